@@ -79,7 +79,7 @@ int main(int argc, char** argv) {
   options.width = 480;
   options.height = 270;
   options.samples = 4;
-  options.light.lamps = 64;  // 0, the library's default: they light nothing
+  options.light.max_lamps = 64;  // 0, the library's default: they light nothing
   options.light.lamp_brightness = 2.0;
   options.light.sun_brightness = 0.0;
   options.light.sky_brightness = 0.2;

@@ -16,7 +16,7 @@ TEST(HalvedMesh, HasFewerFacesOfAboutTheSameAreaInTheSameBox) {
   const TerrainOptions options{.size = {4, 2, 4}, .caves = false, .plants = false};
   const auto grid = generate_terrain(options, *materials);
   ASSERT_TRUE(grid);
-  const Grid coarse = downsample(*grid, types);
+  const Grid coarse = *downsample(*grid, types);
   const auto full_mesh = build_blocky_mesh(*grid, types, {});
   const auto coarse_mesh = build_blocky_mesh(coarse, types, {});
   ASSERT_TRUE(full_mesh && coarse_mesh);

@@ -125,7 +125,7 @@ TEST_F(ToolRender, ACameraOfTheFileIsNamedByItsNumber) {
                 {"_focus", number == 0 ? "0 0 0" : "0 0 2"}});
     });
   }
-  ASSERT_TRUE(write_file(folder_.file("seen.vox"), file.file()));
+  ASSERT_TRUE(write_file(file.file(), folder_.file("seen.vox")));
   const Json listed = Json::parse(run("info seen.vox --json").out)["cameras"];
   ASSERT_EQ(listed.size(), 2U) << "the first was never set";
   EXPECT_EQ(listed[0]["number"], 2);
@@ -436,7 +436,7 @@ TEST_F(ToolRender, FilmsAreFramedAlike) {
   file.transform(0, 1, {{}}, {}, -1).group(1, {2, 4});
   file.transform(2, 3, {{{"_t", "0 0 0"}, {"_f", "0"}}, {{"_t", "40 0 0"}, {"_f", "10"}}}).shape(3, 0);
   file.transform(4, 5, {{}}).shape(5, 0);
-  ASSERT_TRUE(write_file(folder_.file("film.vox"), file.file()));
+  ASSERT_TRUE(write_file(file.file(), folder_.file("film.vox")));
   const ToolRun said = run("render film.vox -o film.png --frames 8:10 --size 64x48 --json");
   ASSERT_EQ(said.status, 0) << said.err;
   const Json object = Json::parse(said.out);

@@ -60,7 +60,7 @@ class ToolSmooth : public ToolTest {
   }
 
   void write(const std::string& name, const std::vector<std::byte>& bytes) {
-    ASSERT_TRUE(write_file(folder_.file(name), bytes));
+    ASSERT_TRUE(write_file(bytes, folder_.file(name)));
   }
 };
 

@@ -138,7 +138,7 @@ TEST_F(Tool, AnAtlasTakesFewerTriangles) {
 TEST_F(Tool, FramesBecomeAnAnimation) {
   vox_test::FileBuilder file;
   file.model(1, 1, 1, {{0, 0, 0, 1}}).model(1, 1, 2, {{0, 0, 0, 2}, {0, 0, 1, 2}});
-  ASSERT_TRUE(write_file(folder_.file("film.vox"), file.file()));
+  ASSERT_TRUE(write_file(file.file(), folder_.file("film.vox")));
   EXPECT_EQ(Json::parse(run("info film.vox --json").out)["frames"], 2);
   const ToolRun result = run("convert film.vox film.glb --animate --fps 4 --json");
   ASSERT_EQ(result.status, 0) << result.err;
@@ -167,7 +167,7 @@ TEST_F(Tool, InfoTellsOfHiddenLayersWithoutAName) {
   file.transform(0, 1, {{}}, {}, -1).group(1, {2});
   file.transform(2, 3, {{}}, {}, 0).shape(3, {{0, {}}});
   file.layer(0, {{"_hidden", "1"}}).layer(1, {{"_name", "people"}});
-  ASSERT_TRUE(write_file(folder_.file("hidden.vox"), file.file()));
+  ASSERT_TRUE(write_file(file.file(), folder_.file("hidden.vox")));
   const ToolRun text = run("info hidden.vox");
   EXPECT_NE(text.out.find("Layers: 2: \"people\", 1 without a name hidden\n"), std::string::npos) << text.out;
 }
@@ -185,7 +185,7 @@ TEST_F(Tool, FromVoxToVoxEverythingIsKept) {
     out.dict({});
   });
   const auto bytes = file.file();
-  ASSERT_TRUE(write_file(folder_.file("crew.vox"), bytes));
+  ASSERT_TRUE(write_file(bytes, folder_.file("crew.vox")));
   const ToolRun same = run("convert crew.vox same.vox");
   EXPECT_EQ(same.status, 0);
   EXPECT_EQ(same.err, "") << "nothing is lost";

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include <quoin/version.h>
+
 #include "commands.h"
 #include "interrupt.h"
 #include "output.h"
@@ -89,7 +91,7 @@ int print_answer(const CLI::App& app, const CLI::ParseError& request) {
 int run(int argc, char** argv) {
   let_writes_fail();
   CLI::App app("Voxel worlds in, lit meshes and pictures out.", "quoin");
-  app.set_version_flag("--version", "quoin " QUOIN_VERSION);
+  app.set_version_flag("--version", "quoin " + std::string(version()));
   app.require_subcommand(1);
   app.get_formatter()->column_width(28);
   app.footer("Example: quoin convert castle.vox castle.glb\n`quoin COMMAND --help` says more.");

@@ -179,7 +179,7 @@ TEST(CpuBackend, WhereThereIsNoTimeMovingPicturesAreDraftsInLessLight) {
     first.samples = 1;
     if (shading == Shading::Lit) {
       first.light.occlusion_mode = OcclusionMode::Vertex;
-      first.light.lamps = std::min(first.light.lamps, 2);
+      first.light.max_lamps = std::min(first.light.max_lamps, 2);
     }
     // A frame that nobody took in time is replaced by the next.
     if (frames.front().colour.width == first.width) {

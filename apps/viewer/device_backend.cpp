@@ -64,7 +64,7 @@ struct DeviceBackend::Impl {
   // Whether light by rays is added at rest, which a processor that acts as a device has no time for.
   [[nodiscard]] bool is_lit_at_rest() const {
     const LightOptions& light = request->light;
-    const bool wants_rays = light.shadows || light.lamps > 0 || light.glass_surfaces;
+    const bool wants_rays = light.shadows || light.max_lamps > 0 || light.glass_surfaces;
     return told.is_processor && is_marched_alike(request->mode) && request->wireframe == Wireframe::Off &&
            light.shading == Shading::Lit && wants_rays;
   }

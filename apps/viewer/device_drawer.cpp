@@ -206,7 +206,7 @@ MeshPictureOptions DeviceDrawer::mesh_picture() const {
   // Without a graphics card meshes have no light that takes rays, nor glass: such a picture would take seconds.
   if (is_processor()) {
     wanted.light.shadows = false;
-    wanted.light.lamps = 0;
+    wanted.light.max_lamps = 0;
     wanted.glass_by_rays = false;
   }
   return wanted;

@@ -383,7 +383,7 @@ std::filesystem::path write_layered(const ScratchFolder& folder) {
     out.dict({});
   });
   const auto path = folder.file("layered.vox");
-  EXPECT_TRUE(write_file(path, file.file()));
+  EXPECT_TRUE(write_file(file.file(), path));
   return path;
 }
 
@@ -435,7 +435,7 @@ TEST(Document, WhatSavingWouldLoseIsToldOnce) {
   EXPECT_TRUE((*document)->losses(folder.file("as.json")).value().empty());
   EXPECT_TRUE((*document)->losses(folder.file("mesh.glb")).value().empty()) << "a copy";
   // Another program's work.
-  ASSERT_TRUE(write_file(path, std::as_bytes(std::span(std::string_view("VOX another")))));
+  ASSERT_TRUE(write_file(std::as_bytes(std::span(std::string_view("VOX another"))), path));
   const auto of_others = (*document)->losses(path);
   ASSERT_TRUE(of_others);
   ASSERT_EQ(of_others->size(), 1U);
@@ -456,7 +456,7 @@ TEST(Document, WhatWasLostOnceIsKeptWhateverIsSavedLater) {
   const auto content = [&](const char* name) {
     return read_file(folder.file(name)).value_or(std::vector<std::byte>{});
   };
-  ASSERT_TRUE(write_file(path, std::as_bytes(std::span(std::string_view("the original")))));
+  ASSERT_TRUE(write_file(std::as_bytes(std::span(std::string_view("the original"))), path));
   const auto original = content("scene.json");
   accept("animation");
   EXPECT_EQ((*document)->kept_as(path).filename(), "scene.json~");
@@ -465,7 +465,7 @@ TEST(Document, WhatWasLostOnceIsKeptWhateverIsSavedLater) {
   save();
   EXPECT_EQ(content("scene.json~"), original);
   EXPECT_FALSE(std::filesystem::exists(folder.file("scene.json.~1~"))) << "nothing more was lost";
-  ASSERT_TRUE(write_file(path, std::as_bytes(std::span(std::string_view("another's work")))));
+  ASSERT_TRUE(write_file(std::as_bytes(std::span(std::string_view("another's work"))), path));
   const auto of_another = content("scene.json");
   accept("another's");
   EXPECT_EQ((*document)->kept_as(path).filename(), "scene.json.~1~");
@@ -510,7 +510,7 @@ TEST(Document, WhatCannotBeDoneIsAnError) {
   EXPECT_FALSE(std::filesystem::exists(folder.file("a.glb")));
   EXPECT_EQ(Document::open(folder.file("absent.vox")).error().code, ErrorCode::CannotRead);
   const std::string text = "not a voxel in sight";
-  ASSERT_TRUE(write_file(folder.file("text.vox"), std::as_bytes(std::span(text))));
+  ASSERT_TRUE(write_file(std::as_bytes(std::span(text)), folder.file("text.vox")));
   EXPECT_FALSE(Document::open(folder.file("text.vox")));
 }
 

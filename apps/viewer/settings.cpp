@@ -94,7 +94,7 @@ void read_light(const Json& object, LightOptions& light) {
   read_number(object, "sky_brightness", 0.0, 100.0, light.sky_brightness);
   read_flag(object, "sky_follows_sun", light.sky_follows_sun);
   read_flag(object, "glass_surfaces", light.glass_surfaces);
-  read_whole(object, "lamps", 0, 1024, light.lamps);
+  read_whole(object, "lamps", 0, 1024, light.max_lamps);
   read_number(object, "lamp_brightness", 0.0, 1000.0, light.lamp_brightness);
   bool has_occlusion = true;
   read_flag(object, "occlusion", has_occlusion);  // what earlier versions wrote
@@ -193,7 +193,7 @@ std::string to_json(const Settings& settings) {
                    {"sky_brightness", light.sky_brightness},
                    {"sky_follows_sun", light.sky_follows_sun},
                    {"glass_surfaces", light.glass_surfaces},
-                   {"lamps", light.lamps},
+                   {"lamps", light.max_lamps},
                    {"lamp_brightness", light.lamp_brightness},
                    {"exposure", light.exposure}}},
                  {"recent", settings.recent}};
@@ -213,7 +213,7 @@ Status write_settings(const Settings& settings, const std::filesystem::path& pat
   std::filesystem::create_directories(path.parent_path(), error);
   if (error) return make_error(ErrorCode::CannotWrite, "cannot make the folder: " + error.message(), path.string());
   const std::string text = to_json(settings);
-  return write_file(path, std::as_bytes(std::span(text)));
+  return write_file(std::as_bytes(std::span(text)), path);
 }
 
 }  // namespace quoin::viewer

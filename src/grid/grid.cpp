@@ -8,6 +8,8 @@
 #include <set>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "core/change_journal.h"
 #include "grid/bounds_cache.h"
 #include "grid/change_records.h"
@@ -105,6 +107,12 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, EditNotice
   return changed;
 }
 
+// What a grid that was moved from has no more. Single voxels, rows and chunks go without the question.
+inline Grid::Impl& Grid::impl() const {
+  QUOIN_ASSERT(impl_ != nullptr, "a grid that was not moved from");
+  return *impl_;
+}
+
 Grid::Grid() : impl_(std::make_unique<Impl>()) {}
 Grid::Grid(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Grid::Grid(Grid&&) noexcept = default;
@@ -112,8 +120,8 @@ Grid& Grid::operator=(Grid&&) noexcept = default;
 Grid::~Grid() = default;
 
 Grid Grid::snapshot() const {
-  impl_->bounds.prepare(impl_->journal, impl_->entries);
-  return Grid(std::make_unique<Impl>(*impl_));
+  impl().bounds.prepare(impl().journal, impl().entries);
+  return Grid(std::make_unique<Impl>(impl()));
 }
 
 VoxelType Grid::get(int x, int y, int z) const {
@@ -177,11 +185,11 @@ std::int64_t Grid::set(std::span<const PlacedVoxel> voxels) {
       }
     };
     const bool is_air = std::all_of(next, end, [](const PlacedVoxel& each) { return each.type == kAir; });
-    if (!is_inside_world(at) || (is_air && impl_->entries.find(at) == nullptr)) {
+    if (!is_inside_world(at) || (is_air && impl().entries.find(at) == nullptr)) {
       next = end;
       continue;
     }
-    changed += impl_->edit_chunk(at, impl_->entries.find_or_create(at), kWholeChunk, notice_, set_all);
+    changed += impl().edit_chunk(at, impl().entries.find_or_create(at), kWholeChunk, notice_, set_all);
   }
   return changed;
 }
@@ -190,7 +198,7 @@ std::int64_t Grid::fill_box(const IBox& box, VoxelType type, const Progress& pro
   const auto fill = [&](IVec3, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
     chunk.fill_box(part, type, [&](int y, int z, std::uint64_t changed) { edit.add(y, z, changed); });
   };
-  return impl_->edit_box(box_from(box), type != kAir, notice_, progress, fill);
+  return impl().edit_box(box_from(box), type != kAir, notice_, progress, fill);
 }
 
 std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type, const Progress& progress) {
@@ -212,7 +220,7 @@ std::int64_t Grid::fill_sphere(DVec3 centre, double radius, VoxelType type, cons
       }
     }
   };
-  return impl_->edit_box(box, type != kAir, notice_, progress, fill);
+  return impl().edit_box(box, type != kAir, notice_, progress, fill);
 }
 
 std::int64_t Grid::edit_rows(const IBox& wanted, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change,
@@ -229,35 +237,35 @@ std::int64_t Grid::edit_rows(const IBox& wanted, FunctionRef<void(IVec3 first, s
       }
     }
   };
-  return impl_->edit_box(box_from(wanted), true, notice_, progress, change_part);
+  return impl().edit_box(box_from(wanted), true, notice_, progress, change_part);
 }
 
 std::int64_t Grid::put_chunk(IVec3 at, Chunk voxels) {
   if (!is_inside_world(at)) return 0;
-  const ChunkEntry* present = impl_->entries.find(at);
+  const ChunkEntry* present = impl().entries.find(at);
   if (present == nullptr && voxels.non_air_count() == 0) return 0;
   if (present != nullptr && present->chunk.shares_storage_with(voxels)) return 0;
-  const ChunkTable::Slot slot = impl_->entries.find_or_create(at);
+  const ChunkTable::Slot slot = impl().entries.find_or_create(at);
   VoxelEdit edit;
   difference_of_types(slot.entry->chunk, voxels, edit);
   slot.entry->chunk = std::move(voxels);
-  impl_->finish_edit(at, slot, edit, notice_);
+  impl().finish_edit(at, slot, edit, notice_);
   return edit.voxels;
 }
 
 void Grid::clear() {
-  if (impl_->entries.empty()) return;
-  impl_->journal.begin_change();
-  impl_->entries.for_each([this](IVec3 at, const ChunkEntry& entry) {
+  if (impl().entries.empty()) return;
+  impl().journal.begin_change();
+  impl().entries.for_each([this](IVec3 at, const ChunkEntry& entry) {
     const IBox box = entry.chunk.bounds();
     VoxelRecord record;
     record.chunk = at;
     record.add_box(box);
     std::uint64_t serial = entry.serial;
-    impl_->journal.note(serial, record, impl_->entries.size());
+    impl().journal.note(serial, record, impl().entries.size());
   });
-  impl_->entries.clear();
-  impl_->voxel_count = 0;
+  impl().entries.clear();
+  impl().voxel_count = 0;
   notice_.give();
 }
 
@@ -268,14 +276,14 @@ const Chunk* Grid::find_chunk(int x, int y, int z) const {
 
 std::vector<IVec3> Grid::chunks() const {
   std::vector<IVec3> all;
-  all.reserve(impl_->entries.size());
-  impl_->entries.for_each([&](IVec3 at, const ChunkEntry&) { all.push_back(at); });
+  all.reserve(impl().entries.size());
+  impl().entries.for_each([&](IVec3 at, const ChunkEntry&) { all.push_back(at); });
   std::sort(all.begin(), all.end(), by_zyx);
   return all;
 }
 
 std::size_t Grid::chunk_count() const {
-  return impl_->entries.size();
+  return impl().entries.size();
 }
 
 Neighbourhood Grid::neighbourhood(IVec3 chunk) const {
@@ -288,15 +296,15 @@ Neighbourhood Grid::neighbourhood(IVec3 chunk) const {
 }
 
 GridChanges Grid::changes_since(ChangeCursor& cursor) const {
-  return impl_->journal.changes_since<ChunkChange>(cursor, by_chunk);
+  return impl().journal.changes_since<ChunkChange>(cursor, by_chunk);
 }
 
 bool Grid::has_changed_since(const ChangeCursor& cursor) const {
-  return impl_->journal.has_changed_since(cursor);
+  return impl().journal.has_changed_since(cursor);
 }
 
 ChangeCursor Grid::cursor() const {
-  return impl_->journal.present();
+  return impl().journal.present();
 }
 
 std::vector<IVec3> chunks_to_mesh(const Grid& grid, const GridChanges& changes) {
@@ -331,16 +339,16 @@ void visit_changes(const Grid& before, const Grid& now, const GridChanges& chang
 }
 
 IBox Grid::bounds() const {
-  return impl_->bounds.update(impl_->journal, impl_->entries);
+  return impl().bounds.update(impl().journal, impl().entries);
 }
 
 std::int64_t Grid::voxel_count() const {
-  return impl_->voxel_count;
+  return impl().voxel_count;
 }
 
 std::vector<VoxelType> Grid::types() const {
   std::set<VoxelType> all;
-  impl_->entries.for_each([&](IVec3, const ChunkEntry& entry) {
+  impl().entries.for_each([&](IVec3, const ChunkEntry& entry) {
     for (const VoxelType type : entry.chunk.types()) {
       if (type != kAir) all.insert(type);
     }
@@ -366,16 +374,16 @@ void Grid::for_each_row(FunctionRef<void(IVec3 first, std::span<const VoxelType>
 
 std::size_t Grid::bytes() const {
   std::size_t total =
-      sizeof(Grid) + sizeof(Impl) + impl_->entries.bytes() + impl_->journal.bytes() + impl_->bounds.bytes();
-  impl_->entries.for_each([&](IVec3, const ChunkEntry& entry) { total += entry.chunk.bytes() - sizeof(Chunk); });
+      sizeof(Grid) + sizeof(Impl) + impl().entries.bytes() + impl().journal.bytes() + impl().bounds.bytes();
+  impl().entries.for_each([&](IVec3, const ChunkEntry& entry) { total += entry.chunk.bytes() - sizeof(Chunk); });
   return total;
 }
 
 void Grid::compact() {
   for (const IVec3 at : chunks()) {
-    const ChunkTable::Slot slot = impl_->entries.find_to_edit(at);
+    const ChunkTable::Slot slot = impl().entries.find_to_edit(at);
     slot.entry->chunk.compact();
-    impl_->entries.voxels_changed(slot);
+    impl().entries.voxels_changed(slot);
   }
 }
 

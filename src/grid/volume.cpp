@@ -69,7 +69,7 @@ std::string_view name_of(ScalarType type) {
   return kTypes[static_cast<std::size_t>(type)].name;
 }
 
-std::size_t bytes_of(ScalarType type) {
+std::size_t size_of(ScalarType type) {
   return kTypes[static_cast<std::size_t>(type)].bytes;
 }
 

@@ -64,7 +64,8 @@ VoxelRegistry::VoxelRegistry() : content_(make_ref<Content>()), journal_(std::ma
 }
 
 VoxelRegistry::VoxelRegistry(const VoxelRegistry& other)
-    : content_(other.content_), journal_(std::make_unique<Journal>(*other.journal_)) {}
+    : content_((QUOIN_ASSERT(other.journal_ != nullptr, "a registry that was not moved from"), other.content_)),
+      journal_(std::make_unique<Journal>(*other.journal_)) {}
 VoxelRegistry::VoxelRegistry(VoxelRegistry&&) noexcept = default;
 VoxelRegistry& VoxelRegistry::operator=(const VoxelRegistry& other) {
   if (this != &other) *this = VoxelRegistry(other);
@@ -132,14 +133,17 @@ void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
 }
 
 ChangeCursor VoxelRegistry::cursor() const {
+  QUOIN_ASSERT(journal_ != nullptr, "a registry that was not moved from");
   return journal_->present();
 }
 
 bool VoxelRegistry::has_changed_since(const ChangeCursor& cursor) const {
+  QUOIN_ASSERT(journal_ != nullptr, "a registry that was not moved from");
   return journal_->has_changed_since(cursor);
 }
 
 TypeChanges VoxelRegistry::changes_since(ChangeCursor& cursor) const {
+  QUOIN_ASSERT(journal_ != nullptr, "a registry that was not moved from");
   const auto by_type = [](const TypeRecord& a, const TypeRecord& b) { return a.type < b.type; };
   return journal_->changes_since<TypeChange>(cursor, by_type);
 }

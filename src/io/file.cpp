@@ -86,8 +86,9 @@ void sync_folder(const std::filesystem::path& folder) {
   ::close(descriptor);
 }
 
-/// The whole of a file, or its first `most` bytes.
-Result<std::vector<std::byte>> read_regular_file(const std::filesystem::path& path, std::optional<std::size_t> most) {
+/// The whole of a file, or its first `max_bytes` bytes.
+Result<std::vector<std::byte>> read_regular_file(const std::filesystem::path& path,
+                                                 std::optional<std::size_t> max_bytes) {
   // O_NONBLOCK: a FIFO without a writer would otherwise block before it can be refused.
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) return cannot_read(reason(errno), path);
@@ -97,7 +98,7 @@ Result<std::vector<std::byte>> read_regular_file(const std::filesystem::path& pa
   if (S_ISDIR(info.st_mode)) return cannot_read("it is a folder", path);
   if (!S_ISREG(info.st_mode)) return cannot_read("it is not a regular file", path);
   const auto held = static_cast<std::uint64_t>(info.st_size);
-  const std::uint64_t wanted = std::min<std::uint64_t>(held, most.value_or(held));
+  const std::uint64_t wanted = std::min<std::uint64_t>(held, max_bytes.value_or(held));
   if (wanted > kMaxFileBytes) {
     return make_error(ErrorCode::LimitExceeded, "the file has " + std::to_string(held) + " bytes", path.string());
   }
@@ -138,8 +139,8 @@ Result<std::vector<std::byte>> read_file(const std::filesystem::path& path) {
   return read_regular_file(path, std::nullopt);
 }
 
-Result<std::vector<std::byte>> read_file_beginning(const std::filesystem::path& path, std::size_t most) {
-  return read_regular_file(path, most);
+Result<std::vector<std::byte>> read_file_beginning(const std::filesystem::path& path, std::size_t max_bytes) {
+  return read_regular_file(path, max_bytes);
 }
 
 Result<AtomicFile> AtomicFile::create(const std::filesystem::path& path) {
@@ -308,7 +309,7 @@ Status FileBackup::keep() {
   return {};
 }
 
-Status write_file(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+Status write_file(std::span<const std::byte> bytes, const std::filesystem::path& path) {
   Result<AtomicFile> file = AtomicFile::create(path);
   if (!file) return file.error();
   if (Status status = file->write(bytes); !status) return status;

@@ -17,7 +17,7 @@ std::span<const std::byte> bytes_of(const std::string& text) {
 }
 
 Error error_of(const TestFolder& folder, const std::string& name, const std::string& content) {
-  EXPECT_TRUE(write_file(folder.file(name), bytes_of(content)));
+  EXPECT_TRUE(write_file(bytes_of(content), folder.file(name)));
   const auto loaded = load_scene(folder.file(name));
   EXPECT_FALSE(loaded) << name;
   return loaded ? Error{} : loaded.error();
@@ -87,7 +87,7 @@ TEST(Formats, RawValuesAreAVolumeWhereOptionsSayHowMany) {
   EXPECT_EQ(loaded->format, "raw");
   EXPECT_EQ(loaded->scene.grids()[loaded->scene.grids().handles()[0]].field.solid_count(), 2);
   const TestFolder folder("formats");
-  ASSERT_TRUE(write_file(folder.file("four.dat"), bytes_of(values)));
+  ASSERT_TRUE(write_file(bytes_of(values), folder.file("four.dat")));
   EXPECT_TRUE(load_scene(folder.file("four.dat"), options));
   options.raw->size.x = 5;
   const auto short_of_values = load_scene(folder.file("four.dat"), options);

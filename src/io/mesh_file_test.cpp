@@ -3,9 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <quoin/mesh/array_surface.h>
+#include <quoin/mesh/label_surfaces.h>
 
 #include "core/death_for_tests.h"
 #include "core/srgb.h"
@@ -302,7 +308,7 @@ TEST_F(SmoothMeshFiles, CancellingLeavesTheOldFile) {
   place(glm::dmat4(1.0));
   for (const Format& format : kFormats) {
     const auto path = folder_.file(std::string("old") + format.extension);
-    ASSERT_TRUE(write_file(path, std::as_bytes(std::span("old", 3))));
+    ASSERT_TRUE(write_file(std::as_bytes(std::span("old", 3)), path));
     const auto refused = write_mesh(meshes_of(parts_), path, {}, [](double) { return false; });
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::Cancelled);
@@ -353,6 +359,44 @@ TEST(MeshFiles, HoldBlocksAndSmoothMeshesSideBySide) {
   const TestFolder folder("mixed_mesh_file");
   EXPECT_TRUE(write_mesh(meshes, folder.file("out.obj")));
   EXPECT_EQ(folder.count(), 3U) << "palette and materials of the blocks";
+}
+
+TEST(MeshFiles, HoldSurfacesOfArraysAndOfLabels) {
+  // Two balls that touch, in an array of labels.
+  constexpr int kEdge = 16;
+  std::vector<std::uint8_t> labels(std::size_t{kEdge} * kEdge * kEdge);
+  for (int i = 0; i < kEdge * kEdge * kEdge; ++i) {
+    const DVec3 at(i % kEdge, i / kEdge % kEdge, i / kEdge / kEdge);
+    if (glm::distance(at, DVec3(7, 7, 4)) < 3.6) labels[static_cast<std::size_t>(i)] = 1;
+    if (glm::distance(at, DVec3(7, 7, 11)) < 3.6) labels[static_cast<std::size_t>(i)] = 2;
+  }
+  ArrayView array{labels.data(), ScalarType::UInt8, {kEdge, kEdge, kEdge}};
+  array.strides = strides_of_first_fastest(array.size, array.type);
+  ArraySurface all = surface_from_array(array, {.iso = 0.5}).value();
+  const auto by_label = surfaces_from_labels(array).value();
+  SceneMeshes meshes;
+  const std::array<std::size_t, 3> vertices = {all.positions.size(), surface_of_label(by_label, 1).positions.size(),
+                                               surface_of_label(by_label, 2).positions.size()};
+  meshes.parts.push_back(mesh_part("both", std::move(all), {255, 0, 0}));
+  for (const std::int64_t label : labels_of(by_label)) {
+    meshes.parts.push_back(mesh_part("ball", surface_of_label(by_label, label), {0, 0, 255}, DVec3(7)));
+  }
+  meshes.parts.push_back(mesh_part("nothing", ArraySurface(), {}));
+  ASSERT_EQ(meshes.parts.size(), 4U);
+  EXPECT_TRUE(meshes.parts[3].surfaces.empty());
+  for (std::size_t part = 0; part < 3; ++part) meshes.placements.push_back({part, ""});
+  const WorldMesh ply = world_of_ply(write_mesh(meshes, FileFormat::Ply).value());
+  EXPECT_EQ(ply.positions.size(), vertices[0] + vertices[1] + vertices[2]);
+  EXPECT_EQ(ply.inward_normals(), 0U);
+  const ParsedGlb glb = parse_glb(write_mesh(meshes, FileFormat::Glb).value());
+  ASSERT_EQ(glb.document["meshes"].size(), 3U);
+  const auto colours = [&](std::size_t mesh) {
+    return glb.array<std::array<std::uint16_t, 4>>(
+        glb.document["meshes"][mesh]["primitives"][0]["attributes"]["COLOR_0"]);
+  };
+  using Colour = std::array<std::uint16_t, 4>;
+  EXPECT_EQ(colours(0), std::vector<Colour>(vertices[0], Colour{65'535, 0, 0, 65'535}));
+  EXPECT_EQ(colours(2), std::vector<Colour>(vertices[2], Colour{0, 0, 65'535, 65'535}));
 }
 
 /// The floats of a PLY file's vertices after their 27 bytes of position, normal and colour.

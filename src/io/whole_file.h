@@ -35,7 +35,7 @@ template <class Read>
 [[nodiscard]] inline Result<std::uint64_t> write_whole(const std::filesystem::path& path,
                                                        Result<std::vector<std::byte>> bytes) {
   if (!bytes) return with_path(Result<std::uint64_t>(bytes.error()), path);
-  if (auto done = write_file(path, *bytes); !done) return with_path(Result<std::uint64_t>(done.error()), path);
+  if (auto done = write_file(*bytes, path); !done) return with_path(Result<std::uint64_t>(done.error()), path);
   return bytes->size();
 }
 

@@ -1,4 +1,5 @@
 #include "light/glass.h"
+#include "scene/tracer/placed_grid.h"
 
 #include <algorithm>
 #include <cmath>
@@ -30,7 +31,7 @@ class BodiesOfGrid {
  public:
   BodiesOfGrid(const SceneView& view, const Surfaces& surfaces, std::int32_t index, const Ray& ray_in_grid,
                double max_t, double length, std::vector<GlassBody>& out)
-      : placed_(view.tracer().placed()[static_cast<std::size_t>(index)]),
+      : placed_(placed_in(view.tracer())[static_cast<std::size_t>(index)]),
         surfaces_(surfaces),
         index_(index),
         ray_(ray_in_grid),
@@ -146,7 +147,7 @@ void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_
   out.clear();
   const double length = glm::length(ray_in_view.direction);
   view.visit_transparent(ray_in_view, max_t, [&](std::int32_t index, const Ray& ray) {
-    const PlacedGrid& placed = view.tracer().placed()[static_cast<std::size_t>(index)];
+    const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(index)];
     BodiesOfGrid bodies(view, surfaces, index, ray, max_t, length, out);
     if (placed.transparent != nullptr) bodies.add_voxels();
     if (placed.glass != nullptr) bodies.add_field();
@@ -169,27 +170,27 @@ bool reaches(const GlassBody& body, double t) {
 }
 
 bool lies_on_opaque(const SceneView& view, const Ray& ray_in_view, const GlassBody& body, double t) {
-  const PlacedGrid& placed = view.tracer().placed()[static_cast<std::size_t>(body.exit_placed)];
+  const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(body.exit_placed)];
   return t <= body.t_exit + kRayLift * placed.voxel_size / glm::length(ray_in_view.direction);
 }
 
 DVec3 normal_entered(const SceneView& view, const Ray& ray_in_view, const GlassBody& body) {
   if (!body.in_field) return DVec3(normal_of(body.face));
   const DVec3 point = view.grid_from_view(body.placed, ray_in_view.origin + ray_in_view.direction * body.t_enter);
-  const PlacedGrid& placed = view.tracer().placed()[static_cast<std::size_t>(body.placed)];
+  const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(body.placed)];
   return glass_normal(*placed.glass, body.voxel, point, body.type, body.before);
 }
 
 DVec3 normal_left(const SceneView& view, const Ray& ray_in_view, const GlassBody& body) {
   if (!body.exit_in_field) return DVec3(normal_of(body.exit_face));
   const DVec3 point = view.grid_from_view(body.exit_placed, ray_in_view.origin + ray_in_view.direction * body.t_exit);
-  const PlacedGrid& placed = view.tracer().placed()[static_cast<std::size_t>(body.exit_placed)];
+  const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(body.exit_placed)];
   return glass_normal(*placed.glass, IVec3(0), point, body.type, kAir);
 }
 
 Mirror mirror_at(const SceneView& view, const Ray& ray_in_view, std::int32_t placed, const DVec3& normal_in_grid,
                  float ior, float other_ior) {
-  const glm::dmat3& axes = view.tracer().placed()[static_cast<std::size_t>(placed)].world_axes;
+  const glm::dmat3& axes = placed_in(view.tracer())[static_cast<std::size_t>(placed)].world_axes;
   const Vec3 normal(axes * normal_in_grid);
   const Vec3 direction(glm::normalize(ray_in_view.direction));
   const float along = glm::dot(direction, normal);

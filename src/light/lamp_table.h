@@ -20,6 +20,7 @@
 
 #include "light/emissive_cells.h"
 #include "light/occlusion_directions.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 

@@ -10,7 +10,7 @@ LightOptions natural_light() {
   LightOptions options;
   options.sun = {-0.48, 0.72, 0.50};
   options.sky_follows_sun = true;
-  options.lamps = 64;
+  options.max_lamps = 64;
   options.glass_surfaces = true;
   return options;
 }
@@ -36,7 +36,7 @@ Status check(const LightOptions& options) {
       return make_error(ErrorCode::InvalidArgument, std::string(name) + ": must be 0 to 1e9");
     }
   }
-  if (options.lamps < 0 || options.lamps > 1024) return refuse("lamps: must be 0 to 1024");
+  if (options.max_lamps < 0 || options.max_lamps > 1024) return refuse("max_lamps: must be 0 to 1024");
   return {};
 }
 

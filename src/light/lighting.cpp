@@ -1,4 +1,5 @@
 #include "light/lighting.h"
+#include "scene/tracer/placed_grid.h"
 
 #include <algorithm>
 #include <array>
@@ -97,7 +98,7 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
     : view_(&view),
       types_(&types),
       surfaces_(&surfaces),
-      lamps_(options.lamps > 0 ? lamps : nullptr),
+      lamps_(options.max_lamps > 0 ? lamps : nullptr),
       options_(options),
       directions_(options.occlusion_rays),
       exposure_(exposure_of(options)),
@@ -105,7 +106,7 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
       daylight_(daylight_of(options)) {
   QUOIN_ASSERT(check(options).has_value(), "light that `check` accepts");
   const DVec3 sun = to_sun(options);
-  for (const PlacedGrid& placed : view.tracer().placed()) {
+  for (const PlacedGrid& placed : placed_in(view.tracer())) {
     if (detail_colours) detail_surfaces_.emplace_back().colour = colour_of_detail(placed.detail, placed.level);
     Frame& frame = frames_.emplace_back();
     frame.voxels_per_cell = placed.voxels_per_cell();
@@ -215,7 +216,7 @@ void Lighting::tint(const Group& group, const RayPacket& rays, std::span<Vec3> l
 
 // Points of one brick have the same list; each point adds its lamps in the list's order, whatever its group.
 std::int64_t Lighting::add_lamplight(const Group& group, std::span<Vec3> lamplight) const {
-  const int level = view_->tracer().placed()[static_cast<std::size_t>(group.placed)].level;
+  const int level = placed_in(view_->tracer())[static_cast<std::size_t>(group.placed)].level;
   std::array<std::span<const std::uint32_t>, RayPacket::kSize> lists;
   std::uint32_t left = group.surfaces;
   for (std::uint32_t lanes = left; lanes != 0; lanes &= lanes - 1) {
@@ -240,7 +241,7 @@ std::int64_t Lighting::add_lamplight(const Group& group, std::span<Vec3> lamplig
 
 std::int64_t Lighting::add_lamp(const Group& group, const PlacedLamp& lamp, std::uint32_t lanes,
                                 std::span<Vec3> lamplight) const {
-  const PlacedGrid& placed = view_->tracer().placed()[static_cast<std::size_t>(group.placed)];
+  const PlacedGrid& placed = placed_in(view_->tracer())[static_cast<std::size_t>(group.placed)];
   // The difference of two far positions is taken first: it is small.
   const DVec3 lamp_from_pivot = lamp.position - placed.position;
   std::array<Vec3, RayPacket::kSize> light;
@@ -292,7 +293,7 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
   const std::int64_t rays = traced == 0 ? 0 : trace_openness(group, traced, openness);
   traced |= found;
   if (traced == group.unknown) return rays;
-  GridReader reader(*view_->tracer().placed()[static_cast<std::size_t>(group.placed)].voxels);
+  GridReader reader(*placed_in(view_->tracer())[static_cast<std::size_t>(group.placed)].voxels);
   FaceOcclusion corners{};
   const SurfacePoint* last = nullptr;
   for (std::size_t i = 0; i < group.size; ++i) {
@@ -308,7 +309,7 @@ std::int64_t Lighting::find_openness(const Group& group, std::span<float> openne
 }
 
 float Lighting::smooth_openness(const SurfacePoint& point) const {
-  const PlacedGrid& placed = view_->tracer().placed()[static_cast<std::size_t>(point.placed)];
+  const PlacedGrid& placed = placed_in(view_->tracer())[static_cast<std::size_t>(point.placed)];
   if (placed.opaque_field == nullptr) return 1.0F;  // glass darkens nothing
   SmoothOcclusionOptions options = options_.smooth_occlusion;
   options.spread /= static_cast<float>(placed.voxels_per_cell());  // as far as in the full field
@@ -360,7 +361,7 @@ const Surface& Lighting::surface_at(const SurfacePoint& point) const {
 }
 
 Vec3 Lighting::normal_colour(const SurfacePoint& point) const {
-  const PlacedGrid& placed = view_->tracer().placed()[static_cast<std::size_t>(point.placed)];
+  const PlacedGrid& placed = placed_in(view_->tracer())[static_cast<std::size_t>(point.placed)];
   const Vec3 normal(placed.world_axes * normal_at(point));
   Vec3 colour;
   for (int axis = 0; axis < 3; ++axis) colour[axis] = linear_from_srgb(0.5F + 0.5F * normal[axis]);

@@ -113,11 +113,11 @@ TEST(LiveReach, SmoothEditsReachTheChunksThatReadAnotherDensity) {
   std::mt19937 random(5);
   for (int i = 0; i < (kIsSlow ? 1 : 12); ++i) {
     SCOPED_TRACE(i);
-    const DensityGrid before = field_from_grid(grid);
+    const DensityGrid before = *field_from_grid(grid);
     const auto place = [&] { return std::array{2, 9, 13, 16, 30, 46, 49, 52, 59, 63}[random() % 10]; };
     const IVec3 at{place(), 10 + static_cast<int>(random() % 20), place()};
     ASSERT_TRUE(grid.set(at, grid.get(at) == kAir ? 1 : i % 3 == 0 ? 5 : kAir));
-    const DensityGrid after = field_from_grid(grid);
+    const DensityGrid after = *field_from_grid(grid);
     ChunkSet asked;
     for (const IVec3 chunk : grid.chunks()) asked.insert(key(chunk));
     for (const IVec3 chunk : grid.chunks()) asked.insert(key(chunk - IVec3{1, 0, 0}));

@@ -179,7 +179,7 @@ inline void expect_smooth(const ShownSurfaces& shown, const Scene& scene, const 
     wanted.keep_thin = true;
     SmoothTriangles expected;
     const Grid& grid = scene.grids()[handle].grid;
-    const DensityGrid whole = field_from_grid(grid);
+    const DensityGrid whole = *field_from_grid(grid);
     const std::vector<std::uint32_t> bodies = smooth::bodies_of(scene.types, grid.types());
     for (const std::uint32_t body : bodies) {
       const bool is_alone = bodies.size() == 1;

@@ -17,6 +17,7 @@
 #include "render/picture_detail.h"
 #include "render/picture_request.h"
 #include "render/tile.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 namespace {
@@ -77,7 +78,7 @@ struct CpuRenderer::Impl {
   }
   [[nodiscard]] std::vector<LampPlace> lamp_places() const {
     std::vector<LampPlace> places;
-    for (const PlacedGrid& each : tracer.placed()) {
+    for (const PlacedGrid& each : placed_in(tracer)) {
       places.push_back(lamp_place(*scene, each, *each.opaque, each.transparent, each.field));
     }
     return places;

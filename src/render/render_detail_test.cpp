@@ -17,6 +17,7 @@
 #include <quoin/terrain/terrain.h>
 
 #include "render/render_test_support.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 namespace {
@@ -159,7 +160,7 @@ int halvings_traced(const Model& model, const Camera& camera, const DetailPolicy
   std::vector<SelectedInstance> selected;
   DetailSelector().select(model.scene, camera, kEdge, kEdge, policy, selected);
   const SceneTracer tracer(model.scene);
-  return tracer.with_detail(selected).placed().at(0).level;
+  return placed_in(tracer.with_detail(selected)).at(0).level;
 }
 
 // Of the pictures without detail and with it.
@@ -279,7 +280,7 @@ TEST(RenderDetail, MidIsTheHalvedGridWithTheFullOnesLight) {
   const Instance& full = model.scene.instances()[model.instance];
   const SceneGrid& full_grid = model.scene.grids()[full.grid];
   SceneGrid grid;
-  grid.grid = downsample(full_grid.grid, coarse.types);
+  grid.grid = *downsample(full_grid.grid, coarse.types);
   grid.pivot = full_grid.pivot / 2.0;
   Instance instance = full;
   instance.grid = coarse.add_grid(std::move(grid));
@@ -308,8 +309,8 @@ TEST(RenderDetail, MidOfAFieldIsTheHalvedFieldWithTheFullOnesLight) {
   Instance instance = model.scene.instances()[model.instance];
   const SceneGrid& full = model.scene.grids()[instance.grid];
   SceneGrid grid;
-  grid.grid = downsample(full.grid, coarse.types);
-  grid.field = downsample(full.field);
+  grid.grid = *downsample(full.grid, coarse.types);
+  grid.field = *downsample(full.field);
   grid.pivot = full.pivot / 2.0;
   instance.grid = coarse.add_grid(std::move(grid));
   instance.voxel_size = 2.0;
@@ -363,7 +364,7 @@ TEST(RenderDetail, OpaqueMidIsTheHalvedGridToTheByteButForRounding) {
   Instance instance = model.scene.instances()[model.instance];
   SceneGrid grid;
   grid.pivot = model.scene.grids()[instance.grid].pivot / 2.0;
-  grid.grid = downsample(voxels, coarse.types);
+  grid.grid = *downsample(voxels, coarse.types);
   instance.grid = coarse.add_grid(std::move(grid));
   instance.voxel_size = 2.0;
   coarse.add_instance(instance);

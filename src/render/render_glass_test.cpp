@@ -9,6 +9,7 @@
 #include "light/glass.h"
 #include "light/sky.h"
 #include "render/render_test_support.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 namespace {
@@ -178,7 +179,7 @@ TEST(RenderGlass, SurfacesMirrorWhatFresnelSays) {
   s.scene.edit(place(s.scene, std::move(grid))).rotation = glm::angleAxis(0.5, glm::normalize(DVec3(1, 2, 3)));
   const SceneTracer tracer(s.scene);
   const SceneView view(tracer, DVec3(0.0));
-  const glm::dmat3& axes = tracer.placed()[0].world_axes;
+  const glm::dmat3& axes = placed_in(tracer)[0].world_axes;
   // At an angle to the upper face, from outside or, with a cosine below 0, from inside.
   const auto at = [&](double cosine, float ior, float other) {
     const DVec3 direction = axes * DVec3(std::sqrt(1.0 - cosine * cosine), -cosine, 0.0);

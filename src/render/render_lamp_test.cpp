@@ -21,7 +21,7 @@ RenderOptions by_night(int width, int height) {
   options.light.occlusion_mode = OcclusionMode::Off;
   options.light.sun_brightness = 0.0;
   options.light.sky_brightness = 0.0;
-  options.light.lamps = 64;
+  options.light.max_lamps = 64;
   return options;
 }
 
@@ -253,7 +253,7 @@ TEST(RenderLamps, WhichLampsLightAPlaceDependsOnThePlaceAlone) {
     scene.lamps.push_back(lamp);
   }
   RenderOptions options = by_night(96, 96);
-  options.light.lamps = 6;
+  options.light.max_lamps = 6;
   const Picture whole = taken(scene, from_above(0, 50, 0, 48), options);
   options.width = options.height = 32;
   const Picture part = taken(scene, from_above(8, 50, -8, 16), options);
@@ -263,7 +263,7 @@ TEST(RenderLamps, WhichLampsLightAPlaceDependsOnThePlaceAlone) {
   }
   EXPECT_EQ(different, 0);
   EXPECT_EQ(taken(scene, from_above(8, 50, -8, 16), options, {1}).colour.rgb, part.colour.rgb);
-  options.light.lamps = 200;
+  options.light.max_lamps = 200;
   EXPECT_GT(count_different(taken(scene, from_above(8, 50, -8, 16), options), part, 1), 500) << "more add more";
 }
 
@@ -275,9 +275,9 @@ TEST(RenderLamps, AreOffUnlessAskedFor) {
   const Picture before = taken(scene, camera, options);
   scene.lamps.push_back({"", Lamp::Kind::Point, {0, 4, 0}});
   EXPECT_EQ(taken(scene, camera, options).colour.rgb, before.colour.rgb);
-  options.light.lamps = 64;
+  options.light.max_lamps = 64;
   EXPECT_NE(taken(scene, camera, options).colour.rgb, before.colour.rgb);
-  options.light.lamps = -1;
+  options.light.max_lamps = -1;
   EXPECT_FALSE(CpuRenderer(scene).render(camera, options).has_value());
 }
 
@@ -417,7 +417,7 @@ TEST(RenderLamps, PicturesOfFewLampsAndOfManyMayTakeTurns) {
   RenderOptions options = by_night(40, 40);
   const auto check = [&](int lamps) {
     SCOPED_TRACE(lamps);
-    options.light.lamps = lamps;
+    options.light.max_lamps = lamps;
     const Picture picture = renderer.render(from_above(0, 20, 0, 40), options).value();
     EXPECT_EQ(picture.colour.rgb, taken(scene, from_above(0, 20, 0, 40), options).colour.rgb);
   };

@@ -1,4 +1,5 @@
 #include "render/tile.h"
+#include "scene/tracer/placed_grid.h"
 
 #include <algorithm>
 #include <bit>
@@ -189,7 +190,7 @@ SurfacePoint& Tile::add_point(std::size_t pixel, Vec3 weight) {
 }
 
 void Tile::light_points() {
-  const std::vector<PlacedGrid>& placed = context_->view->tracer().placed();
+  const std::vector<PlacedGrid>& placed = placed_in(context_->view->tracer());
   std::optional<GridReader> reader;
   std::int32_t known = -1;
   for (SurfacePoint& point : points_) {

@@ -112,7 +112,7 @@ DVec3 direction_of(View view) {
   return kViews[static_cast<std::size_t>(view)].forward;
 }
 
-DVec3 direction_of_view(double azimuth_degrees, double elevation_degrees) {
+DVec3 direction_of(double azimuth_degrees, double elevation_degrees) {
   const double a = azimuth_degrees * std::numbers::pi / 180.0;
   const double e = elevation_degrees * std::numbers::pi / 180.0;
   return glm::normalize(-DVec3(std::sin(a) * std::cos(e), std::sin(e), std::cos(a) * std::cos(e)));

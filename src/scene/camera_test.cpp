@@ -283,7 +283,7 @@ TEST(Framing, SeveralScenesAndTurnsAreFramedAlike) {
     }
     const int turns = 1 + number(8);
     const double aspect = 0.5 + 0.25 * number(8);
-    SceneFraming framing(direction_of_view(number(360), number(120) - 60), aspect, turns);
+    SceneFraming framing(direction_of(number(360), number(120) - 60), aspect, turns);
     for (const Scene& scene : scenes) framing.add(scene);
     const DBox first = scenes[0].bounds();
     const DVec3 middle = first.min + 0.5 * (first.max - first.min);

@@ -129,6 +129,8 @@ DVec3 turned(DVec3 v, int turn, int turns) {
 
 SceneFraming::SceneFraming(DVec3 forward, double aspect, int turns)
     : forward_(forward), aspect_(aspect), turns_(turns) {
+  QUOIN_ASSERT(std::abs(glm::length(forward) - 1.0) < 1e-6, "a unit direction");
+  QUOIN_ASSERT(aspect > 0.0 && std::isfinite(aspect), "a positive, finite aspect");
   QUOIN_ASSERT(turns > 0, "a positive number of turns");
   reaches_.fill(-std::numeric_limits<double>::infinity());
 }

@@ -1,12 +1,15 @@
 #include "scene/hierarchy.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <set>
 #include <utility>
 #include <vector>
 
 #include <glm/gtc/quaternion.hpp>
+
+#include <quoin/core/assert.h>
 
 #include "scene/instance_axes.h"
 
@@ -174,8 +177,18 @@ void show_all(Scene& scene) {
   for (const LayerHandle each : scene.layers().handles()) scene.edit(each).visible = true;
 }
 
+namespace {
+
+[[maybe_unused]] bool is_rotation(const DQuat& q) {
+  const double squared = glm::dot(q, q);
+  return squared > 0.0 && std::isfinite(squared);
+}
+
+}  // namespace
+
 void move_group(Scene& scene, GroupHandle group, DVec3 position, const DQuat& rotation) {
   const SceneGroup before = scene.groups()[group];
+  QUOIN_ASSERT(is_rotation(rotation) && is_rotation(before.rotation), "rotations that are finite and not zero");
   const DQuat turn = unit_rotation(rotation) * glm::conjugate(unit_rotation(before.rotation));
   const auto moved = [&](DVec3 point) { return position + turn * (point - before.position); };
   std::set<GroupHandle> moving = {group};

@@ -1,5 +1,6 @@
 // What functions of scenes and cameras require.
 
+#include <cmath>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -9,6 +10,8 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
+#include <quoin/scene/scene_query.h>
+#include <quoin/scene/scene_tracer.h>
 #include <quoin/terrain/noise.h>
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/ray.h>
@@ -24,6 +27,22 @@ TEST(SceneDeathTest, AHandleOfNothingIsAMistake) {
   scene.remove_grid(gone);
   QUOIN_EXPECT_MISTAKE(scene.edit(gone).name = "x", "the handle names an element");
   QUOIN_EXPECT_MISTAKE((void)scene.instances()[InstanceHandle{}], "the handle names an element");
+  QUOIN_EXPECT_MISTAKE((void)scene.edit(InstanceHandle{}), "the handle names an element");
+  QUOIN_EXPECT_MISTAKE((void)scene.edit(GroupHandle{}), "the handle names an element");
+  QUOIN_EXPECT_MISTAKE((void)scene.edit(LayerHandle{}), "the handle names an element");
+  QUOIN_EXPECT_MISTAKE(move_group(scene, {}, DVec3(0.0), DQuat(1, 0, 0, 0)), "the handle names an element");
+}
+
+TEST(SceneDeathTest, MovingAGroupWithoutARotationIsAMistake) {
+  Scene scene;
+  const GroupHandle group = scene.add_group({});
+  const GroupHandle unturned = scene.add_group({});
+  scene.edit(unturned).rotation = DQuat(0, 0, 0, 0);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const DQuat none(1, 0, 0, 0);
+  QUOIN_EXPECT_MISTAKE(move_group(scene, group, DVec3(0.0), DQuat(0, 0, 0, 0)), "finite and not zero");
+  QUOIN_EXPECT_MISTAKE(move_group(scene, group, DVec3(0.0), DQuat(nan, 0, 0, 1)), "finite and not zero");
+  QUOIN_EXPECT_MISTAKE(move_group(scene, unturned, DVec3(0.0), none), "finite and not zero");
 }
 
 TEST(SceneDeathTest, WhatWasMovedFromIsNotToBeUsed) {
@@ -43,6 +62,8 @@ TEST(CameraDeathTest, APictureWithoutPixelsIsAMistake) {
   QUOIN_EXPECT_MISTAKE((void)ray_through({}, {0.0, 0.0, 0, 5}), "a picture of positive size");
   DetailSelector selector;
   std::vector<SelectedInstance> selected;
+  const Scene scene;
+  QUOIN_EXPECT_MISTAKE((void)pick(SceneTracer(scene), {}, {0.0, 0.0, 5, 0}), "a picture of positive size");
   QUOIN_EXPECT_MISTAKE(selector.select(Scene(), {}, 5, -1, {}, selected), "a picture of positive size");
 }
 
@@ -50,11 +71,29 @@ TEST(CameraDeathTest, BoundsAndAspectsThatAreNoneAreMistakes) {
   const double infinity = std::numeric_limits<double>::infinity();
   QUOIN_EXPECT_MISTAKE((void)frame_view({DVec3(0.0), DVec3(infinity)}, View::Top, 1.0), "finite bounds");
   QUOIN_EXPECT_MISTAKE((void)frame_view({DVec3(0.0), DVec3(1.0)}, View::Top, -1.0), "a positive, finite aspect");
+  QUOIN_EXPECT_MISTAKE((void)frame_scene(Scene(), View::Top, infinity), "a positive, finite aspect");
+}
+
+TEST(CameraDeathTest, FramingByWhatIsNoneIsAMistake) {
+  const DVec3 forward = direction_of(View::Iso);
+  QUOIN_EXPECT_MISTAKE(SceneFraming(2.0 * forward, 1.0), "a unit direction");
+  QUOIN_EXPECT_MISTAKE(SceneFraming(DVec3(0.0), 1.0), "a unit direction");
+  QUOIN_EXPECT_MISTAKE(SceneFraming(forward, 0.0), "a positive, finite aspect");
+  QUOIN_EXPECT_MISTAKE(SceneFraming(forward, 1.0, 0), "a positive number of turns");
+  const SceneFraming framing(forward, 1.0, 3);
+  QUOIN_EXPECT_MISTAKE((void)framing.camera(3), "one of the turns");
+  QUOIN_EXPECT_MISTAKE((void)framing.camera(-1), "one of the turns");
 }
 
 TEST(NoiseDeathTest, PlacesBeyondTheLatticeAreMistakes) {
   QUOIN_EXPECT_MISTAKE((void)noise2(1, 2e9, 0.0), "2.30");
   QUOIN_EXPECT_MISTAKE((void)noise3(1, 0.0, 0.0, -2e9), "2.30");
+  const double edge = 1 << 24;  // of five octaves
+  EXPECT_LE(std::abs(fractal2(1, edge - 1.0, 1.0 - edge, 5)), 2.0);
+  QUOIN_EXPECT_MISTAKE((void)fractal2(1, 0.0, edge, 5), "29 - octaves");
+  QUOIN_EXPECT_MISTAKE((void)fractal2(1, 0.0, 0.0, 30), "29 - octaves");
+  QUOIN_EXPECT_MISTAKE((void)ridged2(1, -edge, 0.0, 5), "29 - octaves");
+  QUOIN_EXPECT_MISTAKE((void)ridged2(1, 0.0, 0.0, -1), "29 - octaves");
 }
 
 }  // namespace

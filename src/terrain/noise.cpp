@@ -129,9 +129,16 @@ void next_octave(double& x, double& y) {
   x = turned_x;
 }
 
+// Each octave is twice as fine, and the last one's coordinates are noise2's.
+[[maybe_unused]] bool are_within(double x, double y, int octaves) {
+  return octaves >= 0 && octaves <= 29 && std::abs(x) < std::ldexp(1.0, 29 - octaves) &&
+         std::abs(y) < std::ldexp(1.0, 29 - octaves);
+}
+
 }  // namespace
 
 double fractal2(std::uint32_t seed, double x, double y, int octaves) {
+  QUOIN_ASSERT(are_within(x, y, octaves), "|x|, |y| < 2^(29 - octaves)");
   double sum = 0.0;
   double amplitude = 1.0;
   for (int octave = 0; octave < octaves; ++octave) {
@@ -143,6 +150,7 @@ double fractal2(std::uint32_t seed, double x, double y, int octaves) {
 }
 
 double ridged2(std::uint32_t seed, double x, double y, int octaves) {
+  QUOIN_ASSERT(are_within(x, y, octaves), "|x|, |y| < 2^(29 - octaves)");
   double sum = 0.0;
   double amplitude = 0.55;
   double weight = 1.0;

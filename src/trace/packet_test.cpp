@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
 #include "grid/change_follower_for_tests.h"
 #include "mesh/mesh_oracle.h"
@@ -179,7 +180,7 @@ void limit_to_hits(const OccupancyTree& tree, RayPacket& rays, InstructionSet wi
   }
 }
 
-TEST_P(Packets, AnswerAsPlainOnesDoAndOneByOne) {
+TEST_P(Packets, AgreeWithPlainOnesAndOneByOne) {
   int hits = 0;
   for (int i = 0; i < 5'000; ++i) {
     RayPacket rays = packet();
@@ -191,7 +192,7 @@ TEST_P(Packets, AnswerAsPlainOnesDoAndOneByOne) {
   EXPECT_GT(hits, 500);
 }
 
-TEST_P(Packets, OfRaysThatGoTheSameWayAnswerTheSame) {
+TEST_P(Packets, OfRaysThatGoTheSameWayAgree) {
   int hits = 0;
   for (int i = 0; i < 4'000; ++i) {
     hits += hits_if_all_agree(tree_, beam(), set());
@@ -200,7 +201,7 @@ TEST_P(Packets, OfRaysThatGoTheSameWayAnswerTheSame) {
   EXPECT_GT(hits, 1'000);
 }
 
-TEST_P(Packets, OfShortRaysFromAboutOnePlaceAnswerTheSame) {
+TEST_P(Packets, OfShortRaysFromAboutOnePlaceAgree) {
   int hits = 0;
   for (int i = 0; i < 5'000; ++i) {
     RayPacket rays = bunch();
@@ -213,7 +214,7 @@ TEST_P(Packets, OfShortRaysFromAboutOnePlaceAnswerTheSame) {
 }
 
 // Voxels fill whole chunks, so that rays come to the ends of the tables.
-TEST_P(Packets, OfShortRaysAtTheEndsOfAWorldAnswerTheSame) {
+TEST_P(Packets, OfShortRaysAtTheEndsOfAWorldAgree) {
   Grid grid;
   const IVec3 corner = IVec3{whole(-2, 1), whole(-2, 1), whole(-2, 1)} * kChunkEdge;
   const IVec3 size = IVec3{whole(1, 2), whole(1, 2), whole(1, 2)} * kChunkEdge;
@@ -237,7 +238,7 @@ TEST_P(Packets, OfShortRaysAtTheEndsOfAWorldAnswerTheSame) {
 }
 
 // Further than the 4^3 chunks that a beam looks at together, and further than single precision goes.
-TEST_P(Packets, OfRaysThatGoTheSameWayThroughALongWorldAnswerTheSame) {
+TEST_P(Packets, OfRaysThatGoTheSameWayThroughALongWorldAgree) {
   Grid grid;
   for (int i = 0; i < 400; ++i) {
     const IVec3 corner{whole(-1'500, 2'500), whole(-40, 90), whole(-70, 75)};
@@ -358,6 +359,22 @@ TEST(PacketsOf, OfNoRaysHitNothing) {
     EXPECT_EQ(any_hits(tree, rays), 0x300U);
     EXPECT_EQ(any_hits(OccupancyTree::build(Grid(), oracle::mixed_types()), rays), 0U);
   }
+}
+
+TEST(PacketDeathTest, ALaneThatIsNoneIsAMistake) {
+  RayPacket rays;
+  QUOIN_EXPECT_MISTAKE(rays.set(RayPacket::kSize, Ray{}, kInfinity), "0 <= lane < kSize");
+  QUOIN_EXPECT_MISTAKE((void)rays.ray(-1), "0 <= lane < kSize");
+  PacketHits hits;
+  QUOIN_EXPECT_MISTAKE(hits.set(-1, RayHit{}), "0 <= lane < kSize");
+  QUOIN_EXPECT_MISTAKE((void)hits[RayPacket::kSize], "0 <= lane < kSize");
+}
+
+TEST(PacketDeathTest, ReadingALaneThatHitNothingIsAMistake) {
+  PacketHits hits;
+  hits.set(3, RayHit{});
+  EXPECT_EQ(hits[3].voxel, IVec3(0));
+  QUOIN_EXPECT_MISTAKE((void)hits[4], "a lane that hit something");
 }
 
 }  // namespace

@@ -115,7 +115,7 @@ quoin::Status Game::add_ships() {
 
 void Game::place_player() {
   player_.centre = {size_.x / 2.0 + 0.5, surface_at(size_.x / 2, size_.z / 2) + 4.0, size_.z / 2.0 + 0.5};
-  if (const auto away = nearest_free_place(*tracer_, player_, 16.0)) player_.centre += *away;
+  if (const auto away = displacement_to_free_place(*tracer_, player_, 16.0)) player_.centre += *away;
 }
 
 double Game::random(double low, double high) {
@@ -268,16 +268,7 @@ void Game::walk(const Input& input) {
 }
 
 Game::Memory Game::memory() const {
-  Memory all{known_.bytes(), 0};
-  std::vector<const quoin::OccupancyTree*> seen;
-  for (const quoin::PlacedGrid& placed : tracer_->placed()) {
-    for (const quoin::OccupancyTree* tree : {placed.opaque, placed.transparent}) {
-      if (tree == nullptr || std::find(seen.begin(), seen.end(), tree) != seen.end()) continue;
-      seen.push_back(tree);
-      all.trees += tree->bytes();
-    }
-  }
-  return all;
+  return {known_.bytes(), tracer_->bytes()};
 }
 
 }  // namespace miner

@@ -96,7 +96,7 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
                    "Glass and water have no surfaces that mirror the sky: they only colour what lies behind them");
   add_text_option(command, "--sky-brightness", "X", "Times this much light of the sky and from all around (default 1)");
   command
-      .add_option("--lamps", arguments.render.light.lamps,
+      .add_option("--lamps", arguments.render.light.max_lamps,
                   "How many lamps and glowing voxels light a surface at most; 0: they only show their own light "
                   "(default 64)")
       ->check(CLI::Range(0, 1024));
@@ -269,7 +269,7 @@ std::string fault_of_light(const CLI::App& command, const RenderArguments& argum
   if (command.count("--shadow-distance") > 0 && !has_shadows) {
     return "--shadow-distance: the preset " + preset + " has no shadows";
   }
-  if (command.count("--lamp-brightness") > 0 && arguments.render.light.lamps == 0) {
+  if (command.count("--lamp-brightness") > 0 && arguments.render.light.max_lamps == 0) {
     return "--lamp-brightness: --lamps 0 has no lamps shine";
   }
   return "";
@@ -355,7 +355,7 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
 DVec3 RenderArguments::forward() const {
   if (!azimuth && !elevation) return direction_of(view);
   const double iso_elevation = std::asin(std::sqrt(1.0 / 3.0)) * 180.0 / std::numbers::pi;
-  return direction_of_view(azimuth.value_or(45.0), elevation.value_or(iso_elevation));
+  return direction_of(azimuth.value_or(45.0), elevation.value_or(iso_elevation));
 }
 
 void add_render_options(CLI::App& command, RenderArguments& arguments) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 
 #include <quoin/core/vec.h>
@@ -29,14 +28,14 @@ struct ArrayView {
 /// The strides of a packed array whose last axis runs through neighbouring bytes, as C and NumPy lay it out.
 [[nodiscard]] inline std::array<std::int64_t, 3> strides_of_last_fastest(const std::array<std::int64_t, 3>& size,
                                                                          ScalarType type) {
-  const auto bytes = static_cast<std::int64_t>(bytes_of(type));
+  const auto bytes = static_cast<std::int64_t>(size_of(type));
   return {bytes * size[2] * size[1], bytes * size[2], bytes};
 }
 
 /// The same where the first axis does, as Fortran, NIfTI and Volume lay it out.
 [[nodiscard]] inline std::array<std::int64_t, 3> strides_of_first_fastest(const std::array<std::int64_t, 3>& size,
                                                                           ScalarType type) {
-  const auto bytes = static_cast<std::int64_t>(bytes_of(type));
+  const auto bytes = static_cast<std::int64_t>(size_of(type));
   return {bytes, bytes * size[0], bytes * size[0] * size[1]};
 }
 

@@ -2,13 +2,16 @@
 
 #include <array>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
 #include <quoin/core/function_ref.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/neighbourhood.h>
 #include <quoin/grid/voxel_registry.h>
 
 namespace quoin {
@@ -25,9 +28,9 @@ struct ChunkChange {
   /// Bit x / 16 + 4 (y / 16) + 16 (z / 16): that part of 16^3 voxels holds one of them.
   std::uint64_t bricks = 0;
 
-  /// Whether the mesh of the chunk at an offset of -1 to 1 on each axis may have changed.
+  /// Whether the mesh of the chunk at an offset may have changed. Requires: -1 <= offset.x, offset.y, offset.z <= 1.
   [[nodiscard]] bool affects(IVec3 offset) const {
-    return (neighbours >> ((offset.z + 1) * 9 + (offset.y + 1) * 3 + offset.x + 1) & 1U) != 0;
+    return (neighbours >> Neighbourhood::index(offset.x, offset.y, offset.z) & 1U) != 0;
   }
 };
 using GridChanges = Changes<ChunkChange>;
@@ -70,9 +73,11 @@ struct DensityChange {
   /// upon one of them; 0 for the chunk itself.
   std::array<std::uint8_t, 27> distance{};
 
-  /// Whether the chunk at an offset of -1 to 1 on each axis, grown by `reach` samples (0 to 64), holds one of them.
+  /// Whether the chunk at an offset, grown by `reach` samples on each side, holds one of them.
+  /// Requires: -1 <= offset.x, offset.y, offset.z <= 1; 0 <= reach <= 64.
   [[nodiscard]] bool affects(IVec3 offset, int reach) const {
-    return distance[static_cast<std::size_t>((offset.z + 1) * 9 + (offset.y + 1) * 3 + offset.x + 1)] <= reach;
+    QUOIN_ASSERT(reach >= 0 && reach <= 64, "0 <= reach <= 64");
+    return distance[Neighbourhood::index(offset.x, offset.y, offset.z)] <= reach;
   }
 };
 using DensityChanges = Changes<DensityChange>;

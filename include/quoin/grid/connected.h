@@ -12,6 +12,7 @@
 #include <quoin/core/parallel.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/grid.h>
+#include <quoin/grid/voxel_registry.h>
 
 namespace quoin {
 

@@ -6,6 +6,7 @@
 #include <quoin/core/axis_orientation.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/grid.h>
+#include <quoin/grid/voxel_registry.h>
 
 namespace quoin {
 

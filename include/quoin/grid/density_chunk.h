@@ -5,13 +5,13 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include <quoin/core/half.h>
 #include <quoin/core/ref.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/neighbourhood.h>
+#include <quoin/grid/voxel_registry.h>
 
 namespace quoin {
 
@@ -26,13 +26,15 @@ struct DensityStorage;
 
 /// 64^3 samples of a density (half floats, negative is solid, 0 is air) with a material each.
 ///
+/// Densities are as `stored_density` gives them: whoever writes a half here makes it by that. A half that it never
+/// gives, such as -0 (which would count as solid), an infinity or NaN, is a mistake.
 /// Samples lie in rows of 64 along x; 4x4 rows are a slab, the unit of uniformity, as in Chunk: what is far from the
 /// surface is clamped to one value by the grid, and a slab of one value holds no samples. The signs of a row are also
 /// kept as one word, so that finding the surface reads 1/16 of the bytes. Copies share their storage as those of Chunk
 /// do.
 class DensityChunk {
  public:
-  /// All samples of one density and material.
+  /// All samples of one density and material. Requires: a `stored_density`.
   explicit DensityChunk(Half density, VoxelType material = kAir);
   DensityChunk(const DensityChunk& other);
   DensityChunk(DensityChunk&& other) noexcept;
@@ -42,17 +44,19 @@ class DensityChunk {
 
   /// Requires: 0 <= x, y, z < 64.
   [[nodiscard]] Half get(int x, int y, int z) const;
-  /// Which samples of a row are solid (below 0). Requires: 0 <= y, z < 64, as for every row.
+  [[nodiscard]] Half get(IVec3 local) const { return get(local.x, local.y, local.z); }
+  /// Which samples of a row are solid (below 0). Requires: 0 <= y, z < 64.
   [[nodiscard]] std::uint64_t solid_row(int y, int z) const;
   /// The 64 samples of a row, or null where its slab, or the chunk, is of one value: `get` of any of them.
-  /// Lifetime: until the chunk is written, assigned or destroyed.
+  /// Requires: 0 <= y, z < 64. Lifetime: until the chunk is written, assigned or destroyed.
   [[nodiscard]] const Half* row(int y, int z) const;
-  /// Copies the densities of one row to `out`.
+  /// Copies the densities of one row to `out`. Requires: 0 <= y, z < 64.
   void read_row(int y, int z, std::span<Half, kChunkEdge> out) const;
 
-  /// Returns which samples of the row had another density before. Slabs stay expanded until `unite_slabs`.
+  /// Writes the densities of one row. Returns which samples had another one before. Slabs stay expanded until
+  /// `unite_slabs`. Requires: 0 <= y, z < 64; every density is a `stored_density`.
   std::uint64_t write_row(int y, int z, std::span<const Half, kChunkEdge> densities);
-  /// Makes the whole chunk one density; materials stay.
+  /// Makes the whole chunk one density; materials stay. Requires: a `stored_density`.
   void fill(Half density);
   /// The density of all samples, if the chunk is stored as such.
   [[nodiscard]] std::optional<Half> uniform() const {
@@ -71,6 +75,8 @@ class DensityChunk {
     return storage_ == other.storage_ && (storage_ != nullptr || uniform_ == other.uniform_) &&
            materials_.shares_storage_with(other.materials_);
   }
+  /// The same densities and materials everywhere, however they are stored. Cost: as that of Chunk.
+  [[nodiscard]] bool operator==(const DensityChunk& other) const;
   /// As Chunk::content_hash, of densities and materials. Cost: up to 0.2 ms.
   [[nodiscard]] std::uint64_t content_hash() const;
 
@@ -99,11 +105,12 @@ struct DensityNeighbourhood {
   std::array<const DensityChunk*, 27> chunks{};
   Half outside = 0x4800;  ///< 8.0
 
+  /// The chunk at an offset. Requires: -1 <= dx, dy, dz <= 1.
   [[nodiscard]] const DensityChunk* at(int dx, int dy, int dz) const {
     return chunks[Neighbourhood::index(dx, dy, dz)];
   }
   [[nodiscard]] const DensityChunk* centre() const { return chunks[13]; }
-  /// The sample at a position relative to the centre chunk, -64..127 on each axis.
+  /// The sample at a position relative to the centre chunk. Requires: -64 <= local.x, local.y, local.z < 128.
   [[nodiscard]] Half get(IVec3 local) const {
     const IVec3 chunk = chunk_of(local);
     const DensityChunk* found = at(chunk.x, chunk.y, chunk.z);

@@ -1,14 +1,19 @@
 #pragma once
 
+#include <concepts>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
 
+#include <quoin/core/changes.h>
 #include <quoin/core/function_ref.h>
+#include <quoin/core/progress.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/changes.h>
 #include <quoin/grid/density_chunk.h>
+#include <quoin/grid/voxel_registry.h>
 
 namespace quoin {
 
@@ -36,9 +41,10 @@ struct FlattenOptions {
 ///            kept, however small the value; NaN counts as far air, infinities as +-band.
 /// Materials: that of an air sample has no effect on any mesh. Far air has none: it reads as kAir.
 /// Edits:     a chunk that is all far air is dropped. When an edit throws (bad_alloc, or what a callback threw), what
-///            it did until then stays done and booked. `changes_since` tells any number of consumers what edits
-///            changed.
-/// Sharing, threads and moving: as Grid.
+///            it did until then, or until its `progress` cancelled it, stays done and booked. `changes_since` tells
+///            any number of consumers what edits changed.
+/// Sharing:   and threads as Grid.
+/// Moving:    a field that was moved from may only be assigned to or destroyed.
 class DensityGrid {
  public:
   /// Requires: 0 < band <= 65,504. A band that is no half counts as the next lesser one.
@@ -81,42 +87,50 @@ class DensityGrid {
   /// Errors:  a negative, infinite or NaN size or place, or a box whose `max` is less than its `min`, changes nothing.
   /// Cost:    adding: O(chunks of the shape's box), and O(samples) in those that its surface comes near or that exist;
   ///          each chunk inside becomes a uniform one of about 200 bytes, and a sphere of radius 10^6 has 10^13 of
-  ///          them: it cannot be cancelled. Removing: only chunks that exist.
-  std::int64_t add_sphere(DVec3 centre, double radius, VoxelType material, double blend = 0.0);
+  ///          them: where a size is a user's own choice, say how much is too much by `progress`. Removing: only chunks
+  ///          that exist.
+  std::int64_t add_sphere(DVec3 centre, double radius, VoxelType material, double blend = 0.0,
+                          const Progress& progress = {});
   std::int64_t remove_sphere(DVec3 centre, double radius, double blend = 0.0);
-  std::int64_t add_box(DVec3 min, DVec3 max, VoxelType material, double rounding = 0.0, double blend = 0.0);
+  std::int64_t add_box(DVec3 min, DVec3 max, VoxelType material, double rounding = 0.0, double blend = 0.0,
+                       const Progress& progress = {});
   std::int64_t remove_box(DVec3 min, DVec3 max, double rounding = 0.0, double blend = 0.0);
   /// Smooths the surface within a sphere: moves each density towards the mean of its 26 neighbours (as they were
   /// before), strength * (1 - (distance / radius)^2)^2 of the way. Samples that become solid take the material of most
   /// of their solid neighbours. A strength above 1 counts as 1; sizes, places and strengths that are not above 0,
-  /// infinite or NaN change nothing. Cost: O(samples of the sphere's box in chunks that exist, or are beside one), and
-  /// 4 bytes of memory for each meanwhile.
+  /// infinite or NaN change nothing. Returns how many samples changed.
+  /// Cost: O(samples of the sphere's box in chunks that exist, or are beside one), and 4 bytes of memory for each
+  /// meanwhile.
   std::int64_t smooth(DVec3 centre, double radius, double strength);
   /// Moves the surface within a sphere towards a plane. A strength, place or normal that is not as FlattenOptions says
-  /// changes nothing. Cost: as adding a sphere.
-  std::int64_t flatten(DVec3 centre, double radius, const FlattenOptions& options);
+  /// changes nothing. Returns how many samples changed. Cost: as adding a sphere.
+  std::int64_t flatten(DVec3 centre, double radius, const FlattenOptions& options, const Progress& progress = {});
   /// Asks `pick(IVec3 sample, DensitySample current)` for the new value of every sample of the box (half open: `max`
   /// excluded), x fastest, then y, then z within a chunk, and chunks in that order too. Returns how many samples
   /// changed.
   /// Requires: `pick` leaves the grid alone. Cost: O(samples of the box), far air too.
   template <class Pick>
-  std::int64_t edit(const IBox& box, Pick&& pick) {
-    return edit_rows(box, [&pick](IVec3 first, std::span<float> densities, std::span<VoxelType> materials) {
-      for (std::size_t i = 0; i < densities.size(); ++i, ++first.x) {
-        const DensitySample picked = pick(first, DensitySample{densities[i], materials[i]});
-        densities[i] = picked.density;
-        materials[i] = picked.material;
-      }
-    });
+  std::int64_t edit(const IBox& box, Pick&& pick, const Progress& progress = {}) {
+    return edit_rows(
+        box,
+        [&pick](IVec3 first, std::span<float> densities, std::span<VoxelType> materials) {
+          for (std::size_t i = 0; i < densities.size(); ++i, ++first.x) {
+            const DensitySample picked = pick(first, DensitySample{densities[i], materials[i]});
+            densities[i] = picked.density;
+            materials[i] = picked.material;
+          }
+        },
+        progress);
   }
   /// `edit`, a row at a time: `change(first, densities, materials)` gets the samples of the box along x in one chunk,
   /// from `first` on, and changes them in place. Returns how many changed.
   std::int64_t edit_rows(
       const IBox& box,
-      FunctionRef<void(IVec3 first, std::span<float> densities, std::span<VoxelType> materials)> change);
-  /// Puts a whole chunk in place; counts as an edit of whatever differs. Requires: its densities are `stored_density`
-  /// of this band. The outermost chunks are ignored.
-  void put_chunk(IVec3 chunk, DensityChunk samples);
+      FunctionRef<void(IVec3 first, std::span<float> densities, std::span<VoxelType> materials)> change,
+      const Progress& progress = {});
+  /// Puts a whole chunk in place; counts as an edit of whatever differs. Returns how many samples changed. Outermost
+  /// chunks are ignored. Requires: its densities are `stored_density` of this band.
+  std::int64_t put_chunk(IVec3 chunk, DensityChunk samples);
   /// Makes everything far air, as an edit.
   void clear();
 
@@ -152,6 +166,7 @@ class DensityGrid {
   friend class Scene;
   struct Impl;
   explicit DensityGrid(std::unique_ptr<Impl> impl);
+  [[nodiscard]] inline Impl& impl() const;
 
   std::unique_ptr<Impl> impl_;
   mutable EditNotice notice_;  // a scene that follows it is no part of it

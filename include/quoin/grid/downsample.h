@@ -4,6 +4,9 @@
 #include <memory>
 
 #include <quoin/core/parallel.h>
+#include <quoin/core/progress.h>
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
@@ -22,7 +25,9 @@ namespace quoin {
 ///          more for every face that meets air (tuned on pictures of terrains); of equal ones the lower.
 /// Threads: the same result at any number.
 /// Cost:    1.3 to 3 milliseconds a chunk of the result, of caves and several types.
-[[nodiscard]] Grid downsample(const Grid& grid, const VoxelRegistry& types, Threads threads = {});
+/// Errors:  Cancelled.
+[[nodiscard]] Result<Grid> downsample(const Grid& grid, const VoxelRegistry& types, Threads threads = {},
+                                      const Progress& progress = {});
 
 /// One chunk of `downsample(grid, types)`, by its place among that grid's chunks.
 ///
@@ -44,7 +49,8 @@ class GridPyramid {
   /// Halves `grid` up to `levels` times, fewer where nothing would be left. Only chunks that edits since the last
   /// update can have changed are made again; all of another grid.
   ///
-  /// Requires: the visibility of the types is that of the last update.
+  /// Requires: the visibility of the types is that of the last update; this is not checked.
+  /// Lifetime: grid and types are only read within the call; their snapshots may take their place in the next.
   /// Cost:     `downsample_chunk` for each chunk that an edit can have changed.
   void update(const Grid& grid, const VoxelRegistry& types, int levels, Threads threads = {});
 
@@ -69,7 +75,9 @@ class GridPyramid {
 ///           solid sample its own.
 /// Threads:  the same result at any number.
 /// Cost:     some 5 milliseconds a chunk of the result, of caves and several materials.
-[[nodiscard]] DensityGrid downsample(const DensityGrid& field, Threads threads = {});
+/// Errors:   Cancelled.
+[[nodiscard]] Result<DensityGrid> downsample(const DensityGrid& field, Threads threads = {},
+                                             const Progress& progress = {});
 
 /// What a halved field has kept of the finer one, in samples.
 struct DownsampledDensityCounts {
@@ -106,6 +114,7 @@ class DensityPyramid {
   ~DensityPyramid();
 
   /// As GridPyramid::update: an edit costs a halved chunk for each chunk that reads what it changed.
+  /// Lifetime: the field is only read within the call.
   void update(const DensityGrid& field, int levels, Threads threads = {});
 
   /// How many there are; none before the first update.

@@ -1,18 +1,21 @@
 #pragma once
 
 #include <array>
+#include <concepts>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
+#include <quoin/core/changes.h>
 #include <quoin/core/function_ref.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/changes.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/neighbourhood.h>
+#include <quoin/grid/voxel_registry.h>
 
 namespace quoin {
 
@@ -147,6 +150,7 @@ class Grid {
   friend class Scene;
   struct Impl;
   explicit Grid(std::unique_ptr<Impl> impl);
+  [[nodiscard]] inline Impl& impl() const;
 
   std::unique_ptr<Impl> impl_;
   mutable EditNotice notice_;  // a scene that follows it is no part of it

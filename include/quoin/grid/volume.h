@@ -13,6 +13,7 @@
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_grid.h>
+#include <quoin/grid/voxel_registry.h>
 
 namespace quoin {
 
@@ -32,8 +33,8 @@ enum class ScalarType : std::uint8_t {
 
 /// "uint8", "float64".
 [[nodiscard]] std::string_view name_of(ScalarType type);
-/// 1, 2, 4 or 8.
-[[nodiscard]] std::size_t bytes_of(ScalarType type);
+/// Bytes a value: 1, 2, 4 or 8.
+[[nodiscard]] std::size_t size_of(ScalarType type);
 
 /// Samples of a scalar on a regular lattice: a CT scan, a simulation.
 struct Volume {

@@ -1,6 +1,9 @@
 #pragma once
 
 #include <quoin/core/parallel.h>
+#include <quoin/core/progress.h>
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
@@ -19,7 +22,9 @@ namespace quoin {
 /// Materials: the voxels' types.
 /// Order:     the same densities at any thread count.
 /// Cost:      about 5 ms a chunk that the surface comes near, on each thread; little for the others.
-[[nodiscard]] DensityGrid field_from_grid(const Grid& grid, Threads threads = {});
+/// Errors:    Cancelled.
+[[nodiscard]] Result<DensityGrid> field_from_grid(const Grid& grid, Threads threads = {},
+                                                  const Progress& progress = {});
 
 /// How far, in voxels, the density of a sample looks: an edit that is farther than this from a chunk leaves its
 /// densities as they were.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -61,7 +62,8 @@ using TypeChanges = Changes<TypeChange>;
 /// The kinds of voxels of a scene. Whatever asks "does this block sight or light?" asks here.
 ///
 /// Copies share what they hold until one of them is changed, as a Grid's snapshots do; a cursor that read one reads on
-/// in the other until then. Threads and moving: as Grid. Cost: `visibility` is one array look-up.
+/// in the other until then. Threads: as Grid. Cost: `visibility` is one array look-up.
+/// Moving: a registry that was moved from may only be assigned to or destroyed.
 class VoxelRegistry {
  public:
   /// Holds air only.
@@ -92,7 +94,10 @@ class VoxelRegistry {
   }
 
   /// Number of ids in use, air included; every id below it is valid.
-  [[nodiscard]] std::size_t size() const { return content_->properties.size(); }
+  [[nodiscard]] std::size_t size() const {
+    QUOIN_ASSERT(content_ != nullptr, "a registry that was not moved from");
+    return content_->properties.size();
+  }
 
   /// An unregistered id counts as opaque, so that a wrong id shows instead of vanishing.
   [[nodiscard]] Visibility visibility(VoxelType type) const {

@@ -15,8 +15,9 @@ namespace quoin {
 /// LimitExceeded beyond 8 GiB.
 [[nodiscard]] Result<std::vector<std::byte>> read_file(const std::filesystem::path& path);
 
-/// The first `most` bytes of a regular file, or all that it has. Errors: as read_file, whatever the file's size.
-[[nodiscard]] Result<std::vector<std::byte>> read_file_beginning(const std::filesystem::path& path, std::size_t most);
+/// The first `max_bytes` bytes of a regular file, or all that it has. Errors: as read_file, whatever the file's size.
+[[nodiscard]] Result<std::vector<std::byte>> read_file_beginning(const std::filesystem::path& path,
+                                                                 std::size_t max_bytes);
 
 /// The file at the end of a chain of symbolic links; it need not be there. A path that is no link is itself.
 [[nodiscard]] std::filesystem::path follow_links(std::filesystem::path path);
@@ -86,6 +87,6 @@ struct FileStamp {
 };
 
 /// Writes all of `bytes` to `path` by way of an AtomicFile.
-[[nodiscard]] Status write_file(const std::filesystem::path& path, std::span<const std::byte> bytes);
+[[nodiscard]] Status write_file(std::span<const std::byte> bytes, const std::filesystem::path& path);
 
 }  // namespace quoin

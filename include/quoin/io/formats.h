@@ -13,6 +13,7 @@
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/io/loaded_scene.h>
+#include <quoin/scene/scene.h>
 
 namespace quoin {
 
@@ -30,18 +31,18 @@ struct FormatInfo {
   bool is_volume;  ///< values, which read_volume reads as such and load_scene as a field
 };
 
-/// All formats, those that can be read first.
+/// All formats, those that can be read first. Lifetime: for ever.
 [[nodiscard]] std::span<const FormatInfo> file_formats();
 
 /// The extensions of all formats that can be read (or written), for messages: ".glb, .gltf, .obj, .ply, .vox".
 [[nodiscard]] std::string readable_extensions();
 [[nodiscard]] std::string writable_extensions();
 
-/// The name of a file without its folder and its ending, nor that of what is within gzip: NAME of NAME.vox and of
+/// The name of a file without its folder and its extension, nor that of what is within gzip: NAME of NAME.vox and of
 /// NAME.nii.gz.
 [[nodiscard]] std::string stem_of_file(const std::filesystem::path& path);
 
-/// What is known of a format.
+/// What is known of a format. Lifetime: for ever.
 [[nodiscard]] const FormatInfo& format_info(FileFormat format);
 
 /// Returns the readable format that bytes are of, by what they begin with, within gzip too; nothing when it is none.
@@ -54,9 +55,10 @@ struct FormatInfo {
 /// Errors: Unsupported, naming the extensions there are.
 [[nodiscard]] Result<FormatInfo> format_for_writing(const std::filesystem::path& path);
 
-// What reads and what writes has a twin for bytes and one for a path. Warnings are part of what is returned: of what
-// was read, and of what was written where its format may not hold all. Options, Threads (where several are used) and
-// Progress (of what may take long) come last, in this order, and may be left out.
+// What reads and what writes has a twin for bytes and one for a path; but for save_scene, which goes by a path's
+// extension: the writers of its formats, write_scene_file and write_vox, have both. Warnings are part of what is
+// returned: of what was read, and of what was written where its format may not hold all. Options, Threads (where
+// several are used) and Progress (of what may take long) come last, in this order, and may be left out.
 
 /// Reads a file of any readable format. A volume becomes a field, as scene_from_volume makes it, at surface_value.
 ///
@@ -75,11 +77,11 @@ struct FormatInfo {
 /// values of a NIfTI pair. Nothing where the file cannot be read.
 [[nodiscard]] std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path);
 
-/// Writes a scene as a file of voxels, in the format of the name's ending: .json (write_scene_file, without loss) or
+/// Writes a scene as a file of voxels, in the format of the name's extension: .json (write_scene_file, without loss) or
 /// .vox (write_vox). It appears whole or not at all.
 ///
 /// Warnings: one line each of what the format does not hold.
-/// Errors:   Unsupported for other endings; those of the format's writer; `path` is set in all.
+/// Errors:   Unsupported for other extensions; those of the format's writer; `path` is set in all.
 [[nodiscard]] Result<SavedScene> save_scene(const Scene& scene, const std::filesystem::path& path, Threads threads = {},
                                             const Progress& progress = {});
 /// The same of a scene that was read, with what its file had beside it: in .json its sun and camera, in .vox what

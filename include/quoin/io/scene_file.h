@@ -12,6 +12,7 @@
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/voxel_registry.h>
 #include <quoin/io/loaded_scene.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
@@ -71,6 +72,8 @@ struct SceneFile {
 ///         which what `write_scene_file` writes does not. What is wrong within voxels is told with its place in them
 ///         ("grids[0].voxels[2]: byte 37 of the voxel data: ...").
 [[nodiscard]] Result<SceneFile> parse_scene_file(std::span<const std::byte> text, Threads threads = {});
+/// The same of a file, without those that it names. Errors: also CannotRead; they name the file.
+[[nodiscard]] Result<SceneFile> parse_scene_file(const std::filesystem::path& path, Threads threads = {});
 
 /// A scene as a file that holds it all: every type, every grid with its voxels and its field (snapshots, which cost
 /// pointers), its groups, layers and lamps, and an instance each. Handles become places in the lists, in their order.

@@ -4,11 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <glm/mat4x4.hpp>
 #include <span>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>

@@ -56,7 +56,7 @@ struct LightOptions {
   /// How many lamps (Scene::lamps, and voxels that emit light, by cells of 4^3) light a surface at most, each with its
   /// shadow: of those that reach a brick of 16^3 voxels, those that can add most to it. 0: none, and what emits light
   /// only shows it. 64 is plenty. A lamp fades out where it adds less than 1/4096.
-  int lamps = 0;
+  int max_lamps = 0;
   double lamp_brightness = 1.0;  ///< times what lamps add to others; what they show of themselves stays as it is
   /// Whether glass and water have surfaces: where a ray goes from air into a body, out of it again or from one body
   /// into another, it shows the sky of the mirrored direction by Fresnel's share, of the types' `ior`. Rays go straight

@@ -2,12 +2,8 @@
 
 #include <cstdint>
 #include <memory>
-#include <vector>
 
-#include <quoin/core/parallel.h>
-#include <quoin/core/progress.h>
-#include <quoin/core/result.h>
-#include <quoin/grid/grid.h>
+#include <quoin/core/vec.h>
 #include <quoin/grid/neighbourhood.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/quad.h>

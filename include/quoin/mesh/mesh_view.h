@@ -4,6 +4,11 @@
 #include <cstdint>
 #include <span>
 
+#include <quoin/core/assert.h>
+#include <quoin/core/direction.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/mesh/array_surface.h>
 #include <quoin/mesh/blocky_mesh.h>
 #include <quoin/mesh/smooth_mesh.h>
 
@@ -56,6 +61,19 @@ struct MeshView {
   view.normals = mesh.normals;
   view.albedo = mesh.albedo;
   view.occlusion = mesh.occlusion;
+  return view;
+}
+
+/// A surface from an array (or that of a label, by `surface_of_label`), which has no colours of its own.
+/// Lifetime: surface and albedo must outlive the view, unchanged.
+/// Requires: as many of `albedo` as vertices.
+[[nodiscard]] inline MeshView view_of(const ArraySurface& surface, std::span<const LinearRgba16> albedo) {
+  QUOIN_ASSERT(albedo.size() == surface.positions.size(), "an albedo a vertex");
+  MeshView view;
+  view.positions = {surface.positions.data(), surface.positions.size()};
+  view.indices = {surface.indices.data(), surface.indices.size()};
+  view.normals = {surface.normals.data(), surface.normals.size()};
+  view.albedo = albedo;
   return view;
 }
 

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include <quoin/core/direction.h>
+#include <quoin/core/vec.h>
 #include <quoin/grid/neighbourhood.h>
 #include <quoin/grid/voxel_registry.h>
 

@@ -1,10 +1,11 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
+#include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/occlusion.h>
 
@@ -34,11 +35,14 @@ struct Quad {
   [[nodiscard]] VoxelType type() const { return static_cast<VoxelType>(field(kTypeShift, 0xFFFF)); }
   [[nodiscard]] bool flipped() const { return field(kFlipShift, 1) != 0; }
   [[nodiscard]] FaceOcclusion occlusion() const { return {occlusion(0), occlusion(1), occlusion(2), occlusion(3)}; }
+  /// That of a corner. Requires: 0 <= corner < 4.
   [[nodiscard]] std::uint8_t occlusion(int corner) const {
+    QUOIN_ASSERT(corner >= 0 && corner < 4, "0 <= corner < 4");
     return static_cast<std::uint8_t>(field(kOcclusionShift + 2 * corner, 3));
   }
-  /// Position of a corner (0..3, as in FaceOcclusion) in chunk coordinates, 0..64.
+  /// Position of a corner, in the order of FaceOcclusion, in chunk coordinates, 0..64. Requires: 0 <= index < 4.
   [[nodiscard]] IVec3 corner(int index) const {
+    QUOIN_ASSERT(index >= 0 && index < 4, "0 <= index < 4");
     const FaceFrame& frame = frame_of(direction());
     IVec3 p = voxel();
     if (frame.sign > 0) p[frame.axis] += 1;

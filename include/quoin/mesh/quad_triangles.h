@@ -8,7 +8,9 @@
 #include <type_traits>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/quad.h>
 
 namespace quoin {

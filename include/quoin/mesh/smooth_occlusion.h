@@ -4,7 +4,10 @@
 #include <span>
 
 #include <quoin/core/parallel.h>
+#include <quoin/core/progress.h>
+#include <quoin/core/result.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/density_chunk.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/mesh/smooth.h>
 
@@ -40,8 +43,10 @@ struct SmoothPlaces {
 /// Cost:      where many lie in a chunk, as in a mesh, twice what occlusion costs the mesher with spreads of 1 and 2,
 ///            the same with others. Memory: 8 bytes a place, and 2 MiB a thread.
 /// Requires:  as many normals as positions, and room for as many in `out`; less than 2^32.
-void smooth_occlusion(const DensityGrid& field, const SmoothPlaces& places, const SmoothOcclusionOptions& options,
-                      std::span<float> out, Threads threads = {});
+/// Errors:    Cancelled; some of `out` may be written then.
+[[nodiscard]] Status smooth_occlusion(const DensityGrid& field, const SmoothPlaces& places,
+                                      const SmoothOcclusionOptions& options, std::span<float> out, Threads threads = {},
+                                      const Progress& progress = {});
 
 /// The same of one chunk and its neighbours, for meshers that go chunk by chunk; holds scratch memory (about 2 MiB), so
 /// keep one a thread.

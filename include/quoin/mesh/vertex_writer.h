@@ -6,9 +6,11 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/mesh_view.h>
+#include <quoin/mesh/quad.h>
 #include <quoin/mesh/quad_triangles.h>
 #include <quoin/mesh/smooth.h>
 
@@ -44,6 +46,7 @@ enum class VertexFormat : std::uint8_t {
   Unorm8x4Srgb,  ///< of colours: encoded as sRGB, but for alpha
   Unorm16x4,     ///< 65,535 is 1
 };
+/// Bytes: 1 to 16.
 [[nodiscard]] std::size_t size_of(VertexFormat format);
 
 struct VertexElement {
@@ -102,8 +105,9 @@ class VertexWriter {
   [[nodiscard]] std::size_t bytes_needed(std::size_t vertices) const { return vertices * layout_.stride; }
 
   /// Four vertices a quad. `origin` is added to positions (chunk coordinates).
-  /// Requires: can_write(layout, VertexSource::Quads); room for the bytes needed; where positions are whole numbers,
-  ///           `origin` is, and their sums are within the format's range.
+  /// Every layout that a writer takes can be written of quads.
+  /// Requires: room for the bytes needed; where positions are whole numbers, `origin` is, and their sums are within the
+  ///           format's range.
   void write(std::span<const Quad> quads, Vec3 origin, std::span<std::byte> out) const;
   /// The mesh's vertices. Requires: can_write(layout, VertexSource::SmoothChunk); room for the bytes needed.
   void write(const SmoothChunkMesh& mesh, Vec3 origin, std::span<std::byte> out) const;

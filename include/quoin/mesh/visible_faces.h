@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include <quoin/core/direction.h>
 #include <quoin/core/direction_set.h>
+#include <quoin/core/vec.h>
 #include <quoin/grid/neighbourhood.h>
 #include <quoin/grid/voxel_registry.h>
 

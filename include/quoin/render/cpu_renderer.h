@@ -76,7 +76,8 @@ class CpuRenderer {
                                        const Progress& progress = {}) const;
 
   /// What its rays go through, for queries (first_hit, pick) that shall see what pictures show. Out of date after an
-  /// edit until `update`; not to be asked during one.
+  /// edit until `update`; not to be asked during one. Lifetime: that of the renderer; moving it leaves the tracer where
+  /// it is.
   [[nodiscard]] const SceneTracer& tracer() const;
 
  private:

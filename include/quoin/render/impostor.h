@@ -18,6 +18,7 @@
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
+#include <quoin/trace/occupancy_tree.h>
 
 namespace quoin {
 
@@ -33,10 +34,12 @@ inline constexpr int kImpostorViews = 26;
 /// most about 27.57 degrees away. None when `direction` is zero or not finite.
 [[nodiscard]] std::optional<int> nearest_impostor_view(DVec3 direction);
 
+class DensityTree;
 struct ImpostorFaces;
 
 struct ImpostorOptions {
-  /// Texels a side of the finest snapshots, 16 to 1,024; twice as many for grids that are wider than so many voxels.
+  /// Texels a side of the finest snapshots; twice as many for grids that are wider than so many voxels.
+  /// Requires: 16 to 1,024.
   int edge = 128;
 };
 
@@ -65,22 +68,24 @@ class Impostor {
   /// Takes all snapshots, on the calling thread. Cost: some 10 ns for each face and view, and nine short rays a face;
   /// of grids with very many faces about 0.15 microseconds a covered texel.
   ///
-  /// Requires: `opaque` is the grid's tree of opaque voxels; the grid is not edited meanwhile.
-  static Impostor build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
-                        const ImpostorOptions& options = {});
+  /// Requires: `opaque` is the grid's tree of opaque voxels, which is not checked; the grid is not edited meanwhile.
+  [[nodiscard]] static Impostor build(const Grid& grid, const VoxelRegistry& types, const OccupancyTree& opaque,
+                                      const ImpostorOptions& options = {});
   /// The same, with a tree of its own.
-  static Impostor build(const Grid& grid, const VoxelRegistry& types, const ImpostorOptions& options = {});
+  [[nodiscard]] static Impostor build(const Grid& grid, const VoxelRegistry& types,
+                                      const ImpostorOptions& options = {});
 
   /// Of what is opaque of voxels and field. Cost: besides, two microseconds a piece of the field's surface, 10 ns for
   /// each view.
-  static Impostor build(const SceneGrid& grid, const VoxelRegistry& types, const ImpostorOptions& options = {});
+  [[nodiscard]] static Impostor build(const SceneGrid& grid, const VoxelRegistry& types,
+                                      const ImpostorOptions& options = {});
 
   /// The impostor of the same grid after an edit: what `build` with the same options would give, bit by bit. Only
   /// texels and faces near what changed are looked at again, unless much changed, the content's sphere is another, or
   /// there are very many faces: then all are.
   ///
   /// Requires: this one was built of that grid or a snapshot of it, without a field, with types of the same visibility;
-  ///           `changes` are those since.
+  ///           `changes` are those since. None of this is checked.
   /// Cost: some 20 ns a face, and what an edit can have changed.
   [[nodiscard]] Impostor rebuilt(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) const;
 
@@ -89,7 +94,8 @@ class Impostor {
   [[nodiscard]] const ContentSphere& content() const { return content_; }
   /// Of the opaque voxels and of what is opaque of the field.
   [[nodiscard]] const IBox& box() const { return box_; }
-  [[nodiscard]] bool is_empty() const { return box_.empty(); }
+  /// Whether it has no face: what is opaque of the grid is nothing, or left to rays.
+  [[nodiscard]] bool empty() const { return box_.empty(); }
   /// It is empty and the grid is to be traced: it has a field with more faces than there are texels, or more than a
   /// quarter of whose surface is of what is at most three samples thick, which tangent planes do not show well.
   [[nodiscard]] bool is_left_to_rays() const { return is_left_to_rays_; }

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include <quoin/core/parallel.h>
+#include <quoin/grid/voxel_registry.h>
 #include <quoin/render/impostor.h>
 #include <quoin/scene/scene.h>
 

@@ -44,7 +44,7 @@ struct VulkanRequirements {
   std::span<const char* const> optional_features;
 };
 
-/// The same for every device; also in builds without Vulkan.
+/// The same for every device; also in builds without Vulkan. Lifetime: for ever.
 [[nodiscard]] VulkanRequirements vulkan_requirements();
 
 /// Returns the name of a physical device of a program's own instance, and what it lacks. `instance` must have been
@@ -71,7 +71,8 @@ struct VulkanFeatureStorage {
 /// Errors:   Unsupported when the library was built without Vulkan.
 [[nodiscard]] Status enable_vulkan_features(VkDeviceCreateInfo& info, VulkanFeatureStorage& storage);
 
-/// A program's own device, for VulkanRenderer::create. Quoin destroys none of these; all must outlive the renderer.
+/// A program's own device, for VulkanRenderer::create.
+/// Lifetime: Quoin destroys none of these; all must outlive the renderer.
 struct BorrowedVulkanDevice {
   VkInstance_T* instance = nullptr;               ///< VkInstance, made as `vulkan_requirements` says
   VkPhysicalDevice_T* physical_device = nullptr;  ///< VkPhysicalDevice

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -73,7 +74,7 @@ class VulkanMeshRenderer {
   /// Takes over instances and types. Cost: O(instances + types).
   [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible);
   /// Takes over surfaces; of one chunk the last. Cost: the upload of these.
-  /// Errors also: InvalidArgument when a surface's arrays contradict each other; then nothing is changed. After another
+  /// Errors: also InvalidArgument when a surface's arrays contradict each other; then nothing is changed. After another
   /// error some surfaces may have been taken over, and the others are what they were.
   [[nodiscard]] Status put(std::span<const SurfaceUpdate> surfaces);
   void clear();
@@ -81,11 +82,12 @@ class VulkanMeshRenderer {
   /// Draws all there is; `threads` are for what detail needs.
   ///
   /// Requires: with levels of detail or lamps the scene was not edited since the last update of this and of the
-  ///           VulkanRenderer.
-  /// Errors also: InvalidArgument for sizes and samples that cannot be, for cameras as CpuRenderer::render and those
-  /// whose axes lie in one plane, for a picture of another renderer, and with shadows, lamps, levels of detail or glass
-  /// by rays, if there is any, when the VulkanRenderer was not last updated with the same scene and filter; Unsupported
-  /// for wireframes where the device has no lines. After an error in drawing the picture has no samples.
+  ///           VulkanRenderer; this is not checked.
+  /// Errors:   also InvalidArgument for sizes and samples that cannot be, for cameras as CpuRenderer::render and those
+  ///           whose axes lie in one plane, for a picture of another renderer, and with shadows, lamps, levels of
+  ///           detail or glass by rays, if there is any, when the VulkanRenderer was not last updated with the same
+  ///           scene and filter; Unsupported for wireframes where the device has no lines. After an error in drawing
+  ///           the picture has no samples.
   [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options = {},
                             Threads threads = {});
 

@@ -48,6 +48,8 @@ enum class Accumulation : std::uint8_t {
 ///          Vulkan 1.2 with bufferDeviceAddress, and worlds are as large as its memory, whatever its limits to buffers.
 /// Errors:  LimitExceeded when a memory is full; DeviceLost, after which a new renderer is needed; Unsupported for what
 ///          the driver refuses otherwise.
+/// Lifetime: must outlive its pictures and mesh renderers; a borrowed device must outlive it, and the scene of the last
+///          update the pictures that `Detail` speaks of.
 /// Threads: one at a time.
 class VulkanRenderer {
  public:
@@ -89,7 +91,8 @@ class VulkanRenderer {
   /// Sample after sample it becomes the picture that `render` takes with as many; after an error, Cancelled too, it has
   /// none.
   ///
-  /// Requires: unless it begins anew, camera, light and scene are those of its other samples.
+  /// Requires: unless it begins anew, camera, light and scene are those of its other samples; of the scene this is not
+  ///           checked.
   /// Errors:   those of `render`, LimitExceeded for more than 4,096 samples, and InvalidArgument for a picture of
   ///           another renderer; `options.depth` means nothing.
   [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options,

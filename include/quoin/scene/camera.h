@@ -64,16 +64,18 @@ enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };
 [[nodiscard]] DVec3 direction_of(View view);
 /// The same of a camera that stands so many degrees to the right of the front (90: towards +X) and above the horizon.
 /// View::Iso is 45 and 35.26.
-[[nodiscard]] DVec3 direction_of_view(double azimuth_degrees, double elevation_degrees);
+[[nodiscard]] DVec3 direction_of(double azimuth_degrees, double elevation_degrees);
 
 /// A perspective camera that has the whole of `bounds` in the picture, filling it but for a margin.
 ///
-/// Requires: `bounds` is finite; an empty one counts as the unit cube at the origin. `aspect` is width / height.
+/// Requires: `bounds` is finite; an empty one counts as the unit cube at the origin. `aspect` (width / height) is
+///           finite and positive.
 [[nodiscard]] Camera frame_view(const DBox& bounds, View view, double aspect);
 
 /// As `frame_view`, but for the voxels themselves: closer, since boxes have corners where often nothing is.
 /// Of the instances that `filter` lets pass.
 ///
+/// Requires: `aspect` (width / height) is finite and positive.
 /// Cost: O(instances * chunks of their grids), and the voxels of the few chunks that touch the picture's margin.
 [[nodiscard]] Camera frame_scene(const Scene& scene, View view, double aspect,
                                  InstanceFilter filter = InstanceFilter::Visible);
@@ -87,7 +89,8 @@ enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };
 class SceneFraming {
  public:
   /// `turns`: into how many equal turns to the right, about the vertical through the middle of the first scene, a full
-  /// one is divided. Requires: `forward` is unit, `aspect` (width / height) and `turns` are positive.
+  /// one is divided.
+  /// Requires: `forward` is unit; `aspect` (width / height) is finite and positive, and `turns` is positive.
   SceneFraming(DVec3 forward, double aspect, int turns = 1);
   /// Cost: that of frame_scene, for each of the turns.
   void add(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible);

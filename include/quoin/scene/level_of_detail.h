@@ -95,7 +95,7 @@ struct DetailOptions {
   /// without a limit is a picture the same whenever it is taken; 0 is for frames. Their occlusion by rays is that of
   /// nine rays of 6 voxels within the grid.
   double impostor_seconds = std::numeric_limits<double>::infinity();
-  int impostor_edge = 128;  ///< texels a side of an impostor's finest snapshots: ImpostorOptions::edge
+  int impostor_edge = 128;  ///< texels a side of an impostor's finest snapshots, 16 to 1,024: ImpostorOptions::edge
   /// Whether instances have colours that tell their detail instead of their own: Near green, Mid yellow to orange the
   /// more often halved, Far blue.
   bool colours = false;
@@ -117,8 +117,8 @@ class DetailSelector {
   ///
   /// Sizes in pixels are those at the picture's centre; towards the edges of a wide angle things are stretched.
   ///
-  /// Requires: width and height are positive, `camera` is valid for rendering; it is always the same scene or its
-  ///           snapshots, edited between calls as you like.
+  /// Requires: width and height are positive. What is not checked: `camera` is valid for rendering; it is always the
+  ///           same scene or its snapshots, edited between calls as you like.
   /// Cost: O(instances), under 50 ns each; a grid's content is looked at again only when it was edited.
   void select(const Scene& scene, const Camera& camera, int width, int height, const DetailPolicy& policy,
               std::vector<SelectedInstance>& out);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -116,7 +117,7 @@ struct SceneChanges {
 class Scene {
  public:
   VoxelRegistry types;
-  /// Lights without a body; voxels that emit light are lamps by themselves. LightOptions::lamps says whether they
+  /// Lights without a body; voxels that emit light are lamps by themselves. LightOptions::max_lamps says whether they
   /// shine. Renderers take over what changed here with their next `update`.
   std::vector<Lamp> lamps;
 
@@ -151,13 +152,13 @@ class Scene {
   [[nodiscard]] const SlotMap<SceneLayer>& layers() const { return layers_; }
   /// A grid, to be edited, now or later: the scene learns of every edit of its voxels and its field. Name, pivot and
   /// canvas are to be changed before the next `changes_since`, since this call is what records the change.
-  /// Requires: the handle names a grid.
+  /// Requires: the handle names a grid. Lifetime: until it is removed, also when the scene is moved.
   [[nodiscard]] SceneGrid& edit(GridHandle handle);
   /// An instance, to be changed before the next `changes_since`: this call is what records it.
-  /// Requires: the handle names an instance.
+  /// Requires: the handle names an instance. Lifetime: as that of a grid.
   [[nodiscard]] Instance& edit(InstanceHandle handle);
   /// A group or a layer, likewise. Groups that go round in a circle by their parents count as standing at the top.
-  /// Requires: the handle names one.
+  /// Requires: the handle names one. Lifetime: as that of a grid.
   [[nodiscard]] SceneGroup& edit(GroupHandle handle);
   [[nodiscard]] SceneLayer& edit(LayerHandle handle);
 
@@ -210,7 +211,7 @@ class Scene {
 
 /// Gives a group another place, and moves what is below it with it.
 ///
-/// Requires: the handle names a group; its rotation and the new one are not zero.
+/// Requires: the handle names a group; its rotation and the new one are finite and not zero.
 /// Cost: O(instances and groups).
 void move_group(Scene& scene, GroupHandle group, DVec3 position, const DQuat& rotation);
 

@@ -4,6 +4,7 @@
 
 #include <quoin/core/oriented_box.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {

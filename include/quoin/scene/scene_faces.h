@@ -14,6 +14,8 @@ namespace quoin {
 /// Follows the journals of scene, types and grids: an edit of a few voxels costs the chunks around it, whatever the
 /// scene's size.
 ///
+/// Lifetime: the scene is only read within calls.
+///
 ///   SceneFaces faces;
 ///   faces.update(scene);                      // all of it; later what changed since
 ///   print(faces.counts().visible, "visible of", faces.counts().total);

@@ -2,12 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <glm/mat4x4.hpp>
 #include <memory>
 #include <optional>
 #include <string>
 #include <variant>
 #include <vector>
+
+#include <glm/mat4x4.hpp>
 
 #include <quoin/core/image.h>
 #include <quoin/core/parallel.h>
@@ -15,6 +16,8 @@
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/volume.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/mesh/array_surface.h>
 #include <quoin/mesh/mesh_view.h>
 #include <quoin/scene/scene.h>
 
@@ -70,9 +73,10 @@ struct GlassThickness {
 /// A body that is placed as one, any number of times.
 struct MeshPart {
   std::string name;
-  std::vector<MeshView> surfaces{};     ///< all of one kind; may be none
-  DVec3 pivot{0.0};                     ///< the point that placements take to their translation
-  std::shared_ptr<const void> owner{};  ///< of the arrays of `surfaces`; null: they must outlive the part
+  std::vector<MeshView> surfaces{};  ///< all of one kind; may be none
+  DVec3 pivot{0.0};                  ///< the point that placements take to their translation
+  /// Of the arrays of `surfaces`. Lifetime: they live as long as it does; where it is null they must outlive the part.
+  std::shared_ptr<const void> owner{};
   /// By type, of blocks: files have one alpha a type, for bodies of that thickness. For types without, and for smooth
   /// surfaces, they are taken from the volume where the surface is closed, and else as one voxel thick.
   std::vector<GlassThickness> thickness{};
@@ -81,6 +85,12 @@ struct MeshPart {
 /// A part that owns its mesh. Surfaces without a triangle are left out.
 [[nodiscard]] MeshPart mesh_part(std::string name, BlockyMesh mesh, const DVec3& pivot = DVec3(0.0));
 [[nodiscard]] MeshPart mesh_part(std::string name, SmoothMesh mesh, const DVec3& pivot = DVec3(0.0));
+/// A surface from an array, or of one label (`surface_of_label`), all of one colour. Where `surface_from_array` was
+/// given spacing and origin, its places are those of the world.
+///
+///   meshes.parts.push_back(mesh_part("bone", std::move(*surface), {230, 220, 200}));
+///   meshes.placements.push_back({.part = 0});
+[[nodiscard]] MeshPart mesh_part(std::string name, ArraySurface surface, Rgba8 colour, const DVec3& pivot = DVec3(0.0));
 
 /// What was counted while meshing; a part that is placed several times counts once.
 struct MeshStats {

@@ -11,7 +11,9 @@
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/camera.h>
+#include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
+#include <quoin/trace/ray.h>
 
 namespace quoin {
 

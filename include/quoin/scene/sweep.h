@@ -4,7 +4,12 @@
 #include <optional>
 #include <vector>
 
+#include <quoin/core/oriented_box.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/scene/scene.h>
 #include <quoin/scene/scene_query.h>
+#include <quoin/scene/scene_tracer.h>
 
 namespace quoin {
 
@@ -43,8 +48,8 @@ struct SweepHit {
 [[nodiscard]] std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement,
                                                 const QueryFilter& filter = {});
 
-/// How far a box has to be moved to meet nothing, in the world: 0 where it meets nothing; nothing where there is no
-/// such place within `max_distance`, world units.
+/// The displacement, in the world, that takes a box to the nearest place where it meets nothing: 0 where it meets
+/// nothing; nothing where there is no such place within `max_distance`, world units.
 ///
 /// Exact:  among voxels whose axes are the box's own, the nearest such place, gaps that are as wide as the box
 ///         included; of several that are as near, one.
@@ -53,8 +58,8 @@ struct SweepHit {
 /// Cost:   an overlap query for each place that is nearer: some hundred of them for a box of the size of a voxel and
 ///         twice that distance.
 /// Errors: sizes, places and distances that are not finite, or below 0, have none.
-[[nodiscard]] std::optional<DVec3> nearest_free_place(const SceneTracer& tracer, const OrientedBox& box,
-                                                      double max_distance, const QueryFilter& filter = {});
+[[nodiscard]] std::optional<DVec3> displacement_to_free_place(const SceneTracer& tracer, const OrientedBox& box,
+                                                              double max_distance, const QueryFilter& filter = {});
 
 /// How a body that walks stands: on floors, which are whatever is no steeper than `max_slope_degrees`.
 struct FloorOptions {
@@ -72,8 +77,8 @@ struct SlideOptions {
   /// The gap that is left in front of what is met, world units: what rounding may not bridge.
   double skin = 1e-3;
   int max_contacts = 5;  ///< at least 1; after which what is left of the displacement is dropped
-  /// A box that starts inside is moved out first: of a field's solid along the gradient where that leads out, else to
-  /// the `nearest_free_place`. Without, and where there is none, it stays where it is: `is_blocked`, with the
+  /// A box that starts inside is moved out first: of a field's solid along the gradient where that leads out, else by
+  /// the `displacement_to_free_place`. Without, and where there is none, it stays where it is: `is_blocked`, with the
   /// displacement as it was.
   bool pushes_out = true;
   /// How far that may be, world units; nothing: the longest edge of the box, and the way out of what it is in.

@@ -4,6 +4,7 @@
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/grid/volume.h>
+#include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {

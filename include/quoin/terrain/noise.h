@@ -26,12 +26,12 @@ namespace quoin {
 [[nodiscard]] double noise3(std::uint32_t seed, double x, double y, double z);
 
 /// A sum of octaves of `noise2`, each of twice the frequency and half the amplitude, turned against the one before so
-/// that their lattices do not meet. About -1 to 1. Requires: |x|, |y| < 2^(29 - octaves).
+/// that their lattices do not meet. About -1 to 1. Requires: 0 <= octaves <= 29, |x|, |y| < 2^(29 - octaves).
 [[nodiscard]] double fractal2(std::uint32_t seed, double x, double y, int octaves);
 
 /// Mountain crests: octaves of 1 - |noise|, squared, where each is weighted by the one before. 0 to 1, crests near 1.
 ///
-/// Requires: |x|, |y| < 2^(29 - octaves).
+/// Requires: 0 <= octaves <= 29, |x|, |y| < 2^(29 - octaves).
 /// Source: F. K. Musgrave, in "Texturing and Modeling: A Procedural Approach" (1998), the ridged multifractal.
 [[nodiscard]] double ridged2(std::uint32_t seed, double x, double y, int octaves);
 

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include <quoin/core/vec.h>
+#include <quoin/grid/changes.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/packet.h>
@@ -25,7 +26,7 @@ class DensityTree {
   explicit DensityTree(DensityGrid&&) = delete;  // it must outlive it
 
   /// Takes over what edits changed, as the field's `changes_since` tells of it.
-  /// Requires: `changes` are those since the last update, or since it was made.
+  /// Requires: `changes` are those since the last update, or since it was made; this is not checked.
   /// Cost: as that of making it, for the chunks that changed, and those below where they changed on their lower faces.
   void update(const DensityChanges& changes) { cells_.update(*field_, changes); }
 

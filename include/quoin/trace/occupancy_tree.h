@@ -1,5 +1,6 @@
 #pragma once
 
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -7,6 +8,7 @@
 
 #include <quoin/core/vec.h>
 #include <quoin/grid/changes.h>
+#include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
@@ -52,7 +54,7 @@ class OccupancyTree {
 
   /// Of a field: of those cells the ones with a solid corner of a transparent material. Cost: 40 to 100 microseconds a
   /// chunk that has such.
-  static OccupancyTree build(const DensityGrid& field, const VoxelRegistry& types);
+  [[nodiscard]] static OccupancyTree build(const DensityGrid& field, const VoxelRegistry& types);
 
   /// Takes over what edits changed, as `grid.changes_since` tells of it, in place; builds it anew when all has changed.
   ///

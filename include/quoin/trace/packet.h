@@ -1,9 +1,11 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
-#include <limits>
 
+#include <quoin/core/assert.h>
+#include <quoin/core/direction.h>
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/ray.h>
 
@@ -22,15 +24,18 @@ struct alignas(64) RayPacket {
   std::uint32_t active = 0;  ///< bit i: ray i counts
 
   /// Puts a ray into a lane, which becomes active; to drop a lane, clear its bit in `active`.
-  /// Requires: 0 <= lane < kSize, here and below.
+  /// Requires: 0 <= lane < kSize.
   void set(int lane, const Ray& ray, double ray_max_t) {
+    QUOIN_ASSERT(lane >= 0 && lane < kSize, "0 <= lane < kSize");
     const auto i = static_cast<std::size_t>(lane);
     origin_x[i] = ray.origin.x, origin_y[i] = ray.origin.y, origin_z[i] = ray.origin.z;
     direction_x[i] = ray.direction.x, direction_y[i] = ray.direction.y, direction_z[i] = ray.direction.z;
     max_t[i] = ray_max_t;
     active |= 1U << lane;
   }
+  /// The ray of a lane, active or not. Requires: 0 <= lane < kSize.
   [[nodiscard]] Ray ray(int lane) const {
+    QUOIN_ASSERT(lane >= 0 && lane < kSize, "0 <= lane < kSize");
     const auto i = static_cast<std::size_t>(lane);
     return {{origin_x[i], origin_y[i], origin_z[i]}, {direction_x[i], direction_y[i], direction_z[i]}};
   }
@@ -44,8 +49,9 @@ struct alignas(64) PacketHits {
   RayPacket::Lanes<double> t{};
   RayPacket::Lanes<Direction> face{};
 
-  /// Puts what a ray alone hit into its lane, which counts as hit.
+  /// Puts what a ray alone hit into its lane, which counts as hit. Requires: 0 <= lane < RayPacket::kSize.
   void set(int lane, const RayHit& found) {
+    QUOIN_ASSERT(lane >= 0 && lane < RayPacket::kSize, "0 <= lane < kSize");
     const auto i = static_cast<std::size_t>(lane);
     hit |= 1U << lane;
     starts_inside |= std::uint32_t{found.starts_inside} << lane;
@@ -53,8 +59,10 @@ struct alignas(64) PacketHits {
     t[i] = found.t;
     face[i] = found.face;
   }
-  /// What a lane hit. Requires: its bit in `hit` is set.
+  /// What a lane hit. Requires: 0 <= lane < RayPacket::kSize, and its bit in `hit` is set.
   [[nodiscard]] RayHit operator[](int lane) const {
+    QUOIN_ASSERT(lane >= 0 && lane < RayPacket::kSize, "0 <= lane < kSize");
+    QUOIN_ASSERT((hit >> lane & 1U) != 0, "a lane that hit something");
     const auto i = static_cast<std::size_t>(lane);
     return {{x[i], y[i], z[i]}, face[i], t[i], (starts_inside >> lane & 1U) != 0};
   }

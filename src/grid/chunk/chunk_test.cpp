@@ -48,7 +48,7 @@ TEST(Chunk, OfOneTypeHoldsNoVoxelData) {
   EXPECT_EQ(Chunk().bounds(), IBox{});
 }
 
-TEST(Chunk, SetAnswersWhetherTheVoxelChanged) {
+TEST(Chunk, SetReturnsWhetherTheVoxelChanged) {
   Chunk chunk;
   EXPECT_TRUE(chunk.set(1, 2, 3, 5));
   EXPECT_FALSE(chunk.set(1, 2, 3, 5));

@@ -1,6 +1,7 @@
 #include <quoin/grid/density_chunk.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 
@@ -27,6 +28,11 @@ std::uint64_t solid_bits(const Half* row) {
   return mask;
 }
 
+// Whether it is none of what no `stored_density` is, whatever the band: -0, an infinity, NaN.
+[[maybe_unused]] bool is_stored(Half density) {
+  return density != 0x8000U && (density & 0x7C00U) != 0x7C00U;
+}
+
 }  // namespace
 
 Half stored_density(float density, float band) {
@@ -34,7 +40,9 @@ Half stored_density(float density, float band) {
   return stored_within(density, largest_within(band));
 }
 
-DensityChunk::DensityChunk(Half density, VoxelType material) : uniform_(density), materials_(material) {}
+DensityChunk::DensityChunk(Half density, VoxelType material) : uniform_(density), materials_(material) {
+  QUOIN_ASSERT(is_stored(density), "a stored_density");
+}
 DensityChunk::DensityChunk(const DensityChunk&) = default;
 DensityChunk::DensityChunk(DensityChunk&&) noexcept = default;
 DensityChunk& DensityChunk::operator=(const DensityChunk&) = default;
@@ -50,11 +58,13 @@ Half DensityChunk::get(int x, int y, int z) const {
 }
 
 std::uint64_t DensityChunk::solid_row(int y, int z) const {
+  QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");
   if (storage_ == nullptr) return is_solid(uniform_) ? ~std::uint64_t{0} : 0;
   return storage_->solid[static_cast<std::size_t>(z * kChunkEdge + y)];
 }
 
 const Half* DensityChunk::row(int y, int z) const {
+  QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");
   if (storage_ == nullptr) return nullptr;
   const std::uint32_t slab = storage_->slabs[ChunkStorage::slab_index(y, z)];
   const bool is_uniform = (slab & ChunkStorage::kUniformSlab) != 0;
@@ -62,6 +72,7 @@ const Half* DensityChunk::row(int y, int z) const {
 }
 
 void DensityChunk::fill(Half density) {
+  QUOIN_ASSERT(is_stored(density), "a stored_density");
   storage_.reset();
   uniform_ = density;
 }
@@ -100,6 +111,7 @@ std::uint32_t DensityChunk::slot_for_writing(std::size_t slab) {
 }
 
 std::uint64_t DensityChunk::write_row(int y, int z, std::span<const Half, kChunkEdge> densities) {
+  QUOIN_ASSERT(std::all_of(densities.begin(), densities.end(), is_stored), "every density is a stored_density");
   std::array<Half, kChunkEdge> uniform_row;
   const Half* old = row(y, z);
   if (old == nullptr) {
@@ -158,6 +170,21 @@ void DensityChunk::compact() {
 bool DensityChunk::is_full() const {
   if (storage_ == nullptr) return is_solid(uniform_);
   return std::all_of(storage_->solid.begin(), storage_->solid.end(), [](std::uint64_t row) { return ~row == 0; });
+}
+
+bool DensityChunk::operator==(const DensityChunk& other) const {
+  if (storage_ != other.storage_ || uniform() != other.uniform()) {
+    std::array<Half, kChunkEdge> row{};
+    std::array<Half, kChunkEdge> others{};
+    for (int z = 0; z < kChunkEdge; ++z) {
+      for (int y = 0; y < kChunkEdge; ++y) {
+        read_row(y, z, row);
+        other.read_row(y, z, others);
+        if (row != others) return false;
+      }
+    }
+  }
+  return materials_ == other.materials_;
 }
 
 std::uint64_t DensityChunk::content_hash() const {

@@ -171,5 +171,28 @@ TEST(DensityNeighbourhood, ReadsAcrossChunksAndOutside) {
   EXPECT_EQ(around.get({127, 0, 127}), kFar);
 }
 
+TEST(DensityChunk, EqualsWhatHoldsTheSameHoweverItIsStored) {
+  const Half air = stored_density(8.0F, 8.0F);
+  const Half solid = stored_density(-3.0F, 8.0F);
+  DensityChunk chunk(air);
+  DensityChunk other(air);
+  EXPECT_EQ(chunk, other);
+  std::array<Half, kChunkEdge> row;
+  row.fill(air);
+  row[7] = solid;
+  chunk.write_row(5, 6, row);
+  EXPECT_NE(chunk, other);
+  EXPECT_EQ(chunk, DensityChunk(chunk));
+  EXPECT_EQ(chunk.get(IVec3(7, 5, 6)), solid);
+  other.write_row(5, 6, row);
+  EXPECT_EQ(chunk, other);
+  row[7] = air;
+  chunk.write_row(5, 6, row);
+  EXPECT_EQ(chunk, DensityChunk(air)) << "with a slab that is stored";
+  EXPECT_NE(chunk, DensityChunk(solid));
+  chunk.materials().set(1, 2, 3, 4);
+  EXPECT_NE(chunk, DensityChunk(air));
+}
+
 }  // namespace
 }  // namespace quoin

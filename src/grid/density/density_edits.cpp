@@ -43,7 +43,8 @@ void combine_row(const Shape& shape, IVec3 start, int first, int end, VoxelType 
 
 // Applies `combine` wherever the shape's distance is below the band; elsewhere it must leave densities as they are.
 template <class Shape, class Combine>
-std::int64_t apply_shape(DensityStore& store, const Shape& shape, bool adds, VoxelType material, Combine&& combine) {
+std::int64_t apply_shape(DensityStore& store, const Shape& shape, bool adds, VoxelType material,
+                         const Progress& progress, Combine&& combine) {
   const double band = store.band();
   const auto choose = [&](IVec3 chunk) {
     const double distance = shape.distance(DVec3(chunk) * double{kChunkEdge} + kMiddle);
@@ -55,20 +56,21 @@ std::int64_t apply_shape(DensityStore& store, const Shape& shape, bool adds, Vox
     combine_row(shape, start, first, end, material, row, combine);
     return true;
   };
-  return store.edit(box_around(shape.min() - band, shape.max() + band), adds, material, choose, change);
+  return store.edit(box_around(shape.min() - band, shape.max() + band), adds, material, choose, change, progress);
 }
 
 template <class Shape>
-std::int64_t add_shape(DensityStore& store, const Shape& shape, VoxelType material, double blend) {
+std::int64_t add_shape(DensityStore& store, const Shape& shape, VoxelType material, double blend,
+                       const Progress& progress) {
   if (!shape.is_sound() || !is_length(blend)) return 0;
-  return apply_shape(store, shape, true, material,
+  return apply_shape(store, shape, true, material, progress,
                      [&](double a, double b) { return united(a, b, blend, store.band()); });
 }
 
 template <class Shape>
 std::int64_t remove_shape(DensityStore& store, const Shape& shape, double blend) {
   if (!shape.is_sound() || !is_length(blend)) return 0;
-  return apply_shape(store, shape, false, kAir,
+  return apply_shape(store, shape, false, kAir, {},
                      [&](double a, double b) { return -united(-a, b, blend, store.band()); });
 }
 
@@ -83,12 +85,12 @@ bool DensityGrid::set(IVec3 sample, DensitySample value) {
   };
   const auto rows = [](IVec3) { return ChunkEdit::Rows; };
   const NoticeOfEdits notice(impl_->store, notice_);
-  return impl_->store.edit(box_from(sample, sample), true, kAir, rows, replace) != 0;
+  return impl_->store.edit(box_from(sample, sample), true, kAir, rows, replace, {}) != 0;
 }
 
 std::int64_t DensityGrid::edit_rows(
-    const IBox& box,
-    FunctionRef<void(IVec3 first, std::span<float> densities, std::span<VoxelType> materials)> change) {
+    const IBox& box, FunctionRef<void(IVec3 first, std::span<float> densities, std::span<VoxelType> materials)> change,
+    const Progress& progress) {
   const auto change_part = [&](IVec3 start, int first, int end, SampleRow& row) {
     const auto from = static_cast<std::size_t>(first);
     const auto count = static_cast<std::size_t>(end - first);
@@ -97,36 +99,39 @@ std::int64_t DensityGrid::edit_rows(
     return true;
   };
   const auto rows = [](IVec3) { return ChunkEdit::Rows; };
-  const NoticeOfEdits notice(impl_->store, notice_);
-  return impl_->store.edit(box_from(box), true, kAir, rows, change_part);
+  const NoticeOfEdits notice(impl().store, notice_);
+  return impl().store.edit(box_from(box), true, kAir, rows, change_part, progress);
 }
 
-std::int64_t DensityGrid::add_sphere(DVec3 centre, double radius, VoxelType material, double blend) {
-  const NoticeOfEdits notice(impl_->store, notice_);
-  return add_shape(impl_->store, Sphere(centre, radius), material, blend);
+std::int64_t DensityGrid::add_sphere(DVec3 centre, double radius, VoxelType material, double blend,
+                                     const Progress& progress) {
+  const NoticeOfEdits notice(impl().store, notice_);
+  return add_shape(impl().store, Sphere(centre, radius), material, blend, progress);
 }
 
 std::int64_t DensityGrid::remove_sphere(DVec3 centre, double radius, double blend) {
-  const NoticeOfEdits notice(impl_->store, notice_);
-  return remove_shape(impl_->store, Sphere(centre, radius), blend);
+  const NoticeOfEdits notice(impl().store, notice_);
+  return remove_shape(impl().store, Sphere(centre, radius), blend);
 }
 
-std::int64_t DensityGrid::add_box(DVec3 min, DVec3 max, VoxelType material, double rounding, double blend) {
-  const NoticeOfEdits notice(impl_->store, notice_);
-  return add_shape(impl_->store, RoundedBox(min, max, rounding), material, blend);
+std::int64_t DensityGrid::add_box(DVec3 min, DVec3 max, VoxelType material, double rounding, double blend,
+                                  const Progress& progress) {
+  const NoticeOfEdits notice(impl().store, notice_);
+  return add_shape(impl().store, RoundedBox(min, max, rounding), material, blend, progress);
 }
 
 std::int64_t DensityGrid::remove_box(DVec3 min, DVec3 max, double rounding, double blend) {
-  const NoticeOfEdits notice(impl_->store, notice_);
-  return remove_shape(impl_->store, RoundedBox(min, max, rounding), blend);
+  const NoticeOfEdits notice(impl().store, notice_);
+  return remove_shape(impl().store, RoundedBox(min, max, rounding), blend);
 }
 
-std::int64_t DensityGrid::flatten(DVec3 centre, double radius, const FlattenOptions& options) {
+std::int64_t DensityGrid::flatten(DVec3 centre, double radius, const FlattenOptions& options,
+                                  const Progress& progress) {
   const Brush brush(centre, radius, options.strength);
   const Plane plane(options.point, options.normal);
   if (!brush.is_sound() || !plane.is_sound()) return 0;
-  const NoticeOfEdits notice(impl_->store, notice_);
-  DensityStore& store = impl_->store;
+  const NoticeOfEdits notice(impl().store, notice_);
+  DensityStore& store = impl().store;
   const double band = store.band();
   const auto choose = [&](IVec3 chunk) {
     const DVec3 middle = DVec3(chunk) * double{kChunkEdge} + kMiddle;
@@ -147,7 +152,8 @@ std::int64_t DensityGrid::flatten(DVec3 centre, double radius, const FlattenOpti
     }
     return true;
   };
-  return store.edit(box_around(brush.sphere().min(), brush.sphere().max()), true, options.material, choose, change);
+  return store.edit(box_around(brush.sphere().min(), brush.sphere().max()), true, options.material, choose, change,
+                    progress);
 }
 
 }  // namespace quoin

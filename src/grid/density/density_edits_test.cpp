@@ -314,5 +314,50 @@ TEST(DensityEdits, FlatteningAtFullStrengthPutsTheSurfaceOnThePlane) {
   EXPECT_EQ(grid.material({0, -2, 0}), 4);
 }
 
+TEST(DensityEdits, GoOnUntilTheirProgressSaysOtherwise) {
+  std::int64_t asked = 0;
+  double last = 0.0;
+  const auto listen = [&](double fraction) {
+    EXPECT_GE(fraction, last);
+    last = fraction;
+    return ++asked < 3;
+  };
+  const auto fresh = [&] {
+    asked = 0;
+    last = 0.0;
+    return DensityGrid();
+  };
+  DensityGrid grid = fresh();
+  ChangeCursor cursor = grid.cursor();
+  const std::int64_t edited = grid.edit(
+      IBox{IVec3(0), IVec3(1'000'000, 64, 64)},
+      [](IVec3, DensitySample) {
+        return DensitySample{-8.0F, 3};
+      },
+      listen);
+  EXPECT_EQ(edited, 3 * 64 * 64 * 64);
+  EXPECT_EQ(grid.solid_count(), edited) << "what was done stays";
+  EXPECT_EQ(grid.changes_since(cursor).items.size(), 3U) << "and is told";
+
+  grid = fresh();
+  const std::int64_t added = grid.add_box(DVec3(0.0), DVec3(1e9), 3, 0.0, 0.0, listen);
+  EXPECT_EQ(added, grid.solid_count());
+  EXPECT_EQ(asked, 3);
+  grid = fresh();
+  grid.add_sphere(DVec3(0.0), 1e6, 3, 0.0, listen);
+  EXPECT_EQ(asked, 3);
+  grid = fresh();
+  grid.flatten(DVec3(0.0), 1e6, {}, listen);
+  EXPECT_EQ(asked, 3);
+
+  grid = DensityGrid();
+  double whole = 0.0;
+  grid.add_sphere(DVec3(0.0), 40.0, 3, 0.0, [&](double fraction) { return (whole = fraction) <= 1.0; });
+  EXPECT_EQ(whole, 1.0);
+  DensityGrid same;
+  same.add_sphere(DVec3(0.0), 40.0, 3);
+  EXPECT_EQ(grid.solid_count(), same.solid_count());
+}
+
 }  // namespace
 }  // namespace quoin

@@ -18,12 +18,12 @@ DensityGrid::~DensityGrid() = default;
 DensityGrid::DensityGrid(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 DensityGrid DensityGrid::snapshot() const {
-  impl_->solid.prepare(impl_->store.journal(), impl_->store.entries());
-  return DensityGrid(std::make_unique<Impl>(*impl_));
+  impl().solid.prepare(impl().store.journal(), impl().store.entries());
+  return DensityGrid(std::make_unique<Impl>(impl()));
 }
 
 float DensityGrid::band() const {
-  return impl_->store.band();
+  return impl().store.band();
 }
 
 float DensityGrid::density(IVec3 sample) const {
@@ -34,14 +34,14 @@ VoxelType DensityGrid::material(IVec3 sample) const {
   return impl_->store.material(sample);
 }
 
-void DensityGrid::put_chunk(IVec3 chunk, DensityChunk samples) {
-  const NoticeOfEdits notice(impl_->store, notice_);
-  impl_->store.put(chunk, std::move(samples));
+std::int64_t DensityGrid::put_chunk(IVec3 chunk, DensityChunk samples) {
+  const NoticeOfEdits notice(impl().store, notice_);
+  return impl().store.put(chunk, std::move(samples));
 }
 
 void DensityGrid::clear() {
-  const NoticeOfEdits notice(impl_->store, notice_);
-  impl_->store.clear();
+  const NoticeOfEdits notice(impl().store, notice_);
+  impl().store.clear();
 }
 
 const DensityChunk* DensityGrid::find_chunk(IVec3 chunk) const {
@@ -50,11 +50,11 @@ const DensityChunk* DensityGrid::find_chunk(IVec3 chunk) const {
 }
 
 std::vector<IVec3> DensityGrid::chunks() const {
-  return impl_->store.chunks();
+  return impl().store.chunks();
 }
 
 std::size_t DensityGrid::chunk_count() const {
-  return impl_->store.entries().size();
+  return impl().store.entries().size();
 }
 
 DensityNeighbourhood DensityGrid::neighbourhood(IVec3 chunk) const {
@@ -68,7 +68,7 @@ DensityNeighbourhood DensityGrid::neighbourhood(IVec3 chunk) const {
 }
 
 IBox DensityGrid::solid_bounds() const {
-  return impl_->solid.update(impl_->store.journal(), impl_->store.entries());
+  return impl().solid.update(impl().store.journal(), impl().store.entries());
 }
 
 IBox DensityGrid::bounds() const {
@@ -78,7 +78,7 @@ IBox DensityGrid::bounds() const {
 
 std::int64_t DensityGrid::solid_count() const {
   std::int64_t count = 0;
-  impl_->store.entries().for_each([&](IVec3, const DensityStore::Entry& entry) {
+  impl().store.entries().for_each([&](IVec3, const DensityStore::Entry& entry) {
     for (int z = 0; z < kChunkEdge; ++z) {
       for (int y = 0; y < kChunkEdge; ++y) count += std::popcount(entry.samples.solid_row(y, z));
     }
@@ -87,15 +87,15 @@ std::int64_t DensityGrid::solid_count() const {
 }
 
 DensityChanges DensityGrid::changes_since(ChangeCursor& cursor) const {
-  return impl_->store.journal().changes_since<DensityChange>(cursor, by_chunk);
+  return impl().store.journal().changes_since<DensityChange>(cursor, by_chunk);
 }
 
 bool DensityGrid::has_changed_since(const ChangeCursor& cursor) const {
-  return impl_->store.journal().has_changed_since(cursor);
+  return impl().store.journal().has_changed_since(cursor);
 }
 
 ChangeCursor DensityGrid::cursor() const {
-  return impl_->store.journal().present();
+  return impl().store.journal().present();
 }
 
 std::vector<IVec3> chunks_to_mesh(const DensityGrid& grid, const DensityChanges& changes, int reach) {
@@ -118,11 +118,11 @@ std::vector<IVec3> chunks_to_mesh(const DensityGrid& grid, const DensityChanges&
 }
 
 std::size_t DensityGrid::bytes() const {
-  return impl_->store.bytes();
+  return impl().store.bytes();
 }
 
 void DensityGrid::compact() {
-  impl_->store.compact();
+  impl().store.compact();
 }
 
 }  // namespace quoin

@@ -3,7 +3,9 @@
 #include <bit>
 #include <cstdint>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
+#include <quoin/grid/density_grid.h>
 
 #include "grid/bounds_cache.h"
 #include "grid/density/density_store.h"
@@ -30,6 +32,12 @@ struct DensityGrid::Impl {
   DensityStore store;
   BoundsCache<DensityRecord, ChunkTrie<DensityStore::Entry>, SolidBox> solid;
 };
+
+// What a field that was moved from has no more. Single samples and chunks go without the question.
+inline DensityGrid::Impl& DensityGrid::impl() const {
+  QUOIN_ASSERT(impl_ != nullptr, "a field that was not moved from");
+  return *impl_;
+}
 
 /// Gives notice, where it ends, of what was edited while it was there, also when that threw.
 class NoticeOfEdits {

@@ -212,5 +212,20 @@ TEST(DensityGrid, EditVisitsEverySampleOnceInOrder) {
   EXPECT_EQ(grid.chunk_count(), 0U);
 }
 
+TEST(DensityGrid, PuttingAChunkTellsHowManySamplesChanged) {
+  DensityGrid grid;
+  DensityChunk chunk(stored_density(grid.band(), grid.band()));
+  EXPECT_EQ(grid.put_chunk(IVec3(0), chunk), 0) << "far air";
+  std::array<Half, kChunkEdge> row;
+  row.fill(stored_density(grid.band(), grid.band()));
+  row[9] = row[10] = stored_density(-1.0F, grid.band());
+  chunk.write_row(3, 4, row);
+  EXPECT_EQ(grid.put_chunk(IVec3(0), chunk), 2);
+  EXPECT_EQ(grid.put_chunk(IVec3(0), chunk), 0);
+  chunk.materials().set(9, 3, 4, 7);
+  EXPECT_EQ(grid.put_chunk(IVec3(0), chunk), 1);
+  EXPECT_EQ(grid.put_chunk(IVec3(1 << 30, 0, 0), chunk), 0) << "beyond the world";
+}
+
 }  // namespace
 }  // namespace quoin

@@ -126,8 +126,8 @@ std::vector<ChunkPart> parts_near_chunks(const DensityStore& store, const LongBo
 std::int64_t DensityGrid::smooth(DVec3 centre, double radius, double strength) {
   const Brush brush(centre, radius, strength);
   if (!brush.is_sound()) return 0;
-  const NoticeOfEdits notice(impl_->store, notice_);
-  DensityStore& store = impl_->store;
+  const NoticeOfEdits notice(impl().store, notice_);
+  DensityStore& store = impl().store;
   const LongBox box = clipped(box_around(brush.sphere().min(), brush.sphere().max()));
   if (is_empty(box)) return 0;
   std::vector<ChunkPart> parts;

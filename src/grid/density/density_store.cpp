@@ -36,6 +36,19 @@ bool are_one_value(const DensityChunk& a, const DensityChunk& b, int y, int z) {
   return material.has_value() && material == b.materials().uniform();
 }
 
+// Whether every density is one that edits within this band store.
+[[maybe_unused]] bool is_stored_within(const DensityChunk& samples, Half far) {
+  const auto is_stored = [far](Half density) { return stored_within(float_from_half(density), far) == density; };
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      const Half* const row = samples.row(y, z);
+      if (row == nullptr ? !is_stored(samples.get(0, y, z)) : !std::all_of(row, row + kChunkEdge, is_stored))
+        return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 DensityStore::DensityStore(float band) : far_(largest_within(band)) {
@@ -130,17 +143,19 @@ std::int64_t DensityStore::make_solid(IVec3 chunk, VoxelType material) {
   return changes.samples;
 }
 
-void DensityStore::put(IVec3 chunk, DensityChunk samples) {
-  if (!is_inside_world(chunk)) return;
+std::int64_t DensityStore::put(IVec3 chunk, DensityChunk samples) {
+  QUOIN_ASSERT(is_stored_within(samples, far_), "densities are stored_density of the band");
+  if (!is_inside_world(chunk)) return 0;
   samples.unite_slabs();
   const Entry* present = find(chunk);
-  if (present != nullptr && present->samples.shares_storage_with(samples)) return;
+  if (present != nullptr && present->samples.shares_storage_with(samples)) return 0;
   const ChangeReach changes = differences(present == nullptr ? nullptr : &present->samples, &samples);
-  if (present == nullptr && changes.samples == 0) return;
+  if (present == nullptr && changes.samples == 0) return 0;
   journal_.begin_change();
   Entry& entry = find_or_create(chunk);
   entry.samples = std::move(samples);
   finish_edit(chunk, entry, changes, false);
+  return changes.samples;
 }
 
 void DensityStore::clear() {

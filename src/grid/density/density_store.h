@@ -1,11 +1,13 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstring>
 #include <utility>
 #include <vector>
 
+#include <quoin/core/progress.h>
 #include <quoin/grid/density_grid.h>
 
 #include "core/change_journal.h"
@@ -67,15 +69,17 @@ class DensityStore {
   /// `chunk_edit(chunk)` says what to do with a chunk; it is asked for chunks that do not exist where `creates`. Solid
   /// counts only for chunks that do not exist, which become `material`; others are edited by rows.
   /// `change(sample, first, end, row)` changes part of a row, and returns false when it did not; `sample` is the row's
-  /// first (local x = 0).
+  /// first (local x = 0). `progress` is asked after each chunk.
   template <class ChooseChunk, class ChangeRow>
-  std::int64_t edit(const LongBox& box, bool creates, VoxelType material, ChooseChunk&& chunk_edit, ChangeRow&& change);
+  std::int64_t edit(const LongBox& box, bool creates, VoxelType material, ChooseChunk&& chunk_edit, ChangeRow&& change,
+                    const Progress& progress);
 
   /// Edits rows of parts of chunks that lie within the world.
   template <class ChangeRow>
   std::int64_t edit_parts(const std::vector<ChunkPart>& parts, ChangeRow&& change);
 
-  void put(IVec3 chunk, DensityChunk samples);
+  /// Returns how many samples changed.
+  std::int64_t put(IVec3 chunk, DensityChunk samples);
   void clear();
   [[nodiscard]] std::vector<IVec3> chunks() const;
   [[nodiscard]] std::size_t bytes() const;
@@ -138,7 +142,7 @@ std::int64_t DensityStore::edit_parts(const std::vector<ChunkPart>& parts, Chang
 
 template <class ChooseChunk, class ChangeRow>
 std::int64_t DensityStore::edit(const LongBox& wanted, bool creates, VoxelType material, ChooseChunk&& chunk_edit,
-                                ChangeRow&& change) {
+                                ChangeRow&& change, const Progress& progress) {
   const LongBox box = clipped(wanted);
   if (is_empty(box)) return 0;
   const IBox chunks = chunks_of(box);
@@ -153,17 +157,26 @@ std::int64_t DensityStore::edit(const LongBox& wanted, bool creates, VoxelType m
       changed += edit_rows(chunk, part_of(box, chunk), change);
     }
   };
+  double done = 0.0;
+  const auto goes_on = [&](double total) { return !progress || progress(std::min(++done / total, 1.0)); };
   if (creates) {
+    const DVec3 size(chunks.size());
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
-        for (int x = chunks.min.x; x < chunks.max.x; ++x) visit({x, y, z});
+        for (int x = chunks.min.x; x < chunks.max.x; ++x) {
+          visit({x, y, z});
+          if (!goes_on(size.x * size.y * size.z)) return changed;
+        }
       }
     }
   } else {
     std::vector<IVec3> present;
     entries_.for_each_in(chunks, [&](IVec3 at, const Entry&) { present.push_back(at); });
     std::sort(present.begin(), present.end(), by_zyx);
-    for (const IVec3 at : present) visit(at);
+    for (const IVec3 at : present) {
+      visit(at);
+      if (!goes_on(static_cast<double>(present.size()))) return changed;
+    }
   }
   return changed;
 }

@@ -302,7 +302,7 @@ void update_density_of_voxels(const Neighbourhood& chunks, const IBox& changed, 
   write_window(*scratch, window, largest_within(kBand), densities);
 }
 
-DensityGrid field_from_grid(const Grid& grid, Threads threads) {
+Result<DensityGrid> field_from_grid(const Grid& grid, Threads threads, const Progress& progress) {
   DensityGrid field(kBand);
   const std::vector<IVec3> places = chunks_near(grid);
   // In batches, so that little waits to be put in place.
@@ -313,6 +313,10 @@ DensityGrid field_from_grid(const Grid& grid, Threads threads) {
     parallel_for(count, threads,
                  [&](std::size_t i) { made[i] = density_of_voxels(grid.neighbourhood(places[first + i])); });
     for (std::size_t i = 0; i < count; ++i) field.put_chunk(places[first + i], std::move(*made[i]));
+    const std::size_t done = first + count;
+    if (progress && !progress(static_cast<double>(done) / static_cast<double>(places.size()))) {
+      return make_error(ErrorCode::Cancelled, "cancelled");
+    }
   }
   return field;
 }

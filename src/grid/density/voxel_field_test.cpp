@@ -65,7 +65,7 @@ TEST(VoxelField, AgreesWithTheSlowWay) {
   for (unsigned seed = 1; seed <= 2; ++seed) {
     SCOPED_TRACE(seed);
     const Grid grid = random_model(seed);
-    const DensityGrid field = field_from_grid(grid, Threads{2});
+    const DensityGrid field = *field_from_grid(grid, Threads{2});
     const PlainVoxelField plain(grid);
     std::mt19937 random(seed);
     for (int round = 0; round < 40; ++round) {
@@ -85,7 +85,7 @@ TEST(VoxelField, AgreesWithTheSlowWay) {
 
 TEST(VoxelField, KeepsEveryVoxelsKindAndType) {
   const Grid grid = random_model(5);
-  const DensityGrid field = field_from_grid(grid);
+  const DensityGrid field = *field_from_grid(grid);
   EXPECT_EQ(field.solid_count(), grid.voxel_count());
   EXPECT_EQ(field.solid_bounds(), grid.bounds());
   grid.for_each([&](IVec3 p, VoxelType type) {
@@ -105,7 +105,7 @@ TEST(VoxelField, KeepsEveryVoxelsKindAndType) {
 TEST(VoxelField, AFlatWallIsTheDistanceFromItsFace) {
   Grid grid;
   grid.fill_box({{-100, -100, -40}, {101, 10, 41}}, 3);
-  const DensityGrid field = field_from_grid(grid);
+  const DensityGrid field = *field_from_grid(grid);
   for (int y = 0; y < 30; ++y) {
     // The smoothing sees no more than 8.5, so it bends the last values a little.
     const double distance = y - 9.5;
@@ -115,8 +115,8 @@ TEST(VoxelField, AFlatWallIsTheDistanceFromItsFace) {
 
 TEST(VoxelField, IsTheSameAtAnyNumberOfThreadsAndNothingForNothing) {
   const Grid grid = random_model(8);
-  const DensityGrid one = field_from_grid(grid, Threads{1});
-  const DensityGrid four = field_from_grid(grid, Threads{4});
+  const DensityGrid one = *field_from_grid(grid, Threads{1});
+  const DensityGrid four = *field_from_grid(grid, Threads{4});
   ASSERT_EQ(one.chunks(), four.chunks());
   for (const IVec3 at : one.chunks()) {
     for (int i = 0; i < kChunkEdge * kChunkEdge; ++i) {
@@ -127,7 +127,7 @@ TEST(VoxelField, IsTheSameAtAnyNumberOfThreadsAndNothingForNothing) {
       ASSERT_EQ(a, b);
     }
   }
-  EXPECT_EQ(field_from_grid(Grid()).chunk_count(), 0U);
+  EXPECT_EQ(field_from_grid(Grid())->chunk_count(), 0U);
 }
 
 TEST(VoxelField, AnUpdateGivesTheBitsOfAFreshChunk) {
@@ -156,10 +156,21 @@ TEST(VoxelField, AnUpdateGivesTheBitsOfAFreshChunk) {
 TEST(VoxelField, TheInsideOfALargeModelTakesNoMemoryPerSample) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {64 * 5, 64 * 5, 64 * 5}}, 3);
-  const DensityGrid field = field_from_grid(grid);
+  const DensityGrid field = *field_from_grid(grid);
   EXPECT_TRUE(field.find_chunk({2, 2, 2})->uniform().has_value());
   EXPECT_TRUE(field.find_chunk({1, 1, 1})->uniform().has_value());
   EXPECT_FALSE(field.find_chunk({0, 2, 2})->uniform().has_value());
+}
+
+TEST(VoxelField, CancelsWhereProgressSaysSo) {
+  Grid grid;
+  grid.fill_box({IVec3(-70), IVec3(200)}, 1);
+  double last = 0.0;
+  EXPECT_TRUE(field_from_grid(grid, {2}, [&](double fraction) { return (last = fraction) <= 1.0; }).has_value());
+  EXPECT_EQ(last, 1.0);
+  const auto cancelled = field_from_grid(grid, {2}, [](double) { return false; });
+  ASSERT_FALSE(cancelled.has_value());
+  EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
 }
 
 }  // namespace

@@ -77,7 +77,7 @@ TEST(DensityHalving, EverySampleIsWhatTheRulesSay) {
   for (unsigned seed = 1; seed <= 4; ++seed) {
     std::mt19937 random(seed);
     const DensityGrid field = random_field(random, seed == 4 ? 3.1F : 8.0F);
-    const DensityGrid coarse = downsample(field);
+    const DensityGrid coarse = *downsample(field);
     EXPECT_EQ(coarse.band(), DensityGrid(0.5F * field.band()).band());
     std::int64_t solid = 0;
     for (const IVec3 chunk : field.chunks()) {
@@ -99,7 +99,7 @@ TEST(DensityHalving, TheSurfaceStaysWhereItWas) {
   DensityGrid field;
   const DVec3 centre{70.3, 61.8, 10.4};
   field.add_sphere(centre, 40.0, 1);
-  const DensityGrid coarse = downsample(field);
+  const DensityGrid coarse = *downsample(field);
   for (int i = 0; i < 200; ++i) {
     const double up = 1.0 - (i + 0.5) / 100.0;
     const double around = 2.4 * i;
@@ -117,8 +117,8 @@ TEST(DensityHalving, WhatLiesOutsideGivesTheMaterial) {
     if (sample.density < 0.0F) sample.material = 2;
     return sample;
   });
-  const DensityGrid once = downsample(field);
-  const DensityGrid twice = downsample(once);
+  const DensityGrid once = *downsample(field);
+  const DensityGrid twice = *downsample(once);
   EXPECT_EQ(field.material({12, 0, 12}), 2);
   EXPECT_EQ(field.material({12, -1, 12}), 1);
   EXPECT_EQ(once.material({6, 0, 6}), 2);
@@ -132,7 +132,7 @@ TEST(DensityHalving, WhatLiesOutsideGivesTheMaterial) {
     return sample;
   });
   EXPECT_EQ(lower.material({12, -2, 12}), 1);
-  EXPECT_EQ(downsample(lower).material({6, -1, 6}), 2);
+  EXPECT_EQ(downsample(lower)->material({6, -1, 6}), 2);
 }
 
 TEST(DensityHalving, APyramidFollowsEdits) {
@@ -146,7 +146,7 @@ TEST(DensityHalving, APyramidFollowsEdits) {
     DensityGrid expected = field.snapshot();
     for (int level = 1; level <= 3; ++level) {
       const std::int64_t finer = expected.solid_count();
-      expected = downsample(expected);
+      expected = *downsample(expected);
       ASSERT_TRUE(are_equal(pyramid.level(level), expected)) << "step " << step << " level " << level;
       EXPECT_EQ(pyramid.counts(level).finer_solid, finer);
       EXPECT_EQ(pyramid.counts(level).solid, expected.solid_count());
@@ -242,7 +242,7 @@ TEST(DensityHalving, AnEditMakesAnewOnlyTheChunksThatReadIt) {
 TEST(DensityHalving, TheSameAtAnyNumberOfThreads) {
   std::mt19937 random(9);
   const DensityGrid field = random_field(random);
-  EXPECT_TRUE(are_equal(downsample(field, {1}), downsample(field, {4})));
+  EXPECT_TRUE(are_equal(*downsample(field, {1}), *downsample(field, {4})));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/progress_steps.h"
 #include "grid/chunk_order.h"
 #include "grid/halving/chunk_halver.h"
 #include "grid/halving/density_halver.h"
@@ -95,7 +96,8 @@ struct Level : Kept {
   using Kept::content;
   ChangeCursor followed;
 
-  void update(const Content& finer, const Halving& halving, Threads threads) {
+  // Returns false where `progress` cancelled it: then nothing has changed.
+  bool update(const Content& finer, const Halving& halving, Threads threads, const Progress& progress = {}) {
     ChangeCursor now = followed;
     const auto changes = finer.changes_since(now);
     std::vector<IVec3> dirty;
@@ -113,9 +115,16 @@ struct Level : Kept {
       return content.find_chunk(chunk) == nullptr;
     });
     std::vector<typename Halving::Made> made(dirty.size());
-    parallel_for(dirty.size(), threads, [&](std::size_t i) { made[i] = halving.make(finer, dirty[i]); });
+    ProgressSteps steps(progress, dirty.size());
+    parallel_for(dirty.size(), threads, [&](std::size_t i) {
+      if (steps.cancelled()) return;
+      made[i] = halving.make(finer, dirty[i]);
+      steps.step();
+    });
+    if (steps.cancelled()) return false;
     for (std::size_t i = 0; i < dirty.size(); ++i) Kept::put(dirty[i], std::move(made[i]));
     followed = now;
+    return true;
   }
 };
 
@@ -155,15 +164,15 @@ Chunk downsample_chunk(const Grid& grid, const VoxelRegistry& types, IVec3 chunk
   return ChunkHalver(grid, types, chunk).make();
 }
 
-Grid downsample(const Grid& grid, const VoxelRegistry& types, Threads threads) {
+Result<Grid> downsample(const Grid& grid, const VoxelRegistry& types, Threads threads, const Progress& progress) {
   Level<VoxelHalving, VoxelLevel> level;
-  level.update(grid, {&types}, threads);
+  if (!level.update(grid, {&types}, threads, progress)) return make_error(ErrorCode::Cancelled, "cancelled");
   return std::move(level.content);
 }
 
-DensityGrid downsample(const DensityGrid& field, Threads threads) {
+Result<DensityGrid> downsample(const DensityGrid& field, Threads threads, const Progress& progress) {
   Level<DensityHalving, DensityLevel> level;
-  level.update(field, {}, threads);
+  if (!level.update(field, {}, threads, progress)) return make_error(ErrorCode::Cancelled, "cancelled");
   return std::move(level.content);
 }
 

@@ -109,7 +109,7 @@ TEST(Downsample, EveryCellIsWhatTheRulesSay) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     std::mt19937 random(seed);
     const Grid grid = random_grid(random);
-    const Grid coarse = downsample(grid, types);
+    const Grid coarse = *downsample(grid, types);
     const Oracle oracle(grid, types);
     const IBox box = grid.bounds();
     std::int64_t solid = 0;
@@ -132,17 +132,17 @@ TEST(Downsample, TheSameAtAnyNumberOfThreads) {
   const VoxelRegistry types = some_types();
   std::mt19937 random(8);
   const Grid grid = random_grid(random);
-  EXPECT_TRUE(are_equal(downsample(grid, types, {1}), downsample(grid, types, {5})));
+  EXPECT_TRUE(are_equal(*downsample(grid, types, {1}), *downsample(grid, types, {5})));
 }
 
 TEST(Downsample, EmptyFullAndUniform) {
   const VoxelRegistry types = some_types();
-  EXPECT_EQ(downsample(Grid(), types).chunk_count(), 0U);
+  EXPECT_EQ(downsample(Grid(), types)->chunk_count(), 0U);
   Grid block;
   block.fill_box({{-128, -128, 0}, {128, 128, 256}}, 3);
   Grid expected;
   expected.fill_box({{-64, -64, 0}, {64, 64, 128}}, 3);
-  EXPECT_TRUE(are_equal(downsample(block, types), expected));
+  EXPECT_TRUE(are_equal(*downsample(block, types), expected));
 }
 
 TEST(Downsample, RodsStayWholeWhereverTheyLie) {
@@ -156,7 +156,7 @@ TEST(Downsample, RodsStayWholeWhereverTheyLie) {
         IVec3 last = first + (IVec3(1) - unit(axis)) * (width - 1);
         last[axis] = 69;
         grid.fill_box({first, last + 1}, 3);
-        const Grid coarse = downsample(grid, types);
+        const Grid coarse = *downsample(grid, types);
         for (int along = -35; along < 35; ++along) {
           int cells = 0;
           coarse.for_each([&](IVec3 cell, VoxelType) { cells += cell[axis] == along; });
@@ -172,11 +172,11 @@ TEST(Downsample, SpecksGoAndStepsOfASurfaceDoNotGrow) {
   const VoxelRegistry types = some_types();
   Grid grid;
   grid.fill_box({{-20, -20, -20}, {20, 0, 20}}, 3);
-  const std::int64_t ground = downsample(grid, types).voxel_count();
+  const std::int64_t ground = downsample(grid, types)->voxel_count();
   grid.fill_box({{-20, 0, 3}, {20, 1, 4}}, 3);  // a kerb on the ground
   grid.set({5, 30, 5}, 3);
   grid.fill_box({{5, 40, 5}, {7, 41, 6}}, 3);
-  EXPECT_EQ(downsample(grid, types).voxel_count(), ground);
+  EXPECT_EQ(downsample(grid, types)->voxel_count(), ground);
 }
 
 TEST(Downsample, WhatLiesOpenGivesTheColourAndOpaqueBeatsTransparent) {
@@ -184,12 +184,12 @@ TEST(Downsample, WhatLiesOpenGivesTheColourAndOpaqueBeatsTransparent) {
   Grid lawn;
   lawn.fill_box({{0, 0, 0}, {8, 7, 8}}, 4);
   lawn.fill_box({{0, 7, 0}, {8, 8, 8}}, 3);  // half of each topmost cell, on top
-  EXPECT_EQ(downsample(lawn, types).get({1, 3, 1}), 3);
-  EXPECT_EQ(downsample(lawn, types).get({1, 2, 1}), 4);
+  EXPECT_EQ(downsample(lawn, types)->get({1, 3, 1}), 3);
+  EXPECT_EQ(downsample(lawn, types)->get({1, 2, 1}), 4);
   Grid framed;
   framed.fill_box({{0, 0, 0}, {2, 2, 2}}, 1);
   framed.set({0, 0, 0}, 4);
-  EXPECT_EQ(downsample(framed, types).get({0, 0, 0}), 4);
+  EXPECT_EQ(downsample(framed, types)->get({0, 0, 0}), 4);
 }
 
 TEST(Downsample, APyramidFollowsEdits) {
@@ -202,7 +202,7 @@ TEST(Downsample, APyramidFollowsEdits) {
     pyramid.update(grid, types, 3);
     Grid expected = grid.snapshot();
     for (int level = 1; level <= pyramid.levels(); ++level) {
-      expected = downsample(expected, types);
+      expected = *downsample(expected, types);
       ASSERT_TRUE(are_equal(pyramid.level(level), expected)) << "step " << step << " level " << level;
     }
     ASSERT_EQ(pyramid.levels(), 3);
@@ -276,6 +276,24 @@ TEST(Downsample, AGridOfWhichNothingWouldBeLeftHasFewerLevels) {
   pyramid.update(grid, types, 4);
   EXPECT_EQ(pyramid.levels(), 2);
   EXPECT_EQ(pyramid.level(2).voxel_count(), 1);
+}
+
+TEST(Downsample, CancelsWhereProgressSaysSo) {
+  Grid grid;
+  grid.fill_box({IVec3(-70), IVec3(200)}, 1);
+  VoxelRegistry types;
+  ASSERT_TRUE(types.add({}).has_value());
+  double last = 0.0;
+  EXPECT_TRUE(downsample(grid, types, {2}, [&](double fraction) { return (last = fraction) <= 1.0; }).has_value());
+  EXPECT_EQ(last, 1.0);
+  const auto cancelled = downsample(grid, types, {2}, [](double) { return false; });
+  ASSERT_FALSE(cancelled.has_value());
+  EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
+  DensityGrid field;
+  field.add_sphere(DVec3(0.0), 80.0, 1);
+  const auto also = downsample(field, {2}, [](double) { return false; });
+  ASSERT_FALSE(also.has_value());
+  EXPECT_EQ(also.error().code, ErrorCode::Cancelled);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include <quoin/scene/scene_animation.h>
 
+#include "core/death_for_tests.h"
 #include "io/gltf/gltf_for_tests.h"
 #include "io/vox/vox_for_tests.h"
 
@@ -269,6 +270,17 @@ TEST_F(GltfAnimation, OddFramesAndKeysAreRefused) {
   }
   meshes.seconds = -1.0;
   EXPECT_EQ(write_mesh(meshes, FileFormat::Glb).error().code, ErrorCode::InvalidArgument);
+}
+
+TEST(SceneAnimationDeathTest, MeshesOfAnotherSceneAndNoTimeAreMistakes) {
+  Scene scene;
+  place(scene, add_asymmetric_grid(scene, "crane"), {0, 0, 0});
+  SceneAnimation animation;
+  ASSERT_TRUE(animation.add(scene).has_value());
+  auto meshes = mesh_scene(animation.scene()).value();
+  QUOIN_EXPECT_MISTAKE(animation.animate(meshes, 0.0), "frames_per_second is positive");
+  meshes.placements[0].instance.reset();
+  QUOIN_EXPECT_MISTAKE(animation.animate(meshes, 10.0), "the meshes are those of the animation's scene");
 }
 
 }  // namespace

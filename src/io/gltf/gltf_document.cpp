@@ -1,7 +1,10 @@
 #include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <utility>
+
+#include <quoin/version.h>
 
 #include "io/gltf/gltf_layout.h"
 
@@ -311,7 +314,7 @@ void add_extensions(const GltfLayout& layout, Json& document) {
 
 std::string gltf_json(const GltfLayout& layout, std::string_view buffer_uri) {
   Json document;
-  document["asset"] = {{"version", "2.0"}, {"generator", "Quoin " QUOIN_VERSION}};
+  document["asset"] = {{"version", "2.0"}, {"generator", "Quoin " + std::string(version())}};
   add_extensions(layout, document);
   add_nodes(layout, document);
   if (!layout.meshes.empty()) add_meshes(layout, buffer_uri, document);

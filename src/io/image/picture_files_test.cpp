@@ -162,7 +162,7 @@ TEST_F(PictureFiles, ImpossiblePicturesAndPathsAreErrors) {
   EXPECT_EQ(write_png(noise(1, 1, 1), file("no/a.png")).error().code, ErrorCode::CannotWrite);
   EXPECT_EQ(write_pfm({1, 1, {1}}, file("no/a.pfm")).error().code, ErrorCode::CannotWrite);
   EXPECT_EQ(read_png(file("a.png")).error().code, ErrorCode::CannotRead);
-  ASSERT_TRUE(write_file(file("a.png"), bytes_of("no picture")));
+  ASSERT_TRUE(write_file(bytes_of("no picture"), file("a.png")));
   EXPECT_EQ(read_png(file("a.png")).error().path, file("a.png").string());
   EXPECT_EQ(read_pfm(file("a.png")).error().path, file("a.png").string());
 }

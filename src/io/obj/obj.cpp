@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <quoin/mesh/occlusion.h>
+#include <quoin/version.h>
 
 #include "io/material_palette.h"
 #include "io/mesh_parts.h"
@@ -19,6 +20,10 @@
 namespace quoin {
 
 namespace {
+
+std::string first_line() {
+  return "# Quoin " + std::string(version()) + "\n";
+}
 
 /// Names in a line-based format: control characters and spaces become '_'.
 std::string one_word(const std::string& name) {
@@ -137,7 +142,7 @@ ObjNames names_beside(const std::filesystem::path& path) {
 
 /// One material for each of the palette's, by name. MTL has no strength beyond the colour, so Ke holds it.
 std::string mtl_text(const SceneMeshes& meshes, const MaterialPalette& palette, const ObjNames& names) {
-  std::string text = "# Quoin " QUOIN_VERSION "\n";
+  std::string text = first_line();
   for (const SurfaceMaterial& material : palette.materials()) {
     text.append("\nnewmtl ").append(mtl_name(material)).append("\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\n");
     const bool is_in_atlas = material.surface == SurfaceClass::Opaque && !meshes.atlas.rgb.empty();
@@ -169,7 +174,7 @@ class ObjText {
   }
 
   void write(const std::string& material_file) {
-    out_.put_text("# Quoin " QUOIN_VERSION "\n");
+    out_.put_text(first_line());
     if (has_materials(meshes_)) {
       out_.put_text("mtllib " + material_file + "\n");
       write_texture_coordinates();

@@ -6,6 +6,7 @@
 #include <string>
 
 #include <quoin/mesh/occlusion.h>
+#include <quoin/version.h>
 
 #include "core/srgb.h"
 #include "io/mesh_parts.h"
@@ -28,7 +29,8 @@ struct Counts {
 };
 
 std::string header_of(const Counts& counts, OcclusionIn occlusion) {
-  std::string text = "ply\nformat binary_little_endian 1.0\ncomment Quoin " QUOIN_VERSION "\n";
+  std::string text = "ply\nformat binary_little_endian 1.0\ncomment Quoin ";
+  text.append(version()).append("\n");
   text += "element vertex " + std::to_string(counts.vertices) + "\n";
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) text += "property float " + std::string(name) + "\n";
   for (const char* name : {"red", "green", "blue"}) text += "property uchar " + std::string(name) + "\n";

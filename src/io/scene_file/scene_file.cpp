@@ -158,7 +158,7 @@ Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOpt
   LoadOptions taken_over = options;
   taken_over.keep_source = false;
   if (*format == FileFormat::Scene) {
-    auto file = read_whole(path, [&](std::span<const std::byte> bytes) { return parse_scene_file(bytes, threads); });
+    auto file = parse_scene_file(path, threads);
     if (!file) return file.error();
     // These may name each other in a circle.
     if (!file->sources.empty()) {
@@ -303,13 +303,13 @@ Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& f
 
 Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const LoadOptions& options, Threads threads,
                                     const Progress& progress) {
-  auto file = read_whole(path, [&](std::span<const std::byte> bytes) { return parse_scene_file(bytes, threads); });
+  auto file = parse_scene_file(path, threads);
   if (!file) return file.error();
   return with_path(put_together(*file, path.parent_path(), options, threads, progress), path);
 }
 
 std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::path& path) {
-  const auto file = read_whole(path, [](std::span<const std::byte> bytes) { return parse_scene_file(bytes); });
+  const auto file = parse_scene_file(path);
   std::vector<std::filesystem::path> named;
   if (!file) return named;
   for (const SceneFile::Source& source : file->sources) named.push_back(path.parent_path() / source.file);

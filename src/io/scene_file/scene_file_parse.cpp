@@ -11,6 +11,7 @@
 #include "io/scene_file/grids_parse.h"
 #include "io/scene_file/json_reader.h"
 #include "io/scene_file/voxel_data.h"
+#include "io/whole_file.h"
 
 namespace quoin {
 
@@ -354,6 +355,10 @@ bool is_scene_file(std::span<const std::byte> beginning) {
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   return first != std::string_view::npos && text[first] == '{' &&
          text.find("\"quoin_scene\"") != std::string_view::npos;
+}
+
+Result<SceneFile> parse_scene_file(const std::filesystem::path& path, Threads threads) {
+  return read_whole(path, [&](std::span<const std::byte> text) { return parse_scene_file(text, threads); });
 }
 
 }  // namespace quoin

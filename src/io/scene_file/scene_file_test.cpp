@@ -364,5 +364,21 @@ TEST_F(SceneFiles, SayWhichFileIsWrong) {
   EXPECT_NE(with_path("noise.vox").find("noise.vox"), std::string::npos);
 }
 
+TEST_F(SceneFiles, AreParsedByTheirPathToo) {
+  const auto file = parse_scene_file(write_text(R"({"quoin_scene": 1, "files": [{"id": "a", "path": "absent.vox"}],
+                                                    "instances": [{"file": "a"}]})"));
+  ASSERT_TRUE(file) << to_string(file.error());
+  ASSERT_EQ(file->sources.size(), 1U);
+  EXPECT_EQ(file->sources[0].file, "absent.vox");
+  const auto absent = parse_scene_file(folder_ / "nothing.json");
+  ASSERT_FALSE(absent);
+  EXPECT_EQ(absent.error().code, ErrorCode::CannotRead);
+  EXPECT_EQ(absent.error().path, (folder_ / "nothing.json").string());
+  const auto broken = parse_scene_file(write_text("{"));
+  ASSERT_FALSE(broken);
+  EXPECT_EQ(broken.error().code, ErrorCode::BadFormat);
+  EXPECT_FALSE(broken.error().path.empty());
+}
+
 }  // namespace
 }  // namespace quoin

@@ -299,45 +299,56 @@ std::optional<std::size_t> place_of(const std::map<Handle<T>, std::size_t>& plac
   return found == places.end() ? std::nullopt : std::optional(found->second);
 }
 
+// Where a scene's elements are in the lists of its file.
+struct PlacesInFile {
+  std::map<GridHandle, std::size_t> grids;
+  std::map<LayerHandle, std::size_t> layers;
+  std::map<GroupHandle, std::size_t> groups;
+};
+
+PlacesInFile put_grids_and_groups(const Scene& scene, SceneFile& file) {
+  PlacesInFile places;
+  scene.grids().for_each([&](GridHandle handle, const SceneGrid& grid) {
+    places.grids[handle] = file.grids.size();
+    file.grids.push_back({grid.name, grid.grid.snapshot(), grid.pivot, grid.canvas, grid.field.snapshot()});
+  });
+  scene.layers().for_each([&](LayerHandle handle, const SceneLayer& layer) {
+    places.layers[handle] = file.layers.size();
+    file.layers.push_back(layer);
+  });
+  for (const GroupHandle handle : groups_from_top(scene)) {
+    const SceneGroup& group = scene.groups()[handle];
+    places.groups[handle] = file.groups.size();
+    file.groups.push_back({group.name, place_of(places.groups, parent_of(scene, handle)),
+                           place_of(places.layers, group.layer), group.position, group.rotation, group.mirrored,
+                           group.visible});
+  }
+  return places;
+}
+
 }  // namespace
 
 Result<SceneFile> scene_file_of(const Scene& scene) {
   SceneFile file;
   file.types = scene.types;
   file.lamps = scene.lamps;
-  std::map<GridHandle, std::size_t> index_of;
-  scene.grids().for_each([&](GridHandle handle, const SceneGrid& grid) {
-    index_of[handle] = file.grids.size();
-    file.grids.push_back({grid.name, grid.grid.snapshot(), grid.pivot, grid.canvas, grid.field.snapshot()});
-  });
-  std::map<LayerHandle, std::size_t> layers;
-  scene.layers().for_each([&](LayerHandle handle, const SceneLayer& layer) {
-    layers[handle] = file.layers.size();
-    file.layers.push_back(layer);
-  });
-  std::map<GroupHandle, std::size_t> groups;
-  for (const GroupHandle handle : groups_from_top(scene)) {
-    const SceneGroup& group = scene.groups()[handle];
-    groups[handle] = file.groups.size();
-    file.groups.push_back({group.name, place_of(groups, parent_of(scene, handle)), place_of(layers, group.layer),
-                           group.position, group.rotation, group.mirrored, group.visible});
-  }
+  const PlacesInFile places = put_grids_and_groups(scene, file);
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
-    const auto grid = index_of.find(instance.grid);
-    if (grid == index_of.end()) {
+    const std::optional<std::size_t> grid = place_of(places.grids, instance.grid);
+    if (!grid) {
       return make_error(ErrorCode::InvalidArgument, "the grid of instance \"" + instance.name + "\" is not there");
     }
     file.placements.push_back({.source = {},
-                               .grid = grid->second,
+                               .grid = grid,
                                .name = instance.name,
                                .position = instance.position,
                                .rotation = instance.rotation,
                                .scale = instance.voxel_size,
                                .mirrored = instance.mirrored,
                                .visible = instance.visible,
-                               .group = place_of(groups, instance.group),
-                               .layer = place_of(layers, instance.layer),
+                               .group = place_of(places.groups, instance.group),
+                               .layer = place_of(places.layers, instance.layer),
                                .categories = instance.categories == Instance().categories
                                                  ? std::nullopt
                                                  : std::optional<std::uint32_t>(instance.categories)});

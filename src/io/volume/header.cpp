@@ -191,7 +191,7 @@ Status read_values(ByteStream& stream, VolumeHeader& header, std::uint64_t offse
   Volume& volume = header.volume;
   const auto count = static_cast<std::size_t>(volume.size.x) * static_cast<std::size_t>(volume.size.y) *
                      static_cast<std::size_t>(volume.size.z);
-  const std::size_t width = bytes_of(volume.type);
+  const std::size_t width = size_of(volume.type);
   const auto cut_off = [&](std::uint64_t held, const char* how) {
     return make_error(ErrorCode::BadFormat,
                       claim(volume, count * width) + ", but there are " + how + std::to_string(held), {}, offset);

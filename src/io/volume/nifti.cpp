@@ -260,7 +260,7 @@ Status read_type(const Fields& fields, Volume& volume) {
   if (!type) return refuse_type(datatype, fields.offset(kDatatype));
   volume.type = *type;
   const int bits = fields.small(kBitpix);
-  if (bits != static_cast<int>(8 * bytes_of(*type))) {
+  if (bits != static_cast<int>(8 * size_of(*type))) {
     volume.warnings.push_back("bitpix is " + std::to_string(bits) + ", but the values are " +
                               std::string(name_of(*type)));
   }

@@ -56,7 +56,7 @@ TEST(Nifti, EveryTypeInEveryOrderAndVersionIsRead) {
       for (const bool is_second : {false, true}) {
         NiftiFile file{.is_second = is_second, .order = order};
         file.datatype = kNiftiTypes[type];
-        file.bitpix = static_cast<int>(8 * bytes_of(scalar));
+        file.bitpix = static_cast<int>(8 * size_of(scalar));
         const Volume volume = volume_of(file, encode(values, scalar, order));
         EXPECT_EQ(volume.values, std::vector<float>(values.begin(), values.end())) << name_of(scalar);
         EXPECT_EQ(volume.type, scalar);

@@ -351,7 +351,7 @@ Status read_type(const Fields& fields, VolumeHeader& header) {
   if (!scalar && normalised(type->text) == "block") return unsupported("the values are blocks, not numbers", type->at);
   if (!scalar) return bad("the type is " + quoted(type->text), type->at);
   header.volume.type = *scalar;
-  if (bytes_of(*scalar) == 1) return {};
+  if (size_of(*scalar) == 1) return {};
   const auto endian = required(fields, "endian");
   if (!endian) return endian.error();
   const std::string order = normalised(endian->text);

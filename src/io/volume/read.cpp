@@ -67,7 +67,7 @@ Result<Volume> read_stream(ByteStream& stream, std::uint64_t skipped, VolumeHead
 Result<Volume> read_from_end(std::span<const std::byte> bytes, VolumeHeader& header) {
   const IVec3 size = header.volume.size;
   const std::uint64_t taken = static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *
-                              static_cast<std::uint64_t>(size.z) * bytes_of(header.volume.type);
+                              static_cast<std::uint64_t>(size.z) * size_of(header.volume.type);
   const std::uint64_t room = bytes.size() - header.data_at;
   ByteStream stream(bytes, 0, Compression::None);
   return read_stream(stream, header.data_at + (room > taken ? room - taken : 0), header);

@@ -18,7 +18,7 @@ const std::vector<float> kTwelveFloats(kTwelve.begin(), kTwelve.end());
 
 TEST(VolumeFiles, RawFilesAreReadAsTheyAreSaidToBe) {
   const TestFolder folder("raw_volume");
-  ASSERT_TRUE(write_file(folder.file("a.raw"), encode(kTwelve, ScalarType::Int16, std::endian::big)));
+  ASSERT_TRUE(write_file(encode(kTwelve, ScalarType::Int16, std::endian::big), folder.file("a.raw")));
   RawVolume raw{.size = {3, 2, 2}, .type = ScalarType::Int16, .order = std::endian::big};
   const auto volume = read_raw_volume(folder.file("a.raw"), raw);
   ASSERT_TRUE(volume) << to_string(volume.error());
@@ -43,21 +43,21 @@ TEST(VolumeFiles, APairIsReadByItsHeader) {
   NiftiFile file{.vox_offset = 0, .magic = "ni1"};
   Bytes header = file.bytes({});
   header.resize(348);
-  ASSERT_TRUE(write_file(folder.file("a.hdr"), header));
+  ASSERT_TRUE(write_file(header, folder.file("a.hdr")));
   const auto missing = read_volume(folder.file("a.hdr"));
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().path, folder.file("a.img").string());
   const Bytes values = encode(kTwelve, ScalarType::UInt8);
-  ASSERT_TRUE(write_file(folder.file("a.img.gz"), volume_test::gzipped(values)));
+  ASSERT_TRUE(write_file(volume_test::gzipped(values), folder.file("a.img.gz")));
   EXPECT_EQ(read_volume(folder.file("a.hdr")).value().values, kTwelveFloats);
-  ASSERT_TRUE(write_file(folder.file("a.img"), values));
+  ASSERT_TRUE(write_file(values, folder.file("a.img")));
   EXPECT_EQ(read_volume(folder.file("a.hdr")).value().values, kTwelveFloats);
 }
 
 TEST(VolumeFiles, TheContentDecidesAndErrorsNameTheFile) {
   const TestFolder folder("volume_content");
   const Bytes compressed = volume_test::gzipped(NiftiFile{}.bytes(encode(kTwelve, ScalarType::UInt8)));
-  ASSERT_TRUE(write_file(folder.file("scan.dat.gz"), compressed));
+  ASSERT_TRUE(write_file(compressed, folder.file("scan.dat.gz")));
   EXPECT_EQ(detect_format(compressed), FileFormat::Nifti);
   EXPECT_EQ(detect_format(folder.file("scan.dat.gz")).value(), FileFormat::Nifti);
   EXPECT_FALSE(detect_format(folder.file("none")));
@@ -71,7 +71,7 @@ TEST(VolumeFiles, TheContentDecidesAndErrorsNameTheFile) {
   ASSERT_TRUE(scene);
   EXPECT_EQ(scene->format, "nifti");
   EXPECT_GT(scene->scene.grids()[scene->scene.grids().handles().front()].field.solid_count(), 0) << "a field of it";
-  ASSERT_TRUE(write_file(folder.file("b.nii"), nrrd));
+  ASSERT_TRUE(write_file(nrrd, folder.file("b.nii")));
   EXPECT_EQ(read_volume(folder.file("b.nii")).error().path, folder.file("b.nii").string());
 }
 

@@ -11,8 +11,10 @@
 
 #include <gtest/gtest.h>
 
+#include <quoin/mesh/mesh_view.h>
 #include <quoin/mesh/smooth_mesh.h>
 
+#include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
 #include "mesh/array/array_for_tests.h"
 #include "mesh/smooth/surface_check_for_tests.h"
@@ -463,6 +465,14 @@ TEST(ArraySurface, TellsItsProgressAndStops) {
     ASSERT_FALSE(stopped.has_value());
     EXPECT_EQ(stopped.error().code, ErrorCode::Cancelled);
   }
+}
+
+TEST(ArraySurfaceDeathTest, AViewWithoutAColourForEachVertexIsAMistake) {
+  ArraySurface surface;
+  surface.positions.resize(3);
+  surface.normals.resize(3);
+  const std::vector<LinearRgba16> albedo(2);
+  QUOIN_EXPECT_MISTAKE((void)view_of(surface, albedo), "an albedo a vertex");
 }
 
 }  // namespace

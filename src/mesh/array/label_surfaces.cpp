@@ -26,8 +26,7 @@ bool is_signed(ScalarType type) {
 class LabelCode {
  public:
   explicit LabelCode(ScalarType type)
-      : bits_(8 * static_cast<unsigned>(bytes_of(type))),
-        sign_(is_signed(type) ? std::uint64_t{1} << (bits_ - 1) : 0) {}
+      : bits_(8 * static_cast<unsigned>(size_of(type))), sign_(is_signed(type) ? std::uint64_t{1} << (bits_ - 1) : 0) {}
 
   [[nodiscard]] std::uint64_t sign() const { return sign_; }
   [[nodiscard]] std::uint64_t bits_of(std::int64_t label) const {

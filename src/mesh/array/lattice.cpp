@@ -21,7 +21,7 @@ std::uint64_t magnitude(std::int64_t v) {
 // Whether all samples lie within the address space.
 bool is_addressable(const ArrayView& array) {
   std::uint64_t below = 0;
-  std::uint64_t above = bytes_of(array.type);
+  std::uint64_t above = size_of(array.type);
   constexpr auto kMost = static_cast<std::uint64_t>(std::numeric_limits<std::ptrdiff_t>::max());
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::uint64_t steps = static_cast<std::uint64_t>(array.size[axis]) - 1;

@@ -25,7 +25,7 @@ struct Lattice {
   bool is_mirrored = false;  // the walked axes, as they lie in space, are left-handed
   std::size_t words = 0;
 
-  [[nodiscard]] std::size_t item_bytes() const { return bytes_of(type); }
+  [[nodiscard]] std::size_t item_bytes() const { return size_of(type); }
   [[nodiscard]] bool has_packed_rows() const {
     return stride[0] == static_cast<std::ptrdiff_t>(item_bytes()) || size[0] == 1;
   }

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "bench/workloads.h"
+#include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
 #include "core/made_with_for_tests.h"
 #include "grid/change_follower_for_tests.h"
@@ -128,7 +129,7 @@ TEST(BlockyMesher, TerrainHasTheSpecifiedFacesAndAboutTheSpecifiedQuads) {
   }
 }
 
-TEST(BlockyMesher, BuriedChunkIsAnsweredFromThePalettes) {
+TEST(BlockyMesher, BuriedChunkIsReadFromThePalettes) {
   const Chunk full(1);
   Neighbourhood n;
   n.chunks.fill(&full);
@@ -334,6 +335,12 @@ TEST(BlockyMesher, EditsDirtyExactlyTheChunksWhoseQuadsChange) {
     before = std::move(after);
   }
   EXPECT_GT(dirty_count, 100);
+}
+
+TEST(QuadDeathTest, ACornerThatIsNoneIsAMistake) {
+  const Quad quad;
+  QUOIN_EXPECT_MISTAKE((void)quad.corner(4), "0 <= index < 4");
+  QUOIN_EXPECT_MISTAKE((void)quad.occlusion(-1), "0 <= corner < 4");
 }
 
 }  // namespace

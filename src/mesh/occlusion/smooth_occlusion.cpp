@@ -10,6 +10,7 @@
 #include <tsl/robin_map.h>
 
 #include "core/lender.h"
+#include "core/progress_steps.h"
 #include "grid/coordinate_hash.h"
 #include "mesh/occlusion/places.h"
 
@@ -108,15 +109,19 @@ float smooth_occlusion(const DensityGrid& field, DVec3 position, Vec3 normal, co
                                     sampling);
 }
 
-void smooth_occlusion(const DensityGrid& field, const SmoothPlaces& places, const SmoothOcclusionOptions& options,
-                      std::span<float> out, Threads threads) {
+Status smooth_occlusion(const DensityGrid& field, const SmoothPlaces& places, const SmoothOcclusionOptions& options,
+                        std::span<float> out, Threads threads, const Progress& progress) {
   check_places(places, out);
   const Sampling sampling(options, places.level);
-  if (sampling.occlusion.method == SmoothOcclusion::None)
-    return void(std::fill_n(out.begin(), places.positions.size(), 0.0F));
+  if (sampling.occlusion.method == SmoothOcclusion::None) {
+    std::fill_n(out.begin(), places.positions.size(), 0.0F);
+    return {};
+  }
   const PlacesByChunk chunks(places, sampling, out);
   Lender<PlaceKernel> kernels;
+  ProgressSteps steps(progress, chunks.size());
   parallel_for(chunks.size(), threads, [&](std::size_t i) {
+    if (steps.cancelled()) return;
     const IVec3 chunk = chunks.chunk(i);
     const DensityNeighbourhood neighbourhood = field.neighbourhood(chunk);
     const auto numbers = chunks.numbers(i);
@@ -124,14 +129,17 @@ void smooth_occlusion(const DensityGrid& field, const SmoothPlaces& places, cons
       kernels.with([&](PlaceKernel& kernel) {
         kernel.occlude(neighbourhood, {places, chunk, numbers}, sampling, out);
       });
-      return;
+      return steps.step();
     }
     for (const std::uint32_t number : numbers) {
       const auto place = smooth::place_at(DVec3(places.positions[number]) + DVec3(places.origin), sampling.level);
       out[number] = smooth::occlusion_of_place(neighbourhood, in_chunk(*place, chunk, sampling.level),
                                                places.normals[number], sampling);
     }
+    steps.step();
   });
+  if (steps.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
+  return {};
 }
 
 struct SmoothOccluder::Scratch {

@@ -10,6 +10,7 @@
 #include <quoin/mesh/smooth_mesh.h>
 #include <quoin/terrain/smooth_terrain.h>
 
+#include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
 #include "mesh/smooth/test_support.h"
 
@@ -38,7 +39,7 @@ DensityGrid hilly_field() {
 std::vector<float> occlusion_of(const DensityGrid& field, const SmoothPlaces& places,
                                 const SmoothOcclusionOptions& options, Threads threads = {}) {
   std::vector<float> out(places.positions.size(), -1.0F);
-  smooth_occlusion(field, places, options, out, threads);
+  EXPECT_TRUE(smooth_occlusion(field, places, options, out, threads).has_value());
   return out;
 }
 
@@ -181,6 +182,36 @@ TEST(SmoothOcclusionOfPlaces, NumbersOutOfRangeCountAsForTheMesher) {
 
 TEST(SmoothOcclusionOfPlaces, OfNoPlacesIsNothing) {
   EXPECT_TRUE(occlusion_of(hilly_field(), {}, {}).empty());
+}
+
+TEST(SmoothOcclusionOfPlaces, CancelsWhereProgressSaysSo) {
+  const DensityGrid field = hilly_field();
+  const std::vector<Vec3> positions = {{-7, -4, -11}, {70, -4, -11}, {-7, -4, 80}};
+  const std::vector<Vec3> normals(positions.size(), Vec3(0, 1, 0));
+  std::vector<float> out(positions.size());
+  const SmoothPlaces places{positions, normals};
+  double last = 0.0;
+  const auto listen = [&](double fraction) { return (last = fraction) < 2.0; };
+  EXPECT_TRUE(smooth_occlusion(field, places, {}, out, Threads{1}, listen).has_value());
+  EXPECT_EQ(last, 1.0);
+  const Status cancelled = smooth_occlusion(field, places, {}, out, Threads{1}, [](double) { return false; });
+  ASSERT_FALSE(cancelled.has_value());
+  EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
+}
+
+TEST(SmoothOcclusionDeathTest, PlacesThatDoNotFitAreAMistake) {
+  const DensityGrid field;
+  const std::vector<Vec3> three(3, Vec3(0, 1, 0));
+  const std::span<const Vec3> two = std::span(three).first(2);
+  std::vector<float> out(2);
+  QUOIN_EXPECT_MISTAKE((void)smooth_occlusion(field, {three, two}, {}, out), "as many normals as positions");
+  QUOIN_EXPECT_MISTAKE((void)smooth_occlusion(field, {three, three}, {}, out), "room for every place");
+  // As many as cannot be, of which none is read.
+  const std::span<const Vec3> many(three.data(), std::size_t{1} << 32);
+  const std::span<float> room(out.data(), many.size());
+  QUOIN_EXPECT_MISTAKE((void)smooth_occlusion(field, {many, many}, {}, room), "less than 2.32 places");
+  SmoothOccluder occluder;
+  QUOIN_EXPECT_MISTAKE(occluder.occlude({}, {three, three}, {}, out), "room for every place");
 }
 
 }  // namespace

@@ -90,7 +90,7 @@ void places(benchmark::State& state) {
     if (how == 0) {
       occluder.occlude(field.neighbourhood(IVec3{0}), all, options.occlusion, found);
     } else if (how == 1) {
-      smooth_occlusion(field, all, options.occlusion, found, Threads{1});
+      if (!smooth_occlusion(field, all, options.occlusion, found, Threads{1})) std::abort();
     } else {
       for (std::size_t i = 0; i < found.size(); ++i) {
         found[i] = smooth_occlusion(field, DVec3(all.positions[i]), all.normals[i], options.occlusion);

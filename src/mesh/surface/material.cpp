@@ -86,12 +86,18 @@ std::size_t materials_under_crossings(const DensityNeighbourhood& chunks, IVec3 
 
 }  // namespace
 
+LinearRgba16 linear_colour_of(Rgba8 colour) {
+  return {linear16(colour.r), linear16(colour.g), linear16(colour.b), static_cast<std::uint16_t>(colour.a * 257)};
+}
+
 SurfaceMaterials::SurfaceMaterials(const VoxelRegistry& types) : albedo_(types.size(), kWhite) {
-  std::array<std::uint16_t, 256> decoded;
-  for (std::size_t i = 0; i < 256; ++i) decoded[i] = linear16(static_cast<std::uint8_t>(i));
+  std::array<std::uint16_t, 256> linear;
+  for (std::size_t i = 0; i < 256; ++i) linear[i] = linear16(static_cast<std::uint8_t>(i));
+  const auto decoded = [&](Rgba8 colour) -> LinearRgba16 {
+    return {linear[colour.r], linear[colour.g], linear[colour.b], static_cast<std::uint16_t>(colour.a * 257)};
+  };
   for (std::size_t i = kAir + 1; i < albedo_.size(); ++i) {
-    const Rgba8 colour = types[static_cast<VoxelType>(i)].colour;
-    albedo_[i] = {decoded[colour.r], decoded[colour.g], decoded[colour.b], static_cast<std::uint16_t>(colour.a * 257)};
+    albedo_[i] = decoded(types[static_cast<VoxelType>(i)].colour);
   }
 }
 

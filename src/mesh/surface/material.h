@@ -14,6 +14,9 @@ struct CellMaterial {
   VoxelType type = kAir;
 };
 
+/// A colour in linear light.
+[[nodiscard]] LinearRgba16 linear_colour_of(Rgba8 colour);
+
 /// What the surface of a cell is made of: the materials of its solid samples.
 class SurfaceMaterials {
  public:

@@ -256,7 +256,7 @@ TEST_F(Simplify, ColoursStayWhereTheyAreAndTheMeshIsManifoldByPlaces) {
   }
   SmoothMeshOptions options;
   options.colours = SurfaceColours::Sharp;
-  auto whole = build_smooth_mesh(field_from_grid(grid), types, options);
+  auto whole = build_smooth_mesh(*field_from_grid(grid), types, options);
   ASSERT_TRUE(whole);
   for (const float error : {0.1F, 0.4F, 1.0F}) {
     SmoothMesh mesh = *whole;

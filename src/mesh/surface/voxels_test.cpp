@@ -52,7 +52,7 @@ SmoothMeshOptions voxels() {
 }
 
 SmoothMesh mesh_of(const Grid& grid, const SmoothMeshOptions& options) {
-  auto mesh = build_smooth_mesh(field_from_grid(grid), six_types(), options, {1});
+  auto mesh = build_smooth_mesh(*field_from_grid(grid), six_types(), options, {1});
   EXPECT_TRUE(mesh.has_value());
   return mesh ? std::move(*mesh) : SmoothMesh{};
 }
@@ -289,7 +289,7 @@ TEST(SmoothVoxels, MoreSmoothnessIsRounder) {
 TEST(SmoothVoxels, ShapesOfNeighbouringChunksMeet) {
   const Grid grid = random_grid(12, {{40, 40, 40}, {90, 90, 90}}, 0.4, {1, 5});
   const VoxelRegistry types = six_types();
-  const DensityGrid whole = field_from_grid(grid);
+  const DensityGrid whole = *field_from_grid(grid);
   const DensityGrid field = smooth::field_of_body(whole, types, 0, {});
   SmoothMesher mesher;
   SmoothOptions options;
@@ -347,7 +347,7 @@ TEST(SmoothBodies, GlassIsAClosedBodyThatMeetsItsFrameExactly) {
   grid.fill_box({{50, 0, 10}, {80, 30, 12}}, 1);  // a wall over a chunk's border
   grid.fill_box({{58, 8, 10}, {72, 22, 12}}, 5);  // a window
   grid.fill_box({{64, 8, 10}, {65, 22, 12}}, 2);  // its bar
-  const DensityGrid whole = field_from_grid(grid);
+  const DensityGrid whole = *field_from_grid(grid);
   SmoothMeshOptions options = voxels();
   std::array<SmoothMesh, 2> bodies;
   const std::vector<std::uint32_t> ids = smooth::bodies_of(types, grid.types());
@@ -389,7 +389,7 @@ TEST(SmoothBodies, KindsOfGlassAreBodiesOfTheirOwn) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {4, 4, 1}}, 5);
   grid.fill_box({{4, 0, 0}, {8, 4, 1}}, 6);
-  const DensityGrid whole = field_from_grid(grid);
+  const DensityGrid whole = *field_from_grid(grid);
   EXPECT_EQ(smooth::bodies_of(types, grid.types()), (std::vector<std::uint32_t>{6, 7}));
   for (const std::uint32_t body : {6U, 7U}) {
     const DensityGrid field = smooth::field_of_body(whole, types, body, {});

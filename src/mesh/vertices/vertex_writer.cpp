@@ -312,7 +312,6 @@ VertexWriter::VertexWriter(VertexLayout layout, const VoxelRegistry& types) : la
 }
 
 void VertexWriter::write(std::span<const Quad> quads, Vec3 origin, std::span<std::byte> out) const {
-  QUOIN_ASSERT(can_write(layout_, VertexSource::Quads), "a layout for quads");
   QUOIN_ASSERT(out.size() >= bytes_needed(vertices_needed(quads.size())), "room for four vertices a quad");
   QUOIN_ASSERT(origin_fits(layout_, origin), "positions are whole and within the format's range");
   by_blocks(quads.size(), 4, layout_.stride, out.data(), [&](std::size_t first, std::size_t count, std::byte* block) {

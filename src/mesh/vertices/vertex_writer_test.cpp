@@ -291,6 +291,14 @@ TEST(VertexWriterDeathTest, WhatDoesNotFitIsAMistake) {
   QUOIN_EXPECT_MISTAKE(writer.write(quads, Vec3(32'704.0F), out), "positions are whole and within the format's range");
   QUOIN_EXPECT_MISTAKE(writer.write(SmoothChunkMesh(), Vec3(0.0F), out), "a layout for smooth chunks");
   QUOIN_EXPECT_MISTAKE(writer.write(MeshView(), Vec3(0.0F), out), "a layout for this kind of mesh");
+  const VertexWriter positions({12, {{VertexAttribute::Position, Float32x3, 0}}}, {});
+  const std::vector<Vec3> three(3);
+  MeshView view;
+  view.positions = three;
+  QUOIN_EXPECT_MISTAKE(positions.write(view, Vec3(0.0F), std::span(out).first(35)), "room for the vertices");
+  SmoothChunkMesh chunk;
+  chunk.positions.resize(3);
+  QUOIN_EXPECT_MISTAKE(positions.write(chunk, Vec3(0.0F), std::span(out).first(35)), "room for the vertices");
   std::vector<std::uint16_t> indices(11);
   QUOIN_EXPECT_MISTAKE(write_indices<std::uint16_t>(std::span(quads), 0, indices), "room for six indices a quad");
   indices.resize(12);

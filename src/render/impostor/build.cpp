@@ -226,7 +226,7 @@ Impostor Impostor::build(const Grid& grid, const VoxelRegistry& types, const Occ
   made.is_left_to_rays_ = subject.is_left_to_rays;
   if (made.is_left_to_rays_) return made;
   made.box_ = subject.box;
-  if (made.is_empty()) return made;
+  if (made.empty()) return made;
   const std::vector<SeenFace> seen =
       subject.shell ? faces_seen_of(*subject.shell, subject.surfels, made.box_, subject.content, subject.edge)
                     : faces_seen_by_rays(opaque, subject.content, subject.edge);
@@ -252,9 +252,8 @@ Impostor Impostor::rebuilt(const Grid& grid, const VoxelRegistry& types, const G
   const OccupancyTree opaque = OccupancyTree::build(grid, types, Occupancy::Opaque);
   const std::optional<std::vector<IBox>> changed = small_boxes(changes, opaque.bounds());
   const Subject subject(grid, types, opaque, nullptr, grid.bounds(), options_);
-  const bool is_comparable = !is_empty() && changed && faces_->is_whole && subject.shell &&
-                             subject.edge == faces_->edge && subject.content.centre == content_.centre &&
-                             subject.content.radius == content_.radius;
+  const bool is_comparable = !empty() && changed && faces_->is_whole && subject.shell && subject.edge == faces_->edge &&
+                             subject.content.centre == content_.centre && subject.content.radius == content_.radius;
   if (!is_comparable) return build(grid, types, opaque, options_);
   Impostor made;
   made.options_ = options_;

@@ -85,7 +85,7 @@ TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
   glass.visibility = Visibility::Transparent;
   world.scene.types.replace(3, glass);
   cache.update_types(world.scene.types);
-  EXPECT_TRUE(ready()->is_empty());
+  EXPECT_TRUE(ready()->empty());
 }
 
 TEST(ImpostorCache, ThoseOfAnotherScenesGridsAreNotSeenMeanwhile) {
@@ -116,7 +116,7 @@ TEST(ImpostorCache, SeesTypesThatWereRegisteredAfterTheirVoxels) {
     cache.update_types(world.scene.types);
     static_cast<void>(cache.find(world.scene, world.grids[0]));
     EXPECT_EQ(cache.wait(world.scene), 0U);
-    return cache.find(world.scene, world.grids[0])->is_empty();
+    return cache.find(world.scene, world.grids[0])->empty();
   };
   EXPECT_FALSE(is_empty());
   VoxelProperties glass;

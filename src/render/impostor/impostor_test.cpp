@@ -155,10 +155,10 @@ TEST(Impostor, BlackVoxelsAreNoHoles) {
 }
 
 TEST(Impostor, OfNothingIsEmpty) {
-  EXPECT_TRUE(Impostor().is_empty());
+  EXPECT_TRUE(Impostor().empty());
   const VoxelRegistry types = two_types();
   const Grid grid;
-  EXPECT_TRUE(Impostor::build(grid, types).is_empty());
+  EXPECT_TRUE(Impostor::build(grid, types).empty());
   const OccupancyTree tree = OccupancyTree::build(grid, types, Occupancy::Opaque);
   for (int view = 0; view < kImpostorViews; ++view) {
     const Snapshot snapshot = take_snapshot(grid, types, tree, view);
@@ -193,7 +193,7 @@ TEST(Impostor, LeavesTransparentVoxelsOut) {
   const VoxelType glass = add_type(scene, {90, 120, 220, 120}, Visibility::Transparent);
   Grid grid;
   grid.fill_box({{0, 0, 0}, {5, 5, 5}}, glass);
-  EXPECT_TRUE(Impostor::build(grid, scene.types).is_empty());
+  EXPECT_TRUE(Impostor::build(grid, scene.types).empty());
 }
 
 void expect_same_level(const ImpostorFaces::Level& a, const ImpostorFaces::Level& b) {
@@ -207,7 +207,7 @@ void expect_same_level(const ImpostorFaces::Level& a, const ImpostorFaces::Level
 }
 
 void expect_same(const Impostor& a, const Impostor& b) {
-  ASSERT_EQ(a.is_empty(), b.is_empty());
+  ASSERT_EQ(a.empty(), b.empty());
   EXPECT_EQ(a.box().min, b.box().min);
   EXPECT_EQ(a.box().max, b.box().max);
   EXPECT_EQ(a.content().centre, b.content().centre);
@@ -284,7 +284,7 @@ TEST(Impostor, RebuiltKnowsWhatItCannotKeep) {
   expect_right();
   grid.set({90, 3, 3}, kAir);  // nothing is left
   expect_right();
-  EXPECT_TRUE(impostor.is_empty());
+  EXPECT_TRUE(impostor.empty());
   grid.fill_box({{0, 0, 0}, {4, 4, 4}}, 2);
   expect_right();
   GridChanges all;

@@ -1,4 +1,5 @@
 #include "render/impostor/pass.h"
+#include "scene/tracer/placed_grid.h"
 
 #include <algorithm>
 #include <array>
@@ -30,7 +31,7 @@ std::int32_t index_of(const std::vector<PlacedGrid>& placed, InstanceHandle inst
 std::vector<std::int32_t> placed_of(const SceneTracer& tracer, std::span<const FarInstance> far) {
   std::vector<std::int32_t> indices;
   for (const FarInstance& instance : far) {
-    const std::int32_t index = index_of(tracer.placed(), instance.instance);
+    const std::int32_t index = index_of(placed_in(tracer), instance.instance);
     if (index >= 0) indices.push_back(index);
   }
   return indices;
@@ -43,7 +44,7 @@ ImpostorPass::ImpostorPass(const SceneTracer& tracer, std::span<const FarInstanc
       across_((width + kTile - 1) / kTile),
       down_((height + kTile - 1) / kTile),
       draw_(raster::draw()) {
-  const std::vector<PlacedGrid>& placed = tracer.placed();
+  const std::vector<PlacedGrid>& placed = placed_in(tracer);
   const ImpostorScreen screen(camera, width, height);
   for (const FarInstance& instance : far) {
     const std::int32_t index = index_of(placed, instance.instance);

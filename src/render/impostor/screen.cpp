@@ -1,4 +1,5 @@
 #include "render/impostor/screen.h"
+#include "scene/tracer/placed_grid.h"
 
 #include <algorithm>
 #include <array>
@@ -88,7 +89,7 @@ std::optional<PixelArea> ImpostorScreen::area_of(const Sphere& sphere) const {
 
 std::optional<DrawnImpostor> ImpostorScreen::drawn(const PlacedGrid& placed, std::int32_t index,
                                                    const Impostor& impostor) const {
-  if (impostor.is_empty() || placed.level != 0) return std::nullopt;
+  if (impostor.empty() || placed.level != 0) return std::nullopt;
   const ContentSphere& content = impostor.content();
   const DVec3 position = placed.position - camera_.position;
   const DVec3 centre = position + placed.world_axes * (content.centre - placed.pivot) * placed.voxel_size;

@@ -10,6 +10,7 @@
 
 #include "render/impostor/raster/faces.h"
 #include "render/impostor/raster/raster.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 

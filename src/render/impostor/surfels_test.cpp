@@ -143,7 +143,7 @@ TEST(Surfels, AnEditMakesThemAnew) {
   (void)cache.find(world.scene, grid);
   EXPECT_EQ(cache.wait(world.scene), 0U);
   EXPECT_TRUE(ImpostorFaces::of(*cache.find(world.scene, grid)).surfels.empty());
-  EXPECT_FALSE(cache.find(world.scene, grid)->is_empty());
+  EXPECT_FALSE(cache.find(world.scene, grid)->empty());
 }
 
 TEST(Surfels, WhatIsTooLargeOrThinIsTraced) {

@@ -1,4 +1,5 @@
 #include "render_vk/march/device_scene.h"
+#include "scene/tracer/placed_grid.h"
 
 #include <algorithm>
 #include <cstring>

@@ -14,6 +14,7 @@
 #include "render_vk/device/memory.h"
 #include "render_vk/trees/device_grid.h"
 #include "scene/tracer/instance_tree.h"
+#include "scene/tracer/placed_grid.h"
 #include "scene/tracer/tree_cache.h"
 
 namespace quoin::vulkan {

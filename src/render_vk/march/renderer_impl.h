@@ -55,7 +55,7 @@ struct VulkanRenderer::Impl {
   std::unique_ptr<DetailChooser> chooser;  // for that scene
   /// What lamps light, sent to the device when it is another than before.
   [[nodiscard]] Result<vulkan::DeviceLamps> lamp_table(const LightOptions& light, Threads threads) {
-    if (light.lamps == 0 || voxels == nullptr) return vulkan::DeviceLamps{};
+    if (light.max_lamps == 0 || voxels == nullptr) return vulkan::DeviceLamps{};
     auto table = lamps.table(*voxels, light, threads, [this] { return scene.lamp_places(*voxels); });
     if (Status done = sent_lamps.put(memory, std::move(table)); !done) return done.error();
     return sent_lamps;

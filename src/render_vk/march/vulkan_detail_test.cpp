@@ -5,6 +5,7 @@
 #include <set>
 
 #include "render_vk/march/vulkan_detail_support.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 namespace {
@@ -25,7 +26,7 @@ class VulkanDetail : public vulkan_test::VulkanDetailTest {
     const SceneTracer whole(scene_);
     const SceneTracer detailed = whole.with_detail(selected);
     std::set<int> halvings;
-    for (const PlacedGrid& placed : detailed.placed()) halvings.insert(placed.level);
+    for (const PlacedGrid& placed : placed_in(detailed)) halvings.insert(placed.level);
     return halvings;
   }
 };

@@ -76,7 +76,7 @@ TEST_F(VulkanField, FromWithinAndFromAbove) {
   compare(scene, towards({0.3, -40.0, 0.2}, {30.0, -40.0, 10.0}), sized(32, 24), "field_in_stone");
   compare(scene, from_above(0.3, 100, -0.7, 150), sized(96, 96), "field_from_above");
   RenderOptions options = sized(96, 72);
-  options.light.lamps = 8;
+  options.light.max_lamps = 8;
   options.light.sun_brightness = 0.0;
   compare(scene, towards({50, 40, 60}, {0, 10, 0}), options, "field_lamps");
 }
@@ -90,15 +90,15 @@ TEST_F(VulkanField, WhatGlowsLightsItsSurroundings) {
   grid.field.remove_box({22.0, 22.0, 50.0}, {60.0, 30.0, 70.0});
   place_grid(scene, std::move(grid));
   RenderOptions options = sized(128, 96);
-  options.light.lamps = 24;
+  options.light.max_lamps = 24;
   options.light.sun_brightness = 0.1;
   options.light.sky_brightness = 0.1;
   const Camera camera = towards({90, 60, 110}, {10, 5, 20});
   compare(scene, camera, options, "field_glow");
   const Picture with = render_test::taken(scene, camera, options);
-  options.light.lamps = 0;
+  options.light.max_lamps = 0;
   EXPECT_GT(render_test::count_different(with, render_test::taken(scene, camera, options), 8), 800);
-  options.light.lamps = 24;
+  options.light.max_lamps = 24;
   options.detail.policy.emplace().far_pixels = 0;
   options.detail.policy->cell_pixels = 4.0;
   compare(scene, camera, options, "field_glow_halved");
@@ -189,7 +189,7 @@ TEST_F(VulkanField, ALakeAndBallsOfGlass) {
   compare(scene, towards({-60, -1.5, 60}, {-32, 0, 20}), options, "field_lake_low");
   compare(scene, towards({-50, -6, 30}, {-32, 0, 20}), options, "field_lake_from_within");
   options.light.occlusion_rays = 16;
-  options.light.lamps = 8;
+  options.light.max_lamps = 8;
   compare(scene, camera, options, "field_lake_lamps");
   for (const Shading shading : {Shading::Unlit, Shading::UnlitWithOcclusion, Shading::Occlusion, Shading::Normals}) {
     options.light.shading = shading;

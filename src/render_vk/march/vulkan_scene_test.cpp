@@ -348,18 +348,18 @@ Scene lit_by_night(DVec3 origin) {
 
 TEST_F(VulkanScene, LampsOfEveryKind) {
   RenderOptions options = sized(96, 72);
-  options.light.lamps = 64;
+  options.light.max_lamps = 64;
   options.light.sun_brightness = 0.0;
   options.light.sky_brightness = 0.05;
   const Scene scene = lit_by_night({0, 0, 0});
   const Camera camera = towards({50, 36, 76}, {12, 3, 9}, 1.0);
   compare(scene, camera, options, "lamps");
-  options.light.lamps = 2;
+  options.light.max_lamps = 2;
   compare(scene, camera, options, "two_lamps");
   options.light.shadows = false;
   compare(scene, camera, options, "lamps_without_shadows");
   options.light = {};
-  options.light.lamps = 16;
+  options.light.max_lamps = 16;
   options.light.occlusion_affects = OcclusionAffects::All;
   options.samples = 2;
   compare(scene, camera, options, "lamps_by_day");

@@ -1,4 +1,5 @@
 #include "render_vk/raster/level_meshes.h"
+#include "scene/tracer/placed_grid.h"
 
 #include "render_vk/device/drop_oldest.h"
 

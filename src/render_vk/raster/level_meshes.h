@@ -10,6 +10,7 @@
 
 #include "live/grid_surfaces.h"
 #include "render_vk/raster/mesh_store.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin::vulkan {
 

@@ -14,6 +14,7 @@
 #include "render_vk/march/frame.h"
 #include "render_vk/raster/mesh_shader_data.h"
 #include "render_vk/raster/mesh_store.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin::vulkan {
 

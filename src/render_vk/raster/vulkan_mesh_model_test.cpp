@@ -61,7 +61,7 @@ TEST_F(VulkanMeshModel, IsDrawnInEveryWay) {
   meshes_->clear();
   std::vector<SurfaceUpdate> surfaces;
   scene.grids().for_each([&](GridHandle handle, const SceneGrid& grid) {
-    for (SurfaceUpdate& update : smooth_surfaces(handle, field_from_grid(grid.grid), scene.types)) {
+    for (SurfaceUpdate& update : smooth_surfaces(handle, *field_from_grid(grid.grid), scene.types)) {
       surfaces.push_back(std::move(update));
     }
   });

@@ -15,6 +15,7 @@
 #include "render_vk/raster/level_meshes.h"
 #include "render_vk/raster/mesh_pass.h"
 #include "scene/instance_axes.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 
@@ -45,7 +46,7 @@ Status check(const Camera& camera, const MeshPictureOptions& options) {
 
 bool traces_light(const LightOptions& light) {
   if (light.shading != Shading::Lit) return false;
-  return (light.shadows && daylight_of(light).sun_brightness > 0.0) || light.lamps > 0;
+  return (light.shadows && daylight_of(light).sun_brightness > 0.0) || light.max_lamps > 0;
 }
 
 std::array<std::uint32_t, 7> sides_of(const ImpostorFaces::Level& level) {

@@ -34,7 +34,7 @@ TEST_F(VulkanMeshSeeThrough, TheYardIsThatOfTheProcessor) {
   compare(glass_yard(), slanted, options, "yard_of_glass_slanted");
   compare(glass_yard(), from_above(32, 60, 32, 66), options, "yard_of_glass_above");
   options.light.shadows = false;
-  options.light.lamps = 0;
+  options.light.max_lamps = 0;
   compare(glass_yard(), over_glass_yard(), options, "yard_of_glass_plain_light");
 }
 
@@ -114,7 +114,7 @@ TEST_F(VulkanMeshSeeThrough, SeamsBetweenQuadsDoNotShow) {
   place(scene, std::move(grid));
   RenderOptions options = glass_yard_options(200, 150);
   options.light.shadows = false;
-  options.light.lamps = 0;
+  options.light.max_lamps = 0;
   const Camera camera = towards({100.3, 60.2, 230.7}, {100, 0, 100}, 0.7);
   put(scene, blocky_surfaces(scene, false));
   const Image single = drawn(camera, mesh_options(options));
@@ -128,7 +128,7 @@ TEST_F(VulkanMeshSeeThrough, ItNeedsTheVoxelsOfTheSceneWhereThereIsGlass) {
   VulkanPicture picture(*renderer_);
   MeshPictureOptions options = mesh_options(glass_yard_options(32, 32));
   options.light.shadows = false;
-  options.light.lamps = 0;
+  options.light.max_lamps = 0;
   EXPECT_TRUE(meshes_->draw(picture, over_glass_yard(), options)) << "nothing of glass is there";
   ASSERT_TRUE(meshes_->put(blocky_surfaces(scene)));
   const Status refused = meshes_->draw(picture, over_glass_yard(), options);

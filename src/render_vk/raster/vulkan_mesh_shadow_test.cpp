@@ -131,10 +131,10 @@ TEST_F(VulkanMeshShadow, LampsShineOnMeshes) {
   RenderOptions options = with_mesh_light(sized(320, 180));
   options.light.sun_brightness = 0.0;
   options.light.sky_brightness = 0.1;
-  options.light.lamps = 64;
+  options.light.max_lamps = 64;
   compare(scene, towards({40, 45, 60}, {0, 4, 5}), options, "lamps");
   const Image lit = drawn(towards({40, 45, 60}, {0, 4, 5}), mesh_options(options));
-  options.light.lamps = 0;
+  options.light.max_lamps = 0;
   EXPECT_GT(bytes_that_differ(lit, drawn(towards({40, 45, 60}, {0, 4, 5}), mesh_options(options)), 20), 5000);
 }
 

@@ -8,6 +8,7 @@
 #include <quoin/grid/voxel_field.h>
 
 #include "mesh/blocky/occlusion_atlas.h"
+#include "mesh/surface/material.h"
 #include "scene/glass_thickness.h"
 #include "scene/instance_axes.h"
 #include "scene/meshes/mesh_parts.h"
@@ -178,6 +179,19 @@ MeshPart mesh_part(std::string name, SmoothMesh mesh, const DVec3& pivot) {
   const auto owner = std::make_shared<const SmoothMesh>(std::move(mesh));
   MeshPart part{std::move(name), {}, pivot, owner};
   if (!owner->indices.empty()) part.surfaces.push_back(view_of(*owner));
+  return part;
+}
+
+MeshPart mesh_part(std::string name, ArraySurface surface, Rgba8 colour, const DVec3& pivot) {
+  struct Coloured {
+    ArraySurface surface;
+    std::vector<LinearRgba16> albedo;
+  };
+  const std::size_t vertices = surface.positions.size();
+  const auto owner = std::make_shared<const Coloured>(
+      Coloured{std::move(surface), std::vector<LinearRgba16>(vertices, linear_colour_of(colour))});
+  MeshPart part{std::move(name), {}, pivot, owner};
+  if (!owner->surface.indices.empty()) part.surfaces.push_back(view_of(owner->surface, owner->albedo));
   return part;
 }
 

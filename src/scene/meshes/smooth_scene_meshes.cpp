@@ -139,12 +139,16 @@ class Mesher {
 
   /// The opaque body, then all that are transparent as one. `united`: null where all has one owner.
   Result<std::array<Body, 2>> mesh(const Grid& voxels, UnitedGrid* united, const Progress& progress) const {
-    const DensityGrid whole = field_from_grid(voxels, threads_);
-    if (progress && !progress(0.0)) return make_error(ErrorCode::Cancelled, "cancelled");
+    constexpr double kFieldShare = 0.2;
+    const auto field = field_from_grid(voxels, threads_, part_of(progress, 0.0, kFieldShare));
+    if (!field) return field.error();
+    const DensityGrid& whole = *field;
     const std::vector<std::uint32_t> bodies = smooth::bodies_of(scene_.types, voxels.types());
     std::array<Body, 2> made;
     for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const auto share = [&](std::size_t k) { return static_cast<double>(k) / static_cast<double>(bodies.size()); };
+      const auto share = [&](std::size_t k) {
+        return kFieldShare + (1.0 - kFieldShare) * static_cast<double>(k) / static_cast<double>(bodies.size());
+      };
       const Progress part = part_of(progress, share(i), share(i + 1));
       const bool is_alone = bodies.size() == 1;
       auto body =

@@ -427,7 +427,7 @@ TEST(FieldQuery, DensitiesNeedNotBeDistances) {
 }
 
 // The same answers wherever and however an instance lies.
-TEST(FieldQuery, AnswersMoveWithTheInstance) {
+TEST(FieldQuery, ResultsMoveWithTheInstance) {
   Random random(64);
   Scene plain = random_blobs(random);
   Scene turned = plain.snapshot();

@@ -22,6 +22,7 @@
 #include <quoin/scene/sweep.h>
 
 #include "scene/query/query_in_grid.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 namespace {
@@ -185,8 +186,8 @@ class FreePlace {
 
 }  // namespace
 
-std::optional<DVec3> nearest_free_place(const SceneTracer& tracer, const OrientedBox& box, double max_distance,
-                                        const QueryFilter& filter) {
+std::optional<DVec3> displacement_to_free_place(const SceneTracer& tracer, const OrientedBox& box, double max_distance,
+                                                const QueryFilter& filter) {
   if (!is_box(box) || !std::isfinite(max_distance) || max_distance < 0.0) return std::nullopt;
   return FreePlace(tracer, box, max_distance, filter).find();
 }

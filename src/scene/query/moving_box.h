@@ -13,6 +13,7 @@
 #include <glm/mat3x3.hpp>
 
 #include "scene/query/query_in_grid.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 

@@ -147,8 +147,8 @@ TEST(QueryFilter, ShapesMeetWhatIsLeft) {
         EXPECT_EQ(overlaps(all.tracer, box.centre, 2.0, filter).size(),
                   overlaps(tracer, box.centre, 2.0, every).size());
         if (shape % 5 != 0) continue;
-        EXPECT_EQ(nearest_free_place(all.tracer, box, 3.0, filter).has_value(),
-                  nearest_free_place(tracer, box, 3.0, every).has_value());
+        EXPECT_EQ(displacement_to_free_place(all.tracer, box, 3.0, filter).has_value(),
+                  displacement_to_free_place(tracer, box, 3.0, every).has_value());
       }
     }
   }

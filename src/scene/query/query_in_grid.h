@@ -15,6 +15,7 @@
 #include <quoin/scene/scene_query.h>
 
 #include "scene/instance_axes.h"
+#include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_tracer_impl.h"
 
 namespace quoin {
@@ -109,7 +110,7 @@ class Seen {
     SceneQuery::instances(tracer_).visit_box(box, [&](std::size_t i) { near.push_back(i); });
     std::sort(near.begin(), near.end());
     for (const std::size_t i : near) {
-      if (includes(tracer_.placed()[i])) visit(tracer_.placed()[i]);
+      if (includes(placed_in(tracer_)[i])) visit(placed_in(tracer_)[i]);
     }
   }
 

@@ -13,6 +13,7 @@
 #include "scene/query/field_sweep.h"
 #include "scene/query/moving_box.h"
 #include "scene/query/query_in_grid.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 
@@ -214,7 +215,7 @@ std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray, dou
   std::optional<GridHit> best;
   std::size_t best_placed = 0;
   SceneQuery::instances(tracer).visit(ray, max_t, [&](std::size_t i) {
-    const PlacedGrid& placed = tracer.placed()[i];
+    const PlacedGrid& placed = placed_in(tracer)[i];
     if (!seen.includes(placed)) return true;
     const auto hit = first_of_grid(placed, seen.types, ray_in_grid(placed, ray), max_t);
     if (hit && (!best || hit->hit.t < best->hit.t || (hit->hit.t == best->hit.t && i < best_placed))) {
@@ -225,7 +226,7 @@ std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray, dou
     return true;
   });
   if (!best) return std::nullopt;
-  const PlacedGrid& placed = tracer.placed()[best_placed];
+  const PlacedGrid& placed = placed_in(tracer)[best_placed];
   const RayHit& hit = best->hit;
   return SceneHit{placed.instance,   hit.voxel,      best->in_field ? best->material : placed.voxels->get(hit.voxel),
                   hit.face,          hit.t,          ray.origin + hit.t * ray.direction,
@@ -237,7 +238,7 @@ bool any_hit(const SceneTracer& tracer, const Ray& ray, double max_t, const Quer
   const Seen seen(tracer, filter, QueryTypes::All);
   bool is_hit = false;
   SceneQuery::instances(tracer).visit(ray, max_t, [&](std::size_t i) {
-    const PlacedGrid& placed = tracer.placed()[i];
+    const PlacedGrid& placed = placed_in(tracer)[i];
     is_hit = seen.includes(placed) && is_any_in_grid(placed, seen.types, ray_in_grid(placed, ray), max_t);
     return !is_hit;
   });

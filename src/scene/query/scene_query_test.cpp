@@ -8,6 +8,8 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include "scene/tracer/placed_grid.h"
+
 namespace quoin {
 namespace {
 
@@ -291,7 +293,7 @@ TEST(SceneQuery, FindsHalvedGridsWhereTheyAreTraced) {
   const SceneTracer full(scene);
   const SelectedInstance selected{handle, Detail::Mid, 1, 0.0};
   const SceneTracer halved = full.with_detail({&selected, 1});
-  ASSERT_EQ(halved.placed().at(0).level, 1);
+  ASSERT_EQ(placed_in(halved).at(0).level, 1);
   const Ray ray{{110.3, 200.0, 10.2}, {0.0, -1.0, 0.0}};
   const auto expected = first_hit(full, ray);
   const auto hit = first_hit(halved, ray);

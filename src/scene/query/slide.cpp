@@ -72,7 +72,7 @@ struct Body {
         return true;
       }
     }
-    const auto away = nearest_free_place(tracer, box, furthest, options.filter);
+    const auto away = displacement_to_free_place(tracer, box, furthest, options.filter);
     if (!away) return false;
     box.centre += *away;
     // And on by the skin where there is room.

@@ -6,6 +6,7 @@
 #include "scene/query/field_sweep.h"
 #include "scene/query/moving_box.h"
 #include "scene/query/query_in_grid.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 namespace {

@@ -1,4 +1,5 @@
 #include "scene/tracer/halved_grid_cache.h"
+#include "scene/tracer/placed_grid.h"
 
 #include <algorithm>
 #include <cmath>

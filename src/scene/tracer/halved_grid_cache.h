@@ -11,6 +11,7 @@
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
 
+#include "scene/tracer/placed_grid.h"
 #include "scene/tracer/tree_cache.h"
 
 namespace quoin {

@@ -14,6 +14,8 @@
 #include <quoin/scene/scene_tracer.h>
 #include <quoin/scene/sweep.h>
 
+#include "scene/tracer/placed_grid.h"
+
 namespace quoin {
 namespace {
 
@@ -62,9 +64,9 @@ TEST(OddInstances, ARotationOfAnyLengthIsThatOfUnitLength) {
     SlabScene world;
     world.scene.add_instance(world.instance(unit * length));
     const SceneTracer tracer(world.scene);
-    ASSERT_EQ(tracer.placed().size(), 1U);
+    ASSERT_EQ(placed_in(tracer).size(), 1U);
     for (int axis = 0; axis < 3; ++axis) {
-      EXPECT_LT(glm::distance(tracer.placed()[0].world_axes[axis], expected_tracer.placed()[0].world_axes[axis]),
+      EXPECT_LT(glm::distance(placed_in(tracer)[0].world_axes[axis], placed_in(expected_tracer)[0].world_axes[axis]),
                 1e-12);
     }
     const auto hit = first_hit(tracer, ray);
@@ -83,8 +85,8 @@ TEST(OddInstances, AZeroRotationIsNone) {
   world.scene.add_instance(world.instance({0.0, 0.0, 0.0, 0.0}));
   world.scene.add_instance(world.instance());
   const SceneTracer tracer(world.scene);
-  ASSERT_EQ(tracer.placed().size(), 2U);
-  EXPECT_EQ(tracer.placed()[0].world_axes, tracer.placed()[1].world_axes);
+  ASSERT_EQ(placed_in(tracer).size(), 2U);
+  EXPECT_EQ(placed_in(tracer)[0].world_axes, placed_in(tracer)[1].world_axes);
   const auto chosen = selected(world.scene);
   ASSERT_EQ(chosen.size(), 2U);
   EXPECT_EQ(chosen[0].distance, chosen[1].distance);
@@ -103,7 +105,7 @@ TEST(OddInstances, WhatIsNotFiniteOrHasNoSizeIsLeftOutOfEverything) {
   for (const Instance& instance : odd) world.scene.add_instance(instance);
   world.scene.edit(world.scene.add_grid({})).pivot.x = kNan;
   const SceneTracer tracer(world.scene);
-  EXPECT_TRUE(tracer.placed().empty());
+  EXPECT_TRUE(placed_in(tracer).empty());
   EXPECT_TRUE(world.scene.bounds(InstanceFilter::All).empty());
   EXPECT_TRUE(selected(world.scene).empty());
   EXPECT_FALSE(first_hit(tracer, {{10, 0.5, 60}, {0, 0, -1}}).has_value());

@@ -1,8 +1,10 @@
 #include <quoin/scene/scene_tracer.h>
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
+#include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_tracer_impl.h"
 
 namespace quoin {
@@ -52,11 +54,26 @@ SceneTracer::~SceneTracer() = default;
 const Scene& SceneTracer::scene() const {
   return *impl_->scene;
 }
-const std::vector<PlacedGrid>& SceneTracer::placed() const {
-  return impl_->placed;
+const std::vector<PlacedGrid>& placed_in(const SceneTracer& tracer) {
+  return tracer.impl_->placed;
 }
 bool SceneTracer::has_transparent() const {
   return impl_->has_transparent;
+}
+std::size_t SceneTracer::bytes() const {
+  std::set<const OccupancyTree*> trees;
+  const auto add_cells = [&](const DensityTree* field) {
+    if (field != nullptr) trees.insert(&field->cells());
+  };
+  for (const PlacedGrid& placed : impl_->placed) {
+    trees.insert({placed.opaque, placed.transparent});
+    add_cells(placed.field);
+    add_cells(placed.opaque_field);
+  }
+  trees.erase(nullptr);
+  std::size_t total = 0;
+  for (const OccupancyTree* tree : trees) total += tree->bytes();
+  return total;
 }
 
 }  // namespace quoin

@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 #include <gtest/gtest.h>
 
+#include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_view.h"
 
 namespace quoin {
@@ -78,15 +79,15 @@ TEST(SceneTracer, FirstHitsAreTheNearestOfAllInstances) {
     std::mt19937 random(2);
     int hit_count = 0;
     for (int round = 0; round < 400; ++round) {
-      const RayPacket rays = random_packet(random, tracer.placed()[random() % tracer.placed().size()].position);
+      const RayPacket rays = random_packet(random, placed_in(tracer)[random() % placed_in(tracer).size()].position);
       SceneHits hits;
       view.first_hits(rays, hits);
       for (int lane = 0; lane < 16; ++lane) {
         const auto l = static_cast<std::size_t>(lane);
         double nearest = kInfinity;
         std::int32_t index = -1;
-        for (std::size_t i = 0; (rays.active >> lane & 1U) != 0 && i < tracer.placed().size(); ++i) {
-          const PlacedGrid& placed = tracer.placed()[i];
+        for (std::size_t i = 0; (rays.active >> lane & 1U) != 0 && i < placed_in(tracer).size(); ++i) {
+          const PlacedGrid& placed = placed_in(tracer)[i];
           const auto hit = first_hit(*placed.opaque, ray_in_grid(placed, rays.ray(lane)), rays.max_t[l]);
           if (!hit || hit->t >= nearest) continue;
           nearest = hit->t;
@@ -110,7 +111,7 @@ TEST(SceneTracer, AnyHitsAskEveryInstanceFromTheHomeGrid) {
   std::mt19937 random(6);
   int blocked_count = 0;
   for (int round = 0; round < 400; ++round) {
-    const auto home = static_cast<std::int32_t>(random() % tracer.placed().size());
+    const auto home = static_cast<std::int32_t>(random() % placed_in(tracer).size());
     const RayPacket rays_in_grid = random_packet(random, DVec3(0.0));
     const RayPacket rays = view.view_from_grid(home, rays_in_grid);
     SceneHits hits;
@@ -161,7 +162,7 @@ TEST(SceneTracer, EquallyNearHitsBelongToTheFirstInstance) {
   for (const double x : {5.0, -5.0}) scene.add_instance({"", handle, {x, 0, 0}});
   for (int i = 0; i < 30; ++i) scene.add_instance({"", handle});
   const SceneTracer tracer(scene);
-  EXPECT_EQ(tracer.placed()[0].opaque, tracer.placed()[6].opaque) << "trees are shared";
+  EXPECT_EQ(placed_in(tracer)[0].opaque, placed_in(tracer)[6].opaque) << "trees are shared";
   const SceneView view(tracer, DVec3(0.0));
   RayPacket rays;
   rays.set(0, {{0.5, 0.5, 9.0}, {0, 0, -1}}, kInfinity);
@@ -190,8 +191,8 @@ TEST(SceneTracer, LeavesOutHiddenEmptyAndImpossibleInstances) {
   instance.voxel_size = 1.0;
   instance.position.x = std::numeric_limits<double>::quiet_NaN();
   scene.add_instance(instance);
-  EXPECT_EQ(SceneTracer(scene).placed().size(), 1U);
-  EXPECT_EQ(SceneTracer(scene, InstanceFilter::All).placed().size(), 2U);
+  EXPECT_EQ(placed_in(SceneTracer(scene)).size(), 1U);
+  EXPECT_EQ(placed_in(SceneTracer(scene, InstanceFilter::All)).size(), 2U);
 }
 
 TEST(SceneTracer, TransparentVoxelsAreVisitedAndNeverHit) {
@@ -205,7 +206,7 @@ TEST(SceneTracer, TransparentVoxelsAreVisitedAndNeverHit) {
   scene.add_instance({"", scene.add_grid(std::move(stone)), {0, 0, -5}});
   const SceneTracer tracer(scene);
   EXPECT_TRUE(tracer.has_transparent());
-  EXPECT_EQ(tracer.placed()[1].transparent, nullptr);
+  EXPECT_EQ(placed_in(tracer)[1].transparent, nullptr);
   const SceneView view(tracer, DVec3(0.0));
   RayPacket rays;
   rays.set(4, {{0.5, 0.5, 9.0}, {0, 0, -1}}, kInfinity);
@@ -218,12 +219,32 @@ TEST(SceneTracer, TransparentVoxelsAreVisitedAndNeverHit) {
   double length = 0.0;
   view.visit_transparent(rays.ray(4), kInfinity, [&](std::int32_t index, const Ray& ray) {
     EXPECT_EQ(index, 0);
-    visit_hits(*tracer.placed()[0].transparent, ray, kInfinity, [&](const VoxelSpan& span) {
+    visit_hits(*placed_in(tracer)[0].transparent, ray, kInfinity, [&](const VoxelSpan& span) {
       length += span.t_exit - span.t_enter;
       return true;
     });
   });
   EXPECT_DOUBLE_EQ(length, 3.0);
+}
+
+TEST(SceneTracer, CountsTheBytesOfSharedTreesOnce) {
+  Scene scene;
+  const VoxelType stone = scene.types.add({}).value();
+  SceneGrid grid;
+  grid.grid.fill_box({IVec3(0), IVec3(40)}, stone);
+  grid.field.add_sphere(DVec3(80.0), 20.0, stone);
+  const GridHandle handle = scene.add_grid(std::move(grid));
+  EXPECT_EQ(SceneTracer(scene).bytes(), 0U);
+  Instance instance;
+  instance.grid = handle;
+  scene.add_instance(instance);
+  const std::size_t one = SceneTracer(scene).bytes();
+  const PlacedGrid placed = placed_in(SceneTracer(scene)).at(0);
+  EXPECT_GT(one, 0U);
+  instance.position = DVec3(500.0);
+  scene.add_instance(instance);
+  EXPECT_EQ(SceneTracer(scene).bytes(), one);
+  EXPECT_EQ(placed.voxels, &scene.grids()[handle].grid);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "scene/instance_axes.h"
+#include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_tracer_impl.h"
 
 namespace quoin {

@@ -12,6 +12,7 @@
 #include <quoin/scene/scene_tracer.h>
 
 #include "scene/tracer/mixed_scene_for_tests.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 namespace {
@@ -25,8 +26,8 @@ void fail_unless(bool holds, const char* what) {
 }
 
 void expect_up_to_date(const SceneTracer& tracer, const Scene& scene) {
-  fail_unless(tracer.placed().size() == static_cast<std::size_t>(kInstances), "an instance is missing");
-  for (const PlacedGrid& placed : tracer.placed()) {
+  fail_unless(placed_in(tracer).size() == static_cast<std::size_t>(kInstances), "an instance is missing");
+  for (const PlacedGrid& placed : placed_in(tracer)) {
     fail_unless(placed.position == scene.instances()[placed.instance].position,
                 "an instance is not where it should be");
     fail_unless(placed.opaque->bounds() == placed.grid->grid.bounds(), "a tree is not of its grid");
@@ -106,7 +107,7 @@ void anew(benchmark::State& state) {
   const Scene scene = mixed_scene(kInstances);
   for (auto _ : state) {
     const SceneTracer tracer(scene, InstanceFilter::Visible, {1});
-    benchmark::DoNotOptimize(tracer.placed().data());
+    benchmark::DoNotOptimize(placed_in(tracer).data());
   }
 }
 BENCHMARK(anew)->Name("scene/update10000/anew")->Unit(benchmark::kMillisecond);

@@ -10,6 +10,7 @@
 #include <quoin/scene/scene_query.h>
 
 #include "grid/change_follower_for_tests.h"
+#include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_view.h"
 
 namespace quoin {
@@ -158,11 +159,11 @@ struct Counts {
 };
 
 void expect_same_placed(const SceneTracer& updated, const SceneTracer& fresh, bool is_detailed, Counts& counts) {
-  ASSERT_EQ(updated.placed().size(), fresh.placed().size());
+  ASSERT_EQ(placed_in(updated).size(), placed_in(fresh).size());
   EXPECT_EQ(updated.has_transparent(), fresh.has_transparent());
-  for (std::size_t i = 0; i < fresh.placed().size(); ++i) {
-    const PlacedGrid& a = updated.placed()[i];
-    const PlacedGrid& b = fresh.placed()[i];
+  for (std::size_t i = 0; i < placed_in(fresh).size(); ++i) {
+    const PlacedGrid& a = placed_in(updated)[i];
+    const PlacedGrid& b = placed_in(fresh)[i];
     EXPECT_EQ(a.instance, b.instance);
     EXPECT_EQ(a.grid, b.grid);
     EXPECT_TRUE(is_detailed || a.voxels == b.voxels);
@@ -187,9 +188,9 @@ void expect_same_hits(const SceneTracer& updated, const SceneTracer& fresh, Chan
   const DVec3 origin = world.vector() * 300.0;
   const SceneView a(updated, origin);
   const SceneView b(fresh, origin);
-  for (int round = 0; round < 12 && !fresh.placed().empty(); ++round) {
-    const auto home = static_cast<std::int32_t>(world.below(static_cast<int>(fresh.placed().size())));
-    const DVec3 towards = fresh.placed()[static_cast<std::size_t>(home)].position - origin + world.vector() * 40.0;
+  for (int round = 0; round < 12 && !placed_in(fresh).empty(); ++round) {
+    const auto home = static_cast<std::int32_t>(world.below(static_cast<int>(placed_in(fresh).size())));
+    const DVec3 towards = placed_in(fresh)[static_cast<std::size_t>(home)].position - origin + world.vector() * 40.0;
     RayPacket rays;
     const DVec3 from = world.vector() * 300.0;
     for (int lane = 0; lane < 16; ++lane) {
@@ -225,7 +226,7 @@ void expect_same_hits(const SceneTracer& updated, const SceneTracer& fresh, Chan
 
 std::vector<SelectedInstance> random_details(const SceneTracer& tracer, ChangingScene& world) {
   std::vector<SelectedInstance> selected;
-  for (const PlacedGrid& placed : tracer.placed()) {
+  for (const PlacedGrid& placed : placed_in(tracer)) {
     if (world.below(4) == 0) continue;
     selected.push_back({placed.instance, Detail::Mid, world.below(kMaxGridLevel + 1)});
   }
@@ -281,8 +282,8 @@ struct TwoCubes {
 TEST(SceneUpdate, KeepsTheTreesOfGridsAndSaysWhetherTheyChanged) {
   TwoCubes world;
   SceneTracer tracer(world.scene);
-  const OccupancyTree* first = tracer.placed()[0].opaque;
-  const OccupancyTree* second = tracer.placed()[1].opaque;
+  const OccupancyTree* first = placed_in(tracer)[0].opaque;
+  const OccupancyTree* second = placed_in(tracer)[1].opaque;
   EXPECT_FALSE(tracer.update());
   world.scene.edit(world.near).position = {1, 2, 3};
   EXPECT_FALSE(tracer.update());
@@ -292,8 +293,8 @@ TEST(SceneUpdate, KeepsTheTreesOfGridsAndSaysWhetherTheyChanged) {
   EXPECT_FALSE(tracer.update()) << "trees outlive their instances";
   world.scene.edit(world.grid).grid.set({70, 20, 0}, 1);
   EXPECT_TRUE(tracer.update());
-  EXPECT_EQ(tracer.placed()[0].opaque, first);
-  EXPECT_EQ(tracer.placed()[1].opaque, second);
+  EXPECT_EQ(placed_in(tracer)[0].opaque, first);
+  EXPECT_EQ(placed_in(tracer)[1].opaque, second);
   EXPECT_TRUE(first->is_occupied({70, 20, 0}));
 }
 
@@ -306,8 +307,8 @@ TEST(SceneUpdate, AGridThatIsShownForTheFirstTimeHasItsTrees) {
   const GridHandle other = world.scene.instances()[world.scene.instances().handles()[1]].grid;
   world.scene.edit(other).grid.set({5, 40, 5}, 1);
   tracer.update();
-  EXPECT_EQ(tracer.placed()[0].opaque->bounds(), world.scene.grids()[hidden].grid.bounds());
-  EXPECT_EQ(tracer.placed()[1].opaque->bounds(), world.scene.grids()[other].grid.bounds());
+  EXPECT_EQ(placed_in(tracer)[0].opaque->bounds(), world.scene.grids()[hidden].grid.bounds());
+  EXPECT_EQ(placed_in(tracer)[1].opaque->bounds(), world.scene.grids()[other].grid.bounds());
 }
 
 TEST(SceneUpdate, OthersWhoFollowTheGridMissNothing) {
@@ -321,7 +322,7 @@ TEST(SceneUpdate, OthersWhoFollowTheGridMissNothing) {
   grid.set({6, 5, 5}, kAir);
   (void)follower.take(grid);
   tracer.update();
-  EXPECT_FALSE(tracer.placed()[0].opaque->is_occupied({6, 5, 5}));
+  EXPECT_FALSE(placed_in(tracer)[0].opaque->is_occupied({6, 5, 5}));
 }
 
 }  // namespace

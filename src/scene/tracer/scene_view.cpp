@@ -7,6 +7,7 @@
 #include <glm/matrix.hpp>
 
 #include "scene/tracer/packet_tree.h"
+#include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_tracer_impl.h"
 #include "scene/tracer/scene_view.h"
 #include "trace/density/density_glass.h"
@@ -135,7 +136,7 @@ struct SceneView::Impl {
 
   // What rays meet first in the only instance that there is.
   void meet_alone(const RayPacket& rays_in_view, SceneHits& hits) const {
-    const PlacedGrid& placed = tracer->placed().front();
+    const PlacedGrid& placed = placed_in(*tracer).front();
     RoomFor<RayPacket> room_for_rays;
     RayPacket& rays = *room_for_rays;
     move(grid_from_view.front(), rays_in_view, rays);
@@ -151,7 +152,7 @@ struct SceneView::Impl {
   // What the lanes `near` of rays in view meet in an instance nearer than what `hits` knows, whose max_t shrink to
   // that. Returns which lanes met it.
   std::uint32_t meet(std::size_t index, std::uint32_t near, RayPacket& left, SceneHits& hits) const {
-    const PlacedGrid& placed = tracer->placed()[index];
+    const PlacedGrid& placed = placed_in(*tracer)[index];
     RoomFor<RayPacket> room_for_rays;
     RayPacket& rays = *room_for_rays;
     move(grid_from_view[index], left, rays);
@@ -207,7 +208,7 @@ struct SceneView::Impl {
 
 SceneView::SceneView(const SceneTracer& tracer, DVec3 origin) : impl_(std::make_unique<Impl>()) {
   impl_->tracer = &tracer;
-  for (const PlacedGrid& placed : tracer.placed()) {
+  for (const PlacedGrid& placed : placed_in(tracer)) {
     // The difference of two far positions is taken first: it is small, and mostly exact.
     const DVec3 position = placed.position - origin;
     const glm::dmat3 grid_axes = glm::transpose(placed.world_axes) / placed.voxel_size;
@@ -217,7 +218,7 @@ SceneView::SceneView(const SceneTracer& tracer, DVec3 origin) : impl_(std::make_
   }
   impl_->origin = origin;
   impl_->instances = PacketTree(tracer.impl_->instances, origin);
-  impl_->is_alone = tracer.placed().size() == 1;
+  impl_->is_alone = placed_in(tracer).size() == 1;
 }
 
 SceneView::SceneView(SceneView&&) noexcept = default;
@@ -230,7 +231,7 @@ const SceneTracer& SceneView::tracer() const {
 
 void SceneView::leave_to_impostors(std::span<const std::int32_t> placed) {
   if (placed.empty()) return;
-  impl_->left_to_impostors.resize(impl_->tracer->placed().size());
+  impl_->left_to_impostors.resize(placed_in(*impl_->tracer).size());
   for (const std::int32_t i : placed) impl_->left_to_impostors[static_cast<std::size_t>(i)] = true;
   impl_->seen = PacketTree(impl_->tracer->impl_->instances, impl_->origin, impl_->left_to_impostors);
 }
@@ -260,7 +261,7 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
 }
 
 std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_grid) const {
-  const std::vector<PlacedGrid>& placed = impl_->tracer->placed();
+  const std::vector<PlacedGrid>& placed = placed_in(*impl_->tracer);
   const auto own = static_cast<std::size_t>(home);
   std::uint32_t blocked = blocked_by(placed[own], rays_in_grid);
   if (impl_->is_alone || blocked == rays_in_grid.active) return blocked;
@@ -294,7 +295,7 @@ std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
   RoomFor<RayPacket> room_for_rays;
   RayPacket& rays = *room_for_rays;
   impl_->instances.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
-    const PlacedGrid& placed = impl_->tracer->placed()[i];
+    const PlacedGrid& placed = placed_in(*impl_->tracer)[i];
     if (!has_transparent(placed)) return true;
     const std::uint32_t near = (*lanes).meet(boxes, box) & left.active;
     if (near == 0) return true;
@@ -312,7 +313,7 @@ std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
 void SceneView::visit_transparent(const Ray& ray_in_view, double max_t,
                                   FunctionRef<void(std::int32_t, const Ray&)> visit) const {
   const auto visit_one = [&](std::size_t i) {
-    if (!has_transparent(impl_->tracer->placed()[i])) return;
+    if (!has_transparent(placed_in(*impl_->tracer)[i])) return;
     const Affine& to_grid = impl_->grid_from_view[i];
     visit(static_cast<std::int32_t>(i), {to_grid.point(ray_in_view.origin), to_grid.axes * ray_in_view.direction});
   };

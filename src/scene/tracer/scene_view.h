@@ -9,6 +9,8 @@
 #include <quoin/trace/packet.h>
 #include <quoin/trace/ray.h>
 
+#include "scene/tracer/placed_grid.h"
+
 namespace quoin {
 
 /// What a packet of rays met in a scene, voxels or fields; lanes whose bit in `grids.hit` is not set hold nothing of

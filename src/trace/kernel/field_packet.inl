@@ -1,6 +1,14 @@
 // Packets of rays in a field of densities: the walk of trace/kernel/lockstep.inl through cells that touch the solid.
 // Where lanes have come to such a cell, all are asked at once whether the field in it may become negative along their
 // ray (trace/kernel/field_cells.inl), and of those each alone where it does; lanes in which it does not walk on.
+//
+//   lane         | 0 | 1 | 2 | ... | 15 |
+//   stopped      | x |   | x | ... |  x |    in a cell that touches the solid: x, y, z in cell_
+//   may          | x |   |   | ... |  x |    in single precision, eight lanes (a half) and one chunk at a time
+//   met          | x |   |   | ... |    |    in double, lane by lane: hits[lane] has t, cell and corners
+//   walks on     |   |   | x | ... |  x |    to its next cell
+//
+// Where registers hold eight lanes (AVX2) a packet goes in two rounds of one half, else in one round of two.
 
 #pragma once
 

@@ -1,6 +1,13 @@
 // One ray in a field of densities, from cell to cell by the planes that it crosses: for processors without the kernels'
 // instructions, and for rays that those leave to others. Slow through what is empty only where that is thin: wider gaps
 // are left to the tree.
+//
+//      tree                     planes               planes, cells without solid            tree
+//   o--------->|  s  |  s  |  s  |     |     |     |   from here the next one that is not  ------->|  s  |
+//      empty    look, meet_cell, step      up to kMaxEmptySteps                       empty
+//
+// An `s` is a cell with a solid corner. In each of them the field's cubic along the ray is asked (meet_cell), from
+// where the ray comes into the cell to where it leaves it (span_).
 
 #pragma once
 

@@ -21,7 +21,7 @@ int main() {
   const auto mesh = quoin::build_blocky_mesh(scene.grids()[handle].grid, scene.types, {});
   if (!mesh || mesh->quads != 6) return 1;
   // Also what only some builds have must be found when linking.
-  auto smooth = quoin::build_smooth_mesh(quoin::field_from_grid(scene.grids()[handle].grid), scene.types, {});
+  auto smooth = quoin::build_smooth_mesh(*quoin::field_from_grid(scene.grids()[handle].grid), scene.types, {});
   if (!smooth || smooth->indices.empty()) return 1;
   if (quoin::simplify_smooth_mesh(*smooth, 0.1F).has_value() != quoin::can_simplify()) return 1;
   std::printf("%lld faces in %lld quads\n", static_cast<long long>(mesh->faces_visible),

@@ -310,9 +310,9 @@ void draw_lamps(LightOptions& light, bool has_rays) {
   draw_brightness("the sun", light.sun_brightness, 4.0F);
   draw_brightness("the sky", light.sky_brightness, 4.0F);
   ImGui::BeginDisabled(!has_rays);
-  bool has_lamps = light.lamps > 0;
-  if (ImGui::Checkbox("lamps light others", &has_lamps)) light.lamps = has_lamps ? natural_light().lamps : 0;
-  ImGui::BeginDisabled(light.lamps == 0);
+  bool has_lamps = light.max_lamps > 0;
+  if (ImGui::Checkbox("lamps light others", &has_lamps)) light.max_lamps = has_lamps ? natural_light().max_lamps : 0;
+  ImGui::BeginDisabled(light.max_lamps == 0);
   draw_brightness("lamps", light.lamp_brightness, 64.0F);
   ImGui::EndDisabled();
   ImGui::EndDisabled();

@@ -17,11 +17,11 @@ struct MenuChoice {
   std::optional<Camera> camera;       ///< one of the file's, to look through
 };
 
-/// The bar at the top. Answers its height, in the window's units.
+/// The bar at the top. Returns its height, in the window's units.
 float draw_menu(ViewState& state, MenuChoice& choice);
-/// The line at the bottom. Answers its height.
+/// The line at the bottom. Returns its height.
 float draw_status(const ViewState& state);
-/// What stands at the right, `top` and `bottom` units off the edges. Answers its width.
+/// What stands at the right, `top` and `bottom` units off the edges. Returns its width.
 float draw_panel(ViewState& state, float scale, float top, float bottom, MenuChoice& choice);
 /// Keys and mouse, if shown.
 void draw_help(ViewState& state, float scale);

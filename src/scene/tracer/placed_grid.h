@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cmath>
+#include <vector>
+
+#include <glm/mat3x3.hpp>
+
+#include <quoin/core/vec.h>
+#include <quoin/grid/grid.h>
+#include <quoin/scene/level_of_detail.h>
+#include <quoin/scene/scene.h>
+#include <quoin/scene/scene_tracer.h>
+#include <quoin/trace/density_ray.h>
+#include <quoin/trace/occupancy_tree.h>
+
+namespace quoin {
+
+class DensityGlass;
+
+/// A grid in the place that an instance gives it, ready to be traced. Instances of one grid share its trees.
+/// Lifetime: owns nothing; the tracer and its scene must outlive it, and an update ends it.
+struct PlacedGrid {
+  InstanceHandle instance;
+  const SceneGrid* grid = nullptr;  ///< as the scene holds it
+  const Grid* voxels = nullptr;     ///< what is traced: its voxels, or what is left of them once halved
+  DVec3 pivot{0.0};                 ///< in the coordinates of `voxels`
+  const OccupancyTree* opaque = nullptr;
+  const OccupancyTree* transparent = nullptr;  ///< null when the grid has no transparent voxel
+  const DensityTree* field = nullptr;          ///< in the space of `voxels`; null when the field has no solid
+  const DensityTree* opaque_field = nullptr;   ///< what of the field is opaque: `field` itself where all is; or null
+  const DensityGlass* glass = nullptr;         ///< what of the field is transparent; null when nothing is
+  glm::dmat3 world_axes{1.0};  ///< columns: the grid's axes in the world, unit; a mirrored instance's x is negated
+  DVec3 position{0.0};         ///< of the grid's pivot, in the world
+  double voxel_size = 1.0;     ///< world units a voxel of `voxels`
+  Detail detail = Detail::Near;
+  int level = 0;  ///< of `voxels`: cells of (2^level)^3 voxels of the grid
+
+  /// How many voxels of the full grid a voxel of `voxels` spans.
+  [[nodiscard]] double voxels_per_cell() const { return std::ldexp(1.0, level); }
+};
+
+/// What a tracer traces, in the order of the instances' handles. Lifetime: the tracer owns them, until an update.
+[[nodiscard]] const std::vector<PlacedGrid>& placed_in(const SceneTracer& tracer);
+
+}  // namespace quoin
