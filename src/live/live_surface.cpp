@@ -77,8 +77,9 @@ void cut_at_regions(const QuadBuffer& quads, int edge, QuadBuffer& out) {
   for (const Quad quad : quads) {
     const FaceFrame& frame = frame_of(quad.direction());
     cut(quad.voxel()[frame.u], quad.size_u(), edge, [&](int u, int size_u) {
-      cut(quad.voxel()[frame.v], quad.size_v(), edge,
-          [&](int v, int size_v) { out.push_back(with_extent(quad, u, v, size_u, size_v)); });
+      cut(quad.voxel()[frame.v], quad.size_v(), edge, [&](int v, int size_v) {
+        out.push_back(quad_part(quad, u - quad.voxel()[frame.u], v - quad.voxel()[frame.v], size_u, size_v));
+      });
     });
   }
 }
