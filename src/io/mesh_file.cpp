@@ -7,7 +7,6 @@
 
 #include "io/mesh_parts.h"
 #include "io/whole_file.h"
-#include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 
