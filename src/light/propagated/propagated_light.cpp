@@ -1,6 +1,6 @@
 // An update is a queue of boxes, a chunk's each, that are to be solved again: those around edits first. What a solution
-// changes at the side of its box puts what lies beyond into the queue, until nothing changes any more. Since light is one
-// level less with every step, there is one state in which nothing does.
+// changes at the side of its box puts what lies beyond into the queue, until nothing changes any more. Since light is
+// one level less with every step, there is one state in which nothing does.
 #include <quoin/light/propagated_light.h>
 
 #include <algorithm>
@@ -209,6 +209,7 @@ void PropagatedLight::Impl::add(const IBox& voxels) {
 
 void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& changes) {
   std::vector<IVec3> chunks;
+  chunks.reserve(changes.items.size());
   for (const ChunkChange& change : changes.items) chunks.push_back(change.chunk);
   change_domain(grid, chunks);
   for (const ChunkChange& change : changes.items) {
