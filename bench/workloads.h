@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <quoin/grid/chunk.h>
+#include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
 namespace quoin::workloads {
@@ -156,6 +157,24 @@ inline VoxelRegistry glass_types() {
   properties.colour = Rgba8{200, 220, 255};
   static_cast<void>(types.add(properties));
   return types;
+}
+
+/// Whether caves are at a voxel of `cave_terrain`.
+inline bool is_cave(IVec3 v) {
+  return std::sin(0.2 * v.x) * std::sin(0.19 * v.z) * std::sin(0.21 * v.y) < -0.35;
+}
+
+/// A 512x128x512 terrain full of caves, of 128 chunks; its voxel as it is without these.
+inline constexpr IBox kCaveTerrain{{0, 0, 0}, {512, 128, 512}};
+inline VoxelType cave_terrain_rock(IVec3 v) {
+  return terrain_type(v.y, 30.0 + height(v.x, v.z));
+}
+
+inline Grid cave_terrain() {
+  Grid made;
+  made.edit(kCaveTerrain, [](IVec3 v, VoxelType) { return is_cave(v) ? kAir : cave_terrain_rock(v); });
+  made.compact();
+  return made;
 }
 
 }  // namespace quoin::workloads

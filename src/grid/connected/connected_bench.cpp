@@ -14,21 +14,8 @@
 namespace quoin {
 namespace {
 
-constexpr IBox kAll{{0, 0, 0}, {512, 128, 512}};
-
-Grid made_terrain() {
-  Grid made;
-  made.edit(kAll, [](IVec3 v, VoxelType) {
-    const VoxelType type = workloads::terrain_type(v.y, 30.0 + workloads::height(v.x, v.z));
-    const bool is_cave = std::sin(0.2 * v.x) * std::sin(0.19 * v.z) * std::sin(0.21 * v.y) < -0.35;
-    return is_cave ? kAir : type;
-  });
-  made.compact();
-  return made;
-}
-
 const Grid& terrain() {
-  static const Grid made = made_terrain();
+  static const Grid made = workloads::cave_terrain();
   return made;
 }
 
@@ -125,7 +112,7 @@ void flood(benchmark::State& state) {
         open.pop_back();
         for (const Direction d : kDirections) {
           const IVec3 next = at + normal_of(d);
-          if (!kAll.contains(next) || is_left[index(next)] == 0) continue;
+          if (!workloads::kCaveTerrain.contains(next) || is_left[index(next)] == 0) continue;
           is_left[index(next)] = 0;
           open.push_back(next);
         }

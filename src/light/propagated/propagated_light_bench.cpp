@@ -14,7 +14,6 @@
 namespace quoin {
 namespace {
 
-constexpr IBox kAll{{0, 0, 0}, {512, 128, 512}};
 constexpr VoxelType kLamp = 4;
 
 struct World {
@@ -32,10 +31,9 @@ World made_world(bool lamps) {
     if (!world.types.add(lamp)) std::exit(1);
   }
   std::uint32_t random = 1;
-  world.grid.edit(kAll, [&](IVec3 v, VoxelType) {
-    const VoxelType type = workloads::terrain_type(v.y, 30.0 + workloads::height(v.x, v.z));
-    const bool is_cave = std::sin(0.2 * v.x) * std::sin(0.19 * v.z) * std::sin(0.21 * v.y) < -0.35;
-    if (!is_cave) return type;
+  world.grid.edit(workloads::kCaveTerrain, [&](IVec3 v, VoxelType) {
+    const VoxelType type = workloads::cave_terrain_rock(v);
+    if (!workloads::is_cave(v)) return type;
     random = random * 1'664'525U + 1'013'904'223U;
     const bool is_lamp = lamps && type != kAir && (random >> 8) % 2'000 == 0;
     return is_lamp ? static_cast<VoxelType>(kLamp + (random >> 30 & 1U)) : kAir;
