@@ -65,8 +65,9 @@ void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edi
     const Chunk& one = before.uniform().has_value() ? before : after;
     const Chunk& other = before.uniform().has_value() ? after : before;
     if (one.shares_storage_with(other)) return;
-    for (int z = 0; z < kChunkEdge; ++z) {
-      for (int y = 0; y < kChunkEdge; ++y) edit.add(y, z, ~other.row_mask(y, z, *one.uniform()));
+    const IBox within = one.uniform() == kAir ? other.bounds() : kWholeChunk;
+    for (int z = within.min.z; z < within.max.z; ++z) {
+      for (int y = within.min.y; y < within.max.y; ++y) edit.add(y, z, ~other.row_mask(y, z, *one.uniform()));
     }
     return;
   }
