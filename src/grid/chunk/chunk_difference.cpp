@@ -65,10 +65,16 @@ void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edi
     const Chunk& one = before.uniform().has_value() ? before : after;
     const Chunk& other = before.uniform().has_value() ? after : before;
     if (one.shares_storage_with(other)) return;
-    const IBox within = one.uniform() == kAir ? other.bounds() : kWholeChunk;
+    const bool is_of_air = one.uniform() == kAir;
+    const IBox within = is_of_air ? other.bounds() : kWholeChunk;
     for (int z = within.min.z; z < within.max.z; ++z) {
-      for (int y = within.min.y; y < within.max.y; ++y) edit.add(y, z, ~other.row_mask(y, z, *one.uniform()));
+      for (int y = within.min.y; y < within.max.y; ++y) {
+        const std::uint64_t changed = ~other.row_mask(y, z, *one.uniform());
+        if (!is_of_air) edit.add(y, z, changed);
+        if (is_of_air && changed != 0) edit.record.add(y, z, changed);
+      }
     }
+    if (is_of_air) edit.voxels += other.non_air_count();
     return;
   }
   for_each_other_row(
