@@ -43,6 +43,10 @@ class ChunkRows {
   /// The 4x4 rows from (y, z) on, which are multiples of 4; they are set only where they are mixed.
   [[nodiscard]] Slab read(int y, int z, SlabRows& rows) const;
 
+  /// Calls `visit(y, z, row)` for the rows of a box's y and z, by slabs; not for those of slabs in which none counts.
+  template <class Visit>
+  void for_each_row(const IBox& box, Visit&& visit) const;
+
  private:
   void sort_types();
   [[nodiscard]] bool belongs(VoxelType type) const;
@@ -57,6 +61,24 @@ class ChunkRows {
   std::vector<std::uint32_t> asked_;  // indices of the palette: whichever list is shorter
   std::uint64_t inverted_ = 0;        // all ones where that is of those which do not count
 };
+
+template <class Visit>
+void ChunkRows::for_each_row(const IBox& box, Visit&& visit) const {
+  for (int z = box.min.z & ~3; z < box.max.z; z += 4) {
+    for (int y = box.min.y & ~3; y < box.max.y; y += 4) {
+      SlabRows slab;
+      const Slab kind = read(y, z, slab);
+      if (kind == Slab::Empty) continue;
+      if (kind == Slab::Full) slab.fill(~std::uint64_t{0});
+      for (int i = 0; i < 16; ++i) {
+        const int row_y = y + (i & 3);
+        const int row_z = z + (i >> 2);
+        const bool is_inside = row_y >= box.min.y && row_y < box.max.y && row_z >= box.min.z && row_z < box.max.z;
+        if (is_inside) visit(row_y, row_z, slab[static_cast<std::size_t>(i)]);
+      }
+    }
+  }
+}
 
 /// The box of the voxels that count, row by row.
 class RowsBox {

@@ -70,11 +70,11 @@ void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edi
     for (int z = within.min.z; z < within.max.z; ++z) {
       for (int y = within.min.y; y < within.max.y; ++y) {
         const std::uint64_t changed = ~other.row_mask(y, z, *one.uniform());
-        if (!is_of_air) edit.add(y, z, changed);
-        if (is_of_air && changed != 0) edit.record.add(y, z, changed);
+        if (changed != 0) edit.record.add(y, z, changed);
       }
     }
-    if (is_of_air) edit.voxels += other.non_air_count();
+    // Counted already, where that is kept.
+    edit.voxels += is_of_air ? other.non_air_count() : static_cast<int>(kChunkVoxels) - other.count(*one.uniform());
     return;
   }
   for_each_other_row(

@@ -53,25 +53,6 @@ RowPlanes planes_of(std::span<const VoxelType, kChunkEdge> words) {
   return planes;
 }
 
-// Each 4x4 rows that a mask of them counts in, 64 voxels each.
-template <class Visit>
-void for_each_mask(const trace::ChunkRows& rows, const IBox& box, Visit&& visit) {
-  for (int z = box.min.z & ~3; z < box.max.z; z += 4) {
-    for (int y = box.min.y & ~3; y < box.max.y; y += 4) {
-      trace::SlabRows slab;
-      const trace::Slab kind = rows.read(y, z, slab);
-      if (kind == trace::Slab::Empty) continue;
-      if (kind == trace::Slab::Full) slab.fill(kAll);
-      for (int i = 0; i < 16; ++i) {
-        const int row_y = y + (i & 3);
-        const int row_z = z + (i >> 2);
-        const bool is_inside = row_y >= box.min.y && row_y < box.max.y && row_z >= box.min.z && row_z < box.max.z;
-        if (is_inside) visit(row_y, row_z, slab[static_cast<std::size_t>(i)]);
-      }
-    }
-  }
-}
-
 TypeLight light_of(const std::vector<TypeLight>& types, VoxelType type) {
   // What is not registered is opaque.
   return type < types.size() ? types[type] : TypeLight{0, 0};
@@ -157,8 +138,9 @@ void LightSolver::add_lamps(const Chunk& voxels, const std::vector<TypeLight>& t
   for (const VoxelType type : voxels.types()) {
     const std::uint16_t lamp = light_of(types, type).lamp;
     if (lamp == 0) continue;
-    for_each_mask(trace::ChunkRows(voxels, type), box_,
-                  [&](int y, int z, std::uint64_t where) { add_word(where & inside_, lamp, source_[at(y, z)]); });
+    trace::ChunkRows(voxels, type).for_each_row(box_, [&](int y, int z, std::uint64_t where) {
+      add_word(where & inside_, lamp, source_[at(y, z)]);
+    });
   }
 }
 
@@ -181,8 +163,9 @@ void LightSolver::read_voxels(const Chunk* voxels, const std::vector<TypeLight>&
     if (voxels == nullptr) continue;
     const auto stops = [&](VoxelType type) { return (light_of(types, type).passes >> channel & 1U) == 0; };
     const FunctionRef<bool(VoxelType)> asked(stops);
-    for_each_mask(trace::ChunkRows(*voxels, asked), box_,
-                  [&](int y, int z, std::uint64_t where) { pass[at(y, z)] &= ~where; });
+    trace::ChunkRows(*voxels, asked).for_each_row(box_, [&](int y, int z, std::uint64_t where) {
+      pass[at(y, z)] &= ~where;
+    });
   }
 }
 

@@ -10,7 +10,6 @@
 #include <optional>
 #include <utility>
 
-#include <quoin/core/assert.h>
 #include <quoin/grid/changes.h>
 
 #include "grid/chunk_order.h"
@@ -53,10 +52,6 @@ IBox grown(const IBox& box, int by) {
   return {box.min - by, box.max + by};
 }
 
-IBox clipped(const IBox& box, IVec3 low) {
-  return {glm::max(box.min, low), glm::min(box.max, low + kChunkEdge)};
-}
-
 }  // namespace
 
 LightLevels lamp_levels(const VoxelProperties& properties) {
@@ -85,7 +80,10 @@ struct PropagatedLight::Impl {
   void change_domain(const Grid& grid, const std::vector<IVec3>& chunks);
   void take_in(IVec3 chunk);
   void let_go(IVec3 chunk);
-  void add(const IBox& voxels);
+  void add_beside(IVec3 chunk);
+  void add(IVec3 chunk, const IBox& box);
+  void add_part(IVec3 chunk, const IBox& voxels);
+  void add_all(const IBox& voxels);
   [[nodiscard]] IBox reach_of(const Grid& grid, const IBox& voxels) const;
   void run(const Grid& grid, Threads threads);
   [[nodiscard]] std::vector<Job> next_jobs();
@@ -153,19 +151,34 @@ void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IV
       if (y < old.begin || y >= old.end) take_in({column.x, y, column.z});
     }
   }
-  std::erase_if(queue, [&](const auto& each) { return !domain.holds(each.first); });
 }
 
 // It begins in the dark: light that grows comes to its end in fewer steps than light that dwindles. To those beside it
 // it was as the domain said.
 void PropagatedLight::Impl::take_in(IVec3 chunk) {
-  queue[chunk] = kWholeChunk;
-  for (const Direction direction : kDirections) queue[chunk + normal_of(direction)] = kWholeChunk;
+  add(chunk, kWholeChunk);
+  add_beside(chunk);
 }
 
 void PropagatedLight::Impl::let_go(IVec3 chunk) {
   levels.put_chunk(chunk, Chunk());
-  for (const Direction direction : kDirections) queue[chunk + normal_of(direction)] = kWholeChunk;
+  add_beside(chunk);
+}
+
+void PropagatedLight::Impl::add_beside(IVec3 chunk) {
+  for (const Direction direction : kDirections) add(chunk + normal_of(direction), kWholeChunk);
+}
+
+// A box of the chunk's voxels is to be solved again, if the domain holds it.
+void PropagatedLight::Impl::add(IVec3 chunk, const IBox& box) {
+  if (box.empty() || !domain.holds(chunk)) return;
+  IBox& known = queue[chunk];
+  known = unite(known, box);
+}
+
+void PropagatedLight::Impl::add_part(IVec3 chunk, const IBox& voxels) {
+  const IVec3 low = chunk * kChunkEdge;
+  add(chunk, intersect({voxels.min - low, voxels.max - low}, kWholeChunk));
 }
 
 // Where light may differ for edits of these voxels: as far as it reaches, around columns that the sky falls down too.
@@ -190,19 +203,12 @@ IBox PropagatedLight::Impl::reach_of(const Grid& grid, const IBox& voxels) const
   return grown({{voxels.min.x, low, voxels.min.z}, voxels.max}, kReach);
 }
 
-void PropagatedLight::Impl::add(const IBox& voxels) {
+void PropagatedLight::Impl::add_all(const IBox& voxels) {
   const IVec3 first = chunk_of(voxels.min);
   const IVec3 last = chunk_of(voxels.max - 1);
   for (int z = first.z; z <= last.z; ++z) {
     for (int y = first.y; y <= last.y; ++y) {
-      for (int x = first.x; x <= last.x; ++x) {
-        const IVec3 chunk{x, y, z};
-        if (!domain.holds(chunk)) continue;
-        const IVec3 low = chunk * kChunkEdge;
-        const IBox part = clipped(voxels, low);
-        IBox& box = queue[chunk];
-        box = unite(box, {part.min - low, part.max - low});
-      }
+      for (int x = first.x; x <= last.x; ++x) add_part({x, y, z}, voxels);
     }
   }
 }
@@ -214,7 +220,7 @@ void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& chang
   change_domain(grid, chunks);
   for (const ChunkChange& change : changes.items) {
     const IVec3 low = change.chunk * kChunkEdge;
-    add(reach_of(grid, {change.box.min + low, change.box.max + low}));
+    add_all(reach_of(grid, {change.box.min + low, change.box.max + low}));
   }
 }
 
@@ -328,15 +334,8 @@ void PropagatedLight::Impl::go_on(const Job& job, const IBox& changed) {
     (is_up ? beyond.min : beyond.max)[frame.axis] = is_up ? world.max[frame.axis] : world.min[frame.axis];
     if (direction == Direction::NegY) beyond.min.y = std::min(beyond.min.y, (beyond.max.y - 1) & ~(kChunkEdge - 1));
     // No farther than the chunk beside it, whose own changes go on from there.
-    const IVec3 next = solved.max[frame.axis] == kChunkEdge && is_up ? job.chunk + normal_of(direction)
-                       : solved.min[frame.axis] == 0 && !is_up       ? job.chunk + normal_of(direction)
-                                                                     : job.chunk;
-    if (!domain.holds(next)) continue;
-    const IVec3 next_low = next * kChunkEdge;
-    const IBox part = clipped(beyond, next_low);
-    if (part.empty()) continue;
-    IBox& box = queue[next];
-    box = unite(box, {part.min - next_low, part.max - next_low});
+    const bool leaves = is_up ? solved.max[frame.axis] == kChunkEdge : solved.min[frame.axis] == 0;
+    add_part(leaves ? job.chunk + normal_of(direction) : job.chunk, beyond);
   }
 }
 

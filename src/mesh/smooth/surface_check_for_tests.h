@@ -213,7 +213,8 @@ inline void expect_manifold(const SurfaceCount& count) {
 }
 
 /// The volume that a closed mesh encloses, positive when it faces outwards.
-inline double signed_volume(const SmoothMesh& mesh) {
+template <class Mesh>
+double signed_volume(const Mesh& mesh) {
   double volume = 0.0;
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
     const DVec3 a(mesh.positions[mesh.indices[i]]);

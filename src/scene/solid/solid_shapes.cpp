@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 
@@ -143,16 +144,10 @@ bool read_solid_rows(const Chunk* chunk, const VoxelRegistry& types, SolidRows& 
   const FunctionRef<bool(VoxelType)> asked(counts);
   const trace::ChunkRows read(*chunk, asked);
   if (read.none()) return false;
-  for (int z = 0; z < kChunkEdge; z += 4) {
-    for (int y = 0; y < kChunkEdge; y += 4) {
-      trace::SlabRows slab;
-      const trace::Slab kind = read.read(y, z, slab);
-      if (kind != trace::Slab::Mixed) slab.fill(kind == trace::Slab::Full ? kAll : 0);
-      for (std::size_t i = 0; i < slab.size(); ++i) {
-        rows[(static_cast<std::size_t>(z) + i / 4) * kEdge + static_cast<std::size_t>(y) + i % 4] = slab[i];
-      }
-    }
-  }
+  rows.fill(0);
+  read.for_each_row(kWholeChunk, [&](int y, int z, std::uint64_t row) {
+    rows[static_cast<std::size_t>(z) * kEdge + static_cast<std::size_t>(y)] = row;
+  });
   return true;
 }
 
@@ -164,17 +159,18 @@ void append_solid_boxes(const Chunk& chunk, const VoxelRegistry& types, std::vec
 void append_solid_faces(const Grid& grid, IVec3 chunk, const VoxelRegistry& types, QuadBuffer& out) {
   SolidRows rows;
   if (!read_solid_rows(grid.find_chunk(chunk), types, rows)) return;
+  std::optional<SolidLayers> layers;
   for (const Direction direction : kDirections) {
     const FaceFrame& frame = frame_of(direction);
-    const SolidLayers layers(rows, frame.axis);
+    const bool is_up = frame.sign > 0;
+    if (is_up) layers.emplace(rows, frame.axis);  // of the opposite direction too, which comes next
     // The bits of a word lie along the lower of the other two axes.
     const bool is_u_in_word = frame.u < frame.v;
-    const bool is_up = frame.sign > 0;
     for (std::size_t i = 0; i < kEdge; ++i) {
       const bool is_last = i == (is_up ? kEdge - 1 : 0);
-      Layer faces = layers.at(i);
+      Layer faces = layers->at(i);
       const Layer next = is_last ? layer_beside(grid.find_chunk(chunk + normal_of(direction)), types, direction)
-                                 : layers.at(is_up ? i + 1 : i - 1);
+                                 : layers->at(is_up ? i + 1 : i - 1);
       for (std::size_t row = 0; row < kEdge; ++row) faces[row] &= ~next[row];
       cut_faces(faces, direction, is_u_in_word, static_cast<int>(i), out);
     }

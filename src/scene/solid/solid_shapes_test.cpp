@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "grid/chunk_order.h"
+#include "mesh/smooth/surface_check_for_tests.h"
 
 namespace quoin {
 namespace {
@@ -176,14 +177,7 @@ TEST(SolidShapes, TrianglesLookOutwards) {
   const SolidMesh mesh = solid_mesh(quads);
   ASSERT_EQ(mesh.positions.size(), 4 * quads.size());
   ASSERT_EQ(mesh.indices.size(), 6 * quads.size());
-  double volume = 0.0;
-  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
-    const DVec3 a(mesh.positions[mesh.indices[i]]);
-    const DVec3 b(mesh.positions[mesh.indices[i + 1]]);
-    const DVec3 c(mesh.positions[mesh.indices[i + 2]]);
-    volume += glm::dot(a, glm::cross(b, c)) / 6.0;
-  }
-  EXPECT_NEAR(volume, static_cast<double>(grid.voxel_count()), 1e-6);
+  EXPECT_NEAR(oracle::signed_volume(mesh), static_cast<double>(grid.voxel_count()), 1e-6);
 }
 
 TEST(SolidShapes, AreFewForATerrain) {
