@@ -129,6 +129,39 @@ std::uint64_t DensityChunk::write_row(int y, int z, std::span<const Half, kChunk
   return changed;
 }
 
+void DensityStorage::turn_outward(DensityChunk& chunk, const std::array<std::uint64_t, kChunkEdge * kChunkEdge>& rows) {
+  constexpr Half kMagnitude = 0x7FFF;
+  if (std::all_of(rows.begin(), rows.end(), [](std::uint64_t row) { return row == 0; })) return;
+  if (chunk.storage_ == nullptr) chunk.make_mixed();
+  chunk.storage_.make_own();
+  DensityStorage& m = *chunk.storage_;
+  for (std::size_t slab = 0; slab < m.slabs.size(); ++slab) {
+    const auto number = [&](std::size_t row) {
+      return (slab / 16 * 4 + row / 4) * kChunkEdge + slab % 16 * 4 + row % 4;
+    };
+    std::uint64_t any = 0;
+    std::uint64_t all = ~std::uint64_t{0};
+    for (std::size_t row = 0; row < kSlabRows; ++row) {
+      any |= rows[number(row)];
+      all &= rows[number(row)];
+      m.solid[number(row)] &= ~rows[number(row)];
+    }
+    if (any == 0) continue;
+    if ((m.slabs[slab] & ChunkStorage::kUniformSlab) != 0 && ~all == 0) {
+      m.slabs[slab] &= ChunkStorage::kUniformSlab | kMagnitude;
+      continue;
+    }
+    const std::uint32_t slot = chunk.slot_for_writing(slab);
+    for (std::size_t row = 0; row < kSlabRows; ++row) {
+      const std::uint64_t turned = rows[number(row)];
+      Half* const values = m.row(slot, static_cast<int>(row));
+      for (std::size_t x = 0; x < kChunkEdge && turned != 0; ++x)
+        values[x] &= (turned >> x & 1U) != 0 ? kMagnitude : 0xFFFFU;
+    }
+  }
+  chunk.unite_slabs();
+}
+
 void DensityChunk::unite_slabs() {
   if (storage_ == nullptr) return;
   for (std::size_t i = 0; i < storage_->slabs.size(); ++i) {

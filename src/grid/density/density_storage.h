@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <quoin/grid/density_chunk.h>
@@ -16,6 +17,9 @@ struct DensityStorage : RefCounted {
   /// Of a chunk; null when it is uniform.
   [[nodiscard]] static const DensityStorage* of(const DensityChunk& chunk) { return chunk.storage_.get(); }
 
+  /// Makes solid samples as far out as they were in. `rows`: [z][y]: which; of solid ones only.
+  static void turn_outward(DensityChunk& chunk, const std::array<std::uint64_t, kChunkEdge * kChunkEdge>& rows);
+
   std::array<std::uint32_t, 256> slabs{};  ///< [z / 4][y / 4]: ChunkStorage::kUniformSlab | half, or a slot in `values`
   std::vector<Half> values;                ///< [slot][z % 4][y % 4][x]
   std::vector<std::uint32_t> free_slots;
@@ -23,6 +27,9 @@ struct DensityStorage : RefCounted {
 
   [[nodiscard]] const Half* row(std::uint32_t slot, int row_in_slab) const {
     return values.data() + (std::size_t{slot} * 16 + static_cast<std::size_t>(row_in_slab)) * kChunkEdge;
+  }
+  [[nodiscard]] Half* row(std::uint32_t slot, int row_in_slab) {
+    return const_cast<Half*>(std::as_const(*this).row(slot, row_in_slab));
   }
 };
 

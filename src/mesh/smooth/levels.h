@@ -55,9 +55,13 @@ class ChunkLevels {
   }
   /// The cell that a vertex of a mesh lies in.
   [[nodiscard]] LevelCell cell_of(SmoothCell name) const {
-    const IVec3 chunk = name.chunk_offset();
-    const int level = of_chunk(chunk);
-    return {chunk, chunk * kChunkEdge + name.cell() * (1 << level), level};
+    // In place: a copy of three integers waits for their stores.
+    LevelCell cell{name.chunk_offset(), name.cell(), 0};
+    cell.level = of_chunk(cell.chunk);
+    for (int axis = 0; axis < 3; ++axis) {
+      cell.first[axis] = cell.chunk[axis] * kChunkEdge + (cell.first[axis] << cell.level);
+    }
+    return cell;
   }
 
   /// The levels of the chunks that meet in the line along `axis` through a sample: one, two or four of them.

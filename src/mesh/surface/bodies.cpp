@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "grid/chunk_order.h"
+#include "grid/density/density_storage.h"
 
 namespace quoin::smooth {
 namespace {
@@ -23,26 +24,31 @@ bool holds_others(const DensityChunk& chunk, const VoxelRegistry& types, std::ui
   return holds(chunk, types, body, true);
 }
 
+// Of opaque ones the others are the transparent types; of a transparent one all but its own type.
+OtherBodies::OtherBodies(const DensityChunk& chunk, const VoxelRegistry& types, std::uint32_t body)
+    : chunk_(chunk), listed_(chunk.materials().types()), listed_are_others_(body == 0) {
+  std::erase_if(listed_, [&](VoxelType material) {
+    return material == kAir ||
+           (listed_are_others_ ? !types.is_transparent(material) : body_of(types, material) != body);
+  });
+}
+
+std::uint64_t OtherBodies::row(int y, int z) const {
+  const std::uint64_t solid = chunk_.solid_row(y, z);
+  std::uint64_t listed = 0;
+  for (std::size_t i = 0; i < listed_.size() && solid != 0; ++i)
+    listed |= chunk_.materials().row_mask(y, z, listed_[i]);
+  return solid & (listed_are_others_ ? listed : ~listed);
+}
+
 DensityChunk without_others(const DensityChunk& whole, const VoxelRegistry& types, std::uint32_t body) {
-  DensityChunk made = whole;
-  std::array<Half, kChunkEdge> row;
+  const OtherBodies bodies(whole, types, body);
+  std::array<std::uint64_t, kChunkEdge * kChunkEdge> others;
   for (int z = 0; z < kChunkEdge; ++z) {
-    for (int y = 0; y < kChunkEdge; ++y) {
-      std::uint64_t others = whole.solid_row(y, z);
-      for (int x = 0; x < kChunkEdge; ++x) {
-        const bool is_solid = (others >> x & 1U) != 0;
-        const bool is_own = is_solid && body_of(types, whole.materials().get({x, y, z})) == body;
-        if (is_own) others &= ~(std::uint64_t{1} << x);
-      }
-      if (others == 0) continue;
-      whole.read_row(y, z, row);
-      for (std::size_t x = 0; x < kChunkEdge; ++x) {
-        if ((others >> x & 1U) != 0) row[x] &= 0x7FFFU;
-      }
-      made.write_row(y, z, row);
-    }
+    for (int y = 0; y < kChunkEdge; ++y) others[static_cast<std::size_t>(z * kChunkEdge + y)] = bodies.row(y, z);
   }
-  made.unite_slabs();
+  DensityChunk made = whole;
+  DensityStorage::turn_outward(made, others);
   return made;
 }
 

@@ -25,6 +25,23 @@ namespace quoin::smooth {
 /// Whether any material of a chunk is of another body.
 [[nodiscard]] bool holds_others(const DensityChunk& chunk, const VoxelRegistry& types, std::uint32_t body);
 
+/// Which samples of a chunk are solid and of another body, row by row.
+class OtherBodies {
+ public:
+  /// Lifetime: `chunk` must outlive this.
+  OtherBodies(const DensityChunk& chunk, const VoxelRegistry& types, std::uint32_t body);
+
+  /// Requires: 0 <= y, z < 64.
+  [[nodiscard]] std::uint64_t row(int y, int z) const;
+  /// Whether there is none, whatever is solid.
+  [[nodiscard]] bool empty() const { return listed_are_others_ && listed_.empty(); }
+
+ private:
+  const DensityChunk& chunk_;
+  std::vector<VoxelType> listed_;
+  bool listed_are_others_;
+};
+
 /// A chunk in which what is solid of other bodies is as far out as it was in.
 [[nodiscard]] DensityChunk without_others(const DensityChunk& whole, const VoxelRegistry& types, std::uint32_t body);
 

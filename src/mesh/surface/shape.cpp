@@ -29,6 +29,69 @@ struct WideRow {
   std::uint64_t high = 0;  ///< bit i: sample i + 2
 };
 
+/// A row of a chunk's neighbourhood, of what `row_of(i, y, z)` has of the i-th chunk.
+template <class RowOf>
+WideRow wide_row(int y, int z, const RowOf& row_of) {
+  const auto part = [&](int dx) -> std::uint64_t {
+    return row_of(Neighbourhood::index(dx, y >> kChunkShift, z >> kChunkShift), y & (kChunkEdge - 1),
+                  z & (kChunkEdge - 1));
+  };
+  const std::uint64_t middle = part(0);
+  return {part(-1) >> 62 | middle << 2, middle >> 2 | part(1) << 62};
+}
+
+/// In the lowest two bits: samples x and x + 1.
+std::uint64_t pair_of(const WideRow& row, int x) {
+  return x < kChunkEdge / 2 ? row.low >> (x + 2) : row.high >> (x - 2);
+}
+
+/// Rows of cells, -1 to 63 on y and z, and one more of samples.
+constexpr int kCellRows = kChunkEdge + 2;
+
+std::size_t cell_row(int y, int z) {
+  return static_cast<std::size_t>((z + 1) * kCellRows + y + 1);
+}
+
+/// [z][y]: adds to each row of samples those that cells beginning there have as well.
+void unite_for_cells(std::vector<WideRow>& rows) {
+  for (std::size_t row = 0; row + kCellRows + 1 < rows.size(); ++row) {
+    for (const std::size_t other : {row + 1, row + kCellRows, row + kCellRows + 1}) {
+      rows[row].low |= rows[other].low;
+      rows[row].high |= rows[other].high;
+    }
+  }
+}
+
+/// Which cells of a chunk have a corner that is solid and transparent: no other has several bodies.
+class TransparentCells {
+ public:
+  TransparentCells(const DensityNeighbourhood& whole, const VoxelRegistry& types) {
+    std::array<std::optional<OtherBodies>, 27> transparent;
+    for (std::size_t i = 0; i < 27; ++i) {
+      if (whole.chunks[i] == nullptr) continue;
+      transparent[i].emplace(*whole.chunks[i], types, 0);
+      if (transparent[i]->empty()) transparent[i].reset();
+    }
+    if (std::none_of(transparent.begin(), transparent.end(), [](const auto& each) { return each.has_value(); })) return;
+    any_.resize(static_cast<std::size_t>(kCellRows * kCellRows));
+    for (int z = -1; z <= kChunkEdge; ++z) {
+      for (int y = -1; y <= kChunkEdge; ++y) {
+        any_[cell_row(y, z)] = wide_row(y, z, [&](std::size_t i, int local_y, int local_z) {
+          return transparent[i] ? transparent[i]->row(local_y, local_z) : 0;
+        });
+      }
+    }
+    unite_for_cells(any_);
+  }
+
+  [[nodiscard]] bool has(IVec3 cell) const {
+    return !any_.empty() && (pair_of(any_[cell_row(cell.y, cell.z)], cell.x) & 3U) != 0;
+  }
+
+ private:
+  std::vector<WideRow> any_;  // [z][y], by unite_for_cells
+};
+
 /// The words of a row and of those beside it, of one half.
 struct RowsAround {
   std::uint64_t here;
@@ -65,63 +128,49 @@ ThinRows thin_of(const RowsAround& rows) {
 class ThinCells {
  public:
   explicit ThinCells(const DensityNeighbourhood& chunks)
-      : solid_(kRead * kRead), thin_(kFound * kFound), any_(kFound * kFound) {
-    for (int z = 0; z < kRead; ++z) {
-      for (int y = 0; y < kRead; ++y) solid_[at(y, z)] = read(chunks, y - 2, z - 2);
+      : solid_(kRead * kRead), thin_(kCellRows * kCellRows), any_(kCellRows * kCellRows) {
+    for (int z = -2; z < kRead - 2; ++z) {
+      for (int y = -2; y < kRead - 2; ++y) solid_[at(y, z)] = read(chunks, y, z);
     }
-    for (int z = 0; z < kFound; ++z) {
-      for (int y = 0; y < kFound; ++y) {
+    for (int z = -1; z <= kChunkEdge; ++z) {
+      for (int y = -1; y <= kChunkEdge; ++y) {
         const ThinRows low = find(y, z, &WideRow::low);
         const ThinRows high = find(y, z, &WideRow::high);
-        const std::size_t row = static_cast<std::size_t>(z * kFound + y);
+        const std::size_t row = cell_row(y, z);
         for (std::size_t axis = 0; axis < 3; ++axis) thin_[row][axis] = {low[axis], high[axis]};
         any_[row] = {low[0] | low[1] | low[2], high[0] | high[1] | high[2]};
       }
     }
-    for (std::size_t row = 0; row + kFound + 1 < any_.size(); ++row) {
-      for (const std::size_t other : {row + 1, row + kFound, row + kFound + 1}) {
-        any_[row].low |= any_[other].low;
-        any_[row].high |= any_[other].high;
-      }
-    }
+    unite_for_cells(any_);
   }
 
   /// Whether `has` holds along any axis.
-  [[nodiscard]] bool has_any(IVec3 cell) const {
-    return (pair_of(any_[static_cast<std::size_t>((cell.z + 1) * kFound + cell.y + 1)], cell.x) & 3U) != 0;
-  }
+  [[nodiscard]] bool has_any(IVec3 cell) const { return (pair_of(any_[cell_row(cell.y, cell.z)], cell.x) & 3U) != 0; }
 
   [[nodiscard]] bool has(IVec3 cell, int axis) const {
     std::uint64_t pair = 0;
     for (int i = 0; i < 4; ++i) {
-      const auto at = static_cast<std::size_t>((cell.z + 1 + (i >> 1)) * kFound + cell.y + 1 + (i & 1));
-      pair |= pair_of(thin_[at][static_cast<std::size_t>(axis)], cell.x);
+      const std::size_t row = cell_row(cell.y + (i & 1), cell.z + (i >> 1));
+      pair |= pair_of(thin_[row][static_cast<std::size_t>(axis)], cell.x);
     }
     return (pair & 3U) != 0;
   }
 
  private:
-  static constexpr int kRead = kChunkEdge + 4;   // rows from -2 on
-  static constexpr int kFound = kChunkEdge + 2;  // rows from -1 on
+  static constexpr int kRead = kChunkEdge + 4;  // rows from -2 on
 
-  static std::size_t at(int y, int z) { return static_cast<std::size_t>(z * kRead + y); }
-  // In the lowest two bits: samples x and x + 1.
-  static std::uint64_t pair_of(const WideRow& row, int x) {
-    return x < kChunkEdge / 2 ? row.low >> (x + 2) : row.high >> (x - 2);
-  }
+  static std::size_t at(int y, int z) { return static_cast<std::size_t>((z + 2) * kRead + y + 2); }
 
   static WideRow read(const DensityNeighbourhood& chunks, int y, int z) {
-    const auto part = [&](int dx) -> std::uint64_t {
-      const DensityChunk* chunk = chunks.at(dx, y >> kChunkShift, z >> kChunkShift);
+    return wide_row(y, z, [&](std::size_t i, int local_y, int local_z) -> std::uint64_t {
+      const DensityChunk* chunk = chunks.chunks[i];
       if (chunk == nullptr) return DensityChunk::is_solid(chunks.outside) ? ~std::uint64_t{0} : 0;
-      return chunk->solid_row(y & (kChunkEdge - 1), z & (kChunkEdge - 1));
-    };
-    const std::uint64_t middle = part(0);
-    return {part(-1) >> 62 | middle << 2, middle >> 2 | part(1) << 62};
+      return chunk->solid_row(local_y, local_z);
+    });
   }
 
   [[nodiscard]] ThinRows find(int y, int z, std::uint64_t WideRow::*half) const {
-    const auto row = [&](int dy, int dz) { return solid_[at(y + 1 + dy, z + 1 + dz)].*half; };
+    const auto row = [&](int dy, int dz) { return solid_[at(y + dy, z + dz)].*half; };
     RowsAround solid{row(0, 0), {row(-1, 0), row(1, 0)}, {row(0, -1), row(0, 1)}, {}};
     // Within the ground and above it, as most rows are.
     const std::uint64_t all = solid.here & solid.y[0] & solid.y[1] & solid.z[0] & solid.z[1];
@@ -137,7 +186,7 @@ class ThinCells {
 
   std::vector<WideRow> solid_;                // [z][y]
   std::vector<std::array<WideRow, 3>> thin_;  // [z][y], by axis
-  std::vector<WideRow> any_;                  // [z][y]: along any axis, in any row of the cells that begin here
+  std::vector<WideRow> any_;                  // [z][y]: along any axis, by unite_for_cells
 };
 
 /// Whether a cell has one sheet, whichever way they are told apart.
@@ -215,19 +264,19 @@ void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& opt
   const ChunkLevels levels(options.levels);
   std::unique_ptr<const ThinCells> thin;
   if (shape.keep_thin) thin = std::make_unique<const ThinCells>(chunks);
-  const bool moves_thin_only = shape.whole == nullptr && shape.smoothness == 1.0F;
+  std::optional<TransparentCells> transparent;
+  if (shape.whole != nullptr) transparent.emplace(*shape.whole, *shape.types);
   std::vector<bool> is_shared(shape.whole != nullptr ? mesh.positions.size() : 0);
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     const LevelCell cell = levels.cell_of(mesh.cells[i]);
     const bool has_thin = thin && cell.level == 0 && thin->has_any(cell.first);
-    if (moves_thin_only && !has_thin) continue;
+    const bool may_be_shared = transparent && cell.level == 0 && transparent->has(cell.first);
+    if (shape.smoothness == 1.0F && !has_thin && !may_be_shared) continue;
     const Vec3 first(cell.first);
     const auto size = static_cast<float>(cell.size());
     Vec3 fraction = (mesh.positions[i] - first) / size;
     std::optional<SharedVertex> shared;
-    if (shape.whole != nullptr && cell.level == 0 && has_one_sheet(solid_corners_of(chunks, cell))) {
-      shared = vertex_of_bodies(shape, cell);
-    }
+    if (may_be_shared && has_one_sheet(solid_corners_of(chunks, cell))) shared = vertex_of_bodies(shape, cell);
     if (shared) {
       is_shared[i] = true;
       fraction = shared->fraction;

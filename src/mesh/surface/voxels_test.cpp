@@ -384,6 +384,39 @@ TEST(SmoothBodies, GlassIsAClosedBodyThatMeetsItsFrameExactly) {
   EXPECT_NEAR(signed_volume(bodies[1]), 2.0 * 14.0 * 13.0, 0.15 * 2.0 * 14.0 * 13.0);
 }
 
+// Every sample of one body's densities, one by one, in rock with water and two kinds of glass.
+TEST(SmoothBodies, OthersAreAsFarOutAsTheyWereIn) {
+  const VoxelRegistry types = six_types();
+  std::mt19937 random(11);
+  for (int round = 0; round < 6; ++round) {
+    Grid grid;
+    if (round != 0) grid.fill_box({{0, 0, 0}, {64, 30, 64}}, 1);  // deep slabs of one density
+    for (int i = 0; i < 30 * round; ++i) {
+      const IVec3 at(static_cast<int>(random() % 56), static_cast<int>(random() % 56), static_cast<int>(random() % 56));
+      const IVec3 size(1 + static_cast<int>(random() % 8), 1 + static_cast<int>(random() % 8), 1);
+      grid.fill_box({at, at + size}, static_cast<VoxelType>(random() % 7));
+    }
+    if (round == 0) grid.fill_box({{-64, -64, -64}, {128, 128, 128}}, 5);  // nothing but the other body
+    const DensityGrid field = *field_from_grid(grid);
+    const DensityChunk& whole = *field.find_chunk({0, 0, 0});
+    const DensityChunk before = whole;
+    for (const std::uint32_t body : {0U, 6U, 7U}) {
+      const DensityChunk made = smooth::without_others(whole, types, body);
+      int wrong = 0;
+      for (int i = 0; i < kChunkEdge * kChunkEdge * kChunkEdge; ++i) {
+        const IVec3 p(i % kChunkEdge, i / kChunkEdge % kChunkEdge, i / kChunkEdge / kChunkEdge);
+        const bool is_solid = DensityChunk::is_solid(whole.get(p));
+        const bool is_other = is_solid && smooth::body_of(types, whole.materials().get(p)) != body;
+        const Half expected = is_other ? static_cast<Half>(whole.get(p) ^ 0x8000U) : whole.get(p);
+        const bool says_solid = (made.solid_row(p.y, p.z) >> p.x & 1U) != 0;
+        if (made.get(p) != expected || says_solid != DensityChunk::is_solid(expected)) ++wrong;
+      }
+      EXPECT_EQ(wrong, 0) << "round " << round << ", body " << body;
+    }
+    EXPECT_TRUE(whole == before);
+  }
+}
+
 TEST(SmoothBodies, KindsOfGlassAreBodiesOfTheirOwn) {
   const VoxelRegistry types = six_types();
   Grid grid;
