@@ -9,8 +9,6 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/neighbourhood.h>
 
-#include "grid/chunk_boxes.h"
-
 namespace quoin {
 
 /// A box of voxels of one chunk in eight bytes, so that it grows by one comparison of all: the least x, y, z, and 255
@@ -60,7 +58,7 @@ struct VoxelRecord {
   IVec3 chunk{0};
   std::uint32_t neighbours = 0;
   PackedBox box;
-  std::uint64_t bricks = 0;  // as ChunkChange::bricks
+  ChunkSlabs slabs;
 
   /// Counts voxels of a row that changed.
   void add(int y, int z, std::uint64_t changed) {
@@ -73,32 +71,29 @@ struct VoxelRecord {
       }
     }
     box.unite(PackedBox::of_row(y, z, changed));
-    const auto has_any = [changed](unsigned part) {
-      return std::uint64_t{(changed >> (16 * part) & 0xFFFFU) != 0} << part;
-    };
-    bricks |= (has_any(0) | has_any(1) | has_any(2) | has_any(3)) << brick_of(0, y, z);
+    slabs.add(y, z);
   }
   /// Counts one voxel that is on no side of the chunk.
   void add_inner(int x, int y, int z) {
     neighbours |= kCentreOnly;
     box.unite(PackedBox::of(x, y, z));
-    bricks |= std::uint64_t{1} << brick_of(x, y, z);
+    slabs.add(y, z);
   }
   /// Counts all voxels of a box that is not empty.
   void add_box(const IBox& all) {
     neighbours = kEverywhere;
     box.unite(PackedBox::of(all.min.x, all.min.y, all.min.z));
     box.unite(PackedBox::of(all.max.x - 1, all.max.y - 1, all.max.z - 1));
-    bricks |= bricks_of(all);
+    slabs.add(ChunkSlabs::of(all));
   }
   /// For an edit that was broken off: anything may have changed.
   void add_all() { add_box(kWholeChunk); }
   void merge(const VoxelRecord& other) {
     neighbours |= other.neighbours;
     box.unite(other.box);
-    bricks |= other.bricks;
+    slabs.add(other.slabs);
   }
-  [[nodiscard]] ChunkChange change() const { return {chunk, box.box(), neighbours, bricks}; }
+  [[nodiscard]] ChunkChange change() const { return {chunk, box.box(), neighbours, slabs}; }
 
  private:
   static constexpr std::uint32_t kEverywhere = (std::uint32_t{1} << 27) - 1;
@@ -106,7 +101,6 @@ struct VoxelRecord {
   static unsigned sides(int local) {
     return 0b010U | static_cast<unsigned>(local == 0) | static_cast<unsigned>(local == kChunkEdge - 1) << 2;
   }
-  static unsigned brick_of(int x, int y, int z) { return static_cast<unsigned>(x >> 4 | y >> 4 << 2 | z >> 4 << 4); }
 };
 
 /// What an edit did to one chunk of voxels.

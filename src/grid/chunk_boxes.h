@@ -12,17 +12,6 @@
 
 namespace quoin {
 
-/// The bricks of 16^3 that a box in a chunk's coordinates reaches, a bit each, as in ChunkChange::bricks.
-inline std::uint64_t bricks_of(const IBox& box) {
-  std::uint64_t bricks = 0;
-  for (int z = box.min.z >> 4; z << 4 < box.max.z; ++z) {
-    for (int y = box.min.y >> 4; y << 4 < box.max.y; ++y) {
-      for (int x = box.min.x >> 4; x << 4 < box.max.x; ++x) bricks |= std::uint64_t{1} << (x + 4 * y + 16 * z);
-    }
-  }
-  return bricks;
-}
-
 /// The boxes of what chunks hold, and the box around all of them, which follows every change at a cost of O(log
 /// chunks): of each of its six sides it is known how many chunks' boxes end at which coordinate.
 class ChunkBoxes {

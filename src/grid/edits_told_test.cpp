@@ -94,36 +94,46 @@ TEST(VisitChanges, TellsOfEveryVoxelAndWhatItWas) {
     GridChanges unknown;
     unknown.all = true;
     ASSERT_EQ(told(before, grid, unknown), expected) << step;
-    // Bricks: those of the changed voxels, and where an edit was undone others too.
-    std::map<Place, std::uint64_t> bricks;
-    for (const ChunkChange& change : changes.items)
-      bricks[{change.chunk.x, change.chunk.y, change.chunk.z}] = change.bricks;
+    // Slabs: those of the changed voxels, and where an edit was undone others too.
+    std::map<Place, ChunkSlabs> slabs;
+    for (const ChunkChange& change : changes.items) {
+      slabs[{change.chunk.x, change.chunk.y, change.chunk.z}] = change.slabs;
+    }
     for (const auto& [place, types] : expected) {
       const IVec3 voxel{std::get<0>(place), std::get<1>(place), std::get<2>(place)};
       const IVec3 chunk = chunk_of(voxel);
-      const IVec3 part = local_of(voxel) >> 4;
-      ASSERT_TRUE(bricks[Place(chunk.x, chunk.y, chunk.z)] >> (part.x + 4 * part.y + 16 * part.z) & 1U);
+      const IVec3 at = local_of(voxel);
+      ASSERT_TRUE((slabs[Place(chunk.x, chunk.y, chunk.z)].has(at.y, at.z)));
     }
     before = grid.snapshot();
   }
 }
 
-TEST(GridChanges, BricksAreThoseThatChanged) {
+TEST(GridChanges, SlabsAreThoseThatChanged) {
   Grid grid;
   ChangeCursor cursor = grid.cursor();
-  const auto bricks = [&] {
+  const auto expect = [&](const IBox& box) {
     const GridChanges changes = grid.changes_since(cursor);
-    EXPECT_EQ(changes.items.size(), 1U);
-    return changes.items.at(0).bricks;
+    ASSERT_EQ(changes.items.size(), 1U);
+    for (int z = 0; z < kChunkEdge; ++z) {
+      for (int y = 0; y < kChunkEdge; ++y) {
+        const bool is_within = y / 4 >= box.min.y / 4 && y / 4 <= (box.max.y - 1) / 4 && z / 4 >= box.min.z / 4 &&
+                               z / 4 <= (box.max.z - 1) / 4;
+        ASSERT_EQ(changes.items[0].slabs.has(y, z), is_within) << y << ' ' << z;
+        const std::uint32_t block = changes.items[0].slabs.block(y & ~15, z & ~15);
+        ASSERT_EQ((block >> ((y >> 2 & 3) + 4 * (z >> 2 & 3)) & 1U) != 0, is_within);
+      }
+    }
   };
-  grid.set({17, 33, 50}, 1);  // inside
-  EXPECT_EQ(bricks(), std::uint64_t{1} << (1 + 4 * 2 + 16 * 3));
-  grid.set({63, 0, 20}, 1);  // on sides
-  EXPECT_EQ(bricks(), std::uint64_t{1} << (3 + 16));
-  grid.fill_box({{10, 5, 5}, {40, 6, 6}}, 2);
-  EXPECT_EQ(bricks(), 7U);
-  grid.fill_box({{0, 0, 0}, {64, 64, 64}}, 3);
-  EXPECT_EQ(bricks(), ~std::uint64_t{0});
+  const auto edit = [&](const IBox& box, VoxelType type) {
+    grid.fill_box(box, type);
+    expect(box);
+  };
+  edit({{17, 33, 50}, {18, 34, 51}}, 1);  // inside
+  edit({{63, 0, 20}, {64, 1, 21}}, 1);    // on sides
+  edit({{10, 5, 5}, {40, 6, 6}}, 2);
+  edit({{10, 3, 60}, {12, 41, 64}}, 2);
+  edit({{0, 0, 0}, {64, 64, 64}}, 3);
 }
 
 TEST(Grid, SetsManyVoxelsAtOnce) {

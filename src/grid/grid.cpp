@@ -322,20 +322,31 @@ std::vector<IVec3> chunks_to_mesh(const Grid& grid, const GridChanges& changes) 
   return chunks;
 }
 
+ChunkSlabs ChunkSlabs::of(const IBox& box) {
+  QUOIN_ASSERT(intersect(box, kWholeChunk) == box, "within 0 to 64");
+  ChunkSlabs slabs;
+  if (box.empty()) return slabs;
+  const std::uint64_t along_y = (std::uint64_t{2} << ((box.max.y - 1) >> 2)) - (std::uint64_t{1} << (box.min.y >> 2));
+  for (int z = box.min.z >> 2; z <= (box.max.z - 1) >> 2; ++z) {
+    slabs.words_[static_cast<std::size_t>(z >> 2)] |= along_y << (16 * (z & 3));
+  }
+  return slabs;
+}
+
 void visit_changes(const Grid& before, const Grid& now, const GridChanges& changes,
                    FunctionRef<void(const RowChange&)> visit) {
-  const auto compare = [&](IVec3 chunk, const IBox& box, std::uint64_t bricks) {
-    visit_other_rows(before.find_chunk(chunk), now.find_chunk(chunk), chunk, box, bricks, visit);
+  const auto compare = [&](IVec3 chunk, const IBox& box, const ChunkSlabs& slabs) {
+    visit_other_rows(before.find_chunk(chunk), now.find_chunk(chunk), chunk, box, slabs, visit);
   };
   if (!changes.all) {
-    for (const ChunkChange& change : changes.items) compare(change.chunk, change.box, change.bricks);
+    for (const ChunkChange& change : changes.items) compare(change.chunk, change.box, change.slabs);
     return;
   }
   std::vector<IVec3> chunks = before.chunks();
   const std::vector<IVec3> present = now.chunks();
   chunks.insert(chunks.end(), present.begin(), present.end());
   sort_and_unite(chunks);
-  for (const IVec3 chunk : chunks) compare(chunk, kWholeChunk, ~std::uint64_t{0});
+  for (const IVec3 chunk : chunks) compare(chunk, kWholeChunk, ChunkSlabs::all());
 }
 
 IBox Grid::bounds() const {

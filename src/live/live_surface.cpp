@@ -1,6 +1,9 @@
 #include <algorithm>
+#include <array>
+#include <span>
 #include <utility>
 
+#include "grid/chunk/content_hash.h"
 #include "live/mesh_job_queue.h"
 #include "mesh/surface/bodies.h"
 #include "mesh/surface/faces.h"
@@ -26,21 +29,64 @@ void cut(int first, int size, int edge, Visit&& visit) {
   }
 }
 
-std::uint64_t hash_of(const SurfaceRegion& region, const QuadBuffer& quads) {
-  std::uint64_t hash = 1;
-  const auto add = [&](std::uint64_t word) {
-    hash = (hash ^ word) * 0x9E37'79B9'7F4A'7C15U;
-    hash ^= hash >> 32;
-  };
-  for (const auto& range : {region.opaque, region.transparent}) {
-    add(range[6] - range[0]);
-    for (std::uint32_t i = range[0]; i < range[6]; ++i) add(quads[i].bits);
+// Four at a time: each waits for its own last product only.
+void mix_into(std::array<std::uint64_t, 4>& lanes, std::span<const Quad> quads) {
+  std::size_t i = 0;
+  for (; i + 4 <= quads.size(); i += 4) {
+    for (std::size_t k = 0; k < 4; ++k) lanes[k] = mixed_with(lanes[k], quads[i + k].bits);
   }
+  for (std::size_t k = 0; i < quads.size(); ++i, ++k) lanes[k] = mixed_with(lanes[k], quads[i].bits);
+}
+
+std::uint64_t hash_of(const SurfaceRegion& region, std::span<const Quad> quads) {
+  std::array<std::uint64_t, 4> lanes = {1, 2, 3, 4};
+  for (const auto& range : {region.opaque, region.transparent}) {
+    const std::uint32_t count = range[6] - range[0];
+    lanes[0] = mixed_with(lanes[0], count);
+    mix_into(lanes, quads.subspan(range[0], count));
+  }
+  std::uint64_t hash = kHashSeed;
+  for (const std::uint64_t lane : lanes) hash = mixed_with(hash, lane);
   return hash;
 }
 
-// The quads in the order of ChunkSurface.
-void sort_into_regions(const QuadBuffer& quads, const VoxelRegistry& types, int edge, ChunkSurface& surface) {
+// Where the quads of each direction begin, from `first` on, and where all end; they are in the order of directions.
+std::array<std::uint32_t, 7> directions_of(const QuadBuffer& quads, std::size_t first, std::size_t end) {
+  std::array<std::uint32_t, 7> range{};
+  auto at = quads.begin() + static_cast<std::ptrdiff_t>(first);
+  const auto last = quads.begin() + static_cast<std::ptrdiff_t>(end);
+  for (std::size_t i = 0; i < 6; ++i) {
+    range[i] = static_cast<std::uint32_t>(at - quads.begin());
+    at = std::partition_point(at, last, [&](Quad quad) { return static_cast<std::size_t>(quad.direction()) <= i; });
+  }
+  range[6] = static_cast<std::uint32_t>(end);
+  return range;
+}
+
+// Those of opaque types first.
+void sort_into_one(const QuadBuffer& quads, const VoxelRegistry& types, ChunkSurface& surface) {
+  surface.quads.resize(quads.size());
+  std::size_t opaque = quads.size();
+  if (types.has_transparent()) {
+    // Transparent ones from the end on, and then turned round. Without a branch: nobody can guess them.
+    opaque = 0;
+    std::size_t end = quads.size();
+    for (const Quad quad : quads) {
+      const bool is_transparent = types.is_transparent(quad.type());
+      surface.quads[is_transparent ? end - 1 : opaque] = quad;
+      opaque += is_transparent ? 0 : 1;
+      end -= is_transparent ? 1 : 0;
+    }
+    std::reverse(surface.quads.begin() + static_cast<std::ptrdiff_t>(opaque), surface.quads.end());
+  } else {
+    std::copy(quads.begin(), quads.end(), surface.quads.begin());
+  }
+  surface.opaque_quads = opaque;
+  surface.regions.push_back(
+      {IVec3{0}, directions_of(surface.quads, 0, opaque), directions_of(surface.quads, opaque, quads.size()), 0});
+}
+
+void sort_into_many(const QuadBuffer& quads, const VoxelRegistry& types, int edge, ChunkSurface& surface) {
   const int across = kChunkEdge / edge;
   const auto region_of = [&](IVec3 voxel) {
     const IVec3 at = voxel / edge;
@@ -67,6 +113,15 @@ void sort_into_regions(const QuadBuffer& quads, const VoxelRegistry& types, int 
   surface.opaque_quads = first[6 * regions];
   surface.quads.resize(quads.size());
   for (const Quad quad : quads) surface.quads[first[place_of(quad)]++] = quad;
+}
+
+// The quads in the order of ChunkSurface.
+void sort_into_regions(const QuadBuffer& quads, const VoxelRegistry& types, int edge, ChunkSurface& surface) {
+  if (edge == kChunkEdge) {
+    sort_into_one(quads, types, surface);
+  } else {
+    sort_into_many(quads, types, edge, surface);
+  }
   for (SurfaceRegion& region : surface.regions) region.hash = hash_of(region, surface.quads);
 }
 

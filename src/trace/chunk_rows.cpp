@@ -78,11 +78,12 @@ Slab ChunkRows::read(int y, int z, SlabRows& rows) const {
   return slab_of(rows);
 }
 
-void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, std::uint64_t wanted, UniformBlocks& blocks) {
+void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, const ChunkSlabs& wanted,
+                         UniformBlocks& blocks) {
   constexpr int kCell = 64;
   std::uint64_t rows = 0;
   for (int row = 0; row < 16; ++row) {
-    if ((wanted >> (4 * row) & 15U) != 0) rows |= std::uint64_t{15} << (4 * row);
+    if (wanted.block((row & 3) * 16, (row >> 2) * 16) != 0) rows |= std::uint64_t{15} << (4 * row);
   }
   for (std::size_t i = 0; i < 64; ++i) {
     if ((rows >> i & 1U) != 0) blocks.cells[i] = 0;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <quoin/core/function_ref.h>
+#include <quoin/grid/changes.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
 
@@ -125,17 +126,20 @@ class RowsBox {
 };
 
 /// Finds which blocks of a chunk are full of one transparent type: in the rows of four bricks that hold any of the
-/// `wanted` ones; of the other rows `blocks` is as it was.
+/// `wanted` slabs; of the other rows `blocks` is as it was.
 /// Cost: as that of a node of the tree for each such type of which there are voxels enough to fill a cell.
-void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, std::uint64_t wanted, UniformBlocks& blocks);
+void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, const ChunkSlabs& wanted,
+                         UniformBlocks& blocks);
 
 /// Four bricks side by side along x, at (y, z) of a chunk, which are multiples of 16.
 struct BrickRow {
   std::array<Node, 4> bricks{};
-  /// Fills them in from what has rows, a ChunkRows or CellRows. False when all four are empty or all four are full, as
-  /// `is_full` says; `bricks` is then not set.
+  /// Fills them in from what has rows, a ChunkRows or CellRows: those of their slabs that are `wanted`, a bit each, as
+  /// ChunkSlabs::block. False when all four are known to be empty or full, as `is_full` says; `bricks` is then not set.
   template <class Rows>
-  bool read(const Rows& rows, int y, int z, RowsBox& box);
+  bool read(const Rows& rows, int y, int z, RowsBox& box, std::uint32_t wanted = kAllSlabs);
+
+  static constexpr std::uint32_t kAllSlabs = 0xFFFF;
   bool is_full = false;
 };
 
@@ -143,11 +147,12 @@ struct BrickRow {
 void transpose_nibbles(SlabRows& rows);
 
 template <class Rows>
-bool BrickRow::read(const Rows& rows, int y, int z, RowsBox& box) {
+bool BrickRow::read(const Rows& rows, int y, int z, RowsBox& box, std::uint32_t wanted) {
   int empty = 0;
   int full = 0;
   SlabRows words;
-  for (int slab = 0; slab < 16; ++slab) {
+  for (; wanted != 0; wanted &= wanted - 1) {
+    const int slab = std::countr_zero(wanted);
     const int slab_y = y + 4 * (slab & 3);
     const int slab_z = z + 4 * (slab >> 2);
     const Slab kind = rows.read(slab_y, slab_z, words);

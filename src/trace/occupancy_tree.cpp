@@ -61,23 +61,28 @@ unsigned bit_of(IVec3 unit) {
 constexpr std::array<IVec3, 8> kBelow = {IVec3{0, 0, 0}, {-1, 0, 0},  {0, -1, 0},  {-1, -1, 0},
                                          {0, 0, -1},     {-1, 0, -1}, {0, -1, -1}, {-1, -1, -1}};
 
-// The bricks whose cells end in what an edit of a field changed.
-std::vector<ChunkBricks> cells_reached(const DensityChanges& changes) {
-  std::vector<ChunkBricks> reached;
+struct SlabsOfChunk {
+  IVec3 chunk{0};
+  ChunkSlabs slabs;
+};
+
+// The slabs whose cells end in what an edit of a field changed.
+std::vector<SlabsOfChunk> cells_reached(const DensityChanges& changes) {
+  std::vector<SlabsOfChunk> reached;
   for (const DensityChange& each : changes.items) {
     for (const IVec3 offset : kBelow) {
       // A cell begins a sample before each of its ends.
       const IBox cells{each.box.min - 1 - offset * kChunkEdge, each.box.max - offset * kChunkEdge};
       const IBox own = intersect(cells, kWholeChunk);
-      if (!own.empty()) reached.push_back({each.chunk + offset, bricks_of(own)});
+      if (!own.empty()) reached.push_back({each.chunk + offset, ChunkSlabs::of(own)});
     }
   }
   std::sort(reached.begin(), reached.end(),
-            [](const ChunkBricks& a, const ChunkBricks& b) { return by_zyx(a.chunk, b.chunk); });
+            [](const SlabsOfChunk& a, const SlabsOfChunk& b) { return by_zyx(a.chunk, b.chunk); });
   std::size_t kept = 0;
-  for (const ChunkBricks& each : reached) {
+  for (const SlabsOfChunk& each : reached) {
     if (kept != 0 && reached[kept - 1].chunk == each.chunk) {
-      reached[kept - 1].bricks |= each.bricks;
+      reached[kept - 1].slabs.add(each.slabs);
     } else {
       reached[kept++] = each;
     }
@@ -225,18 +230,25 @@ struct OccupancyTree::Impl {
     return true;
   }
 
-  // Returns which bricks changed of those that are `wanted`, and of others in their rows; `box` is united with that of
-  // the occupied voxels of what was read, in chunk coordinates.
+  // Puts the slabs that are `wanted`. Returns which bricks changed; `box` is united with that of the occupied voxels of
+  // what was read, in chunk coordinates.
   template <class Rows>
-  std::uint64_t fill(ChunkNode& node, const Rows& rows, std::uint64_t wanted, IBox& box) {
+  std::uint64_t fill(ChunkNode& node, const Rows& rows, const ChunkSlabs& wanted, IBox& box) {
     std::uint64_t changed = 0;
     trace::RowsBox rows_box;
     trace::BrickRow four;
     for (int row = 0; row < 16; ++row) {
-      if ((wanted >> (4 * row) & 15U) == 0) continue;
-      const bool is_mixed = four.read(rows, (row & 3) * 16, (row >> 2) * 16, rows_box);
+      const int y = (row & 3) * 16;
+      const int z = (row >> 2) * 16;
+      const std::uint32_t slabs = wanted.block(y, z);
+      if (slabs == 0) continue;
+      const std::size_t first = 4 * static_cast<std::size_t>(row);
+      for (std::size_t x = 0; x < 4 && slabs != trace::BrickRow::kAllSlabs; ++x) {
+        four.bricks[x] = bricks[node.bricks[first + x]];
+      }
+      const bool is_mixed = four.read(rows, y, z, rows_box, slabs);
       for (std::size_t x = 0; x < 4; ++x) {
-        const std::size_t brick = x + 4 * static_cast<std::size_t>(row);
+        const std::size_t brick = first + x;
         const bool is_other =
             is_mixed ? set_brick(node, brick, four.bricks[x]) : set_uniform(node, brick, four.is_full);
         changed |= std::uint64_t{is_other} << brick;
@@ -267,20 +279,21 @@ struct OccupancyTree::Impl {
     return kAll;
   }
 
-  // Puts the bricks of a chunk that are `wanted`; the others are as they were. Returns which changed.
+  // Puts the slabs of a chunk that are `wanted`; the others are as they were. Returns which bricks changed.
   template <class Rows>
-  std::uint64_t put(const Rows& rows, IVec3 chunk, std::uint64_t wanted = kAll) {
+  std::uint64_t put(const Rows& rows, IVec3 chunk, ChunkSlabs wanted = ChunkSlabs::all()) {
     if (rows.none()) return drop(chunk);
     const IBox* const known = chunk_boxes.find(chunk);
-    if (known == nullptr) wanted = kAll;
+    if (known == nullptr) wanted = ChunkSlabs::all();
+    const bool is_partial = !(wanted == ChunkSlabs::all());
     IBox before = known == nullptr ? IBox{} : *known;
     before = {before.min - chunk * kChunkEdge, before.max - chunk * kChunkEdge};
     ChunkNode& node = find_or_create(chunk);
     IBox box;
     const std::uint64_t changed = fill(node, rows, wanted, box);
-    if (wanted != kAll && changed == 0) return 0;
+    if (is_partial && changed == 0) return 0;
     // Where nothing ended at a side of the box before, that side is where it was.
-    if (wanted != kAll) box = is_inside(changed, before) ? unite(before, box) : box_of(node);
+    if (is_partial) box = is_inside(changed, before) ? unite(before, box) : box_of(node);
     if (box.empty()) return drop(chunk);
     chunk_boxes.put(chunk, {box.min + chunk * kChunkEdge, box.max + chunk * kChunkEdge});
     return changed;
@@ -294,13 +307,14 @@ struct OccupancyTree::Impl {
     }
     return true;
   }
-  std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk, std::uint64_t wanted = kAll) {
+  std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk,
+                    const ChunkSlabs& wanted = ChunkSlabs::all()) {
     if (voxels == nullptr) return drop(chunk);
     const bool was_there = chunk_boxes.find(chunk) != nullptr;
     const std::uint64_t changed = put(trace::ChunkRows(*voxels, types, which), chunk, wanted);
     // Another type may have come where there was one before: then no brick is another.
     if (which == Occupancy::Transparent) {
-      const std::uint64_t part = was_there ? wanted : kAll;
+      const ChunkSlabs part = was_there ? wanted : ChunkSlabs::all();
       set_uniform_blocks(
           chunk, [&](trace::UniformBlocks& blocks) { trace::find_uniform_blocks(*voxels, types, part, blocks); });
     }
@@ -560,7 +574,7 @@ void OccupancyTree::update(const Grid& grid, const VoxelRegistry& types, const G
   std::vector<ChunkBricks> changed;
   changed.reserve(changes.items.size());
   for (const ChunkChange& each : changes.items) {
-    changed.push_back({each.chunk, impl_->put(grid.find_chunk(each.chunk), types, each.chunk, each.bricks)});
+    changed.push_back({each.chunk, impl_->put(grid.find_chunk(each.chunk), types, each.chunk, each.slabs)});
   }
   finish_update(changed);
 }
@@ -570,9 +584,10 @@ void OccupancyTree::update(const DensityGrid& field, const DensityChanges& chang
     *this = build(field);
     return;
   }
-  std::vector<ChunkBricks> changed = cells_reached(changes);
-  for (ChunkBricks& each : changed)
-    each.bricks = impl_->put(trace::CellRows(field, each.chunk), each.chunk, each.bricks);
+  std::vector<ChunkBricks> changed;
+  for (const SlabsOfChunk& each : cells_reached(changes)) {
+    changed.push_back({each.chunk, impl_->put(trace::CellRows(field, each.chunk), each.chunk, each.slabs)});
+  }
   finish_update(changed);
 }
 
@@ -581,8 +596,10 @@ void OccupancyTree::update(const DensityGrid& field, const VoxelRegistry& types,
     *this = build(field, types);
     return;
   }
-  std::vector<ChunkBricks> changed = cells_reached(changes);
-  for (ChunkBricks& each : changed) each.bricks = impl_->put_glass(field, types, each.chunk);
+  std::vector<ChunkBricks> changed;
+  for (const SlabsOfChunk& each : cells_reached(changes)) {
+    changed.push_back({each.chunk, impl_->put_glass(field, types, each.chunk)});
+  }
   finish_update(changed);
 }
 

@@ -19,14 +19,54 @@ namespace quoin {
 class Grid;
 class DensityGrid;
 
+/// Some of the 256 slabs of a chunk: each is 4x4 rows of 64 voxels along x, as chunks are stored.
+class ChunkSlabs {
+ public:
+  /// None.
+  ChunkSlabs() = default;
+  [[nodiscard]] static ChunkSlabs all() {
+    ChunkSlabs slabs;
+    slabs.words_.fill(~std::uint64_t{0});
+    return slabs;
+  }
+  /// Those that a box in the chunk's coordinates reaches. Requires: it lies within 0 to 64.
+  [[nodiscard]] static ChunkSlabs of(const IBox& box);
+
+  /// Adds that of a row. Requires: 0 <= y, z < 64.
+  void add(int y, int z) { words_[static_cast<std::size_t>(z >> 4)] |= std::uint64_t{1} << bit_of(y, z); }
+  void add(const ChunkSlabs& others) {
+    for (std::size_t i = 0; i < words_.size(); ++i) words_[i] |= others.words_[i];
+  }
+  /// Whether that of a row is among them. Requires: 0 <= y, z < 64.
+  [[nodiscard]] bool has(int y, int z) const {
+    return (words_[static_cast<std::size_t>(z >> 4)] >> bit_of(y, z) & 1U) != 0;
+  }
+  /// Of the 16 slabs at a row's z, a bit each by y. Requires: 0 <= z < 64.
+  [[nodiscard]] std::uint32_t along_y(int z) const {
+    return static_cast<std::uint32_t>(words_[static_cast<std::size_t>(z >> 4)] >> (16 * (z >> 2 & 3)) & 0xFFFFU);
+  }
+  /// Of the 4x4 slabs from (y, z) on, which are multiples of 16: a bit each, [z][y].
+  [[nodiscard]] std::uint32_t block(int y, int z) const {
+    std::uint32_t slabs = 0;
+    const std::uint64_t word = words_[static_cast<std::size_t>(z >> 4)] >> (y >> 2);
+    for (unsigned i = 0; i < 4; ++i) slabs |= static_cast<std::uint32_t>(word >> (16 * i) & 15U) << (4 * i);
+    return slabs;
+  }
+  bool operator==(const ChunkSlabs&) const = default;
+
+ private:
+  static int bit_of(int y, int z) { return (z >> 2 & 3) << 4 | y >> 2; }
+
+  std::array<std::uint64_t, 4> words_{};  // [z / 16]: bit y / 4 + 16 (z / 4 % 4)
+};
+
 /// Voxels of one chunk that changed.
 struct ChunkChange {
   IVec3 chunk{0};
   IBox box;  ///< the smallest around them, in the chunk's coordinates
   /// Bit Neighbourhood::index(dx, dy, dz): the chunk at that offset holds one of their 26 neighbours.
   std::uint32_t neighbours = 0;
-  /// Bit x / 16 + 4 (y / 16) + 16 (z / 16): that part of 16^3 voxels holds one of them.
-  std::uint64_t bricks = 0;
+  ChunkSlabs slabs;  ///< those that hold one of them
 
   /// Whether the mesh of the chunk at an offset may have changed. Requires: -1 <= offset.x, offset.y, offset.z <= 1.
   [[nodiscard]] bool affects(IVec3 offset) const {
@@ -61,7 +101,7 @@ struct RowChange {
 /// the last time, `changes` what `now.changes_since` told since then; when all has changed, all of both is compared.
 /// For rules that follow edits, whoever makes them: falling sand, water, wires.
 ///
-/// Cost: O(rows of the boxes that changed); chunks that the two share cost nothing.
+/// Cost: O(slabs that changed); chunks that the two share cost nothing.
 void visit_changes(const Grid& before, const Grid& now, const GridChanges& changes,
                    FunctionRef<void(const RowChange&)> visit);
 

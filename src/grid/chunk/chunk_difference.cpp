@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstring>
 
 #include "grid/chunk/chunk_storage.h"
 
 namespace quoin {
 namespace {
-
-constexpr std::uint64_t kAllBricks = ~std::uint64_t{0};
 
 // Whether the indices of two chunks mean the same types, those that only one of them has apart.
 bool share_palette(const ChunkStorage* a, const ChunkStorage* b) {
@@ -34,19 +33,23 @@ const Chunk& or_air(const Chunk* chunk) {
 
 // Calls `compare(y, z, old row, new row)` for the rows that may differ.
 template <class Compare>
-void for_each_other_row(const Chunk& before, const Chunk& after, const IBox& within, std::uint64_t bricks,
+void for_each_other_row(const Chunk& before, const Chunk& after, const IBox& within, const ChunkSlabs& slabs,
                         Compare&& compare) {
   if (before.shares_storage_with(after)) return;
   const bool share = share_palette(ChunkStorage::of(before), ChunkStorage::of(after));
   std::array<VoxelType, kChunkEdge> old_row;
   std::array<VoxelType, kChunkEdge> new_row;
+  const auto compare_row = [&](int y, int z) {
+    if (share && is_stored_alike(*ChunkStorage::of(before), *ChunkStorage::of(after), y, z)) return;
+    before.read_row(y, z, old_row);
+    after.read_row(y, z, new_row);
+    compare(y, z, old_row, new_row);
+  };
   for (int z = within.min.z; z < within.max.z; ++z) {
-    for (int y = within.min.y; y < within.max.y; ++y) {
-      if ((bricks >> (4 * (y >> 4) + 16 * (z >> 4)) & 15U) == 0) continue;
-      if (share && is_stored_alike(*ChunkStorage::of(before), *ChunkStorage::of(after), y, z)) continue;
-      before.read_row(y, z, old_row);
-      after.read_row(y, z, new_row);
-      compare(y, z, old_row, new_row);
+    for (std::uint32_t left = slabs.along_y(z); left != 0; left &= left - 1) {
+      const int slab = 4 * std::countr_zero(left);
+      const int end = std::min(slab + 4, within.max.y);
+      for (int y = std::max(slab, within.min.y); y < end; ++y) compare_row(y, z);
     }
   }
 }
@@ -78,13 +81,13 @@ void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edi
     return;
   }
   for_each_other_row(
-      before, after, kWholeChunk, kAllBricks,
+      before, after, kWholeChunk, ChunkSlabs::all(),
       [&](int y, int z, const auto& old_row, const auto& new_row) { edit.add(y, z, other_types(old_row, new_row)); });
 }
 
-void visit_other_rows(const Chunk* before, const Chunk* after, IVec3 chunk, const IBox& within, std::uint64_t bricks,
+void visit_other_rows(const Chunk* before, const Chunk* after, IVec3 chunk, const IBox& within, const ChunkSlabs& slabs,
                       FunctionRef<void(const RowChange&)> visit) {
-  for_each_other_row(or_air(before), or_air(after), within, bricks,
+  for_each_other_row(or_air(before), or_air(after), within, slabs,
                      [&](int y, int z, const auto& old_row, const auto& new_row) {
                        const std::uint64_t changed = other_types(old_row, new_row);
                        if (changed != 0) visit({chunk * kChunkEdge + IVec3{0, y, z}, changed, old_row, new_row});
@@ -93,7 +96,7 @@ void visit_other_rows(const Chunk* before, const Chunk* after, IVec3 chunk, cons
 
 ChunkDifference difference(const Chunk* before, const Chunk* after, const IBox& within) {
   ChunkDifference found;
-  for_each_other_row(or_air(before), or_air(after), within, kAllBricks,
+  for_each_other_row(or_air(before), or_air(after), within, ChunkSlabs::all(),
                      [&](int y, int z, const auto& old_row, const auto& new_row) {
                        std::uint64_t solid = 0;
                        for (std::size_t x = 0; x < kChunkEdge; ++x) {

@@ -16,8 +16,8 @@ struct ChunkDifference {
 void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edit);
 
 /// Calls `visit` for the rows that differ between two states of a chunk, by z, then y; null is all air. They differ
-/// nowhere but within the box, and in those parts of 16^3 (ChunkChange::bricks). `chunk`: its coordinates.
-void visit_other_rows(const Chunk* before, const Chunk* after, IVec3 chunk, const IBox& within, std::uint64_t bricks,
+/// nowhere but within the box, and in those slabs. `chunk`: its coordinates.
+void visit_other_rows(const Chunk* before, const Chunk* after, IVec3 chunk, const IBox& within, const ChunkSlabs& slabs,
                       FunctionRef<void(const RowChange&)> visit);
 
 /// They differ nowhere but within the box. Cost: O(rows of 64 voxels of the box); about 20 microseconds for a chunk
