@@ -181,7 +181,8 @@ std::int64_t Grid::set(std::span<const PlacedVoxel> voxels) {
     const auto set_all = [&](IVec3, Chunk& chunk, const IBox&, VoxelEdit& edit) {
       for (; next != end; ++next) {
         const IVec3 local = local_of(next->voxel);
-        edit.add(local.y, local.z, chunk.fill_row(local.y, local.z, std::uint64_t{1} << local.x, next->type));
+        const bool is_other = chunk.set(local.x, local.y, local.z, next->type);
+        edit.add(local.y, local.z, std::uint64_t{is_other} << local.x);
       }
     };
     const bool is_air = std::all_of(next, end, [](const PlacedVoxel& each) { return each.type == kAir; });

@@ -109,9 +109,9 @@ class RowsBox {
     }
   }
   /// Whether nothing within the 16^3 voxels from `at` on could change it.
-  [[nodiscard]] bool covers_brick(IVec3 at) const {
-    return (x_ >> at.x & y_ >> at.y & z_ >> at.z & 0xFFFFU) == 0xFFFFU;
-  }
+  [[nodiscard]] bool covers_brick(IVec3 at) const { return covers(at, 0xFFFF); }
+  /// Likewise within 4^3.
+  [[nodiscard]] bool covers_cell(IVec3 at) const { return covers(at, 0xF); }
   /// In chunk coordinates.
   [[nodiscard]] IBox box() const {
     if (x_ == 0) return {};
@@ -120,6 +120,10 @@ class RowsBox {
   }
 
  private:
+  [[nodiscard]] bool covers(IVec3 at, std::uint64_t size) const {
+    return (x_ >> at.x & y_ >> at.y & z_ >> at.z & size) == size;
+  }
+
   std::uint64_t x_ = 0;
   std::uint64_t y_ = 0;
   std::uint64_t z_ = 0;
@@ -134,39 +138,41 @@ void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, const C
 /// Four bricks side by side along x, at (y, z) of a chunk, which are multiples of 16.
 struct BrickRow {
   std::array<Node, 4> bricks{};
-  /// Fills them in from what has rows, a ChunkRows or CellRows: those of their slabs that are `wanted`, a bit each, as
-  /// ChunkSlabs::block. False when all four are known to be empty or full, as `is_full` says; `bricks` is then not set.
+  /// Fills them in from what has rows, a ChunkRows or CellRows. False when all four are empty or all four are full, as
+  /// `is_full` says; `bricks` is then not set.
   template <class Rows>
-  bool read(const Rows& rows, int y, int z, RowsBox& box, std::uint32_t wanted = kAllSlabs);
-
-  static constexpr std::uint32_t kAllSlabs = 0xFFFF;
+  bool read(const Rows& rows, int y, int z, RowsBox& box);
   bool is_full = false;
 };
 
 // 16 rows of 16 nibbles, [z][y][x / 4], become 16 words of 4^3 bits: nibble j of word i becomes nibble i of word j.
 void transpose_nibbles(SlabRows& rows);
 
+/// The 4x4 rows from (y, z) on, which are multiples of 4, as words of 4^3 voxels, [x].
 template <class Rows>
-bool BrickRow::read(const Rows& rows, int y, int z, RowsBox& box, std::uint32_t wanted) {
+Slab read_cells(const Rows& rows, int y, int z, SlabRows& words, RowsBox& box) {
+  const Slab kind = rows.read(y, z, words);
+  if (kind == Slab::Empty) {
+    words.fill(0);
+  } else if (kind == Slab::Full) {
+    words.fill(~std::uint64_t{0});
+    box.add_slab(y, z);
+  } else {
+    for (int i = 0; i < 16; ++i) box.add(y + (i & 3), z + (i >> 2), words[static_cast<std::size_t>(i)]);
+    transpose_nibbles(words);
+  }
+  return kind;
+}
+
+template <class Rows>
+bool BrickRow::read(const Rows& rows, int y, int z, RowsBox& box) {
   int empty = 0;
   int full = 0;
   SlabRows words;
-  for (; wanted != 0; wanted &= wanted - 1) {
-    const int slab = std::countr_zero(wanted);
-    const int slab_y = y + 4 * (slab & 3);
-    const int slab_z = z + 4 * (slab >> 2);
-    const Slab kind = rows.read(slab_y, slab_z, words);
-    if (kind == Slab::Empty) {
-      words.fill(0);
-      ++empty;
-    } else if (kind == Slab::Full) {
-      words.fill(~std::uint64_t{0});
-      box.add_slab(slab_y, slab_z);
-      ++full;
-    } else {
-      for (int i = 0; i < 16; ++i) box.add(slab_y + (i & 3), slab_z + (i >> 2), words[static_cast<std::size_t>(i)]);
-      transpose_nibbles(words);
-    }
+  for (int slab = 0; slab < 16; ++slab) {
+    const Slab kind = read_cells(rows, y + 4 * (slab & 3), z + 4 * (slab >> 2), words, box);
+    empty += kind == Slab::Empty ? 1 : 0;
+    full += kind == Slab::Full ? 1 : 0;
     for (std::size_t i = 0; i < 16; ++i) bricks[i / 4][i % 4 + static_cast<std::size_t>(slab) * 4] = words[i];
   }
   is_full = full == 16;

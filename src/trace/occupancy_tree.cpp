@@ -230,31 +230,63 @@ struct OccupancyTree::Impl {
     return true;
   }
 
-  // Puts the slabs that are `wanted`. Returns which bricks changed; `box` is united with that of the occupied voxels of
-  // what was read, in chunk coordinates.
+  // Puts the words of one slab in place in a brick, four of its 64; returns whether they are others than before.
+  bool set_slab(ChunkNode& node, std::size_t brick, std::size_t slab, const std::uint64_t* words) {
+    std::uint32_t& index = node.bricks[brick];
+    const std::size_t first = 4 * slab;
+    if (std::equal(words, words + 4, bricks[index].begin() + static_cast<std::ptrdiff_t>(first))) return false;
+    if (index <= 1) {
+      const std::uint32_t uniform_brick = index;
+      index = allocate_brick();
+      bricks[index] = bricks[uniform_brick];
+    }
+    Node& own = bricks[index];
+    std::uint64_t cells = node.cells[brick] & ~(std::uint64_t{15} << first);
+    for (std::size_t i = 0; i < 4; ++i) {
+      own[first + i] = words[i];
+      cells |= std::uint64_t{words[i] != 0} << (first + i);
+    }
+    node.cells[brick] = cells;
+    const bool is_full = cells == kAll && std::all_of(own.begin(), own.end(), [](auto word) { return word == kAll; });
+    if (cells == 0 || is_full) set_uniform(node, brick, is_full);
+    return true;
+  }
+
+  // Puts all slabs. Returns which bricks changed; `box` is united with that of the occupied voxels.
   template <class Rows>
-  std::uint64_t fill(ChunkNode& node, const Rows& rows, const ChunkSlabs& wanted, IBox& box) {
+  std::uint64_t fill(ChunkNode& node, const Rows& rows, trace::RowsBox& box) {
     std::uint64_t changed = 0;
-    trace::RowsBox rows_box;
     trace::BrickRow four;
     for (int row = 0; row < 16; ++row) {
-      const int y = (row & 3) * 16;
-      const int z = (row >> 2) * 16;
-      const std::uint32_t slabs = wanted.block(y, z);
-      if (slabs == 0) continue;
-      const std::size_t first = 4 * static_cast<std::size_t>(row);
-      for (std::size_t x = 0; x < 4 && slabs != trace::BrickRow::kAllSlabs; ++x) {
-        four.bricks[x] = bricks[node.bricks[first + x]];
-      }
-      const bool is_mixed = four.read(rows, y, z, rows_box, slabs);
+      const bool is_mixed = four.read(rows, (row & 3) * 16, (row >> 2) * 16, box);
       for (std::size_t x = 0; x < 4; ++x) {
-        const std::size_t brick = first + x;
+        const std::size_t brick = x + 4 * static_cast<std::size_t>(row);
         const bool is_other =
             is_mixed ? set_brick(node, brick, four.bricks[x]) : set_uniform(node, brick, four.is_full);
         changed |= std::uint64_t{is_other} << brick;
       }
     }
-    box = unite(box, rows_box.box());
+    return changed;
+  }
+
+  // Likewise, but of the `wanted` slabs alone.
+  template <class Rows>
+  std::uint64_t fill(ChunkNode& node, const Rows& rows, const ChunkSlabs& wanted, trace::RowsBox& box) {
+    std::uint64_t changed = 0;
+    trace::SlabRows words;
+    for (int row = 0; row < 16; ++row) {
+      const int y = (row & 3) * 16;
+      const int z = (row >> 2) * 16;
+      for (std::uint32_t slabs = wanted.block(y, z); slabs != 0; slabs &= slabs - 1) {
+        const int slab = std::countr_zero(slabs);
+        trace::read_cells(rows, y + 4 * (slab & 3), z + 4 * (slab >> 2), words, box);
+        for (std::size_t x = 0; x < 4; ++x) {
+          const std::size_t brick = x + 4 * static_cast<std::size_t>(row);
+          const bool is_other = set_slab(node, brick, static_cast<std::size_t>(slab), &words[4 * x]);
+          changed |= std::uint64_t{is_other} << brick;
+        }
+      }
+    }
     return changed;
   }
 
@@ -267,7 +299,8 @@ struct OccupancyTree::Impl {
       if (brick == 0 || box.covers_brick(at)) continue;
       for (std::uint64_t cells = node.cells[static_cast<std::size_t>(i)]; cells != 0; cells &= cells - 1) {
         const int cell = std::countr_zero(cells);
-        box.add_cell(at + 4 * IVec3{cell & 3, cell >> 2 & 3, cell >> 4}, bricks[brick][static_cast<std::size_t>(cell)]);
+        const IVec3 first = at + 4 * IVec3{cell & 3, cell >> 2 & 3, cell >> 4};
+        if (!box.covers_cell(first)) box.add_cell(first, bricks[brick][static_cast<std::size_t>(cell)]);
       }
     }
     return box.box();
@@ -289,8 +322,9 @@ struct OccupancyTree::Impl {
     IBox before = known == nullptr ? IBox{} : *known;
     before = {before.min - chunk * kChunkEdge, before.max - chunk * kChunkEdge};
     ChunkNode& node = find_or_create(chunk);
-    IBox box;
-    const std::uint64_t changed = fill(node, rows, wanted, box);
+    trace::RowsBox rows_box;
+    const std::uint64_t changed = is_partial ? fill(node, rows, wanted, rows_box) : fill(node, rows, rows_box);
+    IBox box = rows_box.box();
     if (is_partial && changed == 0) return 0;
     // Where nothing ended at a side of the box before, that side is where it was.
     if (is_partial) box = is_inside(changed, before) ? unite(before, box) : box_of(node);

@@ -182,7 +182,7 @@ void Game::slide() {
   land().set(voxels);
 }
 
-// What was changed since the last frame, by whomever: the sand above and in it is loose.
+// What others than the sand changed since the last frame: the sand above and in it is loose.
 void Game::note_changes() {
   quoin::Grid& grid = land();
   const quoin::GridChanges changes = grid.changes_since(changes_);
@@ -193,21 +193,24 @@ void Game::note_changes() {
       if (now == sand_) loose_.push_back(voxel);
     });
   });
-  known_ = grid.snapshot();
 }
 
 void Game::drop_sand() {
-  if (loose_.empty()) return;
   quoin::Grid& grid = land();
   std::vector<quoin::PlacedVoxel> moves;
   for (const IVec3 voxel : std::exchange(loose_, {})) {
     const IVec3 below = voxel - IVec3{0, 1, 0};
+    const IVec3 above = voxel + IVec3{0, 1, 0};
     if (voxel.y <= 0 || grid.get(voxel) != sand_ || grid.get(below) != kAir) continue;
     moves.push_back({voxel, kAir});
     moves.push_back({below, sand_});
+    loose_.push_back(below);
+    if (grid.get(above) == sand_) loose_.push_back(above);
     ++sand_fallen_;
   }
   grid.set(moves);
+  (void)grid.changes_since(changes_);  // its own are known
+  known_ = grid.snapshot();
 }
 
 void Game::act(const Input& input) {

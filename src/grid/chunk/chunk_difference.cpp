@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstring>
 
 #include "grid/chunk/chunk_storage.h"
 
@@ -17,13 +16,36 @@ bool share_palette(const ChunkStorage* a, const ChunkStorage* b) {
   return std::equal(a->palette.begin(), a->palette.begin() + static_cast<std::ptrdiff_t>(both), b->palette.begin());
 }
 
+template <int kWords>
+bool are_equal(const std::uint64_t* a, const std::uint64_t* b) {
+  std::uint64_t other = 0;
+  for (int i = 0; i < kWords; ++i) other |= a[i] ^ b[i];
+  return other == 0;
+}
+
+// Whether two rows of so many bits a voxel are equal.
+bool are_rows_equal(const std::uint64_t* a, const std::uint64_t* b, int bits) {
+  switch (bits) {
+    case 1:
+      return are_equal<1>(a, b);
+    case 2:
+      return are_equal<2>(a, b);
+    case 4:
+      return are_equal<4>(a, b);
+    case 8:
+      return are_equal<8>(a, b);
+    default:
+      return are_equal<16>(a, b);
+  }
+}
+
 // Whether a row is stored alike in both. Requires: they share a palette.
 bool is_stored_alike(const ChunkStorage& a, const ChunkStorage& b, int y, int z) {
   const std::uint32_t in_a = a.slabs[ChunkStorage::slab_index(y, z)];
   const std::uint32_t in_b = b.slabs[ChunkStorage::slab_index(y, z)];
   if (((in_a | in_b) & ChunkStorage::kUniformSlab) != 0) return in_a == in_b;
   const int row = ChunkStorage::row_in_slab(y, z);
-  return std::memcmp(a.row(in_a, row), b.row(in_b, row), static_cast<std::size_t>(a.bits) * sizeof(std::uint64_t)) == 0;
+  return are_rows_equal(a.row(in_a, row), b.row(in_b, row), a.bits);
 }
 
 const Chunk& or_air(const Chunk* chunk) {

@@ -5,6 +5,10 @@
 #include <cstdint>
 #include <cstring>
 
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
 namespace quoin::packed_row {
 
 // A row is 64 voxels of `bits` bits each (1, 2, 4, 8 or 16), in `bits` words, lowest bits first. Everything here works
@@ -90,6 +94,38 @@ constexpr std::uint64_t repeat(int bits, std::uint32_t index) {
   return index * kOnes[std::countr_zero(static_cast<unsigned>(bits) | 16U)];
 }
 
+#ifdef __SSE2__
+/// The top bits of 16 bytes, packed.
+inline std::uint64_t top_bits(__m128i bytes) {
+  return static_cast<std::uint32_t>(_mm_movemask_epi8(bytes));
+}
+
+/// As equal_mask, of voxels of 4, 8 or 16 bits.
+template <int kBits>
+std::uint64_t equal_mask_by_bytes(const std::uint64_t* row, std::uint64_t pattern) {
+  const __m128i wanted = _mm_set1_epi64x(static_cast<long long>(pattern));
+  const auto part = [&](int i) { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(row + 2 * i)); };
+  std::uint64_t mask = 0;
+  if constexpr (kBits == 4) {
+    const __m128i low = _mm_set1_epi8(0x0F);
+    for (int i = 0; i < 2; ++i) {
+      const __m128i other = _mm_xor_si128(part(i), wanted);
+      const __m128i even = _mm_cmpeq_epi8(_mm_and_si128(other, low), _mm_setzero_si128());
+      const __m128i odd = _mm_cmpeq_epi8(_mm_andnot_si128(low, other), _mm_setzero_si128());
+      mask |= (top_bits(_mm_unpacklo_epi8(even, odd)) | top_bits(_mm_unpackhi_epi8(even, odd)) << 16) << (32 * i);
+    }
+  } else if constexpr (kBits == 8) {
+    for (int i = 0; i < 4; ++i) mask |= top_bits(_mm_cmpeq_epi8(part(i), wanted)) << (16 * i);
+  } else {
+    for (int i = 0; i < 4; ++i) {
+      const __m128i first = _mm_cmpeq_epi16(part(2 * i), wanted);
+      mask |= top_bits(_mm_packs_epi16(first, _mm_cmpeq_epi16(part(2 * i + 1), wanted))) << (16 * i);
+    }
+  }
+  return mask;
+}
+#endif
+
 /// Which voxels of the row hold `index`: bit x for voxel x.
 inline std::uint64_t equal_mask(const std::uint64_t* row, int bits, std::uint32_t index) {
   const std::uint64_t pattern = repeat(bits, index);
@@ -103,6 +139,14 @@ inline std::uint64_t equal_mask(const std::uint64_t* row, int bits, std::uint32_
         mask |= gather_even_bits(~(x | (x >> 1))) << (32 * i);
       }
       return mask;
+#ifdef __SSE2__
+    case 4:
+      return equal_mask_by_bytes<4>(row, pattern);
+    case 8:
+      return equal_mask_by_bytes<8>(row, pattern);
+    default:
+      return equal_mask_by_bytes<16>(row, pattern);
+#else
     case 4:
       for (int i = 0; i < 4; ++i) {
         const std::uint64_t x = row[i] ^ pattern;
@@ -127,6 +171,7 @@ inline std::uint64_t equal_mask(const std::uint64_t* row, int bits, std::uint32_
       }
       return mask;
     }
+#endif
   }
 }
 
