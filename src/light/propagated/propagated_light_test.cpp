@@ -10,6 +10,8 @@
 
 #include <quoin/mesh/blocky.h>
 
+#include "core/instruction_sets_for_tests.h"
+
 namespace quoin {
 namespace {
 
@@ -170,6 +172,45 @@ TEST(PropagatedLight, IsThatOfASearchAfterAnyEdits) {
       const IVec3 at{static_cast<int>(random() % 150) - 60, static_cast<int>(random() % 150) - 70,
                      static_cast<int>(random() % 150) - 60};
       ASSERT_EQ(light.at(at), fresh.at(at));
+    }
+  }
+}
+
+// Small edits are solved whole: lamps, stones, glass and holes at corners of chunks, by ones and several an update, and
+// with every kernel.
+TEST(PropagatedLight, AfterSmallEditsIsThatOfTheWorldBuiltAnew) {
+  const VoxelRegistry types = light_types();
+  for (const InstructionSet set : sets_of_this_machine()) {
+    const InstructionSetOverride only(set);
+    SCOPED_TRACE(name_in_tests(set));
+    std::mt19937 random(static_cast<unsigned>(set));
+    const auto below = [&](unsigned n) { return static_cast<int>(random() % n); };
+    Grid grid;
+    grid.fill_box({{-90, -100, -90}, {90, 10, 90}}, kStone);
+    for (int i = 0; i < 40; ++i) grid.fill_sphere(DVec3(below(60) - 30, below(60) - 50, below(60) - 30), 7.0, kAir);
+    PropagatedLight light;
+    light.update(grid, types, {1});
+    for (int step = 0; step < 60; ++step) {
+      for (int i = 1 + step % 3 * below(5); i > 0; --i) {
+        const IVec3 at{below(40) - 20, below(60) - 40, below(40) - 20};
+        grid.set(at, static_cast<VoxelType>(below(3) == 0 ? 0 : below(7)));
+      }
+      if (step % 20 == 7) grid.fill_box({{3, -30, 3}, {4, 30, 4}}, step == 7 ? kAir : kStone);
+      light.update(grid, types, {1});
+      if (step % 6 != 5) continue;
+      PropagatedLight fresh;
+      fresh.update(grid, types, {1});
+      std::array<std::uint16_t, kChunkEdge> row;
+      std::array<std::uint16_t, kChunkEdge> expected;
+      for (int z = -60; z < 60; ++z) {
+        for (int y = -80; y < 40; ++y) {
+          for (const int x : {-64, 0}) {
+            light.read_row({x, y, z}, row);
+            fresh.read_row({x, y, z}, expected);
+            ASSERT_EQ(row, expected) << x << ' ' << y << ' ' << z << ", step " << step;
+          }
+        }
+      }
     }
   }
 }
