@@ -8,19 +8,25 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <unordered_map>
 #include <utility>
 
 #include <quoin/grid/changes.h>
 
+#include "core/change_journal.h"
+#include "grid/change_records.h"
 #include "grid/chunk_order.h"
+#include "grid/coordinate_hash.h"
 #include "light/propagated/light_domain.h"
 #include "light/propagated/light_solver.h"
+#include "light/propagated/light_store.h"
 
 namespace quoin {
 namespace {
 
+using propagated::ChangedRows;
+using propagated::ChunkLight;
 using propagated::LightBorder;
-using propagated::LightChange;
 using propagated::LightDomain;
 using propagated::LightSolver;
 using propagated::TypeLight;
@@ -69,11 +75,15 @@ struct PropagatedLight::Impl {
   struct Job {
     IVec3 chunk;
     IBox box;  // of the chunk
-    LightChange change;
-    std::optional<std::uint16_t> uniform;  // what the whole chunk has become
+    ChunkLight* light;
+    ChangedRows changed;
   };
 
-  [[nodiscard]] const Chunk* stored(IVec3 chunk) const { return levels.find_chunk(chunk); }
+  // Null: dark.
+  [[nodiscard]] const ChunkLight* stored(IVec3 chunk) const {
+    const auto found = levels.find(chunk);
+    return found == levels.end() ? nullptr : found->second.get();
+  }
   class WordReader;
   void begin_anew(const Grid& grid);
   void take_over(const Grid& grid, const GridChanges& changes);
@@ -91,8 +101,7 @@ struct PropagatedLight::Impl {
   [[nodiscard]] LightBorder border_of(IVec3 chunk) const;
   [[nodiscard]] std::optional<std::uint16_t> uniform_light(const Grid& grid, IVec3 chunk,
                                                            const LightBorder& border) const;
-  void put_rows(const Job& job);
-  void put(const Job& job);
+  void note_all(IVec3 chunk, ChunkLight& light);
   void go_on(const Job& job, const IBox& changed);
 
   PropagatedLightOptions options;
@@ -100,9 +109,9 @@ struct PropagatedLight::Impl {
   ChangeCursor followed_types;
   std::vector<TypeLight> lights;
   LightDomain domain;
-  Grid levels;  // of packed light, of the chunks of the domain
+  std::unordered_map<IVec3, std::unique_ptr<ChunkLight>, CoordinateHash> levels;  // of the chunks of the domain
+  ChangeJournal<VoxelRecord> journal;                                             // of `levels`
   Queue queue{by_zyx};
-  std::vector<VoxelType> dense;  // of a chunk
 };
 
 /// Remembers the chunk that it read last.
@@ -112,7 +121,7 @@ class PropagatedLight::Impl::WordReader {
   std::uint16_t at(IVec3 voxel) {
     const IVec3 chunk = chunk_of(voxel);
     if (!is_known_ || chunk != last_) look_at(chunk);
-    return stored_ == nullptr ? word_ : stored_->get(local_of(voxel));
+    return stored_ == nullptr ? word_ : stored_->at(local_of(voxel));
   }
 
  private:
@@ -127,13 +136,14 @@ class PropagatedLight::Impl::WordReader {
   const Impl& of_;
   bool is_known_ = false;
   IVec3 last_{0};
-  const Chunk* stored_ = nullptr;
+  const ChunkLight* stored_ = nullptr;
   std::uint16_t word_ = 0;
 };
 
 void PropagatedLight::Impl::begin_anew(const Grid& grid) {
   queue.clear();
   domain.clear();
+  for (const auto& [chunk, light] : levels) note_all(chunk, *light);
   levels.clear();
   change_domain(grid, grid.chunks());
 }
@@ -161,8 +171,18 @@ void PropagatedLight::Impl::take_in(IVec3 chunk) {
 }
 
 void PropagatedLight::Impl::let_go(IVec3 chunk) {
-  levels.put_chunk(chunk, Chunk());
+  const auto found = levels.find(chunk);
+  if (found != levels.end()) {
+    note_all(chunk, *found->second);
+    levels.erase(found);
+  }
   add_beside(chunk);
+}
+
+// It is about to go.
+void PropagatedLight::Impl::note_all(IVec3 chunk, ChunkLight& light) {
+  const ChangedRows changed = fill(light, 0);
+  if (!changed.box().empty()) journal.note(light.serial, changed.record(chunk), levels.size());
 }
 
 void PropagatedLight::Impl::add_beside(IVec3 chunk) {
@@ -244,8 +264,10 @@ std::optional<std::uint16_t> PropagatedLight::Impl::uniform_light(const Grid& gr
   if (grid.find_chunk(chunk) != nullptr) return std::nullopt;
   std::array<std::uint16_t, 6> around{};
   for (std::size_t i = 0; i < around.size(); ++i) {
-    if (border.chunk[i] != nullptr && !border.chunk[i]->uniform()) return std::nullopt;
-    around[i] = border.chunk[i] != nullptr ? *border.chunk[i]->uniform() : border.beyond[i];
+    const std::optional<std::uint16_t> word =
+        border.chunk[i] != nullptr ? border.chunk[i]->uniform() : std::optional(border.beyond[i]);
+    if (!word) return std::nullopt;
+    around[i] = *word;
     if (around[i] != 0 && around[i] != kOpenSky) return std::nullopt;
   }
   if (around[static_cast<std::size_t>(Direction::PosY)] == kOpenSky) return kOpenSky;
@@ -256,85 +278,51 @@ std::optional<std::uint16_t> PropagatedLight::Impl::uniform_light(const Grid& gr
 
 void PropagatedLight::Impl::solve(const Grid& grid, LightSolver& solver, Job& job) const {
   const LightBorder border = border_of(job.chunk);
-  job.uniform = uniform_light(grid, job.chunk, border);
-  if (job.uniform) return;
-  job.change = solver.solve(grid.find_chunk(job.chunk), lights, stored(job.chunk), border, job.box);
+  if (const std::optional<std::uint16_t> word = uniform_light(grid, job.chunk, border)) {
+    job.changed = fill(*job.light, *word);
+    job.box = kWholeChunk;
+  } else {
+    job.changed = solver.solve(grid.find_chunk(job.chunk), lights, border, job.box, *job.light);
+  }
 }
 
-// The highest chunks of the queue, since sky falls: what lies below is solved once with what comes from above.
+// The highest chunks of the queue, since sky falls: what lies below is solved once with what comes from above. Of these
+// every second one, so that none is read by another while its light is replaced.
 std::vector<PropagatedLight::Impl::Job> PropagatedLight::Impl::next_jobs() {
-  int highest = queue.begin()->first.y;
-  for (const auto& [chunk, box] : queue) highest = std::max(highest, chunk.y);
+  IVec3 first = queue.begin()->first;
+  for (const auto& [chunk, box] : queue) {
+    if (chunk.y > first.y) first = chunk;
+  }
+  const auto is_next = [&](IVec3 chunk) {
+    return chunk.y == first.y && ((chunk.x + chunk.z) & 1) == ((first.x + first.z) & 1);
+  };
   std::vector<Job> jobs;
   for (auto next = queue.begin(); next != queue.end();) {
     const auto each = next++;
-    if (each->first.y != highest) continue;
-    jobs.push_back({each->first, each->second, {}, std::nullopt});
+    if (!is_next(each->first)) continue;
+    std::unique_ptr<ChunkLight>& light = levels[each->first];
+    if (light == nullptr) light = std::make_unique<ChunkLight>();
+    jobs.push_back({each->first, each->second, light.get(), {}});
     queue.erase(each);
   }
   return jobs;
 }
 
-void PropagatedLight::Impl::put_rows(const Job& job) {
-  constexpr std::size_t kMany = 256;  // rows: storing all of a chunk anew takes less time
-  if (job.change.rows.size() < kMany) {
-    const IVec3 low = job.chunk * kChunkEdge;
-    for (const LightChange::Row& row : job.change.rows) {
-      levels.write_row(low + IVec3(0, row.y, row.z), row.changed, row.now);
-    }
-    return;
-  }
-  dense.resize(kChunkVoxels);
-  const auto row_of = [&](int y, int z) {
-    const std::size_t first = static_cast<std::size_t>(y + kChunkEdge * z) * kChunkEdge;
-    return std::span(dense).subspan(first).first<kChunkEdge>();
-  };
-  const Chunk* before = stored(job.chunk);
-  const Chunk dark;
-  for (int z = 0; z < kChunkEdge; ++z) {
-    for (int y = 0; y < kChunkEdge; ++y) (before == nullptr ? dark : *before).read_row(y, z, row_of(y, z));
-  }
-  for (const LightChange::Row& row : job.change.rows) {
-    const std::span<VoxelType, kChunkEdge> now = row_of(row.y, row.z);
-    for (std::uint64_t left = row.changed; left != 0; left &= left - 1) {
-      const auto x = static_cast<std::size_t>(std::countr_zero(left));
-      now[x] = row.now[x];
-    }
-  }
-  levels.put_chunk(job.chunk, Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense)));
-}
-
-void PropagatedLight::Impl::put(const Job& job) {
-  IBox changed;
-  if (job.uniform) {
-    const Chunk* before = stored(job.chunk);
-    const VoxelType was = before == nullptr ? kAir : before->uniform().value_or(static_cast<VoxelType>(~*job.uniform));
-    if (was == *job.uniform) return;
-    levels.put_chunk(job.chunk, Chunk(*job.uniform));
-    changed = kWholeChunk;
-  } else {
-    changed = job.change.box;
-    put_rows(job);
-  }
-  if (!changed.empty()) go_on(job, changed);
-}
-
 // What changed at a side of the box may change what lies beyond it: as far as light reaches, and down the whole chunk.
 void PropagatedLight::Impl::go_on(const Job& job, const IBox& changed) {
   const IVec3 low = job.chunk * kChunkEdge;
-  const IBox solved = job.uniform ? kWholeChunk : job.box;
   const IBox world{changed.min + low, changed.max + low};
   for (const Direction direction : kDirections) {
     const FaceFrame& frame = frame_of(direction);
     const bool is_up = frame.sign > 0;
     const bool touches =
-        is_up ? changed.max[frame.axis] == solved.max[frame.axis] : changed.min[frame.axis] == solved.min[frame.axis];
+        is_up ? changed.max[frame.axis] == job.box.max[frame.axis] : changed.min[frame.axis] == job.box.min[frame.axis];
     if (!touches) continue;
     IBox beyond = grown(world, kReach - 1);
     (is_up ? beyond.min : beyond.max)[frame.axis] = is_up ? world.max[frame.axis] : world.min[frame.axis];
     if (direction == Direction::NegY) beyond.min.y = std::min(beyond.min.y, (beyond.max.y - 1) & ~(kChunkEdge - 1));
     // No farther than the chunk beside it, whose own changes go on from there.
-    const bool leaves = is_up ? solved.max[frame.axis] == kChunkEdge : solved.min[frame.axis] == 0;
+    const bool leaves = is_up ? job.box.max[frame.axis] == kChunkEdge : job.box.min[frame.axis] == 0;
     add_part(leaves ? job.chunk + normal_of(direction) : job.chunk, beyond);
   }
 }
@@ -346,7 +334,12 @@ void PropagatedLight::Impl::run(const Grid& grid, Threads threads) {
       thread_local LightSolver solver;
       solve(grid, solver, jobs[i]);
     });
-    for (const Job& job : jobs) put(job);
+    for (const Job& job : jobs) {
+      const IBox changed = job.changed.box();
+      if (changed.empty()) continue;
+      journal.note(job.light->serial, job.changed.record(job.chunk), levels.size());
+      go_on(job, changed);
+    }
   }
 }
 
@@ -386,7 +379,7 @@ void PropagatedLight::read_row(IVec3 voxel, std::span<std::uint16_t, kChunkEdge>
     std::fill(out.begin(), out.end(), impl_->domain.beyond(chunk));
     return;
   }
-  const Chunk* stored = impl_->stored(chunk);
+  const ChunkLight* stored = impl_->stored(chunk);
   if (stored == nullptr) {
     std::fill(out.begin(), out.end(), std::uint16_t{0});
     return;
@@ -396,7 +389,7 @@ void PropagatedLight::read_row(IVec3 voxel, std::span<std::uint16_t, kChunkEdge>
 }
 
 GridChanges PropagatedLight::changes_since(ChangeCursor& cursor) const {
-  return impl_->levels.changes_since(cursor);
+  return impl_->journal.changes_since<ChunkChange>(cursor, by_chunk);
 }
 
 namespace {
@@ -475,7 +468,9 @@ void PropagatedLight::split(const QuadBuffer& quads, IVec3 chunk, QuadBuffer& ou
 }
 
 std::size_t PropagatedLight::bytes() const {
-  return impl_->levels.bytes() + impl_->lights.capacity() * sizeof(TypeLight);
+  std::size_t sum = impl_->lights.capacity() * sizeof(TypeLight) + impl_->journal.bytes();
+  for (const auto& [chunk, light] : impl_->levels) sum += sizeof(chunk) + light->bytes();
+  return sum;
 }
 
 }  // namespace quoin

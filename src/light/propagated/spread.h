@@ -1,0 +1,47 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include <quoin/grid/chunk.h>
+
+// What is compiled for each instruction set. Every kernel gives the same bits.
+
+namespace quoin::propagated {
+
+inline constexpr std::size_t kPlanes = 4;       // bits of a level
+inline constexpr std::size_t kBlock = 8;        // rows that lie side by side along y
+inline constexpr std::size_t kStride = 80;      // from z to z + 1
+inline constexpr std::size_t kSlices = 64 + 2;  // one more at either side
+inline constexpr std::size_t kPlaneWords = kStride * kSlices;
+
+/// Of rows of 64 voxels along x, a bit a voxel: [at(y, z)]. Blocks of rows are aligned.
+struct Plane {
+  alignas(64) std::array<std::uint64_t, kPlaneWords> rows{};
+};
+/// Requires: -1 <= y, z <= 64.
+[[nodiscard]] inline std::size_t at(int y, int z) {
+  return static_cast<std::size_t>(z + 1) * kStride + kBlock + static_cast<std::size_t>(y);
+}
+
+/// [z]: bit b stands for the rows of y = 8 b to 8 b + 7.
+using BlockSet = std::array<std::uint8_t, kChunkEdge>;
+
+/// From one level to the next lower one.
+struct SpreadStep {
+  const std::uint64_t* front;  ///< voxels of the level above; none beside the chunk
+  std::uint64_t* next;         ///< becomes those of this level
+  std::uint64_t* open;         ///< voxels that light may still reach: those of `next` leave it
+  std::array<std::uint64_t*, kPlanes>
+      level;               ///< planes of the level's bits, to which `next` is added; null: bit not set
+  const BlockSet* blocks;  ///< where to look; `next` stays as it was elsewhere
+  BlockSet* lit;           ///< becomes where `next` has any
+};
+using Spread = void (*)(const SpreadStep& step, int low_z, int high_z);
+
+extern const Spread kSpreadPlain;
+extern const Spread kSpreadAvx2;
+extern const Spread kSpreadAvx512;
+
+}  // namespace quoin::propagated

@@ -1,0 +1,13 @@
+// The pass for x86-64 processors with AVX2; called only where it was found.
+
+#ifdef QUOIN_X86_KERNELS
+
+#include "light/propagated/spread.inl"
+
+namespace quoin::propagated {
+
+const Spread kSpreadAvx2 = spread;
+
+}  // namespace quoin::propagated
+
+#endif
