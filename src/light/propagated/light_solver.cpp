@@ -18,7 +18,7 @@ TypeLight light_of(const std::vector<TypeLight>& types, VoxelType type) {
   return type < types.size() ? types[type] : TypeLight{0, 0};
 }
 
-Spread widest_spread() {
+const SpreadKernel& widest_kernel() {
 #ifdef QUOIN_X86_KERNELS
   if (has_instruction_set(InstructionSet::Avx512)) return kSpreadAvx512;
   if (has_instruction_set(InstructionSet::Avx2)) return kSpreadAvx2;
@@ -35,7 +35,7 @@ std::uint8_t blocks_between(int low_y, int high_y) {
 
 }  // namespace
 
-LightSolver::LightSolver() : kernel_(nullptr), scratch_(std::make_unique<Scratch>()) {}
+LightSolver::LightSolver() : scratch_(std::make_unique<Scratch>()) {}
 
 template <class Visit>
 void LightSolver::for_each_row(Visit&& visit) const {
@@ -105,10 +105,10 @@ LightSolver::Side LightSolver::side(Direction direction, std::size_t channel, co
 }
 
 // Voxels that get the level for the first time.
-void LightSolver::set(std::size_t channel, unsigned level, std::size_t row, std::uint64_t voxels) {
+void LightSolver::set(unsigned level, std::size_t row, std::uint64_t voxels) {
   scratch_->open.rows[row] &= ~voxels;
   for (std::size_t bit = 0; bit < kPlanes; ++bit) {
-    if ((level >> bit & 1U) != 0) scratch_->level[channel][bit].rows[row] |= voxels;
+    if ((level >> bit & 1U) != 0) scratch_->level[bit].rows[row] |= voxels;
   }
 }
 
@@ -118,7 +118,6 @@ void LightSolver::begin_channel(std::size_t channel) {
   for_each_block([&](int y, int z) {
     const std::size_t row = at(y, z);
     std::copy_n(&pass.rows[row], kBlock, &scratch_->open.rows[row]);
-    for (Plane& plane : scratch_->level[channel]) std::fill_n(&plane.rows[row], kBlock, std::uint64_t{0});
   });
 }
 
@@ -138,7 +137,7 @@ void LightSolver::let_sky_fall(const Side& above) {
       falling &= scratch_->open.rows[row];
       if (falling == 0) break;
       front.plane.rows[row] = falling;
-      set(kSky, kBrightest, row, falling);
+      set(kBrightest, row, falling);
       front.lit[static_cast<std::size_t>(z)] |= static_cast<std::uint8_t>(1U << (static_cast<unsigned>(y) / kBlock));
     }
   }
@@ -218,23 +217,20 @@ bool LightSolver::spread_to(std::size_t channel, unsigned level, Front& from, Fr
     const unsigned beside = (z > low ? from.lit[z - 1] : 0U) | (z + 1 < high ? from.lit[z + 1] : 0U);
     const unsigned look = (own | own << 1 | own >> 1 | beside) & in_box;
     scratch.blocks[z] = static_cast<std::uint8_t>(look);
-    for (unsigned left = to.lit[z] & ~look; left != 0; left &= left - 1) {
-      const int y = std::countr_zero(left) * static_cast<int>(kBlock);
-      std::fill_n(&to.plane.rows[at(y, static_cast<int>(z))], kBlock, std::uint64_t{0});
-    }
+    clear(to.plane, z, to.lit[z] & ~look);
   }
   SpreadStep step{from.plane.rows.data(), to.plane.rows.data(), scratch.open.rows.data(), {}, &scratch.blocks, &to.lit};
   for (std::size_t bit = 0; bit < kPlanes; ++bit) {
-    step.level[bit] = (level >> bit & 1U) != 0 ? scratch.level[channel][bit].rows.data() : nullptr;
+    step.level[bit] = (level >> bit & 1U) != 0 ? scratch.level[bit].rows.data() : nullptr;
   }
-  kernel_(step, box_.min.z, box_.max.z);
+  kernel_->spread(step, box_.min.z, box_.max.z);
   const Plane& pass = scratch.pass[pass_of_[channel]];
   for (const Source& source : sources_[level]) {
     // A lamp's own voxel need not let light pass.
     const std::uint64_t voxels = source.voxels & (scratch.open.rows[source.row] | ~pass.rows[source.row]);
     if (voxels == 0) continue;
     to.plane.rows[source.row] |= voxels;
-    set(channel, level, source.row, voxels);
+    set(level, source.row, voxels);
     to.lit[source.block / 8] |= static_cast<std::uint8_t>(1U << source.block % 8);
   }
   return std::any_of(to.lit.begin() + box_.min.z, to.lit.begin() + box_.max.z,
@@ -243,62 +239,61 @@ bool LightSolver::spread_to(std::size_t channel, unsigned level, Front& from, Fr
 
 void LightSolver::spread(std::size_t channel) {
   std::array<Front, 2>& fronts = scratch_->fronts;
-  const auto is_lit = [](const Front& front) {
-    return std::any_of(front.lit.begin(), front.lit.end(), [](std::uint8_t lit) { return lit != 0; });
-  };
-  // Sky of level 15 has fallen already; lamps of 15 start like any other.
-  bool goes_on = is_lit(fronts[kBrightest & 1U]);
-  is_lit_[channel] = goes_on;
-  for (unsigned level = kBrightest; level > 0; --level) {
-    if (level == kBrightest && channel == kSky) continue;
+  // Sky of level 15 has fallen already.
+  scratch_->touched = fronts[kBrightest & 1U].lit;
+  bool goes_on = channel == kSky;
+  for (unsigned level = channel == kSky ? kBrightest - 1 : kBrightest; level > 0; --level) {
     if (!goes_on && sources_[level].empty()) continue;
-    goes_on = spread_to(channel, level, fronts[(level + 1) & 1U], fronts[level & 1U]);
-    is_lit_[channel] |= goes_on;
+    Front& to = fronts[level & 1U];
+    goes_on = spread_to(channel, level, fronts[(level + 1) & 1U], to);
+    for (std::size_t z = 0; z < kChunkEdge; ++z) scratch_->touched[z] |= to.lit[z];
   }
   for (Front& front : fronts) {
-    for (int z = box_.min.z; z < box_.max.z; ++z) {
-      for (unsigned left = front.lit[static_cast<std::size_t>(z)]; left != 0; left &= left - 1) {
-        const int y = std::countr_zero(left) * static_cast<int>(kBlock);
-        std::fill_n(&front.plane.rows[at(y, z)], kBlock, std::uint64_t{0});
-      }
-    }
+    for (std::size_t z = 0; z < kChunkEdge; ++z) clear(front.plane, z, front.lit[z]);
     front.lit.fill(0);
   }
 }
 
-void LightSolver::replace(std::size_t channel, ChannelLight& light, ChangedRows& changed) const {
-  if (!is_lit_[channel] && light.uniform() == 0U) return;
+void LightSolver::clear(Plane& plane, std::size_t z, unsigned blocks) const {
+  for (unsigned left = blocks; left != 0; left &= left - 1) {
+    const int y = std::countr_zero(left) * static_cast<int>(kBlock);
+    std::fill_n(&plane.rows[at(y, static_cast<int>(z))], kBlock, std::uint64_t{0});
+  }
+}
+
+// What was found becomes the light of the box, and is forgotten.
+void LightSolver::replace(ChannelLight& light, ChangedRows& changed) {
+  Scratch& scratch = *scratch_;
+  const bool was_dark = light.uniform() == 0U;
+  std::array<std::uint64_t, kBlock> where;
+  std::array<std::uint64_t, kBlock> differs;
   for_each_block([&](int y, int z) {
-    std::array<std::uint64_t, kBlock> where{};
-    for (int i = 0; i < static_cast<int>(kBlock); ++i) {
-      if (y + i >= box_.min.y && y + i < box_.max.y) where[static_cast<std::size_t>(i)] = inside_;
-    }
+    const auto i = static_cast<std::size_t>(z);
+    const bool is_touched = (scratch.touched[i] >> (static_cast<unsigned>(y) / kBlock) & 1U) != 0;
+    if (!is_touched && was_dark) return;
     const std::size_t block = ChannelLight::block_of(y, z);
     unsigned level = 0;
     const LevelBlock* const before = light.block(block, level);
-    if (before == nullptr && level == 0 && !is_lit_[channel]) return;
-    LevelBlock now = before != nullptr ? *before : LevelBlock::uniform(level);
-    std::array<std::uint64_t, kBlock> differs{};
-    std::uint64_t any = 0;
-    for (std::size_t bit = 0; bit < kPlanes; ++bit) {
-      const std::uint64_t* const rows = &scratch_->level[channel][bit].rows[at(y, z)];
-      for (std::size_t i = 0; i < kBlock; ++i) {
-        const std::uint64_t other = (now.bits[bit][i] ^ (is_lit_[channel] ? rows[i] : 0)) & where[i];
-        now.bits[bit][i] ^= other;
-        differs[i] |= other;
-        any |= other;
-      }
+    if (!is_touched && before == nullptr && level == 0) return;
+    for (int row = y; row < y + static_cast<int>(kBlock); ++row) {
+      where[static_cast<std::size_t>(row - y)] = row >= box_.min.y && row < box_.max.y ? inside_ : 0;
     }
-    if (any == 0) return;
+    std::array<const std::uint64_t*, kPlanes> planes;
+    for (std::size_t bit = 0; bit < kPlanes; ++bit) planes[bit] = &scratch.level[bit].rows[at(y, z)];
+    LevelBlock now = before != nullptr ? *before : LevelBlock::uniform(level);
+    if (!kernel_->replace(planes, where, now, differs)) return;
     changed.add_block(block, differs);
     light.put(block, now);
   });
   light.tidy();
+  for (Plane& plane : scratch.level) {
+    for (std::size_t z = 0; z < kChunkEdge; ++z) clear(plane, z, scratch.touched[z]);
+  }
 }
 
 ChangedRows LightSolver::solve(const Chunk* voxels, const std::vector<TypeLight>& types, const LightBorder& border,
                                const IBox& box, ChunkLight& light) {
-  kernel_ = widest_spread();
+  kernel_ = &widest_kernel();
   box_ = box;
   const int width = box.max.x - box.min.x;
   inside_ = (width == kChunkEdge ? kAll : (std::uint64_t{1} << width) - 1) << box.min.x;
@@ -313,7 +308,7 @@ ChangedRows LightSolver::solve(const Chunk* voxels, const std::vector<TypeLight>
     }
     add_lamps(channel);
     spread(channel);
-    replace(channel, light.channels[channel], changed);
+    replace(light.channels[channel], changed);
   }
   return changed;
 }

@@ -57,10 +57,11 @@ class LightSolver {
   };
   struct Scratch {
     std::array<Plane, kChannels> pass;  // where light passes, in the box
-    std::array<std::array<Plane, kPlanes>, kChannels> level;
+    std::array<Plane, kPlanes> level;
     Plane open;
     std::array<Front, 2> fronts;
     BlockSet blocks{};
+    BlockSet touched{};  // of `level`, which is empty elsewhere
   };
   /// Of a channel: what lies beside the box, in the chunk or beyond it.
   struct Side {
@@ -86,15 +87,15 @@ class LightSolver {
   void add(unsigned level, int y, int z, std::uint64_t voxels);
   void spread(std::size_t channel);
   bool spread_to(std::size_t channel, unsigned level, Front& from, Front& to);
-  void set(std::size_t channel, unsigned level, std::size_t row, std::uint64_t voxels);
-  void replace(std::size_t channel, ChannelLight& light, ChangedRows& changed) const;
+  void set(unsigned level, std::size_t row, std::uint64_t voxels);
+  void replace(ChannelLight& light, ChangedRows& changed);
+  void clear(Plane& plane, std::size_t z, unsigned blocks) const;
 
-  Spread kernel_;
+  const SpreadKernel* kernel_ = nullptr;
   IBox box_;
   std::uint64_t inside_ = 0;  // of a row
   std::unique_ptr<Scratch> scratch_;
   std::array<std::size_t, kChannels> pass_of_{};  // the plane that a channel has
-  std::array<bool, kChannels> is_lit_{};          // else `level` means nothing
   std::array<std::vector<Source>, 16> sources_;   // [level], of a channel
   struct Lamp {
     std::uint16_t light;

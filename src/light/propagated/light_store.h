@@ -14,15 +14,6 @@ namespace quoin::propagated {
 inline constexpr std::size_t kChannels = 4;  // sky, red, green, blue
 inline constexpr std::size_t kBlocks = kChunkEdge * kChunkEdge / kBlock;
 
-/// Levels of eight rows of 64 voxels: bit x of [i][y & 7] is bit i of the level at x.
-struct LevelBlock {
-  alignas(64) std::array<std::array<std::uint64_t, kBlock>, kPlanes> bits{};
-
-  [[nodiscard]] static LevelBlock uniform(unsigned level);
-  /// The level of all its voxels, if it is one.
-  [[nodiscard]] std::optional<unsigned> uniform() const;
-};
-
 /// Levels of a channel in a chunk. Blocks of one level take two bytes, a chunk of one level nothing.
 class ChannelLight {
  public:

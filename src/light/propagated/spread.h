@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include <quoin/grid/chunk.h>
 
@@ -38,10 +39,27 @@ struct SpreadStep {
   const BlockSet* blocks;  ///< where to look; `next` stays as it was elsewhere
   BlockSet* lit;           ///< becomes where `next` has any
 };
-using Spread = void (*)(const SpreadStep& step, int low_z, int high_z);
 
-extern const Spread kSpreadPlain;
-extern const Spread kSpreadAvx2;
-extern const Spread kSpreadAvx512;
+/// Levels of eight rows of 64 voxels: bit x of [i][y & 7] is bit i of the level at x.
+struct LevelBlock {
+  alignas(64) std::array<std::array<std::uint64_t, kBlock>, kPlanes> bits{};
+
+  [[nodiscard]] static LevelBlock uniform(unsigned level);
+  /// The level of all its voxels, if it is one.
+  [[nodiscard]] std::optional<unsigned> uniform() const;
+};
+
+struct SpreadKernel {
+  void (*spread)(const SpreadStep& step, int low_z, int high_z);
+  /// Replaces the levels `where` bits are set by those of planes, [bit][y]. Returns whether any differs; `changed` says
+  /// where.
+  bool (*replace)(const std::array<const std::uint64_t*, kPlanes>& planes,
+                  const std::array<std::uint64_t, kBlock>& where, LevelBlock& block,
+                  std::array<std::uint64_t, kBlock>& changed);
+};
+
+extern const SpreadKernel kSpreadPlain;
+extern const SpreadKernel kSpreadAvx2;
+extern const SpreadKernel kSpreadAvx512;
 
 }  // namespace quoin::propagated

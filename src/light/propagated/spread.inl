@@ -59,5 +59,20 @@ void spread(const SpreadStep& step, int low_z, int high_z) {
   }
 }
 
+bool replace(const std::array<const std::uint64_t*, kPlanes>& planes, const std::array<std::uint64_t, kBlock>& where,
+             LevelBlock& block, std::array<std::uint64_t, kBlock>& changed) {
+  const Rows mask = load(where.data());
+  Rows any{};
+  for (std::size_t bit = 0; bit < kPlanes; ++bit) {
+    std::uint64_t* const rows = block.bits[bit].data();
+    const Rows before = load(rows);
+    const Rows other = (before ^ load(planes[bit])) & mask;
+    store(rows, before ^ other);
+    any |= other;
+  }
+  store(changed.data(), any);
+  return has_any(any);
+}
+
 }  // namespace
 }  // namespace quoin::propagated

@@ -6,7 +6,7 @@
 
 namespace quoin::propagated {
 
-const Spread kSpreadAvx2 = spread;
+const SpreadKernel kSpreadAvx2{spread, replace};
 
 }  // namespace quoin::propagated
 

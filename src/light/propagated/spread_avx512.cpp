@@ -6,7 +6,7 @@
 
 namespace quoin::propagated {
 
-const Spread kSpreadAvx512 = spread;
+const SpreadKernel kSpreadAvx512{spread, replace};
 
 }  // namespace quoin::propagated
 

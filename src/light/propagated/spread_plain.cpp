@@ -4,6 +4,6 @@
 
 namespace quoin::propagated {
 
-const Spread kSpreadPlain = spread;
+const SpreadKernel kSpreadPlain{spread, replace};
 
 }  // namespace quoin::propagated
