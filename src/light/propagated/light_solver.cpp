@@ -185,16 +185,11 @@ void LightSolver::add_end(Direction direction, const Side& beside) {
     const LevelBlock* block = nullptr;
     if (beside.light != nullptr) block = beside.light->block(ChannelLight::block_of(first, z), level);
     if (block == nullptr && level <= 1) return;
-    for (std::size_t i = 0; i < kBlock; ++i) {
-      const int y = first + static_cast<int>(i);
-      if ((scratch_->open.rows[at(y, z)] & voxel) == 0) continue;  // rows outside of the box are not open
-      if (block != nullptr) {
-        level = 0;
-        for (std::size_t bit = 0; bit < kPlanes; ++bit) {
-          level |= static_cast<unsigned>(block->bits[bit][i] >> outer & 1U) << bit;
-        }
-      }
-      if (level > 1) add(level - 1, y, z, voxel);
+    const std::uint64_t* const open = &scratch_->open.rows[at(first, z)];
+    for (int i = 0; i < static_cast<int>(kBlock); ++i) {
+      if ((open[i] & voxel) == 0) continue;  // as in rows outside of the box
+      if (block != nullptr) level = block->at(outer, i);
+      if (level > 1) add(level - 1, first + i, z, voxel);
     }
   });
 }

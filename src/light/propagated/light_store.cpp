@@ -70,12 +70,7 @@ std::array<std::uint64_t, kPlanes> ChannelLight::row(int y, int z) const {
 unsigned ChannelLight::at(int x, int y, int z) const {
   unsigned level = 0;
   const LevelBlock* const found = block(block_of(y, z), level);
-  if (found == nullptr) return level;
-  level = 0;
-  for (std::size_t bit = 0; bit < kPlanes; ++bit) {
-    level |= static_cast<unsigned>(found->bits[bit][static_cast<std::size_t>(y) % kBlock] >> x & 1U) << bit;
-  }
-  return level;
+  return found == nullptr ? level : found->at(x, y % static_cast<int>(kBlock));
 }
 
 void ChannelLight::put(std::size_t i, const LevelBlock& block) {
@@ -147,13 +142,18 @@ void ChangedRows::add_block(std::size_t block, const std::array<std::uint64_t, k
   const int z = static_cast<int>(block / (kChunkEdge / kBlock));
   const int y = static_cast<int>(block % (kChunkEdge / kBlock) * kBlock);
   std::array<std::uint64_t, 6>& any = any_[kind_of(z)];
-  for (int i = 0; i < static_cast<int>(kBlock); ++i) {
-    const std::uint64_t row = changed[static_cast<std::size_t>(i)];
-    any[kind_of(y + i)] |= row;
-    x_ |= row;
-    y_ |= std::uint64_t{row != 0} << (y + i);
-    z_ |= std::uint64_t{row != 0} << z;
+  std::uint64_t inner = 0;  // of the rows between the first and the last
+  std::uint64_t rows = 0;
+  for (std::size_t i = 0; i < kBlock; ++i) {
+    rows |= std::uint64_t{changed[i] != 0} << i;
+    if (i > 0 && i + 1 < kBlock) inner |= changed[i];
   }
+  any[kind_of(y)] |= changed.front();
+  any[kind_of(y + 1)] |= inner;
+  any[kind_of(y + static_cast<int>(kBlock) - 1)] |= changed.back();
+  x_ |= inner | changed.front() | changed.back();
+  y_ |= rows << y;
+  z_ |= std::uint64_t{rows != 0} << z;
 }
 
 IBox ChangedRows::box() const {

@@ -45,6 +45,13 @@ struct LevelBlock {
   alignas(64) std::array<std::array<std::uint64_t, kBlock>, kPlanes> bits{};
 
   [[nodiscard]] static LevelBlock uniform(unsigned level);
+  [[nodiscard]] unsigned at(int x, int row) const {
+    unsigned level = 0;
+    for (std::size_t bit = 0; bit < kPlanes; ++bit) {
+      level |= static_cast<unsigned>(bits[bit][static_cast<std::size_t>(row)] >> x & 1U) << bit;
+    }
+    return level;
+  }
   /// The level of all its voxels, if it is one.
   [[nodiscard]] std::optional<unsigned> uniform() const;
 };
