@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <utility>
 
 #include "core/instruction_set.h"
 #include "trace/chunk_rows.h"
@@ -54,18 +55,12 @@ void LightSolver::for_each_block(Visit&& visit) const {
 }
 
 void LightSolver::read_voxels(const Chunk* voxels, const std::vector<TypeLight>& types) {
-  lamps_.clear();
   std::uint8_t any = 15;  // channels that pass by all that lets any pass
   std::vector<VoxelType> found;
   if (voxels != nullptr) found = voxels->types();
   for (const VoxelType type : found) {
-    const TypeLight light = light_of(types, type);
-    const std::uint8_t passes = type == kAir ? 15 : light.passes;
+    const std::uint8_t passes = type == kAir ? 15 : light_of(types, type).passes;
     if (passes != 0) any &= passes;
-    if (light.lamp == 0 || type == kAir) continue;
-    trace::ChunkRows(*voxels, type).for_each_row(box_, [&](int y, int z, std::uint64_t where) {
-      if ((where & inside_) != 0) lamps_.push_back({light.lamp, y, z, where & inside_});
-    });
   }
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     const bool is_first = channel > 0 && (any >> channel & 1U) != 0 && (any & 1U) != 0;
@@ -80,6 +75,31 @@ void LightSolver::read_voxels(const Chunk* voxels, const std::vector<TypeLight>&
     trace::ChunkRows(*voxels, asked).for_each_row(box_, [&](int y, int z, std::uint64_t where) {
       pass.rows[at(y, z)] &= ~where;
     });
+  }
+}
+
+void LightSolver::read_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, ChunkLight& light) {
+  std::vector<std::pair<trace::ChunkRows, std::uint16_t>> lamps;
+  for (const VoxelType type : voxels.types()) {
+    const std::uint16_t lamp = type == kAir ? std::uint16_t{0} : light_of(types, type).lamp;
+    if (lamp != 0) lamps.emplace_back(trace::ChunkRows(voxels, type), lamp);
+  }
+  if (lamps.empty()) return;
+  for (int slab_z = box_.min.z & -4; slab_z < box_.max.z; slab_z += 4) {
+    for (int slab_y = box_.min.y & -4; slab_y < box_.max.y; slab_y += 4) {
+      std::uint16_t& known = light.lamp_slabs[static_cast<std::size_t>(slab_z / 4)];
+      const auto slab = static_cast<std::uint16_t>(1U << (slab_y / 4));
+      if ((known & slab) == 0) continue;
+      known &= static_cast<std::uint16_t>(~slab);
+      const IBox all{{0, slab_y, slab_z}, {kChunkEdge, slab_y + 4, slab_z + 4}};
+      for (const auto& [rows, lamp] : lamps) {
+        rows.for_each_row(all, [&](int y, int z, std::uint64_t where) {
+          known |= slab;
+          const bool is_inside = y >= box_.min.y && y < box_.max.y && z >= box_.min.z && z < box_.max.z;
+          if (is_inside && (where & inside_) != 0) lamps_.push_back({lamp, y, z, where & inside_});
+        });
+      }
+    }
   }
 }
 
@@ -293,6 +313,8 @@ ChangedRows LightSolver::solve(const Chunk* voxels, const std::vector<TypeLight>
   const int width = box.max.x - box.min.x;
   inside_ = (width == kChunkEdge ? kAll : (std::uint64_t{1} << width) - 1) << box.min.x;
   read_voxels(voxels, types);
+  lamps_.clear();
+  if (voxels != nullptr) read_lamps(*voxels, types, light);
   ChangedRows changed;
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     begin_channel(channel);

@@ -76,6 +76,7 @@ class LightSolver {
   template <class Visit>
   void for_each_block(Visit&& visit) const;
   void read_voxels(const Chunk* voxels, const std::vector<TypeLight>& types);
+  void read_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, ChunkLight& light);
   void begin_channel(std::size_t channel);
   [[nodiscard]] Side side(Direction direction, std::size_t channel, const LightBorder& border,
                           const ChunkLight& light) const;

@@ -106,6 +106,13 @@ std::size_t ChannelLight::bytes() const {
          free_.capacity() * sizeof(free_[0]);
 }
 
+void ChunkLight::forget_lamps(const IBox& box) {
+  const unsigned slabs = (2U << ((box.max.y - 1) / 4)) - (1U << (box.min.y / 4));
+  for (int z = box.min.z / 4; z <= (box.max.z - 1) / 4; ++z) {
+    lamp_slabs[static_cast<std::size_t>(z)] |= static_cast<std::uint16_t>(slabs);
+  }
+}
+
 std::uint16_t ChunkLight::at(IVec3 local) const {
   unsigned word = 0;
   for (std::size_t c = 0; c < kChannels; ++c) word |= channels[c].at(local.x, local.y, local.z) << (4 * c);

@@ -57,6 +57,16 @@ class ChannelLight {
 struct ChunkLight {
   std::array<ChannelLight, kChannels> channels;
   std::uint64_t serial = 0;  // of the journal
+  /// [z / 4], bit y / 4: whether those 4x4 rows may have lamps. What solves finds out; edits have to tell.
+  std::array<std::uint16_t, kChunkEdge / 4> lamp_slabs = all_slabs();
+
+  [[nodiscard]] static std::array<std::uint16_t, kChunkEdge / 4> all_slabs() {
+    std::array<std::uint16_t, kChunkEdge / 4> all;
+    all.fill(0xFFFF);
+    return all;
+  }
+  /// Voxels of the box, which is not empty, are others than before.
+  void forget_lamps(const IBox& box);
 
   [[nodiscard]] std::uint16_t at(IVec3 local) const;
   void read_row(int y, int z, std::span<std::uint16_t, kChunkEdge> out) const;

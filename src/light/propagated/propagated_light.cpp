@@ -240,6 +240,7 @@ void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& chang
   change_domain(grid, chunks);
   for (const ChunkChange& change : changes.items) {
     const IVec3 low = change.chunk * kChunkEdge;
+    if (const auto found = levels.find(change.chunk); found != levels.end()) found->second->forget_lamps(change.box);
     add_all(reach_of(grid, {change.box.min + low, change.box.max + low}));
   }
 }
