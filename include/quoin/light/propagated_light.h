@@ -57,7 +57,7 @@ struct PropagatedLightOptions {
 /// Exact:   equal to a search from every lamp and every column of sky (Dijkstra), whatever edits led there.
 /// Cost:    of an update O(rows of 64 voxels within 15 of what changed, and of columns of sky that it opens or closes),
 ///          times 15. The first: some tenths of a millisecond a chunk.
-/// Memory:  as a Grid of that many kinds of light: where it is the same a slab takes nothing.
+/// Memory:  half a byte a voxel and channel, where light is not the same in eight rows side by side.
 /// Threads: any number may read at once; an update needs it to itself.
 /// Source:  levels as block games have them; spread by whole words instead of a queue.
 class PropagatedLight {
