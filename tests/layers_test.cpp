@@ -30,6 +30,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/chunk/chunk_storage.h", {"light", "live", "mesh", "render_vk", "trace"}},
     {"grid/chunk/content_hash.h", {"live"}},
     {"grid/chunk/packed_row.h", {"light", "mesh", "trace"}},
+    {"grid/change_records.h", {"light"}},
     {"grid/chunk_boxes.h", {"trace"}},
     {"grid/chunk_order.h", {"light", "live", "mesh", "render", "scene", "trace"}},
     {"grid/coordinate_hash.h", {"light", "live", "mesh", "scene", "trace"}},

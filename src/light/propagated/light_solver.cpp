@@ -92,11 +92,11 @@ void LightSolver::read_lamps(const Chunk& voxels, const std::vector<TypeLight>& 
       if ((known & slab) == 0) continue;
       known &= static_cast<std::uint16_t>(~slab);
       const IBox all{{0, slab_y, slab_z}, {kChunkEdge, slab_y + 4, slab_z + 4}};
-      for (const auto& [rows, lamp] : lamps) {
-        rows.for_each_row(all, [&](int y, int z, std::uint64_t where) {
+      for (const auto& lamp : lamps) {
+        lamp.first.for_each_row(all, [&](int y, int z, std::uint64_t where) {
           known |= slab;
           const bool is_inside = y >= box_.min.y && y < box_.max.y && z >= box_.min.z && z < box_.max.z;
-          if (is_inside && (where & inside_) != 0) lamps_.push_back({lamp, y, z, where & inside_});
+          if (is_inside && (where & inside_) != 0) lamps_.push_back({lamp.second, y, z, where & inside_});
         });
       }
     }
