@@ -27,9 +27,9 @@ constexpr int kAppsLevel = 7;
 // or a function where the data is. What core has is for all.
 const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/chunk/chunk_difference.h", {"live"}},
-    {"grid/chunk/chunk_storage.h", {"light", "live", "mesh", "render_vk", "trace"}},
+    {"grid/chunk/chunk_storage.h", {"live", "mesh", "render_vk", "trace"}},
     {"grid/chunk/content_hash.h", {"live"}},
-    {"grid/chunk/packed_row.h", {"light", "mesh", "trace"}},
+    {"grid/chunk/packed_row.h", {"mesh", "trace"}},
     {"grid/change_records.h", {"light"}},
     {"grid/chunk_boxes.h", {"trace"}},
     {"grid/chunk_order.h", {"light", "live", "mesh", "render", "scene", "trace"}},
