@@ -142,13 +142,13 @@ std::size_t ChunkLight::bytes() const {
 }
 
 std::size_t ChangedRows::kind_of(int local) {
-  return local == 0 ? 0 : local == kChunkEdge - 1 ? 5 : static_cast<std::size_t>(local >> 4) + 1;
+  return local == 0 ? 0 : local == kChunkEdge - 1 ? 2 : 1;
 }
 
 void ChangedRows::add_block(std::size_t block, const std::array<std::uint64_t, kBlock>& changed) {
   const int z = static_cast<int>(block / (kChunkEdge / kBlock));
   const int y = static_cast<int>(block % (kChunkEdge / kBlock) * kBlock);
-  std::array<std::uint64_t, 6>& any = any_[kind_of(z)];
+  std::array<std::uint64_t, 3>& any = any_[kind_of(z)];
   std::uint64_t inner = 0;  // of the rows between the first and the last
   std::uint64_t rows = 0;
   for (std::size_t i = 0; i < kBlock; ++i) {
@@ -158,6 +158,8 @@ void ChangedRows::add_block(std::size_t block, const std::array<std::uint64_t, k
   any[kind_of(y)] |= changed.front();
   any[kind_of(y + 1)] |= inner;
   any[kind_of(y + static_cast<int>(kBlock) - 1)] |= changed.back();
+  if ((rows & 0x0FU) != 0) slabs_.add(y, z);
+  if ((rows & 0xF0U) != 0) slabs_.add(y + 4, z);
   x_ |= inner | changed.front() | changed.back();
   y_ |= rows << y;
   z_ |= std::uint64_t{rows != 0} << z;
@@ -178,6 +180,7 @@ VoxelRecord ChangedRows::record(IVec3 chunk) const {
   }
   const IBox exact = box();
   record.chunk = chunk;
+  record.slabs = slabs_;
   record.box = PackedBox::of(exact.min.x, exact.min.y, exact.min.z);
   record.box.unite(PackedBox::of(exact.max.x - 1, exact.max.y - 1, exact.max.z - 1));
   return record;

@@ -85,11 +85,12 @@ class ChangedRows {
   [[nodiscard]] VoxelRecord record(IVec3 chunk) const;
 
  private:
-  // Rows that a record does not tell apart: those of y or z of 0, 1 to 15, 16 to 31, 32 to 47, 48 to 62, 63.
-  static constexpr std::array<std::uint8_t, 6> kFirst{0, 1, 16, 32, 48, 63};
+  // Rows whose neighbours lie in the same chunks: those of y or z of 0, 1 to 62, 63.
+  static constexpr std::array<std::uint8_t, 3> kFirst{0, 1, 63};
   [[nodiscard]] static std::size_t kind_of(int local);
 
-  std::array<std::array<std::uint64_t, 6>, 6> any_{};  // [kind of z][kind of y]
+  std::array<std::array<std::uint64_t, 3>, 3> any_{};  // [kind of z][kind of y]
+  ChunkSlabs slabs_;
   std::uint64_t x_ = 0;
   std::uint64_t y_ = 0;
   std::uint64_t z_ = 0;

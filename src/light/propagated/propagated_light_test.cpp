@@ -314,7 +314,8 @@ TEST(PropagatedLight, TellsWhereItChanged) {
           if (before[i] == now[i]) continue;
           const IVec3 voxel{x, y, z};
           const bool is_told = std::any_of(changes.items.begin(), changes.items.end(), [&](const ChunkChange& change) {
-            return change.chunk == chunk_of(voxel) && change.box.contains(local_of(voxel));
+            const IVec3 local = local_of(voxel);
+            return change.chunk == chunk_of(voxel) && change.box.contains(local) && change.slabs.has(local.y, local.z);
           });
           // What lies above all chunks is not kept.
           ASSERT_TRUE(is_told || changes.all) << x << " " << y << " " << z;
