@@ -164,8 +164,11 @@ void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IV
 }
 
 // It begins in the dark: light that grows comes to its end in fewer steps than light that dwindles. To those beside it
-// it was as the domain said.
+// it was as the domain said, and so it was to readers, the open sky nearly always.
 void PropagatedLight::Impl::take_in(IVec3 chunk) {
+  std::unique_ptr<ChunkLight>& light = levels[chunk];
+  if (light == nullptr) light = std::make_unique<ChunkLight>();
+  note_all(chunk, *light);
   add(chunk, kWholeChunk);
   add_beside(chunk);
 }
@@ -179,10 +182,12 @@ void PropagatedLight::Impl::let_go(IVec3 chunk) {
   add_beside(chunk);
 }
 
-// It is about to go.
+// It is about to go, or has just come: readers have what the domain says on the other side.
 void PropagatedLight::Impl::note_all(IVec3 chunk, ChunkLight& light) {
-  const ChangedRows changed = fill(light, 0);
-  if (!changed.box().empty()) journal.note(light.serial, changed.record(chunk), levels.size());
+  VoxelRecord record;
+  record.chunk = chunk;
+  record.add_all();
+  journal.note(light.serial, record, levels.size());
 }
 
 void PropagatedLight::Impl::add_beside(IVec3 chunk) {

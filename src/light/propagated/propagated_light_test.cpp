@@ -326,6 +326,32 @@ TEST(PropagatedLight, TellsWhereItChanged) {
   }
 }
 
+TEST(PropagatedLight, TellsOfChunksThatComeAndGoInTheOpenSky) {
+  const VoxelRegistry types = light_types();
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {20, 5, 20}}, kStone);
+  PropagatedLight light;
+  light.update(grid, types);
+  ChangeCursor cursor;
+  static_cast<void>(light.changes_since(cursor));
+  const IVec3 voxel{200, 200, 5};
+  const auto is_told = [&] {
+    const GridChanges changes = light.changes_since(cursor);
+    return std::any_of(changes.items.begin(), changes.items.end(), [&](const ChunkChange& change) {
+      return change.chunk == chunk_of(voxel) && change.box.contains(local_of(voxel));
+    });
+  };
+  EXPECT_EQ(light.at(voxel).sky, 15);
+  grid.fill_box({{192, 192, 0}, {256, 256, 64}}, kStone);
+  light.update(grid, types);
+  EXPECT_EQ(light.at(voxel).sky, 0);
+  EXPECT_TRUE(is_told());
+  grid.put_chunk(chunk_of(voxel), Chunk());
+  light.update(grid, types);
+  EXPECT_EQ(light.at(voxel).sky, 15);
+  EXPECT_TRUE(is_told());
+}
+
 TEST(PropagatedLight, SplitsQuadsWhereItChanges) {
   VoxelRegistry types = light_types();
   std::mt19937 random(9);
