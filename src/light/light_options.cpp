@@ -31,7 +31,8 @@ Status check(const LightOptions& options) {
   }
   for (const auto& [name, value] : {std::pair{"sun brightness", options.sun_brightness},
                                     {"sky brightness", options.sky_brightness},
-                                    {"lamp brightness", options.lamp_brightness}}) {
+                                    {"lamp brightness", options.lamp_brightness},
+                                    {"least light", options.least_light}}) {
     if (!(value >= 0.0 && value <= 1e9)) {
       return make_error(ErrorCode::InvalidArgument, std::string(name) + ": must be 0 to 1e9");
     }

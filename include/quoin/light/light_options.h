@@ -35,11 +35,22 @@ enum class Shading : std::uint8_t {
   Normals,             ///< of faces, in the world, as colours: bytes are 255 (0.5 + 0.5 n)
 };
 
+/// Where the light of a surface comes from.
+enum class LightModel : std::uint8_t {
+  Rays,        ///< the reference model: a sun with shadows, ambient light with occlusion, lamps
+  Propagated,  ///< light in game time (PropagatedLight): levels that spread through each grid by itself, from the sky
+               ///< along its own y and from voxels that emit, smooth over faces (SurfaceLight), as colours by
+               ///< light_colour; times 1 - 0.75 * occlusion. Scene::lamps, shadows and the sun's direction mean nothing,
+               ///< other grids throw no shadow. It needs no rays but those of OcclusionMode::Rays. VulkanMeshRenderer
+               ///< refuses it
+};
+
 /// How surfaces are lit; the same for every renderer. Where values are shown instead of colours (Occlusion, Normals)
 /// what is transparent is drawn as if it were not, and what is seen from inside is black. Only Lit knows an exposure.
 struct LightOptions {
   DVec3 sun{0.371, 0.743, 0.223};  ///< from the surface towards the sun; any length but 0
   Shading shading = Shading::Lit;
+  LightModel model = LightModel::Rays;  ///< of Shading::Lit
   bool shadows = true;
   OcclusionMode occlusion_mode = OcclusionMode::Rays;
   OcclusionAffects occlusion_affects = OcclusionAffects::Ambient;
@@ -58,6 +69,7 @@ struct LightOptions {
   /// only shows it. 64 is plenty. A lamp fades out where it adds less than 1/4096.
   int max_lamps = 0;
   double lamp_brightness = 1.0;  ///< times what lamps add to others; what they show of themselves stays as it is
+  double least_light = 0.0;      ///< of LightModel::Propagated: what shines everywhere; with 0 closed rooms are black
   /// Whether glass and water have surfaces: where a ray goes from air into a body, out of it again or from one body
   /// into another, it shows the sky of the mirrored direction by Fresnel's share, of the types' `ior`. Rays go straight
   /// on. Shading::Lit; what is rasterised from meshes has them as MeshPictureOptions::glass_by_rays says.
@@ -73,7 +85,7 @@ struct LightOptions {
 
 /// Errors: InvalidArgument, with the option's name, when a number is not finite (but for shadow_distance_voxels) or out
 ///         of range: a sun of length 0, fewer than 1 or more than 4,096 occlusion rays, negative distances or exposure,
-///         brightness of less than 0 or more than 1e9, fewer than 0 or more than 1,024 lamps.
+///         brightness or least light of less than 0 or more than 1e9, fewer than 0 or more than 1,024 lamps.
 [[nodiscard]] Status check(const LightOptions& options);
 
 }  // namespace quoin

@@ -1,0 +1,134 @@
+#pragma once
+
+// Light at surfaces, of whatever says what light voxels have and which are opaque: `Voxels` has
+//   std::uint16_t word(IVec3), packed light, and bool passes(IVec3), whether light gets there.
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include <quoin/core/direction.h>
+#include <quoin/core/vec.h>
+#include <quoin/light/surface_light.h>
+
+namespace quoin {
+
+/// A level a byte: sky, red, green, blue.
+[[nodiscard]] constexpr std::uint32_t level_bytes(std::uint16_t word) {
+  const std::uint32_t w = word;
+  return (w & 0xFU) | (w & 0xF0U) << 4 | (w & 0xF00U) << 8 | (w & 0xF000U) << 12;
+}
+
+/// A voxel in front of a face: its level bytes, and whether light gets there.
+struct FrontLight {
+  std::uint32_t levels = 0;
+  bool passes = false;
+};
+
+/// The light of a corner, in twelfths, from the voxels in front that touch it: that of the face itself, those beside it
+/// along either edge, and the one across.
+[[nodiscard]] constexpr std::uint32_t corner_light(const FrontLight& own, const FrontLight& side1,
+                                                   const FrontLight& side2, const FrontLight& across) {
+  if (!own.passes) return 0;
+  std::uint32_t sum = own.levels;
+  std::uint32_t count = 1;
+  const auto add = [&](const FrontLight& each, bool is_reached) {
+    if (!is_reached) return;
+    sum += each.levels;
+    ++count;
+  };
+  add(side1, side1.passes);
+  add(side2, side2.passes);
+  add(across, across.passes && (side1.passes || side2.passes));
+  return sum * (12U / count);
+}
+
+/// The corners of a face whose front voxel is `front`, which may lie farther away.
+template <class Voxels>
+[[nodiscard]] FaceLight face_light(Voxels& voxels, IVec3 front, Direction face) {
+  const FaceFrame& frame = frame_of(face);
+  std::array<std::array<FrontLight, 3>, 3> around{};  // [v][u]
+  for (int dv = -1; dv <= 1; ++dv) {
+    for (int du = -1; du <= 1; ++du) {
+      IVec3 at = front;
+      at[frame.u] += du;
+      at[frame.v] += dv;
+      FrontLight& each = around[static_cast<std::size_t>(dv + 1)][static_cast<std::size_t>(du + 1)];
+      each.passes = voxels.passes(at);
+      if (each.passes) each.levels = level_bytes(voxels.word(at));
+    }
+  }
+  const auto corner = [&](std::size_t u, std::size_t v) {
+    return corner_light(around[1][1], around[1][u], around[v][1], around[v][u]);
+  };
+  return {corner(0, 0), corner(2, 0), corner(2, 2), corner(0, 2)};
+}
+
+/// The eight voxels around a point, whose coordinates are whole in the middle of voxels. Bit x + 2 y + 4 z is the voxel
+/// that is one further along these axes.
+struct VoxelsAround {
+  IVec3 low{0};
+  std::array<float, 8> nearness{};
+
+  explicit VoxelsAround(DVec3 point) : low(voxel_of(point)) {
+    for (std::size_t i = 0; i < 8; ++i) {
+      double share = 1.0;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double up = point[axis] - low[axis];
+        share *= (i >> axis & 1U) != 0 ? up : 1.0 - up;
+      }
+      nearness[i] = static_cast<float>(share);
+    }
+  }
+  [[nodiscard]] IVec3 voxel(std::size_t i) const {
+    return low + IVec3(static_cast<int>(i & 1U), static_cast<int>(i >> 1 & 1U), static_cast<int>(i >> 2 & 1U));
+  }
+};
+
+/// Those of the eight that can be reached from the one, side by side, within `passing`.
+[[nodiscard]] constexpr std::uint32_t connected_of_eight(std::uint32_t one, std::uint32_t passing) {
+  for (;;) {
+    const std::uint32_t moved = (one & 0x55U) << 1 | (one & 0xAAU) >> 1 | (one & 0x33U) << 2 | (one & 0xCCU) >> 2 |
+                                (one & 0x0FU) << 4 | (one & 0xF0U) >> 4;
+    const std::uint32_t more = (one | moved) & passing;
+    if (more == one) return one;
+    one = more;
+  }
+}
+
+/// Light at a point in front of a surface; false where all eight voxels around are opaque.
+template <class Voxels>
+[[nodiscard]] bool light_around(Voxels& voxels, DVec3 point, MeanLevels& out) {
+  const VoxelsAround around(point);
+  std::uint32_t passing = 0;
+  std::size_t nearest = 8;
+  for (std::size_t i = 0; i < 8; ++i) {
+    if (!voxels.passes(around.voxel(i))) continue;
+    passing |= 1U << i;
+    if (nearest == 8 || around.nearness[i] > around.nearness[nearest]) nearest = i;
+  }
+  if (nearest == 8) return false;
+  const std::uint32_t counted = connected_of_eight(1U << nearest, passing);
+  std::array<float, 4> sum{};
+  float all = 0.0F;
+  for (std::size_t i = 0; i < 8; ++i) {
+    if ((counted >> i & 1U) == 0) continue;
+    const std::uint32_t levels = level_bytes(voxels.word(around.voxel(i)));
+    for (std::size_t c = 0; c < 4; ++c) sum[c] += around.nearness[i] * static_cast<float>(levels >> 8 * c & 255U);
+    all += around.nearness[i];
+  }
+  out = {sum[0] / all, sum[1] / all, sum[2] / all, sum[3] / all};
+  return true;
+}
+
+/// Light of a surface at a point with a unit normal, `step` samples of level 0 a sample of its own. Dark where no air
+/// is near.
+template <class Voxels>
+[[nodiscard]] MeanLevels light_before(Voxels& voxels, DVec3 point, Vec3 normal, int step) {
+  MeanLevels levels;
+  const DVec3 in_front = point + 0.5 * step * DVec3(normal);
+  if (!light_around(voxels, in_front, levels)) static_cast<void>(light_around(voxels, point, levels));
+  return levels;
+}
+
+}  // namespace quoin
