@@ -17,6 +17,11 @@ constexpr float kAmbient = 0.15F;
 constexpr float kAmbientWithoutOcclusion = 0.10F;
 constexpr float kLeastOfAll = 0.25F;  ///< what full occlusion leaves when it darkens everything
 
+/// Whether surfaces show light that needs levels of voxels.
+[[nodiscard]] inline bool is_propagated(const LightOptions& options) {
+  return options.model == LightModel::Propagated && options.shading == Shading::Lit;
+}
+
 /// Whether values are shown instead of colours.
 [[nodiscard]] inline bool shows_values(Shading shading) {
   return shading == Shading::Occlusion || shading == Shading::Normals;

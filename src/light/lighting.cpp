@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
+#include <utility>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -15,6 +17,7 @@
 #include "light/corner_light.h"
 #include "light/glass.h"
 #include "light/light_model.h"
+#include "light/surface/levels.h"
 
 namespace quoin {
 namespace {
@@ -94,17 +97,21 @@ struct Lighting::Group {
 };
 
 Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surfaces& surfaces,
-                   const LightOptions& options, const LampTable* lamps, bool detail_colours)
+                   const LightOptions& options, const LampTable* lamps, bool detail_colours,
+                   std::vector<GridLight> levels)
     : view_(&view),
       types_(&types),
       surfaces_(&surfaces),
       lamps_(options.max_lamps > 0 ? lamps : nullptr),
       options_(options),
       directions_(options.occlusion_rays),
+      levels_(std::move(levels)),
+      look_(light_look(options)),
       exposure_(exposure_of(options)),
       sky_(static_cast<float>(options.sky_brightness)),
       daylight_(daylight_of(options)) {
   QUOIN_ASSERT(check(options).has_value(), "light that `check` accepts");
+  QUOIN_ASSERT(!is_propagated() || levels_.size() == placed_in(view.tracer()).size(), "levels of each placed grid");
   const DVec3 sun = to_sun(options);
   for (const PlacedGrid& placed : placed_in(view.tracer())) {
     if (detail_colours) detail_surfaces_.emplace_back().colour = colour_of_detail(placed.detail, placed.level);
@@ -116,6 +123,10 @@ Lighting::Lighting(const SceneView& view, const VoxelRegistry& types, const Surf
       frame.diffuse[index_of(face)] = static_cast<float>(std::max(cosine, 0.0) * daylight_.sun_brightness);
     }
   }
+}
+
+bool Lighting::is_propagated() const {
+  return quoin::is_propagated(options_);
 }
 
 bool Lighting::needs_openness() const {
@@ -165,12 +176,48 @@ std::int64_t Lighting::light_group(const Group& group, std::span<Vec3> colours) 
   std::array<Vec3, RayPacket::kSize> direct{};
   std::array<float, RayPacket::kSize> openness{};
   std::int64_t rays = find_openness(group, openness);
-  if (options_.shading == Shading::Lit) {
+  if (is_propagated()) {
+    find_propagated(group, direct);
+  } else if (options_.shading == Shading::Lit) {
     rays += find_sunlight(group, direct);
     if (lamps_ != nullptr) rays += add_lamplight(group, direct);
   }
   for (std::size_t i = 0; i < group.size; ++i) colours[i] = shade(*group.points[i], direct[i], openness[i]);
   return rays;
+}
+
+namespace {
+
+// Voxels and their light, of single places.
+class PlacedVoxels {
+ public:
+  PlacedVoxels(const GridLight& of, const VoxelRegistry& types) : light_(*of.light), reader_(*of.voxels), types_(types) {}
+  [[nodiscard]] std::uint16_t word(IVec3 voxel) const { return packed(light_.at(voxel)); }
+  [[nodiscard]] bool passes(IVec3 voxel) { return !types_.is_opaque(reader_.get(voxel)); }
+
+ private:
+  const PropagatedLight& light_;
+  GridReader reader_;
+  const VoxelRegistry& types_;
+};
+
+}  // namespace
+
+void Lighting::find_propagated(const Group& group, std::span<Vec3> light) const {
+  const int level = placed_in(view_->tracer())[static_cast<std::size_t>(group.placed)].level;
+  PlacedVoxels voxels(levels_[static_cast<std::size_t>(group.placed)], *types_);
+  for (std::uint32_t left = group.surfaces; left != 0; left &= left - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(left));
+    const SurfacePoint& point = *group.points[i];
+    MeanLevels levels;
+    if (point.in_field) {
+      levels = light_before(voxels, point.position * std::ldexp(1.0, level), point.normal, 1 << level);
+    } else {
+      const FacePlace place(point.voxel, point.face, point.position - DVec3(point.voxel), level);
+      levels = light_on_face(voxels, place, point.face, level);
+    }
+    light[i] = light_colour(levels, Vec3(normal_at(point)), look_);
+  }
 }
 
 float Lighting::diffuse(const Frame& frame, const SurfacePoint& point) const {
@@ -394,7 +441,10 @@ Vec3 Lighting::shade_lit(const SurfacePoint& point, Vec3 direct, float openness)
   Vec3 colour = surface.emitted;
   if (point.kind == PointKind::Surface) {
     Vec3 light(0.0F);
-    if (options_.occlusion_mode == OcclusionMode::Off) {
+    if (is_propagated()) {
+      const bool is_occluded = options_.occlusion_mode != OcclusionMode::Off;
+      light = direct * (is_occluded ? kLeastOfAll + (1.0F - kLeastOfAll) * openness : 1.0F);
+    } else if (options_.occlusion_mode == OcclusionMode::Off) {
       light = sky_ * kAmbientWithoutOcclusion * daylight_.ambient + direct;
     } else if (options_.occlusion_affects == OcclusionAffects::Ambient) {
       light = sky_ * kAmbient * openness * daylight_.ambient + direct;

@@ -6,7 +6,9 @@
 
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
+#include <quoin/light/light_colour.h>
 #include <quoin/light/light_options.h>
+#include <quoin/light/scene_light.h>
 
 #include "light/daylight.h"
 #include "light/lamp_table.h"
@@ -45,13 +47,15 @@ struct SurfacePoint {
 /// occlusion the ambient term is 0.1. The ambient term and the sun's light are of the colours of daylight_of. Secondary
 /// rays start 0.01 voxels in front of the face. Distances are in voxels of the grid that was hit, of the full one also
 /// where a halved one is traced. Other shadings: see Shading.
+///
+/// LightModel::Propagated has colour * light_colour * (1 - 0.75 * occlusion) + emitted instead.
 class Lighting {
  public:
   /// `view`, `surfaces` and `lamps` must outlive it. Requires: `check` accepts the options.
   /// `lamps`: of the same placed grids; null: none shines. `detail_colours`: surfaces are of the colour of their grid's
-  /// detail and emit nothing.
+  /// detail and emit nothing. `levels`: of each placed grid, where the options' model is propagated light.
   Lighting(const SceneView& view, const VoxelRegistry& types, const Surfaces& surfaces, const LightOptions& options,
-           const LampTable* lamps = nullptr, bool detail_colours = false);
+           const LampTable* lamps = nullptr, bool detail_colours = false, std::vector<GridLight> levels = {});
 
   /// Linear light of each point, not clamped; returns how many rays that took.
   ///
@@ -74,6 +78,7 @@ class Lighting {
   [[nodiscard]] static std::vector<std::uint32_t> coherent_order(std::span<const SurfacePoint> points);
   [[nodiscard]] double voxels_per_cell(std::int32_t placed) const;
   std::int64_t light_group(const Group& group, std::span<Vec3> colours) const;
+  void find_propagated(const Group& group, std::span<Vec3> light) const;
   std::int64_t find_sunlight(const Group& group, std::span<Vec3> sunlight) const;
   // Removes from each active lane's light what does not get past what lies on its ray; returns how many were traced.
   std::int64_t shadow(const Group& group, RayPacket& rays, std::span<Vec3> light) const;
@@ -92,6 +97,7 @@ class Lighting {
   [[nodiscard]] float diffuse(const Frame& frame, const SurfacePoint& point) const;
   [[nodiscard]] Vec3 normal_colour(const SurfacePoint& point) const;
   [[nodiscard]] bool needs_openness() const;
+  [[nodiscard]] bool is_propagated() const;
 
   const SceneView* view_;
   const VoxelRegistry* types_;
@@ -101,6 +107,8 @@ class Lighting {
   OcclusionDirections directions_;
   std::vector<Frame> frames_;
   std::vector<Surface> detail_surfaces_;  // of each placed grid; empty where types have their own colours
+  std::vector<GridLight> levels_;
+  LightLook look_;
   float exposure_ = 1.0F;
   float sky_ = 1.0F;  // brightness
   Daylight daylight_;

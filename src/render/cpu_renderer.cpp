@@ -12,7 +12,9 @@
 #include <glm/geometric.hpp>
 
 #include <quoin/core/assert.h>
+#include <quoin/light/scene_light.h>
 
+#include "light/light_model.h"
 #include "render/impostor/pass.h"
 #include "render/picture_detail.h"
 #include "render/picture_request.h"
@@ -72,7 +74,22 @@ struct CpuRenderer::Impl {
   Surfaces surfaces;
   DetailChooser detail;
   LampCache lamps;
+  SceneLight propagated;
+  bool is_lit = false;  // `propagated` is up to date
+  std::mutex lighting;
 
+  // Of each placed grid of `of`; none where the light is another.
+  [[nodiscard]] std::vector<GridLight> levels(const LightOptions& light, const SceneTracer& of, Threads threads) {
+    if (!is_propagated(light)) return {};
+    const std::lock_guard lock(lighting);
+    if (!is_lit) propagated.update(*scene, threads);
+    is_lit = true;
+    std::vector<GridLight> levels;
+    for (const PlacedGrid& each : placed_in(of)) {
+      levels.push_back(propagated.of(scene->instances()[each.instance].grid));
+    }
+    return levels;
+  }
   [[nodiscard]] std::shared_ptr<const LampTable> lamp_table(const LightOptions& light, Threads threads) {
     return lamps.table(*scene, light, threads, [this] { return lamp_places(); });
   }
@@ -117,6 +134,7 @@ void CpuRenderer::update(Threads threads) {
   impl_->surfaces.update(impl_->scene->types);
   impl_->detail.update_types(impl_->scene->types);
   impl_->lamps.update();
+  impl_->is_lit = false;
 }
 
 Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options, Threads threads,
@@ -136,7 +154,7 @@ Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& o
   const CameraRays rays(camera, options.width, options.height);
   const std::shared_ptr<const LampTable> lamps = impl_->lamp_table(options.light, threads);
   const Lighting lighting(view, impl_->scene->types, impl_->surfaces, options.light, lamps.get(),
-                          options.detail.colours);
+                          options.detail.colours, impl_->levels(options.light, view.tracer(), threads));
   const TileContext context{&view, &rays, &lighting, &options, subject.impostors ? &*subject.impostors : nullptr};
   Picture picture = empty_picture(options);
   const int across = (options.width + Tile::kEdge - 1) / Tile::kEdge;

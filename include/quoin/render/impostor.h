@@ -140,7 +140,8 @@ struct FarInstance {
 /// Each is drawn from the views nearest to the direction in which its own frame sees the camera, and every pixel's ray
 /// is met with the faces that these saw, so that silhouettes, depth and roll are right between views. Light is that of
 /// CpuRenderer, with shadows traced through all of `scene`; but where occlusion comes from rays, it is the share of
-/// nine rays of 6 voxels from the face's middle that meet nothing of the grid; and lamps add nothing.
+/// nine rays of 6 voxels from the face's middle that meet nothing of the grid; and lamps add nothing, nor does
+/// propagated light.
 ///
 /// Depth:    nearer than what the picture holds wins; among far instances at equal depth the lower handle. Pixels that
 ///           show nothing of an instance keep their colour and depth.
@@ -148,8 +149,8 @@ struct FarInstance {
 ///           radius spans less than a pixel; those that `scene` does not hold or holds halved; what is transparent of
 ///           voxels and fields.
 ///
-/// Requires: the camera and options are such that CpuRenderer accepts them; `picture` has their size, and depth.
-///           One sample a pixel is taken, at its centre.
+/// Requires: the camera and options are such that CpuRenderer accepts them, of LightModel::Rays; `picture` has
+///           their size, and depth. One sample a pixel is taken, at its centre.
 void draw_impostors(const SceneTracer& scene, std::span<const FarInstance> far, const Camera& camera,
                     const RenderOptions& options, Picture& picture, Threads threads = {});
 

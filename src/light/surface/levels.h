@@ -3,8 +3,8 @@
 // Light at surfaces, of whatever says what light voxels have and which are opaque: `Voxels` has
 //   std::uint16_t word(IVec3), packed light, and bool passes(IVec3), whether light gets there.
 
+#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 
 #include <quoin/core/direction.h>
@@ -62,6 +62,48 @@ template <class Voxels>
     return corner_light(around[1][1], around[1][u], around[v][1], around[v][u]);
   };
   return {corner(0, 0), corner(2, 0), corner(2, 2), corner(0, 2)};
+}
+
+/// Light at a point of a face, between its corners. `u`, `v`: 0 to 1 along its edges.
+[[nodiscard]] inline MeanLevels light_between(const FaceLight& corners, float u, float v) {
+  std::array<float, 4> levels{};
+  for (std::size_t c = 0; c < 4; ++c) {
+    const auto at = [&](std::size_t corner) { return static_cast<float>(corners[corner] >> 8 * c & 255U); };
+    const float low = at(0) + u * (at(1) - at(0));
+    const float high = at(3) + u * (at(2) - at(3));
+    levels[c] = (low + v * (high - low)) * (1.0F / 12.0F);
+  }
+  return {levels[0], levels[1], levels[2], levels[3]};
+}
+
+/// A place on a face, of a voxel or of a cell of (2^level)^3 of them.
+struct FacePlace {
+  IVec3 front{0};  ///< the voxel before it
+  float u = 0.0F;  ///< in that voxel, along the face's edges
+  float v = 0.0F;
+
+  /// `inside`: in the cell, 0 to 1.
+  FacePlace(IVec3 cell, Direction face, DVec3 inside, int level) : front(cell << level) {
+    const FaceFrame& frame = frame_of(face);
+    const int edge = 1 << level;
+    front[frame.axis] += frame.sign > 0 ? edge : -1;
+    const auto go_along = [&](int axis) {
+      const float along = static_cast<float>(std::clamp(inside[axis], 0.0, 1.0)) * static_cast<float>(edge);
+      const int whole = std::min(static_cast<int>(along), edge - 1);
+      front[axis] += whole;
+      return along - static_cast<float>(whole);
+    };
+    u = go_along(frame.u);
+    v = go_along(frame.v);
+  }
+};
+
+/// The light of a place on a face. Cells are solid where not all of their voxels are: what lies before such a face is
+/// looked for as far as the cell is wide.
+template <class Voxels>
+[[nodiscard]] MeanLevels light_on_face(Voxels& voxels, FacePlace place, Direction face, int level) {
+  for (int step = 1; step < 1 << level && !voxels.passes(place.front); ++step) place.front += normal_of(face);
+  return light_between(face_light(voxels, place.front, face), place.u, place.v);
 }
 
 /// The eight voxels around a point, whose coordinates are whole in the middle of voxels. Bit x + 2 y + 4 z is the voxel

@@ -101,6 +101,7 @@ void draw_impostors(const SceneTracer& scene, std::span<const FarInstance> far, 
   QUOIN_ASSERT(picture.colour.width == options.width && picture.colour.height == options.height &&
                    picture.depth.width == options.width && picture.depth.height == options.height,
                "a picture of the options' size, with depth");
+  QUOIN_ASSERT(options.light.model == LightModel::Rays, "light by rays");
   const SceneView view(scene, camera.position);
   const VoxelRegistry& types = scene.scene().types;
   const Surfaces surfaces(types);

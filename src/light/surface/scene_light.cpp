@@ -1,0 +1,99 @@
+#include <quoin/light/scene_light.h>
+
+#include <array>
+#include <bit>
+#include <span>
+#include <vector>
+
+#include <quoin/core/assert.h>
+
+#include "grid/chunk_order.h"
+
+namespace quoin {
+
+struct SceneLight::Entry {
+  PropagatedLight light;
+  const Grid* voxels = nullptr;  // the scene's, or `both`
+  Grid both;                     // voxels and field as one, where there is a field
+  ChangeCursor followed_voxels;
+  ChangeCursor followed_field;
+
+  void update(const SceneGrid& grid, const VoxelRegistry& types, Threads threads);
+  void unite(const SceneGrid& grid);
+};
+
+namespace {
+
+constexpr VoxelType kUnknown = 65'535;
+
+Chunk united_chunk(const Chunk* voxels, const DensityChunk* field) {
+  Chunk all = voxels == nullptr ? Chunk() : *voxels;
+  if (field == nullptr) return all;
+  std::vector<VoxelType> dense(kChunkVoxels);
+  std::array<VoxelType, kChunkEdge> materials;
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      const auto first = dense.begin() + (y + kChunkEdge * z) * kChunkEdge;
+      const std::span<VoxelType, kChunkEdge> row(first, kChunkEdge);
+      all.read_row(y, z, row);
+      const std::uint64_t solid = field->solid_row(y, z);
+      if (solid != 0) field->materials().read_row(y, z, materials);
+      for (std::uint64_t left = solid; left != 0; left &= left - 1) {
+        const auto x = static_cast<std::size_t>(std::countr_zero(left));
+        if (row[x] == kAir) row[x] = materials[x] == kAir ? kUnknown : materials[x];
+      }
+    }
+  }
+  return Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense));
+}
+
+}  // namespace
+
+void SceneLight::Entry::unite(const SceneGrid& grid) {
+  std::vector<IVec3> chunks;
+  const GridChanges of_voxels = grid.grid.changes_since(followed_voxels);
+  const DensityChanges of_field = grid.field.changes_since(followed_field);
+  if (of_voxels.all || of_field.all) {
+    both.clear();
+    for (const std::vector<IVec3>& more : {grid.grid.chunks(), grid.field.chunks()}) {
+      chunks.insert(chunks.end(), more.begin(), more.end());
+    }
+  } else {
+    for (const auto& change : of_voxels.items) chunks.push_back(change.chunk);
+    for (const auto& change : of_field.items) chunks.push_back(change.chunk);
+  }
+  sort_and_unite(chunks);
+  for (const IVec3 chunk : chunks) {
+    both.put_chunk(chunk, united_chunk(grid.grid.find_chunk(chunk), grid.field.find_chunk(chunk)));
+  }
+}
+
+void SceneLight::Entry::update(const SceneGrid& grid, const VoxelRegistry& types, Threads threads) {
+  const bool has_field = grid.field.chunk_count() > 0;
+  if (has_field) unite(grid);
+  voxels = has_field ? &both : &grid.grid;
+  light.update(*voxels, types, threads);
+}
+
+SceneLight::SceneLight() = default;
+SceneLight::SceneLight(SceneLight&&) noexcept = default;
+SceneLight& SceneLight::operator=(SceneLight&&) noexcept = default;
+SceneLight::~SceneLight() = default;
+
+void SceneLight::update(const Scene& scene, Threads threads) {
+  std::erase_if(grids_, [&](const auto& each) { return scene.grids().find(each.first) == nullptr; });
+  for (const GridHandle handle : scene.grids().handles()) {
+    const SceneGrid& grid = scene.grids()[handle];
+    std::unique_ptr<Entry>& entry = grids_[handle];
+    if (entry == nullptr) entry = std::make_unique<Entry>();
+    entry->update(grid, scene.types, threads);
+  }
+}
+
+GridLight SceneLight::of(GridHandle grid) const {
+  const auto found = grids_.find(grid);
+  QUOIN_ASSERT(found != grids_.end(), "a grid of the scene of the last update");
+  return {&found->second->light, found->second->voxels};
+}
+
+}  // namespace quoin
