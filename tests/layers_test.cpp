@@ -47,6 +47,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"light/lighting.h", {"render"}},
     {"light/occlusion_directions.h", {"render", "render_vk"}},
     {"light/sky.h", {"render"}},
+    {"light/surface/light_bricks.h", {"render", "render_vk"}},
     {"light/surfaces.h", {"io", "render_vk"}},
     {"live/grid_surfaces.h", {"render_vk"}},
     {"mesh/blocky/occlusion_atlas.h", {"scene"}},

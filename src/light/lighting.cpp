@@ -191,7 +191,8 @@ namespace {
 // Voxels and their light, of single places.
 class PlacedVoxels {
  public:
-  PlacedVoxels(const GridLight& of, const VoxelRegistry& types) : light_(*of.light), reader_(*of.voxels), types_(types) {}
+  PlacedVoxels(const GridLight& of, const VoxelRegistry& types)
+      : light_(*of.light), reader_(*of.voxels), types_(types) {}
   [[nodiscard]] std::uint16_t word(IVec3 voxel) const { return packed(light_.at(voxel)); }
   [[nodiscard]] bool passes(IVec3 voxel) { return !types_.is_opaque(reader_.get(voxel)); }
 

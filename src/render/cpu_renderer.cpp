@@ -15,6 +15,7 @@
 #include <quoin/light/scene_light.h>
 
 #include "light/light_model.h"
+#include "light/surface/light_bricks.h"
 #include "render/impostor/pass.h"
 #include "render/picture_detail.h"
 #include "render/picture_request.h"
@@ -74,21 +75,15 @@ struct CpuRenderer::Impl {
   Surfaces surfaces;
   DetailChooser detail;
   LampCache lamps;
-  SceneLight propagated;
-  bool is_lit = false;  // `propagated` is up to date
-  std::mutex lighting;
+  LightCache levels;
 
   // Of each placed grid of `of`; none where the light is another.
-  [[nodiscard]] std::vector<GridLight> levels(const LightOptions& light, const SceneTracer& of, Threads threads) {
-    if (!is_propagated(light)) return {};
-    const std::lock_guard lock(lighting);
-    if (!is_lit) propagated.update(*scene, threads);
-    is_lit = true;
-    std::vector<GridLight> levels;
-    for (const PlacedGrid& each : placed_in(of)) {
-      levels.push_back(propagated.of(scene->instances()[each.instance].grid));
-    }
-    return levels;
+  [[nodiscard]] std::vector<GridLight> levels_of(const SceneTracer& of, const LightOptions& light, Threads threads) {
+    std::vector<GridLight> found;
+    if (!is_propagated(light)) return found;
+    const SceneLight& all = levels.light(*scene, threads);
+    for (const PlacedGrid& each : placed_in(of)) found.push_back(all.of(scene->instances()[each.instance].grid));
+    return found;
   }
   [[nodiscard]] std::shared_ptr<const LampTable> lamp_table(const LightOptions& light, Threads threads) {
     return lamps.table(*scene, light, threads, [this] { return lamp_places(); });
@@ -134,7 +129,7 @@ void CpuRenderer::update(Threads threads) {
   impl_->surfaces.update(impl_->scene->types);
   impl_->detail.update_types(impl_->scene->types);
   impl_->lamps.update();
-  impl_->is_lit = false;
+  impl_->levels.update();
 }
 
 Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options, Threads threads,
@@ -154,7 +149,7 @@ Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& o
   const CameraRays rays(camera, options.width, options.height);
   const std::shared_ptr<const LampTable> lamps = impl_->lamp_table(options.light, threads);
   const Lighting lighting(view, impl_->scene->types, impl_->surfaces, options.light, lamps.get(),
-                          options.detail.colours, impl_->levels(options.light, view.tracer(), threads));
+                          options.detail.colours, impl_->levels_of(view.tracer(), options.light, threads));
   const TileContext context{&view, &rays, &lighting, &options, subject.impostors ? &*subject.impostors : nullptr};
   Picture picture = empty_picture(options);
   const int across = (options.width + Tile::kEdge - 1) / Tile::kEdge;

@@ -40,9 +40,9 @@ enum class LightModel : std::uint8_t {
   Rays,        ///< the reference model: a sun with shadows, ambient light with occlusion, lamps
   Propagated,  ///< light in game time (PropagatedLight): levels that spread through each grid by itself, from the sky
                ///< along its own y and from voxels that emit, smooth over faces (SurfaceLight), as colours by
-               ///< light_colour; times 1 - 0.75 * occlusion. Scene::lamps, shadows and the sun's direction mean nothing,
-               ///< other grids throw no shadow. It needs no rays but those of OcclusionMode::Rays. VulkanMeshRenderer
-               ///< refuses it
+  ///< light_colour; times 1 - 0.75 * occlusion. Scene::lamps, shadows and the sun's direction mean nothing,
+  ///< other grids throw no shadow. It needs no rays but those of OcclusionMode::Rays. VulkanMeshRenderer
+  ///< refuses it
 };
 
 /// How surfaces are lit; the same for every renderer. Where values are shown instead of colours (Occlusion, Normals)

@@ -6,78 +6,26 @@
 #include <quoin/core/assert.h>
 
 #include "light/surface/levels.h"
+#include "light/surface/rows.h"
 
 namespace quoin {
 
-/// Rows of 64 voxels along x, of light and of what is opaque; each has its place among those that are remembered.
 struct SurfaceLight::Rows {
-  Rows(const PropagatedLight& of_light, const Grid& of_grid, const VoxelRegistry& of_types)
-      : light(&of_light), grid(&of_grid), types(&of_types), rows(kRows) {}
-
-  struct Row {
-    IVec3 at{0};  // x in chunks
-    bool is_known = false;
-    std::uint64_t passing = 0;
-    std::array<std::uint16_t, kChunkEdge> words{};
-  };
-  static constexpr std::size_t kRows = 8'192;  // those of two chunks side by side
-  [[nodiscard]] static std::size_t place_of(IVec3 at) {
-    return static_cast<std::size_t>((at.y & 63) | (at.z & 63) << 6 | (at.x & 1) << 12);
-  }
-
-  [[nodiscard]] const Row& row_of(IVec3 voxel) {
-    const IVec3 at{voxel.x >> kChunkShift, voxel.y, voxel.z};
-    Row& row = rows[place_of(at)];
-    if (!row.is_known || row.at != at) look_up(voxel, at, row);
-    return row;
-  }
-  [[nodiscard]] std::uint16_t word(IVec3 voxel) {
-    return row_of(voxel).words[static_cast<std::size_t>(voxel.x & (kChunkEdge - 1))];
-  }
-  [[nodiscard]] bool passes(IVec3 voxel) {
-    return (row_of(voxel).passing >> static_cast<unsigned>(voxel.x & (kChunkEdge - 1)) & 1U) != 0;
-  }
-  [[nodiscard]] FrontLight front(IVec3 voxel) {
-    const Row& row = row_of(voxel);
-    const auto x = static_cast<std::size_t>(voxel.x & (kChunkEdge - 1));
-    if ((row.passing >> x & 1U) == 0) return {};
-    return {level_bytes(row.words[x]), true};
-  }
-
-  const PropagatedLight* light;
-  const Grid* grid;
-  const VoxelRegistry* types;
-  std::vector<Row> rows;
+  LightRows voxels;
   // Of one quad: what lies in front of it and around, corners, and faces that are done.
   std::vector<FrontLight> fronts;
   std::vector<std::uint32_t> corners;
   std::vector<bool> done;
-
- private:
-  void look_up(IVec3 voxel, IVec3 at, Row& row) const {
-    row.at = at;
-    row.is_known = true;
-    light->read_row(voxel, row.words);
-    row.passing = ~std::uint64_t{0};
-    const Chunk* chunk = grid->find_chunk(chunk_of(voxel));
-    if (chunk == nullptr) return;
-    std::array<VoxelType, kChunkEdge> held;
-    const IVec3 local = local_of(voxel);
-    chunk->read_row(local.y, local.z, held);
-    for (std::size_t x = 0; x < held.size(); ++x) {
-      row.passing &= ~(std::uint64_t{types->is_opaque(held[x])} << x);
-    }
-  }
 };
 
 SurfaceLight::SurfaceLight(const PropagatedLight& light, const Grid& grid, const VoxelRegistry& types)
-    : rows_(std::make_unique<Rows>(light, grid, types)) {}
+    : rows_(std::make_unique<Rows>(Rows{LightRows(light, grid, types), {}, {}, {}})) {}
 SurfaceLight::SurfaceLight(SurfaceLight&&) noexcept = default;
 SurfaceLight& SurfaceLight::operator=(SurfaceLight&&) noexcept = default;
 SurfaceLight::~SurfaceLight() = default;
 
 FaceLight SurfaceLight::face(IVec3 voxel, Direction direction) {
-  return face_light(*rows_, voxel + normal_of(direction), direction);
+  return face_light(rows_->voxels, voxel + normal_of(direction), direction);
 }
 
 namespace {
@@ -197,7 +145,7 @@ void SurfaceLight::split(const QuadBuffer& quads, IVec3 chunk, LightMerging merg
         IVec3 at = first;
         at[frame.u] += u;
         at[frame.v] += v;
-        rows.fronts.push_back(rows.front(at));
+        rows.fronts.push_back(rows.voxels.front(at));
       }
     }
     rows.corners.clear();
@@ -218,7 +166,7 @@ void SurfaceLight::read(const SmoothPlaces& places, std::span<MeanLevels> out) {
   const int step = 1 << std::clamp(places.level, 0, kMaxSmoothLevel);
   for (std::size_t i = 0; i < places.positions.size(); ++i) {
     const DVec3 point = DVec3(places.positions[i]) + DVec3(places.origin);
-    out[i] = light_before(*rows_, point, places.normals[i], step);
+    out[i] = light_before(rows_->voxels, point, places.normals[i], step);
   }
 }
 

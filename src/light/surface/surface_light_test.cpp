@@ -7,8 +7,8 @@
 #include <set>
 #include <vector>
 
-#include <gtest/gtest.h>
 #include <glm/geometric.hpp>
+#include <gtest/gtest.h>
 
 #include <quoin/grid/voxel_field.h>
 #include <quoin/mesh/blocky.h>
@@ -100,8 +100,8 @@ std::array<double, 4> shown_by_quad(const FaceLight& corners, int width, int hei
     // The triangles (0,1,2) and (0,2,3), each by its own slopes.
     const double x = static_cast<double>(u) / width;
     const double y = static_cast<double>(v) / height;
-    shown[c] = x >= y ? at(0) + x * (at(1) - at(0)) + y * (at(2) - at(1))
-                      : at(0) + y * (at(3) - at(0)) + x * (at(2) - at(3));
+    shown[c] =
+        x >= y ? at(0) + x * (at(1) - at(0)) + y * (at(2) - at(1)) : at(0) + y * (at(3) - at(0)) + x * (at(2) - at(3));
   }
   return shown;
 }

@@ -192,6 +192,17 @@ Status DeviceLamps::put(DeviceMemory& memory, std::shared_ptr<const LampTable> n
   return done;
 }
 
+Status DeviceLevels::put(DeviceMemory& memory, std::shared_ptr<const LightBricks> now) {
+  if (now == table) return {};
+  table = nullptr;
+  if (now == nullptr) return {};
+  Status done = put_table(memory, bricks, bytes_of(now->bricks));
+  if (done) done = put_table(memory, numbers, bytes_of(now->numbers));
+  if (done) done = memory.flush();
+  if (done) table = std::move(now);
+  return done;
+}
+
 std::vector<LampPlace> DeviceScene::lamp_places(const Scene& scene) const {
   std::vector<LampPlace> places;
   for (const DevicePlaced& each : placement_.placed) {

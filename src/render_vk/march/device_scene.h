@@ -10,6 +10,7 @@
 #include <quoin/scene/scene_tracer.h>
 
 #include "light/lamp_table.h"
+#include "light/surface/light_bricks.h"
 #include "render/impostor/raster/faces.h"
 #include "render_vk/device/memory.h"
 #include "render_vk/trees/device_grid.h"
@@ -64,6 +65,22 @@ struct DeviceLamps {
 
   /// After an error it holds nothing.
   [[nodiscard]] Status put(DeviceMemory& memory, std::shared_ptr<const LampTable> now);
+};
+
+/// Levels of light around surfaces in device memory.
+struct DeviceLevels {
+  std::shared_ptr<const LightBricks> table;  ///< null: pictures are in another light
+  Place bricks;
+  Place numbers;
+
+  /// After an error it holds nothing.
+  [[nodiscard]] Status put(DeviceMemory& memory, std::shared_ptr<const LightBricks> now);
+};
+
+/// What light of a picture is looked up in.
+struct DeviceLight {
+  DeviceLamps lamps;
+  DeviceLevels levels;
 };
 
 /// A scene's voxels in device memory, and its instances.

@@ -11,6 +11,8 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include <quoin/light/light_colour.h>
+
 #include "core/srgb.h"
 #include "light/daylight.h"
 #include "light/light_model.h"
@@ -295,6 +297,22 @@ std::vector<ShaderLamp> put_lamps(const DeviceLamps& lamps, const Camera& camera
   data.frame.lamp_bricks = lamps.bricks.address;
   data.frame.lamp_lists = lamps.lists.address;
   return shader_lamps(*lamps.table, camera.position, data.view_origin);
+}
+
+void put_levels(const DeviceLevels& levels, const Scene& scene, const Placement& placement, const LightOptions& light,
+                FrameData& data) {
+  const LightLook look = light_look(light);
+  data.frame.flags |= kPropagated;
+  data.frame.level_sky = {look.sky, 0.0F};
+  data.frame.level_lamps = {look.lamps, 0.0F};
+  data.frame.level_least = {look.least, 0.0F};
+  data.frame.light_mask = static_cast<std::uint32_t>(levels.table->bricks.size() - 1);
+  data.frame.light_bricks = levels.bricks.address;
+  data.frame.light_numbers = levels.numbers.address;
+  for (std::size_t i = 0; i < data.placed.size(); ++i) {
+    const GridHandle grid = scene.instances()[placement.placed[i].placed.instance].grid;
+    data.placed[i].start_base.w = levels.table->index_of(grid);
+  }
 }
 
 std::vector<float> srgb_thresholds() {

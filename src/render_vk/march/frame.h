@@ -29,6 +29,10 @@ struct FrameData {
 /// Requires: `lamps` has a table, in device memory; `data` is of `camera`.
 [[nodiscard]] std::vector<ShaderLamp> put_lamps(const DeviceLamps& lamps, const Camera& camera, FrameData& data);
 
+/// Has a frame lit by levels. Requires: `levels` has a table of `scene`, in device memory; `data` is of `placement`.
+void put_levels(const DeviceLevels& levels, const Scene& scene, const Placement& placement, const LightOptions& light,
+                FrameData& data);
+
 /// A table's lamps, from where view space has its origin in the world.
 [[nodiscard]] std::vector<ShaderLamp> shader_lamps(const LampTable& table, DVec3 camera, DVec3 view_origin);
 

@@ -66,7 +66,8 @@ Status PicturePass::put_frame(const Camera& camera, const RenderOptions& options
   FrameData data = make_frame(*placement_, camera, options);
   occlusion_rays_ = options.light.occlusion_rays;
   std::vector<ShaderLamp> lamps;
-  if (lamps_.table != nullptr) lamps = put_lamps(lamps_, camera, data);
+  if (light_.lamps.table != nullptr) lamps = put_lamps(light_.lamps, camera, data);
+  if (light_.levels.table != nullptr) put_levels(light_.levels, *content_, *placement_, options.light, data);
   frame_ = data.frame;
   frame_.grids = placement_->grids;
   frame_.last_surface = scene_->last_surface();

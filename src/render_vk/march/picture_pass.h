@@ -20,15 +20,16 @@ namespace quoin::vulkan {
 /// One picture, tile by tile: a tile is drawn in device memory and then read, or stays there.
 class PicturePass {
  public:
-  /// `placement` is of `scene`, and so are `lamps`.
+  /// `placement` is of `scene`, and so is `light`. `content`: what that scene is of; null: nothing.
   PicturePass(Device& device, DeviceMemory& memory, const Pipelines& pipelines, const DeviceScene& scene,
-              const Placement& placement, DeviceLamps lamps)
+              const Placement& placement, DeviceLight light, const Scene* content)
       : device_(&device),
         memory_(&memory),
         pipelines_(&pipelines),
         scene_(&scene),
         placement_(&placement),
-        lamps_(std::move(lamps)) {}
+        light_(std::move(light)),
+        content_(content) {}
   ~PicturePass();
   PicturePass(const PicturePass&) = delete;
   PicturePass& operator=(const PicturePass&) = delete;
@@ -51,7 +52,7 @@ class PicturePass {
   Status reserve(std::size_t bytes, std::uint64_t& address);
   Status put_frame(const Camera& camera, const RenderOptions& options);
   Status put_far(const RenderOptions& options);
-  [[nodiscard]] int most_lamps() const { return lamps_.table == nullptr ? 0 : lamps_.table->longest; }
+  [[nodiscard]] int most_lamps() const { return light_.lamps.table == nullptr ? 0 : light_.lamps.table->longest; }
   void find_hits(VkCommandBuffer commands, const ShaderPush& push) const;
   Status begin(const Camera& camera, const RenderOptions& options);
   Status make_tile_buffers(const RenderOptions& options);
@@ -75,7 +76,8 @@ class PicturePass {
   const Pipelines* pipelines_;
   const DeviceScene* scene_;
   const Placement* placement_;
-  DeviceLamps lamps_;
+  DeviceLight light_;
+  const Scene* content_;
   const PictureImpl* target_ = nullptr;  // null: what is drawn is read
   std::vector<Place> places_;
   ShaderFrame frame_;

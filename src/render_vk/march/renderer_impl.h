@@ -7,6 +7,8 @@
 
 #include <quoin/render_vk/vulkan_renderer.h>
 
+#include "light/light_model.h"
+#include "light/surface/light_bricks.h"
 #include "render/picture_detail.h"
 #include "render_vk/device/access.h"
 #include "render_vk/device/device.h"
@@ -39,6 +41,7 @@ struct VulkanRenderer::Impl {
     voxels = updated;
     instances = filter;
     lamps.update();
+    levels.update();
     if (updated == nullptr) return detail.clear();
     chooser->update_types(updated->types);
     detail.look_at(*updated);
@@ -55,14 +58,31 @@ struct VulkanRenderer::Impl {
   std::unique_ptr<DetailChooser> chooser;  // for that scene
   /// What lamps light, sent to the device when it is another than before.
   [[nodiscard]] Result<vulkan::DeviceLamps> lamp_table(const LightOptions& light, Threads threads) {
-    if (light.max_lamps == 0 || voxels == nullptr) return vulkan::DeviceLamps{};
+    if (light.max_lamps == 0 || is_propagated(light) || voxels == nullptr) return vulkan::DeviceLamps{};
     auto table = lamps.table(*voxels, light, threads, [this] { return scene.lamp_places(*voxels); });
     if (Status done = sent_lamps.put(memory, std::move(table)); !done) return done.error();
     return sent_lamps;
   }
 
+  /// Levels of light, likewise.
+  [[nodiscard]] Result<vulkan::DeviceLevels> level_table(const LightOptions& light, Threads threads) {
+    if (!is_propagated(light) || voxels == nullptr) return vulkan::DeviceLevels{};
+    if (Status done = sent_levels.put(memory, levels.bricks(*voxels, threads)); !done) return done.error();
+    return sent_levels;
+  }
+
+  [[nodiscard]] Result<vulkan::DeviceLight> light_tables(const LightOptions& light, Threads threads) {
+    auto of_lamps = lamp_table(light, threads);
+    if (!of_lamps) return of_lamps.error();
+    auto of_levels = level_table(light, threads);
+    if (!of_levels) return of_levels.error();
+    return vulkan::DeviceLight{std::move(*of_lamps), std::move(*of_levels)};
+  }
+
   LampCache lamps;
   vulkan::DeviceLamps sent_lamps;
+  LightCache levels;
+  vulkan::DeviceLevels sent_levels;
   std::uint64_t uploaded = 0;
 };
 

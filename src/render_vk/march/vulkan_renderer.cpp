@@ -85,10 +85,10 @@ Result<Picture> VulkanRenderer::render(const Camera& camera, const RenderOptions
   if (const Status status = check_request(camera, options); !status) return status.error();
   const auto subject = vulkan::Subject::of(*impl_, camera, options, threads);
   if (!subject) return subject.error();
-  auto lamps = impl_->lamp_table(options.light, threads);
-  if (!lamps) return lamps.error();
+  auto light = impl_->light_tables(options.light, threads);
+  if (!light) return light.error();
   vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
-                           std::move(*lamps));
+                           std::move(*light), impl_->voxels);
   return pass.render(camera, options, progress);
 }
 
@@ -113,10 +113,10 @@ Status VulkanRenderer::draw(VulkanPicture& picture, const Camera& camera, const 
   }
   const auto subject = vulkan::Subject::of(*impl_, camera, options, threads);
   if (!subject) return subject.error();
-  auto lamps = impl_->lamp_table(options.light, threads);
-  if (!lamps) return lamps.error();
+  auto light = impl_->light_tables(options.light, threads);
+  if (!light) return light.error();
   vulkan::PicturePass pass(*impl_->device, impl_->memory, *impl_->pipelines, impl_->scene, subject->placement(),
-                           std::move(*lamps));
+                           std::move(*light), impl_->voxels);
   return pass.draw(target, camera, options, progress);
 }
 

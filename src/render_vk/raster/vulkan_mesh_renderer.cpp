@@ -185,6 +185,9 @@ Status VulkanMeshRenderer::Impl::check_request(const vulkan::PictureImpl& target
   if (options.wireframe != Wireframe::Off && !device->physical().draws_lines) {
     return make_error(ErrorCode::Unsupported, who + " lacks fillModeNonSolid, which draws edges of triangles");
   }
+  if (is_propagated(options.light)) {
+    return make_error(ErrorCode::Unsupported, "vulkan: meshes are not drawn in propagated light");
+  }
   if (target.device != device) return refuse("vulkan: the picture is of another renderer than the meshes");
   const bool needs_voxels =
       options.detail.policy.has_value() || traces_light(options.light) || has_glass_by_rays(options);

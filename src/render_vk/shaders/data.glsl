@@ -23,6 +23,7 @@ const uint kShowOcclusion = 512;
 const uint kShowNormals = 1024;
 const uint kLamps = 2048;
 const uint kGlassSurfaces = 4096;
+const uint kPropagated = 8192;
 
 #define kInfinity uintBitsToFloat(0x7F800000u)
 
@@ -59,7 +60,8 @@ struct Placed {
   ivec4 ref_base;     // of the tree's coordinates; w: the grid
   vec4 ref_inside;    // from there; w: world units a voxel
   vec4 ref_view;      // the same point in view; w: voxels of the full grid a voxel
-  ivec4 start_base;   // of the picture's rays, which start at start + x start_x + y start_y for pixel (x, y)
+  ivec4 start_base;   // of the picture's rays, which start at start + x start_x + y start_y for pixel (x, y); w: the
+                      // grid whose levels of light it has
   vec4 start;         // w: how far along the rays that is, in lengths of their forward component
   vec4 start_x;
   vec4 start_y;
@@ -187,6 +189,9 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   vec4 light;  // ambient, ambient without occlusion, what occlusion leaves of all
   vec4 ambient;  // colours: of the ambient light, of the sun's
   vec4 sun;
+  vec4 level_sky;  // what light of level 15 is like, of the sky, of lamps; and what shines everywhere
+  vec4 level_lamps;
+  vec4 level_least;
   uvec2 placed;
   uvec2 grids;
   uvec2 tree;    // nodes of the tree over the instances: low and high, w: first, count or -1 - axis
@@ -210,7 +215,9 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   uvec2 lamps;
   uvec2 lamp_bricks;
   uvec2 lamp_lists;
-  uvec2 lamp_pad;
+  uvec2 light_bricks;  // levels around surfaces: levels.glsl
+  uvec2 light_numbers;
+  uvec2 light_pad;
   int width;
   int height;
   uint flags;
@@ -228,7 +235,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   float lift;
   uint far_count;  // 0: nothing is drawn from impostors
   uint lamp_mask;  // of slots of bricks
+  uint light_mask;  // of slots of bricks of levels
   uint pad0;
   uint pad1;
-  uint pad2;
 };

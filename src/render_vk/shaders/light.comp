@@ -17,6 +17,7 @@ layout(constant_id = 0) const bool kHasGlass = true;
 #include "rays.glsl"
 #include "faces.glsl"
 #include "corners.glsl"
+#include "levels.glsl"
 #include "see_through.glsl"
 
 const uint kTurns = 1024;
@@ -124,8 +125,8 @@ LightRays rays_of(Point point, Placed placed, GridRay from) {
   bool is_far = (point.what.z & kIsFar) != 0;
   rays.open_count = traces_occlusion(point) && !is_far ? frame().occlusion_count : 0;
   rays.lamps = uvec2(0);
-  if (has(kLit) && has(kLamps)) rays.lamps = lamps_around(point.voxel, placed);
-  rays.first = has(kLit) && has(kShadows) && rays.cosine > 0.0 ? -1 : 0;
+  if (has(kLit) && has(kLamps) && !has(kPropagated)) rays.lamps = lamps_around(point.voxel, placed);
+  rays.first = has(kLit) && has(kShadows) && !has(kPropagated) && rays.cosine > 0.0 ? -1 : 0;
   rays.in_view = view_from_grid(placed, from).origin;
   rays.normal_in_view = turned(placed.view_axes, rays.normal) / placed.ref_inside.w;
   ivec2 pixel = push.corner + tile_pixel();
@@ -162,6 +163,20 @@ float openness_of(Point point, Placed placed, int open) {
   return traces_occlusion(point) ? float(open) / float(frame().occlusion_count) : 0.0;
 }
 
+// All light of a surface point, by the levels of the voxels before it.
+vec3 propagated_light(Point point, Placed placed) {
+  ivec3 cell = point.voxel.xyz + placed.origin.xyz;
+  int level = placed.origin.w;
+  int grid = placed.start_base.w;
+  vec4 levels;
+  if (is_of_field(point)) {
+    levels = levels_before(cell, point.inside.xyz, normal_of(point.what.y), level, grid);
+  } else {
+    levels = levels_on_face(cell, point.what.y, point.inside.xyz, level, grid);
+  }
+  return light_colour(levels, grid_normal(point));
+}
+
 // What reaches a surface point: the sun's light and that of lamps, and its openness. One loop over all rays, for the
 // reason that rays.glsl gives.
 void trace_light(Point point, Placed placed, uint slot, out vec3 light, out float openness) {
@@ -191,7 +206,7 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 light, out floa
       of_lamps += brought * passed;
     }
   }
-  light = sunlight + of_lamps;
+  light = has(kPropagated) ? propagated_light(point, placed) : sunlight + of_lamps;
   openness = openness_of(point, placed, open);
 }
 

@@ -43,10 +43,11 @@ float left_by_occlusion(float openness) {
   return share.z + (1.0 - share.z) * openness;
 }
 
-// The light of a point, before exposure. `sunlight`: what the sun and lamps add.
+// The light of a point, before exposure. `sunlight`: what the sun and lamps add; or all of it, by levels.
 vec3 light_at(vec3 sunlight, float openness) {
   vec4 share = frame().light;
   vec4 ambient = frame().ambient;
+  if (has(kPropagated)) return sunlight * (has_occlusion() ? left_by_occlusion(openness) : 1.0);
   if (!has_occlusion()) return share.y * ambient.xyz + sunlight;
   if (has(kAffectsAll)) return (share.x * ambient.xyz + sunlight) * left_by_occlusion(openness);
   return share.x * openness * ambient.xyz + sunlight;

@@ -136,6 +136,7 @@ constexpr std::uint32_t kShowOcclusion = 512;
 constexpr std::uint32_t kShowNormals = 1024;
 constexpr std::uint32_t kLamps = 2048;
 constexpr std::uint32_t kGlassSurfaces = 4096;
+constexpr std::uint32_t kPropagated = 8192;
 
 constexpr std::uint32_t kBodies = 16;
 constexpr std::size_t kPointBytes = 48;
@@ -168,6 +169,9 @@ struct ShaderFrame {
   Vec4 light{0.0F};
   Vec4 ambient{0.0F};
   Vec4 sun{0.0F};
+  Vec4 level_sky{0.0F};
+  Vec4 level_lamps{0.0F};
+  Vec4 level_least{0.0F};
   std::uint64_t placed = 0;
   std::uint64_t grids = 0;
   std::uint64_t tree = 0;
@@ -191,7 +195,9 @@ struct ShaderFrame {
   std::uint64_t lamps = 0;
   std::uint64_t lamp_bricks = 0;
   std::uint64_t lamp_lists = 0;
-  std::uint64_t lamp_pad = 0;
+  std::uint64_t light_bricks = 0;
+  std::uint64_t light_numbers = 0;
+  std::uint64_t light_pad = 0;
   std::int32_t width = 0;
   std::int32_t height = 0;
   std::uint32_t flags = 0;
@@ -209,7 +215,8 @@ struct ShaderFrame {
   float lift = 0.0F;
   std::uint32_t far_count = 0;
   std::uint32_t lamp_mask = 0;
-  std::array<std::uint32_t, 3> pad{};
+  std::uint32_t light_mask = 0;
+  std::array<std::uint32_t, 2> pad{};
 };
 
 struct ShaderPush {
@@ -246,7 +253,7 @@ struct SwapPush {
 static_assert(sizeof(SwapPush) == 24);
 static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 192);
 static_assert(sizeof(ShaderFarFace) == 32 && sizeof(ShaderVoxelFace) == 16 && sizeof(ShaderFar) == 16 * 16);
-static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 17 * 16 + 24 * 8 + 20 * 4);
+static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 20 * 16 + 26 * 8 + 20 * 4);
 static_assert(sizeof(ShaderLamp) == 13 * 16);
 static_assert(sizeof(ShaderPush) == 96 && sizeof(ShaderCounters) == 16);
 
