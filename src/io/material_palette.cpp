@@ -229,24 +229,25 @@ void MaterialSurfaces::add(const MeshView& view, const MaterialPalette& palette)
   if (view.has_albedo()) {
     return surfaces_.push_back({view, palette.smooth_material(is_transparent(view.surface))});
   }
-  std::map<std::size_t, BlockyTriangles*> by_material;
+  std::map<std::size_t, Owned*> by_material;
   if (emits(view.surface) || is_transparent(view.surface)) {
     for (const VoxelType type : view.types) by_material.try_emplace(palette.material_of(view.surface, type));
   }
   if (by_material.size() < 2) return surfaces_.push_back({view, palette.material_of(view.surface, view.types.front())});
-  for (auto& [material, triangles] : by_material) {
-    triangles = owned_.emplace_back(std::make_unique<BlockyTriangles>()).get();
-  }
+  for (auto& [material, owned] : by_material) owned = owned_.emplace_back(std::make_unique<Owned>()).get();
   // A triangle lies in one face, so its three vertices have one type and move together.
   std::vector<std::uint32_t> moved_to(view.positions.size());
   for (std::size_t i = 0; i < view.positions.size(); ++i) {
-    moved_to[i] = copy_vertex(view, i, *by_material.at(palette.material_of(view.surface, view.types[i])));
+    Owned& owned = *by_material.at(palette.material_of(view.surface, view.types[i]));
+    moved_to[i] = copy_vertex(view, i, owned.triangles);
+    if (!view.light.empty()) owned.light.push_back(view.light[i]);
   }
   for (const std::uint32_t index : view.indices) {
-    by_material.at(palette.material_of(view.surface, view.types[index]))->indices.push_back(moved_to[index]);
+    by_material.at(palette.material_of(view.surface, view.types[index]))->triangles.indices.push_back(moved_to[index]);
   }
-  for (const auto& [material, triangles] : by_material) {
-    surfaces_.push_back({view_of(*triangles, view.surface), material});
+  for (const auto& [material, owned] : by_material) {
+    surfaces_.push_back({view_of(owned->triangles, view.surface), material});
+    surfaces_.back().view.light = owned->light;
   }
 }
 

@@ -127,7 +127,11 @@ class MaterialSurfaces {
   void add(const MeshView& view, const MaterialPalette& palette);
 
   std::vector<Surface> surfaces_;
-  std::vector<std::unique_ptr<BlockyTriangles>> owned_;
+  struct Owned {
+    BlockyTriangles triangles;
+    std::vector<LinearRgba16> light;
+  };
+  std::vector<std::unique_ptr<Owned>> owned_;
 };
 
 }  // namespace quoin

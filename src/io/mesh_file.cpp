@@ -30,6 +30,9 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
   if (!meshes.atlas.rgb.empty() && format == FileFormat::Ply) {
     return make_error(ErrorCode::Unsupported, "PLY has no textures; .glb, .gltf and .obj have");
   }
+  if (has_light(meshes) && !is_gltf) {
+    return make_error(ErrorCode::Unsupported, "only .glb and .gltf have light at vertices");
+  }
   if (auto sound = check_meshes(meshes); !sound) return sound.error();
   switch (format) {
     case FileFormat::Glb:

@@ -62,6 +62,8 @@ const char* fault_of_smooth(const MeshView& view) {
 /// What is wrong with a mesh; null when nothing is.
 const char* fault_of(const MeshView& view, std::size_t types) {
   if (const char* fault = view.has_albedo() ? fault_of_smooth(view) : fault_of_blocks(view, types)) return fault;
+  if (!is_none_or_one_a_vertex(view.light, view)) return "arrays of different lengths";
+  if (!view.light.empty() && !view.atlas.empty()) return "light beside an atlas";
   if (view.indices.size() % 3 != 0) return "indices that make no whole triangles";
   if (!view.indices.empty() && largest_of(view.indices) >= view.positions.size()) return "an index of no vertex";
   return all_finite(view.positions) ? nullptr : "a position that is not finite";
@@ -158,6 +160,11 @@ Status check_part(const MeshPart& part, const SceneMeshes& meshes, std::vector<D
 
 namespace {
 
+bool is_lit_throughout(const MeshPart& part) {
+  return std::ranges::all_of(part.surfaces,
+                             [](const MeshView& view) { return view.positions.empty() || !view.light.empty(); });
+}
+
 Status check_groups(const std::vector<MeshGroup>& groups) {
   for (std::size_t i = 0; i < groups.size(); ++i) {
     const Similarity& place = groups[i].world_from_group;
@@ -172,6 +179,12 @@ Status check_groups(const std::vector<MeshGroup>& groups) {
 
 }  // namespace
 
+bool has_light(const SceneMeshes& meshes) {
+  return std::ranges::any_of(meshes.parts, [](const MeshPart& part) {
+    return std::ranges::any_of(part.surfaces, [](const MeshView& view) { return !view.light.empty(); });
+  });
+}
+
 Status check_meshes(const SceneMeshes& meshes) {
   if (!(meshes.seconds >= 0.0) || !std::isfinite(static_cast<float>(meshes.seconds))) {
     return make_error(ErrorCode::InvalidArgument, "an animation whose length is no number");
@@ -181,9 +194,11 @@ Status check_meshes(const SceneMeshes& meshes) {
                         atlas.rgb.size() == std::size_t{3} * static_cast<std::size_t>(atlas.width) *
                                                 static_cast<std::size_t>(atlas.height);
   if (!is_sound) return make_error(ErrorCode::InvalidArgument, "an atlas of another size than it says");
+  const bool is_lit = has_light(meshes);
   std::vector<DBox> bounds;
   for (const MeshPart& part : meshes.parts) {
     if (auto sound = check_part(part, meshes, bounds); !sound) return sound;
+    if (is_lit && !is_lit_throughout(part)) return unsound(part, "no light, where others have it");
   }
   for (const MeshPlacement& placement : meshes.placements) {
     if (placement.part >= meshes.parts.size()) {
@@ -274,7 +289,8 @@ LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex) {
   LinearRgba16 colour{0, 0, 0, 65'535};
   if (is_transparent(view.surface)) colour[3] = view.albedo[vertex][3];
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    const float light = static_cast<float>(view.albedo[vertex][channel]) * open;
+    float light = static_cast<float>(view.albedo[vertex][channel]) * open;
+    if (!view.light.empty()) light *= static_cast<float>(view.light[vertex][channel]) * (1.0F / 65'535.0F);
     colour[channel] = static_cast<std::uint16_t>(std::lround(light));
   }
   return colour;

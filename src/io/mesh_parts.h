@@ -45,6 +45,9 @@ using PlanMeshFiles = Result<std::vector<MeshFile>>(const SceneMeshes& meshes, c
 /// Errors: InvalidArgument, naming the first part whose mesh or placement is unsound (see mesh_file.h).
 [[nodiscard]] Status check_meshes(const SceneMeshes& meshes);
 
+/// Whether any surface has light at its vertices; of sound meshes then all have.
+[[nodiscard]] bool has_light(const SceneMeshes& meshes);
+
 /// The box of all vertices; empty without one.
 [[nodiscard]] DBox bounds_of(const MeshView& view);
 
@@ -96,7 +99,7 @@ class VertexTransform {
   return surface == SurfaceClass::Transparent || surface == SurfaceClass::EmissiveTransparent;
 }
 
-/// The colour of a vertex of a smooth mesh, darkened by its occlusion: linear light, opaque but for transparent
+/// The colour of a vertex of a smooth mesh, darkened by its occlusion and in its light, if it has any: linear light, opaque but for transparent
 /// surfaces; sRGB.
 [[nodiscard]] LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex);
 [[nodiscard]] std::array<std::uint8_t, 3> srgb_colour(const MeshView& view, std::size_t vertex);

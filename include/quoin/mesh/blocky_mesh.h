@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <quoin/core/direction.h>
@@ -12,6 +13,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
+#include <quoin/mesh/quad.h>
 
 namespace quoin {
 
@@ -46,6 +48,8 @@ struct BlockyMeshOptions {
   bool merge = true;           ///< as QuadOptions::merge
   bool bake_occlusion = true;  ///< as QuadOptions::bake_occlusion
   bool watertight = false;     ///< subdivide outlines so that no vertex lies inside another triangle's edge
+  /// Cuts the quads of a chunk further before they become triangles, if given. From several threads at once.
+  std::function<void(IVec3 chunk, QuadBuffer& quads)> cut{};
 };
 
 /// Meshes a whole grid, chunk by chunk.

@@ -19,6 +19,7 @@ namespace quoin {
 ///
 /// Blocks: `directions` and `types`, whose properties say how it looks; `block_occlusion`, or `atlas`, or none.
 /// Smooth: `normals` and `albedo`; `occlusion`, or none.
+/// Both: `light`, or none.
 ///
 /// Lifetime: owns nothing; the arrays must outlive it, unchanged.
 struct MeshView {
@@ -32,6 +33,9 @@ struct MeshView {
   /// Of opaque blocks whose colours and occlusion are in a texture (SceneMeshes::atlas): texture coordinates from its
   /// upper left corner.
   std::span<const std::array<float, 2>> atlas;
+
+  /// What light arrives at a vertex, linear: its colour is to be multiplied with it and shown as it is. Of either kind.
+  std::span<const LinearRgba16> light;
 
   std::span<const Vec3> normals;         ///< unit
   std::span<const LinearRgba16> albedo;  ///< without occlusion

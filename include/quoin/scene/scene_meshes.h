@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -121,6 +122,8 @@ struct BlockySceneOptions {
   /// then merge across their occlusion, which leaves about a third fewer triangles. A linear filter shades each voxel's
   /// face between its four corners as a saddle, where two triangles have an edge.
   bool atlas = false;
+  /// As BlockyMeshOptions::cut, of each grid; instead of that of `mesh`.
+  std::function<void(GridHandle grid, IVec3 chunk, QuadBuffer& quads)> cut{};
 };
 
 /// Meshes every grid that a drawn instance places, once, as build_blocky_mesh does. Parts are in the order of the
@@ -129,7 +132,7 @@ struct BlockySceneOptions {
 ///
 /// Order:  the same bytes at any thread count.
 /// Errors: those of build_blocky_mesh; InvalidArgument when a drawn instance's transform is not finite or its voxel
-///         size not positive, and for an atlas of faces that are not merged, are watertight or have no occlusion;
+///         size not positive, and for an atlas of faces that are not merged, cut, watertight or without occlusion;
 ///         LimitExceeded when an atlas of 16,384 texels a side does not hold them, or
 ///         voxels of it lie beyond 2^24; Cancelled when `progress` says so.
 [[nodiscard]] Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& options = {},

@@ -97,8 +97,22 @@ void write_smooth_colours(const MaterialPalette& palette, const MeshView& view, 
   }
 }
 
+/// Of blocks: their light, darkened by their occlusion.
+void write_light(const MeshView& view, BlockWriter& out) {
+  for (std::size_t i = 0; i < view.positions.size(); ++i) {
+    LinearRgba16 light = view.light[i];
+    const float open = openness_at(view, i);
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      light[channel] = static_cast<std::uint16_t>(std::lround(static_cast<float>(light[channel]) * open));
+    }
+    light[3] = 65'535;
+    out.put(light);
+  }
+}
+
 void write_colours(const MaterialPalette& palette, const MeshView& view, BlockWriter& out) {
   if (view.has_albedo()) return write_smooth_colours(palette, view, out);
+  if (!view.light.empty()) return write_light(view, out);
   std::array<std::array<std::uint8_t, 4>, 4> greys;
   for (std::size_t i = 0; i < greys.size(); ++i) {
     const std::uint8_t grey = occlusion_grey(static_cast<std::uint8_t>(i));

@@ -26,6 +26,7 @@ constexpr const char* kCompression = "EXT_meshopt_compression";
 constexpr const char* kQuantization = "KHR_mesh_quantization";
 constexpr const char* kIor = "KHR_materials_ior";
 constexpr const char* kTransmission = "KHR_materials_transmission";
+constexpr const char* kUnlit = "KHR_materials_unlit";
 constexpr const char* kVolume = "KHR_materials_volume";
 
 Json json_from(const Vec3& v) {
@@ -170,9 +171,22 @@ void add_glass(const SurfaceMaterial& material, const VoxelProperties& propertie
   if (const auto ior = glass_ior(properties)) extensions[kIor] = {{"ior", *ior}};
 }
 
+/// A material whose colours are shown as they are; what others know of light is left out.
+Json unlit_json(const std::string& name, bool transparent, std::optional<std::size_t> texture) {
+  Json entry = {{"name", name}, {"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}}};
+  if (texture) entry["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", *texture}};
+  if (transparent) entry["alphaMode"] = "BLEND";
+  entry["extensions"][kUnlit] = Json::object();
+  return entry;
+}
+
 Json materials_json(const GltfLayout& layout) {
   Json materials = Json::array();
   for (const SurfaceMaterial& material : layout.palette.materials()) {
+    if (layout.is_unlit) {
+      materials.push_back(unlit_json(material.name, material.is_transparent(), layout.texture(GltfImageKind::Palette)));
+      continue;
+    }
     Json entry = {{"name", material.name}};
     const auto atlas = material.surface == SurfaceClass::Opaque ? layout.texture(GltfImageKind::Atlas) : std::nullopt;
     Json roughness = {{"index", *layout.texture(GltfImageKind::MetallicRoughness)}};
@@ -188,8 +202,12 @@ Json materials_json(const GltfLayout& layout) {
   }
   for (const bool transparent : {false, true}) {
     if (!layout.palette.has_smooth(transparent)) continue;
-    Json entry = {{"name", transparent ? "smooth transparent" : "smooth"},
-                  {"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}}};
+    const char* const name = transparent ? "smooth transparent" : "smooth";
+    if (layout.is_unlit) {
+      materials.push_back(unlit_json(name, transparent, std::nullopt));
+      continue;
+    }
+    Json entry = {{"name", name}, {"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}}};
     if (transparent) entry["alphaMode"] = "BLEND";
     materials.push_back(std::move(entry));
   }
@@ -287,12 +305,13 @@ void add_meshes(const GltfLayout& layout, std::string_view buffer_uri, Json& doc
 void add_extensions(const GltfLayout& layout, Json& document) {
   const MaterialPalette& palette = layout.palette;
   Json used = Json::array();
-  if (palette.has_emission()) used.push_back(kEmissiveStrength);
+  if (layout.is_unlit) used.push_back(kUnlit);
+  if (!layout.is_unlit && palette.has_emission()) used.push_back(kEmissiveStrength);
   bool has_ior = false;
   bool has_glass = false;
   for (const SurfaceMaterial& material : palette.materials()) {
-    has_glass |= material.is_transparent();
-    has_ior |= material.is_transparent() && glass_ior(palette.types()[material.type]).has_value();
+    has_glass |= !layout.is_unlit && material.is_transparent();
+    has_ior |= !layout.is_unlit && material.is_transparent() && glass_ior(palette.types()[material.type]).has_value();
   }
   if (has_glass) used.insert(used.end(), {kTransmission, kVolume});
   if (has_ior) used.push_back(kIor);

@@ -123,8 +123,10 @@ class ArrayPlan {
     if (!is_smooth)
       add(GltfArrayKind::PaletteCoordinate, is_short ? GltfComponent::UnsignedShort : GltfComponent::Float, 2,
           vertices);
-    if (is_smooth || (!is_apart && !view_.block_occlusion.empty()))
-      add(GltfArrayKind::Colour, is_smooth ? GltfComponent::UnsignedShort : GltfComponent::UnsignedByte, 4, vertices);
+    const bool is_wide_colour = is_smooth || !view_.light.empty();
+    if (is_wide_colour || (!is_apart && !view_.block_occlusion.empty()))
+      add(GltfArrayKind::Colour, is_wide_colour ? GltfComponent::UnsignedShort : GltfComponent::UnsignedByte, 4,
+          vertices);
     const bool has_occlusion = !view_.block_occlusion.empty() || !view_.occlusion.empty();
     if (is_apart && has_occlusion) add(GltfArrayKind::Occlusion, GltfComponent::Float, 1, vertices);
     const bool is_wide = needs_wide_indices(vertices);
@@ -228,8 +230,11 @@ Status add_images(const Image& atlas, GltfLayout& layout) {
   if (!has_atlas || !std::ranges::all_of(materials, is_opaque)) {
     images.emplace_back(GltfImageKind::Palette, "palette", palette.base_colour());
   }
-  images.emplace_back(GltfImageKind::MetallicRoughness, "palette metallic-roughness", palette.metallic_roughness());
-  if (palette.has_emission()) images.emplace_back(GltfImageKind::Emissive, "palette emissive", palette.emissive());
+  if (!layout.is_unlit) {
+    images.emplace_back(GltfImageKind::MetallicRoughness, "palette metallic-roughness", palette.metallic_roughness());
+  }
+  if (!layout.is_unlit && palette.has_emission())
+    images.emplace_back(GltfImageKind::Emissive, "palette emissive", palette.emissive());
   if (has_atlas) images.emplace_back(GltfImageKind::Atlas, "atlas", png_of(atlas));
   for (auto& [kind, name, image] : images) {
     auto png = encode_png(image);
@@ -452,6 +457,7 @@ Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, const MeshFileOptions
   }
   QUOIN_ASSERT(check_meshes(meshes).has_value(), "sound meshes");
   GltfLayout layout{.palette = MaterialPalette(meshes), .nodes = {}, .meshes = {}, .images = {}, .surfaces = {}};
+  layout.is_unlit = has_light(meshes);
   for (const MeshPart& part : meshes.parts) layout.surfaces.emplace_back(part, layout.palette);
   for (const MeshPlacement& placement : meshes.placements) {
     const auto transform = [](const auto& place) { return transform_of(place); };

@@ -133,6 +133,8 @@ struct GltfLayout {
   std::uint64_t buffer_bytes = 0;
   std::uint64_t decoded_bytes = 0;  ///< of a compressed file, of the buffer that its arrays are decoded into; else 0
 
+  bool is_unlit = false;  ///< colours of vertices have all light in them
+
   [[nodiscard]] bool is_compressed() const { return decoded_bytes > 0; }
   /// The number of the texture; nothing when the file has none of that kind.
   [[nodiscard]] std::optional<std::size_t> texture(GltfImageKind kind) const;

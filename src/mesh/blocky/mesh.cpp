@@ -70,6 +70,7 @@ std::vector<QuadBuffer> quads_of(const Grid& grid, const std::vector<IVec3>& chu
     quad_options.bake_occlusion = options.bake_occlusion;
     for (std::size_t i = task; i < chunks.size() && !reporter.cancelled(); i += tasks) {
       mesher.mesh(grid.neighbourhood(chunks[i]), types, quad_options, parts[i]);
+      if (options.cut) options.cut(chunks[i], parts[i]);
       reporter.step();
     }
   });

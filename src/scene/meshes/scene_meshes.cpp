@@ -44,8 +44,10 @@ class SharedProgress {
   bool going_ = true;
 };
 
-Result<BlockyMesh> mesh_grid(const Scene& scene, GridHandle handle, const BlockyMeshOptions& options, Threads threads,
+Result<BlockyMesh> mesh_grid(const Scene& scene, GridHandle handle, const BlockySceneOptions& of_scene, Threads threads,
                              SharedProgress& progress) {
+  BlockyMeshOptions options = of_scene.mesh;
+  if (of_scene.cut) options.cut = [&](IVec3 chunk, QuadBuffer& quads) { of_scene.cut(handle, chunk, quads); };
   const Grid& grid = scene.grids()[handle].grid;
   const auto chunks = static_cast<double>(grid.chunk_count());
   double told = 0;
@@ -60,7 +62,7 @@ Result<BlockyMesh> mesh_grid(const Scene& scene, GridHandle handle, const Blocky
 
 using MeshResults = std::vector<std::optional<Result<BlockyMesh>>>;
 
-MeshResults mesh_all(const Scene& scene, const std::vector<GridHandle>& grids, const BlockyMeshOptions& options,
+MeshResults mesh_all(const Scene& scene, const std::vector<GridHandle>& grids, const BlockySceneOptions& options,
                      Threads threads, const Progress& listener) {
   std::size_t chunks = 0;
   std::vector<std::size_t> small;
@@ -96,10 +98,11 @@ BlockyTriangles& opaque_of(BlockyMesh& mesh) {
   return mesh.surfaces[static_cast<std::size_t>(SurfaceClass::Opaque)];
 }
 
-Status check_atlas(const Scene& scene, const std::vector<GridHandle>& grids, const BlockyMeshOptions& options) {
-  if (!options.merge || !options.bake_occlusion || options.watertight) {
+Status check_atlas(const Scene& scene, const std::vector<GridHandle>& grids, const BlockySceneOptions& options) {
+  const BlockyMeshOptions& mesh = options.mesh;
+  if (!mesh.merge || !mesh.bake_occlusion || mesh.watertight || mesh.cut || options.cut) {
     return make_error(ErrorCode::InvalidArgument,
-                      "an atlas is of faces that are merged, not watertight, and have occlusion");
+                      "an atlas is of faces that are merged, not cut or watertight, and have occlusion");
   }
   constexpr int kFarthest = 1 << 24;  // beyond it floats do not tell voxels apart
   for (const GridHandle handle : grids) {
@@ -116,7 +119,7 @@ Status check_atlas(const Scene& scene, const std::vector<GridHandle>& grids, con
 Result<std::vector<Coordinates>> move_into_atlas(const Scene& scene, const std::vector<GridHandle>& grids,
                                                  MeshResults& results, Threads threads, const Progress& progress,
                                                  SceneMeshes& meshes) {
-  MeshResults merged = mesh_all(scene, grids, {.bake_occlusion = false}, threads, progress);
+  MeshResults merged = mesh_all(scene, grids, {.mesh = {.bake_occlusion = false}}, threads, progress);
   OcclusionAtlas atlas;
   for (std::size_t i = 0; i < grids.size(); ++i) {
     if (!merged[i] || !*merged[i])
@@ -215,10 +218,10 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
   if (auto sound = check_instances(scene, options.instances); !sound) return sound.error();
   const std::vector<GridHandle> grids = drawn_grids(scene, options.instances);
   if (options.atlas) {
-    if (auto sound = check_atlas(scene, grids, options.mesh); !sound) return sound.error();
+    if (auto sound = check_atlas(scene, grids, options); !sound) return sound.error();
   }
   const double first_share = options.atlas ? 0.5 : 1.0;
-  MeshResults results = mesh_all(scene, grids, options.mesh, threads, part_of(progress, 0.0, first_share));
+  MeshResults results = mesh_all(scene, grids, options, threads, part_of(progress, 0.0, first_share));
   for (const auto& result : results) {
     if (result && !*result) return result->error();
   }
