@@ -101,6 +101,15 @@ function look(view, zoom = 1, unit = 0) {
   renderer.render(scene, camera);
 }
 
+/** In the scene, in metres; `fov` is vertical, in degrees. */
+function stand(from, to, fov) {
+  camera = new THREE.PerspectiveCamera(fov, window.innerWidth / window.innerHeight, 0.1, 1e4);
+  camera.position.set(...from);
+  camera.lookAt(...to);
+  camera.updateMatrixWorld(true);
+  renderer.render(scene, camera);
+}
+
 const linear = (byte) => (byte / 255 <= 0.04045 ? byte / 255 / 12.92 : ((byte / 255 + 0.055) / 1.055) ** 2.4);
 const encoded = (value) => Math.round(255 * (value <= 0.0031308 ? value * 12.92 : 1.055 * value ** (1 / 2.4) - 0.055));
 
@@ -161,4 +170,4 @@ function checkPixels(count, seed) {
   return result;
 }
 
-window.viewer = { load, compareWith, unlit, look, checkPixels };
+window.viewer = { load, compareWith, unlit, look, stand, checkPixels };

@@ -5,6 +5,7 @@
 
 #include <quoin/io/mesh_file.h>
 #include <quoin/io/vox.h>
+#include <quoin/light/lit_meshes.h>
 
 #include "field_occlusion.h"
 #include "interrupt.h"
@@ -28,9 +29,13 @@ Status convert_blockily(const Scene& scene, const SceneAnimation& animation, con
   ProgressBar bar(!options.is_one_of_many);
   outcome.mesher = options.mesher;
   const InstanceFilter filter = options.common.instances();
-  const BlockyMeshOptions mesh{outcome.mesher == "greedy", !options.occlusion_off, options.watertight};
-  auto meshes =
-      mesh_scene(scene, {mesh, filter, options.texture == "atlas"}, options.common.threads, bar.listener("meshing"));
+  BlockySceneOptions wanted;
+  wanted.mesh = {outcome.mesher == "greedy", !options.occlusion_off, options.watertight};
+  wanted.instances = filter;
+  wanted.atlas = options.texture == "atlas";
+  const Progress progress = bar.listener("meshing");
+  auto meshes = options.light ? mesh_lit_scene(scene, *options.light, wanted, options.common.threads, progress)
+                              : mesh_scene(scene, wanted, options.common.threads, progress);
   if (!meshes) return meshes.error();
   if (options.animate) animation.animate(*meshes, options.frames_per_second);
   outcome.faces = {meshes->stats.faces_visible, meshes->stats.faces_total};
@@ -133,6 +138,7 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   if (format.is_mesh) {
     ConvertOptions settled = options;
     settled.mesher = mesher_for(loaded->scene, options);
+    if (settled.light && loaded->sun) settled.light->sun = *loaded->sun;
     fault = settled.mesher == "smooth" ? "" : fault_of_blocks(settled);
     if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault, options.common.input.string());
     if (auto done = convert_to_meshes(*loaded, settled, watch, outcome); !done) return done.error();
@@ -185,11 +191,20 @@ std::string fault_of_atlas(const ConvertOptions& options) {
   return options.watertight ? what + "not with --watertight" : "";
 }
 
+/// What contradicts light at vertices; empty when nothing does.
+std::string fault_of_light(const ConvertOptions& options) {
+  if (!options.light) return "";
+  const std::string what = "--light propagated is at the corners of faces: ";
+  if (options.texture == "atlas") return what + "not with --texture atlas";
+  return options.watertight && options.mesher != "smooth" ? what + "not with --watertight" : "";
+}
+
 /// What contradicts the kind of input; empty when nothing does.
 std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
   if (is_volume && !options.mesher.empty() && options.mesher != "smooth") {
     return "--mesher " + options.mesher + " is for voxels, and the input is a volume of values; smooth meshes it";
   }
+  if (is_volume && options.light) return "--light is for voxels and fields, and the input is a volume of values";
   if (is_volume && options.texture == "atlas")
     return "--texture atlas is for voxels, and the input is a volume of values";
   if (is_volume && options.animate) return "--animate is for .vox files, and the input is a volume of values";
@@ -332,6 +347,12 @@ void add_meshing_options(CLI::App& command, ConvertOptions& options) {
                   "Where colours of blocks are: in a palette, with occlusion a vertex (default), or in an atlas, with "
                   "occlusion in it, which leaves about a third fewer triangles (.glb, .gltf, .obj)")
       ->check(CLI::IsMember({"palette", "atlas"}));
+  command
+      .add_option("--light",
+                  "Light in the colours of vertices, for materials that clients show as they are: none (default), or "
+                  "propagated, as quoin render --light propagated (.glb, .gltf)")
+      ->type_name("TEXT")
+      ->check(CLI::IsMember({"none", "propagated"}));
   command.add_option("--simplify", options.simplify, "Error in voxels allowed when simplifying (smooth only)")
       ->check(not_negative());
 }
@@ -432,7 +453,7 @@ Json outcome_json(const Outcome& outcome) {
 std::string fault_of_format(const ConvertOptions& options, const FormatInfo& format) {
   if (!format.is_mesh && options.mesh_only) {
     return "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --simplify, "
-           "--scale, --up, --texture, --animate, --compress and --quantize are for mesh formats; " +
+           "--scale, --up, --texture, --light, --animate, --compress and --quantize are for mesh formats; " +
            (options.output.empty() ? std::string(format.extension) : options.output.string()) + " is none";
   }
   if (options.occlusion_apart && format.format == FileFormat::Obj) {
@@ -442,6 +463,9 @@ std::string fault_of_format(const ConvertOptions& options, const FormatInfo& for
     return "--texture atlas: .ply has no textures; .glb, .gltf and .obj have";
   }
   const bool is_gltf = format.format == FileFormat::Glb || format.format == FileFormat::Gltf;
+  if (options.light && !is_gltf) {
+    return "--light: " + std::string(format.extension) + " has no materials without light; .glb and .gltf have";
+  }
   if (options.animate && !is_gltf) {
     return "--animate: " + std::string(format.extension) + " has no animation; .glb and .gltf have";
   }
@@ -538,14 +562,18 @@ std::string read_options(const CLI::App& command, const VolumeTexts& texts,
   std::size_t given = 0;
   for (const char* name :
        {"--mesher", "--no-ao", "--ao-attribute", "--watertight", "--smoothness", "--colours", "--no-unite",
-        "--simplify", "--scale", "--up", "--texture", "--compress", "--quantize", "--animate", "--fps"}) {
+        "--simplify", "--scale", "--up", "--texture", "--light", "--compress", "--quantize", "--animate", "--fps"}) {
     given += command.count(name);
   }
   options.has_field_occlusion = given_field_occlusion(command) != nullptr;
   options.mesh_only = given > 0 || options.has_field_occlusion;
   std::string fault = read_texts(command, texts, options);
   if (fault.empty()) fault = read_occlusion(command, options);
+  if (command.count("--light") > 0 && command.get_option("--light")->as<std::string>() == "propagated") {
+    options.light = natural_light();
+  }
   if (fault.empty()) fault = fault_of_atlas(options);
+  if (fault.empty()) fault = fault_of_light(options);
   if (fault.empty() && command.count("--fps") > 0 && !options.animate) fault = "--fps needs --animate";
   if (fault.empty() && options.animate && options.common.takes_frame)
     fault = "--frame and --animate exclude each other";

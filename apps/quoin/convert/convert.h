@@ -9,6 +9,7 @@
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/volume.h>
+#include <quoin/light/light_options.h>
 #include <quoin/scene/scene_animation.h>
 #include <quoin/scene/scene_faces.h>
 #include <quoin/scene/scene_meshes.h>
@@ -40,10 +41,11 @@ struct ConvertOptions {
   std::optional<double> simplify;
   std::optional<double> smoothness;  ///< of smooth surfaces around voxels
   std::optional<std::string> colours;
-  std::string texture = "palette";  ///< or "atlas"
-  bool animate = false;             ///< all frames, as an animation of glTF
-  double frames_per_second = 10.0;  ///< of `animate`
-  bool apart = false;               ///< instances are not united
+  std::string texture = "palette";    ///< or "atlas"
+  std::optional<LightOptions> light;  ///< propagated, at vertices
+  bool animate = false;               ///< all frames, as an animation of glTF
+  double frames_per_second = 10.0;    ///< of `animate`
+  bool apart = false;                 ///< instances are not united
   std::optional<double> scale;
   std::string up;          ///< "y", "z"; empty: z for .ply, else y
   bool compress = false;   ///< of glTF, as MeshFileOptions has it

@@ -4,6 +4,8 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
+#include <quoin/light/lit_meshes.h>
+
 #include "convert/convert.h"
 #include "interrupt.h"
 #include "progress_bar.h"
@@ -78,6 +80,9 @@ Status convert_smoothly(const Scene& scene, const SceneAnimation& animation, con
   const InstanceFilter filter = options.common.instances();
   auto meshes = mesh_scene_smoothly(scene, scene_options(options), options.common.threads, bar.listener("meshing"));
   if (!meshes) return meshes.error();
+  if (options.light) {
+    if (Status lit = light_meshes(scene, *options.light, *meshes, options.common.threads); !lit) return lit;
+  }
   if (options.animate) animation.animate(*meshes, options.frames_per_second);
   outcome.mesher = "smooth";
   outcome.faces = count_faces(scene, filter, options.common.threads);

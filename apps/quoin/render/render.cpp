@@ -267,6 +267,10 @@ Result<Outcome> render(const RenderArguments& arguments) {
   Status drawn = is_slice ? draw_slice(scene, arguments, watch, outcome) : draw(*loaded, arguments, watch, outcome);
   if (!drawn) return drawn.error();
   warn_of_left_out(scene, filter, outcome.warnings);
+  if (arguments.render.light.model == LightModel::Propagated && !scene.lamps.empty()) {
+    outcome.warnings.push_back("--light propagated is of voxels: lamps left out: " +
+                               std::to_string(scene.lamps.size()));
+  }
   if (!is_slice) warn_of_empty_pictures(scene, filter, outcome.picture, outcome.warnings);
   return outcome;
 }

@@ -86,6 +86,14 @@ void add_camera_options(CLI::App& command, RenderArguments& arguments) {
 }
 
 void add_light_options(CLI::App& command, RenderArguments& arguments) {
+  command
+      .add_option(
+          "--light", arguments.light_model,
+          "Light by rays; or propagated: levels that spread from the sky and from glowing voxels, as games have "
+          "them, without shadows of the sun (default rays)")
+      ->check(CLI::IsMember({"rays", "propagated"}));
+  add_text_option(command, "--least-light", "X",
+                  "Of --light propagated: what shines everywhere; with 0 closed rooms are black (default 0)");
   add_text_option(
       command, "--sun", "X,Y,Z|off",
       "Direction towards the sun (default -0.48,0.72,0.5); the sky follows it, to dusk and night where y is "
@@ -275,6 +283,19 @@ std::string fault_of_light(const CLI::App& command, const RenderArguments& argum
   return "";
 }
 
+std::string fault_of_light_model(const CLI::App& command, const RenderArguments& arguments) {
+  const bool is_propagated = arguments.light_model == "propagated";
+  if (command.count("--least-light") > 0 && !is_propagated) return "--least-light needs --light propagated";
+  if (!is_propagated) return "";
+  if (arguments.preset != "full" && arguments.preset != "no-ao") {
+    return "--light propagated: the preset " + arguments.preset + " does not have it";
+  }
+  for (const char* option : {"--lamps", "--ao-affects", "--shadow-distance"}) {
+    if (command.count(option) > 0) return std::string(option) + ": --light propagated has none to choose";
+  }
+  return "";
+}
+
 /// A slice has no camera, no light and no rays.
 std::string fault_of_slice(const CLI::App& command, const RenderArguments& arguments) {
   if (arguments.preset != "density") {
@@ -286,7 +307,8 @@ std::string fault_of_slice(const CLI::App& command, const RenderArguments& argum
         "--ao-affects",     "--ao-distance",     "--ao-form",         "--ao-spread", "--ao-offset",
         "--ao-power",       "--shadow-distance", "--exposure",        "--samples",   "--depth",
         "--detail",         "--lod-colours",     "--backend",         "--device",    "--fixed-sky",
-        "--azimuth",        "--elevation",       "--turntable",       "--frames",    "--plain-glass"}) {
+        "--azimuth",        "--elevation",       "--turntable",       "--frames",    "--plain-glass",
+        "--light",          "--least-light"}) {
     if (command.count(option) > 0) return std::string(option) + ": the preset density is a flat slice (--slice)";
   }
   return "";
@@ -330,6 +352,7 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
                                         "three numbers that are not all 0, as in 1,2,-0.5, or off", light.sun),
       read_option(command, "--sky-brightness", read_not_negative, at_least_0, light.sky_brightness),
       read_option(command, "--lamp-brightness", read_not_negative, at_least_0, light.lamp_brightness),
+      read_option(command, "--least-light", read_not_negative, at_least_0, light.least_light),
       read_option(command, "--ao-distance", read_not_negative, at_least_0, light.occlusion_distance_voxels),
       read_option(command, "--shadow-distance", read_not_negative, at_least_0, light.shadow_distance_voxels),
       read_option(command, "--exposure", read_not_negative, at_least_0, light.exposure),
@@ -382,7 +405,7 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
   for (const std::string& fault :
        {read_texts(command, arguments), fault_of_files(arguments), fault_of_films(command),
         fault_of_camera(command, arguments), fault_of_slice(command, arguments), fault_of_light(command, arguments),
-        fault_of_backend(command, arguments), fault_of_watching(arguments)}) {
+        fault_of_light_model(command, arguments), fault_of_backend(command, arguments), fault_of_watching(arguments)}) {
     if (!fault.empty()) return fault;
   }
   if (command.count("--detail") == 0 && arguments.render.detail.colours) arguments.detail = "pixels";
@@ -398,6 +421,7 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
   arguments.has_sun = command.count("--sun") > 0;
   LightOptions& light = arguments.render.light;
   if (is_sun_off(command)) light.sun_brightness = 0.0;
+  if (arguments.light_model == "propagated") light.model = LightModel::Propagated;
   if (arguments.has_fixed_sky) light.sky_follows_sun = false;
   if (arguments.has_plain_glass) light.glass_surfaces = false;
   if (arguments.occlusion == "vertex") light.occlusion_mode = OcclusionMode::Vertex;

@@ -40,6 +40,7 @@ struct RenderArguments {
   bool has_fixed_sky = false;
   bool has_plain_glass = false;
   bool watch = false;  ///< draws again whenever the input changes
+  std::string light_model = "rays";
   std::string preset = "full";
   std::string occlusion = "rays";
   std::string occlusion_affects = "ambient";
