@@ -169,11 +169,26 @@ TEST_F(ToolRender, EveryOptionChangesThePicture) {
   const std::string base = "many.vox -o out.png --size 64x48";
   drawn(base);
   const std::string plain = bytes("out.png");
-  for (const std::string flags : {"--view front", "--view top", "--sun=-1,1,0", "--preset no-shadows", "--preset no-ao",
-                                  "--preset unlit", "--preset ao", "--preset unlit --ao vertex", "--ao-distance 0.4",
-                                  "--shadow-distance 0.4", "--ao vertex", "--ao-rays 6", "--ao-affects all",
-                                  "--exposure 0.5", "--samples 1", "--sun 1,-0.1,0", "--sun 1,-0.1,0 --fixed-sky",
-                                  "--camera 30,30,30 --look-at 0,0,0", "--camera 30,30,30 --look-at 0,0,0 --fov 20"}) {
+  for (const std::string flags : {"--view front",
+                                  "--view top",
+                                  "--sun=-1,1,0",
+                                  "--preset no-shadows",
+                                  "--preset no-ao",
+                                  "--preset unlit",
+                                  "--preset ao",
+                                  "--preset unlit --ao vertex",
+                                  "--ao-distance 0.4",
+                                  "--shadow-distance 0.4",
+                                  "--ao vertex",
+                                  "--ao-rays 6",
+                                  "--ao-affects all",
+                                  "--exposure 0.5",
+                                  "--samples 1",
+                                  "--light propagated",
+                                  "--sun 1,-0.1,0",
+                                  "--sun 1,-0.1,0 --fixed-sky",
+                                  "--camera 30,30,30 --look-at 0,0,0",
+                                  "--camera 30,30,30 --look-at 0,0,0 --fov 20"}) {
     drawn(base + " " + flags);
     EXPECT_NE(bytes("out.png"), plain) << flags;
   }
@@ -183,9 +198,19 @@ TEST_F(ToolRender, EveryOptionChangesThePicture) {
     drawn(base + " --preset unlit " + flags);
     EXPECT_NE(bytes("out.png"), unlit) << flags;
   }
+  const std::string propagated = base + " --light propagated";
+  drawn(propagated);
+  const std::string levels = bytes("out.png");
+  for (const std::string flags : {"--ao vertex", "--preset no-ao", "--least-light 0.3", "--sun 1,-0.1,0",
+                                  "--sky-brightness 2", "--exposure 0.5"}) {
+    drawn(propagated + " " + flags);
+    EXPECT_NE(bytes("out.png"), levels) << flags;
+  }
+  drawn(propagated + " --least-light 0 --preset full");
+  EXPECT_EQ(bytes("out.png"), levels) << "these are the defaults";
   drawn(base +
         " --preset full --ao rays --ao-rays 9 --ao-distance 6 --ao-affects ambient --exposure 1 --samples 4 --view iso "
-        "--sun=-0.48,0.72,0.5 --lamps 64");
+        "--sun=-0.48,0.72,0.5 --lamps 64 --light rays");
   EXPECT_EQ(bytes("out.png"), plain) << "these are the defaults";
 }
 
@@ -304,6 +329,14 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
       {out + "--ao smooth --ao-power 3", "--ao-power needs --ao-form weighted"},
       {out + "--ao smooth --backend vulkan", "--ao smooth: the backend vulkan has none"},
       {out + "--preset no-ao --ao-spread 1", "--ao-spread: the preset no-ao has no ambient occlusion"},
+      {out + "--light baked", "--light: "},
+      {out + "--least-light 0.1", "--least-light needs --light propagated"},
+      {out + "--light propagated --least-light -1", "--least-light: must be a number of at least 0"},
+      {out + "--light propagated --preset unlit", "--light propagated: the preset unlit does not have it"},
+      {out + "--light propagated --preset no-shadows", "--light propagated: the preset no-shadows does not have it"},
+      {out + "--light propagated --lamps 3", "--lamps: --light propagated has none to choose"},
+      {out + "--light propagated --shadow-distance 3", "--shadow-distance: --light propagated has none to choose"},
+      {out + "--preset density --light rays", "--light: the preset density is a flat slice"},
       {out + "--slice y:0.5", "--slice needs --preset density"},
       {out + "--preset density --slice y:2", "--slice: must be x, y or z, and a place from 0 to 1"},
       {out + "--preset density --slice w:0.5", "--slice: must be"},
@@ -407,6 +440,10 @@ TEST_F(VulkanTool, ADeviceDrawsTheSamePicture) {
     return count;
   };
   EXPECT_LE(different("device.png", "cpu.png"), 160 * 120 * 3 / 1000);
+  static_cast<void>(drawn("tiny.vox -o levels.png --size 160x120 --light propagated"));
+  static_cast<void>(drawn("tiny.vox -o device_levels.png --size 160x120 --light propagated --backend vulkan"));
+  EXPECT_LE(different("device_levels.png", "levels.png"), 160 * 120 * 3 / 1000);
+  EXPECT_GT(different("device_levels.png", "device.png"), 100);
   static_cast<void>(drawn("tiny.vox -o detail.png --size 160x120 --lod-colours --detail pixels"));
   static_cast<void>(drawn("tiny.vox -o far.png --size 160x120 --lod-colours --detail pixels --backend vulkan"));
   EXPECT_LE(different("far.png", "detail.png"), 160 * 120 * 3 / 1000);

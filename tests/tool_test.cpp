@@ -135,6 +135,34 @@ TEST_F(Tool, AnAtlasTakesFewerTriangles) {
   }
 }
 
+// A box with a hole in its lid: what is light in it is written at vertices, and faces are cut where it changes.
+TEST_F(Tool, LightIsWrittenAtVertices) {
+  std::string voxels;
+  for (int i = 0; i < 20 * 20 * 6; ++i) {
+    const int x = i % 20, y = i / 20 % 20, z = i / 400;
+    const bool is_wall = x == 0 || x == 19 || y == 0 || y == 19 || z == 0 || z == 5;
+    const bool is_hole = z == 5 && x >= 3 && x < 6 && y >= 3 && y < 6;
+    if (!is_wall || is_hole) continue;
+    for (const int byte : {x, y, z, 1}) voxels += static_cast<char>(byte);
+  }
+  std::ofstream(folder_.file("box.vox"), std::ios::binary) << vox_file({20, 20, 6}, voxels);
+  const Json plain = Json::parse(run("convert box.vox plain.glb --json --light none").out);
+  const Json lit = Json::parse(run("convert box.vox lit.glb --light propagated --json").out);
+  EXPECT_EQ(lit["faces_visible"], plain["faces_visible"]);
+  EXPECT_GT(lit["quads"].get<int>(), plain["quads"].get<int>());
+  EXPECT_NE(text_of(folder_.file("lit.glb")).find("KHR_materials_unlit"), std::string::npos);
+  EXPECT_EQ(text_of(folder_.file("plain.glb")).find("KHR_materials_unlit"), std::string::npos);
+  EXPECT_EQ(run("convert box.vox smooth.gltf --light propagated --mesher smooth").status, 0);
+  EXPECT_NE(text_of(folder_.file("smooth.gltf")).find("KHR_materials_unlit"), std::string::npos);
+  for (const std::string arguments : {"out.ply --light propagated", "out.obj --light propagated",
+                                      "out.vox --light propagated", "out.glb --light propagated --watertight",
+                                      "out.glb --light propagated --texture atlas", "out.glb --light rays"}) {
+    const ToolRun refused = run("convert box.vox " + arguments);
+    EXPECT_EQ(refused.status, 2) << arguments;
+    expect_one_error_line(refused);
+  }
+}
+
 TEST_F(Tool, FramesBecomeAnAnimation) {
   vox_test::FileBuilder file;
   file.model(1, 1, 1, {{0, 0, 0, 1}}).model(1, 1, 2, {{0, 0, 0, 2}, {0, 0, 1, 2}});

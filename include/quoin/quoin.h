@@ -41,8 +41,12 @@
 #include <quoin/io/scene_file.h>
 #include <quoin/io/volume.h>
 #include <quoin/io/vox.h>
+#include <quoin/light/light_colour.h>
 #include <quoin/light/light_options.h>
+#include <quoin/light/lit_meshes.h>
 #include <quoin/light/propagated_light.h>
+#include <quoin/light/scene_light.h>
+#include <quoin/light/surface_light.h>
 #include <quoin/live/live_meshes.h>
 #include <quoin/mesh/array_surface.h>
 #include <quoin/mesh/blocky.h>

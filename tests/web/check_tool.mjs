@@ -1,6 +1,7 @@
 // Converts every .vox file below a folder with the tool and checks the results:
-// node check_tool.mjs TOOL FOLDER [--pixels N] [--occluded] [--smooth] [--packed]
+// node check_tool.mjs TOOL FOLDER [--pixels N] [--occluded] [--smooth] [--packed] [--lit]
 //
+// With --lit they have propagated light at their vertices, and pixels are compared with the file alone.
 // With --packed they are quantized and compressed. With --smooth they become smooth meshes, and volumes below the folder too.
 // Every GLB must pass the validator without a message, and N of them (default 4, spread over the list) the pixel check
 // against their voxels. Files that the tool refuses are listed, and count only when it did not refuse them properly (status 1, one
@@ -15,7 +16,7 @@ import { parseArgs } from 'node:util';
 const here = fileURLToPath(new URL('.', import.meta.url));
 const { values, positionals } = parseArgs({ allowPositionals: true, options: {
   pixels: { type: 'string', default: '4' }, occluded: { type: 'boolean', default: false }, smooth: { type: 'boolean', default: false },
-  packed: { type: 'boolean', default: false },
+  packed: { type: 'boolean', default: false }, lit: { type: 'boolean', default: false },
 } });
 const [tool, folder] = positionals;
 if (!existsSync(tool ?? '') || !existsSync(folder ?? '')) {
@@ -31,7 +32,8 @@ function convertAll(sources) {
   const [written, faults] = [[], []];
   for (const source of sources) {
     const glb = join(work, `${basename(source).replace(endings, '')}.glb`);
-    const flags = [...(values.smooth ? ['--mesher', 'smooth'] : []), ...(values.packed ? ['--quantize', '--compress'] : [])];
+    const flags = [...(values.smooth ? ['--mesher', 'smooth'] : []), ...(values.packed ? ['--quantize', '--compress'] : []),
+      ...(values.lit ? ['--light', 'propagated'] : [])];
     const run = spawnSync(tool, ['convert', source, glb, '--json', ...flags], { encoding: 'utf8' });
     if (run.status === 0 && JSON.parse(run.stdout).bytes > 0) {
       written.push([source, glb]);
@@ -57,7 +59,7 @@ function check() {
   const step = Math.max(1, Math.floor(small.length / Math.max(1, Number(values.pixels))));
   // Voxels tell what blocks look like, not what smooth surfaces do.
   const sampled = small.filter((_, i) => i % step === 0).slice(0, Number(values.pixels));
-  const pairs = sampled.map(([source, glb]) => (values.smooth ? glb : `${glb}=${source}`));
+  const pairs = sampled.map(([source, glb]) => (values.smooth || values.lit ? glb : `${glb}=${source}`));
   if (pairs.length > 0) statuses.push(script('pixels.mjs', ...(values.occluded ? ['--occluded'] : []), ...pairs));
   const bad = statuses.filter((status) => status !== 0);
   return bad.some((status) => status !== 77) ? 1 : bad.length > 0 ? 77 : 0;

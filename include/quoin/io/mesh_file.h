@@ -54,6 +54,9 @@ struct MeshFileOptions {
 ///            what pictures show through the type's bodies of typical thickness (MeshPart::thickness).
 ///            Smooth meshes have COLOR_0, 16 bits a channel in linear light, albedo times 1 - occlusion,
 ///            and one rough, opaque material.
+///            Of meshes with light at their vertices (MeshView::light; then all have it) materials are those of
+///            KHR_materials_unlit, and COLOR_0 has 16 bits a channel: light, of smooth meshes times albedo, times what
+///            occlusion leaves. Such materials have no roughness, no emission and no glass but its alpha.
 ///            OcclusionIn::Attribute: a scalar _AO of every
 ///            primitive with occlusion; blocks then have no COLOR_0, smooth meshes one of albedo alone.
 ///            Of meshes with an atlas, opaque blocks that emit nothing have that as their colours, with a linear filter
@@ -86,7 +89,7 @@ struct MeshFileOptions {
 /// Memory:    vertices are streamed: a mebibyte, what glTF's JSON takes and, of one part at a time (in glTF all), a
 ///            copy of surfaces whose emission takes several materials; with `compress` also all that is compressed, and
 ///            the largest array as it is stored.
-/// Errors:    Unsupported for a format that is none of meshes, for an atlas in PLY with its occlusion, for
+/// Errors:    Unsupported for a format that is none of meshes, for light in others than glTF, for an atlas in PLY with its occlusion, for
 ///            OcclusionIn::Attribute in OBJ, for `quantize` and `compress` in others than glTF, and for `compress`
 ///            where the build has no meshoptimizer; CannotWrite; Cancelled; LimitExceeded beyond 4 GiB of GLB or 2^31 -
 ///            1 vertices or triangles of PLY; InvalidArgument when a transform is not finite, not affine or singular,
@@ -94,7 +97,7 @@ struct MeshFileOptions {
 ///            itself (arrays of different lengths, indices of no vertex, types that are not registered, numbers that
 ///            are not finite). Each file appears whole or not at all; of several, those before one that fails stay.
 /// Sources:   Khronos glTF 2.0 specification, sections 3 and 4.4; KHR_materials_emissive_strength, _transmission,
-///            _volume and _ior; KHR_mesh_quantization; EXT_meshopt_compression; Alias/Wavefront's OBJ and MTL.
+///            _volume, _ior and _unlit; KHR_mesh_quantization; EXT_meshopt_compression; Alias/Wavefront's OBJ and MTL.
 [[nodiscard]] Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesystem::path& path,
                                                const MeshFileOptions& options = {}, const Progress& progress = {});
 

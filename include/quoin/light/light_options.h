@@ -37,12 +37,13 @@ enum class Shading : std::uint8_t {
 
 /// Where the light of a surface comes from.
 enum class LightModel : std::uint8_t {
-  Rays,        ///< the reference model: a sun with shadows, ambient light with occlusion, lamps
-  Propagated,  ///< light in game time (PropagatedLight): levels that spread through each grid by itself, from the sky
-               ///< along its own y and from voxels that emit, smooth over faces (SurfaceLight), as colours by
-  ///< light_colour; times 1 - 0.75 * occlusion. Scene::lamps, shadows and the sun's direction mean nothing,
-  ///< other grids throw no shadow. It needs no rays but those of OcclusionMode::Rays. VulkanMeshRenderer
-  ///< refuses it
+  /// The reference model: a sun with shadows, ambient light with occlusion, lamps.
+  Rays,
+  /// Light in game time (PropagatedLight): levels that spread through each grid by itself, from the sky along its own y
+  /// and from voxels that emit, smooth over faces and surfaces (SurfaceLight), as colours by light_colour; times
+  /// 1 - 0.75 * occlusion. Scene::lamps, shadows and the sun's direction mean nothing, other grids throw no shadow. It
+  /// needs no rays but those of OcclusionMode::Rays.
+  Propagated,
 };
 
 /// How surfaces are lit; the same for every renderer. Where values are shown instead of colours (Occlusion, Normals)

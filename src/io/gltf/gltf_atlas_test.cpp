@@ -122,8 +122,8 @@ TEST_F(GltfAtlas, VoxelsThatFloatsDoNotTellApartAreRefused) {
 }
 
 TEST_F(GltfAtlas, WhatContradictsItIsRefused) {
-  for (const BlockyMeshOptions mesh : {BlockyMeshOptions{.merge = false}, BlockyMeshOptions{.bake_occlusion = false},
-                                       BlockyMeshOptions{.watertight = true}}) {
+  for (const BlockyMeshOptions& mesh : {BlockyMeshOptions{.merge = false}, BlockyMeshOptions{.bake_occlusion = false},
+                                        BlockyMeshOptions{.watertight = true}}) {
     EXPECT_EQ(mesh_scene(scene_, {.mesh = mesh, .atlas = true}).error().code, ErrorCode::InvalidArgument);
   }
   EXPECT_EQ(write_mesh(meshed(), FileFormat::Ply).error().code, ErrorCode::Unsupported);

@@ -84,7 +84,8 @@ TEST_F(GltfLight, OcclusionDarkensLightUnlessItIsApart) {
   for (const MeshView& each : meshes.parts[0].surfaces) {
     if (each.surface != SurfaceClass::Emissive) continue;
     for (std::size_t i = 0; i < each.positions.size(); ++i) {
-      if (each.types[i] == 3) EXPECT_EQ(each.light[i], (LinearRgba16{65'535, 65'535, 65'535, 65'535}));
+      if (each.types[i] != 3) continue;
+      EXPECT_EQ(each.light[i], (LinearRgba16{65'535, 65'535, 65'535, 65'535}));
     }
   }
 }

@@ -46,6 +46,7 @@ Status check(const Camera& camera, const MeshPictureOptions& options) {
 
 bool traces_light(const LightOptions& light) {
   if (light.shading != Shading::Lit) return false;
+  if (is_propagated(light)) return true;
   return (light.shadows && daylight_of(light).sun_brightness > 0.0) || light.max_lamps > 0;
 }
 
@@ -185,9 +186,6 @@ Status VulkanMeshRenderer::Impl::check_request(const vulkan::PictureImpl& target
   if (options.wireframe != Wireframe::Off && !device->physical().draws_lines) {
     return make_error(ErrorCode::Unsupported, who + " lacks fillModeNonSolid, which draws edges of triangles");
   }
-  if (is_propagated(options.light)) {
-    return make_error(ErrorCode::Unsupported, "vulkan: meshes are not drawn in propagated light");
-  }
   if (target.device != device) return refuse("vulkan: the picture is of another renderer than the meshes");
   const bool needs_voxels =
       options.detail.policy.has_value() || traces_light(options.light) || has_glass_by_rays(options);
@@ -260,6 +258,9 @@ Status VulkanMeshRenderer::Impl::put_picture(const vulkan::Placement& placement,
   if (lamps->table != nullptr) {
     data.lamps = vulkan::put_lamps(*lamps, camera, data.picture);
   }
+  const auto light = renderer->level_table(request.light, threads);
+  if (!light) return light.error();
+  if (light->table != nullptr) vulkan::put_levels(*light, *scene, placement, request.light, data.picture);
   return {};
 }
 

@@ -10,11 +10,13 @@ struct LitPoint {
   vec3 colour;
   vec3 emitted;
   float openness;
+  LevelPlace at;
 };
 
 vec3 colour_of(LitPoint point) {
   vec3 sunlight = vec3(0.0);
-  if (has(kLit)) sunlight = traced_light(point.voxel, point.base, point.from, point.normal, point.diffuse);
+  if (has(kLit)) sunlight = traced_light(point.voxel, point.base, point.from, point.normal, point.diffuse,
+                                             point.at);
   return colour_in_light(point.colour, point.emitted, sunlight, point.openness);
 }
 

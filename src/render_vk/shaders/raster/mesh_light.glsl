@@ -5,14 +5,36 @@
 #include "glass.glsl"
 #include "lamps.glsl"
 #include "rays.glsl"
+#include "levels.glsl"
 
-// The light of the sun and of lamps. `voxel`: of an instance's tree, w: which instance, -1: it is in nobody's way.
-// `from`: where rays start, as in a GridRay; `normal`: in the world, unit; `diffuse`: of the sun.
+// Where light by levels is looked up.
+struct LevelPlace {
+  ivec3 voxel;  // of an instance's tree; or the sample of a surface from which `inside` counts
+  vec3 inside;
+  vec3 normal;  // in the grid
+  int face;     // of the voxel; -1: on a surface
+};
+
+vec3 light_by_levels(LevelPlace at, Placed placed) {
+  ivec3 cell = at.voxel + placed.origin.xyz;
+  vec4 levels;
+  if (at.face < 0) {
+    levels = levels_before(cell, at.inside, at.normal, placed.origin.w, placed.start_base.w);
+  } else {
+    levels = levels_on_face(cell, uint(at.face), at.inside, placed.origin.w, placed.start_base.w);
+  }
+  return light_colour(levels, at.normal);
+}
+
+// The light of the sun and of lamps, or all light by levels. `voxel`: of an instance's tree, w: which instance, -1: it is in nobody's way.
+// `from`: where rays start, as in a GridRay; `normal`: in the world, unit; `diffuse`: of the sun; `at`: the same place
+// for levels.
 //
 // One loop over them all, for the reason that rays.glsl gives.
-vec3 traced_light(ivec4 voxel, ivec3 base, vec3 from, vec3 normal, float diffuse) {
+vec3 traced_light(ivec4 voxel, ivec3 base, vec3 from, vec3 normal, float diffuse, LevelPlace at) {
   if (!kTraces || voxel.w < 0) return sunlight_of(diffuse);
   Placed placed = placed_at(voxel.w);
+  if (has(kPropagated)) return light_by_levels(at, placed);
   GridRay ray = GridRay(base, from, vec3(0.0), 0.0);
   uvec2 lamps = uvec2(0);
   if (has(kLamps)) lamps = lamps_around(voxel, placed);

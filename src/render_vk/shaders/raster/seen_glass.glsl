@@ -46,8 +46,9 @@ LitPoint point_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
   vec3 inside = vec3(ray.base - body.voxel.xyz) + ray.origin + body.lengths.w * ray.direction;
   if (kHasFieldGlass && (body.what.z & kBeginsInField) != 0) {
     vec3 above = inside + frame().lift / placed.ref_view.w * normal_of(body.what.y);
-    vec3 at = vec3(body.voxel.xyz & 63) + above;
-    return LitPoint(body.voxel, body.voxel.xyz & ~63, at, normal, diffuse, surface.colour, surface.emitted, 1.0);
+    vec3 from = vec3(body.voxel.xyz & 63) + above;
+    LevelPlace at = LevelPlace(body.voxel.xyz, inside, normal_of(body.what.y), -1);
+    return LitPoint(body.voxel, body.voxel.xyz & ~63, from, normal, diffuse, surface.colour, surface.emitted, 1.0, at);
   }
   inside = on_face(inside, face);
   float openness = 1.0;
@@ -57,7 +58,11 @@ LitPoint point_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
   }
   vec3 from = vec3(body.voxel.xyz & 63) + inside;
   from[axis_of(face)] += frame().lift / placed.ref_view.w * sign_of(face);
-  return LitPoint(body.voxel, body.voxel.xyz & ~63, from, normal, diffuse, surface.colour, surface.emitted, openness);
+  vec3 in_grid = vec3(0.0);
+  in_grid[axis_of(face)] = sign_of(face);
+  LevelPlace at = LevelPlace(body.voxel.xyz, inside, in_grid, int(face));
+  return LitPoint(body.voxel, body.voxel.xyz & ~63, from, normal, diffuse, surface.colour, surface.emitted, openness,
+                  at);
 }
 
 // Those that include this say how bodies are lit.

@@ -5,6 +5,7 @@
 layout(constant_id = 2) const bool kTraces = false;
 layout(constant_id = 3) const bool kHasGlass = false;
 layout(constant_id = 5) const uint kGlassStep = 0;  // what is drawn, if it is the nearest glass
+#include "faces.glsl"
 #include "lit.glsl"
 #include "mesh_light.glsl"
 #include "sky.glsl"

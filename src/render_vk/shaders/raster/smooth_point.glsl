@@ -36,5 +36,7 @@ LitPoint own_point() {
   }
   vec3 from = vec3(base.xyz & 63) + place + kLift * in_grid;
   ivec4 voxel = ivec4(base.xyz + ivec3(floor(place - 0.5 * in_grid)), home.w);
-  return LitPoint(voxel, base.xyz & ~63, from, n, max(dot(n, sun.xyz), 0.0), surface, glow, albedo.w);
+  vec3 in_samples = place - f.instances[push.instance].first_sample;
+  LevelPlace at = LevelPlace(base.xyz + ivec3(floor(in_samples)), fract(in_samples), in_grid, -1);
+  return LitPoint(voxel, base.xyz & ~63, from, n, max(dot(n, sun.xyz), 0.0), surface, glow, albedo.w, at);
 }

@@ -1,0 +1,99 @@
+// Meshes in propagated light look as the processor's pictures do.
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+#include <glm/gtc/quaternion.hpp>
+
+#include "render/cave_for_tests.h"
+#include "render_vk/raster/mesh_for_tests.h"
+
+namespace quoin {
+namespace {
+
+using render_test::place;
+using render_test::sized;
+using render_test::towards;
+using vulkan_test::blocky_surfaces;
+using vulkan_test::mesh_options;
+
+class VulkanMeshPropagated : public vulkan_test::VulkanMeshTest {};
+
+RenderOptions propagated(int width, int height) {
+  RenderOptions options = sized(width, height);
+  options.light.model = LightModel::Propagated;
+  options.light.occlusion_mode = OcclusionMode::Vertex;
+  return options;
+}
+
+TEST_F(VulkanMeshPropagated, ACaveWithGlassIsThatOfTheProcessor) {
+  Cave cave;
+  RenderOptions options = propagated(240, 160);
+  compare(cave.scene, towards({-26.0, -2.0, 12.0}, {6.0, -9.0, 0.0}, 1.2), options, "cave");
+  options.light.least_light = 0.03;
+  options.light.lamp_brightness = 2.0;
+  options.light.occlusion_mode = OcclusionMode::Off;
+  compare(cave.scene, towards({26.0, -3.0, 12.0}, {-8.0, -10.0, -2.0}, 1.2), options, "cave_of_lamps");
+}
+
+TEST_F(VulkanMeshPropagated, TurnedHalvedAndFarGridsHaveTheirOwnLight) {
+  Cave cave;
+  cave.scene.add_instance({"turned", cave.grid_handle, {90.0, 10.0, -20.0}, glm::angleAxis(0.7, DVec3(0.6, 0.0, 0.8))});
+  Grid house;
+  house.fill_box({{0, 0, 0}, {20, 12, 20}}, 1);
+  house.fill_box({{1, 1, 1}, {19, 11, 19}}, kAir);
+  house.fill_box({{6, 1, 19}, {12, 7, 20}}, kAir);
+  place(cave.scene, std::move(house), {-10.0, 16.0, -10.0});
+  const Camera camera = towards({110.0, 70.0, 120.0}, {30.0, 0.0, 0.0}, 0.9);
+  RenderOptions options = propagated(240, 160);
+  compare(cave.scene, camera, options, "turned");
+  options.detail.policy = DetailPolicy{};
+  options.detail.policy->voxel_pixels = 100.0;
+  options.detail.policy->cell_pixels = 4.0;
+  options.detail.policy->far_pixels = 0;
+  compare(cave.scene, camera, options, "halved");
+}
+
+TEST_F(VulkanMeshPropagated, AnEditOpensARoom) {
+  Cave cave;
+  const Camera camera = towards(DVec3(Cave::kRoom.min) + 0.9, DVec3(Cave::kRoom.max) - 0.9, 1.4);
+  const RenderOptions options = propagated(64, 48);
+  const auto brightest = [&] {
+    put(cave.scene, blocky_surfaces(cave.scene));
+    const Image image = drawn(camera, mesh_options(options));
+    return *std::max_element(image.rgb.begin(), image.rgb.end());
+  };
+  EXPECT_EQ(brightest(), 0);
+  cave.scene.edit(cave.grid_handle).grid.fill_box({{18, -8, -14}, {19, -7, -9}}, kAir);
+  EXPECT_GT(brightest(), 0);
+}
+
+// What the field's surface shows is marched alike but for the mesh's own shape.
+TEST_F(VulkanMeshPropagated, SmoothSurfacesAreLitAsTheFieldsThatTheyAreOf) {
+  Scene scene;
+  const VoxelType stone = render_test::add_type(scene, {180, 170, 160, 255});
+  const VoxelType lamp = render_test::add_type(scene, {255, 160, 60, 255}, Visibility::Opaque, 1.0F);
+  SceneGrid made;
+  made.field.add_sphere({0.0, 0.0, 0.0}, 20.0, stone);
+  made.field.remove_sphere({6.0, 6.0, 8.0}, 13.0);
+  made.grid.set({0, -3, 2}, lamp);
+  const GridHandle grid = scene.add_grid(std::move(made));
+  scene.add_instance({"", grid});
+  put(scene, vulkan_test::live_surfaces(scene, SurfaceStyle::Smooth));
+  const Camera camera = towards({30.0, 26.0, 34.0}, {0.0, 0.0, 0.0}, 0.9);
+  RenderOptions options = propagated(160, 120);
+  options.light.occlusion_mode = OcclusionMode::Off;
+  const Image mesh = drawn(camera, mesh_options(options));
+  const Picture cpu = render_test::taken(scene, camera, options);
+  int different = 0;
+  for (std::size_t i = 0; i < mesh.rgb.size(); ++i) different += std::abs(mesh.rgb[i] - cpu.colour.rgb[i]) > 24;
+  EXPECT_LE(different, static_cast<int>(mesh.rgb.size()) / 50);
+  if (std::getenv("QUOIN_WRITE_VULKAN") != nullptr) {
+    EXPECT_TRUE(write_png(mesh, QUOIN_BINARY_DIR "/mesh_smooth.vulkan.png"));
+    EXPECT_TRUE(write_png(cpu.colour, QUOIN_BINARY_DIR "/mesh_smooth.cpu.png"));
+  }
+}
+
+}  // namespace
+}  // namespace quoin
