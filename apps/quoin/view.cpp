@@ -27,6 +27,7 @@ struct ViewArguments {
   bool is_bare = false;
   std::string backend = "auto";
   std::string drawn;
+  std::string light;
   std::string device;
   VolumeTexts volume_texts;
 };
@@ -64,6 +65,8 @@ int run_view(const ViewArguments& arguments) {
   if (arguments.drawn == "blocks") options.mode = viewer::DrawMode::Blocks;
   if (arguments.drawn == "smooth") options.mode = viewer::DrawMode::Smooth;
   if (arguments.drawn == "density") options.mode = viewer::DrawMode::Density;
+  if (arguments.light == "rays") options.light = LightModel::Rays;
+  if (arguments.light == "propagated") options.light = LightModel::Propagated;
   if (arguments.backend == "cpu") options.backend = viewer::ViewerBackend::Processor;
   if (arguments.backend == "vulkan") options.backend = viewer::ViewerBackend::Vulkan;
   Status status = check_input(arguments.input, arguments.load.raw.has_value());
@@ -132,6 +135,10 @@ void add_view_command(CLI::App& app, int& status) {
       ->check(file_name());
   command->add_option("--draw", arguments->drawn, "What it is drawn as at first (default: as it was last)")
       ->check(CLI::IsMember({"rays", "blocks", "smooth", "density"}));
+  command
+      ->add_option("--light", arguments->light,
+                   "Light by rays, or propagated as games have it, at first (default: as it was last)")
+      ->check(CLI::IsMember({"rays", "propagated"}));
   command
       ->add_option("--backend", arguments->backend,
                    "What marches rays: a graphics card if there is one, the processor, or any device")

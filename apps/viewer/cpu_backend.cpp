@@ -52,7 +52,7 @@ struct Stage {
 // What is cheap of that light. Where values are shown instead of colours they stay what they are.
 LightOptions draft_of(LightOptions light) {
   if (light.shading != Shading::Lit) return light;
-  light.max_lamps = std::min(light.max_lamps, kDraftLamps);
+  if (light.model == LightModel::Rays) light.max_lamps = std::min(light.max_lamps, kDraftLamps);
   if (light.occlusion_mode == OcclusionMode::Rays) light.occlusion_mode = OcclusionMode::Vertex;
   return light;
 }

@@ -64,7 +64,8 @@ struct DeviceBackend::Impl {
   // Whether light by rays is added at rest, which a processor that acts as a device has no time for.
   [[nodiscard]] bool is_lit_at_rest() const {
     const LightOptions& light = request->light;
-    const bool wants_rays = light.shadows || light.max_lamps > 0 || light.glass_surfaces;
+    const bool has_shadows = light.model == LightModel::Rays && (light.shadows || light.max_lamps > 0);
+    const bool wants_rays = has_shadows || light.glass_surfaces;
     return told.is_processor && is_marched_alike(request->mode) && request->wireframe == Wireframe::Off &&
            light.shading == Shading::Lit && wants_rays;
   }

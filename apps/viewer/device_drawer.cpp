@@ -36,7 +36,8 @@ DeviceDrawer::DeviceDrawer(const Scene& scene, const DeviceBackendOptions& optio
 
 void DeviceDrawer::want(const ViewRequest& request) {
   const bool is_other_kind = !request_ || request_->mode != request.mode || request_->wireframe != request.wireframe ||
-                             request_->light.shading != request.light.shading;
+                             request_->light.shading != request.light.shading ||
+                             request_->light.model != request.light.model;
   if (is_other_kind) {
     mesh_seconds_.clear();
     has_shaders_ = false;
@@ -88,9 +89,14 @@ Status DeviceDrawer::read_scene() {
   return take_surfaces();
 }
 
-// Without levels of detail and light by rays a picture of meshes is one of what was put into the device's memory.
+// Levels of detail and light need the voxels on the device.
+bool DeviceDrawer::needs_voxels() const {
+  return request_->detail_by_pixels || !is_processor() || request_->light.model == LightModel::Propagated;
+}
+
+// Without these a picture of meshes is one of what was put into the device's memory.
 bool DeviceDrawer::draws_from_scene() const {
-  return !has_meshes(request_->mode) || request_->detail_by_pixels || !is_processor();
+  return !has_meshes(request_->mode) || needs_voxels();
 }
 
 Result<std::optional<ViewFrame>> DeviceDrawer::read_and_draw() {
@@ -163,8 +169,7 @@ Status DeviceDrawer::update_renderer() {
 
 // Takes over what was edited and what workers made of it.
 Status DeviceDrawer::take_surfaces() {
-  // Only light by rays and levels of detail need the voxels on the device.
-  if (request_->detail_by_pixels || !is_processor()) {
+  if (needs_voxels()) {
     if (Status updated = update_renderer(); !updated) return updated;
   }
   const bool is_scene_changed = std::exchange(meshes_->is_scene_new, false);

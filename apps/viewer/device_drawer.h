@@ -39,6 +39,7 @@ class DeviceDrawer {
   [[nodiscard]] Status open();
   /// Takes over what was edited and what workers made of it. Requires: it is open.
   [[nodiscard]] Status read_scene();
+  [[nodiscard]] bool needs_voxels() const;
   [[nodiscard]] bool draws_from_scene() const;
   /// The next picture, if there is to be one. Requires: `read_scene` was called since the last edit.
   [[nodiscard]] Result<std::optional<ViewFrame>> draw();

@@ -55,6 +55,7 @@ void read_sun(const Json& object, DVec3& sun) {
 }
 
 constexpr std::array kShadings = {"lit", "unlit", "unlit with occlusion", "occlusion", "normals"};
+constexpr std::array kLightModels = {"rays", "propagated"};
 constexpr std::array kOcclusionModes = {"off", "rays", "vertex", "smooth"};
 constexpr std::array kForms = {"none", "share", "weighted", "weighted-published"};
 constexpr std::array kModes = {"rays", "blocks", "smooth", "density"};
@@ -88,6 +89,8 @@ void read_light(const Json& object, LightOptions& light) {
   read_flag(object, "lit", is_lit);  // what earlier versions wrote
   if (!is_lit) light.shading = Shading::Unlit;
   read_name(object, "shading", kShadings, light.shading);
+  read_name(object, "model", kLightModels, light.model);
+  read_number(object, "least_light", 0.0, 100.0, light.least_light);
   read_flag(object, "shadows", light.shadows);
   read_number(object, "exposure", 0.0, 100.0, light.exposure);
   read_number(object, "sun_brightness", 0.0, 100.0, light.sun_brightness);
@@ -180,6 +183,8 @@ std::string to_json(const Settings& settings) {
                  {"light",
                   {{"sun", {light.sun.x, light.sun.y, light.sun.z}},
                    {"shading", kShadings[static_cast<std::size_t>(light.shading)]},
+                   {"model", kLightModels[static_cast<std::size_t>(light.model)]},
+                   {"least_light", light.least_light},
                    {"shadows", light.shadows},
                    {"occlusion", kOcclusionModes[static_cast<std::size_t>(light.occlusion_mode)]},
                    {"smooth_occlusion",

@@ -34,6 +34,8 @@ TEST(Settings, ComeBackAsTheyWere) {
   settings.light.sky_brightness = 0.0;
   settings.light.sky_follows_sun = false;
   settings.light.glass_surfaces = false;
+  settings.light.model = LightModel::Propagated;
+  settings.light.least_light = 0.25;
   settings.light.max_lamps = 12;
   settings.light.lamp_brightness = 8.0;
   settings.mode = DrawMode::Density;

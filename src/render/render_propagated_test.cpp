@@ -71,8 +71,7 @@ TEST(RenderPropagated, ShowsTheLightBetweenTheCornersOfFaces) {
       const FaceFrame& frame = frame_of(hit->face);
       const DVec3 inside = hit->position - DVec3(hit->voxel);
       const MeanLevels levels = between(surface.face(hit->voxel, hit->face), inside[frame.u], inside[frame.v]);
-      const Pixel wanted =
-          encoded(linear(type.colour) * light_colour(levels, Vec3(normal_of(hit->face)), look));
+      const Pixel wanted = encoded(linear(type.colour) * light_colour(levels, Vec3(normal_of(hit->face)), look));
       const Pixel shown = pixel_at(*picture, x, y);
       for (std::size_t c = 0; c < 3; ++c) ASSERT_NEAR(shown[c], wanted[c], 1) << x << " " << y;
       ++compared;

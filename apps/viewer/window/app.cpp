@@ -77,6 +77,7 @@ App::App(const ViewerOptions& options, Settings settings, std::unique_ptr<Screen
   state_.settings = std::move(settings);
   if (!gui_->status()) stand_in(Error(gui_->status().error()));
   if (options_.mode) state_.settings.mode = *options_.mode;
+  if (options_.light) state_.settings.light.model = *options_.light;
   if (const auto renderer = screen_->renderer(); renderer && renderer->device().kind == "cpu" && !options_.is_bare) {
     state_.tell(renderer->device().name + " is the processor in truth, and slow; --backend auto is faster");
   }

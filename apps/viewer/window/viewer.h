@@ -25,9 +25,10 @@ struct ViewerOptions {
   LoadOptions load;
   Threads threads;
   ViewerBackend backend = ViewerBackend::Auto;
-  std::string device;            ///< of Vulkan, as VulkanOptions::device
-  std::optional<DrawMode> mode;  ///< what the scene is drawn as at first; without, as it was last
-  int width = 0;                 ///< of the window; 0: as it was last
+  std::string device;               ///< of Vulkan, as VulkanOptions::device
+  std::optional<DrawMode> mode;     ///< what the scene is drawn as at first; without, as it was last
+  std::optional<LightModel> light;  ///< likewise
+  int width = 0;                    ///< of the window; 0: as it was last
   int height = 0;
   bool is_bare = false;              ///< the picture alone, neither panels nor bars, and nothing remembered
   std::filesystem::path screenshot;  ///< not empty: written once the picture has settled, which ends the viewer

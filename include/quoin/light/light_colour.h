@@ -30,7 +30,7 @@ struct LightLook {
 
 /// What arrives of a light, linear: f / (4 - 3 f) with f = level / 15. 1 at level 15, 0 at 0; within 0.04 of 0.8 to the
 /// power of 15 - level, which older games have, but that this one comes to nothing.
-/// Source: the curve that Minecraft has had since its version 1.16, of linear light here.
+/// Source: the curve of the light table of Minecraft, of linear light here.
 [[nodiscard]] constexpr float light_of_level(float level) {
   const float f = level * (1.0F / 15.0F);
   return f / (4.0F - 3.0F * f);

@@ -47,8 +47,9 @@ TEST_F(GltfLight, MaterialsAreUnlitAndColoursAreTheLight) {
     EXPECT_EQ(material["extensions"], Json({{"KHR_materials_unlit", Json::object()}}));
     EXPECT_TRUE(material["pbrMetallicRoughness"].contains("baseColorTexture"));
     EXPECT_FALSE(material.contains("emissiveFactor"));
-    EXPECT_EQ(material.contains("alphaMode"), material["name"].get<std::string>().find("glass") != std::string::npos ||
-                                                  material["name"].get<std::string>().find("trans") != std::string::npos)
+    EXPECT_EQ(material.contains("alphaMode"),
+              material["name"].get<std::string>().find("glass") != std::string::npos ||
+                  material["name"].get<std::string>().find("trans") != std::string::npos)
         << material["name"];
   }
   std::size_t next = 0;

@@ -2,61 +2,111 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <mutex>
 #include <span>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
+#include <quoin/core/changes.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/vec.h>
 #include <quoin/light/scene_light.h>
 #include <quoin/scene/scene.h>
 
+#include "grid/coordinate_hash.h"
+
 namespace quoin {
 
+class LightRows;
+
 /// Light around the surfaces of a scene's grids as shaders read it: a table of bricks of 8^3 voxels, those with a voxel
-/// of any kind and those beside them.
-struct LightBricks {
+/// of any kind and those beside them, which follows edits.
+class LightBricks {
+ public:
   static constexpr int kEdge = 8;
   /// 512 words of light, two a number, the lower x in the lower half; then a bit a voxel: whether light gets there.
   static constexpr std::size_t kNumbers = 256 + 16;
   static constexpr std::uint32_t kIsUniform = 0x8000'0000U;
+  static constexpr std::uint32_t kAllOpaque = 0xFFFF'FFFFU;
 
   /// Open addressing by `slot_of`.
   struct Brick {
     IVec3 brick{0};  ///< voxel coordinates / 8, rounded down
     std::int32_t grid = 0;
-    std::uint32_t is_held = 0;  ///< 0: the slot is free
-    std::uint32_t what = 0;     ///< where its numbers begin; or kIsUniform | light, where all of it is alike and passes
+    std::uint32_t is_held = 0;        ///< 0: the slot is free
+    std::uint32_t what = kAllOpaque;  ///< where its numbers begin; kIsUniform | light, where all of it is alike and
+                                      ///< passes; or kAllOpaque, as bricks that are not there
     std::uint32_t pad[2]{};
   };
-  std::vector<Brick> bricks;  ///< a power of two. Of a brick that is not there all is opaque
-  std::vector<std::uint32_t> numbers;
-  std::vector<GridHandle> grids;  ///< in their order; a brick's grid is an index
+  /// What is other than when it was last asked.
+  struct Changed {
+    bool all = true;
+    std::vector<std::uint32_t> slots{};
+    std::vector<std::uint32_t> numbers{};  ///< where those of a brick begin
+  };
 
+  /// Takes over what changed; `light` is up to date.
+  /// Cost: of bricks in which light changed, or beside which voxels came or went, some microseconds each; where types
+  ///       or grids came, changed or went, of all of them.
+  void update(const Scene& scene, const SceneLight& light, Threads threads);
+
+  [[nodiscard]] std::span<const Brick> bricks() const { return bricks_; }  ///< a power of two
+  [[nodiscard]] std::span<const std::uint32_t> numbers() const { return numbers_; }
   [[nodiscard]] static std::uint32_t slot_of(IVec3 brick, std::int32_t grid);
-  /// Requires: it is one of `grids`.
+  /// What a brick's `grid` is. Requires: the scene of the last update has it.
   [[nodiscard]] std::int32_t index_of(GridHandle grid) const;
+  [[nodiscard]] Changed take_changes() { return std::exchange(changed_, {false, {}, {}}); }
+
+ private:
+  using Occupied = std::array<std::uint64_t, 8>;  // [z]: bit x + 8 y
+  struct OfGrid {
+    GridHandle handle;
+    ChangeCursor followed_voxels;
+    ChangeCursor followed_light;
+    std::unordered_map<IVec3, Occupied, CoordinateHash> occupied;  // by chunk
+  };
+  // A brick's content as found; no numbers where it is uniform or opaque.
+  struct Found {
+    IVec3 brick{0};
+    std::uint32_t what = kAllOpaque;
+    std::vector<std::uint32_t> numbers{};
+  };
+
+  void begin_anew(const Scene& scene);
+  [[nodiscard]] static std::vector<IVec3> bricks_to_find(OfGrid& of, const GridLight& light);
+  static void look_at_chunk(OfGrid& of, const GridLight& light, IVec3 chunk);
+  [[nodiscard]] static bool is_at_surface(const OfGrid& of, IVec3 brick);
+  [[nodiscard]] static Found find(const OfGrid& of, LightRows& rows, IVec3 brick);
+  void put(std::int32_t grid, Found found);
+  [[nodiscard]] std::size_t find_slot(IVec3 brick, std::int32_t grid) const;
+  void grow();
+
+  std::vector<Brick> bricks_{1};
+  std::size_t held_ = 0;
+  std::vector<std::uint32_t> numbers_;
+  std::vector<std::uint32_t> free_;  // where numbers may begin
+  std::vector<OfGrid> grids_;        // in the order of their handles
+  ChangeCursor followed_types_;
+  Changed changed_;
 };
 
-/// Keeps light and table of a scene, made when they are first asked for after an `update`.
-/// Threads: any number may ask.
+/// Keeps light and bricks of a scene, brought up to date when they are first asked for after an `update`.
+/// Threads: any number may ask for light; bricks are one's own.
 class LightCache {
  public:
   /// The scene was edited, or is another.
   void update();
   /// Light of the scene as it is now. Lifetime: until the next update.
   [[nodiscard]] const SceneLight& light(const Scene& scene, Threads threads);
-  /// Cost: when it is made, beside that of the light, about 2 ms a chunk, of all chunks.
-  [[nodiscard]] std::shared_ptr<const LightBricks> bricks(const Scene& scene, Threads threads);
+  [[nodiscard]] LightBricks& bricks(const Scene& scene, Threads threads);
 
  private:
-  [[nodiscard]] const SceneLight& up_to_date(const Scene& scene, Threads threads);
-
   std::mutex mutex_;
   SceneLight light_;
+  LightBricks bricks_;
   bool is_lit_ = false;
-  std::shared_ptr<const LightBricks> bricks_;
+  bool has_bricks_ = false;
 };
 
 }  // namespace quoin

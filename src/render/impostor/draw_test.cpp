@@ -255,6 +255,9 @@ TEST(DrawImpostorsDeathTest, WantsAPictureOfTheSizeThatIsAskedFor) {
   };
   QUOIN_EXPECT_MISTAKE(draw(sized(32, 32)), "a picture of the options' size");
   QUOIN_EXPECT_MISTAKE(draw(sized(0, 32)), "that CpuRenderer accepts");
+  RenderOptions propagated = sized(32, 32);
+  propagated.light.model = LightModel::Propagated;
+  QUOIN_EXPECT_MISTAKE(draw(propagated), "light by rays");
 }
 
 }  // namespace

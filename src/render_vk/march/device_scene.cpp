@@ -192,14 +192,38 @@ Status DeviceLamps::put(DeviceMemory& memory, std::shared_ptr<const LampTable> n
   return done;
 }
 
-Status DeviceLevels::put(DeviceMemory& memory, std::shared_ptr<const LightBricks> now) {
-  if (now == table) return {};
-  table = nullptr;
-  if (now == nullptr) return {};
-  Status done = put_table(memory, bricks, bytes_of(now->bricks));
-  if (done) done = put_table(memory, numbers, bytes_of(now->numbers));
+// Numbers have room for some more bricks.
+Status DeviceLevels::put_changes(DeviceMemory& memory, const LightBricks& now, const LightBricks::Changed& changed) {
+  const auto all_bricks = std::as_bytes(now.bricks());
+  const auto all_numbers = std::as_bytes(now.numbers());
+  if (changed.all || table == nullptr || all_numbers.size() > numbers.size) {
+    memory.release(numbers);
+    const auto larger = memory.allocate(all_numbers.size() + all_numbers.size() / 4 + 4, "uploading light");
+    if (!larger) return larger.error();
+    numbers = *larger;
+    Status done = put_table(memory, bricks, all_bricks);
+    return done && !all_numbers.empty() ? memory.write(numbers, all_numbers) : done;
+  }
+  constexpr std::size_t kBrickBytes = sizeof(LightBricks::Brick);
+  constexpr std::size_t kNumberBytes = LightBricks::kNumbers * sizeof(std::uint32_t);
+  Status done;
+  for (const std::size_t slot : changed.slots) {
+    if (done) done = memory.write(bricks, all_bricks.subspan(slot * kBrickBytes, kBrickBytes), slot * kBrickBytes);
+  }
+  for (const std::size_t first : changed.numbers) {
+    const std::size_t offset = first * sizeof(std::uint32_t);
+    if (done) done = memory.write(numbers, all_numbers.subspan(offset, kNumberBytes), offset);
+  }
+  return done;
+}
+
+Status DeviceLevels::put(DeviceMemory& memory, LightBricks& now) {
+  const LightBricks::Changed changed = now.take_changes();
+  if (table != nullptr && !changed.all && changed.slots.empty()) return {};
+  Status done = put_changes(memory, now, changed);
   if (done) done = memory.flush();
-  if (done) table = std::move(now);
+  if (!done) memory.discard();
+  table = done ? &now : nullptr;
   return done;
 }
 

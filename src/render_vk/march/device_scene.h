@@ -69,12 +69,15 @@ struct DeviceLamps {
 
 /// Levels of light around surfaces in device memory.
 struct DeviceLevels {
-  std::shared_ptr<const LightBricks> table;  ///< null: pictures are in another light
+  const LightBricks* table = nullptr;  ///< null: pictures are in another light
   Place bricks;
   Place numbers;
 
-  /// After an error it holds nothing.
-  [[nodiscard]] Status put(DeviceMemory& memory, std::shared_ptr<const LightBricks> now);
+  /// Sends what changed since the last time. After an error it holds nothing, and sends all the next time.
+  [[nodiscard]] Status put(DeviceMemory& memory, LightBricks& now);
+
+ private:
+  [[nodiscard]] Status put_changes(DeviceMemory& memory, const LightBricks& now, const LightBricks::Changed& changed);
 };
 
 /// What light of a picture is looked up in.

@@ -306,7 +306,7 @@ void put_levels(const DeviceLevels& levels, const Scene& scene, const Placement&
   data.frame.level_sky = {look.sky, 0.0F};
   data.frame.level_lamps = {look.lamps, 0.0F};
   data.frame.level_least = {look.least, 0.0F};
-  data.frame.light_mask = static_cast<std::uint32_t>(levels.table->bricks.size() - 1);
+  data.frame.light_mask = static_cast<std::uint32_t>(levels.table->bricks().size() - 1);
   data.frame.light_bricks = levels.bricks.address;
   data.frame.light_numbers = levels.numbers.address;
   for (std::size_t i = 0; i < data.placed.size(); ++i) {

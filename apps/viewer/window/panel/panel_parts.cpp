@@ -309,6 +309,11 @@ void draw_brightness(const char* name, double& value, float most) {
 void draw_lamps(LightOptions& light, bool has_rays) {
   draw_brightness("the sun", light.sun_brightness, 4.0F);
   draw_brightness("the sky", light.sky_brightness, 4.0F);
+  if (light.model == LightModel::Propagated) {
+    draw_brightness("lamps", light.lamp_brightness, 64.0F);
+    draw_brightness("everywhere", light.least_light, 1.0F);
+    return;
+  }
   ImGui::BeginDisabled(!has_rays);
   bool has_lamps = light.max_lamps > 0;
   if (ImGui::Checkbox("lamps light others", &has_lamps)) light.max_lamps = has_lamps ? natural_light().max_lamps : 0;
@@ -329,24 +334,29 @@ void draw_light_part(ViewState& state) {
   draw_occlusion(light, state.settings.mode == DrawMode::Rays);
   ImGui::EndDisabled();
   ImGui::BeginDisabled(light.shading != Shading::Lit);
-  const bool has_shadows = state.open.backend && state.open.backend->traces_light(state.settings.mode);
+  int model = static_cast<int>(light.model);
+  if (ImGui::Combo("light", &model, "by rays\0propagated, as in games\0")) light.model = static_cast<LightModel>(model);
+  const bool is_by_rays = light.model == LightModel::Rays;
+  const bool has_shadows = is_by_rays && state.open.backend && state.open.backend->traces_light(state.settings.mode);
   ImGui::BeginDisabled(!has_shadows);
   bool shows_shadows = light.shadows && has_shadows;
   if (ImGui::Checkbox("shadows", &shows_shadows)) light.shadows = shows_shadows;
   ImGui::EndDisabled();
-  if (!has_shadows && ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) {
+  if (is_by_rays && !has_shadows && ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) {
     ImGui::SetTooltip(
         "smooth meshes of so large a scene have shadows where there is a graphics card; marched rays (F5) and blocks\n"
         "(F6) have them everywhere");
   }
+  ImGui::BeginDisabled(!is_by_rays);
   bool is_all = light.occlusion_affects == OcclusionAffects::All;
   if (ImGui::Checkbox("occlusion of all light", &is_all)) {
     light.occlusion_affects = is_all ? OcclusionAffects::All : OcclusionAffects::Ambient;
   }
+  ImGui::EndDisabled();
   ImGui::BeginDisabled(!shows_shadows);
   draw_shadow_distance(light);
   ImGui::EndDisabled();
-  draw_sun(light, has_shadows);
+  draw_sun(light, has_shadows || !is_by_rays);
   auto exposure = static_cast<float>(light.exposure);
   if (ImGui::SliderFloat("exposure", &exposure, 0.1F, 4.0F, "%.2f",
                          ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic)) {
