@@ -335,7 +335,7 @@ void draw_light_part(ViewState& state) {
   ImGui::EndDisabled();
   ImGui::BeginDisabled(light.shading != Shading::Lit);
   int model = static_cast<int>(light.model);
-  if (ImGui::Combo("light", &model, "by rays\0propagated, as in games\0")) light.model = static_cast<LightModel>(model);
+  if (ImGui::Combo("light", &model, "by rays\0propagated\0")) light.model = static_cast<LightModel>(model);
   const bool is_by_rays = light.model == LightModel::Rays;
   const bool has_shadows = is_by_rays && state.open.backend && state.open.backend->traces_light(state.settings.mode);
   ImGui::BeginDisabled(!has_shadows);
