@@ -99,8 +99,8 @@ class VertexTransform {
   return surface == SurfaceClass::Transparent || surface == SurfaceClass::EmissiveTransparent;
 }
 
-/// The colour of a vertex of a smooth mesh, darkened by its occlusion and in its light, if it has any: linear light, opaque but for transparent
-/// surfaces; sRGB.
+/// The colour of a vertex of a smooth mesh, darkened by its occlusion and in its light, if it has any: linear light,
+/// opaque but for transparent surfaces; sRGB.
 [[nodiscard]] LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex);
 [[nodiscard]] std::array<std::uint8_t, 3> srgb_colour(const MeshView& view, std::size_t vertex);
 

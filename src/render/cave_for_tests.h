@@ -7,8 +7,8 @@
 
 namespace quoin {
 
-/// A cave through the corner of eight chunks with a red and a blue lamp, a pane of glass, and a shaft of sky; behind its
-/// wall a closed room, and a lamp in that wall that shines into the cave alone.
+/// A cave through the corner of eight chunks with a red and a blue lamp, a pane of glass, and a shaft of sky; behind
+/// its wall a closed room, and a lamp in that wall that shines into the cave alone.
 struct Cave {
   static constexpr IBox kRoom{{12, -10, -26}, {24, -2, -14}};
 

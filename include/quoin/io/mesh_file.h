@@ -89,8 +89,8 @@ struct MeshFileOptions {
 /// Memory:    vertices are streamed: a mebibyte, what glTF's JSON takes and, of one part at a time (in glTF all), a
 ///            copy of surfaces whose emission takes several materials; with `compress` also all that is compressed, and
 ///            the largest array as it is stored.
-/// Errors:    Unsupported for a format that is none of meshes, for light in others than glTF, for an atlas in PLY with its occlusion, for
-///            OcclusionIn::Attribute in OBJ, for `quantize` and `compress` in others than glTF, and for `compress`
+/// Errors:    Unsupported for a format that is none of meshes, for light, `quantize` and `compress` in others than
+///            glTF, for an atlas in PLY with its occlusion, for OcclusionIn::Attribute in OBJ, and for `compress`
 ///            where the build has no meshoptimizer; CannotWrite; Cancelled; LimitExceeded beyond 4 GiB of GLB or 2^31 -
 ///            1 vertices or triangles of PLY; InvalidArgument when a transform is not finite, not affine or singular,
 ///            the scale is not positive, a vertex comes to lie beyond the range of floats, or when a mesh contradicts

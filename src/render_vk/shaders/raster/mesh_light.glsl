@@ -26,9 +26,9 @@ vec3 light_by_levels(LevelPlace at, Placed placed) {
   return light_colour(levels, at.normal);
 }
 
-// The light of the sun and of lamps, or all light by levels. `voxel`: of an instance's tree, w: which instance, -1: it is in nobody's way.
-// `from`: where rays start, as in a GridRay; `normal`: in the world, unit; `diffuse`: of the sun; `at`: the same place
-// for levels.
+// The light of the sun and of lamps, or all light by levels. `voxel`: of an instance's tree, w: which instance, -1: it
+// is in nobody's way. `from`: where rays start, as in a GridRay; `normal`: in the world, unit; `diffuse`: of the sun;
+// `at`: the same place for levels.
 //
 // One loop over them all, for the reason that rays.glsl gives.
 vec3 traced_light(ivec4 voxel, ivec3 base, vec3 from, vec3 normal, float diffuse, LevelPlace at) {
