@@ -2,8 +2,12 @@
 
 #include <utility>
 
+#include <glm/gtc/quaternion.hpp>
+
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
+
+#include "render/render_test_support.h"
 
 namespace quoin {
 
@@ -36,6 +40,19 @@ struct Cave {
     scene.add_instance({"cave", grid_handle});
   }
 
+  [[nodiscard]] static Camera inside() { return render_test::towards({-26.0, -2.0, 12.0}, {6.0, -9.0, 0.0}, 1.2); }
+
+  /// The same cave turned, and a house on the first. Seen by `outside`.
+  void add_others() {
+    scene.add_instance({"turned", grid_handle, {90.0, 10.0, -20.0}, glm::angleAxis(0.7, DVec3(0.6, 0.0, 0.8))});
+    Grid house;
+    house.fill_box({{0, 0, 0}, {20, 12, 20}}, 1);
+    house.fill_box({{1, 1, 1}, {19, 11, 19}}, kAir);
+    house.fill_box({{6, 1, 19}, {12, 7, 20}}, kAir);
+    render_test::place(scene, std::move(house), {-10.0, 16.0, -10.0});
+  }
+  [[nodiscard]] static Camera outside() { return render_test::towards({110.0, 70.0, 120.0}, {30.0, 0.0, 0.0}, 0.9); }
+
   Scene scene;
   GridHandle grid_handle;
 
@@ -48,5 +65,20 @@ struct Cave {
     return scene.types.add(properties).value();
   }
 };
+
+[[nodiscard]] inline RenderOptions propagated(int width, int height, OcclusionMode occlusion = OcclusionMode::Off) {
+  RenderOptions options = render_test::sized(width, height);
+  options.light.model = LightModel::Propagated;
+  options.light.occlusion_mode = occlusion;
+  return options;
+}
+
+/// With halved grids, none of them far.
+inline void use_halved(RenderOptions& options) {
+  options.detail.policy = DetailPolicy{};
+  options.detail.policy->voxel_pixels = 100.0;
+  options.detail.policy->cell_pixels = 4.0;
+  options.detail.policy->far_pixels = 0;
+}
 
 }  // namespace quoin

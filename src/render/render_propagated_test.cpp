@@ -16,17 +16,6 @@ namespace {
 
 using namespace render_test;
 
-RenderOptions propagated(int width, int height) {
-  RenderOptions options = sized(width, height);
-  options.light.model = LightModel::Propagated;
-  options.light.occlusion_mode = OcclusionMode::Off;
-  return options;
-}
-
-Camera in_cave() {
-  return towards({-26.0, -2.0, 12.0}, {6.0, -9.0, 0.0}, 1.2);
-}
-
 int brightest(const Picture& picture) {
   return *std::max_element(picture.colour.rgb.begin(), picture.colour.rgb.end());
 }
@@ -51,7 +40,7 @@ TEST(RenderPropagated, ShowsTheLightBetweenTheCornersOfFaces) {
   options.light.sun = {0.4, 0.2, 0.1};
   options.light.lamp_brightness = 0.7;
   const CpuRenderer renderer(cave.scene);
-  const auto picture = renderer.render(in_cave(), options);
+  const auto picture = renderer.render(Cave::inside(), options);
   ASSERT_TRUE(picture);
   SceneLight light;
   light.update(cave.scene);
@@ -62,7 +51,7 @@ TEST(RenderPropagated, ShowsTheLightBetweenTheCornersOfFaces) {
   for (int y = 0; y < options.height; ++y) {
     for (int x = 0; x < options.width; ++x) {
       const PicturePoint point{x + 0.5, y + 0.5, options.width, options.height};
-      const Ray ray = ray_through(in_cave(), point);
+      const Ray ray = ray_through(Cave::inside(), point);
       const auto hit = first_hit(renderer.tracer(), ray);
       ASSERT_TRUE(hit);
       // What is seen through glass is tinted; what emits adds that.
@@ -99,9 +88,9 @@ TEST(RenderPropagated, AClosedRoomIsBlackAndOpensWithAnEdit) {
 TEST(RenderPropagated, OcclusionDarkensAllOfIt) {
   Cave cave;
   RenderOptions options = propagated(64, 48);
-  const Picture open = taken(cave.scene, in_cave(), options);
+  const Picture open = taken(cave.scene, Cave::inside(), options);
   options.light.occlusion_mode = OcclusionMode::Vertex;
-  const Picture occluded = taken(cave.scene, in_cave(), options);
+  const Picture occluded = taken(cave.scene, Cave::inside(), options);
   int darker = 0;
   for (std::size_t i = 0; i < open.colour.rgb.size(); ++i) {
     ASSERT_LE(occluded.colour.rgb[i], open.colour.rgb[i]);
@@ -113,8 +102,8 @@ TEST(RenderPropagated, OcclusionDarkensAllOfIt) {
 TEST(RenderPropagated, TheSameBytesWithAnyThreadsAndNoRaysForLight) {
   Cave cave;
   const RenderOptions options = propagated(64, 48);
-  const Picture one = taken(cave.scene, in_cave(), options, {1});
-  const Picture four = taken(cave.scene, in_cave(), options, {4});
+  const Picture one = taken(cave.scene, Cave::inside(), options, {1});
+  const Picture four = taken(cave.scene, Cave::inside(), options, {4});
   EXPECT_EQ(one.colour.rgb, four.colour.rgb);
   EXPECT_EQ(one.rays, 64 * 48);
 }
@@ -156,7 +145,7 @@ TEST(RenderPropagated, RefusesLeastLightThatIsNone) {
   Cave cave;
   RenderOptions options = propagated(8, 8);
   options.light.least_light = -1.0;
-  EXPECT_EQ(CpuRenderer(cave.scene).render(in_cave(), options).error().code, ErrorCode::InvalidArgument);
+  EXPECT_EQ(CpuRenderer(cave.scene).render(Cave::inside(), options).error().code, ErrorCode::InvalidArgument);
 }
 
 }  // namespace

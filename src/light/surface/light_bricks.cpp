@@ -73,13 +73,12 @@ void LightBricks::look_at_chunk(OfGrid& of, const GridLight& light, IVec3 chunk)
   }
   Occupied& held = of.occupied[chunk];
   held = {};
-  std::array<VoxelType, kChunkEdge> row;
   for (int z = 0; z < kChunkEdge; ++z) {
     for (int y = 0; y < kChunkEdge; ++y) {
-      voxels->read_row(y, z, row);
-      for (std::size_t x = 0; x < row.size(); ++x) {
-        const std::size_t bit = x / kEdge + 8 * static_cast<std::size_t>(y / kEdge);
-        held[static_cast<std::size_t>(z / kEdge)] |= std::uint64_t{row[x] != kAir} << bit;
+      const std::uint64_t row = ~voxels->row_mask(y, z, kAir);
+      for (int x = 0; x < kBricksOfChunk; ++x) {
+        const std::uint64_t is_held = (row >> (kEdge * x) & 0xFFU) != 0 ? 1 : 0;
+        held[static_cast<std::size_t>(z / kEdge)] |= is_held << (x + kBricksOfChunk * (y / kEdge));
       }
     }
   }

@@ -5,8 +5,6 @@
 #include <set>
 #include <utility>
 
-#include <glm/gtc/quaternion.hpp>
-
 #include <quoin/light/light_colour.h>
 
 #include "render/cave_for_tests.h"
@@ -18,23 +16,13 @@ namespace {
 using namespace render_test;
 using namespace vulkan_test;
 
-RenderOptions propagated(int width, int height) {
-  RenderOptions options = sized(width, height);
-  options.light.model = LightModel::Propagated;
-  options.light.occlusion_mode = OcclusionMode::Off;
-  return options;
-}
-
-Camera in_cave() {
-  return towards({-26.0, -2.0, 12.0}, {6.0, -9.0, 0.0}, 1.2);
-}
-
 class VulkanPropagated : public VulkanTest {};
 
 TEST_F(VulkanPropagated, ACaveIsThatOfTheProcessor) {
   Cave cave;
   RenderOptions options = propagated(240, 160);
-  expect_equal(taken(cave.scene, in_cave(), options), render_test::taken(cave.scene, in_cave(), options), "cave");
+  expect_equal(taken(cave.scene, Cave::inside(), options), render_test::taken(cave.scene, Cave::inside(), options),
+               "cave");
   options.light.occlusion_mode = OcclusionMode::Vertex;
   options.light.sky_follows_sun = true;
   options.light.sun = {0.5, 0.1, 0.2};
@@ -92,19 +80,11 @@ TEST_F(VulkanPropagated, EveryLevelHasTheColourThatTheProcessorGivesIt) {
 
 TEST_F(VulkanPropagated, TurnedHalvedAndManyGridsHaveTheirOwnLight) {
   Cave cave;
-  cave.scene.add_instance({"turned", cave.grid_handle, {90.0, 10.0, -20.0}, glm::angleAxis(0.7, DVec3(0.6, 0.0, 0.8))});
-  Grid house;
-  house.fill_box({{0, 0, 0}, {20, 12, 20}}, 1);
-  house.fill_box({{1, 1, 1}, {19, 11, 19}}, kAir);
-  house.fill_box({{6, 1, 19}, {12, 7, 20}}, kAir);
-  place(cave.scene, std::move(house), {-10.0, 16.0, -10.0});
-  const Camera camera = towards({110.0, 70.0, 120.0}, {30.0, 0.0, 0.0}, 0.9);
+  cave.add_others();
+  const Camera camera = Cave::outside();
   RenderOptions options = propagated(240, 160);
   expect_equal(taken(cave.scene, camera, options), render_test::taken(cave.scene, camera, options), "turned");
-  options.detail.policy = DetailPolicy{};
-  options.detail.policy->voxel_pixels = 100.0;
-  options.detail.policy->cell_pixels = 4.0;
-  options.detail.policy->far_pixels = 0;
+  use_halved(options);
   expect_equal(taken(cave.scene, camera, options), render_test::taken(cave.scene, camera, options), "halved");
 }
 

@@ -4,33 +4,22 @@
 #include <cstdlib>
 #include <utility>
 
-#include <glm/gtc/quaternion.hpp>
-
 #include "render/cave_for_tests.h"
 #include "render_vk/raster/mesh_for_tests.h"
 
 namespace quoin {
 namespace {
 
-using render_test::place;
-using render_test::sized;
 using render_test::towards;
 using vulkan_test::blocky_surfaces;
 using vulkan_test::mesh_options;
 
 class VulkanMeshPropagated : public vulkan_test::VulkanMeshTest {};
 
-RenderOptions propagated(int width, int height) {
-  RenderOptions options = sized(width, height);
-  options.light.model = LightModel::Propagated;
-  options.light.occlusion_mode = OcclusionMode::Vertex;
-  return options;
-}
-
 TEST_F(VulkanMeshPropagated, ACaveWithGlassIsThatOfTheProcessor) {
   Cave cave;
-  RenderOptions options = propagated(240, 160);
-  compare(cave.scene, towards({-26.0, -2.0, 12.0}, {6.0, -9.0, 0.0}, 1.2), options, "cave");
+  RenderOptions options = propagated(240, 160, OcclusionMode::Vertex);
+  compare(cave.scene, Cave::inside(), options, "cave");
   options.light.least_light = 0.03;
   options.light.lamp_brightness = 2.0;
   options.light.occlusion_mode = OcclusionMode::Off;
@@ -39,26 +28,18 @@ TEST_F(VulkanMeshPropagated, ACaveWithGlassIsThatOfTheProcessor) {
 
 TEST_F(VulkanMeshPropagated, TurnedHalvedAndFarGridsHaveTheirOwnLight) {
   Cave cave;
-  cave.scene.add_instance({"turned", cave.grid_handle, {90.0, 10.0, -20.0}, glm::angleAxis(0.7, DVec3(0.6, 0.0, 0.8))});
-  Grid house;
-  house.fill_box({{0, 0, 0}, {20, 12, 20}}, 1);
-  house.fill_box({{1, 1, 1}, {19, 11, 19}}, kAir);
-  house.fill_box({{6, 1, 19}, {12, 7, 20}}, kAir);
-  place(cave.scene, std::move(house), {-10.0, 16.0, -10.0});
-  const Camera camera = towards({110.0, 70.0, 120.0}, {30.0, 0.0, 0.0}, 0.9);
-  RenderOptions options = propagated(240, 160);
+  cave.add_others();
+  const Camera camera = Cave::outside();
+  RenderOptions options = propagated(240, 160, OcclusionMode::Vertex);
   compare(cave.scene, camera, options, "turned");
-  options.detail.policy = DetailPolicy{};
-  options.detail.policy->voxel_pixels = 100.0;
-  options.detail.policy->cell_pixels = 4.0;
-  options.detail.policy->far_pixels = 0;
+  use_halved(options);
   compare(cave.scene, camera, options, "halved");
 }
 
 TEST_F(VulkanMeshPropagated, AnEditOpensARoom) {
   Cave cave;
   const Camera camera = towards(DVec3(Cave::kRoom.min) + 0.9, DVec3(Cave::kRoom.max) - 0.9, 1.4);
-  const RenderOptions options = propagated(64, 48);
+  const RenderOptions options = propagated(64, 48, OcclusionMode::Vertex);
   const auto brightest = [&] {
     put(cave.scene, blocky_surfaces(cave.scene));
     const Image image = drawn(camera, mesh_options(options));
@@ -82,7 +63,7 @@ TEST_F(VulkanMeshPropagated, SmoothSurfacesAreLitAsTheFieldsThatTheyAreOf) {
   scene.add_instance({"", grid});
   put(scene, vulkan_test::live_surfaces(scene, SurfaceStyle::Smooth));
   const Camera camera = towards({30.0, 26.0, 34.0}, {0.0, 0.0, 0.0}, 0.9);
-  RenderOptions options = propagated(160, 120);
+  RenderOptions options = propagated(160, 120, OcclusionMode::Vertex);
   options.light.occlusion_mode = OcclusionMode::Off;
   const Image mesh = drawn(camera, mesh_options(options));
   const Picture cpu = render_test::taken(scene, camera, options);

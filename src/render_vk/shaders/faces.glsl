@@ -10,3 +10,9 @@ int axis_of(uint face) {
 float sign_of(uint face) {
   return (face & 1) == 0 ? 1.0 : -1.0;
 }
+// In the grid.
+vec3 face_normal(uint face) {
+  vec3 normal = vec3(0.0);
+  normal[axis_of(face)] = sign_of(face);
+  return normal;
+}

@@ -146,3 +146,23 @@ vec3 light_colour(vec4 levels, vec3 normal) {
   return light_of_facing(normal) *
          (frame().level_least.xyz + light.x * frame().level_sky.xyz + light.yzw * frame().level_lamps.xyz);
 }
+
+// Where light by levels is looked up.
+struct LevelPlace {
+  ivec3 voxel;  // of an instance's tree; or the sample of a surface from which `inside` counts
+  vec3 inside;
+  vec3 normal;  // in the grid
+  int face;     // of the voxel; -1: on a surface
+};
+
+// All light of a surface point.
+vec3 light_by_levels(LevelPlace at, Placed placed) {
+  ivec3 cell = at.voxel + placed.origin.xyz;
+  vec4 levels;
+  if (at.face < 0) {
+    levels = levels_before(cell, at.inside, at.normal, placed.origin.w, placed.start_base.w);
+  } else {
+    levels = levels_on_face(cell, uint(at.face), at.inside, placed.origin.w, placed.start_base.w);
+  }
+  return light_colour(levels, at.normal);
+}

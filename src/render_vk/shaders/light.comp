@@ -64,13 +64,6 @@ float openness_of_far(Point point) {
   return 1.0 - occlusion_at(corners, point.what.y, point.inside.xyz) / 3.0;
 }
 
-// Of a face, in the grid.
-vec3 face_normal(uint face) {
-  vec3 normal = vec3(0.0);
-  normal[axis_of(face)] = sign_of(face);
-  return normal;
-}
-
 // The upright of a surface point, in its grid.
 vec3 grid_normal(Point point) {
   return is_of_field(point) ? normal_of(point.what.y) : face_normal(point.what.y);
@@ -163,18 +156,9 @@ float openness_of(Point point, Placed placed, int open) {
   return traces_occlusion(point) ? float(open) / float(frame().occlusion_count) : 0.0;
 }
 
-// All light of a surface point, by the levels of the voxels before it.
-vec3 propagated_light(Point point, Placed placed) {
-  ivec3 cell = point.voxel.xyz + placed.origin.xyz;
-  int level = placed.origin.w;
-  int grid = placed.start_base.w;
-  vec4 levels;
-  if (is_of_field(point)) {
-    levels = levels_before(cell, point.inside.xyz, normal_of(point.what.y), level, grid);
-  } else {
-    levels = levels_on_face(cell, point.what.y, point.inside.xyz, level, grid);
-  }
-  return light_colour(levels, grid_normal(point));
+LevelPlace level_place(Point point) {
+  return LevelPlace(point.voxel.xyz, point.inside.xyz, grid_normal(point),
+                    is_of_field(point) ? -1 : int(point.what.y));
 }
 
 // What reaches a surface point: the sun's light and that of lamps, and its openness. One loop over all rays, for the
@@ -206,7 +190,7 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 light, out floa
       of_lamps += brought * passed;
     }
   }
-  light = has(kPropagated) ? propagated_light(point, placed) : sunlight + of_lamps;
+  light = has(kPropagated) ? light_by_levels(level_place(point), placed) : sunlight + of_lamps;
   openness = openness_of(point, placed, open);
 }
 

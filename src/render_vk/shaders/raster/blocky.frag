@@ -22,9 +22,7 @@ vec3 light_of(uint face) {
   behind[axis_of(face)] -= 0.5 * sign_of(face);
   ivec4 voxel = ivec4(base.xyz + ivec3(floor(behind)), home.w);
   vec4 normal = sign_of(face) * f.instances[what.y].axes[axis_of(face)];
-  vec3 in_grid = vec3(0.0);
-  in_grid[axis_of(face)] = sign_of(face);
-  LevelPlace at = LevelPlace(voxel.xyz, before_face(face, 0.0) - floor(behind), in_grid, int(face));
+  LevelPlace at = LevelPlace(voxel.xyz, before_face(face, 0.0) - floor(behind), face_normal(face), int(face));
   return traced_light(voxel, base.xyz & ~63, vec3(base.xyz & 63) + from, normal.xyz, diffuse, at);
 }
 

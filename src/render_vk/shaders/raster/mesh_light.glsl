@@ -7,25 +7,6 @@
 #include "rays.glsl"
 #include "levels.glsl"
 
-// Where light by levels is looked up.
-struct LevelPlace {
-  ivec3 voxel;  // of an instance's tree; or the sample of a surface from which `inside` counts
-  vec3 inside;
-  vec3 normal;  // in the grid
-  int face;     // of the voxel; -1: on a surface
-};
-
-vec3 light_by_levels(LevelPlace at, Placed placed) {
-  ivec3 cell = at.voxel + placed.origin.xyz;
-  vec4 levels;
-  if (at.face < 0) {
-    levels = levels_before(cell, at.inside, at.normal, placed.origin.w, placed.start_base.w);
-  } else {
-    levels = levels_on_face(cell, uint(at.face), at.inside, placed.origin.w, placed.start_base.w);
-  }
-  return light_colour(levels, at.normal);
-}
-
 // The light of the sun and of lamps, or all light by levels. `voxel`: of an instance's tree, w: which instance, -1: it
 // is in nobody's way. `from`: where rays start, as in a GridRay; `normal`: in the world, unit; `diffuse`: of the sun;
 // `at`: the same place for levels.

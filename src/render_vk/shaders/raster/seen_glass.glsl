@@ -58,9 +58,7 @@ LitPoint point_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
   }
   vec3 from = vec3(body.voxel.xyz & 63) + inside;
   from[axis_of(face)] += frame().lift / placed.ref_view.w * sign_of(face);
-  vec3 in_grid = vec3(0.0);
-  in_grid[axis_of(face)] = sign_of(face);
-  LevelPlace at = LevelPlace(body.voxel.xyz, inside, in_grid, int(face));
+  LevelPlace at = LevelPlace(body.voxel.xyz, inside, face_normal(face), int(face));
   return LitPoint(body.voxel, body.voxel.xyz & ~63, from, normal, diffuse, surface.colour, surface.emitted, openness,
                   at);
 }
