@@ -50,6 +50,7 @@ struct MeshPictureOptions {
 /// Light:  shadows, and the light of lamps, are found by rays from what a pixel shows through the voxels that the
 ///         VulkanRenderer has, in the detail of the picture: whatever casts shadows there casts them here, drawn or
 ///         not. Those of smooth surfaces start one voxel before them. Glass tints the sun by each grid by itself.
+///         LightModel::Propagated is of the same voxels, without rays.
 /// Detail: of far instances the impostor is drawn, but where all chunks' meshes are there and have fewer quads than it
 ///         has faces, and of the meshes what is transparent; of a smooth one that is its voxels' faces. Until its
 ///         impostor is there an instance is drawn halved.
@@ -81,12 +82,12 @@ class VulkanMeshRenderer {
 
   /// Draws all there is; `threads` are for what detail needs.
   ///
-  /// Requires: with levels of detail or lamps the scene was not edited since the last update of this and of the
-  ///           VulkanRenderer; this is not checked.
+  /// Requires: with levels of detail, lamps or propagated light the scene was not edited since the last update of this
+  ///           and of the VulkanRenderer; this is not checked.
   /// Errors:   also InvalidArgument for sizes and samples that cannot be, for cameras as CpuRenderer::render and those
-  ///           whose axes lie in one plane, for a picture of another renderer, and with shadows, lamps, levels of
-  ///           detail or glass by rays, if there is any, when the VulkanRenderer was not last updated with the same
-  ///           scene and filter; Unsupported for wireframes where the device has no lines. After an error in drawing
+  ///           whose axes lie in one plane, for a picture of another renderer, and with shadows, lamps, propagated
+  ///           light, levels of detail or glass by rays, if there is any, when the VulkanRenderer was not last updated
+  ///           with the same scene and filter; Unsupported for wireframes where the device has no lines. After an error in drawing
   ///           the picture has no samples.
   [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options = {},
                             Threads threads = {});

@@ -42,8 +42,8 @@ enum class Accumulation : std::uint8_t {
 ///          silhouettes, where single precision can take a ray past another voxel: less than a pixel in a thousand,
 ///          unless whole rows of rays run within the faces of voxels. Counts of rays differ as little.
 /// Detail:  grids are halved and impostors built on the processor, when a picture first asks for them, from the scene
-///          of the last update: pictures with `DetailOptions::policy`, and the first with lamps, require that it is
-///          still there, unedited.
+///          of the last update: pictures with `DetailOptions::policy`, and the first with lamps or propagated
+///          light, require that it is still there, unedited.
 /// Device:  computes with 32-bit numbers, relative to the camera, and addresses memory by pointers; so what it needs is
 ///          Vulkan 1.2 with bufferDeviceAddress, and worlds are as large as its memory, whatever its limits to buffers.
 /// Errors:  LimitExceeded when a memory is full; DeviceLost, after which a new renderer is needed; Unsupported for what

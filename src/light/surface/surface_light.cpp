@@ -136,21 +136,24 @@ void SurfaceLight::split(const QuadBuffer& quads, IVec3 chunk, LightMerging merg
   Rows& rows = *rows_;
   for (const Quad quad : quads) {
     const FaceFrame& frame = frame_of(quad.direction());
-    const IVec3 first = chunk * kChunkEdge + quad.voxel() + normal_of(quad.direction());
+    const IVec3 along_u(frame.u == 0, frame.u == 1, frame.u == 2);
+    const IVec3 along_v(frame.v == 0, frame.v == 1, frame.v == 2);
+    IVec3 first = chunk * kChunkEdge + quad.voxel() + normal_of(quad.direction()) - along_u - along_v;
     const int width = quad.size_u();
     const int height = quad.size_v();
     rows.fronts.clear();
-    for (int v = -1; v <= height; ++v) {
-      for (int u = -1; u <= width; ++u) {
-        IVec3 at = first;
-        at[frame.u] += u;
-        at[frame.v] += v;
-        rows.fronts.push_back(rows.voxels.front(at));
-      }
+    for (int v = -1; v <= height; ++v, first += along_v) {
+      IVec3 at = first;
+      for (int u = -1; u <= width; ++u, at += along_u) rows.fronts.push_back(rows.voxels.front(at));
     }
     rows.corners.clear();
     for (int v = 0; v <= height; ++v) {
       for (int u = 0; u <= width; ++u) rows.corners.push_back(corner_of_quad(rows.fronts, width, height, u, v));
+    }
+    if (width == 1 && height == 1) {
+      out.push_back(quad);
+      corners.push_back({rows.corners[0], rows.corners[1], rows.corners[3], rows.corners[2]});
+      continue;
     }
     QuadCutter cutter(width, height, rows.corners, rows.done);
     cutter.cut(merging, [&](int u, int v, int along_u, int along_v) {
