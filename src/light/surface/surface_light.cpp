@@ -136,15 +136,15 @@ void SurfaceLight::split(const QuadBuffer& quads, IVec3 chunk, LightMerging merg
   Rows& rows = *rows_;
   for (const Quad quad : quads) {
     const FaceFrame& frame = frame_of(quad.direction());
-    const IVec3 along_u(frame.u == 0, frame.u == 1, frame.u == 2);
-    const IVec3 along_v(frame.v == 0, frame.v == 1, frame.v == 2);
-    IVec3 first = chunk * kChunkEdge + quad.voxel() + normal_of(quad.direction()) - along_u - along_v;
+    const IVec3 step_u(frame.u == 0, frame.u == 1, frame.u == 2);
+    const IVec3 step_v(frame.v == 0, frame.v == 1, frame.v == 2);
+    IVec3 first = chunk * kChunkEdge + quad.voxel() + normal_of(quad.direction()) - step_u - step_v;
     const int width = quad.size_u();
     const int height = quad.size_v();
     rows.fronts.clear();
-    for (int v = -1; v <= height; ++v, first += along_v) {
+    for (int v = -1; v <= height; ++v, first += step_v) {
       IVec3 at = first;
-      for (int u = -1; u <= width; ++u, at += along_u) rows.fronts.push_back(rows.voxels.front(at));
+      for (int u = -1; u <= width; ++u, at += step_u) rows.fronts.push_back(rows.voxels.front(at));
     }
     rows.corners.clear();
     for (int v = 0; v <= height; ++v) {
