@@ -33,6 +33,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/change_records.h", {"light"}},
     {"grid/chunk_boxes.h", {"trace"}},
     {"grid/chunk_order.h", {"light", "live", "mesh", "render", "scene", "trace"}},
+    {"grid/chunk_trie.h", {"light"}},
     {"grid/coordinate_hash.h", {"light", "live", "mesh", "scene", "trace"}},
     {"grid/density/cell_corners.h", {"mesh", "trace"}},
     {"grid/density/density_storage.h", {"mesh", "trace"}},

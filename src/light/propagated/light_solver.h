@@ -5,105 +5,134 @@
 #include <memory>
 #include <vector>
 
-#include <quoin/core/direction.h>
-#include <quoin/grid/chunk.h>
-#include <quoin/grid/voxel_registry.h>
+#include <quoin/core/vec.h>
 
+#include "light/propagated/chunk_masks.h"
+#include "light/propagated/light_chunk.h"
 #include "light/propagated/light_store.h"
-#include "light/propagated/spread.h"
 
 namespace quoin::propagated {
 
-/// What a type does to light.
-struct TypeLight {
-  std::uint16_t lamp = 0;    ///< packed levels that it gives off
-  std::uint8_t passes = 15;  ///< bit c: channel c
+inline constexpr std::size_t kSky = 0;
+/// Steps that light goes from where it comes from, until it is dark.
+inline constexpr int kReach = 14;
 
-  bool operator==(const TypeLight&) const = default;
+/// A chunk in a region or beside it.
+struct ChunkAround {
+  bool is_held = false;                ///< else its light stays as it is: dark, ...
+  bool is_open = false;                ///< ... or all sky
+  const ChunkMasks* masks = nullptr;   ///< of those that are held, of where the region lies in it
+  const LightChunk* light = nullptr;   ///< null: dark
+  IBox unknown;                        ///< of the chunk: where its light is not to be relied on
 };
 
-/// The light around a chunk, one voxel beyond each side.
-struct LightBorder {
-  /// [direction]: null where it is `beyond` everywhere.
-  std::array<const ChunkLight*, 6> chunk{};
-  std::array<std::uint16_t, 6> beyond{};
+/// Voxels whose light is to be found.
+struct LightRegion {
+  struct Box {
+    IBox voxels;  ///< all that are looked at
+    IBox wanted;  ///< some of these
+
+    bool operator==(const Box&) const = default;
+  };
+  std::array<Box, kChannels> channels;  ///< empty: that channel stays as it is
+  Box all;                              ///< around these
+  IBox chunks;                          ///< those in `all.voxels` and beside them
+  std::vector<ChunkAround> around;      ///< [x, y, z] of these, x fastest
+
+  [[nodiscard]] std::size_t index(IVec3 chunk) const {
+    const IVec3 p = chunk - chunks.min;
+    const IVec3 size = chunks.max - chunks.min;
+    return static_cast<std::size_t>(p.x + size.x * (p.y + size.y * p.z));
+  }
+  [[nodiscard]] const ChunkAround& at(IVec3 chunk) const { return around[index(chunk)]; }
+  [[nodiscard]] ChunkAround& at(IVec3 chunk) { return around[index(chunk)]; }
 };
 
-/// Light in a box of a chunk, given that around it. Reused from chunk to chunk: it only grows.
+/// Light in a region, given that around it. Reused from region to region: it only grows.
 ///
 /// Levels are spread as sets of 64 voxels, from 15 down:
 ///
-///   front[L] = (front[L + 1] moved by one along each axis, or sources[L]), where no higher level has been
+///   front[L] = source[L] | (front[L + 1] moved by one along each axis, where light passes and it is dark)
 ///
-/// Sources are what lamps give off, and what the light around the box becomes one step within it. In one pass over the
-/// 15 levels every voxel has its own, since none is lit by a lower one. Sky of level 15 goes down first.
+/// Sources are what lamps give off and the light at the region's rim, one voxel around it. In one pass over the levels
+/// every voxel has its own, since none is lit by a lower one. Sky of level 15 falls first. At each level only those
+/// blocks of rows are looked at beside which something is of the level before.
+///
+///   words [z][column][y]: bit x of the region is bit x % 64 of column x / 64; x, y and z count from the rim
 class LightSolver {
  public:
-  LightSolver();
-  /// Replaces the light of the box. `voxels`: null where all is air.
-  [[nodiscard]] ChangedRows solve(const Chunk* voxels, const std::vector<TypeLight>& types, const LightBorder& border,
-                                  const IBox& box, ChunkLight& light);
+  /// Whether a region is not too large.
+  [[nodiscard]] static bool fits(IVec3 size);
+
+  /// What becomes of the light that is wanted: equal to that of all voxels, where of those at the region's rim whose
+  /// light is unknown none is within 14 of it, and the others have theirs. `changes`: one for each chunk that has of
+  /// what is wanted, x fastest. Requires: fits(all.voxels.size()).
+  void solve(const LightRegion& region, std::vector<ChunkLightChange>& changes);
+
+  /// Masks for whoever has none that last; they are reused.
+  [[nodiscard]] ChunkMasks& own_masks(std::size_t i) {
+    while (own_masks_.size() <= i) own_masks_.push_back(std::make_unique<ChunkMasks>());
+    return *own_masks_[i];
+  }
 
  private:
-  /// Voxels of a row that get a level, if no higher one.
   struct Source {
-    std::uint32_t row;
-    std::uint32_t block;  // z * 8 + y / 8
-    std::uint64_t voxels;
+    std::uint32_t at;
+    std::uint16_t z;
+    std::uint16_t block;
+    std::uint64_t where;
   };
-  struct Front {
-    Plane plane;  // empty but for the blocks of `lit`
-    BlockSet lit{};
-  };
-  struct Scratch {
-    std::array<Plane, kChannels> pass;  // where light passes, in the box
-    std::array<Plane, kPlanes> level;
-    Plane open;
-    std::array<Front, 2> fronts;
-    BlockSet blocks{};
-    BlockSet touched{};  // of `level`, which is empty elsewhere
-  };
-  /// Of a channel: what lies beside the box, in the chunk or beyond it.
-  struct Side {
-    const ChannelLight* light;  // null: `level` everywhere
-    unsigned level;
-    [[nodiscard]] unsigned uniform() const;
-    [[nodiscard]] std::array<std::uint64_t, kPlanes> row(int y, int z) const;
-  };
-
+  struct Part;  // of a chunk
+  void solve(const LightRegion::Box& box, unsigned channels, std::vector<ChunkLightChange>& changes);
+  void shape(const LightRegion::Box& box);
   template <class Visit>
-  void for_each_row(Visit&& visit) const;
-  template <class Visit>
-  void for_each_block(Visit&& visit) const;
-  void read_voxels(const Chunk* voxels, const std::vector<TypeLight>& types);
-  void read_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, ChunkLight& light);
-  void begin_channel(std::size_t channel);
-  [[nodiscard]] Side side(Direction direction, std::size_t channel, const LightBorder& border,
-                          const ChunkLight& light) const;
-  void let_sky_fall(const Side& above);
-  void add_rows(Direction direction, const Side& beside);
-  void add_row(const std::array<std::uint64_t, kPlanes>& planes, int y, int z);
-  void add_end(Direction direction, const Side& beside);
-  void add_lamps(std::size_t channel);
-  void add(unsigned level, int y, int z, std::uint64_t voxels);
+  void for_each_part(const IBox& box, Visit&& visit) const;
+  void read_rim();
+  void read_light(const Part& part);
+  void read_channel(const Part& part, std::size_t channel, const ChannelLight& light, const IBox& unknown);
+  void open(const Part& part);
+  void read_inside();
+  void read_pass(std::size_t channel);
+  void find_passable();
+  void add_sources(std::size_t channel, const RowPlanes& planes, IVec3 first, std::uint64_t mask);
+  void add_source(std::size_t channel, unsigned level, IVec3 first, std::uint64_t where);
+  void add_word(std::size_t channel, unsigned level, int column, IVec3 at, std::uint64_t where);
+  [[nodiscard]] bool has_sources(std::size_t channel) const;
+  void light_up(const Source& source, unsigned level);
   void spread(std::size_t channel);
-  bool spread_to(std::size_t channel, unsigned level, Front& from, Front& to);
-  void set(unsigned level, std::size_t row, std::uint64_t voxels);
-  void replace(ChannelLight& light, ChangedRows& changed);
-  void clear(Plane& plane, std::size_t z, unsigned blocks) const;
+  [[nodiscard]] std::uint64_t blocks_near(int margin) const;
+  void activate(unsigned level);
+  [[nodiscard]] LevelPass step_to(unsigned level);
+  void clear_fronts();
+  void complete_planes();
+  void write(std::size_t channel, std::vector<ChunkLightChange>& changes);
+  bool write_open(const Part& part, const ChannelLight& before, ChunkLightChange& change) const;
+  void write_chunk(const Part& part, std::size_t channel, ChunkLightChange& change);
+  [[nodiscard]] bool is_touched(const Part& part, int y, int z) const;
+  void read_slab(const Part& part, int y, int z, SlabPlanes& now) const;
 
-  const SpreadKernel* kernel_ = nullptr;
-  IBox box_;
-  std::uint64_t inside_ = 0;  // of a row
-  std::unique_ptr<Scratch> scratch_;
-  std::array<std::size_t, kChannels> pass_of_{};  // the plane that a channel has
-  std::array<std::vector<Source>, 16> sources_;   // [level], of a channel
-  struct Lamp {
-    std::uint16_t light;
-    int y, z;
-    std::uint64_t voxels;
-  };
-  std::vector<Lamp> lamps_;
+  const LightRegion* region_ = nullptr;
+  LightRegion::Box box_;   // that is looked at
+  unsigned channels_ = 0;  // bit c: channel c is
+  IVec3 size_{0};          // of the box
+  IVec3 origin_{0};        // its rim's least voxel
+  std::size_t columns_ = 0;
+  std::size_t blocks_ = 0;  // of a column
+  std::size_t column_ = 0;  // words
+  std::size_t layer_ = 0;
+  std::array<std::array<std::vector<Source>, 16>, kChannels> sources_;  // [channel][level]
+  std::vector<std::unique_ptr<ChunkMasks>> own_masks_;
+  bool has_sky_ = false;  // there is sky that does not come by sources
+  std::vector<std::uint64_t> pass_;
+  std::vector<std::uint64_t> rest_;   // of it what is dark, in blocks that are touched
+  std::vector<std::uint64_t> front_;  // what has the present level; all 0 between regions
+  std::vector<std::uint64_t> next_;   // likewise: the level above, and then that below
+  std::array<std::vector<std::uint64_t>, kPlanes> planes_;
+  std::vector<std::uint64_t> wanted_bits_;  // [column]
+  // [z]: blocks
+  std::vector<std::uint64_t> passable_, open_, active_, touched_;
+  std::vector<std::uint64_t> in_front_, in_next_;  // where `front_` and `next_` are not 0
+  enum class Outcome : std::uint8_t { Dark, Open, Mixed } outcome_ = Outcome::Dark;
 };
 
 }  // namespace quoin::propagated

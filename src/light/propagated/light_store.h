@@ -1,102 +1,85 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
-#include <optional>
-#include <span>
+#include <utility>
 #include <vector>
 
+#include <quoin/grid/changes.h>
+
+#include "core/change_journal.h"
 #include "grid/change_records.h"
-#include "light/propagated/spread.h"
+#include "grid/chunk_order.h"
+#include "grid/chunk_trie.h"
+#include "light/propagated/light_chunk.h"
 
 namespace quoin::propagated {
 
-inline constexpr std::size_t kChannels = 4;  // sky, red, green, blue
-inline constexpr std::size_t kBlocks = kChunkEdge * kChunkEdge / kBlock;
+/// What became of the light of one chunk.
+struct ChunkLightChange {
+  IVec3 chunk{0};
+  std::array<ChannelChange, kChannels> channels;
+  VoxelRecord record;  ///< where something changed
 
-/// Levels of a channel in a chunk. Blocks of one level take two bytes, a chunk of one level nothing.
-class ChannelLight {
- public:
-  [[nodiscard]] static std::size_t block_of(int y, int z) {
-    return static_cast<std::size_t>(z) * (kChunkEdge / kBlock) + static_cast<std::size_t>(y) / kBlock;
+  [[nodiscard]] bool empty() const {
+    return std::all_of(channels.begin(), channels.end(), [](const ChannelChange& channel) { return channel.empty(); });
   }
+};
 
-  /// Null, and the level, where a block has one.
-  [[nodiscard]] const LevelBlock* block(std::size_t i, unsigned& level) const {
-    if (index_.empty()) {
-      level = level_;
-      return nullptr;
+/// The light of chunks, with the bookkeeping of changes. What is not there is dark.
+class LightStore {
+ public:
+  [[nodiscard]] const LightChunk* find(IVec3 chunk) const {
+    const Entry* entry = entries_.find(chunk.x, chunk.y, chunk.z);
+    return entry == nullptr ? nullptr : &entry->light;
+  }
+  void take(ChunkLightChange change) {
+    Entry& entry = entries_.find_or_create(change.chunk, [](auto&) {});
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      if (!change.channels[c].empty()) entry.light.channels[c].take(std::move(change.channels[c]));
     }
-    const std::uint16_t index = index_[i];
-    level = index & 15U;
-    return (index & kUniform) != 0 ? nullptr : &blocks_[index];
+    change.record.chunk = change.chunk;
+    journal_.note(entry.serial, change.record, entries_.size());
+    if (entry.light.is_dark()) entries_.erase(change.chunk, [](auto&) {});
   }
-  /// Bit planes of a row.
-  [[nodiscard]] std::array<std::uint64_t, kPlanes> row(int y, int z) const;
-  [[nodiscard]] unsigned at(int x, int y, int z) const;
-  /// The level of the whole chunk, if it is stored as one.
-  [[nodiscard]] std::optional<unsigned> uniform() const {
-    return index_.empty() ? std::optional<unsigned>(level_) : std::nullopt;
+  /// A chunk is dark from now on, and all of it may be another to readers: it comes, or goes.
+  void begin(IVec3 chunk) {
+    note_all(chunk);
+    entries_.erase(chunk, [](auto&) {});
   }
-
-  void put(std::size_t i, const LevelBlock& block);
-  /// After the last of some `put`: a chunk that has become one level is stored so.
-  void tidy();
-  [[nodiscard]] std::size_t bytes() const;
+  void clear() {
+    std::vector<IVec3> chunks;
+    entries_.for_each([&](IVec3 chunk, const Entry&) { chunks.push_back(chunk); });
+    for (const IVec3 chunk : chunks) note_all(chunk);
+    entries_.clear();
+  }
+  [[nodiscard]] GridChanges changes_since(ChangeCursor& cursor) const {
+    return journal_.changes_since<ChunkChange>(cursor, by_chunk);
+  }
+  [[nodiscard]] std::size_t bytes() const {
+    std::size_t sum = entries_.bytes();
+    entries_.for_each([&](IVec3, const Entry& entry) { sum += entry.light.bytes(); });
+    return sum;
+  }
 
  private:
-  static constexpr std::uint16_t kUniform = 0x8000;
-
-  unsigned level_ = 0;                // where index_ is empty
-  std::vector<std::uint16_t> index_;  // [block_of]: kUniform | level, or an index of blocks_
-  std::vector<LevelBlock> blocks_;
-  std::vector<std::uint16_t> free_;  // of blocks_
-};
-
-/// Light of a chunk; dark at first.
-struct ChunkLight {
-  std::array<ChannelLight, kChannels> channels;
-  std::uint64_t serial = 0;  // of the journal
-  /// [z / 4], bit y / 4: whether those 4x4 rows may have lamps. What solves finds out; edits have to tell.
-  std::array<std::uint16_t, kChunkEdge / 4> lamp_slabs = all_slabs();
-
-  [[nodiscard]] static std::array<std::uint16_t, kChunkEdge / 4> all_slabs() {
-    std::array<std::uint16_t, kChunkEdge / 4> all;
-    all.fill(0xFFFF);
-    return all;
+  struct Entry {
+    LightChunk light;
+    std::uint64_t serial = 0;
+  };
+  void note_all(IVec3 chunk) {
+    VoxelRecord record;
+    record.chunk = chunk;
+    record.add_all();
+    std::uint64_t none = 0;
+    Entry* entry = entries_.find_to_edit(chunk, [](auto&) {});
+    journal_.note(entry == nullptr ? none : entry->serial, record, entries_.size());
   }
-  /// Voxels of the box, which is not empty, are others than before.
-  void forget_lamps(const IBox& box);
 
-  [[nodiscard]] std::uint16_t at(IVec3 local) const;
-  void read_row(int y, int z, std::span<std::uint16_t, kChunkEdge> out) const;
-  /// What all of it is, packed, if it is stored as one.
-  [[nodiscard]] std::optional<std::uint16_t> uniform() const;
-  [[nodiscard]] std::size_t bytes() const;
+  ChunkTrie<Entry> entries_;
+  ChangeJournal<VoxelRecord> journal_;
 };
-
-/// Collects which voxels of a chunk changed.
-class ChangedRows {
- public:
-  void add_block(std::size_t block, const std::array<std::uint64_t, kBlock>& changed);
-  /// The smallest box around them, in the chunk's coordinates.
-  [[nodiscard]] IBox box() const;
-  /// Requires: some changed.
-  [[nodiscard]] VoxelRecord record(IVec3 chunk) const;
-
- private:
-  // Rows whose neighbours lie in the same chunks: those of y or z of 0, 1 to 62, 63.
-  static constexpr std::array<std::uint8_t, 3> kFirst{0, 1, 63};
-  [[nodiscard]] static std::size_t kind_of(int local);
-
-  std::array<std::array<std::uint64_t, 3>, 3> any_{};  // [kind of z][kind of y]
-  ChunkSlabs slabs_;
-  std::uint64_t x_ = 0;
-  std::uint64_t y_ = 0;
-  std::uint64_t z_ = 0;
-};
-
-/// Makes all of a chunk one light.
-[[nodiscard]] ChangedRows fill(ChunkLight& light, std::uint16_t word);
 
 }  // namespace quoin::propagated

@@ -1,38 +1,42 @@
-// An update is a queue of boxes, a chunk's each, that are to be solved again: those around edits first. What a solution
-// changes at the side of its box puts what lies beyond into the queue, until nothing changes any more. Since light is
-// one level less with every step, there is one state in which nothing does.
+// An edit changes light no farther around it than its level less one, and around the columns that the sky falls down:
+// that box is solved from nothing, given the light around it, which stays as it is. Boxes that touch are one. Where
+// that would be too large, chunks are: a layer of them after the other from above, each with as much around it as light
+// comes from, so that none is solved twice.
 #include <quoin/light/propagated_light.h>
 
 #include <algorithm>
-#include <bit>
+#include <array>
 #include <cmath>
 #include <map>
-#include <optional>
+#include <memory>
 #include <unordered_map>
 #include <utility>
 
-#include <quoin/grid/changes.h>
-
-#include "core/change_journal.h"
-#include "grid/change_records.h"
 #include "grid/chunk_order.h"
 #include "grid/coordinate_hash.h"
 #include "light/propagated/light_domain.h"
+#include "light/propagated/light_quads.h"
+#include "light/propagated/light_reader.h"
 #include "light/propagated/light_solver.h"
 #include "light/propagated/light_store.h"
 
 namespace quoin {
 namespace {
 
-using propagated::ChangedRows;
-using propagated::ChunkLight;
-using propagated::LightBorder;
+using propagated::ChunkAround;
+using propagated::ChunkLightChange;
+using propagated::ChunkMasks;
+using propagated::kChannels;
+using propagated::kReach;
+using propagated::kSky;
 using propagated::LightDomain;
+using propagated::LightReader;
+using propagated::LightRegion;
 using propagated::LightSolver;
+using propagated::LightStore;
 using propagated::TypeLight;
 
-constexpr int kReach = 15;
-constexpr std::uint16_t kOpenSky = 15;
+constexpr unsigned kBrightest = 15;
 
 std::vector<TypeLight> type_lights(const VoxelRegistry& types, const PropagatedLightOptions& options) {
   std::vector<TypeLight> lights(types.size());
@@ -54,6 +58,21 @@ std::vector<TypeLight> type_lights(const VoxelRegistry& types, const PropagatedL
   return lights;
 }
 
+// Bit c: whether any type gives off channel c.
+unsigned lamp_channels(const std::vector<TypeLight>& lights) {
+  unsigned channels = 0;
+  for (const TypeLight& light : lights) {
+    for (std::size_t c = 0; c < kChannels; ++c) channels |= static_cast<unsigned>((light.lamp >> (4 * c) & 15U) != 0) << c;
+  }
+  return channels;
+}
+
+IBox around_all(const std::array<IBox, kChannels>& boxes) {
+  IBox all;
+  for (const IBox& box : boxes) all = unite(all, box);
+  return all;
+}
+
 IBox grown(const IBox& box, int by) {
   return {box.min - by, box.max + by};
 }
@@ -71,282 +90,341 @@ LightLevels lamp_levels(const VoxelProperties& properties) {
 }
 
 struct PropagatedLight::Impl {
+  /// Voxels whose light may be another.
+  using Dirty = std::array<IBox, kChannels>;  // [channel]
   using Queue = std::map<IVec3, IBox, bool (*)(IVec3, IVec3)>;
-  struct Job {
-    IVec3 chunk;
-    IBox box;  // of the chunk
-    ChunkLight* light;
-    ChangedRows changed;
-  };
 
-  // Null: dark.
-  [[nodiscard]] const ChunkLight* stored(IVec3 chunk) const {
-    const auto found = levels.find(chunk);
-    return found == levels.end() ? nullptr : found->second.get();
-  }
-  class WordReader;
+  [[nodiscard]] LightReader reader() const { return {store, domain}; }
   void begin_anew(const Grid& grid);
   void take_over(const Grid& grid, const GridChanges& changes);
+  [[nodiscard]] Dirty reach_of(const Grid& grid, const IBox& voxels) const;
+  [[nodiscard]] std::array<unsigned, kChannels> highest_levels(const Grid& grid, const IBox& voxels) const;
+  [[nodiscard]] int end_of_sky(const Grid& grid, const IBox& voxels) const;
   void change_domain(const Grid& grid, const std::vector<IVec3>& chunks);
-  void take_in(IVec3 chunk);
-  void let_go(IVec3 chunk);
-  void add_beside(IVec3 chunk);
-  void add(IVec3 chunk, const IBox& box);
-  void add_part(IVec3 chunk, const IBox& voxels);
-  void add_all(const IBox& voxels);
-  [[nodiscard]] IBox reach_of(const Grid& grid, const IBox& voxels) const;
-  void run(const Grid& grid, Threads threads);
-  [[nodiscard]] std::vector<Job> next_jobs();
-  void solve(const Grid& grid, LightSolver& solver, Job& job) const;
-  [[nodiscard]] LightBorder border_of(IVec3 chunk) const;
-  [[nodiscard]] std::optional<std::uint16_t> uniform_light(const Grid& grid, IVec3 chunk,
-                                                           const LightBorder& border) const;
-  void note_all(IVec3 chunk, ChunkLight& light);
-  void go_on(const Job& job, const IBox& changed);
+  void add_chunks(const IBox& voxels);
+  void sort_dirty();
+  void solve_dirty(const Grid& grid, Threads threads);
+  void solve_queue(const Grid& grid, Threads threads);
+  [[nodiscard]] std::vector<LightRegion> next_layer() const;
+  void read_masks(const Grid& grid, const std::vector<LightRegion>& regions, Threads threads);
+  [[nodiscard]] ChunkAround around(IVec3 chunk) const;
+  void look_around(LightRegion& region) const;
+  void solve(std::vector<LightRegion>& regions, Threads threads, FunctionRef<void(LightSolver&, LightRegion&)> prepare);
 
   PropagatedLightOptions options;
   ChangeCursor followed_grid;
   ChangeCursor followed_types;
   std::vector<TypeLight> lights;
+  unsigned lamp_channels = 0;  // that any type gives off
   LightDomain domain;
-  std::unordered_map<IVec3, std::unique_ptr<ChunkLight>, CoordinateHash> levels;  // of the chunks of the domain
-  ChangeJournal<VoxelRecord> journal;                                             // of `levels`
-  Queue queue{by_zyx};
-};
-
-/// Remembers the chunk that it read last.
-class PropagatedLight::Impl::WordReader {
- public:
-  explicit WordReader(const Impl& of) : of_(of) {}
-  std::uint16_t at(IVec3 voxel) {
-    const IVec3 chunk = chunk_of(voxel);
-    if (!is_known_ || chunk != last_) look_at(chunk);
-    return stored_ == nullptr ? word_ : stored_->at(local_of(voxel));
-  }
-
- private:
-  void look_at(IVec3 chunk) {
-    is_known_ = true;
-    last_ = chunk;
-    const bool is_held = of_.domain.holds(chunk);
-    stored_ = is_held ? of_.stored(chunk) : nullptr;
-    word_ = is_held ? std::uint16_t{0} : of_.domain.beyond(chunk);
-  }
-
-  const Impl& of_;
-  bool is_known_ = false;
-  IVec3 last_{0};
-  const ChunkLight* stored_ = nullptr;
-  std::uint16_t word_ = 0;
+  LightStore store;            // of the chunks of the domain
+  std::vector<Dirty> dirty;    // boxes that are to be solved by themselves
+  Queue queue{by_zyx};         // boxes of chunks that are to be solved, a layer at a time
+  std::unordered_map<IVec3, std::unique_ptr<ChunkMasks>, CoordinateHash> masks;  // during an update
 };
 
 void PropagatedLight::Impl::begin_anew(const Grid& grid) {
   queue.clear();
+  dirty.clear();
   domain.clear();
-  for (const auto& [chunk, light] : levels) note_all(chunk, *light);
-  levels.clear();
+  store.clear();
   change_domain(grid, grid.chunks());
 }
 
-// Chunks that came or went, or may have: light of what the domain has now is found from nothing.
+// Chunks that came or went, or may have: light of what the domain has now is found from nothing, and that around.
 void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IVec3>& chunks) {
   std::vector<LightDomain::Change> changed;
   for (const IVec3 chunk : chunks) domain.set(chunk, grid.find_chunk(chunk) != nullptr, changed);
+  std::vector<IVec3> others;
   for (const LightDomain::Change& column : changed) {
     const LightDomain::Range old = column.before;
-    for (int y = old.begin; y < old.end; ++y) {
-      if (y < column.now.begin || y >= column.now.end) let_go({column.x, y, column.z});
+    const LightDomain::Range now = column.now;
+    for (int y = std::min(old.begin, now.begin); y < std::max(old.end, now.end); ++y) {
+      const bool was_held = y >= old.begin && y < old.end;
+      const bool is_held = y >= now.begin && y < now.end;
+      if (was_held == is_held) continue;
+      store.begin({column.x, y, column.z});
+      others.push_back({column.x, y, column.z});
     }
-    for (int y = column.now.begin; y < column.now.end; ++y) {
-      if (y < old.begin || y >= old.end) take_in({column.x, y, column.z});
-    }
+  }
+  for (const IVec3 chunk : others) {
+    const IVec3 low = chunk * kChunkEdge;
+    add_chunks(grown({low, low + kChunkEdge}, kReach + 1));
   }
 }
 
-// It begins in the dark: light that grows comes to its end in fewer steps than light that dwindles. To those beside it
-// it was as the domain said, and so it was to readers, the open sky nearly always.
-void PropagatedLight::Impl::take_in(IVec3 chunk) {
-  std::unique_ptr<ChunkLight>& light = levels[chunk];
-  if (light == nullptr) light = std::make_unique<ChunkLight>();
-  note_all(chunk, *light);
-  add(chunk, kWholeChunk);
-  add_beside(chunk);
-}
-
-void PropagatedLight::Impl::let_go(IVec3 chunk) {
-  const auto found = levels.find(chunk);
-  if (found != levels.end()) {
-    note_all(chunk, *found->second);
-    levels.erase(found);
-  }
-  add_beside(chunk);
-}
-
-// It is about to go, or has just come: readers have what the domain says on the other side.
-void PropagatedLight::Impl::note_all(IVec3 chunk, ChunkLight& light) {
-  VoxelRecord record;
-  record.chunk = chunk;
-  record.add_all();
-  journal.note(light.serial, record, levels.size());
-}
-
-void PropagatedLight::Impl::add_beside(IVec3 chunk) {
-  for (const Direction direction : kDirections) add(chunk + normal_of(direction), kWholeChunk);
-}
-
-// A box of the chunk's voxels is to be solved again, if the domain holds it.
-void PropagatedLight::Impl::add(IVec3 chunk, const IBox& box) {
-  if (box.empty() || !domain.holds(chunk)) return;
-  IBox& known = queue[chunk];
-  known = unite(known, box);
-}
-
-void PropagatedLight::Impl::add_part(IVec3 chunk, const IBox& voxels) {
-  const IVec3 low = chunk * kChunkEdge;
-  add(chunk, intersect({voxels.min - low, voxels.max - low}, kWholeChunk));
-}
-
-// Where light may differ for edits of these voxels: as far as it reaches, around columns that the sky falls down too.
-IBox PropagatedLight::Impl::reach_of(const Grid& grid, const IBox& voxels) const {
-  int low = voxels.min.y;
-  WordReader words(*this);
-  for (int z = voxels.min.z; z < voxels.max.z; ++z) {
-    for (int x = voxels.min.x; x < voxels.max.x; ++x) {
-      bool has_sky = (words.at({x, voxels.max.y, z}) & 15) == kOpenSky;
-      for (int y = voxels.min.y; y < voxels.max.y; ++y) has_sky |= (words.at({x, y, z}) & 15) == kOpenSky;
-      if (!has_sky) continue;
-      const LightDomain::Range range = domain.range(x >> kChunkShift, z >> kChunkShift);
-      int y = voxels.min.y;
-      const auto passes = [&] {
-        const VoxelType type = grid.get(x, y - 1, z);
-        return type < lights.size() && (type == kAir || (lights[type].passes & 1U) != 0);
-      };
-      while (y - 1 >= range.begin * kChunkEdge && passes()) --y;
-      low = std::min(low, y);
-    }
-  }
-  return grown({{voxels.min.x, low, voxels.min.z}, voxels.max}, kReach);
-}
-
-void PropagatedLight::Impl::add_all(const IBox& voxels) {
+// A box of voxels is to be solved by chunks, of those that the domain holds.
+void PropagatedLight::Impl::add_chunks(const IBox& voxels) {
   const IVec3 first = chunk_of(voxels.min);
   const IVec3 last = chunk_of(voxels.max - 1);
   for (int z = first.z; z <= last.z; ++z) {
     for (int y = first.y; y <= last.y; ++y) {
-      for (int x = first.x; x <= last.x; ++x) add_part({x, y, z}, voxels);
+      for (int x = first.x; x <= last.x; ++x) {
+        const IVec3 chunk{x, y, z};
+        if (!domain.holds(chunk)) continue;
+        const IVec3 low = chunk * kChunkEdge;
+        IBox& known = queue[chunk];
+        known = unite(known, intersect({voxels.min - low, voxels.max - low}, kWholeChunk));
+      }
     }
   }
+}
+
+// Of the light that voxels had, themselves and beside them, and of the lamps that they are now.
+std::array<unsigned, kChannels> PropagatedLight::Impl::highest_levels(const Grid& grid, const IBox& voxels) const {
+  constexpr int kMany = 512;
+  std::array<unsigned, kChannels> highest{};
+  const auto add = [&](std::uint16_t word) {
+    for (std::size_t c = 0; c < kChannels; ++c) highest[c] = std::max(highest[c], word >> (4 * c) & 15U);
+  };
+  const IVec3 size = voxels.size();
+  if (std::int64_t{size.x} * size.y * size.z > kMany) {
+    for (std::size_t c = 0; c < kChannels; ++c) highest[c] = c == kSky || (lamp_channels >> c & 1U) != 0 ? kBrightest : 0;
+    return highest;
+  }
+  LightReader words = reader();
+  const IBox beside = grown(voxels, 1);
+  for (int z = beside.min.z; z < beside.max.z; ++z) {
+    for (int y = beside.min.y; y < beside.max.y; ++y) {
+      for (int x = beside.min.x; x < beside.max.x; ++x) {
+        add(words.at({x, y, z}));
+        if (!voxels.contains({x, y, z})) continue;
+        const VoxelType type = grid.get(x, y, z);
+        if (type < lights.size()) add(lights[type].lamp);
+      }
+    }
+  }
+  return highest;
+}
+
+// Down to where columns of the sky change, of which voxels are part.
+int PropagatedLight::Impl::end_of_sky(const Grid& grid, const IBox& voxels) const {
+  int low = voxels.max.y;
+  LightReader words = reader();
+  for (int z = voxels.min.z; z < voxels.max.z; ++z) {
+    for (int x = voxels.min.x; x < voxels.max.x; ++x) {
+      int y = voxels.max.y;
+      while (y >= voxels.min.y && (words.at({x, y, z}) & 15U) != kBrightest) --y;
+      if (y < voxels.min.y) continue;
+      const LightDomain::Range range = domain.range(x >> kChunkShift, z >> kChunkShift);
+      const auto passes = [&](int below) {
+        const VoxelType type = grid.get(x, below, z);
+        return type < lights.size() && (type == kAir || (lights[type].passes >> kSky & 1U) != 0);
+      };
+      y = voxels.min.y;
+      while (y - 1 >= range.begin * kChunkEdge && passes(y - 1)) --y;
+      low = std::min(low, y);
+    }
+  }
+  return low;
+}
+
+// Where light may differ for edits of these voxels. The domain is still that of before.
+PropagatedLight::Impl::Dirty PropagatedLight::Impl::reach_of(const Grid& grid, const IBox& voxels) const {
+  std::array<unsigned, kChannels> highest = highest_levels(grid, voxels);
+  IBox from = voxels;
+  if (highest[kSky] == kBrightest) from.min.y = std::min(from.min.y, end_of_sky(grid, voxels));
+  Dirty reached;
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    if (highest[c] > 0) reached[c] = grown(c == kSky ? from : voxels, static_cast<int>(highest[c]) - 1);
+  }
+  return reached;
 }
 
 void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& changes) {
   std::vector<IVec3> chunks;
   chunks.reserve(changes.items.size());
-  for (const ChunkChange& change : changes.items) chunks.push_back(change.chunk);
-  change_domain(grid, chunks);
   for (const ChunkChange& change : changes.items) {
+    chunks.push_back(change.chunk);
     const IVec3 low = change.chunk * kChunkEdge;
-    if (const auto found = levels.find(change.chunk); found != levels.end()) found->second->forget_lamps(change.box);
-    add_all(reach_of(grid, {change.box.min + low, change.box.max + low}));
+    dirty.push_back(reach_of(grid, {change.box.min + low, change.box.max + low}));
   }
+  change_domain(grid, chunks);
+  sort_dirty();
 }
 
-LightBorder PropagatedLight::Impl::border_of(IVec3 chunk) const {
-  LightBorder border;
-  for (const Direction direction : kDirections) {
-    const IVec3 other = chunk + normal_of(direction);
-    const auto i = static_cast<std::size_t>(direction);
-    if (domain.holds(other)) {
-      border.chunk[i] = stored(other);  // dark where nothing is stored
-    } else {
-      border.beyond[i] = domain.beyond(other);
-    }
-  }
-  return border;
-}
-
-// Of chunks of air under the open sky, and in the dark.
-std::optional<std::uint16_t> PropagatedLight::Impl::uniform_light(const Grid& grid, IVec3 chunk,
-                                                                  const LightBorder& border) const {
-  if (grid.find_chunk(chunk) != nullptr) return std::nullopt;
-  std::array<std::uint16_t, 6> around{};
-  for (std::size_t i = 0; i < around.size(); ++i) {
-    const std::optional<std::uint16_t> word =
-        border.chunk[i] != nullptr ? border.chunk[i]->uniform() : std::optional(border.beyond[i]);
-    if (!word) return std::nullopt;
-    around[i] = *word;
-    if (around[i] != 0 && around[i] != kOpenSky) return std::nullopt;
-  }
-  if (around[static_cast<std::size_t>(Direction::PosY)] == kOpenSky) return kOpenSky;
-  return std::all_of(around.begin(), around.end(), [](std::uint16_t word) { return word == 0; })
-             ? std::optional<std::uint16_t>(0)
-             : std::nullopt;
-}
-
-void PropagatedLight::Impl::solve(const Grid& grid, LightSolver& solver, Job& job) const {
-  const LightBorder border = border_of(job.chunk);
-  if (const std::optional<std::uint16_t> word = uniform_light(grid, job.chunk, border)) {
-    job.changed = fill(*job.light, *word);
-    job.box = kWholeChunk;
-  } else {
-    job.changed = solver.solve(grid.find_chunk(job.chunk), lights, border, job.box, *job.light);
-  }
-}
-
-// The highest chunks of the queue, since sky falls: what lies below is solved once with what comes from above. Of these
-// every second one, so that none is read by another while its light is replaced.
-std::vector<PropagatedLight::Impl::Job> PropagatedLight::Impl::next_jobs() {
-  IVec3 first = queue.begin()->first;
-  for (const auto& [chunk, box] : queue) {
-    if (chunk.y > first.y) first = chunk;
-  }
-  const auto is_next = [&](IVec3 chunk) {
-    return chunk.y == first.y && ((chunk.x + chunk.z) & 1) == ((first.x + first.z) & 1);
+// Boxes that touch become one, also those that share a slab of a chunk. Where that is too large, chunks are solved.
+void PropagatedLight::Impl::sort_dirty() {
+  constexpr std::size_t kMany = 1024;
+  struct Cluster {
+    Dirty boxes;
+    IBox all;
+    IBox slabs;  // with the rim
+    std::vector<IBox> parts;
   };
-  std::vector<Job> jobs;
-  for (auto next = queue.begin(); next != queue.end();) {
-    const auto each = next++;
-    if (!is_next(each->first)) continue;
-    std::unique_ptr<ChunkLight>& light = levels[each->first];
-    if (light == nullptr) light = std::make_unique<ChunkLight>();
-    jobs.push_back({each->first, each->second, light.get(), {}});
-    queue.erase(each);
+  const auto slabs_of = [](const IBox& box) {
+    const IVec3 size{kChunkEdge, 4, 4};
+    return IBox{(box.min - 1) & ~(size - 1), (box.max + size) & ~(size - 1)};
+  };
+  std::vector<Cluster> clusters;
+  const bool is_alone = queue.empty() && dirty.size() <= kMany;
+  for (const Dirty& each : dirty) {
+    const IBox all = around_all(each);
+    if (all.empty()) continue;
+    Cluster cluster{each, all, slabs_of(all), {all}};
+    for (std::size_t i = 0; is_alone && i < clusters.size();) {
+      Cluster& other = clusters[i];
+      if (intersect(other.slabs, cluster.slabs).empty()) {
+        ++i;
+        continue;
+      }
+      for (std::size_t c = 0; c < kChannels; ++c) cluster.boxes[c] = unite(cluster.boxes[c], other.boxes[c]);
+      cluster.all = unite(cluster.all, other.all);
+      cluster.slabs = unite(cluster.slabs, other.slabs);
+      cluster.parts.insert(cluster.parts.end(), other.parts.begin(), other.parts.end());
+      clusters.erase(clusters.begin() + static_cast<std::ptrdiff_t>(i));
+      i = 0;
+    }
+    clusters.push_back(std::move(cluster));
   }
-  return jobs;
-}
-
-// What changed at a side of the box may change what lies beyond it: as far as light reaches, and down the whole chunk.
-void PropagatedLight::Impl::go_on(const Job& job, const IBox& changed) {
-  const IVec3 low = job.chunk * kChunkEdge;
-  const IBox world{changed.min + low, changed.max + low};
-  for (const Direction direction : kDirections) {
-    const FaceFrame& frame = frame_of(direction);
-    const bool is_up = frame.sign > 0;
-    const bool touches =
-        is_up ? changed.max[frame.axis] == job.box.max[frame.axis] : changed.min[frame.axis] == job.box.min[frame.axis];
-    if (!touches) continue;
-    IBox beyond = grown(world, kReach - 1);
-    (is_up ? beyond.min : beyond.max)[frame.axis] = is_up ? world.max[frame.axis] : world.min[frame.axis];
-    if (direction == Direction::NegY) beyond.min.y = std::min(beyond.min.y, (beyond.max.y - 1) & ~(kChunkEdge - 1));
-    // No farther than the chunk beside it, whose own changes go on from there.
-    const bool leaves = is_up ? job.box.max[frame.axis] == kChunkEdge : job.box.min[frame.axis] == 0;
-    add_part(leaves ? job.chunk + normal_of(direction) : job.chunk, beyond);
-  }
-}
-
-void PropagatedLight::Impl::run(const Grid& grid, Threads threads) {
-  while (!queue.empty()) {
-    std::vector<Job> jobs = next_jobs();
-    parallel_for(jobs.size(), threads, [&](std::size_t i) {
-      thread_local LightSolver solver;
-      solve(grid, solver, jobs[i]);
-    });
-    for (const Job& job : jobs) {
-      const IBox changed = job.changed.box();
-      if (changed.empty()) continue;
-      journal.note(job.light->serial, job.changed.record(job.chunk), levels.size());
-      go_on(job, changed);
+  dirty.clear();
+  for (const Cluster& cluster : clusters) {
+    if (is_alone && LightSolver::fits(cluster.all.size())) {
+      dirty.push_back(cluster.boxes);
+    } else {
+      for (const IBox& part : cluster.parts) add_chunks(part);
     }
   }
+}
+
+ChunkAround PropagatedLight::Impl::around(IVec3 chunk) const {
+  ChunkAround found;
+  found.is_held = domain.holds(chunk);
+  if (!found.is_held) {
+    found.is_open = domain.beyond(chunk) != 0;
+    return found;
+  }
+  found.light = store.find(chunk);
+  if (const auto unknown = queue.find(chunk); unknown != queue.end()) found.unknown = unknown->second;
+  if (const auto known = masks.find(chunk); known != masks.end()) found.masks = known->second.get();
+  return found;
+}
+
+void PropagatedLight::Impl::look_around(LightRegion& region) const {
+  region.chunks = {chunk_of(region.all.voxels.min - 1), chunk_of(region.all.voxels.max) + 1};
+  region.around.clear();
+  for (int z = region.chunks.min.z; z < region.chunks.max.z; ++z) {
+    for (int y = region.chunks.min.y; y < region.chunks.max.y; ++y) {
+      for (int x = region.chunks.min.x; x < region.chunks.max.x; ++x) region.around.push_back(around({x, y, z}));
+    }
+  }
+}
+
+void PropagatedLight::Impl::solve(std::vector<LightRegion>& regions, Threads threads,
+                                  FunctionRef<void(LightSolver&, LightRegion&)> prepare) {
+  std::vector<std::vector<ChunkLightChange>> changes(regions.size());
+  parallel_for(regions.size(), threads, [&](std::size_t i) {
+    thread_local LightSolver solver;
+    look_around(regions[i]);
+    prepare(solver, regions[i]);
+    solver.solve(regions[i], changes[i]);
+  });
+  for (std::vector<ChunkLightChange>& of_region : changes) {
+    for (ChunkLightChange& change : of_region) {
+      if (!change.empty()) store.take(std::move(change));
+    }
+  }
+}
+
+// Each in one go, by what it has of chunks.
+void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
+  std::vector<LightRegion> regions;
+  for (const Dirty& each : dirty) {
+    const IBox all = around_all(each);
+    LightRegion& region = regions.emplace_back();
+    region.all = {all, all};
+    for (std::size_t c = 0; c < kChannels; ++c) region.channels[c] = {each[c], each[c]};
+  }
+  solve(regions, threads, [&](LightSolver& solver, LightRegion& region) {
+    std::size_t i = 0;
+    const IBox chunks{chunk_of(region.all.voxels.min), chunk_of(region.all.voxels.max - 1) + 1};
+    for (int z = chunks.min.z; z < chunks.max.z; ++z) {
+      for (int y = chunks.min.y; y < chunks.max.y; ++y) {
+        for (int x = chunks.min.x; x < chunks.max.x; ++x) {
+          const IVec3 chunk{x, y, z};
+          const IVec3 low = chunk * kChunkEdge;
+          ChunkMasks& read = solver.own_masks(i++);
+          read.read(grid.find_chunk(chunk), lights,
+                    intersect({region.all.voxels.min - low, region.all.voxels.max - low}, kWholeChunk));
+          region.at(chunk).masks = &read;
+        }
+      }
+    }
+  });
+  dirty.clear();
+}
+
+// The highest chunks of the queue, since sky falls: what lies above them is known. Whole ones side by side are solved
+// together, since less lies around them.
+std::vector<LightRegion> PropagatedLight::Impl::next_layer() const {
+  constexpr int kRun = 4;
+  int highest = queue.begin()->first.y;
+  for (const auto& [chunk, box] : queue) highest = std::max(highest, chunk.y);
+  std::vector<LightRegion> regions;
+  int run = 0;
+  for (const auto& [chunk, box] : queue) {
+    if (chunk.y != highest) continue;
+    const IVec3 low = chunk * kChunkEdge;
+    const bool goes_on = run > 0 && run < kRun && box == kWholeChunk && regions.back().all.wanted.max.x == low.x &&
+                         regions.back().all.wanted.min.z == low.z;
+    if (goes_on) {
+      regions.back().all.wanted.max.x += kChunkEdge;
+      ++run;
+    } else {
+      regions.emplace_back().all.wanted = {low + box.min, low + box.max};
+      run = box == kWholeChunk ? 1 : 0;
+    }
+  }
+  for (LightRegion& region : regions) {
+    region.all.voxels = grown(region.all.wanted, kReach);
+    region.all.voxels.max.y = std::min(region.all.voxels.max.y, (highest + 1) * kChunkEdge);
+    region.channels.fill(region.all);
+  }
+  return regions;
+}
+
+// Of the chunks of a layer and of what they look at.
+void PropagatedLight::Impl::read_masks(const Grid& grid, const std::vector<LightRegion>& regions, Threads threads) {
+  std::vector<std::pair<IVec3, ChunkMasks*>> missing;
+  for (const LightRegion& region : regions) {
+    const IBox chunks{chunk_of(region.all.voxels.min), chunk_of(region.all.voxels.max - 1) + 1};
+    for (int z = chunks.min.z; z < chunks.max.z; ++z) {
+      for (int y = chunks.min.y; y < chunks.max.y; ++y) {
+        for (int x = chunks.min.x; x < chunks.max.x; ++x) {
+          const IVec3 chunk{x, y, z};
+          if (!domain.holds(chunk)) continue;
+          std::unique_ptr<ChunkMasks>& made = masks[chunk];
+          if (made != nullptr) continue;
+          made = std::make_unique<ChunkMasks>();
+          missing.emplace_back(chunk, made.get());
+        }
+      }
+    }
+  }
+  parallel_for(missing.size(), threads, [&](std::size_t i) {
+    missing[i].second->read(grid.find_chunk(missing[i].first), lights, kWholeChunk);
+  });
+}
+
+void PropagatedLight::Impl::solve_queue(const Grid& grid, Threads threads) {
+  constexpr std::size_t kBatch = 64;       // regions at a time
+  constexpr std::size_t kMaskLimit = 1024;  // chunks of which masks are kept: 32 MB
+  while (!queue.empty()) {
+    const std::vector<LightRegion> layer = next_layer();
+    for (std::size_t first = 0; first < layer.size(); first += kBatch) {
+      const std::size_t end = std::min(first + kBatch, layer.size());
+      std::vector<LightRegion> batch(layer.begin() + static_cast<std::ptrdiff_t>(first),
+                                     layer.begin() + static_cast<std::ptrdiff_t>(end));
+      if (masks.size() > kMaskLimit) masks.clear();
+      read_masks(grid, batch, threads);
+      solve(batch, threads, [](LightSolver&, LightRegion&) {});
+      for (const LightRegion& region : batch) {
+        IVec3 chunk = chunk_of(region.all.wanted.min);
+        for (; chunk.x * kChunkEdge < region.all.wanted.max.x; ++chunk.x) queue.erase(chunk);
+      }
+    }
+  }
+  masks.clear();
 }
 
 PropagatedLight::PropagatedLight(PropagatedLightOptions options) : impl_(std::make_unique<Impl>()) {
@@ -366,9 +444,11 @@ void PropagatedLight::update(const Grid& grid, const VoxelRegistry& types, Threa
       // A type that was not registered was opaque: those that are new are others than before.
       changes.all |= lights != me.lights;
       me.lights = std::move(lights);
+      me.lamp_channels = lamp_channels(me.lights);
     }
     changes.all ? me.begin_anew(grid) : me.take_over(grid, changes);
-    me.run(grid, threads);
+    me.solve_dirty(grid, threads);
+    me.solve_queue(grid, threads);
   } catch (...) {
     me.followed_grid = {};
     throw;
@@ -376,107 +456,24 @@ void PropagatedLight::update(const Grid& grid, const VoxelRegistry& types, Threa
 }
 
 LightLevels PropagatedLight::at(IVec3 voxel) const {
-  return unpacked_light(Impl::WordReader(*impl_).at(voxel));
+  return unpacked_light(impl_->reader().at(voxel));
 }
 
 void PropagatedLight::read_row(IVec3 voxel, std::span<std::uint16_t, kChunkEdge> out) const {
-  const IVec3 chunk = chunk_of(voxel);
-  if (!impl_->domain.holds(chunk)) {
-    std::fill(out.begin(), out.end(), impl_->domain.beyond(chunk));
-    return;
-  }
-  const ChunkLight* stored = impl_->stored(chunk);
-  if (stored == nullptr) {
-    std::fill(out.begin(), out.end(), std::uint16_t{0});
-    return;
-  }
-  const IVec3 local = local_of(voxel);
-  stored->read_row(local.y, local.z, out);
+  impl_->reader().read_row(voxel, out);
 }
 
 GridChanges PropagatedLight::changes_since(ChangeCursor& cursor) const {
-  return impl_->journal.changes_since<ChunkChange>(cursor, by_chunk);
+  return impl_->store.changes_since(cursor);
 }
-
-namespace {
-
-// The light in front of a quad's faces: [u + width * v].
-struct QuadLight {
-  int width = 0;
-  int height = 0;
-  std::vector<std::uint16_t> words;
-
-  [[nodiscard]] std::uint16_t& at(int u, int v) { return words[static_cast<std::size_t>(u + width * v)]; }
-  [[nodiscard]] bool is_uniform() const {
-    return std::all_of(words.begin(), words.end(), [&](std::uint16_t word) { return word == words.front(); });
-  }
-  // How far the light of a cell goes on along u, and then along v.
-  [[nodiscard]] std::pair<int, int> extent(int u, int v, const std::vector<bool>& done) {
-    const std::uint16_t word = at(u, v);
-    const auto is_free = [&](int x, int y) {
-      return !done[static_cast<std::size_t>(x + width * y)] && at(x, y) == word;
-    };
-    int right = u + 1;
-    while (right < width && is_free(right, v)) ++right;
-    int top = v + 1;
-    const auto is_row = [&](int y) {
-      for (int x = u; x < right; ++x) {
-        if (!is_free(x, y)) return false;
-      }
-      return true;
-    };
-    while (top < height && is_row(top)) ++top;
-    return {right - u, top - v};
-  }
-};
-
-}  // namespace
 
 void PropagatedLight::split(const QuadBuffer& quads, IVec3 chunk, QuadBuffer& out,
                             std::vector<std::uint16_t>& light) const {
-  out.clear();
-  light.clear();
-  Impl::WordReader words(*impl_);
-  QuadLight of_quad;
-  std::vector<bool> done;
-  for (const Quad quad : quads) {
-    const FaceFrame& frame = frame_of(quad.direction());
-    const IVec3 first = chunk * kChunkEdge + quad.voxel() + normal_of(quad.direction());
-    of_quad.width = quad.size_u();
-    of_quad.height = quad.size_v();
-    of_quad.words.clear();
-    for (int v = 0; v < quad.size_v(); ++v) {
-      for (int u = 0; u < quad.size_u(); ++u) {
-        IVec3 at = first;
-        at[frame.u] += u;
-        at[frame.v] += v;
-        of_quad.words.push_back(words.at(at));
-      }
-    }
-    if (of_quad.is_uniform()) {
-      out.push_back(quad);
-      light.push_back(of_quad.words.front());
-      continue;
-    }
-    done.assign(of_quad.words.size(), false);
-    for (int v = 0; v < quad.size_v(); ++v) {
-      for (int u = 0; u < quad.size_u(); ++u) {
-        if (done[static_cast<std::size_t>(u + of_quad.width * v)]) continue;
-        const auto [along_u, along_v] = of_quad.extent(u, v, done);
-        for (int y = v; y < v + along_v; ++y) {
-          for (int x = u; x < u + along_u; ++x) done[static_cast<std::size_t>(x + of_quad.width * y)] = true;
-        }
-        out.push_back(quad_part(quad, u, v, along_u, along_v));
-        light.push_back(of_quad.at(u, v));
-      }
-    }
-  }
+  propagated::split_quads(impl_->reader(), quads, chunk, out, light);
 }
 
 std::size_t PropagatedLight::bytes() const {
-  std::size_t sum = impl_->lights.capacity() * sizeof(TypeLight) + impl_->journal.bytes();
-  for (const auto& [chunk, light] : impl_->levels) sum += sizeof(chunk) + light->bytes();
-  return sum;
+  return impl_->store.bytes() + impl_->lights.capacity() * sizeof(TypeLight);
 }
 
 }  // namespace quoin

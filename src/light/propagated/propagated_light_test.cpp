@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <map>
 #include <random>
 #include <vector>
@@ -175,6 +176,68 @@ TEST(PropagatedLight, IsThatOfASearchAfterAnyEdits) {
                      static_cast<int>(random() % 150) - 60};
       ASSERT_EQ(light.at(at), fresh.at(at));
     }
+  }
+}
+
+// Single voxels for the most part, so that neither rock nor air prevails.
+void edit_little(Grid& grid, std::mt19937& random) {
+  const auto below = [&](unsigned n) { return static_cast<int>(random() % n); };
+  const IVec3 at{below(70) - 30, below(60) - 40, below(70) - 30};
+  const VoxelType type = below(3) == 0 ? static_cast<VoxelType>(1 + below(7)) : kAir;
+  if (below(50) > 0) {
+    grid.set(at, type);
+    return;
+  }
+  grid.fill_box({at, at + IVec3(1 + below(12), 1 + below(4), 1 + below(12))}, below(2) == 0 ? kStone : kAir);
+}
+
+TEST(PropagatedLight, AMillionRandomEditsEqualASearch) {
+  // By day a few thousand, and where each takes ten times as long.
+#if defined(NDEBUG) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  const bool is_night = std::getenv("QUOIN_NIGHTLY") != nullptr;
+#else
+  const bool is_night = false;
+#endif
+  const int edits = is_night ? 1'000'000 : 6'000;
+  const int checks = is_night ? 40 : 4;
+  std::mt19937 random(11);
+  VoxelRegistry types = light_types();
+  Grid grid;
+  grid.fill_box({{-30, -40, -30}, {40, 0, 40}}, kStone);
+  PropagatedLight light;
+  int checked = 0;
+  for (int done = 0; done < edits;) {
+    // At times so many that boxes run into each other.
+    const int count = random() % 100 == 0 ? 200 : 1 + static_cast<int>(random() % 30);
+    for (int i = 0; i < count; ++i) edit_little(grid, random);
+    done += count;
+    light.update(grid, types, {1 + random() % 2});
+    if (done < (checked + 1) * (edits / checks)) continue;
+    ++checked;
+    expect_searched(light, grid, types);
+    ASSERT_FALSE(HasFatalFailure()) << "after " << done << " edits";
+  }
+  EXPECT_GE(checked, checks);
+}
+
+TEST(PropagatedLight, ShadowsFallAsFarAsThereIsSky) {
+  const VoxelRegistry types = light_types();
+  Grid grid;
+  grid.fill_box({{-4, -900, -4}, {12, -890, 12}}, kStone);  // ground
+  grid.set({2, -890, 3}, kLamp);
+  grid.set({0, -500, 0}, kGlass);
+  PropagatedLight light;
+  light.update(grid, types);
+  for (const int y : {-100, -600, 3}) {  // a shadow longer than what is solved at once, and shorter ones
+    const IBox roof{{-2, y, -2}, {3, y + 1, 3}};
+    grid.fill_box(roof, kStone);
+    light.update(grid, types);
+    EXPECT_LT(light.at({0, y - 1, 0}).sky, 15);
+    expect_searched(light, grid, types);
+    grid.fill_box(roof, kAir);
+    light.update(grid, types);
+    EXPECT_EQ(light.at({0, y - 1, 0}).sky, 15);
+    expect_searched(light, grid, types);
   }
 }
 

@@ -1,0 +1,81 @@
+#include "light/propagated/chunk_masks.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "trace/chunk_rows.h"
+
+namespace quoin::propagated {
+namespace {
+
+constexpr std::uint64_t kAll = ~std::uint64_t{0};
+
+TypeLight light_of(const std::vector<TypeLight>& types, VoxelType type) {
+  return type < types.size() ? types[type] : TypeLight{0, 0};
+}
+
+bool passes(const std::vector<TypeLight>& types, VoxelType type, std::size_t channel) {
+  return type == kAir || (light_of(types, type).passes >> channel & 1U) != 0;
+}
+
+}  // namespace
+
+void ChunkMasks::read_rows(const Chunk& voxels, const std::vector<TypeLight>& types, std::size_t channel,
+                           const IBox& box) {
+  Rows& rows = rows_[channel];
+  const auto stopped = std::count_if(found_.begin(), found_.end(),
+                                     [&](VoxelType type) { return !passes(types, type, channel); });
+  rows.is_uniform = stopped == 0 || static_cast<std::size_t>(stopped) == found_.size();
+  rows.uniform = stopped == 0 ? kAll : 0;
+  if (rows.is_uniform) return;
+  rows.words.resize(static_cast<std::size_t>(kChunkEdge) * kChunkEdge);
+  const auto stops = [&](VoxelType type) { return !passes(types, type, channel); };
+  const FunctionRef<bool(VoxelType)> asked(stops);
+  const trace::ChunkRows stopping(voxels, asked);
+  trace::SlabRows slab;
+  for (int z = box.min.z & ~3; z < box.max.z; z += 4) {
+    for (int y = box.min.y & ~3; y < box.max.y; y += 4) {
+      const trace::Slab kind = stopping.read(y, z, slab);
+      if (kind != trace::Slab::Mixed) slab.fill(kind == trace::Slab::Full ? kAll : 0);
+      std::uint64_t* to = rows.words.data() + y + kChunkEdge * z;
+      for (std::size_t i = 0; i < slab.size(); ++i) to[(i & 3) + kChunkEdge * (i >> 2)] = ~slab[i];
+    }
+  }
+}
+
+void ChunkMasks::read_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, const IBox& box) {
+  const auto is_lamp = [&](VoxelType type) { return light_of(types, type).lamp != 0; };
+  if (std::none_of(found_.begin(), found_.end(), is_lamp)) return;
+  const FunctionRef<bool(VoxelType)> asked(is_lamp);
+  trace::ChunkRows(voxels, asked).for_each_row(box, [&](int y, int z, std::uint64_t where) {
+    for (std::uint64_t left = where; left != 0;) {
+      const VoxelType type = voxels.get(std::countr_zero(left), y, z);
+      const std::uint64_t alike = left & voxels.row_mask(y, z, type);
+      lamps_.push_back({static_cast<std::uint8_t>(y), static_cast<std::uint8_t>(z), light_of(types, type).lamp, alike});
+      left &= ~alike;
+    }
+  });
+}
+
+void ChunkMasks::read(const Chunk* voxels, const std::vector<TypeLight>& types, const IBox& box) {
+  lamps_.clear();
+  rows_of_.fill(0);
+  rows_[0].is_uniform = true;
+  rows_[0].uniform = kAll;
+  if (voxels == nullptr) return;
+  found_ = voxels->types();
+  for (std::size_t channel = 0; channel < kChannels; ++channel) {
+    const auto is_like = [&](std::size_t other) {
+      return std::all_of(found_.begin(), found_.end(), [&](VoxelType type) {
+        return passes(types, type, channel) == passes(types, type, other);
+      });
+    };
+    std::size_t other = 0;
+    while (other < channel && !is_like(other)) ++other;
+    rows_of_[channel] = other;
+    if (other == channel) read_rows(*voxels, types, channel, box);
+  }
+  read_lamps(*voxels, types, box);
+}
+
+}  // namespace quoin::propagated

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <quoin/grid/chunk.h>
+
+#include "light/propagated/light_chunk.h"
+
+namespace quoin::propagated {
+
+/// What a type does to light.
+struct TypeLight {
+  std::uint16_t lamp = 0;    ///< packed levels that it gives off
+  std::uint8_t passes = 15;  ///< bit c: channel c
+
+  bool operator==(const TypeLight&) const = default;
+};
+
+/// Where light passes through a box of a chunk, and where it comes from there. Reused: it only grows.
+class ChunkMasks {
+ public:
+  struct LampRow {
+    std::uint8_t y, z;
+    std::uint16_t lamp;  // packed levels
+    std::uint64_t where;
+  };
+
+  /// `voxels`: null where all is air. What is not registered is opaque. Cost: O(rows of the box).
+  void read(const Chunk* voxels, const std::vector<TypeLight>& types, const IBox& box);
+
+  /// Rows of the box, [y + 64 z]; null where they are all `uniform`.
+  [[nodiscard]] const std::uint64_t* rows(std::size_t channel) const {
+    const Rows& found = rows_[rows_of_[channel]];
+    return found.is_uniform ? nullptr : found.words.data();
+  }
+  [[nodiscard]] std::uint64_t uniform(std::size_t channel) const { return rows_[rows_of_[channel]].uniform; }
+  /// Whether two channels pass alike.
+  [[nodiscard]] bool are_alike(std::size_t a, std::size_t b) const { return rows_of_[a] == rows_of_[b]; }
+  [[nodiscard]] std::span<const LampRow> lamps() const { return lamps_; }
+
+ private:
+  struct Rows {
+    bool is_uniform = true;
+    std::uint64_t uniform = 0;
+    std::vector<std::uint64_t> words;
+  };
+  void read_rows(const Chunk& voxels, const std::vector<TypeLight>& types, std::size_t channel, const IBox& box);
+  void read_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, const IBox& box);
+
+  std::array<Rows, kChannels> rows_;
+  std::array<std::size_t, kChannels> rows_of_{};  // [channel]: which of them
+  std::vector<LampRow> lamps_;
+  std::vector<VoxelType> found_;
+};
+
+}  // namespace quoin::propagated

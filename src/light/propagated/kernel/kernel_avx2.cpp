@@ -1,0 +1,13 @@
+// The kernel for x86-64 processors with AVX2, BMI and BMI2; called only where all were found.
+
+#ifdef QUOIN_X86_KERNELS
+
+#include "light/propagated/kernel/kernel.inl"
+
+namespace quoin::propagated {
+
+const Kernel kAvx2Kernel = {&spread, &take_sky, &find_blocks, &find_rows, &unpack, &shift_in, &read_slab, &merge};
+
+}  // namespace quoin::propagated
+
+#endif

@@ -1,0 +1,13 @@
+// The kernel for x86-64 processors with AVX-512 F, BW, DQ and VL; called only where all were found.
+
+#ifdef QUOIN_X86_KERNELS
+
+#include "light/propagated/kernel/kernel.inl"
+
+namespace quoin::propagated {
+
+const Kernel kAvx512Kernel = {&spread, &take_sky, &find_blocks, &find_rows, &unpack, &shift_in, &read_slab, &merge};
+
+}  // namespace quoin::propagated
+
+#endif

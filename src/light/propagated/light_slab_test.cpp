@@ -1,0 +1,123 @@
+#include "light/propagated/light_slab.h"
+
+#include <bit>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "core/instruction_sets_for_tests.h"
+
+namespace quoin::propagated {
+namespace {
+
+// Of several kinds: one level, sky and rock, gradients along an axis, anything.
+SlabPlanes random_planes(std::mt19937_64& random) {
+  SlabPlanes planes;
+  const unsigned kind = random() % 5;
+  for (unsigned row = 0; row < kSlabWords; ++row) {
+    for (unsigned x = 0; x < 64; ++x) {
+      const unsigned anything = random() % 16;
+      const unsigned level = kind == 0   ? 6
+                             : kind == 1 ? (x + row > 40 ? 15 : 0)
+                             : kind == 2 ? (row >> 2) + 3
+                             : kind == 3 ? x / 5
+                                         : anything;
+      for (std::size_t i = 0; i < kPlanes; ++i) {
+        const std::uint64_t bit = std::uint64_t{1} << x;
+        std::uint64_t& word = planes.plane(i)[row];
+        word = (level >> i & 1U) != 0 ? word | bit : word & ~bit;
+      }
+    }
+  }
+  return planes;
+}
+
+unsigned level_of(const SlabPlanes& planes, std::size_t row, unsigned x) {
+  unsigned level = 0;
+  for (std::size_t i = 0; i < kPlanes; ++i) level |= static_cast<unsigned>(planes.plane(i)[row] >> x & 1U) << i;
+  return level;
+}
+
+SlabKinds kinds_of(SlabPlanes& planes) {
+  const SlabPlanes before{};
+  std::array<std::uint64_t, kSlabWords> inside;
+  inside.fill(~std::uint64_t{0});
+  std::array<std::uint64_t, kSlabWords> changed;
+  return kernel().merge(before.words.data(), inside.data(), planes.words.data(), changed.data());
+}
+
+TEST(LightSlab, KeepsWhatItIsMadeOf) {
+  std::mt19937_64 random(1);
+  for (int step = 0; step < 200; ++step) {
+    SlabPlanes planes = random_planes(random);
+    const LightSlab made = LightSlab::of(planes, kinds_of(planes));
+    const LightSlab slab = made;  // NOLINT(performance-unnecessary-copy-initialization): it is shared
+    SlabPlanes read;
+    slab.read(read);
+    ASSERT_EQ(read.words, planes.words);
+    const std::uint64_t mask = random() & random() & random();
+    const unsigned lit = slab.lit_rows(mask);
+    for (std::size_t row = 0; row < kSlabWords; ++row) {
+      std::uint64_t any = 0;
+      for (std::size_t i = 0; i < kPlanes; ++i) {
+        ASSERT_EQ(slab.row(row)[i], planes.plane(i)[row]);
+        any |= planes.plane(i)[row];
+      }
+      ASSERT_EQ((lit >> row & 1U) != 0, (any & mask) != 0);
+      for (unsigned x = 0; x < 64; ++x) ASSERT_EQ(slab.at(row, x), level_of(planes, row, x));
+    }
+  }
+}
+
+TEST(LightSlab, TakesNoMoreThanItsPlanesDiffer) {
+  SlabPlanes planes{};
+  const auto bytes = [&] { return LightSlab::of(planes, kinds_of(planes)).bytes(); };
+  for (std::size_t i = 0; i < kPlanes; ++i) {
+    for (std::size_t row = 0; row < kSlabWords; ++row) planes.plane(i)[row] = ~std::uint64_t{0};
+  }
+  EXPECT_EQ(bytes(), 0U) << "all sky";
+  for (std::size_t i = 0; i < kPlanes; ++i) {
+    for (std::size_t row = 0; row < kSlabWords; ++row) planes.plane(i)[row] = (std::uint64_t{1} << row) * 7;
+  }
+  EXPECT_EQ(bytes(), 24 + 16 * 8U) << "sky and rock: one plane";
+  for (std::size_t row = 0; row < kSlabWords; ++row) planes.plane(2)[row] = row < 8 ? 5 : 9;
+  EXPECT_EQ(bytes(), 24 + (16 + 16 + 16) * 8U) << "three planes, of one of which two rows would do";
+}
+
+TEST(LightSlabKernel, MergesAlikeWithEveryInstructionSet) {
+  std::mt19937_64 random(2);
+  for (int step = 0; step < 100; ++step) {
+    const SlabPlanes before = random_planes(random);
+    const SlabPlanes after = random_planes(random);
+    std::array<std::uint64_t, kSlabWords> inside;
+    for (std::uint64_t& word : inside) word = step % 3 == 0 ? 0 : random() | random();
+    for (const InstructionSet set : sets_of_this_machine()) {
+      const InstructionSetOverride use(set);
+      SlabPlanes now = after;
+      std::array<std::uint64_t, kSlabWords> changed;
+      const SlabKinds kinds = kernel().merge(before.words.data(), inside.data(), now.words.data(), changed.data());
+      bool is_changed = false;
+      for (std::size_t row = 0; row < kSlabWords; ++row) {
+        for (unsigned x = 0; x < 64; ++x) {
+          const bool is_inside = (inside[row] >> x & 1U) != 0;
+          const unsigned expected = level_of(is_inside ? after : before, row, x);
+          ASSERT_EQ(level_of(now, row, x), expected);
+          const bool differs = expected != level_of(before, row, x);
+          ASSERT_EQ((changed[row] >> x & 1U) != 0, differs);
+          is_changed |= differs;
+        }
+      }
+      ASSERT_EQ(kinds.is_changed, is_changed);
+      for (std::size_t i = 0; is_changed && i < kPlanes; ++i) {
+        std::uint64_t ones = 0;
+        std::uint64_t zeros = 0;
+        for (std::size_t row = 0; row < kSlabWords; ++row) ones |= now.plane(i)[row], zeros |= ~now.plane(i)[row];
+        ASSERT_EQ(kinds.has_ones >> i & 1U, ones != 0 ? 1U : 0U);
+        ASSERT_EQ(kinds.has_zeros >> i & 1U, zeros != 0 ? 1U : 0U);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace quoin::propagated
