@@ -43,22 +43,45 @@ void ChunkMasks::read_rows(const Chunk& voxels, const std::vector<TypeLight>& ty
   }
 }
 
-void ChunkMasks::read_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, const IBox& box) {
-  const auto is_lamp = [&](VoxelType type) { return light_of(types, type).lamp != 0; };
-  if (std::none_of(found_.begin(), found_.end(), is_lamp)) return;
-  const FunctionRef<bool(VoxelType)> asked(is_lamp);
-  trace::ChunkRows(voxels, asked).for_each_row(box, [&](int y, int z, std::uint64_t where) {
-    for (std::uint64_t left = where; left != 0;) {
-      const VoxelType type = voxels.get(std::countr_zero(left), y, z);
-      const std::uint64_t alike = left & voxels.row_mask(y, z, type);
-      lamps_.push_back({static_cast<std::uint8_t>(y), static_cast<std::uint8_t>(z), light_of(types, type).lamp, alike});
-      left &= ~alike;
-    }
-  });
+// Lamps of a row, each type once.
+void ChunkMasks::add_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, int y, int z,
+                           std::uint64_t where) {
+  while (where != 0) {
+    const VoxelType type = voxels.get(std::countr_zero(where), y, z);
+    const std::uint64_t alike = where & voxels.row_mask(y, z, type);
+    lamps_.push_back({static_cast<std::uint8_t>(y), static_cast<std::uint8_t>(z), light_of(types, type).lamp, alike});
+    where &= ~alike;
+  }
 }
 
-void ChunkMasks::read(const Chunk* voxels, const std::vector<TypeLight>& types, const IBox& box) {
+void ChunkMasks::read_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, const IBox& box,
+                            const SlabSet& slabs) {
+  const auto is_lamp = [&](VoxelType type) { return light_of(types, type).lamp != 0; };
+  if (std::none_of(found_.begin(), found_.end(), is_lamp)) {
+    without_lamps_ = all_slabs();
+    return;
+  }
+  const FunctionRef<bool(VoxelType)> asked(is_lamp);
+  const trace::ChunkRows lamps(voxels, asked);
+  trace::SlabRows rows;
+  for (int z = box.min.z & ~3; z < box.max.z; z += 4) {
+    for (int y = box.min.y & ~3; y < box.max.y; y += 4) {
+      const auto bit = static_cast<std::uint16_t>(1U << (y / 4));
+      const auto of_z = static_cast<std::size_t>(z / 4);
+      if ((slabs[of_z] & bit) == 0) continue;
+      const trace::Slab kind = lamps.read(y, z, rows);
+      if (kind == trace::Slab::Empty) without_lamps_[of_z] |= bit;
+      if (kind == trace::Slab::Empty) continue;
+      if (kind == trace::Slab::Full) rows.fill(kAll);
+      for (int i = 0; i < 16; ++i) add_lamps(voxels, types, y + (i & 3), z + (i >> 2), rows[static_cast<std::size_t>(i)]);
+    }
+  }
+}
+
+void ChunkMasks::read(const Chunk* voxels, const std::vector<TypeLight>& types, const IBox& box,
+                      const SlabSet& lamp_slabs) {
   lamps_.clear();
+  without_lamps_.fill(0);
   rows_of_.fill(0);
   rows_[0].is_uniform = true;
   rows_[0].uniform = kAll;
@@ -75,7 +98,7 @@ void ChunkMasks::read(const Chunk* voxels, const std::vector<TypeLight>& types, 
     rows_of_[channel] = other;
     if (other == channel) read_rows(*voxels, types, channel, box);
   }
-  read_lamps(*voxels, types, box);
+  read_lamps(*voxels, types, box, lamp_slabs);
 }
 
 }  // namespace quoin::propagated

@@ -29,8 +29,9 @@ class ChunkMasks {
     std::uint64_t where;
   };
 
-  /// `voxels`: null where all is air. What is not registered is opaque. Cost: O(rows of the box).
-  void read(const Chunk* voxels, const std::vector<TypeLight>& types, const IBox& box);
+  /// `voxels`: null where all is air. `lamp_slabs`: all that have lamps, and maybe others. What is not registered is
+  /// opaque. Cost: O(rows of the box).
+  void read(const Chunk* voxels, const std::vector<TypeLight>& types, const IBox& box, const SlabSet& lamp_slabs);
 
   /// Rows of the box, [y + 64 z]; null where they are all `uniform`.
   [[nodiscard]] const std::uint64_t* rows(std::size_t channel) const {
@@ -41,6 +42,8 @@ class ChunkMasks {
   /// Whether two channels pass alike.
   [[nodiscard]] bool are_alike(std::size_t a, std::size_t b) const { return rows_of_[a] == rows_of_[b]; }
   [[nodiscard]] std::span<const LampRow> lamps() const { return lamps_; }
+  /// Slabs that were looked through and have none.
+  [[nodiscard]] const SlabSet& without_lamps() const { return without_lamps_; }
 
  private:
   struct Rows {
@@ -49,11 +52,13 @@ class ChunkMasks {
     std::vector<std::uint64_t> words;
   };
   void read_rows(const Chunk& voxels, const std::vector<TypeLight>& types, std::size_t channel, const IBox& box);
-  void read_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, const IBox& box);
+  void read_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, const IBox& box, const SlabSet& slabs);
+  void add_lamps(const Chunk& voxels, const std::vector<TypeLight>& types, int y, int z, std::uint64_t where);
 
   std::array<Rows, kChannels> rows_;
   std::array<std::size_t, kChannels> rows_of_{};  // [channel]: which of them
   std::vector<LampRow> lamps_;
+  SlabSet without_lamps_{};
   std::vector<VoxelType> found_;
 };
 

@@ -65,9 +65,19 @@ class ChannelLight {
   Ref<Slabs> slabs_;
 };
 
+/// Some slabs of a chunk: [z / 4], bit y / 4.
+using SlabSet = std::array<std::uint16_t, kChunkEdge / 4>;
+
+[[nodiscard]] inline SlabSet all_slabs() {
+  SlabSet all;
+  all.fill(0xFFFF);
+  return all;
+}
+
 /// Of all channels. Dark at first.
 struct LightChunk {
   std::array<ChannelLight, kChannels> channels;
+  SlabSet lamp_slabs = all_slabs();  ///< all that have lamps, and maybe others
 
   /// Packed. Requires: 0 <= x, y, z < 64.
   [[nodiscard]] std::uint16_t at(IVec3 voxel) const {

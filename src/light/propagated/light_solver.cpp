@@ -505,7 +505,10 @@ void LightSolver::solve(const LightRegion& region, std::vector<ChunkLightChange>
   region_ = &region;
   box_ = region.all;
   changes.clear();
-  for_each_part(region.all.wanted, [&](const Part& part) { changes.push_back({part.chunk, {}, {}}); });
+  for_each_part(region.all.wanted, [&](const Part& part) {
+    changes.push_back({part.chunk, {}, {}, {}});
+    if (part.around->masks != nullptr) changes.back().without_lamps = part.around->masks->without_lamps();
+  });
   unsigned done = 0;
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     const LightRegion::Box& box = region.channels[channel];

@@ -21,7 +21,8 @@ namespace quoin::propagated {
 struct ChunkLightChange {
   IVec3 chunk{0};
   std::array<ChannelChange, kChannels> channels;
-  VoxelRecord record;  ///< where something changed
+  VoxelRecord record;    ///< where something changed
+  SlabSet without_lamps{};  ///< slabs in which there was found to be none
 
   [[nodiscard]] bool empty() const {
     return std::all_of(channels.begin(), channels.end(), [](const ChannelChange& channel) { return channel.empty(); });
@@ -40,9 +41,19 @@ class LightStore {
     for (std::size_t c = 0; c < kChannels; ++c) {
       if (!change.channels[c].empty()) entry.light.channels[c].take(std::move(change.channels[c]));
     }
+    for (std::size_t i = 0; i < change.without_lamps.size(); ++i) {
+      entry.light.lamp_slabs[i] &= static_cast<std::uint16_t>(~change.without_lamps[i]);
+    }
     change.record.chunk = change.chunk;
     journal_.note(entry.serial, change.record, entries_.size());
     if (entry.light.is_dark()) entries_.erase(change.chunk, [](auto&) {});
+  }
+  /// There may be lamps in some slabs of a chunk now.
+  void add_lamps(IVec3 chunk, const ChunkSlabs& slabs) {
+    Entry* entry = entries_.find_to_edit(chunk, [](auto&) {});
+    for (int z = 0; entry != nullptr && z < kChunkEdge; z += 4) {
+      entry->light.lamp_slabs[static_cast<std::size_t>(z / 4)] |= static_cast<std::uint16_t>(slabs.along_y(z));
+    }
   }
   /// A chunk is dark from now on, and all of it may be another to readers: it comes, or goes.
   void begin(IVec3 chunk) {

@@ -237,6 +237,7 @@ void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& chang
   for (const ChunkChange& change : changes.items) {
     chunks.push_back(change.chunk);
     const IVec3 low = change.chunk * kChunkEdge;
+    store.add_lamps(change.chunk, change.slabs);
     dirty.push_back(reach_of(grid, {change.box.min + low, change.box.max + low}));
   }
   change_domain(grid, chunks);
@@ -344,9 +345,11 @@ void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
           const IVec3 chunk{x, y, z};
           const IVec3 low = chunk * kChunkEdge;
           ChunkMasks& read = solver.own_masks(i++);
+          ChunkAround& around = region.at(chunk);
+          around.masks = &read;
           read.read(grid.find_chunk(chunk), lights,
-                    intersect({region.all.voxels.min - low, region.all.voxels.max - low}, kWholeChunk));
-          region.at(chunk).masks = &read;
+                    intersect({region.all.voxels.min - low, region.all.voxels.max - low}, kWholeChunk),
+                    around.light == nullptr ? propagated::all_slabs() : around.light->lamp_slabs);
         }
       }
     }
@@ -402,7 +405,10 @@ void PropagatedLight::Impl::read_masks(const Grid& grid, const std::vector<Light
     }
   }
   parallel_for(missing.size(), threads, [&](std::size_t i) {
-    missing[i].second->read(grid.find_chunk(missing[i].first), lights, kWholeChunk);
+    const auto& [chunk, read] = missing[i];
+    const propagated::LightChunk* light = store.find(chunk);
+    read->read(grid.find_chunk(chunk), lights, kWholeChunk,
+               light == nullptr ? propagated::all_slabs() : light->lamp_slabs);
   });
 }
 
