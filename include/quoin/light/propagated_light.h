@@ -55,9 +55,10 @@ struct PropagatedLightOptions {
 /// Colours: a transparent type lets a colour of lamps pass where that channel of its colour is at least half the
 ///          greatest, the sky always.
 /// Exact:   equal to a search from every lamp and every column of sky (Dijkstra), whatever edits led there.
-/// Cost:    of an update O(rows of 64 voxels within 15 of what changed, and of columns of sky that it opens or closes),
-///          times 15. The first: some tenths of a millisecond a chunk.
-/// Memory:  half a byte a voxel and channel, where light is not the same in eight rows side by side.
+/// Cost:    of an update O(rows of 64 voxels within reach of what changed, and of columns of sky that it opens or
+///          closes), times the level. The first: some tenths of a millisecond a chunk.
+/// Memory:  a bit a voxel, channel and bit of its levels, where these are not the same in a slab of 64x4x4 voxels; less
+///          where rows are alike.
 /// Threads: any number may read at once; an update needs it to itself.
 /// Source:  levels as block games have them; spread by whole words instead of a queue.
 class PropagatedLight {

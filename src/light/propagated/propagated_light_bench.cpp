@@ -1,13 +1,17 @@
 // light/propagated/*: sky and lamps of a 512x128x512 terrain of 128 chunks, with caves and a lamp in 2,000 voxels of
-// these, at first and after edits.
+// these, at first and after edits; the sky of the same terrain without caves.
 
 #include <quoin/light/propagated_light.h>
 
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <utility>
+#include <vector>
 
 #include <benchmark/benchmark.h>
+
+#include <quoin/mesh/blocky.h>
 
 #include "bench/workloads.h"
 
@@ -42,8 +46,14 @@ World made_world(bool lamps) {
   return world;
 }
 
-void first(benchmark::State& state, bool lamps) {
-  const World world = made_world(lamps);
+World plain_world() {
+  World world;
+  world.grid.edit(workloads::kCaveTerrain, [](IVec3 v, VoxelType) { return workloads::cave_terrain_rock(v); });
+  world.grid.compact();
+  return world;
+}
+
+void first(benchmark::State& state, const World& world) {
   std::size_t bytes = 0;
   for (auto _ : state) {
     PropagatedLight light;
@@ -54,8 +64,102 @@ void first(benchmark::State& state, bool lamps) {
   state.counters["chunks"] = chunks;
   state.counters["bytes_a_voxel"] = static_cast<double>(bytes) / static_cast<double>(world.grid.voxel_count());
 }
-BENCHMARK_CAPTURE(first, sky, false)->Name("light/propagated/sky")->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(first, lamps, true)->Name("light/propagated/sky_and_lamps")->Unit(benchmark::kMillisecond);
+void plain(benchmark::State& state) {
+  first(state, plain_world());
+}
+void sky(benchmark::State& state) {
+  first(state, made_world(false));
+}
+void sky_and_lamps(benchmark::State& state) {
+  first(state, made_world(true));
+}
+BENCHMARK(plain)->Name("light/propagated/plain")->Unit(benchmark::kMillisecond);
+BENCHMARK(sky)->Name("light/propagated/sky")->Unit(benchmark::kMillisecond);
+BENCHMARK(sky_and_lamps)->Name("light/propagated/sky_and_lamps")->Unit(benchmark::kMillisecond);
+
+// Voxels of caves, or of their walls where a lamp shines at them.
+std::vector<IVec3> places_in_caves(const World& world, const PropagatedLight& light, bool in_walls) {
+  constexpr std::size_t kPlaces = 64;
+  std::vector<IVec3> places;
+  std::uint32_t random = 7;
+  const auto below = [&](std::uint32_t n) {
+    random = random * 1'664'525U + 1'013'904'223U;
+    return static_cast<int>((random >> 8) % n);
+  };
+  while (places.size() < kPlaces) {
+    const IVec3 at{32 + below(448), 5 + below(30), 32 + below(448)};
+    const VoxelType type = world.grid.get(at);
+    const bool is_lit_wall = type != kAir && type < kLamp && light.at(at + IVec3(0, 1, 0)).red > 3;
+    if (in_walls ? is_lit_wall : type == kAir) places.push_back(at);
+  }
+  return places;
+}
+
+// Made and taken back by turns, at one place after the other; each is one iteration.
+void edits_in_caves(benchmark::State& state, bool in_walls, VoxelType type) {
+  World world = made_world(true);
+  PropagatedLight light;
+  light.update(world.grid, world.types, {1});
+  const std::vector<IVec3> places = places_in_caves(world, light, in_walls);
+  VoxelType before = kAir;
+  std::size_t done = 0;
+  for (auto _ : state) {
+    const IVec3 at = places[done / 2 % places.size()];
+    if (done % 2 == 0) before = world.grid.get(at);
+    world.grid.set(at, done % 2 == 0 ? type : before);
+    light.update(world.grid, world.types, {1});
+    ++done;
+  }
+}
+BENCHMARK_CAPTURE(edits_in_caves, lamps, false, kLamp)
+    ->Name("light/propagated/lamps_in_caves")
+    ->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(edits_in_caves, walls, true, kAir)
+    ->Name("light/propagated/dug_in_caves")
+    ->Unit(benchmark::kMicrosecond);
+
+// A lamp placed or removed in the middle of a chunk, until all chunks whose faces it lights are split again.
+void edit_to_mesh(benchmark::State& state) {
+  World world = made_world(true);
+  PropagatedLight light;
+  light.update(world.grid, world.types, {1});
+  ChangeCursor lit;
+  static_cast<void>(light.changes_since(lit));
+  BlockyMesher mesher;
+  QuadBuffer quads;
+  QuadBuffer split;
+  std::vector<std::uint16_t> levels;
+  bool is_there = false;
+  for (auto _ : state) {
+    is_there = !is_there;
+    world.grid.set({224, 24, 224}, is_there ? kLamp : kAir);
+    light.update(world.grid, world.types, {1});
+    for (const ChunkChange& change : light.changes_since(lit).items) {
+      mesher.mesh(world.grid.neighbourhood(change.chunk), world.types, {}, quads);
+      light.split(quads, change.chunk, split, levels);
+    }
+    benchmark::DoNotOptimize(levels.data());
+  }
+}
+BENCHMARK(edit_to_mesh)->Name("light/propagated/edit_to_mesh")->Unit(benchmark::kMicrosecond);
+
+// All chunks once.
+void split(benchmark::State& state) {
+  const World world = made_world(true);
+  PropagatedLight light;
+  light.update(world.grid, world.types, {1});
+  BlockyMesher mesher;
+  std::vector<std::pair<IVec3, QuadBuffer>> meshes;
+  for (const IVec3 chunk : world.grid.chunks()) {
+    mesher.mesh(world.grid.neighbourhood(chunk), world.types, {}, meshes.emplace_back(chunk, QuadBuffer()).second);
+  }
+  QuadBuffer out;
+  std::vector<std::uint16_t> levels;
+  for (auto _ : state) {
+    for (const auto& [chunk, quads] : meshes) light.split(quads, chunk, out, levels);
+  }
+}
+BENCHMARK(split)->Name("light/propagated/split")->Unit(benchmark::kMillisecond);
 
 // Placed and removed by turns; each is one iteration.
 void edit(benchmark::State& state, IVec3 at, VoxelType type) {
@@ -77,7 +181,6 @@ void edit(benchmark::State& state, IVec3 at, VoxelType type) {
   std::exit(1);
 }
 BENCHMARK_CAPTURE(edit, lamp, IVec3(200, 24, 216), kLamp)->Name("light/propagated/lamp")->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(edit, ground, IVec3(230, 40, 230), kAir)->Name("light/propagated/dig")->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(edit, roof, IVec3(230, 100, 230), VoxelType{1})
     ->Name("light/propagated/roof")
     ->Unit(benchmark::kMicrosecond);

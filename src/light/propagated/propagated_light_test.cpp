@@ -211,7 +211,7 @@ TEST(PropagatedLight, AMillionRandomEditsEqualASearch) {
     const int count = random() % 100 == 0 ? 200 : 1 + static_cast<int>(random() % 30);
     for (int i = 0; i < count; ++i) edit_little(grid, random);
     done += count;
-    light.update(grid, types, {1 + random() % 2});
+    light.update(grid, types, {1 + static_cast<unsigned>(random() % 2)});
     if (done < (checked + 1) * (edits / checks)) continue;
     ++checked;
     expect_searched(light, grid, types);
