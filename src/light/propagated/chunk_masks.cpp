@@ -23,8 +23,8 @@ bool passes(const std::vector<TypeLight>& types, VoxelType type, std::size_t cha
 void ChunkMasks::read_rows(const Chunk& voxels, const std::vector<TypeLight>& types, std::size_t channel,
                            const IBox& box) {
   Rows& rows = rows_[channel];
-  const auto stopped = std::count_if(found_.begin(), found_.end(),
-                                     [&](VoxelType type) { return !passes(types, type, channel); });
+  const auto stopped =
+      std::count_if(found_.begin(), found_.end(), [&](VoxelType type) { return !passes(types, type, channel); });
   rows.is_uniform = stopped == 0 || static_cast<std::size_t>(stopped) == found_.size();
   rows.uniform = stopped == 0 ? kAll : 0;
   if (rows.is_uniform) return;
@@ -73,7 +73,8 @@ void ChunkMasks::read_lamps(const Chunk& voxels, const std::vector<TypeLight>& t
       if (kind == trace::Slab::Empty) without_lamps_[of_z] |= bit;
       if (kind == trace::Slab::Empty) continue;
       if (kind == trace::Slab::Full) rows.fill(kAll);
-      for (int i = 0; i < 16; ++i) add_lamps(voxels, types, y + (i & 3), z + (i >> 2), rows[static_cast<std::size_t>(i)]);
+      for (int i = 0; i < 16; ++i)
+        add_lamps(voxels, types, y + (i & 3), z + (i >> 2), rows[static_cast<std::size_t>(i)]);
     }
   }
 }
@@ -89,9 +90,8 @@ void ChunkMasks::read(const Chunk* voxels, const std::vector<TypeLight>& types, 
   found_ = voxels->types();
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     const auto is_like = [&](std::size_t other) {
-      return std::all_of(found_.begin(), found_.end(), [&](VoxelType type) {
-        return passes(types, type, channel) == passes(types, type, other);
-      });
+      return std::all_of(found_.begin(), found_.end(),
+                         [&](VoxelType type) { return passes(types, type, channel) == passes(types, type, other); });
     };
     std::size_t other = 0;
     while (other < channel && !is_like(other)) ++other;

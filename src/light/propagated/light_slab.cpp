@@ -93,7 +93,8 @@ unsigned LightSlab::lit_rows(std::uint64_t mask) const {
 
 void LightSlab::read(SlabPlanes& out) const {
   if (is_uniform()) {
-    for (std::size_t i = 0; i < kPlanes; ++i) std::fill_n(out.plane(i), kSlabWords, (level() >> i & 1U) != 0 ? kAll : 0);
+    for (std::size_t i = 0; i < kPlanes; ++i)
+      std::fill_n(out.plane(i), kSlabWords, (level() >> i & 1U) != 0 ? kAll : 0);
     return;
   }
   const Block& stored = block();

@@ -55,7 +55,8 @@ class LightSlab {
       for (std::size_t i = 0; i < kPlanes; ++i) found |= static_cast<unsigned>(words[i * kSlabWords] >> x & 1U) << i;
       return found;
     }
-    visit_row(row, [&](std::size_t plane, std::uint64_t word) { found |= static_cast<unsigned>(word >> x & 1U) << plane; });
+    visit_row(row,
+              [&](std::size_t plane, std::uint64_t word) { found |= static_cast<unsigned>(word >> x & 1U) << plane; });
     return found;
   }
   [[nodiscard]] RowPlanes row(std::size_t row) const;
@@ -92,6 +93,7 @@ class LightSlab {
   };
   static_assert(sizeof(Block) == 24);
 
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): a chunk has a thousand of them, eight bytes each
   [[nodiscard]] Block& block() const { return *reinterpret_cast<Block*>(bits_); }
   void release() noexcept;
   void read_plane(std::size_t plane, std::uint64_t* out) const;

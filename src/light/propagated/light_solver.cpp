@@ -290,7 +290,8 @@ void LightSolver::find_passable() {
 }
 
 bool LightSolver::has_sources(std::size_t channel) const {
-  return (channel == kSky && has_sky_) || std::any_of(sources_[channel].begin(), sources_[channel].end(),
+  return (channel == kSky && has_sky_) ||
+         std::any_of(sources_[channel].begin(), sources_[channel].end(),
                      [](const std::vector<Source>& sources) { return !sources.empty(); });
 }
 
@@ -341,10 +342,23 @@ void LightSolver::activate(unsigned level) {
 }
 
 LevelPass LightSolver::step_to(unsigned level) {
-  LevelPass step{level, layer_, column_, touched_.size(), pass_.data(), rest_.data(), front_.data(), next_.data(), {},
+  LevelPass step{level,
+                 layer_,
+                 column_,
+                 touched_.size(),
+                 pass_.data(),
+                 rest_.data(),
+                 front_.data(),
+                 next_.data(),
+                 {},
                  static_cast<std::size_t>(box_.wanted.min.z - origin_.z),
-                 static_cast<std::size_t>(box_.wanted.max.z - origin_.z), blocks_near(0), wanted_bits_.data(), active_.data(),
-                 in_next_.data(), touched_.data(), open_.data()};
+                 static_cast<std::size_t>(box_.wanted.max.z - origin_.z),
+                 blocks_near(0),
+                 wanted_bits_.data(),
+                 active_.data(),
+                 in_next_.data(),
+                 touched_.data(),
+                 open_.data()};
   for (std::size_t plane = 0; plane < kPlanes; ++plane) step.planes[plane] = planes_[plane].data();
   return step;
 }
@@ -387,7 +401,8 @@ void LightSolver::complete_planes() {
   const int end = box_.wanted.max.z - origin_.z;
   for (int z = begin; z < end; ++z) {
     std::uint64_t near = 0;
-    for (int i = std::max(z - 3, 0); i < std::min(z + 4, size_.z + 2); ++i) near |= touched_[static_cast<std::size_t>(i)];
+    for (int i = std::max(z - 3, 0); i < std::min(z + 4, size_.z + 2); ++i)
+      near |= touched_[static_cast<std::size_t>(i)];
     near |= near << 1 | near >> 1;
     if (columns_ > 1) near |= near << blocks_ | near >> blocks_;
     const auto layer = static_cast<std::size_t>(z);
@@ -405,18 +420,24 @@ bool LightSolver::is_touched(const Part& part, int y, int z) const {
   const int last = std::min((p.y + 3) / 8, static_cast<int>(blocks_) - 1);
   std::uint64_t blocks = 0;
   for (int column = std::max(part.shift >> 6, 0); column <= (part.shift >> 6) + 1; ++column) {
-    if (column < static_cast<int>(columns_)) blocks |= bits_between(first, last + 1) << (column * static_cast<int>(blocks_));
+    if (column < static_cast<int>(columns_))
+      blocks |= bits_between(first, last + 1) << (column * static_cast<int>(blocks_));
   }
   std::uint64_t touched = 0;
-  for (int i = std::max(p.z, 1); i < std::min(p.z + 4, size_.z + 1); ++i) touched |= touched_[static_cast<std::size_t>(i)];
+  for (int i = std::max(p.z, 1); i < std::min(p.z + 4, size_.z + 1); ++i)
+    touched |= touched_[static_cast<std::size_t>(i)];
   return (touched & blocks) != 0;
 }
 
 void LightSolver::read_slab(const Part& part, int y, int z, SlabPlanes& now) const {
   const IVec3 p = part.chunk * kChunkEdge + IVec3(0, y, z) - origin_;
-  const std::ptrdiff_t at = p.z * static_cast<std::ptrdiff_t>(layer_) +
-                            (part.shift >> 6) * static_cast<std::ptrdiff_t>(column_) + p.y;
-  SlabRead read{{}, layer_, column_, static_cast<unsigned>(part.shift & 63), static_cast<std::size_t>(std::max(1 - p.z, 0)),
+  const std::ptrdiff_t at =
+      p.z * static_cast<std::ptrdiff_t>(layer_) + (part.shift >> 6) * static_cast<std::ptrdiff_t>(column_) + p.y;
+  SlabRead read{{},
+                layer_,
+                column_,
+                static_cast<unsigned>(part.shift & 63),
+                static_cast<std::size_t>(std::max(1 - p.z, 0)),
                 static_cast<std::size_t>(std::min(size_.z + 1 - p.z, 4))};
   for (std::size_t plane = 0; plane < kPlanes; ++plane) read.planes[plane] = planes_[plane].data() + at;
   kernel().read_slab(read, now.words.data());
@@ -435,9 +456,9 @@ bool LightSolver::write_open(const Part& part, const ChannelLight& before, Chunk
 }
 
 void LightSolver::write_chunk(const Part& part, std::size_t channel, ChunkLightChange& change) {
-  static const ChannelLight kDark;
-  static const SlabPlanes kDarkSlab{};
-  const ChannelLight& before = part.around->light == nullptr ? kDark : part.around->light->channels[channel];
+  static const ChannelLight dark;
+  static const SlabPlanes dark_slab{};
+  const ChannelLight& before = part.around->light == nullptr ? dark : part.around->light->channels[channel];
   if (outcome_ == Outcome::Dark && before.is_uniform() && before.level() == 0) return;
   if (write_open(part, before, change)) return;
   const bool is_new = part.is_whole() && part.around->light == nullptr;
@@ -456,7 +477,7 @@ void LightSolver::write_chunk(const Part& part, std::size_t channel, ChunkLightC
     is_dark ? now.words.fill(0) : read_slab(part, y, z, now);
     const bool was_dark = was.is_uniform() && was.level() == 0;
     if (!was_dark) was.read(old);
-    const SlabPlanes& other = was_dark ? kDarkSlab : old;
+    const SlabPlanes& other = was_dark ? dark_slab : old;
     const SlabKinds kinds = kernel().merge(other.words.data(), inside.data(), now.words.data(), changed.data());
     if (!kinds.is_changed) return;
     change.channels[channel].slabs.push_back({index, LightSlab::of(now, kinds)});
@@ -469,7 +490,8 @@ void LightSolver::write(std::size_t channel, std::vector<ChunkLightChange>& chan
   const IVec3 size = chunk_of(region_->all.wanted.max - 1) + 1 - first;
   for_each_part(box_.wanted, [&](const Part& part) {
     const IVec3 p = part.chunk - first;
-    if (part.around->is_held) write_chunk(part, channel, changes[static_cast<std::size_t>(p.x + size.x * (p.y + size.y * p.z))]);
+    if (part.around->is_held)
+      write_chunk(part, channel, changes[static_cast<std::size_t>(p.x + size.x * (p.y + size.y * p.z))]);
   });
 }
 

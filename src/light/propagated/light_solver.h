@@ -19,11 +19,11 @@ inline constexpr int kReach = 14;
 
 /// A chunk in a region or beside it.
 struct ChunkAround {
-  bool is_held = false;                ///< else its light stays as it is: dark, ...
-  bool is_open = false;                ///< ... or all sky
-  const ChunkMasks* masks = nullptr;   ///< of those that are held, of where the region lies in it
-  const LightChunk* light = nullptr;   ///< null: dark
-  IBox unknown;                        ///< of the chunk: where its light is not to be relied on
+  bool is_held = false;               ///< else its light stays as it is: dark, ...
+  bool is_open = false;               ///< ... or all sky
+  const ChunkMasks* masks = nullptr;  ///< of those that are held, of where the region lies in it
+  const LightChunk* light = nullptr;  ///< null: dark
+  IBox unknown;                       ///< of the chunk: where its light is not to be relied on
 };
 
 /// Voxels whose light is to be found.

@@ -21,7 +21,7 @@ namespace quoin::propagated {
 struct ChunkLightChange {
   IVec3 chunk{0};
   std::array<ChannelChange, kChannels> channels;
-  VoxelRecord record;    ///< where something changed
+  VoxelRecord record;       ///< where something changed
   SlabSet without_lamps{};  ///< slabs in which there was found to be none
 
   [[nodiscard]] bool empty() const {

@@ -62,7 +62,8 @@ std::vector<TypeLight> type_lights(const VoxelRegistry& types, const PropagatedL
 unsigned lamp_channels(const std::vector<TypeLight>& lights) {
   unsigned channels = 0;
   for (const TypeLight& light : lights) {
-    for (std::size_t c = 0; c < kChannels; ++c) channels |= static_cast<unsigned>((light.lamp >> (4 * c) & 15U) != 0) << c;
+    for (std::size_t c = 0; c < kChannels; ++c)
+      channels |= static_cast<unsigned>((light.lamp >> (4 * c) & 15U) != 0) << c;
   }
   return channels;
 }
@@ -117,9 +118,9 @@ struct PropagatedLight::Impl {
   std::vector<TypeLight> lights;
   unsigned lamp_channels = 0;  // that any type gives off
   LightDomain domain;
-  LightStore store;            // of the chunks of the domain
-  std::vector<Dirty> dirty;    // boxes that are to be solved by themselves
-  Queue queue{by_zyx};         // boxes of chunks that are to be solved, a layer at a time
+  LightStore store;          // of the chunks of the domain
+  std::vector<Dirty> dirty;  // boxes that are to be solved by themselves
+  Queue queue{by_zyx};       // boxes of chunks that are to be solved, a layer at a time
   std::unordered_map<IVec3, std::unique_ptr<ChunkMasks>, CoordinateHash> masks;  // during an update
 };
 
@@ -179,7 +180,8 @@ std::array<unsigned, kChannels> PropagatedLight::Impl::highest_levels(const Grid
   };
   const IVec3 size = voxels.size();
   if (std::int64_t{size.x} * size.y * size.z > kMany) {
-    for (std::size_t c = 0; c < kChannels; ++c) highest[c] = c == kSky || (lamp_channels >> c & 1U) != 0 ? kBrightest : 0;
+    for (std::size_t c = 0; c < kChannels; ++c)
+      highest[c] = c == kSky || (lamp_channels >> c & 1U) != 0 ? kBrightest : 0;
     return highest;
   }
   LightReader words = reader();
@@ -244,35 +246,44 @@ void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& chang
   sort_dirty();
 }
 
-// Boxes that touch become one, also those that share a slab of a chunk. Where that is too large, chunks are solved.
+namespace {
+
+// Boxes that touch, or share a slab of a chunk, of which the results would be put one over the other.
+struct Cluster {
+  std::array<IBox, kChannels> boxes;
+  IBox all;
+  IBox slabs;  // around it and its rim
+  std::vector<IBox> parts;
+
+  explicit Cluster(const std::array<IBox, kChannels>& one) : boxes(one), all(around_all(one)), parts{all} {
+    const IVec3 size{kChunkEdge, 4, 4};
+    slabs = {(all.min - 1) & ~(size - 1), (all.max + size) & ~(size - 1)};
+  }
+  [[nodiscard]] bool touches(const Cluster& other) const { return !intersect(slabs, other.slabs).empty(); }
+  void add(const Cluster& other) {
+    for (std::size_t c = 0; c < kChannels; ++c) boxes[c] = unite(boxes[c], other.boxes[c]);
+    all = unite(all, other.all);
+    slabs = unite(slabs, other.slabs);
+    parts.insert(parts.end(), other.parts.begin(), other.parts.end());
+  }
+};
+
+}  // namespace
+
+// Where boxes that touch are too large together, or too many, chunks are solved.
 void PropagatedLight::Impl::sort_dirty() {
   constexpr std::size_t kMany = 1024;
-  struct Cluster {
-    Dirty boxes;
-    IBox all;
-    IBox slabs;  // with the rim
-    std::vector<IBox> parts;
-  };
-  const auto slabs_of = [](const IBox& box) {
-    const IVec3 size{kChunkEdge, 4, 4};
-    return IBox{(box.min - 1) & ~(size - 1), (box.max + size) & ~(size - 1)};
-  };
   std::vector<Cluster> clusters;
   const bool is_alone = queue.empty() && dirty.size() <= kMany;
   for (const Dirty& each : dirty) {
-    const IBox all = around_all(each);
-    if (all.empty()) continue;
-    Cluster cluster{each, all, slabs_of(all), {all}};
+    Cluster cluster(each);
+    if (cluster.all.empty()) continue;
     for (std::size_t i = 0; is_alone && i < clusters.size();) {
-      Cluster& other = clusters[i];
-      if (intersect(other.slabs, cluster.slabs).empty()) {
+      if (!clusters[i].touches(cluster)) {
         ++i;
         continue;
       }
-      for (std::size_t c = 0; c < kChannels; ++c) cluster.boxes[c] = unite(cluster.boxes[c], other.boxes[c]);
-      cluster.all = unite(cluster.all, other.all);
-      cluster.slabs = unite(cluster.slabs, other.slabs);
-      cluster.parts.insert(cluster.parts.end(), other.parts.begin(), other.parts.end());
+      cluster.add(clusters[i]);
       clusters.erase(clusters.begin() + static_cast<std::ptrdiff_t>(i));
       i = 0;
     }
@@ -413,7 +424,7 @@ void PropagatedLight::Impl::read_masks(const Grid& grid, const std::vector<Light
 }
 
 void PropagatedLight::Impl::solve_queue(const Grid& grid, Threads threads) {
-  constexpr std::size_t kBatch = 64;       // regions at a time
+  constexpr std::size_t kBatch = 64;        // regions at a time
   constexpr std::size_t kMaskLimit = 1024;  // chunks of which masks are kept: 32 MB
   while (!queue.empty()) {
     const std::vector<LightRegion> layer = next_layer();

@@ -17,22 +17,22 @@ inline constexpr std::size_t kSlabWords = 16;  // rows of a slab of a chunk: 4 a
 /// A step of light from one level to the next lower one. Words are [z][column of words][y]; `layer` words lie from z to
 /// z + 1, `column` words from a word to that beside it along x. Bit i of a layer's mask is its block of rows 8 i on.
 struct LevelPass {
-  unsigned level;                   ///< that which is reached
+  unsigned level;  ///< that which is reached
   std::size_t layer;
   std::size_t column;
-  std::size_t layers;               ///< with those of the rim: the first and the last, which nothing reaches
-  const std::uint64_t* pass;        ///< where light passes; nowhere at the region's rim
-  std::uint64_t* rest;              ///< what of it is dark, in blocks that are touched
-  std::uint64_t* front;             ///< what has just the level above
-  std::uint64_t* next;              ///< becomes what has this very level; holds what had the level two above
-  std::uint64_t* planes[kPlanes];   ///< bits of levels, in what is wanted of the blocks that are touched
+  std::size_t layers;                  ///< with those of the rim: the first and the last, which nothing reaches
+  const std::uint64_t* pass;           ///< where light passes; nowhere at the region's rim
+  std::uint64_t* rest;                 ///< what of it is dark, in blocks that are touched
+  std::uint64_t* front;                ///< what has just the level above
+  std::uint64_t* next;                 ///< becomes what has this very level; holds what had the level two above
+  std::uint64_t* planes[kPlanes];      ///< bits of levels, in what is wanted of the blocks that are touched
   std::size_t wanted_z, wanted_end_z;  ///< what is wanted: these layers, ...
-  std::uint64_t wanted;             ///< ... of these these blocks, ...
-  const std::uint64_t* wanted_bits;  ///< [column]: ... and of their rows at least these voxels
-  const std::uint64_t* active;      ///< [z]: blocks to work on
-  std::uint64_t* changed;           ///< [z]: blocks in which `next` is not 0
-  std::uint64_t* touched;           ///< [z]: blocks in which anything was reached
-  std::uint64_t* open;              ///< [z]: blocks in which something may still be
+  std::uint64_t wanted;                ///< ... of these these blocks, ...
+  const std::uint64_t* wanted_bits;    ///< [column]: ... and of their rows at least these voxels
+  const std::uint64_t* active;         ///< [z]: blocks to work on
+  std::uint64_t* changed;              ///< [z]: blocks in which `next` is not 0
+  std::uint64_t* touched;              ///< [z]: blocks in which anything was reached
+  std::uint64_t* open;                 ///< [z]: blocks in which something may still be
 };
 
 /// Rows of a region that lie in a slab of a chunk.
@@ -40,7 +40,7 @@ struct SlabRead {
   const std::uint64_t* planes[kPlanes];  ///< at the slab's first row
   std::size_t layer;
   std::size_t column;
-  unsigned shift;      ///< bit of a word at which a row begins; it goes on in the next column
+  unsigned shift;          ///< bit of a word at which a row begins; it goes on in the next column
   std::size_t begin, end;  ///< of its four layers of z those that are in the region
 };
 

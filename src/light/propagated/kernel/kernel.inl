@@ -2,6 +2,7 @@
 
 #include <bit>
 #include <cstring>
+#include <utility>
 
 #ifdef QUOIN_KERNEL_AVX2
 #include <immintrin.h>
@@ -128,19 +129,20 @@ void spread(const LevelPass& step) {
   step.layer == step.column ? spread_layers<false>(step) : spread_layers<true>(step);
 }
 
+template <std::size_t kBy, std::size_t... kLanes>
+inline Words lanes_from(Words words, Words above, std::index_sequence<kLanes...>) {
+  return __builtin_shufflevector(words, above, (kLanes + kBy)...);
+}
+
 // Lanes move down by kBy, those of `above` come in.
 template <std::size_t kBy>
 inline Words lanes_down(Words words, Words above) {
-  Words lanes;
-  for (std::size_t i = 0; i < kWidth; ++i) lanes[i] = i + kBy;
-  return __builtin_shuffle(words, above, lanes);
+  return lanes_from<kBy>(words, above, std::make_index_sequence<kWidth>());
 }
 
 // Lanes move up by one, 0 comes in.
 inline Words lanes_up(Words words) {
-  Words lanes;
-  for (std::size_t i = 0; i < kWidth; ++i) lanes[i] = i == 0 ? kWidth : i - 1;
-  return __builtin_shuffle(words, Words{}, lanes);
+  return lanes_from<kWidth - 1>(Words{}, words, std::make_index_sequence<kWidth>());
 }
 
 // What is lit falls to lower lanes while it can pass, and so does what comes from above.
@@ -209,7 +211,8 @@ bool take_sky(const LevelPass& of) {
         all_lit |= lit[part];
         all_dark |= dark[part];
       }
-      if (is_wanted(step, z, std::uint64_t{1} << i)) shade |= all_dark & (Words{} + step.wanted_bits[i * kBlockRows / step.column]);
+      if (is_wanted(step, z, std::uint64_t{1} << i))
+        shade |= all_dark & (Words{} + step.wanted_bits[i * kBlockRows / step.column]);
       if (!any(all_lit)) continue;
       const std::uint64_t block = std::uint64_t{1} << i;
       take_sky_of_block(step, z, at, block, lit, dark);
@@ -271,8 +274,7 @@ void unpack(const std::uint64_t* planes, std::uint16_t* out) {
     return _mm512_or_si512(_mm512_cvtepu8_epi16(low), _mm512_slli_epi16(_mm512_cvtepu8_epi16(high), 8));
   };
   _mm512_storeu_si512(out, join(_mm512_castsi512_si256(bytes[0]), _mm512_castsi512_si256(bytes[1])));
-  _mm512_storeu_si512(out + 32,
-                      join(_mm512_extracti64x4_epi64(bytes[0], 1), _mm512_extracti64x4_epi64(bytes[1], 1)));
+  _mm512_storeu_si512(out + 32, join(_mm512_extracti64x4_epi64(bytes[0], 1), _mm512_extracti64x4_epi64(bytes[1], 1)));
 }
 
 #elif defined(QUOIN_KERNEL_AVX2)
