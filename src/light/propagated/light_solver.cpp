@@ -110,7 +110,11 @@ void LightSolver::shape(const LightRegion::Box& box) {
   grow(rest_, layers * layer_);
   grow(front_, layers * layer_);
   grow(next_, layers * layer_);
-  for (std::vector<std::uint64_t>& plane : planes_) grow(plane, layers * layer_);
+  // Slabs that reach out of the region are read with words before its first and behind its last ones.
+  for (std::size_t i = 0; i < kPlanes; ++i) {
+    grow(plane_words_[i], layers * layer_ + 2 * kBlockRows);
+    planes_[i] = plane_words_[i].data() + kBlockRows;
+  }
   passable_.resize(layers);
   wanted_bits_.resize(columns_);
   for (std::size_t column = 0; column < columns_; ++column) {
@@ -306,7 +310,7 @@ void LightSolver::light_up(const Source& source, unsigned level) {
     touched_[source.z] |= block;
     const std::size_t first = source.at & ~(kBlockRows - 1);
     std::copy_n(pass_.data() + first, kBlockRows, rest_.data() + first);
-    for (auto& plane : planes_) std::fill_n(plane.data() + first, kBlockRows, 0);
+    for (std::uint64_t* plane : planes_) std::fill_n(plane + first, kBlockRows, 0);
   }
   in_front_[source.z] |= block;
   front_[source.at] |= fresh;
@@ -359,7 +363,7 @@ LevelPass LightSolver::step_to(unsigned level) {
                  in_next_.data(),
                  touched_.data(),
                  open_.data()};
-  for (std::size_t plane = 0; plane < kPlanes; ++plane) step.planes[plane] = planes_[plane].data();
+  for (std::size_t plane = 0; plane < kPlanes; ++plane) step.planes[plane] = planes_[plane];
   return step;
 }
 
@@ -408,7 +412,7 @@ void LightSolver::complete_planes() {
     const auto layer = static_cast<std::size_t>(z);
     for (std::uint64_t left = near & ~touched_[layer] & all; left != 0; left &= left - 1) {
       const std::size_t at = layer * layer_ + kBlockRows * static_cast<std::size_t>(std::countr_zero(left));
-      for (auto& plane : planes_) std::fill_n(plane.data() + at, kBlockRows, 0);
+      for (std::uint64_t* plane : planes_) std::fill_n(plane + at, kBlockRows, 0);
     }
   }
 }
@@ -439,7 +443,7 @@ void LightSolver::read_slab(const Part& part, int y, int z, SlabPlanes& now) con
                 static_cast<unsigned>(part.shift & 63),
                 static_cast<std::size_t>(std::max(1 - p.z, 0)),
                 static_cast<std::size_t>(std::min(size_.z + 1 - p.z, 4))};
-  for (std::size_t plane = 0; plane < kPlanes; ++plane) read.planes[plane] = planes_[plane].data() + at;
+  for (std::size_t plane = 0; plane < kPlanes; ++plane) read.planes[plane] = planes_[plane] + at;
   kernel().read_slab(read, now.words.data());
 }
 

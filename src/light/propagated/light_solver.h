@@ -127,7 +127,8 @@ class LightSolver {
   std::vector<std::uint64_t> rest_;   // of it what is dark, in blocks that are touched
   std::vector<std::uint64_t> front_;  // what has the present level; all 0 between regions
   std::vector<std::uint64_t> next_;   // likewise: the level above, and then that below
-  std::array<std::vector<std::uint64_t>, kPlanes> planes_;
+  std::array<std::vector<std::uint64_t>, kPlanes> plane_words_;
+  std::array<std::uint64_t*, kPlanes> planes_{};  // bits of levels, within these
   std::vector<std::uint64_t> wanted_bits_;  // [column]
   // [z]: blocks
   std::vector<std::uint64_t> passable_, open_, active_, touched_;

@@ -183,47 +183,51 @@ inline bool has_bits(const std::uint64_t* words, std::size_t count) {
   return any(all);
 }
 
+// Returns whether something that is wanted stays in the shade of a layer that has sky.
+bool take_sky_of_layer(const LevelPass& step, std::size_t z) {
+  Words shade{};
+  std::uint64_t from_above = 0;
+  std::uint64_t lit_blocks = 0;
+  std::uint64_t full_blocks = 0;
+  for (std::size_t i = step.layer / kBlockRows; i-- > 0;) {
+    const std::size_t at = z * step.layer + i * kBlockRows;
+    const std::uint64_t block = std::uint64_t{1} << i;
+    Words lit[kBlockRows / kWidth];
+    Words dark[kBlockRows / kWidth];
+    Words all_lit{};
+    Words all_dark{};
+    // The top row of a column is of the rim: nothing falls from one column to another.
+    for (std::size_t part = kBlockRows / kWidth; part-- > 0;) {
+      const Words pass = load(step.pass + at + part * kWidth);
+      lit[part] = fall(load(step.front + at + part * kWidth), pass, from_above);
+      from_above = lit[part][0];
+      dark[part] = pass & ~lit[part];
+      all_lit |= lit[part];
+      all_dark |= dark[part];
+    }
+    if (is_wanted(step, z, block)) shade |= all_dark & (Words{} + step.wanted_bits[i * kBlockRows / step.column]);
+    if (!any(all_lit)) continue;
+    take_sky_of_block(step, z, at, block, lit, dark);
+    lit_blocks |= block;
+    if (!any(all_dark)) full_blocks |= block;
+  }
+  step.changed[z] = lit_blocks;
+  step.touched[z] |= lit_blocks;
+  step.open[z] &= ~full_blocks;
+  return any(shade);
+}
+
 bool take_sky(const LevelPass& of) {
   const LevelPass step = of;
   bool is_shady = false;
-  Words shade{};
   for (std::size_t z = 0; z < step.layers; ++z) {
-    if (!has_bits(step.front + z * step.layer, step.layer)) {
-      const bool is_here = z >= step.wanted_z && z < step.wanted_end_z && (step.wanted & step.open[z]) != 0;
-      is_shady |= is_here;
-      continue;
+    if (has_bits(step.front + z * step.layer, step.layer)) {
+      is_shady |= take_sky_of_layer(step, z);
+    } else {
+      is_shady |= z >= step.wanted_z && z < step.wanted_end_z && (step.wanted & step.open[z]) != 0;
     }
-    std::uint64_t from_above = 0;
-    std::uint64_t lit_blocks = 0;
-    std::uint64_t full_blocks = 0;
-    for (std::size_t i = step.layer / kBlockRows; i-- > 0;) {
-      const std::size_t at = z * step.layer + i * kBlockRows;
-      // The top rows of a column are of the rim.
-      Words lit[kBlockRows / kWidth];
-      Words dark[kBlockRows / kWidth];
-      Words all_lit{};
-      Words all_dark{};
-      for (std::size_t part = kBlockRows / kWidth; part-- > 0;) {
-        const Words pass = load(step.pass + at + part * kWidth);
-        lit[part] = fall(load(step.front + at + part * kWidth), pass, from_above);
-        from_above = lit[part][0];
-        dark[part] = pass & ~lit[part];
-        all_lit |= lit[part];
-        all_dark |= dark[part];
-      }
-      if (is_wanted(step, z, std::uint64_t{1} << i))
-        shade |= all_dark & (Words{} + step.wanted_bits[i * kBlockRows / step.column]);
-      if (!any(all_lit)) continue;
-      const std::uint64_t block = std::uint64_t{1} << i;
-      take_sky_of_block(step, z, at, block, lit, dark);
-      lit_blocks |= block;
-      if (!any(all_dark)) full_blocks |= block;
-    }
-    step.changed[z] = lit_blocks;
-    step.touched[z] |= lit_blocks;
-    step.open[z] &= ~full_blocks;
   }
-  return is_shady || any(shade);
+  return is_shady;
 }
 
 std::uint64_t find_blocks(const std::uint64_t* words, std::size_t count) {
