@@ -4,9 +4,10 @@
 #include <cstddef>
 #include <optional>
 #include <span>
-#include <utility>
 
 #include <quoin/core/direction.h>
+
+#include "light/quad_cutter.h"
 
 namespace quoin::propagated {
 namespace {
@@ -17,28 +18,20 @@ struct QuadLight {
   int height = 0;
   std::vector<std::uint16_t> words;
 
-  [[nodiscard]] std::uint16_t& at(int u, int v) { return words[static_cast<std::size_t>(u + width * v)]; }
+  [[nodiscard]] std::uint16_t at(int u, int v) const { return words[static_cast<std::size_t>(u + width * v)]; }
   [[nodiscard]] bool is_uniform() const {
     return std::all_of(words.begin(), words.end(), [&](std::uint16_t word) { return word == words.front(); });
   }
-  // How far the light of a cell goes on along u, and then along v.
-  [[nodiscard]] std::pair<int, int> extent(int u, int v, const std::vector<bool>& done) {
-    const std::uint16_t word = at(u, v);
-    const auto is_free = [&](int x, int y) {
-      return !done[static_cast<std::size_t>(x + width * y)] && at(x, y) == word;
-    };
-    int right = u + 1;
-    while (right < width && is_free(right, v)) ++right;
-    int top = v + 1;
-    const auto is_row = [&](int y) {
-      for (int x = u; x < right; ++x) {
-        if (!is_free(x, y)) return false;
-      }
-      return true;
-    };
-    while (top < height && is_row(top)) ++top;
-    return {right - u, top - v};
-  }
+};
+
+// What one light goes over.
+struct LightPiece {
+  const QuadLight& light;
+  std::uint16_t word;
+  static constexpr bool goes_along_u = true;
+  static constexpr bool goes_along_v = true;
+
+  [[nodiscard]] bool joins(int u, int v) const { return light.at(u, v) == word; }
 };
 
 // Light in a chunk and one voxel around it. Rows are unpacked when one of their voxels is asked for: there are several
@@ -81,7 +74,7 @@ void split_quads(const LightReader& reader, const QuadBuffer& quads, IVec3 chunk
   thread_local ChunkWords words;
   words.begin(reader, chunk);
   QuadLight of_quad;
-  std::vector<bool> done;
+  QuadCutter cutter;
   for (const Quad quad : quads) {
     const FaceFrame& frame = frame_of(quad.direction());
     const IVec3 first = quad.voxel() + normal_of(quad.direction());
@@ -106,18 +99,11 @@ void split_quads(const LightReader& reader, const QuadBuffer& quads, IVec3 chunk
       light.push_back(of_quad.words.front());
       continue;
     }
-    done.assign(of_quad.words.size(), false);
-    for (int v = 0; v < quad.size_v(); ++v) {
-      for (int u = 0; u < quad.size_u(); ++u) {
-        if (done[static_cast<std::size_t>(u + of_quad.width * v)]) continue;
-        const auto [along_u, along_v] = of_quad.extent(u, v, done);
-        for (int y = v; y < v + along_v; ++y) {
-          for (int x = u; x < u + along_u; ++x) done[static_cast<std::size_t>(x + of_quad.width * y)] = true;
-        }
-        out.push_back(quad_part(quad, u, v, along_u, along_v));
-        light.push_back(of_quad.at(u, v));
-      }
-    }
+    const auto start = [&](int u, int v) { return LightPiece{of_quad, of_quad.at(u, v)}; };
+    cutter.cut(of_quad.width, of_quad.height, start, [&](int u, int v, int along_u, int along_v) {
+      out.push_back(quad_part(quad, u, v, along_u, along_v));
+      light.push_back(of_quad.at(u, v));
+    });
   }
 }
 

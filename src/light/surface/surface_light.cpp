@@ -1,10 +1,10 @@
 #include <quoin/light/surface_light.h>
 
 #include <algorithm>
-#include <utility>
 
 #include <quoin/core/assert.h>
 
+#include "light/quad_cutter.h"
 #include "light/surface/levels.h"
 #include "light/surface/rows.h"
 
@@ -12,10 +12,10 @@ namespace quoin {
 
 struct SurfaceLight::Rows {
   LightRows voxels;
-  // Of one quad: what lies in front of it and around, corners, and faces that are done.
+  // Of one quad: what lies in front of it and around, and corners.
   std::vector<FrontLight> fronts;
   std::vector<std::uint32_t> corners;
-  std::vector<bool> done;
+  QuadCutter cutter;
 };
 
 SurfaceLight::SurfaceLight(const PropagatedLight& light, const Grid& grid, const VoxelRegistry& types)
@@ -44,29 +44,18 @@ struct Slope {
   bool is_linear = false;
 };
 
-// Light at the corners of a quad's faces, and how it is cut.
-class QuadCutter {
+// Light at the corners of a quad's faces.
+class QuadCorners {
  public:
-  QuadCutter(int width, int height, const std::vector<std::uint32_t>& corners, std::vector<bool>& done)
-      : width_(width), height_(height), corners_(corners), done_(done) {
-    done_.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), false);
-  }
+  QuadCorners(int width, const std::vector<std::uint32_t>& corners) : width_(width), corners_(corners) {}
 
-  template <class Emit>
-  void cut(LightMerging merging, const Emit& emit) {
-    for (int v = 0; v < height_; ++v) {
-      for (int u = 0; u < width_; ++u) {
-        if (is_done(u, v)) continue;
-        const auto [along_u, along_v] = extent(u, v, merging);
-        for (int y = v; y < v + along_v; ++y) {
-          const auto first = done_.begin() + (u + width_ * y);
-          std::fill(first, first + along_u, true);
-        }
-        emit(u, v, along_u, along_v);
-      }
-    }
+  [[nodiscard]] Slope slope(int u, int v) const {
+    const std::uint64_t first = spread(corner(u, v));
+    const Slope slope{spread(corner(u + 1, v)) - first, spread(corner(u, v + 1)) - first, true};
+    const bool is_linear = spread(corner(u + 1, v + 1)) - spread(corner(u, v + 1)) == slope.along_u;
+    return {slope.along_u, slope.along_v, is_linear};
   }
-  [[nodiscard]] FaceLight corners_of(int u, int v, int along_u, int along_v) const {
+  [[nodiscard]] FaceLight of_part(int u, int v, int along_u, int along_v) const {
     return {corner(u, v), corner(u + along_u, v), corner(u + along_u, v + along_v), corner(u, v + along_v)};
   }
 
@@ -74,44 +63,27 @@ class QuadCutter {
   [[nodiscard]] std::uint32_t corner(int u, int v) const {
     return corners_[static_cast<std::size_t>(u + (width_ + 1) * v)];
   }
-  [[nodiscard]] bool is_done(int u, int v) const { return done_[static_cast<std::size_t>(u + width_ * v)]; }
-  [[nodiscard]] Slope slope(int u, int v) const {
-    const std::uint64_t first = spread(corner(u, v));
-    const Slope slope{spread(corner(u + 1, v)) - first, spread(corner(u, v + 1)) - first, true};
-    const bool is_linear = spread(corner(u + 1, v + 1)) - spread(corner(u, v + 1)) == slope.along_u;
-    return {slope.along_u, slope.along_v, is_linear};
-  }
-  // How far a face goes on, along u and then along v.
-  [[nodiscard]] std::pair<int, int> extent(int u, int v, LightMerging merging) const {
-    const Slope first = slope(u, v);
-    if (!first.is_linear) return {1, 1};
-    const bool is_linear = merging == LightMerging::Linear;
-    const auto joins = [&](int x, int y) {
-      if (is_done(x, y)) return false;
-      const Slope other = slope(x, y);
-      return other.is_linear && other.along_u == first.along_u && other.along_v == first.along_v;
-    };
-    int right = u + 1;
-    if (is_linear || first.along_u == 0) {
-      while (right < width_ && joins(right, v)) ++right;
-    }
-    int top = v + 1;
-    const auto row_joins = [&](int y) {
-      for (int x = u; x < right; ++x) {
-        if (!joins(x, y)) return false;
-      }
-      return true;
-    };
-    if (is_linear || first.along_v == 0) {
-      while (top < height_ && row_joins(top)) ++top;
-    }
-    return {right - u, top - v};
-  }
 
   int width_;
-  int height_;
   const std::vector<std::uint32_t>& corners_;
-  std::vector<bool>& done_;
+};
+
+// What one slope goes over.
+struct SlopePiece {
+  const QuadCorners& corners;
+  Slope slope;
+  bool goes_along_u;
+  bool goes_along_v;
+
+  SlopePiece(const QuadCorners& of, int u, int v, LightMerging merging) : corners(of), slope(of.slope(u, v)) {
+    const bool is_any = merging == LightMerging::Linear;
+    goes_along_u = slope.is_linear && (is_any || slope.along_u == 0);
+    goes_along_v = slope.is_linear && (is_any || slope.along_v == 0);
+  }
+  [[nodiscard]] bool joins(int u, int v) const {
+    const Slope other = corners.slope(u, v);
+    return other.is_linear && other.along_u == slope.along_u && other.along_v == slope.along_v;
+  }
 };
 
 // Corner (u, v) of a quad of so many faces, from what lies in front of it and one voxel around. Its own voxel is one in
@@ -155,10 +127,11 @@ void SurfaceLight::split(const QuadBuffer& quads, IVec3 chunk, LightMerging merg
       corners.push_back({rows.corners[0], rows.corners[1], rows.corners[3], rows.corners[2]});
       continue;
     }
-    QuadCutter cutter(width, height, rows.corners, rows.done);
-    cutter.cut(merging, [&](int u, int v, int along_u, int along_v) {
+    const QuadCorners of_quad(width, rows.corners);
+    const auto start = [&](int u, int v) { return SlopePiece(of_quad, u, v, merging); };
+    rows.cutter.cut(width, height, start, [&](int u, int v, int along_u, int along_v) {
       out.push_back(quad_part(quad, u, v, along_u, along_v));
-      corners.push_back(cutter.corners_of(u, v, along_u, along_v));
+      corners.push_back(of_quad.of_part(u, v, along_u, along_v));
     });
   }
 }
