@@ -87,8 +87,8 @@ class VulkanMeshRenderer {
   /// Errors:   also InvalidArgument for sizes and samples that cannot be, for cameras as CpuRenderer::render and those
   ///           whose axes lie in one plane, for a picture of another renderer, and with shadows, lamps, propagated
   ///           light, levels of detail or glass by rays, if there is any, when the VulkanRenderer was not last updated
-  ///           with the same scene and filter; Unsupported for wireframes where the device has no lines. After an error in drawing
-  ///           the picture has no samples.
+  ///           with the same scene and filter; Unsupported for wireframes where the device has no lines. After an
+  ///           error in drawing the picture has no samples.
   [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options = {},
                             Threads threads = {});
 

@@ -76,8 +76,8 @@ class LightSlab {
     std::uint8_t count = 0;                      // of words
     bool is_sparse = false;
   };
-  // Then words: [plane that is stored][row]; or, where it is sparse, of each of these planes those rows that differ from
-  // the one before, the first from 0.
+  // Then words: [plane that is stored][row]; or, where it is sparse, of each of these planes those rows that differ
+  // from the one before, the first from 0.
   struct Block : Form {
     explicit Block(const Form& form) : Form(form) {}
     std::atomic<std::uint32_t> owners{1};

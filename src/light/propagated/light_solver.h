@@ -129,7 +129,8 @@ class LightSolver {
   std::vector<std::uint64_t> next_;   // likewise: the level above, and then that below
   std::array<std::vector<std::uint64_t>, kPlanes> plane_words_;
   std::array<std::uint64_t*, kPlanes> planes_{};  // bits of levels, within these
-  std::vector<std::uint64_t> wanted_bits_;  // [column]
+  std::vector<std::uint64_t> wanted_bits_;        // [column]
+
   // [z]: blocks
   std::vector<std::uint64_t> passable_, open_, active_, touched_;
   std::vector<std::uint64_t> in_front_, in_next_;  // where `front_` and `next_` are not 0
