@@ -64,12 +64,6 @@ std::vector<EmissiveCell> cells_of(const std::map<int, Sum>& sums) {
   return cells;
 }
 
-bool has_emissive_types(const Chunk& chunk, const VoxelRegistry& types) {
-  const std::vector<VoxelType> all = chunk.types();
-  return std::any_of(all.begin(), all.end(),
-                     [&](VoxelType type) { return type < types.size() && types[type].emission > 0.0F; });
-}
-
 // By how much a surface is smaller than what the three axes see of it together.
 float share_of_area(const DVec3& gradient) {
   const DVec3 size = glm::abs(gradient);
@@ -116,13 +110,11 @@ std::optional<Crossing> crossing(const DensityGrid& field, const VoxelRegistry& 
   return Crossing{own / (own + next) * DVec3(out), share_of_area(gradient_of_body(field, types, sample, type))};
 }
 
-}  // namespace
-
-void EmissiveCells::look_at(const Grid& grid, const VoxelRegistry& types, IVec3 at) {
-  chunks_.erase(at);
+// Of one chunk.
+std::vector<EmissiveCell> look_at(const Grid& grid, const VoxelRegistry& types, IVec3 at) {
   const Chunk* chunk = grid.find_chunk(at);
-  if (chunk == nullptr || !has_emissive_types(*chunk, types)) return;
-  constexpr int kAcross = kChunkEdge / kEdge;
+  if (chunk == nullptr || !has_emissive_types(*chunk, types)) return {};
+  constexpr int kAcross = kChunkEdge / EmissiveCells::kEdge;
   std::map<int, Sum> sums;  // by the cell's number
   GridReader reader(grid);
   const IVec3 corner = at * kChunkEdge;
@@ -132,7 +124,8 @@ void EmissiveCells::look_at(const Grid& grid, const VoxelRegistry& types, IVec3 
         const IVec3 voxel = corner + IVec3{x, y, z};
         const VoxelType type = reader.get(voxel);
         if (type == kAir || type >= types.size() || !(types[type].emission > 0.0F)) continue;
-        Sum& sum = sums[((z / kEdge) * kAcross + y / kEdge) * kAcross + x / kEdge];
+        Sum& sum =
+            sums[(z / EmissiveCells::kEdge * kAcross + y / EmissiveCells::kEdge) * kAcross + x / EmissiveCells::kEdge];
         sum.add_voxel(voxel);
         const Vec3 light = emitted_by(types[type]);
         for (const Direction face : kDirections) {
@@ -142,15 +135,14 @@ void EmissiveCells::look_at(const Grid& grid, const VoxelRegistry& types, IVec3 
       }
     }
   }
-  if (std::vector<EmissiveCell> cells = cells_of(sums); !cells.empty()) chunks_[at] = std::move(cells);
+  return cells_of(sums);
 }
 
 // What the surface crosses of the lattice's edges that begin or end at samples of the chunk that emit.
-void EmissiveCells::look_at(const DensityGrid& field, const VoxelRegistry& types, IVec3 at) {
-  chunks_.erase(at);
+std::vector<EmissiveCell> look_at(const DensityGrid& field, const VoxelRegistry& types, IVec3 at) {
   const DensityChunk* chunk = field.find_chunk(at);
-  if (chunk == nullptr || !has_emissive_types(chunk->materials(), types)) return;
-  constexpr int kAcross = kChunkEdge / kEdge;
+  if (chunk == nullptr || !has_emissive_types(chunk->materials(), types)) return {};
+  constexpr int kAcross = kChunkEdge / EmissiveCells::kEdge;
   std::map<int, Sum> sums;  // by the cell's number
   const IVec3 corner = at * kChunkEdge;
   for (int z = 0; z < kChunkEdge; ++z) {
@@ -163,33 +155,35 @@ void EmissiveCells::look_at(const DensityGrid& field, const VoxelRegistry& types
         for (const Direction face : kDirections) {
           const std::optional<Crossing> found = crossing(field, types, sample, type, normal_of(face));
           if (!found) continue;
-          Sum& sum = sums[((z / kEdge) * kAcross + y / kEdge) * kAcross + x / kEdge];
+          Sum& sum = sums[(z / EmissiveCells::kEdge * kAcross + y / EmissiveCells::kEdge) * kAcross +
+                          x / EmissiveCells::kEdge];
           sum.add_box(sample, {sample - 1, sample + 1});
           sum.add(DVec3(sample - sum.origin) + found->place, face, emitted_by(types[type]) * found->share);
         }
       }
     }
   }
-  if (std::vector<EmissiveCell> cells = cells_of(sums); !cells.empty()) chunks_[at] = std::move(cells);
+  return cells_of(sums);
 }
 
-template <class Content, class Find>
-void EmissiveCells::follow(const Content& content, const VoxelRegistry& types, Find&& chunks_of) {
-  if (!types.changes_since(followed_types_).empty()) followed_ = {};
-  ChangeCursor now = followed_;
-  const auto changes = content.changes_since(now);
-  followed_ = {};  // stays so when memory runs out
-  if (changes.all) chunks_.clear();
-  for (const IVec3 chunk : chunks_of(changes)) look_at(content, types, chunk);
-  followed_ = now;
+}  // namespace
+
+bool has_emissive_types(const Chunk& chunk, const VoxelRegistry& types) {
+  const std::vector<VoxelType> all = chunk.types();
+  return std::any_of(all.begin(), all.end(),
+                     [&](VoxelType type) { return type < types.size() && types[type].emission > 0.0F; });
 }
 
 void EmissiveCells::update(const Grid& grid, const VoxelRegistry& types) {
-  follow(grid, types, [&](const GridChanges& changes) { return chunks_to_mesh(grid, changes); });
+  chunks_.follow(
+      grid, types, [&](const GridChanges& changes) { return chunks_to_mesh(grid, changes); },
+      [&](IVec3 chunk) { return look_at(grid, types, chunk); });
 }
 
 void EmissiveCells::update(const DensityGrid& field, const VoxelRegistry& types) {
-  follow(field, types, [&](const DensityChanges& changes) { return chunks_to_mesh(field, changes, 1); });
+  chunks_.follow(
+      field, types, [&](const DensityChanges& changes) { return chunks_to_mesh(field, changes, 1); },
+      [&](IVec3 chunk) { return look_at(field, types, chunk); });
 }
 
 }  // namespace quoin

@@ -1,16 +1,13 @@
 #pragma once
 
 #include <array>
-#include <map>
-#include <vector>
 
 #include <quoin/core/vec.h>
-#include <quoin/grid/chunk.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
-#include "grid/chunk_order.h"
+#include "light/emissive_chunks.h"
 
 namespace quoin {
 
@@ -37,23 +34,11 @@ class EmissiveCells {
   /// Calls `visit(const EmissiveCell&)` for every cell: chunks by z, y, x, then cells likewise.
   template <class Visit>
   void for_each(Visit&& visit) const {
-    for (const auto& [chunk, cells] : chunks_) {
-      for (const EmissiveCell& cell : cells) visit(cell);
-    }
+    chunks_.for_each([&](IVec3, const EmissiveCell& cell) { visit(cell); });
   }
 
  private:
-  struct ByZyx {
-    bool operator()(IVec3 a, IVec3 b) const { return by_zyx(a, b); }
-  };
-  void look_at(const Grid& grid, const VoxelRegistry& types, IVec3 chunk);
-  void look_at(const DensityGrid& field, const VoxelRegistry& types, IVec3 chunk);
-  template <class Content, class Find>
-  void follow(const Content& content, const VoxelRegistry& types, Find&& chunks_of);
-
-  ChangeCursor followed_;
-  ChangeCursor followed_types_;
-  std::map<IVec3, std::vector<EmissiveCell>, ByZyx> chunks_;  // those that hold some
+  EmissiveChunks<EmissiveCell> chunks_;
 };
 
 }  // namespace quoin

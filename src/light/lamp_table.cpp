@@ -228,6 +228,14 @@ void make_lists(std::span<const LampPlace> places, int max_lamps, Threads thread
 
 }  // namespace
 
+std::vector<PlacedLamp> placed_lamps(const Scene& scene, double brightness) {
+  std::vector<PlacedLamp> lamps;
+  for (const Lamp& lamp : scene.lamps) {
+    if (shines(lamp)) lamps.push_back(placed_lamp(lamp, brightness));
+  }
+  return lamps;
+}
+
 LampRay lamp_ray(const PlacedLamp& lamp, DVec3 to_lamp, DVec3 normal) {
   LampRay ray;
   const double squared = glm::dot(to_lamp, to_lamp);
@@ -316,10 +324,7 @@ std::vector<PlacedLamp> LampCache::lamps_of(const Scene& scene, std::span<const 
   for (auto* const kept : {&cells_, &field_cells_}) {
     std::erase_if(*kept, [&](const auto& each) { return scene.grids().find(each.first) == nullptr; });
   }
-  std::vector<PlacedLamp> lamps;
-  for (const Lamp& lamp : scene.lamps) {
-    if (shines(lamp)) lamps.push_back(placed_lamp(lamp, brightness));
-  }
+  std::vector<PlacedLamp> lamps = placed_lamps(scene, brightness);
   std::map<GridHandle, bool> is_known;
   for (const LampPlace& place : places) {
     EmissiveCells& cells = cells_[place.grid];

@@ -40,6 +40,9 @@ struct PlacedLamp {
   double cos_outer = -3.0;
 };
 
+/// Those of Scene::lamps that shine. `brightness`: times theirs.
+[[nodiscard]] std::vector<PlacedLamp> placed_lamps(const Scene& scene, double brightness);
+
 /// How a lamp lights a point.
 struct LampRay {
   Vec3 light{0.0F};        ///< of a white surface, if nothing is in between; 0: none

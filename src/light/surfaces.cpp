@@ -38,6 +38,8 @@ Surface surface_of(const VoxelProperties& properties) {
   const float emission =
       properties.emission > 0.0F ? std::min(properties.emission, std::numeric_limits<float>::max() / 4.0F) : 0.0F;
   surface.emitted = surface.colour * emission;
+  surface.roughness = properties.roughness >= 0.0F ? std::min(properties.roughness, 1.0F) : 1.0F;
+  surface.metalness = properties.metalness >= 0.0F ? std::min(properties.metalness, 1.0F) : 0.0F;
   if (properties.visibility != Visibility::Transparent) return surface;
   set_absorption(static_cast<float>(c.a) / 255.0F, surface);
   surface.ior = std::min(glass_ior(properties).value_or(1.0F), kLargestIor);

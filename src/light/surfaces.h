@@ -17,7 +17,9 @@ struct Surface {
   /// past altogether. 0 for what is clear; minus infinity for what lets nothing through.
   Vec3 log_transmittance{0.0F};
   float log_clarity = 0.0F;
-  float ior = 1.0F;  ///< of what is transparent, see glass_ior; else that of air
+  float ior = 1.0F;        ///< of what is transparent, see glass_ior; else that of air
+  float roughness = 1.0F;  ///< as VoxelProperties', within 0 and 1; 1 of what is not a number
+  float metalness = 0.0F;  ///< likewise; 0 of what is not a number
 };
 
 /// The index of refraction with which a transparent type is drawn and written to files; none where its own is not one:

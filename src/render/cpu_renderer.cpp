@@ -1,10 +1,8 @@
 #include <quoin/render/cpu_renderer.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <vector>
@@ -20,46 +18,10 @@
 #include "render/picture_detail.h"
 #include "render/picture_request.h"
 #include "render/tile.h"
+#include "render/tile_progress.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin {
-namespace {
-
-// Counts what is done and tells the listener, one call at a time: after each sample of a tile, since a tile of many
-// samples can take minutes.
-class ProgressOfTiles {
- public:
-  ProgressOfTiles(const Progress& listener, std::size_t samples) : listener_(&listener), samples_(samples) {}
-  [[nodiscard]] bool is_cancelled() const { return is_cancelled_; }
-  /// Returns whether to go on.
-  bool add_sample() {
-    const std::lock_guard lock(mutex_);
-    ++done_;
-    if (is_cancelled_ || !*listener_) return !is_cancelled_;
-    if (!(*listener_)(static_cast<double>(done_) / static_cast<double>(samples_))) is_cancelled_ = true;
-    return !is_cancelled_;
-  }
-  void add_counts(const Tile& tile) {
-    const std::lock_guard lock(mutex_);
-    rays_ += tile.rays();
-    pixels_hit_ += tile.pixels_hit();
-  }
-  void put_counts(Picture& picture) const {
-    picture.rays = rays_;
-    picture.pixels_hit = pixels_hit_;
-  }
-
- private:
-  const Progress* listener_;
-  std::size_t samples_;
-  std::size_t done_ = 0;
-  std::int64_t rays_ = 0;
-  std::int64_t pixels_hit_ = 0;
-  std::mutex mutex_;
-  std::atomic<bool> is_cancelled_{false};
-};
-
-}  // namespace
 
 struct CpuRenderer::Impl {
   Impl(const Scene& of_scene, InstanceFilter filter, Threads threads)
@@ -155,18 +117,19 @@ Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& o
   const int across = (options.width + Tile::kEdge - 1) / Tile::kEdge;
   const int down = (options.height + Tile::kEdge - 1) / Tile::kEdge;
   const std::size_t tiles = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
-  ProgressOfTiles done(progress, tiles * static_cast<std::size_t>(options.samples));
+  TileProgress done(progress, tiles * static_cast<std::size_t>(options.samples));
   parallel_for(tiles, threads, [&](std::size_t i) {
     if (done.is_cancelled()) return;
     const auto column = static_cast<int>(i % static_cast<std::size_t>(across)) * Tile::kEdge;
     const auto row = static_cast<int>(i / static_cast<std::size_t>(across)) * Tile::kEdge;
     Tile tile(context, column, row);
-    if (!tile.render([&] { return done.add_sample(); })) return;
+    if (!tile.render([&] { return done.add_samples(); })) return;
     tile.write_to(picture);
-    done.add_counts(tile);
+    done.add_counts(tile.rays(), tile.pixels_hit());
   });
   if (done.is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
-  done.put_counts(picture);
+  picture.rays = done.rays();
+  picture.pixels_hit = done.pixels_hit();
   return picture;
 }
 

@@ -28,17 +28,20 @@ Status check_camera(const Camera& camera) {
 
 }  // namespace
 
+Status check_picture(const Camera& camera, int width, int height) {
+  const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
+  if (width <= 0 || height <= 0) return refuse("size: width and height must be positive");
+  if (std::int64_t{width} * height > kMaxPixels) return refuse("size: more than 268,435,456 pixels");
+  return check_camera(camera);
+}
+
 Status check(const Camera& camera, const RenderOptions& options) {
   const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
-  if (options.width <= 0 || options.height <= 0) return refuse("size: width and height must be positive");
-  if (std::int64_t{options.width} * options.height > kMaxPixels) {
-    return refuse("size: more than 268,435,456 pixels");
-  }
+  if (Status picture = check_picture(camera, options.width, options.height); !picture) return picture;
   if (std::isnan(options.detail.impostor_seconds)) return refuse("impostor_seconds: must be a number");
   if (options.detail.impostor_edge < 16 || options.detail.impostor_edge > 1024)
     return refuse("impostor_edge: must be 16 to 1024");
   if (options.samples < 1 || options.samples > 4096) return refuse("samples: must be 1 to 4096");
-  if (Status camera_status = check_camera(camera); !camera_status) return camera_status;
   return check(options.light);
 }
 

@@ -4,6 +4,9 @@
 
 namespace quoin {
 
+/// InvalidArgument for sizes and cameras that no renderer takes.
+[[nodiscard]] Status check_picture(const Camera& camera, int width, int height);
+
 /// The errors of CpuRenderer::render, which are those of every renderer.
 [[nodiscard]] Status check(const Camera& camera, const RenderOptions& options);
 

@@ -19,4 +19,11 @@ struct FloatImage {
   std::vector<float> values;  ///< width * height
 };
 
+/// Linear light, three floats a pixel, rows from the top, pixels from the left, channels interleaved.
+struct RadianceImage {
+  int width = 0;
+  int height = 0;
+  std::vector<float> rgb;  ///< 3 * width * height
+};
+
 }  // namespace quoin

@@ -330,6 +330,10 @@ DVec3 SceneView::grid_from_view(std::int32_t placed, DVec3 point_in_view) const 
   return impl_->grid_from_view[static_cast<std::size_t>(placed)].point(point_in_view);
 }
 
+DVec3 SceneView::view_from_grid(std::int32_t placed, DVec3 point_in_grid) const {
+  return impl_->view_from_grid[static_cast<std::size_t>(placed)].point(point_in_grid);
+}
+
 RayPacket SceneView::view_from_grid(std::int32_t placed, const RayPacket& rays_in_grid) const {
   RayPacket rays;
   move(impl_->view_from_grid[static_cast<std::size_t>(placed)], rays_in_grid, rays);

@@ -64,6 +64,7 @@ class SceneView {
                          FunctionRef<void(std::int32_t placed, const Ray& ray_in_grid)> visit) const;
 
   [[nodiscard]] DVec3 grid_from_view(std::int32_t placed, DVec3 point_in_view) const;
+  [[nodiscard]] DVec3 view_from_grid(std::int32_t placed, DVec3 point_in_grid) const;
   [[nodiscard]] RayPacket view_from_grid(std::int32_t placed, const RayPacket& rays_in_grid) const;
 
  private:

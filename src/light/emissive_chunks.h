@@ -1,0 +1,56 @@
+#pragma once
+
+#include <map>
+#include <utility>
+#include <vector>
+
+#include <quoin/core/changes.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/chunk.h>
+#include <quoin/grid/voxel_registry.h>
+
+#include "grid/chunk_order.h"
+
+namespace quoin {
+
+/// Whether any type that a chunk may hold emits light. Cost: O(its types).
+[[nodiscard]] bool has_emissive_types(const Chunk& chunk, const VoxelRegistry& types);
+
+/// What is known of a grid's, or a field's, chunks that emit light, kept up to date while it is edited.
+template <class Item>
+class EmissiveChunks {
+ public:
+  /// `chunks_of(changes)`: those to look at again. `look_at(chunk)`: what is known of one, in a vector.
+  template <class Content, class Find, class Look>
+  void follow(const Content& content, const VoxelRegistry& types, Find&& chunks_of, Look&& look_at) {
+    if (!types.changes_since(followed_types_).empty()) followed_ = {};
+    ChangeCursor now = followed_;
+    const auto changes = content.changes_since(now);
+    followed_ = {};  // stays so when memory runs out
+    if (changes.all) chunks_.clear();
+    for (const IVec3 chunk : chunks_of(changes)) {
+      chunks_.erase(chunk);
+      if (std::vector<Item> found = look_at(chunk); !found.empty()) chunks_[chunk] = std::move(found);
+    }
+    followed_ = now;
+  }
+
+  /// Calls `visit(IVec3 chunk, const Item&)`, chunks by z, y, x.
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    for (const auto& [chunk, items] : chunks_) {
+      for (const Item& item : items) visit(chunk, item);
+    }
+  }
+
+ private:
+  struct ByZyx {
+    bool operator()(IVec3 a, IVec3 b) const { return by_zyx(a, b); }
+  };
+
+  ChangeCursor followed_;
+  ChangeCursor followed_types_;
+  std::map<IVec3, std::vector<Item>, ByZyx> chunks_;  // those that hold some
+};
+
+}  // namespace quoin

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <quoin/core/image.h>
+#include <quoin/core/vec.h>
+#include <quoin/render/path_tracer.h>
+
+namespace quoin::path {
+
+/// A clear sky, and the sun through it, seen from the ground.
+struct AtmosphericSky {
+  RadianceImage radiance;  ///< of all directions as EnvironmentLight has them; without the sun
+  Vec3 sunlight{0.0F};     ///< what comes through of the sun's light
+};
+
+/// `to_sun`: unit, in the world. `irradiance`: of the sun before the air. Below the horizon the picture shows ground.
+///
+/// Source: S. Hillaire, "A scalable and production ready sky and atmosphere rendering technique" (2020): single
+///         scattering along the ray, and all further scattering from a table, with its constants for the Earth.
+[[nodiscard]] AtmosphericSky atmospheric_sky(DVec3 to_sun, float irradiance, const AirOptions& air);
+
+}  // namespace quoin::path

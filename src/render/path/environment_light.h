@@ -1,0 +1,47 @@
+#pragma once
+
+#include <vector>
+
+#include <quoin/core/image.h>
+#include <quoin/core/vec.h>
+
+#include "render/path/path_math.h"
+
+namespace quoin::path {
+
+/// Light from infinitely far away, from a direction of the world.
+struct SkySample {
+  Vec3 direction{0.0F};  ///< towards it, unit
+  Vec3 radiance{0.0F};
+  float density = 0.0F;  ///< by solid angle; infinite of a sun without a disc
+};
+
+/// A picture of all directions that shines: +y is up, the picture's middle is -z, its left edge is +z, and to the right
+/// of the middle is +x.
+class EnvironmentLight {
+ public:
+  /// `image`: longitude and latitude. Values that are not finite or negative count as 0.
+  /// Requires: it has at least one pixel. Cost: O(pixels).
+  explicit EnvironmentLight(RadianceImage image);
+
+  /// Between the middles of pixels; `direction` is unit.
+  [[nodiscard]] Vec3 at(Vec3 direction) const;
+  /// The brighter, the likelier.
+  [[nodiscard]] SkySample sample(Pair u) const;
+  [[nodiscard]] float density(Vec3 direction) const;
+
+ private:
+  struct Place {
+    float x = 0.0F;  // pixels from the left, and from the top
+    float y = 0.0F;
+  };
+  [[nodiscard]] Place place_of(Vec3 direction) const;
+  [[nodiscard]] Vec3 pixel(int x, int y) const;
+  [[nodiscard]] float density_at(int x, int y, float sine) const;
+
+  RadianceImage image_;
+  std::vector<float> rows_;     // sums of what is left of them, to 1; [height + 1]
+  std::vector<float> columns_;  // likewise in each row; [height][width + 1]
+};
+
+}  // namespace quoin::path

@@ -1,0 +1,246 @@
+#include "render/path/light_tree.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <quoin/core/assert.h>
+
+#include "render/path/path_math.h"
+
+namespace quoin::path {
+namespace {
+
+constexpr int kBuckets = 12;
+constexpr int kDeepestSplit = 44;  // from there on halves: no way is longer than 64
+
+float sine_of(float cosine) {
+  return std::sqrt(std::max(0.0F, 1.0F - cosine * cosine));
+}
+
+// Of the difference of two angles, 1 where that is not positive.
+float cos_less(float sin_a, float cos_a, float sin_b, float cos_b) {
+  return cos_a > cos_b ? 1.0F : cos_a * cos_b + sin_a * sin_b;
+}
+
+float sin_less(float sin_a, float cos_a, float sin_b, float cos_b) {
+  return cos_a > cos_b ? 0.0F : sin_a * cos_b - cos_a * sin_b;
+}
+
+struct Cone {
+  Vec3 axis;
+  float cosine;
+};
+
+// The smallest cone around two.
+Cone unite(const Cone& a, const Cone& b) {
+  constexpr Cone kAll{{0.0F, 0.0F, 1.0F}, -1.0F};
+  const double of_a = arc_cosine(a.cosine);
+  const double of_b = arc_cosine(b.cosine);
+  const double between = arc_cosine(glm::dot(a.axis, b.axis));
+  if (std::min(between + of_b, std::numbers::pi) <= of_a) return a;
+  if (std::min(between + of_a, std::numbers::pi) <= of_b) return b;
+  const double all = (of_a + between + of_b) / 2.0;
+  if (all >= std::numbers::pi) return kAll;
+  const Vec3 across = b.axis - a.axis * glm::dot(a.axis, b.axis);
+  const float length = glm::length(across);
+  if (!(length > 1e-6F)) return kAll;
+  const SineCosine turn = of_turns(static_cast<float>((all - of_a) / (2.0 * std::numbers::pi)));
+  const SineCosine half = of_turns(static_cast<float>(all / (2.0 * std::numbers::pi)));
+  return {glm::normalize(a.axis * turn.cosine + across * (turn.sine / length)), half.cosine};
+}
+
+LampBounds unite(const LampBounds& a, const LampBounds& b) {
+  if (!(a.power > 0.0F)) return b;
+  if (!(b.power > 0.0F)) return a;
+  const Cone cone = unite(Cone{a.axis, a.cos_spread}, Cone{b.axis, b.cos_spread});
+  return {glm::min(a.low, b.low),           glm::max(a.high, b.high), cone.axis, cone.cosine,
+          std::min(a.cos_edge, b.cos_edge), a.power + b.power};
+}
+
+// How much light such a node may send to a point anywhere: its power, its size and how far it shines about itself.
+float cost_of(const LampBounds& bounds, float longest, float along) {
+  const auto spread = static_cast<float>(arc_cosine(bounds.cos_spread));
+  const float to_edge = std::min(spread + static_cast<float>(arc_cosine(bounds.cos_edge)), kPi);
+  const float sine = sine_of(bounds.cos_spread);
+  const float turns = (2.0F * to_edge - spread) / (2.0F * kPi);  // its cosine and sine, wherever it lies
+  const SineCosine end = of_turns(turns - std::floor(turns));
+  const float measure = 2.0F * kPi * (1.0F - bounds.cos_spread) +
+                        kPi / 2.0F * (2.0F * to_edge * sine - end.cosine - 2.0F * spread * sine + bounds.cos_spread);
+  const Vec3 size = bounds.high - bounds.low;
+  const float area = 2.0F * (size.x * size.y + size.y * size.z + size.z * size.x);
+  return bounds.power * measure * (longest / std::max(along, 1e-9F)) * std::max(area, 1e-12F);
+}
+
+}  // namespace
+
+class LightTree::Builder {
+ public:
+  Builder(std::span<const LampBounds> lamps, LightTree& tree) : lamps_(lamps), tree_(tree), order_(lamps.size()) {
+    std::iota(order_.begin(), order_.end(), 0U);
+    tree.nodes_.reserve(2 * lamps.size());
+    tree.ways_.resize(lamps.size());
+    build(0, lamps.size(), 0, 0);
+  }
+
+ private:
+  LampBounds build(std::size_t begin, std::size_t end, std::uint64_t way, int level) {
+    const std::size_t at = tree_.nodes_.size();
+    tree_.nodes_.emplace_back();
+    if (end - begin == 1) {
+      const std::uint32_t lamp = order_[begin];
+      tree_.nodes_[at] = {lamps_[lamp], -1, static_cast<std::int32_t>(lamp)};
+      tree_.ways_[lamp] = way;
+      return lamps_[lamp];
+    }
+    const std::size_t middle = split(begin, end, level);
+    const LampBounds first = build(begin, middle, way, level + 1);
+    const auto second_at = static_cast<std::int32_t>(tree_.nodes_.size());
+    const LampBounds second = build(middle, end, way | std::uint64_t{1} << level, level + 1);
+    const LampBounds both = unite(first, second);
+    tree_.nodes_[at] = {both, second_at, -1};
+    return both;
+  }
+
+  [[nodiscard]] Vec3 middle_of(std::uint32_t lamp) const { return (lamps_[lamp].low + lamps_[lamp].high) * 0.5F; }
+
+  struct Plane {
+    int axis = -1;
+    int bucket = 0;
+    float low = 0.0F;
+    float scale = 0.0F;
+    [[nodiscard]] int bucket_of(float place) const {
+      return std::clamp(static_cast<int>((place - low) * scale), 0, kBuckets - 1);
+    }
+  };
+
+  [[nodiscard]] std::size_t split(std::size_t begin, std::size_t end, int level) {
+    const auto at = [this](std::size_t i) { return order_.begin() + static_cast<std::ptrdiff_t>(i); };
+    if (level < kDeepestSplit) {
+      const Plane plane = best_plane(begin, end);
+      if (plane.axis >= 0) {
+        const auto second = std::stable_partition(at(begin), at(end), [&](std::uint32_t lamp) {
+          return plane.bucket_of(middle_of(lamp)[plane.axis]) <= plane.bucket;
+        });
+        const auto middle = static_cast<std::size_t>(second - order_.begin());
+        if (middle != begin && middle != end) return middle;
+      }
+    }
+    return begin + (end - begin) / 2;
+  }
+
+  [[nodiscard]] Plane best_plane(std::size_t begin, std::size_t end) const {
+    Vec3 low(std::numeric_limits<float>::max());
+    Vec3 high(-std::numeric_limits<float>::max());
+    for (std::size_t i = begin; i < end; ++i) {
+      low = glm::min(low, middle_of(order_[i]));
+      high = glm::max(high, middle_of(order_[i]));
+    }
+    const Vec3 size = high - low;
+    Plane best;
+    float least = std::numeric_limits<float>::infinity();
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(size[axis] > 0.0F)) continue;
+      Plane plane{axis, 0, low[axis], static_cast<float>(kBuckets) / size[axis]};
+      std::array<LampBounds, kBuckets> buckets{};
+      for (std::size_t i = begin; i < end; ++i) {
+        LampBounds& bucket = buckets[static_cast<std::size_t>(plane.bucket_of(middle_of(order_[i])[axis]))];
+        bucket = unite(bucket, lamps_[order_[i]]);
+      }
+      std::array<LampBounds, kBuckets> from_above{};
+      from_above.back() = buckets.back();
+      for (std::size_t i = kBuckets - 1; i-- > 0;) from_above[i] = unite(buckets[i], from_above[i + 1]);
+      LampBounds below;
+      for (plane.bucket = 0; plane.bucket + 1 < kBuckets; ++plane.bucket) {
+        below = unite(below, buckets[static_cast<std::size_t>(plane.bucket)]);
+        const LampBounds& above = from_above[static_cast<std::size_t>(plane.bucket) + 1];
+        if (!(below.power > 0.0F) || !(above.power > 0.0F)) continue;
+        const float cost = cost_of(below, largest(size), size[axis]) + cost_of(above, largest(size), size[axis]);
+        if (cost < least) least = cost, best = plane;
+      }
+    }
+    return best;
+  }
+
+  std::span<const LampBounds> lamps_;
+  LightTree& tree_;
+  std::vector<std::uint32_t> order_;
+};
+
+LightTree::LightTree(std::span<const LampBounds> lamps) {
+  if (!lamps.empty()) Builder(lamps, *this);
+}
+
+float LightTree::importance(const LampBounds& bounds, Vec3 point, Vec3 normal) {
+  const Vec3 middle = (bounds.low + bounds.high) * 0.5F;
+  const Vec3 way = point - middle;
+  const float diagonal2 = glm::dot(bounds.high - bounds.low, bounds.high - bounds.low);
+  const float real2 = glm::dot(way, way);
+  const float distance2 = std::max(real2, std::sqrt(diagonal2) * 0.5F);
+  const Vec3 from_middle = real2 > 0.0F ? way / std::sqrt(real2) : normal;
+  // The cone in which the box is seen from the point.
+  const float radius2 = diagonal2 * 0.25F;
+  const float cos_box = real2 > radius2 ? std::sqrt(1.0F - radius2 / real2) : -1.0F;
+  const float sin_box = sine_of(cos_box);
+  // Of the angle between the light's nearest normal and the point, as small as it may be.
+  const float cos_axis = glm::dot(bounds.axis, from_middle);
+  const float sin_axis = sine_of(cos_axis);
+  const float sin_spread = sine_of(bounds.cos_spread);
+  const float cos_beyond = cos_less(sin_axis, cos_axis, sin_spread, bounds.cos_spread);
+  const float sin_beyond = sin_less(sin_axis, cos_axis, sin_spread, bounds.cos_spread);
+  const float cos_least = cos_less(sin_beyond, cos_beyond, sin_box, cos_box);
+  if (cos_least <= bounds.cos_edge) return 0.0F;
+  const float cos_here = -glm::dot(from_middle, normal);
+  const float cos_seen = cos_less(sine_of(cos_here), cos_here, sin_box, cos_box);
+  return bounds.power * cos_least / distance2 * std::max(cos_seen, 0.0F);
+}
+
+LightTree::Choice LightTree::choose(Vec3 point, Vec3 normal, float u) const {
+  if (nodes_.empty()) return {};
+  std::size_t at = 0;
+  float probability = 1.0F;
+  if (nodes_[0].lamp >= 0 && !(importance(nodes_[0].bounds, point, normal) > 0.0F)) return {};
+  while (nodes_[at].lamp < 0) {
+    const auto second = static_cast<std::size_t>(nodes_[at].second);
+    const float of_first = importance(nodes_[at + 1].bounds, point, normal);
+    const float of_second = importance(nodes_[second].bounds, point, normal);
+    const float both = of_first + of_second;
+    if (!(both > 0.0F)) return {};
+    const float share = of_first / both;
+    if (u < share) {
+      u = std::min(u / share, 0x1.fffffep-1F);
+      probability *= share;
+      at = at + 1;
+    } else {
+      u = std::min((u - share) / (1.0F - share), 0x1.fffffep-1F);
+      probability *= 1.0F - share;
+      at = second;
+    }
+  }
+  return {nodes_[at].lamp, probability};
+}
+
+float LightTree::probability(std::uint32_t lamp, Vec3 point, Vec3 normal) const {
+  QUOIN_ASSERT(lamp < ways_.size(), "a lamp of the tree");
+  std::size_t at = 0;
+  float probability = 1.0F;
+  if (nodes_[0].lamp >= 0 && !(importance(nodes_[0].bounds, point, normal) > 0.0F)) return 0.0F;
+  for (std::uint64_t way = ways_[lamp]; nodes_[at].lamp < 0; way >>= 1) {
+    const auto second = static_cast<std::size_t>(nodes_[at].second);
+    const float of_first = importance(nodes_[at + 1].bounds, point, normal);
+    const float of_second = importance(nodes_[second].bounds, point, normal);
+    const float both = of_first + of_second;
+    if (!(both > 0.0F)) return 0.0F;
+    const float share = of_first / both;
+    probability *= (way & 1U) != 0 ? 1.0F - share : share;
+    at = (way & 1U) != 0 ? second : at + 1;
+  }
+  return probability;
+}
+
+}  // namespace quoin::path

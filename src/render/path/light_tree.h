@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <quoin/core/vec.h>
+
+namespace quoin::path {
+
+/// What a tree of lamps knows of one.
+struct LampBounds {
+  Vec3 low{0.0F};
+  Vec3 high{0.0F};
+  Vec3 axis{0.0F, 0.0F, 1.0F};  ///< about which it shines, unit
+  float cos_spread = 1.0F;      ///< of the angle between the axis and its normals; -1: all directions
+  float cos_edge = 0.0F;        ///< of the angle between a normal and where light ends; -1: nowhere
+  float power = 0.0F;           ///< positive
+};
+
+/// Finds a lamp for a point at random: the more light it may send there, the likelier.
+///
+/// Source: A. Conty Estevez, C. Kulla, "Importance sampling of many lights with adaptive tree splitting" (2018), with
+///         the bounds of M. Pharr et al., "Physically based rendering" (4th ed.), 12.6.3.
+class LightTree {
+ public:
+  LightTree() = default;
+  /// Cost: O(lamps log(lamps)).
+  explicit LightTree(std::span<const LampBounds> lamps);
+
+  [[nodiscard]] bool empty() const { return nodes_.empty(); }
+
+  struct Choice {
+    std::int32_t lamp = -1;  ///< none
+    float probability = 0.0F;
+  };
+  /// Requires: 0 <= u < 1; `normal` is unit. Cost: O(log(lamps)).
+  [[nodiscard]] Choice choose(Vec3 point, Vec3 normal, float u) const;
+  /// With which `choose` finds that lamp.
+  [[nodiscard]] float probability(std::uint32_t lamp, Vec3 point, Vec3 normal) const;
+
+ private:
+  struct Node {
+    LampBounds bounds;
+    std::int32_t second = -1;  // of an inner node: the first child comes right after it
+    std::int32_t lamp = -1;    // of a leaf
+  };
+  class Builder;
+  [[nodiscard]] static float importance(const LampBounds& bounds, Vec3 point, Vec3 normal);
+
+  std::vector<Node> nodes_;
+  std::vector<std::uint64_t> ways_;  // [lamp]: a bit a level, 1: the second child
+};
+
+}  // namespace quoin::path

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include <quoin/core/direction.h>
+#include <quoin/core/vec.h>
+#include <quoin/mesh/quad.h>
+#include <quoin/scene/scene.h>
+#include <quoin/scene/scene_tracer.h>
+
+#include "light/emissive_chunks.h"
+#include "light/lamp_table.h"
+#include "light/surfaces.h"
+#include "render/path/light_tree.h"
+#include "render/path/path_math.h"
+
+namespace quoin::path {
+
+/// A merged face that shines with the same radiance into all directions before it, or a lamp without a body.
+struct PathLamp {
+  DVec3 corner{0.0};  ///< in the world; where a lamp without a body is
+  Vec3 u{0.0F};       ///< along its sides, unit; they and the normal are perpendicular
+  Vec3 v{0.0F};
+  Vec3 normal{0.0F, 1.0F, 0.0F};  ///< a spot's direction
+  float size_u = 0.0F;            ///< world units
+  float size_v = 0.0F;
+  Vec3 radiance{0.0F};  ///< without a body: intensity
+  bool is_point = false;
+  float cos_inner = -2.0F;  ///< of a spot, as PlacedLamp
+  float cos_outer = -3.0F;
+  float reach = 0.0F;  ///< of one without a body
+};
+
+/// Light from a lamp towards a point.
+struct LampSample {
+  Vec3 direction{0.0F};  ///< to the lamp, unit, in the world
+  float distance = 0.0F;
+  Vec3 radiance{0.0F};   ///< divided by the density; 0: none
+  float density = 0.0F;  ///< by solid angle; infinite of a lamp without a body
+};
+
+/// All lamps of a scene, for points anywhere.
+class PathLamps {
+ public:
+  /// `bodies`: the faces; `points`: those without a body. `origin`: near which all is.
+  PathLamps(std::vector<PathLamp> lamps, DVec3 origin);
+
+  [[nodiscard]] bool empty() const { return lamps_.empty(); }
+  [[nodiscard]] std::size_t size() const { return lamps_.size(); }
+  /// A lamp and a point of it. `point`, `normal`: in the world. `choice`: 0 to less than 1.
+  [[nodiscard]] LampSample sample(DVec3 point, Vec3 normal, float choice, Pair u) const;
+  /// With which `sample` finds the point of that lamp that lies in `direction` at `distance`.
+  [[nodiscard]] float density(std::int32_t lamp, DVec3 point, Vec3 normal, Vec3 direction, float distance) const;
+
+  /// Notes that a unit face of a placed grid's voxel is part of a lamp.
+  void add_face(std::int32_t placed, IVec3 voxel, Direction face, std::int32_t lamp);
+  /// Of which lamp it is part; -1: of none.
+  [[nodiscard]] std::int32_t lamp_of(std::int32_t placed, IVec3 voxel, Direction face) const;
+
+ private:
+  struct Face {
+    IVec3 voxel{0};
+    std::int32_t placed = 0;
+    std::int32_t lamp = -1;
+    Direction direction = Direction::PosX;
+  };
+  [[nodiscard]] static std::size_t hash_of_face(std::int32_t placed, IVec3 voxel, Direction face);
+  void grow();
+
+  DVec3 origin_;
+  std::vector<PathLamp> lamps_;
+  LightTree tree_;
+  std::vector<Face> faces_;  // by their hash; a power of two
+  std::size_t face_count_ = 0;
+};
+
+/// Keeps the faces of a scene's grids that emit light while it is edited.
+class PathLampCache {
+ public:
+  /// The lamps of what is traced. `surfaces`: of the scene's types. `brightness`: times what lamps give.
+  /// Cost: the quads of chunks that changed, and O(faces that emit).
+  [[nodiscard]] std::shared_ptr<const PathLamps> lamps(const Scene& scene, const SceneTracer& tracer,
+                                                       const Surfaces& surfaces, double brightness);
+
+ private:
+  std::map<GridHandle, EmissiveChunks<Quad>> quads_;
+};
+
+}  // namespace quoin::path

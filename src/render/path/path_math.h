@@ -1,0 +1,174 @@
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+
+#include <quoin/core/vec.h>
+
+// What pictures by paths compute with, the same bits on every machine: sums, products, quotients and square roots are
+// rounded alike everywhere, the C library's sine, exponential and power are not.
+namespace quoin::path {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+struct SineCosine {
+  float sine = 0.0F;
+  float cosine = 1.0F;
+};
+
+/// Of an angle in turns. Error: 1e-7. Requires: 0 <= turns <= 1.
+///
+/// Source: Taylor's series about the nearest eighth of a turn.
+[[nodiscard]] inline SineCosine of_turns(float turns) {
+  const float quarters = turns * 4.0F;
+  const auto nearest = static_cast<int>(quarters + 0.5F);
+  const float x = (quarters - static_cast<float>(nearest)) * (kPi / 2.0F);  // -pi/4 to pi/4
+  const float xx = x * x;
+  const float sine =
+      x * (1.0F + xx * (-1.0F / 6.0F + xx * (1.0F / 120.0F + xx * (-1.0F / 5040.0F + xx * (1.0F / 362880.0F)))));
+  const float cosine =
+      1.0F + xx * (-0.5F + xx * (1.0F / 24.0F + xx * (-1.0F / 720.0F + xx * (1.0F / 40320.0F - xx / 3628800.0F))));
+  switch (nearest & 3) {
+    case 0:
+      return {sine, cosine};
+    case 1:
+      return {cosine, -sine};
+    case 2:
+      return {-sine, -cosine};
+    default:
+      return {-cosine, sine};
+  }
+}
+
+/// The angle of (x, y) in radians, -pi to pi; 0 of (0, 0). Error: 1e-7.
+///
+/// Source: the series of the arc tangent after one halving of the angle.
+[[nodiscard]] inline double arc_tangent(double y, double x) {
+  const double larger = std::max(std::abs(x), std::abs(y));
+  if (!(larger > 0.0)) return 0.0;
+  const double ratio = std::min(std::abs(x), std::abs(y)) / larger;     // 0 to 1
+  const double first = ratio / (1.0 + std::sqrt(1.0 + ratio * ratio));  // of half the angle
+  const double t = first / (1.0 + std::sqrt(1.0 + first * first));      // of a quarter: up to 0.199
+  const double tt = t * t;
+  const double quarter =
+      t * (1.0 + tt * (-1.0 / 3 + tt * (1.0 / 5 + tt * (-1.0 / 7 + tt * (1.0 / 9 - tt * (1.0 / 11))))));
+  double angle = 4.0 * quarter;
+  if (std::abs(y) > std::abs(x)) angle = std::numbers::pi / 2 - angle;
+  if (x < 0.0) angle = std::numbers::pi - angle;
+  return y < 0.0 ? -angle : angle;
+}
+
+/// In radians, 0 to pi. Numbers beyond -1 and 1 count as these. Error: 1e-7.
+[[nodiscard]] inline double arc_cosine(double x) {
+  const double c = std::clamp(x, -1.0, 1.0);
+  return arc_tangent(std::sqrt((1.0 - c) * (1.0 + c)), c);
+}
+
+/// 2^x; 0 far below, the largest float far above. Relative error: 2e-7.
+[[nodiscard]] inline float power_of_two(float x) {
+  if (!(x > -126.0F)) return 0.0F;
+  if (x >= 128.0F) return std::numeric_limits<float>::max();
+  const float whole = std::floor(x);
+  const float y = (x - whole - 0.5F) * std::numbers::ln2_v<float>;  // -0.35 to 0.35
+  constexpr float kRootOfTwo = std::numbers::sqrt2_v<float>;
+  const float part =
+      1.0F + y * (1.0F + y * (0.5F + y * (1.0F / 6 + y * (1.0F / 24 + y * (1.0F / 120 + y * (1.0F / 720))))));
+  const auto exponent = static_cast<std::uint32_t>(static_cast<int>(whole) + 127) << 23;
+  return part * kRootOfTwo * std::bit_cast<float>(exponent);
+}
+
+/// e^x, likewise.
+[[nodiscard]] inline float exponential(float x) {
+  return power_of_two(x * std::numbers::log2e_v<float>);
+}
+
+/// The logarithm to base 2 of what is at least the least normal float; of less, that of it. Error: 2e-7 or relative.
+[[nodiscard]] inline float log_of_two(float x) {
+  if (!(x >= std::numeric_limits<float>::min())) return -126.0F;
+  const auto bits = std::bit_cast<std::uint32_t>(x);
+  auto exponent = static_cast<int>(bits >> 23) - 127;
+  float mantissa = std::bit_cast<float>((bits & 0x7F'FFFFU) | 0x3F80'0000U);  // 1 to 2
+  if (mantissa > std::numbers::sqrt2_v<float>) mantissa *= 0.5F, ++exponent;
+  const float s = (mantissa - 1.0F) / (mantissa + 1.0F);  // -0.172 to 0.172
+  const float ss = s * s;
+  const float natural = 2.0F * s * (1.0F + ss * (1.0F / 3 + ss * (1.0F / 5 + ss * (1.0F / 7 + ss * (1.0F / 9)))));
+  return static_cast<float>(exponent) + natural * std::numbers::log2e_v<float>;
+}
+
+/// x^y of x >= 0.
+[[nodiscard]] inline float power(float x, float y) {
+  return x > 0.0F ? power_of_two(log_of_two(x) * y) : 0.0F;
+}
+
+[[nodiscard]] inline float square(float x) {
+  return x * x;
+}
+
+/// How bright a colour is: its luminance in linear sRGB (ITU-R BT.709).
+[[nodiscard]] inline float luminance(Vec3 colour) {
+  return 0.2126F * colour.x + 0.7152F * colour.y + 0.0722F * colour.z;
+}
+
+[[nodiscard]] inline float largest(Vec3 colour) {
+  return std::max({colour.x, colour.y, colour.z});
+}
+
+[[nodiscard]] inline bool is_black(Vec3 colour) {
+  return !(largest(colour) > 0.0F);
+}
+
+/// A right-handed frame whose third axis is a unit vector.
+///
+/// Source: T. Duff et al., "Building an orthonormal basis, revisited" (2017).
+struct Frame {
+  Vec3 x, y, z;
+
+  explicit Frame(Vec3 normal) : z(normal) {
+    const float sign = std::copysign(1.0F, normal.z);
+    const float a = -1.0F / (sign + normal.z);
+    const float b = normal.x * normal.y * a;
+    x = {1.0F + sign * normal.x * normal.x * a, sign * b, -sign * normal.x};
+    y = {b, sign + normal.y * normal.y * a, -normal.y};
+  }
+  [[nodiscard]] Vec3 to_world(Vec3 v) const { return x * v.x + y * v.y + z * v.z; }
+  [[nodiscard]] Vec3 to_local(Vec3 v) const {
+    return {v.x * x.x + v.y * x.y + v.z * x.z, v.x * y.x + v.y * y.y + v.z * y.z, v.x * z.x + v.y * z.y + v.z * z.z};
+  }
+};
+
+/// Two numbers of a sample, 0 to less than 1.
+struct Pair {
+  float x = 0.0F;
+  float y = 0.0F;
+};
+
+/// A point of the unit disc, of equal density. Source: P. Shirley, K. Chiu, "A low distortion map between disk and
+/// square" (1997).
+[[nodiscard]] inline Pair on_disc(Pair u) {
+  const float a = 2.0F * u.x - 1.0F;
+  const float b = 2.0F * u.y - 1.0F;
+  if (a == 0.0F && b == 0.0F) return {};
+  const bool is_wide = std::abs(a) > std::abs(b);
+  const float radius = is_wide ? a : b;
+  float turns = is_wide ? b / a * 0.125F : 0.25F - a / b * 0.125F;
+  if (turns < 0.0F) turns += 1.0F;
+  const SineCosine angle = of_turns(turns);
+  return {radius * angle.cosine, radius * angle.sine};
+}
+
+/// A direction about +z with a density of cosine / pi.
+[[nodiscard]] inline Vec3 cosine_weighted(Pair u) {
+  const Pair disc = on_disc(u);
+  return {disc.x, disc.y, std::sqrt(std::max(0.0F, 1.0F - disc.x * disc.x - disc.y * disc.y))};
+}
+
+/// The share of a strategy of density `own` beside one of `other`: the balance heuristic of E. Veach (1995).
+[[nodiscard]] inline float balance(float own, float other) {
+  return own / (own + other);
+}
+
+}  // namespace quoin::path

@@ -1,0 +1,655 @@
+#include "render/path/path_tile.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "light/light_model.h"
+#include "light/occlusion_directions.h"
+#include "render/on_face.h"
+#include "scene/tracer/placed_grid.h"
+
+namespace quoin::path {
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr float kNoOther = std::numeric_limits<float>::infinity();
+constexpr int kBlock = CameraRays::kBlock;
+constexpr std::uint32_t kDimensions = 8;     // of a vertex
+constexpr int kSureBounces = 3;              // before chance may end a path
+constexpr float kMostLikely = 0.95F;         // to go on
+constexpr int kMostGlass = 64;               // surfaces of glass that a path meets between two others
+constexpr std::uint32_t kBins = 1 + 6 * 16;  // of directions; the first is that of the sun
+
+// The dimensions of a vertex.
+enum : std::uint32_t { kSun, kLampChoice, kLampPoint, kSky, kDirection, kLobe, kRoulette, kGlass };
+
+// Rays of one bin point about the same way: by the largest component, and the other two in four steps each.
+std::uint32_t bin_of(Vec3 direction) {
+  const Vec3 size = glm::abs(direction);
+  const int axis = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
+  const float scale = 2.0F / std::max(size[axis], 1e-20F);
+  const auto step = [&](float v) {
+    return static_cast<std::uint32_t>(std::clamp(static_cast<int>(v * scale + 2.0F), 0, 3));
+  };
+  const std::uint32_t side = direction[axis] < 0.0F ? 1U : 0U;
+  return 1 + (static_cast<std::uint32_t>(axis) * 2 + side) * 16 + step(direction[(axis + 1) % 3]) * 4 +
+         step(direction[(axis + 2) % 3]);
+}
+
+// Calls `put(index)` in the order of keys, equal ones in theirs.
+template <class Key, class Put>
+void sort_by_key(std::size_t count, std::size_t keys, std::vector<std::uint32_t>& starts, Key&& key, Put&& put) {
+  starts.assign(keys + 1, 0);
+  for (std::size_t i = 0; i < count; ++i) ++starts[key(i) + 1];
+  for (std::size_t i = 1; i < starts.size(); ++i) starts[i] += starts[i - 1];
+  for (std::size_t i = 0; i < count; ++i) put(starts[key(i)]++, static_cast<std::uint32_t>(i));
+}
+
+DVec3 in_grid(const PlacedGrid& placed, Vec3 direction) {
+  return DVec3(direction) * placed.world_axes / placed.voxel_size;  // the transposed matrix times it
+}
+
+Vec3 tint_of(const Surface& surface, double voxels) {
+  const auto length = static_cast<float>(voxels);
+  if (!(length > 0.0F)) return Vec3(1.0F);
+  Vec3 tint;
+  for (int i = 0; i < 3; ++i) {
+    // Glass that covers all lets nothing through: the difference of infinities is not a number.
+    const float log = surface.log_clarity > -kNoOther ? surface.log_transmittance[i] - surface.log_clarity : 0.0F;
+    tint[i] = exponential(log * length);
+  }
+  return tint;
+}
+
+float cover_of(const Surface& surface, double voxels) {
+  return voxels > 0.0 ? 1.0F - exponential(surface.log_clarity * static_cast<float>(voxels)) : 0.0F;
+}
+
+// Of a surface between two media, without polarisation; 1 where nothing gets through. `eta`: the index of the medium
+// from which light comes over that of the other; `cosine` of its angle, positive.
+struct Refraction {
+  float mirrored = 1.0F;
+  float cosine = 0.0F;  // of what gets through
+};
+
+Refraction refraction(float cosine, float eta) {
+  const float sine2 = eta * eta * std::max(0.0F, 1.0F - cosine * cosine);
+  if (sine2 >= 1.0F) return {};
+  const float inner = std::sqrt(1.0F - sine2);
+  const float across = (eta * cosine - inner) / (eta * cosine + inner);
+  const float in_plane = (cosine - eta * inner) / (cosine + eta * inner);
+  return {0.5F * (across * across + in_plane * in_plane), inner};
+}
+
+}  // namespace
+
+PathTile::PathTile(const TileContext& context, int column, int row)
+    : context_(&context), column_(column), row_(row), sums_(kPixels) {
+  if (context.options->ground) ground_ = context.options->ground->height - context.camera->position.y;
+}
+
+bool PathTile::render(const std::function<bool(std::size_t)>& goes_on) {
+  const int samples = context_->options->samples;
+  for (int first = 0; first < samples; first += kSamplesAtOnce) {
+    const int count = std::min(kSamplesAtOnce, samples - first);
+    begin(first, count);
+    while (!active_.empty()) {
+      order_paths();
+      meet();
+      requests_.clear();
+      for (const Vertex& vertex : vertices_) shade(vertex);
+      trace_requests();
+      std::swap(active_, next_);
+    }
+    for (const Path& path : paths_) {
+      Sums& sums = sums_[path.pixel];
+      (path.is_caught ? sums.lit : sums.scene) += path.radiance;
+    }
+    if (!goes_on(static_cast<std::size_t>(count))) return false;
+  }
+  return true;
+}
+
+void PathTile::begin(int first, int count) {
+  paths_.clear();
+  active_.clear();
+  const PathOptions& options = *context_->options;
+  for (int block_y = 0; block_y < kEdge; block_y += kBlock) {
+    for (int block_x = 0; block_x < kEdge; block_x += kBlock) {
+      for (int sample = first; sample < first + count; ++sample) {
+        for (int i = 0; i < kBlock * kBlock; ++i) {
+          const int x = block_x + i % kBlock;
+          const int y = block_y + i / kBlock;
+          if (column_ + x >= options.width || row_ + y >= options.height) continue;
+          begin_path(static_cast<std::size_t>(y * kEdge + x), column_ + x, row_ + y, sample);
+        }
+      }
+    }
+  }
+}
+
+void PathTile::begin_path(std::size_t pixel, int x, int y, int sample) {
+  const PathOptions& options = *context_->options;
+  const CameraRays& rays = *context_->rays;
+  const Camera& camera = *context_->camera;
+  Path path;
+  path.pixel = static_cast<std::uint16_t>(pixel);
+  const std::uint32_t place = hash_of(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
+  path.random = Random(mix_bits(place ^ options.seed * 0x9E37'79B9U), static_cast<std::uint32_t>(sample));
+  path.is_first_sample = sample == 0;
+  path.density = kNoOther;
+  const Pair jitter = path.random.pair(0);
+  const DVec3 across = rays.corner() + rays.right() * (x + static_cast<double>(jitter.x)) +
+                       rays.down() * (y + static_cast<double>(jitter.y));
+  if (rays.is_perspective()) {
+    DVec3 direction = glm::normalize(rays.forward() + across);
+    if (options.lens_radius > 0.0) {
+      const Pair lens = on_disc(path.random.pair(1));
+      path.origin =
+          (camera.right * static_cast<double>(lens.x) + camera.up * static_cast<double>(lens.y)) * options.lens_radius;
+      const double t = options.focus_distance / glm::dot(direction, rays.forward());
+      direction = glm::normalize(direction * t - path.origin);
+    }
+    path.direction = Vec3(direction);
+  } else {
+    path.origin = across;
+    path.direction = Vec3(rays.forward());
+  }
+  path.dimension = 2;
+  active_.push_back(static_cast<std::uint32_t>(paths_.size()));
+  paths_.push_back(path);
+}
+
+void PathTile::order_paths() {
+  // The camera's rays are in blocks of pixels already.
+  if (active_.empty() || paths_[active_.front()].is_first) return;
+  next_.resize(active_.size());
+  sort_by_key(
+      active_.size(), kBins, starts_, [&](std::size_t i) { return bin_of(paths_[active_[i]].direction); },
+      [&](std::uint32_t to, std::uint32_t from) { next_[to] = active_[from]; });
+  std::swap(active_, next_);
+}
+
+void PathTile::meet() {
+  next_.clear();
+  vertices_.clear();
+  constexpr std::size_t kLanes = RayPacket::kSize;
+  for (std::size_t first = 0; first < active_.size(); first += kLanes) {
+    meet_packet(std::span(active_).subspan(first, std::min(kLanes, active_.size() - first)));
+  }
+}
+
+void PathTile::meet_packet(std::span<const std::uint32_t> indices) {
+  RayPacket rays;
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    const Path& path = paths_[indices[i]];
+    rays.set(static_cast<int>(i), {path.origin, DVec3(path.direction)}, kInfinite);
+  }
+  SceneHits hits;
+  context_->view->first_hits(rays, hits);
+  rays_ += static_cast<std::int64_t>(indices.size());
+  std::uint32_t through_glass = 0;
+  RayPacket::Lanes<double> until{};
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    until[i] = (hits.grids.hit >> i & 1U) != 0 ? hits.grids.t[i] : kInfinite;
+    const Path& path = paths_[indices[i]];
+    until[i] = std::min(until[i], ground_at(path.origin, path.direction));
+  }
+  if (context_->view->tracer().has_transparent()) {
+    rays.max_t = until;
+    through_glass = context_->view->any_transparent(rays);
+  }
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    const std::uint32_t index = indices[i];
+    Path& path = paths_[index];
+    const int lane = static_cast<int>(i);
+    if (((through_glass >> i & 1U) != 0 || path.inside != kAir) && meet_glass(index, until[i])) continue;
+    const bool is_hit = (hits.grids.hit >> i & 1U) != 0 && hits.grids.t[i] <= until[i];
+    if (is_hit) {
+      hit_matter(index, rays, hits, lane);
+    } else if (until[i] < kInfinite) {
+      hit_ground(index, until[i]);
+    } else {
+      leave(path);
+    }
+  }
+}
+
+double PathTile::ground_at(const DVec3& origin, Vec3 direction) const {
+  if (!context_->options->ground || !(direction.y < 0.0F) || !(origin.y > ground_)) return kInfinite;
+  return (ground_ - origin.y) / static_cast<double>(direction.y);
+}
+
+void PathTile::leave(Path& path) {
+  const SkyLight& sky = *context_->sky;
+  Vec3 direction = path.direction;
+  if (path.is_first && !context_->rays->is_perspective()) {
+    direction = Vec3(glm::normalize(context_->rays->forward() + path.origin * context_->rays->sky_scale()));
+  }
+  Vec3 light = sky.sky(direction);
+  if (path.density < kNoOther && sky.has_uneven_sky()) light *= balance(path.density, sky.sky_density(direction));
+  if (const float density = sky.sun_density(direction); density > 0.0F) {
+    light += sky.sun(direction) * (path.density < kNoOther ? balance(path.density, density) : 1.0F);
+  }
+  if (path.is_first) {
+    sums_[path.pixel].background += light;
+    if (path.is_first_sample) sums_[path.pixel].depth = std::numeric_limits<float>::infinity();
+  } else {
+    path.radiance += path.throughput * light;
+  }
+}
+
+// ---- glass -------------------------------------------------------------------------------------------------------
+
+bool PathTile::meet_glass(std::uint32_t index, double t) {
+  Path& path = paths_[index];
+  find_glass(*context_->view, *context_->surfaces, {path.origin, DVec3(path.direction)}, t, glass_);
+  if (!path.is_seen) return pass_glass(index);
+  if (path.inside != kAir) return leave_glass(index);
+  return !glass_.empty() && enter_glass(index);
+}
+
+// Light from surface to surface goes straight on; by chance it meets what covers the glass.
+bool PathTile::pass_glass(std::uint32_t index) {
+  Path& path = paths_[index];
+  float u = path.random.one(path.dimension + kGlass);
+  for (const GlassBody& body : glass_) {
+    const Surface& surface = (*context_->surfaces)[body.type];
+    const double voxels = std::max(body.voxels, body.starts_inside || body.in_field ? 0.0 : 1.0);
+    const float cover = cover_of(surface, voxels);
+    if (u < cover) {
+      // From within it glows, no more.
+      if (body.starts_inside) {
+        add_emitted(path, surface.emitted, -1, 0.0F);
+      } else {
+        const Ray ray{path.origin, DVec3(path.direction)};
+        hit_glass(index, body, normal_entered(*context_->view, ray, body));
+      }
+      return true;
+    }
+    u = std::min((u - cover) / (1.0F - cover), 0x1.fffffep-1F);
+    path.throughput *= tint_of(surface, voxels);
+  }
+  return false;
+}
+
+bool PathTile::enter_glass(std::uint32_t index) {
+  Path& path = paths_[index];
+  const GlassBody body = glass_.front();
+  const Surface& surface = (*context_->surfaces)[body.type];
+  const Ray ray{path.origin, DVec3(path.direction)};
+  const float u = path.random.one(path.dimension + kGlass);
+  if (body.starts_inside) {  // the camera is in it
+    path.inside = body.type;
+    return leave_glass(index);
+  }
+  const DVec3 in_grid_normal = normal_entered(*context_->view, ray, body);
+  const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(body.placed)];
+  Vec3 normal(placed.world_axes * in_grid_normal);
+  const float cosine = std::clamp(-glm::dot(normal, path.direction), 1e-4F, 1.0F);
+  const Refraction through = refraction(cosine, 1.0F / surface.ior);
+  const DVec3 point = ray.origin + ray.direction * body.t_enter;
+  const double lift = kRayLift * placed.voxel_size;
+  if (u < through.mirrored) {
+    turn_at(path, point, path.direction + normal * (2.0F * cosine), normal, lift, kAir);
+  } else {
+    const double voxels = std::max(body.voxels, body.in_field ? 0.0 : 1.0);
+    const float cover = cover_of(surface, voxels);
+    if (u < through.mirrored + (1.0F - through.mirrored) * cover) {
+      hit_glass(index, body, in_grid_normal);
+      return true;
+    }
+    const float eta = 1.0F / surface.ior;
+    turn_at(path, point, path.direction * eta + normal * (eta * cosine - through.cosine), -normal, lift, body.type);
+  }
+  next_.push_back(index);
+  return true;
+}
+
+// A path within glass: to where the body ends, or to what stands in it.
+bool PathTile::leave_glass(std::uint32_t index) {
+  Path& path = paths_[index];
+  const Ray ray{path.origin, DVec3(path.direction)};
+  const bool is_within = !glass_.empty() && glass_.front().starts_inside && glass_.front().type == path.inside;
+  if (!is_within) {  // it came through a corner, or out by rounding
+    path.inside = kAir;
+    return !glass_.empty() && !glass_.front().starts_inside && enter_glass(index);
+  }
+  const GlassBody body = glass_.front();
+  const Surface& surface = (*context_->surfaces)[body.type];
+  path.throughput *= tint_of(surface, body.voxels);
+  const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(body.exit_placed)];
+  const double lift = kRayLift * placed.voxel_size;
+  if (!(body.t_exit < kInfinite)) return false;
+  const bool has_next = glass_.size() > 1 && reaches(body, glass_[1].t_enter);
+  const DVec3 end = ray.origin + ray.direction * body.t_exit;
+  if (!has_next) {
+    RayPacket ahead;
+    ahead.set(0, ray, body.t_exit + lift);
+    SceneHits met;
+    context_->view->first_hits(ahead, met);
+    const double ground = ground_at(path.origin, path.direction);
+    if (met.grids.hit != 0 || ground <= body.t_exit + lift) return false;  // it lies on something opaque
+  }
+  const float other = has_next ? (*context_->surfaces)[glass_[1].type].ior : 1.0F;
+  Vec3 normal(placed.world_axes * normal_left(*context_->view, ray, body));
+  if (glm::dot(normal, path.direction) < 0.0F) normal = -normal;
+  const float cosine = std::clamp(glm::dot(normal, path.direction), 1e-4F, 1.0F);
+  const float eta = surface.ior / other;
+  const Refraction through = refraction(cosine, eta);
+  const float u = path.random.one(path.dimension + kGlass);
+  if (u < through.mirrored) {
+    turn_at(path, end, path.direction - normal * (2.0F * cosine), -normal, lift, body.type);
+  } else {
+    turn_at(path, end, path.direction * eta + normal * (through.cosine - eta * cosine), normal, lift,
+            has_next ? glass_[1].type : kAir);
+  }
+  next_.push_back(index);
+  return true;
+}
+
+// Sends a path on from a surface of glass, on that side to which `normal` points.
+void PathTile::turn_at(Path& path, const DVec3& point, Vec3 direction, Vec3 normal, double lift, VoxelType inside) {
+  path.origin = point + DVec3(normal) * lift;
+  path.direction = glm::normalize(direction);
+  path.inside = inside;
+  path.dimension += kDimensions;
+  path.density = kNoOther;
+  path.is_first = false;
+  if (path.dimension > kDimensions * (kMostGlass + 2U * path.bounces)) path.throughput = Vec3(0.0F);
+}
+
+// ---- surfaces ----------------------------------------------------------------------------------------------------
+
+void PathTile::add_emitted(Path& path, Vec3 emitted, std::int32_t lamp, float distance) const {
+  if (is_black(emitted)) return;
+  float share = path.is_seen ? 1.0F : static_cast<float>(context_->options->lamp_brightness);
+  if (lamp >= 0 && path.density < kNoOther) {
+    const DVec3 vertex = path.origin + context_->camera->position;
+    share *= balance(path.density, context_->lamps->density(lamp, vertex, path.normal, path.direction, distance));
+  }
+  path.radiance += path.throughput * emitted * share;
+}
+
+void PathTile::note_layers(Path& path, const Vertex& vertex, double t, VoxelType type) {
+  if (path.is_noted) return;
+  path.is_noted = true;
+  Sums& sums = sums_[path.pixel];
+  sums.albedo += vertex.material.colour;
+  sums.normal += vertex.normal;
+  if (!path.is_first_sample) return;
+  sums.type = type;
+  sums.instance = vertex.is_ground ? 0 : static_cast<std::uint32_t>(vertex.placed) + 1;
+  if (path.is_first) sums.depth = static_cast<float>(t);
+}
+
+void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane) {
+  Path& path = paths_[index];
+  const auto i = static_cast<std::size_t>(lane);
+  Vertex vertex;
+  vertex.path = index;
+  vertex.placed = hits.placed[i];
+  const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(vertex.placed)];
+  const IVec3 voxel{hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
+  const Direction face = hits.grids.face[i];
+  const bool in_field = (hits.in_field >> lane & 1U) != 0;
+  const Ray ray = rays.ray(lane);
+  vertex.in_grid = context_->view->grid_from_view(vertex.placed, ray.origin + ray.direction * hits.grids.t[i]);
+  VoxelType type = hits.material[i];
+  DVec3 normal;
+  if (in_field) {
+    normal = DVec3(hits.normal(i));
+  } else {
+    normal = DVec3(normal_of(face));
+    vertex.in_grid = on_face(vertex.in_grid, voxel, face);
+    type = placed.voxels->get(voxel);
+  }
+  const Surface& surface = (*context_->surfaces)[type];
+  if (path.is_first) sums_[path.pixel].scene_share += 1.0F;
+  if ((hits.grids.starts_inside >> lane & 1U) != 0) {  // from inside: its own colour, unlit
+    path.radiance += path.throughput * (path.is_seen ? surface.colour : surface.emitted);
+    if (path.is_first && path.is_first_sample) sums_[path.pixel].depth = 0.0F;
+    return;
+  }
+  vertex.in_grid += normal * kRayLift;
+  vertex.normal = glm::normalize(Vec3(placed.world_axes * normal));
+  vertex.in_view = context_->view->view_from_grid(vertex.placed, vertex.in_grid);
+  vertex.material = {surface.colour, surface.roughness, surface.metalness};
+  note_layers(path, vertex, hits.grids.t[i], type);
+  if (!is_black(surface.emitted)) {
+    const std::int32_t lamp = in_field ? -1 : context_->lamps->lamp_of(vertex.placed, voxel, face);
+    add_emitted(path, surface.emitted, lamp, static_cast<float>(hits.grids.t[i]));
+  }
+  vertices_.push_back(vertex);
+}
+
+void PathTile::hit_glass(std::uint32_t index, const GlassBody& body, const DVec3& normal_in_grid) {
+  Path& path = paths_[index];
+  const Surface& surface = (*context_->surfaces)[body.type];
+  Vertex vertex;
+  vertex.path = index;
+  vertex.placed = body.placed;
+  const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(body.placed)];
+  vertex.in_grid = context_->view->grid_from_view(body.placed, path.origin + DVec3(path.direction) * body.t_enter);
+  if (!body.in_field) vertex.in_grid = on_face(vertex.in_grid, body.voxel, body.face);
+  vertex.in_grid += normal_in_grid * kRayLift;
+  vertex.normal = glm::normalize(Vec3(placed.world_axes * normal_in_grid));
+  vertex.in_view = context_->view->view_from_grid(body.placed, vertex.in_grid);
+  vertex.material = {surface.colour, 1.0F, 0.0F};
+  if (path.is_first) sums_[path.pixel].scene_share += 1.0F;
+  note_layers(path, vertex, body.t_enter, body.type);
+  add_emitted(path, surface.emitted, -1, 0.0F);
+  vertices_.push_back(vertex);
+}
+
+void PathTile::hit_ground(std::uint32_t index, double t) {
+  Path& path = paths_[index];
+  const GroundPlane& ground = *context_->options->ground;
+  Vertex vertex;
+  vertex.path = index;
+  vertex.is_ground = true;
+  vertex.in_view = path.origin + DVec3(path.direction) * t;
+  vertex.in_view.y = ground_ + kRayLift;
+  vertex.normal = {0.0F, 1.0F, 0.0F};
+  vertex.material.colour = ground.colour;
+  Sums& sums = sums_[path.pixel];
+  if (path.is_first && ground.only_shadows) {
+    path.is_caught = true;
+    sums.caught_share += 1.0F;
+    sums.caught += context_->sky->sky(path.direction);
+    if (path.is_first_sample) sums.depth = kNoOther;
+  } else {
+    if (path.is_first) sums.scene_share += 1.0F;
+    note_layers(path, vertex, t, kAir);
+  }
+  // Shadows are asked for in a grid: the first.
+  if (!placed_in(context_->view->tracer()).empty()) vertex.in_grid = context_->view->grid_from_view(0, vertex.in_view);
+  vertices_.push_back(vertex);
+}
+
+// ---- light -------------------------------------------------------------------------------------------------------
+
+void PathTile::shade(const Vertex& vertex) {
+  Path& path = paths_[vertex.path];
+  if (path.bounces >= context_->options->max_bounces || is_black(path.throughput)) return;
+  Vec3 normal = vertex.normal;
+  const float facing = -glm::dot(normal, path.direction);
+  // A smooth normal may look away from who sees the surface.
+  if (facing < 1e-3F) normal = glm::normalize(normal - path.direction * (1e-3F - facing));
+  const Frame frame(normal);
+  Vec3 out = frame.to_local(-path.direction);
+  out.z = std::max(out.z, 1e-4F);
+  const Scatter scatter(vertex.material, glm::normalize(out));
+  ask_sun(vertex, path, frame, scatter);
+  ask_sky(vertex, path, frame, scatter);
+  ask_lamp(vertex, path, frame, scatter);
+  const Scattered next =
+      scatter.sample(path.random.pair(path.dimension + kDirection), path.random.one(path.dimension + kLobe));
+  if (path.is_caught && path.bounces == 0) {
+    const SkyLight& sky = *context_->sky;
+    const SkySample sun = sky.sample_sun(path.random.pair(path.dimension + kSun));
+    const float cosine = std::max(sun.direction.y, 0.0F);
+    Vec3 open = sky.sky(frame.to_world(next.direction)) * next.weight;
+    if (sky.has_sun()) open += sky.sun_irradiance() * vertex.material.colour * (cosine / kPi);
+    sums_[path.pixel].open += open;
+  }
+  if (is_black(next.weight)) return;
+  path.throughput *= next.weight;
+  if (path.bounces >= kSureBounces) {
+    const float likely = std::min(largest(path.throughput), kMostLikely);
+    if (!(path.random.one(path.dimension + kRoulette) < likely)) return;
+    path.throughput /= likely;
+  }
+  ++path.bounces;
+  path.dimension += kDimensions;
+  path.direction = glm::normalize(frame.to_world(next.direction));
+  path.density = next.density;
+  path.origin = vertex.in_view;
+  path.normal = normal;
+  if (next.density < kNoOther) path.is_seen = false;
+  path.is_first = false;
+  path.inside = kAir;
+  next_.push_back(vertex.path);
+}
+
+void PathTile::ask_sun(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter) {
+  const SkyLight& sky = *context_->sky;
+  if (!sky.has_sun()) return;
+  const SkySample sun = sky.sample_sun(path.random.pair(path.dimension + kSun));
+  const Vec3 in = frame.to_local(sun.direction);
+  if (!(in.z > 0.0F)) return;
+  Vec3 light = path.throughput * scatter.value(in);
+  if (sun.density < kNoOther) {
+    light *= sun.radiance / sun.density * balance(sun.density, scatter.density(in));
+  } else {
+    light *= sun.radiance;
+  }
+  ask(vertex, sun.direction, kNoOther, light, true);
+}
+
+void PathTile::ask_sky(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter) {
+  if (!context_->sky->has_uneven_sky()) return;
+  const SkySample sky = context_->sky->sample_sky(path.random.pair(path.dimension + kSky));
+  const Vec3 in = frame.to_local(sky.direction);
+  if (!(in.z > 0.0F) || !(sky.density > 0.0F)) return;
+  const float share = balance(sky.density, scatter.density(in));
+  ask(vertex, sky.direction, kNoOther, path.throughput * scatter.value(in) * sky.radiance * (share / sky.density),
+      false);
+}
+
+void PathTile::ask_lamp(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter) {
+  if (context_->lamps->empty()) return;
+  const LampSample lamp = context_->lamps->sample(vertex.in_view + context_->camera->position, frame.z,
+                                                  path.random.one(path.dimension + kLampChoice),
+                                                  path.random.pair(path.dimension + kLampPoint));
+  if (is_black(lamp.radiance)) return;
+  const Vec3 in = frame.to_local(lamp.direction);
+  if (!(in.z > 0.0F)) return;
+  Vec3 light = path.throughput * scatter.value(in) * lamp.radiance;
+  if (lamp.density < kNoOther) light *= balance(lamp.density, scatter.density(in));
+  // A little before the lamp, for rounding.
+  ask(vertex, lamp.direction, lamp.distance * (1.0F - 1e-4F), light, false);
+}
+
+void PathTile::ask(const Vertex& vertex, Vec3 direction, float max_t, Vec3 light, bool is_sun) {
+  if (is_black(light)) return;
+  if (ground_at(vertex.in_view, direction) < static_cast<double>(max_t)) return;
+  requests_.push_back(
+      {vertex.in_grid, direction, max_t, light, vertex.placed, vertex.path, is_sun ? 0 : bin_of(direction)});
+}
+
+void PathTile::trace_requests() {
+  const std::size_t placed = placed_in(context_->view->tracer()).size();
+  if (placed == 0) {
+    for (const Request& request : requests_) paths_[request.path].radiance += request.light;
+    return;
+  }
+  order_.resize(requests_.size());
+  sort_by_key(
+      requests_.size(), kBins, starts_, [&](std::size_t i) { return requests_[i].bin; },
+      [&](std::uint32_t to, std::uint32_t from) { order_[to] = from; });
+  if (placed > 1) {
+    std::stable_sort(order_.begin(), order_.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return requests_[a].home < requests_[b].home; });
+  }
+  std::size_t first = 0;
+  while (first < order_.size()) {
+    std::size_t end = first + 1;
+    while (end < order_.size() && end - first < RayPacket::kSize &&
+           requests_[order_[end]].home == requests_[order_[first]].home) {
+      ++end;
+    }
+    trace_request_packet(std::span(order_).subspan(first, end - first));
+    first = end;
+  }
+  // In the order in which they were asked, whatever that of the rays was.
+  for (const Request& request : requests_) paths_[request.path].radiance += request.light;
+}
+
+void PathTile::trace_request_packet(std::span<const std::uint32_t> requests) {
+  const std::int32_t home = requests_[requests.front()].home;
+  const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(home)];
+  RayPacket rays;
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    const Request& request = requests_[requests[i]];
+    rays.set(static_cast<int>(i), {request.origin, in_grid(placed, request.direction)},
+             static_cast<double>(request.max_t));
+  }
+  rays_ += static_cast<std::int64_t>(requests.size());
+  const std::uint32_t blocked = context_->view->any_hits(home, rays);
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    if ((blocked >> i & 1U) != 0) requests_[requests[i]].light = Vec3(0.0F);
+  }
+  rays.active &= ~blocked;
+  if (!context_->view->tracer().has_transparent() || rays.active == 0) return;
+  const RayPacket in_view = context_->view->view_from_grid(home, rays);
+  for (std::uint32_t left = context_->view->any_transparent(in_view); left != 0; left &= left - 1) {
+    const int lane = std::countr_zero(left);
+    Request& request = requests_[requests[static_cast<std::size_t>(lane)]];
+    find_glass(*context_->view, *context_->surfaces, in_view.ray(lane), static_cast<double>(request.max_t), glass_);
+    for (const GlassBody& body : glass_) {
+      const Surface& surface = (*context_->surfaces)[body.type];
+      const double voxels = std::max(body.voxels, body.starts_inside || body.in_field ? 0.0 : 1.0);
+      request.light *= tint_of(surface, voxels) * (1.0F - cover_of(surface, voxels));
+    }
+  }
+}
+
+// ---- the picture -------------------------------------------------------------------------------------------------
+
+std::int64_t PathTile::pixels_hit() const {
+  return std::count_if(sums_.begin(), sums_.end(), [](const Sums& sums) { return sums.scene_share > 0.0F; });
+}
+
+void PathTile::write_to(PathPicture& picture) const {
+  const auto samples = static_cast<float>(context_->options->samples);
+  for (int y = 0; y < std::min(kEdge, picture.height - row_); ++y) {
+    for (int x = 0; x < std::min(kEdge, picture.width - column_); ++x) {
+      const Sums& sums = sums_[static_cast<std::size_t>(y * kEdge + x)];
+      const std::size_t to = static_cast<std::size_t>(row_ + y) * static_cast<std::size_t>(picture.width) +
+                             static_cast<std::size_t>(column_ + x);
+      Vec3 passed(1.0F);
+      for (int channel = 0; channel < 3; ++channel) {
+        if (sums.open[channel] > 0.0F) passed[channel] = std::min(sums.lit[channel] / sums.open[channel], 1.0F);
+      }
+      picture.scene[to] = sums.scene / samples;
+      picture.radiance[to] = (sums.scene + sums.background + sums.caught * passed) / samples;
+      picture.alpha[to] = std::min((sums.scene_share + sums.caught_share * (1.0F - luminance(passed))) / samples, 1.0F);
+      if (picture.depth.values.empty()) continue;
+      picture.albedo[to] = sums.albedo / samples;
+      picture.normal[to] = sums.normal / samples;
+      picture.depth.values[to] = sums.depth;
+      picture.types[to] = sums.type;
+      picture.instances[to] = sums.instance;
+    }
+  }
+}
+
+}  // namespace quoin::path

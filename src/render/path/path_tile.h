@@ -1,0 +1,157 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include <quoin/core/direction.h>
+#include <quoin/core/vec.h>
+#include <quoin/render/path_tracer.h>
+
+#include "light/glass.h"
+#include "light/surfaces.h"
+#include "render/camera_rays.h"
+#include "render/path/path_lamps.h"
+#include "render/path/path_random.h"
+#include "render/path/scatter.h"
+#include "render/path/sky_light.h"
+#include "scene/tracer/scene_view.h"
+
+namespace quoin::path {
+
+/// What all tiles of a picture share.
+struct TileContext {
+  const SceneView* view = nullptr;
+  const Surfaces* surfaces = nullptr;
+  const PathLamps* lamps = nullptr;
+  const SkyLight* sky = nullptr;
+  const CameraRays* rays = nullptr;
+  const Camera* camera = nullptr;
+  const PathOptions* options = nullptr;
+};
+
+/// One square of a picture.
+///
+///   begin -> [ order -> meet -> shade -> ask what shadows light ] until no path is left -> add
+///
+/// All paths of some samples go one step at a time, those that point the same way side by side, so that packets of rays
+/// are full and stay near each other. What a path finds depends on its pixel and sample alone.
+class PathTile {
+ public:
+  static constexpr int kEdge = 32;  ///< pixels
+
+  /// `column` and `row` are of its upper left pixel.
+  PathTile(const TileContext& context, int column, int row);
+
+  /// All samples of all pixels. Asks `goes_on(samples)` after some of them; once that returns false, so does this, and
+  /// the tile is not to be used.
+  [[nodiscard]] bool render(const std::function<bool(std::size_t samples)>& goes_on);
+  /// Puts the pixels that lie in the picture in place.
+  void write_to(PathPicture& picture) const;
+
+  [[nodiscard]] std::int64_t rays() const { return rays_; }
+  [[nodiscard]] std::int64_t pixels_hit() const;
+
+ private:
+  static constexpr std::size_t kPixels = std::size_t{kEdge} * kEdge;
+  static constexpr int kSamplesAtOnce = 4;
+
+  struct Path {
+    DVec3 origin{0.0};     // of its next ray, in view space
+    Vec3 direction{0.0F};  // unit
+    float density = 0.0F;  // with which that was found; infinite where nothing else could find it
+    Vec3 throughput{1.0F};
+    Vec3 radiance{0.0F};
+    Vec3 normal{0.0F};  // where it was last scattered
+    Random random;
+    std::uint32_t dimension = 0;  // the first that is free
+    std::uint16_t pixel = 0;      // of the tile
+    std::uint16_t bounces = 0;
+    VoxelType inside = kAir;  // the glass in which it is
+    bool is_seen = true;      // by the camera, itself or by glass and mirrors
+    bool is_first = true;     // nothing was met yet
+    bool is_caught = false;   // the ground only catches shadows where it went
+    bool is_first_sample = false;
+    bool is_noted = false;  // in the layers
+  };
+  // Where a path is scattered.
+  struct Vertex {
+    std::uint32_t path = 0;
+    std::int32_t placed = 0;
+    DVec3 in_grid{0.0};  // a hundredth of a voxel above the surface, so that rays start before it
+    DVec3 in_view{0.0};  // there
+    Vec3 normal{0.0F};   // in the world, on the side from which the path comes
+    Material material;
+    bool is_ground = false;
+  };
+  // Light that reaches a vertex if nothing is in between.
+  struct Request {
+    DVec3 origin{0.0};     // in the grid `home`
+    Vec3 direction{0.0F};  // in the world
+    float max_t = 0.0F;    // world units
+    Vec3 light{0.0F};
+    std::int32_t home = 0;
+    std::uint32_t path = 0;
+    std::uint32_t bin = 0;
+  };
+  struct Sums {
+    Vec3 background{0.0F};  // what is seen of it
+    Vec3 scene{0.0F};
+    Vec3 caught{0.0F};  // background behind ground that only catches shadows
+    Vec3 lit{0.0F};     // that ground
+    Vec3 open{0.0F};    // and what light it would have if nothing was on it
+    float scene_share = 0.0F;
+    float caught_share = 0.0F;
+    Vec3 albedo{0.0F};
+    Vec3 normal{0.0F};
+    float depth = 0.0F;
+    VoxelType type = kAir;
+    std::uint32_t instance = 0;
+  };
+
+  void begin(int first, int count);
+  void begin_path(std::size_t pixel, int x, int y, int sample);
+  void order_paths();
+  void meet();
+  void meet_packet(std::span<const std::uint32_t> paths);
+  // A path that leaves the scene.
+  void leave(Path& path);
+  // What a ray meets of glass before `t`, where it may meet some. Returns whether the path's ray ended there.
+  bool meet_glass(std::uint32_t index, double t);
+  bool pass_glass(std::uint32_t index);
+  bool enter_glass(std::uint32_t index);
+  bool leave_glass(std::uint32_t index);
+  void turn_at(Path& path, const DVec3& point, Vec3 direction, Vec3 normal, double lift, VoxelType inside);
+  void hit_matter(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane);
+  void hit_glass(std::uint32_t index, const GlassBody& body, const DVec3& normal_in_grid);
+  void hit_ground(std::uint32_t index, double t);
+  [[nodiscard]] double ground_at(const DVec3& origin, Vec3 direction) const;  // infinite: nowhere
+  void add_emitted(Path& path, Vec3 emitted, std::int32_t lamp, float distance) const;
+  void note_layers(Path& path, const Vertex& vertex, double t, VoxelType type);
+
+  void shade(const Vertex& vertex);
+  void ask_sun(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter);
+  void ask_sky(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter);
+  void ask_lamp(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter);
+  void ask(const Vertex& vertex, Vec3 direction, float max_t, Vec3 light, bool is_sun);
+  void trace_requests();
+  void trace_request_packet(std::span<const std::uint32_t> requests);
+
+  const TileContext* context_;
+  int column_;
+  int row_;
+  double ground_ = 0.0;  // height in view space
+  std::int64_t rays_ = 0;
+  std::vector<Path> paths_;
+  std::vector<std::uint32_t> active_, next_;
+  std::vector<Vertex> vertices_;
+  std::vector<Request> requests_;
+  std::vector<std::uint32_t> order_;
+  std::vector<std::uint32_t> starts_;  // of counting sorts
+  std::vector<GlassBody> glass_;
+  std::vector<Sums> sums_;
+};
+
+}  // namespace quoin::path

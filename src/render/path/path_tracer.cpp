@@ -1,0 +1,175 @@
+#include <quoin/render/path_tracer.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <string>
+
+#include <glm/geometric.hpp>
+
+#include <quoin/core/assert.h>
+
+#include "light/surfaces.h"
+#include "render/path/path_lamps.h"
+#include "render/path/path_tile.h"
+#include "render/path/sky_light.h"
+#include "render/picture_request.h"
+#include "render/tile_progress.h"
+#include "scene/tracer/scene_view.h"
+
+namespace quoin {
+namespace {
+
+constexpr int kMaxPathSamples = 65'536;
+constexpr int kMaxBounces = 1'024;
+constexpr double kMostBrightness = 1e9;
+constexpr double kMostAir = 100.0;
+constexpr double kWidestSun = 3.0;
+
+Status refuse(const std::string& message) {
+  return make_error(ErrorCode::InvalidArgument, message);
+}
+
+bool is_brightness(double value) {
+  return value >= 0.0 && value <= kMostBrightness;
+}
+
+bool is_colour(Vec3 colour, float most) {
+  return std::min({colour.x, colour.y, colour.z}) >= 0.0F && std::max({colour.x, colour.y, colour.z}) <= most &&
+         is_finite(DVec3(colour));
+}
+
+Status check_sky(const PathOptions& options) {
+  if (!is_finite(options.sun) || options.sun == DVec3(0.0)) return refuse("sun: must be finite and not 0");
+  if (!(options.sun_angle_radians >= 0.0 && options.sun_angle_radians <= kWidestSun)) {
+    return refuse("sun_angle_radians: must be 0 to 3");
+  }
+  if (!is_brightness(options.sun_brightness)) return refuse("sun_brightness: must be 0 to 1e9");
+  if (!is_brightness(options.sky_brightness)) return refuse("sky_brightness: must be 0 to 1e9");
+  if (!is_brightness(options.lamp_brightness)) return refuse("lamp_brightness: must be 0 to 1e9");
+  if (!is_colour(options.sky_colour, static_cast<float>(kMostBrightness))) {
+    return refuse("sky_colour: must be 0 to 1e9 each");
+  }
+  for (const double part : {options.air.rayleigh, options.air.mie, options.air.ozone}) {
+    if (!(part >= 0.0 && part <= kMostAir)) return refuse("air: must be 0 to 100 each");
+  }
+  if (!std::isfinite(options.environment_turn_radians)) return refuse("environment_turn_radians: must be finite");
+  if (options.sky != SkyModel::Environment) return {};
+  const RadianceImage* const image = options.environment.get();
+  const bool is_whole =
+      image != nullptr && image->width > 0 && image->height > 0 &&
+      image->rgb.size() == 3 * static_cast<std::size_t>(image->width) * static_cast<std::size_t>(image->height);
+  return is_whole ? Status() : refuse("environment: must be an image of at least one pixel");
+}
+
+Status check(const Camera& camera, const PathOptions& options) {
+  if (Status picture = check_picture(camera, options.width, options.height); !picture) return picture;
+  if (options.samples < 1 || options.samples > kMaxPathSamples) return refuse("samples: must be 1 to 65536");
+  if (options.max_bounces < 0 || options.max_bounces > kMaxBounces) return refuse("max_bounces: must be 0 to 1024");
+  if (options.ground) {
+    if (!std::isfinite(options.ground->height)) return refuse("ground: its height must be finite");
+    if (!is_colour(options.ground->colour, 1.0F)) return refuse("ground: its colour must be 0 to 1 each");
+  }
+  if (!(options.lens_radius >= 0.0) || !std::isfinite(options.lens_radius)) {
+    return refuse("lens_radius: must be finite and at least 0");
+  }
+  if (!(options.focus_distance > 0.0) || !std::isfinite(options.focus_distance)) {
+    return refuse("focus_distance: must be finite and more than 0");
+  }
+  return check_sky(options);
+}
+
+PathPicture empty_picture(const PathOptions& options) {
+  const auto pixels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
+  PathPicture picture;
+  picture.width = options.width;
+  picture.height = options.height;
+  picture.radiance.resize(pixels);
+  picture.scene.resize(pixels);
+  picture.alpha.resize(pixels);
+  if (!options.layers) return picture;
+  picture.albedo.resize(pixels);
+  picture.normal.resize(pixels);
+  picture.depth = {options.width, options.height, std::vector<float>(pixels)};
+  picture.types.resize(pixels);
+  picture.instances.resize(pixels);
+  return picture;
+}
+
+}  // namespace
+
+struct PathTracer::Impl {
+  Impl(const Scene& of_scene, InstanceFilter filter, Threads threads)
+      : scene(&of_scene), tracer(of_scene, filter, threads), surfaces(of_scene.types) {}
+
+  const Scene* scene;
+  SceneTracer tracer;
+  Surfaces surfaces;
+
+  [[nodiscard]] std::shared_ptr<const path::PathLamps> lamps(double brightness) {
+    const std::lock_guard lock(mutex);
+    if (made == nullptr || made_of != brightness) {
+      made = cache.lamps(*scene, tracer, surfaces, brightness);
+      made_of = brightness;
+    }
+    return made;
+  }
+  void forget_lamps() {
+    const std::lock_guard lock(mutex);
+    made = nullptr;
+  }
+
+ private:
+  std::mutex mutex;
+  path::PathLampCache cache;
+  std::shared_ptr<const path::PathLamps> made;  // null: out of date
+  double made_of = 0.0;
+};
+
+PathTracer::PathTracer(const Scene& scene, InstanceFilter filter, Threads threads)
+    : impl_(std::make_unique<Impl>(scene, filter, threads)) {}
+PathTracer::PathTracer(PathTracer&&) noexcept = default;
+PathTracer& PathTracer::operator=(PathTracer&&) noexcept = default;
+PathTracer::~PathTracer() = default;
+
+void PathTracer::update(Threads threads) {
+  impl_->tracer.update(threads);
+  impl_->surfaces.update(impl_->scene->types);
+  impl_->forget_lamps();
+}
+
+Result<PathPicture> PathTracer::render(const Camera& camera, const PathOptions& options, Threads threads,
+                                       const Progress& progress) const {
+  if (const Status status = check(camera, options); !status) return status.error();
+  QUOIN_ASSERT(std::abs(glm::dot(camera.right, camera.up)) < 1e-3 &&
+                   std::abs(glm::dot(camera.right, camera.forward)) < 1e-3 &&
+                   std::abs(glm::dot(camera.up, camera.forward)) < 1e-3,
+               "the camera's axes are perpendicular");
+  const SceneView view(impl_->tracer, camera.position);
+  const std::shared_ptr<const path::PathLamps> lamps = impl_->lamps(options.lamp_brightness);
+  const path::SkyLight sky(options);
+  const CameraRays rays(camera, options.width, options.height);
+  const path::TileContext context{&view, &impl_->surfaces, lamps.get(), &sky, &rays, &camera, &options};
+  PathPicture picture = empty_picture(options);
+  constexpr int kEdge = path::PathTile::kEdge;
+  const int across = (options.width + kEdge - 1) / kEdge;
+  const int down = (options.height + kEdge - 1) / kEdge;
+  const std::size_t tiles = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
+  TileProgress done(progress, tiles * static_cast<std::size_t>(options.samples));
+  parallel_for(tiles, threads, [&](std::size_t i) {
+    if (done.is_cancelled()) return;
+    const auto column = static_cast<int>(i % static_cast<std::size_t>(across)) * kEdge;
+    const auto row = static_cast<int>(i / static_cast<std::size_t>(across)) * kEdge;
+    path::PathTile tile(context, column, row);
+    if (!tile.render([&](std::size_t samples) { return done.add_samples(samples); })) return;
+    tile.write_to(picture);
+    done.add_counts(tile.rays(), tile.pixels_hit());
+  });
+  if (done.is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
+  picture.rays = done.rays();
+  picture.pixels_hit = done.pixels_hit();
+  return picture;
+}
+
+}  // namespace quoin

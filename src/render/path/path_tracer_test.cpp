@@ -1,0 +1,588 @@
+// Pictures by paths of scenes whose light is known by analysis.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include <quoin/grid/grid.h>
+#include <quoin/render/path_tracer.h>
+
+#include "core/instruction_sets_for_tests.h"
+#include "core/srgb.h"
+#include "render/render_test_support.h"
+
+namespace quoin {
+namespace {
+
+using render_test::add_type;
+using render_test::from_above;
+using render_test::place;
+using render_test::towards;
+
+constexpr Rgba8 kWhite{255, 255, 255, 255};
+constexpr Rgba8 kGrey{188, 188, 188, 255};
+constexpr double kPi = std::numbers::pi;
+
+PathOptions uniform(int width, int height, int samples) {
+  PathOptions options;
+  options.width = width;
+  options.height = height;
+  options.samples = samples;
+  options.sky = SkyModel::Uniform;
+  options.sun_brightness = 0.0;
+  return options;
+}
+
+PathPicture taken(const Scene& scene, const Camera& camera, const PathOptions& options, Threads threads = {}) {
+  auto picture = PathTracer(scene).render(camera, options, threads);
+  EXPECT_TRUE(picture.has_value());
+  return picture ? std::move(*picture) : PathPicture{};
+}
+
+Vec3 mean(const PathPicture& picture) {
+  DVec3 sum(0.0);
+  for (const Vec3& light : picture.radiance) sum += DVec3(light);
+  return Vec3(sum / static_cast<double>(picture.radiance.size()));
+}
+
+Scene cube_of(Rgba8 colour, int edge = 8, float emission = 0.0F) {
+  Scene scene;
+  const VoxelType type = add_type(scene, colour, Visibility::Opaque, emission);
+  Grid grid;
+  grid.fill_box({IVec3(0), IVec3(edge)}, type);
+  place(scene, std::move(grid));
+  return scene;
+}
+
+// A closed room of inner edge `edge` whose wall towards +y is of another type, and a camera within it.
+Scene room(int edge, VoxelProperties walls, VoxelProperties ceiling) {
+  Scene scene;
+  const VoxelType wall = scene.types.add(walls).value_or(kAir);
+  const VoxelType top = scene.types.add(ceiling).value_or(kAir);
+  Grid grid;
+  grid.fill_box({IVec3(-1), IVec3(edge + 1)}, wall);
+  grid.fill_box({{-1, edge, -1}, {edge + 1, edge + 1, edge + 1}}, top);
+  grid.fill_box({IVec3(0), IVec3(edge)}, kAir);
+  place(scene, std::move(grid));
+  return scene;
+}
+
+VoxelProperties of_colour(Rgba8 colour, float emission = 0.0F) {
+  VoxelProperties properties;
+  properties.colour = colour;
+  properties.emission = emission;
+  return properties;
+}
+
+Camera looking(DVec3 position, DVec3 forward, DVec3 up, double view_height) {
+  Camera camera;
+  camera.position = position;
+  camera.forward = forward;
+  camera.up = up;
+  camera.right = glm::cross(forward, up);
+  camera.projection = Camera::Projection::Orthographic;
+  camera.view_height = view_height;
+  return camera;
+}
+
+TEST(PathTracer, AConvexBodyUnderAUniformSkyShowsItsAlbedo) {
+  const Scene scene = cube_of(kGrey);
+  const PathPicture picture = taken(scene, from_above(4.0, 20.0, 4.0, 6.0), uniform(16, 16, 4));
+  for (const Vec3& light : picture.radiance) EXPECT_NEAR(light.x, linear_from_srgb(std::uint8_t{188}), 1e-6F);
+  EXPECT_EQ(picture.pixels_hit, 256);
+}
+
+// E (1 - a^(n+1)) / (1 - a) after n bounces.
+TEST(PathTracer, AClosedBoxThatEmitsFillsWithLight) {
+  const float albedo = linear_from_srgb(std::uint8_t{188});
+  const Scene scene = room(6, of_colour(kGrey, 1.0F), of_colour(kGrey, 1.0F));
+  for (const int bounces : {0, 1, 2, 5, 40}) {
+    PathOptions options = uniform(16, 16, 64);
+    options.max_bounces = bounces;
+    const float light = mean(taken(scene, towards({3.0, 3.0, 3.0}, {3.0, 2.0, 0.0}), options)).x;
+    const float expected = albedo * (1.0F - std::pow(albedo, static_cast<float>(bounces + 1))) / (1.0F - albedo);
+    EXPECT_NEAR(light / expected, 1.0F, 0.01F) << bounces;
+  }
+}
+
+// The share of light from one wall of a cube that reaches another.
+TEST(PathTracer, FormFactorsOfACubesWalls) {
+  constexpr int kEdge = 8;
+  const Scene scene = room(kEdge, of_colour(kGrey), of_colour({255, 255, 255, 255}, 1.0F));
+  const float albedo = linear_from_srgb(std::uint8_t{188});
+  PathOptions options = uniform(32, 32, 256);
+  options.max_bounces = 1;
+  const PathPicture opposite = taken(scene, looking(DVec3(4.0), {0, -1, 0}, {0, 0, -1}, kEdge), options);
+  EXPECT_NEAR(mean(opposite).x / albedo, 0.199825F, 0.001F);
+  const PathPicture adjacent = taken(scene, looking(DVec3(4.0), {1, 0, 0}, {0, 1, 0}, kEdge), options);
+  EXPECT_NEAR(mean(adjacent).x / albedo, 0.200044F, 0.001F);
+}
+
+// Above black ground a surface inclined by phi sees (1 + cos phi) / 2 of a uniform sky.
+TEST(PathTracer, ASlopeSeesTheSkyAboveIt) {
+  for (const double degrees : {0.0, 30.0, 60.0, 90.0}) {
+    Scene scene = cube_of(kGrey, 4);
+    const double angle = degrees * kPi / 180.0;
+    const InstanceHandle handle = scene.instances().handles().front();
+    Instance& moved = scene.edit(handle);
+    moved.rotation = glm::angleAxis(angle, DVec3(1, 0, 0));
+    const DVec3 normal = moved.rotation * DVec3(0, 1, 0);
+    const DVec3 middle = moved.position + moved.rotation * DVec3(2, 4, 2);
+    PathOptions options = uniform(8, 8, 256);
+    options.max_bounces = 1;
+    options.ground.emplace();
+    options.ground->colour = Vec3(0.0F);
+    options.ground->height = -1000.0;
+    const Camera camera = looking(middle + normal * 3.0, -normal, moved.rotation * DVec3(0, 0, -1), 2.0);
+    const float light = mean(taken(scene, camera, options)).x / linear_from_srgb(std::uint8_t{188});
+    EXPECT_NEAR(light, 0.5 * (1.0 + std::cos(angle)), 0.01) << degrees;
+  }
+}
+
+// A square lamp above a plate, by Lambert's formula.
+TEST(PathTracer, ASquareLampLightsAPlateAsLambertSays) {
+  Scene scene;
+  const VoxelType plate = add_type(scene, kGrey);
+  const VoxelType lamp = add_type(scene, kWhite, Visibility::Opaque, 3.0F);
+  const VoxelType black = add_type(scene, {0, 0, 0, 255});
+  Grid grid;
+  grid.fill_box({{-20, 0, -20}, {21, 1, 21}}, plate);
+  grid.fill_box({{-2, 6, -2}, {3, 7, 3}}, lamp);
+  grid.fill_box({{-3, 7, -3}, {4, 8, 4}}, black);
+  grid.fill_box({{-3, 6, -3}, {4, 7, -2}}, black);
+  grid.fill_box({{-3, 6, 3}, {4, 7, 4}}, black);
+  grid.fill_box({{-3, 6, -3}, {-2, 7, 4}}, black);
+  grid.fill_box({{3, 6, -3}, {4, 7, 4}}, black);
+  place(scene, std::move(grid));
+  PathOptions options = uniform(8, 8, 64);
+  options.sky_colour = Vec3(0.0F);
+  options.max_bounces = 1;
+  for (const double x : {0.5, 6.5, 15.5}) {
+    const DVec3 point{x, 1.0, 0.5};
+    double sum = 0.0;
+    const DVec3 corners[] = {{-2, 6, -2}, {3, 6, -2}, {3, 6, 3}, {-2, 6, 3}};
+    for (int i = 0; i < 4; ++i) {
+      const DVec3 a = glm::normalize(corners[i] - point);
+      const DVec3 b = glm::normalize(corners[(i + 1) % 4] - point);
+      sum += std::acos(glm::dot(a, b)) * glm::normalize(glm::cross(a, b)).y;
+    }
+    const double expected = linear_from_srgb(std::uint8_t{188}) / kPi * std::abs(sum) * 0.5 * 3.0;
+    const Camera camera = looking(point + DVec3(0, 2, 0), {0, -1, 0}, {0, 0, -1}, 0.05);
+    EXPECT_NEAR(mean(taken(scene, camera, options)).x / expected, 1.0, 0.01) << x;
+  }
+}
+
+TEST(PathTracer, TheSunLightsWhatFacesIt) {
+  Scene scene = cube_of(kGrey);
+  PathOptions options = uniform(8, 8, 16);
+  options.sky_colour = Vec3(0.0F);
+  options.sun_brightness = 1.0;
+  options.sun = {0.0, 1.0, 1.0};
+  for (const double angle : {0.0, 0.0093}) {
+    options.sun_angle_radians = angle;
+    const float light = mean(taken(scene, from_above(4.0, 20.0, 4.0, 6.0), options)).x;
+    EXPECT_NEAR(light, linear_from_srgb(std::uint8_t{188}) * std::sqrt(0.5F), 1e-3F);
+  }
+}
+
+// The edge of a shadow is as wide as the sun's disc times the distance of what throws it.
+TEST(PathTracer, APenumbraGrowsWithTheDistance) {
+  Scene scene;
+  const VoxelType type = add_type(scene, kWhite);
+  Grid grid;
+  grid.fill_box({{-20, 0, -20}, {20, 1, 20}}, type);
+  grid.fill_box({{-20, 101, -20}, {0, 102, 20}}, type);
+  place(scene, std::move(grid));
+  PathOptions options = uniform(256, 1, 256);
+  options.sky_colour = Vec3(0.0F);
+  options.sun_brightness = 1.0;
+  options.sun = {0.0, 1.0, 0.0};
+  options.max_bounces = 1;
+  // 256 pixels across 5.12 voxels; the plate above ends at x = 0.
+  const Camera camera = looking({0.0, 50.0, 0.0}, {0, -1, 0}, {0, 0, -1}, 5.12 / 256.0);
+  const PathPicture picture = taken(scene, camera, options);
+  const auto share = [&](double x) { return picture.radiance[static_cast<std::size_t>(x / 5.12 * 256.0 + 128.0)].x; };
+  const double width = 0.0093 * 100.0;
+  EXPECT_NEAR(share(-0.6 * width), 0.0F, 1e-3F);
+  EXPECT_NEAR(share(0.0), 0.5F, 0.05F);
+  EXPECT_NEAR(share(0.6 * width), 1.0F, 1e-3F);
+  // Of a disc beyond a chord at a quarter of its diameter from its edge.
+  EXPECT_NEAR(share(-0.25 * width), 1.0 / 3.0 - std::sqrt(3.0) / (4.0 * kPi), 0.03);
+}
+
+Grid voxel_sphere(int radius, VoxelType type) {
+  Grid grid;
+  for (int z = -radius; z <= radius; ++z) {
+    for (int y = -radius; y <= radius; ++y) {
+      for (int x = -radius; x <= radius; ++x) {
+        if (x * x + y * y + z * z <= radius * radius) grid.set({x, y, z}, type);
+      }
+    }
+  }
+  return grid;
+}
+
+// White furnace: what reflects all light cannot be seen, of whatever gloss.
+TEST(PathTracer, AWhiteBallInAWhiteSkyCannotBeSeen) {
+  for (const auto& [rough, metal] : {std::pair{1.0F, 0.0F}, {0.4F, 0.0F}, {0.4F, 1.0F}, {0.0F, 1.0F}}) {
+    Scene scene;
+    VoxelProperties properties = of_colour(kWhite);
+    properties.roughness = rough;
+    properties.metalness = metal;
+    place(scene, voxel_sphere(6, scene.types.add(properties).value_or(kAir)));
+    PathOptions options = uniform(32, 32, 256);
+    options.max_bounces = 1024;
+    const PathPicture picture = taken(scene, towards({0.5, 8.0, 25.0}, DVec3(0.5), 0.6), options);
+    EXPECT_NEAR(mean(picture).x, 1.0F, 0.01F) << rough << " " << metal;
+    for (const Vec3& light : picture.radiance) EXPECT_NEAR(light.x, 1.0F, 0.15F);
+  }
+}
+
+// Clear glass takes no light away, refracts and mirrors as it may.
+TEST(PathTracer, ClearGlassInAWhiteSkyCannotBeSeen) {
+  Scene scene;
+  VoxelProperties properties = of_colour({255, 255, 255, 0});
+  properties.visibility = Visibility::Transparent;
+  properties.ior = 1.5F;
+  place(scene, voxel_sphere(6, scene.types.add(properties).value_or(kAir)));
+  PathOptions options = uniform(32, 32, 64);
+  const PathPicture picture = taken(scene, towards({0.5, 8.0, 25.0}, DVec3(0.5), 0.6), options);
+  EXPECT_NEAR(mean(picture).x, 1.0F, 0.003F);
+}
+
+TEST(PathTracer, GlassShowsWhatLiesBehindItWhereItIsBent) {
+  // A thick pane before a wall that is black on one half: looked at aslant, the edge is seen elsewhere.
+  const auto picture_of = [](float ior) {
+    Scene scene;
+    const VoxelType black = add_type(scene, {0, 0, 0, 255});
+    const VoxelType white = add_type(scene, kWhite, Visibility::Opaque, 1.0F);
+    VoxelProperties properties = of_colour({255, 255, 255, 0});
+    properties.visibility = Visibility::Transparent;
+    properties.ior = ior;
+    const VoxelType glass = scene.types.add(properties).value_or(kAir);
+    Grid grid;
+    grid.fill_box({{-40, -40, -1}, {0, 40, 0}}, black);
+    grid.fill_box({{0, -40, -1}, {40, 40, 0}}, white);
+    grid.fill_box({{-40, -40, 2}, {40, 40, 12}}, glass);
+    place(scene, std::move(grid));
+    PathOptions options = uniform(200, 1, 64);
+    options.sky_colour = Vec3(0.0F);
+    const DVec3 forward = glm::normalize(DVec3(1, 0, -1));
+    return taken(scene, looking(DVec3(0, 0, 0) - forward * 40.0, forward, {0, 1, 0}, 20.0 / 200.0), options);
+  };
+  const auto edge_of = [](const PathPicture& picture) {
+    float sum = 0.0F;
+    for (const Vec3& light : picture.radiance) sum += std::min(light.x / 0.9F, 1.0F);
+    return 200.0F - sum;  // white lies to the right
+  };
+  const PathPicture plain = picture_of(1.0F);
+  const PathPicture bent = picture_of(1.5F);
+  // By how much a ray at 45 degrees is moved aside by 10 of glass of 1.5, seen across: in pixels of 0.1.
+  const double inside = std::asin(std::sin(kPi / 4.0) / 1.5);
+  const double moved = 10.0 * std::sin(kPi / 4.0 - inside) / std::cos(inside) / 0.1;
+  EXPECT_NEAR(std::abs(edge_of(bent) - edge_of(plain)), moved, 6.0);
+}
+
+TEST(PathTracer, AClosedRoomWithoutLampsIsBlack) {
+  const Scene scene = room(6, of_colour(kWhite), of_colour(kWhite));
+  PathOptions options = uniform(16, 16, 16);
+  options.sun_brightness = 1.0;
+  options.max_bounces = 16;
+  for (const Vec3& light : taken(scene, towards({3.0, 3.0, 3.0}, {3.0, 2.0, 0.0}), options).radiance) {
+    EXPECT_EQ(light.x, 0.0F);
+  }
+}
+
+TEST(PathTracer, ALampOfABillionIsANumberAndNoPixelIsBrighterThanIt) {
+  const Scene scene = room(6, of_colour(kGrey), of_colour(kWhite, 1e9F));
+  const PathPicture picture = taken(scene, towards({3.0, 3.0, 3.0}, {3.0, 5.0, 0.0}), uniform(16, 16, 32));
+  for (const Vec3& light : picture.radiance) {
+    EXPECT_TRUE(std::isfinite(light.x));
+    EXPECT_GE(light.x, 0.0F);
+    EXPECT_LE(light.x, 1e9F * 4.0F);
+  }
+  EXPECT_TRUE(develop(picture).has_value());
+}
+
+// Paths that find lamps by chance and those that aim at them agree: here a lamp without gloss beside mirrors.
+TEST(PathTracer, AimedAndFoundLightAgreeOnGloss) {
+  for (const float rough : {0.15F, 0.35F, 0.6F}) {
+    VoxelProperties walls = of_colour(kGrey);
+    walls.roughness = rough;
+    walls.metalness = 0.5F;
+    // Everything emits but the floor: closed, so that any path ends in light of 1.
+    Scene scene = room(8, walls, of_colour(kWhite, 1.0F));
+    PathOptions options = uniform(16, 16, 256);
+    options.max_bounces = 1;
+    const float by_both = mean(taken(scene, towards({4.0, 4.0, 4.0}, {4.5, 0.0, 4.2}), options)).x;
+    // The same as an environment: the ceiling taken away, and a sky of 1 in its place, is found by chance alone.
+    Scene open = room(8, walls, of_colour(kWhite));
+    open.edit(open.grids().handles().front()).grid.fill_box({{-1, 8, -1}, {9, 9, 9}}, kAir);
+    const float by_chance = mean(taken(open, towards({4.0, 4.0, 4.0}, {4.5, 0.0, 4.2}), options)).x;
+    EXPECT_NEAR(by_both / by_chance, 1.0F, 0.03F) << rough;
+  }
+}
+
+Scene town() {
+  Scene scene;
+  const VoxelType ground = add_type(scene, {120, 150, 90, 255});
+  VoxelProperties metal = of_colour({220, 180, 90, 255});
+  metal.roughness = 0.3F;
+  metal.metalness = 1.0F;
+  const VoxelType gold = scene.types.add(metal).value_or(kAir);
+  const VoxelType lamp = add_type(scene, {255, 180, 90, 255}, Visibility::Opaque, 6.0F);
+  const VoxelType glass = add_type(scene, {120, 190, 255, 60}, Visibility::Transparent);
+  Grid grid;
+  grid.fill_box({{-30, -2, -30}, {30, 0, 30}}, ground);
+  grid.fill_box({{-8, 0, -8}, {-2, 12, -2}}, gold);
+  grid.fill_box({{4, 0, -10}, {10, 8, 2}}, glass);
+  grid.fill_box({{-12, 3, 6}, {-10, 5, 8}}, lamp);
+  place(scene, std::move(grid));
+  Grid ship;
+  ship.fill_box({{0, 0, 0}, {6, 3, 4}}, gold);
+  ship.set({3, 3, 2}, lamp);
+  const InstanceHandle handle = place(scene, std::move(ship), {2.0, 14.0, 3.0});
+  Instance& turned = scene.edit(handle);
+  turned.rotation = glm::angleAxis(0.7, glm::normalize(DVec3(1, 2, 3)));
+  Lamp spot;
+  spot.kind = Lamp::Kind::Spot;
+  spot.position = {12.0, 20.0, 12.0};
+  spot.direction = {-1.0, -1.5, -1.0};
+  spot.intensity = 200.0;
+  scene.lamps.push_back(spot);
+  return scene;
+}
+
+Camera of_town() {
+  return towards({18.0, 22.0, 40.0}, {0.0, 4.0, 0.0}, 0.8);
+}
+
+PathOptions quick() {
+  PathOptions options;
+  options.width = 70;
+  options.height = 45;
+  options.samples = 6;
+  options.layers = true;
+  return options;
+}
+
+TEST(PathTracer, TheSameBitsForAnyThreadsAndInstructionSets) {
+  const Scene scene = town();
+  const PathPicture expected = taken(scene, of_town(), quick(), {1});
+  for (const InstructionSet set : sets_of_this_machine()) {
+    const InstructionSetOverride over(set);
+    const PathPicture picture = taken(scene, of_town(), quick(), {3});
+    EXPECT_EQ(picture.radiance, expected.radiance) << name_in_tests(set);
+    EXPECT_EQ(picture.alpha, expected.alpha);
+    EXPECT_EQ(picture.normal, expected.normal);
+    EXPECT_EQ(picture.depth.values, expected.depth.values);
+    EXPECT_EQ(picture.rays, expected.rays);
+  }
+}
+
+TEST(PathTracer, APictureFarFromTheOriginIsTheSame) {
+  const Scene near = town();
+  Scene far = town();
+  const DVec3 there{3e6, -1e6, 7e6};
+  for (const InstanceHandle handle : far.instances().handles()) {
+    Instance& moved = far.edit(handle);
+    moved.position += there;
+  }
+  for (Lamp& lamp : far.lamps) lamp.position += there;
+  Camera camera = of_town();
+  const Vec3 expected = mean(taken(near, camera, quick()));
+  camera.position += there;
+  const Vec3 light = mean(taken(far, camera, quick()));
+  EXPECT_NEAR(light.x / expected.x, 1.0F, 0.02F);
+}
+
+TEST(PathTracer, FollowsEditsOfVoxelsTypesAndInstances) {
+  Scene scene = town();
+  PathTracer tracer(scene);
+  ASSERT_TRUE(tracer.render(of_town(), quick()).has_value());
+  scene.edit(scene.grids().handles().front()).grid.fill_box({{14, 2, 8}, {16, 4, 10}}, VoxelType{3});
+  VoxelProperties red = scene.types[1];
+  red.colour = {220, 30, 30, 255};
+  scene.types.replace(1, red);
+  const InstanceHandle ship = scene.instances().handles().back();
+  Instance& moved = scene.edit(ship);
+  moved.position.y += 3.0;
+  tracer.update();
+  const auto followed = tracer.render(of_town(), quick());
+  ASSERT_TRUE(followed.has_value());
+  EXPECT_EQ(followed->radiance, taken(scene, of_town(), quick()).radiance);
+}
+
+TEST(PathTracer, LayersSayWhatPixelsShow) {
+  const Scene scene = cube_of(kGrey);
+  PathOptions options = uniform(16, 16, 4);
+  options.layers = true;
+  const PathPicture picture = taken(scene, from_above(4.0, 20.0, 4.0, 16.0), options);
+  const std::size_t middle = 8 * 16 + 8;
+  EXPECT_NEAR(picture.albedo[middle].x, linear_from_srgb(std::uint8_t{188}), 1e-6F);
+  EXPECT_NEAR(picture.normal[middle].y, 1.0F, 1e-6F);
+  EXPECT_NEAR(picture.depth.values[middle], 12.0F, 1e-4F);
+  EXPECT_EQ(picture.types[middle], 1);
+  EXPECT_EQ(picture.instances[middle], 1U);
+  EXPECT_EQ(picture.alpha[middle], 1.0F);
+  EXPECT_EQ(picture.alpha[0], 0.0F);
+  EXPECT_EQ(picture.types[0], kAir);
+  EXPECT_EQ(picture.depth.values[0], std::numeric_limits<float>::infinity());
+  EXPECT_EQ(picture.scene[0], Vec3(0.0F));
+  EXPECT_EQ(picture.radiance[0], Vec3(1.0F));
+}
+
+TEST(PathTracer, GroundCatchesShadowsAndIsNotSeenItself) {
+  const Scene scene = cube_of(kGrey);
+  PathOptions options = uniform(64, 64, 64);
+  options.sun_brightness = 1.0;
+  options.sun = {1.0, 1.0, 0.0};
+  options.ground.emplace();
+  options.ground->only_shadows = true;
+  const PathPicture picture = taken(scene, from_above(4.0, 30.0, 4.0, 64.0), options);
+  const auto at = [](int x, int y) { return static_cast<std::size_t>(y * 64 + x); };
+  // Far away it shows the background, and is not there.
+  EXPECT_NEAR(picture.radiance[at(60, 4)].x, 1.0F, 0.03F);
+  EXPECT_NEAR(picture.alpha[at(60, 4)], 0.0F, 0.03F);
+  // To the left of the cube lies its shadow: the pixel's right is +x.
+  EXPECT_LT(picture.radiance[at(25, 32)].x, 0.7F);
+  EXPECT_GT(picture.alpha[at(25, 32)], 0.3F);
+  EXPECT_EQ(picture.alpha[at(32, 32)], 1.0F);
+}
+
+TEST(PathTracer, WhatIsInFocusStaysSharp) {
+  Scene scene;
+  const VoxelType black = add_type(scene, {0, 0, 0, 255});
+  const VoxelType white = add_type(scene, kWhite, Visibility::Opaque, 1.0F);
+  Grid grid;
+  grid.fill_box({{-40, -40, 0}, {0, 40, 1}}, black);
+  grid.fill_box({{0, -40, 0}, {40, 40, 1}}, white);
+  place(scene, std::move(grid));
+  PathOptions options = uniform(64, 4, 64);
+  options.lens_radius = 1.0;
+  const auto grey_pixels = [&](double focus) {
+    options.focus_distance = focus;
+    int grey = 0;
+    for (const Vec3& light : taken(scene, towards({0.013, 0.0, 21.0}, {0.013, 0.0, 0.0}, 0.02), options).scene) {
+      grey += light.x > 0.05F && light.x < 0.95F;
+    }
+    return grey;
+  };
+  EXPECT_LE(grey_pixels(20.0), 8);
+  EXPECT_GT(grey_pixels(10.0), 60);
+}
+
+TEST(PathTracer, AnEnvironmentOfOnePixelIsAUniformSky) {
+  const Scene scene = cube_of(kGrey);
+  PathOptions options = uniform(8, 8, 256);
+  options.sky = SkyModel::Environment;
+  options.environment = std::make_shared<const RadianceImage>(RadianceImage{1, 1, {0.5F, 0.5F, 0.5F}});
+  const float light = mean(taken(scene, from_above(4.0, 20.0, 4.0, 6.0), options)).x;
+  EXPECT_NEAR(light, 0.5F * linear_from_srgb(std::uint8_t{188}), 0.01F);
+}
+
+TEST(PathTracer, RefusesWhatCannotBe) {
+  const Scene scene = cube_of(kGrey);
+  const PathTracer tracer(scene);
+  const Camera camera = from_above(4.0, 20.0, 4.0, 6.0);
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const auto refused = [&](auto change) {
+    PathOptions options = uniform(4, 4, 1);
+    change(options);
+    const auto picture = tracer.render(camera, options);
+    return !picture && picture.error().code == ErrorCode::InvalidArgument;
+  };
+  EXPECT_FALSE(refused([](PathOptions&) {}));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.width = 0; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.samples = 0; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.max_bounces = -1; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.sun = DVec3(0.0); }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.sun.x = kNan; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.sun_angle_radians = -0.1; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.sun_brightness = kNan; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.sky_brightness = -1.0; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.lamp_brightness = 1e10; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.sky_colour.y = -1.0F; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.air.mie = kNan; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.lens_radius = kNan; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.focus_distance = 0.0; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.sky = SkyModel::Environment; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.ground.emplace().height = kNan; }));
+  EXPECT_TRUE(refused([](PathOptions& o) { o.ground.emplace().colour = Vec3(2.0F); }));
+  Camera wrong = camera;
+  wrong.position.x = kNan;
+  EXPECT_FALSE(tracer.render(wrong, uniform(4, 4, 1)).has_value());
+}
+
+TEST(PathTracer, StopsHalfway) {
+  const Scene scene = town();
+  int calls = 0;
+  const auto picture = PathTracer(scene).render(of_town(), quick(), {2}, [&](double) { return ++calls < 3; });
+  ASSERT_FALSE(picture.has_value());
+  EXPECT_EQ(picture.error().code, ErrorCode::Cancelled);
+  EXPECT_LE(calls, 4);
+}
+
+TEST(PathTracer, AnEmptySceneIsSky) {
+  const Scene scene;
+  PathOptions options = uniform(8, 8, 2);
+  options.ground.emplace();
+  const PathPicture picture = taken(scene, towards({0.0, 5.0, 10.0}, {0.0, 5.0, 0.0}), options);
+  EXPECT_EQ(picture.radiance.front(), Vec3(1.0F));
+  EXPECT_NEAR(picture.radiance.back().x, 0.5F, 1e-6F);
+}
+
+TEST(PathDevelop, KeepsOrderAndEnds) {
+  PathPicture picture;
+  picture.width = 64;
+  picture.height = 1;
+  for (int i = 0; i < 64; ++i) picture.radiance.emplace_back(std::pow(1.3F, static_cast<float>(i - 40)));
+  picture.scene = picture.radiance;
+  picture.alpha.assign(64, 1.0F);
+  for (const ToneCurve tone : {ToneCurve::Clamp, ToneCurve::Neutral, ToneCurve::Agx, ToneCurve::Aces}) {
+    const auto image = develop(picture, {1.0, tone});
+    ASSERT_TRUE(image.has_value());
+    for (std::size_t i = 3; i < image->rgb.size(); ++i) EXPECT_GE(int{image->rgb[i]} + 1, image->rgb[i - 3]);
+    EXPECT_LE(image->rgb.front(), 10);
+    EXPECT_GE(image->rgb.back(), 250);
+  }
+  EXPECT_FALSE(develop(picture, {std::numeric_limits<double>::quiet_NaN()}).has_value());
+  EXPECT_FALSE(develop(picture, {-1.0}).has_value());
+}
+
+// The published values: grey of 0.18 and white.
+TEST(PathDevelop, CurvesHaveTheirPublishedValues) {
+  PathPicture picture;
+  picture.width = 2;
+  picture.height = 1;
+  picture.radiance = {Vec3(0.18F), Vec3(1.0F)};
+  picture.scene = picture.radiance;
+  picture.alpha = {1.0F, 1.0F};
+  const auto neutral = develop(picture, {1.0, ToneCurve::Neutral});
+  const SrgbEncoder& encode = SrgbEncoder::shared();
+  EXPECT_EQ(neutral->rgb[0], encode(0.14F));  // less the 0.04 of Fresnel
+  EXPECT_NEAR(neutral->rgb[3], encode(0.88F), 2);
+  const auto clamp = develop(picture, {1.0, ToneCurve::Clamp});
+  EXPECT_EQ(clamp->rgb[0], encode(0.18F));
+  EXPECT_EQ(clamp->rgb[3], 255);
+}
+
+TEST(PathDevelop, FindsTheExposureThatShowsThePicture) {
+  PathPicture picture;
+  picture.width = 10;
+  picture.height = 10;
+  picture.radiance.assign(100, Vec3(0.002F));
+  picture.scene = picture.radiance;
+  picture.alpha.assign(100, 1.0F);
+  EXPECT_NEAR(find_exposure(picture), 90.0, 0.1);
+  picture.radiance.assign(100, Vec3(0.0F));
+  picture.scene = picture.radiance;
+  EXPECT_EQ(find_exposure(picture), 1.0);
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,103 @@
+#include "render/path/sky_light.h"
+
+#include <cmath>
+#include <limits>
+
+#include <glm/geometric.hpp>
+
+#include "light/light_model.h"
+#include "render/path/atmosphere.h"
+
+namespace quoin::path {
+namespace {
+
+// About the vertical: what is in front of -z goes towards +x.
+Vec3 turned(Vec3 v, SineCosine by) {
+  return {v.x * by.cosine - v.z * by.sine, v.y, v.x * by.sine + v.z * by.cosine};
+}
+
+Vec3 turned_back(Vec3 v, SineCosine by) {
+  return turned(v, {-by.sine, by.cosine});
+}
+
+}  // namespace
+
+SkyLight::SkyLight(const PathOptions& options)
+    : model_(options.sky), brightness_(static_cast<float>(options.sky_brightness)), uniform_(options.sky_colour) {
+  LightOptions light;
+  light.sun = options.sun;
+  const DVec3 sun = quoin::to_sun(light);
+  to_sun_ = glm::normalize(Vec3(sun));
+  const float sine = of_turns(static_cast<float>(options.sun_angle_radians / 4.0 / std::numbers::pi / 2.0)).sine;
+  one_less_cos_ = 2.0F * sine * sine;
+  const float irradiance = kPi * static_cast<float>(options.sun_brightness);
+  switch (model_) {
+    case SkyModel::Uniform:
+      sunlight_ = Vec3(irradiance);
+      break;
+    case SkyModel::Gradient: {
+      light.sky_follows_sun = true;
+      light.sun_brightness = options.sun_brightness;
+      const Daylight day = daylight_of(light);
+      gradient_ = day.sky;
+      sunlight_ = day.sun * (kPi * static_cast<float>(day.sun_brightness));
+      break;
+    }
+    case SkyModel::Physical: {
+      AtmosphericSky made = atmospheric_sky(sun, kPi, options.air);
+      sunlight_ = made.sunlight * static_cast<float>(options.sun_brightness);
+      image_.emplace(std::move(made.radiance));
+      break;
+    }
+    case SkyModel::Environment: {
+      sunlight_ = Vec3(irradiance);
+      image_.emplace(*options.environment);
+      is_uneven_ = true;
+      double turns = options.environment_turn_radians / (2.0 * std::numbers::pi);
+      turns -= std::floor(turns);
+      turn_ = of_turns(static_cast<float>(turns));
+      break;
+    }
+  }
+}
+
+Vec3 SkyLight::sky(Vec3 direction) const {
+  if (model_ == SkyModel::Uniform) return uniform_ * brightness_;
+  if (model_ == SkyModel::Gradient) return sky_colour(direction.y, gradient_) * brightness_;
+  return image_->at(is_uneven_ ? turned_back(direction, turn_) : direction) * brightness_;
+}
+
+Vec3 SkyLight::sun(Vec3 direction) const {
+  const float density = sun_density(direction);
+  return density > 0.0F ? sunlight_ * density : Vec3(0.0F);
+}
+
+float SkyLight::sun_density(Vec3 direction) const {
+  if (!(one_less_cos_ > 0.0F) || !has_sun()) return 0.0F;
+  // 1 - cos as a square: a small angle's cosine is 1 to a float.
+  const Vec3 apart = direction - to_sun_;
+  return 0.5F * glm::dot(apart, apart) <= one_less_cos_ ? 1.0F / (2.0F * kPi * one_less_cos_) : 0.0F;
+}
+
+SkySample SkyLight::sample_sun(Pair u) const {
+  if (!(one_less_cos_ > 0.0F)) return {to_sun_, sunlight_, std::numeric_limits<float>::infinity()};
+  const float down = u.x * one_less_cos_;
+  const float across = std::sqrt(down * (2.0F - down));
+  const SineCosine turn = of_turns(u.y);
+  const Vec3 direction = Frame(to_sun_).to_world({across * turn.cosine, across * turn.sine, 1.0F - down});
+  const float density = 1.0F / (2.0F * kPi * one_less_cos_);
+  return {glm::normalize(direction), sunlight_ * density, density};
+}
+
+SkySample SkyLight::sample_sky(Pair u) const {
+  SkySample sample = image_->sample(u);
+  sample.direction = turned(sample.direction, turn_);
+  sample.radiance *= brightness_;
+  return sample;
+}
+
+float SkyLight::sky_density(Vec3 direction) const {
+  return image_->density(turned_back(direction, turn_));
+}
+
+}  // namespace quoin::path

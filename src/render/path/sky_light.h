@@ -1,0 +1,51 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include <quoin/core/vec.h>
+#include <quoin/render/path_tracer.h>
+
+#include "light/daylight.h"
+#include "render/path/environment_light.h"
+
+namespace quoin::path {
+
+/// The sun and the sky of a picture.
+class SkyLight {
+ public:
+  /// Requires: `check` accepts the options.
+  explicit SkyLight(const PathOptions& options);
+
+  /// What a ray meets that leaves the scene: without the sun, and the sun alone. `direction`: unit, in the world.
+  [[nodiscard]] Vec3 sky(Vec3 direction) const;
+  [[nodiscard]] Vec3 sun(Vec3 direction) const;
+
+  /// Whether there is a sun to sample.
+  [[nodiscard]] bool has_sun() const { return largest(sunlight_) > 0.0F; }
+  [[nodiscard]] SkySample sample_sun(Pair u) const;
+  /// What a surface gets of it that faces it.
+  [[nodiscard]] Vec3 sun_irradiance() const { return sunlight_; }
+  /// With which `sample_sun` finds a direction.
+  [[nodiscard]] float sun_density(Vec3 direction) const;
+
+  /// Whether the sky is so uneven that it is sampled by itself.
+  [[nodiscard]] bool has_uneven_sky() const { return is_uneven_; }
+  /// Requires: has_uneven_sky().
+  [[nodiscard]] SkySample sample_sky(Pair u) const;
+  [[nodiscard]] float sky_density(Vec3 direction) const;
+
+ private:
+  SkyModel model_;
+  Vec3 to_sun_{0.0F, 1.0F, 0.0F};
+  Vec3 sunlight_{0.0F};        // irradiance of what faces the sun
+  float one_less_cos_ = 0.0F;  // of half the angle of its disc; 0: it has none
+  float brightness_ = 1.0F;
+  Vec3 uniform_{1.0F};
+  SkyColours gradient_;
+  std::optional<EnvironmentLight> image_;
+  bool is_uneven_ = false;
+  SineCosine turn_;  // of an environment about the vertical
+};
+
+}  // namespace quoin::path
