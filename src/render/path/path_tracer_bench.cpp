@@ -1,0 +1,68 @@
+// path/terrain/640x360: the 256x128x256 terrain by day, four samples and four bounces, one thread; rays a second.
+// path/lamps: the same by night, with a thousand lamps.
+
+#include <benchmark/benchmark.h>
+
+#include <quoin/render/path_tracer.h>
+
+#include "bench/picture_workload.h"
+
+namespace quoin {
+namespace {
+
+using workloads::fail_unless;
+
+void time_paths(benchmark::State& state, const Scene& scene, PathOptions options) {
+  const PathTracer tracer(scene, InstanceFilter::Visible, {1});
+  options.width = 640;
+  options.height = 360;
+  options.samples = 4;
+  options.max_bounces = 4;
+  const Camera camera = frame_view(scene.bounds(), View::Iso, 16.0 / 9.0);
+  std::int64_t rays = 0;
+  for (auto _ : state) {
+    const auto picture = tracer.render(camera, options, {1});
+    fail_unless(picture.has_value() && picture->rays > 0, "a picture", 0);
+    rays += picture->rays;
+  }
+  state.counters["rays"] = benchmark::Counter(static_cast<double>(rays), benchmark::Counter::kIsRate);
+}
+
+void terrain(benchmark::State& state) {
+  static const Scene scene = workloads::picture_scene();
+  fail_unless(scene.voxel_count() == workloads::kPictureVoxels, "the number of voxels", scene.voxel_count());
+  time_paths(state, scene, {});
+}
+
+void lamps(benchmark::State& state) {
+  static const Scene scene = [] {
+    Scene made = workloads::picture_scene();
+    VoxelProperties glow;
+    glow.colour = {255, 190, 110, 255};
+    glow.emission = 20.0F;
+    const VoxelType lamp = made.types.add(glow).value_or(kAir);
+    Grid& grid = made.edit(made.grids().handles().front()).grid;
+    std::uint32_t seed = 1;
+    for (int placed = 0; placed < 1000;) {
+      seed = mix_bits(seed + 0x9E37'79B9U);
+      const int x = static_cast<int>(seed & 255U);
+      const int z = static_cast<int>(seed >> 8 & 255U);
+      int y = 127;
+      while (y > 0 && grid.get({x, y - 1, z}) == kAir) --y;
+      if (y > 120) continue;
+      grid.set({x, y, z}, lamp);
+      ++placed;
+    }
+    return made;
+  }();
+  PathOptions options;
+  options.sun_brightness = 0.0;
+  options.sky_brightness = 0.01;
+  time_paths(state, scene, options);
+}
+
+BENCHMARK(terrain)->Name("path/terrain/640x360")->Unit(benchmark::kMillisecond)->Iterations(3);
+BENCHMARK(lamps)->Name("path/lamps/640x360")->Unit(benchmark::kMillisecond)->Iterations(3);
+
+}  // namespace
+}  // namespace quoin
