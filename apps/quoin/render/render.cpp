@@ -14,6 +14,7 @@
 #include "output.h"
 #include "output_files.h"
 #include "progress_bar.h"
+#include "render/path_pictures.h"
 #include "render/render_arguments.h"
 #include "scene_warnings.h"
 #include "standard_streams.h"
@@ -36,7 +37,8 @@ struct Outcome {
   double read = 0, build = 0, trace = 0, write = 0;
   std::string device;  ///< that drew; empty: the processor
   std::vector<std::string> warnings;
-  std::int64_t rays = 0;  ///< of all pictures
+  std::int64_t rays = 0;           ///< of all pictures
+  std::optional<double> exposure;  ///< of pictures by paths: that of the first
 };
 
 /// A picture to take.
@@ -106,12 +108,15 @@ void warn_of_empty_pictures(const Scene& scene, InstanceFilter filter, const Pic
   }
 }
 
-Status write_outputs(const RenderArguments& arguments, const std::filesystem::path& output, Outcome& outcome) {
+// `paths`: took the picture; null: another renderer.
+Status write_outputs(const RenderArguments& arguments, const std::filesystem::path& output, const PathPictures* paths,
+                     Outcome& outcome) {
   if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", output.string());
-  const auto png = write_png(outcome.picture.colour, output);
-  if (!png) return png.error();
+  const bool is_plain = paths == nullptr || (output.extension() == ".png" && !arguments.path.is_transparent);
+  const auto written = is_plain ? write_png(outcome.picture.colour, output) : paths->write(output);
+  if (!written) return written.error();
   outcome.files.push_back(output);
-  outcome.bytes += *png;
+  outcome.bytes += *written;
   if (arguments.depth.empty()) return {};
   if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", arguments.depth.string());
   const auto pfm = write_pfm(outcome.picture.depth, arguments.depth);
@@ -119,6 +124,16 @@ Status write_outputs(const RenderArguments& arguments, const std::filesystem::pa
   outcome.files.push_back(arguments.depth);
   outcome.bytes += *pfm;
   return {};
+}
+
+// Times what types emit.
+void scale_emission(Scene& scene, double scale) {
+  for (std::size_t type = 1; scale != 1.0 && type < scene.types.size(); ++type) {
+    VoxelProperties properties = scene.types[static_cast<VoxelType>(type)];
+    if (!(properties.emission > 0.0F)) continue;
+    properties.emission *= static_cast<float>(scale);
+    scene.types.replace(static_cast<VoxelType>(type), std::move(properties));
+  }
 }
 
 Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume, int frame) {
@@ -130,10 +145,20 @@ Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume, int f
   if (loaded && arguments.volume.iso && !is_volume) {
     return make_error(ErrorCode::InvalidArgument, "--iso is for volumes, and the input holds voxels");
   }
+  if (loaded) scale_emission(loaded->scene, arguments.emission_scale);
   return loaded;
 }
 
 // Takes the pictures and writes them, with the times into the outcome.
+// Whether a renderer is that by paths.
+const PathPictures* paths_of(const PathPictures& renderer) {
+  return &renderer;
+}
+template <class Renderer>
+const PathPictures* paths_of(const Renderer&) {
+  return nullptr;
+}
+
 template <class Renderer>
 Status take_pictures(Renderer& renderer, const RenderArguments& arguments, const RenderOptions& options,
                      const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
@@ -151,7 +176,7 @@ Status take_pictures(Renderer& renderer, const RenderArguments& arguments, const
     outcome.picture = std::move(*picture);
     outcome.rays += outcome.picture.rays;
     outcome.trace += watch.lap();
-    if (auto written = write_outputs(arguments, shots[i].output, outcome); !written) return written;
+    if (auto written = write_outputs(arguments, shots[i].output, paths_of(renderer), outcome); !written) return written;
     outcome.write += watch.lap();
   }
   return {};
@@ -161,6 +186,18 @@ Status draw_by_cpu(const Scene& scene, const RenderArguments& arguments, const R
                    const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
   const CpuRenderer renderer(scene, arguments.common.instances(), arguments.common.threads);
   return take_pictures(renderer, arguments, options, shots, watch, outcome);
+}
+
+Status draw_by_paths(const Scene& scene, const RenderArguments& arguments, const RenderOptions& options,
+                     const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
+  auto wanted = path_options(arguments.path, options, scene, arguments.common.instances());
+  if (!wanted) return wanted.error();
+  PathPictures pictures(scene, arguments.common.instances(), arguments.common.threads, std::move(*wanted),
+                        arguments.path);
+  pictures.set_exposure(outcome.exposure);
+  Status taken = take_pictures(pictures, arguments, options, shots, watch, outcome);
+  outcome.exposure = pictures.exposure();
+  return taken;
 }
 
 Status draw_by_vulkan(const Scene& scene, const RenderArguments& arguments, const RenderOptions& options,
@@ -181,6 +218,7 @@ Status draw_shots(const LoadedScene& loaded, const RenderArguments& arguments, c
   RenderOptions options = arguments.render;
   if (loaded.sun && !arguments.has_sun) options.light.sun = *loaded.sun;
   const bool is_vulkan = arguments.backend == "vulkan";
+  if (arguments.light_model == "path") return draw_by_paths(loaded.scene, arguments, options, shots, watch, outcome);
   return (is_vulkan ? draw_by_vulkan : draw_by_cpu)(loaded.scene, arguments, options, shots, watch, outcome);
 }
 
@@ -236,7 +274,7 @@ Status draw_slice(const Scene& scene, const RenderArguments& arguments, Stopwatc
   outcome.picture.colour = std::move(slice->colour);
   outcome.picture.pixels_hit = slice->pixels_solid;
   outcome.trace = watch.lap();
-  auto written = write_outputs(arguments, arguments.output, outcome);
+  auto written = write_outputs(arguments, arguments.output, nullptr, outcome);
   outcome.write = watch.lap();
   return written;
 }
@@ -305,6 +343,7 @@ Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
                 {{"read", outcome.read}, {"build", outcome.build}, {"trace", outcome.trace}, {"write", outcome.write}}},
                {"warnings", outcome.warnings}};
   if (!outcome.device.empty()) json["device"] = outcome.device;
+  if (outcome.exposure) json["exposure"] = *outcome.exposure;
   if (outcome.slice) json["slice"] = {{"axis", std::string(1, "xyz"[arguments.slice.axis])}, {"at", *outcome.slice}};
   return json;
 }
@@ -375,6 +414,7 @@ void add_render_command(CLI::App& app, int& status) {
                   "Example: quoin render castle.vox -o gate.png --camera 30,60,160 --look-at 0,30,0 --fov 40\n"
                   "Example: quoin render castle.vox -o round.png --turntable 36 --elevation 20\n"
                   "Example: quoin render walk.vox -o walk.png --frames 0:24 --view left\n"
+                  "Example: quoin render castle.vox -o night.png --light path --sun off --tone aces --exposure auto\n"
                   "Example: quoin render scan.nii.gz -o hollows.png --preset ao --ao smooth --ao-form weighted\n"
                   "Example: quoin render scan.nii.gz -o cut.png --preset density --slice z:0.5\n"
                   "Example: quoin render scan.raw -o scan.png --raw-size 256x256x128 --raw-type uint16 --iso 1200");

@@ -11,6 +11,7 @@
 
 #include "field_occlusion.h"
 #include "parse.h"
+#include "render/text_options.h"
 #include "standard_streams.h"
 #include "volume_options.h"
 
@@ -21,24 +22,6 @@ namespace {
 constexpr int kMaxSamples = 4'096;
 constexpr std::int64_t kMaxPixels = std::int64_t{1} << 28;
 constexpr int kLongestSide = 1'000'000;  // what readers and writers of PNG take
-
-/// An option whose text `settle` reads.
-CLI::Option* add_text_option(CLI::App& command, const std::string& name, const std::string& type,
-                             const std::string& description) {
-  return command.add_option(name, description)->type_name(type);
-}
-
-/// Reads the text of such an option, if it was given, into `value`; returns what is wrong with it, or "".
-template <class Read, class Value>
-std::string read_option(const CLI::App& command, const std::string& name, Read read, const std::string& must_be,
-                        Value& value) {
-  if (command.count(name) == 0) return "";
-  const std::string text = command.get_option(name)->results().back();
-  const auto found = read(text);
-  if (!found) return name + ": must be " + must_be + ", not \"" + text + "\"";
-  value = *found;
-  return "";
-}
 
 std::optional<DVec3> read_direction(const std::string& text) {
   const auto direction = parse_triple(text);
@@ -51,11 +34,6 @@ std::optional<DVec3> read_direction(const std::string& text) {
 std::optional<double> read_angle(const std::string& text) {
   const auto degrees = parse_number(text);
   return degrees && *degrees > 0.0 && *degrees < 180.0 ? degrees : std::nullopt;
-}
-
-std::optional<double> read_not_negative(const std::string& text) {
-  const auto number = parse_number(text);
-  return number && *number >= 0.0 ? number : std::nullopt;
 }
 
 std::optional<PictureSize> read_size(const std::string& text) {
@@ -89,9 +67,10 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
   command
       .add_option(
           "--light", arguments.light_model,
-          "Light by rays; or propagated: levels that spread from the sky and from glowing voxels, as games have "
+          "Light by rays; path: paths of light with all its bounces, soft shadows, gloss and glass that refracts, "
+          "which takes minutes; or propagated: levels that spread from the sky and from glowing voxels, as games have "
           "them, without shadows of the sun (default rays)")
-      ->check(CLI::IsMember({"rays", "propagated"}));
+      ->check(CLI::IsMember({"rays", "path", "propagated"}));
   add_text_option(command, "--least-light", "X",
                   "Of --light propagated: what shines everywhere; with 0 closed rooms are black (default 0)");
   add_text_option(
@@ -128,7 +107,10 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
       ->check(CLI::IsMember({"ambient", "all"}));
   add_text_option(command, "--ao-distance", "VOXELS", "How far the rays of --ao rays reach (default 6)");
   add_text_option(command, "--shadow-distance", "VOXELS", "How far shadows reach (default: any distance)");
-  add_text_option(command, "--exposure", "X", "Times this much light (default 1)");
+  add_text_option(command, "--exposure", "X|auto",
+                  "Times this much light (default 1); auto, of --light path: as the first picture needs it");
+  add_text_option(command, "--emission-scale", "X", "Times this much of what voxels emit (default 1)");
+  add_path_options(command, arguments.path);
 }
 
 void add_detail_options(CLI::App& command, RenderArguments& arguments) {
@@ -170,7 +152,11 @@ bool has_ending(const std::filesystem::path& path, const std::string& ending) {
 std::string fault_of_files(const RenderArguments& arguments) {
   const std::string out = arguments.output.string();
   const std::string depth = arguments.depth.string();
-  if (!has_ending(arguments.output, ".png")) return "-o: the picture's name must end in .png, not \"" + out + "\"";
+  const bool is_path = arguments.light_model == "path";
+  if (has_ending(arguments.output, ".exr") && !is_path) return "-o: .exr, which is linear light, needs --light path";
+  if (!has_ending(arguments.output, ".png") && !has_ending(arguments.output, ".exr")) {
+    return "-o: the picture's name must end in .png or .exr, not \"" + out + "\"";
+  }
   if (is_same_file(arguments.output, arguments.common.input)) return "-o: " + out + " is the input";
   if (depth.empty()) return "";
   if (!has_ending(arguments.depth, ".pfm")) return "--depth: the name must end in .pfm, not \"" + depth + "\"";
@@ -284,6 +270,9 @@ std::string fault_of_light(const CLI::App& command, const RenderArguments& argum
 }
 
 std::string fault_of_light_model(const CLI::App& command, const RenderArguments& arguments) {
+  if (arguments.light_model == "path") return fault_of_path_options(command);
+  if (const std::string option = given_path_option(command); !option.empty()) return option + " needs --light path";
+  if (arguments.path.is_exposure_automatic) return "--exposure auto needs --light path";
   const bool is_propagated = arguments.light_model == "propagated";
   if (command.count("--least-light") > 0 && !is_propagated) return "--least-light needs --light propagated";
   if (!is_propagated) return "";
@@ -301,14 +290,48 @@ std::string fault_of_slice(const CLI::App& command, const RenderArguments& argum
   if (arguments.preset != "density") {
     return command.count("--slice") > 0 ? "--slice needs --preset density" : "";
   }
-  for (const char* option :
-       {"--view",           "--camera",          "--look-at",         "--fov",       "--sun",
-        "--sky-brightness", "--lamps",           "--lamp-brightness", "--ao",        "--ao-rays",
-        "--ao-affects",     "--ao-distance",     "--ao-form",         "--ao-spread", "--ao-offset",
-        "--ao-power",       "--shadow-distance", "--exposure",        "--samples",   "--depth",
-        "--detail",         "--lod-colours",     "--backend",         "--device",    "--fixed-sky",
-        "--azimuth",        "--elevation",       "--turntable",       "--frames",    "--plain-glass",
-        "--light",          "--least-light"}) {
+  for (const char* option : {"--view",
+                             "--camera",
+                             "--look-at",
+                             "--fov",
+                             "--sun",
+                             "--sky-brightness",
+                             "--lamps",
+                             "--lamp-brightness",
+                             "--ao",
+                             "--ao-rays",
+                             "--ao-affects",
+                             "--ao-distance",
+                             "--ao-form",
+                             "--ao-spread",
+                             "--ao-offset",
+                             "--ao-power",
+                             "--shadow-distance",
+                             "--exposure",
+                             "--samples",
+                             "--depth",
+                             "--detail",
+                             "--lod-colours",
+                             "--backend",
+                             "--device",
+                             "--fixed-sky",
+                             "--azimuth",
+                             "--elevation",
+                             "--turntable",
+                             "--frames",
+                             "--plain-glass",
+                             "--light",
+                             "--least-light",
+                             "--emission-scale",
+                             "--bounces",
+                             "--sky",
+                             "--sky-turn",
+                             "--tone",
+                             "--sun-angle",
+                             "--ground",
+                             "--transparent",
+                             "--lens-radius",
+                             "--focus"}) {
     if (command.count(option) > 0) return std::string(option) + ": the preset density is a flat slice (--slice)";
   }
   return "";
@@ -316,6 +339,10 @@ std::string fault_of_slice(const CLI::App& command, const RenderArguments& argum
 
 bool is_sun_off(const CLI::App& command) {
   return command.count("--sun") > 0 && command.get_option("--sun")->results().back() == "off";
+}
+
+bool is_exposure_automatic(const CLI::App& command) {
+  return command.count("--exposure") > 0 && command.get_option("--exposure")->results().back() == "auto";
 }
 
 struct SlicePlace {
@@ -355,13 +382,18 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
       read_option(command, "--least-light", read_not_negative, at_least_0, light.least_light),
       read_option(command, "--ao-distance", read_not_negative, at_least_0, light.occlusion_distance_voxels),
       read_option(command, "--shadow-distance", read_not_negative, at_least_0, light.shadow_distance_voxels),
-      read_option(command, "--exposure", read_not_negative, at_least_0, light.exposure),
+      is_exposure_automatic(command)
+          ? ""
+          : read_option(command, "--exposure", read_not_negative, at_least_0 + ", or auto", light.exposure),
+      read_option(command, "--emission-scale", read_not_negative, at_least_0, arguments.emission_scale),
+      read_path_options(command, arguments.path),
       read_option(command, "--azimuth", parse_number, "a number", arguments.azimuth),
       read_option(command, "--elevation", read_elevation, "from -90 to 90", arguments.elevation),
       read_option(command, "--frames", read_frames, "two frames, as in 0:24", arguments.frames),
       read_option(command, "--slice", read_slice, "x, y or z, and a place from 0 to 1, as in y:0.5", slice),
       read_field_occlusion(command, light.smooth_occlusion),
       read_volume_options(command, arguments.volume_texts, arguments.volume)};
+  arguments.path.is_exposure_automatic = is_exposure_automatic(command);
   arguments.position = camera.position;
   arguments.file_camera = camera.number;
   arguments.slice.axis = slice.axis;
@@ -385,12 +417,17 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
   add_common_options(command, arguments.common);
   arguments.render.light = natural_light();
   arguments.render.samples = 4;
-  command.add_option("-o,--output", arguments.output, "Picture to write: .png")->required()->check(file_name());
+  command
+      .add_option("-o,--output", arguments.output,
+                  "Picture to write: .png; or .exr of --light path: linear light, and layers for compositing")
+      ->required()
+      ->check(file_name());
   add_text_option(command, "--size", "WxH", "Pixels (default 1280x720)");
   add_camera_options(command, arguments);
   add_light_options(command, arguments);
   command
-      .add_option("--samples", arguments.render.samples, "Samples a pixel, for smooth edges and even light (default 4)")
+      .add_option("--samples", arguments.render.samples,
+                  "Samples a pixel, for smooth edges and even light (default 4; of --light path 64)")
       ->check(CLI::Range(1, kMaxSamples));
   add_volume_options(command, arguments.volume_texts);
   add_text_option(command, "--slice", "AXIS:PLACE",
@@ -420,6 +457,7 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
   arguments.has_view = command.count("--view") > 0 || arguments.azimuth || arguments.elevation || arguments.turns > 1;
   arguments.has_sun = command.count("--sun") > 0;
   LightOptions& light = arguments.render.light;
+  if (arguments.light_model == "path" && command.count("--samples") == 0) arguments.render.samples = 64;
   if (is_sun_off(command)) light.sun_brightness = 0.0;
   if (arguments.light_model == "propagated") light.model = LightModel::Propagated;
   if (arguments.has_fixed_sky) light.sky_follows_sun = false;

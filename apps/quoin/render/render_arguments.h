@@ -9,6 +9,7 @@
 #include <quoin/scene/camera.h>
 
 #include "commands.h"
+#include "render/path_arguments.h"
 #include "volume_options.h"
 
 namespace quoin::tool {
@@ -41,6 +42,8 @@ struct RenderArguments {
   bool has_plain_glass = false;
   bool watch = false;  ///< draws again whenever the input changes
   std::string light_model = "rays";
+  double emission_scale = 1.0;
+  PathArguments path;  ///< of the light model path
   std::string preset = "full";
   std::string occlusion = "rays";
   std::string occlusion_affects = "ambient";

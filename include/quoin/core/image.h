@@ -12,6 +12,13 @@ struct Image {
   std::vector<std::uint8_t> rgb;  ///< 3 * width * height
 };
 
+/// A picture with alpha: 8-bit sRGB and linear coverage, not multiplied by it; as Image else.
+struct AlphaImage {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> rgba;  ///< 4 * width * height
+};
+
 /// One float a pixel, rows from the top, pixels from the left; pictures have their depth so.
 struct FloatImage {
   int width = 0;

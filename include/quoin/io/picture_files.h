@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <string>
 #include <vector>
 
 #include <quoin/core/image.h>
@@ -20,6 +21,9 @@ namespace quoin {
 /// Cost:     some 17 nanoseconds a pixel: 16 ms for 1280 x 720. A smaller file would take more than twice that.
 [[nodiscard]] Result<std::uint64_t> write_png(const Image& picture, const std::filesystem::path& path);
 [[nodiscard]] Result<std::vector<std::byte>> write_png(const Image& picture);
+/// The same with alpha, as RGBA.
+[[nodiscard]] Result<std::uint64_t> write_png(const AlphaImage& picture, const std::filesystem::path& path);
+[[nodiscard]] Result<std::vector<std::byte>> write_png(const AlphaImage& picture);
 
 /// Reads any PNG as 8-bit RGB; alpha is dropped.
 ///
@@ -42,5 +46,34 @@ namespace quoin {
 ///         size.
 [[nodiscard]] Result<FloatImage> read_pfm(const std::filesystem::path& path);
 [[nodiscard]] Result<FloatImage> read_pfm(std::span<const std::byte> bytes);
+
+/// Reads linear light: Radiance's .hdr (RGBE) and OpenEXR's .exr, told apart by what they hold. Of an .exr the channels
+/// R, G and B, or Y. Numbers are as in the file; an .hdr's exposure is taken back.
+///
+/// Source: G. Ward, "Real pixels" (Graphics gems II, 1991).
+/// Errors: CannotRead; BadFormat; Unsupported for an .exr where the library was built without OpenEXR; LimitExceeded
+///         beyond 2^26 pixels. Memory stays within a multiple of the file's size, but for runs of one colour.
+[[nodiscard]] Result<RadianceImage> read_radiance(const std::filesystem::path& path);
+[[nodiscard]] Result<RadianceImage> read_radiance(std::span<const std::byte> bytes);
+
+/// One channel of an OpenEXR file.
+struct ExrChannel {
+  enum class Type : std::uint8_t { Float16, Float32, Uint32 };
+  std::string name;  ///< "R", "albedo.R", "Z"; readers group by what stands before the last dot
+  Type type = Type::Float16;
+  std::vector<float> values;           ///< a number a pixel, of floats; what is too large for a half is its largest
+  std::vector<std::uint32_t> numbers;  ///< of Uint32
+};
+
+/// Writes channels of one picture as an OpenEXR file, compressed without loss (ZIP), which appears whole or not at all.
+/// Returns the file's size; without a path, its bytes.
+///
+/// Errors: InvalidArgument when the sizes are not positive, there is no channel, two have one name, or one has not as
+///         many numbers as the sizes say; Unsupported where the library was built without OpenEXR; CannotWrite.
+[[nodiscard]] Result<std::uint64_t> write_exr(int width, int height, std::span<const ExrChannel> channels,
+                                              const std::filesystem::path& path);
+[[nodiscard]] Result<std::vector<std::byte>> write_exr(int width, int height, std::span<const ExrChannel> channels);
+/// Whether there is OpenEXR in this build.
+[[nodiscard]] bool has_exr();
 
 }  // namespace quoin

@@ -152,9 +152,7 @@ struct DevelopOptions {
 /// Errors: InvalidArgument for an exposure that is not finite or less than 0.
 [[nodiscard]] Result<Image> develop(const PathPicture& picture, const DevelopOptions& options = {});
 
-/// The scene alone, sRGB and linear alpha, not multiplied by it: four bytes a pixel.
-/// Errors: as `develop`.
-[[nodiscard]] Result<std::vector<std::uint8_t>> develop_with_alpha(const PathPicture& picture,
-                                                                   const DevelopOptions& options = {});
+/// The scene alone, and how much of each pixel it covers. Errors: as `develop`.
+[[nodiscard]] Result<AlphaImage> develop_with_alpha(const PathPicture& picture, const DevelopOptions& options = {});
 
 }  // namespace quoin

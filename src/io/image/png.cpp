@@ -99,13 +99,30 @@ Result<PngImage> decode_png(std::span<const std::byte> file) {
   return image;
 }
 
-Result<std::vector<std::byte>> write_png(const Image& picture) {
-  const auto width = static_cast<std::uint32_t>(picture.width);
-  const auto height = static_cast<std::uint32_t>(picture.height);
-  if (picture.width <= 0 || picture.height <= 0 || picture.rgb.size() != std::size_t{3} * width * height) {
+namespace {
+
+Result<std::vector<std::byte>> write_pixels(int width, int height, std::uint32_t channels,
+                                            const std::vector<std::uint8_t>& pixels) {
+  if (width <= 0 || height <= 0 ||
+      pixels.size() != std::size_t{channels} * static_cast<std::uint32_t>(width) * static_cast<std::uint32_t>(height)) {
     return make_error(ErrorCode::InvalidArgument, "the picture's size is not that of its pixels");
   }
-  return encode_png(png_of(picture), PngEffort::Quick);
+  return encode_png({static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height), channels, pixels},
+                    PngEffort::Quick);
+}
+
+}  // namespace
+
+Result<std::vector<std::byte>> write_png(const Image& picture) {
+  return write_pixels(picture.width, picture.height, 3, picture.rgb);
+}
+
+Result<std::vector<std::byte>> write_png(const AlphaImage& picture) {
+  return write_pixels(picture.width, picture.height, 4, picture.rgba);
+}
+
+Result<std::uint64_t> write_png(const AlphaImage& picture, const std::filesystem::path& path) {
+  return write_whole(path, write_png(picture));
 }
 
 Result<std::uint64_t> write_png(const Image& picture, const std::filesystem::path& path) {

@@ -138,19 +138,19 @@ Result<Image> develop(const PathPicture& picture, const DevelopOptions& options)
   return image;
 }
 
-Result<std::vector<std::uint8_t>> develop_with_alpha(const PathPicture& picture, const DevelopOptions& options) {
+Result<AlphaImage> develop_with_alpha(const PathPicture& picture, const DevelopOptions& options) {
   if (Status status = check_exposure(options.exposure); !status) return status.error();
   const SrgbEncoder& encode = SrgbEncoder::shared();
   const auto exposure = static_cast<float>(std::min(options.exposure, 1e30));
-  std::vector<std::uint8_t> rgba;
-  rgba.reserve(4 * picture.scene.size());
+  AlphaImage image{picture.width, picture.height, {}};
+  image.rgba.reserve(4 * picture.scene.size());
   for (std::size_t i = 0; i < picture.scene.size(); ++i) {
     const float alpha = picture.alpha[i];
     const Vec3 shown = alpha > 0.0F ? toned(picture.scene[i] / alpha, exposure, options.tone) : Vec3(0.0F);
-    for (int channel = 0; channel < 3; ++channel) rgba.push_back(encode(shown[channel]));
-    rgba.push_back(static_cast<std::uint8_t>(std::clamp(alpha, 0.0F, 1.0F) * 255.0F + 0.5F));
+    for (int channel = 0; channel < 3; ++channel) image.rgba.push_back(encode(shown[channel]));
+    image.rgba.push_back(static_cast<std::uint8_t>(std::clamp(alpha, 0.0F, 1.0F) * 255.0F + 0.5F));
   }
-  return rgba;
+  return image;
 }
 
 }  // namespace quoin

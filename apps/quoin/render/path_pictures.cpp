@@ -1,0 +1,81 @@
+#include "render/path_pictures.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <glm/geometric.hpp>
+
+#include <quoin/io/picture_files.h>
+
+namespace quoin::tool {
+namespace {
+
+using Type = ExrChannel::Type;
+
+void add_colour(std::vector<ExrChannel>& channels, const std::string& prefix, const std::vector<Vec3>& of,
+                const std::array<const char*, 3>& names, Type type, float scale = 1.0F) {
+  for (int i = 0; i < 3; ++i) {
+    ExrChannel channel{prefix + names[static_cast<std::size_t>(i)], type, {}, {}};
+    channel.values.reserve(of.size());
+    for (const Vec3& each : of) channel.values.push_back(each[i] * scale);
+    channels.push_back(std::move(channel));
+  }
+}
+
+// Light times the exposure, not clamped; and what compositing wants to know.
+Result<std::uint64_t> write_layers(const PathPicture& picture, bool is_transparent, float exposure,
+                                   const std::filesystem::path& path) {
+  std::vector<ExrChannel> channels;
+  add_colour(channels, "", is_transparent ? picture.scene : picture.radiance, {"R", "G", "B"}, Type::Float16, exposure);
+  channels.push_back({"A", Type::Float16, picture.alpha, {}});
+  if (!is_transparent) channels.back().values.assign(picture.alpha.size(), 1.0F);
+  add_colour(channels, "albedo.", picture.albedo, {"R", "G", "B"}, Type::Float16);
+  add_colour(channels, "normal.", picture.normal, {"X", "Y", "Z"}, Type::Float16);
+  channels.push_back({"Z", Type::Float32, picture.depth.values, {}});
+  channels.push_back({"id.type", Type::Uint32, {}, {picture.types.begin(), picture.types.end()}});
+  channels.push_back({"id.instance", Type::Uint32, {}, picture.instances});
+  return write_exr(picture.width, picture.height, channels, path);
+}
+
+}  // namespace
+
+PathPictures::PathPictures(const Scene& scene, InstanceFilter filter, Threads threads, PathOptions options,
+                           const PathArguments& arguments)
+    : tracer_(scene, filter, threads), options_(std::move(options)), arguments_(arguments) {
+  const DBox bounds = scene.bounds(filter);
+  if (!bounds.empty()) middle_ = (bounds.min + bounds.max) * 0.5;
+}
+
+Result<Picture> PathPictures::render(const Camera& camera, const RenderOptions& options, Threads threads,
+                                     const Progress& progress) {
+  options_.layers = true;
+  const double to_middle = glm::dot(middle_ - camera.position, camera.forward);
+  options_.focus_distance = arguments_.focus.value_or(std::max(to_middle, 1e-3));
+  auto taken = tracer_.render(camera, options_, threads, progress);
+  if (!taken) return taken.error();
+  last_ = std::move(*taken);
+  if (!exposure_) exposure_ = arguments_.is_exposure_automatic ? find_exposure(last_) : options.light.exposure;
+  auto image = develop(last_, {*exposure_, arguments_.tone_curve()});
+  if (!image) return image.error();
+  Picture picture;
+  picture.colour = std::move(*image);
+  picture.rays = last_.rays;
+  picture.pixels_hit = last_.pixels_hit;
+  if (options.depth) picture.depth = last_.depth;
+  return picture;
+}
+
+Result<std::uint64_t> PathPictures::write(const std::filesystem::path& path) const {
+  if (CLI::detail::to_lower(path.extension().string()) == ".exr") {
+    return write_layers(last_, arguments_.is_transparent, static_cast<float>(exposure()), path);
+  }
+  if (!arguments_.is_transparent) return make_error(ErrorCode::InvalidArgument, "not a picture of this kind");
+  const auto image = develop_with_alpha(last_, {exposure(), arguments_.tone_curve()});
+  if (!image) return image.error();
+  return write_png(*image, path);
+}
+
+}  // namespace quoin::tool

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+
+#include <quoin/render/cpu_renderer.h>
+#include <quoin/render/path_tracer.h>
+
+#include "render/path_arguments.h"
+
+namespace quoin::tool {
+
+/// Takes pictures by paths where others take them of CpuRenderer, and keeps what files of linear light hold besides.
+class PathPictures {
+ public:
+  PathPictures(const Scene& scene, InstanceFilter filter, Threads threads, PathOptions options,
+               const PathArguments& arguments);
+
+  /// With the exposure of RenderOptions::light, or that of the first picture where it is automatic: those of a film
+  /// have one.
+  [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options, Threads threads,
+                                       const Progress& progress);
+
+  /// Of the last picture. Returns the file's size.
+  [[nodiscard]] Result<std::uint64_t> write(const std::filesystem::path& path) const;
+  /// That of the pictures. To be set before the first of them where others were taken before.
+  [[nodiscard]] double exposure() const { return exposure_.value_or(1.0); }
+  void set_exposure(std::optional<double> exposure) { exposure_ = exposure; }
+
+ private:
+  PathTracer tracer_;
+  PathOptions options_;
+  PathArguments arguments_;
+  DVec3 middle_{0.0};  // of the scene
+  std::optional<double> exposure_;
+  PathPicture last_;
+};
+
+}  // namespace quoin::tool

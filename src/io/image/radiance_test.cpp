@@ -1,0 +1,117 @@
+// Linear light in files: Radiance's .hdr and OpenEXR.
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include <quoin/io/picture_files.h>
+
+namespace quoin {
+namespace {
+
+std::vector<std::byte> bytes_of(const std::string& text) {
+  const auto* const data = reinterpret_cast<const std::byte*>(text.data());
+  return {data, data + text.size()};
+}
+
+Result<RadianceImage> read(const std::string& text) {
+  return read_radiance(bytes_of(text));
+}
+
+const std::string kHeader = "#?RADIANCE\n# made by hand\nFORMAT=32-bit_rle_rgbe\n\n";
+
+TEST(Radiance, ReadsPlainPixels) {
+  // 2^(129 - 136) = 1/128: (128.5, 64.5, 0.5) / 128 is near 1, a half and 0.
+  const auto image = read(kHeader + "-Y 1 +X 2\n" + std::string("\x80\x40\x00\x81\x00\x00\x00\x00", 8));
+  ASSERT_TRUE(image.has_value()) << image.error().message;
+  EXPECT_EQ(image->width, 2);
+  EXPECT_EQ(image->rgb, (std::vector<float>{128.5F / 128, 64.5F / 128, 0.5F / 128, 0.0F, 0.0F, 0.0F}));
+}
+
+TEST(Radiance, ReadsRuns) {
+  std::string row("\x02\x02\x00\x0A", 4);
+  row += std::string("\x8A\x80", 2);                                       // ten times 128
+  row += std::string("\x0A\x00\x01\x02\x03\x04\x05\x06\x07\x08\x09", 11);  // ten of their own
+  row += std::string("\x85\x01\x85\x02", 4);                               // twice five
+  row += std::string("\x8A\x88", 2);                                       // exponent 136: times 1
+  const auto image = read(kHeader + "-Y 1 +X 10\n" + row);
+  ASSERT_TRUE(image.has_value()) << image.error().message;
+  for (std::size_t x = 0; x < 10; ++x) {
+    EXPECT_EQ(image->rgb[3 * x], 128.5F);
+    EXPECT_EQ(image->rgb[3 * x + 1], static_cast<float>(x) + 0.5F);
+    EXPECT_EQ(image->rgb[3 * x + 2], x < 5 ? 1.5F : 2.5F);
+  }
+}
+
+TEST(Radiance, TakesTheExposureBack) {
+  const auto image =
+      read("#?RADIANCE\nEXPOSURE=2\nEXPOSURE= 2.0\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n\x80\x80\x80\x81");
+  ASSERT_TRUE(image.has_value()) << image.error().message;
+  EXPECT_EQ(image->rgb[0], 128.5F / 128 / 4);
+}
+
+TEST(Radiance, RefusesWhatIsBroken) {
+  const std::string good = kHeader + "-Y 1 +X 2\n" + std::string("\x80\x40\x00\x81\x00\x00\x00\x00", 8);
+  for (std::size_t size = 0; size < good.size(); ++size) EXPECT_FALSE(read(good.substr(0, size)).has_value()) << size;
+  for (const std::string& size :
+       {"+Y 1 +X 2", "-Y 0 +X 2", "-Y 1 +X x", "-Y 1000000 +X 1000000", "-Y 1.5 +X 2", "-Y 1"}) {
+    EXPECT_FALSE(read(kHeader + size + "\n" + std::string(8, '\x01')).has_value()) << size;
+  }
+  EXPECT_FALSE(read("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n\x01\x02\x03\x04").has_value());
+  EXPECT_FALSE(read("#?RADIANCE\nEXPOSURE=0\n\n-Y 1 +X 1\n\x01\x02\x03\x04").has_value());
+  EXPECT_FALSE(read("PNG").has_value());
+  // A run that goes past its row.
+  EXPECT_FALSE(read(kHeader + "-Y 1 +X 10\n" + std::string("\x02\x02\x00\x0A\x8B\x80", 6) + std::string(60, '\x01'))
+                   .has_value());
+}
+
+std::vector<ExrChannel> three_channels(const std::vector<float>& values, ExrChannel::Type type) {
+  std::vector<ExrChannel> channels;
+  for (const char* name : {"R", "G", "B"}) channels.push_back({name, type, values, {}});
+  return channels;
+}
+
+TEST(Exr, ReadsWhatItWrote) {
+  if (!has_exr()) GTEST_SKIP() << "built without OpenEXR";
+  const std::vector<float> values{0.0F, 1.0F, 0.123456F, 1000.5F, -2.0F, 65504.0F};
+  for (const auto type : {ExrChannel::Type::Float16, ExrChannel::Type::Float32}) {
+    std::vector<ExrChannel> channels = three_channels(values, type);
+    channels.push_back(
+        {"Z", ExrChannel::Type::Float32, std::vector<float>(6, std::numeric_limits<float>::infinity()), {}});
+    channels.push_back({"id", ExrChannel::Type::Uint32, {}, {0, 1, 2, 3, 4, 0xFFFF'FFFFU}});
+    const auto bytes = write_exr(3, 2, channels);
+    ASSERT_TRUE(bytes.has_value()) << bytes.error().message;
+    EXPECT_EQ(*bytes, *write_exr(3, 2, channels));
+    const auto image = read_radiance(*bytes);
+    ASSERT_TRUE(image.has_value()) << image.error().message;
+    EXPECT_EQ(image->width, 3);
+    EXPECT_EQ(image->height, 2);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const float tolerance = type == ExrChannel::Type::Float16 ? std::abs(values[i]) * 0.0005F : 0.0F;
+      for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(image->rgb[3 * i + c], values[i], tolerance);
+    }
+    for (std::size_t size = 0; size < bytes->size(); size += 7) {
+      EXPECT_FALSE(read_radiance(std::span(*bytes).first(size)).has_value()) << size;
+    }
+  }
+}
+
+TEST(Exr, WhatIsTooBrightForAHalfIsItsBrightest) {
+  if (!has_exr()) GTEST_SKIP() << "built without OpenEXR";
+  const auto image = read_radiance(*write_exr(1, 1, three_channels({1e9F}, ExrChannel::Type::Float16)));
+  ASSERT_TRUE(image.has_value());
+  EXPECT_EQ(image->rgb[0], 65504.0F);
+}
+
+TEST(Exr, RefusesWhatCannotBe) {
+  const std::vector<float> one{1.0F};
+  EXPECT_FALSE(write_exr(0, 1, three_channels(one, ExrChannel::Type::Float16)).has_value());
+  EXPECT_FALSE(write_exr(2, 1, three_channels(one, ExrChannel::Type::Float16)).has_value());
+  EXPECT_FALSE(write_exr(1, 1, std::vector<ExrChannel>{}).has_value());
+  EXPECT_FALSE(write_exr(1, 1, std::vector<ExrChannel>{{"R", {}, one, {}}, {"R", {}, one, {}}}).has_value());
+}
+
+}  // namespace
+}  // namespace quoin
