@@ -4,6 +4,7 @@
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 #include <quoin/io/picture_files.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 
+#include "io/image/png.h"
 #include "io/vox/vox_for_tests.h"
 #include "tests/tool_for_tests.h"
 
@@ -212,6 +214,69 @@ TEST_F(ToolRender, EveryOptionChangesThePicture) {
         " --preset full --ao rays --ao-rays 9 --ao-distance 6 --ao-affects ambient --exposure 1 --samples 4 --view iso "
         "--sun=-0.48,0.72,0.5 --lamps 64 --light rays");
   EXPECT_EQ(bytes("out.png"), plain) << "these are the defaults";
+}
+
+TEST_F(ToolRender, EveryOptionOfPathsChangesThePicture) {
+  std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(8);
+  const std::string base = "many.vox -o out.png --size 64x48 --light path --samples 4";
+  drawn(base);
+  const std::string plain = bytes("out.png");
+  for (const std::string flags :
+       {"--bounces 1", "--sky gradient", "--sky uniform", "--tone clamp", "--tone agx", "--tone aces", "--sun-angle 20",
+        "--ground", "--transparent", "--ground --transparent", "--lens-radius 1", "--lens-radius 1 --focus 5",
+        "--exposure auto", "--exposure 0.5", "--sun=-1,1,0", "--sun off", "--sky-brightness 2", "--samples 5"}) {
+    drawn(base + " " + flags);
+    EXPECT_NE(bytes("out.png"), plain) << flags;
+  }
+  drawn(base + " --bounces 8 --sky physical --tone neutral --sun-angle 0.53 --exposure 1 --emission-scale 1");
+  EXPECT_EQ(bytes("out.png"), plain) << "these are the defaults";
+}
+
+TEST_F(ToolRender, PathsTakeASkyFromAFileAndGiveLinearLight) {
+  std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(8);
+  std::ofstream(folder_.file("red.hdr"), std::ios::binary) << "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n"
+                                                           << std::string("\x80\x00\x00\x81", 4);
+  drawn("many.vox -o red.png --size 32x24 --light path --samples 2 --sky red.hdr --sun off --tone clamp");
+  const auto red = read_png(folder_.file("red.png"));
+  ASSERT_TRUE(red.has_value());
+  EXPECT_GT(red->rgb[0], 250);
+  EXPECT_LT(red->rgb[1], 30);
+  EXPECT_EQ(run("render many.vox -o x.png --light path --sky none.hdr").status, 1);
+  EXPECT_EQ(run("render many.vox -o x.png --light path --sky none.jpg").status, 2);
+  if (!has_exr()) GTEST_SKIP() << "built without OpenEXR";
+  drawn("many.vox -o out.exr --size 32x24 --light path --samples 2 --sky red.hdr --sun off");
+  const auto light = read_radiance(folder_.file("out.exr"));
+  ASSERT_TRUE(light.has_value());
+  EXPECT_NEAR(light->rgb[0], 128.5F / 128, 1e-3F);
+  drawn("many.vox -o again.png --size 32x24 --light path --samples 2 --sky out.exr --sky-turn 90");
+}
+
+TEST_F(ToolRender, PathsRefuseWhatIsNotTheirs) {
+  std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(2);
+  for (const std::string flags :
+       {"--light path --lamps 4", "--light path --preset ao", "--light path --detail pixels", "--bounces 4",
+        "--transparent", "--exposure auto", "--light path --bounces -1", "--light path --focus 3",
+        "--light path --sky-turn 4", "--light path --sun-angle 171", "--light path --lens-radius nan"}) {
+    EXPECT_EQ(run("render many.vox -o out.png " + flags).status, 2) << flags;
+  }
+  EXPECT_EQ(run("render many.vox -o out.exr").status, 2);
+}
+
+TEST_F(ToolRender, ThumbnailsAreSmallAndClearWhereNothingIs) {
+  std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(8);
+  const auto made = run("thumbnail many.vox small.png --size 40 --json");
+  ASSERT_EQ(made.status, 0) << made.err;
+  EXPECT_EQ(Json::parse(made.out)["size"], Json({40, 40}));
+  const std::string file = bytes("small.png");
+  const auto image = decode_png(std::as_bytes(std::span(file)));
+  ASSERT_TRUE(image.has_value());
+  EXPECT_EQ(image->width, 40U);
+  EXPECT_EQ(image->pixels[3], 0) << "a corner";
+  EXPECT_EQ(image->pixels[4 * (20 * 40 + 20) + 3], 255) << "the middle";
+  EXPECT_EQ(run("thumbnail many.vox small.jpg").status, 2);
+  EXPECT_EQ(run("thumbnail many.vox many.vox").status, 2);
+  EXPECT_EQ(run("thumbnail none.vox small.png").status, 1);
+  EXPECT_EQ(run("thumbnail many.vox small.png --size 0").status, 2);
 }
 
 TEST_F(ToolRender, FieldsShowTheirDensitiesAndTheOcclusionOfTheirMeshes) {

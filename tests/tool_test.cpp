@@ -705,13 +705,14 @@ TEST_F(Tool, HelpHasAnExampleForEveryCommand) {
   const ToolRun all = run("--help");
   EXPECT_EQ(all.status, 0);
   EXPECT_NE(all.out.find("Example: quoin convert"), std::string::npos) << all.out;
-  for (const std::string command : {"info", "convert", "render", "generate"}) {
+  for (const std::string command : {"info", "convert", "render", "thumbnail", "generate"}) {
     EXPECT_NE(all.out.find(command), std::string::npos);
     const ToolRun help = run(command + " --help");
     EXPECT_EQ(help.status, 0);
     EXPECT_NE(help.out.find("Example: quoin " + command), std::string::npos) << help.out;
     for (const std::string option : {"--raw-size", "--raw-type", "--raw-order"}) {
-      EXPECT_EQ(help.out.find(option) != std::string::npos, command != "generate") << command;
+      const bool reads_volumes_of_any_kind = command != "generate" && command != "thumbnail";
+      EXPECT_EQ(help.out.find(option) != std::string::npos, reads_volumes_of_any_kind) << command;
     }
   }
   EXPECT_EQ(run("--version").out.substr(0, 6), "quoin ");

@@ -44,6 +44,7 @@ inline constexpr const char* kForceHelp = "Replace OUT even where it holds a mod
 void add_info_command(CLI::App& app, int& status);
 void add_convert_command(CLI::App& app, int& status);
 void add_render_command(CLI::App& app, int& status);
+void add_thumbnail_command(CLI::App& app, int& status);
 void add_generate_command(CLI::App& app, int& status);
 void add_view_command(CLI::App& app, int& status);
 /// `completions` and `man`, which tell of all commands.

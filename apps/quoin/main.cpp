@@ -99,6 +99,7 @@ int run(int argc, char** argv) {
   add_info_command(app, status);
   add_convert_command(app, status);
   add_render_command(app, status);
+  add_thumbnail_command(app, status);
   add_generate_command(app, status);
   add_view_command(app, status);
   add_shell_commands(app, status);

@@ -1,6 +1,7 @@
 // Linear light in files: Radiance's .hdr and OpenEXR.
 
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <string>
 
@@ -65,6 +66,16 @@ TEST(Radiance, RefusesWhatIsBroken) {
   // A run that goes past its row.
   EXPECT_FALSE(read(kHeader + "-Y 1 +X 10\n" + std::string("\x02\x02\x00\x0A\x8B\x80", 6) + std::string(60, '\x01'))
                    .has_value());
+}
+
+TEST(Radiance, TheCorpusIsReadOrRefused) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(QUOIN_SOURCE_DIR "/tests/corpus/radiance")) {
+    ++files;
+    const auto image = read_radiance(entry.path());
+    EXPECT_TRUE(image.has_value() || !image.error().message.empty()) << entry.path();
+  }
+  EXPECT_GE(files, 2);
 }
 
 std::vector<ExrChannel> three_channels(const std::vector<float>& values, ExrChannel::Type type) {

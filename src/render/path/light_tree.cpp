@@ -23,15 +23,6 @@ float sine_of(float cosine) {
   return std::sqrt(std::max(0.0F, 1.0F - cosine * cosine));
 }
 
-// Of the difference of two angles, 1 where that is not positive.
-float cos_less(float sin_a, float cos_a, float sin_b, float cos_b) {
-  return cos_a > cos_b ? 1.0F : cos_a * cos_b + sin_a * sin_b;
-}
-
-float sin_less(float sin_a, float cos_a, float sin_b, float cos_b) {
-  return cos_a > cos_b ? 0.0F : sin_a * cos_b - cos_a * sin_b;
-}
-
 struct Cone {
   Vec3 axis;
   float cosine;
@@ -176,28 +167,24 @@ LightTree::LightTree(std::span<const LampBounds> lamps) {
   if (!lamps.empty()) Builder(lamps, *this);
 }
 
+// The form factor of the node's middle, times its power: exact for what is small, and never 0 where a part of the box
+// lies before the point and the point before a part of it. One square root.
 float LightTree::importance(const LampBounds& bounds, Vec3 point, Vec3 normal) {
-  const Vec3 middle = (bounds.low + bounds.high) * 0.5F;
-  const Vec3 way = point - middle;
-  const float diagonal2 = glm::dot(bounds.high - bounds.low, bounds.high - bounds.low);
-  const float real2 = glm::dot(way, way);
-  const float distance2 = std::max(real2, std::sqrt(diagonal2) * 0.5F);
-  const Vec3 from_middle = real2 > 0.0F ? way / std::sqrt(real2) : normal;
-  // The cone in which the box is seen from the point.
-  const float radius2 = diagonal2 * 0.25F;
-  const float cos_box = real2 > radius2 ? std::sqrt(1.0F - radius2 / real2) : -1.0F;
-  const float sin_box = sine_of(cos_box);
-  // Of the angle between the light's nearest normal and the point, as small as it may be.
-  const float cos_axis = glm::dot(bounds.axis, from_middle);
-  const float sin_axis = sine_of(cos_axis);
-  const float sin_spread = sine_of(bounds.cos_spread);
-  const float cos_beyond = cos_less(sin_axis, cos_axis, sin_spread, bounds.cos_spread);
-  const float sin_beyond = sin_less(sin_axis, cos_axis, sin_spread, bounds.cos_spread);
-  const float cos_least = cos_less(sin_beyond, cos_beyond, sin_box, cos_box);
-  if (cos_least <= bounds.cos_edge) return 0.0F;
-  const float cos_here = -glm::dot(from_middle, normal);
-  const float cos_seen = cos_less(sine_of(cos_here), cos_here, sin_box, cos_box);
-  return bounds.power * cos_least / distance2 * std::max(cos_seen, 0.0F);
+  const Vec3 half = (bounds.high - bounds.low) * 0.5F;
+  const Vec3 way = bounds.low + half - point;
+  const float radius2 = glm::dot(half, half);
+  const float distance2 = std::max(glm::dot(way, way), std::max(radius2, 1e-12F));
+  // How far the box reaches before the surface, and the point before the lamps; at least a little of their distance.
+  const float before = glm::dot(way, normal) + glm::dot(half, glm::abs(normal));
+  if (!(before > 0.0F)) return 0.0F;
+  const float distance = std::sqrt(distance2);
+  float shone = distance;
+  if (bounds.cos_edge > -1.0F && bounds.cos_spread > 0.9999F) {
+    shone = glm::dot(half, glm::abs(bounds.axis)) - glm::dot(way, bounds.axis);
+    if (!(shone > 0.0F)) return 0.0F;
+    shone = std::min(shone, distance);
+  }
+  return bounds.power * std::min(before, distance) * shone / (distance2 * distance2);
 }
 
 LightTree::Choice LightTree::choose(Vec3 point, Vec3 normal, float u) const {

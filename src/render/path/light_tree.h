@@ -21,7 +21,8 @@ struct LampBounds {
 /// Finds a lamp for a point at random: the more light it may send there, the likelier.
 ///
 /// Source: A. Conty Estevez, C. Kulla, "Importance sampling of many lights with adaptive tree splitting" (2018), with
-///         the bounds of M. Pharr et al., "Physically based rendering" (4th ed.), 12.6.3.
+///         bounds that cost a square root instead of the six of M. Pharr et al., "Physically based rendering" (4th
+///         ed.), 12.6.3.
 class LightTree {
  public:
   LightTree() = default;

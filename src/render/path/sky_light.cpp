@@ -46,7 +46,7 @@ SkyLight::SkyLight(const PathOptions& options)
     case SkyModel::Physical: {
       AtmosphericSky made = atmospheric_sky(sun, kPi, options.air);
       sunlight_ = made.sunlight * static_cast<float>(options.sun_brightness);
-      image_.emplace(std::move(made.radiance));
+      air_.emplace(EnvironmentLight(std::move(made.radiance)));
       break;
     }
     case SkyModel::Environment: {
@@ -64,7 +64,8 @@ SkyLight::SkyLight(const PathOptions& options)
 Vec3 SkyLight::sky(Vec3 direction) const {
   if (model_ == SkyModel::Uniform) return uniform_ * brightness_;
   if (model_ == SkyModel::Gradient) return sky_colour(direction.y, gradient_) * brightness_;
-  return image_->at(is_uneven_ ? turned_back(direction, turn_) : direction) * brightness_;
+  if (model_ == SkyModel::Physical) return air_->at(direction) * brightness_;
+  return image_->at(turned_back(direction, turn_)) * brightness_;
 }
 
 Vec3 SkyLight::sun(Vec3 direction) const {

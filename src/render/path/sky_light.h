@@ -8,6 +8,7 @@
 
 #include "light/daylight.h"
 #include "render/path/environment_light.h"
+#include "render/path/sky_map.h"
 
 namespace quoin::path {
 
@@ -43,7 +44,8 @@ class SkyLight {
   float brightness_ = 1.0F;
   Vec3 uniform_{1.0F};
   SkyColours gradient_;
-  std::optional<EnvironmentLight> image_;
+  std::optional<SkyMap> air_;              // of SkyModel::Physical
+  std::optional<EnvironmentLight> image_;  // of SkyModel::Environment
   bool is_uneven_ = false;
   SineCosine turn_;  // of an environment about the vertical
 };
