@@ -13,6 +13,7 @@
 
 #include "core/instruction_sets_for_tests.h"
 #include "core/srgb.h"
+#include "render/path/town_for_tests.h"
 #include "render/render_test_support.h"
 
 namespace quoin {
@@ -20,8 +21,10 @@ namespace {
 
 using render_test::add_type;
 using render_test::from_above;
+using render_test::of_town;
 using render_test::place;
 using render_test::towards;
+using render_test::town;
 
 constexpr Rgba8 kWhite{255, 255, 255, 255};
 constexpr Rgba8 kGrey{188, 188, 188, 255};
@@ -325,40 +328,6 @@ TEST(PathTracer, AimedAndFoundLightAgreeOnGloss) {
     const float by_chance = mean(taken(open, towards({4.0, 4.0, 4.0}, {4.5, 0.0, 4.2}), options)).x;
     EXPECT_NEAR(by_both / by_chance, 1.0F, 0.03F) << rough;
   }
-}
-
-Scene town() {
-  Scene scene;
-  const VoxelType ground = add_type(scene, {120, 150, 90, 255});
-  VoxelProperties metal = of_colour({220, 180, 90, 255});
-  metal.roughness = 0.3F;
-  metal.metalness = 1.0F;
-  const VoxelType gold = scene.types.add(metal).value_or(kAir);
-  const VoxelType lamp = add_type(scene, {255, 180, 90, 255}, Visibility::Opaque, 6.0F);
-  const VoxelType glass = add_type(scene, {120, 190, 255, 60}, Visibility::Transparent);
-  Grid grid;
-  grid.fill_box({{-30, -2, -30}, {30, 0, 30}}, ground);
-  grid.fill_box({{-8, 0, -8}, {-2, 12, -2}}, gold);
-  grid.fill_box({{4, 0, -10}, {10, 8, 2}}, glass);
-  grid.fill_box({{-12, 3, 6}, {-10, 5, 8}}, lamp);
-  place(scene, std::move(grid));
-  Grid ship;
-  ship.fill_box({{0, 0, 0}, {6, 3, 4}}, gold);
-  ship.set({3, 3, 2}, lamp);
-  const InstanceHandle handle = place(scene, std::move(ship), {2.0, 14.0, 3.0});
-  Instance& turned = scene.edit(handle);
-  turned.rotation = glm::angleAxis(0.7, glm::normalize(DVec3(1, 2, 3)));
-  Lamp spot;
-  spot.kind = Lamp::Kind::Spot;
-  spot.position = {12.0, 20.0, 12.0};
-  spot.direction = {-1.0, -1.5, -1.0};
-  spot.intensity = 200.0;
-  scene.lamps.push_back(spot);
-  return scene;
-}
-
-Camera of_town() {
-  return towards({18.0, 22.0, 40.0}, {0.0, 4.0, 0.0}, 0.8);
 }
 
 PathOptions quick() {
