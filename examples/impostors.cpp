@@ -75,7 +75,7 @@ bool play(quoin::Scene& scene, quoin::GridHandle rocket) {
   static_cast<void>(cache.find(scene, rocket));
   cache.wait(scene);
   const auto newest = cache.find(scene, rocket);
-  const quoin::ImpostorCacheStats stats = cache.stats();
+  const quoin::ImpostorCache::Stats stats = cache.stats();
   std::printf("%d frames without; built %llu times, %llu of them from the one before; %zu kB\n", without,
               static_cast<unsigned long long>(stats.built), static_cast<unsigned long long>(stats.rebuilt),
               newest == nullptr ? 0 : newest->bytes() / 1000);

@@ -1,6 +1,18 @@
 #pragma once
 
 /// All of Quoin. Including one folder's headers instead builds faster.
+///
+/// What holds everywhere, unless a header says otherwise:
+///
+/// Space:    right-handed, +Y up. Voxel (i, j, k) fills the cube from (i, j, k) to (i + 1, j + 1, k + 1) of its grid;
+///           boxes of voxels end before their `max`. Angles are in radians, but where a name says degrees.
+/// Errors:   what comes from outside (files, options, devices) gives a Result, absence an optional or a null pointer. A
+///           `Requires:` that does not hold is a programmer's mistake: see QUOIN_ASSERT. Nothing throws but bad_alloc,
+///           and std::system_error where threads cannot be started.
+/// Threads:  any number may read one object at once; whatever changes it needs it to itself. Functions that take
+///           Threads return when all of theirs are done, with the same result at any number.
+/// Lifetime: arguments are read within the call and not kept; what is kept, and for how long it must live, is said.
+/// Moving:   what was moved from may only be assigned to or destroyed.
 
 #include <quoin/core/assert.h>
 #include <quoin/core/axis_orientation.h>
@@ -8,6 +20,7 @@
 #include <quoin/core/changes.h>
 #include <quoin/core/direction.h>
 #include <quoin/core/direction_set.h>
+#include <quoin/core/edit_notice.h>
 #include <quoin/core/function_ref.h>
 #include <quoin/core/half.h>
 #include <quoin/core/hash.h>

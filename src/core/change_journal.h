@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/changes.h>
 
 namespace quoin {
@@ -52,6 +53,7 @@ class ChangeJournal {
   /// Books a change of a key with `serial`, 0 at first. `keys` are those of the container. Never throws: where there is
   /// no memory, all has changed.
   void note(std::uint64_t& serial, const Record& record, std::size_t keys) {
+    QUOIN_ASSERT(serial < end_, "a serial of this journal");
     const std::uint64_t seen = seen_.load(std::memory_order_relaxed);
     if (serial > seen) {
       at(serial).merge(record);
@@ -113,6 +115,8 @@ class ChangeJournal {
   void observe() const { seen_.store(end_ - 1, std::memory_order_relaxed); }
 
   [[nodiscard]] Record& at(std::uint64_t serial) const {
+    QUOIN_ASSERT(serial >= first_ && serial < end_, "a record that is kept");
+    QUOIN_ASSERT(serial / kBlock - first_ / kBlock < blocks_.size(), "blocks cover all that is kept");
     return (*blocks_[static_cast<std::size_t>(serial / kBlock - first_ / kBlock)])[serial % kBlock];
   }
 
@@ -138,6 +142,7 @@ class ChangeJournal {
 
   // The oldest block goes; and what is left of it counts as read, so that nothing joins it.
   void let_go() {
+    QUOIN_ASSERT(end_ - first_ > kBlock && blocks_.size() > 1, "more than what goes");
     first_ = (first_ / kBlock + 1) * kBlock;
     blocks_.erase(blocks_.begin());
     if (seen_.load(std::memory_order_relaxed) + 1 < first_) seen_.store(first_ - 1, std::memory_order_relaxed);

@@ -4,7 +4,8 @@
 #include <mutex>
 #include <vector>
 
-#include <quoin/core/changes.h>
+#include <quoin/core/assert.h>
+#include <quoin/core/edit_notice.h>
 
 namespace quoin {
 
@@ -44,6 +45,7 @@ class EditNotices {
   friend class EditNotice;
   void give(std::uint32_t index) {
     const std::lock_guard lock(mutex_);
+    QUOIN_ASSERT(index < is_given_.size(), "room was made when it was followed");
     // A number stands there once, also when what had it has gone and something else has it now.
     if (is_given_[index]) return;
     is_given_[index] = true;

@@ -11,7 +11,7 @@
 #include <quoin/grid/chunk.h>
 
 #include "core/change_journal.h"
-#include "grid/chunk_boxes.h"
+#include "core/coordinates/chunk_boxes.h"
 
 namespace quoin {
 

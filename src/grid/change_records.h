@@ -5,6 +5,7 @@
 #include <bit>
 #include <cstdint>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/changes.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/neighbourhood.h>
@@ -16,10 +17,12 @@ namespace quoin {
 class PackedBox {
  public:
   static PackedBox of(int x, int y, int z) {
+    QUOIN_ASSERT((x | y | z) >= 0 && (x | y | z) < kChunkEdge, "0 <= x, y, z < 64");
     const auto low = static_cast<std::uint32_t>(x | y << 8 | z << 16);
     return PackedBox(low | std::uint64_t{~low} << 32);
   }
   static PackedBox of_row(int y, int z, std::uint64_t voxels) {
+    QUOIN_ASSERT(voxels != 0, "voxels of the row");
     PackedBox box = of(std::countr_zero(voxels), y, z);
     box.unite(of(63 - std::countl_zero(voxels), y, z));
     return box;
@@ -75,12 +78,14 @@ struct VoxelRecord {
   }
   /// Counts one voxel that is on no side of the chunk.
   void add_inner(int x, int y, int z) {
+    QUOIN_ASSERT(sides(x) == 0b010U && sides(y) == 0b010U && sides(z) == 0b010U, "on no side of the chunk");
     neighbours |= kCentreOnly;
     box.unite(PackedBox::of(x, y, z));
     slabs.add(y, z);
   }
   /// Counts all voxels of a box that is not empty.
   void add_box(const IBox& all) {
+    QUOIN_ASSERT(!all.empty(), "voxels that changed");
     neighbours = kEverywhere;
     box.unite(PackedBox::of(all.min.x, all.min.y, all.min.z));
     box.unite(PackedBox::of(all.max.x - 1, all.max.y - 1, all.max.z - 1));

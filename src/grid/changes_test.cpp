@@ -14,7 +14,7 @@
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
-#include "grid/chunk_order.h"
+#include "core/coordinates/chunk_order.h"
 
 namespace quoin {
 namespace {

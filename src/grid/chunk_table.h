@@ -6,10 +6,11 @@
 #include <cstdint>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/chunk.h>
 
+#include "core/coordinates/chunk_trie.h"
 #include "grid/chunk/chunk_storage.h"
-#include "grid/chunk_trie.h"
 
 namespace quoin {
 
@@ -130,6 +131,7 @@ class ChunkTable {
   }
   /// To be called after every change of a chunk's voxels.
   void voxels_changed(const Slot& slot) {
+    QUOIN_ASSERT(slot.entry != nullptr, "a chunk that is there");
     if (slot.cell != ChunkWindow::kOutside && window_.voxels(slot.cell) != ChunkStorage::of(slot.entry->chunk)) {
       window_.put(slot.cell, slot.entry, epoch());
     }

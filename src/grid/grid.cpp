@@ -11,10 +11,10 @@
 #include <quoin/core/assert.h>
 
 #include "core/change_journal.h"
+#include "core/coordinates/chunk_order.h"
 #include "grid/bounds_cache.h"
 #include "grid/change_records.h"
 #include "grid/chunk/chunk_difference.h"
-#include "grid/chunk_order.h"
 #include "grid/chunk_table.h"
 #include "grid/long_box.h"
 
@@ -35,6 +35,7 @@ struct Grid::Impl {
 
   // Books an edit of one chunk, tells whoever follows the grid, and drops the chunk where nothing is left in it.
   void finish_edit(const IVec3& chunk, const ChunkTable::Slot& slot, VoxelEdit& edit, EditNotice& notice) {
+    QUOIN_ASSERT(slot.entry != nullptr && entries.find(chunk) == slot.entry, "the slot is the chunk's");
     // Before anything that may throw: the storage that was known may be gone.
     entries.voxels_changed(slot);
     if (edit.voxels != 0) {
@@ -46,6 +47,7 @@ struct Grid::Impl {
     const int voxels = non_air_count(slot.entry->chunk);
     voxel_count += voxels - slot.entry->counted;
     slot.entry->counted = voxels;
+    QUOIN_ASSERT(voxel_count >= voxels, "a grid has the voxels of its chunks");
     if (voxels == 0) entries.erase(chunk);
   }
 

@@ -1,7 +1,9 @@
 #include <quoin/grid/grid.h>
 
+#include <quoin/core/assert.h>
+
+#include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_storage.h"
-#include "grid/chunk/packed_row.h"
 
 namespace quoin {
 
@@ -37,6 +39,7 @@ VoxelType GridReader::get_in_other_chunk(int x, int y, int z) {
 
 // Unpacks the row. Requires: it lies in the chunk.
 VoxelType GridReader::get_in_new_row(int x, int y, int z) {
+  QUOIN_ASSERT(chunk_ == grid_->find_chunk(x >> kChunkShift, y >> kChunkShift, z >> kChunkShift), "a row of the chunk");
   last_y_ = y;
   last_z_ = z;
   reads_of_row_ = kReadsAlongX;

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
 
@@ -72,6 +73,7 @@ inline bool is_empty(const LongBox& box) {
 
 /// The chunks that a box meets. Requires: it is not empty and lies within the int32 range.
 inline IBox chunks_of(const LongBox& box) {
+  QUOIN_ASSERT(!is_empty(box), "a box of voxels");
   IBox chunks;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);

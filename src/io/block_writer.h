@@ -9,6 +9,7 @@
 #include <type_traits>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 
@@ -38,11 +39,14 @@ class BlockWriter {
   void put(std::span<const std::byte> bytes);
   /// Room for text of at most `most` bytes; `advance` says where what was written into it ends.
   [[nodiscard]] char* room(std::size_t most) {
+    QUOIN_ASSERT(most <= kBlockBytes, "text that fits a block");
     if (used_ + most > kBlockBytes) flush();
     return reinterpret_cast<char*>(block_.data() + used_);
   }
   void advance(const char* end) {
-    used_ = static_cast<std::size_t>(reinterpret_cast<const std::byte*>(end) - block_.data());
+    const auto used = static_cast<std::size_t>(reinterpret_cast<const std::byte*>(end) - block_.data());
+    QUOIN_ASSERT(used >= used_ && used <= kBlockBytes, "text within its room");
+    used_ = used;
   }
   void put_text(std::string_view text) { put(std::as_bytes(std::span(text))); }
   /// Fills up to a multiple of four bytes since the start.

@@ -73,6 +73,7 @@ Result<std::size_t> ByteStream::read(std::span<std::byte> out) {
 
 /// One call of inflate; it may give nothing and still have got ahead.
 Result<std::size_t> ByteStream::inflate_some(std::span<std::byte> out) {
+  QUOIN_ASSERT(position_ <= file_.size() && !out.empty(), "bytes of the file, and room for some");
   z_stream& state = inflater_->state;
   const std::size_t offered = std::min(file_.size() - position_, kMaxAtOnce);
   // zlib reads through this pointer only; its type dates from before const.

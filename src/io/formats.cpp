@@ -8,9 +8,8 @@
 #include <quoin/io/vox.h>
 #include <quoin/scene/volume_scene.h>
 
-#include "core/progress_part.h"
+#include "core/progress_steps.h"
 #include "io/byte_stream.h"
-#include "io/read_beside.h"
 #include "io/volume/header.h"
 #include "io/whole_file.h"
 

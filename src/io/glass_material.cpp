@@ -5,6 +5,8 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 namespace {
 
@@ -13,6 +15,7 @@ constexpr float kLeastAttenuation = 0.01F;  // glTF's colours may be 0, logarith
 }  // namespace
 
 GlassMaterial glass_material(const Surface& surface, float thickness) {
+  QUOIN_ASSERT(thickness > 0.0F, "a body that has a thickness");
   GlassMaterial glass;
   glass.thickness = thickness;
   if (!std::isfinite(surface.log_clarity)) {

@@ -233,6 +233,7 @@ void MaterialSurfaces::add(const MeshView& view, const MaterialPalette& palette)
   if (emits(view.surface) || is_transparent(view.surface)) {
     for (const VoxelType type : view.types) by_material.try_emplace(palette.material_of(view.surface, type));
   }
+  QUOIN_ASSERT(!view.types.empty(), "blocks have types");
   if (by_material.size() < 2) return surfaces_.push_back({view, palette.material_of(view.surface, view.types.front())});
   for (auto& [material, owned] : by_material) owned = owned_.emplace_back(std::make_unique<Owned>()).get();
   // A triangle lies in one face, so its three vertices have one type and move together.

@@ -10,7 +10,7 @@
 #include <quoin/core/result.h>
 #include <quoin/io/file.h>
 
-// What reads or writes bytes becomes what reads or writes a file.
+// What reads or writes bytes becomes what reads or writes a file; and which files a file is read with.
 
 namespace quoin {
 
@@ -38,5 +38,11 @@ template <class Read>
   if (auto done = write_file(*bytes, path); !done) return with_path(Result<std::uint64_t>(done.error()), path);
   return bytes->size();
 }
+
+/// The files that a scene file names; nothing where it cannot be read.
+[[nodiscard]] std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::path& path);
+
+/// Where the values of a NIfTI pair lie, of which `path` is the header; nothing where it is none.
+[[nodiscard]] std::vector<std::filesystem::path> files_of_pair(const std::filesystem::path& path);
 
 }  // namespace quoin

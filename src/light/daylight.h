@@ -1,11 +1,41 @@
 #pragma once
 
+#include <algorithm>
+
 #include <quoin/core/vec.h>
 #include <quoin/light/light_options.h>
 
-#include "light/sky.h"
-
 namespace quoin {
+
+/// In linear light. `kGroundBegins`, `kGroundIsFull`: the y of unit directions.
+namespace sky {
+constexpr Vec3 kZenith{0.145F, 0.335F, 0.700F};
+constexpr Vec3 kHorizon{0.640F, 0.780F, 0.900F};
+constexpr Vec3 kGround{0.400F, 0.410F, 0.430F};
+constexpr float kGroundBegins = -0.02F;
+constexpr float kGroundIsFull = -0.60F;
+}  // namespace sky
+
+/// The colours of a backdrop; by default a day's.
+struct SkyColours {
+  Vec3 zenith = sky::kZenith;
+  Vec3 horizon = sky::kHorizon;
+  Vec3 ground = sky::kGround;
+};
+
+/// The backdrop in linear light: paler towards the horizon, with ground that fades in below it. A picture's exposure
+/// does not change it, so that a scene can be made brighter without the sky burning out.
+///
+/// `up`: the y of a unit direction.
+[[nodiscard]] inline Vec3 sky_colour(float up, const SkyColours& of = {}) {
+  const float y = std::clamp(up, -1.0F, 1.0F);
+  if (y >= 0.0F) {
+    const float low = (1.0F - y) * (1.0F - y);
+    return of.zenith + (of.horizon - of.zenith) * (low * (1.0F - 0.5F * y));
+  }
+  const float s = std::clamp((sky::kGroundBegins - y) / (sky::kGroundBegins - sky::kGroundIsFull), 0.0F, 1.0F);
+  return of.horizon + (of.ground - of.horizon) * (s * s * (3.0F - 2.0F * s));
+}
 
 /// What the sun and the sky give: the one model that every renderer has.
 struct Daylight {

@@ -9,7 +9,7 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
 
-#include "grid/chunk_order.h"
+#include "core/coordinates/chunk_order.h"
 
 namespace quoin {
 

@@ -10,7 +10,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "grid/chunk_order.h"
+#include "core/coordinates/chunk_order.h"
 #include "trace/tree_view.h"
 
 namespace quoin {

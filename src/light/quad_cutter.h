@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 /// Cuts the faces of quads into rectangles of those that belong together: as far along u as it goes, and then along v.
@@ -14,12 +16,14 @@ class QuadCutter {
   /// `joins(u, v)`. `emit(u, v, along_u, along_v)` is called for each rectangle, by rows of their first faces.
   template <class Start, class Emit>
   void cut(int width, int height, const Start& start, const Emit& emit) {
+    QUOIN_ASSERT(width > 0 && height > 0, "a quad with faces");
     width_ = width;
     done_.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), false);
     for (int v = 0; v < height; ++v) {
       for (int u = 0; u < width; ++u) {
         if (is_done(u, v)) continue;
         const auto [along_u, along_v] = extent(u, v, height, start(u, v));
+        QUOIN_ASSERT(u + along_u <= width && v + along_v <= height, "a rectangle within the quad");
         for (int y = v; y < v + along_v; ++y) {
           const auto first = done_.begin() + (u + width * y);
           std::fill(first, first + along_u, true);

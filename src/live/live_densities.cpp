@@ -5,7 +5,7 @@
 
 #include <quoin/grid/voxel_field.h>
 
-#include "grid/chunk_order.h"
+#include "core/coordinates/chunk_order.h"
 #include "grid/long_box.h"
 
 namespace quoin {

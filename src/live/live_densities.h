@@ -13,8 +13,8 @@
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
+#include "core/coordinates/coordinate_hash.h"
 #include "grid/chunk/chunk_difference.h"
-#include "grid/coordinate_hash.h"
 #include "live/body_chunks.h"
 
 namespace quoin {

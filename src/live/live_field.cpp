@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "grid/chunk_order.h"
+#include "core/coordinates/chunk_order.h"
 
 namespace quoin {
 namespace {

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 
+#include <quoin/core/assert.h>
+
+#include "core/coordinates/chunk_order.h"
 #include "grid/chunk/chunk_storage.h"
-#include "grid/chunk_order.h"
 
 namespace quoin {
 namespace {
@@ -196,6 +198,7 @@ std::unique_ptr<LiveJob> LiveGrid::make_job(const GridSnapshot& grid, IVec3 chun
 
 void LiveGrid::hand_over(IVec3 chunk, std::uint64_t serial) {
   LiveChunk& state = chunks_.at(chunk);
+  QUOIN_ASSERT(state.is_waiting && !state.is_gone, "a chunk that waits");
   waiting_.erase(chunk);
   const Change change(totals_, state);
   state.is_waiting = false;
@@ -281,9 +284,11 @@ std::uint64_t LiveGrid::note_regions(LiveChunk& state) const {
   state.region_hashes.resize(static_cast<std::size_t>(across * across * across));
   for (const SurfaceRegion& each : state.surface->regions) {
     const IVec3 at = each.region;
+    QUOIN_ASSERT(at.x < across && at.y < across && at.z < across, "a region of the chunk");
     state.region_hashes[static_cast<std::size_t>(at.x + across * (at.y + across * at.z))] = each.hash;
   }
   if (before.empty()) return kAll;
+  QUOIN_ASSERT(before.size() == state.region_hashes.size(), "regions of one size");
   std::uint64_t changed = 0;
   for (std::size_t i = 0; i < before.size(); ++i) {
     changed |= std::uint64_t{before[i] != state.region_hashes[i]} << i;

@@ -6,10 +6,11 @@
 #include <unordered_set>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/live/live_meshes.h>
 #include <quoin/scene/scene.h>
 
-#include "grid/coordinate_hash.h"
+#include "core/coordinates/coordinate_hash.h"
 #include "live/live_distance.h"
 #include "live/mesh_job_queue.h"
 
@@ -34,6 +35,8 @@ template <class State>
 class LiveChange {
  public:
   LiveChange(LiveTotals& totals, const State& state) : totals_(totals), state_(state) {
+    QUOIN_ASSERT(totals.unfinished >= (state.is_unfinished() ? 1U : 0U), "every state is counted");
+    QUOIN_ASSERT(totals.pending >= (state.is_pending() ? 1U : 0U), "every state is counted");
     totals_.unfinished -= state.is_unfinished() ? 1 : 0;
     totals_.pending -= state.is_pending() ? 1 : 0;
   }

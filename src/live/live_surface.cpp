@@ -3,7 +3,7 @@
 #include <span>
 #include <utility>
 
-#include "grid/chunk/content_hash.h"
+#include "core/rows/content_hash.h"
 #include "live/mesh_job_queue.h"
 #include "mesh/surface/bodies.h"
 #include "mesh/surface/faces.h"

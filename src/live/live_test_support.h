@@ -18,7 +18,7 @@
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth_mesh.h>
 
-#include "grid/chunk_order.h"
+#include "core/coordinates/chunk_order.h"
 #include "mesh/surface/bodies.h"
 #include "mesh/surface/build.h"
 

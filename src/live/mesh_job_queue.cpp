@@ -4,6 +4,8 @@
 #include <new>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 namespace {
 
@@ -101,6 +103,7 @@ LiveMeshes::Stats MeshJobQueue::stats() const {
 }
 
 std::unique_ptr<LiveJob> MeshJobQueue::take_nearest() {
+  QUOIN_ASSERT(!queue_.empty(), "a job waits");
   const auto nearest = std::min_element(queue_.begin(), queue_.end(), [](const auto& a, const auto& b) {
     return a->distance != b->distance ? a->distance < b->distance : a->serial < b->serial;
   });
@@ -159,6 +162,7 @@ void MeshJobQueue::finish(std::unique_ptr<LiveJob> job, LiveClock::time_point st
     } else if (job->outcome == LiveJob::Outcome::OutOfMemory) {
       ++stats_.out_of_memory;
     }
+    QUOIN_ASSERT(running_ != 0 && done_.size() < done_.capacity(), "room was made when the job came");
     done_.push_back(std::move(job));
     --running_;
   }

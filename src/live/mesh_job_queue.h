@@ -17,7 +17,7 @@
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth.h>
 
-#include "grid/coordinate_hash.h"
+#include "core/coordinates/coordinate_hash.h"
 #include "live/body_chunks.h"
 #include "live/live_densities.h"
 #include "mesh/surface/material.h"

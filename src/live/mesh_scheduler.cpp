@@ -6,8 +6,8 @@
 #include <new>
 #include <utility>
 
+#include "core/coordinates/chunk_order.h"
 #include "core/worker_count.h"
-#include "grid/chunk_order.h"
 #include "live/live_field.h"
 #include "live/live_grid.h"
 #include "scene/instance_axes.h"

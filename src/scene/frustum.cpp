@@ -4,9 +4,12 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 Frustum::Frustum(const Camera& camera, int width, int height) {
+  QUOIN_ASSERT(width > 0 && height > 0, "width and height are positive");
   const bool is_perspective = camera.projection == Camera::Projection::Perspective;
   const double up = is_perspective ? std::tan(camera.vertical_fov_radians / 2.0) : 0.5 * camera.view_height;
   const double across = up * width / height;

@@ -20,9 +20,6 @@ namespace quoin {
   return made_unit(q);
 }
 
-/// Whether an instance's numbers are finite and its voxels have a size.
-[[nodiscard]] bool has_place(const Instance& instance);
-
 /// The grid's axes in the world, as columns: the rotation after the mirror, without the voxels' size. Exact for quarter
 /// turns, whose quaternions hold the irrational square root of one half.
 [[nodiscard]] glm::dmat3 world_axes(const Instance& instance);

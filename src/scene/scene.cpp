@@ -6,6 +6,8 @@
 #include <mutex>
 #include <type_traits>
 
+#include <quoin/core/assert.h>
+
 #include "core/change_journal.h"
 #include "core/edit_notices.h"
 #include "scene/hierarchy.h"
@@ -93,6 +95,7 @@ struct Scene::Book {
   template <class T>
   void note(Handle<T> handle, std::size_t keys) {
     constexpr Kind kKind = kind_of<T>();
+    QUOIN_ASSERT(handle.index < serials_of(kKind).size(), "room was made when it came");
     journal.note(serials_of(kKind)[handle.index], {kKind, handle.index, handle.generation}, keys);
   }
   void make_room(Kind kind, std::uint32_t index) {

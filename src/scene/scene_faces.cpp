@@ -9,7 +9,7 @@
 
 #include <quoin/mesh/blocky.h>
 
-#include "grid/coordinate_hash.h"
+#include "core/coordinates/coordinate_hash.h"
 
 namespace quoin {
 namespace {

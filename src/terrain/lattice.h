@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
 
@@ -75,6 +76,7 @@ class Field {
 
  private:
   static std::size_t index(int x, int y, int z) {
+    QUOIN_ASSERT((x | y | z) >= 0 && (x | y | z) < kChunkEdge, "0 <= x, y, z < 64");
     return static_cast<std::size_t>(((z + 1) * kFieldEdge + y + 1) * kFieldEdge + x + 1);
   }
 

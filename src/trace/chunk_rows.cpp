@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_storage.h"
-#include "grid/chunk/packed_row.h"
 
 namespace quoin::trace {
 namespace {

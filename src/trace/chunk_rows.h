@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/function_ref.h>
 #include <quoin/grid/changes.h>
 #include <quoin/grid/chunk.h>
@@ -85,6 +86,7 @@ void ChunkRows::for_each_row(const IBox& box, Visit&& visit) const {
 class RowsBox {
  public:
   void add(int y, int z, std::uint64_t row) {
+    QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");
     x_ |= row;
     const std::uint64_t any = row != 0 ? 1 : 0;
     y_ |= any << y;
@@ -98,6 +100,7 @@ class RowsBox {
   }
   /// A cell of 4^3 voxels, as nodes have it, at a multiple of 4.
   void add_cell(IVec3 at, std::uint64_t cell) {
+    QUOIN_ASSERT(((at.x | at.y | at.z) & ~(kChunkEdge - 4)) == 0, "multiples of 4 within the chunk");
     std::uint64_t plane = (cell | cell >> 32);
     plane = (plane | plane >> 16) & 0xFFFFU;
     std::uint64_t row = plane | plane >> 8;

@@ -8,9 +8,9 @@
 #include <tsl/robin_map.h>
 #include <quoin/core/assert.h>
 
-#include "grid/chunk_boxes.h"
-#include "grid/chunk_order.h"
-#include "grid/coordinate_hash.h"
+#include "core/coordinates/chunk_boxes.h"
+#include "core/coordinates/chunk_order.h"
+#include "core/coordinates/coordinate_hash.h"
 #include "trace/cell_rows.h"
 #include "trace/chunk_rows.h"
 #include "trace/glass_rows.h"
@@ -152,6 +152,7 @@ struct OccupancyTree::Impl {
   Impl() { bricks[1].fill(kAll); }
 
   std::uint32_t allocate_brick() {
+    QUOIN_ASSERT(free_bricks.size() + 2 <= bricks.size(), "the empty and the full brick are never free");
     if (!free_bricks.empty()) {
       const std::uint32_t index = free_bricks.back();
       free_bricks.pop_back();
@@ -177,6 +178,7 @@ struct OccupancyTree::Impl {
     const IVec3 unit{chunk.x & 15, chunk.y & 15, chunk.z & 15};
     std::uint32_t& index = region.nodes[table_index(unit)];
     if (index == 0) return;
+    QUOIN_ASSERT((region.chunks[word_of(unit)] >> bit_of(unit) & 1U) != 0, "a region's bits tell of its nodes");
     release_bricks(chunk_nodes[index]);
     free_chunks.push_back(index);
     index = 0;
@@ -201,6 +203,7 @@ struct OccupancyTree::Impl {
       }
       region->chunks[word_of(unit)] |= std::uint64_t{1} << bit_of(unit);
     }
+    QUOIN_ASSERT(index < chunk_nodes.size(), "a node that is there");
     return chunk_nodes[index];
   }
 
@@ -247,6 +250,7 @@ struct OccupancyTree::Impl {
       cells |= std::uint64_t{words[i] != 0} << (first + i);
     }
     node.cells[brick] = cells;
+    QUOIN_ASSERT(index > 1, "the empty and the full brick are never written");
     const bool is_full = cells == kAll && std::all_of(own.begin(), own.end(), [](auto word) { return word == kAll; });
     if (cells == 0 || is_full) set_uniform(node, brick, is_full);
     return true;
@@ -366,12 +370,14 @@ struct OccupancyTree::Impl {
   void set_uniform_blocks(IVec3 chunk, const Find& find_blocks) {
     uniform.resize(chunk_nodes.size());
     const std::size_t index = static_cast<std::size_t>(&node_of(chunk) - chunk_nodes.data());
+    QUOIN_ASSERT(index < uniform.size(), "a node that is there");
     if (index != 0) find_blocks(uniform[index]);
   }
 
   // Puts 4 bits in place of those at `bit`.
   static void put_bits(std::vector<std::uint32_t>& words, std::size_t bit, std::uint64_t bits) {
     const std::size_t word = bit / 32;
+    QUOIN_ASSERT(bits < 16 && word + 1 < words.size(), "bits of the table");
     const unsigned shift = bit % 32;
     const std::uint64_t mask = std::uint64_t{15} << shift;
     std::uint64_t both = words[word] | std::uint64_t{words[word + 1]} << 32;
@@ -386,6 +392,7 @@ struct OccupancyTree::Impl {
   }
 
   void name_node(IVec3 chunk) {
+    QUOIN_ASSERT(flat_chunks.contains(chunk), "a chunk of the tables");
     const ChunkNode& node = node_of(chunk);
     std::uint64_t bricks_there = 0;
     for (std::size_t i = 0; i < 64; ++i) bricks_there |= std::uint64_t{node.cells[i] != 0} << i;
@@ -455,6 +462,8 @@ struct OccupancyTree::Impl {
   // Puts the bits of one table's row into another's, where they are 0.
   static void copy_bits(const std::vector<std::uint32_t>& from, std::size_t from_bit, std::vector<std::uint32_t>& to,
                         std::size_t to_bit, std::size_t count) {
+    QUOIN_ASSERT((from_bit + count - 1) / 32 + 1 < from.size() && (to_bit + count - 1) / 32 + 1 < to.size(),
+                 "bits of the tables");
     for (std::size_t i = 0; i < count; i += 32) {
       const std::size_t a = from_bit + i;
       const std::size_t b = to_bit + i;
@@ -510,6 +519,7 @@ struct OccupancyTree::Impl {
   // After chunks have been put: the bounds, and the tables where they concern `changed`.
   void finish(std::span<const ChunkBricks> changed) {
     renew_tables(changed);
+    QUOIN_ASSERT(flat_chunks.empty() || flat_nodes.size() == volume(flat_chunks.size()), "tables of their chunks");
     if (!flat_chunks.empty()) view = make_view(flat, flat_nodes.data(), bricks.data(), bounds);
   }
 

@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <quoin/core/assert.h>
 #include <quoin/trace/occupancy_tree.h>
 
 namespace quoin::trace {
@@ -91,7 +92,10 @@ class TreeNodes {
   [[nodiscard]] const ChunkNode& chunk(std::uint32_t index) const { return chunks_[index]; }
   [[nodiscard]] const Node& brick(std::uint32_t index) const { return bricks_[index]; }
   /// Of one of the tree's chunks. Requires: a tree of transparent voxels.
-  [[nodiscard]] const UniformBlocks& uniform_blocks(const ChunkNode& chunk) const { return uniform_[&chunk - chunks_]; }
+  [[nodiscard]] const UniformBlocks& uniform_blocks(const ChunkNode& chunk) const {
+    QUOIN_ASSERT(uniform_ != nullptr && &chunk > chunks_, "a chunk of a tree of transparent voxels");
+    return uniform_[&chunk - chunks_];
+  }
 
  private:
   const OccupancyTree::Impl* tree_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+
 #include <quoin/core/function_ref.h>
 
 namespace quoin {

@@ -36,6 +36,7 @@ class AtomicFile {
 
   /// Errors: CannotWrite (a full disk). Afterwards `commit` fails too.
   [[nodiscard]] Status write(std::span<const std::byte> bytes);
+  /// Puts the file in place. Errors: CannotWrite; the old file is then as it was.
   [[nodiscard]] Status commit();
 
  private:
@@ -86,7 +87,7 @@ struct FileStamp {
   [[nodiscard]] static std::optional<FileStamp> of(const std::filesystem::path& path);
 };
 
-/// Writes all of `bytes` to `path` by way of an AtomicFile.
+/// Writes all of `bytes` to `path` by way of an AtomicFile. Errors: CannotWrite.
 [[nodiscard]] Status write_file(std::span<const std::byte> bytes, const std::filesystem::path& path);
 
 }  // namespace quoin

@@ -64,7 +64,9 @@ struct VoxBytes {
 /// Reading it again gives the same scene when every canvas is a box of at most 256 voxels a side from the origin, as
 /// `read_vox` makes them. Otherwise voxels still stand where they stood, but grids are moved to the origin, and those
 /// beyond 256 become several, under a group.
-/// Types:    keep their ids when all that occur are below 256; else those that occur are numbered from 1.
+/// Types:    keep their ids when all that occur are below 256; else those that occur are numbered from 1. What
+///           MagicaVoxel has no key for (the name of a type, whether it collides, numbers that its own keys round) is
+///           kept under keys that begin with "_quoin_", which other programs lose when they save.
 /// Lost:     names of grids that are placed nowhere. Positions between voxels are rounded, turns of groups that are not
 ///           by quarter turns and lamps are left out, each with a warning.
 /// Errors:   Unsupported when an instance's transform is not one of the 48 axis-aligned ones, a voxel size is not 1 or

@@ -92,13 +92,14 @@ class Impostor {
   [[nodiscard]] const ImpostorOptions& options() const { return options_; }
   /// Around all voxels of the grid, transparent ones too, and its field.
   [[nodiscard]] const ContentSphere& content() const { return content_; }
-  /// Of the opaque voxels and of what is opaque of the field.
-  [[nodiscard]] const IBox& box() const { return box_; }
+  /// The smallest box of the grid around the opaque voxels and what is opaque of the field.
+  [[nodiscard]] const IBox& bounds() const { return box_; }
   /// Whether it has no face: what is opaque of the grid is nothing, or left to rays.
   [[nodiscard]] bool empty() const { return box_.empty(); }
   /// It is empty and the grid is to be traced: it has a field with more faces than there are texels, or more than a
   /// quarter of whose surface is of what is at most three samples thick, which tangent planes do not show well.
   [[nodiscard]] bool is_left_to_rays() const { return is_left_to_rays_; }
+  /// Bytes held, those that copies share too.
   [[nodiscard]] std::size_t bytes() const;
 
  private:

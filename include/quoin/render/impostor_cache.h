@@ -17,16 +17,6 @@ struct ImpostorCacheOptions {
   Threads workers;                               ///< unlike elsewhere 0 means one less than the machine has, at least 1
 };
 
-struct ImpostorCacheStats {
-  std::size_t held = 0;     ///< impostors
-  std::size_t bytes = 0;    ///< of these
-  std::size_t waiting = 0;  ///< grids that were asked for and are yet to be built, or built anew
-  std::uint64_t built = 0;  ///< in all, of which `rebuilt` from the one before
-  std::uint64_t rebuilt = 0;
-  std::uint64_t dropped = 0;        ///< for want of room
-  std::uint64_t out_of_memory = 0;  ///< times a build's memory ran out; the grid is built when it is asked for again
-};
-
 /// Impostors of a scene's grids, built by worker threads when they are first asked for, and again after edits.
 ///
 ///   const std::shared_ptr<const Impostor> impostor = cache.find(scene, instance.grid);  // null: trace it this time
@@ -65,7 +55,16 @@ class ImpostorCache {
   /// Cost: O(types that changed).
   void update_types(const VoxelRegistry& types);
 
-  [[nodiscard]] ImpostorCacheStats stats() const;
+  struct Stats {
+    std::size_t held = 0;     ///< impostors
+    std::size_t bytes = 0;    ///< of these
+    std::size_t waiting = 0;  ///< grids that were asked for and are yet to be built, or built anew
+    std::uint64_t built = 0;  ///< in all, of which `rebuilt` from the one before
+    std::uint64_t rebuilt = 0;
+    std::uint64_t dropped = 0;        ///< for want of room
+    std::uint64_t out_of_memory = 0;  ///< times a build's memory ran out; the grid is built when it is asked for again
+  };
+  [[nodiscard]] Stats stats() const;
 
  private:
   struct Impl;

@@ -46,13 +46,13 @@ struct SceneLayer;
 using GroupHandle = Handle<SceneGroup>;
 using LayerHandle = Handle<SceneLayer>;
 
-/// One placement of a grid in the world. Moving it touches no voxel and no mesh.
+/// One placement of a grid in the world. Moving it touches no voxel and no mesh. One without a place (`has_place`) is
+/// left out of pictures, queries and bounds.
 struct Instance {
   std::string name;
   GridHandle grid;
   DVec3 position{0.0};  ///< of the grid's pivot, in world units
-  /// World from grid. Of any length: what reads it makes it unit, and takes a zero one as no rotation. Where any
-  /// number of an instance is not finite, or its size not positive, it is left out of pictures, queries and bounds.
+  /// World from grid. Of any length: what reads it makes it unit, and takes a zero one as no rotation.
   DQuat rotation{1.0, 0.0, 0.0, 0.0};
   double voxel_size = 1.0;  ///< world units a voxel; positive
   bool mirrored = false;    ///< the grid's x is negated (about the pivot) before the rotation
@@ -215,6 +215,9 @@ class Scene {
 /// Cost: O(instances and groups).
 void move_group(Scene& scene, GroupHandle group, DVec3 position, const DQuat& rotation);
 
+/// Whether an instance has a place: all its numbers are finite, and its voxels have a positive size.
+[[nodiscard]] bool has_place(const Instance& instance);
+
 /// Whether an instance is to be drawn: its grid exists, and `filter` lets it pass; whatever its numbers are.
 [[nodiscard]] bool is_drawn(const Scene& scene, const Instance& instance, InstanceFilter filter);
 
@@ -225,7 +228,7 @@ void move_group(Scene& scene, GroupHandle group, DVec3 position, const DQuat& ro
 /// floats cannot tell neighbouring voxels apart.
 [[nodiscard]] glm::dmat4 world_from_grid(const Instance& instance, const SceneGrid& grid);
 /// A point of the world in the instance's grid (voxels): the inverse of `world_from_grid`, to the rounding of the
-/// point's own doubles. NaN in every component where the instance has no place, which `Instance::rotation` describes.
+/// point's own doubles. NaN in every component where the instance has no place (`has_place`).
 [[nodiscard]] DVec3 grid_from_world(const Instance& instance, const SceneGrid& grid, DVec3 point_in_world);
 /// A displacement in the instance's grid (voxels) as one in the world (world units): turned, mirrored and scaled, not
 /// moved; and its inverse, NaN where the instance has no place.

@@ -14,7 +14,7 @@ namespace quoin {
 // grid that is placed several times changes in all its places.
 //
 // Requires: the handle names an instance of the scene, and the instance's grid is in the scene.
-// Nothing:  is changed, and `false` or 0 returned, where the instance has no place (see Instance::rotation) or a number
+// Nothing:  is changed, and `false` or 0 returned, where the instance has no place (`has_place`) or a number
 //           of the shape is not finite or is negative.
 
 /// Sets the voxel that fills the place of a point of the world (see `voxel_from_world`). Returns true when it had

@@ -73,6 +73,7 @@ class SolidShapes {
   [[nodiscard]] const std::vector<IBox>& boxes(IVec3 chunk) const;
   [[nodiscard]] const QuadBuffer& faces(IVec3 chunk) const;
 
+  /// Bytes held.
   [[nodiscard]] std::size_t bytes() const;
 
  private:

@@ -8,9 +8,9 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/rows/content_hash.h"
+#include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_storage.h"
-#include "grid/chunk/content_hash.h"
-#include "grid/chunk/packed_row.h"
 
 namespace quoin {
 namespace {
@@ -120,6 +120,7 @@ void Chunk::count_change(int y, int z, std::uint64_t became_air, std::uint64_t b
   ChunkStorage& m = *storage_;
   const int delta = std::popcount(became_solid) - std::popcount(became_air);
   m.non_air += delta;
+  QUOIN_ASSERT(m.non_air >= 0 && m.non_air <= static_cast<int>(kChunkVoxels), "as many voxels as a chunk has");
   m.layer_counts[1][static_cast<std::size_t>(y)] += static_cast<std::uint16_t>(delta);
   m.layer_counts[2][static_cast<std::size_t>(z)] += static_cast<std::uint16_t>(delta);
   add_columns(m.layer_counts[0], became_solid, 1);
@@ -152,6 +153,7 @@ inline std::uint32_t Chunk::index_for(VoxelType type) {
 
 // Writes a type where voxels of a row are of others; books it among the palette's counts, but not which became air.
 std::uint32_t Chunk::replace(int y, int z, std::uint64_t changed, VoxelType type) {
+  QUOIN_ASSERT(changed != 0, "voxels that are of other types");
   if (storage_ == nullptr) make_mixed();
   ChunkStorage& m = own();
   const std::uint32_t index = index_for(type);

@@ -4,6 +4,8 @@
 #include <array>
 #include <bit>
 
+#include <quoin/core/assert.h>
+
 #include "grid/chunk/chunk_storage.h"
 
 namespace quoin {
@@ -41,6 +43,7 @@ bool are_rows_equal(const std::uint64_t* a, const std::uint64_t* b, int bits) {
 
 // Whether a row is stored alike in both. Requires: they share a palette.
 bool is_stored_alike(const ChunkStorage& a, const ChunkStorage& b, int y, int z) {
+  QUOIN_ASSERT(a.bits == b.bits, "they share a palette");
   const std::uint32_t in_a = a.slabs[ChunkStorage::slab_index(y, z)];
   const std::uint32_t in_b = b.slabs[ChunkStorage::slab_index(y, z)];
   if (((in_a | in_b) & ChunkStorage::kUniformSlab) != 0) return in_a == in_b;

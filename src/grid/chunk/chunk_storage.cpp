@@ -5,8 +5,10 @@
 #include <new>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
+#include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_storage.h"
-#include "grid/chunk/packed_row.h"
 
 namespace quoin {
 namespace {
@@ -142,6 +144,7 @@ std::uint32_t Chunk::slot_for_writing(std::size_t slab) {
   if ((entry & ChunkStorage::kUniformSlab) == 0) return entry;
   const auto slab_words = static_cast<std::size_t>(kSlabRows * m.bits);
   std::uint32_t slot = m.first_free;
+  QUOIN_ASSERT((slot == ChunkStorage::kNoSlot) == (m.free_count == 0), "free slots are counted");
   if (slot != ChunkStorage::kNoSlot) {
     m.first_free = static_cast<std::uint32_t>(*m.row(slot, 0));
     --m.free_count;
@@ -158,6 +161,7 @@ std::uint32_t Chunk::slot_for_writing(std::size_t slab) {
 void Chunk::release_slot(std::size_t slab, std::uint32_t index) {
   ChunkStorage& m = *storage_;
   const std::uint32_t slot = std::exchange(m.slabs[slab], ChunkStorage::kUniformSlab | index);
+  QUOIN_ASSERT(slot < m.slot_count && m.free_count < m.slot_count, "a slot that is not free");
   *m.row(slot, 0) = m.first_free;
   m.first_free = slot;
   ++m.free_count;
@@ -168,6 +172,7 @@ void Chunk::release_slot(std::size_t slab, std::uint32_t index) {
 void Chunk::after_writing(int y, int z, std::uint32_t index, std::uint32_t changed) {
   constexpr std::uint32_t kFewFree = 8;
   ChunkStorage& m = *storage_;
+  QUOIN_ASSERT(m.used != 0 && (m.direct() || index < m.palette.size()), "an index of the palette");
   if (!m.direct() && m.counts[index] == kChunkVoxels) return fill(m.palette[index]);
   m.credit = std::min(m.credit, kMaxCredit) + changed;
   const std::size_t slab = ChunkStorage::slab_index(y, z);
@@ -219,6 +224,7 @@ bool Chunk::is_one_entry() const {
 void Chunk::repack(int bits) {
   ChunkStorage& m = *storage_;
   Numbering to = m.direct() ? numbering_of_types(m, bits) : numbering_of_palette(m, bits);
+  QUOIN_ASSERT(bits == 16 || to.palette.size() <= std::size_t{1} << bits, "bits enough for the palette");
   const bool is_same = m.direct() ? bits == 16 : bits == m.bits && to.palette.size() == m.palette.size();
   const auto old_words = static_cast<std::size_t>(kSlabRows * m.bits);
   const auto new_words = static_cast<std::size_t>(kSlabRows * bits);
@@ -241,6 +247,7 @@ void Chunk::repack(int bits) {
       renumber_row(m.row(entry, row), m.bits, to.new_index, out + row * bits, bits);
     }
   }
+  QUOIN_ASSERT(slots * new_words == words.size(), "each slot is free or one slab's");
   m.words = std::move(words);
   m.palette = std::move(to.palette);
   m.counts = std::move(to.counts);

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/chunk.h>
 
 namespace quoin {
@@ -58,6 +59,7 @@ struct ChunkStorage : RefCounted {
   void move_counts(std::uint32_t from_index, std::uint32_t to_index, std::uint32_t voxels) {
     const std::uint32_t from = counted_at(from_index);
     const std::uint32_t to = counted_at(to_index);
+    QUOIN_ASSERT(from < counts.size() && to < counts.size() && counts[from] >= voxels, "voxels that are counted");
     if (counts[to] == 0) ++used;
     counts[to] += voxels;
     counts[from] -= voxels;
@@ -66,11 +68,13 @@ struct ChunkStorage : RefCounted {
   /// Books that a voxel became air, or was: -1 or 1.
   void count_voxel(int x, int y, int z, int delta) {
     non_air += delta;
+    QUOIN_ASSERT(non_air >= 0 && non_air <= static_cast<int>(kChunkVoxels), "as many voxels as a chunk has");
     layer_counts[0][static_cast<std::size_t>(x)] += static_cast<std::uint16_t>(delta);
     layer_counts[1][static_cast<std::size_t>(y)] += static_cast<std::uint16_t>(delta);
     layer_counts[2][static_cast<std::size_t>(z)] += static_cast<std::uint16_t>(delta);
   }
   [[nodiscard]] const std::uint64_t* row(std::uint32_t slot, int row_in_slab) const {
+    QUOIN_ASSERT(slot < slot_count, "a slab with voxels of its own");
     return words.data() + (static_cast<std::size_t>(slot) * 16 + static_cast<std::size_t>(row_in_slab)) *
                               static_cast<std::size_t>(bits);
   }
@@ -89,6 +93,7 @@ struct ChunkStorage : RefCounted {
   [[nodiscard]] VoxelType type(int x, int y, int z) const {
     const std::uint32_t slab = slabs[slab_index(y, z)];
     const std::uint32_t index = (slab & kUniformSlab) != 0 ? slab & ~kUniformSlab : read(slab, row_in_slab(y, z), x);
+    QUOIN_ASSERT(direct() || index < palette.size(), "an index of the palette");
     return direct() ? static_cast<VoxelType>(index) : palette[index];
   }
 };
@@ -103,6 +108,7 @@ struct ChunkStorage : RefCounted {
 inline ChunkStorage& Chunk::own() {
   if (storage_.is_shared()) [[unlikely]]
     copy_storage();
+  QUOIN_ASSERT(storage_ != nullptr && !storage_.is_shared(), "what is written belongs to one chunk");
   return *storage_;
 }
 

@@ -16,7 +16,49 @@ std::size_t dense_index(int x, int y, int z) {
   return static_cast<std::size_t>((z * kChunkEdge + y) * kChunkEdge + x);
 }
 
+// What the asserts within Chunk are too cheap to see: slots are one slab's or free, and all counts are those of the
+// voxels.
+void expect_books_agree(const Chunk& chunk) {
+  const ChunkStorage* const m = ChunkStorage::of(chunk);
+  if (m == nullptr) return;
+  std::vector<bool> is_taken(m->slot_count);
+  const auto take = [&](std::uint32_t slot) {
+    ASSERT_LT(slot, m->slot_count);
+    EXPECT_FALSE(is_taken[slot]) << "slot " << slot << " twice";
+    is_taken[slot] = true;
+  };
+  for (const std::uint32_t slab : m->slabs) {
+    if ((slab & ChunkStorage::kUniformSlab) == 0) take(slab);
+  }
+  std::uint32_t free = 0;
+  for (std::uint32_t slot = m->first_free; slot != ChunkStorage::kNoSlot && free <= m->free_count; ++free) {
+    take(slot);
+    slot = static_cast<std::uint32_t>(*m->row(slot, 0));
+  }
+  EXPECT_EQ(free, m->free_count);
+  EXPECT_EQ(std::count(is_taken.begin(), is_taken.end(), false), 0);
+  EXPECT_EQ(m->words.size(), std::size_t{m->slot_count} * kSlabRows * static_cast<std::size_t>(m->bits));
+  std::vector<std::uint32_t> counts(m->counts.size());
+  std::array<std::array<std::uint16_t, kChunkEdge>, 3> layers{};
+  for (std::size_t i = 0; i < kChunkVoxels; ++i) {
+    const IVec3 at{static_cast<int>(i % 64), static_cast<int>(i / 64 % 64), static_cast<int>(i / 4096)};
+    const VoxelType type = m->type(at.x, at.y, at.z);
+    std::size_t place = type % ChunkStorage::kRemainders;
+    if (!m->direct()) {
+      place = static_cast<std::size_t>(std::find(m->palette.begin(), m->palette.end(), type) - m->palette.begin());
+    }
+    ++counts[place];
+    for (int axis = 0; axis < 3 && type != kAir; ++axis) {
+      ++layers.at(static_cast<std::size_t>(axis)).at(static_cast<std::size_t>(at[axis]));
+    }
+  }
+  EXPECT_EQ(m->counts, counts);
+  EXPECT_EQ(m->used, counts.size() - static_cast<std::size_t>(std::count(counts.begin(), counts.end(), 0U)));
+  EXPECT_EQ(m->layer_counts, layers);
+}
+
 void expect_holds(const Chunk& chunk, const std::vector<VoxelType>& dense) {
+  expect_books_agree(chunk);
   int non_air = 0;
   IBox box;
   for (int z = 0; z < kChunkEdge; ++z) {

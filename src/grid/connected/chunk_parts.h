@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/connected.h>
@@ -29,6 +30,7 @@ inline std::uint32_t count_runs(std::uint64_t row) {
 }
 /// Which run of the row holds a voxel. Requires: one does.
 inline std::uint32_t run_of(std::uint64_t row, int x) {
+  QUOIN_ASSERT((row >> x & 1U) != 0, "a voxel of a run");
   const std::uint64_t up_to_x = (std::uint64_t{2} << x) - 1;
   return count_ones(run_starts(row) & up_to_x) - 1;
 }
@@ -138,6 +140,7 @@ class ChunkParts {
     return layer_starts_[static_cast<std::size_t>(z)] + row_starts_[static_cast<std::size_t>(z * kChunkEdge + y)];
   }
   [[nodiscard]] std::uint32_t part_of_run(std::uint32_t run) const {
+    QUOIN_ASSERT(run < (few_parts_.empty() ? many_parts_.size() : few_parts_.size()), "a run that was found");
     return few_parts_.empty() ? many_parts_[run] : few_parts_[run];
   }
   [[nodiscard]] std::uint64_t search_row(int y, int z) const;

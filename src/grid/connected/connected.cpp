@@ -10,7 +10,9 @@
 #include <tuple>
 #include <utility>
 
-#include "grid/chunk_order.h"
+#include <quoin/core/assert.h>
+
+#include "core/coordinates/chunk_order.h"
 #include "grid/connected/chunk_parts.h"
 
 namespace quoin {
@@ -147,6 +149,7 @@ struct ConnectedPieces::Impl {
   [[nodiscard]] const Entry& entry_of_node(std::size_t node) const {
     const auto after = std::upper_bound(in_order.begin(), in_order.end(), node,
                                         [](std::size_t n, const Entry* entry) { return n < entry->first_node; });
+    QUOIN_ASSERT(after != in_order.begin(), "the first entry's nodes begin at 0");
     return **std::prev(after);
   }
   // Calls `visit(entry, nodes of the piece in it)` for the chunks of a piece.
@@ -247,8 +250,14 @@ void ConnectedPieces::Impl::make_pieces() {
     const Entry* other = nullptr;
     std::size_t next = kNextChunks.size();
     for (const Link& link : entry->links) {
-      if (link.next != next) other = &entries.find(entry->at + next_chunk(link.next))->second;
+      if (link.next != next) {
+        const auto found = entries.find(entry->at + next_chunk(link.next));
+        QUOIN_ASSERT(found != entries.end(), "links lead to chunks that are there");
+        other = &found->second;
+      }
       next = link.next;
+      QUOIN_ASSERT(link.part < entry->parts.parts().size() && link.other < other->parts.parts().size(),
+                   "links lead to parts that are there");
       sets.unite(entry->first_node + link.part, other->first_node + link.other);
     }
   }
@@ -263,6 +272,7 @@ void ConnectedPieces::Impl::number_pieces(UnionFind<std::size_t>& sets) {
     for (std::size_t part = 0; part < entry->parts.parts().size(); ++part) {
       const std::size_t node = entry->first_node + part;
       const std::size_t root = sets.find(node);
+      QUOIN_ASSERT(root <= node, "the first node of a piece stands for it");
       piece_of_node[node] = root == node ? pieces.size() : piece_of_node[root];
       if (root == node) pieces.emplace_back();
       add_node(piece_of_node[node], *entry, part);

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "grid/chunk_order.h"
+#include "core/coordinates/chunk_order.h"
 #include "grid/copy/turned_block.h"
 #include "grid/long_box.h"
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/half.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_chunk.h>
@@ -17,6 +18,7 @@ namespace quoin {
 template <class Number, class FindChunk, class Outside>
 inline void read_cell_corners(IVec3 first, int size, const FindChunk& find_chunk, const Outside& outside,
                               Number* corners) {
+  QUOIN_ASSERT(size > 0 && size < kChunkEdge, "0 < size < 64");
   const IVec3 chunk = chunk_of(first);
   const IVec3 local = local_of(first);
   const int last = kChunkEdge - 1 - size;  // from beyond which the next chunk is reached

@@ -1,8 +1,8 @@
 #include <cmath>
 
+#include "core/trilinear.h"
 #include "grid/density/cell_corners.h"
 #include "grid/density/density_grid_impl.h"
-#include "grid/density/trilinear.h"
 
 namespace quoin {
 namespace {

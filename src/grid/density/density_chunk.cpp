@@ -7,7 +7,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "grid/chunk/content_hash.h"
+#include "core/rows/content_hash.h"
 #include "grid/density/density_storage.h"
 #include "grid/density/stored_density.h"
 

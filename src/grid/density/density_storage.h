@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/density_chunk.h>
 
 #include "grid/chunk/chunk_storage.h"
@@ -26,6 +27,7 @@ struct DensityStorage : RefCounted {
   std::array<std::uint64_t, kChunkEdge * kChunkEdge> solid{};  ///< [z][y]: the signs of a row
 
   [[nodiscard]] const Half* row(std::uint32_t slot, int row_in_slab) const {
+    QUOIN_ASSERT((std::size_t{slot} + 1) * 16 * kChunkEdge <= values.size(), "a slab with values of its own");
     return values.data() + (std::size_t{slot} * 16 + static_cast<std::size_t>(row_in_slab)) * kChunkEdge;
   }
   [[nodiscard]] Half* row(std::uint32_t slot, int row_in_slab) {

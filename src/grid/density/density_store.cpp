@@ -126,6 +126,7 @@ DensityStore::Entry& DensityStore::find_or_create(IVec3 chunk) {
 }
 
 void DensityStore::finish_edit(IVec3 chunk, Entry& entry, const ChangeReach& changes, bool has_even_row) {
+  QUOIN_ASSERT(find(chunk) == &entry, "the entry is the chunk's");
   if (changes.samples != 0) {
     ++edits_;
     journal_.note(entry.serial, {chunk, changes}, entries_.size());

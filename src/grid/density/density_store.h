@@ -11,9 +11,9 @@
 #include <quoin/grid/density_grid.h>
 
 #include "core/change_journal.h"
+#include "core/coordinates/chunk_order.h"
+#include "core/coordinates/chunk_trie.h"
 #include "grid/change_records.h"
-#include "grid/chunk_order.h"
-#include "grid/chunk_trie.h"
 #include "grid/long_box.h"
 
 namespace quoin {

@@ -11,7 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "grid/chunk_order.h"
+#include <quoin/core/assert.h>
+
+#include "core/coordinates/chunk_order.h"
 #include "grid/density/stored_density.h"
 
 namespace quoin {
@@ -75,6 +77,7 @@ void for_each_row(const Window& window, int more_y, int more_z, Visit visit) {
 
 // Which voxels of a row of the neighbourhood's chunks are not air. Requires: -64 <= y, z < 128.
 std::uint64_t solid_row(const Neighbourhood& chunks, int dx, int y, int z) {
+  QUOIN_ASSERT(y >= -kChunkEdge && y < 2 * kChunkEdge && z >= -kChunkEdge && z < 2 * kChunkEdge, "-64 <= y, z < 128");
   const Chunk* chunk = chunks.at(dx, y >> kChunkShift, z >> kChunkShift);
   return chunk == nullptr ? 0 : ~chunk->row_mask(y & (kChunkEdge - 1), z & (kChunkEdge - 1), kAir);
 }

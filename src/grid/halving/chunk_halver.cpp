@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_storage.h"
-#include "grid/chunk/packed_row.h"
 
 namespace quoin {
 namespace {

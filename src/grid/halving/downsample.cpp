@@ -9,8 +9,8 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/coordinates/chunk_order.h"
 #include "core/progress_steps.h"
-#include "grid/chunk_order.h"
 #include "grid/halving/chunk_halver.h"
 #include "grid/halving/density_halver.h"
 

@@ -180,6 +180,7 @@ void renumber(std::vector<std::byte>& bytes, const std::vector<std::uint32_t>& p
   for (std::size_t at = 0; at < bytes.size(); at += sizeof(Index)) {
     Index index{};
     std::memcpy(&index, bytes.data() + at, sizeof(Index));
+    QUOIN_ASSERT(index < place_of.size(), "an index of a vertex");
     index = static_cast<Index>(place_of[index]);
     std::memcpy(bytes.data() + at, &index, sizeof(Index));
   }

@@ -70,6 +70,34 @@ TEST(SceneFields, ComeBackToTheLastBit) {
   }
 }
 
+// Voxels come before densities, and what is so regular that it is stored instead of compressed is written twice.
+TEST(SceneFields, WritingThemTellsOfOneWholeThatNeverFalls) {
+  DensityGrid field;
+  field.add_sphere({0.0, 0.0, 0.0}, 150.0, 1);
+  Scene scene = scene_with(std::move(field));
+  Grid& voxels = scene.edit(scene.grids().handles()[0]).grid;
+  constexpr int kChunks = 320;
+  for (int i = 0; i < kChunks * kChunks; ++i) voxels.put_chunk({i % kChunks, 0, i / kChunks}, Chunk(1));
+  for (const bool has_field : {true, false}) {
+    if (!has_field) scene.edit(scene.grids().handles()[0]).field.clear();
+    const auto file = scene_file_of(scene);
+    ASSERT_TRUE(file);
+    double last = 0.0;
+    int told = 0;
+    ASSERT_TRUE(write_scene_file(*file, {}, [&](double fraction) {
+      EXPECT_GE(fraction, last);
+      last = fraction;
+      ++told;
+      return true;
+    }));
+    EXPECT_EQ(last, 1.0);
+    EXPECT_GT(told, 2);
+    const auto cancelled = write_scene_file(*file, {}, [](double) { return false; });
+    ASSERT_FALSE(cancelled);
+    EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
+  }
+}
+
 TEST(SceneFields, WithoutOneFilesAreOfTheVersionsBefore) {
   const auto text = write_scene_file(scene_file_of(scene_with(DensityGrid())).value()).value();
   const std::string_view view(reinterpret_cast<const char*>(text.data()), text.size());

@@ -6,8 +6,7 @@
 
 #include <quoin/io/formats.h>
 
-#include "core/progress_part.h"
-#include "io/read_beside.h"
+#include "core/progress_steps.h"
 #include "io/text.h"
 #include "io/whole_file.h"
 #include "scene/hierarchy.h"

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <quoin/io/scene_file.h>
 
+#include "core/progress_steps.h"
 #include "io/base64.h"
 #include "io/scene_file/voxel_data.h"
 #include "io/text.h"
@@ -263,14 +264,24 @@ class Contents {
   }
 
   Result<SceneText::Pieces> pieces(VoxelCompression compression, Threads threads, const Progress& progress) const {
-    auto voxels = encode_voxels(grids_, compression, threads, progress);
+    const double share = share_of_voxels();
+    auto voxels = encode_voxels(grids_, compression, threads, part_of(progress, 0.0, share));
     if (!voxels) return voxels.error();
-    auto densities = encode_fields(fields_, compression, threads, progress);
+    auto densities = encode_fields(fields_, compression, threads, part_of(progress, share, 1.0));
     if (!densities) return densities.error();
     return SceneText::Pieces{std::move(*voxels), std::move(*densities)};
   }
 
  private:
+  // Of the work; a chunk of a field is twice as large.
+  [[nodiscard]] double share_of_voxels() const {
+    double voxels = 0.0;
+    double densities = 0.0;
+    for (const Grid* grid : grids_) voxels += static_cast<double>(grid->chunk_count());
+    for (const DensityGrid* field : fields_) densities += 2.0 * static_cast<double>(field->chunk_count());
+    return densities == 0.0 ? 1.0 : voxels / (voxels + densities);
+  }
+
   std::vector<const Grid*> grids_;
   std::vector<const DensityGrid*> fields_;
 };
@@ -362,7 +373,8 @@ Result<std::vector<std::byte>> write_scene_file(const SceneFile& scene, Threads 
   const Contents contents(scene);
   auto text = text_of(scene, contents, VoxelCompression::Small, threads, progress);
   if (text && contents.bytes() > max_voxel_bytes(text->size())) {
-    text = text_of(scene, contents, VoxelCompression::Stored, threads, progress);
+    // By now it is all but done: whoever listens may still cancel it.
+    text = text_of(scene, contents, VoxelCompression::Stored, threads, part_of(progress, 1.0, 1.0));
   }
   if (!text) return text.error();
   const auto bytes = std::as_bytes(std::span(*text));

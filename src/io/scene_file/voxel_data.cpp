@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/half.h>
 
 #include "core/progress_steps.h"
@@ -130,6 +131,7 @@ class PieceWriter {
     for_each_run(voxels, slab, [&](std::span<const VoxelType> run) {
       is_uniform = is_uniform && std::ranges::all_of(run, [first](VoxelType type) { return type == first; });
     });
+    QUOIN_ASSERT(index_of_[first] < palette_.size(), "a type of the palette");
     put_number(is_uniform ? index_of_[first] : kMixedSlab);
     if (is_uniform) return;
     const int bits = bits_of(palette_.size());
@@ -246,6 +248,7 @@ class PieceReader {
   [[nodiscard]] bool has(std::size_t count) const { return bytes_.size() - at_ >= count; }
   template <class T>
   T take() {
+    QUOIN_ASSERT(has(sizeof(T)), "bytes that were seen to be there");
     const T number = load<T>(bytes_.data() + at_, std::endian::little);
     at_ += sizeof(T);
     return number;

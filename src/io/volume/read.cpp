@@ -5,7 +5,6 @@
 
 #include <quoin/io/formats.h>
 
-#include "io/read_beside.h"
 #include "io/text.h"
 #include "io/volume/header.h"
 #include "io/whole_file.h"

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstring>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::vox {
 
 namespace {
@@ -22,6 +24,8 @@ constexpr unsigned kChunksShift = 2;
 static_assert((kChunkEdge << kChunksShift) == kMaxModelEdge);
 
 std::size_t chunk_number(IVec3 chunk) {
+  QUOIN_ASSERT((chunk.x | chunk.y | chunk.z) >= 0 && (chunk.x | chunk.y | chunk.z) < 1 << kChunksShift,
+               "a chunk of a model");
   return static_cast<std::size_t>((chunk.z << (2 * kChunksShift)) | (chunk.y << kChunksShift) | chunk.x);
 }
 
@@ -109,6 +113,7 @@ void ModelBuilder::sort_into_chunks(const Model& model) {
 }
 
 void ModelBuilder::fill_chunk(IVec3 chunk, std::size_t first, std::size_t count, Grid& grid) {
+  QUOIN_ASSERT(first + count <= sorted_.size(), "voxels that were sorted");
   const std::span voxels = std::span(sorted_).subspan(first, count);
   const auto type_of_voxel = [](std::uint32_t voxel) { return static_cast<VoxelType>(voxel >> kTypeShift); };
   if (count < kFewVoxels) {
@@ -131,6 +136,7 @@ void ModelBuilder::fill_chunk(IVec3 chunk, std::size_t first, std::size_t count,
 void ModelBuilder::build_densely(const Model& model, Grid& grid) {
   const IVec3 chunks = chunks_of(canvas_of(model.size).max);
   const DensePlaces places = dense_places(model.size);
+  QUOIN_ASSERT(chunks.x * chunks.y * chunks.z <= 64, "no more chunks than a model has");
   dense_.assign(static_cast<std::size_t>(chunks.x * chunks.y * chunks.z) * kChunkVoxels, kAir);
   for (std::size_t i = 0; i + 3 < model.voxels.size(); i += 4) {
     std::array<std::uint8_t, 4> bytes{};  // as one load

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <optional>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::vox {
 
 namespace {
@@ -41,6 +43,7 @@ class NodeIndex {
 
 /// The frame that a looping node shows: folded into the range of its keys, which are sorted.
 std::int64_t folded(std::int64_t frame, std::int64_t first, std::int64_t last) {
+  QUOIN_ASSERT(first <= last, "keys are sorted");
   const std::int64_t length = last - first + 1;
   return first + ((frame - first) % length + length) % length;
 }
@@ -54,6 +57,7 @@ std::size_t key_at(std::span<const Key> keys, std::int64_t frame) {
 
 template <class Key>
 std::int64_t frame_for(const Node& node, std::span<const Key> keys, int frame) {
+  QUOIN_ASSERT(!keys.empty(), "a node with keys");
   return node.loops ? folded(frame, keys.front().frame, keys.back().frame) : frame;
 }
 

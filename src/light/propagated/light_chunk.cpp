@@ -2,7 +2,10 @@
 
 #include <algorithm>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::propagated {
+
 void ChannelLight::take(ChannelChange change) {
   if (change.is_uniform) {
     slabs_.reset();
@@ -17,6 +20,7 @@ void ChannelLight::take(ChannelChange change) {
   }
   bool is_any_uniform = false;
   for (ChannelChange::Slab& slab : change.slabs) {
+    QUOIN_ASSERT(slab.index < kSlabs, "a slab of the chunk");
     is_any_uniform |= slab.now.is_uniform();
     (*slabs_)[slab.index] = std::move(slab.now);
   }

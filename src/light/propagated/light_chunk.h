@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/ref.h>
 #include <quoin/grid/chunk.h>
 
@@ -41,11 +42,18 @@ class ChannelLight {
  public:
   [[nodiscard]] bool is_uniform() const { return slabs_ == nullptr; }
   /// Requires: is_uniform().
-  [[nodiscard]] unsigned level() const { return level_; }
+  [[nodiscard]] unsigned level() const {
+    QUOIN_ASSERT(is_uniform(), "light of one level");
+    return level_;
+  }
   /// Requires: !is_uniform().
-  [[nodiscard]] const LightSlab& stored(std::size_t index) const { return (*slabs_)[index]; }
+  [[nodiscard]] const LightSlab& stored(std::size_t index) const {
+    QUOIN_ASSERT(!is_uniform() && index < kSlabs, "light of several levels, one of its slabs");
+    return (*slabs_)[index];
+  }
   /// Requires: 0 <= x, y, z < 64.
   [[nodiscard]] unsigned at(int x, int y, int z) const {
+    QUOIN_ASSERT((x | y | z) >= 0 && (x | y | z) < kChunkEdge, "0 <= x, y, z < 64");
     return is_uniform() ? level_ : (*slabs_)[slab_index(y, z)].at(row_in_slab(y, z), static_cast<unsigned>(x));
   }
   [[nodiscard]] RowPlanes row(int y, int z) const {

@@ -7,9 +7,10 @@
 #include <unordered_map>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
-#include "grid/coordinate_hash.h"
+#include "core/coordinates/coordinate_hash.h"
 
 namespace quoin::propagated {
 
@@ -57,6 +58,7 @@ class LightDomain {
   }
   /// Packed light of a chunk that it does not hold.
   [[nodiscard]] std::uint16_t beyond(IVec3 chunk) const {
+    QUOIN_ASSERT(!holds(chunk), "a chunk that is not held");
     const Range found = range(chunk.x, chunk.z);
     const bool is_below = found.begin != found.end && chunk.y < found.begin;
     return is_below ? 0 : 15;
@@ -73,6 +75,7 @@ class LightDomain {
       for (int dx = -1; dx <= 1; ++dx) {
         const auto found = columns_.find({x + dx, 0, z + dz});
         if (found == columns_.end()) continue;
+        QUOIN_ASSERT(!found->second.empty(), "a column is there for its chunks");
         const int begin = *found->second.begin() - 1;
         const int end = *found->second.rbegin() + 2;
         all = all ? Range{std::min(all->begin, begin), std::max(all->end, end)} : Range{begin, end};

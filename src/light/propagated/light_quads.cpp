@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/direction.h>
 
 #include "light/quad_cutter.h"
@@ -48,6 +49,7 @@ class ChunkWords {
   [[nodiscard]] std::uint16_t at(IVec3 voxel) {
     if (voxel.x < 0 || voxel.x >= kChunkEdge) return reader_->at(low_ + voxel);
     const auto row = static_cast<std::size_t>((voxel.y + 1) + kStride * (voxel.z + 1));
+    QUOIN_ASSERT(row < kRows, "at most one beside the chunk");
     std::uint16_t* words = words_.data() + row * kChunkEdge;
     if (!is_read_[row]) {
       is_read_[row] = true;

@@ -4,6 +4,8 @@
 #include <bit>
 #include <new>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::propagated {
 namespace {
 
@@ -43,7 +45,9 @@ LightSlab LightSlab::of(const SlabPlanes& planes, const SlabKinds& kinds) {
     for (unsigned left = form.fresh[i]; left != 0; left &= left - 1) *next++ = rows[std::countr_zero(left)];
   }
   LightSlab slab;
+  QUOIN_ASSERT(next == made->words() + form.count, "as many words as were counted");
   slab.bits_ = reinterpret_cast<std::uintptr_t>(made);
+  QUOIN_ASSERT((slab.bits_ & 1U) == 0, "an address is even");
   return slab;
 }
 

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "light/propagated/kernel/kernel.h"
 
 namespace quoin::propagated {
@@ -29,7 +31,9 @@ struct SlabPlanes {
 class LightSlab {
  public:
   /// All of one level.
-  explicit LightSlab(unsigned level = 0) noexcept : bits_(std::uintptr_t{level} << 1 | 1U) {}
+  explicit LightSlab(unsigned level = 0) noexcept : bits_(std::uintptr_t{level} << 1 | 1U) {
+    QUOIN_ASSERT(level < 1U << kPlanes, "a level");
+  }
   [[nodiscard]] static LightSlab of(const SlabPlanes& planes, const SlabKinds& kinds);
 
   LightSlab(const LightSlab& other) noexcept : bits_(other.bits_) {
@@ -46,7 +50,10 @@ class LightSlab {
 
   [[nodiscard]] bool is_uniform() const { return (bits_ & 1U) != 0; }
   /// Requires: is_uniform().
-  [[nodiscard]] unsigned level() const { return static_cast<unsigned>(bits_ >> 1); }
+  [[nodiscard]] unsigned level() const {
+    QUOIN_ASSERT(is_uniform(), "a slab of one level");
+    return static_cast<unsigned>(bits_ >> 1);
+  }
   [[nodiscard]] unsigned at(std::size_t row, unsigned x) const {
     if (is_uniform()) return level();
     unsigned found = 0;
@@ -93,8 +100,11 @@ class LightSlab {
   };
   static_assert(sizeof(Block) == 24);
 
-  // NOLINTNEXTLINE(performance-no-int-to-ptr): a chunk has a thousand of them, eight bytes each
-  [[nodiscard]] Block& block() const { return *reinterpret_cast<Block*>(bits_); }
+  // A chunk has a thousand of them, eight bytes each.
+  [[nodiscard]] Block& block() const {
+    QUOIN_ASSERT(!is_uniform(), "a slab of several levels");
+    return *reinterpret_cast<Block*>(bits_);  // NOLINT(performance-no-int-to-ptr)
+  }
   void release() noexcept;
   void read_plane(std::size_t plane, std::uint64_t* out) const;
   template <class Visit>

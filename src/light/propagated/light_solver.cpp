@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include <quoin/core/assert.h>
+
 #include "light/propagated/kernel/kernel.h"
 
 namespace quoin::propagated {
@@ -494,8 +496,9 @@ void LightSolver::write(std::size_t channel, std::vector<ChunkLightChange>& chan
   const IVec3 size = chunk_of(region_->all.wanted.max - 1) + 1 - first;
   for_each_part(box_.wanted, [&](const Part& part) {
     const IVec3 p = part.chunk - first;
-    if (part.around->is_held)
-      write_chunk(part, channel, changes[static_cast<std::size_t>(p.x + size.x * (p.y + size.y * p.z))]);
+    ChunkLightChange& change = changes[static_cast<std::size_t>(p.x + size.x * (p.y + size.y * p.z))];
+    QUOIN_ASSERT(change.chunk == part.chunk, "changes are in the order of chunks");
+    if (part.around->is_held) write_chunk(part, channel, change);
   });
 }
 
@@ -528,6 +531,7 @@ void LightSolver::solve(const LightRegion::Box& box, unsigned channels, std::vec
 }
 
 void LightSolver::solve(const LightRegion& region, std::vector<ChunkLightChange>& changes) {
+  QUOIN_ASSERT(fits(region.all.voxels.size()), "a region that is not too large");
   region_ = &region;
   box_ = region.all;
   changes.clear();

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
 #include "light/propagated/chunk_masks.h"
@@ -40,6 +41,7 @@ struct LightRegion {
   std::vector<ChunkAround> around;      ///< [x, y, z] of these, x fastest
 
   [[nodiscard]] std::size_t index(IVec3 chunk) const {
+    QUOIN_ASSERT(chunks.contains(chunk), "a chunk in the region or beside it");
     const IVec3 p = chunk - chunks.min;
     const IVec3 size = chunks.max - chunks.min;
     return static_cast<std::size_t>(p.x + size.x * (p.y + size.y * p.z));

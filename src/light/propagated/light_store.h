@@ -10,9 +10,9 @@
 #include <quoin/grid/changes.h>
 
 #include "core/change_journal.h"
+#include "core/coordinates/chunk_order.h"
+#include "core/coordinates/chunk_trie.h"
 #include "grid/change_records.h"
-#include "grid/chunk_order.h"
-#include "grid/chunk_trie.h"
 #include "light/propagated/light_chunk.h"
 
 namespace quoin::propagated {

@@ -12,8 +12,8 @@
 #include <unordered_map>
 #include <utility>
 
-#include "grid/chunk_order.h"
-#include "grid/coordinate_hash.h"
+#include "core/coordinates/chunk_order.h"
+#include "core/coordinates/coordinate_hash.h"
 #include "light/propagated/light_domain.h"
 #include "light/propagated/light_quads.h"
 #include "light/propagated/light_reader.h"

@@ -6,7 +6,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/grid/changes.h>
 
-#include "grid/chunk_order.h"
+#include "core/coordinates/chunk_order.h"
 #include "light/occlusion_directions.h"
 #include "light/surface/rows.h"
 

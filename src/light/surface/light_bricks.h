@@ -14,7 +14,7 @@
 #include <quoin/light/scene_light.h>
 #include <quoin/scene/scene.h>
 
-#include "grid/coordinate_hash.h"
+#include "core/coordinates/coordinate_hash.h"
 
 namespace quoin {
 

@@ -7,7 +7,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "grid/chunk_order.h"
+#include "core/coordinates/chunk_order.h"
 
 namespace quoin {
 

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/buffer.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/result.h>
@@ -46,6 +47,7 @@ class EdgeWindow {
 
   // Slices must follow each other from the first that is asked for.
   CellSlice at(std::size_t slice) {
+    QUOIN_ASSERT(slice <= slices_, "a slice of cells");
     if (is_new_ && slice != 0) load(slice - 1, planes_[0]);
     if (!is_new_) std::swap(planes_[0], planes_[1]);
     is_new_ = false;
@@ -143,6 +145,7 @@ void for_each_cell(const Lattice& lattice, const CellIndex& index, std::size_t f
   std::uint32_t sum = 0;
   for (std::size_t row = 0; row < rows; ++row) index.first[row] = std::exchange(sum, sum + index.first[row]);
   index.first[rows] = sum;
+  QUOIN_ASSERT(sum == index.vertices(), "rows have the vertices of their slabs");
   return {};
 }
 

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::array {
 namespace {
 
@@ -25,6 +27,7 @@ InterfaceTable::Slot& InterfaceTable::insert(std::uint64_t back, std::uint64_t f
     slots_ = storage_.data();
   }
   ++count_;
+  QUOIN_ASSERT(back != front && 2 * count_ <= storage_.size(), "two labels, and room for their slot");
   std::size_t i = place(back, front);
   while (slots_[i].back != slots_[i].front) i = (i + 1) & mask_;
   slots_[i] = {back, front, 0};

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/array_view.h>
@@ -30,6 +31,7 @@ struct Lattice {
     return stride[0] == static_cast<std::ptrdiff_t>(item_bytes()) || size[0] == 1;
   }
   [[nodiscard]] const std::byte* row(std::int64_t y, std::int64_t z) const {
+    QUOIN_ASSERT(y >= 0 && y < size[1] && z >= 0 && z < size[2], "a row of the array");
     return data + y * stride[1] + z * stride[2];
   }
   [[nodiscard]] std::size_t rows() const { return static_cast<std::size_t>(size[1]); }

@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "mesh/array/cell.h"
 #include "mesh/array/corners.h"
 #include "mesh/smooth/split.h"
@@ -91,6 +93,7 @@ Status SplitCells::find(const Lattice& lattice, const Signs& signs, const CellIn
 void SplitCells::number(std::uint64_t vertices) {
   is_split_.assign(vertices / 64 + 1, 0);
   for (Cell& cell : cells_) {
+    QUOIN_ASSERT(cell.vertex < vertices, "a vertex that was counted");
     is_split_[cell.vertex / 64] |= std::uint64_t{1} << (cell.vertex % 64);
     const std::uint32_t count = cell.first_extra;
     cell.first_extra = static_cast<std::uint32_t>(vertices + extra_);
@@ -126,6 +129,7 @@ void SplitCells::place_sheets(const Cell& cell, const smooth::Corners& d, const 
   for (int sheet = 0; sheet < sheets.count; ++sheet) {
     const smooth::CellVertex vertex = vertex_of_sheet(d, sheets, sheet, placement.gradient_scale);
     const std::uint32_t at = sheet == 0 ? cell.vertex : cell.first_extra + static_cast<std::uint32_t>(sheet - 1);
+    QUOIN_ASSERT(at < out.positions.size(), "a vertex that was counted");
     for (int axis = 0; axis < 3; ++axis) {
       const int view_axis = placement.view_axis[axis];
       out.positions[at][view_axis] = in_space(placement, axis, cell.place[axis], vertex.snapped[axis]);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <quoin/core/assert.h>
+
 #include "mesh/array/cells.h"
 #include "mesh/array/corners.h"
 #include "mesh/array/kernel.h"
@@ -60,6 +62,7 @@ Status Signs::find(Threads threads, ProgressSteps& steps) {
 }
 
 std::uint32_t Signs::solid_corners(IVec3 cell) const {
+  QUOIN_ASSERT(cell.x >= 0 && cell.x <= lattice_.size[0], "a cell of the lattice");
   const auto word = static_cast<std::size_t>(cell.x / 64);
   const auto bit = static_cast<unsigned>(cell.x % 64);
   std::uint32_t solid = 0;

@@ -10,8 +10,8 @@
 
 #include <cstdint>
 
+#include "core/rows/packed_row.h"
 #include "grid/chunk/chunk_storage.h"
-#include "grid/chunk/packed_row.h"
 #include "mesh/blocky/scratch.h"
 #include "mesh/blocky/words.inl"
 

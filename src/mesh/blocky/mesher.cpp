@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/thousands.h>
 #include <quoin/mesh/occlusion.h>
 #include <quoin/mesh/visible_faces.h>
@@ -66,6 +67,7 @@ bool holds_transparent(const Chunk& chunk, const VoxelRegistry& types) {
 std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more) {
   if (out.size() < used + more) out.resize(std::max(used + more, out.capacity()));
   static_assert(sizeof(Quad) == sizeof(std::uint64_t));
+  QUOIN_ASSERT(used <= out.size(), "quads that are there");
   return &out[used].bits;
 }
 

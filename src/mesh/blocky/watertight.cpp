@@ -1,5 +1,8 @@
 #include "mesh/blocky/watertight.h"
 
+#include <algorithm>
+
+#include <quoin/core/assert.h>
 #include <quoin/grid/chunk.h>
 
 namespace quoin {
@@ -8,6 +11,8 @@ namespace {
 constexpr int kLattice = kChunkEdge + 1;
 
 std::size_t lattice_index(IVec3 p) {
+  QUOIN_ASSERT(std::min({p.x, p.y, p.z}) >= 0 && std::max({p.x, p.y, p.z}) < kLattice,
+               "a corner of the chunk's voxels");
   return static_cast<std::size_t>((p.z * kLattice + p.y) * kLattice + p.x);
 }
 
@@ -33,6 +38,7 @@ std::array<std::size_t, 4> corner_places(const std::vector<OutlinePoint>& outlin
     const bool is_straight = glm::sign(before) == glm::sign(after);
     if (!is_straight) places[found++] = i;
   }
+  QUOIN_ASSERT(found == 4, "an outline with four corners");
   return places;
 }
 

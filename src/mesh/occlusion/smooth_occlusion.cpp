@@ -9,9 +9,9 @@
 
 #include <tsl/robin_map.h>
 
+#include "core/coordinates/coordinate_hash.h"
 #include "core/lender.h"
 #include "core/progress_steps.h"
-#include "grid/coordinate_hash.h"
 #include "mesh/occlusion/places.h"
 
 namespace quoin {

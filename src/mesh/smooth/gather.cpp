@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstring>
 
+#include <quoin/core/assert.h>
+
 #include "grid/density/density_storage.h"
 #include "mesh/smooth/cell.h"
 #include "mesh/smooth/scratch.h"
@@ -16,6 +18,7 @@ constexpr std::uint64_t kAllSolid = ~std::uint64_t{0};
 
 // Every 2^level-th bit of a word, moved together.
 std::uint64_t thinned(std::uint64_t word, int level) {
+  QUOIN_ASSERT(level >= 0 && level <= kMaxSmoothLevel, "a level of detail");
   if (level == 0) return word;
   std::uint64_t out = 0;
   const int n = kChunkEdge >> level;
@@ -31,6 +34,7 @@ struct ChunkCoordinate {
 
 ChunkCoordinate chunk_coordinate(int point, int level) {
   const int sample = point * (1 << level);
+  QUOIN_ASSERT(sample >= -kChunkEdge && sample < 2 * kChunkEdge, "a sample of the chunk or of one beside it");
   return {sample >> kChunkShift, sample & (kChunkEdge - 1)};
 }
 

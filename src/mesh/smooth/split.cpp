@@ -371,6 +371,7 @@ class Splitter {
 }  // namespace
 
 Sheets sheets_of(std::uint32_t solid, int flipped_face) {
+  QUOIN_ASSERT(solid < 256 && flipped_face >= 0 && flipped_face <= kNoFace, "eight corners, and a face or none");
   return tables().sheets[solid][static_cast<std::size_t>(flipped_face)];
 }
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "grid/chunk_order.h"
+#include "core/coordinates/chunk_order.h"
 #include "grid/density/density_storage.h"
 
 namespace quoin::smooth {

@@ -7,9 +7,9 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/coordinates/chunk_order.h"
 #include "core/lender.h"
 #include "core/progress_steps.h"
-#include "grid/chunk_order.h"
 #include "mesh/smooth/levels.h"
 #include "mesh/surface/build.h"
 #include "mesh/surface/material.h"
@@ -62,6 +62,7 @@ class LevelMap {
   [[nodiscard]] std::array<std::uint8_t, 27> around(IVec3 chunk) const {
     std::array<std::uint8_t, 27> levels{};
     if (chunks_.empty()) return levels;
+    QUOIN_ASSERT(place_in(chunks_, chunk) < chunks_.size(), "a chunk whose level was asked for");
     std::size_t i = 0;
     for (int z = -1; z <= 1; ++z) {
       for (int y = -1; y <= 1; ++y) {
@@ -132,6 +133,7 @@ Part make_part(const DensityNeighbourhood& chunks, int level, const SurfaceMater
     if (materials != nullptr) part.materials.push_back(materials->of_cell(chunks, cell, level));
     if (cell.x == last || cell.y == last || cell.z == last) part.border.push_back({name.bits, place});
   }
+  QUOIN_ASSERT(part.positions.size() < Part::kForeign && part.foreign.size() < Part::kForeign, "places of 31 bits");
   for (std::size_t i = 0; i < mesh.indices.size(); ++i) part.indices[i] = workspace.places[mesh.indices[i]];
   std::sort(part.border.begin(), part.border.end(), [](BorderVertex a, BorderVertex b) { return a.name < b.name; });
   return part;

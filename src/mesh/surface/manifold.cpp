@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 namespace {
@@ -29,6 +31,7 @@ class Corners {
   }
 
   [[nodiscard]] std::span<const std::uint32_t> of(std::uint32_t vertex) const {
+    QUOIN_ASSERT(vertex + std::size_t{1} < first_.size(), "a vertex of the mesh");
     return std::span(triangles_).subspan(first_[vertex], first_[vertex + std::size_t{1}] - first_[vertex]);
   }
 
@@ -51,6 +54,7 @@ void arcs_around(const Triangulation& mesh, const Corners& corners, std::uint32_
 }
 
 void remove_back_to_back(Triangulation& mesh) {
+  QUOIN_ASSERT(mesh.corners.size() == mesh.indices.size(), "a corner an index");
   const Corners corners(mesh);
   std::vector<bool> is_removed(mesh.indices.size() / 3);
   std::vector<Arc> arcs;

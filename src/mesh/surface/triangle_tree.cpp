@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 
 namespace {
@@ -45,6 +47,7 @@ TriangleTree::TriangleTree(std::span<const Vec3> positions, std::span<const std:
 }
 
 void TriangleTree::build(std::size_t node, std::span<Item> items, std::size_t first) {
+  QUOIN_ASSERT(!items.empty() && node < nodes_.size(), "a node of triangles");
   Vec3 min = items[0].min;
   Vec3 max = items[0].max;
   for (const Item& item : items) {
@@ -71,6 +74,7 @@ void TriangleTree::build(std::size_t node, std::span<Item> items, std::size_t fi
 }
 
 float TriangleTree::squared_distance(Vec3 point, std::uint32_t triangle) const {
+  QUOIN_ASSERT(std::size_t{3} * triangle + 2 < indices_.size(), "one of the triangles");
   const std::uint32_t* at = indices_.data() + std::size_t{3} * triangle;
   const Vec3 a = positions_[at[0]];
   const Vec3 b = positions_[at[1]];
@@ -107,6 +111,7 @@ float TriangleTree::distance(Vec3 point, float most) const {
     const auto away = [&](std::uint32_t child) {
       return squared_distance_from_box(point, nodes_[child].min, nodes_[child].max);
     };
+    QUOIN_ASSERT(depth + 2 <= open.size(), "a tree of halves is not so deep");
     std::uint32_t near = node.first;
     std::uint32_t far = near + 1;
     if (away(far) < away(near)) std::swap(near, far);

@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
+
 #include "core/worker_count.h"
 
 namespace quoin {
@@ -81,7 +83,7 @@ struct ImpostorCache::Impl {
   Entries entries;
   std::deque<GridHandle> queue;  // of the entries that wait
   std::size_t building = 0;
-  ImpostorCacheStats stats;
+  Stats stats;
   std::uint64_t built_bytes = 0;
   ChangeCursor followed_types;
   std::shared_ptr<const VoxelRegistry> types;
@@ -171,6 +173,7 @@ void ImpostorCache::Impl::work() {
 Entries::iterator ImpostorCache::Impl::next_to_build() {
   for (auto each = queue.begin(); each != queue.end(); ++each) {
     const auto entry = entries.find(*each);
+    QUOIN_ASSERT(entry != entries.end() && entry->second.waiting, "what is queued waits");
     if (entry->second.building) continue;
     queue.erase(each);
     return entry;
@@ -201,6 +204,7 @@ void ImpostorCache::Impl::build(Entries::iterator entry, std::unique_lock<std::m
   const Origin origin = job->origin;
   job.reset();  // what only the snapshot holds goes without the lock
   lock.lock();
+  QUOIN_ASSERT(building != 0 && entry->second.building, "what is built was begun");
   --building;
   Entry& built = entry->second;
   if (std::exchange(built.is_replaced, false)) {
@@ -236,12 +240,14 @@ void ImpostorCache::Impl::put(GridHandle handle, const Origin& origin, std::shar
   }
   ++stats.held;
   stats.bytes += bytes;
+  QUOIN_ASSERT(entry->second.impostor == nullptr, "the one before was released");
   entry->second.impostor = std::move(made);
   entry->second.origin = origin;
 }
 
 void ImpostorCache::Impl::release(Entry& entry) {
   if (entry.impostor == nullptr) return;
+  QUOIN_ASSERT(stats.held != 0 && stats.bytes >= entry.impostor->bytes(), "what is held is counted");
   --stats.held;
   stats.bytes -= entry.impostor->bytes();
   replaced.push_back(std::exchange(entry.impostor, nullptr));
@@ -348,9 +354,9 @@ void ImpostorCache::update_types(const VoxelRegistry& types) {
   impl_->look_at(types);
 }
 
-ImpostorCacheStats ImpostorCache::stats() const {
+ImpostorCache::Stats ImpostorCache::stats() const {
   const std::lock_guard lock(impl_->mutex);
-  ImpostorCacheStats stats = impl_->stats;
+  Stats stats = impl_->stats;
   stats.waiting = impl_->queue.size() + impl_->building;
   return stats;
 }

@@ -102,7 +102,7 @@ TEST(ImpostorCache, ThoseOfAnotherScenesGridsAreNotSeenMeanwhile) {
   EXPECT_EQ(cache.find(second.scene, second.grids[0]), nullptr);
   EXPECT_EQ(cache.wait(second.scene), 0U);
   EXPECT_NE(cache.find(second.scene, second.grids[0]), nullptr);
-  const ImpostorCacheStats stats = cache.stats();
+  const ImpostorCache::Stats stats = cache.stats();
   EXPECT_EQ(stats.held, 1U);
   EXPECT_EQ(stats.bytes, cache.find(second.scene, second.grids[0])->bytes());
 }

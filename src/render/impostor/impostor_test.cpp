@@ -208,8 +208,8 @@ void expect_same_level(const ImpostorFaces::Level& a, const ImpostorFaces::Level
 
 void expect_same(const Impostor& a, const Impostor& b) {
   ASSERT_EQ(a.empty(), b.empty());
-  EXPECT_EQ(a.box().min, b.box().min);
-  EXPECT_EQ(a.box().max, b.box().max);
+  EXPECT_EQ(a.bounds().min, b.bounds().min);
+  EXPECT_EQ(a.bounds().max, b.bounds().max);
   EXPECT_EQ(a.content().centre, b.content().centre);
   const ImpostorFaces& x = ImpostorFaces::of(a);
   const ImpostorFaces& y = ImpostorFaces::of(b);

@@ -10,7 +10,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "grid/chunk_order.h"
+#include "core/coordinates/chunk_order.h"
 #include "trace/density/smooth_normal.h"
 
 namespace quoin {

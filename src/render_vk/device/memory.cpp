@@ -5,6 +5,8 @@
 #include <iterator>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::vulkan {
 namespace {
 
@@ -127,8 +129,12 @@ Result<Place> DeviceMemory::allocate(VkDeviceSize wanted, const std::string& doi
 void DeviceMemory::release(Place& place) {
   const Place old = std::exchange(place, {});
   if (old.size == 0) return;
+  QUOIN_ASSERT(old.block < blocks_.size() && blocks_[old.block] != nullptr, "a place of a block that is there");
   std::map<VkDeviceSize, VkDeviceSize>& free = blocks_[old.block]->free;
-  auto at = free.emplace(old.offset, old.size).first;
+  const auto [freed, is_new] = free.emplace(old.offset, old.size);
+  QUOIN_ASSERT(is_new, "each place is given back once");
+  auto at = freed;
+  QUOIN_ASSERT(std::next(at) == free.end() || at->first + at->second <= std::next(at)->first, "gaps lie apart");
   if (const auto next = std::next(at); next != free.end() && at->first + at->second == next->first) {
     at->second += next->second;
     free.erase(next);
@@ -146,6 +152,7 @@ void DeviceMemory::release(Place& place) {
 }
 
 Status DeviceMemory::write(const Place& place, std::span<const std::byte> bytes, VkDeviceSize offset) {
+  QUOIN_ASSERT(offset + bytes.size() <= place.size || bytes.empty(), "bytes within the place");
   written_ += bytes.size();
   if (staging_.handle() == VK_NULL_HANDLE && !bytes.empty()) {
     auto staging = Buffer::create(*device_, kStagingBytes, Buffer::Where::Upload, "uploading");

@@ -76,7 +76,7 @@ struct VulkanRenderer::Impl {
     if (!of_lamps) return of_lamps.error();
     auto of_levels = level_table(light, threads);
     if (!of_levels) return of_levels.error();
-    return vulkan::DeviceLight{std::move(*of_lamps), std::move(*of_levels)};
+    return vulkan::DeviceLight{std::move(*of_lamps), *of_levels};
   }
 
   LampCache lamps;

@@ -13,7 +13,7 @@
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 #include <quoin/render_vk/vulkan_picture.h>
 
-#include "grid/chunk_order.h"
+#include "core/coordinates/chunk_order.h"
 #include "mesh/surface/material.h"
 #include "render_vk/device/vulkan_for_tests.h"
 

@@ -1,4 +1,4 @@
-// The backdrop: light/sky.h on the processor's side.
+// The backdrop: light/daylight.h on the processor's side.
 
 struct Sky {
   vec3 zenith;

@@ -5,6 +5,8 @@
 #include <bit>
 #include <tuple>
 
+#include <quoin/core/assert.h>
+
 #include "grid/chunk/chunk_storage.h"
 #include "trace/tree_view.h"
 
@@ -36,6 +38,7 @@ class FieldSamples {
 
   [[nodiscard]] Half operator()(IVec3 sample) const {
     const IVec3 at = sample + 1;
+    QUOIN_ASSERT((IBox{IVec3{0}, IVec3{kEdge}}.contains(at)), "a sample of the record");
     return halves_[static_cast<std::size_t>((at.z * kEdge + at.y) * kEdge + at.x)];
   }
   // Whether a box of samples, `max` excluded, is all solid.
@@ -175,6 +178,7 @@ class RecordWriter {
 
  private:
   void put(std::size_t at, std::uint64_t value) {
+    QUOIN_ASSERT(at + 1 < record.words.size(), "words of the record");
     record.words[at] = static_cast<std::uint32_t>(value);
     record.words[at + 1] = static_cast<std::uint32_t>(value >> 32);
   }
@@ -195,6 +199,7 @@ class RecordWriter {
     headers_.push_back(0);
     for (unsigned i = 0; i < 64; ++i) root.mask |= std::uint64_t{node.cells[i] != 0} << i;
     const std::size_t bricks = 4;
+    QUOIN_ASSERT(record.words.size() <= bricks, "the record's only tree");
     record.words.resize(bricks + 4 * static_cast<std::size_t>(std::popcount(root.mask)));
     std::size_t at = bricks;
     bool is_full = root.mask == kAll;

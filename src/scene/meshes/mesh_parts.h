@@ -10,7 +10,7 @@
 
 #include <quoin/scene/scene_meshes.h>
 
-#include "core/progress_part.h"
+#include "core/progress_steps.h"
 
 namespace quoin {
 

@@ -15,8 +15,8 @@
 #include <quoin/grid/copy_box.h>
 #include <quoin/grid/voxel_field.h>
 
-#include "grid/chunk_order.h"
-#include "grid/coordinate_hash.h"
+#include "core/coordinates/chunk_order.h"
+#include "core/coordinates/coordinate_hash.h"
 #include "mesh/surface/bodies.h"
 #include "mesh/surface/build.h"
 #include "scene/meshes/lattices.h"

@@ -19,7 +19,7 @@
 
 #include <quoin/core/vec.h>
 
-#include "grid/density/trilinear.h"
+#include "core/trilinear.h"
 
 namespace quoin {
 

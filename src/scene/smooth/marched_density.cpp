@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/grid/voxel_field.h>
 
 #include "mesh/surface/bodies.h"
@@ -168,6 +169,7 @@ class BodyBorders {
 
   /// Requires: not empty.
   [[nodiscard]] std::uint64_t row(int y, int z) const {
+    QUOIN_ASSERT(!is_empty(), "borders between bodies");
     std::uint64_t found = 0;
     for (int x = 0; x < kChunkEdge; ++x) found |= std::uint64_t{has(x, y, z)} << x;
     return found;

@@ -8,7 +8,7 @@
 
 #include <quoin/grid/voxel_field.h>
 
-#include "grid/chunk_order.h"
+#include "core/coordinates/chunk_order.h"
 #include "scene/smooth/marched_density.h"
 
 namespace quoin {

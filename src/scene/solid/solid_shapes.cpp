@@ -15,8 +15,8 @@
 #include <quoin/grid/changes.h>
 #include <quoin/mesh/quad_triangles.h>
 
-#include "grid/chunk_order.h"
-#include "grid/coordinate_hash.h"
+#include "core/coordinates/chunk_order.h"
+#include "core/coordinates/coordinate_hash.h"
 #include "scene/solid/solid_rows.h"
 #include "trace/chunk_rows.h"
 

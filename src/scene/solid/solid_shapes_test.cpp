@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "grid/chunk_order.h"
+#include "core/coordinates/chunk_order.h"
 #include "mesh/smooth/surface_check_for_tests.h"
 
 namespace quoin {

@@ -4,6 +4,8 @@
 #include <limits>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 namespace {
 
@@ -84,6 +86,7 @@ double InstanceTree::search_cost() const {
 
 void InstanceTree::fit(Node& node) const {
   if (node.count == 0) {
+    QUOIN_ASSERT(node.first > 1 && node.first < nodes_.size(), "children follow their parent");
     const DBox& a = nodes_[node.first - 1].box;
     const DBox& b = nodes_[node.first].box;
     node.box = {glm::min(a.min, b.min), glm::max(a.max, b.max)};
@@ -101,6 +104,7 @@ void InstanceTree::change(std::span<const Change> changes) {
   bool is_stale = false;
   std::vector<bool> above(nodes_.size());
   for (const Change& change : changes) {
+    QUOIN_ASSERT(change.index < boxes_.size(), "one of the boxes");
     boxes_[change.index] = change.box;
     const std::size_t leaf = leaf_of_[change.index];
     is_stale |= (leaf == kNoLeaf) != change.box.empty();
@@ -140,6 +144,7 @@ void InstanceTree::split(std::size_t node, std::span<Item> items, std::size_t be
                      const double at_b = b.twice_centre[axis];
                      return at_a != at_b ? at_a < at_b : a.box < b.box;
                    });
+  QUOIN_ASSERT(begin + items.size() <= order_.size(), "each box stands in one leaf");
   const std::size_t upper = nodes_.size() + 1;
   nodes_[node].axis = axis;
   nodes_[node].first = upper;

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 #include <quoin/trace/ray.h>
 
@@ -59,6 +60,7 @@ class InstanceTree {
       const Node& node = nodes_[stack[--height]];
       if (!may_meet(ray, max_t, node.box)) continue;
       if (node.count == 0) {
+        QUOIN_ASSERT(height + 2 <= kMaxDepth, "a tree of halves is not so deep");
         const bool is_forward = ray.direction[node.axis] >= 0.0;
         stack[height++] = is_forward ? node.first : node.first - 1;
         stack[height++] = is_forward ? node.first - 1 : node.first;
@@ -84,6 +86,7 @@ class InstanceTree {
       const Node& node = nodes_[stack[--height]];
       if (!touches(node.box)) continue;
       if (node.count == 0) {
+        QUOIN_ASSERT(height + 2 <= kMaxDepth, "a tree of halves is not so deep");
         stack[height++] = node.first;
         stack[height++] = node.first - 1;
         continue;

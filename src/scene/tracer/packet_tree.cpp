@@ -5,6 +5,8 @@
 #include <cstring>
 #include <limits>
 
+#include <quoin/core/assert.h>
+
 namespace quoin {
 namespace {
 
@@ -179,6 +181,7 @@ class PacketTree::Builder {
   void put(std::size_t at, const DBox& box, std::uint32_t child, bool is_box, DBox& around) {
     Node& node = nodes_[at];
     const auto slot = static_cast<std::size_t>(std::popcount(node.present));
+    QUOIN_ASSERT(slot < node.children.size(), "four children at most");
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto i = static_cast<int>(axis);
       node.boxes[axis][slot] = rounded_up(box.max[i] - origin_[i]);

@@ -9,7 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "grid/density/trilinear.h"
+#include "core/trilinear.h"
 #include "trace/density/smooth_normal.h"
 #include "trace/kernel/cell.inl"
 #include "trace/walk.h"

@@ -3,9 +3,9 @@
 #include <bit>
 #include <cmath>
 
+#include "core/trilinear.h"
 #include "grid/density/cell_corners.h"
 #include "grid/density/density_storage.h"
-#include "grid/density/trilinear.h"
 #include "trace/kernel/kernel.h"
 
 namespace quoin {

@@ -5,6 +5,8 @@
 
 #include <zlib.h>
 
+#include <quoin/core/assert.h>
+
 #include "io/vox/write/chunk_writer.h"
 
 namespace quoin::vox {
@@ -142,6 +144,8 @@ class ColourBox {
                  static_cast<std::size_t>(size_.z)) {
     visit_voxels(grid, [&](IVec3 voxel, VoxelType type) {
       const IVec3 local = voxel - piece.min;
+      QUOIN_ASSERT((IBox{IVec3{0}, piece.size}.contains(local)), "the piece holds all of the grid");
+      QUOIN_ASSERT(type < index_of_type.size(), "a type that has a colour");
       colours_[place({local.x, piece.size.z - 1 - local.z, local.y})] = static_cast<std::byte>(index_of_type[type]);
     });
   }
@@ -154,7 +158,10 @@ class ColourBox {
   }
   [[nodiscard]] bool contains(IVec3 at) const { return at.x < size_.x && at.y < size_.y && at.z < size_.z; }
   /// What is there; it is air from then on.
-  std::byte take(std::size_t place) { return std::exchange(colours_[place], std::byte{0}); }
+  std::byte take(std::size_t place) {
+    QUOIN_ASSERT(place < colours_.size(), "a place of the box");
+    return std::exchange(colours_[place], std::byte{0});
+  }
   [[nodiscard]] std::span<const std::byte> colours() const { return colours_; }
 
  private:

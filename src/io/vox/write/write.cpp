@@ -9,7 +9,6 @@
 
 #include <quoin/io/vox.h>
 
-#include "io/field_check.h"
 #include "io/text.h"
 #include "io/vox/chunk_reader.h"
 #include "io/vox/materials.h"
@@ -24,6 +23,13 @@
 namespace quoin {
 
 namespace {
+
+// What files of voxels do not hold is not lost in silence.
+Status check_has_no_field(const SceneGrid& grid) {
+  if (grid.field.chunk_count() == 0) return {};
+  return make_error(ErrorCode::Unsupported,
+                    "grid \"" + grid.name + "\" holds a field of densities, which this format does not");
+}
 
 constexpr std::uint32_t kVersion = 150;
 constexpr std::uint32_t kGone = std::numeric_limits<std::uint32_t>::max();

@@ -217,6 +217,24 @@ TEST(VoxWrite, TypesBelow256KeepTheirIndicesNamesAndProperties) {
   }
 }
 
+// MagicaVoxel has no key for it: it is kept under one of Quoin's own, whatever else there is to say of the type.
+TEST(VoxWrite, WhetherATypeCollidesIsKeptWithoutAWarning) {
+  Scene scene = scene_with_types(4);
+  for (VoxelType type = 1; type <= 4; ++type) {
+    VoxelProperties properties = scene.types[type];
+    properties.collides = type % 2 == 0;
+    if (type > 2) properties.emission = 1.0F;
+    scene.types.replace(type, properties);
+  }
+  SceneGrid grid;
+  for (int i = 0; i < 4; ++i) grid.grid.set({i, 0, 0}, static_cast<VoxelType>(i + 1));
+  scene.add_instance({"", scene.add_grid(std::move(grid))});
+  std::vector<std::string> warnings;
+  const Scene again = reread(scene, warnings);
+  EXPECT_TRUE(warnings.empty());
+  for (VoxelType type = 1; type <= 4; ++type) EXPECT_EQ(again.types[type].collides, type % 2 == 0);
+}
+
 TEST(VoxWrite, ManyTypesAreNumberedWhenFewOccur) {
   Scene scene = scene_with_types(1000);
   SceneGrid grid;

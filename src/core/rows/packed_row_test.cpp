@@ -1,4 +1,4 @@
-#include "grid/chunk/packed_row.h"
+#include "core/rows/packed_row.h"
 
 #include <array>
 #include <cstdint>

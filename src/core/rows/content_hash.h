@@ -1,9 +1,8 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
-
-#include <quoin/grid/chunk.h>
 
 namespace quoin {
 
@@ -16,9 +15,9 @@ inline std::uint64_t mixed_with(std::uint64_t hash, std::uint64_t value) {
 inline constexpr std::uint64_t kHashSeed = 0x2D35'8DCC'AA6C'78A5U;
 
 /// Of 64 types or halves.
-inline std::uint64_t hash_of_row(const std::array<std::uint16_t, kChunkEdge>& row) {
+inline std::uint64_t hash_of_row(const std::array<std::uint16_t, 64>& row) {
   std::uint64_t hash = kHashSeed;
-  for (std::size_t x = 0; x < kChunkEdge; x += 4) {
+  for (std::size_t x = 0; x < row.size(); x += 4) {
     const std::uint64_t four = std::uint64_t{row[x]} | std::uint64_t{row[x + 1]} << 16 |
                                std::uint64_t{row[x + 2]} << 32 | std::uint64_t{row[x + 3]} << 48;
     hash = mixed_with(hash, four);

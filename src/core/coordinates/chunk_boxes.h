@@ -6,9 +6,10 @@
 
 #include <tsl/robin_map.h>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
-#include "grid/coordinate_hash.h"
+#include "core/coordinates/coordinate_hash.h"
 
 namespace quoin {
 
@@ -50,6 +51,7 @@ class ChunkBoxes {
     }
     for (int axis = 0; axis < 3 && !boxes_.empty(); ++axis) {
       const auto i = static_cast<std::size_t>(axis);
+      QUOIN_ASSERT(!mins_[i].empty() && !maxs_[i].empty(), "every box is counted");
       around.min[axis] = mins_[i].begin()->first;
       around.max[axis] = maxs_[i].rbegin()->first;
     }
@@ -76,6 +78,7 @@ class ChunkBoxes {
   static void count(std::map<int, int>& ends, int at, int by) {
     const auto found = ends.try_emplace(at, 0).first;
     found->second += by;
+    QUOIN_ASSERT(found->second >= 0, "no box goes that was not counted");
     if (found->second == 0) ends.erase(found);
   }
 

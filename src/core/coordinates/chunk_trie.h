@@ -7,10 +7,9 @@
 #include <new>
 #include <utility>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/ref.h>
 #include <quoin/core/vec.h>
-
-#include "grid/long_box.h"
 
 namespace quoin {
 
@@ -52,10 +51,11 @@ class ChunkTrie {
     return find(chunk.x, chunk.y, chunk.z) == nullptr ? nullptr : &find_or_create(chunk, on_copy);
   }
 
-  /// Likewise, made where it was missing. Requires: is_inside_world(chunk).
+  /// Likewise, made where it was missing. Requires: the chunk's voxels have int32 coordinates.
   template <class OnCopy>
   Entry& find_or_create(IVec3 chunk, OnCopy&& on_copy) {
     const Place at = place_of(chunk.x, chunk.y, chunk.z);
+    QUOIN_ASSERT((at[0] | at[1] | at[2]) < 2 * kOrigin, "its voxels have int32 coordinates");
     if (root_ == nullptr) root_ = Ref<Node>(new Leaf(at));
     Ref<Node>* here = &root_;
     for (;;) {
@@ -86,6 +86,7 @@ class ChunkTrie {
     if (find_to_edit(chunk, on_copy) == nullptr) return false;
     erase_below(root_, place_of(chunk.x, chunk.y, chunk.z));
     --size_;
+    QUOIN_ASSERT((size_ == 0) == (root_ == nullptr), "no nodes without entries");
     return true;
   }
   void clear() {
@@ -193,6 +194,7 @@ class ChunkTrie {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       slot |= (here->prefix[axis] >> down & (kEdge - 1)) << (kLog * static_cast<int>(axis));
     }
+    QUOIN_ASSERT(slot_of(at, level) != slot, "the smallest node that covers both");
     auto inner = std::make_unique<Inner>(level, at);
     inner->children[slot] = std::move(here);
     inner->present = std::uint64_t{1} << slot;
@@ -201,9 +203,11 @@ class ChunkTrie {
 
   // Requires: the entry is there, and nothing on the way to it is shared.
   static void erase_below(Ref<Node>& here, const Place& at) {
+    QUOIN_ASSERT(!here.is_shared(), "the way to an entry is copied before it changes");
     Node& node = *here;
     const unsigned slot = slot_of(at, node.level);
     const std::uint64_t bit = std::uint64_t{1} << slot;
+    QUOIN_ASSERT(covers(node, at) && (node.present & bit) != 0, "the entry is there");
     if (node.level == 0) {
       static_cast<Leaf&>(node).entries[slot] = Entry();
       node.present &= ~bit;
