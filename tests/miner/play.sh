@@ -51,7 +51,7 @@ mean() { convert "$pictures/$1.png" -format "%[fx:round(255*mean.$2)]" info:; }
 other() { convert "$pictures/$1.png" "$pictures/$2.png" -compose difference -composite -colorspace gray -threshold 8% -format '%[fx:round(mean*w*h)]' info:; }
 
 start() {
-  "$miner" --units 4 --edits 0 "$@" >"$work/log" 2>&1 &
+  "$miner" --units 4 --edits 0 --seed 5 "$@" >"$work/log" 2>&1 &
   game=$!
   window="$(timeout 60 xdotool search --sync --onlyvisible --name 'Miner' 2>/dev/null | head -n 1)" || fail "no window"
   until_true 60 is y -gt 0 || fail "the game does not begin"
@@ -121,7 +121,7 @@ stop
 
 echo "landslide"
 start --ships 0
-hold Up 0.1
+hold Down 0.4
 shot before_slide
 xdotool key --delay 80 l
 until_true 30 is fallen -gt 400 || fail "no sand falls"
@@ -132,7 +132,7 @@ stop
 
 echo "ships"
 start --ships 60
-hold Up 0.5
+hold Up 0.1
 for _ in 1 2 3 4 5 6 7 8; do
   shot ships
   shot ships_later

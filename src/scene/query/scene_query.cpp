@@ -264,7 +264,7 @@ std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& 
 }
 
 std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, DVec3 centre, double radius, const QueryFilter& filter) {
-  return overlaps(tracer, Capsule{centre, DVec3(0.0), radius}, filter);
+  return overlaps(tracer, Capsule{radius, centre, DVec3(0.0)}, filter);
 }
 
 std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const Capsule& capsule, const QueryFilter& filter) {

@@ -121,7 +121,8 @@ Contact CapsuleAmongVoxels::meet(IVec3 voxel, double most) const {
     LineGap gap = gap_of_line(apart + fraction * capsule_.displacement, capsule_.half_axis);
     const double left = gap.distance - radius;
     if (step == 0 && left < 0.0) {
-      if (gap.distance == 0.0) gap = way_out_of_line(apart, capsule_.half_axis);
+      // Less is what rounding leaves of a line that goes through the voxel.
+      if (gap.distance < kTouch) gap = way_out_of_line(apart, capsule_.half_axis);
       Contact contact = contact_at(0.0, gap);
       contact.depth = capsule_.radius - gap.distance;
       return contact;
