@@ -70,12 +70,10 @@ void LiveLight::Impl::run() {
     wake.wait(lock, [&] { return is_stopping || asked != nullptr; });
     if (is_stopping) return;
     std::shared_ptr<const Scene> scene = std::exchange(asked, nullptr);
-    std::unique_ptr<LitScene> old = std::exchange(given_up, nullptr);
     lock.unlock();
     std::unique_ptr<LitScene> done;
     std::exception_ptr failed;
     try {
-      old.reset();
       working.light.update(*scene, threads);
       working.scene = std::move(scene);
       done = std::make_unique<LitScene>(LitScene{working.scene, working.light.snapshot()});
@@ -84,11 +82,14 @@ void LiveLight::Impl::run() {
     }
     lock.lock();
     std::swap(ready, done);  // what nobody took
+    // Whoever takes what is ready finds room for what was shown before.
+    std::unique_ptr<LitScene> old = std::exchange(given_up, nullptr);
     failure = failed;
     is_busy = false;
     progressed.notify_all();
     lock.unlock();
     done.reset();
+    old.reset();
     lock.lock();
   }
 }
@@ -125,11 +126,10 @@ void LiveLight::update(const Scene& scene) {
 
 bool LiveLight::take() {
   Impl& me = *impl_;
-  std::unique_ptr<LitScene> before;
   const std::lock_guard lock(me.mutex);
   if (me.ready == nullptr) return false;
   std::swap(*me.ready, me.shown);
-  before = std::exchange(me.given_up, std::move(me.ready));
+  me.given_up = std::move(me.ready);
   return true;
 }
 

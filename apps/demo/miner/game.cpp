@@ -87,8 +87,7 @@ quoin::Status Game::add_ships() {
       ship.voxel_size = 0.5;
       ship.categories = ~kLand;
       const DVec3 velocity = ship.rotation * DVec3(0.0, random(-0.15, 0.15), 1.0) * random(6.0, 14.0);
-      const quoin::OrientedBox box{ship.position, {2.25, 1.0, 4.0}, ship.rotation};
-      ships_.push_back({scene_.add_instance(ship), box, velocity});
+      ships_.push_back({scene_.add_instance(ship), {ship.position, {2.25, 1.0, 4.0}, ship.rotation}, velocity});
     }
   }
   return {};
@@ -148,10 +147,9 @@ FrameTimes Game::step(const Input& input) {
 void Game::edit_elsewhere() {
   quoin::Grid& grid = land();
   for (int i = 0; i < options_.edits; ++i) {
-    const int x = int(random(0.0, size_.x));
-    const int z = int(random(0.0, size_.z));
-    const int y = surface_at(x, z);
-    i % 2 == 0 ? grid.set({x, y, z}, kAir) : grid.set({x, y + 1, z}, stone_);
+    IVec3 at(int(random(0.0, size_.x)), 0, int(random(0.0, size_.z)));
+    at.y = surface_at(at.x, at.z) + i % 2;
+    grid.set(at, i % 2 == 0 ? kAir : stone_);
   }
 }
 
@@ -228,9 +226,8 @@ void Game::fly() {
     ship.box.centre += way;
     for (const int axis : {0, 1, 2}) {
       const double end = axis == 1 ? size_.y + 40.0 : size_[axis];
-      const double at = ship.box.centre[axis];
-      if (at < 5.0) ship.velocity[axis] = std::abs(ship.velocity[axis]);
-      if (at > end - 5.0) ship.velocity[axis] = -std::abs(ship.velocity[axis]);
+      if (ship.box.centre[axis] < 5.0) ship.velocity[axis] = std::abs(ship.velocity[axis]);
+      if (ship.box.centre[axis] > end - 5.0) ship.velocity[axis] = -std::abs(ship.velocity[axis]);
     }
     ship.box.rotation = glm::angleAxis(std::atan2(ship.velocity.x, ship.velocity.z), kUp);
     quoin::Instance& instance = scene_.edit(ship.instance);
@@ -248,11 +245,10 @@ void Game::walk(const Input& input) {
   falling_ -= kUp * (9.81 * 2.0 * kFrame);
   if (input.jumps && moved_.is_on_floor) falling_ = kUp * 8.0;
   const DVec3 ahead(-std::sin(input.yaw), 0.0, -std::cos(input.yaw));
-  DVec3 way = input.ahead * ahead + input.aside * glm::cross(ahead, kUp);
-  if (glm::length(way) > 1.0) way = glm::normalize(way);
+  const DVec3 way = 5.0 * (input.ahead * ahead + input.aside * glm::cross(ahead, kUp));
   quoin::SlideOptions on_foot;
   on_foot.floor = quoin::FloorOptions{kUp, 50.0, 1.05, 0.3};
-  moved_ = move_and_slide(*tracer_, player_, (way * 5.0 + falling_) * kFrame, on_foot);
+  moved_ = move_and_slide(*tracer_, player_, (way + falling_) * kFrame, on_foot);
   player_.centre = moved_.centre;
   falling_ = kUp * (glm::dot(moved_.displacement, kUp) / kFrame);
   if (moved_.is_on_floor) floor_ = scene_.instances()[moved_.floor.instance];

@@ -39,8 +39,6 @@ inline constexpr std::array kParts = {"frame", "edits", "sand", "tracer", "ships
 using FrameTimes = std::array<double, kParts.size()>;
 
 /// A landscape of blocks with caves, a player who walks and digs in it, sand that falls, ships, and others' edits.
-///
-/// Threads: all calls come from one; meshes are made by workers.
 class Game {
  public:
   /// Errors: as generate_terrain.

@@ -48,8 +48,7 @@ void show(SDL_Renderer* renderer, const quoin::Image& image) {
   SDL_Rect all{};
   SDL_RenderGetViewport(renderer, &all);
   SDL_SetRenderDrawColor(renderer, 255, 255, 255, 255);
-  SDL_RenderDrawLine(renderer, all.w / 2 - 6, all.h / 2, all.w / 2 + 6, all.h / 2);
-  SDL_RenderDrawLine(renderer, all.w / 2, all.h / 2 - 6, all.w / 2, all.h / 2 + 6);
+  SDL_RenderDrawPoint(renderer, all.w / 2, all.h / 2);
   SDL_RenderPresent(renderer);
 }
 
@@ -113,8 +112,7 @@ quoin::Status play_in_window(Game& game, const std::string& device) {
     const auto picture = (*draw)(game.camera(), options);
     if (!picture) return picture.error();
     const auto took = Clock::now() - began;
-    if (took > 4 * step) coarse = std::min(coarse + 1, 8);
-    if (took < step) coarse = std::max(coarse - 1, 1);
+    coarse = std::clamp(coarse + int(took > 4 * step) - int(took < step), 1, 8);
     show(renderer, picture->colour);
     SDL_SetWindowTitle(window, game.status().c_str());
   }

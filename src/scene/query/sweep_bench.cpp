@@ -102,8 +102,7 @@ void sweeps(benchmark::State& state, const World& (*world_of)(), Turn turn, doub
 
 // What goes into a box of that size.
 Capsule capsule_in(const OrientedBox& box) {
-  return {box.half_size.x, box.centre,
-          unit_rotation(box.rotation) * DVec3(0.0, box.half_size.y - box.half_size.x, 0.0)};
+  return {box.half_size.x, box.centre, box.rotation * DVec3(0.0, box.half_size.y - box.half_size.x, 0.0)};
 }
 
 void capsule_sweeps(benchmark::State& state, const World& (*world_of)(), Turn turn, double down) {
