@@ -42,6 +42,8 @@ until_true() {
     sleep 0.2
   done
 }
+# Usage: look DOWN: by so many hundredths of a radian
+look() { xdotool mousemove_relative --sync -- 0 "$(($1 * 10 / 3))" || true; sleep 0.3; }
 hold() { xdotool keydown "$1"; sleep "$2"; xdotool keyup "$1"; }
 shot() { sleep 0.5; import -window root "$pictures/$1.png"; }
 # Usage: mean NAME CHANNEL: of a picture, 0 to 255
@@ -51,7 +53,7 @@ mean() { convert "$pictures/$1.png" -format "%[fx:round(255*mean.$2)]" info:; }
 other() { convert "$pictures/$1.png" "$pictures/$2.png" -compose difference -composite -colorspace gray -threshold 8% -format '%[fx:round(mean*w*h)]' info:; }
 
 start() {
-  "$miner" --units 4 --edits 0 --seed 5 "$@" >"$work/log" 2>&1 &
+  "$miner" --units 4 --edits 0 "$@" >"$work/log" 2>&1 &
   game=$!
   window="$(timeout 60 xdotool search --sync --onlyvisible --name 'Miner' 2>/dev/null | head -n 1)" || fail "no window"
   until_true 60 is y -gt 0 || fail "the game does not begin"
@@ -87,7 +89,7 @@ hold w 1.5
 
 echo "dig"
 top="$(said y)"
-hold Down 2
+for _ in 1 2 3 4 5 6; do look 30; done
 for _ in $(seq 60); do
   ! is y -lt $((top - 12)) || break
   xdotool click 1
@@ -120,8 +122,8 @@ shot blue
 stop
 
 echo "landslide"
-start --ships 0
-hold Down 0.4
+start --ships 0 --seed 5
+look 30; look 30
 shot before_slide
 xdotool key --delay 80 l
 until_true 30 is fallen -gt 400 || fail "no sand falls"
@@ -131,8 +133,8 @@ shot after_slide
 stop
 
 echo "ships"
-start --ships 60
-hold Up 0.1
+start --ships 60 --seed 5
+look -5
 for _ in 1 2 3 4 5 6 7 8; do
   shot ships
   shot ships_later

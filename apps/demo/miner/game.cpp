@@ -103,7 +103,6 @@ double Game::random(double low, double high) {
   return low + (high - low) * static_cast<double>(state_ >> 40) / 16'777'216.0;
 }
 
-// Of the land as the tracer has it.
 int Game::surface_at(int x, int z) const {
   quoin::QueryFilter filter;
   filter.categories = kLand;

@@ -27,10 +27,8 @@ struct Input {
   double ahead = 0.0, aside = 0.0;  ///< -1 to 1
   double yaw = 0.0, pitch = 0.0;    ///< of the eye, in radians: 0 looks along -z; above the horizon
   bool jumps = false;
-  bool digs = false;    ///< a ball of radius 2 out of what is looked at
-  bool places = false;  ///< a stone onto it
-  int torch = -1;       ///< one of that colour, 0 to 2, onto it; -1: none
-  bool slides = false;  ///< much sand over it
+  bool digs = false, places = false, slides = false;  ///< out of what is looked at, a stone onto it, sand over it
+  int torch = -1;                                     ///< one of that colour, 0 to 2, onto it; -1: none
 };
 
 /// What a frame took of the caller's thread, in milliseconds, by parts.

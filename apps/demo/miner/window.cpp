@@ -48,7 +48,8 @@ void show(SDL_Renderer* renderer, const quoin::Image& image) {
   SDL_Rect all{};
   SDL_RenderGetViewport(renderer, &all);
   SDL_SetRenderDrawColor(renderer, 255, 255, 255, 255);
-  SDL_RenderDrawPoint(renderer, all.w / 2, all.h / 2);
+  const SDL_Rect cross{all.w / 2 - 2, all.h / 2 - 2, 5, 5};
+  SDL_RenderFillRect(renderer, &cross);
   SDL_RenderPresent(renderer);
 }
 
@@ -59,7 +60,7 @@ bool take_events(Input& input) {
     if (event.type == SDL_QUIT || key == SDLK_ESCAPE) return false;
     if (event.type == SDL_MOUSEMOTION) {
       input.yaw -= 0.003 * event.motion.xrel;
-      input.pitch -= 0.003 * event.motion.yrel;
+      input.pitch = std::clamp(input.pitch - 0.003 * event.motion.yrel, -1.57, 1.57);
     }
     const int button = event.type == SDL_MOUSEBUTTONDOWN ? event.button.button : 0;
     input.digs |= button == SDL_BUTTON_LEFT;
@@ -70,8 +71,6 @@ bool take_events(Input& input) {
   }
   const Uint8* held = SDL_GetKeyboardState(nullptr);
   const auto push = [&](SDL_Scancode plus, SDL_Scancode minus) { return double(held[plus]) - double(held[minus]); };
-  input.yaw += 0.03 * push(SDL_SCANCODE_LEFT, SDL_SCANCODE_RIGHT);
-  input.pitch = std::clamp(input.pitch + 0.03 * push(SDL_SCANCODE_UP, SDL_SCANCODE_DOWN), -1.57, 1.57);
   input.ahead = push(SDL_SCANCODE_W, SDL_SCANCODE_S);
   input.aside = push(SDL_SCANCODE_D, SDL_SCANCODE_A);
   input.jumps = held[SDL_SCANCODE_SPACE] != 0;
