@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 const std::map<std::string, int> kLevels = {{"core", 0},  {"grid", 1},      {"mesh", 2},  {"trace", 2},  {"terrain", 2},
-                                            {"scene", 3}, {"light", 4},     {"live", 4},  {"render", 5}, {"io", 5},
+                                            {"scene", 3}, {"light", 4},     {"live", 5},  {"render", 5}, {"io", 5},
                                             {"store", 5}, {"render_vk", 6}, {"stream", 6}};
 constexpr int kAppsLevel = 7;
 

@@ -17,6 +17,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/axis_orientation.h>
 #include <quoin/core/buffer.h>
+#include <quoin/core/capsule.h>
 #include <quoin/core/changes.h>
 #include <quoin/core/direction.h>
 #include <quoin/core/direction_set.h>
@@ -60,6 +61,7 @@
 #include <quoin/light/propagated_light.h>
 #include <quoin/light/scene_light.h>
 #include <quoin/light/surface_light.h>
+#include <quoin/live/live_light.h>
 #include <quoin/live/live_meshes.h>
 #include <quoin/mesh/array_surface.h>
 #include <quoin/mesh/blocky.h>

@@ -94,6 +94,10 @@ void CpuRenderer::update(Threads threads) {
   impl_->levels.update();
 }
 
+void CpuRenderer::use_light(const SceneLight* light) {
+  impl_->levels.use(light);
+}
+
 Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options, Threads threads,
                                     const Progress& progress) const {
   if (const Status status = check(camera, options); !status) return status.error();

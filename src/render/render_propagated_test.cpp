@@ -69,6 +69,33 @@ TEST(RenderPropagated, ShowsTheLightBetweenTheCornersOfFaces) {
   EXPECT_GT(compared, 3000);
 }
 
+TEST(RenderPropagated, ShowsTheLightThatItIsGivenAsOfTheLastUpdate) {
+  Cave cave;
+  const RenderOptions options = propagated(48, 32);
+  const auto taken = [&](const CpuRenderer& renderer) {
+    return renderer.render(Cave::inside(), options).value().colour.rgb;
+  };
+  CpuRenderer own(cave.scene);
+  CpuRenderer lent(cave.scene);
+  SceneLight light;
+  lent.use_light(&light);
+  const auto open = taken(lent);
+  EXPECT_NE(open, taken(own)) << "light that knows no grid is open sky";
+  light.update(cave.scene);
+  lent.update();
+  EXPECT_EQ(taken(lent), taken(own));
+  cave.scene.edit(cave.grid_handle).grid.fill_box({{-20, -12, -3}, {-16, -9, -1}}, kAir);  // a lamp goes
+  own.update();
+  lent.update();
+  const auto dark = taken(own);
+  EXPECT_NE(taken(lent), dark) << "late";
+  light.update(cave.scene);
+  lent.update();
+  EXPECT_EQ(taken(lent), dark);
+  lent.use_light(nullptr);
+  EXPECT_EQ(taken(lent), dark);
+}
+
 TEST(RenderPropagated, AClosedRoomIsBlackAndOpensWithAnEdit) {
   Cave cave;
   const DVec3 eye = DVec3(Cave::kRoom.min) + 0.9;

@@ -44,6 +44,8 @@ const VulkanDeviceInfo& VulkanRenderer::device() const {
 Status VulkanRenderer::update(const Scene&, InstanceFilter, Threads) {
   return refusal();
 }
+void VulkanRenderer::use_light(const SceneLight*) {}
+
 std::uint64_t VulkanRenderer::uploaded_bytes() const {
   return 0;
 }

@@ -65,22 +65,29 @@ Stand stand_for(const Reach& reach, DVec3 axis, DVec3 forward, double slope) {
 
 }  // namespace
 
-Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov_radians) {
+Result<Camera> look_along(DVec3 position, DVec3 direction, double vertical_fov_radians) {
   if (!is_finite(position)) return make_error(ErrorCode::InvalidArgument, "the camera's position is not finite");
-  if (!is_finite(target)) return make_error(ErrorCode::InvalidArgument, "the point to look at is not finite");
+  if (!is_finite(direction)) return make_error(ErrorCode::InvalidArgument, "the direction to look along is not finite");
   if (!(vertical_fov_radians > 0.0 && vertical_fov_radians < std::numbers::pi)) {
     return make_error(ErrorCode::InvalidArgument,
                       "the field of view is not more than 0 and less than pi radians (180 degrees)");
   }
-  // Halved so that the difference of the greatest numbers is one; then scaled so that no square is lost.
-  const DVec3 half = 0.5 * target - 0.5 * position;
-  const double largest = std::max({std::abs(half.x), std::abs(half.y), std::abs(half.z)});
-  if (!(largest > 0.0)) return make_error(ErrorCode::InvalidArgument, "the camera looks at the point where it stands");
+  // Scaled so that no square is lost.
+  const double largest = std::max({std::abs(direction.x), std::abs(direction.y), std::abs(direction.z)});
+  if (!(largest > 0.0)) return make_error(ErrorCode::InvalidArgument, "the direction to look along is 0");
   Camera camera;
   camera.position = position;
   camera.vertical_fov_radians = vertical_fov_radians;
-  turn(camera, glm::normalize(half / largest));
+  turn(camera, glm::normalize(direction / largest));
   return camera;
+}
+
+Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov_radians) {
+  if (!is_finite(target)) return make_error(ErrorCode::InvalidArgument, "the point to look at is not finite");
+  if (position == target)
+    return make_error(ErrorCode::InvalidArgument, "the camera looks at the point where it stands");
+  // Halved so that the difference of the greatest numbers is one.
+  return look_along(position, 0.5 * target - 0.5 * position, vertical_fov_radians);
 }
 
 glm::dmat4 camera_from_world(const Camera& camera) {

@@ -104,6 +104,23 @@ TEST(Camera, StraightDownAndUpHaveADefinedTop) {
   expect_orthonormal(*look_at({1e-200, 9, 0}, {0, 0, 0}, 1.0));
 }
 
+TEST(Camera, LooksAlongADirectionOfAnyLength) {
+  for (const double length : {1e-300, 1.0, 7.0, 1e300}) {
+    const auto camera = look_along({1, 2, 3}, length * DVec3{1, 0.5, -0.75}, 0.7);
+    ASSERT_TRUE(camera);
+    expect_orthonormal(*camera);
+    const Camera at = *look_at({1, 2, 3}, {3, 3, 1.5}, 0.7);
+    EXPECT_LT(glm::distance(camera->forward, at.forward), 1e-12);
+    EXPECT_EQ(camera->position, at.position);
+    EXPECT_EQ(camera->vertical_fov_radians, 0.7);
+  }
+  for (const DVec3 bad : {DVec3{0.0}, DVec3{kNan, 0, 1}, DVec3{0, kInfinity, 0}}) {
+    EXPECT_FALSE(look_along({1, 1, 1}, bad, 1.0));
+  }
+  EXPECT_FALSE(look_along({1, kNan, 1}, {1, 0, 0}, 1.0));
+  EXPECT_FALSE(look_along({1, 1, 1}, {1, 0, 0}, 0.0));
+}
+
 TEST(Camera, NumbersOfAnySizeWork) {
   constexpr double kMost = std::numeric_limits<double>::max();
   for (const auto& [position, target] : {std::pair{DVec3{-kMost, 0, kMost}, DVec3{kMost, 1, -kMost}},

@@ -61,6 +61,12 @@ unsigned bit_of(IVec3 unit) {
 constexpr std::array<IVec3, 8> kBelow = {IVec3{0, 0, 0}, {-1, 0, 0},  {0, -1, 0},  {-1, -1, 0},
                                          {0, 0, -1},     {-1, 0, -1}, {0, -1, -1}, {-1, -1, -1}};
 
+// Where the next element would make it grow, an eighth more than there is: twice as much would be half of it for long.
+template <class T>
+void make_room(std::vector<T>& all) {
+  if (all.size() == all.capacity()) all.reserve(all.size() + std::max<std::size_t>(all.size() / 8, 64));
+}
+
 struct SlabsOfChunk {
   IVec3 chunk{0};
   ChunkSlabs slabs;
@@ -158,6 +164,7 @@ struct OccupancyTree::Impl {
       free_bricks.pop_back();
       return index;
     }
+    make_room(bricks);
     bricks.emplace_back();
     return static_cast<std::uint32_t>(bricks.size() - 1);
   }
@@ -195,6 +202,7 @@ struct OccupancyTree::Impl {
     std::uint32_t& index = region->nodes[table_index(unit)];
     if (index == 0) {
       if (free_chunks.empty()) {
+        make_room(chunk_nodes);
         chunk_nodes.emplace_back();
         index = static_cast<std::uint32_t>(chunk_nodes.size() - 1);
       } else {

@@ -8,8 +8,6 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
-#include <quoin/terrain/terrain.h>
-
 namespace miner {
 
 namespace {
@@ -18,21 +16,11 @@ using quoin::DVec3;
 using quoin::IVec3;
 using quoin::kAir;
 
-constexpr double kFrame = 1.0 / 60.0;
 constexpr DVec3 kUp{0.0, 1.0, 0.0};
-// Of instances.
-constexpr std::uint32_t kLand = 1;
-constexpr std::uint32_t kShips = 2;
-
-quoin::SlideOptions on_foot() {
-  quoin::SlideOptions options;
-  options.floor = quoin::FloorOptions{kUp, 50.0, 1.05, 0.3};
-  return options;
-}
+constexpr std::uint32_t kLand = 1;  // of instances
 
 quoin::SceneGrid ship_of(quoin::VoxelType hull, quoin::VoxelType light) {
   quoin::SceneGrid ship;
-  ship.name = "ship";
   ship.grid.fill_box({{2, 0, 0}, {7, 2, 16}}, hull);
   ship.grid.fill_box({{0, 1, 5}, {9, 2, 12}}, hull);
   ship.grid.fill_box({{3, 2, 4}, {6, 4, 10}}, hull);
@@ -46,41 +34,35 @@ quoin::SceneGrid ship_of(quoin::VoxelType hull, quoin::VoxelType light) {
 quoin::Result<std::unique_ptr<Game>> Game::create(const GameOptions& options) {
   std::unique_ptr<Game> game(new Game(options));
   if (const auto made = game->make_land(); !made) return made.error();
-  if (const auto made = game->add_ships(); !made) return made.error();
   game->tracer_.emplace(game->scene_);
+  if (const auto made = game->add_ships(); !made) return made.error();
+  game->tracer_->update();
   game->place_player();
-  quoin::Grid& land = game->land();
-  game->known_ = land.snapshot();
-  (void)land.changes_since(game->changes_);
+  game->known_ = game->land().snapshot();
+  game->changes_ = game->known_.cursor();
   return game;
 }
 
 quoin::Status Game::make_land() {
   const auto types = quoin::add_terrain_types(scene_.types);
   if (!types) return types.error();
-  quoin::VoxelProperties torch;
-  torch.name = "torch";
-  torch.colour = {255, 190, 90, 255};
-  torch.emission = 6.0F;
-  torch.collides = false;
-  const auto torch_type = scene_.types.add(torch);
-  if (!torch_type) return torch_type.error();
+  const std::array<quoin::Rgba8, 3> colours{{{255, 170, 60, 255}, {70, 130, 255, 255}, {90, 255, 110, 255}}};
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    quoin::VoxelProperties properties;
+    properties.colour = colours[i];
+    properties.collides = false;
+    properties.emission = 1.0F;
+    const auto torch = scene_.types.add(properties);
+    if (!torch) return torch.error();
+    torches_[i] = *torch;
+  }
   sand_ = types->sand;
   stone_ = types->stone;
-  torch_ = *torch_type;
   const quoin::TerrainOptions terrain{.seed = options_.seed, .size = {options_.units, 8, options_.units}};
   auto grid = quoin::generate_terrain(terrain, *types);
   if (!grid) return grid.error();
   size_ = terrain.size * quoin::kTerrainUnit;
-  heights_.assign(static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.z), 0);
-  grid->for_each_row([&](IVec3 first, std::span<const quoin::VoxelType> row) {
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      auto& height = heights_[static_cast<std::size_t>(first.z * size_.x + first.x) + i];
-      if (row[i] != kAir) height = std::max(height, static_cast<std::int16_t>(first.y));
-    }
-  });
   quoin::SceneGrid land;
-  land.name = "land";
   land.grid = std::move(*grid);
   land_ = scene_.add_grid(std::move(land));
   quoin::Instance instance{"land", land_};
@@ -90,24 +72,22 @@ quoin::Status Game::make_land() {
 }
 
 quoin::Status Game::add_ships() {
-  quoin::VoxelProperties hull;
   for (int kind = 0; kind < 4; ++kind) {
-    hull.name = "hull " + std::to_string(kind);
-    hull.colour = {static_cast<std::uint8_t>(90 + 40 * kind), 100, static_cast<std::uint8_t>(200 - 40 * kind), 255};
+    const auto shade = static_cast<std::uint8_t>(40 * kind);
+    quoin::VoxelProperties hull;
+    hull.colour = {static_cast<std::uint8_t>(90 + shade), 100, static_cast<std::uint8_t>(200 - shade), 255};
     const auto type = scene_.types.add(hull);
     if (!type) return type.error();
-    const quoin::GridHandle grid = scene_.add_grid(ship_of(*type, torch_));
+    const quoin::GridHandle grid = scene_.add_grid(ship_of(*type, torches_[0]));
     for (int i = kind; i < options_.ships; i += 4) {
       quoin::Instance ship{"ship", grid};
       ship.position = {random(20.0, size_.x - 20.0), 0.0, random(20.0, size_.z - 20.0)};
       ship.position.y = surface_at(int(ship.position.x), int(ship.position.z)) + random(10.0, 30.0);
-      const double heading = random(0.0, 6.28);
-      ship.rotation = glm::angleAxis(heading, kUp);
+      ship.rotation = glm::angleAxis(random(0.0, 6.28), kUp);
       ship.voxel_size = 0.5;
-      ship.categories = kShips;
+      ship.categories = ~kLand;
       const DVec3 velocity = ship.rotation * DVec3(0.0, random(-0.15, 0.15), 1.0) * random(6.0, 14.0);
-      const quoin::OrientedBox box{ship.position, {2.25, 1.0, 4.0}, ship.rotation};
-      ships_.push_back({scene_.add_instance(ship), box, velocity});
+      ships_.push_back({scene_.add_instance(ship), {ship.position, {2.25, 1.0, 4.0}, ship.rotation}, velocity});
     }
   }
   return {};
@@ -124,35 +104,41 @@ double Game::random(double low, double high) {
 }
 
 int Game::surface_at(int x, int z) const {
-  return heights_[static_cast<std::size_t>(std::clamp(z, 0, size_.z - 1) * size_.x + std::clamp(x, 0, size_.x - 1))];
+  quoin::QueryFilter filter;
+  filter.categories = kLand;
+  const auto hit = first_hit(*tracer_, {{x + 0.5, size_.y + 1.0, z + 0.5}, -kUp}, size_.y, filter);
+  return hit ? hit->voxel.y : 0;
 }
 
 FrameTimes Game::step(const Input& input) {
   using Clock = std::chrono::steady_clock;
-  FrameTimes times;
+  FrameTimes times{};
   auto last = Clock::now();
-  const auto done = [&](FrameTimes::Part part) {
+  const auto done = [&](Part part) {
     const auto now = Clock::now();
-    times.parts.at(part) += std::chrono::duration<double, std::milli>(now - last).count();
+    times.at(part) = std::chrono::duration<double, std::milli>(now - last).count();
+    times.at(Total) += times.at(part);
     last = now;
   };
   edit_elsewhere();
   if (options_.slide_chunks > 0) slide();
   act(input);
-  done(FrameTimes::Edits);
+  done(Edits);
   note_changes();
   drop_sand();
-  done(FrameTimes::Sand);
+  done(Sand);
   tracer_->update();
-  done(FrameTimes::Tracer);
+  done(Tracer);
   fly();
-  done(FrameTimes::Ships);
+  done(Ships);
   walk(input);
-  done(FrameTimes::Player);
-  meshes_.update(scene_, eye());
+  done(Player);
+  if (options_.meshes) meshes_.update(scene_, eye());
   (void)meshes_.take();  // a renderer would upload them
-  done(FrameTimes::Meshes);
-  for (const double part : times.parts) times.total += part;
+  done(Meshes);
+  light_.update(scene_);
+  light_.take();
+  done(Light);
   return times;
 }
 
@@ -160,10 +146,9 @@ FrameTimes Game::step(const Input& input) {
 void Game::edit_elsewhere() {
   quoin::Grid& grid = land();
   for (int i = 0; i < options_.edits; ++i) {
-    const int x = int(random(0.0, size_.x));
-    const int z = int(random(0.0, size_.z));
-    const int y = surface_at(x, z);
-    i % 2 == 0 ? grid.set({x, y, z}, kAir) : grid.set({x, y + 1, z}, stone_);
+    IVec3 at(int(random(0.0, size_.x)), 0, int(random(0.0, size_.z)));
+    at.y = surface_at(at.x, at.z) + i % 2;
+    grid.set(at, i % 2 == 0 ? kAir : stone_);
   }
 }
 
@@ -200,12 +185,11 @@ void Game::drop_sand() {
   std::vector<quoin::PlacedVoxel> moves;
   for (const IVec3 voxel : std::exchange(loose_, {})) {
     const IVec3 below = voxel - IVec3{0, 1, 0};
-    const IVec3 above = voxel + IVec3{0, 1, 0};
     if (voxel.y <= 0 || grid.get(voxel) != sand_ || grid.get(below) != kAir) continue;
     moves.push_back({voxel, kAir});
     moves.push_back({below, sand_});
     loose_.push_back(below);
-    if (grid.get(above) == sand_) loose_.push_back(above);
+    if (grid.get(voxel + IVec3{0, 1, 0}) == sand_) loose_.push_back(voxel + IVec3{0, 1, 0});
     ++sand_fallen_;
   }
   grid.set(moves);
@@ -214,20 +198,17 @@ void Game::drop_sand() {
 }
 
 void Game::act(const Input& input) {
-  if (!input.digs && !input.lights) return;
-  const DVec3 ahead(-std::sin(input.yaw) * std::cos(input.pitch), std::sin(input.pitch),
-                    -std::cos(input.yaw) * std::cos(input.pitch));
+  gaze_ = quoin::direction_of(glm::degrees(input.yaw), glm::degrees(-input.pitch));
+  if (!input.digs && !input.places && input.torch < 0 && !input.slides) return;
   quoin::QueryFilter filter;
   filter.categories = kLand;
-  const auto hit = first_hit(*tracer_, {eye(), ahead}, 8.0, filter);
+  const auto hit = first_hit(*tracer_, {eye(), gaze_}, input.slides ? 60.0 : 8.0, filter);
   if (!hit) return;
-  if (input.digs) land().fill_sphere(hit->position - 0.5 * hit->normal, 2.0, kAir);
-  if (!input.lights) return;
   const IVec3 before = quoin::voxel_of(hit->position + 0.5 * hit->normal);
-  land().set(before, torch_);
-  quoin::Lamp lamp;
-  lamp.position = DVec3(before) + 0.5;
-  scene_.lamps.push_back(lamp);
+  if (input.digs) land().fill_sphere(hit->position - 0.5 * hit->normal, 2.0, kAir);
+  if (input.places) land().set(before, stone_);
+  if (input.torch >= 0) land().set(before, torches_.at(std::size_t(input.torch)));
+  if (input.slides) land().fill_sphere(eye() + std::max(hit->t, 14.0) * gaze_ + 14.0 * kUp, 5.0, sand_);
 }
 
 // Off whatever they meet, but for themselves, and off the ends of the world.
@@ -244,12 +225,10 @@ void Game::fly() {
     ship.box.centre += way;
     for (const int axis : {0, 1, 2}) {
       const double end = axis == 1 ? size_.y + 40.0 : size_[axis];
-      const double at = ship.box.centre[axis];
-      if (at < 5.0) ship.velocity[axis] = std::abs(ship.velocity[axis]);
-      if (at > end - 5.0) ship.velocity[axis] = -std::abs(ship.velocity[axis]);
+      if (ship.box.centre[axis] < 5.0) ship.velocity[axis] = std::abs(ship.velocity[axis]);
+      if (ship.box.centre[axis] > end - 5.0) ship.velocity[axis] = -std::abs(ship.velocity[axis]);
     }
-    const double heading = std::atan2(ship.velocity.x, ship.velocity.z);
-    ship.box.rotation = glm::angleAxis(heading, kUp);
+    ship.box.rotation = glm::angleAxis(std::atan2(ship.velocity.x, ship.velocity.z), kUp);
     quoin::Instance& instance = scene_.edit(ship.instance);
     instance.position = ship.box.centre;
     instance.rotation = ship.box.rotation;
@@ -264,14 +243,23 @@ void Game::walk(const Input& input) {
   }
   falling_ -= kUp * (9.81 * 2.0 * kFrame);
   if (input.jumps && moved_.is_on_floor) falling_ = kUp * 8.0;
-  moved_ = move_and_slide(*tracer_, player_, (input.walk * 5.0 + falling_) * kFrame, on_foot());
+  const DVec3 ahead(-std::sin(input.yaw), 0.0, -std::cos(input.yaw));
+  const DVec3 way = 5.0 * (input.ahead * ahead + input.aside * glm::cross(ahead, kUp));
+  quoin::SlideOptions on_foot;
+  on_foot.floor = quoin::FloorOptions{kUp, 50.0, 1.05, 0.3};
+  moved_ = move_and_slide(*tracer_, player_, (way + falling_) * kFrame, on_foot);
   player_.centre = moved_.centre;
   falling_ = kUp * (glm::dot(moved_.displacement, kUp) / kFrame);
   if (moved_.is_on_floor) floor_ = scene_.instances()[moved_.floor.instance];
+  if (player_.centre.y < -50.0) place_player();
 }
 
-Game::Memory Game::memory() const {
-  return {known_.bytes(), tracer_->bytes()};
+std::string Game::status() const {
+  const IVec3 at = quoin::voxel_of(eye());
+  const quoin::LightLevels levels = light_.shown().of(land_).light->at(at);
+  const int lamps = std::max({levels.red, levels.green, levels.blue});
+  return "Miner at " + std::to_string(at.x) + " " + std::to_string(at.y) + " " + std::to_string(at.z) + ", sky " +
+         std::to_string(levels.sky) + ", lamps " + std::to_string(lamps) + ", fallen " + std::to_string(sand_fallen_);
 }
 
 }  // namespace miner

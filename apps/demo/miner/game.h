@@ -4,43 +4,39 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
-#include <quoin/live/live_meshes.h>
-#include <quoin/scene/sweep.h>
+#include <quoin/quoin.h>
 
 namespace miner {
+
+inline constexpr double kFrame = 1.0 / 60.0;
 
 struct GameOptions {
   int units = 32;          ///< of 32 voxels along x and z; the world is 8 high
   int ships = 200;         ///< that fly about and bounce off what they meet
   int edits = 20;          ///< a frame, scattered over the land: what other players do
   int slide_chunks = 0;    ///< chunks that a landslide touches in a frame; 0: none
+  bool meshes = true;      ///< whether they are made, for a renderer that would draw them
   std::uint64_t seed = 7;  ///< of the land, the ships and the edits
 };
 
 /// What the player wants in a frame.
 struct Input {
-  quoin::DVec3 walk{0.0};  ///< in the world, level, at most 1 long
-  double yaw = 0.0;        ///< of the eye, in radians about y; 0 looks along -z
-  double pitch = 0.0;      ///< above the horizon
+  double ahead = 0.0, aside = 0.0;  ///< -1 to 1
+  double yaw = 0.0, pitch = 0.0;    ///< of the eye, in radians: 0 looks along -z; above the horizon
   bool jumps = false;
-  bool digs = false;    ///< a ball of radius 2 out of what is looked at
-  bool lights = false;  ///< a torch onto what is looked at
+  bool digs = false, places = false, slides = false;  ///< out of what is looked at, a stone onto it, sand over it
+  int torch = -1;                                     ///< one of that colour, 0 to 2, onto it; -1: none
 };
 
-/// What a frame took of the caller's thread, in milliseconds.
-struct FrameTimes {
-  enum Part : std::uint8_t { Edits, Sand, Tracer, Ships, Player, Meshes };
-  static constexpr std::size_t kParts = 6;
-  static constexpr std::array<const char*, kParts> kNames = {"edits", "sand", "tracer", "ships", "player", "meshes"};
-  std::array<double, kParts> parts{};
-  double total = 0.0;
-};
+/// What a frame took of the caller's thread, in milliseconds, by parts.
+enum Part : std::uint8_t { Total, Edits, Sand, Tracer, Ships, Player, Meshes, Light };
+inline constexpr std::array kParts = {"frame", "edits", "sand", "tracer", "ships", "player", "meshes", "light"};
+using FrameTimes = std::array<double, kParts.size()>;
 
 /// A landscape of blocks with caves, a player who walks and digs in it, sand that falls, ships, and others' edits.
-///
-/// Threads: all calls come from one; meshes are made by workers.
 class Game {
  public:
   /// Errors: as generate_terrain.
@@ -50,15 +46,16 @@ class Game {
   FrameTimes step(const Input& input);
 
   [[nodiscard]] const quoin::Scene& scene() const { return scene_; }
+  [[nodiscard]] const quoin::SceneTracer& tracer() const { return *tracer_; }
+  [[nodiscard]] quoin::LiveLight& light() { return light_; }
   [[nodiscard]] quoin::LiveMeshes& meshes() { return meshes_; }
   [[nodiscard]] quoin::DVec3 eye() const { return player_.centre + quoin::DVec3(0.0, 0.7, 0.0); }
+  [[nodiscard]] quoin::Camera camera() const { return quoin::look_along(eye(), gaze_, 1.2).value(); }
   [[nodiscard]] const quoin::SlideResult& player() const { return moved_; }
   [[nodiscard]] std::int64_t sand_fallen() const { return sand_fallen_; }
-  /// Bytes of the land's voxels and of all trees.
-  struct Memory {
-    std::size_t voxels = 0, trees = 0;
-  };
-  [[nodiscard]] Memory memory() const;
+  /// Where the player is and how light it is there, sky and lamps.
+  [[nodiscard]] std::string status() const;
+  [[nodiscard]] std::size_t voxel_bytes() const { return known_.bytes(); }
 
  private:
   struct Ship {
@@ -86,14 +83,15 @@ class Game {
   std::uint64_t state_;
   quoin::Scene scene_;
   quoin::GridHandle land_;
-  quoin::VoxelType sand_ = 0, torch_ = 0, stone_ = 0;
+  quoin::VoxelType sand_ = 0, stone_ = 0;
+  std::array<quoin::VoxelType, 3> torches_{};
   quoin::IVec3 size_{0};
-  std::vector<std::int16_t> heights_;  // as generated, by x and z
   std::optional<quoin::SceneTracer> tracer_;
   quoin::LiveMeshes meshes_;
+  quoin::LiveLight light_;
   std::vector<Ship> ships_;
   quoin::OrientedBox player_{{0, 0, 0}, {0.3, 0.9, 0.3}};
-  quoin::DVec3 falling_{0.0};
+  quoin::DVec3 falling_{0.0}, gaze_{0, 0, -1};
   quoin::SlideResult moved_;
   quoin::Instance floor_;  // as it was in the last frame
   quoin::ChangeCursor changes_;
@@ -101,5 +99,9 @@ class Game {
   std::vector<quoin::IVec3> loose_;  // voxels whose support has to be looked at
   std::int64_t sand_fallen_ = 0;
 };
+
+/// Plays in a window until it is closed, drawn by the Vulkan device of that name or number (empty: a graphics card) or,
+/// where there is none or it is `cpu`, by the processor. Errors: Unsupported without a display or such a device.
+[[nodiscard]] quoin::Status play_in_window(Game& game, const std::string& device);
 
 }  // namespace miner

@@ -1,9 +1,11 @@
-// A small game on Quoin. Without a window: plays itself for some frames and says what they took.
+// A small game on Quoin, in a window; or it plays itself for some frames and says what they took.
+#include <malloc.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <fstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -15,91 +17,88 @@
 
 namespace {
 
-double percentile(std::vector<double> all, double share) {
-  if (all.empty()) return 0.0;
-  std::sort(all.begin(), all.end());
-  const auto i = static_cast<std::size_t>(std::lround(share * static_cast<double>(all.size() - 1)));
-  return all[i];
-}
-
 // Walks in a wide circle, jumps now and then, digs and lights.
 miner::Input played(int frame) {
   miner::Input input;
   input.yaw = 0.004 * frame;
   input.pitch = -0.9;
-  input.walk = {-std::sin(input.yaw), 0.0, -std::cos(input.yaw)};
+  input.ahead = 1.0;
   input.jumps = frame % 90 == 60;
   input.digs = frame % 15 == 0;
-  input.lights = frame % 300 == 299;
+  input.torch = frame % 300 == 299 ? frame / 300 % 3 : -1;
   return input;
 }
 
-struct Run {
-  int frames = 600;
-  int warm_up = 60;
-  bool paced = true;
-  bool json = false;
-};
+nlohmann::ordered_json percentiles(std::vector<double> all) {
+  std::sort(all.begin(), all.end());
+  const auto at = [&](double share) { return all.at(std::size_t(std::lround(share * double(all.size() - 1)))); };
+  return {{"median", at(0.5)}, {"p99", at(0.99)}, {"max", at(1.0)}};
+}
 
-int play(miner::Game& game, const Run& run) {
-  using Clock = std::chrono::steady_clock;
-  std::vector<double> totals;
-  std::vector<std::vector<double>> parts(miner::FrameTimes::kParts);
+// Of the whole process, as glibc has it, without what was freed.
+double resident_bytes() {
+  malloc_trim(0);
+  double all = 0.0, resident = 0.0;
+  std::ifstream("/proc/self/statm") >> all >> resident;
+  return 4096.0 * resident;
+}
+
+int play(miner::Game& game, int frames, bool paced, bool as_json) {
+  std::array<std::vector<double>, miner::kParts.size()> times;
   game.meshes().finish(game.scene(), game.eye());
-  (void)game.meshes().take();
-  auto next = Clock::now();
-  for (int frame = 0; frame < run.frames + run.warm_up; ++frame) {
-    const miner::FrameTimes times = game.step(played(frame));
+  game.light().finish(game.scene());
+  auto next = std::chrono::steady_clock::now();
+  for (int frame = -60; frame < frames; ++frame) {
+    const miner::FrameTimes taken = game.step(played(frame));
     next += std::chrono::microseconds(16'667);
-    if (run.paced) std::this_thread::sleep_until(next);
-    if (frame < run.warm_up) continue;
-    totals.push_back(times.total);
-    for (std::size_t i = 0; i < parts.size(); ++i) parts[i].push_back(times.parts.at(i));
+    if (paced) std::this_thread::sleep_until(next);
+    for (std::size_t i = 0; frame >= 0 && i < taken.size(); ++i) times.at(i).push_back(taken.at(i));
   }
-  const miner::Game::Memory memory = game.memory();
-  const auto solid = game.scene().voxel_count();
-  nlohmann::ordered_json json{{"frames", run.frames}, {"solid_voxels", solid}};
-  json["frame_ms"] = {
-      {"median", percentile(totals, 0.5)}, {"p99", percentile(totals, 0.99)}, {"max", percentile(totals, 1.0)}};
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    json["parts_ms"][miner::FrameTimes::kNames.at(i)] = {{"median", percentile(parts[i], 0.5)},
-                                                         {"p99", percentile(parts[i], 0.99)}};
-  }
-  json["tree_bytes_a_voxel"] = double(memory.trees) / double(solid);
-  json["voxel_bytes"] = memory.voxels;
+  const auto solid = double(game.scene().voxel_count());
+  nlohmann::ordered_json json{{"frames", frames}, {"solid_voxels", game.scene().voxel_count()}};
+  json["frame_ms"] = percentiles(times.at(miner::Total));
+  for (std::size_t i = 1; i < times.size(); ++i) json["parts_ms"][miner::kParts.at(i)] = percentiles(times.at(i));
+  const std::size_t trees = game.tracer().bytes(), light = game.light().shown().bytes();
+  json["tree_bytes_a_voxel"] = double(trees) / solid;
+  json["light_bytes_a_voxel"] = double(light) / solid;
+  json["voxel_bytes"] = game.voxel_bytes();
+  json["other_bytes"] = resident_bytes() - double(trees + light + game.voxel_bytes());
   json["sand_fallen"] = game.sand_fallen();
   json["player"] = {game.player().centre.x, game.player().centre.y, game.player().centre.z};
   json["pending"] = game.meshes().pending();
-  if (run.json) {
-    std::printf("%s\n", json.dump(2).c_str());
-  } else {
-    std::printf("%d frames of the caller's thread: median %.2f ms, 99th percentile %.2f, longest %.2f\n", run.frames,
-                percentile(totals, 0.5), percentile(totals, 0.99), percentile(totals, 1.0));
-  }
+  std::printf("%s\n", as_json ? json.dump(2).c_str() : json["frame_ms"].dump().c_str());
   return 0;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("A small game on Quoin: walk, dig and light a landscape of blocks, among ships.");
+  CLI::App app(
+      "A small game on Quoin: walk (WASD, space, mouse), dig and place (buttons), torches (1 to 3), sand (L).");
   miner::GameOptions options;
-  Run run;
-  app.add_option("--frames", run.frames, "play itself for so many frames, without a window")
-      ->check(CLI::PositiveNumber);
+  int frames = 0;
+  bool paced = true, as_json = false;
+  std::string device;
+  app.add_option("--frames", frames, "play itself for so many, without a window")->check(CLI::PositiveNumber);
+  app.add_option("--device", device, "Vulkan device to draw with, by name or number; cpu: none");
   app.add_option("--units", options.units, "of 32 voxels: how wide the world is")->check(CLI::Range(4, 128));
   app.add_option("--ships", options.ships, "how many fly about")->check(CLI::Range(0, 10'000));
   app.add_option("--edits", options.edits, "a frame, all over the land")->check(CLI::Range(0, 10'000));
-  app.add_option("--landslides", options.slide_chunks, "chunks that a landslide touches a frame")
+  app.add_option("--landslides", options.slide_chunks, "chunks in which sand falls a frame")
       ->check(CLI::Range(0, 10'000));
   app.add_option("--seed", options.seed, "of the land");
-  app.add_flag("!--unpaced", run.paced, "without waiting for a sixtieth of a second a frame");
-  app.add_flag("--json", run.json, "figures as JSON");
+  app.add_flag("!--unpaced", paced, "without waiting for a sixtieth of a second a frame");
+  app.add_flag("--json", as_json, "all figures");
   CLI11_PARSE(app, argc, argv);
+  options.meshes = frames > 0;
   const auto game = miner::Game::create(options);
-  if (!game) {
-    std::fprintf(stderr, "quoin_miner: %s\n", quoin::to_string(game.error()).c_str());
-    return 1;
-  }
-  return play(**game, run);
+  quoin::Status ended = game ? quoin::Status{} : game.error();
+  if (game && frames > 0) return play(**game, frames, paced, as_json);
+#ifdef MINER_HAS_WINDOW
+  if (game) ended = miner::play_in_window(**game, device);
+#else
+  if (game) ended = quoin::make_error(quoin::ErrorCode::Unsupported, "built without SDL2: no window; see --frames");
+#endif
+  if (!ended) std::fprintf(stderr, "quoin_miner: %s\n", quoin::to_string(ended.error()).c_str());
+  return ended ? 0 : 1;
 }

@@ -59,7 +59,8 @@ struct PropagatedLightOptions {
 ///          closes), times the level. The first: some tenths of a millisecond a chunk.
 /// Memory:  a bit a voxel, channel and bit of its levels, where these are not the same in a slab of 64x4x4 voxels; less
 ///          where rows are alike.
-/// Threads: any number may read at once; an update needs it to itself.
+/// Threads: any number may read at once, and take snapshots; an update needs it to itself. A snapshot is light of its
+///          own: LiveLight updates on a worker while the game shows what was there before.
 /// Source:  levels as block games have them; spread by whole words instead of a queue.
 class PropagatedLight {
  public:
@@ -71,6 +72,11 @@ class PropagatedLight {
   /// Takes over what was edited since the last update, or all of another grid or where types pass or give off another
   /// light. When it throws (bad_alloc), the next update begins anew.
   void update(const Grid& grid, const VoxelRegistry& types, Threads threads = {});
+
+  /// The light as it is now; later updates of either do not reach the other. A cursor that read this one's changes reads
+  /// on in the snapshot, and the other way round, until the snapshot is updated itself, which goes on from what it is.
+  /// Cost: some pointers; an update copies of what the two share no more than it changes, in slabs of 64x4x4 voxels.
+  [[nodiscard]] PropagatedLight snapshot() const;
 
   /// As of the last update. Of an opaque voxel: what it gives off.
   [[nodiscard]] LightLevels at(IVec3 voxel) const;
@@ -88,6 +94,7 @@ class PropagatedLight {
 
  private:
   struct Impl;
+  explicit PropagatedLight(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
 

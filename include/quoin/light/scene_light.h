@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <map>
 #include <memory>
 
@@ -30,17 +31,24 @@ struct GridLight {
 ///         which anything changed.
 class SceneLight {
  public:
-  SceneLight();
+  explicit SceneLight(PropagatedLightOptions options = {});
   SceneLight(SceneLight&&) noexcept;
   SceneLight& operator=(SceneLight&&) noexcept;
   ~SceneLight();
 
   void update(const Scene& scene, Threads threads = {});
-  /// As of the last update. Requires: the scene had this grid then.
+  /// As PropagatedLight::snapshot, of each grid; GridLight::voxels stays that of the last updates' scene, which must
+  /// outlive it, but for grids with fields.
+  [[nodiscard]] SceneLight snapshot() const;
+  /// As of the last update. Of a grid that the scene did not have then: nothing but open sky.
   [[nodiscard]] GridLight of(GridHandle grid) const;
+  /// Of all light, also what snapshots share.
+  [[nodiscard]] std::size_t bytes() const;
 
  private:
   struct Entry;
+  PropagatedLightOptions options_;
+  std::unique_ptr<Entry> unknown_;  // what grids that are not there have
   std::map<GridHandle, std::unique_ptr<Entry>> grids_;
 };
 

@@ -8,6 +8,7 @@
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/light/light_options.h>
+#include <quoin/light/scene_light.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
@@ -64,6 +65,11 @@ class CpuRenderer {
   /// Cost:     that of SceneTracer::update, and the types' colours. Impostors of edited grids are built anew when they
   ///           are needed.
   void update(Threads threads = {});
+
+  /// Has pictures with LightModel::Propagated show light that the caller keeps, in place of light of the renderer's own;
+  /// null: its own. Until `update` takes over what changed in the light, as in the scene, it stays as it is.
+  /// Requires: no picture is being taken. Lifetime: the light must outlive the renderer, or its use.
+  void use_light(const SceneLight* light);
 
   /// One picture. The same bytes for any number of threads and any instruction set.
   ///

@@ -79,6 +79,8 @@ class VulkanRenderer {
   /// Memory: of a field 700 bytes for each 4^3 cells at its surface, beside its tree.
   [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible,
                               Threads threads = {});
+  /// As CpuRenderer::use_light; also of the renderer's VulkanMeshRenderers.
+  void use_light(const SceneLight* light);
   /// Bytes that the last `update` sent to the device.
   [[nodiscard]] std::uint64_t uploaded_bytes() const;
 

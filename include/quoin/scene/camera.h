@@ -37,6 +37,11 @@ struct Camera {
 ///         than 0 and less than pi.
 [[nodiscard]] Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov_radians);
 
+/// Likewise, one that looks along `direction`, of any length.
+///
+/// Errors: InvalidArgument when a number is not finite, the direction is 0, or the field of view is as above.
+[[nodiscard]] Result<Camera> look_along(DVec3 position, DVec3 direction, double vertical_fov_radians);
+
 /// The view matrix: x to the right, y up, and -z forward, as glTF's cameras and
 /// glm::perspective(camera.vertical_fov_radians, aspect, near, far) expect.
 [[nodiscard]] glm::dmat4 camera_from_world(const Camera& camera);

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/capsule.h>
 #include <quoin/core/direction.h>
 #include <quoin/core/oriented_box.h>
 #include <quoin/core/vec.h>
@@ -86,10 +87,10 @@ struct SceneOverlap {
   DVec3 normal{0.0};  ///< of a field its gradient at a point within the shape, in the world, unit; otherwise 0
 };
 
-/// For each instance that has such a voxel within a sphere or a box, the first of these (z, then y, then x), in
+/// For each instance that has such a voxel within a sphere, a box or a capsule, the first of these (z, then y, then x), in
 /// the order of the instances; of one without, the first cell in which its field is negative anywhere within the shape,
 /// unless that is less than 1e-6 voxels deep. To touch is not to overlap. Numbers that are not finite or negative meet
-/// nothing, nor does a sphere of radius 0; a box of size 0 is a plate, a rod or a point.
+/// nothing, nor does a radius of 0; a box of size 0 is a plate, a rod or a point.
 ///
 /// Fields:  which cells collide, and what bounds do not tell, is as for `sweep_box`; the latter counts as overlapping.
 /// Cost:    O(log instances), and for each instance near it the voxels within the shape's bounds until one is found.
@@ -97,6 +98,8 @@ struct SceneOverlap {
 [[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, DVec3 centre, double radius,
                                                  const QueryFilter& filter = {});
 [[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const OrientedBox& box,
+                                                 const QueryFilter& filter = {});
+[[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const Capsule& capsule,
                                                  const QueryFilter& filter = {});
 
 }  // namespace quoin

@@ -30,6 +30,10 @@ class LightDomain {
     Range before, now;
   };
 
+  [[nodiscard]] bool has_voxels(IVec3 chunk) const {
+    const auto column = columns_.find({chunk.x, 0, chunk.z});
+    return column != columns_.end() && column->second.count(chunk.y) > 0;
+  }
   /// A chunk has voxels now, or has none any more. Appends the columns of which others are held.
   void set(IVec3 chunk, bool has_voxels, std::vector<Change>& changed) {
     std::set<int>& column = columns_[{chunk.x, 0, chunk.z}];

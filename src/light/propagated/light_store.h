@@ -30,6 +30,7 @@ struct ChunkLightChange {
 };
 
 /// The light of chunks, with the bookkeeping of changes. What is not there is dark.
+/// A copy costs some pointers, and shares light until it is changed; its journal is a copy's (ChangeJournal).
 class LightStore {
  public:
   [[nodiscard]] const LightChunk* find(IVec3 chunk) const {
@@ -37,6 +38,7 @@ class LightStore {
     return entry == nullptr ? nullptr : &entry->light;
   }
   void take(ChunkLightChange change) {
+    journal_.begin_change();
     Entry& entry = entries_.find_or_create(change.chunk, [](auto&) {});
     for (std::size_t c = 0; c < kChannels; ++c) {
       if (!change.channels[c].empty()) entry.light.channels[c].take(std::move(change.channels[c]));
@@ -57,10 +59,12 @@ class LightStore {
   }
   /// A chunk is dark from now on, and all of it may be another to readers: it comes, or goes.
   void begin(IVec3 chunk) {
+    journal_.begin_change();
     note_all(chunk);
     entries_.erase(chunk, [](auto&) {});
   }
   void clear() {
+    journal_.begin_change();
     std::vector<IVec3> chunks;
     entries_.for_each([&](IVec3 chunk, const Entry&) { chunks.push_back(chunk); });
     for (const IVec3 chunk : chunks) note_all(chunk);

@@ -12,6 +12,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include <quoin/core/ref.h>
+
 #include "core/coordinates/chunk_order.h"
 #include "core/coordinates/coordinate_hash.h"
 #include "light/propagated/light_domain.h"
@@ -68,6 +70,11 @@ unsigned lamp_channels(const std::vector<TypeLight>& lights) {
   return channels;
 }
 
+// Snapshots have it in common until chunks come or go.
+struct SharedDomain : RefCounted {
+  LightDomain columns;
+};
+
 IBox around_all(const std::array<IBox, kChannels>& boxes) {
   IBox all;
   for (const IBox& box : boxes) all = unite(all, box);
@@ -91,11 +98,25 @@ LightLevels lamp_levels(const VoxelProperties& properties) {
 }
 
 struct PropagatedLight::Impl {
+  Impl() = default;
+  /// Shares all that there is to share. Requires: no update is under way.
+  Impl(const Impl& other)
+      : options(other.options),
+        followed_grid(other.followed_grid),
+        followed_types(other.followed_types),
+        shared_lights(other.shared_lights),
+        lamp_channels(other.lamp_channels),
+        shared_domain(other.shared_domain),
+        store(other.store) {}
+  Impl& operator=(const Impl&) = delete;
+
   /// Voxels whose light may be another.
   using Dirty = std::array<IBox, kChannels>;  // [channel]
   using Queue = std::map<IVec3, IBox, bool (*)(IVec3, IVec3)>;
 
-  [[nodiscard]] LightReader reader() const { return {store, domain}; }
+  [[nodiscard]] const std::vector<TypeLight>& lights() const { return *shared_lights; }
+  [[nodiscard]] const LightDomain& domain() const { return shared_domain->columns; }
+  [[nodiscard]] LightReader reader() const { return {store, domain()}; }
   void begin_anew(const Grid& grid);
   void take_over(const Grid& grid, const GridChanges& changes);
   [[nodiscard]] Dirty reach_of(const Grid& grid, const IBox& voxels) const;
@@ -115,9 +136,9 @@ struct PropagatedLight::Impl {
   PropagatedLightOptions options;
   ChangeCursor followed_grid;
   ChangeCursor followed_types;
-  std::vector<TypeLight> lights;
+  std::shared_ptr<const std::vector<TypeLight>> shared_lights = std::make_shared<const std::vector<TypeLight>>();
   unsigned lamp_channels = 0;  // that any type gives off
-  LightDomain domain;
+  Ref<SharedDomain> shared_domain = make_ref<SharedDomain>();
   LightStore store;          // of the chunks of the domain
   std::vector<Dirty> dirty;  // boxes that are to be solved by themselves
   Queue queue{by_zyx};       // boxes of chunks that are to be solved, a layer at a time
@@ -127,7 +148,8 @@ struct PropagatedLight::Impl {
 void PropagatedLight::Impl::begin_anew(const Grid& grid) {
   queue.clear();
   dirty.clear();
-  domain.clear();
+  masks.clear();
+  shared_domain = make_ref<SharedDomain>();
   store.clear();
   change_domain(grid, grid.chunks());
 }
@@ -135,7 +157,12 @@ void PropagatedLight::Impl::begin_anew(const Grid& grid) {
 // Chunks that came or went, or may have: light of what the domain has now is found from nothing, and that around.
 void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IVec3>& chunks) {
   std::vector<LightDomain::Change> changed;
-  for (const IVec3 chunk : chunks) domain.set(chunk, grid.find_chunk(chunk) != nullptr, changed);
+  for (const IVec3 chunk : chunks) {
+    const bool has_voxels = grid.find_chunk(chunk) != nullptr;
+    if (has_voxels == domain().has_voxels(chunk)) continue;
+    shared_domain.make_own();
+    shared_domain->columns.set(chunk, has_voxels, changed);
+  }
   std::vector<IVec3> others;
   for (const LightDomain::Change& column : changed) {
     const LightDomain::Range old = column.before;
@@ -162,7 +189,7 @@ void PropagatedLight::Impl::add_chunks(const IBox& voxels) {
     for (int y = first.y; y <= last.y; ++y) {
       for (int x = first.x; x <= last.x; ++x) {
         const IVec3 chunk{x, y, z};
-        if (!domain.holds(chunk)) continue;
+        if (!domain().holds(chunk)) continue;
         const IVec3 low = chunk * kChunkEdge;
         IBox& known = queue[chunk];
         known = unite(known, intersect({voxels.min - low, voxels.max - low}, kWholeChunk));
@@ -192,7 +219,7 @@ std::array<unsigned, kChannels> PropagatedLight::Impl::highest_levels(const Grid
         add(words.at({x, y, z}));
         if (!voxels.contains({x, y, z})) continue;
         const VoxelType type = grid.get(x, y, z);
-        if (type < lights.size()) add(lights[type].lamp);
+        if (type < lights().size()) add(lights()[type].lamp);
       }
     }
   }
@@ -208,10 +235,10 @@ int PropagatedLight::Impl::end_of_sky(const Grid& grid, const IBox& voxels) cons
       int y = voxels.max.y;
       while (y >= voxels.min.y && (words.at({x, y, z}) & 15U) != kBrightest) --y;
       if (y < voxels.min.y) continue;
-      const LightDomain::Range range = domain.range(x >> kChunkShift, z >> kChunkShift);
+      const LightDomain::Range range = domain().range(x >> kChunkShift, z >> kChunkShift);
       const auto passes = [&](int below) {
         const VoxelType type = grid.get(x, below, z);
-        return type < lights.size() && (type == kAir || (lights[type].passes >> kSky & 1U) != 0);
+        return type < lights().size() && (type == kAir || (lights()[type].passes >> kSky & 1U) != 0);
       };
       y = voxels.min.y;
       while (y - 1 >= range.begin * kChunkEdge && passes(y - 1)) --y;
@@ -301,9 +328,9 @@ void PropagatedLight::Impl::sort_dirty() {
 
 ChunkAround PropagatedLight::Impl::around(IVec3 chunk) const {
   ChunkAround found;
-  found.is_held = domain.holds(chunk);
+  found.is_held = domain().holds(chunk);
   if (!found.is_held) {
-    found.is_open = domain.beyond(chunk) != 0;
+    found.is_open = domain().beyond(chunk) != 0;
     return found;
   }
   found.light = store.find(chunk);
@@ -358,7 +385,7 @@ void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
           ChunkMasks& read = solver.own_masks(i++);
           ChunkAround& around = region.at(chunk);
           around.masks = &read;
-          read.read(grid.find_chunk(chunk), lights,
+          read.read(grid.find_chunk(chunk), lights(),
                     intersect({region.all.voxels.min - low, region.all.voxels.max - low}, kWholeChunk),
                     around.light == nullptr ? propagated::all_slabs() : around.light->lamp_slabs);
         }
@@ -406,7 +433,7 @@ void PropagatedLight::Impl::read_masks(const Grid& grid, const std::vector<Light
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
         for (int x = chunks.min.x; x < chunks.max.x; ++x) {
           const IVec3 chunk{x, y, z};
-          if (!domain.holds(chunk)) continue;
+          if (!domain().holds(chunk)) continue;
           std::unique_ptr<ChunkMasks>& made = masks[chunk];
           if (made != nullptr) continue;
           made = std::make_unique<ChunkMasks>();
@@ -418,7 +445,7 @@ void PropagatedLight::Impl::read_masks(const Grid& grid, const std::vector<Light
   parallel_for(missing.size(), threads, [&](std::size_t i) {
     const auto& [chunk, read] = missing[i];
     const propagated::LightChunk* light = store.find(chunk);
-    read->read(grid.find_chunk(chunk), lights, kWholeChunk,
+    read->read(grid.find_chunk(chunk), lights(), kWholeChunk,
                light == nullptr ? propagated::all_slabs() : light->lamp_slabs);
   });
 }
@@ -447,6 +474,7 @@ void PropagatedLight::Impl::solve_queue(const Grid& grid, Threads threads) {
 PropagatedLight::PropagatedLight(PropagatedLightOptions options) : impl_(std::make_unique<Impl>()) {
   impl_->options = std::move(options);
 }
+PropagatedLight::PropagatedLight(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 PropagatedLight::PropagatedLight(PropagatedLight&&) noexcept = default;
 PropagatedLight& PropagatedLight::operator=(PropagatedLight&&) noexcept = default;
 PropagatedLight::~PropagatedLight() = default;
@@ -455,13 +483,13 @@ void PropagatedLight::update(const Grid& grid, const VoxelRegistry& types, Threa
   Impl& me = *impl_;
   try {
     GridChanges changes = grid.changes_since(me.followed_grid);
-    if (me.lights.empty() || types.has_changed_since(me.followed_types)) {
+    if (me.lights().empty() || types.has_changed_since(me.followed_types)) {
       me.followed_types = types.cursor();
       std::vector<TypeLight> lights = type_lights(types, me.options);
       // A type that was not registered was opaque: those that are new are others than before.
-      changes.all |= lights != me.lights;
-      me.lights = std::move(lights);
-      me.lamp_channels = lamp_channels(me.lights);
+      changes.all |= lights != me.lights();
+      me.lamp_channels = lamp_channels(lights);
+      me.shared_lights = std::make_shared<const std::vector<TypeLight>>(std::move(lights));
     }
     changes.all ? me.begin_anew(grid) : me.take_over(grid, changes);
     me.solve_dirty(grid, threads);
@@ -470,6 +498,10 @@ void PropagatedLight::update(const Grid& grid, const VoxelRegistry& types, Threa
     me.followed_grid = {};
     throw;
   }
+}
+
+PropagatedLight PropagatedLight::snapshot() const {
+  return PropagatedLight(std::make_unique<Impl>(*impl_));
 }
 
 LightLevels PropagatedLight::at(IVec3 voxel) const {
@@ -490,7 +522,7 @@ void PropagatedLight::split(const QuadBuffer& quads, IVec3 chunk, QuadBuffer& ou
 }
 
 std::size_t PropagatedLight::bytes() const {
-  return impl_->store.bytes() + impl_->lights.capacity() * sizeof(TypeLight);
+  return impl_->store.bytes() + impl_->lights().capacity() * sizeof(TypeLight);
 }
 
 }  // namespace quoin

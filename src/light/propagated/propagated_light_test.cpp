@@ -462,5 +462,34 @@ TEST(PropagatedLight, GamesHaveLevelsOfTheirOwn) {
   EXPECT_EQ(light.at({5, 4, 5}), (LightLevels{14, 2, 1, 0})) << "beside columns of sky";
 }
 
+TEST(PropagatedLight, SnapshotsKeepTheirLightAndGoOnByThemselves) {
+  const VoxelRegistry types = light_types();
+  std::mt19937 random(17);
+  Grid grid;
+  for (int i = 0; i < 6; ++i) edit(grid, random);
+  PropagatedLight light;
+  light.update(grid, types);
+  ChangeCursor cursor;
+  EXPECT_TRUE(light.changes_since(cursor).all);
+  for (int round = 0; round < 4; ++round) {
+    const PropagatedLight kept = light.snapshot();
+    PropagatedLight other = light.snapshot();
+    const Grid before = grid.snapshot();
+    Grid branch = grid.snapshot();
+    edit(grid, random);
+    edit(branch, random);
+    light.update(grid, types);
+    other.update(branch, types);
+    expect_searched(kept, before, types);
+    expect_searched(light, grid, types);
+    expect_searched(other, branch, types);
+    ASSERT_FALSE(HasFatalFailure()) << round;
+    // The one that is updated goes on with its journal; a snapshot that is, has one of its own.
+    ChangeCursor of_kept = cursor;
+    EXPECT_TRUE(kept.changes_since(of_kept).empty());
+    EXPECT_FALSE(light.changes_since(cursor).all);
+  }
+}
+
 }  // namespace
 }  // namespace quoin

@@ -224,8 +224,16 @@ void LightCache::update() {
   is_lit_ = has_bricks_ = false;
 }
 
+void LightCache::use(const SceneLight* light) {
+  const std::lock_guard lock(mutex_);
+  lent_ = light;
+  if (lent_ != nullptr) light_ = SceneLight();
+  is_lit_ = has_bricks_ = false;
+}
+
 const SceneLight& LightCache::light(const Scene& scene, Threads threads) {
   const std::lock_guard lock(mutex_);
+  if (lent_ != nullptr) return *lent_;
   if (!is_lit_) light_.update(scene, threads);
   is_lit_ = true;
   return light_;

@@ -97,13 +97,16 @@ class LightCache {
  public:
   /// The scene was edited, or is another.
   void update();
-  /// Light of the scene as it is now. Lifetime: until the next update.
+  /// Light that somebody else keeps, from now on; null: its own. It changes only together with the scene.
+  void use(const SceneLight* light);
+  /// Light of the scene as it is now, or that in use. Lifetime: until the next update.
   [[nodiscard]] const SceneLight& light(const Scene& scene, Threads threads);
   [[nodiscard]] LightBricks& bricks(const Scene& scene, Threads threads);
 
  private:
   std::mutex mutex_;
   SceneLight light_;
+  const SceneLight* lent_ = nullptr;
   LightBricks bricks_;
   bool is_lit_ = false;
   bool has_bricks_ = false;

@@ -3,6 +3,7 @@
 #include <array>
 #include <bit>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <quoin/core/assert.h>
@@ -12,6 +13,15 @@
 namespace quoin {
 
 struct SceneLight::Entry {
+  explicit Entry(const PropagatedLightOptions& options) : light(options) {}
+  Entry(const Entry& other)
+      : light(other.light.snapshot()),
+        voxels(other.voxels == &other.both ? &both : other.voxels),
+        both(other.both.snapshot()),
+        followed_voxels(other.followed_voxels),
+        followed_field(other.followed_field) {}
+  Entry& operator=(const Entry&) = delete;
+
   PropagatedLight light;
   const Grid* voxels = nullptr;  // the scene's, or `both`
   Grid both;                     // voxels and field as one, where there is a field
@@ -51,8 +61,10 @@ Chunk united_chunk(const Chunk* voxels, const DensityChunk* field) {
 
 void SceneLight::Entry::unite(const SceneGrid& grid) {
   std::vector<IVec3> chunks;
-  const GridChanges of_voxels = grid.grid.changes_since(followed_voxels);
-  const DensityChanges of_field = grid.field.changes_since(followed_field);
+  ChangeCursor read_voxels = followed_voxels;
+  ChangeCursor read_field = followed_field;
+  const GridChanges of_voxels = grid.grid.changes_since(read_voxels);
+  const DensityChanges of_field = grid.field.changes_since(read_field);
   if (of_voxels.all || of_field.all) {
     both.clear();
     for (const std::vector<IVec3>& more : {grid.grid.chunks(), grid.field.chunks()}) {
@@ -66,6 +78,8 @@ void SceneLight::Entry::unite(const SceneGrid& grid) {
   for (const IVec3 chunk : chunks) {
     both.put_chunk(chunk, united_chunk(grid.grid.find_chunk(chunk), grid.field.find_chunk(chunk)));
   }
+  followed_voxels = read_voxels;
+  followed_field = read_field;
 }
 
 void SceneLight::Entry::update(const SceneGrid& grid, const VoxelRegistry& types, Threads threads) {
@@ -75,7 +89,10 @@ void SceneLight::Entry::update(const SceneGrid& grid, const VoxelRegistry& types
   light.update(*voxels, types, threads);
 }
 
-SceneLight::SceneLight() = default;
+SceneLight::SceneLight(PropagatedLightOptions options)
+    : options_(std::move(options)), unknown_(std::make_unique<Entry>(options_)) {
+  unknown_->voxels = &unknown_->both;
+}
 SceneLight::SceneLight(SceneLight&&) noexcept = default;
 SceneLight& SceneLight::operator=(SceneLight&&) noexcept = default;
 SceneLight::~SceneLight() = default;
@@ -85,15 +102,27 @@ void SceneLight::update(const Scene& scene, Threads threads) {
   for (const GridHandle handle : scene.grids().handles()) {
     const SceneGrid& grid = scene.grids()[handle];
     std::unique_ptr<Entry>& entry = grids_[handle];
-    if (entry == nullptr) entry = std::make_unique<Entry>();
+    if (entry == nullptr) entry = std::make_unique<Entry>(options_);
     entry->update(grid, scene.types, threads);
   }
 }
 
+SceneLight SceneLight::snapshot() const {
+  SceneLight copy(options_);
+  for (const auto& [handle, entry] : grids_) copy.grids_[handle] = std::make_unique<Entry>(*entry);
+  return copy;
+}
+
+std::size_t SceneLight::bytes() const {
+  std::size_t sum = 0;
+  for (const auto& [handle, entry] : grids_) sum += entry->light.bytes() + entry->both.bytes();
+  return sum;
+}
+
 GridLight SceneLight::of(GridHandle grid) const {
   const auto found = grids_.find(grid);
-  QUOIN_ASSERT(found != grids_.end(), "a grid of the scene of the last update");
-  return {&found->second->light, found->second->voxels};
+  const Entry& entry = found == grids_.end() ? *unknown_ : *found->second;
+  return {&entry.light, entry.voxels};
 }
 
 }  // namespace quoin

@@ -113,11 +113,39 @@ TEST(LightBricks, HoldTheLightAroundSurfaces) {
   }
 }
 
-TEST(SceneLightDeathTest, AskingOfNoGridAndOfTooFewNormals) {
+TEST(SceneLight, OfAGridThatItDoesNotKnowIsOpenSky) {
   GridHandle handle;
   const Scene scene = scene_of(LightWorld(1), handle);
   SceneLight light;
-  QUOIN_EXPECT_MISTAKE((void)light.of(handle), "a grid of the scene of the last update");
+  EXPECT_EQ(light.of(handle).light->at({0, -20, 0}), (LightLevels{15, 0, 0, 0}));
+  EXPECT_EQ(light.of(handle).voxels->chunk_count(), 0U);
+  light.update(scene);
+  EXPECT_EQ(light.of(handle).voxels, &scene.grids()[handle].grid);
+  EXPECT_EQ(light.of({}).light->at({0, -20, 0}).sky, 15);
+  EXPECT_GE(light.bytes(), light.of(handle).light->bytes());
+}
+
+TEST(SceneLight, SnapshotsKeepTheirLight) {
+  GridHandle handle;
+  Scene scene = scene_of(LightWorld(1), handle);
+  scene.edit(handle).field.add_sphere({60.0, 0.0, 0.0}, 6.0, LightWorld::kStone);
+  SceneLight light;
+  light.update(scene);
+  const SceneLight kept = light.snapshot();
+  EXPECT_NE(kept.of(handle).voxels, light.of(handle).voxels) << "its own, where there is a field";
+  const IVec3 voxel{0, 40, 0};
+  scene.edit(handle).grid.fill_box({{-30, 50, -30}, {30, 51, 30}}, LightWorld::kStone);
+  light.update(scene);
+  EXPECT_EQ(kept.of(handle).light->at(voxel).sky, 15);
+  EXPECT_EQ(light.of(handle).light->at(voxel).sky, 0);
+  EXPECT_EQ(kept.of(handle).voxels->get(0, 50, 0), kAir);
+  EXPECT_EQ(light.of(handle).voxels->get(0, 50, 0), LightWorld::kStone);
+}
+
+TEST(SceneLightDeathTest, AskingOfTooFewNormals) {
+  GridHandle handle;
+  const Scene scene = scene_of(LightWorld(1), handle);
+  SceneLight light;
   light.update(scene);
   SurfaceLight surface(*light.of(handle).light, *light.of(handle).voxels, scene.types);
   const std::vector<Vec3> places(3);

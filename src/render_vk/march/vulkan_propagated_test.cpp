@@ -49,6 +49,20 @@ TEST_F(VulkanPropagated, AClosedRoomIsBlackAndOpensWithAnEdit) {
   expect_equal(lit, render_test::taken(cave.scene, camera, options), "opened_room");
 }
 
+TEST_F(VulkanPropagated, ShowsTheLightThatItIsGiven) {
+  Cave cave;
+  const RenderOptions options = propagated(64, 48);
+  SceneLight light;
+  renderer_->use_light(&light);
+  const Picture open = taken(cave.scene, Cave::inside(), options);
+  light.update(cave.scene);
+  const Picture lit = taken(cave.scene, Cave::inside(), options);
+  EXPECT_NE(open.colour.rgb, lit.colour.rgb);
+  expect_equal(lit, render_test::taken(cave.scene, Cave::inside(), options), "lent_light");
+  renderer_->use_light(nullptr);
+  EXPECT_EQ(taken(cave.scene, Cave::inside(), options).colour.rgb, lit.colour.rgb);
+}
+
 // A corridor with a lamp of each channel at an end of its own, a shaft of sky: every level of each, on plain white.
 TEST_F(VulkanPropagated, EveryLevelHasTheColourThatTheProcessorGivesIt) {
   Scene scene;

@@ -76,6 +76,10 @@ Status VulkanRenderer::update(const Scene& scene, InstanceFilter filter, Threads
   }
 }
 
+void VulkanRenderer::use_light(const SceneLight* light) {
+  impl_->levels.use(light);
+}
+
 std::uint64_t VulkanRenderer::uploaded_bytes() const {
   return impl_->uploaded;
 }

@@ -282,29 +282,78 @@ DBox BoxInField::bounds(IVec3 cell, double from, double to) const {
   return {within.min - DVec3(cell), within.max - DVec3(cell)};
 }
 
-bool BallInField::may_meet(FieldPiece& piece) const {
-  const DVec3 centre = centre_ - DVec3(piece.cell);
-  piece.enter = -1.0;
-  piece.is_exact = true;
-  // By turns within the piece and below its plane: near to the nearest point of its solid.
-  DVec3 nearest = clamped(piece, centre);
-  for (int turn = 0; turn < 4 && piece.square_of_slope > 0.0; ++turn) {
-    const double above = glm::dot(piece.slope, nearest - piece.middle) + piece.level;
-    if (!(above > 0.0)) break;
-    nearest = clamped(piece, nearest - piece.slope * (above / piece.square_of_slope));
+// From the solid of a piece to the line of a capsule at `centre`, unit; 0 where they meet. Relative to the cell.
+DVec3 CapsuleInField::parting(const FieldPiece& piece, const DVec3& centre) const {
+  DVec3 on_line = capsule_.nearest_of_line(centre, piece.middle);
+  DVec3 nearest = on_line;
+  for (int turn = 0; turn < 6; ++turn) {
+    // By turns within the piece and below its plane: near to the nearest point of its solid.
+    nearest = clamped(piece, on_line);
+    for (int again = 0; again < 4 && piece.square_of_slope > 0.0; ++again) {
+      const double above = glm::dot(piece.slope, nearest - piece.middle) + piece.level;
+      if (!(above > 0.0)) break;
+      nearest = clamped(piece, nearest - piece.slope * (above / piece.square_of_slope));
+    }
+    const DVec3 next = capsule_.nearest_of_line(centre, nearest);
+    if (next == on_line) break;
+    on_line = next;
   }
-  const DVec3 away = unit_or_zero(centre - nearest);
-  const double apart = glm::dot(away, centre - piece.middle) - piece.exact_extent(away * piece.half).ahead;
-  return apart < radius_ - kFieldTouch;
+  return unit_or_zero(on_line - nearest);
 }
 
-std::optional<DVec3> BallInField::point_in_solid(const FieldPiece& piece, double /*until*/) const {
-  const DVec3 centre = centre_ - DVec3(piece.cell);
+bool CapsuleInField::may_meet(FieldPiece& piece) const {
+  constexpr int kMostTurns = 16;
+  const double radius = capsule_.radius - kFieldTouch;
+  double time = 0.0;
+  piece.enter = -1.0;
+  piece.slack = 0.0;
+  piece.is_exact = true;
+  for (int turn = 0; turn < kMostTurns; ++turn) {
+    const DVec3 centre = capsule_.centre - DVec3(piece.cell) + time * capsule_.displacement;
+    const DVec3 away = parting(piece, centre);
+    const double apart = glm::dot(away, centre - piece.middle) - std::abs(glm::dot(away, capsule_.half_axis)) -
+                         piece.exact_extent(away * piece.half).ahead;
+    const double left = apart - radius;
+    if (!(left > 0.0)) break;
+    const double speed = -glm::dot(away, capsule_.displacement);
+    if (!(speed > 0.0)) return false;
+    time += left / speed;
+    if (!(time < until_)) return false;
+    piece.enter = time;
+    piece.slack = 2.0 * kFieldTouch / speed;
+    if (left < 1e-3 * kFieldTouch) break;
+  }
+  return true;
+}
+
+std::optional<DVec3> CapsuleInField::point_in_solid(const FieldPiece& piece, double until) const {
+  const DVec3 centre = capsule_.centre - DVec3(piece.cell) + until * capsule_.displacement;
   return by_turns(piece, [&](const DVec3& point) {
-    const DVec3 away = point - centre;
+    const DVec3 on_line = capsule_.nearest_of_line(centre, point);
+    const DVec3 away = point - on_line;
     const double length = glm::length(away);
-    return length > radius_ ? centre + away * (radius_ / length) : point;
+    return length > capsule_.radius ? on_line + away * (capsule_.radius / length) : point;
   });
+}
+
+double CapsuleInField::time_beyond_doubt(const FieldPiece& piece) const {
+  const double rate = -glm::dot(piece.slope, capsule_.displacement);
+  return rate > 0.0 ? std::max(piece.enter, 0.0) + piece.slack + 2.01 * piece.doubt / rate : kInfinity;
+}
+
+DBox CapsuleInField::bounds(IVec3 cell, double from, double to) const {
+  const DBox within = bounds_between(capsule_, reach_of(capsule_), from, to);
+  return {within.min - DVec3(cell), within.max - DVec3(cell)};
+}
+
+// What is round touches in one direction: from where it is met to its line, which between cells is that of their ridge.
+DVec3 CapsuleInField::normal(const FieldContact& contact, const DensityGrid& field) const {
+  const DVec3 centre = capsule_.centre - DVec3(contact.piece.cell) + contact.fraction * capsule_.displacement;
+  DVec3 normal = parting(contact.piece, centre);
+  if (normal == DVec3(0.0)) normal = unit_or_zero(capsule_.nearest_of_line(centre, contact.point) - contact.point);
+  if (glm::dot(normal, capsule_.displacement) < 0.0) return normal;
+  normal = unit_or_zero(field.gradient_at(DVec3(contact.piece.cell) + contact.point));
+  return glm::dot(normal, capsule_.displacement) < 0.0 ? normal : unit_or_zero(-capsule_.displacement);
 }
 
 void BoxInField::shrink(DBox& part, IVec3 cell, double from, double to) const {
@@ -329,11 +378,6 @@ void BoxInField::shrink(DBox& part, IVec3 cell, double from, double to) const {
       part.max[j] = std::min(part.max[j], (axis[j] > 0.0 ? end : begin) / axis[j]);
     }
   }
-}
-
-DBox BallInField::bounds(IVec3 cell, double /*from*/, double /*to*/) const {
-  const DVec3 centre = centre_ - DVec3(cell);
-  return {centre - radius_, centre + radius_};
 }
 
 }  // namespace quoin

@@ -16,6 +16,7 @@
 
 #include "scene/query/field_piece.h"
 #include "scene/query/moving_box.h"
+#include "scene/query/moving_capsule.h"
 
 namespace quoin {
 
@@ -87,20 +88,38 @@ class BoxInField {
   bool is_upright_;  // its axes are the grid's
 };
 
-/// A ball at rest.
-class BallInField {
+/// A capsule on its way, or at rest. What parts it from the solid of a piece is the direction between the points of both
+/// that are nearest to each other, found by turns; any direction's word is good, until they meet along it.
+class CapsuleInField {
  public:
-  BallInField(DVec3 centre, double radius) : centre_(centre), radius_(radius) {}
+  /// `until`: the fraction of the way at which it ends.
+  CapsuleInField(const MovingCapsule& capsule, double until) : capsule_(capsule), until_(until) {}
+
   [[nodiscard]] bool may_meet(FieldPiece& piece) const;
   [[nodiscard]] bool may_meet_exactly(FieldPiece& piece) const { return may_meet(piece); }
   [[nodiscard]] std::optional<DVec3> point_in_solid(const FieldPiece& piece, double until) const;
-  [[nodiscard]] static double time_beyond_doubt(const FieldPiece& /*piece*/) { return 0.0; }
+  [[nodiscard]] double time_beyond_doubt(const FieldPiece& piece) const;
   [[nodiscard]] DBox bounds(IVec3 cell, double from, double to) const;
   static void shrink(DBox& /*part*/, IVec3 /*cell*/, double /*from*/, double /*to*/) {}
+  [[nodiscard]] DVec3 normal(const FieldContact& contact, const DensityGrid& field) const;
 
  private:
-  DVec3 centre_;
-  double radius_;
+  [[nodiscard]] DVec3 parting(const FieldPiece& piece, const DVec3& centre) const;
+
+  const MovingCapsule& capsule_;
+  double until_;
+};
+
+/// The shape in a field of one that moves.
+template <class Moving>
+struct InField;
+template <>
+struct InField<MovingBox> {
+  using Shape = BoxInField;
+};
+template <>
+struct InField<MovingCapsule> {
+  using Shape = CapsuleInField;
 };
 
 }  // namespace quoin

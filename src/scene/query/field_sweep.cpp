@@ -64,10 +64,11 @@ VoxelType FieldCells::material(IVec3 cell, const DVec3& point) {
   return field().material(nearest);
 }
 
-void FieldSweep::check(const IBox& near, double from, double to) {
+template <class Moving>
+void FieldSweep<Moving>::check(const IBox& near, double from, double to) {
   const double until = std::min(to, most_);
-  const BoxInField shape(box_, until);
-  FieldSearch<BoxInField> search(shape);
+  const Shape shape(shape_, until);
+  FieldSearch<Shape> search(shape);
   CellCorners corners;
   for (int z = near.min.z; z < near.max.z; ++z) {
     for (int y = near.min.y; y < near.max.y; ++y) {
@@ -80,24 +81,37 @@ void FieldSweep::check(const IBox& near, double from, double to) {
   if (contact && contact->fraction < best_.fraction) best_ = *contact;
 }
 
-DVec3 FieldSweep::normal() const {
-  return BoxInField(box_, most_).normal(best_, cells_.field());
+template <class Moving>
+DVec3 FieldSweep<Moving>::normal() const {
+  return Shape(shape_, most_).normal(best_, cells_.field());
 }
 
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Where in a box at rest the field is least, of the corners of what it covers of each cell; exact for a box along the
+DVec3 nearest_within(const MovingBox& box, const DVec3& point) {
+  const DVec3 at = glm::clamp((point - box.centre) * box.axes, -box.half_size, box.half_size);
+  return box.centre + box.axes * at;
+}
+DVec3 nearest_within(const MovingCapsule& capsule, const DVec3& point) {
+  const DVec3 on_line = capsule.nearest_of_line(capsule.centre, point);
+  const DVec3 away = point - on_line;
+  const double length = glm::length(away);
+  return length > capsule.radius ? on_line + away * (capsule.radius / length) : point;
+}
+
+// Where in a shape at rest the field is least, of the corners of what it covers of each cell; exact for a box along the
 // grid's axes.
 struct Deepest {
   DVec3 point{0.0};
   double density = 0.0;
 };
 
-Deepest deepest_in(const DensityTree& tree, const TypesMet& types, const MovingBox& box) {
+template <class Moving>
+Deepest deepest_in(const DensityTree& tree, const TypesMet& types, const Moving& shape) {
   FieldCells cells(tree, types);
-  const DBox bounds = bounds_between(box, reach_of_axes(box.half_axes), 0.0, 0.0);
+  const DBox bounds = bounds_between(shape, reach_of(shape), 0.0, 0.0);
   const IBox near = voxels_within(bounds, cells.bounds());
   Deepest deepest;
   CellCorners corners;
@@ -111,8 +125,7 @@ Deepest deepest_in(const DensityTree& tree, const TypesMet& types, const MovingB
         for (int i = 0; i < 8; ++i) {
           const DVec3 corner((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y,
                              (i & 4) != 0 ? high.z : low.z);
-          const DVec3 at = glm::clamp((corner - box.centre) * box.axes, -box.half_size, box.half_size);
-          const DVec3 point = box.centre + box.axes * at;
+          const DVec3 point = nearest_within(shape, corner);
           const double density = tree.field().density_at(point);
           if (density < deepest.density) deepest = {point, density};
         }
@@ -122,14 +135,15 @@ Deepest deepest_in(const DensityTree& tree, const TypesMet& types, const MovingB
   return deepest;
 }
 
-// How far a box has to go along a direction until it is out, at most `most`; infinity where it is not out by then.
-double depth_along(const DensityTree& tree, const TypesMet& types, const MovingBox& box, DVec3 direction, double guess,
+// How far a shape has to go along a direction until it is out, at most `most`; infinity where it is not out by then.
+template <class Moving>
+double depth_along(const DensityTree& tree, const TypesMet& types, const Moving& shape, DVec3 direction, double guess,
                    double most) {
   for (double length = guess;; length *= 2.0) {
-    MovingBox back = box;
+    Moving back = shape;
     back.centre += direction * std::min(length, most);
     back.displacement = -direction * std::min(length, most);
-    FieldSweep sweep(tree, types, back, 1.0);
+    FieldSweep<Moving> sweep(tree, types, back, 1.0);
     follow_way(back, 1.0, sweep);
     // Free where it starts: the last that it leaves is the first that it meets on the way back.
     if (!sweep.best().starts_inside) return std::min(length, most) * (1.0 - std::min(sweep.best().fraction, 1.0));
@@ -151,26 +165,32 @@ DVec3 direction_out(const DensityGrid& field, DVec3 point) {
 
 }  // namespace
 
-WayOut way_out(const DensityTree& tree, const TypesMet& types, const MovingBox& box, const FieldContact& contact) {
-  const DVec3 reach = reach_of_axes(box.half_axes);
+template <class Moving>
+WayOut way_out(const DensityTree& tree, const TypesMet& types, const Moving& shape, const FieldContact& contact) {
+  const DVec3 reach = reach_of(shape);
   const double most = 2.0 * glm::length(reach) + 2.0;
-  Deepest deepest = deepest_in(tree, types, box);
+  Deepest deepest = deepest_in(tree, types, shape);
   if (!(deepest.density < 0.0)) deepest.point = DVec3(contact.piece.cell) + contact.point;
   const DVec3 gradient = direction_out(tree.field(), deepest.point);
   const double guess = std::min(0.25 - 2.0 * deepest.density, most);
   if (gradient != DVec3(0.0)) {
-    const double depth = depth_along(tree, types, box, gradient, guess, most);
+    const double depth = depth_along(tree, types, shape, gradient, guess, most);
     if (depth < kInfinity) return {gradient, std::max(depth, kFieldTouch)};
   }
   WayOut best{gradient, kInfinity};
   for (int i = 0; i < 6; ++i) {
     DVec3 direction(0.0);
     direction[i / 2] = i % 2 == 0 ? 1.0 : -1.0;
-    const double depth = depth_along(tree, types, box, direction, guess, most);
+    const double depth = depth_along(tree, types, shape, direction, guess, most);
     if (depth < best.depth) best = {direction, std::max(depth, kFieldTouch)};
   }
   if (best.depth < kInfinity) return best;
   return {gradient != DVec3(0.0) ? gradient : DVec3(0.0, 1.0, 0.0), 1.0};
 }
+
+template class FieldSweep<MovingBox>;
+template class FieldSweep<MovingCapsule>;
+template WayOut way_out(const DensityTree&, const TypesMet&, const MovingBox&, const FieldContact&);
+template WayOut way_out(const DensityTree&, const TypesMet&, const MovingCapsule&, const FieldContact&);
 
 }  // namespace quoin

@@ -7,11 +7,12 @@
 
 namespace quoin {
 
-/// The first contact of a moving box with a field; for `follow_way`.
+/// The first contact of a moving shape (MovingBox or MovingCapsule) with a field; for `follow_way`.
+template <class Moving>
 class FieldSweep {
  public:
-  FieldSweep(const DensityTree& tree, const TypesMet& types, const MovingBox& box, double most)
-      : cells_(tree, types), box_(box), most_(most) {}
+  FieldSweep(const DensityTree& tree, const TypesMet& types, const Moving& shape, double most)
+      : cells_(tree, types), shape_(shape), most_(most) {}
 
   [[nodiscard]] IBox bounds() const { return cells_.bounds(); }
   [[nodiscard]] double fraction() const { return best_.fraction; }
@@ -22,8 +23,10 @@ class FieldSweep {
   [[nodiscard]] DVec3 normal() const;
 
  private:
+  using Shape = typename InField<Moving>::Shape;
+
   FieldCells cells_;
-  const MovingBox& box_;
+  const Moving& shape_;
   double most_;
   FieldContact best_;
 };
@@ -34,11 +37,12 @@ struct WayOut {
   double depth = 0.0;
 };
 
-/// For a box that starts inside: along the gradient where it is deepest, or along the grid's axis along which it is out
-/// soonest where there is none. Where neither leads out within twice the box's size, it leads a voxel along the first.
+/// For a shape that starts inside: along the gradient where it is deepest, or along the grid's axis along which it is
+/// out soonest where there is none. Where neither leads out within twice its size, it leads a voxel along the first.
 ///
-/// Cost: some sweeps about as long as the box.
-[[nodiscard]] WayOut way_out(const DensityTree& tree, const TypesMet& types, const MovingBox& box,
+/// Cost: some sweeps about as long as the shape.
+template <class Moving>
+[[nodiscard]] WayOut way_out(const DensityTree& tree, const TypesMet& types, const Moving& shape,
                              const FieldContact& contact);
 
 }  // namespace quoin

@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <limits>
 #include <queue>
+#include <type_traits>
 #include <vector>
 
 #include <glm/common.hpp>
@@ -21,40 +22,60 @@
 
 #include <quoin/scene/sweep.h>
 
+#include "scene/query/moving_capsule.h"
 #include "scene/query/query_in_grid.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 namespace {
 
+glm::dmat3 axes_of(const OrientedBox& box) {
+  return glm::mat3_cast(unit_rotation(box.rotation));
+}
+glm::dmat3 axes_of(const Capsule& /*capsule*/) {
+  return glm::dmat3(1.0);
+}
+
+// Some of what a shape has in common with itself moved by anything up to `half` along its axes, if there is any.
+std::optional<OrientedBox> common_of(OrientedBox box, double half) {
+  box.half_size -= half;
+  return is_box(box) ? std::optional(box) : std::nullopt;
+}
+std::optional<Capsule> common_of(Capsule capsule, double half) {
+  capsule.radius -= std::sqrt(3.0) * half;
+  return is_capsule(capsule) ? std::optional(capsule) : std::nullopt;
+}
+
+template <class Shape>
 class FreePlace {
  public:
-  FreePlace(const SceneTracer& tracer, const OrientedBox& box, double max_distance, const QueryFilter& filter)
-      : tracer_(tracer),
-        box_(box),
-        axes_(glm::mat3_cast(unit_rotation(box.rotation))),
-        max_distance_(max_distance),
-        filter_(filter) {}
+  FreePlace(const SceneTracer& tracer, const Shape& shape, double max_distance, const QueryFilter& filter)
+      : tracer_(tracer), shape_(shape), axes_(axes_of(shape)), max_distance_(max_distance), filter_(filter) {}
 
   [[nodiscard]] std::optional<DVec3> find() {
     if (is_free(DVec3(0.0))) return DVec3(0.0);
-    return has_own_axes() ? among_planes() : among_cubes();
+    if constexpr (std::is_same_v<Shape, OrientedBox>) {
+      if (has_own_axes()) return among_planes();
+    }
+    return among_cubes();
   }
 
  private:
-  // Displacements are along the box's axes.
+  // Displacements are along the shape's axes.
   [[nodiscard]] DVec3 in_world(DVec3 displacement) const { return axes_ * displacement; }
-  [[nodiscard]] OrientedBox at(DVec3 displacement) const {
-    return {box_.centre + in_world(displacement), box_.half_size, box_.rotation};
+  [[nodiscard]] Shape at(DVec3 displacement) const {
+    Shape moved = shape_;
+    moved.centre += in_world(displacement);
+    return moved;
   }
   [[nodiscard]] bool is_free(DVec3 displacement) const { return overlaps(tracer_, at(displacement), filter_).empty(); }
 
   // Whether all that may be in the way are voxels whose axes are the box's. Collects where it touches their faces.
   [[nodiscard]] bool has_own_axes() {
-    const DVec3 reach = reach_of_axes(half_axes_of(box_)) + max_distance_;
+    const DVec3 reach = reach_of_axes(half_axes_of(shape_)) + max_distance_;
     bool are_own = true;
     const Seen seen(tracer_, filter_, QueryTypes::Colliding);
-    seen.visit_near({box_.centre - reach, box_.centre + reach}, [&](const PlacedGrid& placed) {
+    seen.visit_near({shape_.centre - reach, shape_.centre + reach}, [&](const PlacedGrid& placed) {
       are_own = are_own && placed.field == nullptr && (placed.voxels->bounds().empty() || add_planes(placed));
     });
     return are_own;
@@ -62,16 +83,16 @@ class FreePlace {
 
   bool add_planes(const PlacedGrid& placed) {
     const ToGrid to_grid(placed);
-    const DVec3 centre = to_grid.point(box_.centre);
+    const DVec3 centre = to_grid.point(shape_.centre);
     const IBox bounds = placed.voxels->bounds();
     // What rounding may leave of an overlap.
-    const double room = 0x1p-50 * (glm::length(box_.centre) + glm::length(placed.position) + max_distance_);
+    const double room = 0x1p-50 * (glm::length(shape_.centre) + glm::length(placed.position) + max_distance_);
     for (int axis = 0; axis < 3; ++axis) {
       const DVec3 direction = to_grid.axes * axes_[axis] * placed.voxel_size;
       const DVec3 size = glm::abs(direction);
       const int of_grid = size.x > size.y ? (size.x > size.z ? 0 : 2) : size.y > size.z ? 1 : 2;
       if (!(size[of_grid] > 1.0 - 1e-12) || !(size.x + size.y + size.z < 1.0 + 1e-9)) return false;
-      const double half = box_.half_size[axis];
+      const double half = shape_.half_size[axis];
       const double reach = (half + max_distance_) / placed.voxel_size;
       const double first = std::max(std::floor(centre[of_grid] - reach), double(bounds.min[of_grid]));
       const double last = std::min(std::ceil(centre[of_grid] + reach), double(bounds.max[of_grid]));
@@ -135,9 +156,8 @@ class FreePlace {
   };
 
   [[nodiscard]] bool is_blocked(const Cube& cube) const {
-    OrientedBox common = at(cube.middle);
-    common.half_size -= cube.half;
-    return is_box(common) && !overlaps(tracer_, common, filter_).empty();
+    const std::optional<Shape> common = common_of(at(cube.middle), cube.half);
+    return common && !overlaps(tracer_, *common, filter_).empty();
   }
 
   // From a free place back towards where it was, sliding along what it meets.
@@ -147,7 +167,7 @@ class FreePlace {
     options.filter = filter_;
     options.max_contacts = 8;
     options.skin = std::min(options.skin, 0.01 * max_distance_);
-    const DVec3 back = move_and_slide(tracer_, at(free), -in_world(free), options).centre - box_.centre;
+    const DVec3 back = move_and_slide(tracer_, at(free), -in_world(free), options).centre - shape_.centre;
     return glm::length(back) < glm::length(free) ? back : in_world(free);
   }
 
@@ -177,7 +197,7 @@ class FreePlace {
   }
 
   const SceneTracer& tracer_;
-  const OrientedBox& box_;
+  const Shape& shape_;
   const glm::dmat3 axes_;
   const double max_distance_;
   const QueryFilter& filter_;
@@ -190,6 +210,12 @@ std::optional<DVec3> displacement_to_free_place(const SceneTracer& tracer, const
                                                 const QueryFilter& filter) {
   if (!is_box(box) || !std::isfinite(max_distance) || max_distance < 0.0) return std::nullopt;
   return FreePlace(tracer, box, max_distance, filter).find();
+}
+
+std::optional<DVec3> displacement_to_free_place(const SceneTracer& tracer, const Capsule& capsule, double max_distance,
+                                                const QueryFilter& filter) {
+  if (!is_capsule(capsule) || !std::isfinite(max_distance) || max_distance < 0.0) return std::nullopt;
+  return FreePlace(tracer, capsule, max_distance, filter).find();
 }
 
 }  // namespace quoin

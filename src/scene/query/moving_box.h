@@ -61,14 +61,20 @@ void visit_sides(const MovingBox& box, const Visit& visit) {
   }
 }
 
-/// The fractions of the way at which the box's bounds are within `tight`.
-inline std::pair<double, double> times_within(const MovingBox& box, DVec3 reach, const IBox& tight) {
+/// How far a shape reaches from its centre along each axis.
+inline DVec3 reach_of(const MovingBox& box) {
+  return reach_of_axes(box.half_axes);
+}
+
+/// The fractions of the way at which a shape's bounds are within `tight`.
+template <class Moving>
+std::pair<double, double> times_within(const Moving& shape, DVec3 reach, const IBox& tight) {
   double first = 0.0;
   double last = 1.0;
   for (int axis = 0; axis < 3; ++axis) {
-    const double low = tight.min[axis] - reach[axis] - 1.0 - box.centre[axis];
-    const double high = tight.max[axis] + reach[axis] + 1.0 - box.centre[axis];
-    const double d = box.displacement[axis];
+    const double low = tight.min[axis] - reach[axis] - 1.0 - shape.centre[axis];
+    const double high = tight.max[axis] + reach[axis] + 1.0 - shape.centre[axis];
+    const double d = shape.displacement[axis];
     if (d == 0.0) {
       if (low > 0.0 || high < 0.0) return {1.0, 0.0};
       continue;
@@ -79,28 +85,29 @@ inline std::pair<double, double> times_within(const MovingBox& box, DVec3 reach,
   return {first, last};
 }
 
-/// The box's bounds between two fractions of its way.
-inline DBox bounds_between(const MovingBox& box, DVec3 reach, double from, double to) {
-  const DVec3 a = box.centre + from * box.displacement;
-  const DVec3 b = box.centre + to * box.displacement;
+/// A shape's bounds between two fractions of its way.
+template <class Moving>
+DBox bounds_between(const Moving& shape, DVec3 reach, double from, double to) {
+  const DVec3 a = shape.centre + from * shape.displacement;
+  const DVec3 b = shape.centre + to * shape.displacement;
   return {glm::min(a, b) - reach, glm::max(a, b) + reach};
 }
 
-/// Follows the way in steps of the box's own size, up to the fraction `most`: `contents.check(near, from, to)` looks
+/// Follows the way of a shape in steps of its own size, up to the fraction `most`: `contents.check(near, from, to)` looks
 /// at the voxels or cells that are near between two fractions, within `contents.bounds()`; the way ends where
 /// `contents.fraction()`, of the best contact so far, has been passed.
-template <class Contents>
-void follow_way(const MovingBox& box, double most, Contents& contents) {
-  const DVec3 reach = reach_of_axes(box.half_axes);
+template <class Moving, class Contents>
+void follow_way(const Moving& shape, double most, Contents& contents) {
+  const DVec3 reach = reach_of(shape);
   const IBox tight = contents.bounds();
   const auto check = [&](double from, double to) {
-    const DBox bounds = bounds_between(box, reach, from, to);
+    const DBox bounds = bounds_between(shape, reach, from, to);
     contents.check(voxels_within({bounds.min - 1e-6, bounds.max + 1e-6}, tight), from, to);
   };
-  const double length = length_of(box.displacement);
+  const double length = length_of(shape.displacement);
   const double step = std::max(1.0, std::min({reach.x, reach.y, reach.z}));
   if (tight.empty()) return;
-  const auto [first, last] = times_within(box, reach, tight);
+  const auto [first, last] = times_within(shape, reach, tight);
   if (first > last) return;
   // Whole steps from the start, so that what is met does not depend on the grid's bounds.
   const double steps = std::max(1.0, std::ceil(length / step));

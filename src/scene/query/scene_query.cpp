@@ -12,6 +12,7 @@
 #include "scene/query/field_search.h"
 #include "scene/query/field_sweep.h"
 #include "scene/query/moving_box.h"
+#include "scene/query/moving_capsule.h"
 #include "scene/query/query_in_grid.h"
 #include "scene/tracer/placed_grid.h"
 
@@ -60,7 +61,7 @@ std::optional<DensityHit> first_beyond(const DensityTree& field, const TypesMet&
   const double until = std::min(max_t, leaves_at(field.cells().bounds(), ray));
   if (!(until >= 0.0)) return std::nullopt;
   point.displacement = ray.direction * until;
-  FieldSweep sweep(field, types, point, 1.0);
+  FieldSweep<MovingBox> sweep(field, types, point, 1.0);
   follow_way(point, 1.0, sweep);
   const FieldContact& met = sweep.best();
   if (!(met.fraction <= 1.0)) return std::nullopt;
@@ -113,19 +114,18 @@ Ray ray_in_grid(const PlacedGrid& placed, const Ray& ray) {
 }
 
 // What overlap queries ask of a shape in a grid's space.
-class SphereInGrid {
+class CapsuleInGrid {
  public:
-  SphereInGrid(DVec3 centre, double radius) : centre_(centre), radius_(radius) {}
-  [[nodiscard]] DBox bounds() const { return {centre_ - radius_, centre_ + radius_}; }
+  explicit CapsuleInGrid(const MovingCapsule& capsule) : capsule_(capsule) {}
+  [[nodiscard]] DBox bounds() const { return bounds_between(capsule_, reach_of(capsule_), 0.0, 0.0); }
   [[nodiscard]] bool meets(IVec3 voxel) const {
-    const DVec3 nearest = glm::clamp(centre_, DVec3(voxel), DVec3(voxel + 1));
-    return glm::length(nearest - centre_) < radius_ - kTouch;
+    const LineGap gap = gap_of_line(capsule_.centre - (DVec3(voxel) + 0.5), capsule_.half_axis);
+    return gap.distance < capsule_.radius - kTouch;
   }
-  [[nodiscard]] BallInField in_field() const { return {centre_, radius_}; }
+  [[nodiscard]] CapsuleInField in_field() const { return {capsule_, 0.0}; }
 
  private:
-  DVec3 centre_;
-  double radius_;
+  MovingCapsule capsule_;
 };
 
 class BoxInGrid {
@@ -165,8 +165,8 @@ std::optional<SceneOverlap> first_of_shape(const PlacedGrid& placed, const Types
 }
 
 std::optional<SceneOverlap> first_of_voxels(const PlacedGrid& placed, const TypesMet& types,
-                                            const SphereInGrid& sphere) {
-  return first_of_shape(placed, types, sphere);
+                                            const CapsuleInGrid& capsule) {
+  return first_of_shape(placed, types, capsule);
 }
 std::optional<SceneOverlap> first_of_voxels(const PlacedGrid& placed, const TypesMet& types, const BoxInGrid& box) {
   std::optional<SceneOverlap> first;
@@ -264,9 +264,14 @@ std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& 
 }
 
 std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, DVec3 centre, double radius, const QueryFilter& filter) {
-  if (!is_finite(centre) || !std::isfinite(radius) || radius <= 0.0) return {};
-  return overlaps_of(tracer, {centre - radius, centre + radius}, filter, [&](const PlacedGrid& placed) {
-    return SphereInGrid(ToGrid(placed).point(centre), radius / placed.voxel_size);
+  return overlaps(tracer, Capsule{radius, centre, DVec3(0.0)}, filter);
+}
+
+std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const Capsule& capsule, const QueryFilter& filter) {
+  if (!is_capsule(capsule)) return {};
+  const DVec3 reach = reach_of(capsule);
+  return overlaps_of(tracer, {capsule.centre - reach, capsule.centre + reach}, filter, [&](const PlacedGrid& placed) {
+    return CapsuleInGrid(moving_in_grid(placed, capsule, DVec3(0.0)));
   });
 }
 

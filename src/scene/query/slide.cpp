@@ -35,14 +35,37 @@ DVec3 along_contacts(DVec3 displacement, const std::vector<DVec3>& normals) {
   return DVec3(0.0);
 }
 
-// A box among what it may meet.
+auto sweep_shape(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement, const QueryFilter& filter) {
+  return sweep_box(tracer, box, displacement, filter);
+}
+auto sweep_shape(const SceneTracer& tracer, const Capsule& capsule, DVec3 displacement, const QueryFilter& filter) {
+  return sweep_capsule(tracer, capsule, displacement, filter);
+}
+
+double longest_of(const OrientedBox& box) {
+  return 2.0 * std::max({box.half_size.x, box.half_size.y, box.half_size.z});
+}
+double longest_of(const Capsule& capsule) {
+  return 2.0 * (glm::length(capsule.half_axis) + capsule.radius);
+}
+// Half of it, across.
+double thinnest_of(const OrientedBox& box) {
+  const DVec3 half = glm::abs(box.half_size);
+  return std::min({half.x, half.y, half.z});
+}
+double thinnest_of(const Capsule& capsule) {
+  return capsule.radius;
+}
+
+// A shape among what it may meet.
+template <class Shape>
 struct Body {
   const SceneTracer& tracer;
   const SlideOptions& options;
-  OrientedBox box;
+  Shape shape;
 
   [[nodiscard]] std::optional<SweepHit> sweep(DVec3 displacement) const {
-    return sweep_box(tracer, box, displacement, options.filter);
+    return sweep_shape(tracer, shape, displacement, options.filter);
   }
   // Moves it to a contact, but for the skin; returns which fraction of the displacement that was. Where it is stuck in
   // a hollow of a field because what went before ended within the skin, it gets that back, or it would stay there.
@@ -50,43 +73,42 @@ struct Body {
     const double speed = -glm::dot(displacement, hit.normal);
     const double back = speed > 0.0 ? options.skin / speed : 0.0;
     const double fraction = std::max(0.0, hit.fraction - back);
-    box.centre += displacement * fraction;
+    shape.centre += displacement * fraction;
     const double gap = hit.fraction * speed;
     if (fraction == 0.0 && hit.in_field && gap < 0.5 * options.skin) {
       const DVec3 away = hit.normal * (options.skin - gap);
-      if (!sweep(away)) box.centre += away;
+      if (!sweep(away)) shape.centre += away;
     }
     return fraction;
   }
   // Out of what it starts inside of; false where it stays there.
   bool move_out(const SweepHit& hit) {
     if (!options.pushes_out) return false;
-    const double longest = 2.0 * std::max({box.half_size.x, box.half_size.y, box.half_size.z});
-    const double furthest = options.max_push_out.value_or(longest + hit.depth + options.skin);
+    const double furthest = options.max_push_out.value_or(longest_of(shape) + hit.depth + options.skin);
     const DVec3 along_normal = hit.normal * (hit.depth + options.skin);
     if (hit.in_field && glm::length(along_normal) <= furthest) {
-      OrientedBox moved = box;
+      Shape moved = shape;
       moved.centre += along_normal;
       if (overlaps(tracer, moved, options.filter).empty()) {
-        box.centre = moved.centre;
+        shape.centre = moved.centre;
         return true;
       }
     }
-    const auto away = displacement_to_free_place(tracer, box, furthest, options.filter);
+    const auto away = displacement_to_free_place(tracer, shape, furthest, options.filter);
     if (!away) return false;
-    box.centre += *away;
+    shape.centre += *away;
     // And on by the skin where there is room.
     const double length = glm::length(*away);
-    OrientedBox further = box;
+    Shape further = shape;
     if (length > 0.0) further.centre += *away * (options.skin / length);
-    if (overlaps(tracer, further, options.filter).empty()) box = further;
+    if (overlaps(tracer, further, options.filter).empty()) shape = further;
     return true;
   }
   // Moves it as far as it goes; returns what it met.
   std::optional<SweepHit> advance(DVec3 displacement) {
     const auto hit = sweep(displacement);
     if (!hit) {
-      if (is_finite(displacement)) box.centre += displacement;
+      if (is_finite(displacement)) shape.centre += displacement;
     } else if (hit->depth == 0.0) {
       move_to(*hit, displacement);
     }
@@ -102,16 +124,17 @@ void note(SlideResult& result, SlideContact::Kind kind, const SweepHit& hit) {
   result.normal = hit.normal;
 }
 
-SlideResult slide(Body body, DVec3 displacement) {
+template <class Shape>
+SlideResult slide(Body<Shape> body, DVec3 displacement) {
   SlideResult result;
-  result.centre = body.box.centre;
+  result.centre = body.shape.centre;
   result.displacement = displacement;
   DVec3 left = displacement;
   std::vector<DVec3> normals;
   for (int contact = 0; contact < body.options.max_contacts; ++contact) {
     const auto hit = body.sweep(left);
     if (!hit) {
-      if (is_finite(left)) body.box.centre += left;
+      if (is_finite(left)) body.shape.centre += left;
       break;
     }
     note(result, hit->depth > 0.0 ? SlideContact::Kind::Inside : SlideContact::Kind::Wall, *hit);
@@ -125,15 +148,16 @@ SlideResult slide(Body body, DVec3 displacement) {
     if (left == DVec3(0.0)) break;
   }
   result.displacement = along_contacts(displacement, normals);
-  result.centre = body.box.centre;
+  result.centre = body.shape.centre;
   return result;
 }
 
 // A body that walks. On a floor it has a level displacement, which walls turn aside and the floor lifts and lowers; off
 // it, it slides as any body.
+template <class Shape>
 class Walk {
  public:
-  Walk(const Body& body, const FloorOptions& floor, DVec3 up)
+  Walk(const Body<Shape>& body, const FloorOptions& floor, DVec3 up)
       : body_(body),
         floor_(floor),
         up_(up),
@@ -148,7 +172,7 @@ class Walk {
       const DVec3 way = is_on_floor_ ? along_floor(left_) : left_;
       const auto hit = body_.sweep(way);
       if (!hit) {
-        if (is_finite(way)) body_.box.centre += way;
+        if (is_finite(way)) body_.shape.centre += way;
         break;
       }
       if (!meet(*hit, way)) break;
@@ -165,7 +189,7 @@ class Walk {
     return v - up_ * (glm::dot(v, result_.floor_normal) / glm::dot(result_.floor_normal, up_));
   }
   [[nodiscard]] SlideResult result() {
-    result_.centre = body_.box.centre;
+    result_.centre = body_.shape.centre;
     result_.displacement = displacement_;
     result_.is_on_floor = is_on_floor_;
     if (!is_on_floor_) {
@@ -271,27 +295,26 @@ class Walk {
   bool steps(DVec3 ahead, DVec3 normal) {
     const double length = glm::length(ahead);
     if (!(length > 0.0) || glm::dot(ahead, normal) >= 0.0) return false;
-    Body raised = body_;
+    Body<Shape> raised = body_;
     raised.advance(up_ * floor_.step_height);
-    const double rise = glm::dot(raised.box.centre - body_.box.centre, up_);
+    const double rise = glm::dot(raised.shape.centre - body_.shape.centre, up_);
     if (!(rise > body_.options.skin)) return false;
-    Body landed = raised;
+    Body<Shape> landed = raised;
     landed.advance(ahead);
     // Not where the wall goes on above.
-    if (glm::dot(landed.box.centre - raised.box.centre, ahead) < 0.25 * length * length) return false;
+    if (glm::dot(landed.shape.centre - raised.shape.centre, ahead) < 0.25 * length * length) return false;
     const DVec3 down = -up_ * (rise + 2.0 * body_.options.skin);
     auto ground = landed.advance(down);
     if (!ground || ground->depth > 0.0) return false;
     if (!is_floor(ground->normal)) {
       // On the edge of the step: the floor may begin a little further on.
-      Body further = raised;
-      const DVec3 half = glm::abs(body_.box.half_size);
-      further.advance(ahead * std::max(1.0, std::min({half.x, half.y, half.z}) / length));
+      Body<Shape> further = raised;
+      further.advance(ahead * std::max(1.0, thinnest_of(body_.shape) / length));
       ground = further.advance(down);
       if (!ground || ground->depth > 0.0 || !is_floor(ground->normal)) return false;
-      if (glm::dot(further.box.centre - body_.box.centre, up_) < body_.options.skin) return false;
+      if (glm::dot(further.shape.centre - body_.shape.centre, up_) < body_.options.skin) return false;
     }
-    body_.box.centre = landed.box.centre;
+    body_.shape.centre = landed.shape.centre;
     displacement_ = level(displacement_);
     left_ = DVec3(0.0);
     meets_floor_ = true;
@@ -315,7 +338,7 @@ class Walk {
     is_on_floor_ = meets_floor_ && hit && hit->fraction * glm::length(down) <= probe;
   }
 
-  Body body_;
+  Body<Shape> body_;
   const FloorOptions& floor_;
   DVec3 up_;
   double steepest_;  // of the normals of floors, along `up_`
@@ -328,18 +351,28 @@ class Walk {
   bool is_supported_ = false;  // by a floor or a slope, from the start
 };
 
+template <class Shape>
+SlideResult moved(const SceneTracer& tracer, const Shape& shape, DVec3 displacement, const SlideOptions& options) {
+  const Body<Shape> body{tracer, options, shape};
+  if (options.floor) {
+    const double length = glm::length(options.floor->up);
+    if (length > 0.0 && std::isfinite(length) && is_finite(displacement)) {
+      return Walk<Shape>(body, *options.floor, options.floor->up / length).run(displacement);
+    }
+  }
+  return slide(body, displacement);
+}
+
 }  // namespace
 
 SlideResult move_and_slide(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement,
                            const SlideOptions& options) {
-  const Body body{tracer, options, box};
-  if (options.floor) {
-    const double length = glm::length(options.floor->up);
-    if (length > 0.0 && std::isfinite(length) && is_finite(displacement)) {
-      return Walk(body, *options.floor, options.floor->up / length).run(displacement);
-    }
-  }
-  return slide(body, displacement);
+  return moved(tracer, box, displacement, options);
+}
+
+SlideResult move_and_slide(const SceneTracer& tracer, const Capsule& capsule, DVec3 displacement,
+                           const SlideOptions& options) {
+  return moved(tracer, capsule, displacement, options);
 }
 
 }  // namespace quoin

@@ -5,6 +5,7 @@
 
 #include "scene/query/field_sweep.h"
 #include "scene/query/moving_box.h"
+#include "scene/query/moving_capsule.h"
 #include "scene/query/query_in_grid.h"
 #include "scene/tracer/placed_grid.h"
 
@@ -15,56 +16,61 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Fractions that differ by less are of voxels met at once.
 constexpr double kAtOnce = 1e-9;
 
-// A moving box, with what parts it from voxels.
-struct Moving {
-  DVec3 centre{0.0};
-  SeparatingAxes axes{};
-  std::array<double, 15> reach{};
-  std::array<double, 15> speed{};
-
-  explicit Moving(const MovingBox& box) : centre(box.centre), axes(separating_axes(box.half_axes)) {
-    for (std::size_t i = 0; i < axes.size(); ++i) {
-      reach[i] = reach_along(axes[i], box.half_axes);
-      speed[i] = glm::dot(box.displacement, axes[i]);
-    }
-  }
-};
-
-// When a moving box meets a voxel.
+// When a moving shape meets a voxel.
 struct Contact {
   double fraction = kInfinity;
   DVec3 normal{0.0};  // in the grid
   double depth = 0.0;
-  int axis = -1;
+  int axis = -1;  // of the normal, where it is one of the grid's; else 3 and more, and -1 where nothing is met
+};
+
+// A moving box, with what parts it from voxels.
+class BoxAmongVoxels {
+ public:
+  explicit BoxAmongVoxels(const MovingBox& box) : centre_(box.centre), axes_(separating_axes(box.half_axes)) {
+    for (std::size_t i = 0; i < axes_.size(); ++i) {
+      reach_[i] = reach_along(axes_[i], box.half_axes);
+      speed_[i] = glm::dot(box.displacement, axes_[i]);
+    }
+  }
+  [[nodiscard]] Contact meet(IVec3 voxel, double most) const;
+
+ private:
+  [[nodiscard]] Contact inside_contact(DVec3 between) const;
+
+  DVec3 centre_{0.0};
+  SeparatingAxes axes_{};
+  std::array<double, 15> reach_{};
+  std::array<double, 15> speed_{};
 };
 
 // The contact of a box that overlaps the voxel from the start: the direction in which it is out soonest.
-Contact inside_contact(const Moving& box, DVec3 between) {
+Contact BoxAmongVoxels::inside_contact(DVec3 between) const {
   Contact contact;
   contact.fraction = 0.0;
   contact.depth = kInfinity;
-  for (std::size_t i = 0; i < box.axes.size(); ++i) {
-    if (box.axes[i] == DVec3(0.0)) continue;
-    const double apart = glm::dot(between, box.axes[i]);
-    const double depth = box.reach[i] - std::abs(apart);
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    if (axes_[i] == DVec3(0.0)) continue;
+    const double apart = glm::dot(between, axes_[i]);
+    const double depth = reach_[i] - std::abs(apart);
     if (depth >= contact.depth - 1e-12) continue;
     contact.depth = depth;
-    contact.normal = apart > 0.0 ? -box.axes[i] : box.axes[i];
+    contact.normal = apart > 0.0 ? -axes_[i] : axes_[i];
     contact.axis = static_cast<int>(i);
   }
   return contact;
 }
 
-Contact meet(const Moving& box, IVec3 voxel) {
-  const DVec3 between = DVec3(voxel) + 0.5 - box.centre;
+Contact BoxAmongVoxels::meet(IVec3 voxel, double most) const {
+  const DVec3 between = DVec3(voxel) + 0.5 - centre_;
   Contact contact;
   double enter = -kInfinity;
   double leave = kInfinity;
-  for (std::size_t i = 0; i < box.axes.size(); ++i) {
-    if (box.axes[i] == DVec3(0.0)) continue;
-    const double apart = glm::dot(between, box.axes[i]);
-    const double reach = box.reach[i] - kTouch;
-    const double speed = box.speed[i];
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    if (axes_[i] == DVec3(0.0)) continue;
+    const double apart = glm::dot(between, axes_[i]);
+    const double reach = reach_[i] - kTouch;
+    const double speed = speed_[i];
     if (speed == 0.0) {
       if (std::abs(apart) >= reach) return {};
       continue;
@@ -74,22 +80,68 @@ Contact meet(const Moving& box, IVec3 voxel) {
     // The voxel's own axes come first, and are preferred.
     if (begin > enter + 1e-12 || contact.axis < 0) {
       enter = begin;
-      contact.normal = speed > 0.0 ? -box.axes[i] : box.axes[i];
+      contact.normal = speed > 0.0 ? -axes_[i] : axes_[i];
       contact.axis = static_cast<int>(i);
     }
     if (enter >= leave || leave <= 0.0) return {};
   }
-  if (enter > 1.0) return {};
-  if (enter < 0.0) return inside_contact(box, between);
+  if (enter > most) return {};
+  if (enter < 0.0) return inside_contact(between);
   contact.fraction = enter;
   return contact;
 }
 
+// A moving capsule, likewise.
+class CapsuleAmongVoxels {
+ public:
+  explicit CapsuleAmongVoxels(const MovingCapsule& capsule) : capsule_(capsule) {}
+  [[nodiscard]] Contact meet(IVec3 voxel, double most) const;
+
+ private:
+  [[nodiscard]] Contact contact_at(double fraction, const LineGap& gap) const;
+
+  const MovingCapsule& capsule_;
+};
+
+Contact CapsuleAmongVoxels::contact_at(double fraction, const LineGap& gap) const {
+  Contact contact{fraction, gap.away, 0.0, 3};
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::abs(gap.away[axis]) >= 1.0 - 1e-12) contact.axis = axis;
+  }
+  return contact;
+}
+
+Contact CapsuleAmongVoxels::meet(IVec3 voxel, double most) const {
+  constexpr int kMostSteps = 64;  // as many as halve a distance until nothing is left of it: when it just grazes
+  constexpr double kMet = 1e-12;
+  const DVec3 apart = capsule_.centre - (DVec3(voxel) + 0.5);
+  const double radius = capsule_.radius - kTouch;
+  double fraction = 0.0;
+  for (int step = 0; step < kMostSteps; ++step) {
+    LineGap gap = gap_of_line(apart + fraction * capsule_.displacement, capsule_.half_axis);
+    const double left = gap.distance - radius;
+    if (step == 0 && left < 0.0) {
+      // Less is what rounding leaves of a line that goes through the voxel.
+      if (gap.distance < kTouch) gap = way_out_of_line(apart, capsule_.half_axis);
+      Contact contact = contact_at(0.0, gap);
+      contact.depth = capsule_.radius - gap.distance;
+      return contact;
+    }
+    const double speed = -glm::dot(gap.away, capsule_.displacement);
+    if (!(speed > 0.0)) return {};
+    if (left <= kMet) return contact_at(fraction, gap);
+    fraction += left / speed;
+    if (!(fraction <= most)) return {};
+  }
+  return {};
+}
+
 // The voxels of one grid, and the best contact with them so far; for `follow_way`.
+template <class Shape>
 class BlockSweep {
  public:
-  BlockSweep(const Grid& grid, const TypesMet& types, const MovingBox& box)
-      : reader_(grid), types_(types), box_(box), bounds_(grid.bounds()) {}
+  BlockSweep(const Grid& grid, const TypesMet& types, const Shape& shape)
+      : reader_(grid), types_(types), shape_(shape), bounds_(grid.bounds()) {}
 
   [[nodiscard]] const IBox& bounds() const { return bounds_; }
   [[nodiscard]] double fraction() const { return best_.fraction; }
@@ -108,8 +160,8 @@ class BlockSweep {
  private:
   void check_voxel(IVec3 voxel) {
     if (!types_.holds(reader_.get(voxel))) return;
-    const Contact contact = meet(box_, voxel);
-    if (contact.fraction > best_.fraction + kAtOnce || contact.axis < 0) return;
+    const Contact contact = shape_.meet(voxel, std::min(best_.fraction + kAtOnce, 1.0));
+    if (contact.axis < 0) return;
     const bool is_exposed = faces_air(voxel, contact);
     const bool is_earlier = contact.fraction < best_.fraction - kAtOnce;
     const bool is_deeper = contact.depth > best_.depth;
@@ -129,44 +181,59 @@ class BlockSweep {
 
   GridReader reader_;
   const TypesMet& types_;
-  Moving box_;
+  const Shape& shape_;
   IBox bounds_;
   Contact best_;
   IVec3 voxel_{0};
   bool best_is_exposed_ = false;
 };
 
+template <class Shape>
+SweepHit hit_of(const PlacedGrid& placed, BlockSweep<Shape>& sweep) {
+  const Contact& best = sweep.best();
+  const DVec3 normal = glm::normalize(placed.world_axes * best.normal);
+  return {best.fraction, normal, placed.instance, sweep.voxel(), best.depth * placed.voxel_size, sweep.type()};
+}
+
 // The first contact with what an instance places, up to the fraction `most`.
 std::optional<SweepHit> first_of_voxels(const PlacedGrid& placed, const TypesMet& types, const MovingBox& box,
                                         double most) {
-  if (placed.voxels->bounds().empty()) return std::nullopt;
   std::optional<SweepHit> last;
   visit_sides(box, [&](const MovingBox& side) {
-    BlockSweep sweep(*placed.voxels, types, side);
+    const BoxAmongVoxels shape(side);
+    BlockSweep sweep(*placed.voxels, types, shape);
     follow_way(side, most, sweep);
     const Contact& best = sweep.best();
     const bool is_met = best.axis >= 0;
     if (!is_met) {
       last.reset();
     } else if (!last || best.fraction > last->fraction) {
-      const DVec3 normal = glm::normalize(placed.world_axes * best.normal);
-      const double depth = best.depth * placed.voxel_size;
-      last = SweepHit{best.fraction, normal, placed.instance, sweep.voxel(), depth, sweep.type()};
+      last = hit_of(placed, sweep);
     }
     return is_met;
   });
   return last;
 }
 
-std::optional<SweepHit> first_of_field(const PlacedGrid& placed, const TypesMet& types, const MovingBox& box,
+std::optional<SweepHit> first_of_voxels(const PlacedGrid& placed, const TypesMet& types, const MovingCapsule& capsule,
+                                        double most) {
+  const CapsuleAmongVoxels shape(capsule);
+  BlockSweep sweep(*placed.voxels, types, shape);
+  follow_way(capsule, most, sweep);
+  if (sweep.best().axis < 0) return std::nullopt;
+  return hit_of(placed, sweep);
+}
+
+template <class Moving>
+std::optional<SweepHit> first_of_field(const PlacedGrid& placed, const TypesMet& types, const Moving& shape,
                                        double most) {
-  FieldSweep sweep(*placed.field, types, box, most);
-  follow_way(box, most, sweep);
+  FieldSweep<Moving> sweep(*placed.field, types, shape, most);
+  follow_way(shape, most, sweep);
   const FieldContact& best = sweep.best();
   if (!(best.fraction <= most)) return std::nullopt;
   SweepHit hit{best.fraction, sweep.normal(), placed.instance, best.piece.cell, 0.0, sweep.material(), true};
   if (best.starts_inside) {
-    const WayOut out = way_out(*placed.field, types, box, best);
+    const WayOut out = way_out(*placed.field, types, shape, best);
     hit.normal = out.normal;
     hit.depth = out.depth * placed.voxel_size;
   }
@@ -178,26 +245,41 @@ bool is_sooner(const SweepHit& hit, const std::optional<SweepHit>& first) {
   return !first || hit.fraction < first->fraction || (hit.fraction == first->fraction && hit.depth > first->depth);
 }
 
+// `moving_in(placed)` is the shape in that grid's space; `reach` what it reaches from its centre along the world's axes.
+template <class MovingIn>
+std::optional<SweepHit> first_of_scene(const SceneTracer& tracer, DVec3 centre, DVec3 reach, DVec3 displacement,
+                                       const QueryFilter& filter, const MovingIn& moving_in) {
+  const DVec3 end = centre + displacement;
+  const Seen seen(tracer, filter, QueryTypes::Colliding);
+  std::optional<SweepHit> first;
+  seen.visit_near({glm::min(centre, end) - reach, glm::max(centre, end) + reach}, [&](const PlacedGrid& placed) {
+    const auto moving = moving_in(placed);
+    if (!placed.voxels->bounds().empty()) {
+      const auto of_voxels = first_of_voxels(placed, seen.types, moving, first ? first->fraction : 1.0);
+      if (of_voxels && is_sooner(*of_voxels, first)) first = of_voxels;
+    }
+    if (placed.field == nullptr) return;
+    const auto of_field = first_of_field(placed, seen.types, moving, first ? first->fraction : 1.0);
+    if (of_field && is_sooner(*of_field, first)) first = of_field;
+  });
+  return first;
+}
+
 }  // namespace
 
 std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement,
                                   const QueryFilter& filter) {
   if (!is_box(box) || !is_finite(displacement)) return std::nullopt;
   const glm::dmat3 half_axes = half_axes_of(box);
-  const DVec3 reach = reach_of_axes(half_axes);
-  const DVec3 end = box.centre + displacement;
-  const Seen seen(tracer, filter, QueryTypes::Colliding);
-  std::optional<SweepHit> first;
-  const DBox way{glm::min(box.centre, end) - reach, glm::max(box.centre, end) + reach};
-  seen.visit_near(way, [&](const PlacedGrid& placed) {
-    const MovingBox moving = moving_in_grid(placed, box, half_axes, displacement);
-    const auto of_voxels = first_of_voxels(placed, seen.types, moving, first ? first->fraction : 1.0);
-    if (of_voxels && is_sooner(*of_voxels, first)) first = of_voxels;
-    if (placed.field == nullptr) return;
-    const auto of_field = first_of_field(placed, seen.types, moving, first ? first->fraction : 1.0);
-    if (of_field && is_sooner(*of_field, first)) first = of_field;
-  });
-  return first;
+  return first_of_scene(tracer, box.centre, reach_of_axes(half_axes), displacement, filter,
+                        [&](const PlacedGrid& placed) { return moving_in_grid(placed, box, half_axes, displacement); });
+}
+
+std::optional<SweepHit> sweep_capsule(const SceneTracer& tracer, const Capsule& capsule, DVec3 displacement,
+                                      const QueryFilter& filter) {
+  if (!is_capsule(capsule) || !is_finite(displacement)) return std::nullopt;
+  return first_of_scene(tracer, capsule.centre, reach_of(capsule), displacement, filter,
+                        [&](const PlacedGrid& placed) { return moving_in_grid(placed, capsule, displacement); });
 }
 
 }  // namespace quoin

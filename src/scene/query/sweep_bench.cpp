@@ -1,6 +1,7 @@
 // scene/sweep/*: a player's box of 0.8x1.8x0.8 on the benchmarks' terrain of 256x128x256, as blocks and without steps
 // as a field, a skin above the ground: moved by 0.2 along the ground (level) or into it (down), upright, turned about
-// its height, and turned anyhow; and a step of walking with gravity. Time is of one query.
+// its height, and turned anyhow; and a step of walking with gravity; likewise a capsule within that box. Time is of one
+// query.
 
 #include <cmath>
 #include <cstdio>
@@ -99,6 +100,33 @@ void sweeps(benchmark::State& state, const World& (*world_of)(), Turn turn, doub
   state.counters["hits"] = hits;
 }
 
+// What goes into a box of that size.
+Capsule capsule_in(const OrientedBox& box) {
+  return {box.half_size.x, box.centre, box.rotation * DVec3(0.0, box.half_size.y - box.half_size.x, 0.0)};
+}
+
+void capsule_sweeps(benchmark::State& state, const World& (*world_of)(), Turn turn, double down) {
+  const World& world = world_of();
+  const std::vector<Query> all = queries(world, turn, down);
+  std::size_t next = 0;
+  for (auto _ : state) {
+    const Query& query = all[next++ % all.size()];
+    benchmark::DoNotOptimize(sweep_capsule(world.tracer, capsule_in(query.box), query.displacement));
+  }
+}
+
+void capsule_walks(benchmark::State& state, const World& (*world_of)()) {
+  const World& world = world_of();
+  const std::vector<Query> all = queries(world, Turn::None, 0.3);
+  SlideOptions options;
+  options.floor = FloorOptions{{0, 1, 0}, 50.0, 1.1, 0.5};
+  std::size_t next = 0;
+  for (auto _ : state) {
+    const Query& query = all[next++ % all.size()];
+    benchmark::DoNotOptimize(move_and_slide(world.tracer, capsule_in(query.box), query.displacement, options).centre);
+  }
+}
+
 void walks(benchmark::State& state, const World& (*world_of)()) {
   const World& world = world_of();
   const std::vector<Query> all = queries(world, Turn::None, 0.3);
@@ -139,6 +167,10 @@ void free_places(benchmark::State& state, const World& (*world_of)(), Turn turn,
     add("down_upright", Turn::Upright, 0.3);
     add("down_any", Turn::Any, 0.3);
     benchmark::RegisterBenchmark((path + "walk").c_str(), walks, world);
+    benchmark::RegisterBenchmark((path + "capsule/level").c_str(), capsule_sweeps, world, Turn::None, 0.0);
+    benchmark::RegisterBenchmark((path + "capsule/down").c_str(), capsule_sweeps, world, Turn::None, 0.3);
+    benchmark::RegisterBenchmark((path + "capsule/down_any").c_str(), capsule_sweeps, world, Turn::Any, 0.3);
+    benchmark::RegisterBenchmark((path + "capsule/walk").c_str(), capsule_walks, world);
     benchmark::RegisterBenchmark((path + "free_place").c_str(), free_places, world, Turn::None, 0.7);
     benchmark::RegisterBenchmark((path + "free_place_any").c_str(), free_places, world, Turn::Any, 0.7);
   }

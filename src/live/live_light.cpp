@@ -1,0 +1,157 @@
+#include <quoin/live/live_light.h>
+
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "core/worker_count.h"
+
+namespace quoin {
+namespace {
+
+// The light of a scene as it was at one moment.
+struct LitScene {
+  std::shared_ptr<const Scene> scene;
+  SceneLight light;
+};
+
+}  // namespace
+
+struct LiveLight::Impl {
+  explicit Impl(LiveLightOptions options)
+      : threads{worker_count(options.workers)}, working{nullptr, SceneLight(std::move(options.light))} {
+    worker = std::thread([this] { run(); });
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+  ~Impl() {
+    {
+      const std::lock_guard lock(mutex);
+      is_stopping = true;
+    }
+    wake.notify_all();
+    worker.join();
+  }
+
+  void run();
+  void throw_failure();
+  void wait() {
+    std::unique_lock lock(mutex);
+    progressed.wait(lock, [&] { return !is_busy; });
+  }
+
+  // The caller's.
+  ChangeCursor followed_scene;
+  ChangeCursor followed_types;
+  bool is_behind = true;  // something changed that no snapshot has
+  LitScene shown;
+
+  // The worker's, and what it was made with.
+  Threads threads;
+  LitScene working;
+
+  mutable std::mutex mutex;  // of all below
+  std::condition_variable wake;
+  std::condition_variable progressed;
+  bool is_stopping = false;
+  bool is_busy = false;                // with what was asked for
+  std::shared_ptr<const Scene> asked;  // to be lit
+  std::unique_ptr<LitScene> ready;     // to be taken
+  std::unique_ptr<LitScene> given_up;  // was shown; the worker destroys it, which takes a while
+  std::exception_ptr failure;
+  std::thread worker;
+};
+
+void LiveLight::Impl::run() {
+  std::unique_lock lock(mutex);
+  for (;;) {
+    wake.wait(lock, [&] { return is_stopping || asked != nullptr; });
+    if (is_stopping) return;
+    std::shared_ptr<const Scene> scene = std::exchange(asked, nullptr);
+    lock.unlock();
+    std::unique_ptr<LitScene> done;
+    std::exception_ptr failed;
+    try {
+      working.light.update(*scene, threads);
+      working.scene = std::move(scene);
+      done = std::make_unique<LitScene>(LitScene{working.scene, working.light.snapshot()});
+    } catch (...) {
+      failed = std::current_exception();
+    }
+    lock.lock();
+    std::swap(ready, done);  // what nobody took
+    // Whoever takes what is ready finds room for what was shown before.
+    std::unique_ptr<LitScene> old = std::exchange(given_up, nullptr);
+    failure = failed;
+    is_busy = false;
+    progressed.notify_all();
+    lock.unlock();
+    done.reset();
+    old.reset();
+    lock.lock();
+  }
+}
+
+// Requires: the mutex is held.
+void LiveLight::Impl::throw_failure() {
+  if (failure == nullptr) return;
+  is_behind = true;
+  std::rethrow_exception(std::exchange(failure, nullptr));
+}
+
+LiveLight::LiveLight(LiveLightOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
+LiveLight::~LiveLight() = default;
+
+void LiveLight::update(const Scene& scene) {
+  Impl& me = *impl_;
+  const SceneChanges changes = scene.changes_since(me.followed_scene);
+  me.is_behind |= changes.all || !changes.grids.empty() || scene.types.has_changed_since(me.followed_types);
+  me.followed_types = scene.types.cursor();
+  {
+    const std::lock_guard lock(me.mutex);
+    me.throw_failure();
+    if (!me.is_behind || me.is_busy) return;
+  }
+  auto snapshot = std::make_shared<const Scene>(scene.snapshot());
+  {
+    const std::lock_guard lock(me.mutex);
+    me.asked = std::move(snapshot);
+    me.is_busy = true;
+    me.is_behind = false;
+  }
+  me.wake.notify_one();
+}
+
+bool LiveLight::take() {
+  Impl& me = *impl_;
+  const std::lock_guard lock(me.mutex);
+  if (me.ready == nullptr) return false;
+  std::swap(*me.ready, me.shown);
+  me.given_up = std::move(me.ready);
+  return true;
+}
+
+const SceneLight& LiveLight::shown() const {
+  return impl_->shown.light;
+}
+
+bool LiveLight::is_late() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->is_behind || impl_->is_busy || impl_->ready != nullptr;
+}
+
+void LiveLight::finish(const Scene& scene) {
+  do {
+    update(scene);
+    impl_->wait();
+    {
+      const std::lock_guard lock(impl_->mutex);
+      impl_->throw_failure();
+    }
+    take();
+  } while (is_late());
+}
+
+}  // namespace quoin

@@ -1,0 +1,145 @@
+#!/usr/bin/env bash
+# Plays apps/demo/miner as a player does, in a real window under Xvfb, with real keys and a real mouse by xdotool: walks,
+# digs a shaft and a tunnel, lights it with torches, starts a landslide, watches ships.
+# Usage: play.sh QUOIN_MINER [FOLDER]: pictures are kept in FOLDER. Exits with 77, and says so, where a program is not installed.
+set -euo pipefail
+miner="$(realpath "$1")"
+for program in xvfb-run xauth xdotool import convert; do
+  command -v "$program" >/dev/null || { echo "skipped: $program is not installed"; exit 77; }
+done
+if [ -z "${MINER_PLAY_INNER:-}" ]; then
+  export MINER_PLAY_INNER=1
+  exec xvfb-run -a -s '-screen 0 960x540x24' "$0" "$@"
+fi
+
+work="$(mktemp -d)"
+game=
+finish() {
+  [ -z "$game" ] || kill "$game" 2>/dev/null || true
+  rm -rf "$work"
+}
+trap finish EXIT
+pictures="${2:-$work}"
+mkdir -p "$pictures"
+export SDL_RENDER_DRIVER=software LC_ALL=C
+unset WAYLAND_DISPLAY SDL_VIDEODRIVER
+
+fail() { echo "FAILED: $*; $(title)"; cat "$work/log"; exit 1; }
+title() { xdotool getwindowname "$window" 2>/dev/null; }
+# What the window's title says of the player: x, y, z, sky, lamps or fallen
+said() {
+  title | sed -n 's/^Miner at \(-\?[0-9]*\) \(-\?[0-9]*\) \(-\?[0-9]*\), sky \([0-9]*\), lamps \([0-9]*\), fallen \([0-9]*\)$/\1 \2 \3 \4 \5 \6/p' |
+    awk -v what="$1" '{ split("x y z sky lamps fallen", names); for (i in names) if (names[i] == what) print $i }'
+}
+is() { local now; now="$(said "$1")"; [ -n "$now" ] && [ "$now" "$2" "$3" ]; }
+# Usage: until_true SECONDS COMMAND...
+until_true() {
+  local left=$(($1 * 5))
+  shift
+  until "$@"; do
+    left=$((left - 1))
+    [ "$left" -gt 0 ] || return 1
+    sleep 0.2
+  done
+}
+# Usage: look DOWN: by so many hundredths of a radian
+look() { xdotool mousemove_relative --sync -- 0 "$(($1 * 10 / 3))" || true; sleep 0.3; }
+hold() { xdotool keydown "$1"; sleep "$2"; xdotool keyup "$1"; }
+shot() { sleep 0.5; import -window root "$pictures/$1.png"; }
+# Usage: mean NAME CHANNEL: of a picture, 0 to 255
+mean() { convert "$pictures/$1.png" -format "%[fx:round(255*mean.$2)]" info:; }
+
+# How many pixels two pictures differ in
+other() { convert "$pictures/$1.png" "$pictures/$2.png" -compose difference -composite -colorspace gray -threshold 8% -format '%[fx:round(mean*w*h)]' info:; }
+
+start() {
+  "$miner" --units 4 --edits 0 "$@" >"$work/log" 2>&1 &
+  game=$!
+  window="$(timeout 60 xdotool search --sync --onlyvisible --name 'Miner' 2>/dev/null | head -n 1)" || fail "no window"
+  until_true 60 is y -gt 0 || fail "the game does not begin"
+  xdotool windowfocus "$window" 2>/dev/null || true
+  # Until it has landed.
+  local before
+  until before="$(said y)"; sleep 1; [ "$before" = "$(said y)" ]; do :; done
+}
+# Usage: torch KEY: onto what is ahead, nearer to it where that is out of reach
+torch() {
+  local tries
+  for tries in 1 2 3 4 5 6 7 8; do
+    xdotool key --delay 80 "$1"
+    ! until_true 4 is lamps -gt 0 || return 0
+    hold w 0.3
+  done
+  fail "torch $1 does not shine"
+}
+stop() {
+  xdotool key --delay 80 Escape
+  until_true 30 gone || fail "Escape does not end it"
+  wait "$game" || fail "it ended with $?"
+  game=
+}
+gone() { ! kill -0 "$game" 2>/dev/null; }
+
+echo "walk"
+start --ships 0
+shot meadow
+before="$(said x) $(said z)"
+hold w 1.5
+[ "$before" != "$(said x) $(said z)" ] || fail "it does not walk"
+
+echo "dig"
+top="$(said y)"
+for _ in 1 2 3 4 5 6; do look 30; done
+for _ in $(seq 60); do
+  ! is y -lt $((top - 12)) || break
+  xdotool click 1
+  sleep 0.4
+done
+is y -lt $((top - 12)) || fail "it does not dig down"
+shot shaft
+xdotool key --delay 80 Home
+for _ in $(seq 60); do
+  ! is sky -lt 3 || break
+  xdotool click 1
+  hold w 0.3
+done
+is sky -lt 3 || fail "the tunnel does not get dark"
+shot dark
+
+echo "torch"
+is lamps -eq 0 || fail "there is lamplight already"
+torch 1
+shot orange
+[ "$(mean orange r)" -ge $(($(mean dark r) + 20)) ] || fail "the cave gets no lighter: $(mean dark r), $(mean orange r)"
+[ "$(mean orange r)" -gt $(($(mean orange b) + 8)) ] || fail "the light of the torch is not orange"
+xdotool click 1
+until_true 20 is lamps -eq 0 || fail "it is lit though the torch is gone"
+shot dark_again
+[ "$(mean dark_again r)" -lt $(($(mean dark r) + 10)) ] || fail "the cave stays light"
+torch 2
+shot blue
+[ "$(mean blue b)" -gt $(($(mean blue r) + 8)) ] || fail "the light of the other torch is not blue"
+stop
+
+echo "landslide"
+start --ships 0 --seed 5
+look 30; look 30
+shot before_slide
+xdotool key --delay 80 l
+until_true 30 is fallen -gt 400 || fail "no sand falls"
+sleep 3
+shot after_slide
+[ "$(other before_slide after_slide)" -gt 5000 ] || fail "the landslide is not to be seen"
+stop
+
+echo "ships"
+start --ships 60 --seed 5
+look -5
+for _ in 1 2 3 4 5 6 7 8; do
+  shot ships
+  shot ships_later
+  [ "$(other ships ships_later)" -le 300 ] || break
+done
+[ "$(other ships ships_later)" -gt 300 ] || fail "no ships fly"
+stop
+echo "played"
