@@ -251,6 +251,22 @@ TEST_F(ToolRender, PathsTakeASkyFromAFileAndGiveLinearLight) {
   drawn("many.vox -o again.png --size 32x24 --light path --samples 2 --sky out.exr --sky-turn 90");
 }
 
+TEST_F(ToolRender, TheNameSaysWhatKindOfPictureItIs) {
+  std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(4);
+  if (has_jpeg()) {
+    drawn("many.vox -o out.JPG --size 64x48");
+    EXPECT_EQ(bytes("out.JPG").substr(0, 3), "\xFF\xD8\xFF");
+    EXPECT_EQ(run("render many.vox -o out.jpg --light path --transparent").status, 2) << "it has no alpha";
+  }
+  if (has_webp()) {
+    drawn("many.vox -o out.webp --size 64x48");
+    EXPECT_EQ(bytes("out.webp").substr(8, 4), "WEBP");
+    drawn("many.vox -o clear.webp --size 64x48 --light path --samples 1 --transparent");
+    EXPECT_NE(bytes("clear.webp"), bytes("out.webp"));
+  }
+  if (!has_jpeg() || !has_webp()) GTEST_SKIP() << "built without libjpeg or libwebp";
+}
+
 TEST_F(ToolRender, PathsRefuseWhatIsNotTheirs) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(2);
   for (const std::string flags :
@@ -336,7 +352,7 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
   const std::string out = "tiny.vox -o out.png ";
   const std::vector<std::pair<std::string, std::string>> errors = {
       {"tiny.vox", "-o OUT is required"},
-      {"tiny.vox -o out.jpg", "-o: the picture's name must end in .png, not \"out.jpg\""},
+      {"tiny.vox -o out.gif", "-o: the picture's name must end in .png, .jpg, .webp or .exr, not \"out.gif\""},
       {"tiny.vox -o ''", "--output: must be the name of a file"},
       {"vox.png -o vox.png", "-o: vox.png is the input"},
       {"tiny.vox -o link.png", "-o: link.png is the input"},

@@ -10,6 +10,8 @@
 
 #include <quoin/io/picture_files.h>
 
+#include "render/picture_output.h"
+
 namespace quoin::tool {
 namespace {
 
@@ -69,13 +71,12 @@ Result<Picture> PathPictures::render(const Camera& camera, const RenderOptions& 
 }
 
 Result<std::uint64_t> PathPictures::write(const std::filesystem::path& path) const {
-  if (CLI::detail::to_lower(path.extension().string()) == ".exr") {
+  if (has_ending(path, ".exr")) {
     return write_layers(last_, arguments_.is_transparent, static_cast<float>(exposure()), path);
   }
-  if (!arguments_.is_transparent) return make_error(ErrorCode::InvalidArgument, "not a picture of this kind");
   const auto image = develop_with_alpha(last_, {exposure(), arguments_.tone_curve()});
   if (!image) return image.error();
-  return write_png(*image, path);
+  return write_picture(*image, path);
 }
 
 }  // namespace quoin::tool

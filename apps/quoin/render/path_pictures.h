@@ -22,7 +22,7 @@ class PathPictures {
   [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options, Threads threads,
                                        const Progress& progress);
 
-  /// Of the last picture. Returns the file's size.
+  /// The last picture as .exr, or with alpha. Returns the file's size.
   [[nodiscard]] Result<std::uint64_t> write(const std::filesystem::path& path) const;
   /// That of the pictures. To be set before the first of them where others were taken before.
   [[nodiscard]] double exposure() const { return exposure_.value_or(1.0); }

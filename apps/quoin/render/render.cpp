@@ -15,6 +15,7 @@
 #include "output_files.h"
 #include "progress_bar.h"
 #include "render/path_pictures.h"
+#include "render/picture_output.h"
 #include "render/render_arguments.h"
 #include "scene_warnings.h"
 #include "standard_streams.h"
@@ -112,8 +113,8 @@ void warn_of_empty_pictures(const Scene& scene, InstanceFilter filter, const Pic
 Status write_outputs(const RenderArguments& arguments, const std::filesystem::path& output, const PathPictures* paths,
                      Outcome& outcome) {
   if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", output.string());
-  const bool is_plain = paths == nullptr || (output.extension() == ".png" && !arguments.path.is_transparent);
-  const auto written = is_plain ? write_png(outcome.picture.colour, output) : paths->write(output);
+  const bool is_plain = paths == nullptr || !(has_ending(output, ".exr") || arguments.path.is_transparent);
+  const auto written = is_plain ? write_picture(outcome.picture.colour, output) : paths->write(output);
   if (!written) return written.error();
   outcome.files.push_back(output);
   outcome.bytes += *written;

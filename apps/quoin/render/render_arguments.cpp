@@ -11,6 +11,7 @@
 
 #include "field_occlusion.h"
 #include "parse.h"
+#include "render/picture_output.h"
 #include "render/text_options.h"
 #include "standard_streams.h"
 #include "volume_options.h"
@@ -145,18 +146,13 @@ std::string fault_of_backend(const CLI::App& command, const RenderArguments& arg
   return "";
 }
 
-bool has_ending(const std::filesystem::path& path, const std::string& ending) {
-  return CLI::detail::to_lower(path.extension().string()) == ending;
-}
-
 std::string fault_of_files(const RenderArguments& arguments) {
   const std::string out = arguments.output.string();
   const std::string depth = arguments.depth.string();
+  if (const std::string fault = fault_of_picture_name(arguments.output); !fault.empty()) return "-o: " + fault;
   const bool is_path = arguments.light_model == "path";
   if (has_ending(arguments.output, ".exr") && !is_path) return "-o: .exr, which is linear light, needs --light path";
-  if (!has_ending(arguments.output, ".png") && !has_ending(arguments.output, ".exr")) {
-    return "-o: the picture's name must end in .png or .exr, not \"" + out + "\"";
-  }
+  if (has_ending(arguments.output, ".jpg") && arguments.path.is_transparent) return "-o: .jpg has no alpha";
   if (is_same_file(arguments.output, arguments.common.input)) return "-o: " + out + " is the input";
   if (depth.empty()) return "";
   if (!has_ending(arguments.depth, ".pfm")) return "--depth: the name must end in .pfm, not \"" + depth + "\"";
@@ -418,8 +414,9 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
   arguments.render.light = natural_light();
   arguments.render.samples = 4;
   command
-      .add_option("-o,--output", arguments.output,
-                  "Picture to write: .png; or .exr of --light path: linear light, and layers for compositing")
+      .add_option(
+          "-o,--output", arguments.output,
+          "Picture to write: .png, .jpg or .webp; or .exr of --light path: linear light, and layers for compositing")
       ->required()
       ->check(file_name());
   add_text_option(command, "--size", "WxH", "Pixels (default 1280x720)");

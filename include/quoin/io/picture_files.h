@@ -47,6 +47,29 @@ namespace quoin {
 [[nodiscard]] Result<FloatImage> read_pfm(const std::filesystem::path& path);
 [[nodiscard]] Result<FloatImage> read_pfm(std::span<const std::byte> bytes);
 
+/// Writes a picture as a JPEG with whole colour in every pixel, which appears whole or not at all; the same picture
+/// gives the same bytes on every machine. `quality`: 1 to 100.
+///
+/// Errors: InvalidArgument as write_png and for the quality; LimitExceeded when a side is longer than 65,500 pixels;
+///         Unsupported where the library was built without libjpeg; CannotWrite.
+[[nodiscard]] Result<std::uint64_t> write_jpeg(const Image& picture, const std::filesystem::path& path,
+                                               int quality = 92);
+[[nodiscard]] Result<std::vector<std::byte>> write_jpeg(const Image& picture, int quality = 92);
+/// Whether there is libjpeg in this build.
+[[nodiscard]] bool has_jpeg();
+
+/// Writes a picture as a WebP without loss, half as large as a PNG or less, likewise.
+///
+/// Errors: InvalidArgument as write_png; LimitExceeded when a side is longer than 16,383 pixels; Unsupported where the
+///         library was built without libwebp; CannotWrite.
+/// Cost:   some half a microsecond a pixel.
+[[nodiscard]] Result<std::uint64_t> write_webp(const Image& picture, const std::filesystem::path& path);
+[[nodiscard]] Result<std::vector<std::byte>> write_webp(const Image& picture);
+[[nodiscard]] Result<std::uint64_t> write_webp(const AlphaImage& picture, const std::filesystem::path& path);
+[[nodiscard]] Result<std::vector<std::byte>> write_webp(const AlphaImage& picture);
+/// Whether there is libwebp in this build.
+[[nodiscard]] bool has_webp();
+
 /// Reads linear light: Radiance's .hdr (RGBE) and OpenEXR's .exr, told apart by what they hold. Of an .exr the channels
 /// R, G and B, or Y. Numbers are as in the file; an .hdr's exposure is taken back.
 ///

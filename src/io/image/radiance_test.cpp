@@ -124,5 +124,35 @@ TEST(Exr, RefusesWhatCannotBe) {
   EXPECT_FALSE(write_exr(1, 1, std::vector<ExrChannel>{{"R", {}, one, {}}, {"R", {}, one, {}}}).has_value());
 }
 
+Image stripes() {
+  Image image{40, 24, {}};
+  for (int i = 0; i < 40 * 24; ++i) {
+    const bool is_red = i % 40 / 8 % 2 == 0;
+    for (const int channel : {is_red ? 220 : 20, 30, is_red ? 20 : 220}) {
+      image.rgb.push_back(static_cast<std::uint8_t>(channel));
+    }
+  }
+  return image;
+}
+
+TEST(LossyAndSmallPictures, AreTheSameEveryTimeAndRefuseWhatCannotBe) {
+  if (!has_jpeg() || !has_webp()) GTEST_SKIP() << "built without libjpeg or libwebp";
+  const Image image = stripes();
+  const auto jpeg = write_jpeg(image);
+  ASSERT_TRUE(jpeg.has_value());
+  EXPECT_EQ(*jpeg, *write_jpeg(image));
+  EXPECT_LT(write_jpeg(image, 20)->size(), write_jpeg(image, 100)->size());
+  const auto webp = write_webp(image);
+  ASSERT_TRUE(webp.has_value());
+  EXPECT_EQ(*webp, *write_webp(image));
+  EXPECT_FALSE(write_jpeg(image, 0).has_value());
+  EXPECT_FALSE(write_jpeg(image, 101).has_value());
+  EXPECT_FALSE(write_jpeg(Image{3, 3, {}}).has_value());
+  EXPECT_FALSE(write_webp(Image{0, 0, {}}).has_value());
+  EXPECT_FALSE(write_webp(AlphaImage{1, 1, {1, 2, 3}}).has_value());
+  EXPECT_EQ(write_jpeg(Image{70'000, 1, std::vector<std::uint8_t>(210'000)}).error().code, ErrorCode::LimitExceeded);
+  EXPECT_EQ(write_webp(Image{70'000, 1, std::vector<std::uint8_t>(210'000)}).error().code, ErrorCode::LimitExceeded);
+}
+
 }  // namespace
 }  // namespace quoin

@@ -1,0 +1,209 @@
+// Writes one of the rooms of docs/gallery.md to the .vox file named on the command line.
+
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <utility>
+
+#include <quoin/io/vox.h>
+#include <quoin/scene/scene.h>
+
+namespace {
+
+using quoin::Grid;
+using quoin::IVec3;
+using quoin::Rgba8;
+using quoin::Scene;
+using quoin::VoxelProperties;
+using quoin::VoxelType;
+
+struct Look {
+  float roughness = 1.0F;
+  float metalness = 0.0F;
+  float emission = 0.0F;
+  float ior = 0.0F;  // more than 0: glass
+};
+
+VoxelType add(Scene& scene, const char* name, Rgba8 colour, Look look = {}) {
+  VoxelProperties properties;
+  properties.name = name;
+  properties.colour = colour;
+  properties.roughness = look.roughness;
+  properties.metalness = look.metalness;
+  properties.emission = look.emission;
+  if (look.ior > 0.0F) {
+    properties.visibility = quoin::Visibility::Transparent;
+    properties.ior = look.ior;
+  }
+  return scene.types.add(properties).value_or(quoin::kAir);
+}
+
+void place(Scene& scene, Grid grid) {
+  quoin::SceneGrid entry;
+  entry.name = "room";
+  entry.canvas = grid.bounds();
+  entry.grid = std::move(grid);
+  quoin::Instance instance;
+  instance.name = "room";
+  instance.grid = scene.add_grid(std::move(entry));
+  scene.add_instance(std::move(instance));
+}
+
+void ball(Grid& grid, IVec3 middle, int radius, VoxelType type) {
+  for (int z = -radius; z <= radius; ++z) {
+    for (int y = -radius; y <= radius; ++y) {
+      for (int x = -radius; x <= radius; ++x) {
+        if (x * x + y * y + z * z <= radius * radius + radius / 2) grid.set(middle + IVec3{x, y, z}, type);
+      }
+    }
+  }
+}
+
+void column(Grid& grid, IVec3 foot, int radius, int height, VoxelType type) {
+  for (int z = -radius; z <= radius; ++z) {
+    for (int x = -radius; x <= radius; ++x) {
+      if (x * x + z * z > radius * radius + radius / 2) continue;
+      grid.fill_box({foot + IVec3{x, 0, z}, foot + IVec3{x + 1, height, z + 1}}, type);
+    }
+  }
+}
+
+// Open towards +z: a red wall and a green one throw their colours over all that is white.
+Scene living_room() {
+  Scene scene;
+  const VoxelType white = add(scene, "white", {236, 232, 224, 255});
+  const VoxelType red = add(scene, "red", {186, 44, 36, 255});
+  const VoxelType green = add(scene, "green", {38, 124, 66, 255});
+  const VoxelType oak = add(scene, "oak", {168, 116, 70, 255}, {0.45F});
+  const VoxelType walnut = add(scene, "walnut", {140, 92, 54, 255}, {0.45F});
+  const VoxelType dark = add(scene, "dark wood", {74, 48, 32, 255}, {0.5F});
+  const VoxelType cloth = add(scene, "cloth", {52, 92, 140, 255});
+  const VoxelType cushion = add(scene, "cushion", {232, 176, 64, 255});
+  const VoxelType rug = add(scene, "rug", {212, 200, 178, 255});
+  const VoxelType rug_edge = add(scene, "rug's edge", {150, 60, 50, 255});
+  const VoxelType gold = add(scene, "gold", {255, 196, 90, 255}, {0.22F, 1.0F});
+  const VoxelType leaf = add(scene, "leaf", {54, 128, 50, 255});
+  const VoxelType clay = add(scene, "clay", {190, 98, 62, 255});
+  const VoxelType glow = add(scene, "lamp", {255, 206, 140, 255}, {1.0F, 0.0F, 10.0F});
+  const VoxelType glass = add(scene, "glass", {205, 235, 230, 20}, {0.0F, 0.0F, 0.0F, 1.5F});
+  Grid grid;
+  grid.fill_box({{-2, -2, -2}, {98, 62, 74}}, white);
+  grid.fill_box({{0, 0, 0}, {96, 60, 74}}, quoin::kAir);
+  grid.fill_box({{-2, -2, -2}, {0, 62, 74}}, red);
+  grid.fill_box({{96, -2, -2}, {98, 62, 74}}, green);
+  for (int z = 0; z < 74; ++z) {
+    for (int x = 0; x < 96; ++x) {
+      const int plank = z / 6;
+      const bool is_seam = z % 6 == 5 || (x + plank * 17) % 32 == 31;
+      grid.set({x, -1, z}, is_seam ? dark : plank % 2 == 0 ? oak : walnut);
+    }
+  }
+  // A window in the red wall.
+  grid.fill_box({{-2, 18, 20}, {0, 48, 52}}, dark);
+  grid.fill_box({{-2, 20, 22}, {0, 46, 35}}, quoin::kAir);
+  grid.fill_box({{-2, 20, 37}, {0, 46, 50}}, quoin::kAir);
+  grid.fill_box({{24, 0, 16}, {78, 1, 58}}, rug_edge);
+  grid.fill_box({{26, 0, 18}, {76, 1, 56}}, rug);
+  // A sofa at the back.
+  grid.fill_box({{28, 2, 3}, {72, 10, 19}}, cloth);
+  grid.fill_box({{28, 10, 3}, {72, 21, 8}}, cloth);
+  grid.fill_box({{25, 2, 3}, {29, 15, 20}}, cloth);
+  grid.fill_box({{71, 2, 3}, {75, 15, 20}}, cloth);
+  grid.fill_box({{32, 10, 9}, {41, 18, 12}}, cushion);
+  grid.fill_box({{60, 10, 9}, {69, 18, 12}}, cushion);
+  // A table with a golden ball and a vase.
+  for (const int x : {36, 62}) {
+    for (const int z : {30, 46}) grid.fill_box({{x, 1, z}, {x + 2, 9, z + 2}}, dark);
+  }
+  grid.fill_box({{34, 9, 28}, {66, 11, 50}}, oak);
+  ball(grid, {42, 17, 38}, 6, gold);
+  column(grid, {57, 11, 38}, 4, 13, glass);
+  // A picture, a plant and a lamp.
+  grid.fill_box({{36, 28, 0}, {64, 48, 1}}, dark);
+  for (int y = 30; y < 46; ++y) {
+    for (int x = 38; x < 62; ++x) grid.set({x, y, 1}, y < 36 + (x % 11) / 3 ? green : y < 41 ? cushion : cloth);
+  }
+  column(grid, {86, 0, 12}, 5, 9, clay);
+  for (int i = 0; i < 26; ++i) {
+    const double turn = i * 2.4;
+    const int reach = 3 + i % 6;
+    const IVec3 tip{86 + static_cast<int>(std::lround(reach * std::cos(turn))), 14 + i,
+                    12 + static_cast<int>(std::lround(reach * std::sin(turn)))};
+    ball(grid, tip, 2, leaf);
+    grid.set({86, 9 + i, 12}, dark);
+  }
+  grid.fill_box({{10, 0, 10}, {16, 1, 16}}, dark);
+  grid.fill_box({{12, 1, 12}, {14, 32, 14}}, dark);
+  grid.fill_box({{9, 32, 9}, {17, 39, 17}}, glow);
+  place(scene, std::move(grid));
+  return scene;
+}
+
+// A basin of water with things of glass and metal in it.
+Scene basin() {
+  Scene scene;
+  const VoxelType tile = add(scene, "tile", {226, 232, 232, 255}, {0.35F});
+  const VoxelType tile_dark = add(scene, "dark tile", {40, 110, 132, 255}, {0.35F});
+  const VoxelType sand = add(scene, "sand", {222, 200, 156, 255});
+  const VoxelType water = add(scene, "water", {120, 205, 215, 24}, {0.0F, 0.0F, 0.0F, 1.333F});
+  const VoxelType amber = add(scene, "amber glass", {255, 150, 40, 40}, {0.0F, 0.0F, 0.0F, 1.5F});
+  const VoxelType blue = add(scene, "blue glass", {70, 110, 255, 40}, {0.0F, 0.0F, 0.0F, 1.5F});
+  const VoxelType clear = add(scene, "clear glass", {240, 250, 250, 6}, {0.0F, 0.0F, 0.0F, 1.5F});
+  const VoxelType copper = add(scene, "copper", {240, 150, 110, 255}, {0.25F, 1.0F});
+  const VoxelType chrome = add(scene, "chrome", {235, 235, 240, 255}, {0.0F, 1.0F});
+  const VoxelType coral = add(scene, "coral", {230, 80, 70, 255});
+  const VoxelType weed = add(scene, "weed", {60, 140, 60, 255});
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {112, 26, 84}}, tile);
+  grid.fill_box({{6, 2, 6}, {106, 26, 78}}, quoin::kAir);
+  grid.fill_box({{6, 2, 6}, {106, 5, 78}}, sand);
+  for (int z = 0; z < 84; ++z) {
+    for (int x = 0; x < 112; ++x) {
+      const bool is_rim = x < 6 || z < 6 || x >= 106 || z >= 78;
+      if (is_rim && (x / 6 + z / 6) % 2 == 0) grid.set({x, 25, z}, tile_dark);
+    }
+  }
+  unsigned random = 5;
+  for (int i = 0; i < 60; ++i) {
+    random = random * 1'664'525U + 1'013'904'223U;
+    const int x = 10 + static_cast<int>(random >> 9) % 92;
+    random = random * 1'664'525U + 1'013'904'223U;
+    const int z = 10 + static_cast<int>(random >> 9) % 64;
+    const int height = 2 + static_cast<int>(random >> 28) % 9;
+    for (int y = 5; y < 5 + height; ++y) grid.set({x + (y / 3) % 2, y, z}, i % 3 == 0 ? coral : weed);
+  }
+  ball(grid, {30, 12, 52}, 8, coral);
+  ball(grid, {84, 10, 24}, 6, copper);
+  for (int z = 6; z < 78; ++z) {
+    for (int x = 6; x < 106; ++x) {
+      for (int y = 5; y < 21; ++y) {
+        if (grid.get({x, y, z}) == quoin::kAir) grid.set({x, y, z}, water);
+      }
+    }
+  }
+  column(grid, {28, 5, 24}, 7, 40, amber);
+  column(grid, {60, 5, 40}, 7, 52, clear);
+  column(grid, {88, 5, 54}, 7, 34, blue);
+  ball(grid, {60, 66, 40}, 11, chrome);
+  ball(grid, {28, 52, 24}, 8, clear);
+  ball(grid, {88, 47, 54}, 9, copper);
+  place(scene, std::move(grid));
+  return scene;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string name = argc == 3 ? argv[1] : "";
+  if (name != "room" && name != "basin") {
+    std::fprintf(stderr, "usage: quoin_demo_gallery room|basin OUT.vox\n");
+    return 2;
+  }
+  const auto written = quoin::write_vox(name == "room" ? living_room() : basin(), argv[2]);
+  if (!written) {
+    std::fprintf(stderr, "quoin_demo_gallery: %s\n", quoin::to_string(written.error()).c_str());
+    return 1;
+  }
+  for (const std::string& warning : written->warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
+  return 0;
+}

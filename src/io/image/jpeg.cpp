@@ -1,0 +1,117 @@
+#include <csetjmp>
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+#include <quoin/io/picture_files.h>
+
+#include "io/whole_file.h"
+
+#ifdef QUOIN_HAVE_JPEG
+#include <jpeglib.h>
+#endif
+
+namespace quoin {
+namespace {
+
+Status check(const Image& picture, int quality) {
+  const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
+  if (quality < 1 || quality > 100) return refuse("a quality that is not 1 to 100");
+  const bool fits = picture.width > 0 && picture.height > 0 &&
+                    picture.rgb.size() == std::size_t{3} * static_cast<std::size_t>(picture.width) *
+                                              static_cast<std::size_t>(picture.height);
+  return fits ? Status() : refuse("the picture's size is not that of its pixels");
+}
+
+#ifdef QUOIN_HAVE_JPEG
+
+// libjpeg's way to report: it must not return.
+struct Failure {
+  jpeg_error_mgr errors;
+  std::jmp_buf back;
+};
+
+[[noreturn]] void jump_back(j_common_ptr info) {
+  std::longjmp(reinterpret_cast<Failure*>(info->err)->back, 1);
+}
+
+void stay_silent(j_common_ptr) {}
+
+// Everything that libjpeg may jump out of; nothing here needs a destructor.
+bool encode(const Image& picture, int quality, jpeg_compress_struct& info, Failure& failure, unsigned char** bytes,
+            unsigned long* size) {
+  info.err = jpeg_std_error(&failure.errors);
+  failure.errors.error_exit = jump_back;
+  failure.errors.output_message = stay_silent;
+  if (setjmp(failure.back) != 0) return false;
+  jpeg_create_compress(&info);
+  jpeg_mem_dest(&info, bytes, size);
+  info.image_width = static_cast<JDIMENSION>(picture.width);
+  info.image_height = static_cast<JDIMENSION>(picture.height);
+  info.input_components = 3;
+  info.in_color_space = JCS_RGB;
+  jpeg_set_defaults(&info);
+  jpeg_set_quality(&info, quality, TRUE);
+  // Voxels have edges of colour, which halved chroma would blur.
+  info.comp_info[0].h_samp_factor = info.comp_info[0].v_samp_factor = 1;
+  info.dct_method = JDCT_ISLOW;  // the same bytes on every machine
+  jpeg_start_compress(&info, TRUE);
+  while (info.next_scanline < info.image_height) {
+    const auto at = std::size_t{3} * info.image_width * info.next_scanline;
+    auto* row = const_cast<JSAMPLE*>(picture.rgb.data() + at);  // NOLINT: it is only read
+    jpeg_write_scanlines(&info, &row, 1);
+  }
+  jpeg_finish_compress(&info);
+  return true;
+}
+
+#endif
+
+}  // namespace
+
+#ifdef QUOIN_HAVE_JPEG
+
+bool has_jpeg() {
+  return true;
+}
+
+Result<std::vector<std::byte>> write_jpeg(const Image& picture, int quality) {
+  if (Status status = check(picture, quality); !status) return status.error();
+  if (picture.width > JPEG_MAX_DIMENSION || picture.height > JPEG_MAX_DIMENSION) {
+    return make_error(ErrorCode::LimitExceeded, "a JPEG has at most 65,500 pixels along a side");
+  }
+  jpeg_compress_struct info{};
+  Failure failure{};
+  unsigned char* bytes = nullptr;
+  unsigned long size = 0;
+  const bool done = encode(picture, quality, info, failure, &bytes, &size);
+  std::vector<std::byte> out;
+  if (done) {
+    const auto* const first = reinterpret_cast<const std::byte*>(bytes);
+    out.assign(first, first + size);
+  }
+  jpeg_destroy_compress(&info);
+  std::free(bytes);  // NOLINT: libjpeg's malloc
+  if (!done) return make_error(ErrorCode::LimitExceeded, "the picture cannot be encoded as JPEG");
+  return out;
+}
+
+#else
+
+bool has_jpeg() {
+  return false;
+}
+
+Result<std::vector<std::byte>> write_jpeg(const Image& picture, int quality) {
+  if (Status status = check(picture, quality); !status) return status.error();
+  return make_error(ErrorCode::Unsupported, "Quoin was built without libjpeg");
+}
+
+#endif
+
+Result<std::uint64_t> write_jpeg(const Image& picture, const std::filesystem::path& path, int quality) {
+  return write_whole(path, write_jpeg(picture, quality));
+}
+
+}  // namespace quoin

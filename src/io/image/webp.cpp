@@ -1,0 +1,76 @@
+#include <cstddef>
+
+#include <quoin/io/picture_files.h>
+
+#include "io/whole_file.h"
+
+#ifdef QUOIN_HAVE_WEBP
+#include <webp/encode.h>
+#endif
+
+namespace quoin {
+namespace {
+
+Status check(int width, int height, std::size_t bytes, std::size_t channels) {
+  if (width <= 0 || height <= 0 ||
+      bytes != channels * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
+    return make_error(ErrorCode::InvalidArgument, "the picture's size is not that of its pixels");
+  }
+  constexpr int kMostPixels = 16'383;
+  if (width > kMostPixels || height > kMostPixels) {
+    return make_error(ErrorCode::LimitExceeded, "a WebP has at most 16,383 pixels along a side");
+  }
+  return {};
+}
+
+#ifdef QUOIN_HAVE_WEBP
+using Encode = std::size_t (*)(const std::uint8_t*, int, int, int, std::uint8_t**);
+
+Result<std::vector<std::byte>> encoded(const std::vector<std::uint8_t>& pixels, int width, int height, int channels,
+                                       Encode encode) {
+  std::uint8_t* bytes = nullptr;
+  const std::size_t size = encode(pixels.data(), width, height, channels * width, &bytes);
+  if (size == 0) return make_error(ErrorCode::LimitExceeded, "the picture cannot be encoded as WebP");
+  const auto* const first = reinterpret_cast<const std::byte*>(bytes);
+  std::vector<std::byte> out(first, first + size);
+  WebPFree(bytes);
+  return out;
+}
+#endif
+
+}  // namespace
+
+bool has_webp() {
+#ifdef QUOIN_HAVE_WEBP
+  return true;
+#else
+  return false;
+#endif
+}
+
+Result<std::vector<std::byte>> write_webp(const Image& picture) {
+  if (Status status = check(picture.width, picture.height, picture.rgb.size(), 3); !status) return status.error();
+#ifdef QUOIN_HAVE_WEBP
+  return encoded(picture.rgb, picture.width, picture.height, 3, WebPEncodeLosslessRGB);
+#else
+  return make_error(ErrorCode::Unsupported, "Quoin was built without libwebp");
+#endif
+}
+
+Result<std::vector<std::byte>> write_webp(const AlphaImage& picture) {
+  if (Status status = check(picture.width, picture.height, picture.rgba.size(), 4); !status) return status.error();
+#ifdef QUOIN_HAVE_WEBP
+  return encoded(picture.rgba, picture.width, picture.height, 4, WebPEncodeLosslessRGBA);
+#else
+  return make_error(ErrorCode::Unsupported, "Quoin was built without libwebp");
+#endif
+}
+
+Result<std::uint64_t> write_webp(const Image& picture, const std::filesystem::path& path) {
+  return write_whole(path, write_webp(picture));
+}
+Result<std::uint64_t> write_webp(const AlphaImage& picture, const std::filesystem::path& path) {
+  return write_whole(path, write_webp(picture));
+}
+
+}  // namespace quoin
