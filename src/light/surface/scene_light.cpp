@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/moved_from.h"
 #include "grid/chunk_order.h"
 
 namespace quoin {
@@ -119,7 +120,7 @@ std::size_t SceneLight::bytes() const {
 
 GridLight SceneLight::of(GridHandle grid) const {
   const auto found = grids_.find(grid);
-  const Entry& entry = found == grids_.end() ? *unknown_ : *found->second;
+  const Entry& entry = found == grids_.end() ? content_of(unknown_) : *found->second;
   return {&entry.light, entry.voxels};
 }
 
