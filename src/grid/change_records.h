@@ -92,7 +92,11 @@ struct VoxelRecord {
     slabs.add(ChunkSlabs::of(all));
   }
   /// For an edit that was broken off: anything may have changed.
-  void add_all() { add_box(kWholeChunk); }
+  void add_all() {
+    neighbours = kEverywhere;
+    box = PackedBox::of_chunk();
+    slabs = ChunkSlabs::all();
+  }
   void merge(const VoxelRecord& other) {
     neighbours |= other.neighbours;
     box.unite(other.box);

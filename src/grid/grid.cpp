@@ -197,8 +197,23 @@ std::int64_t Grid::set(std::span<const PlacedVoxel> voxels) {
   return changed;
 }
 
+namespace {
+
+void fill_whole(Chunk& chunk, VoxelType type, VoxelEdit& edit) {
+  if (chunk.uniform() == type) return;
+  if (chunk.count(type) == 0) {
+    edit.add_all();
+  } else {
+    difference_of_types(chunk, Chunk(type), edit);
+  }
+  chunk.fill(type);
+}
+
+}  // namespace
+
 std::int64_t Grid::fill_box(const IBox& box, VoxelType type, const Progress& progress) {
   const auto fill = [&](IVec3, Chunk& chunk, const IBox& part, VoxelEdit& edit) {
+    if (part == kWholeChunk) return fill_whole(chunk, type, edit);
     chunk.fill_box(part, type, [&](int y, int z, std::uint64_t changed) { edit.add(y, z, changed); });
   };
   return impl().edit_box(box_from(box), type != kAir, notice_, progress, fill);

@@ -12,6 +12,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/light/scene_light.h>
 
+#include "core/moved_from.h"
 #include "light/light_model.h"
 #include "light/surface/light_bricks.h"
 #include "render/impostor/pass.h"
@@ -83,19 +84,19 @@ CpuRenderer& CpuRenderer::operator=(CpuRenderer&&) noexcept = default;
 CpuRenderer::~CpuRenderer() = default;
 
 const SceneTracer& CpuRenderer::tracer() const {
-  return impl_->tracer;
+  return content_of(impl_).tracer;
 }
 
 void CpuRenderer::update(Threads threads) {
-  impl_->tracer.update(threads);
-  impl_->surfaces.update(impl_->scene->types);
-  impl_->detail.update_types(impl_->scene->types);
-  impl_->lamps.update();
-  impl_->levels.update();
+  content_of(impl_).tracer.update(threads);
+  content_of(impl_).surfaces.update(content_of(impl_).scene->types);
+  content_of(impl_).detail.update_types(content_of(impl_).scene->types);
+  content_of(impl_).lamps.update();
+  content_of(impl_).levels.update();
 }
 
 void CpuRenderer::use_light(const SceneLight* light) {
-  impl_->levels.use(light);
+  content_of(impl_).levels.use(light);
 }
 
 Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& options, Threads threads,
@@ -105,17 +106,18 @@ Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& o
                    std::abs(glm::dot(camera.right, camera.forward)) < 1e-3 &&
                    std::abs(glm::dot(camera.up, camera.forward)) < 1e-3,
                "the camera's axes are perpendicular");
-  PictureDetail detail = impl_->detail.choose(*impl_->scene, impl_->instances, camera, options);
+  PictureDetail detail =
+      content_of(impl_).detail.choose(*content_of(impl_).scene, content_of(impl_).instances, camera, options);
   keep_whole(detail.far.instances, detail.selected);
   Subject subject;
-  if (options.detail.policy) subject.detailed.emplace(impl_->tracer.with_detail(detail.selected, threads));
-  subject.view.emplace(subject.detailed ? *subject.detailed : impl_->tracer, camera.position);
+  if (options.detail.policy) subject.detailed.emplace(content_of(impl_).tracer.with_detail(detail.selected, threads));
+  subject.view.emplace(subject.detailed ? *subject.detailed : content_of(impl_).tracer, camera.position);
   subject.leave_to_impostors(detail.far.instances, camera, options);
   const SceneView& view = *subject.view;
   const CameraRays rays(camera, options.width, options.height);
-  const std::shared_ptr<const LampTable> lamps = impl_->lamp_table(options.light, threads);
-  const Lighting lighting(view, impl_->scene->types, impl_->surfaces, options.light, lamps.get(),
-                          options.detail.colours, impl_->levels_of(view.tracer(), options.light, threads));
+  const std::shared_ptr<const LampTable> lamps = content_of(impl_).lamp_table(options.light, threads);
+  const Lighting lighting(view, content_of(impl_).scene->types, content_of(impl_).surfaces, options.light, lamps.get(),
+                          options.detail.colours, content_of(impl_).levels_of(view.tracer(), options.light, threads));
   const TileContext context{&view, &rays, &lighting, &options, subject.impostors ? &*subject.impostors : nullptr};
   Picture picture = empty_picture(options);
   const int across = (options.width + Tile::kEdge - 1) / Tile::kEdge;

@@ -9,6 +9,7 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/moved_from.h"
 #include "scene/frustum.h"
 #include "scene/instance_axes.h"
 
@@ -220,13 +221,14 @@ void DetailSelector::select(const Scene& scene, const Camera& camera, int width,
                             std::vector<SelectedInstance>& out) {
   QUOIN_ASSERT(width > 0 && height > 0, "a picture of positive size");
   out.clear();
-  impl_->look_at_grids(scene);
+  content_of(impl_).look_at_grids(scene);
   const Frustum frustum(camera, width, height);
   const PixelScale pixels(camera, height);
-  for (const Impl::Seen& seen : impl_->look_at_instances(scene, camera.position, frustum, policy.instances)) {
+  for (const Impl::Seen& seen :
+       content_of(impl_).look_at_instances(scene, camera.position, frustum, policy.instances)) {
     const double distance = glm::length(seen.centre);
     const Measure measure{pixels.of(distance, seen.radius, seen.voxel_size), distance, seen.radius};
-    const Choice choice = impl_->choose(seen.instance, measure, policy);
+    const Choice choice = content_of(impl_).choose(seen.instance, measure, policy);
     out.push_back({seen.instance, choice.detail, choice.level, distance});
   }
 }

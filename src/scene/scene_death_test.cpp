@@ -7,11 +7,17 @@
 
 #include <gtest/gtest.h>
 
+#include <quoin/light/scene_light.h>
+#include <quoin/mesh/blocky.h>
+#include <quoin/render/cpu_renderer.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/scene.h>
+#include <quoin/scene/scene_faces.h>
 #include <quoin/scene/scene_query.h>
 #include <quoin/scene/scene_tracer.h>
+#include <quoin/scene/solid_shapes.h>
+#include <quoin/scene/sweep.h>
 #include <quoin/terrain/noise.h>
 #include <quoin/trace/occupancy_tree.h>
 #include <quoin/trace/ray.h>
@@ -31,6 +37,20 @@ TEST(SceneDeathTest, AHandleOfNothingIsAMistake) {
   QUOIN_EXPECT_MISTAKE((void)scene.edit(GroupHandle{}), "the handle names an element");
   QUOIN_EXPECT_MISTAKE((void)scene.edit(LayerHandle{}), "the handle names an element");
   QUOIN_EXPECT_MISTAKE(move_group(scene, {}, DVec3(0.0), DQuat(1, 0, 0, 0)), "the handle names an element");
+}
+
+TEST(SceneDeathTest, AHandleOfAnotherSceneIsAMistake) {
+  Scene scene;
+  Scene other;
+  const GridHandle grid = scene.add_grid({});
+  (void)other.add_grid({});
+  const InstanceHandle instance = scene.add_instance({"", grid});
+  (void)other.add_instance({"", grid});
+  EXPECT_EQ(other.grids().find(grid), nullptr);
+  EXPECT_FALSE(other.remove_instance(instance));
+  EXPECT_NE(scene.snapshot().grids().find(grid), nullptr);
+  QUOIN_EXPECT_MISTAKE((void)other.edit(grid), "the handle names an element");
+  QUOIN_EXPECT_MISTAKE((void)other.instances()[instance], "the handle names an element");
 }
 
 TEST(SceneDeathTest, MovingAGroupWithoutARotationIsAMistake) {
@@ -57,6 +77,55 @@ TEST(SceneDeathTest, WhatWasMovedFromIsNotToBeUsed) {
   QUOIN_EXPECT_MISTAKE((void)tree.is_occupied(IVec3(0)), "a tree that was not moved from");
   QUOIN_EXPECT_MISTAKE((void)first_hit(tree, Ray{}), "a tree that was not moved from");
 }
+
+// NOLINTBEGIN(bugprone-use-after-move): that is what is tried
+TEST(SceneDeathTest, WhateverWasMovedFromIsNotToBeUsed) {
+  const char* const wanted = "an object that was not moved from";
+  const auto leave = [](auto& object) { [[maybe_unused]] const auto taken = std::move(object); };
+  Scene scene;
+  SceneTracer tracer(scene);
+  leave(tracer);
+  QUOIN_EXPECT_MISTAKE((void)tracer.scene(), wanted);
+  QUOIN_EXPECT_MISTAKE((void)first_hit(tracer, {{}, {1, 0, 0}}), wanted);
+  QUOIN_EXPECT_MISTAKE((void)sweep_box(tracer, {}, {1, 0, 0}), wanted);
+  CpuRenderer renderer(scene);
+  leave(renderer);
+  QUOIN_EXPECT_MISTAKE(renderer.update(), wanted);
+  QUOIN_EXPECT_MISTAKE((void)renderer.render({}), wanted);
+  PropagatedLight light;
+  leave(light);
+  QUOIN_EXPECT_MISTAKE((void)light.at({}), wanted);
+  QUOIN_EXPECT_MISTAKE(light.update({}, {}), wanted);
+  QUOIN_EXPECT_MISTAKE((void)light.snapshot(), wanted);
+  SceneLight lights;
+  leave(lights);
+  QUOIN_EXPECT_MISTAKE((void)lights.of({}), wanted);
+  SolidShapes shapes;
+  leave(shapes);
+  QUOIN_EXPECT_MISTAKE((void)shapes.boxes({}), wanted);
+  SceneFaces faces;
+  leave(faces);
+  QUOIN_EXPECT_MISTAKE((void)faces.update(scene), wanted);
+  DetailSelector selector;
+  leave(selector);
+  std::vector<SelectedInstance> selected;
+  QUOIN_EXPECT_MISTAKE(selector.select(scene, {}, 5, 5, {}, selected), wanted);
+  BlockyMesher mesher;
+  leave(mesher);
+  QuadBuffer quads;
+  QUOIN_EXPECT_MISTAKE(mesher.mesh({}, {}, {}, quads), wanted);
+}
+
+// What looks at a scene looks at it where it was.
+TEST(SceneDeathTest, ASceneThatWasMovedAwayFromWhatLooksAtItIsAMistake) {
+  Scene scene;
+  SceneTracer tracer(scene);
+  CpuRenderer renderer(scene);
+  const Scene elsewhere = std::move(scene);
+  QUOIN_EXPECT_MISTAKE(tracer.update(), "that was not moved from");
+  QUOIN_EXPECT_MISTAKE(renderer.update(), "that was not moved from");
+}
+// NOLINTEND(bugprone-use-after-move)
 
 TEST(CameraDeathTest, APictureWithoutPixelsIsAMistake) {
   QUOIN_EXPECT_MISTAKE((void)ray_through({}, {0.0, 0.0, 0, 5}), "a picture of positive size");

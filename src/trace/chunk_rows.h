@@ -1,8 +1,10 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <quoin/core/assert.h>
@@ -41,6 +43,12 @@ class ChunkRows {
 
   /// Whether no voxel counts.
   [[nodiscard]] bool none() const { return in_.empty(); }
+
+  /// The box of those that count, where that of all voxels is the same.
+  [[nodiscard]] std::optional<IBox> known_bounds() const {
+    const bool are_all = std::all_of(out_.begin(), out_.end(), [](VoxelType type) { return type == kAir; });
+    return are_all ? std::optional(chunk_->bounds()) : std::nullopt;
+  }
 
   /// The 4x4 rows from (y, z) on, which are multiples of 4; they are set only where they are mixed.
   [[nodiscard]] Slab read(int y, int z, SlabRows& rows) const;

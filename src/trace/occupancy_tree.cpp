@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <type_traits>
 #include <utility>
 
 #include <glm/common.hpp>
@@ -338,8 +339,7 @@ struct OccupancyTree::Impl {
     const std::uint64_t changed = is_partial ? fill(node, rows, wanted, rows_box) : fill(node, rows, rows_box);
     IBox box = rows_box.box();
     if (is_partial && changed == 0) return 0;
-    // Where nothing ended at a side of the box before, that side is where it was.
-    if (is_partial) box = is_inside(changed, before) ? unite(before, box) : box_of(node);
+    if (is_partial) box = box_after(rows, node, changed, before, box);
     if (box.empty()) return drop(chunk);
     chunk_boxes.put(chunk, {box.min + chunk * kChunkEdge, box.max + chunk * kChunkEdge});
     return changed;
@@ -352,6 +352,17 @@ struct OccupancyTree::Impl {
       if (!inner.contains(IVec3{i & 3, i >> 2 & 3, i >> 4})) return false;
     }
     return true;
+  }
+  // Of a chunk of which some slabs were put, in which `found` is.
+  template <class Rows>
+  [[nodiscard]] IBox box_after(const Rows& rows, const ChunkNode& node, std::uint64_t changed, const IBox& before,
+                               const IBox& found) const {
+    // Where nothing ended at a side of the box before, that side is where it was.
+    if (is_inside(changed, before)) return unite(before, found);
+    if constexpr (std::is_same_v<Rows, trace::ChunkRows>) {
+      if (const auto known = rows.known_bounds()) return *known;
+    }
+    return box_of(node);
   }
   std::uint64_t put(const Chunk* voxels, const VoxelRegistry& types, IVec3 chunk,
                     const ChunkSlabs& wanted = ChunkSlabs::all()) {

@@ -43,7 +43,7 @@ struct VoxelProperties {
   float emission = 0.0F;   ///< radiance emitted, as a multiple of `colour` in linear light; 0 is none
   float ior = 1.5F;        ///< index of refraction, of use to transparent types
   /// What a file format says beyond the above ("_spec" -> "0.3"), kept so that writing it back loses nothing.
-  std::map<std::string, std::string> attributes;
+  std::map<std::string, std::string> attributes{};
 
   bool operator==(const VoxelProperties&) const = default;
 };

@@ -57,7 +57,7 @@ struct LightOptions {
   OcclusionAffects occlusion_affects = OcclusionAffects::Ambient;
   int occlusion_rays = 9;  ///< 6: the reference's set; 9: the symmetric one; others are spread per pixel
   double occlusion_distance_voxels = 6.0;
-  SmoothOcclusionOptions smooth_occlusion;                                  ///< of OcclusionMode::Smooth
+  SmoothOcclusionOptions smooth_occlusion{};                                ///< of OcclusionMode::Smooth
   double shadow_distance_voxels = std::numeric_limits<double>::infinity();  ///< beyond it nothing casts a shadow
   double exposure = 1.0;        ///< times all light of a surface, before it is clamped to 0..1
   double sun_brightness = 1.0;  ///< times the sun's light; 0: night

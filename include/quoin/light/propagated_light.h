@@ -39,7 +39,7 @@ struct LightLevels {
 
 struct PropagatedLightOptions {
   /// What types give off, for games with levels of their own; empty: `lamp_levels`. `sky` counts as 0.
-  std::function<LightLevels(VoxelType, const VoxelProperties&)> lamp;
+  std::function<LightLevels(VoxelType, const VoxelProperties&)> lamp{};
 };
 
 /// Light in game time: that of the sky and of coloured lamps, spread through whatever is not opaque, one level less a

@@ -9,8 +9,8 @@
 namespace quoin {
 
 struct LiveLightOptions {
-  PropagatedLightOptions light;
-  Threads workers;  ///< unlike elsewhere 0 means one less than the machine has, at least 1
+  PropagatedLightOptions light{};
+  Threads workers{};  ///< unlike elsewhere 0 means one less than the machine has, at least 1
 };
 
 /// Propagated light of a scene's grids, kept up to date on workers while the scene is edited: a frame never waits for

@@ -75,20 +75,20 @@ struct LiveMeshOptions {
   bool merge = true;                          ///< blocky: neighbouring faces become one quad
   /// Blocky: 16, 32 or 64. Smaller regions are more quads, and less that is new to a graphics card after an edit.
   int region_edge = 64;
-  SmoothOcclusionOptions occlusion;                ///< of smooth surfaces, those of fields too
+  SmoothOcclusionOptions occlusion{};              ///< of smooth surfaces, those of fields too
   SurfaceColours colours = SurfaceColours::Sharp;  ///< of smooth surfaces of voxels; those of fields are blended
   /// Of fields: where all eyes are farther than this from a chunk, in samples of its nearest instance, it has level of
   /// detail 1, at twice that 2, and so on to kMaxSmoothLevel. A level is left only a tenth beyond where it ends. 0 and
   /// less count as 1, NaN as infinity: level 0 everywhere.
   double detail_distance = std::numeric_limits<double>::infinity();
   InstanceFilter instances = InstanceFilter::Visible;  ///< whose grids are meshed
-  Threads workers;  ///< unlike elsewhere 0 means one less than the machine has, at least 1
+  Threads workers{};  ///< unlike elsewhere 0 means one less than the machine has, at least 1
   /// Called by workers, several at once, for each surface that was made, before it can be taken: what it returns, say
   /// vertices in a format of your own, is ChunkSurface::converted. May be empty.
-  std::function<std::shared_ptr<const void>(const SurfaceUpdate&)> convert;
+  std::function<std::shared_ptr<const void>(const SurfaceUpdate&)> convert{};
   /// Called from a worker that is done with a chunk: there may be something to take, less is `pending`, and there is
   /// room for more chunks. May be empty. It may call `take`, `pending` and `stats`, and nothing else of the meshes.
-  std::function<void()> on_ready;
+  std::function<void()> on_ready{};
 };
 
 /// The meshes of a scene's chunks, of voxels and of fields, kept up to date by worker threads while it is edited.

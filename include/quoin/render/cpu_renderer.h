@@ -21,8 +21,8 @@ struct RenderOptions {
   int height = 720;
   int samples = 1;     ///< a pixel, 1 to 4,096; spread by a fixed pattern that begins with the centre
   bool depth = false;  ///< whether Picture::depth is filled
-  LightOptions light;
-  DetailOptions detail;
+  LightOptions light{};
+  DetailOptions detail{};
 };
 
 struct Picture {

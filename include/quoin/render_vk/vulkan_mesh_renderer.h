@@ -28,10 +28,10 @@ struct MeshPictureOptions {
   int height = 720;
   int samples = 4;  ///< a pixel, of coverage: 1, 2, 4 or 8; the device's next lower number is taken
   /// `occlusion_rays` means nothing here: any occlusion but Off is that of the meshes' vertices.
-  LightOptions light;
+  LightOptions light{};
   /// Mid: meshes of halved grids, made when a picture first shows them, blocky
   /// or smooth as those of the full grid that were put, else blocky; Far: the faces of an impostor.
-  DetailOptions detail;
+  DetailOptions detail{};
   /// Whether glass is what marched pictures show: all that is transparent from the nearest face on, found by rays
   /// through the VulkanRenderer's voxels. Else each blocky face counts as a body one voxel thick without a surface,
   /// drawn from back to front, and of smooth bodies only the nearest is drawn, as one voxel thick with its surface:

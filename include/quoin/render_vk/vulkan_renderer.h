@@ -26,7 +26,7 @@ struct VulkanOptions {
   std::uint64_t block_bytes = kVulkanBlockBytes;
   /// Told what the validation layer says, which is then loaded: each message is a mistake in Quoin. May be called from
   /// any thread that uses the renderer.
-  std::function<void(const std::string& message)> on_validation_message;
+  std::function<void(const std::string& message)> on_validation_message{};
 };
 
 /// What becomes of the samples that a picture has when more are drawn.

@@ -96,7 +96,7 @@ struct SlideOptions {
   /// How far that may be, world units; nothing: the longest edge of the box, and the way out of what it is in.
   std::optional<double> max_push_out = std::nullopt;
   std::optional<FloorOptions> floor = std::nullopt;  ///< nothing: a body that slides, whatever it lies on
-  QueryFilter filter;                                ///< what the body meets at all
+  QueryFilter filter{};                              ///< what the body meets at all
 };
 
 /// What a moving body met.

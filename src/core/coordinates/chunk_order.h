@@ -8,10 +8,10 @@
 namespace quoin {
 
 /// The order in which grids list their chunks: by z, then y, then x.
-inline bool by_zyx(IVec3 a, IVec3 b) {
+inline constexpr auto by_zyx = [](IVec3 a, IVec3 b) {
   if (a.z != b.z) return a.z < b.z;
   return a.y != b.y ? a.y < b.y : a.x < b.x;
-}
+};
 
 inline void sort_and_unite(std::vector<IVec3>& chunks) {
   std::sort(chunks.begin(), chunks.end(), by_zyx);

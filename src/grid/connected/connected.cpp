@@ -13,6 +13,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/coordinates/chunk_order.h"
+#include "core/moved_from.h"
 #include "grid/connected/chunk_parts.h"
 
 namespace quoin {
@@ -376,52 +377,52 @@ std::vector<std::size_t> ConnectedPieces::Impl::listed(const IBox& box, bool tou
 }
 
 ConnectedPieces::ConnectedPieces(ConnectedOptions options) : impl_(std::make_unique<Impl>()) {
-  impl_->options = std::move(options);
+  content_of(impl_).options = std::move(options);
 }
 ConnectedPieces::ConnectedPieces(ConnectedPieces&&) noexcept = default;
 ConnectedPieces& ConnectedPieces::operator=(ConnectedPieces&&) noexcept = default;
 ConnectedPieces::~ConnectedPieces() = default;
 
 void ConnectedPieces::update(const Grid& grid, Threads threads) {
-  ChangeCursor now = impl_->followed;
+  ChangeCursor now = content_of(impl_).followed;
   const GridChanges changes = grid.changes_since(now);
   if (changes.empty()) return;
   std::vector<IVec3> chunks;
   if (changes.all) {
-    impl_->entries.clear();
+    content_of(impl_).entries.clear();
     chunks = grid.chunks();
   }
   for (const ChunkChange& change : changes.items) chunks.push_back(change.chunk);
-  impl_->find_parts(grid, chunks, threads);
-  impl_->find_links(chunks, threads);
-  impl_->make_pieces();
-  impl_->followed = now;
+  content_of(impl_).find_parts(grid, chunks, threads);
+  content_of(impl_).find_links(chunks, threads);
+  content_of(impl_).make_pieces();
+  content_of(impl_).followed = now;
 }
 
 std::span<const ConnectedPiece> ConnectedPieces::pieces() const {
-  return impl_->pieces;
+  return content_of(impl_).pieces;
 }
 
 std::optional<std::size_t> ConnectedPieces::piece_at(IVec3 voxel) const {
-  const auto found = impl_->entries.find(chunk_of(voxel));
-  if (found == impl_->entries.end()) return std::nullopt;
+  const auto found = content_of(impl_).entries.find(chunk_of(voxel));
+  if (found == content_of(impl_).entries.end()) return std::nullopt;
   const Entry& entry = found->second;
   const IVec3 local = local_of(voxel);
   const std::uint64_t row = entry.parts.row(local.y, local.z);
   if ((row >> local.x & 1U) == 0) return std::nullopt;
-  return impl_->piece_of_node[entry.first_node + entry.parts.part_at(row, local.x, local.y, local.z)];
+  return content_of(impl_).piece_of_node[entry.first_node + entry.parts.part_at(row, local.x, local.y, local.z)];
 }
 
 std::vector<std::size_t> ConnectedPieces::touching(const IBox& box) const {
-  return impl_->listed(box, true);
+  return content_of(impl_).listed(box, true);
 }
 
 std::vector<std::size_t> ConnectedPieces::apart_from(const IBox& box) const {
-  return impl_->listed(box, false);
+  return content_of(impl_).listed(box, false);
 }
 
 void ConnectedPieces::for_each_row(std::size_t piece, FunctionRef<void(IVec3 row, std::uint64_t voxels)> visit) const {
-  impl_->for_each_chunk(piece, [&](const Entry& entry, std::span<const std::size_t> of_piece) {
+  content_of(impl_).for_each_chunk(piece, [&](const Entry& entry, std::span<const std::size_t> of_piece) {
     Impl::for_each_row(entry, of_piece,
                        [&](IVec3 row, std::uint64_t voxels) { visit(entry.at * kChunkEdge + row, voxels); });
   });
@@ -430,7 +431,7 @@ void ConnectedPieces::for_each_row(std::size_t piece, FunctionRef<void(IVec3 row
 Grid ConnectedPieces::extract(std::size_t piece) const {
   Grid grid;
   std::array<VoxelType, kChunkEdge> types{};
-  impl_->for_each_chunk(piece, [&](const Entry& entry, std::span<const std::size_t> of_piece) {
+  content_of(impl_).for_each_chunk(piece, [&](const Entry& entry, std::span<const std::size_t> of_piece) {
     if (Impl::are_all(entry, of_piece)) {
       grid.put_chunk(entry.at, entry.parts.chunk());
       return;
@@ -446,7 +447,7 @@ Grid ConnectedPieces::extract(std::size_t piece) const {
 std::int64_t ConnectedPieces::remove_from(Grid& grid, std::size_t piece) const {
   static constexpr std::array<VoxelType, kChunkEdge> kAirRow{};
   std::int64_t changed = 0;
-  impl_->for_each_chunk(piece, [&](const Entry& entry, std::span<const std::size_t> of_piece) {
+  content_of(impl_).for_each_chunk(piece, [&](const Entry& entry, std::span<const std::size_t> of_piece) {
     const Chunk* present = grid.find_chunk(entry.at);
     if (present == nullptr) return;
     if (present->shares_storage_with(entry.parts.chunk()) && Impl::are_all(entry, of_piece)) {
@@ -461,11 +462,12 @@ std::int64_t ConnectedPieces::remove_from(Grid& grid, std::size_t piece) const {
 }
 
 std::size_t ConnectedPieces::bytes() const {
-  std::size_t total = sizeof(*this) + sizeof(Impl) + impl_->pieces.capacity() * sizeof(ConnectedPiece);
-  total += (impl_->piece_of_node.capacity() + impl_->nodes.capacity() + impl_->first_nodes.capacity()) *
+  std::size_t total = sizeof(*this) + sizeof(Impl) + content_of(impl_).pieces.capacity() * sizeof(ConnectedPiece);
+  total += (content_of(impl_).piece_of_node.capacity() + content_of(impl_).nodes.capacity() +
+            content_of(impl_).first_nodes.capacity()) *
                sizeof(std::size_t) +
-           impl_->in_order.capacity() * sizeof(const Entry*);
-  for (const auto& [at, entry] : impl_->entries) {
+           content_of(impl_).in_order.capacity() * sizeof(const Entry*);
+  for (const auto& [at, entry] : content_of(impl_).entries) {
     constexpr std::size_t kMapNode = 4 * sizeof(void*);
     total += kMapNode + sizeof(std::pair<IVec3, Entry>) - sizeof(ChunkParts) + entry.parts.bytes() +
              entry.links.capacity() * sizeof(Link);

@@ -10,6 +10,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/coordinates/chunk_order.h"
+#include "core/moved_from.h"
 #include "core/progress_steps.h"
 #include "grid/halving/chunk_halver.h"
 #include "grid/halving/density_halver.h"
@@ -184,15 +185,15 @@ GridPyramid& GridPyramid::operator=(GridPyramid&&) noexcept = default;
 GridPyramid::~GridPyramid() = default;
 
 void GridPyramid::update(const Grid& grid, const VoxelRegistry& types, int levels, Threads threads) {
-  impl_->update(grid, {&types}, levels, threads);
+  content_of(impl_).update(grid, {&types}, levels, threads);
 }
 
 int GridPyramid::levels() const {
-  return impl_->count();
+  return content_of(impl_).count();
 }
 
 const Grid& GridPyramid::level(int level) const {
-  return impl_->at(level).content;
+  return content_of(impl_).at(level).content;
 }
 
 struct DensityPyramid::Impl : Levels<DensityHalving, DensityLevel> {};
@@ -203,19 +204,19 @@ DensityPyramid& DensityPyramid::operator=(DensityPyramid&&) noexcept = default;
 DensityPyramid::~DensityPyramid() = default;
 
 void DensityPyramid::update(const DensityGrid& field, int levels, Threads threads) {
-  impl_->update(field, {}, levels, threads);
+  content_of(impl_).update(field, {}, levels, threads);
 }
 
 int DensityPyramid::levels() const {
-  return impl_->count();
+  return content_of(impl_).count();
 }
 
 const DensityGrid& DensityPyramid::level(int level) const {
-  return impl_->at(level).content;
+  return content_of(impl_).at(level).content;
 }
 
 const DownsampledDensityCounts& DensityPyramid::counts(int level) const {
-  return impl_->at(level).counts;
+  return content_of(impl_).at(level).counts;
 }
 
 }  // namespace quoin

@@ -30,4 +30,11 @@ struct VoxSource {
   Scene scene;
 };
 
+/// The handle of what has a slot of the scene as it was read, there and in what became of it; of nothing where there
+/// was none.
+template <class T>
+[[nodiscard]] Handle<T> handle_read(const SlotMap<T>& read, std::size_t slot) {
+  return read.handle_at(static_cast<std::uint32_t>(slot)).value_or(Handle<T>{});
+}
+
 }  // namespace quoin

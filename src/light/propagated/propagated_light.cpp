@@ -16,6 +16,7 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "core/coordinates/coordinate_hash.h"
+#include "core/moved_from.h"
 #include "light/propagated/light_domain.h"
 #include "light/propagated/light_quads.h"
 #include "light/propagated/light_reader.h"
@@ -472,7 +473,7 @@ void PropagatedLight::Impl::solve_queue(const Grid& grid, Threads threads) {
 }
 
 PropagatedLight::PropagatedLight(PropagatedLightOptions options) : impl_(std::make_unique<Impl>()) {
-  impl_->options = std::move(options);
+  content_of(impl_).options = std::move(options);
 }
 PropagatedLight::PropagatedLight(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 PropagatedLight::PropagatedLight(PropagatedLight&&) noexcept = default;
@@ -480,7 +481,7 @@ PropagatedLight& PropagatedLight::operator=(PropagatedLight&&) noexcept = defaul
 PropagatedLight::~PropagatedLight() = default;
 
 void PropagatedLight::update(const Grid& grid, const VoxelRegistry& types, Threads threads) {
-  Impl& me = *impl_;
+  Impl& me = content_of(impl_);
   try {
     GridChanges changes = grid.changes_since(me.followed_grid);
     if (me.lights().empty() || types.has_changed_since(me.followed_types)) {
@@ -501,28 +502,28 @@ void PropagatedLight::update(const Grid& grid, const VoxelRegistry& types, Threa
 }
 
 PropagatedLight PropagatedLight::snapshot() const {
-  return PropagatedLight(std::make_unique<Impl>(*impl_));
+  return PropagatedLight(std::make_unique<Impl>(content_of(impl_)));
 }
 
 LightLevels PropagatedLight::at(IVec3 voxel) const {
-  return unpacked_light(impl_->reader().at(voxel));
+  return unpacked_light(content_of(impl_).reader().at(voxel));
 }
 
 void PropagatedLight::read_row(IVec3 voxel, std::span<std::uint16_t, kChunkEdge> out) const {
-  impl_->reader().read_row(voxel, out);
+  content_of(impl_).reader().read_row(voxel, out);
 }
 
 GridChanges PropagatedLight::changes_since(ChangeCursor& cursor) const {
-  return impl_->store.changes_since(cursor);
+  return content_of(impl_).store.changes_since(cursor);
 }
 
 void PropagatedLight::split(const QuadBuffer& quads, IVec3 chunk, QuadBuffer& out,
                             std::vector<std::uint16_t>& light) const {
-  propagated::split_quads(impl_->reader(), quads, chunk, out, light);
+  propagated::split_quads(content_of(impl_).reader(), quads, chunk, out, light);
 }
 
 std::size_t PropagatedLight::bytes() const {
-  return impl_->store.bytes() + impl_->lights().capacity() * sizeof(TypeLight);
+  return content_of(impl_).store.bytes() + content_of(impl_).lights().capacity() * sizeof(TypeLight);
 }
 
 }  // namespace quoin

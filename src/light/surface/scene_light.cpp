@@ -9,6 +9,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/coordinates/chunk_order.h"
+#include "core/moved_from.h"
 
 namespace quoin {
 
@@ -121,7 +122,7 @@ std::size_t SceneLight::bytes() const {
 
 GridLight SceneLight::of(GridHandle grid) const {
   const auto found = grids_.find(grid);
-  const Entry& entry = found == grids_.end() ? *unknown_ : *found->second;
+  const Entry& entry = found == grids_.end() ? content_of(unknown_) : *found->second;
   return {&entry.light, entry.voxels};
 }
 

@@ -4,6 +4,7 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/moved_from.h"
 #include "light/quad_cutter.h"
 #include "light/surface/levels.h"
 #include "light/surface/rows.h"
@@ -25,7 +26,7 @@ SurfaceLight& SurfaceLight::operator=(SurfaceLight&&) noexcept = default;
 SurfaceLight::~SurfaceLight() = default;
 
 FaceLight SurfaceLight::face(IVec3 voxel, Direction direction) {
-  return face_light(rows_->voxels, voxel + normal_of(direction), direction);
+  return face_light(content_of(rows_).voxels, voxel + normal_of(direction), direction);
 }
 
 namespace {
@@ -105,7 +106,7 @@ void SurfaceLight::split(const QuadBuffer& quads, IVec3 chunk, LightMerging merg
                          std::vector<FaceLight>& corners) {
   out.clear();
   corners.clear();
-  Rows& rows = *rows_;
+  Rows& rows = content_of(rows_);
   for (const Quad quad : quads) {
     const FaceFrame& frame = frame_of(quad.direction());
     const IVec3 step_u(frame.u == 0, frame.u == 1, frame.u == 2);

@@ -10,6 +10,7 @@
 #include <quoin/mesh/visible_faces.h>
 
 #include "core/instruction_set.h"
+#include "core/moved_from.h"
 #include "grid/chunk/chunk_storage.h"
 #include "mesh/blocky/scratch.h"
 
@@ -195,8 +196,8 @@ struct BlockyMesher::Scratch : blocky::Scratch {
 };
 
 BlockyMesher::BlockyMesher() : scratch_(new Scratch()) {
-  scratch_->occlusion = blocky::make_occlusion_tables();
-  scratch_->kernel = pick_kernel();
+  content_of(scratch_).occlusion = blocky::make_occlusion_tables();
+  content_of(scratch_).kernel = pick_kernel();
 }
 BlockyMesher::BlockyMesher(BlockyMesher&&) noexcept = default;
 BlockyMesher& BlockyMesher::operator=(BlockyMesher&&) noexcept = default;
@@ -204,7 +205,7 @@ BlockyMesher::~BlockyMesher() = default;
 
 void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types, const QuadOptions& options,
                         QuadBuffer& out) {
-  scratch_->quads = 0;
+  content_of(scratch_).quads = 0;
   const Chunk* centre = chunks.centre();
   if (centre != nullptr && !is_buried(chunks, types)) {
     const IBox region = intersect(intersect(options.region, kWholeChunk), centre->bounds());
@@ -216,10 +217,10 @@ void BlockyMesher::mesh(const Neighbourhood& chunks, const VoxelRegistry& types,
                             .occlusion = options.bake_occlusion,
                             .has_transparent = blocky::holds_transparent(*centre, types),
                             .one_type = false};
-      scratch_->kernel.mesh(job, *scratch_, out);
+      content_of(scratch_).kernel.mesh(job, content_of(scratch_), out);
     }
   }
-  out.resize(scratch_->quads);
+  out.resize(content_of(scratch_).quads);
 }
 
 Quad quad_part(Quad quad, int u, int v, int size_u, int size_v) {
@@ -251,8 +252,8 @@ void BlockyMesher::find_faces(const Neighbourhood& chunks, const VoxelRegistry& 
   if (centre == nullptr || is_buried(chunks, types)) return;
   const IBox region = intersect(intersect(wanted, kWholeChunk), centre->bounds());
   if (region.empty()) return;
-  blocky::Scratch& s = *scratch_;
-  scratch_->kernel.find_faces(job_of_faces(chunks, types, region), s);
+  blocky::Scratch& s = content_of(scratch_);
+  content_of(scratch_).kernel.find_faces(job_of_faces(chunks, types, region), s);
   const std::array<const blocky::Layer*, 6> layers = {&s.sides[0], &s.sides[1],   &s.sides[2],
                                                       &s.sides[3], &s.z.faces[0], &s.z.faces[1]};
   const int width = region.max.x - region.min.x;
@@ -271,7 +272,7 @@ std::int64_t BlockyMesher::count_faces(const Neighbourhood& chunks, const VoxelR
   if (centre == nullptr || is_buried(chunks, types)) return 0;
   const IBox region = centre->bounds();
   if (region.empty()) return 0;
-  return scratch_->kernel.count_faces(job_of_faces(chunks, types, region), *scratch_);
+  return content_of(scratch_).kernel.count_faces(job_of_faces(chunks, types, region), content_of(scratch_));
 }
 
 std::string to_string(const FaceCounts& faces) {

@@ -11,6 +11,7 @@
 
 #include "core/coordinates/coordinate_hash.h"
 #include "core/lender.h"
+#include "core/moved_from.h"
 #include "core/progress_steps.h"
 #include "mesh/occlusion/places.h"
 
@@ -158,10 +159,11 @@ void SmoothOccluder::occlude(const DensityNeighbourhood& chunks, const SmoothPla
   const Sampling sampling(options, places.level);
   const std::size_t count = places.positions.size();
   if (sampling.occlusion.method == SmoothOcclusion::None) return void(std::fill_n(out.begin(), count, 0.0F));
-  for (std::size_t i = scratch_->numbers.size(); i < count; ++i) {
-    scratch_->numbers.push_back(static_cast<std::uint32_t>(i));
+  for (std::size_t i = content_of(scratch_).numbers.size(); i < count; ++i) {
+    content_of(scratch_).numbers.push_back(static_cast<std::uint32_t>(i));
   }
-  scratch_->kernel.occlude(chunks, {places, IVec3{0}, std::span(scratch_->numbers).first(count)}, sampling, out);
+  content_of(scratch_).kernel.occlude(chunks, {places, IVec3{0}, std::span(content_of(scratch_).numbers).first(count)},
+                                      sampling, out);
 }
 
 }  // namespace quoin

@@ -71,11 +71,9 @@ inline LineGap gap_of_line(const DVec3& middle, const DVec3& half_axis) {
   double high = 1.0;
   double below = slope_at(low);
   double above = slope_at(high);
-  if (half_axis == DVec3(0.0) || below >= 0.0) {
-    high = low;
-  } else if (above <= 0.0) {
+  if (above < 0.0) {
     low = high;
-  } else {
+  } else if (below < 0.0) {
     for (int i = 0; i < 6; ++i) {
       const double place = ((i & 1) != 0 ? 0.5 : -0.5) - middle[i >> 1];
       const double t = place / half_axis[i >> 1];

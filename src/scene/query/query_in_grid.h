@@ -14,6 +14,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/scene/scene_query.h>
 
+#include "core/moved_from.h"
 #include "scene/instance_axes.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_tracer_impl.h"
@@ -23,7 +24,7 @@ namespace quoin {
 // What queries may see of a tracer.
 class SceneQuery {
  public:
-  static const InstanceTree& instances(const SceneTracer& tracer) { return tracer.impl_->instances; }
+  static const InstanceTree& instances(const SceneTracer& tracer) { return content_of(tracer.impl_).instances; }
 };
 
 // A length below which two shapes touch rather than overlap, in voxels.

@@ -9,6 +9,7 @@
 #include <quoin/grid/voxel_field.h>
 
 #include "core/coordinates/chunk_order.h"
+#include "core/moved_from.h"
 #include "scene/smooth/marched_density.h"
 
 namespace quoin {
@@ -71,18 +72,18 @@ struct SmoothScene::Impl {
 };
 
 SmoothScene::SmoothScene(const SmoothFieldOptions& options) : impl_(std::make_unique<Impl>()) {
-  impl_->options = options;
+  content_of(impl_).options = options;
 }
 SmoothScene::SmoothScene(SmoothScene&&) noexcept = default;
 SmoothScene& SmoothScene::operator=(SmoothScene&&) noexcept = default;
 SmoothScene::~SmoothScene() = default;
 
 const Scene& SmoothScene::scene() const {
-  return impl_->scene;
+  return content_of(impl_).scene;
 }
 
 std::size_t SmoothScene::bytes() const {
-  return impl_->bytes;
+  return content_of(impl_).bytes;
 }
 
 // Notes what is out of date; nothing is made yet.
@@ -127,7 +128,7 @@ void SmoothScene::Impl::follow_grid(const SceneGrid& grid, GridFields& fields) {
 }
 
 Status SmoothScene::update(const Scene& of, Threads threads, const Progress& progress) {
-  Impl& me = *impl_;
+  Impl& me = content_of(impl_);
   if (me.too_many && chunk_count(of) >= *me.too_many) return me.refuse(of);
   me.too_many.reset();
   me.follow(of);

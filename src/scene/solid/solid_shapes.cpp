@@ -17,6 +17,7 @@
 
 #include "core/coordinates/chunk_order.h"
 #include "core/coordinates/coordinate_hash.h"
+#include "core/moved_from.h"
 #include "scene/solid/solid_rows.h"
 #include "trace/chunk_rows.h"
 
@@ -243,14 +244,14 @@ void SolidShapes::Impl::make(const Grid& grid, IVec3 chunk, const VoxelRegistry&
 }
 
 SolidShapes::SolidShapes(const SolidShapesOptions& options) : impl_(std::make_unique<Impl>()) {
-  impl_->options = options;
+  content_of(impl_).options = options;
 }
 SolidShapes::SolidShapes(SolidShapes&&) noexcept = default;
 SolidShapes& SolidShapes::operator=(SolidShapes&&) noexcept = default;
 SolidShapes::~SolidShapes() = default;
 
 std::vector<IVec3> SolidShapes::update(const Grid& grid, const VoxelRegistry& types, Threads threads) {
-  Impl& me = *impl_;
+  Impl& me = content_of(impl_);
   try {
     std::vector<IVec3> chunks = me.chunks_to_make(grid, types);
     std::vector<ChunkShapes> made(chunks.size());
@@ -276,19 +277,19 @@ std::vector<IVec3> SolidShapes::update(const Grid& grid, const VoxelRegistry& ty
 
 const std::vector<IBox>& SolidShapes::boxes(IVec3 chunk) const {
   static const std::vector<IBox> none;
-  const auto found = impl_->shapes.find(chunk);
-  return found == impl_->shapes.end() ? none : found->second.boxes;
+  const auto found = content_of(impl_).shapes.find(chunk);
+  return found == content_of(impl_).shapes.end() ? none : found->second.boxes;
 }
 
 const QuadBuffer& SolidShapes::faces(IVec3 chunk) const {
   static const QuadBuffer none;
-  const auto found = impl_->shapes.find(chunk);
-  return found == impl_->shapes.end() ? none : found->second.faces;
+  const auto found = content_of(impl_).shapes.find(chunk);
+  return found == content_of(impl_).shapes.end() ? none : found->second.faces;
 }
 
 std::size_t SolidShapes::bytes() const {
-  std::size_t sum = impl_->shapes.size() * sizeof(ChunkShapes);
-  for (const auto& [chunk, shape] : impl_->shapes) {
+  std::size_t sum = content_of(impl_).shapes.size() * sizeof(ChunkShapes);
+  for (const auto& [chunk, shape] : content_of(impl_).shapes) {
     sum += shape.boxes.capacity() * sizeof(IBox) + shape.faces.capacity() * sizeof(Quad);
   }
   return sum;

@@ -251,7 +251,7 @@ void GraphRevision::number_layers() {
   scene_.layers().for_each([&](LayerHandle handle, const SceneLayer&) {
     out_.layer_ids.resize(handle.index + std::size_t{1}, kNoLayer);
     const auto known = std::ranges::find(source_.layer_of, std::size_t{handle.index});
-    if (handle.generation == 0 && known != source_.layer_of.end()) {
+    if (source_.scene.layers().find(handle) != nullptr && known != source_.layer_of.end()) {
       out_.layer_ids[handle.index] = layers[static_cast<std::size_t>(known - source_.layer_of.begin())].id;
       return;
     }
@@ -321,10 +321,10 @@ void GraphRevision::remove(const Hanging& hanging) {
 void GraphRevision::remove_what_is_gone() {
   const Placements& placements = source_.placements;
   for (std::size_t i = 0; i < placements.groups.size(); ++i) {
-    if (scene_.groups().find({static_cast<std::uint32_t>(i), 0}) == nullptr) remove(placements.groups[i]);
+    if (scene_.groups().find(handle_read(source_.scene.groups(), i)) == nullptr) remove(placements.groups[i]);
   }
   for (std::size_t i = 0; i < placements.all.size(); ++i) {
-    const Instance* instance = scene_.instances().find({static_cast<std::uint32_t>(i), 0});
+    const Instance* instance = scene_.instances().find(handle_read(source_.scene.instances(), i));
     if (instance == nullptr || models_.find(instance->grid) == nullptr) remove(placements.all[i]);
   }
 }
@@ -404,7 +404,7 @@ bool GraphRevision::is_hidden(std::int32_t layer) const {
   const std::vector<Layer>& layers = source_.document.layers;
   for (std::size_t i = 0; i < layers.size(); ++i) {
     if (layers[i].id != layer || source_.layer_of[i] == kNone) continue;
-    const SceneLayer* now = scene_.layers().find({static_cast<std::uint32_t>(source_.layer_of[i]), 0});
+    const SceneLayer* now = scene_.layers().find(handle_read(source_.scene.layers(), source_.layer_of[i]));
     if (now != nullptr && !now->visible) return true;
   }
   return false;
@@ -557,7 +557,7 @@ std::vector<GraphRevision::Frame> GraphRevision::frames_about(const Motion& box)
   const Motion ground = box * inverse(lone(static_cast<std::size_t>(source_.frame)));
   std::vector<Frame> frames(source_.document.models.size());
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    const GridPlan* plan = models_.find({static_cast<std::uint32_t>(i), 0});
+    const GridPlan* plan = models_.find(handle_read(source_.scene.grids(), i));
     if (plan == nullptr || source_.scene.grids().find(plan->grid) == nullptr) continue;
     // What outgrew its box has another pivot.
     frames[i] = {plan, ground * lone(i) * inverse(from_source_box(*plan, i))};

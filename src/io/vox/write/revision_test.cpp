@@ -421,7 +421,7 @@ TEST(VoxRevision, FramesThatAreNotShownMayOutgrowTheirBoxesToo) {
     // As it would be shown at its own frame.
     for (const int frame : {1, 2}) {
       LoadedScene at_frame = load(bytes, frame);
-      if (frame == 1) at_frame.scene.edit(other).grid.set(voxel, 9);
+      if (frame == 1) at_frame.scene.edit(at_frame.scene.grids().handles()[1]).grid.set(voxel, 9);
       at_frame.scene.edit(at_frame.scene.instances().handles()[0]).position.x += 7;
       EXPECT_EQ(voxels_of(load(saved, frame).scene), voxels_of(at_frame.scene)) << frame;
     }

@@ -317,7 +317,7 @@ std::span<const std::byte> Writer::content_of(const vox::ChunkPlace& place) cons
 /// Null when the scene has it no more.
 const SceneLayer* Writer::layer_of(std::size_t number) const {
   const std::size_t slot = source_.layer_of[number];
-  return slot == vox::kNone ? nullptr : scene_.layers().find({static_cast<std::uint32_t>(slot), 0});
+  return slot == vox::kNone ? nullptr : scene_.layers().find(handle_read(source_.scene.layers(), slot));
 }
 
 bool Writer::is_removed(const vox::ChunkPlace& place) const {
@@ -567,7 +567,7 @@ void Writer::write_new_layers() {
   };
   if (graph_.adds_only_layer) write(0, {});
   scene_.layers().for_each([&](LayerHandle handle, const SceneLayer& layer) {
-    const bool was_there = handle.generation == 0 &&
+    const bool was_there = source_.scene.layers().find(handle) != nullptr &&
                            std::ranges::find(source_.layer_of, std::size_t{handle.index}) != source_.layer_of.end();
     if (!was_there) write(graph_.layer_ids[handle.index], layer);
   });

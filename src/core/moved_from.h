@@ -1,0 +1,16 @@
+#pragma once
+
+#include <memory>
+
+#include <quoin/core/assert.h>
+
+namespace quoin {
+
+/// What an object consists of. Requires: it was not moved from.
+template <class Content>
+[[nodiscard]] Content& content_of(const std::unique_ptr<Content>& content) {
+  QUOIN_ASSERT(content != nullptr, "an object that was not moved from");
+  return *content;
+}
+
+}  // namespace quoin
