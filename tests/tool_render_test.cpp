@@ -278,6 +278,57 @@ TEST_F(ToolRender, PathsRefuseWhatIsNotTheirs) {
   EXPECT_EQ(run("render many.vox -o out.exr").status, 2);
 }
 
+TEST_F(ToolRender, AFilmAlongAPathOfCamerasGoesOnWhereItEnded) {
+  std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(4);
+  const Json said = drawn("many.vox -o one.png --size 64x48 --camera 12,10,14 --look-at 2,2,-2 --fov 40");
+  std::ofstream(folder_.file("path.json"))
+      << Json({said["camera"],
+               {{"position", {12, 10, 14}}, {"look_at", {2, 2, -2}}, {"fov", 40}},
+               {{"position", {0, 30, 0}}, {"forward", {0, -1, 0}}, {"up", {1, 0, 0}}, {"view_height", 12}}});
+  const Json film = drawn("many.vox -o film.png --size 64x48 --path path.json");
+  EXPECT_EQ(film["files"], Json({"film-00.png", "film-01.png", "film-02.png"}));
+  EXPECT_EQ(bytes("film-00.png"), bytes("one.png"));
+  EXPECT_EQ(bytes("film-01.png"), bytes("one.png"));
+  EXPECT_NE(bytes("film-02.png"), bytes("one.png"));
+  const std::string last = bytes("film-02.png");
+  std::filesystem::remove(folder_.file("film-02.png"));
+  std::ofstream(folder_.file("film-00.png")) << "as it was";
+  const Json rest = drawn("many.vox -o film.png --size 64x48 --path path.json --resume");
+  EXPECT_EQ(rest["files"], Json({"film-02.png"}));
+  EXPECT_EQ(rest["kept"], 2);
+  EXPECT_EQ(bytes("film-00.png"), "as it was");
+  EXPECT_EQ(bytes("film-02.png"), last);
+  EXPECT_EQ(drawn("many.vox -o film.png --size 64x48 --path path.json --resume")["files"], Json::array());
+  // What is there does not change the exposure of the rest.
+  const std::string turns = "many.vox -o turn.png --size 32x24 --turntable 3 --light path --samples 1 --exposure auto";
+  drawn(turns);
+  const std::string third = bytes("turn-02.png");
+  std::filesystem::remove(folder_.file("turn-02.png"));
+  EXPECT_EQ(drawn(turns + " --resume")["kept"], 1);
+  EXPECT_EQ(bytes("turn-02.png"), third);
+}
+
+TEST_F(ToolRender, PathsOfCamerasThatAreNoneAreNamed) {
+  std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(2);
+  for (const std::string text :
+       {"", "{}", "[]", "[1]", "[{}]", R"([{"position":[1,2,3]}])", R"([{"position":[1,2,3],"look_at":[1,2,3]}])",
+        R"([{"position":[1,2,3],"forward":[0,0,1],"look_at":[0,0,0]}])", R"([{"position":[1,2],"forward":[0,0,1]}])",
+        R"([{"position":[1,2,3],"forward":[0,0,1],"fov":180}])",
+        R"([{"position":[1,2,3],"forward":[0,0,1],"fov":"wide"}])",
+        R"([{"position":[1,2,3],"forward":[0,0,1],"up":[0,0,1]}])",
+        R"([{"position":[1,2,3],"forward":[0,0,1],"view_height":0}])",
+        R"([{"position":[1,2,3],"forward":[0,0,1],"zoom":1}])"}) {
+    std::ofstream(folder_.file("path.json")) << text;
+    const ToolRun result = run("render many.vox -o film.png --path path.json");
+    EXPECT_EQ(result.status, 1) << text;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << text << result.err;
+    EXPECT_FALSE(std::filesystem::exists(folder_.file("film-00.png")));
+  }
+  EXPECT_EQ(run("render many.vox -o film.png --path none.json").status, 1);
+  EXPECT_EQ(run("render many.vox -o film.png --path path.json --view top").status, 2);
+  EXPECT_EQ(run("render many.vox -o film.png --resume").status, 2);
+}
+
 TEST_F(ToolRender, ThumbnailsAreSmallAndClearWhereNothingIs) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(8);
   const auto made = run("thumbnail many.vox small.png --size 40 --json");

@@ -14,6 +14,7 @@
 #include "output.h"
 #include "output_files.h"
 #include "progress_bar.h"
+#include "render/camera_path.h"
 #include "render/path_pictures.h"
 #include "render/picture_output.h"
 #include "render/render_arguments.h"
@@ -40,6 +41,7 @@ struct Outcome {
   std::vector<std::string> warnings;
   std::int64_t rays = 0;           ///< of all pictures
   std::optional<double> exposure;  ///< of pictures by paths: that of the first
+  std::int64_t kept = 0;           ///< pictures that were there already
 };
 
 /// A picture to take.
@@ -56,9 +58,12 @@ std::filesystem::path numbered(const std::filesystem::path& output, int number, 
   return output.parent_path() / (output.stem().string() + "-" + digits + output.extension().string());
 }
 
-/// The pictures that will be written.
-std::vector<std::filesystem::path> pictures_of(const RenderArguments& arguments) {
+/// The pictures that will be written. `cameras`: of --path.
+std::vector<std::filesystem::path> pictures_of(const RenderArguments& arguments, std::size_t cameras) {
   std::vector<std::filesystem::path> pictures;
+  const int last = static_cast<int>(cameras) - 1;
+  for (int i = 0; i <= last; ++i) pictures.push_back(numbered(arguments.output, i, last));
+  if (cameras > 0) return pictures;
   if (arguments.frames) {
     const FrameRange& frames = *arguments.frames;
     for (int frame = frames.first; frame <= frames.last; ++frame)
@@ -70,6 +75,14 @@ std::vector<std::filesystem::path> pictures_of(const RenderArguments& arguments)
     pictures.push_back(arguments.output);
   }
   return pictures;
+}
+
+/// Whether a picture of a film is there already. Pictures appear whole or not at all. The first one says the exposure
+/// where that is automatic.
+bool is_kept(const RenderArguments& arguments, const std::filesystem::path& picture, const Outcome& outcome) {
+  if (!arguments.resume || (arguments.path.is_exposure_automatic && !outcome.exposure)) return false;
+  std::error_code none;
+  return std::filesystem::is_regular_file(picture, none);
 }
 
 double aspect_of(const RenderArguments& arguments) {
@@ -166,6 +179,10 @@ Status take_pictures(Renderer& renderer, const RenderArguments& arguments, const
   outcome.build += watch.lap();
   ProgressBar bar;
   for (std::size_t i = 0; i < shots.size(); ++i) {
+    if (is_kept(arguments, shots[i].output, outcome)) {
+      ++outcome.kept;
+      continue;
+    }
     const auto share = [&](double fraction) {
       return (static_cast<double>(i) + fraction) / static_cast<double>(shots.size());
     };
@@ -173,6 +190,7 @@ Status take_pictures(Renderer& renderer, const RenderArguments& arguments, const
     auto picture = renderer.render(shots[i].camera, options, arguments.common.threads,
                                    [&](double fraction) { return listener(share(fraction)); });
     if (!picture) return picture.error();
+    if constexpr (requires { renderer.exposure(); }) outcome.exposure = renderer.exposure();
     outcome.camera = shots[i].camera;
     outcome.picture = std::move(*picture);
     outcome.rays += outcome.picture.rays;
@@ -196,9 +214,7 @@ Status draw_by_paths(const Scene& scene, const RenderArguments& arguments, const
   PathPictures pictures(scene, arguments.common.instances(), arguments.common.threads, std::move(*wanted),
                         arguments.path);
   pictures.set_exposure(outcome.exposure);
-  Status taken = take_pictures(pictures, arguments, options, shots, watch, outcome);
-  outcome.exposure = pictures.exposure();
-  return taken;
+  return take_pictures(pictures, arguments, options, shots, watch, outcome);
 }
 
 Status draw_by_vulkan(const Scene& scene, const RenderArguments& arguments, const RenderOptions& options,
@@ -229,7 +245,7 @@ Status draw_view(const LoadedScene& loaded, const RenderArguments& arguments, St
   if (arguments.turns > 1) {
     SceneFraming framing(arguments.forward(), aspect_of(arguments), arguments.turns);
     framing.add(loaded.scene, arguments.common.instances());
-    const std::vector<std::filesystem::path> pictures = pictures_of(arguments);
+    const std::vector<std::filesystem::path> pictures = pictures_of(arguments, 0);
     for (int turn = 0; turn < arguments.turns; ++turn) {
       shots.push_back({framing.camera(turn), pictures[static_cast<std::size_t>(turn)]});
     }
@@ -238,6 +254,15 @@ Status draw_view(const LoadedScene& loaded, const RenderArguments& arguments, St
     if (!camera) return camera.error();
     shots.push_back({*camera, arguments.output});
   }
+  return draw_shots(loaded, arguments, shots, watch, outcome);
+}
+
+/// Draws what each of these cameras sees.
+Status draw_path(const LoadedScene& loaded, const std::vector<Camera>& cameras, const RenderArguments& arguments,
+                 Stopwatch& watch, Outcome& outcome) {
+  const std::vector<std::filesystem::path> pictures = pictures_of(arguments, cameras.size());
+  std::vector<Shot> shots;
+  for (std::size_t i = 0; i < cameras.size(); ++i) shots.push_back({cameras[i], pictures[i]});
   return draw_shots(loaded, arguments, shots, watch, outcome);
 }
 
@@ -256,9 +281,13 @@ Status draw_frames(const LoadedScene& first, const RenderArguments& arguments, S
   }
   Result<Camera> camera = has_camera ? camera_for(first, arguments) : framing.camera();
   if (!camera) return camera.error();
-  const std::vector<std::filesystem::path> pictures = pictures_of(arguments);
+  const std::vector<std::filesystem::path> pictures = pictures_of(arguments, 0);
   for (int frame = frames.first; frame <= frames.last; ++frame) {
     const bool is_first = frame == frames.first;
+    if (is_kept(arguments, pictures[static_cast<std::size_t>(frame - frames.first)], outcome)) {
+      ++outcome.kept;
+      continue;
+    }
     const auto later = is_first ? Result<LoadedScene>(LoadedScene{}) : load(arguments, false, frame);
     if (!later) return later.error();
     outcome.read += watch.lap();
@@ -283,7 +312,13 @@ Status draw_slice(const Scene& scene, const RenderArguments& arguments, Stopwatc
 Result<Outcome> render(const RenderArguments& arguments) {
   const InstanceFilter filter = arguments.common.instances();
   Stopwatch watch;
-  std::vector<std::filesystem::path> outputs = pictures_of(arguments);
+  std::vector<Camera> path;
+  if (!arguments.camera_path.empty()) {
+    auto cameras = read_camera_path(arguments.camera_path);
+    if (!cameras) return cameras.error();
+    path = std::move(*cameras);
+  }
+  std::vector<std::filesystem::path> outputs = pictures_of(arguments, path.size());
   outputs.push_back(arguments.depth);
   if (auto writable = check_outputs(outputs); !writable) return writable.error();
   const bool is_volume = holds_volume(arguments.common).value_or(false);
@@ -303,14 +338,16 @@ Result<Outcome> render(const RenderArguments& arguments) {
   outcome.faces = count_faces(scene, filter, arguments.common.threads);
   const bool is_slice = arguments.preset == "density";
   const auto draw = arguments.frames ? draw_frames : draw_view;
-  Status drawn = is_slice ? draw_slice(scene, arguments, watch, outcome) : draw(*loaded, arguments, watch, outcome);
+  Status drawn = is_slice        ? draw_slice(scene, arguments, watch, outcome)
+                 : !path.empty() ? draw_path(*loaded, path, arguments, watch, outcome)
+                                 : draw(*loaded, arguments, watch, outcome);
   if (!drawn) return drawn.error();
   warn_of_left_out(scene, filter, outcome.warnings);
   if (arguments.render.light.model == LightModel::Propagated && !scene.lamps.empty()) {
     outcome.warnings.push_back("--light propagated is of voxels: lamps left out: " +
                                std::to_string(scene.lamps.size()));
   }
-  if (!is_slice) warn_of_empty_pictures(scene, filter, outcome.picture, outcome.warnings);
+  if (!is_slice && !outcome.files.empty()) warn_of_empty_pictures(scene, filter, outcome.picture, outcome.warnings);
   return outcome;
 }
 
@@ -330,26 +367,29 @@ Json camera_json(const Camera& camera) {
 Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
   Json files = Json::array();
   for (const auto& file : outcome.files) files.push_back(file.string());
-  Json json = {{"size", {outcome.picture.colour.width, outcome.picture.colour.height}},
+  Json json = {{"size", {arguments.render.width, arguments.render.height}},
                {"rays", outcome.rays},
                {"pixels_hit", outcome.picture.pixels_hit},
                {"faces_visible", outcome.is_volume ? Json() : Json(outcome.faces.visible)},
                {"faces_total", outcome.is_volume ? Json() : Json(outcome.faces.total)},
                {"backend", arguments.backend},
                {"threads", thread_count(arguments.common.threads)},
-               {"camera", outcome.slice ? Json() : camera_json(outcome.camera)},
+               {"camera", outcome.slice || outcome.files.empty() ? Json() : camera_json(outcome.camera)},
                {"bytes", outcome.bytes},
                {"files", files},
                {"seconds",
                 {{"read", outcome.read}, {"build", outcome.build}, {"trace", outcome.trace}, {"write", outcome.write}}},
                {"warnings", outcome.warnings}};
   if (!outcome.device.empty()) json["device"] = outcome.device;
+  if (arguments.resume) json["kept"] = outcome.kept;
   if (outcome.exposure) json["exposure"] = *outcome.exposure;
   if (outcome.slice) json["slice"] = {{"axis", std::string(1, "xyz"[arguments.slice.axis])}, {"at", *outcome.slice}};
   return json;
 }
 
 std::string outcome_text(const Outcome& outcome) {
+  const std::string kept = outcome.kept == 0 ? "" : "Kept " + std::to_string(outcome.kept) + " that were there\n";
+  if (outcome.files.empty()) return kept;
   const Picture& picture = outcome.picture;
   const double per_second = static_cast<double>(outcome.rays) / std::max(outcome.trace, 1e-9);
   std::string text = "Picture: " + std::to_string(picture.colour.width) + " x " +
@@ -371,7 +411,7 @@ std::string outcome_text(const Outcome& outcome) {
     for (const auto& file : outcome.files) text += file.string() + ", ";
   }
   const double seconds = outcome.read + outcome.build + outcome.trace + outcome.write;
-  return text + bytes_for_people(outcome.bytes) + " in " + number_for_people(seconds) + " s\n";
+  return kept + text + bytes_for_people(outcome.bytes) + " in " + number_for_people(seconds) + " s\n";
 }
 
 /// Draws, with standard input as a file where IN is "-".
@@ -415,6 +455,7 @@ void add_render_command(CLI::App& app, int& status) {
                   "Example: quoin render castle.vox -o gate.png --camera 30,60,160 --look-at 0,30,0 --fov 40\n"
                   "Example: quoin render castle.vox -o round.png --turntable 36 --elevation 20\n"
                   "Example: quoin render walk.vox -o walk.png --frames 0:24 --view left\n"
+                  "Example: quoin render castle.vox -o film.png --path cameras.json --light path --resume\n"
                   "Example: quoin render castle.vox -o night.png --light path --sun off --tone aces --exposure auto\n"
                   "Example: quoin render scan.nii.gz -o hollows.png --preset ao --ao smooth --ao-form weighted\n"
                   "Example: quoin render scan.nii.gz -o cut.png --preset density --slice z:0.5\n"

@@ -57,6 +57,13 @@ void add_camera_options(CLI::App& command, RenderArguments& arguments) {
                   "That many pictures once round the scene, framed alike: OUT-00.png, ...")
       ->check(CLI::Range(2, 100'000));
   add_text_option(command, "--frames", "A:B", "A picture of each of these frames of an animation, framed alike");
+  command
+      .add_option("--path", arguments.camera_path,
+                  "A picture of each camera in this JSON file, an array of what --json prints under \"camera\"; "
+                  "OUT-00.png, ...")
+      ->check(file_name());
+  command.add_flag("--resume", arguments.resume,
+                   "Of --turntable, --frames and --path: pictures that are there stay, and are not drawn again");
   add_text_option(command, "--camera", "X,Y,Z|file:N",
                   "Where the camera stands; with --look-at, instead of --view. Or camera N of the file, which "
                   "quoin info lists");
@@ -207,7 +214,13 @@ std::string fault_of_films(const CLI::App& command) {
   if (has("--turntable") && has("--camera")) return "--turntable goes round by itself: no --camera";
   if (has("--turntable") && has("--frames")) return "--turntable and --frames exclude each other";
   if (has("--frames") && has("--frame")) return "--frame and --frames exclude each other";
-  for (const char* option : {"--turntable", "--frames"}) {
+  for (const char* option : {"--view", "--azimuth", "--elevation", "--camera", "--turntable", "--frames"}) {
+    if (has("--path") && has(option)) return std::string("--path and ") + option + " exclude each other";
+  }
+  if (has("--resume") && !has("--turntable") && !has("--frames") && !has("--path")) {
+    return "--resume is for films: --turntable, --frames or --path";
+  }
+  for (const char* option : {"--turntable", "--frames", "--path"}) {
     if (has(option) && has("--depth")) return std::string(option) + ": --depth is for one picture";
   }
   return "";
@@ -315,6 +328,8 @@ std::string fault_of_slice(const CLI::App& command, const RenderArguments& argum
                              "--elevation",
                              "--turntable",
                              "--frames",
+                             "--path",
+                             "--resume",
                              "--plain-glass",
                              "--light",
                              "--least-light",

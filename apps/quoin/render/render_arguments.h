@@ -34,10 +34,12 @@ struct RenderArguments {
   double fov_degrees = 45.0;
   std::optional<double> azimuth;  ///< with or without `elevation`, instead of the view
   std::optional<double> elevation;
-  int turns = 1;                     ///< pictures once round the scene
-  std::optional<FrameRange> frames;  ///< a picture of each
-  bool has_view = false;             ///< --view was given: a scene file's camera does not count
-  bool has_sun = false;              ///< likewise
+  int turns = 1;                      ///< pictures once round the scene
+  std::optional<FrameRange> frames;   ///< a picture of each
+  std::filesystem::path camera_path;  ///< a picture of each camera in that file; empty: none
+  bool resume = false;                ///< pictures of a film that are there stay
+  bool has_view = false;              ///< --view was given: a scene file's camera does not count
+  bool has_sun = false;               ///< likewise
   bool has_fixed_sky = false;
   bool has_plain_glass = false;
   bool watch = false;  ///< draws again whenever the input changes
@@ -54,6 +56,7 @@ struct RenderArguments {
   VolumeArguments volume;
   DensitySliceOptions slice;  ///< of the preset density
 
+  [[nodiscard]] bool is_film() const { return frames || turns > 1 || !camera_path.empty(); }
   /// Where the camera of views and films looks first.
   [[nodiscard]] DVec3 forward() const;
 };
