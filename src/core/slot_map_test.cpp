@@ -4,7 +4,6 @@
 #include <new>
 #include <random>
 #include <string>
-#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -36,24 +35,6 @@ TEST(SlotMap, AMapThatWasMovedFromIsEmptyAndCanBeUsed) {
   EXPECT_EQ(moved[again], 2);
   EXPECT_EQ(moved.size(), 1U);
   EXPECT_TRUE(map.empty());  // NOLINT(bugprone-use-after-move)
-}
-
-TEST(SlotMap, AHandleOfAnotherMapNamesNothing) {
-  std::vector<SlotMap<int>> maps(1000);
-  std::vector<Handle<int>> handles;
-  for (SlotMap<int>& map : maps) {
-    for (int i = 0; i < 100; ++i) map.remove(map.insert(i));  // its slot has been used
-    handles.push_back(map.insert(7));
-  }
-  for (std::size_t i = 0; i < maps.size(); ++i) {
-    for (std::size_t j = 0; j < maps.size(); ++j) ASSERT_EQ(maps[i].find(handles[j]) != nullptr, i == j);
-  }
-  const SlotMap<int> copy = maps[3].copied([](int value) { return value; });
-  EXPECT_NE(copy.find(handles[3]), nullptr);
-  SlotMap<int> before = std::move(maps[4]);
-  (void)maps[4].insert(8);  // NOLINT(bugprone-use-after-move): what is promised
-  EXPECT_EQ(maps[4].find(handles[4]), nullptr);
-  EXPECT_EQ(before[handles[4]], 7);
 }
 
 TEST(SlotMap, AHandleOfARemovedElementNamesNothingForEver) {

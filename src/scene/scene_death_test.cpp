@@ -39,20 +39,6 @@ TEST(SceneDeathTest, AHandleOfNothingIsAMistake) {
   QUOIN_EXPECT_MISTAKE(move_group(scene, {}, DVec3(0.0), DQuat(1, 0, 0, 0)), "the handle names an element");
 }
 
-TEST(SceneDeathTest, AHandleOfAnotherSceneIsAMistake) {
-  Scene scene;
-  Scene other;
-  const GridHandle grid = scene.add_grid({});
-  (void)other.add_grid({});
-  const InstanceHandle instance = scene.add_instance({"", grid});
-  (void)other.add_instance({"", grid});
-  EXPECT_EQ(other.grids().find(grid), nullptr);
-  EXPECT_FALSE(other.remove_instance(instance));
-  EXPECT_NE(scene.snapshot().grids().find(grid), nullptr);
-  QUOIN_EXPECT_MISTAKE((void)other.edit(grid), "the handle names an element");
-  QUOIN_EXPECT_MISTAKE((void)other.instances()[instance], "the handle names an element");
-}
-
 TEST(SceneDeathTest, MovingAGroupWithoutARotationIsAMistake) {
   Scene scene;
   const GroupHandle group = scene.add_group({});

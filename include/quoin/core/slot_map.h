@@ -12,8 +12,9 @@
 
 namespace quoin {
 
-/// Names an element of a SlotMap<T>; stays invalid for ever once that element is removed, and in any other map but
-/// copies: there, but for one time in some millions, it names nothing. The default names nothing.
+/// Names an element of a SlotMap<T>; stays invalid for ever once that element is removed. The default names nothing.
+/// In another map that was filled and emptied alike it names the element at the same place, which is how the frames of a
+/// film belong together; in any other it may name anything or nothing.
 template <class T>
 struct Handle {
   std::uint32_t index = 0xFFFFFFFFu;
@@ -26,29 +27,24 @@ struct Handle {
   }
 };
 
-/// For SlotMap: numbers that lie far apart, so that handles of one map are none of another.
-[[nodiscard]] std::uint32_t next_first_generation();
-
 /// Values by generational handle: O(1) insert, remove and find; iteration in slot order. An element stays at its
 /// address until it is removed, whatever else is inserted, and when the map is moved.
 template <class T>
 class SlotMap {
  public:
-  SlotMap() : first_generation_(next_first_generation()) {}
+  SlotMap() = default;
   /// Leaves the other empty; its handles name the elements here.
   SlotMap(SlotMap&& other) noexcept
       : pages_(std::exchange(other.pages_, {})),
         free_(std::exchange(other.free_, {})),
         count_(std::exchange(other.count_, 0)),
-        size_(std::exchange(other.size_, 0)),
-        first_generation_(std::exchange(other.first_generation_, next_first_generation())) {}
+        size_(std::exchange(other.size_, 0)) {}
   SlotMap& operator=(SlotMap&& other) noexcept {
     SlotMap taken(std::move(other));
     std::swap(pages_, taken.pages_);
     std::swap(free_, taken.free_);
     std::swap(count_, taken.count_);
     std::swap(size_, taken.size_);
-    std::swap(first_generation_, taken.first_generation_);
     return *this;
   }
   ~SlotMap() = default;
@@ -66,7 +62,7 @@ class SlotMap {
       free_.pop_back();
     }
     ++size_;
-    return handle_of(index, slot);
+    return {index, slot.generation};
   }
   /// The slot that the next element is put into: Handle::index of what `insert` returns.
   [[nodiscard]] std::uint32_t next_index() const { return free_.empty() ? count_ : free_.back(); }
@@ -86,7 +82,7 @@ class SlotMap {
   [[nodiscard]] const T* find(Handle<T> handle) const {
     if (handle.index >= count_) return nullptr;
     const Slot& slot = slot_at(handle.index);
-    return slot.value.has_value() && handle_of(handle.index, slot) == handle ? &*slot.value : nullptr;
+    return slot.value.has_value() && slot.generation == handle.generation ? &*slot.value : nullptr;
   }
   [[nodiscard]] T* find(Handle<T> handle) { return const_cast<T*>(std::as_const(*this).find(handle)); }
 
@@ -111,7 +107,7 @@ class SlotMap {
   /// The handle of the element in a slot, if any.
   [[nodiscard]] std::optional<Handle<T>> handle_at(std::uint32_t index) const {
     if (index >= count_ || !slot_at(index).value.has_value()) return std::nullopt;
-    return handle_of(index, slot_at(index));
+    return Handle<T>{index, slot_at(index).generation};
   }
 
   /// Calls `visit(handle, value)` for every element, in slot order. Requires: `visit` neither inserts nor removes.
@@ -120,7 +116,7 @@ class SlotMap {
     std::uint32_t index = 0;
     for (const std::unique_ptr<Page>& page : pages_) {
       for (const Slot& slot : *page) {
-        if (slot.value.has_value()) visit(handle_of(index, slot), *slot.value);
+        if (slot.value.has_value()) visit(Handle<T>{index, slot.generation}, *slot.value);
         ++index;
       }
     }
@@ -141,21 +137,17 @@ class SlotMap {
     made.free_ = free_;
     made.count_ = count_;
     made.size_ = size_;
-    made.first_generation_ = first_generation_;
     return made;
   }
 
  private:
   struct Slot {
     std::optional<T> value;
-    std::uint32_t generation = 0;  // from the map's first on
+    std::uint32_t generation = 0;
   };
   static constexpr std::size_t kPage = 32;
   using Page = std::array<Slot, kPage>;
 
-  [[nodiscard]] Handle<T> handle_of(std::uint32_t index, const Slot& slot) const {
-    return {index, first_generation_ + slot.generation};
-  }
   [[nodiscard]] const Slot& slot_at(std::uint32_t index) const { return (*pages_[index / kPage])[index % kPage]; }
   [[nodiscard]] Slot& slot_at(std::uint32_t index) { return (*pages_[index / kPage])[index % kPage]; }
 
@@ -163,7 +155,6 @@ class SlotMap {
   std::vector<std::uint32_t> free_;
   std::uint32_t count_ = 0;  // slots that were ever used
   std::size_t size_ = 0;
-  std::uint32_t first_generation_;  // far from those of other maps
 };
 
 }  // namespace quoin

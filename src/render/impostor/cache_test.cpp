@@ -91,6 +91,7 @@ TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
 TEST(ImpostorCache, ThoseOfAnotherScenesGridsAreNotSeenMeanwhile) {
   const World first(2);
   const World second(2);
+  ASSERT_EQ(first.grids, second.grids) << "else this tests nothing";
   ImpostorCache cache;
   static_cast<void>(cache.find(first.scene, first.grids[0]));
   EXPECT_EQ(cache.wait(first.scene), 0U);

@@ -152,7 +152,7 @@ TEST(OddInstances, OddQueriesMeetNothingAndComeToAnEnd) {
     EXPECT_TRUE(overlaps(tracer, turned).empty());
     EXPECT_FALSE(sweep_box(tracer, turned, {1, 0, 0}).has_value());
     EXPECT_FALSE(sweep_box(tracer, {}, DVec3(bad)).has_value());
-    EXPECT_EQ(move_and_slide(tracer, {}, DVec3(bad, 0, 0)).centre, DVec3(0.0));
+    EXPECT_EQ(move_and_slide(tracer, OrientedBox{}, DVec3(bad, 0, 0)).centre, DVec3(0.0));
   }
   EXPECT_FALSE(first_hit(tracer, {{0, 0, 0}, {0, 0, 0}}).has_value());
   const OrientedBox unturned{{5, 0, 0}, DVec3(9.0), {0.0, 0.0, 0.0, 0.0}};
