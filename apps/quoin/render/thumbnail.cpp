@@ -43,7 +43,7 @@ float light_of(std::uint8_t encoded) {
 
 std::uint8_t encoded(float light) {
   const float value = light <= 0.0031308F ? light * 12.92F : 1.055F * std::pow(light, 1.0F / 2.4F) - 0.055F;
-  return static_cast<std::uint8_t>(std::clamp(value, 0.0F, 1.0F) * 255.0F + 0.5F);
+  return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0F, 1.0F) * 255.0F));
 }
 
 /// Means of squares of pixels; where nothing was hit it is clear.

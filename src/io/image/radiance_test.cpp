@@ -56,7 +56,7 @@ TEST(Radiance, TakesTheExposureBack) {
 TEST(Radiance, RefusesWhatIsBroken) {
   const std::string good = kHeader + "-Y 1 +X 2\n" + std::string("\x80\x40\x00\x81\x00\x00\x00\x00", 8);
   for (std::size_t size = 0; size < good.size(); ++size) EXPECT_FALSE(read(good.substr(0, size)).has_value()) << size;
-  for (const std::string& size :
+  for (const std::string size :
        {"+Y 1 +X 2", "-Y 0 +X 2", "-Y 1 +X x", "-Y 1000000 +X 1000000", "-Y 1.5 +X 2", "-Y 1"}) {
     EXPECT_FALSE(read(kHeader + size + "\n" + std::string(8, '\x01')).has_value()) << size;
   }

@@ -148,7 +148,7 @@ Result<AlphaImage> develop_with_alpha(const PathPicture& picture, const DevelopO
     const float alpha = picture.alpha[i];
     const Vec3 shown = alpha > 0.0F ? toned(picture.scene[i] / alpha, exposure, options.tone) : Vec3(0.0F);
     for (int channel = 0; channel < 3; ++channel) image.rgba.push_back(encode(shown[channel]));
-    image.rgba.push_back(static_cast<std::uint8_t>(std::clamp(alpha, 0.0F, 1.0F) * 255.0F + 0.5F));
+    image.rgba.push_back(static_cast<std::uint8_t>(std::lround(std::clamp(alpha, 0.0F, 1.0F) * 255.0F)));
   }
   return image;
 }

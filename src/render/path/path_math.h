@@ -25,7 +25,7 @@ struct SineCosine {
 /// Source: Taylor's series about the nearest eighth of a turn.
 [[nodiscard]] inline SineCosine of_turns(float turns) {
   const float quarters = turns * 4.0F;
-  const auto nearest = static_cast<int>(quarters + 0.5F);
+  const int nearest = static_cast<int>(turns * 8.0F + 1.0F) / 2;
   const float x = (quarters - static_cast<float>(nearest)) * (kPi / 2.0F);  // -pi/4 to pi/4
   const float xx = x * x;
   const float sine =

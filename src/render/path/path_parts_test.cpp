@@ -259,8 +259,9 @@ TEST(PathEnvironment, SamplesLightAsItShines) {
     const SkySample sample = light.sample(random.pair(0));
     by_light += static_cast<double>(sample.radiance.x / sample.density);
     // At the poles, where pixels are as narrow as rounding, it may be a neighbour's.
-    if (std::abs(sample.direction.y) < 0.999F)
+    if (std::abs(sample.direction.y) < 0.999F) {
       EXPECT_NEAR(light.density(sample.direction) / sample.density, 1.0F, 0.01F);
+    }
     const Pair u = random.pair(1);
     const float up = 1.0F - 2.0F * u.x;
     const SineCosine turn = of_turns(u.y);

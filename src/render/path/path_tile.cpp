@@ -28,7 +28,16 @@ constexpr int kMostGlass = 64;               // surfaces of glass that a path me
 constexpr std::uint32_t kBins = 1 + 6 * 16;  // of directions; the first is that of the sun
 
 // The dimensions of a vertex.
-enum : std::uint32_t { kSun, kLampChoice, kLampPoint, kSky, kDirection, kLobe, kRoulette, kGlass };
+namespace dimension {
+constexpr std::uint32_t kSun = 0;
+constexpr std::uint32_t kLampChoice = 1;
+constexpr std::uint32_t kLampPoint = 2;
+constexpr std::uint32_t kSky = 3;
+constexpr std::uint32_t kDirection = 4;
+constexpr std::uint32_t kLobe = 5;
+constexpr std::uint32_t kRoulette = 6;
+constexpr std::uint32_t kGlass = 7;
+}  // namespace dimension
 
 // Rays of one bin point about the same way: by the largest component, and the other two in four steps each.
 std::uint32_t bin_of(Vec3 direction) {
@@ -259,7 +268,7 @@ bool PathTile::meet_glass(std::uint32_t index, double t) {
 // Light from surface to surface goes straight on; by chance it meets what covers the glass.
 bool PathTile::pass_glass(std::uint32_t index) {
   Path& path = paths_[index];
-  float u = path.random.one(path.dimension + kGlass);
+  float u = path.random.one(path.dimension + dimension::kGlass);
   for (const GlassBody& body : glass_) {
     const Surface& surface = (*context_->surfaces)[body.type];
     const double voxels = std::max(body.voxels, body.starts_inside || body.in_field ? 0.0 : 1.0);
@@ -285,7 +294,7 @@ bool PathTile::enter_glass(std::uint32_t index) {
   const GlassBody body = glass_.front();
   const Surface& surface = (*context_->surfaces)[body.type];
   const Ray ray{path.origin, DVec3(path.direction)};
-  const float u = path.random.one(path.dimension + kGlass);
+  const float u = path.random.one(path.dimension + dimension::kGlass);
   if (body.starts_inside) {  // the camera is in it
     path.inside = body.type;
     return leave_glass(index);
@@ -344,7 +353,7 @@ bool PathTile::leave_glass(std::uint32_t index) {
   const float cosine = std::clamp(glm::dot(normal, path.direction), 1e-4F, 1.0F);
   const float eta = surface.ior / other;
   const Refraction through = refraction(cosine, eta);
-  const float u = path.random.one(path.dimension + kGlass);
+  const float u = path.random.one(path.dimension + dimension::kGlass);
   if (u < through.mirrored) {
     turn_at(path, end, path.direction - normal * (2.0F * cosine), -normal, lift, body.type);
   } else {
@@ -490,11 +499,11 @@ void PathTile::shade(const Vertex& vertex) {
   ask_sun(vertex, path, frame, scatter);
   ask_sky(vertex, path, frame, scatter);
   ask_lamp(vertex, path, frame, scatter);
-  const Scattered next =
-      scatter.sample(path.random.pair(path.dimension + kDirection), path.random.one(path.dimension + kLobe));
+  const Scattered next = scatter.sample(path.random.pair(path.dimension + dimension::kDirection),
+                                        path.random.one(path.dimension + dimension::kLobe));
   if (path.is_caught && path.bounces == 0) {
     const SkyLight& sky = *context_->sky;
-    const SkySample sun = sky.sample_sun(path.random.pair(path.dimension + kSun));
+    const SkySample sun = sky.sample_sun(path.random.pair(path.dimension + dimension::kSun));
     const float cosine = std::max(sun.direction.y, 0.0F);
     Vec3 open = sky.sky(frame.to_world(next.direction)) * next.weight;
     if (sky.has_sun()) open += sky.sun_irradiance() * vertex.material.colour * (cosine / kPi);
@@ -504,7 +513,7 @@ void PathTile::shade(const Vertex& vertex) {
   path.throughput *= next.weight;
   if (path.bounces >= kSureBounces) {
     const float likely = std::min(largest(path.throughput), kMostLikely);
-    if (!(path.random.one(path.dimension + kRoulette) < likely)) return;
+    if (!(path.random.one(path.dimension + dimension::kRoulette) < likely)) return;
     path.throughput /= likely;
   }
   ++path.bounces;
@@ -522,7 +531,7 @@ void PathTile::shade(const Vertex& vertex) {
 void PathTile::ask_sun(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter) {
   const SkyLight& sky = *context_->sky;
   if (!sky.has_sun()) return;
-  const SkySample sun = sky.sample_sun(path.random.pair(path.dimension + kSun));
+  const SkySample sun = sky.sample_sun(path.random.pair(path.dimension + dimension::kSun));
   const Vec3 in = frame.to_local(sun.direction);
   if (!(in.z > 0.0F)) return;
   Vec3 light = path.throughput * scatter.value(in);
@@ -536,7 +545,7 @@ void PathTile::ask_sun(const Vertex& vertex, const Path& path, const Frame& fram
 
 void PathTile::ask_sky(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter) {
   if (!context_->sky->has_uneven_sky()) return;
-  const SkySample sky = context_->sky->sample_sky(path.random.pair(path.dimension + kSky));
+  const SkySample sky = context_->sky->sample_sky(path.random.pair(path.dimension + dimension::kSky));
   const Vec3 in = frame.to_local(sky.direction);
   if (!(in.z > 0.0F) || !(sky.density > 0.0F)) return;
   const float share = balance(sky.density, scatter.density(in));
@@ -547,8 +556,8 @@ void PathTile::ask_sky(const Vertex& vertex, const Path& path, const Frame& fram
 void PathTile::ask_lamp(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter) {
   if (context_->lamps->empty()) return;
   const LampSample lamp = context_->lamps->sample(vertex.in_view + context_->camera->position, frame.z,
-                                                  path.random.one(path.dimension + kLampChoice),
-                                                  path.random.pair(path.dimension + kLampPoint));
+                                                  path.random.one(path.dimension + dimension::kLampChoice),
+                                                  path.random.pair(path.dimension + dimension::kLampPoint));
   if (is_black(lamp.radiance)) return;
   const Vec3 in = frame.to_local(lamp.direction);
   if (!(in.z > 0.0F)) return;

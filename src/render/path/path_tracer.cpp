@@ -108,23 +108,23 @@ struct PathTracer::Impl {
   Surfaces surfaces;
 
   [[nodiscard]] std::shared_ptr<const path::PathLamps> lamps(double brightness) {
-    const std::lock_guard lock(mutex);
-    if (made == nullptr || made_of != brightness) {
-      made = cache.lamps(*scene, tracer, surfaces, brightness);
-      made_of = brightness;
+    const std::lock_guard lock(mutex_);
+    if (made_ == nullptr || made_of_ != brightness) {
+      made_ = cache_.lamps(*scene, tracer, surfaces, brightness);
+      made_of_ = brightness;
     }
-    return made;
+    return made_;
   }
   void forget_lamps() {
-    const std::lock_guard lock(mutex);
-    made = nullptr;
+    const std::lock_guard lock(mutex_);
+    made_ = nullptr;
   }
 
  private:
-  std::mutex mutex;
-  path::PathLampCache cache;
-  std::shared_ptr<const path::PathLamps> made;  // null: out of date
-  double made_of = 0.0;
+  std::mutex mutex_;
+  path::PathLampCache cache_;
+  std::shared_ptr<const path::PathLamps> made_;  // null: out of date
+  double made_of_ = 0.0;
 };
 
 PathTracer::PathTracer(const Scene& scene, InstanceFilter filter, Threads threads)

@@ -313,7 +313,9 @@ TEST(Capsule, IsPushedOutToANearFreePlace) {
     const SceneTracer among(heaps);
     const Capsule capsule = random_capsule(random, 2.0);
     const auto found = displacement_to_free_place(among, capsule, 4.0);
-    if (found) EXPECT_TRUE(overlaps(among, moved(capsule, *found)).empty());
+    if (found) {
+      EXPECT_TRUE(overlaps(among, moved(capsule, *found)).empty());
+    }
     const double length = found ? glm::length(*found) : 4.0;
     for (int n = 0; n < 300; ++n) {
       const DVec3 other = random.direction() * std::max(length - 4.0 / 32.0, 0.0) * std::abs(random.share());
