@@ -142,7 +142,7 @@ TEST(GoldenComparer, NothingToCompareWithIsAFailure) {
   const Image picture{2, 1, {10, 20, 30, 40, 50, 60}};
   EXPECT_FALSE(is_golden(picture, "a", folders)) << "no golden picture";
   EXPECT_TRUE(std::filesystem::exists(folders.failures / "a.actual.png"));
-  ASSERT_TRUE(write_png({1, 2, picture.rgb}, folders.golden / "a.png"));
+  ASSERT_TRUE(write_png(Image{1, 2, picture.rgb}, folders.golden / "a.png"));
   EXPECT_FALSE(is_golden(picture, "a", folders)) << "as many pixels, but another size";
 }
 
