@@ -34,7 +34,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/density/stored_density.h", {"terrain"}},
     {"grid/long_box.h", {"live"}},
     {"light/corner_light.h", {"render"}},
-    {"light/daylight.h", {"render_vk"}},
+    {"light/daylight.h", {"render", "render_vk"}},
     {"light/glass.h", {"render"}},
     {"light/emissive_chunks.h", {"render"}},
     {"light/lamp_table.h", {"render", "render_vk"}},

@@ -224,7 +224,7 @@ TEST_F(ToolRender, EveryOptionOfPathsChangesThePicture) {
   for (const std::string flags :
        {"--bounces 1", "--sky gradient", "--sky uniform", "--tone clamp", "--tone agx", "--tone aces", "--sun-angle 20",
         "--ground", "--transparent", "--ground --transparent", "--lens-radius 1", "--lens-radius 1 --focus 5",
-        "--exposure auto", "--exposure 0.5", "--sun=-1,1,0", "--sun off", "--sky-brightness 2", "--samples 5"}) {
+        "--exposure auto", "--exposure 0.5", "--sun=-1,1,0", "--sun off", "--sky-brightness 2"}) {
     drawn(base + " " + flags);
     EXPECT_NE(bytes("out.png"), plain) << flags;
   }

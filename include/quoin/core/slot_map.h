@@ -13,7 +13,7 @@
 namespace quoin {
 
 /// Names an element of a SlotMap<T>; stays invalid for ever once that element is removed. The default names nothing.
-/// In another map that was filled and emptied alike it names the element at the same place, which is how the frames of a
+/// In another map that was filled and emptied alike it names the element at the same place, which is how frames of a
 /// film belong together; in any other it may name anything or nothing.
 template <class T>
 struct Handle {

@@ -73,7 +73,7 @@ class PropagatedLight {
   /// light. When it throws (bad_alloc), the next update begins anew.
   void update(const Grid& grid, const VoxelRegistry& types, Threads threads = {});
 
-  /// The light as it is now; later updates of either do not reach the other. A cursor that read this one's changes reads
+  /// The light as it is now; later updates of either do not reach the other. A cursor of this one's changes reads
   /// on in the snapshot, and the other way round, until the snapshot is updated itself, which goes on from what it is.
   /// Cost: some pointers; an update copies of what the two share no more than it changes, in slabs of 64x4x4 voxels.
   [[nodiscard]] PropagatedLight snapshot() const;

@@ -66,7 +66,7 @@ class CpuRenderer {
   ///           are needed.
   void update(Threads threads = {});
 
-  /// Has pictures with LightModel::Propagated show light that the caller keeps, in place of light of the renderer's own;
+  /// Has pictures with LightModel::Propagated show light that the caller keeps, in place of light of its own;
   /// null: its own. Until `update` takes over what changed in the light, as in the scene, it stays as it is.
   /// Requires: no picture is being taken. Lifetime: the light must outlive the renderer, or its use.
   void use_light(const SceneLight* light);

@@ -87,7 +87,7 @@ struct SceneOverlap {
   DVec3 normal{0.0};  ///< of a field its gradient at a point within the shape, in the world, unit; otherwise 0
 };
 
-/// For each instance that has such a voxel within a sphere, a box or a capsule, the first of these (z, then y, then x), in
+/// For each instance that has such a voxel within a sphere, a box or a capsule, the first of these (by z, y, x), in
 /// the order of the instances; of one without, the first cell in which its field is negative anywhere within the shape,
 /// unless that is less than 1e-6 voxels deep. To touch is not to overlap. Numbers that are not finite or negative meet
 /// nothing, nor does a radius of 0; a box of size 0 is a plate, a rod or a point.

@@ -124,8 +124,8 @@ struct SlideResult {
   std::vector<SlideContact> contacts;
 };
 
-/// Moves a box or a capsule and lets it slide along what it meets: the part of the displacement that goes into a face is dropped, in
-/// a crease of two faces what does not run along it, in a corner all.
+/// Moves a box or a capsule and lets it slide along what it meets: what goes into a face is dropped,
+/// in a crease of two faces what does not run along it, in a corner all.
 ///
 /// With a floor: on one the box keeps the level part of its displacement, and goes up and down with the ground; what
 /// points down is dropped, so that it stands still on a slope, and what is left in the result is level. What is steeper

@@ -88,7 +88,7 @@ class BoxInField {
   bool is_upright_;  // its axes are the grid's
 };
 
-/// A capsule on its way, or at rest. What parts it from the solid of a piece is the direction between the points of both
+/// A capsule on its way, or at rest. What parts it from a piece's solid is the direction between the points of both
 /// that are nearest to each other, found by turns; any direction's word is good, until they meet along it.
 class CapsuleInField {
  public:

@@ -93,7 +93,7 @@ DBox bounds_between(const Moving& shape, DVec3 reach, double from, double to) {
   return {glm::min(a, b) - reach, glm::max(a, b) + reach};
 }
 
-/// Follows the way of a shape in steps of its own size, up to the fraction `most`: `contents.check(near, from, to)` looks
+/// Follows a shape's way in steps of its own size, up to the fraction `most`: `contents.check(near, from, to)` looks
 /// at the voxels or cells that are near between two fractions, within `contents.bounds()`; the way ends where
 /// `contents.fraction()`, of the best contact so far, has been passed.
 template <class Moving, class Contents>

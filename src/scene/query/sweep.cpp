@@ -245,7 +245,7 @@ bool is_sooner(const SweepHit& hit, const std::optional<SweepHit>& first) {
   return !first || hit.fraction < first->fraction || (hit.fraction == first->fraction && hit.depth > first->depth);
 }
 
-// `moving_in(placed)` is the shape in that grid's space; `reach` what it reaches from its centre along the world's axes.
+// `moving_in(placed)` is the shape in that grid's space; `reach`: from its centre along the world's axes.
 template <class MovingIn>
 std::optional<SweepHit> first_of_scene(const SceneTracer& tracer, DVec3 centre, DVec3 reach, DVec3 displacement,
                                        const QueryFilter& filter, const MovingIn& moving_in) {
