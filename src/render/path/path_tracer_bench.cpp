@@ -3,6 +3,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include <quoin/core/hash.h>
 #include <quoin/render/path_tracer.h>
 
 #include "bench/picture_workload.h"
