@@ -24,7 +24,8 @@ bool is_same(const VoxelProperties& a, const VoxelProperties& b) {
   VoxelProperties left = a;
   VoxelProperties right = b;
   for (float VoxelProperties::*const number :
-       {&VoxelProperties::roughness, &VoxelProperties::metalness, &VoxelProperties::emission, &VoxelProperties::ior}) {
+       {&VoxelProperties::roughness, &VoxelProperties::metalness, &VoxelProperties::emission, &VoxelProperties::ior,
+        &VoxelProperties::scattering, &VoxelProperties::anisotropy}) {
     if (std::isnan(left.*number) && std::isnan(right.*number)) left.*number = right.*number = 0.0F;
   }
   return left == right;

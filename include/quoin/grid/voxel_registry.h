@@ -42,6 +42,10 @@ struct VoxelProperties {
   float metalness = 0.0F;  ///< 0 to 1
   float emission = 0.0F;   ///< radiance emitted, as a multiple of `colour` in linear light; 0 is none
   float ior = 1.5F;        ///< index of refraction, of use to transparent types
+  /// Of clouds and the like, which are transparent: how often light is scattered on a voxel's length, on average, in
+  /// pictures by paths; what `colour` leaves of it goes on. 0: glass.
+  float scattering = 0.0F;
+  float anisotropy = 0.0F;  ///< of that: the mean cosine of the angle by which light is scattered, -1 to 1
   /// What a file format says beyond the above ("_spec" -> "0.3"), kept so that writing it back loses nothing.
   std::map<std::string, std::string> attributes{};
 

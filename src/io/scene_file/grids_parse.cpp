@@ -31,7 +31,9 @@ void read_attributes(const Object& object, std::map<std::string, std::string>& a
 VoxelProperties properties_of(const Json& json, const Place& place, Faults& faults) {
   const Object type(
       json, place,
-      {"name", "colour", "visibility", "collides", "roughness", "metalness", "emission", "ior", "attributes"}, faults);
+      {"name", "colour", "visibility", "collides", "roughness", "metalness", "emission", "ior", "scattering",
+       "anisotropy", "attributes"},
+      faults);
   VoxelProperties properties;
   type.read_text("name", properties.name);
   if (const Json* colour = type.need("colour")) {
@@ -51,6 +53,8 @@ VoxelProperties properties_of(const Json& json, const Place& place, Faults& faul
   type.read("metalness", properties.metalness);
   type.read("emission", properties.emission);
   type.read("ior", properties.ior);
+  type.read("scattering", properties.scattering);
+  type.read("anisotropy", properties.anisotropy);
   if (type.find("attributes") != nullptr) read_attributes(type, properties.attributes);
   return properties;
 }

@@ -88,6 +88,8 @@ class SceneText {
     put("metalness", type.metalness, plain.metalness);
     put("emission", type.emission, plain.emission);
     put("ior", type.ior, plain.ior);
+    put("scattering", type.scattering, plain.scattering);
+    put("anisotropy", type.anisotropy, plain.anisotropy);
     for (const auto& [key, value] : type.attributes) json["attributes"].push_back({text(key), text(value)});
     return json;
   }
