@@ -83,6 +83,9 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   if (properties.visibility == Visibility::Air) {
     return make_error(ErrorCode::InvalidArgument, "type 0 is the only air");
   }
+  if (properties.state_bits > kMaxStateBits) {
+    return make_error(ErrorCode::InvalidArgument, "a state of more than 32 bits");
+  }
   if (size() > kMaxVoxelTypes) {
     return make_error(ErrorCode::LimitExceeded, "more than 65,535 distinct voxel types");
   }
@@ -116,6 +119,7 @@ Result<VoxelType> VoxelRegistry::find_or_add(const VoxelProperties& properties) 
 void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
   QUOIN_ASSERT(type != kAir && type < size(), "a registered type, not air");
   QUOIN_ASSERT(properties.visibility != Visibility::Air, "type 0 is the only air");
+  QUOIN_ASSERT(properties.state_bits <= kMaxStateBits, "a state word has 32 bits");
   journal_->begin_change();
   content_.make_own();
   Content& c = *content_;

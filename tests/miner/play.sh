@@ -4,44 +4,17 @@
 # Usage: play.sh QUOIN_MINER [FOLDER]: pictures are kept in FOLDER. Exits with 77, and says so, where a program is not installed.
 set -euo pipefail
 miner="$(realpath "$1")"
-for program in xvfb-run xauth xdotool import convert; do
-  command -v "$program" >/dev/null || { echo "skipped: $program is not installed"; exit 77; }
-done
-if [ -z "${MINER_PLAY_INNER:-}" ]; then
-  export MINER_PLAY_INNER=1
-  exec xvfb-run -a -s '-screen 0 960x540x24' "$0" "$@"
-fi
-
-work="$(mktemp -d)"
-game=
-finish() {
-  [ -z "$game" ] || kill "$game" 2>/dev/null || true
-  rm -rf "$work"
-}
-trap finish EXIT
+. "$(dirname "$(realpath "$0")")/../on_screen.sh"
+on_screen 960x540 "import convert" "$0" "$@"
 pictures="${2:-$work}"
 mkdir -p "$pictures"
-export SDL_RENDER_DRIVER=software LC_ALL=C
-unset WAYLAND_DISPLAY SDL_VIDEODRIVER
 
-fail() { echo "FAILED: $*; $(title)"; cat "$work/log"; exit 1; }
-title() { xdotool getwindowname "$window" 2>/dev/null; }
 # What the window's title says of the player: x, y, z, sky, lamps or fallen
 said() {
   title | sed -n 's/^Miner at \(-\?[0-9]*\) \(-\?[0-9]*\) \(-\?[0-9]*\), sky \([0-9]*\), lamps \([0-9]*\), fallen \([0-9]*\)$/\1 \2 \3 \4 \5 \6/p' |
     awk -v what="$1" '{ split("x y z sky lamps fallen", names); for (i in names) if (names[i] == what) print $i }'
 }
 is() { local now; now="$(said "$1")"; [ -n "$now" ] && [ "$now" "$2" "$3" ]; }
-# Usage: until_true SECONDS COMMAND...
-until_true() {
-  local left=$(($1 * 5))
-  shift
-  until "$@"; do
-    left=$((left - 1))
-    [ "$left" -gt 0 ] || return 1
-    sleep 0.2
-  done
-}
 # Usage: look DOWN: by so many hundredths of a radian
 look() { xdotool mousemove_relative --sync -- 0 "$(($1 * 10 / 3))" || true; sleep 0.3; }
 hold() { xdotool keydown "$1"; sleep "$2"; xdotool keyup "$1"; }
@@ -53,9 +26,7 @@ mean() { convert "$pictures/$1.png" -format "%[fx:round(255*mean.$2)]" info:; }
 other() { convert "$pictures/$1.png" "$pictures/$2.png" -compose difference -composite -colorspace gray -threshold 8% -format '%[fx:round(mean*w*h)]' info:; }
 
 start() {
-  "$miner" --units 4 --edits 0 "$@" >"$work/log" 2>&1 &
-  game=$!
-  window="$(timeout 60 xdotool search --sync --onlyvisible --name 'Miner' 2>/dev/null | head -n 1)" || fail "no window"
+  launch Miner "$miner" --units 4 --edits 0 "$@"
   until_true 60 is y -gt 0 || fail "the game does not begin"
   xdotool windowfocus "$window" 2>/dev/null || true
   # Until it has landed.
@@ -72,13 +43,7 @@ torch() {
   done
   fail "torch $1 does not shine"
 }
-stop() {
-  xdotool key --delay 80 Escape
-  until_true 30 gone || fail "Escape does not end it"
-  wait "$game" || fail "it ended with $?"
-  game=
-}
-gone() { ! kill -0 "$game" 2>/dev/null; }
+stop() { quit Escape; }
 
 echo "walk"
 start --ships 0

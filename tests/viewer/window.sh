@@ -4,58 +4,26 @@
 set -euo pipefail
 quoin="$(realpath "$1")" demo_world="$(realpath "$2")" backend="${3:-cpu}"
 
-for program in xvfb-run xauth xdotool; do
-  command -v "$program" >/dev/null || { echo "skipped: $program is not installed"; exit 77; }
-done
-if [ -z "${QUOIN_WINDOW_TEST_INNER:-}" ]; then
-  export QUOIN_WINDOW_TEST_INNER=1
-  exec xvfb-run -a -s '-screen 0 1024x640x24' "$0" "$@"
-fi
+. "$(dirname "$(realpath "$0")")/../on_screen.sh"
+on_screen 1024x640 "" "$0" "$@"
 
-work="$(mktemp -d)"
-viewer=
-finish() {
-  [ -z "$viewer" ] || kill "$viewer" 2>/dev/null || true
-  rm -rf "$work"
-}
-trap finish EXIT
 cd "$work"
-export XDG_CONFIG_HOME="$work/config" SDL_RENDER_DRIVER=software LC_ALL=C
-unset WAYLAND_DISPLAY SDL_VIDEODRIVER
+export XDG_CONFIG_HOME="$work/config"
 
-fail() { echo "FAILED: $*"; cat viewer.log 2>/dev/null || true; exit 1; }
-
-# Usage: until_true SECONDS COMMAND...
-until_true() {
-  local left=$(($1 * 5))
-  shift
-  until "$@"; do
-    left=$((left - 1))
-    [ "$left" -gt 0 ] || return 1
-    sleep 0.2
-  done
-}
-title_is() { [ "$(xdotool getwindowname "$window" 2>/dev/null)" = "$1" ]; }
+title_is() { [ "$(title)" = "$1" ]; }
 voxels() { "$quoin" info "$1" --json | sed -n 's/^  "voxels": \([0-9]*\).*/\1/p'; }
 
 start() {
-  "$quoin" view "$@" --backend "$backend" >viewer.log 2>&1 &
-  viewer=$!
-  window="$(timeout 60 xdotool search --sync --onlyvisible --pid "$viewer" 2>/dev/null | head -n 1)" || true
-  [ -n "$window" ] || window="$(timeout 30 xdotool search --sync --onlyvisible --name 'Quoin' | head -n 1)"
-  until_true 60 title_is "$(basename "$1") - Quoin" || fail "the file did not open: $(xdotool getwindowname "$window")"
+  launch Quoin "$quoin" view "$@" --backend "$backend"
+  until_true 60 title_is "$(basename "$1") - Quoin" || fail "the file did not open"
   xdotool windowmove --sync "$window" 0 0 2>/dev/null || true
   xdotool windowfocus "$window" 2>/dev/null || true
   sleep 0.5
 }
 stop() {
-  xdotool key --delay 80 ctrl+q
-  until_true 30 gone || fail "Ctrl+Q does not end the viewer"
-  wait "$viewer" || fail "the viewer ended with $?"
-  ! grep -qi 'validation' viewer.log || fail "the validation layer has complaints"
-  viewer=
+  quit ctrl+q
+  ! grep -qi 'validation' log || fail "the validation layer has complaints"
 }
-gone() { ! kill -0 "$viewer" 2>/dev/null; }
 # Usage: picture NAME: saves the finished picture as NAME
 picture() {
   rm -f world-*.png
@@ -248,8 +216,8 @@ until_true 20 title_is "sc.json - Quoin" || fail "the window takes no keys after
 stop
 
 echo "another file, and the picture of the settled window is the renderer's"
-"$quoin" view castle.vox --bare --size 320x240 --screenshot window.png --backend "$backend" >viewer.log 2>&1
+"$quoin" view castle.vox --bare --size 320x240 --screenshot window.png --backend "$backend" >log 2>&1
 "$quoin" render castle.vox --size 320x240 --samples 16 -o render.png --backend "$backend" >/dev/null
 cmp window.png render.png || fail "the window shows another picture than quoin render"
-! grep -qi 'validation' viewer.log || fail "the validation layer has complaints"
+! grep -qi 'validation' log || fail "the validation layer has complaints"
 echo "passed"

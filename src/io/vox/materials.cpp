@@ -244,6 +244,9 @@ void decode_own(const Attributes& attributes, VoxelProperties& out) {
   };
   if (const std::string* name = text("name")) out.name = *name;
   if (const std::string* collides = text("collides")) out.collides = *collides != "0";
+  float state_bits = 0.0F;
+  set("state_bits", state_bits);
+  out.state_bits = static_cast<std::uint8_t>(std::clamp(state_bits, 0.0F, float{kMaxStateBits}));
   if (const std::string* visibility = text("visibility")) {
     out.visibility = *visibility == "transparent" ? Visibility::Transparent : Visibility::Opaque;
   }
@@ -300,6 +303,7 @@ void encode_own(const VoxelProperties& wanted, const VoxelProperties& decoded, A
   const auto set = [&](const char* key, const std::string& value) { out[std::string(kOwnPrefix) + key] = value; };
   if (wanted.name != decoded.name) set("name", printable(wanted.name));
   if (wanted.collides != decoded.collides) set("collides", wanted.collides ? "1" : "0");
+  if (wanted.state_bits != decoded.state_bits) set("state_bits", std::to_string(wanted.state_bits));
   if (wanted.visibility != decoded.visibility) {
     set("visibility", wanted.visibility == Visibility::Transparent ? "transparent" : "opaque");
   }
