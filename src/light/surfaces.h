@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -48,6 +49,10 @@ class Surfaces {
   explicit Surfaces(const VoxelRegistry& types, Clouds clouds = Clouds::AsGlass) : clouds_(clouds) { update(types); }
   /// Takes over the types that changed. Cost: O(these).
   void update(const VoxelRegistry& types);
+  /// Whether any type scatters light within: never with Clouds::AsGlass.
+  [[nodiscard]] bool has_clouds() const {
+    return std::ranges::any_of(surfaces_, [](const Surface& each) { return each.scattering > 0.0F; });
+  }
   [[nodiscard]] const Surface& operator[](VoxelType type) const {
     return surfaces_[type < surfaces_.size() - 1 ? type : surfaces_.size() - 1];
   }

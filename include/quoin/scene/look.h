@@ -63,7 +63,7 @@ struct Look {
   SkyModel sky = SkyModel::Physical;
   double sky_brightness = 1.0;                       ///< times the sky's light
   Vec3 sky_colour{1.0F};                             ///< of SkyModel::Uniform, linear
-  AirOptions air;                                    ///< of SkyModel::Physical
+  AirOptions air{};                                  ///< of SkyModel::Physical
   std::shared_ptr<const RadianceImage> environment;  ///< of SkyModel::Environment: longitude and latitude, +y up; its
                                                      ///< middle is -z, its right half +x
   double environment_turn_radians = 0.0;             ///< about the vertical, from -z towards +x
@@ -103,7 +103,7 @@ struct DevelopOptions {
   ToneCurve tone = ToneCurve::Neutral;
   double vignette = 0.0;  ///< 0 to 1: how much darker the corners are
   double gamma = 2.2;     ///< more than 0: of the colours' curve; 2.2 is that of sRGB as it is, more is paler
-  Bloom bloom;
+  Bloom bloom{};
   bool operator==(const DevelopOptions&) const = default;
 };
 

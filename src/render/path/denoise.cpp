@@ -162,14 +162,16 @@ void denoise(const SurfaceParts& parts, int samples, Threads threads, PathPictur
   const auto count = static_cast<float>(samples);
   for (std::size_t pixel = 0; pixel < picture.scene.size(); ++pixel) {
     Vec3 change(0.0F);
+    Vec3 of_sky(0.0F);  // which is no part of the scene
     for (std::size_t slot = 0; slot < SurfaceParts::kOfPixel; ++slot) {
       const SurfacePart& part = parts.at(pixel)[slot];
       if (part.surface == 0) break;
-      change += (denoiser.light(pixel, slot) * part.samples - part.light) / count;
+      (part.surface == SurfaceParts::kSky ? of_sky : change) +=
+          (denoiser.light(pixel, slot) * part.samples - part.light) / count;
     }
     const Vec3 before = picture.scene[pixel];
     picture.scene[pixel] = glm::max(before + change, Vec3(0.0F));
-    picture.radiance[pixel] += picture.scene[pixel] - before;
+    picture.radiance[pixel] = glm::max(picture.radiance[pixel] + picture.scene[pixel] - before + of_sky, Vec3(0.0F));
   }
 }
 

@@ -28,6 +28,7 @@ struct SurfacePart {
 class SurfaceParts {
  public:
   static constexpr std::size_t kOfPixel = 3;
+  static constexpr std::uint32_t kSky = 4;  ///< the surface of what lies behind fog and clouds where nothing does
   using OfPixel = std::array<SurfacePart, kOfPixel>;
 
   SurfaceParts(int width, int height)

@@ -30,6 +30,9 @@ constexpr float kMostLikely = 0.95F;         // to go on
 constexpr int kMostGlass = 64;               // surfaces of glass that a path meets between two others
 constexpr std::uint32_t kBins = 1 + 6 * 16;  // of directions; the first is that of the sun
 
+constexpr std::uint32_t kGroundSurface = 2;  // beside what surface_id gives
+constexpr std::uint32_t kSkySurface = SurfaceParts::kSky;
+
 // The dimensions of a vertex.
 namespace dimension {
 constexpr std::uint32_t kSun = 0;
@@ -258,6 +261,9 @@ void PathTile::meet_packet(std::span<const std::uint32_t> indices) {
     until[i] = (hits.grids.hit >> i & 1U) != 0 ? hits.grids.t[i] : kInfinite;
     const Path& path = paths_[indices[i]];
     until[i] = std::min(until[i], ground_at(path.origin, path.direction));
+    if (context_->has_media && context_->parts != nullptr) {
+      note_behind(paths_[indices[i]], hits, static_cast<int>(i), until[i]);
+    }
     const std::optional<Fog>& fog = context_->options->fog;
     if (!fog || !(fog->density > 0.0) || path.inside != kAir) continue;
     const Interval way = in_fog(path.origin, path.direction, until[i]);
@@ -319,7 +325,13 @@ void PathTile::leave(Path& path, Vec3 direction) {
     light += sky.sun(direction) * (path.density < kNoOther ? balance(path.density, density) : 1.0F);
   }
   if (path.is_first) {
-    sums_[path.pixel].background += options.background.value_or(light);
+    light = options.background.value_or(light);
+    sums_[path.pixel].background += light;
+    if (path.part != kNoPart) {
+      SurfacePart& part = part_of(path);
+      part.light += light;
+      part.square += square(luminance(light));
+    }
     if (path.is_first_sample) sums_[path.pixel].depth = std::numeric_limits<float>::infinity();
   } else {
     path.radiance += path.throughput * light;
@@ -532,6 +544,22 @@ void PathTile::note_part(Path& path, const Vertex& vertex, std::uint32_t surface
   path.part = kNoPart;
 }
 
+void PathTile::note_behind(Path& path, const SceneHits& hits, int lane, double t) {
+  if (!path.is_first) return;
+  const auto i = static_cast<std::size_t>(lane);
+  Vertex whole;
+  whole.material.colour = Vec3(1.0F);
+  if ((hits.grids.hit >> lane & 1U) != 0 && hits.grids.t[i] <= t) {
+    const IVec3 voxel{hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
+    const bool in_field = (hits.in_field >> lane & 1U) != 0;
+    const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(hits.placed[i])];
+    const VoxelType type = in_field ? hits.material[i] : placed.voxels->get(voxel);
+    note_part(path, whole, surface_id(voxel, hits.grids.face[i], in_field, hits.placed[i], type), false);
+  } else {
+    note_part(path, whole, t < kInfinite ? kGroundSurface : kSkySurface, false);
+  }
+}
+
 void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane) {
   Path& path = paths_[index];
   const auto i = static_cast<std::size_t>(lane);
@@ -644,8 +672,7 @@ void PathTile::hit_ground(std::uint32_t index, double t) {
     if (path.is_first_sample) sums.depth = kNoOther;
   } else {
     if (path.is_first) sums.scene_share += 1.0F;
-    constexpr std::uint32_t kGround = 2;
-    if (!path.is_noted) note_part(path, vertex, kGround, false);
+    if (!path.is_noted) note_part(path, vertex, kGroundSurface, false);
     note_layers(path, vertex, t, kAir);
   }
   // Shadows are asked for in a grid: the first.

@@ -32,6 +32,7 @@ struct TileContext {
   const Camera* camera = nullptr;
   const PathOptions* options = nullptr;
   SurfaceParts* parts = nullptr;  ///< of the picture, to be filled; null: not wanted
+  bool has_media = false;         ///< fog or clouds
 };
 
 /// One square of a picture.
@@ -150,6 +151,8 @@ class PathTile {
   [[nodiscard]] double ground_at(const DVec3& origin, Vec3 direction) const;  // infinite: nowhere
   void add_emitted(Path& path, Vec3 emitted, std::int32_t lamp, float distance) const;
   void note_layers(Path& path, const Vertex& vertex, double t, VoxelType type);
+  // Likewise of what a path would meet without fog and clouds: whether it meets these is chance.
+  void note_behind(Path& path, const SceneHits& hits, int lane, double t);
   // Which of the pixel's surfaces that is. `surface`: not 0.
   [[nodiscard]] SurfacePart& part_of(const Path& path);
   void note_part(Path& path, const Vertex& vertex, std::uint32_t surface, bool is_curved);

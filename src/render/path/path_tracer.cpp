@@ -199,8 +199,15 @@ Result<PathPicture> PathTracer::render(const Camera& camera, const PathOptions& 
   const CameraRays rays(camera, options.width, options.height);
   std::optional<path::SurfaceParts> parts;
   if (options.denoise) parts.emplace(options.width, options.height);
-  const path::TileContext context{&view, &impl.surfaces, lamps.get(), &sky,
-                                  &rays, &camera,        &options,    parts ? &*parts : nullptr};
+  const path::TileContext context{&view,
+                                  &impl.surfaces,
+                                  lamps.get(),
+                                  &sky,
+                                  &rays,
+                                  &camera,
+                                  &options,
+                                  parts ? &*parts : nullptr,
+                                  options.fog.has_value() || impl.surfaces.has_clouds()};
   PathPicture picture = empty_picture(options);
   if (Status drawn = draw_tiles<path::PathTile>(context, options, threads, progress, picture); !drawn)
     return drawn.error();
