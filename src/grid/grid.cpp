@@ -48,7 +48,7 @@ struct Grid::Impl {
     QUOIN_ASSERT(slot.entry != nullptr && entries.find(chunk) == slot.entry, "the slot is the chunk's");
     // Before anything that may throw: the storage that was known may be gone.
     entries.voxels_changed(slot);
-    if (const int data = slot.entry->chunk.data_count(); data != edit.data_before) {
+    if (const int data = quoin::data_count(slot.entry->chunk); data != edit.data_before) {
       if (!edit.record.has_data()) edit.record.data = edit.record.box;
       data_count += data - edit.data_before;
     }
@@ -78,7 +78,7 @@ struct Grid::Impl {
 template <class Change>
 std::int64_t Grid::Impl::edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, EditNotice& notice,
                                     Change& change) {
-  VoxelEdit edit{.data_before = slot.entry->chunk.data_count()};
+  VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
   entries.voxels_will_change(slot);
   try {
     change(chunk, slot.entry->chunk, part, edit);
@@ -152,7 +152,7 @@ bool Grid::set(int x, int y, int z, VoxelType type) {
     if (type == kAir || !is_inside_world(at)) return false;
     slot = impl_->entries.find_or_create(at);
   }
-  VoxelEdit edit{.data_before = slot.entry->chunk.data_count()};
+  VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
   try {
     if (!slot.entry->chunk.set(local, type)) return false;
   } catch (...) {
@@ -176,7 +176,7 @@ std::int64_t Grid::write_row(IVec3 row, std::uint64_t mask, std::span<const Voxe
   const IVec3 local = local_of(row);
   if (mask == 0 || !is_inside_world(at)) return 0;
   const ChunkTable::Slot slot = impl_->entries.find_or_create(at);
-  VoxelEdit edit{.data_before = slot.entry->chunk.data_count()};
+  VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
   try {
     edit.add(local.y, local.z, slot.entry->chunk.write_row(local.y, local.z, mask, types));
   } catch (...) {
@@ -200,7 +200,7 @@ bool Grid::set_data(IVec3 voxel, const VoxelData& data) {
   // Asked first, so that nothing is copied where nothing changes.
   if (present == nullptr || present->get(local) == kAir || present->data(local) == data) return false;
   const ChunkTable::Slot slot = impl().entries.find_to_edit(at);
-  VoxelEdit edit{.data_before = slot.entry->chunk.data_count()};
+  VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
   edit.record.data = PackedBox::of(local.x, local.y, local.z);
   slot.entry->chunk.set_data(local, data);
   impl().finish_edit(at, slot, edit, notice_);
@@ -317,7 +317,7 @@ std::int64_t Grid::put_chunk(IVec3 at, Chunk voxels) {
   if (present == nullptr && voxels.non_air_count() == 0) return 0;
   if (present != nullptr && present->chunk.shares_storage_with(voxels)) return 0;
   const ChunkTable::Slot slot = impl().entries.find_or_create(at);
-  VoxelEdit edit{.data_before = slot.entry->chunk.data_count()};
+  VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
   difference_of_types(slot.entry->chunk, voxels, edit);
   visit_other_data(&slot.entry->chunk, &voxels, [&](IVec3 local, const VoxelData&, const VoxelData&) {
     edit.record.data.unite(PackedBox::of(local.x, local.y, local.z));
