@@ -320,10 +320,10 @@ Scene island() {
     const bool is_free = std::hypot(x, z * 1.3) < 40.0 && (x < -6 || x > 26 || z < -10 || z > 32);
     if (is_free) tree(grid, middle + IVec3{x, top_at(x, z), z}, 10 + i % 9, trunk, leaf);
   }
-  for (int i = 0; i < 46; ++i) {
-    const int x = static_cast<int>(drawn(random) * 300.0);
-    const int z = static_cast<int>(drawn(random) * 240.0);
-    cloud(grid, {x, 8 + static_cast<int>(drawn(random) * 12.0), z}, 34.0 + 26.0 * drawn(random), puff, random);
+  for (int i = 0; i < 230; ++i) {
+    const int x = -190 + static_cast<int>(drawn(random) * 680.0);
+    const int z = -300 + static_cast<int>(drawn(random) * 600.0);
+    cloud(grid, {x, 4 + static_cast<int>(drawn(random) * 12.0), z}, 38.0 + 30.0 * drawn(random), puff, random);
   }
   cloud(grid, {52, 104, 84}, 40.0, puff, random);
   cloud(grid, {248, 122, 70}, 46.0, puff, random);

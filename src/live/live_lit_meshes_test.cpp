@@ -112,7 +112,7 @@ INSTANTIATE_TEST_SUITE_P(All, LitMeshes, testing::Values(LightMerging::Constant,
 // A floor over several chunks in a closed room, and a lamp in it.
 struct Room {
   Room() {
-    EXPECT_TRUE(scene.types.add({.name = "stone"}));
+    EXPECT_TRUE(scene.types.add({.name = "stone", .colour = {}}));
     EXPECT_TRUE(scene.types.add({.name = "lamp", .colour = {255, 255, 255, 255}, .emission = 1.0F}));
     SceneGrid room;
     room.grid.fill_box({{0, 0, 0}, {192, 40, 64}}, 1);

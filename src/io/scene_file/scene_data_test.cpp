@@ -25,8 +25,8 @@ constexpr VoxelType kTurned = 2;
 // Of stone, which has no state, and of stairs, which have two bits.
 Scene scene_of(Grid grid) {
   Scene scene;
-  EXPECT_TRUE(scene.types.add({.name = "stone"}));
-  EXPECT_TRUE(scene.types.add({.name = "stairs", .state_bits = 2}));
+  EXPECT_TRUE(scene.types.add({.name = "stone", .colour = {}}));
+  EXPECT_TRUE(scene.types.add({.name = "stairs", .colour = {}, .state_bits = 2}));
   SceneGrid model;
   model.grid = std::move(grid);
   Instance instance;
@@ -107,7 +107,7 @@ TEST(SceneData, IsKeptWhereTypesOfNamedFilesAreRenumbered) {
   grid.set({1, 2, 3}, kTurned, {.state = 2});
   ASSERT_TRUE(save_scene(scene_of(grid.snapshot()), folder.file("inner.json")));
   SceneFile outer;
-  ASSERT_TRUE(outer.types.add({.name = "sand"}));
+  ASSERT_TRUE(outer.types.add({.name = "sand", .colour = {}}));
   outer.sources.push_back({"inner", "inner.json"});
   SceneFile::Placement placement;
   placement.source = "inner";
@@ -121,7 +121,7 @@ TEST(SceneData, IsKeptWhereTypesOfNamedFilesAreRenumbered) {
 
 TEST(SceneData, WhereThereIsNoneTheFileIsAsBefore) {
   Scene scene;
-  ASSERT_TRUE(scene.types.add({.name = "stone"}));
+  ASSERT_TRUE(scene.types.add({.name = "stone", .colour = {}}));
   SceneGrid grid;
   grid.grid.set({0, 0, 0}, kPlain);
   Instance instance;
@@ -246,7 +246,7 @@ TEST(SceneData, StateBitsAreAtMostThirtyTwo) {
     EXPECT_EQ(loaded.error().message, "types[1].state_bits: must be a whole number from 0 to 32");
   }
   VoxelRegistry types;
-  EXPECT_FALSE(types.add({.name = "much", .state_bits = 33}));
+  EXPECT_FALSE(types.add({.name = "much", .colour = {}, .state_bits = 33}));
 }
 
 }  // namespace
