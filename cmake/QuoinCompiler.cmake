@@ -25,11 +25,11 @@ function(quoin_precompile target)
   endif()
 endfunction()
 
-# Sources of one folder are compiled together, at most nine at a time: most of what tests and the tool take is templates that
-# each would instantiate for itself. So names in a folder's anonymous namespaces have to differ. Not for the library,
+# Sources of one folder are compiled together, at most nine at a time: most of what tests, the tool and the viewer take is
+# templates that each would instantiate for itself. So names in a folder's anonymous namespaces have to differ. Not for the library,
 # which would gain a fifth and be optimised otherwise. Sources with definitions or flags of their own are left out.
 # Usage: quoin_compile_together(TARGET [FOLDER...]), without sources of these folders, whose names are the same
-option(QUOIN_COMPILE_TOGETHER "Compile sources of tests and of the tool together, by folder" ${PROJECT_IS_TOP_LEVEL})
+option(QUOIN_COMPILE_TOGETHER "Compile sources of tests, of the tool and of the viewer together, by folder" ${PROJECT_IS_TOP_LEVEL})
 function(quoin_compile_together target)
   if(NOT QUOIN_COMPILE_TOGETHER)
     return()
