@@ -44,6 +44,10 @@ struct GoldenFolders {
   std::filesystem::path failures;
 };
 
+inline GoldenFolders golden_folders() {
+  return {QUOIN_SOURCE_DIR "/tests/golden", QUOIN_BINARY_DIR "/golden"};
+}
+
 /// Whether a picture is the golden one of its name, in every pixel. If not, NAME.actual.png and (where the sizes agree)
 /// NAME.difference.png are written among the failures; if so, such files of an earlier failure go.
 inline ::testing::AssertionResult is_golden(const Image& actual, const std::string& name,

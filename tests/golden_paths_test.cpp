@@ -50,10 +50,6 @@ Image taken(const PathView& view, const PathOptions& options, Threads threads = 
   return develop(picture.value(), {view.exposure, ToneCurve::Neutral}).value();
 }
 
-GoldenFolders golden_folders() {
-  return {QUOIN_SOURCE_DIR "/tests/golden", QUOIN_BINARY_DIR "/golden"};
-}
-
 class GoldenPaths : public ::testing::TestWithParam<PathView> {};
 
 TEST_P(GoldenPaths, PictureIsTheGoldenOneWithAnyInstructionsAndThreads) {

@@ -39,10 +39,6 @@ Picture render(const Scene& scene, const GoldenView& view, const RenderOptions& 
   return CpuRenderer(scene).render(camera_for(view), options, threads).value();
 }
 
-GoldenFolders golden_folders() {
-  return {QUOIN_SOURCE_DIR "/tests/golden", QUOIN_BINARY_DIR "/golden"};
-}
-
 /// How many pixels of the golden picture the twin gets wrong.
 std::int64_t wrong_pixels(const Picture& twin, const GoldenView& view) {
   const auto golden = read_png(golden_folders().golden / (std::string(view.name) + ".png"));

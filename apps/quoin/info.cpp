@@ -77,19 +77,10 @@ std::int64_t voxels_with_data(const Scene& scene) {
   return voxels;
 }
 
-template <class V>
-Json triple(const V& v) {
-  return {v.x, v.y, v.z};
-}
-
-Json triple(const DVec3& v) {
-  return {v.x + 0.0, v.y + 0.0, v.z + 0.0};
-}
-
 /// Nothing has no box; zeros keep the keys' types.
 Json box(const DBox& bounds) {
   const DBox shown = bounds.empty() ? DBox{DVec3(0.0), DVec3(0.0)} : bounds;
-  return {{"min", triple(shown.min)}, {"max", triple(shown.max)}};
+  return {{"min", list_of(shown.min)}, {"max", list_of(shown.max)}};
 }
 
 DVec3 signed_scale(const Instance& instance) {
@@ -123,7 +114,7 @@ class Hierarchy {
       list.push_back({{"name", group.name},
                       {"parent", place_in(groups_, parent_of(scene_, handle))},
                       {"layer", place_in(layers_, group.layer)},
-                      {"position", triple(group.position)},
+                      {"position", list_of(group.position)},
                       {"visible", is_shown(scene_, group)}});
     }
     return list;
@@ -139,9 +130,9 @@ class Hierarchy {
   [[nodiscard]] Json of(const Instance& instance) const {
     const DQuat& q = instance.rotation;
     return {{"name", instance.name},
-            {"position", triple(instance.position)},
+            {"position", list_of(instance.position)},
             {"rotation", {q.x + 0.0, q.y + 0.0, q.z + 0.0, q.w + 0.0}},
-            {"scale", triple(signed_scale(instance))},
+            {"scale", list_of(signed_scale(instance))},
             {"visible", is_shown(scene_, instance)},
             {"group", place_in(groups_, instance.group)},
             {"layer", place_in(layers_, instance.layer)}};
@@ -163,8 +154,8 @@ Json grid_json(const GridReport& report, const Hierarchy& hierarchy) {
   Json entry = {{"name", report.grid->name},
                 {"voxels", report.grid->grid.voxel_count()},
                 {"voxels_with_data", report.grid->grid.data_count()},
-                {"size", triple(report.grid->declared_box().size())},
-                {"bounds", {{"min", triple(bounds.min)}, {"max", triple(bounds.max)}}},
+                {"size", list_of(report.grid->declared_box().size())},
+                {"bounds", {{"min", list_of(bounds.min)}, {"max", list_of(bounds.max)}}},
                 {"instances", Json::array()}};
   for (const Instance* instance : report.instances) entry["instances"].push_back(hierarchy.of(*instance));
   if (report.grid->field.chunk_count() != 0) entry["solid_samples"] = report.grid->field.solid_count();
@@ -176,8 +167,8 @@ Json cameras_json(const LoadedScene& loaded) {
   Json list = Json::array();
   for (const FileCamera& each : loaded.cameras) {
     list.push_back({{"number", each.number},
-                    {"position", triple(each.camera.position)},
-                    {"forward", triple(each.camera.forward)}});
+                    {"position", list_of(each.camera.position)},
+                    {"forward", list_of(each.camera.forward)}});
   }
   return list;
 }
@@ -193,8 +184,8 @@ Json info_json(const LoadedScene& loaded, InstanceFilter filter, const FaceCount
                  {"faces_total", faces.total},
                  {"bounds", box(loaded.scene.bounds(filter))},
                  {"lamps", loaded.scene.lamps.size()},
-                 {"sun", loaded.sun ? triple(*loaded.sun) : Json()},
-                 {"camera", loaded.camera ? triple(loaded.camera->position) : Json()},
+                 {"sun", loaded.sun ? list_of(*loaded.sun) : Json()},
+                 {"camera", loaded.camera ? list_of(loaded.camera->position) : Json()},
                  {"cameras", cameras_json(loaded)},
                  {"frames", loaded.last_frame + 1},
                  {"grids", Json::array()},

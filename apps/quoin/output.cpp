@@ -15,6 +15,14 @@ bool quiet = false;
 
 }  // namespace
 
+Json list_of(const DVec3& v) {
+  return {v.x + 0.0, v.y + 0.0, v.z + 0.0};
+}
+
+Json list_of(const IVec3& v) {
+  return {v.x, v.y, v.z};
+}
+
 std::string on_one_line(std::string_view text) {
   std::string line(text);
   for (char& c : line) {

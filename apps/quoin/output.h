@@ -8,10 +8,15 @@
 
 #include <quoin/core/result.h>
 #include <quoin/core/thousands.h>
+#include <quoin/core/vec.h>
 
 namespace quoin::tool {
 
 using Json = nlohmann::ordered_json;
+
+/// A list of three numbers, without -0.
+[[nodiscard]] Json list_of(const DVec3& v);
+[[nodiscard]] Json list_of(const IVec3& v);
 
 /// Text for a terminal: control characters become question marks.
 [[nodiscard]] std::string on_one_line(std::string_view text);

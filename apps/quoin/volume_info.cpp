@@ -22,15 +22,6 @@ DBox bounds_of(const Volume& volume) {
   return bounds;
 }
 
-template <class V>
-Json triple(const V& v) {
-  return {v.x, v.y, v.z};
-}
-
-Json triple(const DVec3& v) {
-  return {v.x + 0.0, v.y + 0.0, v.z + 0.0};
-}
-
 Json matrix_json(const glm::dmat4& matrix) {
   Json rows = Json::array();
   for (int row = 0; row < 3; ++row) {
@@ -45,18 +36,18 @@ Json volume_json(const Volume& volume) {
   return {{"format", volume.format},
           {"name", volume.name},
           {"type", name_of(volume.type)},
-          {"size", triple(volume.size)},
-          {"spacing", triple(volume.spacing)},
+          {"size", list_of(volume.size)},
+          {"spacing", list_of(volume.spacing)},
           {"units", volume.units},
           {"range", {volume.min, volume.max}},
           {"nan", volume.nan_count},
           {"infinite", volume.infinite_count},
-          {"bounds", {{"min", triple(bounds.min)}, {"max", triple(bounds.max)}}},
+          {"bounds", {{"min", list_of(bounds.min)}, {"max", list_of(bounds.max)}}},
           {"world_from_voxel", matrix_json(volume.world_from_voxel)},
           {"warnings", volume.warnings}};
 }
 
-std::string three(const DVec3& v, const char* between) {
+std::string three_digits(const DVec3& v, const char* between) {
   return digits_for_people(v.x) + between + digits_for_people(v.y) + between + digits_for_people(v.z);
 }
 
@@ -72,8 +63,8 @@ std::string volume_text(const std::string& name, const Volume& volume) {
   return name + ": " + volume.format + " volume\n" + "Values: " + std::to_string(volume.size.x) + " x " +
          std::to_string(volume.size.y) + " x " + std::to_string(volume.size.z) + " = " + with_thousands(count) +
          " of type " + std::string(name_of(volume.type)) + "\n" + "Range: " + range_text(volume) + "\n" +
-         "Spacing: " + three(volume.spacing, " x ") + units + "\n" + "Bounds: " + three(bounds.min, ", ") + "  to  " +
-         three(bounds.max, ", ") + units + "\n";
+         "Spacing: " + three_digits(volume.spacing, " x ") + units + "\n" +
+         "Bounds: " + three_digits(bounds.min, ", ") + "  to  " + three_digits(bounds.max, ", ") + units + "\n";
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr auto kInterval = std::chrono::milliseconds(250);
+constexpr auto kTimeBetweenLooks = std::chrono::milliseconds(250);
 
 void add_folder(const fs::path& folder, Stamps& stamps) {
   std::error_code code;
@@ -37,7 +37,7 @@ Stamps stamps_of(const WatchedWork& work) {
 void wait_for_change(const WatchedWork& work, const Stamps& known) {
   Stamps last = known;
   while (!was_interrupted()) {
-    std::this_thread::sleep_for(kInterval);
+    std::this_thread::sleep_for(kTimeBetweenLooks);
     Stamps now = stamps_of(work);
     if (now != known && now == last) return;
     last = std::move(now);

@@ -13,7 +13,7 @@ namespace {
 
 using Key = std::tuple<int, int, int>;
 
-Key key_of(IVec3 at) {
+Key place_key(IVec3 at) {
   return {at.x, at.y, at.z};
 }
 
@@ -42,12 +42,12 @@ TEST(ChunkTable, FindsWhatAMapFindsWhileChunksComeAndGo) {
       const IVec3 at = random_place(random, round, seed % 2 == 0);
       const bool grows = (round / 3'000) % 2 == 0;
       if (random() % 8 < (grows ? 6U : 1U)) {
-        plain[key_of(at)] = &add(table, at, 7);
+        plain[place_key(at)] = &add(table, at, 7);
         places.push_back(at);
       } else if (!places.empty()) {
         const std::size_t i = random() % places.size();
         table.erase(places[i]);
-        plain.erase(key_of(places[i]));
+        plain.erase(place_key(places[i]));
         places[i] = places.back();
         places.pop_back();
       }
@@ -59,7 +59,7 @@ TEST(ChunkTable, FindsWhatAMapFindsWhileChunksComeAndGo) {
       ASSERT_LE(table.outside(), table.size());
       ASSERT_LE(table.window_cells(), std::max<std::size_t>(256, 32 * plain.size()));
       for (const IVec3 asked : {at, random_place(random, round, seed % 2 == 0), places.empty() ? at : places[0]}) {
-        const auto found = plain.find(key_of(asked));
+        const auto found = plain.find(place_key(asked));
         ASSERT_EQ(table.find(asked), found == plain.end() ? nullptr : found->second);
         const VoxelType expected = found == plain.end() ? kAir : VoxelType{7};
         ASSERT_EQ(table.voxel(asked.x * 64 + 1, asked.y * 64 + 2, asked.z * 64 + 3), expected);

@@ -1,5 +1,6 @@
 // What edits changed: bricks of 16^3, and voxel by voxel.
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -15,7 +16,7 @@ namespace quoin {
 namespace {
 
 using Place = std::tuple<int, int, int>;
-using Told = std::map<Place, std::pair<VoxelType, VoxelType>>;
+using Told = std::vector<std::tuple<int, int, int, VoxelType, VoxelType>>;  // places, what was there, what is
 
 Told told(const Grid& before, const Grid& now, const GridChanges& changes) {
   Told all;
@@ -31,21 +32,23 @@ Told told(const Grid& before, const Grid& now, const GridChanges& changes) {
       EXPECT_NE(old_type, new_type);
       EXPECT_EQ(before.get(voxel), old_type);
       EXPECT_EQ(now.get(voxel), new_type);
-      EXPECT_TRUE(all.emplace(Place{voxel.x, voxel.y, voxel.z}, std::pair{old_type, new_type}).second);
+      all.emplace_back(voxel.x, voxel.y, voxel.z, old_type, new_type);
     });
   });
+  std::sort(all.begin(), all.end());
   return all;
 }
 
-// All voxels that differ, one by one.
+// All voxels that differ, one by one, each once.
 Told compared(const Grid& before, const Grid& now) {
   Told all;
   before.for_each([&](IVec3 p, VoxelType type) {
-    if (now.get(p) != type) all[{p.x, p.y, p.z}] = {type, now.get(p)};
+    if (now.get(p) != type) all.emplace_back(p.x, p.y, p.z, type, now.get(p));
   });
   now.for_each([&](IVec3 p, VoxelType type) {
-    if (before.get(p) != type) all[{p.x, p.y, p.z}] = {before.get(p), type};
+    if (before.get(p) == kAir) all.emplace_back(p.x, p.y, p.z, kAir, type);
   });
+  std::sort(all.begin(), all.end());
   return all;
 }
 
@@ -99,8 +102,8 @@ TEST(VisitChanges, TellsOfEveryVoxelAndWhatItWas) {
     for (const ChunkChange& change : changes.items) {
       slabs[{change.chunk.x, change.chunk.y, change.chunk.z}] = change.slabs;
     }
-    for (const auto& [place, types] : expected) {
-      const IVec3 voxel{std::get<0>(place), std::get<1>(place), std::get<2>(place)};
+    for (const auto& [x, y, z, was, is] : expected) {
+      const IVec3 voxel{x, y, z};
       const IVec3 chunk = chunk_of(voxel);
       const IVec3 at = local_of(voxel);
       ASSERT_TRUE((slabs[Place(chunk.x, chunk.y, chunk.z)].has(at.y, at.z)));

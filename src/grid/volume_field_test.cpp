@@ -13,7 +13,7 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 template <class Value>
-Volume volume_of(IVec3 size, Value&& value) {
+Volume sampled(IVec3 size, Value&& value) {
   Volume volume;
   volume.size = size;
   volume.min = kInfinity;
@@ -45,7 +45,7 @@ double ball(IVec3 p) {
 }
 
 TEST(VolumeField, DensitiesOfABallAreDistancesInSamples) {
-  const Volume volume = volume_of({80, 71, 66}, ball);
+  const Volume volume = sampled({80, 71, 66}, ball);
   const DensityGrid field = field_from_volume(volume, iso_of(100.0F)).value();
   for (int z = 0; z < 66; z += 3) {
     for (int y = 0; y < 71; ++y) {
@@ -65,7 +65,7 @@ TEST(VolumeField, SolidIsExactlyWhatIsGreater) {
     const double least = std::numeric_limits<float>::denorm_min();
     return p.x % 3 == 0 ? least : (p.x % 3 == 1 ? 0.0 : -least) + (p.y == 5 ? 1e30 : 0.0);
   };
-  const Volume volume = volume_of({70, 9, 3}, value);
+  const Volume volume = sampled({70, 9, 3}, value);
   const DensityGrid field = field_from_volume(volume, iso_of(0.0F)).value();
   for (int z = 0; z < 3; ++z) {
     for (int y = 0; y < 9; ++y) {
@@ -75,7 +75,7 @@ TEST(VolumeField, SolidIsExactlyWhatIsGreater) {
 }
 
 TEST(VolumeField, LabelsLieHalfASampleFromTheSurface) {
-  const Volume volume = volume_of({40, 40, 40}, [](IVec3 p) { return p.y < 20 ? 1 : 0; });
+  const Volume volume = sampled({40, 40, 40}, [](IVec3 p) { return p.y < 20 ? 1 : 0; });
   const DensityGrid field = field_from_volume(volume, iso_of(0.5F)).value();
   EXPECT_NEAR(field.density({20, 19, 20}), -0.5F, 0.01F);
   EXPECT_NEAR(field.density({20, 20, 20}), 0.5F, 0.01F);
@@ -83,7 +83,7 @@ TEST(VolumeField, LabelsLieHalfASampleFromTheSurface) {
 
 TEST(VolumeField, NanIsAirAndInfinitiesGoByTheirSign) {
   const std::array<float, 4> values = {kNan, kInfinity, -kInfinity, 3.0F};
-  const Volume volume = volume_of({4, 4, 4}, [&](IVec3 p) { return values[static_cast<std::size_t>(p.x)]; });
+  const Volume volume = sampled({4, 4, 4}, [&](IVec3 p) { return values[static_cast<std::size_t>(p.x)]; });
   const DensityGrid field = field_from_volume(volume, iso_of(2.0F)).value();
   EXPECT_EQ(field.density({0, 1, 1}), 8.0F);
   EXPECT_EQ(field.density({1, 1, 1}), -8.0F);
@@ -96,17 +96,17 @@ TEST(VolumeField, NanIsAirAndInfinitiesGoByTheirSign) {
 }
 
 TEST(VolumeField, AVolumeThatIsNeverCrossedIsEmptyOrSolid) {
-  const Volume flat = volume_of({5, 70, 5}, [](IVec3) { return 7; });
+  const Volume flat = sampled({5, 70, 5}, [](IVec3) { return 7; });
   EXPECT_EQ(field_from_volume(flat, iso_of(9.0F)).value().solid_count(), 0);
   EXPECT_EQ(field_from_volume(flat, iso_of(7.0F)).value().solid_count(), 0);
   EXPECT_EQ(field_from_volume(flat, iso_of(2.0F)).value().solid_count(), 5 * 70 * 5);
-  const Volume ramp = volume_of({9, 9, 9}, [](IVec3 p) { return p.x; });
+  const Volume ramp = sampled({9, 9, 9}, [](IVec3 p) { return p.x; });
   EXPECT_EQ(field_from_volume(ramp, iso_of(100.0F)).value().chunk_count(), 0U);
   EXPECT_EQ(field_from_volume(ramp, iso_of(-100.0F)).value().density({0, 0, 0}), -8.0F);
 }
 
 TEST(VolumeField, WhatIsNoVolumeIsRefused) {
-  const Volume good = volume_of({4, 3, 2}, [](IVec3 p) { return p.x; });
+  const Volume good = sampled({4, 3, 2}, [](IVec3 p) { return p.x; });
   EXPECT_EQ(field_from_volume(good, iso_of(kNan)).error().code, ErrorCode::InvalidArgument);
   constexpr int kMost = std::numeric_limits<int>::max();
   for (const IVec3 size : {IVec3(0, 3, 2), IVec3(-4, -3, 2), IVec3(4, 3, 3), IVec3(4, 3, 1), IVec3(kMost, kMost, kMost),
@@ -122,7 +122,7 @@ TEST(VolumeField, WhatIsNoVolumeIsRefused) {
 }
 
 TEST(VolumeField, IsTheSameAtAnyNumberOfThreadsAndCanBeCancelled) {
-  const Volume volume = volume_of({130, 70, 66}, ball);
+  const Volume volume = sampled({130, 70, 66}, ball);
   const DensityGrid one = field_from_volume(volume, iso_of(0.0F), Threads{1}).value();
   const DensityGrid four = field_from_volume(volume, iso_of(0.0F), Threads{4}).value();
   ASSERT_EQ(one.chunks(), four.chunks());
@@ -140,7 +140,7 @@ TEST(VolumeField, IsTheSameAtAnyNumberOfThreadsAndCanBeCancelled) {
 }
 
 TEST(VolumeField, WhatIsFarFromTheSurfaceTakesNoMemory) {
-  const Volume volume = volume_of({192, 192, 64}, ball);
+  const Volume volume = sampled({192, 192, 64}, ball);
   const DensityGrid field = field_from_volume(volume, iso_of(100.0F)).value();
   EXPECT_EQ(field.chunks(), std::vector<IVec3>({{0, 0, 0}, {1, 0, 0}}));
   EXPECT_LT(field.bytes(), volume.values.size() / 4);

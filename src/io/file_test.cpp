@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::span<const std::byte> bytes_of(std::string_view text) {
+std::span<const std::byte> bytes_in(std::string_view text) {
   return std::as_bytes(std::span(text.data(), text.size()));
 }
 
@@ -44,20 +44,20 @@ class FileTest : public testing::Test {
 
 TEST_F(FileTest, WritesWhatItReads) {
   const fs::path path = folder_ / "a";
-  ASSERT_TRUE(write_file(bytes_of("hello"), path));
+  ASSERT_TRUE(write_file(bytes_in("hello"), path));
   EXPECT_EQ(content(path), "hello");
-  ASSERT_TRUE(write_file(bytes_of(""), path));
+  ASSERT_TRUE(write_file(bytes_in(""), path));
   EXPECT_EQ(content(path), "");
   EXPECT_EQ(entries(), 1U);
 }
 
 TEST_F(FileTest, WithoutCommitTheOldFileStays) {
   const fs::path path = folder_ / "a";
-  ASSERT_TRUE(write_file(bytes_of("old"), path));
+  ASSERT_TRUE(write_file(bytes_in("old"), path));
   {
     auto file = AtomicFile::create(path);
     ASSERT_TRUE(file);
-    ASSERT_TRUE(file->write(bytes_of("new")));
+    ASSERT_TRUE(file->write(bytes_in("new")));
     EXPECT_EQ(content(path), "old");
   }
   EXPECT_EQ(content(path), "old");
@@ -67,10 +67,10 @@ TEST_F(FileTest, WithoutCommitTheOldFileStays) {
 TEST_F(FileTest, KeepsPermissionsAndSymbolicLinks) {
   const fs::path target = folder_ / "target";
   const fs::path link = folder_ / "link";
-  ASSERT_TRUE(write_file(bytes_of("old"), target));
+  ASSERT_TRUE(write_file(bytes_in("old"), target));
   fs::permissions(target, fs::perms::owner_all | fs::perms::others_read);
   fs::create_symlink("target", link);
-  ASSERT_TRUE(write_file(bytes_of("new"), link));
+  ASSERT_TRUE(write_file(bytes_in("new"), link));
   EXPECT_TRUE(fs::is_symlink(link));
   EXPECT_EQ(content(target), "new");
   EXPECT_EQ(fs::status(target).permissions(), fs::perms::owner_all | fs::perms::others_read);
@@ -78,7 +78,7 @@ TEST_F(FileTest, KeepsPermissionsAndSymbolicLinks) {
 
 TEST_F(FileTest, RefusesFoldersDevicesAndPathsThatAreNotThere) {
   for (const fs::path& path : {folder_, fs::path("/dev/null"), folder_ / "no" / "such", fs::path("")}) {
-    const Status written = write_file(bytes_of("x"), path);
+    const Status written = write_file(bytes_in("x"), path);
     ASSERT_FALSE(written) << path;
     EXPECT_EQ(written.error().code, ErrorCode::CannotWrite);
     EXPECT_EQ(written.error().path, path.string());
@@ -93,7 +93,7 @@ TEST_F(FileTest, DoesNotWaitForAFifo) {
   const fs::path fifo = folder_ / "fifo";
   ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
   EXPECT_FALSE(read_file(fifo));
-  EXPECT_FALSE(write_file(bytes_of("x"), fifo));
+  EXPECT_FALSE(write_file(bytes_in("x"), fifo));
 }
 
 TEST_F(FileTest, ABackupKeepsWhatWasReplaced) {
@@ -105,12 +105,12 @@ TEST_F(FileTest, ABackupKeepsWhatWasReplaced) {
     EXPECT_TRUE(nothing->keep());
   }
   EXPECT_EQ(entries(), 0U) << "there was no file";
-  ASSERT_TRUE(write_file(bytes_of("first"), path));
+  ASSERT_TRUE(write_file(bytes_in("first"), path));
   for (const std::string next : {"second", "third"}) {
     const std::string before = content(path);
     auto backup = FileBackup::of(path);
     ASSERT_TRUE(backup);
-    ASSERT_TRUE(write_file(bytes_of(next), path));
+    ASSERT_TRUE(write_file(bytes_in(next), path));
     EXPECT_TRUE(backup->keep());
     EXPECT_EQ(content(path), next);
     EXPECT_EQ(content(beside), before);
@@ -126,7 +126,7 @@ TEST_F(FileTest, ABackupKeepsWhatWasReplaced) {
 
 TEST_F(FileTest, ABackupReplacesNoFolderAndFollowsLinks) {
   const fs::path path = folder_ / "a";
-  ASSERT_TRUE(write_file(bytes_of("kept"), path));
+  ASSERT_TRUE(write_file(bytes_in("kept"), path));
   fs::create_directory(folder_ / "a~");
   EXPECT_EQ(FileBackup::name_for(path), folder_ / "a.~1~");
   auto beside = FileBackup::of(path);
@@ -144,7 +144,7 @@ TEST_F(FileTest, ABackupReplacesNoFolderAndFollowsLinks) {
 TEST_F(FileTest, ABackupThatIsToStayHasItsName) {
   const fs::path path = folder_ / "a";
   for (const char* version : {"first", "second", "third"}) {
-    ASSERT_TRUE(write_file(bytes_of(version), path));
+    ASSERT_TRUE(write_file(bytes_in(version), path));
     auto backup = FileBackup::of(path, FileBackup::Older::Kept);
     ASSERT_TRUE(backup && backup->keep());
   }
@@ -159,7 +159,7 @@ TEST_F(FileTest, AMoveCarriesTheFileAlong) {
   auto first = AtomicFile::create(path);
   ASSERT_TRUE(first);
   AtomicFile second = std::move(*first);
-  ASSERT_TRUE(second.write(bytes_of("moved")));
+  ASSERT_TRUE(second.write(bytes_in("moved")));
   ASSERT_TRUE(second.commit());
   EXPECT_FALSE(second.commit());
   EXPECT_EQ(content(path), "moved");

@@ -1,16 +1,14 @@
 #include <quoin/light/light_options.h>
 
 #include <functional>
-#include <limits>
 #include <string>
 
 #include <gtest/gtest.h>
 
+#include "core/not_finite_for_tests.h"
+
 namespace quoin {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 TEST(LightOptions, DefaultsAndLimitsAreAccepted) {
   EXPECT_TRUE(check(LightOptions{}).has_value());

@@ -12,7 +12,7 @@
 namespace quoin {
 namespace {
 
-using ChunkSet = std::set<std::array<int, 3>>;
+using Places = std::set<std::array<int, 3>>;
 
 std::array<int, 3> key(IVec3 chunk) {
   return {chunk.x, chunk.y, chunk.z};
@@ -29,7 +29,7 @@ class FollowedGrid {
     return options;
   }
   // How many chunks were meshed since the last call, and which were given.
-  std::int64_t meshed(ChunkSet& given) {
+  std::int64_t meshed(Places& given) {
     const std::int64_t before = meshes.stats().chunks_meshed;
     meshes.finish(one.scene, {});
     given.clear();
@@ -48,13 +48,13 @@ TEST(LiveReach, BlockyEditsReachTheChunksOfTheNeighbouringVoxels) {
   FollowedGrid followed(SurfaceStyle::Blocky);
   Grid& grid = followed.one.grid();
   for (int i = 0; i < 27; ++i) grid.set(Neighbourhood::offset(i) * 64 + 30, 1);
-  ChunkSet given;
+  Places given;
   EXPECT_EQ(followed.meshed(given), 27);
   std::mt19937 random(5);
   for (int i = 0; i < 60; ++i) {
     const auto place = [&] { return std::array{0, 1, 31, 62, 63}[random() % 5]; };
     const IVec3 at{place(), place(), place()};
-    ChunkSet reached;
+    Places reached;
     for (int n = 0; n < 27; ++n) reached.insert(key(chunk_of(at + Neighbourhood::offset(n))));
     ASSERT_TRUE(grid.set(at, grid.get(at) == kAir ? 1 : kAir));
     EXPECT_EQ(followed.meshed(given), static_cast<std::int64_t>(reached.size()));
@@ -63,7 +63,7 @@ TEST(LiveReach, BlockyEditsReachTheChunksOfTheNeighbouringVoxels) {
 }
 
 // Those of which a density field says that a sample changed within reach.
-ChunkSet chunks_near_changes(const DensityGrid& before, const DensityGrid& after, int reach) {
+Places chunks_near_changes(const DensityGrid& before, const DensityGrid& after, int reach) {
   DensityGrid edited = before.snapshot();
   ChangeCursor cursor;
   (void)edited.changes_since(cursor);
@@ -71,16 +71,16 @@ ChunkSet chunks_near_changes(const DensityGrid& before, const DensityGrid& after
     if (after.find_chunk(chunk) == nullptr) edited.put_chunk(chunk, DensityChunk(DensityNeighbourhood{}.outside));
   }
   for (const IVec3 chunk : after.chunks()) edited.put_chunk(chunk, *after.find_chunk(chunk));
-  ChunkSet all;
+  Places all;
   for (const IVec3 chunk : chunks_to_mesh(edited, edited.changes_since(cursor), reach)) all.insert(key(chunk));
   return all;
 }
 
 // The chunks that can own quads and read a density that differs, or a type of a solid sample that does.
-ChunkSet chunks_that_read_changes(const DensityGrid& before, const DensityGrid& after, const ChunkSet& asked) {
+Places chunks_that_read_changes(const DensityGrid& before, const DensityGrid& after, const Places& asked) {
   const int reach = reach_of({});
-  ChunkSet changed;
-  const ChunkSet near = chunks_near_changes(before, after, reach);
+  Places changed;
+  const Places near = chunks_near_changes(before, after, reach);
   for (const auto& each : asked) {
     if (!near.contains(each)) continue;
     const IVec3 chunk{each[0], each[1], each[2]};
@@ -108,7 +108,7 @@ TEST(LiveReach, SmoothEditsReachTheChunksThatReadAnotherDensity) {
   Grid& grid = followed.one.grid();
   grid.fill_box({{-40, 0, -40}, {91, 21, 91}}, 1);
   grid.fill_sphere({60, 30, 60}, 24.0, 3);
-  ChunkSet given;
+  Places given;
   followed.meshed(given);
   std::mt19937 random(5);
   for (int i = 0; i < (kIsSlow ? 1 : 12); ++i) {
@@ -118,12 +118,12 @@ TEST(LiveReach, SmoothEditsReachTheChunksThatReadAnotherDensity) {
     const IVec3 at{place(), 10 + static_cast<int>(random() % 20), place()};
     ASSERT_TRUE(grid.set(at, grid.get(at) == kAir ? 1 : i % 3 == 0 ? 5 : kAir));
     const DensityGrid after = *field_from_grid(grid);
-    ChunkSet asked;
+    Places asked;
     for (const IVec3 chunk : grid.chunks()) asked.insert(key(chunk));
     for (const IVec3 chunk : grid.chunks()) asked.insert(key(chunk - IVec3{1, 0, 0}));
     for (const IVec3 chunk : grid.chunks()) asked.insert(key(chunk - IVec3{0, 1, 0}));
     for (const IVec3 chunk : grid.chunks()) asked.insert(key(chunk - IVec3{0, 0, 1}));
-    const ChunkSet reached = chunks_that_read_changes(before, after, asked);
+    const Places reached = chunks_that_read_changes(before, after, asked);
     const std::int64_t meshed = followed.meshed(given);
     // Not all that were asked can own a quad.
     EXPECT_LE(meshed, static_cast<std::int64_t>(reached.size()));
@@ -137,7 +137,7 @@ TEST(LiveReach, SmoothEditsDeepInsideAreMeshedNowhere) {
   FollowedGrid followed(SurfaceStyle::Smooth);
   Grid& grid = followed.one.grid();
   grid.fill_box({{-40, -40, -40}, {101, 101, 101}}, 1);
-  ChunkSet given;
+  Places given;
   EXPECT_GT(followed.meshed(given), 0);
   // Painted, far from every face: the chunk's densities are the same, and no vertex takes its type.
   grid.set({30, 30, 30}, 3);
@@ -145,7 +145,7 @@ TEST(LiveReach, SmoothEditsDeepInsideAreMeshedNowhere) {
   // A type below the face changes colours of that chunk alone.
   grid.set({30, 100, 30}, 3);
   EXPECT_EQ(followed.meshed(given), 1);
-  EXPECT_EQ(given, (ChunkSet{{0, 1, 0}}));
+  EXPECT_EQ(given, (Places{{0, 1, 0}}));
   expect_smooth(followed.shown, followed.one.scene, FollowedGrid::options_of(SurfaceStyle::Smooth));
 }
 
@@ -154,7 +154,7 @@ TEST(LiveReach, OnlyChunksThatShowAChangedTypeAreMeshedAgain) {
     FollowedGrid followed(style);
     followed.one.grid().fill_box({{10, 10, 10}, {21, 21, 21}}, 1);
     followed.one.grid().fill_box({{330, 10, 10}, {341, 21, 21}}, 2);
-    ChunkSet given;
+    Places given;
     EXPECT_EQ(followed.meshed(given), 2);
     VoxelRegistry& types = followed.one.scene.types;
     VoxelProperties properties = types[2];
@@ -166,7 +166,7 @@ TEST(LiveReach, OnlyChunksThatShowAChangedTypeAreMeshedAgain) {
     properties.colour.r = 77;
     types.replace(2, properties);
     EXPECT_EQ(followed.meshed(given), 1);
-    EXPECT_EQ(given, (ChunkSet{{5, 0, 0}}));
+    EXPECT_EQ(given, (Places{{5, 0, 0}}));
     expect_surfaces(followed.shown, followed.one.scene, FollowedGrid::options_of(style));
     // Of a type that nothing has.
     EXPECT_TRUE(types.add(properties).has_value());

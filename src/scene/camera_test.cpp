@@ -11,11 +11,11 @@
 #include <gtest/gtest.h>
 #include <quoin/scene/scene.h>
 
+#include "core/not_finite_for_tests.h"
+
 namespace quoin {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr View kAllViews[] = {View::Front, View::Back, View::Left, View::Right, View::Top, View::Iso};
 
 void expect_near(DVec3 a, DVec3 b, double tolerance = 1e-12) {

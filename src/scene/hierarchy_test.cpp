@@ -14,7 +14,7 @@
 namespace quoin {
 namespace {
 
-constexpr unsigned kSeed = 18;
+constexpr unsigned kHierarchySeed = 18;
 
 GroupHandle group_below(Scene& scene, GroupHandle parent, const char* name = "") {
   return scene.add_group({.name = name, .parent = parent});
@@ -146,7 +146,7 @@ bool slowly_shown(const Scene& scene, const Instance& instance) {
 
 // Who redraws only what changed must be told of every instance that appears or disappears.
 TEST(Hierarchy, WhatAppearsOrDisappearsIsToldOf) {
-  std::mt19937 random(kSeed);
+  std::mt19937 random(kHierarchySeed);
   Scene scene;
   const GridHandle grid = add_voxel(scene);
   std::vector<GroupHandle> groups{GroupHandle{}};
@@ -195,8 +195,9 @@ TEST(Hierarchy, WhatAppearsOrDisappearsIsToldOf) {
     const std::set<InstanceHandle> told(changes.instances.begin(), changes.instances.end());
     for (std::size_t i = 0; i < instances.size(); ++i) {
       const bool now = slowly_shown(scene, scene.instances()[instances[i]]);
-      ASSERT_EQ(is_shown(scene, scene.instances()[instances[i]]), now) << "seed " << kSeed << " round " << round;
-      ASSERT_TRUE(now == before[i] || told.contains(instances[i])) << "seed " << kSeed << " round " << round;
+      ASSERT_EQ(is_shown(scene, scene.instances()[instances[i]]), now)
+          << "seed " << kHierarchySeed << " round " << round;
+      ASSERT_TRUE(now == before[i] || told.contains(instances[i])) << "seed " << kHierarchySeed << " round " << round;
     }
   }
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <random>
 
@@ -13,13 +12,11 @@
 
 #include <quoin/trace/ray.h>
 
+#include "core/not_finite_for_tests.h"
 #include "scene/frustum.h"
 
 namespace quoin {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Scene cubes(int count, int edge = 20) {
   Scene scene;

@@ -12,12 +12,12 @@
 namespace quoin {
 namespace {
 
-struct World {
+struct SmoothWorld {
   VoxelRegistry registry;
   TerrainTypes types = add_terrain_types(registry).value();
 };
 
-SmoothTerrainOptions options_of(std::uint64_t seed, IVec3 size, int first_x = 0, int first_z = 0) {
+SmoothTerrainOptions smooth_options_of(std::uint64_t seed, IVec3 size, int first_x = 0, int first_z = 0) {
   SmoothTerrainOptions options;
   options.seed = seed;
   options.size = size;
@@ -27,7 +27,7 @@ SmoothTerrainOptions options_of(std::uint64_t seed, IVec3 size, int first_x = 0,
 }
 
 DensityGrid make(const SmoothTerrainOptions& options, Threads threads = {1}) {
-  return generate_smooth_terrain(options, World().types, threads).value();
+  return generate_smooth_terrain(options, SmoothWorld().types, threads).value();
 }
 
 std::uint64_t hash_of_chunk(const DensityChunk& chunk, std::uint64_t hash) {
@@ -60,19 +60,19 @@ bool is_solid(const DensityGrid& field, IVec3 p) {
 
 // A world is a promise: who kept a seed wants the same hills back. A change here is a change of every world.
 TEST(SmoothTerrain, GivesTheSameWorldsEverywhere) {
-  EXPECT_EQ(hash_of(make(options_of(42, {2, 2, 2}))), 16'385'689'152'749'590'625U);
-  EXPECT_EQ(hash_of(make(options_of(7, {1, 4, 1}, -3, 5))), 12'034'568'528'284'950'785U);
-  EXPECT_EQ(hash_of(make(options_of(0x1234'5678'9ABC'DEF0U, {2, 1, 1}, -524'288, 524'287))),
+  EXPECT_EQ(hash_of(make(smooth_options_of(42, {2, 2, 2}))), 16'385'689'152'749'590'625U);
+  EXPECT_EQ(hash_of(make(smooth_options_of(7, {1, 4, 1}, -3, 5))), 12'034'568'528'284'950'785U);
+  EXPECT_EQ(hash_of(make(smooth_options_of(0x1234'5678'9ABC'DEF0U, {2, 1, 1}, -524'288, 524'287))),
             7'607'016'377'544'171'522U);
 }
 
 TEST(SmoothTerrain, IsTheSameForAnyNumberOfThreadsAndChunkByChunk) {
-  const SmoothTerrainOptions options = options_of(5, {3, 2, 2}, -2, -1);
+  const SmoothTerrainOptions options = smooth_options_of(5, {3, 2, 2}, -2, -1);
   const DensityGrid one = make(options);
   const DensityGrid many = make(options, {4});
   EXPECT_EQ(hash_of(one), hash_of(many));
   EXPECT_EQ(one.bytes(), many.bytes());
-  const World world;
+  const SmoothWorld world;
   for (int z = -2; z < 2; ++z) {
     for (int y = -1; y < 3; ++y) {
       for (int x = -3; x < 2; ++x) {
@@ -89,8 +89,8 @@ TEST(SmoothTerrain, IsTheSameForAnyNumberOfThreadsAndChunkByChunk) {
 }
 
 TEST(SmoothTerrain, PiecesOfOneLandscapeAgreeAwayFromTheirSides) {
-  const DensityGrid left = make(options_of(11, {2, 2, 1}, 0, 0));
-  const DensityGrid right = make(options_of(11, {2, 2, 1}, 1, 0));
+  const DensityGrid left = make(smooth_options_of(11, {2, 2, 1}, 0, 0));
+  const DensityGrid right = make(smooth_options_of(11, {2, 2, 1}, 1, 0));
   for (int z = 10; z < 54; ++z) {
     for (int y = 0; y < 128; ++y) {
       for (int x = 74; x < 118; ++x) {
@@ -103,7 +103,7 @@ TEST(SmoothTerrain, PiecesOfOneLandscapeAgreeAwayFromTheirSides) {
 
 TEST(SmoothTerrain, IsAClosedBlockWithFlatSides) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    const DensityGrid field = make(options_of(seed, {2, 2, 1}));
+    const DensityGrid field = make(smooth_options_of(seed, {2, 2, 1}));
     const IBox solid = field.solid_bounds();
     EXPECT_EQ(solid.min, IVec3(1));
     EXPECT_EQ(solid.max.x, 127);
@@ -118,7 +118,7 @@ TEST(SmoothTerrain, IsAClosedBlockWithFlatSides) {
 }
 
 TEST(SmoothTerrain, WithoutOverhangsTheGroundIsThatOfTheBlockyWorld) {
-  SmoothTerrainOptions options = options_of(42, {2, 2, 2});
+  SmoothTerrainOptions options = smooth_options_of(42, {2, 2, 2});
   options.overhangs = false;
   options.caves = false;
   const DensityGrid field = make(options);
@@ -187,7 +187,7 @@ TEST(SmoothTerrain, HasOverhangsAndCavesWhereAskedForAndHardlyAnythingFloats) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE(seed);
     const IVec3 size = IVec3(3, 2, 3) * 64;
-    SmoothTerrainOptions options = options_of(seed, {3, 2, 3});
+    SmoothTerrainOptions options = smooth_options_of(seed, {3, 2, 3});
     options.caves = false;
     const DensityGrid solid = make(options);
     overhung += overhung_columns(solid, size);
@@ -206,7 +206,7 @@ TEST(SmoothTerrain, HasOverhangsAndCavesWhereAskedForAndHardlyAnythingFloats) {
 }
 
 TEST(SmoothTerrain, DensitiesChangeLikeDistances) {
-  const DensityGrid field = make(options_of(9, {2, 2, 2}));
+  const DensityGrid field = make(smooth_options_of(9, {2, 2, 2}));
   int near = 0;
   int steep = 0;
   double sum = 0.0;
@@ -232,8 +232,8 @@ TEST(SmoothTerrain, DensitiesChangeLikeDistances) {
 }
 
 TEST(SmoothTerrain, SolidSamplesAreOfTheLandscapesTypesWithGrassOnTop) {
-  const World world;
-  SmoothTerrainOptions options = options_of(42, {3, 2, 3});
+  const SmoothWorld world;
+  SmoothTerrainOptions options = smooth_options_of(42, {3, 2, 3});
   options.caves = false;
   options.overhangs = false;
   const DensityGrid field = make(options);
@@ -254,23 +254,25 @@ TEST(SmoothTerrain, SolidSamplesAreOfTheLandscapesTypesWithGrassOnTop) {
 }
 
 TEST(SmoothTerrain, WhatCannotBeIsRefusedAndCancellingStops) {
-  const World world;
+  const SmoothWorld world;
   for (const IVec3 size : {IVec3(0, 1, 1), IVec3(1, 17, 1), IVec3(513, 1, 1), IVec3(1, 1, -1)}) {
-    EXPECT_EQ(generate_smooth_terrain(options_of(1, size), world.types).error().code, ErrorCode::InvalidArgument);
+    EXPECT_EQ(generate_smooth_terrain(smooth_options_of(1, size), world.types).error().code,
+              ErrorCode::InvalidArgument);
   }
-  EXPECT_EQ(generate_smooth_terrain(options_of(1, {1, 1, 1}, 524'289), world.types).error().code,
+  EXPECT_EQ(generate_smooth_terrain(smooth_options_of(1, {1, 1, 1}, 524'289), world.types).error().code,
             ErrorCode::InvalidArgument);
   const auto cancelled =
-      generate_smooth_terrain(options_of(1, {1, 1, 1}), world.types, {}, [](double) { return false; });
+      generate_smooth_terrain(smooth_options_of(1, {1, 1, 1}), world.types, {}, [](double) { return false; });
   EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
 }
 
 TEST(SmoothTerrainDeathTest, ChunksOfAnImpossibleWorldAndTypesThatNobodyAddedAreMistakes) {
-  const World world;
-  QUOIN_EXPECT_MISTAKE((void)generate_smooth_terrain_chunk(options_of(1, {0, 1, 1}), world.types, {0, 0, 0}), "ranges");
-  QUOIN_EXPECT_MISTAKE((void)generate_smooth_terrain_chunk(options_of(1, {1, 1, 1}), {}, {0, 0, 0}),
+  const SmoothWorld world;
+  QUOIN_EXPECT_MISTAKE((void)generate_smooth_terrain_chunk(smooth_options_of(1, {0, 1, 1}), world.types, {0, 0, 0}),
+                       "ranges");
+  QUOIN_EXPECT_MISTAKE((void)generate_smooth_terrain_chunk(smooth_options_of(1, {1, 1, 1}), {}, {0, 0, 0}),
                        "add_terrain_types");
-  QUOIN_EXPECT_MISTAKE((void)generate_smooth_terrain(options_of(1, {1, 1, 1}), {}), "add_terrain_types");
+  QUOIN_EXPECT_MISTAKE((void)generate_smooth_terrain(smooth_options_of(1, {1, 1, 1}), {}), "add_terrain_types");
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 
 #include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"
+#include "core/not_finite_for_tests.h"
 #include "grid/change_follower_for_tests.h"
 #include "mesh/mesh_oracle.h"
 #include "trace/trace_oracle.h"
@@ -19,8 +20,6 @@
 
 namespace quoin {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 void expect_same(const PacketHits& a, const PacketHits& b) {
   ASSERT_EQ(a.hit, b.hit);

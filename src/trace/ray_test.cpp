@@ -10,14 +10,13 @@
 
 #include "bench/workloads.h"
 #include "core/instruction_sets_for_tests.h"
+#include "core/not_finite_for_tests.h"
 #include "grid/change_follower_for_tests.h"
 #include "mesh/mesh_oracle.h"
 #include "trace/trace_oracle.h"
 
 namespace quoin {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Distance from a point of the ray to the nearest edge of the voxel lattice.
 double distance_to_edge(const DVec3& p) {

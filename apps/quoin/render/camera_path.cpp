@@ -31,7 +31,7 @@ std::optional<DVec3> triple_of(const Object& camera, const char* key) {
 }
 
 // What is wrong with it, or "".
-std::string read_camera(const Object& object, Camera& out) {
+std::string camera_from_json(const Object& object, Camera& out) {
   if (!object.is_object()) return "is no object";
   for (const auto& [key, value] : object.items()) {
     if (key != "position" && key != "forward" && key != "look_at" && key != "up" && key != "fov" &&
@@ -78,7 +78,7 @@ Result<std::vector<Camera>> read_camera_path(const std::filesystem::path& path) 
   if (all.empty() || all.size() > kMaxCameras) return bad("holds no camera, or more than a million");
   std::vector<Camera> cameras(all.size());
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if (const std::string fault = read_camera(all[i], cameras[i]); !fault.empty()) {
+    if (const std::string fault = camera_from_json(all[i], cameras[i]); !fault.empty()) {
       return bad("camera " + std::to_string(i) + " " + fault);
     }
   }

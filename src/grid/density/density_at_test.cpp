@@ -1,16 +1,14 @@
 #include <quoin/grid/density_grid.h>
 
 #include <cmath>
-#include <limits>
 #include <random>
 
 #include <gtest/gtest.h>
 
+#include "core/not_finite_for_tests.h"
+
 namespace quoin {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Every value is an exact half.
 double linear(DVec3 p) {

@@ -15,7 +15,7 @@ namespace {
 
 constexpr Half kFar = 0x4800;   // 8
 constexpr Half kDeep = 0xC800;  // -8
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kFloatInfinity = std::numeric_limits<float>::infinity();
 
 TEST(StoredDensity, KeepsTheSignHoweverSmallAndNothingButZeroIsZero) {
   for (const float small : {1e-45F, 1e-30F, 1e-8F, 3e-8F, 1e-6F, 6e-5F}) {
@@ -30,8 +30,8 @@ TEST(StoredDensity, KeepsTheSignHoweverSmallAndNothingButZeroIsZero) {
 TEST(StoredDensity, EndsAtTheBandAndReadsNanAsFarAir) {
   EXPECT_EQ(stored_density(100.0F, 8.0F), kFar);
   EXPECT_EQ(stored_density(-100.0F, 8.0F), kDeep);
-  EXPECT_EQ(stored_density(kInfinity, 8.0F), kFar);
-  EXPECT_EQ(stored_density(-kInfinity, 8.0F), kDeep);
+  EXPECT_EQ(stored_density(kFloatInfinity, 8.0F), kFar);
+  EXPECT_EQ(stored_density(-kFloatInfinity, 8.0F), kDeep);
   EXPECT_EQ(stored_density(std::nanf(""), 8.0F), kFar);
   EXPECT_EQ(stored_density(-std::nanf(""), 8.0F), kFar);
   EXPECT_EQ(float_from_half(stored_density(1e9F, kMaxHalf)), kMaxHalf);
@@ -42,7 +42,7 @@ TEST(StoredDensity, ABandBetweenTwoHalvesIsNeverExceeded) {
   for (int round = 0; round < 1'000; ++round) {
     const float band =
         std::ldexp(1.0F + static_cast<float>(random() % 10'000) / 10'000.0F, static_cast<int>(random() % 28) - 13);
-    const float most = float_from_half(stored_density(kInfinity, band));
+    const float most = float_from_half(stored_density(kFloatInfinity, band));
     EXPECT_LE(most, band);
     EXPECT_GE(most, band * (1.0F - 1.0F / 1024.0F));
   }

@@ -11,6 +11,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/not_finite_for_tests.h"
 #include "grid/change_follower_for_tests.h"
 #include "grid/density/density_oracle.h"
 
@@ -18,8 +19,6 @@ namespace quoin {
 namespace {
 
 constexpr float kBand = 8.0F;
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Both surfaces flow together where they are nearly as near.
 double flowing_least(double a, double b, double blend) {

@@ -69,7 +69,7 @@ std::vector<IVec3> change_both(std::mt19937& random, int round, DensityGrid& gri
   return changed;
 }
 
-void expect_equal(const DensityGrid& grid, PlainField& plain) {
+void expect_that_of(const DensityGrid& grid, PlainField& plain) {
   IBox bounds;
   std::int64_t count = 0;
   int differing = 0;
@@ -97,7 +97,7 @@ TEST(DensityGrid, AgreesWithAPlainFieldUnderSetsEditsAndWholeChunks) {
     const int reach = static_cast<int>(random() % 65);
     EXPECT_EQ(follower.take(grid, reach), chunks_reached(changed, reach));
     if (round == 11) grid.compact();
-    ASSERT_NO_FATAL_FAILURE(expect_equal(grid, plain));
+    ASSERT_NO_FATAL_FAILURE(expect_that_of(grid, plain));
   }
 }
 

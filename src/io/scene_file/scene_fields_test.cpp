@@ -118,7 +118,7 @@ TEST(SceneFields, MaterialsThatAreNotRegisteredAreRefused) {
   EXPECT_EQ(to_string(refused.error()), "grids[0] has voxels of type 9, which is not registered");
 }
 
-std::string fault_of(const std::string& grid) {
+std::string fault_of_grid(const std::string& grid) {
   const std::string text = R"({"quoin_scene": 3, "types": [{"colour": [1, 2, 3, 255]}], "grids": [{"voxels": [], )" +
                            grid + R"(}], "instances": [{"grid": 0}]})";
   const auto read = load_scene(std::as_bytes(std::span(text)));
@@ -126,46 +126,46 @@ std::string fault_of(const std::string& grid) {
 }
 
 /// What is wrong with a piece of these numbers, 16 bits each.
-std::string fault_of_piece(const std::vector<std::uint16_t>& words, std::size_t cut = 0) {
+std::string fault_of_densities(const std::vector<std::uint16_t>& words, std::size_t cut = 0) {
   std::vector<std::byte> bytes;
   for (const std::uint16_t word : words) {
     bytes.push_back(static_cast<std::byte>(word));
     bytes.push_back(static_cast<std::byte>(word >> 8));
   }
   bytes.resize(bytes.size() - cut);
-  return fault_of(R"("densities": [")" + to_base64(gzipped(bytes, 9)) + "\"]");
+  return fault_of_grid(R"("densities": [")" + to_base64(gzipped(bytes, 9)) + "\"]");
 }
 
 TEST(SceneFields, DamagedOnesAreRefusedWithTheirPlace) {
   const std::string at = "grids[0].densities[0]: ";
   const Half solid = half_from_float(-8.0F);
   const Half beyond = half_from_float(-9.0F);
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0}), "none");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0}, 1), at + "byte 21 of the voxel data: cut off");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, beyond, 0}),
+  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0}), "none");
+  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0}, 1), at + "byte 21 of the voxel data: cut off");
+  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, beyond, 0}),
             at + "byte 18 of the voxel data: a density beyond the band");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, 0x7E00, 0}),
+  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, 0x7E00, 0}),
             at + "byte 18 of the voxel data: a density beyond the band");
   for (const std::uint16_t none : {0x8000, 0x0001, 0x83FF}) {
-    EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, none, 0}),
+    EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, none, 0}),
               at + "byte 18 of the voxel data: a density that is -0, or nearer to 0 than 2^-14");
   }
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 1}),
+  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 1}),
             at + "byte 18 of the voxel data: a density beyond the band");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, 0xFFFF, 0xFFFF, beyond, 0}),
+  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, 0xFFFF, 0xFFFF, beyond, 0}),
             at + "byte 22 of the voxel data: a density beyond the band");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, 0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF, 1}),
+  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, 0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF, 1}),
             at + "byte 28 of the voxel data: cut off");
   std::vector<std::uint16_t> differences = {1, 0, 2, 0, 3, 0, 1, 0, 1, 0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF};
   differences.resize(differences.size() + 1'024, 0x7F7F);
-  EXPECT_EQ(fault_of_piece(differences), at + "byte 26 of the voxel data: a density beyond the band");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, half_from_float(8.0F), 0}),
+  EXPECT_EQ(fault_of_densities(differences), at + "byte 26 of the voxel data: a density beyond the band");
+  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, half_from_float(8.0F), 0}),
             at + "chunk (1, 2, 3) holds nothing");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0, 1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0}),
+  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0, 1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0}),
             at + "chunk (1, 2, 3) was given before");
-  EXPECT_EQ(fault_of(R"("band": 0, "densities": [])"), "grids[0].band: must be more than 0 and at most 65504");
-  EXPECT_EQ(fault_of(R"("band": 70000, "densities": [])"), "grids[0].band: must be more than 0 and at most 65504");
-  EXPECT_EQ(fault_of(R"("densities": [3])"), "grids[0].densities[0]: must be a string");
+  EXPECT_EQ(fault_of_grid(R"("band": 0, "densities": [])"), "grids[0].band: must be more than 0 and at most 65504");
+  EXPECT_EQ(fault_of_grid(R"("band": 70000, "densities": [])"), "grids[0].band: must be more than 0 and at most 65504");
+  EXPECT_EQ(fault_of_grid(R"("densities": [3])"), "grids[0].densities[0]: must be a string");
 }
 
 }  // namespace

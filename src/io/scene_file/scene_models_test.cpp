@@ -348,7 +348,7 @@ std::string file_with_voxels(const std::string& voxels) {
          R"(]}], "instances": [{"grid": 0}]})";
 }
 
-std::string fault_of(const std::string& text) {
+std::string fault_of_scene(const std::string& text) {
   const auto read = load_scene(std::as_bytes(std::span(text)));
   return read ? "none" : to_string(read.error());
 }
@@ -361,7 +361,7 @@ std::string fault_of_piece(std::vector<std::uint16_t> words, std::size_t cut = 0
     bytes.push_back(static_cast<std::byte>(word >> 8));
   }
   bytes.resize(bytes.size() - cut);
-  return fault_of(file_with_voxels("\"" + to_base64(gzipped(bytes, 9)) + "\""));
+  return fault_of_scene(file_with_voxels("\"" + to_base64(gzipped(bytes, 9)) + "\""));
 }
 
 TEST(SceneModels, DamagedVoxelsAreRefusedWithTheirPlace) {
@@ -386,7 +386,7 @@ TEST(SceneModels, DamagedVoxelsAreRefusedWithTheirPlace) {
 
 TEST(SceneModels, LampsAreRefusedWithTheirPlace) {
   const auto fault = [](const std::string& lamp) {
-    return fault_of(R"({"quoin_scene": 2, "grids": [], "instances": [], "lamps": [)" + lamp + "]}");
+    return fault_of_scene(R"({"quoin_scene": 2, "grids": [], "instances": [], "lamps": [)" + lamp + "]}");
   };
   EXPECT_EQ(fault(R"({"position": [1, 2, 3]})"), "none");
   EXPECT_EQ(fault("{}"), "lamps[0]: \"position\" is missing");
@@ -397,13 +397,13 @@ TEST(SceneModels, LampsAreRefusedWithTheirPlace) {
 
 TEST(SceneModels, DamagedTextIsRefusedWithItsPlace) {
   const std::string at = "grids[0].voxels[0]: ";
-  EXPECT_EQ(fault_of(file_with_voxels("")), "none");
-  EXPECT_EQ(fault_of(file_with_voxels("7")), at + "must be a string");
-  EXPECT_EQ(fault_of(file_with_voxels("\"A*==\"")), at + "character 1: no base64 character");
-  EXPECT_EQ(fault_of(file_with_voxels("\"\"")), at + "no gzip stream");
-  EXPECT_EQ(fault_of(file_with_voxels("\"AAAA\"")), at + "no gzip stream");
+  EXPECT_EQ(fault_of_scene(file_with_voxels("")), "none");
+  EXPECT_EQ(fault_of_scene(file_with_voxels("7")), at + "must be a string");
+  EXPECT_EQ(fault_of_scene(file_with_voxels("\"A*==\"")), at + "character 1: no base64 character");
+  EXPECT_EQ(fault_of_scene(file_with_voxels("\"\"")), at + "no gzip stream");
+  EXPECT_EQ(fault_of_scene(file_with_voxels("\"AAAA\"")), at + "no gzip stream");
   std::vector<std::byte> piece = gzipped(std::vector<std::byte>(100), 9);
-  const auto fault = [&] { return fault_of(file_with_voxels("\"" + to_base64(piece) + "\"")); };
+  const auto fault = [&] { return fault_of_scene(file_with_voxels("\"" + to_base64(piece) + "\"")); };
   piece.push_back({});
   EXPECT_EQ(fault(), at + "something follows the compressed data");
   piece.resize(piece.size() - 3);
@@ -411,26 +411,28 @@ TEST(SceneModels, DamagedTextIsRefusedWithItsPlace) {
   piece[12] ^= std::byte{0xFF};
   EXPECT_NE(fault().find(at + "byte "), std::string::npos) << fault();
   EXPECT_NE(fault().find("the compressed data are damaged"), std::string::npos) << fault();
-  EXPECT_EQ(fault_of(R"({"quoin_scene": 2, "grids": [], "instances": [{"grid": 0}]})"),
+  EXPECT_EQ(fault_of_scene(R"({"quoin_scene": 2, "grids": [], "instances": [{"grid": 0}]})"),
             "instances[0].grid: there is no grid 0");
-  EXPECT_EQ(fault_of(R"({"quoin_scene": 2, "grids": [], "instances": [{"grid": -1}]})"),
+  EXPECT_EQ(fault_of_scene(R"({"quoin_scene": 2, "grids": [], "instances": [{"grid": -1}]})"),
             "instances[0].grid: must be a place in the list of grids, from 0");
-  EXPECT_EQ(fault_of(R"({"quoin_scene": 2, "types": [{"colour": [1, 2, 3, 256]}], "grids": [], "instances": []})"),
-            "types[0].colour: must be whole numbers from 0 to 255");
-  EXPECT_EQ(fault_of(R"({"quoin_scene": 2, "types": [{"colour": [1, 2, 3, 4], "visibility": "air"}], "grids": [],
+  EXPECT_EQ(
+      fault_of_scene(R"({"quoin_scene": 2, "types": [{"colour": [1, 2, 3, 256]}], "grids": [], "instances": []})"),
+      "types[0].colour: must be whole numbers from 0 to 255");
+  EXPECT_EQ(fault_of_scene(R"({"quoin_scene": 2, "types": [{"colour": [1, 2, 3, 4], "visibility": "air"}], "grids": [],
                          "instances": []})"),
             "types[0].visibility: must be \"opaque\" or \"transparent\"");
-  EXPECT_EQ(fault_of(R"({"quoin_scene": 2, "types": [{"colour": [1, 2, 3, 4], "ior": 1e39}], "grids": [],
+  EXPECT_EQ(fault_of_scene(R"({"quoin_scene": 2, "types": [{"colour": [1, 2, 3, 4], "ior": 1e39}], "grids": [],
                          "instances": []})"),
             "types[0].ior: is too large");
-  EXPECT_EQ(fault_of(R"({"quoin_scene": 2, "grids": [{"name": {"base64": "*"}, "voxels": []}], "instances": []})"),
-            "grids[0].name: must be a string, or {\"base64\": \"...\"} where it is not UTF-8");
+  EXPECT_EQ(
+      fault_of_scene(R"({"quoin_scene": 2, "grids": [{"name": {"base64": "*"}, "voxels": []}], "instances": []})"),
+      "grids[0].name: must be a string, or {\"base64\": \"...\"} where it is not UTF-8");
 }
 
 // A thousand times its size is what deflate can do.
 TEST(SceneModels, BombsAreRefusedBeforeTheyExpand) {
   const std::vector<std::byte> zeros(std::size_t{64} << 20);
-  EXPECT_EQ(fault_of(file_with_voxels("\"" + to_base64(gzipped(zeros, 9)) + "\"")),
+  EXPECT_EQ(fault_of_scene(file_with_voxels("\"" + to_base64(gzipped(zeros, 9)) + "\"")),
             "grids[0].voxels[0]: expands to more than 32 MiB");
   std::vector<std::byte> chunks;
   for (int i = 0; i < 100'000; ++i) {
@@ -440,7 +442,7 @@ TEST(SceneModels, BombsAreRefusedBeforeTheyExpand) {
     chunks.push_back(std::byte{1});
     chunks.push_back(std::byte{0});
   }
-  EXPECT_EQ(fault_of(file_with_voxels("\"" + to_base64(gzipped(chunks, 9)) + "\"")),
+  EXPECT_EQ(fault_of_scene(file_with_voxels("\"" + to_base64(gzipped(chunks, 9)) + "\"")),
             "grids: voxels would take far more memory than the file has bytes");
 }
 

@@ -25,14 +25,14 @@ Bytes twelve() {
   return encode({1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}, ScalarType::UInt8);
 }
 
-Error error_of(const Bytes& bytes, const VolumeOptions& options = {}) {
+Error error_in(const Bytes& bytes, const VolumeOptions& options = {}) {
   const auto volume = read_volume(bytes, options);
   EXPECT_FALSE(volume);
   return volume ? Error{} : volume.error();
 }
 
 std::string text_of(const NiftiFile& file) {
-  return to_string(error_of(file.bytes(twelve())));
+  return to_string(error_in(file.bytes(twelve())));
 }
 
 Bytes small_nrrd(bool is_compressed) {
@@ -116,7 +116,7 @@ TEST(VolumeHostile, SizesThatOverflowAreErrors) {
             "byte 16: it claims 9223372036854775807 x 9223372036854775807 x 2 values; at most 1073741824 are read");
   EXPECT_EQ(text_of({.is_second = true, .dim = {3, 1LL << 32, 1LL << 32, 1}}),
             "byte 16: it claims 4294967296 x 4294967296 x 1 values; at most 1073741824 are read");
-  EXPECT_EQ(error_of(NiftiFile{}.bytes(twelve()), {.max_values = 11}).code, ErrorCode::LimitExceeded);
+  EXPECT_EQ(error_in(NiftiFile{}.bytes(twelve()), {.max_values = 11}).code, ErrorCode::LimitExceeded);
   EXPECT_TRUE(read_volume(NiftiFile{}.bytes(twelve()), {.max_values = 12}));
   EXPECT_FALSE(read_volume(NiftiFile{}.bytes(twelve()), {.max_values = -1}));
 }
@@ -129,7 +129,7 @@ TEST(VolumeHostile, OffsetsBeyondTheFileAreErrors) {
   Bytes bytes = file.bytes(twelve());
   for (const float offset : {-1.0F, 1e30F, static_cast<float>(kNan), std::numeric_limits<float>::infinity()}) {
     volume_test::put(bytes, 108, offset);
-    EXPECT_EQ(error_of(bytes).code, ErrorCode::BadFormat) << offset;
+    EXPECT_EQ(error_in(bytes).code, ErrorCode::BadFormat) << offset;
   }
 }
 
@@ -139,15 +139,15 @@ TEST(VolumeHostile, HeadersThatLieOfTheirValuesAreErrors) {
   EXPECT_EQ(text_of({.datatype = 3}), "byte 70: datatype 3 is none of NIfTI's");
   EXPECT_EQ(text_of({.slope = 1, .intercept = kNan}), "byte 116: scl_inter is not a finite number");
   for (const int datatype : {1, 32, 128, 1536, 1792, 2048, 2304}) {
-    EXPECT_EQ(error_of(NiftiFile{.datatype = datatype}.bytes(twelve())).code, ErrorCode::Unsupported) << datatype;
+    EXPECT_EQ(error_in(NiftiFile{.datatype = datatype}.bytes(twelve())).code, ErrorCode::Unsupported) << datatype;
   }
   EXPECT_EQ(text_of({.datatype = 128}), "byte 70: the values are colours, not plain numbers of up to 64 bits");
   EXPECT_EQ(text_of({.magic = "ni1"}), "the header of a pair, whose values are in a file of their own (.img)");
-  EXPECT_EQ(to_string(error_of({})), "neither NIfTI nor NRRD");
+  EXPECT_EQ(to_string(error_in({})), "neither NIfTI nor NRRD");
 }
 
 TEST(VolumeHostile, OffsetsWithinCompressedFilesSayWhatTheyCount) {
-  EXPECT_EQ(to_string(error_of(gzipped(NiftiFile{.dim = {0}}.bytes(twelve())))),
+  EXPECT_EQ(to_string(error_in(gzipped(NiftiFile{.dim = {0}}.bytes(twelve())))),
             "byte 40: dim[0] is 0; it must be 1 to 7 (counted after decompression)");
 }
 
@@ -156,12 +156,12 @@ TEST(VolumeHostile, BombsOfGzipAreErrors) {
   NiftiFile file{.dim = {3, 512, 512, 256}};
   const Bytes bomb = gzipped(file.bytes(Bytes(std::size_t{1} << 26)));
   ASSERT_LT(bomb.size(), std::size_t{70'000});
-  EXPECT_EQ(error_of(bomb, {.max_values = 1 << 20}).code, ErrorCode::LimitExceeded);
+  EXPECT_EQ(error_in(bomb, {.max_values = 1 << 20}).code, ErrorCode::LimitExceeded);
   file.dim = {3, 1, 1, 1};
   EXPECT_EQ(read_volume(gzipped(file.bytes(Bytes(std::size_t{1} << 26)))).value().values.size(), 1U);
   // More than so few bytes can hold.
   file.dim = {3, 1000, 1000, 1000};
-  const Error lie = error_of(gzipped(file.bytes(twelve())));
+  const Error lie = error_in(gzipped(file.bytes(twelve())));
   EXPECT_EQ(lie.code, ErrorCode::BadFormat);
   EXPECT_NE(lie.message.find("but there are at most"), std::string::npos) << lie.message;
 }
@@ -169,7 +169,7 @@ TEST(VolumeHostile, BombsOfGzipAreErrors) {
 TEST(VolumeHostile, DamagedCompressionIsAnErrorEvenBehindTheValues) {
   Bytes bytes = gzipped(NiftiFile{}.bytes(twelve()));
   bytes[bytes.size() - 6] ^= std::byte{1};
-  EXPECT_NE(to_string(error_of(bytes)).find("the compressed data are damaged"), std::string::npos);
+  EXPECT_NE(to_string(error_in(bytes)).find("the compressed data are damaged"), std::string::npos);
 }
 
 TEST(VolumeHostile, TheCorpusIsHarmless) {

@@ -12,9 +12,9 @@ using volume_test::Bytes;
 using volume_test::encode;
 using volume_test::gzipped;
 using volume_test::kNiftiTypes;
+using volume_test::kTwelve;
 using volume_test::NiftiFile;
-
-const std::vector<double> kTwelve = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
+using volume_test::position_of;
 
 Volume volume_of(const NiftiFile& file, const Bytes& values) {
   const auto volume = read_volume(file.bytes(values));
@@ -25,10 +25,6 @@ Volume volume_of(const NiftiFile& file, const Bytes& values) {
 /// A volume of twelve bytes, whose values do not matter.
 Volume placed(const NiftiFile& file) {
   return volume_of(file, encode(kTwelve, ScalarType::UInt8));
-}
-
-DVec3 at(const Volume& volume, DVec3 voxel) {
-  return DVec3(volume.world_from_voxel * glm::dvec4(voxel, 1.0));
 }
 
 void expect_near(DVec3 a, DVec3 b) {
@@ -104,7 +100,7 @@ TEST(Nifti, WithoutAFormTheSpacingPlacesSamples) {
   const Volume volume = placed(file);
   EXPECT_EQ(volume.spacing, DVec3(2, 3, 4));
   // Right, front, head become -X, +Z, +Y.
-  expect_near(at(volume, {1, 1, 1}), {-2, 4, 3});
+  expect_near(position_of(volume, {1, 1, 1}), {-2, 4, 3});
   EXPECT_GT(glm::determinant(volume.world_from_voxel), 0.0);
 }
 
@@ -117,12 +113,12 @@ TEST(Nifti, TheSformGoesBeforeTheQform) {
   // i runs to the left, as many scans do; j up; k to the front.
   file.srow = {-2, 0, 0, 10, 0, 0, 2, 20, 0, 2, 0, 30};
   const Volume volume = placed(file);
-  expect_near(at(volume, {0, 0, 0}), {-10, 30, 20});
-  expect_near(at(volume, {1, 0, 0}), {-8, 30, 20});
-  expect_near(at(volume, {0, 1, 0}), {-10, 32, 20});
-  expect_near(at(volume, {0, 0, 1}), {-10, 30, 22});
+  expect_near(position_of(volume, {0, 0, 0}), {-10, 30, 20});
+  expect_near(position_of(volume, {1, 0, 0}), {-8, 30, 20});
+  expect_near(position_of(volume, {0, 1, 0}), {-10, 32, 20});
+  expect_near(position_of(volume, {0, 0, 1}), {-10, 30, 22});
   file.sform_code = 0;
-  expect_near(at(placed(file), {0, 0, 0}), {-7, 7, 7});
+  expect_near(position_of(placed(file), {0, 0, 0}), {-7, 7, 7});
 }
 
 TEST(Nifti, TheQformTurnsAndQfacFlipsTheThirdAxis) {
@@ -134,16 +130,16 @@ TEST(Nifti, TheQformTurnsAndQfacFlipsTheThirdAxis) {
     file.quaternion = {0, 0, std::sqrt(0.5), 5, 6, 7};
     const Volume volume = placed(file);
     const auto ras = [](DVec3 p) { return DVec3(-p.x, p.z, p.y); };
-    expect_near(at(volume, {0, 0, 0}), ras({5, 6, 7}));
-    expect_near(at(volume, {1, 0, 0}), ras({5, 8, 7}));
-    expect_near(at(volume, {0, 1, 0}), ras({2, 6, 7}));
-    expect_near(at(volume, {0, 0, 1}), ras({5, 6, 3}));
+    expect_near(position_of(volume, {0, 0, 0}), ras({5, 6, 7}));
+    expect_near(position_of(volume, {1, 0, 0}), ras({5, 8, 7}));
+    expect_near(position_of(volume, {0, 1, 0}), ras({2, 6, 7}));
+    expect_near(position_of(volume, {0, 0, 1}), ras({5, 6, 3}));
     EXPECT_LT(glm::determinant(volume.world_from_voxel), 0.0) << "stored mirrored";
     file.pixdim[0] = 0;
-    expect_near(at(placed(file), {0, 0, 1}), ras({5, 6, 11}));
+    expect_near(position_of(placed(file), {0, 0, 1}), ras({5, 6, 11}));
     // Rounding left no room for the real part: half a turn about the first axis.
     file.quaternion = {1.0000001, 0, 0, 0, 0, 0};
-    expect_near(at(placed(file), {0, 1, 0}), ras({0, -3, 0}));
+    expect_near(position_of(placed(file), {0, 1, 0}), ras({0, -3, 0}));
   }
 }
 
@@ -152,7 +148,7 @@ TEST(Nifti, FormsThatPlaceNothingAreLeftOutWithAWarning) {
   file.sform_code = 1;
   Volume volume = placed(file);
   EXPECT_TRUE(warns(volume, "sform"));
-  expect_near(at(volume, {1, 0, 0}), {-1, 0, 0});
+  expect_near(position_of(volume, {1, 0, 0}), {-1, 0, 0});
   file.srow = {1, 0, 0, std::nan(""), 0, 1, 0, 0, 0, 0, 1, 0};
   EXPECT_TRUE(warns(placed(file), "sform"));
   file.sform_code = 0;

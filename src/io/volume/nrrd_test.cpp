@@ -10,9 +10,9 @@ namespace {
 using volume_test::Bytes;
 using volume_test::encode;
 using volume_test::gzipped;
-
-const std::vector<double> kTwelve = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
-const std::vector<float> kTwelveFloats(kTwelve.begin(), kTwelve.end());
+using volume_test::kTwelve;
+using volume_test::kTwelveFloats;
+using volume_test::position_of;
 
 Bytes file_of(const std::string& header, const Bytes& data) {
   Bytes bytes;
@@ -36,10 +36,6 @@ Volume volume_of(const Bytes& bytes) {
 std::string error_of(const Bytes& bytes) {
   const auto volume = read_volume(bytes);
   return volume ? "none" : to_string(volume.error());
-}
-
-DVec3 at(const Volume& volume, DVec3 voxel) {
-  return DVec3(volume.world_from_voxel * glm::dvec4(voxel, 1.0));
 }
 
 TEST(Nrrd, EveryTypeByEveryNameInEveryOrderIsRead) {
@@ -87,7 +83,7 @@ TEST(Nrrd, LinesMayEndInTwoCharactersAndFieldsInBlanks) {
 TEST(Nrrd, SpacingsPlaceSamplesLikeVoxels) {
   const Volume volume = volume_of(tiny("spacings: 2 0.5 +4\n"));
   EXPECT_EQ(volume.spacing, DVec3(2, 0.5, 4));
-  EXPECT_EQ(at(volume, {1, 1, 1}), DVec3(2, 4, -0.5));
+  EXPECT_EQ(position_of(volume, {1, 1, 1}), DVec3(2, 4, -0.5));
   EXPECT_EQ(volume_of(tiny("spacings: 2 nan 4\n")).spacing, DVec3(2, 1, 4));
   const Volume turned = volume_of(tiny("spacings: 2 -3 4\n"));
   EXPECT_EQ(turned.spacing, DVec3(2, 3, 4));
@@ -100,16 +96,16 @@ TEST(Nrrd, DirectionsAndOriginPlaceSamples) {
                      "space origin: (10,20,30)\nspace units: \"mm\" \"mm\" \"mm\"\n"));
   EXPECT_EQ(volume.spacing, DVec3(2, 3, 4));
   EXPECT_EQ(volume.units, "mm");
-  EXPECT_EQ(at(volume, {0, 0, 0}), DVec3(10, 30, -20));
-  EXPECT_EQ(at(volume, {1, 0, 0}), DVec3(12, 30, -20));
-  EXPECT_EQ(at(volume, {0, 1, 0}), DVec3(10, 33, -20));
-  EXPECT_EQ(at(volume, {0, 0, 1}), DVec3(10, 30, -16));
+  EXPECT_EQ(position_of(volume, {0, 0, 0}), DVec3(10, 30, -20));
+  EXPECT_EQ(position_of(volume, {1, 0, 0}), DVec3(12, 30, -20));
+  EXPECT_EQ(position_of(volume, {0, 1, 0}), DVec3(10, 33, -20));
+  EXPECT_EQ(position_of(volume, {0, 0, 1}), DVec3(10, 30, -16));
 }
 
 /// The same point of a body, said in each space, lies in the same place.
 TEST(Nrrd, TheSameBodyInEverySpaceIsTheSame) {
   const auto origin = [](const std::string& space, const std::string& vector) {
-    return at(volume_of(tiny("space: " + space + "\nspace origin: (" + vector + ")\n")), {0, 0, 0});
+    return position_of(volume_of(tiny("space: " + space + "\nspace origin: (" + vector + ")\n")), {0, 0, 0});
   };
   // 1 to the right, 2 to the front, 3 up.
   const DVec3 expected(-1, 3, 2);

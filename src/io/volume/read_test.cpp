@@ -11,10 +11,9 @@ namespace {
 
 using volume_test::Bytes;
 using volume_test::encode;
+using volume_test::kTwelve;
+using volume_test::kTwelveFloats;
 using volume_test::NiftiFile;
-
-const std::vector<double> kTwelve = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
-const std::vector<float> kTwelveFloats(kTwelve.begin(), kTwelve.end());
 
 TEST(VolumeFiles, RawFilesAreReadAsTheyAreSaidToBe) {
   const TestFolder folder("raw_volume");

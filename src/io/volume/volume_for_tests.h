@@ -18,6 +18,15 @@ namespace quoin::volume_test {
 
 using Bytes = std::vector<std::byte>;
 
+/// What most files of tests hold: 3 x 2 x 2 samples.
+inline const std::vector<double> kTwelve = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
+inline const std::vector<float> kTwelveFloats(kTwelve.begin(), kTwelve.end());
+
+/// Where a sample is in the world.
+inline DVec3 position_of(const Volume& volume, DVec3 voxel) {
+  return DVec3(volume.world_from_voxel * glm::dvec4(voxel, 1.0));
+}
+
 /// Writes a number of either byte order at `at`. Requires: there is room.
 template <class T>
 void put(Bytes& bytes, std::size_t at, T value, std::endian order = std::endian::little) {

@@ -30,7 +30,7 @@ std::vector<std::byte> bytes_of(std::string_view text) {
   return {bytes.begin(), bytes.end()};
 }
 
-FileBuilder one_voxel() {
+FileBuilder file_of_one_voxel() {
   FileBuilder builder;
   builder.model(1, 1, 1, {{0, 0, 0, 1}});
   return builder;
@@ -130,7 +130,7 @@ TEST(VoxHostile, SizesBeyondTheFormatAreErrors) {
 
 TEST(VoxHostile, CountsBeyondTheBytesAreErrors) {
   const auto with_words = [](std::string_view id, const std::vector<std::uint32_t>& words) {
-    return one_voxel()
+    return file_of_one_voxel()
         .with(id,
               [&](auto& out) {
                 for (const std::uint32_t word : words) out.u32(word);
@@ -153,19 +153,19 @@ TEST(VoxHostile, CountsBeyondTheBytesAreErrors) {
 }
 
 TEST(VoxHostile, ChunksBeyondTheFileAreErrors) {
-  std::vector<std::byte> bytes = one_voxel().file();
+  std::vector<std::byte> bytes = file_of_one_voxel().file();
   bytes[16] = std::byte{44 + 21};
   EXPECT_EQ(text_of(bytes), "byte 8: chunk MAIN claims 65 bytes, but 44 are left");
-  bytes = one_voxel().file();
+  bytes = file_of_one_voxel().file();
   bytes[27] = std::byte{0xFF};
   EXPECT_EQ(text_of(bytes), "byte 20: chunk SIZE claims 4278190092 bytes, but 32 are left");
-  bytes = one_voxel().file();
+  bytes = file_of_one_voxel().file();
   bytes[8] = std::byte{'N'};
   EXPECT_EQ(text_of(bytes), "byte 8: the first chunk must be MAIN, not \"NAIN\"");
 }
 
 TEST(VoxHostile, WhatFollowsMainIsSkippedWithAWarning) {
-  std::vector<std::byte> bytes = one_voxel().file();
+  std::vector<std::byte> bytes = file_of_one_voxel().file();
   bytes.resize(bytes.size() + 9);
   const auto loaded = read_vox(bytes);
   ASSERT_TRUE(loaded);
@@ -180,22 +180,26 @@ TEST(VoxHostile, SizesAndVoxelsComeInPairs) {
 }
 
 TEST(VoxHostile, GraphsThatAreNoGraphsAreErrors) {
-  EXPECT_EQ(text_of(one_voxel().transform(0, 0, {{}}).file()), "byte 64: node 0 is below itself");
-  EXPECT_EQ(text_of(one_voxel().transform(0, 1, {{}}).group(1, {2}).transform(2, 1, {{}}).file()),
+  EXPECT_EQ(text_of(file_of_one_voxel().transform(0, 0, {{}}).file()), "byte 64: node 0 is below itself");
+  EXPECT_EQ(text_of(file_of_one_voxel().transform(0, 1, {{}}).group(1, {2}).transform(2, 1, {{}}).file()),
             "byte 104: node 1 is below itself");
-  EXPECT_EQ(text_of(one_voxel().group(1, {2}).group(2, {1}).file()), "byte 64: node 1 is below itself");
-  EXPECT_EQ(text_of(one_voxel().transform(0, 9, {{}}).file()), "byte 64: node 0 refers to node 9, which is not there");
-  EXPECT_EQ(text_of(one_voxel().transform(0, 1, {{}}).shape(1, 4).file()),
+  EXPECT_EQ(text_of(file_of_one_voxel().group(1, {2}).group(2, {1}).file()), "byte 64: node 1 is below itself");
+  EXPECT_EQ(text_of(file_of_one_voxel().transform(0, 9, {{}}).file()),
+            "byte 64: node 0 refers to node 9, which is not there");
+  EXPECT_EQ(text_of(file_of_one_voxel().transform(0, 1, {{}}).shape(1, 4).file()),
             "byte 104: node 1 shows model 4, but there are 1");
-  EXPECT_EQ(text_of(one_voxel().transform(0, 1, {{}}).shape(1, 0).shape(1, 0).file()),
+  EXPECT_EQ(text_of(file_of_one_voxel().transform(0, 1, {{}}).shape(1, 0).shape(1, 0).file()),
             "byte 136: node 1 is there twice");
   EXPECT_EQ(
-      text_of(one_voxel().transform(0, 1, {{}}).shape(1, std::vector<std::pair<std::uint32_t, Entries>>{}).file()),
+      text_of(
+          file_of_one_voxel().transform(0, 1, {{}}).shape(1, std::vector<std::pair<std::uint32_t, Entries>>{}).file()),
       "byte 104: chunk nSHP has no model");
 }
 
 TEST(VoxHostile, TransformsThatAreNoTransformsAreErrors) {
-  const auto with_frame = [](const Entries& frame) { return one_voxel().transform(0, 1, {frame}).shape(1, 0).file(); };
+  const auto with_frame = [](const Entries& frame) {
+    return file_of_one_voxel().transform(0, 1, {frame}).shape(1, 0).file();
+  };
   for (const char* r : {"0", "3", "5", "10", "-1", "256", "4.0", "x", "99999999999999999999"}) {
     EXPECT_EQ(text_of(with_frame({{"_r", r}})), "byte 64: chunk nTRN has the rotation \"" + std::string(r) + "\"");
   }
@@ -206,7 +210,7 @@ TEST(VoxHostile, TransformsThatAreNoTransformsAreErrors) {
 }
 
 TEST(VoxHostile, HugeTranslationsAddUpWithoutOverflow) {
-  FileBuilder builder = one_voxel();
+  FileBuilder builder = file_of_one_voxel();
   constexpr int kDepth = 100;
   for (int i = 0; i < kDepth; ++i) builder.transform(i, i + 1, {{{"_t", "2147483647 -2147483648 0"}}});
   builder.shape(kDepth, 0);
@@ -220,7 +224,7 @@ TEST(VoxHostile, HugeTranslationsAddUpWithoutOverflow) {
 }
 
 TEST(VoxHostile, AMillionNestedGroupsAreWalked) {
-  FileBuilder builder = one_voxel();
+  FileBuilder builder = file_of_one_voxel();
   constexpr int kDepth = 1'000'000;
   builder.transform(0, 1, {{}});
   for (int i = 1; i < kDepth; ++i) builder.group(i, {i + 1});
@@ -232,7 +236,7 @@ TEST(VoxHostile, AMillionNestedGroupsAreWalked) {
 
 /// 64 groups, each of which holds the next one twice: 2^64 ways down.
 FileBuilder doubling_graph() {
-  FileBuilder builder = one_voxel();
+  FileBuilder builder = file_of_one_voxel();
   builder.transform(0, 1, {{}});
   for (int i = 1; i <= 64; ++i) builder.group(i, {i + 1, i + 1});
   return builder;
@@ -244,7 +248,7 @@ TEST(VoxHostile, NodesWithSeveralParentsCannotMultiplyWithoutBound) {
 }
 
 TEST(VoxHostile, LongNamesCannotMultiplyWithoutBound) {
-  FileBuilder builder = one_voxel();
+  FileBuilder builder = file_of_one_voxel();
   std::vector<std::int32_t> children(60'000, 2);
   builder.transform(0, 1, {{}}).group(1, children);
   builder.transform(2, 3, {{}}, {{"_name", std::string(100'000, 'n')}}).shape(3, 0);
@@ -270,7 +274,7 @@ TEST(VoxHostile, ScatteredVoxelsCannotTakeMemoryWithoutBound) {
 // Real writers have counted headers among MAIN's children.
 TEST(VoxHostile, AMainThatClaimsAFewBytesTooManyIsReadWhenAllWithinIsSound) {
   for (const int more : {1, 8, 12, 20}) {
-    std::vector<std::byte> bytes = one_voxel().file();
+    std::vector<std::byte> bytes = file_of_one_voxel().file();
     bytes[16] = static_cast<std::byte>(44 + more);
     const auto loaded = read_vox(bytes);
     ASSERT_TRUE(loaded) << to_string(loaded.error());

@@ -131,8 +131,9 @@ TEST(PackedVoxels, BombsStayWithinTheBoundsOfModels) {
   std::vector<std::byte> box(std::size_t{256} * 256 * 256);
   // A voxel in every slab of every chunk: dear, and small in the file.
   for (std::size_t i = 0; i < box.size(); i += 1'024) box[i] = std::byte{static_cast<unsigned char>(1 + i % 255)};
+  const auto packed = deflated(box, End::Proper);
   FileBuilder file;
-  for (int i = 0; i < 40; ++i) add_packed(file, IVec3(256), deflated(box, End::Proper));
+  for (int i = 0; i < 40; ++i) add_packed(file, IVec3(256), packed);
   const auto loaded = read_vox(file.file());
   if (!loaded) {
     EXPECT_EQ(loaded.error().code, ErrorCode::LimitExceeded);

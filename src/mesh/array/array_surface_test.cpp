@@ -241,9 +241,9 @@ TEST(ArraySurface, RepeatsSamplesAlongAStrideOfZero) {
 
 template <class T>
 class ArrayTypes : public testing::Test {};
-using Types = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t, std::uint32_t, std::int32_t,
-                             std::uint64_t, std::int64_t, float, double>;
-TYPED_TEST_SUITE(ArrayTypes, Types);
+using SampleTypes = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t, std::uint32_t, std::int32_t,
+                                   std::uint64_t, std::int64_t, float, double>;
+TYPED_TEST_SUITE(ArrayTypes, SampleTypes);
 
 // Whole numbers from 0 to 100 are the same in all.
 TYPED_TEST(ArrayTypes, AllMakeTheSameSurface) {

@@ -268,9 +268,9 @@ TEST(LabelSurfaces, FaceOutwardsInMirroredSpace) {
 
 template <class T>
 class LabelTypes : public testing::Test {};
-using Types = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t, std::uint32_t, std::int32_t,
-                             std::uint64_t, std::int64_t>;
-TYPED_TEST_SUITE(LabelTypes, Types);
+using LabelSampleTypes = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t, std::uint32_t,
+                                        std::int32_t, std::uint64_t, std::int64_t>;
+TYPED_TEST_SUITE(LabelTypes, LabelSampleTypes);
 
 TYPED_TEST(LabelTypes, AllMakeTheSameSurfaces) {
   const auto bytes = scattered<std::uint8_t>({18, 9, 66}, 25);

@@ -85,7 +85,7 @@ TEST_P(NeighbourOffset, AloneHidesAndDarkens) {
 
 INSTANTIATE_TEST_SUITE_P(Offsets, NeighbourOffset, testing::Range(0, 27));
 
-struct World {
+struct LitWorld {
   Grid grid;
   VoxelRegistry types;
   FaceSet lit;
@@ -93,11 +93,11 @@ struct World {
 };
 
 /// Worlds whose chunks have 1 to 16 bits a voxel, with and without transparent types, spanning 27 chunks.
-std::vector<World> worlds_of_all_widths() {
-  std::vector<World> worlds;
+std::vector<LitWorld> worlds_of_all_widths() {
+  std::vector<LitWorld> worlds;
   for (const bool transparent : {false, true}) {
     for (const int types : {1, 3, 12, 200, 900}) {
-      World world;
+      LitWorld world;
       world.types = many_types(types, transparent);
       const auto seed = static_cast<unsigned>(types * 2 + transparent);
       world.grid = oracle::random_world(seed, {IVec3{-5}, IVec3{69}}, types, 0.01);
@@ -133,7 +133,7 @@ class MesherReuse : public testing::TestWithParam<InstructionSet> {};
 // Of the plain kernel the oracle alone is asked, of the others that they give its bytes too.
 TEST_P(MesherReuse, RandomSequencesOfChunksRegionsAndOptionsAgreeWithTheOracle) {
   QUOIN_SKIP_WITHOUT(GetParam());
-  const std::vector<World> worlds = worlds_of_all_widths();
+  const std::vector<LitWorld> worlds = worlds_of_all_widths();
   std::mt19937 random(11);
   BlockyMesher mesher = made_with<BlockyMesher>(GetParam());
   BlockyMesher plain = made_with<BlockyMesher>(InstructionSet::Plain);
@@ -141,7 +141,7 @@ TEST_P(MesherReuse, RandomSequencesOfChunksRegionsAndOptionsAgreeWithTheOracle) 
   QuadBuffer plain_quads;
   FaceRows rows;
   for (int round = 0; round < 300; ++round) {
-    const World& world = worlds[random() % worlds.size()];
+    const LitWorld& world = worlds[random() % worlds.size()];
     const auto near = [&] { return static_cast<int>(random() % 3) - 1; };
     const IVec3 chunk = random() % 2 == 0 ? IVec3{0} : IVec3{near(), near(), near()};
     const QuadOptions options = random_options(random);

@@ -21,7 +21,7 @@ void expect_same_bytes(const Buffer<T>& a, const Buffer<T>& b, const char* what)
   }
 }
 
-void expect_same(const SmoothChunkMesh& a, const SmoothChunkMesh& b) {
+void expect_same_mesh(const SmoothChunkMesh& a, const SmoothChunkMesh& b) {
   expect_same_bytes(a.positions, b.positions, "positions");
   expect_same_bytes(a.normals, b.normals, "normals");
   expect_same_bytes(a.occlusion, b.occlusion, "occlusion");
@@ -68,7 +68,7 @@ TEST_P(SmoothKernels, GiveTheOraclesBytes) {
       ASSERT_GT(expected.indices.size(), 0U);
       for (SmoothMesher& mesher : meshers) {
         mesher.mesh(chunks, options, mesh);
-        expect_same(mesh, expected);
+        expect_same_mesh(mesh, expected);
       }
     }
   }

@@ -17,6 +17,7 @@
 #include "mesh/smooth/surface_check_for_tests.h"
 #include "mesh/surface/manifold.h"
 #include "mesh/surface/triangle_tree.h"
+#include "mesh/surface/welded_for_tests.h"
 
 namespace quoin {
 
@@ -158,19 +159,6 @@ TEST_F(Simplify, RandomBlobsStayClosed) {
     }
   }
   EXPECT_GT(tried, 5);
-}
-
-/// The vertices of each place as one.
-SmoothMesh welded(const SmoothMesh& mesh) {
-  SmoothMesh whole;
-  std::map<std::array<float, 3>, std::uint32_t> known;
-  for (const std::uint32_t index : mesh.indices) {
-    const Vec3 p = mesh.positions[index];
-    const auto [found, is_new] = known.try_emplace({p.x, p.y, p.z}, static_cast<std::uint32_t>(whole.positions.size()));
-    if (is_new) whole.positions.push_back(p);
-    whole.indices.push_back(found->second);
-  }
-  return whole;
 }
 
 /// By looking at every triangle.

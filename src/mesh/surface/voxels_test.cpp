@@ -21,6 +21,7 @@
 #include "mesh/surface/bodies.h"
 #include "mesh/surface/build.h"
 #include "mesh/surface/shape.h"
+#include "mesh/surface/welded_for_tests.h"
 
 namespace quoin {
 namespace {
@@ -64,19 +65,6 @@ Place place_of(Vec3 position) {
   position += 0.0F;  // no -0
   std::memcpy(place.data(), &position, sizeof place);
   return place;
-}
-
-/// A mesh whose vertices of one place are one.
-SmoothMesh welded(const SmoothMesh& mesh) {
-  SmoothMesh whole;
-  std::map<Place, std::uint32_t> known;
-  for (const std::uint32_t index : mesh.indices) {
-    const auto [found, is_new] =
-        known.try_emplace(place_of(mesh.positions[index]), static_cast<std::uint32_t>(whole.positions.size()));
-    if (is_new) whole.positions.push_back(mesh.positions[index]);
-    whole.indices.push_back(found->second);
-  }
-  return whole;
 }
 
 DBox bounds_of(const SmoothMesh& mesh) {

@@ -16,10 +16,10 @@ namespace {
 
 constexpr std::size_t kRoom = ImpostorCacheOptions{}.max_bytes;
 
-struct World {
+struct CacheWorld {
   Scene scene;
   std::vector<GridHandle> grids;
-  explicit World(int count) {
+  explicit CacheWorld(int count) {
     scene.types = workloads::three_types();
     for (int i = 0; i < count; ++i) {
       SceneGrid grid;
@@ -35,7 +35,7 @@ bool shows(const Impostor& impostor, VoxelType type) {
 }
 
 TEST(ImpostorCache, BuildsWhatIsAskedFor) {
-  World world(3);
+  CacheWorld world(3);
   ImpostorCache cache;
   for (const GridHandle grid : world.grids) static_cast<void>(cache.find(world.scene, grid));
   for (const GridHandle grid : world.grids) static_cast<void>(cache.find(world.scene, grid));  // asked for once
@@ -48,7 +48,7 @@ TEST(ImpostorCache, BuildsWhatIsAskedFor) {
 }
 
 TEST(ImpostorCache, KeepsTheOldOneUntilTheEditedGridsIsReady) {
-  World world(2);
+  CacheWorld world(2);
   ImpostorCache cache;
   EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
   EXPECT_EQ(cache.wait(world.scene), 0U);
@@ -67,7 +67,7 @@ TEST(ImpostorCache, KeepsTheOldOneUntilTheEditedGridsIsReady) {
 }
 
 TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
-  World world(1);
+  CacheWorld world(1);
   ImpostorCache cache;
   const auto ready = [&] {
     static_cast<void>(cache.find(world.scene, world.grids[0]));
@@ -89,8 +89,8 @@ TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
 }
 
 TEST(ImpostorCache, ThoseOfAnotherScenesGridsAreNotSeenMeanwhile) {
-  const World first(2);
-  const World second(2);
+  const CacheWorld first(2);
+  const CacheWorld second(2);
   ASSERT_EQ(first.grids, second.grids) << "else this tests nothing";
   ImpostorCache cache;
   static_cast<void>(cache.find(first.scene, first.grids[0]));
@@ -108,7 +108,7 @@ TEST(ImpostorCache, ThoseOfAnotherScenesGridsAreNotSeenMeanwhile) {
 }
 
 TEST(ImpostorCache, SeesTypesThatWereRegisteredAfterTheirVoxels) {
-  World world(1);
+  CacheWorld world(1);
   const auto type = static_cast<VoxelType>(world.scene.types.size());
   world.scene.edit(world.grids[0]).grid.fill_box({{0, 0, 0}, {1, 3, 4}}, type);
   ImpostorCache cache;
@@ -126,7 +126,7 @@ TEST(ImpostorCache, SeesTypesThatWereRegisteredAfterTheirVoxels) {
 }
 
 TEST(ImpostorCache, DropsWhatWasUsedLongestAgo) {
-  World world(3);
+  CacheWorld world(3);
   const std::size_t one = Impostor::build(world.scene.grids()[world.grids[2]].grid, world.scene.types).bytes();
   ImpostorCache cache({.max_bytes = 2 * one, .workers = {1}});
   for (const std::size_t i : {0U, 1U}) {
@@ -145,7 +145,7 @@ TEST(ImpostorCache, DropsWhatWasUsedLongestAgo) {
 }
 
 TEST(ImpostorCache, HoldsNothingThatIsLargerThanItsRoom) {
-  World world(1);
+  CacheWorld world(1);
   ImpostorCache cache({.max_bytes = 1000, .workers = {1}});
   EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
   EXPECT_EQ(cache.wait(world.scene), 0U);
@@ -156,7 +156,7 @@ TEST(ImpostorCache, HoldsNothingThatIsLargerThanItsRoom) {
 }
 
 TEST(ImpostorCache, ForgetsGridsThatAreGone) {
-  World world(2);
+  CacheWorld world(2);
   ImpostorCache cache;
   EXPECT_EQ(cache.find(world.scene, world.grids[0]), nullptr);
   world.scene.remove_grid(world.grids[0]);
@@ -166,7 +166,7 @@ TEST(ImpostorCache, ForgetsGridsThatAreGone) {
 }
 
 TEST(ImpostorCache, MayBeAskedWhileOthersBuild) {
-  World world(8);
+  CacheWorld world(8);
   ImpostorCache cache({.max_bytes = kRoom, .workers = {2}});
   std::thread other([&] { EXPECT_EQ(cache.wait(world.scene), 0U); });
   for (std::size_t ready = 0; ready < world.grids.size();) {
@@ -178,7 +178,7 @@ TEST(ImpostorCache, MayBeAskedWhileOthersBuild) {
 }
 
 TEST(ImpostorCache, WorkersBuildWhileNobodyWaits) {
-  World world(3);
+  CacheWorld world(3);
   ImpostorCache cache({.max_bytes = kRoom, .workers = {1}});
   for (const GridHandle grid : world.grids) static_cast<void>(cache.find(world.scene, grid));
   while (cache.stats().waiting > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -187,7 +187,7 @@ TEST(ImpostorCache, WorkersBuildWhileNobodyWaits) {
 }
 
 TEST(ImpostorCache, AnEditRebuildsFromTheOneBefore) {
-  World world(1);
+  CacheWorld world(1);
   Grid& grid = world.scene.edit(world.grids[0]).grid;
   grid.fill_box({{0, 0, 0}, {40, 40, 40}}, 1);
   ImpostorCache cache;
@@ -215,7 +215,7 @@ TEST(ImpostorCache, AnEditRebuildsFromTheOneBefore) {
 }
 
 TEST(ImpostorCache, OtherOptionsAskForAnotherOne) {
-  World world(1);
+  CacheWorld world(1);
   ImpostorCache cache;
   const auto ready = [&](int edge) {
     static_cast<void>(cache.find(world.scene, world.grids[0], {edge}));
@@ -229,7 +229,7 @@ TEST(ImpostorCache, OtherOptionsAskForAnotherOne) {
 
 TEST(ImpostorCache, CanEndInTheMiddle) {
   for (int i = 0; i < 10; ++i) {
-    World world(6);
+    CacheWorld world(6);
     ImpostorCache cache({.max_bytes = kRoom, .workers = {2}});
     for (const GridHandle grid : world.grids) static_cast<void>(cache.find(world.scene, grid));
   }
@@ -237,7 +237,7 @@ TEST(ImpostorCache, CanEndInTheMiddle) {
 
 // What a frame of a game does: no more than look things up, whatever is built.
 TEST(ImpostorCache, EditsEveryFrameNeverWaitForABuild) {
-  World world(1);
+  CacheWorld world(1);
   world.scene.edit(world.grids[0]).grid.fill_box({{0, 0, 0}, {160, 160, 160}}, 1);
   ImpostorCache cache({.max_bytes = kRoom, .workers = {1}});
   std::mt19937 random(5);

@@ -262,7 +262,7 @@ TEST(Capsule, IsNeverInFieldsThatItHasNotMet) {
   EXPECT_GT(hits, 30);
 }
 
-SlideOptions on_foot() {
+SlideOptions walking() {
   SlideOptions options;
   options.floor = FloorOptions{{0.0, 1.0, 0.0}, 50.0, 1.05, 0.3};
   return options;
@@ -277,7 +277,7 @@ TEST(Capsule, WalksLevelGroundStairsAndEdges) {
   Capsule player{0.4, {-10.0, 0.9 + 1e-3, 0.37}, {0.0, 0.5, 0.0}};
   bool was_blocked = false;
   for (int frame = 0; frame < 140; ++frame) {
-    const SlideResult moved_by = move_and_slide(tracer, player, {0.1, -0.05, 0.03}, on_foot());
+    const SlideResult moved_by = move_and_slide(tracer, player, {0.1, -0.05, 0.03}, walking());
     EXPECT_TRUE(moved_by.is_on_floor) << frame;
     was_blocked |= moved_by.is_blocked;
     player.centre = moved_by.centre;
@@ -287,7 +287,7 @@ TEST(Capsule, WalksLevelGroundStairsAndEdges) {
     }
   }
   for (int frame = 0; frame < 200; ++frame)
-    player.centre = move_and_slide(tracer, player, {0.1, -0.05, 0.0}, on_foot()).centre;
+    player.centre = move_and_slide(tracer, player, {0.1, -0.05, 0.0}, walking()).centre;
   EXPECT_NEAR(player.centre.y, 5.0 + 0.9, 3e-3) << "up the stairs";
 }
 
@@ -323,7 +323,7 @@ TEST(Capsule, IsPushedOutToANearFreePlace) {
       EXPECT_FALSE(overlaps(among, moved(capsule, other)).empty()) << i;
     }
   }
-  const SlideResult out = move_and_slide(tracer, player, {0.0, -0.01, 0.0}, on_foot());
+  const SlideResult out = move_and_slide(tracer, player, {0.0, -0.01, 0.0}, walking());
   EXPECT_TRUE(overlaps(tracer, moved(player, out.centre - player.centre)).empty());
 }
 

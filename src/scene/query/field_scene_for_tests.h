@@ -3,7 +3,6 @@
 // Scenes of fields that tests of queries share.
 
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <random>
 #include <utility>
@@ -14,9 +13,10 @@
 #include <quoin/core/oriented_box.h>
 #include <quoin/scene/scene.h>
 
+#include "core/not_finite_for_tests.h"
+
 namespace quoin {
 
-inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 inline constexpr VoxelType kStone = 1;
 inline constexpr VoxelType kWater = 2;  // does not collide
 inline constexpr VoxelType kWood = 3;

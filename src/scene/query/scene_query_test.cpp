@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include "scene/query/field_scene_for_tests.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin {
@@ -22,14 +23,6 @@ VoxelRegistry stone_and_ghost() {
   EXPECT_TRUE(types.add(properties).has_value());
   return types;
 }
-
-struct Random {
-  std::mt19937 engine;
-  explicit Random(unsigned seed) : engine(seed) {}
-  double share() { return std::uniform_real_distribution<double>(-1.0, 1.0)(engine); }
-  DVec3 vector() { return {share(), share(), share()}; }
-  DQuat rotation() { return glm::angleAxis(share() * std::numbers::pi, glm::normalize(vector())); }
-};
 
 Scene random_scene(Random& random, DVec3 away) {
   Scene scene;

@@ -8,17 +8,10 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include "scene/query/field_scene_for_tests.h"
+
 namespace quoin {
 namespace {
-
-struct Random {
-  std::mt19937 engine;
-  explicit Random(unsigned seed) : engine(seed) {}
-  double share() { return std::uniform_real_distribution<double>(-1.0, 1.0)(engine); }
-  DVec3 vector() { return {share(), share(), share()}; }
-  DVec3 direction() { return glm::normalize(vector()); }
-  DQuat rotation() { return glm::angleAxis(share() * std::numbers::pi, direction()); }
-};
 
 // A registry in which type 1 collides and type 2 does not.
 VoxelRegistry two_types() {
@@ -30,7 +23,7 @@ VoxelRegistry two_types() {
   return types;
 }
 
-Scene scene_of(Grid grid, DQuat rotation = {1, 0, 0, 0}, DVec3 position = DVec3(0.0)) {
+Scene scene_of_voxels(Grid grid, DQuat rotation = {1, 0, 0, 0}, DVec3 position = DVec3(0.0)) {
   Scene scene;
   scene.types = two_types();
   SceneGrid placed;
@@ -61,11 +54,6 @@ Scene random_scene(Random& random) {
     }
   }
   return scene;
-}
-
-OrientedBox moved(OrientedBox box, DVec3 by) {
-  box.centre += by;
-  return box;
 }
 
 TEST(Sweep, StopsExactlyBeforeTheFirstOverlap) {
@@ -108,7 +96,7 @@ TEST(Sweep, NeverTunnelsAtAnySpeed) {
   Random random(8);
   Grid wall;
   wall.fill_box({{-40, -40, 0}, {41, 41, 1}}, 1);
-  const Scene scene = scene_of(std::move(wall), random.rotation());
+  const Scene scene = scene_of_voxels(std::move(wall), random.rotation());
   const SceneTracer tracer(scene);
   const DVec3 normal = scene.instances()[scene.instances().handles()[0]].rotation * DVec3(0, 0, 1);
   for (const double speed : {3.0, 100.0, 1e4, 1e6}) {
@@ -127,7 +115,7 @@ TEST(Sweep, ReadsOnlyWhatCollidesAndIgnoresImpossibleNumbers) {
   Grid grid;
   grid.set({0, 0, 0}, 2);
   grid.set({0, 0, 5}, 1);
-  const Scene scene = scene_of(std::move(grid));
+  const Scene scene = scene_of_voxels(std::move(grid));
   const SceneTracer tracer(scene);
   const OrientedBox box{{0.5, 0.5, -3.0}, DVec3(0.25), {0, 0, 0, 0}};
   const auto hit = sweep_box(tracer, box, {0, 0, 20});
@@ -149,7 +137,7 @@ TEST(Sweep, RestingNeitherSinksNorJitters) {
     Grid floor;
     floor.fill_box({{-30, -2, -30}, {31, 1, 31}}, 1);
     const DQuat rotation = random.rotation();
-    const Scene scene = scene_of(std::move(floor), rotation, away);
+    const Scene scene = scene_of_voxels(std::move(floor), rotation, away);
     const SceneTracer tracer(scene);
     const DVec3 up = rotation * DVec3(0, 1, 0);
     OrientedBox box{away + up * 3.0, {0.4, 0.9, 0.4}, rotation};
@@ -172,7 +160,7 @@ TEST(Sweep, SlidesAlongWallsAndStopsInCorners) {
   Random random(17);
   for (int turn = 0; turn < 4; ++turn) {
     const DQuat rotation = turn == 0 ? DQuat(1, 0, 0, 0) : random.rotation();
-    const Scene scene = scene_of(room.snapshot(), rotation);
+    const Scene scene = scene_of_voxels(room.snapshot(), rotation);
     const SceneTracer tracer(scene);
     const OrientedBox box{rotation * DVec3(10.3, 10.1, 10.2), DVec3(0.6), rotation};
     // Over the floor: what goes down is dropped, the rest kept, across the borders of its voxels.
@@ -196,7 +184,7 @@ TEST(Sweep, SlidesAlongWallsAndStopsInCorners) {
 TEST(Sweep, MovesOutOfWhatItStartsIn) {
   Grid floor;
   floor.fill_box({{-5, -3, -5}, {6, 1, 6}}, 1);
-  const Scene scene = scene_of(std::move(floor));
+  const Scene scene = scene_of_voxels(std::move(floor));
   const SceneTracer tracer(scene);
   const OrientedBox box{{0.5, 1.2, 0.5}, DVec3(0.4), {1, 0, 0, 0}};
   const auto hit = sweep_box(tracer, box, {0.1, 0, 0});

@@ -1,16 +1,14 @@
 #include "scene/tracer/instance_tree.h"
 
-#include <limits>
 #include <set>
 
 #include <gtest/gtest.h>
 
+#include "core/not_finite_for_tests.h"
 #include "scene/query/box_test_support.h"
 
 namespace quoin {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::set<std::size_t> visited(const InstanceTree& tree, const Ray& ray, double max_t) {
   std::set<std::size_t> found;

@@ -1,7 +1,6 @@
 // Instances and queries with numbers that no one should write, but someone will.
 
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <optional>
 #include <vector>
@@ -14,13 +13,11 @@
 #include <quoin/scene/scene_tracer.h>
 #include <quoin/scene/sweep.h>
 
+#include "core/not_finite_for_tests.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 // One slab, away from its pivot, so that its rotation shows.
 struct SlabScene {

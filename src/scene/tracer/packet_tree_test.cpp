@@ -1,18 +1,15 @@
 #include "scene/tracer/packet_tree.h"
 
 #include <cmath>
-#include <limits>
 #include <map>
 
 #include <gtest/gtest.h>
 
+#include "core/not_finite_for_tests.h"
 #include "scene/query/box_test_support.h"
 
 namespace quoin {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 // By the index of each box that was visited: the lanes that may meet it.
 std::map<std::size_t, std::uint32_t> visited(const PacketTree& tree, const RayPacket& rays) {

@@ -8,13 +8,12 @@
 #include <glm/matrix.hpp>
 #include <gtest/gtest.h>
 
+#include "core/not_finite_for_tests.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_view.h"
 
 namespace quoin {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 VoxelRegistry stone_and_glass() {
   VoxelRegistry types;

@@ -1,5 +1,4 @@
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <optional>
 #include <random>
@@ -9,14 +8,13 @@
 
 #include <quoin/scene/scene_query.h>
 
+#include "core/not_finite_for_tests.h"
 #include "grid/change_follower_for_tests.h"
 #include "scene/tracer/placed_grid.h"
 #include "scene/tracer/scene_view.h"
 
 namespace quoin {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // A scene, and things that may happen to it.
 class ChangingScene {

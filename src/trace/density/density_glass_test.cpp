@@ -108,7 +108,7 @@ VoxelType type_at(const std::vector<GlassSpan>& spans, double t) {
   return kAir;
 }
 
-DVec3 random_in(std::mt19937& random, double low, double high) {
+DVec3 random_between(std::mt19937& random, double low, double high) {
   std::uniform_real_distribution<double> any(low, high);
   return {any(random), any(random), any(random)};
 }
@@ -162,8 +162,8 @@ TEST(DensityGlass, SpansAreWhereTheFieldsSay) {
       const DVec3 middle = DVec3(corner) + 5.0;
       int transparent = 0;
       for (int i = 0; i < 40; ++i) {
-        const DVec3 origin = middle + random_in(random, -9.0, 9.0);
-        DVec3 direction = glm::normalize(middle + random_in(random, -4.0, 4.0) - origin);
+        const DVec3 origin = middle + random_between(random, -9.0, 9.0);
+        DVec3 direction = glm::normalize(middle + random_between(random, -4.0, 4.0) - origin);
         if (i % 4 == 0) direction = DVec3{0, 0, origin.z < middle.z ? 1.0 : -1.0};
         transparent += check(glass, oracle, {origin, direction}, i % 5 == 0 ? 6.5 : 24.0);
         if (HasFailure()) FAIL() << "materials " << materials << ", ray " << i;
@@ -196,8 +196,8 @@ TEST(DensityGlass, BlocksAtATimeAreTheSameAsCells) {
   std::size_t by_cells = 0;
   std::size_t by_blocks = 0;
   for (int i = 0; i < 3000; ++i) {
-    const DVec3 origin = DVec3{30, 0, 30} + random_in(random, -80.0, 80.0);
-    const Ray ray{origin, glm::normalize(DVec3{30, -6, 30} + random_in(random, -30.0, 30.0) - origin)};
+    const DVec3 origin = DVec3{30, 0, 30} + random_between(random, -80.0, 80.0);
+    const Ray ray{origin, glm::normalize(DVec3{30, -6, 30} + random_between(random, -30.0, 30.0) - origin)};
     const auto single = spans_along(glass, ray, 300.0, 1.0);
     const auto large = spans_along(glass, ray, 300.0, 64.0);
     by_cells += single.size();
@@ -243,7 +243,7 @@ TEST(DensityGlass, FollowsEdits) {
   DensityGlass glass(field, types.registry);
   ChangeCursor cursor = field.cursor();
   std::mt19937 random(17);
-  const auto place = [&] { return DVec3{30, 0, 30} + random_in(random, -36.0, 36.0); };
+  const auto place = [&] { return DVec3{30, 0, 30} + random_between(random, -36.0, 36.0); };
   for (int i = 0; i < 8; ++i) {
     field.remove_sphere(place(), 6.0);
     field.add_sphere(place(), 5.0, i % 2 == 0 ? types.glass : types.stone);

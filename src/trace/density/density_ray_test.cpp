@@ -8,11 +8,10 @@
 #include <gtest/gtest.h>
 
 #include "core/instruction_sets_for_tests.h"
+#include "core/not_finite_for_tests.h"
 
 namespace quoin {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // The trilinear field in double, sample by sample: what rays must agree with.
 class Dense {

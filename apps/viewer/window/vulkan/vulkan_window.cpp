@@ -16,7 +16,7 @@ namespace {
 
 static_assert(sizeof(OverlayVertex) == 20, "what window_overlay.vert reads");
 
-const char* const kDoing = "showing a picture";
+const char* const kShowing = "showing a picture";
 constexpr VkClearColorValue kGround = {{0.07F, 0.075F, 0.09F, 1.0F}};
 
 VkRect2D within(const PixelRect& rect, VkExtent2D window) {
@@ -192,7 +192,7 @@ Status VulkanWindow::Impl::begin(const VulkanPicture* picture) {
   info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
   VkResult result = api.vkResetCommandPool(device->handle(), pool, 0);
   if (result == VK_SUCCESS) result = api.vkBeginCommandBuffer(commands, &info);
-  if (result != VK_SUCCESS) return device->check(result, kDoing);
+  if (result != VK_SUCCESS) return device->check(result, kShowing);
   return picture == nullptr ? Status{} : picture->record_copy(commands, image.target());
 }
 
@@ -217,7 +217,7 @@ Status VulkanWindow::Impl::record(std::uint32_t shown, const VulkanPicture* pict
   const bool has_overlay = !overlay.draws.empty() && !overlay.indices.empty() && font_size.x > 0;
   if (has_overlay) draw_overlay(overlay);
   api.vkCmdEndRenderPass(commands);
-  return device->check(api.vkEndCommandBuffer(commands), kDoing);
+  return device->check(api.vkEndCommandBuffer(commands), kShowing);
 }
 
 VkResult VulkanWindow::Impl::show(std::uint32_t shown) {
@@ -283,14 +283,14 @@ Status VulkanWindow::present(int width, int height, const VulkanPicture* picture
                                   std::numeric_limits<std::uint64_t>::max(), window.handed, VK_NULL_HANDLE, &shown);
     window.is_stale = result == VK_ERROR_OUT_OF_DATE_KHR;
     if (window.is_stale) continue;
-    if (result != VK_SUCCESS && result != VK_SUBOPTIMAL_KHR) return window.device->check(result, kDoing);
+    if (result != VK_SUCCESS && result != VK_SUBOPTIMAL_KHR) return window.device->check(result, kShowing);
     if (Status recorded = window.record(shown, picture, place, overlay); !recorded) {
       window.give_up_image();
       return recorded;
     }
     result = window.show(shown);
     window.is_stale = result == VK_ERROR_OUT_OF_DATE_KHR || result == VK_SUBOPTIMAL_KHR;
-    return window.is_stale ? Status{} : window.device->check(result, kDoing);
+    return window.is_stale ? Status{} : window.device->check(result, kShowing);
   }
   return {};  // another frame will fit
 }

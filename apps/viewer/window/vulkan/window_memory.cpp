@@ -6,7 +6,7 @@ namespace quoin::viewer {
 
 namespace {
 
-const char* const kDoing = "making room for a window";
+const char* const kMakingRoom = "making room for a window";
 
 }  // namespace
 
@@ -14,7 +14,7 @@ Status WindowBuffer::put(std::span<const std::byte> bytes) {
   if (bytes.empty()) return {};
   if (size_ < bytes.size()) {
     free();
-    if (Status grown = device_->check(grow(bytes.size() * 3 / 2), kDoing); !grown) {
+    if (Status grown = device_->check(grow(bytes.size() * 3 / 2), kMakingRoom); !grown) {
       free();
       return grown;
     }
@@ -64,7 +64,7 @@ void WindowBuffer::free() {
 Result<bool> PictureImage::fit(int width, int height) {
   if (width == width_ && height == height_) return false;
   free();
-  if (Status made = device_->check(make(width, height), kDoing); !made) {
+  if (Status made = device_->check(make(width, height), kMakingRoom); !made) {
     free();
     return made.error();
   }
