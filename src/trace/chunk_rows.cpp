@@ -39,13 +39,18 @@ ChunkRows::ChunkRows(const Chunk& chunk, const FunctionRef<bool(VoxelType)>& cou
 }
 
 void ChunkRows::sort_types() {
-  const Chunk& chunk = *chunk_;
-  for (const VoxelType type : chunk.types()) (belongs(type) ? in_ : out_).push_back(type);
+  const ChunkStorage* const mixed = ChunkStorage::of(*chunk_);
+  if (mixed == nullptr || mixed->direct()) {
+    for (const VoxelType type : chunk_->types()) (belongs(type) ? in_ : out_).push_back(type);
+  } else {
+    for (std::size_t i = 0; i < mixed->palette.size(); ++i) {
+      if (mixed->counts[i] != 0) (belongs(mixed->palette[i]) ? in_ : out_).push_back(mixed->palette[i]);
+    }
+  }
   const bool by_absence = out_.size() < in_.size();
   inverted_ = by_absence ? kAll : 0;
-  if (const ChunkStorage* mixed = ChunkStorage::of(chunk)) {
-    for (const VoxelType type : by_absence ? out_ : in_) asked_.push_back(index_of(*mixed, type));
-  }
+  if (mixed == nullptr) return;
+  for (const VoxelType type : by_absence ? out_ : in_) asked_.push_back(index_of(*mixed, type));
 }
 
 bool ChunkRows::belongs(VoxelType type) const {

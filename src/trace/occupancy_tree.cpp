@@ -371,11 +371,29 @@ struct OccupancyTree::Impl {
     const std::uint64_t changed = put(trace::ChunkRows(*voxels, types, which), chunk, wanted);
     // Another type may have come where there was one before: then no brick is another.
     if (which == Occupancy::Transparent) {
-      const ChunkSlabs part = was_there ? wanted : ChunkSlabs::all();
-      set_uniform_blocks(
-          chunk, [&](trace::UniformBlocks& blocks) { trace::find_uniform_blocks(*voxels, types, part, blocks); });
+      set_uniform_blocks(chunk, [&](trace::UniformBlocks& blocks) {
+        const ChunkSlabs part = was_there ? with_any(node_of(chunk), changed, wanted) : ChunkSlabs::all();
+        if (!(part == ChunkSlabs())) trace::find_uniform_blocks(*voxels, types, part, blocks);
+      });
     }
     return changed;
+  }
+  // Those of some slabs in which there is something, and all in rows of bricks in which there is more or less than
+  // before: of the others nothing can be told that is new.
+  static ChunkSlabs with_any(const ChunkNode& node, std::uint64_t changed, const ChunkSlabs& wanted) {
+    ChunkSlabs slabs;
+    for (std::size_t row = 0; row < 16; ++row) {
+      const IVec3 first{0, static_cast<int>(row & 3) * 16, static_cast<int>(row >> 2) * 16};
+      const bool is_changed = (changed >> (4 * row) & 15U) != 0;
+      std::uint64_t cells = 0;
+      for (std::size_t x = 0; x < 4; ++x) cells |= node.cells[x + 4 * row];
+      for (std::uint32_t left = wanted.block(first.y, first.z); left != 0; left &= left - 1) {
+        const int slab = std::countr_zero(left);
+        if (!is_changed && (cells >> (4 * slab) & 15U) == 0) continue;
+        slabs.add(first.y + 4 * (slab & 3), first.z + 4 * (slab >> 2));
+      }
+    }
+    return slabs;
   }
 
   std::uint64_t put_glass(const DensityGrid& field, const VoxelRegistry& types, IVec3 chunk) {
