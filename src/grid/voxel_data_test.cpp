@@ -35,14 +35,14 @@ struct Held {
   bool operator==(const Held&) const = default;
 };
 using Key = std::tuple<int, int, int>;  // z, y, x
-using Voxels = std::map<Key, Held>;
+using HeldVoxels = std::map<Key, Held>;
 
 Key key_of(IVec3 at) {
   return {at.z, at.y, at.x};
 }
 
-Voxels voxels_of(const Grid& grid) {
-  Voxels found;
+HeldVoxels voxels_of(const Grid& grid) {
+  HeldVoxels found;
   grid.for_each([&](IVec3 at, VoxelType type) {
     const VoxelData data = grid.data(at);
     found[key_of(at)] = {type, data.state, {data.bytes.begin(), data.bytes.end()}};
@@ -51,9 +51,9 @@ Voxels voxels_of(const Grid& grid) {
 }
 
 // A grid beside the slow, obvious version of it.
-struct Twin {
+struct DataTwin {
   Grid grid;
-  Voxels voxels;
+  HeldVoxels voxels;
 
   void set(IVec3 at, VoxelType type) {
     grid.set(at, type);
@@ -78,7 +78,7 @@ struct Twin {
   }
 };
 
-void expect_equal(const Twin& twin) {
+void expect_equal_data(const DataTwin& twin) {
   ASSERT_EQ(voxels_of(twin.grid), twin.voxels);
   std::vector<Key> with_data;
   for (const auto& [key, held] : twin.voxels) {
@@ -114,7 +114,7 @@ class RandomEdits {
     return std::vector<std::byte>(random_() % 3 == 0 ? random_() % 9 : 0, std::byte(random_()));
   }
 
-  void edit(Twin& twin) {
+  void edit(DataTwin& twin) {
     switch (up_to(7)) {
       case 0:
         return twin.set(place(), type());
@@ -172,17 +172,17 @@ TEST(VoxelData, FollowsItsVoxelsThroughEditsAndSnapshots) {
   for (unsigned seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE(seed);
     RandomEdits edits(seed);
-    std::vector<Twin> twins(1);
+    std::vector<DataTwin> twins(1);
     for (int i = 0; i < 400; ++i) {
-      Twin& twin = twins[static_cast<std::size_t>(edits.up_to(static_cast<int>(twins.size())))];
+      DataTwin& twin = twins[static_cast<std::size_t>(edits.up_to(static_cast<int>(twins.size())))];
       if (i % 60 == 30 && twins.size() < 5) {
-        Twin copy{twin.grid.snapshot(), twin.voxels};
+        DataTwin copy{twin.grid.snapshot(), twin.voxels};
         twins.push_back(std::move(copy));
         continue;
       }
       edits.edit(twin);
     }
-    for (const Twin& twin : twins) expect_equal(twin);
+    for (const DataTwin& twin : twins) expect_equal_data(twin);
   }
 }
 
@@ -286,11 +286,11 @@ TEST(VoxelDataChanges, TellOfEveryVoxelThatDiffers) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE(seed);
     RandomEdits edits(seed);
-    Twin twin;
+    DataTwin twin;
     struct Consumer {
       ChangeCursor types, data;
       Grid before;
-      Voxels voxels;
+      HeldVoxels voxels;
     };
     std::vector<Consumer> consumers(3);
     for (int i = 0; i < 300; ++i) {
@@ -344,8 +344,8 @@ TEST(VoxelDataCopies, ArriveTurnedWithTheirVoxels) {
   for (unsigned seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE(seed);
     RandomEdits edits(seed);
-    Twin from;
-    Twin to;
+    DataTwin from;
+    DataTwin to;
     for (int i = 0; i < 150; ++i) edits.edit(from);
     for (int i = 0; i < 150; ++i) edits.edit(to);
     const AxisOrientation turn = AxisOrientation::at(edits.up_to(AxisOrientation::kCount));
@@ -376,7 +376,7 @@ TEST(VoxelDataCopies, ArriveTurnedWithTheirVoxels) {
       to.voxels[key_of(place + v)] = held;
     });
     copy_box(from.grid, box, to.grid, place, turn, options);
-    expect_equal(to);
+    expect_equal_data(to);
   }
 }
 

@@ -23,8 +23,8 @@ namespace {
 using Key = std::tuple<int, int, int>;
 using Surfaces = std::map<Key, std::shared_ptr<const ChunkSurface>>;
 
-struct LitScene {
-  explicit LitScene(unsigned seed) {
+struct DarkeningScene {
+  explicit DarkeningScene(unsigned seed) {
     LightWorld world(seed);
     scene.types = world.types;
     SceneGrid grid;
@@ -61,7 +61,8 @@ LitQuads sorted(const QuadBuffer& quads, const std::vector<FaceLight>& light) {
 }
 
 // As they would be made from nothing.
-void expect_right(const LitScene& world, const SceneLight& light, const Surfaces& surfaces, LightMerging merging) {
+void expect_right(const DarkeningScene& world, const SceneLight& light, const Surfaces& surfaces,
+                  LightMerging merging) {
   const GridLight lit = light.of(world.handle);
   SurfaceLight surface_light(*lit.light, *lit.voxels, world.scene.types);
   BlockyMesher mesher;
@@ -87,7 +88,7 @@ void expect_right(const LitScene& world, const SceneLight& light, const Surfaces
 class LitMeshes : public testing::TestWithParam<LightMerging> {};
 
 TEST_P(LitMeshes, AreThoseOfTheLightAfterAnyEdits) {
-  LitScene world(3);
+  DarkeningScene world(3);
   SceneLight light;
   LiveMeshOptions options;
   options.light_merging = GetParam();
@@ -214,7 +215,7 @@ TEST(LitMeshes, WithoutLightAnyMoreAreThoseOfBefore) {
 
 // Light and meshes on workers, each at its own pace: at the end both are of what is there.
 TEST(LitMeshes, FollowLiveLight) {
-  LitScene world(8);
+  DarkeningScene world(8);
   LiveLight light;
   LiveMeshes meshes;
   meshes.use_light(&light.shown());

@@ -361,14 +361,10 @@ Result<Outcome> render(const RenderArguments& arguments) {
   return outcome;
 }
 
-Json triple(DVec3 v) {
-  return {v.x + 0.0, v.y + 0.0, v.z + 0.0};
-}
-
 Json camera_json(const Camera& camera) {
-  Json json = {{"position", triple(camera.position)},
-               {"forward", triple(camera.forward)},
-               {"up", triple(camera.up)},
+  Json json = {{"position", list_of(camera.position)},
+               {"forward", list_of(camera.forward)},
+               {"up", list_of(camera.up)},
                {"fov", std::round(camera.vertical_fov_radians * 180e9 / std::numbers::pi) / 1e9}};
   if (camera.projection == Camera::Projection::Orthographic) json["view_height"] = camera.view_height;
   return json;

@@ -16,7 +16,7 @@ namespace {
 using vox_test::Entries;
 using vox_test::FileBuilder;
 
-LoadedScene file_with(const std::vector<Entries>& settings) {
+LoadedScene file_with_settings(const std::vector<Entries>& settings) {
   FileBuilder file;
   file.model(1, 1, 1, {{0, 0, 0, 1}});
   for (const Entries& each : settings) {
@@ -26,7 +26,7 @@ LoadedScene file_with(const std::vector<Entries>& settings) {
 }
 
 FileLook look_with(const std::vector<Entries>& settings) {
-  const LoadedScene loaded = file_with(settings);
+  const LoadedScene loaded = file_with_settings(settings);
   EXPECT_TRUE(loaded.look.has_value());
   return loaded.look.value_or(FileLook{});
 }
@@ -91,7 +91,7 @@ TEST(VoxLook, OfWhatNobodySet) {
 }
 
 TEST(VoxLook, OfAFileWithoutSettingsThereIsNone) {
-  EXPECT_FALSE(file_with({}).look.has_value());
+  EXPECT_FALSE(file_with_settings({}).look.has_value());
 }
 
 TEST(VoxLook, AirAndPicturesOfTheSky) {

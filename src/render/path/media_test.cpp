@@ -27,7 +27,7 @@ using render_test::place;
 using render_test::towards;
 using render_test::town;
 
-PathOptions uniform(int size, int samples) {
+PathOptions even_sky(int size, int samples) {
   PathOptions options;
   options.width = size;
   options.height = size;
@@ -39,13 +39,13 @@ PathOptions uniform(int size, int samples) {
   return options;
 }
 
-PathPicture taken(const Scene& scene, const Camera& camera, const PathOptions& options) {
+PathPicture taken_in(const Scene& scene, const Camera& camera, const PathOptions& options) {
   auto picture = PathTracer(scene).render(camera, options);
   EXPECT_TRUE(picture.has_value()) << (picture ? "" : picture.error().message);
   return picture ? std::move(*picture) : PathPicture{};
 }
 
-double mean(const PathPicture& picture) {
+double mean_red(const PathPicture& picture) {
   const auto add = [](double sum, Vec3 light) { return sum + static_cast<double>(light.x); };
   return std::accumulate(picture.radiance.begin(), picture.radiance.end(), 0.0, add) /
          static_cast<double>(picture.radiance.size());
@@ -92,15 +92,15 @@ TEST(PathMedia, ThePhaseFunctionsSamplesHaveItsDensityAndMean) {
 // White furnace: white fog over white ground, and a white cloud, cannot be seen in a white sky.
 TEST(PathMedia, WhiteFogAndCloudsCannotBeSeen) {
   const Scene cube = box_of(cloud_of({255, 255, 255, 255}, 0.4F, 0.5F), {IVec3(0), IVec3(8)});
-  const PathPicture cloud = taken(cube, towards({4.0, 10.0, 24.0}, DVec3(4.0), 0.5), uniform(16, 64));
-  EXPECT_NEAR(mean(cloud), 1.0, 0.005);
+  const PathPicture cloud = taken_in(cube, towards({4.0, 10.0, 24.0}, DVec3(4.0), 0.5), even_sky(16, 64));
+  EXPECT_NEAR(mean_red(cloud), 1.0, 0.005);
   Scene scene;
-  PathOptions options = uniform(16, 64);
+  PathOptions options = even_sky(16, 64);
   options.ground.emplace();
   options.ground->colour = Vec3(1.0F);
   options.fog = Fog{0.2, Vec3(1.0F), 0.3, 8.0};
-  const PathPicture fog = taken(scene, towards({0.0, 3.0, 10.0}, {0.0, 0.0, 0.0}, 0.5), options);
-  EXPECT_NEAR(mean(fog), 1.0, 0.005);
+  const PathPicture fog = taken_in(scene, towards({0.0, 3.0, 10.0}, {0.0, 0.0, 0.0}, 0.5), options);
+  EXPECT_NEAR(mean_red(fog), 1.0, 0.005);
 }
 
 // Black fog lets e^-length through, of what is seen and of what a surface gets.
@@ -109,24 +109,24 @@ TEST(PathMedia, WhatPassesFallsWithTheLength) {
   lamp.colour = {255, 255, 255, 255};
   lamp.emission = 1.0F;
   const Scene wall = box_of(lamp, {{-20, -20, -1}, {20, 20, 0}});
-  PathOptions options = uniform(16, 256);
+  PathOptions options = even_sky(16, 256);
   options.sky_brightness = 0.0;
   options.max_bounces = 0;
   options.fog = Fog{0.1, Vec3(0.0F), 0.0, 100.0};
   Camera camera = towards({0.0, 0.0, 12.0}, {0.0, 0.0, 0.0});
   camera.projection = Camera::Projection::Orthographic;
   camera.view_height = 4.0;
-  EXPECT_NEAR(mean(taken(wall, camera, options)), std::exp(-1.2), 0.003);
+  EXPECT_NEAR(mean_red(taken_in(wall, camera, options)), std::exp(-1.2), 0.003);
 
   // The sun above, through 10 of fog down and, as seen from above, 10 up.
   const Scene floor = box_of({.name = "", .colour = {255, 255, 255, 255}}, {{-20, -1, -20}, {20, 0, 20}});
-  options = uniform(16, 256);
+  options = even_sky(16, 256);
   options.sky_brightness = 0.0;
   options.sun = {0.0, 1.0, 0.0};
   options.sun_brightness = 1.0;
   options.sun_angle_radians = 0.0;
   options.fog = Fog{0.05, Vec3(0.0F), 0.0, 10.0};
-  EXPECT_NEAR(mean(taken(floor, from_above(0.0, 30.0, 0.0, 4.0), options)), std::exp(-1.0), 0.004);
+  EXPECT_NEAR(mean_red(taken_in(floor, from_above(0.0, 30.0, 0.0, 4.0), options)), std::exp(-1.0), 0.004);
 }
 
 // Black clouds likewise; glass with edges counts as a voxel at least, clouds do not.
@@ -136,8 +136,8 @@ TEST(PathMedia, ABlackCloudOnlyTakesAway) {
     Camera camera = towards({0.0, 0.0, 12.0}, {0.0, 0.0, 0.0});
     camera.projection = Camera::Projection::Orthographic;
     camera.view_height = 4.0;
-    const PathPicture picture = taken(scene, camera, uniform(16, 256));
-    EXPECT_NEAR(mean(picture), std::exp(-0.25 * depth), 0.004);
+    const PathPicture picture = taken_in(scene, camera, even_sky(16, 256));
+    EXPECT_NEAR(mean_red(picture), std::exp(-0.25 * depth), 0.004);
     const double alpha = std::accumulate(picture.alpha.begin(), picture.alpha.end(), 0.0) / 256.0;
     EXPECT_NEAR(alpha, 1.0 - std::exp(-0.25 * depth), 0.004);
   }
@@ -156,7 +156,7 @@ TEST(PathMedia, CloudsStandBesideGlass) {
   grid.fill_box({{0, 0, 6}, {8, 8, 8}}, glass);
   place(scene, std::move(grid));
   for (const DVec3& from : {DVec3(4.0, 9.0, 30.0), DVec3(3.0, 2.0, -20.0)}) {
-    EXPECT_NEAR(mean(taken(scene, towards(from, DVec3(4.0), 0.4), uniform(16, 128))), 1.0, 0.01);
+    EXPECT_NEAR(mean_red(taken_in(scene, towards(from, DVec3(4.0), 0.4), even_sky(16, 128))), 1.0, 0.01);
   }
 }
 
@@ -166,10 +166,10 @@ TEST(PathMedia, ALampShinesInFog) {
   lamp.colour = {255, 255, 255, 255};
   lamp.emission = 20.0F;
   const Scene scene = box_of(lamp, {IVec3(0), IVec3(2)});
-  PathOptions options = uniform(24, 64);
+  PathOptions options = even_sky(24, 64);
   options.sky_brightness = 0.0;
   options.fog = Fog{0.05, Vec3(1.0F), 0.0, 100.0};
-  const PathPicture picture = taken(scene, towards({1.0, 1.0, 20.0}, DVec3(1.0), 1.2), options);
+  const PathPicture picture = taken_in(scene, towards({1.0, 1.0, 20.0}, DVec3(1.0), 1.2), options);
   const auto at = [&](std::size_t x, std::size_t y) { return picture.radiance[y * 24 + x].x; };
   EXPECT_GT(at(9, 12), 0.02F);
   EXPECT_GT(at(9, 12), 2.0F * at(0, 0));
@@ -179,7 +179,7 @@ TEST(PathMedia, ALampShinesInFog) {
 TEST(PathMedia, RefusesFogThatCannotBe) {
   const Scene scene;
   const auto refuses = [&](const Fog& fog) {
-    PathOptions options = uniform(2, 1);
+    PathOptions options = even_sky(2, 1);
     options.fog = fog;
     return !PathTracer(scene).render(of_town(), options).has_value();
   };
@@ -199,14 +199,14 @@ TEST(PathLens, BladesShapeWhatIsOutOfFocus) {
   lamp.colour = {255, 255, 255, 255};
   lamp.emission = 1000.0F;
   const Scene scene = box_of(lamp, {IVec3(0), IVec3(1)});
-  PathOptions options = uniform(64, 256);
+  PathOptions options = even_sky(64, 256);
   options.sky_brightness = 0.0;
   options.lens_radius = 4.0;
   options.focus_distance = 30.0;
   options.lens_blades = 4;
   const Camera camera = towards({0.5, 0.5, 60.0}, DVec3(0.5), 0.3);
   const auto lit = [&](const PathOptions& by) {
-    const PathPicture picture = taken(scene, camera, by);
+    const PathPicture picture = taken_in(scene, camera, by);
     return std::ranges::count_if(picture.radiance, [](Vec3 light) { return light.x > 0.0F; });
   };
   const auto square = lit(options);
@@ -231,11 +231,11 @@ TEST(PathDenoise, HalvesTheErrorAtLeast) {
   options.width = 240;
   options.height = 160;
   options.samples = 192;
-  const PathPicture truth = taken(scene, of_town(), options);
+  const PathPicture truth = taken_in(scene, of_town(), options);
   options.samples = 8;
-  const double before = error_of(taken(scene, of_town(), options), truth);
+  const double before = error_of(taken_in(scene, of_town(), options), truth);
   options.denoise = true;
-  const double after = error_of(taken(scene, of_town(), options), truth);
+  const double after = error_of(taken_in(scene, of_town(), options), truth);
   EXPECT_LT(after, 0.6 * before) << before << " " << after;
 }
 
@@ -249,15 +249,15 @@ TEST(PathDenoise, KeepsEdges) {
   grid.fill_box({{-20, -1, -3}, {20, 0, 3}}, red);
   grid.fill_box({{-2, 0, -2}, {2, 8, 2}}, red);
   place(scene, std::move(grid));
-  PathOptions options = uniform(192, 4);
+  PathOptions options = even_sky(192, 4);
   options.sky_brightness = 0.0;
   options.max_bounces = 1;
   options.sun_brightness = 1.0;
   options.sun_angle_radians = 0.0;
   const Camera camera = towards({15.0, 20.0, 25.0}, DVec3(0.0), 0.8);
-  const PathPicture plain = taken(scene, camera, options);
+  const PathPicture plain = taken_in(scene, camera, options);
   options.denoise = true;
-  const PathPicture smooth = taken(scene, camera, options);
+  const PathPicture smooth = taken_in(scene, camera, options);
   int different = 0;
   for (std::size_t i = 0; i < plain.radiance.size(); ++i) {
     if (glm::length(plain.radiance[i] - smooth.radiance[i]) > 0.02F) ++different;
