@@ -99,7 +99,9 @@ struct RowChange {
 /// What edits did to single voxels: calls `visit` for every row of voxels that differs between two states of a grid,
 /// chunks by z, y, x, in each the rows by z, then y. `before` is a snapshot of the time when the cursor was read for
 /// the last time, `changes` what `now.changes_since` told since then; when all has changed, all of both is compared.
-/// For rules that follow edits, whoever makes them: falling sand, water, wires.
+/// For rules that follow edits, whoever makes them: falling sand, water, wires. What became another type and then was
+/// it again meanwhile (a stream, each of whose voxels was followed by the next) is no difference: what a rule moves it
+/// looks at again by itself (examples/falling_sand.cpp).
 ///
 /// Cost: O(slabs that changed); chunks that the two share cost nothing.
 void visit_changes(const Grid& before, const Grid& now, const GridChanges& changes,

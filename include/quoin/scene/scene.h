@@ -22,13 +22,13 @@ namespace quoin {
 /// A grid as a scene holds it: blocks, a field of densities, or both in one space, in which sample (i, j, k) of the
 /// field lies at the point (i, j, k), the least corner of voxel (i, j, k).
 struct SceneGrid {
-  std::string name;
-  Grid grid;  ///< the voxels
+  std::string name{};
+  Grid grid{};  ///< the voxels
   /// The point of the grid, in voxels, that an instance's position places and about which it turns.
   DVec3 pivot{0.0};
   /// The box that the file declares for it (an artist's canvas), in voxels; empty when none was declared. Voxels may
   /// lie outside after edits; `declared_box` says how large the grid counts as.
-  IBox canvas;
+  IBox canvas{};
   /// The densities; its materials are types of the scene's registry. Pictures by rays see through transparent ones.
   /// Where these meet opaque ones in the solid, samples of both are to have their distance to where they meet.
   DensityGrid field = DensityGrid();
