@@ -26,7 +26,8 @@ class Movie {
   /// Makes the folder; unless `resume` an empty one. Errors: Unsupported where there is no ffmpeg; CannotWrite.
   [[nodiscard]] Status begin(bool resume) const;
   /// Makes the film, which appears whole or not at all, and removes the pictures. Returns its size.
-  /// `pictures`: numbered one after the other. Errors: CannotWrite, with the exit status of ffmpeg, which says the rest.
+  /// `pictures`: numbered one after the other.
+  /// Errors: CannotWrite, with the exit status of ffmpeg, which says the rest.
   [[nodiscard]] Result<std::uint64_t> write(const std::vector<std::filesystem::path>& pictures,
                                             double frames_per_second) const;
 
