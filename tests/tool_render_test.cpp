@@ -221,15 +221,85 @@ TEST_F(ToolRender, EveryOptionOfPathsChangesThePicture) {
   const std::string base = "many.vox -o out.png --size 64x48 --light path --samples 4";
   drawn(base);
   const std::string plain = bytes("out.png");
-  for (const std::string flags :
-       {"--bounces 1", "--sky gradient", "--sky uniform", "--tone clamp", "--tone agx", "--tone aces", "--sun-angle 20",
-        "--ground", "--transparent", "--ground --transparent", "--lens-radius 1", "--lens-radius 1 --focus 5",
-        "--exposure auto", "--exposure 0.5", "--sun=-1,1,0", "--sun off", "--sky-brightness 2"}) {
+  for (const std::string flags : {"--bounces 1",        "--sky gradient",
+                                  "--sky uniform",      "--tone clamp",
+                                  "--tone agx",         "--tone aces",
+                                  "--sun-angle 20",     "--ground",
+                                  "--transparent",      "--ground --transparent",
+                                  "--lens-radius 1",    "--lens-radius 1 --focus 5",
+                                  "--exposure auto",    "--exposure 0.5",
+                                  "--sun=-1,1,0",       "--sun off",
+                                  "--sky-brightness 2", "--fog 0.1",
+                                  "--fog 0.1,4",        "--fog 0.1 --fog-colour 1,0,0",
+                                  "--bloom 0.5",        "--vignette 0.5",
+                                  "--denoise",          "--sun-time 12-21,15,50"}) {
     drawn(base + " " + flags);
     EXPECT_NE(bytes("out.png"), plain) << flags;
   }
-  drawn(base + " --bounces 8 --sky physical --tone neutral --sun-angle 0.53 --exposure 1 --emission-scale 1");
+  drawn(base +
+        " --bounces 8 --sky physical --tone neutral --sun-angle 0.53 --exposure 1 --emission-scale 1 --look file "
+        "--no-ground --bloom 0 --vignette 0 --fog 0");
   EXPECT_EQ(bytes("out.png"), plain) << "these are the defaults";
+}
+
+TEST_F(ToolRender, WhatNoOptionSaysTheFileSays) {
+  vox_test::FileBuilder file;
+  file.model(4, 4, 4, {{0, 0, 0, 1}, {3, 0, 0, 2}, {0, 3, 3, 3}});
+  file.with("rOBJ", [&](auto& out) { out.dict({{"_type", "_env"}, {"_mode", "0"}}); });
+  file.with("rOBJ", [&](auto& out) { out.dict({{"_type", "_uni"}, {"_i", "0.5"}, {"_k", "255 0 0"}}); });
+  file.with("rOBJ", [&](auto& out) { out.dict({{"_type", "_film"}, {"_aces", "0"}}); });
+  file.with("rOBJ", [&](auto& out) { out.dict({{"_type", "_setting"}, {"_grid", "1"}}); });
+  ASSERT_TRUE(write_file(file.file(), folder_.file("look.vox")));
+  const std::string base = "look.vox -o out.png --size 32x24 --light path --samples 1";
+  const auto corner = [&] {
+    const auto image = read_png(folder_.file("out.png"));
+    return image ? std::array{int{image->rgb[0]}, int{image->rgb[1]}, int{image->rgb[2]}} : std::array{-1, -1, -1};
+  };
+  const Json said = drawn(base);
+  EXPECT_EQ(corner(), (std::array{188, 0, 0})) << "the file's sky";
+  EXPECT_EQ(said["warnings"], Json({"render settings of the file that are not drawn: _setting _grid 1"}));
+  drawn(base + " --sky-brightness 1");
+  EXPECT_EQ(corner(), (std::array{255, 0, 0}));
+  drawn(base + " --sky uniform --tone clamp");
+  EXPECT_EQ(corner(), (std::array{255, 255, 255})) << "another sky has nothing of the file's";
+  EXPECT_EQ(drawn(base + " --look plain")["warnings"], Json::array());
+  EXPECT_NE(corner()[2], 0);
+
+  file.with("rOBJ", [&](auto& out) { out.dict({{"_type", "_env"}, {"_mode", "2"}}); });
+  file.with("rOBJ", [&](auto& out) { out.dict({{"_type", "_ibl"}, {"_path", "C:\\hdr\\green.hdr"}, {"_i", "1"}}); });
+  ASSERT_TRUE(write_file(file.file(), folder_.file("look.vox")));
+  EXPECT_NE(drawn(base)["warnings"].dump().find("does not lie beside it"), std::string::npos);
+  std::ofstream(folder_.file("green.hdr"), std::ios::binary) << "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n"
+                                                             << std::string("\0\x80\0\x80", 4);
+  drawn(base);
+  EXPECT_EQ(corner()[0], 0);
+  EXPECT_GT(corner()[1], 150);
+}
+
+TEST_F(ToolRender, FilmsInOneFileAreMadeOfPictures) {
+  std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(2);
+  for (const std::string wrong :
+       {"-o film.mp4", "-o film.mp4 --turntable 2 --light path --transparent", "-o film.png --turntable 2 --fps 12",
+        "-o film.webm --turntable 2 --fps 0", "-o film.avi --turntable 2"}) {
+    EXPECT_EQ(run("render many.vox " + wrong).status, 2) << wrong;
+  }
+  const std::string film = "render many.vox -o film.mp4 --size 31x21 --turntable 3 --json";
+  const ToolRun without = shell("PATH=/nowhere '" QUOIN_TOOL "' " + film);
+  EXPECT_EQ(without.status, 1);
+  EXPECT_NE(without.err.find("ffmpeg, which is not installed"), std::string::npos) << without.err;
+  if (std::system("ffmpeg -version > /dev/null 2>&1") != 0) GTEST_SKIP() << "ffmpeg is not installed";
+  const ToolRun made = run(film);
+  ASSERT_EQ(made.status, 0) << made.err;
+  EXPECT_EQ(Json::parse(made.out)["files"], Json({"film.mp4"}));
+  EXPECT_EQ(bytes("film.mp4").substr(4, 4), "ftyp");
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("film.mp4.pictures")));
+  // One that was cut off goes on with what is there.
+  std::filesystem::create_directory(folder_.file("film.mp4.pictures"));
+  drawn("many.vox -o film.mp4.pictures/picture.png --size 31x21 --turntable 3");
+  std::filesystem::remove(folder_.file("film.mp4.pictures/picture-02.png"));
+  EXPECT_EQ(Json::parse(run(film + " --resume").out)["kept"], 2);
+  EXPECT_EQ(run("render many.vox -o film.webm --size 32x24 --turntable 2 --fps 10").status, 0);
+  EXPECT_EQ(bytes("film.webm").substr(0, 4), "\x1A\x45\xDF\xA3");
 }
 
 TEST_F(ToolRender, PathsTakeASkyFromAFileAndGiveLinearLight) {
@@ -269,10 +339,31 @@ TEST_F(ToolRender, TheNameSaysWhatKindOfPictureItIs) {
 
 TEST_F(ToolRender, PathsRefuseWhatIsNotTheirs) {
   std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(2);
-  for (const std::string flags :
-       {"--light path --lamps 4", "--light path --preset ao", "--light path --detail pixels", "--bounces 4",
-        "--transparent", "--exposure auto", "--light path --bounces -1", "--light path --focus 3",
-        "--light path --sky-turn 4", "--light path --sun-angle 171", "--light path --lens-radius nan"}) {
+  for (const std::string flags : {"--light path --lamps 4",
+                                  "--light path --preset ao",
+                                  "--light path --detail pixels",
+                                  "--bounces 4",
+                                  "--transparent",
+                                  "--exposure auto",
+                                  "--light path --bounces -1",
+                                  "--light path --sky-turn 4",
+                                  "--light path --sun-angle 171",
+                                  "--light path --lens-radius nan",
+                                  "--fog 0.1",
+                                  "--denoise",
+                                  "--light path --fog -1",
+                                  "--light path --fog 1,2,3",
+                                  "--light path --fog-colour 1,1,1",
+                                  "--light path --fog 1 --fog-colour 1,1,2",
+                                  "--light path --bloom 2",
+                                  "--light path --bloom 0.1,0.1,-1",
+                                  "--light path --vignette 1.1",
+                                  "--light path --look mine",
+                                  "--light path --sun-time 13-01,12,0",
+                                  "--light path --sun-time 02-30,12,0",
+                                  "--light path --sun-time 06-21,25,0",
+                                  "--light path --sun-time 06-21",
+                                  "--light path --sun-time 06-21,12,0 --sun 0,1,0"}) {
     EXPECT_EQ(run("render many.vox -o out.png " + flags).status, 2) << flags;
   }
   EXPECT_EQ(run("render many.vox -o out.exr").status, 2);

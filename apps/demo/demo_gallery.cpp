@@ -1,7 +1,9 @@
-// Writes one of the rooms of docs/gallery.md to the .vox file named on the command line.
+// Writes one of the scenes of docs/gallery.md, or the box that ./dev blender compares, to the .vox file named on the
+// command line.
 
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -21,7 +23,8 @@ struct Look {
   float roughness = 1.0F;
   float metalness = 0.0F;
   float emission = 0.0F;
-  float ior = 0.0F;  // more than 0: glass
+  float ior = 0.0F;         // more than 0: glass
+  float scattering = 0.0F;  // more than 0: a cloud
 };
 
 VoxelType add(Scene& scene, const char* name, Rgba8 colour, Look look = {}) {
@@ -34,6 +37,11 @@ VoxelType add(Scene& scene, const char* name, Rgba8 colour, Look look = {}) {
   if (look.ior > 0.0F) {
     properties.visibility = quoin::Visibility::Transparent;
     properties.ior = look.ior;
+  }
+  if (look.scattering > 0.0F) {
+    properties.visibility = quoin::Visibility::Transparent;
+    properties.scattering = look.scattering;
+    properties.anisotropy = 0.4F;
   }
   return scene.types.add(properties).value_or(quoin::kAir);
 }
@@ -191,15 +199,150 @@ Scene basin() {
   return scene;
 }
 
+// The box of Cornell University's graphics laboratory, as far as voxels have it: tests/blender/check_light.py builds
+// the same.
+Scene cornell_box() {
+  Scene scene;
+  const VoxelType white = add(scene, "white", {222, 222, 222, 255});
+  const VoxelType red = add(scene, "red", {200, 40, 36, 255});
+  const VoxelType green = add(scene, "green", {60, 160, 60, 255});
+  const VoxelType lamp = add(scene, "lamp", {255, 255, 255, 255}, {1.0F, 0.0F, 12.0F});
+  Grid grid;
+  grid.fill_box({{-1, -1, -1}, {33, 33, 32}}, white);
+  grid.fill_box({{-1, -1, -1}, {0, 33, 32}}, red);
+  grid.fill_box({{32, -1, -1}, {33, 33, 32}}, green);
+  grid.fill_box({{0, 0, 0}, {32, 32, 32}}, quoin::kAir);
+  grid.fill_box({{12, 32, 12}, {20, 33, 20}}, lamp);
+  grid.fill_box({{5, 0, 5}, {14, 19, 14}}, white);
+  grid.fill_box({{18, 0, 16}, {28, 9, 26}}, white);
+  place(scene, std::move(grid));
+  return scene;
+}
+
+// A number from 0 to less than 1.
+double drawn(unsigned& random) {
+  random = random * 1'664'525U + 1'013'904'223U;
+  return (random >> 8U) / 16'777'216.0;
+}
+
+// A flat heap of balls.
+void cloud(Grid& grid, IVec3 middle, double width, VoxelType type, unsigned& random) {
+  for (int i = 0; i < 14; ++i) {
+    const double out = width * std::sqrt(drawn(random)) * 0.5;
+    const double turn = drawn(random) * 6.283;
+    const int radius = 3 + static_cast<int>((1.0 - out / width) * width * 0.22);
+    const IVec3 at =
+        middle + IVec3{static_cast<int>(out * std::cos(turn)), static_cast<int>(drawn(random) * radius * 0.6),
+                       static_cast<int>(out * std::sin(turn))};
+    for (int z = -radius; z <= radius; ++z) {
+      for (int y = -radius / 2; y <= radius; ++y) {
+        for (int x = -radius; x <= radius; ++x) {
+          if (x * x + y * y * 2 + z * z > radius * radius) continue;
+          if (grid.get(at + IVec3{x, y, z}) == quoin::kAir) grid.set(at + IVec3{x, y, z}, type);
+        }
+      }
+    }
+  }
+}
+
+void tree(Grid& grid, IVec3 foot, int height, VoxelType trunk, VoxelType leaf) {
+  grid.fill_box({foot, foot + IVec3{1, height, 1}}, trunk);
+  for (int y = height / 3; y <= height + 2; ++y) {
+    const int radius = (height + 3 - y) / 3;
+    for (int z = -radius; z <= radius; ++z) {
+      for (int x = -radius; x <= radius; ++x) {
+        if (x * x + z * z <= radius * radius + 1) grid.set(foot + IVec3{x, y, z}, leaf);
+      }
+    }
+  }
+}
+
+// An island that floats above a sea of clouds, with a house on it.
+Scene island() {
+  Scene scene;
+  const VoxelType rock = add(scene, "rock", {122, 108, 98, 255});
+  const VoxelType dark_rock = add(scene, "dark rock", {92, 80, 76, 255});
+  const VoxelType soil = add(scene, "soil", {126, 88, 58, 255});
+  const VoxelType grass = add(scene, "grass", {104, 156, 60, 255});
+  const VoxelType meadow = add(scene, "meadow", {134, 176, 70, 255});
+  const VoxelType trunk = add(scene, "trunk", {92, 66, 46, 255});
+  const VoxelType leaf = add(scene, "leaf", {46, 104, 58, 255});
+  const VoxelType wall = add(scene, "wall", {236, 226, 206, 255});
+  const VoxelType roof = add(scene, "roof", {176, 66, 48, 255});
+  const VoxelType window = add(scene, "window", {255, 190, 96, 255}, {1.0F, 0.0F, 5.0F});
+  const VoxelType path = add(scene, "path", {204, 184, 146, 255});
+  const VoxelType puff = add(scene, "cloud", {252, 252, 252, 200}, {1.0F, 0.0F, 0.0F, 0.0F, 0.22F});
+  Grid grid;
+  const IVec3 middle{150, 90, 120};
+  for (int z = -46; z <= 46; ++z) {
+    for (int x = -60; x <= 60; ++x) {
+      const double turn = std::atan2(z * 1.3, x);
+      const double edge = 50.0 + 6.0 * std::sin(3.0 * turn + 1.0) + 3.0 * std::sin(7.0 * turn);
+      const double share = std::hypot(x, z * 1.3) / edge;
+      if (share >= 1.0) continue;
+      const int top = static_cast<int>(7.0 * std::cos(x * 0.06) * std::cos(z * 0.07) * (1.0 - share));
+      const int depth =
+          4 + static_cast<int>(52.0 * std::pow(1.0 - share, 0.8) + 5.0 * std::sin(x * 0.5) * std::cos(z * 0.43));
+      for (int y = -depth; y <= top; ++y) {
+        const VoxelType type = y == top              ? ((x * 7 + z * 13) % 5 == 0 ? meadow : grass)
+                               : y > top - 4         ? soil
+                               : (y + x / 3) % 7 < 2 ? dark_rock
+                                                     : rock;
+        grid.set(middle + IVec3{x, y, z}, type);
+      }
+    }
+  }
+  const auto top_at = [&](int x, int z) {
+    int y = 20;
+    while (y > -20 && grid.get(middle + IVec3{x, y, z}) == quoin::kAir) --y;
+    return y + 1;
+  };
+  const int floor = top_at(6, 0);
+  const IVec3 house = middle + IVec3{0, floor, -6};
+  grid.fill_box({house - IVec3{0, 6, 0}, house + IVec3{18, 12, 13}}, wall);
+  for (int step = 0; step < 9; ++step) {
+    grid.fill_box({house + IVec3{-2, 12 + step, step - 2}, house + IVec3{20, 13 + step, 15 - step}}, roof);
+  }
+  grid.fill_box({house + IVec3{13, 14, 2}, house + IVec3{16, 25, 5}}, dark_rock);
+  for (const int x : {2, 12}) grid.fill_box({house + IVec3{x, 4, 12}, house + IVec3{x + 4, 9, 13}}, window);
+  grid.fill_box({house + IVec3{18 - 1, 4, 4}, house + IVec3{18, 9, 9}}, window);
+  grid.fill_box({house + IVec3{7, 0, 12}, house + IVec3{11, 8, 13}}, trunk);
+  for (int i = 0; i < 22; ++i) {
+    for (int w = 0; w < 4; ++w) {
+      const int x = 7 + w + static_cast<int>(3.0 * std::sin(i * 0.2));
+      grid.set(middle + IVec3{x, top_at(x, 7 + i) - 1, 7 + i}, path);
+    }
+  }
+  unsigned random = 11;
+  for (int i = 0; i < 26; ++i) {
+    const int x = static_cast<int>((drawn(random) - 0.5) * 92.0);
+    const int z = static_cast<int>((drawn(random) - 0.5) * 62.0);
+    const bool is_free = std::hypot(x, z * 1.3) < 40.0 && (x < -6 || x > 26 || z < -10 || z > 32);
+    if (is_free) tree(grid, middle + IVec3{x, top_at(x, z), z}, 10 + i % 9, trunk, leaf);
+  }
+  for (int i = 0; i < 230; ++i) {
+    const int x = -190 + static_cast<int>(drawn(random) * 680.0);
+    const int z = -300 + static_cast<int>(drawn(random) * 600.0);
+    cloud(grid, {x, 4 + static_cast<int>(drawn(random) * 12.0), z}, 38.0 + 30.0 * drawn(random), puff, random);
+  }
+  cloud(grid, {52, 104, 84}, 40.0, puff, random);
+  cloud(grid, {248, 122, 70}, 46.0, puff, random);
+  cloud(grid, {232, 66, 150}, 34.0, puff, random);
+  place(scene, std::move(grid));
+  return scene;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::string name = argc == 3 ? argv[1] : "";
-  if (name != "room" && name != "basin") {
-    std::fprintf(stderr, "usage: quoin_demo_gallery room|basin OUT.vox\n");
+  const std::map<std::string, Scene (*)()> scenes = {
+      {"room", living_room}, {"basin", basin}, {"cornell", cornell_box}, {"island", island}};
+  const auto made = scenes.find(argc == 3 ? argv[1] : "");
+  if (made == scenes.end()) {
+    std::fprintf(stderr, "usage: quoin_demo_gallery room|basin|cornell|island OUT.vox\n");
     return 2;
   }
-  const auto written = quoin::write_vox(name == "room" ? living_room() : basin(), argv[2]);
+  const auto written = quoin::write_vox(made->second(), argv[2]);
   if (!written) {
     std::fprintf(stderr, "quoin_demo_gallery: %s\n", quoin::to_string(written.error()).c_str());
     return 1;

@@ -71,6 +71,12 @@ std::size_t distinct_types(const Scene& scene) {
   return used.size();
 }
 
+std::int64_t voxels_with_data(const Scene& scene) {
+  std::int64_t voxels = 0;
+  scene.grids().for_each([&](GridHandle, const SceneGrid& grid) { voxels += grid.grid.data_count(); });
+  return voxels;
+}
+
 /// Nothing has no box; zeros keep the keys' types.
 Json box(const DBox& bounds) {
   const DBox shown = bounds.empty() ? DBox{DVec3(0.0), DVec3(0.0)} : bounds;
@@ -147,6 +153,7 @@ Json grid_json(const GridReport& report, const Hierarchy& hierarchy) {
   const IBox bounds = report.grid->grid.bounds();
   Json entry = {{"name", report.grid->name},
                 {"voxels", report.grid->grid.voxel_count()},
+                {"voxels_with_data", report.grid->grid.data_count()},
                 {"size", list_of(report.grid->declared_box().size())},
                 {"bounds", {{"min", list_of(bounds.min)}, {"max", list_of(bounds.max)}}},
                 {"instances", Json::array()}};
@@ -170,6 +177,7 @@ Json info_json(const LoadedScene& loaded, InstanceFilter filter, const FaceCount
   const Hierarchy hierarchy(loaded.scene);
   Json object = {{"format", loaded.format},
                  {"voxels", loaded.scene.voxel_count()},
+                 {"voxels_with_data", voxels_with_data(loaded.scene)},
                  {"solid_samples", solid_samples(loaded.scene)},
                  {"types", distinct_types(loaded.scene)},
                  {"faces_visible", faces.visible},
@@ -260,6 +268,9 @@ std::string info_text(const CommonOptions& options, const std::string& name, con
   if (scene.voxel_count() > 0 || solid_samples(scene) == 0) text += to_string(faces) + "\n";
   const DBox bounds = scene.bounds(options.instances());
   if (!bounds.empty()) text += "Bounds: " + three(bounds.min, ", ") + "  to  " + three(bounds.max, ", ") + "\n";
+  if (const std::int64_t voxels = voxels_with_data(scene); voxels != 0) {
+    text += "Data: at " + count_of(voxels, "voxel") + "\n";
+  }
   if (!scene.lamps.empty()) text += "Lamps: " + std::to_string(scene.lamps.size()) + "\n";
   if (loaded.sun) text += "Sun: towards " + three(*loaded.sun, ", ") + "\n";
   for (const FileCamera& each : loaded.cameras) {

@@ -9,6 +9,12 @@ void warn_of_lamps(const Scene& scene, std::vector<std::string>& warnings) {
   warnings.push_back("lamps left out, which meshes do not hold: " + std::to_string(scene.lamps.size()));
 }
 
+void warn_of_data(const Scene& scene, std::vector<std::string>& warnings) {
+  std::int64_t voxels = 0;
+  scene.grids().for_each([&](GridHandle, const SceneGrid& grid) { voxels += grid.grid.data_count(); });
+  if (voxels != 0) warnings.push_back("data of voxels left out, which meshes do not hold: " + std::to_string(voxels));
+}
+
 void warn_of_left_out(const Scene& scene, InstanceFilter filter, std::vector<std::string>& warnings) {
   std::size_t left_out = 0;
   for (const InstanceHandle handle : scene.instances().handles()) {

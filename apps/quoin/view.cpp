@@ -65,6 +65,7 @@ int run_view(const ViewArguments& arguments) {
   if (arguments.drawn == "blocks") options.mode = viewer::DrawMode::Blocks;
   if (arguments.drawn == "smooth") options.mode = viewer::DrawMode::Smooth;
   if (arguments.drawn == "density") options.mode = viewer::DrawMode::Density;
+  if (arguments.drawn == "paths") options.mode = viewer::DrawMode::Paths;
   if (arguments.light == "rays") options.light = LightModel::Rays;
   if (arguments.light == "propagated") options.light = LightModel::Propagated;
   if (arguments.backend == "cpu") options.backend = viewer::ViewerBackend::Processor;
@@ -134,7 +135,7 @@ void add_view_command(CLI::App& app, int& status) {
   command->add_option("--screenshot", arguments->screenshot, "Write the picture (.png) once it is done, and end")
       ->check(file_name());
   command->add_option("--draw", arguments->drawn, "What it is drawn as at first (default: as it was last)")
-      ->check(CLI::IsMember({"rays", "blocks", "smooth", "density"}));
+      ->check(CLI::IsMember({"rays", "blocks", "smooth", "density", "paths"}));
   command
       ->add_option("--light", arguments->light,
                    "Light by rays, or propagated as games have it, at first (default: as it was last)")

@@ -13,6 +13,7 @@
 
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/density_slice.h>
+#include <quoin/render/path_tracer.h>
 #include <quoin/scene/smooth_scene.h>
 
 namespace quoin::viewer {
@@ -23,6 +24,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::array kDivisors = {4, 3, 2, 1};
 constexpr int kSampleFactor = 4;
+constexpr int kPathSamples = 256;            // of a settled picture by paths
 constexpr double kPatienceAfterEdits = 4.0;  // times as long: the view stays, and need not become coarse again
 constexpr double kConstancy = 1.3;           // times as long is what lets the size of moving pictures be as it was
 constexpr double kNews = 0.3;                // the share of a new measurement in what is known of how long pixels take
@@ -58,7 +60,8 @@ LightOptions draft_of(LightOptions light) {
 }
 
 bool has_drafts(const ViewRequest& request) {
-  return request.mode != DrawMode::Density && !request.whole_only && draft_of(request.light) != request.light;
+  return request.mode != DrawMode::Density && request.mode != DrawMode::Paths && !request.whole_only &&
+         draft_of(request.light) != request.light;
 }
 
 RenderOptions options_for(const ViewRequest& request, const Stage& stage) {
@@ -71,6 +74,30 @@ RenderOptions options_for(const ViewRequest& request, const Stage& stage) {
   if (stage.divisor > 1) options.detail.impostor_seconds = 0.0;
   options.detail.colours = request.detail_colours;
   if (request.detail_by_pixels) options.detail.policy.emplace().rule = DetailPolicy::Rule::ByPixels;
+  return options;
+}
+
+// What the file says, in the light of the window's panel.
+PathOptions paths_for(const ViewRequest& request, const Stage& stage, const DBox& bounds) {
+  PathOptions options;
+  if (request.look) static_cast<Look&>(options) = request.look->look;
+  if (options.sky == SkyModel::Environment) options.sky = SkyModel::Uniform;  // its picture is not loaded here
+  options.lens_radius = 0.0;
+  options.width = stage.width(request);
+  options.height = stage.height(request);
+  options.samples = stage.samples;
+  options.denoise = true;
+  const LightOptions& light = request.light;
+  options.sun = light.sun;
+  options.sun_brightness *= light.sun_brightness;
+  options.sky_brightness *= light.sky_brightness;
+  options.lamp_brightness = light.lamp_brightness;
+  if (options.ground) options.ground->height = bounds.empty() ? 0.0 : bounds.min.y;
+  if (options.fog) options.fog->top = bounds.empty() ? 0.0 : bounds.max.y;
+  if (request.look) {
+    options.max_bounces = request.look->max_bounces;
+    options.max_scatterings = request.look->max_scatterings;
+  }
   return options;
 }
 
@@ -89,6 +116,15 @@ Result<Picture> draw_densities(const Scene& scene, const ViewRequest& request, c
   picture.colour = std::move(drawn->colour);
   return picture;
 }
+
+/// What pictures by paths need.
+struct PathPart {
+  PathPart(const Scene& scene, const CpuBackendOptions& options)
+      : tracer(scene, options.instances, options.threads), bounds(scene.bounds(options.instances)) {}
+
+  PathTracer tracer;
+  DBox bounds;
+};
 
 /// What pictures of smooth surfaces are marched through.
 struct SmoothPart {
@@ -125,6 +161,8 @@ struct CpuBackend::Impl {
   void update(std::unique_lock<std::mutex>& lock);
   void draw(std::unique_lock<std::mutex>& lock);
   [[nodiscard]] Result<Picture> picture_of(const ViewRequest& wanted, const Stage& now, const Progress& goes_on);
+  [[nodiscard]] Result<Picture> path_picture(const ViewRequest& wanted, const Stage& now, const Progress& goes_on);
+  void prepare_paths();
   [[nodiscard]] Status prepare_smooth(const Progress& goes_on);
   void refuse_smooth(Error why);
   void publish(Result<Picture> picture, const ViewRequest& of, const Stage& stage, double seconds);
@@ -141,7 +179,9 @@ struct CpuBackend::Impl {
   CpuRenderer renderer;
   std::map<int, DetailSelector> selectors;  // by divisor: pictures of another size are another view
   std::unique_ptr<SmoothPart> smooth;       // the worker's
+  std::unique_ptr<PathPart> paths;          // likewise
   std::atomic<bool> is_smooth_stale{true};
+  std::atomic<bool> are_paths_stale{true};
   std::atomic<int> smooth_percent{-1};  // of what is made for it; -1: nothing is
 
   mutable std::mutex mutex;  // guards what follows, but for the atomic ones
@@ -225,6 +265,7 @@ void CpuBackend::Impl::draw(std::unique_lock<std::mutex>& lock) {
   ViewRequest wanted = *request;
   const bool is_density = wanted.mode == DrawMode::Density;
   if (is_density) wanted.samples = 1;
+  if (wanted.mode == DrawMode::Paths) wanted.samples = kPathSamples;
   const Stage now = *stage;
   const std::uint64_t number = request_number;
   lock.unlock();
@@ -249,6 +290,9 @@ void CpuBackend::Impl::draw(std::unique_lock<std::mutex>& lock) {
 
 Result<Picture> CpuBackend::Impl::picture_of(const ViewRequest& wanted, const Stage& now, const Progress& goes_on) {
   if (wanted.mode == DrawMode::Density) return draw_densities(scene, wanted, now, options);
+  if (wanted.mode == DrawMode::Paths) return path_picture(wanted, now, goes_on);
+  paths.reset();
+  are_paths_stale = true;
   RenderOptions render = options_for(wanted, now);
   if (wanted.mode != DrawMode::Smooth) {
     smooth.reset();
@@ -259,6 +303,33 @@ Result<Picture> CpuBackend::Impl::picture_of(const ViewRequest& wanted, const St
   if (Status prepared = prepare_smooth(goes_on); !prepared) return prepared.error();
   render.detail.selector = &smooth->selectors[now.divisor];
   return smooth->renderer->render(wanted.camera, render, options.threads, goes_on);
+}
+
+Result<Picture> CpuBackend::Impl::path_picture(const ViewRequest& wanted, const Stage& now, const Progress& goes_on) {
+  smooth.reset();
+  is_smooth_stale = true;
+  prepare_paths();
+  auto taken = paths->tracer.render(wanted.camera, paths_for(wanted, now, paths->bounds), options.threads, goes_on);
+  if (!taken) return taken.error();
+  DevelopOptions film = wanted.look ? wanted.look->develop : DevelopOptions{};
+  film.exposure *= wanted.light.exposure;
+  auto colour = develop(*taken, film);
+  if (!colour) return colour.error();
+  Picture picture;
+  picture.colour = std::move(*colour);
+  picture.rays = taken->rays;
+  return picture;
+}
+
+void CpuBackend::Impl::prepare_paths() {
+  if (!are_paths_stale) return;
+  if (paths) {
+    paths->tracer.update(options.threads);
+    paths->bounds = scene.bounds(options.instances);
+  } else {
+    paths = std::make_unique<PathPart>(scene, options);
+  }
+  are_paths_stale = false;
 }
 
 // Makes the fields, or what of them changed.
@@ -377,6 +448,7 @@ void CpuBackend::resume(bool changed) {
     if (changed) {
       impl_->is_stale = true;
       impl_->is_smooth_stale = true;
+      impl_->are_paths_stale = true;
       impl_->is_broken = false;
       impl_->refusal.reset();
       impl_->is_done = false;

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/density_slice.h>
+#include <quoin/render/path_tracer.h>
 
 #include "loader.h"
 #include "viewer_fixture.h"
@@ -91,6 +92,38 @@ TEST(CpuBackend, NoPictureOfAnEarlierRequestIsSettled) {
   const auto frame = watched.backend.take();
   ASSERT_TRUE(frame);
   EXPECT_FALSE(frame->colour.width == request.width && frame->is_settled);
+}
+
+TEST(CpuBackend, PathsConvergeToThePathTracersPicture) {
+  const LoadedScene loaded = small_scene();
+  Watched watched(loaded.scene);
+  ViewRequest request = request_for(loaded.scene, View::Iso, 48, 32);
+  request.mode = DrawMode::Paths;
+  request.light.exposure = 1.5;
+  FileLook look;
+  look.look.sky = SkyModel::Uniform;
+  look.look.ground.emplace();
+  look.develop.tone = ToneCurve::Aces;
+  request.look = std::make_shared<const FileLook>(look);
+  watched.backend.show(request);
+  const auto frames = watched.settle();
+  ASSERT_GE(frames.size(), 5U);
+  for (std::size_t i = 1; i < frames.size(); ++i) EXPECT_GE(frames[i].samples, frames[i - 1].samples);
+  PathOptions options;
+  static_cast<Look&>(options) = look.look;
+  options.ground->height = loaded.scene.bounds().min.y;
+  options.width = 48;
+  options.height = 32;
+  options.samples = frames.back().samples;
+  options.denoise = true;
+  options.sun = request.light.sun;
+  const auto picture = PathTracer(loaded.scene).render(request.camera, options);
+  ASSERT_TRUE(picture.has_value());
+  EXPECT_EQ(frames.back().colour.rgb, develop(*picture, {1.5, ToneCurve::Aces}).value().rgb);
+  // Another mode, and back.
+  request.mode = DrawMode::Rays;
+  watched.backend.show(request);
+  EXPECT_FALSE(watched.settle().empty());
 }
 
 TEST(CpuBackend, TheSettledPictureIsTheRenderersToTheByte) {

@@ -45,7 +45,7 @@ struct DeviceBackend::Impl {
 
   [[nodiscard]] bool has_thread() const { return !options.rays_on_device; }
   [[nodiscard]] bool uses_device() const {
-    if (!request || request->mode == DrawMode::Density) return false;
+    if (!request || request->mode == DrawMode::Density || request->mode == DrawMode::Paths) return false;
     if (has_meshes(request->mode)) return true;
     // Smooth occlusion of fields is the processor's.
     return options.rays_on_device && !is_device_gone && request->light.occlusion_mode != OcclusionMode::Smooth;
@@ -320,7 +320,7 @@ std::string DeviceBackend::name() const {
 }
 
 bool DeviceBackend::traces_light(DrawMode mode) const {
-  if (!has_meshes(mode)) return mode == DrawMode::Rays;
+  if (!has_meshes(mode)) return ViewBackend::traces_light(mode);
   const Impl& me = *impl_;
   const std::lock_guard lock(me.mutex);
   if (!me.has_thread() && me.drawer) return me.tell().traces_light;

@@ -15,7 +15,8 @@ namespace quoin::viewer {
 /// A document and what draws it.
 struct OpenDocument {
   std::unique_ptr<Document> document;
-  std::unique_ptr<ViewBackend> backend;  // goes before the document, which it reads
+  std::unique_ptr<ViewBackend> backend;            // goes before the document, which it reads
+  std::shared_ptr<const FileLook> look = nullptr;  // how the file wants to be drawn, where it says it
 };
 
 /// Makes the backend of a document that was read, on the loading thread.

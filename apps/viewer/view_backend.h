@@ -13,6 +13,7 @@
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/scene/camera.h>
+#include <quoin/scene/look.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_query.h>
 #include <quoin/scene/sweep.h>
@@ -29,6 +30,7 @@ enum class DrawMode : std::uint8_t {
   Blocks,   ///< blocky meshes of its chunks
   Smooth,   ///< smooth meshes of its chunks
   Density,  ///< the densities of its fields on a plane, from the positive end of an axis: draw_density_slice
+  Paths,    ///< paths of light, which converge while one looks: PathTracer
 };
 
 [[nodiscard]] inline bool has_meshes(DrawMode mode) {
@@ -53,6 +55,7 @@ struct ViewRequest {
   int samples = 16;               ///< a pixel, once the picture has settled; meshes: 4, or 1 if that is wanted
   DrawMode mode = DrawMode::Rays;
   Wireframe wireframe = Wireframe::Off;  ///< of meshes
+  std::shared_ptr<const FileLook> look;  ///< of paths: what the file says of them; null: nothing
   SlicePlace slice;                      ///< of densities, which know no camera and no light
   bool whole_only = false;               ///< smaller pictures are of no use in the meantime
 };
@@ -90,7 +93,9 @@ class ViewBackend {
   [[nodiscard]] virtual bool can_draw(DrawMode mode) const { return !has_meshes(mode); }
 
   /// Whether what is drawn so has shadows and the light of lamps.
-  [[nodiscard]] virtual bool traces_light(DrawMode mode) const { return mode == DrawMode::Rays; }
+  [[nodiscard]] virtual bool traces_light(DrawMode mode) const {
+    return mode == DrawMode::Rays || mode == DrawMode::Paths;
+  }
 
   /// From now on this is wanted. The same request again changes nothing.
   virtual void show(const ViewRequest& request) = 0;

@@ -45,6 +45,7 @@
 #include <quoin/grid/grid.h>
 #include <quoin/grid/neighbourhood.h>
 #include <quoin/grid/volume.h>
+#include <quoin/grid/voxel_data.h>
 #include <quoin/grid/voxel_field.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/io/file.h>

@@ -80,6 +80,12 @@ class ChangeJournal {
   /// which compares records by their keys. Records tell of a change by `change()`.
   template <class Change, class Less>
   [[nodiscard]] Changes<Change> changes_since(ChangeCursor& cursor, Less&& less) const {
+    return changes_since<Change>(
+        cursor, less, [](const Record& record, std::vector<Change>& items) { items.push_back(record.change()); });
+  }
+  /// The same of one aspect: `tell(record, items)` appends what a record says of that, if anything.
+  template <class Change, class Less, class Tell>
+  [[nodiscard]] Changes<Change> changes_since(ChangeCursor& cursor, Less&& less, Tell&& tell) const {
     std::vector<Record> records;
     Changes<Change> changes;
     changes.all = !visit_since(cursor, [&](const Record& record) { records.push_back(record); });
@@ -87,7 +93,7 @@ class ChangeJournal {
     for (std::size_t i = 0; i < records.size();) {
       Record united = records[i];
       for (++i; i < records.size() && !less(united, records[i]); ++i) united.merge(records[i]);
-      changes.items.push_back(united.change());
+      tell(united, changes.items);
     }
     return changes;
   }
@@ -101,6 +107,10 @@ class ChangeJournal {
   /// Whether `visit_since` would tell of anything.
   [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const {
     return cursor.container_ != container_ || cursor.next_ != end_;
+  }
+  /// The same of one aspect, of which nothing is told in records after the one with `serial`.
+  [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor, std::uint64_t serial) const {
+    return cursor.container_ != container_ || cursor.next_ < first_ || cursor.next_ <= serial;
   }
 
   [[nodiscard]] std::size_t bytes() const { return blocks_.size() * (sizeof(Block) + sizeof(blocks_[0])); }

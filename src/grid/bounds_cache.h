@@ -76,7 +76,12 @@ class BoundsCache {
     const auto* const entry = entries.find(chunk.x, chunk.y, chunk.z);
     boxes_->put(chunk, entry == nullptr ? IBox{} : box_of(chunk, *entry));
   }
+  [[nodiscard]] static bool changes_voxels(const Record& record) {
+    if constexpr (requires { record.has_types(); }) return record.has_types();
+    return true;
+  }
   [[nodiscard]] bool is_within(const Record& record) const {
+    if (!changes_voxels(record)) return true;
     if (box_.empty()) return false;
     const IBox changed = record.change().box;
     for (int axis = 0; axis < 3; ++axis) {

@@ -35,6 +35,7 @@ class PackedBox {
 
   /// Of nothing.
   PackedBox() = default;
+  [[nodiscard]] bool empty() const { return bytes_ == ~std::uint64_t{0}; }
 
   void unite(const PackedBox& other) {
     const auto a = std::bit_cast<Bytes>(bytes_);
@@ -61,6 +62,7 @@ struct VoxelRecord {
   IVec3 chunk{0};
   std::uint32_t neighbours = 0;
   PackedBox box;
+  PackedBox data;  ///< around those whose data changed, those that became another type too
   ChunkSlabs slabs;
 
   /// Counts voxels of a row that changed.
@@ -100,8 +102,11 @@ struct VoxelRecord {
   void merge(const VoxelRecord& other) {
     neighbours |= other.neighbours;
     box.unite(other.box);
+    data.unite(other.data);
     slabs.add(other.slabs);
   }
+  [[nodiscard]] bool has_types() const { return !box.empty(); }
+  [[nodiscard]] bool has_data() const { return !data.empty(); }
   [[nodiscard]] ChunkChange change() const { return {chunk, box.box(), neighbours, slabs}; }
 
  private:
@@ -115,7 +120,8 @@ struct VoxelRecord {
 /// What an edit did to one chunk of voxels.
 struct VoxelEdit {
   std::int64_t voxels = 0;
-  VoxelRecord record;
+  int data_before = 0;  ///< voxels with data; the edit takes some away where it changes types
+  VoxelRecord record{};
 
   void add(int y, int z, std::uint64_t changed) {
     if (changed == 0) return;

@@ -14,6 +14,7 @@
 #include "core/coordinates/chunk_order.h"
 #include "grid/bounds_cache.h"
 #include "grid/change_records.h"
+#include "grid/chunk/chunk_data.h"
 #include "grid/chunk/chunk_difference.h"
 #include "grid/chunk_table.h"
 #include "grid/long_box.h"
@@ -31,17 +32,30 @@ struct Grid::Impl {
   ChunkTable entries;
   ChangeJournal<VoxelRecord> journal;
   BoundsCache<VoxelRecord, ChunkTable, VoxelBox> bounds;
-  std::int64_t voxel_count = 0;  // that are not air
+  std::int64_t voxel_count = 0;    // that are not air
+  std::int64_t data_count = 0;     // that have data
+  std::uint64_t types_serial = 0;  // of the last record that tells of types
+  std::uint64_t data_serial = 0;   // of the last that tells of data
+
+  void note(std::uint64_t& serial, const VoxelRecord& record) {
+    journal.note(serial, record, entries.size());
+    if (record.has_types()) types_serial = std::max(types_serial, serial);
+    if (record.has_data()) data_serial = std::max(data_serial, serial);
+  }
 
   // Books an edit of one chunk, tells whoever follows the grid, and drops the chunk where nothing is left in it.
   void finish_edit(const IVec3& chunk, const ChunkTable::Slot& slot, VoxelEdit& edit, EditNotice& notice) {
     QUOIN_ASSERT(slot.entry != nullptr && entries.find(chunk) == slot.entry, "the slot is the chunk's");
     // Before anything that may throw: the storage that was known may be gone.
     entries.voxels_changed(slot);
-    if (edit.voxels != 0) {
+    if (const int data = quoin::data_count(slot.entry->chunk); data != edit.data_before) {
+      if (!edit.record.has_data()) edit.record.data = edit.record.box;
+      data_count += data - edit.data_before;
+    }
+    if (edit.voxels != 0 || edit.record.has_data()) {
       journal.begin_change();
       edit.record.chunk = chunk;
-      journal.note(slot.entry->serial, edit.record, entries.size());
+      note(slot.entry->serial, edit.record);
       notice.give();
     }
     const int voxels = non_air_count(slot.entry->chunk);
@@ -64,7 +78,7 @@ struct Grid::Impl {
 template <class Change>
 std::int64_t Grid::Impl::edit_chunk(IVec3 chunk, const ChunkTable::Slot& slot, const IBox& part, EditNotice& notice,
                                     Change& change) {
-  VoxelEdit edit;
+  VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
   entries.voxels_will_change(slot);
   try {
     change(chunk, slot.entry->chunk, part, edit);
@@ -138,7 +152,7 @@ bool Grid::set(int x, int y, int z, VoxelType type) {
     if (type == kAir || !is_inside_world(at)) return false;
     slot = impl_->entries.find_or_create(at);
   }
-  VoxelEdit edit;
+  VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
   try {
     if (!slot.entry->chunk.set(local, type)) return false;
   } catch (...) {
@@ -162,7 +176,7 @@ std::int64_t Grid::write_row(IVec3 row, std::uint64_t mask, std::span<const Voxe
   const IVec3 local = local_of(row);
   if (mask == 0 || !is_inside_world(at)) return 0;
   const ChunkTable::Slot slot = impl_->entries.find_or_create(at);
-  VoxelEdit edit;
+  VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
   try {
     edit.add(local.y, local.z, slot.entry->chunk.write_row(local.y, local.z, mask, types));
   } catch (...) {
@@ -172,6 +186,45 @@ std::int64_t Grid::write_row(IVec3 row, std::uint64_t mask, std::span<const Voxe
   }
   impl_->finish_edit(at, slot, edit, notice_);
   return edit.voxels;
+}
+
+VoxelData Grid::data(IVec3 voxel) const {
+  const Chunk* const chunk = find_chunk(chunk_of(voxel));
+  return chunk == nullptr ? VoxelData{} : chunk->data(local_of(voxel));
+}
+
+bool Grid::set_data(IVec3 voxel, const VoxelData& data) {
+  const IVec3 at = chunk_of(voxel);
+  const IVec3 local = local_of(voxel);
+  const Chunk* const present = find_chunk(at);
+  // Asked first, so that nothing is copied where nothing changes.
+  if (present == nullptr || present->get(local) == kAir || present->data(local) == data) return false;
+  const ChunkTable::Slot slot = impl().entries.find_to_edit(at);
+  VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
+  edit.record.data = PackedBox::of(local.x, local.y, local.z);
+  slot.entry->chunk.set_data(local, data);
+  impl().finish_edit(at, slot, edit, notice_);
+  return true;
+}
+
+bool Grid::set(IVec3 voxel, VoxelType type, const VoxelData& data) {
+  const std::vector<std::byte> bytes(data.bytes.begin(), data.bytes.end());
+  const VoxelData kept{data.state, bytes};
+  const bool is_other = set(voxel, type);
+  return set_data(voxel, kept) || is_other;
+}
+
+std::int64_t Grid::data_count() const {
+  return impl().data_count;
+}
+
+void Grid::for_each_data(FunctionRef<void(IVec3 voxel, VoxelType type, const VoxelData& data)> visit) const {
+  if (data_count() == 0) return;
+  for (const IVec3 at : chunks()) {
+    const Chunk& chunk = *find_chunk(at);
+    chunk.for_each_data(
+        [&](IVec3 local, const VoxelData& data) { visit(at * kChunkEdge + local, chunk.get(local), data); });
+  }
 }
 
 std::int64_t Grid::set(std::span<const PlacedVoxel> voxels) {
@@ -264,8 +317,11 @@ std::int64_t Grid::put_chunk(IVec3 at, Chunk voxels) {
   if (present == nullptr && voxels.non_air_count() == 0) return 0;
   if (present != nullptr && present->chunk.shares_storage_with(voxels)) return 0;
   const ChunkTable::Slot slot = impl().entries.find_or_create(at);
-  VoxelEdit edit;
+  VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
   difference_of_types(slot.entry->chunk, voxels, edit);
+  visit_other_data(&slot.entry->chunk, &voxels, [&](IVec3 local, const VoxelData&, const VoxelData&) {
+    edit.record.data.unite(PackedBox::of(local.x, local.y, local.z));
+  });
   slot.entry->chunk = std::move(voxels);
   impl().finish_edit(at, slot, edit, notice_);
   return edit.voxels;
@@ -279,11 +335,13 @@ void Grid::clear() {
     VoxelRecord record;
     record.chunk = at;
     record.add_box(box);
+    if (entry.chunk.data_count() != 0) record.data = record.box;
     std::uint64_t serial = entry.serial;
-    impl().journal.note(serial, record, impl().entries.size());
+    impl().note(serial, record);
   });
   impl().entries.clear();
   impl().voxel_count = 0;
+  impl().data_count = 0;
   notice_.give();
 }
 
@@ -314,11 +372,25 @@ Neighbourhood Grid::neighbourhood(IVec3 chunk) const {
 }
 
 GridChanges Grid::changes_since(ChangeCursor& cursor) const {
-  return impl().journal.changes_since<ChunkChange>(cursor, by_chunk);
+  const auto tell = [](const VoxelRecord& record, std::vector<ChunkChange>& items) {
+    if (record.has_types()) items.push_back(record.change());
+  };
+  return impl().journal.changes_since<ChunkChange>(cursor, by_chunk, tell);
 }
 
 bool Grid::has_changed_since(const ChangeCursor& cursor) const {
-  return impl().journal.has_changed_since(cursor);
+  return impl().journal.has_changed_since(cursor, impl().types_serial);
+}
+
+DataChanges Grid::data_changes_since(ChangeCursor& cursor) const {
+  const auto tell = [](const VoxelRecord& record, std::vector<DataChange>& items) {
+    if (record.has_data()) items.push_back({record.chunk, record.data.box()});
+  };
+  return impl().journal.changes_since<DataChange>(cursor, by_chunk, tell);
+}
+
+bool Grid::has_data_changed_since(const ChangeCursor& cursor) const {
+  return impl().journal.has_changed_since(cursor, impl().data_serial);
 }
 
 ChangeCursor Grid::cursor() const {
@@ -351,6 +423,18 @@ ChunkSlabs ChunkSlabs::of(const IBox& box) {
   return slabs;
 }
 
+namespace {
+
+std::vector<IVec3> chunks_of_either(const Grid& a, const Grid& b) {
+  std::vector<IVec3> chunks = a.chunks();
+  const std::vector<IVec3> others = b.chunks();
+  chunks.insert(chunks.end(), others.begin(), others.end());
+  sort_and_unite(chunks);
+  return chunks;
+}
+
+}  // namespace
+
 void visit_changes(const Grid& before, const Grid& now, const GridChanges& changes,
                    FunctionRef<void(const RowChange&)> visit) {
   const auto compare = [&](IVec3 chunk, const IBox& box, const ChunkSlabs& slabs) {
@@ -360,11 +444,23 @@ void visit_changes(const Grid& before, const Grid& now, const GridChanges& chang
     for (const ChunkChange& change : changes.items) compare(change.chunk, change.box, change.slabs);
     return;
   }
-  std::vector<IVec3> chunks = before.chunks();
-  const std::vector<IVec3> present = now.chunks();
-  chunks.insert(chunks.end(), present.begin(), present.end());
-  sort_and_unite(chunks);
-  for (const IVec3 chunk : chunks) compare(chunk, kWholeChunk, ChunkSlabs::all());
+  for (const IVec3 chunk : chunks_of_either(before, now)) compare(chunk, kWholeChunk, ChunkSlabs::all());
+}
+
+void visit_data_changes(const Grid& before, const Grid& now, const DataChanges& changes,
+                        FunctionRef<void(IVec3 voxel, const VoxelData& before, const VoxelData& now)> visit) {
+  std::vector<IVec3> chunks;
+  if (changes.all) {
+    chunks = chunks_of_either(before, now);
+  } else {
+    for (const DataChange& change : changes.items) chunks.push_back(change.chunk);
+  }
+  for (const IVec3 chunk : chunks) {
+    visit_other_data(before.find_chunk(chunk), now.find_chunk(chunk),
+                     [&](IVec3 local, const VoxelData& one, const VoxelData& other) {
+                       visit(chunk * kChunkEdge + local, one, other);
+                     });
+  }
 }
 
 IBox Grid::bounds() const {

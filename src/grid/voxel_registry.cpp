@@ -24,7 +24,8 @@ bool is_same(const VoxelProperties& a, const VoxelProperties& b) {
   VoxelProperties left = a;
   VoxelProperties right = b;
   for (float VoxelProperties::*const number :
-       {&VoxelProperties::roughness, &VoxelProperties::metalness, &VoxelProperties::emission, &VoxelProperties::ior}) {
+       {&VoxelProperties::roughness, &VoxelProperties::metalness, &VoxelProperties::emission, &VoxelProperties::ior,
+        &VoxelProperties::scattering, &VoxelProperties::anisotropy}) {
     if (std::isnan(left.*number) && std::isnan(right.*number)) left.*number = right.*number = 0.0F;
   }
   return left == right;
@@ -82,6 +83,9 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   if (properties.visibility == Visibility::Air) {
     return make_error(ErrorCode::InvalidArgument, "type 0 is the only air");
   }
+  if (properties.state_bits > kMaxStateBits) {
+    return make_error(ErrorCode::InvalidArgument, "a state of more than 32 bits");
+  }
   if (size() > kMaxVoxelTypes) {
     return make_error(ErrorCode::LimitExceeded, "more than 65,535 distinct voxel types");
   }
@@ -115,6 +119,7 @@ Result<VoxelType> VoxelRegistry::find_or_add(const VoxelProperties& properties) 
 void VoxelRegistry::replace(VoxelType type, VoxelProperties properties) {
   QUOIN_ASSERT(type != kAir && type < size(), "a registered type, not air");
   QUOIN_ASSERT(properties.visibility != Visibility::Air, "type 0 is the only air");
+  QUOIN_ASSERT(properties.state_bits <= kMaxStateBits, "a state word has 32 bits");
   journal_->begin_change();
   content_.make_own();
   Content& c = *content_;

@@ -1,5 +1,6 @@
 #include "io/text.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -47,6 +48,18 @@ std::optional<float> parse_float(std::string_view text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
   return value;
+}
+
+bool parse_floats(std::string_view text, std::span<float> out) {
+  for (float& number : out) {
+    text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
+    const std::size_t length = std::min(text.find(' '), text.size());
+    const std::optional<float> read = parse_float(text.substr(0, length));
+    if (!read) return false;
+    number = *read;
+    text.remove_prefix(length);
+  }
+  return text.find_first_not_of(' ') == std::string_view::npos;
 }
 
 std::string to_text(float value) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -12,6 +13,9 @@ namespace quoin {
 
 /// The finite number that all of `text` spells, whatever the locale; nothing when it is not one.
 [[nodiscard]] std::optional<float> parse_float(std::string_view text);
+
+/// So many of them with blanks between, and nothing else. Returns whether it is that; otherwise `out` means nothing.
+[[nodiscard]] bool parse_floats(std::string_view text, std::span<float> out);
 
 /// The shortest text from which `parse_float` gives the same number.
 [[nodiscard]] std::string to_text(float value);

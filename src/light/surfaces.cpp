@@ -29,8 +29,9 @@ namespace {
 
 // Mirrors all but four thousandths, and its square is a number.
 constexpr float kLargestIor = 1e3F;
+constexpr float kMostScattering = 1e6F;
 
-Surface surface_of(const VoxelProperties& properties) {
+Surface surface_of(const VoxelProperties& properties, Clouds clouds) {
   Surface surface;
   const Rgba8 c = properties.colour;
   surface.colour = linear_colour(c);
@@ -43,6 +44,12 @@ Surface surface_of(const VoxelProperties& properties) {
   if (properties.visibility != Visibility::Transparent) return surface;
   set_absorption(static_cast<float>(c.a) / 255.0F, surface);
   surface.ior = std::min(glass_ior(properties).value_or(1.0F), kLargestIor);
+  if (clouds == Clouds::AsGlass || !(properties.scattering > 0.0F)) return surface;
+  surface.scattering = std::min(properties.scattering, kMostScattering);
+  if (!std::isnan(properties.anisotropy)) surface.anisotropy = std::clamp(properties.anisotropy, -0.99F, 0.99F);
+  surface.ior = 1.0F;
+  surface.log_clarity = -surface.scattering;
+  surface.log_transmittance = Vec3(-surface.scattering);
   return surface;
 }
 
@@ -53,7 +60,9 @@ void Surfaces::update(const VoxelRegistry& types) {
   ChangeCursor now = followed_;
   const TypeChanges changes = types.changes_since(now);
   followed_ = {};  // stays so when memory runs out
-  const auto put = [&](std::size_t type) { surfaces_[type] = surface_of(types[static_cast<VoxelType>(type)]); };
+  const auto put = [&](std::size_t type) {
+    surfaces_[type] = surface_of(types[static_cast<VoxelType>(type)], clouds_);
+  };
   surfaces_.resize(types.size() + 1);
   surfaces_.back() = {};
   surfaces_.back().colour = {1.0F, 0.0F, 1.0F};

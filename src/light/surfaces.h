@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -20,6 +22,9 @@ struct Surface {
   float ior = 1.0F;        ///< of what is transparent, see glass_ior; else that of air
   float roughness = 1.0F;  ///< as VoxelProperties', within 0 and 1; 1 of what is not a number
   float metalness = 0.0F;  ///< likewise; 0 of what is not a number
+  /// As VoxelProperties', of what is transparent; 0 where pictures show clouds as glass.
+  float scattering = 0.0F;
+  float anisotropy = 0.0F;  ///< -0.99 to 0.99
 };
 
 /// The index of refraction with which a transparent type is drawn and written to files; none where its own is not one:
@@ -32,17 +37,28 @@ struct Surface {
 /// Sets what a voxel's length of a transparent surface lets through, by its colour and alpha.
 void set_absorption(float alpha, Surface& surface);
 
+/// What becomes of types that scatter light within.
+enum class Clouds : std::uint8_t {
+  AsGlass,
+  Scatter,  ///< they refract, tint and absorb nothing; `log_clarity` is of light that is not scattered
+};
+
 /// Surfaces by type; an id that is not registered gives a magenta that shows.
 class Surfaces {
  public:
-  explicit Surfaces(const VoxelRegistry& types) { update(types); }
+  explicit Surfaces(const VoxelRegistry& types, Clouds clouds = Clouds::AsGlass) : clouds_(clouds) { update(types); }
   /// Takes over the types that changed. Cost: O(these).
   void update(const VoxelRegistry& types);
+  /// Whether any type scatters light within: never with Clouds::AsGlass.
+  [[nodiscard]] bool has_clouds() const {
+    return std::ranges::any_of(surfaces_, [](const Surface& each) { return each.scattering > 0.0F; });
+  }
   [[nodiscard]] const Surface& operator[](VoxelType type) const {
     return surfaces_[type < surfaces_.size() - 1 ? type : surfaces_.size() - 1];
   }
 
  private:
+  Clouds clouds_;
   std::vector<Surface> surfaces_;  // that of unregistered types comes last
   ChangeCursor followed_;
 };

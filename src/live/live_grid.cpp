@@ -43,6 +43,30 @@ void LiveGrid::follow(const Grid& grid, LiveClock::time_point now) {
   followed_ = end;
 }
 
+// Corners of faces have the light of voxels in front of them: chunks that hold one of the 26 neighbours of a voxel
+// whose light changed are meshed again.
+void LiveGrid::follow_light(const GridLight& light, LiveClock::time_point now) {
+  if (options_.style != SurfaceStyle::Blocky) return;
+  if (light.light == nullptr) {
+    if (std::exchange(is_lit_, false)) mark_all(now);
+    followed_light_ = {};
+    return;
+  }
+  is_lit_ = true;
+  ChangeCursor end = followed_light_;
+  const GridChanges changes = light.light->changes_since(end);
+  if (changes.empty()) return;
+  followed_light_ = {};
+  if (changes.all) mark_all(now);
+  for (const ChunkChange& change : changes.items) {
+    for (int i = 0; i < 27; ++i) {
+      const IVec3 offset = Neighbourhood::offset(i);
+      if (change.affects(offset)) mark_if_there(change.chunk + offset, now);
+    }
+  }
+  followed_light_ = end;
+}
+
 // What was made so far, or is being made, is of another grid.
 void LiveGrid::begin_anew() {
   densities_.clear();
@@ -65,7 +89,7 @@ void LiveGrid::leave() {
     if (!state.is_gone) all.push_back(chunk);
   }
   for (const IVec3 chunk : all) remove(chunk);
-  followed_ = {};
+  followed_ = followed_light_ = {};
   densities_.clear();
 }
 
@@ -131,6 +155,12 @@ void LiveGrid::mark_if_there(IVec3 chunk, LiveClock::time_point now) {
   if (found != chunks_.end() && !found->second.is_gone) mark(chunk, found->second, now);
 }
 
+void LiveGrid::mark_all(LiveClock::time_point now) {
+  for (auto& [chunk, state] : chunks_) {
+    if (!state.is_gone) mark(chunk, state, now);
+  }
+}
+
 void LiveGrid::mark(IVec3 chunk, LiveChunk& state, LiveClock::time_point now) {
   waiting_.insert(chunk);
   box_ = unite(box_, {chunk, chunk + 1});
@@ -173,10 +203,12 @@ void LiveGrid::make_ready(IVec3 chunk, LiveChunk& state) {
 
 std::unique_ptr<LiveJob> LiveGrid::make_job(LiveInputs& inputs, IVec3 chunk) {
   // Smooth jobs have that of their densities.
-  return make_job(options_.style == SurfaceStyle::Blocky ? inputs.voxels() : GridSnapshot(), chunk, *inputs.types);
+  if (options_.style == SurfaceStyle::Smooth) return make_job(GridSnapshot(), chunk, *inputs.types);
+  return make_job(inputs.voxels(), chunk, *inputs.types, inputs.light());
 }
 
-std::unique_ptr<LiveJob> LiveGrid::make_job(const GridSnapshot& grid, IVec3 chunk, const LiveTypes& types) {
+std::unique_ptr<LiveJob> LiveGrid::make_job(const GridSnapshot& grid, IVec3 chunk, const LiveTypes& types,
+                                            const LightSnapshot& light) {
   const LiveChunk& state = chunks_.at(chunk);
   auto job = std::make_unique<LiveJob>();
   job->source = {handle_, SurfaceContent::Voxels};
@@ -186,6 +218,7 @@ std::unique_ptr<LiveJob> LiveGrid::make_job(const GridSnapshot& grid, IVec3 chun
   job->seen = state.seen;
   if (options_.style == SurfaceStyle::Blocky) {
     job->voxels = grid;
+    job->light = light;
     return job;
   }
   job->densities = densities_.around(chunk, types.registry);

@@ -44,8 +44,9 @@ class LiveGrid final : public LiveSource {
 
   void follow(const SceneGrid& content, LiveClock::time_point now) override { follow(content.grid, now); }
   void follow(const Grid& grid, LiveClock::time_point now);
+  void follow_light(const GridLight& light, LiveClock::time_point now) override;
   void leave() override;
-  void forget() override { followed_ = {}; }
+  void forget() override { followed_ = followed_light_ = {}; }
   void mark_types(const SceneGrid& content, const ChangedTypes& changed, LiveClock::time_point now) override;
 
   void prepare(const SceneGrid&, const VoxelRegistry&) override {}
@@ -54,7 +55,8 @@ class LiveGrid final : public LiveSource {
   [[nodiscard]] bool has_chunks() const override { return !chunks_.empty(); }
   [[nodiscard]] std::unique_ptr<LiveJob> make_job(LiveInputs& inputs, IVec3 chunk) override;
   /// With the grid as `follow` saw it; null for smooth surfaces.
-  [[nodiscard]] std::unique_ptr<LiveJob> make_job(const GridSnapshot& grid, IVec3 chunk, const LiveTypes& types);
+  [[nodiscard]] std::unique_ptr<LiveJob> make_job(const GridSnapshot& grid, IVec3 chunk, const LiveTypes& types,
+                                                  const LightSnapshot& light = nullptr);
   void hand_over(IVec3 chunk, std::uint64_t serial) override;
   [[nodiscard]] bool is_current(const LiveJob& job) const override;
   void withdrawn(const LiveJob& job) override;
@@ -71,6 +73,7 @@ class LiveGrid final : public LiveSource {
   void remove_if_there(IVec3 chunk);
   void see_whether_meshed(const Grid& grid, IVec3 chunk, LiveClock::time_point now);
   void mark_if_there(IVec3 chunk, LiveClock::time_point now);
+  void mark_all(LiveClock::time_point now);
   void mark(IVec3 chunk, LiveChunk& state, LiveClock::time_point now);
   void wait_again(IVec3 chunk, LiveChunk& state);
   void remove(IVec3 chunk);
@@ -83,6 +86,8 @@ class LiveGrid final : public LiveSource {
   const LiveMeshOptions& options_;
   LiveTotals& totals_;
   ChangeCursor followed_;
+  ChangeCursor followed_light_;
+  bool is_lit_ = false;
   Chunks chunks_;
   ChunkSet waiting_;
   IBox box_;                // of all chunks that there were

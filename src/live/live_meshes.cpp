@@ -15,7 +15,7 @@ std::size_t ChunkSurface::bytes() const {
          smooth.normals.capacity() * sizeof(Vec3) + smooth.occlusion.capacity() * sizeof(float) +
          smooth.cells.capacity() * sizeof(SmoothCell) + smooth.indices.capacity() * sizeof(std::uint32_t) +
          albedo.capacity() * sizeof(LinearRgba16) + types.capacity() * sizeof(VoxelType) +
-         regions.capacity() * sizeof(SurfaceRegion);
+         regions.capacity() * sizeof(SurfaceRegion) + light.capacity() * sizeof(FaceLight);
 }
 
 struct LiveMeshes::Impl {
@@ -37,6 +37,9 @@ LiveMeshes::~LiveMeshes() {
 
 void LiveMeshes::update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes) {
   impl_->scheduler.update(scene, eye, other_eyes);
+}
+void LiveMeshes::use_light(const SceneLight* light) {
+  impl_->scheduler.use_light(light);
 }
 std::vector<SurfaceUpdate> LiveMeshes::take(std::size_t max_bytes) {
   return impl_->scheduler.take(max_bytes);

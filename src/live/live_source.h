@@ -68,7 +68,8 @@ struct ChangedTypes {
 /// What jobs of one update are made of; snapshots are taken when the first needs them.
 class LiveInputs {
  public:
-  LiveInputs(const SceneGrid& content, const LiveTypes& with) : types(&with), content_(&content) {}
+  LiveInputs(const SceneGrid& content, const LiveTypes& with, const GridLight& light = {})
+      : types(&with), content_(&content), light_(light) {}
 
   [[nodiscard]] const GridSnapshot& voxels() {
     if (voxels_ == nullptr) voxels_ = std::make_shared<const Grid>(content_->grid.snapshot());
@@ -78,12 +79,21 @@ class LiveInputs {
     if (field_ == nullptr) field_ = std::make_shared<const DensityGrid>(content_->field.snapshot());
     return field_;
   }
+  /// Null where no light is used.
+  [[nodiscard]] const LightSnapshot& light() {
+    if (lit_ == nullptr && light_.light != nullptr) {
+      lit_ = std::make_shared<const LitVoxels>(LitVoxels{light_.light->snapshot(), light_.voxels->snapshot()});
+    }
+    return lit_;
+  }
 
   const LiveTypes* types;
 
  private:
   const SceneGrid* content_;
+  GridLight light_;
   GridSnapshot voxels_;
+  LightSnapshot lit_;
   FieldSnapshot field_;
 };
 
@@ -100,6 +110,11 @@ class LiveSource {
 
   /// Takes over what was edited, at a cost in proportion to that.
   virtual void follow(const SceneGrid& content, LiveClock::time_point now) = 0;
+  /// The same of its light, whose pointers are null where none is used.
+  virtual void follow_light(const GridLight& light, LiveClock::time_point now) {
+    (void)light;
+    (void)now;
+  }
   /// Nothing of it is drawn any more.
   virtual void leave() = 0;
   /// Makes the next `follow` begin anew.

@@ -38,12 +38,21 @@ void mix_into(std::array<std::uint64_t, 4>& lanes, std::span<const Quad> quads) 
   for (std::size_t k = 0; i < quads.size(); ++i, ++k) lanes[k] = mixed_with(lanes[k], quads[i].bits);
 }
 
-std::uint64_t hash_of(const SurfaceRegion& region, std::span<const Quad> quads) {
+void mix_into(std::array<std::uint64_t, 4>& lanes, std::span<const FaceLight> light) {
+  for (const FaceLight& corners : light) {
+    for (std::size_t k = 0; k < 4; ++k) lanes[k] = mixed_with(lanes[k], corners[k]);
+  }
+}
+
+std::uint64_t hash_of(const SurfaceRegion& region, const ChunkSurface& surface) {
+  const std::span<const Quad> quads(surface.quads.begin(), surface.quads.size());
+  const std::span<const FaceLight> light(surface.light);
   std::array<std::uint64_t, 4> lanes = {1, 2, 3, 4};
   for (const auto& range : {region.opaque, region.transparent}) {
     const std::uint32_t count = range[6] - range[0];
     lanes[0] = mixed_with(lanes[0], count);
     mix_into(lanes, quads.subspan(range[0], count));
+    if (!light.empty()) mix_into(lanes, light.subspan(range[0], count));
   }
   std::uint64_t hash = kHashSeed;
   for (const std::uint64_t lane : lanes) hash = mixed_with(hash, lane);
@@ -63,30 +72,44 @@ std::array<std::uint32_t, 7> directions_of(const QuadBuffer& quads, std::size_t 
   return range;
 }
 
+// Quads, and the light of each where there is any.
+struct LitQuads {
+  const QuadBuffer& quads;
+  std::span<const FaceLight> light;
+};
+
 // Those of opaque types first.
-void sort_into_one(const QuadBuffer& quads, const VoxelRegistry& types, ChunkSurface& surface) {
+void sort_into_one(const LitQuads& lit, const VoxelRegistry& types, ChunkSurface& surface) {
+  const QuadBuffer& quads = lit.quads;
   surface.quads.resize(quads.size());
+  surface.light.resize(lit.light.size());
   std::size_t opaque = quads.size();
   if (types.has_transparent()) {
     // Transparent ones from the end on, and then turned round. Without a branch: nobody can guess them.
     opaque = 0;
     std::size_t end = quads.size();
-    for (const Quad quad : quads) {
-      const bool is_transparent = types.is_transparent(quad.type());
-      surface.quads[is_transparent ? end - 1 : opaque] = quad;
+    for (std::size_t i = 0; i < quads.size(); ++i) {
+      const bool is_transparent = types.is_transparent(quads[i].type());
+      const std::size_t place = is_transparent ? end - 1 : opaque;
+      surface.quads[place] = quads[i];
+      if (!lit.light.empty()) surface.light[place] = lit.light[i];
       opaque += is_transparent ? 0 : 1;
       end -= is_transparent ? 1 : 0;
     }
-    std::reverse(surface.quads.begin() + static_cast<std::ptrdiff_t>(opaque), surface.quads.end());
+    const auto first = static_cast<std::ptrdiff_t>(opaque);
+    std::reverse(surface.quads.begin() + first, surface.quads.end());
+    if (!lit.light.empty()) std::reverse(surface.light.begin() + first, surface.light.end());
   } else {
     std::copy(quads.begin(), quads.end(), surface.quads.begin());
+    std::ranges::copy(lit.light, surface.light.begin());
   }
   surface.opaque_quads = opaque;
   surface.regions.push_back(
       {IVec3{0}, directions_of(surface.quads, 0, opaque), directions_of(surface.quads, opaque, quads.size()), 0});
 }
 
-void sort_into_many(const QuadBuffer& quads, const VoxelRegistry& types, int edge, ChunkSurface& surface) {
+void sort_into_many(const LitQuads& lit, const VoxelRegistry& types, int edge, ChunkSurface& surface) {
+  const QuadBuffer& quads = lit.quads;
   const int across = kChunkEdge / edge;
   const auto region_of = [&](IVec3 voxel) {
     const IVec3 at = voxel / edge;
@@ -112,17 +135,34 @@ void sort_into_many(const QuadBuffer& quads, const VoxelRegistry& types, int edg
   }
   surface.opaque_quads = first[6 * regions];
   surface.quads.resize(quads.size());
-  for (const Quad quad : quads) surface.quads[first[place_of(quad)]++] = quad;
+  surface.light.resize(lit.light.size());
+  for (std::size_t i = 0; i < quads.size(); ++i) {
+    const std::uint32_t place = first[place_of(quads[i])]++;
+    surface.quads[place] = quads[i];
+    if (!lit.light.empty()) surface.light[place] = lit.light[i];
+  }
 }
 
 // The quads in the order of ChunkSurface.
-void sort_into_regions(const QuadBuffer& quads, const VoxelRegistry& types, int edge, ChunkSurface& surface) {
+void sort_into_regions(const LitQuads& lit, const VoxelRegistry& types, int edge, ChunkSurface& surface) {
   if (edge == kChunkEdge) {
-    sort_into_one(quads, types, surface);
+    sort_into_one(lit, types, surface);
   } else {
-    sort_into_many(quads, types, edge, surface);
+    sort_into_many(lit, types, edge, surface);
   }
-  for (SurfaceRegion& region : surface.regions) region.hash = hash_of(region, surface.quads);
+  for (SurfaceRegion& region : surface.regions) region.hash = hash_of(region, surface);
+}
+
+// Quads become several where one would not have the light of its faces.
+LitQuads lit_by(const LiveJob& job, const QuadBuffer& quads, LightMerging merging, LiveWorkspace& workspace) {
+  if (workspace.lit != job.light || workspace.lit_types != job.types) {
+    workspace.surface_light.reset();
+    workspace.lit = job.light;
+    workspace.lit_types = job.types;
+    workspace.surface_light.emplace(job.light->light, job.light->voxels, *job.types);
+  }
+  workspace.surface_light->split(quads, job.chunk, merging, workspace.lit_quads, workspace.face_light);
+  return {workspace.lit_quads, workspace.face_light};
 }
 
 // Quads that reach over the border of a region become several of the same faces: where faces were merged all of them
@@ -150,7 +190,10 @@ void make_blocky(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& wo
   surface->style = SurfaceStyle::Blocky;
   const bool is_cut = options.region_edge < kChunkEdge;
   if (is_cut) cut_at_regions(workspace.quads, options.region_edge, workspace.cut_quads);
-  sort_into_regions(is_cut ? workspace.cut_quads : workspace.quads, types, options.region_edge, *surface);
+  const QuadBuffer& quads = is_cut ? workspace.cut_quads : workspace.quads;
+  const bool is_lit = job.light != nullptr;
+  const LitQuads lit = is_lit ? lit_by(job, quads, options.light_merging, workspace) : LitQuads{quads, {}};
+  sort_into_regions(lit, types, options.region_edge, *surface);
   job.surface = std::move(surface);
 }
 

@@ -32,6 +32,13 @@ using FieldSnapshot = std::shared_ptr<const DensityGrid>;
 /// What bodies have of the chunks of a field; none are where there is nothing transparent.
 using FieldBodies = std::unordered_map<IVec3, std::shared_ptr<BodyChunks>, CoordinateHash>;
 
+/// A grid's light as it was at one moment, and the voxels that it is of.
+struct LitVoxels {
+  PropagatedLight light;
+  Grid voxels;
+};
+using LightSnapshot = std::shared_ptr<const LitVoxels>;
+
 /// Whose surfaces: the voxels or the field of a grid.
 struct LiveKey {
   GridHandle grid;
@@ -52,6 +59,7 @@ struct LiveJob {
   LiveClock::time_point seen;  ///< when the edit was
 
   GridSnapshot voxels;  ///< blocky
+  LightSnapshot light;  ///< blocky; null where none is used
   std::shared_ptr<const VoxelRegistry> types;
   LiveDensities densities;                            ///< smooth
   std::shared_ptr<const SurfaceMaterials> materials;  ///< smooth, and of fields
@@ -74,6 +82,11 @@ struct LiveWorkspace {
   std::optional<SmoothMesher> smooth;
   QuadBuffer quads;
   QuadBuffer cut_quads;
+  QuadBuffer lit_quads;
+  std::vector<FaceLight> face_light;  // of `lit_quads`
+  LightSnapshot lit;                  // with the types
+  std::shared_ptr<const VoxelRegistry> lit_types;
+  std::optional<SurfaceLight> surface_light;  // of both; it remembers rows from chunk to chunk
   SmoothChunkMesh mesh;
 };
 

@@ -71,6 +71,7 @@ void MeshScheduler::update_or_throw(const Scene& scene) {
   collect();
   const ChangedTypes changed_types = follow_types(scene.types);
   for (const GridHandle handle : follow_scene(scene)) follow_grid(scene, handle, now);
+  follow_light(now);
   choose_levels(scene, now);
   for (auto& [key, live] : sources_) {
     const SceneGrid* const grid = scene.grids().find(key.grid);
@@ -96,6 +97,12 @@ void MeshScheduler::follow_grid(const Scene& scene, GridHandle handle, LiveClock
     field = (sources_[{handle, SurfaceContent::Field}] = std::make_unique<LiveField>(handle, options_, totals_)).get();
   }
   field->follow(grid, now);
+}
+
+void MeshScheduler::follow_light(LiveClock::time_point now) {
+  for (auto& [key, live] : sources_) {
+    live->follow_light(light_ == nullptr ? GridLight{} : light_->of(key.grid), now);
+  }
 }
 
 // Of fields, where eyes moved, or places did, or there are more to be chosen.
@@ -250,7 +257,9 @@ void MeshScheduler::hand_over(const Scene& scene) {
       farthest = queued.back();
       queued.pop_back();
     }
-    LiveInputs& input = inputs.try_emplace(each.source.grid, scene.grids()[each.source.grid], types_).first->second;
+    const GridHandle grid = each.source.grid;
+    const GridLight light = light_ == nullptr ? GridLight{} : light_->of(grid);
+    LiveInputs& input = inputs.try_emplace(grid, scene.grids()[grid], types_, light).first->second;
     std::unique_ptr<LiveJob> job = each.live->make_job(input, each.chunk);
     job->distance = each.distance;
     const std::uint64_t serial = job->serial;

@@ -25,6 +25,10 @@ class MeshScheduler {
   MeshScheduler(const LiveMeshOptions& options, MeshJobQueue::Work work);
 
   void update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
+  void use_light(const SceneLight* light) {
+    const std::lock_guard lock(mutex_);
+    light_ = light;
+  }
   [[nodiscard]] std::vector<SurfaceUpdate> take(std::size_t max_bytes = std::numeric_limits<std::size_t>::max());
   [[nodiscard]] std::size_t pending() const {
     const std::lock_guard lock(mutex_);
@@ -46,6 +50,7 @@ class MeshScheduler {
   [[nodiscard]] std::vector<GridHandle> drawn_grids(const Scene& scene) const;
   [[nodiscard]] std::vector<GridHandle> follow_scene(const Scene& scene);
   void follow_grid(const Scene& scene, GridHandle handle, LiveClock::time_point now);
+  void follow_light(LiveClock::time_point now);
   void choose_levels(const Scene& scene, LiveClock::time_point now);
   void forget();
   void collect();
@@ -63,6 +68,7 @@ class MeshScheduler {
   mutable std::mutex mutex_;     // guards what follows, but the queue, which guards itself
   LiveTotals totals_;
   LiveTypes types_;
+  const SceneLight* light_ = nullptr;  // of the caller
   ChangeCursor followed_types_;
   ChangeCursor followed_scene_;
   std::vector<GridHandle> drawn_;  // sorted

@@ -120,22 +120,7 @@ Result<Picture> CpuRenderer::render(const Camera& camera, const RenderOptions& o
                           options.detail.colours, content_of(impl_).levels_of(view.tracer(), options.light, threads));
   const TileContext context{&view, &rays, &lighting, &options, subject.impostors ? &*subject.impostors : nullptr};
   Picture picture = empty_picture(options);
-  const int across = (options.width + Tile::kEdge - 1) / Tile::kEdge;
-  const int down = (options.height + Tile::kEdge - 1) / Tile::kEdge;
-  const std::size_t tiles = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
-  TileProgress done(progress, tiles * static_cast<std::size_t>(options.samples));
-  parallel_for(tiles, threads, [&](std::size_t i) {
-    if (done.is_cancelled()) return;
-    const auto column = static_cast<int>(i % static_cast<std::size_t>(across)) * Tile::kEdge;
-    const auto row = static_cast<int>(i / static_cast<std::size_t>(across)) * Tile::kEdge;
-    Tile tile(context, column, row);
-    if (!tile.render([&] { return done.add_samples(); })) return;
-    tile.write_to(picture);
-    done.add_counts(tile.rays(), tile.pixels_hit());
-  });
-  if (done.is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
-  picture.rays = done.rays();
-  picture.pixels_hit = done.pixels_hit();
+  if (Status drawn = draw_tiles<Tile>(context, options, threads, progress, picture); !drawn) return drawn.error();
   return picture;
 }
 

@@ -26,7 +26,7 @@ Tile::Tile(const TileContext& context, int column, int row) : context_(&context)
     far_ = std::make_unique<raster::Canvas>();
 }
 
-bool Tile::render(const std::function<bool()>& goes_on) {
+bool Tile::render(const std::function<bool(std::size_t)>& goes_on) {
   const int samples = context_->options->samples;
   for (int sample = 0; sample < samples; ++sample) {
     take_sample(sample);
@@ -34,7 +34,7 @@ bool Tile::render(const std::function<bool()>& goes_on) {
       // The minimum is taken second: what is not a number becomes 0.
       sum_[i] += glm::min(glm::max(Vec3(0.0F), sample_[i]), Vec3(1.0F));
     }
-    if (!goes_on()) return false;
+    if (!goes_on(1)) return false;
   }
   return true;
 }

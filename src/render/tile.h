@@ -37,8 +37,8 @@ class Tile {
 
   /// All samples of all pixels. The same numbers whatever the tile's size and place.
   ///
-  /// Asks `goes_on` after each sample; once that returns false, so does this, and the tile is not to be used.
-  [[nodiscard]] bool render(const std::function<bool()>& goes_on);
+  /// Asks `goes_on(1)` after each sample; once that returns false, so does this, and the tile is not to be used.
+  [[nodiscard]] bool render(const std::function<bool(std::size_t)>& goes_on);
   /// Puts the pixels that lie in the picture in place.
   void write_to(Picture& picture) const;
 

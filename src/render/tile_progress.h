@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <mutex>
 
+#include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
+#include <quoin/core/result.h>
 
 namespace quoin {
 
@@ -18,7 +20,7 @@ class TileProgress {
 
   [[nodiscard]] bool is_cancelled() const { return is_cancelled_; }
   /// Returns whether to go on.
-  bool add_samples(std::size_t samples = 1) {
+  bool add_samples(std::size_t samples) {
     const std::lock_guard lock(mutex_);
     done_ += samples;
     if (is_cancelled_ || !*listener_) return !is_cancelled_;
@@ -43,5 +45,26 @@ class TileProgress {
   std::mutex mutex_;
   std::atomic<bool> is_cancelled_{false};
 };
+
+/// Draws a picture by squares of Tile::kEdge pixels: `Tile(context, column, row)`, of the upper left pixel, draws its
+/// samples and writes itself into the picture. Errors: Cancelled.
+template <class Tile, class Context, class Options, class Drawn>
+[[nodiscard]] Status draw_tiles(const Context& context, const Options& options, Threads threads,
+                                const Progress& progress, Drawn& picture) {
+  const auto across = static_cast<std::size_t>((options.width + Tile::kEdge - 1) / Tile::kEdge);
+  const auto down = static_cast<std::size_t>((options.height + Tile::kEdge - 1) / Tile::kEdge);
+  TileProgress done(progress, across * down * static_cast<std::size_t>(options.samples));
+  parallel_for(across * down, threads, [&](std::size_t i) {
+    if (done.is_cancelled()) return;
+    Tile tile(context, static_cast<int>(i % across) * Tile::kEdge, static_cast<int>(i / across) * Tile::kEdge);
+    if (!tile.render([&](std::size_t samples) { return done.add_samples(samples); })) return;
+    tile.write_to(picture);
+    done.add_counts(tile.rays(), tile.pixels_hit());
+  });
+  if (done.is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
+  picture.rays = done.rays();
+  picture.pixels_hit = done.pixels_hit();
+  return {};
+}
 
 }  // namespace quoin

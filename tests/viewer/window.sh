@@ -153,6 +153,12 @@ if "$quoin" render castle.vox --size 32x32 --backend vulkan -o probe.png >/dev/n
   done
   xdotool key --delay 80 F8 F8 F9 F9 F9 F9 F5
   picture_becomes rays.png home.png F5 || fail "F5 does not bring back the rays"
+  xdotool key --delay 80 F3
+  sleep 2
+  picture paths.png
+  ! cmp -s home.png paths.png || fail "F3 does not draw paths of light"
+  xdotool key --delay 80 F5
+  picture_becomes rays.png home.png F5 || fail "F5 does not end the paths"
 fi
 
 echo "choose a colour in the panel, paint"

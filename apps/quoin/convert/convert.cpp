@@ -42,6 +42,7 @@ Status convert_blockily(const Scene& scene, const SceneAnimation& animation, con
   outcome.seconds.mesh = watch.lap();
   warn_of_left_out(scene, filter, outcome.warnings);
   warn_of_lamps(scene, outcome.warnings);
+  warn_of_data(scene, outcome.warnings);
   return write_meshes(*meshes, options, bar, outcome);
 }
 

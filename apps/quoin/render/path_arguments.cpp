@@ -1,7 +1,11 @@
 #include "render/path_arguments.h"
 
+#include <algorithm>
 #include <array>
+#include <memory>
 #include <numbers>
+#include <string_view>
+#include <utility>
 
 #include <quoin/io/picture_files.h>
 
@@ -12,8 +16,12 @@ namespace quoin::tool {
 namespace {
 
 constexpr int kMaxBounces = 1'024;
-constexpr std::array kPathOptions = {"--bounces", "--sky",         "--sky-turn",    "--tone", "--sun-angle",
-                                     "--ground",  "--transparent", "--lens-radius", "--focus"};
+constexpr double kRadians = std::numbers::pi / 180.0;
+constexpr std::array kPathOptions = {
+    "--bounces",     "--sky",   "--sky-turn", "--tone",       "--sun-angle", "--sun-time", "--ground", "--transparent",
+    "--lens-radius", "--focus", "--fog",      "--fog-colour", "--bloom",     "--vignette", "--look",   "--denoise"};
+// What all light has, and a file may say too.
+constexpr std::array kCommonOptions = {"--sun", "--sky-brightness", "--exposure"};
 constexpr std::array kOtherLight = {
     "--preset",    "--ao",          "--ao-rays",         "--ao-affects",  "--ao-distance", "--ao-form",
     "--ao-spread", "--ao-offset",   "--ao-power",        "--lamps",       "--fixed-sky",   "--plain-glass",
@@ -24,13 +32,132 @@ std::optional<double> read_sun_angle(const std::string& text) {
   return degrees && *degrees >= 0.0 && *degrees <= 170.0 ? degrees : std::nullopt;
 }
 
-}  // namespace
-
-ToneCurve PathArguments::tone_curve() const {
-  if (tone == "clamp") return ToneCurve::Clamp;
-  if (tone == "agx") return ToneCurve::Agx;
-  return tone == "aces" ? ToneCurve::Aces : ToneCurve::Neutral;
+// Numbers with commas between them, from `least` to `most` of them.
+std::optional<std::vector<double>> read_numbers(const std::string& text, std::size_t least, std::size_t most) {
+  std::vector<double> numbers;
+  for (std::size_t from = 0; from <= text.size();) {
+    const std::size_t end = std::min(text.find(',', from), text.size());
+    const auto number = parse_number(std::string_view(text).substr(from, end - from));
+    if (!number) return std::nullopt;
+    numbers.push_back(*number);
+    from = end + 1;
+  }
+  return numbers.size() >= least && numbers.size() <= most ? std::optional(numbers) : std::nullopt;
 }
+
+// "06-21,18.5,52".
+std::optional<SunTime> read_sun_time(const std::string& text) {
+  const std::size_t dash = text.find('-');
+  const std::size_t comma = text.find(',');
+  if (dash == std::string::npos || comma == std::string::npos || dash > comma) return std::nullopt;
+  const auto month = parse_unsigned(std::string_view(text).substr(0, dash));
+  const auto day = parse_unsigned(std::string_view(text).substr(dash + 1, comma - dash - 1));
+  const auto rest = read_numbers(text.substr(comma + 1), 2, 2);
+  if (!month || !day || *month > 12 || *day > 31 || !rest) return std::nullopt;
+  SunTime time;
+  time.month = static_cast<int>(*month);
+  time.day = static_cast<int>(*day);
+  time.hour = (*rest)[0];
+  time.latitude_degrees = (*rest)[1];
+  return sun_direction(time) ? std::optional(time) : std::nullopt;
+}
+
+std::optional<FogPlace> read_fog(const std::string& text) {
+  const auto numbers = read_numbers(text, 1, 2);
+  if (!numbers || !((*numbers)[0] >= 0.0 && (*numbers)[0] <= 1e6)) return std::nullopt;
+  FogPlace fog;
+  fog.density = (*numbers)[0];
+  if (numbers->size() > 1) fog.top = (*numbers)[1];
+  return fog;
+}
+
+std::optional<DVec3> read_colour(const std::string& text) {
+  const auto colour = parse_triple(text);
+  const auto fits = [](double channel) { return channel >= 0.0 && channel <= 1.0; };
+  return colour && fits(colour->x) && fits(colour->y) && fits(colour->z) ? colour : std::nullopt;
+}
+
+std::optional<Bloom> read_bloom(const std::string& text) {
+  const auto numbers = read_numbers(text, 1, 3);
+  if (!numbers) return std::nullopt;
+  Bloom bloom;
+  bloom.mix = (*numbers)[0];
+  if (numbers->size() > 1) bloom.radius = (*numbers)[1];
+  if (numbers->size() > 2) bloom.threshold = (*numbers)[2];
+  const auto is_share = [](double value) { return value >= 0.0 && value <= 1.0; };
+  return is_share(bloom.mix) && is_share(bloom.radius) && bloom.threshold >= 0.0 ? std::optional(bloom) : std::nullopt;
+}
+
+std::optional<double> read_share(const std::string& text) {
+  const auto number = parse_number(text);
+  return number && *number >= 0.0 && *number <= 1.0 ? number : std::nullopt;
+}
+
+ToneCurve tone_of(const std::string& name) {
+  if (name == "clamp") return ToneCurve::Clamp;
+  if (name == "agx") return ToneCurve::Agx;
+  return name == "aces" ? ToneCurve::Aces : ToneCurve::Neutral;
+}
+
+// The picture of a .vox file's sky, if it lies beside it: MagicaVoxel has it in a folder of its own.
+Result<RadianceImage> environment_beside(const std::filesystem::path& input, std::string name) {
+  std::ranges::replace(name, '\\', '/');
+  return read_radiance(input.parent_path() / std::filesystem::path(name).filename());
+}
+
+void take_file_look(const FileLook& file, PathPlan& plan) {
+  static_cast<Look&>(plan.options) = file.look;
+  plan.develop = file.develop;
+  plan.is_transparent = file.is_transparent;
+  plan.options.max_bounces = file.max_bounces;
+  plan.options.max_scatterings = file.max_scatterings;
+  if (!file.not_drawn.empty()) {
+    std::string all;
+    for (const std::string& each : file.not_drawn) all += (all.empty() ? "" : ", ") + each;
+    plan.warnings.push_back("render settings of the file that are not drawn: " + all);
+  }
+}
+
+Status take_sky(const PathArguments& arguments, const LoadedScene& loaded, const std::filesystem::path& input,
+                PathPlan& plan) {
+  PathOptions& options = plan.options;
+  if (arguments.has("--sky")) {
+    const Look plain;
+    options.sky = arguments.sky == "gradient"  ? SkyModel::Gradient
+                  : arguments.sky == "uniform" ? SkyModel::Uniform
+                  : is_sky_file(arguments)     ? SkyModel::Environment
+                                               : SkyModel::Physical;
+    options.sky_brightness = plain.sky_brightness;
+    options.sky_colour = plain.sky_colour;
+    options.air = plain.air;
+    options.background.reset();
+    if (!is_sky_file(arguments)) return {};
+    auto image = read_radiance(arguments.sky);
+    if (!image) return image.error();
+    options.environment = std::make_shared<const RadianceImage>(std::move(*image));
+    options.environment_turn_radians = arguments.sky_turn_degrees * kRadians;
+  } else if (options.sky == SkyModel::Environment) {
+    auto image = environment_beside(input, loaded.look->environment);
+    if (image) {
+      options.environment = std::make_shared<const RadianceImage>(std::move(*image));
+    } else {
+      plan.warnings.push_back("the file's sky \"" + loaded.look->environment +
+                              "\" does not lie beside it: a uniform sky instead");
+      options.sky = SkyModel::Uniform;
+    }
+  }
+  return {};
+}
+
+void take_lens(const PathArguments& arguments, const LoadedScene& loaded, std::optional<int> file_camera,
+               PathPlan& plan) {
+  if (arguments.has("--lens-radius")) plan.options.lens_radius = arguments.lens_radius;
+  plan.focus = arguments.focus;
+  const auto looks = std::ranges::find(loaded.cameras, file_camera.value_or(-1), &FileCamera::number);
+  if (!plan.focus && looks != loaded.cameras.end() && looks->focus_distance > 0.0) plan.focus = looks->focus_distance;
+}
+
+}  // namespace
 
 void add_path_options(CLI::App& command, PathArguments& arguments) {
   command
@@ -51,7 +178,10 @@ void add_path_options(CLI::App& command, PathArguments& arguments) {
       ->check(CLI::IsMember({"clamp", "neutral", "agx", "aces"}));
   add_text_option(command, "--sun-angle", "DEGREES",
                   "Of --light path: how wide the sun is, which makes shadows soft; 0 to 170 (default 0.53)");
-  command.add_flag("--ground", arguments.has_ground,
+  add_text_option(command, "--sun-time", "MM-DD,HOUR,LATITUDE",
+                  "Of --light path: the sun of that day, solar time and latitude, with north at the back (-z), as in "
+                  "06-21,18.5,52");
+  command.add_flag("--ground,!--no-ground", arguments.has_ground,
                    "Of --light path: stands the scene on level ground; with --transparent that only catches shadows");
   command.add_flag("--transparent", arguments.is_transparent,
                    "Of --light path: no background: the picture has alpha instead");
@@ -59,6 +189,20 @@ void add_path_options(CLI::App& command, PathArguments& arguments) {
                   "Of --light path: world units; with more than 0 what is out of focus is blurred (default 0)");
   add_text_option(command, "--focus", "X",
                   "Of --light path: the distance at which it is sharp (default: that of the scene's middle)");
+  add_text_option(command, "--fog", "DENSITY[,TOP]",
+                  "Of --light path: fog that scatters light so often by world unit, up to that height (default: the "
+                  "scene's top)");
+  add_text_option(command, "--fog-colour", "R,G,B", "Of --fog: linear, 0 to 1 each (default 1,1,1)");
+  add_text_option(command, "--bloom", "MIX[,RADIUS[,THRESHOLD]]",
+                  "Of --light path: that share of light spreads, of the radius as a share of the height, where it is "
+                  "brighter than the threshold (default 0,0.02,0)");
+  add_text_option(command, "--vignette", "X", "Of --light path: how much darker corners are, 0 to 1 (default 0)");
+  command
+      .add_option("--look", arguments.look,
+                  "Of --light path: what no option says, the file says (its render settings and cameras' focus), or "
+                  "with plain the defaults (default file)")
+      ->check(CLI::IsMember({"file", "plain"}));
+  command.add_flag("--denoise", arguments.denoise, "Of --light path: removes noise within surfaces, not across edges");
 }
 
 std::string given_path_option(const CLI::App& command) {
@@ -72,7 +216,8 @@ std::string fault_of_path_options(const CLI::App& command) {
   for (const char* option : kOtherLight) {
     if (command.count(option) > 0) return std::string(option) + ": --light path has none to choose";
   }
-  if (command.count("--focus") > 0 && command.count("--lens-radius") == 0) return "--focus needs --lens-radius";
+  if (command.count("--fog-colour") > 0 && command.count("--fog") == 0) return "--fog-colour needs --fog";
+  if (command.count("--sun-time") > 0 && command.count("--sun") > 0) return "--sun and --sun-time exclude each other";
   return "";
 }
 
@@ -80,10 +225,24 @@ std::string read_path_options(const CLI::App& command, PathArguments& arguments)
   for (const std::string& fault :
        {read_option(command, "--sky-turn", parse_number, "a number", arguments.sky_turn_degrees),
         read_option(command, "--sun-angle", read_sun_angle, "from 0 to 170", arguments.sun_angle_degrees),
+        read_option(command, "--sun-time", read_sun_time,
+                    "a day, an hour from 0 to 24 and a latitude from -90 to 90, as in 06-21,18.5,52",
+                    arguments.sun_time),
+        read_option(command, "--fog", read_fog, "a density from 0 to 1e6, and a height, as in 0.02,40", arguments.fog),
+        read_option(command, "--fog-colour", read_colour, "three numbers from 0 to 1, as in 0.8,0.9,1",
+                    arguments.fog_colour),
+        read_option(command, "--bloom", read_bloom, "a share, a radius from 0 to 1, and a threshold, as in 0.2,0.03,1",
+                    arguments.bloom),
+        read_option(command, "--vignette", read_share, "from 0 to 1", arguments.vignette),
         read_option(command, "--lens-radius", read_not_negative, "a number of at least 0", arguments.lens_radius),
         read_option(command, "--focus", read_positive, "a number above 0", arguments.focus)}) {
     if (!fault.empty()) return fault;
   }
+  const auto note = [&](const char* option) {
+    if (command.count(option) > 0) arguments.given.insert(option);
+  };
+  std::ranges::for_each(kPathOptions, note);
+  std::ranges::for_each(kCommonOptions, note);
   if (command.count("--sky-turn") > 0 && !is_sky_file(arguments)) return "--sky-turn needs a --sky that is a file";
   const std::string ending = CLI::detail::to_lower(std::filesystem::path(arguments.sky).extension().string());
   if (is_sky_file(arguments) && ending != ".hdr" && ending != ".exr") {
@@ -96,36 +255,58 @@ bool is_sky_file(const PathArguments& arguments) {
   return arguments.sky != "physical" && arguments.sky != "gradient" && arguments.sky != "uniform";
 }
 
-Result<PathOptions> path_options(const PathArguments& arguments, const RenderOptions& render, const Scene& scene,
-                                 InstanceFilter filter) {
-  constexpr double kRadians = std::numbers::pi / 180.0;
-  PathOptions options;
+Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions& render, const LoadedScene& loaded,
+                            InstanceFilter filter, const std::filesystem::path& input, std::optional<int> file_camera) {
+  PathPlan plan;
+  PathOptions& options = plan.options;
+  options.sun = render.light.sun;
+  const bool has_look = loaded.look && arguments.look == "file";
+  if (has_look) take_file_look(*loaded.look, plan);
   options.width = render.width;
   options.height = render.height;
   options.samples = render.samples;
-  options.max_bounces = arguments.bounces;
-  options.sun = render.light.sun;
-  options.sun_brightness = render.light.sun_brightness;
-  options.sun_angle_radians = arguments.sun_angle_degrees * kRadians;
-  options.sky_brightness = render.light.sky_brightness;
+  if (!has_look || arguments.has("--bounces")) options.max_bounces = arguments.bounces;
+  if (arguments.has("--sun")) {
+    options.sun = render.light.sun;
+    if (render.light.sun_brightness == 0.0) options.sun_brightness = 0.0;
+  }
+  if (arguments.sun_time) {
+    const auto sun = sun_direction(*arguments.sun_time);
+    if (!sun) return sun.error();
+    options.sun = *sun;
+  }
+  if (!has_look || arguments.has("--sun-angle")) options.sun_angle_radians = arguments.sun_angle_degrees * kRadians;
   options.lamp_brightness = render.light.lamp_brightness;
-  options.lens_radius = arguments.lens_radius;
-  if (arguments.sky == "gradient") options.sky = SkyModel::Gradient;
-  if (arguments.sky == "uniform") options.sky = SkyModel::Uniform;
-  if (is_sky_file(arguments)) {
-    auto image = read_radiance(arguments.sky);
-    if (!image) return image.error();
-    options.sky = SkyModel::Environment;
-    options.environment = std::make_shared<const RadianceImage>(std::move(*image));
-    options.environment_turn_radians = arguments.sky_turn_degrees * kRadians;
-  }
-  if (arguments.has_ground) {
-    const DBox bounds = scene.bounds(filter);
+  if (Status sky = take_sky(arguments, loaded, input, plan); !sky) return sky.error();
+  if (arguments.has("--sky-brightness")) options.sky_brightness = render.light.sky_brightness;
+  take_lens(arguments, loaded, file_camera, plan);
+
+  if (!has_look || arguments.has("--tone")) plan.develop.tone = tone_of(arguments.tone);
+  if (arguments.has("--exposure")) plan.develop.exposure = render.light.exposure;
+  if (arguments.has("--bloom")) plan.develop.bloom = arguments.bloom;
+  if (arguments.has("--vignette")) plan.develop.vignette = arguments.vignette;
+  plan.is_exposure_automatic = arguments.is_exposure_automatic;
+  if (arguments.has("--transparent")) plan.is_transparent = true;
+  plan.denoise = arguments.denoise;
+
+  DBox bounds = loaded.scene.bounds(filter);
+  if (bounds.empty()) bounds = {DVec3(0.0), DVec3(0.0)};
+  if (arguments.has("--ground") && !arguments.has_ground) {
+    options.ground.reset();
+  } else if (arguments.has_ground && !options.ground) {
     options.ground.emplace();
-    options.ground->height = bounds.empty() ? 0.0 : bounds.min.y;
-    options.ground->only_shadows = arguments.is_transparent;
   }
-  return options;
+  if (options.ground) {
+    options.ground->height = bounds.min.y;
+    options.ground->only_shadows = plan.is_transparent;
+  }
+  if (arguments.fog) {
+    options.fog.emplace();
+    options.fog->density = arguments.fog->density;
+    options.fog->colour = Vec3(arguments.fog_colour);
+  }
+  if (options.fog) options.fog->top = arguments.fog ? arguments.fog->top.value_or(bounds.max.y) : bounds.max.y;
+  return plan;
 }
 
 }  // namespace quoin::tool

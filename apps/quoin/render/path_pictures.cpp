@@ -44,23 +44,25 @@ Result<std::uint64_t> write_layers(const PathPicture& picture, bool is_transpare
 
 }  // namespace
 
-PathPictures::PathPictures(const Scene& scene, InstanceFilter filter, Threads threads, PathOptions options,
-                           const PathArguments& arguments)
-    : tracer_(scene, filter, threads), options_(std::move(options)), arguments_(arguments) {
+PathPictures::PathPictures(const Scene& scene, InstanceFilter filter, Threads threads, PathPlan plan, bool with_layers)
+    : tracer_(scene, filter, threads), plan_(std::move(plan)), with_layers_(with_layers) {
   const DBox bounds = scene.bounds(filter);
   if (!bounds.empty()) middle_ = (bounds.min + bounds.max) * 0.5;
 }
 
 Result<Picture> PathPictures::render(const Camera& camera, const RenderOptions& options, Threads threads,
                                      const Progress& progress) {
-  options_.layers = true;
+  PathOptions& wanted = plan_.options;
+  wanted.layers = with_layers_ || options.depth;
+  wanted.denoise = plan_.denoise;
   const double to_middle = glm::dot(middle_ - camera.position, camera.forward);
-  options_.focus_distance = arguments_.focus.value_or(std::max(to_middle, 1e-3));
-  auto taken = tracer_.render(camera, options_, threads, progress);
+  wanted.focus_distance = plan_.focus.value_or(std::max(to_middle, 1e-3));
+  auto taken = tracer_.render(camera, wanted, threads, progress);
   if (!taken) return taken.error();
   last_ = std::move(*taken);
-  if (!exposure_) exposure_ = arguments_.is_exposure_automatic ? find_exposure(last_) : options.light.exposure;
-  auto image = develop(last_, {*exposure_, arguments_.tone_curve()});
+  if (!exposure_) exposure_ = plan_.is_exposure_automatic ? find_exposure(last_) : plan_.develop.exposure;
+  plan_.develop.exposure = *exposure_;
+  auto image = develop(last_, plan_.develop);
   if (!image) return image.error();
   Picture picture;
   picture.colour = std::move(*image);
@@ -72,9 +74,9 @@ Result<Picture> PathPictures::render(const Camera& camera, const RenderOptions& 
 
 Result<std::uint64_t> PathPictures::write(const std::filesystem::path& path) const {
   if (has_ending(path, ".exr")) {
-    return write_layers(last_, arguments_.is_transparent, static_cast<float>(exposure()), path);
+    return write_layers(last_, plan_.is_transparent, static_cast<float>(exposure()), path);
   }
-  const auto image = develop_with_alpha(last_, {exposure(), arguments_.tone_curve()});
+  const auto image = develop_with_alpha(last_, plan_.develop);
   if (!image) return image.error();
   return write_picture(*image, path);
 }

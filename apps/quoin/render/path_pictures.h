@@ -14,10 +14,10 @@ namespace quoin::tool {
 /// Takes pictures by paths where others take them of CpuRenderer, and keeps what files of linear light hold besides.
 class PathPictures {
  public:
-  PathPictures(const Scene& scene, InstanceFilter filter, Threads threads, PathOptions options,
-               const PathArguments& arguments);
+  /// `with_layers`: whether what .exr files hold besides light is kept.
+  PathPictures(const Scene& scene, InstanceFilter filter, Threads threads, PathPlan plan, bool with_layers);
 
-  /// With the exposure of RenderOptions::light, or that of the first picture where it is automatic: those of a film
+  /// With the plan's exposure, or that of the first picture where it is automatic: those of a film
   /// have one.
   [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options, Threads threads,
                                        const Progress& progress);
@@ -26,12 +26,13 @@ class PathPictures {
   [[nodiscard]] Result<std::uint64_t> write(const std::filesystem::path& path) const;
   /// That of the pictures. To be set before the first of them where others were taken before.
   [[nodiscard]] double exposure() const { return exposure_.value_or(1.0); }
+  [[nodiscard]] bool is_transparent() const { return plan_.is_transparent; }
   void set_exposure(std::optional<double> exposure) { exposure_ = exposure; }
 
  private:
   PathTracer tracer_;
-  PathOptions options_;
-  PathArguments arguments_;
+  PathPlan plan_;
+  bool with_layers_;
   DVec3 middle_{0.0};  // of the scene
   std::optional<double> exposure_;
   PathPicture last_;

@@ -15,6 +15,7 @@
 #include "output_files.h"
 #include "progress_bar.h"
 #include "render/camera_path.h"
+#include "render/movie.h"
 #include "render/path_pictures.h"
 #include "render/picture_output.h"
 #include "render/render_arguments.h"
@@ -39,9 +40,10 @@ struct Outcome {
   double read = 0, build = 0, trace = 0, write = 0;
   std::string device;  ///< that drew; empty: the processor
   std::vector<std::string> warnings;
-  std::int64_t rays = 0;           ///< of all pictures
-  std::optional<double> exposure;  ///< of pictures by paths: that of the first
-  std::int64_t kept = 0;           ///< pictures that were there already
+  std::int64_t rays = 0;                    ///< of all pictures
+  std::optional<double> exposure;           ///< of pictures by paths: that of the first
+  std::int64_t kept = 0;                    ///< pictures that were there already
+  std::vector<std::filesystem::path> film;  ///< all pictures, in their order
 };
 
 /// A picture to take.
@@ -126,7 +128,7 @@ void warn_of_empty_pictures(const Scene& scene, InstanceFilter filter, const Pic
 Status write_outputs(const RenderArguments& arguments, const std::filesystem::path& output, const PathPictures* paths,
                      Outcome& outcome) {
   if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", output.string());
-  const bool is_plain = paths == nullptr || !(has_ending(output, ".exr") || arguments.path.is_transparent);
+  const bool is_plain = paths == nullptr || !(has_ending(output, ".exr") || paths->is_transparent());
   const auto written = is_plain ? write_picture(outcome.picture.colour, output) : paths->write(output);
   if (!written) return written.error();
   outcome.files.push_back(output);
@@ -207,12 +209,19 @@ Status draw_by_cpu(const Scene& scene, const RenderArguments& arguments, const R
   return take_pictures(renderer, arguments, options, shots, watch, outcome);
 }
 
-Status draw_by_paths(const Scene& scene, const RenderArguments& arguments, const RenderOptions& options,
+Status draw_by_paths(const LoadedScene& loaded, const RenderArguments& arguments, const RenderOptions& options,
                      const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
-  auto wanted = path_options(arguments.path, options, scene, arguments.common.instances());
-  if (!wanted) return wanted.error();
-  PathPictures pictures(scene, arguments.common.instances(), arguments.common.threads, std::move(*wanted),
-                        arguments.path);
+  const InstanceFilter filter = arguments.common.instances();
+  auto plan = plan_paths(arguments.path, options, loaded, filter, arguments.common.input, arguments.file_camera);
+  if (!plan) return plan.error();
+  if (has_ending(arguments.output, ".jpg")) plan->is_transparent = false;  // it has no alpha
+  for (std::string& warning : plan->warnings) {
+    if (std::ranges::find(outcome.warnings, warning) == outcome.warnings.end()) {
+      outcome.warnings.push_back(std::move(warning));
+    }
+  }
+  PathPictures pictures(loaded.scene, filter, arguments.common.threads, std::move(*plan),
+                        has_ending(arguments.output, ".exr"));
   pictures.set_exposure(outcome.exposure);
   return take_pictures(pictures, arguments, options, shots, watch, outcome);
 }
@@ -235,7 +244,7 @@ Status draw_shots(const LoadedScene& loaded, const RenderArguments& arguments, c
   RenderOptions options = arguments.render;
   if (loaded.sun && !arguments.has_sun) options.light.sun = *loaded.sun;
   const bool is_vulkan = arguments.backend == "vulkan";
-  if (arguments.light_model == "path") return draw_by_paths(loaded.scene, arguments, options, shots, watch, outcome);
+  if (arguments.light_model == "path") return draw_by_paths(loaded, arguments, options, shots, watch, outcome);
   return (is_vulkan ? draw_by_vulkan : draw_by_cpu)(loaded.scene, arguments, options, shots, watch, outcome);
 }
 
@@ -319,6 +328,8 @@ Result<Outcome> render(const RenderArguments& arguments) {
     path = std::move(*cameras);
   }
   std::vector<std::filesystem::path> outputs = pictures_of(arguments, path.size());
+  Outcome outcome;
+  outcome.film = outputs;
   outputs.push_back(arguments.depth);
   if (auto writable = check_outputs(outputs); !writable) return writable.error();
   const bool is_volume = holds_volume(arguments.common).value_or(false);
@@ -329,7 +340,6 @@ Result<Outcome> render(const RenderArguments& arguments) {
   auto loaded = load(arguments, is_volume, frame);
   if (!loaded) return loaded.error();
   const Scene& scene = loaded->scene;
-  Outcome outcome;
   outcome.warnings = std::move(loaded->warnings);
   if (arguments.frames) std::erase_if(outcome.warnings, [](const auto& each) { return each.starts_with("animated"); });
   outcome.read = watch.lap();
@@ -414,10 +424,28 @@ std::string outcome_text(const Outcome& outcome) {
   return kept + text + bytes_for_people(outcome.bytes) + " in " + number_for_people(seconds) + " s\n";
 }
 
+/// Draws a film's pictures, and has one file made of them.
+Result<Outcome> render_movie(const RenderArguments& arguments) {
+  if (auto writable = check_outputs({arguments.output}); !writable) return writable.error();
+  const Movie movie(arguments.output);
+  if (Status begun = movie.begin(arguments.resume); !begun) return begun.error();
+  RenderArguments of_pictures = arguments;
+  of_pictures.output = movie.picture();
+  auto outcome = render(of_pictures);
+  if (!outcome) return outcome.error();
+  Stopwatch watch;
+  const auto bytes = movie.write(outcome->film, arguments.frames_per_second);
+  if (!bytes) return bytes.error();
+  outcome->write += watch.lap();
+  outcome->bytes = *bytes;
+  outcome->files = {arguments.output};
+  return outcome;
+}
+
 /// Draws, with standard input as a file where IN is "-".
 Result<Outcome> render_from(RenderArguments& arguments, StandardStreams& streams) {
   if (Status read = streams.take_input(arguments.common.input); !read) return read.error();
-  return render(arguments);
+  return is_movie(arguments.output) ? render_movie(arguments) : render(arguments);
 }
 
 WatchedWork run_render(RenderArguments& arguments) {
@@ -455,6 +483,7 @@ void add_render_command(CLI::App& app, int& status) {
                   "Example: quoin render castle.vox -o gate.png --camera 30,60,160 --look-at 0,30,0 --fov 40\n"
                   "Example: quoin render castle.vox -o round.png --turntable 36 --elevation 20\n"
                   "Example: quoin render walk.vox -o walk.png --frames 0:24 --view left\n"
+                  "Example: quoin render castle.vox -o round.mp4 --turntable 240 --fps 24\n"
                   "Example: quoin render castle.vox -o film.png --path cameras.json --light path --resume\n"
                   "Example: quoin render castle.vox -o night.png --light path --sun off --tone aces --exposure auto\n"
                   "Example: quoin render scan.nii.gz -o hollows.png --preset ao --ao smooth --ao-form weighted\n"

@@ -11,6 +11,7 @@
 
 #include "field_occlusion.h"
 #include "parse.h"
+#include "render/movie.h"
 #include "render/picture_output.h"
 #include "render/text_options.h"
 #include "standard_streams.h"
@@ -64,6 +65,7 @@ void add_camera_options(CLI::App& command, RenderArguments& arguments) {
       ->check(file_name());
   command.add_flag("--resume", arguments.resume,
                    "Of --turntable, --frames and --path: pictures that are there stay, and are not drawn again");
+  add_text_option(command, "--fps", "N", "Of a film in one file (.mp4, .webm): pictures a second (default 24)");
   add_text_option(command, "--camera", "X,Y,Z|file:N",
                   "Where the camera stands; with --look-at, instead of --view. Or camera N of the file, which "
                   "quoin info lists");
@@ -156,7 +158,12 @@ std::string fault_of_backend(const CLI::App& command, const RenderArguments& arg
 std::string fault_of_files(const RenderArguments& arguments) {
   const std::string out = arguments.output.string();
   const std::string depth = arguments.depth.string();
-  if (const std::string fault = fault_of_picture_name(arguments.output); !fault.empty()) return "-o: " + fault;
+  if (is_movie(arguments.output)) {
+    if (!arguments.is_film()) return "-o: " + out + " is a film, which needs --turntable, --frames or --path";
+    if (arguments.path.is_transparent) return "-o: films have no alpha";
+  } else if (const std::string fault = fault_of_picture_name(arguments.output); !fault.empty()) {
+    return "-o: " + fault;
+  }
   const bool is_path = arguments.light_model == "path";
   if (has_ending(arguments.output, ".exr") && !is_path) return "-o: .exr, which is linear light, needs --light path";
   if (has_ending(arguments.output, ".jpg") && arguments.path.is_transparent) return "-o: .jpg has no alpha";
@@ -205,7 +212,12 @@ std::optional<double> read_elevation(const std::string& text) {
   return degrees && std::abs(*degrees) <= 90.0 ? degrees : std::nullopt;
 }
 
-std::string fault_of_films(const CLI::App& command) {
+std::optional<double> read_rate(const std::string& text) {
+  const auto rate = parse_number(text);
+  return rate && *rate > 0.0 && *rate <= 1000.0 ? rate : std::nullopt;
+}
+
+std::string fault_of_films(const CLI::App& command, const RenderArguments& arguments) {
   const auto has = [&](const char* option) { return command.count(option) > 0; };
   for (const char* option : {"--azimuth", "--elevation"}) {
     if (has(option) && has("--view")) return std::string("--view and ") + option + " exclude each other";
@@ -217,6 +229,7 @@ std::string fault_of_films(const CLI::App& command) {
   for (const char* option : {"--view", "--azimuth", "--elevation", "--camera", "--turntable", "--frames"}) {
     if (has("--path") && has(option)) return std::string("--path and ") + option + " exclude each other";
   }
+  if (has("--fps") && !is_movie(arguments.output)) return "--fps is for films in one file: .mp4 or .webm";
   if (has("--resume") && !has("--turntable") && !has("--frames") && !has("--path")) {
     return "--resume is for films: --turntable, --frames or --path";
   }
@@ -342,7 +355,14 @@ std::string fault_of_slice(const CLI::App& command, const RenderArguments& argum
                              "--ground",
                              "--transparent",
                              "--lens-radius",
-                             "--focus"}) {
+                             "--focus",
+                             "--sun-time",
+                             "--fog",
+                             "--fog-colour",
+                             "--bloom",
+                             "--vignette",
+                             "--look",
+                             "--denoise"}) {
     if (command.count(option) > 0) return std::string(option) + ": the preset density is a flat slice (--slice)";
   }
   return "";
@@ -401,6 +421,7 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
       read_option(command, "--azimuth", parse_number, "a number", arguments.azimuth),
       read_option(command, "--elevation", read_elevation, "from -90 to 90", arguments.elevation),
       read_option(command, "--frames", read_frames, "two frames, as in 0:24", arguments.frames),
+      read_option(command, "--fps", read_rate, "more than 0 and at most 1000", arguments.frames_per_second),
       read_option(command, "--slice", read_slice, "x, y or z, and a place from 0 to 1, as in y:0.5", slice),
       read_field_occlusion(command, light.smooth_occlusion),
       read_volume_options(command, arguments.volume_texts, arguments.volume)};
@@ -431,7 +452,8 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
   command
       .add_option(
           "-o,--output", arguments.output,
-          "Picture to write: .png, .jpg or .webp; or .exr of --light path: linear light, and layers for compositing")
+          "Picture to write: .png, .jpg or .webp; .exr of --light path: linear light, and layers for compositing; or a "
+          "film, .mp4 or .webm, which the program ffmpeg makes")
       ->required()
       ->check(file_name());
   add_text_option(command, "--size", "WxH", "Pixels (default 1280x720)");
@@ -452,7 +474,7 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
 
 std::string settle(const CLI::App& command, RenderArguments& arguments) {
   for (const std::string& fault :
-       {read_texts(command, arguments), fault_of_files(arguments), fault_of_films(command),
+       {read_texts(command, arguments), fault_of_files(arguments), fault_of_films(command, arguments),
         fault_of_camera(command, arguments), fault_of_slice(command, arguments), fault_of_light(command, arguments),
         fault_of_light_model(command, arguments), fault_of_backend(command, arguments), fault_of_watching(arguments)}) {
     if (!fault.empty()) return fault;

@@ -38,6 +38,7 @@ struct RenderArguments {
   std::optional<FrameRange> frames;   ///< a picture of each
   std::filesystem::path camera_path;  ///< a picture of each camera in that file; empty: none
   bool resume = false;                ///< pictures of a film that are there stay
+  double frames_per_second = 24.0;    ///< of a film in one file
   bool has_view = false;              ///< --view was given: a scene file's camera does not count
   bool has_sun = false;               ///< likewise
   bool has_fixed_sky = false;

@@ -244,6 +244,7 @@ void App::ask_for_picture() {
   request.mode = state_.settings.mode;
   request.wireframe = state_.settings.wireframe;
   request.slice = state_.settings.slice;
+  request.look = state_.open.look;
   // What was drawn before is another picture, however good.
   if (!asked_ || !is_same(*asked_, request)) state_.stats.is_settled = false;
   asked_ = request;

@@ -50,6 +50,9 @@ bool App::run_draw_command(Command command) {
     case Command::DrawDensity:
       draw_as(DrawMode::Density);
       return true;
+    case Command::DrawPaths:
+      draw_as(DrawMode::Paths);
+      return true;
     case Command::NextWireframe:
       settings.wireframe = next(settings.wireframe, 3);
       break;

@@ -119,6 +119,8 @@ void App::adopt(OpenDocument opened) {
   screen_->forget_picture();
   const LoadedScene& loaded = state_.open.document->loaded();
   state_.settings.note_recent(state_.open.document->path());
+  if (loaded.look) state_.open.look = std::make_shared<const FileLook>(*loaded.look);
+  if (loaded.look) state_.settings.light.sun = loaded.look->look.sun;
   if (loaded.sun) state_.settings.light.sun = *loaded.sun;
   state_.brush.type = 1;
   state_.tool = Tool::Look;  // the first click into a world should not change it

@@ -36,6 +36,7 @@ constexpr std::array kCommands = {
     CommandInfo{Command::DrawBlocks, "Blocky meshes", "F6", SDLK_F6, false, false},
     CommandInfo{Command::DrawSmooth, "Smooth meshes", "F7", SDLK_F7, false, false},
     CommandInfo{Command::DrawDensity, "A slice through the densities", "F4", SDLK_F4, false, false},
+    CommandInfo{Command::DrawPaths, "Paths of light", "F3", SDLK_F3, false, false},
     CommandInfo{Command::NextWireframe, "Edges of triangles", "F8", SDLK_F8, false, false},
     CommandInfo{Command::NextShading, "Lit, unlit, with or only occlusion, normals", "F9", SDLK_F9, false, false},
     CommandInfo{Command::DetailColours, "Levels of detail in colours", "F10", SDLK_F10, false, false},

@@ -39,6 +39,7 @@ enum class Command : std::uint8_t {
   DrawBlocks,
   DrawSmooth,
   DrawDensity,
+  DrawPaths,
   NextWireframe,
   NextShading,
   DetailColours,

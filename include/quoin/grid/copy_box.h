@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 
 #include <quoin/core/axis_orientation.h>
@@ -15,10 +16,13 @@ struct CopyOptions {
   /// [type]: the type that takes its place, which may be air. [0] means nothing: air stays air. Types beyond its end
   /// stay as they are. Lifetime: it must outlive the call.
   std::span<const VoxelType> type_map;
+  /// The state (VoxelData) with which a voxel of this type arrives, where it has one: what is turned with its box says
+  /// another direction there, which only the game knows. Empty: as it was.
+  std::function<std::uint32_t(VoxelType type, std::uint32_t state)> map_state{};
 };
 
 /// Copies the voxels of a box into another grid, or another place of the same: turned and mirrored by `orientation`,
-/// so that the least corner of the turned box is at `to_min`. Returns how many voxels changed.
+/// so that the least corner of the turned box is at `to_min`; their data goes with them. Returns how many types differ.
 ///
 /// Space:   voxel coordinates of each grid. Voxel `v` of the box arrives at `to_min` + (the turned v - box.min, moved
 ///          so that the turned box begins at 0). The turned box's size is `orientation.size_of(box.size())`.

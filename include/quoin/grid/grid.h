@@ -16,6 +16,7 @@
 #include <quoin/grid/changes.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/neighbourhood.h>
+#include <quoin/grid/voxel_data.h>
 #include <quoin/grid/voxel_registry.h>
 
 namespace quoin {
@@ -34,6 +35,9 @@ struct PlacedVoxel {
 ///           (bad_alloc, or what a callback threw), or is cancelled by its `progress`, what it did until then stays
 ///           done and booked. `changes_since` tells any number of consumers what edits changed, `visit_changes` from
 ///           which type to which.
+/// Data:     voxels that are not air may hold VoxelData. It follows its voxel: an edit that gives it another type takes
+///           it away, one that gives it the type it has leaves it; whole chunks, snapshots, `copy_box` and extracted
+///           pieces carry it along. Halved grids and fields have none.
 /// Sharing:  `snapshot` is a copy that costs a pointer. What the two share is copied when one of them is edited, a
 ///           chunk at a time.
 /// Threads:  any number may read at once, and take snapshots; an edit needs the grid to itself. A snapshot is a grid of
@@ -98,11 +102,24 @@ class Grid {
   /// box along x in one chunk, from `first` on, and changes them in place. Returns how many changed.
   std::int64_t edit_rows(const IBox& box, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change,
                          const Progress& progress = {});
-  /// Puts a whole chunk in place; counts as an edit of whatever differs. Returns how many voxels changed. The outermost
-  /// chunks are ignored.
+  /// Puts a whole chunk in place, its data too; counts as an edit of whatever differs. Returns how many types changed.
+  /// The outermost chunks are ignored.
   std::int64_t put_chunk(IVec3 chunk, Chunk voxels);
   /// Makes everything air, as an edit.
   void clear();
+
+  /// What the voxel holds besides its type; empty where nothing was put. Lifetime: until the grid's next edit.
+  [[nodiscard]] VoxelData data(IVec3 voxel) const;
+  /// Puts that in the place of what there was; true when it was another. False, and nothing is put, where the voxel is
+  /// air. No type changes: `changes_since` tells nothing of it, `data_changes_since` does.
+  /// Requires: at most kMaxVoxelDataBytes bytes, which are copied.
+  bool set_data(IVec3 voxel, const VoxelData& data);
+  /// Type and data, which may be this grid's own: `set(at, opened_door, world.data(at))`. True when either changed.
+  bool set(IVec3 voxel, VoxelType type, const VoxelData& data);
+  /// Voxels with data. Cost: O(1).
+  [[nodiscard]] std::int64_t data_count() const;
+  /// Calls `visit` for them: chunks as in `chunks`, then z, y, x; it must not edit the grid.
+  void for_each_data(FunctionRef<void(IVec3 voxel, VoxelType type, const VoxelData& data)> visit) const;
 
   /// Null where all is air. Lifetime: the grid owns the chunk, and its next edit may end it; a copy of the chunk costs
   /// no more than the pointer and is the caller's own.
@@ -119,6 +136,11 @@ class Grid {
   [[nodiscard]] GridChanges changes_since(ChangeCursor& cursor) const;
   /// Whether that would tell of anything. Cost: O(1).
   [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const;
+  /// Where voxels' data changed since the cursor's last time; moves the cursor to the present, so that whoever asks
+  /// for both has a cursor for each. Cost: as `changes_since`.
+  [[nodiscard]] DataChanges data_changes_since(ChangeCursor& cursor) const;
+  /// Whether that would tell of anything. Cost: O(1).
+  [[nodiscard]] bool has_data_changed_since(const ChangeCursor& cursor) const;
   /// A cursor at the present: it will be told what changes from now on.
   [[nodiscard]] ChangeCursor cursor() const;
 

@@ -20,6 +20,9 @@ inline constexpr VoxelType kAir = 0;
 /// Types besides air that a registry can hold.
 inline constexpr std::size_t kMaxVoxelTypes = 65'535;
 
+/// Bits of a voxel's state word (VoxelData).
+inline constexpr std::uint8_t kMaxStateBits = 32;
+
 /// How a voxel takes part in visibility, occlusion and light.
 enum class Visibility : std::uint8_t { Air, Opaque, Transparent };
 
@@ -42,8 +45,15 @@ struct VoxelProperties {
   float metalness = 0.0F;  ///< 0 to 1
   float emission = 0.0F;   ///< radiance emitted, as a multiple of `colour` in linear light; 0 is none
   float ior = 1.5F;        ///< index of refraction, of use to transparent types
+  /// Of clouds and the like, which are transparent: how often light is scattered on a voxel's length, on average, in
+  /// pictures by paths; what `colour` leaves of it goes on. 0: glass.
+  float scattering = 0.0F;
+  float anisotropy = 0.0F;  ///< of that: the mean cosine of the angle by which light is scattered, -1 to 1
   /// What a file format says beyond the above ("_spec" -> "0.3"), kept so that writing it back loses nothing.
   std::map<std::string, std::string> attributes{};
+  /// How many bits of a state word (VoxelData) voxels of this type may have, from the lowest up; 0: they have no state.
+  /// What a scene file holds is checked against it.
+  std::uint8_t state_bits = 0;
 
   bool operator==(const VoxelProperties&) const = default;
 };
@@ -76,7 +86,7 @@ class VoxelRegistry {
 
   /// Adds a type and returns its id: ids count up from 1.
   ///
-  /// Errors: LimitExceeded beyond kMaxVoxelTypes; InvalidArgument when `visibility` is Air.
+  /// Errors: LimitExceeded beyond kMaxVoxelTypes; InvalidArgument when `visibility` is Air or `state_bits` beyond 32.
   [[nodiscard]] Result<VoxelType> add(VoxelProperties properties);
 
   /// The id of a type that equals `properties` in everything, or a new one. Errors: as `add`. Cost: O(log types).
@@ -84,7 +94,7 @@ class VoxelRegistry {
 
   /// Replaces the properties of `type`. Meshes and pictures made before know nothing of it; `changes_since` tells.
   ///
-  /// Requires: type is not air and is registered; visibility is not Air.
+  /// Requires: type is not air and is registered; visibility is not Air; at most 32 state bits.
   void replace(VoxelType type, VoxelProperties properties);
 
   /// Lifetime: until a type is added or replaced. Requires: `type < size()`.

@@ -10,6 +10,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/io/volume.h>
 #include <quoin/scene/camera.h>
+#include <quoin/scene/look.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {
@@ -21,6 +22,7 @@ struct VoxSource;
 struct FileCamera {
   std::int32_t number = 0;
   Camera camera;
+  double focus_distance = 0.0;  ///< world units along its forward axis, of what it looks at; 0: not said
 };
 
 /// What reading a file gave.
@@ -31,6 +33,7 @@ struct LoadedScene {
   std::optional<DVec3> sun;                           ///< from the surface towards the sun, where the file says it
   std::optional<Camera> camera;                       ///< to look through at first, where the file has such a one
   std::vector<FileCamera> cameras;                    ///< all of the file, in its order
+  std::optional<FileLook> look;                       ///< how the file wants to be drawn, where it says it
   std::int64_t last_frame = 0;                        ///< of its animation; LoadOptions::frame says which one this is
   std::vector<std::filesystem::path> named_files;     ///< whose models are in it, which saving would put into this one
   std::shared_ptr<const VoxSource> source = nullptr;  ///< of a .vox file, with LoadOptions::keep_source

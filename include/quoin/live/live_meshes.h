@@ -11,6 +11,8 @@
 
 #include <quoin/core/parallel.h>
 #include <quoin/core/vec.h>
+#include <quoin/light/scene_light.h>
+#include <quoin/light/surface_light.h>
 #include <quoin/mesh/quad.h>
 #include <quoin/mesh/smooth_mesh.h>
 #include <quoin/scene/scene.h>
@@ -32,7 +34,7 @@ struct SurfaceRegion {
   /// [transparent[d], transparent[d + 1]): what the camera cannot see of a region need not be drawn.
   std::array<std::uint32_t, 7> opaque{};
   std::array<std::uint32_t, 7> transparent{};
-  std::uint64_t hash = 0;  ///< of its quads
+  std::uint64_t hash = 0;  ///< of its quads and their light
 };
 
 /// The surface of one chunk as it is drawn; never changed once it was made.
@@ -43,6 +45,7 @@ struct ChunkSurface {
   /// direction, layer, row, column. None reaches over the border of a region.
   QuadBuffer quads;
   std::size_t opaque_quads = 0;
+  std::vector<FaceLight> light;        ///< of each quad, where LiveMeshes uses light; else empty
   std::vector<SurfaceRegion> regions;  ///< blocky: those with quads, sorted by z, then y, then x
   /// Smooth: point p of the mesh is point p + 64 * chunk of the grid, of voxels p + 0.5 + 64 * chunk (samples are their
   /// middles); a colour (linear) and a type a vertex. Each transparent type is a closed body of its own, and of voxels
@@ -75,8 +78,9 @@ struct LiveMeshOptions {
   bool merge = true;                          ///< blocky: neighbouring faces become one quad
   /// Blocky: 16, 32 or 64. Smaller regions are more quads, and less that is new to a graphics card after an edit.
   int region_edge = 64;
-  SmoothOcclusionOptions occlusion{};              ///< of smooth surfaces, those of fields too
-  SurfaceColours colours = SurfaceColours::Sharp;  ///< of smooth surfaces of voxels; those of fields are blended
+  LightMerging light_merging = LightMerging::Linear;  ///< blocky, with `use_light`: where faces stay merged
+  SmoothOcclusionOptions occlusion{};                 ///< of smooth surfaces, those of fields too
+  SurfaceColours colours = SurfaceColours::Sharp;     ///< of smooth surfaces of voxels; those of fields are blended
   /// Of fields: where all eyes are farther than this from a chunk, in samples of its nearest instance, it has level of
   /// detail 1, at twice that 2, and so on to kMaxSmoothLevel. A level is left only a tenth beyond where it ends. 0 and
   /// less count as 1, NaN as infinity: level 0 everywhere.
@@ -119,6 +123,12 @@ class LiveMeshes {
   ///         while chunks wait for workers, besides O(chunks that wait).
   /// Errors: bad_alloc; the next call begins anew with all chunks.
   void update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
+
+  /// From the next update on blocky surfaces of voxels carry this light at their corners, and a chunk is also meshed
+  /// again when its light alone changed. Null: none. It is only read within `update` and `finish`; that of LiveLight
+  /// (`&light.shown()`) is a few frames late, and so are the meshes.
+  /// Lifetime: it must outlive its use here, until another is used.
+  void use_light(const SceneLight* light);
 
   /// The surfaces that are new since the last call: of one chunk only the last, never one older than was given before.
   /// Of chunks of which nothing was, or is, to be seen, none is given. Once those of voxels have `max_bytes`, as

@@ -12,62 +12,22 @@
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/camera.h>
+#include <quoin/scene/look.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_tracer.h>
 
 namespace quoin {
 
-/// Where light comes from that comes from infinitely far away.
-enum class SkyModel : std::uint8_t {
-  Physical,     ///< a clear sky of the Earth by the sun's height, from noon to night; see AirOptions
-  Gradient,     ///< the backdrop of LightOptions::sky_follows_sun
-  Uniform,      ///< PathOptions::sky_colour from everywhere
-  Environment,  ///< PathOptions::environment
-};
-
-/// The air of SkyModel::Physical, as multiples of the Earth's. Of at least 0 and at most 100.
-struct AirOptions {
-  double rayleigh = 1.0;  ///< what makes the sky blue and the sunset red
-  double mie = 1.0;       ///< haze
-  double ozone = 1.0;     ///< what keeps the sky blue at dusk
-  bool operator==(const AirOptions&) const = default;
-};
-
-/// A plane below a scene, level in the world.
-struct GroundPlane {
-  double height = 0.0;  ///< its y in the world
-  Vec3 colour{0.5F};    ///< linear, 0 to 1 each; matte
-  /// What is seen of it is the background, darker where less light comes than on open ground, and the scene's shadow
-  /// in the alpha of a picture without a background. It throws light back at the scene like any ground.
-  bool only_shadows = false;
-  bool operator==(const GroundPlane&) const = default;
-};
-
-struct PathOptions {
+/// How a picture by paths is taken; Look says of what light.
+struct PathOptions : Look {
   int width = 1280;
   int height = 720;
-  int samples = 64;     ///< a pixel, 1 to 65,536
-  int max_bounces = 8;  ///< 0 to 1,024: how often light is scattered at most on its way to the camera, less one
+  int samples = 64;          ///< a pixel, 1 to 65,536
+  int max_bounces = 8;       ///< 0 to 1,024: how often light is scattered at most on its way to the camera
+  int max_scatterings = 64;  ///< 0 to 1,024: how often light is scattered at most in fog and clouds besides
   std::uint32_t seed = 0;
-
-  DVec3 sun{-0.48, 0.72, 0.5};        ///< from the scene towards the sun; any length but 0
-  double sun_angle_radians = 0.0093;  ///< of its disc, across; 0: a point, which is not seen itself; at most 3
-  double sun_brightness = 1.0;        ///< 1: a white surface that faces it shows 1, before the air; 0: no sun
-  SkyModel sky = SkyModel::Physical;
-  double sky_brightness = 1.0;                       ///< times the sky's light
-  Vec3 sky_colour{1.0F};                             ///< of SkyModel::Uniform, linear
-  AirOptions air;                                    ///< of SkyModel::Physical
-  std::shared_ptr<const RadianceImage> environment;  ///< of SkyModel::Environment: longitude and latitude, +y up; its
-                                                     ///< middle is -z, its right half +x
-  double environment_turn_radians = 0.0;             ///< about the vertical, from -z towards +x
-
-  double lamp_brightness = 1.0;  ///< times what lamps and glowing voxels give to others
-  std::optional<GroundPlane> ground;
-
-  double lens_radius = 0.0;     ///< world units; more than 0: what is not in focus is blurred. Perspective cameras only
-  double focus_distance = 1.0;  ///< world units along the camera's forward axis; more than 0
-
-  bool layers = false;  ///< whether PathPicture's layers are filled
+  bool layers = false;   ///< whether PathPicture's layers are filled
+  bool denoise = false;  ///< whether noise is taken out within surfaces; edges stay, also those of shadows and colours
 
   bool operator==(const PathOptions&) const = default;
 };
@@ -99,6 +59,8 @@ struct PathPicture {
 /// Glass:    what the camera sees of it, also by its reflections, refracts by the types' `ior` and absorbs by length.
 ///           Light that goes from surface to surface passes it straight, tinted: no caustics. What alpha covers of it
 ///           is matte.
+/// Fog, clouds: light is scattered in Look::fog, and in transparent types that have VoxelProperties::scattering, any
+///           number of times.
 /// Lamps:    faces that glow and Scene::lamps are sampled by a light tree. Fields and glass that glow are found by
 ///           chance.
 ///
@@ -122,7 +84,7 @@ class PathTracer {
   ///           brightnesses of less than 0 or more than 1e9, SkyModel::Environment without an environment of at least
   ///           a pixel, more than 2^28 pixels, and cameras that CpuRenderer refuses; Cancelled when `progress` returns
   ///           false, which is asked after every few samples of a tile.
-  /// Memory:   28 bytes a pixel, 62 with layers.
+  /// Memory:   28 bytes a pixel, 62 with layers; some 300 besides with `denoise`, while it runs.
   [[nodiscard]] Result<PathPicture> render(const Camera& camera, const PathOptions& options = {}, Threads threads = {},
                                            const Progress& progress = {}) const;
 
@@ -131,25 +93,13 @@ class PathTracer {
   std::unique_ptr<Impl> impl_;
 };
 
-/// How linear light becomes the colours of a screen.
-enum class ToneCurve : std::uint8_t {
-  Clamp,    ///< 0 to 1 as it is: what LightModel::Rays shows
-  Neutral,  ///< Khronos PBR Neutral: colours up to 0.8 as they are, what is brighter rolled off, paler
-  Agx,      ///< AgX: as film, soft and pale in what is bright
-  Aces,     ///< ACES, in the fit of S. Hill: contrast, as MagicaVoxel's pictures have
-};
-
-struct DevelopOptions {
-  double exposure = 1.0;  ///< times all light
-  ToneCurve tone = ToneCurve::Neutral;
-};
-
 /// The exposure that shows a picture in the middle of the tones: its scene's mean logarithm of light becomes 0.18, but
 /// what is brightest stays within four times white. 1 of a black one.
 [[nodiscard]] double find_exposure(const PathPicture& picture);
 
 /// The picture as bytes, sRGB, the background included.
-/// Errors: InvalidArgument for an exposure that is not finite or less than 0.
+/// Errors: InvalidArgument, with the option's name, for what DevelopOptions do not allow. Memory: with bloom the light
+/// twice more.
 [[nodiscard]] Result<Image> develop(const PathPicture& picture, const DevelopOptions& options = {});
 
 /// The scene alone, and how much of each pixel it covers. Errors: as `develop`.

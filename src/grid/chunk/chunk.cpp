@@ -10,6 +10,7 @@
 
 #include "core/rows/content_hash.h"
 #include "core/rows/packed_row.h"
+#include "grid/chunk/chunk_data.h"
 #include "grid/chunk/chunk_storage.h"
 
 namespace quoin {
@@ -112,6 +113,9 @@ void Chunk::copy_storage() {
 }
 
 void Chunk::fill(VoxelType type) {
+  for (int z = 0; z < kChunkEdge && data_ != nullptr; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) types_will_change(y, z, ~row_mask(y, z, type));
+  }
   storage_.reset();
   uniform_ = type;
 }
@@ -125,6 +129,49 @@ void Chunk::count_change(int y, int z, std::uint64_t became_air, std::uint64_t b
   m.layer_counts[2][static_cast<std::size_t>(z)] += static_cast<std::uint16_t>(delta);
   add_columns(m.layer_counts[0], became_solid, 1);
   add_columns(m.layer_counts[0], became_air, -1);
+}
+
+VoxelData Chunk::data(IVec3 local) const {
+  QUOIN_ASSERT(kWholeChunk.contains(local), "0 <= x, y, z < 64");
+  return data_ == nullptr ? VoxelData{} : data_->get(local.x, local.y, local.z);
+}
+
+int Chunk::data_count() const {
+  return data_ == nullptr ? 0 : data_->count();
+}
+
+bool Chunk::set_data(IVec3 local, const VoxelData& data) {
+  QUOIN_ASSERT(data.bytes.size() <= kMaxVoxelDataBytes, "no more bytes than a voxel can hold");
+  if (get(local) == kAir || this->data(local) == data) return false;
+  if (data.empty()) {
+    clear_data(local.y, local.z, std::uint64_t{1} << local.x);
+    return true;
+  }
+  if (data_ == nullptr) {
+    data_ = make_ref<ChunkData>();
+  } else {
+    data_.make_own();
+  }
+  data_->put(local.x, local.y, local.z, data);
+  return true;
+}
+
+void Chunk::clear_data(int y, int z, std::uint64_t voxels) {
+  if ((data_->voxels(y, z) & voxels) == 0) return;
+  data_.make_own();
+  data_->clear(y, z, voxels);
+  if (data_->count() == 0) data_.reset();
+}
+
+void Chunk::for_each_data(FunctionRef<void(IVec3 local, const VoxelData& data)> visit) const {
+  for (int z = 0; z < kChunkEdge && data_ != nullptr; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      for (std::uint64_t left = data_->voxels(y, z); left != 0; left &= left - 1) {
+        const int x = std::countr_zero(left);
+        visit({x, y, z}, data_->get(x, y, z));
+      }
+    }
+  }
 }
 
 std::uint64_t Chunk::row_mask(int y, int z, VoxelType type) const {
@@ -154,6 +201,7 @@ inline std::uint32_t Chunk::index_for(VoxelType type) {
 // Writes a type where voxels of a row are of others; books it among the palette's counts, but not which became air.
 std::uint32_t Chunk::replace(int y, int z, std::uint64_t changed, VoxelType type) {
   QUOIN_ASSERT(changed != 0, "voxels that are of other types");
+  types_will_change(y, z, changed);
   if (storage_ == nullptr) make_mixed();
   ChunkStorage& m = own();
   const std::uint32_t index = index_for(type);
@@ -203,6 +251,7 @@ bool Chunk::set(int x, int y, int z, VoxelType type) {
   if (old == m.recent) return false;
   if (storage_.is_shared()) [[unlikely]]
     return set_anywhere(x, y, z, type);
+  types_will_change(y, z, std::uint64_t{1} << x);
   word ^= std::uint64_t{old ^ m.recent} << (bit & 63U);
   m.move_counts(old, m.recent, 1);
   if (type == kAir) {
@@ -218,6 +267,7 @@ bool Chunk::set(int x, int y, int z, VoxelType type) {
 bool Chunk::set_anywhere(int x, int y, int z, VoxelType type) {
   const VoxelType old = storage_ == nullptr ? uniform_ : storage_->type(x, y, z);
   if (old == type) return false;
+  types_will_change(y, z, std::uint64_t{1} << x);
   if (storage_ == nullptr) make_mixed();
   ChunkStorage& m = own();
   const std::uint32_t index = index_for(type);
@@ -409,7 +459,8 @@ IBox Chunk::bounds() const {
 
 bool Chunk::operator==(const Chunk& other) const {
   if (shares_storage_with(other)) return true;
-  if (non_air_count() != other.non_air_count()) return false;
+  if (non_air_count() != other.non_air_count() || data_count() != other.data_count()) return false;
+  if (data_count() != 0 && !(*data_ == *other.data_)) return false;
   std::array<VoxelType, kChunkEdge> row{};
   std::array<VoxelType, kChunkEdge> other_row{};
   for (int z = 0; z < kChunkEdge; ++z) {
@@ -438,6 +489,11 @@ std::uint64_t Chunk::content_hash() const {
       hash = mixed_with(hash, row_hash);
     }
   }
+  for_each_data([&](IVec3 local, const VoxelData& data) {
+    hash = mixed_with(hash, static_cast<std::uint64_t>((local.z * kChunkEdge + local.y) * kChunkEdge + local.x));
+    hash = mixed_with(hash, std::uint64_t{data.state} << 32 | data.bytes.size());
+    for (const std::byte byte : data.bytes) hash = mixed_with(hash, std::to_integer<std::uint64_t>(byte));
+  });
   return hash;
 }
 

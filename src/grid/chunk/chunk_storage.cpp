@@ -8,6 +8,7 @@
 #include <quoin/core/assert.h>
 
 #include "core/rows/packed_row.h"
+#include "grid/chunk/chunk_data.h"
 #include "grid/chunk/chunk_storage.h"
 
 namespace quoin {
@@ -262,9 +263,10 @@ void Chunk::repack(int bits) {
 }
 
 std::size_t Chunk::bytes() const {
-  if (storage_ == nullptr) return sizeof(Chunk);
+  const std::size_t of_data = data_ == nullptr ? 0 : data_->allocated();
+  if (storage_ == nullptr) return sizeof(Chunk) + of_data;
   const ChunkStorage& m = *storage_;
-  return sizeof(Chunk) + sizeof(ChunkStorage) + m.palette.capacity() * sizeof(VoxelType) +
+  return sizeof(Chunk) + of_data + sizeof(ChunkStorage) + m.palette.capacity() * sizeof(VoxelType) +
          m.counts.capacity() * sizeof(std::uint32_t) + m.words.capacity() * sizeof(std::uint64_t);
 }
 

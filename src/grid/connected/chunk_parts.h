@@ -118,6 +118,8 @@ class ChunkParts {
 
   [[nodiscard]] std::span<const ChunkPart> parts() const { return parts_; }
   [[nodiscard]] const Chunk& chunk() const { return chunk_; }
+  /// The same voxels with other data. Requires: the types are the same.
+  void take_data(const Chunk& chunk) { chunk_ = chunk; }
   /// The voxels of a row that belong to parts.
   [[nodiscard]] std::uint64_t row(int y, int z) const;
   /// The part of a voxel of a row. Requires: `row` is that row, and has the voxel.

@@ -133,6 +133,8 @@ std::uint64_t columns(int first, int end) {
 }  // namespace
 
 struct ConnectedPieces::Impl {
+  void take_data(IVec3 at, const Chunk* chunk);
+
   ConnectedOptions options;
   ChangeCursor followed;
   Entries entries;
@@ -383,10 +385,23 @@ ConnectedPieces::ConnectedPieces(ConnectedPieces&&) noexcept = default;
 ConnectedPieces& ConnectedPieces::operator=(ConnectedPieces&&) noexcept = default;
 ConnectedPieces::~ConnectedPieces() = default;
 
+void ConnectedPieces::Impl::take_data(IVec3 at, const Chunk* chunk) {
+  const auto found = entries.find(at);
+  if (found != entries.end() && chunk != nullptr) found->second.parts.take_data(*chunk);
+}
+
 void ConnectedPieces::update(const Grid& grid, Threads threads) {
   ChangeCursor now = content_of(impl_).followed;
+  ChangeCursor of_data = now;
   const GridChanges changes = grid.changes_since(now);
-  if (changes.empty()) return;
+  // What became another type as well is found anew below.
+  for (const DataChange& change : grid.data_changes_since(of_data).items) {
+    content_of(impl_).take_data(change.chunk, grid.find_chunk(change.chunk));
+  }
+  if (changes.empty()) {
+    content_of(impl_).followed = now;
+    return;
+  }
   std::vector<IVec3> chunks;
   if (changes.all) {
     content_of(impl_).entries.clear();
@@ -439,6 +454,10 @@ Grid ConnectedPieces::extract(std::size_t piece) const {
     Impl::for_each_row(entry, of_piece, [&](IVec3 row, std::uint64_t voxels) {
       entry.parts.chunk().read_row(row.y, row.z, types);
       grid.write_row(entry.at * kChunkEdge + row, voxels, types);
+    });
+    entry.parts.chunk().for_each_data([&](IVec3 local, const VoxelData& data) {
+      // Where the piece has nothing is air, which takes none.
+      grid.set_data(entry.at * kChunkEdge + local, data);
     });
   });
   return grid;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -52,7 +53,12 @@ class BoxCopy {
  public:
   BoxCopy(const Grid& from, const IBox& box, Grid& to, IVec3 to_min, AxisOrientation orientation,
           const CopyOptions& options)
-      : from_(from), to_(to), options_(options), orientation_(orientation), source_(box_from(box)) {
+      : from_(from),
+        to_(to),
+        options_(options),
+        orientation_(orientation),
+        source_(box_from(box)),
+        has_data_(from.data_count() != 0 || to.data_count() != 0) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::size_t along = source_axis(axis);
       origin_[axis] = to_min[static_cast<int>(axis)];
@@ -153,26 +159,72 @@ class BoxCopy {
     return mapped(*all);
   }
 
+  // Voxel by voxel, where types are already.
+  void copy_data(IVec3 at, const LongBox& source, const IBox& chunks, const IBox& place) {
+    std::vector<IVec3> gone;
+    if (const Chunk* const present = to_.find_chunk(at); present != nullptr && present->data_count() != 0) {
+      present->for_each_data([&](IVec3 local, const VoxelData&) {
+        const IVec3 voxel = at * kChunkEdge + local;
+        const bool arrives = options_.copy_air || mapped(from_.get(source_of(voxel))) != kAir;
+        if (place.contains(voxel) && arrives) gone.push_back(voxel);
+      });
+    }
+    for (const IVec3 voxel : gone) to_.set_data(voxel, {});
+    const IBox all = narrowed(source);
+    for (int z = chunks.min.z; z < chunks.max.z; ++z) {
+      for (int y = chunks.min.y; y < chunks.max.y; ++y) {
+        for (int x = chunks.min.x; x < chunks.max.x; ++x) {
+          const Chunk* const chunk = from_.find_chunk(x, y, z);
+          if (chunk == nullptr || chunk->data_count() == 0) continue;
+          chunk->for_each_data([&](IVec3 local, const VoxelData& data) {
+            const IVec3 voxel = IVec3{x, y, z} * kChunkEdge + local;
+            if (all.contains(voxel)) put_data(voxel, data);
+          });
+        }
+      }
+    }
+  }
+  void put_data(IVec3 source, const VoxelData& data) {
+    const VoxelType type = mapped(from_.get(source));
+    if (type == kAir) return;
+    const IVec3 voxel = narrowed(target_of(box_of_voxel(source))).min;
+    const bool is_mapped = data.state != 0 && options_.map_state != nullptr;
+    to_.set_data(voxel, {is_mapped ? options_.map_state(type, data.state) : data.state, data.bytes});
+  }
+  static LongBox box_of_voxel(IVec3 voxel) { return box_from({voxel, voxel + 1}); }
+  [[nodiscard]] IVec3 source_of(IVec3 voxel) const { return narrowed(source_of(box_of_voxel(voxel))).min; }
+
   void copy_chunk(IVec3 at) {
     const LongBox part = common_part(target_, box_of_chunk(at));
     const LongBox source = source_of(part);
     const IBox chunks = chunks_of(source);
     const IBox place = narrowed(part);
+    if (!is_shared_whole(at, chunks, place)) {
+      copy_types(at, source, chunks, place);
+      if (has_data_) copy_data(at, source, chunks, place);
+    }
+  }
+
+  // Where a chunk arrives as it is, data and all.
+  bool is_shared_whole(IVec3 at, const IBox& chunks, const IBox& place) {
+    if (place.size() != IVec3(kChunkEdge) || orientation_ != AxisOrientation() || chunks.size() != IVec3(1))
+      return false;
+    const Chunk* const chunk = from_.find_chunk(chunks.min);
+    if (chunk == nullptr || !keeps_types(*chunk)) return false;
+    if (chunk->data_count() != 0 && options_.map_state != nullptr) return false;
+    if (!options_.copy_air && !chunk->is_full() && to_.find_chunk(at) != nullptr) return false;
+    changed_ += to_.put_chunk(at, *chunk);
+    return true;
+  }
+
+  void copy_types(IVec3 at, const LongBox& source, const IBox& chunks, const IBox& place) {
     const bool is_whole = place.size() == IVec3(kChunkEdge);
     if (const auto type = one_type(chunks)) {
       if (*type == kAir && !options_.copy_air) return;
       changed_ += is_whole ? to_.put_chunk(at, Chunk(*type)) : to_.fill_box(place, *type);
       return;
     }
-    if (is_whole && orientation_ == AxisOrientation() && chunks.size() == IVec3(1)) {
-      const Chunk& chunk = *from_.find_chunk(chunks.min);
-      const bool replaces = options_.copy_air || chunk.is_full() || to_.find_chunk(at) == nullptr;
-      if (replaces && keeps_types(chunk)) {
-        changed_ += to_.put_chunk(at, chunk);
-        return;
-      }
-    }
-    block_.begin(orientation_, part_of(part, at));
+    block_.begin(orientation_, part_of(box_from(place), at));
     const bool is_new = to_.find_chunk(at) == nullptr;
     if (is_new && !is_whole) block_.clear();
     gather(source, chunks);
@@ -222,6 +274,7 @@ class BoxCopy {
   std::array<std::int64_t, 3> origin_{};
   LongBox target_;
   TurnedBlock block_;
+  bool has_data_;
   std::int64_t changed_ = 0;
 };
 

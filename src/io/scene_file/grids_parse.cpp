@@ -1,5 +1,6 @@
 #include "io/scene_file/grids_parse.h"
 
+#include <array>
 #include <atomic>
 #include <limits>
 #include <optional>
@@ -29,9 +30,10 @@ void read_attributes(const Object& object, std::map<std::string, std::string>& a
 }
 
 VoxelProperties properties_of(const Json& json, const Place& place, Faults& faults) {
-  const Object type(
-      json, place,
-      {"name", "colour", "visibility", "collides", "roughness", "metalness", "emission", "ior", "attributes"}, faults);
+  const Object type(json, place,
+                    {"name", "colour", "visibility", "collides", "roughness", "metalness", "emission", "ior",
+                     "scattering", "anisotropy", "state_bits", "attributes"},
+                    faults);
   VoxelProperties properties;
   type.read_text("name", properties.name);
   if (const Json* colour = type.need("colour")) {
@@ -51,23 +53,39 @@ VoxelProperties properties_of(const Json& json, const Place& place, Faults& faul
   type.read("metalness", properties.metalness);
   type.read("emission", properties.emission);
   type.read("ior", properties.ior);
+  type.read("scattering", properties.scattering);
+  type.read("anisotropy", properties.anisotropy);
+  if (const Json* bits = type.find("state_bits")) {
+    if (bits->is_number_unsigned() && *bits <= kMaxStateBits) {
+      properties.state_bits = bits->get<std::uint8_t>();
+    } else {
+      faults.add(type.place_of("state_bits"), "must be a whole number from 0 to 32");
+    }
+  }
   if (type.find("attributes") != nullptr) read_attributes(type, properties.attributes);
   return properties;
 }
 
-/// Text of voxels or of densities, with its place in the file.
+/// Text of a grid's content, under one of its keys, with its place in the file.
 struct Piece {
+  enum class Kind : std::uint8_t { Voxels, Densities, Data };
   std::size_t grid = 0;
   std::size_t index = 0;
   const std::string* text = nullptr;
-  bool is_field = false;
+  Kind kind = Kind::Voxels;
 };
 
-void read_pieces(const Object& object, const char* key, bool is_field, std::size_t grid, std::vector<Piece>& pieces) {
+constexpr const char* key_of(Piece::Kind kind) {
+  constexpr std::array kKeys = {"voxels", "densities", "data"};
+  return kKeys[static_cast<std::size_t>(kind)];
+}
+
+void read_pieces(const Object& object, Piece::Kind kind, std::size_t grid, std::vector<Piece>& pieces) {
+  const char* const key = key_of(kind);
   std::size_t count = 0;
   read_list(object, key, std::numeric_limits<std::size_t>::max(), [&](const Json& piece, const Place& at) {
     if (piece.is_string()) {
-      pieces.push_back({grid, count++, &piece.get_ref<const std::string&>(), is_field});
+      pieces.push_back({grid, count++, &piece.get_ref<const std::string&>(), kind});
     } else {
       object.faults().add(at, "must be a string");
     }
@@ -77,7 +95,7 @@ void read_pieces(const Object& object, const char* key, bool is_field, std::size
 SceneGrid grid_of(const Json& json, const Place& place, std::size_t index, std::vector<Piece>& pieces, Faults& faults) {
   constexpr int kLeast = std::numeric_limits<int>::min();
   constexpr int kMost = std::numeric_limits<int>::max();
-  const Object object(json, place, {"name", "pivot", "canvas", "voxels", "band", "densities"}, faults);
+  const Object object(json, place, {"name", "pivot", "canvas", "voxels", "band", "densities", "data"}, faults);
   SceneGrid grid;
   object.read_text("name", grid.name);
   object.read("pivot", grid.pivot);
@@ -85,7 +103,7 @@ SceneGrid grid_of(const Json& json, const Place& place, std::size_t index, std::
     const std::vector<int> c = object.whole_numbers(*canvas, object.place_of("canvas"), 6, kLeast, kMost);
     grid.canvas = {{c[0], c[1], c[2]}, {c[3], c[4], c[5]}};
   }
-  read_pieces(object, "voxels", false, index, pieces);
+  read_pieces(object, Piece::Kind::Voxels, index, pieces);
   if (object.find("densities") != nullptr) {
     double band = static_cast<double>(grid.field.band());
     object.read("band", band);
@@ -95,8 +113,10 @@ SceneGrid grid_of(const Json& json, const Place& place, std::size_t index, std::
     } else {
       faults.add(object.place_of("band"), "must be more than 0 and at most 65504");
     }
-    read_pieces(object, "densities", true, index, pieces);
+    read_pieces(object, Piece::Kind::Densities, index, pieces);
   }
+  // Behind the voxels that hold it.
+  if (object.find("data") != nullptr) read_pieces(object, Piece::Kind::Data, index, pieces);
   return grid;
 }
 
@@ -126,10 +146,28 @@ std::string put(std::vector<PlacedDensities> chunks, DensityGrid& field) {
   return "";
 }
 
+// The same of data, whose voxels are there already.
+std::string put(const DataPiece& piece, Grid& grid, const VoxelRegistry& types) {
+  std::string fault;
+  for_each_data(piece, [&](IVec3 voxel, const VoxelData& data) {
+    const VoxelType type = grid.get(voxel);
+    if (type == kAir) {
+      fault = about(chunk_of(voxel), "has data where there is no voxel");
+    } else if (!grid.data(voxel).empty()) {
+      fault = about(chunk_of(voxel), "has data twice at one voxel");
+    } else if (fault = fault_of_state(voxel, data, types[type]); fault.empty()) {
+      grid.set_data(voxel, data);
+    }
+    return fault.empty();
+  });
+  return fault;
+}
+
 /// What became of a piece.
 struct Decoded {
   Result<std::vector<PlacedChunk>> voxels;
   Result<std::vector<PlacedDensities>> densities;
+  Result<DataPiece> data;
 };
 
 /// The chunks of all pieces; nothing where they take more than `max_bytes`.
@@ -140,7 +178,13 @@ std::optional<std::vector<Decoded>> decode(const std::vector<Piece>& pieces, con
   parallel_for(pieces.size(), threads, [&](std::size_t i) {
     if (bytes > max_bytes) return;
     const Piece& piece = pieces[i];
-    if (piece.is_field) {
+    if (piece.kind == Piece::Kind::Data) {
+      auto& data = decoded[i].data;
+      data = decode_data(*piece.text);
+      if (data) bytes += data->memory;
+      return;
+    }
+    if (piece.kind == Piece::Kind::Densities) {
       auto& densities = decoded[i].densities;
       densities = decode_field(*piece.text, type_count, grids[piece.grid].field.band());
       if (!densities) return;
@@ -157,18 +201,18 @@ std::optional<std::vector<Decoded>> decode(const std::vector<Piece>& pieces, con
 }
 
 // Puts a piece into its grid, or says what is wrong with it.
-template <class Chunks, class Content>
-void put_or_blame(Result<Chunks>& chunks, Content& content, const Place& place, Faults& faults) {
+template <class Chunks, class... Content>
+void put_or_blame(Result<Chunks>& chunks, const Place& place, Faults& faults, Content&&... content) {
   if (!chunks) {
     faults.add(place, chunks.error().message, chunks.error().code);
-  } else if (const std::string fault = put(std::move(*chunks), content); !fault.empty()) {
+  } else if (const std::string fault = put(std::move(*chunks), content...); !fault.empty()) {
     faults.add(place, fault);
   }
 }
 
-void read_voxels(const std::vector<Piece>& pieces, std::size_t type_count, std::size_t file_bytes,
+void read_voxels(const std::vector<Piece>& pieces, const VoxelRegistry& types, std::size_t file_bytes,
                  std::vector<SceneGrid>& grids, Threads threads, Faults& faults) {
-  auto decoded = decode(pieces, grids, type_count, max_voxel_bytes(file_bytes), threads);
+  auto decoded = decode(pieces, grids, types.size(), max_voxel_bytes(file_bytes), threads);
   if (!decoded) {
     faults.add({nullptr, "grids", std::nullopt}, "voxels would take far more memory than the file has bytes",
                ErrorCode::LimitExceeded);
@@ -178,12 +222,19 @@ void read_voxels(const std::vector<Piece>& pieces, std::size_t type_count, std::
     const Piece& piece = pieces[i];
     const Place list{nullptr, "grids", std::nullopt};
     const Place grid{&list, {}, piece.grid};
-    const Place of_content{&grid, piece.is_field ? "densities" : "voxels", std::nullopt};
+    const Place of_content{&grid, key_of(piece.kind), std::nullopt};
     const Place place{&of_content, {}, piece.index};
-    if (piece.is_field) {
-      put_or_blame((*decoded)[i].densities, grids[piece.grid].field, place, faults);
-    } else {
-      put_or_blame((*decoded)[i].voxels, grids[piece.grid].grid, place, faults);
+    SceneGrid& into = grids[piece.grid];
+    switch (piece.kind) {
+      case Piece::Kind::Voxels:
+        put_or_blame((*decoded)[i].voxels, place, faults, into.grid);
+        break;
+      case Piece::Kind::Densities:
+        put_or_blame((*decoded)[i].densities, place, faults, into.field);
+        break;
+      case Piece::Kind::Data:
+        put_or_blame((*decoded)[i].data, place, faults, into.grid, types);
+        break;
     }
   }
 }
@@ -200,14 +251,15 @@ VoxelRegistry read_types(const Object& file) {
   return types;
 }
 
-std::vector<SceneGrid> read_grids(const Object& file, std::size_t type_count, std::size_t file_bytes, Threads threads) {
+std::vector<SceneGrid> read_grids(const Object& file, const VoxelRegistry& types, std::size_t file_bytes,
+                                  Threads threads) {
   std::vector<SceneGrid> grids;
   if (file.find("grids") == nullptr) return grids;
   std::vector<Piece> pieces;
   read_list(file, "grids", kMaxGrids, [&](const Json& each, const Place& place) {
     grids.push_back(grid_of(each, place, grids.size(), pieces, file.faults()));
   });
-  if (!file.faults().error()) read_voxels(pieces, type_count, file_bytes, grids, threads, file.faults());
+  if (!file.faults().error()) read_voxels(pieces, types, file_bytes, grids, threads, file.faults());
   return grids;
 }
 

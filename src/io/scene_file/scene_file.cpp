@@ -20,6 +20,7 @@ bool renumber(Chunk& chunk, const std::vector<VoxelType>& new_type_of) {
   bool is_same = true;
   for (const VoxelType type : chunk.types()) is_same = is_same && new_type_of[type] == type;
   if (is_same) return false;
+  const Chunk before = chunk;
   std::array<VoxelType, kChunkEdge> row{};
   for (int z = 0; z < kChunkEdge; ++z) {
     for (int y = 0; y < kChunkEdge; ++y) {
@@ -28,6 +29,7 @@ bool renumber(Chunk& chunk, const std::vector<VoxelType>& new_type_of) {
       chunk.write_row(y, z, row);
     }
   }
+  before.for_each_data([&](IVec3 local, const VoxelData& data) { chunk.set_data(local, data); });
   chunk.compact();
   return true;
 }

@@ -39,11 +39,25 @@ void read_as_voxels(std::span<const std::byte> bytes) {
   }
 }
 
+/// What is in the pieces of data likewise, put at a grid of which every second voxel is air.
+void read_as_data(std::span<const std::byte> bytes) {
+  const auto piece = quoin::decode_data(quoin::to_base64(quoin::gzipped(bytes, 0)));
+  if (!piece) return;
+  quoin::Grid grid;
+  quoin::for_each_data(*piece, [&](quoin::IVec3 voxel, const quoin::VoxelData& data) {
+    require(!data.empty() && data.bytes.size() <= quoin::kMaxVoxelDataBytes);
+    if ((voxel.x & 1) == 0) grid.set(voxel, 1);
+    require(grid.set_data(voxel, data) == (grid.get(voxel) != quoin::kAir) || grid.data(voxel) == data);
+    return grid.chunk_count() < 100;
+  });
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::span bytes(reinterpret_cast<const std::byte*>(data), size);
   read_as_text(bytes);
   read_as_voxels(bytes);
+  read_as_data(bytes);
   return 0;
 }

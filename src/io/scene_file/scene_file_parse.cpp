@@ -24,7 +24,7 @@ constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
 constexpr int kMaxDepth = 32;
 constexpr std::size_t kMaxFiles = 65'536;
 constexpr std::size_t kMaxInstances = std::size_t{1} << 22;
-constexpr int kVersion = 4;
+constexpr int kVersion = 5;
 
 DQuat rotation_of(const Object& instance, const Json& json) {
   const Place place = instance.place_of("rotation");
@@ -261,11 +261,11 @@ void read_file_object(const Json& json, std::size_t file_bytes, Threads threads,
   if (version != nullptr && !version->is_number_unsigned())
     faults.add(file.place_of("quoin_scene"), "must be a version, a whole number");
   if (version != nullptr && version->is_number_unsigned() && (*version < 1 || *version > kVersion)) {
-    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not known; 1 to 4 are",
+    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not known; 1 to 5 are",
                ErrorCode::Unsupported);
   }
   scene.types = read_types(file);
-  scene.grids = read_grids(file, scene.types.size(), file_bytes, threads);
+  scene.grids = read_grids(file, scene.types, file_bytes, threads);
   if (file.find("grids") == nullptr || file.find("files") != nullptr) {
     read_list(file, "files", kMaxFiles,
               [&](const Json& each, const Place& place) { scene.sources.push_back(source_of(each, place, faults)); });

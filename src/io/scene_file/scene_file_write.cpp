@@ -43,6 +43,7 @@ class SceneText {
   struct Pieces {
     Texts voxels;
     Texts densities;
+    Texts data;
   };
 
   /// Errors: InvalidArgument.
@@ -50,10 +51,14 @@ class SceneText {
     try {
       for (std::size_t type = 1; type < scene.types.size(); ++type) {
         types_.push_back(json_of(scene.types[static_cast<VoxelType>(type)]));
+        const VoxelProperties& properties = scene.types[static_cast<VoxelType>(type)];
+        is_fifth_ |= properties.state_bits != 0 || !is_same(properties.scattering, 0.0F) ||
+                     !is_same(properties.anisotropy, 0.0F);
       }
       for (std::size_t i = 0; i < scene.grids.size(); ++i) {
-        grids_.push_back(json_of(scene.grids[i], pieces.voxels[i], pieces.densities[i]));
+        grids_.push_back(json_of(scene.grids[i], pieces.voxels[i], pieces.densities[i], pieces.data[i]));
         is_third_ |= !pieces.densities[i].empty();
+        is_fifth_ |= !pieces.data[i].empty();
       }
       for (const SceneLayer& layer : scene.layers) layers_.push_back(json_of(layer));
       for (const SceneFile::Group& group : scene.groups) groups_.push_back(json_of(group));
@@ -88,12 +93,15 @@ class SceneText {
     put("metalness", type.metalness, plain.metalness);
     put("emission", type.emission, plain.emission);
     put("ior", type.ior, plain.ior);
+    put("scattering", type.scattering, plain.scattering);
+    put("anisotropy", type.anisotropy, plain.anisotropy);
+    if (type.state_bits != 0) json["state_bits"] = type.state_bits;
     for (const auto& [key, value] : type.attributes) json["attributes"].push_back({text(key), text(value)});
     return json;
   }
 
-  Json json_of(const SceneGrid& grid, const std::vector<std::string>& voxels,
-               const std::vector<std::string>& densities) {
+  Json json_of(const SceneGrid& grid, const std::vector<std::string>& voxels, const std::vector<std::string>& densities,
+               const std::vector<std::string>& data) {
     Json json = Json::object();
     if (!grid.name.empty()) json["name"] = text(grid.name);
     if (!is_same(grid.pivot, DVec3(0.0))) json["pivot"] = triple(grid.pivot);
@@ -106,6 +114,7 @@ class SceneText {
       json["band"] = grid.field.band();
       json["densities"] = densities;
     }
+    if (!data.empty()) json["data"] = data;
     return json;
   }
 
@@ -200,7 +209,7 @@ class SceneText {
     const bool has_models = !types_.empty() || !grids_.empty();
     const bool is_fourth = !layers_.empty() || !groups_.empty();
     std::string text = "{\n  \"quoin_scene\": ";
-    text += is_fourth ? "4" : is_third_ ? "3" : has_models || is_second_ ? "2" : "1";
+    text += is_fifth_ ? "5" : is_fourth ? "4" : is_third_ ? "3" : has_models || is_second_ ? "2" : "1";
     if (has_models) put_list(text, "types", types_);
     if (has_models) put_list(text, "grids", grids_);
     std::vector<Json> files;
@@ -225,6 +234,7 @@ class SceneText {
   Json camera_;
   bool is_second_ = false;
   bool is_third_ = false;
+  bool is_fifth_ = false;
 };
 
 Status check_types(const SceneFile& scene) {
@@ -242,7 +252,18 @@ Status check_types(const SceneFile& scene) {
   return {};
 }
 
-// What there is of voxels, and of densities, in the grids of a file.
+Status check_data(const SceneFile& scene) {
+  for (std::size_t i = 0; i < scene.grids.size(); ++i) {
+    std::string fault;
+    scene.grids[i].grid.for_each_data([&](IVec3 voxel, VoxelType type, const VoxelData& data) {
+      if (fault.empty()) fault = fault_of_state(voxel, data, scene.types[type]);
+    });
+    if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, "grids[" + std::to_string(i) + "]: " + fault);
+  }
+  return {};
+}
+
+// What there is of voxels, of densities and of data in the grids of a file.
 class Contents {
  public:
   explicit Contents(const SceneFile& scene) {
@@ -265,11 +286,15 @@ class Contents {
 
   Result<SceneText::Pieces> pieces(VoxelCompression compression, Threads threads, const Progress& progress) const {
     const double share = share_of_voxels();
-    auto voxels = encode_voxels(grids_, compression, threads, part_of(progress, 0.0, share));
+    const bool has_data = std::ranges::any_of(grids_, [](const Grid* grid) { return grid->data_count() != 0; });
+    const double end = has_data ? 0.9 : 1.0;
+    auto voxels = encode_voxels(grids_, compression, threads, part_of(progress, 0.0, share * end));
     if (!voxels) return voxels.error();
-    auto densities = encode_fields(fields_, compression, threads, part_of(progress, share, 1.0));
+    auto densities = encode_fields(fields_, compression, threads, part_of(progress, share * end, end));
     if (!densities) return densities.error();
-    return SceneText::Pieces{std::move(*voxels), std::move(*densities)};
+    auto data = encode_data(grids_, compression, threads, part_of(progress, end, 1.0));
+    if (!data) return data.error();
+    return SceneText::Pieces{std::move(*voxels), std::move(*densities), std::move(*data)};
   }
 
  private:
@@ -296,7 +321,7 @@ Result<std::string> text_of(const SceneFile& scene, const Contents& contents, Vo
 // Whatever the reader refuses is not written. Voxels, which it takes as they are written, are left out here.
 Status check_readable(const SceneFile& scene) {
   const SceneText::Texts none(scene.grids.size());
-  const auto text = SceneText().write(scene, {none, none});
+  const auto text = SceneText().write(scene, {none, none, none});
   if (!text) return text.error();
   const auto read = parse_scene_file(std::as_bytes(std::span(*text)));
   if (read) return {};
@@ -369,6 +394,7 @@ Result<SceneFile> scene_file_of(const Scene& scene) {
 
 Result<std::vector<std::byte>> write_scene_file(const SceneFile& scene, Threads threads, const Progress& progress) {
   if (auto sound = check_types(scene); !sound) return sound.error();
+  if (auto sound = check_data(scene); !sound) return sound.error();
   if (auto sound = check_readable(scene); !sound) return sound.error();
   const Contents contents(scene);
   auto text = text_of(scene, contents, VoxelCompression::Small, threads, progress);

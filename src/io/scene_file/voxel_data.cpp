@@ -33,14 +33,21 @@ constexpr int kMinPlace = -kMaxPlace - 1;
 constexpr std::size_t kMaxPieceBytes = std::size_t{32} << 20;
 static_assert(kChunksPerPiece * (16 + 2 * kMaxTypesOfChunk + kSlabs * (4 + 2 * kSlabVoxels)) <= kMaxPieceBytes);
 
+// Data is cut into pieces anywhere between two voxels.
+constexpr std::size_t kDataPieceBytes = std::size_t{8} << 20;
+static_assert(kDataPieceBytes + kMaxVoxelDataBytes < kMaxPieceBytes);
+// Of a voxel's data besides its bytes, and of a chunk's.
+constexpr std::size_t kPlacedDataBytes = 12;
+constexpr std::size_t kDataHeaderBytes = 16;
+
 static_assert(kFieldChunksPerPiece * (16 + 2 * kMaxTypesOfChunk + 2 * kSlabs * (4 + 2 * kSlabVoxels)) <=
               kMaxPieceBytes);
 
 // Real scenes take up to thirty times their text.
 constexpr std::size_t kFreeBytes = std::size_t{64} << 20;
 constexpr std::size_t kBytesPerFileByte = 64;
-// Of the tree above a chunk that lies alone, about.
-constexpr std::size_t kBytesAboveChunk = 1'024;
+// Of the tree above a chunk that lies alone, about; with the chunk itself 1,040, by which old files were bounded.
+constexpr std::size_t kBytesAboveChunk = 1'040 - sizeof(Chunk);
 
 constexpr int bits_of(std::size_t types) {
   int bits = 1;
@@ -191,14 +198,11 @@ class PieceReader {
   Result<PlacedChunk> read_chunk() {
     constexpr std::size_t kHeaderBytes = 16;
     if (!has(kHeaderBytes)) return cut_off();
+    const auto place = read_place();
+    if (!place) return place.error();
     PlacedChunk chunk;
-    const std::size_t begin = at_;
-    for (int axis = 0; axis < 3; ++axis) chunk.place[axis] = take<std::int32_t>();
+    chunk.place = *place;
     const auto count = take<std::uint32_t>();
-    for (int axis = 0; axis < 3; ++axis) {
-      const int at = chunk.place[axis];
-      if (at < kMinPlace || at > kMaxPlace) return fault("a chunk beyond where voxels end", begin);
-    }
     if (count == 0 || count > kMaxTypesOfChunk) {
       return fault("a chunk of " + std::to_string(count) + " types", at_ - sizeof(count));
     }
@@ -213,6 +217,36 @@ class PieceReader {
     }
     chunk.voxels = Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense_));
     return chunk;
+  }
+
+  /// Calls `visit(place in the chunk, data)` for the voxels of a chunk's data, and returns the chunk.
+  template <class Visit>
+  Result<IVec3> read_data(Visit&& visit) {
+    if (!has(kDataHeaderBytes)) return cut_off();
+    const auto place = read_place();
+    if (!place) return place.error();
+    const auto count = take<std::uint32_t>();
+    if (count == 0 || count > kChunkVoxels) {
+      return fault("a chunk with data at " + std::to_string(count) + " voxels", at_ - sizeof(count));
+    }
+    std::uint32_t next = 0;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      if (!has(kPlacedDataBytes)) return cut_off();
+      const auto voxel = take<std::uint32_t>();
+      const auto state = take<std::uint32_t>();
+      const auto length = take<std::uint32_t>();
+      const std::size_t begin = at_ - kPlacedDataBytes;
+      if (voxel >= kChunkVoxels) return fault("a voxel outside its chunk", begin);
+      if (voxel < next) return fault("a voxel that does not come after the one before", begin);
+      next = voxel + 1;
+      if (length > kMaxVoxelDataBytes)
+        return fault(std::to_string(length) + " bytes at one voxel", at_ - sizeof(length));
+      if (state == 0 && length == 0) return fault("a voxel that holds nothing", begin);
+      if (!has(length)) return cut_off();
+      visit(voxel, VoxelData{state, bytes_.subspan(at_, length)});
+      at_ += length;
+    }
+    return *place;
   }
 
   Result<PlacedDensities> read_densities(float band) {
@@ -257,6 +291,17 @@ class PieceReader {
     return make_error(ErrorCode::BadFormat, "byte " + std::to_string(at) + " of the voxel data: " + what);
   }
   [[nodiscard]] Error cut_off() const { return fault("cut off", bytes_.size()); }
+
+  // Requires: its bytes are there.
+  Result<IVec3> read_place() {
+    const std::size_t begin = at_;
+    IVec3 place{0};
+    for (int axis = 0; axis < 3; ++axis) place[axis] = take<std::int32_t>();
+    for (int axis = 0; axis < 3; ++axis) {
+      if (place[axis] < kMinPlace || place[axis] > kMaxPlace) return fault("a chunk beyond where voxels end", begin);
+    }
+    return place;
+  }
 
   Status read_palette(std::uint32_t count) {
     if (!has(count * sizeof(VoxelType))) return cut_off();
@@ -380,7 +425,9 @@ std::size_t max_voxel_bytes(std::size_t file_bytes) {
 }
 
 std::size_t voxel_bytes(const Chunk& chunk) {
-  return kBytesAboveChunk + chunk.bytes();
+  const std::size_t bytes = kBytesAboveChunk + chunk.bytes();
+  // The reader counts twice what two pieces share of a chunk's data.
+  return chunk.data_count() == 0 ? bytes : bytes + bytes / 32;
 }
 
 std::size_t voxel_bytes(const DensityChunk& chunk) {
@@ -450,6 +497,128 @@ Result<std::vector<std::vector<std::string>>> encode_fields(std::span<const Dens
                                                             VoxelCompression compression, Threads threads,
                                                             const Progress& progress) {
   return encode(fields, kFieldChunksPerPiece, compression, threads, progress);
+}
+
+namespace {
+
+/// Writes the data of chunk after chunk, cut into pieces.
+class DataWriter {
+ public:
+  void put(IVec3 chunk, std::uint32_t place, const VoxelData& data) {
+    const bool is_full = !pieces_.empty() && pieces_.back().size() >= kDataPieceBytes;
+    if (pieces_.empty() || is_full) pieces_.emplace_back();
+    if (chunk != chunk_ || pieces_.back().empty()) begin(chunk);
+    put_number(place);
+    put_number(data.state);
+    put_number(static_cast<std::uint32_t>(data.bytes.size()));
+    pieces_.back().insert(pieces_.back().end(), data.bytes.begin(), data.bytes.end());
+    ++count_;
+    for (std::size_t i = 0; i < sizeof(count_); ++i) {
+      pieces_.back()[count_at_ + i] = static_cast<std::byte>(count_ >> (8 * i));
+    }
+  }
+  [[nodiscard]] const std::vector<std::vector<std::byte>>& pieces() const { return pieces_; }
+
+ private:
+  void begin(IVec3 chunk) {
+    chunk_ = chunk;
+    for (int axis = 0; axis < 3; ++axis) put_number(static_cast<std::uint32_t>(chunk[axis]));
+    count_at_ = pieces_.back().size();
+    count_ = 0;
+    put_number(count_);
+  }
+  void put_number(std::uint32_t number) {
+    for (std::size_t i = 0; i < sizeof(number); ++i) {
+      pieces_.back().push_back(static_cast<std::byte>(number >> (8 * i)));
+    }
+  }
+
+  std::vector<std::vector<std::byte>> pieces_;
+  IVec3 chunk_{0};
+  std::size_t count_at_ = 0;  // in the last piece: how many voxels of the chunk it holds
+  std::uint32_t count_ = 0;
+};
+
+std::uint32_t place_of(IVec3 local) {
+  return static_cast<std::uint32_t>((local.z * kChunkEdge + local.y) * kChunkEdge + local.x);
+}
+
+}  // namespace
+
+Result<std::vector<std::vector<std::string>>> encode_data(std::span<const Grid* const> grids,
+                                                          VoxelCompression compression, Threads threads,
+                                                          const Progress& progress) {
+  std::vector<std::vector<std::string>> of_grids(grids.size());
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    DataWriter writer;
+    grids[i]->for_each_data([&](IVec3 voxel, VoxelType, const VoxelData& data) {
+      writer.put(chunk_of(voxel), place_of(local_of(voxel)), data);
+    });
+    of_grids[i].resize(writer.pieces().size());
+    const auto share = [&](std::size_t done) { return static_cast<double>(done) / static_cast<double>(grids.size()); };
+    const Progress of_grid = part_of(progress, share(i), share(i + 1));
+    ProgressSteps steps(of_grid, writer.pieces().size());
+    parallel_for(writer.pieces().size(), threads, [&](std::size_t piece) {
+      if (steps.cancelled()) return;
+      of_grids[i][piece] = text_of(writer.pieces()[piece], compression);
+      steps.step();
+    });
+    if (steps.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
+  }
+  return of_grids;
+}
+
+std::string fault_of_state(IVec3 voxel, const VoxelData& data, const VoxelProperties& type) {
+  if (static_cast<int>(std::bit_width(data.state)) <= type.state_bits) return "";
+  return "state " + std::to_string(data.state) + " of voxel (" + std::to_string(voxel.x) + ", " +
+         std::to_string(voxel.y) + ", " + std::to_string(voxel.z) + ") has more than the " +
+         std::to_string(type.state_bits) + " bits of its type";
+}
+
+Result<DataPiece> decode_data(std::string_view text) {
+  auto bytes = expanded(text);
+  if (!bytes) return bytes.error();
+  DataPiece piece;
+  PieceReader reader(*bytes, 0);
+  while (!reader.is_at_end()) {
+    // Chunk, slabs, states and bytes, as they are kept.
+    constexpr std::size_t kOfChunk = 2'048;
+    constexpr std::size_t kOfSlab = 180;
+    constexpr std::size_t kBesideBytes = 48;
+    std::array<bool, kSlabs> has_data{};
+    const auto read = reader.read_data([&](std::uint32_t place, const VoxelData& data) {
+      const std::size_t slab = (place >> 14) * 16 + (place >> 8 & 15);
+      piece.memory += std::exchange(has_data[slab], true) ? 0 : kOfSlab;
+      piece.memory += data.state == 0 ? 0 : sizeof(data.state);
+      piece.memory += data.bytes.empty() ? 0 : kBesideBytes + data.bytes.size();
+    });
+    if (!read) return read.error();
+    piece.memory += kOfChunk;
+  }
+  piece.bytes = std::move(*bytes);
+  return piece;
+}
+
+void for_each_data(const DataPiece& piece, FunctionRef<bool(IVec3 voxel, const VoxelData& data)> visit) {
+  std::size_t at = 0;
+  const auto take = [&] {
+    const auto number = load<std::uint32_t>(piece.bytes.data() + at, std::endian::little);
+    at += sizeof(number);
+    return number;
+  };
+  while (at < piece.bytes.size()) {
+    IVec3 chunk{0};
+    for (int axis = 0; axis < 3; ++axis) chunk[axis] = static_cast<int>(take());
+    for (std::uint32_t left = take(); left > 0; --left) {
+      const auto place = static_cast<int>(take());
+      const std::uint32_t state = take();
+      const std::uint32_t length = take();
+      const IVec3 local{place % kChunkEdge, place / kChunkEdge % kChunkEdge, place / kChunkEdge / kChunkEdge};
+      const VoxelData data{state, std::span(piece.bytes).subspan(at, length)};
+      at += length;
+      if (!visit(chunk * kChunkEdge + local, data)) return;
+    }
+  }
 }
 
 Result<std::vector<PlacedChunk>> decode_voxels(std::string_view piece, std::size_t type_count) {

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include <quoin/core/function_ref.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
@@ -32,6 +33,15 @@
 //              uint32 density       of all of the slab, as a half; or 0xFFFFFFFF, and then
 //              uint8 low[1024], high[1024]  the two bytes of each half's difference, modulo 65,536, from the one before
 //                                           it along x; of the first in a row from 0
+//
+// What voxels hold besides their types, chunk after chunk, of which one may come in several pieces:
+//
+//   chunk    int32 x, y, z
+//            uint32 n               voxels with data that follow, 1 to 262,144; of each
+//              uint32 place         x + 64 y + 4,096 z in the chunk, ascending
+//              uint32 state
+//              uint32 length        of its bytes, at most 65,536
+//              uint8 bytes[length]
 
 namespace quoin {
 
@@ -56,6 +66,11 @@ enum class VoxelCompression : std::uint8_t { Stored, Small };
                                                                           VoxelCompression compression, Threads threads,
                                                                           const Progress& progress);
 
+/// The same of what voxels hold besides their types; no pieces where they hold nothing.
+[[nodiscard]] Result<std::vector<std::vector<std::string>>> encode_data(std::span<const Grid* const> grids,
+                                                                        VoxelCompression compression, Threads threads,
+                                                                        const Progress& progress);
+
 struct PlacedChunk {
   IVec3 place{0};
   Chunk voxels;
@@ -75,5 +90,17 @@ struct PlacedDensities {
 /// The same of a field with that band; also for densities that are not within it.
 [[nodiscard]] Result<std::vector<PlacedDensities>> decode_field(std::string_view piece, std::size_t type_count,
                                                                 float band);
+
+/// A piece of data whose form is sound; whether voxels are there that may hold it is to be asked when it is put.
+struct DataPiece {
+  std::vector<std::byte> bytes;
+  std::size_t memory = 0;  ///< that it will take in a grid, at least
+};
+/// What is wrong with a voxel's state, or "": more bits than its type says.
+[[nodiscard]] std::string fault_of_state(IVec3 voxel, const VoxelData& data, const VoxelProperties& type);
+/// Errors: as `decode_voxels`.
+[[nodiscard]] Result<DataPiece> decode_data(std::string_view piece);
+/// Calls `visit` for all that a piece holds, in its order, until that returns false.
+void for_each_data(const DataPiece& piece, FunctionRef<bool(IVec3 voxel, const VoxelData& data)> visit);
 
 }  // namespace quoin

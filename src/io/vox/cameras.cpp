@@ -1,6 +1,7 @@
 #include "io/vox/cameras.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -20,19 +21,10 @@ struct Keys {
   std::string_view mode = "pers";
 };
 
-/// Three numbers with blanks between them.
 std::optional<DVec3> parse_three(std::string_view text) {
-  DVec3 numbers(0.0);
-  for (int axis = 0; axis < 3; ++axis) {
-    text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
-    const std::size_t length = std::min(text.find(' '), text.size());
-    const std::optional<float> number = parse_float(text.substr(0, length));
-    if (!number) return std::nullopt;
-    numbers[axis] = static_cast<double>(*number);
-    text.remove_prefix(length);
-  }
-  if (text.find_first_not_of(' ') != std::string_view::npos) return std::nullopt;
-  return numbers;
+  std::array<float, 3> numbers{};
+  if (!parse_floats(text, numbers)) return std::nullopt;
+  return DVec3(numbers[0], numbers[1], numbers[2]);
 }
 
 /// Reads a key, where the camera has it; says which one is none.
@@ -122,7 +114,7 @@ std::vector<FileCamera> cameras_of(const Document& document, const DBox& bounds,
       fault = "there was one of this number before";
     }
     if (fault.empty()) {
-      cameras.push_back({chunk.id, camera_from(keys, bounds)});
+      cameras.push_back({chunk.id, camera_from(keys, bounds), keys.radius});
     } else {
       warnings.push_back("camera " + std::to_string(chunk.id) + " skipped: " + fault);
     }

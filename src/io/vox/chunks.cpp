@@ -158,6 +158,15 @@ void parse_camera(ChunkReader& chunk, Document& out) {
   }
 }
 
+void parse_setting(ChunkReader& chunk, Document& out) {
+  SettingChunk setting{chunk.dict()};
+  if (chunk.failed()) {
+    out.warnings.push_back("render settings skipped: " + chunk.too_short().message);
+  } else {
+    out.settings.push_back(std::move(setting));
+  }
+}
+
 /// Whether the last SIZE still waits for its XYZI.
 struct ModelState {
   bool has_size = false;
@@ -208,6 +217,7 @@ Status parse_chunk(ChunkReader& chunk, ModelState& state, Document& out) {
   if (id == "LAYR") return parse_layer(chunk, out);
   if (id == "META") return parse_animation_range(chunk, out);
   if (id == "rCAM") parse_camera(chunk, out);
+  if (id == "rOBJ") parse_setting(chunk, out);
   return {};  // PACK repeats the number of models; lights and notes have no place in a scene.
 }
 

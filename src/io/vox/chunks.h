@@ -85,6 +85,11 @@ struct CameraChunk {
   Dict attributes;
 };
 
+/// An rOBJ chunk.
+struct SettingChunk {
+  Dict attributes;
+};
+
 /// What a chunk within MAIN says, in the order of the file.
 enum class ChunkKind : std::uint8_t { Other, ModelCount, Size, Voxels, PackedVoxels, Palette, Material, Node, Layer };
 
@@ -112,6 +117,7 @@ struct Document {
   std::vector<ModelKey> model_keys;          ///< likewise
   std::vector<Layer> layers;
   std::vector<CameraChunk> cameras;
+  std::vector<SettingChunk> settings;
   std::int32_t last_frame = 0;       ///< of the keys and META's range
   std::int64_t stray_materials = 0;  ///< MATL and MATT chunks whose id is no colour index
   std::vector<std::string> warnings;

@@ -158,8 +158,12 @@ constexpr float kMaxFlux = 16.0F;
 constexpr float kMaxRefraction = 10.0F;
 const float kDefaultRefraction = VoxelProperties{}.ior;
 
-const std::array<std::string, 11> kDecodedKeys = {"_type",  "_rough", "_metal", "_plastic", "_weight", "_alpha",
-                                                  "_trans", "_emit",  "_flux",  "_ior",     "_ri"};
+constexpr float kDefaultScattering = 0.05F;
+constexpr float kMaxScattering = 1e6F;
+
+const std::array<std::string, 14> kDecodedKeys = {"_type",  "_rough", "_metal",      "_plastic", "_weight",
+                                                  "_alpha", "_trans", "_emit",       "_flux",    "_ior",
+                                                  "_ri",    "_d",     "_media_type", "_g"};
 constexpr std::string_view kOwnPrefix = "quoin_";
 
 std::optional<float> number(const Attributes& attributes, const std::string& key) {
@@ -190,6 +194,14 @@ float emitted(const Attributes& attributes) {
   return share * std::exp2(flux);
 }
 
+/// Clouds and what light enters below its surface scatter; the other kinds of medium are drawn as glass.
+void decode_cloud(const Attributes& attributes, VoxelProperties& out) {
+  const auto kind = attributes.find("_media_type");
+  if (kind == attributes.end() || (kind->second != "_scatter" && kind->second != "_sss")) return;
+  out.scattering = std::clamp(number(attributes, "_d").value_or(kDefaultScattering), 0.0F, kMaxScattering);
+  out.anisotropy = std::clamp(number(attributes, "_g").value_or(0.0F), -1.0F, 1.0F);
+}
+
 /// What the published keys say.
 void decode_published(const Attributes& attributes, VoxelProperties& out) {
   const auto type_entry = attributes.find("_type");
@@ -206,6 +218,7 @@ void decode_published(const Attributes& attributes, VoxelProperties& out) {
   } else if (type == "_glass" || type == "_media") {
     out.roughness = rough;
     make_transparent(out, unit(either(transparency, weight), kDefaultTransparency));
+    if (type == "_media") decode_cloud(attributes, out);
   } else if (type == "_blend") {
     out.roughness = rough;
     out.metalness = unit(number(attributes, "_metal"), 0.0F);
@@ -231,6 +244,9 @@ void decode_own(const Attributes& attributes, VoxelProperties& out) {
   };
   if (const std::string* name = text("name")) out.name = *name;
   if (const std::string* collides = text("collides")) out.collides = *collides != "0";
+  float state_bits = 0.0F;
+  set("state_bits", state_bits);
+  out.state_bits = static_cast<std::uint8_t>(std::clamp(state_bits, 0.0F, float{kMaxStateBits}));
   if (const std::string* visibility = text("visibility")) {
     out.visibility = *visibility == "transparent" ? Visibility::Transparent : Visibility::Opaque;
   }
@@ -241,10 +257,14 @@ void decode_own(const Attributes& attributes, VoxelProperties& out) {
   set("metalness", out.metalness);
   set("emission", out.emission);
   set("ior", out.ior);
+  set("scattering", out.scattering);
+  set("anisotropy", out.anisotropy);
   out.roughness = std::clamp(out.roughness, 0.0F, 1.0F);
   out.metalness = std::clamp(out.metalness, 0.0F, 1.0F);
   out.emission = std::max(out.emission, 0.0F);
   out.ior = std::clamp(out.ior, 1.0F, kMaxRefraction);
+  out.scattering = std::clamp(out.scattering, 0.0F, kMaxScattering);
+  out.anisotropy = std::clamp(out.anisotropy, -1.0F, 1.0F);
 }
 
 void encode_emission(float emission, Attributes& out) {
@@ -261,7 +281,7 @@ void encode_published(const VoxelProperties& properties, Attributes& out) {
     out["_type"] = "_emit";
     encode_emission(properties.emission, out);
   } else if (transparent) {
-    out["_type"] = properties.metalness > 0.0F ? "_blend" : "_glass";
+    out["_type"] = properties.scattering > 0.0F ? "_media" : properties.metalness > 0.0F ? "_blend" : "_glass";
   } else if (properties.metalness > 0.0F) {
     out["_type"] = "_metal";
   } else if (properties.roughness < 1.0F) {
@@ -270,6 +290,11 @@ void encode_published(const VoxelProperties& properties, Attributes& out) {
   if (out.empty() || out.find("_type") == out.end()) return;
   if (properties.roughness < 1.0F) out["_rough"] = to_text(properties.roughness);
   if (properties.metalness > 0.0F) out["_metal"] = to_text(properties.metalness);
+  if (out["_type"] == "_media") {
+    out["_media_type"] = "_scatter";
+    out["_d"] = to_text(properties.scattering);
+    if (properties.anisotropy != 0.0F) out["_g"] = to_text(properties.anisotropy);
+  }
   if (transparent) out["_trans"] = to_text(static_cast<float>(255 - properties.colour.a) / 255.0F);
 }
 
@@ -278,6 +303,7 @@ void encode_own(const VoxelProperties& wanted, const VoxelProperties& decoded, A
   const auto set = [&](const char* key, const std::string& value) { out[std::string(kOwnPrefix) + key] = value; };
   if (wanted.name != decoded.name) set("name", printable(wanted.name));
   if (wanted.collides != decoded.collides) set("collides", wanted.collides ? "1" : "0");
+  if (wanted.state_bits != decoded.state_bits) set("state_bits", std::to_string(wanted.state_bits));
   if (wanted.visibility != decoded.visibility) {
     set("visibility", wanted.visibility == Visibility::Transparent ? "transparent" : "opaque");
   }
@@ -286,6 +312,8 @@ void encode_own(const VoxelProperties& wanted, const VoxelProperties& decoded, A
   if (wanted.metalness != decoded.metalness) set("metalness", to_text(wanted.metalness));
   if (wanted.emission != decoded.emission) set("emission", to_text(wanted.emission));
   if (wanted.ior != decoded.ior) set("ior", to_text(wanted.ior));
+  if (wanted.scattering != decoded.scattering) set("scattering", to_text(wanted.scattering));
+  if (wanted.anisotropy != decoded.anisotropy) set("anisotropy", to_text(wanted.anisotropy));
 }
 
 }  // namespace

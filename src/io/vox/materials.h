@@ -37,7 +37,7 @@ namespace quoin::vox {
 ///   _glass    transparent; alpha 1 - `_trans` (else `_alpha`, which holds the same; else `_weight`; else 0.5), at
 ///             least a tenth so that clear glass still shows; roughness `_rough`
 ///   _blend    metalness `_metal`; transparent when `_trans` (`_alpha`) is above 0; roughness `_rough`
-///   _media    (cloud) as glass
+///   _media    (cloud) as glass; with `_media_type` _scatter or _sss, scattering `_d` (0.05 a voxel), anisotropy `_g`
 ///   _emit     emission (`_emit`, else `_weight`, else 1) * 2^`_flux`
 /// For all: index of refraction `_ri`, else 1 + `_ior`. `_rough` missing is 0.1, MagicaVoxel's default.
 /// Keys that start with "quoin_" override these; `encode_material` writes them where MagicaVoxel has no words.

@@ -24,7 +24,6 @@ constexpr float kMieScattering = 3.996e-3F;
 constexpr float kMieAbsorption = 4.4e-3F;
 constexpr float kMieHeight = 1.2F;
 constexpr Vec3 kOzone{0.650e-3F, 1.881e-3F, 0.085e-3F};
-constexpr float kForward = 0.8F;  // Mie's phase function
 constexpr float kGroundAlbedo = 0.3F;
 constexpr Vec3 kNight{0.0006F, 0.0009F, 0.0016F};  // of stars and air: never black
 
@@ -33,18 +32,20 @@ constexpr int kHeight = 256;
 
 struct Medium {
   Vec3 rayleigh{0.0F};
-  float mie = 0.0F;
+  Vec3 mie{0.0F};
   Vec3 extinction{0.0F};
 };
 
 Medium medium_at(float radius, const AirOptions& air) {
   const float height = std::max(radius - kGround, 0.0F);
   Medium medium;
-  medium.rayleigh = kRayleigh * (exponential(-height / kRayleighHeight) * static_cast<float>(air.rayleigh));
+  medium.rayleigh =
+      kRayleigh * air.rayleigh_colour * (exponential(-height / kRayleighHeight) * static_cast<float>(air.rayleigh));
   const float haze = exponential(-height / kMieHeight) * static_cast<float>(air.mie);
-  medium.mie = kMieScattering * haze;
+  medium.mie = air.mie_colour * (kMieScattering * haze);
   const float layer = std::max(0.0F, 1.0F - std::abs(height - 25.0F) / 15.0F) * static_cast<float>(air.ozone);
-  medium.extinction = medium.rayleigh + Vec3((kMieScattering + kMieAbsorption) * haze) + kOzone * layer;
+  medium.extinction =
+      medium.rayleigh + air.mie_colour * ((kMieScattering + kMieAbsorption) * haze) + kOzone * air.ozone_colour * layer;
   return medium;
 }
 
@@ -208,8 +209,9 @@ class Sky {
     const float length =
         std::max(on_ground ? distance_to(kEye, up, kGround, true) : distance_to(kEye, up, kTop, false), 0.0F);
     const float rayleigh_phase = 3.0F / (16.0F * kPi) * (1.0F + towards * towards);
-    constexpr float gg = kForward * kForward;
-    const float under = std::max(1.0F + gg - 2.0F * kForward * towards, 1e-4F);
+    const auto g = static_cast<float>(air_.mie_anisotropy);
+    const float gg = g * g;
+    const float under = std::max(1.0F + gg - 2.0F * g * towards, 1e-4F);
     const float mie_phase =
         3.0F / (8.0F * kPi) * (1.0F - gg) * (1.0F + towards * towards) / ((2.0F + gg) * under * std::sqrt(under));
     Vec3 sum(0.0F);
@@ -224,8 +226,8 @@ class Sky {
       const Medium medium = medium_at(here, air_);
       const Vec3 step_passes = through(medium.extinction * (end - before));
       const Vec3 direct =
-          transmittance_.at(here, sun_here) * (medium.rayleigh * rayleigh_phase + Vec3(medium.mie * mie_phase));
-      const Vec3 all = direct + scattering_.at(here, sun_here) * (medium.rayleigh + Vec3(medium.mie));
+          transmittance_.at(here, sun_here) * (medium.rayleigh * rayleigh_phase + medium.mie * mie_phase);
+      const Vec3 all = direct + scattering_.at(here, sun_here) * (medium.rayleigh + medium.mie);
       sum += passed * all * (Vec3(1.0F) - step_passes) / glm::max(medium.extinction, Vec3(1e-9F));
       passed *= step_passes;
       before = end;

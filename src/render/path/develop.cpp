@@ -1,5 +1,8 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <vector>
 
@@ -97,10 +100,129 @@ Vec3 toned(Vec3 light, float exposure, ToneCurve tone) {
   return exposed;
 }
 
-Status check_exposure(double exposure) {
-  if (std::isfinite(exposure) && exposure >= 0.0) return {};
-  return make_error(ErrorCode::InvalidArgument, "exposure: must be finite and at least 0");
+Status refuse(const char* message) {
+  return make_error(ErrorCode::InvalidArgument, message);
 }
+
+Status check(const DevelopOptions& options) {
+  if (!std::isfinite(options.exposure) || options.exposure < 0.0) {
+    return refuse("exposure: must be finite and at least 0");
+  }
+  if (!(options.vignette >= 0.0 && options.vignette <= 1.0)) return refuse("vignette: must be 0 to 1");
+  if (!(options.gamma > 0.0) || !std::isfinite(options.gamma)) return refuse("gamma: must be finite and more than 0");
+  const Bloom& bloom = options.bloom;
+  if (!(bloom.mix >= 0.0 && bloom.mix <= 1.0)) return refuse("bloom: its mix must be 0 to 1");
+  if (!(bloom.radius >= 0.0 && bloom.radius <= 1.0)) return refuse("bloom: its radius must be 0 to 1");
+  if (!(bloom.aspect >= -1.0 && bloom.aspect <= 1.0)) return refuse("bloom: its aspect must be -1 to 1");
+  if (!(bloom.threshold >= 0.0) || !std::isfinite(bloom.threshold)) {
+    return refuse("bloom: its threshold must be finite and at least 0");
+  }
+  return {};
+}
+
+// Means of `2 radius + 1` pixels along lines of `count` values that lie `step` apart; what lies outside is as the edge.
+void blur_line(std::vector<Vec3>& values, std::size_t first, std::size_t step, int count, int radius,
+               std::vector<Vec3>& line) {
+  const auto at = [&](int i) -> Vec3& {
+    return values[first + step * static_cast<std::size_t>(std::clamp(i, 0, count - 1))];
+  };
+  line.clear();
+  DVec3 sum(0.0);
+  for (int i = -radius; i <= radius; ++i) sum += DVec3(at(i));
+  for (int i = 0; i < count; ++i) {
+    line.push_back(Vec3(sum / (2.0 * radius + 1.0)));
+    sum += DVec3(at(i + radius + 1)) - DVec3(at(i - radius));
+  }
+  for (int i = 0; i < count; ++i) at(i) = line[static_cast<std::size_t>(i)];
+}
+
+// Three means of a box come near Gauss's curve. `radius`: its standard deviation, in pixels.
+void blur(std::vector<Vec3>& values, int width, int height, double radius_x, double radius_y) {
+  std::vector<Vec3> line;
+  const auto box_of = [](double radius, int most) {
+    return std::min(static_cast<int>(std::lround(std::sqrt(radius * radius + 0.25) - 0.5)), most);
+  };
+  const auto w = static_cast<std::size_t>(width);
+  for (int pass = 0; pass < 3; ++pass) {
+    for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) {
+      blur_line(values, y * w, 1, width, box_of(radius_x, width), line);
+    }
+    for (std::size_t x = 0; x < w; ++x) blur_line(values, x, w, height, box_of(radius_y, height), line);
+  }
+}
+
+// What light is before the tone curve: exposed, with what spreads from what is bright. `most`: of what spreads, so that
+// one pixel of a lamp does not fill the picture.
+std::vector<Vec3> bloomed(const std::vector<Vec3>& light, int width, int height, float exposure, const Bloom& bloom) {
+  constexpr float kMost = 64.0F;
+  constexpr float kWide = 4.0F;  // the widest spread beside the narrowest
+  constexpr std::array kSpreads = {0.25, 1.0};
+  constexpr int kSpreadCount = static_cast<int>(kSpreads.size());
+  const auto threshold = static_cast<float>(bloom.threshold);
+  std::vector<Vec3> spread(light.size());
+  for (std::size_t i = 0; i < light.size(); ++i) {
+    const Vec3 exposed = glm::min(glm::max(Vec3(0.0F), light[i] * exposure), Vec3(kMost));
+    const float brightest = largest(exposed);
+    const float kept = threshold > 0.0F ? std::max(brightest - threshold, 0.0F) / std::max(brightest, 1e-9F) : 1.0F;
+    spread[i] = exposed * kept;
+  }
+  const double radius = bloom.radius * height;
+  const auto stretch = static_cast<double>(power(kWide, static_cast<float>(bloom.aspect)));
+  std::vector<Vec3> out(light.size());
+  const auto mix = static_cast<float>(bloom.mix);
+  for (std::size_t i = 0; i < light.size(); ++i) out[i] = light[i] * exposure - spread[i] * mix;
+  for (const double part : kSpreads) {  // near glare and far haze
+    std::vector<Vec3> blurred = spread;
+    blur(blurred, width, height, radius * part * stretch, radius * part / stretch);
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] += blurred[i] * (mix / kSpreadCount);
+  }
+  return out;
+}
+
+// From linear light to bytes.
+class Developer {
+ public:
+  Developer(const DevelopOptions& options, int width, int height)
+      : options_(&options),
+        exposure_(static_cast<float>(std::min(options.exposure, 1e30))),
+        bends_(options.gamma != kUsualGamma),
+        bend_(static_cast<float>(kUsualGamma / options.gamma)),
+        middle_x_(static_cast<float>(width) * 0.5F),
+        middle_y_(static_cast<float>(height) * 0.5F) {}
+
+  // The light to show: the exposure is in it already where that is 1.
+  [[nodiscard]] std::vector<Vec3> spread(const std::vector<Vec3>& light, int width, int height) {
+    std::vector<Vec3> out = bloomed(light, width, height, exposure_, options_->bloom);
+    exposure_ = 1.0F;
+    return out;
+  }
+  [[nodiscard]] bool has_bloom() const { return options_->bloom.mix > 0.0 && options_->bloom.radius > 0.0; }
+
+  void put(Vec3 light, std::size_t x, std::size_t y, std::vector<std::uint8_t>& bytes) const {
+    if (options_->vignette > 0.0) light *= 1.0F - static_cast<float>(options_->vignette) * corner(x, y);
+    Vec3 shown = toned(light, exposure_, options_->tone);
+    if (bends_) shown = {power(shown.x, bend_), power(shown.y, bend_), power(shown.z, bend_)};
+    for (int channel = 0; channel < 3; ++channel) bytes.push_back(encode_(shown[channel]));
+  }
+
+ private:
+  static constexpr double kUsualGamma = 2.2;
+
+  // 0 in the middle, 1 in the corners, by the square of the distance.
+  [[nodiscard]] float corner(std::size_t x, std::size_t y) const {
+    const float across = (static_cast<float>(x) + 0.5F - middle_x_) / middle_x_;
+    const float down = (static_cast<float>(y) + 0.5F - middle_y_) / middle_y_;
+    return 0.5F * (across * across + down * down);
+  }
+
+  const DevelopOptions* options_;
+  float exposure_;
+  bool bends_;
+  float bend_;
+  float middle_x_;
+  float middle_y_;
+  const SrgbEncoder& encode_ = SrgbEncoder::shared();
+};
 
 }  // namespace
 
@@ -126,28 +248,30 @@ double find_exposure(const PathPicture& picture) {
 }
 
 Result<Image> develop(const PathPicture& picture, const DevelopOptions& options) {
-  if (Status status = check_exposure(options.exposure); !status) return status.error();
-  const SrgbEncoder& encode = SrgbEncoder::shared();
-  const auto exposure = static_cast<float>(std::min(options.exposure, 1e30));
+  if (Status status = check(options); !status) return status.error();
+  Developer developer(options, picture.width, picture.height);
+  std::vector<Vec3> spread;
+  if (developer.has_bloom()) spread = developer.spread(picture.radiance, picture.width, picture.height);
+  const std::vector<Vec3>& light = spread.empty() ? picture.radiance : spread;
   Image image{picture.width, picture.height, {}};
-  image.rgb.reserve(3 * picture.radiance.size());
-  for (const Vec3& light : picture.radiance) {
-    const Vec3 shown = toned(light, exposure, options.tone);
-    for (int channel = 0; channel < 3; ++channel) image.rgb.push_back(encode(shown[channel]));
-  }
+  image.rgb.reserve(3 * light.size());
+  const auto width = static_cast<std::size_t>(picture.width);
+  for (std::size_t i = 0; i < light.size(); ++i) developer.put(light[i], i % width, i / width, image.rgb);
   return image;
 }
 
 Result<AlphaImage> develop_with_alpha(const PathPicture& picture, const DevelopOptions& options) {
-  if (Status status = check_exposure(options.exposure); !status) return status.error();
-  const SrgbEncoder& encode = SrgbEncoder::shared();
-  const auto exposure = static_cast<float>(std::min(options.exposure, 1e30));
+  if (Status status = check(options); !status) return status.error();
+  Developer developer(options, picture.width, picture.height);
+  std::vector<Vec3> spread;
+  if (developer.has_bloom()) spread = developer.spread(picture.scene, picture.width, picture.height);
+  const std::vector<Vec3>& light = spread.empty() ? picture.scene : spread;
   AlphaImage image{picture.width, picture.height, {}};
-  image.rgba.reserve(4 * picture.scene.size());
-  for (std::size_t i = 0; i < picture.scene.size(); ++i) {
+  image.rgba.reserve(4 * light.size());
+  const auto width = static_cast<std::size_t>(picture.width);
+  for (std::size_t i = 0; i < light.size(); ++i) {
     const float alpha = picture.alpha[i];
-    const Vec3 shown = alpha > 0.0F ? toned(picture.scene[i] / alpha, exposure, options.tone) : Vec3(0.0F);
-    for (int channel = 0; channel < 3; ++channel) image.rgba.push_back(encode(shown[channel]));
+    developer.put(alpha > 0.0F ? light[i] / alpha : Vec3(0.0F), i % width, i / width, image.rgba);
     image.rgba.push_back(static_cast<std::uint8_t>(std::lround(std::clamp(alpha, 0.0F, 1.0F) * 255.0F)));
   }
   return image;

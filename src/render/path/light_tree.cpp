@@ -175,9 +175,9 @@ float LightTree::importance(const LampBounds& bounds, Vec3 point, Vec3 normal) {
   const float radius2 = glm::dot(half, half);
   const float distance2 = std::max(glm::dot(way, way), std::max(radius2, 1e-12F));
   // How far the box reaches before the surface, and the point before the lamps; at least a little of their distance.
-  const float before = glm::dot(way, normal) + glm::dot(half, glm::abs(normal));
-  if (!(before > 0.0F)) return 0.0F;
   const float distance = std::sqrt(distance2);
+  const float before = is_black(glm::abs(normal)) ? distance : glm::dot(way, normal) + glm::dot(half, glm::abs(normal));
+  if (!(before > 0.0F)) return 0.0F;
   float shone = distance;
   if (bounds.cos_edge > -1.0F && bounds.cos_spread > 0.9999F) {
     shone = glm::dot(half, glm::abs(bounds.axis)) - glm::dot(way, bounds.axis);

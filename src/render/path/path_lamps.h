@@ -50,7 +50,8 @@ class PathLamps {
 
   [[nodiscard]] bool empty() const { return lamps_.empty(); }
   [[nodiscard]] std::size_t size() const { return lamps_.size(); }
-  /// A lamp and a point of it. `point`, `normal`: in the world. `choice`: 0 to less than 1.
+  /// A lamp and a point of it. `point`, `normal`: in the world; a normal of 0 is of a point in the air, which light
+  /// reaches from everywhere. `choice`: 0 to less than 1.
   [[nodiscard]] LampSample sample(DVec3 point, Vec3 normal, float choice, Pair u) const;
   /// With which `sample` finds the point of that lamp that lies in `direction` at `distance`.
   [[nodiscard]] float density(std::int32_t lamp, DVec3 point, Vec3 normal, Vec3 direction, float distance) const;

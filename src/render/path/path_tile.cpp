@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <optional>
 
 #include <glm/common.hpp>
@@ -22,10 +23,15 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr float kNoOther = std::numeric_limits<float>::infinity();
 constexpr int kBlock = CameraRays::kBlock;
 constexpr std::uint32_t kDimensions = 8;     // of a vertex
+constexpr std::uint32_t kFog = 0x4000'0000;  // added to a vertex's: numbers of their own
+constexpr std::uint32_t kFade = 0x5000'0000;
 constexpr int kSureBounces = 3;              // before chance may end a path
 constexpr float kMostLikely = 0.95F;         // to go on
 constexpr int kMostGlass = 64;               // surfaces of glass that a path meets between two others
 constexpr std::uint32_t kBins = 1 + 6 * 16;  // of directions; the first is that of the sun
+
+constexpr std::uint32_t kGroundSurface = 2;  // beside what surface_id gives
+constexpr std::uint32_t kSkySurface = SurfaceParts::kSky;
 
 // The dimensions of a vertex.
 namespace dimension {
@@ -61,6 +67,14 @@ void sort_by_key(std::size_t count, std::size_t keys, std::vector<std::uint32_t>
   for (std::size_t i = 0; i < count; ++i) put(starts[key(i)]++, static_cast<std::uint32_t>(i));
 }
 
+// Names the plane of a voxel's face, or a field, of one grid and type; odd.
+std::uint32_t surface_id(IVec3 voxel, Direction face, bool in_field, std::int32_t placed, VoxelType type) {
+  const auto plane = in_field ? 0U : static_cast<std::uint32_t>(voxel[frame_of(face).axis]);
+  std::uint32_t id = mix_bits(plane ^ (in_field ? 6U : static_cast<std::uint32_t>(face)) << 28);
+  id = mix_bits(id ^ static_cast<std::uint32_t>(placed));
+  return mix_bits(id ^ static_cast<std::uint32_t>(type)) | 1U;
+}
+
 DVec3 in_grid(const PlacedGrid& placed, Vec3 direction) {
   return DVec3(direction) * placed.world_axes / placed.voxel_size;  // the transposed matrix times it
 }
@@ -75,6 +89,17 @@ Vec3 tint_of(const Surface& surface, double voxels) {
     tint[i] = exponential(log * length);
   }
   return tint;
+}
+
+// Of a body, which is a voxel long at least where it has edges that are to be crisp.
+double length_of(const Surface& surface, const GlassBody& body) {
+  const bool is_soft = body.starts_inside || body.in_field || surface.scattering > 0.0F;
+  return std::max(body.voxels, is_soft ? 0.0 : 1.0);
+}
+
+// How long a way is on which light is scattered `density` times by unit length, on average.
+double free_way(float u, double density) {
+  return -static_cast<double>(log_of_two(1.0F - u)) * std::numbers::ln2 / density;
 }
 
 float cover_of(const Surface& surface, double voxels) {
@@ -102,6 +127,7 @@ Refraction refraction(float cosine, float eta) {
 PathTile::PathTile(const TileContext& context, int column, int row)
     : context_(&context), column_(column), row_(row), sums_(kPixels) {
   if (context.options->ground) ground_ = context.options->ground->height - context.camera->position.y;
+  if (context.options->fog) fog_top_ = context.options->fog->top - context.camera->position.y;
 }
 
 bool PathTile::render(const std::function<bool(std::size_t)>& goes_on) {
@@ -120,6 +146,11 @@ bool PathTile::render(const std::function<bool(std::size_t)>& goes_on) {
     for (const Path& path : paths_) {
       Sums& sums = sums_[path.pixel];
       (path.is_caught ? sums.lit : sums.scene) += path.radiance;
+      if (path.part != kNoPart) {
+        SurfacePart& part = part_of(path);
+        part.light += path.radiance;
+        part.square += square(luminance(path.radiance));
+      }
     }
     if (!goes_on(static_cast<std::size_t>(count))) return false;
   }
@@ -144,6 +175,25 @@ void PathTile::begin(int first, int count) {
   }
 }
 
+Pair PathTile::on_lens(Pair u) const {
+  const int blades = context_->options->lens_blades;
+  if (blades < 3) return on_disc(u);
+  // One of the triangles about the middle, then a point of it.
+  const float place = u.x * static_cast<float>(blades);
+  const float first = std::min(std::floor(place), static_cast<float>(blades - 1));
+  double turned = context_->options->lens_turn_radians / (2.0 * std::numbers::pi);
+  turned -= std::floor(turned);
+  const auto corner = [&](float which) {
+    const float turns = which / static_cast<float>(blades) + static_cast<float>(turned);
+    return of_turns(turns - std::floor(turns));
+  };
+  const SineCosine a = corner(first);
+  const SineCosine b = corner(first + 1.0F);
+  const float out = std::sqrt(place - first);
+  const float side = u.y;
+  return {out * (a.cosine + (b.cosine - a.cosine) * side), out * (a.sine + (b.sine - a.sine) * side)};
+}
+
 void PathTile::begin_path(std::size_t pixel, int x, int y, int sample) {
   const PathOptions& options = *context_->options;
   const CameraRays& rays = *context_->rays;
@@ -160,7 +210,7 @@ void PathTile::begin_path(std::size_t pixel, int x, int y, int sample) {
   if (rays.is_perspective()) {
     DVec3 direction = glm::normalize(rays.forward() + across);
     if (options.lens_radius > 0.0) {
-      const Pair lens = on_disc(path.random.pair(1));
+      const Pair lens = on_lens(path.random.pair(1));
       path.origin =
           (camera.right * static_cast<double>(lens.x) + camera.up * static_cast<double>(lens.y)) * options.lens_radius;
       const double t = options.focus_distance / glm::dot(direction, rays.forward());
@@ -205,11 +255,22 @@ void PathTile::meet_packet(std::span<const std::uint32_t> indices) {
   context_->view->first_hits(rays, hits);
   rays_ += static_cast<std::int64_t>(indices.size());
   std::uint32_t through_glass = 0;
+  std::uint32_t in_fog_lanes = 0;
   RayPacket::Lanes<double> until{};
   for (std::size_t i = 0; i < indices.size(); ++i) {
     until[i] = (hits.grids.hit >> i & 1U) != 0 ? hits.grids.t[i] : kInfinite;
     const Path& path = paths_[indices[i]];
     until[i] = std::min(until[i], ground_at(path.origin, path.direction));
+    if (context_->has_media && context_->parts != nullptr) {
+      note_behind(paths_[indices[i]], hits, static_cast<int>(i), until[i]);
+    }
+    const std::optional<Fog>& fog = context_->options->fog;
+    if (!fog || !(fog->density > 0.0) || path.inside != kAir) continue;
+    const Interval way = in_fog(path.origin, path.direction, until[i]);
+    const double met = way.begin + free_way(path.random.one(path.dimension + kFog), fog->density);
+    if (!(met < way.end)) continue;
+    until[i] = met;
+    in_fog_lanes |= 1U << i;
   }
   if (context_->view->tracer().has_transparent()) {
     rays.max_t = until;
@@ -220,13 +281,18 @@ void PathTile::meet_packet(std::span<const std::uint32_t> indices) {
     Path& path = paths_[index];
     const int lane = static_cast<int>(i);
     if (((through_glass >> i & 1U) != 0 || path.inside != kAir) && meet_glass(index, until[i])) continue;
+    if ((in_fog_lanes >> i & 1U) != 0) {
+      const Fog& fog = *context_->options->fog;
+      hit_air(index, until[i], fog.colour, static_cast<float>(fog.anisotropy), 0);
+      continue;
+    }
     const bool is_hit = (hits.grids.hit >> i & 1U) != 0 && hits.grids.t[i] <= until[i];
     if (is_hit) {
       hit_matter(index, rays, hits, lane);
     } else if (until[i] < kInfinite) {
       hit_ground(index, until[i]);
     } else {
-      leave(path);
+      leave(path, path.direction);
     }
   }
 }
@@ -236,19 +302,36 @@ double PathTile::ground_at(const DVec3& origin, Vec3 direction) const {
   return (ground_ - origin.y) / static_cast<double>(direction.y);
 }
 
-void PathTile::leave(Path& path) {
+PathTile::Interval PathTile::in_fog(const DVec3& origin, Vec3 direction, double max_t) const {
+  const double above = origin.y - fog_top_;
+  const auto up = static_cast<double>(direction.y);
+  if (above >= 0.0 && up >= 0.0) return {};
+  Interval way{0.0, max_t};
+  if (above > 0.0) way.begin = std::min(above / -up, max_t);
+  if (above < 0.0 && up > 0.0) way.end = std::min(above / -up, max_t);
+  return way;
+}
+
+void PathTile::leave(Path& path, Vec3 direction) {
   const SkyLight& sky = *context_->sky;
-  Vec3 direction = path.direction;
+  const PathOptions& options = *context_->options;
   if (path.is_first && !context_->rays->is_perspective()) {
     direction = Vec3(glm::normalize(context_->rays->forward() + path.origin * context_->rays->sky_scale()));
   }
   Vec3 light = sky.sky(direction);
   if (path.density < kNoOther && sky.has_uneven_sky()) light *= balance(path.density, sky.sky_density(direction));
-  if (const float density = sky.sun_density(direction); density > 0.0F) {
+  const float density = options.sun_is_seen || !path.is_seen ? sky.sun_density(direction) : 0.0F;
+  if (density > 0.0F) {
     light += sky.sun(direction) * (path.density < kNoOther ? balance(path.density, density) : 1.0F);
   }
   if (path.is_first) {
+    light = options.background.value_or(light);
     sums_[path.pixel].background += light;
+    if (path.part != kNoPart) {
+      SurfacePart& part = part_of(path);
+      part.light += light;
+      part.square += square(luminance(light));
+    }
     if (path.is_first_sample) sums_[path.pixel].depth = std::numeric_limits<float>::infinity();
   } else {
     path.radiance += path.throughput * light;
@@ -261,6 +344,7 @@ bool PathTile::meet_glass(std::uint32_t index, double t) {
   Path& path = paths_[index];
   find_glass(*context_->view, *context_->surfaces, {path.origin, DVec3(path.direction)}, t, glass_);
   if (!path.is_seen) return pass_glass(index);
+  if (path.inside == kAir && pass_clouds(index)) return true;
   if (path.inside != kAir) return leave_glass(index);
   return !glass_.empty() && enter_glass(index);
 }
@@ -271,9 +355,13 @@ bool PathTile::pass_glass(std::uint32_t index) {
   float u = path.random.one(path.dimension + dimension::kGlass);
   for (const GlassBody& body : glass_) {
     const Surface& surface = (*context_->surfaces)[body.type];
-    const double voxels = std::max(body.voxels, body.starts_inside || body.in_field ? 0.0 : 1.0);
+    const double voxels = length_of(surface, body);
     const float cover = cover_of(surface, voxels);
     if (u < cover) {
+      if (surface.scattering > 0.0F) {
+        scatter_in(index, body, u);
+        return true;
+      }
       // From within it glows, no more.
       if (body.starts_inside) {
         add_emitted(path, surface.emitted, -1, 0.0F);
@@ -287,6 +375,33 @@ bool PathTile::pass_glass(std::uint32_t index) {
     path.throughput *= tint_of(surface, voxels);
   }
   return false;
+}
+
+bool PathTile::pass_clouds(std::uint32_t index) {
+  Path& path = paths_[index];
+  const auto first_glass = std::ranges::find_if(
+      glass_, [&](const GlassBody& body) { return !((*context_->surfaces)[body.type].scattering > 0.0F); });
+  if (first_glass == glass_.begin()) return false;
+  float u = path.random.one(path.dimension + dimension::kGlass);
+  for (auto body = glass_.begin(); body != first_glass; ++body) {
+    const Surface& surface = (*context_->surfaces)[body->type];
+    const float cover = cover_of(surface, body->voxels);
+    if (u < cover) {
+      scatter_in(index, *body, u);
+      return true;
+    }
+    u = std::min((u - cover) / (1.0F - cover), 0x1.fffffep-1F);
+  }
+  glass_.erase(glass_.begin(), first_glass);
+  return false;
+}
+
+void PathTile::scatter_in(std::uint32_t index, const GlassBody& body, float u) {
+  const Surface& surface = (*context_->surfaces)[body.type];
+  const double share = free_way(u, static_cast<double>(surface.scattering)) / std::max(body.voxels, 1e-12);
+  const double t = body.t_enter + (body.t_exit - body.t_enter) * std::clamp(share, 0.0, 1.0);
+  add_emitted(paths_[index], surface.emitted, -1, 0.0F);
+  hit_air(index, t, surface.colour, surface.anisotropy, body.placed);
 }
 
 bool PathTile::enter_glass(std::uint32_t index) {
@@ -303,13 +418,19 @@ bool PathTile::enter_glass(std::uint32_t index) {
   const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(body.placed)];
   Vec3 normal(placed.world_axes * in_grid_normal);
   const float cosine = std::clamp(-glm::dot(normal, path.direction), 1e-4F, 1.0F);
+  if (path.is_first) {
+    // What is mirrored, and what is seen through it, are one: which of them a path meets is chance.
+    Vertex whole;
+    whole.material.colour = Vec3(1.0F);
+    note_part(path, whole, surface_id(body.voxel, body.face, body.in_field, body.placed, body.type), false);
+  }
   const Refraction through = refraction(cosine, 1.0F / surface.ior);
   const DVec3 point = ray.origin + ray.direction * body.t_enter;
   const double lift = kRayLift * placed.voxel_size;
   if (u < through.mirrored) {
     turn_at(path, point, path.direction + normal * (2.0F * cosine), normal, lift, kAir);
   } else {
-    const double voxels = std::max(body.voxels, body.in_field ? 0.0 : 1.0);
+    const double voxels = length_of(surface, body);
     const float cover = cover_of(surface, voxels);
     if (u < through.mirrored + (1.0F - through.mirrored) * cover) {
       hit_glass(index, body, in_grid_normal);
@@ -372,7 +493,8 @@ void PathTile::turn_at(Path& path, const DVec3& point, Vec3 direction, Vec3 norm
   path.dimension += kDimensions;
   path.density = kNoOther;
   path.is_first = false;
-  if (path.dimension > kDimensions * (kMostGlass + 2U * path.bounces)) path.throughput = Vec3(0.0F);
+  if (path.dimension > kDimensions * (kMostGlass + 2U * path.bounces + 2U * path.scatterings))
+    path.throughput = Vec3(0.0F);
 }
 
 // ---- surfaces ----------------------------------------------------------------------------------------------------
@@ -397,6 +519,45 @@ void PathTile::note_layers(Path& path, const Vertex& vertex, double t, VoxelType
   sums.type = type;
   sums.instance = vertex.is_ground ? 0 : static_cast<std::uint32_t>(vertex.placed) + 1;
   if (path.is_first) sums.depth = static_cast<float>(t);
+}
+
+SurfacePart& PathTile::part_of(const Path& path) {
+  const auto x = static_cast<std::size_t>(column_ + path.pixel % kEdge);
+  const auto y = static_cast<std::size_t>(row_ + path.pixel / kEdge);
+  return context_->parts->at(y * static_cast<std::size_t>(context_->options->width) + x)[path.part];
+}
+
+void PathTile::note_part(Path& path, const Vertex& vertex, std::uint32_t surface, bool is_curved) {
+  if (context_->parts == nullptr || path.part != kNoPart || path.is_caught) return;
+  for (std::size_t slot = 0; slot < SurfaceParts::kOfPixel; ++slot) {
+    path.part = static_cast<std::uint8_t>(slot);
+    SurfacePart& part = part_of(path);
+    if (part.surface != 0 && part.surface != surface) continue;
+    part.surface = surface;
+    part.samples += 1.0F;
+    part.albedo += vertex.material.colour;
+    if (!is_curved) return;
+    part.normal += vertex.normal;
+    part.place += Vec3(vertex.in_view);
+    return;
+  }
+  path.part = kNoPart;
+}
+
+void PathTile::note_behind(Path& path, const SceneHits& hits, int lane, double t) {
+  if (!path.is_first) return;
+  const auto i = static_cast<std::size_t>(lane);
+  Vertex whole;
+  whole.material.colour = Vec3(1.0F);
+  if ((hits.grids.hit >> lane & 1U) != 0 && hits.grids.t[i] <= t) {
+    const IVec3 voxel{hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
+    const bool in_field = (hits.in_field >> lane & 1U) != 0;
+    const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(hits.placed[i])];
+    const VoxelType type = in_field ? hits.material[i] : placed.voxels->get(voxel);
+    note_part(path, whole, surface_id(voxel, hits.grids.face[i], in_field, hits.placed[i], type), false);
+  } else {
+    note_part(path, whole, t < kInfinite ? kGroundSurface : kSkySurface, false);
+  }
 }
 
 void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane) {
@@ -431,6 +592,11 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
   vertex.normal = glm::normalize(Vec3(placed.world_axes * normal));
   vertex.in_view = context_->view->view_from_grid(vertex.placed, vertex.in_grid);
   vertex.material = {surface.colour, surface.roughness, surface.metalness};
+  if (!path.is_noted) {
+    // What shines or glows differs by its type; what is matte differs by its colour alone.
+    const bool is_matte = surface.roughness >= 1.0F && surface.metalness <= 0.0F && is_black(surface.emitted);
+    note_part(path, vertex, surface_id(voxel, face, in_field, vertex.placed, is_matte ? kAir : type), in_field);
+  }
   note_layers(path, vertex, hits.grids.t[i], type);
   if (!is_black(surface.emitted)) {
     const std::int32_t lamp = in_field ? -1 : context_->lamps->lamp_of(vertex.placed, voxel, face);
@@ -458,9 +624,39 @@ void PathTile::hit_glass(std::uint32_t index, const GlassBody& body, const DVec3
   vertices_.push_back(vertex);
 }
 
+void PathTile::hit_air(std::uint32_t index, double t, Vec3 colour, float anisotropy, std::int32_t placed) {
+  Path& path = paths_[index];
+  Vertex vertex;
+  vertex.path = index;
+  vertex.placed = placed;
+  vertex.is_medium = true;
+  vertex.anisotropy = anisotropy;
+  vertex.in_view = path.origin + DVec3(path.direction) * t;
+  vertex.material.colour = colour;
+  if (!placed_in(context_->view->tracer()).empty()) {
+    vertex.in_grid = context_->view->grid_from_view(placed, vertex.in_view);
+  }
+  Sums& sums = sums_[path.pixel];
+  if (path.is_first) {
+    sums.scene_share += 1.0F;
+    if (path.is_first_sample) sums.depth = static_cast<float>(t);
+  }
+  // It has no normal, and what lies behind is not what the pixel shows.
+  if (!path.is_noted) sums.albedo += colour;
+  path.is_noted = true;
+  vertices_.push_back(vertex);
+}
+
 void PathTile::hit_ground(std::uint32_t index, double t) {
   Path& path = paths_[index];
   const GroundPlane& ground = *context_->options->ground;
+  if (path.is_first && ground.fade > 0.0) {
+    const float near = std::clamp(-path.direction.y / static_cast<float>(ground.fade), 0.0F, 1.0F);
+    if (path.random.one(path.dimension + kFade) >= near * near * (3.0F - 2.0F * near)) {
+      leave(path, glm::normalize(Vec3(path.direction.x, -path.direction.y, path.direction.z)));
+      return;
+    }
+  }
   Vertex vertex;
   vertex.path = index;
   vertex.is_ground = true;
@@ -476,6 +672,7 @@ void PathTile::hit_ground(std::uint32_t index, double t) {
     if (path.is_first_sample) sums.depth = kNoOther;
   } else {
     if (path.is_first) sums.scene_share += 1.0F;
+    if (!path.is_noted) note_part(path, vertex, kGroundSurface, false);
     note_layers(path, vertex, t, kAir);
   }
   // Shadows are asked for in a grid: the first.
@@ -485,17 +682,40 @@ void PathTile::hit_ground(std::uint32_t index, double t) {
 
 // ---- light -------------------------------------------------------------------------------------------------------
 
-void PathTile::shade(const Vertex& vertex) {
-  Path& path = paths_[vertex.path];
-  if (path.bounces >= context_->options->max_bounces || is_black(path.throughput)) return;
-  Vec3 normal = vertex.normal;
-  const float facing = -glm::dot(normal, path.direction);
-  // A smooth normal may look away from who sees the surface.
-  if (facing < 1e-3F) normal = glm::normalize(normal - path.direction * (1e-3F - facing));
-  const Frame frame(normal);
+Scatter PathTile::scatter_at(const Vertex& vertex, const Path& path, const Frame& frame) const {
+  if (vertex.is_medium) return {vertex.material.colour, vertex.anisotropy};
   Vec3 out = frame.to_local(-path.direction);
   out.z = std::max(out.z, 1e-4F);
-  const Scatter scatter(vertex.material, glm::normalize(out));
+  return {vertex.material, glm::normalize(out)};
+}
+
+bool PathTile::goes_on(Path& path, bool in_medium) const {
+  if (in_medium) ++path.scatterings;
+  const bool is_sure = in_medium ? path.scatterings <= kSureBounces : path.bounces < kSureBounces;
+  if (!is_sure) {
+    // In white fog light stays until it is out.
+    const float likely = std::min(largest(path.throughput), in_medium ? 1.0F : kMostLikely);
+    if (!(path.random.one(path.dimension + dimension::kRoulette) < likely)) return false;
+    path.throughput /= likely;
+  }
+  if (!in_medium) ++path.bounces;
+  return true;
+}
+
+void PathTile::shade(const Vertex& vertex) {
+  Path& path = paths_[vertex.path];
+  const bool in_medium = vertex.is_medium;
+  const int left =
+      in_medium ? context_->options->max_scatterings - path.scatterings : context_->options->max_bounces - path.bounces;
+  if (left <= 0 || is_black(path.throughput)) return;
+  Vec3 normal = vertex.normal;
+  if (!in_medium) {
+    const float facing = -glm::dot(normal, path.direction);
+    // A smooth normal may look away from who sees the surface.
+    if (facing < 1e-3F) normal = glm::normalize(normal - path.direction * (1e-3F - facing));
+  }
+  const Frame frame(in_medium ? path.direction : normal);
+  const Scatter scatter = scatter_at(vertex, path, frame);
   ask_sun(vertex, path, frame, scatter);
   ask_sky(vertex, path, frame, scatter);
   ask_lamp(vertex, path, frame, scatter);
@@ -511,12 +731,7 @@ void PathTile::shade(const Vertex& vertex) {
   }
   if (is_black(next.weight)) return;
   path.throughput *= next.weight;
-  if (path.bounces >= kSureBounces) {
-    const float likely = std::min(largest(path.throughput), kMostLikely);
-    if (!(path.random.one(path.dimension + dimension::kRoulette) < likely)) return;
-    path.throughput /= likely;
-  }
-  ++path.bounces;
+  if (!goes_on(path, in_medium)) return;
   path.dimension += kDimensions;
   path.direction = glm::normalize(frame.to_world(next.direction));
   path.density = next.density;
@@ -533,7 +748,7 @@ void PathTile::ask_sun(const Vertex& vertex, const Path& path, const Frame& fram
   if (!sky.has_sun()) return;
   const SkySample sun = sky.sample_sun(path.random.pair(path.dimension + dimension::kSun));
   const Vec3 in = frame.to_local(sun.direction);
-  if (!(in.z > 0.0F)) return;
+  if (!(in.z > 0.0F) && !vertex.is_medium) return;
   Vec3 light = path.throughput * scatter.value(in);
   if (sun.density < kNoOther) {
     light *= sun.radiance / sun.density * balance(sun.density, scatter.density(in));
@@ -547,7 +762,7 @@ void PathTile::ask_sky(const Vertex& vertex, const Path& path, const Frame& fram
   if (!context_->sky->has_uneven_sky()) return;
   const SkySample sky = context_->sky->sample_sky(path.random.pair(path.dimension + dimension::kSky));
   const Vec3 in = frame.to_local(sky.direction);
-  if (!(in.z > 0.0F) || !(sky.density > 0.0F)) return;
+  if ((!(in.z > 0.0F) && !vertex.is_medium) || !(sky.density > 0.0F)) return;
   const float share = balance(sky.density, scatter.density(in));
   ask(vertex, sky.direction, kNoOther, path.throughput * scatter.value(in) * sky.radiance * (share / sky.density),
       false);
@@ -555,12 +770,13 @@ void PathTile::ask_sky(const Vertex& vertex, const Path& path, const Frame& fram
 
 void PathTile::ask_lamp(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter) {
   if (context_->lamps->empty()) return;
-  const LampSample lamp = context_->lamps->sample(vertex.in_view + context_->camera->position, frame.z,
+  const Vec3 normal = vertex.is_medium ? Vec3(0.0F) : frame.z;
+  const LampSample lamp = context_->lamps->sample(vertex.in_view + context_->camera->position, normal,
                                                   path.random.one(path.dimension + dimension::kLampChoice),
                                                   path.random.pair(path.dimension + dimension::kLampPoint));
   if (is_black(lamp.radiance)) return;
   const Vec3 in = frame.to_local(lamp.direction);
-  if (!(in.z > 0.0F)) return;
+  if (!(in.z > 0.0F) && !vertex.is_medium) return;
   Vec3 light = path.throughput * scatter.value(in) * lamp.radiance;
   if (lamp.density < kNoOther) light *= balance(lamp.density, scatter.density(in));
   // A little before the lamp, for rounding.
@@ -570,6 +786,11 @@ void PathTile::ask_lamp(const Vertex& vertex, const Path& path, const Frame& fra
 void PathTile::ask(const Vertex& vertex, Vec3 direction, float max_t, Vec3 light, bool is_sun) {
   if (is_black(light)) return;
   if (ground_at(vertex.in_view, direction) < static_cast<double>(max_t)) return;
+  if (const std::optional<Fog>& fog = context_->options->fog) {
+    const Interval way = in_fog(vertex.in_view, direction, static_cast<double>(max_t));
+    light *= exponential(static_cast<float>(-fog->density * (way.end - way.begin)));
+    if (is_black(light)) return;
+  }
   requests_.push_back(
       {vertex.in_grid, direction, max_t, light, vertex.placed, vertex.path, is_sun ? 0 : bin_of(direction)});
 }
@@ -625,7 +846,7 @@ void PathTile::trace_request_packet(std::span<const std::uint32_t> requests) {
     find_glass(*context_->view, *context_->surfaces, in_view.ray(lane), static_cast<double>(request.max_t), glass_);
     for (const GlassBody& body : glass_) {
       const Surface& surface = (*context_->surfaces)[body.type];
-      const double voxels = std::max(body.voxels, body.starts_inside || body.in_field ? 0.0 : 1.0);
+      const double voxels = length_of(surface, body);
       request.light *= tint_of(surface, voxels) * (1.0F - cover_of(surface, voxels));
     }
   }

@@ -13,6 +13,7 @@
 #include "light/glass.h"
 #include "light/surfaces.h"
 #include "render/camera_rays.h"
+#include "render/path/denoise.h"
 #include "render/path/path_lamps.h"
 #include "render/path/path_random.h"
 #include "render/path/scatter.h"
@@ -30,6 +31,8 @@ struct TileContext {
   const CameraRays* rays = nullptr;
   const Camera* camera = nullptr;
   const PathOptions* options = nullptr;
+  SurfaceParts* parts = nullptr;  ///< of the picture, to be filled; null: not wanted
+  bool has_media = false;         ///< fog or clouds
 };
 
 /// One square of a picture.
@@ -57,6 +60,7 @@ class PathTile {
  private:
   static constexpr std::size_t kPixels = std::size_t{kEdge} * kEdge;
   static constexpr int kSamplesAtOnce = 4;
+  static constexpr std::uint8_t kNoPart = 255;
 
   struct Path {
     DVec3 origin{0.0};     // of its next ray, in view space
@@ -69,10 +73,12 @@ class PathTile {
     std::uint32_t dimension = 0;  // the first that is free
     std::uint16_t pixel = 0;      // of the tile
     std::uint16_t bounces = 0;
-    VoxelType inside = kAir;  // the glass in which it is
-    bool is_seen = true;      // by the camera, itself or by glass and mirrors
-    bool is_first = true;     // nothing was met yet
-    bool is_caught = false;   // the ground only catches shadows where it went
+    std::uint16_t scatterings = 0;  // in fog and clouds
+    std::uint8_t part = kNoPart;    // of the pixel's surfaces
+    VoxelType inside = kAir;        // the glass in which it is
+    bool is_seen = true;            // by the camera, itself or by glass and mirrors
+    bool is_first = true;           // nothing was met yet
+    bool is_caught = false;         // the ground only catches shadows where it went
     bool is_first_sample = false;
     bool is_noted = false;  // in the layers
   };
@@ -85,6 +91,8 @@ class PathTile {
     Vec3 normal{0.0F};   // in the world, on the side from which the path comes
     Material material;
     bool is_ground = false;
+    bool is_medium = false;   // in the air; it has no normal
+    float anisotropy = 0.0F;  // of that
   };
   // Light that reaches a vertex if nothing is in between.
   struct Request {
@@ -95,6 +103,10 @@ class PathTile {
     std::int32_t home = 0;
     std::uint32_t path = 0;
     std::uint32_t bin = 0;
+  };
+  struct Interval {
+    double begin = 0.0;
+    double end = 0.0;
   };
   struct Sums {
     Vec3 background{0.0F};  // what is seen of it
@@ -112,15 +124,24 @@ class PathTile {
   };
 
   void begin(int first, int count);
+  // A point of the lens, of radius 1.
+  [[nodiscard]] Pair on_lens(Pair u) const;
   void begin_path(std::size_t pixel, int x, int y, int sample);
   void order_paths();
   void meet();
   void meet_packet(std::span<const std::uint32_t> paths);
-  // A path that leaves the scene.
-  void leave(Path& path);
+  // A path that leaves the scene towards `direction`.
+  void leave(Path& path, Vec3 direction);
   // What a ray meets of glass before `t`, where it may meet some. Returns whether the path's ray ended there.
   bool meet_glass(std::uint32_t index, double t);
   bool pass_glass(std::uint32_t index);
+  // Those bodies before the first of glass that scatter light.
+  bool pass_clouds(std::uint32_t index);
+  // Where a path ends in a body that scatters, if `u` is below the share of paths that do.
+  void scatter_in(std::uint32_t index, const GlassBody& body, float u);
+  // The way through fog from a point, up to `max_t`.
+  [[nodiscard]] Interval in_fog(const DVec3& origin, Vec3 direction, double max_t) const;
+  void hit_air(std::uint32_t index, double t, Vec3 colour, float anisotropy, std::int32_t placed);
   bool enter_glass(std::uint32_t index);
   bool leave_glass(std::uint32_t index);
   void turn_at(Path& path, const DVec3& point, Vec3 direction, Vec3 normal, double lift, VoxelType inside);
@@ -130,8 +151,16 @@ class PathTile {
   [[nodiscard]] double ground_at(const DVec3& origin, Vec3 direction) const;  // infinite: nowhere
   void add_emitted(Path& path, Vec3 emitted, std::int32_t lamp, float distance) const;
   void note_layers(Path& path, const Vertex& vertex, double t, VoxelType type);
+  // Likewise of what a path would meet without fog and clouds: whether it meets these is chance.
+  void note_behind(Path& path, const SceneHits& hits, int lane, double t);
+  // Which of the pixel's surfaces that is. `surface`: not 0.
+  [[nodiscard]] SurfacePart& part_of(const Path& path);
+  void note_part(Path& path, const Vertex& vertex, std::uint32_t surface, bool is_curved);
 
   void shade(const Vertex& vertex);
+  [[nodiscard]] Scatter scatter_at(const Vertex& vertex, const Path& path, const Frame& frame) const;
+  // Counts the scattering that comes now, and by chance ends the path. Returns whether it goes on.
+  [[nodiscard]] bool goes_on(Path& path, bool in_medium) const;
   void ask_sun(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter);
   void ask_sky(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter);
   void ask_lamp(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter);
@@ -142,7 +171,8 @@ class PathTile {
   const TileContext* context_;
   int column_;
   int row_;
-  double ground_ = 0.0;  // height in view space
+  double ground_ = 0.0;   // height in view space
+  double fog_top_ = 0.0;  // likewise
   std::int64_t rays_ = 0;
   std::vector<Path> paths_;
   std::vector<std::uint32_t> active_, next_;

@@ -10,7 +10,9 @@
 
 #include <quoin/core/assert.h>
 
+#include "core/moved_from.h"
 #include "light/surfaces.h"
+#include "render/path/denoise.h"
 #include "render/path/path_lamps.h"
 #include "render/path/path_tile.h"
 #include "render/path/sky_light.h"
@@ -26,6 +28,9 @@ constexpr int kMaxBounces = 1'024;
 constexpr double kMostBrightness = 1e9;
 constexpr double kMostAir = 100.0;
 constexpr double kWidestSun = 3.0;
+constexpr double kMostAnisotropy = 0.99;
+constexpr double kMostFog = 1e6;
+constexpr int kMostBlades = 64;
 
 Status refuse(const std::string& message) {
   return make_error(ErrorCode::InvalidArgument, message);
@@ -40,7 +45,47 @@ bool is_colour(Vec3 colour, float most) {
          is_finite(DVec3(colour));
 }
 
-Status check_sky(const PathOptions& options) {
+bool is_anisotropy(double value) {
+  return value >= -kMostAnisotropy && value <= kMostAnisotropy;
+}
+
+Status check_air(const AirOptions& air) {
+  for (const double part : {air.rayleigh, air.mie, air.ozone}) {
+    if (!(part >= 0.0 && part <= kMostAir)) return refuse("air: must be 0 to 100 each");
+  }
+  for (const Vec3& colour : {air.rayleigh_colour, air.mie_colour, air.ozone_colour}) {
+    if (!is_colour(colour, static_cast<float>(kMostAir))) return refuse("air: its colours must be 0 to 100 each");
+  }
+  return is_anisotropy(air.mie_anisotropy) ? Status() : refuse("air: its mie_anisotropy must be -0.99 to 0.99");
+}
+
+Status check_ground(const GroundPlane& ground) {
+  if (!std::isfinite(ground.height)) return refuse("ground: its height must be finite");
+  if (!is_colour(ground.colour, 1.0F)) return refuse("ground: its colour must be 0 to 1 each");
+  return ground.fade >= 0.0 && ground.fade <= 1.0 ? Status() : refuse("ground: its fade must be 0 to 1");
+}
+
+Status check_fog(const Fog& fog) {
+  if (!(fog.density >= 0.0 && fog.density <= kMostFog)) return refuse("fog: its density must be 0 to 1e6");
+  if (!is_colour(fog.colour, 1.0F)) return refuse("fog: its colour must be 0 to 1 each");
+  if (!is_anisotropy(fog.anisotropy)) return refuse("fog: its anisotropy must be -0.99 to 0.99");
+  return std::isfinite(fog.top) ? Status() : refuse("fog: its top must be finite");
+}
+
+Status check_lens(const Look& look) {
+  if (!(look.lens_radius >= 0.0) || !std::isfinite(look.lens_radius)) {
+    return refuse("lens_radius: must be finite and at least 0");
+  }
+  if (!(look.focus_distance > 0.0) || !std::isfinite(look.focus_distance)) {
+    return refuse("focus_distance: must be finite and more than 0");
+  }
+  if (look.lens_blades != 0 && (look.lens_blades < 3 || look.lens_blades > kMostBlades)) {
+    return refuse("lens_blades: must be 0, or 3 to 64");
+  }
+  return std::isfinite(look.lens_turn_radians) ? Status() : refuse("lens_turn_radians: must be finite");
+}
+
+Status check_sky(const Look& options) {
   if (!is_finite(options.sun) || options.sun == DVec3(0.0)) return refuse("sun: must be finite and not 0");
   if (!(options.sun_angle_radians >= 0.0 && options.sun_angle_radians <= kWidestSun)) {
     return refuse("sun_angle_radians: must be 0 to 3");
@@ -51,9 +96,13 @@ Status check_sky(const PathOptions& options) {
   if (!is_colour(options.sky_colour, static_cast<float>(kMostBrightness))) {
     return refuse("sky_colour: must be 0 to 1e9 each");
   }
-  for (const double part : {options.air.rayleigh, options.air.mie, options.air.ozone}) {
-    if (!(part >= 0.0 && part <= kMostAir)) return refuse("air: must be 0 to 100 each");
+  if (!is_colour(options.sun_colour, static_cast<float>(kMostBrightness))) {
+    return refuse("sun_colour: must be 0 to 1e9 each");
   }
+  if (options.background && !is_colour(*options.background, static_cast<float>(kMostBrightness))) {
+    return refuse("background: must be 0 to 1e9 each");
+  }
+  if (Status air = check_air(options.air); !air) return air;
   if (!std::isfinite(options.environment_turn_radians)) return refuse("environment_turn_radians: must be finite");
   if (options.sky != SkyModel::Environment) return {};
   const RadianceImage* const image = options.environment.get();
@@ -67,16 +116,12 @@ Status check(const Camera& camera, const PathOptions& options) {
   if (Status picture = check_picture(camera, options.width, options.height); !picture) return picture;
   if (options.samples < 1 || options.samples > kMaxPathSamples) return refuse("samples: must be 1 to 65536");
   if (options.max_bounces < 0 || options.max_bounces > kMaxBounces) return refuse("max_bounces: must be 0 to 1024");
-  if (options.ground) {
-    if (!std::isfinite(options.ground->height)) return refuse("ground: its height must be finite");
-    if (!is_colour(options.ground->colour, 1.0F)) return refuse("ground: its colour must be 0 to 1 each");
+  if (options.max_scatterings < 0 || options.max_scatterings > kMaxBounces) {
+    return refuse("max_scatterings: must be 0 to 1024");
   }
-  if (!(options.lens_radius >= 0.0) || !std::isfinite(options.lens_radius)) {
-    return refuse("lens_radius: must be finite and at least 0");
-  }
-  if (!(options.focus_distance > 0.0) || !std::isfinite(options.focus_distance)) {
-    return refuse("focus_distance: must be finite and more than 0");
-  }
+  if (Status ground = options.ground ? check_ground(*options.ground) : Status(); !ground) return ground;
+  if (Status fog = options.fog ? check_fog(*options.fog) : Status(); !fog) return fog;
+  if (Status lens = check_lens(options); !lens) return lens;
   return check_sky(options);
 }
 
@@ -101,7 +146,7 @@ PathPicture empty_picture(const PathOptions& options) {
 
 struct PathTracer::Impl {
   Impl(const Scene& of_scene, InstanceFilter filter, Threads threads)
-      : scene(&of_scene), tracer(of_scene, filter, threads), surfaces(of_scene.types) {}
+      : scene(&of_scene), tracer(of_scene, filter, threads), surfaces(of_scene.types, Clouds::Scatter) {}
 
   const Scene* scene;
   SceneTracer tracer;
@@ -134,9 +179,10 @@ PathTracer& PathTracer::operator=(PathTracer&&) noexcept = default;
 PathTracer::~PathTracer() = default;
 
 void PathTracer::update(Threads threads) {
-  impl_->tracer.update(threads);
-  impl_->surfaces.update(impl_->scene->types);
-  impl_->forget_lamps();
+  Impl& impl = content_of(impl_);
+  impl.tracer.update(threads);
+  impl.surfaces.update(impl.scene->types);
+  impl.forget_lamps();
 }
 
 Result<PathPicture> PathTracer::render(const Camera& camera, const PathOptions& options, Threads threads,
@@ -146,29 +192,26 @@ Result<PathPicture> PathTracer::render(const Camera& camera, const PathOptions& 
                    std::abs(glm::dot(camera.right, camera.forward)) < 1e-3 &&
                    std::abs(glm::dot(camera.up, camera.forward)) < 1e-3,
                "the camera's axes are perpendicular");
-  const SceneView view(impl_->tracer, camera.position);
-  const std::shared_ptr<const path::PathLamps> lamps = impl_->lamps(options.lamp_brightness);
+  Impl& impl = content_of(impl_);
+  const SceneView view(impl.tracer, camera.position);
+  const std::shared_ptr<const path::PathLamps> lamps = impl.lamps(options.lamp_brightness);
   const path::SkyLight sky(options);
   const CameraRays rays(camera, options.width, options.height);
-  const path::TileContext context{&view, &impl_->surfaces, lamps.get(), &sky, &rays, &camera, &options};
+  std::optional<path::SurfaceParts> parts;
+  if (options.denoise) parts.emplace(options.width, options.height);
+  const path::TileContext context{&view,
+                                  &impl.surfaces,
+                                  lamps.get(),
+                                  &sky,
+                                  &rays,
+                                  &camera,
+                                  &options,
+                                  parts ? &*parts : nullptr,
+                                  options.fog.has_value() || impl.surfaces.has_clouds()};
   PathPicture picture = empty_picture(options);
-  constexpr int kEdge = path::PathTile::kEdge;
-  const int across = (options.width + kEdge - 1) / kEdge;
-  const int down = (options.height + kEdge - 1) / kEdge;
-  const std::size_t tiles = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
-  TileProgress done(progress, tiles * static_cast<std::size_t>(options.samples));
-  parallel_for(tiles, threads, [&](std::size_t i) {
-    if (done.is_cancelled()) return;
-    const auto column = static_cast<int>(i % static_cast<std::size_t>(across)) * kEdge;
-    const auto row = static_cast<int>(i / static_cast<std::size_t>(across)) * kEdge;
-    path::PathTile tile(context, column, row);
-    if (!tile.render([&](std::size_t samples) { return done.add_samples(samples); })) return;
-    tile.write_to(picture);
-    done.add_counts(tile.rays(), tile.pixels_hit());
-  });
-  if (done.is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
-  picture.rays = done.rays();
-  picture.pixels_hit = done.pixels_hit();
+  if (Status drawn = draw_tiles<path::PathTile>(context, options, threads, progress, picture); !drawn)
+    return drawn.error();
+  if (parts) path::denoise(*parts, options.samples, threads, picture);
   return picture;
 }
 

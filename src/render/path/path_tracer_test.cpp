@@ -506,53 +506,5 @@ TEST(PathTracer, AnEmptySceneIsSky) {
   EXPECT_NEAR(picture.radiance.back().x, 0.5F, 1e-6F);
 }
 
-TEST(PathDevelop, KeepsOrderAndEnds) {
-  PathPicture picture;
-  picture.width = 64;
-  picture.height = 1;
-  for (int i = 0; i < 64; ++i) picture.radiance.emplace_back(std::pow(1.3F, static_cast<float>(i - 40)));
-  picture.scene = picture.radiance;
-  picture.alpha.assign(64, 1.0F);
-  for (const ToneCurve tone : {ToneCurve::Clamp, ToneCurve::Neutral, ToneCurve::Agx, ToneCurve::Aces}) {
-    const auto image = develop(picture, {1.0, tone});
-    ASSERT_TRUE(image.has_value());
-    for (std::size_t i = 3; i < image->rgb.size(); ++i) EXPECT_GE(int{image->rgb[i]} + 1, image->rgb[i - 3]);
-    EXPECT_LE(image->rgb.front(), 10);
-    EXPECT_GE(image->rgb.back(), 250);
-  }
-  EXPECT_FALSE(develop(picture, {std::numeric_limits<double>::quiet_NaN()}).has_value());
-  EXPECT_FALSE(develop(picture, {-1.0}).has_value());
-}
-
-// The published values: grey of 0.18 and white.
-TEST(PathDevelop, CurvesHaveTheirPublishedValues) {
-  PathPicture picture;
-  picture.width = 2;
-  picture.height = 1;
-  picture.radiance = {Vec3(0.18F), Vec3(1.0F)};
-  picture.scene = picture.radiance;
-  picture.alpha = {1.0F, 1.0F};
-  const auto neutral = develop(picture, {1.0, ToneCurve::Neutral});
-  const SrgbEncoder& encode = SrgbEncoder::shared();
-  EXPECT_EQ(neutral->rgb[0], encode(0.14F));  // less the 0.04 of Fresnel
-  EXPECT_NEAR(neutral->rgb[3], encode(0.88F), 2);
-  const auto clamp = develop(picture, {1.0, ToneCurve::Clamp});
-  EXPECT_EQ(clamp->rgb[0], encode(0.18F));
-  EXPECT_EQ(clamp->rgb[3], 255);
-}
-
-TEST(PathDevelop, FindsTheExposureThatShowsThePicture) {
-  PathPicture picture;
-  picture.width = 10;
-  picture.height = 10;
-  picture.radiance.assign(100, Vec3(0.002F));
-  picture.scene = picture.radiance;
-  picture.alpha.assign(100, 1.0F);
-  EXPECT_NEAR(find_exposure(picture), 90.0, 0.1);
-  picture.radiance.assign(100, Vec3(0.0F));
-  picture.scene = picture.radiance;
-  EXPECT_EQ(find_exposure(picture), 1.0);
-}
-
 }  // namespace
 }  // namespace quoin

@@ -141,11 +141,23 @@ Scatter::Scatter(const Material& material, Vec3 out) : out_(out), colour_(materi
   gloss_share_ = shine > 0.0F ? std::clamp(shine / (shine + below), below > 0.0F ? 0.1F : 1.0F, 1.0F) : 0.0F;
 }
 
+Scatter::Scatter(Vec3 colour, float anisotropy) : colour_(colour), is_medium_(true), anisotropy_(anisotropy) {}
+
+float Scatter::phase(float cosine) const {
+  const float g = anisotropy_;
+  const float under = std::max(1.0F + g * g - 2.0F * g * cosine, 1e-6F);
+  return (1.0F - g * g) / (4.0F * kPi * under * std::sqrt(under));
+}
+
 Vec3 Scatter::gloss_at(float cosine) const {
   return fresnel(colour_, cosine) * metal_gain_ + fresnel(Vec3(kDielectric), cosine) * dielectric_gain_;
 }
 
 Scatter::Both Scatter::evaluate(Vec3 in) const {
+  if (is_medium_) {
+    const float share = phase(in.z);
+    return {colour_ * share, share};
+  }
   if (!(in.z > 0.0F)) return {};
   Both both{matte_ * (in.z / kPi), (1.0F - gloss_share_) * in.z / kPi};
   if (gloss_share_ <= 0.0F || is_mirror_) return both;
@@ -164,6 +176,17 @@ float Scatter::density(Vec3 in) const {
 }
 
 Scattered Scatter::sample(Pair u, float choice) const {
+  if (is_medium_) {
+    const float g = anisotropy_;
+    float cosine = 1.0F - 2.0F * u.x;
+    if (std::abs(g) > 1e-3F) {
+      const float part = (1.0F - g * g) / (1.0F + g - 2.0F * g * u.x);
+      cosine = std::clamp((1.0F + g * g - part * part) / (2.0F * g), -1.0F, 1.0F);
+    }
+    const float sine = std::sqrt(1.0F - cosine * cosine);
+    const SineCosine turn = of_turns(u.y);
+    return {{sine * turn.cosine, sine * turn.sine, cosine}, colour_, phase(cosine)};
+  }
   if (choice >= gloss_share_) {
     const Vec3 in = cosine_weighted(u);
     if (!(in.z > 0.0F)) return {};

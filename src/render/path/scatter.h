@@ -33,6 +33,11 @@ class Scatter {
  public:
   /// Requires: out.z > 0.
   Scatter(const Material& material, Vec3 out);
+  /// That of fog and clouds instead: +z is where the light that is traced goes, from all around of which it comes.
+  /// `anisotropy`: -0.99 to 0.99.
+  ///
+  /// Source: L. Henyey, J. Greenstein, "Diffuse radiation in the galaxy" (1941).
+  Scatter(Vec3 colour, float anisotropy);
 
   /// The scattering function times the cosine of `in`; 0 below the surface.
   [[nodiscard]] Vec3 value(Vec3 in) const;
@@ -40,10 +45,6 @@ class Scatter {
   [[nodiscard]] float density(Vec3 in) const;
   /// A weight of 0: nothing comes from there.
   [[nodiscard]] Scattered sample(Pair u, float choice) const;
-  /// Whether gloss is so sharp that only `sample` finds it: `value` and `density` leave it out.
-  [[nodiscard]] bool is_mirror() const { return is_mirror_; }
-  /// Whether it has any gloss.
-  [[nodiscard]] bool is_glossy() const { return gloss_share_ > 0.0F; }
 
  private:
   struct Both {
@@ -54,7 +55,9 @@ class Scatter {
   // What the gloss reflects of light at that cosine with a facet's normal, with what is put back.
   [[nodiscard]] Vec3 gloss_at(float cosine) const;
 
-  Vec3 out_;
+  [[nodiscard]] float phase(float cosine) const;
+
+  Vec3 out_{0.0F};
   Vec3 colour_;
   Vec3 matte_{0.0F};  // of it, what the gloss lets through
   // Put back what facets scatter more than once; times the shares of metal and of what is none.
@@ -62,7 +65,9 @@ class Scatter {
   Vec3 dielectric_gain_{0.0F};
   float alpha_ = 1.0F;
   float gloss_share_ = 0.0F;  // of samples
-  bool is_mirror_ = false;
+  bool is_mirror_ = false;    // only `sample` finds gloss that is so sharp
+  bool is_medium_ = false;
+  float anisotropy_ = 0.0F;
 };
 
 }  // namespace quoin::path

@@ -22,7 +22,7 @@ Vec3 turned_back(Vec3 v, SineCosine by) {
 
 }  // namespace
 
-SkyLight::SkyLight(const PathOptions& options)
+SkyLight::SkyLight(const Look& options)
     : model_(options.sky), brightness_(static_cast<float>(options.sky_brightness)), uniform_(options.sky_colour) {
   LightOptions light;
   light.sun = options.sun;
@@ -59,6 +59,7 @@ SkyLight::SkyLight(const PathOptions& options)
       break;
     }
   }
+  sunlight_ *= options.sun_colour;
 }
 
 Vec3 SkyLight::sky(Vec3 direction) const {

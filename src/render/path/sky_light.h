@@ -16,7 +16,7 @@ namespace quoin::path {
 class SkyLight {
  public:
   /// Requires: `check` accepts the options.
-  explicit SkyLight(const PathOptions& options);
+  explicit SkyLight(const Look& options);
 
   /// What a ray meets that leaves the scene: without the sun, and the sun alone. `direction`: unit, in the world.
   [[nodiscard]] Vec3 sky(Vec3 direction) const;

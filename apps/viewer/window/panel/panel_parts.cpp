@@ -224,7 +224,7 @@ void draw_picture_part(ViewState& state) {
   if (!heading("Picture")) return;
   Settings& settings = state.settings;
   int mode = static_cast<int>(settings.mode);
-  if (ImGui::Combo("drawn as", &mode, "rays\0blocks\0smooth\0densities\0")) {
+  if (ImGui::Combo("drawn as", &mode, "rays\0blocks\0smooth\0densities\0paths\0")) {
     const auto wanted = static_cast<DrawMode>(mode);
     const char* const why = state.why_not_drawn_as(wanted);
     why == nullptr ? void(settings.mode = wanted) : state.tell(why);

@@ -281,6 +281,9 @@ void Writer::warn(std::vector<std::string>& warnings) const {
   scene_.instances().for_each([&](InstanceHandle, const Instance& instance) {
     categories += instance.categories == Instance().categories ? 0 : 1;
   });
+  std::int64_t with_data = 0;
+  scene_.grids().for_each([&](GridHandle, const SceneGrid& grid) { with_data += grid.grid.data_count(); });
+  count("voxels whose data is left out, which .vox does not hold (a .json keeps it)", with_data);
   count("instances whose categories are left out, which .vox does not hold (a .json keeps them)", categories);
   warnings.insert(warnings.end(), lost_.begin(), lost_.end());
 }

@@ -1,0 +1,132 @@
+#include "render/movie.h"
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "render/picture_output.h"
+
+namespace quoin::tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::optional<fs::path> find_program(const std::string& name) {
+  const char* const path = std::getenv("PATH");
+  std::string_view left = path == nullptr ? "/usr/bin:/bin" : path;
+  while (!left.empty()) {
+    const std::size_t end = std::min(left.find(':'), left.size());
+    const fs::path candidate = fs::path(left.substr(0, end)) / name;
+    if (::access(candidate.c_str(), X_OK) == 0) return candidate;
+    left.remove_prefix(std::min(end + 1, left.size()));
+  }
+  return std::nullopt;
+}
+
+// Its exit status; what it prints goes to standard error, and it reads nothing.
+Result<int> run(const fs::path& program, std::vector<std::string> words) {
+  words.insert(words.begin(), program.string());
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
+  pid_t child = 0;
+  const int fault = ::posix_spawn(&child, program.c_str(), &actions, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (fault != 0) return make_error(ErrorCode::CannotWrite, std::generic_category().message(fault), program.string());
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0) {
+    if (errno != EINTR) return make_error(ErrorCode::CannotWrite, "lost", program.string());
+  }
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+// The number in OUT-007.png, as text.
+std::string number_in(const fs::path& picture) {
+  const std::string stem = picture.stem().string();
+  return stem.substr(stem.rfind('-') + 1);
+}
+
+// A name in which ffmpeg sees nothing but a name.
+std::string escaped(const std::string& name) {
+  std::string out;
+  for (const char letter : name) out += letter == '%' ? std::string("%%") : std::string(1, letter);
+  return out;
+}
+
+}  // namespace
+
+bool is_movie(const fs::path& path) {
+  return has_ending(path, ".mp4") || has_ending(path, ".webm");
+}
+
+fs::path Movie::folder() const {
+  return fs::path(output_.string() + ".pictures");
+}
+
+fs::path Movie::picture() const {
+  return folder() / "picture.png";
+}
+
+Status Movie::begin(bool resume) const {
+  if (!find_program("ffmpeg")) {
+    return make_error(ErrorCode::Unsupported,
+                      "films in one file are made by the program ffmpeg, which is not installed; numbered pictures "
+                      "need none (-o film.png)",
+                      output_.string());
+  }
+  std::error_code code;
+  if (!resume) fs::remove_all(folder(), code);
+  if (!code) fs::create_directory(folder(), code);
+  return code ? make_error(ErrorCode::CannotWrite, code.message(), folder().string()) : Status();
+}
+
+Result<std::uint64_t> Movie::write(const std::vector<fs::path>& pictures, double frames_per_second) const {
+  const auto ffmpeg = find_program("ffmpeg");
+  if (!ffmpeg) return make_error(ErrorCode::Unsupported, "ffmpeg is gone", output_.string());
+  const std::string first = number_in(pictures.front());
+  const std::string pattern = (folder() / ("picture-%0" + std::to_string(first.size()) + "d.png")).filename().string();
+  const fs::path whole = folder() / ("film" + output_.extension().string());
+  std::vector<std::string> words = {
+      "-nostdin", "-hide_banner", "-loglevel", "error", "-y", "-framerate", std::to_string(frames_per_second),
+      "-start_number", std::to_string(std::stol(first)), "-i", escaped(folder().string()) + "/" + pattern, "-frames:v",
+      std::to_string(pictures.size()),
+      // Even sides, as chroma of half size needs; colours of BT.709, and said so.
+      "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv", "-pix_fmt", "yuv420p",
+      "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"};
+  const std::vector<std::string> codec =
+      has_ending(output_, ".mp4")
+          ? std::vector<std::string>{"-c:v", "libx264", "-preset", "slow", "-crf", "16", "-movflags", "+faststart"}
+          : std::vector<std::string>{"-c:v", "libvpx-vp9", "-crf", "22", "-b:v", "0", "-row-mt", "1"};
+  words.insert(words.end(), codec.begin(), codec.end());
+  words.push_back("file:" + whole.string());
+  const auto status = run(*ffmpeg, std::move(words));
+  if (!status) return status.error();
+  std::error_code code;
+  if (*status != 0) {
+    return make_error(
+        ErrorCode::CannotWrite,
+        "ffmpeg failed with status " + std::to_string(*status) + "; its pictures stay in " + folder().string(),
+        output_.string());
+  }
+  const std::uint64_t bytes = fs::file_size(whole, code);
+  if (!code) fs::rename(whole, output_, code);
+  if (code) return make_error(ErrorCode::CannotWrite, code.message(), output_.string());
+  fs::remove_all(folder(), code);
+  return bytes;
+}
+
+}  // namespace quoin::tool

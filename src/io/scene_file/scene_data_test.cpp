@@ -1,0 +1,253 @@
+#include <quoin/io/scene_file.h>
+
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <quoin/io/formats.h>
+#include <quoin/io/vox.h>
+
+#include "io/base64.h"
+#include "io/byte_stream.h"
+#include "io/gltf/glb_for_tests.h"
+#include "io/scene_file/voxel_data.h"
+
+// Data at voxels in scene files.
+
+namespace quoin {
+namespace {
+
+constexpr VoxelType kPlain = 1;
+constexpr VoxelType kTurned = 2;
+
+// Of stone, which has no state, and of stairs, which have two bits.
+Scene scene_of(Grid grid) {
+  Scene scene;
+  EXPECT_TRUE(scene.types.add({.name = "stone", .colour = {}}));
+  EXPECT_TRUE(scene.types.add({.name = "stairs", .colour = {}, .state_bits = 2}));
+  SceneGrid model;
+  model.grid = std::move(grid);
+  Instance instance;
+  instance.grid = scene.add_grid(std::move(model));
+  scene.add_instance(instance);
+  return scene;
+}
+
+std::string text_of(const Scene& scene, Threads threads = {}) {
+  const auto bytes = write_scene_file(scene_file_of(scene).value(), threads);
+  EXPECT_TRUE(bytes) << to_string(bytes.error());
+  return bytes ? std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size()) : std::string();
+}
+
+Result<LoadedScene> read(const std::string& text) {
+  return read_scene_file(std::as_bytes(std::span(text)));
+}
+
+const Grid& only_grid(const Scene& scene) {
+  return scene.grids()[scene.grids().handles().front()].grid;
+}
+
+void expect_same_chunks(const Grid& a, const Grid& b) {
+  ASSERT_EQ(a.chunks(), b.chunks());
+  for (const IVec3 at : a.chunks()) ASSERT_TRUE(*a.find_chunk(at) == *b.find_chunk(at));
+  ASSERT_EQ(a.data_count(), b.data_count());
+}
+
+TEST(SceneData, ComesBackAtEveryVoxel) {
+  std::mt19937 random(5);
+  Grid grid;
+  for (int i = 0; i < 3'000; ++i) {
+    const IVec3 at = IVec3(random() % 150U, random() % 150U, random() % 150U) - 70;
+    const VoxelType type = random() % 2U == 0 ? kPlain : kTurned;
+    grid.set(at, type);
+    const std::vector<std::byte> bytes(random() % 4U == 0 ? random() % 300U : 0, std::byte(random()));
+    grid.set_data(at, {type == kTurned ? static_cast<std::uint32_t>(random() % 4U) : 0, bytes});
+  }
+  ASSERT_GT(grid.data_count(), 500);
+  const Scene scene = scene_of(grid.snapshot());
+  const std::string text = text_of(scene);
+  EXPECT_NE(text.find("\"quoin_scene\": 5"), std::string::npos);
+  const auto loaded = read(text);
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  expect_same_chunks(only_grid(loaded->scene), grid);
+  EXPECT_EQ(loaded->scene.types[kTurned], scene.types[kTurned]);
+  EXPECT_EQ(text_of(loaded->scene, Threads{1}), text) << "by any number of threads";
+}
+
+TEST(SceneData, OfManyMegabytesComesInSeveralPieces) {
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {64, 64, 64}}, kTurned);
+  std::mt19937 random(6);
+  std::vector<std::byte> bytes(kMaxVoxelDataBytes);
+  for (std::byte& byte : bytes) byte = std::byte(random());
+  for (int i = 0; i < 300; ++i) grid.set_data({i % 64, i / 64, 7}, {3, bytes});
+  const auto loaded = read(text_of(scene_of(grid.snapshot())));
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  expect_same_chunks(only_grid(loaded->scene), grid);
+  const Grid* const all = &grid;
+  EXPECT_EQ(encode_data({&all, 1}, VoxelCompression::Stored, {}, {}).value()[0].size(), 3U);
+}
+
+// What compresses too well is stored as it is, so that the reader takes it.
+TEST(SceneData, ThatIsRegularIsTaken) {
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {64, 64, 1}}, kPlain);
+  const std::vector<std::byte> zeros(kMaxVoxelDataBytes);
+  for (int i = 0; i < 1'200; ++i) grid.set_data({i % 64, i / 64, 0}, {.bytes = zeros});
+  const auto loaded = read(text_of(scene_of(grid.snapshot())));
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_EQ(only_grid(loaded->scene).data_count(), grid.data_count());
+}
+
+TEST(SceneData, IsKeptWhereTypesOfNamedFilesAreRenumbered) {
+  const TestFolder folder("scene_data");
+  Grid grid;
+  grid.set({1, 2, 3}, kTurned, {.state = 2});
+  ASSERT_TRUE(save_scene(scene_of(grid.snapshot()), folder.file("inner.json")));
+  SceneFile outer;
+  ASSERT_TRUE(outer.types.add({.name = "sand", .colour = {}}));
+  outer.sources.push_back({"inner", "inner.json"});
+  SceneFile::Placement placement;
+  placement.source = "inner";
+  outer.placements.push_back(placement);
+  ASSERT_TRUE(write_scene_file(outer, folder.file("outer.json")));
+  const auto loaded = load_scene(folder.file("outer.json"));
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_EQ(only_grid(loaded->scene).get({1, 2, 3}), 3) << "behind the file's own type";
+  EXPECT_EQ(only_grid(loaded->scene).data({1, 2, 3}).state, 2U);
+}
+
+TEST(SceneData, WhereThereIsNoneTheFileIsAsBefore) {
+  Scene scene;
+  ASSERT_TRUE(scene.types.add({.name = "stone", .colour = {}}));
+  SceneGrid grid;
+  grid.grid.set({0, 0, 0}, kPlain);
+  Instance instance;
+  instance.grid = scene.add_grid(std::move(grid));
+  scene.add_instance(instance);
+  const std::string before = text_of(scene);
+  EXPECT_NE(before.find("\"quoin_scene\": 2"), std::string::npos);
+  Grid& edited = scene.edit(instance.grid).grid;
+  const std::vector<std::byte> bytes(3);
+  edited.set_data({0, 0, 0}, {.bytes = bytes});
+  EXPECT_NE(text_of(scene), before);
+  edited.set_data({0, 0, 0}, {});
+  EXPECT_EQ(text_of(scene), before);
+}
+
+TEST(SceneData, OfMoreBitsThanTheTypeSaysIsNotWritten) {
+  Grid grid;
+  grid.set({1, 2, 3}, kTurned, {.state = 4});
+  const auto written = write_scene_file(scene_file_of(scene_of(std::move(grid))).value());
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().code, ErrorCode::InvalidArgument);
+  EXPECT_EQ(written.error().message, "grids[0]: state 4 of voxel (1, 2, 3) has more than the 2 bits of its type");
+}
+
+TEST(SceneData, ThatVoxCannotHoldIsNamed) {
+  Grid grid;
+  grid.set({1, 2, 3}, kTurned, {.state = 3});
+  const Scene scene = scene_of(std::move(grid));
+  const auto losses = losses_of_vox(scene);
+  ASSERT_TRUE(losses);
+  ASSERT_EQ(losses->size(), 1U);
+  EXPECT_EQ((*losses)[0], "voxels whose data is left out, which .vox does not hold (a .json keeps it): 1");
+}
+
+// A record of data as it lies in a file.
+struct Record {
+  IVec3 chunk{0};
+  std::uint32_t count = 1;
+  struct Voxel {
+    std::uint32_t place = 0;
+    std::uint32_t state = 1;
+    std::uint32_t length = 0;
+    std::size_t bytes = 0;
+  };
+  std::vector<Voxel> voxels;
+};
+
+std::vector<std::byte> bytes_of(const std::vector<Record>& records) {
+  std::vector<std::byte> bytes;
+  const auto put = [&](std::uint32_t number) {
+    for (int i = 0; i < 4; ++i) bytes.push_back(static_cast<std::byte>(number >> (8 * i)));
+  };
+  for (const Record& record : records) {
+    for (int axis = 0; axis < 3; ++axis) put(static_cast<std::uint32_t>(record.chunk[axis]));
+    put(record.count);
+    for (const Record::Voxel& voxel : record.voxels) {
+      put(voxel.place);
+      put(voxel.state);
+      put(voxel.length);
+      bytes.resize(bytes.size() + voxel.bytes);
+    }
+  }
+  return bytes;
+}
+
+// What is wrong with such data at a grid of stairs at (1, 0, 0) and stone at (2, 0, 0).
+std::string fault_of_bytes(const std::vector<std::byte>& data, const std::string& further = "") {
+  Grid grid;
+  grid.set({1, 0, 0}, kTurned);
+  grid.set({2, 0, 0}, kPlain);
+  std::string text = text_of(scene_of(std::move(grid)));
+  const std::size_t end = text.find("]}", text.find("\"voxels\""));
+  text.insert(end + 1, ",\"data\":[\"" + to_base64(gzipped(data, 9)) + "\"" + further + "]");
+  const auto loaded = read(text);
+  if (loaded) return "";
+  EXPECT_EQ(loaded.error().code, ErrorCode::BadFormat);
+  return loaded.error().message;
+}
+std::string fault_of(const std::vector<Record>& records) {
+  return fault_of_bytes(bytes_of(records));
+}
+
+TEST(SceneData, ThatIsWrongIsRefusedWithItsPlace) {
+  const std::string piece = "grids[0].data[0]: ";
+  const std::string at = piece + "byte 16 of the voxel data: ";
+  EXPECT_EQ(fault_of({{.voxels = {{.place = 1}}}}), "");
+  EXPECT_EQ(fault_of({{.voxels = {{.place = 2}}}}),
+            piece + "state 1 of voxel (2, 0, 0) has more than the 0 bits of its type");
+  EXPECT_EQ(fault_of({{.voxels = {{.place = 3}}}}), piece + "chunk (0, 0, 0) has data where there is no voxel");
+  EXPECT_EQ(fault_of({{.chunk = {7, 0, 0}, .voxels = {{.place = 1}}}}),
+            piece + "chunk (7, 0, 0) has data where there is no voxel");
+  EXPECT_EQ(fault_of({{.voxels = {{.place = 1}}}, {.voxels = {{.place = 1}}}}),
+            piece + "chunk (0, 0, 0) has data twice at one voxel");
+  EXPECT_EQ(fault_of({{.voxels = {{.place = 262'144}}}}), at + "a voxel outside its chunk");
+  EXPECT_EQ(fault_of({{.count = 2, .voxels = {{.place = 1}, {.place = 1}}}}),
+            piece + "byte 28 of the voxel data: a voxel that does not come after the one before");
+  EXPECT_EQ(fault_of({{.voxels = {{.place = 1, .state = 0}}}}), at + "a voxel that holds nothing");
+  EXPECT_EQ(fault_of({{.voxels = {{.place = 1, .length = 65'537, .bytes = 65'537}}}}),
+            piece + "byte 24 of the voxel data: 65537 bytes at one voxel");
+  EXPECT_EQ(fault_of({{.voxels = {{.place = 1, .length = 9, .bytes = 8}}}}),
+            piece + "byte 36 of the voxel data: cut off");
+  EXPECT_EQ(fault_of({{.count = 0, .voxels = {}}}), piece + "byte 12 of the voxel data: a chunk with data at 0 voxels");
+  EXPECT_EQ(fault_of({{.count = 262'145, .voxels = {}}}),
+            piece + "byte 12 of the voxel data: a chunk with data at 262145 voxels");
+  EXPECT_EQ(fault_of({{.count = 200'000, .voxels = {{.place = 1}}}}), piece + "byte 28 of the voxel data: cut off");
+  EXPECT_EQ(fault_of({{.chunk = {1 << 30, 0, 0}, .voxels = {{.place = 1}}}}),
+            piece + "byte 0 of the voxel data: a chunk beyond where voxels end");
+  EXPECT_EQ(fault_of_bytes(std::vector<std::byte>(5)), piece + "byte 5 of the voxel data: cut off");
+  EXPECT_EQ(fault_of_bytes(bytes_of({{.voxels = {{.place = 1}}}}), ", 5"), "grids[0].data[1]: must be a string");
+}
+
+TEST(SceneData, StateBitsAreAtMostThirtyTwo) {
+  std::string text = text_of(scene_of(Grid()));
+  const std::string wanted = "\"state_bits\":2";
+  const std::size_t place = text.find(wanted);
+  ASSERT_NE(place, std::string::npos);
+  for (const char* bits : {"33", "-1", "1.5", "\"2\""}) {
+    std::string other = text;
+    other.replace(place, wanted.size(), std::string("\"state_bits\":") + bits);
+    const auto loaded = read(other);
+    ASSERT_FALSE(loaded);
+    EXPECT_EQ(loaded.error().message, "types[1].state_bits: must be a whole number from 0 to 32");
+  }
+  VoxelRegistry types;
+  EXPECT_FALSE(types.add({.name = "much", .colour = {}, .state_bits = 33}));
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,249 @@
+#include "io/vox/look.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "core/srgb.h"
+#include "io/text.h"
+
+namespace quoin::vox {
+namespace {
+
+constexpr double kRadians = std::numbers::pi / 180.0;
+constexpr double kUsualAir = 0.4;                            // _ray_d, _mie_d and _o3_d of the Earth
+constexpr std::array kUsualRayleigh = {45.0, 104.0, 255.0};  // _ray_k, likewise
+constexpr std::array kUsualOzone = {105.0, 255.0, 110.0};
+constexpr double kBloomRadius = 0.05;  // of a _scale of 1
+constexpr double kMost = 1e9;
+constexpr double kMostFog = 1e6;
+constexpr double kMostAir = 100.0;
+constexpr double kMostAnisotropy = 0.99;
+
+// What a key that Quoin does not draw is set to when nobody sets it.
+struct Usual {
+  std::string_view group, key, value;
+};
+constexpr std::array kUsual = {
+    Usual{"_bounce", "_energy", "3"},     Usual{"_lens", "_proj", "0"},    Usual{"_lens", "_fov", "45"},
+    Usual{"_setting", "_scale", "1 1 1"}, Usual{"_setting", "_cell", "1"}, Usual{"_setting", "_aa", "1"},
+    Usual{"_setting", "_sw", "1"},        Usual{"_setting", "_grid", "0"}, Usual{"_setting", "_edge", "0"},
+    Usual{"_grid", "_enable", "0"},       Usual{"_edge", "_enable", "0"}};
+
+// The values of all groups, and which of them were read.
+class Settings {
+ public:
+  explicit Settings(const std::vector<SettingChunk>& chunks) {
+    for (const SettingChunk& chunk : chunks) {
+      const std::string_view group = chunk.attributes.get("_type");
+      for (const auto& [key, value] : chunk.attributes.entries) {
+        if (key != "_type") values_[{group, key}] = {value, false};
+      }
+    }
+  }
+
+  // The numbers of a key. What is no such text stays unread.
+  template <std::size_t kCount>
+  [[nodiscard]] std::optional<std::array<double, kCount>> numbers(std::string_view group, std::string_view key) {
+    const auto found = values_.find({group, key});
+    if (found == values_.end()) return std::nullopt;
+    std::array<float, kCount> read{};
+    if (!parse_floats(found->second.text, read)) return std::nullopt;
+    std::array<double, kCount> out{};
+    std::ranges::copy(read, out.begin());
+    found->second.is_read = true;
+    return out;
+  }
+  [[nodiscard]] std::optional<double> number(std::string_view group, std::string_view key) {
+    const auto one = numbers<1>(group, key);
+    return one ? std::optional((*one)[0]) : std::nullopt;
+  }
+  void put(std::string_view group, std::string_view key, double least, double most, double& out) {
+    if (const auto value = number(group, key)) out = std::clamp(*value, least, most);
+  }
+  void put_colour(std::string_view group, std::string_view key, Vec3& out) {
+    const auto value = numbers<3>(group, key);
+    if (!value) return;
+    for (int i = 0; i < 3; ++i) {
+      const double channel = std::clamp((*value)[static_cast<std::size_t>(i)], 0.0, 255.0);
+      out[i] = linear_from_srgb(static_cast<float>(channel / 255.0));
+    }
+  }
+  // As multiples of what is usual.
+  void put_ratio(std::string_view group, std::string_view key, const std::array<double, 3>& usual, Vec3& out) {
+    const auto value = numbers<3>(group, key);
+    if (!value) return;
+    for (std::size_t i = 0; i < 3; ++i) {
+      out[static_cast<int>(i)] = static_cast<float>(std::clamp((*value)[i] / usual[i], 0.0, kMostAir));
+    }
+  }
+  [[nodiscard]] bool is_on(std::string_view group, std::string_view key, bool otherwise) {
+    const auto value = number(group, key);
+    return value ? *value != 0.0 : otherwise;
+  }
+  [[nodiscard]] std::string text(std::string_view group, std::string_view key) {
+    const auto found = values_.find({group, key});
+    if (found == values_.end()) return {};
+    found->second.is_read = true;
+    return std::string(found->second.text);
+  }
+  // What a group says does not count.
+  void pass(std::string_view group) {
+    for (auto& [name, value] : values_) {
+      if (name.first == group && name.second != "_enable") value.is_read = true;
+    }
+  }
+  [[nodiscard]] std::vector<std::string> unread() const {
+    std::vector<std::string> out;
+    for (const auto& [name, value] : values_) {
+      const bool is_usual = std::ranges::any_of(kUsual, [&, &n = name, &v = value](const Usual& usual) {
+        return usual.group == n.first && usual.key == n.second && usual.value == v.text;
+      });
+      if (value.is_read || is_usual) continue;
+      out.push_back(printable(name.first) + " " + printable(name.second) + " " + printable(value.text));
+    }
+    return out;
+  }
+
+ private:
+  struct Value {
+    std::string_view text;
+    bool is_read = false;
+  };
+  std::map<std::pair<std::string_view, std::string_view>, Value> values_;
+};
+
+// The tangent of half the disc's angle.
+double angle_of_area(double area) {
+  constexpr double kWidest = 3.0;
+  return std::min(2.0 * std::atan(std::max(area, 0.0)), kWidest);
+}
+
+void read_sun(Settings& settings, Look& look) {
+  settings.put("_inf", "_i", 0.0, kMost, look.sun_brightness);
+  settings.put_colour("_inf", "_k", look.sun_colour);
+  if (const auto angle = settings.numbers<2>("_inf", "_angle")) {
+    const double pitch = (*angle)[0] * kRadians;
+    const double yaw = (*angle)[1] * kRadians;
+    look.sun = {std::sin(yaw) * std::cos(pitch), std::sin(pitch), std::cos(yaw) * std::cos(pitch)};
+  }
+  if (const auto area = settings.number("_inf", "_area")) look.sun_angle_radians = angle_of_area(*area);
+  look.sun_is_seen = settings.is_on("_inf", "_disk", look.sun_is_seen);
+}
+
+void read_air(Settings& settings, AirOptions& air) {
+  const auto density = [&](const char* key, double& out) {
+    if (const auto value = settings.number("_atm", key)) out = std::clamp(*value / kUsualAir, 0.0, kMostAir);
+  };
+  density("_ray_d", air.rayleigh);
+  density("_mie_d", air.mie);
+  density("_o3_d", air.ozone);
+  settings.put_ratio("_atm", "_ray_k", kUsualRayleigh, air.rayleigh_colour);
+  settings.put_ratio("_atm", "_mie_k", {255.0, 255.0, 255.0}, air.mie_colour);
+  settings.put_ratio("_atm", "_o3_k", kUsualOzone, air.ozone_colour);
+  settings.put("_atm", "_mie_g", -kMostAnisotropy, kMostAnisotropy, air.mie_anisotropy);
+}
+
+void read_sky(Settings& settings, FileLook& out) {
+  Look& look = out.look;
+  const int mode = static_cast<int>(std::clamp(settings.number("_env", "_mode").value_or(0.0), 0.0, 2.0));
+  if (mode == 1) {
+    look.sky = SkyModel::Physical;
+    look.sky_brightness = look.sun_brightness;
+    read_air(settings, look.air);
+  } else if (mode == 2) {
+    look.sky = SkyModel::Environment;
+    out.environment = settings.text("_ibl", "_path");
+    settings.put("_ibl", "_i", 0.0, kMost, look.sky_brightness);
+    if (const auto turn = settings.number("_ibl", "_rot")) look.environment_turn_radians = *turn * kRadians;
+    if (const auto angle = settings.numbers<2>("_ibl", "_angle")) {
+      look.environment_turn_radians = (*angle)[1] * kRadians;
+    }
+  } else {
+    look.sky = SkyModel::Uniform;
+    settings.put("_uni", "_i", 0.0, kMost, look.sky_brightness);
+    settings.put_colour("_uni", "_k", look.sky_colour);
+  }
+  for (const char* of_others : {"_uni", "_atm", "_ibl"}) settings.pass(of_others);
+}
+
+void read_fog(Settings& settings, Look& look) {
+  Fog fog;
+  fog.density = 0.0;
+  settings.put("_fog_uni", "_d", 0.0, kMostFog, fog.density);
+  settings.put_colour("_fog_uni", "_k", fog.colour);
+  settings.put("_fog_uni", "_g", -kMostAnisotropy, kMostAnisotropy, fog.anisotropy);
+  if (fog.density > 0.0) look.fog = fog;
+}
+
+void read_lens(Settings& settings, Look& look) {
+  constexpr double kMostBlades = 64.0;
+  settings.put("_lens", "_aperture", 0.0, kMost, look.lens_radius);
+  if (const auto blades = settings.number("_lens", "_blade_n")) {
+    look.lens_blades = *blades < 3.0 ? 0 : static_cast<int>(std::min(*blades, kMostBlades));
+  }
+  if (const auto turn = settings.number("_lens", "_blade_r")) look.lens_turn_radians = *turn * kRadians;
+}
+
+void read_film(Settings& settings, DevelopOptions& develop) {
+  settings.put("_film", "_expo", 0.0, kMost, develop.exposure);
+  settings.put("_film", "_vig", 0.0, 1.0, develop.vignette);
+  settings.put("_film", "_gam", 0.1, 10.0, develop.gamma);
+  develop.tone = settings.is_on("_film", "_aces", true) ? ToneCurve::Aces : ToneCurve::Clamp;
+  Bloom& bloom = develop.bloom;
+  settings.put("_bloom", "_mix", 0.0, 1.0, bloom.mix);
+  settings.put("_bloom", "_aspect", -1.0, 1.0, bloom.aspect);
+  settings.put("_bloom", "_threshold", 0.0, kMost, bloom.threshold);
+  double scale = 0.0;
+  settings.put("_bloom", "_scale", 0.0, 1.0 / kBloomRadius, scale);
+  bloom.radius = scale * kBloomRadius;
+  if (bloom.radius == 0.0) bloom = {};
+}
+
+void read_ground(Settings& settings, FileLook& out) {
+  GroundPlane ground;
+  settings.put_colour("_ground", "_color", ground.colour);
+  settings.put("_ground", "_hor", 0.0, 1.0, ground.fade);
+  const bool has_ground = settings.is_on("_setting", "_ground", settings.is_on("_ground", "_enable", false));
+  if (has_ground) out.look.ground = ground;
+  Vec3 colour(0.0F);
+  settings.put_colour("_bg", "_color", colour);
+  if (settings.is_on("_setting", "_bg_c", settings.is_on("_bg", "_enable", false))) out.look.background = colour;
+  out.is_transparent = settings.is_on("_setting", "_bg_a", false);
+}
+
+}  // namespace
+
+std::optional<FileLook> look_of(const Document& document) {
+  if (document.settings.empty()) return std::nullopt;
+  Settings settings(document.settings);
+  FileLook out;
+  read_sun(settings, out.look);
+  read_sky(settings, out);
+  read_fog(settings, out.look);
+  read_lens(settings, out.look);
+  read_film(settings, out.develop);
+  read_ground(settings, out);
+  constexpr double kMostBounces = 1'023.0;
+  double diffuse = 0.0;
+  double specular = 0.0;
+  double scatter = out.max_scatterings;
+  settings.put("_bounce", "_diffuse", 0.0, kMostBounces, diffuse);
+  settings.put("_bounce", "_specular", 0.0, kMostBounces, specular);
+  settings.put("_bounce", "_scatter", 0.0, kMostBounces, scatter);
+  const double bounces = std::max(diffuse, specular);
+  if (bounces > 0.0) out.max_bounces = 1 + static_cast<int>(bounces);
+  out.max_scatterings = static_cast<int>(scatter);
+  // How edges and grids look does not matter where they are not drawn; whether they are says _setting, or _enable.
+  settings.pass("_grid");
+  settings.pass("_edge");
+  out.not_drawn = settings.unread();
+  return out;
+}
+
+}  // namespace quoin::vox

@@ -1,0 +1,283 @@
+// Light in fog and clouds, where analysis knows it; and what takes the noise out of pictures.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include <quoin/grid/grid.h>
+#include <quoin/render/path_tracer.h>
+
+#include "core/srgb.h"
+#include "render/path/path_random.h"
+#include "render/path/scatter.h"
+#include "render/path/town_for_tests.h"
+#include "render/render_test_support.h"
+
+namespace quoin {
+namespace {
+
+using render_test::add_type;
+using render_test::from_above;
+using render_test::of_town;
+using render_test::place;
+using render_test::towards;
+using render_test::town;
+
+PathOptions uniform(int size, int samples) {
+  PathOptions options;
+  options.width = size;
+  options.height = size;
+  options.samples = samples;
+  options.sky = SkyModel::Uniform;
+  options.sun_brightness = 0.0;
+  options.max_bounces = 1024;
+  options.max_scatterings = 1024;
+  return options;
+}
+
+PathPicture taken(const Scene& scene, const Camera& camera, const PathOptions& options) {
+  auto picture = PathTracer(scene).render(camera, options);
+  EXPECT_TRUE(picture.has_value()) << (picture ? "" : picture.error().message);
+  return picture ? std::move(*picture) : PathPicture{};
+}
+
+double mean(const PathPicture& picture) {
+  const auto add = [](double sum, Vec3 light) { return sum + static_cast<double>(light.x); };
+  return std::accumulate(picture.radiance.begin(), picture.radiance.end(), 0.0, add) /
+         static_cast<double>(picture.radiance.size());
+}
+
+Scene box_of(VoxelProperties properties, IBox box) {
+  Scene scene;
+  Grid grid;
+  grid.fill_box(box, scene.types.add(std::move(properties)).value_or(kAir));
+  place(scene, std::move(grid));
+  return scene;
+}
+
+VoxelProperties cloud_of(Rgba8 colour, float scattering, float anisotropy = 0.0F) {
+  VoxelProperties properties;
+  properties.colour = colour;
+  properties.colour.a = 128;
+  properties.visibility = Visibility::Transparent;
+  properties.scattering = scattering;
+  properties.anisotropy = anisotropy;
+  return properties;
+}
+
+TEST(PathMedia, ThePhaseFunctionsSamplesHaveItsDensityAndMean) {
+  for (const float g : {-0.7F, 0.0F, 0.3F, 0.9F}) {
+    const path::Scatter scatter(Vec3(0.5F), g);
+    double sum = 0.0;
+    double inverse = 0.0;
+    constexpr std::uint32_t kSamples = 1U << 14U;
+    for (std::uint32_t i = 0; i < kSamples; ++i) {
+      const path::Scattered sample = scatter.sample(path::Random(7, i).pair(0), 0.5F);
+      EXPECT_NEAR(glm::length(sample.direction), 1.0F, 1e-5F);
+      EXPECT_NEAR(scatter.density(sample.direction) / sample.density, 1.0F, 2e-3F);
+      EXPECT_NEAR(scatter.value(sample.direction).x, 0.5F * sample.density, sample.density * 2e-3F);
+      sum += static_cast<double>(sample.direction.z);
+      inverse += 1.0 / static_cast<double>(sample.density);
+    }
+    EXPECT_NEAR(sum / kSamples, static_cast<double>(g), 2e-3);
+    // The mean of 1 / density is the whole sphere.
+    EXPECT_NEAR(inverse / kSamples / (4.0 * std::acos(-1.0)), 1.0, 0.05) << g;
+  }
+}
+
+// White furnace: white fog over white ground, and a white cloud, cannot be seen in a white sky.
+TEST(PathMedia, WhiteFogAndCloudsCannotBeSeen) {
+  const Scene cube = box_of(cloud_of({255, 255, 255, 255}, 0.4F, 0.5F), {IVec3(0), IVec3(8)});
+  const PathPicture cloud = taken(cube, towards({4.0, 10.0, 24.0}, DVec3(4.0), 0.5), uniform(16, 64));
+  EXPECT_NEAR(mean(cloud), 1.0, 0.005);
+  Scene scene;
+  PathOptions options = uniform(16, 64);
+  options.ground.emplace();
+  options.ground->colour = Vec3(1.0F);
+  options.fog = Fog{0.2, Vec3(1.0F), 0.3, 8.0};
+  const PathPicture fog = taken(scene, towards({0.0, 3.0, 10.0}, {0.0, 0.0, 0.0}, 0.5), options);
+  EXPECT_NEAR(mean(fog), 1.0, 0.005);
+}
+
+// Black fog lets e^-length through, of what is seen and of what a surface gets.
+TEST(PathMedia, WhatPassesFallsWithTheLength) {
+  VoxelProperties lamp;
+  lamp.colour = {255, 255, 255, 255};
+  lamp.emission = 1.0F;
+  const Scene wall = box_of(lamp, {{-20, -20, -1}, {20, 20, 0}});
+  PathOptions options = uniform(16, 256);
+  options.sky_brightness = 0.0;
+  options.max_bounces = 0;
+  options.fog = Fog{0.1, Vec3(0.0F), 0.0, 100.0};
+  Camera camera = towards({0.0, 0.0, 12.0}, {0.0, 0.0, 0.0});
+  camera.projection = Camera::Projection::Orthographic;
+  camera.view_height = 4.0;
+  EXPECT_NEAR(mean(taken(wall, camera, options)), std::exp(-1.2), 0.003);
+
+  // The sun above, through 10 of fog down and, as seen from above, 10 up.
+  const Scene floor = box_of({.name = "", .colour = {255, 255, 255, 255}}, {{-20, -1, -20}, {20, 0, 20}});
+  options = uniform(16, 256);
+  options.sky_brightness = 0.0;
+  options.sun = {0.0, 1.0, 0.0};
+  options.sun_brightness = 1.0;
+  options.sun_angle_radians = 0.0;
+  options.fog = Fog{0.05, Vec3(0.0F), 0.0, 10.0};
+  EXPECT_NEAR(mean(taken(floor, from_above(0.0, 30.0, 0.0, 4.0), options)), std::exp(-1.0), 0.004);
+}
+
+// Black clouds likewise; glass with edges counts as a voxel at least, clouds do not.
+TEST(PathMedia, ABlackCloudOnlyTakesAway) {
+  for (const int depth : {1, 6}) {
+    const Scene scene = box_of(cloud_of({0, 0, 0, 255}, 0.25F), {{-20, -20, -depth}, {20, 20, 0}});
+    Camera camera = towards({0.0, 0.0, 12.0}, {0.0, 0.0, 0.0});
+    camera.projection = Camera::Projection::Orthographic;
+    camera.view_height = 4.0;
+    const PathPicture picture = taken(scene, camera, uniform(16, 256));
+    EXPECT_NEAR(mean(picture), std::exp(-0.25 * depth), 0.004);
+    const double alpha = std::accumulate(picture.alpha.begin(), picture.alpha.end(), 0.0) / 256.0;
+    EXPECT_NEAR(alpha, 1.0 - std::exp(-0.25 * depth), 0.004);
+  }
+}
+
+// Glass before and behind a cloud, and a lamp within: nothing is lost on the way in a white sky.
+TEST(PathMedia, CloudsStandBesideGlass) {
+  Scene scene;
+  const VoxelType cloud = scene.types.add(cloud_of({255, 255, 255, 255}, 0.3F)).value_or(kAir);
+  VoxelProperties clear = cloud_of({255, 255, 255, 255}, 0.0F);
+  clear.colour.a = 0;
+  const VoxelType glass = scene.types.add(clear).value_or(kAir);
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {8, 8, 2}}, glass);
+  grid.fill_box({{0, 0, 2}, {8, 8, 5}}, cloud);
+  grid.fill_box({{0, 0, 6}, {8, 8, 8}}, glass);
+  place(scene, std::move(grid));
+  for (const DVec3& from : {DVec3(4.0, 9.0, 30.0), DVec3(3.0, 2.0, -20.0)}) {
+    EXPECT_NEAR(mean(taken(scene, towards(from, DVec3(4.0), 0.4), uniform(16, 128))), 1.0, 0.01);
+  }
+}
+
+// A lamp in fog lights the air about it, by next-event estimation and by chance alike.
+TEST(PathMedia, ALampShinesInFog) {
+  VoxelProperties lamp;
+  lamp.colour = {255, 255, 255, 255};
+  lamp.emission = 20.0F;
+  const Scene scene = box_of(lamp, {IVec3(0), IVec3(2)});
+  PathOptions options = uniform(24, 64);
+  options.sky_brightness = 0.0;
+  options.fog = Fog{0.05, Vec3(1.0F), 0.0, 100.0};
+  const PathPicture picture = taken(scene, towards({1.0, 1.0, 20.0}, DVec3(1.0), 1.2), options);
+  const auto at = [&](std::size_t x, std::size_t y) { return picture.radiance[y * 24 + x].x; };
+  EXPECT_GT(at(9, 12), 0.02F);
+  EXPECT_GT(at(9, 12), 2.0F * at(0, 0));
+  EXPECT_GT(at(0, 0), 0.0F);
+}
+
+TEST(PathMedia, RefusesFogThatCannotBe) {
+  const Scene scene;
+  const auto refuses = [&](const Fog& fog) {
+    PathOptions options = uniform(2, 1);
+    options.fog = fog;
+    return !PathTracer(scene).render(of_town(), options).has_value();
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(refuses(Fog{}));
+  EXPECT_TRUE(refuses(Fog{-1.0}));
+  EXPECT_TRUE(refuses(Fog{nan}));
+  EXPECT_TRUE(refuses(Fog{1e7}));
+  EXPECT_TRUE(refuses(Fog{0.1, Vec3(2.0F)}));
+  EXPECT_TRUE(refuses(Fog{0.1, Vec3(1.0F), 1.0}));
+  EXPECT_TRUE(refuses(Fog{0.1, Vec3(1.0F), 0.0, std::numeric_limits<double>::infinity()}));
+}
+
+// A lens of blades shows a point that is out of focus as their polygon.
+TEST(PathLens, BladesShapeWhatIsOutOfFocus) {
+  VoxelProperties lamp;
+  lamp.colour = {255, 255, 255, 255};
+  lamp.emission = 1000.0F;
+  const Scene scene = box_of(lamp, {IVec3(0), IVec3(1)});
+  PathOptions options = uniform(64, 256);
+  options.sky_brightness = 0.0;
+  options.lens_radius = 4.0;
+  options.focus_distance = 30.0;
+  options.lens_blades = 4;
+  const Camera camera = towards({0.5, 0.5, 60.0}, DVec3(0.5), 0.3);
+  const auto lit = [&](const PathOptions& by) {
+    const PathPicture picture = taken(scene, camera, by);
+    return std::ranges::count_if(picture.radiance, [](Vec3 light) { return light.x > 0.0F; });
+  };
+  const auto square = lit(options);
+  options.lens_blades = 0;
+  const auto disc = lit(options);
+  EXPECT_NEAR(static_cast<double>(square) / static_cast<double>(disc), 2.0 / std::acos(-1.0), 0.12);
+}
+
+double error_of(const PathPicture& picture, const PathPicture& truth) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < picture.radiance.size(); ++i) {
+    const DVec3 apart =
+        glm::min(DVec3(picture.radiance[i]), DVec3(2.0)) - glm::min(DVec3(truth.radiance[i]), DVec3(2.0));
+    sum += glm::dot(apart, apart);
+  }
+  return std::sqrt(sum / static_cast<double>(picture.radiance.size()));
+}
+
+TEST(PathDenoise, HalvesTheErrorAtLeast) {
+  const Scene scene = town();
+  PathOptions options;
+  options.width = 240;
+  options.height = 160;
+  options.samples = 192;
+  const PathPicture truth = taken(scene, of_town(), options);
+  options.samples = 8;
+  const double before = error_of(taken(scene, of_town(), options), truth);
+  options.denoise = true;
+  const double after = error_of(taken(scene, of_town(), options), truth);
+  EXPECT_LT(after, 0.6 * before) << before << " " << after;
+}
+
+// Without noise nothing changes: edges of surfaces, colours and hard shadows.
+TEST(PathDenoise, KeepsEdges) {
+  Scene scene;
+  Grid grid;
+  const VoxelType red = add_type(scene, {200, 40, 30, 255});
+  const VoxelType white = add_type(scene, {230, 230, 230, 255});
+  grid.fill_box({{-20, -1, -20}, {20, 0, 20}}, white);
+  grid.fill_box({{-20, -1, -3}, {20, 0, 3}}, red);
+  grid.fill_box({{-2, 0, -2}, {2, 8, 2}}, red);
+  place(scene, std::move(grid));
+  PathOptions options = uniform(192, 4);
+  options.sky_brightness = 0.0;
+  options.max_bounces = 1;
+  options.sun_brightness = 1.0;
+  options.sun_angle_radians = 0.0;
+  const Camera camera = towards({15.0, 20.0, 25.0}, DVec3(0.0), 0.8);
+  const PathPicture plain = taken(scene, camera, options);
+  options.denoise = true;
+  const PathPicture smooth = taken(scene, camera, options);
+  int different = 0;
+  for (std::size_t i = 0; i < plain.radiance.size(); ++i) {
+    if (glm::length(plain.radiance[i] - smooth.radiance[i]) > 0.02F) ++different;
+  }
+  // Pixels through which a shadow's edge goes have noise themselves.
+  EXPECT_LT(different, static_cast<int>(plain.radiance.size()) / 100);
+}
+
+TEST(PathDenoise, TheSameBitsForAnyThreads) {
+  const Scene scene = town();
+  PathOptions options;
+  options.width = 70;
+  options.height = 40;
+  options.samples = 4;
+  options.denoise = true;
+  const auto one = PathTracer(scene).render(of_town(), options, Threads{1});
+  const auto three = PathTracer(scene).render(of_town(), options, Threads{3});
+  ASSERT_TRUE(one.has_value() && three.has_value());
+  EXPECT_EQ(one->radiance, three->radiance);
+}
+
+}  // namespace
+}  // namespace quoin
