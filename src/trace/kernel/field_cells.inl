@@ -51,7 +51,7 @@ inline F8 floats_from_halves(I8 high) {
 inline I8 pairs_of(const DensityStorage& chunk, I8 x, I8 y, I8 z, I8 mask) {
   const I8 slab = gather8<4>(chunk.slabs.data(), (z >> 2) * 16 + (y >> 2), mask);
   const I8 is_uniform = slab < 0;
-  const I8 row = slab * 16 + (z & 3) * 4 + (y & 3);
+  const I8 row = (slab << 4) + (z & 3) * 4 + (y & 3);  // a uniform slab has its sign bit set, which goes
   const I8 pairs = gather8<sizeof(Half)>(chunk.values.data(), row * kChunkEdge + x, mask & ~is_uniform);
   return is_uniform ? slab << 16 | (slab & 0xFFFF) : pairs;
 }
