@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <quoin/io/file.h>
+#include <quoin/io/formats.h>
 
 #include "io/vox/vox_for_tests.h"
 #include "tests/tool_for_tests.h"
@@ -45,6 +46,27 @@ TEST_F(Tool, InfoSaysWhatIsInAFile) {
     EXPECT_EQ(size, (std::array{3.0, 2.0, 1.0})[static_cast<std::size_t>(axis)]);
   }
   EXPECT_EQ(object["warnings"], Json::array());
+}
+
+TEST_F(Tool, DataOfVoxelsIsCountedAndNamedWhereItIsLost) {
+  Scene scene;
+  const auto stairs = scene.types.add({.name = "stairs", .colour = {150, 110, 70, 255}, .state_bits = 2});
+  ASSERT_TRUE(stairs);
+  SceneGrid model;
+  model.grid.set({1, 0, 0}, *stairs, {.state = 3});
+  model.grid.set({2, 0, 0}, *stairs);
+  scene.add_instance({.name = "", .grid = scene.add_grid(std::move(model))});
+  ASSERT_TRUE(save_scene(scene, folder_.file("data.json")));
+  const ToolRun text = run("info data.json");
+  EXPECT_NE(text.out.find("Data: at 1 voxel\n"), std::string::npos) << text.out;
+  const Json object = Json::parse(run("info data.json --json").out);
+  EXPECT_EQ(object["voxels_with_data"], 1);
+  EXPECT_EQ(object["grids"][0]["voxels_with_data"], 1);
+  EXPECT_NE(run("convert data.json out.glb").err.find("data of voxels left out, which meshes do not hold: 1"),
+            std::string::npos);
+  EXPECT_NE(run("convert data.json out.vox").err.find("voxels whose data is left out"), std::string::npos);
+  EXPECT_EQ(run("convert data.json again.json").err, "");
+  EXPECT_EQ(read_file(folder_.file("again.json")).value(), read_file(folder_.file("data.json")).value());
 }
 
 TEST_F(Tool, InfoSaysWhatIsInAVolume) {

@@ -154,6 +154,12 @@ TEST(SceneData, ThatVoxCannotHoldIsNamed) {
   ASSERT_TRUE(losses);
   ASSERT_EQ(losses->size(), 1U);
   EXPECT_EQ((*losses)[0], "voxels whose data is left out, which .vox does not hold (a .json keeps it): 1");
+  const auto written = write_vox(scene);
+  ASSERT_TRUE(written);
+  const auto again = load_scene(written->bytes);
+  ASSERT_TRUE(again) << to_string(again.error());
+  const VoxelType type = only_grid(again->scene).types().at(0);
+  EXPECT_EQ(again->scene.types[type].state_bits, 2) << "what a type says of itself is kept";
 }
 
 // A record of data as it lies in a file.
