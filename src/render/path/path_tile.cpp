@@ -14,36 +14,16 @@
 #include "light/light_model.h"
 #include "light/occlusion_directions.h"
 #include "render/on_face.h"
+#include "render/path/path_tile_parts.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin::path {
 namespace {
 
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
-constexpr float kNoOther = std::numeric_limits<float>::infinity();
 constexpr int kBlock = CameraRays::kBlock;
-constexpr std::uint32_t kDimensions = 8;     // of a vertex
-constexpr std::uint32_t kFog = 0x4000'0000;  // added to a vertex's: numbers of their own
-constexpr std::uint32_t kFade = 0x5000'0000;
 constexpr int kSureBounces = 3;              // before chance may end a path
 constexpr float kMostLikely = 0.95F;         // to go on
-constexpr int kMostGlass = 64;               // surfaces of glass that a path meets between two others
 constexpr std::uint32_t kBins = 1 + 6 * 16;  // of directions; the first is that of the sun
-
-constexpr std::uint32_t kGroundSurface = 2;  // beside what surface_id gives
-constexpr std::uint32_t kSkySurface = SurfaceParts::kSky;
-
-// The dimensions of a vertex.
-namespace dimension {
-constexpr std::uint32_t kSun = 0;
-constexpr std::uint32_t kLampChoice = 1;
-constexpr std::uint32_t kLampPoint = 2;
-constexpr std::uint32_t kSky = 3;
-constexpr std::uint32_t kDirection = 4;
-constexpr std::uint32_t kLobe = 5;
-constexpr std::uint32_t kRoulette = 6;
-constexpr std::uint32_t kGlass = 7;
-}  // namespace dimension
 
 // Rays of one bin point about the same way: by the largest component, and the other two in four steps each.
 std::uint32_t bin_of(Vec3 direction) {
@@ -67,59 +47,8 @@ void sort_by_key(std::size_t count, std::size_t keys, std::vector<std::uint32_t>
   for (std::size_t i = 0; i < count; ++i) put(starts[key(i)]++, static_cast<std::uint32_t>(i));
 }
 
-// Names the plane of a voxel's face, or a field, of one grid and type; odd.
-std::uint32_t surface_id(IVec3 voxel, Direction face, bool in_field, std::int32_t placed, VoxelType type) {
-  const auto plane = in_field ? 0U : static_cast<std::uint32_t>(voxel[frame_of(face).axis]);
-  std::uint32_t id = mix_bits(plane ^ (in_field ? 6U : static_cast<std::uint32_t>(face)) << 28);
-  id = mix_bits(id ^ static_cast<std::uint32_t>(placed));
-  return mix_bits(id ^ static_cast<std::uint32_t>(type)) | 1U;
-}
-
 DVec3 in_grid(const PlacedGrid& placed, Vec3 direction) {
   return DVec3(direction) * placed.world_axes / placed.voxel_size;  // the transposed matrix times it
-}
-
-Vec3 tint_of(const Surface& surface, double voxels) {
-  const auto length = static_cast<float>(voxels);
-  if (!(length > 0.0F)) return Vec3(1.0F);
-  Vec3 tint;
-  for (int i = 0; i < 3; ++i) {
-    // Glass that covers all lets nothing through: the difference of infinities is not a number.
-    const float log = surface.log_clarity > -kNoOther ? surface.log_transmittance[i] - surface.log_clarity : 0.0F;
-    tint[i] = exponential(log * length);
-  }
-  return tint;
-}
-
-// Of a body, which is a voxel long at least where it has edges that are to be crisp.
-double length_of(const Surface& surface, const GlassBody& body) {
-  const bool is_soft = body.starts_inside || body.in_field || surface.scattering > 0.0F;
-  return std::max(body.voxels, is_soft ? 0.0 : 1.0);
-}
-
-// How long a way is on which light is scattered `density` times by unit length, on average.
-double free_way(float u, double density) {
-  return -static_cast<double>(log_of_two(1.0F - u)) * std::numbers::ln2 / density;
-}
-
-float cover_of(const Surface& surface, double voxels) {
-  return voxels > 0.0 ? 1.0F - exponential(surface.log_clarity * static_cast<float>(voxels)) : 0.0F;
-}
-
-// Of a surface between two media, without polarisation; 1 where nothing gets through. `eta`: the index of the medium
-// from which light comes over that of the other; `cosine` of its angle, positive.
-struct Refraction {
-  float mirrored = 1.0F;
-  float cosine = 0.0F;  // of what gets through
-};
-
-Refraction refraction(float cosine, float eta) {
-  const float sine2 = eta * eta * std::max(0.0F, 1.0F - cosine * cosine);
-  if (sine2 >= 1.0F) return {};
-  const float inner = std::sqrt(1.0F - sine2);
-  const float across = (eta * cosine - inner) / (eta * cosine + inner);
-  const float in_plane = (cosine - eta * inner) / (cosine + eta * inner);
-  return {0.5F * (across * across + in_plane * in_plane), inner};
 }
 
 }  // namespace
@@ -302,16 +231,6 @@ double PathTile::ground_at(const DVec3& origin, Vec3 direction) const {
   return (ground_ - origin.y) / static_cast<double>(direction.y);
 }
 
-PathTile::Interval PathTile::in_fog(const DVec3& origin, Vec3 direction, double max_t) const {
-  const double above = origin.y - fog_top_;
-  const auto up = static_cast<double>(direction.y);
-  if (above >= 0.0 && up >= 0.0) return {};
-  Interval way{0.0, max_t};
-  if (above > 0.0) way.begin = std::min(above / -up, max_t);
-  if (above < 0.0 && up > 0.0) way.end = std::min(above / -up, max_t);
-  return way;
-}
-
 void PathTile::leave(Path& path, Vec3 direction) {
   const SkyLight& sky = *context_->sky;
   const PathOptions& options = *context_->options;
@@ -336,165 +255,6 @@ void PathTile::leave(Path& path, Vec3 direction) {
   } else {
     path.radiance += path.throughput * light;
   }
-}
-
-// ---- glass -------------------------------------------------------------------------------------------------------
-
-bool PathTile::meet_glass(std::uint32_t index, double t) {
-  Path& path = paths_[index];
-  find_glass(*context_->view, *context_->surfaces, {path.origin, DVec3(path.direction)}, t, glass_);
-  if (!path.is_seen) return pass_glass(index);
-  if (path.inside == kAir && pass_clouds(index)) return true;
-  if (path.inside != kAir) return leave_glass(index);
-  return !glass_.empty() && enter_glass(index);
-}
-
-// Light from surface to surface goes straight on; by chance it meets what covers the glass.
-bool PathTile::pass_glass(std::uint32_t index) {
-  Path& path = paths_[index];
-  float u = path.random.one(path.dimension + dimension::kGlass);
-  for (const GlassBody& body : glass_) {
-    const Surface& surface = (*context_->surfaces)[body.type];
-    const double voxels = length_of(surface, body);
-    const float cover = cover_of(surface, voxels);
-    if (u < cover) {
-      if (surface.scattering > 0.0F) {
-        scatter_in(index, body, u);
-        return true;
-      }
-      // From within it glows, no more.
-      if (body.starts_inside) {
-        add_emitted(path, surface.emitted, -1, 0.0F);
-      } else {
-        const Ray ray{path.origin, DVec3(path.direction)};
-        hit_glass(index, body, normal_entered(*context_->view, ray, body));
-      }
-      return true;
-    }
-    u = std::min((u - cover) / (1.0F - cover), 0x1.fffffep-1F);
-    path.throughput *= tint_of(surface, voxels);
-  }
-  return false;
-}
-
-bool PathTile::pass_clouds(std::uint32_t index) {
-  Path& path = paths_[index];
-  const auto first_glass = std::ranges::find_if(
-      glass_, [&](const GlassBody& body) { return !((*context_->surfaces)[body.type].scattering > 0.0F); });
-  if (first_glass == glass_.begin()) return false;
-  float u = path.random.one(path.dimension + dimension::kGlass);
-  for (auto body = glass_.begin(); body != first_glass; ++body) {
-    const Surface& surface = (*context_->surfaces)[body->type];
-    const float cover = cover_of(surface, body->voxels);
-    if (u < cover) {
-      scatter_in(index, *body, u);
-      return true;
-    }
-    u = std::min((u - cover) / (1.0F - cover), 0x1.fffffep-1F);
-  }
-  glass_.erase(glass_.begin(), first_glass);
-  return false;
-}
-
-void PathTile::scatter_in(std::uint32_t index, const GlassBody& body, float u) {
-  const Surface& surface = (*context_->surfaces)[body.type];
-  const double share = free_way(u, static_cast<double>(surface.scattering)) / std::max(body.voxels, 1e-12);
-  const double t = body.t_enter + (body.t_exit - body.t_enter) * std::clamp(share, 0.0, 1.0);
-  add_emitted(paths_[index], surface.emitted, -1, 0.0F);
-  hit_air(index, t, surface.colour, surface.anisotropy, body.placed);
-}
-
-bool PathTile::enter_glass(std::uint32_t index) {
-  Path& path = paths_[index];
-  const GlassBody body = glass_.front();
-  const Surface& surface = (*context_->surfaces)[body.type];
-  const Ray ray{path.origin, DVec3(path.direction)};
-  const float u = path.random.one(path.dimension + dimension::kGlass);
-  if (body.starts_inside) {  // the camera is in it
-    path.inside = body.type;
-    return leave_glass(index);
-  }
-  const DVec3 in_grid_normal = normal_entered(*context_->view, ray, body);
-  const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(body.placed)];
-  Vec3 normal(placed.world_axes * in_grid_normal);
-  const float cosine = std::clamp(-glm::dot(normal, path.direction), 1e-4F, 1.0F);
-  if (path.is_first) {
-    // What is mirrored, and what is seen through it, are one: which of them a path meets is chance.
-    Vertex whole;
-    whole.material.colour = Vec3(1.0F);
-    note_part(path, whole, surface_id(body.voxel, body.face, body.in_field, body.placed, body.type), false);
-  }
-  const Refraction through = refraction(cosine, 1.0F / surface.ior);
-  const DVec3 point = ray.origin + ray.direction * body.t_enter;
-  const double lift = kRayLift * placed.voxel_size;
-  if (u < through.mirrored) {
-    turn_at(path, point, path.direction + normal * (2.0F * cosine), normal, lift, kAir);
-  } else {
-    const double voxels = length_of(surface, body);
-    const float cover = cover_of(surface, voxels);
-    if (u < through.mirrored + (1.0F - through.mirrored) * cover) {
-      hit_glass(index, body, in_grid_normal);
-      return true;
-    }
-    const float eta = 1.0F / surface.ior;
-    turn_at(path, point, path.direction * eta + normal * (eta * cosine - through.cosine), -normal, lift, body.type);
-  }
-  next_.push_back(index);
-  return true;
-}
-
-// A path within glass: to where the body ends, or to what stands in it.
-bool PathTile::leave_glass(std::uint32_t index) {
-  Path& path = paths_[index];
-  const Ray ray{path.origin, DVec3(path.direction)};
-  const bool is_within = !glass_.empty() && glass_.front().starts_inside && glass_.front().type == path.inside;
-  if (!is_within) {  // it came through a corner, or out by rounding
-    path.inside = kAir;
-    return !glass_.empty() && !glass_.front().starts_inside && enter_glass(index);
-  }
-  const GlassBody body = glass_.front();
-  const Surface& surface = (*context_->surfaces)[body.type];
-  path.throughput *= tint_of(surface, body.voxels);
-  const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(body.exit_placed)];
-  const double lift = kRayLift * placed.voxel_size;
-  if (!(body.t_exit < kInfinite)) return false;
-  const bool has_next = glass_.size() > 1 && reaches(body, glass_[1].t_enter);
-  const DVec3 end = ray.origin + ray.direction * body.t_exit;
-  if (!has_next) {
-    RayPacket ahead;
-    ahead.set(0, ray, body.t_exit + lift);
-    SceneHits met;
-    context_->view->first_hits(ahead, met);
-    const double ground = ground_at(path.origin, path.direction);
-    if (met.grids.hit != 0 || ground <= body.t_exit + lift) return false;  // it lies on something opaque
-  }
-  const float other = has_next ? (*context_->surfaces)[glass_[1].type].ior : 1.0F;
-  Vec3 normal(placed.world_axes * normal_left(*context_->view, ray, body));
-  if (glm::dot(normal, path.direction) < 0.0F) normal = -normal;
-  const float cosine = std::clamp(glm::dot(normal, path.direction), 1e-4F, 1.0F);
-  const float eta = surface.ior / other;
-  const Refraction through = refraction(cosine, eta);
-  const float u = path.random.one(path.dimension + dimension::kGlass);
-  if (u < through.mirrored) {
-    turn_at(path, end, path.direction - normal * (2.0F * cosine), -normal, lift, body.type);
-  } else {
-    turn_at(path, end, path.direction * eta + normal * (through.cosine - eta * cosine), normal, lift,
-            has_next ? glass_[1].type : kAir);
-  }
-  next_.push_back(index);
-  return true;
-}
-
-// Sends a path on from a surface of glass, on that side to which `normal` points.
-void PathTile::turn_at(Path& path, const DVec3& point, Vec3 direction, Vec3 normal, double lift, VoxelType inside) {
-  path.origin = point + DVec3(normal) * lift;
-  path.direction = glm::normalize(direction);
-  path.inside = inside;
-  path.dimension += kDimensions;
-  path.density = kNoOther;
-  path.is_first = false;
-  if (path.dimension > kDimensions * (kMostGlass + 2U * path.bounces + 2U * path.scatterings))
-    path.throughput = Vec3(0.0F);
 }
 
 // ---- surfaces ----------------------------------------------------------------------------------------------------
@@ -544,22 +304,6 @@ void PathTile::note_part(Path& path, const Vertex& vertex, std::uint32_t surface
   path.part = kNoPart;
 }
 
-void PathTile::note_behind(Path& path, const SceneHits& hits, int lane, double t) {
-  if (!path.is_first) return;
-  const auto i = static_cast<std::size_t>(lane);
-  Vertex whole;
-  whole.material.colour = Vec3(1.0F);
-  if ((hits.grids.hit >> lane & 1U) != 0 && hits.grids.t[i] <= t) {
-    const IVec3 voxel{hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
-    const bool in_field = (hits.in_field >> lane & 1U) != 0;
-    const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(hits.placed[i])];
-    const VoxelType type = in_field ? hits.material[i] : placed.voxels->get(voxel);
-    note_part(path, whole, surface_id(voxel, hits.grids.face[i], in_field, hits.placed[i], type), false);
-  } else {
-    note_part(path, whole, t < kInfinite ? kGroundSurface : kSkySurface, false);
-  }
-}
-
 void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane) {
   Path& path = paths_[index];
   const auto i = static_cast<std::size_t>(lane);
@@ -602,48 +346,6 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
     const std::int32_t lamp = in_field ? -1 : context_->lamps->lamp_of(vertex.placed, voxel, face);
     add_emitted(path, surface.emitted, lamp, static_cast<float>(hits.grids.t[i]));
   }
-  vertices_.push_back(vertex);
-}
-
-void PathTile::hit_glass(std::uint32_t index, const GlassBody& body, const DVec3& normal_in_grid) {
-  Path& path = paths_[index];
-  const Surface& surface = (*context_->surfaces)[body.type];
-  Vertex vertex;
-  vertex.path = index;
-  vertex.placed = body.placed;
-  const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(body.placed)];
-  vertex.in_grid = context_->view->grid_from_view(body.placed, path.origin + DVec3(path.direction) * body.t_enter);
-  if (!body.in_field) vertex.in_grid = on_face(vertex.in_grid, body.voxel, body.face);
-  vertex.in_grid += normal_in_grid * kRayLift;
-  vertex.normal = glm::normalize(Vec3(placed.world_axes * normal_in_grid));
-  vertex.in_view = context_->view->view_from_grid(body.placed, vertex.in_grid);
-  vertex.material = {surface.colour, 1.0F, 0.0F};
-  if (path.is_first) sums_[path.pixel].scene_share += 1.0F;
-  note_layers(path, vertex, body.t_enter, body.type);
-  add_emitted(path, surface.emitted, -1, 0.0F);
-  vertices_.push_back(vertex);
-}
-
-void PathTile::hit_air(std::uint32_t index, double t, Vec3 colour, float anisotropy, std::int32_t placed) {
-  Path& path = paths_[index];
-  Vertex vertex;
-  vertex.path = index;
-  vertex.placed = placed;
-  vertex.is_medium = true;
-  vertex.anisotropy = anisotropy;
-  vertex.in_view = path.origin + DVec3(path.direction) * t;
-  vertex.material.colour = colour;
-  if (!placed_in(context_->view->tracer()).empty()) {
-    vertex.in_grid = context_->view->grid_from_view(placed, vertex.in_view);
-  }
-  Sums& sums = sums_[path.pixel];
-  if (path.is_first) {
-    sums.scene_share += 1.0F;
-    if (path.is_first_sample) sums.depth = static_cast<float>(t);
-  }
-  // It has no normal, and what lies behind is not what the pixel shows.
-  if (!path.is_noted) sums.albedo += colour;
-  path.is_noted = true;
   vertices_.push_back(vertex);
 }
 

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+
+#include <quoin/core/direction.h>
+#include <quoin/core/hash.h>
+#include <quoin/core/vec.h>
+
+#include "light/glass.h"
+#include "light/surfaces.h"
+#include "render/path/denoise.h"
+#include "render/path/path_math.h"
+
+// What the two halves of PathTile share: path_tile.cpp has surfaces and light, path_tile_media.cpp glass, fog and clouds.
+namespace quoin::path {
+
+inline constexpr double kInfinite = std::numeric_limits<double>::infinity();
+inline constexpr float kNoOther = std::numeric_limits<float>::infinity();  // a density beside which there is no other
+inline constexpr std::uint32_t kDimensions = 8;                            // of a vertex
+inline constexpr std::uint32_t kFog = 0x4000'0000;                         // added to a vertex's: numbers of their own
+inline constexpr std::uint32_t kFade = 0x5000'0000;
+inline constexpr std::uint32_t kGroundSurface = 2;  // beside what surface_id gives
+
+// The dimensions of a vertex.
+namespace dimension {
+inline constexpr std::uint32_t kSun = 0;
+inline constexpr std::uint32_t kLampChoice = 1;
+inline constexpr std::uint32_t kLampPoint = 2;
+inline constexpr std::uint32_t kSky = 3;
+inline constexpr std::uint32_t kDirection = 4;
+inline constexpr std::uint32_t kLobe = 5;
+inline constexpr std::uint32_t kRoulette = 6;
+inline constexpr std::uint32_t kGlass = 7;
+}  // namespace dimension
+
+inline Vec3 tint_of(const Surface& surface, double voxels) {
+  const auto length = static_cast<float>(voxels);
+  if (!(length > 0.0F)) return Vec3(1.0F);
+  Vec3 tint;
+  for (int i = 0; i < 3; ++i) {
+    // Glass that covers all lets nothing through: the difference of infinities is not a number.
+    const float log = surface.log_clarity > -kNoOther ? surface.log_transmittance[i] - surface.log_clarity : 0.0F;
+    tint[i] = exponential(log * length);
+  }
+  return tint;
+}
+
+inline float cover_of(const Surface& surface, double voxels) {
+  return voxels > 0.0 ? 1.0F - exponential(surface.log_clarity * static_cast<float>(voxels)) : 0.0F;
+}
+
+// Of a body, which is a voxel long at least where it has edges that are to be crisp.
+inline double length_of(const Surface& surface, const GlassBody& body) {
+  const bool is_soft = body.starts_inside || body.in_field || surface.scattering > 0.0F;
+  return std::max(body.voxels, is_soft ? 0.0 : 1.0);
+}
+
+// Names the plane of a voxel's face, or a field, of one grid and type; odd.
+inline std::uint32_t surface_id(IVec3 voxel, Direction face, bool in_field, std::int32_t placed, VoxelType type) {
+  const auto plane = in_field ? 0U : static_cast<std::uint32_t>(voxel[frame_of(face).axis]);
+  std::uint32_t id = mix_bits(plane ^ (in_field ? 6U : static_cast<std::uint32_t>(face)) << 28);
+  id = mix_bits(id ^ static_cast<std::uint32_t>(placed));
+  return mix_bits(id ^ static_cast<std::uint32_t>(type)) | 1U;
+}
+
+// How long a way is on which light is scattered `density` times by unit length, on average.
+inline double free_way(float u, double density) {
+  return -static_cast<double>(log_of_two(1.0F - u)) * std::numbers::ln2 / density;
+}
+
+}  // namespace quoin::path
