@@ -125,7 +125,7 @@ struct Room {
   GridHandle handle;
 };
 
-TEST(LitMeshes, OfAChunkThatOnlyItsLightReachesAreMadeAgain) {
+TEST(LiveLitMeshes, OfAChunkThatOnlyItsLightReachesAreMadeAgain) {
   Room room;
   SceneLight light;
   LiveMeshOptions options;
@@ -175,7 +175,7 @@ TEST(LitMeshes, OfAChunkThatOnlyItsLightReachesAreMadeAgain) {
   }
 }
 
-TEST(LitMeshes, NothingIsMadeAgainWhereNothingChanged) {
+TEST(LiveLitMeshes, NothingIsMadeAgainWhereNothingChanged) {
   Room room;
   SceneLight light;
   light.update(room.scene);
@@ -188,7 +188,7 @@ TEST(LitMeshes, NothingIsMadeAgainWhereNothingChanged) {
   EXPECT_EQ(meshes.stats().chunks_meshed, meshed);
 }
 
-TEST(LitMeshes, WithoutLightAnyMoreAreThoseOfBefore) {
+TEST(LiveLitMeshes, WithoutLightAnyMoreAreThoseOfBefore) {
   Room room;
   SceneLight light;
   light.update(room.scene);
@@ -214,7 +214,7 @@ TEST(LitMeshes, WithoutLightAnyMoreAreThoseOfBefore) {
 }
 
 // Light and meshes on workers, each at its own pace: at the end both are of what is there.
-TEST(LitMeshes, FollowLiveLight) {
+TEST(LiveLitMeshes, FollowLiveLight) {
   DarkeningScene world(8);
   LiveLight light;
   LiveMeshes meshes;

@@ -206,10 +206,10 @@ TEST(SceneFile, NamesThePlaceOfWhatIsWrong) {
   }
   EXPECT_EQ(fault_of(file_with(R"({"file": "a", "visible": 1})")), "instances[0].visible: must be true or false");
   EXPECT_EQ(fault_of(file_with("7")), "instances[0]: must be an object");
-  EXPECT_EQ(fault_of(R"({"quoin_scene": 5, "files": [], "instances": []})"),
-            "quoin_scene: version 5 is not known; 1 to 4 are");
+  EXPECT_EQ(fault_of(R"({"quoin_scene": 6, "files": [], "instances": []})"),
+            "quoin_scene: version 6 is not known; 1 to 5 are");
   EXPECT_EQ(fault_of(R"({"quoin_scene": 0, "files": [], "instances": []})"),
-            "quoin_scene: version 0 is not known; 1 to 4 are");
+            "quoin_scene: version 0 is not known; 1 to 5 are");
   EXPECT_EQ(fault_of(R"({"quoin_scene": 1, "files": []})"), "\"instances\" is missing");
   const auto hierarchy = [](const std::string& lists, const std::string& instance) {
     return R"({"quoin_scene": 4, "files": [{"id": "a", "path": "x"}], )" + lists + R"("instances": [{"file": "a")" +
