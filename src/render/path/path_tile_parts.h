@@ -15,7 +15,8 @@
 #include "render/path/denoise.h"
 #include "render/path/path_math.h"
 
-// What the two halves of PathTile share: path_tile.cpp has surfaces and light, path_tile_media.cpp glass, fog and clouds.
+// What the two halves of PathTile share: path_tile.cpp has surfaces and light, path_tile_media.cpp glass, fog and
+// clouds.
 namespace quoin::path {
 
 inline constexpr double kInfinite = std::numeric_limits<double>::infinity();
