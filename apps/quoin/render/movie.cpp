@@ -37,6 +37,7 @@ std::optional<fs::path> find_program(const std::string& name) {
 Result<int> run(const fs::path& program, std::vector<std::string> words) {
   words.insert(words.begin(), program.string());
   std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   posix_spawn_file_actions_t actions;

@@ -394,7 +394,7 @@ Json outcome_json(const RenderArguments& arguments, const Outcome& outcome) {
 }
 
 std::string outcome_text(const Outcome& outcome) {
-  const std::string kept = outcome.kept == 0 ? "" : "Kept " + std::to_string(outcome.kept) + " that were there\n";
+  std::string kept = outcome.kept == 0 ? "" : "Kept " + std::to_string(outcome.kept) + " that were there\n";
   if (outcome.files.empty()) return kept;
   const Picture& picture = outcome.picture;
   const double per_second = static_cast<double>(outcome.rays) / std::max(outcome.trace, 1e-9);

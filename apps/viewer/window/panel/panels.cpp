@@ -69,8 +69,8 @@ void draw_view_menu(const ViewState& state, MenuChoice& choice) {
     menu_item(command, choice, state.open.backend != nullptr);
   }
   ImGui::Separator();
-  for (const Command command : {Command::DrawRays, Command::DrawBlocks, Command::DrawSmooth, Command::DrawDensity,
-                                Command::DrawPaths}) {
+  for (const Command command :
+       {Command::DrawRays, Command::DrawBlocks, Command::DrawSmooth, Command::DrawDensity, Command::DrawPaths}) {
     const int index = static_cast<int>(command) - static_cast<int>(Command::DrawRays);
     menu_item(command, choice, state.open.backend != nullptr, static_cast<int>(state.settings.mode) == index);
   }
