@@ -71,12 +71,6 @@ std::size_t distinct_types(const Scene& scene) {
   return used.size();
 }
 
-std::int64_t voxels_with_data(const Scene& scene) {
-  std::int64_t voxels = 0;
-  scene.grids().for_each([&](GridHandle, const SceneGrid& grid) { voxels += grid.grid.data_count(); });
-  return voxels;
-}
-
 /// Nothing has no box; zeros keep the keys' types.
 Json box(const DBox& bounds) {
   const DBox shown = bounds.empty() ? DBox{DVec3(0.0), DVec3(0.0)} : bounds;

@@ -10,6 +10,12 @@ std::int64_t solid_samples(const Scene& scene) {
   return count;
 }
 
+std::int64_t voxels_with_data(const Scene& scene) {
+  std::int64_t count = 0;
+  scene.grids().for_each([&](GridHandle, const SceneGrid& grid) { count += grid.grid.data_count(); });
+  return count;
+}
+
 std::string content_text(const SceneContent& content) {
   const std::string samples = with_thousands(content.solid_samples);
   if (content.solid_samples == 0) return "Voxels: " + with_thousands(content.voxels);

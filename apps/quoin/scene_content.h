@@ -14,6 +14,7 @@ struct SceneContent {
 };
 
 [[nodiscard]] std::int64_t solid_samples(const Scene& scene);
+[[nodiscard]] std::int64_t voxels_with_data(const Scene& scene);
 
 /// "Voxels: 1,234", "Solid samples: 5,678" or both, in one line without its end.
 [[nodiscard]] std::string content_text(const SceneContent& content);

@@ -2,6 +2,8 @@
 
 #include <quoin/scene/scene_meshes.h>
 
+#include "scene_content.h"
+
 namespace quoin::tool {
 
 void warn_of_lamps(const Scene& scene, std::vector<std::string>& warnings) {
@@ -10,8 +12,7 @@ void warn_of_lamps(const Scene& scene, std::vector<std::string>& warnings) {
 }
 
 void warn_of_data(const Scene& scene, std::vector<std::string>& warnings) {
-  std::int64_t voxels = 0;
-  scene.grids().for_each([&](GridHandle, const SceneGrid& grid) { voxels += grid.grid.data_count(); });
+  const std::int64_t voxels = voxels_with_data(scene);
   if (voxels != 0) warnings.push_back("data of voxels left out, which meshes do not hold: " + std::to_string(voxels));
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/change_journal.h"
+#include "grid/make_room.h"
 
 namespace quoin {
 namespace {
@@ -29,11 +30,6 @@ bool is_same(const VoxelProperties& a, const VoxelProperties& b) {
     if (std::isnan(left.*number) && std::isnan(right.*number)) left.*number = right.*number = 0.0F;
   }
   return left == right;
-}
-
-template <class T>
-void make_room(std::vector<T>& all) {
-  if (all.size() == all.capacity()) all.reserve(2 * all.size() + 1);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "light/surface/light_world_for_tests.h"
+#include "live/placed_light_world_for_tests.h"
 
 namespace quoin {
 namespace {
@@ -48,15 +49,8 @@ void expect_right(const GridLight& lit, const VoxelRegistry& types) {
   expect_equal(*lit.light, wanted);
 }
 
-struct LitScene {
-  explicit LitScene(unsigned seed) {
-    LightWorld world(seed);
-    scene.types = world.types;
-    SceneGrid grid;
-    grid.grid = std::move(world.grid);
-    handle = scene.add_grid(std::move(grid));
-    scene.add_instance({"world", handle});
-  }
+struct LitScene : PlacedLightWorld {
+  using PlacedLightWorld::PlacedLightWorld;
   [[nodiscard]] Grid& grid() { return scene.edit(handle).grid; }
   void edit(std::mt19937& random) {
     for (int i = 0; i < 5; ++i) grid().set(LightWorld::somewhere(random), static_cast<VoxelType>(random() % 5));
@@ -64,9 +58,6 @@ struct LitScene {
     if (random() % 8 == 0)
       grid().fill_box({{-30, 12, -30}, {40, 13, 30}}, random() % 2 == 0 ? kAir : LightWorld::kStone);
   }
-
-  Scene scene;
-  GridHandle handle;
 };
 
 TEST(LiveLight, WhatIsShownIsRightAtAnyTime) {

@@ -16,6 +16,7 @@
 #include <quoin/mesh/blocky.h>
 
 #include "light/surface/light_world_for_tests.h"
+#include "live/placed_light_world_for_tests.h"
 
 namespace quoin {
 namespace {
@@ -23,23 +24,13 @@ namespace {
 using Key = std::tuple<int, int, int>;
 using Surfaces = std::map<Key, std::shared_ptr<const ChunkSurface>>;
 
-struct DarkeningScene {
-  explicit DarkeningScene(unsigned seed) {
-    LightWorld world(seed);
-    scene.types = world.types;
-    SceneGrid grid;
-    grid.grid = std::move(world.grid);
-    handle = scene.add_grid(std::move(grid));
-    scene.add_instance({"world", handle});
-  }
+struct DarkeningScene : PlacedLightWorld {
+  using PlacedLightWorld::PlacedLightWorld;
   [[nodiscard]] const Grid& grid() const { return scene.grids()[handle].grid; }
   void edit(std::mt19937& random) {
     Grid& edited = scene.edit(handle).grid;
     for (int i = 0; i < 5; ++i) edited.set(LightWorld::somewhere(random), static_cast<VoxelType>(random() % 5));
   }
-
-  Scene scene;
-  GridHandle handle;
 };
 
 void take(LiveMeshes& meshes, Surfaces& surfaces, int* count = nullptr) {

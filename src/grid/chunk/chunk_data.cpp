@@ -4,16 +4,9 @@
 
 #include <quoin/core/assert.h>
 
+#include "grid/make_room.h"
+
 namespace quoin {
-namespace {
-
-// So that the next one is put without a failure.
-template <class T>
-void make_room(std::vector<T>& all) {
-  if (all.size() == all.capacity()) all.reserve(2 * all.size() + 1);
-}
-
-}  // namespace
 
 std::size_t SlabData::rank(int row, int x) const {
   int before = std::popcount(stateful_[static_cast<std::size_t>(row)] & ((std::uint64_t{1} << x) - 1));

@@ -45,6 +45,14 @@ PathPicture taken_in(const Scene& scene, const Camera& camera, const PathOptions
   return picture ? std::move(*picture) : PathPicture{};
 }
 
+// Along -z, each pixel alike.
+Camera straight_at_the_front() {
+  Camera camera = towards({0.0, 0.0, 12.0}, {0.0, 0.0, 0.0});
+  camera.projection = Camera::Projection::Orthographic;
+  camera.view_height = 4.0;
+  return camera;
+}
+
 double mean_red(const PathPicture& picture) {
   const auto add = [](double sum, Vec3 light) { return sum + static_cast<double>(light.x); };
   return std::accumulate(picture.radiance.begin(), picture.radiance.end(), 0.0, add) /
@@ -113,9 +121,7 @@ TEST(PathMedia, WhatPassesFallsWithTheLength) {
   options.sky_brightness = 0.0;
   options.max_bounces = 0;
   options.fog = Fog{0.1, Vec3(0.0F), 0.0, 100.0};
-  Camera camera = towards({0.0, 0.0, 12.0}, {0.0, 0.0, 0.0});
-  camera.projection = Camera::Projection::Orthographic;
-  camera.view_height = 4.0;
+  const Camera camera = straight_at_the_front();
   EXPECT_NEAR(mean_red(taken_in(wall, camera, options)), std::exp(-1.2), 0.003);
 
   // The sun above, through 10 of fog down and, as seen from above, 10 up.
@@ -133,9 +139,7 @@ TEST(PathMedia, WhatPassesFallsWithTheLength) {
 TEST(PathMedia, ABlackCloudOnlyTakesAway) {
   for (const int depth : {1, 6}) {
     const Scene scene = box_of(cloud_of({0, 0, 0, 255}, 0.25F), {{-20, -20, -depth}, {20, 20, 0}});
-    Camera camera = towards({0.0, 0.0, 12.0}, {0.0, 0.0, 0.0});
-    camera.projection = Camera::Projection::Orthographic;
-    camera.view_height = 4.0;
+    const Camera camera = straight_at_the_front();
     const PathPicture picture = taken_in(scene, camera, even_sky(16, 256));
     EXPECT_NEAR(mean_red(picture), std::exp(-0.25 * depth), 0.004);
     const double alpha = std::accumulate(picture.alpha.begin(), picture.alpha.end(), 0.0) / 256.0;
