@@ -2,6 +2,7 @@
 
 #include <quoin/render_vk/vulkan_device.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
+#include <quoin/render_vk/vulkan_path_picture.h>
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 
@@ -57,6 +58,14 @@ Status VulkanRenderer::draw(VulkanPicture&, const Camera&, const RenderOptions&,
   return refusal();
 }
 
+Result<PathPicture> VulkanRenderer::render_paths(const Camera&, const PathOptions&, Threads, const Progress&) {
+  return refusal();
+}
+Status VulkanRenderer::draw_paths(VulkanPathPicture&, const Camera&, const PathOptions&, Accumulation, Threads,
+                                  const Progress&) {
+  return refusal();
+}
+
 // A renderer to make these for cannot be had.
 struct VulkanPicture::Impl {};
 
@@ -90,6 +99,29 @@ Status VulkanPicture::record_copy(VkCommandBuffer_T*, const VulkanImageTarget&) 
   return refusal();
 }
 Status VulkanPicture::copy_to(const VulkanImageTarget&) const {
+  return refusal();
+}
+
+struct VulkanPathPicture::Impl {};
+
+VulkanPathPicture::VulkanPathPicture(VulkanRenderer&) {}
+VulkanPathPicture::VulkanPathPicture(VulkanPathPicture&&) noexcept = default;
+VulkanPathPicture& VulkanPathPicture::operator=(VulkanPathPicture&&) noexcept = default;
+VulkanPathPicture::~VulkanPathPicture() = default;
+
+int VulkanPathPicture::width() const {
+  return 0;
+}
+int VulkanPathPicture::height() const {
+  return 0;
+}
+int VulkanPathPicture::samples() const {
+  return 0;
+}
+std::size_t VulkanPathPicture::bytes() const {
+  return 0;
+}
+Result<PathPicture> VulkanPathPicture::read(Threads) const {
   return refusal();
 }
 

@@ -10,6 +10,7 @@
 #include <quoin/core/result.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render_vk/vulkan_device.h>
+#include <quoin/render_vk/vulkan_path_picture.h>
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
@@ -99,6 +100,26 @@ class VulkanRenderer {
   ///           another renderer; `options.depth` means nothing.
   [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options,
                             Accumulation accumulation, Threads threads = {}, const Progress& progress = {});
+
+  /// One picture by paths, as PathTracer::render, of the scene of the last `update`, which must still be there,
+  /// unedited, since faces that glow are found in it.
+  ///
+  /// Equal:  the same paths: they have the same random numbers, and part only where single precision takes one past
+  ///         another voxel. So a picture has the processor's light and the processor's noise, but for such paths.
+  /// Errors: those of PathTracer::render; those above.
+  /// Memory: VulkanPathPicture's.
+  [[nodiscard]] Result<PathPicture> render_paths(const Camera& camera, const PathOptions& options = {},
+                                                 Threads threads = {}, const Progress& progress = {});
+
+  /// Adds `options.samples` samples a pixel to those of a picture by paths, or begins it anew, with
+  /// Accumulation::Restart, if the size is another, or after an error, Cancelled too.
+  ///
+  /// Requires: unless it begins anew, camera and options, but for the count of samples, are those of its other samples;
+  ///           so is the scene, of which this is not checked.
+  /// Errors:   those of `render_paths`; LimitExceeded for more than 65,536 samples, and InvalidArgument for a picture of
+  ///           another renderer.
+  [[nodiscard]] Status draw_paths(VulkanPathPicture& picture, const Camera& camera, const PathOptions& options,
+                                  Accumulation accumulation, Threads threads = {}, const Progress& progress = {});
 
  private:
   friend struct vulkan::Access;

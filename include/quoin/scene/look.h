@@ -12,6 +12,14 @@
 
 namespace quoin {
 
+// What is allowed of a look at most.
+inline constexpr double kMaxBrightness = 1e9;  ///< also of colours of light
+inline constexpr double kMaxAir = 100.0;       ///< times the Earth's
+inline constexpr double kMaxAnisotropy = 0.99;
+inline constexpr double kMaxFogDensity = 1e6;
+inline constexpr double kMaxSunAngleRadians = 3.0;
+inline constexpr int kMaxLensBlades = 64;
+
 /// Where light comes from that comes from infinitely far away.
 enum class SkyModel : std::uint8_t {
   Physical,     ///< a clear sky of the Earth by the sun's height, from noon to night; see AirOptions

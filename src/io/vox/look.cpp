@@ -20,10 +20,6 @@ constexpr double kUsualAir = 0.4;                            // _ray_d, _mie_d a
 constexpr std::array kUsualRayleigh = {45.0, 104.0, 255.0};  // _ray_k, likewise
 constexpr std::array kUsualOzone = {105.0, 255.0, 110.0};
 constexpr double kBloomRadius = 0.05;  // of a _scale of 1
-constexpr double kMost = 1e9;
-constexpr double kMostFog = 1e6;
-constexpr double kMostAir = 100.0;
-constexpr double kMostAnisotropy = 0.99;
 
 // What a key that Quoin does not draw is set to when nobody sets it.
 struct Usual {
@@ -79,7 +75,7 @@ class Settings {
     const auto value = numbers<3>(group, key);
     if (!value) return;
     for (std::size_t i = 0; i < 3; ++i) {
-      out[static_cast<int>(i)] = static_cast<float>(std::clamp((*value)[i] / usual[i], 0.0, kMostAir));
+      out[static_cast<int>(i)] = static_cast<float>(std::clamp((*value)[i] / usual[i], 0.0, kMaxAir));
     }
   }
   [[nodiscard]] bool is_on(std::string_view group, std::string_view key, bool otherwise) {
@@ -125,7 +121,7 @@ double angle_of_area(double area) {
 }
 
 void read_sun(Settings& settings, Look& look) {
-  settings.put("_inf", "_i", 0.0, kMost, look.sun_brightness);
+  settings.put("_inf", "_i", 0.0, kMaxBrightness, look.sun_brightness);
   settings.put_colour("_inf", "_k", look.sun_colour);
   if (const auto angle = settings.numbers<2>("_inf", "_angle")) {
     const double pitch = (*angle)[0] * kRadians;
@@ -138,7 +134,7 @@ void read_sun(Settings& settings, Look& look) {
 
 void read_air(Settings& settings, AirOptions& air) {
   const auto density = [&](const char* key, double& out) {
-    if (const auto value = settings.number("_atm", key)) out = std::clamp(*value / kUsualAir, 0.0, kMostAir);
+    if (const auto value = settings.number("_atm", key)) out = std::clamp(*value / kUsualAir, 0.0, kMaxAir);
   };
   density("_ray_d", air.rayleigh);
   density("_mie_d", air.mie);
@@ -146,7 +142,7 @@ void read_air(Settings& settings, AirOptions& air) {
   settings.put_ratio("_atm", "_ray_k", kUsualRayleigh, air.rayleigh_colour);
   settings.put_ratio("_atm", "_mie_k", {255.0, 255.0, 255.0}, air.mie_colour);
   settings.put_ratio("_atm", "_o3_k", kUsualOzone, air.ozone_colour);
-  settings.put("_atm", "_mie_g", -kMostAnisotropy, kMostAnisotropy, air.mie_anisotropy);
+  settings.put("_atm", "_mie_g", -kMaxAnisotropy, kMaxAnisotropy, air.mie_anisotropy);
 }
 
 void read_sky(Settings& settings, FileLook& out) {
@@ -159,14 +155,14 @@ void read_sky(Settings& settings, FileLook& out) {
   } else if (mode == 2) {
     look.sky = SkyModel::Environment;
     out.environment = settings.text("_ibl", "_path");
-    settings.put("_ibl", "_i", 0.0, kMost, look.sky_brightness);
+    settings.put("_ibl", "_i", 0.0, kMaxBrightness, look.sky_brightness);
     if (const auto turn = settings.number("_ibl", "_rot")) look.environment_turn_radians = *turn * kRadians;
     if (const auto angle = settings.numbers<2>("_ibl", "_angle")) {
       look.environment_turn_radians = (*angle)[1] * kRadians;
     }
   } else {
     look.sky = SkyModel::Uniform;
-    settings.put("_uni", "_i", 0.0, kMost, look.sky_brightness);
+    settings.put("_uni", "_i", 0.0, kMaxBrightness, look.sky_brightness);
     settings.put_colour("_uni", "_k", look.sky_colour);
   }
   for (const char* of_others : {"_uni", "_atm", "_ibl"}) settings.pass(of_others);
@@ -175,15 +171,15 @@ void read_sky(Settings& settings, FileLook& out) {
 void read_fog(Settings& settings, Look& look) {
   Fog fog;
   fog.density = 0.0;
-  settings.put("_fog_uni", "_d", 0.0, kMostFog, fog.density);
+  settings.put("_fog_uni", "_d", 0.0, kMaxFogDensity, fog.density);
   settings.put_colour("_fog_uni", "_k", fog.colour);
-  settings.put("_fog_uni", "_g", -kMostAnisotropy, kMostAnisotropy, fog.anisotropy);
+  settings.put("_fog_uni", "_g", -kMaxAnisotropy, kMaxAnisotropy, fog.anisotropy);
   if (fog.density > 0.0) look.fog = fog;
 }
 
 void read_lens(Settings& settings, Look& look) {
-  constexpr double kMostBlades = 64.0;
-  settings.put("_lens", "_aperture", 0.0, kMost, look.lens_radius);
+  constexpr double kMostBlades = kMaxLensBlades;
+  settings.put("_lens", "_aperture", 0.0, kMaxBrightness, look.lens_radius);
   if (const auto blades = settings.number("_lens", "_blade_n")) {
     look.lens_blades = *blades < 3.0 ? 0 : static_cast<int>(std::min(*blades, kMostBlades));
   }
@@ -191,14 +187,14 @@ void read_lens(Settings& settings, Look& look) {
 }
 
 void read_film(Settings& settings, DevelopOptions& develop) {
-  settings.put("_film", "_expo", 0.0, kMost, develop.exposure);
+  settings.put("_film", "_expo", 0.0, kMaxBrightness, develop.exposure);
   settings.put("_film", "_vig", 0.0, 1.0, develop.vignette);
   settings.put("_film", "_gam", 0.1, 10.0, develop.gamma);
   develop.tone = settings.is_on("_film", "_aces", true) ? ToneCurve::Aces : ToneCurve::Clamp;
   Bloom& bloom = develop.bloom;
   settings.put("_bloom", "_mix", 0.0, 1.0, bloom.mix);
   settings.put("_bloom", "_aspect", -1.0, 1.0, bloom.aspect);
-  settings.put("_bloom", "_threshold", 0.0, kMost, bloom.threshold);
+  settings.put("_bloom", "_threshold", 0.0, kMaxBrightness, bloom.threshold);
   double scale = 0.0;
   settings.put("_bloom", "_scale", 0.0, 1.0 / kBloomRadius, scale);
   bloom.radius = scale * kBloomRadius;

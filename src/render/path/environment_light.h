@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include <quoin/core/image.h>
@@ -29,6 +30,11 @@ class EnvironmentLight {
   /// The brighter, the likelier.
   [[nodiscard]] SkySample sample(Pair u) const;
   [[nodiscard]] float density(Vec3 direction) const;
+
+  // For renderers that look up elsewhere.
+  [[nodiscard]] const RadianceImage& image() const { return image_; }
+  [[nodiscard]] std::span<const float> rows() const { return rows_; }        ///< [height + 1]
+  [[nodiscard]] std::span<const float> columns() const { return columns_; }  ///< [height][width + 1]
 
  private:
   struct Place {

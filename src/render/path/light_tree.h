@@ -40,12 +40,17 @@ class LightTree {
   /// With which `choose` finds that lamp.
   [[nodiscard]] float probability(std::uint32_t lamp, Vec3 point, Vec3 normal) const;
 
- private:
   struct Node {
     LampBounds bounds;
-    std::int32_t second = -1;  // of an inner node: the first child comes right after it
-    std::int32_t lamp = -1;    // of a leaf
+    std::int32_t second = -1;  ///< of an inner node: the first child comes right after it
+    std::int32_t lamp = -1;    ///< of a leaf
   };
+  // For renderers that choose elsewhere.
+  [[nodiscard]] std::span<const Node> nodes() const { return nodes_; }
+  /// [lamp]: a bit a level from the root, 1: the second child.
+  [[nodiscard]] std::span<const std::uint64_t> ways() const { return ways_; }
+
+ private:
   class Builder;
   [[nodiscard]] static float importance(const LampBounds& bounds, Vec3 point, Vec3 normal);
 

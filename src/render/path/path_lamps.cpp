@@ -261,7 +261,7 @@ PathLamp lamp_without_body(const PlacedLamp& from) {
 
 }  // namespace
 
-std::shared_ptr<const PathLamps> PathLampCache::lamps(const Scene& scene, const SceneTracer& tracer,
+std::shared_ptr<const PathLamps> PathLampCache::lamps(const Scene& scene, std::span<const PlacedGrid> placed,
                                                       const Surfaces& surfaces, double brightness) {
   std::erase_if(quads_, [&](const auto& each) { return scene.grids().find(each.first) == nullptr; });
   std::vector<PathLamp> lamps;
@@ -275,12 +275,11 @@ std::shared_ptr<const PathLamps> PathLampCache::lamps(const Scene& scene, const 
   std::vector<Face> faces;
   BlockyMesher mesher;
   std::map<GridHandle, bool> is_known;
-  const std::vector<PlacedGrid>& placed = placed_in(tracer);
   for (std::size_t i = 0; i < placed.size(); ++i) {
     const GridHandle handle = scene.instances()[placed[i].instance].grid;
     EmissiveChunks<Quad>& quads = quads_[handle];
     if (is_known.try_emplace(handle, true).second) {
-      const Grid& grid = *placed[i].voxels;
+      const Grid& grid = scene.grids().find(handle)->grid;
       quads.follow(
           grid, scene.types, [&](const GridChanges& changes) { return chunks_to_mesh(grid, changes); },
           [&](IVec3 chunk) { return emissive_quads(grid, scene.types, chunk, mesher); });

@@ -3,19 +3,20 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
 #include <quoin/mesh/quad.h>
 #include <quoin/scene/scene.h>
-#include <quoin/scene/scene_tracer.h>
 
 #include "light/emissive_chunks.h"
 #include "light/lamp_table.h"
 #include "light/surfaces.h"
 #include "render/path/light_tree.h"
 #include "render/path/path_math.h"
+#include "scene/tracer/placed_grid.h"
 
 namespace quoin::path {
 
@@ -61,13 +62,20 @@ class PathLamps {
   /// Of which lamp it is part; -1: of none.
   [[nodiscard]] std::int32_t lamp_of(std::int32_t placed, IVec3 voxel, Direction face) const;
 
- private:
   struct Face {
     IVec3 voxel{0};
     std::int32_t placed = 0;
-    std::int32_t lamp = -1;
+    std::int32_t lamp = -1;  ///< -1: the slot is free
     Direction direction = Direction::PosX;
   };
+  // For renderers that sample elsewhere.
+  [[nodiscard]] std::span<const PathLamp> lamps() const { return lamps_; }
+  [[nodiscard]] const LightTree& tree() const { return tree_; }
+  [[nodiscard]] DVec3 origin() const { return origin_; }  ///< of the tree's bounds, in the world
+  /// By their hash, as `lamp_of` looks them up; a power of two, or none.
+  [[nodiscard]] std::span<const Face> faces() const { return faces_; }
+
+ private:
   [[nodiscard]] static std::size_t hash_of_face(std::int32_t placed, IVec3 voxel, Direction face);
   void grow();
 
@@ -81,9 +89,9 @@ class PathLamps {
 /// Keeps the faces of a scene's grids that emit light while it is edited.
 class PathLampCache {
  public:
-  /// The lamps of what is traced. `surfaces`: of the scene's types. `brightness`: times what lamps give.
+  /// The lamps of the instances that are placed. `surfaces`: of the scene's types. `brightness`: times what lamps give.
   /// Cost: the quads of chunks that changed, and O(faces that emit).
-  [[nodiscard]] std::shared_ptr<const PathLamps> lamps(const Scene& scene, const SceneTracer& tracer,
+  [[nodiscard]] std::shared_ptr<const PathLamps> lamps(const Scene& scene, std::span<const PlacedGrid> placed,
                                                        const Surfaces& surfaces, double brightness);
 
  private:

@@ -73,7 +73,7 @@ bool PathTile::render(const std::function<bool(std::size_t)>& goes_on) {
       std::swap(active_, next_);
     }
     for (const Path& path : paths_) {
-      Sums& sums = sums_[path.pixel];
+      PixelSums& sums = sums_[path.pixel];
       (path.is_caught ? sums.lit : sums.scene) += path.radiance;
       if (path.part != kNoPart) {
         SurfacePart& part = part_of(path);
@@ -272,7 +272,7 @@ void PathTile::add_emitted(Path& path, Vec3 emitted, std::int32_t lamp, float di
 void PathTile::note_layers(Path& path, const Vertex& vertex, double t, VoxelType type) {
   if (path.is_noted) return;
   path.is_noted = true;
-  Sums& sums = sums_[path.pixel];
+  PixelSums& sums = sums_[path.pixel];
   sums.albedo += vertex.material.colour;
   sums.normal += vertex.normal;
   if (!path.is_first_sample) return;
@@ -325,7 +325,9 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
     vertex.in_grid = on_face(vertex.in_grid, voxel, face);
     type = placed.voxels->get(voxel);
   }
-  const Surface& surface = (*context_->surfaces)[type];
+  // As in smooth meshes, a field without materials is white.
+  static const Surface white{Vec3(1.0F)};
+  const Surface& surface = in_field && type == kAir ? white : (*context_->surfaces)[type];
   if (path.is_first) sums_[path.pixel].scene_share += 1.0F;
   if ((hits.grids.starts_inside >> lane & 1U) != 0) {  // from inside: its own colour, unlit
     path.radiance += path.throughput * (path.is_seen ? surface.colour : surface.emitted);
@@ -366,7 +368,7 @@ void PathTile::hit_ground(std::uint32_t index, double t) {
   vertex.in_view.y = ground_ + kRayLift;
   vertex.normal = {0.0F, 1.0F, 0.0F};
   vertex.material.colour = ground.colour;
-  Sums& sums = sums_[path.pixel];
+  PixelSums& sums = sums_[path.pixel];
   if (path.is_first && ground.only_shadows) {
     path.is_caught = true;
     sums.caught_share += 1.0F;
@@ -557,29 +559,32 @@ void PathTile::trace_request_packet(std::span<const std::uint32_t> requests) {
 // ---- the picture -------------------------------------------------------------------------------------------------
 
 std::int64_t PathTile::pixels_hit() const {
-  return std::count_if(sums_.begin(), sums_.end(), [](const Sums& sums) { return sums.scene_share > 0.0F; });
+  return std::count_if(sums_.begin(), sums_.end(), [](const PixelSums& sums) { return sums.scene_share > 0.0F; });
+}
+
+void PixelSums::write_to(PathPicture& picture, std::size_t pixel, int samples) const {
+  const auto count = static_cast<float>(samples);
+  Vec3 passed(1.0F);
+  for (int channel = 0; channel < 3; ++channel) {
+    if (open[channel] > 0.0F) passed[channel] = std::min(lit[channel] / open[channel], 1.0F);
+  }
+  picture.scene[pixel] = scene / count;
+  picture.radiance[pixel] = (scene + background + caught * passed) / count;
+  picture.alpha[pixel] = std::min((scene_share + caught_share * (1.0F - luminance(passed))) / count, 1.0F);
+  if (picture.depth.values.empty()) return;
+  picture.albedo[pixel] = albedo / count;
+  picture.normal[pixel] = normal / count;
+  picture.depth.values[pixel] = depth;
+  picture.types[pixel] = type;
+  picture.instances[pixel] = instance;
 }
 
 void PathTile::write_to(PathPicture& picture) const {
-  const auto samples = static_cast<float>(context_->options->samples);
   for (int y = 0; y < std::min(kEdge, picture.height - row_); ++y) {
     for (int x = 0; x < std::min(kEdge, picture.width - column_); ++x) {
-      const Sums& sums = sums_[static_cast<std::size_t>(y * kEdge + x)];
       const std::size_t to = static_cast<std::size_t>(row_ + y) * static_cast<std::size_t>(picture.width) +
                              static_cast<std::size_t>(column_ + x);
-      Vec3 passed(1.0F);
-      for (int channel = 0; channel < 3; ++channel) {
-        if (sums.open[channel] > 0.0F) passed[channel] = std::min(sums.lit[channel] / sums.open[channel], 1.0F);
-      }
-      picture.scene[to] = sums.scene / samples;
-      picture.radiance[to] = (sums.scene + sums.background + sums.caught * passed) / samples;
-      picture.alpha[to] = std::min((sums.scene_share + sums.caught_share * (1.0F - luminance(passed))) / samples, 1.0F);
-      if (picture.depth.values.empty()) continue;
-      picture.albedo[to] = sums.albedo / samples;
-      picture.normal[to] = sums.normal / samples;
-      picture.depth.values[to] = sums.depth;
-      picture.types[to] = sums.type;
-      picture.instances[to] = sums.instance;
+      sums_[static_cast<std::size_t>(y * kEdge + x)].write_to(picture, to, context_->options->samples);
     }
   }
 }

@@ -35,6 +35,25 @@ struct TileContext {
   bool has_media = false;         ///< fog or clouds
 };
 
+/// What a pixel's samples add up to.
+struct PixelSums {
+  Vec3 background{0.0F};  ///< what is seen of it
+  Vec3 scene{0.0F};
+  Vec3 caught{0.0F};  ///< background behind ground that only catches shadows
+  Vec3 lit{0.0F};     ///< that ground
+  Vec3 open{0.0F};    ///< and what light it would have if nothing was on it
+  float scene_share = 0.0F;
+  float caught_share = 0.0F;
+  Vec3 albedo{0.0F};
+  Vec3 normal{0.0F};
+  float depth = 0.0F;
+  VoxelType type = kAir;
+  std::uint32_t instance = 0;
+
+  /// Puts their means in place.
+  void write_to(PathPicture& picture, std::size_t pixel, int samples) const;
+};
+
 /// One square of a picture.
 ///
 ///   begin -> [ order -> meet -> shade -> ask what shadows light ] until no path is left -> add
@@ -108,20 +127,6 @@ class PathTile {
     double begin = 0.0;
     double end = 0.0;
   };
-  struct Sums {
-    Vec3 background{0.0F};  // what is seen of it
-    Vec3 scene{0.0F};
-    Vec3 caught{0.0F};  // background behind ground that only catches shadows
-    Vec3 lit{0.0F};     // that ground
-    Vec3 open{0.0F};    // and what light it would have if nothing was on it
-    float scene_share = 0.0F;
-    float caught_share = 0.0F;
-    Vec3 albedo{0.0F};
-    Vec3 normal{0.0F};
-    float depth = 0.0F;
-    VoxelType type = kAir;
-    std::uint32_t instance = 0;
-  };
 
   void begin(int first, int count);
   // A point of the lens, of radius 1.
@@ -181,7 +186,7 @@ class PathTile {
   std::vector<std::uint32_t> order_;
   std::vector<std::uint32_t> starts_;  // of counting sorts
   std::vector<GlassBody> glass_;
-  std::vector<Sums> sums_;
+  std::vector<PixelSums> sums_;
 };
 
 }  // namespace quoin::path

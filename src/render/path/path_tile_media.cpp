@@ -237,7 +237,7 @@ void PathTile::hit_air(std::uint32_t index, double t, Vec3 colour, float anisotr
   if (!placed_in(context_->view->tracer()).empty()) {
     vertex.in_grid = context_->view->grid_from_view(placed, vertex.in_view);
   }
-  Sums& sums = sums_[path.pixel];
+  PixelSums& sums = sums_[path.pixel];
   if (path.is_first) {
     sums.scene_share += 1.0F;
     if (path.is_first_sample) sums.depth = static_cast<float>(t);

@@ -14,136 +14,13 @@
 #include "light/surfaces.h"
 #include "render/path/denoise.h"
 #include "render/path/path_lamps.h"
+#include "render/path/path_request.h"
 #include "render/path/path_tile.h"
 #include "render/path/sky_light.h"
-#include "render/picture_request.h"
 #include "render/tile_progress.h"
 #include "scene/tracer/scene_view.h"
 
 namespace quoin {
-namespace {
-
-constexpr int kMaxPathSamples = 65'536;
-constexpr int kMaxBounces = 1'024;
-constexpr double kMostBrightness = 1e9;
-constexpr double kMostAir = 100.0;
-constexpr double kWidestSun = 3.0;
-constexpr double kMostAnisotropy = 0.99;
-constexpr double kMostFog = 1e6;
-constexpr int kMostBlades = 64;
-
-Status refuse(const std::string& message) {
-  return make_error(ErrorCode::InvalidArgument, message);
-}
-
-bool is_brightness(double value) {
-  return value >= 0.0 && value <= kMostBrightness;
-}
-
-bool is_colour(Vec3 colour, float most) {
-  return std::min({colour.x, colour.y, colour.z}) >= 0.0F && std::max({colour.x, colour.y, colour.z}) <= most &&
-         is_finite(DVec3(colour));
-}
-
-bool is_anisotropy(double value) {
-  return value >= -kMostAnisotropy && value <= kMostAnisotropy;
-}
-
-Status check_air(const AirOptions& air) {
-  for (const double part : {air.rayleigh, air.mie, air.ozone}) {
-    if (!(part >= 0.0 && part <= kMostAir)) return refuse("air: must be 0 to 100 each");
-  }
-  for (const Vec3& colour : {air.rayleigh_colour, air.mie_colour, air.ozone_colour}) {
-    if (!is_colour(colour, static_cast<float>(kMostAir))) return refuse("air: its colours must be 0 to 100 each");
-  }
-  return is_anisotropy(air.mie_anisotropy) ? Status() : refuse("air: its mie_anisotropy must be -0.99 to 0.99");
-}
-
-Status check_ground(const GroundPlane& ground) {
-  if (!std::isfinite(ground.height)) return refuse("ground: its height must be finite");
-  if (!is_colour(ground.colour, 1.0F)) return refuse("ground: its colour must be 0 to 1 each");
-  return ground.fade >= 0.0 && ground.fade <= 1.0 ? Status() : refuse("ground: its fade must be 0 to 1");
-}
-
-Status check_fog(const Fog& fog) {
-  if (!(fog.density >= 0.0 && fog.density <= kMostFog)) return refuse("fog: its density must be 0 to 1e6");
-  if (!is_colour(fog.colour, 1.0F)) return refuse("fog: its colour must be 0 to 1 each");
-  if (!is_anisotropy(fog.anisotropy)) return refuse("fog: its anisotropy must be -0.99 to 0.99");
-  return std::isfinite(fog.top) ? Status() : refuse("fog: its top must be finite");
-}
-
-Status check_lens(const Look& look) {
-  if (!(look.lens_radius >= 0.0) || !std::isfinite(look.lens_radius)) {
-    return refuse("lens_radius: must be finite and at least 0");
-  }
-  if (!(look.focus_distance > 0.0) || !std::isfinite(look.focus_distance)) {
-    return refuse("focus_distance: must be finite and more than 0");
-  }
-  if (look.lens_blades != 0 && (look.lens_blades < 3 || look.lens_blades > kMostBlades)) {
-    return refuse("lens_blades: must be 0, or 3 to 64");
-  }
-  return std::isfinite(look.lens_turn_radians) ? Status() : refuse("lens_turn_radians: must be finite");
-}
-
-Status check_sky(const Look& options) {
-  if (!is_finite(options.sun) || options.sun == DVec3(0.0)) return refuse("sun: must be finite and not 0");
-  if (!(options.sun_angle_radians >= 0.0 && options.sun_angle_radians <= kWidestSun)) {
-    return refuse("sun_angle_radians: must be 0 to 3");
-  }
-  if (!is_brightness(options.sun_brightness)) return refuse("sun_brightness: must be 0 to 1e9");
-  if (!is_brightness(options.sky_brightness)) return refuse("sky_brightness: must be 0 to 1e9");
-  if (!is_brightness(options.lamp_brightness)) return refuse("lamp_brightness: must be 0 to 1e9");
-  if (!is_colour(options.sky_colour, static_cast<float>(kMostBrightness))) {
-    return refuse("sky_colour: must be 0 to 1e9 each");
-  }
-  if (!is_colour(options.sun_colour, static_cast<float>(kMostBrightness))) {
-    return refuse("sun_colour: must be 0 to 1e9 each");
-  }
-  if (options.background && !is_colour(*options.background, static_cast<float>(kMostBrightness))) {
-    return refuse("background: must be 0 to 1e9 each");
-  }
-  if (Status air = check_air(options.air); !air) return air;
-  if (!std::isfinite(options.environment_turn_radians)) return refuse("environment_turn_radians: must be finite");
-  if (options.sky != SkyModel::Environment) return {};
-  const RadianceImage* const image = options.environment.get();
-  const bool is_whole =
-      image != nullptr && image->width > 0 && image->height > 0 &&
-      image->rgb.size() == 3 * static_cast<std::size_t>(image->width) * static_cast<std::size_t>(image->height);
-  return is_whole ? Status() : refuse("environment: must be an image of at least one pixel");
-}
-
-Status check(const Camera& camera, const PathOptions& options) {
-  if (Status picture = check_picture(camera, options.width, options.height); !picture) return picture;
-  if (options.samples < 1 || options.samples > kMaxPathSamples) return refuse("samples: must be 1 to 65536");
-  if (options.max_bounces < 0 || options.max_bounces > kMaxBounces) return refuse("max_bounces: must be 0 to 1024");
-  if (options.max_scatterings < 0 || options.max_scatterings > kMaxBounces) {
-    return refuse("max_scatterings: must be 0 to 1024");
-  }
-  if (Status ground = options.ground ? check_ground(*options.ground) : Status(); !ground) return ground;
-  if (Status fog = options.fog ? check_fog(*options.fog) : Status(); !fog) return fog;
-  if (Status lens = check_lens(options); !lens) return lens;
-  return check_sky(options);
-}
-
-PathPicture empty_picture(const PathOptions& options) {
-  const auto pixels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
-  PathPicture picture;
-  picture.width = options.width;
-  picture.height = options.height;
-  picture.radiance.resize(pixels);
-  picture.scene.resize(pixels);
-  picture.alpha.resize(pixels);
-  if (!options.layers) return picture;
-  picture.albedo.resize(pixels);
-  picture.normal.resize(pixels);
-  picture.depth = {options.width, options.height, std::vector<float>(pixels)};
-  picture.types.resize(pixels);
-  picture.instances.resize(pixels);
-  return picture;
-}
-
-}  // namespace
-
 struct PathTracer::Impl {
   Impl(const Scene& of_scene, InstanceFilter filter, Threads threads)
       : scene(&of_scene), tracer(of_scene, filter, threads), surfaces(of_scene.types, Clouds::Scatter) {}
@@ -155,7 +32,7 @@ struct PathTracer::Impl {
   [[nodiscard]] std::shared_ptr<const path::PathLamps> lamps(double brightness) {
     const std::lock_guard lock(mutex_);
     if (made_ == nullptr || made_of_ != brightness) {
-      made_ = cache_.lamps(*scene, tracer, surfaces, brightness);
+      made_ = cache_.lamps(*scene, placed_in(tracer), surfaces, brightness);
       made_of_ = brightness;
     }
     return made_;
@@ -187,11 +64,7 @@ void PathTracer::update(Threads threads) {
 
 Result<PathPicture> PathTracer::render(const Camera& camera, const PathOptions& options, Threads threads,
                                        const Progress& progress) const {
-  if (const Status status = check(camera, options); !status) return status.error();
-  QUOIN_ASSERT(std::abs(glm::dot(camera.right, camera.up)) < 1e-3 &&
-                   std::abs(glm::dot(camera.right, camera.forward)) < 1e-3 &&
-                   std::abs(glm::dot(camera.up, camera.forward)) < 1e-3,
-               "the camera's axes are perpendicular");
+  if (const Status status = path::check(camera, options); !status) return status.error();
   Impl& impl = content_of(impl_);
   const SceneView view(impl.tracer, camera.position);
   const std::shared_ptr<const path::PathLamps> lamps = impl.lamps(options.lamp_brightness);
@@ -208,7 +81,7 @@ Result<PathPicture> PathTracer::render(const Camera& camera, const PathOptions& 
                                   &options,
                                   parts ? &*parts : nullptr,
                                   options.fog.has_value() || impl.surfaces.has_clouds()};
-  PathPicture picture = empty_picture(options);
+  PathPicture picture = path::empty_picture(options);
   if (Status drawn = draw_tiles<path::PathTile>(context, options, threads, progress, picture); !drawn)
     return drawn.error();
   if (parts) path::denoise(*parts, options.samples, threads, picture);

@@ -65,6 +65,8 @@ class GlossTable {
     float scale = 1.0F;  // times F0
     float bias = 0.0F;
   };
+  static_assert(sizeof(Entry) == 2 * sizeof(float));
+  [[nodiscard]] std::span<const float> numbers() const { return {&entries_[0].scale, 2 * entries_.size()}; }
   [[nodiscard]] Entry at(float cosine, float roughness) const {
     const float x = std::clamp(cosine, 0.0F, 1.0F) * (kEdge - 1);
     const float y = std::clamp(roughness, 0.0F, 1.0F) * (kEdge - 1);
@@ -81,7 +83,7 @@ class GlossTable {
   }
 
  private:
-  static constexpr int kEdge = 32;
+  static constexpr int kEdge = kGlossEdge;
   GlossTable() {
     for (int j = 0; j < kEdge; ++j) {
       for (int i = 0; i < kEdge; ++i) entries_[static_cast<std::size_t>(j * kEdge + i)] = integrate(i, j);
@@ -113,6 +115,10 @@ class GlossTable {
 };
 
 }  // namespace
+
+std::span<const float> gloss_table() {
+  return GlossTable::shared().numbers();
+}
 
 Scatter::Scatter(const Material& material, Vec3 out) : out_(out), colour_(material.colour) {
   const float metal = std::clamp(material.metalness, 0.0F, 1.0F);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+
 #include <quoin/core/vec.h>
 
 #include "render/path/path_math.h"
@@ -69,5 +71,10 @@ class Scatter {
   bool is_medium_ = false;
   float anisotropy_ = 0.0F;
 };
+
+/// What gloss reflects of all light that comes from everywhere, as Scatter looks it up: [roughness][cosine] in kGlossEdge
+/// steps from 0 to 1 each, two numbers each, of which the first is times what it reflects straight down.
+constexpr int kGlossEdge = 32;
+[[nodiscard]] std::span<const float> gloss_table();
 
 }  // namespace quoin::path

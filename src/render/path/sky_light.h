@@ -36,6 +36,17 @@ class SkyLight {
   [[nodiscard]] SkySample sample_sky(Pair u) const;
   [[nodiscard]] float sky_density(Vec3 direction) const;
 
+  // For renderers that look up elsewhere.
+  [[nodiscard]] SkyModel model() const { return model_; }
+  [[nodiscard]] Vec3 to_sun() const { return to_sun_; }
+  [[nodiscard]] float one_less_cos() const { return one_less_cos_; }  ///< of half the angle of its disc; 0: it has none
+  [[nodiscard]] float brightness() const { return brightness_; }      ///< times the sky's light
+  [[nodiscard]] Vec3 uniform() const { return uniform_; }
+  [[nodiscard]] const SkyColours& gradient() const { return gradient_; }
+  [[nodiscard]] SineCosine turn() const { return turn_; }
+  [[nodiscard]] const SkyMap* air() const { return air_ ? &*air_ : nullptr; }
+  [[nodiscard]] const EnvironmentLight* image() const { return image_ ? &*image_ : nullptr; }
+
  private:
   SkyModel model_;
   Vec3 to_sun_{0.0F, 1.0F, 0.0F};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include <quoin/core/vec.h>
@@ -40,8 +41,11 @@ class SkyMap {
     return (row[0] * (1.0F - fx) + row[1] * fx) * (1.0F - fy) + (next[0] * (1.0F - fx) + next[1] * fx) * fy;
   }
 
+  static constexpr int kEdge = 256;  ///< steps between two corners of the square
+  /// [y][x] of the square's corners, kEdge + 1 a row.
+  [[nodiscard]] std::span<const Vec3> pixels() const { return pixels_; }
+
  private:
-  static constexpr int kEdge = 256;
   static std::size_t index(int x, int y) { return static_cast<std::size_t>(y * (kEdge + 1) + x); }
   static Vec3 direction_of(int x, int y) {
     const float u = static_cast<float>(x) / (kEdge / 2.0F) - 1.0F;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <quoin/render_vk/vulkan_path_picture.h>
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 
@@ -9,12 +10,15 @@ namespace quoin::vulkan {
 struct Access {
   using Renderer = VulkanRenderer::Impl;
   using Picture = VulkanPicture::Impl;
+  using PathPicture = VulkanPathPicture::Impl;
 
   [[nodiscard]] static Renderer& of(VulkanRenderer& renderer) { return *renderer.impl_; }
   [[nodiscard]] static Picture& of(VulkanPicture& picture) { return *picture.impl_; }
+  [[nodiscard]] static PathPicture& of(VulkanPathPicture& picture) { return *picture.impl_; }
 };
 
 using RendererImpl = Access::Renderer;
 using PictureImpl = Access::Picture;
+using PathPictureImpl = Access::PathPicture;
 
 }  // namespace quoin::vulkan

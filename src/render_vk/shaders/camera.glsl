@@ -1,29 +1,9 @@
 // The camera's rays, one an invocation; in view, and in the grids of instances.
+#include "picture_rays.glsl"
 
 // Where the invocation's ray crosses the picture, in pixels.
 vec2 picture_point() {
   return vec2(push.corner + tile_pixel()) + push.point;
-}
-
-vec3 picture_vector(vec2 point) {
-  Frame f = frame();
-  return f.corner.xyz + f.right.xyz * point.x + f.down.xyz * point.y;
-}
-
-// A camera's ray. It starts where view space has its origin, at frame().view_depth times length_a_depth.
-ViewRay camera_ray(vec2 point) {
-  Frame f = frame();
-  vec3 start = f.start.xyz + f.start_x.xyz * point.x + f.start_y.xyz * point.y;
-  if (!has(kPerspective)) return ViewRay(start, f.forward.xyz);
-  vec3 d = picture_vector(point) + f.forward.xyz;
-  return ViewRay(start, d * (1.0 / sqrt(dot(d, d))));
-}
-
-// The ray's length by which its forward component grows by 1.
-float length_a_depth(vec2 point) {
-  if (!has(kPerspective)) return 1.0;
-  vec3 d = picture_vector(point) + frame().forward.xyz;
-  return sqrt(dot(d, d));
 }
 
 // How far behind where view space has its origin the point lies on its ray; what shows nothing lies nowhere.

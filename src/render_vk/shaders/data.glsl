@@ -236,6 +236,5 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   uint far_count;  // 0: nothing is drawn from impostors
   uint lamp_mask;  // of slots of bricks
   uint light_mask;  // of slots of bricks of levels
-  uint pad0;
-  uint pad1;
+  uvec2 paths;  // of a picture by paths: paths/path_data.glsl
 };

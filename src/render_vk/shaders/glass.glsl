@@ -10,8 +10,11 @@ const float kTouching = 4e-6;
 bool reaches(Body body, float t) {
   return t <= body.lengths.y + kTouching * max(1.0, body.lengths.y);
 }
-// No body of a field counts as longer than it is, nor one from within.
+// No body of a field counts as longer than it is, nor one from within, nor a cloud.
 bool has_own_length(Body body) {
+#ifdef HAS_CLOUDS
+  if (surface_of(body.what.x).scattering > 0.0) return true;
+#endif
   return (body.what.z & kHowItBegins) != 0;
 }
 bool continues(Body body, Body next) {

@@ -1,4 +1,5 @@
 // What lights others: light/lamp_table.h on the processor's side.
+#include "hash.glsl"
 
 struct Lamp {
   vec4 position;  // in view; w: its reach
@@ -20,16 +21,6 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer La
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer LampBricks {
   LampBrick at[];
 };
-
-// A well-mixed number of one.
-uint mixed(uint x) {
-  x = (x ^ (x >> 16)) * 0x7FEB352Du;
-  x = (x ^ (x >> 15)) * 0x846CA68Bu;
-  return x ^ (x >> 16);
-}
-uint hash_of(uint a, uint b) {
-  return mixed(a * 0x9E3779B9u + b * 0x85EBCA6Bu + 0x27D4EB2Fu);
-}
 
 // The lamps of a brick of 16^3 voxels of an instance's full grid: the first in the lists, and how many.
 uvec2 lamps_at(ivec3 brick, int placed) {

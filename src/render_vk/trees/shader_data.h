@@ -216,7 +216,7 @@ struct ShaderFrame {
   std::uint32_t far_count = 0;
   std::uint32_t lamp_mask = 0;
   std::uint32_t light_mask = 0;
-  std::array<std::uint32_t, 2> pad{};
+  std::uint64_t paths = 0;
 };
 
 struct ShaderPush {

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+
+#include <quoin/render_vk/vulkan_path_picture.h>
+#include <quoin/scene/camera.h>
+
+#include "render_vk/device/access.h"
+#include "render_vk/device/memory.h"
+
+namespace quoin {
+
+/// What VulkanPathPicture is to those who draw it.
+struct VulkanPathPicture::Impl {
+  explicit Impl(vulkan::Device& of_device) : device(&of_device) {}
+
+  /// Room for a picture, of which nothing was drawn so far. Errors: LimitExceeded, after which it has none.
+  [[nodiscard]] Status begin(const Camera& of_camera, const PathOptions& with_options);
+
+  vulkan::Device* device;
+  int samples = 0;
+  std::int64_t rays = 0;
+  // What its samples were drawn with.
+  Camera camera;
+  PathOptions options;
+  vulkan::Buffer sums;   ///< vectors of four floats a pixel: path_data.glsl
+  vulkan::Buffer parts;  ///< of surfaces, for the denoiser
+};
+
+}  // namespace quoin

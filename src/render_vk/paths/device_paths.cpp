@@ -1,0 +1,170 @@
+#include "render_vk/paths/device_paths.h"
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+#include <glm/common.hpp>
+
+#include "render/path/scatter.h"
+
+namespace quoin::vulkan {
+namespace {
+
+Vec4 to_vec4(Vec3 v, float w = 0.0F) {
+  return {v, w};
+}
+
+// What types look like by paths: four vectors each, and those of types beyond the last.
+std::vector<Vec4> path_surface_table(const Surfaces& surfaces, std::size_t types) {
+  // A product with an infinite logarithm is not sure to be a number on every device.
+  constexpr float kLeast = -1e30F;
+  std::vector<Vec4> table;
+  table.reserve(4 * (types + 1));
+  for (std::size_t type = 0; type <= types; ++type) {
+    const Surface& surface = surfaces[static_cast<VoxelType>(std::min(type, kMaxVoxelTypes))];
+    table.push_back(to_vec4(surface.colour, std::max(surface.log_clarity, kLeast)));
+    table.push_back(to_vec4(surface.emitted, surface.ior));
+    table.push_back(to_vec4(glm::max(surface.log_transmittance, Vec3(kLeast)), surface.roughness));
+    table.emplace_back(surface.metalness, surface.scattering, surface.anisotropy, 0.0F);
+  }
+  return table;
+}
+
+// Whether skies are the same; the rest of a look does not matter to them.
+bool is_same_sky(Look a, const Look& b) {
+  a.background = b.background;
+  a.ground = b.ground;
+  a.fog = b.fog;
+  a.lamp_brightness = b.lamp_brightness;
+  a.lens_radius = b.lens_radius;
+  a.focus_distance = b.focus_distance;
+  a.lens_blades = b.lens_blades;
+  a.lens_turn_radians = b.lens_turn_radians;
+  a.sun_is_seen = b.sun_is_seen;
+  return a == b;
+}
+
+template <class T>
+Status put_values(DeviceMemory& memory, Place& place, std::span<const T> values) {
+  return put_table(memory, place, std::as_bytes(values));
+}
+
+}  // namespace
+
+void DevicePaths::look_at(const Scene* scene) {
+  lamps_ = nullptr;
+  has_sent_surfaces_ = false;
+  if (scene != scene_) {
+    cache_ = {};
+    surfaces_.reset();
+  }
+  scene_ = scene;
+  if (scene == nullptr) return;
+  if (surfaces_) {
+    surfaces_->update(scene->types);
+  } else {
+    surfaces_.emplace(scene->types, Clouds::Scatter);
+  }
+}
+
+std::shared_ptr<const path::PathLamps> DevicePaths::lamps(const Placement& placement, double brightness) {
+  if (lamps_ != nullptr && brightness_ == brightness) return lamps_;
+  std::vector<PlacedGrid> placed;
+  placed.reserve(placement.placed.size());
+  for (const DevicePlaced& each : placement.placed) placed.push_back(each.placed);
+  lamps_ = cache_.lamps(*scene_, placed, *surfaces_, brightness);
+  brightness_ = brightness;
+  return lamps_;
+}
+
+Status DevicePaths::put(DeviceMemory& memory, const PathOptions& options, ShaderPathFrame& frame) {
+  Status done = try_put(memory, options, frame);
+  if (done) return done;
+  memory.discard();
+  for (Place* place : {&surfaces_place_, &sky_pixels_, &sky_rows_, &sky_columns_, &gloss_}) memory.release(*place);
+  has_sent_surfaces_ = false;
+  look_.reset();
+  return done;
+}
+
+Status DevicePaths::try_put(DeviceMemory& memory, const PathOptions& options, ShaderPathFrame& frame) {
+  Status done = put_surfaces(memory);
+  if (done) done = put_sky(memory, options);
+  if (done && gloss_.size == 0) done = put_values(memory, gloss_, path::gloss_table());
+  if (!done) return done;
+  frame.gloss = gloss_.address;
+  frame.sky_model = static_cast<std::int32_t>(sky_->model());
+  frame.to_sun = to_vec4(sky_->to_sun(), sky_->one_less_cos());
+  frame.sunlight = to_vec4(sky_->sun_irradiance(), options.sun_is_seen ? 1.0F : 0.0F);
+  frame.sky = to_vec4(sky_->uniform(), sky_->brightness());
+  frame.sky_pixels = sky_pixels_.address;
+  if (const path::EnvironmentLight* const image = sky_->image(); image != nullptr) {
+    frame.sky_width = image->image().width;
+    frame.sky_height = image->image().height;
+    frame.sky_rows = sky_rows_.address;
+    frame.sky_columns = sky_columns_.address;
+  }
+  frame.environment = {sky_->turn().sine, sky_->turn().cosine, 0.0F, 0.0F};
+  if (sky_->has_sun()) frame.flags |= kPathSun;
+  if (sky_->has_uneven_sky()) frame.flags |= kPathUneven;
+  return done;
+}
+
+Status DevicePaths::put_surfaces(DeviceMemory& memory) {
+  if (has_sent_surfaces_ || scene_ == nullptr) return {};
+  const std::vector<Vec4> table = path_surface_table(*surfaces_, scene_->types.size());
+  Status done = put_values(memory, surfaces_place_, std::span<const Vec4>(table));
+  last_surface_ = static_cast<std::uint32_t>(scene_->types.size());
+  has_sent_surfaces_ = static_cast<bool>(done);
+  return done;
+}
+
+Status DevicePaths::put_sky(DeviceMemory& memory, const Look& look) {
+  if (look_ && is_same_sky(*look_, look)) return {};
+  look_.reset();
+  sky_ = std::make_unique<const path::SkyLight>(look);
+  Status done;
+  if (const path::SkyMap* const air = sky_->air(); air != nullptr) done = put_values(memory, sky_pixels_, air->pixels());
+  if (const path::EnvironmentLight* const image = sky_->image(); image != nullptr) {
+    done = put_values(memory, sky_pixels_, std::span<const float>(image->image().rgb));
+    if (done) done = put_values(memory, sky_rows_, image->rows());
+    if (done) done = put_values(memory, sky_columns_, image->columns());
+  }
+  if (done) look_ = look;
+  return done;
+}
+
+LampTables lamp_tables(const path::PathLamps& lamps, DVec3 view_origin) {
+  LampTables tables;
+  tables.lamps.reserve(lamps.size());
+  for (const path::PathLamp& from : lamps.lamps()) {
+    ShaderPathLamp& lamp = tables.lamps.emplace_back();
+    lamp.corner = to_vec4(Vec3(from.corner - view_origin), from.is_point ? from.reach : 0.0F);
+    lamp.u = to_vec4(from.u, from.size_u);
+    lamp.v = to_vec4(from.v, from.size_v);
+    lamp.normal = to_vec4(from.normal, from.cos_inner);
+    lamp.radiance = to_vec4(from.radiance, from.cos_outer);
+  }
+  const Vec3 to_view(lamps.origin() - view_origin);
+  for (const path::LightTree::Node& from : lamps.tree().nodes()) {
+    ShaderLampNode& node = tables.nodes.emplace_back();
+    node.low = to_vec4(from.bounds.low + to_view, from.bounds.power);
+    node.high = to_vec4(from.bounds.high + to_view, from.bounds.cos_spread);
+    node.axis = to_vec4(from.bounds.axis, from.bounds.cos_edge);
+    node.next = {from.second, from.lamp, 0, 0};
+  }
+  tables.ways.assign(lamps.tree().ways().begin(), lamps.tree().ways().end());
+  for (const path::PathLamps::Face& face : lamps.faces()) {
+    tables.face_keys.emplace_back(face.voxel, face.placed * 8 + static_cast<std::int32_t>(face.direction));
+    tables.face_lamps.push_back(face.lamp);
+  }
+  // Where no face glows a lookup still needs a free slot.
+  if (tables.face_lamps.empty()) {
+    tables.face_keys.emplace_back(0);
+    tables.face_lamps.push_back(-1);
+  }
+  return tables;
+}
+
+}  // namespace quoin::vulkan

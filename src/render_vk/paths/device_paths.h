@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <quoin/render/path_tracer.h>
+
+#include "light/surfaces.h"
+#include "render/path/path_lamps.h"
+#include "render/path/sky_light.h"
+#include "render_vk/device/memory.h"
+#include "render_vk/march/device_scene.h"
+#include "render_vk/paths/path_data.h"
+
+namespace quoin::vulkan {
+
+/// What paths look up, in device memory: types as light by paths sees them, the sky, what gloss reflects. It is sent
+/// again where it is another than before.
+class DevicePaths {
+ public:
+  /// Of this scene from now on, as it is now; null: there is none. What lights others is found anew.
+  void look_at(const Scene* scene);
+
+  /// Puts in place what a picture needs, and says so in its frame; all but lamps.
+  /// Errors: LimitExceeded; after one it holds nothing.
+  [[nodiscard]] Status put(DeviceMemory& memory, const PathOptions& options, ShaderPathFrame& frame);
+
+  /// The lamps of the instances that are placed. Requires: a scene, unedited since `look_at`.
+  [[nodiscard]] std::shared_ptr<const path::PathLamps> lamps(const Placement& placement, double brightness);
+
+  [[nodiscard]] std::uint64_t surfaces_address() const { return surfaces_place_.address; }
+  [[nodiscard]] std::uint32_t last_surface() const { return last_surface_; }
+  [[nodiscard]] bool has_clouds() const { return surfaces_ && surfaces_->has_clouds(); }
+  [[nodiscard]] const path::SkyLight& sky() const { return *sky_; }  ///< of the last `put`
+
+ private:
+  Status try_put(DeviceMemory& memory, const PathOptions& options, ShaderPathFrame& frame);
+  Status put_surfaces(DeviceMemory& memory);
+  Status put_sky(DeviceMemory& memory, const Look& look);
+
+  const Scene* scene_ = nullptr;
+  std::optional<Surfaces> surfaces_;
+  bool has_sent_surfaces_ = false;
+  std::uint32_t last_surface_ = 0;
+  Place surfaces_place_;
+  std::optional<Look> look_;  // of the sky that was sent
+  std::unique_ptr<const path::SkyLight> sky_;
+  Place sky_pixels_;
+  Place sky_rows_;
+  Place sky_columns_;
+  Place gloss_;
+  path::PathLampCache cache_;
+  std::shared_ptr<const path::PathLamps> lamps_;  // null: out of date
+  double brightness_ = 0.0;
+};
+
+/// A picture's lamps as shaders have them, from where view space has its origin in the world.
+struct LampTables {
+  std::vector<ShaderPathLamp> lamps;
+  std::vector<ShaderLampNode> nodes;
+  std::vector<std::uint64_t> ways;
+  std::vector<IVec4> face_keys;
+  std::vector<std::int32_t> face_lamps;
+};
+[[nodiscard]] LampTables lamp_tables(const path::PathLamps& lamps, DVec3 view_origin);
+
+}  // namespace quoin::vulkan

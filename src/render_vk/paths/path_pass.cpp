@@ -1,0 +1,265 @@
+#include "render_vk/paths/path_pass.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <numbers>
+#include <span>
+
+#include "core/moved_from.h"
+#include "render/path/path_request.h"
+#include "render_vk/march/frame.h"
+#include "render_vk/paths/device_paths.h"
+#include "render_vk/paths/path_pipelines.h"
+
+namespace quoin {
+namespace vulkan {
+namespace {
+
+const char* const kDoing = "drawing by paths";
+constexpr int kSamplesAtOnce = 16;  // of a tile; between them its progress is told
+constexpr int kDispatchesAtOnce = 4;
+
+Vec4 to_vec4(DVec3 v, double w = 0.0) {
+  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
+}
+
+double capped(double value) {
+  return std::min(value, 1e30);
+}
+
+// The options; `from`: where view space has its origin in the world.
+void put_options(const Camera& camera, const PathOptions& options, DVec3 from, ShaderPathFrame& frame) {
+  if (options.background) frame.background = Vec4(*options.background, 1.0F);
+  if (const auto& ground = options.ground) {
+    frame.flags |= kPathGround | (ground->only_shadows ? kPathOnlyShadows : 0);
+    frame.ground = Vec4(ground->colour, static_cast<float>(ground->height - from.y));
+    frame.environment.z = static_cast<float>(ground->fade);
+  }
+  if (const auto& fog = options.fog) {
+    frame.flags |= kPathFog;
+    frame.fog = Vec4(fog->colour, static_cast<float>(fog->top - from.y));
+    frame.air.x = static_cast<float>(fog->density);
+    frame.air.y = static_cast<float>(fog->anisotropy);
+  }
+  frame.air.z = static_cast<float>(options.lamp_brightness);
+  frame.lens_right = to_vec4(camera.right, capped(options.lens_radius));
+  frame.lens_up = to_vec4(camera.up, capped(options.focus_distance));
+  frame.lens_blades = options.lens_blades;
+  const double turns = options.lens_turn_radians / (2.0 * std::numbers::pi);
+  frame.lens_turn = static_cast<float>(turns - std::floor(turns));
+  frame.max_bounces = options.max_bounces;
+  frame.max_scatterings = options.max_scatterings;
+  frame.seed = options.seed;
+  if (options.layers) frame.flags |= kPathLayers;
+  frame.sum_pitch = options.layers ? kPathSumsWithLayers : kPathSums;
+}
+
+}  // namespace
+
+PathPass::~PathPass() {
+  renderer_->memory.discard();
+  for (Place& place : places_) renderer_->memory.release(place);
+}
+
+Status PathPass::reserve(std::size_t bytes, std::uint64_t& address) {
+  const auto place = renderer_->memory.allocate(bytes, kDoing);
+  if (!place) return place.error();
+  places_.push_back(*place);
+  address = place->address;
+  return {};
+}
+
+template <class T>
+Status PathPass::upload(const std::vector<T>& values, std::uint64_t& address) {
+  const auto bytes = std::as_bytes(std::span(values));
+  if (bytes.empty()) return {};
+  if (Status done = reserve(bytes.size(), address); !done) return done;
+  return renderer_->memory.write(places_.back(), bytes);
+}
+
+Status PathPass::put_lamps(DVec3 view_origin, ShaderPathFrame& paths) {
+  if (renderer_->voxels == nullptr) return {};
+  const auto lamps =
+      renderer_->paths.lamps(renderer_->scene.placement(), picture_->options.lamp_brightness);
+  if (lamps->empty()) return {};
+  const LampTables tables = lamp_tables(*lamps, view_origin);
+  paths.lamp_count = static_cast<std::uint32_t>(tables.lamps.size());
+  paths.face_mask = static_cast<std::uint32_t>(tables.face_lamps.size() - 1);
+  Status done = upload(tables.lamps, paths.lamps);
+  if (done) done = upload(tables.nodes, paths.lamp_nodes);
+  if (done) done = upload(tables.ways, paths.lamp_ways);
+  if (done) done = upload(tables.face_keys, paths.face_keys);
+  if (done) done = upload(tables.face_lamps, paths.face_lamps);
+  return done;
+}
+
+Status PathPass::put_tile_buffers(ShaderFrame& frame, ShaderPathFrame& paths) {
+  const PathOptions& options = picture_->options;
+  const bool has_glass = renderer_->scene.placement().has_transparent;
+  // Graphics hardware needs many pixels at a time to be busy; the lists of glass take 768 bytes a pixel.
+  const bool is_processor = renderer_->device->physical().type == VK_PHYSICAL_DEVICE_TYPE_CPU;
+  tile_edge_ = is_processor ? 128 : has_glass ? 256 : 512;
+  const auto pixels = static_cast<std::size_t>(std::min(tile_edge_, options.width)) *
+                      static_cast<std::size_t>(std::min(tile_edge_, options.height));
+  for (Buffer* buffer : {&counters_, &results_}) {
+    const auto where = buffer == &counters_ ? Buffer::Where::Device : Buffer::Where::Read;
+    auto made = Buffer::create(*renderer_->device, sizeof(ShaderCounters), where, kDoing);
+    if (!made) return made.error();
+    *buffer = std::move(*made);
+  }
+  frame.counters = counters_.address();
+  paths.sums = picture_->sums.address();
+  if (picture_->parts.size() > 0) paths.parts = picture_->parts.address();
+  Status done = reserve(pixels * kPathStateBytes, paths.states);
+  if (done && has_glass) done = reserve(pixels * kBodies * kBodyBytes, frame.bodies);
+  return done;
+}
+
+Status PathPass::put_frame() {
+  const PathOptions& options = picture_->options;
+  const Camera& camera = picture_->camera;
+  RenderOptions plain;
+  plain.width = options.width;
+  plain.height = options.height;
+  const Placement& placement = renderer_->scene.placement();
+  FrameData data = make_frame(placement, camera, plain);
+  ShaderFrame& frame = data.frame;
+  const DVec3 view_origin = camera.position + data.view_origin;
+  ShaderPathFrame paths;
+  Status done = renderer_->paths.put(renderer_->memory, options, paths);
+  if (!done) return done;
+  put_options(camera, options, view_origin, paths);
+  if (options.denoise && (options.fog.has_value() || renderer_->paths.has_clouds())) paths.flags |= kPathMedia;
+  const SkyColours& gradient = renderer_->paths.sky().gradient();
+  frame.sky_zenith = Vec4(gradient.zenith, 0.0F);
+  frame.sky_horizon = Vec4(gradient.horizon, 0.0F);
+  frame.sky_ground = Vec4(gradient.ground, 0.0F);
+  frame.grids = placement.grids;
+  frame.surfaces = renderer_->paths.surfaces_address();
+  frame.last_surface = renderer_->paths.last_surface();
+  done = put_lamps(view_origin, paths);
+  if (done) done = upload(data.placed, frame.placed);
+  if (done) done = upload(data.tree, frame.tree);
+  if (done) done = upload(data.leaves, frame.leaves);
+  if (done) done = put_tile_buffers(frame, paths);
+  if (done) done = upload(std::vector<ShaderPathFrame>{paths}, frame.paths);
+  if (done) done = upload(std::vector<ShaderFrame>{frame}, frame_address_);
+  if (done) done = renderer_->memory.flush();
+  return done;
+}
+
+// Some samples of a tile. `done`: of the picture, before.
+Status PathPass::take(const Tile& tile, int first, int count, const Progress& progress, double done_before) {
+  PathPush push;
+  push.frame = frame_address_;
+  push.corner_x = tile.x;
+  push.corner_y = tile.y;
+  push.size_x = tile.width;
+  push.size_y = tile.height;
+  push.first = static_cast<std::uint32_t>(first);
+  push.count = static_cast<std::uint32_t>(count);
+  push.width = static_cast<std::uint32_t>(picture_->options.width);
+  push.begins = 1;
+  const Api& api = renderer_->device->api();
+  for (;;) {
+    Status done = renderer_->device->run(kDoing, [&](VkCommandBuffer commands) {
+      for (int i = 0; i < kDispatchesAtOnce; ++i) {
+        api.vkCmdFillBuffer(commands, counters_.handle(), offsetof(ShaderCounters, pending), 4, 0);
+        renderer_->device->separate(commands);
+        renderer_->path_pipelines->dispatch(commands, renderer_->scene.placement(), push);
+        push.begins = 0;
+      }
+      const VkBufferCopy all{0, 0, sizeof(ShaderCounters)};
+      api.vkCmdCopyBuffer(commands, counters_.handle(), results_.handle(), 1, &all);
+    });
+    if (!done) return done;
+    if (progress && !progress(done_before)) return make_error(ErrorCode::Cancelled, "cancelled");
+    ShaderCounters counters;
+    std::memcpy(&counters, results_.mapped(), sizeof counters);
+    if (counters.pending == 0) return {};
+  }
+}
+
+Status PathPass::add_samples(int samples, const Progress& progress) {
+  const PathOptions& options = picture_->options;
+  std::vector<Tile> tiles;
+  for (std::int32_t y = 0; y < options.height; y += tile_edge_) {
+    for (std::int32_t x = 0; x < options.width; x += tile_edge_) {
+      tiles.push_back({x, y, std::min(tile_edge_, options.width - x), std::min(tile_edge_, options.height - y)});
+    }
+  }
+  const double all = static_cast<double>(tiles.size()) * samples;
+  double count = 0.0;
+  for (const Tile& tile : tiles) {
+    for (int first = 0; first < samples; first += kSamplesAtOnce) {
+      const int some = std::min(kSamplesAtOnce, samples - first);
+      if (Status done = take(tile, picture_->samples + first, some, progress, count / all); !done) return done;
+      count += some;
+    }
+  }
+  if (progress && !progress(1.0)) return make_error(ErrorCode::Cancelled, "cancelled");
+  return {};
+}
+
+Status PathPass::draw(int samples, const Progress& progress) {
+  Status done = renderer_->path_pipelines->prepare(renderer_->scene.placement());
+  if (done) done = put_frame();
+  if (done) {
+    done = renderer_->device->run(kDoing, [&](VkCommandBuffer commands) {
+      renderer_->device->api().vkCmdFillBuffer(commands, counters_.handle(), 0, sizeof(ShaderCounters), 0);
+    });
+  }
+  if (done) done = add_samples(samples, progress);
+  // Sums to which not every tile was added are of no use.
+  if (!done) {
+    picture_->samples = 0;
+    return done;
+  }
+  ShaderCounters counters;
+  std::memcpy(&counters, results_.mapped(), sizeof counters);
+  picture_->samples += samples;
+  picture_->rays += static_cast<std::int64_t>(counters.rays_low | std::uint64_t{counters.rays_high} << 32);
+  return done;
+}
+
+}  // namespace vulkan
+
+Status VulkanRenderer::draw_paths(VulkanPathPicture& picture, const Camera& camera, const PathOptions& options,
+                                  Accumulation accumulation, Threads, const Progress& progress) {
+  constexpr int kMaxSamples = 65'536;
+  if (Status status = path::check(camera, options); !status) return status;
+  vulkan::PathPictureImpl& target = vulkan::Access::of(picture);
+  if (target.device != impl_->device.get()) {
+    return make_error(ErrorCode::InvalidArgument, "vulkan: the picture is of another renderer");
+  }
+  const bool has_another_size = target.options.width != options.width || target.options.height != options.height;
+  if (accumulation == Accumulation::Restart || target.samples == 0 || has_another_size) {
+    if (Status begun = target.begin(camera, options); !begun) return begun;
+  }
+  PathOptions as_before = options;
+  as_before.samples = target.options.samples;
+  QUOIN_ASSERT(target.camera == camera, "a picture's samples are of one camera");
+  QUOIN_ASSERT(target.options == as_before, "a picture's samples are of the same options");
+  if (target.samples + options.samples > kMaxSamples) {
+    return make_error(ErrorCode::LimitExceeded, "vulkan: a picture by paths has 65,536 samples a pixel at most");
+  }
+  if (impl_->path_pipelines == nullptr) {
+    auto made = vulkan::PathPipelines::create(*impl_->device);
+    if (!made) return made.error();
+    impl_->path_pipelines = std::move(*made);
+  }
+  vulkan::PathPass pass(*impl_, target);
+  return pass.draw(options.samples, progress);
+}
+
+Result<PathPicture> VulkanRenderer::render_paths(const Camera& camera, const PathOptions& options, Threads threads,
+                                                 const Progress& progress) {
+  VulkanPathPicture picture(*this);
+  if (Status done = draw_paths(picture, camera, options, Accumulation::Restart, threads, progress); !done) {
+    return done.error();
+  }
+  return picture.read(threads);
+}
+
+}  // namespace quoin

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <quoin/core/progress.h>
+
+#include "render_vk/march/renderer_impl.h"
+#include "render_vk/paths/device_path_picture.h"
+
+namespace quoin::vulkan {
+
+/// Adds samples to a picture by paths, tile by tile.
+///
+///   tile: begin -> [ some steps of every pixel's path, in whose place comes that of its next sample ] until all are done
+class PathPass {
+ public:
+  PathPass(RendererImpl& renderer, PathPictureImpl& picture) : renderer_(&renderer), picture_(&picture) {}
+  ~PathPass();
+  PathPass(const PathPass&) = delete;
+  PathPass& operator=(const PathPass&) = delete;
+
+  /// `samples` more. After an error the picture has none.
+  [[nodiscard]] Status draw(int samples, const Progress& progress);
+
+ private:
+  struct Tile {
+    std::int32_t x, y, width, height;
+  };
+  template <class T>
+  Status upload(const std::vector<T>& values, std::uint64_t& address);
+  Status reserve(std::size_t bytes, std::uint64_t& address);
+  Status put_frame();
+  Status put_lamps(DVec3 view_origin, ShaderPathFrame& paths);
+  Status put_tile_buffers(ShaderFrame& frame, ShaderPathFrame& paths);
+  Status add_samples(int samples, const Progress& progress);
+  Status take(const Tile& tile, int first, int count, const Progress& progress, double done);
+
+  RendererImpl* renderer_;
+  PathPictureImpl* picture_;
+  std::vector<Place> places_;
+  std::uint64_t frame_address_ = 0;
+  std::int32_t tile_edge_ = 0;
+  Buffer counters_;  // on the device
+  Buffer results_;   // the same, for the processor
+};
+
+}  // namespace quoin::vulkan

@@ -1,0 +1,170 @@
+// Pictures by paths on a device beside those of the processor: the same random numbers, so the same paths.
+
+#include <cstdlib>
+
+#include <cmath>
+#include <string>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include <quoin/io/picture_files.h>
+#include <quoin/render/path_tracer.h>
+
+#include "render/path/town_for_tests.h"
+#include "render_vk/device/vulkan_for_tests.h"
+
+namespace quoin::vulkan_test {
+namespace {
+
+using render_test::add_type;
+using render_test::of_town;
+using render_test::place;
+using render_test::towards;
+using render_test::town;
+
+PathOptions small(int samples = 4) {
+  PathOptions options;
+  options.width = 64;
+  options.height = 48;
+  options.samples = samples;
+  options.layers = true;
+  return options;
+}
+
+// What two pictures of the same paths differ in.
+struct PathDifferences {
+  int pixels = 0;  ///< whose light differs by more than a hundredth
+  int depths = 0;  ///< by more than 1e-4 of the distance
+  double light = 1.0;  ///< of the whole, by the other's
+  int total = 0;
+};
+
+bool is_near(float a, float b, float relative, float absolute) {
+  return a == b || std::abs(a - b) <= relative * std::max(std::abs(a), std::abs(b)) + absolute;
+}
+
+PathDifferences path_differences(const PathPicture& a, const PathPicture& b) {
+  PathDifferences found;
+  EXPECT_EQ(a.radiance.size(), b.radiance.size());
+  if (a.radiance.size() != b.radiance.size()) return found;
+  found.total = static_cast<int>(a.radiance.size());
+  DVec3 of_a(0.0);
+  DVec3 of_b(0.0);
+  for (std::size_t i = 0; i < a.radiance.size(); ++i) {
+    bool differs = !is_near(a.alpha[i], b.alpha[i], 0.01F, 1e-4F);
+    for (int c = 0; c < 3; ++c) {
+      differs = differs || !is_near(a.radiance[i][c], b.radiance[i][c], 0.01F, 1e-3F) ||
+                !is_near(a.scene[i][c], b.scene[i][c], 0.01F, 1e-3F);
+    }
+    found.pixels += static_cast<int>(differs);
+    of_a += DVec3(a.radiance[i]);
+    of_b += DVec3(b.radiance[i]);
+    if (a.depth.values.empty() || b.depth.values.empty()) continue;
+    found.depths += static_cast<int>(!is_near(a.depth.values[i], b.depth.values[i], 1e-4F, 0.0F));
+  }
+  const DVec3 ones(1.0);
+  found.light = of_b == DVec3(0.0) ? (of_a == DVec3(0.0) ? 1.0 : 2.0) : glm::dot(of_a, ones) / glm::dot(of_b, ones);
+  return found;
+}
+
+class VulkanPaths : public VulkanTest {
+ protected:
+  PathPicture drawn(const Scene& scene, const Camera& camera, const PathOptions& options) {
+    const Status updated = renderer_->update(scene);
+    EXPECT_TRUE(updated) << to_string(updated.error());
+    auto picture = renderer_->render_paths(camera, options);
+    EXPECT_TRUE(picture) << to_string(picture.error());
+    return picture ? std::move(*picture) : PathPicture{};
+  }
+
+  // `share`: of pixels in whose paths single precision may matter.
+  void expect_same_light(const Scene& scene, const Camera& camera, const PathOptions& options, const std::string& name,
+                         double share = 0.02) {
+    const PathPicture device = drawn(scene, camera, options);
+    auto cpu = PathTracer(scene).render(camera, options);
+    ASSERT_TRUE(cpu);
+    const PathDifferences found = path_differences(device, *cpu);
+    EXPECT_LE(found.pixels, share * found.total) << name;
+    EXPECT_LE(found.depths, 0.005 * found.total + 1.0) << name;
+    EXPECT_NEAR(found.light, 1.0, 0.01) << name;
+    EXPECT_NEAR(static_cast<double>(device.rays), static_cast<double>(cpu->rays),
+                0.02 * static_cast<double>(cpu->rays))
+        << name;
+    EXPECT_NEAR(static_cast<double>(device.pixels_hit), static_cast<double>(cpu->pixels_hit), 0.002 * found.total + 1.0);
+    if (std::getenv("QUOIN_WRITE_VULKAN") == nullptr) return;
+    std::printf("%s: %d pixels, %d depths of %d; light %.5f; rays %lld, %lld\n", name.c_str(), found.pixels,
+                found.depths, found.total, found.light, static_cast<long long>(device.rays),
+                static_cast<long long>(cpu->rays));
+    const std::string base = std::string(QUOIN_BINARY_DIR "/paths_") + name;
+    EXPECT_TRUE(write_png(*develop(device), base + ".vulkan.png"));
+    EXPECT_TRUE(write_png(*develop(*cpu), base + ".cpu.png"));
+  }
+};
+
+TEST_F(VulkanPaths, AreTheProcessors) {
+  PathOptions options = small();
+  expect_same_light(town(), of_town(), options, "physical");
+  options.sky = SkyModel::Gradient;
+  expect_same_light(town(), of_town(), options, "gradient");
+  options.sky = SkyModel::Uniform;
+  options.sun_angle_radians = 0.0;
+  options.max_bounces = 1;
+  expect_same_light(town(), of_town(), options, "uniform");
+}
+
+TEST_F(VulkanPaths, SampleAnEnvironment) {
+  PathOptions options = small();
+  RadianceImage image{16, 8, std::vector<float>(std::size_t{16} * 8 * 3, 0.2F)};
+  image.rgb[3 * (2 * 16 + 5)] = 40.0F;
+  options.environment = std::make_shared<const RadianceImage>(image);
+  options.sky = SkyModel::Environment;
+  options.environment_turn_radians = 1.0;
+  options.sun_brightness = 0.0;
+  expect_same_light(town(), of_town(), options, "environment");
+}
+
+TEST_F(VulkanPaths, HaveGroundAndFogAndALens) {
+  PathOptions options = small();
+  options.ground = GroundPlane{.height = -3.0, .colour = Vec3(0.4F), .only_shadows = false, .fade = 0.1};
+  expect_same_light(town(), of_town(), options, "ground");
+  options.ground->only_shadows = true;
+  expect_same_light(town(), of_town(), options, "caught");
+  options.fog = Fog{.density = 0.02, .colour = {0.9F, 0.95F, 1.0F}, .anisotropy = 0.4, .top = 6.0};
+  expect_same_light(town(), of_town(), options, "fog");
+  options.lens_radius = 0.7;
+  options.lens_blades = 5;
+  options.focus_distance = 40.0;
+  expect_same_light(town(), of_town(), options, "lens");
+}
+
+TEST_F(VulkanPaths, LookAlongParallelRays) {
+  Camera camera = of_town();
+  camera.projection = Camera::Projection::Orthographic;
+  camera.view_height = 40.0;
+  expect_same_light(town(), camera, small(), "orthographic");
+}
+
+TEST_F(VulkanPaths, GoThroughClouds) {
+  Scene scene = town();
+  VoxelProperties cloud;
+  cloud.colour = {230, 230, 240, 60};
+  cloud.visibility = Visibility::Transparent;
+  cloud.scattering = 0.2F;
+  cloud.anisotropy = 0.5F;
+  const VoxelType type = scene.types.add(cloud).value_or(kAir);
+  Grid grid;
+  grid.fill_box({IVec3(0), {12, 6, 12}}, type);
+  place(scene, std::move(grid), {6.0, 10.0, 6.0});
+  expect_same_light(scene, of_town(), small(), "clouds", 0.05);
+}
+
+TEST_F(VulkanPaths, TakeOutTheProcessorsNoise) {
+  PathOptions options = small(8);
+  options.denoise = true;
+  options.fog = Fog{.density = 0.01, .colour = Vec3(1.0F), .anisotropy = 0.0, .top = 4.0};
+  expect_same_light(town(), of_town(), options, "denoised", 0.06);
+}
+
+}  // namespace
+}  // namespace quoin::vulkan_test

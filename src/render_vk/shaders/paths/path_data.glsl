@@ -1,0 +1,162 @@
+// What pictures by paths read and write; src/render_vk/paths/path_data.h says the same to the processor's compiler.
+
+// Of a picture by paths: PathOptions and tables. Addresses of tables that there are not are 0.
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PathFrame {
+  vec4 to_sun;    // w: one less the cosine of half its disc's angle; 0: it has none
+  vec4 sunlight;  // irradiance of what faces it; w: 1 where the camera sees its disc
+  vec4 sky;       // of SkyModel::Uniform; w: times the light of other skies
+  vec4 background;    // w: 1 where there is one
+  vec4 ground;        // its colour; w: its height in view
+  vec4 fog;           // its colour; w: its top in view
+  vec4 lens_right;    // of the camera; w: the lens's radius
+  vec4 lens_up;       // w: the distance in focus
+  vec4 environment;   // its turn's sine and cosine; z: the ground's fade
+  vec4 air;           // fog: density, anisotropy; lamps' brightness
+  uvec2 sky_pixels;   // of the octahedron, or of the environment: 3 floats each
+  uvec2 sky_rows;     // sums
+  uvec2 sky_columns;
+  uvec2 gloss;        // pairs
+  uvec2 lamps;        // PathLamp
+  uvec2 lamp_nodes;   // LampNode
+  uvec2 lamp_ways;
+  uvec2 face_keys;    // ivec4
+  uvec2 face_lamps;   // int
+  uvec2 states;       // PathState, of a tile
+  uvec2 sums;         // of the picture: kSums or kSumsWithLayers vectors a pixel
+  uvec2 parts;        // kParts of a pixel; 0: not wanted
+  int sky_model;
+  int sky_width;
+  int sky_height;
+  uint face_mask;
+  uint lamp_count;
+  int max_bounces;
+  int max_scatterings;
+  uint seed;
+  int lens_blades;
+  float lens_turn;    // in turns, 0 to 1
+  uint flags;
+  uint sum_pitch;     // vectors a pixel
+};
+
+const uint kPathGround = 1;
+const uint kPathOnlyShadows = 2;
+const uint kPathFog = 4;
+const uint kPathLayers = 8;
+const uint kPathMedia = 16;
+const uint kPathUneven = 32;  // the sky is sampled by itself
+const uint kPathSun = 64;
+
+const int kSkyPhysical = 0;
+const int kSkyGradient = 1;
+const int kSkyUniform = 2;
+const int kSkyEnvironment = 3;
+
+struct PathLamp {
+  vec4 corner;  // in view; w: the reach of one without a body, else 0
+  vec4 u;       // unit; w: size
+  vec4 v;
+  vec4 normal;    // w: cosine of a spot's inner angle
+  vec4 radiance;  // w: of its outer one
+};
+struct LampNode {
+  vec4 low;   // in view; w: power
+  vec4 high;  // w: cosine of the spread
+  vec4 axis;  // w: cosine of the edge
+  ivec4 next;  // the second child, or -1; the lamp, or -1
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PathLampTable {
+  PathLamp at[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer LampNodes {
+  LampNode at[];
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Keys {
+  ivec4 at[];
+};
+
+// A path between two steps.
+struct PathState {
+  ivec4 voxel;      // where its next ray begins, of an instance's tree; w: the instance, -1: `inside` is in view
+  vec4 inside;      // from the voxel's lower corner; w: the density with which its direction was found
+  vec4 direction;   // in the world, unit; w: how much of `u_left` glass took of it
+  vec4 throughput;  // w: where bodies of glass are still to be looked for
+  vec4 radiance;
+  vec4 normal;      // in the world, where it was last scattered
+  uvec4 counts;     // sample, dimension, bounces | scatterings << 16, flags
+  uvec4 more;       // type of glass within, part, fog's number is taken; samples that are done
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer PathStates {
+  PathState at[];
+};
+
+const uint kIsSeen = 1;    // by the camera, itself or by glass and mirrors
+const uint kIsFirst = 2;   // nothing was met yet
+const uint kIsCaught = 4;  // the ground only catches shadows where it went
+const uint kIsNoted = 8;   // in the layers
+const uint kIsAlive = 16;
+
+// What a pixel's samples add up to.
+const uint kSumBackground = 0;  // w: share of the scene
+const uint kSumScene = 1;       // w: share of what is caught
+const uint kSumCaught = 2;      // w: depth
+const uint kSumLit = 3;         // w: type
+const uint kSumOpen = 4;        // w: instance
+const uint kSumAlbedo = 5;
+const uint kSumNormal = 6;
+
+const uint kNoPart = 255;
+const uint kParts = 3;
+const uint kSkySurface = 4;
+const uint kGroundSurface = 2;
+
+// SurfacePart of render/path/denoise.h.
+struct Part {
+  uint surface;
+  float samples;
+  float square;
+  float light[3];
+  float albedo[3];
+  float normal[3];
+  float place[3];
+};
+layout(buffer_reference, std430, buffer_reference_align = 4) buffer Parts {
+  Part at[];
+};
+
+layout(push_constant) uniform Push {
+  uvec2 frame_address;
+  ivec2 corner;  // of the tile, in pixels
+  ivec2 size;    // of the tile
+  uint first;    // sample
+  uint count;    // of samples
+  uint begins;   // 1: paths begin, and are not gone on with
+  uint width;    // of the picture
+} push;
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+Frame frame() {
+  return Frame(push.frame_address);
+}
+PathFrame path_frame() {
+  return PathFrame(frame().paths);
+}
+bool has(uint flag) {
+  return (frame().flags & flag) != 0;
+}
+bool has_path(uint flag) {
+  return (path_frame().flags & flag) != 0;
+}
+ivec2 tile_pixel() {
+  return ivec2(gl_GlobalInvocationID.xy);
+}
+bool is_in_tile() {
+  return all(lessThan(tile_pixel(), push.size));
+}
+uint slot_of_pixel() {
+  return gl_GlobalInvocationID.y * uint(push.size.x) + gl_GlobalInvocationID.x;
+}
+uint place_of_pixel() {
+  ivec2 pixel = push.corner + tile_pixel();
+  return uint(pixel.y) * push.width + uint(pixel.x);
+}

@@ -1,0 +1,22 @@
+// The camera's rays in view, by where they cross the picture, in pixels.
+
+vec3 picture_vector(vec2 point) {
+  Frame f = frame();
+  return f.corner.xyz + f.right.xyz * point.x + f.down.xyz * point.y;
+}
+
+// A camera's ray. It starts where view space has its origin, at frame().view_depth times length_a_depth.
+ViewRay camera_ray(vec2 point) {
+  Frame f = frame();
+  vec3 start = f.start.xyz + f.start_x.xyz * point.x + f.start_y.xyz * point.y;
+  if (!has(kPerspective)) return ViewRay(start, f.forward.xyz);
+  vec3 d = picture_vector(point) + f.forward.xyz;
+  return ViewRay(start, d * (1.0 / sqrt(dot(d, d))));
+}
+
+// The ray's length by which its forward component grows by 1.
+float length_a_depth(vec2 point) {
+  if (!has(kPerspective)) return 1.0;
+  vec3 d = picture_vector(point) + frame().forward.xyz;
+  return sqrt(dot(d, d));
+}
