@@ -30,12 +30,11 @@ SphericalRectangle rectangle_of(PathLamp lamp, vec3 to_corner) {
   seen.b1 = seen.high.y / sqrt(zz + seen.high.y * seen.high.y);
   float right = seen.high.x / sqrt(zz + seen.high.x * seen.high.x);
   float left = -seen.low.x / sqrt(zz + seen.low.x * seen.low.x);
-  float g0 = arc_cosine(-seen.b0 * right);
-  float g1 = arc_cosine(-right * seen.b1);
-  float g2 = arc_cosine(-seen.b1 * left);
-  float g3 = arc_cosine(-left * seen.b0);
-  seen.turn = 2.0 * kPi - g2 - g3;
-  seen.solid_angle = max(g0 + g1 - seen.turn, 0.0);
+  vec4 cosines = vec4(-seen.b0 * right, -right * seen.b1, -seen.b1 * left, -left * seen.b0);
+  vec4 g;
+  for (int i = 0; i < 4; ++i) g[i] = arc_cosine(cosines[i]);
+  seen.turn = 2.0 * kPi - g.z - g.w;
+  seen.solid_angle = max(g.x + g.y - seen.turn, 0.0);
   return seen;
 }
 

@@ -41,6 +41,10 @@ const uint kGoesOn = 0;  // nothing was met yet
 const uint kTurns = 1;   // the path has a next ray
 const uint kScatters = 2;
 const uint kEnds = 3;
+// And of these, by glass.
+const uint kTurnsAtGlass = 4;
+const uint kOnGlass = 5;
+const uint kInAir = 6;
 
 // Where a path is scattered.
 struct Vertex {
@@ -525,19 +529,35 @@ vec3 normal_entered(Body body) {
   return in_field ? normal_of(body.what.y) : face_normal(body.what.y);
 }
 
-// Sends a path on from a surface of glass, on that side to which `normal` points, in the instance's grid.
-void turn_at(int instance, ViewRay ray, float t, vec3 direction, vec3 normal, uint within) {
+// What a path comes to by glass and air: each is done in one place, since compilers copy functions.
+struct Glass {
+  uint outcome;
+  Body body;
+  // kTurnsAtGlass: where, and on which side of the surface the path goes on.
+  int instance;
+  float t;
+  vec3 direction;
+  vec3 normal;  // in the instance's grid
+  uint within;
+  // kInAir, with t.
+  vec3 colour;
+  float anisotropy;
+};
+
+// Sends a path on from a surface of glass.
+uint turn_at(Glass glass, ViewRay ray) {
   ivec4 voxel;
   vec3 inside;
-  place_along(instance, ray, t, voxel, inside);
+  place_along(glass.instance, ray, glass.t, voxel, inside);
   path.voxel = voxel;
-  path.inside = vec4(inside + normal * frame().lift, kInfinity);
-  path.direction = vec4(normalize(direction), -1.0);
+  path.inside = vec4(inside + glass.normal * frame().lift, kInfinity);
+  path.direction = vec4(normalize(glass.direction), -1.0);
   path.throughput.w = -kNever;
-  path.more.x = within;
+  path.more.x = glass.within;
   path.counts.y += kDimensions;
   path.counts.w &= ~kIsFirst;
   if (path.counts.y > kDimensions * (kMostGlass + 2 * bounces() + 2 * scatterings())) path.throughput.xyz = vec3(0.0);
+  return kTurns;
 }
 
 uint hit_glass(Body body, ViewRay ray) {
@@ -559,48 +579,38 @@ uint hit_glass(Body body, ViewRay ray) {
   return kScatters;
 }
 
-uint scatter_in(Body body, float u, vec3 origin) {
+// Somewhere in a cloud, if `u` is below the share of paths that are scattered there.
+void scatter_in(Body body, float u, inout Glass glass) {
   Surface surface = surface_of(body.what.x);
   float share = free_way(u, surface.scattering) / max(body.lengths.z, 1e-12);
-  float t = body.lengths.x + (body.lengths.y - body.lengths.x) * clamp(share, 0.0, 1.0);
-  add_emitted(surface.emitted, -1, vec3(0.0), 0.0);
-  return hit_air(origin, t, surface.colour, surface.anisotropy);
+  glass.t = body.lengths.x + (body.lengths.y - body.lengths.x) * clamp(share, 0.0, 1.0);
+  glass.colour = surface.colour;
+  glass.anisotropy = surface.anisotropy;
+  glass.outcome = kInAir;
 }
 
-// Has the bodies that found no room looked for in a step of their own.
-uint look_further(BodyList list, float u) {
-  if (list.dropped_t == kInfinity) return kGoesOn;
-  path.throughput.w = list.dropped_t;
-  path.direction.w = u;
-  return kTurns;
-}
-
-float first_glass_number() {
-  return path.direction.w >= 0.0 ? path.direction.w : number(kOfGlass);
-}
-
-// Light from surface to surface goes straight on; by chance it meets what covers the glass.
-uint pass_glass(BodyList list, ViewRay ray) {
-  float u = first_glass_number();
-  uint i = 0;
-  Body body;
-  while (next_body(list, i, body)) {
-    Surface surface = surface_of(body.what.x);
-    float voxels = length_of(surface, body);
-    float cover = cover_of(surface, voxels);
-    if (u < cover) {
-      if (surface.scattering > 0.0) return scatter_in(body, u, ray.origin);
-      if (!is_begun(body)) return hit_glass(body, ray);
-      add_emitted(surface.emitted, -1, vec3(0.0), 0.0);  // from within it glows, no more
-      return kEnds;
-    }
+// A path that goes straight through a body: light from surface to surface, and all through clouds. By chance it meets
+// what covers the glass.
+void pass_through(Body body, inout float u, inout Glass glass) {
+  Surface surface = surface_of(body.what.x);
+  bool is_cloud = surface.scattering > 0.0;
+  float voxels = length_of(surface, body);
+  float cover = cover_of(surface, voxels);
+  if (u >= cover) {
     u = min((u - cover) / (1.0 - cover), kAlmostOne);
-    path.throughput.xyz *= tint_of(surface, voxels);
+    if (!is(kIsSeen)) path.throughput.xyz *= tint_of(surface, voxels);
+    return;
   }
-  return look_further(list, u);
+  glass.body = body;
+  if (is_cloud || is_begun(body)) add_emitted(surface.emitted, -1, vec3(0.0), 0.0);
+  if (is_cloud) {
+    scatter_in(body, u, glass);
+  } else {
+    glass.outcome = is_begun(body) ? kEnds : kOnGlass;  // from within it glows, no more
+  }
 }
 
-uint enter_glass(Body body, ViewRay ray) {
+void enter_glass(Body body, inout Glass glass) {
   Surface surface = surface_of(body.what.x);
   float u = number(kOfGlass);
   vec3 in_grid = normal_entered(body);
@@ -612,28 +622,36 @@ uint enter_glass(Body body, ViewRay ray) {
     uint id = surface_id(voxel_of_grid(body.voxel), in_field ? 0 : body.what.y, in_field, body.voxel.w, body.what.x);
     note_part(vec3(1.0), id, false, vec3(0.0), vec3(0.0));
   }
-  vec2 through = refraction(cosine, 1.0 / surface.ior);
-  if (u < through.x) {
-    turn_at(body.voxel.w, ray, body.lengths.x, direction + normal * (2.0 * cosine), in_grid, 0);
-    return kTurns;
-  }
-  float cover = cover_of(surface, length_of(surface, body));
-  if (u < through.x + (1.0 - through.x) * cover) return hit_glass(body, ray);
   float eta = 1.0 / surface.ior;
-  turn_at(body.voxel.w, ray, body.lengths.x, direction * eta + normal * (eta * cosine - through.y), -in_grid,
-          body.what.x);
-  return kTurns;
+  vec2 through = refraction(cosine, eta);
+  float cover = cover_of(surface, length_of(surface, body));
+  bool is_mirrored = u < through.x;
+  glass.outcome = kTurnsAtGlass;
+  glass.body = body;
+  glass.instance = body.voxel.w;
+  glass.t = body.lengths.x;
+  if (is_mirrored) {
+    glass.direction = direction + normal * (2.0 * cosine);
+    glass.normal = in_grid;
+    glass.within = 0;
+  } else if (u < through.x + (1.0 - through.x) * cover) {
+    glass.outcome = kOnGlass;
+  } else {
+    glass.direction = direction * eta + normal * (eta * cosine - through.y);
+    glass.normal = -in_grid;
+    glass.within = body.what.x;
+  }
 }
 
 // A path within glass: to where the body ends, or to what stands in it. `opaque_t`: where that is.
-uint leave_glass(Body body, bool has_next, Body next, ViewRay ray, float opaque_t) {
+void leave_glass(Body body, bool has_next, Body next, float opaque_t, inout Glass glass) {
   Surface surface = surface_of(body.what.x);
   path.throughput.xyz *= tint_of(surface, body.lengths.z);
   int instance = int(body.what.w >> 3);
   Placed placed = placed_at(instance);
   bool touches = has_next && reaches(body, next.lengths.x);
   // It lies on something opaque.
-  if (!touches && opaque_t <= body.lengths.y + frame().lift * placed.ref_inside.w) return kGoesOn;
+  if (!touches && opaque_t <= body.lengths.y + frame().lift * placed.ref_inside.w) return;
   float other = touches ? surface_of(next.what.x).ior : 1.0;
   bool in_field = kHasFieldGlass && (body.what.z & kEndsInField) != 0;
   vec3 in_grid = in_field ? normal_from_28(body.what.z >> kExitNormal) : face_normal(body.what.w & 7);
@@ -646,44 +664,27 @@ uint leave_glass(Body body, bool has_next, Body next, ViewRay ray, float opaque_
   float cosine = clamp(dot(normal, direction), 1e-4, 1.0);
   float eta = surface.ior / other;
   vec2 through = refraction(cosine, eta);
-  if (number(kOfGlass) < through.x) {
-    turn_at(instance, ray, body.lengths.y, direction - normal * (2.0 * cosine), -in_grid, body.what.x);
-  } else {
-    turn_at(instance, ray, body.lengths.y, direction * eta + normal * (through.y - eta * cosine), in_grid,
-            touches ? next.what.x : 0);
-  }
-  return kTurns;
+  bool is_mirrored = number(kOfGlass) < through.x;
+  glass.outcome = kTurnsAtGlass;
+  glass.instance = instance;
+  glass.t = body.lengths.y;
+  glass.direction =
+      is_mirrored ? direction - normal * (2.0 * cosine) : direction * eta + normal * (through.y - eta * cosine);
+  glass.normal = is_mirrored ? -in_grid : in_grid;
+  glass.within = is_mirrored ? body.what.x : touches ? next.what.x : 0;
 }
 
-// What a path's ray meets of glass and clouds, which are in the list, before `opaque_t`.
-uint meet_glass(BodyList list, ViewRay ray, float opaque_t) {
-  if (!is(kIsSeen)) return pass_glass(list, ray);
-  uint i = 0;
-  Body body;
-  bool has_body = next_body(list, i, body);
-  if (path.more.x == 0) {
-    // Those bodies before the first of glass that scatter light.
-    float u = first_glass_number();
-    while (has_body && surface_of(body.what.x).scattering > 0.0) {
-      float cover = cover_of(surface_of(body.what.x), body.lengths.z);
-      if (u < cover) return scatter_in(body, u, ray.origin);
-      u = min((u - cover) / (1.0 - cover), kAlmostOne);
-      has_body = next_body(list, i, body);
-    }
-    if (!has_body) return look_further(list, u);
-  }
-  Body next;
-  bool has_next = has_body && next_body(list, i, next);
-  if (path.more.x != 0) {
-    bool is_within = has_body && is_begun(body) && body.what.x == path.more.x;
-    if (is_within) return leave_glass(body, has_next, next, ray, opaque_t);
-    path.more.x = 0;  // it came through a corner, or out by rounding
-    if (!has_body || is_begun(body)) return kGoesOn;
-  } else if (is_begun(body)) {  // the camera is in it
+// What is seen in glass, of the first body that is no cloud, and the one after it.
+void look_into(bool has_body, Body body, bool has_next, Body next, float opaque_t, inout Glass glass) {
+  bool is_within = has_body && is_begun(body) && (path.more.x == 0 || body.what.x == path.more.x);
+  if (is_within) {  // or the camera is in it
     path.more.x = body.what.x;
-    return leave_glass(body, has_next, next, ray, opaque_t);
+    leave_glass(body, has_next, next, opaque_t, glass);
+    return;
   }
-  return enter_glass(body, ray);
+  // Where it was in glass it came through a corner, or out by rounding.
+  path.more.x = 0;
+  if (has_body && !is_begun(body)) enter_glass(body, glass);
 }
 
 // ---- light ----
@@ -792,15 +793,12 @@ bool shade() {
   return true;
 }
 
-// What the path's own ray comes to.
-uint meet(Hit hit, BodyList list, ViewRay ray, float until, bool in_fog_now) {
-  if (kHasGlass) {
-    bool has_some = list.count > 0 || path.more.x != 0;
-    uint met = has_some ? meet_glass(list, ray, min(hit.t, ground_at(ray.origin, path.direction.xyz, -behind)))
-                        : kGoesOn;
-    if (met != kGoesOn) return met;
-  }
-  if (in_fog_now) return hit_air(ray.origin, until, path_frame().fog.xyz, path_frame().air.y);
+// What the path's own ray comes to, of which glass has said so much already.
+uint meet(Hit hit, Glass glass, ViewRay ray, float until) {
+  if (kHasGlass && glass.outcome == kTurnsAtGlass) return turn_at(glass, ray);
+  if (kHasGlass && glass.outcome == kOnGlass) return hit_glass(glass.body, ray);
+  if (glass.outcome == kInAir) return hit_air(ray.origin, glass.t, glass.colour, glass.anisotropy);
+  if (glass.outcome != kGoesOn) return glass.outcome;
   if (hit.voxel.w >= 0 && hit.t <= until) return hit_matter(hit, ray.origin);
   if (until < kInfinity) return hit_ground(ray.origin, until);
   leave(ray.origin, path.direction.xyz);
@@ -821,37 +819,70 @@ void step_path() {
     float max_t = is_own ? kInfinity : requests[i - 1].max_t;
     ViewRay ray = view_ray_at(voxel, inside, direction);
     Hit hit = trace(voxel, inside, ray, max_t, !is_own);
-    bool in_fog_now = false;
+    if (!is_own && hit.voxel.w >= 0) continue;
+    Glass glass;
+    glass.outcome = kGoesOn;
+    float opaque_t = max_t;
     float until = max_t;
     if (is_own) {
-      until = min(hit.t, ground_at(ray.origin, direction, -behind));
+      opaque_t = until = min(hit.t, ground_at(ray.origin, direction, -behind));
       if (has_path(kPathMedia)) note_behind(hit, until);
       if (has_path(kPathFog) && path_frame().air.x > 0.0 && path.more.x == 0) {
         vec2 way = in_fog(ray.origin, direction, -behind, until);
         float met = way.x + free_way(number(kOfFog), path_frame().air.x);
-        in_fog_now = met < way.y;
-        if (in_fog_now) until = met;
+        if (met < way.y) until = met;
       }
-    } else if (hit.voxel.w >= 0) {
+    }
+    if (kHasGlass) {
+      BodyList list = BodyList(frame().bodies, slot_of_pixel() * kBodies, kBodies, 0, kInfinity);
+      vec3 passed = vec3(1.0);
+      find_bodies(voxel, inside, ray, until, is_own ? path.throughput.w : -kNever, list, passed);
+      float u = path.direction.w >= 0.0 ? path.direction.w : number(kOfGlass);
+      uint k = 0;
+      Body body;
+      Body first;
+      bool has_first = false;
+      bool has_next = false;
+      while (glass.outcome == kGoesOn && !has_next && next_body(list, k, body)) {
+        Surface surface = surface_of(body.what.x);
+        if (!is_own) {
+          passed *= passed_by(surface, body.lengths.z, has_own_length(body));
+        } else if (!is(kIsSeen) || (path.more.x == 0 && !has_first && surface.scattering > 0.0)) {
+          pass_through(body, u, glass);
+        } else if (!has_first) {
+          first = body;
+          has_first = true;
+        } else {
+          has_next = true;
+        }
+      }
+      if (!is_own) {
+        requests[i - 1].light *= passed;
+      } else if (glass.outcome == kGoesOn) {
+        if (is(kIsSeen) && (has_first || path.more.x != 0)) {
+          look_into(has_first, first, has_next, body, opaque_t, glass);
+        } else if (list.dropped_t < kInfinity) {
+          // Bodies that found no room are looked for in a step of their own.
+          path.throughput.w = list.dropped_t;
+          path.direction.w = u;
+          glass.outcome = kTurns;
+        }
+      }
+    }
+    if (!is_own) {
+      path.radiance.xyz += requests[i - 1].light;
       continue;
     }
-    uint slot = slot_of_pixel();
-    BodyList list = BodyList(frame().bodies, slot * kBodies, kBodies, 0, kInfinity);
-    vec3 passed = vec3(1.0);
-    if (kHasGlass) find_bodies(voxel, inside, ray, until, is_own ? path.throughput.w : -kNever, list, passed);
-    if (is_own) {
-      uint met = meet(hit, list, ray, until, in_fog_now);
-      goes_on_after = met == kTurns && !is_black(path.throughput.xyz);
-      if (met == kScatters) goes_on_after = shade();
-      // What the loop still asks for belongs to the vertex.
-      continue;
+    if (glass.outcome == kGoesOn && until < opaque_t) {
+      glass.outcome = kInAir;
+      glass.t = until;
+      glass.colour = path_frame().fog.xyz;
+      glass.anisotropy = path_frame().air.y;
     }
-    uint k = 0;
-    Body body;
-    while (kHasGlass && next_body(list, k, body)) {
-      passed *= passed_by(surface_of(body.what.x), body.lengths.z, has_own_length(body));
-    }
-    path.radiance.xyz += requests[i - 1].light * passed;
+    uint met = meet(hit, glass, ray, until);
+    goes_on_after = met == kTurns && !is_black(path.throughput.xyz);
+    // What the loop still asks for belongs to the vertex.
+    if (met == kScatters) goes_on_after = shade();
   }
   if (!goes_on_after) end_path();
 }
