@@ -24,10 +24,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::array kDivisors = {4, 3, 2, 1};
 constexpr int kSampleFactor = 4;
-constexpr int kPathSamples = 256;            // of a settled picture by paths
 constexpr double kPatienceAfterEdits = 4.0;  // times as long: the view stays, and need not become coarse again
-constexpr double kConstancy = 1.3;           // times as long is what lets the size of moving pictures be as it was
-constexpr double kNews = 0.3;                // the share of a new measurement in what is known of how long pixels take
 // Of drafts. The castle at a quarter, two cores: 73 ms in full light; without lamps 23, with 2 of them 28, with 4 33.
 constexpr int kDraftLamps = 2;
 
@@ -74,30 +71,6 @@ RenderOptions options_for(const ViewRequest& request, const Stage& stage) {
   if (stage.divisor > 1) options.detail.impostor_seconds = 0.0;
   options.detail.colours = request.detail_colours;
   if (request.detail_by_pixels) options.detail.policy.emplace().rule = DetailPolicy::Rule::ByPixels;
-  return options;
-}
-
-// What the file says, in the light of the window's panel.
-PathOptions paths_for(const ViewRequest& request, const Stage& stage, const DBox& bounds) {
-  PathOptions options;
-  if (request.look) static_cast<Look&>(options) = request.look->look;
-  if (options.sky == SkyModel::Environment) options.sky = SkyModel::Uniform;  // its picture is not loaded here
-  options.lens_radius = 0.0;
-  options.width = stage.width(request);
-  options.height = stage.height(request);
-  options.samples = stage.samples;
-  options.denoise = true;
-  const LightOptions& light = request.light;
-  options.sun = light.sun;
-  options.sun_brightness *= light.sun_brightness;
-  options.sky_brightness *= light.sky_brightness;
-  options.lamp_brightness = light.lamp_brightness;
-  if (options.ground) options.ground->height = bounds.empty() ? 0.0 : bounds.min.y;
-  if (options.fog) options.fog->top = bounds.empty() ? 0.0 : bounds.max.y;
-  if (request.look) {
-    options.max_bounces = request.look->max_bounces;
-    options.max_scatterings = request.look->max_scatterings;
-  }
   return options;
 }
 
@@ -309,11 +282,9 @@ Result<Picture> CpuBackend::Impl::path_picture(const ViewRequest& wanted, const 
   smooth.reset();
   is_smooth_stale = true;
   prepare_paths();
-  auto taken = paths->tracer.render(wanted.camera, paths_for(wanted, now, paths->bounds), options.threads, goes_on);
+  auto taken = paths->tracer.render(wanted.camera, path_options(wanted, now.width(wanted), now.height(wanted), now.samples, paths->bounds), options.threads, goes_on);
   if (!taken) return taken.error();
-  DevelopOptions film = wanted.look ? wanted.look->develop : DevelopOptions{};
-  film.exposure *= wanted.light.exposure;
-  auto colour = develop(*taken, film);
+  auto colour = develop(*taken, develop_options(wanted));
   if (!colour) return colour.error();
   Picture picture;
   picture.colour = std::move(*colour);

@@ -45,7 +45,7 @@ struct DeviceBackend::Impl {
 
   [[nodiscard]] bool has_thread() const { return !options.rays_on_device; }
   [[nodiscard]] bool uses_device() const {
-    if (!request || request->mode == DrawMode::Density || request->mode == DrawMode::Paths) return false;
+    if (!request || request->mode == DrawMode::Density) return false;
     if (has_meshes(request->mode)) return true;
     // Smooth occlusion of fields is the processor's.
     return options.rays_on_device && !is_device_gone && request->light.occlusion_mode != OcclusionMode::Smooth;

@@ -19,8 +19,6 @@ constexpr int kMeshSamples = 4;
 constexpr double kDetailDistance = 256.0;  // samples of fields
 constexpr std::chrono::milliseconds kRest{150};
 constexpr double kSlowStart = 10.0;  // times as long as a slow picture is a slow first one
-constexpr double kConstancy = 1.3;   // times as long is what lets the size of moving pictures be as it was
-constexpr double kNews = 0.3;        // the share of a new measurement in what is known of how long pictures take
 
 std::string text(const char* format, double value) {
   std::array<char, 64> buffer{};
@@ -58,7 +56,7 @@ void DeviceDrawer::note_edit() {
 
 bool DeviceDrawer::wants_frames() const {
   if (!request_) return false;
-  const bool is_rays = request_->mode == DrawMode::Rays;
+  const bool is_rays = !has_meshes(request_->mode);
   const bool is_stale = is_rays ? is_scene_new_ || !is_settled_
                                 : !meshes_ || meshes_->is_scene_new || (!is_settled_ && meshes_->live->pending() == 0);
   return is_request_new_ || is_stale;
@@ -83,7 +81,7 @@ Status DeviceDrawer::open() {
 }
 
 Status DeviceDrawer::read_scene() {
-  if (request_->mode == DrawMode::Rays) return update_renderer();
+  if (!has_meshes(request_->mode)) return update_renderer();
   const bool is_smooth = request_->mode == DrawMode::Smooth;
   if (Status ready = prepare_meshes(is_smooth ? SurfaceStyle::Smooth : SurfaceStyle::Blocky); !ready) return ready;
   return take_surfaces();
@@ -113,7 +111,8 @@ Result<std::optional<ViewFrame>> DeviceDrawer::read_and_draw() {
 
 Result<std::optional<ViewFrame>> DeviceDrawer::draw() {
   const Clock::time_point start = Clock::now();
-  const Result<bool> drawn = request_->mode == DrawMode::Rays ? draw_rays() : draw_meshes();
+  if (request_->mode != DrawMode::Paths) paths_.reset();
+  const Result<bool> drawn = has_meshes(request_->mode) ? draw_meshes() : draw_rays();
   if (!drawn) return drawn.error();
   if (!*drawn) return std::optional<ViewFrame>();
   if (!std::exchange(is_mode_drawn_, true) && is_processor()) {
@@ -312,14 +311,52 @@ Status DeviceDrawer::draw_stage() {
 Result<bool> DeviceDrawer::draw_rays() {
   if (is_request_new_) is_settled_ = false;
   if (is_settled_) return false;
+  if (request_->mode == DrawMode::Paths) return draw_path_stage();
   if (Status drawn = draw_stage(); !drawn) return drawn.error();
+  return true;
+}
+
+// Samples of paths are added as the time of a frame allows; they are read, freed of noise and shown whenever there are
+// twice as many as were shown before.
+Result<bool> DeviceDrawer::draw_path_stage() {
+  const bool is_first = std::exchange(is_request_new_, false);
+  const bool is_new = is_first || divisor_ > 1;
+  if (!paths_) {
+    paths_ = std::make_unique<VulkanPathPicture>(*renderer_);
+    seconds_per_sample_ = 0.0;
+  }
+  divisor_ = is_first ? first_divisor() : std::max(divisor_ / 2, 1);
+  const int width = (request_->width + divisor_ - 1) / divisor_;
+  const int height = (request_->height + divisor_ - 1) / divisor_;
+  const double pixels = static_cast<double>(width) * height;
+  const int before = is_new ? 0 : paths_->samples();
+  int samples = 1;
+  if (before > 0 && seconds_per_sample_ > 0.0) {
+    samples = static_cast<int>(std::min(options_.frame_seconds / (pixels * seconds_per_sample_), 64.0));
+    samples = std::clamp(samples, 1, std::min(kPathSamples, 2 * shown_samples_) - before);
+  }
+  const PathOptions wanted =
+      path_options(*request_, width, height, samples, scene_->bounds(options_.cpu.instances));
+  const Accumulation accumulation = is_new ? Accumulation::Restart : Accumulation::Continue;
+  const Clock::time_point start = Clock::now();
+  if (Status drawn = renderer_->draw_paths(*paths_, request_->camera, wanted, accumulation); !drawn)
+    return drawn.error();
+  seconds_per_sample_ = seconds_since(start) / (pixels * samples);
+  is_settled_ = divisor_ == 1 && paths_->samples() >= kPathSamples;
+  if (!is_new && paths_->samples() < std::min(2 * shown_samples_, kPathSamples)) return false;
+  auto taken = paths_->read(options_.cpu.threads);
+  if (!taken) return taken.error();
+  const auto colour = develop(*taken, develop_options(*request_));
+  if (!colour) return colour.error();
+  if (Status written = picture_->write(*colour); !written) return written.error();
+  shown_samples_ = paths_->samples();
   return true;
 }
 
 ViewFrame DeviceDrawer::frame(double seconds) const {
   ViewFrame made;
   made.on_device = picture_;
-  made.samples = picture_->samples();
+  made.samples = paths_ ? shown_samples_ : picture_->samples();
   made.is_whole = divisor_ == 1;
   made.is_settled = is_settled_;
   made.seconds = seconds;

@@ -81,6 +81,7 @@ class DeviceDrawer {
   [[nodiscard]] double foreseen_seconds(int divisor) const;
   Result<bool> draw_rays();
   Status draw_stage();
+  Result<bool> draw_path_stage();
   [[nodiscard]] int first_divisor() const;
   [[nodiscard]] int samples_now() const;
   [[nodiscard]] ViewFrame frame(double seconds) const;
@@ -96,11 +97,13 @@ class DeviceDrawer {
   Clock::time_point wanted_at_ = Clock::now();  // the request that is wanted now
   Clock::time_point mode_since_ = Clock::now();
   bool is_mode_drawn_ = false;
-  std::array<bool, 4> is_slow_{};
+  std::array<bool, 5> is_slow_{};
 
   std::shared_ptr<VulkanRenderer> renderer_;
   bool is_scene_new_ = true;  // to the renderer
   std::shared_ptr<VulkanPicture> picture_;
+  std::unique_ptr<VulkanPathPicture> paths_;  // null: the mode is another
+  int shown_samples_ = 0;                     // of these
   std::unique_ptr<Meshes> meshes_;
   int divisor_ = 1;
   int samples_ = 1;

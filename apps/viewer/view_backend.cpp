@@ -9,4 +9,32 @@ bool is_same(const ViewRequest& a, const ViewRequest& b) {
          a.camera == b.camera && a.light == b.light;
 }
 
+PathOptions path_options(const ViewRequest& request, int width, int height, int samples, const DBox& bounds) {
+  PathOptions options;
+  if (request.look) static_cast<Look&>(options) = request.look->look;
+  if (options.sky == SkyModel::Environment) options.sky = SkyModel::Uniform;  // its picture is not loaded here
+  options.lens_radius = 0.0;
+  options.width = width;
+  options.height = height;
+  options.samples = samples;
+  options.denoise = true;
+  const LightOptions& light = request.light;
+  options.sun = light.sun;
+  options.sun_brightness *= light.sun_brightness;
+  options.sky_brightness *= light.sky_brightness;
+  options.lamp_brightness = light.lamp_brightness;
+  fit_look(bounds, options);
+  if (request.look) {
+    options.max_bounces = request.look->max_bounces;
+    options.max_scatterings = request.look->max_scatterings;
+  }
+  return options;
+}
+
+DevelopOptions develop_options(const ViewRequest& request) {
+  DevelopOptions options = request.look ? request.look->develop : DevelopOptions{};
+  options.exposure *= request.light.exposure;
+  return options;
+}
+
 }  // namespace quoin::viewer

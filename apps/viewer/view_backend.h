@@ -10,6 +10,7 @@
 
 #include <quoin/core/image.h>
 #include <quoin/light/light_options.h>
+#include <quoin/render/path_tracer.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/scene/camera.h>
@@ -62,6 +63,19 @@ struct ViewRequest {
 
 /// Whether both want the same picture.
 [[nodiscard]] bool is_same(const ViewRequest& a, const ViewRequest& b);
+
+// Of what backends know of how long pictures take.
+constexpr double kConstancy = 1.3;  ///< times as long is what lets the size of moving pictures be as it was
+constexpr double kNews = 0.3;       ///< the share of a new measurement in what is known of how long pixels take
+
+constexpr int kPathSamples = 256;  ///< of a settled picture by paths
+
+/// How a picture by paths is taken: what the file says, in the light of the window's panel, without noise within
+/// surfaces. `bounds`: of the scene.
+[[nodiscard]] PathOptions path_options(const ViewRequest& request, int width, int height, int samples,
+                                       const DBox& bounds);
+/// And how it is developed.
+[[nodiscard]] DevelopOptions develop_options(const ViewRequest& request);
 
 /// A picture of what was asked for last, or of what was asked for a moment before.
 struct ViewFrame {

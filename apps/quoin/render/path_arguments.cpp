@@ -25,7 +25,7 @@ constexpr std::array kCommonOptions = {"--sun", "--sky-brightness", "--exposure"
 constexpr std::array kOtherLight = {
     "--preset",    "--ao",          "--ao-rays",         "--ao-affects",  "--ao-distance", "--ao-form",
     "--ao-spread", "--ao-offset",   "--ao-power",        "--lamps",       "--fixed-sky",   "--plain-glass",
-    "--detail",    "--lod-colours", "--shadow-distance", "--least-light", "--backend",     "--device"};
+    "--detail",    "--lod-colours", "--shadow-distance", "--least-light"};
 
 std::optional<double> read_sun_angle(const std::string& text) {
   const auto degrees = parse_number(text);
@@ -64,7 +64,7 @@ std::optional<SunTime> read_sun_time(const std::string& text) {
 
 std::optional<FogPlace> read_fog(const std::string& text) {
   const auto numbers = read_numbers(text, 1, 2);
-  if (!numbers || !((*numbers)[0] >= 0.0 && (*numbers)[0] <= 1e6)) return std::nullopt;
+  if (!numbers || !((*numbers)[0] >= 0.0 && (*numbers)[0] <= kMaxFogDensity)) return std::nullopt;
   FogPlace fog;
   fog.density = (*numbers)[0];
   if (numbers->size() > 1) fog.top = (*numbers)[1];
@@ -289,23 +289,22 @@ Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions&
   if (arguments.has("--transparent")) plan.is_transparent = true;
   plan.denoise = arguments.denoise;
 
-  DBox bounds = loaded.scene.bounds(filter);
-  if (bounds.empty()) bounds = {DVec3(0.0), DVec3(0.0)};
   if (arguments.has("--ground") && !arguments.has_ground) {
     options.ground.reset();
   } else if (arguments.has_ground && !options.ground) {
     options.ground.emplace();
   }
-  if (options.ground) {
-    options.ground->height = bounds.min.y;
-    options.ground->only_shadows = plan.is_transparent;
-  }
+  if (options.ground) options.ground->only_shadows = plan.is_transparent;
   if (arguments.fog) {
     options.fog.emplace();
     options.fog->density = arguments.fog->density;
     options.fog->colour = Vec3(arguments.fog_colour);
   }
-  if (options.fog) options.fog->top = arguments.fog ? arguments.fog->top.value_or(bounds.max.y) : bounds.max.y;
+  fit_look(loaded.scene.bounds(filter), options);
+  if (arguments.fog && arguments.fog->top) options.fog->top = *arguments.fog->top;
+  if (arguments.focus && !(options.lens_radius > 0.0)) {
+    plan.warnings.emplace_back("--focus changes nothing: neither --lens-radius nor the file gives the lens a size");
+  }
   return plan;
 }
 

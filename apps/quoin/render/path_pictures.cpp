@@ -42,13 +42,21 @@ Result<std::uint64_t> write_layers(const PathPicture& picture, bool is_transpare
   return write_exr(picture.width, picture.height, channels, path);
 }
 
+DVec3 middle_of(const Scene& scene, InstanceFilter filter) {
+  const DBox bounds = scene.bounds(filter);
+  return bounds.empty() ? DVec3(0.0) : (bounds.min + bounds.max) * 0.5;
+}
+
 }  // namespace
 
 PathPictures::PathPictures(const Scene& scene, InstanceFilter filter, Threads threads, PathPlan plan, bool with_layers)
-    : tracer_(scene, filter, threads), plan_(std::move(plan)), with_layers_(with_layers) {
-  const DBox bounds = scene.bounds(filter);
-  if (!bounds.empty()) middle_ = (bounds.min + bounds.max) * 0.5;
+    : plan_(std::move(plan)), with_layers_(with_layers), middle_(middle_of(scene, filter)) {
+  tracer_.emplace(scene, filter, threads);
 }
+
+PathPictures::PathPictures(VulkanRenderer& device, const Scene& scene, InstanceFilter filter, PathPlan plan,
+                           bool with_layers)
+    : device_(&device), plan_(std::move(plan)), with_layers_(with_layers), middle_(middle_of(scene, filter)) {}
 
 Result<Picture> PathPictures::render(const Camera& camera, const RenderOptions& options, Threads threads,
                                      const Progress& progress) {
@@ -57,7 +65,8 @@ Result<Picture> PathPictures::render(const Camera& camera, const RenderOptions& 
   wanted.denoise = plan_.denoise;
   const double to_middle = glm::dot(middle_ - camera.position, camera.forward);
   wanted.focus_distance = plan_.focus.value_or(std::max(to_middle, 1e-3));
-  auto taken = tracer_.render(camera, wanted, threads, progress);
+  auto taken = tracer_ ? tracer_->render(camera, wanted, threads, progress)
+                       : device_->render_paths(camera, wanted, threads, progress);
   if (!taken) return taken.error();
   last_ = std::move(*taken);
   if (!exposure_) exposure_ = plan_.is_exposure_automatic ? find_exposure(last_) : plan_.develop.exposure;

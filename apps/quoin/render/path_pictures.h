@@ -6,6 +6,7 @@
 
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render/path_tracer.h>
+#include <quoin/render_vk/vulkan_renderer.h>
 
 #include "render/path_arguments.h"
 
@@ -16,6 +17,9 @@ class PathPictures {
  public:
   /// `with_layers`: whether what .exr files hold besides light is kept.
   PathPictures(const Scene& scene, InstanceFilter filter, Threads threads, PathPlan plan, bool with_layers);
+
+  /// By a device, which has the scene and must outlive it.
+  PathPictures(VulkanRenderer& device, const Scene& scene, InstanceFilter filter, PathPlan plan, bool with_layers);
 
   /// With the plan's exposure, or that of the first picture where it is automatic: those of a film
   /// have one.
@@ -30,7 +34,8 @@ class PathPictures {
   void set_exposure(std::optional<double> exposure) { exposure_ = exposure; }
 
  private:
-  PathTracer tracer_;
+  std::optional<PathTracer> tracer_;  // none: a device draws
+  VulkanRenderer* device_ = nullptr;
   PathPlan plan_;
   bool with_layers_;
   DVec3 middle_{0.0};  // of the scene

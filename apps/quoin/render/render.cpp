@@ -209,6 +209,19 @@ Status draw_by_cpu(const Scene& scene, const RenderArguments& arguments, const R
   return take_pictures(renderer, arguments, options, shots, watch, outcome);
 }
 
+// A device that has the scene.
+Result<VulkanRenderer> device_for(const Scene& scene, const RenderArguments& arguments, Outcome& outcome) {
+  VulkanOptions vulkan;
+  vulkan.device = arguments.device;
+  auto renderer = VulkanRenderer::create(vulkan);
+  if (!renderer) return renderer.error();
+  outcome.device = renderer->device().name;
+  if (auto updated = renderer->update(scene, arguments.common.instances(), arguments.common.threads); !updated) {
+    return updated.error();
+  }
+  return renderer;
+}
+
 Status draw_by_paths(const LoadedScene& loaded, const RenderArguments& arguments, const RenderOptions& options,
                      const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
   const InstanceFilter filter = arguments.common.instances();
@@ -220,22 +233,23 @@ Status draw_by_paths(const LoadedScene& loaded, const RenderArguments& arguments
       outcome.warnings.push_back(std::move(warning));
     }
   }
-  PathPictures pictures(loaded.scene, filter, arguments.common.threads, std::move(*plan),
-                        has_ending(arguments.output, ".exr"));
-  pictures.set_exposure(outcome.exposure);
-  return take_pictures(pictures, arguments, options, shots, watch, outcome);
+  const bool with_layers = has_ending(arguments.output, ".exr");
+  const auto take = [&](PathPictures pictures) {
+    pictures.set_exposure(outcome.exposure);
+    return take_pictures(pictures, arguments, options, shots, watch, outcome);
+  };
+  if (arguments.backend != "vulkan") {
+    return take(PathPictures(loaded.scene, filter, arguments.common.threads, std::move(*plan), with_layers));
+  }
+  auto renderer = device_for(loaded.scene, arguments, outcome);
+  if (!renderer) return renderer.error();
+  return take(PathPictures(*renderer, loaded.scene, filter, std::move(*plan), with_layers));
 }
 
 Status draw_by_vulkan(const Scene& scene, const RenderArguments& arguments, const RenderOptions& options,
                       const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
-  VulkanOptions vulkan;
-  vulkan.device = arguments.device;
-  auto renderer = VulkanRenderer::create(vulkan);
+  auto renderer = device_for(scene, arguments, outcome);
   if (!renderer) return renderer.error();
-  outcome.device = renderer->device().name;
-  if (auto updated = renderer->update(scene, arguments.common.instances(), arguments.common.threads); !updated) {
-    return updated;
-  }
   return take_pictures(*renderer, arguments, options, shots, watch, outcome);
 }
 

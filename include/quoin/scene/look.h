@@ -89,6 +89,13 @@ struct Look {
   bool operator==(const Look&) const = default;
 };
 
+/// Stands a look's ground below a scene, and has its fog reach up to the scene's top. `bounds`: of the scene, in the
+/// world; where they are empty both are at a height of 0.
+inline void fit_look(const DBox& bounds, Look& look) {
+  if (look.ground) look.ground->height = bounds.empty() ? 0.0 : bounds.min.y;
+  if (look.fog) look.fog->top = bounds.empty() ? 0.0 : bounds.max.y;
+}
+
 /// How linear light becomes the colours of a screen.
 enum class ToneCurve : std::uint8_t {
   Clamp,    ///< 0 to 1 as it is: what LightModel::Rays shows
