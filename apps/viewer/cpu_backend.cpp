@@ -26,8 +26,6 @@ constexpr std::array kDivisors = {4, 3, 2, 1};
 constexpr int kSampleFactor = 4;
 constexpr int kPathSamples = 256;            // of a settled picture by paths
 constexpr double kPatienceAfterEdits = 4.0;  // times as long: the view stays, and need not become coarse again
-constexpr double kConstancy = 1.3;           // times as long is what lets the size of moving pictures be as it was
-constexpr double kNews = 0.3;                // the share of a new measurement in what is known of how long pixels take
 // Of drafts. The castle at a quarter, two cores: 73 ms in full light; without lamps 23, with 2 of them 28, with 4 33.
 constexpr int kDraftLamps = 2;
 
@@ -380,11 +378,9 @@ void CpuBackend::Impl::publish(Result<Picture> picture, const ViewRequest& of, c
   if (drawn.samples == 1) note_speed(drawn, of, seconds);
 }
 
-// One measurement says little where other programs take their share.
 void CpuBackend::Impl::note_speed(const Stage& drawn, const ViewRequest& of, double seconds) {
   double& known = seconds_per_pixel.at(drawn.is_draft ? 1 : 0);
-  const double now = seconds / drawn.pixels(of);
-  known += (known > 0.0 ? kNews : 1.0) * (now - known);
+  known = seconds_known(known, seconds / drawn.pixels(of));
 }
 
 CpuBackend::CpuBackend(const Scene& scene, const CpuBackendOptions& options, std::function<void()> on_frame)

@@ -19,8 +19,6 @@ constexpr int kMeshSamples = 4;
 constexpr double kDetailDistance = 256.0;  // samples of fields
 constexpr std::chrono::milliseconds kRest{150};
 constexpr double kSlowStart = 10.0;  // times as long as a slow picture is a slow first one
-constexpr double kConstancy = 1.3;   // times as long is what lets the size of moving pictures be as it was
-constexpr double kNews = 0.3;        // the share of a new measurement in what is known of how long pictures take
 
 std::string text(const char* format, double value) {
   std::array<char, 64> buffer{};
@@ -242,9 +240,9 @@ void DeviceDrawer::note_mesh_seconds(double seconds, bool is_moving) {
   if (!is_moving) return;
   // The first of a kind compiles shaders: it says nothing.
   if (!std::exchange(has_shaders_, true)) return;
-  const auto [known, is_new] = mesh_seconds_.try_emplace(divisor_, seconds);
-  if (!is_new) known->second += kNews * (seconds - known->second);
-  if (divisor_ == kMeshDivisors.front() && known->second > options_.slow_seconds)
+  double& known = mesh_seconds_[divisor_];
+  known = seconds_known(known, seconds);
+  if (divisor_ == kMeshDivisors.front() && known > options_.slow_seconds)
     is_slow_.at(static_cast<std::size_t>(request_->mode)) = true;
 }
 
