@@ -5,7 +5,7 @@
 
 #include <quoin/io/mesh_file.h>
 #include <quoin/mesh/smooth_mesh.h>
-#include <quoin/terrain/smooth_terrain.h>
+#include <quoin/terrain/terrain.h>
 
 namespace {
 

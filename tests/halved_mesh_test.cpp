@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <quoin/grid/downsample.h>
-#include <quoin/mesh/blocky_mesh.h>
+#include <quoin/mesh/blocky.h>
 #include <quoin/terrain/terrain.h>
 
 namespace quoin {

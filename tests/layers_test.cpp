@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <regex>
@@ -236,11 +237,79 @@ TEST(Layers, PrivateHeadersAreUsedInTheirLayerOrLent) {
   }
 }
 
+// Of what the checks here rest on.
+TEST(Layers, IncludesAreFound) {
+  std::set<std::string> found;
+  for (const Include& include : includes_of(__FILE__)) {
+    EXPECT_FALSE(include.quoted) << include.path;
+    found.insert(include.path);
+  }
+  EXPECT_TRUE(found.contains("gtest/gtest.h"));
+  EXPECT_TRUE(found.contains("filesystem"));
+}
+
+TEST(Layers, TheHeaderOfEverythingIncludesEveryPublicHeader) {
+  const fs::path root = fs::path(QUOIN_SOURCE_DIR) / "include";
+  std::set<std::string> included;
+  for (const Include& include : includes_of(root / "quoin/quoin.h")) included.insert(include.path);
+  for (const Source& source : sources_of("include")) {
+    const std::string name = source.place.generic_string();
+    EXPECT_EQ(included.contains(name), name != "quoin/quoin.h") << name;
+  }
+}
+
+// Sources of tests are found by their names and compiled together: none of them may get lost on the way.
+TEST(Layers, EverySourceOfTestsIsPartOfThisProgram) {
+  std::set<fs::path> run;
+  const testing::UnitTest& all = *testing::UnitTest::GetInstance();
+  for (int i = 0; i < all.total_test_suite_count(); ++i) {
+    const testing::TestSuite& suite = *all.GetTestSuite(i);
+    for (int j = 0; j < suite.total_test_count(); ++j) {
+      run.insert(fs::path(suite.GetTestInfo(j)->file()).lexically_normal());
+    }
+  }
+  for (const char* top : {"src", "tests"}) {
+    for (const Source& source : sources_of(top)) {
+      const std::string name = source.file.filename().string();
+      if (!name.ends_with("_test.cpp")) continue;
+#if !defined(QUOIN_HAVE_VULKAN)
+      if (source.layer() == "render_vk") continue;
+#endif
+      EXPECT_TRUE(run.contains(source.file.lexically_normal())) << source.file;
+    }
+  }
+}
+
 TEST(Layers, PublicHeadersIncludeNoPrivateOnes) {
   for (const Source& source : sources_of("include/quoin")) {
     for (const Include& include : source.includes) {
       EXPECT_FALSE(include.quoted) << source.file << " includes \"" << include.path << "\"";
     }
+  }
+}
+
+// What one source alone needs belongs in it, unless it is long enough to be read by itself.
+TEST(Layers, SmallHeadersWithoutASourceAreShared) {
+  constexpr int kSmall = 60;
+  const std::set<std::string> kChoices = {"lanes.h"};  // one of several, by the flags of whoever includes it
+  std::map<std::string, std::set<fs::path>> users;
+  std::vector<fs::path> small;
+  for (const char* top : {"src", "apps"}) {
+    for (const Source& source : sources_of(top)) {
+      for (const Include& include : source.includes) {
+        if (include.quoted) users[fs::path(include.path).filename().string()].insert(source.file);
+      }
+      fs::path own = source.file;
+      if (source.file.extension() != ".h" || fs::exists(own.replace_extension(".cpp"))) continue;
+      std::ifstream in(source.file);
+      const auto lines = std::count(std::istreambuf_iterator<char>(in), {}, '\n');
+      if (lines < kSmall && !is_for_tests(source.file)) small.push_back(source.file);
+    }
+  }
+  EXPECT_FALSE(small.empty());
+  for (const fs::path& header : small) {
+    const std::string name = header.filename().string();
+    EXPECT_TRUE(users[name].size() > 1 || kChoices.contains(name)) << header << " has one user";
   }
 }
 

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include <quoin/io/formats.h>
-#include <quoin/terrain/smooth_terrain.h>
 #include <quoin/terrain/terrain.h>
 
 #include "tests/tool_for_tests.h"

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include <quoin/mesh/simplify.h>
+#include <quoin/mesh/smooth_mesh.h>
 
 #include "io/mesh_file_for_tests.h"
 #include "io/volume/volume_for_tests.h"

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 #include <quoin/io/formats.h>
-#include <quoin/mesh/blocky_mesh.h>
-#include <quoin/mesh/simplify.h>
+#include <quoin/mesh/blocky.h>
+#include <quoin/mesh/smooth_mesh.h>
 #include <quoin/scene/scene_meshes.h>
 
 #include "mesh/blocky/watertight_for_tests.h"

@@ -2,7 +2,6 @@
 
 #include <quoin/io/formats.h>
 #include <quoin/scene/scene_faces.h>
-#include <quoin/terrain/smooth_terrain.h>
 #include <quoin/terrain/terrain.h>
 
 #include "commands.h"

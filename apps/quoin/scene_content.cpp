@@ -1,5 +1,7 @@
 #include "scene_content.h"
 
+#include <quoin/scene/scene_meshes.h>
+
 #include "output.h"
 
 namespace quoin::tool {
@@ -21,6 +23,28 @@ std::string content_text(const SceneContent& content) {
   if (content.solid_samples == 0) return "Voxels: " + with_thousands(content.voxels);
   if (content.voxels == 0) return "Solid samples: " + samples;
   return "Voxels: " + with_thousands(content.voxels) + ", solid samples: " + samples;
+}
+
+void warn_of_lamps(const Scene& scene, std::vector<std::string>& warnings) {
+  if (scene.lamps.empty()) return;
+  warnings.push_back("lamps left out, which meshes do not hold: " + std::to_string(scene.lamps.size()));
+}
+
+void warn_of_data(const Scene& scene, std::vector<std::string>& warnings) {
+  const std::int64_t voxels = voxels_with_data(scene);
+  if (voxels != 0) warnings.push_back("data of voxels left out, which meshes do not hold: " + std::to_string(voxels));
+}
+
+void warn_of_left_out(const Scene& scene, InstanceFilter filter, std::vector<std::string>& warnings) {
+  std::size_t left_out = 0;
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    if (is_drawn(scene, instance, InstanceFilter::All) && !is_drawn(scene, instance, filter)) ++left_out;
+  }
+  if (left_out == 1) warnings.emplace_back("1 hidden instance left out; --hidden includes it");
+  if (left_out > 1) {
+    warnings.push_back(std::to_string(left_out) + " hidden instances left out; --hidden includes them");
+  }
 }
 
 }  // namespace quoin::tool

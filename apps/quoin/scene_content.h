@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include <quoin/scene/scene.h>
 
@@ -18,5 +19,12 @@ struct SceneContent {
 
 /// "Voxels: 1,234", "Solid samples: 5,678" or both, in one line without its end.
 [[nodiscard]] std::string content_text(const SceneContent& content);
+
+/// Adds a warning when lamps are left out of meshes.
+void warn_of_lamps(const Scene& scene, std::vector<std::string>& warnings);
+/// Adds a warning when data of voxels is left out of meshes.
+void warn_of_data(const Scene& scene, std::vector<std::string>& warnings);
+/// Adds a warning when hidden instances are left out by `filter`.
+void warn_of_left_out(const Scene& scene, InstanceFilter filter, std::vector<std::string>& warnings);
 
 }  // namespace quoin::tool

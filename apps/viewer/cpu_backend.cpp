@@ -351,11 +351,9 @@ void CpuBackend::Impl::publish(Result<Picture> picture, const ViewRequest& of, c
   if (drawn.samples == 1) note_speed(drawn, of, seconds);
 }
 
-// One measurement says little where other programs take their share.
 void CpuBackend::Impl::note_speed(const Stage& drawn, const ViewRequest& of, double seconds) {
   double& known = seconds_per_pixel.at(drawn.is_draft ? 1 : 0);
-  const double now = seconds / drawn.pixels(of);
-  known += (known > 0.0 ? kNews : 1.0) * (now - known);
+  known = seconds_known(known, seconds / drawn.pixels(of));
 }
 
 CpuBackend::CpuBackend(const Scene& scene, const CpuBackendOptions& options, std::function<void()> on_frame)

@@ -241,9 +241,9 @@ void DeviceDrawer::note_mesh_seconds(double seconds, bool is_moving) {
   if (!is_moving) return;
   // The first of a kind compiles shaders: it says nothing.
   if (!std::exchange(has_shaders_, true)) return;
-  const auto [known, is_new] = mesh_seconds_.try_emplace(divisor_, seconds);
-  if (!is_new) known->second += kNews * (seconds - known->second);
-  if (divisor_ == kMeshDivisors.front() && known->second > options_.slow_seconds)
+  double& known = mesh_seconds_[divisor_];
+  known = seconds_known(known, seconds);
+  if (divisor_ == kMeshDivisors.front() && known > options_.slow_seconds)
     is_slow_.at(static_cast<std::size_t>(request_->mode)) = true;
 }
 

@@ -25,6 +25,12 @@ inline double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+/// Times as long as a picture in motion should take is what lets its size be as it was: it does not go to and fro.
+inline constexpr double kConstancy = 1.3;
+/// What is known of a time, in seconds, after one more measurement of it; 0: nothing was known. One measurement says
+/// little where other programs take their share.
+[[nodiscard]] double seconds_known(double known, double measured);
+
 /// What the scene is drawn as.
 enum class DrawMode : std::uint8_t {
   Rays,     ///< a ray-marched picture

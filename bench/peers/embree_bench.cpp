@@ -10,7 +10,7 @@
 #include <pmmintrin.h>
 #include <xmmintrin.h>
 
-#include <quoin/mesh/blocky_mesh.h>
+#include <quoin/mesh/blocky.h>
 
 #include "bench/peers/peer_report.h"
 

@@ -1,4 +1,4 @@
-#include <quoin/core/direction_set.h>
+#include <quoin/core/direction.h>
 
 #include <algorithm>
 #include <string>

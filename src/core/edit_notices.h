@@ -5,7 +5,7 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
-#include <quoin/core/edit_notice.h>
+#include <quoin/core/changes.h>
 
 namespace quoin {
 

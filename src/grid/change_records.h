@@ -8,7 +8,6 @@
 #include <quoin/core/assert.h>
 #include <quoin/grid/changes.h>
 #include <quoin/grid/chunk.h>
-#include <quoin/grid/neighbourhood.h>
 
 namespace quoin {
 

@@ -6,10 +6,10 @@
 #include <gtest/gtest.h>
 
 #include <quoin/core/ref.h>
+#include <quoin/grid/chunk.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/downsample.h>
 #include <quoin/grid/grid.h>
-#include <quoin/grid/neighbourhood.h>
 #include <quoin/grid/voxel_registry.h>
 
 #include "core/death_for_tests.h"
@@ -92,6 +92,14 @@ TEST(ChangesDeathTest, AskingAboutChunksFartherOffIsAMistake) {
   QUOIN_EXPECT_MISTAKE((void)ChunkChange().affects(IVec3(2, 0, 0)), "-1 <= dx, dy, dz <= 1");
   QUOIN_EXPECT_MISTAKE((void)DensityChange().affects(IVec3(0, 0, -2), 0), "-1 <= dx, dy, dz <= 1");
   QUOIN_EXPECT_MISTAKE((void)DensityChange().affects(IVec3(0), 65), "0 <= reach <= 64");
+}
+
+TEST(ChangesDeathTest, SlabsOutsideOfAChunkAreMistakes) {
+  ChunkSlabs slabs;
+  QUOIN_EXPECT_MISTAKE(slabs.add(64, 0), "0 <= y, z < 64");
+  QUOIN_EXPECT_MISTAKE((void)slabs.has(0, -1), "0 <= y, z < 64");
+  QUOIN_EXPECT_MISTAKE((void)slabs.along_y(64), "0 <= z < 64");
+  QUOIN_EXPECT_MISTAKE((void)slabs.block(8, 0), "0, 16, 32 or 48");
 }
 
 TEST(DensityDeathTest, ABandThatIsNotPositiveIsAMistake) {

@@ -8,7 +8,7 @@
 #include <functional>
 #include <limits>
 
-#include "io/glass_bodies.h"
+#include "io/glass.h"
 #include "io/mesh_parts.h"
 
 namespace quoin {

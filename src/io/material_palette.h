@@ -12,7 +12,7 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/scene_meshes.h>
 
-#include "io/glass_material.h"
+#include "io/glass.h"
 #include "io/image/png.h"
 
 namespace quoin {

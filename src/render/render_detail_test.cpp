@@ -13,7 +13,6 @@
 
 #include <quoin/grid/downsample.h>
 #include <quoin/scene/scene_tracer.h>
-#include <quoin/terrain/smooth_terrain.h>
 #include <quoin/terrain/terrain.h>
 
 #include "render/render_test_support.h"

@@ -113,6 +113,14 @@ TEST(SceneDeathTest, ASceneThatWasMovedAwayFromWhatLooksAtItIsAMistake) {
 }
 // NOLINTEND(bugprone-use-after-move)
 
+TEST(SceneDeathTest, SlidingWithoutContactsIsAMistake) {
+  const Scene scene;
+  const SceneTracer tracer(scene);
+  SlideOptions options;
+  options.max_contacts = 0;
+  QUOIN_EXPECT_MISTAKE((void)move_and_slide(tracer, OrientedBox(), DVec3(1.0), options), "at least one contact");
+}
+
 TEST(CameraDeathTest, APictureWithoutPixelsIsAMistake) {
   QUOIN_EXPECT_MISTAKE((void)ray_through({}, {0.0, 0.0, 0, 5}), "a picture of positive size");
   DetailSelector selector;

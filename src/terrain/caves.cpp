@@ -1,4 +1,4 @@
-#include "terrain/caves.h"
+#include "terrain/terrain_parts.h"
 
 #include <algorithm>
 #include <memory>

@@ -1,11 +1,9 @@
-#include "terrain/ground.h"
+#include "terrain/terrain_parts.h"
 
 #include <algorithm>
 #include <array>
 #include <memory>
 #include <span>
-
-#include "terrain/caves.h"
 
 namespace quoin::terrain {
 namespace {

@@ -1,4 +1,4 @@
-#include "terrain/plants.h"
+#include "terrain/terrain_parts.h"
 
 #include <algorithm>
 #include <optional>

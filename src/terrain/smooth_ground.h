@@ -4,7 +4,7 @@
 
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_chunk.h>
-#include <quoin/terrain/smooth_terrain.h>
+#include <quoin/terrain/terrain.h>
 
 #include "terrain/landform.h"
 

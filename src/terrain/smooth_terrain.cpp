@@ -1,4 +1,4 @@
-#include <quoin/terrain/smooth_terrain.h>
+#include <quoin/terrain/terrain.h>
 
 #include <algorithm>
 #include <iterator>

@@ -1,4 +1,4 @@
-#include <quoin/terrain/smooth_terrain.h>
+#include <quoin/terrain/terrain.h>
 
 #include <array>
 #include <cmath>

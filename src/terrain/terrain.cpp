@@ -7,9 +7,8 @@
 
 #include <quoin/core/assert.h>
 
-#include "terrain/ground.h"
 #include "terrain/landform.h"
-#include "terrain/plants.h"
+#include "terrain/terrain_parts.h"
 
 namespace quoin {
 namespace {

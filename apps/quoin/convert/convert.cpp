@@ -13,7 +13,7 @@
 #include "output_files.h"
 #include "parse.h"
 #include "progress_bar.h"
-#include "scene_warnings.h"
+#include "scene_content.h"
 #include "standard_streams.h"
 #include "stopwatch.h"
 #include "volume_options.h"

@@ -9,7 +9,7 @@
 #include "convert/convert.h"
 #include "interrupt.h"
 #include "progress_bar.h"
-#include "scene_warnings.h"
+#include "scene_content.h"
 #include "stopwatch.h"
 #include "volume_options.h"
 

@@ -19,7 +19,7 @@
 #include "render/path_pictures.h"
 #include "render/picture_output.h"
 #include "render/render_arguments.h"
-#include "scene_warnings.h"
+#include "scene_content.h"
 #include "standard_streams.h"
 #include "stopwatch.h"
 #include "volume_options.h"

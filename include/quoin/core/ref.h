@@ -28,6 +28,7 @@ class RefCounted {
 
 /// One of the owners of a T, which derives from RefCounted; the last one destroys it. Null by default.
 ///
+/// Requires: `*` and `->` are of one that is not null; this is not checked.
 /// Copy on write: what `is_shared` is not to be changed; `make_own` puts a copy in its place.
 /// Threads: owners of one object may come and go on several threads at once, each Ref by itself on one.
 template <class T>

@@ -41,6 +41,7 @@ class [[nodiscard]] Result : public tl::expected<T, Error> {
   Result(Error&& error) : tl::expected<T, Error>(tl::unexpect, std::move(error)) {}
 };
 
+/// Success, or what went wrong.
 using Status = Result<void>;
 
 /// An Error in one call: `return make_error(ErrorCode::BadFormat, "no voxels", path);`.

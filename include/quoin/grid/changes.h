@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
@@ -11,7 +12,7 @@
 #include <quoin/core/changes.h>
 #include <quoin/core/function_ref.h>
 #include <quoin/core/vec.h>
-#include <quoin/grid/neighbourhood.h>
+#include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
 
 namespace quoin {
@@ -33,20 +34,26 @@ class ChunkSlabs {
   [[nodiscard]] static ChunkSlabs of(const IBox& box);
 
   /// Adds that of a row. Requires: 0 <= y, z < 64.
-  void add(int y, int z) { words_[static_cast<std::size_t>(z >> 4)] |= std::uint64_t{1} << bit_of(y, z); }
+  void add(int y, int z) {
+    QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");
+    words_[static_cast<std::size_t>(z >> 4)] |= std::uint64_t{1} << bit_of(y, z);
+  }
   void add(const ChunkSlabs& others) {
     for (std::size_t i = 0; i < words_.size(); ++i) words_[i] |= others.words_[i];
   }
   /// Whether that of a row is among them. Requires: 0 <= y, z < 64.
   [[nodiscard]] bool has(int y, int z) const {
+    QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");
     return (words_[static_cast<std::size_t>(z >> 4)] >> bit_of(y, z) & 1U) != 0;
   }
   /// Of the 16 slabs at a row's z, a bit each by y. Requires: 0 <= z < 64.
   [[nodiscard]] std::uint32_t along_y(int z) const {
+    QUOIN_ASSERT(z >= 0 && z < kChunkEdge, "0 <= z < 64");
     return static_cast<std::uint32_t>(words_[static_cast<std::size_t>(z >> 4)] >> (16 * (z >> 2 & 3)) & 0xFFFFU);
   }
-  /// Of the 4x4 slabs from (y, z) on, which are multiples of 16: a bit each, [z][y].
+  /// Of the 4x4 slabs from (y, z) on a bit each, [z][y]. Requires: y and z are 0, 16, 32 or 48.
   [[nodiscard]] std::uint32_t block(int y, int z) const {
+    QUOIN_ASSERT((y | z) >= 0 && ((y | z) & ~48) == 0, "0, 16, 32 or 48");
     std::uint32_t slabs = 0;
     const std::uint64_t word = words_[static_cast<std::size_t>(z >> 4)] >> (y >> 2);
     for (unsigned i = 0; i < 4; ++i) slabs |= static_cast<std::uint32_t>(word >> (16 * i) & 15U) << (4 * i);
@@ -106,6 +113,22 @@ struct RowChange {
 /// Cost: O(slabs that changed); chunks that the two share cost nothing.
 void visit_changes(const Grid& before, const Grid& now, const GridChanges& changes,
                    FunctionRef<void(const RowChange&)> visit);
+
+/// Voxels of one chunk whose data changed, because it was set or because they became another type.
+struct DataChange {
+  IVec3 chunk{0};
+  IBox box;  ///< around them, in the chunk's coordinates
+};
+using DataChanges = Changes<DataChange>;
+
+/// What edits did to the data of single voxels: calls `visit` for every voxel whose data differs between two states of
+/// a grid, chunks by z, y, x, in each the voxels by z, y, x. `before` is a snapshot of when the cursor was read
+/// for the last time, `changes` what `now.data_changes_since` told since then; when all has changed, all of both is
+/// compared.
+///
+/// Cost: O(voxels with data of the slabs, of 4x4 rows, in which some changed); what the two share costs nothing.
+void visit_data_changes(const Grid& before, const Grid& now, const DataChanges& changes,
+                        FunctionRef<void(IVec3 voxel, const VoxelData& before, const VoxelData& now)> visit);
 
 /// Samples of one chunk that changed, in density or in material.
 struct DensityChange {

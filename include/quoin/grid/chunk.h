@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
@@ -7,10 +9,10 @@
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/function_ref.h>
 #include <quoin/core/ref.h>
 #include <quoin/core/vec.h>
-#include <quoin/grid/voxel_data.h>
 #include <quoin/grid/voxel_registry.h>
 
 namespace quoin {
@@ -32,6 +34,27 @@ IVec3 chunk_of(Point<T> point) = delete;  // chunk_of(voxel_of(point))
 }
 template <std::floating_point T>
 IVec3 local_of(Point<T> point) = delete;
+
+/// Bytes that one voxel can hold.
+inline constexpr std::size_t kMaxVoxelDataBytes = std::size_t{1} << 16;
+
+/// What a voxel holds besides its type: how a stair is turned, how high water stands, what is in a chest.
+///
+///   world.set(at, stairs, {.state = 3});                    // type and data in one
+///   world.set_data(at, {.state = world.data(at).state ^ 1});
+///   world.set_data(chest, {.bytes = inventory});            // copied
+///
+/// A word for what many voxels have, whose bits the type declares (VoxelProperties::state_bits), and bytes for what
+/// few have. Neither has a meaning to the engine; it is stored where it is not empty, and takes no types.
+struct VoxelData {
+  std::uint32_t state = 0;             ///< 0 is what a voxel has of which nothing was said
+  std::span<const std::byte> bytes{};  ///< at most kMaxVoxelDataBytes. Lifetime: of a grid's until its next edit
+
+  [[nodiscard]] bool empty() const { return state == 0 && bytes.empty(); }
+  bool operator==(const VoxelData& other) const {
+    return state == other.state && std::ranges::equal(bytes, other.bytes);
+  }
+};
 
 class ChunkData;
 struct ChunkStorage;
@@ -163,5 +186,43 @@ class Chunk {
   Ref<ChunkStorage> storage_;
   Ref<ChunkData> data_;  // null where no voxel has any
 };
+
+/// A chunk and its 26 neighbours: everything that meshing a chunk may read, in one object.
+///
+/// A null chunk reads as air.
+/// Lifetime: owns nothing; the grid must outlive it, and an edit of the grid ends it.
+struct Neighbourhood {
+  /// [(dz + 1) * 9 + (dy + 1) * 3 + (dx + 1)]; the centre is 13.
+  std::array<const Chunk*, 27> chunks{};
+
+  /// The offset of the chunk at an index, the inverse of `index`: -1 to 1 on each axis. Requires: 0 <= index < 27.
+  [[nodiscard]] static IVec3 offset(int index) {
+    QUOIN_ASSERT(index >= 0 && index < 27, "0 <= index < 27");
+    return {index % 3 - 1, index / 3 % 3 - 1, index / 9 - 1};
+  }
+  /// The index of the chunk at an offset. Requires: -1 <= dx, dy, dz <= 1.
+  [[nodiscard]] static std::size_t index(int dx, int dy, int dz) {
+    QUOIN_ASSERT(dx * dx <= 1 && dy * dy <= 1 && dz * dz <= 1, "-1 <= dx, dy, dz <= 1");
+    return static_cast<std::size_t>((dz + 1) * 9 + (dy + 1) * 3 + (dx + 1));
+  }
+  /// The chunk at an offset. Requires: -1 <= dx, dy, dz <= 1.
+  [[nodiscard]] const Chunk* at(int dx, int dy, int dz) const { return chunks[index(dx, dy, dz)]; }
+  [[nodiscard]] const Chunk* centre() const { return chunks[13]; }
+
+  /// The voxel at a position relative to the centre chunk: (-1, -1, z) is in the edge neighbour.
+  /// Requires: -64 <= local.x, local.y, local.z < 128.
+  [[nodiscard]] VoxelType get(IVec3 local) const {
+    const IVec3 chunk = chunk_of(local);
+    const Chunk* found = at(chunk.x, chunk.y, chunk.z);
+    return found == nullptr ? kAir : found->get(local_of(local));
+  }
+};
+
+/// A neighbourhood of a chunk with nothing around it. Lifetime: as Neighbourhood.
+[[nodiscard]] inline Neighbourhood isolated(const Chunk& chunk) {
+  Neighbourhood n;
+  n.chunks[13] = &chunk;
+  return n;
+}
 
 }  // namespace quoin

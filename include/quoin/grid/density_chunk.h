@@ -10,7 +10,6 @@
 #include <quoin/core/ref.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
-#include <quoin/grid/neighbourhood.h>
 #include <quoin/grid/voxel_registry.h>
 
 namespace quoin {

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include <quoin/core/changes.h>
-#include <quoin/core/edit_notice.h>
 #include <quoin/core/function_ref.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/vec.h>

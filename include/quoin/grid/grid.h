@@ -9,14 +9,11 @@
 #include <vector>
 
 #include <quoin/core/changes.h>
-#include <quoin/core/edit_notice.h>
 #include <quoin/core/function_ref.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/changes.h>
 #include <quoin/grid/chunk.h>
-#include <quoin/grid/neighbourhood.h>
-#include <quoin/grid/voxel_data.h>
 #include <quoin/grid/voxel_registry.h>
 
 namespace quoin {

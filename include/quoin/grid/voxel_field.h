@@ -4,10 +4,10 @@
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/chunk.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
-#include <quoin/grid/neighbourhood.h>
 
 namespace quoin {
 

@@ -31,8 +31,10 @@ namespace quoin {
 /// Odd:     a MAIN chunk that claims up to 20 bytes more than there are is read with a warning, when all within is
 ///          sound.
 /// Cameras: those that were set, by the file's numbers; panoramas are skipped with a warning.
-/// Skipped: with a warning, voxels outside their model's box or of colour 0. Frames but one, render settings, notes and
-///          chunks that are not known are in LoadedScene::source alone: `only_in_source` names them.
+/// Look:    the render settings are LoadedScene::look, where the file has them.
+/// Skipped: with a warning, voxels outside their model's box or of colour 0. Frames but one, notes and chunks that are
+///          not known are in LoadedScene::source alone. `only_in_source` names these, and all else that a Scene cannot
+///          hold: cameras and render settings.
 /// Progress: told after every model.
 /// Errors:  BadFormat with the byte offset; Unsupported for SLAB6's format of the same name and git-LFS pointers;
 ///          InvalidArgument for a frame that is not there; Cancelled; LimitExceeded when a scene graph or scattered

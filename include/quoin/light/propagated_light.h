@@ -28,6 +28,7 @@ struct LightLevels {
 [[nodiscard]] constexpr std::uint16_t packed(LightLevels levels) {
   return static_cast<std::uint16_t>(levels.sky | levels.red << 4 | levels.green << 8 | levels.blue << 12);
 }
+/// The levels of such a word.
 [[nodiscard]] constexpr LightLevels unpacked_light(std::uint16_t word) {
   return {static_cast<std::uint8_t>(word & 15), static_cast<std::uint8_t>(word >> 4 & 15),
           static_cast<std::uint8_t>(word >> 8 & 15), static_cast<std::uint8_t>(word >> 12)};
@@ -90,6 +91,7 @@ class PropagatedLight {
   /// the order of the quads they come from; both are replaced.
   void split(const QuadBuffer& quads, IVec3 chunk, QuadBuffer& out, std::vector<std::uint16_t>& light) const;
 
+  /// Bytes held, also those that snapshots share.
   [[nodiscard]] std::size_t bytes() const;
 
  private:

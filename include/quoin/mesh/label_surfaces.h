@@ -9,7 +9,7 @@
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
-#include <quoin/grid/array_view.h>
+#include <quoin/grid/volume.h>
 #include <quoin/mesh/array_surface.h>
 
 namespace quoin {

@@ -9,7 +9,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/array_surface.h>
-#include <quoin/mesh/blocky_mesh.h>
+#include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth_mesh.h>
 
 namespace quoin {

@@ -6,7 +6,7 @@
 
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
-#include <quoin/grid/neighbourhood.h>
+#include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
 
 namespace quoin {

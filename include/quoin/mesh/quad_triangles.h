@@ -20,6 +20,7 @@ namespace quoin {
 /// The order of a triangle's corners, seen from its front.
 enum class Winding : std::uint8_t { CounterClockwise, Clockwise };
 
+/// What the meshes of so many quads take: four vertices and six indices each.
 [[nodiscard]] constexpr std::size_t vertices_needed(std::size_t quads) {
   return 4 * quads;
 }
@@ -49,6 +50,7 @@ inline constexpr std::array<std::array<std::uint8_t, 6>, 4> kTriangleCorners = {
   const std::uint32_t along_v = static_cast<std::uint32_t>(quad.size_v()) << (8 * frame.v);
   return {first, first + along_u, first + along_u + along_v, first + along_v};
 }
+/// The position in such a word.
 [[nodiscard]] inline IVec3 unpacked_corner(std::uint32_t packed) {
   return {static_cast<int>(packed & 255U), static_cast<int>(packed >> 8 & 255U), static_cast<int>(packed >> 16)};
 }

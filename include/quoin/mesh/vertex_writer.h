@@ -104,15 +104,16 @@ class VertexWriter {
   [[nodiscard]] const VertexLayout& layout() const { return layout_; }
   [[nodiscard]] std::size_t bytes_needed(std::size_t vertices) const { return vertices * layout_.stride; }
 
-  /// Four vertices a quad. `origin` is added to positions (chunk coordinates).
+  /// Four vertices a quad. `origin`, in voxels, is added to positions (chunk coordinates).
   /// Every layout that a writer takes can be written of quads.
   /// Requires: room for the bytes needed; where positions are whole numbers, `origin` is, and their sums are within the
   ///           format's range.
   void write(std::span<const Quad> quads, Vec3 origin, std::span<std::byte> out) const;
-  /// The mesh's vertices. Requires: can_write(layout, VertexSource::SmoothChunk); room for the bytes needed.
+  /// The mesh's vertices; `origin`, in samples, is added to positions.
+  /// Requires: can_write(layout, VertexSource::SmoothChunk); room for the bytes needed.
   void write(const SmoothChunkMesh& mesh, Vec3 origin, std::span<std::byte> out) const;
-  /// The view's vertices. Requires: can_write(layout, source), where `has_albedo` tells Smooth from Blocks; room for
-  /// the bytes needed.
+  /// The view's vertices; `origin`, in its coordinates, is added to positions.
+  /// Requires: can_write(layout, source), where `has_albedo` tells Smooth from Blocks; room for the bytes needed.
   void write(const MeshView& mesh, Vec3 origin, std::span<std::byte> out) const;
 
  private:

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include <quoin/core/direction_set.h>
+#include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
-#include <quoin/grid/neighbourhood.h>
+#include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
 
 namespace quoin {

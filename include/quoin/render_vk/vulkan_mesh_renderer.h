@@ -78,6 +78,7 @@ class VulkanMeshRenderer {
   /// Errors: also InvalidArgument when a surface's arrays contradict each other; then nothing is changed. After another
   /// error some surfaces may have been taken over, and the others are what they were.
   [[nodiscard]] Status put(std::span<const SurfaceUpdate> surfaces);
+  /// Forgets all surfaces.
   void clear();
 
   /// Draws all there is; `threads` are for what detail needs.

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include <quoin/core/oriented_box.h>
+#include <quoin/core/shapes.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/scene.h>

@@ -6,9 +6,8 @@
 #include <span>
 #include <vector>
 
-#include <quoin/core/capsule.h>
 #include <quoin/core/direction.h>
-#include <quoin/core/oriented_box.h>
+#include <quoin/core/shapes.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/camera.h>
@@ -49,9 +48,9 @@ struct SceneHit {
   DVec3 normal{0.0};  ///< in the world: unit, out of what was hit; 0 where a field has no gradient
 };
 
-/// The nearest voxel or field's surface along a ray in the world, transparent ones too; of equally near ones that of
-/// the instance that comes first, in it the voxel. Nothing when there is none, or when the ray is not finite or its
-/// direction is zero.
+/// The nearest voxel or field's surface along a ray in the world, up to and including `max_t` (in lengths of its
+/// direction), transparent ones too; of equally near ones that of the instance that comes first, in it the voxel.
+/// Nothing when there is none, when the ray is not finite or its direction is zero, or when `max_t` is negative or NaN.
 ///
 /// Precision: moved into each grid in double before it is traced there, so as exact 10^9 from the origin as the ray
 ///            itself.

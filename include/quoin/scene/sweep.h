@@ -4,8 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include <quoin/core/capsule.h>
-#include <quoin/core/oriented_box.h>
+#include <quoin/core/shapes.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/scene/scene.h>
@@ -88,7 +87,7 @@ struct FloorOptions {
 struct SlideOptions {
   /// The gap that is left in front of what is met, world units: what rounding may not bridge.
   double skin = 1e-3;
-  int max_contacts = 5;  ///< at least 1; after which what is left of the displacement is dropped
+  int max_contacts = 5;  ///< after which what is left of the displacement is dropped
   /// A box that starts inside is moved out first: of a field's solid along the gradient where that leads out, else by
   /// the `displacement_to_free_place`. Without, and where there is none, it stays where it is: `is_blocked`, with the
   /// displacement as it was.
@@ -132,6 +131,7 @@ struct SlideResult {
 /// is a wall to it while it stands: it does not climb it; when it falls it slides down along it. A displacement that
 /// points up leaves the floor. Gravity belongs to the displacement in every frame.
 ///
+/// Requires: `max_contacts` is at least 1.
 /// Cost:    a sweep for each contact, `max_contacts` at most. With a floor two more, and four for an attempt to step.
 /// Threads: any number may ask at once, while the tracer is not updated.
 [[nodiscard]] SlideResult move_and_slide(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement,

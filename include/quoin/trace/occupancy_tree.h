@@ -59,7 +59,7 @@ class OccupancyTree {
   /// Takes over what edits changed, as `grid.changes_since` tells of it, in place; builds it anew when all has changed.
   ///
   /// Requires: `changes` are those since the last update, or what was built; no type has another visibility since then
-  ///           (`has_other_visibility`), or else all has changed.
+  ///           (`has_other_visibility`), or else all has changed. Neither is checked.
   /// Cost: about a microsecond for each row of four bricks (of 16^3 voxels, along x) in which something changed; for
   ///       changes at the sides of what a chunk holds, some microseconds for its box. When the box of chunks around
   ///       everything outgrows the flat tables, these are copied once, with room for more on that side.

@@ -1,5 +1,5 @@
 // Four lanes in plain C++, which compilers turn into what the build's baseline has.
-// What a comparison with a number that is none answers, and which of two `min` and `max` take then, is as in x86-64.
+// What a comparison with NaN gives, and which of two `min` and `max` take then, is as in x86-64.
 
 #pragma once
 

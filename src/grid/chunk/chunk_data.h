@@ -8,8 +8,8 @@
 #include <vector>
 
 #include <quoin/core/ref.h>
+#include <quoin/grid/changes.h>
 #include <quoin/grid/chunk.h>
-#include <quoin/grid/voxel_data.h>
 
 #include "grid/chunk/chunk_storage.h"
 

@@ -168,7 +168,7 @@ struct NiftiFile {
 /// The datatype numbers of NIfTI, by ScalarType.
 inline constexpr std::array<int, 10> kNiftiTypes = {2, 256, 512, 4, 768, 8, 1280, 1024, 16, 64};
 
-/// Reads bytes that may be anything: what is wrong with the answer, or nothing.
+/// Reads bytes that may be anything: what is wrong with what came of it, or nothing.
 inline std::string wrong_with(std::span<const std::byte> bytes) {
   constexpr std::int64_t kMost = 1 << 20;
   const Result<Volume> volume = read_volume(bytes, {.max_values = kMost});

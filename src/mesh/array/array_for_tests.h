@@ -12,7 +12,7 @@
 
 #include <quoin/core/buffer.h>
 #include <quoin/core/vec.h>
-#include <quoin/grid/array_view.h>
+#include <quoin/grid/volume.h>
 
 namespace quoin::array_tests {
 

@@ -7,7 +7,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
-#include <quoin/grid/array_view.h>
+#include <quoin/grid/volume.h>
 
 namespace quoin::array {
 

@@ -1,10 +1,9 @@
-#include <quoin/mesh/blocky_mesh.h>
+#include <quoin/mesh/blocky.h>
 
 #include <algorithm>
 #include <limits>
 #include <memory>
 
-#include <quoin/mesh/blocky.h>
 #include <quoin/mesh/quad_triangles.h>
 
 #include "core/progress_steps.h"

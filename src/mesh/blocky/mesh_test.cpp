@@ -1,4 +1,4 @@
-#include <quoin/mesh/blocky_mesh.h>
+#include <quoin/mesh/blocky.h>
 
 #include <gtest/gtest.h>
 

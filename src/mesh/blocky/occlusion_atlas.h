@@ -9,7 +9,7 @@
 #include <quoin/core/image.h>
 #include <quoin/core/result.h>
 #include <quoin/grid/voxel_registry.h>
-#include <quoin/mesh/blocky_mesh.h>
+#include <quoin/mesh/blocky.h>
 
 namespace quoin {
 

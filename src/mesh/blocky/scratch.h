@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include <quoin/core/direction.h>
-#include <quoin/grid/neighbourhood.h>
+#include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/quad.h>

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include <quoin/mesh/blocky_mesh.h>
+#include <quoin/mesh/blocky.h>
 
 namespace quoin::oracle {
 

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 #include <quoin/mesh/smooth_mesh.h>
-#include <quoin/terrain/smooth_terrain.h>
+#include <quoin/terrain/terrain.h>
 
 #include "core/death_for_tests.h"
 #include "core/instruction_sets_for_tests.h"

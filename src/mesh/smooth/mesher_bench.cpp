@@ -11,7 +11,7 @@
 #include <benchmark/benchmark.h>
 #include <quoin/mesh/smooth_mesh.h>
 #include <quoin/mesh/smooth_occlusion.h>
-#include <quoin/terrain/smooth_terrain.h>
+#include <quoin/terrain/terrain.h>
 
 #include "bench/smooth_workload.h"
 #include "core/made_with_for_tests.h"

@@ -1,4 +1,4 @@
-#include <quoin/mesh/simplify.h>
+#include <quoin/mesh/smooth_mesh.h>
 
 #include <gtest/gtest.h>
 

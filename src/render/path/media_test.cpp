@@ -23,26 +23,18 @@ namespace {
 using render_test::add_type;
 using render_test::from_above;
 using render_test::of_town;
+using render_test::path_picture;
 using render_test::place;
 using render_test::towards;
 using render_test::town;
+using render_test::under_even_sky;
 
+// With light that is scattered as often as it likes.
 PathOptions even_sky(int size, int samples) {
-  PathOptions options;
-  options.width = size;
-  options.height = size;
-  options.samples = samples;
-  options.sky = SkyModel::Uniform;
-  options.sun_brightness = 0.0;
+  PathOptions options = under_even_sky(size, size, samples);
   options.max_bounces = 1024;
   options.max_scatterings = 1024;
   return options;
-}
-
-PathPicture taken_in(const Scene& scene, const Camera& camera, const PathOptions& options) {
-  auto picture = PathTracer(scene).render(camera, options);
-  EXPECT_TRUE(picture.has_value()) << (picture ? "" : picture.error().message);
-  return picture ? std::move(*picture) : PathPicture{};
 }
 
 // Along -z, each pixel alike.
@@ -100,14 +92,14 @@ TEST(PathMedia, ThePhaseFunctionsSamplesHaveItsDensityAndMean) {
 // White furnace: white fog over white ground, and a white cloud, cannot be seen in a white sky.
 TEST(PathMedia, WhiteFogAndCloudsCannotBeSeen) {
   const Scene cube = box_of(cloud_of({255, 255, 255, 255}, 0.4F, 0.5F), {IVec3(0), IVec3(8)});
-  const PathPicture cloud = taken_in(cube, towards({4.0, 10.0, 24.0}, DVec3(4.0), 0.5), even_sky(16, 64));
+  const PathPicture cloud = path_picture(cube, towards({4.0, 10.0, 24.0}, DVec3(4.0), 0.5), even_sky(16, 64));
   EXPECT_NEAR(mean_red(cloud), 1.0, 0.005);
   Scene scene;
   PathOptions options = even_sky(16, 64);
   options.ground.emplace();
   options.ground->colour = Vec3(1.0F);
   options.fog = Fog{0.2, Vec3(1.0F), 0.3, 8.0};
-  const PathPicture fog = taken_in(scene, towards({0.0, 3.0, 10.0}, {0.0, 0.0, 0.0}, 0.5), options);
+  const PathPicture fog = path_picture(scene, towards({0.0, 3.0, 10.0}, {0.0, 0.0, 0.0}, 0.5), options);
   EXPECT_NEAR(mean_red(fog), 1.0, 0.005);
 }
 
@@ -122,7 +114,7 @@ TEST(PathMedia, WhatPassesFallsWithTheLength) {
   options.max_bounces = 0;
   options.fog = Fog{0.1, Vec3(0.0F), 0.0, 100.0};
   const Camera camera = straight_at_the_front();
-  EXPECT_NEAR(mean_red(taken_in(wall, camera, options)), std::exp(-1.2), 0.003);
+  EXPECT_NEAR(mean_red(path_picture(wall, camera, options)), std::exp(-1.2), 0.003);
 
   // The sun above, through 10 of fog down and, as seen from above, 10 up.
   const Scene floor = box_of({.name = "", .colour = {255, 255, 255, 255}}, {{-20, -1, -20}, {20, 0, 20}});
@@ -132,7 +124,7 @@ TEST(PathMedia, WhatPassesFallsWithTheLength) {
   options.sun_brightness = 1.0;
   options.sun_angle_radians = 0.0;
   options.fog = Fog{0.05, Vec3(0.0F), 0.0, 10.0};
-  EXPECT_NEAR(mean_red(taken_in(floor, from_above(0.0, 30.0, 0.0, 4.0), options)), std::exp(-1.0), 0.004);
+  EXPECT_NEAR(mean_red(path_picture(floor, from_above(0.0, 30.0, 0.0, 4.0), options)), std::exp(-1.0), 0.004);
 }
 
 // Black clouds likewise; glass with edges counts as a voxel at least, clouds do not.
@@ -140,7 +132,7 @@ TEST(PathMedia, ABlackCloudOnlyTakesAway) {
   for (const int depth : {1, 6}) {
     const Scene scene = box_of(cloud_of({0, 0, 0, 255}, 0.25F), {{-20, -20, -depth}, {20, 20, 0}});
     const Camera camera = straight_at_the_front();
-    const PathPicture picture = taken_in(scene, camera, even_sky(16, 256));
+    const PathPicture picture = path_picture(scene, camera, even_sky(16, 256));
     EXPECT_NEAR(mean_red(picture), std::exp(-0.25 * depth), 0.004);
     const double alpha = std::accumulate(picture.alpha.begin(), picture.alpha.end(), 0.0) / 256.0;
     EXPECT_NEAR(alpha, 1.0 - std::exp(-0.25 * depth), 0.004);
@@ -160,7 +152,7 @@ TEST(PathMedia, CloudsStandBesideGlass) {
   grid.fill_box({{0, 0, 6}, {8, 8, 8}}, glass);
   place(scene, std::move(grid));
   for (const DVec3& from : {DVec3(4.0, 9.0, 30.0), DVec3(3.0, 2.0, -20.0)}) {
-    EXPECT_NEAR(mean_red(taken_in(scene, towards(from, DVec3(4.0), 0.4), even_sky(16, 128))), 1.0, 0.01);
+    EXPECT_NEAR(mean_red(path_picture(scene, towards(from, DVec3(4.0), 0.4), even_sky(16, 128))), 1.0, 0.01);
   }
 }
 
@@ -173,7 +165,7 @@ TEST(PathMedia, ALampShinesInFog) {
   PathOptions options = even_sky(24, 64);
   options.sky_brightness = 0.0;
   options.fog = Fog{0.05, Vec3(1.0F), 0.0, 100.0};
-  const PathPicture picture = taken_in(scene, towards({1.0, 1.0, 20.0}, DVec3(1.0), 1.2), options);
+  const PathPicture picture = path_picture(scene, towards({1.0, 1.0, 20.0}, DVec3(1.0), 1.2), options);
   const auto at = [&](std::size_t x, std::size_t y) { return picture.radiance[y * 24 + x].x; };
   EXPECT_GT(at(9, 12), 0.02F);
   EXPECT_GT(at(9, 12), 2.0F * at(0, 0));
@@ -210,7 +202,7 @@ TEST(PathLens, BladesShapeWhatIsOutOfFocus) {
   options.lens_blades = 4;
   const Camera camera = towards({0.5, 0.5, 60.0}, DVec3(0.5), 0.3);
   const auto lit = [&](const PathOptions& by) {
-    const PathPicture picture = taken_in(scene, camera, by);
+    const PathPicture picture = path_picture(scene, camera, by);
     return std::ranges::count_if(picture.radiance, [](Vec3 light) { return light.x > 0.0F; });
   };
   const auto square = lit(options);
@@ -235,11 +227,11 @@ TEST(PathDenoise, HalvesTheErrorAtLeast) {
   options.width = 240;
   options.height = 160;
   options.samples = 192;
-  const PathPicture truth = taken_in(scene, of_town(), options);
+  const PathPicture truth = path_picture(scene, of_town(), options);
   options.samples = 8;
-  const double before = error_of(taken_in(scene, of_town(), options), truth);
+  const double before = error_of(path_picture(scene, of_town(), options), truth);
   options.denoise = true;
-  const double after = error_of(taken_in(scene, of_town(), options), truth);
+  const double after = error_of(path_picture(scene, of_town(), options), truth);
   EXPECT_LT(after, 0.6 * before) << before << " " << after;
 }
 
@@ -259,9 +251,9 @@ TEST(PathDenoise, KeepsEdges) {
   options.sun_brightness = 1.0;
   options.sun_angle_radians = 0.0;
   const Camera camera = towards({15.0, 20.0, 25.0}, DVec3(0.0), 0.8);
-  const PathPicture plain = taken_in(scene, camera, options);
+  const PathPicture plain = path_picture(scene, camera, options);
   options.denoise = true;
-  const PathPicture smooth = taken_in(scene, camera, options);
+  const PathPicture smooth = path_picture(scene, camera, options);
   int different = 0;
   for (std::size_t i = 0; i < plain.radiance.size(); ++i) {
     if (glm::length(plain.radiance[i] - smooth.radiance[i]) > 0.02F) ++different;

@@ -22,29 +22,15 @@ namespace {
 using render_test::add_type;
 using render_test::from_above;
 using render_test::of_town;
+using render_test::path_picture;
 using render_test::place;
 using render_test::towards;
 using render_test::town;
+using render_test::under_even_sky;
 
 constexpr Rgba8 kWhite{255, 255, 255, 255};
 constexpr Rgba8 kGrey{188, 188, 188, 255};
 constexpr double kPi = std::numbers::pi;
-
-PathOptions uniform(int width, int height, int samples) {
-  PathOptions options;
-  options.width = width;
-  options.height = height;
-  options.samples = samples;
-  options.sky = SkyModel::Uniform;
-  options.sun_brightness = 0.0;
-  return options;
-}
-
-PathPicture taken(const Scene& scene, const Camera& camera, const PathOptions& options, Threads threads = {}) {
-  auto picture = PathTracer(scene).render(camera, options, threads);
-  EXPECT_TRUE(picture.has_value());
-  return picture ? std::move(*picture) : PathPicture{};
-}
 
 Vec3 mean(const PathPicture& picture) {
   DVec3 sum(0.0);
@@ -94,7 +80,7 @@ Camera looking(DVec3 position, DVec3 forward, DVec3 up, double view_height) {
 
 TEST(PathTracer, AConvexBodyUnderAUniformSkyShowsItsAlbedo) {
   const Scene scene = cube_of(kGrey);
-  const PathPicture picture = taken(scene, from_above(4.0, 20.0, 4.0, 6.0), uniform(16, 16, 4));
+  const PathPicture picture = path_picture(scene, from_above(4.0, 20.0, 4.0, 6.0), under_even_sky(16, 16, 4));
   for (const Vec3& light : picture.radiance) EXPECT_NEAR(light.x, linear_from_srgb(std::uint8_t{188}), 1e-6F);
   EXPECT_EQ(picture.pixels_hit, 256);
 }
@@ -104,9 +90,9 @@ TEST(PathTracer, AClosedBoxThatEmitsFillsWithLight) {
   const float albedo = linear_from_srgb(std::uint8_t{188});
   const Scene scene = room(6, of_colour(kGrey, 1.0F), of_colour(kGrey, 1.0F));
   for (const int bounces : {0, 1, 2, 5, 40}) {
-    PathOptions options = uniform(16, 16, 64);
+    PathOptions options = under_even_sky(16, 16, 64);
     options.max_bounces = bounces;
-    const float light = mean(taken(scene, towards({3.0, 3.0, 3.0}, {3.0, 2.0, 0.0}), options)).x;
+    const float light = mean(path_picture(scene, towards({3.0, 3.0, 3.0}, {3.0, 2.0, 0.0}), options)).x;
     const float expected = albedo * (1.0F - std::pow(albedo, static_cast<float>(bounces + 1))) / (1.0F - albedo);
     EXPECT_NEAR(light / expected, 1.0F, 0.01F) << bounces;
   }
@@ -117,11 +103,11 @@ TEST(PathTracer, FormFactorsOfACubesWalls) {
   constexpr int kEdge = 8;
   const Scene scene = room(kEdge, of_colour(kGrey), of_colour({255, 255, 255, 255}, 1.0F));
   const float albedo = linear_from_srgb(std::uint8_t{188});
-  PathOptions options = uniform(32, 32, 256);
+  PathOptions options = under_even_sky(32, 32, 256);
   options.max_bounces = 1;
-  const PathPicture opposite = taken(scene, looking(DVec3(4.0), {0, -1, 0}, {0, 0, -1}, kEdge), options);
+  const PathPicture opposite = path_picture(scene, looking(DVec3(4.0), {0, -1, 0}, {0, 0, -1}, kEdge), options);
   EXPECT_NEAR(mean(opposite).x / albedo, 0.199825F, 0.001F);
-  const PathPicture adjacent = taken(scene, looking(DVec3(4.0), {1, 0, 0}, {0, 1, 0}, kEdge), options);
+  const PathPicture adjacent = path_picture(scene, looking(DVec3(4.0), {1, 0, 0}, {0, 1, 0}, kEdge), options);
   EXPECT_NEAR(mean(adjacent).x / albedo, 0.200044F, 0.001F);
 }
 
@@ -135,13 +121,13 @@ TEST(PathTracer, ASlopeSeesTheSkyAboveIt) {
     moved.rotation = glm::angleAxis(angle, DVec3(1, 0, 0));
     const DVec3 normal = moved.rotation * DVec3(0, 1, 0);
     const DVec3 middle = moved.position + moved.rotation * DVec3(2, 4, 2);
-    PathOptions options = uniform(8, 8, 256);
+    PathOptions options = under_even_sky(8, 8, 256);
     options.max_bounces = 1;
     options.ground.emplace();
     options.ground->colour = Vec3(0.0F);
     options.ground->height = -1000.0;
     const Camera camera = looking(middle + normal * 3.0, -normal, moved.rotation * DVec3(0, 0, -1), 2.0);
-    const float light = mean(taken(scene, camera, options)).x / linear_from_srgb(std::uint8_t{188});
+    const float light = mean(path_picture(scene, camera, options)).x / linear_from_srgb(std::uint8_t{188});
     EXPECT_NEAR(light, 0.5 * (1.0 + std::cos(angle)), 0.01) << degrees;
   }
 }
@@ -161,7 +147,7 @@ TEST(PathTracer, ASquareLampLightsAPlateAsLambertSays) {
   grid.fill_box({{-3, 6, -3}, {-2, 7, 4}}, black);
   grid.fill_box({{3, 6, -3}, {4, 7, 4}}, black);
   place(scene, std::move(grid));
-  PathOptions options = uniform(8, 8, 64);
+  PathOptions options = under_even_sky(8, 8, 64);
   options.sky_colour = Vec3(0.0F);
   options.max_bounces = 1;
   for (const double x : {0.5, 6.5, 15.5}) {
@@ -175,19 +161,19 @@ TEST(PathTracer, ASquareLampLightsAPlateAsLambertSays) {
     }
     const double expected = linear_from_srgb(std::uint8_t{188}) / kPi * std::abs(sum) * 0.5 * 3.0;
     const Camera camera = looking(point + DVec3(0, 2, 0), {0, -1, 0}, {0, 0, -1}, 0.05);
-    EXPECT_NEAR(mean(taken(scene, camera, options)).x / expected, 1.0, 0.01) << x;
+    EXPECT_NEAR(mean(path_picture(scene, camera, options)).x / expected, 1.0, 0.01) << x;
   }
 }
 
 TEST(PathTracer, TheSunLightsWhatFacesIt) {
   Scene scene = cube_of(kGrey);
-  PathOptions options = uniform(8, 8, 16);
+  PathOptions options = under_even_sky(8, 8, 16);
   options.sky_colour = Vec3(0.0F);
   options.sun_brightness = 1.0;
   options.sun = {0.0, 1.0, 1.0};
   for (const double angle : {0.0, 0.0093}) {
     options.sun_angle_radians = angle;
-    const float light = mean(taken(scene, from_above(4.0, 20.0, 4.0, 6.0), options)).x;
+    const float light = mean(path_picture(scene, from_above(4.0, 20.0, 4.0, 6.0), options)).x;
     EXPECT_NEAR(light, linear_from_srgb(std::uint8_t{188}) * std::sqrt(0.5F), 1e-3F);
   }
 }
@@ -200,14 +186,14 @@ TEST(PathTracer, APenumbraGrowsWithTheDistance) {
   grid.fill_box({{-20, 0, -20}, {20, 1, 20}}, type);
   grid.fill_box({{-20, 101, -20}, {0, 102, 20}}, type);
   place(scene, std::move(grid));
-  PathOptions options = uniform(256, 1, 256);
+  PathOptions options = under_even_sky(256, 1, 256);
   options.sky_colour = Vec3(0.0F);
   options.sun_brightness = 1.0;
   options.sun = {0.0, 1.0, 0.0};
   options.max_bounces = 1;
   // 256 pixels across 5.12 voxels; the plate above ends at x = 0.
   const Camera camera = looking({0.0, 50.0, 0.0}, {0, -1, 0}, {0, 0, -1}, 5.12 / 256.0);
-  const PathPicture picture = taken(scene, camera, options);
+  const PathPicture picture = path_picture(scene, camera, options);
   const auto share = [&](double x) { return picture.radiance[static_cast<std::size_t>(x / 5.12 * 256.0 + 128.0)].x; };
   const double width = 0.0093 * 100.0;
   EXPECT_NEAR(share(-0.6 * width), 0.0F, 1e-3F);
@@ -237,9 +223,9 @@ TEST(PathTracer, AWhiteBallInAWhiteSkyCannotBeSeen) {
     properties.roughness = rough;
     properties.metalness = metal;
     place(scene, voxel_sphere(6, scene.types.add(properties).value_or(kAir)));
-    PathOptions options = uniform(32, 32, 256);
+    PathOptions options = under_even_sky(32, 32, 256);
     options.max_bounces = 1024;
-    const PathPicture picture = taken(scene, towards({0.5, 8.0, 25.0}, DVec3(0.5), 0.6), options);
+    const PathPicture picture = path_picture(scene, towards({0.5, 8.0, 25.0}, DVec3(0.5), 0.6), options);
     EXPECT_NEAR(mean(picture).x, 1.0F, 0.01F) << rough << " " << metal;
     for (const Vec3& light : picture.radiance) EXPECT_NEAR(light.x, 1.0F, 0.15F);
   }
@@ -252,8 +238,8 @@ TEST(PathTracer, ClearGlassInAWhiteSkyCannotBeSeen) {
   properties.visibility = Visibility::Transparent;
   properties.ior = 1.5F;
   place(scene, voxel_sphere(6, scene.types.add(properties).value_or(kAir)));
-  PathOptions options = uniform(32, 32, 64);
-  const PathPicture picture = taken(scene, towards({0.5, 8.0, 25.0}, DVec3(0.5), 0.6), options);
+  PathOptions options = under_even_sky(32, 32, 64);
+  const PathPicture picture = path_picture(scene, towards({0.5, 8.0, 25.0}, DVec3(0.5), 0.6), options);
   EXPECT_NEAR(mean(picture).x, 1.0F, 0.003F);
 }
 
@@ -272,10 +258,10 @@ TEST(PathTracer, GlassShowsWhatLiesBehindItWhereItIsBent) {
     grid.fill_box({{0, -40, -1}, {40, 40, 0}}, white);
     grid.fill_box({{-40, -40, 2}, {40, 40, 12}}, glass);
     place(scene, std::move(grid));
-    PathOptions options = uniform(200, 1, 64);
+    PathOptions options = under_even_sky(200, 1, 64);
     options.sky_colour = Vec3(0.0F);
     const DVec3 forward = glm::normalize(DVec3(1, 0, -1));
-    return taken(scene, looking(DVec3(0, 0, 0) - forward * 40.0, forward, {0, 1, 0}, 20.0 / 200.0), options);
+    return path_picture(scene, looking(DVec3(0, 0, 0) - forward * 40.0, forward, {0, 1, 0}, 20.0 / 200.0), options);
   };
   const auto edge_of = [](const PathPicture& picture) {
     float sum = 0.0F;
@@ -292,17 +278,18 @@ TEST(PathTracer, GlassShowsWhatLiesBehindItWhereItIsBent) {
 
 TEST(PathTracer, AClosedRoomWithoutLampsIsBlack) {
   const Scene scene = room(6, of_colour(kWhite), of_colour(kWhite));
-  PathOptions options = uniform(16, 16, 16);
+  PathOptions options = under_even_sky(16, 16, 16);
   options.sun_brightness = 1.0;
   options.max_bounces = 16;
-  for (const Vec3& light : taken(scene, towards({3.0, 3.0, 3.0}, {3.0, 2.0, 0.0}), options).radiance) {
+  for (const Vec3& light : path_picture(scene, towards({3.0, 3.0, 3.0}, {3.0, 2.0, 0.0}), options).radiance) {
     EXPECT_EQ(light.x, 0.0F);
   }
 }
 
 TEST(PathTracer, ALampOfABillionIsANumberAndNoPixelIsBrighterThanIt) {
   const Scene scene = room(6, of_colour(kGrey), of_colour(kWhite, 1e9F));
-  const PathPicture picture = taken(scene, towards({3.0, 3.0, 3.0}, {3.0, 5.0, 0.0}), uniform(16, 16, 32));
+  const PathPicture picture =
+      path_picture(scene, towards({3.0, 3.0, 3.0}, {3.0, 5.0, 0.0}), under_even_sky(16, 16, 32));
   for (const Vec3& light : picture.radiance) {
     EXPECT_TRUE(std::isfinite(light.x));
     EXPECT_GE(light.x, 0.0F);
@@ -319,13 +306,13 @@ TEST(PathTracer, AimedAndFoundLightAgreeOnGloss) {
     walls.metalness = 0.5F;
     // Everything emits but the floor: closed, so that any path ends in light of 1.
     Scene scene = room(8, walls, of_colour(kWhite, 1.0F));
-    PathOptions options = uniform(16, 16, 256);
+    PathOptions options = under_even_sky(16, 16, 256);
     options.max_bounces = 1;
-    const float by_both = mean(taken(scene, towards({4.0, 4.0, 4.0}, {4.5, 0.0, 4.2}), options)).x;
+    const float by_both = mean(path_picture(scene, towards({4.0, 4.0, 4.0}, {4.5, 0.0, 4.2}), options)).x;
     // The same as an environment: the ceiling taken away, and a sky of 1 in its place, is found by chance alone.
     Scene open = room(8, walls, of_colour(kWhite));
     open.edit(open.grids().handles().front()).grid.fill_box({{-1, 8, -1}, {9, 9, 9}}, kAir);
-    const float by_chance = mean(taken(open, towards({4.0, 4.0, 4.0}, {4.5, 0.0, 4.2}), options)).x;
+    const float by_chance = mean(path_picture(open, towards({4.0, 4.0, 4.0}, {4.5, 0.0, 4.2}), options)).x;
     EXPECT_NEAR(by_both / by_chance, 1.0F, 0.03F) << rough;
   }
 }
@@ -341,10 +328,10 @@ PathOptions quick() {
 
 TEST(PathTracer, TheSameBitsForAnyThreadsAndInstructionSets) {
   const Scene scene = town();
-  const PathPicture expected = taken(scene, of_town(), quick(), {1});
+  const PathPicture expected = path_picture(scene, of_town(), quick(), {1});
   for (const InstructionSet set : sets_of_this_machine()) {
     const InstructionSetOverride over(set);
-    const PathPicture picture = taken(scene, of_town(), quick(), {3});
+    const PathPicture picture = path_picture(scene, of_town(), quick(), {3});
     EXPECT_EQ(picture.radiance, expected.radiance) << name_in_tests(set);
     EXPECT_EQ(picture.alpha, expected.alpha);
     EXPECT_EQ(picture.normal, expected.normal);
@@ -363,9 +350,9 @@ TEST(PathTracer, APictureFarFromTheOriginIsTheSame) {
   }
   for (Lamp& lamp : far.lamps) lamp.position += there;
   Camera camera = of_town();
-  const Vec3 expected = mean(taken(near, camera, quick()));
+  const Vec3 expected = mean(path_picture(near, camera, quick()));
   camera.position += there;
-  const Vec3 light = mean(taken(far, camera, quick()));
+  const Vec3 light = mean(path_picture(far, camera, quick()));
   EXPECT_NEAR(light.x / expected.x, 1.0F, 0.02F);
 }
 
@@ -383,14 +370,14 @@ TEST(PathTracer, FollowsEditsOfVoxelsTypesAndInstances) {
   tracer.update();
   const auto followed = tracer.render(of_town(), quick());
   ASSERT_TRUE(followed.has_value());
-  EXPECT_EQ(followed->radiance, taken(scene, of_town(), quick()).radiance);
+  EXPECT_EQ(followed->radiance, path_picture(scene, of_town(), quick()).radiance);
 }
 
 TEST(PathTracer, LayersSayWhatPixelsShow) {
   const Scene scene = cube_of(kGrey);
-  PathOptions options = uniform(16, 16, 4);
+  PathOptions options = under_even_sky(16, 16, 4);
   options.layers = true;
-  const PathPicture picture = taken(scene, from_above(4.0, 20.0, 4.0, 16.0), options);
+  const PathPicture picture = path_picture(scene, from_above(4.0, 20.0, 4.0, 16.0), options);
   const std::size_t middle = 8 * 16 + 8;
   EXPECT_NEAR(picture.albedo[middle].x, linear_from_srgb(std::uint8_t{188}), 1e-6F);
   EXPECT_NEAR(picture.normal[middle].y, 1.0F, 1e-6F);
@@ -407,12 +394,12 @@ TEST(PathTracer, LayersSayWhatPixelsShow) {
 
 TEST(PathTracer, GroundCatchesShadowsAndIsNotSeenItself) {
   const Scene scene = cube_of(kGrey);
-  PathOptions options = uniform(64, 64, 64);
+  PathOptions options = under_even_sky(64, 64, 64);
   options.sun_brightness = 1.0;
   options.sun = {1.0, 1.0, 0.0};
   options.ground.emplace();
   options.ground->only_shadows = true;
-  const PathPicture picture = taken(scene, from_above(4.0, 30.0, 4.0, 64.0), options);
+  const PathPicture picture = path_picture(scene, from_above(4.0, 30.0, 4.0, 64.0), options);
   const auto at = [](int x, int y) { return static_cast<std::size_t>(y * 64 + x); };
   // Far away it shows the background, and is not there.
   EXPECT_NEAR(picture.radiance[at(60, 4)].x, 1.0F, 0.03F);
@@ -431,13 +418,13 @@ TEST(PathTracer, WhatIsInFocusStaysSharp) {
   grid.fill_box({{-40, -40, 0}, {0, 40, 1}}, black);
   grid.fill_box({{0, -40, 0}, {40, 40, 1}}, white);
   place(scene, std::move(grid));
-  PathOptions options = uniform(64, 4, 64);
+  PathOptions options = under_even_sky(64, 4, 64);
   options.sky_colour = Vec3(0.0F);
   options.lens_radius = 1.0;
   const auto grey_pixels = [&](double focus) {
     options.focus_distance = focus;
     int grey = 0;
-    for (const Vec3& light : taken(scene, towards({0.013, 0.0, 21.0}, {0.013, 0.0, 0.0}, 0.02), options).scene) {
+    for (const Vec3& light : path_picture(scene, towards({0.013, 0.0, 21.0}, {0.013, 0.0, 0.0}, 0.02), options).scene) {
       grey += light.x > 0.05F && light.x < 0.95F;
     }
     return grey;
@@ -448,10 +435,10 @@ TEST(PathTracer, WhatIsInFocusStaysSharp) {
 
 TEST(PathTracer, AnEnvironmentOfOnePixelIsAUniformSky) {
   const Scene scene = cube_of(kGrey);
-  PathOptions options = uniform(8, 8, 256);
+  PathOptions options = under_even_sky(8, 8, 256);
   options.sky = SkyModel::Environment;
   options.environment = std::make_shared<const RadianceImage>(RadianceImage{1, 1, {0.5F, 0.5F, 0.5F}});
-  const float light = mean(taken(scene, from_above(4.0, 20.0, 4.0, 6.0), options)).x;
+  const float light = mean(path_picture(scene, from_above(4.0, 20.0, 4.0, 6.0), options)).x;
   EXPECT_NEAR(light, 0.5F * linear_from_srgb(std::uint8_t{188}), 0.01F);
 }
 
@@ -461,7 +448,7 @@ TEST(PathTracer, RefusesWhatCannotBe) {
   const Camera camera = from_above(4.0, 20.0, 4.0, 6.0);
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const auto refused = [&](auto change) {
-    PathOptions options = uniform(4, 4, 1);
+    PathOptions options = under_even_sky(4, 4, 1);
     change(options);
     const auto picture = tracer.render(camera, options);
     return !picture && picture.error().code == ErrorCode::InvalidArgument;
@@ -485,7 +472,7 @@ TEST(PathTracer, RefusesWhatCannotBe) {
   EXPECT_TRUE(refused([](PathOptions& o) { o.ground.emplace().colour = Vec3(2.0F); }));
   Camera wrong = camera;
   wrong.position.x = kNan;
-  EXPECT_FALSE(tracer.render(wrong, uniform(4, 4, 1)).has_value());
+  EXPECT_FALSE(tracer.render(wrong, under_even_sky(4, 4, 1)).has_value());
 }
 
 TEST(PathTracer, StopsHalfway) {
@@ -499,9 +486,9 @@ TEST(PathTracer, StopsHalfway) {
 
 TEST(PathTracer, AnEmptySceneIsSky) {
   const Scene scene;
-  PathOptions options = uniform(8, 8, 2);
+  PathOptions options = under_even_sky(8, 8, 2);
   options.ground.emplace();
-  const PathPicture picture = taken(scene, towards({0.0, 5.0, 10.0}, {0.0, 5.0, 0.0}), options);
+  const PathPicture picture = path_picture(scene, towards({0.0, 5.0, 10.0}, {0.0, 5.0, 0.0}), options);
   EXPECT_EQ(picture.radiance.front(), Vec3(1.0F));
   EXPECT_NEAR(picture.radiance.back().x, 0.5F, 1e-6F);
 }

@@ -3,8 +3,10 @@
 #include <utility>
 
 #include <glm/geometric.hpp>
+#include <gtest/gtest.h>
 
 #include <quoin/grid/grid.h>
+#include <quoin/render/path_tracer.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 
@@ -42,6 +44,25 @@ inline Scene town() {
   spot.intensity = 200.0;
   scene.lamps.push_back(spot);
   return scene;
+}
+
+/// A picture without a sun, under a sky that is 1 everywhere.
+inline PathOptions under_even_sky(int width, int height, int samples) {
+  PathOptions options;
+  options.width = width;
+  options.height = height;
+  options.samples = samples;
+  options.sky = SkyModel::Uniform;
+  options.sun_brightness = 0.0;
+  return options;
+}
+
+/// Expects that there is such a picture.
+inline PathPicture path_picture(const Scene& scene, const Camera& camera, const PathOptions& options,
+                                Threads threads = {}) {
+  auto picture = PathTracer(scene).render(camera, options, threads);
+  EXPECT_TRUE(picture.has_value()) << (picture ? "" : picture.error().message);
+  return picture ? std::move(*picture) : PathPicture{};
 }
 
 inline Camera of_town() {

@@ -13,7 +13,7 @@
 #include <variant>
 #include <vector>
 
-#include <quoin/mesh/simplify.h>
+#include <quoin/mesh/smooth_mesh.h>
 
 namespace quoin {
 

@@ -14,7 +14,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include <quoin/core/capsule.h>
+#include <quoin/core/shapes.h>
 
 #include "scene/query/query_in_grid.h"
 #include "scene/tracer/placed_grid.h"

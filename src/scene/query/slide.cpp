@@ -5,6 +5,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
 #include <quoin/scene/sweep.h>
 
 #include "scene/query/query_in_grid.h"
@@ -353,6 +354,7 @@ class Walk {
 
 template <class Shape>
 SlideResult moved(const SceneTracer& tracer, const Shape& shape, DVec3 displacement, const SlideOptions& options) {
+  QUOIN_ASSERT(options.max_contacts >= 1, "at least one contact");
   const Body<Shape> body{tracer, options, shape};
   if (options.floor) {
     const double length = glm::length(options.floor->up);

@@ -1,7 +1,7 @@
 #pragma once
 
+#include <quoin/grid/chunk.h>
 #include <quoin/grid/density_chunk.h>
-#include <quoin/grid/neighbourhood.h>
 #include <quoin/grid/voxel_registry.h>
 
 namespace quoin {

@@ -7,7 +7,9 @@
 #include <quoin/scene/solid_shapes.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cstdint>
 #include <optional>
 #include <unordered_map>
 #include <utility>
@@ -18,7 +20,6 @@
 #include "core/coordinates/chunk_order.h"
 #include "core/coordinates/coordinate_hash.h"
 #include "core/moved_from.h"
-#include "scene/solid/solid_rows.h"
 #include "trace/chunk_rows.h"
 
 namespace quoin {
@@ -27,7 +28,27 @@ namespace {
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr std::size_t kEdge = kChunkEdge;
 
+using SolidRows = std::array<std::uint64_t, kEdge * kEdge>;  // the solid voxels of a chunk: bit x of word y + 64 z
+
 using Layer = std::array<std::uint64_t, kEdge>;  // bit u of word v
+
+bool is_solid(const VoxelRegistry& types, VoxelType type) {
+  return type != kAir && (type >= types.size() || types[type].collides);
+}
+
+// Null: nothing of it is solid. False where nothing is; the rows are then not set.
+bool read_solid_rows(const Chunk* chunk, const VoxelRegistry& types, SolidRows& rows) {
+  if (chunk == nullptr) return false;
+  const auto counts = [&](VoxelType type) { return is_solid(types, type); };
+  const FunctionRef<bool(VoxelType)> asked(counts);
+  const trace::ChunkRows read(*chunk, asked);
+  if (read.none()) return false;
+  rows.fill(0);
+  read.for_each_row(kWholeChunk, [&](int y, int z, std::uint64_t row) {
+    rows[static_cast<std::size_t>(z) * kEdge + static_cast<std::size_t>(y)] = row;
+  });
+  return true;
+}
 
 // The lowest run of ones of a word that is not 0.
 std::uint64_t lowest_run(std::uint64_t word) {
@@ -138,19 +159,6 @@ Layer layer_beside(const Chunk* neighbour, const VoxelRegistry& types, Direction
 }
 
 }  // namespace
-
-bool read_solid_rows(const Chunk* chunk, const VoxelRegistry& types, SolidRows& rows) {
-  if (chunk == nullptr) return false;
-  const auto counts = [&](VoxelType type) { return is_solid(types, type); };
-  const FunctionRef<bool(VoxelType)> asked(counts);
-  const trace::ChunkRows read(*chunk, asked);
-  if (read.none()) return false;
-  rows.fill(0);
-  read.for_each_row(kWholeChunk, [&](int y, int z, std::uint64_t row) {
-    rows[static_cast<std::size_t>(z) * kEdge + static_cast<std::size_t>(y)] = row;
-  });
-  return true;
-}
 
 void append_solid_boxes(const Chunk& chunk, const VoxelRegistry& types, std::vector<IBox>& out) {
   SolidRows rows;

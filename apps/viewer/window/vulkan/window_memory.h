@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <span>
 
-#include <quoin/render_vk/vulkan_image.h>
+#include <quoin/render_vk/vulkan_picture.h>
 
 #include "window_device.h"
 

@@ -1,6 +1,3 @@
-// The scene graph that is written: one class, since each of its steps goes over what the last left in the same members.
-// That is why it is longer than 800 lines.
-
 #include "io/vox/write/graph_revision.h"
 
 #include <algorithm>
@@ -8,20 +5,22 @@
 #include <limits>
 #include <optional>
 #include <set>
-#include <string_view>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "io/text.h"
+#include "io/vox/write/graph_revision_steps.h"
 
 namespace quoin::vox {
 
 namespace {
 
-constexpr std::int32_t kRootTransform = 0;
 // In RevisedGraph::added, of the nodes that begin_graph puts there.
 constexpr std::size_t kNewRoot = 0;
 constexpr std::size_t kNewTop = 1;
 constexpr std::int32_t kOnlyLayer = 0;
-constexpr std::int32_t kNoLayer = -1;
 
 std::string instance_text(const Instance& instance) {
   if (instance.name.empty()) return "an instance";
@@ -29,14 +28,6 @@ std::string instance_text(const Instance& instance) {
   text += printable(instance.name);
   text += '"';
   return text;
-}
-
-bool has_32_bits(const Offset& offset) {
-  return std::ranges::all_of(offset, [](std::int64_t value) {
-    // Less than the largest, so that it can be negated.
-    return value > -std::int64_t{std::numeric_limits<std::int32_t>::max()} &&
-           value < std::numeric_limits<std::int32_t>::max();
-  });
 }
 
 /// A point of the world in MagicaVoxel's axes, between voxels moved to the nearest; nothing beyond 32 bits.
@@ -56,158 +47,15 @@ bool has_same_place(const Placed& a, const Placed& b) {
   return a.position == b.position && a.rotation == b.rotation && a.mirrored == b.mirrored;
 }
 
-/// Where a piece of a grid stands beside its first one.
-Motion from_first_piece(const GridPlan& plan, std::size_t piece) {
-  const DVec3 way = pivot_of(plan.pieces[piece]) - pivot_of(plan.pieces.front());
-  return {{}, vox_from_quoin({std::llround(way.x), std::llround(way.y), std::llround(way.z)})};
+}  // namespace
+
+bool has_32_bits(const Offset& offset) {
+  return std::ranges::all_of(offset, [](std::int64_t value) {
+    // Less than the largest, so that it can be negated.
+    return value > -std::int64_t{std::numeric_limits<std::int32_t>::max()} &&
+           value < std::numeric_limits<std::int32_t>::max();
+  });
 }
-
-/// Looks for ids that no node has.
-class FreshIds {
- public:
-  explicit FreshIds(const Document* document) {
-    if (document == nullptr) return;
-    for (const Node& node : document->nodes) used_.insert(node.id);
-    // What is referred to and not there must not come to be.
-    used_.insert(document->children.begin(), document->children.end());
-    constexpr std::int32_t kFarEnd = std::numeric_limits<std::int32_t>::max() / 2;
-    if (!used_.empty() && *used_.rbegin() >= 0 && *used_.rbegin() < kFarEnd) next_ = *used_.rbegin() + 1;
-  }
-  std::int32_t take() {
-    while (used_.contains(next_)) ++next_;
-    return next_++;
-  }
-
- private:
-  std::set<std::int32_t> used_;
-  std::int32_t next_ = kRootTransform;
-};
-
-/// Where children are hung: a group of the source or a new one.
-struct Parent {
-  std::size_t source_node = kNone;  ///< else it is new
-  std::size_t added = kNone;        ///< in RevisedGraph::added
-  Motion world;
-
-  bool operator<(const Parent& other) const {
-    return source_node != other.source_node ? source_node < other.source_node : added < other.added;
-  }
-  [[nodiscard]] bool is_same(const Parent& other) const {
-    return source_node == other.source_node && added == other.added;
-  }
-};
-
-struct ChildChanges {
-  std::set<std::int32_t> removed;
-  std::map<std::int32_t, std::int32_t> replaced;
-  std::vector<std::int32_t> added;
-};
-
-/// What an instance and a group have in common: what its transform says.
-struct Wanted {
-  std::string name;
-  bool visible = true;
-  LayerHandle layer;
-  Parent parent;
-  Motion world;
-};
-
-/// What it was when it was read.
-struct Known {
-  const Hanging& hanging;
-  const std::string& name;
-  bool visible = true;
-  LayerHandle layer;
-  Parent parent;
-};
-
-class GraphRevision {
- public:
-  GraphRevision(const Scene& scene, const VoxSource& source, const ModelPlan& models, bool keeps_graph)
-      : scene_(scene),
-        source_(source),
-        models_(models),
-        keeps_graph_(keeps_graph),
-        ids_(keeps_graph ? &source.document : nullptr) {
-    out_.is_removed.assign(source.document.nodes.size(), !keeps_graph);
-  }
-
-  Result<RevisedGraph> run();
-  RevisedGraph layers_only() {
-    number_layers();
-    return std::move(out_);
-  }
-
- private:
-  /// What a file without a scene graph shows at one frame.
-  struct Frame {
-    const GridPlan* plan = nullptr;  ///< null: its grid is gone
-    Motion first;                    ///< where the pivot of its first piece goes
-  };
-
-  void number_layers();
-  void find_top();
-  void begin_graph(std::vector<std::int32_t> below);
-  [[nodiscard]] std::optional<std::int32_t> root_below_no_group() const;
-  [[nodiscard]] bool would_be_the_scene(const SceneGroup& group) const;
-  [[nodiscard]] bool needs_new_top() const;
-  void settle_root();
-  void free_root_id();
-  void remove_what_is_gone();
-  void remove(const Hanging& hanging);
-  Status revise_groups();
-  Status revise_group(GroupHandle handle);
-  Status revise_instances();
-  Status revise_instance(const Instance& instance, const Placement& placement, const Instance& before);
-  Status add_instance(InstanceHandle handle, const Instance& instance);
-  Status revise_transform(const Wanted& wanted, const Known& known);
-  void show(const Known& known, bool visible, NodeContent& transform);
-  void keep_shown_by_chain(const Wanted& wanted, const Known& known);
-  [[nodiscard]] bool was_hidden(std::int32_t layer) const;
-  [[nodiscard]] bool is_hidden(std::int32_t layer) const;
-  Status move(const Wanted& wanted, const Known& known, NodeContent* transform, const NodeContent& read);
-  void show_model(const Placement& placement, const GridPlan& plan);
-  void show_pieces(std::size_t shape, const GridPlan& plan);
-  std::int32_t add_shape(const NodeContent& before, const std::vector<std::uint32_t>& shown, const Motion& motion);
-  void name_shapes();
-  void apply_child_changes();
-
-  NodeContent& change(std::size_t node);
-  [[nodiscard]] NodeContent read(std::size_t node) const;
-  [[nodiscard]] std::size_t last_transform(const Hanging& hanging) const;
-  NodeContent& transform_of(const Known& known);
-  [[nodiscard]] Parent parent_in_source(std::size_t group) const;
-  [[nodiscard]] Parent parent_now(GroupHandle group) const;
-  [[nodiscard]] std::int32_t layer_id(LayerHandle layer) const;
-  [[nodiscard]] Result<Motion> place(const Instance& instance, const GridPlan& plan);
-  [[nodiscard]] Motion place(const SceneGroup& group, const Motion& parent);
-  [[nodiscard]] Result<NodeContent> transform_for(const Wanted& wanted, std::int32_t child);
-  [[nodiscard]] bool was_of_frames() const {
-    return source_.document.nodes.empty() && source_.document.models.size() > 1;
-  }
-  [[nodiscard]] std::vector<Frame> frames_about(const Motion& box) const;
-  [[nodiscard]] Motion from_source_box(const GridPlan& plan, std::size_t model) const;
-  void show_frames(const std::vector<Frame>& frames, NodeContent& transform, NodeContent& shape);
-  void hang_piece(std::size_t group, const std::string& name, const GridPlan& plan, std::size_t piece,
-                  const Motion& motion, std::size_t frame, std::size_t frame_count);
-  void add_model(NodeContent transform, NodeContent shape, const GridPlan& plan, const std::string& name);
-  Status add_frames(NodeContent transform, NodeContent shape, const GridPlan& plan, const std::string& name);
-  [[nodiscard]] NodeContent shape_of(std::int32_t id, std::uint32_t model) const;
-
-  const Scene& scene_;
-  const VoxSource& source_;
-  const ModelPlan& models_;
-  bool keeps_graph_;
-  bool keeps_frames_ = false;
-  FreshIds ids_;
-  RevisedGraph out_;
-  Parent top_;
-  std::map<GroupHandle, Parent> groups_;  // of the scene
-  std::map<Parent, ChildChanges> children_;
-  std::map<std::size_t, std::size_t> inserted_;  // transforms that were put above nodes, in RevisedGraph::added
-  std::map<GridHandle, std::vector<std::size_t>> added_shapes_;   // of grids, in RevisedGraph::added
-  std::map<GridHandle, std::vector<std::size_t>> source_shapes_;  // likewise, in the source's nodes
-};
 
 NodeContent GraphRevision::read(std::size_t node) const {
   const auto known = out_.changed.find(node);
@@ -516,21 +364,6 @@ Status GraphRevision::revise_groups() {
   return {};
 }
 
-NodeContent group_of(std::int32_t id) {
-  NodeContent group;
-  group.kind = NodeKind::Group;
-  group.id = id;
-  return group;
-}
-
-NodeContent GraphRevision::shape_of(std::int32_t id, std::uint32_t model) const {
-  NodeContent shape;
-  shape.kind = NodeKind::Shape;
-  shape.id = id;
-  shape.models.emplace_back(model, Entries{});
-  return shape;
-}
-
 /// A new transform, without an id.
 Result<NodeContent> GraphRevision::transform_for(const Wanted& wanted, std::int32_t child) {
   NodeContent transform;
@@ -545,73 +378,6 @@ Result<NodeContent> GraphRevision::transform_for(const Wanted& wanted, std::int3
   }
   set_motion(transform.frames.emplace_back(), local);
   return transform;
-}
-
-/// Without a scene graph each model was a frame. `box`: where the pivot of the shown one's box in the source goes.
-std::vector<GraphRevision::Frame> GraphRevision::frames_about(const Motion& box) const {
-  const auto lone = [&](std::size_t model) {
-    Motion motion;
-    motion.translation[2] = source_.document.models[model].size.z / 2;
-    return motion;
-  };
-  const Motion ground = box * inverse(lone(static_cast<std::size_t>(source_.frame)));
-  std::vector<Frame> frames(source_.document.models.size());
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    const GridPlan* plan = models_.find(handle_read(source_.scene.grids(), i));
-    if (plan == nullptr || source_.scene.grids().find(plan->grid) == nullptr) continue;
-    // What outgrew its box has another pivot.
-    frames[i] = {plan, ground * lone(i) * inverse(from_source_box(*plan, i))};
-  }
-  return frames;
-}
-
-/// Where the pivot of a model's box in the source lies beside that of its first piece.
-Motion GraphRevision::from_source_box(const GridPlan& plan, std::size_t model) const {
-  GridPlan boxes = plan;
-  const IBox before = canvas_of(source_.document.models[model].size);
-  boxes.pieces.push_back({before.min, before.size(), 0});
-  return from_first_piece(boxes, plan.pieces.size());
-}
-
-/// A shape that shows, at each frame, the model that is one piece, and nothing where there are several.
-void GraphRevision::show_frames(const std::vector<Frame>& frames, NodeContent& transform, NodeContent& shape) {
-  transform.frames.clear();
-  shape.models.clear();
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    const bool is_one = frames[i].plan != nullptr && frames[i].plan->pieces.size() == 1;
-    out_.has_empty_model = out_.has_empty_model || !is_one;
-    Entries& key = transform.frames.emplace_back();
-    if (is_one) set_motion(key, frames[i].first);
-    key.set("_f", std::to_string(i));
-    const std::uint32_t model = is_one ? frames[i].plan->first_model : models_.count;
-    shape.models.emplace_back(model, Entries{}).second.set("_f", std::to_string(i));
-  }
-}
-
-/// Hangs a piece of a grid below a group that is at `group` in the added nodes; `frame`: the only one that shows it,
-/// of all those in `frame_count`; kNone: all do.
-void GraphRevision::hang_piece(std::size_t group, const std::string& name, const GridPlan& plan, std::size_t piece,
-                               const Motion& motion, std::size_t frame, std::size_t frame_count) {
-  NodeContent transform;
-  transform.kind = NodeKind::Transform;
-  transform.id = ids_.take();
-  transform.children = {ids_.take()};
-  transform.layer = layer_id({});
-  transform.attributes.set_or_erase("_name", name);
-  set_motion(transform.frames.emplace_back(), motion);
-  out_.added[group].children.push_back(transform.id);
-  const std::uint32_t model = plan.first_model + static_cast<std::uint32_t>(piece);
-  NodeContent shape = shape_of(transform.children.front(), model);
-  if (frame != kNone) {
-    shape.models.clear();
-    out_.has_empty_model = true;
-    for (std::size_t i = 0; i < frame_count; ++i) {
-      shape.models.emplace_back(i == frame ? model : models_.count, Entries{}).second.set("_f", std::to_string(i));
-    }
-  }
-  out_.added.push_back(std::move(transform));
-  added_shapes_[plan.grid].push_back(out_.added.size());
-  out_.added.push_back(std::move(shape));
 }
 
 Status GraphRevision::add_instance(InstanceHandle handle, const Instance& instance) {
@@ -633,118 +399,6 @@ Status GraphRevision::add_instance(InstanceHandle handle, const Instance& instan
   if (was_frame) return add_frames(std::move(*transform), shape, plan, name);
   add_model(std::move(*transform), shape, plan, name);
   return {};
-}
-
-void GraphRevision::add_model(NodeContent transform, NodeContent shape, const GridPlan& plan, const std::string& name) {
-  out_.added.push_back(std::move(transform));
-  const std::size_t at = out_.added.size();
-  const bool is_one = plan.pieces.size() == 1;
-  if (is_one) added_shapes_[plan.grid].push_back(at);
-  out_.added.push_back(is_one ? std::move(shape) : group_of(shape.id));
-  for (std::size_t i = 0; !is_one && i < plan.pieces.size(); ++i) {
-    hang_piece(at, name, plan, i, from_first_piece(plan, i), kNone, 0);
-  }
-}
-
-/// All models that were frames: keys of one shape; those of several pieces are a group, with a shape for each.
-Status GraphRevision::add_frames(NodeContent transform, NodeContent shape, const GridPlan& plan,
-                                 const std::string& name) {
-  const Motion box = from_source_box(plan, static_cast<std::size_t>(source_.frame));
-  const auto is_one = [](const Frame& frame) { return frame.plan != nullptr && frame.plan->pieces.size() == 1; };
-  std::vector<Frame> frames = frames_about(motion_of(transform.frames.front()) * box);
-  if (!std::ranges::all_of(frames, [](const Frame& frame) { return has_32_bits(frame.first.translation); })) {
-    return make_error(ErrorCode::LimitExceeded, "\"" + name + "\" lies too far out for a .vox file");
-  }
-  if (std::ranges::all_of(frames, [&](const Frame& frame) { return frame.plan == nullptr || is_one(frame); })) {
-    show_frames(frames, transform, shape);
-    out_.added.push_back(std::move(transform));
-    added_shapes_[plan.grid].push_back(out_.added.size());
-    out_.added.push_back(std::move(shape));
-    return {};
-  }
-  frames = frames_about(box);
-  out_.added.push_back(std::move(transform));
-  const std::size_t group = out_.added.size();
-  out_.added.push_back(group_of(shape.id));
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    if (frames[i].plan == nullptr || is_one(frames[i])) continue;
-    for (std::size_t piece = 0; piece < frames[i].plan->pieces.size(); ++piece) {
-      hang_piece(group, name, *frames[i].plan, piece, frames[i].first * from_first_piece(*frames[i].plan, piece), i,
-                 frames.size());
-    }
-  }
-  if (std::ranges::none_of(frames, is_one)) return {};
-  NodeContent others;
-  others.kind = NodeKind::Transform;
-  others.id = ids_.take();
-  others.layer = layer_id({});
-  others.attributes.set_or_erase("_name", name);
-  shape.id = ids_.take();
-  others.children = {shape.id};
-  out_.added[group].children.push_back(others.id);
-  show_frames(frames, others, shape);
-  out_.added.push_back(std::move(others));
-  if (plan.pieces.size() == 1) added_shapes_[plan.grid].push_back(out_.added.size());
-  out_.added.push_back(std::move(shape));
-  return {};
-}
-
-/// Adds a shape, like one of the source but that it shows other models, below a transform. Returns the transform's id.
-std::int32_t GraphRevision::add_shape(const NodeContent& before, const std::vector<std::uint32_t>& shown,
-                                      const Motion& motion) {
-  const std::int32_t id = ids_.take();
-  NodeContent shape = before;
-  shape.id = ids_.take();
-  shape.attributes.erase("_hidden");
-  for (std::size_t i = 0; i < shown.size(); ++i) shape.models[i].first = shown[i];
-  NodeContent& transform = out_.added.emplace_back();
-  transform.kind = NodeKind::Transform;
-  transform.id = id;
-  transform.children = {shape.id};
-  set_motion(transform.frames.emplace_back(), motion);
-  out_.added.push_back(std::move(shape));
-  return id;
-}
-
-/// A shape that shows one model at the frame becomes a group of shapes that show its pieces then, and nothing at other
-/// frames; what it shows at those is a shape beside them.
-void GraphRevision::show_pieces(std::size_t shape_node, const GridPlan& plan) {
-  NodeContent& shape = change(shape_node);
-  const NodeContent before = shape;
-  const KeyInForce now = model_in_force(before, source_.frame);
-  const bool has_others = before.models.size() > 1;
-  const std::uint32_t nothing = models_.count;
-  out_.has_empty_model = out_.has_empty_model || has_others;
-  shape.kind = NodeKind::Group;
-  shape.models.clear();
-  shape.attributes = Entries{};
-  if (before.attributes.get("_hidden") == "1") shape.attributes.set("_hidden", "1");
-  std::vector<std::int32_t> children;
-  for (std::size_t i = 0; i < plan.pieces.size(); ++i) {
-    std::vector<std::uint32_t> shown(before.models.size(), nothing);
-    shown[now.place] = plan.first_model + static_cast<std::uint32_t>(i);
-    added_shapes_[plan.grid].push_back(out_.added.size() + 1);
-    children.push_back(add_shape(before, shown, from_first_piece(plan, i)));
-  }
-  if (has_others) {
-    std::vector<std::uint32_t> shown;
-    shown.reserve(before.models.size());
-    for (const auto& [model, key] : before.models) shown.push_back(model);
-    shown[now.place] = nothing;
-    children.push_back(add_shape(before, shown, {}));
-  }
-  shape.children = std::move(children);
-}
-
-void GraphRevision::show_model(const Placement& placement, const GridPlan& plan) {
-  if (plan.pieces.size() > 1) {
-    show_pieces(placement.node, plan);
-    return;
-  }
-  source_shapes_[plan.grid].push_back(placement.node);
-  if (placement.model == plan.first_model) return;
-  NodeContent& shape = change(placement.node);
-  shape.models[model_in_force(shape, source_.frame).place].first = plan.first_model;
 }
 
 Status GraphRevision::revise_instance(const Instance& instance, const Placement& placement, const Instance& before) {
@@ -775,29 +429,6 @@ Status GraphRevision::revise_instances() {
     if (!done) return done;
   }
   return {};
-}
-
-/// Shapes name their grids where the names of instances do not.
-void GraphRevision::name_shapes() {
-  std::map<GridHandle, std::string> of_instances;
-  for (const InstanceHandle handle : scene_.instances().handles()) {
-    const Instance& instance = scene_.instances()[handle];
-    std::string& name = of_instances[instance.grid];
-    if (name.empty()) name = printable(instance.name);
-  }
-  for (const GridPlan& plan : models_.grids) {
-    const std::string wanted = printable(scene_.grids()[plan.grid].name);
-    const std::vector<std::size_t>& known = source_shapes_[plan.grid];
-    std::string read;
-    for (const std::size_t node : known) {
-      if (read.empty()) read = printable(source_.document.nodes[node].name);
-    }
-    const std::string& of_instance = of_instances[plan.grid];
-    if ((read.empty() ? of_instance : read) == wanted) continue;
-    const std::string name = wanted == of_instance ? std::string{} : wanted;
-    for (const std::size_t node : known) change(node).attributes.set_or_erase("_name", name);
-    for (const std::size_t node : added_shapes_[plan.grid]) out_.added[node].attributes.set_or_erase("_name", name);
-  }
 }
 
 void GraphRevision::apply_child_changes() {
@@ -870,8 +501,6 @@ Result<RevisedGraph> GraphRevision::run() {
   settle_root();
   return std::move(out_);
 }
-
-}  // namespace
 
 RevisedGraph revise_layers(const Scene& scene, const VoxSource& source) {
   ModelPlan nothing;

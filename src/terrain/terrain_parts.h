@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -9,7 +11,27 @@
 
 #include "terrain/landform.h"
 
+// What generate_terrain_chunk puts together: caves, the ground with what covers it, and what stands on that.
+
 namespace quoin::terrain {
+
+/// Which voxels of a chunk tunnels pass through, as rows along x.
+struct CaveMasks {
+  std::array<std::uint64_t, kChunkEdge * kChunkEdge> rows{};  ///< [z][y]
+
+  [[nodiscard]] std::uint64_t row(int y, int z) const { return rows[static_cast<std::size_t>(z * kChunkEdge + y)]; }
+};
+
+/// Tunnels run where two noises are both near zero. The noises are taken at every fourth voxel and interpolated.
+///
+/// `height`: up to which layer of the chunk to look.
+void find_caves(std::uint32_t seed, IVec3 chunk, int height, CaveMasks& out);
+
+/// One chunk of stone, soil, cover and water, with caves where asked for.
+///
+/// `columns`: the chunk's 64x64, x fastest. `part`: what of the chunk lies in the world, in the chunk's coordinates.
+[[nodiscard]] Chunk make_ground(const Landform& land, const std::vector<Column>& columns, const TerrainTypes& types,
+                                IVec3 chunk, const IBox& part, bool has_caves);
 
 enum class Growth : std::uint8_t { Rock, Bush, Broadleaf, Conifer };
 
