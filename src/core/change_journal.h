@@ -14,9 +14,6 @@
 
 namespace quoin {
 
-/// A name for a journal that no other of the process has, of whatever kind.
-[[nodiscard]] std::uint64_t next_journal();
-
 /// The changes of a container in the order in which they happened: what stands behind every `changes_since`.
 ///
 ///   serial    1 2 3 4 5 6 7 8 9
@@ -35,7 +32,7 @@ namespace quoin {
 template <class Record>
 class ChangeJournal {
  public:
-  ChangeJournal() : container_(next_journal()) {}
+  ChangeJournal() : container_(next_serial()) {}
   ChangeJournal(const ChangeJournal& other)
       : container_(other.container_), is_copy_(true), first_(other.first_), end_(other.end_), blocks_(other.blocks_) {
     // The records stay as they are from now on, and later ones are kept for consumers that read only copies.
@@ -160,7 +157,7 @@ class ChangeJournal {
 
   void become_own() {
     is_copy_ = false;
-    container_ = next_journal();
+    container_ = next_serial();
     blocks_.clear();
     first_ = end_;
     seen_.store(kNobody, std::memory_order_relaxed);

@@ -7,7 +7,7 @@
 
 namespace quoin {
 
-std::uint64_t next_journal() {
+std::uint64_t next_serial() {
   static std::atomic<std::uint64_t> count{0};
   return count.fetch_add(1, std::memory_order_relaxed) + 1;
 }

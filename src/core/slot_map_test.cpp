@@ -50,6 +50,40 @@ TEST(SlotMap, AHandleOfARemovedElementNamesNothingForEver) {
   EXPECT_EQ(map[next], 2);
 }
 
+TEST(SlotMap, AHandleNamesNothingInAMapThatWasFilledAlike) {
+  SlotMap<int> map;
+  SlotMap<int> other;
+  const auto handle = map.insert(1);
+  const auto same_place = other.insert(1);
+  EXPECT_EQ(handle.index, same_place.index);
+  EXPECT_NE(handle, same_place);
+  EXPECT_EQ(other.find(handle), nullptr);
+  EXPECT_FALSE(other.remove(handle));
+  EXPECT_EQ(other.size(), 1U);
+  for (int i = 0; i < 100; ++i) {  // nor after any number of elements in that slot
+    EXPECT_TRUE(other.remove(*other.handle_at(0)));
+    (void)other.insert(i);
+    EXPECT_EQ(other.find(handle), nullptr);
+  }
+}
+
+TEST(SlotMap, AHandleNamesTheCopyOfItsElementAndNothingThatCameLater) {
+  SlotMap<int> map;
+  const auto handle = map.insert(1);
+  const auto removed = map.insert(2);
+  EXPECT_TRUE(map.remove(removed));
+  SlotMap<int> copy = map.copied([](int value) { return value; });
+  EXPECT_EQ(copy[handle], 1);
+  EXPECT_EQ(copy.find(removed), nullptr);
+  const auto in_map = map.insert(3);
+  const auto in_copy = copy.insert(4);
+  EXPECT_EQ(in_map.index, in_copy.index);
+  EXPECT_EQ(copy.find(in_map), nullptr);
+  EXPECT_EQ(map.find(in_copy), nullptr);
+  EXPECT_EQ(map[in_map], 3);
+  EXPECT_EQ(copy[in_copy], 4);
+}
+
 // Moving one throws now and then, as copying what cannot be moved may.
 struct Fragile {
   explicit Fragile(int given) : value(given) {}

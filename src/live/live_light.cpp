@@ -2,6 +2,7 @@
 
 #include <condition_variable>
 #include <exception>
+#include <map>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -15,6 +16,12 @@ namespace {
 struct LitScene {
   std::shared_ptr<const Scene> scene;
   SceneLight light;
+};
+
+// How far the changes of a grid were read that light depends on.
+struct GridCursors {
+  ChangeCursor voxels;
+  ChangeCursor field;
 };
 
 }  // namespace
@@ -37,6 +44,7 @@ struct LiveLight::Impl {
 
   void run();
   void throw_failure();
+  bool read_changes(const Scene& scene);
   void wait() {
     std::unique_lock lock(mutex);
     progressed.wait(lock, [&] { return !is_busy; });
@@ -45,6 +53,7 @@ struct LiveLight::Impl {
   // The caller's.
   ChangeCursor followed_scene;
   ChangeCursor followed_types;
+  std::map<GridHandle, GridCursors> followed_grids;
   bool is_behind = true;  // something changed that no snapshot has
   LitScene shown;
 
@@ -101,14 +110,31 @@ void LiveLight::Impl::throw_failure() {
   std::rethrow_exception(std::exchange(failure, nullptr));
 }
 
+// Whether light depends on any of what changed since the last time. A scene tells of names and of data at voxels, too.
+bool LiveLight::Impl::read_changes(const Scene& scene) {
+  const SceneChanges changes = scene.changes_since(followed_scene);
+  bool is_any = changes.all || scene.types.has_changed_since(followed_types);
+  followed_types = scene.types.cursor();
+  if (changes.all) followed_grids.clear();
+  for (const GridHandle handle : changes.all ? scene.grids().handles() : changes.grids) {
+    const SceneGrid* grid = scene.grids().find(handle);
+    if (grid == nullptr) {
+      is_any |= followed_grids.erase(handle) > 0;
+      continue;
+    }
+    GridCursors& followed = followed_grids[handle];
+    is_any |= grid->grid.has_changed_since(followed.voxels) || grid->field.has_changed_since(followed.field);
+    followed = {grid->grid.cursor(), grid->field.cursor()};
+  }
+  return is_any;
+}
+
 LiveLight::LiveLight(LiveLightOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
 LiveLight::~LiveLight() = default;
 
 void LiveLight::update(const Scene& scene) {
   Impl& me = *impl_;
-  const SceneChanges changes = scene.changes_since(me.followed_scene);
-  me.is_behind |= changes.all || !changes.grids.empty() || scene.types.has_changed_since(me.followed_types);
-  me.followed_types = scene.types.cursor();
+  me.is_behind |= me.read_changes(scene);
   {
     const std::lock_guard lock(me.mutex);
     me.throw_failure();

@@ -216,5 +216,32 @@ TEST(LiveLight, MovedInstancesAreNoWork) {
   EXPECT_FALSE(light.is_late());
 }
 
+TEST(LiveLight, DataAtVoxelsAndNamesAreNoWork) {
+  LitScene world(1);
+  ASSERT_TRUE(world.grid().set({0, 0, 0}, LightWorld::kStone) || world.grid().get({0, 0, 0}) == LightWorld::kStone);
+  LiveLight light;
+  light.finish(world.scene);
+  ChangeCursor scene = world.scene.cursor();
+  ASSERT_TRUE(world.grid().set_data({0, 0, 0}, {.state = 1}));
+  world.scene.edit(world.handle).name = "another";
+  EXPECT_EQ(world.scene.changes_since(scene).grids.size(), 1U) << "the scene tells of it";
+  light.update(world.scene);
+  EXPECT_FALSE(light.is_late());
+
+  ASSERT_TRUE(world.grid().set({0, 0, 0}, kAir)) << "which takes data and stone away";
+  light.update(world.scene);
+  EXPECT_TRUE(light.is_late());
+  light.finish(world.scene);
+  expect_right(light.shown().of(world.handle), world.scene.types);
+
+  world.scene.edit(world.handle).field.add_sphere({5.0, 5.0, 5.0}, 3.0, LightWorld::kStone);
+  light.update(world.scene);
+  EXPECT_TRUE(light.is_late()) << "fields are in light's way, too";
+  light.finish(world.scene);
+  world.scene.remove_grid(world.handle);
+  light.update(world.scene);
+  EXPECT_TRUE(light.is_late());
+}
+
 }  // namespace
 }  // namespace quoin

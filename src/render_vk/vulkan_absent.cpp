@@ -2,7 +2,6 @@
 
 #include <quoin/render_vk/vulkan_device.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
-#include <quoin/render_vk/vulkan_path_picture.h>
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/render_vk/vulkan_renderer.h>
 

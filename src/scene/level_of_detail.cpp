@@ -48,7 +48,7 @@ class PixelScale {
 
 // What is chosen of an instance, and remembered until the next time.
 struct Choice {
-  std::uint32_t generation = std::numeric_limits<std::uint32_t>::max();  // of the instance; none: nothing chosen yet
+  std::uint64_t generation = 0;  // of the instance; 0: nothing chosen yet
   std::uint8_t level = 0;
   Detail detail = Detail::Near;
 };
@@ -128,7 +128,7 @@ Detail detail_by_pixels(const ScreenSize& size, const DetailPolicy& policy) {
 
 struct DetailSelector::Impl {
   struct Content {
-    std::uint32_t generation = 0;  // of the grid's handle
+    std::uint64_t generation = 0;  // of the grid's handle
     bool is_there = false;         // now
     ContentSphere sphere;
     DVec3 from_pivot{0.0};  // the sphere's centre, in voxels

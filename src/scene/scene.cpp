@@ -59,7 +59,7 @@ enum class Kind : std::uint8_t { Grid, Instance, Group, Layer };
 struct SceneRecord {
   Kind kind = Kind::Grid;
   std::uint32_t index = 0;
-  std::uint32_t generation = 0;
+  std::uint64_t generation = 0;
   void merge(const SceneRecord&) {}
 };
 

@@ -39,6 +39,63 @@ TEST(SceneDeathTest, AHandleOfNothingIsAMistake) {
   QUOIN_EXPECT_MISTAKE(move_group(scene, {}, DVec3(0.0), DQuat(1, 0, 0, 0)), "the handle names an element");
 }
 
+// A grid that is placed once, in a group and on a layer.
+struct Built {
+  Scene scene;
+  GridHandle grid = scene.add_grid({.name = "grid"});
+  GroupHandle group = scene.add_group({.name = "group"});
+  LayerHandle layer = scene.add_layer({.name = "layer"});
+  InstanceHandle instance = scene.add_instance({.grid = grid, .group = group, .layer = layer});
+};
+
+void expect_to_name_nothing(Scene& scene, const Built& other) {
+  const char* const wanted = "the handle names an element";
+  QUOIN_EXPECT_MISTAKE((void)scene.edit(other.grid), wanted);
+  QUOIN_EXPECT_MISTAKE((void)scene.edit(other.instance), wanted);
+  QUOIN_EXPECT_MISTAKE((void)scene.edit(other.group), wanted);
+  QUOIN_EXPECT_MISTAKE((void)scene.edit(other.layer), wanted);
+  QUOIN_EXPECT_MISTAKE((void)scene.grids()[other.grid], wanted);
+  QUOIN_EXPECT_MISTAKE((void)scene.instances()[other.instance], wanted);
+  QUOIN_EXPECT_MISTAKE(move_group(scene, other.group, DVec3(0.0), DQuat(1, 0, 0, 0)), wanted);
+  EXPECT_EQ(scene.grids().find(other.grid), nullptr);
+  EXPECT_FALSE(scene.remove_grid(other.grid) || scene.remove_instance(other.instance) ||
+               scene.remove_group(other.group) || scene.remove_layer(other.layer));
+}
+
+TEST(SceneDeathTest, AHandleOfAnotherSceneIsAMistakeAlsoWhereBothWereBuiltAlike) {
+  Built ours;
+  const Built other;
+  ASSERT_EQ(ours.grid.index, other.grid.index);
+  ASSERT_EQ(ours.instance.index, other.instance.index);
+  expect_to_name_nothing(ours.scene, other);
+  EXPECT_EQ(ours.scene.grids().size() + ours.scene.instances().size(), 2U);
+}
+
+TEST(SceneDeathTest, AHandleOfWhatCameAfterASnapshotIsAMistakeInTheOther) {
+  Built ours;
+  Built other{.scene = ours.scene.snapshot()};
+  ASSERT_EQ(ours.scene.grids().size(), 1U);
+  ASSERT_EQ(other.grid.index, 1U);
+  EXPECT_EQ(other.scene.edit(ours.grid).name, "grid") << "what was there before is named by the same handle";
+  (void)ours.scene.add_grid({});
+  (void)ours.scene.add_instance({});
+  (void)ours.scene.add_group({});
+  (void)ours.scene.add_layer({});
+  expect_to_name_nothing(ours.scene, other);
+}
+
+// It is as if nobody placed it.
+TEST(SceneDeathTest, AnInstanceOfAnotherScenesGridIsLeftOut) {
+  Built ours;
+  Built other;
+  ours.scene.edit(ours.grid).grid.set({0, 0, 0}, 1);
+  other.scene.edit(other.grid).grid.set({0, 0, 0}, 1);
+  ours.scene.edit(ours.instance).grid = other.grid;
+  EXPECT_TRUE(ours.scene.bounds().empty());
+  EXPECT_FALSE(first_hit(SceneTracer(ours.scene), {{-5.0, 0.5, 0.5}, {1.0, 0.0, 0.0}}).has_value());
+  EXPECT_TRUE(first_hit(SceneTracer(other.scene), {{-5.0, 0.5, 0.5}, {1.0, 0.0, 0.0}}).has_value());
+}
+
 TEST(SceneDeathTest, MovingAGroupWithoutARotationIsAMistake) {
   Scene scene;
   const GroupHandle group = scene.add_group({});

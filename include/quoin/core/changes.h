@@ -5,6 +5,10 @@
 
 namespace quoin {
 
+/// A number that nothing in this process had before; never 0. Journals and elements of slot maps are told apart by it.
+/// Threads: any.
+[[nodiscard]] std::uint64_t next_serial();
+
 /// How far a consumer has read the journal of changes of a container (Grid, DensityGrid, VoxelRegistry, Scene).
 ///
 ///   quoin::ChangeCursor cursor;                              // has read nothing

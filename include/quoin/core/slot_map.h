@@ -9,16 +9,17 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/changes.h>
 
 namespace quoin {
 
 /// Names an element of a SlotMap<T>; stays invalid for ever once that element is removed. The default names nothing.
-/// In another map that was filled and emptied alike it names the element at the same place, which is how frames of a
-/// film belong together; in any other it may name anything or nothing.
+/// In a copy of the map (SlotMap::copied) it names the copy of that element. In any other map it names nothing, also
+/// where both were filled alike, and so does a handle of what was inserted into a copy in the map that was copied.
 template <class T>
 struct Handle {
-  std::uint32_t index = 0xFFFFFFFFu;
-  std::uint32_t generation = 0;
+  std::uint32_t index = 0xFFFFFFFFu;  ///< the slot
+  std::uint64_t generation = 0;       ///< of the element: no other one of this process has the same; 0: none
 
   bool operator==(const Handle& other) const = default;
   /// By slot; gives a stable order for things drawn at equal depth.
@@ -56,6 +57,7 @@ class SlotMap {
     if (index / kPage == pages_.size()) pages_.push_back(std::make_unique<Page>());
     Slot& slot = slot_at(index);
     slot.value.emplace(std::move(value));
+    slot.generation = next_serial();
     if (index == count_) {
       ++count_;
     } else {
@@ -73,7 +75,7 @@ class SlotMap {
     free_.push_back(handle.index);  // first, since it may throw
     Slot& slot = slot_at(handle.index);
     slot.value.reset();
-    ++slot.generation;
+    slot.generation = 0;
     --size_;
     return true;
   }
@@ -143,7 +145,7 @@ class SlotMap {
  private:
   struct Slot {
     std::optional<T> value;
-    std::uint32_t generation = 0;
+    std::uint64_t generation = 0;  // of the value; 0: none
   };
   static constexpr std::size_t kPage = 32;
   using Page = std::array<Slot, kPage>;

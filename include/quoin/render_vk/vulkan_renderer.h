@@ -10,7 +10,6 @@
 #include <quoin/core/result.h>
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/render_vk/vulkan_device.h>
-#include <quoin/render_vk/vulkan_path_picture.h>
 #include <quoin/render_vk/vulkan_picture.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>

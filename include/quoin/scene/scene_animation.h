@@ -24,10 +24,10 @@ namespace quoin {
 class SceneAnimation {
  public:
   /// Adds the next frame, of what `filter` counts as drawn. Instances are told apart by their place in the order of
-  /// their handles; of the grids, types, groups and layers those of the first frame are taken, which the same handles
-  /// mean in every frame: the frames of a .vox file, or snapshots of one scene whose instances alone change.
+  /// their handles; of the grids, types, groups and layers those of the first frame are taken, for what is in the same
+  /// slots in every frame: the frames of a .vox file, or snapshots of one scene whose instances alone change.
   /// Cost: O(instances), times the grids that each has shown; memory for what changes.
-  /// Errors: InvalidArgument where the number of instances or grids is another than before.
+  /// Errors: InvalidArgument where the number of instances is another than before, or grids are in other slots.
   [[nodiscard]] Status add(const Scene& frame, InstanceFilter filter = InstanceFilter::Visible);
 
   /// All that any frame shows: an instance that shows several grids one after the other is as many.
@@ -41,7 +41,7 @@ class SceneAnimation {
  private:
   /// What an instance is at one time: a part of its own in a file, since a node shows one mesh.
   struct Look {
-    GridHandle grid;
+    GridHandle grid;  ///< in scene_
     bool mirrored = false;
     bool operator==(const Look&) const = default;
   };
@@ -57,7 +57,8 @@ class SceneAnimation {
     std::size_t frames_until_last = 0;  ///< how many there were when it was last shown
   };
 
-  Shown& shown_as(std::size_t place, const Instance& instance);
+  [[nodiscard]] bool has_the_same_grids(const Scene& frame) const;
+  Shown& shown_as(std::size_t place, const Scene& frame, const Instance& instance);
   static void show(Shown& shown, std::size_t frame, const Similarity& place);
   [[nodiscard]] std::vector<MeshKey> keys_of(const Shown& shown, double frames_per_second) const;
 

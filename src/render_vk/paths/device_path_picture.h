@@ -2,7 +2,6 @@
 
 #include <cstdint>
 
-#include <quoin/render_vk/vulkan_path_picture.h>
 #include <quoin/scene/camera.h>
 
 #include "render_vk/device/access.h"

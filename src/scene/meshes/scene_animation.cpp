@@ -17,6 +17,13 @@ Similarity place_of(const Instance& instance) {
   return {instance.position, unit_rotation(instance.rotation), instance.voxel_size, instance.mirrored};
 }
 
+// What is in the same slot of another map; nothing where the handle names nothing in its own.
+template <class T>
+Handle<T> in_slot_of(Handle<T> handle, const SlotMap<T>& own, const SlotMap<T>& other) {
+  if (own.find(handle) == nullptr) return {};
+  return other.handle_at(handle.index).value_or(Handle<T>{});
+}
+
 }  // namespace
 
 Status SceneAnimation::add(const Scene& frame, InstanceFilter filter) {
@@ -26,7 +33,7 @@ Status SceneAnimation::add(const Scene& frame, InstanceFilter filter) {
     for (const InstanceHandle handle : scene_.instances().handles()) scene_.remove_instance(handle);
     instances_.resize(count);
   }
-  if (count != instances_.size() || frame.grids().size() != scene_.grids().size()) {
+  if (count != instances_.size() || !has_the_same_grids(frame)) {
     return make_error(ErrorCode::InvalidArgument,
                       "frame " + std::to_string(frames_) + " has other instances or grids than those before it");
   }
@@ -34,7 +41,7 @@ Status SceneAnimation::add(const Scene& frame, InstanceFilter filter) {
   for (const InstanceHandle handle : frame.instances().handles()) {
     const Instance& instance = frame.instances()[handle];
     if (is_drawn(frame, instance, filter)) {
-      show(shown_as(place, instance), frames_, place_of(instance));
+      show(shown_as(place, frame, instance), frames_, place_of(instance));
     }
     ++place;
   }
@@ -42,13 +49,24 @@ Status SceneAnimation::add(const Scene& frame, InstanceFilter filter) {
   return {};
 }
 
-SceneAnimation::Shown& SceneAnimation::shown_as(std::size_t place, const Instance& instance) {
-  const Look look{instance.grid, instance.mirrored};
+bool SceneAnimation::has_the_same_grids(const Scene& frame) const {
+  if (frame.grids().size() != scene_.grids().size()) return false;
+  bool all_there = true;
+  frame.grids().for_each(
+      [&](GridHandle handle, const SceneGrid&) { all_there &= scene_.grids().handle_at(handle.index).has_value(); });
+  return all_there;
+}
+
+SceneAnimation::Shown& SceneAnimation::shown_as(std::size_t place, const Scene& frame, const Instance& instance) {
+  const Look look{in_slot_of(instance.grid, frame.grids(), scene_.grids()), instance.mirrored};
   auto& all = instances_[place];
   const auto known = std::ranges::find(all, look, &Shown::look);
   if (known != all.end()) return *known;
   Instance taken = instance;
   taken.visible = true;
+  taken.grid = look.grid;
+  taken.group = in_slot_of(instance.group, frame.groups(), scene_.groups());
+  taken.layer = in_slot_of(instance.layer, frame.layers(), scene_.layers());
   return all.emplace_back(Shown{look, scene_.add_instance(std::move(taken)), {}});
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -48,10 +49,19 @@ struct SlabRead {
 struct SlabKinds {
   unsigned has_ones = 0;
   unsigned has_zeros = 0;
-  unsigned differs = 0;  ///< from the plane before
   bool is_changed = false;
-  std::uint16_t fresh[kPlanes] = {};  ///< rows that differ from the one before, the first from 0
 };
+
+/// The planes of a slab by Gray's code, in which levels that follow each other differ in one bit: of each, units of 32
+/// voxels that differ from those a row before, in the first row from 0. Light changes little from row to row, and then
+/// by one level.
+struct SlabUnits {
+  std::array<std::uint32_t, kPlanes> fresh;     ///< bit half + 2 row: which units are there
+  std::array<std::uint8_t, kPlanes + 1> first;  ///< unit of each plane; how many there are
+};
+
+/// What units are packed into: as many as there may be, and room for kernels to write beyond.
+using SlabUnitsRoom = std::array<std::uint32_t, 2 * kPlanes * kSlabWords + 16>;
 
 struct Kernel {
   void (*spread)(const LevelPass& step);
@@ -72,6 +82,12 @@ struct Kernel {
   /// Puts what was at voxels outside of `inside` into `now`, both [plane][row]; `changed` becomes where they differ.
   SlabKinds (*merge)(const std::uint64_t* before, const std::uint64_t* inside, std::uint64_t* now,
                      std::uint64_t* changed);
+  /// Of [plane][row]. `units`: plane by plane, in the order of the bits.
+  SlabUnits (*pack_slab)(const std::uint64_t* planes, SlabUnitsRoom& units);
+  /// The inverse. Nothing beyond the units that there are is read.
+  void (*unpack_slab)(const SlabUnits& of, const std::uint32_t* units, std::uint64_t* planes);
+  /// Of one row; planes[i] is that of bit i.
+  void (*unpack_row)(const SlabUnits& of, const std::uint32_t* units, std::size_t row, std::uint64_t* planes);
 };
 
 extern const Kernel kPlainKernel;

@@ -357,12 +357,10 @@ void read_slab(const SlabRead& from, std::uint64_t* out) {
 SlabKinds merge(const std::uint64_t* before, const std::uint64_t* inside, std::uint64_t* now, std::uint64_t* changed) {
   Words ones[kPlanes]{};
   Words zeros[kPlanes]{};
-  Words differs[kPlanes]{};
   Words all_changed{};
   for (std::size_t row = 0; row < kSlabWords; row += kWidth) {
     const Words here = load(inside + row);
     Words changed_here{};
-    Words last{};
     for (std::size_t plane = 0; plane < kPlanes; ++plane) {
       const std::size_t at = plane * kSlabWords + row;
       const Words old = load(before + at);
@@ -372,8 +370,6 @@ SlabKinds merge(const std::uint64_t* before, const std::uint64_t* inside, std::u
       changed_here |= other;
       ones[plane] |= words;
       zeros[plane] |= ~words;
-      differs[plane] |= words ^ last;
-      last = words;
     }
     store(changed_here, changed + row);
     all_changed |= changed_here;
@@ -381,14 +377,8 @@ SlabKinds merge(const std::uint64_t* before, const std::uint64_t* inside, std::u
   SlabKinds kinds;
   kinds.is_changed = any(all_changed);
   for (std::size_t plane = 0; kinds.is_changed && plane < kPlanes; ++plane) {
-    for (std::size_t row = 0; row < kSlabWords; row += kWidth) {
-      const std::uint64_t* here = now + plane * kSlabWords + row;
-      const Words before_it = row == 0 ? lanes_up(load(here)) : load(here - 1);
-      kinds.fresh[plane] |= static_cast<std::uint16_t>(lanes_with_bits(load(here) ^ before_it) << row);
-    }
     kinds.has_ones |= static_cast<unsigned>(any(ones[plane])) << plane;
     kinds.has_zeros |= static_cast<unsigned>(any(zeros[plane])) << plane;
-    kinds.differs |= static_cast<unsigned>(any(differs[plane])) << plane;
   }
   return kinds;
 }

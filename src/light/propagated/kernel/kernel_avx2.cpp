@@ -3,10 +3,12 @@
 #ifdef QUOIN_X86_KERNELS
 
 #include "light/propagated/kernel/kernel.inl"
+#include "light/propagated/kernel/slab_units.inl"
 
 namespace quoin::propagated {
 
-const Kernel kAvx2Kernel = {&spread, &take_sky, &find_blocks, &find_rows, &unpack, &shift_in, &read_slab, &merge};
+const Kernel kAvx2Kernel = {&spread,    &take_sky, &find_blocks, &find_rows,   &unpack,    &shift_in,
+                            &read_slab, &merge,    &pack_slab,   &unpack_slab, &unpack_row};
 
 }  // namespace quoin::propagated
 

@@ -1,9 +1,11 @@
 // The kernel for any processor.
 
 #include "light/propagated/kernel/kernel.inl"
+#include "light/propagated/kernel/slab_units.inl"
 
 namespace quoin::propagated {
 
-const Kernel kPlainKernel = {&spread, &take_sky, &find_blocks, &find_rows, &unpack, &shift_in, &read_slab, &merge};
+const Kernel kPlainKernel = {&spread,    &take_sky, &find_blocks, &find_rows,   &unpack,    &shift_in,
+                             &read_slab, &merge,    &pack_slab,   &unpack_slab, &unpack_row};
 
 }  // namespace quoin::propagated
