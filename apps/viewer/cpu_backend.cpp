@@ -282,7 +282,9 @@ Result<Picture> CpuBackend::Impl::path_picture(const ViewRequest& wanted, const 
   smooth.reset();
   is_smooth_stale = true;
   prepare_paths();
-  auto taken = paths->tracer.render(wanted.camera, path_options(wanted, now.width(wanted), now.height(wanted), now.samples, paths->bounds), options.threads, goes_on);
+  auto taken = paths->tracer.render(
+      wanted.camera, path_options(wanted, now.width(wanted), now.height(wanted), now.samples, paths->bounds),
+      options.threads, goes_on);
   if (!taken) return taken.error();
   auto colour = develop(*taken, develop_options(wanted));
   if (!colour) return colour.error();

@@ -335,8 +335,7 @@ Result<bool> DeviceDrawer::draw_path_stage() {
     samples = static_cast<int>(std::min(options_.frame_seconds / (pixels * seconds_per_sample_), 64.0));
     samples = std::clamp(samples, 1, std::min(kPathSamples, 2 * shown_samples_) - before);
   }
-  const PathOptions wanted =
-      path_options(*request_, width, height, samples, scene_->bounds(options_.cpu.instances));
+  const PathOptions wanted = path_options(*request_, width, height, samples, scene_->bounds(options_.cpu.instances));
   const Accumulation accumulation = is_new ? Accumulation::Restart : Accumulation::Continue;
   const Clock::time_point start = Clock::now();
   if (Status drawn = renderer_->draw_paths(*paths_, request_->camera, wanted, accumulation); !drawn)

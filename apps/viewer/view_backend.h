@@ -70,10 +70,6 @@ struct ViewRequest {
 /// Whether both want the same picture.
 [[nodiscard]] bool is_same(const ViewRequest& a, const ViewRequest& b);
 
-// Of what backends know of how long pictures take.
-constexpr double kConstancy = 1.3;  ///< times as long is what lets the size of moving pictures be as it was
-constexpr double kNews = 0.3;       ///< the share of a new measurement in what is known of how long pixels take
-
 constexpr int kPathSamples = 256;  ///< of a settled picture by paths
 
 /// How a picture by paths is taken: what the file says, in the light of the window's panel, without noise within

@@ -45,7 +45,7 @@ struct Built {
   GridHandle grid = scene.add_grid({.name = "grid"});
   GroupHandle group = scene.add_group({.name = "group"});
   LayerHandle layer = scene.add_layer({.name = "layer"});
-  InstanceHandle instance = scene.add_instance({.grid = grid, .group = group, .layer = layer});
+  InstanceHandle instance = scene.add_instance({.name = "", .grid = grid, .group = group, .layer = layer});
 };
 
 void expect_to_name_nothing(Scene& scene, const Built& other) {

@@ -22,10 +22,10 @@ constexpr std::array kPathOptions = {
     "--lens-radius", "--focus", "--fog",      "--fog-colour", "--bloom",     "--vignette", "--look",   "--denoise"};
 // What all light has, and a file may say too.
 constexpr std::array kCommonOptions = {"--sun", "--sky-brightness", "--exposure"};
-constexpr std::array kOtherLight = {
-    "--preset",    "--ao",          "--ao-rays",         "--ao-affects",  "--ao-distance", "--ao-form",
-    "--ao-spread", "--ao-offset",   "--ao-power",        "--lamps",       "--fixed-sky",   "--plain-glass",
-    "--detail",    "--lod-colours", "--shadow-distance", "--least-light"};
+constexpr std::array kOtherLight = {"--preset",      "--ao",          "--ao-rays",         "--ao-affects",
+                                    "--ao-distance", "--ao-form",     "--ao-spread",       "--ao-offset",
+                                    "--ao-power",    "--lamps",       "--fixed-sky",       "--plain-glass",
+                                    "--detail",      "--lod-colours", "--shadow-distance", "--least-light"};
 
 std::optional<double> read_sun_angle(const std::string& text) {
   const auto degrees = parse_number(text);

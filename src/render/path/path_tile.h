@@ -16,6 +16,7 @@
 #include "render/path/denoise.h"
 #include "render/path/path_lamps.h"
 #include "render/path/path_random.h"
+#include "render/path/pixel_sums.h"
 #include "render/path/scatter.h"
 #include "render/path/sky_light.h"
 #include "scene/tracer/scene_view.h"
@@ -33,25 +34,6 @@ struct TileContext {
   const PathOptions* options = nullptr;
   SurfaceParts* parts = nullptr;  ///< of the picture, to be filled; null: not wanted
   bool has_media = false;         ///< fog or clouds
-};
-
-/// What a pixel's samples add up to.
-struct PixelSums {
-  Vec3 background{0.0F};  ///< what is seen of it
-  Vec3 scene{0.0F};
-  Vec3 caught{0.0F};  ///< background behind ground that only catches shadows
-  Vec3 lit{0.0F};     ///< that ground
-  Vec3 open{0.0F};    ///< and what light it would have if nothing was on it
-  float scene_share = 0.0F;
-  float caught_share = 0.0F;
-  Vec3 albedo{0.0F};
-  Vec3 normal{0.0F};
-  float depth = 0.0F;
-  VoxelType type = kAir;
-  std::uint32_t instance = 0;
-
-  /// Puts their means in place.
-  void write_to(PathPicture& picture, std::size_t pixel, int samples) const;
 };
 
 /// One square of a picture.

@@ -16,10 +16,12 @@
 #include "render_vk/march/device_detail.h"
 #include "render_vk/march/device_scene.h"
 #include "render_vk/march/pipelines.h"
-#include "render_vk/paths/device_paths.h"
-#include "render_vk/paths/path_pipelines.h"
 
 namespace quoin {
+
+namespace vulkan {
+struct PathScene;
+}
 
 /// What a renderer, its pictures and its mesh renderers share.
 struct VulkanRenderer::Impl {
@@ -44,7 +46,7 @@ struct VulkanRenderer::Impl {
     instances = filter;
     lamps.update();
     levels.update();
-    paths.look_at(updated);
+    ++update_count;
     if (updated == nullptr) return detail.clear();
     chooser->update_types(updated->types);
     detail.look_at(*updated);
@@ -86,8 +88,8 @@ struct VulkanRenderer::Impl {
   vulkan::DeviceLamps sent_lamps;
   LightCache levels;
   vulkan::DeviceLevels sent_levels;
-  vulkan::DevicePaths paths;
-  std::unique_ptr<vulkan::PathPipelines> path_pipelines;  ///< null: nothing was drawn by paths
+  std::uint64_t update_count = 0;            ///< of updates
+  std::shared_ptr<vulkan::PathScene> paths;  ///< null: nothing was drawn by paths
   std::uint64_t uploaded = 0;
 };
 

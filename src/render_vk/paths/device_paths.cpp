@@ -125,7 +125,8 @@ Status DevicePaths::put_sky(DeviceMemory& memory, const Look& look) {
   look_.reset();
   sky_ = std::make_unique<const path::SkyLight>(look);
   Status done;
-  if (const path::SkyMap* const air = sky_->air(); air != nullptr) done = put_values(memory, sky_pixels_, air->pixels());
+  if (const path::SkyMap* const air = sky_->air(); air != nullptr)
+    done = put_values(memory, sky_pixels_, air->pixels());
   if (const path::EnvironmentLight* const image = sky_->image(); image != nullptr) {
     done = put_values(memory, sky_pixels_, std::span<const float>(image->image().rgb));
     if (done) done = put_values(memory, sky_rows_, image->rows());

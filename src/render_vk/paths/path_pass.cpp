@@ -5,12 +5,12 @@
 #include <cstring>
 #include <numbers>
 #include <span>
+#include <utility>
 
-#include "core/moved_from.h"
+#include <quoin/core/assert.h>
+
 #include "render/path/path_request.h"
 #include "render_vk/march/frame.h"
-#include "render_vk/paths/device_paths.h"
-#include "render_vk/paths/path_pipelines.h"
 
 namespace quoin {
 namespace vulkan {
@@ -80,8 +80,7 @@ Status PathPass::upload(const std::vector<T>& values, std::uint64_t& address) {
 
 Status PathPass::put_lamps(DVec3 view_origin, ShaderPathFrame& paths) {
   if (renderer_->voxels == nullptr) return {};
-  const auto lamps =
-      renderer_->paths.lamps(renderer_->scene.placement(), picture_->options.lamp_brightness);
+  const auto lamps = renderer_->paths->tables.lamps(renderer_->scene.placement(), picture_->options.lamp_brightness);
   if (lamps->empty()) return {};
   const LampTables tables = lamp_tables(*lamps, view_origin);
   paths.lamp_count = static_cast<std::uint32_t>(tables.lamps.size());
@@ -127,17 +126,17 @@ Status PathPass::put_frame() {
   ShaderFrame& frame = data.frame;
   const DVec3 view_origin = camera.position + data.view_origin;
   ShaderPathFrame paths;
-  Status done = renderer_->paths.put(renderer_->memory, options, paths);
+  Status done = renderer_->paths->tables.put(renderer_->memory, options, paths);
   if (!done) return done;
   put_options(camera, options, view_origin, paths);
-  if (options.denoise && (options.fog.has_value() || renderer_->paths.has_clouds())) paths.flags |= kPathMedia;
-  const SkyColours& gradient = renderer_->paths.sky().gradient();
+  if (options.denoise && (options.fog.has_value() || renderer_->paths->tables.has_clouds())) paths.flags |= kPathMedia;
+  const SkyColours& gradient = renderer_->paths->tables.sky().gradient();
   frame.sky_zenith = Vec4(gradient.zenith, 0.0F);
   frame.sky_horizon = Vec4(gradient.horizon, 0.0F);
   frame.sky_ground = Vec4(gradient.ground, 0.0F);
   frame.grids = placement.grids;
-  frame.surfaces = renderer_->paths.surfaces_address();
-  frame.last_surface = renderer_->paths.last_surface();
+  frame.surfaces = renderer_->paths->tables.surfaces_address();
+  frame.last_surface = renderer_->paths->tables.last_surface();
   done = put_lamps(view_origin, paths);
   if (done) done = upload(data.placed, frame.placed);
   if (done) done = upload(data.tree, frame.tree);
@@ -167,7 +166,7 @@ Status PathPass::take(const Tile& tile, int first, int count, const Progress& pr
       for (int i = 0; i < kDispatchesAtOnce; ++i) {
         api.vkCmdFillBuffer(commands, counters_.handle(), offsetof(ShaderCounters, pending), 4, 0);
         renderer_->device->separate(commands);
-        renderer_->path_pipelines->dispatch(commands, renderer_->scene.placement(), push);
+        renderer_->paths->pipelines->dispatch(commands, renderer_->scene.placement(), push);
         push.begins = 0;
       }
       const VkBufferCopy all{0, 0, sizeof(ShaderCounters)};
@@ -203,7 +202,7 @@ Status PathPass::add_samples(int samples, const Progress& progress) {
 }
 
 Status PathPass::draw(int samples, const Progress& progress) {
-  Status done = renderer_->path_pipelines->prepare(renderer_->scene.placement());
+  Status done = renderer_->paths->pipelines->prepare(renderer_->scene.placement());
   if (done) done = put_frame();
   if (done) {
     done = renderer_->device->run(kDoing, [&](VkCommandBuffer commands) {
@@ -244,10 +243,13 @@ Status VulkanRenderer::draw_paths(VulkanPathPicture& picture, const Camera& came
   if (target.samples + options.samples > kMaxSamples) {
     return make_error(ErrorCode::LimitExceeded, "vulkan: a picture by paths has 65,536 samples a pixel at most");
   }
-  if (impl_->path_pipelines == nullptr) {
+  if (impl_->paths == nullptr) {
     auto made = vulkan::PathPipelines::create(*impl_->device);
     if (!made) return made.error();
-    impl_->path_pipelines = std::move(*made);
+    impl_->paths = std::make_shared<vulkan::PathScene>(std::move(*made));
+  }
+  if (std::exchange(impl_->paths->update_count, impl_->update_count) != impl_->update_count) {
+    impl_->paths->tables.look_at(impl_->voxels);
   }
   vulkan::PathPass pass(*impl_, target);
   return pass.draw(options.samples, progress);

@@ -1,14 +1,27 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include <quoin/core/progress.h>
 
 #include "render_vk/march/renderer_impl.h"
 #include "render_vk/paths/device_path_picture.h"
+#include "render_vk/paths/device_paths.h"
+#include "render_vk/paths/path_pipelines.h"
 
 namespace quoin::vulkan {
+
+/// What pictures by paths of one renderer share.
+struct PathScene {
+  explicit PathScene(std::unique_ptr<PathPipelines> made) : pipelines(std::move(made)) {}
+
+  std::unique_ptr<PathPipelines> pipelines;
+  DevicePaths tables;
+  std::uint64_t update_count = 0;  ///< of the renderer, when the tables last looked
+};
 
 /// Adds samples to a picture by paths, tile by tile.
 ///
