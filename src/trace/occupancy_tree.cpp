@@ -155,6 +155,7 @@ struct OccupancyTree::Impl {
   const ChunkNode* known_nodes = nullptr;  // where they were when `flat_nodes` was made
   IBox flat_chunks;
   trace::TreeView view{};
+  bool is_built = false;  // until then what is kept may double: finish_build trims it
 
   Impl() { bricks[1].fill(kAll); }
 
@@ -165,7 +166,7 @@ struct OccupancyTree::Impl {
       free_bricks.pop_back();
       return index;
     }
-    make_room(bricks);
+    if (is_built) make_room(bricks);
     bricks.emplace_back();
     return static_cast<std::uint32_t>(bricks.size() - 1);
   }
@@ -203,7 +204,7 @@ struct OccupancyTree::Impl {
     std::uint32_t& index = region->nodes[table_index(unit)];
     if (index == 0) {
       if (free_chunks.empty()) {
-        make_room(chunk_nodes);
+        if (is_built) make_room(chunk_nodes);
         chunk_nodes.emplace_back();
         index = static_cast<std::uint32_t>(chunk_nodes.size() - 1);
       } else {
@@ -638,6 +639,7 @@ void OccupancyTree::finish_build() {
   trim(impl_->chunk_nodes);
   trim(impl_->bricks);
   trim(impl_->uniform);
+  impl_->is_built = true;
   impl_->finish({});
   view_ = impl_->kernel_view();
 }

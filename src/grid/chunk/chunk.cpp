@@ -271,7 +271,9 @@ bool Chunk::set_anywhere(int x, int y, int z, VoxelType type) {
   if (storage_ == nullptr) make_mixed();
   ChunkStorage& m = own();
   const std::uint32_t index = index_for(type);
-  std::uint64_t* row = m.row(slot_for_writing(ChunkStorage::slab_index(y, z)), ChunkStorage::row_in_slab(y, z));
+  const std::size_t slab = ChunkStorage::slab_index(y, z);
+  const bool has_slot = (m.slabs[slab] & ChunkStorage::kUniformSlab) == 0;  // most have: a call less
+  std::uint64_t* row = m.row(has_slot ? m.slabs[slab] : slot_for_writing(slab), ChunkStorage::row_in_slab(y, z));
   m.move_counts(packed_row::read(row, m.bits, x), index, 1);
   packed_row::write(row, m.bits, x, index);
   if ((old == kAir) != (type == kAir)) m.count_voxel(x, y, z, type == kAir ? -1 : 1);
