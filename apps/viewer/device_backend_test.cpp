@@ -210,6 +210,39 @@ TEST_F(DeviceBackendTest, EveryModeAndShadingDraws) {
   EXPECT_EQ(all.size(), 17U);
 }
 
+// By the device, and as the processor would; they converge, and begin anew with an edit.
+TEST_F(DeviceBackendTest, PathsConvergeAndFollowEdits) {
+  Document document = small_document();
+  const auto backend = backend_of(document);
+  ViewRequest request = request_for(document, DrawMode::Paths);
+  request.width = 48;
+  request.height = 32;
+  backend->show(request);
+  const auto picture_of = [&](int samples) {
+    Image image;
+    const bool came = comes([&] {
+      const auto frame = backend->take();
+      if (!frame || !frame->is_whole || frame->samples != samples) return false;
+      image = frame->on_device ? frame->on_device->read().value_or(Image{}) : frame->colour;
+      return true;
+    });
+    EXPECT_TRUE(came);
+    return image;
+  };
+  const auto by_paths = [&] {
+    const Scene& scene = document.scene();
+    const PathOptions options = path_options(request, request.width, request.height, 4, scene.bounds());
+    return develop(PathTracer(scene).render(request.camera, options).value(), develop_options(request)).value();
+  };
+  const Image before = picture_of(4);
+  EXPECT_LT(differing(before, by_paths(), 4), 0.02);
+  edit(document, *backend, {30, 12, 20});
+  const Image after = picture_of(4);
+  EXPECT_GT(differing(before, after, 4), 0.001);
+  EXPECT_LT(differing(after, by_paths(), 4), 0.02);
+  EXPECT_EQ(backend->name(), renderer_->device().name);
+}
+
 TEST_F(DeviceBackendTest, SmoothMeshesTakeTheOcclusionThatIsWanted) {
   Document document = small_document();
   const auto backend = backend_of(document);
