@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # Plays apps/demo/miner as a player does, in a real window under Xvfb, with real keys and a real mouse by xdotool: walks,
 # digs a shaft and a tunnel, lights it with torches, starts a landslide, watches ships.
-# Usage: play.sh QUOIN_MINER [FOLDER]: pictures are kept in FOLDER. Exits with 77, and says so, where a program is not installed.
+# Usage: play.sh QUOIN_MINER [FOLDER [DEVICE]]: pictures are kept in FOLDER; DEVICE is the game's --device. Exits with 77, and says so, where a program is not installed.
 set -euo pipefail
 miner="$(realpath "$1")"
 . "$(dirname "$(realpath "$0")")/../on_screen.sh"
 on_screen 960x540 "import convert" "$0" "$@"
 pictures="${2:-$work}"
+device="${3:-}"
 mkdir -p "$pictures"
 
 # What the window's title says of the player: x, y, z, sky, lamps or fallen
@@ -26,7 +27,7 @@ mean() { convert "$pictures/$1.png" -format "%[fx:round(255*mean.$2)]" info:; }
 other() { convert "$pictures/$1.png" "$pictures/$2.png" -compose difference -composite -colorspace gray -threshold 8% -format '%[fx:round(mean*w*h)]' info:; }
 
 start() {
-  launch Miner "$miner" --units 4 --edits 0 "$@"
+  launch Miner "$miner" --units 4 --edits 0 ${device:+--device "$device"} "$@"
   until_true 60 is y -gt 0 || fail "the game does not begin"
   xdotool windowfocus "$window" 2>/dev/null || true
   # Until it has landed.

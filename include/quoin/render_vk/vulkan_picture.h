@@ -89,8 +89,8 @@ class VulkanPicture {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The samples of a picture by paths, which stay in device memory, so that more can be added to them: it converges while
-/// one looks at it.
+/// The samples of a picture by paths, which stay in device memory, so that more can be added to them: it converges
+/// while one looks at it.
 ///
 /// Memory:   80 bytes a pixel of the device's, 112 with layers, and 180 besides with PathOptions::denoise.
 /// Lifetime: the renderer it was made for must outlive it.

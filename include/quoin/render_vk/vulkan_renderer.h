@@ -115,8 +115,8 @@ class VulkanRenderer {
   ///
   /// Requires: unless it begins anew, camera and options, but for the count of samples, are those of its other samples;
   ///           so is the scene, of which this is not checked.
-  /// Errors:   those of `render_paths`; LimitExceeded for more than 65,536 samples, and InvalidArgument for a picture of
-  ///           another renderer.
+  /// Errors:   those of `render_paths`; LimitExceeded for more than 65,536 samples, and InvalidArgument for a picture
+  ///           of another renderer.
   [[nodiscard]] Status draw_paths(VulkanPathPicture& picture, const Camera& camera, const PathOptions& options,
                                   Accumulation accumulation, Threads threads = {}, const Progress& progress = {});
 

@@ -224,16 +224,14 @@ void LightSolver::read_channel(const Part& part, std::size_t channel, const Chan
   part.for_each_slab([&](int y, int z) {
     const LightSlab& slab = light.is_uniform() ? uniform : light.stored(slab_index(y, z));
     if (slab.is_uniform() && slab.level() == 0) return;
-    const unsigned wanted = rows_of(part.box, y, z);
-    // At a side of the box a slab has four rows of it.
-    const bool are_few = slab.is_uniform() || std::popcount(wanted) <= 4;
-    if (!are_few) slab.read(planes);
+    slab.read(planes);
+    unsigned rows = planes.lit_rows(part.bits) & rows_of(part.box, y, z);
     const unsigned unknown_rows = unknown.empty() ? 0 : rows_of(unknown, y, z);
-    for (unsigned rows = are_few ? wanted : wanted & planes.lit_rows(part.bits); rows != 0; rows &= rows - 1) {
+    for (; rows != 0; rows &= rows - 1) {
       const auto row = static_cast<unsigned>(std::countr_zero(rows));
       const std::uint64_t mask = (unknown_rows >> row & 1U) != 0 ? known : part.bits;
       const IVec3 first = low + IVec3(0, y + static_cast<int>(row & 3), z + static_cast<int>(row >> 2));
-      add_sources(channel, are_few ? slab.row(row) : planes.row(row), first, mask);
+      add_sources(channel, planes.row(row), first, mask);
     }
   });
 }

@@ -72,8 +72,8 @@ class Scatter {
   float anisotropy_ = 0.0F;
 };
 
-/// What gloss reflects of all light that comes from everywhere, as Scatter looks it up: [roughness][cosine] in kGlossEdge
-/// steps from 0 to 1 each, two numbers each, of which the first is times what it reflects straight down.
+/// What gloss reflects of all light that comes from everywhere, as Scatter looks it up: [roughness][cosine] in
+/// kGlossEdge steps from 0 to 1 each, two numbers each, of which the first is times what it reflects straight down.
 constexpr int kGlossEdge = 32;
 [[nodiscard]] std::span<const float> gloss_table();
 

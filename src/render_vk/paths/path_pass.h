@@ -25,7 +25,8 @@ struct PathScene {
 
 /// Adds samples to a picture by paths, tile by tile.
 ///
-///   tile: begin -> [ some steps of every pixel's path, in whose place comes that of its next sample ] until all are done
+///   tile: begin -> [ some steps of every pixel's path, in whose place comes that of its next sample ] until all have
+///   ended
 class PathPass {
  public:
   PathPass(RendererImpl& renderer, PathPictureImpl& picture) : renderer_(&renderer), picture_(&picture) {}
