@@ -313,7 +313,7 @@ TEST(LiveCallbacks, SurfacesAreConvertedByWorkersAndTakenByThem) {
   take();
   EXPECT_EQ(live.pending(), 0U);
   std::size_t with_quads = 0;
-  for (const GridHandle handle : drawn_grids(editor.scene, InstanceFilter::Visible)) {
+  for (const GridHandle handle : grids_of_drawn(editor.scene, InstanceFilter::Visible)) {
     const Grid& grid = editor.scene.grids()[handle].grid;
     for (const IVec3 chunk : grid.chunks()) {
       QuadBuffer quads;

@@ -79,7 +79,7 @@ class ShownSurfaces {
   std::set<SurfaceUpdate> shown_;
 };
 
-inline std::set<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filter) {
+inline std::set<GridHandle> grids_of_drawn(const Scene& scene, InstanceFilter filter) {
   std::set<GridHandle> drawn;
   scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
     if (passes(filter, scene, instance)) drawn.insert(instance.grid);
@@ -90,7 +90,7 @@ inline std::set<GridHandle> drawn_grids(const Scene& scene, InstanceFilter filte
 inline void expect_blocky(const ShownSurfaces& shown, const Scene& scene, const LiveMeshOptions& options) {
   BlockyMesher mesher;
   std::size_t surfaces = 0;
-  for (const GridHandle handle : drawn_grids(scene, options.instances)) {
+  for (const GridHandle handle : grids_of_drawn(scene, options.instances)) {
     const Grid& grid = scene.grids()[handle].grid;
     for (const IVec3 chunk : grid.chunks()) {
       QuadBuffer quads;
@@ -170,7 +170,7 @@ inline void expect_glass_last(const ChunkSurface& surface, const VoxelRegistry& 
 }
 
 inline void expect_smooth(const ShownSurfaces& shown, const Scene& scene, const LiveMeshOptions& options) {
-  const std::set<GridHandle> drawn = drawn_grids(scene, options.instances);
+  const std::set<GridHandle> drawn = grids_of_drawn(scene, options.instances);
   for (const SurfaceUpdate& each : shown.all()) EXPECT_TRUE(drawn.contains(each.grid));
   for (const GridHandle handle : drawn) {
     SmoothMeshOptions wanted;
