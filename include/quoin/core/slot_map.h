@@ -15,7 +15,7 @@ namespace quoin {
 
 /// Names an element of a SlotMap<T>; stays invalid for ever once that element is removed. The default names nothing.
 /// In a copy of the map (SlotMap::copied) it names the copy of that element. In any other map it names nothing, also
-/// where both were filled alike, and so does a handle of what was inserted into a copy in the map that was copied.
+/// where both were filled alike; what is inserted into one of the two after the copy has no name in the other.
 template <class T>
 struct Handle {
   std::uint32_t index = 0xFFFFFFFFu;  ///< the slot
