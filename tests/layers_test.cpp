@@ -59,7 +59,6 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"render/path/denoise.h", {"render_vk"}},
     {"render/path/path_lamps.h", {"render_vk"}},
     {"render/path/path_request.h", {"render_vk"}},
-    {"render/path/pixel_sums.h", {"render_vk"}},
     {"render/path/scatter.h", {"render_vk"}},
     {"render/path/sky_light.h", {"render_vk"}},
     {"render/picture_detail.h", {"render_vk"}},

@@ -494,8 +494,9 @@ TEST(Document, WhatIsShownAndHiddenCanBeUndoneAndSaved) {
   ASSERT_TRUE((*document)->write(path, warnings));
   const auto again = Document::open(path);
   ASSERT_TRUE(again);
-  EXPECT_FALSE((*again)->scene().groups()[group].visible);
-  EXPECT_TRUE((*again)->scene().layers()[layer].visible);
+  const Scene& saved = (*again)->scene();
+  EXPECT_FALSE(saved.groups()[saved.groups().handles().front()].visible);
+  EXPECT_TRUE(saved.layers()[saved.layers().handles()[1]].visible);
   EXPECT_FALSE((*document)->show(GroupHandle{9, 9}, true)) << "there is none";
 }
 

@@ -60,7 +60,7 @@ Status VulkanRenderer::draw(VulkanPicture&, const Camera&, const RenderOptions&,
 Result<PathPicture> VulkanRenderer::render_paths(const Camera&, const PathOptions&, Threads, const Progress&) {
   return refusal();
 }
-Status VulkanRenderer::draw_paths(VulkanPathPicture&, const Camera&, const PathOptions&, Accumulation, Threads,
+Status VulkanRenderer::draw_paths(VulkanPathPicture&, const Camera&, const PathOptions&, Accumulation,
                                   const Progress&) {
   return refusal();
 }

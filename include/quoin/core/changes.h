@@ -26,6 +26,10 @@ namespace quoin {
 class ChangeCursor {
  public:
   bool operator==(const ChangeCursor&) const = default;
+  /// Whether both are of the same container, at whatever times; never so of one that was not used yet.
+  [[nodiscard]] bool is_beside(const ChangeCursor& other) const {
+    return container_ != 0 && container_ == other.container_;
+  }
 
  private:
   template <class Record>

@@ -36,8 +36,8 @@ class LiveLight {
   LiveLight& operator=(const LiveLight&) = delete;
 
   /// Has workers find the light of the scene as it is now, if voxels' types, fields, grids or types are others than
-  /// when it last did, unless they are still at an earlier state: call it once a frame. Data at voxels, names and places
-  /// are none of light's: in what is shown they may be those of an earlier moment.
+  /// when it last did, unless they are still at an earlier state: call it once a frame. Data at voxels, names and
+  /// places are none of light's: in what is shown they may be those of an earlier moment.
   /// Cost:   nothing where nothing changed; else that of Scene::snapshot.
   /// Errors: bad_alloc, of a worker too; what could not be lit then is, anew, after the next call.
   void update(const Scene& scene);

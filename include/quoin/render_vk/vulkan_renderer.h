@@ -118,7 +118,7 @@ class VulkanRenderer {
   /// Errors:   those of `render_paths`; LimitExceeded for more than 65,536 samples, and InvalidArgument for a picture
   ///           of another renderer.
   [[nodiscard]] Status draw_paths(VulkanPathPicture& picture, const Camera& camera, const PathOptions& options,
-                                  Accumulation accumulation, Threads threads = {}, const Progress& progress = {});
+                                  Accumulation accumulation, const Progress& progress = {});
 
  private:
   friend struct vulkan::Access;

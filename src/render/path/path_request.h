@@ -1,6 +1,11 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+
 #include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+#include <quoin/grid/voxel_registry.h>
 #include <quoin/render/path_tracer.h>
 #include <quoin/scene/camera.h>
 
@@ -11,5 +16,24 @@ namespace quoin::path {
 
 /// With room for all that the options ask for.
 [[nodiscard]] PathPicture empty_picture(const PathOptions& options);
+
+/// What a pixel's samples add up to.
+struct PixelSums {
+  Vec3 background{0.0F};  ///< what is seen of it
+  Vec3 scene{0.0F};
+  Vec3 caught{0.0F};  ///< background behind ground that only catches shadows
+  Vec3 lit{0.0F};     ///< that ground
+  Vec3 open{0.0F};    ///< and what light it would have if nothing was on it
+  float scene_share = 0.0F;
+  float caught_share = 0.0F;
+  Vec3 albedo{0.0F};
+  Vec3 normal{0.0F};
+  float depth = 0.0F;
+  VoxelType type = kAir;
+  std::uint32_t instance = 0;
+
+  /// Puts their means in place.
+  void write_to(PathPicture& picture, std::size_t pixel, int samples) const;
+};
 
 }  // namespace quoin::path

@@ -16,7 +16,7 @@
 #include "render/path/denoise.h"
 #include "render/path/path_lamps.h"
 #include "render/path/path_random.h"
-#include "render/path/pixel_sums.h"
+#include "render/path/path_request.h"
 #include "render/path/scatter.h"
 #include "render/path/sky_light.h"
 #include "scene/tracer/scene_view.h"

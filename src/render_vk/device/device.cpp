@@ -3,6 +3,7 @@
 #include <array>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include <quoin/core/assert.h>
 
@@ -186,6 +187,31 @@ VkResult make_shader(const Device& device, std::span<const std::uint32_t> code, 
   info.codeSize = code.size_bytes();
   info.pCode = code.data();
   return device.api().vkCreateShaderModule(device.handle(), &info, nullptr, &shader);
+}
+
+VkResult make_compute_pipeline(const Device& device, VkPipelineLayout layout, std::span<const std::uint32_t> code,
+                               std::span<const ShaderConstant> constants, VkPipeline& pipeline) {
+  std::vector<VkBool32> values;
+  std::vector<VkSpecializationMapEntry> entries;
+  for (const ShaderConstant& constant : constants) {
+    const auto offset = static_cast<std::uint32_t>(values.size() * sizeof(VkBool32));
+    entries.push_back({constant.number, offset, sizeof(VkBool32)});
+    values.push_back(constant.value ? VK_TRUE : VK_FALSE);
+  }
+  const VkSpecializationInfo specialization{static_cast<std::uint32_t>(entries.size()), entries.data(),
+                                            values.size() * sizeof(VkBool32), values.data()};
+  auto info = info_of<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
+  info.layout = layout;
+  info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
+  info.stage.pName = "main";
+  info.stage.pSpecializationInfo = &specialization;
+  VkResult result = make_shader(device, code, info.stage.module);
+  if (result != VK_SUCCESS) return result;
+  const Api& api = device.api();
+  result = api.vkCreateComputePipelines(device.handle(), VK_NULL_HANDLE, 1, &info, nullptr, &pipeline);
+  api.vkDestroyShaderModule(device.handle(), info.stage.module, nullptr);
+  return result;
 }
 
 VkResult make_push_layout(const Device& device, VkShaderStageFlags stages, std::uint32_t bytes,

@@ -65,6 +65,15 @@ class Device {
 
 /// A shader, to be destroyed once pipelines were made of it.
 [[nodiscard]] VkResult make_shader(const Device& device, std::span<const std::uint32_t> code, VkShaderModule& shader);
+/// What a shader that computes is made with: its constants of these numbers.
+struct ShaderConstant {
+  std::uint32_t number = 0;
+  bool value = false;
+};
+/// A pipeline of one shader that computes.
+[[nodiscard]] VkResult make_compute_pipeline(const Device& device, VkPipelineLayout layout,
+                                             std::span<const std::uint32_t> code,
+                                             std::span<const ShaderConstant> constants, VkPipeline& pipeline);
 /// How shaders are given what they read: `bytes` that are pushed, in which the rest is found by address.
 [[nodiscard]] VkResult make_push_layout(const Device& device, VkShaderStageFlags stages, std::uint32_t bytes,
                                         VkPipelineLayout& layout);

@@ -194,4 +194,23 @@ std::size_t DeviceMemory::block_count() const {
       std::count_if(blocks_.begin(), blocks_.end(), [](const auto& block) { return block != nullptr; }));
 }
 
+Places::~Places() {
+  memory_->discard();
+  for (Place& place : places_) memory_->release(place);
+}
+
+Status Places::reserve(std::size_t bytes, std::uint64_t& address) {
+  const auto place = memory_->allocate(bytes, doing_);
+  if (!place) return place.error();
+  places_.push_back(*place);
+  address = place->address;
+  return {};
+}
+
+Status Places::upload(std::span<const std::byte> bytes, std::uint64_t& address) {
+  if (bytes.empty()) return {};
+  if (Status done = reserve(bytes.size(), address); !done) return done;
+  return memory_->write(places_.back(), bytes);
+}
+
 }  // namespace quoin::vulkan

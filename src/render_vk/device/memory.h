@@ -104,4 +104,29 @@ class DeviceMemory {
   std::uint64_t written_ = 0;
 };
 
+/// Parts of device memory that are given back together, and what was not sent of them is forgotten.
+class Places {
+ public:
+  /// `doing`: as in "drawing".
+  Places(DeviceMemory& memory, const char* doing) : memory_(&memory), doing_(doing) {}
+  ~Places();
+  Places(const Places&) = delete;
+  Places& operator=(const Places&) = delete;
+
+  [[nodiscard]] Status reserve(std::size_t bytes, std::uint64_t& address);
+  /// Puts bytes in place, before what `DeviceMemory::flush` is followed by; of none the address stays as it is.
+  [[nodiscard]] Status upload(std::span<const std::byte> bytes, std::uint64_t& address);
+  template <class T>
+  [[nodiscard]] Status upload(const std::vector<T>& values, std::uint64_t& address) {
+    return upload(std::as_bytes(std::span(values)), address);
+  }
+  /// The last one. Requires: there is one.
+  [[nodiscard]] const Place& last() const { return places_.back(); }
+
+ private:
+  DeviceMemory* memory_;
+  const char* doing_;
+  std::vector<Place> places_;
+};
+
 }  // namespace quoin::vulkan

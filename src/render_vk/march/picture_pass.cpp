@@ -41,27 +41,6 @@ const std::vector<float>& thresholds() {
 
 }  // namespace
 
-PicturePass::~PicturePass() {
-  memory_->discard();
-  for (Place& place : places_) memory_->release(place);
-}
-
-Status PicturePass::reserve(std::size_t bytes, std::uint64_t& address) {
-  const auto place = memory_->allocate(bytes, kDoing);
-  if (!place) return place.error();
-  places_.push_back(*place);
-  address = place->address;
-  return {};
-}
-
-template <class T>
-Status PicturePass::upload(const std::vector<T>& values, std::uint64_t& address) {
-  const auto bytes = std::as_bytes(std::span(values));
-  if (bytes.empty()) return {};
-  if (Status done = reserve(bytes.size(), address); !done) return done;
-  return memory_->write(places_.back(), bytes);
-}
-
 Status PicturePass::put_frame(const Camera& camera, const RenderOptions& options) {
   FrameData data = make_frame(*placement_, camera, options);
   occlusion_rays_ = options.light.occlusion_rays;
@@ -72,16 +51,16 @@ Status PicturePass::put_frame(const Camera& camera, const RenderOptions& options
   frame_.grids = placement_->grids;
   frame_.last_surface = scene_->last_surface();
   frame_.surfaces = scene_->surfaces_address();
-  Status done = upload(data.placed, frame_.placed);
-  if (done) done = upload(data.tree, frame_.tree);
-  if (done) done = upload(data.leaves, frame_.leaves);
-  if (done) done = upload(data.directions, frame_.directions);
-  if (done) done = upload(data.turns, frame_.turns);
-  if (done) done = upload(lamps, frame_.lamps);
-  if (done) done = upload(thresholds(), frame_.thresholds);
+  Status done = places_.upload(data.placed, frame_.placed);
+  if (done) done = places_.upload(data.tree, frame_.tree);
+  if (done) done = places_.upload(data.leaves, frame_.leaves);
+  if (done) done = places_.upload(data.directions, frame_.directions);
+  if (done) done = places_.upload(data.turns, frame_.turns);
+  if (done) done = places_.upload(lamps, frame_.lamps);
+  if (done) done = places_.upload(thresholds(), frame_.thresholds);
   if (done) done = make_tile_buffers(options);
   if (done) done = put_far(options);
-  if (done) done = upload(std::vector<ShaderFrame>{frame_}, frame_address_);
+  if (done) done = places_.upload(std::vector<ShaderFrame>{frame_}, frame_address_);
   if (done) done = memory_->flush();
   return done;
 }
@@ -91,12 +70,12 @@ Status PicturePass::put_far(const RenderOptions& options) {
   far_ = tiles.ranges;
   frame_.far_count = static_cast<std::uint32_t>(placement_->far.size());
   if (tiles.parts.empty()) return {};
-  Status done = upload(placement_->far, frame_.fars);
-  if (done) done = upload(tiles.parts, frame_.far_parts);
+  Status done = places_.upload(placement_->far, frame_.fars);
+  if (done) done = places_.upload(tiles.parts, frame_.far_parts);
   const auto pixels = static_cast<std::size_t>(tile_edge_) * static_cast<std::size_t>(tile_edge_);
-  if (done) done = reserve(pixels * 8, frame_.far_depths);
+  if (done) done = places_.reserve(pixels * 8, frame_.far_depths);
   if (!done) return done;
-  far_place_ = places_.back();
+  far_place_ = places_.last();
   frame_.far_numbers = frame_.far_depths + pixels * 4;
   return {};
 }
@@ -116,18 +95,18 @@ Status PicturePass::make_tile_buffers(const RenderOptions& options) {
   frame_.counters = output_.address();
   frame_.colours = output_.address() + sizeof(ShaderCounters);
   frame_.depths = frame_.colours + pixels * 4;
-  Status done = reserve(pixels * kPointBytes, frame_.points);
-  if (done) done = reserve(pixels * kStateBytes, frame_.states);
+  Status done = places_.reserve(pixels * kPointBytes, frame_.points);
+  if (done) done = places_.reserve(pixels * kStateBytes, frame_.states);
   if (target_ != nullptr) {
     frame_.colours = target_->colours.address();
     frame_.sums = target_->sums.address();
-    if (done) done = reserve(pixels * 4, frame_.depths);
+    if (done) done = places_.reserve(pixels * 4, frame_.depths);
   } else if (done) {
-    done = reserve(pixels * kSumBytes, frame_.sums);
+    done = places_.reserve(pixels * kSumBytes, frame_.sums);
   }
   if (!has_glass) return done;
-  if (done) done = reserve(pixels * kBodies * kBodyBytes, frame_.bodies);
-  if (done) done = reserve(pixels * kBodies * kBodyBytes, frame_.sun_bodies);
+  if (done) done = places_.reserve(pixels * kBodies * kBodyBytes, frame_.bodies);
+  if (done) done = places_.reserve(pixels * kBodies * kBodyBytes, frame_.sun_bodies);
   return done;
 }
 

@@ -29,8 +29,8 @@ class PicturePass {
         scene_(&scene),
         placement_(&placement),
         light_(std::move(light)),
-        content_(content) {}
-  ~PicturePass();
+        content_(content),
+        places_(memory, "drawing") {}
   PicturePass(const PicturePass&) = delete;
   PicturePass& operator=(const PicturePass&) = delete;
 
@@ -47,9 +47,6 @@ class PicturePass {
     FarTiles::Range far;
   };
 
-  template <class T>
-  Status upload(const std::vector<T>& values, std::uint64_t& address);
-  Status reserve(std::size_t bytes, std::uint64_t& address);
   Status put_frame(const Camera& camera, const RenderOptions& options);
   Status put_far(const RenderOptions& options);
   [[nodiscard]] int most_lamps() const { return light_.lamps.table == nullptr ? 0 : light_.lamps.table->longest; }
@@ -79,7 +76,7 @@ class PicturePass {
   DeviceLight light_;
   const Scene* content_;
   const PictureImpl* target_ = nullptr;  // null: what is drawn is read
-  std::vector<Place> places_;
+  Places places_;
   ShaderFrame frame_;
   std::uint64_t frame_address_ = 0;
   std::int32_t tile_edge_ = 0;

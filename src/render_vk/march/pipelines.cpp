@@ -100,28 +100,13 @@ Pipelines::~Pipelines() {
 }
 
 VkResult Pipelines::make(Pass pass) {
-  const Api& api = device_->api();
-  auto info = info_of<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
-  info.layout = layout_;
-  info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
-  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
-  info.stage.pName = "main";
   // Passes of one shader differ in its constants.
   const bool is_second = pass == Pass::LightWithGlass || pass == Pass::LightWithGlassAndFields ||
                          pass == Pass::LightWithFieldGlass || pass == Pass::FarFaces;
   const bool has_field_glass = is_of_field_glass(pass);
-  const std::array<VkBool32, 3> values{is_second, is_of_fields(pass) || has_field_glass, has_field_glass};
-  constexpr std::array kEntries = {VkSpecializationMapEntry{0, 0, sizeof(VkBool32)},
-                                   VkSpecializationMapEntry{4, sizeof(VkBool32), sizeof(VkBool32)},
-                                   VkSpecializationMapEntry{6, 2 * sizeof(VkBool32), sizeof(VkBool32)}};
-  const VkSpecializationInfo constants{kEntries.size(), kEntries.data(), sizeof values, values.data()};
-  info.stage.pSpecializationInfo = &constants;
-  VkResult result = make_shader(*device_, code_of(pass), info.stage.module);
-  if (result != VK_SUCCESS) return result;
-  result = api.vkCreateComputePipelines(device_->handle(), VK_NULL_HANDLE, 1, &info, nullptr,
-                                        &pipelines_[static_cast<std::size_t>(pass)]);
-  api.vkDestroyShaderModule(device_->handle(), info.stage.module, nullptr);
-  return result;
+  const std::array constants = {ShaderConstant{0, is_second}, ShaderConstant{4, is_of_fields(pass) || has_field_glass},
+                                ShaderConstant{6, has_field_glass}};
+  return make_compute_pipeline(*device_, layout_, code_of(pass), constants, pipelines_[static_cast<std::size_t>(pass)]);
 }
 
 void Pipelines::dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const {

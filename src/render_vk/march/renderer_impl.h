@@ -41,7 +41,9 @@ struct VulkanRenderer::Impl {
 
   /// Null: there is none.
   void look_at(const Scene* updated, InstanceFilter filter) {
-    if (chooser == nullptr || updated != voxels) chooser = std::make_unique<DetailChooser>();
+    const ChangeCursor before = std::exchange(at_update, updated != nullptr ? updated->cursor() : ChangeCursor{});
+    const bool is_same = updated == voxels && before.is_beside(at_update);
+    if (chooser == nullptr || !is_same) chooser = std::make_unique<DetailChooser>();
     voxels = updated;
     instances = filter;
     lamps.update();
@@ -59,6 +61,7 @@ struct VulkanRenderer::Impl {
   vulkan::DeviceDetail detail;
   /// What levels of detail are made of, as of the last update: null where there was none.
   const Scene* voxels = nullptr;
+  ChangeCursor at_update;  ///< of it: where one scene was another may be by now
   InstanceFilter instances = InstanceFilter::Visible;
   std::unique_ptr<DetailChooser> chooser;  // for that scene
   /// What lamps light, sent to the device when it is another than before.

@@ -7,7 +7,6 @@
 
 #include "render/path/denoise.h"
 #include "render/path/path_request.h"
-#include "render/path/pixel_sums.h"
 #include "render_vk/march/renderer_impl.h"
 #include "render_vk/paths/path_data.h"
 

@@ -57,27 +57,6 @@ void put_options(const Camera& camera, const PathOptions& options, DVec3 from, S
 
 }  // namespace
 
-PathPass::~PathPass() {
-  renderer_->memory.discard();
-  for (Place& place : places_) renderer_->memory.release(place);
-}
-
-Status PathPass::reserve(std::size_t bytes, std::uint64_t& address) {
-  const auto place = renderer_->memory.allocate(bytes, kDoing);
-  if (!place) return place.error();
-  places_.push_back(*place);
-  address = place->address;
-  return {};
-}
-
-template <class T>
-Status PathPass::upload(const std::vector<T>& values, std::uint64_t& address) {
-  const auto bytes = std::as_bytes(std::span(values));
-  if (bytes.empty()) return {};
-  if (Status done = reserve(bytes.size(), address); !done) return done;
-  return renderer_->memory.write(places_.back(), bytes);
-}
-
 Status PathPass::put_lamps(DVec3 view_origin, ShaderPathFrame& paths) {
   if (renderer_->voxels == nullptr) return {};
   const auto lamps = renderer_->paths->tables.lamps(renderer_->scene.placement(), picture_->options.lamp_brightness);
@@ -85,11 +64,11 @@ Status PathPass::put_lamps(DVec3 view_origin, ShaderPathFrame& paths) {
   const LampTables tables = lamp_tables(*lamps, view_origin);
   paths.lamp_count = static_cast<std::uint32_t>(tables.lamps.size());
   paths.face_mask = static_cast<std::uint32_t>(tables.face_lamps.size() - 1);
-  Status done = upload(tables.lamps, paths.lamps);
-  if (done) done = upload(tables.nodes, paths.lamp_nodes);
-  if (done) done = upload(tables.ways, paths.lamp_ways);
-  if (done) done = upload(tables.face_keys, paths.face_keys);
-  if (done) done = upload(tables.face_lamps, paths.face_lamps);
+  Status done = places_.upload(tables.lamps, paths.lamps);
+  if (done) done = places_.upload(tables.nodes, paths.lamp_nodes);
+  if (done) done = places_.upload(tables.ways, paths.lamp_ways);
+  if (done) done = places_.upload(tables.face_keys, paths.face_keys);
+  if (done) done = places_.upload(tables.face_lamps, paths.face_lamps);
   return done;
 }
 
@@ -110,8 +89,8 @@ Status PathPass::put_tile_buffers(ShaderFrame& frame, ShaderPathFrame& paths) {
   frame.counters = counters_.address();
   paths.sums = picture_->sums.address();
   if (picture_->parts.size() > 0) paths.parts = picture_->parts.address();
-  Status done = reserve(pixels * kPathStateBytes, paths.states);
-  if (done && has_glass) done = reserve(pixels * kBodies * kBodyBytes, frame.bodies);
+  Status done = places_.reserve(pixels * kPathStateBytes, paths.states);
+  if (done && has_glass) done = places_.reserve(pixels * kBodies * kBodyBytes, frame.bodies);
   return done;
 }
 
@@ -138,12 +117,12 @@ Status PathPass::put_frame() {
   frame.surfaces = renderer_->paths->tables.surfaces_address();
   frame.last_surface = renderer_->paths->tables.last_surface();
   done = put_lamps(view_origin, paths);
-  if (done) done = upload(data.placed, frame.placed);
-  if (done) done = upload(data.tree, frame.tree);
-  if (done) done = upload(data.leaves, frame.leaves);
+  if (done) done = places_.upload(data.placed, frame.placed);
+  if (done) done = places_.upload(data.tree, frame.tree);
+  if (done) done = places_.upload(data.leaves, frame.leaves);
   if (done) done = put_tile_buffers(frame, paths);
-  if (done) done = upload(std::vector<ShaderPathFrame>{paths}, frame.paths);
-  if (done) done = upload(std::vector<ShaderFrame>{frame}, frame_address_);
+  if (done) done = places_.upload(std::vector<ShaderPathFrame>{paths}, frame.paths);
+  if (done) done = places_.upload(std::vector<ShaderFrame>{frame}, frame_address_);
   if (done) done = renderer_->memory.flush();
   return done;
 }
@@ -225,7 +204,7 @@ Status PathPass::draw(int samples, const Progress& progress) {
 }  // namespace vulkan
 
 Status VulkanRenderer::draw_paths(VulkanPathPicture& picture, const Camera& camera, const PathOptions& options,
-                                  Accumulation accumulation, Threads, const Progress& progress) {
+                                  Accumulation accumulation, const Progress& progress) {
   constexpr int kMaxSamples = 65'536;
   if (Status status = path::check(camera, options); !status) return status;
   vulkan::PathPictureImpl& target = vulkan::Access::of(picture);
@@ -258,7 +237,7 @@ Status VulkanRenderer::draw_paths(VulkanPathPicture& picture, const Camera& came
 Result<PathPicture> VulkanRenderer::render_paths(const Camera& camera, const PathOptions& options, Threads threads,
                                                  const Progress& progress) {
   VulkanPathPicture picture(*this);
-  if (Status done = draw_paths(picture, camera, options, Accumulation::Restart, threads, progress); !done) {
+  if (Status done = draw_paths(picture, camera, options, Accumulation::Restart, progress); !done) {
     return done.error();
   }
   return picture.read(threads);

@@ -29,8 +29,8 @@ struct PathScene {
 ///   ended
 class PathPass {
  public:
-  PathPass(RendererImpl& renderer, PathPictureImpl& picture) : renderer_(&renderer), picture_(&picture) {}
-  ~PathPass();
+  PathPass(RendererImpl& renderer, PathPictureImpl& picture)
+      : renderer_(&renderer), picture_(&picture), places_(renderer.memory, "drawing by paths") {}
   PathPass(const PathPass&) = delete;
   PathPass& operator=(const PathPass&) = delete;
 
@@ -41,18 +41,15 @@ class PathPass {
   struct Tile {
     std::int32_t x, y, width, height;
   };
-  template <class T>
-  Status upload(const std::vector<T>& values, std::uint64_t& address);
-  Status reserve(std::size_t bytes, std::uint64_t& address);
   Status put_frame();
   Status put_lamps(DVec3 view_origin, ShaderPathFrame& paths);
   Status put_tile_buffers(ShaderFrame& frame, ShaderPathFrame& paths);
   Status add_samples(int samples, const Progress& progress);
-  Status take(const Tile& tile, int first, int count, const Progress& progress, double done);
+  Status take(const Tile& tile, int first, int count, const Progress& progress, double done_before);
 
   RendererImpl* renderer_;
   PathPictureImpl* picture_;
-  std::vector<Place> places_;
+  Places places_;
   std::uint64_t frame_address_ = 0;
   std::int32_t tile_edge_ = 0;
   Buffer counters_;  // on the device

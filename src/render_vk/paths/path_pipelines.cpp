@@ -36,24 +36,10 @@ std::size_t PathPipelines::variant_of(const Placement& placement) {
 Status PathPipelines::prepare(const Placement& placement) {
   const std::size_t variant = variant_of(placement);
   if (pipelines_[variant] != VK_NULL_HANDLE) return {};
-  const Api& api = device_->api();
-  auto info = info_of<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
-  info.layout = layout_;
-  info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
-  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
-  info.stage.pName = "main";
-  const std::array<VkBool32, 3> values{(variant & kGlass) != 0, (variant & (kFields | kFieldGlass)) != 0,
-                                       (variant & kFieldGlass) != 0};
-  constexpr std::array kEntries = {VkSpecializationMapEntry{0, 0, sizeof(VkBool32)},
-                                   VkSpecializationMapEntry{4, sizeof(VkBool32), sizeof(VkBool32)},
-                                   VkSpecializationMapEntry{6, 2 * sizeof(VkBool32), sizeof(VkBool32)}};
-  const VkSpecializationInfo constants{kEntries.size(), kEntries.data(), sizeof values, values.data()};
-  info.stage.pSpecializationInfo = &constants;
-  VkResult result = make_shader(*device_, kPaths, info.stage.module);
-  if (result == VK_SUCCESS) {
-    result = api.vkCreateComputePipelines(device_->handle(), VK_NULL_HANDLE, 1, &info, nullptr, &pipelines_[variant]);
-    api.vkDestroyShaderModule(device_->handle(), info.stage.module, nullptr);
-  }
+  const std::array constants = {ShaderConstant{0, (variant & kGlass) != 0},
+                                ShaderConstant{4, (variant & (kFields | kFieldGlass)) != 0},
+                                ShaderConstant{6, (variant & kFieldGlass) != 0}};
+  const VkResult result = make_compute_pipeline(*device_, layout_, kPaths, constants, pipelines_[variant]);
   return device_->check(result, "compiling shaders");
 }
 

@@ -280,7 +280,7 @@ TEST_F(VulkanPaths, RefuseWhatTheProcessorRefuses) {
   EXPECT_EQ(renderer_->draw_paths(picture, of_town(), options, Accumulation::Continue).error().code,
             ErrorCode::LimitExceeded);
   const auto stop = [](double) { return false; };
-  EXPECT_EQ(renderer_->draw_paths(picture, of_town(), small(1), Accumulation::Continue, {}, stop).error().code,
+  EXPECT_EQ(renderer_->draw_paths(picture, of_town(), small(1), Accumulation::Continue, stop).error().code,
             ErrorCode::Cancelled);
   EXPECT_EQ(picture.samples(), 0);
 }

@@ -101,6 +101,7 @@ struct VulkanMeshRenderer::Impl {
   vulkan::MeshStore store;
   vulkan::LevelMeshes levels;
   const Scene* scene = nullptr;
+  ChangeCursor at_update;  // of it
   InstanceFilter shown = InstanceFilter::Visible;
   std::vector<vulkan::MeshInstance> instances;  // in the order of their handles; voxels, then the field
   vulkan::Place surfaces;
@@ -127,7 +128,8 @@ Status VulkanMeshRenderer::update(const Scene& scene, InstanceFilter filter) {
 }
 
 void VulkanMeshRenderer::Impl::place(const Scene& of_scene, InstanceFilter filter) {
-  if (scene != &of_scene) levels.clear();
+  const ChangeCursor before = std::exchange(at_update, of_scene.cursor());
+  if (scene != &of_scene || !before.is_beside(at_update)) levels.clear();
   scene = &of_scene;
   shown = filter;
   instances.clear();
@@ -189,7 +191,9 @@ Status VulkanMeshRenderer::Impl::check_request(const vulkan::PictureImpl& target
   if (target.device != device) return refuse("vulkan: the picture is of another renderer than the meshes");
   const bool needs_voxels =
       options.detail.policy.has_value() || traces_light(options.light) || has_glass_by_rays(options);
-  if (needs_voxels && scene != nullptr && (renderer->voxels != scene || renderer->instances != shown)) {
+  const bool has_voxels =
+      renderer->voxels == scene && renderer->at_update.is_beside(at_update) && renderer->instances == shown;
+  if (needs_voxels && scene != nullptr && !has_voxels) {
     return refuse(
         "vulkan: shadows, lamps, glass by rays and levels of detail need VulkanRenderer::update with the scene of the "
         "meshes");

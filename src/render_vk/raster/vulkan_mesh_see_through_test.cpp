@@ -1,5 +1,7 @@
 // Glass by rays: what a fragment of it shows is what the marched picture shows.
 
+#include <optional>
+
 #include <glm/gtc/quaternion.hpp>
 
 #include "render_vk/lakeside_for_tests.h"
@@ -120,6 +122,22 @@ TEST_F(VulkanMeshSeeThrough, SeamsBetweenQuadsDoNotShow) {
   const Image single = drawn(camera, mesh_options(options));
   put(scene, blocky_surfaces(scene, true));
   EXPECT_EQ(bytes_that_differ(single, drawn(camera, mesh_options(options)), 2), 0);
+}
+
+// Another scene where one was before is none that the renderer knows.
+TEST_F(VulkanMeshSeeThrough, ItTellsScenesApartThatStandInTheSamePlace) {
+  std::optional<Scene> scene(glass_yard());
+  ASSERT_TRUE(renderer_->update(*scene));
+  ASSERT_TRUE(meshes_->update(*scene));
+  ASSERT_TRUE(meshes_->put(blocky_surfaces(*scene)));
+  VulkanPicture picture(*renderer_);
+  const MeshPictureOptions options = mesh_options(glass_yard_options(32, 32));
+  EXPECT_TRUE(meshes_->draw(picture, over_glass_yard(), options));
+  scene.emplace(glass_yard());
+  ASSERT_TRUE(meshes_->update(*scene));
+  ASSERT_TRUE(meshes_->put(blocky_surfaces(*scene)));
+  EXPECT_EQ(meshes_->draw(picture, over_glass_yard(), options).error().code, ErrorCode::InvalidArgument);
+  meshes_->clear();
 }
 
 TEST_F(VulkanMeshSeeThrough, ItNeedsTheVoxelsOfTheSceneWhereThereIsGlass) {

@@ -19,26 +19,8 @@ layout(push_constant) uniform Push {
   uint far_groups;
 } push;
 
-layout(local_size_x = 8, local_size_y = 8) in;
+#include "tile.glsl"
 
-Frame frame() {
-  return Frame(push.frame_address);
-}
-
-bool has(uint flag) {
-  return (frame().flags & flag) != 0;
-}
-
-// The invocation's place in the tile, and in the buffers of a tile.
-ivec2 tile_pixel() {
-  return ivec2(gl_GlobalInvocationID.xy);
-}
-bool is_in_tile() {
-  return all(lessThan(tile_pixel(), push.size));
-}
-uint slot_of_pixel() {
-  return gl_GlobalInvocationID.y * uint(push.size.x) + gl_GlobalInvocationID.x;
-}
 // Its place where the picture comes together.
 uint place_of_pixel() {
   return push.base + gl_GlobalInvocationID.y * push.pitch + gl_GlobalInvocationID.x;

@@ -133,28 +133,13 @@ layout(push_constant) uniform Push {
   uint width;    // of the picture
 } push;
 
-layout(local_size_x = 8, local_size_y = 8) in;
+#include "tile.glsl"
 
-Frame frame() {
-  return Frame(push.frame_address);
-}
 PathFrame path_frame() {
   return PathFrame(frame().paths);
 }
-bool has(uint flag) {
-  return (frame().flags & flag) != 0;
-}
 bool has_path(uint flag) {
   return (path_frame().flags & flag) != 0;
-}
-ivec2 tile_pixel() {
-  return ivec2(gl_GlobalInvocationID.xy);
-}
-bool is_in_tile() {
-  return all(lessThan(tile_pixel(), push.size));
-}
-uint slot_of_pixel() {
-  return gl_GlobalInvocationID.y * uint(push.size.x) + gl_GlobalInvocationID.x;
 }
 uint place_of_pixel() {
   ivec2 pixel = push.corner + tile_pixel();
