@@ -14,7 +14,6 @@
 namespace quoin::path {
 namespace {
 
-constexpr int kMaxPathSamples = 65'536;
 constexpr int kMaxBounces = 1'024;
 
 Status refuse(const std::string& message) {

@@ -11,6 +11,9 @@
 
 namespace quoin::path {
 
+/// Of a pixel.
+inline constexpr int kMaxPathSamples = 65'536;
+
 /// What PathTracer::render refuses. Requires: the camera's axes are perpendicular.
 [[nodiscard]] Status check(const Camera& camera, const PathOptions& options);
 

@@ -1,14 +1,6 @@
 #include <quoin/render/path_tracer.h>
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
 #include <mutex>
-#include <string>
-
-#include <glm/geometric.hpp>
-
-#include <quoin/core/assert.h>
 
 #include "core/moved_from.h"
 #include "light/surfaces.h"
@@ -21,6 +13,7 @@
 #include "scene/tracer/scene_view.h"
 
 namespace quoin {
+
 struct PathTracer::Impl {
   Impl(const Scene& of_scene, InstanceFilter filter, Threads threads)
       : scene(&of_scene), tracer(of_scene, filter, threads), surfaces(of_scene.types, Clouds::Scatter) {}

@@ -250,16 +250,20 @@ bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b)
   return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(ShaderGrid)) == 0);
 }
 
-std::vector<Vec4> surface_table(const VoxelRegistry& types) {
+void add_surface(const Surface& surface, float last, std::vector<Vec4>& table) {
   // A product with an infinite logarithm is not sure to be a number on every device.
   constexpr float kLeast = -1e30F;
+  table.emplace_back(surface.colour, std::max(surface.log_clarity, kLeast));
+  table.emplace_back(surface.emitted, surface.ior);
+  table.emplace_back(glm::max(surface.log_transmittance, Vec3(kLeast)), last);
+}
+
+std::vector<Vec4> surface_table(const VoxelRegistry& types) {
   const Surfaces surfaces(types);
   std::vector<Vec4> table;
   for (std::size_t type = 0; type <= types.size(); ++type) {
     const Surface& surface = surfaces[static_cast<VoxelType>(std::min(type, kMaxVoxelTypes))];
-    table.emplace_back(surface.colour, std::max(surface.log_clarity, kLeast));
-    table.emplace_back(surface.emitted, surface.ior);
-    table.emplace_back(glm::max(surface.log_transmittance, Vec3(kLeast)), 0.0F);
+    add_surface(surface, 0.0F, table);
   }
   return table;
 }

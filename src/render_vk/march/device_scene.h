@@ -11,6 +11,7 @@
 
 #include "light/lamp_table.h"
 #include "light/surface/light_bricks.h"
+#include "light/surfaces.h"
 #include "render/impostor/raster/faces.h"
 #include "render_vk/device/memory.h"
 #include "render_vk/trees/device_grid.h"
@@ -54,6 +55,8 @@ struct Placement {
 [[nodiscard]] Status put_table(DeviceMemory& memory, Place& place, std::span<const std::byte> bytes);
 [[nodiscard]] bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b);
 
+/// Adds what a type looks like, as shaders have it: three vectors, the last of whose numbers is `last`.
+void add_surface(const Surface& surface, float last, std::vector<Vec4>& table);
 /// What types look like, as shaders/data.glsl has it: three vectors each, and those of types beyond the last.
 [[nodiscard]] std::vector<Vec4> surface_table(const VoxelRegistry& types);
 

@@ -30,10 +30,6 @@ std::int32_t tile_edge(const RenderOptions& options, int lamps, bool has_glass, 
   return edge;
 }
 
-std::int64_t rays_in(const ShaderCounters& counters) {
-  return static_cast<std::int64_t>(counters.rays_low | std::uint64_t{counters.rays_high} << 32);
-}
-
 const std::vector<float>& thresholds() {
   static const std::vector<float> shared = srgb_thresholds();
   return shared;
@@ -258,7 +254,7 @@ Result<Picture> PicturePass::render(const Camera& camera, const RenderOptions& o
   ShaderCounters counters;
   if (done) done = read_counters(counters);
   if (!done) return done.error();
-  picture.rays = rays_in(counters);
+  picture.rays = counters.rays();
   picture.pixels_hit = counters.hits;
   return picture;
 }
@@ -314,7 +310,7 @@ Status PicturePass::draw(PictureImpl& picture, const Camera& camera, const Rende
   if (done) done = read_counters(counters);
   // Sums to which not every tile was added are of no use.
   picture.samples = done ? all.samples : 0;
-  picture.rays = done ? picture.rays + rays_in(counters) : 0;
+  picture.rays = done ? picture.rays + counters.rays() : 0;
   return done;
 }
 

@@ -4,28 +4,18 @@
 #include <span>
 #include <utility>
 
-#include <glm/common.hpp>
-
 #include "render/path/scatter.h"
 
 namespace quoin::vulkan {
 namespace {
 
-Vec4 to_vec4(Vec3 v, float w = 0.0F) {
-  return {v, w};
-}
-
 // What types look like by paths: four vectors each, and those of types beyond the last.
 std::vector<Vec4> path_surface_table(const Surfaces& surfaces, std::size_t types) {
-  // A product with an infinite logarithm is not sure to be a number on every device.
-  constexpr float kLeast = -1e30F;
   std::vector<Vec4> table;
   table.reserve(4 * (types + 1));
   for (std::size_t type = 0; type <= types; ++type) {
     const Surface& surface = surfaces[static_cast<VoxelType>(std::min(type, kMaxVoxelTypes))];
-    table.push_back(to_vec4(surface.colour, std::max(surface.log_clarity, kLeast)));
-    table.push_back(to_vec4(surface.emitted, surface.ior));
-    table.push_back(to_vec4(glm::max(surface.log_transmittance, Vec3(kLeast)), surface.roughness));
+    add_surface(surface, surface.roughness, table);
     table.emplace_back(surface.metalness, surface.scattering, surface.anisotropy, 0.0F);
   }
   return table;
@@ -95,9 +85,9 @@ Status DevicePaths::try_put(DeviceMemory& memory, const PathOptions& options, Sh
   if (!done) return done;
   frame.gloss = gloss_.address;
   frame.sky_model = static_cast<std::int32_t>(sky_->model());
-  frame.to_sun = to_vec4(sky_->to_sun(), sky_->one_less_cos());
-  frame.sunlight = to_vec4(sky_->sun_irradiance(), options.sun_is_seen ? 1.0F : 0.0F);
-  frame.sky = to_vec4(sky_->uniform(), sky_->brightness());
+  frame.to_sun = Vec4(sky_->to_sun(), sky_->one_less_cos());
+  frame.sunlight = Vec4(sky_->sun_irradiance(), options.sun_is_seen ? 1.0F : 0.0F);
+  frame.sky = Vec4(sky_->uniform(), sky_->brightness());
   frame.sky_pixels = sky_pixels_.address;
   if (const path::EnvironmentLight* const image = sky_->image(); image != nullptr) {
     frame.sky_width = image->image().width;
@@ -141,18 +131,18 @@ LampTables lamp_tables(const path::PathLamps& lamps, DVec3 view_origin) {
   tables.lamps.reserve(lamps.size());
   for (const path::PathLamp& from : lamps.lamps()) {
     ShaderPathLamp& lamp = tables.lamps.emplace_back();
-    lamp.corner = to_vec4(Vec3(from.corner - view_origin), from.is_point ? from.reach : 0.0F);
-    lamp.u = to_vec4(from.u, from.size_u);
-    lamp.v = to_vec4(from.v, from.size_v);
-    lamp.normal = to_vec4(from.normal, from.cos_inner);
-    lamp.radiance = to_vec4(from.radiance, from.cos_outer);
+    lamp.corner = Vec4(Vec3(from.corner - view_origin), from.is_point ? from.reach : 0.0F);
+    lamp.u = Vec4(from.u, from.size_u);
+    lamp.v = Vec4(from.v, from.size_v);
+    lamp.normal = Vec4(from.normal, from.cos_inner);
+    lamp.radiance = Vec4(from.radiance, from.cos_outer);
   }
   const Vec3 to_view(lamps.origin() - view_origin);
   for (const path::LightTree::Node& from : lamps.tree().nodes()) {
     ShaderLampNode& node = tables.nodes.emplace_back();
-    node.low = to_vec4(from.bounds.low + to_view, from.bounds.power);
-    node.high = to_vec4(from.bounds.high + to_view, from.bounds.cos_spread);
-    node.axis = to_vec4(from.bounds.axis, from.bounds.cos_edge);
+    node.low = Vec4(from.bounds.low + to_view, from.bounds.power);
+    node.high = Vec4(from.bounds.high + to_view, from.bounds.cos_spread);
+    node.axis = Vec4(from.bounds.axis, from.bounds.cos_edge);
     node.next = {from.second, from.lamp, 0, 0};
   }
   tables.ways.assign(lamps.tree().ways().begin(), lamps.tree().ways().end());

@@ -57,6 +57,9 @@ void put_options(const Camera& camera, const PathOptions& options, DVec3 from, S
 
 }  // namespace
 
+PathPass::PathPass(RendererImpl& renderer, PathPictureImpl& picture)
+    : renderer_(&renderer), picture_(&picture), places_(renderer.memory, kDoing) {}
+
 Status PathPass::put_lamps(DVec3 view_origin, ShaderPathFrame& paths) {
   if (renderer_->voxels == nullptr) return {};
   const auto lamps = renderer_->paths->tables.lamps(renderer_->scene.placement(), picture_->options.lamp_brightness);
@@ -197,7 +200,7 @@ Status PathPass::draw(int samples, const Progress& progress) {
   ShaderCounters counters;
   std::memcpy(&counters, results_.mapped(), sizeof counters);
   picture_->samples += samples;
-  picture_->rays += static_cast<std::int64_t>(counters.rays_low | std::uint64_t{counters.rays_high} << 32);
+  picture_->rays += counters.rays();
   return done;
 }
 
@@ -205,7 +208,6 @@ Status PathPass::draw(int samples, const Progress& progress) {
 
 Status VulkanRenderer::draw_paths(VulkanPathPicture& picture, const Camera& camera, const PathOptions& options,
                                   Accumulation accumulation, const Progress& progress) {
-  constexpr int kMaxSamples = 65'536;
   if (Status status = path::check(camera, options); !status) return status;
   vulkan::PathPictureImpl& target = vulkan::Access::of(picture);
   if (target.device != impl_->device.get()) {
@@ -219,7 +221,7 @@ Status VulkanRenderer::draw_paths(VulkanPathPicture& picture, const Camera& came
   as_before.samples = target.options.samples;
   QUOIN_ASSERT(target.camera == camera, "a picture's samples are of one camera");
   QUOIN_ASSERT(target.options == as_before, "a picture's samples are of the same options");
-  if (target.samples + options.samples > kMaxSamples) {
+  if (target.samples + options.samples > path::kMaxPathSamples) {
     return make_error(ErrorCode::LimitExceeded, "vulkan: a picture by paths has 65,536 samples a pixel at most");
   }
   if (impl_->paths == nullptr) {

@@ -29,8 +29,7 @@ struct PathScene {
 ///   ended
 class PathPass {
  public:
-  PathPass(RendererImpl& renderer, PathPictureImpl& picture)
-      : renderer_(&renderer), picture_(&picture), places_(renderer.memory, "drawing by paths") {}
+  PathPass(RendererImpl& renderer, PathPictureImpl& picture);
   PathPass(const PathPass&) = delete;
   PathPass& operator=(const PathPass&) = delete;
 

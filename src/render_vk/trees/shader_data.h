@@ -149,6 +149,10 @@ struct ShaderCounters {
   std::uint32_t rays_high = 0;
   std::uint32_t hits = 0;
   std::uint32_t pending = 0;
+
+  [[nodiscard]] std::int64_t rays() const {
+    return static_cast<std::int64_t>(rays_low | std::uint64_t{rays_high} << 32);
+  }
 };
 
 struct ShaderFrame {

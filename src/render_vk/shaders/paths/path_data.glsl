@@ -78,12 +78,12 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Ke
 struct PathState {
   ivec4 voxel;      // where its next ray begins, of an instance's tree; w: the instance, -1: `inside` is in view
   vec4 inside;      // from the voxel's lower corner; w: the density with which its direction was found
-  vec4 direction;   // in the world, unit; w: how much of `u_left` glass took of it
-  vec4 throughput;  // w: where bodies of glass are still to be looked for
+  vec4 direction;   // in the world, unit; w: the number by which glass that is still ahead is met; -1: a new one
+  vec4 throughput;  // w: from where on bodies of glass are still to be looked for
   vec4 radiance;
   vec4 normal;      // in the world, where it was last scattered
   uvec4 counts;     // sample, dimension, bounces | scatterings << 16, flags
-  uvec4 more;       // type of glass within, part, fog's number is taken; samples that are done
+  uvec4 more;       // the type of glass within, the part of the pixel's surfaces; zw: nothing
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer PathStates {
   PathState at[];

@@ -1,0 +1,191 @@
+// Glass and clouds on a path's way: render/path/path_tile_media.cpp on the processor's side. Included by paths.comp
+// once it knows of paths, vertices and rays.
+
+// Of a surface between two media: what is mirrored, and the cosine of what gets through.
+vec2 refraction(float cosine, float eta) {
+  float sine2 = eta * eta * max(0.0, 1.0 - cosine * cosine);
+  if (sine2 >= 1.0) return vec2(1.0, 0.0);
+  float inner = sqrt(1.0 - sine2);
+  float across = (eta * cosine - inner) / (eta * cosine + inner);
+  float in_plane = (cosine - eta * inner) / (cosine + eta * inner);
+  return vec2(0.5 * (across * across + in_plane * in_plane), inner);
+}
+
+bool is_begun(Body body) {
+  return (body.what.z & kStartsInside) != 0;
+}
+float length_of(Surface surface, Body body) {
+  return max(body.lengths.z, has_own_length(body) ? 0.0 : 1.0);
+}
+
+// Where a ray is in an instance at `t`: voxel and place within.
+void place_along(int instance, ViewRay ray, float t, out ivec4 voxel, out vec3 inside) {
+  GridRay in_grid = ray_in(instance, path.voxel, path.inside.xyz, ray);
+  vec3 at = in_grid.origin + t * in_grid.direction;
+  vec3 whole = floor(at);
+  voxel = ivec4(in_grid.base + ivec3(whole), instance);
+  inside = at - whole;
+}
+
+vec3 normal_entered(Body body) {
+  bool in_field = kHasFieldGlass && (body.what.z & kBeginsInField) != 0;
+  return in_field ? normal_of(body.what.y) : face_normal(body.what.y);
+}
+
+// What a path comes to by glass and air: each is done in one place, since compilers copy functions.
+struct Glass {
+  uint outcome;
+  Body body;
+  // kTurnsAtGlass: where, and on which side of the surface the path goes on.
+  int instance;
+  float t;
+  vec3 direction;
+  vec3 normal;  // in the instance's grid
+  uint within;
+  // kInAir, with t.
+  vec3 colour;
+  float anisotropy;
+};
+
+// Sends a path on from a surface of glass.
+uint turn_at(Glass glass, ViewRay ray) {
+  ivec4 voxel;
+  vec3 inside;
+  place_along(glass.instance, ray, glass.t, voxel, inside);
+  path.voxel = voxel;
+  path.inside = vec4(inside + glass.normal * frame().lift, kInfinity);
+  path.direction = vec4(normalize(glass.direction), -1.0);
+  path.throughput.w = -kNever;
+  path.more.x = glass.within;
+  path.counts.y += kDimensions;
+  path.counts.w &= ~kIsFirst;
+  if (path.counts.y > kDimensions * (kMostGlass + 2 * bounces() + 2 * scatterings())) path.throughput.xyz = vec3(0.0);
+  return kTurns;
+}
+
+uint hit_glass(Body body, ViewRay ray) {
+  Surface surface = surface_of(body.what.x);
+  bool in_field = kHasFieldGlass && (body.what.z & kBeginsInField) != 0;
+  ivec4 voxel;
+  vec3 inside;
+  place_along(body.voxel.w, ray, body.lengths.x, voxel, inside);
+  inside += vec3(voxel.xyz - body.voxel.xyz);
+  if (!in_field) inside = put_on_face(inside, body.what.y);
+  vertex.is_ground = vertex.is_medium = false;
+  put_on_surface(body.voxel, inside, normal_entered(body));
+  vertex.colour = surface.colour;
+  vertex.roughness = 1.0;
+  vertex.metalness = 0.0;
+  count_scene();
+  note_layers(body.lengths.x + behind, body.what.x);
+  add_emitted(surface.emitted, -1, vec3(0.0), 0.0);
+  return kScatters;
+}
+
+// Somewhere in a cloud, if `u` is below the share of paths that are scattered there.
+void scatter_in(Body body, float u, inout Glass glass) {
+  Surface surface = surface_of(body.what.x);
+  float share = free_way(u, surface.scattering) / max(body.lengths.z, 1e-12);
+  glass.t = body.lengths.x + (body.lengths.y - body.lengths.x) * clamp(share, 0.0, 1.0);
+  glass.colour = surface.colour;
+  glass.anisotropy = surface.anisotropy;
+  glass.outcome = kInAir;
+}
+
+// A path that goes straight through a body: light from surface to surface, and all through clouds. By chance it meets
+// what covers the glass.
+void pass_through(Body body, inout float u, inout Glass glass) {
+  Surface surface = surface_of(body.what.x);
+  bool is_cloud = surface.scattering > 0.0;
+  float voxels = length_of(surface, body);
+  float cover = cover_of(surface, voxels);
+  if (u >= cover) {
+    u = min((u - cover) / (1.0 - cover), kAlmostOne);
+    if (!is(kIsSeen)) path.throughput.xyz *= tint_of(surface, voxels);
+    return;
+  }
+  glass.body = body;
+  if (is_cloud || is_begun(body)) add_emitted(surface.emitted, -1, vec3(0.0), 0.0);
+  if (is_cloud) {
+    scatter_in(body, u, glass);
+  } else {
+    glass.outcome = is_begun(body) ? kEnds : kOnGlass;  // from within it glows, no more
+  }
+}
+
+void enter_glass(Body body, inout Glass glass) {
+  Surface surface = surface_of(body.what.x);
+  float u = number(kOfGlass);
+  vec3 in_grid = normal_entered(body);
+  vec3 normal = turned(placed_at(body.voxel.w).view_axes, in_grid) / placed_at(body.voxel.w).ref_inside.w;
+  vec3 direction = path.direction.xyz;
+  float cosine = clamp(-dot(normal, direction), 1e-4, 1.0);
+  if (is(kIsFirst)) {
+    bool in_field = kHasFieldGlass && (body.what.z & kBeginsInField) != 0;
+    uint id = surface_id(voxel_of_grid(body.voxel), in_field ? 0 : body.what.y, in_field, body.voxel.w, body.what.x);
+    note_part(vec3(1.0), id, false, vec3(0.0), vec3(0.0));
+  }
+  float eta = 1.0 / surface.ior;
+  vec2 through = refraction(cosine, eta);
+  float cover = cover_of(surface, length_of(surface, body));
+  bool is_mirrored = u < through.x;
+  glass.outcome = kTurnsAtGlass;
+  glass.body = body;
+  glass.instance = body.voxel.w;
+  glass.t = body.lengths.x;
+  if (is_mirrored) {
+    glass.direction = direction + normal * (2.0 * cosine);
+    glass.normal = in_grid;
+    glass.within = 0;
+  } else if (u < through.x + (1.0 - through.x) * cover) {
+    glass.outcome = kOnGlass;
+  } else {
+    glass.direction = direction * eta + normal * (eta * cosine - through.y);
+    glass.normal = -in_grid;
+    glass.within = body.what.x;
+  }
+}
+
+// A path within glass: to where the body ends, or to what stands in it. `opaque_t`: where that is.
+void leave_glass(Body body, bool has_next, Body next, float opaque_t, inout Glass glass) {
+  Surface surface = surface_of(body.what.x);
+  path.throughput.xyz *= tint_of(surface, body.lengths.z);
+  int instance = int(body.what.w >> 3);
+  Placed placed = placed_at(instance);
+  bool touches = has_next && reaches(body, next.lengths.x);
+  // It lies on something opaque.
+  if (!touches && opaque_t <= body.lengths.y + frame().lift * placed.ref_inside.w) return;
+  float other = touches ? surface_of(next.what.x).ior : 1.0;
+  bool in_field = kHasFieldGlass && (body.what.z & kEndsInField) != 0;
+  vec3 in_grid = in_field ? normal_from_28(body.what.z >> kExitNormal) : face_normal(body.what.w & 7);
+  vec3 normal = turned(placed.view_axes, in_grid) / placed.ref_inside.w;
+  vec3 direction = path.direction.xyz;
+  if (dot(normal, direction) < 0.0) {
+    normal = -normal;
+    in_grid = -in_grid;
+  }
+  float cosine = clamp(dot(normal, direction), 1e-4, 1.0);
+  float eta = surface.ior / other;
+  vec2 through = refraction(cosine, eta);
+  bool is_mirrored = number(kOfGlass) < through.x;
+  glass.outcome = kTurnsAtGlass;
+  glass.instance = instance;
+  glass.t = body.lengths.y;
+  glass.direction =
+      is_mirrored ? direction - normal * (2.0 * cosine) : direction * eta + normal * (through.y - eta * cosine);
+  glass.normal = is_mirrored ? -in_grid : in_grid;
+  glass.within = is_mirrored ? body.what.x : touches ? next.what.x : 0;
+}
+
+// What is seen in glass, of the first body that is no cloud, and the one after it.
+void look_into(bool has_body, Body body, bool has_next, Body next, float opaque_t, inout Glass glass) {
+  bool is_within = has_body && is_begun(body) && (path.more.x == 0 || body.what.x == path.more.x);
+  if (is_within) {  // or the camera is in it
+    path.more.x = body.what.x;
+    leave_glass(body, has_next, next, opaque_t, glass);
+    return;
+  }
+  // Where it was in glass it came through a corner, or out by rounding.
+  path.more.x = 0;
+  if (has_body && !is_begun(body)) enter_glass(body, glass);
+}
