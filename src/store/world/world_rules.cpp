@@ -11,14 +11,6 @@ namespace {
 
 constexpr std::size_t kMaxValueBytes = std::size_t{64} << 20;
 
-VoxelProperties lost_type(std::int64_t number) {
-  VoxelProperties properties;
-  properties.name = "lost type " + std::to_string(number);
-  properties.colour = {255, 0, 255, 255};
-  properties.state_bits = kMaxStateBits;  // whatever its voxels hold is read
-  return properties;
-}
-
 // Types up to a number, those that are lost in between.
 Status fill_types(VoxelRegistry& types, std::int64_t number, std::vector<std::string>& damage) {
   while (static_cast<std::int64_t>(types.size()) < number) {
@@ -60,6 +52,14 @@ Status check_types(const ChunkPlace& place, const Chunk& chunk, const VoxelRegis
 }
 
 }  // namespace
+
+VoxelProperties lost_type(std::int64_t number) {
+  VoxelProperties properties;
+  properties.name = "lost type " + std::to_string(number);
+  properties.colour = {255, 0, 255, 255};
+  properties.state_bits = kMaxStateBits;  // whatever its voxels hold is read
+  return properties;
+}
 
 std::string about(const ChunkPlace& place) {
   std::string text = "chunk (";

@@ -29,6 +29,8 @@ struct WorldRules {
 /// Those of a world on disk. Types that are damaged become magenta ones, so that their voxels show; grids that are
 /// become nameless.
 [[nodiscard]] Result<WorldRules> read_rules(WorldReader& reader);
+/// What stands for a type that is lost: magenta, so that it shows.
+[[nodiscard]] VoxelProperties lost_type(std::int64_t number);
 /// "chunk (1, 2, 3) of grid 0".
 [[nodiscard]] std::string about(const ChunkPlace& place);
 /// As WorldStore::save says.

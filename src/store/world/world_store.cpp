@@ -1,12 +1,9 @@
 #include <quoin/store/world_store.h>
 
-#include <fcntl.h>
-#include <stdio.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
-#include <cerrno>
 #include <charconv>
 #include <mutex>
 #include <set>
@@ -54,22 +51,6 @@ Result<std::uint64_t> last_revision(WorldReader& reader) {
   return *body ? number_from(**body) : 0;
 }
 
-/// A new file, moved to a name at which there is none.
-Status move_to(const std::filesystem::path& from, const std::filesystem::path& to) {
-  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return {};
-  const int number = errno;
-  if (number == EINVAL || number == ENOSYS) {  // a file system that does not know it; the lock keeps others away
-    std::error_code error;
-    if (std::filesystem::exists(std::filesystem::symlink_status(to, error))) {
-      return make_error(ErrorCode::CannotWrite, "there is a file of that name");
-    }
-    std::filesystem::rename(from, to, error);
-    return error ? Status(make_error(ErrorCode::CannotWrite, error.message())) : Status();
-  }
-  if (number == EEXIST) return make_error(ErrorCode::CannotWrite, "there is a file of that name");
-  return make_error(ErrorCode::CannotWrite, std::generic_category().message(number));
-}
-
 Status make_database(const std::filesystem::path& path, const char* vfs) {
   auto connection = Connection::open(path.string(), Connection::Mode::Create, vfs);
   if (!connection) return connection.error();
@@ -79,44 +60,6 @@ Status make_database(const std::filesystem::path& path, const char* vfs) {
 }
 
 }  // namespace
-
-namespace store {
-
-Status begin_writing(Connection& connection, bool is_network) {
-  // Acknowledged is what is synced: NORMAL would lose commits when the power goes. Without a log the folder, from which
-  // the journal vanishes, is to be synced too; so also where the log begins: a journal that came back after a power cut
-  // would have the database forget that there is one.
-  if (auto done = connection.run("PRAGMA synchronous=EXTRA"); !done) return done;
-  if (is_network) return {};
-  const auto mode = connection.text("PRAGMA journal_mode=WAL");
-  if (!mode) return mode.error();
-  return *mode == "wal" ? connection.run("PRAGMA synchronous=FULL") : Status();
-}
-
-bool end_writing(Connection& connection) {
-  if (!connection.run("PRAGMA busy_timeout=0; PRAGMA synchronous=EXTRA")) return false;
-  const auto mode = connection.text("PRAGMA journal_mode=DELETE");
-  return mode && *mode == "delete";
-}
-
-Result<WorldReader> open_reader(const std::filesystem::path& path, const char* vfs) {
-  auto connection = Connection::open(path.string(), Connection::Mode::Read, vfs);
-  if (!connection) return connection.error();
-  auto sound = check_schema(*connection);
-  if (sound) return WorldReader(std::move(*connection));
-  // A folder that nobody can write to has no place for the memory that readers share; then there are no writers either.
-  const std::filesystem::path folder = path.parent_path();
-  std::error_code error;
-  const bool has_log = std::filesystem::exists(path.string() + "-wal", error);
-  const bool may_write = ::access(folder.empty() ? "." : folder.c_str(), W_OK) == 0;
-  if (sound.error().code != ErrorCode::CannotRead || has_log || may_write || vfs != nullptr) return sound.error();
-  auto alone = Connection::open(path.string(), Connection::Mode::ReadImmutable);
-  if (!alone) return alone.error();
-  if (auto done = check_schema(*alone); !done) return done.error();
-  return WorldReader(std::move(*alone));
-}
-
-}  // namespace store
 
 struct WorldStore::Impl {
   std::filesystem::path path;
@@ -220,14 +163,13 @@ Result<WorldStore> WorldParts::create(const std::filesystem::path& path, Threads
     remove_database(fresh);
     auto done = make_database(fresh, nullptr);
     if (done) {
-      remove_database(path);  // what another file of that name left beside it
-      done = move_to(fresh, path);
+      remove_database_log(path);  // what another file of that name left
+      done = move_in_place(fresh, path);
     }
     if (!done) {
       remove_database(fresh);
       return with_path(Result<WorldStore>(done.error()), path);
     }
-    sync_folder(path.parent_path());
   }
   return open(path, WorldAccess::Write, threads, nullptr);
 }

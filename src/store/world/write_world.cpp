@@ -1,7 +1,3 @@
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <cerrno>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -37,18 +33,8 @@ Status clear_log(const std::filesystem::path& path) {
       if (auto done = connection->close(); !done) return done;
     }
   }
-  std::error_code error;
-  for (const char* suffix : {"-wal", "-shm", "-journal"}) std::filesystem::remove(path.string() + suffix, error);
+  remove_database_log(path);
   return {};
-}
-
-Status sync_file(const std::filesystem::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  const bool done = descriptor >= 0 && ::fsync(descriptor) == 0;
-  const int number = errno;
-  if (descriptor >= 0) ::close(descriptor);
-  if (done) return {};
-  return make_error(ErrorCode::CannotWrite, "it cannot be written: " + std::generic_category().message(number));
 }
 
 /// A world that is made beside the name that it is to have; without `put_in_place` nothing is left of it.
@@ -69,7 +55,6 @@ class FreshWorld {
   [[nodiscard]] const std::filesystem::path& fresh() const { return fresh_; }
 
   Status put_in_place() {
-    if (auto done = sync_file(fresh_); !done) return done;
     std::error_code error;
     const auto status = std::filesystem::status(path_, error);
     if (std::filesystem::exists(status)) {
@@ -79,10 +64,7 @@ class FreshWorld {
       if (auto done = clear_log(path_); !done) return done;
       std::filesystem::permissions(fresh_, status.permissions(), error);
     }
-    std::filesystem::rename(fresh_, path_, error);
-    if (error) return make_error(ErrorCode::CannotWrite, error.message());
-    sync_folder(path_.parent_path());
-    return {};
+    return move_in_place(fresh_, path_, Existing::Replaced);
   }
 
  private:
@@ -115,15 +97,6 @@ Result<SavedScene> write(const Scene& scene, WorldView view, const std::filesyst
 }
 
 }  // namespace
-
-namespace store {
-
-void remove_database(const std::filesystem::path& path) {
-  std::error_code ignored;
-  for (const char* suffix : {"", "-wal", "-shm", "-journal"}) std::filesystem::remove(path.string() + suffix, ignored);
-}
-
-}  // namespace store
 
 // Errors name the file that was wanted, not the one beside it.
 Result<SavedScene> write_world(const Scene& scene, const std::filesystem::path& path, Threads threads,
