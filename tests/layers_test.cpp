@@ -31,7 +31,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/chunk/chunk_storage.h", {"live", "mesh", "render_vk", "store", "trace"}},
     {"grid/change_records.h", {"light"}},
     {"grid/density/cell_corners.h", {"mesh", "trace"}},
-    {"grid/density/density_storage.h", {"mesh", "trace"}},
+    {"grid/density/density_storage.h", {"mesh", "store", "trace"}},
     {"grid/density/stored_density.h", {"terrain"}},
     {"grid/long_box.h", {"live"}},
     {"io/scene_file/scene_parts.h", {"store"}},

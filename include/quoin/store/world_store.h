@@ -133,7 +133,7 @@ class WorldStore {
   /// failed; it must not call `wait` or `flush`. What failed is kept in memory, read by `load_chunk`, and tried again
   /// with the next save or `flush`.
   /// Errors: InvalidArgument, and nothing is saved: chunks with types, or of grids, that were never put; voxels' data
-  ///         with more state bits than their type has; a value of more than 64 MiB.
+  ///         with more state bits than their type has, or more than 64 MiB in one chunk; a value of more.
   /// Requires: open for writing.
   Result<SaveTicket> save(WorldChanges changes, std::function<void(const Status&)> on_saved = {});
   /// Waits until that save is on disk. Errors: CannotWrite (a full disk ...): it is not, but kept.

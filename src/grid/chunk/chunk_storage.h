@@ -46,6 +46,13 @@ struct ChunkStorage : RefCounted {
 
   /// Of a chunk; null when it is uniform.
   [[nodiscard]] static const ChunkStorage* of(const Chunk& chunk) { return chunk.storage_.get(); }
+  /// A chunk of these voxels. Requires: of two types at least; counts, layers and slabs agree with `words`.
+  [[nodiscard]] static Chunk chunk_of(Ref<ChunkStorage> storage) {
+    QUOIN_ASSERT(storage != nullptr && storage->used >= 2, "voxels of several types");
+    Chunk chunk;
+    chunk.storage_ = std::move(storage);
+    return chunk;
+  }
 
   [[nodiscard]] static std::size_t slab_index(int y, int z) {
     return static_cast<std::size_t>((z >> 2) * 16 + (y >> 2));

@@ -17,6 +17,13 @@ namespace quoin {
 struct DensityStorage : RefCounted {
   /// Of a chunk; null when it is uniform.
   [[nodiscard]] static const DensityStorage* of(const DensityChunk& chunk) { return chunk.storage_.get(); }
+  /// A chunk of these densities. Requires: of two at least; each a `stored_density`, `solid` agrees with them.
+  [[nodiscard]] static DensityChunk chunk_of(Ref<DensityStorage> storage, Chunk materials) {
+    DensityChunk chunk(Half{0});
+    chunk.storage_ = std::move(storage);
+    chunk.materials_ = std::move(materials);
+    return chunk;
+  }
 
   /// Makes solid samples as far out as they were in. `rows`: [z][y]: which; of solid ones only.
   static void turn_outward(DensityChunk& chunk, const std::array<std::uint64_t, kChunkEdge * kChunkEdge>& rows);

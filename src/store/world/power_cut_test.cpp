@@ -1,120 +1,18 @@
 // Power cuts, failing calls: what was acknowledged is there, and every save is there as a whole or not at all.
 
+#include <atomic>
 #include <cstdlib>
-#include <optional>
-#include <set>
 #include <string>
 
 #include <gtest/gtest.h>
 
-#include "store/world/connection.h"
 #include "store/world/disk_for_tests.h"
-#include "store/world/world_changes.h"
-#include "store/world/world_for_tests.h"
+#include "store/world/saves_for_tests.h"
 
 namespace quoin {
 namespace {
 
-using store::Connection;
-
 constexpr const char* kFile = "w.quoin";
-constexpr int kPlaces = 24;
-constexpr int kTypes = 200;
-
-/// What a world holds after so many saves: the type of each place's chunk; 0: none. Save i is save i whatever was
-/// before, so that any number of them can be replayed.
-struct Expected {
-  std::array<VoxelType, kPlaces> types{};
-  int saves = 0;
-};
-
-/// Save number `i` (from 1): a counter, and some chunks, of which one may go.
-template <class Put, class Remove>
-void each_of_save(int i, Put put, Remove remove) {
-  std::minstd_rand random(static_cast<unsigned>(i) * 7919U);
-  const unsigned count = 1 + random() % 5;
-  std::set<int> places;
-  while (places.size() < count) places.insert(static_cast<int>(random() % kPlaces));
-  bool may_remove = random() % 4 == 0;
-  for (const int place : places) {
-    if (may_remove) {
-      remove(place);
-    } else {
-      put(place, static_cast<VoxelType>(1 + (i * 13 + place) % kTypes));
-    }
-    may_remove = false;
-  }
-}
-
-void apply(Expected& expected, int i) {
-  each_of_save(
-      i, [&](int place, VoxelType type) { expected.types[static_cast<std::size_t>(place)] = type; },
-      [&](int place) { expected.types[static_cast<std::size_t>(place)] = kAir; });
-  expected.saves = i;
-}
-
-ChunkPlace place_of(int place) {
-  return {0, 0, {place % 5 - 2, place / 5, 31 + place % 3}};
-}
-
-// Several rows' worth of content, told apart by its type.
-Chunk content_of(VoxelType type) {
-  Chunk chunk(type);
-  for (int i = 0; i < 40; ++i) chunk.set(i, (i * type) % 64, (i * 5) % 64, kAir);
-  return chunk;
-}
-
-WorldChanges changes_of(int i) {
-  WorldChanges changes;
-  const std::string number = std::to_string(i);
-  const auto bytes = std::as_bytes(std::span(number));
-  changes.put_value("saves", {bytes.begin(), bytes.end()});
-  each_of_save(
-      i, [&](int place, VoxelType type) { changes.put_chunk(place_of(place), {content_of(type)}); },
-      [&](int place) { changes.remove_chunk(place_of(place)); });
-  return changes;
-}
-
-Result<WorldStore> create_on(const TestDisk& disk) {
-  auto world = WorldParts::create(kFile, {1}, disk.name());
-  if (!world) return world.error();
-  WorldChanges first;
-  first.put_types(coloured_types(kTypes));
-  first.put_grid(0, {});
-  if (auto saved = world->save(std::move(first)); !saved) return saved.error();
-  if (auto saved = world->flush(); !saved) return saved.error();
-  return world;
-}
-
-/// How many saves a world has; -1 where it is not as after any number of them, with the reason.
-struct Found {
-  int saves = -1;
-  std::string why;
-};
-
-Found look_at(const TestDisk& disk) {
-  auto connection = Connection::open(kFile, Connection::Mode::Write, disk.name());
-  if (!connection) return {-1, "it does not open: " + connection.error().message};
-  const auto sound = connection->text("PRAGMA integrity_check");
-  if (!sound || *sound != "ok") return {-1, "integrity_check: " + (sound ? *sound : sound.error().message)};
-  static_cast<void>(connection->close());
-  auto world = WorldParts::open(kFile, WorldAccess::Write, {1}, disk.name());
-  if (!world) return {-1, "the world does not open: " + world.error().message};
-  const auto value = world->value("saves");
-  if (!value) return {-1, value.error().message};
-  int saves = 0;
-  if (*value) saves = std::atoi(std::string(reinterpret_cast<const char*>((*value)->data()), (*value)->size()).c_str());
-  Expected expected;
-  for (int i = 1; i <= saves; ++i) apply(expected, i);
-  for (int place = 0; place < kPlaces; ++place) {
-    const auto chunk = world->load_chunk(place_of(place));
-    if (!chunk) return {-1, chunk.error().message};
-    const VoxelType type = expected.types[static_cast<std::size_t>(place)];
-    const bool is_right = chunk->has_value() ? type != kAir && (*chunk)->voxels == content_of(type) : type == kAir;
-    if (!is_right) return {-1, "after " + std::to_string(saves) + " saves place " + std::to_string(place)};
-  }
-  return {saves, ""};
-}
 
 /// Saves to a world on a disk, and cuts the power all the while.
 class Cuts {
@@ -124,7 +22,7 @@ class Cuts {
   }
 
   void run(int saves, bool has_honest_syncs = true) {
-    auto world = create_on(disk_);
+    auto world = create_for_saves(kFile, disk_.name());
     ASSERT_TRUE(world) << to_string(world.error());
     if (!has_honest_syncs) disk_.is_sync_honest = [](const std::string& file) { return !file.ends_with("-wal"); };
     is_cutting_ = true;
@@ -157,7 +55,7 @@ class Cuts {
     const int least = acknowledged_;
     after_.become(disk_.image(), cut_random_);
     ++cuts;
-    const Found found = look_at(after_);
+    const Found found = look_at(kFile, after_.name());
     if (found.saves < least || found.saves > submitted_) {
       if (bad++ == 0) {
         first_fault = found.saves < 0 ? found.why
@@ -243,7 +141,7 @@ bool survives_fault(int number, int code, bool is_lasting) {
   TestDisk disk("faulty");
   Fault fault(disk, number, code, is_lasting);
   {
-    auto world = create_on(disk);
+    auto world = create_for_saves(kFile, disk.name());
     if (!world) {
       expect_one_clear_line(world.error());
       return true;
@@ -262,7 +160,7 @@ bool survives_fault(int number, int code, bool is_lasting) {
       TestDisk after("after the fault");
       std::minstd_rand random(static_cast<unsigned>(number));
       after.become(disk.image(), random);
-      const Found found = look_at(after);
+      const Found found = look_at(kFile, after.name());
       EXPECT_GE(found.saves, acknowledged) << found.why << " call " << number;
       // What failed is read, and saved once there is room again.
       Expected expected;
@@ -280,7 +178,7 @@ bool survives_fault(int number, int code, bool is_lasting) {
     }
     fault.heal();
   }
-  const Found found = look_at(disk);
+  const Found found = look_at(kFile, disk.name());
   EXPECT_EQ(found.saves, kSaves) << found.why << ": call " << number << ", code " << code;
   return fault.was_hit();
 }

@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "store/chunk/placed_data.h"
 #include "store/world/part_text.h"
 
 namespace quoin::store {
@@ -33,11 +34,14 @@ Status put_type(VoxelRegistry& types, std::int64_t number, const VoxelProperties
 Status check_data(const ChunkPlace& place, const Chunk& chunk, const VoxelRegistry& types) {
   if (chunk.data_count() == 0) return {};
   std::string fault;
+  std::size_t bytes = 0;
   chunk.for_each_data([&](IVec3 local, const VoxelData& data) {
     const std::uint8_t bits = types[chunk.get(local)].state_bits;
     const bool fits = bits == kMaxStateBits || data.state >> bits == 0;
     if (!fits && fault.empty()) fault = about(place) + ": a state of more bits than its type has";
+    bytes += data.bytes.size();
   });
+  if (bytes > kMaxChunkDataBytes) fault = about(place) + ": its voxels hold more than 64 MiB of data";
   if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault);
   return {};
 }

@@ -4,6 +4,7 @@
 #include <string>
 
 #include <gtest/gtest.h>
+#include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/scene_file.h>
 #include <quoin/terrain/terrain.h>
@@ -13,13 +14,14 @@
 namespace quoin {
 namespace {
 
-/// The scene's text as a scene file: equal texts are equal scenes, to the last bit.
+/// The scene's text as a scene file, shortened: equal texts are equal scenes, to the last bit.
 std::string text_of(const Scene& scene) {
   const auto file = scene_file_of(scene);
   if (!file) return to_string(file.error());
   const auto text = write_scene_file(*file);
   if (!text) return to_string(text.error());
-  return {reinterpret_cast<const char*>(text->data()), text->size()};
+  std::string all(reinterpret_cast<const char*>(text->data()), text->size());
+  return all.substr(0, 3000) + std::to_string(std::hash<std::string>()(all));
 }
 
 /// Of everything something.
@@ -58,7 +60,7 @@ Scene rich_scene() {
                       .layer = layer,
                       .categories = 12});
   scene.lamps.push_back({.name = "sun lamp", .position = {1, 2, 3}, .intensity = 7.25});
-  scene.lamps.push_back({.kind = Lamp::Kind::Spot, .range = 33.0});
+  scene.lamps.push_back({.name = "", .kind = Lamp::Kind::Spot, .range = 33.0});
   return scene;
 }
 
@@ -265,7 +267,7 @@ TEST(WorldSaver, OldWorldsAreReplacedWholeWithTheirLogs) {
   ASSERT_TRUE(small.types.add(coloured_type(1)));
   SceneGrid grid;
   grid.grid.set({0, 0, 0}, 1);
-  small.add_instance({.grid = small.add_grid(std::move(grid))});
+  small.add_instance({.name = "", .grid = small.add_grid(std::move(grid))});
   ASSERT_TRUE(save_scene(small, path));
   EXPECT_EQ(text_of(loaded_from(path)), text_of(small));
 }

@@ -314,7 +314,7 @@ Status WorldWriter::write_chunks(const ChangeSet& changes) {
     const auto region = region_for(region_of(place), chunk.has_value());
     if (!region) return region.error();
     if (!*region) continue;
-    chunks.push_back({key_of(**region, place.chunk), &place, chunk ? &*chunk : nullptr, {}});
+    chunks.push_back({key_of(**region, place.chunk), &place, chunk ? &*chunk : nullptr, {}, {}});
   }
   std::ranges::sort(chunks, {}, &Encoded::key);
   for (std::size_t begin = 0; begin < chunks.size(); begin += kSliceChunks) {
@@ -327,7 +327,7 @@ Status WorldWriter::write_chunks(const ChangeSet& changes) {
         Encoded& each = slice[i];
         if (each.chunk == nullptr) continue;
         const DensityChunk* const densities = each.chunk->densities ? &*each.chunk->densities : nullptr;
-        encoders_[worker].encode(*each.place, revision_, each.chunk->voxels, densities, each.body);
+        each.outcome = encoders_[worker].encode(*each.place, revision_, each.chunk->voxels, densities, each.body);
       }
     });
     if (auto done = put_chunks(slice); !done) return done;
@@ -341,6 +341,7 @@ Status WorldWriter::put_chunks(std::vector<Encoded>& chunks) {
   const auto remove = ready(kDeleteChunk);
   if (!remove) return remove.error();
   for (const Encoded& each : chunks) {
+    if (!each.outcome) return each.outcome;
     Statement& statement = each.chunk != nullptr ? **put : **remove;
     statement.bind(0, each.key);
     if (each.chunk != nullptr) statement.bind(1, std::span<const std::byte>(each.body));

@@ -71,6 +71,7 @@ class WorldWriter {
     const ChunkPlace* place = nullptr;
     const StoredChunk* chunk = nullptr;  ///< null: the row goes
     std::vector<std::byte> body;
+    Status outcome;
   };
 
   void run();

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <quoin/grid/chunk.h>
+#include <quoin/grid/density_chunk.h>
+#include <quoin/grid/voxel_registry.h>
+
+namespace quoin::store {
+
+/// Types 1 to `count`, of which those divisible by 3 have 8 bits of state, those by 5 have 32.
+inline VoxelRegistry types_for_tests(int count) {
+  VoxelRegistry types;
+  for (int i = 1; i <= count; ++i) {
+    VoxelProperties properties;
+    properties.name = "t" + std::to_string(i);
+    properties.state_bits = static_cast<std::uint8_t>(i % 5 == 0 ? 32 : i % 3 == 0 ? 8 : 0);
+    if (!types.add(properties)) break;
+  }
+  return types;
+}
+
+/// Boxes of types below `types`, one in another; with noise, single voxels besides.
+inline Chunk chunk_of_boxes(std::mt19937& random, int types, int boxes, int noise) {
+  const auto below = [&](int end) { return static_cast<int>(random() % static_cast<unsigned>(end)); };
+  Chunk chunk(static_cast<VoxelType>(below(types)));
+  for (int i = 0; i < boxes; ++i) {
+    const IVec3 min{below(64), below(64), below(64)};
+    const IVec3 size{1 + below(40), 1 + below(40), 1 + below(40)};
+    chunk.fill_box({min, min + size}, static_cast<VoxelType>(below(types)), [](int, int, std::uint64_t) {});
+  }
+  for (int i = 0; i < noise; ++i) {
+    chunk.set(below(64), below(64), below(64), static_cast<VoxelType>(below(types)));
+  }
+  return chunk;
+}
+
+/// States and bytes at some voxels whose types take them.
+inline void put_some_data(std::mt19937& random, const VoxelRegistry& types, int tries, Chunk& chunk) {
+  for (int i = 0; i < tries; ++i) {
+    const IVec3 local{static_cast<int>(random() % 64), static_cast<int>(random() % 64),
+                      static_cast<int>(random() % 64)};
+    const int bits = types[chunk.get(local)].state_bits;
+    VoxelData data;
+    if (bits != 0) data.state = static_cast<std::uint32_t>(random()) >> (32 - bits);
+    std::vector<std::byte> bytes(random() % 4 == 0 ? random() % 200 : 0);
+    for (std::byte& byte : bytes) byte = static_cast<std::byte>(random());
+    data.bytes = bytes;
+    chunk.set_data(local, data);
+  }
+}
+
+/// Densities of spheres within a band, with materials below `types`.
+inline DensityChunk densities_of_spheres(std::mt19937& random, int types, float band, int spheres) {
+  const auto below = [&](int end) { return static_cast<float>(random() % static_cast<unsigned>(end)); };
+  DensityChunk chunk(stored_density(band, band));
+  chunk.materials() = chunk_of_boxes(random, types, 4, 10);
+  for (int i = 0; i < spheres; ++i) {
+    const float at[3] = {below(64), below(64), below(64)};
+    const float radius = 2.0F + below(16);
+    for (int z = 0; z < kChunkEdge; ++z) {
+      for (int y = 0; y < kChunkEdge; ++y) {
+        std::array<Half, kChunkEdge> row{};
+        chunk.read_row(y, z, row);
+        for (int x = 0; x < kChunkEdge; ++x) {
+          const float d[3] = {static_cast<float>(x) - at[0], static_cast<float>(y) - at[1],
+                              static_cast<float>(z) - at[2]};
+          const float distance = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) - radius;
+          Half& half = row[static_cast<std::size_t>(x)];
+          half = stored_density(std::min(float_from_half(half), distance), band);
+        }
+        chunk.write_row(y, z, row);
+      }
+    }
+  }
+  return chunk;
+}
+
+}  // namespace quoin::store

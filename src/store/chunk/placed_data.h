@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include <quoin/core/result.h>
+#include <quoin/grid/chunk.h>
+#include <quoin/grid/voxel_registry.h>
+
+#include "store/chunk/content.h"
+
+// What a chunk's voxels hold besides their types.
+//
+//   uint32 n            voxels with data, 1 to 262,144
+//   uint32 bytes[3]     of the next three lines
+//   gaps[n]             voxels between this one and the one before that has data, or that come before it
+//   states[n]
+//   lengths[n]          of their bytes, at most 65,536 each and 64 MiB all together
+//   uint8 bytes[]       of one voxel after the other
+//
+// Voxels x fastest, then y, then z. Gaps, states and lengths seven bits a byte, as lengths of runs.
+
+namespace quoin::store {
+
+/// That the voxels of a chunk can hold all together, to be kept in a world.
+inline constexpr std::size_t kMaxChunkDataBytes = std::size_t{64} << 20;
+/// The most that this can take of a chunk's content.
+inline constexpr std::size_t kMaxDataSection = 16 + kChunkVoxels * (3 + 5 + 3) + kMaxChunkDataBytes;
+
+/// Appends it. Errors: LimitExceeded, and nothing is appended. Requires: some voxel has data.
+[[nodiscard]] Status write_placed_data(const Chunk& chunk, std::vector<std::byte>& out);
+
+/// Puts it into a chunk. Errors: BadFormat, with the offset in the content; also for voxels of air and for states of
+/// more bits than their type has.
+[[nodiscard]] Status read_placed_data(ContentReader& reader, const VoxelRegistry& types, Chunk& chunk);
+
+}  // namespace quoin::store

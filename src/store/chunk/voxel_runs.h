@@ -1,0 +1,75 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/core/result.h>
+#include <quoin/grid/chunk.h>
+
+#include "store/chunk/content.h"
+
+// The types of a chunk's voxels, as runs of equal ones across rows, or packed where that is smaller.
+//
+//   uint8 form           0: all of one type, 1: runs, 2: packed
+//   uint16 n - 1         types; 1 where the form is 0, else 2 to 65,536
+//   uint16 types[n]      in the order in which they first occur, each once
+//   runs: voxels x fastest, then y, then z
+//     uint32 runs        n to 262,144
+//     uint32 bytes       of the next line
+//     uint8 lengths[]    each run's voxels - 1, seven bits a byte, lowest first, the top bit set in all bytes but the last
+//     uint8 indices[]    each run's type; none where n is 2, as runs alternate then; to 256 types a byte a run,
+//                        else the low bytes of all runs, then the high ones
+//   packed:
+//     uint8 [32,768 * bits]  indices of `bits` bits, x fastest, then y, then z, from the lowest bit up; `bits` is the
+//                            first of 1, 2, 4, 8 and 16 with 2^bits >= n
+//
+// A run's type differs from that of the run before. So the same voxels are the same bytes, whatever edits led to them.
+
+namespace quoin::store {
+
+/// The most bytes that a chunk's types can take.
+inline constexpr std::size_t kMaxVoxelSection = 3 + 2 * (std::size_t{1} << 16) + kChunkVoxels * sizeof(VoxelType);
+
+/// Writes the types of one chunk after the other. One thread at a time. Memory: 1.1 MiB once there was a noisy chunk.
+class VoxelRunWriter {
+ public:
+  /// Appends those of a chunk; its data is left out. Cost: O(rows + runs).
+  void write(const Chunk& chunk, std::vector<std::byte>& out);
+
+ private:
+  struct Scan;
+  void put_palette(std::vector<std::byte>& out) const;
+  void put_runs(const Scan& scan, std::vector<std::byte>& out) const;
+  void put_packed(const Chunk& chunk, std::vector<std::byte>& out);
+
+  std::vector<VoxelType> palette_;
+  std::vector<std::uint32_t> new_index_;  // by the index that the chunk stores
+  std::vector<std::uint8_t> lengths_;
+  std::vector<std::uint16_t> indices_;
+};
+
+/// Reads them, straight into the storage of a chunk. One thread at a time. Memory: 0.6 MiB once there was a noisy chunk.
+class VoxelRunReader {
+ public:
+  /// Errors: BadFormat, with the offset in the content; also for types that are not below `type_count`.
+  [[nodiscard]] Result<Chunk> read(ContentReader& reader, std::size_t type_count);
+
+ private:
+  struct Run;
+  struct Streams;
+  [[nodiscard]] Status read_palette(ContentReader& reader, std::size_t count, std::size_t type_count);
+  [[nodiscard]] Result<Chunk> read_runs(ContentReader& reader);
+  [[nodiscard]] Result<Chunk> read_packed(ContentReader& reader);
+  template <int kBits>
+  [[nodiscard]] Result<Chunk> build(Streams streams);
+
+  std::vector<VoxelType> palette_;
+  std::vector<std::uint64_t> seen_;  // by type / 64: in the palette; 0 between calls
+  std::vector<std::uint32_t> counts_;
+  std::vector<std::uint64_t> changes_;  // of four layers of rows: what each voxel's index is, XOR the one before
+  std::vector<std::uint64_t> words_;
+};
+
+}  // namespace quoin::store
