@@ -77,8 +77,8 @@ Status DevicePaths::put(DeviceMemory& memory, const Placement& placement, const 
   Status done = try_put(memory, placement, options, frame);
   if (done) return done;
   memory.discard();
-  for (Place* place : {&surfaces_place_, &sky_pixels_, &sky_rows_, &sky_columns_, &gloss_, &lamp_ways_, &face_keys_,
-                       &face_lamps_}) {
+  for (Place* place :
+       {&surfaces_place_, &sky_pixels_, &sky_rows_, &sky_columns_, &gloss_, &lamp_ways_, &face_keys_, &face_lamps_}) {
     memory.release(*place);
   }
   has_sent_surfaces_ = false;

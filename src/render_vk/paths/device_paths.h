@@ -16,8 +16,8 @@
 
 namespace quoin::vulkan {
 
-/// What paths look up, in device memory: types as light by paths sees them, the sky, what gloss reflects, of which lamps
-/// faces are part. It is sent again where it is another than before.
+/// What paths look up, in device memory: types as light by paths sees them, the sky, what gloss reflects, of which
+/// lamps faces are part. It is sent again where it is another than before.
 class DevicePaths {
  public:
   /// Of this scene from now on, as it is now; null: there is none. What lights others is found anew.

@@ -12,8 +12,10 @@
 #include <quoin/render/path_tracer.h>
 
 #include "render/path/town_for_tests.h"
+#include "render_vk/device/access.h"
 #include "render_vk/device/vulkan_for_tests.h"
 #include "render_vk/lakeside_for_tests.h"
+#include "render_vk/march/renderer_impl.h"
 
 namespace quoin::vulkan_test {
 namespace {
@@ -278,6 +280,7 @@ TEST_F(VulkanPaths, KeepTheFacesThatGlowUntilTheyAreOthers) {
   scene.edit(grid).grid.fill_box({{-4, 0, 10}, {2, 6, 12}}, 1);
   EXPECT_EQ(sent(), again) << "what glows is where it was";
   VoxelProperties glowing;
+  glowing.colour = {90, 255, 90, 255};
   glowing.emission = 9.0F;
   const VoxelType type = scene.types.add(glowing).value_or(kAir);
   const std::uint64_t with_a_type = sent();
