@@ -1,3 +1,4 @@
+#include <quoin/store/world_care.h>
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
 
@@ -52,6 +53,9 @@ Result<WorldStore> WorldStore::create(const std::filesystem::path& path, Threads
   return absent(path);
 }
 Result<WorldStore> WorldStore::open(const std::filesystem::path& path, WorldAccess, Threads) {
+  return absent(path);
+}
+Result<WorldStore> WorldStore::open_or_create(const std::filesystem::path& path, Threads) {
   return absent(path);
 }
 Result<std::optional<StoredChunk>> WorldStore::load_chunk(const ChunkPlace&) const {
@@ -112,6 +116,22 @@ Result<SavedScene> write_world(const Scene&, const std::filesystem::path& path, 
   return absent(path);
 }
 Result<SavedScene> write_world(const LoadedScene&, const std::filesystem::path& path, Threads, const Progress&) {
+  return absent(path);
+}
+
+Result<WorldSummary> summarize_world(const std::filesystem::path& path, const Progress&) {
+  return absent(path);
+}
+Result<WorldCheck> check_world(const std::filesystem::path& path, const Progress&) {
+  return absent(path);
+}
+Result<WorldRepair> repair_world(const std::filesystem::path& from, const std::filesystem::path&, const Progress&) {
+  return absent(from);
+}
+Result<std::uint64_t> back_up_world(const std::filesystem::path& from, const std::filesystem::path&) {
+  return absent(from);
+}
+Result<std::uint64_t> compact_world(const std::filesystem::path& path) {
   return absent(path);
 }
 

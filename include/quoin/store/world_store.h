@@ -106,6 +106,8 @@ class WorldStore {
   ///         reading: see repair_world); Unsupported (of a later version; in builds without SQLite).
   [[nodiscard]] static Result<WorldStore> open(const std::filesystem::path& path, WorldAccess access,
                                                Threads threads = {});
+  /// Opens a world for writing; makes it where there is none. Errors: as those two.
+  [[nodiscard]] static Result<WorldStore> open_or_create(const std::filesystem::path& path, Threads threads = {});
   WorldStore(WorldStore&&) noexcept;
   WorldStore& operator=(WorldStore&&) noexcept;
   ~WorldStore();

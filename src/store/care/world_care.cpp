@@ -17,8 +17,8 @@
 #include "io/whole_file.h"
 #include "store/care/world_rows.h"
 #include "store/chunk/chunk_body.h"
+#include "store/database/world_lock.h"
 #include "store/world/part_text.h"
-#include "store/world/world_lock.h"
 #include "store/world/world_open.h"
 #include "store/world/world_rules.h"
 

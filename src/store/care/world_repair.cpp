@@ -14,10 +14,10 @@
 #include "store/care/found_parts.h"
 #include "store/care/world_rows.h"
 #include "store/chunk/chunk_body.h"
+#include "store/database/world_lock.h"
 #include "store/salvage/page_scan.h"
 #include "store/world/part_text.h"
 #include "store/world/world_changes.h"
-#include "store/world/world_lock.h"
 #include "store/world/world_open.h"
 #include "store/world/world_rules.h"
 

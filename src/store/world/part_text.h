@@ -8,7 +8,7 @@
 #include <quoin/io/scene_file.h>
 #include <quoin/store/world_store.h>
 
-#include "store/world/schema.h"
+#include "store/database/schema.h"
 
 // Parts of a world as texts of JSON, each as it stands in scene files (docs/scene-files.md); where that has a place in
 // a list, the number of the part stands here.

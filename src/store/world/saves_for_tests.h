@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "store/world/connection.h"
+#include "store/database/connection.h"
 #include "store/world/world_changes.h"
 #include "store/world/world_for_tests.h"
 

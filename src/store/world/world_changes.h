@@ -11,7 +11,7 @@
 #include <quoin/core/hash.h>
 #include <quoin/store/world_store.h>
 
-#include "store/world/schema.h"
+#include "store/database/schema.h"
 
 namespace quoin::store {
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "io/whole_file.h"
-#include "store/world/schema.h"
+#include "store/database/schema.h"
 
 namespace quoin::store {
 

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "store/world/connection.h"
+#include "store/database/connection.h"
 #include "store/world/world_reader.h"
 
 namespace quoin::store {

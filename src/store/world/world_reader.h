@@ -9,8 +9,8 @@
 
 #include <quoin/core/function_ref.h>
 
-#include "store/world/connection.h"
-#include "store/world/schema.h"
+#include "store/database/connection.h"
+#include "store/database/schema.h"
 
 namespace quoin::store {
 

@@ -17,8 +17,8 @@
 #include "io/whole_file.h"
 #include "io/world_format.h"
 #include "store/chunk/chunk_body.h"
+#include "store/database/world_lock.h"
 #include "store/world/world_changes.h"
-#include "store/world/world_lock.h"
 #include "store/world/world_open.h"
 #include "store/world/world_reader.h"
 #include "store/world/world_rules.h"
@@ -187,6 +187,11 @@ Result<WorldStore> WorldParts::create_unsynced(const std::filesystem::path& path
 
 Result<WorldStore> WorldStore::open(const std::filesystem::path& path, WorldAccess access, Threads threads) {
   return WorldParts::open(path, access, threads, nullptr);
+}
+
+Result<WorldStore> WorldStore::open_or_create(const std::filesystem::path& path, Threads threads) {
+  std::error_code error;
+  return std::filesystem::exists(path, error) ? open(path, WorldAccess::Write, threads) : create(path, threads);
 }
 
 Result<WorldStore> WorldParts::open(const std::filesystem::path& path, WorldAccess access, Threads threads,

@@ -15,7 +15,7 @@
 #include <quoin/core/parallel.h>
 
 #include "store/chunk/chunk_body.h"
-#include "store/world/connection.h"
+#include "store/database/connection.h"
 #include "store/world/world_changes.h"
 
 namespace quoin::store {

@@ -1,4 +1,4 @@
-#include "store/world/connection.h"
+#include "store/database/connection.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,4 +1,4 @@
-#include "store/world/world_lock.h"
+#include "store/database/world_lock.h"
 
 #include <fcntl.h>
 #include <sys/file.h>

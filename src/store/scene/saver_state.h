@@ -9,7 +9,7 @@
 #include <quoin/core/changes.h>
 #include <quoin/store/world_saver.h>
 
-#include "store/world/schema.h"
+#include "store/database/schema.h"
 
 namespace quoin::store {
 

@@ -9,8 +9,8 @@
 
 #include "io/whole_file.h"
 #include "scene/hierarchy.h"
+#include "store/scene/saver_state.h"
 #include "store/world/part_text.h"
-#include "store/world/saver_state.h"
 #include "store/world/world_changes.h"
 #include "store/world/world_rules.h"
 

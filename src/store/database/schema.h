@@ -15,7 +15,7 @@
 #include <quoin/core/vec.h>
 #include <quoin/store/world_store.h>
 
-#include "store/world/connection.h"
+#include "store/database/connection.h"
 
 // The tables of a world, as docs/formats/world.md tells them to others:
 //

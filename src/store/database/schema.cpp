@@ -1,4 +1,4 @@
-#include "store/world/schema.h"
+#include "store/database/schema.h"
 
 #include <algorithm>
 #include <array>

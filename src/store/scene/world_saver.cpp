@@ -8,8 +8,8 @@
 
 #include <quoin/core/assert.h>
 
+#include "store/scene/saver_state.h"
 #include "store/world/part_text.h"
-#include "store/world/saver_state.h"
 #include "store/world/world_changes.h"
 
 namespace quoin {

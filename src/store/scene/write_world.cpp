@@ -7,10 +7,10 @@
 
 #include "io/whole_file.h"
 #include "io/world_format.h"
-#include "store/world/connection.h"
-#include "store/world/schema.h"
+#include "store/database/connection.h"
+#include "store/database/schema.h"
+#include "store/database/world_lock.h"
 #include "store/world/world_changes.h"
-#include "store/world/world_lock.h"
 #include "store/world/world_open.h"
 
 namespace quoin {
