@@ -162,6 +162,8 @@ class StorageBuilder {
     changes_.assign(kRows * kBits, 0);
     words_.resize(std::max(words_.size(), kChunkVoxels / 64 * kBits));
     last_ = stored(0);
+    const auto air = std::ranges::find(palette_, kAir);
+    if (air != palette_.end()) air_ = static_cast<std::uint32_t>(air - palette_.begin());
     is_last_solid_ = palette_[0] != kAir;
   }
 
@@ -170,45 +172,39 @@ class StorageBuilder {
     const std::uint32_t change = stored(before) ^ stored(index);
     const std::uint32_t x = voxel % kChunkEdge;
     changes_[voxel * kBits >> 6] ^= std::uint64_t{change} << (voxel * kBits & 63U);
-    const int solid = (palette_[index] != kAir ? 1 : 0) - (palette_[before] != kAir ? 1 : 0);
+    const int solid = (index != air_ ? 1 : 0) - (before != air_ ? 1 : 0);
     RowSum& row = sums_[voxel / kChunkEdge];
     row.change ^= static_cast<std::uint16_t>(change);
+    row.inside |= x;
     row.solid = static_cast<std::int16_t>(row.solid + solid * static_cast<int>(kChunkEdge - x));
     ended_[x] -= solid;
   }
 
   /// All runs of these layers were told.
-  void end_layers(int first_z) {
-    std::array<std::uint32_t, kRows> before{};  // index of the voxel before each row
-    std::array<std::uint32_t, kRows> first{};
-    std::array<std::uint32_t, kRows> is_mixed{};
+  void end_layers(int first_y) {
+    std::array<std::uint32_t, kRows> before;  // index of the voxel before each row
+    std::array<std::uint32_t, kRows> first;   // of its first; with kMixed where others follow
     for (std::uint32_t row = 0; row < kRows; ++row) {
       constexpr std::uint64_t kField = (std::uint64_t{1} << kBits) - 1;
-      const std::uint64_t* const changes = changes_.data() + row * kBits;
-      std::uint64_t inside = changes[0] & ~kField;
-      for (int i = 1; i < kBits; ++i) inside |= changes[i];
       before[row] = last_;
-      first[row] = last_ ^ static_cast<std::uint32_t>(changes[0] & kField);
-      is_mixed[row] = inside != 0 ? 1U : 0U;
-      count_row(first_z + static_cast<int>(row / kChunkEdge), row % kChunkEdge, sums_[row]);
+      first[row] = last_ ^ static_cast<std::uint32_t>(changes_[row * kBits] & kField);
+      if (sums_[row].inside != 0) first[row] |= kMixed;
+      count_row(static_cast<std::size_t>(first_y) + row / kChunkEdge, row % kChunkEdge, sums_[row]);
       last_ ^= sums_[row].change;
     }
-    for (std::uint32_t y = 0; y < kChunkEdge; y += 4) {
-      std::uint32_t differs = 0;
-      for (std::uint32_t i = 0; i < kSlabRows; ++i) {
-        const std::uint32_t row = row_of_slab(y, i);
-        differs |= is_mixed[row] | (first[row] ^ first[y]);
-      }
-      std::uint32_t& entry = m_->slabs[ChunkStorage::slab_index(static_cast<int>(y), first_z)];
+    for (std::uint32_t z = 0; z < kChunkEdge; z += 4) {
+      std::uint32_t differs = first[z] & kMixed;
+      for (std::uint32_t i = 0; i < kSlabRows; ++i) differs |= first[row_of_slab(z, i)] ^ first[z];
+      std::uint32_t& entry = m_->slabs[ChunkStorage::slab_index(first_y, static_cast<int>(z))];
       if (differs == 0) {
-        entry = ChunkStorage::kUniformSlab | first[y];
+        entry = ChunkStorage::kUniformSlab | first[z];
         continue;
       }
       entry = m_->slot_count++;
       std::uint64_t* out = words_.data() + std::size_t{entry} * kSlabRows * kBits;
       for (std::uint32_t i = 0; i < kSlabRows; ++i, out += kBits) {
-        const std::uint32_t row = row_of_slab(y, i);
-        if (is_mixed[row] != 0) {
+        const std::uint32_t row = row_of_slab(z, i);
+        if ((first[row] & kMixed) != 0) {
           put_row(changes_.data() + row * kBits, before[row], out);
         } else {
           std::fill_n(out, kBits, packed_row::repeat(kBits, first[row]));
@@ -224,10 +220,7 @@ class StorageBuilder {
     ChunkStorage& m = *m_;
     m.bits = kBits;
     m.words.assign(words_.begin(), words_.begin() + static_cast<std::ptrdiff_t>(m.slot_count) * kSlabRows * kBits);
-    m.non_air = static_cast<int>(kChunkVoxels);
-    for (std::size_t i = 0; i < palette_.size(); ++i) {
-      if (palette_[i] == kAir) m.non_air -= static_cast<int>(counts[i]);
-    }
+    m.non_air = static_cast<int>(kChunkVoxels - (air_ < counts.size() ? counts[air_] : 0));
     count_columns();
     if (kBits == 16) {
       m.counts.assign(ChunkStorage::kRemainders, 0);
@@ -241,21 +234,23 @@ class StorageBuilder {
   }
 
  private:
+  static constexpr std::uint32_t kMixed = 0x8000'0000U;
   struct RowSum {
     std::uint16_t change = 0;
     std::int16_t solid = 0;
+    std::uint32_t inside = 0;  // not 0 where a run starts within the row
   };
-  static std::uint32_t row_of_slab(std::uint32_t y, std::uint32_t i) { return (i >> 2) * kChunkEdge + y + (i & 3U); }
+  static std::uint32_t row_of_slab(std::uint32_t z, std::uint32_t i) { return (i & 3U) * kChunkEdge + z + (i >> 2); }
 
   [[nodiscard]] std::uint32_t stored(std::uint32_t index) const { return kBits == 16 ? palette_[index] : index; }
 
-  void count_row(int z, std::uint32_t y, RowSum sum) {
+  void count_row(std::size_t y, std::size_t z, RowSum sum) {
     const int solid = (is_last_solid_ ? kChunkEdge : 0) + sum.solid;
     auto& counts = m_->layer_counts;
     counts[1][y] = static_cast<std::uint16_t>(counts[1][y] + solid);
-    counts[2][static_cast<std::size_t>(z)] = static_cast<std::uint16_t>(counts[2][static_cast<std::size_t>(z)] + solid);
+    counts[2][z] = static_cast<std::uint16_t>(counts[2][z] + solid);
     const std::uint32_t last = last_ ^ sum.change;
-    is_last_solid_ = (kBits == 16 ? static_cast<VoxelType>(last) : palette_[last]) != kAir;
+    is_last_solid_ = last != (kBits == 16 ? kAir : air_);
   }
 
   static void put_row(const std::uint64_t* changes, std::uint32_t before, std::uint64_t* out) {
@@ -284,6 +279,7 @@ class StorageBuilder {
   Ref<ChunkStorage> m_ = make_ref<ChunkStorage>();
   std::array<RowSum, kRows> sums_{};
   std::array<int, kChunkEdge> ended_{};  // by x: runs of solid voxels that end before it, less those that start there
+  std::uint32_t air_ = 0xFFFF'FFFFU;     // its index, where there is any
   std::uint32_t last_ = 0;               // index of the last voxel of the rows so far
   bool is_last_solid_ = false;
 };
@@ -330,13 +326,14 @@ Result<Chunk> VoxelRunReader::read_packed(ContentReader& reader) {
   if (!reader.has(kChunkVoxels / 8 * bits)) return reader.cut_off();
   std::vector<VoxelType> types(kChunkVoxels);
   std::uint32_t seen = 0;
-  for (std::size_t first = 0; first < kChunkVoxels; first += kChunkEdge) {
+  for (std::size_t i = 0; i < std::size_t{kChunkEdge} * kChunkEdge; ++i) {
+    const std::size_t first = (i % kChunkEdge * kChunkEdge + i / kChunkEdge) * kChunkEdge;  // of a row: by z, then y
     std::array<std::uint64_t, 16> row{};
-    for (std::size_t i = 0; i < bits; ++i) row[i] = reader.take<std::uint64_t>();
+    for (std::size_t k = 0; k < bits; ++k) row[k] = reader.take<std::uint64_t>();
     for (int x = 0; x < kChunkEdge; ++x) {
       const std::uint32_t index = packed_row::read(row.data(), static_cast<int>(bits), x);
       if (index > seen || index >= palette_.size()) {
-        return wrong_index(index, palette_.size(), begin + (first + static_cast<std::size_t>(x)) * bits / 8);
+        return wrong_index(index, palette_.size(), begin + (i * kChunkEdge + static_cast<std::size_t>(x)) * bits / 8);
       }
       seen += index == seen ? 1U : 0U;
       types[first + static_cast<std::size_t>(x)] = palette_[index];

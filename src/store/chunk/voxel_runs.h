@@ -15,17 +15,18 @@
 //   uint8 form           0: all of one type, 1: runs, 2: packed
 //   uint16 n - 1         types; 1 where the form is 0, else 2 to 65,536
 //   uint16 types[n]      in the order in which they first occur, each once
-//   runs: voxels x fastest, then y, then z
+//   runs: voxels x fastest, then z, then y
 //     uint32 runs        n to 262,144
 //     uint32 bytes       of the next line
-//     uint8 lengths[]    each run's voxels - 1, seven bits a byte, lowest first, the top bit set in all bytes but the last
+//     uint8 lengths[]    each run's voxels - 1, seven bits a byte, lowest first, the top bit set in all but the last byte
 //     uint8 indices[]    each run's type; none where n is 2, as runs alternate then; to 256 types a byte a run,
 //                        else the low bytes of all runs, then the high ones
 //   packed:
-//     uint8 [32,768 * bits]  indices of `bits` bits, x fastest, then y, then z, from the lowest bit up; `bits` is the
+//     uint8 [32,768 * bits]  indices of `bits` bits, x fastest, then z, then y, from the lowest bit up; `bits` is the
 //                            first of 1, 2, 4, 8 and 16 with 2^bits >= n
 //
-// A run's type differs from that of the run before. So the same voxels are the same bytes, whatever edits led to them.
+// Layers of equal height come one after the other: ground is alike along them. A run's type differs from that of the run
+// before. So the same voxels are the same bytes, whatever edits led to them.
 
 namespace quoin::store {
 
