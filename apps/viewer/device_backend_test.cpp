@@ -243,6 +243,38 @@ TEST_F(DeviceBackendTest, PathsConvergeAndFollowEdits) {
   EXPECT_EQ(backend->name(), renderer_->device().name);
 }
 
+// How fine the first picture may be follows from what others like it took.
+TEST_F(DeviceBackendTest, WhatPathsTakeSaysNothingOfRays) {
+  const Document document = small_document();
+  DeviceBackendOptions options;
+  options.cpu.threads = {2};
+  options.rays_on_device = true;
+  options.frame_seconds = 1e9;
+  const auto backend = backend_of(document, options);
+  ViewRequest request = request_for(document, DrawMode::Rays);
+  const auto width_of_first = [&] {
+    backend->show(request);
+    const std::vector<Image> pictures = settle(*backend);
+    return pictures.empty() ? 0 : pictures.front().width;
+  };
+  EXPECT_EQ(width_of_first(), 20) << "nothing is known yet";
+  request.camera.position.y += 1.0;
+  EXPECT_EQ(width_of_first(), 160);
+  ViewRequest of_paths = request;
+  of_paths.mode = DrawMode::Paths;
+  of_paths.width = 16;
+  of_paths.height = 8;
+  for (const int width : {2, 16}) {
+    backend->show(of_paths);
+    std::optional<ViewFrame> first;
+    ASSERT_TRUE(comes([&] { return (first = backend->take()).has_value(); }));
+    ASSERT_TRUE(first->on_device);
+    EXPECT_EQ(first->on_device->read().value_or(Image{}).width, width);
+    of_paths.camera.position.y += 1.0;
+  }
+  EXPECT_EQ(width_of_first(), 20);
+}
+
 TEST_F(DeviceBackendTest, SmoothMeshesTakeTheOcclusionThatIsWanted) {
   Document document = small_document();
   const auto backend = backend_of(document);

@@ -111,7 +111,10 @@ Result<std::optional<ViewFrame>> DeviceDrawer::read_and_draw() {
 
 Result<std::optional<ViewFrame>> DeviceDrawer::draw() {
   const Clock::time_point start = Clock::now();
-  if (request_->mode != DrawMode::Paths) paths_.reset();
+  if ((request_->mode == DrawMode::Paths) != (paths_ != nullptr)) {
+    paths_ = paths_ ? nullptr : std::make_unique<VulkanPathPicture>(*renderer_);
+    seconds_per_sample_ = 0.0;
+  }
   const Result<bool> drawn = has_meshes(request_->mode) ? draw_meshes() : draw_rays();
   if (!drawn) return drawn.error();
   if (!*drawn) return std::optional<ViewFrame>();
@@ -278,32 +281,38 @@ int DeviceDrawer::first_divisor() const {
   return chosen;
 }
 
-// As many as the time of a frame allows, so that fast devices settle soon.
-int DeviceDrawer::samples_now() const {
-  if (divisor_ > 1 || picture_->samples() == 0) return 1;
-  const double whole = static_cast<double>(request_->width) * request_->height * seconds_per_sample_;
-  const int affordable = whole > 0.0 ? static_cast<int>(std::min(options_.frame_seconds / whole, 64.0)) : 1;
-  return std::clamp(affordable, 1, request_->samples - picture_->samples());
-}
-
-Status DeviceDrawer::draw_stage() {
+// A picture is coarse at first, then ever finer, then of more samples.
+DeviceDrawer::Stage DeviceDrawer::next_stage() {
   const bool is_first = std::exchange(is_request_new_, false);
   const bool is_new = is_first || divisor_ > 1;
   divisor_ = is_first ? first_divisor() : std::max(divisor_ / 2, 1);
+  return {(request_->width + divisor_ - 1) / divisor_, (request_->height + divisor_ - 1) / divisor_,
+          is_new ? Accumulation::Restart : Accumulation::Continue};
+}
+
+// As many as the time of a frame allows, so that fast devices settle soon.
+int DeviceDrawer::samples_now(const Stage& stage, int before, int wanted) const {
+  if (stage.accumulation == Accumulation::Restart) return 1;
+  const double seconds = stage.pixels() * seconds_per_sample_;
+  const int affordable = seconds > 0.0 ? static_cast<int>(std::min(options_.frame_seconds / seconds, 64.0)) : 1;
+  return std::clamp(affordable, 1, wanted - before);
+}
+
+Status DeviceDrawer::draw_stage() {
+  const Stage stage = next_stage();
   RenderOptions wanted;
-  wanted.width = (request_->width + divisor_ - 1) / divisor_;
-  wanted.height = (request_->height + divisor_ - 1) / divisor_;
-  wanted.samples = is_new ? 1 : samples_now();
+  wanted.width = stage.width;
+  wanted.height = stage.height;
+  wanted.samples = samples_now(stage, picture_->samples(), request_->samples);
   wanted.light = request_->light;
   wanted.detail.colours = request_->detail_colours;
   if (request_->detail_by_pixels) wanted.detail.policy.emplace().rule = DetailPolicy::Rule::ByPixels;
   wanted.detail.selector = &selectors_[divisor_];
   // What is shown for a moment does not wait for impostors.
   if (divisor_ > 1) wanted.detail.impostor_seconds = 0.0;
-  const Accumulation accumulation = is_new ? Accumulation::Restart : Accumulation::Continue;
   const Clock::time_point start = Clock::now();
-  if (Status drawn = renderer_->draw(*picture_, request_->camera, wanted, accumulation); !drawn) return drawn;
-  seconds_per_sample_ = seconds_since(start) / (static_cast<double>(wanted.width) * wanted.height * wanted.samples);
+  if (Status drawn = renderer_->draw(*picture_, request_->camera, wanted, stage.accumulation); !drawn) return drawn;
+  seconds_per_sample_ = seconds_since(start) / (stage.pixels() * wanted.samples);
   is_settled_ = divisor_ == 1 && picture_->samples() >= request_->samples;
   return {};
 }
@@ -319,30 +328,17 @@ Result<bool> DeviceDrawer::draw_rays() {
 // Samples of paths are added as the time of a frame allows; they are read, freed of noise and shown whenever there are
 // twice as many as were shown before.
 Result<bool> DeviceDrawer::draw_path_stage() {
-  const bool is_first = std::exchange(is_request_new_, false);
-  const bool is_new = is_first || divisor_ > 1;
-  if (!paths_) {
-    paths_ = std::make_unique<VulkanPathPicture>(*renderer_);
-    seconds_per_sample_ = 0.0;
-  }
-  divisor_ = is_first ? first_divisor() : std::max(divisor_ / 2, 1);
-  const int width = (request_->width + divisor_ - 1) / divisor_;
-  const int height = (request_->height + divisor_ - 1) / divisor_;
-  const double pixels = static_cast<double>(width) * height;
-  const int before = is_new ? 0 : paths_->samples();
-  int samples = 1;
-  if (before > 0 && seconds_per_sample_ > 0.0) {
-    samples = static_cast<int>(std::min(options_.frame_seconds / (pixels * seconds_per_sample_), 64.0));
-    samples = std::clamp(samples, 1, std::min(kPathSamples, 2 * shown_samples_) - before);
-  }
-  const PathOptions wanted = path_options(*request_, width, height, samples, scene_->bounds(options_.cpu.instances));
-  const Accumulation accumulation = is_new ? Accumulation::Restart : Accumulation::Continue;
+  const Stage stage = next_stage();
+  const int to_show = stage.accumulation == Accumulation::Restart ? 1 : std::min(2 * shown_samples_, kPathSamples);
+  const PathOptions wanted =
+      path_options(*request_, stage.width, stage.height, samples_now(stage, paths_->samples(), to_show),
+                   scene_->bounds(options_.cpu.instances));
   const Clock::time_point start = Clock::now();
-  if (Status drawn = renderer_->draw_paths(*paths_, request_->camera, wanted, accumulation); !drawn)
+  if (Status drawn = renderer_->draw_paths(*paths_, request_->camera, wanted, stage.accumulation); !drawn)
     return drawn.error();
-  seconds_per_sample_ = seconds_since(start) / (pixels * samples);
+  seconds_per_sample_ = seconds_since(start) / (stage.pixels() * wanted.samples);
   is_settled_ = divisor_ == 1 && paths_->samples() >= kPathSamples;
-  if (!is_new && paths_->samples() < std::min(2 * shown_samples_, kPathSamples)) return false;
+  if (paths_->samples() < to_show) return false;
   auto taken = paths_->read(options_.cpu.threads);
   if (!taken) return taken.error();
   const auto colour = develop(*taken, develop_options(*request_));

@@ -67,6 +67,15 @@ class DeviceDrawer {
     std::size_t to_mesh = 0;
   };
 
+  /// What of a picture by rays or paths is drawn at once.
+  struct Stage {
+    [[nodiscard]] double pixels() const { return static_cast<double>(width) * height; }
+
+    int width = 0;
+    int height = 0;
+    Accumulation accumulation = Accumulation::Restart;
+  };
+
   Status prepare_meshes(SurfaceStyle style);
   [[nodiscard]] std::unique_ptr<LiveMeshes> live_meshes(SurfaceStyle style,
                                                         const SmoothOcclusionOptions& occlusion) const;
@@ -83,7 +92,8 @@ class DeviceDrawer {
   Status draw_stage();
   Result<bool> draw_path_stage();
   [[nodiscard]] int first_divisor() const;
-  [[nodiscard]] int samples_now() const;
+  [[nodiscard]] Stage next_stage();
+  [[nodiscard]] int samples_now(const Stage& stage, int before, int wanted) const;
   [[nodiscard]] ViewFrame frame(double seconds) const;
 
   const Scene* scene_;
@@ -109,7 +119,7 @@ class DeviceDrawer {
   int samples_ = 1;
   bool waits_ = false;                       // for impostors
   std::map<int, DetailSelector> selectors_;  // by divisor: pictures of another size are another view
-  double seconds_per_sample_ = 0.0;          // and pixel, of rays; 0: not known
+  double seconds_per_sample_ = 0.0;          // and pixel, of rays or of paths; 0: not known
   std::map<int, double> mesh_seconds_;       // of moving pictures, by divisor
   bool has_shaders_ = false;                 // for what these are of
 };

@@ -401,11 +401,9 @@ void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& 
 }
 
 const Surface& Lighting::surface_at(const SurfacePoint& point) const {
-  // As in smooth meshes, a field without materials is white.
-  static const Surface white{Vec3(1.0F)};
-  if (point.in_field && point.type == kAir) return white;
-  if (detail_surfaces_.empty()) return (*surfaces_)[point.type];
-  return detail_surfaces_[static_cast<std::size_t>(point.placed)];
+  const bool is_bare = point.in_field && point.type == kAir;
+  if (!detail_surfaces_.empty() && !is_bare) return detail_surfaces_[static_cast<std::size_t>(point.placed)];
+  return point.in_field ? surfaces_->of_field(point.type) : (*surfaces_)[point.type];
 }
 
 Vec3 Lighting::normal_colour(const SurfacePoint& point) const {

@@ -55,8 +55,13 @@ Surface surface_of(const VoxelProperties& properties, Clouds clouds) {
 
 }  // namespace
 
-void Surfaces::update(const VoxelRegistry& types) {
-  if (!types.has_changed_since(followed_)) return;
+const Surface& Surfaces::of_field(VoxelType material) const {
+  static const Surface white{Vec3(1.0F)};
+  return material == kAir ? white : (*this)[material];
+}
+
+bool Surfaces::update(const VoxelRegistry& types) {
+  if (!types.has_changed_since(followed_)) return false;
   ChangeCursor now = followed_;
   const TypeChanges changes = types.changes_since(now);
   followed_ = {};  // stays so when memory runs out
@@ -69,6 +74,7 @@ void Surfaces::update(const VoxelRegistry& types) {
   for (std::size_t type = 0; changes.all && type < types.size(); ++type) put(type);
   for (const TypeChange& change : changes.items) put(change.type);
   followed_ = now;
+  return true;
 }
 
 }  // namespace quoin

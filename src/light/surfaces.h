@@ -47,8 +47,8 @@ enum class Clouds : std::uint8_t {
 class Surfaces {
  public:
   explicit Surfaces(const VoxelRegistry& types, Clouds clouds = Clouds::AsGlass) : clouds_(clouds) { update(types); }
-  /// Takes over the types that changed. Cost: O(these).
-  void update(const VoxelRegistry& types);
+  /// Takes over the types that changed; false: none did. Cost: O(these).
+  bool update(const VoxelRegistry& types);
   /// Whether any type scatters light within: never with Clouds::AsGlass.
   [[nodiscard]] bool has_clouds() const {
     return std::ranges::any_of(surfaces_, [](const Surface& each) { return each.scattering > 0.0F; });
@@ -56,6 +56,8 @@ class Surfaces {
   [[nodiscard]] const Surface& operator[](VoxelType type) const {
     return surfaces_[type < surfaces_.size() - 1 ? type : surfaces_.size() - 1];
   }
+  /// Of a field's material; kAir: it has none, and is white as in smooth meshes.
+  [[nodiscard]] const Surface& of_field(VoxelType material) const;
 
  private:
   Clouds clouds_;

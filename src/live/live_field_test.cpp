@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <random>
+#include <thread>
 #include <tuple>
 #include <vector>
 
@@ -176,8 +178,11 @@ TEST(LiveField, WhatIsShownIsClosedAtAnyTimeWhileItIsEdited) {
     meshes.finish(one.scene, DVec3(0.0));
     shown.apply(meshes.take());
     std::size_t taken = 0;
-    for (int i = 0; i < (kIsSlow ? 10 : 60); ++i) {
-      if (random() % 3 != 0) dig(one.field(), random, 2);
+    const int edits = kIsSlow ? 10 : 60;
+    // On a busy machine workers may need longer than all the edits.
+    for (int i = 0; i < edits || taken == 0; ++i) {
+      if (i >= edits) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      if (i < edits && random() % 3 != 0) dig(one.field(), random, 2);
       meshes.update(one.scene, DVec3(64.0, 40.0, 64.0));
       const std::vector<SurfaceUpdate> updates = meshes.take();
       shown.apply(updates);
@@ -187,7 +192,6 @@ TEST(LiveField, WhatIsShownIsClosedAtAnyTimeWhileItIsEdited) {
       }
       if (random() % 30 == 0) meshes.finish(one.scene, DVec3(0.0));
     }
-    EXPECT_GT(taken, 0U);
     meshes.finish(one.scene, DVec3(0.0));
     shown.apply(meshes.take());
     EXPECT_EQ(meshes.pending(), 0U);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <utility>
 
 #include <glm/geometric.hpp>
@@ -33,6 +34,7 @@ quoin::SceneGrid ship_of(quoin::VoxelType hull, quoin::VoxelType light) {
 
 quoin::Result<std::unique_ptr<Game>> Game::create(const GameOptions& options) {
   std::unique_ptr<Game> game(new Game(options));
+  if (const auto opened = game->open_world(); !opened) return opened.error();
   if (const auto made = game->make_land(); !made) return made.error();
   game->tracer_.emplace(game->scene_);
   if (const auto made = game->add_ships(); !made) return made.error();
@@ -41,6 +43,40 @@ quoin::Result<std::unique_ptr<Game>> Game::create(const GameOptions& options) {
   game->known_ = game->land().snapshot();
   game->changes_ = game->known_.cursor();
   return game;
+}
+
+// Ships are no part of the land: they start anew.
+quoin::Status Game::open_world() {
+  if (options_.world.empty()) return {};
+  auto world = quoin::WorldStore::open_or_create(options_.world);
+  if (!world) return world.error();
+  auto loaded = load_world(*world);
+  if (!loaded) return loaded.error();
+  world_ = std::move(*world);
+  scene_ = std::move(loaded->loaded.scene);
+  saver_ = std::move(loaded->saver);
+  for (const quoin::GridHandle grid : scene_.grids().handles()) {
+    if (scene_.grids()[grid].name == "land") {
+      land_ = grid;
+    } else {
+      scene_.remove_grid(grid);
+    }
+  }
+  return {};
+}
+
+// What changed since the last time; the world's own thread writes it.
+void Game::save() {
+  if (!world_) return;
+  quoin::WorldChanges more;
+  const auto* place = reinterpret_cast<const std::byte*>(&player_.centre);
+  more.put_value("player", {place, place + sizeof(player_.centre)});
+  if (const auto begun = saver_.save(*world_, scene_, std::move(more)); !begun) saved_ = begun.error();
+}
+
+quoin::Status Game::finish() {
+  save();
+  return world_ && saved_ ? world_->flush() : saved_;
 }
 
 quoin::Status Game::make_land() {
@@ -52,17 +88,23 @@ quoin::Status Game::make_land() {
     properties.colour = colours[i];
     properties.collides = false;
     properties.emission = 1.0F;
-    const auto torch = scene_.types.add(properties);
+    const auto torch = scene_.types.find_or_add(properties);
     if (!torch) return torch.error();
     torches_[i] = *torch;
   }
   sand_ = types->sand;
   stone_ = types->stone;
+  if (const quoin::SceneGrid* const kept = scene_.grids().find(land_)) {
+    size_ = kept->canvas.max;
+    return {};
+  }
   const quoin::TerrainOptions terrain{.seed = options_.seed, .size = {options_.units, 8, options_.units}};
   auto grid = quoin::generate_terrain(terrain, *types);
   if (!grid) return grid.error();
   size_ = terrain.size * quoin::kTerrainUnit;
   quoin::SceneGrid land;
+  land.name = "land";
+  land.canvas = {{0, 0, 0}, size_};
   land.grid = std::move(*grid);
   land_ = scene_.add_grid(std::move(land));
   quoin::Instance instance{"land", land_};
@@ -76,7 +118,7 @@ quoin::Status Game::add_ships() {
     const auto shade = static_cast<std::uint8_t>(40 * kind);
     quoin::VoxelProperties hull;
     hull.colour = {static_cast<std::uint8_t>(90 + shade), 100, static_cast<std::uint8_t>(200 - shade), 255};
-    const auto type = scene_.types.add(hull);
+    const auto type = scene_.types.find_or_add(hull);
     if (!type) return type.error();
     const quoin::GridHandle grid = scene_.add_grid(ship_of(*type, torches_[0]));
     for (int i = kind; i < options_.ships; i += 4) {
@@ -95,6 +137,10 @@ quoin::Status Game::add_ships() {
 
 void Game::place_player() {
   player_.centre = {size_.x / 2.0 + 0.5, surface_at(size_.x / 2, size_.z / 2) + 4.0, size_.z / 2.0 + 0.5};
+  if (world_ && frame_ == 0) {
+    const auto kept = world_->value("player");
+    if (kept && *kept && (*kept)->size() == sizeof(DVec3)) std::memcpy(&player_.centre, (*kept)->data(), sizeof(DVec3));
+  }
   if (const auto away = displacement_to_free_place(*tracer_, player_, 16.0)) player_.centre += *away;
 }
 
@@ -139,6 +185,8 @@ FrameTimes Game::step(const Input& input) {
   light_.update(scene_);
   light_.take();
   done(Light);
+  if (++frame_ % 300 == 0) save();  // every five seconds
+  done(Saving);
   return times;
 }
 

@@ -20,6 +20,7 @@ struct GameOptions {
   int slide_chunks = 0;    ///< chunks that a landslide touches in a frame; 0: none
   bool meshes = true;      ///< whether they are made, for a renderer that would draw them
   std::uint64_t seed = 7;  ///< of the land, the ships and the edits
+  std::string world;       ///< the file that keeps the land, a .quoin; empty: none
 };
 
 /// What the player wants in a frame.
@@ -32,18 +33,21 @@ struct Input {
 };
 
 /// What a frame took of the caller's thread, in milliseconds, by parts.
-enum Part : std::uint8_t { Total, Edits, Sand, Tracer, Ships, Player, Meshes, Light };
-inline constexpr std::array kParts = {"frame", "edits", "sand", "tracer", "ships", "player", "meshes", "light"};
+enum Part : std::uint8_t { Total, Edits, Sand, Tracer, Ships, Player, Meshes, Light, Saving };
+inline constexpr std::array kParts = {"frame",  "edits",  "sand",  "tracer", "ships",
+                                      "player", "meshes", "light", "saving"};
 using FrameTimes = std::array<double, kParts.size()>;
 
 /// A landscape of blocks with caves, a player who walks and digs in it, sand that falls, ships, and others' edits.
 class Game {
  public:
-  /// Errors: as generate_terrain.
+  /// Goes on with the world that there is. Errors: as generate_terrain, and of that world.
   [[nodiscard]] static quoin::Result<std::unique_ptr<Game>> create(const GameOptions& options);
 
   /// A sixtieth of a second.
   FrameTimes step(const Input& input);
+  /// Returns once all of the world is on disk; what could not be saved is an error.
+  [[nodiscard]] quoin::Status finish();
 
   [[nodiscard]] const quoin::Scene& scene() const { return scene_; }
   [[nodiscard]] const quoin::SceneTracer& tracer() const { return *tracer_; }
@@ -65,6 +69,8 @@ class Game {
   };
 
   explicit Game(const GameOptions& options) : options_(options), state_(options.seed) {}
+  [[nodiscard]] quoin::Status open_world();
+  void save();
   [[nodiscard]] quoin::Status make_land();
   [[nodiscard]] quoin::Status add_ships();
   void place_player();
@@ -90,6 +96,10 @@ class Game {
   quoin::LiveMeshes meshes_;
   quoin::LiveLight light_;
   std::vector<Ship> ships_;
+  std::optional<quoin::WorldStore> world_;
+  quoin::WorldSaver saver_;
+  quoin::Status saved_;
+  int frame_ = 0;
   quoin::OrientedBox player_{{0, 0, 0}, {0.3, 0.9, 0.3}};
   quoin::DVec3 falling_{0.0}, gaze_{0, 0, -1};
   quoin::SlideResult moved_;

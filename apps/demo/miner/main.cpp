@@ -43,7 +43,7 @@ double resident_bytes() {
   return 4096.0 * resident;
 }
 
-int play(miner::Game& game, int frames, bool paced, bool as_json) {
+void play(miner::Game& game, int frames, bool paced, bool as_json) {
   std::array<std::vector<double>, miner::kParts.size()> times;
   game.meshes().finish(game.scene(), game.eye());
   game.light().finish(game.scene());
@@ -67,7 +67,6 @@ int play(miner::Game& game, int frames, bool paced, bool as_json) {
   json["player"] = {game.player().centre.x, game.player().centre.y, game.player().centre.z};
   json["pending"] = game.meshes().pending();
   std::printf("%s\n", as_json ? json.dump(2).c_str() : json["frame_ms"].dump().c_str());
-  return 0;
 }
 
 }  // namespace
@@ -86,6 +85,7 @@ int main(int argc, char** argv) {
   app.add_option("--edits", options.edits, "a frame, all over the land")->check(CLI::Range(0, 10'000));
   app.add_option("--landslides", options.slide_chunks, "chunks in which sand falls a frame")
       ->check(CLI::Range(0, 10'000));
+  app.add_option("--world", options.world, "NAME.quoin: keeps the land, what was built, where the player is");
   app.add_option("--seed", options.seed, "of the land");
   app.add_flag("!--unpaced", paced, "without waiting for a sixtieth of a second a frame");
   app.add_flag("--json", as_json, "all figures");
@@ -93,11 +93,18 @@ int main(int argc, char** argv) {
   options.meshes = frames > 0;
   const auto game = miner::Game::create(options);
   quoin::Status ended = game ? quoin::Status{} : game.error();
-  if (game && frames > 0) return play(**game, frames, paced, as_json);
+  if (game && frames > 0) {
+    play(**game, frames, paced, as_json);
+    ended = (*game)->finish();
+  }
 #ifdef MINER_HAS_WINDOW
-  if (game) ended = miner::play_in_window(**game, device);
+  if (game && frames == 0) {
+    ended = miner::play_in_window(**game, device);
+    if (const auto kept = (*game)->finish(); ended) ended = kept;
+  }
 #else
-  if (game) ended = quoin::make_error(quoin::ErrorCode::Unsupported, "built without SDL2: no window; see --frames");
+  if (game && frames == 0)
+    ended = quoin::make_error(quoin::ErrorCode::Unsupported, "built without SDL2: no window; see --frames");
 #endif
   if (!ended) std::fprintf(stderr, "quoin_miner: %s\n", quoin::to_string(ended.error()).c_str());
   return ended ? 0 : 1;

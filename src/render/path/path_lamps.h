@@ -67,6 +67,8 @@ class PathLamps {
     std::int32_t placed = 0;
     std::int32_t lamp = -1;  ///< -1: the slot is free
     Direction direction = Direction::PosX;
+
+    [[nodiscard]] friend bool operator==(const Face&, const Face&) = default;
   };
   // For renderers that sample elsewhere.
   [[nodiscard]] std::span<const PathLamp> lamps() const { return lamps_; }

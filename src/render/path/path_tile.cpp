@@ -325,9 +325,7 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
     vertex.in_grid = on_face(vertex.in_grid, voxel, face);
     type = placed.voxels->get(voxel);
   }
-  // As in smooth meshes, a field without materials is white.
-  static const Surface white{Vec3(1.0F)};
-  const Surface& surface = in_field && type == kAir ? white : (*context_->surfaces)[type];
+  const Surface& surface = in_field ? context_->surfaces->of_field(type) : (*context_->surfaces)[type];
   if (path.is_first) sums_[path.pixel].scene_share += 1.0F;
   if ((hits.grids.starts_inside >> lane & 1U) != 0) {  // from inside: its own colour, unlit
     path.radiance += path.throughput * (path.is_seen ? surface.colour : surface.emitted);

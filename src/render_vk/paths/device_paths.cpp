@@ -35,6 +35,11 @@ bool is_same_sky(Look a, const Look& b) {
   return a == b;
 }
 
+// Whether the same faces are part of the same lamps, which one finds by the same ways.
+bool has_same_faces(const path::PathLamps& a, const path::PathLamps& b) {
+  return std::ranges::equal(a.faces(), b.faces()) && std::ranges::equal(a.tree().ways(), b.tree().ways());
+}
+
 template <class T>
 Status put_values(DeviceMemory& memory, Place& place, std::span<const T> values) {
   return put_table(memory, place, std::as_bytes(values));
@@ -44,44 +49,53 @@ Status put_values(DeviceMemory& memory, Place& place, std::span<const T> values)
 
 void DevicePaths::look_at(const Scene* scene) {
   lamps_ = nullptr;
-  has_sent_surfaces_ = false;
   if (scene != scene_) {
     cache_ = {};
     surfaces_.reset();
   }
   scene_ = scene;
   if (scene == nullptr) return;
-  if (surfaces_) {
-    surfaces_->update(scene->types);
-  } else {
+  if (!surfaces_) {
     surfaces_.emplace(scene->types, Clouds::Scatter);
+    has_sent_surfaces_ = false;
+  } else if (surfaces_->update(scene->types)) {
+    has_sent_surfaces_ = false;
   }
 }
 
-std::shared_ptr<const path::PathLamps> DevicePaths::lamps(const Placement& placement, double brightness) {
-  if (lamps_ != nullptr && brightness_ == brightness) return lamps_;
+void DevicePaths::find_lamps(const Placement& placement, double brightness) {
+  if (scene_ == nullptr || (lamps_ != nullptr && brightness_ == brightness)) return;
   std::vector<PlacedGrid> placed;
   placed.reserve(placement.placed.size());
   for (const DevicePlaced& each : placement.placed) placed.push_back(each.placed);
   lamps_ = cache_.lamps(*scene_, placed, *surfaces_, brightness);
   brightness_ = brightness;
-  return lamps_;
 }
 
-Status DevicePaths::put(DeviceMemory& memory, const PathOptions& options, ShaderPathFrame& frame) {
-  Status done = try_put(memory, options, frame);
+Status DevicePaths::put(DeviceMemory& memory, const Placement& placement, const PathOptions& options,
+                        ShaderPathFrame& frame) {
+  Status done = try_put(memory, placement, options, frame);
   if (done) return done;
   memory.discard();
-  for (Place* place : {&surfaces_place_, &sky_pixels_, &sky_rows_, &sky_columns_, &gloss_}) memory.release(*place);
+  for (Place* place :
+       {&surfaces_place_, &sky_pixels_, &sky_rows_, &sky_columns_, &gloss_, &lamp_ways_, &face_keys_, &face_lamps_}) {
+    memory.release(*place);
+  }
   has_sent_surfaces_ = false;
   look_.reset();
+  of_faces_ = nullptr;
   return done;
 }
 
-Status DevicePaths::try_put(DeviceMemory& memory, const PathOptions& options, ShaderPathFrame& frame) {
+Status DevicePaths::try_put(DeviceMemory& memory, const Placement& placement, const PathOptions& options,
+                            ShaderPathFrame& frame) {
+  find_lamps(placement, options.lamp_brightness);
   Status done = put_surfaces(memory);
   if (done) done = put_sky(memory, options);
   if (done && gloss_.size == 0) done = put_values(memory, gloss_, path::gloss_table());
+  if (done) done = put_faces(memory);
+  // What is kept is sent, whatever becomes of the rest of the picture.
+  if (done) done = memory.flush();
   if (!done) return done;
   frame.gloss = gloss_.address;
   frame.sky_model = static_cast<std::int32_t>(sky_->model());
@@ -96,6 +110,12 @@ Status DevicePaths::try_put(DeviceMemory& memory, const PathOptions& options, Sh
     frame.sky_columns = sky_columns_.address;
   }
   frame.environment = {sky_->turn().sine, sky_->turn().cosine, 0.0F, 0.0F};
+  if (lamps_ != nullptr && !lamps_->empty()) {
+    frame.lamp_ways = lamp_ways_.address;
+    frame.face_keys = face_keys_.address;
+    frame.face_lamps = face_lamps_.address;
+    frame.face_mask = static_cast<std::uint32_t>(std::max<std::size_t>(lamps_->faces().size(), 1) - 1);
+  }
   if (sky_->has_sun()) frame.flags |= kPathSun;
   if (sky_->has_uneven_sky()) frame.flags |= kPathUneven;
   return done;
@@ -126,6 +146,28 @@ Status DevicePaths::put_sky(DeviceMemory& memory, const Look& look) {
   return done;
 }
 
+Status DevicePaths::put_faces(DeviceMemory& memory) {
+  if (lamps_ == nullptr || lamps_->empty()) return {};
+  if (of_faces_ != nullptr && has_same_faces(*of_faces_, *lamps_)) return {};
+  of_faces_ = nullptr;
+  std::vector<IVec4> keys;
+  std::vector<std::int32_t> lamps;
+  for (const path::PathLamps::Face& face : lamps_->faces()) {
+    keys.emplace_back(face.voxel, face.placed * 8 + static_cast<std::int32_t>(face.direction));
+    lamps.push_back(face.lamp);
+  }
+  // Where no face glows a lookup still needs a free slot.
+  if (lamps.empty()) {
+    keys.emplace_back(0);
+    lamps.push_back(-1);
+  }
+  Status done = put_values(memory, lamp_ways_, lamps_->tree().ways());
+  if (done) done = put_values(memory, face_keys_, std::span<const IVec4>(keys));
+  if (done) done = put_values(memory, face_lamps_, std::span<const std::int32_t>(lamps));
+  if (done) of_faces_ = lamps_;
+  return done;
+}
+
 LampTables lamp_tables(const path::PathLamps& lamps, DVec3 view_origin) {
   LampTables tables;
   tables.lamps.reserve(lamps.size());
@@ -144,16 +186,6 @@ LampTables lamp_tables(const path::PathLamps& lamps, DVec3 view_origin) {
     node.high = Vec4(from.bounds.high + to_view, from.bounds.cos_spread);
     node.axis = Vec4(from.bounds.axis, from.bounds.cos_edge);
     node.next = {from.second, from.lamp, 0, 0};
-  }
-  tables.ways.assign(lamps.tree().ways().begin(), lamps.tree().ways().end());
-  for (const path::PathLamps::Face& face : lamps.faces()) {
-    tables.face_keys.emplace_back(face.voxel, face.placed * 8 + static_cast<std::int32_t>(face.direction));
-    tables.face_lamps.push_back(face.lamp);
-  }
-  // Where no face glows a lookup still needs a free slot.
-  if (tables.face_lamps.empty()) {
-    tables.face_keys.emplace_back(0);
-    tables.face_lamps.push_back(-1);
   }
   return tables;
 }

@@ -16,19 +16,19 @@
 
 namespace quoin::vulkan {
 
-/// What paths look up, in device memory: types as light by paths sees them, the sky, what gloss reflects. It is sent
-/// again where it is another than before.
+/// What paths look up, in device memory: types as light by paths sees them, the sky, what gloss reflects, of which
+/// lamps faces are part. It is sent again where it is another than before.
 class DevicePaths {
  public:
   /// Of this scene from now on, as it is now; null: there is none. What lights others is found anew.
   void look_at(const Scene* scene);
 
-  /// Puts in place what a picture needs, and says so in its frame; all but lamps.
-  /// Errors: LimitExceeded; after one it holds nothing.
-  [[nodiscard]] Status put(DeviceMemory& memory, const PathOptions& options, ShaderPathFrame& frame);
+  /// Puts in place what a picture of what is placed needs, and says so in its frame; all but lamps as they lie from it.
+  /// Errors: LimitExceeded; after one it holds nothing. Requires: the scene was not edited since `look_at`.
+  [[nodiscard]] Status put(DeviceMemory& memory, const Placement& placement, const PathOptions& options,
+                           ShaderPathFrame& frame);
 
-  /// The lamps of the instances that are placed. Requires: a scene, unedited since `look_at`.
-  [[nodiscard]] std::shared_ptr<const path::PathLamps> lamps(const Placement& placement, double brightness);
+  [[nodiscard]] const path::PathLamps* lamps() const { return lamps_.get(); }  ///< of the last `put`; null: no scene
 
   [[nodiscard]] std::uint64_t surfaces_address() const { return surfaces_place_.address; }
   [[nodiscard]] std::uint32_t last_surface() const { return last_surface_; }
@@ -36,9 +36,11 @@ class DevicePaths {
   [[nodiscard]] const path::SkyLight& sky() const { return *sky_; }  ///< of the last `put`
 
  private:
-  Status try_put(DeviceMemory& memory, const PathOptions& options, ShaderPathFrame& frame);
+  Status try_put(DeviceMemory& memory, const Placement& placement, const PathOptions& options, ShaderPathFrame& frame);
   Status put_surfaces(DeviceMemory& memory);
   Status put_sky(DeviceMemory& memory, const Look& look);
+  void find_lamps(const Placement& placement, double brightness);
+  Status put_faces(DeviceMemory& memory);
 
   const Scene* scene_ = nullptr;
   std::optional<Surfaces> surfaces_;
@@ -54,15 +56,16 @@ class DevicePaths {
   path::PathLampCache cache_;
   std::shared_ptr<const path::PathLamps> lamps_;  // null: out of date
   double brightness_ = 0.0;
+  std::shared_ptr<const path::PathLamps> of_faces_;  // those whose faces and ways were sent
+  Place lamp_ways_;
+  Place face_keys_;
+  Place face_lamps_;
 };
 
 /// A picture's lamps as shaders have them, from where view space has its origin in the world.
 struct LampTables {
   std::vector<ShaderPathLamp> lamps;
   std::vector<ShaderLampNode> nodes;
-  std::vector<std::uint64_t> ways;
-  std::vector<IVec4> face_keys;
-  std::vector<std::int32_t> face_lamps;
 };
 [[nodiscard]] LampTables lamp_tables(const path::PathLamps& lamps, DVec3 view_origin);
 

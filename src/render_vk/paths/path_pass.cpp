@@ -61,17 +61,12 @@ PathPass::PathPass(RendererImpl& renderer, PathPictureImpl& picture)
     : renderer_(&renderer), picture_(&picture), places_(renderer.memory, kDoing) {}
 
 Status PathPass::put_lamps(DVec3 view_origin, ShaderPathFrame& paths) {
-  if (renderer_->voxels == nullptr) return {};
-  const auto lamps = renderer_->paths->tables.lamps(renderer_->scene.placement(), picture_->options.lamp_brightness);
-  if (lamps->empty()) return {};
+  const path::PathLamps* const lamps = renderer_->paths->tables.lamps();
+  if (lamps == nullptr || lamps->empty()) return {};
   const LampTables tables = lamp_tables(*lamps, view_origin);
   paths.lamp_count = static_cast<std::uint32_t>(tables.lamps.size());
-  paths.face_mask = static_cast<std::uint32_t>(tables.face_lamps.size() - 1);
   Status done = places_.upload(tables.lamps, paths.lamps);
   if (done) done = places_.upload(tables.nodes, paths.lamp_nodes);
-  if (done) done = places_.upload(tables.ways, paths.lamp_ways);
-  if (done) done = places_.upload(tables.face_keys, paths.face_keys);
-  if (done) done = places_.upload(tables.face_lamps, paths.face_lamps);
   return done;
 }
 
@@ -108,7 +103,7 @@ Status PathPass::put_frame() {
   ShaderFrame& frame = data.frame;
   const DVec3 view_origin = camera.position + data.view_origin;
   ShaderPathFrame paths;
-  Status done = renderer_->paths->tables.put(renderer_->memory, options, paths);
+  Status done = renderer_->paths->tables.put(renderer_->memory, placement, options, paths);
   if (!done) return done;
   put_options(camera, options, view_origin, paths);
   if (options.denoise && (options.fog.has_value() || renderer_->paths->tables.has_clouds())) paths.flags |= kPathMedia;

@@ -12,8 +12,10 @@
 #include <quoin/render/path_tracer.h>
 
 #include "render/path/town_for_tests.h"
+#include "render_vk/device/access.h"
 #include "render_vk/device/vulkan_for_tests.h"
 #include "render_vk/lakeside_for_tests.h"
+#include "render_vk/march/renderer_impl.h"
 
 namespace quoin::vulkan_test {
 namespace {
@@ -260,6 +262,33 @@ TEST_F(VulkanPaths, FollowEdits) {
   scene.edit(grid).grid.fill_box({{-4, 0, 10}, {2, 6, 12}}, type);
   scene.lamps.clear();
   expect_same_light(scene, of_town(), small(), "edited");
+}
+
+TEST_F(VulkanPaths, KeepTheFacesThatGlowUntilTheyAreOthers) {
+  Scene scene = town();
+  const vulkan::DeviceMemory& memory = vulkan::Access::of(*renderer_).memory;
+  const auto sent = [&] {
+    EXPECT_TRUE(renderer_->update(scene));
+    const std::uint64_t before = memory.written();
+    EXPECT_TRUE(renderer_->render_paths(of_town(), small(1)));
+    return memory.written() - before;
+  };
+  const std::uint64_t first = sent();
+  const std::uint64_t again = sent();
+  EXPECT_LT(again, first);
+  const GridHandle grid = scene.instances()[scene.instances().handles().front()].grid;
+  scene.edit(grid).grid.fill_box({{-4, 0, 10}, {2, 6, 12}}, 1);
+  EXPECT_EQ(sent(), again) << "what glows is where it was";
+  VoxelProperties glowing;
+  glowing.colour = {90, 255, 90, 255};
+  glowing.emission = 9.0F;
+  const VoxelType type = scene.types.add(glowing).value_or(kAir);
+  const std::uint64_t with_a_type = sent();
+  EXPECT_GT(with_a_type, again);
+  scene.edit(grid).grid.fill_box({{-4, 0, 10}, {2, 6, 12}}, type);
+  // Over a hundred unit faces, which take 20 bytes each and as many free slots.
+  EXPECT_GT(sent(), again + 4'000);
+  expect_same_light(scene, of_town(), small(), "glowing");
 }
 
 TEST_F(VulkanPaths, RefuseWhatTheProcessorRefuses) {

@@ -5,7 +5,6 @@
 #ifdef QUOIN_X86_KERNELS
 
 #include "trace/kernel/field.inl"
-#include "trace/kernel/field_packet.inl"
 
 namespace quoin::trace {
 

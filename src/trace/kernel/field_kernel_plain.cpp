@@ -1,9 +1,127 @@
-// Rays in fields for any processor, one at a time: the walk of trace/kernel/field_walk.inl.
+// One ray in a field of densities, from cell to cell by the planes that it crosses: for processors without the kernels'
+// instructions, and for rays that those leave to others. Slow through what is empty only where that is thin: wider gaps
+// are left to the tree.
+//
+//      tree                     planes               planes, cells without solid            tree
+//   o--------->|  s  |  s  |  s  |     |     |     |   from here the next one that is not  ------->|  s  |
+//      empty    look, meet_cell, step      up to kMaxEmptySteps                       empty
+//
+// An `s` is a cell with a solid corner. In each of them the field's cubic along the ray is asked (meet_cell), from
+// where the ray comes into the cell to where it leaves it (span_).
 
-#include "trace/kernel/field_walk.inl"
+#include <optional>
+
+#include "trace/kernel/cell.inl"
 #include "trace/kernel/kernel.h"
+#include "trace/tree_view.h"
 
 namespace quoin::trace {
+namespace {
+
+// How many empty cells are stepped through one by one before the tree is asked for the next one that is not.
+constexpr int kMaxEmptySteps = 3;
+// A ray is asked about anew from the middle of a cell that it passes for at least this, in t.
+constexpr double kLeastSpan = 1e-6;
+
+// Asks a tree of cells that lie near each other.
+class NearbyCells {
+ public:
+  explicit NearbyCells(const OccupancyTree& tree) : nodes_(tree) {}
+
+  [[nodiscard]] bool is_occupied(IVec3 cell) {
+    const IVec3 brick = cell >> 4;
+    if (brick != brick_ || !knows_) {
+      brick_ = brick;
+      knows_ = true;
+      const ChunkNode* const chunk = nodes_.find_chunk(cell >> kChunkShift);
+      const auto index = static_cast<std::size_t>((brick.x & 3) + 4 * (brick.y & 3) + 16 * (brick.z & 3));
+      words_ = chunk == nullptr ? nullptr : &nodes_.brick(chunk->bricks[index]);
+    }
+    if (words_ == nullptr) return false;
+    const auto word = static_cast<std::size_t>((cell.x >> 2 & 3) + 4 * (cell.y >> 2 & 3) + 16 * (cell.z >> 2 & 3));
+    return ((*words_)[word] >> ((cell.x & 3) + 4 * (cell.y & 3) + 16 * (cell.z & 3)) & 1U) != 0;
+  }
+
+ private:
+  TreeNodes nodes_;
+  IVec3 brick_{0};
+  bool knows_ = false;
+  const Node* words_ = nullptr;
+};
+
+// A ray's way from cell to cell at a field's surface: for processors without the kernels' instructions, and for rays
+// that those leave to others.
+template <bool kAsksWhere>
+class SurfaceWalk {
+ public:
+  SurfaceWalk(const OccupancyTree& tree, const FieldView& field, const Ray& ray, double max_t)
+      : tree_(tree), field_(field), cells_(tree), ray_(ray), in_cells_(cell_ray(ray, max_t)) {}
+
+  std::optional<FieldHit> find() {
+    std::optional<RayHit> next = first_hit(tree_, ray_, in_cells_.max_t);
+    while (next) {
+      cell_ = next->voxel;
+      do {
+        look();
+        FieldHit hit{0.0, cell_.x, cell_.y, cell_.z, {}};
+        field_.read(*field_.grid, cell_.x, cell_.y, cell_.z, hit.corners);
+        hit.t = meet_cell<kAsksWhere>(in_cells_, at_, span_, hit.corners);
+        if (hit.t >= 0.0) return hit;
+        if (!step()) return std::nullopt;
+      } while (cells_.is_occupied(cell_));
+      next = find_next_cell();
+    }
+    return std::nullopt;
+  }
+
+ private:
+  void look() {
+    for (int axis = 0; axis < 3; ++axis) at_[axis] = cell_[axis];
+    span_ = span_in(in_cells_, at_);
+  }
+
+  // Into the next cell, through the plane that is crossed first; false when that lies beyond the end.
+  bool step() {
+    if (span_.t_out > in_cells_.max_t) return false;
+    int axis = -1;
+    double least = 0.0;
+    for (int other = 0; other < 3; ++other) {
+      const double d = in_cells_.direction[other];
+      if (d == 0.0) continue;
+      const double t = (cell_[other] + (d > 0.0 ? 1.0 : 0.0) - ray_.origin[other]) * in_cells_.inverse[other];
+      if (axis < 0 || t < least) {
+        axis = other;
+        least = t;
+      }
+    }
+    cell_[axis] += in_cells_.direction[axis] > 0.0 ? 1 : -1;
+    return true;
+  }
+
+  // From a cell that touches no solid to the next that does.
+  std::optional<RayHit> find_next_cell() {
+    for (int steps = 0;; ++steps) {
+      look();
+      if (steps >= kMaxEmptySteps && span_.t_out - span_.t_in >= kLeastSpan) break;
+      if (!step()) return std::nullopt;
+      if (cells_.is_occupied(cell_)) return RayHit{cell_};
+    }
+    const double from = span_.t_in + 0.5 * (span_.t_out - span_.t_in);
+    if (from > in_cells_.max_t) return std::nullopt;
+    return first_hit(tree_, {ray_.origin + ray_.direction * from, ray_.direction}, in_cells_.max_t - from);
+  }
+
+  const OccupancyTree& tree_;
+  const FieldView& field_;
+  NearbyCells cells_;
+  Ray ray_;
+  CellRay in_cells_;
+  IVec3 cell_{0};
+  double at_[3] = {};  // the cell again
+  CellSpan span_{};
+};
+
+}  // namespace
 
 bool walk_in_field(const OccupancyTree& cells, const FieldView& field, const Ray& ray, double max_t, bool asks_where,
                    FieldHit& hit) {

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <quoin/store/world_care.h>
+
+#include "store/salvage/page_scan.h"
+#include "store/world/world_changes.h"
+
+namespace quoin::store {
+
+/// What a damaged world has besides its chunks, as far as it is sound, and what stands for what is lost.
+class FoundParts {
+ public:
+  FoundParts();
+
+  /// Takes all parts that SQLite can read. False where it cannot read all of them.
+  bool read(Connection& connection, std::vector<WorldDamage>& damage);
+  /// Takes a record that was found in the file's pages, if it is a sound part and newer than what is there.
+  void add(const PageRecord& record);
+
+  [[nodiscard]] float band(std::uint32_t grid) const;
+  /// As many types as there can be: what chunks are checked against before it is known which are lost.
+  [[nodiscard]] const VoxelRegistry& any_types() const { return any_types_; }
+  /// Sees to it that there is such a grid, and types up to a number.
+  void add_grid(std::uint32_t grid);
+  void add_types_up_to(VoxelType last);
+  /// Puts what was not put yet into changes.
+  void move_to(WorldChanges& changes);
+
+  /// Sound ones.
+  [[nodiscard]] std::size_t count() const { return count_; }
+  /// A line for each thing that is lost.
+  [[nodiscard]] std::vector<std::string> lost() const { return lost_; }
+
+ private:
+  struct Found {
+    std::uint64_t revision = 0;
+    PartBody body;
+  };
+  void take(const Part& part);
+
+  VoxelRegistry any_types_;
+  std::map<PartKey, Found> parts_;
+  std::set<PartKey> put_;
+  std::size_t count_ = 0;
+  std::int64_t types_put_ = 0;
+  std::map<std::uint32_t, WorldGrid> grids_;
+  std::set<std::uint32_t> placed_grids_;
+  std::int64_t next_instance_ = 0;
+  std::vector<std::string> lost_;
+};
+
+}  // namespace quoin::store

@@ -1,0 +1,260 @@
+#include <quoin/store/world_care.h>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include <glm/common.hpp>
+#include <quoin/io/file.h>
+
+#include "io/whole_file.h"
+#include "store/care/world_rows.h"
+#include "store/chunk/chunk_body.h"
+#include "store/database/world_lock.h"
+#include "store/world/part_text.h"
+#include "store/world/world_open.h"
+#include "store/world/world_rules.h"
+
+namespace quoin {
+
+using namespace store;
+
+namespace {
+
+constexpr std::array kKinds = {part::kType,  part::kGrid,      part::kInstance, part::kGroup,
+                               part::kLayer, part::kLamp,      part::kCamera,   part::kView,
+                               part::kSun,   part::kThumbnail, part::kValue,    part::kWorld};
+
+std::uint64_t file_bytes(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, error);
+  return error ? 0 : bytes;
+}
+
+/// Tells of bytes that were read, as a share of a file's.
+class ReadProgress {
+ public:
+  ReadProgress(const Progress& progress, const std::filesystem::path& path)
+      : progress_(progress), bytes_(static_cast<double>(std::max<std::uint64_t>(file_bytes(path), 1))) {}
+  /// Whether to go on.
+  bool add(std::size_t bytes) {
+    read_ += bytes;
+    if (!progress_ || (++calls_ & 255U) != 0) return true;
+    is_cancelled_ = !progress_(std::min(1.0, static_cast<double>(read_) / bytes_));
+    return !is_cancelled_;
+  }
+  [[nodiscard]] Status status() const {
+    return is_cancelled_ ? Status(make_error(ErrorCode::Cancelled, "cancelled")) : Status();
+  }
+
+ private:
+  const Progress& progress_;
+  double bytes_;
+  std::size_t read_ = 0;
+  unsigned calls_ = 0;
+  bool is_cancelled_ = false;
+};
+
+Result<WorldSummary> summarize(const std::filesystem::path& path, const Progress& progress) {
+  auto reader = open_reader(path);
+  if (!reader) return reader.error();
+  const auto rules = read_rules(*reader);
+  if (!rules) return rules.error();
+  WorldSummary summary;
+  const auto version = reader->connection().number("PRAGMA user_version");
+  if (!version) return version.error();
+  summary.version = static_cast<int>(*version);
+  summary.bytes = file_bytes(path) + file_bytes(path.string() + "-wal");
+  summary.types = rules->types.size() - 1;
+  for (const auto& [number, grid] : rules->grids) summary.grids[number].grid = grid;
+  const auto count = [&](const char* kind, std::size_t& counted) {
+    return reader->each_part(kind, [&](const Part&, bool) { ++counted; });
+  };
+  if (auto done = count(part::kInstance, summary.instances); !done) return done.error();
+  if (auto done = count(part::kValue, summary.values); !done) return done.error();
+  if (const auto revision = reader->part({part::kWorld, std::string("revision")}); revision && *revision) {
+    const char* const digits = reinterpret_cast<const char*>((*revision)->data());
+    std::from_chars(digits, digits + (*revision)->size(), summary.saves);
+  }
+  std::vector<std::string> damage;
+  ChunkRows rows(reader->connection());
+  const std::map<std::int64_t, RegionPlace> regions = rows.regions(damage);
+  ReadProgress reading(progress, path);
+  const auto gaps = rows.each([&](std::int64_t key, std::span<const std::byte> body) {
+    const auto region = regions.find(key >> kRegionBits);
+    if (region == regions.end()) return reading.add(body.size());
+    auto& grid = summary.grids[region->second.grid];
+    ++grid.by_level[region->second.level];
+    if (region->second.level == 0) {
+      ++grid.chunks;
+      const IVec3 chunk = chunk_of_key(region->second, key);
+      grid.chunk_bounds = unite(grid.chunk_bounds, IBox{chunk, chunk + IVec3(1)});
+    }
+    return reading.add(body.size());
+  });
+  if (!gaps) return gaps.error();
+  if (auto done = reading.status(); !done) return done.error();
+  return summary;
+}
+
+/// Checks rows one by one.
+class Check {
+ public:
+  Check(WorldReader& reader, const Progress& progress, const std::filesystem::path& path)
+      : reader_(reader), reading_(progress, path) {}
+
+  Result<WorldCheck> run() {
+    auto rules = read_rules(reader_);
+    if (rules) {
+      rules_ = std::move(*rules);
+    } else if (rules.error().code == ErrorCode::BadFormat) {
+      tell("types and grids: " + rules.error().message);
+    } else {
+      return rules.error();
+    }
+    for (const char* const kind : kKinds) check_parts(kind);
+    if (auto done = check_chunks(); !done) return done.error();
+    if (auto done = check_tables(); !done) return done.error();
+    return std::move(check_);
+  }
+
+ private:
+  void tell(std::string line) { check_.damage.push_back({std::nullopt, std::move(line)}); }
+
+  void check_parts(const char* kind) {
+    const Status read = reader_.each_part(kind, [&](const Part& part, bool is_sound) {
+      if (!is_sound) {
+        tell(name_of(part.key) + " is damaged");
+      } else if (const Status sound = check_part(part.key, part.body); !sound) {
+        tell(sound.error().message);
+      } else {
+        ++check_.parts;
+      }
+    });
+    if (!read) tell(std::string(kind) + ": " + read.error().message);
+  }
+
+  Status check_chunks() {
+    std::vector<std::string> damage;
+    ChunkRows rows(reader_.connection());
+    const std::map<std::int64_t, RegionPlace> regions = rows.regions(damage);
+    for (std::string& line : damage) tell(std::move(line));
+    const auto gaps = rows.each([&](std::int64_t key, std::span<const std::byte> body) {
+      const auto region = regions.find(key >> kRegionBits);
+      if (region == regions.end()) {
+        tell("the chunk of key " + std::to_string(key) + " lies in a region that is not there");
+        return reading_.add(body.size());
+      }
+      const ChunkPlace place{region->second.grid, region->second.level, chunk_of_key(region->second, key)};
+      const auto grid = rules_.grids.find(place.grid);
+      const float band = grid == rules_.grids.end() ? WorldGrid{}.band : grid->second.band;
+      const auto chunk = decoder_.decode(place, body, ChunkLimits{&rules_.types, band});
+      if (chunk) {
+        ++check_.chunks;
+      } else {
+        check_.damage.push_back({place, about(place) + ": " + chunk.error().message});
+      }
+      return reading_.add(body.size());
+    });
+    if (!gaps) return gaps.error();
+    for (const KeyGap& gap : *gaps) tell(about(gap, regions) + ": " + gap.why);
+    return reading_.status();
+  }
+
+  // What rows alone do not show: indices, free pages.
+  Status check_tables() {
+    auto select = reader_.connection().prepare("PRAGMA integrity_check(20)");
+    if (!select) return select.error().code == ErrorCode::BadFormat ? Status() : Status(select.error());
+    while (true) {
+      const auto row = select->step();
+      if (!row) {
+        if (row.error().code != ErrorCode::BadFormat) return row.error();
+        tell("the tables: " + row.error().message);
+        return {};
+      }
+      if (!*row) return {};
+      std::string line(select->text(0));
+      std::ranges::replace(line, '\n', ' ');
+      if (line != "ok") tell("the tables: " + line);
+    }
+  }
+
+  WorldReader& reader_;
+  ReadProgress reading_;
+  ChunkDecoder decoder_;
+  WorldRules rules_;
+  WorldCheck check_;
+};
+
+Result<std::uint64_t> back_up(const std::filesystem::path& from, const std::filesystem::path& to) {
+  std::error_code error;
+  if (std::filesystem::exists(std::filesystem::symlink_status(to, error))) {
+    return make_error(ErrorCode::CannotWrite, "there is a file of that name", to.string());
+  }
+  const auto lock = WorldLock::take(to);
+  if (!lock) return with_path(Result<std::uint64_t>(lock.error()), to);
+  const std::filesystem::path fresh = to.string() + "-new";
+  remove_database(fresh);
+  const Status done = [&]() -> Status {
+    auto reader = with_path(open_reader(from), from);
+    if (!reader) return reader.error();
+    // It writes another file than the one that it may only read.
+    if (auto set = reader->connection().run("PRAGMA query_only=OFF"); !set) return set;
+    auto copy = reader->connection().prepare("VACUUM INTO ?");
+    if (!copy) return copy.error();
+    copy->bind(0, std::string_view(fresh.native()));
+    if (auto copied = copy->run(); !copied) {
+      Error fault = copied.error();
+      if (fault.path.empty()) fault.path = (fault.code == ErrorCode::CannotWrite ? to : from).string();
+      return fault;
+    }
+    remove_database_log(to);
+    return move_in_place(fresh, to);
+  }();
+  if (!done) {
+    remove_database(fresh);
+    return done.error();
+  }
+  return file_bytes(to);
+}
+
+Status compact(const std::filesystem::path& path) {
+  const auto lock = WorldLock::take(path);
+  if (!lock) return lock.error();
+  auto connection = Connection::open(path.string(), Connection::Mode::Write);
+  if (!connection) return connection.error();
+  if (auto done = check_schema(*connection); !done) return done;
+  if (!end_writing(*connection)) return make_error(ErrorCode::CannotWrite, "another program reads it");
+  if (auto done = connection->run("VACUUM"); !done) return done;
+  return connection->close();
+}
+
+}  // namespace
+
+Result<WorldSummary> summarize_world(const std::filesystem::path& path, const Progress& progress) {
+  return with_path(summarize(path, progress), path);
+}
+
+Result<WorldCheck> check_world(const std::filesystem::path& path, const Progress& progress) {
+  auto reader = open_reader(path);
+  if (!reader) return with_path(Result<WorldCheck>(reader.error()), path);
+  return with_path(Check(*reader, progress, path).run(), path);
+}
+
+Result<std::uint64_t> back_up_world(const std::filesystem::path& from, const std::filesystem::path& to) {
+  return back_up(from, to);
+}
+
+Result<std::uint64_t> compact_world(const std::filesystem::path& path) {
+  if (auto done = compact(path); !done) return with_path(Result<std::uint64_t>(done.error()), path);
+  return file_bytes(path);
+}
+
+}  // namespace quoin

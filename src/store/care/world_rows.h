@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <quoin/core/function_ref.h>
+#include <quoin/core/progress.h>
+
+#include "store/world/world_reader.h"
+
+namespace quoin::store {
+
+/// Keys of chunks that SQLite cannot read, because pages of the table are damaged: from the first to the last.
+struct KeyGap {
+  std::int64_t first = 0;
+  std::int64_t last = 0;
+  std::string why;
+};
+
+/// Reads every row of the table of chunks by its key, whatever else is damaged.
+class ChunkRows {
+ public:
+  explicit ChunkRows(Connection& connection) : connection_(connection) {}
+
+  /// The places of regions; those that cannot be read are left out, with a line in `damage`.
+  [[nodiscard]] std::map<std::int64_t, RegionPlace> regions(std::vector<std::string>& damage);
+  /// Calls `visit(key, body)` for each row that can be read, until it returns false; returns the keys of those that
+  /// cannot. Errors: CannotRead.
+  [[nodiscard]] Result<std::vector<KeyGap>> each(
+      FunctionRef<bool(std::int64_t key, std::span<const std::byte> body)> visit);
+
+ private:
+  Connection& connection_;
+};
+
+/// "chunks (0, 0, 0) to (31, 4, 2) of grid 0", as far as it is known.
+[[nodiscard]] std::string about(const KeyGap& gap, const std::map<std::int64_t, RegionPlace>& regions);
+
+}  // namespace quoin::store

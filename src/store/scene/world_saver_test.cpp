@@ -1,0 +1,299 @@
+#include <quoin/store/world_saver.h>
+
+#include <fstream>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <quoin/io/file.h>
+#include <quoin/io/formats.h>
+#include <quoin/io/scene_file.h>
+#include <quoin/terrain/terrain.h>
+
+#include "store/world/world_for_tests.h"
+
+namespace quoin {
+namespace {
+
+/// The scene's text as a scene file, shortened: equal texts are equal scenes, to the last bit.
+std::string text_of(const Scene& scene) {
+  const auto file = scene_file_of(scene);
+  if (!file) return to_string(file.error());
+  const auto text = write_scene_file(*file);
+  if (!text) return to_string(text.error());
+  std::string all(reinterpret_cast<const char*>(text->data()), text->size());
+  return all.substr(0, 3000) + std::to_string(std::hash<std::string>()(all));
+}
+
+/// Of everything something.
+Scene rich_scene() {
+  Scene scene;
+  scene.types = coloured_types(9);
+  SceneGrid ground;
+  ground.name = "ground";
+  ground.pivot = {1.5, 2.25, -3.0};
+  ground.canvas = {{0, 0, 0}, {5, 6, 7}};
+  for (int i = 0; i < 12; ++i) {
+    ground.grid.put_chunk({i % 4 - 2, i / 4, 40 - i}, random_chunk(static_cast<std::uint32_t>(i), 9));
+  }
+  ground.grid.set({3, 3, 3}, 4);
+  const std::array<std::byte, 3> chest = {std::byte{1}, std::byte{2}, std::byte{3}};
+  ground.grid.set_data({3, 3, 3}, {.state = 7, .bytes = chest});
+  SceneGrid hill;
+  hill.name = std::string("not \xff UTF-8");
+  hill.field = DensityGrid(4.0F);
+  hill.field.edit({{-20, -20, -20}, {90, 20, 20}}, [](IVec3 p, DensitySample) {
+    return DensitySample{static_cast<float>(p.y) + 0.1F * static_cast<float>(p.x % 7),
+                         static_cast<VoxelType>(1 + (p.x & 1))};
+  });
+  const GridHandle first = scene.add_grid(std::move(ground));
+  const GridHandle second = scene.add_grid(std::move(hill));
+  const LayerHandle layer = scene.add_layer({"front", false});
+  const GroupHandle outer = scene.add_group({.name = "outer", .layer = layer});
+  const GroupHandle inner = scene.add_group({.name = "inner", .parent = outer, .position = {1e9, 2, 3}});
+  scene.add_instance({.name = "a", .grid = first, .position = {1, 2, 1e12}, .group = inner});
+  scene.add_instance({.name = "b",
+                      .grid = second,
+                      .rotation = {0.5, 0.5, -0.5, 0.5},
+                      .voxel_size = 0.1,
+                      .mirrored = true,
+                      .visible = false,
+                      .layer = layer,
+                      .categories = 12});
+  scene.lamps.push_back({.name = "sun lamp", .position = {1, 2, 3}, .intensity = 7.25});
+  scene.lamps.push_back({.name = "", .kind = Lamp::Kind::Spot, .range = 33.0});
+  return scene;
+}
+
+Scene loaded_from(const std::filesystem::path& path) {
+  auto loaded = load_scene(path);
+  EXPECT_TRUE(loaded) << to_string(loaded.error());
+  if (!loaded) return {};
+  EXPECT_TRUE(loaded->warnings.empty()) << loaded->warnings.front();
+  return std::move(loaded->scene);
+}
+
+TEST(WorldSaver, ASceneIsTheSameAgain) {
+  const WorldFolder folder;
+  const Scene scene = rich_scene();
+  const auto saved = save_scene(scene, folder / "w.quoin");
+  ASSERT_TRUE(saved) << to_string(saved.error());
+  EXPECT_EQ(saved->bytes, std::filesystem::file_size(folder / "w.quoin"));
+  EXPECT_TRUE(saved->warnings.empty());
+  EXPECT_EQ(text_of(loaded_from(folder / "w.quoin")), text_of(scene));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "nothing lies beside it";
+}
+
+TEST(WorldSaver, TheSameSceneGivesTheSameBytes) {
+  const WorldFolder folder;
+  const Scene scene = rich_scene();
+  ASSERT_TRUE(save_scene(scene, folder / "a.quoin", {1}));
+  ASSERT_TRUE(save_scene(scene, folder / "b.quoin", {3}));
+  EXPECT_EQ(*read_file(folder / "a.quoin"), *read_file(folder / "b.quoin"));
+}
+
+TEST(WorldSaver, SunAndCamerasAreKept) {
+  const WorldFolder folder;
+  LoadedScene loaded;
+  loaded.scene = rich_scene();
+  loaded.sun = DVec3(0.1, 0.7, -0.2);
+  loaded.camera = look_at({1, 2, 3}, {4, 5, 7}, 0.7).value();
+  FileCamera flat{.number = -3, .camera = *loaded.camera, .focus_distance = 12.5};
+  flat.camera.projection = Camera::Projection::Orthographic;
+  loaded.cameras = {{.number = 0, .camera = *loaded.camera}, flat};
+  ASSERT_TRUE(save_scene(loaded, folder / "w.quoin"));
+  const auto again = load_scene(folder / "w.quoin");
+  ASSERT_TRUE(again);
+  EXPECT_EQ(*again->sun, *loaded.sun);
+  EXPECT_EQ(again->camera->forward, loaded.camera->forward);
+  ASSERT_EQ(again->cameras.size(), 2U);
+  EXPECT_EQ(again->cameras[1].number, -3);
+  EXPECT_EQ(again->cameras[1].focus_distance, 12.5);
+  EXPECT_EQ(again->cameras[1].camera.projection, Camera::Projection::Orthographic);
+}
+
+/// A world that is saved again and again, and what should be in it.
+class Session {
+ public:
+  explicit Session(const std::filesystem::path& path) : world_(WorldStore::create(path).value()) {}
+
+  void save(const Scene& scene) {
+    const auto ticket = saver_.save(world_, scene);
+    ASSERT_TRUE(ticket) << to_string(ticket.error());
+    ASSERT_TRUE(world_.flush());
+    expect_like(scene);
+  }
+  void expect_like(const Scene& scene) {
+    const auto loaded = load_world(world_);
+    ASSERT_TRUE(loaded) << to_string(loaded.error());
+    EXPECT_EQ(text_of(loaded->loaded.scene), text_of(scene));
+  }
+  [[nodiscard]] std::uint64_t chunks_of_last_save() {
+    const std::uint64_t now = world_.stats().saved_chunks;
+    return now - std::exchange(counted_, now);
+  }
+  WorldStore& world() { return world_; }
+  WorldSaver& saver() { return saver_; }
+
+ private:
+  WorldStore world_;
+  WorldSaver saver_;
+  std::uint64_t counted_ = 0;
+};
+
+TEST(WorldSaver, SavesWhatChangedAndNoMore) {
+  const WorldFolder folder;
+  Session session(folder / "w.quoin");
+  Scene scene = rich_scene();
+  session.save(scene);
+  EXPECT_GT(session.chunks_of_last_save(), 12U);
+  session.save(scene);
+  EXPECT_EQ(session.chunks_of_last_save(), 0U);
+  const GridHandle ground = scene.grids().handles().front();
+  const GridHandle hill = scene.grids().handles().back();
+  scene.edit(ground).grid.set({3, 3, 4}, 5);
+  session.save(scene);
+  EXPECT_EQ(session.chunks_of_last_save(), 1U);
+  scene.edit(ground).grid.set_data({3, 3, 4}, {.state = 9});
+  session.save(scene);
+  EXPECT_EQ(session.chunks_of_last_save(), 1U);
+  scene.edit(hill).field.edit({{0, 0, 0}, {1, 1, 1}}, [](IVec3, DensitySample) { return DensitySample{-1.0F, 3}; });
+  session.save(scene);
+  EXPECT_EQ(session.chunks_of_last_save(), 1U);
+  // A chunk that becomes air is kept as air.
+  const IVec3 emptied = scene.grids()[ground].grid.chunks().front();
+  scene.edit(ground).grid.fill_box({emptied * kChunkEdge, (emptied + IVec3(1)) * kChunkEdge}, kAir);
+  session.save(scene);
+  const auto air = session.world().load_chunk({0, 0, emptied});
+  ASSERT_TRUE(air && air->has_value());
+  EXPECT_EQ((*air)->voxels.uniform(), kAir);
+}
+
+TEST(WorldSaver, FollowsEverythingThatASceneCanDo) {
+  const WorldFolder folder;
+  Session session(folder / "w.quoin");
+  Scene scene = rich_scene();
+  session.save(scene);
+  const InstanceHandle instance = scene.instances().handles().front();
+  scene.edit(instance).position = {-7, 8, 9};
+  session.save(scene);
+  ASSERT_TRUE(scene.types.add(coloured_type(99)));
+  scene.types.replace(2, coloured_type(77));
+  session.save(scene);
+  scene.lamps.erase(scene.lamps.begin());
+  session.save(scene);
+  scene.lamps.push_back({.name = "third"});
+  session.save(scene);
+  const GroupHandle outer = scene.groups().handles().front();
+  scene.remove_group(outer);
+  session.save(scene);
+  scene.remove_layer(scene.layers().handles().front());
+  session.save(scene);
+  SceneGrid ship;
+  ship.grid.fill_box({{0, 0, 0}, {70, 3, 3}}, 10);
+  const GridHandle ship_handle = scene.add_grid(std::move(ship));
+  scene.add_instance({.name = "ship", .grid = ship_handle});
+  session.save(scene);
+  scene.remove_grid(scene.grids().handles().front());
+  session.save(scene);
+  EXPECT_EQ(session.world().chunks(0, 0)->size(), 0U);
+  EXPECT_EQ(session.world().grids()->size(), 2U);
+}
+
+TEST(WorldSaver, GoesOnWithWhatWasLoaded) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  ASSERT_TRUE(save_scene(rich_scene(), path));
+  std::string wanted;
+  {
+    auto world = WorldStore::open(path, WorldAccess::Write);
+    ASSERT_TRUE(world);
+    auto loaded = load_world(*world);
+    ASSERT_TRUE(loaded);
+    Scene& scene = loaded->loaded.scene;
+    ASSERT_TRUE(loaded->saver.save(*world, scene));
+    ASSERT_TRUE(world->flush());
+    EXPECT_EQ(world->stats().saved_chunks, 0U) << "nothing has changed since it was read";
+    scene.edit(scene.grids().handles().front()).grid.set({100, 100, 100}, 3);
+    scene.add_instance({.name = "new", .grid = scene.grids().handles().back()});
+    WorldChanges more;
+    more.put_value("time", {std::byte{12}});
+    ASSERT_TRUE(loaded->saver.save(*world, scene, std::move(more)));
+    ASSERT_TRUE(world->flush());
+    EXPECT_EQ(world->stats().saved_chunks, 1U);
+    wanted = text_of(scene);
+  }
+  EXPECT_EQ(text_of(loaded_from(path)), wanted);
+  EXPECT_TRUE(WorldStore::open(path, WorldAccess::Read)->value("time")->has_value());
+}
+
+TEST(WorldSaver, WhatWasRefusedIsSavedTheNextTime) {
+  const WorldFolder folder;
+  Session session(folder / "w.quoin");
+  Scene scene = rich_scene();
+  session.save(scene);
+  const InstanceHandle gone = scene.instances().handles().front();
+  const InstanceHandle other = scene.instances().handles().back();
+  scene.remove_instance(gone);
+  scene.edit(scene.grids().handles().front()).grid.set({1, 1, 1}, 6);
+  scene.edit(other).position.x = std::nan("");
+  const auto refused = session.saver().save(session.world(), scene);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+  EXPECT_NE(refused.error().message.find("instance"), std::string::npos) << refused.error().message;
+  scene.edit(other).position.x = 3.0;
+  session.save(scene);
+}
+
+TEST(WorldSaver, ANewSceneDoesNotFitAnotherWorldsTypes) {
+  const WorldFolder folder;
+  Session session(folder / "w.quoin");
+  session.save(rich_scene());
+  Scene other;
+  ASSERT_TRUE(other.types.add(coloured_type(200)));
+  WorldSaver saver;
+  EXPECT_FALSE(saver.save(session.world(), other));
+}
+
+TEST(WorldSaver, OldWorldsAreReplacedWholeWithTheirLogs) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  ASSERT_TRUE(save_scene(rich_scene(), path));
+  {
+    auto world = WorldStore::open(path, WorldAccess::Write);
+    EXPECT_FALSE(save_scene(rich_scene(), path)) << "while another writes it";
+    EXPECT_FALSE(std::filesystem::exists(path.string() + "-new"));
+  }
+  Scene small;
+  ASSERT_TRUE(small.types.add(coloured_type(1)));
+  SceneGrid grid;
+  grid.grid.set({0, 0, 0}, 1);
+  small.add_instance({.name = "", .grid = small.add_grid(std::move(grid))});
+  ASSERT_TRUE(save_scene(small, path));
+  EXPECT_EQ(text_of(loaded_from(path)), text_of(small));
+}
+
+TEST(WorldSaver, BytesInMemoryAreAWorldToo) {
+  const WorldFolder folder;
+  ASSERT_TRUE(save_scene(rich_scene(), folder / "w.quoin"));
+  const auto bytes = read_file(folder / "w.quoin");
+  ASSERT_TRUE(bytes);
+  const auto loaded = load_scene(*bytes);
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_EQ(text_of(loaded->scene), text_of(rich_scene()));
+  EXPECT_EQ(loaded->format, "world");
+}
+
+TEST(WorldSaver, CancelledLeavesNothing) {
+  const WorldFolder folder;
+  const auto saved = save_scene(rich_scene(), folder / "w.quoin", {}, [](double) { return false; });
+  ASSERT_FALSE(saved);
+  EXPECT_EQ(saved.error().code, ErrorCode::Cancelled);
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  ASSERT_TRUE(save_scene(rich_scene(), folder / "w.quoin"));
+  const auto loaded = load_scene(folder / "w.quoin", {}, {}, [](double) { return false; });
+  ASSERT_FALSE(loaded);
+  EXPECT_EQ(loaded.error().code, ErrorCode::Cancelled);
+}
+
+}  // namespace
+}  // namespace quoin

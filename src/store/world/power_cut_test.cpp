@@ -1,0 +1,197 @@
+// Power cuts, failing calls: what was acknowledged is there, and every save is there as a whole or not at all.
+
+#include <atomic>
+#include <cstdlib>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "store/world/disk_for_tests.h"
+#include "store/world/saves_for_tests.h"
+
+namespace quoin {
+namespace {
+
+constexpr const char* kFile = "w.quoin";
+
+/// Saves to a world on a disk, and cuts the power all the while.
+class Cuts {
+ public:
+  explicit Cuts(unsigned seed, int one_of) : random_(seed), one_of_(one_of) {
+    disk_.before_change = [this] { consider(); };
+  }
+
+  void run(int saves, bool has_honest_syncs = true) {
+    auto world = create_for_saves(kFile, disk_.name());
+    ASSERT_TRUE(world) << to_string(world.error());
+    if (!has_honest_syncs) disk_.is_sync_honest = [](const std::string& file) { return !file.ends_with("-wal"); };
+    is_cutting_ = true;
+    for (int i = 1; i <= saves; ++i) {
+      submitted_ = i;
+      const auto ticket = world->save(changes_of(i), [this, i](const Status& saved) {
+        if (saved) acknowledged_ = i;
+      });
+      ASSERT_TRUE(ticket) << to_string(ticket.error());
+      if (random_() % 3 == 0) {
+        ASSERT_TRUE(world->wait(*ticket));
+      }
+      if (i % 20 == 0) {  // closed and opened, by which the log ends and begins
+        world = make_error(ErrorCode::Cancelled, "closed");
+        world = WorldParts::open(kFile, WorldAccess::Write, {1}, disk_.name());
+        ASSERT_TRUE(world) << to_string(world.error());
+      }
+    }
+  }
+
+  int cuts = 0;
+  int bad = 0;
+  std::string first_fault;
+
+ private:
+  // On the thread that writes.
+  void consider() {
+    if (!is_cutting_ || is_looking_ || cut_random_() % static_cast<unsigned>(one_of_) != 0) return;
+    is_looking_ = true;
+    const int least = acknowledged_;
+    after_.become(disk_.image(), cut_random_);
+    ++cuts;
+    const Found found = look_at(kFile, after_.name());
+    if (found.saves < least || found.saves > submitted_) {
+      if (bad++ == 0) {
+        first_fault = found.saves < 0 ? found.why
+                                      : "of " + std::to_string(least) + " acknowledged saves there are " +
+                                            std::to_string(found.saves);
+      }
+    }
+    is_looking_ = false;
+  }
+
+  TestDisk disk_{"cut"};
+  TestDisk after_{"after the cut"};
+  std::minstd_rand random_;
+  std::minstd_rand cut_random_{random_() | 1U};
+  int one_of_;
+  std::atomic<bool> is_cutting_ = false;
+  bool is_looking_ = false;
+  std::atomic<int> submitted_ = 0;
+  std::atomic<int> acknowledged_ = 0;
+};
+
+int wanted_cuts() {
+  const char* const wanted = std::getenv("QUOIN_CUTS");
+  return wanted != nullptr ? std::atoi(wanted) : 400;
+}
+
+TEST(WorldPowerCut, NothingAcknowledgedIsLost) {
+  int cuts = 0;
+  for (unsigned seed = 1; cuts < wanted_cuts(); ++seed) {
+    Cuts run(seed, 4);
+    run.run(60);
+    ASSERT_EQ(run.bad, 0) << "seed " << seed << ": " << run.first_fault;
+    cuts += run.cuts;
+  }
+  RecordProperty("cuts", cuts);
+  std::printf("%d power cuts, nothing lost\n", cuts);
+}
+
+// The test can fail: a disk that says it has synced the log, and has not.
+TEST(WorldPowerCut, ADiskThatLiesAboutSyncsLosesSaves) {
+  int bad = 0;
+  for (unsigned seed = 1; seed < 4; ++seed) {
+    Cuts run(seed, 4);
+    run.run(40, false);
+    bad += run.bad;
+  }
+  EXPECT_GT(bad, 0);
+}
+
+/// Fails the n-th call that changes the disk, or it and all behind it.
+class Fault {
+ public:
+  Fault(TestDisk& disk, int number, int code, bool is_lasting) : disk_(disk) {
+    disk_.fault = [=, this](const char* what) {
+      if (what == std::string_view("read")) return SQLITE_OK;
+      const int call = ++calls_;
+      const bool fails = !is_healed_ && (call == number || (is_lasting && call > number));
+      if (!fails) return SQLITE_OK;
+      was_hit_ = true;
+      return code;
+    };
+  }
+  void heal() { is_healed_ = true; }
+  [[nodiscard]] bool was_hit() const { return was_hit_; }
+
+ private:
+  TestDisk& disk_;
+  std::atomic<int> calls_ = 0;
+  std::atomic<bool> is_healed_ = false;
+  std::atomic<bool> was_hit_ = false;
+};
+
+void expect_one_clear_line(const Error& error) {
+  EXPECT_EQ(error.path, kFile);
+  EXPECT_FALSE(error.message.empty());
+  EXPECT_EQ(error.message.find('\n'), std::string::npos);
+  EXPECT_NE(error.code, ErrorCode::BadFormat) << error.message;
+}
+
+/// Saves, with a fault at some call; returns whether there were as many calls.
+bool survives_fault(int number, int code, bool is_lasting) {
+  constexpr int kSaves = 6;
+  TestDisk disk("faulty");
+  Fault fault(disk, number, code, is_lasting);
+  {
+    auto world = create_for_saves(kFile, disk.name());
+    if (!world) {
+      expect_one_clear_line(world.error());
+      return true;
+    }
+    int acknowledged = 0;
+    for (int i = 1; i <= kSaves; ++i) {
+      const auto ticket = world->save(changes_of(i));
+      EXPECT_TRUE(ticket);
+      const Status saved = world->wait(*ticket);
+      if (saved) {
+        acknowledged = i;
+        continue;
+      }
+      expect_one_clear_line(saved.error());
+      // As if the power went now.
+      TestDisk after("after the fault");
+      std::minstd_rand random(static_cast<unsigned>(number));
+      after.become(disk.image(), random);
+      const Found found = look_at(kFile, after.name());
+      EXPECT_GE(found.saves, acknowledged) << found.why << " call " << number;
+      // What failed is read, and saved once there is room again.
+      Expected expected;
+      for (int k = 1; k <= i; ++k) apply(expected, k);
+      for (int place = 0; place < kPlaces; ++place) {
+        const auto chunk = world->load_chunk(place_of(place));
+        EXPECT_TRUE(chunk) << to_string(chunk.error());
+        if (!chunk) continue;
+        EXPECT_EQ(chunk->has_value(), expected.types[static_cast<std::size_t>(place)] != kAir);
+      }
+      fault.heal();
+      const Status again = world->flush();
+      EXPECT_TRUE(again) << to_string(again.error());
+      acknowledged = again ? i : acknowledged;
+    }
+    fault.heal();
+  }
+  const Found found = look_at(kFile, disk.name());
+  EXPECT_EQ(found.saves, kSaves) << found.why << ": call " << number << ", code " << code;
+  return fault.was_hit();
+}
+
+TEST(WorldFault, AnyCallMayFailAndNothingIsLost) {
+  for (const int code : {SQLITE_FULL, SQLITE_IOERR_WRITE}) {
+    for (const bool is_lasting : {false, true}) {
+      int number = 1;
+      while (survives_fault(number, code, is_lasting) && number < 2000 && !HasFailure()) ++number;
+      EXPECT_GT(number, 50);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,95 @@
+#include "store/world/world_open.h"
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include "io/whole_file.h"
+#include "store/database/schema.h"
+
+namespace quoin::store {
+
+namespace {
+
+Error failed(int number) {
+  return make_error(ErrorCode::CannotWrite, "it cannot be written: " + std::generic_category().message(number));
+}
+
+Status sync_file(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool done = descriptor >= 0 && ::fsync(descriptor) == 0;
+  const int number = errno;
+  if (descriptor >= 0) ::close(descriptor);
+  return done ? Status() : Status(failed(number));
+}
+
+}  // namespace
+
+Status begin_writing(Connection& connection, bool is_network) {
+  // Acknowledged is what is synced: NORMAL would lose commits when the power goes. Without a log the folder, from which
+  // the journal vanishes, is to be synced too; so also where the log begins: a journal that came back after a power cut
+  // would have the database forget that there is one.
+  if (auto done = connection.run("PRAGMA synchronous=EXTRA"); !done) return done;
+  if (is_network) return {};
+  const auto mode = connection.text("PRAGMA journal_mode=WAL");
+  if (!mode) return mode.error();
+  return *mode == "wal" ? connection.run("PRAGMA synchronous=FULL") : Status();
+}
+
+bool end_writing(Connection& connection) {
+  if (!connection.run("PRAGMA busy_timeout=0; PRAGMA synchronous=EXTRA")) return false;
+  const auto mode = connection.text("PRAGMA journal_mode=DELETE");
+  return mode && *mode == "delete";
+}
+
+Result<WorldReader> open_reader(const std::filesystem::path& path, const char* vfs) {
+  auto connection = Connection::open(path.string(), Connection::Mode::Read, vfs);
+  if (!connection) return connection.error();
+  auto sound = check_schema(*connection);
+  if (sound) return WorldReader(std::move(*connection));
+  // A folder that nobody can write to has no place for the memory that readers share; then there are no writers either.
+  const std::filesystem::path folder = path.parent_path();
+  std::error_code error;
+  const bool has_log = std::filesystem::exists(path.string() + "-wal", error);
+  const bool may_write = ::access(folder.empty() ? "." : folder.c_str(), W_OK) == 0;
+  if (sound.error().code != ErrorCode::CannotRead || has_log || may_write || vfs != nullptr) return sound.error();
+  auto alone = Connection::open(path.string(), Connection::Mode::ReadImmutable);
+  if (!alone) return alone.error();
+  if (auto done = check_schema(*alone); !done) return done.error();
+  return WorldReader(std::move(*alone));
+}
+
+void remove_database_log(const std::filesystem::path& path) {
+  std::error_code ignored;
+  for (const char* suffix : {"-wal", "-shm", "-journal"}) std::filesystem::remove(path.string() + suffix, ignored);
+}
+
+void remove_database(const std::filesystem::path& path) {
+  std::error_code ignored;
+  std::filesystem::remove(path, ignored);
+  remove_database_log(path);
+}
+
+Status move_in_place(const std::filesystem::path& from, const std::filesystem::path& to, Existing existing) {
+  if (auto done = sync_file(from); !done) return done;
+  std::error_code error;
+  const unsigned flags = existing == Existing::Refused ? RENAME_NOREPLACE : 0;
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), flags) != 0) {
+    const int number = errno;
+    const bool is_there = std::filesystem::exists(std::filesystem::symlink_status(to, error));
+    if (existing == Existing::Refused && is_there) {
+      return make_error(ErrorCode::CannotWrite, "there is a file of that name");
+    }
+    if (number != EINVAL && number != ENOSYS) return failed(number);
+    std::filesystem::rename(from, to, error);  // a file system without such flags; the lock keeps others away
+    if (error) return failed(error.value());
+  }
+  sync_folder(to.parent_path());
+  return {};
+}
+
+}  // namespace quoin::store
