@@ -58,8 +58,9 @@ class VoxelRunReader {
   [[nodiscard]] Result<Chunk> read(ContentReader& reader, std::size_t type_count);
 
  private:
-  struct Run;
   struct Streams;
+  template <int kBits>
+  class Builder;
   [[nodiscard]] Status read_palette(ContentReader& reader, std::size_t count, std::size_t type_count);
   [[nodiscard]] Result<Chunk> read_runs(ContentReader& reader);
   [[nodiscard]] Result<Chunk> read_packed(ContentReader& reader);
@@ -69,7 +70,7 @@ class VoxelRunReader {
   std::vector<VoxelType> palette_;
   std::vector<std::uint64_t> seen_;  // by type / 64: in the palette; 0 between calls
   std::vector<std::uint32_t> counts_;
-  std::vector<std::uint64_t> changes_;  // of four layers of rows: what each voxel's index is, XOR the one before
+  std::vector<std::uint64_t> changes_;  // of four layers: what each voxel's index is, XOR the one before
   std::vector<std::uint64_t> words_;
 };
 
