@@ -38,7 +38,7 @@
 namespace quoin::store {
 
 inline constexpr std::size_t kChunkBodyHeader = 44;
-/// The most bytes that a chunk's content can be: without data at voxels 2 MiB and a little.
+/// The most bytes that a chunk's content can be: without data at voxels below 2 MiB.
 inline constexpr std::size_t kMaxChunkContent = kMaxVoxelSection + kMaxDataSection + kMaxDensitySection;
 
 namespace chunk_sections {

@@ -7,11 +7,13 @@
 #include <cstdint>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/density_chunk.h>
 #include <quoin/grid/voxel_registry.h>
+#include <quoin/store/stored_chunk.h>
 
 namespace quoin::store {
 
@@ -81,6 +83,43 @@ inline DensityChunk densities_of_spheres(std::mt19937& random, int types, float 
     }
   }
   return chunk;
+}
+
+struct CorpusChunk {
+  std::string file;
+  StoredChunk chunk;
+};
+
+/// What the files of tests/corpus/chunk_body hold, at place {} and with `types_for_tests(300)`.
+inline std::vector<CorpusChunk> corpus_chunks() {
+  std::mt19937 random(42);
+  const VoxelRegistry types = types_for_tests(300);
+  std::vector<CorpusChunk> chunks;
+  const auto put = [&](const char* file, Chunk voxels) { chunks.push_back({file, {std::move(voxels)}}); };
+  put("air", Chunk());
+  put("one_type", Chunk(VoxelType{7}));
+  put("two_types", chunk_of_boxes(random, 2, 6, 10));
+  put("twenty_types", chunk_of_boxes(random, 20, 20, 20));
+  put("three_hundred_types", chunk_of_boxes(random, 301, 500, 100));
+  Chunk noise;
+  for (int z = 0; z < 64; ++z) {
+    for (int y = 0; y < 64; ++y) noise.fill_row(y, z, 0xAAAA'AAAA'5555'5555U << (z & 1), VoxelType{1});
+  }
+  put("packed", noise);
+  Chunk with_data = chunk_of_boxes(random, 31, 8, 0);
+  put_some_data(random, types, 60, with_data);
+  put("data", with_data);
+  DensityChunk densities(stored_density(8.0F, 8.0F), VoxelType{2});
+  std::array<Half, kChunkEdge> row{};
+  for (int i = 0; i < 9; ++i) {
+    for (std::size_t x = 0; x < row.size(); ++x) {
+      row[x] = stored_density(static_cast<float>(x) / 8.0F + static_cast<float>(i) - 6.0F, 8.0F);
+    }
+    densities.write_row(30 + i % 3, 9 + i / 3, row);
+  }
+  densities.unite_slabs();
+  chunks.push_back({"densities", {Chunk(), densities}});
+  return chunks;
 }
 
 }  // namespace quoin::store

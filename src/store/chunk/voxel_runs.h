@@ -15,17 +15,18 @@
 //   uint8 form           0: all of one type, 1: runs, 2: packed
 //   uint16 n - 1         types; 1 where the form is 0, else 2 to 65,536
 //   uint16 types[n]      in the order in which they first occur, each once
-//   runs: voxels x fastest, then y, then z
+//   runs: voxels x fastest, then z, then y
 //     uint32 runs        n to 262,144
 //     uint32 bytes       of the next line
-//     uint8 lengths[]    each run's voxels - 1, seven bits a byte, lowest first, the top bit set in all bytes but the last
+//     uint8 lengths[]    each run's voxels - 1, seven bits a byte, lowest first, the top bit set in all but the last byte
 //     uint8 indices[]    each run's type; none where n is 2, as runs alternate then; to 256 types a byte a run,
 //                        else the low bytes of all runs, then the high ones
 //   packed:
-//     uint8 [32,768 * bits]  indices of `bits` bits, x fastest, then y, then z, from the lowest bit up; `bits` is the
+//     uint8 [32,768 * bits]  indices of `bits` bits, x fastest, then z, then y, from the lowest bit up; `bits` is the
 //                            first of 1, 2, 4, 8 and 16 with 2^bits >= n
 //
-// A run's type differs from that of the run before. So the same voxels are the same bytes, whatever edits led to them.
+// Layers of equal height come one after the other: ground is alike along them. A run's type differs from that of the run
+// before. So the same voxels are the same bytes, whatever edits led to them.
 
 namespace quoin::store {
 
@@ -57,8 +58,9 @@ class VoxelRunReader {
   [[nodiscard]] Result<Chunk> read(ContentReader& reader, std::size_t type_count);
 
  private:
-  struct Run;
   struct Streams;
+  template <int kBits>
+  class Builder;
   [[nodiscard]] Status read_palette(ContentReader& reader, std::size_t count, std::size_t type_count);
   [[nodiscard]] Result<Chunk> read_runs(ContentReader& reader);
   [[nodiscard]] Result<Chunk> read_packed(ContentReader& reader);
@@ -68,7 +70,7 @@ class VoxelRunReader {
   std::vector<VoxelType> palette_;
   std::vector<std::uint64_t> seen_;  // by type / 64: in the palette; 0 between calls
   std::vector<std::uint32_t> counts_;
-  std::vector<std::uint64_t> changes_;  // of four layers of rows: what each voxel's index is, XOR the one before
+  std::vector<std::uint64_t> changes_;  // of four layers: what each voxel's index is, XOR the one before
   std::vector<std::uint64_t> words_;
 };
 

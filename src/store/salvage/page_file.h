@@ -1,0 +1,88 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+namespace quoin::store {
+
+/// A file that is read at places. Owns its descriptor.
+class RandomFile {
+ public:
+  /// Nothing where there is no such file. Errors: CannotRead.
+  [[nodiscard]] static Result<std::optional<RandomFile>> open(const std::filesystem::path& path);
+  RandomFile(RandomFile&& other) noexcept
+      : descriptor_(std::exchange(other.descriptor_, -1)), size_(std::exchange(other.size_, 0)) {}
+  RandomFile& operator=(RandomFile&& other) noexcept {
+    std::swap(descriptor_, other.descriptor_);
+    std::swap(size_, other.size_);
+    return *this;
+  }
+  ~RandomFile();
+
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  /// Fills `out` from an offset on; what the file does not have, or the disk does not give, is 0.
+  void read(std::uint64_t offset, std::span<std::byte> out) const;
+
+ private:
+  RandomFile(int descriptor, std::uint64_t size) : descriptor_(descriptor), size_(size) {}
+  int descriptor_ = -1;
+  std::uint64_t size_ = 0;
+};
+
+/// How a file is cut into pages.
+struct PageLayout {
+  std::size_t page_size = 8'192;
+  std::size_t usable = 8'192;  ///< of these, what SQLite fills
+};
+
+/// Which state of the pages is meant: that of the file alone, or with the log's frames up to one.
+struct PageView {
+  std::size_t frames = 0;  ///< of the log that count
+};
+
+/// The pages of a database and of its log. Those of the log are numbered by frame: several may be of one page.
+class PageFile {
+ public:
+  /// Errors: CannotRead.
+  [[nodiscard]] static Result<PageFile> open(const std::filesystem::path& database);
+
+  /// Layouts that it may have, the likeliest first.
+  [[nodiscard]] std::vector<PageLayout> layouts() const;
+  void set_layout(const PageLayout& layout);
+  [[nodiscard]] const PageLayout& layout() const { return layout_; }
+
+  /// Those in the file, a last part of one included, and those in the log behind them.
+  [[nodiscard]] std::size_t page_count() const { return file_pages_ + frames_.size(); }
+  [[nodiscard]] std::uint64_t bytes() const { return file_.size() + (log_ ? log_->size() : 0); }
+  /// Requires: index < page_count(), room for a page.
+  void read(std::size_t index, std::span<std::byte> page) const;
+  /// The states in which a page may have been written that lead from it to others, the likeliest first.
+  [[nodiscard]] std::vector<PageView> views(std::size_t index) const;
+  /// A page by its number, 1 or more, in a state. False where there is none.
+  [[nodiscard]] bool read(std::uint32_t number, PageView view, std::span<std::byte> page) const;
+
+ private:
+  PageFile(RandomFile file, std::optional<RandomFile> log) : file_(std::move(file)), log_(std::move(log)) {}
+  [[nodiscard]] std::uint64_t offset_of_frame(std::size_t frame) const;
+
+  RandomFile file_;
+  std::optional<RandomFile> log_;
+  PageLayout layout_;
+  std::size_t file_pages_ = 0;
+  struct Frame {
+    std::uint32_t page = 0;
+    bool ends_transaction = false;
+  };
+  std::vector<Frame> frames_;
+  std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> frames_of_;  // by page
+};
+
+}  // namespace quoin::store
