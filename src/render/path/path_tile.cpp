@@ -193,13 +193,7 @@ void PathTile::meet_packet(std::span<const std::uint32_t> indices) {
     if (context_->has_media && context_->parts != nullptr) {
       note_behind(paths_[indices[i]], hits, static_cast<int>(i), until[i]);
     }
-    const std::optional<Fog>& fog = context_->options->fog;
-    if (!fog || !(fog->density > 0.0) || path.inside != kAir) continue;
-    const Interval way = in_fog(path.origin, path.direction, until[i]);
-    const double met = way.begin + free_way(path.random.one(path.dimension + kFog), fog->density);
-    if (!(met < way.end)) continue;
-    until[i] = met;
-    in_fog_lanes |= 1U << i;
+    if (ends_in_fog(path, until[i])) in_fog_lanes |= 1U << i;
   }
   if (context_->view->tracer().has_transparent()) {
     rays.max_t = until;
@@ -208,7 +202,6 @@ void PathTile::meet_packet(std::span<const std::uint32_t> indices) {
   for (std::size_t i = 0; i < indices.size(); ++i) {
     const std::uint32_t index = indices[i];
     Path& path = paths_[index];
-    const int lane = static_cast<int>(i);
     if (((through_glass >> i & 1U) != 0 || path.inside != kAir) && meet_glass(index, until[i])) continue;
     if ((in_fog_lanes >> i & 1U) != 0) {
       const Fog& fog = *context_->options->fog;
@@ -217,13 +210,23 @@ void PathTile::meet_packet(std::span<const std::uint32_t> indices) {
     }
     const bool is_hit = (hits.grids.hit >> i & 1U) != 0 && hits.grids.t[i] <= until[i];
     if (is_hit) {
-      hit_matter(index, rays, hits, lane);
+      hit_matter(index, rays, hits, static_cast<int>(i));
     } else if (until[i] < kInfinite) {
       hit_ground(index, until[i]);
     } else {
       leave(path, path.direction);
     }
   }
+}
+
+bool PathTile::ends_in_fog(const Path& path, double& until) const {
+  const std::optional<Fog>& fog = context_->options->fog;
+  if (!fog || !(fog->density > 0.0) || path.inside != kAir) return false;
+  const Interval way = in_fog(path.origin, path.direction, until);
+  const double met = way.begin + free_way(path.random.one(path.dimension + kFog), fog->density);
+  if (!(met < way.end)) return false;
+  until = met;
+  return true;
 }
 
 double PathTile::ground_at(const DVec3& origin, Vec3 direction) const {

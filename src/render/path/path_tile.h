@@ -128,6 +128,8 @@ class PathTile {
   void scatter_in(std::uint32_t index, const GlassBody& body, float u);
   // The way through fog from a point, up to `max_t`.
   [[nodiscard]] Interval in_fog(const DVec3& origin, Vec3 direction, double max_t) const;
+  // Whether it meets fog before `until`, which is then where.
+  [[nodiscard]] bool ends_in_fog(const Path& path, double& until) const;
   void hit_air(std::uint32_t index, double t, Vec3 colour, float anisotropy, std::int32_t placed);
   bool enter_glass(std::uint32_t index);
   bool leave_glass(std::uint32_t index);
