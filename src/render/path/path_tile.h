@@ -134,6 +134,8 @@ class PathTile {
   bool enter_glass(std::uint32_t index);
   bool leave_glass(std::uint32_t index);
   void turn_at(Path& path, const DVec3& point, Vec3 direction, Vec3 normal, double lift, VoxelType inside);
+  // A ray of a packet, of what neither glass nor fog ends.
+  void meet_lane(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane, double until);
   void hit_matter(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane);
   void hit_glass(std::uint32_t index, const GlassBody& body, const DVec3& normal_in_grid);
   void hit_ground(std::uint32_t index, double t);
