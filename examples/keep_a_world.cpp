@@ -10,7 +10,7 @@
 namespace {
 
 struct Player {
-  quoin::DVec3 position{64.0, 90.0, 64.0};
+  quoin::DVec3 position{64.0, 56.0, 64.0};
   int voxels_dug = 0;
 };
 
@@ -44,7 +44,7 @@ quoin::Status save(quoin::WorldStore& world, quoin::WorldSaver& saver, const quo
 void play(quoin::Scene& scene, Player& player) {
   quoin::Grid& land = scene.edit(scene.grids().handles().front()).grid;
   player.voxels_dug += static_cast<int>(land.fill_sphere(player.position, 2.5, quoin::kAir));
-  player.position += quoin::DVec3(0.05, -0.4, 0.02);
+  player.position += quoin::DVec3(0.05, -0.25, 0.02);
 }
 
 quoin::Status run(const std::string& path) {

@@ -1,6 +1,7 @@
 #include "store/care/found_parts.h"
 
 #include <algorithm>
+#include <charconv>
 #include <utility>
 
 #include "store/world/part_text.h"
@@ -14,6 +15,26 @@ namespace {
 std::int64_t number_of(const PartKey& key) {
   const auto* const number = std::get_if<std::int64_t>(&key.id);
   return number != nullptr ? *number : -1;
+}
+
+// The part in a record of the columns kind, id, revision, sum, body, if its sum is right. Lifetime: of the record's.
+std::optional<Part> sound_part(const PageRecord& record) {
+  if (record.columns.size() != 5) return std::nullopt;
+  const auto* const kind = std::get_if<std::string>(&record.columns[0]);
+  const auto* const revision = std::get_if<std::int64_t>(&record.columns[2]);
+  const auto* const sum = std::get_if<std::int64_t>(&record.columns[3]);
+  const auto* const body = std::get_if<std::vector<std::byte>>(&record.columns[4]);
+  if (kind == nullptr || revision == nullptr || sum == nullptr || body == nullptr) return std::nullopt;
+  Part part{{*kind, std::int64_t{0}}, static_cast<std::uint64_t>(*revision), *body};
+  if (const auto* const number = std::get_if<std::int64_t>(&record.columns[1])) {
+    part.key.id = *number;
+  } else if (const auto* const name = std::get_if<std::string>(&record.columns[1])) {
+    part.key.id = *name;
+  } else {
+    return std::nullopt;
+  }
+  if (sum_of(part) != static_cast<std::uint64_t>(*sum)) return std::nullopt;
+  return part;
 }
 
 }  // namespace
@@ -75,22 +96,16 @@ bool FoundParts::read(Connection& connection, std::vector<WorldDamage>& damage) 
 }
 
 void FoundParts::add(const PageRecord& record) {
-  // kind, id, revision, sum, body
-  if (record.columns.size() != 5) return;
-  const auto* const kind = std::get_if<std::string>(&record.columns[0]);
-  const auto* const revision = std::get_if<std::int64_t>(&record.columns[2]);
-  const auto* const sum = std::get_if<std::int64_t>(&record.columns[3]);
-  const auto* const body = std::get_if<std::vector<std::byte>>(&record.columns[4]);
-  if (kind == nullptr || revision == nullptr || sum == nullptr || body == nullptr) return;
-  Part part{{*kind, std::int64_t{0}}, static_cast<std::uint64_t>(*revision), *body};
-  if (const auto* const number = std::get_if<std::int64_t>(&record.columns[1])) {
-    part.key.id = *number;
-  } else if (const auto* const name = std::get_if<std::string>(&record.columns[1])) {
-    part.key.id = *name;
-  } else {
-    return;
-  }
-  if (sum_of(part) == static_cast<std::uint64_t>(*sum)) take(part);
+  if (const auto part = sound_part(record)) take(*part);
+}
+
+std::optional<int> FoundParts::version_of(const PageRecord& record) {
+  const auto part = sound_part(record);
+  if (!part || part->key != PartKey{part::kWorld, std::string("version")}) return std::nullopt;
+  int version = 0;
+  const char* const digits = reinterpret_cast<const char*>(part->body.data());
+  std::from_chars(digits, digits + part->body.size(), version);
+  return version;
 }
 
 float FoundParts::band(std::uint32_t grid) const {

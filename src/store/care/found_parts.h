@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -22,6 +23,9 @@ class FoundParts {
   bool read(Connection& connection, std::vector<WorldDamage>& damage);
   /// Takes a record that was found in the file's pages, if it is a sound part and newer than what is there.
   void add(const PageRecord& record);
+
+  /// The version of the format, where a record is the sound part that says it.
+  [[nodiscard]] static std::optional<int> version_of(const PageRecord& record);
 
   [[nodiscard]] float band(std::uint32_t grid) const;
   /// As many types as there can be: what chunks are checked against before it is known which are lost.

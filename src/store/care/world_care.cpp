@@ -88,8 +88,9 @@ Result<WorldSummary> summarize(const std::filesystem::path& path, const Progress
   const std::map<std::int64_t, RegionPlace> regions = rows.regions(damage);
   ReadProgress reading(progress, path);
   const auto gaps = rows.each([&](std::int64_t key, std::span<const std::byte> body) {
+    if (!reading.add(body.size())) return RowVerdict::Stop;
     const auto region = regions.find(key >> kRegionBits);
-    if (region == regions.end()) return reading.add(body.size());
+    if (region == regions.end()) return RowVerdict::Damaged;
     auto& grid = summary.grids[region->second.grid];
     ++grid.by_level[region->second.level];
     if (region->second.level == 0) {
@@ -97,7 +98,7 @@ Result<WorldSummary> summarize(const std::filesystem::path& path, const Progress
       const IVec3 chunk = chunk_of_key(region->second, key);
       grid.chunk_bounds = unite(grid.chunk_bounds, IBox{chunk, chunk + IVec3(1)});
     }
-    return reading.add(body.size());
+    return RowVerdict::Sound;
   });
   if (!gaps) return gaps.error();
   if (auto done = reading.status(); !done) return done.error();
@@ -147,10 +148,11 @@ class Check {
     const std::map<std::int64_t, RegionPlace> regions = rows.regions(damage);
     for (std::string& line : damage) tell(std::move(line));
     const auto gaps = rows.each([&](std::int64_t key, std::span<const std::byte> body) {
+      if (!reading_.add(body.size())) return RowVerdict::Stop;
       const auto region = regions.find(key >> kRegionBits);
       if (region == regions.end()) {
         tell("the chunk of key " + std::to_string(key) + " lies in a region that is not there");
-        return reading_.add(body.size());
+        return RowVerdict::Damaged;
       }
       const ChunkPlace place{region->second.grid, region->second.level, chunk_of_key(region->second, key)};
       const auto grid = rules_.grids.find(place.grid);
@@ -158,10 +160,10 @@ class Check {
       const auto chunk = decoder_.decode(place, body, ChunkLimits{&rules_.types, band});
       if (chunk) {
         ++check_.chunks;
-      } else {
-        check_.damage.push_back({place, about(place) + ": " + chunk.error().message});
+        return RowVerdict::Sound;
       }
-      return reading_.add(body.size());
+      check_.damage.push_back({place, about(place) + ": " + chunk.error().message});
+      return RowVerdict::Damaged;
     });
     if (!gaps) return gaps.error();
     for (const KeyGap& gap : *gaps) tell(about(gap, regions) + ": " + gap.why);

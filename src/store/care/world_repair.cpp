@@ -66,7 +66,17 @@ class Repair {
 
   Result<WorldCheck> run() {
     auto reader = open_reader(from_);
-    if (!reader && reader.error().code != ErrorCode::BadFormat) return reader.error();
+    if (!reader && reader.error().code == ErrorCode::Unsupported) {
+      // Of a later Quoin; or the number itself is damaged, and the world says another one elsewhere.
+      bool is_known = false;
+      const Status scanned = scan_records(from_, [&](const PageRecord& record) {
+        const auto version = FoundParts::version_of(record);
+        is_known = is_known || (version && *version <= kSchemaVersion);
+      });
+      if (!scanned || !is_known) return reader.error();
+    } else if (!reader && reader.error().code != ErrorCode::BadFormat) {
+      return reader.error();
+    }
     if (!reader) tell("the tables: " + reader.error().message);
     bool needs_scan = !reader;
     if (reader && !parts_.read(reader->connection(), check_.damage)) needs_scan = true;
@@ -111,18 +121,20 @@ class Repair {
     for (std::string& line : damage) tell(std::move(line));
     Status fault;
     auto gaps = rows.each([&](std::int64_t key, std::span<const std::byte> body) {
+      if (is_cancelled()) return RowVerdict::Stop;
       // What a body says of itself counts: the row's key may be wrong, or its region lost.
-      const auto header = read_header(body);
-      if (header) {
+      const auto region = regions.find(key >> kRegionBits);
+      const bool is_key_right = region != regions.end();
+      if (const auto header = read_header(body)) {
         fault = take(*header, body, output);
-        return fault && !is_cancelled();
+        return !fault ? RowVerdict::Stop : is_key_right ? RowVerdict::Sound : RowVerdict::Damaged;
       }
-      if (const auto region = regions.find(key >> kRegionBits); region != regions.end()) {
+      if (is_key_right) {
         lost_.insert({region->second.grid, region->second.level, chunk_of_key(region->second, key)});
       } else {
         tell("the chunk of key " + std::to_string(key) + " is damaged");
       }
-      return !is_cancelled();
+      return RowVerdict::Damaged;
     });
     if (!fault) return fault;
     if (is_cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");

@@ -1,6 +1,8 @@
 #include "store/care/world_rows.h"
 
 #include <limits>
+#include <optional>
+#include <set>
 #include <utility>
 
 #include "store/world/world_rules.h"
@@ -10,13 +12,6 @@ namespace quoin::store {
 namespace {
 
 constexpr std::int64_t kLastKey = std::numeric_limits<std::int64_t>::max();
-
-// Whether the first row from a key on can be found.
-bool can_seek(Statement& select, std::int64_t from) {
-  const StatementScope scope(select);
-  select.bind(0, from);
-  return select.step().has_value();
-}
 
 }  // namespace
 
@@ -40,53 +35,59 @@ std::map<std::int64_t, RegionPlace> ChunkRows::regions(std::vector<std::string>&
   }
 }
 
-Result<std::vector<KeyGap>> ChunkRows::each(FunctionRef<bool(std::int64_t, std::span<const std::byte>)> visit) {
+Result<std::vector<KeyGap>> ChunkRows::each(FunctionRef<RowVerdict(std::int64_t, std::span<const std::byte>)> visit) {
+  constexpr std::int64_t kFirstKey = std::numeric_limits<std::int64_t>::min();
   std::vector<KeyGap> gaps;
   auto rows = connection_.prepare("SELECT key, body FROM chunks WHERE key>=? ORDER BY key");
   if (!rows) {
     if (rows.error().code != ErrorCode::BadFormat) return rows.error();
-    gaps.push_back({0, kLastKey, rows.error().message});
+    gaps.push_back({kFirstKey, kLastKey, rows.error().message});
     return gaps;
   }
-  auto seek = connection_.prepare("SELECT key, body FROM chunks WHERE key>=? ORDER BY key LIMIT 1");
-  if (!seek) return seek.error();
-  std::int64_t next = std::numeric_limits<std::int64_t>::min();
+  std::set<std::int64_t> unsound;
+  std::optional<KeyGap> gap;
+  std::int64_t next = kFirstKey;    // behind the last row that was sound
+  std::int64_t resume = kFirstKey;  // where to begin once more
+  std::uint64_t step = 1;
   while (true) {
-    rows->bind(0, next);
+    rows->bind(0, resume);
     Result<bool> row = rows->step();
-    while (row && *row) {
+    for (; row && *row; row = rows->step()) {
       const std::int64_t key = rows->integer(0);
-      if (!visit(key, rows->bytes(1))) {
+      if (unsound.contains(key)) continue;
+      const RowVerdict verdict = visit(key, rows->bytes(1));
+      if (verdict == RowVerdict::Stop) {
         rows->reset();
         return gaps;
       }
+      // A key that is a lie says nothing of where the rows behind it are.
+      if (verdict == RowVerdict::Damaged) {
+        unsound.insert(key);
+        continue;
+      }
+      if (gap) {
+        gap->last = key - 1;
+        gaps.push_back(*std::exchange(gap, std::nullopt));
+      }
       if (key == kLastKey) return gaps;
       next = key + 1;
-      row = rows->step();
+      step = 1;
     }
     rows->reset();
-    if (row) return gaps;  // the end
+    if (row) {  // the end
+      if (gap) gaps.push_back(*gap);
+      return gaps;
+    }
     if (row.error().code != ErrorCode::BadFormat) return row.error();
-    // A key behind the damage, near it: what is readable between two damaged pages may be taken for damaged too.
-    std::int64_t unreadable = next;
-    std::int64_t readable = next;
-    for (std::uint64_t step = 1; !can_seek(*seek, readable); step *= 2) {
-      if (readable == kLastKey) {
-        gaps.push_back({next, kLastKey, row.error().message});
-        return gaps;
-      }
-      unreadable = readable;
-      const std::uint64_t room = static_cast<std::uint64_t>(kLastKey) - static_cast<std::uint64_t>(next);
-      readable =
-          step != 0 && step < room ? static_cast<std::int64_t>(static_cast<std::uint64_t>(next) + step) : kLastKey;
+    // Behind the damage, at first near it. What is readable between two damaged pages may be taken for damaged too.
+    if (!gap) gap = KeyGap{next, kLastKey, row.error().message};
+    const std::uint64_t room = static_cast<std::uint64_t>(kLastKey) - static_cast<std::uint64_t>(next);
+    if (step == 0 || step > room) {
+      gaps.push_back(*gap);
+      return gaps;
     }
-    while (readable - unreadable > 1) {
-      const std::int64_t middle = unreadable + (readable - unreadable) / 2;
-      (can_seek(*seek, middle) ? readable : unreadable) = middle;
-    }
-    if (readable == next) readable = next + 1;  // it can be found, and not be read: its own pages are damaged
-    gaps.push_back({next, readable - 1, row.error().message});
-    next = readable;
+    resume = static_cast<std::int64_t>(static_cast<std::uint64_t>(next) + step);
+    step *= 2;
   }
 }
 

@@ -21,6 +21,9 @@ struct KeyGap {
   std::string why;
 };
 
+/// What a visitor found a row to be.
+enum class RowVerdict : std::uint8_t { Sound, Damaged, Stop };
+
 /// Reads every row of the table of chunks by its key, whatever else is damaged.
 class ChunkRows {
  public:
@@ -28,10 +31,10 @@ class ChunkRows {
 
   /// The places of regions; those that cannot be read are left out, with a line in `damage`.
   [[nodiscard]] std::map<std::int64_t, RegionPlace> regions(std::vector<std::string>& damage);
-  /// Calls `visit(key, body)` for each row that can be read, until it returns false; returns the keys of those that
+  /// Calls `visit(key, body)` for each row that can be read, until it says to stop; returns the keys of those that
   /// cannot. Errors: CannotRead.
   [[nodiscard]] Result<std::vector<KeyGap>> each(
-      FunctionRef<bool(std::int64_t key, std::span<const std::byte> body)> visit);
+      FunctionRef<RowVerdict(std::int64_t key, std::span<const std::byte> body)> visit);
 
  private:
   Connection& connection_;

@@ -257,9 +257,15 @@ Status WorldWriter::write_all(const ChangeSet& changes) {
   for (const auto& [key, body] : changes.parts) {
     if (auto done = write_part(key, body); !done) return done;
   }
-  const std::string number = std::to_string(revision_);
-  const auto bytes = std::as_bytes(std::span(number));
-  return write_part({part::kWorld, std::string("revision")}, PartBody(bytes.begin(), bytes.end()));
+  const auto put = [&](const char* name, std::uint64_t number) {
+    const std::string digits = std::to_string(number);
+    const auto bytes = std::as_bytes(std::span(digits));
+    return write_part({part::kWorld, std::string(name)}, PartBody(bytes.begin(), bytes.end()));
+  };
+  if (revision_ == 1) {  // again, where no turned bit of the header can say another
+    if (auto done = put("version", kSchemaVersion); !done) return done;
+  }
+  return put("revision", revision_);
 }
 
 Status WorldWriter::remove_grid(std::uint32_t number) {
