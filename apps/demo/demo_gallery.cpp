@@ -76,73 +76,93 @@ void column(Grid& grid, IVec3 foot, int radius, int height, VoxelType type) {
   }
 }
 
-// Open towards +z: a red wall and a green one throw their colours over all that is white.
-Scene living_room() {
-  Scene scene;
-  const VoxelType white = add(scene, "white", {236, 232, 224, 255});
-  const VoxelType red = add(scene, "red", {186, 44, 36, 255});
-  const VoxelType green = add(scene, "green", {38, 124, 66, 255});
-  const VoxelType oak = add(scene, "oak", {168, 116, 70, 255}, {0.45F});
-  const VoxelType walnut = add(scene, "walnut", {140, 92, 54, 255}, {0.45F});
-  const VoxelType dark = add(scene, "dark wood", {74, 48, 32, 255}, {0.5F});
-  const VoxelType cloth = add(scene, "cloth", {52, 92, 140, 255});
-  const VoxelType cushion = add(scene, "cushion", {232, 176, 64, 255});
-  const VoxelType rug = add(scene, "rug", {212, 200, 178, 255});
-  const VoxelType rug_edge = add(scene, "rug's edge", {150, 60, 50, 255});
-  const VoxelType gold = add(scene, "gold", {255, 196, 90, 255}, {0.22F, 1.0F});
-  const VoxelType leaf = add(scene, "leaf", {54, 128, 50, 255});
-  const VoxelType clay = add(scene, "clay", {190, 98, 62, 255});
-  const VoxelType glow = add(scene, "lamp", {255, 206, 140, 255}, {1.0F, 0.0F, 10.0F});
-  const VoxelType glass = add(scene, "glass", {205, 235, 230, 20}, {0.0F, 0.0F, 0.0F, 1.5F});
-  Grid grid;
-  grid.fill_box({{-2, -2, -2}, {98, 62, 74}}, white);
+struct RoomTypes {
+  explicit RoomTypes(Scene& scene)
+      : white(add(scene, "white", {236, 232, 224, 255})),
+        red(add(scene, "red", {186, 44, 36, 255})),
+        green(add(scene, "green", {38, 124, 66, 255})),
+        oak(add(scene, "oak", {168, 116, 70, 255}, {0.45F})),
+        walnut(add(scene, "walnut", {140, 92, 54, 255}, {0.45F})),
+        dark(add(scene, "dark wood", {74, 48, 32, 255}, {0.5F})),
+        cloth(add(scene, "cloth", {52, 92, 140, 255})),
+        cushion(add(scene, "cushion", {232, 176, 64, 255})),
+        rug(add(scene, "rug", {212, 200, 178, 255})),
+        rug_edge(add(scene, "rug's edge", {150, 60, 50, 255})),
+        gold(add(scene, "gold", {255, 196, 90, 255}, {0.22F, 1.0F})),
+        leaf(add(scene, "leaf", {54, 128, 50, 255})),
+        clay(add(scene, "clay", {190, 98, 62, 255})),
+        glow(add(scene, "lamp", {255, 206, 140, 255}, {1.0F, 0.0F, 10.0F})),
+        glass(add(scene, "glass", {205, 235, 230, 20}, {0.0F, 0.0F, 0.0F, 1.5F})) {}
+
+  VoxelType white, red, green, oak, walnut, dark, cloth, cushion, rug, rug_edge, gold, leaf, clay, glow, glass;
+};
+
+// Walls, a window in the red one, a floor of planks and a rug.
+void build_room(Grid& grid, const RoomTypes& types) {
+  grid.fill_box({{-2, -2, -2}, {98, 62, 74}}, types.white);
   grid.fill_box({{0, 0, 0}, {96, 60, 74}}, quoin::kAir);
-  grid.fill_box({{-2, -2, -2}, {0, 62, 74}}, red);
-  grid.fill_box({{96, -2, -2}, {98, 62, 74}}, green);
+  grid.fill_box({{-2, -2, -2}, {0, 62, 74}}, types.red);
+  grid.fill_box({{96, -2, -2}, {98, 62, 74}}, types.green);
   for (int z = 0; z < 74; ++z) {
     for (int x = 0; x < 96; ++x) {
       const int plank = z / 6;
       const bool is_seam = z % 6 == 5 || (x + plank * 17) % 32 == 31;
-      grid.set({x, -1, z}, is_seam ? dark : plank % 2 == 0 ? oak : walnut);
+      grid.set({x, -1, z}, is_seam ? types.dark : plank % 2 == 0 ? types.oak : types.walnut);
     }
   }
-  // A window in the red wall.
-  grid.fill_box({{-2, 18, 20}, {0, 48, 52}}, dark);
+  grid.fill_box({{-2, 18, 20}, {0, 48, 52}}, types.dark);
   grid.fill_box({{-2, 20, 22}, {0, 46, 35}}, quoin::kAir);
   grid.fill_box({{-2, 20, 37}, {0, 46, 50}}, quoin::kAir);
-  grid.fill_box({{24, 0, 16}, {78, 1, 58}}, rug_edge);
-  grid.fill_box({{26, 0, 18}, {76, 1, 56}}, rug);
-  // A sofa at the back.
-  grid.fill_box({{28, 2, 3}, {72, 10, 19}}, cloth);
-  grid.fill_box({{28, 10, 3}, {72, 21, 8}}, cloth);
-  grid.fill_box({{25, 2, 3}, {29, 15, 20}}, cloth);
-  grid.fill_box({{71, 2, 3}, {75, 15, 20}}, cloth);
-  grid.fill_box({{32, 10, 9}, {41, 18, 12}}, cushion);
-  grid.fill_box({{60, 10, 9}, {69, 18, 12}}, cushion);
-  // A table with a golden ball and a vase.
+  grid.fill_box({{24, 0, 16}, {78, 1, 58}}, types.rug_edge);
+  grid.fill_box({{26, 0, 18}, {76, 1, 56}}, types.rug);
+}
+
+// A sofa at the back, a table with a golden ball and a vase.
+void furnish(Grid& grid, const RoomTypes& types) {
+  grid.fill_box({{28, 2, 3}, {72, 10, 19}}, types.cloth);
+  grid.fill_box({{28, 10, 3}, {72, 21, 8}}, types.cloth);
+  grid.fill_box({{25, 2, 3}, {29, 15, 20}}, types.cloth);
+  grid.fill_box({{71, 2, 3}, {75, 15, 20}}, types.cloth);
+  grid.fill_box({{32, 10, 9}, {41, 18, 12}}, types.cushion);
+  grid.fill_box({{60, 10, 9}, {69, 18, 12}}, types.cushion);
   for (const int x : {36, 62}) {
-    for (const int z : {30, 46}) grid.fill_box({{x, 1, z}, {x + 2, 9, z + 2}}, dark);
+    for (const int z : {30, 46}) grid.fill_box({{x, 1, z}, {x + 2, 9, z + 2}}, types.dark);
   }
-  grid.fill_box({{34, 9, 28}, {66, 11, 50}}, oak);
-  ball(grid, {42, 17, 38}, 6, gold);
-  column(grid, {57, 11, 38}, 4, 13, glass);
-  // A picture, a plant and a lamp.
-  grid.fill_box({{36, 28, 0}, {64, 48, 1}}, dark);
+  grid.fill_box({{34, 9, 28}, {66, 11, 50}}, types.oak);
+  ball(grid, {42, 17, 38}, 6, types.gold);
+  column(grid, {57, 11, 38}, 4, 13, types.glass);
+}
+
+// A picture, a plant and a lamp.
+void decorate(Grid& grid, const RoomTypes& types) {
+  grid.fill_box({{36, 28, 0}, {64, 48, 1}}, types.dark);
   for (int y = 30; y < 46; ++y) {
-    for (int x = 38; x < 62; ++x) grid.set({x, y, 1}, y < 36 + (x % 11) / 3 ? green : y < 41 ? cushion : cloth);
+    for (int x = 38; x < 62; ++x) {
+      grid.set({x, y, 1}, y < 36 + (x % 11) / 3 ? types.green : y < 41 ? types.cushion : types.cloth);
+    }
   }
-  column(grid, {86, 0, 12}, 5, 9, clay);
+  column(grid, {86, 0, 12}, 5, 9, types.clay);
   for (int i = 0; i < 26; ++i) {
     const double turn = i * 2.4;
     const int reach = 3 + i % 6;
     const IVec3 tip{86 + static_cast<int>(std::lround(reach * std::cos(turn))), 14 + i,
                     12 + static_cast<int>(std::lround(reach * std::sin(turn)))};
-    ball(grid, tip, 2, leaf);
-    grid.set({86, 9 + i, 12}, dark);
+    ball(grid, tip, 2, types.leaf);
+    grid.set({86, 9 + i, 12}, types.dark);
   }
-  grid.fill_box({{10, 0, 10}, {16, 1, 16}}, dark);
-  grid.fill_box({{12, 1, 12}, {14, 32, 14}}, dark);
-  grid.fill_box({{9, 32, 9}, {17, 39, 17}}, glow);
+  grid.fill_box({{10, 0, 10}, {16, 1, 16}}, types.dark);
+  grid.fill_box({{12, 1, 12}, {14, 32, 14}}, types.dark);
+  grid.fill_box({{9, 32, 9}, {17, 39, 17}}, types.glow);
+}
+
+// Open towards +z: a red wall and a green one throw their colours over all that is white.
+Scene living_room() {
+  Scene scene;
+  const RoomTypes types(scene);
+  Grid grid;
+  build_room(grid, types);
+  furnish(grid, types);
+  decorate(grid, types);
   place(scene, std::move(grid));
   return scene;
 }
@@ -257,23 +277,27 @@ void tree(Grid& grid, IVec3 foot, int height, VoxelType trunk, VoxelType leaf) {
   }
 }
 
-// An island that floats above a sea of clouds, with a house on it.
-Scene island() {
-  Scene scene;
-  const VoxelType rock = add(scene, "rock", {122, 108, 98, 255});
-  const VoxelType dark_rock = add(scene, "dark rock", {92, 80, 76, 255});
-  const VoxelType soil = add(scene, "soil", {126, 88, 58, 255});
-  const VoxelType grass = add(scene, "grass", {104, 156, 60, 255});
-  const VoxelType meadow = add(scene, "meadow", {134, 176, 70, 255});
-  const VoxelType trunk = add(scene, "trunk", {92, 66, 46, 255});
-  const VoxelType leaf = add(scene, "leaf", {46, 104, 58, 255});
-  const VoxelType wall = add(scene, "wall", {236, 226, 206, 255});
-  const VoxelType roof = add(scene, "roof", {176, 66, 48, 255});
-  const VoxelType window = add(scene, "window", {255, 190, 96, 255}, {1.0F, 0.0F, 5.0F});
-  const VoxelType path = add(scene, "path", {204, 184, 146, 255});
-  const VoxelType puff = add(scene, "cloud", {252, 252, 252, 200}, {1.0F, 0.0F, 0.0F, 0.0F, 0.22F});
-  Grid grid;
-  const IVec3 middle{150, 90, 120};
+struct IslandTypes {
+  explicit IslandTypes(Scene& scene)
+      : rock(add(scene, "rock", {122, 108, 98, 255})),
+        dark_rock(add(scene, "dark rock", {92, 80, 76, 255})),
+        soil(add(scene, "soil", {126, 88, 58, 255})),
+        grass(add(scene, "grass", {104, 156, 60, 255})),
+        meadow(add(scene, "meadow", {134, 176, 70, 255})),
+        trunk(add(scene, "trunk", {92, 66, 46, 255})),
+        leaf(add(scene, "leaf", {46, 104, 58, 255})),
+        wall(add(scene, "wall", {236, 226, 206, 255})),
+        roof(add(scene, "roof", {176, 66, 48, 255})),
+        window(add(scene, "window", {255, 190, 96, 255}, {1.0F, 0.0F, 5.0F})),
+        path(add(scene, "path", {204, 184, 146, 255})),
+        puff(add(scene, "cloud", {252, 252, 252, 200}, {1.0F, 0.0F, 0.0F, 0.0F, 0.22F})) {}
+
+  VoxelType rock, dark_rock, soil, grass, meadow, trunk, leaf, wall, roof, window, path, puff;
+};
+
+constexpr IVec3 kIslandMiddle{150, 90, 120};
+
+void raise_island(Grid& grid, const IslandTypes& types) {
   for (int z = -46; z <= 46; ++z) {
     for (int x = -60; x <= 60; ++x) {
       const double turn = std::atan2(z * 1.3, x);
@@ -284,50 +308,68 @@ Scene island() {
       const int depth =
           4 + static_cast<int>(52.0 * std::pow(1.0 - share, 0.8) + 5.0 * std::sin(x * 0.5) * std::cos(z * 0.43));
       for (int y = -depth; y <= top; ++y) {
-        const VoxelType type = y == top              ? ((x * 7 + z * 13) % 5 == 0 ? meadow : grass)
-                               : y > top - 4         ? soil
-                               : (y + x / 3) % 7 < 2 ? dark_rock
-                                                     : rock;
-        grid.set(middle + IVec3{x, y, z}, type);
+        const VoxelType type = y == top              ? ((x * 7 + z * 13) % 5 == 0 ? types.meadow : types.grass)
+                               : y > top - 4         ? types.soil
+                               : (y + x / 3) % 7 < 2 ? types.dark_rock
+                                                     : types.rock;
+        grid.set(kIslandMiddle + IVec3{x, y, z}, type);
       }
     }
   }
-  const auto top_at = [&](int x, int z) {
-    int y = 20;
-    while (y > -20 && grid.get(middle + IVec3{x, y, z}) == quoin::kAir) --y;
-    return y + 1;
-  };
-  const int floor = top_at(6, 0);
-  const IVec3 house = middle + IVec3{0, floor, -6};
-  grid.fill_box({house - IVec3{0, 6, 0}, house + IVec3{18, 12, 13}}, wall);
+}
+
+// The first air above the island's ground, from its middle.
+int top_at(const Grid& grid, int x, int z) {
+  int y = 20;
+  while (y > -20 && grid.get(kIslandMiddle + IVec3{x, y, z}) == quoin::kAir) --y;
+  return y + 1;
+}
+
+// With a path to its door.
+void build_house(Grid& grid, const IslandTypes& types) {
+  const IVec3 house = kIslandMiddle + IVec3{0, top_at(grid, 6, 0), -6};
+  grid.fill_box({house - IVec3{0, 6, 0}, house + IVec3{18, 12, 13}}, types.wall);
   for (int step = 0; step < 9; ++step) {
-    grid.fill_box({house + IVec3{-2, 12 + step, step - 2}, house + IVec3{20, 13 + step, 15 - step}}, roof);
+    grid.fill_box({house + IVec3{-2, 12 + step, step - 2}, house + IVec3{20, 13 + step, 15 - step}}, types.roof);
   }
-  grid.fill_box({house + IVec3{13, 14, 2}, house + IVec3{16, 25, 5}}, dark_rock);
-  for (const int x : {2, 12}) grid.fill_box({house + IVec3{x, 4, 12}, house + IVec3{x + 4, 9, 13}}, window);
-  grid.fill_box({house + IVec3{18 - 1, 4, 4}, house + IVec3{18, 9, 9}}, window);
-  grid.fill_box({house + IVec3{7, 0, 12}, house + IVec3{11, 8, 13}}, trunk);
+  grid.fill_box({house + IVec3{13, 14, 2}, house + IVec3{16, 25, 5}}, types.dark_rock);
+  for (const int x : {2, 12}) grid.fill_box({house + IVec3{x, 4, 12}, house + IVec3{x + 4, 9, 13}}, types.window);
+  grid.fill_box({house + IVec3{18 - 1, 4, 4}, house + IVec3{18, 9, 9}}, types.window);
+  grid.fill_box({house + IVec3{7, 0, 12}, house + IVec3{11, 8, 13}}, types.trunk);
   for (int i = 0; i < 22; ++i) {
     for (int w = 0; w < 4; ++w) {
       const int x = 7 + w + static_cast<int>(3.0 * std::sin(i * 0.2));
-      grid.set(middle + IVec3{x, top_at(x, 7 + i) - 1, 7 + i}, path);
+      grid.set(kIslandMiddle + IVec3{x, top_at(grid, x, 7 + i) - 1, 7 + i}, types.path);
     }
   }
-  unsigned random = 11;
+}
+
+void plant_trees(Grid& grid, const IslandTypes& types, unsigned& random) {
   for (int i = 0; i < 26; ++i) {
     const int x = static_cast<int>((drawn(random) - 0.5) * 92.0);
     const int z = static_cast<int>((drawn(random) - 0.5) * 62.0);
     const bool is_free = std::hypot(x, z * 1.3) < 40.0 && (x < -6 || x > 26 || z < -10 || z > 32);
-    if (is_free) tree(grid, middle + IVec3{x, top_at(x, z), z}, 10 + i % 9, trunk, leaf);
+    if (is_free) tree(grid, kIslandMiddle + IVec3{x, top_at(grid, x, z), z}, 10 + i % 9, types.trunk, types.leaf);
   }
+}
+
+// An island that floats above a sea of clouds, with a house on it.
+Scene island() {
+  Scene scene;
+  const IslandTypes types(scene);
+  Grid grid;
+  unsigned random = 11;
+  raise_island(grid, types);
+  build_house(grid, types);
+  plant_trees(grid, types, random);
   for (int i = 0; i < 230; ++i) {
     const int x = -190 + static_cast<int>(drawn(random) * 680.0);
     const int z = -300 + static_cast<int>(drawn(random) * 600.0);
-    cloud(grid, {x, 4 + static_cast<int>(drawn(random) * 12.0), z}, 38.0 + 30.0 * drawn(random), puff, random);
+    cloud(grid, {x, 4 + static_cast<int>(drawn(random) * 12.0), z}, 38.0 + 30.0 * drawn(random), types.puff, random);
   }
-  cloud(grid, {52, 104, 84}, 40.0, puff, random);
-  cloud(grid, {248, 122, 70}, 46.0, puff, random);
-  cloud(grid, {232, 66, 150}, 34.0, puff, random);
+  cloud(grid, {52, 104, 84}, 40.0, types.puff, random);
+  cloud(grid, {248, 122, 70}, 46.0, types.puff, random);
+  cloud(grid, {232, 66, 150}, 34.0, types.puff, random);
   place(scene, std::move(grid));
   return scene;
 }

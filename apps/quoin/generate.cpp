@@ -146,7 +146,7 @@ int run_generate(GenerateOptions& options) {
   const bool is_wrong = !format || format->is_mesh || (options.is_smooth && format->format == FileFormat::Vox);
   if (is_wrong) {
     print_error(options.output.string() + ": a " + (options.is_smooth ? "smooth terrain" : "terrain") +
-                " is written as " + (options.is_smooth ? "" : ".vox or ") +
+                " is written as .quoin" + (options.is_smooth ? " or " : ", .vox or ") +
                 ".json; `quoin convert` turns that into other formats");
     return kWrongUsage;
   }
@@ -186,7 +186,7 @@ void add_generate_command(CLI::App& app, int& status) {
   command->require_subcommand(1);
   command->footer("Example: quoin generate terrain hills.vox");
   CLI::App* terrain = command->add_subcommand("terrain", "Hills, rivers, caves and woods");
-  add_world(*terrain, "File to write: .vox, .json",
+  add_world(*terrain, "File to write: .quoin, .vox, .json",
             "Width x height x depth in units of 32 voxels (default 4x2x4); 1024x32x1024 at most, 65,536 in all",
             status);
   terrain->footer(
@@ -194,7 +194,7 @@ void add_generate_command(CLI::App& app, int& status) {
       "Example: quoin generate terrain hills.vox --seed 7 --chunks 8x3x8");
   CLI::App* smooth = command->add_subcommand("smooth-terrain", "Smooth hills with cliffs, arches and caves");
   const auto options = add_world(
-      *smooth, "File to write: .json",
+      *smooth, "File to write: .quoin, .json",
       "Width x height x depth in units of 64 samples (default 4x2x4); 512x16x512 at most, 8,192 in all", status);
   options->is_smooth = true;
   smooth->add_flag("!--no-overhangs", options->smooth.overhangs, "No cliffs that overhang, no arches");

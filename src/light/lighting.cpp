@@ -75,6 +75,7 @@ struct Lighting::Group {
 
   // `lift`: in the voxels that are traced.
   void add(const SurfacePoint& point, double lift) {
+    QUOIN_ASSERT(size < points.size(), "a group has as many points as a packet has rays");
     if (point.kind == PointKind::Surface) {
       surfaces |= 1U << size;
       if (point.openness < 0.0F) unknown |= 1U << size;

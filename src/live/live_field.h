@@ -7,7 +7,6 @@
 #include <unordered_map>
 #include <vector>
 
-#include "live/live_distance.h"
 #include "live/live_source.h"
 
 namespace quoin {

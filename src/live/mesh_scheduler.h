@@ -12,7 +12,6 @@
 #include <quoin/live/live_meshes.h>
 #include <quoin/scene/scene.h>
 
-#include "live/live_distance.h"
 #include "live/live_source.h"
 #include "live/mesh_job_queue.h"
 

@@ -136,6 +136,7 @@ std::array<DVec3, 4> framing_directions(DVec3 forward, double aspect) {
   static_cast<void>(frame(
       DVec3(0.0),
       [&](DVec3 direction) {
+        QUOIN_ASSERT(count < asked.size(), "a reach is asked of four directions");
         asked[count++] = direction;
         return 1.0;
       },

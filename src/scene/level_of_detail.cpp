@@ -197,6 +197,7 @@ std::span<const DetailSelector::Impl::Seen> DetailSelector::Impl::look_at_instan
     // The difference of two far positions is taken first: it is small, and mostly exact.
     const DVec3 centre = (instance.position - camera) + unit_rotation(instance.rotation) * offset;
     const double radius = content.sphere.radius * voxel_size;
+    QUOIN_ASSERT(count < seen.size(), "room for every instance");
     seen[count] = {handle, centre, radius, voxel_size};
     count += static_cast<std::size_t>(is_finite(centre + radius) && frustum.meets(centre, radius));
   });

@@ -14,7 +14,6 @@
 #include "core/coordinates/coordinate_hash.h"
 #include "trace/cell_rows.h"
 #include "trace/chunk_rows.h"
-#include "trace/glass_rows.h"
 #include "trace/tree_view.h"
 
 namespace quoin {

@@ -31,6 +31,7 @@ std::array<DVec3, kImpostorViews> all_views() {
       for (const double z : {-1.0, 1.0}) add(x, y, z);
     }
   }
+  QUOIN_ASSERT(count == views.size(), "a direction a view");
   return views;
 }
 

@@ -241,56 +241,72 @@ class Sky {
   MultipleScattering scattering_;
 };
 
-}  // namespace
-
-AtmosphericSky atmospheric_sky(DVec3 to_sun, float irradiance, const AirOptions& air) {
-  const Sky sky(air);
-  const auto sun_up = static_cast<float>(to_sun.y);
-  const Vec3 sun(to_sun);
-  AtmosphericSky made;
-  made.sunlight = sky.sunlight(sun_up) * irradiance;
-  made.radiance = {kWidth, kHeight, std::vector<float>(std::size_t{3} * kWidth * kHeight)};
-  // By elevation, and by the angle from the sun around the vertical: fine near the horizon and near the sun.
-  constexpr int kUps = 96;
-  constexpr int kTurns = 64;
-  const float sun_across = std::sqrt(std::max(0.0F, 1.0F - sun_up * sun_up));
-  std::vector<Vec3> dome(std::size_t{kUps} * kTurns);
-  for (int j = 0; j < kUps; ++j) {
-    const float up = std::max(square(static_cast<float>(j) / (kUps - 1)), 1e-5F);
-    const float across = std::sqrt(std::max(0.0F, 1.0F - up * up));
-    for (int i = 0; i < kTurns; ++i) {
-      const float turns = 0.5F * square(static_cast<float>(i) / (kTurns - 1));
-      const float towards = std::clamp(up * sun_up + across * sun_across * of_turns(turns).cosine, -1.0F, 1.0F);
-      dome[static_cast<std::size_t>(j * kTurns + i)] = sky.radiance(up, towards, sun_up) * irradiance + kNight;
+// The sky above the horizon, by elevation, and by the angle from the sun around the vertical: fine near the horizon and
+// near the sun.
+class Dome {
+ public:
+  Dome(const Sky& sky, float sun_up, float irradiance) {
+    const float sun_across = std::sqrt(std::max(0.0F, 1.0F - sun_up * sun_up));
+    for (int j = 0; j < kUps; ++j) {
+      const float up = std::max(square(static_cast<float>(j) / (kUps - 1)), 1e-5F);
+      const float across = std::sqrt(std::max(0.0F, 1.0F - up * up));
+      for (int i = 0; i < kTurns; ++i) {
+        const float turns = 0.5F * square(static_cast<float>(i) / (kTurns - 1));
+        const float towards = std::clamp(up * sun_up + across * sun_across * of_turns(turns).cosine, -1.0F, 1.0F);
+        entries_[index(i, j)] = sky.radiance(up, towards, sun_up) * irradiance + kNight;
+      }
     }
   }
-  const auto sky_at = [&](float up, float turns) {
+
+  [[nodiscard]] Vec3 at(float up, float turns) const {
     const float y = std::sqrt(std::clamp(up, 0.0F, 1.0F)) * (kUps - 1);
     const float x = std::sqrt(std::clamp(2.0F * turns, 0.0F, 1.0F)) * (kTurns - 1);
     const int i = std::min(static_cast<int>(x), kTurns - 2);
     const int j = std::min(static_cast<int>(y), kUps - 2);
     const float fx = x - static_cast<float>(i);
     const float fy = y - static_cast<float>(j);
-    const auto entry = [&](int column, int row) { return dome[static_cast<std::size_t>(row * kTurns + column)]; };
-    return (entry(i, j) * (1.0F - fx) + entry(i + 1, j) * fx) * (1.0F - fy) +
-           (entry(i, j + 1) * (1.0F - fx) + entry(i + 1, j + 1) * fx) * fy;
-  };
-  // What a level ground gets of all this, for the colour of the ground below the horizon.
-  Vec3 level(0.0F);
-  for (int j = 0; j < kHeight / 2; ++j) {
-    const SineCosine down = of_turns((static_cast<float>(j) + 0.5F) / kHeight * 0.5F);
-    Vec3 row(0.0F);
-    for (int i = 0; i < 16; ++i) row += sky_at(down.cosine, (static_cast<float>(i) + 0.5F) / 32.0F);
-    level += row * (down.sine * down.cosine / 16.0F * 2.0F * kPi * kPi / kHeight);
+    return (entries_[index(i, j)] * (1.0F - fx) + entries_[index(i + 1, j)] * fx) * (1.0F - fy) +
+           (entries_[index(i, j + 1)] * (1.0F - fx) + entries_[index(i + 1, j + 1)] * fx) * fy;
   }
-  const Vec3 ground = (level + made.sunlight * std::max(sun_up, 0.0F)) * (kGroundAlbedo / kPi);
+
+  // What a level ground gets of it.
+  [[nodiscard]] Vec3 on_level_ground() const {
+    Vec3 level(0.0F);
+    for (int j = 0; j < kHeight / 2; ++j) {
+      const SineCosine down = of_turns((static_cast<float>(j) + 0.5F) / kHeight * 0.5F);
+      Vec3 row(0.0F);
+      for (int i = 0; i < 16; ++i) row += at(down.cosine, (static_cast<float>(i) + 0.5F) / 32.0F);
+      level += row * (down.sine * down.cosine / 16.0F * 2.0F * kPi * kPi / kHeight);
+    }
+    return level;
+  }
+
+ private:
+  static constexpr int kUps = 96;
+  static constexpr int kTurns = 64;
+  static std::size_t index(int turn, int up) { return static_cast<std::size_t>(up * kTurns + turn); }
+
+  std::vector<Vec3> entries_ = std::vector<Vec3>(std::size_t{kUps} * kTurns);
+};
+
+}  // namespace
+
+AtmosphericSky atmospheric_sky(DVec3 to_sun, float irradiance, const AirOptions& air) {
+  const Sky sky(air);
+  const auto sun_up = static_cast<float>(to_sun.y);
+  AtmosphericSky made;
+  made.sunlight = sky.sunlight(sun_up) * irradiance;
+  made.radiance = {kWidth, kHeight, std::vector<float>(std::size_t{3} * kWidth * kHeight)};
+  const Dome dome(sky, sun_up, irradiance);
+  // The colour of the ground below the horizon.
+  const Vec3 ground = (dome.on_level_ground() + made.sunlight * std::max(sun_up, 0.0F)) * (kGroundAlbedo / kPi);
   const double sun_turns = arc_tangent(to_sun.x, -to_sun.z) / (2.0 * std::numbers::pi) + 0.5;
   for (int y = 0; y < kHeight; ++y) {
     const float up = of_turns((static_cast<float>(y) + 0.5F) / kHeight * 0.5F).cosine;
     for (int x = 0; x < kWidth; ++x) {
       double turns = std::abs((x + 0.5) / kWidth - sun_turns);
       if (turns > 0.5) turns = 1.0 - turns;
-      Vec3 light = sky_at(up, static_cast<float>(turns));
+      Vec3 light = dome.at(up, static_cast<float>(turns));
       if (up < 0.0F) {
         const float s = std::clamp(-up / 0.12F, 0.0F, 1.0F);
         light += (ground - light) * (s * s * (3.0F - 2.0F * s));

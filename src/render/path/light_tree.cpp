@@ -77,6 +77,7 @@ class LightTree::Builder {
     tree.nodes_.reserve(2 * lamps.size());
     tree.ways_.resize(lamps.size());
     build(0, lamps.size(), 0, 0);
+    QUOIN_ASSERT(tree.nodes_.size() == 2 * lamps.size() - 1, "each lamp in one leaf");
   }
 
  private:
@@ -86,6 +87,7 @@ class LightTree::Builder {
     if (end - begin == 1) {
       const std::uint32_t lamp = order_[begin];
       tree_.nodes_[at] = {lamps_[lamp], -1, static_cast<std::int32_t>(lamp)};
+      QUOIN_ASSERT(level <= 64, "a way has a bit a level");
       tree_.ways_[lamp] = way;
       return lamps_[lamp];
     }

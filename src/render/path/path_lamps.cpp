@@ -177,6 +177,7 @@ LampSample PathLamps::sample(DVec3 point, Vec3 normal, float choice, Pair u) con
 }
 
 float PathLamps::density(std::int32_t lamp, DVec3 point, Vec3 normal, Vec3 direction, float distance) const {
+  QUOIN_ASSERT(lamp >= 0 && static_cast<std::size_t>(lamp) < lamps_.size(), "one of these lamps");
   const PathLamp& of = lamps_[static_cast<std::size_t>(lamp)];
   const float here = density_of(of, seen_from(of, point), direction, distance);
   return here > 0.0F ? here * tree_.probability(static_cast<std::uint32_t>(lamp), Vec3(point - origin_), normal) : 0.0F;
@@ -190,6 +191,7 @@ std::size_t PathLamps::hash_of_face(std::int32_t placed, IVec3 voxel, Direction 
 }
 
 void PathLamps::add_face(std::int32_t placed, IVec3 voxel, Direction face, std::int32_t lamp) {
+  QUOIN_ASSERT(lamp >= 0 && static_cast<std::size_t>(lamp) < lamps_.size(), "a face of one of these lamps");
   if (2 * (face_count_ + 1) > faces_.size()) grow();
   const std::size_t mask = faces_.size() - 1;
   std::size_t slot = hash_of_face(placed, voxel, face) & mask;

@@ -193,13 +193,7 @@ void PathTile::meet_packet(std::span<const std::uint32_t> indices) {
     if (context_->has_media && context_->parts != nullptr) {
       note_behind(paths_[indices[i]], hits, static_cast<int>(i), until[i]);
     }
-    const std::optional<Fog>& fog = context_->options->fog;
-    if (!fog || !(fog->density > 0.0) || path.inside != kAir) continue;
-    const Interval way = in_fog(path.origin, path.direction, until[i]);
-    const double met = way.begin + free_way(path.random.one(path.dimension + kFog), fog->density);
-    if (!(met < way.end)) continue;
-    until[i] = met;
-    in_fog_lanes |= 1U << i;
+    if (ends_in_fog(path, until[i])) in_fog_lanes |= 1U << i;
   }
   if (context_->view->tracer().has_transparent()) {
     rays.max_t = until;
@@ -207,23 +201,37 @@ void PathTile::meet_packet(std::span<const std::uint32_t> indices) {
   }
   for (std::size_t i = 0; i < indices.size(); ++i) {
     const std::uint32_t index = indices[i];
-    Path& path = paths_[index];
-    const int lane = static_cast<int>(i);
-    if (((through_glass >> i & 1U) != 0 || path.inside != kAir) && meet_glass(index, until[i])) continue;
+    const bool may_meet_glass = (through_glass >> i & 1U) != 0 || paths_[index].inside != kAir;
+    if (may_meet_glass && meet_glass(index, until[i])) continue;
     if ((in_fog_lanes >> i & 1U) != 0) {
       const Fog& fog = *context_->options->fog;
       hit_air(index, until[i], fog.colour, static_cast<float>(fog.anisotropy), 0);
-      continue;
-    }
-    const bool is_hit = (hits.grids.hit >> i & 1U) != 0 && hits.grids.t[i] <= until[i];
-    if (is_hit) {
-      hit_matter(index, rays, hits, lane);
-    } else if (until[i] < kInfinite) {
-      hit_ground(index, until[i]);
     } else {
-      leave(path, path.direction);
+      meet_lane(index, rays, hits, static_cast<int>(i), until[i]);
     }
   }
+}
+
+void PathTile::meet_lane(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane, double until) {
+  const auto i = static_cast<std::size_t>(lane);
+  const bool is_hit = (hits.grids.hit >> i & 1U) != 0 && hits.grids.t[i] <= until;
+  if (is_hit) {
+    hit_matter(index, rays, hits, lane);
+  } else if (until < kInfinite) {
+    hit_ground(index, until);
+  } else {
+    leave(paths_[index], paths_[index].direction);
+  }
+}
+
+bool PathTile::ends_in_fog(const Path& path, double& until) const {
+  const std::optional<Fog>& fog = context_->options->fog;
+  if (!fog || !(fog->density > 0.0) || path.inside != kAir) return false;
+  const Interval way = in_fog(path.origin, path.direction, until);
+  const double met = way.begin + free_way(path.random.one(path.dimension + kFog), fog->density);
+  if (!(met < way.end)) return false;
+  until = met;
+  return true;
 }
 
 double PathTile::ground_at(const DVec3& origin, Vec3 direction) const {

@@ -128,10 +128,14 @@ class PathTile {
   void scatter_in(std::uint32_t index, const GlassBody& body, float u);
   // The way through fog from a point, up to `max_t`.
   [[nodiscard]] Interval in_fog(const DVec3& origin, Vec3 direction, double max_t) const;
+  // Whether it meets fog before `until`, which is then where.
+  [[nodiscard]] bool ends_in_fog(const Path& path, double& until) const;
   void hit_air(std::uint32_t index, double t, Vec3 colour, float anisotropy, std::int32_t placed);
   bool enter_glass(std::uint32_t index);
   bool leave_glass(std::uint32_t index);
   void turn_at(Path& path, const DVec3& point, Vec3 direction, Vec3 normal, double lift, VoxelType inside);
+  // A ray of a packet, of what neither glass nor fog ends.
+  void meet_lane(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane, double until);
   void hit_matter(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane);
   void hit_glass(std::uint32_t index, const GlassBody& body, const DVec3& normal_in_grid);
   void hit_ground(std::uint32_t index, double t);

@@ -1,8 +1,11 @@
 #include "render_vk/paths/device_paths.h"
 
 #include <algorithm>
+#include <bit>
 #include <span>
 #include <utility>
+
+#include <quoin/core/assert.h>
 
 #include "render/path/scatter.h"
 
@@ -161,6 +164,7 @@ Status DevicePaths::put_faces(DeviceMemory& memory) {
     keys.emplace_back(0);
     lamps.push_back(-1);
   }
+  QUOIN_ASSERT(std::has_single_bit(lamps.size()), "slots that a mask of their number chooses from");
   Status done = put_values(memory, lamp_ways_, lamps_->tree().ways());
   if (done) done = put_values(memory, face_keys_, std::span<const IVec4>(keys));
   if (done) done = put_values(memory, face_lamps_, std::span<const std::int32_t>(lamps));

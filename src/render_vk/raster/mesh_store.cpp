@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "render_vk/trees/octahedral.h"
 
 namespace quoin::vulkan {
@@ -175,6 +177,7 @@ void MeshStore::replace(Change& change) {
 }
 
 void MeshStore::give_back(StoredMesh& mesh) {
+  QUOIN_ASSERT(chunks_ > 0 && bytes_ >= mesh.place.size && triangles_ >= mesh.triangles(), "what is there was counted");
   --chunks_;
   chunks_with_glass_ -= mesh.has_glass() ? 1 : 0;
   triangles_ -= mesh.triangles();
@@ -193,6 +196,7 @@ const MeshStore::StoredGrid* MeshStore::find(MeshKey key) {
   const auto found = grids_.find(key);
   if (found == grids_.end()) return nullptr;
   StoredGrid& grid = found->second;
+  QUOIN_ASSERT(!grid.chunks.empty(), "a grid without meshes is not kept");
   if (!grid.bounds_known) {
     grid.low = grid.high = grid.chunks.begin()->first;
     grid.opaque_quads = 0;

@@ -152,7 +152,8 @@ TEST(WorldCare, AnyDamageIsSeenAndWhatIsSoundIsKept) {
     ASSERT_TRUE(repair) << to_string(repair.error());
     const std::size_t kept = sound_chunks(mended);
     EXPECT_GE(kept, readable);
-    EXPECT_GE(kept, std::size_t{kChunks} - 12) << "a page holds few chunks";
+    // Two bodies may lie where a few bytes were turned; a page holds some thirty of these small ones.
+    EXPECT_GE(kept, std::size_t{kChunks} - (is_page ? 40 : 2));
     EXPECT_EQ(repair->check.chunks, kept);
     const auto sound = check_world(mended);
     ASSERT_TRUE(sound) << to_string(sound.error());

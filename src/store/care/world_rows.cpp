@@ -77,7 +77,8 @@ Result<std::vector<KeyGap>> ChunkRows::each(FunctionRef<bool(std::int64_t, std::
       }
       unreadable = readable;
       const std::uint64_t room = static_cast<std::uint64_t>(kLastKey) - static_cast<std::uint64_t>(next);
-      readable = step < room ? static_cast<std::int64_t>(static_cast<std::uint64_t>(next) + step) : kLastKey;
+      readable =
+          step != 0 && step < room ? static_cast<std::int64_t>(static_cast<std::uint64_t>(next) + step) : kLastKey;
     }
     while (readable - unreadable > 1) {
       const std::int64_t middle = unreadable + (readable - unreadable) / 2;

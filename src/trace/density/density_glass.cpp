@@ -9,6 +9,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <quoin/core/assert.h>
+
 #include "core/trilinear.h"
 #include "trace/density/smooth_normal.h"
 #include "trace/kernel/cell.inl"
@@ -119,7 +121,10 @@ class Crossings {
     }
     add_between(f, low, 1.0);
   }
-  void add(double at) { places_[count_++] = at; }
+  void add(double at) {
+    QUOIN_ASSERT(count_ < kMost, "room for every crossing that there can be");
+    places_[count_++] = at;
+  }
   void sort() { std::sort(places_.begin(), places_.begin() + static_cast<std::ptrdiff_t>(count_)); }
   [[nodiscard]] std::size_t count() const { return count_; }
   [[nodiscard]] double operator[](std::size_t i) const { return places_[i]; }

@@ -1,4 +1,4 @@
-#include "live/live_distance.h"
+#include "live/live_source.h"
 
 #include <algorithm>
 #include <limits>
