@@ -32,8 +32,8 @@
 //   content              the sections that there are, one after the other: voxel_runs.h, placed_data.h,
 //                        density_section.h
 //
-// Without the first section all voxels are air. A body says where it belongs, so that a world whose index is lost can be
-// put together again from its bodies.
+// Without the first section all voxels are air. A body says where it belongs, so that a world whose index is lost can
+// be put together again from its bodies.
 
 namespace quoin::store {
 

@@ -34,7 +34,7 @@
 //     (at y - 1) + (at z - 1) - (at both)
 //
 // or the one neighbour that the chunk has, or 0 in its first row. Rounded to a half: the 15 bits are those of a float
-// from the 13th bit up, after adding 2^12 to these bits and taking 112 from the exponent, at least 0, at most `largest`.
+// from the 13th bit up, after adding 2^12 to these bits, less 112 of the exponent, at least 0, at most `largest`.
 
 namespace quoin::store {
 

@@ -18,15 +18,15 @@
 //   runs: voxels x fastest, then z, then y
 //     uint32 runs        n to 262,144
 //     uint32 bytes       of the next line
-//     uint8 lengths[]    each run's voxels - 1, seven bits a byte, lowest first, the top bit set in all but the last byte
+//     uint8 lengths[]    each run's voxels - 1, seven bits a byte, lowest first, the top bit set but in its last byte
 //     uint8 indices[]    each run's type; none where n is 2, as runs alternate then; to 256 types a byte a run,
 //                        else the low bytes of all runs, then the high ones
 //   packed:
 //     uint8 [32,768 * bits]  indices of `bits` bits, x fastest, then z, then y, from the lowest bit up; `bits` is the
 //                            first of 1, 2, 4, 8 and 16 with 2^bits >= n
 //
-// Layers of equal height come one after the other: ground is alike along them. A run's type differs from that of the run
-// before. So the same voxels are the same bytes, whatever edits led to them.
+// Layers of equal height come one after the other: ground is alike along them. A run's type differs from that of the
+// run before. So the same voxels are the same bytes, whatever edits led to them.
 
 namespace quoin::store {
 
@@ -51,7 +51,7 @@ class VoxelRunWriter {
   std::vector<std::uint16_t> indices_;
 };
 
-/// Reads them, straight into the storage of a chunk. One thread at a time. Memory: 0.6 MiB once there was a noisy chunk.
+/// Reads them, straight into a chunk's storage. One thread at a time. Memory: 0.6 MiB once there was a noisy chunk.
 class VoxelRunReader {
  public:
   /// Errors: BadFormat, with the offset in the content; also for types that are not below `type_count`.

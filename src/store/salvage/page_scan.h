@@ -15,8 +15,8 @@
 // first page, the inner pages of trees or pages' own headers are damaged, and what lies on pages that are no longer
 // used. Source: https://sqlite.org/fileformat2.html.
 //
-// Neither trees nor the places of cells are followed: each byte of each page may be where a cell begins. What follows is
-// a record if its lengths agree, and a chunk's body if its checksum is right.
+// Neither trees nor the places of cells are followed: each byte of each page may be where a cell begins. What follows
+// is a record if its lengths agree, and a chunk's body if its checksum is right.
 //
 // Errors:  CannotRead where the file cannot be opened. Pages that the disk does not give count as damaged.
 //          LimitExceeded for a file whose pages were made to lead back to themselves again and again.
@@ -33,8 +33,8 @@ struct PageRecord {
   std::vector<ColumnValue> columns;
 };
 
-/// Calls `visit` for all that may be a row of a table of two columns or more, as often as it is found: also older states
-/// of rows, and bytes that look like rows by chance. Whoever reads them has checksums of his own.
+/// Calls `visit` for all that may be a row of a table of two columns or more, as often as it is found: also older
+/// states of rows, and bytes that look like rows by chance. Whoever reads them has checksums of his own.
 [[nodiscard]] Status scan_records(const std::filesystem::path& database, FunctionRef<void(const PageRecord&)> visit);
 
 /// A body whose own row cannot be read has this key.

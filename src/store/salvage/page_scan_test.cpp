@@ -372,6 +372,23 @@ TEST(PageScan, EndsWhereRecordsDoNot) {
   EXPECT_TRUE(found_in(path).empty());
 }
 
+// As page_scan_fuzz reads them: a database of blocks of 256 bytes, as many as the first byte says, and its log.
+TEST(PageScan, FilesOfTheCorpusHoldTheirBodies) {
+  const WorldFolder folder;
+  for (const char* const name : {"pages_of_512", "pages_of_1024"}) {
+    const Bytes file = file_of(std::filesystem::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "page_scan" / name);
+    ASSERT_GT(file.size(), 1U);
+    const auto log = file.begin() + 1 + std::to_integer<std::ptrdiff_t>(file[0]) * 256;
+    write(folder / "world", Bytes(file.begin() + 1, log));
+    write(folder / "world-wal", Bytes(log, file.end()));
+    const auto found = found_in(folder / "world");
+    EXPECT_EQ(found.size(), 6U);
+    for (const auto& [body, keys] : found) {
+      EXPECT_FALSE(keys.contains(kLostKey)) << name;
+    }
+  }
+}
+
 TEST(PageScan, SaysThatThereIsNoFile) {
   const WorldFolder folder;
   const auto status = scan_bodies(folder / "none", [](std::int64_t, std::span<const std::byte>) {});
