@@ -93,6 +93,9 @@
 #include <quoin/scene/solid_shapes.h>
 #include <quoin/scene/sweep.h>
 #include <quoin/scene/volume_scene.h>
+#include <quoin/store/stored_chunk.h>
+#include <quoin/store/world_saver.h>
+#include <quoin/store/world_store.h>
 #include <quoin/terrain/noise.h>
 #include <quoin/terrain/terrain.h>
 #include <quoin/trace/density_ray.h>

@@ -13,6 +13,8 @@
 #include <system_error>
 #include <utility>
 
+#include "io/whole_file.h"
+
 namespace quoin {
 
 namespace {
@@ -78,14 +80,6 @@ Status check_replaceable(const std::filesystem::path& path, std::optional<mode_t
   return {};
 }
 
-/// Makes a rename last: without it a power cut may bring the old folder entry back. Not all file systems can.
-void sync_folder(const std::filesystem::path& folder) {
-  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  ::fsync(descriptor);
-  ::close(descriptor);
-}
-
 /// The whole of a file, or its first `max_bytes` bytes.
 Result<std::vector<std::byte>> read_regular_file(const std::filesystem::path& path,
                                                  std::optional<std::size_t> max_bytes) {
@@ -116,6 +110,13 @@ Result<std::vector<std::byte>> read_regular_file(const std::filesystem::path& pa
 }
 
 }  // namespace
+
+void sync_folder(const std::filesystem::path& folder) {
+  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
+}
 
 std::filesystem::path follow_links(std::filesystem::path path) {
   constexpr int kMaxLinks = 40;

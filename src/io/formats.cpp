@@ -12,6 +12,7 @@
 #include "io/byte_stream.h"
 #include "io/volume/header.h"
 #include "io/whole_file.h"
+#include "io/world_format.h"
 
 namespace quoin {
 
@@ -20,6 +21,8 @@ namespace {
 constexpr std::array kFormats = {
     FormatInfo{FileFormat::Vox, "vox", ".vox", "MagicaVoxel", true, true, false, false},
     FormatInfo{FileFormat::Scene, "scene", ".json", "Quoin's scene files", true, true, false, false},
+    FormatInfo{FileFormat::World, "world", ".quoin", "Quoin's worlds, which may be larger than memory", true, true,
+               false, false},
     FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, false, false, true},
     FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes", true, false, false, true},
     FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true, false},
@@ -95,6 +98,7 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
   const auto format = detect_format(bytes);
   if (format == FileFormat::Vox) return read_vox(bytes, options, progress);
   if (format == FileFormat::Scene) return read_scene_file(bytes, options, threads, progress);
+  if (format == FileFormat::World) return read_world_format(bytes, options, threads, progress);
   if (is_volume(format)) return read_volume_as_scene(bytes, options, threads, progress);
   Error error = unrecognised(bytes);
   // The reader knows more of what else goes by this name.
@@ -131,6 +135,11 @@ Result<SavedScene> save(const Saved& saved, const std::filesystem::path& path, T
   if (*format == FileFormat::Vox) {
     return saved.loaded != nullptr ? write_vox(*saved.loaded, path, progress) : write_vox(saved.scene, path, progress);
   }
+  if (*format == FileFormat::World) {
+    auto written = write_world_format(saved.scene, saved.loaded, path, threads, progress);
+    if (!written) return written.error();
+    return SavedScene{written->bytes, lost_with_source(saved)};
+  }
   auto file = with_path(scene_file_of(saved.scene), path);
   if (!file) return file.error();
   if (saved.loaded != nullptr) {
@@ -150,6 +159,14 @@ Result<std::vector<std::string>> losses(const Saved& saved, const std::filesyste
 }
 
 }  // namespace
+
+bool is_world_format(std::span<const std::byte> beginning) {
+  constexpr std::size_t kIdAt = 68;
+  if (beginning.size() < kWorldHeaderBytes || !begins_with(beginning, {"SQLite format 3\0", 16})) return false;
+  std::uint32_t id = 0;
+  for (std::size_t i = 0; i < 4; ++i) id = id << 8 | std::to_integer<std::uint32_t>(beginning[kIdAt + i]);
+  return id == kWorldApplicationId;
+}
 
 std::span<const FormatInfo> file_formats() {
   return kFormats;
@@ -175,6 +192,7 @@ const FormatInfo& format_info(FileFormat format) {
 
 std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
   if (begins_with(bytes, "VOX ")) return FileFormat::Vox;
+  if (is_world_format(bytes)) return FileFormat::World;
   if (is_scene_file(bytes)) return FileFormat::Scene;
   const auto first = first_bytes(bytes, nifti::kMaxHeaderBytes);
   if (first && nifti::is_header(*first)) return FileFormat::Nifti;
@@ -225,6 +243,7 @@ std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path
   const auto format = detect_format(path);
   if (!format || !*format) return {};
   if (**format == FileFormat::Scene) return files_named_in_scene(path);
+  if (**format == FileFormat::World) return {path.string() + "-wal"};
   return **format == FileFormat::Nifti ? files_of_pair(path) : std::vector<std::filesystem::path>();
 }
 
@@ -234,6 +253,7 @@ Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOpti
   if (options.raw) return with_path(read_volume_as_scene(path, options, threads, progress), path);
   const auto format = detect_format(path);
   if (!format) return format.error();
+  if (*format == FileFormat::World) return with_path(read_world_format(path, options, threads, progress), path);
   if (is_volume(*format)) return with_path(read_volume_as_scene(path, options, threads, progress), path);
   const auto bytes = read_file(path);
   if (!bytes) return bytes.error();

@@ -49,6 +49,7 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
       return plan_ply(meshes, path, options);
     case FileFormat::Vox:
     case FileFormat::Scene:
+    case FileFormat::World:
     case FileFormat::Nifti:
     case FileFormat::Nrrd:
       break;

@@ -45,4 +45,7 @@ template <class Read>
 /// Where the values of a NIfTI pair lie, of which `path` is the header; nothing where it is none.
 [[nodiscard]] std::vector<std::filesystem::path> files_of_pair(const std::filesystem::path& path);
 
+/// Makes a rename last: without it a power cut may bring the old folder entry back. Not all file systems can.
+void sync_folder(const std::filesystem::path& folder);
+
 }  // namespace quoin

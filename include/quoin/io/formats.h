@@ -17,7 +17,7 @@
 
 namespace quoin {
 
-enum class FileFormat : std::uint8_t { Vox, Scene, Nifti, Nrrd, Glb, Gltf, Obj, Ply };
+enum class FileFormat : std::uint8_t { Vox, Scene, World, Nifti, Nrrd, Glb, Gltf, Obj, Ply };
 
 /// What Quoin can do with a file format.
 struct FormatInfo {
@@ -77,15 +77,15 @@ struct FormatInfo {
 /// values of a NIfTI pair. Nothing where the file cannot be read.
 [[nodiscard]] std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path);
 
-/// Writes a scene as a file of voxels, in the format of the name's extension: .json (write_scene_file, without loss) or
-/// .vox (write_vox). It appears whole or not at all.
+/// Writes a scene as a file of voxels, in the format of the name's extension: .quoin (write_world) or .json
+/// (write_scene_file), both without loss, or .vox (write_vox). It appears whole or not at all.
 ///
 /// Warnings: one line each of what the format does not hold.
 /// Errors:   Unsupported for other extensions; those of the format's writer; `path` is set in all.
 [[nodiscard]] Result<SavedScene> save_scene(const Scene& scene, const std::filesystem::path& path, Threads threads = {},
                                             const Progress& progress = {});
-/// The same of a scene that was read, with what its file had beside it: in .json its sun and camera, in .vox what
-/// `source` holds.
+/// The same of a scene that was read, with what its file had beside it: in .quoin and .json its sun and camera, in
+/// .vox what `source` holds.
 [[nodiscard]] Result<SavedScene> save_scene(const LoadedScene& loaded, const std::filesystem::path& path,
                                             Threads threads = {}, const Progress& progress = {});
 

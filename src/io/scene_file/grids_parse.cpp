@@ -9,62 +9,13 @@
 
 #include <quoin/core/parallel.h>
 
+#include "io/scene_file/scene_parts.h"
 #include "io/scene_file/voxel_data.h"
 
 namespace quoin::scene_json {
 namespace {
 
 constexpr std::size_t kMaxGrids = std::size_t{1} << 22;
-
-/// A list "attributes" of pairs.
-void read_attributes(const Object& object, std::map<std::string, std::string>& attributes) {
-  read_list(object, "attributes", std::numeric_limits<std::size_t>::max(), [&](const Json& pair, const Place& place) {
-    if (!pair.is_array() || pair.size() != 2) {
-      object.faults().add(place, "must be a key and a value");
-      return;
-    }
-    std::string key = object.text(pair[0], {&place, {}, 0});
-    const bool is_new = attributes.emplace(std::move(key), object.text(pair[1], {&place, {}, 1})).second;
-    if (!is_new) object.faults().add(place, "this key was given before");
-  });
-}
-
-VoxelProperties properties_of(const Json& json, const Place& place, Faults& faults) {
-  const Object type(json, place,
-                    {"name", "colour", "visibility", "collides", "roughness", "metalness", "emission", "ior",
-                     "scattering", "anisotropy", "state_bits", "attributes"},
-                    faults);
-  VoxelProperties properties;
-  type.read_text("name", properties.name);
-  if (const Json* colour = type.need("colour")) {
-    const std::vector<int> c = type.whole_numbers(*colour, type.place_of("colour"), 4, 0, 255);
-    const auto channel = [&](std::size_t i) { return static_cast<std::uint8_t>(c[i]); };
-    properties.colour = {channel(0), channel(1), channel(2), channel(3)};
-  }
-  std::string visibility = "opaque";
-  type.read("visibility", visibility);
-  if (visibility == "transparent") {
-    properties.visibility = Visibility::Transparent;
-  } else if (visibility != "opaque") {
-    faults.add(type.place_of("visibility"), "must be \"opaque\" or \"transparent\"");
-  }
-  type.read("collides", properties.collides);
-  type.read("roughness", properties.roughness);
-  type.read("metalness", properties.metalness);
-  type.read("emission", properties.emission);
-  type.read("ior", properties.ior);
-  type.read("scattering", properties.scattering);
-  type.read("anisotropy", properties.anisotropy);
-  if (const Json* bits = type.find("state_bits")) {
-    if (bits->is_number_unsigned() && *bits <= kMaxStateBits) {
-      properties.state_bits = bits->get<std::uint8_t>();
-    } else {
-      faults.add(type.place_of("state_bits"), "must be a whole number from 0 to 32");
-    }
-  }
-  if (type.find("attributes") != nullptr) read_attributes(type, properties.attributes);
-  return properties;
-}
 
 /// Text of a grid's content, under one of its keys, with its place in the file.
 struct Piece {
@@ -93,26 +44,12 @@ void read_pieces(const Object& object, Piece::Kind kind, std::size_t grid, std::
 }
 
 SceneGrid grid_of(const Json& json, const Place& place, std::size_t index, std::vector<Piece>& pieces, Faults& faults) {
-  constexpr int kLeast = std::numeric_limits<int>::min();
-  constexpr int kMost = std::numeric_limits<int>::max();
   const Object object(json, place, {"name", "pivot", "canvas", "voxels", "band", "densities", "data"}, faults);
   SceneGrid grid;
-  object.read_text("name", grid.name);
-  object.read("pivot", grid.pivot);
-  if (const Json* canvas = object.find("canvas")) {
-    const std::vector<int> c = object.whole_numbers(*canvas, object.place_of("canvas"), 6, kLeast, kMost);
-    grid.canvas = {{c[0], c[1], c[2]}, {c[3], c[4], c[5]}};
-  }
+  read_grid_header(object, grid);
   read_pieces(object, Piece::Kind::Voxels, index, pieces);
   if (object.find("densities") != nullptr) {
-    double band = static_cast<double>(grid.field.band());
-    object.read("band", band);
-    constexpr double kGreatest = 65'504.0;
-    if (band > 0.0 && band <= kGreatest) {
-      grid.field = DensityGrid(static_cast<float>(band));
-    } else {
-      faults.add(object.place_of("band"), "must be more than 0 and at most 65504");
-    }
+    read_band(object, grid);
     read_pieces(object, Piece::Kind::Densities, index, pieces);
   }
   // Behind the voxels that hold it.

@@ -1,15 +1,12 @@
 #include <algorithm>
-#include <cmath>
 #include <initializer_list>
-#include <limits>
-#include <numbers>
 #include <set>
 
-#include <glm/geometric.hpp>
 #include <quoin/io/scene_file.h>
 
 #include "io/scene_file/grids_parse.h"
 #include "io/scene_file/json_reader.h"
+#include "io/scene_file/scene_parts.h"
 #include "io/scene_file/voxel_data.h"
 #include "io/whole_file.h"
 
@@ -26,127 +23,6 @@ constexpr std::size_t kMaxFiles = 65'536;
 constexpr std::size_t kMaxInstances = std::size_t{1} << 22;
 constexpr int kVersion = 5;
 
-DQuat rotation_of(const Object& instance, const Json& json) {
-  const Place place = instance.place_of("rotation");
-  Faults& faults = instance.faults();
-  if (json.is_array()) {
-    const std::vector<double> q = unit(instance.numbers(json, place, 4), place, faults);
-    return {q[3], q[0], q[1], q[2]};
-  }
-  if (!json.is_object()) {
-    faults.add(place, "must be a quaternion [x, y, z, w] or an axis with degrees");
-    return {1.0, 0.0, 0.0, 0.0};
-  }
-  const Object turn(json, place, {"axis", "degrees"}, faults);
-  double degrees = 0.0;
-  const Json* axis = turn.need("axis");
-  if (turn.need("degrees") == nullptr || axis == nullptr) return {1.0, 0.0, 0.0, 0.0};
-  turn.read("degrees", degrees);
-  const std::vector<double> a = unit(turn.numbers(*axis, turn.place_of("axis"), 3), turn.place_of("axis"), faults);
-  const double half = std::fmod(degrees, 720.0) * std::numbers::pi / 360.0;
-  return {std::cos(half), a[0] * std::sin(half), a[1] * std::sin(half), a[2] * std::sin(half)};
-}
-
-// A quaternion as it is: of a grid's instance, which may have any length.
-DQuat kept_rotation(const Object& instance, const Json& json) {
-  if (!json.is_array()) return rotation_of(instance, json);
-  const std::vector<double> q = instance.numbers(json, instance.place_of("rotation"), 4);
-  return {q[3], q[0], q[1], q[2]};
-}
-
-// A place in another list; whether there is one is known once all is read.
-std::optional<std::size_t> place_in(const Object& object, std::string_view key, std::string_view list) {
-  const Json* json = object.find(key);
-  if (json == nullptr) return std::nullopt;
-  if (json->is_number_unsigned()) return json->get<std::size_t>();
-  object.faults().add(object.place_of(key), "must be a place in the list of " + std::string(list) + ", from 0");
-  return 0;
-}
-
-// Bits of 32.
-std::optional<std::uint32_t> bits_in(const Object& object, std::string_view key) {
-  const Json* json = object.find(key);
-  if (json == nullptr) return std::nullopt;
-  if (json->is_number_unsigned() && json->get<std::uint64_t>() <= std::numeric_limits<std::uint32_t>::max()) {
-    return json->get<std::uint32_t>();
-  }
-  object.faults().add(object.place_of(key), "must be a whole number from 0 to 4294967295");
-  return std::nullopt;
-}
-
-SceneFile::Placement placement_of(const Json& json, const Place& place, Faults& faults) {
-  const Object instance(
-      json, place,
-      {"file", "grid", "name", "position", "rotation", "scale", "mirrored", "visible", "group", "layer", "categories"},
-      faults);
-  SceneFile::Placement placement;
-  placement.grid = place_in(instance, "grid", "grids");
-  if (!placement.grid && instance.need("file") != nullptr) {
-    instance.read("file", placement.source);
-  }
-  instance.read_text("name", placement.name);
-  instance.read("position", placement.position);
-  instance.read("scale", placement.scale);
-  instance.read("mirrored", placement.mirrored);
-  instance.read("visible", placement.visible);
-  placement.categories = bits_in(instance, "categories");
-  if (const Json* rotation = instance.find("rotation")) {
-    placement.rotation = placement.grid ? kept_rotation(instance, *rotation) : rotation_of(instance, *rotation);
-  }
-  if (!(placement.scale > 0.0)) faults.add(instance.place_of("scale"), "must be more than 0");
-  placement.group = place_in(instance, "group", "groups");
-  placement.layer = place_in(instance, "layer", "layers");
-  return placement;
-}
-
-Lamp lamp_of(const Json& json, const Place& place, Faults& faults) {
-  const Object object(
-      json, place,
-      {"kind", "name", "position", "direction", "colour", "intensity", "range", "inner_angle", "outer_angle"}, faults);
-  Lamp lamp;
-  std::string kind = "point";
-  object.read("kind", kind);
-  if (kind == "spot") {
-    lamp.kind = Lamp::Kind::Spot;
-  } else if (kind != "point") {
-    faults.add(object.place_of("kind"), "must be point or spot");
-  }
-  object.read_text("name", lamp.name);
-  if (object.need("position") != nullptr) object.read("position", lamp.position);
-  object.read("direction", lamp.direction);
-  if (const Json* colour = object.find("colour")) {
-    const std::vector<double> v = object.numbers(*colour, object.place_of("colour"), 3);
-    lamp.colour = Vec3(v[0], v[1], v[2]);
-    if (!is_finite(DVec3(lamp.colour))) faults.add(object.place_of("colour"), "is too large");
-  }
-  object.read("intensity", lamp.intensity);
-  object.read("range", lamp.range);
-  object.read("inner_angle", lamp.inner_angle_radians);
-  object.read("outer_angle", lamp.outer_angle_radians);
-  return lamp;
-}
-
-SceneFile::Group group_of(const Json& json, const Place& place, Faults& faults) {
-  const Object object(json, place, {"name", "parent", "layer", "position", "rotation", "mirrored", "visible"}, faults);
-  SceneFile::Group group;
-  object.read_text("name", group.name);
-  group.parent = place_in(object, "parent", "groups");
-  group.layer = place_in(object, "layer", "layers");
-  object.read("position", group.position);
-  if (const Json* rotation = object.find("rotation")) group.rotation = kept_rotation(object, *rotation);
-  object.read("mirrored", group.mirrored);
-  object.read("visible", group.visible);
-  return group;
-}
-
-SceneLayer layer_of(const Json& json, const Place& place, Faults& faults) {
-  const Object object(json, place, {"name", "visible"}, faults);
-  SceneLayer layer;
-  object.read_text("name", layer.name);
-  object.read("visible", layer.visible);
-  return layer;
-}
-
 SceneFile::Source source_of(const Json& json, const Place& place, Faults& faults) {
   const Object object(json, place, {"id", "path"}, faults);
   SceneFile::Source source;
@@ -156,52 +32,6 @@ SceneFile::Source source_of(const Json& json, const Place& place, Faults& faults
     faults.add(object.place_of("path"), "must name a file");
   }
   return source;
-}
-
-/// Whether axes are unit, perpendicular and right-handed, to the rounding of sums of them.
-bool is_frame(const Camera& camera) {
-  constexpr double kRounding = 1e-6;
-  const auto is_near = [](DVec3 a, DVec3 b) { return glm::distance(a, b) <= kRounding; };
-  return std::abs(glm::length(camera.forward) - 1.0) <= kRounding &&
-         std::abs(glm::length(camera.up) - 1.0) <= kRounding &&
-         is_near(glm::cross(camera.forward, camera.up), camera.right);
-}
-
-/// A camera of any kind, number by number.
-Camera kept_camera(const Json& json, const Place& place, Faults& faults) {
-  const Object object(json, place, {"position", "right", "up", "forward", "fov_radians", "view_height"}, faults);
-  Camera camera;
-  for (const char* key : {"position", "right", "up"}) static_cast<void>(object.need(key));
-  object.read("position", camera.position);
-  object.read("right", camera.right);
-  object.read("up", camera.up);
-  object.read("forward", camera.forward);
-  object.read("fov_radians", camera.vertical_fov_radians);
-  object.read("view_height", camera.view_height);
-  const bool is_flat = object.find("view_height") != nullptr;
-  if (is_flat == (object.find("fov_radians") != nullptr)) faults.add(place, "needs fov_radians or view_height");
-  if (is_flat) camera.projection = Camera::Projection::Orthographic;
-  if (!is_frame(camera)) faults.add(place, "right, up and forward must be unit and perpendicular");
-  if (!(camera.vertical_fov_radians > 0.0 && camera.vertical_fov_radians < std::numbers::pi)) {
-    faults.add(object.place_of("fov_radians"), "must be more than 0 and less than pi");
-  }
-  if (!(camera.view_height > 0.0)) faults.add(object.place_of("view_height"), "must be more than 0");
-  return camera;
-}
-
-Camera camera_of(const Json& json, Faults& faults) {
-  const Place place{nullptr, "camera", std::nullopt};
-  if (json.is_object() && json.contains("forward")) return kept_camera(json, place, faults);
-  const Object object(json, place, {"position", "look_at", "fov"}, faults);
-  DVec3 position(0.0);
-  DVec3 target(0.0);
-  double fov = 50.0;
-  if (object.need("position") != nullptr) object.read("position", position);
-  if (object.need("look_at") != nullptr) object.read("look_at", target);
-  object.read("fov", fov);
-  const auto camera = look_at(position, target, fov * std::numbers::pi / 180.0);
-  if (!camera) faults.add(place, camera.error().message);
-  return camera.value_or(Camera{});
 }
 
 // Faults of what names entries of other lists.
@@ -289,7 +119,7 @@ void read_file_object(const Json& json, std::size_t file_bytes, Threads threads,
     const std::vector<double> v = unit(file.numbers(*sun, file.place_of("sun"), 3), file.place_of("sun"), faults);
     scene.sun = DVec3(v[0], v[1], v[2]);
   }
-  if (const Json* camera = file.find("camera")) scene.camera = camera_of(*camera, faults);
+  if (const Json* camera = file.find("camera")) scene.camera = camera_of(*camera, file.place_of("camera"), faults);
   if (!faults.error()) NameCheck(scene, faults).check();
 }
 

@@ -1,39 +1,21 @@
 #include <algorithm>
-#include <bit>
 #include <map>
-#include <numbers>
 #include <utility>
 
-#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 #include <quoin/io/scene_file.h>
 
 #include "core/progress_steps.h"
-#include "io/base64.h"
+#include "io/scene_file/scene_parts.h"
 #include "io/scene_file/voxel_data.h"
-#include "io/text.h"
 #include "io/whole_file.h"
 
 namespace quoin {
 namespace {
 
-// Keys in the order in which they are put.
-using Json = nlohmann::ordered_json;
-
-Json triple(DVec3 v) {
-  return {v.x, v.y, v.z};
-}
-
-// -0 is another number than 0.
-bool is_same(double a, double b) {
-  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
-}
-bool is_same(DVec3 a, DVec3 b) {
-  return is_same(a.x, b.x) && is_same(a.y, b.y) && is_same(a.z, b.z);
-}
-bool is_same(const DQuat& a, const DQuat& b) {
-  return is_same(a.w, b.w) && is_same(a.x, b.x) && is_same(a.y, b.y) && is_same(a.z, b.z);
-}
+using scene_json::is_same;
+using scene_json::OrderedJson;
+using scene_json::PartWriter;
 
 /// Writes a scene file, and knows which version of the format it needs.
 class SceneText {
@@ -50,156 +32,45 @@ class SceneText {
   Result<std::string> write(const SceneFile& scene, const Pieces& pieces) {
     try {
       for (std::size_t type = 1; type < scene.types.size(); ++type) {
-        types_.push_back(json_of(scene.types[static_cast<VoxelType>(type)]));
+        types_.push_back(parts_.json_of(scene.types[static_cast<VoxelType>(type)]));
         const VoxelProperties& properties = scene.types[static_cast<VoxelType>(type)];
         is_fifth_ |= properties.state_bits != 0 || !is_same(properties.scattering, 0.0F) ||
                      !is_same(properties.anisotropy, 0.0F);
       }
       for (std::size_t i = 0; i < scene.grids.size(); ++i) {
-        grids_.push_back(json_of(scene.grids[i], pieces.voxels[i], pieces.densities[i], pieces.data[i]));
+        put_grid(scene.grids[i], pieces.voxels[i], pieces.densities[i], pieces.data[i]);
         is_third_ |= !pieces.densities[i].empty();
         is_fifth_ |= !pieces.data[i].empty();
       }
-      for (const SceneLayer& layer : scene.layers) layers_.push_back(json_of(layer));
-      for (const SceneFile::Group& group : scene.groups) groups_.push_back(json_of(group));
-      for (const SceneFile::Placement& placement : scene.placements) instances_.push_back(json_of(placement));
-      for (const Lamp& lamp : scene.lamps) lamps_.push_back(json_of(lamp));
-      is_second_ = is_second_ || !lamps_.empty();
-      if (scene.camera) camera_ = json_of(*scene.camera);
+      for (const SceneLayer& layer : scene.layers) layers_.push_back(parts_.json_of(layer));
+      for (const SceneFile::Group& group : scene.groups) groups_.push_back(parts_.json_of(group));
+      for (const SceneFile::Placement& placement : scene.placements) instances_.push_back(parts_.json_of(placement));
+      for (const Lamp& lamp : scene.lamps) lamps_.push_back(parts_.json_of(lamp));
+      if (scene.camera) camera_ = parts_.json_of(*scene.camera);
       return text_of(scene);
-    } catch (const Json::type_error&) {  // of text: numbers that are not finite become null
+    } catch (const OrderedJson::type_error&) {  // of text: numbers that are not finite become null
       return make_error(ErrorCode::InvalidArgument, "an id or path is not UTF-8");
     }
   }
 
  private:
-  Json text(const std::string& bytes) {
-    if (is_utf8(bytes)) return bytes;
-    is_second_ = true;
-    return {{"base64", to_base64(std::as_bytes(std::span(bytes)))}};
-  }
-
-  Json json_of(const VoxelProperties& type) {
-    const VoxelProperties plain;
-    Json json = Json::object();
-    if (!type.name.empty()) json["name"] = text(type.name);
-    json["colour"] = {type.colour.r, type.colour.g, type.colour.b, type.colour.a};
-    if (type.visibility == Visibility::Transparent) json["visibility"] = "transparent";
-    if (!type.collides) json["collides"] = false;
-    const auto put = [&](const char* key, float value, float usual) {
-      if (!is_same(value, usual)) json[key] = value;
-    };
-    put("roughness", type.roughness, plain.roughness);
-    put("metalness", type.metalness, plain.metalness);
-    put("emission", type.emission, plain.emission);
-    put("ior", type.ior, plain.ior);
-    put("scattering", type.scattering, plain.scattering);
-    put("anisotropy", type.anisotropy, plain.anisotropy);
-    if (type.state_bits != 0) json["state_bits"] = type.state_bits;
-    for (const auto& [key, value] : type.attributes) json["attributes"].push_back({text(key), text(value)});
-    return json;
-  }
-
-  Json json_of(const SceneGrid& grid, const std::vector<std::string>& voxels, const std::vector<std::string>& densities,
-               const std::vector<std::string>& data) {
-    Json json = Json::object();
-    if (!grid.name.empty()) json["name"] = text(grid.name);
-    if (!is_same(grid.pivot, DVec3(0.0))) json["pivot"] = triple(grid.pivot);
-    const IBox& canvas = grid.canvas;
-    if (canvas != IBox{}) {
-      json["canvas"] = {canvas.min.x, canvas.min.y, canvas.min.z, canvas.max.x, canvas.max.y, canvas.max.z};
-    }
+  void put_grid(const SceneGrid& grid, const std::vector<std::string>& voxels,
+                const std::vector<std::string>& densities, const std::vector<std::string>& data) {
+    OrderedJson json = parts_.json_of(grid);
     json["voxels"] = voxels;
     if (!densities.empty()) {
       json["band"] = grid.field.band();
       json["densities"] = densities;
     }
     if (!data.empty()) json["data"] = data;
-    return json;
-  }
-
-  Json json_of(const SceneFile::Placement& placement) {
-    const SceneFile::Placement plain;
-    Json json = placement.grid ? Json{{"grid", *placement.grid}} : Json{{"file", placement.source}};
-    if (!placement.name.empty()) json["name"] = text(placement.name);
-    if (!is_same(placement.position, plain.position)) json["position"] = triple(placement.position);
-    const DQuat& q = placement.rotation;
-    if (!is_same(q, plain.rotation)) json["rotation"] = {q.x, q.y, q.z, q.w};
-    if (!is_same(placement.scale, plain.scale)) json["scale"] = placement.scale;
-    if (placement.mirrored) json["mirrored"] = true;
-    if (!placement.visible) json["visible"] = false;
-    if (placement.group) json["group"] = *placement.group;
-    if (placement.layer) json["layer"] = *placement.layer;
-    if (placement.categories) json["categories"] = *placement.categories;
-    return json;
-  }
-
-  Json json_of(const SceneFile::Group& group) {
-    const SceneFile::Group plain;
-    Json json = Json::object();
-    if (!group.name.empty()) json["name"] = text(group.name);
-    if (group.parent) json["parent"] = *group.parent;
-    if (group.layer) json["layer"] = *group.layer;
-    if (!is_same(group.position, plain.position)) json["position"] = triple(group.position);
-    const DQuat& q = group.rotation;
-    if (!is_same(q, plain.rotation)) json["rotation"] = {q.x, q.y, q.z, q.w};
-    if (group.mirrored) json["mirrored"] = true;
-    if (!group.visible) json["visible"] = false;
-    return json;
-  }
-
-  Json json_of(const SceneLayer& layer) {
-    Json json = Json::object();
-    if (!layer.name.empty()) json["name"] = text(layer.name);
-    if (!layer.visible) json["visible"] = false;
-    return json;
-  }
-
-  Json json_of(const Lamp& lamp) {
-    const Lamp plain;
-    const bool is_spot = lamp.kind == Lamp::Kind::Spot;
-    Json json = {{"kind", is_spot ? "spot" : "point"}};
-    if (!lamp.name.empty()) json["name"] = text(lamp.name);
-    json["position"] = triple(lamp.position);
-    json["colour"] = {lamp.colour.x, lamp.colour.y, lamp.colour.z};
-    json["intensity"] = lamp.intensity;
-    const auto put = [&](const char* key, double value, double usual) {
-      if (!is_same(value, usual)) json[key] = value;
-    };
-    put("range", lamp.range, plain.range);
-    if (!is_same(lamp.direction, plain.direction)) json["direction"] = triple(lamp.direction);
-    put("inner_angle", lamp.inner_angle_radians, plain.inner_angle_radians);
-    put("outer_angle", lamp.outer_angle_radians, plain.outer_angle_radians);
-    return json;
-  }
-
-  // An upright perspective camera is said by a point that it looks at and an angle in degrees, where these give it to
-  // the last bit; any other by its axes.
-  Json json_of(const Camera& camera) {
-    // So far that the sum's rounding turns nothing.
-    const DVec3 reach = glm::abs(camera.position);
-    const DVec3 target = camera.position + camera.forward * std::max({1.0, reach.x, reach.y, reach.z});
-    const double degrees = camera.vertical_fov_radians * 180.0 / std::numbers::pi;
-    const auto again = look_at(camera.position, target, degrees * std::numbers::pi / 180.0);
-    const bool is_flat = camera.projection == Camera::Projection::Orthographic;
-    if (!is_flat && again && is_same(again->forward, camera.forward) && is_same(again->up, camera.up) &&
-        is_same(again->right, camera.right) && is_same(again->vertical_fov_radians, camera.vertical_fov_radians)) {
-      return {{"position", triple(camera.position)}, {"look_at", triple(target)}, {"fov", degrees}};
-    }
-    is_second_ = true;
-    Json json = {{"position", triple(camera.position)},
-                 {"right", triple(camera.right)},
-                 {"up", triple(camera.up)},
-                 {"forward", triple(camera.forward)}};
-    json[is_flat ? "view_height" : "fov_radians"] = is_flat ? camera.view_height : camera.vertical_fov_radians;
-    return json;
+    grids_.push_back(std::move(json));
   }
 
   // A line an entry: what people look for is found.
-  void put_list(std::string& text, const char* key, const std::vector<Json>& entries) const {
+  void put_list(std::string& text, const char* key, const std::vector<OrderedJson>& entries) const {
     text.append(",\n  \"").append(key).append("\": [");
     const char* before = "\n    ";
-    for (const Json& entry : entries) {
+    for (const OrderedJson& entry : entries) {
       text.append(std::exchange(before, ",\n    ")).append(entry.dump());
     }
     text += entries.empty() ? "]" : "\n  ]";
@@ -209,10 +80,14 @@ class SceneText {
     const bool has_models = !types_.empty() || !grids_.empty();
     const bool is_fourth = !layers_.empty() || !groups_.empty();
     std::string text = "{\n  \"quoin_scene\": ";
-    text += is_fifth_ ? "5" : is_fourth ? "4" : is_third_ ? "3" : has_models || is_second_ ? "2" : "1";
+    text += is_fifth_                                                ? "5"
+            : is_fourth                                              ? "4"
+            : is_third_                                              ? "3"
+            : has_models || !lamps_.empty() || parts_.needs_second() ? "2"
+                                                                     : "1";
     if (has_models) put_list(text, "types", types_);
     if (has_models) put_list(text, "grids", grids_);
-    std::vector<Json> files;
+    std::vector<OrderedJson> files;
     files.reserve(scene.sources.size());
     for (const SceneFile::Source& source : scene.sources) files.push_back({{"id", source.id}, {"path", source.file}});
     if (!has_models || !files.empty()) put_list(text, "files", files);
@@ -220,19 +95,19 @@ class SceneText {
     if (!groups_.empty()) put_list(text, "groups", groups_);
     put_list(text, "instances", instances_);
     if (!lamps_.empty()) put_list(text, "lamps", lamps_);
-    if (scene.sun) text.append(",\n  \"sun\": ").append(triple(*scene.sun).dump());
+    if (scene.sun) text.append(",\n  \"sun\": ").append(OrderedJson{scene.sun->x, scene.sun->y, scene.sun->z}.dump());
     if (scene.camera) text.append(",\n  \"camera\": ").append(camera_.dump());
     return text + "\n}\n";
   }
 
-  std::vector<Json> types_;
-  std::vector<Json> grids_;
-  std::vector<Json> layers_;
-  std::vector<Json> groups_;
-  std::vector<Json> instances_;
-  std::vector<Json> lamps_;
-  Json camera_;
-  bool is_second_ = false;
+  std::vector<OrderedJson> types_;
+  std::vector<OrderedJson> grids_;
+  std::vector<OrderedJson> layers_;
+  std::vector<OrderedJson> groups_;
+  std::vector<OrderedJson> instances_;
+  std::vector<OrderedJson> lamps_;
+  OrderedJson camera_;
+  PartWriter parts_;
   bool is_third_ = false;
   bool is_fifth_ = false;
 };

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <quoin/core/parallel.h>
+#include <quoin/core/progress.h>
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+#include <quoin/io/loaded_scene.h>
+#include <quoin/scene/camera.h>
+#include <quoin/scene/scene.h>
+#include <quoin/store/world_store.h>
+
+namespace quoin {
+
+struct LoadedWorld;
+
+/// As in LoadedScene.
+struct WorldView {
+  std::optional<DVec3> sun;
+  std::optional<Camera> camera;
+  std::vector<FileCamera> cameras;
+};
+
+/// Keeps a scene in a world: each `save` writes what changed since the one before, found by the journals.
+///
+///   auto world = quoin::WorldStore::open("home.quoin", quoin::WorldAccess::Write);
+///   auto loaded = quoin::load_world(*world);
+///   quoin::Scene& scene = loaded->loaded.scene;
+///   while (play(scene)) {
+///     if (it_is_time()) loaded->saver.save(*world, scene);    // the world writes on its own thread
+///   }
+///   loaded->saver.save(*world, scene);
+///   if (const auto saved = world->flush(); !saved) complain(saved.error());
+///
+/// A chunk that edits emptied is kept as air (StoredChunk). Numbers of grids, instances, groups and layers stay theirs.
+/// Lifetime: it holds no reference between calls.
+/// Threads:  as the scene.
+class WorldSaver {
+ public:
+  /// Of a scene that the world does not hold yet: the first `save` adds it to what the world has.
+  WorldSaver();
+  WorldSaver(WorldSaver&&) noexcept;
+  WorldSaver& operator=(WorldSaver&&) noexcept;
+  ~WorldSaver();
+
+  /// Saves what changed, all of it in one go; returns at once. Chunks are shared with the scene, not copied.
+  /// `more`: is saved with it, a game's own values for one.
+  /// Errors: InvalidArgument, and nothing is saved: voxels of types that are not registered, numbers that are not
+  ///         finite, an instance whose grid is not there, a world with other types. Of writing: see WorldStore::save.
+  /// Cost:   O(what changed); the first time O(chunks).
+  /// Requires: the same world and scene (or a snapshot of it) each time; the world is open for writing.
+  Result<SaveTicket> save(WorldStore& world, const Scene& scene, WorldChanges more = {},
+                          std::function<void(const Status&)> on_saved = {});
+  /// From where it is looked at, and lit: saved with the next `save`. What load_world read until then.
+  void set_view(WorldView view);
+
+ private:
+  friend Result<LoadedWorld> load_world(const WorldStore& world, const LoadOptions& options, Threads threads,
+                                        const Progress& progress);
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// A world's scene, and what saves what becomes of it.
+struct LoadedWorld {
+  LoadedScene loaded;
+  WorldSaver saver;
+};
+
+/// Reads a world's scene: all chunks of level 0, into memory.
+///
+/// Warnings: of what is damaged, which is left out, and stays in the file.
+/// Errors:   CannotRead, BadFormat, Cancelled.
+[[nodiscard]] Result<LoadedWorld> load_world(const WorldStore& world, const LoadOptions& options = {},
+                                             Threads threads = {}, const Progress& progress = {});
+
+/// Writes a scene as a new world, in place of what is there; it appears whole or not at all. Returns its size.
+///
+/// Errors: those of WorldSaver::save; CannotWrite, also where another program writes the world that is there.
+[[nodiscard]] Result<SavedScene> write_world(const Scene& scene, const std::filesystem::path& path,
+                                             Threads threads = {}, const Progress& progress = {});
+/// The same with the sun and the cameras of a scene that was read.
+[[nodiscard]] Result<SavedScene> write_world(const LoadedScene& loaded, const std::filesystem::path& path,
+                                             Threads threads = {}, const Progress& progress = {});
+
+}  // namespace quoin

@@ -1,0 +1,391 @@
+#include "io/scene_file/scene_parts.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <span>
+
+#include <glm/geometric.hpp>
+
+#include "io/base64.h"
+#include "io/text.h"
+
+namespace quoin::scene_json {
+
+bool is_same(double a, double b) {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
+
+namespace {
+
+OrderedJson triple(DVec3 v) {
+  return {v.x, v.y, v.z};
+}
+
+bool is_same(DVec3 a, DVec3 b) {
+  return scene_json::is_same(a.x, b.x) && scene_json::is_same(a.y, b.y) && scene_json::is_same(a.z, b.z);
+}
+bool is_same(const DQuat& a, const DQuat& b) {
+  return scene_json::is_same(a.w, b.w) && scene_json::is_same(a.x, b.x) && scene_json::is_same(a.y, b.y) &&
+         scene_json::is_same(a.z, b.z);
+}
+using scene_json::is_same;
+
+DQuat rotation_of(const Object& instance, const Json& json) {
+  const Place place = instance.place_of("rotation");
+  Faults& faults = instance.faults();
+  if (json.is_array()) {
+    const std::vector<double> q = unit(instance.numbers(json, place, 4), place, faults);
+    return {q[3], q[0], q[1], q[2]};
+  }
+  if (!json.is_object()) {
+    faults.add(place, "must be a quaternion [x, y, z, w] or an axis with degrees");
+    return {1.0, 0.0, 0.0, 0.0};
+  }
+  const Object turn(json, place, {"axis", "degrees"}, faults);
+  double degrees = 0.0;
+  const Json* axis = turn.need("axis");
+  if (turn.need("degrees") == nullptr || axis == nullptr) return {1.0, 0.0, 0.0, 0.0};
+  turn.read("degrees", degrees);
+  const std::vector<double> a = unit(turn.numbers(*axis, turn.place_of("axis"), 3), turn.place_of("axis"), faults);
+  const double half = std::fmod(degrees, 720.0) * std::numbers::pi / 360.0;
+  return {std::cos(half), a[0] * std::sin(half), a[1] * std::sin(half), a[2] * std::sin(half)};
+}
+
+// A quaternion as it is: of a grid's instance, which may have any length.
+DQuat kept_rotation(const Object& instance, const Json& json) {
+  if (!json.is_array()) return rotation_of(instance, json);
+  const std::vector<double> q = instance.numbers(json, instance.place_of("rotation"), 4);
+  return {q[3], q[0], q[1], q[2]};
+}
+
+// A place in another list; whether there is one is known once all is read.
+std::optional<std::size_t> place_in(const Object& object, std::string_view key, std::string_view list) {
+  const Json* json = object.find(key);
+  if (json == nullptr) return std::nullopt;
+  if (json->is_number_unsigned()) return json->get<std::size_t>();
+  object.faults().add(object.place_of(key), "must be a place in the list of " + std::string(list) + ", from 0");
+  return 0;
+}
+
+// Bits of 32.
+std::optional<std::uint32_t> bits_in(const Object& object, std::string_view key) {
+  const Json* json = object.find(key);
+  if (json == nullptr) return std::nullopt;
+  if (json->is_number_unsigned() && json->get<std::uint64_t>() <= std::numeric_limits<std::uint32_t>::max()) {
+    return json->get<std::uint32_t>();
+  }
+  object.faults().add(object.place_of(key), "must be a whole number from 0 to 4294967295");
+  return std::nullopt;
+}
+
+/// Whether axes are unit, perpendicular and right-handed, to the rounding of sums of them.
+bool is_frame(const Camera& camera) {
+  constexpr double kRounding = 1e-6;
+  const auto is_near = [](DVec3 a, DVec3 b) { return glm::distance(a, b) <= kRounding; };
+  return std::abs(glm::length(camera.forward) - 1.0) <= kRounding &&
+         std::abs(glm::length(camera.up) - 1.0) <= kRounding &&
+         is_near(glm::cross(camera.forward, camera.up), camera.right);
+}
+
+/// A camera of any kind, number by number.
+Camera kept_camera(const Json& json, const Place& place, Faults& faults) {
+  const Object object(json, place, {"position", "right", "up", "forward", "fov_radians", "view_height"}, faults);
+  Camera camera;
+  for (const char* key : {"position", "right", "up"}) static_cast<void>(object.need(key));
+  object.read("position", camera.position);
+  object.read("right", camera.right);
+  object.read("up", camera.up);
+  object.read("forward", camera.forward);
+  object.read("fov_radians", camera.vertical_fov_radians);
+  object.read("view_height", camera.view_height);
+  const bool is_flat = object.find("view_height") != nullptr;
+  if (is_flat == (object.find("fov_radians") != nullptr)) faults.add(place, "needs fov_radians or view_height");
+  if (is_flat) camera.projection = Camera::Projection::Orthographic;
+  if (!is_frame(camera)) faults.add(place, "right, up and forward must be unit and perpendicular");
+  if (!(camera.vertical_fov_radians > 0.0 && camera.vertical_fov_radians < std::numbers::pi)) {
+    faults.add(object.place_of("fov_radians"), "must be more than 0 and less than pi");
+  }
+  if (!(camera.view_height > 0.0)) faults.add(object.place_of("view_height"), "must be more than 0");
+  return camera;
+}
+
+/// A list "attributes" of pairs.
+void read_attributes(const Object& object, std::map<std::string, std::string>& attributes) {
+  read_list(object, "attributes", std::numeric_limits<std::size_t>::max(), [&](const Json& pair, const Place& place) {
+    if (!pair.is_array() || pair.size() != 2) {
+      object.faults().add(place, "must be a key and a value");
+      return;
+    }
+    std::string key = object.text(pair[0], {&place, {}, 0});
+    const bool is_new = attributes.emplace(std::move(key), object.text(pair[1], {&place, {}, 1})).second;
+    if (!is_new) object.faults().add(place, "this key was given before");
+  });
+}
+
+}  // namespace
+
+OrderedJson PartWriter::text(const std::string& bytes) {
+  if (is_utf8(bytes)) return bytes;
+  needs_second_ = true;
+  return {{"base64", to_base64(std::as_bytes(std::span(bytes)))}};
+}
+
+OrderedJson PartWriter::json_of(const VoxelProperties& type) {
+  const VoxelProperties plain;
+  OrderedJson json = OrderedJson::object();
+  if (!type.name.empty()) json["name"] = text(type.name);
+  json["colour"] = {type.colour.r, type.colour.g, type.colour.b, type.colour.a};
+  if (type.visibility == Visibility::Transparent) json["visibility"] = "transparent";
+  if (!type.collides) json["collides"] = false;
+  const auto put = [&](const char* key, float value, float usual) {
+    if (!is_same(value, usual)) json[key] = value;
+  };
+  put("roughness", type.roughness, plain.roughness);
+  put("metalness", type.metalness, plain.metalness);
+  put("emission", type.emission, plain.emission);
+  put("ior", type.ior, plain.ior);
+  put("scattering", type.scattering, plain.scattering);
+  put("anisotropy", type.anisotropy, plain.anisotropy);
+  if (type.state_bits != 0) json["state_bits"] = type.state_bits;
+  for (const auto& [key, value] : type.attributes) json["attributes"].push_back({text(key), text(value)});
+  return json;
+}
+
+OrderedJson PartWriter::json_of(const SceneGrid& grid) {
+  OrderedJson json = OrderedJson::object();
+  if (!grid.name.empty()) json["name"] = text(grid.name);
+  if (!is_same(grid.pivot, DVec3(0.0))) json["pivot"] = triple(grid.pivot);
+  const IBox& canvas = grid.canvas;
+  if (canvas != IBox{}) {
+    json["canvas"] = {canvas.min.x, canvas.min.y, canvas.min.z, canvas.max.x, canvas.max.y, canvas.max.z};
+  }
+  return json;
+}
+
+OrderedJson PartWriter::json_of(const SceneFile::Placement& placement) {
+  const SceneFile::Placement plain;
+  OrderedJson json = placement.grid ? OrderedJson{{"grid", *placement.grid}} : OrderedJson{{"file", placement.source}};
+  if (!placement.name.empty()) json["name"] = text(placement.name);
+  if (!is_same(placement.position, plain.position)) json["position"] = triple(placement.position);
+  const DQuat& q = placement.rotation;
+  if (!is_same(q, plain.rotation)) json["rotation"] = {q.x, q.y, q.z, q.w};
+  if (!is_same(placement.scale, plain.scale)) json["scale"] = placement.scale;
+  if (placement.mirrored) json["mirrored"] = true;
+  if (!placement.visible) json["visible"] = false;
+  if (placement.group) json["group"] = *placement.group;
+  if (placement.layer) json["layer"] = *placement.layer;
+  if (placement.categories) json["categories"] = *placement.categories;
+  return json;
+}
+
+OrderedJson PartWriter::json_of(const SceneFile::Group& group) {
+  const SceneFile::Group plain;
+  OrderedJson json = OrderedJson::object();
+  if (!group.name.empty()) json["name"] = text(group.name);
+  if (group.parent) json["parent"] = *group.parent;
+  if (group.layer) json["layer"] = *group.layer;
+  if (!is_same(group.position, plain.position)) json["position"] = triple(group.position);
+  const DQuat& q = group.rotation;
+  if (!is_same(q, plain.rotation)) json["rotation"] = {q.x, q.y, q.z, q.w};
+  if (group.mirrored) json["mirrored"] = true;
+  if (!group.visible) json["visible"] = false;
+  return json;
+}
+
+OrderedJson PartWriter::json_of(const SceneLayer& layer) {
+  OrderedJson json = OrderedJson::object();
+  if (!layer.name.empty()) json["name"] = text(layer.name);
+  if (!layer.visible) json["visible"] = false;
+  return json;
+}
+
+OrderedJson PartWriter::json_of(const Lamp& lamp) {
+  const Lamp plain;
+  const bool is_spot = lamp.kind == Lamp::Kind::Spot;
+  OrderedJson json = {{"kind", is_spot ? "spot" : "point"}};
+  if (!lamp.name.empty()) json["name"] = text(lamp.name);
+  json["position"] = triple(lamp.position);
+  json["colour"] = {lamp.colour.x, lamp.colour.y, lamp.colour.z};
+  json["intensity"] = lamp.intensity;
+  const auto put = [&](const char* key, double value, double usual) {
+    if (!is_same(value, usual)) json[key] = value;
+  };
+  put("range", lamp.range, plain.range);
+  if (!is_same(lamp.direction, plain.direction)) json["direction"] = triple(lamp.direction);
+  put("inner_angle", lamp.inner_angle_radians, plain.inner_angle_radians);
+  put("outer_angle", lamp.outer_angle_radians, plain.outer_angle_radians);
+  return json;
+}
+
+// An upright perspective camera is said by a point that it looks at and an angle in degrees, where these give it to
+// the last bit; any other by its axes.
+OrderedJson PartWriter::json_of(const Camera& camera) {
+  // So far that the sum's rounding turns nothing.
+  const DVec3 reach = glm::abs(camera.position);
+  const DVec3 target = camera.position + camera.forward * std::max({1.0, reach.x, reach.y, reach.z});
+  const double degrees = camera.vertical_fov_radians * 180.0 / std::numbers::pi;
+  const auto again = look_at(camera.position, target, degrees * std::numbers::pi / 180.0);
+  const bool is_flat = camera.projection == Camera::Projection::Orthographic;
+  if (!is_flat && again && is_same(again->forward, camera.forward) && is_same(again->up, camera.up) &&
+      is_same(again->right, camera.right) && is_same(again->vertical_fov_radians, camera.vertical_fov_radians)) {
+    return {{"position", triple(camera.position)}, {"look_at", triple(target)}, {"fov", degrees}};
+  }
+  needs_second_ = true;
+  OrderedJson json = {{"position", triple(camera.position)},
+                      {"right", triple(camera.right)},
+                      {"up", triple(camera.up)},
+                      {"forward", triple(camera.forward)}};
+  json[is_flat ? "view_height" : "fov_radians"] = is_flat ? camera.view_height : camera.vertical_fov_radians;
+  return json;
+}
+
+VoxelProperties properties_of(const Json& json, const Place& place, Faults& faults) {
+  const Object type(json, place,
+                    {"name", "colour", "visibility", "collides", "roughness", "metalness", "emission", "ior",
+                     "scattering", "anisotropy", "state_bits", "attributes"},
+                    faults);
+  VoxelProperties properties;
+  type.read_text("name", properties.name);
+  if (const Json* colour = type.need("colour")) {
+    const std::vector<int> c = type.whole_numbers(*colour, type.place_of("colour"), 4, 0, 255);
+    const auto channel = [&](std::size_t i) { return static_cast<std::uint8_t>(c[i]); };
+    properties.colour = {channel(0), channel(1), channel(2), channel(3)};
+  }
+  std::string visibility = "opaque";
+  type.read("visibility", visibility);
+  if (visibility == "transparent") {
+    properties.visibility = Visibility::Transparent;
+  } else if (visibility != "opaque") {
+    faults.add(type.place_of("visibility"), "must be \"opaque\" or \"transparent\"");
+  }
+  type.read("collides", properties.collides);
+  type.read("roughness", properties.roughness);
+  type.read("metalness", properties.metalness);
+  type.read("emission", properties.emission);
+  type.read("ior", properties.ior);
+  type.read("scattering", properties.scattering);
+  type.read("anisotropy", properties.anisotropy);
+  if (const Json* bits = type.find("state_bits")) {
+    if (bits->is_number_unsigned() && *bits <= kMaxStateBits) {
+      properties.state_bits = bits->get<std::uint8_t>();
+    } else {
+      faults.add(type.place_of("state_bits"), "must be a whole number from 0 to 32");
+    }
+  }
+  if (type.find("attributes") != nullptr) read_attributes(type, properties.attributes);
+  return properties;
+}
+
+SceneFile::Placement placement_of(const Json& json, const Place& place, Faults& faults) {
+  const Object instance(
+      json, place,
+      {"file", "grid", "name", "position", "rotation", "scale", "mirrored", "visible", "group", "layer", "categories"},
+      faults);
+  SceneFile::Placement placement;
+  placement.grid = place_in(instance, "grid", "grids");
+  if (!placement.grid && instance.need("file") != nullptr) {
+    instance.read("file", placement.source);
+  }
+  instance.read_text("name", placement.name);
+  instance.read("position", placement.position);
+  instance.read("scale", placement.scale);
+  instance.read("mirrored", placement.mirrored);
+  instance.read("visible", placement.visible);
+  placement.categories = bits_in(instance, "categories");
+  if (const Json* rotation = instance.find("rotation")) {
+    placement.rotation = placement.grid ? kept_rotation(instance, *rotation) : rotation_of(instance, *rotation);
+  }
+  if (!(placement.scale > 0.0)) faults.add(instance.place_of("scale"), "must be more than 0");
+  placement.group = place_in(instance, "group", "groups");
+  placement.layer = place_in(instance, "layer", "layers");
+  return placement;
+}
+
+Lamp lamp_of(const Json& json, const Place& place, Faults& faults) {
+  const Object object(
+      json, place,
+      {"kind", "name", "position", "direction", "colour", "intensity", "range", "inner_angle", "outer_angle"}, faults);
+  Lamp lamp;
+  std::string kind = "point";
+  object.read("kind", kind);
+  if (kind == "spot") {
+    lamp.kind = Lamp::Kind::Spot;
+  } else if (kind != "point") {
+    faults.add(object.place_of("kind"), "must be point or spot");
+  }
+  object.read_text("name", lamp.name);
+  if (object.need("position") != nullptr) object.read("position", lamp.position);
+  object.read("direction", lamp.direction);
+  if (const Json* colour = object.find("colour")) {
+    const std::vector<double> v = object.numbers(*colour, object.place_of("colour"), 3);
+    lamp.colour = Vec3(v[0], v[1], v[2]);
+    if (!is_finite(DVec3(lamp.colour))) faults.add(object.place_of("colour"), "is too large");
+  }
+  object.read("intensity", lamp.intensity);
+  object.read("range", lamp.range);
+  object.read("inner_angle", lamp.inner_angle_radians);
+  object.read("outer_angle", lamp.outer_angle_radians);
+  return lamp;
+}
+
+SceneFile::Group group_of(const Json& json, const Place& place, Faults& faults) {
+  const Object object(json, place, {"name", "parent", "layer", "position", "rotation", "mirrored", "visible"}, faults);
+  SceneFile::Group group;
+  object.read_text("name", group.name);
+  group.parent = place_in(object, "parent", "groups");
+  group.layer = place_in(object, "layer", "layers");
+  object.read("position", group.position);
+  if (const Json* rotation = object.find("rotation")) group.rotation = kept_rotation(object, *rotation);
+  object.read("mirrored", group.mirrored);
+  object.read("visible", group.visible);
+  return group;
+}
+
+SceneLayer layer_of(const Json& json, const Place& place, Faults& faults) {
+  const Object object(json, place, {"name", "visible"}, faults);
+  SceneLayer layer;
+  object.read_text("name", layer.name);
+  object.read("visible", layer.visible);
+  return layer;
+}
+
+Camera camera_of(const Json& json, const Place& place, Faults& faults) {
+  if (json.is_object() && json.contains("forward")) return kept_camera(json, place, faults);
+  const Object object(json, place, {"position", "look_at", "fov"}, faults);
+  DVec3 position(0.0);
+  DVec3 target(0.0);
+  double fov = 50.0;
+  if (object.need("position") != nullptr) object.read("position", position);
+  if (object.need("look_at") != nullptr) object.read("look_at", target);
+  object.read("fov", fov);
+  const auto camera = look_at(position, target, fov * std::numbers::pi / 180.0);
+  if (!camera) faults.add(place, camera.error().message);
+  return camera.value_or(Camera{});
+}
+
+void read_grid_header(const Object& object, SceneGrid& grid) {
+  constexpr int kLeast = std::numeric_limits<int>::min();
+  constexpr int kMost = std::numeric_limits<int>::max();
+  object.read_text("name", grid.name);
+  object.read("pivot", grid.pivot);
+  if (const Json* canvas = object.find("canvas")) {
+    const std::vector<int> c = object.whole_numbers(*canvas, object.place_of("canvas"), 6, kLeast, kMost);
+    grid.canvas = {{c[0], c[1], c[2]}, {c[3], c[4], c[5]}};
+  }
+}
+
+void read_band(const Object& object, SceneGrid& grid) {
+  double band = static_cast<double>(grid.field.band());
+  object.read("band", band);
+  constexpr double kGreatest = 65'504.0;
+  if (band > 0.0 && band <= kGreatest) {
+    grid.field = DensityGrid(static_cast<float>(band));
+  } else {
+    object.faults().add(object.place_of("band"), "must be more than 0 and at most 65504");
+  }
+}
+
+}  // namespace quoin::scene_json

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json.hpp>
+#include <quoin/io/scene_file.h>
+
+#include "io/scene_file/json_reader.h"
+
+// What a scene is made of, but for its voxels, each part as the JSON of scene files (docs/scene-files.md). Worlds on
+// disk hold the same texts, a part each.
+
+namespace quoin::scene_json {
+
+/// With keys in the order in which they are put.
+using OrderedJson = nlohmann::ordered_json;
+
+/// The same bits: -0 is another number than 0.
+[[nodiscard]] bool is_same(double a, double b);
+
+/// Writes parts, and knows whether what it wrote needs version 2 of the format.
+class PartWriter {
+ public:
+  [[nodiscard]] OrderedJson json_of(const VoxelProperties& type);
+  /// Without its voxels, densities and data.
+  [[nodiscard]] OrderedJson json_of(const SceneGrid& grid);
+  [[nodiscard]] OrderedJson json_of(const SceneFile::Placement& placement);
+  [[nodiscard]] OrderedJson json_of(const SceneFile::Group& group);
+  [[nodiscard]] OrderedJson json_of(const SceneLayer& layer);
+  [[nodiscard]] OrderedJson json_of(const Lamp& lamp);
+  [[nodiscard]] OrderedJson json_of(const Camera& camera);
+
+  [[nodiscard]] bool needs_second() const { return needs_second_; }
+
+ private:
+  [[nodiscard]] OrderedJson text(const std::string& bytes);
+
+  bool needs_second_ = false;
+};
+
+// Reads parts; whatever is wrong is added to the faults.
+[[nodiscard]] VoxelProperties properties_of(const Json& json, const Place& place, Faults& faults);
+[[nodiscard]] SceneFile::Placement placement_of(const Json& json, const Place& place, Faults& faults);
+[[nodiscard]] SceneFile::Group group_of(const Json& json, const Place& place, Faults& faults);
+[[nodiscard]] SceneLayer layer_of(const Json& json, const Place& place, Faults& faults);
+[[nodiscard]] Lamp lamp_of(const Json& json, const Place& place, Faults& faults);
+[[nodiscard]] Camera camera_of(const Json& json, const Place& place, Faults& faults);
+/// Name, pivot and canvas.
+void read_grid_header(const Object& object, SceneGrid& grid);
+/// Density beyond which a field is clamped, where the key is there.
+void read_band(const Object& object, SceneGrid& grid);
+
+}  // namespace quoin::scene_json

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+
+#include <quoin/core/parallel.h>
+#include <quoin/core/progress.h>
+#include <quoin/core/result.h>
+#include <quoin/io/loaded_scene.h>
+
+// Worlds on disk as one of the formats. The store, a layer above this one, defines these; in builds without SQLite they
+// say so.
+
+namespace quoin {
+
+/// By which a database of SQLite's says that it is a world: "Quon".
+inline constexpr std::uint32_t kWorldApplicationId = 0x51756F6E;
+/// Bytes of a file that `is_world_format` has to see.
+inline constexpr std::size_t kWorldHeaderBytes = 100;
+
+/// Whether bytes begin as a world does: with SQLite's header, and our mark.
+[[nodiscard]] bool is_world_format(std::span<const std::byte> beginning);
+[[nodiscard]] Result<LoadedScene> read_world_format(const std::filesystem::path& path, const LoadOptions& options,
+                                                    Threads threads, const Progress& progress);
+[[nodiscard]] Result<LoadedScene> read_world_format(std::span<const std::byte> bytes, const LoadOptions& options,
+                                                    Threads threads, const Progress& progress);
+/// `loaded`: the scene with what was read beside it, if it was read; else null.
+[[nodiscard]] Result<SavedScene> write_world_format(const Scene& scene, const LoadedScene* loaded,
+                                                    const std::filesystem::path& path, Threads threads,
+                                                    const Progress& progress);
+
+}  // namespace quoin

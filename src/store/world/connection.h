@@ -1,0 +1,109 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include <quoin/core/result.h>
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace quoin::store {
+
+/// A prepared statement of a Connection. Parameters and columns count from 0.
+class Statement {
+ public:
+  Statement() = default;
+
+  [[nodiscard]] bool is_prepared() const { return statement_ != nullptr; }
+  void bind(int parameter, std::int64_t value);
+  void bind(int parameter, std::string_view text);
+  /// Lifetime: the bytes until the statement is reset.
+  void bind(int parameter, std::span<const std::byte> bytes);
+
+  /// Goes on to the next row: true where there is one. Errors: those of the database; the statement is then reset.
+  [[nodiscard]] Result<bool> step();
+  /// Runs a statement that gives no rows, and resets it.
+  [[nodiscard]] Status run();
+  void reset();
+
+  [[nodiscard]] std::int64_t integer(int column) const;
+  /// Lifetime: until the next step or reset.
+  [[nodiscard]] std::span<const std::byte> bytes(int column) const;
+  [[nodiscard]] std::string_view text(int column) const;
+  [[nodiscard]] bool is_integer(int column) const;
+  /// Of bytes or of text.
+  [[nodiscard]] bool is_bytes(int column) const;
+
+ private:
+  friend class Connection;
+  struct Finalizer {
+    void operator()(sqlite3_stmt* statement) const;
+  };
+  explicit Statement(sqlite3_stmt* statement) : statement_(statement) {}
+  std::unique_ptr<sqlite3_stmt, Finalizer> statement_;
+};
+
+/// Resets a statement at the end of its scope, so that no read of the database stays open.
+class StatementScope {
+ public:
+  explicit StatementScope(Statement& statement) : statement_(statement) {}
+  StatementScope(const StatementScope&) = delete;
+  StatementScope& operator=(const StatementScope&) = delete;
+  ~StatementScope() { statement_.reset(); }
+
+ private:
+  Statement& statement_;
+};
+
+/// An open SQLite database, used by one thread at a time. Errors name no path: whoever knows it adds it.
+class Connection {
+ public:
+  enum class Mode : std::uint8_t {
+    Read,
+    /// Of a file in a folder that nobody can write to: without locks and shared memory.
+    ReadImmutable,
+    Write,
+    Create,
+  };
+  /// `vfs`: the name of a registered file system of SQLite's; null: the usual one.
+  [[nodiscard]] static Result<Connection> open(const std::string& path, Mode mode, const char* vfs = nullptr);
+  /// A database in memory, of its bytes, to be read.
+  [[nodiscard]] static Result<Connection> open(std::span<const std::byte> bytes);
+
+  [[nodiscard]] Result<Statement> prepare(std::string_view sql);
+  /// Runs statements that give no rows, or whose rows nobody wants.
+  [[nodiscard]] Status run(const char* sql);
+  /// The first column of the first row, as a number or as text. Errors: also where there is no row.
+  [[nodiscard]] Result<std::int64_t> number(const char* sql);
+  [[nodiscard]] Result<std::string> text(const char* sql);
+
+  /// Writes what the write-ahead log holds into the database, as far as no reader needs it there.
+  [[nodiscard]] Status checkpoint();
+  /// Pages in the write-ahead log as the last commit left it.
+  [[nodiscard]] int log_pages() const { return *log_pages_; }
+  [[nodiscard]] bool is_in_transaction() const;
+  /// Ends it. Errors: what SQLite gave for a close that failed.
+  [[nodiscard]] Status close();
+  [[nodiscard]] sqlite3* raw() { return database_.get(); }
+
+ private:
+  struct Closer {
+    void operator()(sqlite3* database) const;
+  };
+  explicit Connection(sqlite3* database) : database_(database) {}
+  [[nodiscard]] Status set_up(Mode mode);
+
+  std::unique_ptr<sqlite3, Closer> database_;
+  std::unique_ptr<int> log_pages_ = std::make_unique<int>(0);
+};
+
+/// What SQLite says of its last fault, as an error of ours.
+[[nodiscard]] Error error_of(sqlite3* database, int code);
+
+}  // namespace quoin::store

@@ -1,0 +1,205 @@
+#include "store/world/part_text.h"
+
+#include <limits>
+#include <string_view>
+
+#include <nlohmann/json.hpp>
+
+#include "io/scene_file/scene_parts.h"
+
+namespace quoin::store {
+
+namespace {
+
+using scene_json::Faults;
+using scene_json::Json;
+using scene_json::Object;
+using scene_json::OrderedJson;
+using scene_json::PartWriter;
+using scene_json::Place;
+
+// Parts are flat; what is deeper would fill the stack of whoever reads it.
+constexpr int kMaxDepth = 32;
+
+bool is_too_deep(std::string_view text) {
+  int depth = 0;
+  for (const char c : text) {
+    depth += c == '{' || c == '[' ? 1 : 0;
+    depth -= c == '}' || c == ']' ? 1 : 0;
+    if (depth > kMaxDepth) return true;
+  }
+  return false;
+}
+
+VoxelProperties read(const Json& json, const Place& place, Faults& faults, VoxelProperties*) {
+  return scene_json::properties_of(json, place, faults);
+}
+
+WorldGrid read(const Json& json, const Place& place, Faults& faults, WorldGrid*) {
+  const Object object(json, place, {"name", "pivot", "canvas", "band"}, faults);
+  SceneGrid grid;
+  scene_json::read_grid_header(object, grid);
+  scene_json::read_band(object, grid);
+  return {grid.name, grid.pivot, grid.canvas, grid.field.band()};
+}
+
+SceneFile::Placement read(const Json& json, const Place& place, Faults& faults, SceneFile::Placement*) {
+  SceneFile::Placement instance = scene_json::placement_of(json, place, faults);
+  if (!instance.grid) faults.add(place, "names no grid");
+  return instance;
+}
+
+SceneFile::Group read(const Json& json, const Place& place, Faults& faults, SceneFile::Group*) {
+  return scene_json::group_of(json, place, faults);
+}
+
+SceneLayer read(const Json& json, const Place& place, Faults& faults, SceneLayer*) {
+  return scene_json::layer_of(json, place, faults);
+}
+
+Lamp read(const Json& json, const Place& place, Faults& faults, Lamp*) {
+  return scene_json::lamp_of(json, place, faults);
+}
+
+Camera read(const Json& json, const Place& place, Faults& faults, Camera*) {
+  return scene_json::camera_of(json, place, faults);
+}
+
+FileCamera read(const Json& json, const Place& place, Faults& faults, FileCamera*) {
+  FileCamera camera;
+  if (!json.is_object()) {
+    faults.add(place, "must be an object");
+    return camera;
+  }
+  Json rest = json;
+  Json own = Json::object();
+  for (const char* key : {"number", "focus_distance"}) {
+    if (rest.contains(key)) own[key] = rest[key];
+    rest.erase(key);
+  }
+  camera.camera = scene_json::camera_of(rest, place, faults);
+  const Object object(own, place, {"number", "focus_distance"}, faults);
+  if (const Json* number = object.find("number")) {
+    constexpr int kLeast = std::numeric_limits<int>::min();
+    constexpr int kMost = std::numeric_limits<int>::max();
+    camera.number = object.whole_numbers(Json::array({*number}), object.place_of("number"), 1, kLeast, kMost).front();
+  }
+  object.read("focus_distance", camera.focus_distance);
+  return camera;
+}
+
+DVec3 read(const Json& json, const Place& place, Faults& faults, DVec3*) {
+  const Json holder = {{"value", json}};
+  const Object object(holder, place, {"value"}, faults);
+  DVec3 vector(0.0);
+  object.read("value", vector);
+  return vector;
+}
+
+// A number that is not finite has no JSON.
+template <class T>
+std::string dumped(const T& part) {
+  PartWriter writer;
+  return writer.json_of(part).dump();
+}
+
+}  // namespace
+
+std::string text_of(const VoxelProperties& type) {
+  return dumped(type);
+}
+
+std::string text_of(const WorldGrid& grid) {
+  SceneGrid header;
+  header.name = grid.name;
+  header.pivot = grid.pivot;
+  header.canvas = grid.canvas;
+  PartWriter writer;
+  OrderedJson json = writer.json_of(header);
+  json["band"] = grid.band;
+  return json.dump();
+}
+
+std::string text_of(const SceneFile::Placement& instance) {
+  return dumped(instance);
+}
+
+std::string text_of(const SceneFile::Group& group) {
+  return dumped(group);
+}
+
+std::string text_of(const SceneLayer& layer) {
+  return dumped(layer);
+}
+
+std::string text_of(const Lamp& lamp) {
+  return dumped(lamp);
+}
+
+std::string text_of(const Camera& camera) {
+  return dumped(camera);
+}
+
+std::string text_of(const FileCamera& camera) {
+  PartWriter writer;
+  OrderedJson json = writer.json_of(camera.camera);
+  json["number"] = camera.number;
+  json["focus_distance"] = camera.focus_distance;
+  return json.dump();
+}
+
+std::string text_of(DVec3 vector) {
+  return OrderedJson{vector.x, vector.y, vector.z}.dump();
+}
+
+template <class T>
+Result<T> part_from(std::span<const std::byte> text, const std::string& name) {
+  const std::string_view chars(reinterpret_cast<const char*>(text.data()), text.size());
+  if (is_too_deep(chars)) return make_error(ErrorCode::BadFormat, name + ": nested too deeply");
+  Faults faults;
+  try {
+    const Place place{nullptr, name, std::nullopt};
+    T part = read(Json::parse(chars), place, faults, static_cast<T*>(nullptr));
+    if (faults.error()) return *faults.error();
+    return part;
+  } catch (const Json::exception&) {
+    return make_error(ErrorCode::BadFormat, name + ": not valid JSON");
+  }
+}
+
+template Result<VoxelProperties> part_from(std::span<const std::byte> text, const std::string& name);
+template Result<WorldGrid> part_from(std::span<const std::byte> text, const std::string& name);
+template Result<SceneFile::Placement> part_from(std::span<const std::byte> text, const std::string& name);
+template Result<SceneFile::Group> part_from(std::span<const std::byte> text, const std::string& name);
+template Result<SceneLayer> part_from(std::span<const std::byte> text, const std::string& name);
+template Result<Lamp> part_from(std::span<const std::byte> text, const std::string& name);
+template Result<Camera> part_from(std::span<const std::byte> text, const std::string& name);
+template Result<FileCamera> part_from(std::span<const std::byte> text, const std::string& name);
+template Result<DVec3> part_from(std::span<const std::byte> text, const std::string& name);
+
+namespace {
+
+template <class T>
+Status check_as(std::span<const std::byte> body, const std::string& name) {
+  const Result<T> part = part_from<T>(body, name);
+  if (!part) return make_error(ErrorCode::InvalidArgument, part.error().message);
+  return {};
+}
+
+}  // namespace
+
+Status check_part(const PartKey& key, std::span<const std::byte> body) {
+  const std::string name = name_of(key);
+  if (key.kind == part::kType) return check_as<VoxelProperties>(body, name);
+  if (key.kind == part::kGrid) return check_as<WorldGrid>(body, name);
+  if (key.kind == part::kInstance) return check_as<SceneFile::Placement>(body, name);
+  if (key.kind == part::kGroup) return check_as<SceneFile::Group>(body, name);
+  if (key.kind == part::kLayer) return check_as<SceneLayer>(body, name);
+  if (key.kind == part::kLamp) return check_as<Lamp>(body, name);
+  if (key.kind == part::kView) return check_as<Camera>(body, name);
+  if (key.kind == part::kCamera) return check_as<FileCamera>(body, name);
+  if (key.kind == part::kSun) return check_as<DVec3>(body, name);
+  return {};
+}
+
+}  // namespace quoin::store

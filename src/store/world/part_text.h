@@ -1,0 +1,39 @@
+#pragma once
+
+#include <span>
+#include <string>
+
+#include <quoin/core/result.h>
+#include <quoin/io/loaded_scene.h>
+#include <quoin/io/scene_file.h>
+#include <quoin/store/world_store.h>
+
+#include "store/world/schema.h"
+
+// Parts of a world as texts of JSON, each as it stands in scene files (docs/scene-files.md); where that has a place in
+// a list, the number of the part stands here.
+
+namespace quoin::store {
+
+[[nodiscard]] std::string text_of(const VoxelProperties& type);
+/// Name, pivot and canvas as in scene files, and `band`.
+[[nodiscard]] std::string text_of(const WorldGrid& grid);
+[[nodiscard]] std::string text_of(const SceneFile::Placement& instance);
+[[nodiscard]] std::string text_of(const SceneFile::Group& group);
+[[nodiscard]] std::string text_of(const SceneLayer& layer);
+[[nodiscard]] std::string text_of(const Lamp& lamp);
+[[nodiscard]] std::string text_of(const Camera& camera);
+/// A camera, with `number` and `focus_distance`.
+[[nodiscard]] std::string text_of(const FileCamera& camera);
+/// A list of three numbers.
+[[nodiscard]] std::string text_of(DVec3 vector);
+
+/// Reads a part. `name`: of it, for errors. Errors: BadFormat.
+template <class T>
+[[nodiscard]] Result<T> part_from(std::span<const std::byte> text, const std::string& name);
+
+/// Whether a part of a kind that scenes have can be read again; of other kinds anything can.
+/// Errors: InvalidArgument.
+[[nodiscard]] Status check_part(const PartKey& key, std::span<const std::byte> body);
+
+}  // namespace quoin::store

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include <quoin/core/changes.h>
+#include <quoin/store/world_saver.h>
+
+#include "store/world/schema.h"
+
+namespace quoin::store {
+
+/// The numbers under which a world has the elements of a scene.
+template <class T>
+struct Numbers {
+  std::map<Handle<T>, std::int64_t> numbers;
+  std::int64_t next = 0;
+
+  /// A new one where it has none.
+  std::int64_t of(Handle<T> handle) {
+    const auto [found, is_new] = numbers.try_emplace(handle, next);
+    if (is_new) ++next;
+    return found->second;
+  }
+  /// Forgets it.
+  std::optional<std::int64_t> take(Handle<T> handle) {
+    const auto found = numbers.find(handle);
+    if (found == numbers.end()) return std::nullopt;
+    const std::int64_t number = found->second;
+    numbers.erase(found);
+    return number;
+  }
+  void add(Handle<T> handle, std::int64_t number) {
+    numbers.emplace(handle, number);
+    next = std::max(next, number + 1);
+  }
+};
+
+struct SavedGrid {
+  std::uint32_t number = 0;
+  WorldGrid header;
+  ChangeCursor voxels;
+  ChangeCursor data;
+  ChangeCursor densities;
+};
+
+/// How much of a scene a world has.
+struct SaverState {
+  ChangeCursor scene;
+  ChangeCursor types;
+  std::map<GridHandle, SavedGrid> grids;
+  Numbers<Instance> instances;
+  Numbers<SceneGroup> groups;
+  Numbers<SceneLayer> layers;
+  std::vector<Lamp> lamps;
+  WorldView view;
+  std::size_t saved_cameras = 0;
+  bool is_view_new = false;
+  bool is_begun = false;    ///< the world has a state of this scene
+  bool owes_lamps = false;  ///< they lie under other numbers than in the scene
+  bool owes_all = false;    ///< a save was refused: the next one is to hold everything
+  std::vector<PartKey> owed_removals;
+};
+
+}  // namespace quoin::store
+
+namespace quoin {
+
+struct WorldSaver::Impl {
+  store::SaverState state;
+};
+
+}  // namespace quoin

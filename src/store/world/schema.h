@@ -1,0 +1,99 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <variant>
+#include <vector>
+
+#include <quoin/core/vec.h>
+#include <quoin/store/world_store.h>
+
+#include "store/world/connection.h"
+
+// The tables of a world, as docs/formats/world.md tells them to others:
+//
+//   parts    kind, id -> body     what a scene has besides chunks, a text of JSON each; a game's values
+//   regions  id <- grid, level, place of 32^3 chunks
+//   chunks   key = region * 32768 + Morton code within it -> body (store/chunk/chunk_body.h)
+
+namespace quoin::store {
+
+inline constexpr int kSchemaVersion = 1;
+inline constexpr int kPageBytes = 8192;
+/// Chunks along a region's edge.
+inline constexpr int kRegionShift = 5;
+inline constexpr int kRegionEdge = 1 << kRegionShift;
+inline constexpr int kRegionBits = 3 * kRegionShift;
+
+/// Makes the tables of an empty database.
+[[nodiscard]] Status create_schema(Connection& database);
+/// Whether they are there, in a version that this program knows.
+/// Errors: BadFormat (another program's database), Unsupported (a later version).
+[[nodiscard]] Status check_schema(Connection& database);
+
+struct RegionPlace {
+  std::uint32_t grid = 0;
+  std::uint8_t level = 0;
+  IVec3 region{0};
+  bool operator==(const RegionPlace&) const = default;
+  bool operator<(const RegionPlace& b) const {
+    return std::tie(grid, level, region.z, region.y, region.x) <
+           std::tie(b.grid, b.level, b.region.z, b.region.y, b.region.x);
+  }
+};
+
+[[nodiscard]] RegionPlace region_of(const ChunkPlace& place);
+[[nodiscard]] std::int64_t key_of(std::int64_t region, IVec3 chunk);
+/// The chunk that a key names in a region of that place. The upper bits of the key are not looked at.
+[[nodiscard]] IVec3 chunk_of_key(const RegionPlace& region, std::int64_t key);
+[[nodiscard]] inline std::int64_t first_key(std::int64_t region) {
+  return region << kRegionBits;
+}
+/// Regions with ids beyond would have keys that are no int64.
+inline constexpr std::int64_t kMaxRegion = (std::int64_t{1} << (62 - kRegionBits)) - 1;
+
+/// Names a part: a number, or a name.
+using PartId = std::variant<std::int64_t, std::string>;
+struct PartKey {
+  std::string kind;
+  PartId id;
+  bool operator<(const PartKey& b) const { return std::tie(kind, id) < std::tie(b.kind, b.id); }
+  bool operator==(const PartKey& b) const = default;
+};
+struct Part {
+  PartKey key;
+  std::uint64_t revision = 0;
+  std::span<const std::byte> body;
+};
+
+/// Kinds of parts.
+namespace part {
+inline constexpr const char* kType = "type";
+inline constexpr const char* kGrid = "grid";
+inline constexpr const char* kInstance = "instance";
+inline constexpr const char* kGroup = "group";
+inline constexpr const char* kLayer = "layer";
+inline constexpr const char* kLamp = "lamp";
+inline constexpr const char* kCamera = "camera";
+/// Id 0: what is looked through at first; the others are the "camera"s.
+inline constexpr const char* kView = "view";
+inline constexpr const char* kSun = "sun";
+inline constexpr const char* kThumbnail = "thumbnail";
+inline constexpr const char* kValue = "value";
+/// Of the world itself: id "revision", the number of its last commit as decimal digits; id "next_grid" likewise.
+inline constexpr const char* kWorld = "world";
+}  // namespace part
+
+/// XXH3 (64 bits) of kind, id, revision and body.
+[[nodiscard]] std::uint64_t sum_of(const Part& part);
+/// "type 7", "value \"inventory\"".
+[[nodiscard]] std::string name_of(const PartKey& key);
+
+}  // namespace quoin::store

@@ -1,0 +1,89 @@
+#include "store/world/world_changes.h"
+
+#include <string>
+#include <utility>
+
+#include <quoin/core/assert.h>
+
+#include "store/world/part_text.h"
+
+namespace quoin::store {
+
+void ChangeSet::remove_grid(std::uint32_t number) {
+  std::erase_if(chunks, [&](const auto& each) { return each.first.grid == number; });
+  parts.insert_or_assign({part::kGrid, std::int64_t{number}}, std::nullopt);
+  removed_grids.insert(number);
+}
+
+void ChangeSet::add(ChangeSet later) {
+  for (const std::uint32_t grid : later.removed_grids) remove_grid(grid);
+  for (auto& [place, chunk] : later.chunks) chunks.insert_or_assign(place, std::move(chunk));
+  for (auto& [key, body] : later.parts) parts.insert_or_assign(key, std::move(body));
+}
+
+}  // namespace quoin::store
+
+namespace quoin {
+
+WorldChanges::WorldChanges() : content_(std::make_unique<store::ChangeSet>()) {}
+WorldChanges::WorldChanges(WorldChanges&&) noexcept = default;
+WorldChanges& WorldChanges::operator=(WorldChanges&&) noexcept = default;
+WorldChanges::~WorldChanges() = default;
+
+void WorldChanges::put_chunk(const ChunkPlace& place, StoredChunk chunk) {
+  content_->chunks.insert_or_assign(place, std::move(chunk));
+}
+
+void WorldChanges::remove_chunk(const ChunkPlace& place) {
+  content_->chunks.insert_or_assign(place, std::nullopt);
+}
+
+void WorldChanges::put_types(const VoxelRegistry& types, VoxelType first) {
+  for (std::size_t type = std::max<VoxelType>(first, 1); type < types.size(); ++type) {
+    put_type(static_cast<VoxelType>(type), types[static_cast<VoxelType>(type)]);
+  }
+}
+
+void WorldChanges::put_type(VoxelType type, const VoxelProperties& properties) {
+  QUOIN_ASSERT(type != kAir, "a type besides air");
+  WorldParts::put(*this, store::part::kType, type, store::text_of(properties));
+}
+
+void WorldChanges::put_grid(std::uint32_t number, const WorldGrid& grid) {
+  WorldParts::put(*this, store::part::kGrid, number, store::text_of(grid));
+}
+
+void WorldChanges::remove_grid(std::uint32_t number) {
+  content_->remove_grid(number);
+}
+
+void WorldChanges::put_value(std::string name, std::vector<std::byte> bytes) {
+  WorldParts::put(*this, {store::part::kValue, std::move(name)}, std::move(bytes));
+}
+
+void WorldChanges::remove_value(std::string name) {
+  WorldParts::put(*this, {store::part::kValue, std::move(name)}, std::nullopt);
+}
+
+bool WorldChanges::empty() const {
+  return content_->empty();
+}
+
+std::size_t WorldChanges::chunk_count() const {
+  return content_->chunks.size();
+}
+
+void WorldParts::put(WorldChanges& changes, store::PartKey key, std::optional<PartBody> body) {
+  changes.content_->parts.insert_or_assign(std::move(key), std::move(body));
+}
+
+void WorldParts::put(WorldChanges& changes, const char* kind, std::int64_t id, std::string_view text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  put(changes, {kind, id}, PartBody(bytes.begin(), bytes.end()));
+}
+
+void WorldParts::remove(WorldChanges& changes, const char* kind, std::int64_t id) {
+  put(changes, {kind, id}, std::nullopt);
+}
+
+}  // namespace quoin

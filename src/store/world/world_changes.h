@@ -1,0 +1,79 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <unordered_map>
+#include <vector>
+
+#include <quoin/core/hash.h>
+#include <quoin/store/world_store.h>
+
+#include "store/world/schema.h"
+
+namespace quoin::store {
+
+struct ChunkPlaceHash {
+  std::size_t operator()(const ChunkPlace& place) const {
+    std::uint32_t hash = mix_bits(place.grid ^ std::uint32_t{place.level} << 24);
+    for (int axis = 0; axis < 3; ++axis) hash = mix_bits(hash ^ static_cast<std::uint32_t>(place.chunk[axis]));
+    return hash;
+  }
+};
+
+using PartBody = std::vector<std::byte>;
+
+struct ChangeSet {
+  std::set<std::uint32_t> removed_grids;  ///< before all else
+  std::unordered_map<ChunkPlace, std::optional<StoredChunk>, ChunkPlaceHash> chunks;
+  std::map<PartKey, std::optional<PartBody>> parts;
+
+  [[nodiscard]] bool empty() const { return removed_grids.empty() && chunks.empty() && parts.empty(); }
+  void remove_grid(std::uint32_t number);
+  /// Adds changes that were made later.
+  void add(ChangeSet later);
+};
+
+}  // namespace quoin::store
+
+namespace quoin {
+
+using store::PartBody;
+
+/// What the store's own parts put into changes besides chunks and values.
+struct WorldParts {
+  /// Nothing for `body`: the part goes.
+  static void put(WorldChanges& changes, store::PartKey key, std::optional<PartBody> body);
+  static void put(WorldChanges& changes, const char* kind, std::int64_t id, std::string_view text);
+  static void remove(WorldChanges& changes, const char* kind, std::int64_t id);
+  /// The part's body, saved or about to be. Errors: BadFormat where it is damaged; CannotRead.
+  [[nodiscard]] static Result<std::optional<PartBody>> find(const WorldStore& world, const store::PartKey& key);
+  /// Calls `visit` for the parts of a kind that are saved or about to be, by their ids, with whether each is as it was
+  /// written. Errors: CannotRead.
+  [[nodiscard]] static Status each(const WorldStore& world, const char* kind,
+                                   FunctionRef<void(const store::Part& part, bool is_sound)> visit);
+  /// Calls `visit`, on the caller's thread, for the chunks of a grid and level that are on disk in the order of their
+  /// keys, until it returns false; those that are damaged are errors. Decodes on several threads, in bounded memory.
+  [[nodiscard]] static Status each_chunk(const WorldStore& world, std::uint32_t grid, std::uint8_t level,
+                                         Threads threads,
+                                         FunctionRef<bool(const ChunkPlace& place, Result<StoredChunk> chunk)> visit);
+  /// What of types and grids was found damaged when it was opened, a line each.
+  [[nodiscard]] static std::vector<std::string> damage(const WorldStore& world);
+
+  /// `vfs`: a file system of SQLite's, for tests; null: the usual one, with a lock.
+  [[nodiscard]] static Result<WorldStore> create(const std::filesystem::path& path, Threads threads, const char* vfs);
+  [[nodiscard]] static Result<WorldStore> open(const std::filesystem::path& path, WorldAccess access, Threads threads,
+                                               const char* vfs);
+  /// A world that no crash may meet: nothing is synced before it is closed.
+  [[nodiscard]] static Result<WorldStore> create_unsynced(const std::filesystem::path& path, Threads threads);
+  /// A world in memory, to be read.
+  [[nodiscard]] static Result<WorldStore> open(std::span<const std::byte> bytes);
+
+ private:
+  [[nodiscard]] static Result<WorldStore> begin(std::unique_ptr<WorldStore::Impl> impl,
+                                                std::optional<store::Connection> writing, Threads threads);
+};
+
+}  // namespace quoin

@@ -1,0 +1,217 @@
+#include <algorithm>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <string>
+#include <utility>
+
+#include <quoin/store/world_saver.h>
+
+#include "io/whole_file.h"
+#include "scene/hierarchy.h"
+#include "store/world/part_text.h"
+#include "store/world/saver_state.h"
+#include "store/world/world_changes.h"
+#include "store/world/world_rules.h"
+
+namespace quoin {
+
+using namespace store;
+
+namespace {
+
+// Lines of damage: of a whole world that is broken nobody reads more.
+constexpr std::size_t kMaxLines = 20;
+// As scene files.
+constexpr std::int64_t kMaxLamps = std::int64_t{1} << 22;
+
+/// Puts a world's parts and chunks into a scene.
+class Load {
+ public:
+  Load(const WorldStore& world, LoadedScene& loaded, SaverState& state)
+      : world_(world), scene_(loaded.scene), loaded_(loaded), state_(state) {}
+
+  Status run(Threads threads, const Progress& progress) {
+    auto types = world_.types();
+    if (!types) return types.error();
+    scene_.types = std::move(*types);
+    for (std::string& line : WorldParts::damage(world_)) add_line(std::move(line));
+    const auto grids = world_.grids();
+    if (!grids) return grids.error();
+    std::size_t done = 0;
+    for (const auto& [number, header] : *grids) {
+      const auto share = [&] { return static_cast<double>(done) / static_cast<double>(grids->size()); };
+      if (progress && !progress(share())) return make_error(ErrorCode::Cancelled, "cancelled", world_.path().string());
+      if (auto read = read_grid(number, header, threads, progress, share()); !read) return read;
+      ++done;
+    }
+    if (auto read = read_parts(); !read) return read;
+    tell_rest();
+    remember();
+    return {};
+  }
+
+ private:
+  void add_line(std::string line) {
+    if (lines_++ < kMaxLines) loaded_.warnings.push_back(std::move(line));
+  }
+  void tell_rest() {
+    if (lines_ > kMaxLines) {
+      loaded_.warnings.push_back("and " + std::to_string(lines_ - kMaxLines) + " more (quoin world check)");
+    }
+  }
+
+  Status read_grid(std::uint32_t number, const WorldGrid& header, Threads threads, const Progress& progress,
+                   double share) {
+    SceneGrid grid;
+    grid.name = header.name;
+    grid.pivot = header.pivot;
+    grid.canvas = header.canvas;
+    grid.field = DensityGrid(header.band);
+    bool is_cancelled = false;
+    const Status read =
+        WorldParts::each_chunk(world_, number, 0, threads, [&](const ChunkPlace& place, Result<StoredChunk> chunk) {
+          if (!chunk) {
+            add_line(chunk.error().message);
+            return true;
+          }
+          if (chunk->voxels.uniform() != kAir) grid.grid.put_chunk(place.chunk, std::move(chunk->voxels));
+          if (chunk->densities) grid.field.put_chunk(place.chunk, std::move(*chunk->densities));
+          is_cancelled = progress && (++chunks_ & 255U) == 0 && !progress(share);
+          return !is_cancelled;
+        });
+    if (is_cancelled) return make_error(ErrorCode::Cancelled, "cancelled", world_.path().string());
+    if (!read) {
+      // Where the tables themselves are damaged, what was read until there is kept.
+      if (read.error().code != ErrorCode::BadFormat) return read;
+      add_line("grid " + std::to_string(number) + ": not all could be read: " + read.error().message);
+    }
+    const GridHandle handle = scene_.add_grid(std::move(grid));
+    handles_[number] = handle;
+    SavedGrid& saved = state_.grids[handle];
+    saved.number = number;
+    saved.header = header;
+    return {};
+  }
+
+  // Reads the parts of a kind; what is damaged is told, and left out.
+  template <class T, class Put>
+  Status each(const char* kind, Put put) {
+    return WorldParts::each(world_, kind, [&](const Part& part, bool is_sound) {
+      const auto* const number = std::get_if<std::int64_t>(&part.key.id);
+      const std::string name = name_of(part.key);
+      if (number != nullptr) last_[kind] = std::max(last_[kind], *number);
+      if (!is_sound || number == nullptr) {
+        add_line(name + " is damaged");
+        return;
+      }
+      auto content = part_from<T>(part.body, name);
+      if (!content) {
+        add_line(content.error().message);
+        return;
+      }
+      put(*number, std::move(*content));
+    });
+  }
+
+  Status read_parts() {
+    if (auto read = read_hierarchy(); !read) return read;
+    if (auto read = read_instances(); !read) return read;
+    Status read = each<Lamp>(part::kLamp, [&](std::int64_t, Lamp lamp) { scene_.lamps.push_back(std::move(lamp)); });
+    if (!read) return read;
+    read = each<DVec3>(part::kSun, [&](std::int64_t, DVec3 sun) { loaded_.sun = sun; });
+    if (!read) return read;
+    read = each<Camera>(part::kView, [&](std::int64_t, Camera camera) { loaded_.camera = camera; });
+    if (!read) return read;
+    return each<FileCamera>(part::kCamera, [&](std::int64_t, FileCamera camera) { loaded_.cameras.push_back(camera); });
+  }
+
+  Status read_hierarchy() {
+    Status read = each<SceneLayer>(part::kLayer, [&](std::int64_t number, SceneLayer layer) {
+      const LayerHandle handle = scene_.add_layer(std::move(layer));
+      layers_[number] = handle;
+      state_.layers.add(handle, number);
+    });
+    if (!read) return read;
+    std::vector<std::pair<GroupHandle, std::int64_t>> parents;
+    read = each<SceneFile::Group>(part::kGroup, [&](std::int64_t number, const SceneFile::Group& group) {
+      const GroupHandle handle = scene_.add_group(
+          {group.name, {}, named(layers_, group.layer), group.position, group.rotation, group.mirrored, group.visible});
+      groups_[number] = handle;
+      state_.groups.add(handle, number);
+      if (group.parent) parents.emplace_back(handle, static_cast<std::int64_t>(*group.parent));
+    });
+    for (const auto& [handle, parent] : parents) {
+      scene_.edit(handle).parent = named(groups_, static_cast<std::size_t>(parent));
+    }
+    return read;
+  }
+
+  Status read_instances() {
+    return each<SceneFile::Placement>(part::kInstance, [&](std::int64_t number, const SceneFile::Placement& text) {
+      const auto grid = handles_.find(static_cast<std::int64_t>(*text.grid));
+      if (grid == handles_.end()) {
+        add_line("instance " + std::to_string(number) + ": its grid is lost");
+        return;
+      }
+      const InstanceHandle handle = scene_.add_instance(
+          {text.name, grid->second, text.position, text.rotation, text.scale, text.mirrored, text.visible,
+           named(groups_, text.group), named(layers_, text.layer), text.categories.value_or(Instance().categories)});
+      state_.instances.add(handle, number);
+    });
+  }
+
+  template <class T>
+  static Handle<T> named(const std::map<std::int64_t, Handle<T>>& handles, std::optional<std::size_t> number) {
+    if (!number) return {};
+    const auto found = handles.find(static_cast<std::int64_t>(*number));
+    return found == handles.end() ? Handle<T>{} : found->second;
+  }
+
+  void remember() {
+    state_.scene = scene_.cursor();
+    state_.types = scene_.types.cursor();
+    for (auto& [handle, saved] : state_.grids) {
+      const SceneGrid& grid = scene_.grids()[handle];
+      saved.voxels = saved.data = grid.grid.cursor();
+      saved.densities = grid.field.cursor();
+    }
+    // The numbers of what is damaged stay taken.
+    const auto after = [&](const char* kind) { return last_.contains(kind) ? last_[kind] + 1 : 0; };
+    state_.instances.next = after(part::kInstance);
+    state_.groups.next = after(part::kGroup);
+    state_.layers.next = after(part::kLayer);
+    state_.lamps = scene_.lamps;
+    const auto lamps = static_cast<std::size_t>(std::clamp<std::int64_t>(after(part::kLamp), 0, kMaxLamps));
+    state_.owes_lamps = lamps != scene_.lamps.size();
+    state_.lamps.resize(std::max(lamps, scene_.lamps.size()));
+    state_.view = {loaded_.sun, loaded_.camera, loaded_.cameras};
+    state_.saved_cameras = loaded_.cameras.size();
+    state_.is_begun = true;
+  }
+
+  const WorldStore& world_;
+  Scene& scene_;
+  LoadedScene& loaded_;
+  SaverState& state_;
+  std::map<std::int64_t, GridHandle> handles_;
+  std::map<std::int64_t, LayerHandle> layers_;
+  std::map<std::int64_t, GroupHandle> groups_;
+  std::map<std::string, std::int64_t> last_;  // of each kind's numbers
+  std::size_t lines_ = 0;
+  std::size_t chunks_ = 0;
+};
+
+}  // namespace
+
+Result<LoadedWorld> load_world(const WorldStore& world, const LoadOptions& options, Threads threads,
+                               const Progress& progress) {
+  LoadedWorld result;
+  result.loaded.format = "world";
+  Load load(world, result.loaded, result.saver.impl_->state);
+  if (auto done = load.run(threads, progress); !done) return with_path(Result<LoadedWorld>(done.error()), world.path());
+  if (options.show_hidden) show_all(result.loaded.scene);
+  return result;
+}
+
+}  // namespace quoin

@@ -1,0 +1,237 @@
+#include "store/world/world_reader.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include <glm/common.hpp>
+
+namespace quoin::store {
+
+namespace {
+
+constexpr const char* kSelectChunk = "SELECT body FROM chunks WHERE key=?";
+constexpr const char* kSelectRegion = "SELECT id FROM regions WHERE grid=? AND level=? AND x=? AND y=? AND z=?";
+constexpr const char* kSelectRegionsIn =
+    "SELECT id, x, y, z FROM regions WHERE grid=? AND level=? AND x BETWEEN ? AND ? AND y BETWEEN ? AND ?"
+    " AND z BETWEEN ? AND ?";
+constexpr const char* kSelectKeys = "SELECT key FROM chunks WHERE key BETWEEN ? AND ?";
+constexpr const char* kSelectBodies = "SELECT key, body FROM chunks WHERE key BETWEEN ? AND ?";
+constexpr const char* kSelectPart = "SELECT id, revision, sum, body FROM parts WHERE kind=? AND id=?";
+constexpr const char* kSelectParts = "SELECT id, revision, sum, body FROM parts WHERE kind=? ORDER BY id";
+
+std::vector<std::byte> copy_of(std::span<const std::byte> bytes) {
+  return {bytes.begin(), bytes.end()};
+}
+
+// So few chunks that each is looked up. A range of keys costs reading the chunks within it.
+bool is_small(const IBox& box) {
+  const IVec3 size = box.size();
+  return size.x * size.y * size.z <= 512;
+}
+
+IBox regions_of(const IBox& chunks) {
+  const IVec3 last = chunks.max - IVec3(1);
+  return {{chunks.min.x >> kRegionShift, chunks.min.y >> kRegionShift, chunks.min.z >> kRegionShift},
+          {(last.x >> kRegionShift) + 1, (last.y >> kRegionShift) + 1, (last.z >> kRegionShift) + 1}};
+}
+
+}  // namespace
+
+std::optional<Part> part_of(Statement& row, std::string_view kind, std::uint64_t& sum) {
+  if (!row.is_integer(1) || !row.is_integer(2) || !row.is_bytes(3)) return std::nullopt;
+  if (!row.is_integer(0) && !row.is_bytes(0)) return std::nullopt;
+  Part part;
+  part.key.kind = kind;
+  part.key.id = row.is_integer(0) ? PartId(row.integer(0)) : PartId(std::string(row.text(0)));
+  part.revision = static_cast<std::uint64_t>(row.integer(1));
+  sum = static_cast<std::uint64_t>(row.integer(2));
+  part.body = row.bytes(3);
+  return part;
+}
+
+Result<Statement*> WorldReader::ready(Statement& statement, const char* sql) {
+  if (!statement.is_prepared()) {
+    auto prepared = connection_.prepare(sql);
+    if (!prepared) return prepared.error();
+    statement = std::move(*prepared);
+  }
+  return &statement;
+}
+
+Result<std::optional<std::int64_t>> WorldReader::region_id(const RegionPlace& place) {
+  if (const auto known = known_regions_.find(place); known != known_regions_.end()) return known->second;
+  const auto statement = ready(region_, kSelectRegion);
+  if (!statement) return statement.error();
+  Statement& select = **statement;
+  const StatementScope scope(select);
+  select.bind(0, std::int64_t{place.grid});
+  select.bind(1, std::int64_t{place.level});
+  for (int axis = 0; axis < 3; ++axis) select.bind(2 + axis, std::int64_t{place.region[axis]});
+  const auto row = select.step();
+  if (!row) return row.error();
+  if (!*row) return std::optional<std::int64_t>();
+  const std::int64_t id = select.integer(0);
+  if (id < 0 || id > kMaxRegion) return make_error(ErrorCode::BadFormat, "a region's number is out of range");
+  known_regions_[place] = id;
+  return id;
+}
+
+Result<std::optional<std::vector<std::byte>>> WorldReader::chunk_body(const ChunkPlace& place) {
+  const auto region = region_id(region_of(place));
+  if (!region) return region.error();
+  if (!*region) return std::optional<std::vector<std::byte>>();
+  const auto statement = ready(chunk_, kSelectChunk);
+  if (!statement) return statement.error();
+  Statement& select = **statement;
+  const StatementScope scope(select);
+  select.bind(0, key_of(**region, place.chunk));
+  const auto row = select.step();
+  if (!row) return row.error();
+  if (!*row) return std::optional<std::vector<std::byte>>();
+  return copy_of(select.bytes(0));
+}
+
+Result<std::vector<WorldReader::Region>> WorldReader::find_regions(std::uint32_t grid, std::uint8_t level,
+                                                                   const IBox& box) {
+  const auto statement = ready(regions_in_, kSelectRegionsIn);
+  if (!statement) return statement.error();
+  Statement& select = **statement;
+  const StatementScope scope(select);
+  select.bind(0, std::int64_t{grid});
+  select.bind(1, std::int64_t{level});
+  for (int axis = 0; axis < 3; ++axis) {
+    select.bind(2 + 2 * axis, std::int64_t{box.min[axis]});
+    select.bind(3 + 2 * axis, std::int64_t{box.max[axis]} - 1);
+  }
+  std::vector<Region> found;
+  while (true) {
+    const auto row = select.step();
+    if (!row) return row.error();
+    if (!*row) break;
+    const std::int64_t id = select.integer(0);
+    if (id < 0 || id > kMaxRegion) return make_error(ErrorCode::BadFormat, "a region's number is out of range");
+    const auto along = [&](int column) { return static_cast<int>(select.integer(column)); };
+    found.push_back({id, {grid, level, {along(1), along(2), along(3)}}});
+  }
+  std::ranges::sort(found, {}, &Region::id);
+  return found;
+}
+
+Status WorldReader::find_chunks(std::uint32_t grid, std::uint8_t level, const IBox& box, std::vector<IVec3>& out) {
+  if (box.empty()) return {};
+  const auto regions = find_regions(grid, level, regions_of(box));
+  if (!regions) return regions.error();
+  const auto statement = ready(keys_, kSelectKeys);
+  if (!statement) return statement.error();
+  Statement& select = **statement;
+  const auto add_keys = [&](const Region& region, std::int64_t first, std::int64_t last) -> Status {
+    const StatementScope scope(select);
+    select.bind(0, first);
+    select.bind(1, last);
+    while (true) {
+      const auto row = select.step();
+      if (!row) return row.error();
+      if (!*row) return {};
+      const IVec3 chunk = chunk_of_key(region.place, select.integer(0));
+      if (box.contains(chunk)) out.push_back(chunk);
+    }
+  };
+  for (const Region& region : *regions) {
+    const IVec3 corner = region.place.region * kRegionEdge;
+    const IBox part{glm::max(box.min, corner), glm::min(box.max, corner + IVec3(kRegionEdge))};
+    if (!is_small(part)) {
+      if (auto done = add_keys(region, first_key(region.id), first_key(region.id + 1) - 1); !done) return done;
+      continue;
+    }
+    for (int z = part.min.z; z < part.max.z; ++z) {
+      for (int y = part.min.y; y < part.max.y; ++y) {
+        for (int x = part.min.x; x < part.max.x; ++x) {
+          const std::int64_t key = key_of(region.id, {x, y, z});
+          if (auto done = add_keys(region, key, key); !done) return done;
+        }
+      }
+    }
+  }
+  return {};
+}
+
+Status WorldReader::each_body(std::uint32_t grid, std::uint8_t level,
+                              FunctionRef<bool(const ChunkPlace&, std::span<const std::byte>)> visit) {
+  constexpr int kFar = 1 << 26;
+  const auto regions = find_regions(grid, level, {IVec3(-kFar), IVec3(kFar)});
+  if (!regions) return regions.error();
+  const auto statement = ready(bodies_, kSelectBodies);
+  if (!statement) return statement.error();
+  Statement& select = **statement;
+  for (const Region& region : *regions) {
+    const StatementScope scope(select);
+    select.bind(0, first_key(region.id));
+    select.bind(1, first_key(region.id + 1) - 1);
+    while (true) {
+      const auto row = select.step();
+      if (!row) return row.error();
+      if (!*row) break;
+      const IVec3 chunk = chunk_of_key(region.place, select.integer(0));
+      if (!visit({grid, level, chunk}, select.bytes(1))) return {};
+    }
+  }
+  return {};
+}
+
+Result<std::vector<RegionPlace>> WorldReader::regions() {
+  auto select = connection_.prepare("SELECT grid, level, x, y, z FROM regions ORDER BY id");
+  if (!select) return select.error();
+  std::vector<RegionPlace> found;
+  while (true) {
+    const auto row = select->step();
+    if (!row) return row.error();
+    if (!*row) return found;
+    const auto along = [&](int column) { return static_cast<int>(select->integer(column)); };
+    found.push_back({static_cast<std::uint32_t>(select->integer(0)),
+                     static_cast<std::uint8_t>(select->integer(1)),
+                     {along(2), along(3), along(4)}});
+  }
+}
+
+Result<std::optional<std::vector<std::byte>>> WorldReader::part(const PartKey& key) {
+  const auto statement = ready(part_, kSelectPart);
+  if (!statement) return statement.error();
+  Statement& select = **statement;
+  const StatementScope scope(select);
+  select.bind(0, key.kind);
+  if (const auto* const number = std::get_if<std::int64_t>(&key.id)) {
+    select.bind(1, *number);
+  } else {
+    select.bind(1, std::string_view(std::get<std::string>(key.id)));
+  }
+  const auto row = select.step();
+  if (!row) return row.error();
+  if (!*row) return std::optional<std::vector<std::byte>>();
+  std::uint64_t sum = 0;
+  const auto found = part_of(select, key.kind, sum);
+  if (!found || sum_of(*found) != sum) return make_error(ErrorCode::BadFormat, name_of(key) + " is damaged");
+  return copy_of(found->body);
+}
+
+Status WorldReader::each_part(std::string_view kind, FunctionRef<void(const Part&, bool)> visit) {
+  const auto statement = ready(parts_, kSelectParts);
+  if (!statement) return statement.error();
+  Statement& select = **statement;
+  const StatementScope scope(select);
+  select.bind(0, kind);
+  while (true) {
+    const auto row = select.step();
+    if (!row) return row.error();
+    if (!*row) return {};
+    std::uint64_t sum = 0;
+    const auto found = part_of(select, kind, sum);
+    if (found) {
+      visit(*found, sum_of(*found) == sum);
+    } else {
+      visit(Part{{std::string(kind), select.integer(0)}, 0, {}}, false);
+    }
+  }
+}
+
+}  // namespace quoin::store

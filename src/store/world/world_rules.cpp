@@ -1,0 +1,160 @@
+#include "store/world/world_rules.h"
+
+#include <string>
+#include <utility>
+
+#include "store/world/part_text.h"
+
+namespace quoin::store {
+
+namespace {
+
+constexpr std::size_t kMaxValueBytes = std::size_t{64} << 20;
+
+VoxelProperties lost_type(std::int64_t number) {
+  VoxelProperties properties;
+  properties.name = "lost type " + std::to_string(number);
+  properties.colour = {255, 0, 255, 255};
+  properties.state_bits = kMaxStateBits;  // whatever its voxels hold is read
+  return properties;
+}
+
+// Types up to a number, those that are lost in between.
+Status fill_types(VoxelRegistry& types, std::int64_t number, std::vector<std::string>& damage) {
+  while (static_cast<std::int64_t>(types.size()) < number) {
+    const auto missing = static_cast<std::int64_t>(types.size());
+    damage.push_back(name_of({part::kType, missing}) + " is lost");
+    if (const auto added = types.add(lost_type(missing)); !added) return added.error();
+  }
+  return {};
+}
+
+Status put_type(VoxelRegistry& types, std::int64_t number, const VoxelProperties& properties) {
+  if (number == static_cast<std::int64_t>(types.size())) {
+    const auto added = types.add(properties);
+    return added ? Status() : Status(added.error());
+  }
+  types.replace(static_cast<VoxelType>(number), properties);
+  return {};
+}
+
+Status check_data(const ChunkPlace& place, const Chunk& chunk, const VoxelRegistry& types) {
+  if (chunk.data_count() == 0) return {};
+  std::string fault;
+  chunk.for_each_data([&](IVec3 local, const VoxelData& data) {
+    const std::uint8_t bits = types[chunk.get(local)].state_bits;
+    const bool fits = bits == kMaxStateBits || data.state >> bits == 0;
+    if (!fits && fault.empty()) fault = about(place) + ": a state of more bits than its type has";
+  });
+  if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault);
+  return {};
+}
+
+Status check_types(const ChunkPlace& place, const Chunk& chunk, const VoxelRegistry& types) {
+  for (const VoxelType type : chunk.types()) {
+    if (type < types.size()) continue;
+    return make_error(ErrorCode::InvalidArgument,
+                      about(place) + " has voxels of type " + std::to_string(type) + ", which was never put");
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string about(const ChunkPlace& place) {
+  std::string text = "chunk (";
+  for (int axis = 0; axis < 3; ++axis) text += std::to_string(place.chunk[axis]) + (axis < 2 ? ", " : ") of grid ");
+  return text + std::to_string(place.grid);
+}
+
+bool WorldRules::concern(const ChangeSet& changes) {
+  for (const auto& [key, body] : changes.parts) {
+    if (key.kind == part::kType || key.kind == part::kGrid) return true;
+  }
+  return false;
+}
+
+Result<WorldRules> WorldRules::after(const ChangeSet& changes) const {
+  WorldRules rules = *this;
+  for (const auto& [key, body] : changes.parts) {
+    const auto* const number = std::get_if<std::int64_t>(&key.id);
+    if (key.kind == part::kType && body && number != nullptr) {
+      const auto type = part_from<VoxelProperties>(*body, name_of(key));
+      if (!type) return make_error(ErrorCode::InvalidArgument, type.error().message);
+      if (*number > static_cast<std::int64_t>(rules.types.size())) {
+        return make_error(ErrorCode::InvalidArgument, name_of(key) + " is put before those below it");
+      }
+      if (auto done = put_type(rules.types, *number, *type); !done) return done.error();
+    }
+    if (key.kind == part::kGrid && number != nullptr) {
+      const auto grid_number = static_cast<std::uint32_t>(*number);
+      if (!body) {
+        rules.grids.erase(grid_number);
+        continue;
+      }
+      const auto grid = part_from<WorldGrid>(*body, name_of(key));
+      if (!grid) return make_error(ErrorCode::InvalidArgument, grid.error().message);
+      rules.grids.insert_or_assign(grid_number, *grid);
+    }
+  }
+  return rules;
+}
+
+Result<WorldRules> read_rules(WorldReader& reader) {
+  WorldRules rules;
+  Status fault;
+  const auto keep = [&](Status outcome) {
+    if (!outcome && fault) fault = std::move(outcome);
+  };
+  const Status types = reader.each_part(part::kType, [&](const Part& part, bool is_sound) {
+    const auto* const number = std::get_if<std::int64_t>(&part.key.id);
+    if (number == nullptr || *number < 1 || *number > static_cast<std::int64_t>(kMaxVoxelTypes)) {
+      rules.damage.push_back(name_of(part.key) + " is none");
+      return;
+    }
+    keep(fill_types(rules.types, *number, rules.damage));
+    auto type = is_sound ? part_from<VoxelProperties>(part.body, name_of(part.key))
+                         : Result<VoxelProperties>(make_error(ErrorCode::BadFormat, name_of(part.key) + " is damaged"));
+    if (!type) rules.damage.push_back(type.error().message);
+    if (fault) keep(put_type(rules.types, *number, type ? *type : lost_type(*number)));
+  });
+  if (!types) return types.error();
+  const Status grids = reader.each_part(part::kGrid, [&](const Part& part, bool is_sound) {
+    const auto* const number = std::get_if<std::int64_t>(&part.key.id);
+    if (number == nullptr || *number < 0 || *number > std::int64_t{0xFFFFFFFF}) {
+      rules.damage.push_back(name_of(part.key) + " is none");
+      return;
+    }
+    const auto grid = is_sound ? part_from<WorldGrid>(part.body, name_of(part.key))
+                               : Result<WorldGrid>(make_error(ErrorCode::BadFormat, name_of(part.key) + " is damaged"));
+    if (!grid) rules.damage.push_back(grid.error().message);
+    rules.grids.emplace(static_cast<std::uint32_t>(*number), grid.value_or(WorldGrid{}));
+  });
+  if (!grids) return grids.error();
+  if (!fault) return fault.error();
+  return rules;
+}
+
+Status check_changes(const ChangeSet& changes, const WorldRules& rules) {
+  for (const auto& [place, chunk] : changes.chunks) {
+    if (!chunk) continue;
+    const auto grid = rules.grids.find(place.grid);
+    if (grid == rules.grids.end()) {
+      return make_error(ErrorCode::InvalidArgument, about(place) + ", which was never put");
+    }
+    if (auto done = check_types(place, chunk->voxels, rules.types); !done) return done;
+    if (auto done = check_data(place, chunk->voxels, rules.types); !done) return done;
+    if (!chunk->densities) continue;
+    if (auto done = check_types(place, chunk->densities->materials(), rules.types); !done) return done;
+  }
+  for (const auto& [key, body] : changes.parts) {
+    if (!body) continue;
+    if (body->size() > kMaxValueBytes) {
+      return make_error(ErrorCode::InvalidArgument, name_of(key) + " has more than 64 MiB");
+    }
+    if (auto done = check_part(key, *body); !done) return done;
+  }
+  return {};
+}
+
+}  // namespace quoin::store

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <quoin/grid/voxel_registry.h>
+#include <quoin/store/world_store.h>
+
+#include "store/world/world_changes.h"
+#include "store/world/world_reader.h"
+
+namespace quoin::store {
+
+/// What chunks are checked against: the types and grids of a world.
+struct WorldRules {
+  VoxelRegistry types;
+  std::map<std::uint32_t, WorldGrid> grids;
+  std::vector<std::string> damage;  ///< a line each: of what was replaced by something that shows
+
+  /// Rules after changes. Errors: InvalidArgument, as WorldStore::save.
+  [[nodiscard]] Result<WorldRules> after(const ChangeSet& changes) const;
+  /// Whether changes have types or grids.
+  [[nodiscard]] static bool concern(const ChangeSet& changes);
+};
+
+/// Those of a world on disk. Types that are damaged become magenta ones, so that their voxels show; grids that are
+/// become nameless.
+[[nodiscard]] Result<WorldRules> read_rules(WorldReader& reader);
+/// "chunk (1, 2, 3) of grid 0".
+[[nodiscard]] std::string about(const ChunkPlace& place);
+/// As WorldStore::save says.
+[[nodiscard]] Status check_changes(const ChangeSet& changes, const WorldRules& rules);
+
+}  // namespace quoin::store

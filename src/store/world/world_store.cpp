@@ -1,0 +1,495 @@
+#include <quoin/store/world_store.h>
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <charconv>
+#include <mutex>
+#include <set>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include <quoin/core/assert.h>
+#include <quoin/io/file.h>
+
+#include "io/whole_file.h"
+#include "io/world_format.h"
+#include "store/chunk/chunk_body.h"
+#include "store/world/world_changes.h"
+#include "store/world/world_lock.h"
+#include "store/world/world_open.h"
+#include "store/world/world_reader.h"
+#include "store/world/world_rules.h"
+#include "store/world/world_writer.h"
+
+namespace quoin {
+
+namespace {
+
+using namespace store;
+
+/// What one thread reads with.
+struct ReadKit {
+  WorldReader reader;
+  ChunkDecoder decoder;
+};
+
+std::uint64_t number_from(std::span<const std::byte> digits) {
+  std::uint64_t number = 0;
+  const char* const text = reinterpret_cast<const char*>(digits.data());
+  std::from_chars(text, text + digits.size(), number);
+  return number;
+}
+
+Result<std::uint64_t> last_revision(WorldReader& reader) {
+  const auto body = reader.part({part::kWorld, std::string("revision")});
+  // One that is damaged is higher than any that was: salvage may then take later rows for older ones, no more.
+  if (!body)
+    return body.error().code == ErrorCode::BadFormat ? std::uint64_t{1} << 48 : Result<std::uint64_t>(body.error());
+  return *body ? number_from(**body) : 0;
+}
+
+/// A new file, moved to a name at which there is none.
+Status move_to(const std::filesystem::path& from, const std::filesystem::path& to) {
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return {};
+  const int number = errno;
+  if (number == EINVAL || number == ENOSYS) {  // a file system that does not know it; the lock keeps others away
+    std::error_code error;
+    if (std::filesystem::exists(std::filesystem::symlink_status(to, error))) {
+      return make_error(ErrorCode::CannotWrite, "there is a file of that name");
+    }
+    std::filesystem::rename(from, to, error);
+    return error ? Status(make_error(ErrorCode::CannotWrite, error.message())) : Status();
+  }
+  if (number == EEXIST) return make_error(ErrorCode::CannotWrite, "there is a file of that name");
+  return make_error(ErrorCode::CannotWrite, std::generic_category().message(number));
+}
+
+Status make_database(const std::filesystem::path& path, const char* vfs) {
+  auto connection = Connection::open(path.string(), Connection::Mode::Create, vfs);
+  if (!connection) return connection.error();
+  if (auto done = connection->run("PRAGMA page_size=8192; PRAGMA synchronous=EXTRA"); !done) return done;
+  if (auto done = create_schema(*connection); !done) return done;
+  return connection->close();
+}
+
+}  // namespace
+
+namespace store {
+
+Status begin_writing(Connection& connection, bool is_network) {
+  // Acknowledged is what is synced: NORMAL would lose commits when the power goes. Without a log the folder, from which
+  // the journal vanishes, is to be synced too; so also where the log begins: a journal that came back after a power cut
+  // would have the database forget that there is one.
+  if (auto done = connection.run("PRAGMA synchronous=EXTRA"); !done) return done;
+  if (is_network) return {};
+  const auto mode = connection.text("PRAGMA journal_mode=WAL");
+  if (!mode) return mode.error();
+  return *mode == "wal" ? connection.run("PRAGMA synchronous=FULL") : Status();
+}
+
+bool end_writing(Connection& connection) {
+  if (!connection.run("PRAGMA busy_timeout=0; PRAGMA synchronous=EXTRA")) return false;
+  const auto mode = connection.text("PRAGMA journal_mode=DELETE");
+  return mode && *mode == "delete";
+}
+
+Result<WorldReader> open_reader(const std::filesystem::path& path, const char* vfs) {
+  auto connection = Connection::open(path.string(), Connection::Mode::Read, vfs);
+  if (!connection) return connection.error();
+  auto sound = check_schema(*connection);
+  if (sound) return WorldReader(std::move(*connection));
+  // A folder that nobody can write to has no place for the memory that readers share; then there are no writers either.
+  const std::filesystem::path folder = path.parent_path();
+  std::error_code error;
+  const bool has_log = std::filesystem::exists(path.string() + "-wal", error);
+  const bool may_write = ::access(folder.empty() ? "." : folder.c_str(), W_OK) == 0;
+  if (sound.error().code != ErrorCode::CannotRead || has_log || may_write || vfs != nullptr) return sound.error();
+  auto alone = Connection::open(path.string(), Connection::Mode::ReadImmutable);
+  if (!alone) return alone.error();
+  if (auto done = check_schema(*alone); !done) return done.error();
+  return WorldReader(std::move(*alone));
+}
+
+}  // namespace store
+
+struct WorldStore::Impl {
+  std::filesystem::path path;
+  const char* vfs = nullptr;
+  WorldLock lock;
+  mutable std::mutex mutex;  // of what follows
+  mutable std::vector<std::unique_ptr<ReadKit>> idle;
+  mutable std::shared_ptr<const WorldRules> rules;
+  std::uint32_t next_grid = 0;
+  std::unique_ptr<WorldWriter> writer;  // null where it is only read
+  std::vector<std::byte> in_memory;     // the database itself, where it is no file
+
+  Result<std::unique_ptr<ReadKit>> take() const {
+    {
+      const std::scoped_lock guard(mutex);
+      if (!idle.empty()) {
+        auto kit = std::move(idle.back());
+        idle.pop_back();
+        return kit;
+      }
+    }
+    auto reader = in_memory.empty() ? with_path(open_reader(path, vfs), path) : open_bytes();
+    if (!reader) return reader.error();
+    return std::make_unique<ReadKit>(ReadKit{std::move(*reader), {}});
+  }
+  Result<WorldReader> open_bytes() const {
+    auto connection = Connection::open(in_memory);
+    if (!connection) return connection.error();
+    if (auto done = check_schema(*connection); !done) return done.error();
+    return WorldReader(std::move(*connection));
+  }
+  void give_back(std::unique_ptr<ReadKit> kit) const {
+    const std::scoped_lock guard(mutex);
+    idle.push_back(std::move(kit));
+  }
+  /// What `read(kit)` returns, its errors with the path.
+  template <class Read>
+  auto with_kit(Read read) const -> std::invoke_result_t<Read, ReadKit&> {
+    auto kit = take();
+    if (!kit) return kit.error();
+    auto outcome = with_path(read(**kit), path);
+    give_back(std::move(*kit));
+    return outcome;
+  }
+  std::shared_ptr<const WorldRules> current_rules() const {
+    const std::scoped_lock guard(mutex);
+    return rules;
+  }
+  void set_rules(WorldRules now) const {
+    auto shared = std::make_shared<const WorldRules>(std::move(now));
+    const std::scoped_lock guard(mutex);
+    rules = std::move(shared);
+  }
+  Result<StoredChunk> decode(ReadKit& kit, const ChunkPlace& place, std::span<const std::byte> body) const {
+    auto chunk = decode_with(kit, place, body, *current_rules());
+    if (chunk || writer != nullptr) return chunk;
+    // Another process may have put types and grids since.
+    auto now = read_rules(kit.reader);
+    if (!now) return chunk;
+    set_rules(std::move(*now));
+    return decode_with(kit, place, body, *current_rules());
+  }
+  static Result<StoredChunk> decode_with(ReadKit& kit, const ChunkPlace& place, std::span<const std::byte> body,
+                                         const WorldRules& rules) {
+    const auto grid = rules.grids.find(place.grid);
+    const float band = grid == rules.grids.end() ? WorldGrid{}.band : grid->second.band;
+    auto chunk = kit.decoder.decode(place, body, ChunkLimits{&rules.types, band});
+    if (!chunk) return make_error(chunk.error().code, about(place) + ": " + chunk.error().message);
+    return chunk;
+  }
+};
+
+WorldStore::WorldStore(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+WorldStore::WorldStore(WorldStore&&) noexcept = default;
+WorldStore& WorldStore::operator=(WorldStore&&) noexcept = default;
+WorldStore::~WorldStore() {
+  if (impl_ == nullptr) return;
+  // Readers first: the last connection of all clears the log away, and it is to be the one that may.
+  const std::scoped_lock guard(impl_->mutex);
+  impl_->idle.clear();
+  impl_->writer.reset();
+}
+
+Result<WorldStore> WorldStore::create(const std::filesystem::path& path, Threads threads) {
+  return WorldParts::create(path, threads, nullptr);
+}
+
+Result<WorldStore> WorldParts::create(const std::filesystem::path& path, Threads threads, const char* vfs) {
+  if (vfs != nullptr) {
+    if (auto done = make_database(path, vfs); !done) return with_path(Result<WorldStore>(done.error()), path);
+    return open(path, WorldAccess::Write, threads, vfs);
+  }
+  std::error_code error;
+  if (std::filesystem::exists(std::filesystem::symlink_status(path, error))) {
+    return make_error(ErrorCode::CannotWrite, "there is a file of that name", path.string());
+  }
+  {
+    const auto lock = WorldLock::take(path);
+    if (!lock) return with_path(Result<WorldStore>(lock.error()), path);
+    const std::filesystem::path fresh = path.string() + "-new";
+    remove_database(fresh);
+    auto done = make_database(fresh, nullptr);
+    if (done) {
+      remove_database(path);  // what another file of that name left beside it
+      done = move_to(fresh, path);
+    }
+    if (!done) {
+      remove_database(fresh);
+      return with_path(Result<WorldStore>(done.error()), path);
+    }
+    sync_folder(path.parent_path());
+  }
+  return open(path, WorldAccess::Write, threads, nullptr);
+}
+
+Result<WorldStore> WorldParts::create_unsynced(const std::filesystem::path& path, Threads threads) {
+  auto connection = Connection::open(path.string(), Connection::Mode::Create);
+  if (!connection) return connection.error();
+  const Status set = connection->run("PRAGMA page_size=8192; PRAGMA journal_mode=MEMORY; PRAGMA synchronous=OFF");
+  if (!set) return set.error();
+  if (auto done = create_schema(*connection); !done) return done.error();
+  auto impl = std::make_unique<WorldStore::Impl>();
+  impl->path = path;
+  return begin(std::move(impl), std::move(*connection), threads);
+}
+
+Result<WorldStore> WorldStore::open(const std::filesystem::path& path, WorldAccess access, Threads threads) {
+  return WorldParts::open(path, access, threads, nullptr);
+}
+
+Result<WorldStore> WorldParts::open(const std::filesystem::path& path, WorldAccess access, Threads threads,
+                                    const char* vfs) {
+  auto impl = std::make_unique<WorldStore::Impl>();
+  impl->path = path;
+  impl->vfs = vfs;
+  const auto fail = [&](const Error& error) { return with_path(Result<WorldStore>(error), path); };
+  if (vfs == nullptr) {
+    const auto beginning = read_file_beginning(path, kWorldHeaderBytes);
+    if (!beginning) return beginning.error();
+    if (!is_world_format(*beginning)) return fail(make_error(ErrorCode::BadFormat, "it is no world of Quoin's"));
+  }
+  std::optional<Connection> writing;
+  if (access == WorldAccess::Write) {
+    if (vfs == nullptr) {
+      auto lock = WorldLock::take(path);
+      if (!lock) return fail(lock.error());
+      impl->lock = std::move(*lock);
+      if (::access(path.c_str(), W_OK) != 0) return fail(make_error(ErrorCode::CannotWrite, "it may not be written"));
+    }
+    auto connection = Connection::open(path.string(), Connection::Mode::Write, vfs);
+    if (!connection) return fail(connection.error());
+    if (auto done = check_schema(*connection); !done) return fail(done.error());
+    if (auto done = begin_writing(*connection, vfs == nullptr && is_on_network(path)); !done) return fail(done.error());
+    writing = std::move(*connection);
+  }
+  return begin(std::move(impl), std::move(writing), threads);
+}
+
+Result<WorldStore> WorldParts::open(std::span<const std::byte> bytes) {
+  if (!is_world_format(bytes)) return make_error(ErrorCode::BadFormat, "it is no world of Quoin's");
+  auto impl = std::make_unique<WorldStore::Impl>();
+  impl->in_memory.assign(bytes.begin(), bytes.end());
+  return begin(std::move(impl), std::nullopt, {});
+}
+
+Result<WorldStore> WorldParts::begin(std::unique_ptr<WorldStore::Impl> impl, std::optional<Connection> writing,
+                                     Threads threads) {
+  auto kit = impl->take();
+  if (!kit) return kit.error();
+  auto rules = with_path(read_rules((*kit)->reader), impl->path);
+  if (!rules) return rules.error();
+  const auto revision = with_path(last_revision((*kit)->reader), impl->path);
+  if (!revision) return revision.error();
+  if (!rules->grids.empty()) impl->next_grid = rules->grids.rbegin()->first + 1;
+  const auto next_grid = (*kit)->reader.part({part::kWorld, std::string("next_grid")});
+  if (next_grid && *next_grid) {
+    impl->next_grid = std::max(impl->next_grid, static_cast<std::uint32_t>(number_from(**next_grid)));
+  }
+  impl->give_back(std::move(*kit));
+  impl->set_rules(std::move(*rules));
+  if (writing) impl->writer = std::make_unique<WorldWriter>(std::move(*writing), *revision, threads);
+  return WorldStore(std::move(impl));
+}
+
+Result<std::optional<StoredChunk>> WorldStore::load_chunk(const ChunkPlace& place) const {
+  if (impl_->writer != nullptr) {
+    if (auto pending = impl_->writer->pending_chunk(place)) return std::move(*pending);
+  }
+  return impl_->with_kit([&](ReadKit& kit) -> Result<std::optional<StoredChunk>> {
+    const auto body = kit.reader.chunk_body(place);
+    if (!body) return body.error();
+    if (!*body) return std::optional<StoredChunk>();
+    auto chunk = impl_->decode(kit, place, **body);
+    if (!chunk) return chunk.error();
+    return std::optional(std::move(*chunk));
+  });
+}
+
+Result<std::vector<IVec3>> WorldStore::chunks(std::uint32_t grid, std::uint8_t level, const IBox& box) const {
+  // Before the disk is read: what is written meanwhile is found there.
+  WorldWriter::PendingChunks pending;
+  if (impl_->writer != nullptr) pending = impl_->writer->pending_chunks(grid, level, box);
+  std::vector<IVec3> on_disk;
+  const Status done = impl_->with_kit([&](ReadKit& kit) { return kit.reader.find_chunks(grid, level, box, on_disk); });
+  if (!done) return done.error();
+  const auto before = [](IVec3 a, IVec3 b) { return std::tie(a.z, a.y, a.x) < std::tie(b.z, b.y, b.x); };
+  std::set<IVec3, decltype(before)> changed(before);
+  std::vector<IVec3> found;
+  for (const auto& [chunk, is_there] : pending.chunks) {
+    changed.insert(chunk);
+    if (is_there) found.push_back(chunk);
+  }
+  for (const IVec3 chunk : on_disk) {
+    if (!pending.is_removed && !changed.contains(chunk)) found.push_back(chunk);
+  }
+  std::ranges::sort(found, before);
+  return found;
+}
+
+Result<std::vector<IVec3>> WorldStore::chunks(std::uint32_t grid, std::uint8_t level) const {
+  constexpr int kFar = 1 << 26;
+  return chunks(grid, level, {IVec3(-kFar), IVec3(kFar)});
+}
+
+Result<VoxelRegistry> WorldStore::types() const {
+  if (impl_->writer == nullptr) {
+    auto rules = impl_->with_kit([&](ReadKit& kit) { return read_rules(kit.reader); });
+    if (!rules) return rules.error();
+    impl_->set_rules(std::move(*rules));
+  }
+  return impl_->current_rules()->types;
+}
+
+Result<std::map<std::uint32_t, WorldGrid>> WorldStore::grids() const {
+  if (auto now = types(); !now) return now.error();
+  return impl_->current_rules()->grids;
+}
+
+std::uint32_t WorldStore::next_grid() {
+  const std::scoped_lock guard(impl_->mutex);
+  return impl_->next_grid++;
+}
+
+Result<std::optional<std::vector<std::byte>>> WorldStore::value(std::string_view name) const {
+  return WorldParts::find(*this, {part::kValue, std::string(name)});
+}
+
+Result<std::optional<PartBody>> WorldParts::find(const WorldStore& world, const PartKey& key) {
+  const WorldStore::Impl& impl = *world.impl_;
+  if (impl.writer != nullptr) {
+    if (auto pending = impl.writer->pending_part(key)) return std::move(*pending);
+  }
+  return impl.with_kit([&](ReadKit& kit) { return kit.reader.part(key); });
+}
+
+Result<std::vector<std::string>> WorldStore::value_names() const {
+  std::vector<std::string> names;
+  const Status done = WorldParts::each(*this, part::kValue, [&](const Part& part, bool) {
+    if (const auto* const name = std::get_if<std::string>(&part.key.id)) names.push_back(*name);
+  });
+  if (!done) return done.error();
+  return names;
+}
+
+Status WorldParts::each(const WorldStore& world, const char* kind, FunctionRef<void(const Part&, bool)> visit) {
+  const WorldStore::Impl& impl = *world.impl_;
+  std::map<PartKey, PartBody> parts;
+  std::set<PartKey> damaged;
+  std::vector<std::pair<PartKey, std::optional<PartBody>>> pending;
+  if (impl.writer != nullptr) pending = impl.writer->pending_parts(kind);
+  const Status done = impl.with_kit([&](ReadKit& kit) {
+    return kit.reader.each_part(kind, [&](const Part& part, bool is_sound) {
+      parts[part.key].assign(part.body.begin(), part.body.end());
+      if (!is_sound) damaged.insert(part.key);
+    });
+  });
+  if (!done) return done;
+  for (auto& [key, body] : pending) {
+    damaged.erase(key);
+    if (body) {
+      parts[key] = std::move(*body);
+    } else {
+      parts.erase(key);
+    }
+  }
+  for (const auto& [key, body] : parts) visit(Part{key, 0, body}, !damaged.contains(key));
+  return {};
+}
+
+Status WorldParts::each_chunk(const WorldStore& world, std::uint32_t grid, std::uint8_t level, Threads threads,
+                              FunctionRef<bool(const ChunkPlace&, Result<StoredChunk>)> visit) {
+  struct Row {
+    ChunkPlace place;
+    std::vector<std::byte> body;
+    Result<StoredChunk> chunk = StoredChunk{};
+  };
+  const WorldStore::Impl& impl = *world.impl_;
+  const std::shared_ptr<const WorldRules> rules = impl.current_rules();
+  const unsigned workers = thread_count(threads);
+  std::vector<std::unique_ptr<ReadKit>> kits;
+  for (unsigned i = 0; i < workers + 1; ++i) {
+    auto kit = impl.take();
+    if (!kit) return kit.error();
+    kits.push_back(std::move(*kit));
+  }
+  std::vector<Row> rows;
+  bool is_wanted = true;
+  const auto pass_on = [&] {
+    parallel_for(workers, threads, [&](std::size_t worker) {
+      for (std::size_t i = worker; i < rows.size(); i += workers) {
+        rows[i].chunk = WorldStore::Impl::decode_with(*kits[worker], rows[i].place, rows[i].body, *rules);
+      }
+    });
+    for (Row& row : rows) is_wanted = is_wanted && visit(row.place, with_path(std::move(row.chunk), impl.path));
+    rows.clear();
+    return is_wanted;
+  };
+  const std::size_t slice = std::size_t{64} * workers;
+  const Status done = kits.back()->reader.each_body(grid, level, [&](const ChunkPlace& place, auto body) {
+    rows.push_back({place, {body.begin(), body.end()}});
+    return rows.size() < slice || pass_on();
+  });
+  if (is_wanted) pass_on();
+  for (auto& kit : kits) impl.give_back(std::move(kit));
+  return with_path(done, impl.path);
+}
+
+std::vector<std::string> WorldParts::damage(const WorldStore& world) {
+  return world.impl_->current_rules()->damage;
+}
+
+Result<SaveTicket> WorldStore::save(WorldChanges changes, std::function<void(const Status&)> on_saved) {
+  QUOIN_ASSERT(impl_->writer != nullptr, "a world that is open for writing");
+  ChangeSet& content = *changes.content_;
+  if (content.empty() && !on_saved) return SaveTicket{};
+  // Under the lock: two threads that put types must not overtake each other.
+  const std::scoped_lock guard(impl_->mutex);
+  std::shared_ptr<const WorldRules> rules = impl_->rules;
+  if (WorldRules::concern(content)) {
+    auto now = rules->after(content);
+    if (!now) return with_path(Result<SaveTicket>(now.error()), impl_->path);
+    if (now->grids.size() > rules->grids.size()) {
+      impl_->next_grid = std::max(impl_->next_grid, now->grids.rbegin()->first + 1);
+      const std::string next = std::to_string(impl_->next_grid);
+      const auto bytes = std::as_bytes(std::span(next));
+      content.parts.insert_or_assign({part::kWorld, std::string("next_grid")}, PartBody(bytes.begin(), bytes.end()));
+    }
+    rules = std::make_shared<const WorldRules>(std::move(*now));
+  }
+  if (auto done = check_changes(content, *rules); !done)
+    return with_path(Result<SaveTicket>(done.error()), impl_->path);
+  impl_->rules = rules;
+  return impl_->writer->save(std::move(content), std::move(on_saved));
+}
+
+Status WorldStore::wait(SaveTicket ticket) {
+  return impl_->writer == nullptr ? Status() : with_path(impl_->writer->wait(ticket), impl_->path);
+}
+
+Status WorldStore::flush() {
+  return impl_->writer == nullptr ? Status() : with_path(impl_->writer->flush(), impl_->path);
+}
+
+WorldStats WorldStore::stats() const {
+  return impl_->writer == nullptr ? WorldStats{} : impl_->writer->stats();
+}
+
+const std::filesystem::path& WorldStore::path() const {
+  return impl_->path;
+}
+
+bool WorldStore::is_writable() const {
+  return impl_->writer != nullptr;
+}
+
+}  // namespace quoin

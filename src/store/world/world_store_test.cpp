@@ -1,0 +1,239 @@
+#include <quoin/store/world_store.h>
+
+#include <sys/stat.h>
+
+#include <fstream>
+#include <string>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "store/world/world_for_tests.h"
+
+namespace quoin {
+namespace {
+
+std::vector<std::byte> bytes_of(std::string_view text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+WorldStore made(const std::filesystem::path& path, int types = 9) {
+  auto world = WorldStore::create(path);
+  EXPECT_TRUE(world) << to_string(world.error());
+  WorldChanges changes;
+  changes.put_types(coloured_types(types));
+  changes.put_grid(0, {.name = "ground"});
+  EXPECT_TRUE(world->save(std::move(changes)));
+  EXPECT_TRUE(world->flush());
+  return std::move(*world);
+}
+
+TEST(WorldStore, ChunksValuesTypesAndGridsSurviveAReopening) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  {
+    WorldStore world = made(path);
+    WorldChanges changes;
+    for (int i = -3; i < 40; ++i) {
+      changes.put_chunk({0, 0, {i, -i, 2 * i}}, {random_chunk(static_cast<std::uint32_t>(i + 3), 9)});
+    }
+    changes.put_chunk({0, 0, {0, 9, 0}}, {});
+    changes.put_value("inventory", bytes_of("a sword"));
+    changes.put_value(std::string("\0\xff", 2), {});
+    ASSERT_TRUE(world.save(std::move(changes)));
+    ASSERT_TRUE(world.flush());
+  }
+  EXPECT_FALSE(std::filesystem::exists(path.string() + "-wal"));
+  EXPECT_FALSE(std::filesystem::exists(path.string() + "-lock"));
+  for (const WorldAccess access : {WorldAccess::Read, WorldAccess::Write}) {
+    auto world = WorldStore::open(path, access);
+    ASSERT_TRUE(world) << to_string(world.error());
+    for (int i = -3; i < 40; ++i) {
+      const auto chunk = world->load_chunk({0, 0, {i, -i, 2 * i}});
+      ASSERT_TRUE(chunk) << to_string(chunk.error());
+      ASSERT_TRUE(chunk->has_value());
+      EXPECT_EQ((*chunk)->voxels, random_chunk(static_cast<std::uint32_t>(i + 3), 9));
+    }
+    const auto air = world->load_chunk({0, 0, {0, 9, 0}});
+    ASSERT_TRUE(air && air->has_value()) << "air that was put is there";
+    EXPECT_EQ((*air)->voxels.uniform(), kAir);
+    EXPECT_FALSE(world->load_chunk({0, 0, {0, 10, 0}})->has_value());
+    EXPECT_FALSE(world->load_chunk({0, 1, {0, 9, 0}})->has_value());
+    EXPECT_EQ(world->chunks(0, 0)->size(), 44U);
+    EXPECT_EQ(world->types()->size(), 10U);
+    EXPECT_EQ((*world->types())[3], coloured_type(3));
+    EXPECT_EQ(world->grids()->at(0).name, "ground");
+    EXPECT_EQ(**world->value("inventory"), bytes_of("a sword"));
+    EXPECT_EQ(world->value_names()->size(), 2U);
+    EXPECT_FALSE(world->value("nothing")->has_value());
+    EXPECT_EQ(world->next_grid(), 1U);
+  }
+}
+
+TEST(WorldStore, WhatIsSavedIsReadBeforeItIsOnDisk) {
+  const WorldFolder folder;
+  WorldStore world = made(folder / "w.quoin");
+  for (std::uint32_t i = 0; i < 300; ++i) {
+    WorldChanges changes;
+    changes.put_chunk({0, 0, {static_cast<int>(i % 7), 0, 0}}, {random_chunk(i, 9)});
+    ASSERT_TRUE(world.save(std::move(changes)));
+    const auto chunk = world.load_chunk({0, 0, {static_cast<int>(i % 7), 0, 0}});
+    ASSERT_TRUE(chunk && chunk->has_value());
+    ASSERT_EQ((*chunk)->voxels, random_chunk(i, 9)) << i;
+    ASSERT_EQ(world.chunks(0, 0, {{0, 0, 0}, {7, 1, 1}})->size(), std::min<std::size_t>(i + 1, 7));
+  }
+  WorldChanges changes;
+  changes.remove_chunk({0, 0, {1, 0, 0}});
+  ASSERT_TRUE(world.save(std::move(changes)));
+  EXPECT_FALSE(world.load_chunk({0, 0, {1, 0, 0}})->has_value());
+  EXPECT_EQ(world.chunks(0, 0)->size(), 6U);
+  ASSERT_TRUE(world.flush());
+  EXPECT_FALSE(world.load_chunk({0, 0, {1, 0, 0}})->has_value());
+  EXPECT_EQ(world.stats().pending_chunks, 0U);
+  EXPECT_EQ(world.stats().pending_bytes, 0U);
+}
+
+TEST(WorldStore, ARemovedGridTakesItsChunksAlong) {
+  const WorldFolder folder;
+  WorldStore world = made(folder / "w.quoin");
+  WorldChanges two;
+  two.put_grid(1, {});
+  for (int x = 0; x < 80; ++x) {
+    two.put_chunk({0, 0, {x, 0, 0}}, {random_chunk(1, 9)});
+    two.put_chunk({1, 0, {x, 0, 0}}, {random_chunk(2, 9)});
+  }
+  ASSERT_TRUE(world.save(std::move(two)));
+  ASSERT_TRUE(world.flush());
+  WorldChanges gone;
+  gone.remove_grid(0);
+  ASSERT_TRUE(world.save(std::move(gone)));
+  EXPECT_EQ(world.chunks(0, 0)->size(), 0U);
+  ASSERT_TRUE(world.flush());
+  EXPECT_EQ(world.chunks(0, 0)->size(), 0U);
+  EXPECT_EQ(world.chunks(1, 0)->size(), 80U);
+  EXPECT_EQ(world.grids()->size(), 1U);
+  EXPECT_FALSE(world.load_chunk({0, 0, {3, 0, 0}})->has_value());
+}
+
+TEST(WorldStore, ChunksInABoxAreFoundBothWays) {
+  const WorldFolder folder;
+  WorldStore world = made(folder / "w.quoin");
+  WorldChanges changes;
+  for (int z = -40; z < 40; z += 5) {
+    for (int x = -40; x < 40; x += 3) changes.put_chunk({0, 0, {x, 1, z}}, {});
+  }
+  ASSERT_TRUE(world.save(std::move(changes)));
+  ASSERT_TRUE(world.flush());
+  for (const IBox& box :
+       {IBox{{-40, 0, -40}, {40, 2, 40}}, IBox{{-7, 1, -7}, {7, 2, 7}}, IBox{{30, -5, -9}, {36, 5, 9}}}) {
+    std::size_t wanted = 0;
+    for (int z = -40; z < 40; z += 5) {
+      for (int x = -40; x < 40; x += 3) wanted += box.contains({x, 1, z}) ? 1 : 0;
+    }
+    EXPECT_EQ(world.chunks(0, 0, box)->size(), wanted);
+  }
+  EXPECT_TRUE(world.chunks(0, 0, {})->empty());
+}
+
+TEST(WorldStore, ASecondWriterIsRefusedAndReadersAreNot) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  WorldStore world = made(path);
+  const auto second = WorldStore::open(path, WorldAccess::Write);
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, ErrorCode::CannotWrite);
+  EXPECT_EQ(to_string(second.error()), path.string() + ": another program is writing it");
+  auto reader = WorldStore::open(path, WorldAccess::Read);
+  ASSERT_TRUE(reader) << to_string(reader.error());
+  WorldChanges changes;
+  changes.put_type(10, coloured_type(10));
+  changes.put_chunk({0, 0, {5, 5, 5}}, {Chunk(10)});
+  ASSERT_TRUE(world.save(std::move(changes)));
+  ASSERT_TRUE(world.flush());
+  const auto chunk = reader->load_chunk({0, 0, {5, 5, 5}});
+  ASSERT_TRUE(chunk) << to_string(chunk.error());
+  EXPECT_EQ((*chunk)->voxels.uniform(), VoxelType{10}) << "of a type that was put after the reader had opened it";
+}
+
+TEST(WorldStore, RefusesWhatCouldNotBeReadAgain) {
+  const WorldFolder folder;
+  WorldStore world = made(folder / "w.quoin");
+  const auto refused = [&](auto&& put) {
+    WorldChanges changes;
+    put(changes);
+    const auto ticket = world.save(std::move(changes));
+    EXPECT_FALSE(ticket);
+    return ticket ? ErrorCode::DeviceLost : ticket.error().code;
+  };
+  EXPECT_EQ(refused([](auto& c) { c.put_chunk({0, 0, {}}, {Chunk(77)}); }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(refused([](auto& c) { c.put_chunk({5, 0, {}}, {Chunk(1)}); }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(refused([](auto& c) { c.put_type(33, {}); }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(refused([](auto& c) { c.put_grid(1, {.pivot = DVec3(std::nan(""))}); }), ErrorCode::InvalidArgument);
+  EXPECT_EQ(refused([](auto& c) { c.put_value("x", std::vector<std::byte>((64U << 20) + 1)); }),
+            ErrorCode::InvalidArgument);
+  Chunk chunk(1);
+  chunk.set_data({}, {.state = 256});
+  EXPECT_EQ(refused([&](auto& c) { c.put_chunk({0, 0, {}}, {chunk}); }), ErrorCode::InvalidArgument);
+  EXPECT_TRUE(world.chunks(0, 0)->empty());
+  EXPECT_EQ(world.grids()->size(), 1U);
+}
+
+TEST(WorldStore, SaysWhatIsWrongWithFiles) {
+  const WorldFolder folder;
+  const auto text_of = [](const Result<WorldStore>& world) { return world ? "" : to_string(world.error()); };
+  EXPECT_NE(text_of(WorldStore::open(folder / "none", WorldAccess::Read)).find("No such file"), std::string::npos);
+  std::ofstream(folder / "text") << std::string(200, 'x');
+  EXPECT_NE(text_of(WorldStore::open(folder / "text", WorldAccess::Write)).find("no world"), std::string::npos);
+  EXPECT_NE(text_of(WorldStore::create(folder / "text")).find("there is a file of that name"), std::string::npos);
+  EXPECT_NE(text_of(WorldStore::create(folder / "no" / "w.quoin")).find("w.quoin"), std::string::npos);
+  { WorldStore world = made(folder / "w.quoin"); }
+  std::filesystem::resize_file(folder / "w.quoin", 5000);
+  EXPECT_EQ(WorldStore::open(folder / "w.quoin", WorldAccess::Read).error().code, ErrorCode::BadFormat);
+}
+
+TEST(WorldStore, ThreadsReadAndWriteAtOnce) {
+  const WorldFolder folder;
+  WorldStore world = made(folder / "w.quoin");
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 4; ++t) {
+    threads.emplace_back([&, t] {
+      for (std::uint32_t i = 0; i < 60; ++i) {
+        const ChunkPlace place{0, 0, {t, static_cast<int>(i % 5), 0}};
+        WorldChanges changes;
+        changes.put_chunk(place, {random_chunk(i, 9)});
+        const auto ticket = world.save(std::move(changes));
+        ASSERT_TRUE(ticket);
+        if (i % 3 == 0) {
+          ASSERT_TRUE(world.wait(*ticket));
+        }
+        const auto chunk = world.load_chunk(place);
+        ASSERT_TRUE(chunk && chunk->has_value());
+        ASSERT_EQ((*chunk)->voxels, random_chunk(i, 9));
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(world.chunks(0, 0)->size(), 20U);
+}
+
+TEST(WorldStore, CallbacksComeOnceItIsOnDisk) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  WorldStore world = made(path);
+  auto reader = WorldStore::open(path, WorldAccess::Read);
+  ASSERT_TRUE(reader);
+  bool was_there = false;
+  WorldChanges changes;
+  changes.put_chunk({0, 0, {1, 1, 1}}, {Chunk(2)});
+  ASSERT_TRUE(world.save(std::move(changes), [&](const Status& saved) {
+    was_there = saved && reader->load_chunk({0, 0, {1, 1, 1}})->has_value();
+  }));
+  ASSERT_TRUE(world.flush());
+  // The callback follows the commit, which is what flush waits for.
+  for (int i = 0; i < 1000 && !was_there; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_TRUE(was_there);
+}
+
+}  // namespace
+}  // namespace quoin

@@ -1,0 +1,370 @@
+#include "store/world/world_writer.h"
+
+#include <algorithm>
+#include <span>
+#include <string>
+
+#include <quoin/core/assert.h>
+
+#include "store/world/world_open.h"
+
+namespace quoin::store {
+
+namespace {
+
+// Chunks of one commit, unless a single save has more: the commit's syncs cost as much as some tens of chunks, and
+// what comes later waits for the whole of it.
+constexpr std::size_t kGroupChunks = 256;
+// Of a save with more chunks so many are encoded at once, so that memory stays bounded.
+constexpr std::size_t kSliceChunks = 256;
+// The log is moved into the database at 16 MiB: left alone it grows, and so does the time of moving it.
+constexpr int kMaxLogPages = (16 << 20) / kPageBytes;
+
+constexpr const char* kPutChunk = "REPLACE INTO chunks(key, body) VALUES(?, ?)";
+constexpr const char* kDeleteChunk = "DELETE FROM chunks WHERE key=?";
+constexpr const char* kDeleteChunks = "DELETE FROM chunks WHERE key BETWEEN ? AND ?";
+constexpr const char* kSelectRegion = "SELECT id FROM regions WHERE grid=? AND level=? AND x=? AND y=? AND z=?";
+constexpr const char* kAddRegion = "INSERT INTO regions(grid, level, x, y, z) VALUES(?, ?, ?, ?, ?) RETURNING id";
+constexpr const char* kSelectGridRegion = "SELECT id FROM regions WHERE grid=? LIMIT 1";
+constexpr const char* kDeleteRegion = "DELETE FROM regions WHERE id=?";
+constexpr const char* kPutPart =
+    "INSERT INTO parts(kind, id, revision, sum, body) VALUES(?, ?, ?, ?, ?)"
+    " ON CONFLICT(kind, id) DO UPDATE SET revision=excluded.revision, sum=excluded.sum, body=excluded.body";
+constexpr const char* kDeletePart = "DELETE FROM parts WHERE kind=? AND id=?";
+
+void bind_id(Statement& statement, int parameter, const PartId& id) {
+  if (const auto* const number = std::get_if<std::int64_t>(&id)) {
+    statement.bind(parameter, *number);
+  } else {
+    statement.bind(parameter, std::string_view(std::get<std::string>(id)));
+  }
+}
+
+std::uint64_t bytes_of(const std::optional<StoredChunk>& chunk) {
+  if (!chunk) return 0;
+  return chunk->voxels.bytes() + (chunk->densities ? chunk->densities->bytes() : 0);
+}
+
+}  // namespace
+
+WorldWriter::WorldWriter(Connection connection, std::uint64_t revision, Threads threads)
+    : connection_(std::move(connection)), revision_(revision), threads_(threads), encoders_(thread_count(threads)) {
+  thread_ = std::thread([this] { run(); });
+}
+
+WorldWriter::~WorldWriter() {
+  {
+    const std::scoped_lock lock(mutex_);
+    is_ending_ = true;
+    failed_through_ = 0;  // once more
+  }
+  work_.notify_all();
+  thread_.join();
+  statements_.clear();
+  end_writing(connection_);
+  static_cast<void>(connection_.close());
+}
+
+SaveTicket WorldWriter::save(ChangeSet changes, OnSaved on_saved) {
+  SaveTicket ticket;
+  {
+    const std::scoped_lock lock(mutex_);
+    ticket.number = ++last_ticket_;
+    note_pending(changes, ticket.number);
+    Save save{ticket.number, std::move(changes), {}};
+    if (on_saved) save.on_saved.push_back(std::move(on_saved));
+    queue_.push_back(std::move(save));
+    failed_through_ = 0;
+  }
+  work_.notify_all();
+  return ticket;
+}
+
+void WorldWriter::note_pending(const ChangeSet& changes, std::uint64_t ticket) {
+  const auto drop = [&](auto found) {
+    stats_.pending_bytes -= bytes_of(found->second.content);
+    return pending_chunks_.erase(found);
+  };
+  for (const std::uint32_t grid : changes.removed_grids) {
+    pending_removed_[grid] = ticket;
+    for (auto it = pending_chunks_.begin(); it != pending_chunks_.end();) it = it->first.grid == grid ? drop(it) : ++it;
+  }
+  for (const auto& [place, chunk] : changes.chunks) {
+    Pending<StoredChunk>& pending = pending_chunks_[place];
+    stats_.pending_bytes += bytes_of(chunk) - bytes_of(pending.content);
+    pending = {chunk, ticket};
+  }
+  for (const auto& [key, body] : changes.parts) pending_parts_[key] = {body, ticket};
+  stats_.pending_chunks = pending_chunks_.size();
+}
+
+void WorldWriter::forget_pending(const Save& group) {
+  for (const auto& [place, chunk] : group.changes.chunks) {
+    const auto found = pending_chunks_.find(place);
+    if (found == pending_chunks_.end() || found->second.ticket > group.last) continue;
+    stats_.pending_bytes -= bytes_of(found->second.content);
+    pending_chunks_.erase(found);
+  }
+  for (const auto& [key, body] : group.changes.parts) {
+    const auto found = pending_parts_.find(key);
+    if (found != pending_parts_.end() && found->second.ticket <= group.last) pending_parts_.erase(found);
+  }
+  std::erase_if(pending_removed_, [&](const auto& removed) { return removed.second <= group.last; });
+  stats_.pending_chunks = pending_chunks_.size();
+}
+
+Status WorldWriter::wait(SaveTicket ticket) {
+  std::unique_lock lock(mutex_);
+  QUOIN_ASSERT(ticket.number <= last_ticket_, "a ticket of this world");
+  done_.wait(lock, [&] { return saved_through_ >= ticket.number || failed_through_ >= ticket.number; });
+  return saved_through_ >= ticket.number ? Status() : failure_;
+}
+
+Status WorldWriter::flush() {
+  SaveTicket last;
+  {
+    const std::scoped_lock lock(mutex_);
+    last.number = last_ticket_;
+    failed_through_ = 0;
+  }
+  work_.notify_all();
+  return wait(last);
+}
+
+WorldStats WorldWriter::stats() const {
+  const std::scoped_lock lock(mutex_);
+  return stats_;
+}
+
+std::optional<std::optional<StoredChunk>> WorldWriter::pending_chunk(const ChunkPlace& place) const {
+  const std::scoped_lock lock(mutex_);
+  const auto found = pending_chunks_.find(place);
+  if (found != pending_chunks_.end()) return found->second.content;
+  if (pending_removed_.contains(place.grid)) return std::optional<StoredChunk>();
+  return std::nullopt;
+}
+
+std::optional<std::optional<PartBody>> WorldWriter::pending_part(const PartKey& key) const {
+  const std::scoped_lock lock(mutex_);
+  const auto found = pending_parts_.find(key);
+  if (found == pending_parts_.end()) return std::nullopt;
+  return found->second.content;
+}
+
+WorldWriter::PendingChunks WorldWriter::pending_chunks(std::uint32_t grid, std::uint8_t level, const IBox& box) const {
+  const std::scoped_lock lock(mutex_);
+  PendingChunks found;
+  found.is_removed = pending_removed_.contains(grid);
+  for (const auto& [place, pending] : pending_chunks_) {
+    if (place.grid != grid || place.level != level || !box.contains(place.chunk)) continue;
+    found.chunks.emplace_back(place.chunk, pending.content.has_value());
+  }
+  return found;
+}
+
+std::vector<std::pair<PartKey, std::optional<PartBody>>> WorldWriter::pending_parts(std::string_view kind) const {
+  const std::scoped_lock lock(mutex_);
+  std::vector<std::pair<PartKey, std::optional<PartBody>>> found;
+  for (const auto& [key, pending] : pending_parts_) {
+    if (key.kind == kind) found.emplace_back(key, pending.content);
+  }
+  return found;
+}
+
+std::optional<WorldWriter::Save> WorldWriter::next_group(std::unique_lock<std::mutex>& lock) {
+  work_.wait(lock, [&] { return is_ending_ || (!queue_.empty() && failed_through_ == 0); });
+  if (queue_.empty() || failed_through_ != 0) return std::nullopt;
+  Save group = std::move(queue_.front());
+  queue_.pop_front();
+  while (!queue_.empty() && group.changes.chunks.size() + queue_.front().changes.chunks.size() <= kGroupChunks) {
+    Save& next = queue_.front();
+    group.changes.add(std::move(next.changes));
+    group.last = next.last;
+    std::ranges::move(next.on_saved, std::back_inserter(group.on_saved));
+    queue_.pop_front();
+  }
+  return group;
+}
+
+void WorldWriter::run() {
+  std::unique_lock lock(mutex_);
+  while (std::optional<Save> group = next_group(lock)) {
+    lock.unlock();
+    Status outcome;
+    try {
+      outcome = write(group->changes);
+    } catch (const std::bad_alloc&) {
+      outcome = make_error(ErrorCode::LimitExceeded, "there is not enough memory to save");
+    }
+    finish(std::move(*group), outcome);
+    lock.lock();
+  }
+}
+
+void WorldWriter::finish(Save group, const Status& outcome) {
+  const std::vector<OnSaved> told = group.on_saved;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (outcome) {
+      forget_pending(group);
+      saved_through_ = group.last;
+      ++stats_.commits;
+      stats_.saved_chunks += chunks_of_commit_;
+      stats_.saved_bytes += bytes_of_commit_;
+    } else {
+      failure_ = outcome;
+      // Of what is behind it nothing is tried either, until somebody asks.
+      failed_through_ = last_ticket_;
+      queue_.push_front(std::move(group));
+    }
+  }
+  done_.notify_all();
+  for (const OnSaved& on_saved : told) on_saved(outcome);
+}
+
+Result<Statement*> WorldWriter::ready(const char* sql) {
+  Statement& statement = statements_[sql];
+  if (!statement.is_prepared()) {
+    auto prepared = connection_.prepare(sql);
+    if (!prepared) return prepared.error();
+    statement = std::move(*prepared);
+  }
+  return &statement;
+}
+
+Status WorldWriter::write(const ChangeSet& changes) {
+  chunks_of_commit_ = 0;
+  bytes_of_commit_ = 0;
+  ++revision_;
+  Status outcome = connection_.run("BEGIN IMMEDIATE");
+  if (outcome) outcome = write_all(changes);
+  if (outcome) outcome = connection_.run("COMMIT");
+  if (!outcome) {
+    regions_.clear();
+    if (connection_.is_in_transaction()) static_cast<void>(connection_.run("ROLLBACK"));
+    return outcome;
+  }
+  // What fails here is tried again with a later commit; the commit is safe in the log.
+  if (connection_.log_pages() > kMaxLogPages) static_cast<void>(connection_.checkpoint());
+  return outcome;
+}
+
+Status WorldWriter::write_all(const ChangeSet& changes) {
+  for (const std::uint32_t grid : changes.removed_grids) {
+    if (auto done = remove_grid(grid); !done) return done;
+  }
+  if (auto done = write_chunks(changes); !done) return done;
+  for (const auto& [key, body] : changes.parts) {
+    if (auto done = write_part(key, body); !done) return done;
+  }
+  const std::string number = std::to_string(revision_);
+  const auto bytes = std::as_bytes(std::span(number));
+  return write_part({part::kWorld, std::string("revision")}, PartBody(bytes.begin(), bytes.end()));
+}
+
+Status WorldWriter::remove_grid(std::uint32_t number) {
+  const auto select = ready(kSelectGridRegion);
+  if (!select) return select.error();
+  const auto chunks = ready(kDeleteChunks);
+  if (!chunks) return chunks.error();
+  const auto region = ready(kDeleteRegion);
+  if (!region) return region.error();
+  std::erase_if(regions_, [&](const auto& known) { return known.first.grid == number; });
+  while (true) {
+    (*select)->bind(0, std::int64_t{number});
+    const auto row = (*select)->step();
+    if (!row) return row.error();
+    const std::int64_t id = *row ? (*select)->integer(0) : 0;
+    (*select)->reset();
+    if (!*row) return {};
+    if (id < 0 || id > kMaxRegion) return make_error(ErrorCode::BadFormat, "a region's number is out of range");
+    (*chunks)->bind(0, first_key(id));
+    (*chunks)->bind(1, first_key(id + 1) - 1);
+    if (auto done = (*chunks)->run(); !done) return done;
+    (*region)->bind(0, id);
+    if (auto done = (*region)->run(); !done) return done;
+  }
+}
+
+Result<std::optional<std::int64_t>> WorldWriter::region_for(const RegionPlace& place, bool may_add) {
+  if (const auto known = regions_.find(place); known != regions_.end()) return known->second;
+  for (const char* sql : {kSelectRegion, kAddRegion}) {
+    if (sql == kAddRegion && !may_add) return std::optional<std::int64_t>();
+    const auto statement = ready(sql);
+    if (!statement) return statement.error();
+    const StatementScope scope(**statement);
+    (*statement)->bind(0, std::int64_t{place.grid});
+    (*statement)->bind(1, std::int64_t{place.level});
+    for (int axis = 0; axis < 3; ++axis) (*statement)->bind(2 + axis, std::int64_t{place.region[axis]});
+    const auto row = (*statement)->step();
+    if (!row) return row.error();
+    if (!*row) continue;
+    const std::int64_t id = (*statement)->integer(0);
+    if (id < 0 || id > kMaxRegion) return make_error(ErrorCode::BadFormat, "a region's number is out of range");
+    regions_[place] = id;
+    return id;
+  }
+  return make_error(ErrorCode::BadFormat, "a region was not added");
+}
+
+Status WorldWriter::write_chunks(const ChangeSet& changes) {
+  std::vector<Encoded> chunks;
+  chunks.reserve(changes.chunks.size());
+  for (const auto& [place, chunk] : changes.chunks) {
+    const auto region = region_for(region_of(place), chunk.has_value());
+    if (!region) return region.error();
+    if (!*region) continue;
+    chunks.push_back({key_of(**region, place.chunk), &place, chunk ? &*chunk : nullptr, {}});
+  }
+  std::ranges::sort(chunks, {}, &Encoded::key);
+  for (std::size_t begin = 0; begin < chunks.size(); begin += kSliceChunks) {
+    const std::size_t end = std::min(begin + kSliceChunks, chunks.size());
+    std::vector<Encoded> slice(std::make_move_iterator(chunks.begin() + static_cast<std::ptrdiff_t>(begin)),
+                               std::make_move_iterator(chunks.begin() + static_cast<std::ptrdiff_t>(end)));
+    const std::size_t stride = encoders_.size();
+    parallel_for(stride, threads_, [&](std::size_t worker) {
+      for (std::size_t i = worker; i < slice.size(); i += stride) {
+        Encoded& each = slice[i];
+        if (each.chunk == nullptr) continue;
+        const DensityChunk* const densities = each.chunk->densities ? &*each.chunk->densities : nullptr;
+        encoders_[worker].encode(*each.place, revision_, each.chunk->voxels, densities, each.body);
+      }
+    });
+    if (auto done = put_chunks(slice); !done) return done;
+  }
+  return {};
+}
+
+Status WorldWriter::put_chunks(std::vector<Encoded>& chunks) {
+  const auto put = ready(kPutChunk);
+  if (!put) return put.error();
+  const auto remove = ready(kDeleteChunk);
+  if (!remove) return remove.error();
+  for (const Encoded& each : chunks) {
+    Statement& statement = each.chunk != nullptr ? **put : **remove;
+    statement.bind(0, each.key);
+    if (each.chunk != nullptr) statement.bind(1, std::span<const std::byte>(each.body));
+    if (auto done = statement.run(); !done) return done;
+    if (each.chunk == nullptr) continue;
+    ++chunks_of_commit_;
+    bytes_of_commit_ += each.body.size();
+  }
+  return {};
+}
+
+Status WorldWriter::write_part(const PartKey& key, const std::optional<PartBody>& body) {
+  const auto prepared = ready(body ? kPutPart : kDeletePart);
+  if (!prepared) return prepared.error();
+  Statement& statement = **prepared;
+  statement.bind(0, std::string_view(key.kind));
+  bind_id(statement, 1, key.id);
+  if (body) {
+    const Part part{key, revision_, *body};
+    statement.bind(2, static_cast<std::int64_t>(revision_));
+    statement.bind(3, static_cast<std::int64_t>(sum_of(part)));
+    statement.bind(4, std::span<const std::byte>(*body));
+  }
+  return statement.run();
+}
+
+}  // namespace quoin::store

@@ -1,0 +1,119 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include <quoin/core/parallel.h>
+
+#include "store/chunk/chunk_body.h"
+#include "store/world/connection.h"
+#include "store/world/world_changes.h"
+
+namespace quoin::store {
+
+/// Saves changes on a thread of its own, many in one commit while commits take longer than they come:
+///
+///   save -> queue -> group (merged) -> encoded, by key -> one transaction -> commit, synced -> acknowledged
+///
+/// What is not on disk yet is found here (`pending_*`). Threads: any function from any thread.
+class WorldWriter {
+ public:
+  using OnSaved = std::function<void(const Status&)>;
+
+  /// `revision`: of the last commit. The connection is the only one that writes.
+  WorldWriter(Connection connection, std::uint64_t revision, Threads threads);
+  WorldWriter(const WorldWriter&) = delete;
+  WorldWriter& operator=(const WorldWriter&) = delete;
+  /// Saves what is queued, if it can, and closes the connection.
+  ~WorldWriter();
+
+  SaveTicket save(ChangeSet changes, OnSaved on_saved);
+  [[nodiscard]] Status wait(SaveTicket ticket);
+  [[nodiscard]] Status flush();
+  [[nodiscard]] WorldStats stats() const;
+
+  /// The chunk that is to be saved, none where it is to be removed; nothing at all where it is not about to change.
+  [[nodiscard]] std::optional<std::optional<StoredChunk>> pending_chunk(const ChunkPlace& place) const;
+  /// As `pending_chunk`.
+  [[nodiscard]] std::optional<std::optional<PartBody>> pending_part(const PartKey& key) const;
+  /// What is about to change of a grid's and level's chunks in a box: whether each will be there. All others go where
+  /// the grid is to be removed.
+  struct PendingChunks {
+    bool is_removed = false;
+    std::vector<std::pair<IVec3, bool>> chunks;
+  };
+  [[nodiscard]] PendingChunks pending_chunks(std::uint32_t grid, std::uint8_t level, const IBox& box) const;
+  /// The parts of a kind that are about to change; nothing for those that go.
+  [[nodiscard]] std::vector<std::pair<PartKey, std::optional<PartBody>>> pending_parts(std::string_view kind) const;
+
+ private:
+  struct Save {
+    std::uint64_t last = 0;  ///< its ticket, or of several the last
+    ChangeSet changes;
+    std::vector<OnSaved> on_saved;
+  };
+  template <class T>
+  struct Pending {
+    std::optional<T> content;
+    std::uint64_t ticket = 0;
+  };
+  struct Encoded {
+    std::int64_t key = 0;
+    const ChunkPlace* place = nullptr;
+    const StoredChunk* chunk = nullptr;  ///< null: the row goes
+    std::vector<std::byte> body;
+  };
+
+  void run();
+  /// Waits for work; nothing when the writer ends.
+  [[nodiscard]] std::optional<Save> next_group(std::unique_lock<std::mutex>& lock);
+  void note_pending(const ChangeSet& changes, std::uint64_t ticket);
+  void finish(Save group, const Status& outcome);
+  void forget_pending(const Save& group);
+
+  // On the writer's thread.
+  [[nodiscard]] Status write(const ChangeSet& changes);
+  [[nodiscard]] Status write_all(const ChangeSet& changes);
+  [[nodiscard]] Status remove_grid(std::uint32_t number);
+  [[nodiscard]] Status write_chunks(const ChangeSet& changes);
+  [[nodiscard]] Status put_chunks(std::vector<Encoded>& chunks);
+  [[nodiscard]] Status write_part(const PartKey& key, const std::optional<PartBody>& body);
+  [[nodiscard]] Result<std::optional<std::int64_t>> region_for(const RegionPlace& place, bool may_add);
+  [[nodiscard]] Result<Statement*> ready(const char* sql);
+
+  Connection connection_;
+  std::uint64_t revision_;
+  Threads threads_;
+  std::vector<ChunkEncoder> encoders_;
+  std::map<const char*, Statement> statements_;
+  std::map<RegionPlace, std::int64_t> regions_;
+  std::uint64_t bytes_of_commit_ = 0;
+  std::uint64_t chunks_of_commit_ = 0;
+
+  mutable std::mutex mutex_;
+  std::condition_variable work_;
+  std::condition_variable done_;
+  std::deque<Save> queue_;
+  std::unordered_map<ChunkPlace, Pending<StoredChunk>, ChunkPlaceHash> pending_chunks_;
+  std::map<PartKey, Pending<PartBody>> pending_parts_;
+  std::map<std::uint32_t, std::uint64_t> pending_removed_;  // grids, with their tickets
+  std::uint64_t last_ticket_ = 0;
+  std::uint64_t saved_through_ = 0;
+  std::uint64_t failed_through_ = 0;
+  Status failure_;
+  bool is_ending_ = false;
+  WorldStats stats_;
+
+  std::thread thread_;
+};
+
+}  // namespace quoin::store
