@@ -67,7 +67,7 @@ TEST_F(ToolWorld, DamageIsToldAndRepaired) {
   const ToolRun repair = run("world repair hills.quoin --json");
   EXPECT_EQ(repair.status, 0) << repair.err;
   const Json repaired = Json::parse(repair.out);
-  EXPECT_TRUE(std::filesystem::exists(std::string(repaired["kept"])));
+  EXPECT_TRUE(std::filesystem::exists(folder_.file(std::string(repaired["kept"]).c_str())));
   EXPECT_EQ(run("world check hills.quoin").status, 0);
   EXPECT_EQ(run("render hills.quoin -o a.png --size 64x48 -q").status, 0);
 }
