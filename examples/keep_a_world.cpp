@@ -55,7 +55,7 @@ quoin::Status run(const std::string& path) {
   for (const std::string& warning : loaded->loaded.warnings) std::fprintf(stderr, "%s\n", warning.c_str());
   quoin::Scene& scene = loaded->loaded.scene;
   if (scene.grids().empty()) {
-    if (const auto made = make_land(scene); !made) return made;
+    if (auto made = make_land(scene); !made) return made;
   }
   Player player;
   const auto kept = world->value("player");
@@ -64,10 +64,10 @@ quoin::Status run(const std::string& path) {
   for (int frame = 1; frame <= 120; ++frame) {
     play(scene, player);
     if (frame % 30 == 0) {  // the disk is another thread's
-      if (const auto saved = save(*world, loaded->saver, scene, player); !saved) return saved;
+      if (auto saved = save(*world, loaded->saver, scene, player); !saved) return saved;
     }
   }
-  if (const auto safe = world->flush(); !safe) return safe;
+  if (auto safe = world->flush(); !safe) return safe;
   const quoin::WorldStats stats = world->stats();
   std::printf("%d voxels dug, the player is at height %.1f; saved %llu chunks in %llu commits\n", player.voxels_dug,
               player.position.y, static_cast<unsigned long long>(stats.saved_chunks),

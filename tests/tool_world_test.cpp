@@ -67,7 +67,7 @@ TEST_F(ToolWorld, DamageIsToldAndRepaired) {
   const ToolRun repair = run("world repair hills.quoin --json");
   EXPECT_EQ(repair.status, 0) << repair.err;
   const Json repaired = Json::parse(repair.out);
-  EXPECT_TRUE(std::filesystem::exists(folder_.file(std::string(repaired["kept"]).c_str())));
+  EXPECT_TRUE(std::filesystem::exists(folder_.file(std::string(repaired["kept"]))));
   EXPECT_EQ(run("world check hills.quoin").status, 0);
   EXPECT_EQ(run("render hills.quoin -o a.png --size 64x48 -q").status, 0);
 }
@@ -90,7 +90,7 @@ TEST_F(ToolWorld, BackupAndCompact) {
 
 TEST_F(ToolWorld, WhatIsNoWorldIsRefusedInOneLine) {
   std::ofstream(folder_.file("text.quoin")) << "hello";
-  std::ofstream(folder_.file("empty.quoin"));
+  std::ofstream(folder_.file("empty.quoin")) << "";
   for (const char* name : {"text.quoin", "empty.quoin", "none.quoin", "."}) {
     for (const char* command : {"info", "check", "repair", "compact"}) {
       const ToolRun result = run("world " + std::string(command) + " " + name);

@@ -4,7 +4,8 @@
 
 #include "io/world_format.h"
 
-// Builds without SQLite, zstd or xxHash: worlds on disk say so.
+// Builds without SQLite, zstd or xxHash: worlds on disk say so. Arguments are taken as where there are any.
+// NOLINTBEGIN(performance-unnecessary-value-param)
 
 namespace quoin {
 
@@ -147,3 +148,4 @@ Result<SavedScene> write_world_format(const Scene&, const LoadedScene*, const st
 }
 
 }  // namespace quoin
+// NOLINTEND(performance-unnecessary-value-param)

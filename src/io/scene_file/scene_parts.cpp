@@ -31,8 +31,6 @@ bool is_same(const DQuat& a, const DQuat& b) {
   return scene_json::is_same(a.w, b.w) && scene_json::is_same(a.x, b.x) && scene_json::is_same(a.y, b.y) &&
          scene_json::is_same(a.z, b.z);
 }
-using scene_json::is_same;
-
 DQuat rotation_of(const Object& instance, const Json& json) {
   const Place place = instance.place_of("rotation");
   Faults& faults = instance.faults();

@@ -164,7 +164,7 @@ class Repair {
   Status salvage_chunks(Output& output) {
     Status fault;
     const auto read = revisions_;  // what SQLite could read is newer than what lies on unused pages
-    const Status scanned = scan_bodies(from_, [&](std::int64_t key, std::span<const std::byte> body) {
+    Status scanned = scan_bodies(from_, [&](std::int64_t key, std::span<const std::byte> body) {
       const bool is_in_gap =
           std::ranges::any_of(gaps_, [&](const KeyGap& gap) { return gap.first <= key && key <= gap.last; });
       if (!fault || is_cancelled()) return;

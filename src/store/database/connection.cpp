@@ -106,7 +106,7 @@ Result<bool> Statement::step() {
   const int code = sqlite3_step(statement_.get());
   if (code == SQLITE_ROW) return true;
   if (code == SQLITE_DONE) return false;
-  const Error error = error_of(sqlite3_db_handle(statement_.get()), code);
+  Error error = error_of(sqlite3_db_handle(statement_.get()), code);
   reset();
   return error;
 }
@@ -259,7 +259,7 @@ Status Connection::close() {
   sqlite3* const database = database_.release();
   const int code = sqlite3_close(database);
   if (code == SQLITE_OK) return {};
-  const Error error = error_of(database, code);
+  Error error = error_of(database, code);
   sqlite3_close_v2(database);
   return error;
 }

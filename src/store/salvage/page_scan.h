@@ -21,7 +21,8 @@
 // Errors:  CannotRead where the file cannot be opened. Pages that the disk does not give count as damaged.
 //          LimitExceeded for a file whose pages were made to lead back to themselves again and again.
 // Memory:  a page or two, the largest record, and 16 bytes for each page in the log.
-// Cost:    about 10 ns a byte for records, 0.5 ns for bodies, besides reading the file twice at most.
+// Cost:    about 10 ns a byte for records, 0.5 ns for bodies, besides reading the file twice; where no body that spans pages
+//          says how large these are, 1 GiB of it at most for each size that there may be.
 
 namespace quoin::store {
 

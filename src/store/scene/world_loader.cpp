@@ -69,7 +69,7 @@ class Load {
     grid.canvas = header.canvas;
     grid.field = DensityGrid(header.band);
     bool is_cancelled = false;
-    const Status read =
+    Status read =
         WorldParts::each_chunk(world_, number, 0, threads, [&](const ChunkPlace& place, Result<StoredChunk> chunk) {
           if (!chunk) {
             add_line(chunk.error().message);

@@ -15,10 +15,11 @@ void ChangeSet::remove_grid(std::uint32_t number) {
   removed_grids.insert(number);
 }
 
-void ChangeSet::add(ChangeSet later) {
+void ChangeSet::add(ChangeSet&& later) {
   for (const std::uint32_t grid : later.removed_grids) remove_grid(grid);
   for (auto& [place, chunk] : later.chunks) chunks.insert_or_assign(place, std::move(chunk));
   for (auto& [key, body] : later.parts) parts.insert_or_assign(key, std::move(body));
+  later = {};
 }
 
 }  // namespace quoin::store

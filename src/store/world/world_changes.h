@@ -33,7 +33,7 @@ struct ChangeSet {
   [[nodiscard]] bool empty() const { return removed_grids.empty() && chunks.empty() && parts.empty(); }
   void remove_grid(std::uint32_t number);
   /// Adds changes that were made later.
-  void add(ChangeSet later);
+  void add(ChangeSet&& later);
 };
 
 }  // namespace quoin::store

@@ -334,7 +334,7 @@ Status WorldParts::each(const WorldStore& world, const char* kind, FunctionRef<v
   std::set<PartKey> damaged;
   std::vector<std::pair<PartKey, std::optional<PartBody>>> pending;
   if (impl.writer != nullptr) pending = impl.writer->pending_parts(kind);
-  const Status done = impl.with_kit([&](ReadKit& kit) {
+  Status done = impl.with_kit([&](ReadKit& kit) {
     return kit.reader.each_part(kind, [&](const Part& part, bool is_sound) {
       parts[part.key].assign(part.body.begin(), part.body.end());
       if (!is_sound) damaged.insert(part.key);

@@ -196,6 +196,7 @@ TEST(WorldStore, ThreadsReadAndWriteAtOnce) {
   const WorldFolder folder;
   WorldStore world = made(folder / "w.quoin");
   std::vector<std::thread> threads;
+  threads.reserve(4);
   for (int t = 0; t < 4; ++t) {
     threads.emplace_back([&, t] {
       for (std::uint32_t i = 0; i < 60; ++i) {
