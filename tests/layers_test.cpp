@@ -35,6 +35,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/density/stored_density.h", {"terrain"}},
     {"grid/long_box.h", {"live"}},
     {"io/byte_order.h", {"store"}},
+    {"io/held_files.h", {"store"}},
     {"io/scene_file/scene_parts.h", {"store"}},
     {"io/text.h", {"store"}},
     {"io/whole_file.h", {"store"}},

@@ -13,6 +13,7 @@
 #include <system_error>
 #include <utility>
 
+#include "io/held_files.h"
 #include "io/whole_file.h"
 
 namespace quoin {
@@ -42,7 +43,7 @@ struct DescriptorGuard {
   explicit DescriptorGuard(int value) : descriptor(value) {}
   DescriptorGuard(const DescriptorGuard&) = delete;
   DescriptorGuard& operator=(const DescriptorGuard&) = delete;
-  ~DescriptorGuard() { ::close(descriptor); }
+  ~DescriptorGuard() { close_after_reading(descriptor); }
 };
 
 /// Why there is no folder in which `path` could lie, or nothing when there is one.
@@ -83,8 +84,7 @@ Status check_replaceable(const std::filesystem::path& path, std::optional<mode_t
 /// The whole of a file, or its first `max_bytes` bytes.
 Result<std::vector<std::byte>> read_regular_file(const std::filesystem::path& path,
                                                  std::optional<std::size_t> max_bytes) {
-  // O_NONBLOCK: a FIFO without a writer would otherwise block before it can be refused.
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  const int descriptor = open_for_reading(path);
   if (descriptor < 0) return cannot_read(reason(errno), path);
   const DescriptorGuard guard(descriptor);
   struct stat info {};
@@ -99,7 +99,7 @@ Result<std::vector<std::byte>> read_regular_file(const std::filesystem::path& pa
   std::vector<std::byte> bytes(static_cast<std::size_t>(wanted));
   std::size_t filled = 0;
   while (filled < bytes.size()) {
-    const ssize_t count = ::read(descriptor, bytes.data() + filled, bytes.size() - filled);
+    const ssize_t count = ::pread(descriptor, bytes.data() + filled, bytes.size() - filled, static_cast<off_t>(filled));
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) return cannot_read(reason(errno), path);
     if (count == 0) break;

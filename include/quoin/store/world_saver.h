@@ -43,7 +43,7 @@ struct WorldView {
 /// Threads:  as the scene.
 class WorldSaver {
  public:
-  /// Of a scene that the world does not hold yet: the first `save` adds it to what the world has.
+  /// Of a scene for a world that holds none yet: the first `save` writes all of it.
   WorldSaver();
   WorldSaver(WorldSaver&&) noexcept;
   WorldSaver& operator=(WorldSaver&&) noexcept;
@@ -52,7 +52,7 @@ class WorldSaver {
   /// Saves what changed, all of it in one go; returns at once. Chunks are shared with the scene, not copied.
   /// `more`: is saved with it, a game's own values for one.
   /// Errors: InvalidArgument, and nothing is saved: voxels of types that are not registered, numbers that are not
-  ///         finite, an instance whose grid is not there, a world with other types. Of writing: see WorldStore::save.
+  ///         finite, an instance whose grid is not there; the first time, a world that holds a scene or other types. Of writing: see WorldStore::save.
   /// Cost:   O(what changed); the first time O(chunks).
   /// Requires: the same world and scene (or a snapshot of it) each time; the world is open for writing.
   Result<SaveTicket> save(WorldStore& world, const Scene& scene, WorldChanges more = {},

@@ -95,7 +95,7 @@ struct WorldStats {
 /// Files:   beside NAME there are NAME-wal, NAME-shm and NAME-lock while it is written, of which the first belongs to
 ///          it: after a crash it holds what was saved last. On network file systems there is no -wal; readers then wait
 ///          for writers.
-/// Requires: no other code of this process opens and closes the file while it is open here: that would end its locks.
+/// Requires: nothing but Quoin opens and closes the file in this process while it is open here: that would end its locks.
 /// Lifetime: moving it is cheap; it waits for its saves when it ends.
 class WorldStore {
  public:
@@ -120,9 +120,9 @@ class WorldStore {
   [[nodiscard]] Result<std::vector<IVec3>> chunks(std::uint32_t grid, std::uint8_t level, const IBox& box) const;
   /// The same of a whole level.
   [[nodiscard]] Result<std::vector<IVec3>> chunks(std::uint32_t grid, std::uint8_t level) const;
-  /// The types of its voxels. Errors: BadFormat where one is damaged; CannotRead.
+  /// The types of its voxels; those that are damaged are magenta ones of other names. Errors: CannotRead.
   [[nodiscard]] Result<VoxelRegistry> types() const;
-  /// Its grids by their numbers. Errors: as `types`.
+  /// Its grids by their numbers; those that are damaged are nameless. Errors: as `types`.
   [[nodiscard]] Result<std::map<std::uint32_t, WorldGrid>> grids() const;
   /// A number for a new grid, which no grid had before, and which no other call returns.
   [[nodiscard]] std::uint32_t next_grid();
@@ -134,7 +134,7 @@ class WorldStore {
   /// Saves, on the world's own thread; returns at once. `on_saved` is called there once it is on disk, or when it
   /// failed; it must not call `wait` or `flush`. What failed is kept in memory, read by `load_chunk`, and tried again
   /// with the next save or `flush`.
-  /// Errors: InvalidArgument, and nothing is saved: chunks with types, or of grids, that were never put; voxels' data
+  /// Errors: InvalidArgument, and nothing is saved: types with fewer state bits than before; chunks with types, or of grids, that were never put; voxels' data
   ///         with more state bits than their type has, or more than 64 MiB in one chunk; a value of more.
   /// Requires: open for writing.
   Result<SaveTicket> save(WorldChanges changes, std::function<void(const Status&)> on_saved = {});

@@ -47,7 +47,9 @@ FoundParts::FoundParts() {
 
 void FoundParts::take(const Part& part) {
   if (part.key.kind == part::kWorld) return;  // of the file that it is in
-  if (!check_part(part.key, part.body)) {
+  const bool is_named = std::holds_alternative<std::string>(part.key.id);
+  if ((!is_named && (number_of(part.key) < 0 || number_of(part.key) > kMaxPartNumber)) ||
+      !check_part(part.key, part.body)) {
     lost_.push_back(name_of(part.key) + " is no part of that kind");
     return;
   }

@@ -65,6 +65,8 @@ class ReadProgress {
 Result<WorldSummary> summarize(const std::filesystem::path& path, const Progress& progress) {
   auto reader = open_reader(path);
   if (!reader) return reader.error();
+  // All of one moment.
+  if (auto begun = reader->connection().run("BEGIN"); !begun) return begun.error();
   const auto rules = read_rules(*reader);
   if (!rules) return rules.error();
   WorldSummary summary;
@@ -112,6 +114,8 @@ class Check {
       : reader_(reader), reading_(progress, path) {}
 
   Result<WorldCheck> run() {
+    // All of one moment: others may write it meanwhile.
+    if (auto begun = reader_.connection().run("BEGIN"); !begun) return begun.error();
     auto rules = read_rules(reader_);
     if (rules) {
       rules_ = std::move(*rules);
@@ -202,8 +206,7 @@ Result<std::uint64_t> back_up(const std::filesystem::path& from, const std::file
   }
   const auto lock = WorldLock::take(to);
   if (!lock) return with_path(Result<std::uint64_t>(lock.error()), to);
-  const std::filesystem::path fresh = to.string() + "-new";
-  remove_database(fresh);
+  const std::filesystem::path fresh = fresh_name(to);
   const Status done = [&]() -> Status {
     auto reader = with_path(open_reader(from), from);
     if (!reader) return reader.error();
@@ -227,14 +230,15 @@ Result<std::uint64_t> back_up(const std::filesystem::path& from, const std::file
   return file_bytes(to);
 }
 
-Status compact(const std::filesystem::path& path) {
+Status compact(const std::filesystem::path& named) {
+  const std::filesystem::path path = follow_links(named);
   const auto lock = WorldLock::take(path);
   if (!lock) return lock.error();
   auto connection = Connection::open(path.string(), Connection::Mode::Write);
   if (!connection) return connection.error();
   if (auto done = check_schema(*connection); !done) return done;
   if (!end_writing(*connection)) return make_error(ErrorCode::CannotWrite, "another program reads it");
-  if (auto done = connection->run("VACUUM"); !done) return done;
+  if (auto done = connection->run("PRAGMA temp_store=FILE; VACUUM"); !done) return done;
   return connection->close();
 }
 

@@ -198,7 +198,11 @@ Result<std::filesystem::path> replace(const std::filesystem::path& fresh, const 
   if (!backup) return backup.error();
   const std::filesystem::path kept = FileBackup::name_for(path, FileBackup::Older::Kept);
   if (auto done = backup->keep(); !done) return done.error();
-  // The log goes before the new world comes, which must not find it.
+  // From here on the damaged world has the other name alone, so that no crash leaves it without its log; the new one
+  // must not find that.
+  std::error_code removed;
+  std::filesystem::remove(path, removed);
+  if (removed) return make_error(ErrorCode::CannotWrite, removed.message());
   for (const char* suffix : {"-wal", "-journal"}) {
     std::error_code error;
     const std::filesystem::path log = path.string() + suffix;
@@ -228,8 +232,7 @@ Result<WorldRepair> repair_world(const std::filesystem::path& from, const std::f
   if (!is_in_place && std::filesystem::exists(std::filesystem::symlink_status(target, error))) {
     return fail(make_error(ErrorCode::CannotWrite, "there is a file of that name"), to);
   }
-  const std::filesystem::path fresh = target.string() + "-new";
-  remove_database(fresh);
+  const std::filesystem::path fresh = fresh_name(target);
   WorldRepair repair;
   auto check = Repair(from, fresh, progress).run();
   Status done = check ? Status() : Status(check.error());

@@ -154,7 +154,7 @@ Result<Connection> Connection::open(const std::string& path, Mode mode, const ch
   int flags = SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE | SQLITE_OPEN_URI;
   flags |= mode == Mode::Read || mode == Mode::ReadImmutable ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE;
   if (mode == Mode::Create) flags |= SQLITE_OPEN_CREATE;
-  std::string uri = "file:";
+  std::string uri = path.starts_with("//") ? "file://" : "file:";
   for (const char c : path) {
     constexpr const char* kHex = "0123456789abcdef";
     const auto byte = static_cast<unsigned char>(c);

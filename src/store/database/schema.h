@@ -73,6 +73,9 @@ struct Part {
   std::span<const std::byte> body;
 };
 
+/// The greatest number of a part: far more than there can be, and safe to count on from.
+inline constexpr std::int64_t kMaxPartNumber = std::int64_t{1} << 53;
+
 /// Kinds of parts.
 namespace part {
 inline constexpr const char* kType = "type";

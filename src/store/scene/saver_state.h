@@ -45,6 +45,8 @@ struct SavedGrid {
   ChangeCursor voxels;
   ChangeCursor data;
   ChangeCursor densities;
+  std::vector<IVec3> unread;    ///< chunks that are damaged: the scene lacks them, and they stay
+  bool is_partly_read = false;  ///< there may be others that the scene lacks
 };
 
 /// How much of a scene a world has.
@@ -56,6 +58,7 @@ struct SaverState {
   Numbers<SceneGroup> groups;
   Numbers<SceneLayer> layers;
   std::vector<Lamp> lamps;
+  std::vector<std::int64_t> lamp_numbers;  ///< that the world has
   WorldView view;
   std::size_t saved_cameras = 0;
   bool is_view_new = false;

@@ -1,3 +1,4 @@
+#include <string>
 #include <utility>
 
 #include <quoin/store/world_saver.h>
@@ -13,6 +14,13 @@ Result<LoadedScene> load(const WorldStore& world, const LoadOptions& options, Th
                          const Progress& progress) {
   auto loaded = load_world(world, options, threads, progress);
   if (!loaded) return loaded.error();
+  const auto values = world.value_names();
+  if (!values) return values.error();
+  if (!values->empty()) {
+    loaded->loaded.warnings.push_back("a game keeps " + std::to_string(values->size()) +
+                                      (values->size() == 1 ? " value" : " values") +
+                                      " in it, which no other file holds (quoin world backup copies all)");
+  }
   return std::move(loaded->loaded);
 }
 

@@ -22,8 +22,6 @@ namespace {
 
 // Lines of damage: of a whole world that is broken nobody reads more.
 constexpr std::size_t kMaxLines = 20;
-// As scene files.
-constexpr std::int64_t kMaxLamps = std::int64_t{1} << 22;
 
 /// Puts a world's parts and chunks into a scene.
 class Load {
@@ -68,11 +66,15 @@ class Load {
     grid.pivot = header.pivot;
     grid.canvas = header.canvas;
     grid.field = DensityGrid(header.band);
+    SavedGrid saved;
+    saved.number = number;
+    saved.header = header;
     bool is_cancelled = false;
     Status read =
         WorldParts::each_chunk(world_, number, 0, threads, [&](const ChunkPlace& place, Result<StoredChunk> chunk) {
           if (!chunk) {
             add_line(chunk.error().message);
+            saved.unread.push_back(place.chunk);
             return true;
           }
           if (chunk->voxels.uniform() != kAir) grid.grid.put_chunk(place.chunk, std::move(chunk->voxels));
@@ -84,13 +86,12 @@ class Load {
     if (!read) {
       // Where the tables themselves are damaged, what was read until there is kept.
       if (read.error().code != ErrorCode::BadFormat) return read;
+      saved.is_partly_read = true;
       add_line("grid " + std::to_string(number) + ": not all could be read: " + read.error().message);
     }
     const GridHandle handle = scene_.add_grid(std::move(grid));
     handles_[number] = handle;
-    SavedGrid& saved = state_.grids[handle];
-    saved.number = number;
-    saved.header = header;
+    state_.grids.emplace(handle, std::move(saved));
     return {};
   }
 
@@ -100,8 +101,10 @@ class Load {
     return WorldParts::each(world_, kind, [&](const Part& part, bool is_sound) {
       const auto* const number = std::get_if<std::int64_t>(&part.key.id);
       const std::string name = name_of(part.key);
-      if (number != nullptr) last_[kind] = std::max(last_[kind], *number);
-      if (!is_sound || number == nullptr) {
+      const bool is_number = number != nullptr && *number >= 0 && *number <= kMaxPartNumber;
+      if (is_number) last_[kind] = std::max(last_[kind], *number);
+      if (is_number && kind == std::string_view(part::kLamp)) lamp_numbers_.push_back(*number);
+      if (!is_sound || !is_number) {
         add_line(name + " is damaged");
         return;
       }
@@ -182,9 +185,11 @@ class Load {
     state_.groups.next = after(part::kGroup);
     state_.layers.next = after(part::kLayer);
     state_.lamps = scene_.lamps;
-    const auto lamps = static_cast<std::size_t>(std::clamp<std::int64_t>(after(part::kLamp), 0, kMaxLamps));
-    state_.owes_lamps = lamps != scene_.lamps.size();
-    state_.lamps.resize(std::max(lamps, scene_.lamps.size()));
+    for (std::size_t i = 0; i < lamp_numbers_.size(); ++i) {
+      state_.owes_lamps |= lamp_numbers_[i] != static_cast<std::int64_t>(i);
+    }
+    state_.owes_lamps |= lamp_numbers_.size() != scene_.lamps.size();
+    state_.lamp_numbers = std::move(lamp_numbers_);
     state_.view = {loaded_.sun, loaded_.camera, loaded_.cameras};
     state_.saved_cameras = loaded_.cameras.size();
     state_.is_begun = true;
@@ -198,6 +203,7 @@ class Load {
   std::map<std::int64_t, LayerHandle> layers_;
   std::map<std::int64_t, GroupHandle> groups_;
   std::map<std::string, std::int64_t> last_;  // of each kind's numbers
+  std::vector<std::int64_t> lamp_numbers_;
   std::size_t lines_ = 0;
   std::size_t chunks_ = 0;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 #include <set>
 #include <string>
 #include <utility>
@@ -76,6 +77,7 @@ class Save {
   Status put_types() {
     const TypeChanges changed = scene_.types.changes_since(state_.types);
     if (!state_.is_begun) {
+      if (auto empty = check_empty(); !empty) return empty;
       const auto held = world_.types();
       if (!held) return held.error();
       for (std::size_t type = 1; type < held->size(); ++type) {
@@ -89,6 +91,17 @@ class Save {
     if (changed.all) changes_.put_types(scene_.types);
     for (const TypeChange& change : changed.items) changes_.put_type(change.type, scene_.types[change.type]);
     return {};
+  }
+
+  // A scene that the world has is not to be mixed with this one.
+  Status check_empty() const {
+    bool is_empty = true;
+    for (const char* const kind : {part::kGrid, part::kInstance, part::kGroup, part::kLayer, part::kLamp}) {
+      const Status read = WorldParts::each(world_, kind, [&](const Part&, bool) { is_empty = false; });
+      if (!read) return read;
+    }
+    if (is_empty) return {};
+    return make_error(ErrorCode::InvalidArgument, "the world holds a scene already, which load_world reads");
   }
 
   // All that there is, and all that there was.
@@ -200,10 +213,12 @@ class Save {
     if (is_all) {
       for (const IVec3 chunk : grid.grid.chunks()) changed.insert(chunk);
       for (const IVec3 chunk : grid.field.chunks()) changed.insert(chunk);
-      if (!is_new) {  // what was emptied meanwhile
+      if (!is_new && !saved.is_partly_read) {  // what was emptied meanwhile, but for what was never read
         const auto held = world_.chunks(saved.number, 0);
         if (!held) return held.error();
-        changed.insert(held->begin(), held->end());
+        ChunkSet emptied(held->begin(), held->end(), kBefore);
+        for (const IVec3 chunk : saved.unread) emptied.erase(chunk);
+        changed.merge(emptied);
       }
     }
     for (const IVec3 chunk : changed) {
@@ -221,9 +236,11 @@ class Save {
       if (!state_.owes_all && !state_.owes_lamps && i < state_.lamps.size() && state_.lamps[i] == now[i]) continue;
       WorldParts::put(changes_, part::kLamp, static_cast<std::int64_t>(i), text_of(now[i]));
     }
-    for (std::size_t i = now.size(); i < state_.lamps.size(); ++i) {
-      remove(part::kLamp, static_cast<std::int64_t>(i));
+    for (const std::int64_t number : state_.lamp_numbers) {
+      if (number < 0 || number >= static_cast<std::int64_t>(now.size())) remove(part::kLamp, number);
     }
+    state_.lamp_numbers.resize(now.size());
+    std::iota(state_.lamp_numbers.begin(), state_.lamp_numbers.end(), 0);
     state_.lamps = now;
     state_.owes_lamps = false;
   }

@@ -9,6 +9,7 @@
 #include <quoin/io/scene_file.h>
 #include <quoin/terrain/terrain.h>
 
+#include "store/database/connection.h"
 #include "store/world/world_for_tests.h"
 
 namespace quoin {
@@ -222,7 +223,11 @@ TEST(WorldSaver, GoesOnWithWhatWasLoaded) {
     EXPECT_EQ(world->stats().saved_chunks, 1U);
     wanted = text_of(scene);
   }
-  EXPECT_EQ(text_of(loaded_from(path)), wanted);
+  const auto again = load_scene(path);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(text_of(again->scene), wanted);
+  ASSERT_EQ(again->warnings.size(), 1U);
+  EXPECT_NE(again->warnings.front().find("1 value"), std::string::npos) << "which only a world keeps";
   EXPECT_TRUE(WorldStore::open(path, WorldAccess::Read)->value("time")->has_value());
 }
 
@@ -293,6 +298,41 @@ TEST(WorldSaver, CancelledLeavesNothing) {
   const auto loaded = load_scene(folder / "w.quoin", {}, {}, [](double) { return false; });
   ASSERT_FALSE(loaded);
   EXPECT_EQ(loaded.error().code, ErrorCode::Cancelled);
+}
+
+TEST(WorldSaver, WhatIsDamagedIsNotOverwritten) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  ASSERT_TRUE(save_scene(rich_scene(), path));
+  {  // the last byte of a chunk's body
+    auto connection = store::Connection::open(path.string(), store::Connection::Mode::Write);
+    ASSERT_TRUE(connection);
+    ASSERT_TRUE(
+        connection->run("UPDATE chunks SET body = substr(body, 1, length(body) - 1) || x'00' WHERE key IN (SELECT key "
+                        "FROM chunks LIMIT 1)"));
+  }
+  auto world = WorldStore::open(path, WorldAccess::Write);
+  auto loaded = load_world(*world);
+  ASSERT_TRUE(loaded);
+  ASSERT_EQ(loaded->loaded.warnings.size(), 1U);
+  Scene& scene = loaded->loaded.scene;
+  const InstanceHandle instance = scene.instances().handles().front();
+  scene.edit(instance).position.x = std::nan("");
+  ASSERT_FALSE(loaded->saver.save(*world, scene)) << "after which all is saved";
+  scene.edit(instance).position.x = 1.0;
+  ASSERT_TRUE(loaded->saver.save(*world, scene));
+  ASSERT_TRUE(world->flush());
+  EXPECT_EQ(load_world(*world)->loaded.warnings.size(), 1U) << "it is damaged still, not air";
+}
+
+TEST(WorldSaver, ANewSceneIsNotMixedWithOneThatIsThere) {
+  const WorldFolder folder;
+  Session session(folder / "w.quoin");
+  session.save(rich_scene());
+  WorldSaver saver;
+  const auto refused = saver.save(session.world(), rich_scene());
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("load_world"), std::string::npos);
 }
 
 }  // namespace

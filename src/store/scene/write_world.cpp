@@ -27,8 +27,10 @@ Status clear_log(const std::filesystem::path& path) {
   if (is_world_format(*beginning)) {
     auto connection = Connection::open(path.string(), Connection::Mode::Write);
     if (!connection) return connection.error();
-    // A world that cannot be read has a log that cannot be either.
-    if (check_schema(*connection)) {
+    // A world that is damaged beyond reading has a log that is of no use either.
+    const Status sound = check_schema(*connection);
+    if (!sound && sound.error().code != ErrorCode::BadFormat) return sound;
+    if (sound) {
       if (!end_writing(*connection)) return make_error(ErrorCode::CannotWrite, "another program reads it");
       if (auto done = connection->close(); !done) return done;
     }
@@ -40,7 +42,7 @@ Status clear_log(const std::filesystem::path& path) {
 /// A world that is made beside the name that it is to have; without `put_in_place` nothing is left of it.
 class FreshWorld {
  public:
-  explicit FreshWorld(std::filesystem::path path) : path_(std::move(path)), fresh_(path_.string() + "-new") {}
+  explicit FreshWorld(std::filesystem::path path) : path_(std::move(path)), fresh_(fresh_name(path_)) {}
   FreshWorld(const FreshWorld&) = delete;
   FreshWorld& operator=(const FreshWorld&) = delete;
   ~FreshWorld() { remove_database(fresh_); }
@@ -49,7 +51,6 @@ class FreshWorld {
     auto lock = WorldLock::take(path_);
     if (!lock) return lock.error();
     lock_ = std::move(*lock);
-    remove_database(fresh_);
     return {};
   }
   [[nodiscard]] const std::filesystem::path& fresh() const { return fresh_; }

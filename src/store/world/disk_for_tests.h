@@ -258,7 +258,7 @@ class TestDisk {
     const Bytes& content = handle.file->content;
     const auto begin = std::min(static_cast<std::size_t>(offset), content.size());
     const std::size_t there = std::min(content.size() - begin, static_cast<std::size_t>(count));
-    std::memcpy(out, content.data() + begin, there);
+    if (there != 0) std::memcpy(out, content.data() + begin, there);
     if (there == static_cast<std::size_t>(count)) return SQLITE_OK;
     std::memset(static_cast<char*>(out) + there, 0, static_cast<std::size_t>(count) - there);
     return SQLITE_IOERR_SHORT_READ;

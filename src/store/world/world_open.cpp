@@ -4,12 +4,15 @@
 #include <stdio.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
+#include <string>
 #include <system_error>
 #include <utility>
 
 #include "io/whole_file.h"
 #include "store/database/schema.h"
+#include "store/database/world_lock.h"
 
 namespace quoin::store {
 
@@ -27,6 +30,15 @@ Status sync_file(const std::filesystem::path& path) {
   return done ? Status() : Status(failed(number));
 }
 
+Status roll_back(const std::filesystem::path& path) {
+  const auto lock = WorldLock::take(follow_links(path));
+  if (!lock) return lock.error();
+  auto connection = Connection::open(path.string(), Connection::Mode::Write);
+  if (!connection) return connection.error();
+  if (auto done = check_schema(*connection); !done) return done;
+  return connection->close();
+}
+
 }  // namespace
 
 Status begin_writing(Connection& connection, bool is_network) {
@@ -34,7 +46,11 @@ Status begin_writing(Connection& connection, bool is_network) {
   // the journal vanishes, is to be synced too; so also where the log begins: a journal that came back after a power cut
   // would have the database forget that there is one.
   if (auto done = connection.run("PRAGMA synchronous=EXTRA"); !done) return done;
-  if (is_network) return {};
+  if (is_network) {  // of another machine it may still have one
+    const auto mode = connection.text("PRAGMA journal_mode=DELETE");
+    if (!mode) return mode.error();
+    return *mode == "delete" ? Status() : Status(make_error(ErrorCode::CannotWrite, "another program reads it"));
+  }
   const auto mode = connection.text("PRAGMA journal_mode=WAL");
   if (!mode) return mode.error();
   return *mode == "wal" ? connection.run("PRAGMA synchronous=FULL") : Status();
@@ -51,6 +67,14 @@ Result<WorldReader> open_reader(const std::filesystem::path& path, const char* v
   if (!connection) return connection.error();
   auto sound = check_schema(*connection);
   if (sound) return WorldReader(std::move(*connection));
+  // A transaction that a crash cut off in rollback mode is undone by whoever may write.
+  if (sound.error().code == ErrorCode::CannotWrite && vfs == nullptr) {
+    if (auto undone = roll_back(path); !undone) return undone.error();
+    auto again = Connection::open(path.string(), Connection::Mode::Read);
+    if (!again) return again.error();
+    if (auto done = check_schema(*again); !done) return done.error();
+    return WorldReader(std::move(*again));
+  }
   // A folder that nobody can write to has no place for the memory that readers share; then there are no writers either.
   const std::filesystem::path folder = path.parent_path();
   std::error_code error;
@@ -72,6 +96,12 @@ void remove_database(const std::filesystem::path& path) {
   std::error_code ignored;
   std::filesystem::remove(path, ignored);
   remove_database_log(path);
+}
+
+std::filesystem::path fresh_name(const std::filesystem::path& world) {
+  static std::atomic<unsigned> counter{0};
+  return world.parent_path() /
+         (".quoin-world-" + std::to_string(::getpid()) + "-" + std::to_string(counter++) + ".tmp");
 }
 
 Status move_in_place(const std::filesystem::path& from, const std::filesystem::path& to, Existing existing) {

@@ -19,6 +19,9 @@ void remove_database_log(const std::filesystem::path& path);
 /// A database, and what lies beside it.
 void remove_database(const std::filesystem::path& path);
 
+/// A name beside a world for one that is being made, which nobody else uses.
+[[nodiscard]] std::filesystem::path fresh_name(const std::filesystem::path& world);
+
 enum class Existing : std::uint8_t { Refused, Replaced };
 /// Gives a closed database another name, at which it is whole after any power cut, or is not. Errors: CannotWrite.
 [[nodiscard]] Status move_in_place(const std::filesystem::path& from, const std::filesystem::path& to,

@@ -78,14 +78,28 @@ Result<std::optional<std::int64_t>> WorldReader::region_id(const RegionPlace& pl
 }
 
 Result<std::optional<std::vector<std::byte>>> WorldReader::chunk_body(const ChunkPlace& place) {
-  const auto region = region_id(region_of(place));
+  const RegionPlace wanted = region_of(place);
+  const auto known = known_regions_.find(wanted);
+  const bool was_known = known != known_regions_.end();
+  const std::int64_t before = was_known ? known->second : -1;
+  auto body = body_in_region(wanted, place.chunk);
+  if (!body || *body || !was_known) return body;
+  // The grid may have gone and come again, with another region.
+  known_regions_.erase(wanted);
+  const auto now = region_id(wanted);
+  if (!now) return now.error();
+  return *now && **now != before ? body_in_region(wanted, place.chunk) : body;
+}
+
+Result<std::optional<std::vector<std::byte>>> WorldReader::body_in_region(const RegionPlace& place, IVec3 chunk) {
+  const auto region = region_id(place);
   if (!region) return region.error();
   if (!*region) return std::optional<std::vector<std::byte>>();
   const auto statement = ready(chunk_, kSelectChunk);
   if (!statement) return statement.error();
   Statement& select = **statement;
   const StatementScope scope(select);
-  select.bind(0, key_of(**region, place.chunk));
+  select.bind(0, key_of(**region, chunk));
   const auto row = select.step();
   if (!row) return row.error();
   if (!*row) return std::optional<std::vector<std::byte>>();

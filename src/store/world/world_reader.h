@@ -42,6 +42,7 @@ class WorldReader {
   };
   /// Prepares a statement the first time.
   [[nodiscard]] Result<Statement*> ready(Statement& statement, const char* sql);
+  [[nodiscard]] Result<std::optional<std::vector<std::byte>>> body_in_region(const RegionPlace& place, IVec3 chunk);
   [[nodiscard]] Result<std::optional<std::int64_t>> region_id(const RegionPlace& place);
   /// The regions of a grid and level that meet a box of regions.
   [[nodiscard]] Result<std::vector<Region>> find_regions(std::uint32_t grid, std::uint8_t level, const IBox& box);
@@ -54,7 +55,8 @@ class WorldReader {
   Statement bodies_;
   Statement part_;
   Statement parts_;
-  std::map<RegionPlace, std::int64_t> known_regions_;  // an id is never another region's
+  std::map<RegionPlace, std::int64_t>
+      known_regions_;  // an id is never another region's, though a region may get another
 };
 
 /// A part of a row whose columns are id, revision, sum, body; nothing where they are of other types.

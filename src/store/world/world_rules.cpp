@@ -10,6 +10,8 @@ namespace quoin::store {
 
 namespace {
 
+// There is always a number after it.
+constexpr std::int64_t kMaxGrid = 0xFFFF'FFFE;
 constexpr std::size_t kMaxValueBytes = std::size_t{64} << 20;
 
 // Types up to a number, those that are lost in between.
@@ -88,9 +90,15 @@ Result<WorldRules> WorldRules::after(const ChangeSet& changes) const {
       if (*number > static_cast<std::int64_t>(rules.types.size())) {
         return make_error(ErrorCode::InvalidArgument, name_of(key) + " is put before those below it");
       }
+      if (*number < static_cast<std::int64_t>(rules.types.size()) &&
+          type->state_bits < rules.types[static_cast<VoxelType>(*number)].state_bits) {
+        return make_error(ErrorCode::InvalidArgument, name_of(key) + " may not have fewer state bits than before");
+      }
       if (auto done = put_type(rules.types, *number, *type); !done) return done.error();
     }
     if (key.kind == part::kGrid && number != nullptr) {
+      if (*number < 0 || *number > kMaxGrid)
+        return make_error(ErrorCode::InvalidArgument, name_of(key) + ": no number");
       const auto grid_number = static_cast<std::uint32_t>(*number);
       if (!body) {
         rules.grids.erase(grid_number);
@@ -125,7 +133,7 @@ Result<WorldRules> read_rules(WorldReader& reader) {
   if (!types) return types.error();
   const Status grids = reader.each_part(part::kGrid, [&](const Part& part, bool is_sound) {
     const auto* const number = std::get_if<std::int64_t>(&part.key.id);
-    if (number == nullptr || *number < 0 || *number > std::int64_t{0xFFFFFFFF}) {
+    if (number == nullptr || *number < 0 || *number > kMaxGrid) {
       rules.damage.push_back(name_of(part.key) + " is none");
       return;
     }

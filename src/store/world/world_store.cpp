@@ -1,5 +1,6 @@
 #include <quoin/store/world_store.h>
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
+#include "io/held_files.h"
 #include "io/whole_file.h"
 #include "io/world_format.h"
 #include "store/chunk/chunk_body.h"
@@ -29,6 +31,19 @@ namespace quoin {
 namespace {
 
 using namespace store;
+
+/// Which file a name leads to.
+struct FileIdentity {
+  dev_t device = 0;
+  ino_t number = 0;
+  bool operator==(const FileIdentity&) const = default;
+
+  static std::optional<FileIdentity> of(const std::filesystem::path& path) {
+    struct stat info {};
+    if (::stat(path.c_str(), &info) != 0) return std::nullopt;
+    return FileIdentity{info.st_dev, info.st_ino};
+  }
+};
 
 /// What one thread reads with.
 struct ReadKit {
@@ -62,17 +77,43 @@ Status make_database(const std::filesystem::path& path, const char* vfs) {
 }  // namespace
 
 struct WorldStore::Impl {
+  Impl() = default;
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+  ~Impl() {
+    // Readers first: the last connection of all clears the log away, and it is to be the one that may. Not under the
+    // lock, which what is called back when the last saves are done may want.
+    std::vector<std::unique_ptr<ReadKit>> readers;
+    {
+      const std::scoped_lock guard(mutex);
+      readers.swap(idle);
+    }
+    readers.clear();
+    writer.reset();
+  }
+
   std::filesystem::path path;
+  HeldFile held;                         // ends after all connections
+  std::optional<FileIdentity> identity;  // of the file that was opened
   const char* vfs = nullptr;
   WorldLock lock;
   mutable std::mutex mutex;  // of what follows
   mutable std::vector<std::unique_ptr<ReadKit>> idle;
   mutable std::shared_ptr<const WorldRules> rules;
   std::uint32_t next_grid = 0;
+  std::uint32_t saved_next_grid = 0;
   std::unique_ptr<WorldWriter> writer;  // null where it is only read
   std::vector<std::byte> in_memory;     // the database itself, where it is no file
 
+  void hold() {
+    held = HeldFile(path);
+    identity = FileIdentity::of(path);
+  }
   Result<std::unique_ptr<ReadKit>> take() const {
+    // A log that belongs to another file of that name must not be read with this one.
+    if (identity && FileIdentity::of(path) != identity) {
+      return make_error(ErrorCode::CannotRead, "another file took its place: open it again", path.string());
+    }
     {
       const std::scoped_lock guard(mutex);
       if (!idle.empty()) {
@@ -114,19 +155,19 @@ struct WorldStore::Impl {
     rules = std::move(shared);
   }
   Result<StoredChunk> decode(ReadKit& kit, const ChunkPlace& place, std::span<const std::byte> body) const {
-    auto chunk = decode_with(kit, place, body, *current_rules());
+    auto chunk = decode_with(kit.decoder, place, body, *current_rules());
     if (chunk || writer != nullptr) return chunk;
     // Another process may have put types and grids since.
     auto now = read_rules(kit.reader);
     if (!now) return chunk;
     set_rules(std::move(*now));
-    return decode_with(kit, place, body, *current_rules());
+    return decode_with(kit.decoder, place, body, *current_rules());
   }
-  static Result<StoredChunk> decode_with(ReadKit& kit, const ChunkPlace& place, std::span<const std::byte> body,
-                                         const WorldRules& rules) {
+  static Result<StoredChunk> decode_with(ChunkDecoder& decoder, const ChunkPlace& place,
+                                         std::span<const std::byte> body, const WorldRules& rules) {
     const auto grid = rules.grids.find(place.grid);
     const float band = grid == rules.grids.end() ? WorldGrid{}.band : grid->second.band;
-    auto chunk = kit.decoder.decode(place, body, ChunkLimits{&rules.types, band});
+    auto chunk = decoder.decode(place, body, ChunkLimits{&rules.types, band});
     if (!chunk) return make_error(chunk.error().code, about(place) + ": " + chunk.error().message);
     return chunk;
   }
@@ -135,19 +176,14 @@ struct WorldStore::Impl {
 WorldStore::WorldStore(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 WorldStore::WorldStore(WorldStore&&) noexcept = default;
 WorldStore& WorldStore::operator=(WorldStore&&) noexcept = default;
-WorldStore::~WorldStore() {
-  if (impl_ == nullptr) return;
-  // Readers first: the last connection of all clears the log away, and it is to be the one that may.
-  const std::scoped_lock guard(impl_->mutex);
-  impl_->idle.clear();
-  impl_->writer.reset();
-}
+WorldStore::~WorldStore() = default;
 
 Result<WorldStore> WorldStore::create(const std::filesystem::path& path, Threads threads) {
   return WorldParts::create(path, threads, nullptr);
 }
 
-Result<WorldStore> WorldParts::create(const std::filesystem::path& path, Threads threads, const char* vfs) {
+Result<WorldStore> WorldParts::create(const std::filesystem::path& named, Threads threads, const char* vfs) {
+  const std::filesystem::path path = vfs == nullptr ? follow_links(named) : named;
   if (vfs != nullptr) {
     if (auto done = make_database(path, vfs); !done) return with_path(Result<WorldStore>(done.error()), path);
     return open(path, WorldAccess::Write, threads, vfs);
@@ -159,8 +195,7 @@ Result<WorldStore> WorldParts::create(const std::filesystem::path& path, Threads
   {
     const auto lock = WorldLock::take(path);
     if (!lock) return with_path(Result<WorldStore>(lock.error()), path);
-    const std::filesystem::path fresh = path.string() + "-new";
-    remove_database(fresh);
+    const std::filesystem::path fresh = fresh_name(path);
     auto done = make_database(fresh, nullptr);
     if (done) {
       remove_database_log(path);  // what another file of that name left
@@ -194,8 +229,9 @@ Result<WorldStore> WorldStore::open_or_create(const std::filesystem::path& path,
   return std::filesystem::exists(path, error) ? open(path, WorldAccess::Write, threads) : create(path, threads);
 }
 
-Result<WorldStore> WorldParts::open(const std::filesystem::path& path, WorldAccess access, Threads threads,
+Result<WorldStore> WorldParts::open(const std::filesystem::path& named, WorldAccess access, Threads threads,
                                     const char* vfs) {
+  const std::filesystem::path path = vfs == nullptr ? follow_links(named) : named;
   auto impl = std::make_unique<WorldStore::Impl>();
   impl->path = path;
   impl->vfs = vfs;
@@ -204,6 +240,7 @@ Result<WorldStore> WorldParts::open(const std::filesystem::path& path, WorldAcce
     const auto beginning = read_file_beginning(path, kWorldHeaderBytes);
     if (!beginning) return beginning.error();
     if (!is_world_format(*beginning)) return fail(make_error(ErrorCode::BadFormat, "it is no world of Quoin's"));
+    impl->hold();
   }
   std::optional<Connection> writing;
   if (access == WorldAccess::Write) {
@@ -242,6 +279,7 @@ Result<WorldStore> WorldParts::begin(std::unique_ptr<WorldStore::Impl> impl, std
   if (next_grid && *next_grid) {
     impl->next_grid = std::max(impl->next_grid, static_cast<std::uint32_t>(number_from(**next_grid)));
   }
+  impl->saved_next_grid = impl->next_grid;
   impl->give_back(std::move(*kit));
   impl->set_rules(std::move(*rules));
   if (writing) impl->writer = std::make_unique<WorldWriter>(std::move(*writing), *revision, threads);
@@ -363,18 +401,15 @@ Status WorldParts::each_chunk(const WorldStore& world, std::uint32_t grid, std::
   const WorldStore::Impl& impl = *world.impl_;
   const std::shared_ptr<const WorldRules> rules = impl.current_rules();
   const unsigned workers = thread_count(threads);
-  std::vector<std::unique_ptr<ReadKit>> kits;
-  for (unsigned i = 0; i < workers + 1; ++i) {
-    auto kit = impl.take();
-    if (!kit) return kit.error();
-    kits.push_back(std::move(*kit));
-  }
+  auto kit = impl.take();
+  if (!kit) return kit.error();
+  std::vector<ChunkDecoder> decoders(workers);
   std::vector<Row> rows;
   bool is_wanted = true;
   const auto pass_on = [&] {
     parallel_for(workers, threads, [&](std::size_t worker) {
       for (std::size_t i = worker; i < rows.size(); i += workers) {
-        rows[i].chunk = WorldStore::Impl::decode_with(*kits[worker], rows[i].place, rows[i].body, *rules);
+        rows[i].chunk = WorldStore::Impl::decode_with(decoders[worker], rows[i].place, rows[i].body, *rules);
       }
     });
     for (Row& row : rows) is_wanted = is_wanted && visit(row.place, with_path(std::move(row.chunk), impl.path));
@@ -382,12 +417,12 @@ Status WorldParts::each_chunk(const WorldStore& world, std::uint32_t grid, std::
     return is_wanted;
   };
   const std::size_t slice = std::size_t{64} * workers;
-  const Status done = kits.back()->reader.each_body(grid, level, [&](const ChunkPlace& place, auto body) {
+  const Status done = (*kit)->reader.each_body(grid, level, [&](const ChunkPlace& place, auto body) {
     rows.push_back({place, {body.begin(), body.end()}});
     return rows.size() < slice || pass_on();
   });
   if (is_wanted) pass_on();
-  for (auto& kit : kits) impl.give_back(std::move(kit));
+  impl.give_back(std::move(*kit));
   return with_path(done, impl.path);
 }
 
@@ -405,8 +440,15 @@ Result<SaveTicket> WorldStore::save(WorldChanges changes, std::function<void(con
   if (WorldRules::concern(content)) {
     auto now = rules->after(content);
     if (!now) return with_path(Result<SaveTicket>(now.error()), impl_->path);
-    if (now->grids.size() > rules->grids.size()) {
-      impl_->next_grid = std::max(impl_->next_grid, now->grids.rbegin()->first + 1);
+    std::uint32_t next_after = impl_->next_grid;
+    for (const auto& [key, body] : content.parts) {
+      const auto* const number = std::get_if<std::int64_t>(&key.id);
+      const bool is_grid = key.kind == part::kGrid && body && number != nullptr;
+      if (is_grid) next_after = std::max(next_after, static_cast<std::uint32_t>(*number) + 1);
+    }
+    if (next_after > impl_->saved_next_grid) {
+      impl_->next_grid = next_after;
+      impl_->saved_next_grid = next_after;
       const std::string next = std::to_string(impl_->next_grid);
       const auto bytes = std::as_bytes(std::span(next));
       content.parts.insert_or_assign({part::kWorld, std::string("next_grid")}, PartBody(bytes.begin(), bytes.end()));

@@ -7,6 +7,8 @@
 #include <thread>
 
 #include <gtest/gtest.h>
+#include <quoin/io/file.h>
+#include <quoin/io/formats.h>
 
 #include "store/world/world_for_tests.h"
 
@@ -234,6 +236,98 @@ TEST(WorldStore, CallbacksComeOnceItIsOnDisk) {
   // The callback follows the commit, which is what flush waits for.
   for (int i = 0; i < 1000 && !was_there; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   EXPECT_TRUE(was_there);
+}
+
+// Locks of this process on a file, as the system lists them.
+int locks_on(const std::filesystem::path& path) {
+  struct stat info {};
+  if (::stat(path.c_str(), &info) != 0) return -1;
+  const std::string number = ":" + std::to_string(info.st_ino) + " ";
+  std::ifstream locks("/proc/locks");
+  int count = 0;
+  for (std::string line; std::getline(locks, line);) count += line.find(number) != std::string::npos ? 1 : 0;
+  return count;
+}
+
+TEST(WorldStore, ReadingTheFileByOtherMeansEndsNoLocks) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  WorldStore world = made(path);
+  EXPECT_FALSE(world.load_chunk({0, 0, {1, 1, 1}})->has_value());
+  const int before = locks_on(path);
+  if (before <= 0) GTEST_SKIP() << "/proc/locks does not tell of it";
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_TRUE(WorldStore::open(path, WorldAccess::Read));
+    EXPECT_TRUE(read_file_beginning(path, 64));
+    EXPECT_EQ(*detect_format(path), FileFormat::World);
+    EXPECT_EQ(read_file(path)->size(), std::filesystem::file_size(path));
+  }
+  EXPECT_EQ(locks_on(path), before);
+}
+
+TEST(WorldStore, AWriterByAnotherNameIsAWriterToo) {
+  const WorldFolder folder;
+  WorldStore world = made(folder / "w.quoin");
+  std::filesystem::create_symlink(folder / "w.quoin", folder / "link.quoin");
+  EXPECT_FALSE(WorldStore::open(folder / "link.quoin", WorldAccess::Write));
+  EXPECT_TRUE(WorldStore::open(folder / "link.quoin", WorldAccess::Read));
+}
+
+TEST(WorldStore, AGridThatComesAgainIsRead) {
+  const WorldFolder folder;
+  WorldStore world = made(folder / "w.quoin");
+  for (int round = 0; round < 3; ++round) {
+    WorldChanges changes;
+    changes.remove_grid(0);
+    changes.put_grid(0, {});
+    changes.put_chunk({0, 0, {1, 2, 3}}, {Chunk(static_cast<VoxelType>(1 + round))});
+    ASSERT_TRUE(world.save(std::move(changes)));
+    ASSERT_TRUE(world.flush());
+    const auto chunk = world.load_chunk({0, 0, {1, 2, 3}});
+    ASSERT_TRUE(chunk && chunk->has_value()) << round;
+    EXPECT_EQ((*chunk)->voxels.uniform(), static_cast<VoxelType>(1 + round));
+  }
+}
+
+TEST(WorldStore, NumbersOfGridsAreNeverGivenAgain) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  {
+    WorldStore world = made(path);
+    WorldChanges exchanged;
+    exchanged.remove_grid(0);
+    exchanged.put_grid(7, {});
+    ASSERT_TRUE(world.save(std::move(exchanged)));
+    WorldChanges gone;
+    gone.remove_grid(7);
+    ASSERT_TRUE(world.save(std::move(gone)));
+    ASSERT_TRUE(world.flush());
+  }
+  EXPECT_EQ(WorldStore::open(path, WorldAccess::Write)->next_grid(), 8U);
+}
+
+TEST(WorldStore, CallbacksMayUseTheWorldWhileItEnds) {
+  const WorldFolder folder;
+  std::uint32_t number = 0;
+  {
+    WorldStore world = made(folder / "w.quoin");
+    WorldChanges changes;
+    changes.put_chunk({0, 0, {1, 1, 1}}, {Chunk(2)});
+    ASSERT_TRUE(world.save(std::move(changes), [&](const Status&) { number = world.next_grid(); }));
+  }
+  EXPECT_EQ(number, 1U);
+}
+
+TEST(WorldStore, AWorldThatWasReplacedIsNotReadWithAnothersLog) {
+  const WorldFolder folder;
+  { WorldStore first = made(folder / "a.quoin"); }
+  { WorldStore second = made(folder / "b.quoin"); }
+  const auto reader = WorldStore::open(folder / "a.quoin", WorldAccess::Read);
+  ASSERT_TRUE(reader->load_chunk({0, 0, {}}));
+  std::filesystem::rename(folder / "b.quoin", folder / "a.quoin");
+  const auto chunk = reader->load_chunk({0, 0, {}});
+  ASSERT_FALSE(chunk);
+  EXPECT_NE(chunk.error().message.find("open it again"), std::string::npos);
 }
 
 }  // namespace

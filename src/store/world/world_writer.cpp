@@ -48,7 +48,11 @@ std::uint64_t bytes_of(const std::optional<StoredChunk>& chunk) {
 }  // namespace
 
 WorldWriter::WorldWriter(Connection connection, std::uint64_t revision, Threads threads)
-    : connection_(std::move(connection)), revision_(revision), threads_(threads), encoders_(thread_count(threads)) {
+    : connection_(std::move(connection)),
+      revision_(revision),
+      needs_version_(revision == 0),
+      threads_(threads),
+      encoders_(thread_count(threads)) {
   thread_ = std::thread([this] { run(); });
 }
 
@@ -244,6 +248,7 @@ Status WorldWriter::write(const ChangeSet& changes) {
     if (connection_.is_in_transaction()) static_cast<void>(connection_.run("ROLLBACK"));
     return outcome;
   }
+  needs_version_ = false;
   // What fails here is tried again with a later commit; the commit is safe in the log.
   if (connection_.log_pages() > kMaxLogPages) static_cast<void>(connection_.checkpoint());
   return outcome;
@@ -262,7 +267,7 @@ Status WorldWriter::write_all(const ChangeSet& changes) {
     const auto bytes = std::as_bytes(std::span(digits));
     return write_part({part::kWorld, std::string(name)}, PartBody(bytes.begin(), bytes.end()));
   };
-  if (revision_ == 1) {  // again, where no turned bit of the header can say another
+  if (needs_version_) {  // again, where no turned bit of the header can say another
     if (auto done = put("version", kSchemaVersion); !done) return done;
   }
   return put("revision", revision_);

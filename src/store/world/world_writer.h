@@ -93,6 +93,7 @@ class WorldWriter {
 
   Connection connection_;
   std::uint64_t revision_;
+  bool needs_version_;
   Threads threads_;
   std::vector<ChunkEncoder> encoders_;
   std::map<const char*, Statement> statements_;

@@ -1,0 +1,96 @@
+#include "io/held_files.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <map>
+#include <mutex>
+#include <tuple>
+#include <utility>
+
+namespace quoin {
+
+namespace {
+
+using FileNumber = std::pair<unsigned long, unsigned long>;
+
+// Locks are the process's, and so is what is known of them.
+struct Held {
+  int databases = 0;
+  int descriptor = -1;  // that was opened beside them, and stays open as long as they do
+};
+struct HeldFiles {
+  std::mutex mutex;
+  std::map<FileNumber, Held> files;
+};
+
+HeldFiles& held_files() {
+  static HeldFiles files;
+  return files;
+}
+
+FileNumber number_of(const struct stat& info) {
+  return {static_cast<unsigned long>(info.st_dev), static_cast<unsigned long>(info.st_ino)};
+}
+
+}  // namespace
+
+HeldFile::HeldFile(const std::filesystem::path& file) {
+  struct stat info {};
+  if (::stat(file.c_str(), &info) != 0) return;
+  std::tie(device_, number_) = number_of(info);
+  holds_ = true;
+  HeldFiles& held = held_files();
+  const std::scoped_lock lock(held.mutex);
+  ++held.files[{device_, number_}].databases;
+}
+
+HeldFile::HeldFile(HeldFile&& other) noexcept
+    : device_(other.device_), number_(other.number_), holds_(std::exchange(other.holds_, false)) {}
+
+HeldFile& HeldFile::operator=(HeldFile&& other) noexcept {
+  std::swap(device_, other.device_);
+  std::swap(number_, other.number_);
+  std::swap(holds_, other.holds_);
+  return *this;
+}
+
+HeldFile::~HeldFile() {
+  if (!holds_) return;
+  HeldFiles& held = held_files();
+  const std::scoped_lock lock(held.mutex);
+  const auto found = held.files.find({device_, number_});
+  if (--found->second.databases != 0) return;
+  if (found->second.descriptor >= 0) ::close(found->second.descriptor);
+  held.files.erase(found);
+}
+
+int open_for_reading(const std::filesystem::path& file) {
+  HeldFiles& held = held_files();
+  const std::scoped_lock lock(held.mutex);
+  struct stat info {};
+  const auto found = ::stat(file.c_str(), &info) == 0 ? held.files.find(number_of(info)) : held.files.end();
+  if (found != held.files.end() && found->second.descriptor >= 0) return found->second.descriptor;
+  // O_NONBLOCK: a FIFO without a writer would otherwise block before it can be refused.
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (found != held.files.end()) found->second.descriptor = descriptor;
+  return descriptor;
+}
+
+void close_after_reading(int descriptor) {
+  HeldFiles& held = held_files();
+  const std::scoped_lock lock(held.mutex);
+  struct stat info {};
+  if (::fstat(descriptor, &info) == 0) {
+    const auto found = held.files.find(number_of(info));
+    if (found != held.files.end()) {
+      // One that was opened before the database was stays open too, for ever if there is another: that is rare.
+      if (found->second.descriptor < 0) found->second.descriptor = descriptor;
+      return;
+    }
+  }
+  ::close(descriptor);
+}
+
+}  // namespace quoin
