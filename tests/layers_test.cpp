@@ -302,7 +302,7 @@ TEST(Layers, PublicHeadersIncludeNoPrivateOnes) {
 // What one source alone needs belongs in it, unless it is long enough to be read by itself.
 TEST(Layers, SmallHeadersWithoutASourceAreShared) {
   constexpr int kSmall = 60;
-  const std::set<std::string> kChoices = {"lanes.h"};  // one of several, by the flags of whoever includes it
+  const std::set<std::string> choices = {"lanes.h"};  // one of several, by the flags of whoever includes it
   std::map<std::string, std::set<fs::path>> users;
   std::vector<fs::path> small;
   for (const char* top : {"src", "apps"}) {
@@ -320,7 +320,7 @@ TEST(Layers, SmallHeadersWithoutASourceAreShared) {
   EXPECT_FALSE(small.empty());
   for (const fs::path& header : small) {
     const std::string name = header.filename().string();
-    EXPECT_TRUE(users[name].size() > 1 || kChoices.contains(name)) << header << " has one user";
+    EXPECT_TRUE(users[name].size() > 1 || choices.contains(name)) << header << " has one user";
   }
 }
 

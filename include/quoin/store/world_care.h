@@ -62,8 +62,8 @@ struct WorldRepair {
 /// Makes a new world of all that is sound in one, wherever in the file it lies and whether SQLite can still read it or
 /// not. `to`: a new file; or `from` itself, whose damaged content is then kept as NAME~ or under another name that the
 /// outcome has. Types that are lost become magenta ones.
-/// Errors: CannotRead; CannotWrite (another writer, a file `to`); Cancelled; BadFormat where nothing of a world is left;
-///         Unsupported for a world of a later version.
+/// Errors: CannotRead; CannotWrite (another writer, a file `to`); Cancelled; BadFormat where nothing of a world is
+///         left; Unsupported for a world of a later version.
 [[nodiscard]] Result<WorldRepair> repair_world(const std::filesystem::path& from, const std::filesystem::path& to,
                                                const Progress& progress = {});
 

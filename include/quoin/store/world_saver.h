@@ -52,7 +52,8 @@ class WorldSaver {
   /// Saves what changed, all of it in one go; returns at once. Chunks are shared with the scene, not copied.
   /// `more`: is saved with it, a game's own values for one.
   /// Errors: InvalidArgument, and nothing is saved: voxels of types that are not registered, numbers that are not
-  ///         finite, an instance whose grid is not there; the first time, a world that holds a scene or other types. Of writing: see WorldStore::save.
+  ///         finite, an instance whose grid is not there; the first time, a world that holds a scene or other types.
+  ///         Of writing: see WorldStore::save.
   /// Cost:   O(what changed); the first time O(chunks).
   /// Requires: the same world and scene (or a snapshot of it) each time; the world is open for writing.
   Result<SaveTicket> save(WorldStore& world, const Scene& scene, WorldChanges more = {},

@@ -95,7 +95,7 @@ struct WorldStats {
 /// Files:   beside NAME there are NAME-wal, NAME-shm and NAME-lock while it is written, of which the first belongs to
 ///          it: after a crash it holds what was saved last. On network file systems there is no -wal; readers then wait
 ///          for writers.
-/// Requires: nothing but Quoin opens and closes the file in this process while it is open here: that would end its locks.
+/// Requires: nothing but Quoin opens and closes the file in this process while it is open: that would end its locks.
 /// Lifetime: moving it is cheap; it waits for its saves when it ends.
 class WorldStore {
  public:
@@ -134,8 +134,9 @@ class WorldStore {
   /// Saves, on the world's own thread; returns at once. `on_saved` is called there once it is on disk, or when it
   /// failed; it must not call `wait` or `flush`. What failed is kept in memory, read by `load_chunk`, and tried again
   /// with the next save or `flush`.
-  /// Errors: InvalidArgument, and nothing is saved: types with fewer state bits than before; chunks with types, or of grids, that were never put; voxels' data
-  ///         with more state bits than their type has, or more than 64 MiB in one chunk; a value of more.
+  /// Errors: InvalidArgument, and nothing is saved: types with fewer state bits than before; chunks with types, or of
+  ///         grids, that were never put; voxels' data with more state bits than their type has, or more than 64 MiB in
+  ///         one chunk; a value of more.
   /// Requires: open for writing.
   Result<SaveTicket> save(WorldChanges changes, std::function<void(const Status&)> on_saved = {});
   /// Waits until that save is on disk. Errors: CannotWrite (a full disk ...): it is not, but kept.

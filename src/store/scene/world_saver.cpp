@@ -97,7 +97,7 @@ class Save {
   Status check_empty() const {
     bool is_empty = true;
     for (const char* const kind : {part::kGrid, part::kInstance, part::kGroup, part::kLayer, part::kLamp}) {
-      const Status read = WorldParts::each(world_, kind, [&](const Part&, bool) { is_empty = false; });
+      Status read = WorldParts::each(world_, kind, [&](const Part&, bool) { is_empty = false; });
       if (!read) return read;
     }
     if (is_empty) return {};

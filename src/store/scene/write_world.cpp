@@ -28,7 +28,7 @@ Status clear_log(const std::filesystem::path& path) {
     auto connection = Connection::open(path.string(), Connection::Mode::Write);
     if (!connection) return connection.error();
     // A world that is damaged beyond reading has a log that is of no use either.
-    const Status sound = check_schema(*connection);
+    Status sound = check_schema(*connection);
     if (!sound && sound.error().code != ErrorCode::BadFormat) return sound;
     if (sound) {
       if (!end_writing(*connection)) return make_error(ErrorCode::CannotWrite, "another program reads it");
