@@ -113,9 +113,9 @@ TEST(WorldSaver, SunAndCamerasAreKept) {
 }
 
 /// A world that is saved again and again, and what should be in it.
-class Session {
+class KeptWorld {
  public:
-  explicit Session(const std::filesystem::path& path) : world_(WorldStore::create(path).value()) {}
+  explicit KeptWorld(const std::filesystem::path& path) : world_(WorldStore::create(path).value()) {}
 
   void save(const Scene& scene) {
     const auto ticket = saver_.save(world_, scene);
@@ -143,61 +143,61 @@ class Session {
 
 TEST(WorldSaver, SavesWhatChangedAndNoMore) {
   const WorldFolder folder;
-  Session session(folder / "w.quoin");
+  KeptWorld kept(folder / "w.quoin");
   Scene scene = rich_scene();
-  session.save(scene);
-  EXPECT_GT(session.chunks_of_last_save(), 12U);
-  session.save(scene);
-  EXPECT_EQ(session.chunks_of_last_save(), 0U);
+  kept.save(scene);
+  EXPECT_GT(kept.chunks_of_last_save(), 12U);
+  kept.save(scene);
+  EXPECT_EQ(kept.chunks_of_last_save(), 0U);
   const GridHandle ground = scene.grids().handles().front();
   const GridHandle hill = scene.grids().handles().back();
   scene.edit(ground).grid.set({3, 3, 4}, 5);
-  session.save(scene);
-  EXPECT_EQ(session.chunks_of_last_save(), 1U);
+  kept.save(scene);
+  EXPECT_EQ(kept.chunks_of_last_save(), 1U);
   scene.edit(ground).grid.set_data({3, 3, 4}, {.state = 9});
-  session.save(scene);
-  EXPECT_EQ(session.chunks_of_last_save(), 1U);
+  kept.save(scene);
+  EXPECT_EQ(kept.chunks_of_last_save(), 1U);
   scene.edit(hill).field.edit({{0, 0, 0}, {1, 1, 1}}, [](IVec3, DensitySample) { return DensitySample{-1.0F, 3}; });
-  session.save(scene);
-  EXPECT_EQ(session.chunks_of_last_save(), 1U);
+  kept.save(scene);
+  EXPECT_EQ(kept.chunks_of_last_save(), 1U);
   // A chunk that becomes air is kept as air.
   const IVec3 emptied = scene.grids()[ground].grid.chunks().front();
   scene.edit(ground).grid.fill_box({emptied * kChunkEdge, (emptied + IVec3(1)) * kChunkEdge}, kAir);
-  session.save(scene);
-  const auto air = session.world().load_chunk({0, 0, emptied});
+  kept.save(scene);
+  const auto air = kept.world().load_chunk({0, 0, emptied});
   ASSERT_TRUE(air && air->has_value());
   EXPECT_EQ((*air)->voxels.uniform(), kAir);
 }
 
 TEST(WorldSaver, FollowsEverythingThatASceneCanDo) {
   const WorldFolder folder;
-  Session session(folder / "w.quoin");
+  KeptWorld kept(folder / "w.quoin");
   Scene scene = rich_scene();
-  session.save(scene);
+  kept.save(scene);
   const InstanceHandle instance = scene.instances().handles().front();
   scene.edit(instance).position = {-7, 8, 9};
-  session.save(scene);
+  kept.save(scene);
   ASSERT_TRUE(scene.types.add(coloured_type(99)));
   scene.types.replace(2, coloured_type(77));
-  session.save(scene);
+  kept.save(scene);
   scene.lamps.erase(scene.lamps.begin());
-  session.save(scene);
+  kept.save(scene);
   scene.lamps.push_back({.name = "third"});
-  session.save(scene);
+  kept.save(scene);
   const GroupHandle outer = scene.groups().handles().front();
   scene.remove_group(outer);
-  session.save(scene);
+  kept.save(scene);
   scene.remove_layer(scene.layers().handles().front());
-  session.save(scene);
+  kept.save(scene);
   SceneGrid ship;
   ship.grid.fill_box({{0, 0, 0}, {70, 3, 3}}, 10);
   const GridHandle ship_handle = scene.add_grid(std::move(ship));
   scene.add_instance({.name = "ship", .grid = ship_handle});
-  session.save(scene);
+  kept.save(scene);
   scene.remove_grid(scene.grids().handles().front());
-  session.save(scene);
-  EXPECT_EQ(session.world().chunks(0, 0)->size(), 0U);
-  EXPECT_EQ(session.world().grids()->size(), 2U);
+  kept.save(scene);
+  EXPECT_EQ(kept.world().chunks(0, 0)->size(), 0U);
+  EXPECT_EQ(kept.world().grids()->size(), 2U);
 }
 
 TEST(WorldSaver, GoesOnWithWhatWasLoaded) {
@@ -233,30 +233,30 @@ TEST(WorldSaver, GoesOnWithWhatWasLoaded) {
 
 TEST(WorldSaver, WhatWasRefusedIsSavedTheNextTime) {
   const WorldFolder folder;
-  Session session(folder / "w.quoin");
+  KeptWorld kept(folder / "w.quoin");
   Scene scene = rich_scene();
-  session.save(scene);
+  kept.save(scene);
   const InstanceHandle gone = scene.instances().handles().front();
   const InstanceHandle other = scene.instances().handles().back();
   scene.remove_instance(gone);
   scene.edit(scene.grids().handles().front()).grid.set({1, 1, 1}, 6);
   scene.edit(other).position.x = std::nan("");
-  const auto refused = session.saver().save(session.world(), scene);
+  const auto refused = kept.saver().save(kept.world(), scene);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
   EXPECT_NE(refused.error().message.find("instance"), std::string::npos) << refused.error().message;
   scene.edit(other).position.x = 3.0;
-  session.save(scene);
+  kept.save(scene);
 }
 
 TEST(WorldSaver, ANewSceneDoesNotFitAnotherWorldsTypes) {
   const WorldFolder folder;
-  Session session(folder / "w.quoin");
-  session.save(rich_scene());
+  KeptWorld kept(folder / "w.quoin");
+  kept.save(rich_scene());
   Scene other;
   ASSERT_TRUE(other.types.add(coloured_type(200)));
   WorldSaver saver;
-  EXPECT_FALSE(saver.save(session.world(), other));
+  EXPECT_FALSE(saver.save(kept.world(), other));
 }
 
 TEST(WorldSaver, OldWorldsAreReplacedWholeWithTheirLogs) {
@@ -327,10 +327,10 @@ TEST(WorldSaver, WhatIsDamagedIsNotOverwritten) {
 
 TEST(WorldSaver, ANewSceneIsNotMixedWithOneThatIsThere) {
   const WorldFolder folder;
-  Session session(folder / "w.quoin");
-  session.save(rich_scene());
+  KeptWorld kept(folder / "w.quoin");
+  kept.save(rich_scene());
   WorldSaver saver;
-  const auto refused = saver.save(session.world(), rich_scene());
+  const auto refused = saver.save(kept.world(), rich_scene());
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().message.find("load_world"), std::string::npos);
 }
