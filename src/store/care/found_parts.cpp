@@ -1,7 +1,7 @@
 #include "store/care/found_parts.h"
 
 #include <algorithm>
-#include <charconv>
+#include <limits>
 #include <utility>
 
 #include "store/world/part_text.h"
@@ -104,10 +104,7 @@ void FoundParts::add(const PageRecord& record) {
 std::optional<int> FoundParts::version_of(const PageRecord& record) {
   const auto part = sound_part(record);
   if (!part || part->key != PartKey{part::kWorld, std::string("version")}) return std::nullopt;
-  int version = 0;
-  const char* const digits = reinterpret_cast<const char*>(part->body.data());
-  std::from_chars(digits, digits + part->body.size(), version);
-  return version;
+  return static_cast<int>(std::min<std::uint64_t>(number_in(part->body), std::numeric_limits<int>::max()));
 }
 
 float FoundParts::band(std::uint32_t grid) const {
@@ -120,10 +117,7 @@ void FoundParts::add_grid(std::uint32_t grid) {
   const std::string name = "lost grid " + std::to_string(grid);
   lost_.push_back(name_of({part::kGrid, std::int64_t{grid}}) + ": its name, place of its pivot and band are lost");
   const WorldGrid header{.name = name};
-  const auto put = [&](const PartKey& key, const std::string& text) {
-    const auto bytes = std::as_bytes(std::span(text));
-    parts_[key] = {0, PartBody(bytes.begin(), bytes.end())};
-  };
+  const auto put = [&](const PartKey& key, const std::string& text) { parts_[key] = {0, body_of(text)}; };
   put({part::kGrid, std::int64_t{grid}}, text_of(header));
   grids_[grid] = header;
   if (placed_grids_.contains(grid)) return;
@@ -142,9 +136,7 @@ void FoundParts::add_types_up_to(VoxelType last) {
     const PartKey key{part::kType, type};
     if (parts_.contains(key)) continue;
     lost_.push_back(name_of(key) + " is lost");
-    const std::string text = text_of(lost_type(type));
-    const auto bytes = std::as_bytes(std::span(text));
-    parts_[key] = {0, PartBody(bytes.begin(), bytes.end())};
+    parts_[key] = {0, body_of(text_of(lost_type(type)))};
   }
   types_put_ = std::max(types_put_, greatest);
 }

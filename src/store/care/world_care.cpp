@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -82,8 +81,7 @@ Result<WorldSummary> summarize(const std::filesystem::path& path, const Progress
   if (auto done = count(part::kInstance, summary.instances); !done) return done.error();
   if (auto done = count(part::kValue, summary.values); !done) return done.error();
   if (const auto revision = reader->part({part::kWorld, std::string("revision")}); revision && *revision) {
-    const char* const digits = reinterpret_cast<const char*>((*revision)->data());
-    std::from_chars(digits, digits + (*revision)->size(), summary.saves);
+    summary.saves = number_in(**revision);
   }
   std::vector<std::string> damage;
   ChunkRows rows(reader->connection());

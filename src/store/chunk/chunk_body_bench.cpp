@@ -12,6 +12,8 @@
 
 #include <quoin/terrain/terrain.h>
 
+#include "store/world/terrain_chunks_for_tests.h"
+
 namespace quoin::store {
 namespace {
 
@@ -25,17 +27,6 @@ void require(bool holds, const char* what) {
   if (holds) return;
   std::fprintf(stderr, "store benchmark: %s\n", what);
   std::exit(1);
-}
-
-/// Removes and adds single voxels and small boxes, as players do.
-void edit(Chunk& chunk, VoxelType added, std::uint32_t seed) {
-  for (int i = 0; i < 40; ++i) {
-    seed = seed * 1'664'525U + 1'013'904'223U;
-    const IVec3 at{static_cast<int>(seed >> 8 & 63U), static_cast<int>(seed >> 14 & 63U),
-                   static_cast<int>(seed >> 20 & 63U)};
-    const int edge = i % 8 == 0 ? 5 : 1;
-    chunk.fill_box({at, at + IVec3{edge}}, i % 2 == 0 ? kAir : added, [](int, int, std::uint64_t) {});
-  }
 }
 
 void encode_all(Sample& sample) {
@@ -53,15 +44,9 @@ void encode_all(Sample& sample) {
 const Sample& voxels() {
   static const Sample sample = [] {
     Sample s;
-    const auto types = add_terrain_types(s.types);
-    const auto terrain = generate_terrain({.size = {16, 8, 16}}, *types);
-    std::uint32_t count = 0;
-    for (const IVec3 place : terrain->chunks()) {
-      Chunk chunk = *terrain->find_chunk(place);
-      if (chunk.uniform()) continue;
-      if (count++ % 5 == 0) edit(chunk, types->stone, count);
-      s.chunks.push_back({chunk});
-    }
+    TerrainChunks terrain(16);
+    s.types = std::move(terrain.types);
+    s.chunks = std::move(terrain.chunks);
     encode_all(s);
     return s;
   }();

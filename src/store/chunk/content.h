@@ -11,6 +11,8 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/result.h>
 
+#include "io/byte_order.h"
+
 namespace quoin::store {
 
 /// Appends a number, its lowest byte first.
@@ -24,10 +26,7 @@ void put_number(std::vector<std::byte>& out, T number) {
 
 template <class T>
 [[nodiscard]] T number_at(const std::byte* bytes) {
-  static_assert(std::is_unsigned_v<T>);
-  std::uint64_t number = 0;
-  for (std::size_t i = 0; i < sizeof(T); ++i) number |= std::to_integer<std::uint64_t>(bytes[i]) << (8 * i);
-  return static_cast<T>(number);
+  return load<T>(bytes, std::endian::little);
 }
 
 /// Appends a number, seven bits a byte, lowest first; the top bit is set in all bytes but the last.

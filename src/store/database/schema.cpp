@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 
 #include <quoin/core/assert.h>
 
@@ -100,6 +101,26 @@ IVec3 chunk_of_key(const RegionPlace& region, std::int64_t key) {
     return static_cast<int>(static_cast<std::uint32_t>(region.region[axis]) << kRegionShift | gather(code >> axis));
   };
   return {along(0), along(1), along(2)};
+}
+
+std::vector<std::byte> body_of(std::string_view text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+std::uint64_t number_in(std::span<const std::byte> digits) {
+  std::uint64_t number = 0;
+  const char* const text = reinterpret_cast<const char*>(digits.data());
+  std::from_chars(text, text + digits.size(), number);
+  return number;
+}
+
+void bind(Statement& statement, int parameter, const PartId& id) {
+  if (const auto* const number = std::get_if<std::int64_t>(&id)) {
+    statement.bind(parameter, *number);
+  } else {
+    statement.bind(parameter, std::string_view(std::get<std::string>(id)));
+  }
 }
 
 std::uint64_t sum_of(const Part& part) {

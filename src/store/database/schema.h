@@ -49,6 +49,9 @@ struct RegionPlace {
   }
 };
 
+/// All chunks that there can be.
+inline constexpr IBox kAllChunks{{-(1 << 26), -(1 << 26), -(1 << 26)}, {1 << 26, 1 << 26, 1 << 26}};
+
 [[nodiscard]] RegionPlace region_of(const ChunkPlace& place);
 [[nodiscard]] std::int64_t key_of(std::int64_t region, IVec3 chunk);
 /// The chunk that a key names in a region of that place. The upper bits of the key are not looked at.
@@ -93,6 +96,13 @@ inline constexpr const char* kValue = "value";
 /// Of the world itself: id "revision", the number of its last commit as decimal digits; id "next_grid" likewise.
 inline constexpr const char* kWorld = "world";
 }  // namespace part
+
+/// A text as the body of a part.
+[[nodiscard]] std::vector<std::byte> body_of(std::string_view text);
+/// The number whose decimal digits a body is; 0 where it is none.
+[[nodiscard]] std::uint64_t number_in(std::span<const std::byte> digits);
+/// Binds the id of a part.
+void bind(Statement& statement, int parameter, const PartId& id);
 
 /// XXH3 (64 bits) of kind, id, revision and body.
 [[nodiscard]] std::uint64_t sum_of(const Part& part);

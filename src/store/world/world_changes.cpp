@@ -79,8 +79,7 @@ void WorldParts::put(WorldChanges& changes, store::PartKey key, std::optional<Pa
 }
 
 void WorldParts::put(WorldChanges& changes, const char* kind, std::int64_t id, std::string_view text) {
-  const auto bytes = std::as_bytes(std::span(text));
-  put(changes, {kind, id}, PartBody(bytes.begin(), bytes.end()));
+  put(changes, {kind, id}, store::body_of(text));
 }
 
 void WorldParts::remove(WorldChanges& changes, const char* kind, std::int64_t id) {

@@ -172,8 +172,7 @@ Status WorldReader::find_chunks(std::uint32_t grid, std::uint8_t level, const IB
 
 Status WorldReader::each_body(std::uint32_t grid, std::uint8_t level,
                               FunctionRef<bool(const ChunkPlace&, std::span<const std::byte>)> visit) {
-  constexpr int kFar = 1 << 26;
-  const auto regions = find_regions(grid, level, {IVec3(-kFar), IVec3(kFar)});
+  const auto regions = find_regions(grid, level, kAllChunks);
   if (!regions) return regions.error();
   const auto statement = ready(bodies_, kSelectBodies);
   if (!statement) return statement.error();
@@ -214,11 +213,7 @@ Result<std::optional<std::vector<std::byte>>> WorldReader::part(const PartKey& k
   Statement& select = **statement;
   const StatementScope scope(select);
   select.bind(0, key.kind);
-  if (const auto* const number = std::get_if<std::int64_t>(&key.id)) {
-    select.bind(1, *number);
-  } else {
-    select.bind(1, std::string_view(std::get<std::string>(key.id)));
-  }
+  bind(select, 1, key.id);
   const auto row = select.step();
   if (!row) return row.error();
   if (!*row) return std::optional<std::vector<std::byte>>();

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <charconv>
 #include <mutex>
 #include <set>
 #include <string>
@@ -51,19 +50,12 @@ struct ReadKit {
   ChunkDecoder decoder;
 };
 
-std::uint64_t number_from(std::span<const std::byte> digits) {
-  std::uint64_t number = 0;
-  const char* const text = reinterpret_cast<const char*>(digits.data());
-  std::from_chars(text, text + digits.size(), number);
-  return number;
-}
-
 Result<std::uint64_t> last_revision(WorldReader& reader) {
   const auto body = reader.part({part::kWorld, std::string("revision")});
   // One that is damaged is higher than any that was: salvage may then take later rows for older ones, no more.
   if (!body)
     return body.error().code == ErrorCode::BadFormat ? std::uint64_t{1} << 48 : Result<std::uint64_t>(body.error());
-  return *body ? number_from(**body) : 0;
+  return *body ? number_in(**body) : 0;
 }
 
 Status make_database(const std::filesystem::path& path, const char* vfs) {
@@ -277,7 +269,7 @@ Result<WorldStore> WorldParts::begin(std::unique_ptr<WorldStore::Impl> impl, std
   if (!rules->grids.empty()) impl->next_grid = rules->grids.rbegin()->first + 1;
   const auto next_grid = (*kit)->reader.part({part::kWorld, std::string("next_grid")});
   if (next_grid && *next_grid) {
-    impl->next_grid = std::max(impl->next_grid, static_cast<std::uint32_t>(number_from(**next_grid)));
+    impl->next_grid = std::max(impl->next_grid, static_cast<std::uint32_t>(number_in(**next_grid)));
   }
   impl->saved_next_grid = impl->next_grid;
   impl->give_back(std::move(*kit));
@@ -322,8 +314,7 @@ Result<std::vector<IVec3>> WorldStore::chunks(std::uint32_t grid, std::uint8_t l
 }
 
 Result<std::vector<IVec3>> WorldStore::chunks(std::uint32_t grid, std::uint8_t level) const {
-  constexpr int kFar = 1 << 26;
-  return chunks(grid, level, {IVec3(-kFar), IVec3(kFar)});
+  return chunks(grid, level, kAllChunks);
 }
 
 Result<VoxelRegistry> WorldStore::types() const {
@@ -449,9 +440,8 @@ Result<SaveTicket> WorldStore::save(WorldChanges changes, std::function<void(con
     if (next_after > impl_->saved_next_grid) {
       impl_->next_grid = next_after;
       impl_->saved_next_grid = next_after;
-      const std::string next = std::to_string(impl_->next_grid);
-      const auto bytes = std::as_bytes(std::span(next));
-      content.parts.insert_or_assign({part::kWorld, std::string("next_grid")}, PartBody(bytes.begin(), bytes.end()));
+      content.parts.insert_or_assign({part::kWorld, std::string("next_grid")},
+                                     body_of(std::to_string(impl_->next_grid)));
     }
     rules = std::make_shared<const WorldRules>(std::move(*now));
   }

@@ -32,14 +32,6 @@ constexpr const char* kPutPart =
     " ON CONFLICT(kind, id) DO UPDATE SET revision=excluded.revision, sum=excluded.sum, body=excluded.body";
 constexpr const char* kDeletePart = "DELETE FROM parts WHERE kind=? AND id=?";
 
-void bind_id(Statement& statement, int parameter, const PartId& id) {
-  if (const auto* const number = std::get_if<std::int64_t>(&id)) {
-    statement.bind(parameter, *number);
-  } else {
-    statement.bind(parameter, std::string_view(std::get<std::string>(id)));
-  }
-}
-
 std::uint64_t bytes_of(const std::optional<StoredChunk>& chunk) {
   if (!chunk) return 0;
   return chunk->voxels.bytes() + (chunk->densities ? chunk->densities->bytes() : 0);
@@ -263,9 +255,7 @@ Status WorldWriter::write_all(const ChangeSet& changes) {
     if (auto done = write_part(key, body); !done) return done;
   }
   const auto put = [&](const char* name, std::uint64_t number) {
-    const std::string digits = std::to_string(number);
-    const auto bytes = std::as_bytes(std::span(digits));
-    return write_part({part::kWorld, std::string(name)}, PartBody(bytes.begin(), bytes.end()));
+    return write_part({part::kWorld, std::string(name)}, body_of(std::to_string(number)));
   };
   if (needs_version_) {  // again, where no turned bit of the header can say another
     if (auto done = put("version", kSchemaVersion); !done) return done;
@@ -369,7 +359,7 @@ Status WorldWriter::write_part(const PartKey& key, const std::optional<PartBody>
   if (!prepared) return prepared.error();
   Statement& statement = **prepared;
   statement.bind(0, std::string_view(key.kind));
-  bind_id(statement, 1, key.id);
+  bind(statement, 1, key.id);
   if (body) {
     const Part part{key, revision_, *body};
     statement.bind(2, static_cast<std::int64_t>(revision_));
