@@ -63,6 +63,7 @@ struct VoxelRecord {
   PackedBox box;
   PackedBox data;  ///< around those whose data changed, those that became another type too
   ChunkSlabs slabs;
+  bool is_edit = true;  ///< false: only loaded or unloaded
 
   /// Counts voxels of a row that changed.
   void add(int y, int z, std::uint64_t changed) {
@@ -103,10 +104,11 @@ struct VoxelRecord {
     box.unite(other.box);
     data.unite(other.data);
     slabs.add(other.slabs);
+    is_edit |= other.is_edit;
   }
   [[nodiscard]] bool has_types() const { return !box.empty(); }
   [[nodiscard]] bool has_data() const { return !data.empty(); }
-  [[nodiscard]] ChunkChange change() const { return {chunk, box.box(), neighbours, slabs}; }
+  [[nodiscard]] ChunkChange change() const { return {chunk, box.box(), neighbours, slabs, is_edit}; }
 
  private:
   static constexpr std::uint32_t kEverywhere = (std::uint32_t{1} << 27) - 1;
@@ -170,7 +172,9 @@ class ChangeReach {
   [[nodiscard]] bool is_within(int reach, int dx, int dy, int dz) const {
     return least_[static_cast<std::size_t>(Neighbourhood::index(dx, dy, dz))] <= reach;
   }
-  [[nodiscard]] DensityChange change(IVec3 chunk) const { return {chunk, box_.box(), least_}; }
+  [[nodiscard]] DensityChange change(IVec3 chunk, bool is_edit = true) const {
+    return {chunk, box_.box(), least_, is_edit};
+  }
 
   std::int64_t samples = 0;
 
@@ -191,8 +195,13 @@ struct DensityRecord {
   IVec3 chunk{0};
   ChangeReach reach;
 
-  void merge(const DensityRecord& other) { reach.add(other.reach); }
-  [[nodiscard]] DensityChange change() const { return reach.change(chunk); }
+  bool is_edit = true;  ///< as in VoxelRecord
+
+  void merge(const DensityRecord& other) {
+    reach.add(other.reach);
+    is_edit |= other.is_edit;
+  }
+  [[nodiscard]] DensityChange change() const { return reach.change(chunk, is_edit); }
 };
 
 }  // namespace quoin

@@ -17,6 +17,7 @@
 #include "grid/chunk/chunk_data.h"
 #include "grid/chunk/chunk_difference.h"
 #include "grid/chunk_table.h"
+#include "grid/loaded_chunks.h"
 #include "grid/long_box.h"
 
 namespace quoin {
@@ -30,6 +31,7 @@ struct VoxelBox {
 
 struct Grid::Impl {
   ChunkTable entries;
+  LoadedChunks loaded;
   ChangeJournal<VoxelRecord> journal;
   BoundsCache<VoxelRecord, ChunkTable, VoxelBox> bounds;
   std::int64_t voxel_count = 0;    // that are not air
@@ -63,6 +65,17 @@ struct Grid::Impl {
     slot.entry->counted = voxels;
     QUOIN_ASSERT(voxel_count >= voxels, "a grid has the voxels of its chunks");
     if (voxels == 0) entries.erase(chunk);
+  }
+
+  // Puts voxels in place that were, or now are, not loaded: whatever the chunk held or holds is told of, as no edit.
+  void replace(const IVec3& chunk, Chunk voxels, EditNotice& notice) {
+    const ChunkTable::Slot slot = entries.find_or_create(chunk);
+    VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
+    edit.add_all();
+    edit.record.is_edit = false;
+    entries.voxels_will_change(slot);
+    slot.entry->chunk = std::move(voxels);
+    finish_edit(chunk, slot, edit, notice);
   }
 
   // Calls `change(chunk, voxels, part of the box in chunk coordinates, edit)` for every chunk of a box. Chunks that are
@@ -106,7 +119,7 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, EditNotice
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
         for (int x = chunks.min.x; x < chunks.max.x; ++x) {
           const IVec3 at{x, y, z};
-          changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), notice, change);
+          if (loaded.has(at)) changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), notice, change);
           if (!goes_on(size.x * size.y * size.z)) return changed;
         }
       }
@@ -149,7 +162,7 @@ bool Grid::set(int x, int y, int z, VoxelType type) {
   const IVec3 local{x & (kChunkEdge - 1), y & (kChunkEdge - 1), z & (kChunkEdge - 1)};
   ChunkTable::Slot slot = impl_->entries.find_to_edit(at);
   if (slot.entry == nullptr) {
-    if (type == kAir || !is_inside_world(at)) return false;
+    if (type == kAir || !impl_->loaded.may_edit(at)) return false;
     slot = impl_->entries.find_or_create(at);
   }
   VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
@@ -174,7 +187,7 @@ bool Grid::set(int x, int y, int z, VoxelType type) {
 std::int64_t Grid::write_row(IVec3 row, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types) {
   const IVec3 at = chunk_of(row);
   const IVec3 local = local_of(row);
-  if (mask == 0 || !is_inside_world(at)) return 0;
+  if (mask == 0 || !impl_->loaded.may_edit(at)) return 0;
   const ChunkTable::Slot slot = impl_->entries.find_or_create(at);
   VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
   try {
@@ -241,7 +254,7 @@ std::int64_t Grid::set(std::span<const PlacedVoxel> voxels) {
       }
     };
     const bool is_air = std::all_of(next, end, [](const PlacedVoxel& each) { return each.type == kAir; });
-    if (!is_inside_world(at) || (is_air && impl().entries.find(at) == nullptr)) {
+    if (!impl().loaded.may_edit(at) || (is_air && impl().entries.find(at) == nullptr)) {
       next = end;
       continue;
     }
@@ -312,7 +325,7 @@ std::int64_t Grid::edit_rows(const IBox& wanted, FunctionRef<void(IVec3 first, s
 }
 
 std::int64_t Grid::put_chunk(IVec3 at, Chunk voxels) {
-  if (!is_inside_world(at)) return 0;
+  if (!impl().loaded.may_edit(at)) return 0;
   const ChunkEntry* present = impl().entries.find(at);
   if (present == nullptr && voxels.non_air_count() == 0) return 0;
   if (present != nullptr && present->chunk.shares_storage_with(voxels)) return 0;
@@ -325,6 +338,39 @@ std::int64_t Grid::put_chunk(IVec3 at, Chunk voxels) {
   slot.entry->chunk = std::move(voxels);
   impl().finish_edit(at, slot, edit, notice_);
   return edit.voxels;
+}
+
+void Grid::make_partial() {
+  clear();
+  impl().loaded.begin();
+}
+
+bool Grid::is_partial() const {
+  return impl().loaded.is_partial();
+}
+
+bool Grid::is_loaded(IVec3 chunk) const {
+  return impl().loaded.has(chunk);
+}
+
+bool Grid::is_loaded_around(IVec3 chunk, int distance) const {
+  return impl().loaded.has_around(chunk, distance);
+}
+
+std::vector<IVec3> Grid::loaded_chunks() const {
+  return impl().loaded.is_partial() ? impl().loaded.sorted() : chunks();
+}
+
+bool Grid::load_chunk(IVec3 chunk, Chunk voxels) {
+  if (!impl().loaded.add(chunk)) return false;
+  impl().replace(chunk, std::move(voxels), notice_);
+  return true;
+}
+
+bool Grid::unload_chunk(IVec3 chunk) {
+  if (!impl().loaded.remove(chunk)) return false;
+  impl().replace(chunk, Chunk(kAir), notice_);
+  return true;
 }
 
 void Grid::clear() {
@@ -364,6 +410,7 @@ std::size_t Grid::chunk_count() const {
 
 Neighbourhood Grid::neighbourhood(IVec3 chunk) const {
   Neighbourhood result;
+  if (!is_loaded_around(chunk)) return result;
   for (std::size_t i = 0; i < result.chunks.size(); ++i) {
     const IVec3 offset = Neighbourhood::offset(static_cast<int>(i));
     if (has_neighbour(chunk, offset)) result.chunks[i] = find_chunk(chunk + offset);
@@ -384,7 +431,7 @@ bool Grid::has_changed_since(const ChangeCursor& cursor) const {
 
 DataChanges Grid::data_changes_since(ChangeCursor& cursor) const {
   const auto tell = [](const VoxelRecord& record, std::vector<DataChange>& items) {
-    if (record.has_data()) items.push_back({record.chunk, record.data.box()});
+    if (record.has_data()) items.push_back({record.chunk, record.data.box(), record.is_edit});
   };
   return impl().journal.changes_since<DataChange>(cursor, by_chunk, tell);
 }
@@ -438,6 +485,7 @@ std::vector<IVec3> chunks_of_either(const Grid& a, const Grid& b) {
 void visit_changes(const Grid& before, const Grid& now, const GridChanges& changes,
                    FunctionRef<void(const RowChange&)> visit) {
   const auto compare = [&](IVec3 chunk, const IBox& box, const ChunkSlabs& slabs) {
+    if (!before.is_loaded(chunk) || !now.is_loaded(chunk)) return;
     visit_other_rows(before.find_chunk(chunk), now.find_chunk(chunk), chunk, box, slabs, visit);
   };
   if (!changes.all) {
@@ -456,6 +504,7 @@ void visit_data_changes(const Grid& before, const Grid& now, const DataChanges& 
     for (const DataChange& change : changes.items) chunks.push_back(change.chunk);
   }
   for (const IVec3 chunk : chunks) {
+    if (!before.is_loaded(chunk) || !now.is_loaded(chunk)) continue;
     visit_other_data(before.find_chunk(chunk), now.find_chunk(chunk),
                      [&](IVec3 local, const VoxelData& one, const VoxelData& other) {
                        visit(chunk * kChunkEdge + local, one, other);
@@ -499,7 +548,7 @@ void Grid::for_each_row(FunctionRef<void(IVec3 first, std::span<const VoxelType>
 
 std::size_t Grid::bytes() const {
   std::size_t total =
-      sizeof(Grid) + sizeof(Impl) + impl().entries.bytes() + impl().journal.bytes() + impl().bounds.bytes();
+      sizeof(Grid) + sizeof(Impl) + impl().entries.bytes() + impl().loaded.bytes() + impl().journal.bytes() + impl().bounds.bytes();
   impl().entries.for_each([&](IVec3, const ChunkEntry& entry) { total += entry.chunk.bytes() - sizeof(Chunk); });
   return total;
 }

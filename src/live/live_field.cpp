@@ -23,6 +23,7 @@ IVec3 cell_chunk(IVec3 chunk, int i) {
 }
 
 bool is_there(const DensityGrid& field, IVec3 chunk) {
+  if (!field.is_loaded_around(chunk)) return false;
   for (int i = 0; i < 8; ++i) {
     if (field.find_chunk(corner_chunk(chunk, i)) != nullptr) return true;
   }
@@ -125,9 +126,16 @@ void LiveField::begin_anew(const DensityGrid& field, LiveClock::time_point now) 
 void LiveField::follow_changes(const DensityGrid& field, const DensityChanges& changes, LiveClock::time_point now) {
   for (const DensityChange& change : changes.items) {
     bodies_.erase(change.chunk);
+    // What a loaded chunk completes was not there before, and what an unloaded one was beside goes: neither has to fit
+    // what is seen.
+    if (!change.is_edit) {
+      for (int i = 0; i < 27; ++i) see_whether_there(field, change.chunk + Neighbourhood::offset(i), false, now);
+      continue;
+    }
     for (int i = 0; i < 8; ++i) see_whether_there(field, cell_chunk(change.chunk, i), true, now);
   }
   for (const DensityChange& change : changes.items) {
+    if (!change.is_edit) continue;
     for (int i = 0; i < 27; ++i) {
       const IVec3 offset = Neighbourhood::offset(i);
       const IVec3 chunk = change.chunk + offset;

@@ -17,8 +17,12 @@ bool has_solid_first_layer(const Chunk* chunk, std::size_t axis) {
   return ChunkStorage::of(*chunk)->layer_counts[axis][0] != 0;
 }
 
+// Of a partial grid: its densities are made of its own and the 26 chunks around each.
+constexpr int kSmoothDistance = 2;
+
 // Quads belong to the chunk in which their lattice edge starts: it, or the next one along the edge, has a solid sample.
 bool can_own_smooth_quads(const Grid& grid, IVec3 chunk) {
+  if (!grid.is_loaded_around(chunk, kSmoothDistance)) return false;
   return grid.find_chunk(chunk) != nullptr || has_solid_first_layer(grid.find_chunk(chunk + IVec3{1, 0, 0}), 0) ||
          has_solid_first_layer(grid.find_chunk(chunk + IVec3{0, 1, 0}), 1) ||
          has_solid_first_layer(grid.find_chunk(chunk + IVec3{0, 0, 1}), 2);
@@ -99,10 +103,19 @@ void LiveGrid::follow_blocky(const Grid& grid, const GridChanges& changes, LiveC
     for (const auto& [chunk, state] : chunks_) seen.push_back(chunk);
   }
   for (const IVec3 chunk : seen) {
-    if (grid.find_chunk(chunk) != nullptr) {
+    if (grid.find_chunk(chunk) != nullptr && grid.is_loaded_around(chunk)) {
       mark(chunk, chunks_[chunk], now);
     } else {
       remove_if_there(chunk);
+    }
+  }
+}
+
+// Those that may have been waiting for a chunk to be loaded, or must not be shown without it.
+void LiveGrid::add_chunks_around(IVec3 chunk, int distance, std::vector<IVec3>& to) {
+  for (int z = -distance; z <= distance; ++z) {
+    for (int y = -distance; y <= distance; ++y) {
+      for (int x = -distance; x <= distance; ++x) to.push_back(chunk + IVec3{x, y, z});
     }
   }
 }
@@ -119,6 +132,9 @@ void LiveGrid::follow_smooth(const Grid& grid, const GridChanges& changes, LiveC
   std::vector<IVec3> asked;
   for (const IVec3 chunk : changed) {
     for (const IVec3 step : {IVec3{0}, IVec3{1, 0, 0}, IVec3{0, 1, 0}, IVec3{0, 0, 1}}) asked.push_back(chunk - step);
+  }
+  for (const ChunkChange& change : changes.items) {
+    if (!change.is_edit) add_chunks_around(change.chunk, kSmoothDistance, asked);
   }
   for (const auto& [chunk, state] : chunks_) {
     if (state.oldest > state.serial && !state.is_gone) asked.push_back(chunk);

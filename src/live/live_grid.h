@@ -70,6 +70,7 @@ class LiveGrid final : public LiveSource {
   void begin_anew();
   void follow_blocky(const Grid& grid, const GridChanges& changes, LiveClock::time_point now);
   void follow_smooth(const Grid& grid, const GridChanges& changes, LiveClock::time_point now);
+  static void add_chunks_around(IVec3 chunk, int distance, std::vector<IVec3>& to);
   void remove_if_there(IVec3 chunk);
   void see_whether_meshed(const Grid& grid, IVec3 chunk, LiveClock::time_point now);
   void mark_if_there(IVec3 chunk, LiveClock::time_point now);

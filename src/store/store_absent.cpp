@@ -110,7 +110,13 @@ Result<SaveTicket> WorldSaver::save(WorldStore&, const Scene&, WorldChanges, std
   return absent();
 }
 void WorldSaver::set_view(WorldView) {}
+std::optional<std::uint32_t> WorldSaver::number_of(GridHandle) const {
+  return std::nullopt;
+}
 Result<LoadedWorld> load_world(const WorldStore&, const LoadOptions&, Threads, const Progress&) {
+  return absent();
+}
+Result<LoadedWorld> load_partial_world(const WorldStore&, const LoadOptions&) {
   return absent();
 }
 Result<SavedScene> write_world(const Scene&, const std::filesystem::path& path, Threads, const Progress&) {

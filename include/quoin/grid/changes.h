@@ -74,6 +74,8 @@ struct ChunkChange {
   /// Bit Neighbourhood::index(dx, dy, dz): the chunk at that offset holds one of their 26 neighbours.
   std::uint32_t neighbours = 0;
   ChunkSlabs slabs;  ///< those that hold one of them
+  /// False: nothing was edited, the chunk only came into memory or went out of it (Grid::load_chunk).
+  bool is_edit = true;
 
   /// Whether the mesh of the chunk at an offset may have changed. Requires: -1 <= offset.x, offset.y, offset.z <= 1.
   [[nodiscard]] bool affects(IVec3 offset) const {
@@ -84,7 +86,7 @@ using GridChanges = Changes<ChunkChange>;
 
 /// The chunks whose blocky meshes have to be made again: those that hold one of the 26 neighbours of a changed voxel,
 /// and are there; and those that changed and are there no more. Sorted by z, then y, then x. All of the grid's when all
-/// has changed. `changes` are those up to the grid's present state.
+/// has changed. Of a partial grid those are among them whose mesh has to go, since a chunk beside them was unloaded. `changes` are those up to the grid's present state.
 [[nodiscard]] std::vector<IVec3> chunks_to_mesh(const Grid& grid, const GridChanges& changes);
 
 /// A row of 64 voxels along x in one chunk, some of which changed; valid during the call that tells of it.
@@ -108,7 +110,7 @@ struct RowChange {
 /// the last time, `changes` what `now.changes_since` told since then; when all has changed, all of both is compared.
 /// For rules that follow edits, whoever makes them: falling sand, water, wires. What became another type and then was
 /// it again meanwhile (a stream, each of whose voxels was followed by the next) is no difference: what a rule moves it
-/// looks at again by itself (examples/falling_sand.cpp).
+/// looks at again by itself (examples/falling_sand.cpp). Chunks that are not loaded in one of the two are left out.
 ///
 /// Cost: O(slabs that changed); chunks that the two share cost nothing.
 void visit_changes(const Grid& before, const Grid& now, const GridChanges& changes,
@@ -118,6 +120,7 @@ void visit_changes(const Grid& before, const Grid& now, const GridChanges& chang
 struct DataChange {
   IVec3 chunk{0};
   IBox box;  ///< around them, in the chunk's coordinates
+  bool is_edit = true;  ///< as in ChunkChange
 };
 using DataChanges = Changes<DataChange>;
 
@@ -137,6 +140,7 @@ struct DensityChange {
   /// [Neighbourhood::index(dx, dy, dz)]: how many samples past its own the chunk at that offset has to read to come
   /// upon one of them; 0 for the chunk itself.
   std::array<std::uint8_t, 27> distance{};
+  bool is_edit = true;  ///< as in ChunkChange
 
   /// Whether the chunk at an offset, grown by `reach` samples on each side, holds one of them.
   /// Requires: -1 <= offset.x, offset.y, offset.z <= 1; 0 <= reach <= 64.

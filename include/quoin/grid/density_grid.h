@@ -43,6 +43,7 @@ struct FlattenOptions {
 /// Edits:     a chunk that is all far air is dropped. When an edit throws (bad_alloc, or what a callback threw), what
 ///            it did until then, or until its `progress` cancelled it, stays done and booked. `changes_since` tells
 ///            any number of consumers what edits changed.
+/// Partial:   as Grid; `smooth` leaves chunks as they are beside which one is not loaded.
 /// Sharing:   and threads as Grid.
 /// Moving:    a field that was moved from may only be assigned to or destroyed.
 class DensityGrid {
@@ -133,6 +134,17 @@ class DensityGrid {
   std::int64_t put_chunk(IVec3 chunk, DensityChunk samples);
   /// Makes everything far air, as an edit.
   void clear();
+
+  /// As those of Grid.
+  void make_partial();
+  [[nodiscard]] bool is_partial() const;
+  /// Requires: as `put_chunk`.
+  bool load_chunk(IVec3 chunk, DensityChunk samples);
+  /// Likewise, of a chunk that is known to be far air.
+  bool load_air_chunk(IVec3 chunk);
+  bool unload_chunk(IVec3 chunk);
+  [[nodiscard]] bool is_loaded(IVec3 chunk) const;
+  [[nodiscard]] bool is_loaded_around(IVec3 chunk, int distance = 1) const;
 
   /// Null where all is far air. Lifetime: as Grid::find_chunk.
   [[nodiscard]] const DensityChunk* find_chunk(IVec3 chunk) const;

@@ -35,6 +35,9 @@ struct PlacedVoxel {
 /// Data:     voxels that are not air may hold VoxelData. It follows its voxel: an edit that gives it another type takes
 ///           it away, one that gives it the type it has leaves it; whole chunks, snapshots, `copy_box` and extracted
 ///           pieces carry it along. Halved grids and fields have none.
+/// Partial:  of a world that is larger than memory a grid holds some chunks (`make_partial`). Those that are not loaded
+///           read as air, which is not what they are: edits leave them as they are, and no mesh is made of a chunk
+///           unless all around it are loaded.
 /// Sharing:  `snapshot` is a copy that costs a pointer. What the two share is copied when one of them is edited, a
 ///           chunk at a time.
 /// Threads:  any number may read at once, and take snapshots; an edit needs the grid to itself. A snapshot is a grid of
@@ -102,8 +105,23 @@ class Grid {
   /// Puts a whole chunk in place, its data too; counts as an edit of whatever differs. Returns how many types changed.
   /// The outermost chunks are ignored.
   std::int64_t put_chunk(IVec3 chunk, Chunk voxels);
-  /// Makes everything air, as an edit.
+  /// Makes everything air, as an edit; of a partial grid, what is loaded.
   void clear();
+
+  /// Makes it a partial grid of which nothing is loaded; what it held is gone, as an edit.
+  void make_partial();
+  [[nodiscard]] bool is_partial() const;
+  /// Brings a chunk into memory, which may be air: `changes_since` tells of it, as no edit (ChunkChange::is_edit).
+  /// False, and nothing is done, where it is loaded, the grid is not partial, or the chunk is an outermost one.
+  bool load_chunk(IVec3 chunk, Chunk voxels);
+  /// Takes a chunk out of memory, likewise. False where it is not loaded, or the grid is not partial.
+  bool unload_chunk(IVec3 chunk);
+  /// Whether a chunk's voxels are in memory: always, unless the grid is partial.
+  [[nodiscard]] bool is_loaded(IVec3 chunk) const;
+  /// Whether it and all that are at most so many chunks from it along each axis are.
+  [[nodiscard]] bool is_loaded_around(IVec3 chunk, int distance = 1) const;
+  /// Of a partial grid the chunks that are loaded, air too; else as `chunks`. Sorted likewise.
+  [[nodiscard]] std::vector<IVec3> loaded_chunks() const;
 
   /// What the voxel holds besides its type; empty where nothing was put. Lifetime: until the grid's next edit.
   [[nodiscard]] VoxelData data(IVec3 voxel) const;
@@ -125,7 +143,7 @@ class Grid {
   /// Coordinates of all chunks that hold a voxel, sorted by z, then y, then x.
   [[nodiscard]] std::vector<IVec3> chunks() const;
   [[nodiscard]] std::size_t chunk_count() const;
-  /// The chunk and the 26 around it, for meshers. Lifetime: the grid must outlive it, and an edit ends it.
+  /// The chunk and the 26 around it, for meshers; nothing where not all of them are loaded. Lifetime: the grid must outlive it, and an edit ends it.
   [[nodiscard]] Neighbourhood neighbourhood(IVec3 chunk) const;
 
   /// What edits changed since the cursor's last time, exactly; moves the cursor to the present.

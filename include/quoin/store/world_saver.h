@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -60,8 +61,11 @@ class WorldSaver {
                           std::function<void(const Status&)> on_saved = {});
   /// From where it is looked at, and lit: saved with the next `save`. What load_world read until then.
   void set_view(WorldView view);
+  /// The number that a grid has in the world (ChunkPlace::grid); nothing before it was saved. Cost: O(log grids).
+  [[nodiscard]] std::optional<std::uint32_t> number_of(GridHandle grid) const;
 
  private:
+  friend Result<LoadedWorld> load_partial_world(const WorldStore& world, const LoadOptions& options);
   friend Result<LoadedWorld> load_world(const WorldStore& world, const LoadOptions& options, Threads threads,
                                         const Progress& progress);
   struct Impl;
@@ -80,6 +84,10 @@ struct LoadedWorld {
 /// Errors:   CannotRead, BadFormat, Cancelled.
 [[nodiscard]] Result<LoadedWorld> load_world(const WorldStore& world, const LoadOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
+
+/// The same without chunks: its grids are partial, and nothing of them is loaded (Grid::make_partial). The saver keeps
+/// what is edited in what is loaded later; what is not loaded stays as it is stored.
+[[nodiscard]] Result<LoadedWorld> load_partial_world(const WorldStore& world, const LoadOptions& options = {});
 
 /// Writes a scene as a new world, in place of what is there; it appears whole or not at all. Returns its size.
 ///

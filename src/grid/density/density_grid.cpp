@@ -39,6 +39,37 @@ std::int64_t DensityGrid::put_chunk(IVec3 chunk, DensityChunk samples) {
   return impl().store.put(chunk, std::move(samples));
 }
 
+void DensityGrid::make_partial() {
+  const NoticeOfEdits notice(impl().store, notice_);
+  impl().store.make_partial();
+}
+
+bool DensityGrid::is_partial() const {
+  return impl().store.loaded().is_partial();
+}
+
+bool DensityGrid::load_chunk(IVec3 chunk, DensityChunk samples) {
+  const NoticeOfEdits notice(impl().store, notice_);
+  return impl().store.load(chunk, std::move(samples));
+}
+
+bool DensityGrid::load_air_chunk(IVec3 chunk) {
+  return load_chunk(chunk, DensityChunk(impl().store.far()));
+}
+
+bool DensityGrid::unload_chunk(IVec3 chunk) {
+  const NoticeOfEdits notice(impl().store, notice_);
+  return impl().store.unload(chunk);
+}
+
+bool DensityGrid::is_loaded(IVec3 chunk) const {
+  return impl().store.loaded().has(chunk);
+}
+
+bool DensityGrid::is_loaded_around(IVec3 chunk, int distance) const {
+  return impl().store.loaded().has_around(chunk, distance);
+}
+
 void DensityGrid::clear() {
   const NoticeOfEdits notice(impl().store, notice_);
   impl().store.clear();

@@ -134,6 +134,7 @@ std::int64_t DensityGrid::smooth(DVec3 centre, double radius, double strength) {
   std::vector<Smoothed> news;
   Window window;
   for (const ChunkPart& part : parts_near_chunks(store, box)) {
+    if (!is_loaded_around(part.chunk)) continue;  // what it would flow together with is not known
     const DensityNeighbourhood around = neighbourhood(part.chunk);
     if (is_one_value(around)) continue;
     window.read(around, part.box);

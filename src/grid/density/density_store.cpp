@@ -125,11 +125,12 @@ DensityStore::Entry& DensityStore::find_or_create(IVec3 chunk) {
   return made;
 }
 
-void DensityStore::finish_edit(IVec3 chunk, Entry& entry, const ChangeReach& changes, bool has_even_row) {
+void DensityStore::finish_edit(IVec3 chunk, Entry& entry, const ChangeReach& changes, bool has_even_row,
+                               bool is_edit) {
   QUOIN_ASSERT(find(chunk) == &entry, "the entry is the chunk's");
   if (changes.samples != 0) {
     ++edits_;
-    journal_.note(entry.serial, {chunk, changes}, entries_.size());
+    journal_.note(entry.serial, {chunk, changes, is_edit}, entries_.size());
     if (has_even_row) entry.samples.unite_slabs();
   }
   if (entry.samples.uniform() == far_) entries_.erase(chunk, [](auto&) {});
@@ -146,7 +147,7 @@ std::int64_t DensityStore::make_solid(IVec3 chunk, VoxelType material) {
 
 std::int64_t DensityStore::put(IVec3 chunk, DensityChunk samples) {
   QUOIN_ASSERT(is_stored_within(samples, far_), "densities are stored_density of the band");
-  if (!is_inside_world(chunk)) return 0;
+  if (!loaded_.may_edit(chunk)) return 0;
   samples.unite_slabs();
   const Entry* present = find(chunk);
   if (present != nullptr && present->samples.shares_storage_with(samples)) return 0;
@@ -157,6 +158,35 @@ std::int64_t DensityStore::put(IVec3 chunk, DensityChunk samples) {
   entry.samples = std::move(samples);
   finish_edit(chunk, entry, changes, false);
   return changes.samples;
+}
+
+// Samples that were, or now are, not loaded.
+void DensityStore::replace(IVec3 chunk, DensityChunk samples) {
+  journal_.begin_change();
+  Entry& entry = find_or_create(chunk);
+  entry.samples = std::move(samples);
+  ChangeReach all;
+  all.add_all();
+  finish_edit(chunk, entry, all, false, false);
+}
+
+void DensityStore::make_partial() {
+  clear();
+  loaded_.begin();
+}
+
+bool DensityStore::load(IVec3 chunk, DensityChunk samples) {
+  QUOIN_ASSERT(is_stored_within(samples, far_), "densities are stored_density of the band");
+  if (!loaded_.add(chunk)) return false;
+  samples.unite_slabs();
+  replace(chunk, std::move(samples));
+  return true;
+}
+
+bool DensityStore::unload(IVec3 chunk) {
+  if (!loaded_.remove(chunk)) return false;
+  replace(chunk, DensityChunk(far_));
+  return true;
 }
 
 void DensityStore::clear() {
@@ -179,7 +209,7 @@ std::vector<IVec3> DensityStore::chunks() const {
 }
 
 std::size_t DensityStore::bytes() const {
-  std::size_t total = sizeof(DensityGrid) + sizeof(DensityStore) + entries_.bytes() + journal_.bytes();
+  std::size_t total = sizeof(DensityGrid) + sizeof(DensityStore) + entries_.bytes() + loaded_.bytes() + journal_.bytes();
   entries_.for_each([&](IVec3, const Entry& entry) { total += entry.samples.bytes() - sizeof(DensityChunk); });
   return total;
 }

@@ -14,6 +14,7 @@
 #include "core/coordinates/chunk_order.h"
 #include "core/coordinates/chunk_trie.h"
 #include "grid/change_records.h"
+#include "grid/loaded_chunks.h"
 #include "grid/long_box.h"
 
 namespace quoin {
@@ -74,12 +75,16 @@ class DensityStore {
   std::int64_t edit(const LongBox& box, bool creates, VoxelType material, ChooseChunk&& chunk_edit, ChangeRow&& change,
                     const Progress& progress);
 
-  /// Edits rows of parts of chunks that lie within the world.
+  /// Edits rows of parts of chunks that lie within the world and are loaded.
   template <class ChangeRow>
   std::int64_t edit_parts(const std::vector<ChunkPart>& parts, ChangeRow&& change);
 
   /// Returns how many samples changed.
   std::int64_t put(IVec3 chunk, DensityChunk samples);
+  [[nodiscard]] const LoadedChunks& loaded() const { return loaded_; }
+  void make_partial();
+  bool load(IVec3 chunk, DensityChunk samples);
+  bool unload(IVec3 chunk);
   void clear();
   [[nodiscard]] std::vector<IVec3> chunks() const;
   [[nodiscard]] std::size_t bytes() const;
@@ -97,13 +102,15 @@ class DensityStore {
   Entry& find_or_create(IVec3 chunk);
   // Books an edit of one chunk, and drops it where it is all far air. `has_even_row`: an edited row came to hold one
   // density, so that slabs may have to be united.
-  void finish_edit(IVec3 chunk, Entry& entry, const ChangeReach& changes, bool has_even_row);
+  void finish_edit(IVec3 chunk, Entry& entry, const ChangeReach& changes, bool has_even_row, bool is_edit = true);
+  void replace(IVec3 chunk, DensityChunk samples);
   template <class ChangeRow>
   std::int64_t edit_rows(IVec3 chunk, const IBox& part, ChangeRow& change);
   std::int64_t make_solid(IVec3 chunk, VoxelType material);
 
   Half far_;
   ChunkTrie<Entry> entries_;
+  LoadedChunks loaded_;
   ChangeJournal<DensityRecord> journal_;
   std::uint64_t edits_ = 0;
 };
@@ -149,6 +156,7 @@ std::int64_t DensityStore::edit(const LongBox& wanted, bool creates, VoxelType m
   journal_.begin_change();
   std::int64_t changed = 0;
   const auto visit = [&](IVec3 chunk) {
+    if (!loaded_.has(chunk)) return;
     const ChunkEdit wish = chunk_edit(chunk);
     if (wish == ChunkEdit::Nothing) return;
     if (wish == ChunkEdit::Solid && find(chunk) == nullptr) {

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -26,8 +27,10 @@ constexpr std::size_t kMaxLines = 20;
 /// Puts a world's parts and chunks into a scene.
 class Load {
  public:
-  Load(const WorldStore& world, LoadedScene& loaded, SaverState& state)
-      : world_(world), scene_(loaded.scene), loaded_(loaded), state_(state) {}
+  enum class Chunks : std::uint8_t { All, None };
+
+  Load(const WorldStore& world, Chunks chunks, LoadedScene& loaded, SaverState& state)
+      : world_(world), wanted_(chunks), scene_(loaded.scene), loaded_(loaded), state_(state) {}
 
   Status run(Threads threads, const Progress& progress) {
     auto types = world_.types();
@@ -69,6 +72,12 @@ class Load {
     SavedGrid saved;
     saved.number = number;
     saved.header = header;
+    if (wanted_ == Chunks::None) {
+      grid.grid.make_partial();
+      grid.field.make_partial();
+      add_grid(number, std::move(grid), std::move(saved));
+      return {};
+    }
     bool is_cancelled = false;
     Status read =
         WorldParts::each_chunk(world_, number, 0, threads, [&](const ChunkPlace& place, Result<StoredChunk> chunk) {
@@ -89,10 +98,14 @@ class Load {
       saved.is_partly_read = true;
       add_line("grid " + std::to_string(number) + ": not all could be read: " + read.error().message);
     }
+    add_grid(number, std::move(grid), std::move(saved));
+    return {};
+  }
+
+  void add_grid(std::uint32_t number, SceneGrid grid, SavedGrid saved) {
     const GridHandle handle = scene_.add_grid(std::move(grid));
     handles_[number] = handle;
     state_.grids.emplace(handle, std::move(saved));
-    return {};
   }
 
   // Reads the parts of a kind; what is damaged is told, and left out.
@@ -196,6 +209,7 @@ class Load {
   }
 
   const WorldStore& world_;
+  const Chunks wanted_;
   Scene& scene_;
   LoadedScene& loaded_;
   SaverState& state_;
@@ -208,16 +222,34 @@ class Load {
   std::size_t chunks_ = 0;
 };
 
-}  // namespace
-
-Result<LoadedWorld> load_world(const WorldStore& world, const LoadOptions& options, Threads threads,
-                               const Progress& progress) {
-  LoadedWorld result;
+Result<LoadedWorld> load(const WorldStore& world, Load::Chunks chunks, LoadedWorld result, SaverState& state,
+                         const LoadOptions& options, Threads threads, const Progress& progress) {
   result.loaded.format = "world";
-  Load load(world, result.loaded, result.saver.impl_->state);
+  Load load(world, chunks, result.loaded, state);
   if (auto done = load.run(threads, progress); !done) return with_path(Result<LoadedWorld>(done.error()), world.path());
   if (options.show_hidden) show_all(result.loaded.scene);
   return result;
+}
+
+}  // namespace
+
+// The saver's state stays where it is when the saver is moved.
+Result<LoadedWorld> load_world(const WorldStore& world, const LoadOptions& options, Threads threads,
+                               const Progress& progress) {
+  LoadedWorld result;
+  SaverState& state = result.saver.impl_->state;
+  return load(world, Load::Chunks::All, std::move(result), state, options, threads, progress);
+}
+
+Result<LoadedWorld> load_partial_world(const WorldStore& world, const LoadOptions& options) {
+  LoadedWorld result;
+  SaverState& state = result.saver.impl_->state;
+  return load(world, Load::Chunks::None, std::move(result), state, options, {}, {});
+}
+
+std::optional<std::uint32_t> WorldSaver::number_of(GridHandle grid) const {
+  const auto found = impl_->state.grids.find(grid);
+  return found == impl_->state.grids.end() ? std::nullopt : std::optional(found->second.number);
 }
 
 }  // namespace quoin

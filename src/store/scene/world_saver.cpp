@@ -205,7 +205,9 @@ class Save {
     bool is_all = false;
     const auto add = [&](const auto& changes) {
       is_all |= changes.all;
-      for (const auto& change : changes.items) changed.insert(change.chunk);
+      for (const auto& change : changes.items) {
+        if (change.is_edit) changed.insert(change.chunk);
+      }
     };
     add(grid.grid.changes_since(saved.voxels));
     add(grid.grid.data_changes_since(saved.data));
@@ -222,6 +224,7 @@ class Save {
       }
     }
     for (const IVec3 chunk : changed) {
+      if (!grid.grid.is_loaded(chunk) || !grid.field.is_loaded(chunk)) continue;  // it is as it was stored
       StoredChunk stored;
       if (const Chunk* const voxels = grid.grid.find_chunk(chunk)) stored.voxels = *voxels;
       if (const DensityChunk* const densities = grid.field.find_chunk(chunk)) stored.densities = *densities;

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include <quoin/core/vec.h>
+
+#include "core/coordinates/chunk_order.h"
+#include "core/coordinates/chunk_trie.h"
+#include "grid/long_box.h"
+
+namespace quoin {
+
+/// Which chunks of a partial grid are in memory; of a grid that is not partial all are. Copies share it.
+class LoadedChunks {
+ public:
+  /// None is, from now on.
+  void begin() {
+    is_partial_ = true;
+    chunks_.clear();
+  }
+  [[nodiscard]] bool is_partial() const { return is_partial_; }
+  [[nodiscard]] bool has(IVec3 chunk) const {
+    return !is_partial_ || !is_inside_world(chunk) || chunks_.find(chunk.x, chunk.y, chunk.z) != nullptr;
+  }
+  /// Whether edits may change a chunk.
+  [[nodiscard]] bool may_edit(IVec3 chunk) const { return is_inside_world(chunk) && has(chunk); }
+  [[nodiscard]] bool has_around(IVec3 chunk, int distance) const {
+    if (!is_partial_) return true;
+    for (int z = -distance; z <= distance; ++z) {
+      for (int y = -distance; y <= distance; ++y) {
+        for (int x = -distance; x <= distance; ++x) {
+          if (!has(chunk + IVec3{x, y, z})) return false;
+        }
+      }
+    }
+    return true;
+  }
+  [[nodiscard]] std::size_t count() const { return chunks_.size(); }
+  [[nodiscard]] std::vector<IVec3> sorted() const {
+    std::vector<IVec3> all;
+    all.reserve(chunks_.size());
+    chunks_.for_each([&](IVec3 at, const Mark&) { all.push_back(at); });
+    std::sort(all.begin(), all.end(), by_zyx);
+    return all;
+  }
+  [[nodiscard]] std::size_t bytes() const { return chunks_.bytes(); }
+
+  /// False where it is loaded, outside of the world, or the grid is not partial.
+  bool add(IVec3 chunk) {
+    if (!is_partial_ || has(chunk)) return false;
+    chunks_.find_or_create(chunk, [](auto&) {});
+    return true;
+  }
+  /// False where it is not loaded, or the grid is not partial.
+  bool remove(IVec3 chunk) {
+    return is_partial_ && chunks_.erase(chunk, [](auto&) {});
+  }
+
+ private:
+  struct Mark {};
+  ChunkTrie<Mark> chunks_;
+  bool is_partial_ = false;
+};
+
+}  // namespace quoin

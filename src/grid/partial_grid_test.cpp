@@ -1,0 +1,181 @@
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <quoin/grid/changes.h>
+#include <quoin/grid/density_grid.h>
+#include <quoin/grid/grid.h>
+
+namespace quoin {
+namespace {
+
+Grid partial() {
+  Grid grid;
+  grid.make_partial();
+  return grid;
+}
+
+TEST(PartialGrid, AWholeGridHasAllChunksInMemory) {
+  Grid grid;
+  EXPECT_FALSE(grid.is_partial());
+  EXPECT_TRUE(grid.is_loaded({1, 2, 3}));
+  EXPECT_TRUE(grid.is_loaded_around({1, 2, 3}, 2));
+  EXPECT_FALSE(grid.load_chunk({0, 0, 0}, Chunk(1)));
+  EXPECT_FALSE(grid.unload_chunk({0, 0, 0}));
+  EXPECT_EQ(grid.voxel_count(), 0);
+}
+
+TEST(PartialGrid, WhatIsNotLoadedIsNotEdited) {
+  Grid grid = partial();
+  ChangeCursor cursor = grid.cursor();
+  const std::array<VoxelType, kChunkEdge> row{1, 2, 3};
+  const std::array<PlacedVoxel, 1> placed{{{{3, 3, 3}, 1}}};
+  EXPECT_FALSE(grid.set(1, 2, 3, 1));
+  EXPECT_EQ(grid.set(placed), 0);
+  EXPECT_EQ(grid.write_row({0, 0, 0}, 7, row), 0);
+  EXPECT_EQ(grid.fill_box({{0, 0, 0}, {10, 10, 10}}, 1), 0);
+  EXPECT_EQ(grid.fill_box({{0, 0, 0}, {64, 64, 64}}, 1), 0);
+  EXPECT_EQ(grid.fill_sphere({0, 0, 0}, 5.0, 1), 0);
+  EXPECT_EQ(grid.edit({{0, 0, 0}, {2, 2, 2}}, [](IVec3, VoxelType) { return VoxelType{1}; }), 0);
+  EXPECT_EQ(grid.put_chunk({0, 0, 0}, Chunk(1)), 0);
+  EXPECT_FALSE(grid.has_changed_since(cursor));
+  // A box that reaches over a loaded and other chunks changes what is loaded.
+  EXPECT_TRUE(grid.load_chunk({0, 0, 0}, Chunk(kAir)));
+  EXPECT_EQ(grid.fill_box({{-5, 0, 0}, {5, 1, 1}}, 1), 5);
+}
+
+TEST(PartialGrid, LoadingIsToldOfAndIsNoEdit) {
+  Grid grid = partial();
+  ChangeCursor cursor = grid.cursor();
+  Chunk chunk(kAir);
+  chunk.set({1, 2, 3}, 7);
+  chunk.set_data({1, 2, 3}, {5, {}});
+  EXPECT_TRUE(grid.load_chunk({1, 0, 0}, chunk));
+  EXPECT_FALSE(grid.load_chunk({1, 0, 0}, Chunk(3)));
+  EXPECT_TRUE(grid.load_chunk({2, 0, 0}, Chunk(kAir)));
+  EXPECT_EQ(grid.get(65, 2, 3), 7);
+  EXPECT_EQ(grid.voxel_count(), 1);
+  EXPECT_EQ(grid.data_count(), 1);
+  EXPECT_EQ(grid.loaded_chunks(), (std::vector<IVec3>{{1, 0, 0}, {2, 0, 0}}));
+  EXPECT_EQ(grid.chunks(), (std::vector<IVec3>{{1, 0, 0}}));
+  ChangeCursor data = cursor;
+  const GridChanges loaded = grid.changes_since(cursor);
+  ASSERT_EQ(loaded.items.size(), 2U);
+  EXPECT_FALSE(loaded.items[0].is_edit);
+  EXPECT_FALSE(loaded.items[1].is_edit);
+  const DataChanges of_data = grid.data_changes_since(data);
+  ASSERT_EQ(of_data.items.size(), 1U);
+  EXPECT_FALSE(of_data.items[0].is_edit);
+
+  grid.set(65, 2, 3, 8);
+  const GridChanges edited = grid.changes_since(cursor);
+  ASSERT_EQ(edited.items.size(), 1U);
+  EXPECT_TRUE(edited.items[0].is_edit);
+
+  EXPECT_TRUE(grid.unload_chunk({1, 0, 0}));
+  EXPECT_FALSE(grid.unload_chunk({1, 0, 0}));
+  EXPECT_TRUE(grid.unload_chunk({2, 0, 0}));
+  EXPECT_EQ(grid.voxel_count(), 0);
+  EXPECT_EQ(grid.data_count(), 0);
+  EXPECT_EQ(grid.chunk_count(), 0U);
+  const GridChanges unloaded = grid.changes_since(cursor);
+  ASSERT_EQ(unloaded.items.size(), 2U);
+  EXPECT_FALSE(unloaded.items[0].is_edit);
+  EXPECT_TRUE(grid.loaded_chunks().empty());
+}
+
+TEST(PartialGrid, WhatIsLoadedAndThenEditedIsAnEdit) {
+  Grid grid = partial();
+  ChangeCursor cursor = grid.cursor();
+  grid.load_chunk({0, 0, 0}, Chunk(1));
+  grid.set(0, 0, 0, 2);
+  const GridChanges changes = grid.changes_since(cursor);
+  ASSERT_EQ(changes.items.size(), 1U);
+  EXPECT_TRUE(changes.items[0].is_edit);
+}
+
+TEST(PartialGrid, AChunkIsMeshedOnceAllAroundItAreLoaded) {
+  Grid grid = partial();
+  ChangeCursor cursor = grid.cursor();
+  int left = 27;
+  for (int z = -1; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1; ++x) {
+        EXPECT_FALSE(grid.is_loaded_around({0, 0, 0}));
+        EXPECT_EQ(grid.neighbourhood({0, 0, 0}).centre(), nullptr);
+        grid.load_chunk({x, y, z}, Chunk(y < 1 ? 1 : kAir));
+        (void)chunks_to_mesh(grid, grid.changes_since(cursor));
+        --left;
+      }
+    }
+  }
+  EXPECT_EQ(left, 0);
+  EXPECT_TRUE(grid.is_loaded_around({0, 0, 0}));
+  EXPECT_NE(grid.neighbourhood({0, 0, 0}).centre(), nullptr);
+  grid.unload_chunk({1, 1, 1});
+  EXPECT_FALSE(grid.is_loaded_around({0, 0, 0}));
+  const std::vector<IVec3> again = chunks_to_mesh(grid, grid.changes_since(cursor));
+  EXPECT_NE(std::find(again.begin(), again.end(), IVec3(0, 0, 0)), again.end());
+}
+
+TEST(PartialGrid, RulesSeeNoDifferenceInWhatCameOrWent) {
+  Grid grid = partial();
+  grid.load_chunk({0, 0, 0}, Chunk(1));
+  grid.load_chunk({1, 0, 0}, Chunk(1));
+  ChangeCursor cursor = grid.cursor();
+  const Grid before = grid.snapshot();
+  grid.unload_chunk({0, 0, 0});
+  grid.load_chunk({2, 0, 0}, Chunk(2));
+  grid.set(64, 0, 0, 3);
+  int rows = 0;
+  visit_changes(before, grid, grid.changes_since(cursor), [&](const RowChange& row) {
+    ++rows;
+    EXPECT_EQ(row.first, IVec3(64, 0, 0));
+    EXPECT_EQ(row.changed, 1U);
+  });
+  EXPECT_EQ(rows, 1);
+}
+
+TEST(PartialGrid, SnapshotsKeepWhatWasLoaded) {
+  Grid grid = partial();
+  grid.load_chunk({0, 0, 0}, Chunk(1));
+  const Grid before = grid.snapshot();
+  grid.unload_chunk({0, 0, 0});
+  grid.load_chunk({5, 5, 5}, Chunk(2));
+  EXPECT_TRUE(before.is_loaded({0, 0, 0}));
+  EXPECT_FALSE(before.is_loaded({5, 5, 5}));
+  EXPECT_EQ(before.get(1, 1, 1), 1);
+  EXPECT_TRUE(grid.is_loaded({5, 5, 5}));
+}
+
+TEST(PartialGrid, FieldsAlike) {
+  DensityGrid field;
+  field.add_sphere({32.0, 32.0, 32.0}, 10.0, 1);
+  const DensityChunk sphere = *field.find_chunk({0, 0, 0});
+  field.make_partial();
+  EXPECT_EQ(field.chunk_count(), 0U);
+  EXPECT_EQ(field.add_sphere({32.0, 32.0, 32.0}, 10.0, 1), 0);
+  EXPECT_EQ(field.put_chunk({0, 0, 0}, sphere), 0);
+  ChangeCursor cursor = field.cursor();
+  EXPECT_TRUE(field.load_chunk({0, 0, 0}, sphere));
+  EXPECT_TRUE(field.load_air_chunk({1, 0, 0}));
+  EXPECT_FALSE(field.load_air_chunk({1, 0, 0}));
+  EXPECT_LT(field.density({32, 32, 32}), 0.0F);
+  const DensityChanges loaded = field.changes_since(cursor);
+  ASSERT_EQ(loaded.items.size(), 2U);
+  EXPECT_FALSE(loaded.items[0].is_edit);
+  EXPECT_GT(field.add_sphere({70.0, 32.0, 32.0}, 10.0, 2), 0);  // what is loaded of it
+  EXPECT_EQ(field.material({70, 32, -5}), kAir);
+  const DensityChanges edited = field.changes_since(cursor);
+  ASSERT_EQ(edited.items.size(), 2U);
+  EXPECT_TRUE(edited.items[0].is_edit);
+  EXPECT_EQ(field.smooth({70.0, 32.0, 32.0}, 10.0, 1.0), 0);  // not all around is loaded
+  EXPECT_TRUE(field.unload_chunk({0, 0, 0}));
+  EXPECT_FALSE(field.is_loaded({0, 0, 0}));
+  EXPECT_FALSE(field.is_loaded_around({1, 0, 0}));
+  EXPECT_EQ(field.density({32, 32, 32}), field.band());
+}
+
+}  // namespace
+}  // namespace quoin
