@@ -1,0 +1,206 @@
+#include "stream/stream_plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+#include <glm/geometric.hpp>
+#include <quoin/core/assert.h>
+#include <quoin/grid/chunk.h>
+
+#include "grid/long_box.h"
+
+namespace quoin::stream {
+namespace {
+
+// Of the budget, when it does not suffice: the rest is for what lies at the border and would come and go.
+constexpr double kShareOfWanted = 0.95;
+// What is not looked at comes as if it were so much farther away, from a distance on at which one has to turn to it.
+constexpr double kBehind = 1.75;
+constexpr double kCloseBy = 2.0 * kChunkEdge;
+
+double distance_to_chunk(DVec3 point, IVec3 chunk) {
+  const DVec3 low = DVec3(chunk) * double{kChunkEdge};
+  const DVec3 nearest = glm::clamp(point, low, low + double{kChunkEdge});
+  return glm::length(nearest - point);
+}
+
+bool is_looked_at(const Eye& eye, IVec3 chunk) {
+  const DVec3 to = (DVec3(chunk) + 0.5) * double{kChunkEdge} - eye.position;
+  const double length = glm::length(to);
+  return length <= kCloseBy || glm::dot(to, eye.direction) >= 0.5 * length || eye.direction == DVec3(0.0);
+}
+
+// Chunks that a ball meets may be these.
+IBox chunks_around(const Eye& eye) {
+  const LongBox box = clipped(box_around(eye.position - eye.radius, eye.position + eye.radius));
+  return is_empty(box) ? IBox{} : chunks_of(box);
+}
+
+}  // namespace
+
+bool StreamPlan::is_nearer(const Wanted& a, const Wanted& b) {
+  const auto key = [](const Wanted& w) {
+    return std::tuple(w.distance, w.place.grid, w.place.chunk.z, w.place.chunk.y, w.place.chunk.x);
+  };
+  return key(a) < key(b);
+}
+
+const StreamPlan::State* StreamPlan::state_of(const ChunkPlace& place) const {
+  const auto grid = states_.find(place.grid);
+  if (grid == states_.end()) return nullptr;
+  const auto found = grid->second.find(place.chunk);
+  return found == grid->second.end() ? nullptr : &found->second;
+}
+
+void StreamPlan::set_state(const ChunkPlace& place, State state) {
+  states_[place.grid][place.chunk] = state;
+  is_counted_ = false;
+}
+
+void StreamPlan::forget(const ChunkPlace& place) {
+  states_[place.grid].erase(place.chunk);
+  is_counted_ = false;
+}
+
+void StreamPlan::plan(Wishes wishes) {
+  wishes_ = std::move(wishes);
+  find_wanted();
+  cut_to_budget();
+  find_queue();
+  find_leaving();
+  here_ = 0;
+  is_counted_ = false;
+}
+
+StreamPlan::Wanted StreamPlan::measured(const ChunkPlace& place, const std::vector<Eye>& eyes) const {
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  Wanted all{place, kFar, kFar};
+  for (const Eye& eye : eyes) {
+    const double distance = distance_to_chunk(eye.position, place.chunk) * eye.voxel_size;
+    all.distance = std::min(all.distance, distance);
+    all.rank = std::min(all.rank, is_looked_at(eye, place.chunk) ? distance : distance * kBehind);
+  }
+  return all;
+}
+
+void StreamPlan::find_wanted() {
+  wanted_.clear();
+  for (const auto& [grid, eyes] : wishes_.eyes) {
+    std::vector<IVec3> chunks;
+    for (const Eye& eye : eyes) {
+      const IBox box = chunks_around(eye);
+      for (int z = box.min.z; z < box.max.z; ++z) {
+        for (int y = box.min.y; y < box.max.y; ++y) {
+          for (int x = box.min.x; x < box.max.x; ++x) {
+            const IVec3 chunk{x, y, z};
+            if (is_inside_world(chunk) && distance_to_chunk(eye.position, chunk) <= eye.radius) chunks.push_back(chunk);
+          }
+        }
+      }
+    }
+    if (eyes.size() > 1) {
+      const auto before = [](IVec3 a, IVec3 b) { return std::tie(a.z, a.y, a.x) < std::tie(b.z, b.y, b.x); };
+      std::ranges::sort(chunks, before);
+      chunks.erase(std::unique(chunks.begin(), chunks.end()), chunks.end());
+    }
+    for (const IVec3 chunk : chunks) wanted_.push_back(measured({grid, 0, chunk}, eyes));
+  }
+  std::ranges::sort(wanted_, is_nearer);
+}
+
+void StreamPlan::cut_to_budget() {
+  is_cut_ = wanted_.size() > wishes_.max_chunks;
+  if (!is_cut_) return;
+  const auto fits = static_cast<std::size_t>(static_cast<double>(wishes_.max_chunks) * kShareOfWanted);
+  wanted_.resize(std::min(wanted_.size(), fits));
+}
+
+void StreamPlan::find_queue() {
+  std::vector<Wanted> missing;
+  for (const Wanted& each : wanted_) {
+    if (state_of(each.place) == nullptr) missing.push_back(each);
+  }
+  std::ranges::stable_sort(missing, [](const Wanted& a, const Wanted& b) { return a.rank < b.rank; });
+  queue_.clear();
+  for (const Wanted& each : missing) queue_.push_back(each.place);
+  next_ = asked_ = 0;
+}
+
+// What is here and not wanted stays while it is near and there is room.
+void StreamPlan::find_leaving() {
+  leaving_.clear();
+  std::map<std::uint32_t, std::unordered_map<IVec3, bool, CoordinateHash>> is_wanted;
+  for (const Wanted& each : wanted_) is_wanted[each.place.grid].emplace(each.place.chunk, true);
+  std::vector<Wanted> others;
+  static const std::vector<Eye> kNobody;
+  for (const auto& [grid, states] : states_) {
+    const auto eyes = wishes_.eyes.find(grid);
+    const auto& of_grid = is_wanted[grid];
+    for (const auto& [chunk, state] : states) {
+      if (state != State::Here || of_grid.contains(chunk)) continue;
+      others.push_back(measured({grid, 0, chunk}, eyes == wishes_.eyes.end() ? kNobody : eyes->second));
+    }
+  }
+  std::ranges::sort(others, is_nearer);
+  std::size_t room = wishes_.max_chunks > wanted_.size() ? wishes_.max_chunks - wanted_.size() : 0;
+  const auto is_near = [&](const Wanted& each) {
+    const auto eyes = wishes_.eyes.find(each.place.grid);
+    return eyes != wishes_.eyes.end() && std::ranges::any_of(eyes->second, [&](const Eye& eye) {
+             return distance_to_chunk(eye.position, each.place.chunk) <= eye.radius + kMargin;
+           });
+  };
+  for (const Wanted& each : others) {
+    if (room != 0 && is_near(each)) {
+      --room;
+    } else {
+      leaving_.push_back(each.place);
+    }
+  }
+  std::ranges::reverse(leaving_);
+}
+
+bool StreamPlan::next(ChunkPlace& place) {
+  const auto take_from = [&](const std::vector<ChunkPlace>& places, std::size_t& at) {
+    while (at < places.size()) {
+      place = places[at++];
+      if (state_of(place) == nullptr) {
+        set_state(place, State::Begun);
+        return true;
+      }
+    }
+    return false;
+  };
+  return take_from(wishes_.asked, asked_) || take_from(queue_, next_);
+}
+
+std::vector<ChunkPlace> StreamPlan::take_leaving() {
+  return std::exchange(leaving_, {});
+}
+
+std::size_t StreamPlan::missing() {
+  if (is_counted_) return missing_count_;
+  const auto is_missing = [&](const Wanted& each) {
+    const State* const state = state_of(each.place);
+    return state == nullptr || *state == State::Begun;
+  };
+  while (here_ < wanted_.size() && !is_missing(wanted_[here_])) ++here_;
+  missing_count_ = static_cast<std::size_t>(
+      std::count_if(wanted_.begin() + static_cast<std::ptrdiff_t>(here_), wanted_.end(), is_missing));
+  is_counted_ = true;
+  return missing_count_;
+}
+
+double StreamPlan::complete_radius() {
+  (void)missing();
+  if (here_ < wanted_.size()) return wanted_[here_].distance;
+  if (is_cut_) return wanted_.empty() ? 0.0 : wanted_.back().distance;
+  double least = std::numeric_limits<double>::infinity();
+  for (const auto& [grid, eyes] : wishes_.eyes) {
+    for (const Eye& eye : eyes) least = std::min(least, eye.radius * eye.voxel_size);
+  }
+  return std::isfinite(least) ? least : 0.0;
+}
+
+}  // namespace quoin::stream

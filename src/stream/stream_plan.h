@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <unordered_map>
+#include <vector>
+
+#include <quoin/core/vec.h>
+#include <quoin/store/stored_chunk.h>
+
+#include "core/coordinates/coordinate_hash.h"
+
+namespace quoin::stream {
+
+/// A viewer in the space of a grid.
+struct Eye {
+  DVec3 position{0.0};      ///< voxels
+  DVec3 direction{0.0};     ///< unit; 0: nowhere in particular
+  double radius = 0.0;      ///< voxels
+  double voxel_size = 1.0;  ///< world units
+
+  bool operator==(const Eye&) const = default;
+};
+
+/// What is wanted, as the caller's thread says it.
+struct Wishes {
+  std::map<std::uint32_t, std::vector<Eye>> eyes;  ///< of each grid, by its number in the world
+  std::size_t max_chunks = 0;                      ///< that the budget suffices for
+  std::vector<ChunkPlace> asked;                   ///< for edits: wherever they lie
+};
+
+/// Which chunks are to be loaded, nearest first, and which are to go.
+///
+///   unknown -> begun -> here -> unknown
+///
+/// Threads: one at a time.
+class StreamPlan {
+ public:
+  /// Voxels beyond a viewer's radius in which what is loaded stays.
+  static constexpr double kMargin = 96.0;
+
+  enum class State : std::uint8_t { Begun, Here, Broken };
+
+  void set_state(const ChunkPlace& place, State state);
+  void forget(const ChunkPlace& place);
+
+  /// Takes over what is wanted, and finds anew what is to be loaded.
+  void plan(Wishes wishes);
+  /// The next chunk to load, which then counts as begun. False where there is none.
+  bool next(ChunkPlace& place);
+  [[nodiscard]] bool has_next() const { return asked_ < wishes_.asked.size() || next_ < queue_.size(); }
+  /// Those that are to go, farthest first, since the last call.
+  [[nodiscard]] std::vector<ChunkPlace> take_leaving();
+
+  [[nodiscard]] std::size_t wanted() const { return wanted_.size(); }
+  /// Of these, that are not here; and how far the nearest of them is, world units. Cost: O(what came since).
+  [[nodiscard]] std::size_t missing();
+  [[nodiscard]] double complete_radius();
+
+ private:
+  struct Wanted {
+    ChunkPlace place;
+    double distance = 0.0;  ///< world units, of its nearest point from the nearest eye
+    double rank = 0.0;      ///< the less the sooner
+  };
+  using States = std::unordered_map<IVec3, State, CoordinateHash>;
+
+  void find_wanted();
+  void cut_to_budget();
+  void find_queue();
+  void find_leaving();
+  [[nodiscard]] const State* state_of(const ChunkPlace& place) const;
+  [[nodiscard]] static bool is_nearer(const Wanted& a, const Wanted& b);
+  [[nodiscard]] Wanted measured(const ChunkPlace& place, const std::vector<Eye>& eyes) const;
+
+  Wishes wishes_;
+  std::map<std::uint32_t, States> states_;
+  std::vector<Wanted> wanted_;  ///< by distance
+  bool is_cut_ = false;         ///< the budget did not suffice
+  std::vector<ChunkPlace> queue_;
+  std::size_t next_ = 0;
+  std::size_t asked_ = 0;
+  std::vector<ChunkPlace> leaving_;
+  std::size_t here_ = 0;           ///< of `wanted_`, all before it are here
+  std::size_t missing_count_ = 0;  ///< as of the last count
+  bool is_counted_ = false;
+};
+
+}  // namespace quoin::stream

@@ -1,0 +1,658 @@
+#include <quoin/stream/streamed_world.h>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <unordered_map>
+#include <unordered_set>
+#include <utility>
+
+#include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
+#include <quoin/core/assert.h>
+#include <quoin/io/file.h>
+
+#include "core/coordinates/coordinate_hash.h"
+#include "core/worker_count.h"
+#include "stream/chunk_streamer.h"
+
+namespace quoin {
+
+using namespace stream;
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Before anything is loaded a chunk counts as so many bytes.
+constexpr double kGuessedChunkBytes = 24.0 * 1024.0;
+constexpr std::size_t kGuessBelow = 64;
+// Of the budget: what allocators and what is on its way take is not counted.
+constexpr double kShareOfBudget = 0.97;
+// Eyes that moved less, voxels, or turned less (cosine) see the same.
+constexpr double kMoves = 12.0;
+constexpr double kTurns = 0.94;
+constexpr auto kAskOthers = std::chrono::milliseconds(250);
+// The landscape that a grid goes on with.
+constexpr std::string_view kTerrainValue = "quoin.terrain.";
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+std::size_t bytes_of(const StoredChunk& chunk) {
+  return chunk.voxels.bytes() + (chunk.densities ? chunk.densities->bytes() : 0);
+}
+
+std::vector<std::byte> bytes_of_text(const std::string& text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+std::string text_of(const EndlessTerrain& terrain) {
+  return nlohmann::json{{"seed", terrain.seed}, {"height", terrain.height}, {"smooth", terrain.is_smooth}}.dump();
+}
+
+std::optional<EndlessTerrain> terrain_from(std::span<const std::byte> bytes) {
+  const auto* const text = reinterpret_cast<const char*>(bytes.data());  // NOLINT: UTF-8 as it was written
+  const auto json = nlohmann::json::parse(text, text + bytes.size(), nullptr, false);
+  if (!json.is_object() || !json.contains("seed") || !json["seed"].is_number_unsigned() || !json.contains("height") ||
+      !json["height"].is_number_integer() || !json.contains("smooth") || !json["smooth"].is_boolean()) {
+    return std::nullopt;
+  }
+  const auto height = json["height"].get<std::int64_t>();
+  if (height < 1 || height > 16) return std::nullopt;
+  return EndlessTerrain{json["seed"].get<std::uint64_t>(), static_cast<int>(height), json["smooth"].get<bool>()};
+}
+
+}  // namespace
+
+struct StreamedWorld::Impl {
+  using Edits = std::vector<std::shared_ptr<const WorldEdit>>;
+  struct Streamed {
+    GridHandle handle;
+    std::uint32_t number = 0;
+    std::vector<InstanceHandle> instances;
+    ChangeCursor voxels, data, densities;
+    std::unordered_map<IVec3, std::size_t, CoordinateHash> sizes;  // of what is loaded, bytes
+    std::unordered_set<IVec3, CoordinateHash> kept;  // edited, where the world may not be written: they stay
+    std::unordered_map<IVec3, Edits, CoordinateHash> waiting;
+    std::unordered_set<IVec3, CoordinateHash> broken;
+  };
+  using Eyes = std::map<std::uint32_t, std::vector<Eye>>;
+
+  Impl(WorldStore opened_store, LoadedWorld opened_world, StreamOptions wanted, bool made)
+      : options(std::move(wanted)),
+        store(std::move(opened_store)),
+        world(std::move(opened_world)),
+        is_new(made),
+        streamer(store, {options.keep_generated && store.is_writable(), worker_count(options.workers)}) {}
+
+  [[nodiscard]] Scene& scene() { return world.loaded.scene; }
+  Status begin();
+  Streamed& add_streamed(GridHandle handle, std::uint32_t number);
+  Streamed* streamed(std::uint32_t number) {
+    const auto found = grids.find(number);
+    return found == grids.end() ? nullptr : &found->second;
+  }
+  // Null where the game has removed it.
+  SceneGrid* content_of_grid(const Streamed& grid) {
+    return scene().grids().find(grid.handle) == nullptr ? nullptr : &scene().edit(grid.handle);
+  }
+
+  Status update(std::span<const Viewer> viewers, double seconds);
+  bool move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note);
+  void follow_instances();
+  [[nodiscard]] Eyes eyes_of(std::span<const Viewer> viewers);
+  void wish(ChunkStreamer::Note& note);
+  [[nodiscard]] std::size_t chunks_of_budget() const;
+  [[nodiscard]] bool is_near_anyone(const ChunkPlace& place) const;
+  void put(Arrival arrival, ChunkStreamer::Note& note);
+  void edit_on_arrival(Streamed& grid, Arrival& arrival, const SceneGrid& content);
+  void take_away(const ChunkPlace& place, ChunkStreamer::Note& note);
+  void note_edits();
+  Status save_now();
+  [[nodiscard]] std::size_t waiting_chunks() const;
+  [[nodiscard]] Status waits_for_broken() const;
+
+  StreamOptions options;
+  WorldStore store;
+  LoadedWorld world;
+  bool is_new = false;
+  std::map<std::uint32_t, Streamed> grids;
+  ChangeCursor followed_scene;
+
+  Eyes eyes;          // now
+  Eyes planned_eyes;  // of the last wishes
+  std::size_t planned_chunks = 0;
+  std::size_t planned_waiting = 0;
+  bool must_plan = true;
+  Clock::time_point planned{};
+  std::deque<Arrival> arrivals;
+  std::deque<ChunkPlace> leaving;
+
+  std::size_t loaded_chunks = 0;
+  std::size_t loaded_bytes = 0;
+  std::size_t other_bytes = 0;
+  Clock::time_point asked_others{};
+  bool is_edited = false;  // since the last save
+  Clock::time_point saved{};
+  bool has_moved = false;  // something came or went in the last update
+  std::vector<std::string> problems;
+  ChunkStreamer::Outbox box;
+  StreamStats totals;
+
+  ChunkStreamer streamer;  // last: its workers end first
+};
+
+Status StreamedWorld::Impl::begin() {
+  for (const GridHandle handle : scene().grids().handles()) {
+    const auto number = world.saver.number_of(handle);
+    QUOIN_ASSERT(number.has_value(), "a grid that was read has a number");
+    add_streamed(handle, *number);
+    const auto value = store.value(std::string(kTerrainValue) + std::to_string(*number));
+    if (!value) return value.error();
+    if (!*value) continue;
+    const auto terrain = terrain_from(**value);
+    if (!terrain) {
+      problems.push_back("the landscape of grid " + std::to_string(*number) + " is of an unknown kind, and ends");
+      continue;
+    }
+    auto generator = make_terrain_generator(*terrain, scene().types);
+    if (!generator) return generator.error();
+    streamer.set_generator(*number, std::move(*generator));
+  }
+  return save_now();
+}
+
+StreamedWorld::Impl::Streamed& StreamedWorld::Impl::add_streamed(GridHandle handle, std::uint32_t number) {
+  Streamed& added = grids[number];
+  added.handle = handle;
+  added.number = number;
+  const SceneGrid& content = scene().grids()[handle];
+  added.voxels = added.data = content.grid.cursor();
+  added.densities = content.field.cursor();
+  followed_scene = {};
+  return added;
+}
+
+void StreamedWorld::Impl::follow_instances() {
+  const SceneChanges changes = scene().changes_since(followed_scene);
+  if (!changes.all && changes.instances.empty() && changes.groups.empty() && changes.layers.empty()) return;
+  for (auto& [number, grid] : grids) grid.instances.clear();
+  std::map<GridHandle, Streamed*> by_handle;
+  for (auto& [number, grid] : grids) by_handle[grid.handle] = &grid;
+  for (const InstanceHandle handle : scene().instances().handles()) {
+    const Instance& instance = scene().instances()[handle];
+    const auto found = by_handle.find(instance.grid);
+    if (found != by_handle.end() && has_place(instance)) found->second->instances.push_back(handle);
+  }
+}
+
+StreamedWorld::Impl::Eyes StreamedWorld::Impl::eyes_of(std::span<const Viewer> viewers) {
+  follow_instances();
+  Eyes found;
+  for (auto& [number, grid] : grids) {
+    const SceneGrid* const content = scene().grids().find(grid.handle);
+    if (content == nullptr) continue;
+    for (const InstanceHandle handle : grid.instances) {
+      const Instance* const instance = scene().instances().find(handle);
+      if (instance == nullptr) continue;
+      for (const Viewer& viewer : viewers) {
+        if (!is_finite(viewer.position) || !(viewer.radius > 0.0)) continue;
+        Eye eye;
+        eye.position = grid_from_world(*instance, *content, viewer.position);
+        eye.radius = viewer.radius / instance->voxel_size;
+        eye.voxel_size = instance->voxel_size;
+        const double length = glm::length(viewer.direction);
+        if (std::isfinite(length) && length > 0.0) {
+          eye.direction = glm::normalize(grid_from_world_direction(*instance, viewer.direction / length));
+        }
+        if (is_finite(eye.position) && std::isfinite(eye.radius)) found[number].push_back(eye);
+      }
+    }
+  }
+  return found;
+}
+
+// As many as fit by what the loaded ones take, with all that is made of them.
+std::size_t StreamedWorld::Impl::chunks_of_budget() const {
+  const double total = static_cast<double>(loaded_bytes + other_bytes);
+  const double each = loaded_chunks < kGuessBelow ? std::max(kGuessedChunkBytes, total / kGuessBelow)
+                                                  : std::max(total / static_cast<double>(loaded_chunks), 64.0);
+  return static_cast<std::size_t>(static_cast<double>(options.budget_bytes) * kShareOfBudget / each);
+}
+
+namespace {
+
+bool sees_alike(const Eye& a, const Eye& b) {
+  if (a.radius != b.radius || a.voxel_size != b.voxel_size) return false;
+  if (glm::length(a.position - b.position) > kMoves) return false;
+  return a.direction == b.direction || glm::dot(a.direction, b.direction) >= kTurns;
+}
+
+bool see_alike(const std::map<std::uint32_t, std::vector<Eye>>& a, const std::map<std::uint32_t, std::vector<Eye>>& b) {
+  return std::ranges::equal(a, b, [](const auto& one, const auto& other) {
+    return one.first == other.first && std::ranges::equal(one.second, other.second, sees_alike);
+  });
+}
+
+}  // namespace
+
+void StreamedWorld::Impl::wish(ChunkStreamer::Note& note) {
+  const std::size_t fit = chunks_of_budget();
+  const bool is_over = loaded_bytes + other_bytes > options.budget_bytes;
+  const double change = static_cast<double>(fit) / static_cast<double>(std::max<std::size_t>(planned_chunks, 1));
+  // Where all fits, how much more would fit changes nothing.
+  const bool is_limited = planned_chunks <= box.wanted + box.wanted / 8 || fit <= box.wanted || is_over;
+  const bool is_other_budget = is_limited && (change < 0.97 || change > 1.05) && seconds_since(planned) > 0.1;
+  const std::size_t waits = waiting_chunks();
+  if (!must_plan && !is_other_budget && waits == planned_waiting && see_alike(eyes, planned_eyes)) return;
+  Wishes wishes;
+  wishes.eyes = eyes;
+  wishes.max_chunks = fit;
+  for (const auto& [number, grid] : grids) {
+    for (const auto& [chunk, edits] : grid.waiting) wishes.asked.push_back({number, 0, chunk});
+  }
+  std::ranges::sort(wishes.asked, [](const ChunkPlace& a, const ChunkPlace& b) {
+    return std::tie(a.grid, a.chunk.z, a.chunk.y, a.chunk.x) < std::tie(b.grid, b.chunk.z, b.chunk.y, b.chunk.x);
+  });
+  note.wishes = std::move(wishes);
+  planned_eyes = eyes;
+  planned_chunks = fit;
+  planned_waiting = waits;
+  must_plan = false;
+  planned = Clock::now();
+}
+
+bool StreamedWorld::Impl::is_near_anyone(const ChunkPlace& place) const {
+  const auto found = eyes.find(place.grid);
+  if (found == eyes.end()) return false;
+  const DVec3 low = DVec3(place.chunk) * double{kChunkEdge};
+  return std::ranges::any_of(found->second, [&](const Eye& eye) {
+    const DVec3 nearest = glm::clamp(eye.position, low, low + double{kChunkEdge});
+    return glm::length(nearest - eye.position) <= eye.radius + StreamPlan::kMargin;
+  });
+}
+
+// What edits did since the last time; what workers brought is no edit.
+void StreamedWorld::Impl::note_edits() {
+  for (auto& [number, grid] : grids) {
+    const SceneGrid* const content = scene().grids().find(grid.handle);
+    if (content == nullptr) continue;
+    const auto note = [&, &of = grid](const auto& changes) {
+      for (const auto& change : changes.items) {
+        if (!change.is_edit) continue;
+        is_edited = true;
+        const auto size = of.sizes.find(change.chunk);
+        if (size == of.sizes.end()) continue;
+        const Chunk* const voxels = content->grid.find_chunk(change.chunk);
+        const DensityChunk* const densities = content->field.find_chunk(change.chunk);
+        const std::size_t now =
+            (voxels == nullptr ? 0 : voxels->bytes()) + (densities == nullptr ? 0 : densities->bytes());
+        loaded_bytes = loaded_bytes - size->second + now;
+        size->second = now;
+        if (!store.is_writable()) of.kept.insert(change.chunk);
+      }
+      if (changes.all) {  // so much that it was not noted: whatever is loaded may have been edited
+        is_edited = true;
+        if (store.is_writable()) return;
+        for (const auto& [chunk, size] : of.sizes) of.kept.insert(chunk);
+      }
+    };
+    if (content->grid.has_changed_since(grid.voxels)) note(content->grid.changes_since(grid.voxels));
+    if (content->grid.has_data_changed_since(grid.data)) note(content->grid.data_changes_since(grid.data));
+    if (content->field.has_changed_since(grid.densities)) note(content->field.changes_since(grid.densities));
+  }
+}
+
+Status StreamedWorld::Impl::save_now() {
+  saved = Clock::now();
+  if (!store.is_writable()) return {};
+  const auto ticket = world.saver.save(store, scene());
+  if (!ticket) return ticket.error();
+  is_edited = false;
+  return {};
+}
+
+void StreamedWorld::Impl::edit_on_arrival(Streamed& grid, Arrival& arrival, const SceneGrid& content) {
+  const auto waiting = grid.waiting.find(arrival.place.chunk);
+  if (waiting == grid.waiting.end()) return;
+  // Partial grids of this chunk alone: whatever the edit does elsewhere it does not do here.
+  const IVec3 at = arrival.place.chunk;
+  Grid voxels;
+  voxels.make_partial();
+  voxels.load_chunk(at, arrival.chunk.voxels);
+  DensityGrid field(content.field.band());
+  field.make_partial();
+  if (arrival.chunk.densities) {
+    field.load_chunk(at, *arrival.chunk.densities);
+  } else {
+    field.load_air_chunk(at);
+  }
+  std::int64_t changed = 0;
+  for (const auto& edit : waiting->second) changed += apply_edit(*edit, voxels, field);
+  grid.waiting.erase(waiting);
+  if (changed == 0) return;
+  const Chunk* const now = voxels.find_chunk(at);
+  arrival.chunk.voxels = now == nullptr ? Chunk(kAir) : *now;
+  const DensityChunk* const densities = field.find_chunk(at);
+  arrival.chunk.densities = densities == nullptr ? std::nullopt : std::optional(*densities);
+  if (!store.is_writable()) {
+    grid.kept.insert(at);
+    return;
+  }
+  WorldChanges changes;
+  changes.put_chunk(arrival.place, arrival.chunk);
+  if (const auto done = store.save(std::move(changes)); !done) problems.push_back(to_string(done.error()));
+}
+
+void StreamedWorld::Impl::put(Arrival arrival, ChunkStreamer::Note& note) {
+  const ChunkPlace place = arrival.place;
+  Streamed* const grid = streamed(place.grid);
+  SceneGrid* const content = grid == nullptr ? nullptr : content_of_grid(*grid);
+  if (content == nullptr) return note.gone.push_back(place);
+  if (arrival.outcome == Arrival::Outcome::Broken) {
+    grid->broken.insert(place.chunk);
+    return note.broken.push_back(place);
+  }
+  if (arrival.outcome == Arrival::Outcome::OutOfMemory) {
+    must_plan = true;
+    return note.gone.push_back(place);
+  }
+  edit_on_arrival(*grid, arrival, *content);
+  if (!is_near_anyone(place) && !grid->kept.contains(place.chunk)) {
+    ++totals.chunks_dropped;
+    note.let_go.push_back(std::move(arrival.chunk));
+    return note.gone.push_back(place);
+  }
+  const std::size_t size = bytes_of(arrival.chunk);
+  content->grid.load_chunk(place.chunk, std::move(arrival.chunk.voxels));
+  if (arrival.chunk.densities) {
+    content->field.load_chunk(place.chunk, std::move(*arrival.chunk.densities));
+  } else {
+    content->field.load_air_chunk(place.chunk);
+  }
+  grid->sizes[place.chunk] = size;
+  loaded_bytes += size;
+  ++loaded_chunks;
+  note.here.push_back(place);
+}
+
+void StreamedWorld::Impl::take_away(const ChunkPlace& place, ChunkStreamer::Note& note) {
+  Streamed* const grid = streamed(place.grid);
+  SceneGrid* const content = grid == nullptr ? nullptr : content_of_grid(*grid);
+  if (content == nullptr) return note.gone.push_back(place);
+  if (grid->kept.contains(place.chunk) || !content->grid.is_loaded(place.chunk)) return;
+  StoredChunk last;  // so that it ends on another thread
+  if (const Chunk* const voxels = content->grid.find_chunk(place.chunk)) last.voxels = *voxels;
+  if (const DensityChunk* const densities = content->field.find_chunk(place.chunk)) last.densities = *densities;
+  content->grid.unload_chunk(place.chunk);
+  content->field.unload_chunk(place.chunk);
+  note.let_go.push_back(std::move(last));
+  note.gone.push_back(place);
+  const auto size = grid->sizes.find(place.chunk);
+  QUOIN_ASSERT(size != grid->sizes.end(), "what is loaded was counted");
+  loaded_bytes -= size->second;
+  grid->sizes.erase(size);
+  --loaded_chunks;
+  ++totals.chunks_unloaded;
+}
+
+// Chunks that came or are to go, as far as the time suffices; one at least. False where saving did not go well.
+bool StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note) {
+  has_moved = false;
+  const bool may_leave = !is_edited;
+  while (!arrivals.empty() || (may_leave && !leaving.empty())) {
+    if (has_moved && seconds_since(start) >= seconds) break;
+    has_moved = true;
+    // What goes makes room for what comes.
+    const bool is_over = loaded_bytes + other_bytes > options.budget_bytes;
+    if (may_leave && !leaving.empty() && (is_over || arrivals.empty() || leaving.size() >= arrivals.size())) {
+      take_away(leaving.front(), note);
+      leaving.pop_front();
+    } else if (!arrivals.empty()) {
+      put(std::move(arrivals.front()), note);
+      arrivals.pop_front();
+    } else {
+      break;
+    }
+  }
+  return may_leave || leaving.empty();
+}
+
+Status StreamedWorld::Impl::update(std::span<const Viewer> viewers, double seconds) {
+  const Clock::time_point start = Clock::now();
+  note_edits();
+  streamer.take(box);
+  for (Arrival& arrival : box.arrivals) arrivals.push_back(std::move(arrival));
+  if (box.has_leaving) leaving.assign(box.leaving.begin(), box.leaving.end());
+  std::ranges::move(box.problems, std::back_inserter(problems));
+  if (options.other_bytes && start - asked_others >= kAskOthers) {
+    other_bytes = options.other_bytes() + static_cast<std::size_t>(store.stats().pending_bytes);
+    asked_others = start;
+  }
+  Status outcome;
+  // Before anything is taken out of memory it is on its way to the disk.
+  if (start - saved >= options.save_interval || (is_edited && !leaving.empty())) outcome = save_now();
+  if (!store.is_writable()) is_edited = false;
+  eyes = eyes_of(viewers);
+  ChunkStreamer::Note note;
+  move_chunks(seconds, start, note);
+  wish(note);
+  streamer.post(std::move(note));
+  totals.longest_update_seconds = std::max(totals.longest_update_seconds, seconds_since(start));
+  return outcome;
+}
+
+std::size_t StreamedWorld::Impl::waiting_chunks() const {
+  std::size_t sum = 0;
+  for (const auto& [number, grid] : grids) sum += grid.waiting.size();
+  return sum;
+}
+
+Status StreamedWorld::Impl::waits_for_broken() const {
+  for (const auto& [number, grid] : grids) {
+    for (const auto& [chunk, edits] : grid.waiting) {
+      if (!grid.broken.contains(chunk)) continue;
+      return make_error(ErrorCode::CannotRead,
+                        "edits wait for chunk (" + std::to_string(chunk.x) + ", " + std::to_string(chunk.y) + ", " +
+                            std::to_string(chunk.z) + ") of grid " + std::to_string(number) + ", which is damaged",
+                        store.path().string());
+    }
+  }
+  return {};
+}
+
+StreamedWorld::StreamedWorld(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+StreamedWorld::StreamedWorld(StreamedWorld&&) noexcept = default;
+StreamedWorld& StreamedWorld::operator=(StreamedWorld&& other) noexcept {
+  if (this != &other) {
+    if (impl_ != nullptr) (void)flush();
+    impl_ = std::move(other.impl_);
+  }
+  return *this;
+}
+StreamedWorld::~StreamedWorld() {
+  if (impl_ != nullptr && impl_->store.is_writable()) (void)flush();
+}
+
+Result<StreamedWorld> StreamedWorld::open(const std::filesystem::path& path, WorldAccess access,
+                                          const StreamOptions& options) {
+  auto store = WorldStore::open(path, access);
+  if (!store) return store.error();
+  auto loaded = load_partial_world(*store);
+  if (!loaded) return loaded.error();
+  StreamedWorld world(std::make_unique<Impl>(std::move(*store), std::move(*loaded), options, false));
+  if (auto done = world.impl_->begin(); !done) return done.error();
+  return world;
+}
+
+Result<StreamedWorld> StreamedWorld::open_or_create(const std::filesystem::path& path, const StreamOptions& options) {
+  std::error_code error;
+  const bool is_there = std::filesystem::exists(path, error);
+  if (!is_there) {
+    if (const auto made = WorldStore::create(path); !made) return made.error();
+  }
+  auto world = open(path, WorldAccess::Write, options);
+  if (world) world->impl_->is_new = !is_there;
+  return world;
+}
+
+Scene& StreamedWorld::scene() {
+  return impl_->scene();
+}
+const Scene& StreamedWorld::scene() const {
+  return impl_->scene();
+}
+bool StreamedWorld::is_new() const {
+  return impl_->is_new;
+}
+const LoadedScene& StreamedWorld::opened() const {
+  return impl_->world.loaded;
+}
+void StreamedWorld::set_view(WorldView view) {
+  impl_->world.saver.set_view(std::move(view));
+}
+
+Result<GridHandle> StreamedWorld::add_grid(SceneGrid grid, std::shared_ptr<const ChunkGenerator> generator) {
+  QUOIN_ASSERT(grid.grid.voxel_count() == 0 && grid.field.chunk_count() == 0, "neither voxels nor densities");
+  if (!impl_->store.is_writable()) {
+    return make_error(ErrorCode::CannotWrite, "it was opened to be read", impl_->store.path().string());
+  }
+  grid.grid.make_partial();
+  grid.field.make_partial();
+  const GridHandle handle = scene().add_grid(std::move(grid));
+  if (auto saved = impl_->save_now(); !saved) {
+    scene().remove_grid(handle);
+    return saved.error();
+  }
+  const auto number = impl_->world.saver.number_of(handle);
+  QUOIN_ASSERT(number.has_value(), "a grid that was saved has a number");
+  impl_->add_streamed(handle, *number);
+  if (generator != nullptr) impl_->streamer.set_generator(*number, std::move(generator));
+  impl_->must_plan = true;
+  return handle;
+}
+
+void StreamedWorld::use_generator(GridHandle grid, std::shared_ptr<const ChunkGenerator> generator) {
+  const auto number = impl_->world.saver.number_of(grid);
+  QUOIN_ASSERT(number && impl_->streamed(*number) != nullptr, "a grid that is streamed");
+  impl_->streamer.set_generator(*number, std::move(generator));
+}
+
+Result<GridHandle> StreamedWorld::add_terrain(const EndlessTerrain& terrain) {
+  auto generator = make_terrain_generator(terrain, scene().types);
+  if (!generator) return generator.error();
+  SceneGrid grid;
+  grid.name = "terrain";
+  auto handle = add_grid(std::move(grid), std::move(*generator));
+  if (!handle) return handle;
+  WorldChanges changes;
+  changes.put_value(std::string(kTerrainValue) + std::to_string(*impl_->world.saver.number_of(*handle)),
+                    bytes_of_text(text_of(terrain)));
+  if (auto saved = store().save(std::move(changes)); !saved) return saved.error();
+  Instance instance;
+  instance.name = "terrain";
+  instance.grid = *handle;
+  scene().add_instance(instance);
+  if (auto saved = impl_->save_now(); !saved) return saved.error();
+  return handle;
+}
+
+Status StreamedWorld::update(std::span<const Viewer> viewers) {
+  return impl_->update(viewers, impl_->options.update_seconds);
+}
+
+Status StreamedWorld::load_all(std::span<const Viewer> viewers) {
+  constexpr double kAsLongAsItTakes = std::numeric_limits<double>::infinity();
+  for (;;) {
+    if (auto done = impl_->update(viewers, kAsLongAsItTakes); !done) return done;
+    const bool is_quiet = !impl_->has_moved && impl_->box.missing == 0 && impl_->box.begun == 0;
+    if (is_quiet && see_alike(impl_->eyes, impl_->planned_eyes) && impl_->box.plans != 0) return {};
+    impl_->streamer.wait();
+  }
+}
+
+bool StreamedWorld::is_loaded(GridHandle grid, IVec3 chunk) const {
+  const SceneGrid* const content = scene().grids().find(grid);
+  return content != nullptr && content->grid.is_loaded(chunk);
+}
+
+Status StreamedWorld::apply(const WorldEdit& edit) {
+  Impl::Streamed* const grid = impl_->streamed(edit.grid);
+  SceneGrid* const content = grid == nullptr ? nullptr : impl_->content_of_grid(*grid);
+  if (content == nullptr) {
+    return make_error(ErrorCode::InvalidArgument, "the world has no grid " + std::to_string(edit.grid));
+  }
+  const auto chunks = chunks_of_edit(edit, content->field.band());
+  if (!chunks) return chunks.error();
+  std::shared_ptr<const WorldEdit> kept;
+  for (const IVec3 chunk : *chunks) {
+    if (content->grid.is_loaded(chunk)) continue;
+    if (kept == nullptr) kept = std::make_shared<const WorldEdit>(edit);
+    grid->waiting[chunk].push_back(kept);
+  }
+  apply_edit(edit, content->grid, content->field);
+  return {};
+}
+
+Status StreamedWorld::flush() {
+  constexpr double kAsLongAsItTakes = std::numeric_limits<double>::infinity();
+  Status waits;
+  while (impl_->waiting_chunks() != 0) {
+    waits = impl_->waits_for_broken();
+    if (!waits) break;
+    // Around nobody: what comes is edited, saved and dropped, but for what is near those of the last update.
+    ChunkStreamer::Note note;
+    impl_->streamer.take(impl_->box);
+    for (Arrival& arrival : impl_->box.arrivals) impl_->arrivals.push_back(std::move(arrival));
+    if (impl_->box.has_leaving) impl_->leaving.assign(impl_->box.leaving.begin(), impl_->box.leaving.end());
+    std::ranges::move(impl_->box.problems, std::back_inserter(impl_->problems));
+    impl_->leaving.clear();
+    impl_->must_plan = true;
+    impl_->move_chunks(kAsLongAsItTakes, Clock::now(), note);
+    impl_->wish(note);
+    impl_->streamer.post(std::move(note));
+    if (impl_->waiting_chunks() != 0) impl_->streamer.wait();
+  }
+  impl_->note_edits();
+  if (auto saved = impl_->save_now(); !saved) return saved;
+  if (impl_->store.is_writable()) {
+    if (auto flushed = impl_->store.flush(); !flushed) return flushed;
+  }
+  return waits;
+}
+
+std::vector<std::string> StreamedWorld::take_problems() {
+  return std::exchange(impl_->problems, {});
+}
+
+StreamStats StreamedWorld::stats() {
+  StreamStats now = impl_->totals;
+  impl_->totals.longest_update_seconds = 0.0;
+  now.loaded_chunks = impl_->loaded_chunks;
+  now.loaded_bytes = impl_->loaded_bytes;
+  now.other_bytes = impl_->other_bytes;
+  now.wanted_chunks = impl_->box.wanted;
+  now.missing_chunks = impl_->box.missing;
+  now.waiting_edits = impl_->waiting_chunks();
+  now.complete_radius = impl_->box.complete_radius;
+  now.chunks_read = impl_->box.read;
+  now.chunks_made = impl_->box.made;
+  return now;
+}
+
+WorldStore& StreamedWorld::store() {
+  return impl_->store;
+}
+
+}  // namespace quoin

@@ -1,0 +1,76 @@
+#include <utility>
+
+#include <quoin/stream/chunk_generator.h>
+#include <quoin/terrain/terrain.h>
+
+namespace quoin {
+namespace {
+
+// Chunks from the origin, along x and z.
+constexpr int kReach = 1 << 18;
+
+class VoxelTerrain final : public ChunkGenerator {
+ public:
+  VoxelTerrain(const EndlessTerrain& terrain, const TerrainTypes& types) : terrain_(terrain), types_(types) {}
+
+  [[nodiscard]] IBox chunks() const override {
+    return {{-kReach, 0, -kReach}, {kReach, terrain_.height, kReach}};
+  }
+  [[nodiscard]] Result<StoredChunk> make(IVec3 chunk) const override {
+    constexpr int kUnits = kChunkEdge / kTerrainUnit;
+    TerrainOptions piece;
+    piece.seed = terrain_.seed;
+    piece.size = {kUnits, kUnits * terrain_.height, kUnits};
+    piece.first_x = kUnits * chunk.x;
+    piece.first_z = kUnits * chunk.z;
+    return StoredChunk{generate_terrain_chunk(piece, types_, chunk)};
+  }
+
+ private:
+  EndlessTerrain terrain_;
+  TerrainTypes types_;
+};
+
+class SmoothTerrain final : public ChunkGenerator {
+ public:
+  SmoothTerrain(const EndlessTerrain& terrain, const TerrainTypes& types) : terrain_(terrain), types_(types) {}
+
+  [[nodiscard]] IBox chunks() const override {
+    return {{-kReach, 0, -kReach}, {kReach, terrain_.height, kReach}};
+  }
+  [[nodiscard]] Result<StoredChunk> make(IVec3 chunk) const override {
+    // A piece is closed at its sides: the chunk lies in the middle of one.
+    SmoothTerrainOptions piece;
+    piece.seed = terrain_.seed;
+    piece.size = {3, terrain_.height, 3};
+    piece.first_x = chunk.x - 1;
+    piece.first_z = chunk.z - 1;
+    StoredChunk made;
+    made.densities = generate_smooth_terrain_chunk(piece, types_, chunk);
+    return made;
+  }
+
+ private:
+  EndlessTerrain terrain_;
+  TerrainTypes types_;
+};
+
+}  // namespace
+
+Result<std::shared_ptr<const ChunkGenerator>> make_terrain_generator(const EndlessTerrain& terrain,
+                                                                     VoxelRegistry& types) {
+  if (terrain.height < 1 || terrain.height > 16) {
+    return make_error(ErrorCode::InvalidArgument, "a landscape is 1 to 16 chunks high");
+  }
+  const auto filled = add_terrain_types(types);
+  if (!filled) return filled.error();
+  std::shared_ptr<const ChunkGenerator> made;
+  if (terrain.is_smooth) {
+    made = std::make_shared<SmoothTerrain>(terrain, *filled);
+  } else {
+    made = std::make_shared<VoxelTerrain>(terrain, *filled);
+  }
+  return made;
+}
+
+}  // namespace quoin

@@ -1,0 +1,121 @@
+#include <quoin/stream/world_edit.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "core/coordinates/chunk_order.h"
+#include "grid/long_box.h"
+
+namespace quoin {
+namespace {
+
+template <class... Each>
+struct Overloaded : Each... {
+  using Each::operator()...;
+};
+
+bool is_length(double value) {
+  return std::isfinite(value) && value >= 0.0;
+}
+
+Error not_sound(const char* what) {
+  return make_error(ErrorCode::InvalidArgument, std::string(what) + " that is not finite, or negative");
+}
+
+Result<std::vector<IVec3>> chunks_of_box(const LongBox& wanted) {
+  const LongBox box = clipped(wanted);
+  std::vector<IVec3> chunks;
+  if (is_empty(box)) return chunks;
+  const IBox range = chunks_of(box);
+  const DVec3 size(range.size());
+  if (size.x * size.y * size.z > static_cast<double>(kMaxEditChunks)) {
+    return make_error(ErrorCode::LimitExceeded,
+                      "an edit of more than " + std::to_string(kMaxEditChunks) + " chunks at once");
+  }
+  for (int z = range.min.z; z < range.max.z; ++z) {
+    for (int y = range.min.y; y < range.max.y; ++y) {
+      for (int x = range.min.x; x < range.max.x; ++x) chunks.push_back({x, y, z});
+    }
+  }
+  return chunks;
+}
+
+Result<std::vector<IVec3>> chunks_of_voxels(std::span<const PlacedVoxel> voxels) {
+  std::vector<IVec3> chunks;
+  for (const PlacedVoxel& each : voxels) {
+    const IVec3 at = chunk_of(each.voxel);
+    if (is_inside_world(at) && (chunks.empty() || chunks.back() != at)) chunks.push_back(at);
+  }
+  sort_and_unite(chunks);
+  if (chunks.size() > kMaxEditChunks) {
+    return make_error(ErrorCode::LimitExceeded,
+                      "an edit of more than " + std::to_string(kMaxEditChunks) + " chunks at once");
+  }
+  return chunks;
+}
+
+}  // namespace
+
+bool WorldEdit::SetVoxels::operator==(const SetVoxels& other) const {
+  return std::ranges::equal(voxels, other.voxels, [](const PlacedVoxel& a, const PlacedVoxel& b) {
+    return a.voxel == b.voxel && a.type == b.type;
+  });
+}
+
+Result<std::vector<IVec3>> chunks_of_edit(const WorldEdit& edit, float band) {
+  using Chunks = Result<std::vector<IVec3>>;
+  return std::visit(
+      Overloaded{[](const WorldEdit::SetVoxels& set) { return chunks_of_voxels(set.voxels); },
+                 [](const WorldEdit::SetData& set) -> Chunks {
+                   if (set.bytes.size() > kMaxVoxelDataBytes) {
+                     return make_error(ErrorCode::LimitExceeded, "more data at a voxel than it can hold");
+                   }
+                   const PlacedVoxel voxel{set.voxel, 0};
+                   return chunks_of_voxels({&voxel, 1});
+                 },
+                 [](const WorldEdit::FillBox& fill) { return chunks_of_box(box_from(fill.box)); },
+                 [](const WorldEdit::FillSphere& fill) -> Chunks {
+                   if (!is_finite(fill.centre) || !is_length(fill.radius)) return not_sound("a sphere");
+                   return chunks_of_box(box_around(fill.centre - fill.radius, fill.centre + fill.radius));
+                 },
+                 [&](const WorldEdit::FieldSphere& sphere) -> Chunks {
+                   if (!is_finite(sphere.centre) || !is_length(sphere.radius) || !is_length(sphere.blend)) {
+                     return not_sound("a sphere");
+                   }
+                   const double reach = sphere.radius + double{band};
+                   return chunks_of_box(box_around(sphere.centre - reach, sphere.centre + reach));
+                 },
+                 [&](const WorldEdit::FieldBox& box) -> Chunks {
+                   if (!is_finite(box.min) || !is_finite(box.max) || !is_length(box.rounding) ||
+                       !is_length(box.blend)) {
+                     return not_sound("a box");
+                   }
+                   return chunks_of_box(box_around(box.min - double{band}, box.max + double{band}));
+                 }},
+      edit.content);
+}
+
+std::int64_t apply_edit(const WorldEdit& edit, Grid& grid, DensityGrid& field) {
+  return std::visit(
+      Overloaded{[&](const WorldEdit::SetVoxels& set) { return grid.set(set.voxels); },
+                 [&](const WorldEdit::SetData& set) {
+                   return std::int64_t{grid.set_data(set.voxel, {set.state, set.bytes})};
+                 },
+                 [&](const WorldEdit::FillBox& fill) { return grid.fill_box(fill.box, fill.type); },
+                 [&](const WorldEdit::FillSphere& fill) {
+                   return grid.fill_sphere(fill.centre, fill.radius, fill.type);
+                 },
+                 [&](const WorldEdit::FieldSphere& sphere) {
+                   if (sphere.material == kAir) return field.remove_sphere(sphere.centre, sphere.radius, sphere.blend);
+                   return field.add_sphere(sphere.centre, sphere.radius, sphere.material, sphere.blend);
+                 },
+                 [&](const WorldEdit::FieldBox& box) {
+                   if (box.material == kAir) return field.remove_box(box.min, box.max, box.rounding, box.blend);
+                   return field.add_box(box.min, box.max, box.material, box.rounding, box.blend);
+                 }},
+      edit.content);
+}
+
+}  // namespace quoin
