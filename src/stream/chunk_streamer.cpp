@@ -108,8 +108,8 @@ void ChunkStreamer::read_inbox() {
   for (const ChunkPlace& place : note.here) plan_.set_state(place, StreamPlan::State::Here);
   for (const ChunkPlace& place : note.broken) plan_.set_state(place, StreamPlan::State::Broken);
   if (note.wishes) {
+    plans_ = note.wishes->number;
     plan_.plan(std::move(*note.wishes));
-    ++plans_;
   }
 }
 

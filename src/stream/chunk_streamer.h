@@ -61,7 +61,7 @@ class ChunkStreamer {
     std::size_t wanted = 0;
     std::size_t missing = 0;
     double complete_radius = 0.0;
-    std::uint64_t plans = 0;  ///< wishes that were planned for
+    std::uint64_t plans = 0;  ///< the number of the wishes that were planned for last
     std::uint64_t read = 0;   ///< chunks, in all
     std::uint64_t made = 0;
     std::size_t begun = 0;  ///< chunks that workers are at

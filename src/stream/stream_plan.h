@@ -29,6 +29,7 @@ struct Wishes {
   std::map<std::uint32_t, std::vector<Eye>> eyes;  ///< of each grid, by its number in the world
   std::size_t max_chunks = 0;                      ///< that the budget suffices for
   std::vector<ChunkPlace> asked;                   ///< for edits: wherever they lie
+  std::uint64_t number = 0;                        ///< the caller's own; greater for later ones
 };
 
 /// Which chunks are to be loaded, nearest first, and which are to go.

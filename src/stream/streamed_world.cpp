@@ -134,6 +134,7 @@ struct StreamedWorld::Impl {
   Eyes planned_eyes;  // of the last wishes
   std::size_t planned_chunks = 0;
   std::size_t planned_waiting = 0;
+  std::uint64_t posted_plans = 0;
   bool must_plan = true;
   Clock::time_point planned{};
   std::deque<Arrival> arrivals;
@@ -265,6 +266,7 @@ void StreamedWorld::Impl::wish(ChunkStreamer::Note& note) {
   std::ranges::sort(wishes.asked, [](const ChunkPlace& a, const ChunkPlace& b) {
     return std::tie(a.grid, a.chunk.z, a.chunk.y, a.chunk.x) < std::tie(b.grid, b.chunk.z, b.chunk.y, b.chunk.x);
   });
+  wishes.number = ++posted_plans;
   note.wishes = std::move(wishes);
   planned_eyes = eyes;
   planned_chunks = fit;
@@ -577,7 +579,7 @@ Status StreamedWorld::load_all(std::span<const Viewer> viewers) {
   for (;;) {
     if (auto done = impl_->update(viewers, kAsLongAsItTakes); !done) return done;
     const bool is_quiet = !impl_->has_moved && impl_->box.missing == 0 && impl_->box.begun == 0;
-    if (is_quiet && see_alike(impl_->eyes, impl_->planned_eyes) && impl_->box.plans != 0) return {};
+    if (is_quiet && impl_->box.plans == impl_->posted_plans) return {};
     impl_->streamer.wait();
   }
 }

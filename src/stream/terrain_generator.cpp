@@ -17,12 +17,13 @@ class VoxelTerrain final : public ChunkGenerator {
     return {{-kReach, 0, -kReach}, {kReach, terrain_.height, kReach}};
   }
   [[nodiscard]] Result<StoredChunk> make(IVec3 chunk) const override {
+    // Trees end at a piece's sides: the chunk lies in the middle of one.
     constexpr int kUnits = kChunkEdge / kTerrainUnit;
     TerrainOptions piece;
     piece.seed = terrain_.seed;
-    piece.size = {kUnits, kUnits * terrain_.height, kUnits};
-    piece.first_x = kUnits * chunk.x;
-    piece.first_z = kUnits * chunk.z;
+    piece.size = {3 * kUnits, kUnits * terrain_.height, 3 * kUnits};
+    piece.first_x = kUnits * (chunk.x - 1);
+    piece.first_z = kUnits * (chunk.z - 1);
     return StoredChunk{generate_terrain_chunk(piece, types_, chunk)};
   }
 

@@ -41,7 +41,7 @@ struct EndlessTerrain {
 };
 
 /// Its generator. Bits: as `generate_terrain`; each chunk is that of any piece of this height and seed that holds it,
-/// but for the sides of pieces of smooth terrain. It reaches 2^24 voxels from the origin.
+/// but for what lies within a chunk of the piece's sides. It reaches 2^24 voxels from the origin.
 /// Errors: InvalidArgument for heights out of their range; LimitExceeded where the registry is full: `types` gets the
 ///         landscape's (`add_terrain_types`).
 [[nodiscard]] Result<std::shared_ptr<const ChunkGenerator>> make_terrain_generator(const EndlessTerrain& terrain,

@@ -1,0 +1,441 @@
+#include <quoin/stream/streamed_world.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <random>
+#include <thread>
+#include <tuple>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <quoin/live/live_meshes.h>
+#include <quoin/store/world_care.h>
+#include <quoin/terrain/terrain.h>
+
+#include "store/world/world_for_tests.h"
+
+namespace quoin {
+namespace {
+
+using Key = std::tuple<int, int, int>;
+
+/// Ground below y = 0 with a pattern of its own in each chunk; counts who asks.
+class PatternGround final : public ChunkGenerator {
+ public:
+  explicit PatternGround(int delay_microseconds = 0) : delay_(delay_microseconds) {}
+  [[nodiscard]] IBox chunks() const override { return {{-1000, -2, -1000}, {1000, 2, 1000}}; }
+  [[nodiscard]] Result<StoredChunk> make(IVec3 chunk) const override {
+    {
+      const std::scoped_lock lock(mutex_);
+      ++asked_[{chunk.x, chunk.y, chunk.z}];
+    }
+    if (delay_ != 0) {
+      const auto spread = static_cast<unsigned>(chunk.x * 7 + chunk.y * 13 + chunk.z * 31) % 5U;
+      std::this_thread::sleep_for(std::chrono::microseconds(delay_ * static_cast<int>(spread)));
+    }
+    return StoredChunk{of(chunk)};
+  }
+  static Chunk of(IVec3 chunk) {
+    if (chunk.y >= 0) return Chunk(kAir);
+    Chunk made(1);
+    const auto noise = static_cast<unsigned>(chunk.x * 73'856'093 ^ chunk.y * 19'349'663 ^ chunk.z * 83'492'791);
+    made.set({static_cast<int>(noise % 64), static_cast<int>(noise / 64 % 64), static_cast<int>(noise / 4096 % 64)}, 2);
+    return made;
+  }
+  [[nodiscard]] int most_asked() const {
+    const std::scoped_lock lock(mutex_);
+    int most = 0;
+    for (const auto& [chunk, count] : asked_) most = std::max(most, count);
+    return most;
+  }
+  [[nodiscard]] std::size_t asked() const {
+    const std::scoped_lock lock(mutex_);
+    return asked_.size();
+  }
+
+ private:
+  int delay_;
+  mutable std::mutex mutex_;
+  mutable std::map<Key, int> asked_;
+};
+
+class StreamedWorldTest : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::filesystem::path path(const char* name = "world.quoin") const { return folder_ / name; }
+
+  static void add_types(StreamedWorld& world) {
+    for (std::uint8_t type = 1; type <= 3; ++type) {
+      ASSERT_TRUE(world.scene().types.add(coloured_type(type)).has_value());
+    }
+  }
+  // A world of one grid of PatternGround; the grid's number is 0.
+  static StreamedWorld ground(const std::filesystem::path& path, const std::shared_ptr<const PatternGround>& generator,
+                              StreamOptions options = {}) {
+    auto world = StreamedWorld::open_or_create(path, options);
+    EXPECT_TRUE(world.has_value()) << to_string(world.error());
+    if (world->is_new()) {
+      add_types(*world);
+      const auto grid = world->add_grid({.name = "ground"}, generator);
+      EXPECT_TRUE(grid.has_value()) << to_string(grid.error());
+      Instance instance;
+      instance.grid = *grid;
+      world->scene().add_instance(instance);
+    } else {
+      world->use_generator(only_grid(*world), generator);
+    }
+    return std::move(*world);
+  }
+  static GridHandle only_grid(const StreamedWorld& world) { return world.scene().grids().handles().front(); }
+
+  WorldFolder folder_;
+};
+
+TEST_F(StreamedWorldTest, LoadsWhatIsAroundAViewerAndNothingElse) {
+  auto generator = std::make_shared<PatternGround>();
+  StreamedWorld world = ground(path(), generator);
+  const Viewer viewer{.position = {10.0, 5.0, 10.0}, .radius = 150.0};
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  const Grid& grid = world.scene().grids()[only_grid(world)].grid;
+  for (int z = -4; z <= 4; ++z) {
+    for (int y = -4; y <= 4; ++y) {
+      for (int x = -4; x <= 4; ++x) {
+        const IVec3 chunk{x, y, z};
+        const DVec3 low = DVec3(chunk) * 64.0;
+        const double distance = glm::length(glm::clamp(viewer.position, low, low + 64.0) - viewer.position);
+        EXPECT_EQ(grid.is_loaded(chunk), distance <= 150.0) << x << " " << y << " " << z;
+        if (!grid.is_loaded(chunk)) continue;
+        const Chunk* const held = grid.find_chunk(chunk);
+        EXPECT_EQ(held == nullptr ? Chunk(kAir) : *held, y >= -2 ? PatternGround::of(chunk) : Chunk(kAir));
+      }
+    }
+  }
+  const StreamStats stats = world.stats();
+  EXPECT_EQ(stats.missing_chunks, 0U);
+  EXPECT_EQ(stats.complete_radius, 150.0);
+  EXPECT_EQ(stats.loaded_chunks, grid.loaded_chunks().size());
+  EXPECT_TRUE(world.take_problems().empty());
+}
+
+TEST_F(StreamedWorldTest, EditsSurviveEvictionAndTheGeneratorIsAskedOnce) {
+  auto generator = std::make_shared<PatternGround>();
+  {
+    StreamedWorld world = ground(path(), generator);
+    const GridHandle handle = only_grid(world);
+    Viewer viewer{.position = {0.0, 0.0, 0.0}, .radius = 100.0};
+    ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+    EXPECT_TRUE(world.scene().edit(handle).grid.set(3, -3, 3, 3));
+    EXPECT_TRUE(world.scene().edit(handle).grid.set_data({3, -3, 3}, {9, {}}));
+    viewer.position.x = 5000.0;
+    ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+    EXPECT_FALSE(world.is_loaded(handle, {0, -1, 0}));
+    EXPECT_EQ(world.scene().grids()[handle].grid.get(3, -3, 3), kAir);
+    viewer.position.x = 0.0;
+    ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+    EXPECT_EQ(world.scene().grids()[handle].grid.get(3, -3, 3), 3);
+    EXPECT_EQ(world.scene().grids()[handle].grid.data({3, -3, 3}).state, 9U);
+    EXPECT_EQ(generator->most_asked(), 1);
+  }
+  const std::size_t asked = generator->asked();
+  StreamedWorld world = ground(path(), generator);
+  const Viewer viewer{.position = {0.0, 0.0, 0.0}, .radius = 100.0};
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  EXPECT_EQ(world.scene().grids()[only_grid(world)].grid.get(3, -3, 3), 3);
+  EXPECT_EQ(world.scene().instances().size(), 1U);
+  EXPECT_EQ(generator->asked(), asked);
+  EXPECT_EQ(generator->most_asked(), 1);
+}
+
+TEST_F(StreamedWorldTest, WhatWasEditedIsSavedThoughTheWorldJustEnds) {
+  auto generator = std::make_shared<PatternGround>();
+  {
+    StreamedWorld world = ground(path(), generator);
+    const Viewer viewer{.radius = 70.0};
+    ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+    world.scene().edit(only_grid(world)).grid.set(1, 1, 1, 2);
+    ASSERT_TRUE(world.apply({0, WorldEdit::SetVoxels{{{{9000, 1, 1}, 3}}}}).has_value());
+  }
+  EXPECT_TRUE(check_world(path())->damage.empty());
+  const auto loaded = load_world(*WorldStore::open(path(), WorldAccess::Read));
+  ASSERT_TRUE(loaded.has_value());
+  const Grid& grid = loaded->loaded.scene.grids()[loaded->loaded.scene.grids().handles().front()].grid;
+  EXPECT_EQ(grid.get(1, 1, 1), 2);
+  EXPECT_EQ(grid.get(9000, 1, 1), 3);
+}
+
+TEST_F(StreamedWorldTest, TheBudgetHoldsAndTheNearestStay) {
+  auto generator = std::make_shared<PatternGround>();
+  StreamOptions options;
+  std::size_t others = 0;
+  options.other_bytes = [&] { return others; };
+  options.budget_bytes = std::size_t{4} << 20;
+  StreamedWorld world = ground(path(), generator, options);
+  Viewer viewer{.position = {32.0, -10.0, 32.0}, .radius = 700.0};
+  std::size_t most = 0;
+  for (int step = 0; step < 25; ++step) {
+    viewer.position.x += 20.0;
+    for (int i = 0; i < 20; ++i) {
+      ASSERT_TRUE(world.update({&viewer, 1}).has_value());
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    const StreamStats stats = world.stats();
+    most = std::max(most, stats.loaded_bytes);
+    // Meshes and the like of what is loaded.
+    others = 3000 * stats.loaded_chunks;
+    EXPECT_LE(stats.loaded_bytes + stats.other_bytes, options.budget_bytes + options.budget_bytes / 4) << step;
+  }
+  EXPECT_GT(most, options.budget_bytes / 16);
+  EXPECT_TRUE(world.is_loaded(only_grid(world), chunk_of(IVec3(viewer.position))));
+}
+
+TEST_F(StreamedWorldTest, EditsReachWhatIsNotLoaded) {
+  auto generator = std::make_shared<PatternGround>();
+  StreamedWorld world = ground(path(), generator);
+  const Viewer viewer{.radius = 100.0};
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  const std::size_t loaded = world.stats().loaded_chunks;
+  ASSERT_TRUE(world.apply({0, WorldEdit::FillBox{{{-10, -10, -10}, {3000, -5, 3}}, 3}}).has_value());
+  EXPECT_GT(world.stats().waiting_edits, 0U);
+  ASSERT_TRUE(world.apply({0, WorldEdit::SetVoxels{{{{2000, -6, 0}, 2}}}}).has_value());  // later than the box
+  ASSERT_TRUE(world.flush().has_value());
+  EXPECT_EQ(world.stats().waiting_edits, 0U);
+  EXPECT_LT(world.stats().loaded_chunks, loaded + 10);  // of what it came by, what is near stays
+  const auto kept = world.store().load_chunk({0, 0, chunk_of(IVec3{2000, -6, 0})});
+  ASSERT_TRUE(kept.has_value() && kept->has_value());
+  EXPECT_EQ((*kept)->voxels.get(local_of(IVec3{2000, -6, 0})), 2);
+  EXPECT_EQ((*kept)->voxels.get(local_of(IVec3{2001, -6, 0})), 3);
+  EXPECT_EQ(world.scene().grids()[only_grid(world)].grid.get(5, -6, 0), 3);
+  EXPECT_EQ(world.apply({7, WorldEdit::FillBox{}}).error().code, ErrorCode::InvalidArgument);
+}
+
+TEST_F(StreamedWorldTest, MeshesHaveNoWallsWhereTheWorldIsNotLoaded) {
+  auto generator = std::make_shared<PatternGround>();
+  StreamedWorld world = ground(path(), generator);
+  LiveMeshes meshes;
+  const Viewer viewer{.position = {32.0, 10.0, 32.0}, .radius = 200.0};
+  std::map<Key, std::size_t> quads;
+  const auto follow = [&](const Viewer& now) {
+    ASSERT_TRUE(world.load_all({&now, 1}).has_value());
+    meshes.finish(world.scene(), now.position);
+    for (const SurfaceUpdate& update : meshes.take()) {
+      const Key key{update.chunk.x, update.chunk.y, update.chunk.z};
+      if (update.surface == nullptr) {
+        quads.erase(key);
+      } else {
+        quads[key] = update.surface->quads.size();
+        for (const SurfaceRegion& region : update.surface->regions) {
+          for (const Direction side : {Direction::PosX, Direction::NegX, Direction::PosZ, Direction::NegZ}) {
+            const auto d = static_cast<std::size_t>(side);
+            EXPECT_EQ(region.opaque[d], region.opaque[d + 1]) << "a wall";
+          }
+        }
+      }
+    }
+  };
+  follow(viewer);
+  // Ground without end, from y = -128 to 0.
+  ASSERT_FALSE(quads.empty());
+  const Grid& grid = world.scene().grids()[only_grid(world)].grid;
+  for (const auto& [chunk, count] : quads) {
+    EXPECT_TRUE(grid.is_loaded_around({std::get<0>(chunk), std::get<1>(chunk), std::get<2>(chunk)}));
+  }
+  EXPECT_TRUE(quads.contains({0, -1, 0}));
+  Viewer far = viewer;
+  far.position.x = 1000.0;
+  follow(far);
+  EXPECT_FALSE(quads.contains({0, -1, 0}));
+  EXPECT_TRUE(quads.contains({15, -1, 0}));
+}
+
+TEST_F(StreamedWorldTest, FieldsAreStreamedLikeVoxels) {
+  Viewer viewer{.position = {100.0, 100.0, 100.0}, .radius = 130.0};
+  {
+    auto world = StreamedWorld::open_or_create(path());
+    ASSERT_TRUE(world.has_value());
+    const auto grid = world->add_terrain({.seed = 3, .height = 2, .is_smooth = true});
+    ASSERT_TRUE(grid.has_value()) << to_string(grid.error());
+    ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+    DensityGrid& field = world->scene().edit(*grid).field;
+    EXPECT_GT(field.chunk_count(), 4U);
+    EXPECT_GT(field.add_sphere({100.0, 110.0, 100.0}, 12.0, 1), 0);
+    LiveMeshes meshes;
+    meshes.finish(world->scene(), viewer.position);
+    EXPECT_FALSE(meshes.take().empty());
+    viewer.position.x = 2000.0;
+    ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+    EXPECT_FALSE(world->is_loaded(*grid, {1, 1, 1}));
+    viewer.position.x = 100.0;
+    ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+    EXPECT_LT(world->scene().grids()[*grid].field.density({100, 110, 100}), 0.0F);
+  }
+  // The landscape goes on when the world is opened again.
+  auto world = StreamedWorld::open(path(), WorldAccess::Write);
+  ASSERT_TRUE(world.has_value()) << to_string(world.error());
+  viewer.position.z = 1500.0;
+  ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+  EXPECT_GT(world->stats().chunks_made, 0U);
+  EXPECT_GT(world->scene().grids()[only_grid(*world)].field.chunk_count(), 4U);
+}
+
+TEST_F(StreamedWorldTest, TerrainIsTheSameAsInOnePiece) {
+  VoxelRegistry types;
+  const auto filled = add_terrain_types(types);
+  const auto whole = generate_terrain({.seed = 5, .size = {8, 4, 8}}, *filled);
+  VoxelRegistry again;
+  const auto generator = make_terrain_generator({.seed = 5, .height = 2}, again);
+  ASSERT_TRUE(generator.has_value());
+  for (int z = 1; z < 3; ++z) {
+    for (int y = 0; y < 2; ++y) {
+      for (int x = 1; x < 3; ++x) {
+        const Chunk* const expected = whole->find_chunk(x, y, z);
+        EXPECT_EQ((*generator)->make({x, y, z})->voxels, expected == nullptr ? Chunk(kAir) : *expected);
+      }
+    }
+  }
+  EXPECT_FALSE(make_terrain_generator({.height = 0}, again).has_value());
+  EXPECT_FALSE(make_terrain_generator({.height = 17}, again).has_value());
+}
+
+TEST_F(StreamedWorldTest, AWorldThatIsOnlyReadKeepsItsEditsInMemory) {
+  auto generator = std::make_shared<PatternGround>();
+  Viewer viewer{.radius = 100.0};
+  {
+    StreamedWorld world = ground(path(), generator);
+    ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  }
+  auto world = StreamedWorld::open(path(), WorldAccess::Read);
+  ASSERT_TRUE(world.has_value()) << to_string(world.error());
+  const GridHandle grid = only_grid(*world);
+  world->use_generator(grid, generator);
+  ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+  EXPECT_TRUE(world->scene().edit(grid).grid.set(3, 3, 3, 2));
+  viewer.position.x = 4000.0;
+  ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+  EXPECT_TRUE(world->is_loaded(grid, {0, 0, 0}));
+  EXPECT_FALSE(world->is_loaded(grid, {0, -1, 0}));
+  EXPECT_EQ(world->scene().grids()[grid].grid.get(3, 3, 3), 2);
+  EXPECT_TRUE(world->flush().has_value());
+}
+
+/// Fails for one chunk.
+class BrokenGround final : public ChunkGenerator {
+ public:
+  [[nodiscard]] IBox chunks() const override { return {{-9, -9, -9}, {9, 9, 9}}; }
+  [[nodiscard]] Result<StoredChunk> make(IVec3 chunk) const override {
+    if (chunk == IVec3{0, 0, 0}) return make_error(ErrorCode::BadFormat, "a broken region");
+    return StoredChunk{Chunk(1)};
+  }
+};
+
+TEST_F(StreamedWorldTest, WhatCannotBeMadeIsNamedAndIsAir) {
+  auto world = StreamedWorld::open_or_create(path());
+  ASSERT_TRUE(world.has_value());
+  add_types(*world);
+  const auto grid = world->add_grid({}, std::make_shared<BrokenGround>());
+  Instance instance;
+  instance.grid = *grid;
+  world->scene().add_instance(instance);
+  const Viewer viewer{.radius = 80.0};
+  ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
+  EXPECT_TRUE(world->is_loaded(*grid, {0, 0, 0}));
+  EXPECT_EQ(world->scene().grids()[*grid].grid.get(1, 1, 1), kAir);
+  const auto problems = world->take_problems();
+  ASSERT_EQ(problems.size(), 1U);
+  EXPECT_NE(problems[0].find("a broken region"), std::string::npos);
+}
+
+// Random flights, edits and threads: whatever the order in which things happen, the world's file has the same chunks.
+TEST_F(StreamedWorldTest, RandomSchedulesGiveTheSameBytes) {
+  const int rounds = std::getenv("QUOIN_SCHEDULES") == nullptr ? 8 : std::atoi(std::getenv("QUOIN_SCHEDULES"));
+  std::map<Key, StoredChunk> expected;
+  for (int round = 0; round < rounds; ++round) {
+    std::mt19937 edits(7);  // the same in all rounds
+    std::mt19937 chance(static_cast<unsigned>(round));
+    auto generator = std::make_shared<PatternGround>(static_cast<int>(chance() % 200));
+    StreamOptions options;
+    options.workers.count = 1 + chance() % 3;
+    options.budget_bytes = std::size_t{1} << (21 + chance() % 3);
+    options.save_interval = std::chrono::milliseconds(chance() % 20);
+    options.update_seconds = (chance() % 10) * 1e-4;
+    const std::filesystem::path file = path(("round" + std::to_string(round) + ".quoin").c_str());
+    {
+      StreamedWorld world = ground(file, generator, options);
+      for (int step = 0; step < 40; ++step) {
+        const auto at = [&](int range) { return static_cast<int>(edits() % static_cast<unsigned>(2 * range)) - range; };
+        const IVec3 low{at(400), at(60), at(400)};
+        ASSERT_TRUE(world.apply({0, WorldEdit::FillBox{{low, low + 40}, static_cast<VoxelType>(edits() % 4)}}));
+        ASSERT_TRUE(world.apply({0, WorldEdit::FillSphere{DVec3(low), 17.5, static_cast<VoxelType>(edits() % 4)}}));
+        const Viewer viewer{.position = DVec3(low), .radius = 80.0 + static_cast<double>(chance() % 200)};
+        for (unsigned i = chance() % 6; i != 0; --i) {
+          ASSERT_TRUE(world.update({&viewer, 1}).has_value());
+          if (chance() % 3 == 0) std::this_thread::sleep_for(std::chrono::microseconds(chance() % 2000));
+        }
+      }
+      ASSERT_TRUE(world.flush().has_value());
+      EXPECT_EQ(generator->most_asked(), 1);
+      EXPECT_TRUE(world.take_problems().empty());
+    }
+    const auto store = WorldStore::open(file, WorldAccess::Read);
+    ASSERT_TRUE(store.has_value());
+    std::map<Key, StoredChunk> found;
+    for (int z = -7; z <= 7; ++z) {
+      for (int y = -2; y < 2; ++y) {
+        for (int x = -7; x <= 7; ++x) {
+          auto chunk = store->load_chunk({0, 0, {x, y, z}});
+          ASSERT_TRUE(chunk.has_value());
+          // What nobody came near was not made.
+          found[{x, y, z}] = *chunk ? std::move(**chunk) : StoredChunk{PatternGround::of({x, y, z})};
+        }
+      }
+    }
+    if (round == 0) expected = found;
+    EXPECT_TRUE(found == expected) << round;
+    std::filesystem::remove(file);
+  }
+}
+
+// What a server sends: the same log applied to two worlds whose viewers are elsewhere.
+TEST_F(StreamedWorldTest, ReplayedLogsGiveTheSameWorlds) {
+  EditLog log;
+  std::mt19937 chance(3);
+  for (std::uint64_t i = 1; i <= 60; ++i) {
+    const auto at = [&] { return static_cast<int>(chance() % 300) - 150; };
+    const IVec3 low{at(), at() / 2, at()};
+    WorldEdit edit{0, WorldEdit::FillBox{{low, low + 20}, static_cast<VoxelType>(chance() % 4)}};
+    if (i % 3 == 0) edit.content = WorldEdit::SetVoxels{{{low, 2}, {low + 70, 3}}};
+    log.add({i, 1, std::move(edit)});
+  }
+  const auto sent = EditLog::decode(log.encode());
+  ASSERT_TRUE(sent.has_value());
+  std::vector<std::map<Key, StoredChunk>> ends;
+  for (const double place : {0.0, 900.0}) {
+    const std::filesystem::path file = path(("at" + std::to_string(place) + ".quoin").c_str());
+    {
+      StreamedWorld world = ground(file, std::make_shared<PatternGround>());
+      const Viewer viewer{.position = {place, 0.0, 0.0}, .radius = 200.0};
+      for (const LoggedEdit& each : sent->edits()) {
+        ASSERT_TRUE(world.update({&viewer, 1}).has_value());
+        ASSERT_TRUE(world.apply(each.edit).has_value());
+      }
+      ASSERT_TRUE(world.flush().has_value());
+    }
+    const auto store = WorldStore::open(file, WorldAccess::Read);
+    auto& end = ends.emplace_back();
+    for (int z = -4; z <= 4; ++z) {
+      for (int y = -2; y < 2; ++y) {
+        for (int x = -4; x <= 4; ++x) {
+          auto chunk = store->load_chunk({0, 0, {x, y, z}});
+          end[{x, y, z}] = *chunk ? std::move(**chunk) : StoredChunk{PatternGround::of({x, y, z})};
+        }
+      }
+    }
+  }
+  EXPECT_TRUE(ends[0] == ends[1]);
+}
+
+}  // namespace
+}  // namespace quoin
