@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 
 #include "io/minecraft/block_looks.h"
 #include "io/minecraft/block_states.h"
 #include "io/minecraft/legacy_blocks.h"
+#include "io/minecraft/level_file.h"
 #include "io/minecraft/minecraft_for_tests.h"
 #include "io/minecraft/nbt.h"
 #include "io/minecraft/region_file.h"
@@ -158,6 +160,34 @@ TEST(MinecraftSource, NumbersOfTypesDoNotDependOnWhatWasReadBefore) {
   EXPECT_EQ(into[(*chunk)->get(0, 0, 0)].name, "minecraft:stone");
   EXPECT_EQ((*chunk)->get(1, 0, 0), 2);  // by their names
   EXPECT_NE((*chunk)->data({1, 0, 0}).state, 0U);
+}
+
+TEST(MinecraftSource, FilesOfTheCorpusGiveWorldsOrErrors) {
+  std::size_t read = 0;
+  std::size_t broken = 0;
+  for (const auto& entry : fs::directory_iterator(fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "minecraft")) {
+    const auto bytes = read_file(entry.path());
+    ASSERT_TRUE(bytes);
+    const auto source = minecraft::open_minecraft(*bytes);
+    if (!source) continue;
+    for (std::size_t i = 0; i < (*source)->parts().size(); ++i) {
+      const auto part = (*source)->read_part(i);
+      ASSERT_TRUE(part) << entry.path();
+      read += part->chunks.size();
+      broken += part->broken.size();
+    }
+  }
+  EXPECT_EQ(read, 3U);
+  EXPECT_EQ(broken, 5U);
+}
+
+TEST(LevelFile, TellsNameAndSpawn) {
+  const auto bytes = read_file(fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "minecraft" / "level_dat");
+  ASSERT_TRUE(bytes);
+  const auto level = minecraft::parse_level_file(*bytes);
+  ASSERT_TRUE(level);
+  EXPECT_EQ(level->name, "Home");
+  EXPECT_EQ(level->spawn, DVec3(8, 70, -9));
 }
 
 struct Known {
