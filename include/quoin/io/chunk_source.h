@@ -57,7 +57,7 @@ struct SourcePart {
 /// Threads: every function from any thread, also at once.
 /// Memory:  bounded, whatever the world: besides 40 bytes a part, what is being read and 32 MiB of parts that were read
 ///          last, from which `read` takes chunks.
-/// Files:   must not change meanwhile; what did is told as broken.
+/// Files:   must not change meanwhile.
 class ChunkSource {
  public:
   ChunkSource(const ChunkSource&) = delete;

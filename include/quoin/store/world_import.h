@@ -29,7 +29,7 @@ struct ImportedWorld {
 /// Only then does it get the name PATH, in place of what had it.
 /// Memory:  what the source takes, and some 100 chunks, whatever the world.
 /// Errors:  those of WorldStore and ChunkSource::read_part; Cancelled; InvalidArgument where PATH.part is of another
-///          source, or of one that has changed.
+///          source, or of one that has other parts now. (Whether the same parts hold something else is not noticed.)
 [[nodiscard]] Result<ImportedWorld> import_world(const ChunkSource& source, const std::filesystem::path& path,
                                                  Threads threads = {}, const Progress& progress = {});
 

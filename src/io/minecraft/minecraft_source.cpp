@@ -218,7 +218,7 @@ class MinecraftSource final : public ChunkSource {
       return {};
     }
     Status put;
-    const Status read = reader.read(
+    Status read = reader.read(
         document->root(),
         [&](const Section& section) {
           const IVec3 corner{place.x * kSectionEdge, section.y * kSectionEdge, place.z * kSectionEdge};

@@ -120,6 +120,32 @@ TEST(MinecraftSource, ABrokenChunkIsNamedWithItsPlace) {
   EXPECT_NE(part->broken[0].message.find("chunk (5, 2)"), std::string::npos);
 }
 
+TEST(MinecraftSource, Lz4IsReadOrSaysWhatIsMissing) {
+  // One block of LZ4 that is stored as it is, and the empty one that ends the stream.
+  const std::vector<std::byte> chunk = chunk_of_stairs(0);
+  std::vector<std::byte> stream;
+  const auto block = [&](const std::vector<std::byte>& content, int method) {
+    for (const char c : std::string("LZ4Block")) stream.push_back(static_cast<std::byte>(c));
+    stream.push_back(static_cast<std::byte>(method));
+    for (const std::size_t number : {content.size(), content.size(), std::size_t{0}}) {
+      for (unsigned i = 0; i < 4; ++i) stream.push_back(static_cast<std::byte>(number >> (8 * i)));
+    }
+    stream.insert(stream.end(), content.begin(), content.end());
+  };
+  block(chunk, 0x16);
+  block({}, 0x16);
+  const auto source = minecraft::open_minecraft(region_with(stream, 0, 0, 4));
+  ASSERT_TRUE(source);
+  const auto part = (*source)->read_part(0);
+  ASSERT_TRUE(part);
+  if (!part->broken.empty()) {
+    EXPECT_NE(part->broken[0].message.find("liblz4-dev"), std::string::npos);
+  } else {
+    ASSERT_EQ(part->chunks.size(), 1U);
+    EXPECT_EQ(part->chunks[0].voxels.non_air_count(), 3);
+  }
+}
+
 TEST(MinecraftSource, IndicesThatSpanLongsAreRead) {
   // 17 blocks take 5 bits: 320 longs that they span, or 342 that they do not.
   for (const std::size_t words : {320U, 342U}) {
