@@ -464,7 +464,7 @@ void add_number(How how, int data, Properties& properties) {
 }
 
 std::string name_of(const Legacy& block, int data) {
-  const std::string end(block.name);
+  std::string end(block.name);
   switch (block.how) {
     case How::Kinds:
       return word(block.kinds, data);
