@@ -123,8 +123,8 @@ class SourceTypes {
 /// Errors: CannotRead; BadFormat, Unsupported where it is nothing that Quoin reads.
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_chunk_source(const std::filesystem::path& path);
 
-/// Puts what lies in a box of chunk coordinates into a scene: one grid, one instance. What was broken, and that there is
-/// more outside, are warnings.
+/// Puts what lies in a box of chunk coordinates into a scene: one grid, one instance. What was broken, and that there
+/// is more outside, are warnings.
 ///
 /// Memory: all that lies in the box is held.
 /// Errors: as ChunkSource::read_part; Cancelled.
