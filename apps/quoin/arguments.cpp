@@ -52,6 +52,12 @@ void add_quiet_option(CLI::App& command) {
 void add_common_options(CLI::App& command, CommonOptions& options) {
   command.add_option("IN", options.input, "File to read")->required()->check(file_name());
   command.add_flag("--hidden", options.load.show_hidden, "Include hidden layers and nodes");
+  command
+      .add_option(
+          "--around", options.load.radius,
+          "Of a world of Minecraft's: how far around its spawn, in chunks of 64 blocks to each side (default 4; "
+          "converted to .quoin it is all there)")
+      ->check(CLI::Range(0, 1'000));
   command.add_option("--frame", options.load.frame, "Animation frame to take (default 0)")
       ->check(not_negative_whole())
       ->each([&options](const std::string&) { options.takes_frame = true; });

@@ -42,6 +42,7 @@
 #include <quoin/grid/volume.h>
 #include <quoin/grid/voxel_field.h>
 #include <quoin/grid/voxel_registry.h>
+#include <quoin/io/chunk_source.h>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/loaded_scene.h>
@@ -95,6 +96,7 @@
 #include <quoin/scene/volume_scene.h>
 #include <quoin/store/stored_chunk.h>
 #include <quoin/store/world_care.h>
+#include <quoin/store/world_import.h>
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
 #include <quoin/terrain/noise.h>

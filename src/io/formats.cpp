@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include <quoin/io/chunk_source.h>
 #include <quoin/io/scene_file.h>
 #include <quoin/io/volume.h>
 #include <quoin/io/vox.h>
@@ -10,6 +11,8 @@
 
 #include "core/progress_steps.h"
 #include "io/byte_stream.h"
+#include "io/minecraft/minecraft_source.h"
+#include "io/minecraft/region_file.h"
 #include "io/volume/header.h"
 #include "io/whole_file.h"
 #include "io/world_format.h"
@@ -23,6 +26,8 @@ constexpr std::array kFormats = {
     FormatInfo{FileFormat::Scene, "scene", ".json", "Quoin's scene files", true, true, false, false},
     FormatInfo{FileFormat::World, "world", ".quoin", "Quoin's worlds, which may be larger than memory", true, true,
                false, false},
+    FormatInfo{FileFormat::Minecraft, "minecraft", ".mca",
+               "worlds of Minecraft's (Java): folders, or regions of theirs", true, false, false, false},
     FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, false, false, true},
     FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes", true, false, false, true},
     FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true, false},
@@ -92,6 +97,13 @@ Result<LoadedScene> read_volume_as_scene(const Source& source, const LoadOptions
   return loaded;
 }
 
+/// What lies around the spawn of a world that is read by chunks.
+Result<LoadedScene> read_around_spawn(const Result<std::unique_ptr<ChunkSource>>& source, const LoadOptions& options,
+                                      Threads threads, const Progress& progress) {
+  if (!source) return source.error();
+  return load_source(**source, chunks_around_spawn(**source, options.radius), threads, progress);
+}
+
 Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<const std::byte> bytes,
                                const LoadOptions& options, Threads threads, const Progress& progress) {
   if (options.raw) return read_volume_as_scene(bytes, options, threads, progress);
@@ -99,6 +111,9 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
   if (format == FileFormat::Vox) return read_vox(bytes, options, progress);
   if (format == FileFormat::Scene) return read_scene_file(bytes, options, threads, progress);
   if (format == FileFormat::World) return read_world_format(bytes, options, threads, progress);
+  if (format == FileFormat::Minecraft) {
+    return read_around_spawn(minecraft::open_minecraft(bytes), options, threads, progress);
+  }
   if (is_volume(format)) return read_volume_as_scene(bytes, options, threads, progress);
   Error error = unrecognised(bytes);
   // The reader knows more of what else goes by this name.
@@ -194,6 +209,7 @@ std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
   if (begins_with(bytes, "VOX ")) return FileFormat::Vox;
   if (is_world_format(bytes)) return FileFormat::World;
   if (is_scene_file(bytes)) return FileFormat::Scene;
+  if (minecraft::is_region_file(bytes)) return FileFormat::Minecraft;
   const auto first = first_bytes(bytes, nifti::kMaxHeaderBytes);
   if (first && nifti::is_header(*first)) return FileFormat::Nifti;
   if (first && nrrd::is_header(*first)) return FileFormat::Nrrd;
@@ -201,6 +217,7 @@ std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
 }
 
 Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& path) {
+  if (is_world_folder(path)) return FileFormat::Minecraft;
   // What decompresses to a header, with room for names and comments in gzip's own.
   constexpr std::size_t kEnough = 1 << 16;
   const auto bytes = read_file_beginning(path, kEnough);
@@ -253,6 +270,9 @@ Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOpti
   if (options.raw) return with_path(read_volume_as_scene(path, options, threads, progress), path);
   const auto format = detect_format(path);
   if (!format) return format.error();
+  if (*format == FileFormat::Minecraft) {
+    return with_path(read_around_spawn(open_chunk_source(path), options, threads, progress), path);
+  }
   if (*format == FileFormat::World) return with_path(read_world_format(path, options, threads, progress), path);
   if (is_volume(*format)) return with_path(read_volume_as_scene(path, options, threads, progress), path);
   const auto bytes = read_file(path);

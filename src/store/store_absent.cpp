@@ -1,4 +1,5 @@
 #include <quoin/store/world_care.h>
+#include <quoin/store/world_import.h>
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
 
@@ -123,6 +124,10 @@ Result<SavedScene> write_world(const Scene&, const std::filesystem::path& path, 
   return absent(path);
 }
 Result<SavedScene> write_world(const LoadedScene&, const std::filesystem::path& path, Threads, const Progress&) {
+  return absent(path);
+}
+
+Result<ImportedWorld> import_world(const ChunkSource&, const std::filesystem::path& path, Threads, const Progress&) {
   return absent(path);
 }
 

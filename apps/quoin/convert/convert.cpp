@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <memory>
 
+#include <quoin/io/chunk_source.h>
 #include <quoin/io/mesh_file.h>
 #include <quoin/io/vox.h>
 #include <quoin/light/lit_meshes.h>
+#include <quoin/store/world_import.h>
 
 #include "field_occlusion.h"
 #include "interrupt.h"
@@ -153,6 +155,30 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   if (!saved) return saved.error();
   outcome.bytes = saved->bytes;
   outcome.warnings.insert(outcome.warnings.end(), saved->warnings.begin(), saved->warnings.end());
+  outcome.seconds.write = watch.lap();
+  return outcome;
+}
+
+/// Puts a world that is read by chunks into one of Quoin's, whatever its size.
+Result<Outcome> convert_by_chunks(const ConvertOptions& options) {
+  Stopwatch watch;
+  const auto source = open_chunk_source(options.common.input);
+  if (!source) return source.error();
+  catch_interrupts();
+  Outcome outcome;
+  outcome.files = {options.output};
+  outcome.seconds.read = watch.lap();
+  ProgressBar bar(!options.is_one_of_many);
+  const auto imported = import_world(**source, options.output, options.common.threads, bar.listener("converting"));
+  if (!imported) return imported.error();
+  outcome.content.voxels = static_cast<std::int64_t>(imported->voxels);
+  outcome.bytes = imported->bytes;
+  for (const std::string& line : imported->broken) outcome.warnings.push_back("left out: " + line);
+  if (!imported->guessed.empty()) {
+    std::string names;
+    for (const std::string& name : imported->guessed) names += (names.empty() ? "" : ", ") + name;
+    outcome.warnings.push_back("blocks that Quoin does not know, whose looks are guesses by their names: " + names);
+  }
   outcome.seconds.write = watch.lap();
   return outcome;
 }
@@ -488,6 +514,9 @@ Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& fo
     if (auto made = make_folder_of(options.output); !made) return made.error();
   }
   if (auto writable = check_outputs({options.output}); !writable) return writable.error();
+  if (format.format == FileFormat::World && detect_format(options.common.input) == FileFormat::Minecraft) {
+    return convert_by_chunks(options);
+  }
   return convert(options, format, *is_volume, fault);
 }
 

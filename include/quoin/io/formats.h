@@ -17,7 +17,7 @@
 
 namespace quoin {
 
-enum class FileFormat : std::uint8_t { Vox, Scene, World, Nifti, Nrrd, Glb, Gltf, Obj, Ply };
+enum class FileFormat : std::uint8_t { Vox, Scene, World, Minecraft, Nifti, Nrrd, Glb, Gltf, Obj, Ply };
 
 /// What Quoin can do with a file format.
 struct FormatInfo {
@@ -47,7 +47,7 @@ struct FormatInfo {
 
 /// Returns the readable format that bytes are of, by what they begin with, within gzip too; nothing when it is none.
 [[nodiscard]] std::optional<FileFormat> detect_format(std::span<const std::byte> bytes);
-/// The same of a file, of which only the beginning is read. Errors: CannotRead.
+/// The same of a file, of which only the beginning is read, or of a folder that holds a world. Errors: CannotRead.
 [[nodiscard]] Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& path);
 
 /// Returns the format that a file of this name is written in, by its extension in any case.
@@ -60,7 +60,8 @@ struct FormatInfo {
 // returned: of what was read, and of what was written where its format may not hold all. Options, Threads (where
 // several are used) and Progress (of what may take long) come last, in this order, and may be left out.
 
-/// Reads a file of any readable format. A volume becomes a field, as scene_from_volume makes it, at surface_value.
+/// Reads a file of any readable format, or a folder that holds a world. A volume becomes a field, as scene_from_volume
+/// makes it, at surface_value. Of worlds that open_chunk_source reads it is what lies around their spawn.
 ///
 /// The content decides, unless `LoadOptions::raw` does; the name only helps to say what is wrong with a file that is of
 /// no known format.

@@ -47,6 +47,8 @@ struct LoadOptions {
   bool keep_source = true;
   /// Of a volume of values: what is above is solid; without, a value between its two groups (volume_threshold).
   std::optional<float> iso = std::nullopt;
+  /// Of a world that is read by chunks (ChunkSource): how far around its spawn, in chunks of 64 voxels to each side.
+  int radius = 4;
   /// The file holds values alone, as many as this says: a volume.
   std::optional<RawVolume> raw = std::nullopt;
 };

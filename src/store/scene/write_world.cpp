@@ -10,6 +10,7 @@
 #include "store/database/connection.h"
 #include "store/database/schema.h"
 #include "store/database/world_lock.h"
+#include "store/scene/put_world.h"
 #include "store/world/world_changes.h"
 #include "store/world/world_open.h"
 
@@ -55,18 +56,7 @@ class FreshWorld {
   }
   [[nodiscard]] const std::filesystem::path& fresh() const { return fresh_; }
 
-  Status put_in_place() {
-    std::error_code error;
-    const auto status = std::filesystem::status(path_, error);
-    if (std::filesystem::exists(status)) {
-      if (!std::filesystem::is_regular_file(status)) {
-        return make_error(ErrorCode::CannotWrite, "it is not a regular file");
-      }
-      if (auto done = clear_log(path_); !done) return done;
-      std::filesystem::permissions(fresh_, status.permissions(), error);
-    }
-    return move_in_place(fresh_, path_, Existing::Replaced);
-  }
+  Status put_in_place() { return put_world_in_place(fresh_, path_); }
 
  private:
   std::filesystem::path path_;
@@ -98,6 +88,19 @@ Result<SavedScene> write(const Scene& scene, WorldView view, const std::filesyst
 }
 
 }  // namespace
+
+Status store::put_world_in_place(const std::filesystem::path& from, const std::filesystem::path& to) {
+  std::error_code error;
+  const auto status = std::filesystem::status(to, error);
+  if (std::filesystem::exists(status)) {
+    if (!std::filesystem::is_regular_file(status)) {
+      return make_error(ErrorCode::CannotWrite, "it is not a regular file");
+    }
+    if (auto done = clear_log(to); !done) return done;
+    std::filesystem::permissions(from, status.permissions(), error);
+  }
+  return move_in_place(from, to, Existing::Replaced);
+}
 
 // Errors name the file that was wanted, not the one beside it.
 Result<SavedScene> write_world(const Scene& scene, const std::filesystem::path& path, Threads threads,

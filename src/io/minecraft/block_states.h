@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <quoin/grid/voxel_registry.h>
+
+// What Minecraft says of a block besides its name ("facing=east,half=top") as a word of bits, VoxelData::state, so that
+// blocks that differ in it alone are one type. docs/formats/minecraft.md tells the bits to others.
+
+namespace quoin::minecraft {
+
+using Property = std::pair<std::string, std::string>;
+
+/// The attribute of a type that lists what its states' bits are, from the lowest up: "facing:3,half:2".
+inline constexpr const char* kStatesAttribute = "minecraft.states";
+/// The attribute of a type whose look was guessed: "words" or "nothing".
+inline constexpr const char* kGuessAttribute = "minecraft.look";
+/// The attribute of a type that a biome coloured: what does so.
+inline constexpr const char* kTintAttribute = "minecraft.tint";
+
+/// A block as a type and a state.
+struct BlockState {
+  std::string name;         ///< "minecraft:furnace[lit=true]": with what has no bits, since it changes the look
+  std::string layout;       ///< as kStatesAttribute
+  std::uint32_t state = 0;  ///< 0 where all properties have their commonest value
+  std::uint8_t bits = 0;
+  bool is_lit = false;
+  bool is_snowy = false;
+};
+
+/// Splits a block's properties into what is part of its type's name and what is a state. Of leaves what only decides
+/// when they decay ("distance", "persistent") is left out.
+[[nodiscard]] BlockState block_state(std::string_view name, std::vector<Property> properties);
+
+/// The block of a type and a state: its name, and all properties that `block_state` was given but those it left out
+/// and lit=false and snowy=false, sorted by name. Of types of other formats the type's name, and none.
+struct BlockText {
+  std::string name;
+  std::vector<Property> properties;
+};
+[[nodiscard]] BlockText block_text(const VoxelProperties& type, std::uint32_t state);
+/// "minecraft:oak_stairs[facing=east,half=top]".
+[[nodiscard]] std::string to_string(const BlockText& block);
+/// The inverse. Nothing where brackets or equals signs are missing.
+[[nodiscard]] std::optional<BlockText> parse_block(std::string_view text);
+
+}  // namespace quoin::minecraft

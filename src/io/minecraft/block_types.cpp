@@ -1,0 +1,93 @@
+#include "io/minecraft/block_types.h"
+
+#include <array>
+#include <utility>
+
+namespace quoin::minecraft {
+
+namespace {
+
+VoxelProperties properties_of(const BlockState& state, const BlockLook& look) {
+  VoxelProperties type;
+  type.name = state.name;
+  type.colour = look.colour;
+  type.visibility = look.colour.a < 255 ? Visibility::Transparent : Visibility::Opaque;
+  type.collides = look.collides;
+  type.emission = look.emission;
+  type.roughness = look.roughness;
+  type.ior = look.ior;
+  type.state_bits = state.bits;
+  type.attributes[kStatesAttribute] = state.layout;
+  if (look.knowledge != Knowledge::Table) {
+    type.attributes[kGuessAttribute] = look.knowledge == Knowledge::Words ? "words" : "nothing";
+  }
+  return type;
+}
+
+std::uint32_t colour_of(Tint tint, const BiomeTints& tints) {
+  return tint == Tint::Grass ? tints.grass : tint == Tint::Foliage ? tints.foliage : tints.water;
+}
+
+std::uint8_t times(std::uint8_t part, std::uint32_t tint) {
+  return static_cast<std::uint8_t>((part * (tint & 255U) + 127U) / 255U);
+}
+
+}  // namespace
+
+Result<Block> BlockTypes::block(std::string_view name, const std::vector<Property>& properties) {
+  std::string key(name);
+  for (const auto& [property, value] : properties) key.append(1, '\0').append(property).append(1, '\0').append(value);
+  {
+    const std::shared_lock lock(mutex_);
+    if (const auto known = blocks_.find(key); known != blocks_.end()) return known->second;
+  }
+  return add(key, block_state(name, properties));
+}
+
+Result<Block> BlockTypes::add(const std::string& key, const BlockState& state) {
+  const std::string_view name = std::string_view(state.name).substr(0, state.name.find('['));
+  const BlockLook look = look_of_block(name, state.is_lit, state.is_snowy);
+  Block block;
+  block.state = state.state;
+  const std::unique_lock lock(mutex_);
+  if (!look.is_air && look.tint == Tint::None) {
+    const auto type = types_.find_or_add(properties_of(state, look));
+    if (!type) return type.error();
+    block.type = *type;
+  } else if (!look.is_air) {
+    block.tint = look.tint;
+    VoxelProperties type = properties_of(state, look);
+    std::size_t number = 0;
+    while (number < tinted_.size() && !(tinted_[number] == type)) ++number;
+    if (number == tinted_.size()) tinted_.push_back(std::move(type));
+    block.number = static_cast<std::uint32_t>(number);
+  }
+  blocks_.emplace(key, block);
+  return block;
+}
+
+Result<VoxelType> BlockTypes::tinted(const Block& block, const BiomeTints& tints) {
+  const std::uint32_t colour = colour_of(block.tint, tints);
+  const std::uint64_t key = std::uint64_t{block.number} << 32 | colour;
+  {
+    const std::shared_lock lock(mutex_);
+    if (const auto known = tinted_types_.find(key); known != tinted_types_.end()) return known->second;
+  }
+  const std::unique_lock lock(mutex_);
+  VoxelProperties type = tinted_[block.number];
+  type.colour.r = times(type.colour.r, colour >> 16);
+  type.colour.g = times(type.colour.g, colour >> 8);
+  type.colour.b = times(type.colour.b, colour);
+  constexpr std::array kNames = {"", "grass", "foliage", "water"};
+  type.attributes[kTintAttribute] = kNames[static_cast<std::size_t>(block.tint)];
+  const auto added = types_.find_or_add(type);
+  if (added) tinted_types_[key] = *added;
+  return added;
+}
+
+VoxelRegistry BlockTypes::types() const {
+  const std::shared_lock lock(mutex_);
+  return types_;
+}
+
+}  // namespace quoin::minecraft

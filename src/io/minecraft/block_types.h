@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <shared_mutex>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include <quoin/core/result.h>
+#include <quoin/grid/voxel_registry.h>
+
+#include "io/minecraft/biomes.h"
+#include "io/minecraft/block_looks.h"
+#include "io/minecraft/block_states.h"
+
+namespace quoin::minecraft {
+
+/// A block as voxels have it. What a biome colours has a type for each colour: BlockTypes::tinted.
+struct Block {
+  VoxelType type = kAir;  ///< kAir too where it is tinted
+  std::uint32_t state = 0;
+  Tint tint = Tint::None;
+  std::uint32_t number = 0;  ///< of the block among those with a tint
+
+  [[nodiscard]] bool is_air() const { return type == kAir && tint == Tint::None; }
+};
+
+/// The types of the blocks that were met so far. Threads: any function from any thread, also at once.
+class BlockTypes {
+ public:
+  /// The block of that name with these properties, in any order. Errors: LimitExceeded.
+  [[nodiscard]] Result<Block> block(std::string_view name, const std::vector<Property>& properties);
+  /// The type of a block with a tint, in a biome. Errors: LimitExceeded.
+  [[nodiscard]] Result<VoxelType> tinted(const Block& block, const BiomeTints& tints);
+  [[nodiscard]] VoxelRegistry types() const;
+
+ private:
+  [[nodiscard]] Result<Block> add(const std::string& key, const BlockState& state);
+  mutable std::shared_mutex mutex_;
+  VoxelRegistry types_;
+  std::unordered_map<std::string, Block> blocks_;
+  std::vector<VoxelProperties> tinted_;                        // by Block::number, before their tint
+  std::unordered_map<std::uint64_t, VoxelType> tinted_types_;  // by number and colour
+};
+
+}  // namespace quoin::minecraft

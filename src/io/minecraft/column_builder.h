@@ -1,0 +1,42 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <quoin/io/chunk_source.h>
+
+#include "io/minecraft/sections.h"
+
+namespace quoin::minecraft {
+
+/// Puts sections together to chunks of 64^3: of a column of them, or of a box of blocks.
+class ColumnBuilder {
+ public:
+  explicit ColumnBuilder(BlockTypes& types) : types_(types) {}
+
+  /// Puts a section where its least corner is, which is a multiple of 16. Errors: LimitExceeded, of types.
+  [[nodiscard]] Status put(const Section& section, IVec3 corner);
+  /// The chunks, by y, then z, then x; those that are all air are left out. The builder is empty then.
+  [[nodiscard]] std::vector<SourceChunk> take();
+
+ private:
+  struct Cell {
+    IVec3 place{0};
+    std::vector<VoxelType> types;
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> states;  // voxel, state
+  };
+  [[nodiscard]] Cell& cell(IVec3 place);
+  [[nodiscard]] Status find_types(const Section& section);
+  void fill(const Section& section, Cell& cell, IVec3 first) const;
+
+  BlockTypes& types_;
+  std::vector<Cell> cells_;
+  std::vector<Cell> spare_;          // whose memory is used again
+  std::vector<VoxelType> types_of_;  // [biome][index in the palette]
+  bool has_states_ = false;
+  bool has_tints_ = false;
+};
+
+}  // namespace quoin::minecraft

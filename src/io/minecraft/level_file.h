@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+
+namespace quoin::minecraft {
+
+/// What level.dat says of a world.
+struct LevelFile {
+  std::string name;
+  std::string version;  ///< "1.18.2"; empty before 1.9
+  std::optional<DVec3> spawn;
+};
+
+/// Errors: BadFormat, with the offset (in what it expands to, where it is compressed); LimitExceeded.
+[[nodiscard]] Result<LevelFile> parse_level_file(std::span<const std::byte> bytes);
+
+}  // namespace quoin::minecraft

@@ -1,0 +1,307 @@
+#include "io/minecraft/minecraft_source.h"
+
+#include <algorithm>
+#include <list>
+#include <map>
+#include <mutex>
+#include <set>
+#include <string>
+#include <system_error>
+#include <tuple>
+#include <utility>
+
+#include <quoin/io/file.h>
+
+#include "io/minecraft/block_types.h"
+#include "io/minecraft/column_builder.h"
+#include "io/minecraft/level_file.h"
+#include "io/minecraft/nbt.h"
+#include "io/minecraft/region_file.h"
+#include "io/minecraft/sections.h"
+
+namespace quoin::minecraft {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kChunksOfColumn = kChunkEdge / kSectionEdge;       // the game's, along an edge of a column of ours
+constexpr int kColumnsOfRegion = kRegionEdge / kChunksOfColumn;  // along an edge
+// Sections' heights are signed bytes.
+constexpr int kLowestChunk = -32;
+constexpr int kHighestChunk = 32;
+/// Regions beyond have blocks that are no int32 with room for what looks past borders.
+constexpr int kMaxRegion = 1 << 21;
+
+struct Region {
+  fs::path path;
+  RegionName name;
+  std::shared_ptr<const RegionFile> file = nullptr;  // where it has no name
+};
+
+bool is_too_far(RegionName name) {
+  return std::max(std::abs(std::int64_t{name.x}), std::abs(std::int64_t{name.z})) > kMaxRegion;
+}
+
+std::vector<Region> regions_in(const fs::path& folder, std::vector<Error>& broken) {
+  std::vector<Region> regions;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    const auto name = parse_region_name(entry->path());
+    if (!name) continue;
+    if (is_too_far(*name)) {
+      broken.push_back(make_error(ErrorCode::Unsupported, "lies too far out", entry->path().string()));
+      continue;
+    }
+    regions.push_back({.path = entry->path(), .name = *name});
+  }
+  const auto place = [](const Region& r) {
+    return std::tuple(r.name.z, r.name.x, r.name.is_mcregion, r.path.string());
+  };
+  std::ranges::sort(regions, {}, place);
+  // What the game turned into Anvil it leaves beside it.
+  for (std::size_t i = 1; i < regions.size();) {
+    const bool is_same = regions[i].name.x == regions[i - 1].name.x && regions[i].name.z == regions[i - 1].name.z;
+    if (!is_same) {
+      ++i;
+      continue;
+    }
+    broken.push_back(make_error(ErrorCode::Unsupported,
+                                "of the same region as " + regions[i - 1].path.filename().string(),
+                                regions[i].path.string()));
+    regions.erase(regions.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  return regions;
+}
+
+bool has_regions(const fs::path& folder) {
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    if (parse_region_name(entry->path())) return true;
+  }
+  return false;
+}
+
+/// Where the region files of a world lie, if it is one.
+std::optional<fs::path> region_folder(const fs::path& path) {
+  for (const fs::path& folder : {path / "region", path}) {
+    if (has_regions(folder)) return folder;
+  }
+  return std::nullopt;
+}
+
+/// level.dat of a world, or of the one that a dimension belongs to.
+std::optional<fs::path> level_file_of(const fs::path& path) {
+  std::error_code error;
+  const fs::path whole = fs::absolute(path, error).lexically_normal();
+  fs::path folder = whole.has_filename() ? whole : whole.parent_path();
+  constexpr int kMaxLevels = 5;  // WORLD/dimensions/NAMESPACE/NAME/region
+  for (int i = 0; i < kMaxLevels && folder.has_relative_path(); ++i, folder = folder.parent_path()) {
+    if (fs::is_regular_file(folder / "level.dat", error)) return folder / "level.dat";
+  }
+  return std::nullopt;
+}
+
+bool is_overworld(const fs::path& regions, const fs::path& level) {
+  std::error_code error;
+  return fs::equivalent(regions, level.parent_path() / "region", error);
+}
+
+/// Regions that are open, a few at a time.
+class OpenRegions {
+ public:
+  explicit OpenRegions(std::vector<Region> regions) : regions_(std::move(regions)) {}
+  [[nodiscard]] const Region& operator[](std::size_t i) const { return regions_[i]; }
+  [[nodiscard]] std::size_t size() const { return regions_.size(); }
+
+  Result<std::shared_ptr<const RegionFile>> open(std::size_t i) {
+    constexpr std::size_t kMaxOpen = 16;
+    if (regions_[i].file != nullptr) return regions_[i].file;
+    const std::scoped_lock lock(mutex_);
+    const auto known = std::ranges::find(open_, i, &Open::index);
+    if (known != open_.end()) {
+      open_.splice(open_.begin(), open_, known);
+      return known->file;
+    }
+    auto file = RegionFile::open(regions_[i].path, regions_[i].name);
+    if (!file) return file.error();
+    open_.push_front({i, std::move(*file)});
+    if (open_.size() > kMaxOpen) open_.pop_back();
+    return open_.front().file;
+  }
+
+ private:
+  struct Open {
+    std::size_t index;
+    std::shared_ptr<const RegionFile> file;
+  };
+  std::vector<Region> regions_;
+  std::mutex mutex_;
+  std::list<Open> open_;
+};
+
+/// The columns of 4 x 4 of the game's chunks that a region has.
+std::vector<IBox> columns_of(const RegionFile& file, RegionName name) {
+  std::vector<IBox> columns;
+  for (int cz = 0; cz < kColumnsOfRegion; ++cz) {
+    for (int cx = 0; cx < kColumnsOfRegion; ++cx) {
+      bool is_there = false;
+      for (int i = 0; i < kChunksOfColumn * kChunksOfColumn; ++i) {
+        is_there |= file.has(cx * kChunksOfColumn + i % kChunksOfColumn, cz * kChunksOfColumn + i / kChunksOfColumn);
+      }
+      if (!is_there) continue;
+      const IVec3 place{name.x * kColumnsOfRegion + cx, name.is_mcregion ? 0 : kLowestChunk,
+                        name.z * kColumnsOfRegion + cz};
+      columns.push_back({place, {place.x + 1, name.is_mcregion ? 2 : kHighestChunk, place.z + 1}});
+    }
+  }
+  return columns;
+}
+
+class MinecraftSource final : public ChunkSource {
+ public:
+  MinecraftSource(ChunkSourceInfo info, std::vector<IBox> parts, std::vector<std::uint32_t> region_of,
+                  std::vector<Region> regions)
+      : ChunkSource(std::move(info), std::move(parts)),
+        region_of_(std::move(region_of)),
+        regions_(std::move(regions)) {}
+
+  VoxelRegistry types() const override { return types_.types(); }
+
+  Result<SourcePart> read_part(std::size_t part) const override {
+    QUOIN_ASSERT(part < parts().size(), "a part of the source");
+    SourcePart result;
+    const std::size_t region = region_of_[part];
+    const auto file = regions_.open(region);
+    if (!file) {
+      result.broken.push_back(file.error());
+      return result;
+    }
+    const IVec3 column = parts()[part].min;
+    const RegionName name = regions_[region].name;
+    const int first_x = (column.x - name.x * kColumnsOfRegion) * kChunksOfColumn;
+    const int first_z = (column.z - name.z * kColumnsOfRegion) * kChunksOfColumn;
+    ColumnBuilder builder(types_);
+    SectionReader reader(types_);
+    for (int i = 0; i < kChunksOfColumn * kChunksOfColumn; ++i) {
+      const IVec3 chunk{first_x + i % kChunksOfColumn, 0, first_z + i / kChunksOfColumn};
+      if (!(*file)->has(chunk.x, chunk.z)) continue;
+      if (auto read = read_chunk(**file, name, chunk, reader, builder, result.broken); !read) return read.error();
+    }
+    result.chunks = builder.take();
+    return result;
+  }
+
+ private:
+  /// Puts one of the game's chunks into the builder. What is broken is told.
+  Status read_chunk(const RegionFile& file, RegionName name, IVec3 chunk, SectionReader& reader, ColumnBuilder& builder,
+                    std::vector<Error>& broken) const {
+    const IVec3 place{name.x * kRegionEdge + chunk.x, 0, name.z * kRegionEdge + chunk.z};
+    const auto tell = [&](const Error& error) {
+      Error told = error;
+      const std::string where = "chunk (" + std::to_string(place.x) + ", " + std::to_string(place.z) + "): ";
+      told.message = where + told.message;
+      if (told.byte_offset) told.message += " (byte " + std::to_string(*told.byte_offset) + " of what it expands to)";
+      told.path = file.path().string();
+      told.byte_offset = file.offset(chunk.x, chunk.z);
+      broken.push_back(std::move(told));
+    };
+    const auto bytes = file.read(chunk.x, chunk.z);
+    if (!bytes) {
+      broken.push_back(bytes.error());
+      return {};
+    }
+    constexpr std::size_t kMaxValues = std::size_t{1} << 20;
+    const auto document = nbt::Document::parse(*bytes, {.depth = 512, .nodes = kMaxValues});
+    if (!document) {
+      tell(document.error());
+      return {};
+    }
+    Status put;
+    Status read = reader.read(
+        document->root(),
+        [&](const Section& section) {
+          const IVec3 corner{place.x * kSectionEdge, section.y * kSectionEdge, place.z * kSectionEdge};
+          if (put) put = builder.put(section, corner);
+        },
+        tell);
+    if (!put) return put;
+    if (!read && read.error().code == ErrorCode::BadFormat) {
+      tell(read.error());
+      return {};
+    }
+    return read;
+  }
+
+  std::vector<std::uint32_t> region_of_;  // by part
+  mutable OpenRegions regions_;
+  mutable BlockTypes types_;
+};
+
+void read_level(const fs::path& path, bool has_spawn, ChunkSourceInfo& info) {
+  const auto bytes = read_file_beginning(path, std::size_t{16} << 20);
+  auto level = bytes ? parse_level_file(*bytes) : Result<LevelFile>(bytes.error());
+  if (!level) {
+    level.error().path = path.string();
+    info.broken.push_back(level.error());
+    return;
+  }
+  info.name = level->name;
+  info.version = level->version;
+  if (has_spawn) info.spawn = level->spawn;
+}
+
+}  // namespace
+
+bool is_minecraft_folder(const fs::path& path) {
+  return region_folder(path).has_value();
+}
+
+Result<std::unique_ptr<ChunkSource>> open_minecraft(const fs::path& path) {
+  ChunkSourceInfo info;
+  info.format = "minecraft";
+  std::vector<Region> regions;
+  std::error_code error;
+  if (const auto name = parse_region_name(path); name && fs::is_regular_file(path, error)) {
+    if (is_too_far(*name)) return make_error(ErrorCode::Unsupported, "lies too far out", path.string());
+    regions.push_back({.path = path, .name = *name});
+  } else if (const auto folder = region_folder(path)) {
+    regions = regions_in(*folder, info.broken);
+    if (const auto level = level_file_of(path)) read_level(*level, is_overworld(*folder, *level), info);
+  } else {
+    return make_error(ErrorCode::BadFormat, "there are no region files (r.X.Z.mca) in it", path.string());
+  }
+  std::vector<IBox> parts;
+  std::vector<std::uint32_t> region_of;
+  for (std::size_t i = 0; i < regions.size(); ++i) {
+    const auto file = RegionFile::open(regions[i].path, regions[i].name);
+    if (!file) {
+      if (regions.size() == 1) return file.error();
+      info.broken.push_back(file.error());
+      continue;
+    }
+    for (const IBox& column : columns_of(**file, regions[i].name)) {
+      info.chunks = unite(info.chunks, column);
+      parts.push_back(column);
+      region_of.push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+  return std::unique_ptr<ChunkSource>(
+      new MinecraftSource(std::move(info), std::move(parts), std::move(region_of), std::move(regions)));
+}
+
+Result<std::unique_ptr<ChunkSource>> open_minecraft(std::span<const std::byte> region) {
+  auto file = RegionFile::of(region);
+  if (!file) return file.error();
+  ChunkSourceInfo info;
+  info.format = "minecraft";
+  std::vector<IBox> parts = columns_of(**file, {});
+  for (const IBox& column : parts) info.chunks = unite(info.chunks, column);
+  std::vector<std::uint32_t> region_of(parts.size(), 0);
+  std::vector<Region> regions;
+  regions.push_back({{}, {}, std::move(*file)});
+  return std::unique_ptr<ChunkSource>(
+      new MinecraftSource(std::move(info), std::move(parts), std::move(region_of), std::move(regions)));
+}
+
+}  // namespace quoin::minecraft

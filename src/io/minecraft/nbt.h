@@ -1,0 +1,125 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+// Named Binary Tag, the tree in which Minecraft (Java) keeps what it saves: https://minecraft.wiki/w/NBT_format.
+// Numbers have the most significant byte first.
+
+namespace quoin::nbt {
+
+enum class Tag : std::uint8_t {
+  End = 0,
+  Byte,
+  Short,
+  Int,
+  Long,
+  Float,
+  Double,
+  ByteArray,
+  String,
+  List,
+  Compound,
+  IntArray,
+  LongArray,
+};
+
+/// What a document may be; beyond it is refused.
+struct Limits {
+  int depth = 512;  ///< of lists and compounds, as the game has it
+  std::size_t nodes = std::size_t{1} << 22;
+};
+
+class Value;
+
+/// A parsed document: where each value lies in the bytes, which it does not own.
+/// Memory: 32 bytes a value; elements of arrays, and of lists of numbers, are none.
+class Document {
+ public:
+  /// Requires: `bytes` outlive it.
+  /// Errors: BadFormat, LimitExceeded, with the offset in `bytes`.
+  [[nodiscard]] static Result<Document> parse(std::span<const std::byte> bytes, const Limits& limits = {});
+
+  /// The compound (or whatever it is) that all lies in.
+  [[nodiscard]] Value root() const;
+  /// Bytes of the document: others may follow it.
+  [[nodiscard]] std::size_t size() const { return size_; }
+
+ private:
+  friend class Value;
+  friend class Parser;
+  struct Node {
+    Tag tag = Tag::End;
+    Tag element = Tag::End;   // of a list
+    std::uint32_t name = 0;   // of its text, whose length stands before it; 0: it has none
+    std::uint32_t begin = 0;  // of the payload, behind any count
+    std::uint32_t count = 0;  // elements, or bytes of a string
+    std::uint32_t next = 0;   // node after all that is in it
+  };
+  std::span<const std::byte> bytes_;
+  std::size_t size_ = 0;
+  std::vector<Node> nodes_;
+};
+
+/// A value of a document, or none: what is asked of none, or of a value of another kind, is none again.
+/// Lifetime: of the document and its bytes.
+class Value {
+ public:
+  Value() = default;
+
+  [[nodiscard]] Tag tag() const { return document_ != nullptr ? node().tag : Tag::End; }
+  [[nodiscard]] explicit operator bool() const { return document_ != nullptr; }
+  /// Where it begins in the document's bytes.
+  [[nodiscard]] std::size_t offset() const { return document_ != nullptr ? node().begin : 0; }
+  [[nodiscard]] std::string_view name() const;
+
+  /// The value of that name in a compound.
+  [[nodiscard]] Value operator[](std::string_view name) const;
+  /// Calls `visit(Value)` for the values in a compound, or in a list whose elements are no numbers, in order.
+  template <class Visit>
+  void for_each(Visit visit) const {
+    if (tag() != Tag::Compound && tag() != Tag::List) return;
+    for (std::uint32_t at = index_ + 1; at < node().next; at = document_->nodes_[at].next) visit(Value(document_, at));
+  }
+
+  /// Of a byte, short, int or long.
+  [[nodiscard]] std::optional<std::int64_t> integer() const;
+  /// Of any number.
+  [[nodiscard]] std::optional<double> number() const;
+  /// Of a string: UTF-8, but for zeros and what lies beyond 16 bits.
+  [[nodiscard]] std::optional<std::string_view> text() const;
+  /// Elements of an array or a list.
+  [[nodiscard]] std::size_t count() const;
+  /// Of a byte array (or a list of bytes): its bytes.
+  [[nodiscard]] std::span<const std::byte> bytes() const;
+  /// Of an array, or a list of whole numbers: one of them. Requires: i < count(); is_integers().
+  [[nodiscard]] std::int64_t integer(std::size_t i) const;
+  [[nodiscard]] bool is_integers() const;
+  /// Of a list of numbers of any kind (or an array): one of them.
+  [[nodiscard]] std::optional<double> number(std::size_t i) const;
+  /// Of a long array: its words, as they lie there. Requires: nothing; empty where it is none.
+  [[nodiscard]] std::span<const std::byte> long_bytes() const;
+
+ private:
+  friend class Document;
+  Value(const Document* document, std::uint32_t index) : document_(document), index_(index) {}
+  [[nodiscard]] const Document::Node& node() const { return document_->nodes_[index_]; }
+  [[nodiscard]] Tag element() const;
+
+  const Document* document_ = nullptr;
+  std::uint32_t index_ = 0;
+};
+
+/// Of a compound its value of the first of these names that is there.
+[[nodiscard]] inline Value first_of(Value compound, std::string_view name, std::string_view other) {
+  const Value found = compound[name];
+  return found ? found : compound[other];
+}
+
+}  // namespace quoin::nbt

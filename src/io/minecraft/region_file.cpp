@@ -1,0 +1,240 @@
+#include "io/minecraft/region_file.h"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include <quoin/io/file.h>
+
+#include "io/byte_order.h"
+#include "io/byte_stream.h"
+#include "io/held_files.h"
+#include "io/minecraft/lz4_blocks.h"
+
+namespace quoin::minecraft {
+
+namespace {
+
+constexpr std::size_t kSectorBytes = 4096;
+constexpr std::size_t kChunkHeader = 5;
+constexpr std::uint8_t kExternal = 128;
+
+Result<std::vector<std::byte>> inflate_all(std::span<const std::byte> bytes, Compression compression,
+                                           std::size_t max_bytes) {
+  ByteStream stream(bytes, 0, compression);
+  std::vector<std::byte> out;
+  constexpr std::size_t kUsualRatio = 16;
+  std::size_t room = std::min(max_bytes, bytes.size() * kUsualRatio + kSectorBytes);
+  while (true) {
+    const std::size_t filled = out.size();
+    out.resize(filled + room);
+    const auto count = stream.read(std::span(out).subspan(filled));
+    if (!count) return count.error();
+    out.resize(filled + *count);
+    if (*count < room) return out;
+    if (out.size() >= max_bytes) {
+      return make_error(ErrorCode::LimitExceeded, "expands to more than " + std::to_string(max_bytes) + " bytes", {},
+                        stream.position());
+    }
+    room = std::min(max_bytes - out.size(), out.size());
+  }
+}
+
+std::optional<int> whole_number(std::string_view text) {
+  int number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const bool is_whole = error == std::errc() && end == text.data() + text.size();
+  return is_whole ? std::optional(number) : std::nullopt;
+}
+
+/// What stands behind the last dot; the text becomes what stands before it.
+std::optional<std::string_view> take_last(std::string_view& text) {
+  const std::size_t dot = text.rfind('.');
+  if (dot == std::string_view::npos) return std::nullopt;
+  const std::string_view last = text.substr(dot + 1);
+  text = text.substr(0, dot);
+  return last;
+}
+
+}  // namespace
+
+Result<std::vector<std::byte>> decompress(std::span<const std::byte> bytes, std::uint8_t compression,
+                                          std::size_t max_bytes) {
+  switch (static_cast<ChunkCompression>(compression)) {
+    case ChunkCompression::Gzip:
+      return inflate_all(bytes, Compression::Gzip, max_bytes);
+    case ChunkCompression::Zlib:
+      return inflate_all(bytes, Compression::Zlib, max_bytes);
+    case ChunkCompression::None:
+      return std::vector<std::byte>(bytes.begin(), bytes.end());
+    case ChunkCompression::Lz4:
+      return expand_lz4_blocks(bytes, max_bytes);
+  }
+  return make_error(ErrorCode::Unsupported, "compressed in an unknown way, number " + std::to_string(compression));
+}
+
+Result<std::vector<std::byte>> decompress_file(std::span<const std::byte> bytes, std::size_t max_bytes) {
+  constexpr std::byte kDeflate{8};
+  const bool is_zlib = bytes.size() >= 2 && (bytes[0] & std::byte{15}) == kDeflate &&
+                       std::to_integer<int>(bytes[0]) >> 4 <= 7 &&
+                       (std::to_integer<int>(bytes[0]) * 256 + std::to_integer<int>(bytes[1])) % 31 == 0;
+  const ChunkCompression found = begins_gzip(bytes) ? ChunkCompression::Gzip
+                                 : is_zlib          ? ChunkCompression::Zlib
+                                                    : ChunkCompression::None;
+  return decompress(bytes, static_cast<std::uint8_t>(found), max_bytes);
+}
+
+std::optional<RegionName> parse_region_name(const std::filesystem::path& path) {
+  const std::string name = path.filename().string();
+  std::string_view text = name;
+  const auto extension = take_last(text);
+  if (!extension || (*extension != "mca" && *extension != "mcr")) return std::nullopt;
+  const auto z = take_last(text);
+  const auto x = z ? take_last(text) : std::nullopt;
+  if (!x || !text.ends_with('r')) return std::nullopt;
+  const auto x_number = whole_number(*x);
+  const auto z_number = whole_number(*z);
+  if (!x_number || !z_number) return std::nullopt;
+  return RegionName{*x_number, *z_number, *extension == "mcr"};
+}
+
+RegionFile::RegionFile(std::filesystem::path path, RegionName name, int descriptor)
+    : path_(std::move(path)), name_(name), descriptor_(descriptor) {}
+
+RegionFile::~RegionFile() {
+  if (descriptor_ >= 0) close_after_reading(descriptor_);
+}
+
+bool is_region_file(std::span<const std::byte> beginning) {
+  if (beginning.size() < 2 * kSectorBytes) return false;
+  std::uint32_t first = 0;
+  for (std::size_t i = 0; i < kSectorBytes / 4; ++i) {
+    const auto entry = load<std::uint32_t>(beginning.data() + 4 * i, std::endian::big);
+    if (entry == 0) continue;
+    if (entry >> 8 < 2 || (entry & 255U) == 0) return false;
+    first = first == 0 ? entry >> 8 : std::min(first, entry >> 8);
+  }
+  const std::size_t at = std::size_t{first} * kSectorBytes;
+  if (first == 0 || beginning.size() - 2 * kSectorBytes < at - 2 * kSectorBytes + kChunkHeader) return false;
+  const auto size = load<std::uint32_t>(beginning.data() + at, std::endian::big);
+  const auto compression = std::to_integer<unsigned>(beginning[at + 4]) & ~unsigned{kExternal};
+  return size >= 1 && size <= kMaxChunkBytes && compression >= 1 && compression <= 4;
+}
+
+Result<std::unique_ptr<RegionFile>> RegionFile::of(std::span<const std::byte> bytes) {
+  std::unique_ptr<RegionFile> file(new RegionFile({}, {}, -1));
+  file->bytes_.assign(bytes.begin(), bytes.end());
+  file->size_ = bytes.size();
+  if (auto done = file->read_table(); !done) return done.error();
+  return file;
+}
+
+Result<std::unique_ptr<RegionFile>> RegionFile::open(const std::filesystem::path& path, RegionName name) {
+  const auto cannot = [&] {
+    return make_error(ErrorCode::CannotRead, std::generic_category().message(errno), path.string());
+  };
+  const int descriptor = open_for_reading(path);
+  if (descriptor < 0) return cannot();
+  std::unique_ptr<RegionFile> file(new RegionFile(path, name, descriptor));
+  struct stat info {};
+  if (::fstat(descriptor, &info) != 0) return cannot();
+  if (!S_ISREG(info.st_mode)) return make_error(ErrorCode::CannotRead, "it is not a regular file", path.string());
+  file->size_ = static_cast<std::uint64_t>(info.st_size);
+  if (auto done = file->read_table(); !done) return done.error();
+  return file;
+}
+
+Status RegionFile::read_table() {
+  if (size_ == 0) return {};  // as the game leaves files that it made and did not fill
+  std::array<std::byte, kSectorBytes> table{};
+  const auto count = read_at(0, table);
+  if (!count) return count.error();
+  if (*count < table.size()) {
+    return make_error(ErrorCode::BadFormat, "a region file of " + std::to_string(*count) + " bytes", path_.string(),
+                      *count);
+  }
+  for (std::size_t i = 0; i < table_.size(); ++i) {
+    table_[i] = load<std::uint32_t>(table.data() + 4 * i, std::endian::big);
+  }
+  return {};
+}
+
+Result<std::size_t> RegionFile::read_at(std::uint64_t offset, std::span<std::byte> out) const {
+  if (descriptor_ < 0) {
+    const std::size_t begin = std::min<std::uint64_t>(offset, bytes_.size());
+    const std::size_t count = std::min(out.size(), bytes_.size() - begin);
+    std::copy_n(bytes_.data() + begin, count, out.data());
+    return count;
+  }
+  std::size_t filled = 0;
+  while (filled < out.size()) {
+    const ssize_t count =
+        ::pread(descriptor_, out.data() + filled, out.size() - filled, static_cast<off_t>(offset + filled));
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return make_error(ErrorCode::CannotRead, std::generic_category().message(errno), path_.string());
+    if (count == 0) break;
+    filled += static_cast<std::size_t>(count);
+  }
+  return filled;
+}
+
+Error RegionFile::fault(int x, int z, std::string what) const {
+  const std::string place =
+      std::to_string(name_.x * kRegionEdge + x) + ", " + std::to_string(name_.z * kRegionEdge + z);
+  return make_error(ErrorCode::BadFormat, "chunk (" + place + "): " + std::move(what), path_.string(), offset(x, z));
+}
+
+Result<std::vector<std::byte>> RegionFile::read_sectors(int x, int z, std::uint8_t& compression) const {
+  const std::uint64_t begin = offset(x, z);
+  if (begin < 2 * kSectorBytes) return fault(x, z, "its first sector lies in the table");
+  if (begin + kChunkHeader > size_) return fault(x, z, "its first sector lies beyond the file's end");
+  std::array<std::byte, kChunkHeader> header{};
+  if (const auto count = read_at(begin, header); !count || *count < header.size()) {
+    return count ? Result<std::vector<std::byte>>(fault(x, z, "cut off")) : count.error();
+  }
+  const std::uint64_t bytes = load<std::uint32_t>(header.data(), std::endian::big);
+  compression = std::to_integer<std::uint8_t>(header[4]);
+  // It may have more sectors than the table says, which the checksum of its compressed data then bears out.
+  if (bytes < 1 || begin + 4 + bytes > size_) {
+    return fault(x, z, "says that it has " + std::to_string(bytes) + " bytes");
+  }
+  if (bytes > kMaxChunkBytes) return fault(x, z, "has " + std::to_string(bytes) + " bytes, which is too much");
+  std::vector<std::byte> content(static_cast<std::size_t>(bytes - 1));
+  const auto count = read_at(begin + kChunkHeader, content);
+  if (!count) return count.error();
+  if (*count < content.size()) return fault(x, z, "cut off");
+  return content;
+}
+
+Result<std::vector<std::byte>> RegionFile::read_external(int x, int z) const {
+  const std::string name =
+      "c." + std::to_string(name_.x * kRegionEdge + x) + "." + std::to_string(name_.z * kRegionEdge + z) + ".mcc";
+  const std::filesystem::path file = path_.parent_path() / name;
+  auto bytes = read_file_beginning(file, kMaxChunkBytes);
+  if (!bytes) return fault(x, z, "lies in " + name + ", which cannot be read: " + bytes.error().message);
+  return bytes;
+}
+
+Result<std::vector<std::byte>> RegionFile::read(int x, int z) const {
+  std::uint8_t compression = 0;
+  auto content = read_sectors(x, z, compression);
+  if (!content) return content;
+  if ((compression & kExternal) != 0) {
+    content = read_external(x, z);
+    if (!content) return content;
+    compression &= static_cast<std::uint8_t>(~kExternal);
+  }
+  auto expanded = decompress(*content, compression, kMaxChunkBytes);
+  if (expanded) return expanded;
+  Error error = fault(x, z, expanded.error().message);
+  error.code = expanded.error().code;
+  return error;
+}
+
+}  // namespace quoin::minecraft

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+// Files of 32 x 32 chunks: Anvil (.mca) and McRegion (.mcr), https://minecraft.wiki/w/Region_file_format.
+//
+//   1,024 x (uint24 first sector, uint8 sectors), by z, then x; 1,024 x uint32 times; sectors of 4,096 bytes
+//   a chunk: uint32 bytes that follow; uint8 compression (| 128: in c.X.Z.mcc beside it); the compressed NBT
+
+namespace quoin::minecraft {
+
+inline constexpr int kRegionEdge = 32;
+/// The most bytes that a chunk may expand to; the game's have some 100,000.
+inline constexpr std::size_t kMaxChunkBytes = std::size_t{64} << 20;
+
+/// Decompresses the NBT of a chunk, or of a whole file.
+enum class ChunkCompression : std::uint8_t { Gzip = 1, Zlib = 2, None = 3, Lz4 = 4 };
+/// Errors: BadFormat, with the offset in `bytes`; LimitExceeded beyond `max_bytes`; Unsupported for other numbers, and
+/// for LZ4 in builds without it.
+[[nodiscard]] Result<std::vector<std::byte>> decompress(std::span<const std::byte> bytes, std::uint8_t compression,
+                                                        std::size_t max_bytes);
+/// A file of NBT, as it is or within gzip or zlib, by how it begins. Errors: as `decompress`.
+[[nodiscard]] Result<std::vector<std::byte>> decompress_file(std::span<const std::byte> bytes, std::size_t max_bytes);
+
+/// Where a region's name says that it lies: (x, z) of "r.X.Z.mca", whatever stands before it.
+struct RegionName {
+  int x = 0;
+  int z = 0;
+  bool is_mcregion = false;
+};
+[[nodiscard]] std::optional<RegionName> parse_region_name(const std::filesystem::path& path);
+
+/// Whether a file that begins so may be one: its table names sectors that there can be, and the first one of those that
+/// are among the bytes holds a chunk. Of a file without chunks nobody can tell.
+[[nodiscard]] bool is_region_file(std::span<const std::byte> beginning);
+
+/// A region that is open for reading. Threads: any number at once.
+class RegionFile {
+ public:
+  /// Errors: CannotRead; BadFormat where it is shorter than its table.
+  [[nodiscard]] static Result<std::unique_ptr<RegionFile>> open(const std::filesystem::path& path, RegionName name);
+  /// The same of a file's bytes, which are copied; chunks in files beside it are not found.
+  [[nodiscard]] static Result<std::unique_ptr<RegionFile>> of(std::span<const std::byte> bytes);
+  RegionFile(const RegionFile&) = delete;
+  RegionFile& operator=(const RegionFile&) = delete;
+  ~RegionFile();
+
+  /// Whether a chunk is there. Requires: 0 <= x, z < 32.
+  [[nodiscard]] bool has(int x, int z) const { return entry(x, z) != 0; }
+  /// The NBT of a chunk, decompressed. Requires: has(x, z).
+  /// Errors: BadFormat, Unsupported, LimitExceeded, CannotRead; with the file, and the offset in it.
+  [[nodiscard]] Result<std::vector<std::byte>> read(int x, int z) const;
+  /// Where a chunk begins in the file.
+  [[nodiscard]] std::uint64_t offset(int x, int z) const { return std::uint64_t{entry(x, z) >> 8} * 4096; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  RegionFile(std::filesystem::path path, RegionName name, int descriptor);
+  [[nodiscard]] Status read_table();
+  [[nodiscard]] std::uint32_t entry(int x, int z) const {
+    return table_[static_cast<std::size_t>(z * kRegionEdge + x)];
+  }
+  [[nodiscard]] Result<std::vector<std::byte>> read_sectors(int x, int z, std::uint8_t& compression) const;
+  [[nodiscard]] Result<std::vector<std::byte>> read_external(int x, int z) const;
+  [[nodiscard]] Result<std::size_t> read_at(std::uint64_t offset, std::span<std::byte> out) const;
+  [[nodiscard]] Error fault(int x, int z, std::string what) const;
+
+  std::filesystem::path path_;
+  RegionName name_;
+  int descriptor_;                // -1: of `bytes_`
+  std::vector<std::byte> bytes_;  // of a file that has no name
+  std::uint64_t size_ = 0;
+  std::array<std::uint32_t, kRegionEdge * kRegionEdge> table_{};
+};
+
+}  // namespace quoin::minecraft

@@ -1,0 +1,249 @@
+#include "io/minecraft/sections.h"
+
+#include <algorithm>
+#include <bit>
+#include <string>
+#include <utility>
+
+#include "io/byte_order.h"
+#include "io/minecraft/legacy_blocks.h"
+
+namespace quoin::minecraft {
+
+namespace {
+
+constexpr std::uint16_t kNoIndex = 0xFFFF;
+constexpr std::size_t kLegacyCodes = std::size_t{4096} * 16;
+
+Error fault(std::string what, nbt::Value at) {
+  return make_error(ErrorCode::BadFormat, std::move(what), {}, at.offset());
+}
+
+std::uint64_t word(std::span<const std::byte> longs, std::size_t i) {
+  return load<std::uint64_t>(longs.data() + 8 * i, std::endian::big);
+}
+
+int nibble(std::span<const std::byte> bytes, std::size_t i) {
+  if (i / 2 >= bytes.size()) return 0;
+  return std::to_integer<int>(bytes[i / 2]) >> (i % 2 * 4) & 15;
+}
+
+}  // namespace
+
+int bits_of_palette(std::size_t size, int least) {
+  return std::max(static_cast<int>(std::bit_width(size - 1)), least);
+}
+
+bool unpack_indices(nbt::Value longs, int bits, std::span<std::uint16_t> out) {
+  const std::span<const std::byte> bytes = longs.long_bytes();
+  const std::size_t words = bytes.size() / 8;
+  const auto width = static_cast<std::size_t>(bits);
+  const std::size_t per_word = 64 / width;
+  const std::uint64_t mask = (std::uint64_t{1} << width) - 1;
+  if (words == (out.size() + per_word - 1) / per_word) {  // none spans two
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < words; ++i) {
+      std::uint64_t rest = word(bytes, i);
+      for (std::size_t k = 0; k < per_word && at < out.size(); ++k, rest >>= width) {
+        out[at++] = static_cast<std::uint16_t>(rest & mask);
+      }
+    }
+    return true;
+  }
+  if (words != (out.size() * width + 63) / 64) return false;
+  for (std::size_t at = 0; at < out.size(); ++at) {
+    const std::size_t bit = at * width;
+    std::uint64_t value = word(bytes, bit / 64) >> (bit % 64);
+    if (bit % 64 + width > 64) value |= word(bytes, bit / 64 + 1) << (64 - bit % 64);
+    out[at] = static_cast<std::uint16_t>(value & mask);
+  }
+  return true;
+}
+
+Status SectionReader::read_palette(nbt::Value palette) {
+  section_.palette.clear();
+  Status done;
+  std::vector<Property> properties;
+  palette.for_each([&](nbt::Value entry) {
+    if (!done) return;
+    // Before 20w17 and since: a compound; a few snapshots had the name alone.
+    const auto name = entry.tag() == nbt::Tag::String ? entry.text() : entry["Name"].text();
+    if (!name) {
+      done = fault("a block without a name", entry);
+      return;
+    }
+    properties.clear();
+    entry["Properties"].for_each([&](nbt::Value value) {
+      if (const auto text = value.text()) properties.emplace_back(value.name(), *text);
+    });
+    const auto block = types_.block(*name, properties);
+    if (block) {
+      section_.palette.push_back(*block);
+    } else {
+      done = block.error();
+    }
+  });
+  return done;
+}
+
+void SectionReader::begin_legacy() {
+  section_.palette.clear();
+  legacy_index_.resize(kLegacyCodes, kNoIndex);
+}
+
+void SectionReader::end_legacy() {
+  for (const std::uint32_t code : legacy_used_) legacy_index_[code] = kNoIndex;
+  legacy_used_.clear();
+}
+
+Status SectionReader::put_legacy(std::size_t at, int id, int data) {
+  const auto code = static_cast<std::uint32_t>(id * 16 + data);
+  if (legacy_index_[code] == kNoIndex) {
+    const auto [name, properties] = legacy_block(id, data);
+    const auto block = types_.block(name, properties);
+    if (!block) return block.error();
+    legacy_index_[code] = static_cast<std::uint16_t>(section_.palette.size());
+    legacy_used_.push_back(code);
+    section_.palette.push_back(*block);
+  }
+  section_.indices[at] = legacy_index_[code];
+  return {};
+}
+
+Status SectionReader::read_legacy(nbt::Value section) {
+  const auto blocks = section["Blocks"].bytes();
+  if (blocks.size() != kSectionBlocks)
+    return fault("a section of " + std::to_string(blocks.size()) + " blocks", section);
+  const auto data = section["Data"].bytes();
+  const auto add = section["Add"].bytes();
+  begin_legacy();
+  Status done;
+  for (std::size_t i = 0; i < kSectionBlocks && done; ++i) {
+    done = put_legacy(i, nibble(add, i) << 8 | std::to_integer<int>(blocks[i]), nibble(data, i));
+  }
+  end_legacy();
+  return done;
+}
+
+// 16 x 128 x 16 blocks in one array, by x, then z, then y.
+Status SectionReader::read_mcregion(nbt::Value level, FunctionRef<void(const Section&)> take) {
+  constexpr std::size_t kHeight = 128;
+  const auto blocks = level["Blocks"].bytes();
+  const auto data = level["Data"].bytes();
+  if (blocks.size() != kHeight * 256) return fault("a chunk of " + std::to_string(blocks.size()) + " blocks", level);
+  for (int y = 0; y < 8; ++y) {
+    begin_legacy();
+    Status done;
+    for (std::size_t i = 0; i < kSectionBlocks && done; ++i) {
+      const std::size_t x = i & 15U;
+      const std::size_t z = i >> 4 & 15U;
+      const std::size_t from = (x * 16 + z) * kHeight + static_cast<std::size_t>(y) * 16 + (i >> 8);
+      done = put_legacy(i, std::to_integer<int>(blocks[from]), nibble(data, from));
+    }
+    end_legacy();
+    if (!done) return done;
+    section_.y = y;
+    read_biomes({}, level);
+    if (!is_air()) take(section_);
+  }
+  return {};
+}
+
+void SectionReader::read_biomes(nbt::Value section, nbt::Value level) {
+  std::vector<BiomeTints>& biomes = section_.biomes;
+  std::vector<std::uint8_t>& indices = section_.biome_indices;
+  biomes.clear();
+  indices.assign(64, 0);
+  constexpr std::size_t kMost = 255;
+  const auto index_of = [&](const BiomeTints& tints) {
+    const auto found = std::ranges::find(biomes, tints);
+    if (found != biomes.end()) return static_cast<std::uint8_t>(found - biomes.begin());
+    if (biomes.size() >= kMost) return std::uint8_t{0};
+    biomes.push_back(tints);
+    return static_cast<std::uint8_t>(biomes.size() - 1);
+  };
+  if (const nbt::Value palette = section["biomes"]["palette"]; palette.count() > 0) {
+    std::vector<std::uint8_t> of_palette;
+    palette.for_each(
+        [&](nbt::Value name) { of_palette.push_back(index_of(tints_of_biome(name.text().value_or("")))); });
+    std::array<std::uint16_t, 64> cells{};
+    const nbt::Value data = section["biomes"]["data"];
+    if (data && !of_palette.empty() && of_palette.size() <= 64) {
+      if (!unpack_indices(data, bits_of_palette(of_palette.size(), 1), cells)) cells = {};
+    }
+    for (std::size_t i = 0; i < cells.size() && !of_palette.empty(); ++i) {
+      indices[i] = of_palette[std::min<std::size_t>(cells[i], of_palette.size() - 1)];
+    }
+  } else if (const nbt::Value numbers = level["Biomes"]; numbers.is_integers() && numbers.count() == 256) {
+    indices.resize(256);
+    for (std::size_t i = 0; i < 256; ++i) {
+      const std::int64_t number = numbers.integer(i);
+      indices[i] =
+          index_of(tints_of_biome(name_of_biome(numbers.tag() == nbt::Tag::ByteArray ? number & 255 : number)));
+    }
+  } else if (numbers.is_integers() && numbers.count() >= 1024 && section_.y >= 0) {
+    // Cells of the whole chunk, from below.
+    const std::size_t first = std::min(static_cast<std::size_t>(section_.y) * 64, numbers.count() - 64);
+    for (std::size_t i = 0; i < 64; ++i)
+      indices[i] = index_of(tints_of_biome(name_of_biome(numbers.integer(first + i))));
+  }
+  if (biomes.empty()) biomes.emplace_back();
+}
+
+bool SectionReader::is_air() const {
+  return std::ranges::all_of(section_.palette, [](const Block& block) { return block.is_air(); });
+}
+
+Status SectionReader::read_section(nbt::Value section, nbt::Value level) {
+  const auto y = section["Y"].integer();
+  if (!y || *y < -128 || *y > 127) return fault("a section without a height", section);
+  section_.y = static_cast<int>(*y);
+  const nbt::Value states = section["block_states"];
+  const nbt::Value palette = states ? states["palette"] : section["Palette"];
+  section_.palette.clear();
+  if (palette) {
+    const nbt::Value data = states ? states["data"] : section["BlockStates"];
+    if (auto read = read_palette(palette); !read) return read;
+    const std::size_t size = section_.palette.size();
+    if (size == 0 || size > kSectionBlocks) return fault("a palette of " + std::to_string(size) + " blocks", palette);
+    if (data) {
+      if (is_air()) return {};
+      if (!unpack_indices(data, bits_of_palette(size, 4), section_.indices)) {
+        return fault("indices of " + std::to_string(size) + " blocks in " + std::to_string(data.count()) + " longs",
+                     data);
+      }
+      if (*std::ranges::max_element(section_.indices) >= size) {
+        return fault("an index beyond the " + std::to_string(size) + " blocks of its palette", data);
+      }
+    } else {
+      if (size > 1) return fault("a palette of " + std::to_string(size) + " blocks without indices", palette);
+      section_.indices.fill(0);
+    }
+  } else if (section["Blocks"]) {
+    if (auto read = read_legacy(section); !read) return read;
+  }
+  if (!section_.palette.empty()) read_biomes(section, level);
+  return {};
+}
+
+Status SectionReader::read(nbt::Value root, FunctionRef<void(const Section&)> take,
+                           FunctionRef<void(const Error&)> broken) {
+  const nbt::Value level = root["Level"] ? root["Level"] : root;
+  nbt::Value sections = nbt::first_of(level, "sections", "Sections");
+  if (!sections && level["Blocks"]) return read_mcregion(level, take);
+  Status done;
+  sections.for_each([&](nbt::Value section) {
+    if (!done) return;
+    const Status read = read_section(section, level);
+    if (!read && read.error().code == ErrorCode::BadFormat) {
+      broken(read.error());
+    } else if (!read) {
+      done = read;
+    } else if (!is_air()) {
+      take(section_);
+    }
+  });
+  return done;
+}
+
+}  // namespace quoin::minecraft

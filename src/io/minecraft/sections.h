@@ -1,0 +1,66 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <quoin/core/function_ref.h>
+#include <quoin/core/result.h>
+
+#include "io/minecraft/biomes.h"
+#include "io/minecraft/block_types.h"
+#include "io/minecraft/nbt.h"
+
+namespace quoin::minecraft {
+
+inline constexpr int kSectionEdge = 16;
+inline constexpr std::size_t kSectionBlocks = 4096;
+
+/// 16^3 blocks of a chunk.
+struct Section {
+  int y = 0;  ///< its lowest blocks are at 16 y
+  std::vector<Block> palette;
+  std::array<std::uint16_t, kSectionBlocks> indices{};  ///< in the palette, by y, then z, then x
+  /// Of cells of 4^3, by y, then z, then x; or of columns, by z, then x.
+  std::vector<std::uint8_t> biome_indices;
+  std::vector<BiomeTints> biomes;  ///< those that the section has, at least one
+};
+
+/// Reads the sections of a chunk's NBT, of any version from McRegion on, one after the other. What is broken is told,
+/// and the other sections are read.
+///
+/// `take`:   gets each section that is not all air; it may keep nothing of it.
+/// `broken`: gets what cannot be read, with its offset in the NBT.
+/// Errors: LimitExceeded.
+class SectionReader {
+ public:
+  explicit SectionReader(BlockTypes& types) : types_(types) {}
+
+  [[nodiscard]] Status read(nbt::Value root, FunctionRef<void(const Section&)> take,
+                            FunctionRef<void(const Error&)> broken);
+
+ private:
+  [[nodiscard]] Status read_section(nbt::Value section, nbt::Value level);
+  [[nodiscard]] Status read_palette(nbt::Value palette);
+  [[nodiscard]] Status read_legacy(nbt::Value section);
+  [[nodiscard]] Status read_mcregion(nbt::Value level, FunctionRef<void(const Section&)> take);
+  [[nodiscard]] Status put_legacy(std::size_t at, int id, int data);
+  void begin_legacy();
+  void end_legacy();
+  void read_biomes(nbt::Value section, nbt::Value level);
+  [[nodiscard]] bool is_air() const;
+
+  BlockTypes& types_;
+  Section section_;
+  std::vector<std::uint16_t> legacy_index_;  // by id and data: in the palette; kNoIndex
+  std::vector<std::uint32_t> legacy_used_;
+};
+
+/// Unpacks indices of `bits` each from longs, from the lowest bit up. Where they span longs is told by how many there
+/// are. False where the longs are of neither form. Requires: 1 <= bits <= 16.
+[[nodiscard]] bool unpack_indices(nbt::Value longs, int bits, std::span<std::uint16_t> out);
+/// Bits that an index of a palette takes. Requires: size > 0.
+[[nodiscard]] int bits_of_palette(std::size_t size, int least);
+
+}  // namespace quoin::minecraft

@@ -1,0 +1,118 @@
+#include <quoin/io/chunk_source.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <list>
+#include <mutex>
+#include <numeric>
+#include <tuple>
+#include <unordered_map>
+#include <utility>
+
+#include <quoin/core/assert.h>
+
+namespace quoin {
+
+namespace {
+
+constexpr std::size_t kCacheBytes = std::size_t{32} << 20;
+/// What a part takes besides its chunks.
+constexpr std::size_t kPartBytes = 256;
+
+/// Of a box that is one chunk along x and z: by columns, from below in each.
+std::tuple<int, int, int> order_of(IVec3 place) {
+  return {place.z, place.x, place.y};
+}
+
+}  // namespace
+
+/// The parts that were read last. A part that several threads want is read by the first, for which the others wait.
+struct ChunkSource::Cache {
+  struct Entry {
+    std::size_t part = 0;
+    bool is_read = false;
+    std::vector<SourceChunk> chunks{};
+    std::size_t bytes = 0;
+  };
+  std::mutex mutex;
+  std::condition_variable was_read;
+  std::list<Entry> entries;  // what was wanted last first
+  std::unordered_map<std::size_t, std::list<Entry>::iterator> by_part;
+  std::size_t bytes = 0;
+
+  void forget(std::list<Entry>::iterator entry) {
+    bytes -= entry->bytes;
+    by_part.erase(entry->part);
+    entries.erase(entry);
+  }
+  void keep_within_limit() {
+    for (auto last = entries.end(); bytes > kCacheBytes && last != entries.begin();) {
+      --last;
+      if (last == entries.begin() || !last->is_read) continue;  // what was read just now stays
+      const auto gone = last++;
+      forget(gone);
+    }
+  }
+};
+
+ChunkSource::ChunkSource(ChunkSourceInfo info, std::vector<IBox> parts)
+    : info_(std::move(info)), parts_(std::move(parts)), by_place_(parts_.size()), cache_(std::make_unique<Cache>()) {
+  std::iota(by_place_.begin(), by_place_.end(), 0U);
+  std::ranges::sort(by_place_, {}, [&](std::uint32_t part) { return order_of(parts_[part].min); });
+}
+
+ChunkSource::~ChunkSource() = default;
+
+std::optional<std::size_t> ChunkSource::part_of(IVec3 chunk) const {
+  const auto after = std::ranges::upper_bound(by_place_, order_of(chunk), {},
+                                              [&](std::uint32_t part) { return order_of(parts_[part].min); });
+  if (after == by_place_.begin()) return std::nullopt;
+  const std::uint32_t part = *(after - 1);
+  return parts_[part].contains(chunk) ? std::optional<std::size_t>(part) : std::nullopt;
+}
+
+Result<std::optional<Chunk>> ChunkSource::read(IVec3 chunk, std::vector<Error>* broken) const {
+  const auto part = part_of(chunk);
+  if (!part) return std::optional<Chunk>();
+  const auto chunk_in = [&](const std::vector<SourceChunk>& chunks) -> std::optional<Chunk> {
+    const auto found = std::ranges::find(chunks, chunk, &SourceChunk::place);
+    return found == chunks.end() ? std::nullopt : std::optional(found->voxels);
+  };
+  std::unique_lock lock(cache_->mutex);
+  for (auto known = cache_->by_part.find(*part); known != cache_->by_part.end(); known = cache_->by_part.find(*part)) {
+    const auto entry = known->second;
+    if (entry->is_read) {
+      cache_->entries.splice(cache_->entries.begin(), cache_->entries, entry);
+      return chunk_in(entry->chunks);
+    }
+    cache_->was_read.wait(lock);
+  }
+  cache_->entries.push_front({.part = *part});
+  const auto entry = cache_->entries.begin();
+  cache_->by_part[*part] = entry;
+  lock.unlock();
+  Result<SourcePart> content = [&]() -> Result<SourcePart> {
+    try {
+      return read_part(*part);
+    } catch (const std::bad_alloc&) {
+      return make_error(ErrorCode::LimitExceeded, "there is not enough memory to read it");
+    }
+  }();
+  lock.lock();
+  cache_->was_read.notify_all();
+  if (!content) {
+    cache_->forget(entry);
+    return content.error();
+  }
+  entry->is_read = true;
+  entry->chunks = std::move(content->chunks);
+  entry->bytes = kPartBytes;
+  for (const SourceChunk& each : entry->chunks) entry->bytes += each.voxels.bytes();
+  cache_->bytes += entry->bytes;
+  if (broken != nullptr) std::ranges::move(content->broken, std::back_inserter(*broken));
+  std::optional<Chunk> found = chunk_in(entry->chunks);
+  cache_->keep_within_limit();
+  return found;
+}
+
+}  // namespace quoin

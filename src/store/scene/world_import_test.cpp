@@ -1,0 +1,110 @@
+#include <quoin/store/world_import.h>
+
+#include <filesystem>
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+
+#include <quoin/io/file.h>
+#include <quoin/store/world_saver.h>
+
+#include "io/minecraft/minecraft_for_tests.h"
+
+namespace quoin {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder with regions of the game's, removed at the end.
+class WorldImport : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder = fs::temp_directory_path() / ("quoin-import-" + std::to_string(::getpid()));
+    fs::remove_all(folder);
+    fs::create_directories(folder / "region");
+    for (int i = 0; i < kRegions; ++i) {
+      const auto bytes = minecraft_test::region_with(minecraft_test::chunk_of_stairs(i - 4), i, i);
+      ASSERT_TRUE(write_file(bytes, folder / "region" / ("r." + std::to_string(i - 3) + ".1.mca")));
+    }
+    std::vector<std::byte> broken = minecraft_test::chunk_of_stairs(0);
+    broken.resize(50);
+    ASSERT_TRUE(write_file(minecraft_test::region_with(broken), folder / "region" / "r.9.9.mca"));
+  }
+  void TearDown() override { fs::remove_all(folder); }
+
+  [[nodiscard]] std::unique_ptr<ChunkSource> open() const {
+    auto source = open_chunk_source(folder);
+    EXPECT_TRUE(source);
+    return std::move(*source);
+  }
+  static Scene scene_of(const fs::path& path) {
+    const auto world = WorldStore::open(path, WorldAccess::Read);
+    EXPECT_TRUE(world);
+    auto loaded = load_world(*world);
+    EXPECT_TRUE(loaded);
+    EXPECT_TRUE(loaded->loaded.warnings.empty());
+    return std::move(loaded->loaded.scene);
+  }
+  static const Grid& grid_of(const Scene& scene) { return scene.grids()[scene.grids().handles().front()].grid; }
+
+  static constexpr int kRegions = 12;
+  fs::path folder;
+};
+
+TEST_F(WorldImport, HoldsAllThatCanBeReadAndNamesTheRest) {
+  const auto source = open();
+  const auto imported = import_world(*source, folder / "out.quoin");
+  ASSERT_TRUE(imported) << to_string(imported.error());
+  EXPECT_EQ(imported->voxels, 3U * kRegions);
+  ASSERT_EQ(imported->broken.size(), 1U);
+  EXPECT_NE(imported->broken[0].find("r.9.9.mca: byte 8192"), std::string::npos);
+  EXPECT_FALSE(fs::exists(folder / "out.quoin.part"));
+  const Scene scene = scene_of(folder / "out.quoin");
+  EXPECT_EQ(scene.voxel_count(), 3 * kRegions);
+  const Grid& grid = grid_of(scene);
+  EXPECT_EQ(scene.types[grid.get(-3 * 512, -64, 512)].name, "minecraft:stone");
+  EXPECT_NE(grid.data({-3 * 512 + 1, -64, 512}).state, 0U);
+}
+
+TEST_F(WorldImport, WhatWasStoppedAnywhereEndsAsIfItHadNotBeen) {
+  const auto source = open();
+  ASSERT_TRUE(import_world(*source, folder / "whole.quoin", {1}));
+  int stopped = 0;
+  for (int run = 0; run < 50; ++run) {
+    int calls = 0;
+    const auto part = import_world(*open(), folder / "parts.quoin", {1}, [&](double) { return calls++ == 0; });
+    if (part) {
+      EXPECT_GT(part->resumed_parts, 0U);
+      break;
+    }
+    EXPECT_EQ(part.error().code, ErrorCode::Cancelled);
+    ++stopped;
+  }
+  EXPECT_GE(stopped, 2);
+  const Scene whole = scene_of(folder / "whole.quoin");
+  const Scene parts = scene_of(folder / "parts.quoin");
+  ASSERT_EQ(whole.types.size(), parts.types.size());
+  for (std::size_t type = 1; type < whole.types.size(); ++type) {
+    EXPECT_EQ(whole.types[static_cast<VoxelType>(type)], parts.types[static_cast<VoxelType>(type)]);
+  }
+  ASSERT_EQ(grid_of(whole).chunk_count(), static_cast<std::size_t>(kRegions));
+  EXPECT_EQ(grid_of(parts).chunks(), grid_of(whole).chunks());
+  for (const IVec3 place : grid_of(whole).chunks()) {
+    EXPECT_TRUE(*grid_of(parts).find_chunk(place) == *grid_of(whole).find_chunk(place));
+  }
+}
+
+TEST_F(WorldImport, RefusesToGoOnWithAnotherSource) {
+  int calls = 0;
+  const auto part = import_world(*open(), folder / "out.quoin", {1}, [&](double) { return calls++ == 0; });
+  ASSERT_FALSE(part);
+  fs::remove(folder / "region" / "r.0.1.mca");
+  const auto other = import_world(*open(), folder / "out.quoin");
+  ASSERT_FALSE(other);
+  EXPECT_EQ(other.error().code, ErrorCode::InvalidArgument);
+}
+
+}  // namespace
+
+}  // namespace quoin
