@@ -94,9 +94,9 @@ TEST(C, FilesKeepThem) {
 TEST(C, MeshesAreSeenWhereTheyLie) {
   std::vector<float> values(std::size_t{kEdge} * kEdge * kEdge);
   for (int i = 0; i < kEdge * kEdge * kEdge; ++i) {
-    const double x = i / (kEdge * kEdge) - 5.5;
-    const double y = i / kEdge % kEdge - 5.5;
-    const double z = i % kEdge - 5.5;
+    const double x = static_cast<double>(i / (kEdge * kEdge)) - 5.5;
+    const double y = static_cast<double>(i / kEdge % kEdge) - 5.5;
+    const double z = static_cast<double>(i % kEdge) - 5.5;
     values[static_cast<std::size_t>(i)] = static_cast<float>(std::sqrt(x * x + y * y + z * z) - 4.0);
   }
   quoin_array array = array_of(values, QUOIN_FLOAT32);

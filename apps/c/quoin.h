@@ -11,6 +11,7 @@
  */
 #ifndef QUOIN_C_H
 #define QUOIN_C_H
+/* NOLINTBEGIN(readability-*,modernize-*,performance-*,cppcoreguidelines-*): this is C */
 
 #include <stddef.h>
 #include <stdint.h>
@@ -26,7 +27,8 @@ extern "C" {
 #endif
 
 /* An empty struct of `type`: every number 0, which means its default. */
-#define QUOIN_INIT(type) {.size = sizeof(type)}
+#define QUOIN_INIT(type) \
+  { .size = sizeof(type) }
 
 typedef enum quoin_status {
   QUOIN_OK = 0,
@@ -63,7 +65,7 @@ typedef uint64_t quoin_mesh;
 typedef struct quoin_array {
   size_t size;
   const void* data;
-  int32_t scalar;     /* quoin_scalar */
+  int32_t scalar; /* quoin_scalar */
   int64_t shape[3];
   int64_t strides[3]; /* bytes, of any sign */
   double spacing[3];  /* of neighbours; all three 0: 1 */
@@ -81,10 +83,10 @@ typedef struct quoin_grid_info {
 
 typedef struct quoin_type {
   size_t size;
-  uint8_t rgba[4];      /* sRGB; alpha below 255 makes a type transparent */
-  float emission;       /* 0: none */
-  float metalness;      /* 0 to 1 */
-  float roughness;      /* 0 to 1; QUOIN_INIT's 0 is a mirror */
+  uint8_t rgba[4]; /* sRGB; alpha below 255 makes a type transparent */
+  float emission;  /* 0: none */
+  float metalness; /* 0 to 1 */
+  float roughness; /* 0 to 1; QUOIN_INIT's 0 is a mirror */
   char name[128];
 } quoin_type;
 
@@ -123,10 +125,10 @@ typedef struct quoin_render_options {
 /* What rays met; arrays of the caller, of one entry a ray; null: not wanted. */
 typedef struct quoin_hits {
   size_t size;
-  double* t;         /* in lengths of the direction; infinity: nothing was met */
-  int32_t* voxel;    /* [count][3], in its grid */
+  double* t;      /* in lengths of the direction; infinity: nothing was met */
+  int32_t* voxel; /* [count][3], in its grid */
   uint16_t* type;
-  double* normal;    /* [count][3], in the world */
+  double* normal; /* [count][3], in the world */
 } quoin_hits;
 
 QUOIN_API const char* quoin_version(void);
@@ -182,4 +184,5 @@ QUOIN_API quoin_status quoin_scene_rays(quoin_scene scene, size_t count, const d
 #ifdef __cplusplus
 }
 #endif
+/* NOLINTEND(readability-*,modernize-*,performance-*,cppcoreguidelines-*) */
 #endif
