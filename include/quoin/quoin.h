@@ -99,6 +99,9 @@
 #include <quoin/store/world_import.h>
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
+#include <quoin/stream/chunk_generator.h>
+#include <quoin/stream/streamed_world.h>
+#include <quoin/stream/world_edit.h>
 #include <quoin/terrain/noise.h>
 #include <quoin/terrain/terrain.h>
 #include <quoin/trace/density_ray.h>

@@ -18,7 +18,8 @@ namespace {
 
 const char* const kDoing = "drawing by paths";
 constexpr int kSamplesAtOnce = 16;  // of a tile; between them its progress is told
-constexpr int kDispatchesAtOnce = 4;
+constexpr int kDispatchesAtOnce = 8;
+constexpr int kFewSamples = 4;  // so few are over before larger buffers are made
 
 Vec4 to_vec4(DVec3 v, double w = 0.0) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
@@ -55,6 +56,19 @@ void put_options(const Camera& camera, const PathOptions& options, DVec3 from, S
   frame.sum_pitch = options.layers ? kPathSumsWithLayers : kPathSums;
 }
 
+// Graphics hardware needs many pixels at a time to be busy; the lists of glass may take a sixteenth of its memory.
+int tile_edge(const Device& device, int samples, bool has_glass) {
+  if (device.physical().type == VK_PHYSICAL_DEVICE_TYPE_CPU) return 128;
+  constexpr int kEdge = 1024;
+  VkDeviceSize most = 0;
+  const VkPhysicalDeviceMemoryProperties& memory = device.memory();
+  for (const VkMemoryHeap& heap : std::span(memory.memoryHeaps, memory.memoryHeapCount)) {
+    if ((heap.flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT) != 0) most = std::max(most, heap.size);
+  }
+  const bool has_room = !has_glass || VkDeviceSize{kEdge} * kEdge * kBodies * kBodyBytes <= most / 16;
+  return samples > kFewSamples && has_room ? kEdge : kEdge / 2;
+}
+
 }  // namespace
 
 PathPass::PathPass(RendererImpl& renderer, PathPictureImpl& picture)
@@ -70,12 +84,10 @@ Status PathPass::put_lamps(DVec3 view_origin, ShaderPathFrame& paths) {
   return done;
 }
 
-Status PathPass::put_tile_buffers(ShaderFrame& frame, ShaderPathFrame& paths) {
+Status PathPass::put_tile_buffers(int samples, ShaderFrame& frame, ShaderPathFrame& paths) {
   const PathOptions& options = picture_->options;
   const bool has_glass = renderer_->scene.placement().has_transparent;
-  // Graphics hardware needs many pixels at a time to be busy; the lists of glass take 768 bytes a pixel.
-  const bool is_processor = renderer_->device->physical().type == VK_PHYSICAL_DEVICE_TYPE_CPU;
-  tile_edge_ = is_processor ? 128 : has_glass ? 256 : 512;
+  tile_edge_ = tile_edge(*renderer_->device, samples, has_glass);
   const auto pixels = static_cast<std::size_t>(std::min(tile_edge_, options.width)) *
                       static_cast<std::size_t>(std::min(tile_edge_, options.height));
   for (Buffer* buffer : {&counters_, &results_}) {
@@ -92,7 +104,7 @@ Status PathPass::put_tile_buffers(ShaderFrame& frame, ShaderPathFrame& paths) {
   return done;
 }
 
-Status PathPass::put_frame() {
+Status PathPass::put_frame(int samples) {
   const PathOptions& options = picture_->options;
   const Camera& camera = picture_->camera;
   RenderOptions plain;
@@ -118,7 +130,7 @@ Status PathPass::put_frame() {
   if (done) done = places_.upload(data.placed, frame.placed);
   if (done) done = places_.upload(data.tree, frame.tree);
   if (done) done = places_.upload(data.leaves, frame.leaves);
-  if (done) done = put_tile_buffers(frame, paths);
+  if (done) done = put_tile_buffers(samples, frame, paths);
   if (done) done = places_.upload(std::vector<ShaderPathFrame>{paths}, frame.paths);
   if (done) done = places_.upload(std::vector<ShaderFrame>{frame}, frame_address_);
   if (done) done = renderer_->memory.flush();
@@ -180,7 +192,7 @@ Status PathPass::add_samples(int samples, const Progress& progress) {
 
 Status PathPass::draw(int samples, const Progress& progress) {
   Status done = renderer_->paths->pipelines->prepare(renderer_->scene.placement());
-  if (done) done = put_frame();
+  if (done) done = put_frame(samples);
   if (done) {
     done = renderer_->device->run(kDoing, [&](VkCommandBuffer commands) {
       renderer_->device->api().vkCmdFillBuffer(commands, counters_.handle(), 0, sizeof(ShaderCounters), 0);

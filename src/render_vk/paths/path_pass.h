@@ -40,9 +40,9 @@ class PathPass {
   struct Tile {
     std::int32_t x, y, width, height;
   };
-  Status put_frame();
+  Status put_frame(int samples);
   Status put_lamps(DVec3 view_origin, ShaderPathFrame& paths);
-  Status put_tile_buffers(ShaderFrame& frame, ShaderPathFrame& paths);
+  Status put_tile_buffers(int samples, ShaderFrame& frame, ShaderPathFrame& paths);
   Status add_samples(int samples, const Progress& progress);
   Status take(const Tile& tile, int first, int count, const Progress& progress, double done_before);
 

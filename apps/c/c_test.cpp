@@ -1,0 +1,223 @@
+// The door for C: what it makes, and that bad input is an error and never a crash.
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "quoin.h"
+
+namespace {
+
+constexpr int kEdge = 12;
+
+template <class T>
+T sized() {
+  T made{};
+  made.size = sizeof made;
+  return made;
+}
+
+template <class T>
+quoin_array array_of(const std::vector<T>& values, quoin_scalar scalar, int edge = kEdge) {
+  auto array = sized<quoin_array>();
+  array.data = values.data();
+  array.scalar = scalar;
+  const auto bytes = static_cast<std::int64_t>(sizeof(T));
+  for (int axis = 0; axis < 3; ++axis) array.shape[axis] = edge;
+  array.strides[0] = bytes * edge * edge;
+  array.strides[1] = bytes * edge;
+  array.strides[2] = bytes;
+  return array;
+}
+
+// A scene of one grid: types 1 and 2 by turns in a box of kEdge.
+quoin_scene made_scene(std::vector<std::uint16_t>& voxels) {
+  quoin_scene scene = 0;
+  EXPECT_EQ(quoin_scene_create(&scene), QUOIN_OK);
+  auto type = sized<quoin_type>();
+  type.rgba[0] = 200;
+  type.rgba[3] = 255;
+  type.roughness = 1.0F;
+  std::uint16_t number = 0;
+  EXPECT_EQ(quoin_type_add(scene, &type, &number), QUOIN_OK);
+  EXPECT_EQ(quoin_type_add(scene, &type, &number), QUOIN_OK);
+  EXPECT_EQ(number, 2);
+  voxels.resize(std::size_t{kEdge} * kEdge * kEdge);
+  for (std::size_t i = 0; i < voxels.size(); ++i) voxels[i] = static_cast<std::uint16_t>((i + i / kEdge) % 3);
+  const quoin_array array = array_of(voxels, QUOIN_UINT16);
+  std::size_t grid = 7;
+  EXPECT_EQ(quoin_grid_add(scene, &array, "box", &grid), QUOIN_OK) << quoin_last_error();
+  EXPECT_EQ(grid, 0U);
+  return scene;
+}
+
+TEST(C, ArraysComeBackAsTheyWent) {
+  std::vector<std::uint16_t> voxels;
+  const quoin_scene scene = made_scene(voxels);
+  auto info = sized<quoin_grid_info>();
+  ASSERT_EQ(quoin_grid_get_info(scene, 0, &info), QUOIN_OK);
+  EXPECT_STREQ(info.name, "box");
+  EXPECT_EQ(info.extent[1], kEdge);
+  std::vector<std::uint16_t> read(voxels.size());
+  ASSERT_EQ(quoin_grid_read(scene, 0, info.min, info.extent, read.data(), read.size()), QUOIN_OK);
+  EXPECT_EQ(read, voxels);
+  EXPECT_EQ(quoin_grid_read(scene, 0, info.min, info.extent, read.data(), read.size() - 1), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+}
+
+TEST(C, FilesKeepThem) {
+  std::vector<std::uint16_t> voxels;
+  const quoin_scene scene = made_scene(voxels);
+  ASSERT_EQ(quoin_scene_save(scene, "c_test.json"), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_scene_save(scene, "c_test.glb"), QUOIN_OK) << quoin_last_error();
+  quoin_scene again = 0;
+  ASSERT_EQ(quoin_scene_load("c_test.json", &again), QUOIN_OK) << quoin_last_error();
+  const std::array<std::int32_t, 3> min{};
+  const std::array<std::int32_t, 3> shape{kEdge, kEdge, kEdge};
+  std::vector<std::uint16_t> read(voxels.size());
+  ASSERT_EQ(quoin_grid_read(again, 0, min.data(), shape.data(), read.data(), read.size()), QUOIN_OK);
+  EXPECT_EQ(read, voxels);
+  EXPECT_EQ(quoin_free(again), QUOIN_OK);
+  EXPECT_EQ(quoin_scene_load("c_test.nothing", &again), QUOIN_CANNOT_READ);
+  EXPECT_NE(std::string(quoin_last_error()).find("c_test.nothing"), std::string::npos);
+  EXPECT_EQ(quoin_scene_load_bytes("VOX ????", 8, &again), QUOIN_BAD_FORMAT);
+  EXPECT_EQ(quoin_scene_save(scene, "c_test.unknown"), QUOIN_UNSUPPORTED);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+}
+
+TEST(C, MeshesAreSeenWhereTheyLie) {
+  std::vector<float> values(std::size_t{kEdge} * kEdge * kEdge);
+  for (int i = 0; i < kEdge * kEdge * kEdge; ++i) {
+    const double x = static_cast<double>(i / (kEdge * kEdge)) - 5.5;
+    const double y = static_cast<double>(i / kEdge % kEdge) - 5.5;
+    const double z = static_cast<double>(i % kEdge) - 5.5;
+    values[static_cast<std::size_t>(i)] = static_cast<float>(std::sqrt(x * x + y * y + z * z) - 4.0);
+  }
+  quoin_array array = array_of(values, QUOIN_FLOAT32);
+  quoin_mesh mesh = 0;
+  ASSERT_EQ(quoin_surface_nets(&array, 0.0, 1, 0, &mesh), QUOIN_OK) << quoin_last_error();
+  auto data = sized<quoin_mesh_data>();
+  ASSERT_EQ(quoin_mesh_view(mesh, &data), QUOIN_OK);
+  ASSERT_GT(data.vertex_count, 100U);
+  for (std::size_t i = 0; i < data.vertex_count; ++i) {
+    const float* p = data.positions + 3 * i;
+    EXPECT_NEAR(std::hypot(p[0] - 5.5, p[1] - 5.5, p[2] - 5.5), 4.0, 0.25);
+  }
+  auto twice = sized<quoin_mesh_data>();
+  ASSERT_EQ(quoin_mesh_view(mesh, &twice), QUOIN_OK);
+  EXPECT_EQ(data.positions, twice.positions);
+  EXPECT_EQ(data.colours, nullptr);
+  EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
+  EXPECT_EQ(quoin_mesh_view(mesh, &data), QUOIN_BAD_HANDLE);
+  for (float& value : values) value = std::numeric_limits<float>::quiet_NaN();
+  ASSERT_EQ(quoin_surface_nets(&array, 0.0, 1, 0, &mesh), QUOIN_OK);
+  ASSERT_EQ(quoin_mesh_view(mesh, &data), QUOIN_OK);
+  EXPECT_EQ(data.index_count, 0U);
+  EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
+  EXPECT_EQ(quoin_mesh_labels(&array, 0, 4, 0, &mesh), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_surface_nets(&array, std::nan(""), 0, 0, &mesh), QUOIN_INVALID_ARGUMENT);
+}
+
+TEST(C, LabelsAndGridsAreMeshed) {
+  std::vector<std::uint16_t> voxels;
+  const quoin_scene scene = made_scene(voxels);
+  const quoin_array array = array_of(voxels, QUOIN_UINT16);
+  quoin_mesh mesh = 0;
+  auto data = sized<quoin_mesh_data>();
+  ASSERT_EQ(quoin_mesh_labels(&array, 0, 4, 1, &mesh), QUOIN_OK);
+  ASSERT_EQ(quoin_mesh_view(mesh, &data), QUOIN_OK);
+  EXPECT_EQ(data.interface_count, 3U);  // 1 and 2 with air, and with each other
+  EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
+  for (const int smooth : {0, 1}) {
+    auto options = sized<quoin_mesh_options>();
+    options.smooth = smooth;
+    ASSERT_EQ(quoin_grid_mesh(scene, 0, &options, &mesh), QUOIN_OK) << quoin_last_error();
+    ASSERT_EQ(quoin_mesh_view(mesh, &data), QUOIN_OK);
+    EXPECT_GT(data.index_count, 0U);
+    for (std::size_t i = 0; i < data.index_count; ++i) ASSERT_LT(data.indices[i], data.vertex_count);
+    for (std::size_t i = 0; i < data.vertex_count; ++i) EXPECT_EQ(data.colours[4 * i + 3], 255);
+    EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
+  }
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+}
+
+TEST(C, PicturesAndRaysSeeTheScene) {
+  std::vector<std::uint16_t> voxels;
+  const quoin_scene scene = made_scene(voxels);
+  auto options = sized<quoin_render_options>();
+  options.width = 32;
+  options.height = 24;
+  std::vector<std::uint8_t> picture(std::size_t{3} * 32 * 24, 1);
+  for (const int paths : {0, 1}) {
+    options.paths = paths;
+    options.samples = 1;
+    ASSERT_EQ(quoin_scene_render(scene, &options, picture.data(), picture.size()), QUOIN_OK) << quoin_last_error();
+    EXPECT_NE(picture, std::vector<std::uint8_t>(picture.size(), picture[0]));
+  }
+  EXPECT_EQ(quoin_scene_render(scene, &options, picture.data(), picture.size() - 1), QUOIN_INVALID_ARGUMENT);
+  options.has_camera = 1;
+  options.camera[0] = std::nan("");
+  EXPECT_EQ(quoin_scene_render(scene, &options, picture.data(), picture.size()), QUOIN_INVALID_ARGUMENT);
+  const std::vector<double> origins = {2.5, 50.0, 2.5, -9.0, -9.0, -9.0, std::nan(""), 0.0, 0.0};
+  const std::vector<double> directions = {0.0, -1.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0};
+  std::array<double, 3> t{};
+  std::array<std::int32_t, 9> voxel{};
+  auto hits = sized<quoin_hits>();
+  hits.t = t.data();
+  hits.voxel = voxel.data();
+  ASSERT_EQ(quoin_scene_rays(scene, 3, origins.data(), directions.data(), 1e9, &hits), QUOIN_OK);
+  EXPECT_EQ(t[0], 50.0 - voxel[1] - 1.0);
+  EXPECT_EQ(voxel[0], 2);
+  EXPECT_TRUE(std::isinf(t[1]) && std::isinf(t[2]));
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+}
+
+TEST(C, WhatCannotBeIsAnError) {
+  std::vector<std::uint16_t> voxels;
+  const quoin_scene scene = made_scene(voxels);
+  std::size_t count = 0;
+  quoin_mesh mesh = 0;
+  EXPECT_EQ(quoin_free(0), QUOIN_OK);
+  EXPECT_EQ(quoin_free(1'000'000), QUOIN_BAD_HANDLE);
+  EXPECT_EQ(quoin_grid_count(0, &count), QUOIN_BAD_HANDLE);
+  EXPECT_EQ(quoin_grid_count(scene, nullptr), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_mesh_view(scene, nullptr), QUOIN_BAD_HANDLE);
+  EXPECT_EQ(quoin_scene_create(nullptr), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_scene_load(nullptr, nullptr), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_grid_mesh(scene, 5, nullptr, &mesh), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_surface_nets(nullptr, 0.0, 0, 0, &mesh), QUOIN_INVALID_ARGUMENT);
+  quoin_array array = array_of(voxels, QUOIN_UINT16);
+  array.shape[0] = -1;
+  EXPECT_EQ(quoin_surface_nets(&array, 0.5, 0, 0, &mesh), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_grid_add(scene, &array, nullptr, nullptr), QUOIN_INVALID_ARGUMENT);
+  array = array_of(voxels, QUOIN_UINT16);
+  array.scalar = 99;
+  EXPECT_EQ(quoin_mesh_labels(&array, 0, 0, 0, &mesh), QUOIN_INVALID_ARGUMENT);
+  array = array_of(voxels, QUOIN_UINT16);
+  array.origin[1] = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(quoin_grid_add(scene, &array, nullptr, nullptr), QUOIN_INVALID_ARGUMENT);
+  voxels[5] = 900;
+  array = array_of(voxels, QUOIN_UINT16);
+  EXPECT_EQ(quoin_grid_add(scene, &array, nullptr, nullptr), QUOIN_INVALID_ARGUMENT);
+  auto type = quoin_type{};  // without its size
+  std::uint16_t number = 0;
+  EXPECT_EQ(quoin_type_add(scene, &type, &number), QUOIN_INVALID_ARGUMENT);
+  type.size = sizeof type;
+  type.emission = std::nanf("");
+  EXPECT_EQ(quoin_type_add(scene, &type, &number), QUOIN_INVALID_ARGUMENT);
+  std::memset(type.name, 'x', sizeof type.name);  // without an end
+  type.emission = 0.0F;
+  EXPECT_EQ(quoin_type_add(scene, &type, &number), QUOIN_OK);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+  EXPECT_EQ(quoin_free(scene), QUOIN_BAD_HANDLE);
+  EXPECT_EQ(quoin_scene_render(scene, nullptr, nullptr, 0), QUOIN_BAD_HANDLE);
+  EXPECT_STRNE(quoin_last_error(), "");
+}
+
+}  // namespace

@@ -1,0 +1,188 @@
+/* Quoin for C99 and whatever speaks C: files of voxels, arrays, meshes, pictures and rays.
+ *
+ * Status:   every function that can fail returns QUOIN_OK or a code; quoin_last_error() then says why, in one line.
+ *           No call ends the process, and no exception leaves it.
+ * Handles:  scenes and meshes are numbers. One that was freed, or never given, is QUOIN_BAD_HANDLE. 0 is none.
+ * Arrays:   the caller owns what he gives and what he has filled. What quoin_mesh_view shows belongs to the mesh, and
+ *           lasts until that is freed.
+ * Structs:  set `size` to sizeof the struct (QUOIN_INIT does), so that later versions can add to its end.
+ * Axes:     right-handed, +Y up; a voxel (x, y, z) fills the cube from there to (x + 1, y + 1, z + 1).
+ * Threads:  any thread may call, but a scene is read and changed by one at a time.
+ */
+#ifndef QUOIN_C_H
+#define QUOIN_C_H
+/* NOLINTBEGIN(readability-*,modernize-*,performance-*,cppcoreguidelines-*): this is C */
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if defined(__GNUC__)
+#define QUOIN_API __attribute__((visibility("default")))
+#else
+#define QUOIN_API
+#endif
+
+/* An empty struct of `type`: every number 0, which means its default. */
+#define QUOIN_INIT(type) \
+  { .size = sizeof(type) }
+
+typedef enum quoin_status {
+  QUOIN_OK = 0,
+  QUOIN_INVALID_ARGUMENT = 1, /* null, NaN, a size that cannot be, an index out of range */
+  QUOIN_CANNOT_READ = 2,
+  QUOIN_CANNOT_WRITE = 3,
+  QUOIN_BAD_FORMAT = 4,
+  QUOIN_UNSUPPORTED = 5,
+  QUOIN_LIMIT_EXCEEDED = 6,
+  QUOIN_CANCELLED = 7,
+  QUOIN_DEVICE_LOST = 8,
+  QUOIN_BAD_HANDLE = 9,
+  QUOIN_OUT_OF_MEMORY = 10,
+  QUOIN_INTERNAL = 11
+} quoin_status;
+
+typedef enum quoin_scalar {
+  QUOIN_UINT8 = 0,
+  QUOIN_INT8 = 1,
+  QUOIN_UINT16 = 2,
+  QUOIN_INT16 = 3,
+  QUOIN_UINT32 = 4,
+  QUOIN_INT32 = 5,
+  QUOIN_UINT64 = 6,
+  QUOIN_INT64 = 7,
+  QUOIN_FLOAT32 = 8,
+  QUOIN_FLOAT64 = 9
+} quoin_scalar;
+
+typedef uint64_t quoin_scene;
+typedef uint64_t quoin_mesh;
+
+/* A dense array of numbers; axes 0, 1 and 2 are x, y and z. */
+typedef struct quoin_array {
+  size_t size;
+  const void* data;
+  int32_t scalar; /* quoin_scalar */
+  int64_t shape[3];
+  int64_t strides[3]; /* bytes, of any sign */
+  double spacing[3];  /* of neighbours; all three 0: 1 */
+  double origin[3];   /* where sample (0, 0, 0) lies */
+} quoin_array;
+
+typedef struct quoin_grid_info {
+  size_t size;
+  char name[128]; /* UTF-8, cut off where it is longer */
+  int64_t voxels;
+  int32_t min[3]; /* of the tight box around its voxels, or its field's solid */
+  int32_t extent[3];
+  int32_t has_field; /* densities: the surface of a volume */
+} quoin_grid_info;
+
+typedef struct quoin_type {
+  size_t size;
+  uint8_t rgba[4]; /* sRGB; alpha below 255 makes a type transparent */
+  float emission;  /* 0: none */
+  float metalness; /* 0 to 1 */
+  float roughness; /* 0 to 1; QUOIN_INIT's 0 is a mirror */
+  char name[128];
+} quoin_type;
+
+/* What a mesh has; null where it has none. One entry a vertex, but for indices and interfaces. */
+typedef struct quoin_mesh_data {
+  size_t size;
+  size_t vertex_count;
+  size_t index_count;
+  size_t interface_count;
+  const float* positions;    /* [vertex_count][3] */
+  const float* normals;      /* [vertex_count][3], unit */
+  const uint8_t* colours;    /* [vertex_count][4], sRGB, without occlusion; of grids */
+  const float* occlusion;    /* [vertex_count], 0 open to 1 dark; of grids */
+  const uint32_t* indices;   /* three a triangle, counter-clockwise from outside */
+  const int64_t* interfaces; /* [interface_count][4]: back label, front label, first index, count; of labels */
+} quoin_mesh_data;
+
+typedef struct quoin_mesh_options {
+  size_t size;
+  int32_t smooth;       /* 0: blocks; else smooth surfaces around them */
+  int32_t no_occlusion; /* of blocks */
+  int32_t threads;      /* 0: all */
+} quoin_mesh_options;
+
+typedef struct quoin_render_options {
+  size_t size;
+  int32_t width, height; /* 0: 1280 x 720 */
+  int32_t samples;       /* a pixel; 0: 4, of paths 64 */
+  int32_t paths;         /* 0: light by rays; else paths of light */
+  int32_t threads;       /* 0: all */
+  int32_t has_camera;    /* 0: the whole scene, seen from in front, the right and above */
+  double camera[3], look_at[3];
+  double fov_degrees; /* vertical; 0: 45 */
+} quoin_render_options;
+
+/* What rays met; arrays of the caller, of one entry a ray; null: not wanted. */
+typedef struct quoin_hits {
+  size_t size;
+  double* t;      /* in lengths of the direction; infinity: nothing was met */
+  int32_t* voxel; /* [count][3], in its grid */
+  uint16_t* type;
+  double* normal; /* [count][3], in the world */
+} quoin_hits;
+
+QUOIN_API const char* quoin_version(void);
+/* Of this thread's last call that failed. Lasts until its next call. Never null. */
+QUOIN_API const char* quoin_last_error(void);
+/* Frees a scene or a mesh; 0 is none, and fine. */
+QUOIN_API quoin_status quoin_free(uint64_t handle);
+
+/* Scenes. `path` is UTF-8. */
+QUOIN_API quoin_status quoin_scene_create(quoin_scene* out);
+QUOIN_API quoin_status quoin_scene_load(const char* path, quoin_scene* out);
+QUOIN_API quoin_status quoin_scene_load_bytes(const void* data, size_t bytes, quoin_scene* out);
+/* By the name's ending: .quoin, .json and .vox hold voxels; .glb, .gltf, .obj and .ply their meshes, of blocks. */
+QUOIN_API quoin_status quoin_scene_save(quoin_scene scene, const char* path);
+/* One line each, of what reading left out, and of the last save. */
+QUOIN_API quoin_status quoin_scene_warning_count(quoin_scene scene, size_t* out);
+QUOIN_API quoin_status quoin_scene_warning(quoin_scene scene, size_t index, char* text, size_t capacity);
+
+/* Types of voxels: 0 is air, others count up from 1. */
+QUOIN_API quoin_status quoin_type_count(quoin_scene scene, size_t* out);
+QUOIN_API quoin_status quoin_type_get(quoin_scene scene, size_t index, quoin_type* out);
+QUOIN_API quoin_status quoin_type_add(quoin_scene scene, const quoin_type* type, uint16_t* out);
+
+/* Grids, by number. */
+QUOIN_API quoin_status quoin_grid_count(quoin_scene scene, size_t* out);
+QUOIN_API quoin_status quoin_grid_get_info(quoin_scene scene, size_t grid, quoin_grid_info* out);
+/* Writes the types of the voxels from `min` on, shape[0] x shape[1] x shape[2] of them, x slowest and z fastest, as
+ * uint16_t[capacity]. */
+QUOIN_API quoin_status quoin_grid_read(quoin_scene scene, size_t grid, const int32_t min[3], const int32_t shape[3],
+                                       uint16_t* out, size_t capacity);
+/* Adds a grid of an array of types (QUOIN_UINT8 or QUOIN_UINT16), all of which the scene has, and shows it at
+ * array->origin, which is rounded down to whole voxels. `name` may be null, and `out`, its number. */
+QUOIN_API quoin_status quoin_grid_add(quoin_scene scene, const quoin_array* array, const char* name, size_t* out);
+
+/* Meshes; `options` may be null. Of arrays nothing is copied. */
+QUOIN_API quoin_status quoin_grid_mesh(quoin_scene scene, size_t grid, const quoin_mesh_options* options,
+                                       quoin_mesh* out);
+/* Where the array has the value `iso`. solid_below: what is less than it is solid, as of signed distances. */
+QUOIN_API quoin_status quoin_surface_nets(const quoin_array* array, double iso, int32_t solid_below, int32_t threads,
+                                          quoin_mesh* out);
+/* The surfaces between whole numbers; relaxation steps, 0 to 1,000, smooth their stairs. */
+QUOIN_API quoin_status quoin_mesh_labels(const quoin_array* array, int64_t background, int32_t relaxation_steps,
+                                         int32_t threads, quoin_mesh* out);
+QUOIN_API quoin_status quoin_mesh_view(quoin_mesh mesh, quoin_mesh_data* out);
+
+/* A picture, rows from the top, three bytes a pixel (sRGB), into rgb[capacity]. `options` may be null. */
+QUOIN_API quoin_status quoin_scene_render(quoin_scene scene, const quoin_render_options* options, uint8_t* rgb,
+                                          size_t capacity);
+/* The nearest voxel or surface along each ray: origins[count][3] and directions[count][3], in the world. */
+QUOIN_API quoin_status quoin_scene_rays(quoin_scene scene, size_t count, const double* origins,
+                                        const double* directions, double max_t, const quoin_hits* out);
+
+#ifdef __cplusplus
+}
+#endif
+/* NOLINTEND(readability-*,modernize-*,performance-*,cppcoreguidelines-*) */
+#endif

@@ -1,0 +1,295 @@
+// Scenes, their types and their grids.
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <span>
+
+#include <quoin/io/formats.h>
+#include <quoin/io/mesh_file.h>
+#include <quoin/scene/scene_meshes.h>
+#include <quoin/version.h>
+
+#include "handles.h"
+
+namespace quoin::c {
+namespace {
+
+thread_local std::string last_error;
+constexpr std::int64_t kFurthest = 1 << 30;  // of a voxel from its grid's origin
+
+void list_grids(SceneBody& scene) {
+  const auto all = scene.loaded.scene.grids().handles();
+  scene.grids.assign(all.begin(), all.end());
+}
+
+quoin_status give(Result<LoadedScene> loaded, quoin_scene* out) {
+  if (!loaded) return fail(loaded.error());
+  auto body = std::make_shared<SceneBody>();
+  body->loaded = std::move(*loaded);
+  list_grids(*body);
+  *out = handles().put(std::move(body));
+  return QUOIN_OK;
+}
+
+bool is_in_range(const std::int32_t min[3], const std::int32_t shape[3]) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (shape[axis] < 0 || std::abs(std::int64_t{min[axis]}) + shape[axis] > kFurthest) return false;
+  }
+  return true;
+}
+
+VoxelType type_at(const quoin_array& array, std::int64_t x, std::int64_t y, std::int64_t z) {
+  const auto* at =
+      static_cast<const std::byte*>(array.data) + x * array.strides[0] + y * array.strides[1] + z * array.strides[2];
+  if (array.scalar == QUOIN_UINT8) return static_cast<VoxelType>(*at);
+  VoxelType type = kAir;
+  std::memcpy(&type, at, sizeof type);
+  return type;
+}
+
+const char* what_is_wrong(const quoin_array& array) {
+  if (array.data == nullptr) return "the array's data is null";
+  if (array.scalar != QUOIN_UINT8 && array.scalar != QUOIN_UINT16) return "types are QUOIN_UINT8 or QUOIN_UINT16";
+  for (int axis = 0; axis < 3; ++axis) {
+    if (array.shape[axis] <= 0 || array.shape[axis] > kFurthest) return "a shape that cannot be";
+    if (!(std::abs(array.origin[axis]) < static_cast<double>(kFurthest) / 2.0)) return "an origin too far away";
+    if (std::abs(array.origin[axis]) + static_cast<double>(array.shape[axis]) > static_cast<double>(kFurthest))
+      return "an array that reaches too far";
+  }
+  return nullptr;
+}
+
+quoin_status add_grid(SceneBody& scene, const quoin_array& array, const char* name, size_t* out) {
+  const IVec3 size(array.shape[0], array.shape[1], array.shape[2]);
+  const std::size_t types = scene.loaded.scene.types.size();
+  bool is_known = true;
+  SceneGrid placed;
+  placed.name = name == nullptr ? "" : name;
+  placed.grid.edit_rows({IVec3(0), size}, [&](IVec3 first, std::span<VoxelType> row) {
+    for (VoxelType& type : row) {
+      type = type_at(array, first.x++, first.y, first.z);
+      is_known = is_known && type < types;
+    }
+  });
+  if (!is_known) return fail(QUOIN_INVALID_ARGUMENT, "the array has a type that the scene has not");
+  const GridHandle grid = scene.loaded.scene.add_grid(std::move(placed));
+  Instance instance;
+  instance.name = name == nullptr ? "" : name;
+  instance.grid = grid;
+  for (int axis = 0; axis < 3; ++axis) instance.position[axis] = std::floor(array.origin[axis]);
+  scene.loaded.scene.add_instance(instance);
+  scene.grids.push_back(grid);
+  if (out != nullptr) *out = scene.grids.size() - 1;
+  return QUOIN_OK;
+}
+
+quoin_status save(SceneBody& scene, const char* path) {
+  const auto format = format_for_writing(path);
+  if (!format) return fail(format.error());
+  if (!format->is_mesh) {
+    auto saved = save_scene(scene.loaded, path);
+    if (!saved) return fail(saved.error());
+    scene.loaded.warnings = std::move(saved->warnings);
+    return QUOIN_OK;
+  }
+  const auto meshes = mesh_scene(scene.loaded.scene);
+  if (!meshes) return fail(meshes.error());
+  const auto written = write_mesh(*meshes, path);
+  return written ? QUOIN_OK : fail(written.error());
+}
+
+}  // namespace
+
+Handles& handles() {
+  static auto* const all = new Handles();  // never destroyed: other threads may still call while the process ends
+  return *all;
+}
+
+quoin_status fail(quoin_status status, const char* why) noexcept {
+  try {
+    last_error = why;
+  } catch (...) {
+    last_error.clear();
+  }
+  return status;
+}
+
+quoin_status fail(const Error& error) {
+  return fail(static_cast<quoin_status>(static_cast<int>(error.code) + 1), to_string(error).c_str());
+}
+
+void copy_text(const std::string& text, char* to, std::size_t capacity) {
+  std::size_t length = std::min(text.size(), capacity - 1);
+  while (length < text.size() && length > 0 && (static_cast<unsigned char>(text[length]) & 0xC0U) == 0x80U) --length;
+  std::memcpy(to, text.data(), length);
+  to[length] = '\0';
+}
+
+}  // namespace quoin::c
+
+using namespace quoin;
+using namespace quoin::c;
+
+const char* quoin_version(void) {
+  return version().data();
+}
+
+const char* quoin_last_error(void) {
+  return last_error.c_str();
+}
+
+quoin_status quoin_free(std::uint64_t handle) {
+  return guarded([&] {
+    return handle == 0 || handles().remove(handle) ? QUOIN_OK : fail(QUOIN_BAD_HANDLE, "nothing has this handle");
+  });
+}
+
+quoin_status quoin_scene_create(quoin_scene* out) {
+  return guarded(
+      [&] { return out == nullptr ? fail(QUOIN_INVALID_ARGUMENT, "out is null") : give(LoadedScene{}, out); });
+}
+
+quoin_status quoin_scene_load(const char* path, quoin_scene* out) {
+  return guarded([&] {
+    if (path == nullptr || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "path or out is null");
+    return give(load_scene(std::filesystem::path(path)), out);
+  });
+}
+
+quoin_status quoin_scene_load_bytes(const void* data, std::size_t bytes, quoin_scene* out) {
+  return guarded([&] {
+    if ((data == nullptr && bytes > 0) || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "data or out is null");
+    return give(load_scene(std::span(static_cast<const std::byte*>(data), bytes)), out);
+  });
+}
+
+quoin_status quoin_scene_save(quoin_scene scene, const char* path) {
+  return with_scene(scene, [&](SceneBody& body) {
+    return path == nullptr ? fail(QUOIN_INVALID_ARGUMENT, "path is null") : save(body, path);
+  });
+}
+
+quoin_status quoin_scene_warning_count(quoin_scene scene, std::size_t* out) {
+  return with_scene(scene, [&](SceneBody& body) {
+    if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
+    *out = body.loaded.warnings.size();
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_scene_warning(quoin_scene scene, std::size_t index, char* text, std::size_t capacity) {
+  return with_scene(scene, [&](SceneBody& body) {
+    if (text == nullptr || capacity == 0) return fail(QUOIN_INVALID_ARGUMENT, "there is no room for a text");
+    if (index >= body.loaded.warnings.size()) return fail(QUOIN_INVALID_ARGUMENT, "no warning has this number");
+    copy_text(body.loaded.warnings[index], text, capacity);
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_type_count(quoin_scene scene, std::size_t* out) {
+  return with_scene(scene, [&](SceneBody& body) {
+    if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
+    *out = body.loaded.scene.types.size();
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_type_get(quoin_scene scene, std::size_t index, quoin_type* out) {
+  return with_scene(scene, [&](SceneBody& body) {
+    if (out == nullptr || out->size != sizeof *out) return fail(QUOIN_INVALID_ARGUMENT, "out is null, or its size");
+    if (index >= body.loaded.scene.types.size()) return fail(QUOIN_INVALID_ARGUMENT, "no type has this number");
+    const VoxelProperties& type = body.loaded.scene.types[static_cast<VoxelType>(index)];
+    const Rgba8 colour = type.colour;
+    const std::uint8_t alpha = index == kAir ? 0 : type.visibility == Visibility::Opaque ? 255 : colour.a;
+    const std::uint8_t rgba[] = {colour.r, colour.g, colour.b, alpha};
+    std::memcpy(out->rgba, rgba, sizeof rgba);
+    out->emission = type.emission;
+    out->metalness = type.metalness;
+    out->roughness = type.roughness;
+    copy_text(type.name, out->name, sizeof out->name);
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_type_add(quoin_scene scene, const quoin_type* type, std::uint16_t* out) {
+  return with_scene(scene, [&](SceneBody& body) {
+    if (type == nullptr || type->size != sizeof *type || out == nullptr)
+      return fail(QUOIN_INVALID_ARGUMENT, "type or out is null, or the type's size");
+    const auto is_share = [](float x) { return x >= 0.0F && x <= 1.0F; };
+    if (!is_share(type->metalness) || !is_share(type->roughness) || !(type->emission >= 0.0F) ||
+        !std::isfinite(type->emission))
+      return fail(QUOIN_INVALID_ARGUMENT, "emission, metalness or roughness out of range");
+    VoxelProperties properties;
+    properties.colour = {type->rgba[0], type->rgba[1], type->rgba[2], type->rgba[3]};
+    if (type->rgba[3] < 255) properties.visibility = Visibility::Transparent;
+    properties.emission = type->emission;
+    properties.metalness = type->metalness;
+    properties.roughness = type->roughness;
+    properties.name.assign(type->name, strnlen(type->name, sizeof type->name));
+    const auto added = body.loaded.scene.types.add(std::move(properties));
+    if (!added) return fail(added.error());
+    *out = *added;
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_grid_count(quoin_scene scene, std::size_t* out) {
+  return with_scene(scene, [&](SceneBody& body) {
+    if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
+    *out = body.grids.size();
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_grid_get_info(quoin_scene scene, std::size_t grid, quoin_grid_info* out) {
+  return with_scene(scene, [&](SceneBody& body) {
+    if (out == nullptr || out->size != sizeof *out) return fail(QUOIN_INVALID_ARGUMENT, "out is null, or its size");
+    if (grid >= body.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
+    const SceneGrid& found = body.loaded.scene.grids()[body.grids[grid]];
+    const IBox box = found.bounds();
+    copy_text(found.name, out->name, sizeof out->name);
+    out->voxels = found.grid.voxel_count();
+    for (int axis = 0; axis < 3; ++axis) {
+      out->extent[axis] = std::max(box.max[axis] - box.min[axis], 0);
+      out->min[axis] = out->extent[axis] > 0 ? box.min[axis] : 0;
+    }
+    out->has_field = found.field.bounds().min.x < found.field.bounds().max.x ? 1 : 0;
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_grid_read(quoin_scene scene, std::size_t grid, const std::int32_t min[3],
+                             const std::int32_t shape[3], std::uint16_t* out, std::size_t capacity) {
+  return with_scene(scene, [&](SceneBody& body) {
+    if (min == nullptr || shape == nullptr || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "an array is null");
+    if (grid >= body.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
+    if (!is_in_range(min, shape)) return fail(QUOIN_INVALID_ARGUMENT, "a box that cannot be");
+    std::size_t left = capacity;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (shape[axis] == 0) return QUOIN_OK;
+      left /= static_cast<std::size_t>(shape[axis]);
+    }
+    if (left == 0) return fail(QUOIN_INVALID_ARGUMENT, "the array has no room for the box");
+    // x is the slowest axis of the array, and the fastest of a grid: whole runs along x are read.
+    GridReader reader(body.loaded.scene.grids()[body.grids[grid]].grid);
+    const auto plane = static_cast<std::size_t>(shape[1]) * static_cast<std::size_t>(shape[2]);
+    for (std::int32_t z = 0; z < shape[2]; ++z) {
+      for (std::int32_t y = 0; y < shape[1]; ++y) {
+        std::uint16_t* to = out + static_cast<std::size_t>(y) * static_cast<std::size_t>(shape[2]) + z;
+        for (std::int32_t x = 0; x < shape[0]; ++x, to += plane) *to = reader.get(min[0] + x, min[1] + y, min[2] + z);
+      }
+    }
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_grid_add(quoin_scene scene, const quoin_array* array, const char* name, std::size_t* out) {
+  return with_scene(scene, [&](SceneBody& body) {
+    if (array == nullptr || array->size != sizeof *array)
+      return fail(QUOIN_INVALID_ARGUMENT, "array is null, or its size");
+    if (const char* wrong = what_is_wrong(*array)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    return add_grid(body, *array, name, out);
+  });
+}
