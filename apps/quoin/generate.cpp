@@ -2,6 +2,7 @@
 
 #include <quoin/io/formats.h>
 #include <quoin/scene/scene_faces.h>
+#include <quoin/stream/streamed_world.h>
 #include <quoin/terrain/terrain.h>
 
 #include "commands.h"
@@ -24,6 +25,7 @@ struct GenerateOptions {
   std::string seed = "42";
   std::string chunks = "4x2x4";
   bool is_smooth = false;
+  bool is_endless = false;  ///< a world that goes on where one flies; made so far around the origin
   bool force = false;
   TerrainOptions terrain;
   SmoothTerrainOptions smooth;  ///< what of it the other has not
@@ -44,6 +46,11 @@ struct Outcome {
 /// How many voxels, or samples, a unit of the world's size has along each axis.
 int edge_of_unit(const GenerateOptions& options) {
   return options.is_smooth ? kChunkEdge : kTerrainUnit;
+}
+
+/// Of a world without an end, in chunks.
+int endless_height(const GenerateOptions& options) {
+  return (options.terrain.size.y * edge_of_unit(options) + kChunkEdge - 1) / kChunkEdge;
 }
 
 /// What is wrong with the options, which are read into `options.terrain`; empty when nothing is.
@@ -114,17 +121,62 @@ Result<Outcome> generate(const GenerateOptions& options) {
   return outcome;
 }
 
+/// A world that is made as one comes by: what is within `--chunks` around the origin is there.
+Result<Outcome> generate_endless(const GenerateOptions& options) {
+  Stopwatch watch;
+  if (auto kept = check_replaced(options.output, {}, options.force); !kept) return kept.error();
+  if (auto writable = check_outputs({options.output}); !writable) return writable.error();
+  catch_interrupts();
+  // It appears when it is whole.
+  std::filesystem::path fresh = options.output;
+  fresh += ".new";
+  std::error_code ignored;
+  std::filesystem::remove(fresh, ignored);
+  Outcome outcome;
+  {
+    auto world = StreamedWorld::open_or_create(fresh, {.workers = options.threads});
+    if (!world) return world.error();
+    const EndlessTerrain terrain{options.terrain.seed, endless_height(options), options.is_smooth};
+    const auto grid = world->add_terrain(terrain);
+    if (!grid) return grid.error();
+    const IVec3 size = options.terrain.size * edge_of_unit(options);
+    const Viewer viewer{.position = {0.0, 0.5 * size.y, 0.0}, .radius = 0.5 * std::max(size.x, size.z)};
+    if (auto loaded = world->load_all({&viewer, 1}); !loaded) return loaded.error();
+    const SceneGrid& content = world->scene().grids()[*grid];
+    outcome.voxels = content.grid.voxel_count() + content.field.solid_count();
+    outcome.types = world->scene().types.size() - 1;
+    outcome.seconds_generate = watch.lap();
+    if (auto saved = world->flush(); !saved) return saved.error();
+    for (std::string& problem : world->take_problems()) outcome.warnings.push_back(std::move(problem));
+  }
+  if (was_interrupted()) {
+    std::filesystem::remove(fresh, ignored);
+    return make_error(ErrorCode::Cancelled, "cancelled", options.output.string());
+  }
+  std::error_code error;
+  std::filesystem::rename(fresh, options.output, error);
+  if (error) return make_error(ErrorCode::CannotWrite, error.message(), options.output.string());
+  outcome.bytes = std::filesystem::file_size(options.output, error);
+  outcome.seconds_write = watch.lap();
+  return outcome;
+}
+
+// A field has none, and of a world without an end nobody counts them.
+bool has_faces(const GenerateOptions& options) {
+  return !options.is_smooth && !options.is_endless;
+}
+
 Json outcome_json(const GenerateOptions& options, const Outcome& outcome) {
   const IVec3 size = options.terrain.size;
   const int unit = edge_of_unit(options);
-  // A field has no faces.
   return {{"seed", options.terrain.seed},
           {"chunks", {size.x, size.y, size.z}},
           {"size", {size.x * unit, size.y * unit, size.z * unit}},
           {"voxels", outcome.voxels},
           {"types", outcome.types},
-          {"faces_visible", options.is_smooth ? Json() : Json(outcome.faces.visible)},
-          {"faces_total", options.is_smooth ? Json() : Json(outcome.faces.total)},
+          {"endless", options.is_endless},
+          {"faces_visible", has_faces(options) ? Json(outcome.faces.visible) : Json()},
+          {"faces_total", has_faces(options) ? Json(outcome.faces.total) : Json()},
           {"bytes", outcome.bytes},
           {"files", {options.output.string()}},
           {"seconds", {{"generate", outcome.seconds_generate}, {"write", outcome.seconds_write}}},
@@ -133,11 +185,12 @@ Json outcome_json(const GenerateOptions& options, const Outcome& outcome) {
 
 std::string outcome_text(const GenerateOptions& options, const Outcome& outcome) {
   const IVec3 size = options.terrain.size * edge_of_unit(options);
-  return "Terrain: seed " + std::to_string(options.terrain.seed) + ", " + std::to_string(size.x) + " x " +
-         std::to_string(size.y) + " x " + std::to_string(size.z) +
-         (options.is_smooth ? "\nSolid samples: " : "\nVoxels: ") + with_thousands(outcome.voxels) + " of " +
-         std::to_string(outcome.types) + " types\n" + (options.is_smooth ? "" : to_string(outcome.faces) + "\n") +
-         "Wrote " + options.output.string() + ", " + bytes_for_people(outcome.bytes) + " in " +
+  return std::string(options.is_endless ? "Terrain without an end: seed " : "Terrain: seed ") +
+         std::to_string(options.terrain.seed) + ", " + std::to_string(size.x) + " x " + std::to_string(size.y) + " x " +
+         std::to_string(size.z) + (options.is_smooth ? "\nSolid samples: " : "\nVoxels: ") +
+         with_thousands(outcome.voxels) + " of " + std::to_string(outcome.types) + " types\n" +
+         (has_faces(options) ? to_string(outcome.faces) + "\n" : "") + "Wrote " + options.output.string() + ", " +
+         bytes_for_people(outcome.bytes) + " in " +
          number_for_people(outcome.seconds_generate + outcome.seconds_write) + " s\n";
 }
 
@@ -150,11 +203,15 @@ int run_generate(GenerateOptions& options) {
                 ".json; `quoin convert` turns that into other formats");
     return kWrongUsage;
   }
+  if (options.is_endless && format->format != FileFormat::World) {
+    print_error(options.output.string() + ": only a .quoin can be without an end (--endless)");
+    return kWrongUsage;
+  }
   if (const std::string fault = read_options(options); !fault.empty()) {
     print_error(fault + " (try --help)");
     return kWrongUsage;
   }
-  const auto outcome = generate(options);
+  const auto outcome = options.is_endless ? generate_endless(options) : generate(options);
   if (!outcome) {
     die_if_interrupted();
     print_error(outcome.error());
@@ -170,6 +227,9 @@ std::shared_ptr<GenerateOptions> add_world(CLI::App& command, const char* files,
   command.add_option("OUT", options->output, files)->required()->check(file_name());
   command.add_option("--seed", options->seed, "Which world: a whole number (default 42)");
   command.add_option("--chunks", options->chunks, chunks);
+  command.add_flag(
+      "--endless", options->is_endless,
+      "A .quoin that a program with StreamedWorld goes on making; --chunks says how much of it is made now");
   command.add_flag("--force", options->force, kForceHelp);
   command.add_flag("--json", options->json, "Print one JSON object instead of text");
   add_quiet_option(command);

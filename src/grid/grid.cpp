@@ -547,8 +547,8 @@ void Grid::for_each_row(FunctionRef<void(IVec3 first, std::span<const VoxelType>
 }
 
 std::size_t Grid::bytes() const {
-  std::size_t total =
-      sizeof(Grid) + sizeof(Impl) + impl().entries.bytes() + impl().loaded.bytes() + impl().journal.bytes() + impl().bounds.bytes();
+  std::size_t total = sizeof(Grid) + sizeof(Impl) + impl().entries.bytes() + impl().loaded.bytes() +
+                      impl().journal.bytes() + impl().bounds.bytes();
   impl().entries.for_each([&](IVec3, const ChunkEntry& entry) { total += entry.chunk.bytes() - sizeof(Chunk); });
   return total;
 }

@@ -50,6 +50,7 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
     case FileFormat::Vox:
     case FileFormat::Scene:
     case FileFormat::World:
+    case FileFormat::Minecraft:
     case FileFormat::Nifti:
     case FileFormat::Nrrd:
       break;

@@ -282,7 +282,7 @@ void LiveField::prepare(const SceneGrid& content, const VoxelRegistry& types) {
     for (const IVec3 each : members) {
       FieldChunk& state = chunks_.at(each);
       if (state.group != nullptr) continue;  // what it waits for is in its present group
-      state.is_empty = !may_have_surface(content.field, types, each);
+      state.is_empty = state.is_gone || !may_have_surface(content.field, types, each);
       is_empty &= state.is_empty;
       if (begins && !state.is_empty) {
         waiting_.insert(each);

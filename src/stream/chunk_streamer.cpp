@@ -91,9 +91,7 @@ void ChunkStreamer::wait() {
     posted = posted_;
   }
   std::unique_lock lock(outbox_mutex_);
-  came_.wait(lock, [&] {
-    return !outbox_.arrivals.empty() || (working_ == 0 && !has_more_ && told_posts_ >= posted);
-  });
+  came_.wait(lock, [&] { return !outbox_.arrivals.empty() || (working_ == 0 && !has_more_ && told_posts_ >= posted); });
 }
 
 // Under the plan's lock.
@@ -115,6 +113,9 @@ void ChunkStreamer::read_inbox() {
 
 // Under the plan's lock: what the caller is to know of it.
 void ChunkStreamer::tell() {
+  // Not under the lock that the caller takes.
+  const std::size_t missing = plan_.missing();
+  const double complete_radius = plan_.complete_radius();
   {
     const std::scoped_lock lock(outbox_mutex_);
     if (outbox_.plans != plans_) {
@@ -123,8 +124,8 @@ void ChunkStreamer::tell() {
       outbox_.plans = plans_;
     }
     outbox_.wanted = plan_.wanted();
-    outbox_.missing = plan_.missing();
-    outbox_.complete_radius = plan_.complete_radius();
+    outbox_.missing = missing;
+    outbox_.complete_radius = complete_radius;
     has_more_ = plan_.has_next();
     told_posts_ = read_posts_;
   }

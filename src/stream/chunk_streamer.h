@@ -44,19 +44,19 @@ class ChunkStreamer {
   };
   /// What happened on the caller's thread.
   struct Note {
-    std::optional<Wishes> wishes;        ///< where they are others than before
-    std::vector<ChunkPlace> here;        ///< that arrived and were put in place
-    std::vector<ChunkPlace> broken;      ///< that will not come
-    std::vector<ChunkPlace> gone;        ///< that were taken away, or dropped
-    std::vector<StoredChunk> let_go;     ///< to be destroyed where nobody waits for it
-    [[nodiscard]] bool empty() const { 
+    std::optional<Wishes> wishes;     ///< where they are others than before
+    std::vector<ChunkPlace> here;     ///< that arrived and were put in place
+    std::vector<ChunkPlace> broken;   ///< that will not come
+    std::vector<ChunkPlace> gone;     ///< that were taken away, or dropped
+    std::vector<StoredChunk> let_go;  ///< to be destroyed where nobody waits for it
+    [[nodiscard]] bool empty() const {
       return !wishes && here.empty() && broken.empty() && gone.empty() && let_go.empty();
     }
   };
   struct Outbox {
     std::vector<Arrival> arrivals;
-    std::vector<ChunkPlace> leaving;     ///< of the last plan
-    bool has_leaving = false;            ///< there was a plan
+    std::vector<ChunkPlace> leaving;  ///< of the last plan
+    bool has_leaving = false;         ///< there was a plan
     std::vector<std::string> problems;
     std::size_t wanted = 0;
     std::size_t missing = 0;

@@ -147,9 +147,7 @@ bool begin_kind(std::uint32_t number, WorldEdit::Content& content) {
 
 Result<LoggedEdit> read_edit(std::span<const std::byte> body, std::size_t offset) {
   ContentReader in(body);
-  const auto fault = [&](const char* what) {
-    return make_error(ErrorCode::BadFormat, what, {}, offset + in.at());
-  };
+  const auto fault = [&](const char* what) { return make_error(ErrorCode::BadFormat, what, {}, offset + in.at()); };
   constexpr std::size_t kFixed = 8 + 4 + 4 + 4;
   if (!in.has(kFixed)) return fault("an edit that is cut off");
   LoggedEdit read;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <tuple>
 #include <utility>
 
@@ -32,9 +33,17 @@ bool is_looked_at(const Eye& eye, IVec3 chunk) {
   return length <= kCloseBy || glm::dot(to, eye.direction) >= 0.5 * length || eye.direction == DVec3(0.0);
 }
 
+// What a plan holds at most, however large the budget and the radius are: a ball of 40 chunks' radius.
+constexpr std::size_t kMaxPlanned = std::size_t{1} << 18;
+
+// A ball of more chunks than may be loaded would be cut to this anyway.
+double reach_of(std::size_t max_chunks) {
+  return (std::cbrt(static_cast<double>(max_chunks) * 0.75 / std::numbers::pi) + 2.0) * kChunkEdge;
+}
+
 // Chunks that a ball meets may be these.
-IBox chunks_around(const Eye& eye) {
-  const LongBox box = clipped(box_around(eye.position - eye.radius, eye.position + eye.radius));
+IBox chunks_around(const Eye& eye, double radius) {
+  const LongBox box = clipped(box_around(eye.position - radius, eye.position + radius));
   return is_empty(box) ? IBox{} : chunks_of(box);
 }
 
@@ -66,6 +75,7 @@ void StreamPlan::forget(const ChunkPlace& place) {
 
 void StreamPlan::plan(Wishes wishes) {
   wishes_ = std::move(wishes);
+  wishes_.max_chunks = std::min(wishes_.max_chunks, kMaxPlanned);
   find_wanted();
   cut_to_budget();
   find_queue();
@@ -87,15 +97,17 @@ StreamPlan::Wanted StreamPlan::measured(const ChunkPlace& place, const std::vect
 
 void StreamPlan::find_wanted() {
   wanted_.clear();
+  const double reach = reach_of(wishes_.max_chunks);
   for (const auto& [grid, eyes] : wishes_.eyes) {
     std::vector<IVec3> chunks;
     for (const Eye& eye : eyes) {
-      const IBox box = chunks_around(eye);
+      const double radius = std::min(eye.radius, reach);
+      const IBox box = chunks_around(eye, radius);
       for (int z = box.min.z; z < box.max.z; ++z) {
         for (int y = box.min.y; y < box.max.y; ++y) {
           for (int x = box.min.x; x < box.max.x; ++x) {
             const IVec3 chunk{x, y, z};
-            if (is_inside_world(chunk) && distance_to_chunk(eye.position, chunk) <= eye.radius) chunks.push_back(chunk);
+            if (is_inside_world(chunk) && distance_to_chunk(eye.position, chunk) <= radius) chunks.push_back(chunk);
           }
         }
       }

@@ -37,10 +37,14 @@ constexpr double kGuessedChunkBytes = 24.0 * 1024.0;
 constexpr std::size_t kGuessBelow = 64;
 // Of the budget: what allocators and what is on its way take is not counted.
 constexpr double kShareOfBudget = 0.97;
+// Of one grid.
+constexpr std::size_t kMaxEyes = 64;
 // Eyes that moved less, voxels, or turned less (cosine) see the same.
 constexpr double kMoves = 12.0;
 constexpr double kTurns = 0.94;
-constexpr auto kAskOthers = std::chrono::milliseconds(250);
+constexpr auto kAskOthers = std::chrono::milliseconds(100);
+// Between plans that the budget alone is the reason of, seconds.
+constexpr double kReplan = 0.2;
 // The landscape that a grid goes on with.
 constexpr std::string_view kTerrainValue = "quoin.terrain.";
 
@@ -109,10 +113,11 @@ struct StreamedWorld::Impl {
   }
 
   Status update(std::span<const Viewer> viewers, double seconds);
-  bool move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note);
+  void move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note);
   void follow_instances();
   [[nodiscard]] Eyes eyes_of(std::span<const Viewer> viewers);
   void wish(ChunkStreamer::Note& note);
+  [[nodiscard]] bool is_cut() const;
   [[nodiscard]] std::size_t chunks_of_budget() const;
   [[nodiscard]] bool is_near_anyone(const ChunkPlace& place) const;
   void put(Arrival arrival, ChunkStreamer::Note& note);
@@ -220,16 +225,35 @@ StreamedWorld::Impl::Eyes StreamedWorld::Impl::eyes_of(std::span<const Viewer> v
         if (is_finite(eye.position) && std::isfinite(eye.radius)) found[number].push_back(eye);
       }
     }
+    // Of a grid that is placed often, what the nearest ones need is what the others need too.
+    const auto eyes_of_grid = found.find(number);
+    if (eyes_of_grid == found.end() || eyes_of_grid->second.size() <= kMaxEyes) continue;
+    std::ranges::stable_sort(eyes_of_grid->second, {}, [&](const Eye& eye) {
+      return glm::length(eye.position - content->pivot) * eye.voxel_size;
+    });
+    eyes_of_grid->second.resize(kMaxEyes);
   }
   return found;
 }
 
-// As many as fit by what the loaded ones take, with all that is made of them.
+bool StreamedWorld::Impl::is_cut() const {
+  return planned_chunks != 0 && static_cast<double>(box.wanted) > 0.9 * static_cast<double>(planned_chunks);
+}
+
+// As many as fit by what the loaded ones take, with all that is made of them. Near ones take more than far ones: where
+// the budget cuts what is wanted it is found step by step, down at once, up when all that was wanted is there.
 std::size_t StreamedWorld::Impl::chunks_of_budget() const {
   const double total = static_cast<double>(loaded_bytes + other_bytes);
-  const double each = loaded_chunks < kGuessBelow ? std::max(kGuessedChunkBytes, total / kGuessBelow)
-                                                  : std::max(total / static_cast<double>(loaded_chunks), 64.0);
-  return static_cast<std::size_t>(static_cast<double>(options.budget_bytes) * kShareOfBudget / each);
+  const double budget = static_cast<double>(options.budget_bytes) * kShareOfBudget;
+  const auto chunks = [](double count) { return std::max<std::size_t>(static_cast<std::size_t>(count), 8); };
+  if (loaded_chunks < kGuessBelow && !is_cut()) {
+    return chunks(budget / std::max(kGuessedChunkBytes, total / kGuessBelow));
+  }
+  const double ratio = budget / std::max(total, 1.0);
+  if (!is_cut()) return chunks(static_cast<double>(loaded_chunks) * std::min(ratio, 1e6));
+  const bool may_grow = box.missing == 0 && box.begun == 0 && arrivals.empty();
+  const double step = std::clamp(ratio, 0.5, may_grow ? 1.1 : 1.0);
+  return chunks(static_cast<double>(planned_chunks) * step);
 }
 
 namespace {
@@ -253,8 +277,8 @@ void StreamedWorld::Impl::wish(ChunkStreamer::Note& note) {
   const bool is_over = loaded_bytes + other_bytes > options.budget_bytes;
   const double change = static_cast<double>(fit) / static_cast<double>(std::max<std::size_t>(planned_chunks, 1));
   // Where all fits, how much more would fit changes nothing.
-  const bool is_limited = planned_chunks <= box.wanted + box.wanted / 8 || fit <= box.wanted || is_over;
-  const bool is_other_budget = is_limited && (change < 0.97 || change > 1.05) && seconds_since(planned) > 0.1;
+  const bool is_limited = is_cut() || fit <= box.wanted || is_over;
+  const bool is_other_budget = is_limited && (change < 0.99 || change > 1.05) && seconds_since(planned) > kReplan;
   const std::size_t waits = waiting_chunks();
   if (!must_plan && !is_other_budget && waits == planned_waiting && see_alike(eyes, planned_eyes)) return;
   Wishes wishes;
@@ -289,7 +313,13 @@ bool StreamedWorld::Impl::is_near_anyone(const ChunkPlace& place) const {
 void StreamedWorld::Impl::note_edits() {
   for (auto& [number, grid] : grids) {
     const SceneGrid* const content = scene().grids().find(grid.handle);
-    if (content == nullptr) continue;
+    if (content == nullptr) {  // removed, with what was loaded of it
+      for (const auto& [chunk, size] : grid.sizes) loaded_bytes -= size;
+      loaded_chunks -= grid.sizes.size();
+      grid.sizes.clear();
+      grid.waiting.clear();
+      continue;
+    }
     const auto note = [&, &of = grid](const auto& changes) {
       for (const auto& change : changes.items) {
         if (!change.is_edit) continue;
@@ -409,8 +439,9 @@ void StreamedWorld::Impl::take_away(const ChunkPlace& place, ChunkStreamer::Note
   ++totals.chunks_unloaded;
 }
 
-// Chunks that came or are to go, as far as the time suffices; one at least. False where saving did not go well.
-bool StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note) {
+// Chunks that came or are to go, as far as the time suffices; one at least. While edits could not be handed to the
+// store nothing goes.
+void StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note) {
   has_moved = false;
   const bool may_leave = !is_edited;
   while (!arrivals.empty() || (may_leave && !leaving.empty())) {
@@ -428,7 +459,6 @@ bool StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, C
       break;
     }
   }
-  return may_leave || leaving.empty();
 }
 
 Status StreamedWorld::Impl::update(std::span<const Viewer> viewers, double seconds) {

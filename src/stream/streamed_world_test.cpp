@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <random>
+#include <set>
 #include <thread>
 #include <tuple>
 #include <vector>
@@ -264,10 +265,26 @@ TEST_F(StreamedWorldTest, FieldsAreStreamedLikeVoxels) {
     EXPECT_GT(field.add_sphere({100.0, 110.0, 100.0}, 12.0, 1), 0);
     LiveMeshes meshes;
     meshes.finish(world->scene(), viewer.position);
-    EXPECT_FALSE(meshes.take().empty());
+    std::set<Key> drawn;
+    const auto take = [&] {
+      for (const SurfaceUpdate& update : meshes.take()) {
+        const Key key{update.chunk.x, update.chunk.y, update.chunk.z};
+        if (update.surface == nullptr) {
+          drawn.erase(key);
+        } else {
+          drawn.insert(key);
+        }
+      }
+    };
+    take();
+    EXPECT_FALSE(drawn.empty());
     viewer.position.x = 2000.0;
     ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
     EXPECT_FALSE(world->is_loaded(*grid, {1, 1, 1}));
+    meshes.finish(world->scene(), viewer.position);
+    take();
+    EXPECT_FALSE(drawn.empty());
+    for (const Key& chunk : drawn) EXPECT_GT(std::get<0>(chunk), 25);  // what is gone is not drawn
     viewer.position.x = 100.0;
     ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
     EXPECT_LT(world->scene().grids()[*grid].field.density({100, 110, 100}), 0.0F);
@@ -405,9 +422,12 @@ TEST_F(StreamedWorldTest, ReplayedLogsGiveTheSameWorlds) {
   for (std::uint64_t i = 1; i <= 60; ++i) {
     const auto at = [&] { return static_cast<int>(chance() % 300) - 150; };
     const IVec3 low{at(), at() / 2, at()};
-    WorldEdit edit{0, WorldEdit::FillBox{{low, low + 20}, static_cast<VoxelType>(chance() % 4)}};
-    if (i % 3 == 0) edit.content = WorldEdit::SetVoxels{{{low, 2}, {low + 70, 3}}};
-    log.add({i, 1, std::move(edit)});
+    const auto type = static_cast<VoxelType>(chance() % 4);
+    if (i % 3 == 0) {
+      log.add({i, 1, {0, WorldEdit::SetVoxels{{{low, 2}, {low + 70, type}}}}});
+    } else {
+      log.add({i, 1, {0, WorldEdit::FillBox{{low, low + 20}, type}}});
+    }
   }
   const auto sent = EditLog::decode(log.encode());
   ASSERT_TRUE(sent.has_value());

@@ -13,9 +13,7 @@ class VoxelTerrain final : public ChunkGenerator {
  public:
   VoxelTerrain(const EndlessTerrain& terrain, const TerrainTypes& types) : terrain_(terrain), types_(types) {}
 
-  [[nodiscard]] IBox chunks() const override {
-    return {{-kReach, 0, -kReach}, {kReach, terrain_.height, kReach}};
-  }
+  [[nodiscard]] IBox chunks() const override { return {{-kReach, 0, -kReach}, {kReach, terrain_.height, kReach}}; }
   [[nodiscard]] Result<StoredChunk> make(IVec3 chunk) const override {
     // Trees end at a piece's sides: the chunk lies in the middle of one.
     constexpr int kUnits = kChunkEdge / kTerrainUnit;
@@ -36,9 +34,7 @@ class SmoothTerrain final : public ChunkGenerator {
  public:
   SmoothTerrain(const EndlessTerrain& terrain, const TerrainTypes& types) : terrain_(terrain), types_(types) {}
 
-  [[nodiscard]] IBox chunks() const override {
-    return {{-kReach, 0, -kReach}, {kReach, terrain_.height, kReach}};
-  }
+  [[nodiscard]] IBox chunks() const override { return {{-kReach, 0, -kReach}, {kReach, terrain_.height, kReach}}; }
   [[nodiscard]] Result<StoredChunk> make(IVec3 chunk) const override {
     // A piece is closed at its sides: the chunk lies in the middle of one.
     SmoothTerrainOptions piece;

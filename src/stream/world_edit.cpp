@@ -98,24 +98,25 @@ Result<std::vector<IVec3>> chunks_of_edit(const WorldEdit& edit, float band) {
 }
 
 std::int64_t apply_edit(const WorldEdit& edit, Grid& grid, DensityGrid& field) {
-  return std::visit(
-      Overloaded{[&](const WorldEdit::SetVoxels& set) { return grid.set(set.voxels); },
-                 [&](const WorldEdit::SetData& set) {
-                   return std::int64_t{grid.set_data(set.voxel, {set.state, set.bytes})};
-                 },
-                 [&](const WorldEdit::FillBox& fill) { return grid.fill_box(fill.box, fill.type); },
-                 [&](const WorldEdit::FillSphere& fill) {
-                   return grid.fill_sphere(fill.centre, fill.radius, fill.type);
-                 },
-                 [&](const WorldEdit::FieldSphere& sphere) {
-                   if (sphere.material == kAir) return field.remove_sphere(sphere.centre, sphere.radius, sphere.blend);
-                   return field.add_sphere(sphere.centre, sphere.radius, sphere.material, sphere.blend);
-                 },
-                 [&](const WorldEdit::FieldBox& box) {
-                   if (box.material == kAir) return field.remove_box(box.min, box.max, box.rounding, box.blend);
-                   return field.add_box(box.min, box.max, box.material, box.rounding, box.blend);
-                 }},
-      edit.content);
+  return std::visit(Overloaded{[&](const WorldEdit::SetVoxels& set) { return grid.set(set.voxels); },
+                               [&](const WorldEdit::SetData& set) {
+                                 return std::int64_t{grid.set_data(set.voxel, {set.state, set.bytes})};
+                               },
+                               [&](const WorldEdit::FillBox& fill) { return grid.fill_box(fill.box, fill.type); },
+                               [&](const WorldEdit::FillSphere& fill) {
+                                 return grid.fill_sphere(fill.centre, fill.radius, fill.type);
+                               },
+                               [&](const WorldEdit::FieldSphere& sphere) {
+                                 if (sphere.material == kAir)
+                                   return field.remove_sphere(sphere.centre, sphere.radius, sphere.blend);
+                                 return field.add_sphere(sphere.centre, sphere.radius, sphere.material, sphere.blend);
+                               },
+                               [&](const WorldEdit::FieldBox& box) {
+                                 if (box.material == kAir)
+                                   return field.remove_box(box.min, box.max, box.rounding, box.blend);
+                                 return field.add_box(box.min, box.max, box.material, box.rounding, box.blend);
+                               }},
+                    edit.content);
 }
 
 }  // namespace quoin

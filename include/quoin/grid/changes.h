@@ -86,7 +86,8 @@ using GridChanges = Changes<ChunkChange>;
 
 /// The chunks whose blocky meshes have to be made again: those that hold one of the 26 neighbours of a changed voxel,
 /// and are there; and those that changed and are there no more. Sorted by z, then y, then x. All of the grid's when all
-/// has changed. Of a partial grid those are among them whose mesh has to go, since a chunk beside them was unloaded. `changes` are those up to the grid's present state.
+/// has changed. Of a partial grid those are among them whose mesh has to go, since a chunk beside them was unloaded.
+/// `changes` are those up to the grid's present state.
 [[nodiscard]] std::vector<IVec3> chunks_to_mesh(const Grid& grid, const GridChanges& changes);
 
 /// A row of 64 voxels along x in one chunk, some of which changed; valid during the call that tells of it.
@@ -119,7 +120,7 @@ void visit_changes(const Grid& before, const Grid& now, const GridChanges& chang
 /// Voxels of one chunk whose data changed, because it was set or because they became another type.
 struct DataChange {
   IVec3 chunk{0};
-  IBox box;  ///< around them, in the chunk's coordinates
+  IBox box;             ///< around them, in the chunk's coordinates
   bool is_edit = true;  ///< as in ChunkChange
 };
 using DataChanges = Changes<DataChange>;

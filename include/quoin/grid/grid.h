@@ -143,7 +143,8 @@ class Grid {
   /// Coordinates of all chunks that hold a voxel, sorted by z, then y, then x.
   [[nodiscard]] std::vector<IVec3> chunks() const;
   [[nodiscard]] std::size_t chunk_count() const;
-  /// The chunk and the 26 around it, for meshers; nothing where not all of them are loaded. Lifetime: the grid must outlive it, and an edit ends it.
+  /// The chunk and the 26 around it, for meshers; nothing where not all of them are loaded.
+  /// Lifetime: the grid must outlive it, and an edit ends it.
   [[nodiscard]] Neighbourhood neighbourhood(IVec3 chunk) const;
 
   /// What edits changed since the cursor's last time, exactly; moves the cursor to the present.

@@ -27,11 +27,12 @@ class ChunkGenerator {
   [[nodiscard]] virtual IBox chunks() const = 0;
   /// One chunk, in types of the world's registry; densities within the band of the grid's field.
   /// Errors: whatever kept it from being made. The chunk is then air, and asked for anew when the world is opened
-  ///         again; a StreamedWorld tells of it by `take_problems`.
+  ///         again; a StreamedWorld tells of it by `take_problems`. It throws nothing but bad_alloc.
   [[nodiscard]] virtual Result<StoredChunk> make(IVec3 chunk) const = 0;
 };
 
-/// A landscape without an end: the worlds of `generate_terrain` and `generate_smooth_terrain`, of which each is a piece.
+/// A landscape without an end: the worlds of `generate_terrain` and `generate_smooth_terrain`, each of which is a piece
+/// of it.
 struct EndlessTerrain {
   std::uint64_t seed = 42;
   int height = 4;          ///< chunks from 0 upwards: 1 to 16

@@ -33,7 +33,7 @@ struct StreamOptions {
   /// viewers' radius is loaded.
   std::size_t budget_bytes = std::size_t{1} << 30;
   /// Bytes that are kept elsewhere because of what is loaded: meshes, trees, light, device memory. Asked for by
-  /// `update`, a few times a second. May be empty.
+  /// `update`, ten times a second. May be empty.
   std::function<std::size_t()> other_bytes{};
   /// What one `update` may take of its caller's time, in seconds; one chunk comes or goes at least.
   double update_seconds = 0.0002;
@@ -46,17 +46,17 @@ struct StreamOptions {
 };
 
 struct StreamStats {
-  std::size_t loaded_chunks = 0;    ///< in memory, air too
-  std::size_t loaded_bytes = 0;     ///< of their voxels and densities
-  std::size_t other_bytes = 0;      ///< as StreamOptions::other_bytes said last
-  std::size_t wanted_chunks = 0;    ///< within the viewers' radius and the budget
-  std::size_t missing_chunks = 0;   ///< of these, that are not loaded yet
-  std::size_t waiting_edits = 0;    ///< chunks that edits wait for
-  double complete_radius = 0.0;     ///< world units around every viewer within which all is loaded; less a chunk meshed
-  std::uint64_t chunks_read = 0;    ///< since it was opened: from the world's file
-  std::uint64_t chunks_made = 0;    ///< likewise: by generators
+  std::size_t loaded_chunks = 0;   ///< in memory, air too
+  std::size_t loaded_bytes = 0;    ///< of their voxels and densities
+  std::size_t other_bytes = 0;     ///< as StreamOptions::other_bytes said last
+  std::size_t wanted_chunks = 0;   ///< within the viewers' radius and the budget
+  std::size_t missing_chunks = 0;  ///< of these, that are not loaded yet
+  std::size_t waiting_edits = 0;   ///< chunks that edits wait for
+  double complete_radius = 0.0;    ///< world units around every viewer within which all is loaded; less a chunk meshed
+  std::uint64_t chunks_read = 0;   ///< since it was opened: from the world's file
+  std::uint64_t chunks_made = 0;   ///< likewise: by generators
   std::uint64_t chunks_unloaded = 0;
-  std::uint64_t chunks_dropped = 0;  ///< that came when nobody wanted them any more
+  std::uint64_t chunks_dropped = 0;     ///< that came when nobody wanted them any more
   double longest_update_seconds = 0.0;  ///< since `stats` was called last
 };
 

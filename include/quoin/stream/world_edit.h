@@ -72,8 +72,8 @@ struct WorldEdit {
 inline constexpr std::size_t kMaxEditChunks = 1U << 16;
 
 /// The chunks that an edit may change, each once, sorted by z, then y, then x. `band`: of the grid's field.
-/// Errors: LimitExceeded where there are more than kMaxEditChunks; InvalidArgument for sizes, places and blends that are
-///         not finite or negative.
+/// Errors: LimitExceeded where there are more than kMaxEditChunks; InvalidArgument for sizes, places and blends that
+///         are not finite or negative.
 [[nodiscard]] Result<std::vector<IVec3>> chunks_of_edit(const WorldEdit& edit, float band = 8.0F);
 
 /// Does it to what is loaded of a grid. Returns how many voxels or samples changed.

@@ -125,8 +125,7 @@ DensityStore::Entry& DensityStore::find_or_create(IVec3 chunk) {
   return made;
 }
 
-void DensityStore::finish_edit(IVec3 chunk, Entry& entry, const ChangeReach& changes, bool has_even_row,
-                               bool is_edit) {
+void DensityStore::finish_edit(IVec3 chunk, Entry& entry, const ChangeReach& changes, bool has_even_row, bool is_edit) {
   QUOIN_ASSERT(find(chunk) == &entry, "the entry is the chunk's");
   if (changes.samples != 0) {
     ++edits_;
@@ -209,7 +208,8 @@ std::vector<IVec3> DensityStore::chunks() const {
 }
 
 std::size_t DensityStore::bytes() const {
-  std::size_t total = sizeof(DensityGrid) + sizeof(DensityStore) + entries_.bytes() + loaded_.bytes() + journal_.bytes();
+  std::size_t total =
+      sizeof(DensityGrid) + sizeof(DensityStore) + entries_.bytes() + loaded_.bytes() + journal_.bytes();
   entries_.for_each([&](IVec3, const Entry& entry) { total += entry.samples.bytes() - sizeof(DensityChunk); });
   return total;
 }

@@ -180,7 +180,9 @@ TEST(MinecraftSource, NumbersOfTypesDoNotDependOnWhatWasReadBefore) {
   auto chunk = (*a)->read({0, 0, 0});
   ASSERT_TRUE(chunk && *chunk);
   VoxelRegistry into;
-  ASSERT_TRUE(into.add({.name = "mine"}));
+  VoxelProperties mine;
+  mine.name = "mine";
+  ASSERT_TRUE(into.add(mine));
   SourceTypes numbers(**a);
   ASSERT_TRUE(numbers.renumber(**chunk, into));
   EXPECT_EQ(into[(*chunk)->get(0, 0, 0)].name, "minecraft:stone");
