@@ -56,9 +56,7 @@ void ChunkStreamer::post(Note note) {
   {
     const std::scoped_lock lock(inbox_mutex_);
     if (note.wishes) inbox_.wishes = std::move(note.wishes);
-    append(inbox_.here, note.here);
-    append(inbox_.broken, note.broken);
-    append(inbox_.gone, note.gone);
+    append(inbox_.events, note.events);
     append(inbox_.let_go, note.let_go);
     ++posted_;
   }
@@ -102,9 +100,14 @@ void ChunkStreamer::read_inbox() {
     std::swap(note, inbox_);
     read_posts_ = posted_;
   }
-  for (const ChunkPlace& place : note.gone) plan_.forget(place);
-  for (const ChunkPlace& place : note.here) plan_.set_state(place, StreamPlan::State::Here);
-  for (const ChunkPlace& place : note.broken) plan_.set_state(place, StreamPlan::State::Broken);
+  for (const Event& event : note.events) {
+    if (event.what == Event::What::Gone) {
+      plan_.forget(event.place);
+    } else {
+      plan_.set_state(event.place,
+                      event.what == Event::What::Here ? StreamPlan::State::Here : StreamPlan::State::Broken);
+    }
+  }
   if (note.wishes) {
     plans_ = note.wishes->number;
     plan_.plan(std::move(*note.wishes));

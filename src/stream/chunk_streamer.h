@@ -42,16 +42,22 @@ class ChunkStreamer {
     bool keeps_made = true;
     unsigned workers = 1;
   };
-  /// What happened on the caller's thread.
+  /// What became of a chunk on the caller's thread.
+  struct Event {
+    enum class What : std::uint8_t {
+      Here,    ///< it was put in place
+      Broken,  ///< it will not come
+      Gone,    ///< it was taken away, or dropped
+    };
+    ChunkPlace place;
+    What what = What::Here;
+  };
   struct Note {
-    std::optional<Wishes> wishes;     ///< where they are others than before
-    std::vector<ChunkPlace> here;     ///< that arrived and were put in place
-    std::vector<ChunkPlace> broken;   ///< that will not come
-    std::vector<ChunkPlace> gone;     ///< that were taken away, or dropped
-    std::vector<StoredChunk> let_go;  ///< to be destroyed where nobody waits for it
-    [[nodiscard]] bool empty() const {
-      return !wishes && here.empty() && broken.empty() && gone.empty() && let_go.empty();
-    }
+    std::optional<Wishes> wishes{};     ///< where they are others than before
+    std::vector<Event> events;          ///< in their order
+    std::vector<StoredChunk> let_go{};  ///< to be destroyed where nobody waits for it
+    void add(const ChunkPlace& place, Event::What what) { events.push_back({place, what}); }
+    [[nodiscard]] bool empty() const { return !wishes && events.empty() && let_go.empty(); }
   };
   struct Outbox {
     std::vector<Arrival> arrivals;

@@ -31,6 +31,7 @@ using namespace stream;
 namespace {
 
 using Clock = std::chrono::steady_clock;
+using What = ChunkStreamer::Event::What;
 
 // Before anything is loaded a chunk counts as so many bytes.
 constexpr double kGuessedChunkBytes = 24.0 * 1024.0;
@@ -391,20 +392,20 @@ void StreamedWorld::Impl::put(Arrival arrival, ChunkStreamer::Note& note) {
   const ChunkPlace place = arrival.place;
   Streamed* const grid = streamed(place.grid);
   SceneGrid* const content = grid == nullptr ? nullptr : content_of_grid(*grid);
-  if (content == nullptr) return note.gone.push_back(place);
+  if (content == nullptr) return note.add(place, What::Gone);
   if (arrival.outcome == Arrival::Outcome::Broken) {
     grid->broken.insert(place.chunk);
-    return note.broken.push_back(place);
+    return note.add(place, What::Broken);
   }
   if (arrival.outcome == Arrival::Outcome::OutOfMemory) {
     must_plan = true;
-    return note.gone.push_back(place);
+    return note.add(place, What::Gone);
   }
   edit_on_arrival(*grid, arrival, *content);
   if (!is_near_anyone(place) && !grid->kept.contains(place.chunk)) {
     ++totals.chunks_dropped;
     note.let_go.push_back(std::move(arrival.chunk));
-    return note.gone.push_back(place);
+    return note.add(place, What::Gone);
   }
   const std::size_t size = bytes_of(arrival.chunk);
   content->grid.load_chunk(place.chunk, std::move(arrival.chunk.voxels));
@@ -416,13 +417,13 @@ void StreamedWorld::Impl::put(Arrival arrival, ChunkStreamer::Note& note) {
   grid->sizes[place.chunk] = size;
   loaded_bytes += size;
   ++loaded_chunks;
-  note.here.push_back(place);
+  note.add(place, What::Here);
 }
 
 void StreamedWorld::Impl::take_away(const ChunkPlace& place, ChunkStreamer::Note& note) {
   Streamed* const grid = streamed(place.grid);
   SceneGrid* const content = grid == nullptr ? nullptr : content_of_grid(*grid);
-  if (content == nullptr) return note.gone.push_back(place);
+  if (content == nullptr) return note.add(place, What::Gone);
   if (grid->kept.contains(place.chunk) || !content->grid.is_loaded(place.chunk)) return;
   StoredChunk last;  // so that it ends on another thread
   if (const Chunk* const voxels = content->grid.find_chunk(place.chunk)) last.voxels = *voxels;
@@ -430,7 +431,7 @@ void StreamedWorld::Impl::take_away(const ChunkPlace& place, ChunkStreamer::Note
   content->grid.unload_chunk(place.chunk);
   content->field.unload_chunk(place.chunk);
   note.let_go.push_back(std::move(last));
-  note.gone.push_back(place);
+  note.add(place, What::Gone);
   const auto size = grid->sizes.find(place.chunk);
   QUOIN_ASSERT(size != grid->sizes.end(), "what is loaded was counted");
   loaded_bytes -= size->second;

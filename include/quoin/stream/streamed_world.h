@@ -36,7 +36,7 @@ struct StreamOptions {
   /// `update`, ten times a second. May be empty.
   std::function<std::size_t()> other_bytes{};
   /// What one `update` may take of its caller's time, in seconds; one chunk comes or goes at least.
-  double update_seconds = 0.0002;
+  double update_seconds = 0.0001;
   /// How often `update` saves what was edited; 0: each time.
   std::chrono::milliseconds save_interval{1000};
   /// Whether made chunks are saved, so that a generator is asked once for each; without, once each time that it is

@@ -174,8 +174,8 @@ void DensityStore::make_partial() {
   loaded_.begin();
 }
 
+// Nobody looks at each sample here, as `put` does: chunks are loaded on threads that must not wait.
 bool DensityStore::load(IVec3 chunk, DensityChunk samples) {
-  QUOIN_ASSERT(is_stored_within(samples, far_), "densities are stored_density of the band");
   if (!loaded_.add(chunk)) return false;
   samples.unite_slabs();
   replace(chunk, std::move(samples));
