@@ -85,7 +85,6 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"trace/tree_view.h", {"light", "render", "render_vk"}},
     {"trace/walk.h", {"light"}},
     {"store/chunk/content.h", {"stream"}},
-    {"store/world/world_for_tests.h", {"stream"}},
 };
 
 // A folder with more files is several rooms in one.

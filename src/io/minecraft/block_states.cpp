@@ -119,7 +119,7 @@ BlockState block_state(std::string_view name, std::vector<Property> properties) 
     const auto code = is_look ? std::nullopt : coded(property);
     if (!code || block.bits + code->bits > kMaxStateBits) {
       if (is_look && value == "false") continue;  // as blocks are that have no such property
-      in_name += (in_name.empty() ? "[" : ",") + key + "=" + value;
+      in_name.append(in_name.empty() ? "[" : ",").append(key).append("=").append(value);
       continue;
     }
     block.layout += (block.layout.empty() ? "" : ",") + key + ":" + code->kind + std::to_string(code->bits);
@@ -173,7 +173,7 @@ BlockText block_text(const VoxelProperties& type, std::uint32_t state) {
 std::string to_string(const BlockText& block) {
   std::string text = block.name;
   for (const auto& [key, value] : block.properties) {
-    text += (&key == &block.properties.front().first ? "[" : ",") + key + "=" + value;
+    text.append(&key == &block.properties.front().first ? "[" : ",").append(key).append("=").append(value);
   }
   return block.properties.empty() ? text : text + "]";
 }

@@ -80,7 +80,7 @@ Result<VoxelType> BlockTypes::tinted(const Block& block, const BiomeTints& tints
   type.colour.b = times(type.colour.b, colour);
   constexpr std::array kNames = {"", "grass", "foliage", "water"};
   type.attributes[kTintAttribute] = kNames[static_cast<std::size_t>(block.tint)];
-  const auto added = types_.find_or_add(type);
+  auto added = types_.find_or_add(type);
   if (added) tinted_types_[key] = *added;
   return added;
 }

@@ -71,6 +71,9 @@ TEST(WorldStore, ChunksValuesTypesAndGridsSurviveAReopening) {
     EXPECT_FALSE(world->value("nothing")->has_value());
     EXPECT_EQ(world->next_grid(), 1U);
   }
+  // The second one was opened for writing, and wrote nothing.
+  EXPECT_FALSE(std::filesystem::exists(path.string() + "-wal"));
+  EXPECT_FALSE(std::filesystem::exists(path.string() + "-shm"));
 }
 
 TEST(WorldStore, WhatIsSavedIsReadBeforeItIsOnDisk) {
