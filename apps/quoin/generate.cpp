@@ -121,41 +121,40 @@ Result<Outcome> generate(const GenerateOptions& options) {
   return outcome;
 }
 
-/// A world that is made as one comes by: what is within `--chunks` around the origin is there.
+/// A world that is made as one comes by: so far around the origin it is there.
 Result<Outcome> generate_endless(const GenerateOptions& options) {
   Stopwatch watch;
-  if (auto kept = check_replaced(options.output, {}, options.force); !kept) return kept.error();
+  std::error_code error;
+  if (std::filesystem::exists(std::filesystem::symlink_status(options.output, error))) {
+    return make_error(ErrorCode::CannotWrite, "there already; a world without an end is made as a new file",
+                      options.output.string());
+  }
   if (auto writable = check_outputs({options.output}); !writable) return writable.error();
   catch_interrupts();
-  // It appears when it is whole.
-  std::filesystem::path fresh = options.output;
-  fresh += ".new";
-  std::error_code ignored;
-  std::filesystem::remove(fresh, ignored);
   Outcome outcome;
+  Status done;
   {
-    auto world = StreamedWorld::open_or_create(fresh, {.workers = options.threads});
+    auto world = StreamedWorld::open_or_create(options.output, {.workers = options.threads});
     if (!world) return world.error();
     const EndlessTerrain terrain{options.terrain.seed, endless_height(options), options.is_smooth};
     const auto grid = world->add_terrain(terrain);
-    if (!grid) return grid.error();
     const IVec3 size = options.terrain.size * edge_of_unit(options);
     const Viewer viewer{.position = {0.0, 0.5 * size.y, 0.0}, .radius = 0.5 * std::max(size.x, size.z)};
-    if (auto loaded = world->load_all({&viewer, 1}); !loaded) return loaded.error();
-    const SceneGrid& content = world->scene().grids()[*grid];
-    outcome.voxels = content.grid.voxel_count() + content.field.solid_count();
-    outcome.types = world->scene().types.size() - 1;
-    outcome.seconds_generate = watch.lap();
-    if (auto saved = world->flush(); !saved) return saved.error();
-    for (std::string& problem : world->take_problems()) outcome.warnings.push_back(std::move(problem));
+    done = grid ? world->load_all({&viewer, 1}) : Status(grid.error());
+    if (done) {
+      const SceneGrid& content = world->scene().grids()[*grid];
+      outcome.voxels = content.grid.voxel_count() + content.field.solid_count();
+      outcome.types = world->scene().types.size() - 1;
+      outcome.seconds_generate = watch.lap();
+      done = world->flush();
+      for (std::string& problem : world->take_problems()) outcome.warnings.push_back(std::move(problem));
+    }
   }
-  if (was_interrupted()) {
-    std::filesystem::remove(fresh, ignored);
-    return make_error(ErrorCode::Cancelled, "cancelled", options.output.string());
+  if (done && was_interrupted()) done = make_error(ErrorCode::Cancelled, "cancelled", options.output.string());
+  if (!done) {
+    std::filesystem::remove(options.output, error);
+    return done.error();
   }
-  std::error_code error;
-  std::filesystem::rename(fresh, options.output, error);
-  if (error) return make_error(ErrorCode::CannotWrite, error.message(), options.output.string());
   outcome.bytes = std::filesystem::file_size(options.output, error);
   outcome.seconds_write = watch.lap();
   return outcome;
@@ -227,9 +226,9 @@ std::shared_ptr<GenerateOptions> add_world(CLI::App& command, const char* files,
   command.add_option("OUT", options->output, files)->required()->check(file_name());
   command.add_option("--seed", options->seed, "Which world: a whole number (default 42)");
   command.add_option("--chunks", options->chunks, chunks);
-  command.add_flag(
-      "--endless", options->is_endless,
-      "A .quoin that a program with StreamedWorld goes on making; --chunks says how much of it is made now");
+  command.add_flag("--endless", options->is_endless,
+                   "A .quoin that a program with StreamedWorld goes on making; made now is what lies within half of "
+                   "--chunks' width around the origin");
   command.add_flag("--force", options->force, kForceHelp);
   command.add_flag("--json", options->json, "Print one JSON object instead of text");
   add_quiet_option(command);

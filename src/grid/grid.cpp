@@ -113,13 +113,21 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, EditNotice
   std::int64_t changed = 0;
   double done = 0.0;
   const auto goes_on = [&](double total) { return !progress || progress(std::min(++done / total, 1.0)); };
+  if (create && loaded.is_partial()) {  // however large the box is
+    const std::vector<IVec3> here = loaded.within(chunks);
+    for (const IVec3 at : here) {
+      changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), notice, change);
+      if (!goes_on(static_cast<double>(here.size()))) return changed;
+    }
+    return changed;
+  }
   if (create) {
     const DVec3 size(chunks.size());
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
         for (int x = chunks.min.x; x < chunks.max.x; ++x) {
           const IVec3 at{x, y, z};
-          if (loaded.has(at)) changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), notice, change);
+          changed += edit_chunk(at, entries.find_or_create(at), part_of(box, at), notice, change);
           if (!goes_on(size.x * size.y * size.z)) return changed;
         }
       }

@@ -45,6 +45,13 @@ class LoadedChunks {
     std::sort(all.begin(), all.end(), by_zyx);
     return all;
   }
+  /// Of a partial grid those in a box of chunks, sorted by z, then y, then x.
+  [[nodiscard]] std::vector<IVec3> within(const IBox& chunks) const {
+    std::vector<IVec3> found;
+    chunks_.for_each_in(chunks, [&](IVec3 at, const Mark&) { found.push_back(at); });
+    std::sort(found.begin(), found.end(), by_zyx);
+    return found;
+  }
   [[nodiscard]] std::size_t bytes() const { return chunks_.bytes(); }
 
   /// False where it is loaded, outside of the world, or the grid is not partial.

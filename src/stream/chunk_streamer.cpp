@@ -227,10 +227,7 @@ void ChunkStreamer::make(const ChunkGenerator& generator, Arrival& arrival) {
   WorldChanges changes;
   changes.put_chunk(arrival.place, arrival.chunk);
   // What could not be written is kept by the store, and tried again.
-  if (const auto saved = store_.save(std::move(changes)); !saved) {
-    add_problem(arrival.place, saved.error());
-    arrival.chunk = {};
-  }
+  if (const auto saved = store_.save(std::move(changes)); !saved) add_problem(arrival.place, saved.error());
 }
 
 void ChunkStreamer::add_problem(const ChunkPlace& place, const Error& error) {

@@ -160,7 +160,6 @@ Result<LoggedEdit> read_edit(std::span<const std::byte> body, std::size_t offset
     return fault("an edit that is cut off");
   }
   if (!in.is_at_end()) return fault("bytes that are left over in an edit");
-  if (const auto chunks = chunks_of_edit(read.edit); !chunks) return fault(chunks.error().message.c_str());
   return read;
 }
 

@@ -118,6 +118,12 @@ void StreamPlan::find_wanted() {
       chunks.erase(std::unique(chunks.begin(), chunks.end()), chunks.end());
     }
     for (const IVec3 chunk : chunks) wanted_.push_back(measured({grid, 0, chunk}, eyes));
+    // Of many grids no more is kept than could be wanted, and one to tell that there was more.
+    if (wanted_.size() > 2 * wishes_.max_chunks + 1) {
+      const auto end = wanted_.begin() + static_cast<std::ptrdiff_t>(wishes_.max_chunks + 1);
+      std::nth_element(wanted_.begin(), end, wanted_.end(), is_nearer);
+      wanted_.erase(end, wanted_.end());
+    }
   }
   std::ranges::sort(wanted_, is_nearer);
 }
@@ -146,13 +152,13 @@ void StreamPlan::find_leaving() {
   std::map<std::uint32_t, std::unordered_map<IVec3, bool, CoordinateHash>> is_wanted;
   for (const Wanted& each : wanted_) is_wanted[each.place.grid].emplace(each.place.chunk, true);
   std::vector<Wanted> others;
-  static const std::vector<Eye> kNobody;
+  const std::vector<Eye> nobody;
   for (const auto& [grid, states] : states_) {
     const auto eyes = wishes_.eyes.find(grid);
     const auto& of_grid = is_wanted[grid];
     for (const auto& [chunk, state] : states) {
       if (state != State::Here || of_grid.contains(chunk)) continue;
-      others.push_back(measured({grid, 0, chunk}, eyes == wishes_.eyes.end() ? kNobody : eyes->second));
+      others.push_back(measured({grid, 0, chunk}, eyes == wishes_.eyes.end() ? nobody : eyes->second));
     }
   }
   std::ranges::sort(others, is_nearer);

@@ -56,7 +56,7 @@ class StreamPlan {
   [[nodiscard]] std::vector<ChunkPlace> take_leaving();
 
   [[nodiscard]] std::size_t wanted() const { return wanted_.size(); }
-  /// Of these, that are not here; and how far the nearest of them is, world units. Cost: O(what came since).
+  /// Of these, that are not here; and how far the nearest of them is, world units. Cost: O(wanted) after a change.
   [[nodiscard]] std::size_t missing();
   [[nodiscard]] double complete_radius();
 

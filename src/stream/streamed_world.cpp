@@ -7,6 +7,8 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <mutex>
+#include <new>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -40,6 +42,14 @@ constexpr std::size_t kGuessBelow = 64;
 constexpr double kShareOfBudget = 0.97;
 // Of one grid.
 constexpr std::size_t kMaxEyes = 64;
+// Chunks that edits wait for, in one plan.
+constexpr std::size_t kMaxAsked = 1024;
+// World units: what is farther is of no grid.
+constexpr double kMaxRadius = 1e12;
+// Of a chunk that is loaded, besides its voxels and densities: marks, sizes and states, bytes.
+constexpr std::size_t kChunkBytes = 256;
+// Journals keep some thousand records: after so many chunks that came or went it is time to read them.
+constexpr std::size_t kMaxMoved = 4000;
 // Eyes that moved less, voxels, or turned less (cosine) see the same.
 constexpr double kMoves = 12.0;
 constexpr double kTurns = 0.94;
@@ -54,7 +64,7 @@ double seconds_since(Clock::time_point start) {
 }
 
 std::size_t bytes_of(const StoredChunk& chunk) {
-  return chunk.voxels.bytes() + (chunk.densities ? chunk.densities->bytes() : 0);
+  return kChunkBytes + chunk.voxels.bytes() + (chunk.densities ? chunk.densities->bytes() : 0);
 }
 
 std::vector<std::byte> bytes_of_text(const std::string& text) {
@@ -78,6 +88,53 @@ std::optional<EndlessTerrain> terrain_from(std::span<const std::byte> bytes) {
   return EndlessTerrain{json["seed"].get<std::uint64_t>(), static_cast<int>(height), json["smooth"].get<bool>()};
 }
 
+/// What became of saves, told by the store's thread.
+class DiskOutcome {
+ public:
+  void put(const Status& outcome) {
+    const std::scoped_lock lock(mutex_);
+    last_ = outcome;
+  }
+  [[nodiscard]] Status last() const {
+    const std::scoped_lock lock(mutex_);
+    return last_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  Status last_;
+};
+
+// Types that the world does not have, and states of more bits than their type has, could not be saved.
+Status check_types(const WorldEdit& edit, const VoxelRegistry& types) {
+  const auto is_known = [&](VoxelType type) { return type < types.size(); };
+  bool fits = true;
+  if (const auto* const set = std::get_if<WorldEdit::SetVoxels>(&edit.content)) {
+    fits = std::ranges::all_of(set->voxels, is_known, &PlacedVoxel::type);
+  } else if (const auto* const box = std::get_if<WorldEdit::FillBox>(&edit.content)) {
+    fits = is_known(box->type);
+  } else if (const auto* const ball = std::get_if<WorldEdit::FillSphere>(&edit.content)) {
+    fits = is_known(ball->type);
+  } else if (const auto* const field_ball = std::get_if<WorldEdit::FieldSphere>(&edit.content)) {
+    fits = is_known(field_ball->material);
+  } else if (const auto* const field_box = std::get_if<WorldEdit::FieldBox>(&edit.content)) {
+    fits = is_known(field_box->material);
+  }
+  if (fits) return {};
+  return make_error(ErrorCode::InvalidArgument, "an edit of a type that the world does not have");
+}
+
+// Data that a voxel's type has no room for is left out, on every machine alike.
+std::int64_t apply_fitting(const WorldEdit& edit, Grid& grid, DensityGrid& field, const VoxelRegistry& types) {
+  if (const auto* const set = std::get_if<WorldEdit::SetData>(&edit.content)) {
+    const VoxelType type = grid.get(set->voxel);
+    if (type >= types.size()) return 0;
+    const std::uint8_t bits = types[type].state_bits;
+    if (bits < 32 && set->state >> bits != 0) return 0;
+  }
+  return apply_edit(edit, grid, field);
+}
+
 }  // namespace
 
 struct StreamedWorld::Impl {
@@ -91,6 +148,24 @@ struct StreamedWorld::Impl {
     std::unordered_set<IVec3, CoordinateHash> kept;  // edited, where the world may not be written: they stay
     std::unordered_map<IVec3, Edits, CoordinateHash> waiting;
     std::unordered_set<IVec3, CoordinateHash> broken;
+
+    // Keeps an edit for chunks that are not loaded; of many voxels for each its own.
+    void wait_for(const WorldEdit& edit, const std::vector<IVec3>& chunks) {
+      if (const auto* const set = std::get_if<WorldEdit::SetVoxels>(&edit.content)) {
+        std::unordered_map<IVec3, WorldEdit::SetVoxels, CoordinateHash> parts;
+        for (const IVec3 chunk : chunks) parts[chunk];
+        for (const PlacedVoxel& voxel : set->voxels) {
+          const auto part = parts.find(chunk_of(voxel.voxel));
+          if (part != parts.end()) part->second.voxels.push_back(voxel);
+        }
+        for (auto& [chunk, part] : parts) {
+          waiting[chunk].push_back(std::make_shared<const WorldEdit>(WorldEdit{edit.grid, std::move(part)}));
+        }
+        return;
+      }
+      const auto shared = std::make_shared<const WorldEdit>(edit);
+      for (const IVec3 chunk : chunks) waiting[chunk].push_back(shared);
+    }
   };
   using Eyes = std::map<std::uint32_t, std::vector<Eye>>;
 
@@ -122,12 +197,13 @@ struct StreamedWorld::Impl {
   [[nodiscard]] std::size_t chunks_of_budget() const;
   [[nodiscard]] bool is_near_anyone(const ChunkPlace& place) const;
   void put(Arrival arrival, ChunkStreamer::Note& note);
-  void edit_on_arrival(Streamed& grid, Arrival& arrival, const SceneGrid& content);
+  std::optional<StoredChunk> edited_on_arrival(Streamed& grid, const Arrival& arrival, const SceneGrid& content);
   void take_away(const ChunkPlace& place, ChunkStreamer::Note& note);
   void note_edits();
   Status save_now();
   [[nodiscard]] std::size_t waiting_chunks() const;
   [[nodiscard]] Status waits_for_broken() const;
+  [[nodiscard]] bool waits_for_broken_alone() const;
 
   StreamOptions options;
   WorldStore store;
@@ -139,7 +215,7 @@ struct StreamedWorld::Impl {
   Eyes eyes;          // now
   Eyes planned_eyes;  // of the last wishes
   std::size_t planned_chunks = 0;
-  std::size_t planned_waiting = 0;
+  std::size_t asked_left = 0;  // of the chunks that edits wait for, as of the last wishes
   std::uint64_t posted_plans = 0;
   bool must_plan = true;
   Clock::time_point planned{};
@@ -148,9 +224,15 @@ struct StreamedWorld::Impl {
 
   std::size_t loaded_chunks = 0;
   std::size_t loaded_bytes = 0;
-  std::size_t other_bytes = 0;
+  std::size_t other_bytes = 0;     // with what waits for the disk
+  std::size_t reported_bytes = 0;  // as StreamOptions::other_bytes said last
   Clock::time_point asked_others{};
   bool is_edited = false;  // since the last save
+  bool has_save_failed = false;
+  std::size_t moved_since_save = 0;  // chunks that came or went
+  ChangeCursor saved_types;
+  std::shared_ptr<DiskOutcome> disk = std::make_shared<DiskOutcome>();
+  ChunkStreamer::Note unposted;
   Clock::time_point saved{};
   bool has_moved = false;  // something came or went in the last update
   std::vector<std::string> problems;
@@ -217,7 +299,7 @@ StreamedWorld::Impl::Eyes StreamedWorld::Impl::eyes_of(std::span<const Viewer> v
         if (!is_finite(viewer.position) || !(viewer.radius > 0.0)) continue;
         Eye eye;
         eye.position = grid_from_world(*instance, *content, viewer.position);
-        eye.radius = viewer.radius / instance->voxel_size;
+        eye.radius = std::min(viewer.radius, kMaxRadius) / instance->voxel_size;
         eye.voxel_size = instance->voxel_size;
         const double length = glm::length(viewer.direction);
         if (std::isfinite(length) && length > 0.0) {
@@ -280,14 +362,18 @@ void StreamedWorld::Impl::wish(ChunkStreamer::Note& note) {
   // Where all fits, how much more would fit changes nothing.
   const bool is_limited = is_cut() || fit <= box.wanted || is_over;
   const bool is_other_budget = is_limited && (change < 0.99 || change > 1.05) && seconds_since(planned) > kReplan;
-  const std::size_t waits = waiting_chunks();
-  if (!must_plan && !is_other_budget && waits == planned_waiting && see_alike(eyes, planned_eyes)) return;
+  if (asked_left == 0 && waiting_chunks() != 0 && !waits_for_broken_alone()) must_plan = true;
+  if (!must_plan && !is_other_budget && see_alike(eyes, planned_eyes)) return;
   Wishes wishes;
   wishes.eyes = eyes;
   wishes.max_chunks = fit;
   for (const auto& [number, grid] : grids) {
-    for (const auto& [chunk, edits] : grid.waiting) wishes.asked.push_back({number, 0, chunk});
+    for (const auto& [chunk, edits] : grid.waiting) {
+      if (wishes.asked.size() == kMaxAsked) break;
+      if (!grid.broken.contains(chunk)) wishes.asked.push_back({number, 0, chunk});
+    }
   }
+  asked_left = wishes.asked.size();
   std::ranges::sort(wishes.asked, [](const ChunkPlace& a, const ChunkPlace& b) {
     return std::tie(a.grid, a.chunk.z, a.chunk.y, a.chunk.x) < std::tie(b.grid, b.chunk.z, b.chunk.y, b.chunk.x);
   });
@@ -295,7 +381,6 @@ void StreamedWorld::Impl::wish(ChunkStreamer::Note& note) {
   note.wishes = std::move(wishes);
   planned_eyes = eyes;
   planned_chunks = fit;
-  planned_waiting = waits;
   must_plan = false;
   planned = Clock::now();
 }
@@ -330,7 +415,7 @@ void StreamedWorld::Impl::note_edits() {
         const Chunk* const voxels = content->grid.find_chunk(change.chunk);
         const DensityChunk* const densities = content->field.find_chunk(change.chunk);
         const std::size_t now =
-            (voxels == nullptr ? 0 : voxels->bytes()) + (densities == nullptr ? 0 : densities->bytes());
+            kChunkBytes + (voxels == nullptr ? 0 : voxels->bytes()) + (densities == nullptr ? 0 : densities->bytes());
         loaded_bytes = loaded_bytes - size->second + now;
         size->second = now;
         if (!store.is_writable()) of.kept.insert(change.chunk);
@@ -349,16 +434,22 @@ void StreamedWorld::Impl::note_edits() {
 
 Status StreamedWorld::Impl::save_now() {
   saved = Clock::now();
+  moved_since_save = 0;
   if (!store.is_writable()) return {};
-  const auto ticket = world.saver.save(store, scene());
+  saved_types = scene().types.cursor();
+  const auto ticket = world.saver.save(store, scene(), {}, [to = disk](const Status& outcome) { to->put(outcome); });
+  has_save_failed = !ticket;
   if (!ticket) return ticket.error();
   is_edited = false;
   return {};
 }
 
-void StreamedWorld::Impl::edit_on_arrival(Streamed& grid, Arrival& arrival, const SceneGrid& content) {
+// What edits that waited make of a chunk; nothing where nothing waited, or changed.
+std::optional<StoredChunk> StreamedWorld::Impl::edited_on_arrival(Streamed& grid, const Arrival& arrival,
+                                                                  const SceneGrid& content) {
   const auto waiting = grid.waiting.find(arrival.place.chunk);
-  if (waiting == grid.waiting.end()) return;
+  if (waiting == grid.waiting.end()) return std::nullopt;
+  if (asked_left != 0) --asked_left;
   // Partial grids of this chunk alone: whatever the edit does elsewhere it does not do here.
   const IVec3 at = arrival.place.chunk;
   Grid voxels;
@@ -372,37 +463,35 @@ void StreamedWorld::Impl::edit_on_arrival(Streamed& grid, Arrival& arrival, cons
     field.load_air_chunk(at);
   }
   std::int64_t changed = 0;
-  for (const auto& edit : waiting->second) changed += apply_edit(*edit, voxels, field);
+  for (const auto& edit : waiting->second) changed += apply_fitting(*edit, voxels, field, scene().types);
   grid.waiting.erase(waiting);
-  if (changed == 0) return;
-  const Chunk* const now = voxels.find_chunk(at);
-  arrival.chunk.voxels = now == nullptr ? Chunk(kAir) : *now;
-  const DensityChunk* const densities = field.find_chunk(at);
-  arrival.chunk.densities = densities == nullptr ? std::nullopt : std::optional(*densities);
-  if (!store.is_writable()) {
-    grid.kept.insert(at);
-    return;
-  }
-  WorldChanges changes;
-  changes.put_chunk(arrival.place, arrival.chunk);
-  if (const auto done = store.save(std::move(changes)); !done) problems.push_back(to_string(done.error()));
+  if (changed == 0) return std::nullopt;
+  StoredChunk edited;
+  if (const Chunk* const now = voxels.find_chunk(at)) edited.voxels = *now;
+  if (const DensityChunk* const now = field.find_chunk(at)) edited.densities = *now;
+  return edited;
 }
 
 void StreamedWorld::Impl::put(Arrival arrival, ChunkStreamer::Note& note) {
   const ChunkPlace place = arrival.place;
   Streamed* const grid = streamed(place.grid);
   SceneGrid* const content = grid == nullptr ? nullptr : content_of_grid(*grid);
-  if (content == nullptr) return note.add(place, What::Gone);
+  if (content == nullptr) {
+    if (grid != nullptr) grid->waiting.clear();
+    return note.add(place, What::Gone);
+  }
   if (arrival.outcome == Arrival::Outcome::Broken) {
     grid->broken.insert(place.chunk);
+    if (asked_left != 0 && grid->waiting.contains(place.chunk)) --asked_left;
     return note.add(place, What::Broken);
   }
   if (arrival.outcome == Arrival::Outcome::OutOfMemory) {
     must_plan = true;
     return note.add(place, What::Gone);
   }
-  edit_on_arrival(*grid, arrival, *content);
-  if (!is_near_anyone(place) && !grid->kept.contains(place.chunk)) {
+  std::optional<StoredChunk> edited = edited_on_arrival(*grid, arrival, *content);
+  const bool is_near = is_near_anyone(place);
+  if (!is_near && !edited) {
     ++totals.chunks_dropped;
     note.let_go.push_back(std::move(arrival.chunk));
     return note.add(place, What::Gone);
@@ -417,7 +506,17 @@ void StreamedWorld::Impl::put(Arrival arrival, ChunkStreamer::Note& note) {
   grid->sizes[place.chunk] = size;
   loaded_bytes += size;
   ++loaded_chunks;
+  ++moved_since_save;
   note.add(place, What::Here);
+  if (!edited) return;
+  // As an edit of what was loaded: it is saved like any other, before the chunk goes again.
+  content->grid.put_chunk(place.chunk, std::move(edited->voxels));
+  content->field.put_chunk(place.chunk, edited->densities
+                                            ? std::move(*edited->densities)
+                                            : DensityChunk(content->field.neighbourhood(place.chunk).outside));
+  is_edited = true;
+  if (!store.is_writable()) grid->kept.insert(place.chunk);
+  if (!is_near) must_plan = true;
 }
 
 void StreamedWorld::Impl::take_away(const ChunkPlace& place, ChunkStreamer::Note& note) {
@@ -437,6 +536,7 @@ void StreamedWorld::Impl::take_away(const ChunkPlace& place, ChunkStreamer::Note
   loaded_bytes -= size->second;
   grid->sizes.erase(size);
   --loaded_chunks;
+  ++moved_since_save;
   ++totals.chunks_unloaded;
 }
 
@@ -469,19 +569,23 @@ Status StreamedWorld::Impl::update(std::span<const Viewer> viewers, double secon
   for (Arrival& arrival : box.arrivals) arrivals.push_back(std::move(arrival));
   if (box.has_leaving) leaving.assign(box.leaving.begin(), box.leaving.end());
   std::ranges::move(box.problems, std::back_inserter(problems));
-  if (options.other_bytes && start - asked_others >= kAskOthers) {
-    other_bytes = options.other_bytes() + static_cast<std::size_t>(store.stats().pending_bytes);
+  if (start - asked_others >= kAskOthers) {
+    reported_bytes = options.other_bytes ? options.other_bytes() : 0;
+    other_bytes = reported_bytes + static_cast<std::size_t>(store.stats().pending_bytes);
     asked_others = start;
   }
   Status outcome;
-  // Before anything is taken out of memory it is on its way to the disk.
-  if (start - saved >= options.save_interval || (is_edited && !leaving.empty())) outcome = save_now();
+  // Before anything is taken out of memory it is on its way to the disk; and before workers save what has new types.
+  const bool is_due = start - saved >= options.save_interval;
+  const bool is_wanted =
+      (is_edited && !leaving.empty()) || moved_since_save > kMaxMoved || scene().types.has_changed_since(saved_types);
+  if (is_due || (is_wanted && !has_save_failed)) outcome = save_now();
+  if (outcome) outcome = disk->last();
   if (!store.is_writable()) is_edited = false;
   eyes = eyes_of(viewers);
-  ChunkStreamer::Note note;
-  move_chunks(seconds, start, note);
-  wish(note);
-  streamer.post(std::move(note));
+  move_chunks(seconds, start, unposted);
+  wish(unposted);
+  streamer.post(std::exchange(unposted, {}));
   totals.longest_update_seconds = std::max(totals.longest_update_seconds, seconds_since(start));
   return outcome;
 }
@@ -490,6 +594,14 @@ std::size_t StreamedWorld::Impl::waiting_chunks() const {
   std::size_t sum = 0;
   for (const auto& [number, grid] : grids) sum += grid.waiting.size();
   return sum;
+}
+
+// Nothing will come of what waits now.
+bool StreamedWorld::Impl::waits_for_broken_alone() const {
+  return std::ranges::all_of(grids, [](const auto& each) {
+    const Streamed& grid = each.second;
+    return std::ranges::all_of(grid.waiting, [&](const auto& waits) { return grid.broken.contains(waits.first); });
+  });
 }
 
 Status StreamedWorld::Impl::waits_for_broken() const {
@@ -515,7 +627,11 @@ StreamedWorld& StreamedWorld::operator=(StreamedWorld&& other) noexcept {
   return *this;
 }
 StreamedWorld::~StreamedWorld() {
-  if (impl_ != nullptr && impl_->store.is_writable()) (void)flush();
+  if (impl_ == nullptr || !impl_->store.is_writable()) return;
+  try {
+    (void)flush();
+  } catch (const std::bad_alloc&) {  // what was saved before is kept
+  }
 }
 
 Result<StreamedWorld> StreamedWorld::open(const std::filesystem::path& path, WorldAccess access,
@@ -579,6 +695,8 @@ Result<GridHandle> StreamedWorld::add_grid(SceneGrid grid, std::shared_ptr<const
 void StreamedWorld::use_generator(GridHandle grid, std::shared_ptr<const ChunkGenerator> generator) {
   const auto number = impl_->world.saver.number_of(grid);
   QUOIN_ASSERT(number && impl_->streamed(*number) != nullptr, "a grid that is streamed");
+  // The types of what it makes.
+  if (const auto saved = impl_->save_now(); !saved) impl_->problems.push_back(to_string(saved.error()));
   impl_->streamer.set_generator(*number, std::move(generator));
 }
 
@@ -592,7 +710,10 @@ Result<GridHandle> StreamedWorld::add_terrain(const EndlessTerrain& terrain) {
   WorldChanges changes;
   changes.put_value(std::string(kTerrainValue) + std::to_string(*impl_->world.saver.number_of(*handle)),
                     bytes_of_text(text_of(terrain)));
-  if (auto saved = store().save(std::move(changes)); !saved) return saved.error();
+  if (auto saved = store().save(std::move(changes)); !saved) {
+    scene().remove_grid(*handle);
+    return saved.error();
+  }
   Instance instance;
   instance.name = "terrain";
   instance.grid = *handle;
@@ -628,35 +749,41 @@ Status StreamedWorld::apply(const WorldEdit& edit) {
   }
   const auto chunks = chunks_of_edit(edit, content->field.band());
   if (!chunks) return chunks.error();
-  std::shared_ptr<const WorldEdit> kept;
+  if (auto known = check_types(edit, scene().types); !known) return known;
+  std::vector<IVec3> absent;
   for (const IVec3 chunk : *chunks) {
-    if (content->grid.is_loaded(chunk)) continue;
-    if (kept == nullptr) kept = std::make_shared<const WorldEdit>(edit);
-    grid->waiting[chunk].push_back(kept);
+    if (!content->grid.is_loaded(chunk)) absent.push_back(chunk);
   }
-  apply_edit(edit, content->grid, content->field);
+  if (!absent.empty()) {
+    grid->wait_for(edit, absent);
+    impl_->must_plan = true;
+  }
+  apply_fitting(edit, content->grid, content->field, scene().types);
   return {};
 }
 
 Status StreamedWorld::flush() {
   constexpr double kAsLongAsItTakes = std::numeric_limits<double>::infinity();
-  Status waits;
-  while (impl_->waiting_chunks() != 0) {
-    waits = impl_->waits_for_broken();
-    if (!waits) break;
-    // Around nobody: what comes is edited, saved and dropped, but for what is near those of the last update.
-    ChunkStreamer::Note note;
+  impl_->note_edits();
+  // Types first: what workers and edits bring may need them.
+  if (auto saved = impl_->save_now(); !saved) return saved;
+  while (!impl_->waits_for_broken_alone()) {
+    // Around those of the last update: what else comes is edited, saved, and goes again.
     impl_->streamer.take(impl_->box);
     for (Arrival& arrival : impl_->box.arrivals) impl_->arrivals.push_back(std::move(arrival));
     if (impl_->box.has_leaving) impl_->leaving.assign(impl_->box.leaving.begin(), impl_->box.leaving.end());
     std::ranges::move(impl_->box.problems, std::back_inserter(impl_->problems));
-    impl_->leaving.clear();
-    impl_->must_plan = true;
-    impl_->move_chunks(kAsLongAsItTakes, Clock::now(), note);
-    impl_->wish(note);
-    impl_->streamer.post(std::move(note));
-    if (impl_->waiting_chunks() != 0) impl_->streamer.wait();
+    impl_->note_edits();
+    if (impl_->is_edited) {
+      if (auto saved = impl_->save_now(); !saved) return saved;
+    }
+    impl_->must_plan |= impl_->asked_left == 0;
+    impl_->move_chunks(kAsLongAsItTakes, Clock::now(), impl_->unposted);
+    impl_->wish(impl_->unposted);
+    impl_->streamer.post(std::exchange(impl_->unposted, {}));
+    if (!impl_->waits_for_broken_alone()) impl_->streamer.wait();
   }
+  const Status waits = impl_->waits_for_broken();
   impl_->note_edits();
   if (auto saved = impl_->save_now(); !saved) return saved;
   if (impl_->store.is_writable()) {
@@ -674,7 +801,7 @@ StreamStats StreamedWorld::stats() {
   impl_->totals.longest_update_seconds = 0.0;
   now.loaded_chunks = impl_->loaded_chunks;
   now.loaded_bytes = impl_->loaded_bytes;
-  now.other_bytes = impl_->other_bytes;
+  now.other_bytes = impl_->reported_bytes;
   now.wanted_chunks = impl_->box.wanted;
   now.missing_chunks = impl_->box.missing;
   now.waiting_edits = impl_->waiting_chunks();

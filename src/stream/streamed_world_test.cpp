@@ -204,6 +204,7 @@ TEST_F(StreamedWorldTest, EditsReachWhatIsNotLoaded) {
   ASSERT_TRUE(world.apply({0, WorldEdit::SetVoxels{{{{2000, -6, 0}, 2}}}}).has_value());  // later than the box
   ASSERT_TRUE(world.flush().has_value());
   EXPECT_EQ(world.stats().waiting_edits, 0U);
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
   EXPECT_LT(world.stats().loaded_chunks, loaded + 10);  // of what it came by, what is near stays
   const auto kept = world.store().load_chunk({0, 0, chunk_of(IVec3{2000, -6, 0})});
   ASSERT_TRUE(kept.has_value() && kept->has_value());
@@ -336,6 +337,60 @@ TEST_F(StreamedWorldTest, AWorldThatIsOnlyReadKeepsItsEditsInMemory) {
   EXPECT_FALSE(world->is_loaded(grid, {0, -1, 0}));
   EXPECT_EQ(world->scene().grids()[grid].grid.get(3, 3, 3), 2);
   EXPECT_TRUE(world->flush().has_value());
+}
+
+TEST_F(StreamedWorldTest, EditsWithNewTypesWaitAndAreSaved) {
+  {
+    StreamedWorld world = ground(path(), std::make_shared<PatternGround>());
+    const VoxelType fresh = world.scene().types.add(coloured_type(9)).value();
+    ASSERT_TRUE(world.apply({0, WorldEdit::SetVoxels{{{{900, 1, 1}, fresh}}}}).has_value());
+    EXPECT_EQ(world.apply({0, WorldEdit::SetVoxels{{{{900, 1, 1}, 60'000}}}}).error().code, ErrorCode::InvalidArgument);
+    EXPECT_EQ(world.apply({0, WorldEdit::FillBox{{{0, 0, 0}, {1, 1, 1}}, 60'000}}).error().code,
+              ErrorCode::InvalidArgument);
+    // State bits that the type lacks are left out.
+    ASSERT_TRUE(world.apply({0, WorldEdit::SetData{{900, 1, 1}, 0xFFFF, {}}}).has_value());
+    ASSERT_TRUE(world.flush().has_value());
+    EXPECT_TRUE(world.take_problems().empty());
+  }
+  const auto store = WorldStore::open(path(), WorldAccess::Read);
+  const auto kept = store->load_chunk({0, 0, {14, 0, 0}});
+  ASSERT_TRUE(kept.has_value() && kept->has_value());
+  EXPECT_EQ((*kept)->voxels.get(local_of(IVec3{900, 1, 1})), 4);
+}
+
+TEST_F(StreamedWorldTest, EditsThatWaitForAGridThatIsRemovedDoNotHang) {
+  StreamedWorld world = ground(path(), std::make_shared<PatternGround>());
+  ASSERT_TRUE(world.apply({0, WorldEdit::FillBox{{{900, 0, 0}, {1000, 9, 9}}, 1}}).has_value());
+  world.scene().remove_grid(only_grid(world));
+  ASSERT_TRUE(world.flush().has_value());
+  EXPECT_EQ(world.stats().waiting_edits, 0U);
+}
+
+TEST_F(StreamedWorldTest, EditsThatWaitAreMadeOneAfterTheOther) {
+  StreamedWorld world = ground(path(), std::make_shared<PatternGround>());
+  const Viewer viewer{.radius = 70.0};
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_TRUE(world.apply({0, WorldEdit::SetVoxels{{{{3000 + 100 * i, 1, 1}, 2}}}}).has_value());
+    ASSERT_TRUE(world.update({&viewer, 1}).has_value());
+  }
+  for (int i = 0; i < 1000 && world.stats().waiting_edits != 0; ++i) {
+    ASSERT_TRUE(world.update({&viewer, 1}).has_value());
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  EXPECT_EQ(world.stats().waiting_edits, 0U);
+}
+
+TEST_F(StreamedWorldTest, ALargeEditThatWaitsDoesNotHoldUpItsCaller) {
+  StreamedWorld world = ground(path(), std::make_shared<PatternGround>());
+  const Viewer viewer{.radius = 70.0};
+  ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
+  ASSERT_TRUE(world.apply({0, WorldEdit::FillBox{{{0, -64, 0}, {1280, 0, 1280}}, 3}}).has_value());  // 400 chunks
+  ASSERT_TRUE(world.flush().has_value());
+  EXPECT_EQ(world.stats().waiting_edits, 0U);
+  const auto kept = world.store().load_chunk({0, 0, {19, -1, 19}});
+  ASSERT_TRUE(kept.has_value() && kept->has_value());
+  EXPECT_EQ((*kept)->voxels, Chunk(3));
 }
 
 /// Fails for one chunk.

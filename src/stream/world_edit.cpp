@@ -15,6 +15,8 @@ template <class... Each>
 struct Overloaded : Each... {
   using Each::operator()...;
 };
+template <class... Each>
+Overloaded(Each...) -> Overloaded<Each...>;
 
 bool is_length(double value) {
   return std::isfinite(value) && value >= 0.0;

@@ -156,7 +156,6 @@ std::int64_t DensityStore::edit(const LongBox& wanted, bool creates, VoxelType m
   journal_.begin_change();
   std::int64_t changed = 0;
   const auto visit = [&](IVec3 chunk) {
-    if (!loaded_.has(chunk)) return;
     const ChunkEdit wish = chunk_edit(chunk);
     if (wish == ChunkEdit::Nothing) return;
     if (wish == ChunkEdit::Solid && find(chunk) == nullptr) {
@@ -167,7 +166,13 @@ std::int64_t DensityStore::edit(const LongBox& wanted, bool creates, VoxelType m
   };
   double done = 0.0;
   const auto goes_on = [&](double total) { return !progress || progress(std::min(++done / total, 1.0)); };
-  if (creates) {
+  if (creates && loaded_.is_partial()) {  // however large the box is
+    const std::vector<IVec3> here = loaded_.within(chunks);
+    for (const IVec3 at : here) {
+      visit(at);
+      if (!goes_on(static_cast<double>(here.size()))) return changed;
+    }
+  } else if (creates) {
     const DVec3 size(chunks.size());
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
