@@ -49,6 +49,12 @@ IBox chunks_around(const Eye& eye, double radius) {
 
 }  // namespace
 
+bool stays_for(const Eye& eye, IVec3 chunk) {
+  // Voxels beyond a viewer's radius.
+  constexpr double kMargin = 96.0;
+  return distance_to_chunk(eye.position, chunk) <= eye.radius + kMargin;
+}
+
 bool StreamPlan::is_nearer(const Wanted& a, const Wanted& b) {
   const auto key = [](const Wanted& w) {
     return std::tuple(w.distance, w.place.grid, w.place.chunk.z, w.place.chunk.y, w.place.chunk.x);
@@ -165,9 +171,8 @@ void StreamPlan::find_leaving() {
   std::size_t room = wishes_.max_chunks > wanted_.size() ? wishes_.max_chunks - wanted_.size() : 0;
   const auto is_near = [&](const Wanted& each) {
     const auto eyes = wishes_.eyes.find(each.place.grid);
-    return eyes != wishes_.eyes.end() && std::ranges::any_of(eyes->second, [&](const Eye& eye) {
-             return distance_to_chunk(eye.position, each.place.chunk) <= eye.radius + kMargin;
-           });
+    return eyes != wishes_.eyes.end() &&
+           std::ranges::any_of(eyes->second, [&](const Eye& eye) { return stays_for(eye, each.place.chunk); });
   };
   for (const Wanted& each : others) {
     if (room != 0 && is_near(each)) {

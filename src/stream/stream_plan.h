@@ -24,6 +24,9 @@ struct Eye {
   bool operator==(const Eye&) const = default;
 };
 
+/// Whether a chunk that is loaded may stay for a viewer: it lies within the radius, or little beyond.
+[[nodiscard]] bool stays_for(const Eye& eye, IVec3 chunk);
+
 /// What is wanted, as the caller's thread says it.
 struct Wishes {
   std::map<std::uint32_t, std::vector<Eye>> eyes;  ///< of each grid, by its number in the world
@@ -39,9 +42,6 @@ struct Wishes {
 /// Threads: one at a time.
 class StreamPlan {
  public:
-  /// Voxels beyond a viewer's radius in which what is loaded stays.
-  static constexpr double kMargin = 96.0;
-
   enum class State : std::uint8_t { Begun, Here, Broken };
 
   void set_state(const ChunkPlace& place, State state);

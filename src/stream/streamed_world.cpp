@@ -18,13 +18,14 @@
 #include <utility>
 
 #include <glm/geometric.hpp>
-#include <nlohmann/json.hpp>
 #include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
 #include "core/coordinates/coordinate_hash.h"
 #include "core/worker_count.h"
 #include "stream/chunk_streamer.h"
+#include "stream/edit_fit.h"
+#include "stream/terrain_text.h"
 
 namespace quoin {
 
@@ -72,22 +73,6 @@ std::vector<std::byte> bytes_of_text(const std::string& text) {
   return {bytes.begin(), bytes.end()};
 }
 
-std::string text_of(const EndlessTerrain& terrain) {
-  return nlohmann::json{{"seed", terrain.seed}, {"height", terrain.height}, {"smooth", terrain.is_smooth}}.dump();
-}
-
-std::optional<EndlessTerrain> terrain_from(std::span<const std::byte> bytes) {
-  const auto* const text = reinterpret_cast<const char*>(bytes.data());  // NOLINT: UTF-8 as it was written
-  const auto json = nlohmann::json::parse(text, text + bytes.size(), nullptr, false);
-  if (!json.is_object() || !json.contains("seed") || !json["seed"].is_number_unsigned() || !json.contains("height") ||
-      !json["height"].is_number_integer() || !json.contains("smooth") || !json["smooth"].is_boolean()) {
-    return std::nullopt;
-  }
-  const auto height = json["height"].get<std::int64_t>();
-  if (height < 1 || height > 16) return std::nullopt;
-  return EndlessTerrain{json["seed"].get<std::uint64_t>(), static_cast<int>(height), json["smooth"].get<bool>()};
-}
-
 /// What became of saves, told by the store's thread.
 class DiskOutcome {
  public:
@@ -104,36 +89,6 @@ class DiskOutcome {
   mutable std::mutex mutex_;
   Status last_;
 };
-
-// Types that the world does not have, and states of more bits than their type has, could not be saved.
-Status check_types(const WorldEdit& edit, const VoxelRegistry& types) {
-  const auto is_known = [&](VoxelType type) { return type < types.size(); };
-  bool fits = true;
-  if (const auto* const set = std::get_if<WorldEdit::SetVoxels>(&edit.content)) {
-    fits = std::ranges::all_of(set->voxels, is_known, &PlacedVoxel::type);
-  } else if (const auto* const box = std::get_if<WorldEdit::FillBox>(&edit.content)) {
-    fits = is_known(box->type);
-  } else if (const auto* const ball = std::get_if<WorldEdit::FillSphere>(&edit.content)) {
-    fits = is_known(ball->type);
-  } else if (const auto* const field_ball = std::get_if<WorldEdit::FieldSphere>(&edit.content)) {
-    fits = is_known(field_ball->material);
-  } else if (const auto* const field_box = std::get_if<WorldEdit::FieldBox>(&edit.content)) {
-    fits = is_known(field_box->material);
-  }
-  if (fits) return {};
-  return make_error(ErrorCode::InvalidArgument, "an edit of a type that the world does not have");
-}
-
-// Data that a voxel's type has no room for is left out, on every machine alike.
-std::int64_t apply_fitting(const WorldEdit& edit, Grid& grid, DensityGrid& field, const VoxelRegistry& types) {
-  if (const auto* const set = std::get_if<WorldEdit::SetData>(&edit.content)) {
-    const VoxelType type = grid.get(set->voxel);
-    if (type >= types.size()) return 0;
-    const std::uint8_t bits = types[type].state_bits;
-    if (bits < 32 && set->state >> bits != 0) return 0;
-  }
-  return apply_edit(edit, grid, field);
-}
 
 }  // namespace
 
@@ -189,6 +144,7 @@ struct StreamedWorld::Impl {
   }
 
   Status update(std::span<const Viewer> viewers, double seconds);
+  void take_in();
   void move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note);
   void follow_instances();
   [[nodiscard]] Eyes eyes_of(std::span<const Viewer> viewers);
@@ -388,11 +344,7 @@ void StreamedWorld::Impl::wish(ChunkStreamer::Note& note) {
 bool StreamedWorld::Impl::is_near_anyone(const ChunkPlace& place) const {
   const auto found = eyes.find(place.grid);
   if (found == eyes.end()) return false;
-  const DVec3 low = DVec3(place.chunk) * double{kChunkEdge};
-  return std::ranges::any_of(found->second, [&](const Eye& eye) {
-    const DVec3 nearest = glm::clamp(eye.position, low, low + double{kChunkEdge});
-    return glm::length(nearest - eye.position) <= eye.radius + StreamPlan::kMargin;
-  });
+  return std::ranges::any_of(found->second, [&](const Eye& eye) { return stays_for(eye, place.chunk); });
 }
 
 // What edits did since the last time; what workers brought is no edit.
@@ -562,13 +514,18 @@ void StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, C
   }
 }
 
-Status StreamedWorld::Impl::update(std::span<const Viewer> viewers, double seconds) {
-  const Clock::time_point start = Clock::now();
-  note_edits();
+// What workers have brought and planned since the last time.
+void StreamedWorld::Impl::take_in() {
   streamer.take(box);
   for (Arrival& arrival : box.arrivals) arrivals.push_back(std::move(arrival));
   if (box.has_leaving) leaving.assign(box.leaving.begin(), box.leaving.end());
   std::ranges::move(box.problems, std::back_inserter(problems));
+}
+
+Status StreamedWorld::Impl::update(std::span<const Viewer> viewers, double seconds) {
+  const Clock::time_point start = Clock::now();
+  note_edits();
+  take_in();
   if (start - asked_others >= kAskOthers) {
     reported_bytes = options.other_bytes ? options.other_bytes() : 0;
     other_bytes = reported_bytes + static_cast<std::size_t>(store.stats().pending_bytes);
@@ -769,10 +726,7 @@ Status StreamedWorld::flush() {
   if (auto saved = impl_->save_now(); !saved) return saved;
   while (!impl_->waits_for_broken_alone()) {
     // Around those of the last update: what else comes is edited, saved, and goes again.
-    impl_->streamer.take(impl_->box);
-    for (Arrival& arrival : impl_->box.arrivals) impl_->arrivals.push_back(std::move(arrival));
-    if (impl_->box.has_leaving) impl_->leaving.assign(impl_->box.leaving.begin(), impl_->box.leaving.end());
-    std::ranges::move(impl_->box.problems, std::back_inserter(impl_->problems));
+    impl_->take_in();
     impl_->note_edits();
     if (impl_->is_edited) {
       if (auto saved = impl_->save_now(); !saved) return saved;

@@ -1,0 +1,36 @@
+#include "stream/edit_fit.h"
+
+#include <algorithm>
+#include <variant>
+
+namespace quoin::stream {
+
+Status check_types(const WorldEdit& edit, const VoxelRegistry& types) {
+  const auto is_known = [&](VoxelType type) { return type < types.size(); };
+  bool fits = true;
+  if (const auto* const set = std::get_if<WorldEdit::SetVoxels>(&edit.content)) {
+    fits = std::ranges::all_of(set->voxels, is_known, &PlacedVoxel::type);
+  } else if (const auto* const box = std::get_if<WorldEdit::FillBox>(&edit.content)) {
+    fits = is_known(box->type);
+  } else if (const auto* const ball = std::get_if<WorldEdit::FillSphere>(&edit.content)) {
+    fits = is_known(ball->type);
+  } else if (const auto* const field_ball = std::get_if<WorldEdit::FieldSphere>(&edit.content)) {
+    fits = is_known(field_ball->material);
+  } else if (const auto* const field_box = std::get_if<WorldEdit::FieldBox>(&edit.content)) {
+    fits = is_known(field_box->material);
+  }
+  if (fits) return {};
+  return make_error(ErrorCode::InvalidArgument, "an edit of a type that the world does not have");
+}
+
+std::int64_t apply_fitting(const WorldEdit& edit, Grid& grid, DensityGrid& field, const VoxelRegistry& types) {
+  if (const auto* const set = std::get_if<WorldEdit::SetData>(&edit.content)) {
+    const VoxelType type = grid.get(set->voxel);
+    if (type >= types.size()) return 0;
+    const std::uint8_t bits = types[type].state_bits;
+    if (bits < 32 && set->state >> bits != 0) return 0;
+  }
+  return apply_edit(edit, grid, field);
+}
+
+}  // namespace quoin::stream

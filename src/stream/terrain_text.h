@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+
+#include <quoin/stream/chunk_generator.h>
+
+namespace quoin::stream {
+
+/// A landscape as a world keeps it: JSON.
+[[nodiscard]] std::string text_of(const EndlessTerrain& terrain);
+/// Nothing where it is none that this version makes.
+[[nodiscard]] std::optional<EndlessTerrain> terrain_from(std::span<const std::byte> bytes);
+
+}  // namespace quoin::stream
