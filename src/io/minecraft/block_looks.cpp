@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-// One table, sorted by name, and what is guessed of names that it lacks: in pieces it would be no shorter, and harder to
+// One table, of like beside like, and what is guessed of names that it lacks: in pieces it would be no shorter, and harder to
 // find something in.
 
 namespace quoin::minecraft {
