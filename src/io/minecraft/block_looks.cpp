@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
-// One table, of like beside like, and what is guessed of names that it lacks: in pieces it would be no shorter, and harder to
-// find something in.
+// One table, like beside like, and what is guessed of names that it lacks: in pieces it would be no shorter, and harder
+// to find something in.
 
 namespace quoin::minecraft {
 
