@@ -737,7 +737,7 @@ Status StreamedWorld::flush() {
     impl_->streamer.post(std::exchange(impl_->unposted, {}));
     if (!impl_->waits_for_broken_alone()) impl_->streamer.wait();
   }
-  const Status waits = impl_->waits_for_broken();
+  Status waits = impl_->waits_for_broken();
   impl_->note_edits();
   if (auto saved = impl_->save_now(); !saved) return saved;
   if (impl_->store.is_writable()) {
