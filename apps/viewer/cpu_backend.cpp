@@ -157,7 +157,7 @@ struct CpuBackend::Impl {
   std::unique_ptr<PathPart> paths;          // likewise
   std::atomic<bool> is_smooth_stale{true};
   std::atomic<bool> are_paths_stale{true};
-  std::atomic<std::size_t> held{0};        // bytes of what is made of the scene
+  std::atomic<std::size_t> held{0};     // bytes of what is made of the scene
   std::atomic<int> smooth_percent{-1};  // of what is made for it; -1: nothing is
 
   mutable std::mutex mutex;  // guards what follows, but for the atomic ones

@@ -45,8 +45,8 @@ Status write_as_glb(const Scene& scene, const std::filesystem::path& path, const
 Result<FileFormat> format_to_write(const std::filesystem::path& path) {
   const auto format = format_for_writing(path);
   if (format && (!format->is_mesh || format->format == FileFormat::Glb)) return format->format;
-  return make_error(ErrorCode::Unsupported, "the viewer saves .quoin, .vox, .json and .glb; `quoin convert` writes the others",
-                    path.string());
+  return make_error(ErrorCode::Unsupported,
+                    "the viewer saves .quoin, .vox, .json and .glb; `quoin convert` writes the others", path.string());
 }
 
 }  // namespace
@@ -232,7 +232,7 @@ Result<std::vector<std::string>> Document::losses(const std::filesystem::path& p
   const auto format = format_to_write(path);
   if (!format) return format.error();
   std::vector<std::string> all;
-  if (world_) return all;  // itself, or a copy
+  if (world_) return all;                      // itself, or a copy
   if (*format == FileFormat::Glb) return all;  // a copy
   auto of_format = losses_of_saving(loaded_, path);
   if (!of_format) return of_format.error();

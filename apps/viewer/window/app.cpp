@@ -136,7 +136,8 @@ bool App::is_moving() const {
 
 bool App::is_animating() const {
   if (screen_->is_minimised()) return false;
-  return is_moving() || is_streaming() || state_.loader || state_.saver || state_.message || ImGui::GetIO().WantTextInput;
+  return is_moving() || is_streaming() || state_.loader || state_.saver || state_.message ||
+         ImGui::GetIO().WantTextInput;
 }
 
 int App::patience_milliseconds() const {
@@ -199,10 +200,11 @@ void App::frame() {
   stream_world();
   if (screen_->is_minimised()) return;
   if (state_.camera.mode == CameraMode::Walk) {
-    if (has_ground()) state_.walker.advance(step, input_.push(), input_.boost(), state_.camera,
-                          [&](const OrientedBox& box, DVec3 way, const SlideOptions& options) {
-                            return state_.open.backend ? state_.open.backend->slide(box, way, options) : std::nullopt;
-                          });
+    if (has_ground())
+      state_.walker.advance(step, input_.push(), input_.boost(), state_.camera,
+                            [&](const OrientedBox& box, DVec3 way, const SlideOptions& options) {
+                              return state_.open.backend ? state_.open.backend->slide(box, way, options) : std::nullopt;
+                            });
   } else {
     state_.camera.advance(step, input_.push(), input_.boost());
   }
@@ -265,8 +267,8 @@ void App::take_picture() {
 
 bool App::is_settled() const {
   const WorldWindow* const world = state_.open.document->world();
-  return (world == nullptr || world->is_complete()) && state_.stats.is_settled && state_.stats.width == state_.picture_place.w &&
-         state_.stats.height == state_.picture_place.h;
+  return (world == nullptr || world->is_complete()) && state_.stats.is_settled &&
+         state_.stats.width == state_.picture_place.w && state_.stats.height == state_.picture_place.h;
 }
 
 void App::take_frame(ViewFrame frame) {

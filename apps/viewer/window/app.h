@@ -135,7 +135,7 @@ class App {
   std::optional<ViewRequest> asked_;
   bool has_seen_chunks_ = true;  // a picture came since chunks of the world were moved last
   std::string told_saving_;      // of the world, what went wrong as long as it lasts
-  std::string told_fault_;  // of the backend, as long as it lasts; empty: none
+  std::string told_fault_;       // of the backend, as long as it lasts; empty: none
   std::optional<SDL_Event> postponed_;
   int frames_left_ = 3;
   Clock::time_point last_frame_ = Clock::now();
