@@ -36,6 +36,8 @@ class WorldWindow {
   [[nodiscard]] const std::string& why_not_written() const { return why_not_written_; }
   /// Where one stands at first: what the world says, else above the middle of what is stored, or of the landscape.
   [[nodiscard]] Camera first_camera(double aspect) const;
+  /// Whether all of it is in memory once it is complete, wherever the camera is.
+  [[nodiscard]] bool is_whole() const { return all_.has_value(); }
   /// Of what there is to be seen from a place: for speeds and distances.
   [[nodiscard]] DBox bounds(DVec3 from) const;
 

@@ -115,6 +115,7 @@ void App::adopt(OpenDocument opened) {
   state_.open.backend.reset();  // before the document that it reads
   state_.open = std::move(opened);
   has_seen_chunks_ = true;
+  unframed_.reset();
   told_saving_.clear();
   state_.stats = {};
   state_.picture = {};
@@ -132,6 +133,7 @@ void App::adopt(OpenDocument opened) {
   if (!state_.has_picture_place()) state_.picture_place = {0, 0, std::max(output.x, 1), std::max(output.y, 1)};
   if (const WorldWindow* const world = state_.open.document->world()) {
     look_through(world->first_camera(state_.aspect()));
+    if (world->is_whole() && !loaded.camera) unframed_ = state_.camera.camera();
     if (!world->why_not_written().empty() && options_.screenshot.empty()) {
       state_.tell("this world is only looked at: " + world->why_not_written());
     }

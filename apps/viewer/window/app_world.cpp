@@ -12,6 +12,7 @@ void App::stream_world() {
   const Camera camera = state_.camera.camera();
   world->set_other_bytes(backend.bytes() + state_.open.document->history().bytes());
   tell_of_world(world->plan(camera));
+  if (unframed_ && world->is_complete()) frame_world();
   const bool may_move = has_seen_chunks_ || !asked_ || backend.fault().has_value();
   if (!world->has_chunks_to_move() || !may_move || state_.open.document->stroke_brush() != nullptr) return;
   const ChangeCursor before = state_.scene().cursor();
@@ -21,6 +22,12 @@ void App::stream_world() {
   if (!pause.changed) return;
   has_seen_chunks_ = false;
   state_.stats.is_settled = false;
+}
+
+// As any other scene is, now that its voxels are known, unless the user has moved on.
+void App::frame_world() {
+  if (state_.camera.camera() == *unframed_) show_from(View::Iso);
+  unframed_.reset();
 }
 
 void App::tell_of_world(const Status& saving) {
