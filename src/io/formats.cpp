@@ -13,6 +13,7 @@
 #include "io/byte_stream.h"
 #include "io/minecraft/minecraft_source.h"
 #include "io/minecraft/region_file.h"
+#include "io/minecraft/schematic.h"
 #include "io/volume/header.h"
 #include "io/whole_file.h"
 #include "io/world_format.h"
@@ -28,6 +29,9 @@ constexpr std::array kFormats = {
                false, false},
     FormatInfo{FileFormat::Minecraft, "minecraft", ".mca",
                "worlds of Minecraft's (Java): folders, or regions of theirs", true, false, false, false},
+    FormatInfo{FileFormat::Schematic, "schematic", ".schem",
+               "pieces of Minecraft's worlds, also .schematic, .litematic and structures (.nbt)", true, false, false,
+               false},
     FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, false, false, true},
     FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes", true, false, false, true},
     FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true, false},
@@ -114,6 +118,7 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
   if (format == FileFormat::Minecraft) {
     return read_around_spawn(minecraft::open_minecraft(bytes), options, threads, progress);
   }
+  if (format == FileFormat::Schematic) return minecraft::read_schematic(bytes, progress);
   if (is_volume(format)) return read_volume_as_scene(bytes, options, threads, progress);
   Error error = unrecognised(bytes);
   // The reader knows more of what else goes by this name.
@@ -213,6 +218,7 @@ std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
   const auto first = first_bytes(bytes, nifti::kMaxHeaderBytes);
   if (first && nifti::is_header(*first)) return FileFormat::Nifti;
   if (first && nrrd::is_header(*first)) return FileFormat::Nrrd;
+  if (minecraft::begins_nbt(bytes)) return FileFormat::Schematic;
   return std::nullopt;
 }
 

@@ -51,6 +51,7 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
     case FileFormat::Scene:
     case FileFormat::World:
     case FileFormat::Minecraft:
+    case FileFormat::Schematic:
     case FileFormat::Nifti:
     case FileFormat::Nrrd:
       break;

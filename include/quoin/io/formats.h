@@ -17,7 +17,7 @@
 
 namespace quoin {
 
-enum class FileFormat : std::uint8_t { Vox, Scene, World, Minecraft, Nifti, Nrrd, Glb, Gltf, Obj, Ply };
+enum class FileFormat : std::uint8_t { Vox, Scene, World, Minecraft, Schematic, Nifti, Nrrd, Glb, Gltf, Obj, Ply };
 
 /// What Quoin can do with a file format.
 struct FormatInfo {
