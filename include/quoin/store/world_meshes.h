@@ -36,8 +36,8 @@ struct WorldMeshes {
 /// chunk. `loaded`: of load_partial_world.
 ///
 /// Order:  the same meshes as mesh_scene makes of the whole world, to the byte.
-/// Memory: `cache_bytes`, or the chunks around 32 of them if these are more; 40 bytes a chunk of a grid; 16 bytes a
-///         transparent triangle. What is read of the meshes later comes from files, and goes again by itself.
+/// Memory: `cache_bytes`, or the chunks around 32 of them if these are more; the triangles of 32 chunks; 80 bytes a
+///         chunk of a grid. What is read of the meshes later comes from files, and goes again by itself.
 /// Errors: those of mesh_scene and of reading; CannotWrite for `folder`; Unsupported where there are densities, which
 ///         are meshed as a whole.
 /// Requires: `scene` without atlas and cut.

@@ -18,10 +18,9 @@ namespace glass_thickness_detail {
 
 constexpr int kDeepest = 1024;
 
-struct Sample {
-  int voxels = 0;
-  double area = 0.0;
-};
+/// [voxels deep]: the area of the triangles behind which it is so deep. Areas are whole numbers: in any order they have
+/// the same sum.
+using AreaByDepth = std::vector<double>;
 
 template <class Reader>
 int depth_behind(Reader& reader, Vec3 middle, Direction face, VoxelType type) {
@@ -35,15 +34,14 @@ int depth_behind(Reader& reader, Vec3 middle, Direction face, VoxelType type) {
   return std::max(depth, 1);
 }
 
-inline float median(std::vector<Sample>& samples) {
-  std::ranges::sort(samples, {}, &Sample::voxels);
+inline float median(const AreaByDepth& areas) {
   double half = 0.0;
-  for (const Sample& sample : samples) half += sample.area / 2.0;
-  for (const Sample& sample : samples) {
-    half -= sample.area;
-    if (half <= 0.0) return static_cast<float>(sample.voxels);
+  for (const double area : areas) half += area / 2.0;
+  for (std::size_t depth = 0; depth < areas.size(); ++depth) {
+    half -= areas[depth];
+    if (half <= 0.0 && areas[depth] > 0.0) return static_cast<float>(depth);
   }
-  return static_cast<float>(samples.back().voxels);
+  return static_cast<float>(areas.size() - 1);
 }
 
 }  // namespace glass_thickness_detail
@@ -54,7 +52,7 @@ inline float median(std::vector<Sample>& samples) {
 template <class Reader>
 std::vector<GlassThickness> glass_thickness(Reader& reader, std::span<const MeshView> surfaces) {
   using namespace glass_thickness_detail;
-  std::map<VoxelType, std::vector<Sample>> samples;
+  std::map<VoxelType, AreaByDepth> areas;
   for (const MeshView& view : surfaces) {
     if (view.surface != SurfaceClass::Transparent && view.surface != SurfaceClass::EmissiveTransparent) continue;
     for (std::size_t i = 0; i + 2 < view.indices.size(); i += 3) {
@@ -64,11 +62,12 @@ std::vector<GlassThickness> glass_thickness(Reader& reader, std::span<const Mesh
       const Vec3 c = view.positions[view.indices[i + 2]];
       const VoxelType type = view.types[first];
       const int voxels = depth_behind(reader, (a + b + c) / 3.0F, view.directions[first], type);
-      samples[type].push_back({voxels, glm::length(glm::cross(b - a, c - a))});
+      AreaByDepth& of_type = areas.try_emplace(type, kDeepest + 1).first->second;
+      of_type[static_cast<std::size_t>(voxels)] += glm::length(glm::cross(b - a, c - a));
     }
   }
   std::vector<GlassThickness> thickness;
-  for (auto& [type, each] : samples) thickness.push_back({type, median(each)});
+  for (const auto& [type, each] : areas) thickness.push_back({type, median(each)});
   return thickness;
 }
 

@@ -275,6 +275,18 @@ std::optional<SceneHit> first_unloaded_of(const Seen& seen, const Ray& ray, doub
   return first;
 }
 
+// Has a hit, or none up to `max_t`, say what is not loaded before it, or be that.
+void note_unloaded(const Seen& seen, const Ray& ray, double max_t, std::optional<SceneHit>& found) {
+  if (!found && !seen.meets_unloaded) return;
+  const auto unloaded = first_unloaded_of(seen, ray, max_t);
+  if (!unloaded || (found && unloaded->t >= found->t)) return;
+  if (seen.meets_unloaded) {
+    found = unloaded;
+  } else {
+    found->unloaded_t = unloaded->t;
+  }
+}
+
 }  // namespace
 
 std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray, double max_t, const QueryFilter& filter) {
@@ -293,17 +305,15 @@ std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray, dou
     }
     return true;
   });
-  // Whether something not loaded comes first.
-  std::optional<SceneHit> unloaded;
-  if (best || seen.meets_unloaded) unloaded = first_unloaded_of(seen, ray, max_t);
-  if (seen.meets_unloaded && unloaded && (!best || unloaded->t < best->hit.t)) return unloaded;
-  if (!best) return std::nullopt;
-  const PlacedGrid& placed = placed_in(tracer)[best_placed];
-  const RayHit& hit = best->hit;
-  SceneHit found{placed.instance,   hit.voxel,      best->in_field ? best->material : placed.voxels->get(hit.voxel),
-                 hit.face,          hit.t,          ray.origin + hit.t * ray.direction,
-                 hit.starts_inside, best->in_field, placed.world_axes * best->normal};
-  if (unloaded && unloaded->t < found.t) found.unloaded_t = unloaded->t;
+  std::optional<SceneHit> found;
+  if (best) {
+    const PlacedGrid& placed = placed_in(tracer)[best_placed];
+    const RayHit& hit = best->hit;
+    found = SceneHit{placed.instance,   hit.voxel,      best->in_field ? best->material : placed.voxels->get(hit.voxel),
+                     hit.face,          hit.t,          ray.origin + hit.t * ray.direction,
+                     hit.starts_inside, best->in_field, placed.world_axes * best->normal};
+  }
+  if (!SceneQuery::unloaded(tracer).empty()) note_unloaded(seen, ray, max_t, found);
   return found;
 }
 
