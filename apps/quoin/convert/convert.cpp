@@ -9,6 +9,7 @@
 #include <quoin/light/lit_meshes.h>
 #include <quoin/store/world_import.h>
 #include <quoin/store/world_saver.h>
+#include <quoin/store/world_store.h>
 
 #include "field_occlusion.h"
 #include "interrupt.h"
@@ -171,6 +172,22 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   return outcome;
 }
 
+/// Draws what lies around a source's spawn, and puts that into the world that was made of it.
+Status add_thumbnail(const ChunkSource& source, const ConvertOptions& options) {
+  constexpr int kRadius = 4;
+  const Threads threads = options.common.threads;
+  const auto stop = [](double) { return !was_interrupted(); };
+  const auto around = load_source(source, chunks_around_spawn(source, kRadius), threads, stop);
+  if (!around) return around.error();
+  WorldChanges changes;
+  if (auto done = put_thumbnail(around->scene, threads, changes); !done) return done;
+  if (changes.empty()) return {};
+  auto world = WorldStore::open(options.output, WorldAccess::Write, threads);
+  if (!world) return world.error();
+  if (const auto ticket = world->save(std::move(changes)); !ticket) return ticket.error();
+  return world->flush();
+}
+
 /// Puts a world that is read by chunks into one of Quoin's, whatever its size.
 Result<Outcome> convert_by_chunks(const ConvertOptions& options) {
   Stopwatch watch;
@@ -185,6 +202,7 @@ Result<Outcome> convert_by_chunks(const ConvertOptions& options) {
   if (!imported) return imported.error();
   outcome.content.voxels = static_cast<std::int64_t>(imported->voxels);
   outcome.bytes = imported->bytes;
+  if (auto done = add_thumbnail(**source, options); !done) return done.error();
   for (const std::string& line : imported->broken) outcome.warnings.push_back("left out: " + line);
   if (!imported->guessed.empty()) {
     std::string names;
