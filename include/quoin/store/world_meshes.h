@@ -40,7 +40,7 @@ struct WorldMeshes {
 ///         chunk of a grid. What is read of the meshes later comes from files, and goes again by itself.
 /// Errors: those of mesh_scene and of reading; CannotWrite for `folder`; Unsupported where there are densities, which
 ///         are meshed as a whole.
-/// Requires: `scene` without atlas and cut.
+/// Requires: `scene` without atlas and cut. Nobody writes the world meanwhile: chunks would not fit those beside them.
 [[nodiscard]] Result<WorldMeshes> mesh_world(const WorldStore& world, const LoadedWorld& loaded,
                                              const WorldMeshOptions& options, Threads threads = {},
                                              const Progress& progress = {});

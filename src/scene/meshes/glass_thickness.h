@@ -67,6 +67,7 @@ std::vector<GlassThickness> glass_thickness(Reader& reader, std::span<const Mesh
     }
   }
   std::vector<GlassThickness> thickness;
+  thickness.reserve(areas.size());
   for (const auto& [type, each] : areas) thickness.push_back({type, median(each)});
   return thickness;
 }

@@ -156,6 +156,10 @@ class WorldMesher {
   [[nodiscard]] static Status densities() {
     return make_error(ErrorCode::Unsupported, "it holds densities, which are meshed as a whole");
   }
+  [[nodiscard]] Error of_folder(Error error) const {
+    if (error.code == ErrorCode::CannotWrite) error.path = options_.folder.empty() ? "." : options_.folder.string();
+    return error;
+  }
   void count(const ChunkCache& cache) {
     made_.voxels += cache.voxels();
     made_.voxels_with_data += cache.data();
@@ -183,8 +187,8 @@ class WorldMesher {
       const auto batch = places.subspan(i, std::min(kBatch, places.size() - i));
       BlockyMesh mesh;
       Status done = mesh_batch(batch, cache, triangles, mesh);
-      if (done) done = spooled->append(mesh, options_.folder);
       if (!done) return done.error();
+      if (auto spool = spooled->append(mesh, options_.folder); !spool) return of_folder(spool.error());
       stats.faces_visible += mesh.faces_visible;
       stats.quads += mesh.quads;
       stats.triangles += mesh.triangle_count();
@@ -196,7 +200,7 @@ class WorldMesher {
     if (!cache.status()) return cache.status().error();
     stats.faces_total += 6 * cache.voxels();
     count(cache);
-    if (auto done = spooled->finish(); !done) return done.error();
+    if (auto done = spooled->finish(); !done) return of_folder(done.error());
     MeshPart part{{}, spooled->views(), DVec3(0.0), spooled};
     CachedReader reader(cache, threads_);
     part.thickness = glass_thickness(reader, part.surfaces);

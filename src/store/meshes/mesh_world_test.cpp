@@ -148,6 +148,7 @@ TEST(WorldMeshes, AFolderThatIsNotThereIsToldOf) {
   const auto made = meshed(path, options);
   ASSERT_FALSE(made);
   EXPECT_EQ(made.error().code, ErrorCode::CannotWrite);
+  EXPECT_EQ(made.error().path, options.folder.string());
 }
 
 TEST(WorldMeshes, CanBeCancelled) {
