@@ -50,7 +50,7 @@ TEST_F(ToolWorld, AWorldIsAFileLikeAnyOther) {
 TEST_F(ToolWorld, InfoSaysWhatThereIs) {
   const ToolRun text = run("world info hills.quoin");
   EXPECT_EQ(text.status, 0) << text.err;
-  EXPECT_NE(text.out.find("a world of version 1"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("a world of version 2"), std::string::npos) << text.out;
   const Json json = Json::parse(run("world info hills.quoin --json").out);
   EXPECT_EQ(json["bytes"], std::filesystem::file_size(folder_.file("hills.quoin")));
   EXPECT_EQ(json["grids"].size(), 1U);
@@ -88,6 +88,91 @@ TEST_F(ToolWorld, BackupAndCompact) {
   EXPECT_EQ(refused.status, 1);
   EXPECT_NE(refused.err.find("another program is writing it"), std::string::npos) << refused.err;
   EXPECT_EQ(run("world backup hills.quoin tuesday.quoin").status, 0) << "while it is written";
+}
+
+TEST_F(ToolWorld, ShowsItselfByAThumbnail) {
+  EXPECT_GT(Json::parse(run("world info hills.quoin --json").out)["thumbnail_bytes"], 1000);
+  ASSERT_EQ(run("world thumbnail hills.quoin hills.png -q").status, 0);
+  EXPECT_EQ(text_of(folder_.file("hills.png")).substr(1, 3), "PNG");
+  // That is what `thumbnail` draws.
+  ASSERT_EQ(run("thumbnail hills.quoin drawn.png -q").status, 0);
+  EXPECT_TRUE(text_of(folder_.file("hills.png")) == text_of(folder_.file("drawn.png")));
+  ASSERT_TRUE(WorldStore::create(folder_.file("bare.quoin")));
+  const ToolRun none = run("world thumbnail bare.quoin none.png");
+  EXPECT_EQ(none.status, 1);
+  EXPECT_NE(none.err.find("it has no thumbnail"), std::string::npos) << none.err;
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("none.png")));
+  EXPECT_EQ(run("world thumbnail hills.quoin hills.quoin").status, 1);
+}
+
+TEST_F(ToolWorld, IsConvertedToAnotherWithAllThatItHas) {
+  {
+    auto world = WorldStore::open(folder_.file("hills.quoin"), WorldAccess::Write);
+    WorldChanges changes;
+    changes.put_value("inventory", {std::byte{7}});
+    changes.put_chunk({0, 2, {0, 0, 0}}, {Chunk(1)});
+    ASSERT_TRUE(world->save(std::move(changes)));
+    ASSERT_TRUE(world->flush());
+  }
+  const ToolRun done = run("convert hills.quoin copy.quoin --json");
+  ASSERT_EQ(done.status, 0) << done.err;
+  EXPECT_EQ(Json::parse(done.out)["voxels"], Json::parse(run("info hills.quoin --json").out)["voxels"]);
+  const auto copy = WorldStore::open(folder_.file("copy.quoin"), WorldAccess::Read);
+  EXPECT_EQ((**copy->value("inventory")).size(), 1U);
+  EXPECT_TRUE((*copy->load_chunk({0, 2, {0, 0, 0}})).has_value());
+  EXPECT_EQ(run("convert hills.quoin copy.quoin -q").status, 1) << "not without --force";
+  EXPECT_EQ(run("convert hills.quoin copy.quoin --force -q").status, 0);
+  damage("copy.quoin");
+  const ToolRun damaged = run("convert copy.quoin other.quoin");
+  EXPECT_NE(damaged.err, "");
+}
+
+TEST_F(ToolWorld, MeshesAreThoseOfTheSameSceneHeldWhole) {
+  ASSERT_EQ(run("convert hills.quoin hills.json -q").status, 0);
+  for (const std::string options : {"", "--mesher culled", "--no-ao", "--watertight"}) {
+    for (const std::string ending : {"glb", "ply"}) {
+      ASSERT_EQ(run("convert hills.quoin a." + ending + " -q " + options).status, 0);
+      ASSERT_EQ(run("convert hills.json b." + ending + " -q " + options).status, 0);
+      EXPECT_TRUE(text_of(folder_.file("a." + ending)) == text_of(folder_.file("b." + ending))) << options;
+    }
+  }
+  const Json by_chunks = Json::parse(run("convert hills.quoin a.glb --json").out);
+  const Json whole = Json::parse(run("convert hills.json b.glb --json").out);
+  for (const char* key : {"voxels", "faces_visible", "faces_total", "quads", "triangles", "vertices", "warnings"}) {
+    EXPECT_EQ(by_chunks[key], whole[key]) << key;
+  }
+  EXPECT_EQ(run("convert hills.quoin smooth.glb --mesher smooth -q").status, 0);
+}
+
+TEST_F(ToolWorld, WhatDoesNotFitIntoMemoryIsToldBeforeItIsTried) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers take more addresses than the limit";
+#endif
+  {
+    // Chunks of 256 types take 400 MB, of which few bytes are on disk.
+    auto world = WorldStore::create(folder_.file("large.quoin"));
+    WorldChanges changes;
+    VoxelRegistry types;
+    for (int i = 0; i < 255; ++i) (void)types.add({.name = "t" + std::to_string(i)});
+    changes.put_types(types);
+    changes.put_grid(0, {});
+    Chunk chunk(kAir);
+    for (int y = 0; y < 64; ++y) {
+      for (int x = 0; x < 64; x += 4) {
+        for (int z = 0; z < 64; z += 4) chunk.set({x, y, z}, static_cast<VoxelType>(1 + (x + y * 4 + z) % 255));
+      }
+    }
+    ASSERT_GT(chunk.bytes(), 100'000U);
+    for (int i = 0; i < 1600; ++i) changes.put_chunk({0, 0, {i, 0, 0}}, {chunk});
+    ASSERT_TRUE(world->save(std::move(changes)));
+    ASSERT_TRUE(world->flush());
+  }
+  const ToolRun refused = shell("ulimit -v 400000; '" QUOIN_TOOL "' convert large.quoin large.json");
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_NE(refused.err.find("as a whole it takes about"), std::string::npos) << refused.err;
+  EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
+  const ToolRun copied = shell("ulimit -v 400000; '" QUOIN_TOOL "' convert large.quoin copy.quoin -q");
+  EXPECT_EQ(copied.status, 0) << copied.err;
 }
 
 TEST_F(ToolWorld, WhatIsNoWorldIsRefusedInOneLine) {

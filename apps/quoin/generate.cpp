@@ -2,6 +2,7 @@
 
 #include <quoin/io/formats.h>
 #include <quoin/scene/scene_faces.h>
+#include <quoin/store/world_saver.h>
 #include <quoin/stream/streamed_world.h>
 #include <quoin/terrain/terrain.h>
 
@@ -11,6 +12,7 @@
 #include "output_files.h"
 #include "parse.h"
 #include "progress_bar.h"
+#include "render/small_picture.h"
 #include "stopwatch.h"
 
 namespace quoin::tool {
@@ -90,6 +92,16 @@ Status make_content(const GenerateOptions& options, const TerrainTypes& types, c
   return {};
 }
 
+Result<SavedScene> save(const Scene& scene, const GenerateOptions& options, ProgressBar& bar) {
+  const auto format = format_for_writing(options.output);
+  if (!format || format->format != FileFormat::World) {
+    return save_scene(scene, options.output, options.threads, bar.listener("writing"));
+  }
+  WorldChanges more;
+  if (auto done = put_thumbnail(scene, options.threads, more); !done) return done.error();
+  return write_world(scene, options.output, options.threads, bar.listener("writing"), std::move(more));
+}
+
 Result<Outcome> generate(const GenerateOptions& options) {
   Stopwatch watch;
   if (auto kept = check_replaced(options.output, {}, options.force); !kept) return kept.error();
@@ -113,7 +125,7 @@ Result<Outcome> generate(const GenerateOptions& options) {
   scene.add_instance(std::move(instance));
   outcome.faces = count_faces(scene, InstanceFilter::All, options.threads);
   if (was_interrupted()) return make_error(ErrorCode::Cancelled, "cancelled", options.output.string());
-  auto saved = save_scene(scene, options.output, options.threads, bar.listener("writing"));
+  auto saved = save(scene, options, bar);
   if (!saved) return saved.error();
   outcome.bytes = saved->bytes;
   outcome.warnings = std::move(saved->warnings);
@@ -146,7 +158,13 @@ Result<Outcome> generate_endless(const GenerateOptions& options) {
       outcome.voxels = content.grid.voxel_count() + content.field.solid_count();
       outcome.types = world->scene().types.size() - 1;
       outcome.seconds_generate = watch.lap();
-      done = world->flush();
+      WorldChanges more;
+      done = put_thumbnail(world->scene(), options.threads, more);
+      if (done && !more.empty()) {
+        const auto saved = world->store().save(std::move(more));
+        if (!saved) done = saved.error();
+      }
+      if (done) done = world->flush();
       for (std::string& problem : world->take_problems()) outcome.warnings.push_back(std::move(problem));
     }
   }

@@ -30,8 +30,13 @@ void warn_of_lamps(const Scene& scene, std::vector<std::string>& warnings) {
   warnings.push_back("lamps left out, which meshes do not hold: " + std::to_string(scene.lamps.size()));
 }
 
-void warn_of_data(const Scene& scene, std::vector<std::string>& warnings) {
-  const std::int64_t voxels = voxels_with_data(scene);
+void warn_of_values(std::size_t values, std::vector<std::string>& warnings) {
+  if (values == 0) return;
+  warnings.push_back("a game keeps " + std::to_string(values) + (values == 1 ? " value" : " values") +
+                     " in it, which no other file holds (quoin world backup copies all)");
+}
+
+void warn_of_data(std::int64_t voxels, std::vector<std::string>& warnings) {
   if (voxels != 0) warnings.push_back("data of voxels left out, which meshes do not hold: " + std::to_string(voxels));
 }
 

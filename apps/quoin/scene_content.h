@@ -23,7 +23,9 @@ struct SceneContent {
 /// Adds a warning when lamps are left out of meshes.
 void warn_of_lamps(const Scene& scene, std::vector<std::string>& warnings);
 /// Adds a warning when data of voxels is left out of meshes.
-void warn_of_data(const Scene& scene, std::vector<std::string>& warnings);
+void warn_of_data(std::int64_t voxels, std::vector<std::string>& warnings);
+/// Adds a warning when values that a game keeps in a world are left out.
+void warn_of_values(std::size_t values, std::vector<std::string>& warnings);
 /// Adds a warning when hidden instances are left out by `filter`.
 void warn_of_left_out(const Scene& scene, InstanceFilter filter, std::vector<std::string>& warnings);
 

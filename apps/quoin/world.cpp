@@ -3,11 +3,14 @@
 #include <string>
 #include <utility>
 
+#include <quoin/io/file.h>
 #include <quoin/store/world_care.h>
+#include <quoin/store/world_store.h>
 
 #include "commands.h"
 #include "interrupt.h"
 #include "output.h"
+#include "output_files.h"
 #include "progress_bar.h"
 
 namespace quoin::tool {
@@ -17,6 +20,7 @@ namespace {
 struct WorldOptions {
   std::filesystem::path world;
   std::filesystem::path output;
+  bool force = false;
   bool json = false;
 };
 
@@ -35,11 +39,12 @@ int run_info(const WorldOptions& options) {
   const auto summary = summarize_world(options.world, bar.listener("reading"));
   if (!summary) return fail(summary.error());
   Json grids = Json::array();
-  std::string text = options.world.filename().string() + ": a world of version " + std::to_string(summary->version) +
-                     ", " + bytes_for_people(summary->bytes) + ", " + with_thousands(summary->saves) +
-                     " saves\nTypes: " + with_thousands(summary->types) +
-                     "\nInstances: " + with_thousands(summary->instances) +
-                     "\nValues: " + with_thousands(summary->values) + "\n";
+  std::string text =
+      options.world.filename().string() + ": a world of version " + std::to_string(summary->version) + ", " +
+      bytes_for_people(summary->bytes) + ", " + with_thousands(summary->saves) +
+      " saves\nTypes: " + with_thousands(summary->types) + "\nInstances: " + with_thousands(summary->instances) +
+      "\nValues: " + with_thousands(summary->values) +
+      "\nThumbnail: " + (summary->thumbnail_bytes == 0 ? "none" : bytes_for_people(summary->thumbnail_bytes)) + "\n";
   for (const auto& [number, grid] : summary->grids) {
     Json levels = Json::object();
     for (const auto& [level, chunks] : grid.by_level) levels[std::to_string(level)] = chunks;
@@ -60,6 +65,7 @@ int run_info(const WorldOptions& options) {
                      {"types", summary->types},
                      {"instances", summary->instances},
                      {"values", summary->values},
+                     {"thumbnail_bytes", summary->thumbnail_bytes},
                      {"grids", grids}});
 }
 
@@ -131,6 +137,27 @@ int run_compact(const WorldOptions& options) {
   return bytes ? report_bytes(options, options.world, *bytes) : fail(bytes.error());
 }
 
+int run_thumbnail(const WorldOptions& options) {
+  if (auto kept = check_replaced(options.output, FileSet({&options.world, 1}), options.force); !kept)
+    return fail(kept.error());
+  if (auto writable = check_outputs({options.output}); !writable) return fail(writable.error());
+  const auto world = WorldStore::open(options.world, WorldAccess::Read);
+  if (!world) return fail(world.error());
+  const auto png = world->thumbnail();
+  if (!png) return fail(png.error());
+  if (!*png) {
+    return fail(make_error(ErrorCode::InvalidArgument,
+                           "it has no thumbnail; `quoin thumbnail` draws a picture of any world",
+                           options.world.string()));
+  }
+  if (auto written = write_file(**png, options.output); !written) {
+    Error error = written.error();
+    if (error.path.empty()) error.path = options.output.string();
+    return fail(error);
+  }
+  return report_bytes(options, options.output, (*png)->size());
+}
+
 using Run = int (*)(const WorldOptions& options);
 
 std::shared_ptr<WorldOptions> add(CLI::App& command, CLI::App*& added, const char* name, const char* help, Run run,
@@ -163,6 +190,11 @@ void add_world_command(CLI::App& app, int& status) {
   const auto backed_up = add(*command, added, "backup", "Copy a world, also while it is written", run_backup, status);
   added->add_option("OUT", backed_up->output, "File to write, which must not be there")->required()->check(file_name());
   added->footer("Example: quoin world backup home.quoin monday.quoin");
+  const auto shown = add(*command, added, "thumbnail", "Write the picture with which a world shows itself in lists",
+                         run_thumbnail, status);
+  added->add_option("OUT", shown->output, "Picture to write: .png")->required()->check(file_name());
+  added->add_flag("--force", shown->force, kForceHelp);
+  added->footer("Example: quoin world thumbnail home.quoin home.png");
   add(*command, added, "compact", "Give back the space that edits left unused", run_compact, status);
   added->footer("Example: quoin world compact home.quoin");
 }

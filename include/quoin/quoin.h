@@ -97,6 +97,7 @@
 #include <quoin/store/stored_chunk.h>
 #include <quoin/store/world_care.h>
 #include <quoin/store/world_import.h>
+#include <quoin/store/world_meshes.h>
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
 #include <quoin/stream/chunk_generator.h>

@@ -365,6 +365,10 @@ bool Grid::is_loaded_around(IVec3 chunk, int distance) const {
   return impl().loaded.has_around(chunk, distance);
 }
 
+bool Grid::is_loaded_within(const IBox& voxels) const {
+  return impl().loaded.has_within(voxels);
+}
+
 std::vector<IVec3> Grid::loaded_chunks() const {
   return impl().loaded.is_partial() ? impl().loaded.sorted() : chunks();
 }

@@ -37,6 +37,24 @@ class LoadedChunks {
     }
     return true;
   }
+  /// Of all chunks that a box of voxels meets.
+  [[nodiscard]] bool has_within(const IBox& voxels) const {
+    if (!is_partial_ || voxels.empty()) return true;
+    const IBox chunks = chunks_of(box_from(voxels));
+    // More than there are cannot all be there; and what lies outside of the world is.
+    const LongBox inside = box_from(intersect(chunks, {IVec3(kMinChunk + 1), IVec3(kMaxChunk)}));
+    if (is_empty(inside)) return true;
+    const auto edge = [&](std::size_t axis) { return static_cast<double>(inside.max[axis] - inside.min[axis]); };
+    if (edge(0) * edge(1) * edge(2) > static_cast<double>(count())) return false;
+    for (std::int64_t z = inside.min[2]; z < inside.max[2]; ++z) {
+      for (std::int64_t y = inside.min[1]; y < inside.max[1]; ++y) {
+        for (std::int64_t x = inside.min[0]; x < inside.max[0]; ++x) {
+          if (!has({static_cast<int>(x), static_cast<int>(y), static_cast<int>(z)})) return false;
+        }
+      }
+    }
+    return true;
+  }
   [[nodiscard]] std::size_t count() const { return chunks_.size(); }
   [[nodiscard]] std::vector<IVec3> sorted() const {
     std::vector<IVec3> all;

@@ -1,9 +1,12 @@
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <quoin/core/axis_orientation.h>
 #include <quoin/grid/changes.h>
+#include <quoin/grid/copy_box.h>
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 
@@ -147,6 +150,50 @@ TEST(PartialGrid, SnapshotsKeepWhatWasLoaded) {
   EXPECT_FALSE(before.is_loaded({5, 5, 5}));
   EXPECT_EQ(before.get(1, 1, 1), 1);
   EXPECT_TRUE(grid.is_loaded({5, 5, 5}));
+}
+
+TEST(PartialGrid, ABoxIsLoadedWhereAllItsChunksAre) {
+  Grid grid = partial();
+  DensityGrid field;
+  field.make_partial();
+  for (int x = 0; x < 2; ++x) {
+    grid.load_chunk({x, 0, 0}, Chunk(kAir));
+    field.load_air_chunk({x, 0, 0});
+  }
+  EXPECT_TRUE(grid.is_loaded_within({{0, 0, 0}, {128, 64, 64}}));
+  EXPECT_TRUE(field.is_loaded_within({{0, 0, 0}, {128, 64, 64}}));
+  EXPECT_FALSE(grid.is_loaded_within({{0, 0, 0}, {129, 64, 64}}));
+  EXPECT_FALSE(field.is_loaded_within({{0, 0, 0}, {129, 64, 64}}));
+  EXPECT_FALSE(grid.is_loaded_within({{-1, 0, 0}, {1, 1, 1}}));
+  EXPECT_TRUE(grid.is_loaded_within({{5, 5, 5}, {5, 5, 5}}));
+  const int least = std::numeric_limits<int>::min();
+  const int most = std::numeric_limits<int>::max();
+  EXPECT_FALSE(grid.is_loaded_within({IVec3(least), IVec3(most)}));
+  EXPECT_TRUE(grid.is_loaded_within({IVec3(least), IVec3(least + 64)}));  // the outermost is air
+  EXPECT_TRUE(Grid().is_loaded_within({IVec3(least), IVec3(most)}));
+}
+
+TEST(PartialGrid, WhatIsNotLoadedIsNotCopied) {
+  Grid grid = partial();
+  grid.load_chunk({0, 0, 0}, Chunk(kAir));
+  grid.set(63, 5, 5, 2);
+  for (int x = 0; x < 64; ++x) grid.set(x, 0, 0, 3);
+  const IBox box{{60, 0, 0}, {68, 10, 10}};  // half of it is loaded
+  for (const bool is_turned : {false, true}) {
+    Grid to;
+    to.fill_box({{0, 0, 0}, {20, 20, 20}}, 1);
+    const AxisOrientation turn = is_turned ? AxisOrientation::quarter_turns(1, 1) : AxisOrientation();
+    const std::int64_t changed = copy_box(grid, box, to, {0, 0, 0}, turn);
+    EXPECT_EQ(changed, 4 * 10 * 10);
+    std::int64_t air = 0;
+    for (int z = 0; z < 10; ++z) {
+      for (int y = 0; y < 10; ++y) {
+        for (int x = 0; x < 10; ++x) air += to.get(x, y, z) == kAir ? 1 : 0;
+      }
+    }
+    EXPECT_EQ(air, 4 * 10 * 10 - 4 - 1);
+    EXPECT_EQ(to.voxel_count(), 20 * 20 * 20 - air);
+  }
 }
 
 TEST(PartialGrid, FieldsAlike) {

@@ -1,5 +1,6 @@
 #include <quoin/store/world_care.h>
 #include <quoin/store/world_import.h>
+#include <quoin/store/world_meshes.h>
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
 
@@ -40,6 +41,8 @@ void WorldChanges::put_grid(std::uint32_t, const WorldGrid&) {}
 void WorldChanges::remove_grid(std::uint32_t) {}
 void WorldChanges::put_value(std::string, std::vector<std::byte>) {}
 void WorldChanges::remove_value(std::string) {}
+void WorldChanges::put_thumbnail(std::vector<std::byte>) {}
+void WorldChanges::remove_thumbnail() {}
 bool WorldChanges::empty() const {
   return true;
 }
@@ -81,6 +84,9 @@ std::uint32_t WorldStore::next_grid() {
 Result<std::optional<std::vector<std::byte>>> WorldStore::value(std::string_view) const {
   return absent();
 }
+Result<std::optional<std::vector<std::byte>>> WorldStore::thumbnail() const {
+  return absent();
+}
 Result<std::vector<std::string>> WorldStore::value_names() const {
   return absent();
 }
@@ -120,10 +126,12 @@ Result<LoadedWorld> load_world(const WorldStore&, const LoadOptions&, Threads, c
 Result<LoadedWorld> load_partial_world(const WorldStore&, const LoadOptions&) {
   return absent();
 }
-Result<SavedScene> write_world(const Scene&, const std::filesystem::path& path, Threads, const Progress&) {
+Result<SavedScene> write_world(const Scene&, const std::filesystem::path& path, Threads, const Progress&,
+                               WorldChanges) {
   return absent(path);
 }
-Result<SavedScene> write_world(const LoadedScene&, const std::filesystem::path& path, Threads, const Progress&) {
+Result<SavedScene> write_world(const LoadedScene&, const std::filesystem::path& path, Threads, const Progress&,
+                               WorldChanges) {
   return absent(path);
 }
 
@@ -142,6 +150,16 @@ Result<WorldRepair> repair_world(const std::filesystem::path& from, const std::f
 }
 Result<std::uint64_t> back_up_world(const std::filesystem::path& from, const std::filesystem::path&) {
   return absent(from);
+}
+Result<WorldCopy> copy_world(const std::filesystem::path& from, const std::filesystem::path&, const Progress&) {
+  return absent(from);
+}
+Result<WorldMeshes> mesh_world(const WorldStore&, const LoadedWorld&, const WorldMeshOptions&, Threads,
+                               const Progress&) {
+  return absent();
+}
+std::optional<std::uint64_t> memory_of_world(const WorldStore&) {
+  return std::nullopt;
 }
 Result<std::uint64_t> compact_world(const std::filesystem::path& path) {
   return absent(path);

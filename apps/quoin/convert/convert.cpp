@@ -8,6 +8,8 @@
 #include <quoin/io/vox.h>
 #include <quoin/light/lit_meshes.h>
 #include <quoin/store/world_import.h>
+#include <quoin/store/world_saver.h>
+#include <quoin/store/world_store.h>
 
 #include "field_occlusion.h"
 #include "interrupt.h"
@@ -15,6 +17,7 @@
 #include "output_files.h"
 #include "parse.h"
 #include "progress_bar.h"
+#include "render/small_picture.h"
 #include "scene_content.h"
 #include "standard_streams.h"
 #include "stopwatch.h"
@@ -44,7 +47,7 @@ Status convert_blockily(const Scene& scene, const SceneAnimation& animation, con
   outcome.seconds.mesh = watch.lap();
   warn_of_left_out(scene, filter, outcome.warnings);
   warn_of_lamps(scene, outcome.warnings);
-  warn_of_data(scene, outcome.warnings);
+  warn_of_data(voxels_with_data(scene), outcome.warnings);
   return write_meshes(*meshes, options, bar, outcome);
 }
 
@@ -124,6 +127,16 @@ std::string mesher_for(const Scene& scene, const ConvertOptions& options) {
   return is_smooth ? "smooth" : "greedy";
 }
 
+Result<SavedScene> save(const LoadedScene& loaded, const FormatInfo& format, const ConvertOptions& options,
+                        ProgressBar& bar) {
+  const Threads threads = options.common.threads;
+  const Progress progress = bar.listener("writing");
+  if (format.format != FileFormat::World) return save_scene(loaded, options.output, threads, progress);
+  WorldChanges more;
+  if (auto done = put_thumbnail(loaded.scene, threads, more); !done) return done.error();
+  return write_world(loaded, options.output, threads, progress, std::move(more));
+}
+
 Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& format, std::string& fault) {
   Stopwatch watch;
   LoadOptions load = options.common.load;
@@ -151,12 +164,28 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   outcome.files = {options.output};
   outcome.faces = count_faces(loaded->scene, options.common.instances(), options.common.threads);
   ProgressBar bar(!options.is_one_of_many);
-  const auto saved = save_scene(*loaded, options.output, options.common.threads, bar.listener("writing"));
+  const auto saved = save(*loaded, format, options, bar);
   if (!saved) return saved.error();
   outcome.bytes = saved->bytes;
   outcome.warnings.insert(outcome.warnings.end(), saved->warnings.begin(), saved->warnings.end());
   outcome.seconds.write = watch.lap();
   return outcome;
+}
+
+/// Draws what lies around a source's spawn, and puts that into the world that was made of it.
+Status add_thumbnail(const ChunkSource& source, const ConvertOptions& options) {
+  constexpr int kRadius = 4;
+  const Threads threads = options.common.threads;
+  const auto stop = [](double) { return !was_interrupted(); };
+  const auto around = load_source(source, chunks_around_spawn(source, kRadius), threads, stop);
+  if (!around) return around.error();
+  WorldChanges changes;
+  if (auto done = put_thumbnail(around->scene, threads, changes); !done) return done;
+  if (changes.empty()) return {};
+  auto world = WorldStore::open(options.output, WorldAccess::Write, threads);
+  if (!world) return world.error();
+  if (const auto ticket = world->save(std::move(changes)); !ticket) return ticket.error();
+  return world->flush();
 }
 
 /// Puts a world that is read by chunks into one of Quoin's, whatever its size.
@@ -173,6 +202,7 @@ Result<Outcome> convert_by_chunks(const ConvertOptions& options) {
   if (!imported) return imported.error();
   outcome.content.voxels = static_cast<std::int64_t>(imported->voxels);
   outcome.bytes = imported->bytes;
+  if (auto done = add_thumbnail(**source, options); !done) return done.error();
   for (const std::string& line : imported->broken) outcome.warnings.push_back("left out: " + line);
   if (!imported->guessed.empty()) {
     std::string names;
@@ -514,8 +544,13 @@ Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& fo
     if (auto made = make_folder_of(options.output); !made) return made.error();
   }
   if (auto writable = check_outputs({options.output}); !writable) return writable.error();
-  if (format.format == FileFormat::World && detect_format(options.common.input) == FileFormat::Minecraft) {
-    return convert_by_chunks(options);
+  const auto from = detect_format(options.common.input);
+  if (format.format == FileFormat::World && from == FileFormat::Minecraft) return convert_by_chunks(options);
+  if (from == FileFormat::World && format.format == FileFormat::World) return copy_world_file(options);
+  if (from == FileFormat::World && format.is_mesh && meshes_by_chunks(options)) {
+    auto meshed = mesh_world_file(options);
+    if (!meshed) return meshed.error();
+    if (*meshed) return std::move(**meshed);
   }
   return convert(options, format, *is_volume, fault);
 }

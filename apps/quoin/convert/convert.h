@@ -106,6 +106,14 @@ using Converted = std::map<std::filesystem::path, Stamps>;
 [[nodiscard]] Status convert_smoothly(const Scene& scene, const SceneAnimation& animation,
                                       const ConvertOptions& options, Outcome& outcome);
 
+/// Copies a world (.quoin) to another, row by row.
+[[nodiscard]] Result<Outcome> copy_world_file(const ConvertOptions& options);
+
+/// Whether what is asked for is made of a world chunk by chunk.
+[[nodiscard]] bool meshes_by_chunks(const ConvertOptions& options);
+/// Meshes a world (.quoin) chunk by chunk and writes it; nothing, and nothing is written, where it holds densities.
+[[nodiscard]] Result<std::optional<Outcome>> mesh_world_file(const ConvertOptions& options);
+
 /// Reads a volume, meshes it and writes it.
 [[nodiscard]] Result<Outcome> convert_volume(const ConvertOptions& options, const FormatInfo& format);
 

@@ -89,7 +89,7 @@ Status convert_smoothly(const Scene& scene, const SceneAnimation& animation, con
   outcome.seconds.mesh = watch.lap();
   warn_of_left_out(scene, filter, outcome.warnings);
   warn_of_lamps(scene, outcome.warnings);
-  warn_of_data(scene, outcome.warnings);
+  warn_of_data(voxels_with_data(scene), outcome.warnings);
   warn_of_looks(scene, filter, options.output, outcome.warnings);
   return write_meshes(*meshes, options, bar, outcome);
 }

@@ -31,6 +31,8 @@ struct ConnectedPiece {
   IBox box;
   std::int64_t voxels = 0;
   IVec3 first{0};  ///< the one that comes first by z, then y, then x
+  /// Whether it touches a chunk that is not loaded (Grid::is_loaded): it may go on there, and be held by what is there.
+  bool touches_unloaded = false;
 };
 
 /// The connected pieces of a grid, kept up to date while it is edited: whether a blow has broken something off, and
@@ -46,6 +48,8 @@ struct ConnectedPiece {
 /// Cost:    of the first update O(rows of 64 voxels), of later ones O(rows of the chunks that changed and of the sides
 ///          of those next to them + parts of pieces in all chunks). Chunks of one type take no time by the voxel.
 ///          A part is what of a piece lies connected in one chunk.
+/// Partial: of a grid that is not all in memory pieces are those of what is loaded. Chunks that come or go are taken
+///          over by updates like edits.
 /// Memory:  about 0.3 KiB a chunk and 110 bytes a part; of chunks with several parts also 8 KiB and 1 to 4 bytes a run
 ///          of voxels along x. Measured: 9 KiB a chunk of terrain full of caves, 1.3 MB for a chunk of noise of 12,000
 ///          parts. Beside that it shares the chunks of the grid as it was at the last update, as a snapshot does, so
@@ -71,8 +75,8 @@ class ConnectedPieces {
   [[nodiscard]] std::optional<std::size_t> piece_at(IVec3 voxel) const;
   /// The pieces that have a voxel in the box, ascending. Cost: O(chunks + rows of 64 voxels of the box).
   [[nodiscard]] std::vector<std::size_t> touching(const IBox& box) const;
-  /// All others, ascending: with the ground as the box (y = 0: {{INT_MIN, 0, INT_MIN}, {INT_MAX, 1, INT_MAX}}) those
-  /// that nothing holds any more. Cost: as `touching`, and O(pieces).
+  /// All others, ascending, but for those that touch what is not loaded: with the ground as the box (y = 0: {{INT_MIN,
+  /// 0, INT_MIN}, {INT_MAX, 1, INT_MAX}}) those that nothing holds any more. Cost: as `touching`, and O(pieces).
   [[nodiscard]] std::vector<std::size_t> apart_from(const IBox& box) const;
 
   /// Calls `visit(row, voxels)` for the rows of 64 voxels in which a piece has some: `row` is the row's first voxel,

@@ -27,6 +27,7 @@ struct CopyOptions {
 /// Space:   voxel coordinates of each grid. Voxel `v` of the box arrives at `to_min` + (the turned v - box.min, moved
 ///          so that the turned box begins at 0). The turned box's size is `orientation.size_of(box.size())`.
 /// Overlap: `from` and `to` may be one grid, and the boxes may overlap: as if all were copied at once.
+/// Partial: what is not loaded of `from` is not copied, and leaves what is there; of `to` it is not changed.
 /// Ends:    what would come to lie outside the world (see Grid) is left out; an empty box copies nothing.
 /// Cost:    O(chunks of the box) where it is moved by whole chunks and not turned: these are shared with `from`, no
 ///          voxel is copied until one is edited. So are chunks of one type, wherever they go. Otherwise O(rows of 64

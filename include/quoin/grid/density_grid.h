@@ -145,6 +145,8 @@ class DensityGrid {
   bool unload_chunk(IVec3 chunk);
   [[nodiscard]] bool is_loaded(IVec3 chunk) const;
   [[nodiscard]] bool is_loaded_around(IVec3 chunk, int distance = 1) const;
+  /// As that of Grid, of a box of samples. A point between samples is known where all eight around it are loaded.
+  [[nodiscard]] bool is_loaded_within(const IBox& samples) const;
 
   /// Null where all is far air. Lifetime: as Grid::find_chunk.
   [[nodiscard]] const DensityChunk* find_chunk(IVec3 chunk) const;

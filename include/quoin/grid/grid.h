@@ -36,8 +36,9 @@ struct PlacedVoxel {
 ///           it away, one that gives it the type it has leaves it; whole chunks, snapshots, `copy_box` and extracted
 ///           pieces carry it along. Halved grids and fields have none.
 /// Partial:  of a world that is larger than memory a grid holds some chunks (`make_partial`). Those that are not loaded
-///           read as air, which is not what they are: edits leave them as they are, and no mesh is made of a chunk
-///           unless all around it are loaded.
+///           read as air, which is not what they are: edits leave them as they are, no mesh is made of a chunk unless
+///           all around it are loaded, and queries of a scene know of them (UnloadedChunks). What counts or reads
+///           voxels here tells of what is loaded: `is_loaded_within` says whether that is all.
 /// Sharing:  `snapshot` is a copy that costs a pointer. What the two share is copied when one of them is edited, a
 ///           chunk at a time.
 /// Threads:  any number may read at once, and take snapshots; an edit needs the grid to itself. A snapshot is a grid of
@@ -120,6 +121,9 @@ class Grid {
   [[nodiscard]] bool is_loaded(IVec3 chunk) const;
   /// Whether it and all that are at most so many chunks from it along each axis are.
   [[nodiscard]] bool is_loaded_around(IVec3 chunk, int distance = 1) const;
+  /// Whether all chunks are that a box of voxels meets (half open: `max` excluded): whether what is read, counted or
+  /// copied there is all that there is. Cost: O(1) unless the grid is partial; else O(log chunks) for each chunk.
+  [[nodiscard]] bool is_loaded_within(const IBox& voxels) const;
   /// Of a partial grid the chunks that are loaded, air too; else as `chunks`. Sorted likewise.
   [[nodiscard]] std::vector<IVec3> loaded_chunks() const;
 

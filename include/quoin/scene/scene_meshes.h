@@ -124,6 +124,10 @@ struct BlockySceneOptions {
   bool atlas = false;
   /// As BlockyMeshOptions::cut, of each grid; instead of that of `mesh`.
   std::function<void(GridHandle grid, IVec3 chunk, QuadBuffer& quads)> cut{};
+  /// Where given, makes the surfaces of a grid, whose name and pivot it need not know, in the place of
+  /// build_blocky_mesh, and adds their numbers to `stats`: for grids that nobody holds whole (mesh_world). Not for an
+  /// atlas.
+  std::function<Result<MeshPart>(GridHandle grid, MeshStats& stats)> part_of{};
 };
 
 /// Meshes every grid that a drawn instance places, once, as build_blocky_mesh does. Parts are in the order of the

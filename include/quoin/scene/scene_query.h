@@ -25,12 +25,22 @@ enum class QueryTypes : std::uint8_t {
   Opaque,     ///< what blocks sight
 };
 
+/// What chunks that are not loaded are to a query (Grid::make_partial): nobody knows what is in them. Between samples
+/// of a field that is partial, what lies between a sample that is loaded and one that is not is not known either.
+enum class UnloadedChunks : std::uint8_t {
+  Passed,  ///< air
+  Met,     ///< solid, and what is met says so
+};
+
 /// What of a scene a query looks at; by default all of it.
 /// Lifetime: what `ignored` looks at must outlive the query.
 struct QueryFilter {
   std::span<const InstanceHandle> ignored = {};    ///< passed through: a body that moves ignores itself
   std::uint32_t categories = ~std::uint32_t{0};    ///< instances without any of these bits are passed through
   std::optional<QueryTypes> types = std::nullopt;  ///< nothing: All for rays, Colliding for shapes
+  /// Nothing: Passed for rays, whose hits say what they passed; Met for shapes, so that nobody falls through ground that
+  /// has not come yet.
+  std::optional<UnloadedChunks> unloaded = std::nullopt;
 };
 
 /// Where a ray meets a scene.
@@ -46,6 +56,11 @@ struct SceneHit {
   bool starts_inside = false;
   bool in_field = false;
   DVec3 normal{0.0};  ///< in the world: unit, out of what was hit; 0 where a field has no gradient
+  /// What was met is a chunk that is not loaded (UnloadedChunks::Met): `voxel` is its first one, `type` air.
+  bool is_unloaded = false;
+  /// Where the ray came to what is not loaded, before `t`: it may be stopped from there on by what is not known. Infinite
+  /// where it did not.
+  double unloaded_t = std::numeric_limits<double>::infinity();
 };
 
 /// The nearest voxel or field's surface along a ray in the world, up to and including `max_t` (in lengths of its
@@ -55,6 +70,8 @@ struct SceneHit {
 /// Precision: moved into each grid in double before it is traced there, so as exact 10^9 from the origin as the ray
 ///            itself.
 /// Filters:   what is passed through is nowhere; a ray that starts inside of it starts in air.
+/// Partial:   with UnloadedChunks::Met a hit is certain, or says that the ray comes to what is not loaded, and where;
+///            nothing is then met by a ray that stays in what is loaded. Costs a look-up for each chunk on the ray.
 /// Cost:      O(log instances + grids on the ray); in grids that hold types which the filter passes through, besides
 ///            O(such voxels, and a field's cells, on the ray).
 [[nodiscard]] std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray_in_world,
@@ -84,11 +101,14 @@ struct SceneOverlap {
   VoxelType type = kAir;  ///< of a field the material, of the nearest sample whose material counts
   bool in_field = false;
   DVec3 normal{0.0};  ///< of a field its gradient at a point within the shape, in the world, unit; otherwise 0
+  /// A chunk that is not loaded (UnloadedChunks::Met): `voxel` is its first one, `type` air.
+  bool is_unloaded = false;
 };
 
 /// For each instance that has such a voxel within a sphere, a box or a capsule, the first of these (by z, y, x), in
 /// the order of the instances; of one without, the first cell in which its field is negative anywhere within the shape,
-/// unless that is less than 1e-6 voxels deep. To touch is not to overlap. Numbers that are not finite or negative meet
+/// unless that is less than 1e-6 voxels deep; of one without that too, a chunk of its grid that is not loaded. To touch
+/// is not to overlap. Numbers that are not finite or negative meet
 /// nothing, nor does a radius of 0; a box of size 0 is a plate, a rod or a point.
 ///
 /// Fields:  which cells collide, and what bounds do not tell, is as for `sweep_box`; the latter counts as overlapping.

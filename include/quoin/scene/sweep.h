@@ -25,6 +25,8 @@ struct SweepHit {
   double depth = 0.0;     ///< how deep it starts inside, in world units along `normal`; 0 when it does not
   VoxelType type = kAir;  ///< of a field the material
   bool in_field = false;
+  /// A chunk that is not loaded (QueryFilter::unloaded): `voxel` is its first one, `type` air.
+  bool is_unloaded = false;
 };
 
 /// The first voxel that a box meets on its way, or the first point at which the field of an instance is negative,
@@ -38,6 +40,7 @@ struct SweepHit {
 ///         The box stops before it or touching it, less than 1e-5 voxels away, whatever the densities mean; less than
 ///         1e-6 voxels deep is touching. Where bounds do not tell within 4,000 parts of cells (a large box that lies
 ///         almost flush on an uneven surface), it stops at the first that is open, up to a part's size away.
+/// Partial: chunks that are not loaded stop it, unless `filter` says others.
 /// Inside: of a field's solid the way out is along the gradient where the box is deepest, and `depth` leads out of all
 ///         of that field that is about the box; of what is nowhere near a surface it leads a voxel on.
 /// Cost:   for each instance on the way, the voxels about the box for each step of its own size; of a field those that
@@ -101,20 +104,23 @@ struct SlideOptions {
 /// What a moving body met.
 struct SlideContact {
   enum class Kind : std::uint8_t {
-    Floor,    ///< with `SlideOptions::floor`: no steeper than that says
-    Wall,     ///< anything else
-    Ceiling,  ///< with `SlideOptions::floor`: what would be a floor from the other side
-    Inside,   ///< it started in there, and was moved out if it could be
+    Floor,     ///< with `SlideOptions::floor`: no steeper than that says
+    Wall,      ///< anything else
+    Ceiling,   ///< with `SlideOptions::floor`: what would be a floor from the other side
+    Inside,    ///< it started in there, and was moved out if it could be
+    Unloaded,  ///< a chunk that is not loaded: no floor, whatever its direction
   };
   Kind kind = Kind::Wall;
   SweepHit hit;  ///< `fraction` is of the part of the way that was left then
 };
 
 struct SlideResult {
-  DVec3 centre{0.0};         ///< where the box ends
-  DVec3 displacement{0.0};   ///< without what went into the contacts: over the time step, the velocity to go on with
-  bool is_blocked = false;   ///< whether anything was met; with `SlideOptions::floor`, anything but a floor
-  DVec3 normal{0.0};         ///< of the last such contact
+  DVec3 centre{0.0};        ///< where the box ends
+  DVec3 displacement{0.0};  ///< without what went into the contacts: over the time step, the velocity to go on with
+  bool is_blocked = false;  ///< whether anything was met; with `SlideOptions::floor`, anything but a floor
+  DVec3 normal{0.0};        ///< of the last such contact
+  /// What is not loaded was in its way. Where it starts in there it stays, with no displacement, until that is loaded.
+  bool is_waiting = false;
   bool is_on_floor = false;  ///< at the end, with `SlideOptions::floor`
   DVec3 floor_normal{0.0};   ///< of that floor
   SweepHit floor;            ///< what it stands on then: the instance, which may carry it (`carried_point`), the voxel

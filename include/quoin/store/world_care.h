@@ -25,6 +25,7 @@ struct WorldSummary {
   std::size_t types = 0;    ///< besides air
   std::size_t instances = 0;
   std::size_t values = 0;
+  std::size_t thumbnail_bytes = 0;  ///< 0: there is none
   struct GridSummary {
     WorldGrid grid;
     std::uint64_t chunks = 0;                        ///< of level 0; those that are kept as air too
@@ -34,7 +35,7 @@ struct WorldSummary {
   std::map<std::uint32_t, GridSummary> grids;
 };
 
-/// Errors: as WorldStore::open. Cost: O(bytes of the file), read once and not decoded.
+/// Errors: as WorldStore::open. Cost: O(chunks), of which only the keys are read; of a world of version 1 all of the file.
 [[nodiscard]] Result<WorldSummary> summarize_world(const std::filesystem::path& path, const Progress& progress = {});
 
 /// Something of a world file that is not as it was written.
@@ -70,6 +71,24 @@ struct WorldRepair {
 /// Copies a world as one commit left it, also while others write it; the copy is compact, and appears whole or not at
 /// all. Returns its size. Errors: CannotRead, CannotWrite (there is a file `to`), BadFormat (damaged).
 [[nodiscard]] Result<std::uint64_t> back_up_world(const std::filesystem::path& from, const std::filesystem::path& to);
+
+/// What a copy of a world has.
+struct WorldCopy {
+  std::uint64_t bytes = 0;        ///< of the file
+  std::uint64_t chunks = 0;       ///< of all levels
+  std::uint64_t voxels = 0;       ///< of level 0 that are not air
+  std::uint64_t samples = 0;      ///< of level 0 that are solid, of densities
+  std::vector<WorldDamage> lost;  ///< chunks that are damaged, and left out
+};
+
+/// Writes all that one commit left in a world as a new one of the present version, compact, in place of what is there;
+/// it appears whole or not at all. Each chunk is read and checked, and written as it is; what games keep, thumbnails and
+/// what this version does not know go along. Others may write `from` meanwhile.
+/// Memory: a chunk, whatever the world.
+/// Errors: CannotRead; CannotWrite, also where another program writes the world that is there; Cancelled; BadFormat
+///         where parts besides chunks are damaged, which repair_world is for.
+[[nodiscard]] Result<WorldCopy> copy_world(const std::filesystem::path& from, const std::filesystem::path& to,
+                                           const Progress& progress = {});
 
 /// Gives back to the file system what edits left unused. A crash meanwhile loses nothing. Returns the file's size.
 /// Errors: CannotWrite (another writer or reader has it open, a full disk), BadFormat.

@@ -51,7 +51,7 @@ class WorldSaver {
   ~WorldSaver();
 
   /// Saves what changed, all of it in one go; returns at once. Chunks are shared with the scene, not copied.
-  /// `more`: is saved with it, a game's own values for one.
+  /// `more`: is saved with it, a game's own values for one, or a thumbnail.
   /// Errors: InvalidArgument, and nothing is saved: voxels of types that are not registered, numbers that are not
   ///         finite, an instance whose grid is not there; the first time, a world that holds a scene or other types.
   ///         Of writing: see WorldStore::save.
@@ -90,12 +90,15 @@ struct LoadedWorld {
 [[nodiscard]] Result<LoadedWorld> load_partial_world(const WorldStore& world, const LoadOptions& options = {});
 
 /// Writes a scene as a new world, in place of what is there; it appears whole or not at all. Returns its size.
+/// `more`: as WorldSaver::save.
 ///
 /// Errors: those of WorldSaver::save; CannotWrite, also where another program writes the world that is there.
 [[nodiscard]] Result<SavedScene> write_world(const Scene& scene, const std::filesystem::path& path,
-                                             Threads threads = {}, const Progress& progress = {});
+                                             Threads threads = {}, const Progress& progress = {},
+                                             WorldChanges more = {});
 /// The same with the sun and the cameras of a scene that was read.
 [[nodiscard]] Result<SavedScene> write_world(const LoadedScene& loaded, const std::filesystem::path& path,
-                                             Threads threads = {}, const Progress& progress = {});
+                                             Threads threads = {}, const Progress& progress = {},
+                                             WorldChanges more = {});
 
 }  // namespace quoin

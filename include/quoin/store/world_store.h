@@ -57,6 +57,9 @@ class WorldChanges {
   /// What a game keeps beside the world: an inventory, the time of day. Any bytes under any name, up to 64 MiB.
   void put_value(std::string name, std::vector<std::byte> bytes);
   void remove_value(std::string name);
+  /// What shows the world in lists: a PNG, up to 16 MiB. Whoever saves draws it, when it likes; it stays until the next.
+  void put_thumbnail(std::vector<std::byte> png);
+  void remove_thumbnail();
 
   [[nodiscard]] bool empty() const;
   [[nodiscard]] std::size_t chunk_count() const;
@@ -131,12 +134,15 @@ class WorldStore {
   /// The names of all values, sorted.
   [[nodiscard]] Result<std::vector<std::string>> value_names() const;
 
+  /// The PNG that shows the world; nothing where none was put. Errors: as `value`.
+  [[nodiscard]] Result<std::optional<std::vector<std::byte>>> thumbnail() const;
+
   /// Saves, on the world's own thread; returns at once. `on_saved` is called there once it is on disk, or when it
   /// failed; it must not call `wait` or `flush`. What failed is kept in memory, read by `load_chunk`, and tried again
   /// with the next save or `flush`.
   /// Errors: InvalidArgument, and nothing is saved: types with fewer state bits than before; chunks with types, or of
   ///         grids, that were never put; voxels' data with more state bits than their type has, or more than 64 MiB in
-  ///         one chunk; a value of more.
+  ///         one chunk; a value of more; a thumbnail that is no PNG.
   /// Requires: open for writing.
   Result<SaveTicket> save(WorldChanges changes, std::function<void(const Status&)> on_saved = {});
   /// Waits until that save is on disk. Errors: CannotWrite (a full disk ...): it is not, but kept.

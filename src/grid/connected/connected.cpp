@@ -51,7 +51,8 @@ struct Entry {
   IVec3 at{0};
   ChunkParts parts;
   std::vector<Link> links;
-  std::size_t first_node = 0;  // its parts are nodes from here on
+  std::vector<std::uint32_t> open_parts;  // ascending: that touch a chunk that is not loaded
+  std::size_t first_node = 0;             // its parts are nodes from here on
 };
 
 struct ByZyx {
@@ -116,6 +117,31 @@ class Linker {
   std::vector<Link> links_;
 };
 
+// Whether a part has a voxel at that side, edge or corner of its chunk which lies towards a neighbour.
+bool touches(const ChunkParts& parts, std::uint32_t part, IVec3 towards) {
+  const IBox box = parts.parts()[part].box();
+  IBox side{IVec3(0), IVec3(kChunkEdge)};
+  int fixed = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (towards[axis] == 0) continue;
+    ++fixed;
+    side.min[axis] = towards[axis] < 0 ? 0 : kChunkEdge - 1;
+    side.max[axis] = side.min[axis] + 1;
+  }
+  const IBox rows = intersect(box, side);
+  if (rows.empty()) return false;
+  if (fixed == 1) return true;  // its box is tight
+  const auto width = static_cast<unsigned>(rows.size().x);
+  const std::uint64_t columns = (width == kChunkEdge ? ~std::uint64_t{0} : (std::uint64_t{1} << width) - 1)
+                                << rows.min.x;
+  for (int z = rows.min.z; z < rows.max.z; ++z) {
+    for (int y = rows.min.y; y < rows.max.y; ++y) {
+      if ((parts.row_of_part(parts.row(y, z), y, z, part) & columns) != 0) return true;
+    }
+  }
+  return false;
+}
+
 IBox moved(const IBox& box, IVec3 by) {
   return {box.min + by, box.max + by};
 }
@@ -146,6 +172,8 @@ struct ConnectedPieces::Impl {
 
   void find_parts(const Grid& grid, const std::vector<IVec3>& chunks, Threads threads);
   void find_links(const std::vector<IVec3>& chunks, Threads threads);
+  void find_open_parts(const Grid& grid, const std::vector<IVec3>& chunks);
+  void find_open_parts(const Grid& grid, Entry& entry) const;
   void make_pieces();
   void number_pieces(UnionFind<std::size_t>& sets);
   void add_node(std::size_t piece, const Entry& entry, std::size_t part);
@@ -239,6 +267,35 @@ void ConnectedPieces::Impl::find_links(const std::vector<IVec3>& chunks, Threads
   }
 }
 
+// Finds again which parts of these chunks and of those around them touch what is not loaded.
+void ConnectedPieces::Impl::find_open_parts(const Grid& grid, const std::vector<IVec3>& chunks) {
+  if (!grid.is_partial()) return;
+  std::vector<IVec3> around;
+  for (const IVec3 chunk : chunks) {
+    for (int i = 0; i < 27; ++i) around.push_back(chunk + IVec3(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
+  }
+  sort_and_unite(around);
+  for (const IVec3 chunk : around) {
+    const auto found = entries.find(chunk);
+    if (found != entries.end()) find_open_parts(grid, found->second);
+  }
+}
+
+void ConnectedPieces::Impl::find_open_parts(const Grid& grid, Entry& entry) const {
+  entry.open_parts.clear();
+  for (int i = 0; i < 27; ++i) {
+    const IVec3 towards(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+    const int steps = std::abs(towards.x) + std::abs(towards.y) + std::abs(towards.z);
+    if (steps == 0 || (options.connectivity == Connectivity::Faces6 && steps != 1)) continue;
+    if (grid.is_loaded(entry.at + towards)) continue;
+    for (std::uint32_t part = 0; part < entry.parts.parts().size(); ++part) {
+      if (touches(entry.parts, part, towards)) entry.open_parts.push_back(part);
+    }
+  }
+  std::sort(entry.open_parts.begin(), entry.open_parts.end());
+  entry.open_parts.erase(std::unique(entry.open_parts.begin(), entry.open_parts.end()), entry.open_parts.end());
+}
+
 void ConnectedPieces::Impl::make_pieces() {
   std::size_t count = 0;
   in_order.clear();
@@ -313,6 +370,7 @@ void ConnectedPieces::Impl::add_node(std::size_t piece, const Entry& entry, std:
   if (whole.voxels == 0 || by_zyx(first, whole.first)) whole.first = first;
   whole.box = unite(whole.box, moved(added.box(), origin));
   whole.voxels += added.voxels;
+  whole.touches_unloaded |= std::binary_search(entry.open_parts.begin(), entry.open_parts.end(), part);
 }
 
 template <class Visit>
@@ -410,6 +468,7 @@ void ConnectedPieces::update(const Grid& grid, Threads threads) {
   for (const ChunkChange& change : changes.items) chunks.push_back(change.chunk);
   content_of(impl_).find_parts(grid, chunks, threads);
   content_of(impl_).find_links(chunks, threads);
+  content_of(impl_).find_open_parts(grid, chunks);
   content_of(impl_).make_pieces();
   content_of(impl_).followed = now;
 }
@@ -433,7 +492,9 @@ std::vector<std::size_t> ConnectedPieces::touching(const IBox& box) const {
 }
 
 std::vector<std::size_t> ConnectedPieces::apart_from(const IBox& box) const {
-  return content_of(impl_).listed(box, false);
+  std::vector<std::size_t> apart = content_of(impl_).listed(box, false);
+  std::erase_if(apart, [&](std::size_t piece) { return content_of(impl_).pieces[piece].touches_unloaded; });
+  return apart;
 }
 
 void ConnectedPieces::for_each_row(std::size_t piece, FunctionRef<void(IVec3 row, std::uint64_t voxels)> visit) const {
@@ -489,7 +550,7 @@ std::size_t ConnectedPieces::bytes() const {
   for (const auto& [at, entry] : content_of(impl_).entries) {
     constexpr std::size_t kMapNode = 4 * sizeof(void*);
     total += kMapNode + sizeof(std::pair<IVec3, Entry>) - sizeof(ChunkParts) + entry.parts.bytes() +
-             entry.links.capacity() * sizeof(Link);
+             entry.links.capacity() * sizeof(Link) + entry.open_parts.capacity() * sizeof(std::uint32_t);
   }
   return total;
 }

@@ -325,5 +325,106 @@ TEST(ConnectedPiecesDeathTest, APieceThatIsNotThereIsAMistake) {
   QUOIN_EXPECT_MISTAKE(pieces.for_each_row(1, [](IVec3, std::uint64_t) {}), "piece < size");
 }
 
+// Whether a voxel of a piece lies beside one that is not loaded, one voxel at a time.
+bool touches_unloaded(const Grid& grid, const ConnectedPieces& pieces, std::size_t piece, Connectivity connectivity) {
+  bool found = false;
+  pieces.for_each_row(piece, [&](IVec3 row, std::uint64_t voxels) {
+    for (int x = 0; x < kChunkEdge; ++x) {
+      if ((voxels >> x & 1U) == 0) continue;
+      for (int i = 0; i < 27; ++i) {
+        const IVec3 step(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+        const int axes = std::abs(step.x) + std::abs(step.y) + std::abs(step.z);
+        if (axes == 0 || (connectivity == Connectivity::Faces6 && axes > 1)) continue;
+        found |= !grid.is_loaded(chunk_of(row + IVec3(x, 0, 0) + step));
+      }
+    }
+  });
+  return found;
+}
+
+TEST(ConnectedPieces, WhatTouchesChunksThatAreNotLoadedIsHeld) {
+  Grid grid;
+  grid.make_partial();
+  grid.load_chunk({0, 0, 0}, Chunk(kAir));
+  grid.set(63, 10, 10, 1);  // may go on in the next chunk
+  grid.set(30, 30, 30, 1);
+  ConnectedPieces pieces;
+  pieces.update(grid);
+  ASSERT_EQ(pieces.size(), 2U);
+  EXPECT_TRUE(pieces.pieces()[0].touches_unloaded);
+  EXPECT_FALSE(pieces.pieces()[1].touches_unloaded);
+  const IBox ground{{0, 0, 0}, {64, 1, 64}};
+  EXPECT_EQ(pieces.apart_from(ground), (std::vector<std::size_t>{1}));
+
+  grid.load_chunk({1, 0, 0}, Chunk(kAir));  // it does not
+  pieces.update(grid);
+  EXPECT_FALSE(pieces.pieces()[0].touches_unloaded);
+  EXPECT_EQ(pieces.apart_from(ground), (std::vector<std::size_t>{0, 1}));
+  grid.unload_chunk({1, 0, 0});
+  pieces.update(grid);
+  EXPECT_TRUE(pieces.pieces()[0].touches_unloaded);
+  // The twin: of a whole grid with the same voxels all that is apart falls.
+  Grid whole;
+  whole.set(63, 10, 10, 1);
+  whole.set(30, 30, 30, 1);
+  ConnectedPieces of_whole;
+  of_whole.update(whole);
+  EXPECT_EQ(of_whole.apart_from(ground), (std::vector<std::size_t>{0, 1}));
+}
+
+TEST(ConnectedPieces, EdgesAndCornersOfChunksCountWhereVoxelsConnectByThem) {
+  for (const Connectivity connectivity : {Connectivity::Faces6, Connectivity::Corners26}) {
+    Grid grid;
+    grid.make_partial();
+    for (int i = 0; i < 27; ++i) {
+      const IVec3 chunk(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+      if (chunk != IVec3(1, 1, 0) && chunk != IVec3(-1, -1, -1)) grid.load_chunk(chunk, Chunk(kAir));
+    }
+    grid.set(63, 63, 20, 1);  // at the edge towards one that is not loaded
+    grid.set(0, 0, 0, 1);     // at the corner towards another
+    // Its box reaches both sides of that edge, it does not.
+    for (int x = 40; x < 64; ++x) grid.set(x, 40, 40, 1);
+    for (int y = 40; y < 64; ++y) grid.set(40, y, 40, 1);
+    ConnectedPieces pieces({.connectivity = connectivity, .belongs = {}});
+    pieces.update(grid);
+    ASSERT_EQ(pieces.size(), 3U);
+    const bool has_corners = connectivity == Connectivity::Corners26;
+    EXPECT_EQ(pieces.pieces()[0].touches_unloaded, has_corners);
+    EXPECT_EQ(pieces.pieces()[1].touches_unloaded, has_corners);
+    EXPECT_FALSE(pieces.pieces()[2].touches_unloaded);
+  }
+}
+
+TEST(ConnectedPieces, RandomLoadingAgreesWithVoxelsOneByOne) {
+  std::mt19937 random(11);
+  std::uniform_int_distribution<int> place(-2, 1);
+  std::uniform_int_distribution<int> voxel(-128, 127);
+  for (const Connectivity connectivity : {Connectivity::Faces6, Connectivity::Corners26}) {
+    Grid grid;
+    grid.make_partial();
+    ConnectedPieces pieces({.connectivity = connectivity, .belongs = {}});
+    int held = 0;
+    for (int step = 0; step < 30; ++step) {
+      const IVec3 chunk(place(random), place(random), place(random));
+      if (step % 4 == 3) {
+        grid.unload_chunk(chunk);
+      } else {
+        grid.load_chunk(chunk, Chunk(kAir));
+      }
+      for (int i = 0; i < 60; ++i) {
+        const IVec3 at(voxel(random), voxel(random), voxel(random));
+        grid.fill_box({at, at + IVec3(i % 9 + 1, 2, 1)}, 1);
+      }
+      pieces.update(grid);
+      for (std::size_t i = 0; i < pieces.size(); ++i) {
+        const bool expected = touches_unloaded(grid, pieces, i, connectivity);
+        ASSERT_EQ(pieces.pieces()[i].touches_unloaded, expected) << step << " " << i;
+        held += expected ? 1 : 0;
+      }
+    }
+    EXPECT_GT(held, 50);
+  }
+}
+
 }  // namespace
 }  // namespace quoin

@@ -199,9 +199,27 @@ class BoxCopy {
     const LongBox source = source_of(part);
     const IBox chunks = chunks_of(source);
     const IBox place = narrowed(part);
+    if (!from_.is_loaded_within(narrowed(source))) {
+      copy_loaded(source, chunks);
+      return;
+    }
     if (!is_shared_whole(at, chunks, place)) {
       copy_types(at, source, chunks, place);
       if (has_data_) copy_data(at, source, chunks, place);
+    }
+  }
+
+  // Of what is not loaded as a whole, each chunk that is.
+  void copy_loaded(const LongBox& source, const IBox& chunks) {
+    for (int z = chunks.min.z; z < chunks.max.z; ++z) {
+      for (int y = chunks.min.y; y < chunks.max.y; ++y) {
+        for (int x = chunks.min.x; x < chunks.max.x; ++x) {
+          if (!from_.is_loaded({x, y, z})) continue;
+          const LongBox part = common_part(source, box_of_chunk({x, y, z}));
+          const IVec3 to_min = narrowed(target_of(part)).min;
+          changed_ += BoxCopy(from_, narrowed(part), to_, to_min, orientation_, options_).run();
+        }
+      }
     }
   }
 

@@ -70,6 +70,10 @@ bool DensityGrid::is_loaded_around(IVec3 chunk, int distance) const {
   return impl().store.loaded().has_around(chunk, distance);
 }
 
+bool DensityGrid::is_loaded_within(const IBox& samples) const {
+  return impl().store.loaded().has_within(samples);
+}
+
 void DensityGrid::clear() {
   const NoticeOfEdits notice(impl().store, notice_);
   impl().store.clear();

@@ -1,41 +1,11 @@
 #include <quoin/mesh/blocky.h>
 
 #include <algorithm>
-#include <limits>
-#include <memory>
-
-#include <quoin/mesh/quad_triangles.h>
 
 #include "core/progress_steps.h"
-#include "mesh/blocky/watertight.h"
+#include "mesh/blocky/chunk_triangles.h"
 
 namespace quoin {
-namespace {
-
-void append_quad(const Quad& quad, IVec3 origin, BlockyTriangles& out) {
-  const auto base = static_cast<std::uint32_t>(out.positions.size());
-  for_each_vertex({&quad, 1}, [&](std::size_t, const QuadVertex& vertex) {
-    out.positions.emplace_back(origin + vertex.position);
-    out.directions.push_back(vertex.direction);
-    out.occlusion.push_back(vertex.occlusion);
-    out.types.push_back(vertex.type);
-  });
-  for (const std::uint8_t corner : triangle_corners(quad.flipped())) out.indices.push_back(base + corner);
-}
-
-void append_outline(const Quad& quad, IVec3 origin, const std::vector<OutlinePoint>& outline, BlockyTriangles& out) {
-  const auto base = static_cast<std::uint32_t>(out.positions.size());
-  for (const OutlinePoint& point : outline) {
-    out.positions.emplace_back(origin + point.position);
-    out.directions.push_back(quad.direction());
-    out.occlusion.push_back(point.occlusion);
-    out.types.push_back(quad.type());
-  }
-  triangulate_outline(outline, quad.flipped(), base, out.indices);
-}
-
-}  // namespace
-
 SurfaceClass surface_class(const VoxelProperties& properties) {
   const bool is_transparent = properties.visibility == Visibility::Transparent;
   if (properties.emission > 0.0F) return is_transparent ? SurfaceClass::EmissiveTransparent : SurfaceClass::Emissive;
@@ -85,31 +55,12 @@ Result<BlockyMesh> build_blocky_mesh(const Grid& grid, const VoxelRegistry& type
   std::vector<QuadBuffer> parts = quads_of(grid, chunks, types, options, threads, reporter);
   if (reporter.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
 
-  std::vector<SurfaceClass> classes(types.size());
-  for (std::size_t i = 0; i < classes.size(); ++i) classes[i] = surface_class(types[static_cast<VoxelType>(i)]);
   BlockyMesh mesh;
   mesh.faces_total = 6 * grid.voxel_count();
-  OutlineFinder finder;
-  std::vector<OutlinePoint> outline;
+  ChunkTriangles triangles(types, options.watertight);
   for (std::size_t i = 0; i < chunks.size(); ++i) {
-    QuadBuffer& quads = parts[i];
-    mesh.faces_visible += face_count(quads);
-    mesh.quads += static_cast<std::int64_t>(quads.size());
-    if (options.watertight) finder.prepare(quads);
-    for (const Quad& quad : quads) {
-      const SurfaceClass which = quad.type() < classes.size() ? classes[quad.type()] : SurfaceClass::Opaque;
-      BlockyTriangles& out = mesh.surfaces[static_cast<std::size_t>(which)];
-      if (out.positions.size() > std::numeric_limits<std::uint32_t>::max() - 1'024) {
-        return make_error(ErrorCode::LimitExceeded, "the mesh needs more than 2^32 vertices");
-      }
-      if (options.watertight) {
-        finder.outline(quad, outline);
-        append_outline(quad, chunks[i] * kChunkEdge, outline, out);
-      } else {
-        append_quad(quad, chunks[i] * kChunkEdge, out);
-      }
-    }
-    quads = {};
+    if (auto done = triangles.append(parts[i], chunks[i], mesh); !done) return done.error();
+    parts[i] = {};
     reporter.step();
     if (reporter.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
   }

@@ -1,75 +1,23 @@
 #include <quoin/scene/scene_meshes.h>
 
 #include <algorithm>
-#include <cmath>
-#include <map>
 #include <mutex>
 #include <utility>
 
 #include <glm/common.hpp>
-#include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 
-#include <quoin/core/direction.h>
+#include <quoin/core/assert.h>
 #include <quoin/grid/voxel_field.h>
 
 #include "mesh/blocky/occlusion_atlas.h"
 #include "mesh/surface/material.h"
 #include "scene/instance_axes.h"
+#include "scene/meshes/glass_thickness.h"
 #include "scene/meshes/mesh_parts.h"
 
 namespace quoin {
 namespace {
-
-constexpr int kDeepest = 1024;
-
-struct Sample {
-  int voxels = 0;
-  double area = 0.0;
-};
-
-int depth_behind(GridReader& reader, Vec3 middle, Direction face, VoxelType type) {
-  const IVec3 inwards = -normal_of(face);
-  IVec3 voxel(glm::floor(middle + 0.5F * Vec3(inwards)));
-  int depth = 0;
-  while (depth < kDeepest && reader.get(voxel) == type) {
-    ++depth;
-    voxel += inwards;
-  }
-  return std::max(depth, 1);
-}
-
-float median(std::vector<Sample>& samples) {
-  std::ranges::sort(samples, {}, &Sample::voxels);
-  double half = 0.0;
-  for (const Sample& sample : samples) half += sample.area / 2.0;
-  for (const Sample& sample : samples) {
-    half -= sample.area;
-    if (half <= 0.0) return static_cast<float>(sample.voxels);
-  }
-  return static_cast<float>(samples.back().voxels);
-}
-
-// How thick the bodies of each transparent type are, by type: looked up straight in from the middle of each triangle of
-// the grid's surfaces, 1,024 voxels deep at most. Cost: a voxel for each that lies behind a triangle's middle.
-std::vector<GlassThickness> glass_thickness(const Grid& grid, std::span<const MeshView> surfaces) {
-  std::map<VoxelType, std::vector<Sample>> samples;
-  GridReader reader(grid);
-  for (const MeshView& view : surfaces) {
-    if (view.surface != SurfaceClass::Transparent && view.surface != SurfaceClass::EmissiveTransparent) continue;
-    for (std::size_t i = 0; i + 2 < view.indices.size(); i += 3) {
-      const std::uint32_t first = view.indices[i];
-      const Vec3 a = view.positions[first];
-      const Vec3 b = view.positions[view.indices[i + 1]];
-      const Vec3 c = view.positions[view.indices[i + 2]];
-      const VoxelType type = view.types[first];
-      const int voxels = depth_behind(reader, (a + b + c) / 3.0F, view.directions[first], type);
-      samples[type].push_back({voxels, glm::length(glm::cross(b - a, c - a))});
-    }
-  }
-  std::vector<GlassThickness> thickness;
-  for (auto& [type, each] : samples) thickness.push_back({type, median(each)});
-  return thickness;
-}
 
 /// Grids of at most this many chunks are meshed side by side, one thread each; larger ones one after the other, with
 /// all threads on their chunks.
@@ -274,8 +222,10 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
   if (options.atlas) {
     if (auto sound = check_atlas(scene, grids, options); !sound) return sound.error();
   }
+  QUOIN_ASSERT(!options.atlas || !options.part_of, "an atlas is of grids that are held whole");
   const double first_share = options.atlas ? 0.5 : 1.0;
-  MeshResults results = mesh_all(scene, grids, options, threads, part_of(progress, 0.0, first_share));
+  MeshResults results;
+  if (!options.part_of) results = mesh_all(scene, grids, options, threads, part_of(progress, 0.0, first_share));
   for (const auto& result : results) {
     if (result && !*result) return result->error();
   }
@@ -289,9 +239,19 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
   }
   for (std::size_t i = 0; i < grids.size(); ++i) {
     const SceneGrid& grid = scene.grids()[grids[i]];
-    add_stats(**results[i], meshes.stats);
-    MeshPart& part = meshes.parts.emplace_back(mesh_part(grid.name, std::move(**results[i]), grid.pivot));
-    part.thickness = glass_thickness(grid.grid, part.surfaces);
+    if (options.part_of) {
+      auto made = options.part_of(grids[i], meshes.stats);
+      if (!made) return made.error();
+      made->name = grid.name;
+      made->pivot = grid.pivot;
+      meshes.parts.push_back(std::move(*made));
+    } else {
+      add_stats(**results[i], meshes.stats);
+      meshes.parts.push_back(mesh_part(grid.name, std::move(**results[i]), grid.pivot));
+      GridReader reader(grid.grid);
+      meshes.parts.back().thickness = glass_thickness(reader, meshes.parts.back().surfaces);
+    }
+    MeshPart& part = meshes.parts.back();
     if (!meshes.atlas.rgb.empty()) part = with_atlas(std::move(part), std::move(coordinates[i]));
     for (MeshView& view : part.surfaces) {
       if (!options.mesh.bake_occlusion) view.block_occlusion = {};

@@ -24,6 +24,7 @@
 
 #include "scene/query/moving_capsule.h"
 #include "scene/query/query_in_grid.h"
+#include "scene/query/unloaded_chunks.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin {
@@ -77,6 +78,13 @@ class FreePlace {
     const Seen seen(tracer_, filter_, QueryTypes::Colliding);
     seen.visit_near({shape_.centre - reach, shape_.centre + reach}, [&](const PlacedGrid& placed) {
       are_own = are_own && placed.field == nullptr && (placed.voxels->bounds().empty() || add_planes(placed));
+    });
+    if (!are_own || !seen.meets_unloaded) return are_own;
+    seen.visit_partial([&](const PlacedGrid& chunks) {
+      const ToGrid to_chunks(chunks);
+      const DVec3 around = DVec3(glm::length(reach)) / chunks.voxel_size;
+      const DVec3 centre = to_chunks.point(shape_.centre);
+      are_own = are_own && is_surely_loaded(*chunks.grid, {centre - around, centre + around});
     });
     return are_own;
   }

@@ -25,6 +25,9 @@ namespace quoin {
 class SceneQuery {
  public:
   static const InstanceTree& instances(const SceneTracer& tracer) { return content_of(tracer.impl_).instances; }
+  static const std::vector<PlacedGrid>& unloaded(const SceneTracer& tracer) {
+    return content_of(tracer.impl_).unloaded;
+  }
 };
 
 // A length below which two shapes touch rather than overlap, in voxels.
@@ -95,7 +98,12 @@ class TypesMet {
 class Seen {
  public:
   Seen(const SceneTracer& tracer, const QueryFilter& filter, QueryTypes by_default)
-      : types(tracer.scene().types, filter.types.value_or(by_default)), tracer_(tracer), filter_(filter) {}
+      : types(tracer.scene().types, filter.types.value_or(by_default)),
+        meets_unloaded(filter.unloaded.value_or(by_default == QueryTypes::Colliding
+                                                    ? UnloadedChunks::Met
+                                                    : UnloadedChunks::Passed) == UnloadedChunks::Met),
+        tracer_(tracer),
+        filter_(filter) {}
 
   [[nodiscard]] bool includes(const PlacedGrid& placed) const {
     if (std::find(filter_.ignored.begin(), filter_.ignored.end(), placed.instance) != filter_.ignored.end())
@@ -115,7 +123,16 @@ class Seen {
     }
   }
 
+  /// Calls `visit(chunks)` for each instance of a partial grid (SceneTracer::Impl::unloaded), in their order.
+  template <class Visit>
+  void visit_partial(const Visit& visit) const {
+    for (const PlacedGrid& chunks : SceneQuery::unloaded(tracer_)) {
+      if (includes(chunks)) visit(chunks);
+    }
+  }
+
   const TypesMet types;
+  const bool meets_unloaded;
 
  private:
   const SceneTracer& tracer_;

@@ -9,11 +9,13 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "core/coordinates/chunk_order.h"
 #include "scene/query/field_search.h"
 #include "scene/query/field_sweep.h"
 #include "scene/query/moving_box.h"
 #include "scene/query/moving_capsule.h"
 #include "scene/query/query_in_grid.h"
+#include "scene/query/unloaded_chunks.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin {
@@ -123,6 +125,11 @@ class CapsuleInGrid {
     return gap.distance < capsule_.radius - kTouch;
   }
   [[nodiscard]] CapsuleInField in_field() const { return {capsule_, 0.0}; }
+  [[nodiscard]] CapsuleInGrid moved(DVec3 by) const {
+    MovingCapsule capsule = capsule_;
+    capsule.centre += by;
+    return CapsuleInGrid(capsule);
+  }
 
  private:
   MovingCapsule capsule_;
@@ -141,17 +148,23 @@ class BoxInGrid {
   }
   [[nodiscard]] BoxInField in_field() const { return {box_, 0.0}; }
   [[nodiscard]] const MovingBox& box() const { return box_; }
+  [[nodiscard]] BoxInGrid moved(DVec3 by) const {
+    MovingBox box = box_;
+    box.centre += by;
+    return BoxInGrid(box);
+  }
 
  private:
   MovingBox box_;
   SeparatingAxes separators_;
 };
 
-template <class Shape>
-std::optional<SceneOverlap> first_of_shape(const PlacedGrid& placed, const TypesMet& types, const Shape& shape) {
-  const Grid& grid = *placed.voxels;
-  const IBox box = voxels_within(shape.bounds(), grid.bounds());
-  GridReader reader(grid);
+// `source`: what a Reader reads, within `tight`.
+template <class Reader, class Shape, class Source>
+std::optional<SceneOverlap> first_of_shape(const PlacedGrid& placed, const TypesMet& types, const Shape& shape,
+                                           const Source& source, const IBox& tight) {
+  const IBox box = voxels_within(shape.bounds(), tight);
+  Reader reader(source);
   for (int z = box.min.z; z < box.max.z; ++z) {
     for (int y = box.min.y; y < box.max.y; ++y) {
       for (int x = box.min.x; x < box.max.x; ++x) {
@@ -164,17 +177,43 @@ std::optional<SceneOverlap> first_of_shape(const PlacedGrid& placed, const Types
   return std::nullopt;
 }
 
-std::optional<SceneOverlap> first_of_voxels(const PlacedGrid& placed, const TypesMet& types,
-                                            const CapsuleInGrid& capsule) {
-  return first_of_shape(placed, types, capsule);
+template <class Reader, class Source>
+std::optional<SceneOverlap> first_of(const PlacedGrid& placed, const TypesMet& types, const CapsuleInGrid& capsule,
+                                     const Source& source, const IBox& tight) {
+  return first_of_shape<Reader>(placed, types, capsule, source, tight);
 }
-std::optional<SceneOverlap> first_of_voxels(const PlacedGrid& placed, const TypesMet& types, const BoxInGrid& box) {
+template <class Reader, class Source>
+std::optional<SceneOverlap> first_of(const PlacedGrid& placed, const TypesMet& types, const BoxInGrid& box,
+                                     const Source& source, const IBox& tight) {
   std::optional<SceneOverlap> first;
   visit_sides(box.box(), [&](const MovingBox& side) {
-    const auto found = first_of_shape(placed, types, BoxInGrid(side));
+    const auto found = first_of_shape<Reader>(placed, types, BoxInGrid(side), source, tight);
     if (!found || !first) first = found;
     return found.has_value();
   });
+  return first;
+}
+
+template <class Shape>
+std::optional<SceneOverlap> first_of_voxels(const PlacedGrid& placed, const TypesMet& types, const Shape& shape) {
+  return first_of<GridReader>(placed, types, shape, *placed.voxels, placed.voxels->bounds());
+}
+
+// The first chunk that is not loaded and meets a shape in chunks.
+template <class Shape>
+std::optional<SceneOverlap> first_of_unloaded(const PlacedGrid& chunks, const Shape& shape) {
+  if (is_surely_loaded(*chunks.grid, shape.bounds())) return std::nullopt;
+  const VoxelRegistry none;
+  const TypesMet all(none, QueryTypes::All);
+  std::optional<SceneOverlap> first;
+  for_each_corner(*chunks.grid, [&](DVec3 offset, const UnloadedReader& reader) {
+    const auto found = first_of<UnloadedReader>(chunks, all, shape.moved(offset), reader, chunks_of_world());
+    if (found && (!first || by_zyx(found->voxel, first->voxel))) first = found;
+  });
+  if (!first) return std::nullopt;
+  first->voxel *= kChunkEdge;
+  first->type = kAir;
+  first->is_unloaded = true;
   return first;
 }
 
@@ -204,7 +243,48 @@ std::vector<SceneOverlap> overlaps_of(const SceneTracer& tracer, const DBox& bou
     if (!overlap) overlap = first_of_field(placed, seen.types, shape);
     if (overlap) found.push_back(*overlap);
   });
+  if (!seen.meets_unloaded) return found;
+  seen.visit_partial([&](const PlacedGrid& chunks) {
+    const auto at =
+        std::lower_bound(found.begin(), found.end(), chunks.instance,
+                         [](const SceneOverlap& each, InstanceHandle instance) { return each.instance < instance; });
+    if (at != found.end() && at->instance == chunks.instance) return;
+    if (const auto overlap = first_of_unloaded(chunks, shape_of(chunks))) found.insert(at, *overlap);
+  });
   return found;
+}
+
+// The first chunk that is not loaded on a ray in the world, up to and including `max_t`, that a query may see.
+std::optional<SceneHit> first_unloaded_of(const Seen& seen, const Ray& ray, double max_t) {
+  std::optional<SceneHit> first;
+  seen.visit_partial([&](const PlacedGrid& chunks) {
+    const Ray in_chunks = ray_in_grid(chunks, ray);
+    const auto hit = first_unloaded(*chunks.grid, in_chunks, first ? first->t : max_t);
+    if (!hit || (first && hit->t >= first->t)) return;
+    first = SceneHit{chunks.instance,
+                     hit->voxel * kChunkEdge,
+                     kAir,
+                     hit->face,
+                     hit->t,
+                     ray.origin + hit->t * ray.direction,
+                     hit->starts_inside,
+                     false,
+                     chunks.world_axes * DVec3(normal_of(hit->face)),
+                     true};
+  });
+  return first;
+}
+
+// Has a hit, or none up to `max_t`, say what is not loaded before it, or be that.
+void note_unloaded(const Seen& seen, const Ray& ray, double max_t, std::optional<SceneHit>& found) {
+  if (!found && !seen.meets_unloaded) return;
+  const auto unloaded = first_unloaded_of(seen, ray, max_t);
+  if (!unloaded || (found && unloaded->t >= found->t)) return;
+  if (seen.meets_unloaded) {
+    found = unloaded;
+  } else {
+    found->unloaded_t = unloaded->t;
+  }
 }
 
 }  // namespace
@@ -225,12 +305,16 @@ std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray, dou
     }
     return true;
   });
-  if (!best) return std::nullopt;
-  const PlacedGrid& placed = placed_in(tracer)[best_placed];
-  const RayHit& hit = best->hit;
-  return SceneHit{placed.instance,   hit.voxel,      best->in_field ? best->material : placed.voxels->get(hit.voxel),
-                  hit.face,          hit.t,          ray.origin + hit.t * ray.direction,
-                  hit.starts_inside, best->in_field, placed.world_axes * best->normal};
+  std::optional<SceneHit> found;
+  if (best) {
+    const PlacedGrid& placed = placed_in(tracer)[best_placed];
+    const RayHit& hit = best->hit;
+    found = SceneHit{placed.instance,   hit.voxel,      best->in_field ? best->material : placed.voxels->get(hit.voxel),
+                     hit.face,          hit.t,          ray.origin + hit.t * ray.direction,
+                     hit.starts_inside, best->in_field, placed.world_axes * best->normal};
+  }
+  if (!SceneQuery::unloaded(tracer).empty()) note_unloaded(seen, ray, max_t, found);
+  return found;
 }
 
 bool any_hit(const SceneTracer& tracer, const Ray& ray, double max_t, const QueryFilter& filter) {
@@ -242,7 +326,7 @@ bool any_hit(const SceneTracer& tracer, const Ray& ray, double max_t, const Quer
     is_hit = seen.includes(placed) && is_any_in_grid(placed, seen.types, ray_in_grid(placed, ray), max_t);
     return !is_hit;
   });
-  return is_hit;
+  return is_hit || (seen.meets_unloaded && first_unloaded_of(seen, ray, max_t));
 }
 
 std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, const PicturePoint& point,
@@ -259,7 +343,9 @@ std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& 
   const double begin = std::max(double{depth} - room, 0.0);
   ray.origin += begin * ray.direction;
   auto hit = first_hit(tracer, ray, double{depth} + room - begin, filter);
-  if (hit) hit->t += begin;
+  if (!hit) return hit;
+  hit->t += begin;
+  hit->unloaded_t += begin;
   return hit;
 }
 

@@ -84,7 +84,7 @@ struct Body {
   }
   // Out of what it starts inside of; false where it stays there.
   bool move_out(const SweepHit& hit) {
-    if (!options.pushes_out) return false;
+    if (!options.pushes_out || hit.is_unloaded) return false;
     const double furthest = options.max_push_out.value_or(longest_of(shape) + hit.depth + options.skin);
     const DVec3 along_normal = hit.normal * (hit.depth + options.skin);
     if (hit.in_field && glm::length(along_normal) <= furthest) {
@@ -119,6 +119,10 @@ struct Body {
 
 // What was met, which a floor is no obstacle among.
 void note(SlideResult& result, SlideContact::Kind kind, const SweepHit& hit) {
+  if (hit.is_unloaded) {
+    kind = SlideContact::Kind::Unloaded;
+    result.is_waiting = true;
+  }
   result.contacts.push_back({kind, hit});
   if (kind == SlideContact::Kind::Floor) return;
   result.is_blocked = true;
@@ -140,8 +144,9 @@ SlideResult slide(Body<Shape> body, DVec3 displacement) {
     }
     note(result, hit->depth > 0.0 ? SlideContact::Kind::Inside : SlideContact::Kind::Wall, *hit);
     if (hit->depth > 0.0) {
-      if (!body.move_out(*hit)) break;
-      continue;
+      if (body.move_out(*hit)) continue;
+      if (hit->is_unloaded) displacement = DVec3(0.0);
+      break;
     }
     const double fraction = body.move_to(*hit, left);
     normals.push_back(hit->normal);
@@ -184,6 +189,15 @@ class Walk {
 
  private:
   [[nodiscard]] bool is_floor(DVec3 normal) const { return glm::dot(normal, up_) >= steepest_; }
+  // Nobody stands on what is not loaded.
+  [[nodiscard]] bool is_floor(const SweepHit& hit) const { return !hit.is_unloaded && is_floor(hit.normal); }
+  // Where it starts inside of something; false where it stays there.
+  bool move_out(const SweepHit& hit) {
+    note(result_, SlideContact::Kind::Inside, hit);
+    if (body_.move_out(hit)) return true;
+    if (hit.is_unloaded) displacement_ = DVec3(0.0);
+    return false;
+  }
   [[nodiscard]] DVec3 level(DVec3 v) const { return v - glm::dot(v, up_) * up_; }
   // A level displacement as the floor lifts it.
   [[nodiscard]] DVec3 along_floor(DVec3 v) const {
@@ -209,11 +223,10 @@ class Walk {
       if (!hit) return true;
       if (hit->depth == 0.0) {
         is_supported_ = !(glm::dot(displacement, up_) > 0.0);
-        if (is_supported_ && is_floor(hit->normal)) land(*hit);
+        if (is_supported_ && is_floor(*hit)) land(*hit);
         return true;
       }
-      note(result_, SlideContact::Kind::Inside, *hit);
-      if (!body_.move_out(*hit)) return false;
+      if (!move_out(*hit)) return false;
     }
     return true;
   }
@@ -244,12 +257,9 @@ class Walk {
 
   // Goes to a contact and turns what is left of the way; false where it is over.
   bool meet(const SweepHit& hit, DVec3 way) {
-    if (hit.depth > 0.0) {
-      note(result_, SlideContact::Kind::Inside, hit);
-      return body_.move_out(hit);
-    }
+    if (hit.depth > 0.0) return move_out(hit);
     left_ *= 1.0 - body_.move_to(hit, way);
-    if (is_floor(hit.normal) && !(glm::dot(displacement_, up_) > 0.0)) {
+    if (is_floor(hit) && !(glm::dot(displacement_, up_) > 0.0)) {
       note(result_, SlideContact::Kind::Floor, hit);
       land(hit);
       displacement_ = along_contacts(level(displacement_), walls_);
@@ -307,12 +317,12 @@ class Walk {
     const DVec3 down = -up_ * (rise + 2.0 * body_.options.skin);
     auto ground = landed.advance(down);
     if (!ground || ground->depth > 0.0) return false;
-    if (!is_floor(ground->normal)) {
+    if (!is_floor(*ground)) {
       // On the edge of the step: the floor may begin a little further on.
       Body<Shape> further = raised;
       further.advance(ahead * std::max(1.0, thinnest_of(body_.shape) / length));
       ground = further.advance(down);
-      if (!ground || ground->depth > 0.0 || !is_floor(ground->normal)) return false;
+      if (!ground || ground->depth > 0.0 || !is_floor(*ground)) return false;
       if (glm::dot(further.shape.centre - body_.shape.centre, up_) < body_.options.skin) return false;
     }
     body_.shape.centre = landed.shape.centre;
@@ -330,7 +340,7 @@ class Walk {
     const double probe = skin + skin / std::max(steepest_, 0.1);
     const DVec3 down = -up_ * std::max(floor_.snap_distance, probe);
     const auto hit = body_.sweep(down);
-    if (hit && hit->depth == 0.0 && is_floor(hit->normal)) {
+    if (hit && hit->depth == 0.0 && is_floor(*hit)) {
       body_.move_to(*hit, down);
       land(*hit);
       return;

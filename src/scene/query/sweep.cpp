@@ -7,6 +7,7 @@
 #include "scene/query/moving_box.h"
 #include "scene/query/moving_capsule.h"
 #include "scene/query/query_in_grid.h"
+#include "scene/query/unloaded_chunks.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin {
@@ -137,11 +138,13 @@ Contact CapsuleAmongVoxels::meet(IVec3 voxel, double most) const {
 }
 
 // The voxels of one grid, and the best contact with them so far; for `follow_way`.
-template <class Shape>
+template <class Shape, class Reader>
 class BlockSweep {
  public:
-  BlockSweep(const Grid& grid, const TypesMet& types, const Shape& shape)
-      : reader_(grid), types_(types), shape_(shape), bounds_(grid.bounds()) {}
+  // `source`: what is read.
+  template <class Source>
+  BlockSweep(const Source& source, const IBox& bounds, const TypesMet& types, const Shape& shape)
+      : reader_(source), types_(types), shape_(shape), bounds_(bounds) {}
 
   [[nodiscard]] const IBox& bounds() const { return bounds_; }
   [[nodiscard]] double fraction() const { return best_.fraction; }
@@ -179,7 +182,7 @@ class BlockSweep {
     return !types_.holds(reader_.get(before));
   }
 
-  GridReader reader_;
+  Reader reader_;
   const TypesMet& types_;
   const Shape& shape_;
   IBox bounds_;
@@ -188,20 +191,25 @@ class BlockSweep {
   bool best_is_exposed_ = false;
 };
 
-template <class Shape>
-SweepHit hit_of(const PlacedGrid& placed, BlockSweep<Shape>& sweep) {
+template <class Shape, class Reader>
+SweepHit hit_of(const PlacedGrid& placed, BlockSweep<Shape, Reader>& sweep) {
   const Contact& best = sweep.best();
   const DVec3 normal = glm::normalize(placed.world_axes * best.normal);
   return {best.fraction, normal, placed.instance, sweep.voxel(), best.depth * placed.voxel_size, sweep.type()};
 }
 
-// The first contact with what an instance places, up to the fraction `most`.
-std::optional<SweepHit> first_of_voxels(const PlacedGrid& placed, const TypesMet& types, const MovingBox& box,
-                                        double most) {
+bool is_sooner(const SweepHit& hit, const std::optional<SweepHit>& first) {
+  return !first || hit.fraction < first->fraction || (hit.fraction == first->fraction && hit.depth > first->depth);
+}
+
+// The first contact with voxels, up to the fraction `most`.
+template <class Reader, class Source>
+std::optional<SweepHit> first_of(const PlacedGrid& placed, const TypesMet& types, const MovingBox& box, double most,
+                                 const Source& source, const IBox& bounds) {
   std::optional<SweepHit> last;
   visit_sides(box, [&](const MovingBox& side) {
     const BoxAmongVoxels shape(side);
-    BlockSweep sweep(*placed.voxels, types, shape);
+    BlockSweep<BoxAmongVoxels, Reader> sweep(source, bounds, types, shape);
     follow_way(side, most, sweep);
     const Contact& best = sweep.best();
     const bool is_met = best.axis >= 0;
@@ -215,13 +223,42 @@ std::optional<SweepHit> first_of_voxels(const PlacedGrid& placed, const TypesMet
   return last;
 }
 
-std::optional<SweepHit> first_of_voxels(const PlacedGrid& placed, const TypesMet& types, const MovingCapsule& capsule,
-                                        double most) {
+template <class Reader, class Source>
+std::optional<SweepHit> first_of(const PlacedGrid& placed, const TypesMet& types, const MovingCapsule& capsule,
+                                 double most, const Source& source, const IBox& bounds) {
   const CapsuleAmongVoxels shape(capsule);
-  BlockSweep sweep(*placed.voxels, types, shape);
+  BlockSweep<CapsuleAmongVoxels, Reader> sweep(source, bounds, types, shape);
   follow_way(capsule, most, sweep);
   if (sweep.best().axis < 0) return std::nullopt;
   return hit_of(placed, sweep);
+}
+
+// The first contact with what an instance places, likewise.
+template <class Moving>
+std::optional<SweepHit> first_of_voxels(const PlacedGrid& placed, const TypesMet& types, const Moving& shape,
+                                        double most) {
+  return first_of<GridReader>(placed, types, shape, most, *placed.voxels, placed.voxels->bounds());
+}
+
+// With a chunk that is not loaded, of a shape in chunks.
+template <class Moving>
+std::optional<SweepHit> first_of_unloaded(const PlacedGrid& chunks, const Moving& shape, double most) {
+  if (is_surely_loaded(*chunks.grid, bounds_between(shape, reach_of(shape), 0.0, most))) return std::nullopt;
+  const VoxelRegistry none;
+  const TypesMet all(none, QueryTypes::All);
+  std::optional<SweepHit> first;
+  for_each_corner(*chunks.grid, [&](DVec3 offset, const UnloadedReader& reader) {
+    Moving moved = shape;
+    moved.centre += offset;
+    const double until = first ? first->fraction : most;
+    const auto hit = first_of<UnloadedReader>(chunks, all, moved, until, reader, chunks_of_world());
+    if (hit && is_sooner(*hit, first)) first = hit;
+  });
+  if (!first) return std::nullopt;
+  first->voxel *= kChunkEdge;
+  first->type = kAir;
+  first->is_unloaded = true;
+  return first;
 }
 
 template <class Moving>
@@ -241,10 +278,6 @@ std::optional<SweepHit> first_of_field(const PlacedGrid& placed, const TypesMet&
   return hit;
 }
 
-bool is_sooner(const SweepHit& hit, const std::optional<SweepHit>& first) {
-  return !first || hit.fraction < first->fraction || (hit.fraction == first->fraction && hit.depth > first->depth);
-}
-
 // `moving_in(placed)` is the shape in that grid's space; `reach`: from its centre along the world's axes.
 template <class MovingIn>
 std::optional<SweepHit> first_of_scene(const SceneTracer& tracer, DVec3 centre, DVec3 reach, DVec3 displacement,
@@ -261,6 +294,11 @@ std::optional<SweepHit> first_of_scene(const SceneTracer& tracer, DVec3 centre, 
     if (placed.field == nullptr) return;
     const auto of_field = first_of_field(placed, seen.types, moving, first ? first->fraction : 1.0);
     if (of_field && is_sooner(*of_field, first)) first = of_field;
+  });
+  if (!seen.meets_unloaded) return first;
+  seen.visit_partial([&](const PlacedGrid& chunks) {
+    const auto of_unloaded = first_of_unloaded(chunks, moving_in(chunks), first ? first->fraction : 1.0);
+    if (of_unloaded && is_sooner(*of_unloaded, first)) first = of_unloaded;
   });
   return first;
 }

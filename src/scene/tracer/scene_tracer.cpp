@@ -28,6 +28,7 @@ SceneTracer SceneTracer::with_detail(std::span<const SelectedInstance> selected,
   detailed->filter = content_of(impl_).filter;
   detailed->placed = content_of(impl_).placed;
   detailed->has_transparent = content_of(impl_).has_transparent;
+  detailed->unloaded = content_of(impl_).unloaded;
   std::vector<InstanceTree::Change> halved;
   const HalvedGridCache::Lock levels = content_of(impl_).coarse.make(*content_of(impl_).scene, selected, threads);
   auto next = detailed->placed.begin();

@@ -21,6 +21,7 @@ struct TracedGrid {
   IBox tight;
   bool can_be_placed = false;  ///< it is not empty, and its pivot is finite
   bool is_placed = false;      ///< by an instance that is traced
+  bool is_partial = false;     ///< its voxels or its field
   std::uint64_t shape = 0;     ///< another number whenever pivot or bounds have changed, and of every other grid
   TreeCache trees;             ///< up to date while it is placed
 };
@@ -53,6 +54,9 @@ struct SceneTracer::Impl {
   std::vector<PlacedGrid> placed;
   std::vector<Source> sources;  // of `placed`
   InstanceTree instances;       // of `placed`, in the world
+  // Instances of partial grids, empty ones too, by their handles; in the space of a grid whose voxels are chunks. They
+  // have no trees.
+  std::vector<PlacedGrid> unloaded;
   bool has_transparent = false;
   HalvedGridCache coarse;  // those of `with_detail`
 
@@ -71,6 +75,8 @@ struct SceneTracer::Impl {
   void place(std::size_t i, InstanceHandle handle, const Instance& instance, TracedGrid& grid);
   [[nodiscard]] bool move_all_instances();
   void place_instances();
+  void find_unloaded(const SceneChanges& changes, bool finds_all);
+  void place_unloaded(InstanceHandle handle, const Instance* instance);
   void update_trees(const SceneChanges& changes, Threads threads);
 };
 

@@ -64,6 +64,7 @@ bool SceneTracer::Impl::update(Threads threads) {
     place_instances();
     changes.all = true;
   }
+  find_unloaded(changes, moves_all || changes.all || has_other_trees);
   update_trees(changes, threads);
   followed_types = types_now;
   followed_scene = scene_now;
@@ -137,8 +138,9 @@ bool SceneTracer::Impl::look_at(GridHandle handle) {
   has_other_trees |= known->grid != &grid;
   const bool is_new = std::exchange(known->grid, &grid) == nullptr;
   const IBox tight = grid.bounds();
+  const bool was_partial = std::exchange(known->is_partial, grid.grid.is_partial() || grid.field.is_partial());
   // What is not a number differs from itself, and is another each time.
-  if (!is_new && tight == known->tight && known->pivot == grid.pivot) return true;
+  if (!is_new && tight == known->tight && known->pivot == grid.pivot && was_partial == known->is_partial) return true;
   known->shape = ++shapes;
   known->pivot = grid.pivot;
   known->tight = tight;
@@ -242,6 +244,47 @@ void SceneTracer::Impl::place_instances() {
     boxes.push_back(bounds_in_world(placed.back(), grid->tight));
   });
   instances = InstanceTree(std::move(boxes));
+}
+
+// Keeps `unloaded` up to date.
+void SceneTracer::Impl::find_unloaded(const SceneChanges& changes, bool finds_all) {
+  const bool has_partial =
+      std::any_of(grids.begin(), grids.end(), [](const auto& grid) { return grid != nullptr && grid->is_partial; });
+  if (!has_partial || finds_all) unloaded.clear();
+  if (!has_partial) return;
+  if (finds_all) {
+    scene->instances().for_each(
+        [&](InstanceHandle handle, const Instance& instance) { place_unloaded(handle, &instance); });
+    return;
+  }
+  for (const InstanceHandle handle : changes.instances) place_unloaded(handle, scene->instances().find(handle));
+}
+
+// Puts an instance of a partial grid where it belongs in `unloaded`; takes away what is none any more.
+void SceneTracer::Impl::place_unloaded(InstanceHandle handle, const Instance* instance) {
+  const auto at = std::lower_bound(unloaded.begin(), unloaded.end(), handle,
+                                   [](const PlacedGrid& each, InstanceHandle key) { return each.instance < key; });
+  const bool is_there = at != unloaded.end() && at->instance == handle;
+  const TracedGrid* const grid =
+      instance == nullptr || instance->grid.index >= grids.size() ? nullptr : grids[instance->grid.index].get();
+  const bool is_wanted = grid != nullptr && grid->handle == instance->grid && grid->is_partial &&
+                         is_finite(grid->pivot) && passes(filter, *scene, *instance) && has_place(*instance);
+  if (!is_wanted) {
+    if (is_there) unloaded.erase(at);
+    return;
+  }
+  PlacedGrid placed_chunks;
+  placed_chunks.instance = handle;
+  placed_chunks.grid = grid->grid;
+  placed_chunks.pivot = grid->pivot / double{kChunkEdge};
+  placed_chunks.world_axes = world_axes(*instance);
+  placed_chunks.position = instance->position;
+  placed_chunks.voxel_size = instance->voxel_size * kChunkEdge;
+  if (is_there) {
+    *at = placed_chunks;
+  } else {
+    unloaded.insert(at, placed_chunks);
+  }
 }
 
 void SceneTracer::Impl::update_trees(const SceneChanges& changes, Threads threads) {

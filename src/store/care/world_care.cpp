@@ -83,25 +83,23 @@ Result<WorldSummary> summarize(const std::filesystem::path& path, const Progress
   if (const auto revision = reader->part({part::kWorld, std::string("revision")}); revision && *revision) {
     summary.saves = number_in(**revision);
   }
-  std::vector<std::string> damage;
-  ChunkRows rows(reader->connection());
-  const std::map<std::int64_t, RegionPlace> regions = rows.regions(damage);
-  ReadProgress reading(progress, path);
-  const auto gaps = rows.each([&](std::int64_t key, std::span<const std::byte> body) {
-    if (!reading.add(body.size())) return RowVerdict::Stop;
-    const auto region = regions.find(key >> kRegionBits);
-    if (region == regions.end()) return RowVerdict::Damaged;
-    auto& grid = summary.grids[region->second.grid];
-    ++grid.by_level[region->second.level];
-    if (region->second.level == 0) {
+  if (const auto thumbnail = reader->part({part::kThumbnail, std::int64_t{0}}); thumbnail && *thumbnail) {
+    summary.thumbnail_bytes = (*thumbnail)->size();
+  }
+  std::uint64_t seen = 0;
+  bool is_cancelled = false;
+  const Status read = reader->each_place([&](const ChunkPlace& place) {
+    auto& grid = summary.grids[place.grid];
+    ++grid.by_level[place.level];
+    if (place.level == 0) {
       ++grid.chunks;
-      const IVec3 chunk = chunk_of_key(region->second, key);
-      grid.chunk_bounds = unite(grid.chunk_bounds, IBox{chunk, chunk + IVec3(1)});
+      grid.chunk_bounds = unite(grid.chunk_bounds, IBox{place.chunk, place.chunk + IVec3(1)});
     }
-    return RowVerdict::Sound;
+    is_cancelled = progress && (++seen & 65'535U) == 0 && !progress(0.5);
+    return !is_cancelled;
   });
-  if (!gaps) return gaps.error();
-  if (auto done = reading.status(); !done) return done.error();
+  if (!read) return read.error();
+  if (is_cancelled) return make_error(ErrorCode::Cancelled, "cancelled");
   return summary;
 }
 

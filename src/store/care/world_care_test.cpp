@@ -10,6 +10,7 @@
 #include <quoin/io/formats.h>
 #include <quoin/store/world_saver.h>
 
+#include "store/database/connection.h"
 #include "store/world/world_for_tests.h"
 
 namespace quoin {
@@ -54,7 +55,7 @@ TEST(WorldCare, SummaryAndCheckOfASoundWorld) {
   make_world(path);
   const auto summary = summarize_world(path);
   ASSERT_TRUE(summary) << to_string(summary.error());
-  EXPECT_EQ(summary->version, 1);
+  EXPECT_EQ(summary->version, 2);
   EXPECT_EQ(summary->types, 9U);
   EXPECT_EQ(summary->values, 1U);
   EXPECT_EQ(summary->saves, 1U);
@@ -204,6 +205,121 @@ TEST(WorldCare, NothingIsRepairedOfNothing) {
   EXPECT_FALSE(std::filesystem::exists(folder / "m.quoin"));
   EXPECT_FALSE(std::filesystem::exists(folder / "m.quoin-new"));
   EXPECT_FALSE(repair_world(folder / "none", folder / "m.quoin"));
+}
+
+std::vector<std::byte> png_of(char last) {
+  const std::string text = std::string("\x89PNG\r\n\x1A\n") + last;
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+TEST(WorldThumbnail, IsKeptUntilTheNext) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  make_world(path);
+  EXPECT_EQ(summarize_world(path)->thumbnail_bytes, 0U);
+  {
+    auto world = WorldStore::open(path, WorldAccess::Write);
+    EXPECT_FALSE(world->thumbnail()->has_value());
+    for (const char last : {'a', 'b'}) {
+      WorldChanges changes;
+      changes.put_thumbnail(png_of(last));
+      ASSERT_TRUE(world->save(std::move(changes)));
+      EXPECT_EQ(**world->thumbnail(), png_of(last));
+    }
+    WorldChanges none;
+    none.put_thumbnail(std::vector<std::byte>(100));
+    const auto refused = world->save(std::move(none));
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+    ASSERT_TRUE(world->flush());
+  }
+  EXPECT_EQ(**WorldStore::open(path, WorldAccess::Read)->thumbnail(), png_of('b'));
+  EXPECT_EQ(summarize_world(path)->thumbnail_bytes, 9U);
+  EXPECT_TRUE(check_world(path)->damage.empty());
+  auto world = WorldStore::open(path, WorldAccess::Write);
+  WorldChanges changes;
+  changes.remove_thumbnail();
+  ASSERT_TRUE(world->save(std::move(changes)));
+  EXPECT_FALSE(world->thumbnail()->has_value());
+}
+
+TEST(WorldCopy, HasAllThatTheWorldHas) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  make_world(path);
+  {
+    auto world = WorldStore::open(path, WorldAccess::Write);
+    WorldChanges changes;
+    changes.put_thumbnail(png_of('a'));
+    changes.put_chunk({0, 3, {1, 2, 3}}, {Chunk(2)});  // of another level
+    ASSERT_TRUE(world->save(std::move(changes)));
+    ASSERT_TRUE(world->flush());
+  }
+  const auto copied = copy_world(path, folder / "c.quoin");
+  ASSERT_TRUE(copied) << to_string(copied.error());
+  EXPECT_EQ(copied->chunks, kChunks + 1U);
+  EXPECT_TRUE(copied->lost.empty());
+  EXPECT_EQ(copied->bytes, std::filesystem::file_size(folder / "c.quoin"));
+  std::uint64_t voxels = 0;
+  for (int i = 0; i < kChunks; ++i) voxels += static_cast<std::uint64_t>(chunk_of(i).non_air_count());
+  EXPECT_EQ(copied->voxels, voxels);
+  EXPECT_EQ(sound_chunks(folder / "c.quoin"), std::size_t{kChunks});
+  EXPECT_TRUE(check_world(folder / "c.quoin")->damage.empty());
+  const auto copy = WorldStore::open(folder / "c.quoin", WorldAccess::Read);
+  EXPECT_EQ(**copy->value("inventory"), std::vector<std::byte>(3000, std::byte{7}));
+  EXPECT_EQ(**copy->thumbnail(), png_of('a'));
+  EXPECT_EQ((*copy->load_chunk({0, 3, {1, 2, 3}}))->voxels.uniform(), 2);
+  // And goes on: numbers of grids and regions are those of the world.
+  auto on = WorldStore::open(folder / "c.quoin", WorldAccess::Write);
+  WorldChanges more;
+  more.put_chunk({0, 0, {500, 0, 0}}, {Chunk(1)});
+  ASSERT_TRUE(on->save(std::move(more)));
+  ASSERT_TRUE(on->flush());
+  EXPECT_EQ(on->chunks(0, 0)->size(), kChunks + 1U);
+}
+
+TEST(WorldCopy, LeavesOutChunksThatAreDamagedAndRefusesOtherDamage) {
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  make_world(path);
+  const auto damage = [&](const char* sql) {
+    auto database = store::Connection::open(path.string(), store::Connection::Mode::Write);
+    ASSERT_TRUE(database->run(sql));
+    ASSERT_TRUE(database->close());
+  };
+  damage("UPDATE chunks SET body = zeroblob(length(body)) WHERE key = (SELECT max(key) FROM chunks)");
+  const auto copied = copy_world(path, folder / "c.quoin");
+  ASSERT_TRUE(copied) << to_string(copied.error());
+  ASSERT_EQ(copied->lost.size(), 1U);
+  EXPECT_TRUE(copied->lost[0].chunk.has_value());
+  EXPECT_EQ(copied->chunks, kChunks - 1U);
+  EXPECT_TRUE(check_world(folder / "c.quoin")->damage.empty());
+  damage("UPDATE parts SET body = zeroblob(length(body)) WHERE kind = 'value'");
+  const auto refused = copy_world(path, folder / "d.quoin");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::BadFormat);
+  EXPECT_NE(to_string(refused.error()).find("quoin world repair"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder / "d.quoin"));
+}
+
+TEST(WorldCopy, TakesThePlaceOfAWorldUnlessSomebodyWritesThat) {
+  const WorldFolder folder;
+  make_world(folder / "w.quoin");
+  make_world(folder / "c.quoin");
+  {
+    const auto writer = WorldStore::open(folder / "c.quoin", WorldAccess::Write);
+    const auto refused = copy_world(folder / "w.quoin", folder / "c.quoin");
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::CannotWrite);
+  }
+  EXPECT_TRUE(copy_world(folder / "w.quoin", folder / "c.quoin"));
+  EXPECT_EQ(sound_chunks(folder / "c.quoin"), std::size_t{kChunks});
+  EXPECT_EQ(copy_world(folder / "none.quoin", folder / "e.quoin").error().code, ErrorCode::CannotRead);
+  int steps = 0;
+  const auto cancelled = copy_world(folder / "w.quoin", folder / "e.quoin", [&](double) { return ++steps > 9; });
+  EXPECT_TRUE(cancelled);  // too small a world to be asked
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 3);
 }
 
 }  // namespace

@@ -47,11 +47,11 @@ void hash_text(XXH3_state_t& state, std::string_view text) {
 }  // namespace
 
 Status create_schema(Connection& database) {
-  static_assert(kWorldApplicationId == 0x51756F6E && kSchemaVersion == 1, "as in the statements");
+  static_assert(kWorldApplicationId == 0x51756F6E && kSchemaVersion == 2, "as in the statements");
   return database.run(
       "BEGIN;"
       "PRAGMA application_id=0x51756F6E;"
-      "PRAGMA user_version=1;"
+      "PRAGMA user_version=2;"
       "CREATE TABLE parts(kind TEXT NOT NULL, id NOT NULL, revision INTEGER NOT NULL, sum INTEGER NOT NULL,"
       " body BLOB NOT NULL);"
       "CREATE UNIQUE INDEX parts_by_id ON parts(kind, id);"
@@ -59,6 +59,7 @@ Status create_schema(Connection& database) {
       " x INTEGER NOT NULL, y INTEGER NOT NULL, z INTEGER NOT NULL);"
       "CREATE UNIQUE INDEX regions_by_place ON regions(grid, level, x, y, z);"
       "CREATE TABLE chunks(key INTEGER PRIMARY KEY, body BLOB NOT NULL);"
+      "CREATE INDEX chunk_keys ON chunks(key);"
       "COMMIT");
 }
 

@@ -21,11 +21,12 @@
 //
 //   parts    kind, id -> body     what a scene has besides chunks, a text of JSON each; a game's values
 //   regions  id <- grid, level, place of 32^3 chunks
-//   chunks   key = region * 32768 + Morton code within it -> body (store/chunk/chunk_body.h)
+//   chunks   key = region * 32768 + Morton code within it -> body (store/chunk/chunk_body.h); its keys alone are an
+//            index, since reading them in the table would read the bodies
 
 namespace quoin::store {
 
-inline constexpr int kSchemaVersion = 1;
+inline constexpr int kSchemaVersion = 2;
 inline constexpr int kPageBytes = 8192;
 /// Chunks along a region's edge.
 inline constexpr int kRegionShift = 5;
@@ -34,7 +35,8 @@ inline constexpr int kRegionBits = 3 * kRegionShift;
 
 /// Makes the tables of an empty database.
 [[nodiscard]] Status create_schema(Connection& database);
-/// Whether they are there, in a version that this program knows.
+/// Whether they are there, in a version that this program reads: from 1 on; `migrate` (world/migration.h) takes earlier ones
+/// to the present one before they are written.
 /// Errors: BadFormat (another program's database), Unsupported (a later version).
 [[nodiscard]] Status check_schema(Connection& database);
 
@@ -91,6 +93,7 @@ inline constexpr const char* kCamera = "camera";
 /// Id 0: what is looked through at first; the others are the "camera"s.
 inline constexpr const char* kView = "view";
 inline constexpr const char* kSun = "sun";
+/// Id 0: a PNG.
 inline constexpr const char* kThumbnail = "thumbnail";
 inline constexpr const char* kValue = "value";
 /// Of the world itself: id "revision", the number of its last commit as decimal digits; id "next_grid" likewise.

@@ -1,8 +1,10 @@
 #include <string>
 #include <utility>
 
+#include <quoin/store/world_meshes.h>
 #include <quoin/store/world_saver.h>
 
+#include "core/available_memory.h"
 #include "io/world_format.h"
 #include "store/world/world_changes.h"
 
@@ -10,8 +12,26 @@ namespace quoin {
 
 namespace {
 
+std::string megabytes(std::uint64_t bytes) {
+  return std::to_string((bytes + 500'000) / 1'000'000) + " MB";
+}
+
+// Says so, rather than being ended by the system half-way.
+Status check_memory(const WorldStore& world) {
+  constexpr std::uint64_t kSmall = std::uint64_t{64} << 20;
+  const auto needed = memory_of_world(world);
+  if (!needed || *needed < kSmall) return {};
+  const auto available = available_memory();
+  if (!available || *needed <= *available) return {};
+  return make_error(
+      ErrorCode::LimitExceeded,
+      "as a whole it takes about " + megabytes(*needed) + " of memory, and " + megabytes(*available) + " are available",
+      world.path().string());
+}
+
 Result<LoadedScene> load(const WorldStore& world, const LoadOptions& options, Threads threads,
                          const Progress& progress) {
+  if (auto fits = check_memory(world); !fits) return fits.error();
   auto loaded = load_world(world, options, threads, progress);
   if (!loaded) return loaded.error();
   const auto values = world.value_names();

@@ -65,7 +65,7 @@ class FreshWorld {
 };
 
 Result<SavedScene> write(const Scene& scene, WorldView view, const std::filesystem::path& path, Threads threads,
-                         const Progress& progress) {
+                         const Progress& progress, WorldChanges more) {
   const std::filesystem::path target = follow_links(path);
   FreshWorld fresh(target);
   if (auto done = fresh.begin(); !done) return done.error();
@@ -75,7 +75,7 @@ Result<SavedScene> write(const Scene& scene, WorldView view, const std::filesyst
     WorldSaver saver;
     saver.set_view(std::move(view));
     if (progress && !progress(0.0)) return make_error(ErrorCode::Cancelled, "cancelled");
-    const auto ticket = saver.save(*world, scene);
+    const auto ticket = saver.save(*world, scene, std::move(more));
     if (!ticket) return ticket.error();
     if (auto done = world->flush(); !done) return done.error();
     if (progress && !progress(0.95)) return make_error(ErrorCode::Cancelled, "cancelled");
@@ -104,15 +104,16 @@ Status store::put_world_in_place(const std::filesystem::path& from, const std::f
 
 // Errors name the file that was wanted, not the one beside it.
 Result<SavedScene> write_world(const Scene& scene, const std::filesystem::path& path, Threads threads,
-                               const Progress& progress) {
-  auto saved = write(scene, {}, path, threads, progress);
+                               const Progress& progress, WorldChanges more) {
+  auto saved = write(scene, {}, path, threads, progress, std::move(more));
   if (!saved) saved.error().path = path.string();
   return saved;
 }
 
 Result<SavedScene> write_world(const LoadedScene& loaded, const std::filesystem::path& path, Threads threads,
-                               const Progress& progress) {
-  auto saved = write(loaded.scene, {loaded.sun, loaded.camera, loaded.cameras}, path, threads, progress);
+                               const Progress& progress, WorldChanges more) {
+  auto saved =
+      write(loaded.scene, {loaded.sun, loaded.camera, loaded.cameras}, path, threads, progress, std::move(more));
   if (!saved) saved.error().path = path.string();
   return saved;
 }

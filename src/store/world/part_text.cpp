@@ -1,5 +1,7 @@
 #include "store/world/part_text.h"
 
+#include <algorithm>
+#include <array>
 #include <limits>
 #include <string_view>
 
@@ -186,6 +188,17 @@ Status check_as(std::span<const std::byte> body, const std::string& name) {
   return {};
 }
 
+Status check_thumbnail(std::span<const std::byte> body, const std::string& name) {
+  constexpr std::size_t kMaxBytes = std::size_t{16} << 20;
+  constexpr std::array<std::uint8_t, 8> kPng = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
+  const bool is_png =
+      body.size() > kPng.size() &&
+      std::equal(kPng.begin(), kPng.end(), body.begin(), [](std::uint8_t a, std::byte b) { return std::byte{a} == b; });
+  if (!is_png) return make_error(ErrorCode::InvalidArgument, name + " is no PNG");
+  if (body.size() > kMaxBytes) return make_error(ErrorCode::InvalidArgument, name + " has more than 16 MiB");
+  return {};
+}
+
 }  // namespace
 
 Status check_part(const PartKey& key, std::span<const std::byte> body) {
@@ -199,6 +212,7 @@ Status check_part(const PartKey& key, std::span<const std::byte> body) {
   if (key.kind == part::kView) return check_as<Camera>(body, name);
   if (key.kind == part::kCamera) return check_as<FileCamera>(body, name);
   if (key.kind == part::kSun) return check_as<DVec3>(body, name);
+  if (key.kind == part::kThumbnail) return check_thumbnail(body, name);
   return {};
 }
 

@@ -66,6 +66,14 @@ void WorldChanges::remove_value(std::string name) {
   WorldParts::put(*this, {store::part::kValue, std::move(name)}, std::nullopt);
 }
 
+void WorldChanges::put_thumbnail(std::vector<std::byte> png) {
+  WorldParts::put(*this, {store::part::kThumbnail, std::int64_t{0}}, std::move(png));
+}
+
+void WorldChanges::remove_thumbnail() {
+  WorldParts::put(*this, {store::part::kThumbnail, std::int64_t{0}}, std::nullopt);
+}
+
 bool WorldChanges::empty() const {
   return content_->empty();
 }

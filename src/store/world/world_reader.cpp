@@ -24,7 +24,8 @@ std::vector<std::byte> copy_of(std::span<const std::byte> bytes) {
   return {bytes.begin(), bytes.end()};
 }
 
-// So few chunks that each is looked up. A range of keys costs reading the chunks within it.
+// So few chunks that each is looked up. A range of keys costs reading those within it, from their index; in a world of
+// version 1 also the chunks.
 bool is_small(const IBox& box) {
   const IVec3 size = box.size();
   return size.x * size.y * size.z <= 512;
@@ -190,6 +191,32 @@ Status WorldReader::each_body(std::uint32_t grid, std::uint8_t level,
     }
   }
   return {};
+}
+
+Status WorldReader::each_place(FunctionRef<bool(const ChunkPlace&)> visit) {
+  std::map<std::int64_t, RegionPlace> places;
+  auto regions = connection_.prepare("SELECT id, grid, level, x, y, z FROM regions");
+  if (!regions) return regions.error();
+  while (true) {
+    const auto row = regions->step();
+    if (!row) return row.error();
+    if (!*row) break;
+    const auto along = [&](int column) { return static_cast<int>(regions->integer(column)); };
+    places[regions->integer(0)] = {static_cast<std::uint32_t>(regions->integer(1)),
+                                   static_cast<std::uint8_t>(regions->integer(2)),
+                                   {along(3), along(4), along(5)}};
+  }
+  auto keys = connection_.prepare("SELECT key FROM chunks");
+  if (!keys) return keys.error();
+  while (true) {
+    const auto row = keys->step();
+    if (!row) return row.error();
+    if (!*row) return {};
+    const auto region = places.find(keys->integer(0) >> kRegionBits);
+    if (region == places.end()) continue;
+    const RegionPlace& place = region->second;
+    if (!visit({place.grid, place.level, chunk_of_key(place, keys->integer(0))})) return {};
+  }
 }
 
 Result<std::vector<RegionPlace>> WorldReader::regions() {

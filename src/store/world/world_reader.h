@@ -26,6 +26,9 @@ class WorldReader {
   /// Calls `visit` for the chunks' rows in the order of their keys, until it returns false.
   [[nodiscard]] Status each_body(std::uint32_t grid, std::uint8_t level,
                                  FunctionRef<bool(const ChunkPlace& place, std::span<const std::byte> body)> visit);
+  /// Calls `visit` for the places of all chunks of all grids and levels, in no order, until it returns false; without
+  /// reading their bodies. Chunks in regions that are not there are left out.
+  [[nodiscard]] Status each_place(FunctionRef<bool(const ChunkPlace& place)> visit);
   [[nodiscard]] Result<std::vector<RegionPlace>> regions();
 
   /// The part's body. Errors: BadFormat where its sum is another.

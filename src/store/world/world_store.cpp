@@ -19,6 +19,7 @@
 #include "io/world_format.h"
 #include "store/chunk/chunk_body.h"
 #include "store/database/world_lock.h"
+#include "store/world/migration.h"
 #include "store/world/world_changes.h"
 #include "store/world/world_open.h"
 #include "store/world/world_reader.h"
@@ -246,6 +247,7 @@ Result<WorldStore> WorldParts::open(const std::filesystem::path& named, WorldAcc
     if (!connection) return fail(connection.error());
     if (auto done = check_schema(*connection); !done) return fail(done.error());
     if (auto done = begin_writing(*connection, vfs == nullptr && is_on_network(path)); !done) return fail(done.error());
+    if (auto done = migrate(*connection, path); !done) return fail(done.error());
     writing = std::move(*connection);
   }
   return begin(std::move(impl), std::move(writing), threads);
@@ -338,6 +340,10 @@ std::uint32_t WorldStore::next_grid() {
 
 Result<std::optional<std::vector<std::byte>>> WorldStore::value(std::string_view name) const {
   return WorldParts::find(*this, {part::kValue, std::string(name)});
+}
+
+Result<std::optional<std::vector<std::byte>>> WorldStore::thumbnail() const {
+  return WorldParts::find(*this, {part::kThumbnail, std::int64_t{0}});
 }
 
 Result<std::optional<PartBody>> WorldParts::find(const WorldStore& world, const PartKey& key) {

@@ -1,0 +1,85 @@
+#include <algorithm>
+
+#include <quoin/store/world_care.h>
+#include <quoin/store/world_meshes.h>
+#include <quoin/store/world_saver.h>
+#include <quoin/store/world_store.h>
+
+#include "convert/convert.h"
+#include "interrupt.h"
+#include "scene_content.h"
+#include "stopwatch.h"
+
+namespace quoin::tool {
+
+namespace {
+
+constexpr std::size_t kMaxLines = 20;
+
+void tell_lost(const std::vector<std::string>& lines, std::vector<std::string>& warnings) {
+  for (std::size_t i = 0; i < std::min(lines.size(), kMaxLines); ++i) warnings.push_back(lines[i]);
+  if (lines.size() > kMaxLines) {
+    warnings.push_back("and " + std::to_string(lines.size() - kMaxLines) + " more (quoin world check)");
+  }
+}
+
+}  // namespace
+
+Result<Outcome> copy_world_file(const ConvertOptions& options) {
+  Stopwatch watch;
+  catch_interrupts();
+  Outcome outcome;
+  outcome.files = {options.output};
+  ProgressBar bar(!options.is_one_of_many);
+  const auto copied = copy_world(options.common.input, options.output, bar.listener("copying"));
+  if (!copied) return copied.error();
+  outcome.content = {static_cast<std::int64_t>(copied->voxels), static_cast<std::int64_t>(copied->samples)};
+  outcome.bytes = copied->bytes;
+  std::vector<std::string> lines;
+  for (const WorldDamage& lost : copied->lost) lines.push_back("left out: " + lost.what);
+  tell_lost(lines, outcome.warnings);
+  outcome.seconds.write = watch.lap();
+  return outcome;
+}
+
+bool meshes_by_chunks(const ConvertOptions& options) {
+  const bool is_blocky = options.mesher.empty() || options.mesher == "greedy" || options.mesher == "culled";
+  return is_blocky && options.texture == "palette" && !options.light && !options.animate &&
+         !options.has_field_occlusion && !options.simplify && !options.smoothness && !options.colours && !options.apart;
+}
+
+Result<std::optional<Outcome>> mesh_world_file(const ConvertOptions& options) {
+  Stopwatch watch;
+  const auto world = WorldStore::open(options.common.input, WorldAccess::Read, options.common.threads);
+  if (!world) return world.error();
+  auto loaded = load_partial_world(*world, options.common.load);
+  if (!loaded) return loaded.error();
+  const auto values = world->value_names();
+  if (!values) return values.error();
+  catch_interrupts();
+  Outcome outcome;
+  outcome.warnings = std::move(loaded->loaded.warnings);
+  outcome.seconds.read = watch.lap();
+  outcome.mesher = options.mesher.empty() ? "greedy" : options.mesher;
+  ProgressBar bar(!options.is_one_of_many);
+  WorldMeshOptions wanted;
+  wanted.scene.mesh = {outcome.mesher == "greedy", !options.occlusion_off, options.watertight, {}};
+  wanted.scene.instances = options.common.instances();
+  wanted.folder = options.output.parent_path();
+  auto made = mesh_world(*world, *loaded, wanted, options.common.threads, bar.listener("meshing"));
+  if (!made && made.error().code == ErrorCode::Unsupported) return std::optional<Outcome>();
+  if (!made) return made.error();
+  outcome.content.voxels = made->voxels;
+  outcome.faces = {made->meshes.stats.faces_visible, made->meshes.stats.faces_total};
+  outcome.seconds.mesh = watch.lap();
+  tell_lost(made->broken, outcome.warnings);
+  warn_of_values(values->size(), outcome.warnings);
+  const Scene& scene = loaded->loaded.scene;
+  warn_of_left_out(scene, wanted.scene.instances, outcome.warnings);
+  warn_of_lamps(scene, outcome.warnings);
+  warn_of_data(made->voxels_with_data, outcome.warnings);
+  if (auto done = write_meshes(made->meshes, options, bar, outcome); !done) return done.error();
+  return std::optional(std::move(outcome));
+}
+
+}  // namespace quoin::tool

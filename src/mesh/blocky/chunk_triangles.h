@@ -1,0 +1,27 @@
+#pragma once
+
+#include <vector>
+
+#include <quoin/mesh/blocky.h>
+
+#include "mesh/blocky/watertight.h"
+
+namespace quoin {
+
+/// Turns the quads of chunks into triangles, chunk after chunk.
+class ChunkTriangles {
+ public:
+  ChunkTriangles(const VoxelRegistry& types, bool watertight);
+
+  /// Appends those of one chunk, and counts its faces and quads.
+  /// Errors: LimitExceeded when a surface class needs more than about 2^32 vertices.
+  [[nodiscard]] Status append(const QuadBuffer& quads, IVec3 chunk, BlockyMesh& mesh);
+
+ private:
+  std::vector<SurfaceClass> classes_;  // [VoxelType]
+  bool watertight_;
+  OutlineFinder finder_;
+  std::vector<OutlinePoint> outline_;
+};
+
+}  // namespace quoin

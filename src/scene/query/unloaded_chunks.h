@@ -1,0 +1,79 @@
+#pragma once
+
+// What of partial grids is not loaded, as rays and shapes meet it: cubes of the size of a chunk, in a space whose units
+// are chunks. Between the samples of a field a point is known where all eight around it are: what is asked of a field
+// is asked of the point, and of those a sample farther along each axis.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <type_traits>
+
+#include <glm/common.hpp>
+
+#include <quoin/core/direction.h>
+#include <quoin/scene/scene_query.h>
+#include <quoin/trace/ray.h>
+
+#include "grid/long_box.h"
+#include "scene/query/query_in_grid.h"
+#include "scene/tracer/placed_grid.h"
+
+namespace quoin {
+
+/// The chunks of a placed grid as voxels: solid where they are not loaded, air where they are.
+class UnloadedReader {
+ public:
+  /// `asks_voxels`: also of the voxels, and not of the field alone.
+  UnloadedReader(const SceneGrid& grid, bool asks_voxels) : grid_(&grid), asks_voxels_(asks_voxels) {}
+  [[nodiscard]] VoxelType get(IVec3 chunk) const {
+    const bool is_loaded = (!asks_voxels_ || grid_->grid.is_loaded(chunk)) && grid_->field.is_loaded(chunk);
+    return is_loaded ? kAir : VoxelType{1};
+  }
+
+ private:
+  const SceneGrid* grid_;
+  bool asks_voxels_;
+};
+
+/// All chunks that can be not loaded.
+inline IBox chunks_of_world() {
+  return {IVec3(kMinChunk + 1), IVec3(kMaxChunk)};
+}
+
+/// Calls `ask(offset in chunks, reader)` for a point, and where the grid has a partial field for those of the seven
+/// samples around it.
+template <class Ask>
+void for_each_corner(const SceneGrid& grid, const Ask& ask) {
+  const int count = grid.field.is_partial() ? 8 : 1;
+  for (int i = 0; i < count; ++i) {
+    ask(DVec3(i & 1, i >> 1 & 1, i >> 2) / double{kChunkEdge}, UnloadedReader(grid, i == 0));
+  }
+}
+
+/// Whether all chunks are loaded that a box, in chunks, may ask of. False where that would be a long list.
+inline bool is_surely_loaded(const SceneGrid& grid, const DBox& bounds) {
+  constexpr double kFew = 256.0;
+  const DBox all{bounds.min - 1e-6, bounds.max + 1e-6 + (grid.field.is_partial() ? 1.0 / kChunkEdge : 0.0)};
+  const IBox chunks = voxels_within(all, chunks_of_world());
+  const DVec3 size = DVec3(chunks.max) - DVec3(chunks.min);
+  if (size.x * size.y * size.z > kFew) return false;
+  const UnloadedReader reader(grid, true);
+  for (int z = chunks.min.z; z < chunks.max.z; ++z) {
+    for (int y = chunks.min.y; y < chunks.max.y; ++y) {
+      for (int x = chunks.min.x; x < chunks.max.x; ++x) {
+        if (reader.get({x, y, z}) != kAir) return false;
+      }
+    }
+  }
+  return true;
+}
+
+/// The first chunk that is not loaded along a ray in chunks, up to and including `max_t`; as `first_hit` of voxels.
+/// Cost: O(loaded chunks on the ray).
+[[nodiscard]] std::optional<RayHit> first_unloaded(const SceneGrid& grid, const Ray& ray_in_chunks, double max_t);
+
+}  // namespace quoin

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include <quoin/core/parallel.h>
+#include <quoin/grid/chunk.h>
+#include <quoin/store/world_store.h>
+
+#include "core/coordinates/coordinate_hash.h"
+
+namespace quoin::store {
+
+/// The chunks of a grid of a world, level 0, of which the last ones used are in memory.
+class ChunkCache {
+ public:
+  /// `bytes`: of voxels that are kept. `world` must outlive it. Errors of reading keys: `status`.
+  ChunkCache(const WorldStore& world, std::uint32_t grid, std::size_t bytes);
+  /// What went wrong with reading the world as such.
+  [[nodiscard]] const Status& status() const { return status_; }
+
+  /// All that there are, by z, then y, then x.
+  [[nodiscard]] std::span<const IVec3> places() const { return places_; }
+  /// Reads those that are not there yet, on several threads; places that hold none are left out.
+  void load(std::span<const IVec3> places, Threads threads);
+  /// Null where there is none, or it is not loaded. Lifetime: until the next `trim`.
+  [[nodiscard]] const Chunk* find(IVec3 place) const;
+  /// Lets those go that were not loaded last and do not fit any more.
+  void trim();
+
+  /// Of all that was read, each chunk once: voxels that are not air, those with data.
+  [[nodiscard]] std::int64_t voxels() const { return voxels_; }
+  [[nodiscard]] std::int64_t data() const { return data_; }
+  [[nodiscard]] bool has_densities() const { return has_densities_; }
+  /// A line for each chunk that is damaged, which counts as air.
+  [[nodiscard]] const std::vector<std::string>& damage() const { return damage_; }
+
+ private:
+  struct Entry {
+    Chunk chunk{kAir};
+    std::uint64_t used = 0;
+  };
+
+  const WorldStore& world_;
+  std::uint32_t grid_;
+  std::size_t max_bytes_;
+  std::size_t bytes_ = 0;
+  std::uint64_t now_ = 0;
+  Status status_;
+  std::vector<IVec3> places_;
+  std::unordered_map<IVec3, Entry, CoordinateHash> loaded_;
+  std::unordered_set<IVec3, CoordinateHash> counted_;
+  std::int64_t voxels_ = 0;
+  std::int64_t data_ = 0;
+  bool has_densities_ = false;
+  std::vector<std::string> damage_;
+};
+
+}  // namespace quoin::store

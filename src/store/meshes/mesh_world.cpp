@@ -1,0 +1,282 @@
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <condition_variable>
+#include <limits>
+#include <mutex>
+#include <set>
+#include <thread>
+#include <utility>
+
+#include <quoin/core/assert.h>
+#include <quoin/store/world_meshes.h>
+
+#include "core/coordinates/chunk_order.h"
+#include "io/whole_file.h"
+#include "mesh/blocky/chunk_triangles.h"
+#include "scene/meshes/glass_thickness.h"
+#include "store/meshes/chunk_cache.h"
+#include "store/meshes/spool.h"
+
+namespace quoin {
+
+using namespace store;
+
+namespace {
+
+// Chunks that are meshed at once.
+constexpr std::size_t kBatch = 32;
+// What is read of files is not counted as theirs by those who read it: it goes after so long.
+constexpr auto kGiveBack = std::chrono::milliseconds(10);
+
+/// The triangles of a grid, in files.
+class SpooledMesh {
+ public:
+  Status append(const BlockyMesh& mesh, const std::filesystem::path& folder) {
+    for (std::size_t i = 0; i < kSurfaceClasses; ++i) {
+      const BlockyTriangles& from = mesh.surfaces[i];
+      if (from.indices.empty()) continue;
+      Surface& to = surfaces_[i];
+      if (to.vertices + from.positions.size() > std::numeric_limits<std::uint32_t>::max() - 1'024) {
+        return make_error(ErrorCode::LimitExceeded, "the mesh needs more than 2^32 vertices");
+      }
+      std::vector<std::uint32_t> indices = from.indices;
+      for (std::uint32_t& index : indices) index += static_cast<std::uint32_t>(to.vertices);
+      to.vertices += from.positions.size();
+      for (const Status& done :
+           {to.positions.append(from.positions, folder), to.directions.append(from.directions, folder),
+            to.occlusion.append(from.occlusion, folder), to.types.append(from.types, folder),
+            to.indices.append(indices, folder)}) {
+        if (!done) return done;
+      }
+    }
+    return {};
+  }
+  Status finish() {
+    for (Surface& surface : surfaces_) {
+      for (Spool* const spool : surface.all()) {
+        if (auto done = spool->finish(); !done) return done;
+      }
+    }
+    const std::scoped_lock lock(mutex_);
+    giver_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+    return {};
+  }
+  [[nodiscard]] std::vector<MeshView> views() const {
+    std::vector<MeshView> views;
+    for (std::size_t i = 0; i < kSurfaceClasses; ++i) {
+      const Surface& surface = surfaces_[i];
+      if (surface.vertices == 0) continue;
+      MeshView& view = views.emplace_back();
+      view.positions = surface.positions.values<Vec3>();
+      view.indices = surface.indices.values<std::uint32_t>();
+      view.surface = static_cast<SurfaceClass>(i);
+      view.directions = surface.directions.values<Direction>();
+      view.types = surface.types.values<VoxelType>();
+      view.block_occlusion = surface.occlusion.values<std::uint8_t>();
+    }
+    return views;
+  }
+
+ private:
+  struct Surface {
+    std::uint64_t vertices = 0;
+    Spool positions, directions, occlusion, types, indices;
+    std::array<Spool*, 5> all() { return {&positions, &directions, &occlusion, &types, &indices}; }
+  };
+
+  void run(const std::stop_token& stop) {
+    std::unique_lock lock(mutex_);
+    while (!wake_.wait_for(lock, stop, kGiveBack, [] { return false; }) && !stop.stop_requested()) {
+      for (Surface& surface : surfaces_) {
+        for (const Spool* const spool : surface.all()) spool->give_back();
+      }
+    }
+  }
+
+  std::array<Surface, kSurfaceClasses> surfaces_;
+  std::mutex mutex_;
+  std::condition_variable_any wake_;
+  std::jthread giver_;  // last: it ends first
+};
+
+/// Reads voxels of a grid, whichever chunks they are in.
+class CachedReader {
+ public:
+  CachedReader(ChunkCache& cache, Threads threads) : cache_(cache), threads_(threads) {}
+  VoxelType get(IVec3 voxel) {
+    const IVec3 place = chunk_of(voxel);
+    if (chunk_ == nullptr || place != place_) {
+      cache_.trim();
+      cache_.load({&place, 1}, threads_);
+      chunk_ = cache_.find(place);
+      place_ = place;
+    }
+    return chunk_ == nullptr ? kAir : chunk_->get(local_of(voxel));
+  }
+
+ private:
+  ChunkCache& cache_;
+  Threads threads_;
+  const Chunk* chunk_ = nullptr;
+  IVec3 place_{0};
+};
+
+class WorldMesher {
+ public:
+  WorldMesher(const WorldStore& world, const LoadedWorld& loaded, const WorldMeshOptions& options, Threads threads,
+              const Progress& progress)
+      : world_(world), loaded_(loaded), options_(options), threads_(threads), progress_(progress) {}
+
+  Result<WorldMeshes> run() {
+    const Scene& scene = loaded_.loaded.scene;
+    BlockySceneOptions wanted = options_.scene;
+    wanted.part_of = [this](GridHandle grid, MeshStats& stats) { return part_of_grid(grid, stats); };
+    auto meshes = mesh_scene(scene, wanted, threads_, {});
+    if (!meshes) return meshes.error();
+    made_.meshes = std::move(*meshes);
+    // What nothing places is counted all the same.
+    for (const GridHandle grid : scene.grids().handles()) {
+      if (meshed_.contains(grid)) continue;
+      ChunkCache cache(world_, number_of(grid), options_.cache_bytes);
+      if (auto done = read_all(cache); !done) return done.error();
+    }
+    return std::move(made_);
+  }
+
+ private:
+  [[nodiscard]] std::uint32_t number_of(GridHandle grid) const {
+    const auto number = loaded_.saver.number_of(grid);
+    QUOIN_ASSERT(number.has_value(), "a grid that was read has a number");
+    return *number;
+  }
+  [[nodiscard]] Status cancelled() const {
+    return make_error(ErrorCode::Cancelled, "cancelled", world_.path().string());
+  }
+  [[nodiscard]] static Status densities() {
+    return make_error(ErrorCode::Unsupported, "it holds densities, which are meshed as a whole");
+  }
+  [[nodiscard]] Error of_folder(Error error) const {
+    if (error.code == ErrorCode::CannotWrite) error.path = options_.folder.empty() ? "." : options_.folder.string();
+    return error;
+  }
+  void count(const ChunkCache& cache) {
+    made_.voxels += cache.voxels();
+    made_.voxels_with_data += cache.data();
+    made_.broken.insert(made_.broken.end(), cache.damage().begin(), cache.damage().end());
+  }
+
+  Status read_all(ChunkCache& cache) {
+    const std::span<const IVec3> places = cache.places();
+    for (std::size_t i = 0; cache.status() && i < places.size(); i += kBatch) {
+      cache.load(places.subspan(i, std::min(kBatch, places.size() - i)), threads_);
+      cache.trim();
+      if (progress_ && !progress_(1.0)) return cancelled();
+    }
+    count(cache);
+    return cache.status();
+  }
+
+  Result<MeshPart> part_of_grid(GridHandle grid, MeshStats& stats) {
+    meshed_.insert(grid);
+    ChunkCache cache(world_, number_of(grid), options_.cache_bytes);
+    auto spooled = std::make_shared<SpooledMesh>();
+    ChunkTriangles triangles(loaded_.loaded.scene.types, options_.scene.mesh.watertight);
+    const std::span<const IVec3> places = cache.places();
+    for (std::size_t i = 0; i < places.size(); i += kBatch) {
+      const auto batch = places.subspan(i, std::min(kBatch, places.size() - i));
+      BlockyMesh mesh;
+      Status done = mesh_batch(batch, cache, triangles, mesh);
+      if (!done) return done.error();
+      if (auto spool = spooled->append(mesh, options_.folder); !spool) return of_folder(spool.error());
+      stats.faces_visible += mesh.faces_visible;
+      stats.quads += mesh.quads;
+      stats.triangles += mesh.triangle_count();
+      stats.vertices += mesh.vertex_count();
+      if (progress_ && !progress_(static_cast<double>(i) / static_cast<double>(places.size()))) {
+        return cancelled().error();
+      }
+    }
+    if (!cache.status()) return cache.status().error();
+    stats.faces_total += 6 * cache.voxels();
+    count(cache);
+    if (auto done = spooled->finish(); !done) return of_folder(done.error());
+    MeshPart part{{}, spooled->views(), DVec3(0.0), spooled};
+    CachedReader reader(cache, threads_);
+    part.thickness = glass_thickness(reader, part.surfaces);
+    return part;
+  }
+
+  Status mesh_batch(std::span<const IVec3> batch, ChunkCache& cache, ChunkTriangles& triangles,
+                    BlockyMesh& mesh) const {
+    std::vector<IVec3> around;
+    for (const IVec3 chunk : batch) {
+      for (int i = 0; i < 27; ++i) around.push_back(chunk + IVec3(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
+    }
+    sort_and_unite(around);
+    cache.load(around, threads_);
+    if (!cache.status()) return cache.status();
+    if (cache.has_densities()) return densities();
+    Grid window;
+    for (const IVec3 place : around) {
+      if (const Chunk* const chunk = cache.find(place)) window.put_chunk(place, *chunk);
+    }
+    cache.trim();
+    std::vector<QuadBuffer> quads(batch.size());
+    const std::size_t tasks = std::min<std::size_t>(batch.size(), thread_count(threads_));
+    parallel_for(tasks, threads_, [&](std::size_t task) {
+      BlockyMesher mesher;
+      QuadOptions options;
+      options.merge = options_.scene.mesh.merge;
+      options.bake_occlusion = options_.scene.mesh.bake_occlusion;
+      for (std::size_t i = task; i < batch.size(); i += tasks) {
+        mesher.mesh(window.neighbourhood(batch[i]), loaded_.loaded.scene.types, options, quads[i]);
+      }
+    });
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      if (auto done = triangles.append(quads[i], batch[i], mesh); !done) return done;
+    }
+    return {};
+  }
+
+  const WorldStore& world_;
+  const LoadedWorld& loaded_;
+  const WorldMeshOptions& options_;
+  Threads threads_;
+  const Progress& progress_;
+  std::set<GridHandle> meshed_;
+  WorldMeshes made_;
+};
+
+}  // namespace
+
+Result<WorldMeshes> mesh_world(const WorldStore& world, const LoadedWorld& loaded, const WorldMeshOptions& options,
+                               Threads threads, const Progress& progress) {
+  QUOIN_ASSERT(!options.scene.atlas && !options.scene.cut && !options.scene.mesh.cut, "as the header says");
+  return with_path(WorldMesher(world, loaded, options, threads, progress).run(), world.path());
+}
+
+std::optional<std::uint64_t> memory_of_world(const WorldStore& world) {
+  constexpr std::size_t kSamples = 64;
+  const auto grids = world.grids();
+  if (!grids) return std::nullopt;
+  double total = 0.0;
+  for (const auto& [number, grid] : *grids) {
+    const auto places = world.chunks(number, 0);
+    if (!places) return std::nullopt;
+    double bytes = 0.0;
+    std::size_t read = 0;
+    const std::size_t step = std::max<std::size_t>(places->size() / kSamples, 1);
+    for (std::size_t i = 0; i < places->size(); i += step) {
+      const auto chunk = world.load_chunk({number, 0, (*places)[i]});
+      if (!chunk || !*chunk) continue;
+      ++read;
+      bytes += static_cast<double>((*chunk)->voxels.bytes());
+      if ((*chunk)->densities) bytes += static_cast<double>((*chunk)->densities->bytes());
+    }
+    if (read != 0) total += bytes / static_cast<double>(read) * static_cast<double>(places->size());
+  }
+  return static_cast<std::uint64_t>(total);
+}
+
+}  // namespace quoin

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+namespace quoin::store {
+
+/// Values that are written once, in order, and then read: in a file without a name, which is gone with it.
+class Spool {
+ public:
+  Spool() = default;
+  Spool(Spool&& other) noexcept;
+  Spool& operator=(Spool&& other) noexcept;
+  ~Spool();
+
+  /// Errors: CannotWrite (a full disk, a folder that is not there).
+  [[nodiscard]] Status append(std::span<const std::byte> bytes, const std::filesystem::path& folder);
+  template <class T>
+  [[nodiscard]] Status append(const std::vector<T>& values, const std::filesystem::path& folder) {
+    return append(std::as_bytes(std::span(values)), folder);
+  }
+  /// From now on it is read. Errors: as `append`.
+  [[nodiscard]] Status finish();
+
+  /// Lifetime: as the spool. Requires: finished, and written as values of that type.
+  template <class T>
+  [[nodiscard]] std::span<const T> values() const {
+    return {static_cast<const T*>(mapped_), static_cast<std::size_t>(written_) / sizeof(T)};
+  }
+  [[nodiscard]] std::uint64_t bytes() const { return written_ + buffer_.size(); }
+  /// Takes what was read out of the process's memory; it is read again from the file when it is needed.
+  void give_back() const;
+
+ private:
+  [[nodiscard]] Status write_buffer();
+
+  int file_ = -1;
+  std::vector<std::byte> buffer_;
+  std::uint64_t written_ = 0;
+  void* mapped_ = nullptr;
+};
+
+}  // namespace quoin::store
