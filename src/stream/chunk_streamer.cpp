@@ -57,8 +57,9 @@ std::shared_ptr<const ChunkGenerator> ChunkStreamer::generator_of(std::uint32_t 
   return found == generators_.end() ? nullptr : found->second;
 }
 
-void ChunkStreamer::post(Note note) {
+void ChunkStreamer::post(Note note, bool hurries) {
   if (note.empty()) return;
+  hurries |= note.wishes.has_value();
   {
     const std::scoped_lock lock(inbox_mutex_);
     if (note.wishes) inbox_.wishes = std::move(note.wishes);
@@ -67,7 +68,7 @@ void ChunkStreamer::post(Note note) {
     ++posted_;
   }
   ++signal_;
-  signal_.notify_one();  // whoever plans tells the others
+  if (hurries) signal_.notify_one();  // whoever plans tells the others
 }
 
 void ChunkStreamer::take(Outbox& out) {
@@ -94,6 +95,7 @@ void ChunkStreamer::wait() {
     const std::scoped_lock lock(inbox_mutex_);
     posted = posted_;
   }
+  signal_.notify_one();
   std::unique_lock lock(outbox_mutex_);
   came_.wait(lock, [&] { return !outbox_.arrivals.empty() || (working_ == 0 && !has_more_ && told_posts_ >= posted); });
 }

@@ -83,7 +83,8 @@ class ChunkStreamer {
   /// Null: what is not in the world is air.
   void set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator);
   [[nodiscard]] std::shared_ptr<const ChunkGenerator> generator_of(std::uint32_t grid) const;
-  void post(Note note);
+  /// Where nothing hurries, who waits for work is not woken: that takes the caller longer than all else here.
+  void post(Note note, bool hurries = true);
   /// What came since the last call; the numbers are those of the present.
   void take(Outbox& out);
   /// Returns once something came, or nothing is left to do for what was posted.

@@ -49,8 +49,8 @@ constexpr std::size_t kMaxAsked = 1024;
 constexpr double kMaxRadius = 1e12;
 // Of a chunk that is loaded, besides its voxels and densities: marks, sizes and states, bytes.
 constexpr std::size_t kChunkBytes = 256;
-// Journals keep some thousand records: after so many chunks that came or went it is time to read them.
-constexpr std::size_t kMaxMoved = 4000;
+// After so many chunks that came or went it is time to save: what saves reads of the journals is so never much at once.
+constexpr std::size_t kMaxMoved = 48;
 // Eyes that moved less, voxels, or turned less (cosine) see the same.
 constexpr double kMoves = 12.0;
 constexpr double kTurns = 0.94;
@@ -146,6 +146,7 @@ struct StreamedWorld::Impl {
   Status update(std::span<const Viewer> viewers, double seconds);
   Status plan(std::span<const Viewer> viewers);
   void tell_workers();
+  [[nodiscard]] bool has_chunks_to_move() const { return !arrivals.empty() || (!is_edited && !leaving.empty()); }
   void take_in();
   void move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note);
   void follow_instances();
@@ -561,7 +562,7 @@ Status StreamedWorld::Impl::update(std::span<const Viewer> viewers, double secon
 
 void StreamedWorld::Impl::tell_workers() {
   wish(unposted);
-  streamer.post(std::exchange(unposted, {}));
+  streamer.post(std::exchange(unposted, {}), !has_chunks_to_move());
 }
 
 std::size_t StreamedWorld::Impl::waiting_chunks() const {
@@ -745,7 +746,7 @@ Status StreamedWorld::plan(std::span<const Viewer> viewers) {
 }
 
 bool StreamedWorld::has_chunks_to_move() const {
-  return !impl_->arrivals.empty() || (!impl_->is_edited && !impl_->leaving.empty());
+  return impl_->has_chunks_to_move();
 }
 
 Status StreamedWorld::load_all(std::span<const Viewer> viewers) {

@@ -204,7 +204,7 @@ void WorldWriter::finish(Save group, const Status& outcome) {
     if (outcome) {
       forget_pending(group);
       saved_through_ = group.last;
-      ++stats_.commits;
+      stats_.commits += group.changes.empty() ? 0 : 1;
       stats_.saved_chunks += chunks_of_commit_;
       stats_.saved_bytes += bytes_of_commit_;
     } else {
@@ -231,6 +231,7 @@ Result<Statement*> WorldWriter::ready(const char* sql) {
 Status WorldWriter::write(const ChangeSet& changes) {
   chunks_of_commit_ = 0;
   bytes_of_commit_ = 0;
+  if (changes.empty() && !needs_version_) return {};  // what was saved before is on disk
   ++revision_;
   Status outcome = connection_.run("BEGIN IMMEDIATE");
   if (outcome) outcome = write_all(changes);
