@@ -1,5 +1,9 @@
 #include "stream/chunk_streamer.h"
 
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
+
 #include <chrono>
 #include <new>
 #include <utility>
@@ -12,10 +16,23 @@ namespace {
 // Bytes that wait to be written, from which on nothing is made until there are fewer.
 constexpr std::uint64_t kMaxPendingBytes = std::uint64_t{128} << 20;
 constexpr std::size_t kMaxProblems = 1000;
+// After so many bytes of chunks that went memory is given back to the system.
+constexpr std::size_t kTrimBytes = std::size_t{16} << 20;
 
 std::string name_of(const ChunkPlace& place) {
   return "chunk (" + std::to_string(place.chunk.x) + ", " + std::to_string(place.chunk.y) + ", " +
          std::to_string(place.chunk.z) + ") of grid " + std::to_string(place.grid);
+}
+
+std::size_t bytes_of(const StoredChunk& chunk) {
+  return chunk.voxels.bytes() + (chunk.densities ? chunk.densities->bytes() : 0);
+}
+
+// What was let go of lies between what is kept: allocators give such pages back only when they are asked to.
+void trim_heaps() {
+#if defined(__GLIBC__)
+  ::malloc_trim(0);
+#endif
 }
 
 template <class T>
@@ -71,6 +88,13 @@ void ChunkStreamer::post(Note note, bool hurries) {
   if (hurries) signal_.notify_one();  // whoever plans tells the others
 }
 
+void ChunkStreamer::set_room(std::int64_t bytes, std::int64_t each) {
+  each_ = each;
+  if (room_.exchange(bytes) > 0 || bytes <= 0) return;
+  ++signal_;
+  signal_.notify_all();
+}
+
 void ChunkStreamer::take(Outbox& out) {
   out.arrivals.clear();
   out.problems.clear();
@@ -96,6 +120,8 @@ void ChunkStreamer::wait() {
     posted = posted_;
   }
   signal_.notify_one();
+  // It is the caller who makes room.
+  if (room_ <= 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   std::unique_lock lock(outbox_mutex_);
   came_.wait(lock, [&] { return !outbox_.arrivals.empty() || (working_ == 0 && !has_more_ && told_posts_ >= posted); });
 }
@@ -108,6 +134,7 @@ void ChunkStreamer::read_inbox() {
     std::swap(note, inbox_);
     read_posts_ = posted_;
   }
+  for (const StoredChunk& chunk : note.let_go) let_go_bytes_ += bytes_of(chunk);
   for (const Event& event : note.events) {
     if (event.what == Event::What::Gone) {
       plan_.forget(event.place);
@@ -137,10 +164,16 @@ void ChunkStreamer::tell() {
     outbox_.wanted = plan_.wanted();
     outbox_.missing = missing;
     outbox_.complete_radius = complete_radius;
-    has_more_ = plan_.has_next();
+    has_more_ = plan_.has_next(has_room());
     told_posts_ = read_posts_;
   }
   came_.notify_all();
+}
+
+// Few chunks come in any case, so that nobody stands in nothing.
+bool ChunkStreamer::has_room() const {
+  constexpr std::size_t kFew = 64;
+  return room_ > 0 || plan_.max_chunks() <= kFew;
 }
 
 void ChunkStreamer::run() {
@@ -157,7 +190,7 @@ void ChunkStreamer::run() {
       tell();
     }
     ChunkPlace place;
-    if (!plan_.next(place)) {
+    if (!plan_.next(place, has_room())) {
       tell();
       lock.unlock();
       signal_.wait(seen);
@@ -168,9 +201,15 @@ void ChunkStreamer::run() {
       const std::scoped_lock outbox(outbox_mutex_);
       ++working_;
     }
-    if (is_new && plan_.has_next()) signal();
+    if (is_new && plan_.has_next(has_room())) signal();
+    const bool must_trim = let_go_bytes_ > kTrimBytes;
+    if (must_trim) let_go_bytes_ = 0;
     lock.unlock();
+    if (must_trim) trim_heaps();
+    const std::int64_t reserved = each_;
+    room_ -= reserved;
     Arrival arrival = fetch(place);
+    room_ += reserved - static_cast<std::int64_t>(bytes_of(arrival.chunk));
     {
       const std::scoped_lock outbox(outbox_mutex_);
       outbox_.arrivals.push_back(std::move(arrival));

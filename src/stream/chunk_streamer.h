@@ -85,14 +85,18 @@ class ChunkStreamer {
   [[nodiscard]] std::shared_ptr<const ChunkGenerator> generator_of(std::uint32_t grid) const;
   /// Where nothing hurries, who waits for work is not woken: that takes the caller longer than all else here.
   void post(Note note, bool hurries = true);
+  /// How many bytes of chunks may be read or made besides those that workers are at, and what one may take; what edits
+  /// wait for comes in any case.
+  void set_room(std::int64_t bytes, std::int64_t each);
   /// What came since the last call; the numbers are those of the present.
   void take(Outbox& out);
-  /// Returns once something came, or nothing is left to do for what was posted.
+  /// Returns once something came, or nothing is left to do for what was posted, or there is no room for it.
   void wait();
 
  private:
   void run();
   void read_inbox();
+  [[nodiscard]] bool has_room() const;
   [[nodiscard]] Arrival fetch(const ChunkPlace& place);
   void read_or_make(Arrival& arrival);
   void make(const ChunkGenerator& generator, Arrival& arrival);
@@ -113,7 +117,10 @@ class ChunkStreamer {
   std::map<std::uint32_t, std::shared_ptr<const ChunkGenerator>> generators_;
   std::uint64_t read_posts_ = 0;
   std::uint64_t plans_ = 0;
+  std::size_t let_go_bytes_ = 0;  ///< since memory was given back
   std::atomic<bool> is_ending_{false};
+  std::atomic<std::int64_t> room_{0};  ///< bytes
+  std::atomic<std::int64_t> each_{0};
   std::atomic<std::uint32_t> signal_{0};  ///< raised when there may be something to do
 
   std::mutex outbox_mutex_;

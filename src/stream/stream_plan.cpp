@@ -184,7 +184,7 @@ void StreamPlan::find_leaving() {
   std::ranges::reverse(leaving_);
 }
 
-bool StreamPlan::next(ChunkPlace& place) {
+bool StreamPlan::next(ChunkPlace& place, bool has_room) {
   const auto take_from = [&](const std::vector<ChunkPlace>& places, std::size_t& at) {
     while (at < places.size()) {
       place = places[at++];
@@ -195,7 +195,7 @@ bool StreamPlan::next(ChunkPlace& place) {
     }
     return false;
   };
-  return take_from(wishes_.asked, asked_) || take_from(queue_, next_);
+  return take_from(wishes_.asked, asked_) || (has_room && take_from(queue_, next_));
 }
 
 std::vector<ChunkPlace> StreamPlan::take_leaving() {

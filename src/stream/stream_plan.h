@@ -49,9 +49,13 @@ class StreamPlan {
 
   /// Takes over what is wanted, and finds anew what is to be loaded.
   void plan(Wishes wishes);
-  /// The next chunk to load, which then counts as begun. False where there is none.
-  bool next(ChunkPlace& place);
-  [[nodiscard]] bool has_next() const { return asked_ < wishes_.asked.size() || next_ < queue_.size(); }
+  /// The next chunk to load, which then counts as begun. False where there is none. Without `has_room` only what edits
+  /// wait for is loaded.
+  bool next(ChunkPlace& place, bool has_room);
+  [[nodiscard]] bool has_next(bool has_room) const {
+    return asked_ < wishes_.asked.size() || (has_room && next_ < queue_.size());
+  }
+  [[nodiscard]] std::size_t max_chunks() const { return wishes_.max_chunks; }
   /// Those that are to go, farthest first, since the last call.
   [[nodiscard]] std::vector<ChunkPlace> take_leaving();
 
