@@ -95,7 +95,10 @@ class ChunkStreamer {
 
  private:
   void run();
+  bool work_once();
   void read_inbox();
+  void hand_over(Arrival arrival);
+  void note_shortage();
   [[nodiscard]] bool has_room() const;
   [[nodiscard]] Arrival fetch(const ChunkPlace& place);
   void read_or_make(Arrival& arrival);
@@ -115,6 +118,8 @@ class ChunkStreamer {
   mutable std::mutex plan_mutex_;  ///< of what follows
   StreamPlan plan_;
   std::map<std::uint32_t, std::shared_ptr<const ChunkGenerator>> generators_;
+  Note reading_;  ///< of it the first events have been read
+  std::size_t read_events_ = 0;
   std::uint64_t read_posts_ = 0;
   std::uint64_t plans_ = 0;
   std::size_t let_go_bytes_ = 0;  ///< since memory was given back
@@ -127,6 +132,7 @@ class ChunkStreamer {
   Outbox outbox_;
   std::condition_variable came_;
   std::size_t working_ = 0;
+  bool is_short_ = false;  ///< of memory, since the caller was told last
   std::uint64_t told_posts_ = 0;
   bool has_more_ = false;
 

@@ -16,8 +16,8 @@ constexpr double kGuessedRatio = 1.5;
 // rest comes later.
 constexpr double kRises = 3.0;
 constexpr double kFalls = 8.0;
-// Of the budget: what allocators take besides is not counted.
-constexpr double kShareOfBudget = 0.97;
+// Of the budget: the rest is what allocators keep between what is used, of what was let go of.
+constexpr double kShareOfBudget = 0.9;
 
 }  // namespace
 
@@ -33,7 +33,8 @@ void StreamBudget::set_others(std::size_t reported, std::size_t pending, bool is
     fixed_ = std::min(fixed_, reported);
   }
   if (is_told_ && (is_other || is_quiet) && chunks_ >= kGuessBelow) {
-    const double found = static_cast<double>(reported - fixed_) / static_cast<double>(std::max(chunk_bytes_, std::size_t{1}));
+    const double found =
+        static_cast<double>(reported - fixed_) / static_cast<double>(std::max(chunk_bytes_, std::size_t{1}));
     ratio_ += (found - ratio_) * (1.0 - std::exp(-seconds / (found > ratio_ ? kRises : kFalls)));
   }
   reported_ = reported;

@@ -49,9 +49,6 @@ constexpr double kMaxRadius = 1e12;
 constexpr std::size_t kChunkBytes = 256;
 // After so many chunks that came or went it is time to save: what saves reads of the journals is so never much at once.
 constexpr std::size_t kMaxMoved = 48;
-// Eyes that moved less, voxels, or turned less (cosine) see the same.
-constexpr double kMoves = 12.0;
-constexpr double kTurns = 0.94;
 constexpr auto kAskOthers = std::chrono::milliseconds(100);
 // Between plans that the budget alone is the reason of, seconds.
 constexpr double kReplan = 0.2;
@@ -93,7 +90,6 @@ class DiskOutcome {
 }  // namespace
 
 struct StreamedWorld::Impl {
-  using Edits = std::vector<std::shared_ptr<const WorldEdit>>;
   struct Streamed {
     GridHandle handle;
     std::uint32_t number = 0;
@@ -101,28 +97,9 @@ struct StreamedWorld::Impl {
     ChangeCursor voxels, data, densities;
     std::unordered_map<IVec3, std::size_t, CoordinateHash> sizes;  // of what is loaded, bytes
     std::unordered_set<IVec3, CoordinateHash> kept;  // edited, where the world may not be written: they stay
-    std::unordered_map<IVec3, Edits, CoordinateHash> waiting;
+    WaitingEdits waiting;
     std::unordered_set<IVec3, CoordinateHash> broken;
-
-    // Keeps an edit for chunks that are not loaded; of many voxels for each its own.
-    void wait_for(const WorldEdit& edit, const std::vector<IVec3>& chunks) {
-      if (const auto* const set = std::get_if<WorldEdit::SetVoxels>(&edit.content)) {
-        std::unordered_map<IVec3, WorldEdit::SetVoxels, CoordinateHash> parts;
-        for (const IVec3 chunk : chunks) parts[chunk];
-        for (const PlacedVoxel& voxel : set->voxels) {
-          const auto part = parts.find(chunk_of(voxel.voxel));
-          if (part != parts.end()) part->second.voxels.push_back(voxel);
-        }
-        for (auto& [chunk, part] : parts) {
-          waiting[chunk].push_back(std::make_shared<const WorldEdit>(WorldEdit{edit.grid, std::move(part)}));
-        }
-        return;
-      }
-      const auto shared = std::make_shared<const WorldEdit>(edit);
-      for (const IVec3 chunk : chunks) waiting[chunk].push_back(shared);
-    }
   };
-  using Eyes = std::map<std::uint32_t, std::vector<Eye>>;
 
   Impl(WorldStore opened_store, LoadedWorld opened_world, StreamOptions wanted, bool made)
       : options(std::move(wanted)),
@@ -190,7 +167,7 @@ struct StreamedWorld::Impl {
   std::size_t arrived_bytes = 0;  // of `arrivals`
   Clock::time_point asked_others{};
   Clock::time_point moved{};  // when a chunk came or went last
-  bool is_edited = false;  // since the last save
+  bool is_edited = false;     // since the last save
   bool has_save_failed = false;
   std::size_t moved_since_save = 0;  // chunks that came or went
   ChangeCursor saved_types;
@@ -249,7 +226,7 @@ void StreamedWorld::Impl::follow_instances() {
   }
 }
 
-StreamedWorld::Impl::Eyes StreamedWorld::Impl::eyes_of(std::span<const Viewer> viewers) {
+Eyes StreamedWorld::Impl::eyes_of(std::span<const Viewer> viewers) {
   follow_instances();
   Eyes found;
   for (auto& [number, grid] : grids) {
@@ -293,22 +270,6 @@ std::size_t StreamedWorld::Impl::chunks_of_budget() const {
   const bool is_stuck = !has_all && !has_chunks_to_move() && budget.room(0) <= 0 && seconds_since(planned) > kReplan;
   return is_stuck ? std::min(fit, planned_chunks * 9 / 10) : fit;
 }
-
-namespace {
-
-bool sees_alike(const Eye& a, const Eye& b) {
-  if (a.radius != b.radius || a.voxel_size != b.voxel_size) return false;
-  if (glm::length(a.position - b.position) > kMoves) return false;
-  return a.direction == b.direction || glm::dot(a.direction, b.direction) >= kTurns;
-}
-
-bool see_alike(const std::map<std::uint32_t, std::vector<Eye>>& a, const std::map<std::uint32_t, std::vector<Eye>>& b) {
-  return std::ranges::equal(a, b, [](const auto& one, const auto& other) {
-    return one.first == other.first && std::ranges::equal(one.second, other.second, sees_alike);
-  });
-}
-
-}  // namespace
 
 void StreamedWorld::Impl::wish(ChunkStreamer::Note& note) {
   const std::size_t fit = chunks_of_budget();
@@ -776,7 +737,7 @@ Status StreamedWorld::apply(const WorldEdit& edit) {
     if (!content->grid.is_loaded(chunk)) absent.push_back(chunk);
   }
   if (!absent.empty()) {
-    grid->wait_for(edit, absent);
+    keep_for(edit, absent, grid->waiting);
     impl_->must_plan = true;
   }
   apply_fitting(edit, content->grid, content->field, scene().types);
