@@ -55,6 +55,10 @@ void ChunkWindow::move_to(const Box& box) {
   voxels_ = std::vector<const ChunkStorage*>(cells, air_);
   entries_ = std::move(entries);
   epochs_ = std::move(epochs);
+  set_box(box);
+}
+
+void ChunkWindow::set_box(const Box& box) {
   box_ = box;
   first_x_ = static_cast<std::uint32_t>(box.first.x);
   first_y_ = static_cast<std::uint32_t>(box.first.y);
@@ -62,8 +66,44 @@ void ChunkWindow::move_to(const Box& box) {
   size_x_ = 1U << box.log[0];
   size_y_ = 1U << box.log[1];
   size_z_ = 1U << box.log[2];
+  mask_x_ = size_x_ - 1;
+  mask_y_ = size_y_ - 1;
+  mask_z_ = size_z_ - 1;
   shift_y_ = box.log[0];
   shift_z_ = box.log[0] + box.log[1];
+}
+
+bool ChunkWindow::is_empty_in(const IBox& chunks) const {
+  for (int z = chunks.min.z; z < chunks.max.z; ++z) {
+    for (int y = chunks.min.y; y < chunks.max.y; ++y) {
+      for (int x = chunks.min.x; x < chunks.max.x; ++x) {
+        if (entries_[cell(x, y, z)] != nullptr) return false;
+      }
+    }
+  }
+  return true;
+}
+
+bool ChunkWindow::slide_to(IVec3 chunk) {
+  const IVec3 size = box_.size();
+  Box slid = box_;
+  for (int axis = 0; axis < 3; ++axis) {
+    IBox left{box_.first, box_.first + size};
+    const int before = left.min[axis] - chunk[axis];
+    const int behind = chunk[axis] - left.max[axis] + 1;
+    const int layers = std::max(before, behind);
+    if (layers <= 0) continue;
+    if (layers > kMaxSlide || layers > size[axis]) return false;
+    slid.first[axis] += before > 0 ? -layers : layers;
+    if (before > 0) {
+      left.min[axis] = left.max[axis] - layers;
+    } else {
+      left.max[axis] = left.min[axis] + layers;
+    }
+    if (!is_empty_in(left)) return false;
+  }
+  set_box(slid);
+  return true;
 }
 
 void ChunkWindow::close() {
@@ -156,6 +196,7 @@ void ChunkTable::place(const IVec3& chunk, ChunkEntry& entry) {
   const std::uint32_t cell = window_.cell(chunk.x, chunk.y, chunk.z);
   if (cell != ChunkWindow::kOutside) return window_.put(cell, &entry, epoch());
   ++outside_;
+  if (slide_to(chunk)) return window_.put(window_.cell(chunk.x, chunk.y, chunk.z), &entry, epoch());
   if (window_.cells() != 0) {
     const ChunkWindow::Box grown = window_.box().grown_to(chunk);
     try {
@@ -164,6 +205,35 @@ void ChunkTable::place(const IVec3& chunk, ChunkEntry& entry) {
     }
   }
   outside_changed();
+}
+
+bool ChunkTable::slide_to(const IVec3& chunk) {
+  if (window_.cells() == 0) return false;
+  const ChunkWindow::Box before = window_.box();
+  if (!window_.slide_to(chunk)) return false;
+  const ChunkWindow::Box& now = window_.box();
+  for (int axis = 0; axis < 3; ++axis) {
+    const int layers = now.first[axis] - before.first[axis];
+    if (layers == 0) continue;
+    IBox come{now.first, now.first + now.size()};
+    if (layers > 0) {
+      come.min[axis] = come.max[axis] - layers;
+    } else {
+      come.max[axis] = come.min[axis] - layers;
+    }
+    take_in(come);
+  }
+  return true;
+}
+
+// Chunks that stood outside, and now may stand in the window.
+void ChunkTable::take_in(const IBox& chunks) {
+  trie_.for_each_in(chunks, [&](IVec3 at, const ChunkEntry& entry) {
+    const std::uint32_t cell = window_.cell(at.x, at.y, at.z);
+    if (window_.entry(cell) != nullptr) return;  // by another axis
+    window_.put(cell, const_cast<ChunkEntry*>(&entry), 0);
+    --outside_;
+  });
 }
 
 // Looks where the chunks are now and then, so that all of it costs no more than a few visits a change.

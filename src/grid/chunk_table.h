@@ -22,14 +22,19 @@ struct ChunkEntry {
 };
 
 /// A box of chunks in which one is found by its place: a pointer for every chunk of the box, there or not.
+///
+///   box from 5 to 12:  8 9 10 11 12 5 6 7    a chunk's place is its coordinate modulo the box's size, so that a box
+///   from 6 to 13:      8 9 10 11 12 13 6 7   that slides along leaves what it goes on holding where it stands
 class ChunkWindow {
  public:
   static constexpr std::uint32_t kOutside = ~std::uint32_t{0};
+  static constexpr int kMaxSlide = 4;
   /// Powers of two along each axis, so that a place is found by shifts.
   struct Box {
     IVec3 first{0};
     std::array<int, 3> log{};
     [[nodiscard]] int log_cells() const { return log[0] + log[1] + log[2]; }
+    [[nodiscard]] IVec3 size() const { return {1 << log[0], 1 << log[1], 1 << log[2]}; }
     /// Doubled on the sides of a chunk until it is inside.
     [[nodiscard]] Box grown_to(IVec3 chunk) const;
   };
@@ -45,7 +50,8 @@ class ChunkWindow {
     const std::uint32_t dz = static_cast<std::uint32_t>(z) - first_z_;
     if (dx >= size_x_ || dy >= size_y_ || dz >= size_z_) [[unlikely]]
       return kOutside;
-    return dx + (dy << shift_y_) + (dz << shift_z_);
+    return (static_cast<std::uint32_t>(x) & mask_x_) + ((static_cast<std::uint32_t>(y) & mask_y_) << shift_y_) +
+           ((static_cast<std::uint32_t>(z) & mask_z_) << shift_z_);
   }
   /// Null where there is no chunk.
   [[nodiscard]] ChunkEntry* entry(std::uint32_t cell) const { return entries_[cell]; }
@@ -66,10 +72,16 @@ class ChunkWindow {
   void forget_voxels(std::uint32_t cell) { voxels_[cell] = nullptr; }
   /// Another box, in which no chunk stands yet. When it throws, all is as it was.
   void move_to(const Box& box);
+  /// Moves the box so that a chunk is inside. False, and nothing has changed, where a chunk stands in what it would
+  /// leave, or that is more than kMaxSlide layers along an axis.
+  bool slide_to(IVec3 chunk);
   /// A box of nothing.
   void close();
 
  private:
+  void set_box(const Box& box);
+  [[nodiscard]] bool is_empty_in(const IBox& chunks) const;
+
   const ChunkStorage* air_;
   std::uint32_t first_x_ = 0;
   std::uint32_t first_y_ = 0;
@@ -77,6 +89,9 @@ class ChunkWindow {
   std::uint32_t size_x_ = 0;
   std::uint32_t size_y_ = 0;
   std::uint32_t size_z_ = 0;
+  std::uint32_t mask_x_ = 0;  // sizes less 1
+  std::uint32_t mask_y_ = 0;
+  std::uint32_t mask_z_ = 0;
   int shift_y_ = 0;
   int shift_z_ = 0;
   std::vector<const ChunkStorage*> voxels_;
@@ -87,7 +102,8 @@ class ChunkWindow {
 
 /// The chunks of a grid by their coordinates: in a tree, and those that lie close together in a window besides.
 ///
-/// The window grows with the chunks and goes where they go, without the outermost eighth along each axis where these
+/// The window grows with the chunks and goes where they go: it slides where they come on one side and go on the other,
+/// as around somebody who walks; else it is made anew, without the outermost eighth along each axis where these
 /// lie too far out, and never has more than 8 places a chunk (or 64), 32 where chunks were dropped. What lies outside
 /// it is found in the tree.
 /// A copy shares the tree's nodes and has no window until it is changed. Entries are changed by way of `find_to_edit`
@@ -168,6 +184,8 @@ class ChunkTable {
   [[nodiscard]] bool fits(const ChunkWindow::Box& box) const;
   [[nodiscard]] ChunkWindow::Box box_of_most(std::size_t left_out) const;
   void place(const IVec3& chunk, ChunkEntry& entry);
+  bool slide_to(const IVec3& chunk);
+  void take_in(const IBox& chunks);
   void outside_changed();
   void plan();
   void try_to_plan();

@@ -93,6 +93,40 @@ TEST(ChunkTable, TheWindowFollowsACrowdThatMoves) {
   }
 }
 
+// As around a viewer: what comes ahead and what goes behind are never many, and the window never stands anew.
+TEST(ChunkTable, TheWindowSlidesAlongAndKnowsTheSameChunks) {
+  for (const IVec3 way : {IVec3{1, 0, 0}, IVec3{-1, 0, 0}, IVec3{0, 1, 0}, IVec3{0, 0, -1}, IVec3{1, -1, 1}}) {
+    ChunkTable table;
+    const auto each = [](auto&& visit) {
+      for (int i = 0; i < 9 * 9 * 9; ++i) visit(IVec3{i % 9, i / 9 % 9, i / 81});
+    };
+    const IVec3 start = way * 1000 - 4;
+    each([&](IVec3 at) { add(table, start + at, 3); });
+    const std::size_t cells = table.window_cells();
+    for (int step = 0; step < 60; ++step) {
+      const IVec3 here = start + way * step;
+      const IBox behind{here, here + 9};
+      const IBox ahead{here + way, here + way + 9};
+      each([&](IVec3 at) {
+        if (!behind.contains(here + way + at)) add(table, here + way + at, 3);
+      });
+      each([&](IVec3 at) {
+        if (!ahead.contains(here + at)) table.erase(here + at);
+      });
+      ASSERT_EQ(table.size(), 9U * 9U * 9U);
+      ASSERT_EQ(table.outside(), 0U);
+      ASSERT_EQ(table.window_cells(), cells);
+      each([&](IVec3 at) {
+        const IVec3 chunk = here + way + at;
+        ASSERT_NE(table.find(chunk), nullptr);
+        ASSERT_EQ(table.voxel(chunk.x * 64 + 1, chunk.y * 64 + 2, chunk.z * 64 + 3), 3);
+      });
+      ASSERT_EQ(table.find(here + way + 9), nullptr);
+      ASSERT_EQ(table.find(here + way - 1), nullptr);
+    }
+  }
+}
+
 TEST(ChunkTable, AFewFarAwayDoNotKeepTheOthersOutOfTheWindow) {
   for (const bool far_first : {true, false}) {
     ChunkTable table;

@@ -69,6 +69,16 @@ struct Grid::Impl {
 
   // Puts voxels in place that were, or now are, not loaded: whatever the chunk held or holds is told of, as no edit.
   void replace(const IVec3& chunk, Chunk voxels, EditNotice& notice) {
+    if (non_air_count(voxels) == 0 && quoin::data_count(voxels) == 0 && entries.find(chunk) == nullptr) {
+      VoxelRecord record;  // air where nothing was: no chunk comes and goes for it
+      record.chunk = chunk;
+      record.add_all();
+      record.is_edit = false;
+      journal.begin_change();
+      std::uint64_t serial = 0;
+      note(serial, record);
+      return notice.give();
+    }
     const ChunkTable::Slot slot = entries.find_or_create(chunk);
     VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};
     edit.add_all();

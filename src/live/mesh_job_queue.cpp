@@ -78,6 +78,15 @@ std::vector<double> MeshJobQueue::measure(const std::function<double(const LiveJ
   return distances;
 }
 
+void MeshJobQueue::renew(const std::function<void(LiveJob&)>& renew) {
+  const std::lock_guard lock(mutex_);
+  for (const std::unique_ptr<LiveJob>& job : queue_) {
+    if (job->voxels == nullptr) continue;
+    spent_.emplace_back(job->voxels, job->light);
+    renew(*job);
+  }
+}
+
 std::vector<std::unique_ptr<LiveJob>> MeshJobQueue::collect() {
   std::vector<std::unique_ptr<LiveJob>> taken;
   const std::lock_guard lock(mutex_);
@@ -131,7 +140,9 @@ void MeshJobQueue::run() {
     if (is_stopping_) return;
     std::unique_ptr<LiveJob> job = take_nearest();
     ++running_;
+    auto spent = std::exchange(spent_, {});
     lock.unlock();
+    spent.clear();
     const LiveClock::time_point start = LiveClock::now();
     guard([&] {
       try {

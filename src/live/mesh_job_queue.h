@@ -11,6 +11,7 @@
 #include <optional>
 #include <thread>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include <quoin/live/live_meshes.h>
@@ -112,6 +113,9 @@ class MeshJobQueue {
   [[nodiscard]] std::vector<std::unique_ptr<LiveJob>> withdraw(const std::function<bool(const LiveJob&)>& is_unwanted);
   /// Gives the jobs that wait new distances; returns these, the least first.
   [[nodiscard]] std::vector<double> measure(const std::function<double(const LiveJob&)>& distance);
+  /// Calls `renew` for the jobs that wait, to give blocky ones newer snapshots in which their chunks are the same: an old
+  /// one keeps all that was let go of since. Workers end the old ones.
+  void renew(const std::function<void(LiveJob&)>& renew);
   /// The jobs that were done since the last call, in the order in which they were.
   [[nodiscard]] std::vector<std::unique_ptr<LiveJob>> collect();
   /// Returns once at most `waiting` jobs wait for workers; with 0, once none is left at all.
@@ -134,6 +138,7 @@ class MeshJobQueue {
   std::size_t running_ = 0;
   std::vector<std::unique_ptr<LiveJob>> queue_;
   std::vector<std::unique_ptr<LiveJob>> done_;  // with room for all that wait and run
+  std::vector<std::pair<GridSnapshot, LightSnapshot>> spent_;
   LiveMeshes::Stats stats_;
   std::exception_ptr failure_;
   std::vector<std::jthread> workers_;  // last: they end first

@@ -83,6 +83,7 @@ void MeshScheduler::update_or_throw(const Scene& scene) {
     const LiveSource* live = find(job.source);
     return live == nullptr || !live->is_current(job);
   });
+  renew_jobs(scene, now);
   if (totals_.unfinished != 0) hand_over(scene);
 }
 
@@ -240,6 +241,21 @@ std::vector<MeshScheduler::Candidate> MeshScheduler::candidates(const std::map<G
   std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(most), all.end(), comes_before);
   all.resize(most);
   return all;
+}
+
+void MeshScheduler::renew_jobs(const Scene& scene, LiveClock::time_point now) {
+  constexpr auto kOld = std::chrono::milliseconds(250);
+  if (now - renewed_ < kOld) return;
+  renewed_ = now;
+  std::map<GridHandle, LiveInputs> inputs;
+  queue_.renew([&](LiveJob& job) {
+    const GridHandle grid = job.source.grid;
+    const GridLight light = light_ == nullptr ? GridLight{} : light_->of(grid);
+    LiveInputs& input = inputs.try_emplace(grid, scene.grids()[grid], types_, light).first->second;
+    if (job.light != nullptr && input.light() == nullptr) return;
+    if (job.light != nullptr) job.light = input.light();
+    job.voxels = input.voxels();
+  });
 }
 
 // Gives jobs to the workers; those that wait and are farther than what comes now have to wait longer.

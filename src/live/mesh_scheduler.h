@@ -53,6 +53,7 @@ class MeshScheduler {
   void choose_levels(const Scene& scene, LiveClock::time_point now);
   void forget();
   void collect();
+  void renew_jobs(const Scene& scene, LiveClock::time_point now);
   void hand_over(const Scene& scene);
   [[nodiscard]] bool has_waiting() const;
   void add_places(const Scene& scene, std::map<GridHandle, ChunkDistances>& distances) const;
@@ -69,6 +70,7 @@ class MeshScheduler {
   LiveTypes types_;
   const SceneLight* light_ = nullptr;  // of the caller
   ChangeCursor followed_types_;
+  LiveClock::time_point renewed_{};
   ChangeCursor followed_scene_;
   std::vector<GridHandle> drawn_;  // sorted
   Sources sources_;

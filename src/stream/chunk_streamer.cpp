@@ -1,6 +1,11 @@
 #include "stream/chunk_streamer.h"
 
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
+
 #include <chrono>
+#include <exception>
 #include <new>
 #include <utility>
 
@@ -12,10 +17,23 @@ namespace {
 // Bytes that wait to be written, from which on nothing is made until there are fewer.
 constexpr std::uint64_t kMaxPendingBytes = std::uint64_t{128} << 20;
 constexpr std::size_t kMaxProblems = 1000;
+// After so many bytes of chunks that went memory is given back to the system.
+constexpr std::size_t kTrimBytes = std::size_t{16} << 20;
 
 std::string name_of(const ChunkPlace& place) {
   return "chunk (" + std::to_string(place.chunk.x) + ", " + std::to_string(place.chunk.y) + ", " +
          std::to_string(place.chunk.z) + ") of grid " + std::to_string(place.grid);
+}
+
+std::size_t bytes_of(const StoredChunk& chunk) {
+  return chunk.voxels.bytes() + (chunk.densities ? chunk.densities->bytes() : 0);
+}
+
+// What was let go of lies between what is kept: allocators give such pages back only when they are asked to.
+void trim_heaps() {
+#if defined(__GLIBC__)
+  ::malloc_trim(0);
+#endif
 }
 
 template <class T>
@@ -57,8 +75,9 @@ std::shared_ptr<const ChunkGenerator> ChunkStreamer::generator_of(std::uint32_t 
   return found == generators_.end() ? nullptr : found->second;
 }
 
-void ChunkStreamer::post(Note note) {
+void ChunkStreamer::post(Note note, bool hurries) {
   if (note.empty()) return;
+  hurries |= note.wishes.has_value();
   {
     const std::scoped_lock lock(inbox_mutex_);
     if (note.wishes) inbox_.wishes = std::move(note.wishes);
@@ -67,7 +86,14 @@ void ChunkStreamer::post(Note note) {
     ++posted_;
   }
   ++signal_;
-  signal_.notify_one();  // whoever plans tells the others
+  if (hurries) signal_.notify_one();  // whoever plans tells the others
+}
+
+void ChunkStreamer::set_room(std::int64_t bytes, std::int64_t each) {
+  each_ = each;
+  if (room_.exchange(bytes) > 0 || bytes <= 0) return;
+  ++signal_;
+  signal_.notify_all();
 }
 
 void ChunkStreamer::take(Outbox& out) {
@@ -86,6 +112,7 @@ void ChunkStreamer::take(Outbox& out) {
   out.read = outbox_.read;
   out.made = outbox_.made;
   out.begun = working_;
+  if (std::exchange(is_short_, false)) out.problems.emplace_back("there is not enough memory to load what is wanted");
 }
 
 void ChunkStreamer::wait() {
@@ -94,19 +121,27 @@ void ChunkStreamer::wait() {
     const std::scoped_lock lock(inbox_mutex_);
     posted = posted_;
   }
+  signal_.notify_one();
+  // It is the caller who makes room.
+  if (room_ <= 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   std::unique_lock lock(outbox_mutex_);
   came_.wait(lock, [&] { return !outbox_.arrivals.empty() || (working_ == 0 && !has_more_ && told_posts_ >= posted); });
 }
 
-// Under the plan's lock.
+// Under the plan's lock. Where memory runs out on the way it goes on from there the next time.
 void ChunkStreamer::read_inbox() {
-  Note note;
-  {
+  if (read_events_ == reading_.events.size() && !reading_.wishes) {
+    Note done;
+    std::swap(done, reading_);
+    read_events_ = 0;
     const std::scoped_lock lock(inbox_mutex_);
-    std::swap(note, inbox_);
+    std::swap(reading_, inbox_);
     read_posts_ = posted_;
+    for (const StoredChunk& chunk : reading_.let_go) let_go_bytes_ += bytes_of(chunk);
   }
-  for (const Event& event : note.events) {
+  reading_.let_go.clear();
+  for (; read_events_ < reading_.events.size(); ++read_events_) {
+    const Event& event = reading_.events[read_events_];
     if (event.what == Event::What::Gone) {
       plan_.forget(event.place);
     } else {
@@ -114,10 +149,10 @@ void ChunkStreamer::read_inbox() {
                       event.what == Event::What::Here ? StreamPlan::State::Here : StreamPlan::State::Broken);
     }
   }
-  if (note.wishes) {
-    plans_ = note.wishes->number;
-    plan_.plan(std::move(*note.wishes));
-  }
+  if (!reading_.wishes) return;
+  plan_.plan(*reading_.wishes);
+  plans_ = reading_.wishes->number;
+  reading_.wishes.reset();
 }
 
 // Under the plan's lock: what the caller is to know of it.
@@ -135,48 +170,89 @@ void ChunkStreamer::tell() {
     outbox_.wanted = plan_.wanted();
     outbox_.missing = missing;
     outbox_.complete_radius = complete_radius;
-    has_more_ = plan_.has_next();
+    has_more_ = plan_.has_next(has_room());
     told_posts_ = read_posts_;
   }
   came_.notify_all();
 }
 
+// Few chunks come in any case, so that nobody stands in nothing.
+bool ChunkStreamer::has_room() const {
+  constexpr std::size_t kFew = 64;
+  return room_ > 0 || plan_.max_chunks() <= kFew;
+}
+
 void ChunkStreamer::run() {
+  constexpr auto kUntilThereIsMemory = std::chrono::milliseconds(20);
+  bool goes_on = true;
+  while (goes_on) {
+    try {
+      goes_on = work_once();
+    } catch (const std::bad_alloc&) {
+      note_shortage();
+      std::this_thread::sleep_for(kUntilThereIsMemory);
+    }
+  }
+}
+
+// Reads what was posted, and sees to one chunk, or waits for either. False: it ends.
+bool ChunkStreamer::work_once() {
+  std::unique_lock lock(plan_mutex_);
   const auto has_post = [&] {
     const std::scoped_lock inbox(inbox_mutex_);
-    return read_posts_ != posted_;
+    return read_posts_ != posted_ || read_events_ != reading_.events.size() || reading_.wishes;
   };
-  std::unique_lock lock(plan_mutex_);
-  while (!is_ending_) {
-    const std::uint32_t seen = signal_;
-    const bool is_new = has_post();
-    if (is_new) {
-      read_inbox();
-      tell();
-    }
-    ChunkPlace place;
-    if (!plan_.next(place)) {
-      tell();
-      lock.unlock();
-      signal_.wait(seen);
-      lock.lock();
-      continue;
-    }
-    {
-      const std::scoped_lock outbox(outbox_mutex_);
-      ++working_;
-    }
-    if (is_new && plan_.has_next()) signal();
+  if (is_ending_) return false;
+  const std::uint32_t seen = signal_;
+  const bool is_new = has_post();
+  if (is_new) {
+    read_inbox();
+    tell();
+  }
+  ChunkPlace place;
+  if (!plan_.next(place, has_room())) {
+    tell();
     lock.unlock();
-    Arrival arrival = fetch(place);
-    {
+    signal_.wait(seen);
+    return true;
+  }
+  {
+    const std::scoped_lock outbox(outbox_mutex_);
+    ++working_;
+  }
+  if (is_new && plan_.has_next(has_room())) signal();
+  const bool must_trim = let_go_bytes_ > kTrimBytes;
+  if (must_trim) let_go_bytes_ = 0;
+  lock.unlock();
+  if (must_trim) trim_heaps();
+  const std::int64_t reserved = each_;
+  room_ -= reserved;
+  Arrival arrival = fetch(place);
+  room_ += reserved - static_cast<std::int64_t>(bytes_of(arrival.chunk));
+  hand_over(std::move(arrival));
+  return true;
+}
+
+// What has come is not lost: where there is no memory for its place in the list, that is waited for.
+void ChunkStreamer::hand_over(Arrival arrival) {
+  for (bool is_done = false; !is_done;) {
+    try {
       const std::scoped_lock outbox(outbox_mutex_);
       outbox_.arrivals.push_back(std::move(arrival));
       --working_;
+      is_done = true;
+    } catch (const std::bad_alloc&) {
+      note_shortage();
+      if (is_ending_) return;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
-    came_.notify_all();
-    lock.lock();
   }
+  came_.notify_all();
+}
+
+void ChunkStreamer::note_shortage() {
+  const std::scoped_lock lock(outbox_mutex_);
+  is_short_ = true;
 }
 
 Arrival ChunkStreamer::fetch(const ChunkPlace& place) {
@@ -187,6 +263,9 @@ Arrival ChunkStreamer::fetch(const ChunkPlace& place) {
   } catch (const std::bad_alloc&) {
     arrival.chunk = {};
     arrival.outcome = Arrival::Outcome::OutOfMemory;
+  } catch (const std::exception& thrown) {  // by a generator that breaks its word
+    arrival.chunk = {};
+    add_problem(place, make_error(ErrorCode::InvalidArgument, thrown.what()));
   }
   return arrival;
 }

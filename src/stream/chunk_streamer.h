@@ -83,15 +83,23 @@ class ChunkStreamer {
   /// Null: what is not in the world is air.
   void set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator);
   [[nodiscard]] std::shared_ptr<const ChunkGenerator> generator_of(std::uint32_t grid) const;
-  void post(Note note);
+  /// Where nothing hurries, who waits for work is not woken: that takes the caller longer than all else here.
+  void post(Note note, bool hurries = true);
+  /// How many bytes of chunks may be read or made besides those that workers are at, and what one may take; what edits
+  /// wait for comes in any case.
+  void set_room(std::int64_t bytes, std::int64_t each);
   /// What came since the last call; the numbers are those of the present.
   void take(Outbox& out);
-  /// Returns once something came, or nothing is left to do for what was posted.
+  /// Returns once something came, or nothing is left to do for what was posted, or there is no room for it.
   void wait();
 
  private:
   void run();
+  bool work_once();
   void read_inbox();
+  void hand_over(Arrival arrival);
+  void note_shortage();
+  [[nodiscard]] bool has_room() const;
   [[nodiscard]] Arrival fetch(const ChunkPlace& place);
   void read_or_make(Arrival& arrival);
   void make(const ChunkGenerator& generator, Arrival& arrival);
@@ -110,15 +118,21 @@ class ChunkStreamer {
   mutable std::mutex plan_mutex_;  ///< of what follows
   StreamPlan plan_;
   std::map<std::uint32_t, std::shared_ptr<const ChunkGenerator>> generators_;
+  Note reading_;  ///< of it the first events have been read
+  std::size_t read_events_ = 0;
   std::uint64_t read_posts_ = 0;
   std::uint64_t plans_ = 0;
+  std::size_t let_go_bytes_ = 0;  ///< since memory was given back
   std::atomic<bool> is_ending_{false};
+  std::atomic<std::int64_t> room_{0};  ///< bytes
+  std::atomic<std::int64_t> each_{0};
   std::atomic<std::uint32_t> signal_{0};  ///< raised when there may be something to do
 
   std::mutex outbox_mutex_;
   Outbox outbox_;
   std::condition_variable came_;
   std::size_t working_ = 0;
+  bool is_short_ = false;  ///< of memory, since the caller was told last
   std::uint64_t told_posts_ = 0;
   bool has_more_ = false;
 

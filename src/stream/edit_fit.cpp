@@ -1,6 +1,7 @@
 #include "stream/edit_fit.h"
 
 #include <algorithm>
+#include <utility>
 #include <variant>
 
 namespace quoin::stream {
@@ -31,6 +32,24 @@ std::int64_t apply_fitting(const WorldEdit& edit, Grid& grid, DensityGrid& field
     if (bits < 32 && set->state >> bits != 0) return 0;
   }
   return apply_edit(edit, grid, field);
+}
+
+void keep_for(const WorldEdit& edit, const std::vector<IVec3>& chunks, WaitingEdits& waiting) {
+  const auto* const set = std::get_if<WorldEdit::SetVoxels>(&edit.content);
+  if (set == nullptr) {
+    const auto shared = std::make_shared<const WorldEdit>(edit);
+    for (const IVec3 chunk : chunks) waiting[chunk].push_back(shared);
+    return;
+  }
+  std::unordered_map<IVec3, WorldEdit::SetVoxels, CoordinateHash> parts;
+  for (const IVec3 chunk : chunks) parts[chunk];
+  for (const PlacedVoxel& voxel : set->voxels) {
+    const auto part = parts.find(chunk_of(voxel.voxel));
+    if (part != parts.end()) part->second.voxels.push_back(voxel);
+  }
+  for (auto& [chunk, part] : parts) {
+    waiting[chunk].push_back(std::make_shared<const WorldEdit>(WorldEdit{edit.grid, std::move(part)}));
+  }
 }
 
 }  // namespace quoin::stream

@@ -1,10 +1,15 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <unordered_map>
+#include <vector>
 
 #include <quoin/core/result.h>
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/stream/world_edit.h>
+
+#include "core/coordinates/coordinate_hash.h"
 
 // Edits come from elsewhere: what a world could not save is not done.
 
@@ -14,5 +19,11 @@ namespace quoin::stream {
 [[nodiscard]] Status check_types(const WorldEdit& edit, const VoxelRegistry& types);
 /// As `apply_edit`; data that a voxel's type has no room for is left out, on every machine alike.
 std::int64_t apply_fitting(const WorldEdit& edit, Grid& grid, DensityGrid& field, const VoxelRegistry& types);
+
+/// Edits that wait for chunks, in their order.
+using WaitingEdits = std::unordered_map<IVec3, std::vector<std::shared_ptr<const WorldEdit>>, CoordinateHash>;
+
+/// Keeps an edit for chunks that are not loaded; of many voxels for each its own.
+void keep_for(const WorldEdit& edit, const std::vector<IVec3>& chunks, WaitingEdits& waiting);
 
 }  // namespace quoin::stream

@@ -1,18 +1,21 @@
 // stream/flight: 100 voxels a second over a landscape that is generated, meshed, edited, saved and let go of meanwhile,
-// at 60 frames a second. What it takes of the caller's thread, and what is in memory. QUOIN_FLIGHT_SECONDS: how long.
+// at 60 frames a second. What it takes of the caller's thread, and what is in memory. QUOIN_FLIGHT_SECONDS: how long;
+// QUOIN_FLIGHT_RADIUS: of the viewer; QUOIN_FLIGHT_BUDGET: MiB; QUOIN_FLIGHT_PLOT: a file for a line a second.
 
 #include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <string>
 #include <thread>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <benchmark/benchmark.h>
@@ -75,102 +78,163 @@ class Drawn {
   std::size_t bytes_ = 0;
 };
 
+double number_of(const char* name, double otherwise) {
+  const char* const text = std::getenv(name);
+  return text == nullptr ? otherwise : std::atof(text);
+}
+
+/// What was seen on the way; a line a second goes into a file, to be plotted.
+class FlightLog {
+ public:
+  FlightLog() {
+    const char* const file = std::getenv("QUOIN_FLIGHT_PLOT");
+    if (file == nullptr) return;
+    plot_.open(file);
+    plot_ << "seconds,resident_MB,counted_MB,chunks,radius,slowest_update_us\n";
+  }
+
+  /// `resident`: more than before there was a world.
+  void note(int frame, double own_seconds, double update_seconds, const StreamStats& now, double base) {
+    own.push_back(own_seconds);
+    updates.push_back(update_seconds);
+    least_radius = std::min(least_radius, now.complete_radius);
+    const double counted = static_cast<double>(now.loaded_bytes + now.other_bytes) / 1e6;
+    most_counted = std::max(most_counted, counted);
+    slowest_ = std::max(slowest_, own_seconds);
+    if (frame % 60 != 0) return;
+    const double resident = resident_megabytes() - base;
+    residents.push_back(resident);
+    if (plot_.is_open()) {
+      plot_ << frame / 60 << ',' << resident << ',' << counted << ',' << now.loaded_chunks << ',' << now.complete_radius
+            << ',' << 1e6 * slowest_ << std::endl;
+    }
+    slowest_ = 0.0;
+  }
+  void tell(benchmark::State& state) const {
+    const auto put = [&](const std::string& name, const std::vector<double>& all, double factor) {
+      for (const auto& [end, share] : {std::pair("_p50", 0.5), {"_p99", 0.99}, {"_p999", 0.999}, {"_max", 1.0}}) {
+        state.counters[name + end] = factor * quantile(all, share);
+      }
+    };
+    put("update_us", updates, 1e6);
+    put("update_own_us", own, 1e6);
+    put("meshes_us", follows, 1e6);
+    put("control_us", control, 1e6);
+    put("resident_MB", residents, 1.0);
+    state.counters["least_radius"] = least_radius;
+    state.counters["counted_MB_most"] = most_counted;
+  }
+
+  std::vector<double> updates;
+  std::vector<double> own;  // of these, what the processor did for them
+  std::vector<double> follows;
+  std::vector<double> control;    // of work that is always the same: what the machine does to any work
+  std::vector<double> residents;  // megabytes
+  double least_radius = std::numeric_limits<double>::infinity();
+  double most_counted = 0.0;
+
+ private:
+  std::ofstream plot_;
+  double slowest_ = 0.0;
+};
+
+/// A world, its meshes, and who flies through it.
+struct Flight {
+  Flight(StreamedWorld streamed, bool smooth) : world(std::move(streamed)), is_smooth(smooth) {}
+
+  Status begin() {
+    viewer.radius = number_of("QUOIN_FLIGHT_RADIUS", 448.0);
+    // What every such program takes, whatever its world's size: its code, its workers and what these work with.
+    const Viewer near{.position = viewer.position, .radius = 100.0};
+    if (auto done = world.load_all({&near, 1}); !done) return done;
+    meshes.finish(world.scene(), viewer.position);
+    drawn.take(meshes);
+    const StreamStats first = world.stats();
+    base = resident_megabytes() - static_cast<double>(first.loaded_bytes + drawn.bytes()) / 1e6;
+    return world.load_all({&viewer, 1});
+  }
+  void dig() {
+    SceneGrid& land = world.scene().edit(grid);
+    const DVec3 below = viewer.position - DVec3(0.0, 80.0, 0.0);
+    if (is_smooth) {
+      land.field.remove_sphere(below, 6.0);
+    } else {
+      land.grid.fill_sphere(below, 6.0, kAir);
+    }
+  }
+  Status frame(int number, FlightLog& log) {
+    viewer.position.x += 100.0 / 60.0;
+    if (number % 10 == 0) dig();
+    const double control_before = processor_seconds();
+    for (unsigned i = 0; i < 60'000; ++i) benchmark::DoNotOptimize(i);
+    const Clock::time_point at = Clock::now();
+    const double own_before = processor_seconds();
+    if (auto done = world.update({&viewer, 1}); !done) return done;
+    log.control.push_back(own_before - control_before);
+    const double own = processor_seconds() - own_before;
+    const Clock::time_point then = Clock::now();
+    meshes.update(world.scene(), viewer.position);
+    drawn.take(meshes);
+    log.follows.push_back(seconds_since(then));
+    log.note(number, own, std::chrono::duration<double>(then - at).count(), world.stats(), base);
+    return {};
+  }
+
+  StreamedWorld world;
+  bool is_smooth;
+  GridHandle grid;
+  LiveMeshes meshes;
+  Drawn drawn;
+  Viewer viewer{.position = {0.0, 150.0, 0.0}, .direction = {1.0, -0.2, 0.0}};
+  double base = 0.0;  // megabytes
+};
+
+Status fly_through(Flight& flight, benchmark::State& state) {
+  const Clock::time_point began = Clock::now();
+  if (auto done = flight.begin(); !done) return done;
+  state.counters["first_seconds"] = seconds_since(began);
+  flight.meshes.finish(flight.world.scene(), flight.viewer.position);
+  flight.drawn.take(flight.meshes);
+  const StreamStats before = flight.world.stats();
+  FlightLog log;
+  const double length = number_of("QUOIN_FLIGHT_SECONDS", 8.0);
+  const Clock::time_point start = Clock::now();
+  int frame = 0;
+  for (; seconds_since(start) < length; ++frame) {
+    if (auto done = flight.frame(frame, log); !done) return done;
+    std::this_thread::sleep_until(start + std::chrono::microseconds(16'667LL * (frame + 1)));
+  }
+  const double seconds = seconds_since(start);
+  const StreamStats after = flight.world.stats();
+  if (auto saved = flight.world.flush(); !saved) return saved;
+  const auto rate = [&](double count) { return benchmark::Counter(count / seconds); };
+  log.tell(state);
+  state.counters["made_a_second"] = rate(static_cast<double>(after.chunks_made - before.chunks_made));
+  state.counters["meshed_a_second"] = rate(static_cast<double>(flight.meshes.stats().chunks_meshed));
+  state.counters["unloaded_a_second"] = rate(static_cast<double>(after.chunks_unloaded - before.chunks_unloaded));
+  state.counters["saved_chunks"] = static_cast<double>(flight.world.store().stats().saved_chunks);
+  state.counters["loaded_chunks"] = static_cast<double>(after.loaded_chunks);
+  state.counters["base_MB"] = flight.base;
+  state.counters["frames_a_second"] = rate(frame);
+  return {};
+}
+
 void fly(benchmark::State& state, bool is_smooth) {
-  const char* const wanted = std::getenv("QUOIN_FLIGHT_SECONDS");
-  const double length = wanted == nullptr ? 8.0 : std::atof(wanted);
   for (auto _ : state) {
     const WorldFolder folder;
-    Drawn drawn;
+    Flight* flying = nullptr;
     StreamOptions options;
-    options.budget_bytes = std::size_t{192} << 20;
-    options.other_bytes = [&] { return drawn.bytes(); };
+    options.budget_bytes = static_cast<std::size_t>(number_of("QUOIN_FLIGHT_BUDGET", 192.0)) << 20;
+    options.other_bytes = [&flying] { return flying == nullptr ? 0 : flying->drawn.bytes(); };
     auto world = StreamedWorld::open_or_create(folder / "flight.quoin", options);
-    const auto grid =
-        world ? world->add_terrain({.seed = 9, .is_smooth = is_smooth}) : Result<GridHandle>(world.error());
-    if (!grid) {
-      state.SkipWithError(to_string(grid.error()).c_str());
-      return;
-    }
-    LiveMeshes meshes;
-    Viewer viewer{.position = {0.0, 150.0, 0.0}, .direction = {1.0, -0.2, 0.0}, .radius = 448.0};
-    const Clock::time_point began = Clock::now();
-    if (const auto done = world->load_all({&viewer, 1}); !done) {
-      state.SkipWithError(to_string(done.error()).c_str());
-      return;
-    }
-    const double first_seconds = seconds_since(began);
-    meshes.finish(world->scene(), viewer.position);
-    drawn.take(meshes);
-    const StreamStats before = world->stats();
-    std::vector<double> updates;
-    std::vector<double> own;  // of these, what the processor did for them
-    std::vector<double> follows;
-    double least_radius = viewer.radius;
-    double most_resident = resident_megabytes();
-    const double first_resident = most_resident;
-    std::size_t most_counted = 0;
-    const Clock::time_point start = Clock::now();
-    int frame = 0;
-    for (; seconds_since(start) < length; ++frame) {
-      viewer.position.x += 100.0 / 60.0;
-      if (frame % 10 == 0) {
-        SceneGrid& land = world->scene().edit(*grid);
-        if (is_smooth) {
-          land.field.remove_sphere(viewer.position - DVec3(0.0, 80.0, 0.0), 6.0);
-        } else {
-          land.grid.fill_sphere(viewer.position - DVec3(0.0, 80.0, 0.0), 6.0, kAir);
-        }
-      }
-      const Clock::time_point at = Clock::now();
-      const double own_before = processor_seconds();
-      if (const auto done = world->update({&viewer, 1}); !done) {
-        state.SkipWithError(to_string(done.error()).c_str());
-        return;
-      }
-      own.push_back(processor_seconds() - own_before);
-      updates.push_back(seconds_since(at));
-      const Clock::time_point then = Clock::now();
-      meshes.update(world->scene(), viewer.position);
-      drawn.take(meshes);
-      follows.push_back(seconds_since(then));
-      const StreamStats now = world->stats();
-      least_radius = std::min(least_radius, now.complete_radius);
-      most_counted = std::max(most_counted, now.loaded_bytes + now.other_bytes);
-      if (frame % 30 == 0) most_resident = std::max(most_resident, resident_megabytes());
-      if (std::getenv("QUOIN_FLIGHT_PLOT") != nullptr && frame % 60 == 0) {
-        std::fprintf(stderr, "%d s: %.0f MB resident, %.0f MB counted, %zu chunks, complete to %.0f\n", frame / 60,
-                     resident_megabytes(), static_cast<double>(now.loaded_bytes + now.other_bytes) / 1e6,
-                     now.loaded_chunks, now.complete_radius);
-      }
-      std::this_thread::sleep_until(start + std::chrono::microseconds(16'667LL * (frame + 1)));
-    }
-    const double seconds = seconds_since(start);
-    const StreamStats after = world->stats();
-    const auto saved = world->flush();
-    if (!saved) state.SkipWithError(to_string(saved.error()).c_str());
-    const auto rate = [&](double count) { return benchmark::Counter(count / seconds); };
-    state.counters["update_us_p50"] = 1e6 * quantile(updates, 0.5);
-    state.counters["update_us_p99"] = 1e6 * quantile(updates, 0.99);
-    state.counters["update_us_p999"] = 1e6 * quantile(updates, 0.999);
-    state.counters["update_us_max"] = 1e6 * quantile(updates, 1.0);
-    state.counters["update_own_us_p50"] = 1e6 * quantile(own, 0.5);
-    state.counters["update_own_us_p99"] = 1e6 * quantile(own, 0.99);
-    state.counters["update_own_us_p999"] = 1e6 * quantile(own, 0.999);
-    state.counters["update_own_us_max"] = 1e6 * quantile(own, 1.0);
-    state.counters["meshes_us_p50"] = 1e6 * quantile(follows, 0.5);
-    state.counters["meshes_us_p99"] = 1e6 * quantile(follows, 0.99);
-    state.counters["meshes_us_max"] = 1e6 * quantile(follows, 1.0);
-    state.counters["made_a_second"] = rate(static_cast<double>(after.chunks_made - before.chunks_made));
-    state.counters["meshed_a_second"] = rate(static_cast<double>(meshes.stats().chunks_meshed));
-    state.counters["saved_chunks"] = static_cast<double>(world->store().stats().saved_chunks);
-    state.counters["unloaded_a_second"] = rate(static_cast<double>(after.chunks_unloaded - before.chunks_unloaded));
-    state.counters["loaded_chunks"] = static_cast<double>(after.loaded_chunks);
-    state.counters["first_seconds"] = first_seconds;
-    state.counters["least_radius"] = least_radius;
-    state.counters["resident_MB_first"] = first_resident;
-    state.counters["resident_MB_most"] = most_resident;
-    state.counters["counted_MB_most"] = static_cast<double>(most_counted) / 1e6;
-    state.counters["frames_a_second"] = rate(frame);
+    if (!world) return state.SkipWithError(to_string(world.error()).c_str());
+    Flight flight(std::move(*world), is_smooth);
+    const auto grid = flight.world.add_terrain({.seed = 9, .is_smooth = is_smooth});
+    if (!grid) return state.SkipWithError(to_string(grid.error()).c_str());
+    flight.grid = *grid;
+    flying = &flight;
+    if (auto done = fly_through(flight, state); !done) return state.SkipWithError(to_string(done.error()).c_str());
+    state.counters["file_MB"] = static_cast<double>(std::filesystem::file_size(folder / "flight.quoin")) / 1e6;
   }
 }
 

@@ -47,7 +47,23 @@ IBox chunks_around(const Eye& eye, double radius) {
   return is_empty(box) ? IBox{} : chunks_of(box);
 }
 
+// Eyes that moved less, voxels, or turned less (cosine) see the same.
+constexpr double kMoves = 12.0;
+constexpr double kTurns = 0.94;
+
+bool sees_alike(const Eye& a, const Eye& b) {
+  if (a.radius != b.radius || a.voxel_size != b.voxel_size) return false;
+  if (glm::length(a.position - b.position) > kMoves) return false;
+  return a.direction == b.direction || glm::dot(a.direction, b.direction) >= kTurns;
+}
+
 }  // namespace
+
+bool see_alike(const Eyes& a, const Eyes& b) {
+  return std::ranges::equal(a, b, [](const auto& one, const auto& other) {
+    return one.first == other.first && std::ranges::equal(one.second, other.second, sees_alike);
+  });
+}
 
 bool stays_for(const Eye& eye, IVec3 chunk) {
   // Voxels beyond a viewer's radius.
@@ -80,14 +96,16 @@ void StreamPlan::forget(const ChunkPlace& place) {
 }
 
 void StreamPlan::plan(Wishes wishes) {
+  queue_.clear();  // so that nothing old is left where memory runs out on the way
+  leaving_.clear();
+  next_ = asked_ = here_ = 0;
+  is_counted_ = false;
   wishes_ = std::move(wishes);
   wishes_.max_chunks = std::min(wishes_.max_chunks, kMaxPlanned);
   find_wanted();
   cut_to_budget();
   find_queue();
   find_leaving();
-  here_ = 0;
-  is_counted_ = false;
 }
 
 StreamPlan::Wanted StreamPlan::measured(const ChunkPlace& place, const std::vector<Eye>& eyes) const {
@@ -184,18 +202,18 @@ void StreamPlan::find_leaving() {
   std::ranges::reverse(leaving_);
 }
 
-bool StreamPlan::next(ChunkPlace& place) {
+bool StreamPlan::next(ChunkPlace& place, bool has_room) {
   const auto take_from = [&](const std::vector<ChunkPlace>& places, std::size_t& at) {
     while (at < places.size()) {
-      place = places[at++];
-      if (state_of(place) == nullptr) {
-        set_state(place, State::Begun);
-        return true;
-      }
+      place = places[at];
+      const bool is_new = state_of(place) == nullptr;
+      if (is_new) set_state(place, State::Begun);
+      ++at;
+      if (is_new) return true;
     }
     return false;
   };
-  return take_from(wishes_.asked, asked_) || take_from(queue_, next_);
+  return take_from(wishes_.asked, asked_) || (has_room && take_from(queue_, next_));
 }
 
 std::vector<ChunkPlace> StreamPlan::take_leaving() {

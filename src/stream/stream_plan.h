@@ -27,12 +27,17 @@ struct Eye {
 /// Whether a chunk that is loaded may stay for a viewer: it lies within the radius, or little beyond.
 [[nodiscard]] bool stays_for(const Eye& eye, IVec3 chunk);
 
+using Eyes = std::map<std::uint32_t, std::vector<Eye>>;  ///< of each grid, by its number in the world
+
+/// Whether nothing else is wanted for these than for those: they moved and turned little.
+[[nodiscard]] bool see_alike(const Eyes& a, const Eyes& b);
+
 /// What is wanted, as the caller's thread says it.
 struct Wishes {
-  std::map<std::uint32_t, std::vector<Eye>> eyes;  ///< of each grid, by its number in the world
-  std::size_t max_chunks = 0;                      ///< that the budget suffices for
-  std::vector<ChunkPlace> asked;                   ///< for edits: wherever they lie
-  std::uint64_t number = 0;                        ///< the caller's own; greater for later ones
+  Eyes eyes;
+  std::size_t max_chunks = 0;     ///< that the budget suffices for
+  std::vector<ChunkPlace> asked;  ///< for edits: wherever they lie
+  std::uint64_t number = 0;       ///< the caller's own; greater for later ones
 };
 
 /// Which chunks are to be loaded, nearest first, and which are to go.
@@ -49,9 +54,13 @@ class StreamPlan {
 
   /// Takes over what is wanted, and finds anew what is to be loaded.
   void plan(Wishes wishes);
-  /// The next chunk to load, which then counts as begun. False where there is none.
-  bool next(ChunkPlace& place);
-  [[nodiscard]] bool has_next() const { return asked_ < wishes_.asked.size() || next_ < queue_.size(); }
+  /// The next chunk to load, which then counts as begun. False where there is none. Without `has_room` only what edits
+  /// wait for is loaded.
+  bool next(ChunkPlace& place, bool has_room);
+  [[nodiscard]] bool has_next(bool has_room) const {
+    return asked_ < wishes_.asked.size() || (has_room && next_ < queue_.size());
+  }
+  [[nodiscard]] std::size_t max_chunks() const { return wishes_.max_chunks; }
   /// Those that are to go, farthest first, since the last call.
   [[nodiscard]] std::vector<ChunkPlace> take_leaving();
 

@@ -25,6 +25,7 @@
 #include "core/worker_count.h"
 #include "stream/chunk_streamer.h"
 #include "stream/edit_fit.h"
+#include "stream/stream_budget.h"
 #include "stream/terrain_text.h"
 
 namespace quoin {
@@ -36,11 +37,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using What = ChunkStreamer::Event::What;
 
-// Before anything is loaded a chunk counts as so many bytes.
-constexpr double kGuessedChunkBytes = 24.0 * 1024.0;
-constexpr std::size_t kGuessBelow = 64;
-// Of the budget: what allocators and what is on its way take is not counted.
-constexpr double kShareOfBudget = 0.97;
+// Chunks that came and were not put in place yet.
+constexpr std::size_t kMaxArrivals = 128;
 // Of one grid.
 constexpr std::size_t kMaxEyes = 64;
 // Chunks that edits wait for, in one plan.
@@ -49,14 +47,13 @@ constexpr std::size_t kMaxAsked = 1024;
 constexpr double kMaxRadius = 1e12;
 // Of a chunk that is loaded, besides its voxels and densities: marks, sizes and states, bytes.
 constexpr std::size_t kChunkBytes = 256;
-// Journals keep some thousand records: after so many chunks that came or went it is time to read them.
-constexpr std::size_t kMaxMoved = 4000;
-// Eyes that moved less, voxels, or turned less (cosine) see the same.
-constexpr double kMoves = 12.0;
-constexpr double kTurns = 0.94;
+// After so many chunks that came or went it is time to save: what saves reads of the journals is so never much at once.
+constexpr std::size_t kMaxMoved = 48;
 constexpr auto kAskOthers = std::chrono::milliseconds(100);
 // Between plans that the budget alone is the reason of, seconds.
 constexpr double kReplan = 0.2;
+// When nothing came or went for so long, all that is made of chunks is there, seconds.
+constexpr double kQuiet = 3.0;
 // The landscape that a grid goes on with.
 constexpr std::string_view kTerrainValue = "quoin.terrain.";
 
@@ -93,7 +90,6 @@ class DiskOutcome {
 }  // namespace
 
 struct StreamedWorld::Impl {
-  using Edits = std::vector<std::shared_ptr<const WorldEdit>>;
   struct Streamed {
     GridHandle handle;
     std::uint32_t number = 0;
@@ -101,34 +97,16 @@ struct StreamedWorld::Impl {
     ChangeCursor voxels, data, densities;
     std::unordered_map<IVec3, std::size_t, CoordinateHash> sizes;  // of what is loaded, bytes
     std::unordered_set<IVec3, CoordinateHash> kept;  // edited, where the world may not be written: they stay
-    std::unordered_map<IVec3, Edits, CoordinateHash> waiting;
+    WaitingEdits waiting;
     std::unordered_set<IVec3, CoordinateHash> broken;
-
-    // Keeps an edit for chunks that are not loaded; of many voxels for each its own.
-    void wait_for(const WorldEdit& edit, const std::vector<IVec3>& chunks) {
-      if (const auto* const set = std::get_if<WorldEdit::SetVoxels>(&edit.content)) {
-        std::unordered_map<IVec3, WorldEdit::SetVoxels, CoordinateHash> parts;
-        for (const IVec3 chunk : chunks) parts[chunk];
-        for (const PlacedVoxel& voxel : set->voxels) {
-          const auto part = parts.find(chunk_of(voxel.voxel));
-          if (part != parts.end()) part->second.voxels.push_back(voxel);
-        }
-        for (auto& [chunk, part] : parts) {
-          waiting[chunk].push_back(std::make_shared<const WorldEdit>(WorldEdit{edit.grid, std::move(part)}));
-        }
-        return;
-      }
-      const auto shared = std::make_shared<const WorldEdit>(edit);
-      for (const IVec3 chunk : chunks) waiting[chunk].push_back(shared);
-    }
   };
-  using Eyes = std::map<std::uint32_t, std::vector<Eye>>;
 
   Impl(WorldStore opened_store, LoadedWorld opened_world, StreamOptions wanted, bool made)
       : options(std::move(wanted)),
         store(std::move(opened_store)),
         world(std::move(opened_world)),
         is_new(made),
+        budget(options.budget_bytes, options.other_bytes != nullptr),
         streamer(store, {options.keep_generated && store.is_writable(), worker_count(options.workers)}) {}
 
   [[nodiscard]] Scene& scene() { return world.loaded.scene; }
@@ -146,6 +124,7 @@ struct StreamedWorld::Impl {
   Status update(std::span<const Viewer> viewers, double seconds);
   Status plan(std::span<const Viewer> viewers);
   void tell_workers();
+  [[nodiscard]] bool has_chunks_to_move() const { return !arrivals.empty() || (!is_edited && !leaving.empty()); }
   void take_in();
   void move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note);
   void follow_instances();
@@ -171,6 +150,7 @@ struct StreamedWorld::Impl {
   WorldStore store;
   LoadedWorld world;
   bool is_new = false;
+  StreamBudget budget;
   std::map<std::uint32_t, Streamed> grids;
   ChangeCursor followed_scene;
 
@@ -184,12 +164,10 @@ struct StreamedWorld::Impl {
   std::deque<Arrival> arrivals;
   std::deque<ChunkPlace> leaving;
 
-  std::size_t loaded_chunks = 0;
-  std::size_t loaded_bytes = 0;
-  std::size_t other_bytes = 0;     // with what waits for the disk
-  std::size_t reported_bytes = 0;  // as StreamOptions::other_bytes said last
+  std::size_t arrived_bytes = 0;  // of `arrivals`
   Clock::time_point asked_others{};
-  bool is_edited = false;  // since the last save
+  Clock::time_point moved{};  // when a chunk came or went last
+  bool is_edited = false;     // since the last save
   bool has_save_failed = false;
   std::size_t moved_since_save = 0;  // chunks that came or went
   ChangeCursor saved_types;
@@ -248,7 +226,7 @@ void StreamedWorld::Impl::follow_instances() {
   }
 }
 
-StreamedWorld::Impl::Eyes StreamedWorld::Impl::eyes_of(std::span<const Viewer> viewers) {
+Eyes StreamedWorld::Impl::eyes_of(std::span<const Viewer> viewers) {
   follow_instances();
   Eyes found;
   for (auto& [number, grid] : grids) {
@@ -285,41 +263,17 @@ bool StreamedWorld::Impl::is_cut() const {
   return planned_chunks != 0 && static_cast<double>(box.wanted) > 0.9 * static_cast<double>(planned_chunks);
 }
 
-// As many as fit by what the loaded ones take, with all that is made of them. Near ones take more than far ones: where
-// the budget cuts what is wanted it is found step by step, down at once, up when all that was wanted is there.
 std::size_t StreamedWorld::Impl::chunks_of_budget() const {
-  const double total = static_cast<double>(loaded_bytes + other_bytes);
-  const double budget = static_cast<double>(options.budget_bytes) * kShareOfBudget;
-  const auto chunks = [](double count) { return std::max<std::size_t>(static_cast<std::size_t>(count), 8); };
-  if (loaded_chunks < kGuessBelow && !is_cut()) {
-    return chunks(budget / std::max(kGuessedChunkBytes, total / kGuessBelow));
-  }
-  const double ratio = budget / std::max(total, 1.0);
-  if (!is_cut()) return chunks(static_cast<double>(loaded_chunks) * std::min(ratio, 1e6));
-  const bool may_grow = box.missing == 0 && box.begun == 0 && arrivals.empty();
-  const double step = std::clamp(ratio, 0.5, may_grow ? 1.1 : 1.0);
-  return chunks(static_cast<double>(planned_chunks) * step);
+  const bool has_all = box.missing == 0 && box.begun == 0 && arrivals.empty();
+  const std::size_t fit = budget.chunks(planned_chunks, is_cut(), has_all);
+  // What may not be taken away, edited and not to be saved, is counted too: then less is wanted, until that fits.
+  const bool is_stuck = !has_all && !has_chunks_to_move() && budget.room(0) <= 0 && seconds_since(planned) > kReplan;
+  return is_stuck ? std::min(fit, planned_chunks * 9 / 10) : fit;
 }
-
-namespace {
-
-bool sees_alike(const Eye& a, const Eye& b) {
-  if (a.radius != b.radius || a.voxel_size != b.voxel_size) return false;
-  if (glm::length(a.position - b.position) > kMoves) return false;
-  return a.direction == b.direction || glm::dot(a.direction, b.direction) >= kTurns;
-}
-
-bool see_alike(const std::map<std::uint32_t, std::vector<Eye>>& a, const std::map<std::uint32_t, std::vector<Eye>>& b) {
-  return std::ranges::equal(a, b, [](const auto& one, const auto& other) {
-    return one.first == other.first && std::ranges::equal(one.second, other.second, sees_alike);
-  });
-}
-
-}  // namespace
 
 void StreamedWorld::Impl::wish(ChunkStreamer::Note& note) {
   const std::size_t fit = chunks_of_budget();
-  const bool is_over = loaded_bytes + other_bytes > options.budget_bytes;
+  const bool is_over = budget.is_over();
   const double change = static_cast<double>(fit) / static_cast<double>(std::max<std::size_t>(planned_chunks, 1));
   // Where all fits, how much more would fit changes nothing.
   const bool is_limited = is_cut() || fit <= box.wanted || is_over;
@@ -358,8 +312,7 @@ void StreamedWorld::Impl::note_edits() {
   for (auto& [number, grid] : grids) {
     const SceneGrid* const content = scene().grids().find(grid.handle);
     if (content == nullptr) {  // removed, with what was loaded of it
-      for (const auto& [chunk, size] : grid.sizes) loaded_bytes -= size;
-      loaded_chunks -= grid.sizes.size();
+      for (const auto& [chunk, size] : grid.sizes) budget.remove_chunk(size);
       grid.sizes.clear();
       grid.waiting.clear();
       continue;
@@ -374,7 +327,7 @@ void StreamedWorld::Impl::note_edits() {
         const DensityChunk* const densities = content->field.find_chunk(change.chunk);
         const std::size_t now =
             kChunkBytes + (voxels == nullptr ? 0 : voxels->bytes()) + (densities == nullptr ? 0 : densities->bytes());
-        loaded_bytes = loaded_bytes - size->second + now;
+        budget.resize_chunk(size->second, now);
         size->second = now;
         if (!store.is_writable()) of.kept.insert(change.chunk);
       }
@@ -462,8 +415,7 @@ void StreamedWorld::Impl::put(Arrival arrival, ChunkStreamer::Note& note) {
     content->field.load_air_chunk(place.chunk);
   }
   grid->sizes[place.chunk] = size;
-  loaded_bytes += size;
-  ++loaded_chunks;
+  budget.add_chunk(size);
   ++moved_since_save;
   note.add(place, What::Here);
   if (!edited) return;
@@ -491,9 +443,8 @@ void StreamedWorld::Impl::take_away(const ChunkPlace& place, ChunkStreamer::Note
   note.add(place, What::Gone);
   const auto size = grid->sizes.find(place.chunk);
   QUOIN_ASSERT(size != grid->sizes.end(), "what is loaded was counted");
-  loaded_bytes -= size->second;
+  budget.remove_chunk(size->second);
   grid->sizes.erase(size);
-  --loaded_chunks;
   ++moved_since_save;
   ++totals.chunks_unloaded;
 }
@@ -507,11 +458,13 @@ void StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, C
     if (has_moved && seconds_since(start) >= seconds) break;
     has_moved = true;
     // What goes makes room for what comes.
-    const bool is_over = loaded_bytes + other_bytes > options.budget_bytes;
+    const bool is_over = budget.is_over();
     if (may_leave && !leaving.empty() && (is_over || arrivals.empty() || leaving.size() >= arrivals.size())) {
       take_away(leaving.front(), note);
       leaving.pop_front();
     } else if (!arrivals.empty()) {
+      arrived_bytes -= bytes_of(arrivals.front().chunk);
+      budget.set_arrived(arrived_bytes);
       put(std::move(arrivals.front()), note);
       arrivals.pop_front();
     } else {
@@ -523,7 +476,11 @@ void StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, C
 // What workers have brought and planned since the last time.
 void StreamedWorld::Impl::take_in() {
   streamer.take(box);
-  for (Arrival& arrival : box.arrivals) arrivals.push_back(std::move(arrival));
+  for (Arrival& arrival : box.arrivals) {
+    arrived_bytes += bytes_of(arrival.chunk);
+    arrivals.push_back(std::move(arrival));
+  }
+  budget.set_arrived(arrived_bytes);
   if (box.has_leaving) leaving.assign(box.leaving.begin(), box.leaving.end());
   std::ranges::move(box.problems, std::back_inserter(problems));
 }
@@ -534,8 +491,9 @@ Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
   note_edits();
   take_in();
   if (start - asked_others >= kAskOthers) {
-    reported_bytes = options.other_bytes ? options.other_bytes() : 0;
-    other_bytes = reported_bytes + static_cast<std::size_t>(store.stats().pending_bytes);
+    const std::size_t others = options.other_bytes ? options.other_bytes() : 0;
+    const auto pending = static_cast<std::size_t>(store.stats().pending_bytes);
+    budget.set_others(others, pending, is_quiet() && seconds_since(moved) > kQuiet, start);
     asked_others = start;
   }
   Status outcome;
@@ -561,7 +519,10 @@ Status StreamedWorld::Impl::update(std::span<const Viewer> viewers, double secon
 
 void StreamedWorld::Impl::tell_workers() {
   wish(unposted);
-  streamer.post(std::exchange(unposted, {}));
+  if (has_moved) moved = Clock::now();
+  // No more is brought than the caller takes.
+  streamer.set_room(arrivals.size() > kMaxArrivals ? 0 : budget.room(box.begun), budget.guess());
+  streamer.post(std::exchange(unposted, {}), !has_chunks_to_move());
 }
 
 std::size_t StreamedWorld::Impl::waiting_chunks() const {
@@ -745,7 +706,7 @@ Status StreamedWorld::plan(std::span<const Viewer> viewers) {
 }
 
 bool StreamedWorld::has_chunks_to_move() const {
-  return !impl_->arrivals.empty() || (!impl_->is_edited && !impl_->leaving.empty());
+  return impl_->has_chunks_to_move();
 }
 
 Status StreamedWorld::load_all(std::span<const Viewer> viewers) {
@@ -776,7 +737,7 @@ Status StreamedWorld::apply(const WorldEdit& edit) {
     if (!content->grid.is_loaded(chunk)) absent.push_back(chunk);
   }
   if (!absent.empty()) {
-    grid->wait_for(edit, absent);
+    keep_for(edit, absent, grid->waiting);
     impl_->must_plan = true;
   }
   apply_fitting(edit, content->grid, content->field, scene().types);
@@ -816,9 +777,9 @@ std::vector<std::string> StreamedWorld::take_problems() {
 StreamStats StreamedWorld::stats() {
   StreamStats now = impl_->totals;
   impl_->totals.longest_update_seconds = 0.0;
-  now.loaded_chunks = impl_->loaded_chunks;
-  now.loaded_bytes = impl_->loaded_bytes;
-  now.other_bytes = impl_->reported_bytes;
+  now.loaded_chunks = impl_->budget.loaded_chunks();
+  now.loaded_bytes = impl_->budget.loaded_bytes();
+  now.other_bytes = impl_->budget.reported_bytes();
   now.wanted_chunks = impl_->box.wanted;
   now.missing_chunks = impl_->box.missing;
   now.is_complete = impl_->is_quiet();

@@ -16,10 +16,23 @@ void ChangeSet::remove_grid(std::uint32_t number) {
 }
 
 void ChangeSet::add(ChangeSet&& later) {
-  for (const std::uint32_t grid : later.removed_grids) remove_grid(grid);
-  for (auto& [place, chunk] : later.chunks) chunks.insert_or_assign(place, std::move(chunk));
-  for (auto& [key, body] : later.parts) parts.insert_or_assign(key, std::move(body));
-  later = {};
+  chunks.reserve(chunks.size() + later.chunks.size());
+  // From here on nothing asks for memory: what is there moves, node by node.
+  for (const std::uint32_t grid : later.removed_grids) {
+    std::erase_if(chunks, [&](const auto& each) { return each.first.grid == grid; });
+  }
+  removed_grids.merge(later.removed_grids);
+  while (!later.chunks.empty()) {
+    auto node = later.chunks.extract(later.chunks.begin());
+    chunks.erase(node.key());
+    chunks.insert(std::move(node));
+  }
+  while (!later.parts.empty()) {
+    auto node = later.parts.extract(later.parts.begin());
+    parts.erase(node.key());
+    parts.insert(std::move(node));
+  }
+  later.removed_grids.clear();
 }
 
 }  // namespace quoin::store

@@ -32,7 +32,7 @@ struct ChangeSet {
 
   [[nodiscard]] bool empty() const { return removed_grids.empty() && chunks.empty() && parts.empty(); }
   void remove_grid(std::uint32_t number);
-  /// Adds changes that were made later.
+  /// Adds changes that were made later. Where memory runs out both are as they were.
   void add(ChangeSet&& later);
 };
 

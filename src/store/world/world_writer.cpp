@@ -167,16 +167,23 @@ std::vector<std::pair<PartKey, std::optional<PartBody>>> WorldWriter::pending_pa
   return found;
 }
 
-std::optional<WorldWriter::Save> WorldWriter::next_group(std::unique_lock<std::mutex>& lock) {
+// One save, in a list's node, so that it can be put back without memory; none: it ends.
+std::list<WorldWriter::Save> WorldWriter::next_group(std::unique_lock<std::mutex>& lock) {
   work_.wait(lock, [&] { return is_ending_ || (!queue_.empty() && failed_through_ == 0); });
-  if (queue_.empty() || failed_through_ != 0) return std::nullopt;
-  Save group = std::move(queue_.front());
-  queue_.pop_front();
-  while (!queue_.empty() && group.changes.chunks.size() + queue_.front().changes.chunks.size() <= kGroupChunks) {
+  std::list<Save> group;
+  if (queue_.empty() || failed_through_ != 0) return group;
+  group.splice(group.begin(), queue_, queue_.begin());
+  Save& first = group.front();
+  while (!queue_.empty() && first.changes.chunks.size() + queue_.front().changes.chunks.size() <= kGroupChunks) {
     Save& next = queue_.front();
-    group.changes.add(std::move(next.changes));
-    group.last = next.last;
-    std::ranges::move(next.on_saved, std::back_inserter(group.on_saved));
+    try {
+      first.on_saved.reserve(first.on_saved.size() + next.on_saved.size());
+      first.changes.add(std::move(next.changes));
+    } catch (const std::bad_alloc&) {
+      break;  // in a commit of its own
+    }
+    first.last = next.last;
+    std::ranges::move(next.on_saved, std::back_inserter(first.on_saved));
     queue_.pop_front();
   }
   return group;
@@ -184,38 +191,59 @@ std::optional<WorldWriter::Save> WorldWriter::next_group(std::unique_lock<std::m
 
 void WorldWriter::run() {
   std::unique_lock lock(mutex_);
-  while (std::optional<Save> group = next_group(lock)) {
+  for (;;) {
+    std::list<Save> group = next_group(lock);
+    if (group.empty()) return;
     lock.unlock();
     Status outcome;
     try {
-      outcome = write(group->changes);
+      outcome = write(group.front().changes);
     } catch (const std::bad_alloc&) {
+      roll_back();
       outcome = make_error(ErrorCode::LimitExceeded, "there is not enough memory to save");
     }
-    finish(std::move(*group), outcome);
+    finish(std::move(group), outcome);
     lock.lock();
   }
 }
 
-void WorldWriter::finish(Save group, const Status& outcome) {
-  const std::vector<OnSaved> told = group.on_saved;
+void WorldWriter::finish(std::list<Save> group, const Status& outcome) {
+  Save& save = group.front();
+  std::vector<OnSaved> told;
+  if (outcome) {
+    told = std::move(save.on_saved);
+  } else {
+    try {
+      told = save.on_saved;
+    } catch (const std::bad_alloc&) {  // they are told when it was tried again
+    }
+  }
   {
     const std::scoped_lock lock(mutex_);
     if (outcome) {
-      forget_pending(group);
-      saved_through_ = group.last;
-      ++stats_.commits;
+      forget_pending(save);
+      saved_through_ = save.last;
+      stats_.commits += save.changes.empty() ? 0 : 1;
       stats_.saved_chunks += chunks_of_commit_;
       stats_.saved_bytes += bytes_of_commit_;
     } else {
       failure_ = outcome;
       // Of what is behind it nothing is tried either, until somebody asks.
       failed_through_ = last_ticket_;
-      queue_.push_front(std::move(group));
+      queue_.splice(queue_.begin(), group);
     }
   }
   done_.notify_all();
   for (const OnSaved& on_saved : told) on_saved(outcome);
+}
+
+// What was begun of a commit is undone.
+void WorldWriter::roll_back() {
+  regions_.clear();
+  try {
+    if (connection_.is_in_transaction()) static_cast<void>(connection_.run("ROLLBACK"));
+  } catch (const std::bad_alloc&) {  // the next one begins with it
+  }
 }
 
 Result<Statement*> WorldWriter::ready(const char* sql) {
@@ -231,13 +259,14 @@ Result<Statement*> WorldWriter::ready(const char* sql) {
 Status WorldWriter::write(const ChangeSet& changes) {
   chunks_of_commit_ = 0;
   bytes_of_commit_ = 0;
+  if (changes.empty() && !needs_version_) return {};  // what was saved before is on disk
   ++revision_;
+  if (connection_.is_in_transaction()) roll_back();
   Status outcome = connection_.run("BEGIN IMMEDIATE");
   if (outcome) outcome = write_all(changes);
   if (outcome) outcome = connection_.run("COMMIT");
   if (!outcome) {
-    regions_.clear();
-    if (connection_.is_in_transaction()) static_cast<void>(connection_.run("ROLLBACK"));
+    roll_back();
     return outcome;
   }
   needs_version_ = false;

@@ -2,8 +2,8 @@
 
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <functional>
+#include <list>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -76,9 +76,10 @@ class WorldWriter {
 
   void run();
   /// Waits for work; nothing when the writer ends.
-  [[nodiscard]] std::optional<Save> next_group(std::unique_lock<std::mutex>& lock);
+  [[nodiscard]] std::list<Save> next_group(std::unique_lock<std::mutex>& lock);
   void note_pending(const ChangeSet& changes, std::uint64_t ticket);
-  void finish(Save group, const Status& outcome);
+  void finish(std::list<Save> group, const Status& outcome);
+  void roll_back();
   void forget_pending(const Save& group);
 
   // On the writer's thread.
@@ -104,7 +105,7 @@ class WorldWriter {
   mutable std::mutex mutex_;
   std::condition_variable work_;
   std::condition_variable done_;
-  std::deque<Save> queue_;
+  std::list<Save> queue_;
   std::unordered_map<ChunkPlace, Pending<StoredChunk>, ChunkPlaceHash> pending_chunks_;
   std::map<PartKey, Pending<PartBody>> pending_parts_;
   std::map<std::uint32_t, std::uint64_t> pending_removed_;  // grids, with their tickets

@@ -1,0 +1,86 @@
+#include "stream/stream_budget.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace quoin::stream {
+namespace {
+
+// Before anything is loaded a chunk counts as so many bytes.
+constexpr double kGuessedChunkBytes = 24.0 * 1024.0;
+constexpr std::size_t kGuessBelow = 64;
+constexpr std::size_t kLeastChunks = 8;
+// What is made of chunks, before any of it was seen: meshes of smooth ground take more, of blocks less.
+constexpr double kGuessedRatio = 1.5;
+// Seconds in which what turned out counts for two thirds of what was believed: less is believed sooner than that the
+// rest comes later.
+constexpr double kRises = 3.0;
+constexpr double kFalls = 8.0;
+// Of the budget: the rest is what allocators keep between what is used, of what was let go of.
+constexpr double kShareOfBudget = 0.9;
+
+}  // namespace
+
+StreamBudget::StreamBudget(std::size_t bytes, bool has_others)
+    : budget_(bytes), ratio_(has_others ? kGuessedRatio : 0.0) {}
+
+void StreamBudget::set_others(std::size_t reported, std::size_t pending, bool is_quiet, Clock::time_point now) {
+  const double seconds = is_told_ ? std::chrono::duration<double>(now - told_).count() : 0.0;
+  const bool is_other = !is_told_ || reported != reported_;
+  if (!is_told_ || chunks_ == 0) {
+    fixed_ = reported;
+  } else {
+    fixed_ = std::min(fixed_, reported);
+  }
+  if (is_told_ && (is_other || is_quiet) && chunks_ >= kGuessBelow) {
+    const double found =
+        static_cast<double>(reported - fixed_) / static_cast<double>(std::max(chunk_bytes_, std::size_t{1}));
+    ratio_ += (found - ratio_) * (1.0 - std::exp(-seconds / (found > ratio_ ? kRises : kFalls)));
+  }
+  reported_ = reported;
+  pending_ = pending;
+  told_ = now;
+  is_told_ = true;
+}
+
+double StreamBudget::limit() const {
+  return static_cast<double>(budget_) * kShareOfBudget;
+}
+
+double StreamBudget::used() const {
+  return static_cast<double>(chunk_bytes_ + arrived_bytes_ + reported_ + pending_);
+}
+
+double StreamBudget::expected() const {
+  const double made = (1.0 + ratio_) * static_cast<double>(chunk_bytes_ + arrived_bytes_);
+  return std::max(used(), made + static_cast<double>(fixed_ + pending_));
+}
+
+std::int64_t StreamBudget::guess() const {
+  const double mean = chunks_ == 0 ? 0.0 : static_cast<double>(chunk_bytes_) / static_cast<double>(chunks_);
+  return static_cast<std::int64_t>(std::max(mean, kGuessedChunkBytes));
+}
+
+std::int64_t StreamBudget::room(std::size_t begun) const {
+  return static_cast<std::int64_t>((limit() - expected()) / (1.0 + ratio_)) -
+         guess() * static_cast<std::int64_t>(begun);
+}
+
+// Near chunks take more than far ones: where the budget cuts what is wanted it is found step by step, down at once, up
+// when all that was wanted is there.
+std::size_t StreamBudget::chunks(std::size_t planned, bool is_cut, bool may_grow) const {
+  const double total = expected();
+  const auto at_least = [](double count) { return std::max(static_cast<std::size_t>(count), kLeastChunks); };
+  if (chunks_ < kGuessBelow && !is_cut) {
+    const double each = std::max(kGuessedChunkBytes * (1.0 + ratio_), total / static_cast<double>(kGuessBelow));
+    return at_least(limit() / each);
+  }
+  const double ratio = limit() / std::max(total, 1.0);
+  const double fit = static_cast<double>(chunks_) * std::min(ratio, 1e6);
+  if (!is_cut) return at_least(fit);
+  const auto were = static_cast<double>(planned);
+  if (ratio < 1.0) return at_least(std::min(fit, were));
+  return at_least(may_grow ? were * std::min(ratio, 1.1) : were);
+}
+
+}  // namespace quoin::stream
