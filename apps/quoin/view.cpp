@@ -29,6 +29,8 @@ struct ViewArguments {
   std::string drawn;
   std::string light;
   std::string device;
+  std::size_t memory_mebibytes = 0;
+  double distance = 0.0;
   VolumeTexts volume_texts;
 };
 
@@ -56,6 +58,8 @@ int run_view(const ViewArguments& arguments) {
   options.is_bare = arguments.is_bare;
   options.screenshot = arguments.screenshot;
   options.device = arguments.device;
+  options.world.memory_bytes = arguments.memory_mebibytes << 20;
+  if (arguments.distance > 0.0) options.world.distance = arguments.distance;
   options.leave_at_once = [] {
     die_if_interrupted();
     std::fflush(nullptr);
@@ -146,6 +150,14 @@ void add_view_command(CLI::App& app, int& status) {
       ->check(CLI::IsMember({"auto", "cpu", "vulkan"}))
       ->capture_default_str();
   command->add_option("--device", arguments->device, "Device of Vulkan: its number or a part of its name");
+  command
+      ->add_option("--memory", arguments->memory_mebibytes,
+                   "For what is loaded of a world (.quoin), and what is made of it, MiB (default: a quarter of all)")
+      ->check(CLI::Range(std::size_t{64}, std::size_t{1} << 24));
+  command
+      ->add_option("--distance", arguments->distance,
+                   "How far around the camera a world is loaded, world units (default 640)")
+      ->check(CLI::Range(64.0, 1e6));
   command->add_option("--threads", arguments->threads.count, "Threads to use (default: all)")
       ->check(CLI::Range(1U, 1024U));
   command->footer(

@@ -113,6 +113,7 @@ struct SmoothPart {
 struct CpuBackend::Impl {
   Impl(const Scene& shown, const CpuBackendOptions& given, std::function<void()> listener)
       : scene(shown), options(given), on_frame(std::move(listener)), renderer(shown, given.instances, given.threads) {
+    count_bytes();
     worker = std::thread([this] { work(); });
   }
 
@@ -136,6 +137,7 @@ struct CpuBackend::Impl {
   [[nodiscard]] Result<Picture> picture_of(const ViewRequest& wanted, const Stage& now, const Progress& goes_on);
   [[nodiscard]] Result<Picture> path_picture(const ViewRequest& wanted, const Stage& now, const Progress& goes_on);
   void prepare_paths();
+  void count_bytes();
   [[nodiscard]] Status prepare_smooth(const Progress& goes_on);
   void refuse_smooth(Error why);
   void publish(Result<Picture> picture, const ViewRequest& of, const Stage& stage, double seconds);
@@ -155,6 +157,7 @@ struct CpuBackend::Impl {
   std::unique_ptr<PathPart> paths;          // likewise
   std::atomic<bool> is_smooth_stale{true};
   std::atomic<bool> are_paths_stale{true};
+  std::atomic<std::size_t> held{0};     // bytes of what is made of the scene
   std::atomic<int> smooth_percent{-1};  // of what is made for it; -1: nothing is
 
   mutable std::mutex mutex;  // guards what follows, but for the atomic ones
@@ -205,8 +208,17 @@ void CpuBackend::Impl::work() {
 void CpuBackend::Impl::update(std::unique_lock<std::mutex>& lock) {
   lock.unlock();
   renderer.update(options.threads);
+  count_bytes();
   lock.lock();
   is_stale = false;
+}
+
+// Paths are taken through structures of their own, as large as the others.
+void CpuBackend::Impl::count_bytes() {
+  const std::size_t structures = renderer.tracer().bytes();
+  std::size_t all = paths ? 2 * structures : structures;
+  if (smooth) all += smooth->fields.bytes() + (smooth->renderer ? smooth->renderer->tracer().bytes() : 0);
+  held = all;
 }
 
 std::optional<Stage> CpuBackend::Impl::finest(bool is_draft, double patience) const {
@@ -303,6 +315,7 @@ void CpuBackend::Impl::prepare_paths() {
     paths = std::make_unique<PathPart>(scene, options);
   }
   are_paths_stale = false;
+  count_bytes();
 }
 
 // Makes the fields, or what of them changed.
@@ -331,6 +344,7 @@ Status CpuBackend::Impl::prepare_smooth(const Progress& goes_on) {
   smooth_percent = -1;
   if (made) {
     is_smooth_stale = false;
+    count_bytes();
   } else if (made.error().code != ErrorCode::Cancelled) {
     refuse_smooth(made.error());
   }
@@ -385,6 +399,10 @@ void CpuBackend::show(const ViewRequest& request) {
 std::optional<ViewFrame> CpuBackend::take() {
   const std::lock_guard lock(impl_->mutex);
   return std::exchange(impl_->frame, std::nullopt);
+}
+
+std::size_t CpuBackend::bytes() const {
+  return impl_->held;
 }
 
 std::string CpuBackend::activity() const {

@@ -41,6 +41,7 @@ class CpuBackend final : public ViewBackend {
   [[nodiscard]] std::string name() const override;
   void show(const ViewRequest& request) override;
   [[nodiscard]] std::optional<ViewFrame> take() override;
+  [[nodiscard]] std::size_t bytes() const override;
   [[nodiscard]] std::string activity() const override;
   [[nodiscard]] std::optional<Error> fault() override;
   /// Why the scene cannot be marched as DrawMode::Smooth, if that was tried since the last edit: its densities take

@@ -388,7 +388,7 @@ TEST(Loader, ReadsOnItsOwnThread) {
   std::vector<std::string> warnings;
   ASSERT_TRUE(small_document().write(folder.file("hill.vox"), warnings));
   Bell bell;
-  Loader loader(folder.file("hill.vox"), {}, by_processor(), [&bell] { bell.ring(); });
+  Loader loader(folder.file("hill.vox"), {}, {}, by_processor(), [&bell] { bell.ring(); });
   ASSERT_TRUE(bell.wait());
   ASSERT_TRUE(loader.is_done());
   auto opened = loader.take();
@@ -402,7 +402,7 @@ TEST(Loader, MayBeCancelledAtAnyTime) {
   std::vector<std::string> warnings;
   ASSERT_TRUE(small_document().write(folder.file("hill.vox"), warnings));
   for (int attempt = 0; attempt < 50; ++attempt) {
-    Loader loader(folder.file("hill.vox"), {}, by_processor(), nullptr);
+    Loader loader(folder.file("hill.vox"), {}, {}, by_processor(), nullptr);
     loader.cancel();
     while (!loader.is_done()) std::this_thread::yield();
     const auto result = loader.take();
@@ -414,7 +414,7 @@ TEST(Loader, MayBeCancelledAtAnyTime) {
 
 TEST(Loader, ErrorsArriveToo) {
   Bell bell;
-  Loader loader("/nowhere/a.vox", {}, by_processor(), [&bell] { bell.ring(); });
+  Loader loader("/nowhere/a.vox", {}, {}, by_processor(), [&bell] { bell.ring(); });
   ASSERT_TRUE(bell.wait());
   EXPECT_EQ(loader.take().error().code, ErrorCode::CannotRead);
 }

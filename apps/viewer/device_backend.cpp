@@ -24,6 +24,8 @@ struct DeviceBackend::Impl {
     std::string name;
     std::string activity;
     std::vector<std::pair<std::string, std::string>> stats;
+    std::size_t mesh_bytes = 0;
+    bool has_scene = false;
     bool traces_light = false;
     bool is_processor = false;  // that acts as a device
     std::array<bool, 4> is_slow{};
@@ -245,6 +247,8 @@ DeviceBackend::Impl::Told DeviceBackend::Impl::tell() const {
   Told now;
   if (drawer->renderer() != nullptr) now.name = drawer->renderer()->device().name;
   now.stats = drawer->stats();
+  now.mesh_bytes = drawer->mesh_bytes();
+  now.has_scene = drawer->has_scene();
   now.is_processor = drawer->is_processor();
   now.traces_light = drawer->renderer() != nullptr && !now.is_processor;
   for (std::size_t mode = 0; mode < now.is_slow.size(); ++mode) {
@@ -383,6 +387,16 @@ std::vector<std::pair<std::string, std::string>> DeviceBackend::stats() const {
   const std::lock_guard lock(me.mutex);
   if (!me.uses_device() || !me.drawer) return {};
   return me.has_thread() ? me.told.stats : me.drawer->stats();
+}
+
+// What rays meet is as large on a device as it is here.
+std::size_t DeviceBackend::bytes() const {
+  const Impl& me = *impl_;
+  const std::lock_guard lock(me.mutex);
+  const bool is_here = !me.has_thread() && me.drawer;
+  const bool has_scene = is_here ? me.drawer->has_scene() : me.told.has_scene;
+  const std::size_t mesh_bytes = is_here ? me.drawer->mesh_bytes() : me.told.mesh_bytes;
+  return me.cpu.bytes() * (has_scene ? 2 : 1) + mesh_bytes;
 }
 
 std::string DeviceBackend::activity() const {

@@ -47,6 +47,7 @@ class DeviceBackend final : public ViewBackend {
   [[nodiscard]] std::optional<ViewFrame> take() override;
   [[nodiscard]] bool wants_frames() const override;
   [[nodiscard]] std::vector<std::pair<std::string, std::string>> stats() const override;
+  [[nodiscard]] std::size_t bytes() const override;
   [[nodiscard]] std::string activity() const override;
   [[nodiscard]] bool is_slow(DrawMode mode) const override;
   [[nodiscard]] bool ends_late() const override;

@@ -51,6 +51,10 @@ class DeviceDrawer {
   /// Chunks that are meshed, and those that were to be when there was last nothing left to mesh; 0 of 0: none are.
   [[nodiscard]] std::pair<std::size_t, std::size_t> meshing() const;
   [[nodiscard]] std::vector<std::pair<std::string, std::string>> stats() const;
+  /// Of meshes, in the device's memory.
+  [[nodiscard]] std::size_t mesh_bytes() const { return meshes_ ? meshes_->renderer.stats().bytes : 0; }
+  /// Whether the device has the scene's voxels.
+  [[nodiscard]] bool has_scene() const { return renderer_ != nullptr && !is_scene_new_; }
   /// Whether pictures of the mode took longer than options allow when they were as small as they get, or the first of a
   /// processor that acts as a device ten times as long.
   [[nodiscard]] bool is_slow(DrawMode mode) const { return is_slow_.at(static_cast<std::size_t>(mode)); }

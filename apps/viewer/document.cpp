@@ -45,8 +45,8 @@ Status write_as_glb(const Scene& scene, const std::filesystem::path& path, const
 Result<FileFormat> format_to_write(const std::filesystem::path& path) {
   const auto format = format_for_writing(path);
   if (format && (!format->is_mesh || format->format == FileFormat::Glb)) return format->format;
-  return make_error(ErrorCode::Unsupported, "the viewer saves .vox, .json and .glb; `quoin convert` writes the others",
-                    path.string());
+  return make_error(ErrorCode::Unsupported,
+                    "the viewer saves .quoin, .vox, .json and .glb; `quoin convert` writes the others", path.string());
 }
 
 }  // namespace
@@ -60,8 +60,17 @@ Document::Document(LoadedScene loaded, std::filesystem::path path)
   faces_.update(loaded_.scene);
 }
 
+Document::Document(WorldWindow world, std::filesystem::path path)
+    : world_(std::make_unique<WorldWindow>(std::move(world))), path_(std::move(path)) {}
+
 Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& path, const LoadOptions& options,
-                                                 const Progress& progress) {
+                                                 const Progress& progress, const WorldOptions& world) {
+  const auto format = detect_format(path);
+  if (format && *format == FileFormat::World && !options.raw) {
+    auto window = WorldWindow::open(path, world);
+    if (!window) return window.error();
+    return std::make_unique<Document>(std::move(*window), path);
+  }
   LoadOptions as_saved = options;
   as_saved.show_hidden = false;
   // Before it is read: what is written meanwhile is not what was read.
@@ -73,11 +82,17 @@ Result<std::unique_ptr<Document>> Document::open(const std::filesystem::path& pa
   return document;
 }
 
+const char* Document::why_not_edited() const {
+  return world_ && !world_->why_not_written().empty() ? world_->why_not_written().c_str() : nullptr;
+}
+
 bool Document::can_save_in_place() const {
+  if (world_) return why_not_edited() == nullptr;
   return can_write(path_) && loaded_.named_files.empty();
 }
 
 std::filesystem::path Document::proposed_path() const {
+  if (world_) return path_.parent_path() / (stem_of_file(path_) + "-copy.quoin");
   bool has_field = false;
   loaded_.scene.grids().for_each(
       [&](GridHandle, const SceneGrid& grid) { has_field = has_field || grid.field.chunk_count() > 0; });
@@ -93,11 +108,12 @@ std::string Document::name() const {
 
 bool Document::begin_stroke(const Brush& brush, const SceneHit& hit) {
   end_stroke();
-  const Instance* instance = loaded_.scene.instances().find(hit.instance);
-  if (instance == nullptr || loaded_.scene.grids().find(instance->grid) == nullptr) return false;
+  if (why_not_edited() != nullptr) return false;
+  const Instance* instance = scene().instances().find(hit.instance);
+  if (instance == nullptr || scene().grids().find(instance->grid) == nullptr) return false;
   const bool needs_type = brush.action != BrushAction::Remove && brush.action != BrushAction::Smooth;
-  if (needs_type && (brush.type == kAir || brush.type >= loaded_.scene.types.size())) return false;
-  if (const auto surface = SurfacePlace::of(hit, *instance, loaded_.scene.grids()[instance->grid])) {
+  if (needs_type && (brush.type == kAir || brush.type >= scene().types.size())) return false;
+  if (const auto surface = SurfacePlace::of(hit, *instance, scene().grids()[instance->grid])) {
     stroke_ = Stroke{brush, instance->grid, hit.instance, {}, {}, surface, surface->point};
     history_.begin(name_of(brush.action));
     touch_surface(surface->point);
@@ -112,13 +128,13 @@ bool Document::begin_stroke(const Brush& brush, const SceneHit& hit) {
 }
 
 std::int64_t Document::touch(IVec3 voxel) {
-  Grid& grid = loaded_.scene.edit(stroke_->grid).grid;
+  Grid& grid = edited_scene().edit(stroke_->grid).grid;
   history_.touch(stroke_->grid, grid, reach_of(stroke_->brush, voxel));
   return apply(stroke_->brush, voxel, grid);
 }
 
 std::int64_t Document::touch_surface(DVec3 point) {
-  DensityGrid& field = loaded_.scene.edit(stroke_->grid).field;
+  DensityGrid& field = edited_scene().edit(stroke_->grid).field;
   history_.touch(stroke_->grid, field, reach_of(stroke_->brush, point, field));
   return sculpt(stroke_->brush, point, *stroke_->surface, field);
 }
@@ -150,8 +166,8 @@ std::int64_t Document::drag_surface(const Ray& ray_in_world, const std::optional
 
 std::int64_t Document::drag_to(const Ray& ray_in_world, const std::optional<SceneHit>& hit) {
   if (!stroke_) return 0;
-  const Instance* instance = loaded_.scene.instances().find(stroke_->instance);
-  const SceneGrid* grid = loaded_.scene.grids().find(stroke_->grid);
+  const Instance* instance = scene().instances().find(stroke_->instance);
+  const SceneGrid* grid = scene().grids().find(stroke_->grid);
   if (instance == nullptr || grid == nullptr) return 0;
   if (stroke_->surface) return drag_surface(ray_in_world, hit, *instance, *grid);
   if (stroke_->brush.action == BrushAction::Paint) {
@@ -182,26 +198,26 @@ std::int64_t Document::drag_to(const Ray& ray_in_world, const std::optional<Scen
 void Document::end_stroke() {
   if (!stroke_) return;
   stroke_.reset();
-  history_.end(loaded_.scene);
+  history_.end(scene());
 }
 
 bool Document::undo() {
-  return !stroke_ && history_.undo(loaded_.scene);
+  return !stroke_ && history_.undo(edited_scene());
 }
 
 bool Document::redo() {
-  return !stroke_ && history_.redo(loaded_.scene);
+  return !stroke_ && history_.redo(edited_scene());
 }
 
 bool Document::show(const SceneNode& node, bool is_visible) {
-  if (stroke_ || visibility_of(loaded_.scene, node).value_or(is_visible) == is_visible) return false;
-  history_.show(loaded_.scene, node, is_visible);
+  if (stroke_ || visibility_of(scene(), node).value_or(is_visible) == is_visible) return false;
+  history_.show(edited_scene(), node, is_visible);
   return true;
 }
 
 Result<VoxelType> Document::type_of_colour(Rgba8 colour, float emission) {
-  for (std::size_t type = 1; type < loaded_.scene.types.size(); ++type) {
-    const VoxelProperties& known = loaded_.scene.types[static_cast<VoxelType>(type)];
+  for (std::size_t type = 1; type < scene().types.size(); ++type) {
+    const VoxelProperties& known = scene().types[static_cast<VoxelType>(type)];
     if (known.colour == colour && known.visibility == Visibility::Opaque && known.emission == emission) {
       return static_cast<VoxelType>(type);
     }
@@ -209,13 +225,14 @@ Result<VoxelType> Document::type_of_colour(Rgba8 colour, float emission) {
   VoxelProperties properties;
   properties.colour = colour;
   properties.emission = emission;
-  return loaded_.scene.types.add(std::move(properties));
+  return edited_scene().types.add(std::move(properties));
 }
 
 Result<std::vector<std::string>> Document::losses(const std::filesystem::path& path) const {
   const auto format = format_to_write(path);
   if (!format) return format.error();
   std::vector<std::string> all;
+  if (world_) return all;                      // itself, or a copy
   if (*format == FileFormat::Glb) return all;  // a copy
   auto of_format = losses_of_saving(loaded_, path);
   if (!of_format) return of_format.error();
@@ -232,6 +249,7 @@ Result<std::vector<std::string>> Document::losses(const std::filesystem::path& p
 
 Status Document::write(const std::filesystem::path& path, std::vector<std::string>& warnings,
                        const Progress& progress) const {
+  if (world_) return write_world(path);
   const auto format = format_to_write(path);
   if (!format) return format.error();
   if (*format == FileFormat::Glb) return write_as_glb(loaded_.scene, path, progress);
@@ -250,11 +268,21 @@ Status Document::write(const std::filesystem::path& path, std::vector<std::strin
   return {};
 }
 
+Status Document::write_world(const std::filesystem::path& path) const {
+  if (is_same_file(path, path_)) return world_->flush();
+  const auto format = format_to_write(path);
+  if (format && *format == FileFormat::World) return world_->copy_to(path);
+  return make_error(ErrorCode::Unsupported,
+                    "only a part of a world is in memory here: it is copied as .quoin; `quoin convert` writes others",
+                    path.string());
+}
+
 std::filesystem::path Document::kept_as(const std::filesystem::path& path) const {
   return FileBackup::name_for(path, originals_.contains(path) ? FileBackup::Older::Kept : FileBackup::Older::Replaced);
 }
 
 void Document::note_written(const std::filesystem::path& path, std::uint64_t state) {
+  if (world_) return note_saving({});
   const auto format = format_to_write(path);
   if (!format || *format == FileFormat::Glb) return;
   path_ = path;

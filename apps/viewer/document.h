@@ -17,10 +17,12 @@
 #include "brush.h"
 #include "edit_history.h"
 #include "sculpt.h"
+#include "world_window.h"
 
 namespace quoin::viewer {
 
-/// A scene under edit, where it came from, and what can be undone.
+/// A scene under edit, where it came from, and what can be undone. Of a world on disk it is a window: chunks come and go,
+/// and edits are saved as they are made.
 ///
 /// Edits need the scene to themselves; whoever draws it must have stopped (ViewBackend::pause).
 class Document {
@@ -28,15 +30,22 @@ class Document {
   /// An empty scene without a name.
   Document() = default;
   Document(LoadedScene loaded, std::filesystem::path path);
+  Document(WorldWindow world, std::filesystem::path path);
 
   /// Reads any file that `load_scene` reads. What is hidden stays so, whatever the options say: who draws looks at all
-  /// instances, or not. Errors: those of load_scene.
+  /// instances, or not. Of a world on disk no chunk is read yet. Errors: those of load_scene and WorldWindow::open.
   [[nodiscard]] static Result<std::unique_ptr<Document>> open(const std::filesystem::path& path,
                                                               const LoadOptions& options = {},
-                                                              const Progress& progress = {});
+                                                              const Progress& progress = {},
+                                                              const WorldOptions& world = {});
 
-  [[nodiscard]] const Scene& scene() const { return loaded_.scene; }
-  [[nodiscard]] const LoadedScene& loaded() const { return loaded_; }
+  [[nodiscard]] const Scene& scene() const { return loaded().scene; }
+  [[nodiscard]] const LoadedScene& loaded() const { return world_ ? world_->opened() : loaded_; }
+  /// Null where the document is no world on disk.
+  [[nodiscard]] WorldWindow* world() { return world_.get(); }
+  [[nodiscard]] const WorldWindow* world() const { return world_.get(); }
+  /// Why it may not be edited, for people; null where it may.
+  [[nodiscard]] const char* why_not_edited() const;
   /// Empty for a scene that came from nowhere.
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   /// Whether it may be saved under its own name without a question: that can be written, and it is no scene file that
@@ -47,10 +56,14 @@ class Document {
   [[nodiscard]] std::filesystem::path proposed_path() const;
   /// For titles: the file's name, or "empty scene".
   [[nodiscard]] std::string name() const;
-  [[nodiscard]] bool is_dirty() const { return history_.state() != saved_state_; }
+  /// Whether something would be lost if it were closed now. A world on disk saves itself, also when it is closed: only
+  /// what could not be saved (`note_saving`) would be.
+  [[nodiscard]] bool is_dirty() const { return world_ ? has_failed_ : history_.state() != saved_state_; }
+  /// What became of the last save of a world on disk.
+  void note_saving(const Status& outcome) { has_failed_ = !outcome; }
   /// The faces of what is drawn, as of now. Cost: that of what was edited since the last time; all were counted when
   /// the document was made. Requires: no edit is under way on another thread.
-  [[nodiscard]] const FaceCounts& faces() { return faces_.update(loaded_.scene); }
+  [[nodiscard]] const FaceCounts& faces() { return faces_.update(scene()); }
 
   /// Begins a stroke with its first touch, where the user points: of voxels, or of the field whose surface was hit.
   /// False, without a stroke, when the instance or its grid is gone, the brush's type is not registered, or the action
@@ -65,7 +78,7 @@ class Document {
   [[nodiscard]] const Brush* stroke_brush() const { return stroke_ ? &stroke_->brush : nullptr; }
 
   [[nodiscard]] const EditHistory& history() const { return history_; }
-  /// False when there is nothing to undo (redo), or in a stroke.
+  /// False when there is nothing to undo (redo), in a stroke, or where what it would change is not in memory.
   bool undo();
   bool redo();
 
@@ -88,7 +101,8 @@ class Document {
   /// What `write` keeps the file as that is there now; empty where it keeps none.
   [[nodiscard]] std::filesystem::path kept_as(const std::filesystem::path& path) const;
 
-  /// Writes .vox, .json or .glb, by the name's ending, and only reads the scene. A file that is there already is kept
+  /// Writes .quoin, .vox, .json or .glb, by the name's ending, and only reads the scene. A world on disk saves itself
+  /// under its own name, and is copied under others, which must end in .quoin. A file that is there already is kept
   /// as NAME~ (see FileBackup), unless it is a mesh. What was kept because saving lost something stays: later saves of
   /// the document under that name neither replace it nor keep more, until something else is lost.
   /// Errors: Unsupported for other endings; those of save_scene, FileBackup, mesh_scene and write_mesh; Cancelled.
@@ -109,12 +123,16 @@ class Document {
     DVec3 last_point{0.0};
   };
 
+  [[nodiscard]] Scene& edited_scene() { return world_ ? world_->scene() : loaded_.scene; }
+  [[nodiscard]] Status write_world(const std::filesystem::path& path) const;
   std::int64_t touch(IVec3 voxel);
   std::int64_t touch_surface(DVec3 point);
   std::int64_t drag_surface(const Ray& ray_in_world, const std::optional<SceneHit>& hit, const Instance& instance,
                             const SceneGrid& grid);
 
-  LoadedScene loaded_;
+  LoadedScene loaded_;                  // of anything but a world
+  std::unique_ptr<WorldWindow> world_;  // null: it is none
+  bool has_failed_ = false;             // the last save of that
   SceneFaces faces_;
   std::filesystem::path path_;
   EditHistory history_;

@@ -143,6 +143,14 @@ std::string EditHistory::redo_name() const {
   return can_redo() ? steps_[done_].name : "";
 }
 
+bool EditHistory::is_loaded(const Scene& scene, const Step& step) {
+  const auto is_there = [&](const auto& chunk) {
+    const SceneGrid* const grid = scene.grids().find(chunk.grid);
+    return grid == nullptr || content_of(*grid, chunk.before).is_loaded(chunk.place);
+  };
+  return std::ranges::all_of(step.chunks, is_there) && std::ranges::all_of(step.samples, is_there);
+}
+
 void EditHistory::put(Scene& scene, const Step& step, bool after) {
   for (const ChangedChunk& chunk : step.chunks) {
     if (scene.grids().find(chunk.grid) == nullptr) continue;
@@ -157,7 +165,7 @@ void EditHistory::put(Scene& scene, const Step& step, bool after) {
 
 bool EditHistory::undo(Scene& scene) {
   QUOIN_ASSERT(!open_, "no step is under way");
-  if (!can_undo()) return false;
+  if (!can_undo() || !is_loaded(scene, steps_[done_ - 1])) return false;
   --done_;
   put(scene, steps_[done_], false);
   return true;
@@ -165,7 +173,7 @@ bool EditHistory::undo(Scene& scene) {
 
 bool EditHistory::redo(Scene& scene) {
   QUOIN_ASSERT(!open_, "no step is under way");
-  if (!can_redo()) return false;
+  if (!can_redo() || !is_loaded(scene, steps_[done_])) return false;
   put(scene, steps_[done_], true);
   ++done_;
   return true;

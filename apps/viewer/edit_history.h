@@ -41,7 +41,8 @@ class EditHistory {
   /// The names of what would be undone or redone; empty when nothing would.
   [[nodiscard]] std::string undo_name() const;
   [[nodiscard]] std::string redo_name() const;
-  /// False when there is nothing to undo (redo). Requires: no step is under way.
+  /// False when there is nothing to undo (redo), or where chunks that it would change are not loaded: then nothing is
+  /// changed. Requires: no step is under way.
   bool undo(Scene& scene);
   bool redo(Scene& scene);
   void clear();
@@ -76,6 +77,7 @@ class EditHistory {
   void touch_chunks(std::vector<Changed<Content>>& known, GridHandle handle, const Grid& grid, const IBox& box);
   template <class Content>
   void finish(const Scene& scene, std::vector<Changed<Content>>& changed, std::size_t& bytes);
+  [[nodiscard]] static bool is_loaded(const Scene& scene, const Step& step);
   static void put(Scene& scene, const Step& step, bool after);
 
   std::size_t max_bytes_;

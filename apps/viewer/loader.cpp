@@ -14,12 +14,12 @@ Error out_of_memory(const std::filesystem::path& path) {
 
 }  // namespace
 
-Loader::Loader(std::filesystem::path path, const LoadOptions& options, MakeBackend make_backend,
-               std::function<void()> on_done)
+Loader::Loader(std::filesystem::path path, const LoadOptions& options, const WorldOptions& world,
+               MakeBackend make_backend, std::function<void()> on_done)
     : path_(std::move(path)) {
-  thread_ = std::thread([this, options, make = std::move(make_backend), done = std::move(on_done)] {
+  thread_ = std::thread([this, options, world, make = std::move(make_backend), done = std::move(on_done)] {
     try {
-      work(options, make);
+      work(options, world, make);
     } catch (const std::bad_alloc&) {
       result_ = out_of_memory(path_);
     }
@@ -33,11 +33,12 @@ Loader::~Loader() {
   thread_.join();
 }
 
-void Loader::work(const LoadOptions& options, const MakeBackend& make_backend) {
-  auto document = Document::open(path_, options, [this](double share) {
+void Loader::work(const LoadOptions& options, const WorldOptions& world, const MakeBackend& make_backend) {
+  const auto tell = [this](double share) {
     fraction_ = share;
     return !is_abandoned_;
-  });
+  };
+  auto document = Document::open(path_, options, tell, world);
   if (!document) {
     result_ = document.error();
     return;

@@ -26,7 +26,7 @@ using MakeBackend = std::function<std::unique_ptr<ViewBackend>(const Document&)>
 class Loader {
  public:
   /// `on_done` is called from the loading thread, unless the loader is destroyed first.
-  Loader(std::filesystem::path path, const LoadOptions& options, MakeBackend make_backend,
+  Loader(std::filesystem::path path, const LoadOptions& options, const WorldOptions& world, MakeBackend make_backend,
          std::function<void()> on_done);
   Loader(const Loader&) = delete;
   Loader& operator=(const Loader&) = delete;
@@ -48,7 +48,7 @@ class Loader {
   [[nodiscard]] Result<OpenDocument> take();
 
  private:
-  void work(const LoadOptions& options, const MakeBackend& make_backend);
+  void work(const LoadOptions& options, const WorldOptions& world, const MakeBackend& make_backend);
 
   std::filesystem::path path_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();

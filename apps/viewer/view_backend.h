@@ -125,6 +125,10 @@ class ViewBackend {
   /// What people may want to know of it: names and values.
   [[nodiscard]] virtual std::vector<std::pair<std::string, std::string>> stats() const { return {}; }
 
+  /// Bytes that are held because of the scene, on whatever device, as of the last picture; not counted are tables of a
+  /// fixed size.
+  [[nodiscard]] virtual std::size_t bytes() const { return 0; }
+
   /// For people, what a picture still waits for: "meshing 120/480"; empty: nothing but its drawing.
   [[nodiscard]] virtual std::string activity() const { return {}; }
 

@@ -13,6 +13,10 @@
 #include <oneapi/tbb/info.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
+
+#include <memory>
+#include <utility>
+#include <vector>
 #endif
 
 namespace quoin {
@@ -47,6 +51,20 @@ void parallel_for(std::size_t count, Threads threads, FunctionRef<void(std::size
 
 #else
 
+namespace {
+
+// Arenas that are made for one call each are given back late, to the thread that made them: a game that calls this every
+// frame would grow by some kilobytes a call. So each thread keeps one for each number of workers that it asked for.
+oneapi::tbb::task_arena& arena_of(unsigned workers) {
+  thread_local std::vector<std::pair<unsigned, std::unique_ptr<oneapi::tbb::task_arena>>> arenas;
+  const auto known = std::ranges::find(arenas, workers, [](const auto& arena) { return arena.first; });
+  if (known != arenas.end()) return *known->second;
+  arenas.emplace_back(workers, std::make_unique<oneapi::tbb::task_arena>(static_cast<int>(workers)));
+  return *arenas.back().second;
+}
+
+}  // namespace
+
 void parallel_for(std::size_t count, Threads threads, FunctionRef<void(std::size_t i)> body) {
   // Asked for more workers than there are processors, oneTBB starts no more but complains on standard error.
   const auto processors = static_cast<unsigned>(std::max(1, oneapi::tbb::info::default_concurrency()));
@@ -55,8 +73,7 @@ void parallel_for(std::size_t count, Threads threads, FunctionRef<void(std::size
     for (std::size_t i = 0; i < count; ++i) body(i);
     return;
   }
-  oneapi::tbb::task_arena arena(static_cast<int>(workers));
-  arena.execute([&] { oneapi::tbb::parallel_for(std::size_t{0}, count, body); });
+  arena_of(workers).execute([&] { oneapi::tbb::parallel_for(std::size_t{0}, count, body); });
 }
 
 #endif

@@ -13,6 +13,8 @@
 #include "io/byte_stream.h"
 #include "io/minecraft/minecraft_source.h"
 #include "io/minecraft/region_file.h"
+#include "io/minecraft/schematic.h"
+#include "io/models/models.h"
 #include "io/volume/header.h"
 #include "io/whole_file.h"
 #include "io/world_format.h"
@@ -28,6 +30,18 @@ constexpr std::array kFormats = {
                false, false},
     FormatInfo{FileFormat::Minecraft, "minecraft", ".mca",
                "worlds of Minecraft's (Java): folders, or regions of theirs", true, false, false, false},
+    FormatInfo{FileFormat::Schematic, "schematic", ".schem",
+               "pieces of Minecraft's worlds, also .schematic, .litematic and structures (.nbt)", true, false, false,
+               false, ".schematic .litematic .nbt"},
+    FormatInfo{FileFormat::Qubicle, "qubicle", ".qb", "Qubicle, also .qbt and .qef", true, false, false, false,
+               ".qbt .qef"},
+    FormatInfo{FileFormat::Goxel, "goxel", ".gox", "Goxel", true, false, false, false},
+    FormatInfo{FileFormat::Voxlap, "voxlap", ".vxl",
+               "maps of Voxlap and Ace of Spades, also models: .kv6, .kvx and SLAB6's .vox", true, false, false, false,
+               ".kv6 .kvx"},
+    FormatInfo{FileFormat::Binvox, "binvox", ".binvox", "binvox", true, false, false, false},
+    FormatInfo{FileFormat::CubeWorld, "cub", ".cub", "models of Cube World", true, false, false, false},
+    FormatInfo{FileFormat::LuantiSchematic, "luanti", ".mts", "schematics of Luanti", true, false, false, false},
     FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, false, false, true},
     FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes", true, false, false, true},
     FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true, false},
@@ -52,7 +66,13 @@ std::string lower_case_extension(const std::filesystem::path& path) {
 std::string extensions_with(bool FormatInfo::*ability) {
   std::vector<std::string_view> sorted;
   for (const FormatInfo& info : kFormats) {
-    if (info.*ability) sorted.push_back(info.extension);
+    if (!(info.*ability)) continue;
+    sorted.push_back(info.extension);
+    for (std::string_view rest = info.also; !rest.empty();) {
+      const std::size_t end = std::min(rest.find(' '), rest.size());
+      sorted.push_back(rest.substr(0, end));
+      rest.remove_prefix(std::min(end + 1, rest.size()));
+    }
   }
   std::sort(sorted.begin(), sorted.end());
   std::string list;
@@ -68,6 +88,9 @@ Error unrecognised(std::span<const std::byte> bytes) {
   if (bytes.empty()) return {ErrorCode::BadFormat, "the file is empty", {}, {}};
   if (begins_with(bytes, "version https://git-lfs.github.com/spec/")) {
     return {ErrorCode::BadFormat, "a Git LFS pointer, not the file itself (git lfs pull fetches it)", {}, 0};
+  }
+  if (begins_with(bytes, "Voxel Animation")) {
+    return {ErrorCode::Unsupported, "a model of Westwood's games, no map of Voxlap's", {}, 0};
   }
   return {ErrorCode::BadFormat, "not a file of any format that Quoin reads (" + readable_extensions() + ")", {}, {}};
 }
@@ -97,6 +120,43 @@ Result<LoadedScene> read_volume_as_scene(const Source& source, const LoadOptions
   return loaded;
 }
 
+/// Voxlap's formats have no name for what they share.
+Result<LoadedScene> read_voxlap(std::span<const std::byte> bytes) {
+  if (models::is_kv6(bytes)) return models::read_kv6(bytes);
+  if (models::is_kvx(bytes)) return models::read_kvx(bytes);
+  if (models::is_slab6(bytes)) return models::read_slab6(bytes);
+  return models::read_vxl(bytes);
+}
+
+/// What reads a format of models; null where it is none.
+using ReadModel = Result<LoadedScene> (*)(std::span<const std::byte>);
+ReadModel model_reader(const std::optional<FileFormat>& format) {
+  if (format == FileFormat::Qubicle) return models::read_qubicle;
+  if (format == FileFormat::Goxel) return models::read_goxel;
+  if (format == FileFormat::Voxlap) return read_voxlap;
+  if (format == FileFormat::Binvox) return models::read_binvox;
+  if (format == FileFormat::CubeWorld) return models::read_cub;
+  if (format == FileFormat::LuantiSchematic) return models::read_mts;
+  return nullptr;
+}
+
+/// Of formats of models that begin with something of their own.
+std::optional<FileFormat> detect_model(std::span<const std::byte> beginning) {
+  if (models::is_goxel(beginning)) return FileFormat::Goxel;
+  if (models::is_kv6(beginning)) return FileFormat::Voxlap;
+  if (models::is_binvox(beginning)) return FileFormat::Binvox;
+  if (models::is_mts(beginning)) return FileFormat::LuantiSchematic;
+  if (models::is_qubicle(beginning)) return FileFormat::Qubicle;
+  return std::nullopt;
+}
+
+/// Of those whose whole length has to fit what they say.
+std::optional<FileFormat> detect_headerless(std::span<const std::byte> whole) {
+  if (models::is_cub(whole)) return FileFormat::CubeWorld;
+  if (models::is_slab6(whole) || models::is_kvx(whole) || models::is_vxl(whole)) return FileFormat::Voxlap;
+  return std::nullopt;
+}
+
 /// What lies around the spawn of a world that is read by chunks.
 Result<LoadedScene> read_around_spawn(const Result<std::unique_ptr<ChunkSource>>& source, const LoadOptions& options,
                                       Threads threads, const Progress& progress) {
@@ -114,6 +174,8 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
   if (format == FileFormat::Minecraft) {
     return read_around_spawn(minecraft::open_minecraft(bytes), options, threads, progress);
   }
+  if (format == FileFormat::Schematic) return minecraft::read_schematic(bytes, progress);
+  if (const ReadModel read = model_reader(format); read != nullptr) return read(bytes);
   if (is_volume(format)) return read_volume_as_scene(bytes, options, threads, progress);
   Error error = unrecognised(bytes);
   // The reader knows more of what else goes by this name.
@@ -213,7 +275,9 @@ std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
   const auto first = first_bytes(bytes, nifti::kMaxHeaderBytes);
   if (first && nifti::is_header(*first)) return FileFormat::Nifti;
   if (first && nrrd::is_header(*first)) return FileFormat::Nrrd;
-  return std::nullopt;
+  if (minecraft::begins_nbt(bytes)) return FileFormat::Schematic;
+  if (const auto model = detect_model(bytes)) return model;
+  return detect_headerless(bytes);
 }
 
 Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& path) {
@@ -222,7 +286,13 @@ Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& pat
   constexpr std::size_t kEnough = 1 << 16;
   const auto bytes = read_file_beginning(path, kEnough);
   if (!bytes) return bytes.error();
-  return detect_format(*bytes);
+  if (const auto format = detect_format(*bytes); format || bytes->size() < kEnough) return format;
+  const std::string extension = lower_case_extension(path);
+  constexpr std::array<std::string_view, 4> kHeaderless = {".vxl", ".kvx", ".vox", ".cub"};
+  if (std::ranges::find(kHeaderless, extension) == kHeaderless.end()) return std::optional<FileFormat>();
+  const auto whole = read_file(path);
+  if (!whole) return whole.error();
+  return detect_headerless(*whole);
 }
 
 Result<FormatInfo> format_for_writing(const std::filesystem::path& path) {

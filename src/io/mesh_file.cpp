@@ -51,6 +51,13 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
     case FileFormat::Scene:
     case FileFormat::World:
     case FileFormat::Minecraft:
+    case FileFormat::Schematic:
+    case FileFormat::Qubicle:
+    case FileFormat::Goxel:
+    case FileFormat::Voxlap:
+    case FileFormat::Binvox:
+    case FileFormat::CubeWorld:
+    case FileFormat::LuantiSchematic:
     case FileFormat::Nifti:
     case FileFormat::Nrrd:
       break;

@@ -51,6 +51,12 @@ void ChunkStreamer::set_generator(std::uint32_t grid, std::shared_ptr<const Chun
   generators_[grid] = std::move(generator);
 }
 
+std::shared_ptr<const ChunkGenerator> ChunkStreamer::generator_of(std::uint32_t grid) const {
+  const std::scoped_lock lock(plan_mutex_);
+  const auto found = generators_.find(grid);
+  return found == generators_.end() ? nullptr : found->second;
+}
+
 void ChunkStreamer::post(Note note) {
   if (note.empty()) return;
   {

@@ -82,6 +82,7 @@ class ChunkStreamer {
 
   /// Null: what is not in the world is air.
   void set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator);
+  [[nodiscard]] std::shared_ptr<const ChunkGenerator> generator_of(std::uint32_t grid) const;
   void post(Note note);
   /// What came since the last call; the numbers are those of the present.
   void take(Outbox& out);
@@ -106,7 +107,7 @@ class ChunkStreamer {
   Note inbox_;
   std::uint64_t posted_ = 0;
 
-  std::mutex plan_mutex_;  ///< of what follows
+  mutable std::mutex plan_mutex_;  ///< of what follows
   StreamPlan plan_;
   std::map<std::uint32_t, std::shared_ptr<const ChunkGenerator>> generators_;
   std::uint64_t read_posts_ = 0;

@@ -144,12 +144,18 @@ struct StreamedWorld::Impl {
   }
 
   Status update(std::span<const Viewer> viewers, double seconds);
+  Status plan(std::span<const Viewer> viewers);
+  void tell_workers();
   void take_in();
   void move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note);
   void follow_instances();
   [[nodiscard]] Eyes eyes_of(std::span<const Viewer> viewers);
   void wish(ChunkStreamer::Note& note);
   [[nodiscard]] bool is_cut() const;
+  // Nothing that was wanted is on its way any more.
+  [[nodiscard]] bool is_quiet() const {
+    return box.missing == 0 && box.begun == 0 && arrivals.empty() && box.plans == posted_plans;
+  }
   [[nodiscard]] std::size_t chunks_of_budget() const;
   [[nodiscard]] bool is_near_anyone(const ChunkPlace& place) const;
   void put(Arrival arrival, ChunkStreamer::Note& note);
@@ -522,7 +528,8 @@ void StreamedWorld::Impl::take_in() {
   std::ranges::move(box.problems, std::back_inserter(problems));
 }
 
-Status StreamedWorld::Impl::update(std::span<const Viewer> viewers, double seconds) {
+// All but what changes the scene.
+Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
   const Clock::time_point start = Clock::now();
   note_edits();
   take_in();
@@ -540,11 +547,21 @@ Status StreamedWorld::Impl::update(std::span<const Viewer> viewers, double secon
   if (outcome) outcome = disk->last();
   if (!store.is_writable()) is_edited = false;
   eyes = eyes_of(viewers);
+  return outcome;
+}
+
+Status StreamedWorld::Impl::update(std::span<const Viewer> viewers, double seconds) {
+  const Clock::time_point start = Clock::now();
+  Status outcome = plan(viewers);
   move_chunks(seconds, start, unposted);
-  wish(unposted);
-  streamer.post(std::exchange(unposted, {}));
+  tell_workers();
   totals.longest_update_seconds = std::max(totals.longest_update_seconds, seconds_since(start));
   return outcome;
+}
+
+void StreamedWorld::Impl::tell_workers() {
+  wish(unposted);
+  streamer.post(std::exchange(unposted, {}));
 }
 
 std::size_t StreamedWorld::Impl::waiting_chunks() const {
@@ -629,6 +646,44 @@ void StreamedWorld::set_view(WorldView view) {
   impl_->world.saver.set_view(std::move(view));
 }
 
+namespace {
+
+// Grows to hold the chunks of a box (half open), as every instance of a grid places them.
+void extend(DBox& world, const Scene& scene, const std::vector<InstanceHandle>& instances, const IBox& chunks) {
+  if (chunks.empty()) return;
+  const DBox voxels{DVec3(chunks.min) * double{kChunkEdge}, DVec3(chunks.max) * double{kChunkEdge}};
+  for (const InstanceHandle handle : instances) {
+    const Instance* const instance = scene.instances().find(handle);
+    if (instance == nullptr) continue;
+    const SceneGrid& grid = scene.grids()[instance->grid];
+    for (int i = 0; i < 8; ++i) world.extend(world_from_grid(*instance, grid, box_corner(voxels, i)));
+  }
+}
+
+IBox box_of(const std::vector<IVec3>& chunks) {
+  if (chunks.empty()) return {};
+  IBox box{chunks.front(), chunks.front() + 1};
+  for (const IVec3 chunk : chunks) box = {glm::min(box.min, chunk), glm::max(box.max, chunk + 1)};
+  return box;
+}
+
+}  // namespace
+
+Result<WorldExtent> StreamedWorld::extent() const {
+  WorldExtent found;
+  impl_->follow_instances();
+  for (const auto& [number, grid] : impl_->grids) {
+    if (scene().grids().find(grid.handle) == nullptr) continue;
+    const auto chunks = impl_->store.chunks(number, 0);
+    if (!chunks) return chunks.error();
+    found.stored_chunks += chunks->size();
+    extend(found.stored, scene(), grid.instances, box_of(*chunks));
+    const auto generator = impl_->streamer.generator_of(number);
+    if (generator != nullptr) extend(found.generated, scene(), grid.instances, generator->chunks());
+  }
+  return found;
+}
+
 Result<GridHandle> StreamedWorld::add_grid(SceneGrid grid, std::shared_ptr<const ChunkGenerator> generator) {
   QUOIN_ASSERT(grid.grid.voxel_count() == 0 && grid.field.chunk_count() == 0, "neither voxels nor densities");
   if (!impl_->store.is_writable()) {
@@ -683,12 +738,21 @@ Status StreamedWorld::update(std::span<const Viewer> viewers) {
   return impl_->update(viewers, impl_->options.update_seconds);
 }
 
+Status StreamedWorld::plan(std::span<const Viewer> viewers) {
+  Status outcome = impl_->plan(viewers);
+  impl_->tell_workers();
+  return outcome;
+}
+
+bool StreamedWorld::has_chunks_to_move() const {
+  return !impl_->arrivals.empty() || (!impl_->is_edited && !impl_->leaving.empty());
+}
+
 Status StreamedWorld::load_all(std::span<const Viewer> viewers) {
   constexpr double kAsLongAsItTakes = std::numeric_limits<double>::infinity();
   for (;;) {
     if (auto done = impl_->update(viewers, kAsLongAsItTakes); !done) return done;
-    const bool is_quiet = !impl_->has_moved && impl_->box.missing == 0 && impl_->box.begun == 0;
-    if (is_quiet && impl_->box.plans == impl_->posted_plans) return {};
+    if (!impl_->has_moved && impl_->is_quiet()) return {};
     impl_->streamer.wait();
   }
 }
@@ -733,8 +797,7 @@ Status StreamedWorld::flush() {
     }
     impl_->must_plan |= impl_->asked_left == 0;
     impl_->move_chunks(kAsLongAsItTakes, Clock::now(), impl_->unposted);
-    impl_->wish(impl_->unposted);
-    impl_->streamer.post(std::exchange(impl_->unposted, {}));
+    impl_->tell_workers();
     if (!impl_->waits_for_broken_alone()) impl_->streamer.wait();
   }
   Status waits = impl_->waits_for_broken();
@@ -758,6 +821,7 @@ StreamStats StreamedWorld::stats() {
   now.other_bytes = impl_->reported_bytes;
   now.wanted_chunks = impl_->box.wanted;
   now.missing_chunks = impl_->box.missing;
+  now.is_complete = impl_->is_quiet();
   now.waiting_edits = impl_->waiting_chunks();
   now.complete_radius = impl_->box.complete_radius;
   now.chunks_read = impl_->box.read;

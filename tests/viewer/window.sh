@@ -221,6 +221,32 @@ xdotool key --delay 80 ctrl+z
 until_true 20 title_is "sc.json - Quoin" || fail "the window takes no keys after Save as was cancelled"
 stop
 
+echo "a world on disk: chunks come, edits are saved without being asked"
+echo '{"width": 640, "height": 400, "samples": 1, "panel": false}' >config/quoin/viewer.json
+if "$quoin" generate terrain world.quoin --endless >/dev/null 2>no_worlds; then
+  cp world.quoin before.quoin
+  start world.quoin --distance 200 --memory 128
+  picture flown.png
+  xdotool mousemove 320 300
+  sleep 0.5
+  xdotool key --delay 80 3
+  xdotool click 1
+  sleep 2
+  picture dug.png
+  ! cmp -s flown.png dug.png || fail "nothing was removed from the world"
+  title_is "world.quoin - Quoin" || fail "an edit of a world on disk waits to be saved"
+  stop
+  "$quoin" world check world.quoin >/dev/null || fail "the world is damaged"
+  stored() { "$quoin" world info "$1" | sed -n 's/^Grid 0.*: \([0-9]*\) chunks.*/\1/p'; }
+  [ "$(stored world.quoin)" -gt "$(stored before.quoin)" ] || fail "no chunk that was made is kept"
+  [ ! -e world.quoin-wal ] || fail "the world's log was left behind"
+  "$quoin" view world.quoin --bare --size 320x240 --distance 200 --screenshot again.png --backend "$backend" >log 2>&1
+  "$quoin" view before.quoin --bare --size 320x240 --distance 200 --screenshot untouched.png --backend "$backend" >>log 2>&1
+  ! cmp -s again.png untouched.png || fail "what was removed came back"
+else
+  cat no_worlds
+fi
+
 echo "another file, and the picture of the settled window is the renderer's"
 "$quoin" view castle.vox --bare --size 320x240 --screenshot window.png --backend "$backend" >log 2>&1
 "$quoin" render castle.vox --size 320x240 --samples 16 -o render.png --backend "$backend" >/dev/null

@@ -136,13 +136,14 @@ bool App::is_moving() const {
 
 bool App::is_animating() const {
   if (screen_->is_minimised()) return false;
-  return is_moving() || state_.loader || state_.saver || state_.message || ImGui::GetIO().WantTextInput;
+  return is_moving() || is_streaming() || state_.loader || state_.saver || state_.message ||
+         ImGui::GetIO().WantTextInput;
 }
 
 int App::patience_milliseconds() const {
   if (frames_left_ > 0 && !screen_->is_minimised()) return 0;
   if (!is_animating()) return kPatience;
-  return is_moving() ? 0 : kPatienceOfBars;
+  return is_moving() || is_streaming() ? 0 : kPatienceOfBars;
 }
 
 void App::wait_and_process() {
@@ -196,12 +197,14 @@ void App::frame() {
   const double step = was_idle_ ? kFrameSeconds : std::min(elapsed, 0.1);
   take_loaded();
   take_saved();
+  stream_world();
   if (screen_->is_minimised()) return;
   if (state_.camera.mode == CameraMode::Walk) {
-    state_.walker.advance(step, input_.push(), input_.boost(), state_.camera,
-                          [&](const OrientedBox& box, DVec3 way, const SlideOptions& options) {
-                            return state_.open.backend ? state_.open.backend->slide(box, way, options) : std::nullopt;
-                          });
+    if (has_ground())
+      state_.walker.advance(step, input_.push(), input_.boost(), state_.camera,
+                            [&](const OrientedBox& box, DVec3 way, const SlideOptions& options) {
+                              return state_.open.backend ? state_.open.backend->slide(box, way, options) : std::nullopt;
+                            });
   } else {
     state_.camera.advance(step, input_.push(), input_.boost());
   }
@@ -263,14 +266,16 @@ void App::take_picture() {
 }
 
 bool App::is_settled() const {
-  return state_.stats.is_settled && state_.stats.width == state_.picture_place.w &&
-         state_.stats.height == state_.picture_place.h;
+  const WorldWindow* const world = state_.open.document->world();
+  return (world == nullptr || world->is_complete()) && state_.stats.is_settled &&
+         state_.stats.width == state_.picture_place.w && state_.stats.height == state_.picture_place.h;
 }
 
 void App::take_frame(ViewFrame frame) {
   const int width = frame.on_device ? frame.on_device->width() : frame.colour.width;
   const int height = frame.on_device ? frame.on_device->height() : frame.colour.height;
   state_.stats = {width, height, frame.samples, frame.is_settled, frame.seconds, frame.rays};
+  has_seen_chunks_ = true;
   if (Status taken = screen_->set_picture(frame); !taken) {
     screen_->forget_picture();
     state_.tell(taken.error());
@@ -394,7 +399,7 @@ void App::show_from(View view) {
 
 void App::look_through(const Camera& camera) {
   if (state_.camera.mode == CameraMode::Walk) state_.set_camera_mode(CameraMode::Orbit);
-  state_.camera.set(camera, state_.scene().bounds(options_.instances()));
+  state_.camera.set(camera, state_.bounds(camera.position, options_.instances()));
 }
 
 void App::pick_type() {

@@ -69,6 +69,13 @@ class App {
   void note_size();
   void forget_slow_mode();
 
+  // Worlds on disk.
+  void stream_world();
+  void tell_of_world(const Status& saving);
+  void frame_world();
+  [[nodiscard]] bool is_streaming() const;
+  [[nodiscard]] bool has_ground() const;
+
   // What commands do.
   void run_command(Command command);
   bool run_draw_command(Command command);
@@ -127,7 +134,10 @@ class App {
   bool is_running_ = true;
   std::vector<WantedPicture> wanted_;
   std::optional<ViewRequest> asked_;
-  std::string told_fault_;  // of the backend, as long as it lasts; empty: none
+  bool has_seen_chunks_ = true;     // a picture came since chunks of the world were moved last
+  std::optional<Camera> unframed_;  // a small world is looked through this until all of it is there
+  std::string told_saving_;         // of the world, what went wrong as long as it lasts
+  std::string told_fault_;          // of the backend, as long as it lasts; empty: none
   std::optional<SDL_Event> postponed_;
   int frames_left_ = 3;
   Clock::time_point last_frame_ = Clock::now();

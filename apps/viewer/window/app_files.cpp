@@ -88,7 +88,9 @@ void App::load(const std::filesystem::path& path) {
   LoadOptions wanted = options_.load;
   // It says what that one file holds.
   if (path != options_.file) wanted.raw.reset();
-  state_.loader = std::make_unique<Loader>(path, wanted, make, wake_window);
+  WorldOptions world = options_.world;
+  if (!options_.screenshot.empty()) world.may_write = false;
+  state_.loader = std::make_unique<Loader>(path, wanted, world, make, wake_window);
 }
 
 void App::take_loaded() {
@@ -112,6 +114,9 @@ void App::adopt(OpenDocument opened) {
   state_.hover.reset();
   state_.open.backend.reset();  // before the document that it reads
   state_.open = std::move(opened);
+  has_seen_chunks_ = true;
+  unframed_.reset();
+  told_saving_.clear();
   state_.stats = {};
   state_.picture = {};
   told_fault_.clear();
@@ -126,7 +131,13 @@ void App::adopt(OpenDocument opened) {
   state_.tool = Tool::Look;  // the first click into a world should not change it
   const SDL_Point output = screen_->output_size();
   if (!state_.has_picture_place()) state_.picture_place = {0, 0, std::max(output.x, 1), std::max(output.y, 1)};
-  if (loaded.camera) {
+  if (const WorldWindow* const world = state_.open.document->world()) {
+    look_through(world->first_camera(state_.aspect()));
+    if (world->is_whole() && !loaded.camera) unframed_ = state_.camera.camera();
+    if (!world->why_not_written().empty() && options_.screenshot.empty()) {
+      state_.tell("this world is only looked at: " + world->why_not_written());
+    }
+  } else if (loaded.camera) {
     look_through(*loaded.camera);
   } else {
     show_from(View::Iso);

@@ -43,14 +43,21 @@ void tell_of_copies(ViewState& state, const SceneHit& hit) {
   if (copies > 1) state.tell("this model stands at " + std::to_string(copies) + " places: all of them change");
 }
 
+constexpr const char* kNotInMemory = "that was done elsewhere in this world: go back there first";
+
 /// Runs `edit` on the document while nothing draws it. `edit` returns whether it changed anything.
+/// Returns the same.
 template <class Edit>
-void edit_paused(ViewState& state, Edit edit) {
+bool edit_paused(ViewState& state, Edit edit) {
   ScenePause pause(*state.open.backend);
   state.last_wait_seconds = pause.waited_seconds();
   state.longest_wait_seconds = std::max(state.longest_wait_seconds, pause.waited_seconds());
   pause.changed = edit(*state.open.document);
-  if (pause.changed) state.stats.is_settled = false;
+  if (pause.changed) {
+    state.stats.is_settled = false;
+    state.edited_at = std::chrono::steady_clock::now();
+  }
+  return pause.changed;
 }
 
 }  // namespace
@@ -87,6 +94,9 @@ void Editing::begin(ViewState& state) {
   const auto action = action_of(state.tool);
   const auto hit = action ? pick_at(state, from_.x, from_.y) : std::nullopt;
   if (!hit) return;
+  if (const char* const why = state.open.document->why_not_edited()) {
+    return state.tell("this world is only looked at: " + std::string(why));
+  }
   tell_of_copies(state, *hit);
   Brush brush = state.brush;
   brush.action = *action;
@@ -129,7 +139,7 @@ void undo(ViewState& state) {
   if (!state.can_edit()) return;
   if (!state.open.document->history().can_undo()) return state.tell("nothing to undo");
   const std::string name = state.open.document->history().undo_name();
-  edit_paused(state, [](Document& document) { return document.undo(); });
+  if (!edit_paused(state, [](Document& document) { return document.undo(); })) return state.tell(kNotInMemory);
   state.tell("undone: " + name);
 }
 
@@ -137,7 +147,7 @@ void redo(ViewState& state) {
   if (!state.can_edit()) return;
   if (!state.open.document->history().can_redo()) return state.tell("nothing to redo");
   const std::string name = state.open.document->history().redo_name();
-  edit_paused(state, [](Document& document) { return document.redo(); });
+  if (!edit_paused(state, [](Document& document) { return document.redo(); })) return state.tell(kNotInMemory);
   state.tell("done again: " + name);
 }
 

@@ -30,7 +30,7 @@ constexpr double kWalkersFov = 1.15;  // radians
 
 void ViewState::set_camera_mode(CameraMode mode) {
   if (mode == CameraMode::Walk && camera.mode != mode) {
-    const DBox bounds = scene().bounds();
+    const DBox bounds = this->bounds(camera.camera().position);
     DVec3 feet(0.0);
     if (!bounds.empty()) {
       const DVec3 middle = 0.5 * bounds.min + 0.5 * bounds.max;

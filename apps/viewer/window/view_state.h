@@ -2,6 +2,7 @@
 
 #include <SDL.h>
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -69,6 +70,7 @@ struct ViewState {
   double frame_seconds = 0.0;         ///< the work of a frame of the window, smoothed
   double longest_wait_seconds = 0.0;  ///< of an edit for the picture to stop
   double last_wait_seconds = 0.0;
+  std::chrono::steady_clock::time_point edited_at{};  ///< the document, last
 
   std::optional<Message> message;
   bool is_help_shown = false;
@@ -76,6 +78,11 @@ struct ViewState {
   std::unique_ptr<Saver> saver;
 
   [[nodiscard]] const Scene& scene() const { return open.document->scene(); }
+  [[nodiscard]] double aspect() const { return static_cast<double>(picture_place.w) / std::max(picture_place.h, 1); }
+  /// Of what speeds and distances at a place go by.
+  [[nodiscard]] DBox bounds(DVec3 from, InstanceFilter filter = InstanceFilter::Visible) const {
+    return open.document->world() ? open.document->world()->bounds(from) : scene().bounds(filter);
+  }
   [[nodiscard]] bool has_picture_place() const { return picture_place.w > 0 && picture_place.h > 0; }
   /// Whether the document may be changed now.
   [[nodiscard]] bool can_edit() const { return open.backend != nullptr && !saver && !loader; }

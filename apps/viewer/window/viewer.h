@@ -10,6 +10,7 @@
 #include <quoin/io/vox.h>
 
 #include "viewer/view_backend.h"
+#include "viewer/world_window.h"
 
 namespace quoin::viewer {
 
@@ -23,6 +24,7 @@ enum class ViewerBackend : std::uint8_t {
 struct ViewerOptions {
   std::filesystem::path file;  ///< empty: an empty window
   LoadOptions load;
+  WorldOptions world;  ///< of worlds on disk
   Threads threads;
   ViewerBackend backend = ViewerBackend::Auto;
   std::string device;               ///< of Vulkan, as VulkanOptions::device

@@ -17,7 +17,25 @@
 
 namespace quoin {
 
-enum class FileFormat : std::uint8_t { Vox, Scene, World, Minecraft, Nifti, Nrrd, Glb, Gltf, Obj, Ply };
+enum class FileFormat : std::uint8_t {
+  Vox,
+  Scene,
+  World,
+  Minecraft,
+  Schematic,
+  Qubicle,
+  Goxel,
+  Voxlap,
+  Binvox,
+  CubeWorld,
+  LuantiSchematic,
+  Nifti,
+  Nrrd,
+  Glb,
+  Gltf,
+  Obj,
+  Ply
+};
 
 /// What Quoin can do with a file format.
 struct FormatInfo {
@@ -27,8 +45,9 @@ struct FormatInfo {
   std::string_view description;  ///< for a person
   bool readable;
   bool writable;
-  bool is_mesh;    ///< written from meshes rather than from voxels
-  bool is_volume;  ///< values, which read_volume reads as such and load_scene as a field
+  bool is_mesh;                ///< written from meshes rather than from voxels
+  bool is_volume;              ///< values, which read_volume reads as such and load_scene as a field
+  std::string_view also = "";  ///< further extensions of the same format, or of kin: ".kv6 .kvx"
 };
 
 /// All formats, those that can be read first. Lifetime: for ever.

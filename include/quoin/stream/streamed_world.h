@@ -51,6 +51,7 @@ struct StreamStats {
   std::size_t other_bytes = 0;     ///< as StreamOptions::other_bytes said last
   std::size_t wanted_chunks = 0;   ///< within the viewers' radius and the budget
   std::size_t missing_chunks = 0;  ///< of these, that are not loaded yet
+  bool is_complete = false;        ///< all that was wanted in the last `update` or `plan` is in place
   std::size_t waiting_edits = 0;   ///< chunks that edits wait for
   double complete_radius = 0.0;    ///< world units around every viewer within which all is loaded; less a chunk meshed
   std::uint64_t chunks_read = 0;   ///< since it was opened: from the world's file
@@ -58,6 +59,13 @@ struct StreamStats {
   std::uint64_t chunks_unloaded = 0;
   std::uint64_t chunks_dropped = 0;     ///< that came when nobody wanted them any more
   double longest_update_seconds = 0.0;  ///< since `stats` was called last
+};
+
+/// What a world may reach to, loaded or not. In the world's space, as its instances place it.
+struct WorldExtent {
+  DBox stored;                    ///< of the chunks in its file; empty: none
+  DBox generated;                 ///< of what generators may make; empty: there are none
+  std::size_t stored_chunks = 0;  ///< of the finest level, of all grids
 };
 
 /// A world of which only what lies around viewers is in memory; what is edited is saved, and comes back.
@@ -101,6 +109,8 @@ class StreamedWorld {
   /// `scene()`.
   [[nodiscard]] const LoadedScene& opened() const;
   void set_view(WorldView view);
+  /// What the file and the generators hold now. Cost: O(stored chunks). Errors: CannotRead.
+  [[nodiscard]] Result<WorldExtent> extent() const;
 
   /// Adds an empty grid whose chunks are loaded, or made by the generator, around viewers; it shows once an instance
   /// places it. Requires: neither voxels nor densities. Errors: CannotWrite; as WorldSaver::save.
@@ -117,7 +127,12 @@ class StreamedWorld {
   /// Cost:   StreamOptions::update_seconds, and what an edit costs WorldSaver::save when it is time to save.
   /// Errors: those of saving: nothing is lost, it is tried again. bad_alloc.
   Status update(std::span<const Viewer> viewers);
-  /// The same until all that these viewers want is there: for tools and tests.
+  /// For who draws the scene on another thread: does all that `update` does but for the scene, which is only read, so
+  /// that the caller need not stop drawing for every update. Errors: as update.
+  Status plan(std::span<const Viewer> viewers);
+  /// Whether the next `update` has chunks to put in place or to take away, as of the last `plan`.
+  [[nodiscard]] bool has_chunks_to_move() const;
+  /// Calls `update` until all that these viewers want is there: for tools and tests.
   Status load_all(std::span<const Viewer> viewers);
 
   /// Whether a chunk of a grid is in memory.

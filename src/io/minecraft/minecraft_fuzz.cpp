@@ -8,11 +8,13 @@
 
 #include "io/minecraft/level_file.h"
 #include "io/minecraft/minecraft_source.h"
+#include "io/minecraft/schematic.h"
 
-/// Any bytes must give a world or errors, as a region file and as level.dat; whatever is read is of registered types.
+/// Any bytes must give a world or errors, as a region file, as level.dat and as a schematic; whatever is read is of registered types.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::span bytes(reinterpret_cast<const std::byte*>(data), size);
   static_cast<void>(quoin::minecraft::parse_level_file(bytes));
+  static_cast<void>(quoin::minecraft::read_schematic(bytes));
   const auto source = quoin::minecraft::open_minecraft(bytes);
   if (!source) return 0;
   for (std::size_t i = 0; i < (*source)->parts().size(); ++i) {

@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include <quoin/core/assert.h>
+
 #include "io/byte_order.h"
 #include "io/minecraft/legacy_blocks.h"
 
@@ -51,17 +53,25 @@ bool unpack_indices(nbt::Value longs, int bits, std::span<std::uint16_t> out) {
     return true;
   }
   if (words != (out.size() * width + 63) / 64) return false;
+  unpack_spanning(longs, bits, 0, out);
+  return true;
+}
+
+void unpack_spanning(nbt::Value longs, int bits, std::size_t first, std::span<std::uint16_t> out) {
+  const std::span<const std::byte> bytes = longs.long_bytes();
+  const auto width = static_cast<std::size_t>(bits);
+  QUOIN_ASSERT(((first + out.size()) * width + 63) / 64 <= bytes.size() / 8, "that many are there");
+  const std::uint64_t mask = (std::uint64_t{1} << width) - 1;
   for (std::size_t at = 0; at < out.size(); ++at) {
-    const std::size_t bit = at * width;
+    const std::size_t bit = (first + at) * width;
     std::uint64_t value = word(bytes, bit / 64) >> (bit % 64);
     if (bit % 64 + width > 64) value |= word(bytes, bit / 64 + 1) << (64 - bit % 64);
     out[at] = static_cast<std::uint16_t>(value & mask);
   }
-  return true;
 }
 
-Status SectionReader::read_palette(nbt::Value palette) {
-  section_.palette.clear();
+Status read_block_palette(nbt::Value palette, BlockTypes& types, std::vector<Block>& out) {
+  out.clear();
   Status done;
   std::vector<Property> properties;
   palette.for_each([&](nbt::Value entry) {
@@ -76,9 +86,9 @@ Status SectionReader::read_palette(nbt::Value palette) {
     entry["Properties"].for_each([&](nbt::Value value) {
       if (const auto text = value.text()) properties.emplace_back(value.name(), *text);
     });
-    const auto block = types_.block(*name, properties);
+    const auto block = types.block(*name, properties);
     if (block) {
-      section_.palette.push_back(*block);
+      out.push_back(*block);
     } else {
       done = block.error();
     }
@@ -203,7 +213,7 @@ Status SectionReader::read_section(nbt::Value section, nbt::Value level) {
   section_.palette.clear();
   if (palette) {
     const nbt::Value data = states ? states["data"] : section["BlockStates"];
-    if (auto read = read_palette(palette); !read) return read;
+    if (auto read = read_block_palette(palette, types_, section_.palette); !read) return read;
     const std::size_t size = section_.palette.size();
     if (size == 0 || size > kSectionBlocks) return fault("a palette of " + std::to_string(size) + " blocks", palette);
     if (data) {

@@ -42,7 +42,6 @@ class SectionReader {
 
  private:
   [[nodiscard]] Status read_section(nbt::Value section, nbt::Value level);
-  [[nodiscard]] Status read_palette(nbt::Value palette);
   [[nodiscard]] Status read_legacy(nbt::Value section);
   [[nodiscard]] Status read_mcregion(nbt::Value level, FunctionRef<void(const Section&)> take);
   [[nodiscard]] Status put_legacy(std::size_t at, int id, int data);
@@ -60,6 +59,10 @@ class SectionReader {
 /// Unpacks indices of `bits` each from longs, from the lowest bit up. Where they span longs is told by how many there
 /// are. False where the longs are of neither form. Requires: 1 <= bits <= 16.
 [[nodiscard]] bool unpack_indices(nbt::Value longs, int bits, std::span<std::uint16_t> out);
+/// The same of indices that span longs, from the one of number `first` on. Requires: they are all there.
+void unpack_spanning(nbt::Value longs, int bits, std::size_t first, std::span<std::uint16_t> out);
+/// Reads a list of blocks: compounds with a Name and Properties. Errors: BadFormat, LimitExceeded.
+[[nodiscard]] Status read_block_palette(nbt::Value palette, BlockTypes& types, std::vector<Block>& out);
 /// Bits that an index of a palette takes. Requires: size > 0.
 [[nodiscard]] int bits_of_palette(std::size_t size, int least);
 

@@ -6,69 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include <quoin/core/assert.h>
-
+#include "io/byte_reader.h"
 #include "io/text.h"
 #include "io/vox/chunks.h"
-
-namespace quoin {
-
-/// Reads little-endian values from bytes that may end too early.
-///
-/// A read past the end gives zeros (or an empty view) and makes `failed` true for good, so a parser may read a whole
-/// record and ask once.
-class ByteReader {
- public:
-  /// Reads `bytes[begin, end)`. Requires: begin <= end <= bytes.size().
-  ByteReader(std::span<const std::byte> bytes, std::size_t begin, std::size_t end)
-      : bytes_(bytes), position_(begin), end_(end) {
-    QUOIN_ASSERT(begin <= end && end <= bytes.size(), "a stretch of the bytes");
-  }
-  explicit ByteReader(std::span<const std::byte> bytes) : ByteReader(bytes, 0, bytes.size()) {}
-
-  [[nodiscard]] bool failed() const { return failed_; }
-  /// Counted from the beginning of `bytes`.
-  [[nodiscard]] std::size_t position() const { return position_; }
-  [[nodiscard]] std::size_t remaining() const { return end_ - position_; }
-
-  [[nodiscard]] std::span<const std::byte> take(std::size_t count) {
-    if (count > remaining()) {
-      failed_ = true;
-      position_ = end_;
-      return {};
-    }
-    const std::span<const std::byte> taken = bytes_.subspan(position_, count);
-    position_ += count;
-    return taken;
-  }
-  [[nodiscard]] std::string_view text(std::size_t count) {
-    const std::span<const std::byte> taken = take(count);
-    return {reinterpret_cast<const char*>(taken.data()), taken.size()};
-  }
-  [[nodiscard]] std::uint32_t u32() {
-    const std::span<const std::byte> b = take(4);
-    if (b.empty()) return 0;
-    return static_cast<std::uint32_t>(b[0]) | static_cast<std::uint32_t>(b[1]) << 8 |
-           static_cast<std::uint32_t>(b[2]) << 16 | static_cast<std::uint32_t>(b[3]) << 24;
-  }
-  [[nodiscard]] std::int32_t i32() { return static_cast<std::int32_t>(u32()); }
-
-  /// A count of records of at least `record_bytes` each: fails when the remaining bytes cannot hold that many.
-  [[nodiscard]] std::size_t count(std::size_t record_bytes) {
-    const std::size_t claimed = u32();
-    if (claimed <= remaining() / record_bytes) return claimed;
-    failed_ = true;
-    return 0;
-  }
-
- private:
-  std::span<const std::byte> bytes_;
-  std::size_t position_;
-  std::size_t end_;
-  bool failed_ = false;
-};
-
-}  // namespace quoin
 
 namespace quoin::vox {
 

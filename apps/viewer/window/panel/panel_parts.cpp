@@ -367,6 +367,22 @@ void draw_light_part(ViewState& state) {
   if (ImGui::Button("Reset light")) light = natural_light();
 }
 
+namespace {
+
+void draw_world_rows(const WorldWindow* world) {
+  if (world == nullptr) return;
+  const StreamStats& stats = world->stats();
+  row("chunks in memory", "%.0f", static_cast<double>(stats.loaded_chunks));
+  row("on their way", "%.0f", static_cast<double>(stats.missing_chunks));
+  row("complete within", "%.0f voxels", stats.complete_radius);
+  row("read so far", "%.0f", static_cast<double>(stats.chunks_read));
+  row("made so far", "%.0f", static_cast<double>(stats.chunks_made));
+  row("let go so far", "%.0f", static_cast<double>(stats.chunks_unloaded));
+  row("world's memory", "%.0f MB", static_cast<double>(stats.loaded_bytes + stats.other_bytes) / 1e6);
+}
+
+}  // namespace
+
 void draw_statistics_part(const ViewState& state) {
   if (!heading("Statistics")) return;
   const FrameStats& stats = state.stats;
@@ -380,6 +396,7 @@ void draw_statistics_part(const ViewState& state) {
   row("history", "%.1f MB", static_cast<double>(state.open.document->history().bytes()) / 1e6);
   row("last edit waited", "%.2f ms", state.last_wait_seconds * 1e3);
   row("longest so far", "%.2f ms", state.longest_wait_seconds * 1e3);
+  draw_world_rows(state.open.document->world());
   if (state.open.backend) {
     for (const auto& [what, value] : state.open.backend->stats()) {
       ImGui::TextDisabled("%s", what.c_str());

@@ -161,7 +161,9 @@ float draw_status(const ViewState& state) {
     std::snprintf(body.data(), body.size(), "   walk, %.3g voxels tall", state.walker.height());
     right = picture_text(state) + body.data();
   }
-  const std::string faces = to_string(state.open.document->faces()) + "   ";
+  // Faces of a world would be those of what is in memory at the moment.
+  const WorldWindow* const world = state.open.document->world();
+  const std::string faces = (world ? world->text() : to_string(state.open.document->faces())) + "   ";
   const auto width = [](const std::string& text) { return ImGui::CalcTextSize(text.c_str()).x; };
   if (width(hover_text(state)) + width(faces + right) + 48.0F < room.x) right.insert(0, faces);
   ImGui::SameLine(room.x - ImGui::CalcTextSize(right.c_str()).x - 12.0F);

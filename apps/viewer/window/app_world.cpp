@@ -1,0 +1,56 @@
+#include "app.h"
+
+namespace quoin::viewer {
+
+// The chunks of a world on disk follow the camera. Where pictures come from another thread, chunks are moved only once
+// one of them has been seen since the last time: else none would ever be finished. Nothing moves within a stroke, which
+// is one step to undo.
+void App::stream_world() {
+  WorldWindow* const world = state_.open.document->world();
+  if (world == nullptr || state_.saver || !state_.open.backend) return;
+  ViewBackend& backend = *state_.open.backend;
+  const Camera camera = state_.camera.camera();
+  world->set_other_bytes(backend.bytes() + state_.open.document->history().bytes());
+  tell_of_world(world->plan(camera));
+  if (unframed_ && world->is_complete()) frame_world();
+  const bool may_move = has_seen_chunks_ || !asked_ || backend.fault().has_value();
+  if (!world->has_chunks_to_move() || !may_move || state_.open.document->stroke_brush() != nullptr) return;
+  const ChangeCursor before = state_.scene().cursor();
+  ScenePause pause(backend);
+  tell_of_world(world->move(camera));
+  pause.changed = state_.scene().has_changed_since(before);
+  if (!pause.changed) return;
+  has_seen_chunks_ = false;
+  state_.stats.is_settled = false;
+}
+
+// As any other scene is, now that its voxels are known, unless the user has moved on.
+void App::frame_world() {
+  if (state_.camera.camera() == *unframed_) show_from(View::Iso);
+  unframed_.reset();
+}
+
+void App::tell_of_world(const Status& saving) {
+  state_.open.document->note_saving(saving);
+  const std::string text = saving ? "" : to_string(saving.error());
+  if (text != told_saving_ && !saving) state_.tell(saving.error());
+  told_saving_ = text;
+  const std::vector<std::string> problems = state_.open.document->world()->take_problems();
+  if (!problems.empty()) state_.message = Message{problems.front(), true};
+}
+
+// Whether chunks are on their way, or an edit is to be saved, so that time must go on.
+bool App::is_streaming() const {
+  constexpr std::chrono::seconds kUntilSaved{3};
+  const WorldWindow* const world = state_.open.document->world();
+  if (world == nullptr || state_.saver || !state_.open.backend) return false;
+  return !world->is_complete() || Clock::now() - state_.edited_at < kUntilSaved;
+}
+
+// Whoever walks waits for the ground below.
+bool App::has_ground() const {
+  const WorldWindow* const world = state_.open.document->world();
+  return world == nullptr || world->is_loaded_at(state_.walker.feet());
+}
+
+}  // namespace quoin::viewer

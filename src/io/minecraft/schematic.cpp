@@ -1,0 +1,502 @@
+#include "io/minecraft/schematic.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "io/byte_stream.h"
+#include "io/minecraft/block_types.h"
+#include "io/minecraft/column_builder.h"
+#include "io/minecraft/legacy_blocks.h"
+#include "io/minecraft/nbt.h"
+#include "io/minecraft/region_file.h"
+#include "io/minecraft/sections.h"
+
+namespace quoin::minecraft {
+
+namespace {
+
+constexpr std::size_t kMaxBytes = std::size_t{1} << 30;
+constexpr std::int64_t kMaxBlocks = std::int64_t{1} << 30;
+constexpr std::size_t kMaxPalette = 65'535;
+constexpr int kMaxEdge = 1 << 20;
+constexpr std::int64_t kMaxPlace = 1 << 26;
+constexpr std::uint16_t kNoIndex = 0xFFFF;
+
+Error fault(std::string what, nbt::Value at) {
+  return make_error(ErrorCode::BadFormat, std::move(what), {}, at.offset());
+}
+
+std::string text_of(IVec3 size) {
+  return std::to_string(size.x) + " x " + std::to_string(size.y) + " x " + std::to_string(size.z);
+}
+
+/// Blocks that one array holds.
+struct Region {
+  std::string name;
+  IVec3 min{0};
+  IVec3 size{0};
+  std::vector<Block> palette;
+  /// Fills a layer: indices in the palette, by z, then x. Called for each layer once, from below. May be empty of a
+  /// region of one block.
+  std::function<Status(int y, std::span<std::uint16_t> layer)> read_layer;
+};
+
+class SchematicReader {
+ public:
+  SchematicReader(nbt::Value root, const Progress& progress) : root_(root), progress_(progress) {}
+
+  Result<LoadedScene> read() {
+    loaded_.format = "schematic";
+    Status done = read_any();
+    if (!done) return done.error();
+    loaded_.scene.types = types_.types();
+    note_left_out();
+    return std::move(loaded_);
+  }
+
+ private:
+  Status read_any();
+  Status read_sponge(nbt::Value schematic);
+  Status read_mcedit();
+  Status read_litematic(nbt::Value regions);
+  Status read_litematic_region(nbt::Value from);
+  Status read_structure();
+  Status put_structure(Region& region, nbt::Value blocks);
+  Status put(Region region);
+  Status fill(const Region& region, int first_y, std::span<const std::uint16_t> layers);
+  Result<IVec3> size_of(nbt::Value schematic) const;
+  void note_left_out();
+
+  nbt::Value root_;
+  const Progress& progress_;
+  BlockTypes types_;
+  LoadedScene loaded_;
+  ColumnBuilder builder_{types_};
+  std::size_t entities_ = 0;
+  std::size_t block_entities_ = 0;
+  bool has_biomes_ = false;
+};
+
+std::uint64_t volume_of(IVec3 size) {
+  return static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) * static_cast<std::uint64_t>(size.z);
+}
+
+Status check_size(IVec3 size, nbt::Value at) {
+  const bool is_sound = size.x > 0 && size.y > 0 && size.z > 0;
+  if (!is_sound) return fault("a region of " + text_of(size) + " blocks", at);
+  const std::int64_t blocks = std::int64_t{size.x} * size.z;
+  if (std::max({size.x, size.y, size.z}) > kMaxEdge || blocks > kMaxBlocks / size.y) {
+    return make_error(ErrorCode::LimitExceeded, "a region of " + text_of(size) + " blocks", {}, at.offset());
+  }
+  return {};
+}
+
+std::optional<IVec3> vector_of(nbt::Value compound) {
+  IVec3 vector{0};
+  constexpr std::array kNames = {"x", "y", "z"};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto number = compound[kNames.at(static_cast<std::size_t>(axis))].integer();
+    if (!number || *number < -kMaxPlace || *number > kMaxPlace) return std::nullopt;
+    vector[axis] = static_cast<int>(*number);
+  }
+  return vector;
+}
+
+std::optional<IVec3> vector_of_list(nbt::Value list) {
+  if (!list.is_integers() || list.count() != 3) return std::nullopt;
+  IVec3 vector{0};
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int64_t number = list.integer(static_cast<std::size_t>(axis));
+    if (number < -kMaxPlace || number > kMaxPlace) return std::nullopt;
+    vector[axis] = static_cast<int>(number);
+  }
+  return vector;
+}
+
+// The three sizes are shorts without a sign.
+Result<IVec3> SchematicReader::size_of(nbt::Value schematic) const {
+  IVec3 size{0};
+  constexpr std::array kNames = {"Width", "Height", "Length"};
+  for (int axis = 0; axis < 3; ++axis) {
+    const nbt::Value of_axis = schematic[kNames.at(static_cast<std::size_t>(axis))];
+    const auto number = of_axis.integer();
+    if (!number) return fault(std::string("a schematic without ") + kNames.at(static_cast<std::size_t>(axis)), root_);
+    const bool is_short = of_axis.tag() == nbt::Tag::Short;
+    size[axis] = static_cast<int>(is_short ? *number & 0xFFFF : std::clamp<std::int64_t>(*number, 0, kMaxEdge + 1));
+  }
+  if (auto sound = check_size(size, schematic); !sound) return sound.error();
+  return size;
+}
+
+/// Numbers of seven bits a byte, the lowest first, that say more is to come by the eighth.
+class VarintReader {
+ public:
+  explicit VarintReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
+  [[nodiscard]] std::optional<std::uint32_t> next() {
+    std::uint32_t value = 0;
+    for (int shift = 0; shift < 35 && at_ < bytes_.size(); shift += 7) {
+      const auto byte = std::to_integer<std::uint32_t>(bytes_[at_++]);
+      value |= (byte & 127U) << shift;
+      if (byte < 128U) return value;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  std::span<const std::byte> bytes_;
+  std::size_t at_ = 0;
+};
+
+// A compound of blocks as texts, with their indices.
+Result<std::vector<Block>> palette_of_texts(nbt::Value palette, BlockTypes& types) {
+  std::vector<Block> blocks;
+  Status done;
+  palette.for_each([&](nbt::Value entry) {
+    if (!done) return;
+    const auto index = entry.integer();
+    const auto block = parse_block(entry.name());
+    if (!index || *index < 0 || !block) {
+      done = fault("a block \"" + std::string(entry.name()) + "\" without an index", entry);
+      return;
+    }
+    if (static_cast<std::uint64_t>(*index) >= kMaxPalette) {
+      done = make_error(ErrorCode::LimitExceeded, "a palette of more than 65,535 blocks", {}, entry.offset());
+      return;
+    }
+    const auto made = types.block(block->name, block->properties);
+    if (!made) {
+      done = made.error();
+      return;
+    }
+    const auto at = static_cast<std::size_t>(*index);
+    if (blocks.size() <= at) blocks.resize(at + 1);
+    blocks[at] = *made;
+  });
+  if (!done) return done.error();
+  if (blocks.empty()) return fault("a schematic without a palette", palette);
+  return blocks;
+}
+
+Status SchematicReader::read_sponge(nbt::Value schematic) {
+  const auto size = size_of(schematic);
+  if (!size) return size.error();
+  const nbt::Value blocks = schematic["Blocks"];
+  const bool is_third = blocks.tag() == nbt::Tag::Compound;
+  const nbt::Value holder = is_third ? blocks : schematic;
+  const nbt::Value data = is_third ? blocks["Data"] : schematic["BlockData"];
+  auto palette = palette_of_texts(holder["Palette"], types_);
+  if (!palette) return palette.error();
+  Region region;
+  region.name = schematic["Metadata"]["Name"].text().value_or("");
+  region.size = *size;
+  region.palette = std::move(*palette);
+  block_entities_ += nbt::first_of(holder, "BlockEntities", "TileEntities").count();
+  entities_ += schematic["Entities"].count();
+  has_biomes_ = schematic["BiomeData"] || schematic["Biomes"];
+  if (data.bytes().size() < volume_of(*size)) {
+    return fault(
+        "a schematic of " + text_of(*size) + " with " + std::to_string(data.bytes().size()) + " bytes of blocks",
+        schematic);
+  }
+  VarintReader indices(data.bytes());
+  region.read_layer = [&indices, data, kinds = region.palette.size()](int y, std::span<std::uint16_t> layer) -> Status {
+    for (std::uint16_t& index : layer) {
+      const auto next = indices.next();
+      if (!next) return fault("its blocks end in layer " + std::to_string(y), data);
+      if (*next >= kinds) return fault("an index beyond the " + std::to_string(kinds) + " blocks of its palette", data);
+      index = static_cast<std::uint16_t>(*next);
+    }
+    return {};
+  };
+  return put(std::move(region));
+}
+
+int nibble(std::span<const std::byte> bytes, std::size_t i) {
+  if (i / 2 >= bytes.size()) return 0;
+  return std::to_integer<int>(bytes[i / 2]) >> (i % 2 * 4) & 15;
+}
+
+// Blocks by the numbers that they had before 1.13.
+Status SchematicReader::read_mcedit() {
+  const auto size = size_of(root_);
+  if (!size) return size.error();
+  const std::span<const std::byte> blocks = root_["Blocks"].bytes();
+  const std::span<const std::byte> data = root_["Data"].bytes();
+  const std::span<const std::byte> add = root_["AddBlocks"].bytes();
+  const std::size_t count =
+      static_cast<std::size_t>(size->x) * static_cast<std::size_t>(size->y) * static_cast<std::size_t>(size->z);
+  if (blocks.size() != count || (!data.empty() && data.size() != count)) {
+    return fault("a schematic of " + text_of(*size) + " with " + std::to_string(blocks.size()) + " blocks and " +
+                     std::to_string(data.size()) + " data",
+                 root_["Blocks"]);
+  }
+  const std::string materials(root_["Materials"].text().value_or("Alpha"));
+  if (materials != "Alpha") {
+    loaded_.warnings.push_back("blocks are read by the numbers of the Java edition, though it says \"" + materials +
+                               "\"");
+  }
+  if (root_["SchematicaMapping"] || root_["BlockIDs"]) {
+    loaded_.warnings.emplace_back("its own numbers of blocks are not used: those of the game are");
+  }
+  Region region;
+  region.size = *size;
+  block_entities_ += root_["TileEntities"].count();
+  entities_ += root_["Entities"].count();
+  has_biomes_ = root_["Biomes"].count() > 0;
+  std::vector<std::uint16_t> index_of(std::size_t{4096} * 16, kNoIndex);
+  const auto code_of = [&](std::size_t i) {
+    const int id = nibble(add, i) << 8 | std::to_integer<int>(blocks[i]);
+    return static_cast<std::size_t>(id * 16 + (data.empty() ? 0 : std::to_integer<int>(data[i]) & 15));
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t code = code_of(i);
+    if (index_of[code] != kNoIndex) continue;
+    const auto [name, properties] = legacy_block(static_cast<int>(code / 16), static_cast<int>(code % 16));
+    const auto block = types_.block(name, properties);
+    if (!block) return block.error();
+    index_of[code] = static_cast<std::uint16_t>(region.palette.size());
+    region.palette.push_back(*block);
+  }
+  region.read_layer = [&](int y, std::span<std::uint16_t> layer) -> Status {
+    const std::size_t first = static_cast<std::size_t>(y) * layer.size();
+    for (std::size_t i = 0; i < layer.size(); ++i) layer[i] = index_of[code_of(first + i)];
+    return {};
+  };
+  return put(std::move(region));
+}
+
+Status SchematicReader::read_litematic(nbt::Value regions) {
+  Status done;
+  regions.for_each([&](nbt::Value region) {
+    if (done) done = read_litematic_region(region);
+  });
+  if (done && loaded_.scene.grids().empty()) return fault("a litematic without regions", regions);
+  return done;
+}
+
+// A size below 0 reaches from the position downwards.
+Status SchematicReader::read_litematic_region(nbt::Value from) {
+  const auto place = vector_of(from["Position"]);
+  const auto reach = vector_of(from["Size"]);
+  if (!place || !reach) return fault("a region without a place or a size", from);
+  Region region;
+  region.name = from.name();
+  region.size = glm::abs(*reach);
+  region.min = *place;
+  for (int axis = 0; axis < 3; ++axis) {
+    if ((*reach)[axis] < 0) region.min[axis] += (*reach)[axis] + 1;
+  }
+  if (auto sound = check_size(region.size, from); !sound) return sound;
+  if (auto read = read_block_palette(from["BlockStatePalette"], types_, region.palette); !read) return read;
+  const std::size_t kinds = region.palette.size();
+  if (kinds == 0 || kinds > kMaxPalette) {
+    return fault("a palette of " + std::to_string(kinds) + " blocks", from["BlockStatePalette"]);
+  }
+  block_entities_ += from["TileEntities"].count();
+  entities_ += from["Entities"].count();
+  const nbt::Value states = from["BlockStates"];
+  const int bits = bits_of_palette(kinds, 2);
+  if (states.count() < (volume_of(region.size) * static_cast<std::uint64_t>(bits) + 63) / 64) {
+    return fault("indices of " + text_of(region.size) + " blocks in " + std::to_string(states.count()) + " longs",
+                 from);
+  }
+  region.read_layer = [states, bits, kinds](int y, std::span<std::uint16_t> layer) -> Status {
+    unpack_spanning(states, bits, static_cast<std::size_t>(y) * layer.size(), layer);
+    if (std::ranges::all_of(layer, [kinds](std::uint16_t index) { return index < kinds; })) return {};
+    return fault("an index beyond the " + std::to_string(kinds) + " blocks of its palette", states);
+  };
+  return put(std::move(region));
+}
+
+Status SchematicReader::read_structure() {
+  const auto size = vector_of_list(root_["size"]);
+  if (!size) return fault("a structure without a size", root_);
+  if (auto sound = check_size(*size, root_["size"]); !sound) return sound;
+  // Of which nothing but what is in it says how large it is.
+  constexpr std::int64_t kMaxArea = std::int64_t{1} << 22;
+  if (std::int64_t{size->x} * size->z > kMaxArea) {
+    return make_error(ErrorCode::LimitExceeded, "a structure of " + text_of(*size) + " blocks");
+  }
+  Region region;
+  region.size = *size;
+  nbt::Value palette = root_["palette"];
+  if (!palette) {  // of several that the game chooses from by chance the first
+    bool is_first = true;
+    root_["palettes"].for_each([&](nbt::Value each) {
+      if (std::exchange(is_first, false)) palette = each;
+    });
+    if (root_["palettes"].count() > 1) {
+      loaded_.warnings.push_back("of its " + std::to_string(root_["palettes"].count()) + " palettes the first");
+    }
+  }
+  if (auto read = read_block_palette(palette, types_, region.palette); !read) return read;
+  if (region.palette.size() >= kMaxPalette) return fault("a palette of more than 65,534 blocks", palette);
+  entities_ += root_["entities"].count();
+  return put_structure(region, root_["blocks"]);
+}
+
+// Where nothing is said there is air.
+Status SchematicReader::put_structure(Region& region, nbt::Value blocks) {
+  struct Placed {
+    int y;
+    std::uint32_t at;
+    std::uint16_t index;
+  };
+  const auto air = static_cast<std::uint16_t>(region.palette.size());
+  std::vector<Placed> placed;
+  Status done;
+  blocks.for_each([&](nbt::Value block) {
+    if (!done) return;
+    const auto at = vector_of_list(block["pos"]);
+    const auto index = block["state"].integer();
+    const bool is_sound = at && index && IBox{IVec3(0), region.size}.contains(*at) && *index >= 0 && *index < air;
+    if (!is_sound) {
+      done = fault("a block outside of the structure, or of its palette", block);
+      return;
+    }
+    if (block["nbt"]) ++block_entities_;
+    const auto in_layer = static_cast<std::uint32_t>(at->z) * static_cast<std::uint32_t>(region.size.x) +
+                          static_cast<std::uint32_t>(at->x);
+    placed.push_back({at->y, in_layer, static_cast<std::uint16_t>(*index)});
+  });
+  if (!done) return done;
+  std::ranges::stable_sort(placed, {}, &Placed::y);
+  region.palette.emplace_back();
+  std::size_t next = 0;
+  region.read_layer = [&placed, &next, air](int y, std::span<std::uint16_t> layer) -> Status {
+    std::ranges::fill(layer, air);
+    for (; next < placed.size() && placed[next].y == y; ++next) layer[placed[next].at] = placed[next].index;
+    return {};
+  };
+  return put(std::move(region));
+}
+
+// One slab of 16 layers at a time, cut into sections.
+Status SchematicReader::fill(const Region& region, int first_y, std::span<const std::uint16_t> layers) {
+  const auto width = static_cast<std::size_t>(region.size.x);
+  const std::size_t area = width * static_cast<std::size_t>(region.size.z);
+  const int height = static_cast<int>(layers.size() / area);
+  const auto air = static_cast<std::uint16_t>(region.palette.size());
+  Section section;
+  section.palette = region.palette;
+  section.palette.emplace_back();
+  section.biomes.emplace_back();
+  section.biome_indices.assign(64, 0);
+  for (int z = 0; z < region.size.z; z += kSectionEdge) {
+    for (int x = 0; x < region.size.x; x += kSectionEdge) {
+      section.indices.fill(air);
+      const int end_z = std::min(kSectionEdge, region.size.z - z);
+      const auto row = static_cast<std::size_t>(std::min(kSectionEdge, region.size.x - x));
+      bool is_air = true;
+      for (int dy = 0; dy < height; ++dy) {
+        for (int dz = 0; dz < end_z; ++dz) {
+          const std::uint16_t* const from = layers.data() + static_cast<std::size_t>(dy) * area +
+                                            static_cast<std::size_t>(z + dz) * width + static_cast<std::size_t>(x);
+          std::uint16_t* const to = section.indices.data() + (dy * kSectionEdge + dz) * kSectionEdge;
+          for (std::size_t i = 0; i < row; ++i) {
+            to[i] = from[i];
+            is_air = is_air && region.palette[from[i]].is_air();
+          }
+        }
+      }
+      if (is_air) continue;
+      if (auto put = builder_.put(section, {x, first_y, z}); !put) return put;
+    }
+  }
+  return {};
+}
+
+Status SchematicReader::put(Region region) {
+  SceneGrid grid;
+  grid.name = region.name;
+  const auto area = static_cast<std::size_t>(region.size.x) * static_cast<std::size_t>(region.size.z);
+  std::vector<std::uint16_t> layers;
+  for (int y = 0; y < region.size.y; y += kSectionEdge) {
+    const int height = std::min(kSectionEdge, region.size.y - y);
+    layers.resize(area * static_cast<std::size_t>(height));
+    for (int dy = 0; dy < height; ++dy) {
+      auto read = region.read_layer(y + dy, std::span(layers).subspan(static_cast<std::size_t>(dy) * area, area));
+      if (!read) return read;
+    }
+    if (auto filled = fill(region, y, layers); !filled) return filled;
+    const bool is_chunk_done = (y + height) % kChunkEdge == 0 || y + height == region.size.y;
+    if (!is_chunk_done) continue;
+    for (SourceChunk& chunk : builder_.take()) grid.grid.put_chunk(chunk.place, std::move(chunk.voxels));
+    if (progress_ && !progress_(static_cast<double>(y + height) / region.size.y)) {
+      return make_error(ErrorCode::Cancelled, "cancelled");
+    }
+  }
+  grid.canvas = {IVec3(0), region.size};
+  Instance instance;
+  instance.name = region.name;
+  instance.position = DVec3(region.min);
+  instance.grid = loaded_.scene.add_grid(std::move(grid));
+  loaded_.scene.add_instance(std::move(instance));
+  return {};
+}
+
+void SchematicReader::note_left_out() {
+  const auto note = [&](std::size_t count, const char* what) {
+    if (count > 0) loaded_.warnings.push_back("left out: " + std::to_string(count) + " " + what);
+  };
+  note(block_entities_, "blocks' contents (chests, signs and the like)");
+  note(entities_, "entities");
+  if (has_biomes_)
+    loaded_.warnings.emplace_back("left out: biomes; grass, leaves and water have the colours of plains");
+}
+
+Status SchematicReader::read_any() {
+  if (const nbt::Value third = root_["Schematic"]; third["Blocks"]) return read_sponge(third);
+  if (root_["BlockData"]) return read_sponge(root_);
+  if (root_["Regions"].tag() == nbt::Tag::Compound) return read_litematic(root_["Regions"]);
+  if (root_["size"] && (root_["palette"] || root_["palettes"])) return read_structure();
+  if (root_["Blocks"].tag() == nbt::Tag::ByteArray && root_["Width"]) return read_mcedit();
+  std::string keys;
+  root_.for_each([&](nbt::Value value) {
+    constexpr std::size_t kEnough = 80;
+    if (keys.size() < kEnough) keys.append(keys.empty() ? "" : ", ").append(value.name());
+  });
+  return make_error(ErrorCode::Unsupported,
+                    "a file of NBT that is no schematic: it has " + (keys.empty() ? std::string("nothing") : keys));
+}
+
+}  // namespace
+
+bool begins_nbt(std::span<const std::byte> beginning) {
+  constexpr std::size_t kLongestName = 64;
+  constexpr std::size_t kEnough = 3 + kLongestName + 1;
+  std::vector<std::byte> expanded;
+  std::span<const std::byte> bytes = beginning;
+  if (begins_gzip(beginning)) {
+    auto first = first_bytes(beginning, kEnough);
+    if (!first) return false;
+    expanded = std::move(*first);
+    bytes = expanded;
+  }
+  const auto at = [&](std::size_t i) { return std::to_integer<unsigned>(bytes[i]); };
+  if (bytes.size() < 4 || at(0) != static_cast<unsigned>(nbt::Tag::Compound)) return false;
+  const std::size_t name = at(1) << 8 | at(2);
+  if (name > kLongestName || bytes.size() < 4 + name) return false;
+  for (std::size_t i = 3; i < 3 + name; ++i) {
+    if (at(i) < 0x20) return false;
+  }
+  return at(3 + name) <= static_cast<unsigned>(nbt::Tag::LongArray);
+}
+
+Result<LoadedScene> read_schematic(std::span<const std::byte> bytes, const Progress& progress) {
+  const auto expanded = decompress_file(bytes, kMaxBytes);
+  if (!expanded) return expanded.error();
+  const auto document = nbt::Document::parse(*expanded, {.depth = 512, .nodes = std::size_t{1} << 24});
+  if (!document) return document.error();
+  return SchematicReader(document->root(), progress).read();
+}
+
+}  // namespace quoin::minecraft

@@ -1,0 +1,216 @@
+#include "io/minecraft/schematic.h"
+
+#include <gtest/gtest.h>
+
+#include <quoin/io/file.h>
+#include <quoin/io/formats.h>
+
+#include "io/byte_stream.h"
+#include "io/minecraft/block_states.h"
+#include "io/minecraft/minecraft_for_tests.h"
+
+namespace quoin::minecraft {
+namespace {
+
+namespace fs = std::filesystem;
+using minecraft_test::NbtWriter;
+
+NbtWriter& put_short(NbtWriter& nbt, const char* name, int value) {
+  return nbt.tag(2, name).number(static_cast<std::uint64_t>(value), 2);
+}
+NbtWriter& put_sizes(NbtWriter& nbt, IVec3 size) {
+  put_short(nbt, "Width", size.x);
+  put_short(nbt, "Height", size.y);
+  return put_short(nbt, "Length", size.z);
+}
+NbtWriter& put_vector(NbtWriter& nbt, const char* name, IVec3 v) {
+  return nbt.compound(name).integer("x", v.x).integer("y", v.y).integer("z", v.z).end();
+}
+NbtWriter& put_palette(NbtWriter& nbt, const char* name) {
+  nbt.list(name, 10, 3);
+  nbt.string("Name", "minecraft:air").end();
+  nbt.string("Name", "minecraft:stone").end();
+  return nbt.string("Name", "minecraft:oak_stairs").compound("Properties").string("facing", "west").end().end();
+}
+
+// 2 x 2 x 3: stone at (0, 0, 0), stairs at (1, 1, 2).
+std::vector<std::byte> sponge(int version) {
+  std::vector<std::uint8_t> data(12, 0);
+  data[0] = 1;
+  data[11] = 2;
+  NbtWriter nbt;
+  nbt.compound(version == 3 ? "" : "Schematic");
+  if (version == 3) nbt.compound("Schematic");
+  nbt.integer("Version", version);
+  put_sizes(nbt, {2, 2, 3});
+  if (version == 3) nbt.compound("Blocks");
+  nbt.compound("Palette").integer("minecraft:air", 0).integer("minecraft:stone", 1);
+  nbt.integer("minecraft:oak_stairs[facing=west]", 2).end();
+  nbt.byte_array(version == 3 ? "Data" : "BlockData", data);
+  nbt.list(version == 1 ? "TileEntities" : "BlockEntities", 10, 1).end();
+  if (version == 3) nbt.end().end();
+  return nbt.end().bytes;
+}
+
+std::vector<std::byte> litematic(IVec3 size) {
+  NbtWriter nbt;
+  nbt.compound("").integer("Version", 6).compound("Regions").compound("tower");
+  put_vector(nbt, "Position", {10, 20, 30});
+  put_vector(nbt, "Size", size);
+  put_palette(nbt, "BlockStatePalette");
+  // 33 blocks of two bits: the last one begins the second word.
+  return nbt.longs("BlockStates", {1, 2}).end().end().end().bytes;
+}
+
+std::vector<std::byte> structure(IVec3 stairs) {
+  NbtWriter nbt;
+  nbt.compound("").list("size", 3, 3).number(2, 4).number(2, 4).number(3, 4);
+  put_palette(nbt, "palette");
+  nbt.list("blocks", 10, 2);
+  nbt.list("pos", 3, 3).number(0, 4).number(0, 4).number(0, 4).integer("state", 1).end();
+  nbt.list("pos", 3, 3);
+  for (int axis = 0; axis < 3; ++axis) nbt.number(static_cast<std::uint64_t>(stairs[axis]), 4);
+  return nbt.integer("state", 2).end().end().bytes;
+}
+
+std::vector<std::byte> mcedit() {
+  NbtWriter nbt;
+  nbt.compound("Schematic");
+  put_sizes(nbt, {2, 2, 3});
+  std::vector<std::uint8_t> blocks(12, 0);
+  std::vector<std::uint8_t> data(12, 0);
+  blocks[0] = 1;
+  blocks[11] = 53;
+  data[11] = 1;  // towards the west
+  return nbt.byte_array("Blocks", blocks).byte_array("Data", data).string("Materials", "Alpha").end().bytes;
+}
+
+std::string block_at(const LoadedScene& loaded, IVec3 voxel) {
+  const Grid& grid = loaded.scene.grids()[loaded.scene.grids().handles().front()].grid;
+  const VoxelType type = grid.get(voxel);
+  return type == kAir ? "air" : to_string(block_text(loaded.scene.types[type], grid.data(voxel).state));
+}
+
+void expect_house(const Result<LoadedScene>& loaded) {
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_EQ(loaded->scene.voxel_count(), 2);
+  EXPECT_EQ(block_at(*loaded, {0, 0, 0}), "minecraft:stone");
+  EXPECT_NE(block_at(*loaded, {1, 1, 2}).find("minecraft:oak_stairs[facing=west"), std::string::npos)
+      << block_at(*loaded, {1, 1, 2});
+}
+
+TEST(Schematic, AllKindsHoldTheSameHouse) {
+  for (int version = 1; version <= 3; ++version) {
+    const auto loaded = read_schematic(sponge(version));
+    expect_house(loaded);
+    ASSERT_EQ(loaded->warnings.size(), 1U);
+    EXPECT_NE(loaded->warnings[0].find("1 blocks' contents"), std::string::npos);
+  }
+  expect_house(read_schematic(mcedit()));
+  expect_house(read_schematic(structure({1, 1, 2})));
+}
+
+TEST(Schematic, IsKnownByItsContentAlsoWithinGzip) {
+  for (const auto& bytes : {sponge(2), sponge(3), mcedit(), structure({1, 1, 2}), litematic({11, 1, 3})}) {
+    EXPECT_EQ(detect_format(bytes), FileFormat::Schematic);
+    const std::vector<std::byte> packed = gzipped(bytes, 6);
+    EXPECT_EQ(detect_format(packed), FileFormat::Schematic);
+    EXPECT_TRUE(load_scene(packed)) << to_string(load_scene(packed).error());
+  }
+}
+
+TEST(Schematic, ALitematicsSizeMayReachDownwards) {
+  const auto up = read_schematic(litematic({11, 1, 3}));
+  const auto down = read_schematic(litematic({-11, 1, -3}));
+  ASSERT_TRUE(up && down);
+  for (const auto* loaded : {&*up, &*down}) {
+    EXPECT_EQ(loaded->scene.voxel_count(), 2);
+    EXPECT_EQ(block_at(*loaded, {0, 0, 0}), "minecraft:stone");
+    EXPECT_NE(block_at(*loaded, {10, 0, 2}).find("oak_stairs"), std::string::npos);
+  }
+  const auto place = [](const LoadedScene& loaded) {
+    return loaded.scene.instances()[loaded.scene.instances().handles().front()].position;
+  };
+  EXPECT_EQ(place(*up), DVec3(10.0, 20.0, 30.0));
+  EXPECT_EQ(place(*down), DVec3(0.0, 20.0, 28.0));
+}
+
+TEST(Schematic, LargerOnesThanASectionComeWhole) {
+  // 70 x 70 x 70, each block by its place.
+  constexpr int kEdge = 70;
+  std::vector<std::uint8_t> data;
+  for (int i = 0; i < kEdge * kEdge * kEdge; ++i) data.push_back(static_cast<std::uint8_t>(i % 3));
+  NbtWriter nbt;
+  nbt.compound("Schematic").integer("Version", 2);
+  put_sizes(nbt, IVec3(kEdge));
+  nbt.compound("Palette").integer("minecraft:air", 0).integer("minecraft:stone", 1).integer("minecraft:dirt", 2).end();
+  nbt.byte_array("BlockData", data).end();
+  const auto loaded = read_schematic(nbt.bytes);
+  ASSERT_TRUE(loaded);
+  for (const IVec3 voxel : {IVec3(0), IVec3(63, 64, 65), IVec3(69), IVec3(15, 16, 17), IVec3(64, 3, 2)}) {
+    const int index = (voxel.y * kEdge + voxel.z) * kEdge + voxel.x;
+    const std::array kNames = {"air", "minecraft:stone", "minecraft:dirt"};
+    EXPECT_EQ(block_at(*loaded, voxel), kNames.at(static_cast<std::size_t>(index % 3)));
+  }
+  EXPECT_EQ(loaded->scene.voxel_count(), kEdge * kEdge * kEdge - (kEdge * kEdge * kEdge + 2) / 3);
+}
+
+TEST(Schematic, WhatIsWrongIsSaidInALine) {
+  EXPECT_EQ(read_schematic(structure({2, 1, 2})).error().code, ErrorCode::BadFormat);
+  EXPECT_EQ(read_schematic(litematic({12, 1, 6})).error().code, ErrorCode::BadFormat);
+  EXPECT_EQ(read_schematic(litematic({0, 1, 3})).error().code, ErrorCode::BadFormat);
+  EXPECT_EQ(read_schematic(litematic({1 << 20, 1 << 20, 1 << 20})).error().code, ErrorCode::LimitExceeded);
+  NbtWriter other;
+  other.compound("").integer("DataVersion", 7).end();
+  const auto refused = read_schematic(other.bytes);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
+  EXPECT_NE(refused.error().message.find("DataVersion"), std::string::npos);
+  NbtWriter wide;
+  wide.compound("").list("size", 3, 3).number(1 << 14, 4).number(1, 4).number(1 << 14, 4);
+  put_palette(wide, "palette");
+  EXPECT_EQ(read_schematic(wide.list("blocks", 10, 0).end().bytes).error().code, ErrorCode::LimitExceeded);
+}
+
+TEST(Schematic, WhatIsCutOffOrTurnedAnywhereNeverCrashes) {
+  for (const auto& whole : {sponge(1), sponge(3), mcedit(), structure({1, 1, 2}), litematic({11, 1, 3})}) {
+    for (std::size_t size = 0; size < whole.size(); ++size) {
+      EXPECT_FALSE(read_schematic(std::span(whole).first(size))) << size;
+    }
+    for (std::size_t at = 0; at < whole.size(); ++at) {
+      for (const int bit : {0, 4, 7}) {
+        std::vector<std::byte> turned = whole;
+        turned[at] ^= std::byte{1} << bit;
+        (void)read_schematic(turned);
+      }
+    }
+  }
+}
+
+TEST(Schematic, RealOnesHaveTheirCounts) {
+  const fs::path folder = fs::path(QUOIN_SOURCE_DIR).parent_path() / "shared" / "data" / "mc";
+  if (!fs::exists(folder)) GTEST_SKIP() << "real files are not here";
+  struct Known {
+    const char* file;
+    IVec3 size;
+    std::int64_t voxels;
+  };
+  const std::array kKnown = {
+      Known{"PrismarineJS+prismarine-schematic/5c99fe__test__schematics__smallhouse1.schem", {21, 28, 20}, 3'201},
+      Known{"PrismarineJS+prismarine-schematic/ea3ed7__test__schematics__viking-house1.schematic", {23, 35, 23}, 2'492},
+      Known{"vengi-voxel+vengi/data__tests__test.litematic", {79, 29, 70}, 11'722},
+      Known{"TelepathicGrunt+StructureTutorialMod/"
+            "src__main__resources__data__structure_tutorial__structures__sky_fan.nbt",
+            {27, 12, 27},
+            420}};
+  for (const Known& known : kKnown) {
+    const auto loaded = load_scene(folder / known.file);
+    ASSERT_TRUE(loaded) << to_string(loaded.error());
+    EXPECT_EQ(loaded->scene.voxel_count(), known.voxels) << known.file;
+    const SceneGrid& grid = loaded->scene.grids()[loaded->scene.grids().handles().front()];
+    EXPECT_EQ(grid.canvas.size(), known.size) << known.file;
+  }
+}
+
+}  // namespace
+}  // namespace quoin::minecraft

@@ -1,0 +1,220 @@
+// Goxel's files: chunks of a type, a size, content and a sum. Its z points up; +x, +z, -y are this library's axes.
+//
+//   BL16   16^3 voxels as a PNG of 64 x 64 pixels
+//   MATE   a material
+//   LAYR   a layer: which blocks stand where, and what is said of it
+
+#include <array>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "io/byte_reader.h"
+#include "io/image/png.h"
+#include "io/models/model_builder.h"
+#include "io/models/models.h"
+
+namespace quoin::models {
+
+namespace {
+
+constexpr std::string_view kMagic = "GOX ";
+constexpr int kBlockEdge = 16;
+constexpr std::size_t kBlockBytes = std::size_t{4} * kBlockEdge * kBlockEdge * kBlockEdge;
+constexpr std::int32_t kMaxPlace = 1 << 26;
+
+Error fault(std::string what, std::size_t at) {
+  return make_error(ErrorCode::BadFormat, std::move(what), {}, at);
+}
+
+class GoxelReader {
+ public:
+  explicit GoxelReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
+  Result<LoadedScene> read();
+
+ private:
+  using Dict = std::map<std::string, std::span<const std::byte>, std::less<>>;
+  struct Material {
+    VoxelProperties properties;
+    std::array<float, 4> colour{1.0F, 1.0F, 1.0F, 1.0F};
+  };
+  struct Block {
+    std::uint32_t index;
+    IVec3 place;
+  };
+
+  Status read_chunk(std::string_view type, ByteReader chunk);
+  Status read_block(ByteReader& chunk);
+  void read_material(ByteReader& chunk);
+  Status read_layer(ByteReader& chunk);
+  Status put_block(const Block& block, const Material& material);
+  static Dict read_dict(ByteReader& chunk);
+
+  std::span<const std::byte> bytes_;
+  std::uint32_t version_ = 0;
+  std::vector<std::vector<std::uint8_t>> blocks_;
+  std::vector<Material> materials_;
+  std::map<std::string, std::size_t, std::less<>> left_out_;
+  ModelBuilder builder_;
+};
+
+Result<LoadedScene> GoxelReader::read() {
+  ByteReader reader(bytes_);
+  static_cast<void>(reader.take(4));
+  version_ = reader.u32();
+  if (version_ < 1 || version_ > 2) {
+    return make_error(ErrorCode::Unsupported, "version " + std::to_string(version_) + " of Goxel's files", {}, 4);
+  }
+  while (reader.remaining() > 0) {
+    const std::size_t at = reader.position();
+    const std::string_view type = reader.text(4);
+    const std::size_t size = reader.u32();
+    const std::size_t begin = reader.position();
+    static_cast<void>(reader.take(size));
+    static_cast<void>(reader.u32());  // its sum, which programs do not agree on
+    if (reader.failed()) return fault("a chunk that ends behind its file", at);
+    if (auto done = read_chunk(type, ByteReader(bytes_, begin, begin + size)); !done) return done.error();
+  }
+  for (const auto& [what, count] : left_out_) builder_.warn("left out: " + std::to_string(count) + " " + what);
+  return builder_.take("goxel");
+}
+
+Status GoxelReader::read_chunk(std::string_view type, ByteReader chunk) {
+  if (type == "BL16") return read_block(chunk);
+  if (type == "LAYR") return read_layer(chunk);
+  if (type == "MATE") {
+    read_material(chunk);
+    return {};
+  }
+  if (type == "CAMR") ++left_out_["cameras"];
+  if (type == "LIGH") ++left_out_["settings of its light"];
+  const bool is_known = type == "CAMR" || type == "LIGH" || type == "IMG " || type == "PREV";
+  if (!is_known) ++left_out_["chunks of unknown kinds"];
+  return {};
+}
+
+Status GoxelReader::read_block(ByteReader& chunk) {
+  const std::size_t at = chunk.position();
+  auto image = decode_png(chunk.take(chunk.remaining()));
+  if (!image) return fault("a block that is no picture: " + image.error().message, at);
+  if (image->pixels.size() != kBlockBytes) return fault("a block of another size than 16^3", at);
+  blocks_.push_back(std::move(image->pixels));
+  return {};
+}
+
+// Names and values, until a name of no length.
+GoxelReader::Dict GoxelReader::read_dict(ByteReader& chunk) {
+  Dict dict;
+  for (;;) {
+    const std::size_t length = chunk.remaining() == 0 ? 0 : chunk.u32();
+    if (length == 0) return dict;
+    const std::string key(chunk.text(length));
+    const auto value = chunk.take(chunk.u32());
+    if (chunk.failed()) return dict;
+    dict[key] = value;
+  }
+}
+
+std::string text_of(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+template <std::size_t Count>
+void read_numbers(std::span<const std::byte> bytes, std::array<float, Count>& numbers) {
+  ByteReader reader(bytes);
+  for (float& number : numbers) {
+    const float read = reader.f32();
+    if (!reader.failed() && std::isfinite(read)) number = read;
+  }
+}
+
+void GoxelReader::read_material(ByteReader& chunk) {
+  const Dict dict = read_dict(chunk);
+  Material material;
+  const auto value = [&](std::string_view name) {
+    const auto found = dict.find(name);
+    return found == dict.end() ? std::span<const std::byte>() : found->second;
+  };
+  material.properties.name = text_of(value("name"));
+  read_numbers(value("color"), material.colour);
+  std::array<float, 1> metallic{0.0F};
+  std::array<float, 1> roughness{1.0F};
+  std::array<float, 3> emission{};
+  read_numbers(value("metallic"), metallic);
+  read_numbers(value("roughness"), roughness);
+  read_numbers(value("emission"), emission);
+  material.properties.metalness = std::clamp(metallic[0], 0.0F, 1.0F);
+  material.properties.roughness = std::clamp(roughness[0], 0.0F, 1.0F);
+  material.properties.emission = std::clamp(std::max({emission[0], emission[1], emission[2]}), 0.0F, 1000.0F);
+  materials_.push_back(std::move(material));
+}
+
+Status GoxelReader::read_layer(ByteReader& chunk) {
+  const std::size_t at = chunk.position();
+  const std::size_t count = chunk.count(20);
+  std::vector<Block> blocks;
+  for (std::size_t i = 0; i < count; ++i) {
+    Block block{chunk.u32(), {}};
+    for (int axis = 0; axis < 3; ++axis) block.place[axis] = chunk.i32();
+    static_cast<void>(chunk.u32());
+    const auto is_far = [&](int axis) { return block.place[axis] < -kMaxPlace || block.place[axis] > kMaxPlace; };
+    if (is_far(0) || is_far(1) || is_far(2)) return fault("a block that lies too far out", at);
+    if (block.index >= blocks_.size()) return fault("a block that is not there", at);
+    if (version_ == 1) block.place -= kBlockEdge / 2;
+    blocks.push_back(block);
+  }
+  if (chunk.failed()) return fault("a layer that ends too early", at);
+  const Dict dict = read_dict(chunk);
+  const auto value = [&](std::string_view name) {
+    const auto found = dict.find(name);
+    return ByteReader(found == dict.end() ? std::span<const std::byte>() : found->second);
+  };
+  Model model;
+  if (const auto name = dict.find("name"); name != dict.end()) model.name = text_of(name->second);
+  ByteReader visible = value("visible");
+  model.visible = visible.remaining() == 0 || visible.u8() != 0;
+  ByteReader base = value("base_id");
+  if (count == 0 && (base.u32() != 0 || dict.contains("shape"))) ++left_out_["layers that are clones or shapes"];
+  const std::int32_t index = value("material").i32();
+  const bool has_material =
+      dict.contains("material") && index >= 0 && static_cast<std::size_t>(index) < materials_.size();
+  const Material material = has_material ? materials_[static_cast<std::size_t>(index)] : Material{};
+  builder_.begin(std::move(model));
+  builder_.use_material(material.properties);
+  for (const Block& block : blocks) {
+    if (auto put = put_block(block, material); !put) return put;
+  }
+  return {};
+}
+
+Status GoxelReader::put_block(const Block& block, const Material& material) {
+  constexpr std::uint8_t kSolid = 127;
+  const std::vector<std::uint8_t>& pixels = blocks_[block.index];
+  const auto times = [&](std::uint8_t channel, std::size_t i) {
+    return static_cast<std::uint8_t>(std::lround(channel * std::clamp(material.colour.at(i), 0.0F, 1.0F)));
+  };
+  for (int i = 0; i < kBlockEdge * kBlockEdge * kBlockEdge; ++i) {
+    const std::uint8_t* const rgba = pixels.data() + std::size_t{4} * static_cast<std::size_t>(i);
+    if (rgba[3] < kSolid) continue;
+    const IVec3 at = block.place + IVec3(i % 16, i / 16 % 16, i / 256);
+    const Rgba8 colour{times(rgba[0], 0), times(rgba[1], 1), times(rgba[2], 2),
+                       std::max<std::uint8_t>(times(255, 3), 1)};
+    if (auto put = builder_.put({at.x, at.z, -at.y - 1}, colour); !put) return put;
+  }
+  return {};
+}
+
+}  // namespace
+
+bool is_goxel(std::span<const std::byte> beginning) {
+  return ByteReader(beginning).text(4) == kMagic;
+}
+
+Result<LoadedScene> read_goxel(std::span<const std::byte> bytes) {
+  return GoxelReader(bytes).read();
+}
+
+}  // namespace quoin::models

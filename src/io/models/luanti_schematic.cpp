@@ -1,0 +1,108 @@
+// Luanti's schematics: names of nodes, and three arrays in a zlib stream. Its axes are left-handed: z is turned round.
+
+#include <bit>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "io/byte_order.h"
+#include "io/byte_reader.h"
+#include "io/byte_stream.h"
+#include "io/minecraft/biomes.h"
+#include "io/minecraft/block_looks.h"
+#include "io/models/model_builder.h"
+#include "io/models/models.h"
+
+namespace quoin::models {
+
+namespace {
+
+constexpr std::string_view kMagic = "MTSM";
+
+Error fault(std::string what, std::size_t at) {
+  return make_error(ErrorCode::BadFormat, std::move(what), {}, at);
+}
+
+std::uint16_t read_u16(ByteReader& reader) {
+  const auto bytes = reader.take(2);
+  return bytes.empty() ? std::uint16_t{0} : load<std::uint16_t>(bytes.data(), std::endian::big);
+}
+
+/// What a node looks like, by its name; alpha 0: it is air.
+struct Node {
+  VoxelProperties properties;
+  Rgba8 colour{0, 0, 0, 0};
+};
+
+Node node_of(std::string name) {
+  Node node;
+  if (name == "air" || name == "ignore") return node;
+  const minecraft::BlockLook look = minecraft::look_of_block(name, false, false);
+  const minecraft::BiomeTints tints;
+  const auto tint = [&](std::uint8_t channel, int shift) {
+    if (look.tint == minecraft::Tint::None) return channel;
+    const std::uint32_t colour = look.tint == minecraft::Tint::Grass     ? tints.grass
+                                 : look.tint == minecraft::Tint::Foliage ? tints.foliage
+                                                                         : tints.water;
+    return static_cast<std::uint8_t>((channel * (colour >> shift & 255U) + 127U) / 255U);
+  };
+  node.colour = {tint(look.colour.r, 16), tint(look.colour.g, 8), tint(look.colour.b, 0),
+                 std::max<std::uint8_t>(look.colour.a, 1)};
+  node.properties.name = std::move(name);
+  node.properties.collides = look.collides;
+  node.properties.emission = look.emission;
+  node.properties.roughness = look.roughness;
+  node.properties.ior = look.ior;
+  return node;
+}
+
+}  // namespace
+
+bool is_mts(std::span<const std::byte> beginning) {
+  return ByteReader(beginning).text(4) == kMagic;
+}
+
+Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
+  ByteReader reader(bytes);
+  static_cast<void>(reader.take(4));
+  const int version = read_u16(reader);
+  if (version < 1 || version > 4) {
+    return make_error(ErrorCode::Unsupported, "version " + std::to_string(version) + " of Luanti's schematics", {}, 4);
+  }
+  const int size_x = read_u16(reader);
+  const int size_y = read_u16(reader);
+  const int size_z = read_u16(reader);
+  if (version >= 3) static_cast<void>(reader.take(static_cast<std::size_t>(size_y)));  // how likely each layer is
+  std::vector<Node> nodes(read_u16(reader));
+  for (Node& node : nodes) node = node_of(std::string(reader.text(read_u16(reader))));
+  if (reader.failed()) return fault("it ends before its nodes do", bytes.size());
+  const std::size_t begin = reader.position();
+  const std::uint64_t volume =
+      static_cast<std::uint64_t>(size_x) * static_cast<std::uint64_t>(size_y) * static_cast<std::uint64_t>(size_z);
+  ByteStream stream(bytes, begin, Compression::Zlib);
+  if (volume * 4 > stream.max_bytes()) return fault("a schematic of more nodes than there can be", 6);
+  std::vector<std::byte> content(volume * 4);
+  const auto read = stream.read(content);
+  if (!read) return read.error();
+  if (*read < volume * 3) return fault("it ends before its nodes do", bytes.size());
+  ModelBuilder builder;
+  Model model;
+  model.canvas = {IVec3(0), {size_x, size_y, size_z}};
+  builder.begin(std::move(model));
+  std::size_t at = 0;
+  for (int z = 0; z < size_z; ++z) {
+    for (int y = 0; y < size_y; ++y) {
+      for (int x = 0; x < size_x; ++x, ++at) {
+        const auto index = load<std::uint16_t>(content.data() + 2 * at, std::endian::big);
+        if (index >= nodes.size()) return fault("a node beyond its names", begin);
+        constexpr unsigned kChance = 0x7F;
+        if (version >= 2 && (std::to_integer<unsigned>(content[2 * volume + at]) & kChance) == 0) continue;
+        builder.use_material(nodes[index].properties);
+        if (auto put = builder.put({x, y, size_z - 1 - z}, nodes[index].colour); !put) return put.error();
+      }
+    }
+  }
+  return builder.take("luanti");
+}
+
+}  // namespace quoin::models

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include <quoin/core/result.h>
+#include <quoin/io/loaded_scene.h>
+
+namespace quoin::models {
+
+/// What a file says of a model besides its voxels.
+struct Model {
+  std::string name{};
+  DVec3 pivot{0.0};         ///< voxels: SceneGrid::pivot
+  DVec3 position{0.0};      ///< of the pivot, in the world
+  double voxel_size = 1.0;  ///< world units
+  IBox canvas{};
+  bool visible = true;
+};
+
+/// Collects coloured voxels, in any number of models, and makes a scene of them: a type for each colour and material.
+/// Memory: 20 bytes a voxel, or a run of them.
+class ModelBuilder {
+ public:
+  /// Voxels that follow are of this model. Requires: sizes are finite and positive.
+  void begin(Model model);
+  /// What the voxels that follow are of besides their colour; a name and a colour say nothing.
+  void use_material(VoxelProperties material);
+  /// `count` voxels from `voxel` upwards. Alpha below 255 makes a type transparent, 0 is no voxel.
+  /// Errors: LimitExceeded beyond 2^26 of such calls.
+  [[nodiscard]] Status put(IVec3 voxel, Rgba8 colour, int count = 1);
+  void warn(std::string line) { warnings_.push_back(std::move(line)); }
+
+  /// The scene. Where there are more colours than types there can be, their last bits are rounded, with a warning.
+  [[nodiscard]] Result<LoadedScene> take(std::string format);
+
+ private:
+  struct Run {
+    IVec3 voxel;
+    std::uint32_t look;
+    std::int32_t count;
+  };
+  struct Part {
+    Model model;
+    std::size_t first = 0;  // run
+  };
+  struct Look {
+    Rgba8 colour;
+    std::uint32_t material;
+  };
+  [[nodiscard]] Result<std::vector<VoxelType>> types_of_looks(VoxelRegistry& types);
+
+  std::vector<Part> parts_;
+  std::vector<Run> runs_;
+  std::vector<Look> looks_;
+  std::unordered_map<std::uint64_t, std::uint32_t> numbers_;  // of looks, by colour and material
+  std::vector<VoxelProperties> materials_{VoxelProperties{}};
+  std::uint32_t material_ = 0;
+  std::vector<std::string> warnings_;
+};
+
+}  // namespace quoin::models

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include <quoin/core/result.h>
+#include <quoin/io/loaded_scene.h>
+
+// Formats of voxel models, and of maps that are one. docs/formats/models.md says what of each is read.
+//
+// Recognition is by content: `is_...` take what a file begins with (64 KiB suffice), or the whole of those that have no
+// header, where only all of it tells.
+// Errors of readers: BadFormat with the byte offset; LimitExceeded; Unsupported.
+
+namespace quoin::models {
+
+/// https://www.patrickmin.com/binvox/binvox.html. The voxels have no colours: they are grey.
+[[nodiscard]] bool is_binvox(std::span<const std::byte> beginning);
+[[nodiscard]] Result<LoadedScene> read_binvox(std::span<const std::byte> bytes);
+
+/// Cube World's models: three sizes, and three bytes a voxel, black ones empty.
+[[nodiscard]] bool is_cub(std::span<const std::byte> whole);
+[[nodiscard]] Result<LoadedScene> read_cub(std::span<const std::byte> bytes);
+
+/// Ken Silverman's: KV6 and KVX models, SLAB6's .vox, and .vxl maps, those of Ace of Spades (without a header) and of
+/// Voxlap.
+[[nodiscard]] bool is_kv6(std::span<const std::byte> beginning);
+[[nodiscard]] Result<LoadedScene> read_kv6(std::span<const std::byte> bytes);
+[[nodiscard]] bool is_kvx(std::span<const std::byte> whole);
+[[nodiscard]] Result<LoadedScene> read_kvx(std::span<const std::byte> bytes);
+[[nodiscard]] bool is_slab6(std::span<const std::byte> whole);
+[[nodiscard]] Result<LoadedScene> read_slab6(std::span<const std::byte> bytes);
+[[nodiscard]] bool is_vxl(std::span<const std::byte> whole);
+[[nodiscard]] Result<LoadedScene> read_vxl(std::span<const std::byte> bytes);
+
+/// Qubicle's .qb, .qbt and .qef.
+[[nodiscard]] bool is_qubicle(std::span<const std::byte> beginning);
+[[nodiscard]] Result<LoadedScene> read_qubicle(std::span<const std::byte> bytes);
+
+/// Goxel's .gox, versions 1 and 2.
+[[nodiscard]] bool is_goxel(std::span<const std::byte> beginning);
+[[nodiscard]] Result<LoadedScene> read_goxel(std::span<const std::byte> bytes);
+
+/// Luanti's schematics (.mts), versions 1 to 4.
+[[nodiscard]] bool is_mts(std::span<const std::byte> beginning);
+[[nodiscard]] Result<LoadedScene> read_mts(std::span<const std::byte> bytes);
+
+}  // namespace quoin::models

@@ -1,0 +1,367 @@
+// Qubicle's formats. Matrices are placed by whole voxels; of compounds what they show is read, not what they were made of.
+//
+//   .qb    matrices of colours, as they are or as runs a slice
+//   .qbt   a tree of matrices, each a zlib stream
+//   .qef   text: colours, then voxels
+
+#include <array>
+#include <charconv>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "io/byte_reader.h"
+#include "io/byte_stream.h"
+#include "io/models/model_builder.h"
+#include "io/models/models.h"
+
+namespace quoin::models {
+
+namespace {
+
+constexpr std::string_view kTree = "QB 2";
+constexpr std::string_view kExchange = "Qubicle Exchange Format";
+constexpr std::int32_t kMaxPlace = 1 << 26;
+constexpr std::uint32_t kMaxEdge = 1 << 14;
+
+Error fault(std::string what, std::size_t at) {
+  return make_error(ErrorCode::BadFormat, std::move(what), {}, at);
+}
+
+std::string_view text_of(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+Rgba8 colour_of(std::uint32_t rgba, bool is_bgra) {
+  const auto low = static_cast<std::uint8_t>(rgba);
+  const auto high = static_cast<std::uint8_t>(rgba >> 16);
+  return {is_bgra ? high : low, static_cast<std::uint8_t>(rgba >> 8), is_bgra ? low : high,
+          static_cast<std::uint8_t>(rgba >> 24)};
+}
+
+/// A matrix's place and size.
+struct Matrix {
+  std::string name;
+  IVec3 size{0};
+  IVec3 place{0};
+};
+
+std::optional<IVec3> read_size(ByteReader& reader) {
+  IVec3 size{0};
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::uint32_t edge = reader.u32();
+    if (edge > kMaxEdge) return std::nullopt;
+    size[axis] = static_cast<int>(edge);
+  }
+  return size;
+}
+
+std::optional<IVec3> read_place(ByteReader& reader) {
+  IVec3 place{0};
+  for (int axis = 0; axis < 3; ++axis) {
+    place[axis] = reader.i32();
+    if (place[axis] < -kMaxPlace || place[axis] > kMaxPlace) return std::nullopt;
+  }
+  return place;
+}
+
+class QbReader {
+ public:
+  explicit QbReader(std::span<const std::byte> bytes) : bytes_(bytes), reader_(bytes) {}
+
+  Result<LoadedScene> read() {
+    static_cast<void>(reader_.u32());  // version
+    is_bgra_ = reader_.u32() == 1;
+    is_mirrored_ = reader_.u32() == 0;  // left-handed
+    is_packed_ = reader_.u32() != 0;
+    has_masks_ = reader_.u32() != 0;
+    const std::uint32_t matrices = reader_.u32();
+    for (std::uint32_t i = 0; i < matrices; ++i) {
+      if (auto done = read_matrix(); !done) return done.error();
+    }
+    return builder_.take("qubicle");
+  }
+
+ private:
+  Status read_matrix();
+  Status read_run(const Matrix& matrix, int z, std::uint64_t& at, std::uint64_t count, std::uint32_t data);
+  Status read_slice(const Matrix& matrix, int z);
+  [[nodiscard]] Error too_short() const { return fault("it ends before its matrices do", bytes_.size()); }
+
+  std::span<const std::byte> bytes_;
+  ByteReader reader_;
+  ModelBuilder builder_;
+  bool is_bgra_ = false;
+  bool is_mirrored_ = false;
+  bool is_packed_ = false;
+  bool has_masks_ = false;
+};
+
+Status QbReader::read_matrix() {
+  const std::size_t at = reader_.position();
+  Matrix matrix;
+  matrix.name = reader_.text(reader_.u8());
+  const auto size = read_size(reader_);
+  const auto place = read_place(reader_);
+  if (reader_.failed()) return too_short();
+  if (!size || !place) return fault("a matrix whose size or place is out of range", at);
+  matrix.size = *size;
+  matrix.place = *place;
+  Model model;
+  model.name = matrix.name;
+  IVec3 corner = matrix.place;
+  if (is_mirrored_) corner.z = -matrix.place.z - matrix.size.z;
+  model.position = DVec3(corner);
+  model.canvas = {IVec3(0), matrix.size};
+  builder_.begin(std::move(model));
+  for (int z = 0; z < matrix.size.z; ++z) {
+    if (auto done = read_slice(matrix, z); !done) return done;
+  }
+  return {};
+}
+
+Status QbReader::read_slice(const Matrix& matrix, int z) {
+  constexpr std::uint32_t kRun = 2;
+  constexpr std::uint32_t kNextSlice = 6;
+  const std::uint64_t area = static_cast<std::uint64_t>(matrix.size.x) * static_cast<std::uint64_t>(matrix.size.y);
+  std::uint64_t at = 0;
+  if (!is_packed_) {
+    while (at < area) {
+      if (auto done = read_run(matrix, z, at, 1, reader_.u32()); !done) return done;
+    }
+    return {};
+  }
+  for (;;) {
+    const std::uint32_t data = reader_.u32();
+    if (reader_.failed()) return too_short();
+    if (data == kNextSlice) return {};
+    std::uint64_t count = 1;
+    std::uint32_t colour = data;
+    if (data == kRun) {
+      count = reader_.u32();
+      colour = reader_.u32();
+    }
+    if (count > area - at) return fault("a slice of more voxels than its matrix has", reader_.position());
+    if (auto done = read_run(matrix, z, at, count, colour); !done) return done;
+  }
+}
+
+Status QbReader::read_run(const Matrix& matrix, int z, std::uint64_t& at, std::uint64_t count, std::uint32_t data) {
+  if (reader_.failed()) return too_short();
+  Rgba8 colour = colour_of(data, is_bgra_);
+  if (has_masks_ && colour.a != 0) colour.a = 255;
+  const auto width = static_cast<std::uint64_t>(matrix.size.x);
+  const std::uint64_t end = at + count;
+  if (colour.a == 0) {
+    at = end;
+    return {};
+  }
+  const int placed_z = is_mirrored_ ? matrix.size.z - 1 - z : z;
+  for (; at < end; ++at) {
+    const IVec3 voxel{static_cast<int>(at % width), static_cast<int>(at / width), placed_z};
+    if (auto put = builder_.put(voxel, colour); !put) return put;
+  }
+  return {};
+}
+
+class QbtReader {
+ public:
+  explicit QbtReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
+
+  Result<LoadedScene> read() {
+    ByteReader reader(bytes_);
+    static_cast<void>(reader.take(4 + 2 + 12));  // magic, version, scale
+    // Before version 1.1 colours stood in voxels alone.
+    std::size_t at = reader.position();
+    std::string_view part = reader.text(8);
+    if (part == "COLORMAP") {
+      const std::size_t colours = reader.count(4);
+      for (std::size_t i = 0; i < colours; ++i) colours_.push_back(colour_of(reader.u32(), false));
+      at = reader.position();
+      part = reader.text(8);
+    }
+    if (part != "DATATREE") return fault("it has no tree", at);
+    if (auto done = read_node(reader, 0); !done) return done.error();
+    return builder_.take("qubicle");
+  }
+
+ private:
+  Status read_node(ByteReader& reader, int depth);
+  Status read_matrix(ByteReader& reader);
+  Status put_voxels(const Matrix& matrix, std::span<const std::byte> packed, std::size_t at);
+
+  std::span<const std::byte> bytes_;
+  std::vector<Rgba8> colours_;
+  ModelBuilder builder_;
+};
+
+Status QbtReader::read_node(ByteReader& reader, int depth) {
+  enum : std::uint32_t { kIsMatrix = 0, kIsModel = 1, kIsCompound = 2 };
+  constexpr int kDeepest = 64;
+  const std::size_t at = reader.position();
+  const std::uint32_t kind = reader.u32();
+  const std::size_t size = reader.u32();
+  if (reader.failed() || size > reader.remaining()) return fault("a node that ends behind its file", at);
+  if (depth > kDeepest) return make_error(ErrorCode::LimitExceeded, "nodes within 64 others", {}, at);
+  ByteReader node(bytes_, reader.position(), reader.position() + size);
+  static_cast<void>(reader.take(size));
+  if (kind == kIsMatrix || kind == kIsCompound) return read_matrix(node);
+  if (kind != kIsModel) {
+    builder_.warn("left out: a node of the unknown kind " + std::to_string(kind));
+    return {};
+  }
+  const std::size_t children = node.count(8);
+  if (node.failed()) return fault("a node of more nodes than there is room for", at);
+  for (std::size_t i = 0; i < children; ++i) {
+    if (auto done = read_node(node, depth + 1); !done) return done;
+  }
+  return {};
+}
+
+Status QbtReader::read_matrix(ByteReader& reader) {
+  const std::size_t at = reader.position();
+  Matrix matrix;
+  matrix.name = reader.text(reader.u32());
+  const auto place = read_place(reader);
+  static_cast<void>(reader.take(12));  // scale
+  const std::array<float, 3> pivot = {reader.f32(), reader.f32(), reader.f32()};
+  const auto size = read_size(reader);
+  const std::size_t packed_at = reader.position() + 4;
+  const auto packed = reader.take(reader.u32());
+  if (reader.failed()) return fault("a matrix that ends too early", at);
+  if (!size || !place) return fault("a matrix whose size or place is out of range", at);
+  matrix.size = *size;
+  matrix.place = *place;
+  Model model;
+  model.name = matrix.name;
+  model.canvas = {IVec3(0), matrix.size};
+  const DVec3 turned(pivot[0], pivot[1], pivot[2]);
+  if (is_finite(turned) && glm::length(turned) < 1e6) model.pivot = turned;
+  model.position = DVec3(matrix.place) + model.pivot;
+  builder_.begin(std::move(model));
+  return put_voxels(matrix, packed, packed_at);
+}
+
+// x changes slowest, then z, then y. The last byte says which faces are seen: none of what is empty.
+Status QbtReader::put_voxels(const Matrix& matrix, std::span<const std::byte> packed, std::size_t at) {
+  ByteStream stream(packed, 0, Compression::Zlib);
+  std::vector<std::byte> column(static_cast<std::size_t>(matrix.size.y) * 4);
+  for (int x = 0; x < matrix.size.x; ++x) {
+    for (int z = 0; z < matrix.size.z; ++z) {
+      const auto read = stream.read(column);
+      if (!read)
+        return make_error(read.error().code, read.error().message, {}, at + read.error().byte_offset.value_or(0));
+      if (*read != column.size()) return fault("a matrix of fewer voxels than its size says", at);
+      ByteReader voxels(column);
+      for (int y = 0; y < matrix.size.y; ++y) {
+        Rgba8 colour = colour_of(voxels.u32(), false);
+        if (colour.a == 0) continue;
+        if (!colours_.empty()) {
+          if (colour.r >= colours_.size()) return fault("a colour beyond its map", at);
+          colour = colours_[colour.r];
+        }
+        colour.a = 255;
+        if (auto put = builder_.put({x, y, z}, colour); !put) return put;
+      }
+    }
+  }
+  return {};
+}
+
+/// Numbers of a text, line by line.
+class NumberReader {
+ public:
+  NumberReader(std::string_view text, std::size_t begin) : text_(text), at_(begin) {}
+  [[nodiscard]] std::size_t position() const { return at_; }
+  [[nodiscard]] bool is_at_end() {
+    while (at_ < text_.size() && is_space(text_[at_])) ++at_;
+    return at_ >= text_.size();
+  }
+  template <class T>
+  [[nodiscard]] bool next(T& number) {
+    if (is_at_end()) return false;
+    const auto [end, error] = std::from_chars(text_.data() + at_, text_.data() + text_.size(), number);
+    if (error != std::errc()) return false;
+    at_ = static_cast<std::size_t>(end - text_.data());
+    return true;
+  }
+
+ private:
+  static bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
+  std::string_view text_;
+  std::size_t at_;
+};
+
+Result<LoadedScene> read_qef(std::span<const std::byte> bytes) {
+  const std::string_view text = text_of(bytes);
+  std::size_t at = 0;
+  for (int line = 0; line < 3; ++line) at = std::min(text.find('\n', at), text.size() - 1) + 1;
+  NumberReader numbers(text, at);
+  IVec3 size{0};
+  std::uint32_t count = 0;
+  const bool is_sound = numbers.next(size.x) && numbers.next(size.y) && numbers.next(size.z) && numbers.next(count);
+  constexpr std::uint32_t kMost = 1 << 20;
+  const auto is_edge = [](int edge) { return edge > 0 && edge <= static_cast<int>(kMaxEdge); };
+  if (!is_sound || !is_edge(size.x) || !is_edge(size.y) || !is_edge(size.z) || count > kMost) {
+    return fault("no size and number of colours within their ranges", numbers.position());
+  }
+  std::vector<Rgba8> colours;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    std::array<float, 3> rgb{};
+    for (float& channel : rgb) {
+      if (!numbers.next(channel)) return fault("a colour that is no number", numbers.position());
+    }
+    const auto byte = [](float channel) {
+      return static_cast<std::uint8_t>(std::lround(std::clamp(channel, 0.0F, 1.0F) * 255.0F));
+    };
+    colours.push_back({byte(rgb[0]), byte(rgb[1]), byte(rgb[2]), 255});
+  }
+  ModelBuilder builder;
+  Model model;
+  model.canvas = {IVec3(0), size};
+  builder.begin(std::move(model));
+  while (!numbers.is_at_end()) {
+    const std::size_t place = numbers.position();
+    IVec3 voxel{0};
+    std::uint32_t colour = 0;
+    std::uint32_t faces = 0;
+    const bool is_read = numbers.next(voxel.x) && numbers.next(voxel.y) && numbers.next(voxel.z) &&
+                         numbers.next(colour) && numbers.next(faces);
+    if (!is_read || colour >= colours.size() || !IBox{IVec3(0), size}.contains(voxel)) {
+      return fault("a voxel outside of its model, or of its colours", place);
+    }
+    if (auto put = builder.put(voxel, colours[colour]); !put) return put.error();
+  }
+  return builder.take("qubicle");
+}
+
+bool is_qb(std::span<const std::byte> beginning) {
+  ByteReader reader(beginning);
+  const std::uint32_t version = reader.u32();
+  const bool is_version = (version & 0xFFU) <= 3 && (version >> 8 & 0xFFU) <= 3 && (version >> 24) == 0 && version != 0;
+  for (int flag = 0; flag < 4; ++flag) {
+    if (reader.u32() > 1) return false;
+  }
+  const std::uint32_t matrices = reader.u32();
+  return is_version && matrices > 0 && matrices < (1U << 20) && !reader.failed() && reader.remaining() > 0;
+}
+
+}  // namespace
+
+bool is_qubicle(std::span<const std::byte> beginning) {
+  const std::string_view text = text_of(beginning);
+  return text.starts_with(kTree) || text.starts_with(kExchange) || text.starts_with("QBCL") || is_qb(beginning);
+}
+
+Result<LoadedScene> read_qubicle(std::span<const std::byte> bytes) {
+  const std::string_view text = text_of(bytes);
+  if (text.starts_with("QBCL")) {
+    return make_error(ErrorCode::Unsupported, "a project of Qubicle's (.qbcl): export it as .qb, .qbt or .qef", {}, 0);
+  }
+  if (text.starts_with(kExchange)) return read_qef(bytes);
+  if (text.starts_with(kTree)) return QbtReader(bytes).read();
+  return QbReader(bytes).read();
+}
+
+}  // namespace quoin::models
