@@ -38,8 +38,8 @@ struct QueryFilter {
   std::span<const InstanceHandle> ignored = {};    ///< passed through: a body that moves ignores itself
   std::uint32_t categories = ~std::uint32_t{0};    ///< instances without any of these bits are passed through
   std::optional<QueryTypes> types = std::nullopt;  ///< nothing: All for rays, Colliding for shapes
-  /// Nothing: Passed for rays, whose hits say what they passed; Met for shapes, so that nobody falls through ground that
-  /// has not come yet.
+  /// Nothing: Passed for rays, whose hits say what they passed; Met for shapes, so that nobody falls through ground
+  /// that has not come yet.
   std::optional<UnloadedChunks> unloaded = std::nullopt;
 };
 
@@ -58,8 +58,8 @@ struct SceneHit {
   DVec3 normal{0.0};  ///< in the world: unit, out of what was hit; 0 where a field has no gradient
   /// What was met is a chunk that is not loaded (UnloadedChunks::Met): `voxel` is its first one, `type` air.
   bool is_unloaded = false;
-  /// Where the ray came to what is not loaded, before `t`: it may be stopped from there on by what is not known. Infinite
-  /// where it did not.
+  /// Where the ray came to what is not loaded, before `t`: it may be stopped from there on by what is not known.
+  /// Infinite where it did not.
   double unloaded_t = std::numeric_limits<double>::infinity();
 };
 

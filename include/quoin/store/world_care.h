@@ -35,7 +35,7 @@ struct WorldSummary {
   std::map<std::uint32_t, GridSummary> grids;
 };
 
-/// Errors: as WorldStore::open. Cost: O(chunks), of which only the keys are read; of a world of version 1 all of the file.
+/// Errors: as WorldStore::open. Cost: O(chunks), of which only the keys are read; of version 1 all of the file.
 [[nodiscard]] Result<WorldSummary> summarize_world(const std::filesystem::path& path, const Progress& progress = {});
 
 /// Something of a world file that is not as it was written.
@@ -82,8 +82,8 @@ struct WorldCopy {
 };
 
 /// Writes all that one commit left in a world as a new one of the present version, compact, in place of what is there;
-/// it appears whole or not at all. Each chunk is read and checked, and written as it is; what games keep, thumbnails and
-/// what this version does not know go along. Others may write `from` meanwhile.
+/// it appears whole or not at all. Each chunk is read and checked, and written as it is; what games keep, thumbnails
+/// and what this version does not know go along. Others may write `from` meanwhile.
 /// Memory: a chunk, whatever the world.
 /// Errors: CannotRead; CannotWrite, also where another program writes the world that is there; Cancelled; BadFormat
 ///         where parts besides chunks are damaged, which repair_world is for.

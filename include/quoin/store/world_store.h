@@ -57,7 +57,7 @@ class WorldChanges {
   /// What a game keeps beside the world: an inventory, the time of day. Any bytes under any name, up to 64 MiB.
   void put_value(std::string name, std::vector<std::byte> bytes);
   void remove_value(std::string name);
-  /// What shows the world in lists: a PNG, up to 16 MiB. Whoever saves draws it, when it likes; it stays until the next.
+  /// What shows the world in lists: a PNG, up to 16 MiB. Whoever saves draws it, at any time; it stays until the next.
   void put_thumbnail(std::vector<std::byte> png);
   void remove_thumbnail();
 

@@ -35,8 +35,8 @@ inline constexpr int kRegionBits = 3 * kRegionShift;
 
 /// Makes the tables of an empty database.
 [[nodiscard]] Status create_schema(Connection& database);
-/// Whether they are there, in a version that this program reads: from 1 on; `migrate` (world/migration.h) takes earlier ones
-/// to the present one before they are written.
+/// Whether they are there, in a version that this program reads: from 1 on; `migrate` (world/migration.h) takes earlier
+/// ones to the present one before they are written.
 /// Errors: BadFormat (another program's database), Unsupported (a later version).
 [[nodiscard]] Status check_schema(Connection& database);
 

@@ -23,8 +23,8 @@ struct MigrationStep {
 [[nodiscard]] Status put_version(Connection& database, int version);
 
 /// Takes a world to the version after the last of the steps, all of them in one transaction: after a crash, and where
-/// one of them fails, it is as it was. Where rows change, a copy of the world is kept beside it first, as NAME~ or, where
-/// there is such a file, under the next such name that is free. Nothing is done to a world of that version.
+/// one of them fails, it is as it was. Where rows change, a copy of the world is kept beside it first, as NAME~ or,
+/// where there is such a file, under the next such name that is free. Nothing is done to a world of that version.
 ///
 /// Requires: `database` is open for writing, by whoever holds the lock of `path`; a commit lasts once it returns.
 /// Errors: CannotWrite (a full disk ...), BadFormat.
