@@ -10,6 +10,9 @@ namespace {
 constexpr double kGuessedChunkBytes = 24.0 * 1024.0;
 constexpr std::size_t kGuessBelow = 64;
 constexpr std::size_t kLeastChunks = 8;
+// From one plan to the next; and not while much is missing, of which nobody knows what it takes.
+constexpr double kGrows = 1.1;
+constexpr double kMostMissing = 0.25;
 // What is made of chunks, before any of it was seen: meshes of smooth ground take more, of blocks less.
 constexpr double kGuessedRatio = 1.5;
 // Seconds in which what turned out counts for two thirds of what was believed: less is believed sooner than that the
@@ -67,8 +70,8 @@ std::int64_t StreamBudget::room(std::size_t begun) const {
 }
 
 // Near chunks take more than far ones: where the budget cuts what is wanted it is found step by step, down at once, up
-// when all that was wanted is there.
-std::size_t StreamBudget::chunks(std::size_t planned, bool is_cut, bool may_grow) const {
+// when nearly all that was wanted is there.
+std::size_t StreamBudget::chunks(std::size_t planned, bool is_cut, double missing) const {
   const double total = expected();
   const auto at_least = [](double count) { return std::max(static_cast<std::size_t>(count), kLeastChunks); };
   if (chunks_ < kGuessBelow && !is_cut) {
@@ -80,7 +83,9 @@ std::size_t StreamBudget::chunks(std::size_t planned, bool is_cut, bool may_grow
   if (!is_cut) return at_least(fit);
   const auto were = static_cast<double>(planned);
   if (ratio < 1.0) return at_least(std::min(fit, were));
-  return at_least(may_grow ? were * std::min(ratio, 1.1) : were);
+  // As if what is missing were there; who flies never has all.
+  const double ratio_of_all = missing < kMostMissing ? ratio * (1.0 - missing) : 1.0;
+  return at_least(were * std::clamp(ratio_of_all, 1.0, kGrows));
 }
 
 }  // namespace quoin::stream

@@ -43,8 +43,8 @@ class StreamBudget {
   /// Bytes of a chunk that is not known yet.
   [[nodiscard]] std::int64_t guess() const;
   /// How many chunks the budget suffices for. `planned`: as many were wanted last; `is_cut`: and more were asked for;
-  /// `may_grow`: all of them are there.
-  [[nodiscard]] std::size_t chunks(std::size_t planned, bool is_cut, bool may_grow) const;
+  /// `missing`: the share of them that is not there yet.
+  [[nodiscard]] std::size_t chunks(std::size_t planned, bool is_cut, double missing) const;
 
  private:
   [[nodiscard]] double used() const;

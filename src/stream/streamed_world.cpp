@@ -25,6 +25,7 @@
 #include "core/worker_count.h"
 #include "stream/chunk_streamer.h"
 #include "stream/edit_fit.h"
+#include "stream/placements.h"
 #include "stream/stream_budget.h"
 #include "stream/terrain_text.h"
 
@@ -39,12 +40,8 @@ using What = ChunkStreamer::Event::What;
 
 // Chunks that came and were not put in place yet.
 constexpr std::size_t kMaxArrivals = 128;
-// Of one grid.
-constexpr std::size_t kMaxEyes = 64;
 // Chunks that edits wait for, in one plan.
 constexpr std::size_t kMaxAsked = 1024;
-// World units: what is farther is of no grid.
-constexpr double kMaxRadius = 1e12;
 // Of a chunk that is loaded, besides its voxels and densities: marks, sizes and states, bytes.
 constexpr std::size_t kChunkBytes = 256;
 // After so many chunks that came or went it is time to save: what saves reads of the journals is so never much at once.
@@ -93,7 +90,7 @@ struct StreamedWorld::Impl {
   struct Streamed {
     GridHandle handle;
     std::uint32_t number = 0;
-    std::vector<InstanceHandle> instances;
+    Placements placements;
     ChangeCursor voxels, data, densities;
     std::unordered_map<IVec3, std::size_t, CoordinateHash> sizes;  // of what is loaded, bytes
     std::unordered_set<IVec3, CoordinateHash> kept;  // edited, where the world may not be written: they stay
@@ -115,6 +112,10 @@ struct StreamedWorld::Impl {
   Streamed* streamed(std::uint32_t number) {
     const auto found = grids.find(number);
     return found == grids.end() ? nullptr : &found->second;
+  }
+  [[nodiscard]] const std::uint32_t* number_of(GridHandle handle) const {
+    const auto found = numbers.find(handle);
+    return found == numbers.end() ? nullptr : &found->second;
   }
   // Null where the game has removed it.
   SceneGrid* content_of_grid(const Streamed& grid) {
@@ -152,6 +153,8 @@ struct StreamedWorld::Impl {
   bool is_new = false;
   StreamBudget budget;
   std::map<std::uint32_t, Streamed> grids;
+  std::map<GridHandle, std::uint32_t> numbers;  // of `grids`
+  std::map<InstanceHandle, std::uint32_t> grid_of_instance;
   ChangeCursor followed_scene;
 
   Eyes eyes;          // now
@@ -206,6 +209,7 @@ StreamedWorld::Impl::Streamed& StreamedWorld::Impl::add_streamed(GridHandle hand
   Streamed& added = grids[number];
   added.handle = handle;
   added.number = number;
+  numbers[handle] = number;
   const SceneGrid& content = scene().grids()[handle];
   added.voxels = added.data = content.grid.cursor();
   added.densities = content.field.cursor();
@@ -215,15 +219,25 @@ StreamedWorld::Impl::Streamed& StreamedWorld::Impl::add_streamed(GridHandle hand
 
 void StreamedWorld::Impl::follow_instances() {
   const SceneChanges changes = scene().changes_since(followed_scene);
-  if (!changes.all && changes.instances.empty() && changes.groups.empty() && changes.layers.empty()) return;
-  for (auto& [number, grid] : grids) grid.instances.clear();
-  std::map<GridHandle, Streamed*> by_handle;
-  for (auto& [number, grid] : grids) by_handle[grid.handle] = &grid;
-  for (const InstanceHandle handle : scene().instances().handles()) {
-    const Instance& instance = scene().instances()[handle];
-    const auto found = by_handle.find(instance.grid);
-    if (found != by_handle.end() && has_place(instance)) found->second->instances.push_back(handle);
+  const auto follow = [&](InstanceHandle handle) {
+    const Instance* const instance = scene().instances().find(handle);
+    const auto was = grid_of_instance.find(handle);
+    const auto* const number = instance == nullptr || !has_place(*instance) ? nullptr : number_of(instance->grid);
+    if (was != grid_of_instance.end() && (number == nullptr || was->second != *number)) {
+      if (Streamed* const grid = streamed(was->second)) grid->placements.remove(handle);
+      grid_of_instance.erase(was);
+    }
+    if (number == nullptr) return;
+    grid_of_instance[handle] = *number;
+    streamed(*number)->placements.put(handle);
+  };
+  if (changes.all) {
+    for (auto& [number, grid] : grids) grid.placements.clear();
+    grid_of_instance.clear();
+    for (const InstanceHandle handle : scene().instances().handles()) follow(handle);
+    return;
   }
+  for (const InstanceHandle handle : changes.instances) follow(handle);
 }
 
 Eyes StreamedWorld::Impl::eyes_of(std::span<const Viewer> viewers) {
@@ -232,29 +246,8 @@ Eyes StreamedWorld::Impl::eyes_of(std::span<const Viewer> viewers) {
   for (auto& [number, grid] : grids) {
     const SceneGrid* const content = scene().grids().find(grid.handle);
     if (content == nullptr) continue;
-    for (const InstanceHandle handle : grid.instances) {
-      const Instance* const instance = scene().instances().find(handle);
-      if (instance == nullptr) continue;
-      for (const Viewer& viewer : viewers) {
-        if (!is_finite(viewer.position) || !(viewer.radius > 0.0)) continue;
-        Eye eye;
-        eye.position = grid_from_world(*instance, *content, viewer.position);
-        eye.radius = std::min(viewer.radius, kMaxRadius) / instance->voxel_size;
-        eye.voxel_size = instance->voxel_size;
-        const double length = glm::length(viewer.direction);
-        if (std::isfinite(length) && length > 0.0) {
-          eye.direction = glm::normalize(grid_from_world_direction(*instance, viewer.direction / length));
-        }
-        if (is_finite(eye.position) && std::isfinite(eye.radius)) found[number].push_back(eye);
-      }
-    }
-    // Of a grid that is placed often, what the nearest ones need is what the others need too.
-    const auto eyes_of_grid = found.find(number);
-    if (eyes_of_grid == found.end() || eyes_of_grid->second.size() <= kMaxEyes) continue;
-    std::ranges::stable_sort(eyes_of_grid->second, {}, [&](const Eye& eye) {
-      return glm::length(eye.position - content->pivot) * eye.voxel_size;
-    });
-    eyes_of_grid->second.resize(kMaxEyes);
+    std::vector<Eye> of_grid = grid.placements.eyes(scene(), *content, viewers);
+    if (!of_grid.empty()) found.emplace(number, std::move(of_grid));
   }
   return found;
 }
@@ -265,7 +258,8 @@ bool StreamedWorld::Impl::is_cut() const {
 
 std::size_t StreamedWorld::Impl::chunks_of_budget() const {
   const bool has_all = box.missing == 0 && box.begun == 0 && arrivals.empty();
-  const std::size_t fit = budget.chunks(planned_chunks, is_cut(), has_all);
+  const double missing = static_cast<double>(box.missing) / static_cast<double>(std::max<std::size_t>(box.wanted, 1));
+  const std::size_t fit = budget.chunks(planned_chunks, is_cut(), missing);
   // What may not be taken away, edited and not to be saved, is counted too: then less is wanted, until that fits.
   const bool is_stuck = !has_all && !has_chunks_to_move() && budget.room(0) <= 0 && seconds_since(planned) > kReplan;
   return is_stuck ? std::min(fit, planned_chunks * 9 / 10) : fit;
@@ -638,9 +632,9 @@ Result<WorldExtent> StreamedWorld::extent() const {
     const auto chunks = impl_->store.chunks(number, 0);
     if (!chunks) return chunks.error();
     found.stored_chunks += chunks->size();
-    extend(found.stored, scene(), grid.instances, box_of(*chunks));
+    extend(found.stored, scene(), grid.placements.instances(), box_of(*chunks));
     const auto generator = impl_->streamer.generator_of(number);
-    if (generator != nullptr) extend(found.generated, scene(), grid.instances, generator->chunks());
+    if (generator != nullptr) extend(found.generated, scene(), grid.placements.instances(), generator->chunks());
   }
   return found;
 }
@@ -711,6 +705,7 @@ bool StreamedWorld::has_chunks_to_move() const {
 
 Status StreamedWorld::load_all(std::span<const Viewer> viewers) {
   constexpr double kAsLongAsItTakes = std::numeric_limits<double>::infinity();
+  for (auto& [number, grid] : impl_->grids) grid.placements.look_at_all();
   for (;;) {
     if (auto done = impl_->update(viewers, kAsLongAsItTakes); !done) return done;
     if (!impl_->has_moved && impl_->is_quiet()) return {};

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <map>
+#include <span>
+#include <vector>
+
+#include <quoin/scene/scene.h>
+#include <quoin/stream/streamed_world.h>
+
+#include "stream/stream_plan.h"
+
+namespace quoin::stream {
+
+/// Where one grid of a scene is placed, the nearest ones first: what these need the others need too.
+///
+///   [ the nearest kNearest, looked at each time | the others, some of which are looked at each time ]
+///
+/// So what a look costs does not grow with the instances, and of thousands that all come nearer at once the right ones
+/// are found a little later. Where there are no more than kNearest it is exact.
+class Placements {
+ public:
+  static constexpr std::size_t kNearest = 64;
+
+  void clear();
+  /// An instance that is new or elsewhere, or of this grid no more.
+  void put(InstanceHandle instance);
+  void remove(InstanceHandle instance);
+  [[nodiscard]] bool contains(InstanceHandle instance) const { return index_.contains(instance); }
+  [[nodiscard]] std::vector<InstanceHandle> instances() const;
+  /// Viewers in the grid's space, at most kNearest, nearest first where there are so many.
+  [[nodiscard]] std::vector<Eye> eyes(const Scene& scene, const SceneGrid& grid, std::span<const Viewer> viewers);
+  /// The next `eyes` looks at all instances.
+  void look_at_all() { looked_at_ = false; }
+
+ private:
+  struct Placed {
+    InstanceHandle instance;
+    double distance = std::numeric_limits<double>::infinity();  // of the nearest viewer, as of the last look
+  };
+
+  void swap(std::size_t a, std::size_t b);
+  void look(const Scene& scene, const SceneGrid& grid, std::span<const Viewer> viewers);
+
+  std::vector<Placed> placed_;
+  std::map<InstanceHandle, std::size_t> index_;
+  std::vector<InstanceHandle> moved_;  // since the last look, of those beyond the nearest
+  std::size_t next_ = kNearest;
+  bool looked_at_ = false;
+};
+
+}  // namespace quoin::stream
