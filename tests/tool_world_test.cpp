@@ -153,7 +153,11 @@ TEST_F(ToolWorld, WhatDoesNotFitIntoMemoryIsToldBeforeItIsTried) {
     auto world = WorldStore::create(folder_.file("large.quoin"));
     WorldChanges changes;
     VoxelRegistry types;
-    for (int i = 0; i < 255; ++i) (void)types.add({.name = "t" + std::to_string(i)});
+    for (int i = 0; i < 255; ++i) {
+      VoxelProperties type;
+      type.name = "t" + std::to_string(i);
+      (void)types.add(std::move(type));
+    }
     changes.put_types(types);
     changes.put_grid(0, {});
     Chunk chunk(kAir);
