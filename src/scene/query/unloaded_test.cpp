@@ -21,7 +21,9 @@ struct PartialScene {
   InstanceHandle instance;
 
   explicit PartialScene(const DQuat& rotation = DQuat(1, 0, 0, 0), double voxel_size = 1.0) {
-    (void)scene.types.add({.name = "stone"});
+    VoxelProperties stone;
+    stone.name = "stone";
+    (void)scene.types.add(std::move(stone));
     SceneGrid content;
     content.grid.make_partial();
     grid = scene.add_grid(std::move(content));

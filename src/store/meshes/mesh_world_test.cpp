@@ -130,7 +130,9 @@ TEST(WorldMeshes, DensitiesAreMeshedAsAWhole) {
   Scene scene = landscape();
   SceneGrid smooth;
   smooth.field.add_sphere({5.0, 5.0, 5.0}, 20.0, 1);
-  scene.add_instance({.grid = scene.add_grid(std::move(smooth))});
+  Instance placed;
+  placed.grid = scene.add_grid(std::move(smooth));
+  scene.add_instance(placed);
   ASSERT_TRUE(write_world(scene, path));
   WorldMeshOptions options;
   options.folder = folder.path();
