@@ -21,8 +21,8 @@
 
 namespace quoin::viewer {
 
-/// A scene under edit, where it came from, and what can be undone. Of a world on disk it is a window: chunks come and go,
-/// and edits are saved as they are made.
+/// A scene under edit, where it came from, and what can be undone. Of a world on disk it is a window: chunks come and
+/// go, and edits are saved as they are made.
 ///
 /// Edits need the scene to themselves; whoever draws it must have stopped (ViewBackend::pause).
 class Document {

@@ -113,8 +113,8 @@ class MeshJobQueue {
   [[nodiscard]] std::vector<std::unique_ptr<LiveJob>> withdraw(const std::function<bool(const LiveJob&)>& is_unwanted);
   /// Gives the jobs that wait new distances; returns these, the least first.
   [[nodiscard]] std::vector<double> measure(const std::function<double(const LiveJob&)>& distance);
-  /// Calls `renew` for the jobs that wait, to give blocky ones newer snapshots in which their chunks are the same: an old
-  /// one keeps all that was let go of since. Workers end the old ones.
+  /// Calls `renew` for the jobs that wait, to give blocky ones newer snapshots in which their chunks are the same: an
+  /// old one keeps all that was let go of since. Workers end the old ones.
   void renew(const std::function<void(LiveJob&)>& renew);
   /// The jobs that were done since the last call, in the order in which they were.
   [[nodiscard]] std::vector<std::unique_ptr<LiveJob>> collect();

@@ -1,4 +1,5 @@
-// Qubicle's formats. Matrices are placed by whole voxels; of compounds what they show is read, not what they were made of.
+// Qubicle's formats. Matrices are placed by whole voxels; of compounds what they show is read, not what they were made
+// of.
 //
 //   .qb    matrices of colours, as they are or as runs a slice
 //   .qbt   a tree of matrices, each a zlib stream
