@@ -59,7 +59,7 @@ int run_view(const ViewArguments& arguments) {
   options.screenshot = arguments.screenshot;
   options.device = arguments.device;
   options.world.memory_bytes = arguments.memory_mebibytes << 20;
-  if (arguments.distance > 0.0) options.world.distance = arguments.distance;
+  options.world.distance = arguments.distance;
   options.leave_at_once = [] {
     die_if_interrupted();
     std::fflush(nullptr);
@@ -156,8 +156,8 @@ void add_view_command(CLI::App& app, int& status) {
       ->check(CLI::Range(std::size_t{64}, std::size_t{1} << 24));
   command
       ->add_option("--distance", arguments->distance,
-                   "How far around the camera a world is loaded, world units (default 640)")
-      ->check(CLI::Range(64.0, 1e6));
+                   "How far around the camera a world is loaded, world units (default: 640 voxels)")
+      ->check(CLI::Range(1.0, 1e6));
   command->add_option("--threads", arguments->threads.count, "Threads to use (default: all)")
       ->check(CLI::Range(1U, 1024U));
   command->footer(

@@ -17,11 +17,13 @@ namespace quoin::viewer {
 namespace {
 
 constexpr double kUpdateSeconds = 0.004;
+constexpr double kUsualDistance = 640.0;
 constexpr double kFov = 1.0;
 // What a small world's chunks take at most with all that is made of them, for the guess whether it fits.
 constexpr std::size_t kBytesOfChunk = 96 * 1024;
-// World units. What a ball holds that is larger is planned slowly, and mostly air.
-constexpr double kLargestWhole = 1400.0;
+// A plan of more is slow, and mostly air, which takes some bytes, too.
+constexpr double kMostPlanned = 1 << 17;
+constexpr double kBytesOfAir = 300.0;
 constexpr double kAround = 2.0 * kChunkEdge;
 // Below the feet, voxels.
 constexpr double kGround = 8.0;
@@ -36,6 +38,17 @@ std::size_t quarter_of_memory() {
 
 DVec3 middle_of(const DBox& box) {
   return 0.5 * box.min + 0.5 * box.max;
+}
+
+double smallest_voxel(const Scene& scene) {
+  double smallest = 1.0;
+  bool is_first = true;
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    if (!has_place(instance)) continue;
+    smallest = std::exchange(is_first, false) ? instance.voxel_size : std::min(smallest, instance.voxel_size);
+  }
+  return smallest;
 }
 
 /// From above the middle of a box, into the distance.
@@ -65,16 +78,32 @@ Result<WorldWindow> WorldWindow::open(const std::filesystem::path& path, const W
   if (!opened) return opened.error();
   WorldWindow window(std::move(*opened), options, other_bytes);
   window.why_not_written_ = std::move(why_not_written);
+  if (!(options.distance > 0.0)) window.options_.distance = kUsualDistance * smallest_voxel(window.scene());
   const auto extent = window.world_.extent();
   if (!extent) return extent.error();
   window.extent_ = *extent;
   const DBox& stored = extent->stored;
   const double half = stored.empty() ? 0.0 : 0.5 * glm::length(stored.max - stored.min);
-  const bool fits = extent->stored_chunks * kBytesOfChunk <= stream.budget_bytes;
-  if (!stored.empty() && extent->generated.empty() && fits && half <= kLargestWhole) {
-    window.all_ = Viewer{middle_of(stored), DVec3(0.0), half + kAround};
-  }
+  const Viewer all{middle_of(stored), DVec3(0.0), half + kAround};
+  const double planned = window.chunks_around(all.radius);
+  const double bytes = static_cast<double>(extent->stored_chunks * kBytesOfChunk) + planned * kBytesOfAir;
+  const bool fits = planned <= kMostPlanned && bytes <= static_cast<double>(stream.budget_bytes);
+  if (!stored.empty() && extent->generated.empty() && fits) window.all_ = all;
   return window;
+}
+
+// Of all grids that are loaded by chunks, within a ball.
+double WorldWindow::chunks_around(double radius) const {
+  constexpr double kBall = 4.19;
+  double sum = 0.0;
+  for (const InstanceHandle handle : scene().instances().handles()) {
+    const Instance& instance = scene().instances()[handle];
+    const SceneGrid* const grid = scene().grids().find(instance.grid);
+    if (grid == nullptr || !grid->grid.is_partial() || !has_place(instance)) continue;
+    const double chunks = radius / (instance.voxel_size * kChunkEdge) + 1.0;
+    sum += kBall * chunks * chunks * chunks;
+  }
+  return sum;
 }
 
 Camera WorldWindow::first_camera(double aspect) const {
@@ -119,7 +148,9 @@ bool WorldWindow::is_complete() const {
   return stats_.is_complete && !has_chunks_to_move();
 }
 
+// What is wanted and does not come, since it is damaged, is waited for by nobody.
 bool WorldWindow::is_loaded_at(DVec3 point) const {
+  if (is_complete()) return true;
   const Scene& scene = world_.scene();
   return std::ranges::all_of(scene.instances().handles(), [&](InstanceHandle handle) {
     const Instance& instance = scene.instances()[handle];

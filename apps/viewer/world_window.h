@@ -15,8 +15,9 @@ namespace quoin::viewer {
 /// How a world on disk is opened.
 struct WorldOptions {
   std::size_t memory_bytes = 0;  ///< for its chunks and what is made of them; 0: a quarter of the machine's
-  double distance = 640.0;       ///< world units around the camera within which all is loaded, where memory suffices
-  bool may_write = true;         ///< what is edited, and what generators make, is saved
+  /// World units around the camera within which all is loaded, where memory suffices; 0: 640 of the smallest voxels.
+  double distance = 0.0;
+  bool may_write = true;  ///< what is edited, and what generators make, is saved
 };
 
 /// A world on disk (`.quoin`) of which what lies around the camera is in memory; a small one is there as a whole.
@@ -51,7 +52,7 @@ class WorldWindow {
   Status move(const Camera& camera);
   /// Whether all that is wanted from where the camera is is in place.
   [[nodiscard]] bool is_complete() const;
-  /// Whether the ground around a point of the world, and below it, is in memory.
+  /// Whether the ground around a point of the world, and below it, is in memory, as far as it will ever be.
   [[nodiscard]] bool is_loaded_at(DVec3 point) const;
   /// Saves all that was edited, and returns once it is on disk. Errors: as StreamedWorld::flush.
   Status flush() { return world_.flush(); }
@@ -66,7 +67,7 @@ class WorldWindow {
  private:
   WorldWindow(StreamedWorld world, const WorldOptions& options, std::shared_ptr<std::size_t> other_bytes);
   [[nodiscard]] std::vector<Viewer> viewers(const Camera& camera) const;
-  void note_stats();
+  [[nodiscard]] double chunks_around(double radius) const;
 
   StreamedWorld world_;
   WorldOptions options_;

@@ -102,6 +102,24 @@ TEST_F(WorldWindowTest, ASmallWorldIsThereAsAWholeWhereverTheCameraIs) {
   EXPECT_EQ(document->world()->first_camera(1.5).forward, direction_of(View::Iso));
 }
 
+TEST_F(WorldWindowTest, AWideWorldOfSmallVoxelsIsSeenWhereTheCameraIs) {
+  Scene scene;
+  (void)scene.types.add(VoxelProperties{}).value();
+  SceneGrid wide;
+  for (int i = 0; i < 8; ++i) wide.grid.fill_box({{4000 * i, 0, 0}, {4000 * i + 32, 32, 32}}, 1);
+  Instance instance;
+  instance.grid = scene.add_grid(std::move(wide));
+  instance.voxel_size = 0.1;
+  scene.add_instance(instance);
+  ASSERT_TRUE(save_scene(scene, path()));
+  WorldOptions options;
+  options.distance = 20.0;
+  const auto document = open(options);
+  EXPECT_FALSE(document->world()->is_whole());
+  settle(*document->world(), camera_at({0.0, 10.0, -10.0}));
+  EXPECT_GE(document->scene().voxel_count(), 32 * 32 * 32);
+}
+
 TEST_F(WorldWindowTest, EditsAreSavedWithoutBeingAsked) {
   make_small();
   {

@@ -172,6 +172,7 @@ struct StreamedWorld::Impl {
   Clock::time_point moved{};  // when a chunk came or went last
   bool is_edited = false;     // since the last save
   bool has_save_failed = false;
+  Status failed_save;                // why
   std::size_t moved_since_save = 0;  // chunks that came or went
   ChangeCursor saved_types;
   std::shared_ptr<DiskOutcome> disk = std::make_shared<DiskOutcome>();
@@ -344,6 +345,7 @@ Status StreamedWorld::Impl::save_now() {
   saved_types = scene().types.cursor();
   const auto ticket = world.saver.save(store, scene(), {}, [to = disk](const Status& outcome) { to->put(outcome); });
   has_save_failed = !ticket;
+  failed_save = ticket ? Status() : Status(ticket.error());
   if (!ticket) return ticket.error();
   is_edited = false;
   return {};
@@ -496,7 +498,7 @@ Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
   const bool is_wanted =
       (is_edited && !leaving.empty()) || moved_since_save > kMaxMoved || scene().types.has_changed_since(saved_types);
   if (is_due || (is_wanted && !has_save_failed)) outcome = save_now();
-  if (outcome) outcome = disk->last();
+  if (outcome) outcome = has_save_failed ? failed_save : disk->last();
   if (!store.is_writable()) is_edited = false;
   eyes = eyes_of(viewers);
   return outcome;

@@ -112,6 +112,9 @@ Status App::run(const std::function<bool()>& is_interrupted) {
   note_size();
   show_detail(false);
   forget_slow_mode();
+  // Whatever ends the process now does so without destructors, perhaps.
+  state_.saver.reset();
+  if (Status saved = save_world(); !saved && status_) status_ = saved;
   return status_;
 }
 
@@ -135,7 +138,7 @@ bool App::is_moving() const {
 }
 
 bool App::is_animating() const {
-  if (screen_->is_minimised()) return false;
+  if (screen_->is_minimised()) return is_streaming();
   return is_moving() || is_streaming() || state_.loader || state_.saver || state_.message ||
          ImGui::GetIO().WantTextInput;
 }
@@ -143,7 +146,7 @@ bool App::is_animating() const {
 int App::patience_milliseconds() const {
   if (frames_left_ > 0 && !screen_->is_minimised()) return 0;
   if (!is_animating()) return kPatience;
-  return is_moving() || is_streaming() ? 0 : kPatienceOfBars;
+  return (is_moving() || is_streaming()) && !screen_->is_minimised() ? 0 : kPatienceOfBars;
 }
 
 void App::wait_and_process() {

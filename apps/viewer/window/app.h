@@ -73,6 +73,9 @@ class App {
   void stream_world();
   void tell_of_world(const Status& saving);
   void frame_world();
+  /// Saves what was edited in a world on disk, and returns once that is done. What goes wrong is told.
+  Status save_world();
+  void close_document();
   [[nodiscard]] bool is_streaming() const;
   [[nodiscard]] bool has_ground() const;
 

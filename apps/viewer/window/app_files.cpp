@@ -52,6 +52,7 @@ void App::leave(Leaving leaving) {
   if (leaving_ || state_.saver) return;
   input_.editing.abandon(state_);
   leaving_ = std::move(leaving);
+  (void)save_world();  // where that fails it is asked whether to lose it
   if (!state_.open.document->is_dirty()) go_on_leaving();
 }
 
@@ -76,6 +77,8 @@ void App::load(const std::filesystem::path& path) {
     state_.loader->cancel();
     abandoned_.push_back(std::move(state_.loader));
   }
+  const Document& now = *state_.open.document;
+  if (now.world() != nullptr && is_same_file(path, now.path()) && save_world()) close_document();
   DeviceBackendOptions backend;
   backend.cpu = {options_.instances(), options_.threads, CpuBackendOptions{}.first_frame_seconds};
   backend.rays_on_device = screen_->renderer() != nullptr;

@@ -1,5 +1,7 @@
 #include "app.h"
 
+#include <cstdio>
+
 namespace quoin::viewer {
 
 // The chunks of a world on disk follow the camera. Where pictures come from another thread, chunks are moved only once
@@ -36,7 +38,32 @@ void App::tell_of_world(const Status& saving) {
   if (text != told_saving_ && !saving) state_.tell(saving.error());
   told_saving_ = text;
   const std::vector<std::string> problems = state_.open.document->world()->take_problems();
-  if (!problems.empty()) state_.message = Message{problems.front(), true};
+  if (problems.empty()) return;
+  if (!options_.screenshot.empty()) {
+    for (const std::string& problem : problems) std::fprintf(stderr, "quoin: warning: %s\n", problem.c_str());
+  }
+  const std::size_t more = problems.size() - 1;
+  state_.message = Message{problems.front() + (more > 0 ? " (and " + std::to_string(more) + " more)" : ""), true};
+}
+
+Status App::save_world() {
+  WorldWindow* const world = state_.open.document->world();
+  if (world == nullptr || !world->why_not_written().empty()) return {};
+  Status saved = world->flush();
+  tell_of_world(saved);
+  return saved;
+}
+
+// Before the file is opened again, by whom it would otherwise be held.
+void App::close_document() {
+  state_.hover.reset();
+  asked_.reset();
+  save_wanted_pictures();
+  state_.open.backend.reset();
+  state_.open = {std::make_unique<Document>(), nullptr};
+  state_.stats = {};
+  state_.picture = {};
+  screen_->forget_picture();
 }
 
 // Whether chunks are on their way, or an edit is to be saved, so that time must go on.

@@ -65,6 +65,7 @@ void FileChooser::show(Purpose purpose, const std::filesystem::path& start) {
   problem_.clear();
   asked_about_.clear();
   name_ = start.filename().string();
+  default_extension_ = can_write(start) ? start.extension().string() : "";
   std::error_code error;
   std::filesystem::path folder = std::filesystem::absolute(start, error).parent_path();
   if (error || !std::filesystem::is_directory(folder, error)) folder = std::filesystem::current_path(error);
@@ -149,9 +150,9 @@ std::optional<std::filesystem::path> FileChooser::accept() {
     problem_ = "no such file: " + path.string();
     return std::nullopt;
   }
-  if (path.extension().empty()) path += ".vox";
+  if (path.extension().empty()) path += default_extension_.empty() ? ".vox" : default_extension_;
   if (!can_write(path)) {
-    problem_ = "the name must end in .vox, .json or .glb";
+    problem_ = "the name must end in .quoin, .vox, .json or .glb";
     return std::nullopt;
   }
   if (std::filesystem::exists(path, error) && asked_about_ != path.string()) {

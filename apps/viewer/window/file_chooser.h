@@ -41,7 +41,8 @@ class FileChooser {
   std::filesystem::path folder_;
   std::string name_;
   std::string problem_;
-  std::string asked_about_;  // the file whose replacement was warned of
+  std::string default_extension_;  // of a name without one, in saving
+  std::string asked_about_;        // the file whose replacement was warned of
   std::vector<Entry> entries_;
 };
 

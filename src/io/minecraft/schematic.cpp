@@ -488,7 +488,8 @@ bool begins_nbt(std::span<const std::byte> beginning) {
   for (std::size_t i = 3; i < 3 + name; ++i) {
     if (at(i) < 0x20) return false;
   }
-  return at(3 + name) <= static_cast<unsigned>(nbt::Tag::LongArray);
+  const unsigned first = at(3 + name);
+  return first != static_cast<unsigned>(nbt::Tag::End) && first <= static_cast<unsigned>(nbt::Tag::LongArray);
 }
 
 Result<LoadedScene> read_schematic(std::span<const std::byte> bytes, const Progress& progress) {

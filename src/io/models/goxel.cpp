@@ -39,6 +39,7 @@ class GoxelReader {
   using Dict = std::map<std::string, std::span<const std::byte>, std::less<>>;
   struct Material {
     VoxelProperties properties;
+    std::uint32_t number = 0;
     std::array<float, 4> colour{1.0F, 1.0F, 1.0F, 1.0F};
   };
   struct Block {
@@ -90,6 +91,7 @@ Status GoxelReader::read_chunk(std::string_view type, ByteReader chunk) {
     return {};
   }
   if (type == "CAMR") ++left_out_["cameras"];
+  if (type == "IMG ") ++left_out_["settings of its picture"];
   if (type == "LIGH") ++left_out_["settings of its light"];
   const bool is_known = type == "CAMR" || type == "LIGH" || type == "IMG " || type == "PREV";
   if (!is_known) ++left_out_["chunks of unknown kinds"];
@@ -98,7 +100,16 @@ Status GoxelReader::read_chunk(std::string_view type, ByteReader chunk) {
 
 Status GoxelReader::read_block(ByteReader& chunk) {
   const std::size_t at = chunk.position();
-  auto image = decode_png(chunk.take(chunk.remaining()));
+  const auto png = chunk.take(chunk.remaining());
+  // A picture says its sizes at its beginning; one that is no block is not decoded.
+  constexpr std::size_t kSizesAt = 16;
+  ByteReader sizes(png);
+  static_cast<void>(sizes.take(kSizesAt));
+  const std::array<std::uint8_t, 8> edge_64 = {0, 0, 0, 64, 0, 0, 0, 64};
+  if (!std::ranges::equal(sizes.take(edge_64.size()), std::as_bytes(std::span(edge_64)))) {
+    return fault("a block that is no picture of 64 x 64 pixels", at);
+  }
+  auto image = decode_png(png);
   if (!image) return fault("a block that is no picture: " + image.error().message, at);
   if (image->pixels.size() != kBlockBytes) return fault("a block of another size than 16^3", at);
   blocks_.push_back(std::move(image->pixels));
@@ -149,6 +160,7 @@ void GoxelReader::read_material(ByteReader& chunk) {
   material.properties.metalness = std::clamp(metallic[0], 0.0F, 1.0F);
   material.properties.roughness = std::clamp(roughness[0], 0.0F, 1.0F);
   material.properties.emission = std::clamp(std::max({emission[0], emission[1], emission[2]}), 0.0F, 1000.0F);
+  material.number = builder_.add_material(material.properties);
   materials_.push_back(std::move(material));
 }
 
@@ -183,7 +195,7 @@ Status GoxelReader::read_layer(ByteReader& chunk) {
       dict.contains("material") && index >= 0 && static_cast<std::size_t>(index) < materials_.size();
   const Material material = has_material ? materials_[static_cast<std::size_t>(index)] : Material{};
   builder_.begin(std::move(model));
-  builder_.use_material(material.properties);
+  builder_.use_material(material.number);
   for (const Block& block : blocks) {
     if (auto put = put_block(block, material); !put) return put;
   }

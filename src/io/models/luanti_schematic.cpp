@@ -79,6 +79,8 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
   const std::size_t begin = reader.position();
   const std::uint64_t volume =
       static_cast<std::uint64_t>(size_x) * static_cast<std::uint64_t>(size_y) * static_cast<std::uint64_t>(size_z);
+  constexpr std::uint64_t kMaxNodes = std::uint64_t{1} << 24;
+  if (volume > kMaxNodes) return make_error(ErrorCode::LimitExceeded, "a schematic of more than 2^24 nodes", {}, 6);
   ByteStream stream(bytes, begin, Compression::Zlib);
   if (volume * 4 > stream.max_bytes()) return fault("a schematic of more nodes than there can be", 6);
   std::vector<std::byte> content(volume * 4);
@@ -89,15 +91,19 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
   Model model;
   model.canvas = {IVec3(0), {size_x, size_y, size_z}};
   builder.begin(std::move(model));
+  std::vector<std::uint32_t> materials;
+  materials.reserve(nodes.size());
+  for (const Node& node : nodes) materials.push_back(builder.add_material(node.properties));
   std::size_t at = 0;
   for (int z = 0; z < size_z; ++z) {
     for (int y = 0; y < size_y; ++y) {
       for (int x = 0; x < size_x; ++x, ++at) {
         const auto index = load<std::uint16_t>(content.data() + 2 * at, std::endian::big);
         if (index >= nodes.size()) return fault("a node beyond its names", begin);
-        constexpr unsigned kChance = 0x7F;
-        if (version >= 2 && (std::to_integer<unsigned>(content[2 * volume + at]) & kChance) == 0) continue;
-        builder.use_material(nodes[index].properties);
+        // How likely the node is, of 127 since version 4 and of 255 before.
+        const auto chance = std::to_integer<unsigned>(content[2 * volume + at]);
+        if (version >= 2 && (version >= 4 ? chance & 0x7FU : chance >> 1) == 0) continue;
+        builder.use_material(materials[index]);
         if (auto put = builder.put({x, y, size_z - 1 - z}, nodes[index].colour); !put) return put.error();
       }
     }

@@ -9,7 +9,7 @@ namespace quoin::models {
 
 namespace {
 
-constexpr std::size_t kMaxRuns = std::size_t{1} << 26;
+constexpr std::size_t kMaxRuns = std::size_t{1} << 25;
 // Runs that are set at once.
 constexpr std::size_t kBatch = std::size_t{1} << 18;
 
@@ -36,20 +36,28 @@ void ModelBuilder::begin(Model model) {
   parts_.push_back({std::move(model), runs_.size()});
 }
 
-void ModelBuilder::use_material(VoxelProperties material) {
-  const auto known = std::ranges::find(materials_, material);
-  material_ = static_cast<std::uint32_t>(known - materials_.begin());
-  if (known == materials_.end()) materials_.push_back(std::move(material));
+std::uint32_t ModelBuilder::add_material(VoxelProperties material) {
+  materials_.push_back(std::move(material));
+  return static_cast<std::uint32_t>(materials_.size() - 1);
 }
 
-Status ModelBuilder::put(IVec3 voxel, Rgba8 colour, int count) {
+void ModelBuilder::use_material(std::uint32_t material) {
+  QUOIN_ASSERT(material < materials_.size(), "a material that was added");
+  material_ = material;
+}
+
+void ModelBuilder::warn(std::string line) {
+  warnings_.push_back(std::move(line));
+}
+
+Status ModelBuilder::put(IVec3 voxel, Rgba8 colour, int count, int axis) {
   QUOIN_ASSERT(!parts_.empty(), "a model has begun");
   if (colour.a == 0 || count <= 0) return {};
-  if (runs_.size() == kMaxRuns) return make_error(ErrorCode::LimitExceeded, "more than 2^26 voxels");
+  if (runs_.size() == kMaxRuns) return make_error(ErrorCode::LimitExceeded, "more than 2^25 voxels, or runs of them");
   const auto [known, is_new] =
       numbers_.try_emplace(key_of(colour, material_), static_cast<std::uint32_t>(looks_.size()));
   if (is_new) looks_.push_back({colour, material_});
-  runs_.push_back({voxel, known->second, count});
+  runs_.push_back({voxel, known->second, count, axis});
   return {};
 }
 
@@ -98,7 +106,10 @@ Result<LoadedScene> ModelBuilder::take(std::string format) {
     grid.canvas = model.canvas;
     for (std::size_t run = parts_[i].first; run < end; ++run) {
       const Run& r = runs_[run];
-      if (r.count > 1) grid.grid.fill_box({r.voxel, r.voxel + IVec3(1, r.count, 1)}, (*types)[r.look]);
+      if (r.count == 1) continue;
+      IVec3 size(1);
+      size[r.axis] = r.count;
+      grid.grid.fill_box({r.voxel, r.voxel + size}, (*types)[r.look]);
     }
     for (std::size_t run = parts_[i].first; run < end;) {
       batch.clear();

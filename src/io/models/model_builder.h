@@ -22,17 +22,19 @@ struct Model {
 };
 
 /// Collects coloured voxels, in any number of models, and makes a scene of them: a type for each colour and material.
-/// Memory: 20 bytes a voxel, or a run of them.
+/// Memory: 24 bytes a voxel, or a run of them.
 class ModelBuilder {
  public:
   /// Voxels that follow are of this model. Requires: sizes are finite and positive.
   void begin(Model model);
-  /// What the voxels that follow are of besides their colour; a name and a colour say nothing.
-  void use_material(VoxelProperties material);
-  /// `count` voxels from `voxel` upwards. Alpha below 255 makes a type transparent, 0 is no voxel.
-  /// Errors: LimitExceeded beyond 2^26 of such calls.
-  [[nodiscard]] Status put(IVec3 voxel, Rgba8 colour, int count = 1);
-  void warn(std::string line) { warnings_.push_back(std::move(line)); }
+  /// What voxels are of besides their colour and their transparency. Returns its number; 0 is a material of nothing.
+  [[nodiscard]] std::uint32_t add_material(VoxelProperties material);
+  /// Voxels that follow are of this material. Requires: it was added.
+  void use_material(std::uint32_t material);
+  /// `count` voxels from `voxel` on along an axis. Alpha below 255 makes a type transparent, 0 is no voxel.
+  /// Errors: LimitExceeded beyond 2^25 of such calls.
+  [[nodiscard]] Status put(IVec3 voxel, Rgba8 colour, int count = 1, int axis = 1);
+  void warn(std::string line);
 
   /// The scene. Where there are more colours than types there can be, their last bits are rounded, with a warning.
   [[nodiscard]] Result<LoadedScene> take(std::string format);
@@ -42,6 +44,7 @@ class ModelBuilder {
     IVec3 voxel;
     std::uint32_t look;
     std::int32_t count;
+    std::int32_t axis;
   };
   struct Part {
     Model model;

@@ -247,7 +247,41 @@ TEST(Models, HeadersThatClaimTooMuchAreRefused) {
   EXPECT_EQ(read_binvox(wide.bytes).error().code, ErrorCode::LimitExceeded);
   Writer nodes;
   nodes.text("MTSM").big(4, 2).big(65'535, 2).big(1, 2).big(65'535, 2).number(1, 1).big(0, 2).number(0x78, 1);
-  EXPECT_EQ(read_mts(nodes.bytes).error().code, ErrorCode::BadFormat);
+  EXPECT_EQ(read_mts(nodes.bytes).error().code, ErrorCode::LimitExceeded);
+}
+
+TEST(Models, AModelOfWidth10IsNoNbt) {
+  Writer wide;
+  wide.u32s({10, 1, 1});
+  for (int x = 0; x < 10; ++x) wide.number(0x0000FF, 3);
+  EXPECT_EQ(detect_format(wide.bytes), FileFormat::CubeWorld);
+  Writer empty;
+  empty.number(10, 1).number(0, 3);
+  EXPECT_EQ(detect_format(empty.bytes), std::nullopt);
+}
+
+TEST(Models, ASizeThatIsNoneIsTold) {
+  Writer tiny;
+  tiny.text("#binvox 1\ndim 1 1 1\ntranslate 0 0 0\nscale 1e-323\ndata\n").number(1, 1).number(1, 1);
+  const auto loaded = read_binvox(tiny.bytes);
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  ASSERT_EQ(loaded->warnings.size(), 1U);
+}
+
+TEST(Models, NodesThatMayBePlacedAre) {
+  for (const int version : {2, 3, 4}) {
+    Writer nodes;
+    nodes.big(0, 2).big(0, 2).number(128, 1).number(1, 1).number(0, 2);
+    Writer writer;
+    writer.text("MTSM").big(static_cast<std::uint64_t>(version), 2).big(2, 2).big(1, 2).big(1, 2);
+    if (version >= 3) writer.number(0x7F, 1);
+    writer.big(1, 2).big(13, 2).text("default:stone").append(zlib_stored(nodes.bytes));
+    const auto loaded = read_mts(writer.bytes);
+    ASSERT_TRUE(loaded) << to_string(loaded.error());
+    // Half of 255 before version 4, and the least that there is after it; the highest bit says another thing there.
+    EXPECT_EQ(only_grid(*loaded).grid.get({0, 0, 0}) != kAir, version < 4) << version;
+    EXPECT_EQ(only_grid(*loaded).grid.get({1, 0, 0}) != kAir, version >= 4) << version;
+  }
 }
 
 TEST(Models, TooManyColoursAreRoundedWithAWord) {

@@ -159,9 +159,11 @@ Status QbReader::read_run(const Matrix& matrix, int z, std::uint64_t& at, std::u
     return {};
   }
   const int placed_z = is_mirrored_ ? matrix.size.z - 1 - z : z;
-  for (; at < end; ++at) {
+  while (at < end) {
     const IVec3 voxel{static_cast<int>(at % width), static_cast<int>(at / width), placed_z};
-    if (auto put = builder_.put(voxel, colour); !put) return put;
+    const std::uint64_t row = std::min(end - at, width - at % width);
+    if (auto put = builder_.put(voxel, colour, static_cast<int>(row), 0); !put) return put;
+    at += row;
   }
   return {};
 }
@@ -246,6 +248,7 @@ Status QbtReader::read_matrix(ByteReader& reader) {
 
 // x changes slowest, then z, then y. The last byte says which faces are seen: none of what is empty.
 Status QbtReader::put_voxels(const Matrix& matrix, std::span<const std::byte> packed, std::size_t at) {
+  if (matrix.size.x == 0 || matrix.size.y == 0 || matrix.size.z == 0) return {};
   ByteStream stream(packed, 0, Compression::Zlib);
   std::vector<std::byte> column(static_cast<std::size_t>(matrix.size.y) * 4);
   for (int x = 0; x < matrix.size.x; ++x) {

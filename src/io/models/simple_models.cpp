@@ -64,7 +64,7 @@ Result<BinvoxHeader> parse_binvox_header(std::span<const std::byte> bytes) {
     }
     const std::size_t wanted = key == "dim" || key == "translate" ? 3 : key == "scale" ? 1 : 0;
     if (!parse_numbers(line.substr(space), std::span(numbers).first(wanted))) {
-      return fault("a line of \"" + std::string(key) + "\" without its numbers", at);
+      return fault(std::string("a line without its numbers: ").append(key), at);
     }
     if (key == "dim") {
       for (int axis = 0; axis < 3; ++axis) {
@@ -96,10 +96,12 @@ Result<LoadedScene> read_binvox(std::span<const std::byte> bytes) {
   if (volume > kMaxVoxels) return make_error(ErrorCode::LimitExceeded, "more than 2^32 voxels");
   ModelBuilder builder;
   Model model;
-  const bool is_placed = std::isfinite(header->scale) && header->scale > 0.0 && is_finite(header->translate);
-  if (is_placed) {
+  const double voxel_size = header->scale / std::max({size.x, size.y, size.z});
+  if (voxel_size > 1e-9 && voxel_size < 1e9 && is_finite(header->translate)) {
     model.position = header->translate;
-    model.voxel_size = header->scale / std::max({size.x, size.y, size.z});
+    model.voxel_size = voxel_size;
+  } else {
+    builder.warn("its place and size are out of range: a voxel is one unit");
   }
   model.canvas = {IVec3(0), size};
   builder.begin(std::move(model));

@@ -149,6 +149,7 @@ void draw_scene_part(ViewState& state) {
   if (!list.switched() || !state.can_edit()) return;
   const ScenePause pause(*state.open.backend);
   state.stats.is_settled = false;
+  state.edited_at = std::chrono::steady_clock::now();
   state.open.document->show(list.switched()->node, list.switched()->is_visible);
 }
 
