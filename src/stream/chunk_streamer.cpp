@@ -4,6 +4,7 @@
 #include <malloc.h>
 #endif
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <new>
@@ -233,19 +234,35 @@ bool ChunkStreamer::work_once() {
   return true;
 }
 
+namespace {
+
+// Makes room for one more. False where there is no memory for that.
+bool has_place(std::vector<Arrival>& arrivals) {
+  constexpr std::size_t kLeast = 16;
+  try {
+    if (arrivals.size() == arrivals.capacity()) arrivals.reserve(std::max(kLeast, 2 * arrivals.capacity()));
+    return true;
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
+}
+
+}  // namespace
+
 // What has come is not lost: where there is no memory for its place in the list, that is waited for.
 void ChunkStreamer::hand_over(Arrival arrival) {
-  for (bool is_done = false; !is_done;) {
-    try {
+  for (;;) {
+    {
       const std::scoped_lock outbox(outbox_mutex_);
-      outbox_.arrivals.push_back(std::move(arrival));
-      --working_;
-      is_done = true;
-    } catch (const std::bad_alloc&) {
-      note_shortage();
-      if (is_ending_) return;
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      if (has_place(outbox_.arrivals)) {
+        outbox_.arrivals.push_back(std::move(arrival));
+        --working_;
+        break;
+      }
     }
+    note_shortage();
+    if (is_ending_) return;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   came_.notify_all();
 }
