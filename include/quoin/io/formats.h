@@ -47,7 +47,7 @@ struct FormatInfo {
   bool writable;
   bool is_mesh;                ///< written from meshes rather than from voxels
   bool is_volume;              ///< values, which read_volume reads as such and load_scene as a field
-  std::string_view also = "";  ///< further extensions of the same format, or of kin: ".kv6 .kvx"
+  std::string_view also{};  ///< further extensions of the same format, or of kin: ".kv6 .kvx"
 };
 
 /// All formats, those that can be read first. Lifetime: for ever.
