@@ -60,7 +60,8 @@ void App::close_document() {
   asked_.reset();
   save_wanted_pictures();
   state_.open.backend.reset();
-  state_.open = {std::make_unique<Document>(), nullptr};
+  state_.open.document = std::make_unique<Document>();
+  state_.open.look.reset();
   state_.stats = {};
   state_.picture = {};
   screen_->forget_picture();

@@ -200,18 +200,18 @@ class QbtReader {
 };
 
 Status QbtReader::read_node(ByteReader& reader, int depth) {
-  enum : std::uint32_t { kIsMatrix = 0, kIsModel = 1, kIsCompound = 2 };
+  enum class Kind : std::uint32_t { Matrix, Model, Compound };
   constexpr int kDeepest = 64;
   const std::size_t at = reader.position();
-  const std::uint32_t kind = reader.u32();
+  const auto kind = static_cast<Kind>(reader.u32());
   const std::size_t size = reader.u32();
   if (reader.failed() || size > reader.remaining()) return fault("a node that ends behind its file", at);
   if (depth > kDeepest) return make_error(ErrorCode::LimitExceeded, "nodes within 64 others", {}, at);
   ByteReader node(bytes_, reader.position(), reader.position() + size);
   static_cast<void>(reader.take(size));
-  if (kind == kIsMatrix || kind == kIsCompound) return read_matrix(node);
-  if (kind != kIsModel) {
-    builder_.warn("left out: a node of the unknown kind " + std::to_string(kind));
+  if (kind == Kind::Matrix || kind == Kind::Compound) return read_matrix(node);
+  if (kind != Kind::Model) {
+    builder_.warn("left out: a node of the unknown kind " + std::to_string(static_cast<std::uint32_t>(kind)));
     return {};
   }
   const std::size_t children = node.count(8);
