@@ -70,7 +70,7 @@ class SchematicReader {
   Status read_litematic_region(nbt::Value from);
   Status read_structure();
   Status put_structure(Region& region, nbt::Value blocks);
-  Status put(Region region);
+  Status put(const Region& region);
   Status fill(const Region& region, int first_y, std::span<const std::uint16_t> layers);
   Result<IVec3> size_of(nbt::Value schematic) const;
   void note_left_out();
@@ -216,7 +216,7 @@ Status SchematicReader::read_sponge(nbt::Value schematic) {
     }
     return {};
   };
-  return put(std::move(region));
+  return put(region);
 }
 
 int nibble(std::span<const std::byte> bytes, std::size_t i) {
@@ -270,7 +270,7 @@ Status SchematicReader::read_mcedit() {
     for (std::size_t i = 0; i < layer.size(); ++i) layer[i] = index_of[code_of(first + i)];
     return {};
   };
-  return put(std::move(region));
+  return put(region);
 }
 
 Status SchematicReader::read_litematic(nbt::Value regions) {
@@ -313,7 +313,7 @@ Status SchematicReader::read_litematic_region(nbt::Value from) {
     if (std::ranges::all_of(layer, [kinds](std::uint16_t index) { return index < kinds; })) return {};
     return fault("an index beyond the " + std::to_string(kinds) + " blocks of its palette", states);
   };
-  return put(std::move(region));
+  return put(region);
 }
 
 Status SchematicReader::read_structure() {
@@ -376,7 +376,7 @@ Status SchematicReader::put_structure(Region& region, nbt::Value blocks) {
     for (; next < placed.size() && placed[next].y == y; ++next) layer[placed[next].at] = placed[next].index;
     return {};
   };
-  return put(std::move(region));
+  return put(region);
 }
 
 // One slab of 16 layers at a time, cut into sections.
@@ -414,7 +414,7 @@ Status SchematicReader::fill(const Region& region, int first_y, std::span<const 
   return {};
 }
 
-Status SchematicReader::put(Region region) {
+Status SchematicReader::put(const Region& region) {
   SceneGrid grid;
   grid.name = region.name;
   const auto area = static_cast<std::size_t>(region.size.x) * static_cast<std::size_t>(region.size.z);
