@@ -45,8 +45,8 @@ struct FormatInfo {
   std::string_view description;  ///< for a person
   bool readable;
   bool writable;
-  bool is_mesh;                ///< written from meshes rather than from voxels
-  bool is_volume;              ///< values, which read_volume reads as such and load_scene as a field
+  bool is_mesh;             ///< written from meshes rather than from voxels
+  bool is_volume;           ///< values, which read_volume reads as such and load_scene as a field
   std::string_view also{};  ///< further extensions of the same format, or of kin: ".kv6 .kvx"
 };
 
