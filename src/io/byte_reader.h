@@ -4,11 +4,24 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
+#include <utility>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/result.h>
 
 namespace quoin {
+
+/// BadFormat at an offset of the file.
+[[nodiscard]] inline Error bad_at(std::uint64_t offset, std::string message) {
+  return make_error(ErrorCode::BadFormat, std::move(message), {}, offset);
+}
+
+/// The bytes as characters.
+[[nodiscard]] inline std::string_view text_of(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
 
 /// Reads little-endian values from bytes that may end too early.
 ///
@@ -38,10 +51,7 @@ class ByteReader {
     position_ += count;
     return taken;
   }
-  [[nodiscard]] std::string_view text(std::size_t count) {
-    const std::span<const std::byte> taken = take(count);
-    return {reinterpret_cast<const char*>(taken.data()), taken.size()};
-  }
+  [[nodiscard]] std::string_view text(std::size_t count) { return text_of(take(count)); }
   [[nodiscard]] std::uint32_t u32() {
     const std::span<const std::byte> b = take(4);
     if (b.empty()) return 0;

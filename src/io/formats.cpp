@@ -164,10 +164,10 @@ Result<LoadedScene> read_around_spawn(const Result<std::unique_ptr<ChunkSource>>
   return load_source(**source, chunks_around_spawn(**source, options.radius), threads, progress);
 }
 
+/// `format`: as detect_format says it of the bytes.
 Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<const std::byte> bytes,
-                               const LoadOptions& options, Threads threads, const Progress& progress) {
-  if (options.raw) return read_volume_as_scene(bytes, options, threads, progress);
-  const auto format = detect_format(bytes);
+                               std::optional<FileFormat> format, const LoadOptions& options, Threads threads,
+                               const Progress& progress) {
   if (format == FileFormat::Vox) return read_vox(bytes, options, progress);
   if (format == FileFormat::Scene) return read_scene_file(bytes, options, threads, progress);
   if (format == FileFormat::World) return read_world_format(bytes, options, threads, progress);
@@ -323,7 +323,8 @@ Result<std::vector<std::string>> losses_of_saving(const LoadedScene& loaded, con
 
 Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options, Threads threads,
                                const Progress& progress) {
-  return read_bytes({}, bytes, options, threads, progress);
+  if (options.raw) return read_volume_as_scene(bytes, options, threads, progress);
+  return read_bytes({}, bytes, detect_format(bytes), options, threads, progress);
 }
 
 std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path) {
@@ -347,8 +348,10 @@ Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOpti
   if (is_volume(*format)) return with_path(read_volume_as_scene(path, options, threads, progress), path);
   const auto bytes = read_file(path);
   if (!bytes) return bytes.error();
-  if (detect_format(*bytes) == FileFormat::Scene) return read_scene_file(path, options, threads, progress);
-  return with_path(read_bytes(path, *bytes, options, threads, progress), path);
+  // Of the whole file, which some formats are known by only then, and which may be another by now.
+  const auto of_all = detect_format(*bytes);
+  if (of_all == FileFormat::Scene) return read_scene_file(path, options, threads, progress);
+  return with_path(read_bytes(path, *bytes, of_all, options, threads, progress), path);
 }
 
 }  // namespace quoin

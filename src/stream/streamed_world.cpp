@@ -169,10 +169,9 @@ struct StreamedWorld::Impl {
 
   std::size_t arrived_bytes = 0;  // of `arrivals`
   Clock::time_point asked_others{};
-  Clock::time_point moved{};  // when a chunk came or went last
-  bool is_edited = false;     // since the last save
-  bool has_save_failed = false;
-  Status failed_save;                // why
+  Clock::time_point moved{};         // when a chunk came or went last
+  bool is_edited = false;            // since the last save
+  Status handed_over;                // to the store, at the last save; where that failed it is tried again
   std::size_t moved_since_save = 0;  // chunks that came or went
   ChangeCursor saved_types;
   std::shared_ptr<DiskOutcome> disk = std::make_shared<DiskOutcome>();
@@ -344,8 +343,7 @@ Status StreamedWorld::Impl::save_now() {
   if (!store.is_writable()) return {};
   saved_types = scene().types.cursor();
   const auto ticket = world.saver.save(store, scene(), {}, [to = disk](const Status& outcome) { to->put(outcome); });
-  has_save_failed = !ticket;
-  failed_save = ticket ? Status() : Status(ticket.error());
+  handed_over = ticket ? Status() : Status(ticket.error());
   if (!ticket) return ticket.error();
   is_edited = false;
   return {};
@@ -497,8 +495,8 @@ Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
   const bool is_due = start - saved >= options.save_interval;
   const bool is_wanted =
       (is_edited && !leaving.empty()) || moved_since_save > kMaxMoved || scene().types.has_changed_since(saved_types);
-  if (is_due || (is_wanted && !has_save_failed)) outcome = save_now();
-  if (outcome) outcome = has_save_failed ? failed_save : disk->last();
+  if (is_due || (is_wanted && handed_over)) outcome = save_now();
+  if (outcome) outcome = handed_over ? disk->last() : handed_over;
   if (!store.is_writable()) is_edited = false;
   eyes = eyes_of(viewers);
   return outcome;
@@ -618,9 +616,8 @@ void extend(DBox& world, const Scene& scene, const std::vector<InstanceHandle>& 
 }
 
 IBox box_of(const std::vector<IVec3>& chunks) {
-  if (chunks.empty()) return {};
-  IBox box{chunks.front(), chunks.front() + 1};
-  for (const IVec3 chunk : chunks) box = {glm::min(box.min, chunk), glm::max(box.max, chunk + 1)};
+  IBox box;
+  for (const IVec3 chunk : chunks) box = unite(box, {chunk, chunk + 1});
   return box;
 }
 

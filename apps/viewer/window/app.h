@@ -75,7 +75,6 @@ class App {
   void frame_world();
   /// Saves what was edited in a world on disk, and returns once that is done. What goes wrong is told.
   Status save_world();
-  void close_document();
   [[nodiscard]] bool is_streaming() const;
   [[nodiscard]] bool has_ground() const;
 
@@ -94,6 +93,7 @@ class App {
   void go_on_leaving();
   void load(const std::filesystem::path& path);
   void take_loaded();
+  void close_document();
   void adopt(OpenDocument opened);
   void save(const std::filesystem::path& path, bool accepts_losses = false);
   void take_saved();

@@ -78,6 +78,7 @@ void App::load(const std::filesystem::path& path) {
     abandoned_.push_back(std::move(state_.loader));
   }
   const Document& now = *state_.open.document;
+  // It would be held against who opens it again.
   if (now.world() != nullptr && is_same_file(path, now.path()) && save_world()) close_document();
   DeviceBackendOptions backend;
   backend.cpu = {options_.instances(), options_.threads, CpuBackendOptions{}.first_frame_seconds};
@@ -109,14 +110,15 @@ void App::take_loaded() {
   if (!options_.screenshot.empty()) end_with(opened.error());
 }
 
-void App::adopt(OpenDocument opened) {
-  state_.message.reset();
+// An empty one takes its place.
+void App::close_document() {
   asked_.reset();
   save_wanted_pictures();
   input_.editing = {};
   state_.hover.reset();
   state_.open.backend.reset();  // before the document that it reads
-  state_.open = std::move(opened);
+  state_.open.document = std::make_unique<Document>();
+  state_.open.look.reset();
   has_seen_chunks_ = true;
   unframed_.reset();
   told_saving_.clear();
@@ -125,6 +127,12 @@ void App::adopt(OpenDocument opened) {
   told_fault_.clear();
   lossy_save_.reset();
   screen_->forget_picture();
+}
+
+void App::adopt(OpenDocument opened) {
+  state_.message.reset();
+  close_document();
+  state_.open = std::move(opened);
   const LoadedScene& loaded = state_.open.document->loaded();
   state_.settings.note_recent(state_.open.document->path());
   if (loaded.look) state_.open.look = std::make_shared<const FileLook>(*loaded.look);

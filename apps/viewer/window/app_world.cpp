@@ -54,19 +54,6 @@ Status App::save_world() {
   return saved;
 }
 
-// Before the file is opened again, by whom it would otherwise be held.
-void App::close_document() {
-  state_.hover.reset();
-  asked_.reset();
-  save_wanted_pictures();
-  state_.open.backend.reset();
-  state_.open.document = std::make_unique<Document>();
-  state_.open.look.reset();
-  state_.stats = {};
-  state_.picture = {};
-  screen_->forget_picture();
-}
-
 // Whether chunks are on their way, or an edit is to be saved, so that time must go on.
 bool App::is_streaming() const {
   constexpr std::chrono::seconds kUntilSaved{3};

@@ -5,6 +5,8 @@
 
 #include <quoin/grid/voxel_registry.h>
 
+#include "io/minecraft/biomes.h"
+
 // What Minecraft's blocks look like as voxels, by their names: a table of our own making, and rules by the words of a
 // name for what is not in it.
 
@@ -12,6 +14,11 @@ namespace quoin::minecraft {
 
 /// What of a place colours a block there: its colour is then multiplied by that of the biome.
 enum class Tint : std::uint8_t { None, Grass, Foliage, Water };
+
+/// What a biome colours so, 0xRRGGBB; white for Tint::None.
+[[nodiscard]] std::uint32_t colour_of(Tint tint, const BiomeTints& biome);
+/// A colour multiplied by that; its alpha stays.
+[[nodiscard]] Rgba8 tinted_colour(Rgba8 colour, std::uint32_t tint);
 
 /// How sure a look is.
 enum class Knowledge : std::uint8_t {

@@ -24,14 +24,6 @@ VoxelProperties properties_of(const BlockState& state, const BlockLook& look) {
   return type;
 }
 
-std::uint32_t colour_of(Tint tint, const BiomeTints& tints) {
-  return tint == Tint::Grass ? tints.grass : tint == Tint::Foliage ? tints.foliage : tints.water;
-}
-
-std::uint8_t times(std::uint8_t part, std::uint32_t tint) {
-  return static_cast<std::uint8_t>((part * (tint & 255U) + 127U) / 255U);
-}
-
 }  // namespace
 
 Result<Block> BlockTypes::block(std::string_view name, const std::vector<Property>& properties) {
@@ -75,9 +67,7 @@ Result<VoxelType> BlockTypes::tinted(const Block& block, const BiomeTints& tints
   }
   const std::unique_lock lock(mutex_);
   VoxelProperties type = tinted_[block.number];
-  type.colour.r = times(type.colour.r, colour >> 16);
-  type.colour.g = times(type.colour.g, colour >> 8);
-  type.colour.b = times(type.colour.b, colour);
+  type.colour = tinted_colour(type.colour, colour);
   constexpr std::array kNames = {"", "grass", "foliage", "water"};
   type.attributes[kTintAttribute] = kNames[static_cast<std::size_t>(block.tint)];
   auto added = types_.find_or_add(type);

@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <quoin/core/result.h>
@@ -115,6 +117,11 @@ class Value {
   const Document* document_ = nullptr;
   std::uint32_t index_ = 0;
 };
+
+/// BadFormat at a value.
+[[nodiscard]] inline Error fault(std::string what, Value at) {
+  return make_error(ErrorCode::BadFormat, std::move(what), {}, at.offset());
+}
 
 /// Of a compound its value of the first of these names that is there.
 [[nodiscard]] inline Value first_of(Value compound, std::string_view name, std::string_view other) {

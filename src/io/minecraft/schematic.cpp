@@ -30,10 +30,6 @@ constexpr int kMaxEdge = 1 << 20;
 constexpr std::int64_t kMaxPlace = 1 << 26;
 constexpr std::uint16_t kNoIndex = 0xFFFF;
 
-Error fault(std::string what, nbt::Value at) {
-  return make_error(ErrorCode::BadFormat, std::move(what), {}, at.offset());
-}
-
 std::string text_of(IVec3 size) {
   return std::to_string(size.x) + " x " + std::to_string(size.y) + " x " + std::to_string(size.z);
 }
@@ -217,11 +213,6 @@ Status SchematicReader::read_sponge(nbt::Value schematic) {
     return {};
   };
   return put(region);
-}
-
-int nibble(std::span<const std::byte> bytes, std::size_t i) {
-  if (i / 2 >= bytes.size()) return 0;
-  return std::to_integer<int>(bytes[i / 2]) >> (i % 2 * 4) & 15;
 }
 
 // Blocks by the numbers that they had before 1.13.

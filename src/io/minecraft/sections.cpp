@@ -17,20 +17,16 @@ namespace {
 constexpr std::uint16_t kNoIndex = 0xFFFF;
 constexpr std::size_t kLegacyCodes = std::size_t{4096} * 16;
 
-Error fault(std::string what, nbt::Value at) {
-  return make_error(ErrorCode::BadFormat, std::move(what), {}, at.offset());
-}
-
 std::uint64_t word(std::span<const std::byte> longs, std::size_t i) {
   return load<std::uint64_t>(longs.data() + 8 * i, std::endian::big);
 }
+
+}  // namespace
 
 int nibble(std::span<const std::byte> bytes, std::size_t i) {
   if (i / 2 >= bytes.size()) return 0;
   return std::to_integer<int>(bytes[i / 2]) >> (i % 2 * 4) & 15;
 }
-
-}  // namespace
 
 int bits_of_palette(std::size_t size, int least) {
   return std::max(static_cast<int>(std::bit_width(size - 1)), least);

@@ -56,6 +56,8 @@ class SectionReader {
   std::vector<std::uint32_t> legacy_used_;
 };
 
+/// The i-th half of a byte, low ones first; 0 behind the end: what is left out of old worlds is 0.
+[[nodiscard]] int nibble(std::span<const std::byte> bytes, std::size_t i);
 /// Unpacks indices of `bits` each from longs, from the lowest bit up. Where they span longs is told by how many there
 /// are. False where the longs are of neither form. Requires: 1 <= bits <= 16.
 [[nodiscard]] bool unpack_indices(nbt::Value longs, int bits, std::span<std::uint16_t> out);

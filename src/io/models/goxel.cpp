@@ -26,10 +26,6 @@ constexpr int kBlockEdge = 16;
 constexpr std::size_t kBlockBytes = std::size_t{4} * kBlockEdge * kBlockEdge * kBlockEdge;
 constexpr std::int32_t kMaxPlace = 1 << 26;
 
-Error fault(std::string what, std::size_t at) {
-  return make_error(ErrorCode::BadFormat, std::move(what), {}, at);
-}
-
 class GoxelReader {
  public:
   explicit GoxelReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
@@ -76,7 +72,7 @@ Result<LoadedScene> GoxelReader::read() {
     const std::size_t begin = reader.position();
     static_cast<void>(reader.take(size));
     static_cast<void>(reader.u32());  // its sum, which programs do not agree on
-    if (reader.failed()) return fault("a chunk that ends behind its file", at);
+    if (reader.failed()) return bad_at(at, "a chunk that ends behind its file");
     if (auto done = read_chunk(type, ByteReader(bytes_, begin, begin + size)); !done) return done.error();
   }
   for (const auto& [what, count] : left_out_) builder_.warn("left out: " + std::to_string(count) + " " + what);
@@ -107,11 +103,11 @@ Status GoxelReader::read_block(ByteReader& chunk) {
   static_cast<void>(sizes.take(kSizesAt));
   const std::array<std::uint8_t, 8> edge_64 = {0, 0, 0, 64, 0, 0, 0, 64};
   if (!std::ranges::equal(sizes.take(edge_64.size()), std::as_bytes(std::span(edge_64)))) {
-    return fault("a block that is no picture of 64 x 64 pixels", at);
+    return bad_at(at, "a block that is no picture of 64 x 64 pixels");
   }
   auto image = decode_png(png);
-  if (!image) return fault("a block that is no picture: " + image.error().message, at);
-  if (image->pixels.size() != kBlockBytes) return fault("a block of another size than 16^3", at);
+  if (!image) return bad_at(at, "a block that is no picture: " + image.error().message);
+  if (image->pixels.size() != kBlockBytes) return bad_at(at, "a block of another size than 16^3");
   blocks_.push_back(std::move(image->pixels));
   return {};
 }
@@ -127,10 +123,6 @@ GoxelReader::Dict GoxelReader::read_dict(ByteReader& chunk) {
     if (chunk.failed()) return dict;
     dict[key] = value;
   }
-}
-
-std::string text_of(std::span<const std::byte> bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 template <std::size_t Count>
@@ -173,12 +165,12 @@ Status GoxelReader::read_layer(ByteReader& chunk) {
     for (int axis = 0; axis < 3; ++axis) block.place[axis] = chunk.i32();
     static_cast<void>(chunk.u32());
     const auto is_far = [&](int axis) { return block.place[axis] < -kMaxPlace || block.place[axis] > kMaxPlace; };
-    if (is_far(0) || is_far(1) || is_far(2)) return fault("a block that lies too far out", at);
-    if (block.index >= blocks_.size()) return fault("a block that is not there", at);
+    if (is_far(0) || is_far(1) || is_far(2)) return bad_at(at, "a block that lies too far out");
+    if (block.index >= blocks_.size()) return bad_at(at, "a block that is not there");
     if (version_ == 1) block.place -= kBlockEdge / 2;
     blocks.push_back(block);
   }
-  if (chunk.failed()) return fault("a layer that ends too early", at);
+  if (chunk.failed()) return bad_at(at, "a layer that ends too early");
   const Dict dict = read_dict(chunk);
   const auto value = [&](std::string_view name) {
     const auto found = dict.find(name);

@@ -8,7 +8,6 @@
 #include "io/byte_order.h"
 #include "io/byte_reader.h"
 #include "io/byte_stream.h"
-#include "io/minecraft/biomes.h"
 #include "io/minecraft/block_looks.h"
 #include "io/models/model_builder.h"
 #include "io/models/models.h"
@@ -18,10 +17,6 @@ namespace quoin::models {
 namespace {
 
 constexpr std::string_view kMagic = "MTSM";
-
-Error fault(std::string what, std::size_t at) {
-  return make_error(ErrorCode::BadFormat, std::move(what), {}, at);
-}
 
 std::uint16_t read_u16(ByteReader& reader) {
   const auto bytes = reader.take(2);
@@ -38,16 +33,8 @@ Node node_of(std::string name) {
   Node node;
   if (name == "air" || name == "ignore") return node;
   const minecraft::BlockLook look = minecraft::look_of_block(name, false, false);
-  const minecraft::BiomeTints tints;
-  const auto tint = [&](std::uint8_t channel, int shift) {
-    if (look.tint == minecraft::Tint::None) return channel;
-    const std::uint32_t colour = look.tint == minecraft::Tint::Grass     ? tints.grass
-                                 : look.tint == minecraft::Tint::Foliage ? tints.foliage
-                                                                         : tints.water;
-    return static_cast<std::uint8_t>((channel * (colour >> shift & 255U) + 127U) / 255U);
-  };
-  node.colour = {tint(look.colour.r, 16), tint(look.colour.g, 8), tint(look.colour.b, 0),
-                 std::max<std::uint8_t>(look.colour.a, 1)};
+  node.colour = minecraft::tinted_colour(look.colour, minecraft::colour_of(look.tint, {}));
+  node.colour.a = std::max<std::uint8_t>(node.colour.a, 1);
   node.properties.name = std::move(name);
   node.properties.collides = look.collides;
   node.properties.emission = look.emission;
@@ -75,18 +62,18 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
   if (version >= 3) static_cast<void>(reader.take(static_cast<std::size_t>(size_y)));  // how likely each layer is
   std::vector<Node> nodes(read_u16(reader));
   for (Node& node : nodes) node = node_of(std::string(reader.text(read_u16(reader))));
-  if (reader.failed()) return fault("it ends before its nodes do", bytes.size());
+  if (reader.failed()) return bad_at(bytes.size(), "it ends before its nodes do");
   const std::size_t begin = reader.position();
   const std::uint64_t volume =
       static_cast<std::uint64_t>(size_x) * static_cast<std::uint64_t>(size_y) * static_cast<std::uint64_t>(size_z);
   constexpr std::uint64_t kMaxNodes = std::uint64_t{1} << 24;
   if (volume > kMaxNodes) return make_error(ErrorCode::LimitExceeded, "a schematic of more than 2^24 nodes", {}, 6);
   ByteStream stream(bytes, begin, Compression::Zlib);
-  if (volume * 4 > stream.max_bytes()) return fault("a schematic of more nodes than there can be", 6);
+  if (volume * 4 > stream.max_bytes()) return bad_at(6, "a schematic of more nodes than there can be");
   std::vector<std::byte> content(volume * 4);
   const auto read = stream.read(content);
   if (!read) return read.error();
-  if (*read < volume * 3) return fault("it ends before its nodes do", bytes.size());
+  if (*read < volume * 3) return bad_at(bytes.size(), "it ends before its nodes do");
   ModelBuilder builder;
   Model model;
   model.canvas = {IVec3(0), {size_x, size_y, size_z}};
@@ -99,7 +86,7 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
     for (int y = 0; y < size_y; ++y) {
       for (int x = 0; x < size_x; ++x, ++at) {
         const auto index = load<std::uint16_t>(content.data() + 2 * at, std::endian::big);
-        if (index >= nodes.size()) return fault("a node beyond its names", begin);
+        if (index >= nodes.size()) return bad_at(begin, "a node beyond its names");
         // How likely the node is, of 127 since version 4 and of 255 before.
         const auto chance = std::to_integer<unsigned>(content[2 * volume + at]);
         if (version >= 2 && (version >= 4 ? chance & 0x7FU : chance >> 1) == 0) continue;

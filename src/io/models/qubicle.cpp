@@ -26,14 +26,6 @@ constexpr std::string_view kExchange = "Qubicle Exchange Format";
 constexpr std::int32_t kMaxPlace = 1 << 26;
 constexpr std::uint32_t kMaxEdge = 1 << 14;
 
-Error fault(std::string what, std::size_t at) {
-  return make_error(ErrorCode::BadFormat, std::move(what), {}, at);
-}
-
-std::string_view text_of(std::span<const std::byte> bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 Rgba8 colour_of(std::uint32_t rgba, bool is_bgra) {
   const auto low = static_cast<std::uint8_t>(rgba);
   const auto high = static_cast<std::uint8_t>(rgba >> 16);
@@ -88,7 +80,7 @@ class QbReader {
   Status read_matrix();
   Status read_run(const Matrix& matrix, int z, std::uint64_t& at, std::uint64_t count, std::uint32_t data);
   Status read_slice(const Matrix& matrix, int z);
-  [[nodiscard]] Error too_short() const { return fault("it ends before its matrices do", bytes_.size()); }
+  [[nodiscard]] Error too_short() const { return bad_at(bytes_.size(), "it ends before its matrices do"); }
 
   std::span<const std::byte> bytes_;
   ByteReader reader_;
@@ -106,7 +98,7 @@ Status QbReader::read_matrix() {
   const auto size = read_size(reader_);
   const auto place = read_place(reader_);
   if (reader_.failed()) return too_short();
-  if (!size || !place) return fault("a matrix whose size or place is out of range", at);
+  if (!size || !place) return bad_at(at, "a matrix whose size or place is out of range");
   matrix.size = *size;
   matrix.place = *place;
   Model model;
@@ -143,7 +135,7 @@ Status QbReader::read_slice(const Matrix& matrix, int z) {
       count = reader_.u32();
       colour = reader_.u32();
     }
-    if (count > area - at) return fault("a slice of more voxels than its matrix has", reader_.position());
+    if (count > area - at) return bad_at(reader_.position(), "a slice of more voxels than its matrix has");
     if (auto done = read_run(matrix, z, at, count, colour); !done) return done;
   }
 }
@@ -184,7 +176,7 @@ class QbtReader {
       at = reader.position();
       part = reader.text(8);
     }
-    if (part != "DATATREE") return fault("it has no tree", at);
+    if (part != "DATATREE") return bad_at(at, "it has no tree");
     if (auto done = read_node(reader, 0); !done) return done.error();
     return builder_.take("qubicle");
   }
@@ -205,7 +197,7 @@ Status QbtReader::read_node(ByteReader& reader, int depth) {
   const std::size_t at = reader.position();
   const auto kind = static_cast<Kind>(reader.u32());
   const std::size_t size = reader.u32();
-  if (reader.failed() || size > reader.remaining()) return fault("a node that ends behind its file", at);
+  if (reader.failed() || size > reader.remaining()) return bad_at(at, "a node that ends behind its file");
   if (depth > kDeepest) return make_error(ErrorCode::LimitExceeded, "nodes within 64 others", {}, at);
   ByteReader node(bytes_, reader.position(), reader.position() + size);
   static_cast<void>(reader.take(size));
@@ -215,7 +207,7 @@ Status QbtReader::read_node(ByteReader& reader, int depth) {
     return {};
   }
   const std::size_t children = node.count(8);
-  if (node.failed()) return fault("a node of more nodes than there is room for", at);
+  if (node.failed()) return bad_at(at, "a node of more nodes than there is room for");
   for (std::size_t i = 0; i < children; ++i) {
     if (auto done = read_node(node, depth + 1); !done) return done;
   }
@@ -232,8 +224,8 @@ Status QbtReader::read_matrix(ByteReader& reader) {
   const auto size = read_size(reader);
   const std::size_t packed_at = reader.position() + 4;
   const auto packed = reader.take(reader.u32());
-  if (reader.failed()) return fault("a matrix that ends too early", at);
-  if (!size || !place) return fault("a matrix whose size or place is out of range", at);
+  if (reader.failed()) return bad_at(at, "a matrix that ends too early");
+  if (!size || !place) return bad_at(at, "a matrix whose size or place is out of range");
   matrix.size = *size;
   matrix.place = *place;
   Model model;
@@ -256,13 +248,13 @@ Status QbtReader::put_voxels(const Matrix& matrix, std::span<const std::byte> pa
       const auto read = stream.read(column);
       if (!read)
         return make_error(read.error().code, read.error().message, {}, at + read.error().byte_offset.value_or(0));
-      if (*read != column.size()) return fault("a matrix of fewer voxels than its size says", at);
+      if (*read != column.size()) return bad_at(at, "a matrix of fewer voxels than its size says");
       ByteReader voxels(column);
       for (int y = 0; y < matrix.size.y; ++y) {
         Rgba8 colour = colour_of(voxels.u32(), false);
         if (colour.a == 0) continue;
         if (!colours_.empty()) {
-          if (colour.r >= colours_.size()) return fault("a colour beyond its map", at);
+          if (colour.r >= colours_.size()) return bad_at(at, "a colour beyond its map");
           colour = colours_[colour.r];
         }
         colour.a = 255;
@@ -308,13 +300,13 @@ Result<LoadedScene> read_qef(std::span<const std::byte> bytes) {
   constexpr std::uint32_t kMost = 1 << 20;
   const auto is_edge = [](int edge) { return edge > 0 && edge <= static_cast<int>(kMaxEdge); };
   if (!is_sound || !is_edge(size.x) || !is_edge(size.y) || !is_edge(size.z) || count > kMost) {
-    return fault("no size and number of colours within their ranges", numbers.position());
+    return bad_at(numbers.position(), "no size and number of colours within their ranges");
   }
   std::vector<Rgba8> colours;
   for (std::uint32_t i = 0; i < count; ++i) {
     std::array<float, 3> rgb{};
     for (float& channel : rgb) {
-      if (!numbers.next(channel)) return fault("a colour that is no number", numbers.position());
+      if (!numbers.next(channel)) return bad_at(numbers.position(), "a colour that is no number");
     }
     const auto byte = [](float channel) {
       return static_cast<std::uint8_t>(std::lround(std::clamp(channel, 0.0F, 1.0F) * 255.0F));
@@ -333,7 +325,7 @@ Result<LoadedScene> read_qef(std::span<const std::byte> bytes) {
     const bool is_read = numbers.next(voxel.x) && numbers.next(voxel.y) && numbers.next(voxel.z) &&
                          numbers.next(colour) && numbers.next(faces);
     if (!is_read || colour >= colours.size() || !IBox{IVec3(0), size}.contains(voxel)) {
-      return fault("a voxel outside of its model, or of its colours", place);
+      return bad_at(place, "a voxel outside of its model, or of its colours");
     }
     if (auto put = builder.put(voxel, colours[colour]); !put) return put.error();
   }

@@ -18,14 +18,6 @@ constexpr std::string_view kBinvox = "#binvox";
 constexpr int kMaxEdge = 1 << 14;
 constexpr std::uint64_t kMaxVoxels = std::uint64_t{1} << 32;
 
-std::string_view text_of(std::span<const std::byte> bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
-Error fault(std::string what, std::size_t at) {
-  return make_error(ErrorCode::BadFormat, std::move(what), {}, at);
-}
-
 /// Lines of text, and then bytes.
 struct BinvoxHeader {
   IVec3 size{0};  ///< x, z, y, in the file's order
@@ -59,17 +51,17 @@ Result<BinvoxHeader> parse_binvox_header(std::span<const std::byte> bytes) {
     std::array<double, 3> numbers{};
     if (key == "data") {
       header.data_at = end + 1;
-      if (header.size.x == 0) return fault("no size before its data", at);
+      if (header.size.x == 0) return bad_at(at, "no size before its data");
       return header;
     }
     const std::size_t wanted = key == "dim" || key == "translate" ? 3 : key == "scale" ? 1 : 0;
     if (!parse_numbers(line.substr(space), std::span(numbers).first(wanted))) {
-      return fault(std::string("a line without its numbers: ").append(key), at);
+      return bad_at(at, std::string("a line without its numbers: ").append(key));
     }
     if (key == "dim") {
       for (int axis = 0; axis < 3; ++axis) {
         const double edge = numbers.at(static_cast<std::size_t>(axis));
-        if (!(edge >= 1.0 && edge <= kMaxEdge)) return fault("a size out of range", at);
+        if (!(edge >= 1.0 && edge <= kMaxEdge)) return bad_at(at, "a size out of range");
         header.size[axis] = static_cast<int>(edge);
       }
     }
@@ -77,7 +69,7 @@ Result<BinvoxHeader> parse_binvox_header(std::span<const std::byte> bytes) {
     if (key == "scale") header.scale = numbers[0];
     at = end + 1;
   }
-  return fault("it has no data", text.size());
+  return bad_at(text.size(), "it has no data");
 }
 
 }  // namespace
@@ -107,10 +99,10 @@ Result<LoadedScene> read_binvox(std::span<const std::byte> bytes) {
   builder.begin(std::move(model));
   std::uint64_t at = 0;
   for (std::size_t byte = header->data_at; at < volume; byte += 2) {
-    if (byte + 2 > bytes.size()) return fault("it ends before its voxels do", bytes.size());
+    if (byte + 2 > bytes.size()) return bad_at(bytes.size(), "it ends before its voxels do");
     const auto value = std::to_integer<unsigned>(bytes[byte]);
     std::uint64_t count = std::to_integer<unsigned>(bytes[byte + 1]);
-    if (count > volume - at) return fault("more voxels than its size has", byte);
+    if (count > volume - at) return bad_at(byte, "more voxels than its size has");
     while (count > 0) {
       const auto y = static_cast<int>(at % static_cast<std::uint64_t>(size.y));
       const std::uint64_t run = std::min(count, static_cast<std::uint64_t>(size.y - y));
@@ -140,7 +132,7 @@ bool is_cub(std::span<const std::byte> whole) {
 
 // x changes fastest, then what lies in the ground's plane, then the height: turned, so that up is +y.
 Result<LoadedScene> read_cub(std::span<const std::byte> bytes) {
-  if (!is_cub(bytes)) return fault("its size does not fit its three sizes", 0);
+  if (!is_cub(bytes)) return bad_at(0, "its size does not fit its three sizes");
   ByteReader reader(bytes);
   const auto width = static_cast<int>(reader.u32());
   const auto depth = static_cast<int>(reader.u32());

@@ -23,10 +23,6 @@ constexpr std::size_t kPaletteBytes = 768;
 // Ground that no surface shows has no colour in the file.
 constexpr Rgba8 kEarth{101, 77, 51, 255};
 
-Error fault(std::string what, std::size_t at) {
-  return make_error(ErrorCode::BadFormat, std::move(what), {}, at);
-}
-
 struct Sizes {
   int x = 0, y = 0, z = 0;  ///< in the file's axes
   [[nodiscard]] IVec3 place(int at_x, int at_y, int at_z) const { return {at_x, z - 1 - at_z, at_y}; }
@@ -74,7 +70,7 @@ Result<LoadedScene> read_kv6(std::span<const std::byte> bytes) {
   ByteReader reader(bytes);
   static_cast<void>(reader.u32());
   const auto sizes = read_sizes(reader);
-  if (!sizes) return fault("a size out of range", 4);
+  if (!sizes) return bad_at(4, "a size out of range");
   const float pivot_x = reader.f32();
   const float pivot_y = reader.f32();
   const float pivot_z = reader.f32();
@@ -82,7 +78,7 @@ Result<LoadedScene> read_kv6(std::span<const std::byte> bytes) {
   ByteReader voxel = reader;
   static_cast<void>(reader.take(voxels * 8));
   static_cast<void>(reader.take(std::size_t{4} * static_cast<std::size_t>(sizes->x)));  // voxels of each x
-  if (reader.failed()) return fault("it ends before its voxels do", bytes.size());
+  if (reader.failed()) return bad_at(bytes.size(), "it ends before its voxels do");
   ModelBuilder builder;
   builder.begin(model_of(*sizes, DVec3(pivot_x, pivot_y, pivot_z)));
   std::size_t read = 0;
@@ -90,22 +86,22 @@ Result<LoadedScene> read_kv6(std::span<const std::byte> bytes) {
     for (int y = 0; y < sizes->y; ++y) {
       const std::size_t at = reader.position();
       const std::size_t count = reader.u16();
-      if (reader.failed()) return fault("it ends before its columns do", bytes.size());
+      if (reader.failed()) return bad_at(bytes.size(), "it ends before its columns do");
       read += count;
-      if (read > voxels) return fault("columns of more voxels than it has", at);
+      if (read > voxels) return bad_at(at, "columns of more voxels than it has");
       for (std::size_t i = 0; i < count; ++i) {
         const std::size_t place = voxel.position();
         const Rgba8 colour = colour_of(voxel.take(4));
         const int z = voxel.u16();
         static_cast<void>(voxel.u16());  // faces that are seen, and a normal
-        if (z >= sizes->z) return fault("a voxel below its model", place);
+        if (z >= sizes->z) return bad_at(place, "a voxel below its model");
         if (auto put = builder.put(sizes->place(x, y, z), colour); !put) return put.error();
       }
     }
   }
   if (read != voxels)
-    return fault("columns of " + std::to_string(read) + " of its " + std::to_string(voxels) + " voxels",
-                 reader.position());
+    return bad_at(reader.position(),
+                  "columns of " + std::to_string(read) + " of its " + std::to_string(voxels) + " voxels");
   return builder.take("voxlap");
 }
 
@@ -147,7 +143,7 @@ bool is_kvx(std::span<const std::byte> whole) {
 
 Result<LoadedScene> read_kvx(std::span<const std::byte> bytes) {
   const auto layout = kvx_layout(bytes);
-  if (!layout) return fault("its tables do not fit its size", 0);
+  if (!layout) return bad_at(0, "its tables do not fit its size");
   const Sizes& sizes = layout->sizes;
   const std::span<const std::byte> palette = bytes.last(kPaletteBytes);
   ModelBuilder builder;
@@ -163,7 +159,7 @@ Result<LoadedScene> read_kvx(std::span<const std::byte> bytes) {
       const std::size_t end = of_y.u16();
       const std::size_t from = layout->tables + first + std::exchange(begin, end);
       const std::size_t to = layout->tables + first + end;
-      if (from > to || to > layout->end) return fault("a column outside of its model", of_y.position() - 2);
+      if (from > to || to > layout->end) return bad_at(of_y.position() - 2, "a column outside of its model");
       ByteReader slab(bytes, from, to);
       while (slab.remaining() > 0) {
         const std::size_t at = slab.position();
@@ -171,7 +167,7 @@ Result<LoadedScene> read_kvx(std::span<const std::byte> bytes) {
         const int length = slab.u8();
         static_cast<void>(slab.u8());  // faces that are seen
         const auto indices = slab.take(static_cast<std::size_t>(length));
-        if (slab.failed() || top + length > sizes.z) return fault("a slab that does not fit its column", at);
+        if (slab.failed() || top + length > sizes.z) return bad_at(at, "a slab that does not fit its column");
         for (int i = 0; i < length; ++i) {
           const auto index = std::to_integer<std::uint8_t>(indices[static_cast<std::size_t>(i)]);
           if (auto put = builder.put(sizes.place(x, y, top + i), colour_of(palette, index)); !put) return put.error();
@@ -192,7 +188,7 @@ bool is_slab6(std::span<const std::byte> whole) {
 }
 
 Result<LoadedScene> read_slab6(std::span<const std::byte> bytes) {
-  if (!is_slab6(bytes)) return fault("its size does not fit its three sizes", 0);
+  if (!is_slab6(bytes)) return bad_at(0, "its size does not fit its three sizes");
   constexpr std::uint8_t kEmpty = 255;
   ByteReader reader(bytes);
   const Sizes sizes = *read_sizes(reader);
@@ -300,7 +296,7 @@ Result<LoadedScene> read_vxl(std::span<const std::byte> bytes) {
         done = builder.put(sizes.place(x, y, z + count - 1), colour != nullptr ? colour_of(*colour) : kEarth, count);
       };
       if (!read_column(reader, sizes.z, take)) {
-        return fault("column (" + std::to_string(x) + ", " + std::to_string(y) + ") does not fit its map", at);
+        return bad_at(at, "column (" + std::to_string(x) + ", " + std::to_string(y) + ") does not fit its map");
       }
       if (!done) return done.error();
     }

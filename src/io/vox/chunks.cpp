@@ -239,10 +239,6 @@ Status parse_chunks(std::span<const std::byte> bytes, std::size_t begin, std::si
 
 }  // namespace
 
-Error bad_at(std::uint64_t offset, std::string message) {
-  return make_error(ErrorCode::BadFormat, std::move(message), {}, offset);
-}
-
 std::string_view Dict::get(std::string_view key) const {
   const auto found =
       std::find_if(entries.rbegin(), entries.rend(), [&](const auto& entry) { return entry.first == key; });

@@ -154,9 +154,6 @@ inline constexpr std::size_t kChunkHeaderBytes = 12;
 /// Errors: BadFormat with the byte offset, for damaged data and for more or fewer voxels than the box has.
 [[nodiscard]] Result<std::vector<std::byte>> unpack_voxels(std::span<const std::byte> file, const Model& model);
 
-/// BadFormat at `offset`.
-[[nodiscard]] Error bad_at(std::uint64_t offset, std::string message);
-
 // One chunk's content each; `reader` covers exactly that content.
 class ChunkReader;
 [[nodiscard]] Status parse_transform(ChunkReader& chunk, Document& out);

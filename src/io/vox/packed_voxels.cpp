@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "io/byte_reader.h"
 #include "io/byte_stream.h"
 #include "io/vox/chunks.h"
 

@@ -5,6 +5,8 @@
 
 #include <quoin/core/assert.h>
 
+#include "io/byte_reader.h"
+
 namespace quoin::vox {
 
 namespace {
