@@ -1,7 +1,5 @@
 #include "world_window.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include <glm/geometric.hpp>
+#include <quoin/core/memory.h>
 #include <quoin/store/world_care.h>
 
 namespace quoin::viewer {
@@ -30,10 +29,8 @@ constexpr double kGround = 8.0;
 
 std::size_t quarter_of_memory() {
   constexpr std::size_t kLeast = std::size_t{256} << 20;
-  const long pages = sysconf(_SC_PHYS_PAGES);
-  const long page = sysconf(_SC_PAGESIZE);
-  if (pages <= 0 || page <= 0) return 4 * kLeast;
-  return std::max(kLeast, static_cast<std::size_t>(pages) / 4 * static_cast<std::size_t>(page));
+  const auto left = available_memory();
+  return left ? std::max(kLeast, static_cast<std::size_t>(*left / 4)) : 4 * kLeast;
 }
 
 DVec3 middle_of(const DBox& box) {
@@ -64,6 +61,7 @@ WorldWindow::WorldWindow(StreamedWorld world, const WorldOptions& options, std::
     : world_(std::move(world)), options_(options), other_bytes_(std::move(other_bytes)) {}
 
 Result<WorldWindow> WorldWindow::open(const std::filesystem::path& path, const WorldOptions& options) {
+  return_freed_memory();
   const auto other_bytes = std::make_shared<std::size_t>(0);
   StreamOptions stream;
   stream.budget_bytes = options.memory_bytes == 0 ? quarter_of_memory() : options.memory_bytes;

@@ -14,7 +14,7 @@ namespace quoin::viewer {
 
 /// How a world on disk is opened.
 struct WorldOptions {
-  std::size_t memory_bytes = 0;  ///< for its chunks and what is made of them; 0: a quarter of the machine's
+  std::size_t memory_bytes = 0;  ///< for its chunks and what is made of them; 0: a quarter of `available_memory`
   /// World units around the camera within which all is loaded, where memory suffices; 0: 640 of the smallest voxels.
   double distance = 0.0;
   bool may_write = true;  ///< what is edited, and what generators make, is saved

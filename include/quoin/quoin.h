@@ -23,6 +23,7 @@
 #include <quoin/core/half.h>
 #include <quoin/core/hash.h>
 #include <quoin/core/image.h>
+#include <quoin/core/memory.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/ref.h>

@@ -1,6 +1,7 @@
 // stream/flight: 100 voxels a second over a landscape that is generated, meshed, edited, saved and let go of meanwhile,
 // at 60 frames a second. What it takes of the caller's thread, and what is in memory. QUOIN_FLIGHT_SECONDS: how long;
-// QUOIN_FLIGHT_RADIUS: of the viewer; QUOIN_FLIGHT_BUDGET: MiB; QUOIN_FLIGHT_PLOT: a file for a line a second.
+// QUOIN_FLIGHT_RADIUS: of the viewer; QUOIN_FLIGHT_BUDGET: MiB; QUOIN_FLIGHT_PLOT: a file for a line a second;
+// QUOIN_FLIGHT_KEEPS: the allocator keeps what is freed.
 
 #include <time.h>
 #include <unistd.h>
@@ -19,6 +20,7 @@
 #include <vector>
 
 #include <benchmark/benchmark.h>
+#include <quoin/core/memory.h>
 #include <quoin/live/live_meshes.h>
 #include <quoin/stream/streamed_world.h>
 
@@ -220,6 +222,8 @@ Status fly_through(Flight& flight, benchmark::State& state) {
 }
 
 void fly(benchmark::State& state, bool is_smooth) {
+  // As programs that stream do; QUOIN_FLIGHT_KEEPS: as those that do not.
+  if (std::getenv("QUOIN_FLIGHT_KEEPS") == nullptr) return_freed_memory();
   for (auto _ : state) {
     const WorldFolder folder;
     Flight* flying = nullptr;

@@ -30,7 +30,7 @@ struct Viewer {
 
 struct StreamOptions {
   /// For what is loaded and what is made of it (`other_bytes`) together: where it does not suffice, less than the
-  /// viewers' radius is loaded.
+  /// viewers' radius is loaded. What the process has resident keeps to it by `return_freed_memory`.
   std::size_t budget_bytes = std::size_t{1} << 30;
   /// Bytes that are kept elsewhere because of what is loaded: meshes, trees, light, device memory. Asked for by
   /// `update`, ten times a second. May be empty.

@@ -209,7 +209,7 @@ Status Connection::set_up(Mode mode) {
         return SQLITE_OK;
       },
       log_pages_.get());
-  return run("PRAGMA cache_size=-8192");
+  return run("PRAGMA cache_size=-2048");
 }
 
 Result<Statement> Connection::prepare(std::string_view sql) {

@@ -1,10 +1,10 @@
 #include <string>
 #include <utility>
 
+#include <quoin/core/memory.h>
 #include <quoin/store/world_meshes.h>
 #include <quoin/store/world_saver.h>
 
-#include "core/available_memory.h"
 #include "io/world_format.h"
 #include "store/world/world_changes.h"
 

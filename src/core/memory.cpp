@@ -1,7 +1,10 @@
-#include "core/available_memory.h"
+#include <quoin/core/memory.h>
 
 #include <sys/resource.h>
 #include <unistd.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <algorithm>
 #include <fstream>
@@ -76,6 +79,16 @@ std::optional<std::uint64_t> available_memory() {
     if (each) least = std::min(least.value_or(*each), *each);
   }
   return least;
+}
+
+bool return_freed_memory() {
+#ifdef __GLIBC__
+  // A size that is set stays: glibc would raise it to the largest block that was freed, and keep all below in its arenas.
+  constexpr int kLargeBlock = 32 * 1024;
+  return ::mallopt(M_MMAP_THRESHOLD, kLargeBlock) == 1;
+#else
+  return false;
+#endif
 }
 
 }  // namespace quoin
