@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 
 #include <quoin/io/chunk_source.h>
 #include <quoin/io/scene_file.h>
@@ -15,7 +16,9 @@
 #include "io/minecraft/region_file.h"
 #include "io/minecraft/schematic.h"
 #include "io/models/models.h"
+#include "io/models/write/write_models.h"
 #include "io/volume/header.h"
+#include "io/volume/write.h"
 #include "io/whole_file.h"
 #include "io/world_format.h"
 
@@ -31,18 +34,18 @@ constexpr std::array kFormats = {
     FormatInfo{FileFormat::Minecraft, "minecraft", ".mca",
                "worlds of Minecraft's (Java): folders, or regions of theirs", true, false, false, false},
     FormatInfo{FileFormat::Schematic, "schematic", ".schem",
-               "pieces of Minecraft's worlds, also .schematic, .litematic and structures (.nbt)", true, false, false,
+               "pieces of Minecraft's worlds, also .schematic, .litematic and structures (.nbt)", true, true, false,
                false, ".schematic .litematic .nbt"},
-    FormatInfo{FileFormat::Qubicle, "qubicle", ".qb", "Qubicle, also .qbt and .qef", true, false, false, false,
+    FormatInfo{FileFormat::Qubicle, "qubicle", ".qb", "Qubicle, also .qbt and .qef", true, true, false, false,
                ".qbt .qef"},
-    FormatInfo{FileFormat::Goxel, "goxel", ".gox", "Goxel", true, false, false, false},
+    FormatInfo{FileFormat::Goxel, "goxel", ".gox", "Goxel", true, true, false, false},
     FormatInfo{FileFormat::Voxlap, "voxlap", ".vxl",
-               "maps of Voxlap and Ace of Spades, also models: .kv6, .kvx and SLAB6's .vox", true, false, false, false,
+               "maps of Voxlap and Ace of Spades, also models: .kv6, .kvx and SLAB6's .vox", true, true, false, false,
                ".kv6 .kvx"},
-    FormatInfo{FileFormat::Binvox, "binvox", ".binvox", "binvox", true, false, false, false},
+    FormatInfo{FileFormat::Binvox, "binvox", ".binvox", "binvox", true, true, false, false},
     FormatInfo{FileFormat::CubeWorld, "cub", ".cub", "models of Cube World", true, false, false, false},
     FormatInfo{FileFormat::LuantiSchematic, "luanti", ".mts", "schematics of Luanti", true, false, false, false},
-    FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, false, false, true},
+    FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, true, false, true},
     FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes", true, false, false, true},
     FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true, false},
     FormatInfo{FileFormat::Gltf, "gltf", ".gltf", "glTF 2.0, JSON and .bin", false, true, true, false},
@@ -63,11 +66,13 @@ std::string lower_case_extension(const std::filesystem::path& path) {
   return extension;
 }
 
+/// What is written has one extension, what is read others, too.
 std::string extensions_with(bool FormatInfo::*ability) {
   std::vector<std::string_view> sorted;
   for (const FormatInfo& info : kFormats) {
     if (!(info.*ability)) continue;
     sorted.push_back(info.extension);
+    if (ability == &FormatInfo::writable) continue;
     for (std::string_view rest = info.also; !rest.empty();) {
       const std::size_t end = std::min(rest.find(' '), rest.size());
       sorted.push_back(rest.substr(0, end));
@@ -205,10 +210,38 @@ Result<FileFormat> format_for_saving(const std::filesystem::path& path) {
   return format->format;
 }
 
+/// What writes a format of models, whose losses are known when it is written; null where it is none.
+using WriteModel = Result<models::ModelBytes> (*)(const Scene&, const Progress&);
+WriteModel model_writer(FileFormat format) {
+  if (format == FileFormat::Schematic) return minecraft::write_schematic;
+  if (format == FileFormat::Qubicle) return models::write_qb;
+  if (format == FileFormat::Goxel) return models::write_goxel;
+  if (format == FileFormat::Voxlap) return models::write_vxl;
+  if (format == FileFormat::Binvox) return models::write_binvox;
+  if (format == FileFormat::Nifti) return write_nifti;
+  return nullptr;
+}
+
+std::vector<std::string> all_lost(std::vector<std::string> lines, const Saved& saved) {
+  std::vector<std::string> more = lost_with_source(saved);
+  std::ranges::move(more, std::back_inserter(lines));
+  return lines;
+}
+
+Result<SavedScene> save_model(Result<models::ModelBytes> file, const Saved& saved, const std::filesystem::path& path) {
+  if (!file) return file.error();
+  const auto bytes = write_whole(path, std::move(file->bytes));
+  if (!bytes) return bytes.error();
+  return SavedScene{*bytes, all_lost(std::move(file->warnings), saved)};
+}
+
 Result<SavedScene> save(const Saved& saved, const std::filesystem::path& path, Threads threads,
                         const Progress& progress) {
   const auto format = format_for_saving(path);
   if (!format) return format.error();
+  if (const WriteModel write = model_writer(*format); write != nullptr) {
+    return save_model(with_path(write(saved.scene, progress), path), saved, path);
+  }
   if (*format == FileFormat::Vox) {
     return saved.loaded != nullptr ? write_vox(*saved.loaded, path, progress) : write_vox(saved.scene, path, progress);
   }
@@ -231,6 +264,11 @@ Result<SavedScene> save(const Saved& saved, const std::filesystem::path& path, T
 Result<std::vector<std::string>> losses(const Saved& saved, const std::filesystem::path& path) {
   const auto format = format_for_saving(path);
   if (!format) return format.error();
+  if (const WriteModel write = model_writer(*format); write != nullptr) {
+    auto file = with_path(write(saved.scene, {}), path);
+    if (!file) return file.error();
+    return all_lost(std::move(file->warnings), saved);
+  }
   if (*format != FileFormat::Vox) return lost_with_source(saved);
   return with_path(saved.loaded != nullptr ? losses_of_vox(*saved.loaded) : losses_of_vox(saved.scene), path);
 }

@@ -59,7 +59,9 @@ TEST(Formats, NamesDecideWhatIsWritten) {
     const auto format = format_for_writing(name);
     ASSERT_FALSE(format) << name;
     EXPECT_EQ(format.error().code, ErrorCode::Unsupported);
-    EXPECT_NE(format.error().message.find(".glb, .gltf, .json, .obj, .ply, .quoin, .vox"), std::string::npos)
+    EXPECT_NE(format.error().message.find(
+                  ".binvox, .glb, .gltf, .gox, .json, .nii, .obj, .ply, .qb, .quoin, .schem, .vox, .vxl"),
+              std::string::npos)
         << format.error().message;
   }
 }

@@ -98,7 +98,8 @@ struct FormatInfo {
 [[nodiscard]] std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path);
 
 /// Writes a scene as a file of voxels, in the format of the name's extension: .quoin (write_world) or .json
-/// (write_scene_file), both without loss, or .vox (write_vox). It appears whole or not at all.
+/// (write_scene_file), both without loss, .vox (write_vox), or one of other programs: .qb, .gox, .vxl, .binvox, .schem,
+/// .nii. It appears whole or not at all. docs/formats/models.md says what each of these holds.
 ///
 /// Warnings: one line each of what the format does not hold.
 /// Errors:   Unsupported for other extensions; those of the format's writer; `path` is set in all.
@@ -109,7 +110,8 @@ struct FormatInfo {
 [[nodiscard]] Result<SavedScene> save_scene(const LoadedScene& loaded, const std::filesystem::path& path,
                                             Threads threads = {}, const Progress& progress = {});
 
-/// What `save_scene` would warn of, for who wants to ask before: nothing when all is kept. Cost: little beside saving.
+/// What `save_scene` would warn of, for who wants to ask before: nothing when all is kept. Cost: little beside saving,
+/// but of formats of other programs that of making the file.
 /// Errors: those of `save_scene` that are known before anything is written.
 [[nodiscard]] Result<std::vector<std::string>> losses_of_saving(const Scene& scene, const std::filesystem::path& path);
 [[nodiscard]] Result<std::vector<std::string>> losses_of_saving(const LoadedScene& loaded,

@@ -192,6 +192,7 @@ Status SchematicReader::read_sponge(nbt::Value schematic) {
   if (!palette) return palette.error();
   Region region;
   region.name = schematic["Metadata"]["Name"].text().value_or("");
+  region.min = vector_of_list(schematic["Offset"]).value_or(IVec3(0));
   region.size = *size;
   region.palette = std::move(*palette);
   block_entities_ += nbt::first_of(holder, "BlockEntities", "TileEntities").count();

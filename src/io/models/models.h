@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 #include <quoin/core/result.h>
+#include <quoin/grid/voxel_registry.h>
 #include <quoin/io/loaded_scene.h>
 
 // Formats of voxel models, and of maps that are one. docs/formats/models.md says what of each is read.
@@ -30,6 +32,9 @@ namespace quoin::models {
 [[nodiscard]] Result<LoadedScene> read_kvx(std::span<const std::byte> bytes);
 [[nodiscard]] bool is_slab6(std::span<const std::byte> whole);
 [[nodiscard]] Result<LoadedScene> read_slab6(std::span<const std::byte> bytes);
+/// Ground of a .vxl that no surface shows has no colour in the file: this one.
+inline constexpr Rgba8 kEarth{101, 77, 51, 255};
+inline constexpr std::uint32_t kVoxlapMagic = 0x09072000;
 [[nodiscard]] bool is_vxl(std::span<const std::byte> whole);
 [[nodiscard]] Result<LoadedScene> read_vxl(std::span<const std::byte> bytes);
 

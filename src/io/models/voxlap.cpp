@@ -20,8 +20,6 @@ namespace {
 
 constexpr std::uint32_t kMaxEdge = 4096;
 constexpr std::size_t kPaletteBytes = 768;
-// Ground that no surface shows has no colour in the file.
-constexpr Rgba8 kEarth{101, 77, 51, 255};
 
 struct Sizes {
   int x = 0, y = 0, z = 0;  ///< in the file's axes
@@ -209,7 +207,6 @@ Result<LoadedScene> read_slab6(std::span<const std::byte> bytes) {
 
 namespace {
 
-constexpr std::uint32_t kVoxlapMagic = 0x09072000;
 constexpr Sizes kAceOfSpades{512, 512, 64};
 constexpr Sizes kVoxlapMap{1024, 1024, 256};
 

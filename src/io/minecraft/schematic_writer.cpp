@@ -1,0 +1,195 @@
+// A schematic of Sponge's, version 2, which most programs read: a palette of blocks, and an index of it for each place.
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <quoin/core/thousands.h>
+
+#include "core/progress_steps.h"
+#include "io/byte_stream.h"
+#include "io/minecraft/block_looks.h"
+#include "io/minecraft/block_states.h"
+#include "io/minecraft/nbt_writer.h"
+#include "io/minecraft/schematic.h"
+
+namespace quoin::minecraft {
+
+namespace {
+
+constexpr models::FormatHolds kHolds = {
+    .extension = ".schem", .transparency = true, .materials = true, .type_names = true};
+constexpr int kMaxEdge = 65'535;
+constexpr std::int64_t kMaxBlocks = std::int64_t{1} << 30;
+constexpr std::int32_t kVersion = 2;
+// The game's 1.20.1.
+constexpr std::int32_t kDataVersion = 3465;
+
+constexpr std::array<std::string_view, 16> kDyes = {"white", "orange", "magenta",    "light_blue", "yellow", "lime",
+                                                    "pink",  "gray",   "light_gray", "cyan",       "purple", "blue",
+                                                    "brown", "green",  "red",        "black"};
+
+/// Blocks of one colour that fill their place.
+std::vector<std::string> plain_blocks() {
+  std::vector<std::string> names = {
+      "stone",         "smooth_stone", "deepslate",       "dirt",       "sand",       "red_sand",   "oak_planks",
+      "spruce_planks", "birch_planks", "dark_oak_planks", "snow_block", "bricks",     "obsidian",   "iron_block",
+      "gold_block",    "quartz_block", "netherrack",      "end_stone",  "prismarine", "coal_block", "diamond_block",
+      "emerald_block", "lapis_block",  "terracotta"};
+  for (const std::string_view kind : {"_concrete", "_wool", "_terracotta"}) {
+    for (const std::string_view dye : kDyes) names.push_back(std::string(dye).append(kind));
+  }
+  return names;
+}
+
+std::vector<std::string> glass_blocks() {
+  std::vector<std::string> names;
+  for (const std::string_view dye : kDyes) names.push_back(std::string(dye).append("_stained_glass"));
+  return names;
+}
+
+std::vector<std::string> light_blocks() {
+  return {"glowstone", "sea_lantern", "shroomlight", "ochre_froglight", "verdant_froglight", "pearlescent_froglight"};
+}
+
+/// Blocks, of which one is found by a colour.
+class Blocks {
+ public:
+  explicit Blocks(const std::vector<std::string>& names) {
+    for (const std::string& name : names) all_.emplace_back(name, look_of_block(name, false, false).colour);
+  }
+  /// The one of the nearest colour, as eyes weigh its channels.
+  [[nodiscard]] std::string nearest(Rgba8 colour) const {
+    const auto distance = [&](Rgba8 other) {
+      const auto squared = [](int a, int b) { return (a - b) * (a - b); };
+      return 2 * squared(colour.r, other.r) + 4 * squared(colour.g, other.g) + 3 * squared(colour.b, other.b);
+    };
+    const auto found = std::ranges::min_element(
+        all_, [&](const auto& a, const auto& b) { return distance(a.second) < distance(b.second); });
+    return "minecraft:" + found->first;
+  }
+
+ private:
+  std::vector<std::pair<std::string, Rgba8>> all_;
+};
+
+/// The blocks of a scene's types, and their numbers.
+class Palette {
+ public:
+  explicit Palette(const VoxelRegistry& types) : types_(types), guessed_(types.size(), false) {
+    static_cast<void>(number_of("minecraft:air"));
+    plain_.assign(types.size(), kNone);
+    plain_[kAir] = 0;
+  }
+  [[nodiscard]] std::int32_t number(VoxelType type, std::uint32_t state) {
+    if (state == 0 && plain_[type] != kNone) return plain_[type];
+    const std::int32_t number = number_of(text_of(type, state));
+    if (state == 0) plain_[type] = number;
+    return number;
+  }
+  /// By their names.
+  [[nodiscard]] const std::map<std::string, std::int32_t>& all() const { return numbers_; }
+  [[nodiscard]] std::int64_t guessed() const { return std::ranges::count(guessed_, true); }
+
+ private:
+  static constexpr std::int32_t kNone = -1;
+  std::int32_t number_of(const std::string& text) {
+    return numbers_.try_emplace(text, static_cast<std::int32_t>(numbers_.size())).first->second;
+  }
+  [[nodiscard]] std::string text_of(VoxelType type, std::uint32_t state) {
+    const VoxelProperties& properties = types_[type];
+    const bool is_block =
+        properties.attributes.contains(kStatesAttribute) || properties.name.find(':') != std::string::npos;
+    if (is_block) return to_string(block_text(properties, state));
+    guessed_[type] = true;
+    static const Blocks kPlain(plain_blocks());
+    static const Blocks kGlass(glass_blocks());
+    static const Blocks kLights(light_blocks());
+    if (properties.emission > 0.0F) return kLights.nearest(properties.colour);
+    return (properties.visibility == Visibility::Transparent ? kGlass : kPlain).nearest(properties.colour);
+  }
+
+  const VoxelRegistry& types_;
+  std::map<std::string, std::int32_t> numbers_;
+  std::vector<std::int32_t> plain_;  // of types without a state
+  std::vector<bool> guessed_;
+};
+
+/// Seven bits a byte, the lowest first; the eighth says that more is to come.
+void put_varint(std::uint32_t value, std::vector<std::byte>& out) {
+  for (; value >= 0x80; value >>= 7) out.push_back(static_cast<std::byte>(value | 0x80));
+  out.push_back(static_cast<std::byte>(value));
+}
+
+Result<std::vector<std::byte>> blocks_of(const VoxelRegistry& types, const models::MergedGrid& merged, Palette& palette,
+                                         const Progress& progress) {
+  const IBox& box = merged.box;
+  std::vector<std::byte> blocks;
+  std::vector<VoxelType> row(static_cast<std::size_t>(box.size().x));
+  ProgressSteps steps(progress, static_cast<std::size_t>(box.size().y));
+  for (int y = box.min.y; y < box.max.y; ++y) {
+    for (int z = box.min.z; z < box.max.z; ++z) {
+      models::read_voxels(merged.voxels, {box.min.x, y, z}, row);
+      for (std::size_t x = 0; x < row.size(); ++x) {
+        const bool has_state = row[x] != kAir && types[row[x]].state_bits != 0;
+        const IVec3 voxel{box.min.x + static_cast<int>(x), y, z};
+        const std::uint32_t state = has_state ? merged.voxels.data(voxel).state : 0;
+        put_varint(static_cast<std::uint32_t>(palette.number(row[x], state)), blocks);
+      }
+    }
+    steps.step();
+    if (steps.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
+  }
+  return blocks;
+}
+
+}  // namespace
+
+Result<models::ModelBytes> write_schematic(const Scene& scene, const Progress& progress) {
+  auto merged = models::merge_grids(scene, kHolds);
+  if (!merged) return merged.error();
+  if (merged->box.empty()) return make_error(ErrorCode::Unsupported, "there are no voxels, and .schem needs some");
+  const IVec3 size = merged->box.size();
+  if (std::max({size.x, size.y, size.z}) > kMaxEdge || std::int64_t{size.x} * size.y > kMaxBlocks / size.z) {
+    return make_error(ErrorCode::LimitExceeded, "more than 65,535 blocks a side, or 2^30 in all");
+  }
+  Palette palette(scene.types);
+  const auto blocks = blocks_of(scene.types, *merged, palette, progress);
+  if (!blocks) return blocks.error();
+  nbt::DocumentWriter out;
+  out.begin("Schematic");
+  out.int32("Version", kVersion);
+  out.int32("DataVersion", kDataVersion);
+  out.begin("Metadata");
+  out.string("Name", merged->name);
+  out.end();
+  out.int16("Width", static_cast<std::int16_t>(size.x));
+  out.int16("Height", static_cast<std::int16_t>(size.y));
+  out.int16("Length", static_cast<std::int16_t>(size.z));
+  const std::array<std::int32_t, 3> offset = {merged->box.min.x, merged->box.min.y, merged->box.min.z};
+  out.ints("Offset", offset);
+  out.int32("PaletteMax", static_cast<std::int32_t>(palette.all().size()));
+  out.begin("Palette");
+  for (const auto& [name, number] : palette.all()) out.int32(name, number);
+  out.end();
+  out.bytes("BlockData", *blocks);
+  out.empty_list("BlockEntities");
+  out.end();
+  if (merged->voxel_size != 1.0) {
+    merged->warnings.emplace_back("the size of voxels is left out, which .schem does not hold");
+  }
+  if (palette.guessed() != 0) {
+    merged->warnings.push_back("types that are no blocks of the game became those of the nearest colour: " +
+                               with_thousands(palette.guessed()));
+  }
+  constexpr std::size_t kMost = (std::size_t{1} << 31) - 1;
+  if (out.document().size() > kMost) return make_error(ErrorCode::LimitExceeded, "more than 2 GiB of blocks");
+  constexpr int kLevel = 6;
+  return models::ModelBytes{gzipped(out.document(), kLevel), std::move(merged->warnings)};
+}
+
+}  // namespace quoin::minecraft

@@ -1,0 +1,395 @@
+#include "io/models/write/write_models.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <quoin/core/axis_orientation.h>
+#include <quoin/io/file.h>
+#include <quoin/io/formats.h>
+#include <quoin/io/volume.h>
+
+#include "io/minecraft/schematic.h"
+#include "io/models/models.h"
+#include "io/placed/placed_grids.h"
+#include "io/volume/write.h"
+
+namespace quoin::models {
+namespace {
+
+namespace fs = std::filesystem;
+
+VoxelProperties type_of(Rgba8 colour, const std::string& name = "") {
+  VoxelProperties type;
+  type.name = name;
+  type.colour = colour;
+  type.visibility = colour.a == 255 ? Visibility::Opaque : Visibility::Transparent;
+  return type;
+}
+
+/// Two models: one at its place, one turned and mirrored. Of three colours, one transparent.
+Scene two_models() {
+  Scene scene;
+  const VoxelType red = *scene.types.add(type_of({200, 10, 20, 255}));
+  const VoxelType green = *scene.types.add(type_of({20, 180, 30, 255}));
+  const VoxelType glass = *scene.types.add(type_of({40, 60, 220, 128}));
+  SceneGrid grid;
+  grid.name = "step";
+  grid.grid.fill_box({{0, 0, 0}, {70, 2, 3}}, red);
+  grid.grid.fill_box({{0, 2, 0}, {1, 5, 1}}, green);
+  grid.grid.set(5, 3, 2, glass);
+  const GridHandle handle = scene.add_grid(std::move(grid));
+  Instance first;
+  first.name = "first";
+  first.grid = handle;
+  first.position = {10.0, 4.0, 20.0};
+  scene.add_instance(first);
+  Instance second;
+  second.name = "second";
+  second.grid = handle;
+  second.position = {200.0, 7.0, 120.0};
+  second.rotation = glm::quat_cast(AxisOrientation::quarter_turns(1, 1).matrix());
+  second.mirrored = true;
+  scene.add_instance(second);
+  return scene;
+}
+
+using Voxels = std::map<std::tuple<int, int, int>, std::tuple<int, int, int, int>>;
+
+/// Colours of the world's voxels, which are one unit large.
+Voxels voxels_of(const Scene& scene) {
+  FormatHolds all;
+  all.extension = "test";
+  const auto merged = merge_grids(scene, all);
+  EXPECT_TRUE(merged) << to_string(merged.error());
+  const auto colours = colours_of(scene.types);
+  Voxels voxels;
+  merged->voxels.for_each([&](IVec3 v, VoxelType type) {
+    const Rgba8 c = colours[type];
+    voxels[{v.x, v.y, v.z}] = {c.r, c.g, c.b, c.a};
+  });
+  return voxels;
+}
+
+/// The same colours at the same places.
+bool are_alike(const Scene& a, const Scene& b) {
+  const auto of_a = merge_grids(a, {});
+  const auto of_b = merge_grids(b, {});
+  if (!of_a || !of_b || of_a->voxels.voxel_count() != of_b->voxels.voxel_count()) return false;
+  const auto colours_a = colours_of(a.types);
+  const auto colours_b = colours_of(b.types);
+  const IBox box = of_a->voxels.bounds();
+  std::vector<VoxelType> row_a(static_cast<std::size_t>(box.size().x));
+  std::vector<VoxelType> row_b(row_a.size());
+  for (int z = box.min.z; z < box.max.z; ++z) {
+    for (int y = box.min.y; y < box.max.y; ++y) {
+      read_voxels(of_a->voxels, {box.min.x, y, z}, row_a);
+      read_voxels(of_b->voxels, {box.min.x, y, z}, row_b);
+      for (std::size_t x = 0; x < row_a.size(); ++x) {
+        if (colours_a[row_a[x]] != colours_b[row_b[x]]) return false;
+      }
+    }
+  }
+  return true;
+}
+
+TEST(PlacedGrids, TurnsAndMirrorsAsInstancesDo) {
+  const Scene scene = two_models();
+  const Voxels voxels = voxels_of(scene);
+  std::size_t expected = 0;
+  scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
+    const SceneGrid& grid = scene.grids()[instance.grid];
+    grid.grid.for_each([&](IVec3 v, VoxelType type) {
+      const DVec3 at = world_from_grid(instance, grid, DVec3(v) + 0.5);
+      const IVec3 voxel = voxel_of(at);
+      const auto found = voxels.find({voxel.x, voxel.y, voxel.z});
+      ASSERT_NE(found, voxels.end());
+      EXPECT_EQ(std::get<0>(found->second), scene.types[type].colour.r);
+      ++expected;
+    });
+  });
+  EXPECT_EQ(voxels.size(), expected);
+}
+
+TEST(WriteModels, QubicleIsReadAgainAsItWas) {
+  const Scene scene = two_models();
+  const auto file = write_qb(scene);
+  ASSERT_TRUE(file) << to_string(file.error());
+  EXPECT_TRUE(file->warnings.empty()) << file->warnings.front();
+  const auto read = read_qubicle(file->bytes);
+  ASSERT_TRUE(read) << to_string(read.error());
+  EXPECT_EQ(read->scene.instances().size(), 2U);
+  EXPECT_EQ(voxels_of(read->scene), voxels_of(scene));
+  const auto again = write_qb(read->scene);
+  ASSERT_TRUE(again);
+  EXPECT_TRUE(again->bytes == file->bytes);
+}
+
+TEST(WriteModels, GoxelKeepsMaterialsAndWhatIsHidden) {
+  Scene scene = two_models();
+  VoxelProperties metal = type_of({90, 90, 90, 255}, "metal");
+  metal.metalness = 0.75F;
+  metal.roughness = 0.25F;
+  metal.emission = 2.0F;
+  const VoxelType type = *scene.types.add(metal);
+  const GridHandle grid = scene.grids().handles().front();
+  scene.edit(grid).grid.set(-20, 1, -33, type);
+  scene.edit(scene.instances().handles().back()).visible = false;
+  const auto file = write_goxel(scene);
+  ASSERT_TRUE(file) << to_string(file.error());
+  const auto read = read_goxel(file->bytes);
+  ASSERT_TRUE(read) << to_string(read.error());
+  // A layer for what is opaque, for glass and for metal, twice.
+  EXPECT_EQ(read->scene.instances().size(), 6U);
+  std::size_t hidden = 0;
+  read->scene.instances().for_each(
+      [&](InstanceHandle, const Instance& instance) { hidden += instance.visible ? 0 : 1; });
+  EXPECT_EQ(hidden, 3U);
+  EXPECT_EQ(voxels_of(read->scene), voxels_of(scene));
+  bool has_metal = false;
+  for (std::size_t i = 1; i < read->scene.types.size(); ++i) {
+    const VoxelProperties& t = read->scene.types[static_cast<VoxelType>(i)];
+    has_metal |= t.metalness == 0.75F && t.roughness == 0.25F && t.emission == 2.0F && t.colour.r == 90;
+  }
+  EXPECT_TRUE(has_metal);
+  ASSERT_EQ(file->warnings.size(), 2U);
+  EXPECT_NE(file->warnings[0].find("names"), std::string::npos) << file->warnings[0];
+  EXPECT_NE(file->warnings[1].find("several layers, since a layer has one material: 2"), std::string::npos);
+}
+
+TEST(WriteModels, BinvoxKeepsPlaceAndSize) {
+  Scene scene = two_models();
+  for (const InstanceHandle handle : scene.instances().handles()) scene.edit(handle).voxel_size = 0.25;
+  const auto file = write_binvox(scene);
+  ASSERT_TRUE(file) << to_string(file.error());
+  ASSERT_EQ(file->warnings.size(), 3U);
+  const auto read = read_binvox(file->bytes);
+  ASSERT_TRUE(read) << to_string(read.error());
+  const Instance& instance = *read->scene.instances().find(read->scene.instances().handles().front());
+  EXPECT_DOUBLE_EQ(instance.voxel_size, 0.25);
+  FormatHolds all;
+  const auto before = merge_grids(scene, all);
+  const auto after = merge_grids(read->scene, all);
+  EXPECT_EQ(after->box, before->box);
+  EXPECT_EQ(after->voxels.voxel_count(), before->voxels.voxel_count());
+  after->voxels.for_each([&](IVec3 v, VoxelType) { EXPECT_NE(before->voxels.get(v), kAir); });
+}
+
+TEST(WriteModels, MapsKeepEveryColourAndGetGround) {
+  Scene scene = two_models();
+  const auto file = write_vxl(scene);
+  ASSERT_TRUE(file) << to_string(file.error());
+  ASSERT_TRUE(is_vxl(file->bytes));
+  const auto read = read_vxl(file->bytes);
+  ASSERT_TRUE(read) << to_string(read.error());
+  Voxels expected = voxels_of(scene);
+  for (auto& [place, colour] : expected) std::get<3>(colour) = 255;  // nothing is transparent there
+  std::size_t ground = 0;
+  const Voxels found = voxels_of(read->scene);
+  for (const auto& [place, colour] : found) {
+    const auto wanted = expected.find(place);
+    if (wanted != expected.end()) {
+      EXPECT_EQ(wanted->second, colour);
+      continue;
+    }
+    ++ground;
+    EXPECT_EQ(std::get<1>(place), 0);
+    EXPECT_EQ(colour, std::tuple(101, 77, 51, 255));
+  }
+  EXPECT_EQ(ground, 512U * 512U - static_cast<std::size_t>(std::ranges::count_if(
+                                      expected, [](const auto& e) { return std::get<1>(e.first) == 0; })));
+  EXPECT_EQ(found.size(), expected.size() + ground);
+  // What was read is written as it was read: nothing moves, and nothing is lost.
+  const auto again = write_vxl(read->scene);
+  ASSERT_TRUE(again);
+  EXPECT_TRUE(again->bytes == file->bytes);
+  EXPECT_TRUE(again->warnings.empty()) << again->warnings.front();
+}
+
+// Spans with a bottom, a top that fills them, and stretches without colours within.
+TEST(WriteModels, SpansOfMapsOfAnyForm) {
+  Scene scene;
+  const VoxelType red = *scene.types.add(type_of({200, 10, 20, 255}));
+  const VoxelType earth = *scene.types.add(type_of(kEarth));
+  SceneGrid grid;
+  grid.grid.fill_box({{0, 0, 0}, {512, 20, 512}}, earth);
+  grid.grid.fill_box({{100, 30, 100}, {140, 60, 140}}, earth);
+  grid.grid.set(120, 45, 120, red);  // in the middle of what nobody sees
+  grid.grid.fill_box({{50, 63, 50}, {60, 64, 60}}, red);
+  grid.grid.set(120, 8, 120, red);
+  const GridHandle handle = scene.add_grid(std::move(grid));
+  Instance instance;
+  instance.grid = handle;
+  scene.add_instance(instance);
+  const auto file = write_vxl(scene);
+  ASSERT_TRUE(file) << to_string(file.error());
+  EXPECT_TRUE(file->warnings.empty()) << file->warnings.front();
+  // Of 20 layers of earth the top one alone is seen.
+  EXPECT_LT(file->bytes.size(), std::size_t{512} * 512 * 9);
+  const auto read = read_vxl(file->bytes);
+  ASSERT_TRUE(read) << to_string(read.error());
+  EXPECT_TRUE(are_alike(read->scene, scene));
+}
+
+TEST(WriteModels, LargeMapsAreVoxlaps) {
+  Scene scene;
+  const VoxelType red = *scene.types.add(type_of({200, 10, 20, 255}));
+  SceneGrid grid;
+  grid.grid.fill_box({{-3, -9, -3}, {3, 190, 600}}, red);
+  Instance instance;
+  instance.grid = scene.add_grid(std::move(grid));
+  scene.add_instance(instance);
+  const auto file = write_vxl(scene);
+  ASSERT_TRUE(file) << to_string(file.error());
+  const auto read = read_vxl(file->bytes);
+  ASSERT_TRUE(read) << to_string(read.error());
+  const IBox bounds = read->scene.grids()[read->scene.grids().handles().front()].grid.bounds();
+  EXPECT_EQ(bounds.size(), IVec3(1024, 199, 1024));
+  EXPECT_TRUE(
+      std::ranges::any_of(file->warnings, [](const std::string& w) { return w.starts_with("moved to the middle"); }));
+  scene.edit(scene.grids().handles().front()).grid.set(0, 400, 0, red);
+  const auto refused = write_vxl(scene);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::LimitExceeded);
+}
+
+TEST(WriteModels, SchematicsHaveBlocksOfTheNearestColour) {
+  Scene scene = two_models();
+  const VoxelType stairs = *scene.types.add(type_of({100, 80, 50, 255}, "minecraft:oak_stairs"));
+  scene.edit(scene.grids().handles().front()).grid.set(-4, 9, -4, stairs);
+  const auto file = minecraft::write_schematic(scene);
+  ASSERT_TRUE(file) << to_string(file.error());
+  EXPECT_TRUE(std::ranges::any_of(file->warnings, [](const std::string& w) {
+    return w == "types that are no blocks of the game became those of the nearest colour: 3";
+  }));
+  const auto read = minecraft::read_schematic(file->bytes);
+  ASSERT_TRUE(read) << to_string(read.error());
+  Voxels expected = voxels_of(scene);
+  const Voxels found = voxels_of(read->scene);
+  ASSERT_EQ(found.size(), expected.size());
+  for (const auto& [place, colour] : found) EXPECT_TRUE(expected.contains(place));
+  std::vector<std::string> names;
+  for (std::size_t i = 1; i < read->scene.types.size(); ++i)
+    names.push_back(read->scene.types[static_cast<VoxelType>(i)].name);
+  std::ranges::sort(names);
+  EXPECT_EQ(names, (std::vector<std::string>{"minecraft:blue_stained_glass", "minecraft:lime_concrete",
+                                             "minecraft:oak_stairs", "minecraft:red_wool"}));
+  const auto again = minecraft::write_schematic(read->scene);
+  ASSERT_TRUE(again);
+  EXPECT_TRUE(again->bytes == file->bytes);
+}
+
+TEST(WriteModels, VolumesHoldTypesOrDensities) {
+  const Scene scene = two_models();
+  const auto file = write_nifti(scene);
+  ASSERT_TRUE(file) << to_string(file.error());
+  const auto volume = read_volume(file->bytes);
+  ASSERT_TRUE(volume) << to_string(volume.error());
+  EXPECT_EQ(volume->type, ScalarType::UInt8);
+  FormatHolds all;
+  const auto merged = merge_grids(scene, all);
+  std::int64_t solid = 0;
+  for (int k = 0; k < volume->size.z; ++k) {
+    for (int j = 0; j < volume->size.y; ++j) {
+      for (int i = 0; i < volume->size.x; ++i) {
+        const float value = volume->values[static_cast<std::size_t>(i + volume->size.x * (j + volume->size.y * k))];
+        const DVec3 at(volume->world_from_voxel * glm::dvec4(i, j, k, 1.0));
+        ASSERT_EQ(static_cast<VoxelType>(value), merged->voxels.get(voxel_of(at)));
+        solid += value > 0.0F ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_EQ(solid, merged->voxels.voxel_count());
+
+  Scene smooth;
+  const VoxelType type = *smooth.types.add(type_of({200, 10, 20, 255}));
+  SceneGrid grid;
+  grid.field.add_sphere({3.5, -2.0, 8.0}, 9.0, type);
+  Instance instance;
+  instance.grid = smooth.add_grid(std::move(grid));
+  instance.position = {5.0, 6.0, 7.0};
+  instance.voxel_size = 0.5;
+  smooth.add_instance(instance);
+  const auto densities = write_nifti(smooth);
+  ASSERT_TRUE(densities) << to_string(densities.error());
+  const auto read = read_volume(densities->bytes);
+  ASSERT_TRUE(read) << to_string(read.error());
+  const SceneGrid& held = smooth.grids()[instance.grid];
+  for (int k = 0; k < read->size.z; ++k) {
+    for (int j = 0; j < read->size.y; ++j) {
+      for (int i = 0; i < read->size.x; ++i) {
+        const float value = read->values[static_cast<std::size_t>(i + read->size.x * (j + read->size.y * k))];
+        const DVec3 world(read->world_from_voxel * glm::dvec4(i, j, k, 1.0));
+        const DVec3 sample = grid_from_world(instance, held, world);
+        ASSERT_NEAR(glm::length(sample - glm::round(sample)), 0.0, 1e-4);
+        ASSERT_EQ(value, -held.field.density(IVec3(glm::round(sample))));
+      }
+    }
+  }
+  EXPECT_GT(read->max, 0.0F);
+  EXPECT_LT(read->min, 0.0F);
+}
+
+TEST(WriteModels, RefuseWhatTheyWouldShowOtherwise) {
+  using Write = Result<ModelBytes> (*)(const Scene&, const Progress&);
+  for (const Write write : {Write{write_qb}, Write{write_goxel}, Write{write_vxl}, Write{write_binvox},
+                            Write{minecraft::write_schematic}, Write{write_nifti}}) {
+    Scene turned = two_models();
+    turned.edit(turned.instances().handles().front()).rotation = glm::angleAxis(0.3, DVec3(0.0, 1.0, 0.0));
+    Scene scaled = two_models();
+    scaled.edit(scaled.instances().handles().front()).voxel_size = 2.0;
+    Scene far = two_models();
+    far.edit(far.instances().handles().front()).position.x = 1e12;
+    Scene with_field = two_models();
+    with_field.edit(with_field.grids().handles().front()).field.add_sphere({0.0, 0.0, 0.0}, 3.0, 1);
+    for (const Scene* const scene : {&turned, &scaled, &far, &with_field}) {
+      const auto refused = write(*scene, {});
+      ASSERT_FALSE(refused);
+      EXPECT_TRUE(refused.error().code == ErrorCode::Unsupported || refused.error().code == ErrorCode::LimitExceeded);
+      EXPECT_EQ(refused.error().message.find('\n'), std::string::npos);
+    }
+    const auto cancelled = write(two_models(), [](double) { return false; });
+    ASSERT_FALSE(cancelled);
+    EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
+    // An empty scene is a file, or said to be none.
+    const auto empty = write(Scene(), {});
+    EXPECT_TRUE(empty || empty.error().code == ErrorCode::Unsupported);
+  }
+}
+
+#ifdef QUOIN_SOURCE_DIR
+/// Real files, written again in their own format, are what they were.
+TEST(WriteModels, RealFilesAreReadAgainAsTheyWere) {
+  const fs::path data = fs::path(QUOIN_SOURCE_DIR) / "../shared/data";
+  if (!fs::exists(data)) GTEST_SKIP() << "no real files here: " << data;
+  std::map<std::string, int> tried;
+  for (const auto& entry : fs::recursive_directory_iterator(data)) {
+    const std::string extension = entry.path().extension().string();
+    constexpr std::array kExtensions = {".qb", ".gox", ".vxl", ".binvox", ".schem"};
+    if (std::ranges::find(kExtensions, extension) == kExtensions.end()) continue;
+    const auto read = load_scene(entry.path());
+    if (!read || tried[extension] >= 3) continue;
+    const fs::path copy = fs::temp_directory_path() / ("quoin_written" + extension);
+    const auto written = save_scene(read->scene, copy);
+    ASSERT_TRUE(written) << entry.path() << ": " << to_string(written.error());
+    const auto again = load_scene(copy);
+    ASSERT_TRUE(again) << entry.path() << ": " << to_string(again.error());
+    if (extension == ".binvox") {
+      EXPECT_EQ(again->scene.voxel_count(), read->scene.voxel_count());
+    } else {
+      EXPECT_TRUE(are_alike(again->scene, read->scene)) << entry.path();
+    }
+    ++tried[extension];
+    fs::remove(copy);
+  }
+  EXPECT_EQ(tried.size(), 5U);
+}
+#endif
+
+}  // namespace
+}  // namespace quoin::models

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <quoin/core/result.h>
+#include <quoin/scene/scene.h>
+
+// Scenes as formats have them that know whole voxels in one lattice: what stands where, and what of it they do not hold.
+
+namespace quoin::models {
+
+/// A file that was made of a scene, and what it does not hold: one line each.
+struct ModelBytes {
+  std::vector<std::byte> bytes;
+  std::vector<std::string> warnings;
+};
+
+/// What a format says of models besides their voxels' colours.
+struct FormatHolds {
+  std::string_view extension;   ///< for messages: ".qb"
+  bool names = false;           ///< of models
+  bool hidden = false;          ///< that a model is hidden; else those are left out
+  bool several = false;         ///< models; else they become one
+  bool colours = true;          ///< of voxels
+  bool transparency = false;    ///< of colours
+  bool materials = false;       ///< roughness, metalness and light of voxels
+  bool type_names = false;      ///< names of types, and states of voxels
+  bool place_in_units = false;  ///< how large a voxel is
+};
+
+/// A placement of a grid in the file's lattice.
+struct PlacedGrid {
+  std::string name;  ///< of the instance, or of the grid where it has none
+  bool visible = true;
+  Grid voxels{};  ///< turned and moved: in voxels of the file; shares chunks with the scene's where it can
+  IBox box{};     ///< likewise, of its declared box; never empty
+};
+
+/// A scene in one lattice: voxel v of it lies at voxel_size * v in the world.
+struct PlacedGrids {
+  std::vector<PlacedGrid> grids;  ///< in the order of the instances' handles
+  double voxel_size = 1.0;        ///< world units
+  std::vector<std::string> warnings;
+};
+
+/// Turns and moves each placement of a scene. Instances between voxels move to the nearest, with a warning; what the
+/// format does not hold is counted in others.
+///
+/// Errors: Unsupported for fields of densities, turns that are none by quarters, and voxels of different sizes;
+///         LimitExceeded for what lies farther out than 2^26 voxels.
+[[nodiscard]] Result<PlacedGrids> place_grids(const Scene& scene, const FormatHolds& holds);
+
+/// The same as one grid; where several have a voxel, it is that of the last.
+struct MergedGrid {
+  std::string name;
+  Grid voxels{};
+  IBox box{};  ///< empty where the scene shows nothing
+  double voxel_size = 1.0;
+  std::vector<std::string> warnings;
+};
+[[nodiscard]] Result<MergedGrid> merge_grids(const Scene& scene, const FormatHolds& holds);
+
+/// Types of the voxels from `first` on along x.
+void read_voxels(const Grid& grid, IVec3 first, std::span<VoxelType> out);
+
+/// The colour of a type, whose alpha is 255 unless it is transparent, and then at least 1. Of air 0, 0, 0, 0.
+[[nodiscard]] std::vector<Rgba8> colours_of(const VoxelRegistry& types);
+
+}  // namespace quoin::models
