@@ -15,6 +15,7 @@
 #include "io/minecraft/region_file.h"
 #include "io/minecraft/schematic.h"
 #include "io/models/models.h"
+#include "io/source/luanti_map.h"
 #include "io/volume/header.h"
 #include "io/whole_file.h"
 #include "io/world_format.h"
@@ -42,6 +43,8 @@ constexpr std::array kFormats = {
     FormatInfo{FileFormat::Binvox, "binvox", ".binvox", "binvox", true, false, false, false},
     FormatInfo{FileFormat::CubeWorld, "cub", ".cub", "models of Cube World", true, false, false, false},
     FormatInfo{FileFormat::LuantiSchematic, "luanti", ".mts", "schematics of Luanti", true, false, false, false},
+    FormatInfo{FileFormat::LuantiMap, "luanti_map", ".sqlite", "worlds of Luanti's: folders, or their map.sqlite", true,
+               false, false, false},
     FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, false, false, true},
     FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes", true, false, false, true},
     FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true, false},
@@ -174,6 +177,7 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
   if (format == FileFormat::Minecraft) {
     return read_around_spawn(minecraft::open_minecraft(bytes), options, threads, progress);
   }
+  if (format == FileFormat::LuantiMap) return read_around_spawn(open_luanti(bytes), options, threads, progress);
   if (format == FileFormat::Schematic) return minecraft::read_schematic(bytes, progress);
   if (const ReadModel read = model_reader(format); read != nullptr) return read(bytes);
   if (is_volume(format)) return read_volume_as_scene(bytes, options, threads, progress);
@@ -270,6 +274,7 @@ const FormatInfo& format_info(FileFormat format) {
 std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
   if (begins_with(bytes, "VOX ")) return FileFormat::Vox;
   if (is_world_format(bytes)) return FileFormat::World;
+  if (is_luanti_map(bytes)) return FileFormat::LuantiMap;
   if (is_scene_file(bytes)) return FileFormat::Scene;
   if (minecraft::is_region_file(bytes)) return FileFormat::Minecraft;
   const auto first = first_bytes(bytes, nifti::kMaxHeaderBytes);
@@ -281,7 +286,9 @@ std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
 }
 
 Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& path) {
-  if (is_world_folder(path)) return FileFormat::Minecraft;
+  if (is_world_folder(path)) {
+    return minecraft::is_minecraft_folder(path) ? FileFormat::Minecraft : FileFormat::LuantiMap;
+  }
   // What decompresses to a header, with room for names and comments in gzip's own.
   constexpr std::size_t kEnough = 1 << 16;
   const auto bytes = read_file_beginning(path, kEnough);
@@ -341,7 +348,7 @@ Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOpti
   if (options.raw) return with_path(read_volume_as_scene(path, options, threads, progress), path);
   const auto format = detect_format(path);
   if (!format) return format.error();
-  if (*format == FileFormat::Minecraft) {
+  if (is_read_by_chunks(*format)) {
     return with_path(read_around_spawn(open_chunk_source(path), options, threads, progress), path);
   }
   if (*format == FileFormat::World) return with_path(read_world_format(path, options, threads, progress), path);
