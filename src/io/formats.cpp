@@ -11,6 +11,7 @@
 
 #include "core/progress_steps.h"
 #include "io/byte_stream.h"
+#include "io/heights/heights.h"
 #include "io/minecraft/minecraft_source.h"
 #include "io/minecraft/region_file.h"
 #include "io/minecraft/schematic.h"
@@ -45,6 +46,8 @@ constexpr std::array kFormats = {
     FormatInfo{FileFormat::LuantiSchematic, "luanti", ".mts", "schematics of Luanti", true, false, false, false},
     FormatInfo{FileFormat::LuantiMap, "luanti_map", ".sqlite", "worlds of Luanti's: folders, or their map.sqlite", true,
                false, false, false},
+    FormatInfo{FileFormat::Heights, "heights", ".hgt", "heights of SRTM, and pictures of heights (.png) by --heights",
+               true, false, false, false},
     FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, false, false, true},
     FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes", true, false, false, true},
     FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true, false},
@@ -95,6 +98,12 @@ Error unrecognised(std::span<const std::byte> bytes) {
   if (begins_with(bytes, "Voxel Animation")) {
     return {ErrorCode::Unsupported, "a model of Westwood's games, no map of Voxlap's", {}, 0};
   }
+  if (heights::is_png(bytes)) {
+    return {ErrorCode::BadFormat,
+            "a picture; what it shows may be heights: --heights grey, mapbox or terrarium says so",
+            {},
+            {}};
+  }
   return {ErrorCode::BadFormat, "not a file of any format that Quoin reads (" + readable_extensions() + ")", {}, {}};
 }
 
@@ -120,6 +129,20 @@ Result<LoadedScene> read_volume_as_scene(const Source& source, const LoadOptions
   loaded.scene = std::move(*scene);
   loaded.format = volume->format;
   loaded.warnings = volume->warnings;
+  return loaded;
+}
+
+Result<LoadedScene> read_heights_as_scene(std::span<const std::byte> bytes, const LoadOptions& options, Threads threads,
+                                          const Progress& progress) {
+  const HeightOptions wanted = options.heights.value_or(HeightOptions{});
+  auto map = read_height_map(bytes, wanted);
+  if (!map) return map.error();
+  auto scene = scene_from_heights(*map, wanted, threads, progress);
+  if (!scene) return scene.error();
+  LoadedScene loaded;
+  loaded.scene = std::move(*scene);
+  loaded.format = "heights";
+  loaded.warnings = std::move(map->warnings);
   return loaded;
 }
 
@@ -286,6 +309,10 @@ std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
 }
 
 Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& path) {
+  std::error_code unknown_size;
+  if (lower_case_extension(path) == ".hgt" && heights::is_hgt_size(std::filesystem::file_size(path, unknown_size))) {
+    return FileFormat::Heights;
+  }
   if (is_world_folder(path)) {
     return minecraft::is_minecraft_folder(path) ? FileFormat::Minecraft : FileFormat::LuantiMap;
   }
@@ -331,6 +358,7 @@ Result<std::vector<std::string>> losses_of_saving(const LoadedScene& loaded, con
 Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options, Threads threads,
                                const Progress& progress) {
   if (options.raw) return read_volume_as_scene(bytes, options, threads, progress);
+  if (options.heights) return read_heights_as_scene(bytes, options, threads, progress);
   return read_bytes({}, bytes, detect_format(bytes), options, threads, progress);
 }
 
@@ -348,6 +376,11 @@ Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOpti
   if (options.raw) return with_path(read_volume_as_scene(path, options, threads, progress), path);
   const auto format = detect_format(path);
   if (!format) return format.error();
+  if (options.heights || *format == FileFormat::Heights) {
+    return read_whole(path, [&](std::span<const std::byte> bytes) {
+      return read_heights_as_scene(bytes, options, threads, progress);
+    });
+  }
   if (is_read_by_chunks(*format)) {
     return with_path(read_around_spawn(open_chunk_source(path), options, threads, progress), path);
   }
