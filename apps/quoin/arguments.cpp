@@ -1,5 +1,7 @@
 #include <charconv>
 #include <cmath>
+#include <optional>
+#include <string>
 
 #include "commands.h"
 #include "output.h"
@@ -49,18 +51,67 @@ void add_quiet_option(CLI::App& command) {
       "-q,--quiet", [] { be_quiet(); }, "Print errors alone, and what --json prints; no progress, no warnings");
 }
 
+namespace {
+
+/// Adds options that say how heights become a landscape; any of them makes the input one.
+void add_height_options(CLI::App& command, std::optional<HeightOptions>& heights) {
+  constexpr const char* kGroup = "Heights";
+  const auto wanted = [&heights]() -> HeightOptions& { return heights ? *heights : heights.emplace(); };
+  const auto number = [&](const char* name, const char* help, auto set) {
+    command
+        .add_option_function<double>(
+            name, [wanted, set](const double& value) { set(wanted(), value); }, help)
+        ->check(positive())
+        ->group(kGroup);
+  };
+  command
+      .add_option_function<std::string>(
+          "--heights",
+          [wanted](const std::string& name) {
+            wanted().encoding = name == "grey"     ? HeightEncoding::Grey
+                                : name == "mapbox" ? HeightEncoding::Mapbox
+                                                   : HeightEncoding::Terrarium;
+          },
+          "IN is a picture (.png) of heights: grey (of 8 or 16 bits), or terrain-RGB as mapbox or terrarium have it; "
+          ".hgt say so themselves")
+      ->check(CLI::IsMember({"grey", "mapbox", "terrarium"}))
+      ->group(kGroup);
+  number("--metres-per-level", "Of grey: the height of one level (default 1)",
+         [](HeightOptions& options, double value) { options.metres_per_level = value; });
+  number("--metres-per-pixel", "Between neighbouring heights (default: of .hgt what its size says, else 1)",
+         [](HeightOptions& options, double value) { options.metres_per_pixel = value; });
+  number("--metres-per-voxel", "Edge of a voxel (default: as far as heights are apart)",
+         [](HeightOptions& options, double value) { options.metres_per_voxel = value; });
+  number("--exaggeration", "Heights times this (default 1)",
+         [](HeightOptions& options, double value) { options.vertical_exaggeration = value; });
+  command
+      .add_option_function<int>(
+          "--ground-depth", [wanted](const int& value) { wanted().depth = value; },
+          "Voxels of ground below the lowest height (default 8)")
+      ->check(CLI::Range(1, 4096))
+      ->group(kGroup);
+  command
+      .add_flag_callback(
+          "--smooth-ground", [wanted] { wanted().as_field = true; },
+          "Heights become densities, whose surface is smooth, rather than voxels")
+      ->group(kGroup);
+}
+
+}  // namespace
+
 void add_common_options(CLI::App& command, CommonOptions& options) {
   command.add_option("IN", options.input, "File to read")->required()->check(file_name());
   command.add_flag("--hidden", options.load.show_hidden, "Include hidden layers and nodes");
   command
-      .add_option(
-          "--around", options.load.radius,
-          "Of a world of Minecraft's: how far around its spawn, in chunks of 64 blocks to each side (default 4; "
-          "converted to .quoin it is all there)")
+      .add_option("--around", options.load.radius,
+                  "Of a world of Minecraft's or Luanti's: how far around its spawn, in chunks of 64 blocks to each "
+                  "side (default 4; "
+                  "converted to .quoin it is all there)")
       ->check(CLI::Range(0, 1'000));
   command.add_option("--frame", options.load.frame, "Animation frame to take (default 0)")
       ->check(not_negative_whole())
       ->each([&options](const std::string&) { options.takes_frame = true; });
+  add_height_options(command, options.load.heights);
   command.add_flag("--json", options.json, "Print one JSON object instead of text");
   add_quiet_option(command);
   command.add_option("--threads", options.threads.count, "Threads to use (default: all)")->check(CLI::Range(1U, 1024U));

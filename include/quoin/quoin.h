@@ -46,6 +46,7 @@
 #include <quoin/io/chunk_source.h>
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
+#include <quoin/io/heights.h>
 #include <quoin/io/loaded_scene.h>
 #include <quoin/io/mesh_file.h>
 #include <quoin/io/picture_files.h>

@@ -12,11 +12,13 @@
 
 #include "core/progress_steps.h"
 #include "io/byte_stream.h"
+#include "io/heights/heights.h"
 #include "io/minecraft/minecraft_source.h"
 #include "io/minecraft/region_file.h"
 #include "io/minecraft/schematic.h"
 #include "io/models/models.h"
 #include "io/models/write/write_models.h"
+#include "io/source/luanti_map.h"
 #include "io/volume/header.h"
 #include "io/volume/write.h"
 #include "io/whole_file.h"
@@ -45,6 +47,10 @@ constexpr std::array kFormats = {
     FormatInfo{FileFormat::Binvox, "binvox", ".binvox", "binvox", true, true, false, false},
     FormatInfo{FileFormat::CubeWorld, "cub", ".cub", "models of Cube World", true, false, false, false},
     FormatInfo{FileFormat::LuantiSchematic, "luanti", ".mts", "schematics of Luanti", true, false, false, false},
+    FormatInfo{FileFormat::LuantiMap, "luanti_map", ".sqlite", "worlds of Luanti's: folders, or their map.sqlite", true,
+               false, false, false},
+    FormatInfo{FileFormat::Heights, "heights", ".hgt", "heights of SRTM, and pictures of heights (.png) by --heights",
+               true, false, false, false},
     FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, true, false, true},
     FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes", true, false, false, true},
     FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true, false},
@@ -97,6 +103,12 @@ Error unrecognised(std::span<const std::byte> bytes) {
   if (begins_with(bytes, "Voxel Animation")) {
     return {ErrorCode::Unsupported, "a model of Westwood's games, no map of Voxlap's", {}, 0};
   }
+  if (heights::is_png(bytes)) {
+    return {ErrorCode::BadFormat,
+            "a picture; what it shows may be heights: --heights grey, mapbox or terrarium says so",
+            {},
+            {}};
+  }
   return {ErrorCode::BadFormat, "not a file of any format that Quoin reads (" + readable_extensions() + ")", {}, {}};
 }
 
@@ -122,6 +134,20 @@ Result<LoadedScene> read_volume_as_scene(const Source& source, const LoadOptions
   loaded.scene = std::move(*scene);
   loaded.format = volume->format;
   loaded.warnings = volume->warnings;
+  return loaded;
+}
+
+Result<LoadedScene> read_heights_as_scene(std::span<const std::byte> bytes, const LoadOptions& options, Threads threads,
+                                          const Progress& progress) {
+  const HeightOptions wanted = options.heights.value_or(HeightOptions{});
+  auto map = read_height_map(bytes, wanted);
+  if (!map) return map.error();
+  auto scene = scene_from_heights(*map, wanted, threads, progress);
+  if (!scene) return scene.error();
+  LoadedScene loaded;
+  loaded.scene = std::move(*scene);
+  loaded.format = "heights";
+  loaded.warnings = std::move(map->warnings);
   return loaded;
 }
 
@@ -179,6 +205,7 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
   if (format == FileFormat::Minecraft) {
     return read_around_spawn(minecraft::open_minecraft(bytes), options, threads, progress);
   }
+  if (format == FileFormat::LuantiMap) return read_around_spawn(open_luanti(bytes), options, threads, progress);
   if (format == FileFormat::Schematic) return minecraft::read_schematic(bytes, progress);
   if (const ReadModel read = model_reader(format); read != nullptr) return read(bytes);
   if (is_volume(format)) return read_volume_as_scene(bytes, options, threads, progress);
@@ -308,6 +335,7 @@ const FormatInfo& format_info(FileFormat format) {
 std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
   if (begins_with(bytes, "VOX ")) return FileFormat::Vox;
   if (is_world_format(bytes)) return FileFormat::World;
+  if (is_luanti_map(bytes)) return FileFormat::LuantiMap;
   if (is_scene_file(bytes)) return FileFormat::Scene;
   if (minecraft::is_region_file(bytes)) return FileFormat::Minecraft;
   const auto first = first_bytes(bytes, nifti::kMaxHeaderBytes);
@@ -319,7 +347,13 @@ std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
 }
 
 Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& path) {
-  if (is_world_folder(path)) return FileFormat::Minecraft;
+  std::error_code unknown_size;
+  if (lower_case_extension(path) == ".hgt" && heights::is_hgt_size(std::filesystem::file_size(path, unknown_size))) {
+    return FileFormat::Heights;
+  }
+  if (is_world_folder(path)) {
+    return minecraft::is_minecraft_folder(path) ? FileFormat::Minecraft : FileFormat::LuantiMap;
+  }
   // What decompresses to a header, with room for names and comments in gzip's own.
   constexpr std::size_t kEnough = 1 << 16;
   const auto bytes = read_file_beginning(path, kEnough);
@@ -362,6 +396,7 @@ Result<std::vector<std::string>> losses_of_saving(const LoadedScene& loaded, con
 Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options, Threads threads,
                                const Progress& progress) {
   if (options.raw) return read_volume_as_scene(bytes, options, threads, progress);
+  if (options.heights) return read_heights_as_scene(bytes, options, threads, progress);
   return read_bytes({}, bytes, detect_format(bytes), options, threads, progress);
 }
 
@@ -379,7 +414,12 @@ Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOpti
   if (options.raw) return with_path(read_volume_as_scene(path, options, threads, progress), path);
   const auto format = detect_format(path);
   if (!format) return format.error();
-  if (*format == FileFormat::Minecraft) {
+  if (options.heights || *format == FileFormat::Heights) {
+    return read_whole(path, [&](std::span<const std::byte> bytes) {
+      return read_heights_as_scene(bytes, options, threads, progress);
+    });
+  }
+  if (is_read_by_chunks(*format)) {
     return with_path(read_around_spawn(open_chunk_source(path), options, threads, progress), path);
   }
   if (*format == FileFormat::World) return with_path(read_world_format(path, options, threads, progress), path);

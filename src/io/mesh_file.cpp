@@ -58,6 +58,9 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
     case FileFormat::Binvox:
     case FileFormat::CubeWorld:
     case FileFormat::LuantiSchematic:
+    case FileFormat::LuantiMap:
+    case FileFormat::Heights:
+    case FileFormat::Vdb:
     case FileFormat::Nifti:
     case FileFormat::Nrrd:
       break;

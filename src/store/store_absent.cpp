@@ -4,6 +4,7 @@
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
 
+#include "io/source/luanti_map.h"
 #include "io/world_format.h"
 
 // Builds without SQLite, zstd or xxHash: worlds on disk say so. Arguments are taken as where there are any.
@@ -174,6 +175,14 @@ Result<LoadedScene> read_world_format(std::span<const std::byte>, const LoadOpti
 Result<SavedScene> write_world_format(const Scene&, const LoadedScene*, const std::filesystem::path& path, Threads,
                                       const Progress&) {
   return absent(path);
+}
+
+Result<std::unique_ptr<ChunkSource>> open_luanti(const std::filesystem::path& path) {
+  return make_error(ErrorCode::Unsupported, "this build of Quoin reads no worlds of Luanti's: " QUOIN_STORE_MISSING,
+                    path.string());
+}
+Result<std::unique_ptr<ChunkSource>> open_luanti(std::span<const std::byte>) {
+  return open_luanti(std::filesystem::path());
 }
 
 }  // namespace quoin

@@ -545,7 +545,7 @@ Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& fo
   }
   if (auto writable = check_outputs({options.output}); !writable) return writable.error();
   const auto from = detect_format(options.common.input);
-  if (format.format == FileFormat::World && from == FileFormat::Minecraft) return convert_by_chunks(options);
+  if (format.format == FileFormat::World && from && is_read_by_chunks(*from)) return convert_by_chunks(options);
   if (from == FileFormat::World && format.format == FileFormat::World) return copy_world_file(options);
   if (from == FileFormat::World && format.is_mesh && meshes_by_chunks(options)) {
     auto meshed = mesh_world_file(options);

@@ -15,13 +15,14 @@
 #include <quoin/core/vec.h>
 #include <quoin/grid/chunk.h>
 #include <quoin/grid/voxel_registry.h>
+#include <quoin/io/formats.h>
 #include <quoin/io/loaded_scene.h>
 
 namespace quoin {
 
 /// What a source says of itself before anything is read of it.
 struct ChunkSourceInfo {
-  std::string format;           ///< "minecraft", ...
+  std::string format;           ///< "minecraft", "luanti_map"
   std::string version;          ///< of what wrote it, for a person: "1.18.2"; empty: it is not said
   std::string name;             ///< of the world, where it has one
   double spacing = 1.0;         ///< world units along a voxel's edge
@@ -117,8 +118,10 @@ class SourceTypes {
 
 /// Whether a path leads to what open_chunk_source reads and load_scene does not: a folder that holds a world.
 [[nodiscard]] bool is_world_folder(const std::filesystem::path& path);
+/// Whether files of a format, as detect_format says it, are what open_chunk_source reads.
+[[nodiscard]] bool is_read_by_chunks(std::optional<FileFormat> format);
 
-/// Opens a world: a folder of Minecraft's (Java), or one of its region files.
+/// Opens a world: a folder of Minecraft's (Java), or one of its region files; a folder of Luanti's, or its map.sqlite.
 ///
 /// Errors: CannotRead; BadFormat, Unsupported where it is nothing that Quoin reads.
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_chunk_source(const std::filesystem::path& path);

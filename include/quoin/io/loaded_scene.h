@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <quoin/core/vec.h>
+#include <quoin/io/heights.h>
 #include <quoin/io/volume.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/look.h>
@@ -45,12 +46,16 @@ struct LoadOptions {
   /// Whether LoadedScene::source is set, so that writing a .vox file again keeps what scenes cannot hold. It takes the
   /// file's size, and of chunks that are edited later what they were.
   bool keep_source = true;
-  /// Of a volume of values: what is above is solid; without, a value between its two groups (volume_threshold).
+  /// Of a volume of values, or the fog of a .vdb: what is above is solid; without, a value between its two groups
+  /// (volume_threshold).
   std::optional<float> iso = std::nullopt;
   /// Of a world that is read by chunks (ChunkSource): how far around its spawn, in chunks of 64 voxels to each side.
   int radius = 4;
   /// The file holds values alone, as many as this says: a volume.
   std::optional<RawVolume> raw = std::nullopt;
+  /// The file holds the heights of a landscape. Nothing tells such a picture from another, so it has to be said; of
+  /// .hgt files, which say it by their name and size, it only says how they become voxels.
+  std::optional<HeightOptions> heights = std::nullopt;
 };
 
 /// What saving a scene gave.

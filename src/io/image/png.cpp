@@ -2,8 +2,11 @@
 
 #include <png.h>
 
+#include <algorithm>
+#include <array>
 #include <csetjmp>
 #include <new>
+#include <string>
 
 #include <quoin/core/assert.h>
 #include <quoin/io/picture_files.h>
@@ -97,6 +100,99 @@ Result<PngImage> decode_png(std::span<const std::byte> file) {
     return make_error(ErrorCode::BadFormat, std::string("not a readable PNG: ") + header.message);
   }
   return image;
+}
+
+namespace {
+
+/// What libpng reads from.
+struct Input {
+  std::span<const std::byte> left;
+};
+
+void take_bytes(png_structp png, png_bytep out, std::size_t size) {
+  auto& input = *static_cast<Input*>(png_get_io_ptr(png));
+  if (size > input.left.size()) png_error(png, "it ends early");
+  std::copy_n(input.left.begin(), size, reinterpret_cast<std::byte*>(out));
+  input.left = input.left.subspan(size);
+}
+
+/// Keeps the reason, and jumps back.
+[[noreturn]] void keep_reason(png_structp png, png_const_charp reason) {
+  auto& kept = *static_cast<std::array<char, 128>*>(png_get_error_ptr(png));
+  for (std::size_t i = 0; i + 1 < kept.size() && reason[i] != '\0'; ++i) {
+    kept[i] = reason[i];
+    kept[i + 1] = '\0';
+  }
+  png_longjmp(png, 1);
+}
+
+/// Everything up to the pixels that libpng may jump out of; nothing here needs a destructor.
+bool read_header(png_structp png, png_infop info, Input& input, PngSamples& samples, int& passes) {
+  if (setjmp(png_jmpbuf(png)) != 0) return false;
+  png_set_read_fn(png, &input, take_bytes);
+  png_read_info(png, info);
+  const int type = png_get_color_type(png, info);
+  if (type == PNG_COLOR_TYPE_PALETTE) png_set_palette_to_rgb(png);
+  if (png_get_bit_depth(png, info) < 8) png_set_packing(png);
+  png_set_strip_alpha(png);
+  passes = png_set_interlace_handling(png);
+  png_read_update_info(png, info);
+  samples.width = png_get_image_width(png, info);
+  samples.height = png_get_image_height(png, info);
+  samples.channels = png_get_channels(png, info);
+  samples.bits = png_get_bit_depth(png, info);
+  return true;
+}
+
+/// Likewise of the pixels.
+bool read_rows(png_structp png, int passes, PngSamples& samples) {
+  if (setjmp(png_jmpbuf(png)) != 0) return false;
+  const std::size_t row = samples.bytes.size() / samples.height;
+  for (int pass = 0; pass < passes; ++pass) {
+    for (std::uint32_t y = 0; y < samples.height; ++y) {
+      png_read_row(png, reinterpret_cast<png_bytep>(samples.bytes.data() + y * row), nullptr);
+    }
+  }
+  png_read_end(png, nullptr);
+  return true;
+}
+
+/// libpng's reader, which ends with its scope.
+struct PngReader {
+  std::array<char, 128> reason{};
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reason, keep_reason, stay_silent);
+  png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
+  PngReader() {
+    if (info == nullptr) throw std::bad_alloc();
+  }
+  PngReader(const PngReader&) = delete;
+  PngReader& operator=(const PngReader&) = delete;
+  ~PngReader() { png_destroy_read_struct(&png, &info, nullptr); }
+};
+
+}  // namespace
+
+Result<PngSamples> decode_png_samples(std::span<const std::byte> file) {
+  PngReader reader;
+  Input input{file};
+  PngSamples samples;
+  int passes = 1;
+  const auto fault = [&] {
+    return make_error(ErrorCode::BadFormat, std::string("not a readable PNG: ") + reader.reason.data(), {},
+                      file.size() - input.left.size());
+  };
+  if (!read_header(reader.png, reader.info, input, samples, passes)) return fault();
+  const std::uint64_t pixels = std::uint64_t{samples.width} * samples.height;
+  if (pixels > (std::uint64_t{1} << 28)) {
+    return make_error(ErrorCode::LimitExceeded, "the PNG has more than 2^28 pixels");
+  }
+  // Deflate makes at most 1,032 bytes of one, and a pixel takes a bit or more.
+  if (pixels > std::uint64_t{8} * 1032 * file.size()) {
+    return make_error(ErrorCode::BadFormat, "not a readable PNG: it claims more pixels than its bytes can hold");
+  }
+  samples.bytes.resize(pixels * samples.channels * (samples.bits / 8));
+  if (!read_rows(reader.png, passes, samples)) return fault();
+  return samples;
 }
 
 namespace {

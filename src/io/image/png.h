@@ -39,4 +39,17 @@ enum class PngEffort : std::uint8_t {
 /// Errors: BadFormat; LimitExceeded beyond 2^28 pixels. Memory stays within a multiple of the input's size.
 [[nodiscard]] Result<PngImage> decode_png(std::span<const std::byte> file);
 
+/// The numbers of a picture as its file has them, whatever they mean: no gamma, no scaling.
+struct PngSamples {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::uint32_t channels = 1;  ///< 1 grey, 3 RGB; of palettes their colours; alpha is left out
+  std::uint32_t bits = 8;      ///< 8 (files of fewer bits too), or 16
+  std::vector<std::byte>
+      bytes;  ///< rows from the top, channels interleaved; of 16 bits the more significant byte first
+};
+
+/// Errors: as decode_png.
+[[nodiscard]] Result<PngSamples> decode_png_samples(std::span<const std::byte> file);
+
 }  // namespace quoin

@@ -1,6 +1,7 @@
 // Luanti's schematics: names of nodes, and three arrays in a zlib stream. Its axes are left-handed: z is turned round.
 
 #include <bit>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -8,7 +9,7 @@
 #include "io/byte_order.h"
 #include "io/byte_reader.h"
 #include "io/byte_stream.h"
-#include "io/minecraft/block_looks.h"
+#include "io/models/luanti_nodes.h"
 #include "io/models/model_builder.h"
 #include "io/models/models.h"
 
@@ -21,26 +22,6 @@ constexpr std::string_view kMagic = "MTSM";
 std::uint16_t read_u16(ByteReader& reader) {
   const auto bytes = reader.take(2);
   return bytes.empty() ? std::uint16_t{0} : load<std::uint16_t>(bytes.data(), std::endian::big);
-}
-
-/// What a node looks like, by its name; alpha 0: it is air.
-struct Node {
-  VoxelProperties properties;
-  Rgba8 colour{0, 0, 0, 0};
-};
-
-Node node_of(std::string name) {
-  Node node;
-  if (name == "air" || name == "ignore") return node;
-  const minecraft::BlockLook look = minecraft::look_of_block(name, false, false);
-  node.colour = minecraft::tinted_colour(look.colour, minecraft::colour_of(look.tint, {}));
-  node.colour.a = std::max<std::uint8_t>(node.colour.a, 1);
-  node.properties.name = std::move(name);
-  node.properties.collides = look.collides;
-  node.properties.emission = look.emission;
-  node.properties.roughness = look.roughness;
-  node.properties.ior = look.ior;
-  return node;
 }
 
 }  // namespace
@@ -60,8 +41,8 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
   const int size_y = read_u16(reader);
   const int size_z = read_u16(reader);
   if (version >= 3) static_cast<void>(reader.take(static_cast<std::size_t>(size_y)));  // how likely each layer is
-  std::vector<Node> nodes(read_u16(reader));
-  for (Node& node : nodes) node = node_of(std::string(reader.text(read_u16(reader))));
+  std::vector<std::optional<VoxelProperties>> nodes(read_u16(reader));                 // nothing: air
+  for (auto& node : nodes) node = node_properties(reader.text(read_u16(reader)));
   if (reader.failed()) return bad_at(bytes.size(), "it ends before its nodes do");
   const std::size_t begin = reader.position();
   const std::uint64_t volume =
@@ -80,7 +61,7 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
   builder.begin(std::move(model));
   std::vector<std::uint32_t> materials;
   materials.reserve(nodes.size());
-  for (const Node& node : nodes) materials.push_back(builder.add_material(node.properties));
+  for (const auto& node : nodes) materials.push_back(node ? builder.add_material(*node) : 0);
   std::size_t at = 0;
   for (int z = 0; z < size_z; ++z) {
     for (int y = 0; y < size_y; ++y) {
@@ -90,8 +71,9 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
         // How likely the node is, of 127 since version 4 and of 255 before.
         const auto chance = std::to_integer<unsigned>(content[2 * volume + at]);
         if (version >= 2 && (version >= 4 ? chance & 0x7FU : chance >> 1) == 0) continue;
+        if (!nodes[index]) continue;
         builder.use_material(materials[index]);
-        if (auto put = builder.put({x, y, size_z - 1 - z}, nodes[index].colour); !put) return put.error();
+        if (auto put = builder.put({x, y, size_z - 1 - z}, nodes[index]->colour); !put) return put.error();
       }
     }
   }

@@ -13,6 +13,7 @@
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
 
+#include "io/models/luanti_nodes.h"
 #include "io/whole_file.h"
 #include "store/scene/put_world.h"
 
@@ -118,7 +119,9 @@ class Import {
     }
     for (std::size_t type = 1; type < types_.size(); ++type) {
       const VoxelProperties& properties = types_[static_cast<VoxelType>(type)];
-      if (properties.attributes.contains("minecraft.look")) result.guessed.push_back(properties.name);
+      const bool is_guess = properties.attributes.contains("minecraft.look") ||
+                            properties.attributes.contains(models::kNodeGuessAttribute);
+      if (is_guess) result.guessed.push_back(properties.name);
     }
     std::ranges::sort(result.guessed);
     const auto same = std::ranges::unique(result.guessed);

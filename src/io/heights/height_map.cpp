@@ -1,0 +1,155 @@
+#include <quoin/io/heights.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <string_view>
+#include <utility>
+
+#include "io/byte_order.h"
+#include "io/byte_reader.h"
+#include "io/heights/heights.h"
+#include "io/image/png.h"
+
+namespace quoin {
+
+namespace {
+
+constexpr std::string_view kPngSignature = "\x89PNG\r\n\x1a\n";
+/// Of a degree of latitude.
+constexpr double kMetresOfDegree = 111'320.0;
+/// Of .hgt: three arc-seconds and one.
+constexpr std::size_t kHgtEdges[] = {1201, 3601};
+
+std::optional<std::size_t> hgt_edge(std::uint64_t bytes) {
+  for (const std::size_t edge : kHgtEdges) {
+    if (bytes == 2 * edge * edge) return edge;
+  }
+  return std::nullopt;
+}
+
+std::string_view name_of(HeightEncoding encoding) {
+  switch (encoding) {
+    case HeightEncoding::Grey:
+      return "grey";
+    case HeightEncoding::Mapbox:
+      return "mapbox";
+    case HeightEncoding::Terrarium:
+      break;
+  }
+  return "terrarium";
+}
+
+HeightMap read_hgt(std::span<const std::byte> bytes, std::size_t edge) {
+  constexpr std::int16_t kVoid = -32'768;
+  HeightMap map;
+  map.format = "hgt";
+  map.width = map.height = static_cast<int>(edge);
+  map.metres_per_pixel = kMetresOfDegree / static_cast<double>(edge - 1);
+  map.metres.resize(edge * edge);
+  std::size_t voids = 0;
+  for (std::size_t i = 0; i < map.metres.size(); ++i) {
+    const auto height = load<std::int16_t>(bytes.data() + 2 * i, std::endian::big);
+    voids += height == kVoid ? 1 : 0;
+    map.metres[i] = height == kVoid ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(height);
+  }
+  if (voids > 0) {
+    map.warnings.push_back(std::to_string(voids) + " of " + std::to_string(map.metres.size()) +
+                           " heights are not known (voids); nothing is there");
+  }
+  return map;
+}
+
+float metres_of(HeightEncoding encoding, const std::byte* rgb) {
+  const auto r = std::to_integer<std::uint32_t>(rgb[0]);
+  const auto g = std::to_integer<std::uint32_t>(rgb[1]);
+  const auto b = std::to_integer<std::uint32_t>(rgb[2]);
+  const auto number = static_cast<double>(r << 16 | g << 8 | b);
+  return static_cast<float>(encoding == HeightEncoding::Mapbox ? number / 10.0 - 10'000.0 : number / 256.0 - 32'768.0);
+}
+
+Result<HeightMap> read_picture(std::span<const std::byte> bytes, HeightEncoding encoding, double metres_per_level) {
+  const auto picture = decode_png_samples(bytes);
+  if (!picture) return picture.error();
+  const bool is_grey = encoding == HeightEncoding::Grey;
+  if (is_grey && picture->channels != 1) {
+    return make_error(ErrorCode::BadFormat, "a picture in colours has no heights by grey (mapbox and terrarium have)");
+  }
+  if (!is_grey && (picture->channels != 3 || picture->bits != 8)) {
+    return make_error(ErrorCode::BadFormat, "heights by " + std::string(name_of(encoding)) +
+                                                " are three channels of 8 bits, which this picture does not have");
+  }
+  HeightMap map;
+  map.format = name_of(encoding);
+  map.width = static_cast<int>(picture->width);
+  map.height = static_cast<int>(picture->height);
+  map.metres.resize(std::size_t{picture->width} * picture->height);
+  const std::byte* const samples = picture->bytes.data();
+  for (std::size_t i = 0; i < map.metres.size(); ++i) {
+    if (!is_grey) {
+      map.metres[i] = metres_of(encoding, samples + 3 * i);
+      continue;
+    }
+    const unsigned level = picture->bits == 16 ? load<std::uint16_t>(samples + 2 * i, std::endian::big)
+                                               : std::to_integer<unsigned>(samples[i]);
+    map.metres[i] = static_cast<float>(level * metres_per_level);
+  }
+  return map;
+}
+
+}  // namespace
+
+namespace heights {
+
+bool is_hgt_size(std::uint64_t bytes) {
+  return hgt_edge(bytes).has_value();
+}
+
+bool is_png(std::span<const std::byte> beginning) {
+  return text_of(beginning).starts_with(kPngSignature);
+}
+
+Status check(const HeightOptions& options) {
+  const auto is_length = [](double length) { return length >= 1e-6 && length <= 1e6; };
+  const bool are_lengths = is_length(options.metres_per_level) && is_length(options.metres_per_pixel.value_or(1.0)) &&
+                           is_length(options.metres_per_voxel.value_or(1.0)) &&
+                           is_length(options.vertical_exaggeration);
+  if (!are_lengths) {
+    return make_error(
+        ErrorCode::InvalidArgument,
+        "metres a level, a pixel and a voxel, and how heights are exaggerated, are 0.000001 to 1,000,000");
+  }
+  if (options.depth < 1 || options.depth > kMaxDepth) {
+    return make_error(ErrorCode::InvalidArgument, "the ground is 1 to " + std::to_string(kMaxDepth) + " voxels deep");
+  }
+  return {};
+}
+
+}  // namespace heights
+
+Result<HeightMap> read_height_map(std::span<const std::byte> bytes, const HeightOptions& options) {
+  if (auto sound = heights::check(options); !sound) return sound.error();
+  if (!options.encoding) {
+    if (const auto edge = hgt_edge(bytes.size()); edge && !heights::is_png(bytes)) {
+      HeightMap map = read_hgt(bytes, *edge);
+      if (options.metres_per_pixel) map.metres_per_pixel = *options.metres_per_pixel;
+      return map;
+    }
+    return make_error(ErrorCode::BadFormat,
+                      heights::is_png(bytes)
+                          ? "of a picture it must be said how it has heights: grey, mapbox, terrarium"
+                          : "no heights: .hgt have 1201 x 1201 or 3601 x 3601 numbers of 2 bytes");
+  }
+  if (!heights::is_png(bytes)) return bad_at(0, "pictures of heights are PNG");
+  auto map = read_picture(bytes, *options.encoding, options.metres_per_level);
+  if (!map) return map.error();
+  if (options.metres_per_pixel) {
+    map->metres_per_pixel = *options.metres_per_pixel;
+  } else {
+    map->warnings.emplace_back("it does not say how far apart its pixels are: taken as 1 metre (--metres-per-pixel)");
+  }
+  return map;
+}
+
+}  // namespace quoin

@@ -1,0 +1,330 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <quoin/grid/density_chunk.h>
+#include <quoin/io/heights.h>
+#include <quoin/terrain/terrain.h>
+
+#include "io/heights/heights.h"
+
+namespace quoin {
+
+namespace {
+
+constexpr float kBand = 8.0F;
+constexpr float kSteep = 1.0F;       // rise of a voxel
+constexpr float kSandMetres = 2.0F;  // the highest that has sand
+constexpr float kSnowMetres = 3'000.0F;
+constexpr float kTopsoil = 4.0F;  // voxels above stone
+
+/// What the ground is made of in a column, from above.
+struct Ground {
+  VoxelType surface = kAir;
+  VoxelType below = kAir;
+};
+
+/// The heights above the corner of each column, in voxels, and what they are made of.
+struct Surface {
+  int width = 0;
+  int depth = 0;                 // along z
+  std::vector<float> heights{};  // [z][x]; NaN: a void
+  int base = 0;                  // the lowest voxel
+  int top = 0;                   // above all of them
+  float metres_of_height = 1.0F;
+
+  [[nodiscard]] float at(int x, int z) const {
+    return heights[static_cast<std::size_t>(z) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
+  }
+  [[nodiscard]] bool has(int x, int z) const {
+    return x >= 0 && z >= 0 && x < width && z < depth && !std::isnan(at(x, z));
+  }
+  /// The rise of a voxel along an axis; one-sided beside a void or the border. Requires: has(x, z).
+  [[nodiscard]] float rise(int x, int z, int step_x, int step_z) const {
+    const bool has_before = has(x - step_x, z - step_z);
+    const bool has_after = has(x + step_x, z + step_z);
+    const float before = has_before ? at(x - step_x, z - step_z) : at(x, z);
+    const float after = has_after ? at(x + step_x, z + step_z) : at(x, z);
+    return (after - before) / (has_before && has_after ? 2.0F : 1.0F);
+  }
+  [[nodiscard]] float steepness(int x, int z) const { return std::hypot(rise(x, z, 1, 0), rise(x, z, 0, 1)); }
+  [[nodiscard]] Ground ground(int x, int z, const TerrainTypes& types) const {
+    const float metres = at(x, z) * metres_of_height;
+    if (steepness(x, z) > kSteep) return {types.stone, types.stone};
+    if (metres > kSnowMetres) return {types.snow, types.stone};
+    if (metres <= kSandMetres) return {types.sand, types.sand};
+    return {types.grass, types.earth};
+  }
+};
+
+/// What a column of chunks holds.
+struct Range {
+  float lowest = std::numeric_limits<float>::infinity();
+  float highest = -std::numeric_limits<float>::infinity();
+  bool is_whole = true;  // no voids, nothing beyond the border
+};
+
+Result<Surface> surface_of(const HeightMap& map, const HeightOptions& options) {
+  const double voxel = options.metres_per_voxel.value_or(map.metres_per_pixel);
+  const double step = voxel / map.metres_per_pixel;  // pixels a voxel
+  const double scale = options.vertical_exaggeration / voxel;
+  const auto count = [&](int pixels) { return std::floor((pixels - 1) / step + 1e-6) + 1.0; };
+  constexpr double kMaxColumns = 0x1p26;
+  if (!(count(map.width) * count(map.height) <= kMaxColumns)) {
+    return make_error(ErrorCode::LimitExceeded, "a landscape of more than 2^26 columns (larger voxels have fewer)");
+  }
+  Surface surface;
+  surface.width = static_cast<int>(count(map.width));
+  surface.depth = static_cast<int>(count(map.height));
+  surface.metres_of_height = static_cast<float>(1.0 / scale);
+  surface.heights.resize(static_cast<std::size_t>(surface.width) * static_cast<std::size_t>(surface.depth));
+  const auto pixel = [&](int x, int y) {
+    const std::size_t row = static_cast<std::size_t>(std::min(y, map.height - 1)) * static_cast<std::size_t>(map.width);
+    return double{map.metres[row + static_cast<std::size_t>(std::min(x, map.width - 1))]};
+  };
+  double lowest = std::numeric_limits<double>::infinity();
+  double highest = -lowest;
+  for (int z = 0; z < surface.depth; ++z) {
+    for (int x = 0; x < surface.width; ++x) {
+      const double at_x = std::min(x * step, map.width - 1.0);
+      const double at_y = std::min(z * step, map.height - 1.0);
+      const int px = static_cast<int>(at_x);
+      const int py = static_cast<int>(at_y);
+      const double fx = at_x - px;
+      const double fy = at_y - py;
+      // What is at a pixel is its height alone, even beside a void.
+      const auto mix = [](double a, double b, double share) { return share < 1e-6 ? a : a + share * (b - a); };
+      const double metres =
+          mix(mix(pixel(px, py), pixel(px + 1, py), fx), mix(pixel(px, py + 1), pixel(px + 1, py + 1), fx), fy);
+      const double height = metres * scale;
+      surface.heights[static_cast<std::size_t>(z) * static_cast<std::size_t>(surface.width) +
+                      static_cast<std::size_t>(x)] = static_cast<float>(height);
+      if (std::isnan(height)) continue;
+      lowest = std::min(lowest, height);
+      highest = std::max(highest, height);
+    }
+  }
+  if (lowest > highest) return surface;
+  constexpr double kMaxHeight = 0x1p16;
+  constexpr double kMaxPlace = 0x1p24;
+  if (highest - lowest + options.depth > kMaxHeight || std::max(-lowest, highest) > kMaxPlace) {
+    return make_error(ErrorCode::LimitExceeded, "columns of more than 2^16 voxels (larger voxels have fewer)");
+  }
+  surface.base = static_cast<int>(std::floor(lowest)) - options.depth;
+  surface.top = static_cast<int>(std::ceil(highest)) + 1;
+  return surface;
+}
+
+Range range_of(const Surface& surface, int first_x, int first_z) {
+  Range range;
+  for (int z = first_z - 1; z <= first_z + kChunkEdge; ++z) {
+    for (int x = first_x - 1; x <= first_x + kChunkEdge; ++x) {
+      if (!surface.has(x, z)) {
+        range.is_whole = false;
+        continue;
+      }
+      range.lowest = std::min(range.lowest, surface.at(x, z));
+      range.highest = std::max(range.highest, surface.at(x, z));
+    }
+  }
+  return range;
+}
+
+/// Makes the chunks of one column after the other. Each thread has its own.
+class ColumnMaker {
+ public:
+  ColumnMaker(const Surface& surface, const TerrainTypes& types, int chunk_x, int chunk_z)
+      : surface_(surface),
+        types_(types),
+        first_x_(chunk_x * kChunkEdge),
+        first_z_(chunk_z * kChunkEdge),
+        range_(range_of(surface, first_x_, first_z_)) {
+    for (int z = 0; z < kChunkEdge; ++z) {
+      for (int x = 0; x < kChunkEdge; ++x) {
+        if (!surface.has(first_x_ + x, first_z_ + z)) continue;
+        ground_[place(x, z)] = surface.ground(first_x_ + x, first_z_ + z, types);
+        const float steepness = surface.steepness(first_x_ + x, first_z_ + z);
+        slope_[place(x, z)] = std::sqrt(1.0F + steepness * steepness);
+      }
+    }
+  }
+
+  /// Nothing where all is air.
+  [[nodiscard]] std::optional<Chunk> voxels(int chunk_y) {
+    const int first_y = chunk_y * kChunkEdge;
+    if (static_cast<float>(first_y) > range_.highest + 1.0F) return std::nullopt;
+    if (is_within(first_y, kTopsoil + 1.0F)) return Chunk(types_.stone);
+    dense_.assign(kChunkVoxels, kAir);
+    for (int z = 0; z < kChunkEdge; ++z) {
+      for (int x = 0; x < kChunkEdge; ++x) {
+        if (ground_[place(x, z)].surface == kAir) continue;
+        const float height = surface_.at(first_x_ + x, first_z_ + z);
+        const int top = std::max(static_cast<int>(std::lround(height)), surface_.base + 1);
+        for (int y = std::max(first_y, surface_.base); y < std::min(first_y + kChunkEdge, top); ++y) {
+          dense_[static_cast<std::size_t>((z * kChunkEdge + y - first_y) * kChunkEdge + x)] =
+              type_at(ground_[place(x, z)], static_cast<float>(top - 1 - y));
+        }
+      }
+    }
+    return Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense_));
+  }
+
+  /// Nothing where all is far air.
+  [[nodiscard]] std::optional<DensityChunk> densities(int chunk_y) {
+    const int first_y = chunk_y * kChunkEdge;
+    if (static_cast<float>(first_y) > range_.highest + kBand * 2.0F) return std::nullopt;
+    if (is_within(first_y, kBand * steepest())) return DensityChunk(stored_density(-kBand, kBand), types_.stone);
+    DensityChunk chunk(stored_density(kBand, kBand));
+    dense_.assign(kChunkVoxels, kAir);
+    std::array<Half, kChunkEdge> row{};
+    for (int z = 0; z < kChunkEdge; ++z) {
+      for (int y = 0; y < kChunkEdge; ++y) {
+        for (int x = 0; x < kChunkEdge; ++x) {
+          const float density = density_at(x, first_y + y, z);
+          row[static_cast<std::size_t>(x)] = stored_density(density, kBand);
+          if (density >= kBand || ground_[place(x, z)].surface == kAir) continue;
+          const float below = surface_.at(first_x_ + x, first_z_ + z) - static_cast<float>(first_y + y);
+          dense_[static_cast<std::size_t>((z * kChunkEdge + y) * kChunkEdge + x)] =
+              type_at(ground_[place(x, z)], std::max(below, 0.0F));
+        }
+        chunk.write_row(y, z, row);
+      }
+    }
+    chunk.materials() = Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense_));
+    chunk.compact();
+    return chunk;
+  }
+
+ private:
+  [[nodiscard]] static std::size_t place(int x, int z) { return static_cast<std::size_t>(z * kChunkEdge + x); }
+  /// Whether a chunk lies below the ground by so much, and above its bottom.
+  [[nodiscard]] bool is_within(int first_y, float below) const {
+    return range_.is_whole && static_cast<float>(first_y + kChunkEdge) + below <= range_.lowest &&
+           first_y >= surface_.base + static_cast<int>(kBand) && is_far_from_border();
+  }
+  [[nodiscard]] bool is_far_from_border() const {
+    const int reach = static_cast<int>(kBand) + 1;
+    return first_x_ >= reach && first_z_ >= reach && first_x_ + kChunkEdge + reach < surface_.width &&
+           first_z_ + kChunkEdge + reach < surface_.depth;
+  }
+  [[nodiscard]] float steepest() const { return *std::ranges::max_element(slope_); }
+  /// `below`: the surface, in voxels.
+  [[nodiscard]] VoxelType type_at(const Ground& ground, float below) const {
+    if (below < 1.0F) return ground.surface;
+    return below < kTopsoil ? ground.below : types_.stone;
+  }
+  [[nodiscard]] float density_at(int x, int y, int z) const {
+    const int world_x = first_x_ + x;
+    const int world_z = first_z_ + z;
+    // Where the ground ends, it does so halfway between a sample of it and one of air.
+    constexpr float kHalf = 0.5F;
+    float highest = -std::numeric_limits<float>::infinity();
+    bool is_beside_void = false;
+    for (int i = 0; i < 9; ++i) {
+      const int near_x = world_x + i % 3 - 1;
+      const int near_z = world_z + i / 3 - 1;
+      if (surface_.has(near_x, near_z)) highest = std::max(highest, surface_.at(near_x, near_z));
+      is_beside_void |= !surface_.has(near_x, near_z);
+    }
+    const auto height = static_cast<float>(y);
+    if (!surface_.has(world_x, world_z)) {
+      return std::isinf(highest) ? kBand : std::max(kHalf, height - highest);
+    }
+    float density = (height - surface_.at(world_x, world_z)) / slope_[place(x, z)];
+    density = std::max(density, static_cast<float>(surface_.base - y) + kHalf);
+    const int inside = std::min({world_x, world_z, surface_.width - 1 - world_x, surface_.depth - 1 - world_z});
+    density = std::max(density, kHalf - static_cast<float>(inside));
+    return is_beside_void && inside > 0 ? std::max(density, -kHalf) : density;
+  }
+
+  const Surface& surface_;
+  const TerrainTypes& types_;
+  int first_x_;
+  int first_z_;
+  Range range_;
+  std::array<Ground, std::size_t{kChunkEdge} * kChunkEdge> ground_{};
+  std::array<float, std::size_t{kChunkEdge} * kChunkEdge> slope_{};
+  std::vector<VoxelType> dense_;
+};
+
+Status make_ground(const Surface& surface, const TerrainTypes& types, bool is_field, Threads threads,
+                   const Progress& progress, SceneGrid& content) {
+  const IVec3 first{0, chunk_of(IVec3(surface.base - 1)).y, 0};
+  // The field goes on to where it is far air.
+  const IVec3 last = chunk_of({surface.width, surface.top + static_cast<int>(kBand) * 2, surface.depth});
+  const std::size_t across = static_cast<std::size_t>(last.x) + 1;
+  const std::size_t count = across * (static_cast<std::size_t>(last.z) + 1);
+  const std::size_t up = static_cast<std::size_t>(last.y - first.y) + 1;
+  constexpr std::size_t kBatch = 16;
+  struct Made {
+    std::vector<std::optional<Chunk>> voxels;
+    std::vector<std::optional<DensityChunk>> densities;
+  };
+  std::vector<Made> made(std::min(kBatch, count));
+  const auto place = [&](std::size_t i) {
+    return IVec3{static_cast<int>(i % across), 0, static_cast<int>(i / across)};
+  };
+  for (std::size_t begin = 0; begin < count; begin += kBatch) {
+    if (progress && !progress(static_cast<double>(begin) / static_cast<double>(count))) {
+      return make_error(ErrorCode::Cancelled, "cancelled");
+    }
+    const std::size_t batch = std::min(kBatch, count - begin);
+    parallel_for(batch, threads, [&](std::size_t i) {
+      ColumnMaker maker(surface, types, place(begin + i).x, place(begin + i).z);
+      made[i] = {};
+      for (std::size_t y = 0; y < up; ++y) {
+        const int chunk_y = first.y + static_cast<int>(y);
+        if (is_field) {
+          made[i].densities.push_back(maker.densities(chunk_y));
+        } else {
+          made[i].voxels.push_back(maker.voxels(chunk_y));
+        }
+      }
+    });
+    for (std::size_t i = 0; i < batch; ++i) {
+      for (std::size_t y = 0; y < up; ++y) {
+        const IVec3 chunk = place(begin + i) + IVec3{0, first.y + static_cast<int>(y), 0};
+        if (is_field && made[i].densities[y]) content.field.put_chunk(chunk, std::move(*made[i].densities[y]));
+        if (!is_field && made[i].voxels[y]) content.grid.put_chunk(chunk, std::move(*made[i].voxels[y]));
+      }
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Scene> scene_from_heights(const HeightMap& map, const HeightOptions& options, Threads threads,
+                                 const Progress& progress) {
+  if (auto sound = heights::check(options); !sound) return sound.error();
+  const bool is_sound = map.width > 0 && map.height > 0 && std::isfinite(map.metres_per_pixel) &&
+                        map.metres_per_pixel > 0.0 &&
+                        map.metres.size() == static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height);
+  if (!is_sound) return make_error(ErrorCode::InvalidArgument, "heights that are not as many as their size says");
+  const auto surface = surface_of(map, options);
+  if (!surface) return surface.error();
+  Scene scene;
+  const auto types = add_terrain_types(scene.types);
+  if (!types) return types.error();
+  SceneGrid content;
+  content.name = "heights";
+  content.field = DensityGrid(kBand);
+  if (surface->top > surface->base) {
+    content.canvas = {{0, surface->base, 0}, {surface->width, surface->top, surface->depth}};
+    if (auto done = make_ground(*surface, *types, options.as_field, threads, progress, content); !done) {
+      return done.error();
+    }
+  }
+  Instance instance;
+  instance.name = content.name;
+  instance.voxel_size = options.metres_per_voxel.value_or(map.metres_per_pixel);
+  instance.grid = scene.add_grid(std::move(content));
+  scene.add_instance(std::move(instance));
+  return scene;
+}
+
+}  // namespace quoin

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <span>
+
+#include <quoin/io/chunk_source.h>
+
+// Luanti's worlds, which are SQLite's databases. The store, a layer above this one, opens them; in builds without
+// SQLite it says so.
+
+namespace quoin {
+
+/// Whether bytes begin as a map of Luanti's does: with SQLite's header, and its table of blocks.
+[[nodiscard]] bool is_luanti_map(std::span<const std::byte> beginning);
+/// Whether a folder is a world of Luanti's: it holds world.mt.
+[[nodiscard]] bool is_luanti_folder(const std::filesystem::path& path);
+
+/// A world of Luanti's: its folder, or the database in it (map.sqlite).
+/// Errors: CannotRead; BadFormat; Unsupported where world.mt says that it is kept elsewhere.
+[[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_luanti(const std::filesystem::path& path);
+/// The database's bytes, which are copied.
+[[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_luanti(std::span<const std::byte> database);
+
+}  // namespace quoin

@@ -1,0 +1,449 @@
+// A world of Luanti's: a database with a row a block of 16^3 nodes, by its place. Its axes are left-handed: z is turned
+// round, so that block z is -1 - z in ours. A part is up to eight of our chunks on top of each other.
+
+#include <algorithm>
+#include <condition_variable>
+#include <cstdint>
+#include <fstream>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <shared_mutex>
+#include <string>
+#include <system_error>
+#include <tuple>
+#include <unordered_set>
+#include <utility>
+
+#include <quoin/core/assert.h>
+#include <quoin/io/file.h>
+
+#include "io/models/luanti_nodes.h"
+#include "io/source/luanti_map.h"
+#include "io/text.h"
+#include "store/database/connection.h"
+#include "store/luanti/map_block.h"
+
+namespace quoin {
+
+namespace store::luanti {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kBlocksOfChunk = kChunkEdge / kBlockEdge;  // along an edge
+constexpr int kLowestBlock = -2048;
+constexpr int kHighestBlock = 2048;  // the first that there cannot be
+constexpr int kChunksOfPart = 8;
+/// Of a row. What Luanti writes has some kilobytes; a zlib stream of more could expand to gigabytes.
+constexpr std::size_t kMaxRow = std::size_t{16} << 20;
+constexpr const char* kStatesAttribute = "luanti.states";
+
+/// How the table says places: by a number, or by three since version 5.12.
+enum class Places : std::uint8_t { Number, Three };
+
+std::int64_t number_of(IVec3 block) {
+  return (std::int64_t{block.z} << 24) + (std::int64_t{block.y} << 12) + block.x;
+}
+
+std::optional<IVec3> block_of(std::int64_t number) {
+  constexpr std::int64_t kOffset = 0x800800800;
+  constexpr std::int64_t kEnd = std::int64_t{1} << 36;
+  if (number < -kOffset || number >= kEnd - kOffset) return std::nullopt;
+  const std::int64_t shifted = number + kOffset;
+  const auto part = [&](int shift) { return static_cast<int>(shifted >> shift & 0xFFF) + kLowestBlock; };
+  return IVec3{part(0), part(12), part(24)};
+}
+
+bool is_block(std::int64_t coordinate) {
+  return coordinate >= kLowestBlock && coordinate < kHighestBlock;
+}
+
+std::string to_string(IVec3 place) {
+  return "(" + std::to_string(place.x) + ", " + std::to_string(place.y) + ", " + std::to_string(place.z) + ")";
+}
+
+/// A fault of the database, without what only Quoin's own worlds can do about it.
+Error fault_of_database(Error error, const fs::path& path) {
+  if (error.code == ErrorCode::BadFormat) error.message = "the database is damaged";
+  error.path = path.string();
+  return error;
+}
+
+/// A connection and what reads a row with it.
+struct Reader {
+  Connection connection;
+  Statement row;
+  MapBlockReader blocks{};
+  MapBlock block{};
+};
+
+/// Readers of a database, each used by one thread at a time; of one in memory there is one.
+class Readers {
+ public:
+  Readers(fs::path path, std::vector<std::byte> bytes) : path_(std::move(path)), bytes_(std::move(bytes)) {}
+
+  [[nodiscard]] const fs::path& path() const { return path_; }
+  [[nodiscard]] Places places() const { return places_; }
+
+  Result<Connection> connect() const {
+    if (!path_.empty()) return open_file();
+    return Connection::open(bytes_);
+  }
+
+  /// Finds out how places are said.
+  Status choose(Connection& connection) {
+    if (const auto by_number = connection.prepare("SELECT pos, data FROM blocks LIMIT 1")) {
+      places_ = Places::Number;
+      return {};
+    }
+    const auto by_three = connection.prepare("SELECT x, y, z, data FROM blocks LIMIT 1");
+    if (!by_three) {
+      return make_error(ErrorCode::BadFormat, "no map of Luanti's: it has no table of blocks", path_.string());
+    }
+    places_ = Places::Three;
+    return {};
+  }
+
+  /// Runs `use(Reader&)` with one that no other thread uses.
+  template <class Use>
+  auto with_reader(Use use) -> decltype(use(std::declval<Reader&>())) {
+    auto reader = take();
+    if (!reader) return reader.error();
+    try {
+      auto result = use(**reader);
+      give_back(std::move(*reader));
+      return result;
+    } catch (...) {
+      give_back(nullptr);
+      throw;
+    }
+  }
+
+ private:
+  Result<Connection> open_file() const {
+    auto connection = Connection::open(path_.string(), Connection::Mode::Read);
+    // In a folder that nobody can write to there is no place for what readers of a log share.
+    if (!connection || connection->prepare("SELECT data FROM blocks LIMIT 1")) return connection;
+    auto alone = Connection::open(path_.string(), Connection::Mode::ReadImmutable);
+    if (alone && alone->prepare("SELECT data FROM blocks LIMIT 1")) return alone;
+    return connection;
+  }
+
+  Result<std::unique_ptr<Reader>> take() {
+    std::unique_lock lock(mutex_);
+    const bool is_alone = path_.empty();
+    given_back_.wait(lock, [&] { return !is_alone || used_ == 0; });
+    ++used_;
+    if (!free_.empty()) {
+      auto reader = std::move(free_.back());
+      free_.pop_back();
+      return reader;
+    }
+    lock.unlock();
+    auto fresh = open();
+    if (!fresh) give_back(nullptr);
+    return fresh;
+  }
+
+  Result<std::unique_ptr<Reader>> open() const {
+    auto connection = connect();
+    if (!connection) return fault_of_database(connection.error(), path_);
+    auto row =
+        connection->prepare(places_ == Places::Number ? "SELECT data FROM blocks WHERE pos = ?"
+                                                      : "SELECT data FROM blocks WHERE x = ? AND y = ? AND z = ?");
+    if (!row) return fault_of_database(row.error(), path_);
+    return std::unique_ptr<Reader>(new Reader{std::move(*connection), std::move(*row)});
+  }
+
+  void give_back(std::unique_ptr<Reader> reader) {
+    const std::scoped_lock lock(mutex_);
+    --used_;
+    if (reader != nullptr) free_.push_back(std::move(reader));
+    given_back_.notify_one();
+  }
+
+  fs::path path_;  // empty: bytes_ are the database
+  std::vector<std::byte> bytes_;
+  Places places_ = Places::Number;
+  std::mutex mutex_;
+  std::condition_variable given_back_;
+  std::vector<std::unique_ptr<Reader>> free_;
+  int used_ = 0;
+};
+
+/// The types of the nodes that were met so far. Threads: any function from any thread, also at once.
+class NodeTypes {
+ public:
+  /// kAir for what is no node. Errors: LimitExceeded.
+  Result<VoxelType> find(const std::string& name) {
+    {
+      const std::shared_lock lock(mutex_);
+      if (const auto known = numbers_.find(name); known != numbers_.end()) return known->second;
+    }
+    auto properties = models::node_properties(name);
+    const std::unique_lock lock(mutex_);
+    VoxelType type = kAir;
+    if (properties) {
+      properties->state_bits = 8;
+      properties->attributes[kStatesAttribute] = "param2:n8";
+      const auto added = types_.find_or_add(*properties);
+      if (!added) return added.error();
+      type = *added;
+    }
+    numbers_.emplace(name, type);
+    return type;
+  }
+  VoxelRegistry types() const {
+    const std::shared_lock lock(mutex_);
+    return types_;
+  }
+
+ private:
+  mutable std::shared_mutex mutex_;
+  VoxelRegistry types_;
+  std::map<std::string, VoxelType, std::less<>> numbers_;
+};
+
+/// A chunk of ours that blocks are put into.
+class ChunkBuilder {
+ public:
+  explicit ChunkBuilder(NodeTypes& types) : types_(types), voxels_(kChunkVoxels) {}
+
+  void begin() {
+    std::ranges::fill(voxels_, kAir);
+    states_.clear();
+  }
+  /// `corner`: of the block within the chunk. Errors: LimitExceeded, of types.
+  Status put(const MapBlock& block, IVec3 corner) {
+    types_of_.clear();
+    for (const std::string& name : block.names) {
+      const auto type = types_.find(name);
+      if (!type) return type.error();
+      types_of_.push_back(*type);
+    }
+    for (std::size_t i = 0; i < kBlockNodes; ++i) {
+      const VoxelType type = types_of_[block.nodes[i]];
+      if (type == kAir) continue;
+      const auto node = static_cast<int>(i);
+      const IVec3 at = corner + IVec3{node & 15, node >> 4 & 15, kBlockEdge - 1 - (node >> 8)};
+      voxels_[static_cast<std::size_t>((at.z * kChunkEdge + at.y) * kChunkEdge + at.x)] = type;
+      if (block.param2[i] != 0) states_.emplace_back(at, block.param2[i]);
+    }
+    return {};
+  }
+  Chunk take() {
+    Chunk chunk = Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(voxels_));
+    for (const auto& [at, state] : states_) chunk.set_data(at, {.state = state});
+    return chunk;
+  }
+
+ private:
+  NodeTypes& types_;
+  std::vector<VoxelType> voxels_;
+  std::vector<std::pair<IVec3, std::uint32_t>> states_;
+  std::vector<VoxelType> types_of_;  // by place in a block's names
+};
+
+class LuantiSource final : public ChunkSource {
+ public:
+  LuantiSource(ChunkSourceInfo info, std::vector<IBox> parts, std::unique_ptr<Readers> readers)
+      : ChunkSource(std::move(info), std::move(parts)), readers_(std::move(readers)) {}
+
+  VoxelRegistry types() const override { return types_.types(); }
+
+  Result<SourcePart> read_part(std::size_t part) const override {
+    QUOIN_ASSERT(part < parts().size(), "a part of the source");
+    const IBox box = parts()[part];
+    return readers_->with_reader([&](Reader& reader) -> Result<SourcePart> {
+      SourcePart result;
+      ChunkBuilder builder(types_);
+      for (IVec3 place = box.min; place.y < box.max.y; ++place.y) {
+        builder.begin();
+        for (int i = 0; i < kBlocksOfChunk * kBlocksOfChunk * kBlocksOfChunk; ++i) {
+          const IVec3 inside{i & 3, i >> 2 & 3, i >> 4};
+          if (auto read = put_block(reader, place, inside, builder, result.broken); !read) return read.error();
+        }
+        Chunk chunk = builder.take();
+        if (chunk.uniform() != kAir) result.chunks.push_back({place, std::move(chunk)});
+      }
+      return result;
+    });
+  }
+
+ private:
+  /// `inside`: which of the chunk's blocks. What is broken is told.
+  Status put_block(Reader& reader, IVec3 chunk, IVec3 inside, ChunkBuilder& builder, std::vector<Error>& broken) const {
+    const IVec3 ours = chunk * kBlocksOfChunk + inside;
+    const IVec3 place{ours.x, ours.y, -1 - ours.z};
+    const StatementScope scope(reader.row);
+    if (readers_->places() == Places::Number) {
+      reader.row.bind(0, number_of(place));
+    } else {
+      for (int axis = 0; axis < 3; ++axis) reader.row.bind(axis, std::int64_t{place[axis]});
+    }
+    const auto tell = [&](const Error& error) {
+      std::string what = "block " + to_string(place) + ": ";
+      if (error.byte_offset) what += "byte " + std::to_string(*error.byte_offset) + " of its row: ";
+      broken.push_back(make_error(error.code, what + error.message, readers_->path().string()));
+    };
+    const auto found = reader.row.step();
+    if (!found && found.error().code == ErrorCode::BadFormat) {
+      tell(fault_of_database(found.error(), {}));
+      return {};
+    }
+    if (!found) return fault_of_database(found.error(), readers_->path());
+    if (!*found) return {};
+    const std::span<const std::byte> row = reader.row.bytes(0);
+    if (!reader.row.is_bytes(0) || row.size() > kMaxRow) {
+      tell(make_error(ErrorCode::BadFormat,
+                      reader.row.is_bytes(0) ? "a row of more than 16 MiB" : "a row without data"));
+      return {};
+    }
+    if (const auto read = reader.blocks.read(row, reader.block); !read) {
+      tell(read.error());
+      return {};
+    }
+    return builder.put(reader.block, inside * kBlockEdge);
+  }
+
+  std::unique_ptr<Readers> readers_;
+  mutable NodeTypes types_;
+};
+
+/// What the table has, as our chunks.
+struct Extent {
+  std::unordered_set<std::uint64_t> chunks;
+  std::int64_t stray = 0;  // rows whose place there cannot be
+
+  void add(std::optional<IVec3> block) {
+    if (!block) {
+      ++stray;
+      return;
+    }
+    const IVec3 chunk{block->x >> 2, block->y >> 2, (-1 - block->z) >> 2};
+    const auto part = [](int coordinate) { return static_cast<std::uint64_t>(coordinate + 512); };
+    chunks.insert(part(chunk.z) << 20 | part(chunk.x) << 10 | part(chunk.y));
+  }
+
+  [[nodiscard]] std::vector<IBox> parts() const {
+    std::vector<std::uint64_t> sorted(chunks.begin(), chunks.end());
+    std::ranges::sort(sorted);
+    std::vector<IBox> result;
+    for (const std::uint64_t each : sorted) {
+      const auto part = [&](int shift) { return static_cast<int>(each >> shift & 0x3FFU) - 512; };
+      const IVec3 chunk{part(10), part(0), part(20)};
+      const bool goes_on = !result.empty() && result.back().max == IVec3{chunk.x + 1, chunk.y, chunk.z + 1} &&
+                           result.back().size().y < kChunksOfPart;
+      if (goes_on) {
+        ++result.back().max.y;
+      } else {
+        result.push_back({chunk, chunk + 1});
+      }
+    }
+    return result;
+  }
+};
+
+Result<Extent> find_extent(Readers& readers) {
+  auto connection = readers.connect();
+  if (!connection) return fault_of_database(connection.error(), readers.path());
+  if (auto chosen = readers.choose(*connection); !chosen) return chosen.error();
+  const bool is_number = readers.places() == Places::Number;
+  auto rows = connection->prepare(is_number ? "SELECT pos FROM blocks" : "SELECT x, y, z FROM blocks");
+  if (!rows) return fault_of_database(rows.error(), readers.path());
+  Extent extent;
+  for (;;) {
+    const auto row = rows->step();
+    if (!row) return fault_of_database(row.error(), readers.path());
+    if (!*row) return extent;
+    if (is_number) {
+      extent.add(rows->is_integer(0) ? block_of(rows->integer(0)) : std::nullopt);
+      continue;
+    }
+    IVec3 block{0};
+    bool is_sound = true;
+    for (int axis = 0; axis < 3; ++axis) {
+      is_sound &= rows->is_integer(axis) && is_block(rows->integer(axis));
+      if (is_sound) block[axis] = static_cast<int>(rows->integer(axis));
+    }
+    extent.add(is_sound ? std::optional(block) : std::nullopt);
+  }
+}
+
+Result<std::unique_ptr<ChunkSource>> open(std::unique_ptr<Readers> readers, std::string name) {
+  auto extent = find_extent(*readers);
+  if (!extent) return extent.error();
+  ChunkSourceInfo info;
+  info.format = "luanti_map";
+  info.name = std::move(name);
+  if (extent->stray > 0) {
+    info.broken.push_back(make_error(ErrorCode::BadFormat,
+                                     std::to_string(extent->stray) + " rows of places that there cannot be",
+                                     readers->path().string()));
+  }
+  std::vector<IBox> parts = extent->parts();
+  for (const IBox& part : parts) info.chunks = unite(info.chunks, part);
+  // Where a player begins is not in the map; the game looks for a place around the middle of the world.
+  const bool has_middle =
+      std::ranges::any_of(parts, [](const IBox& part) { return part.min.x == 0 && part.min.z == -1; });
+  if (has_middle) info.spawn = DVec3(0.0, 0.0, -0.5);
+  return std::unique_ptr<ChunkSource>(new LuantiSource(std::move(info), std::move(parts), std::move(readers)));
+}
+
+/// What world.mt says under a name; empty where it says nothing.
+std::string value_of(const std::string& text, std::string_view key) {
+  constexpr std::string_view kBlank = " \t\r";
+  const auto trimmed = [&](std::string_view part) {
+    const std::size_t first = part.find_first_not_of(kBlank);
+    if (first == std::string_view::npos) return std::string_view();
+    return part.substr(first, part.find_last_not_of(kBlank) + 1 - first);
+  };
+  std::string_view rest = text;
+  std::string found;
+  while (!rest.empty()) {
+    const std::string_view line = rest.substr(0, rest.find('\n'));
+    rest.remove_prefix(std::min(line.size() + 1, rest.size()));
+    const std::size_t equals = line.find('=');
+    if (equals != std::string_view::npos && trimmed(line.substr(0, equals)) == key) {
+      found = trimmed(line.substr(equals + 1));
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+}  // namespace store::luanti
+
+Result<std::unique_ptr<ChunkSource>> open_luanti(const std::filesystem::path& path) {
+  using namespace store::luanti;
+  std::error_code error;
+  if (!fs::is_directory(path, error)) return open(std::make_unique<Readers>(path, std::vector<std::byte>()), {});
+  constexpr std::size_t kMaxSettings = std::size_t{1} << 20;
+  const auto settings = read_file_beginning(path / "world.mt", kMaxSettings);
+  if (!settings) return settings.error();
+  const std::string text(reinterpret_cast<const char*>(settings->data()), settings->size());
+  const std::string backend = value_of(text, "backend");
+  if (!backend.empty() && backend != "sqlite3") {
+    return make_error(ErrorCode::Unsupported,
+                      "a world that is kept by " + printable(backend) +
+                          ", and only sqlite3 is read (luanti --migrate sqlite3 turns it into that)",
+                      (path / "world.mt").string());
+  }
+  const fs::path map = path / "map.sqlite";
+  if (!fs::is_regular_file(map, error)) {
+    return make_error(ErrorCode::BadFormat, "a world of Luanti's without its map.sqlite", path.string());
+  }
+  std::string name = value_of(text, "world_name");
+  if (name.empty()) name = fs::absolute(path, error).lexically_normal().filename().string();
+  return open(std::make_unique<Readers>(map, std::vector<std::byte>()), printable(name));
+}
+
+Result<std::unique_ptr<ChunkSource>> open_luanti(std::span<const std::byte> database) {
+  using namespace store::luanti;
+  return open(std::make_unique<Readers>(fs::path(), std::vector<std::byte>(database.begin(), database.end())), {});
+}
+
+}  // namespace quoin

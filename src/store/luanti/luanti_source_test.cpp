@@ -1,0 +1,256 @@
+#include <filesystem>
+#include <random>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include <quoin/io/chunk_source.h>
+#include <quoin/io/file.h>
+#include <quoin/io/formats.h>
+#include <quoin/store/world_import.h>
+#include <quoin/store/world_saver.h>
+
+#include "io/source/luanti_map.h"
+#include "store/luanti/luanti_for_tests.h"
+#include "store/luanti/map_block.h"
+#include "store/world/world_for_tests.h"
+
+namespace quoin {
+
+namespace {
+
+namespace fs = std::filesystem;
+using luanti_test::Block;
+using luanti_test::Bytes;
+using luanti_test::Map;
+using luanti_test::row_of;
+
+/// Air with a stone, a turned chest and a node of a mod.
+Block some_block() {
+  Block block;
+  block.names = {{0, "air"}, {3, "default:stone"}, {100, "default:chest"}, {2053, "mod:unheard_of"}};
+  block.at(1, 2, 3) = {3, 0};
+  block.at(15, 0, 15) = {100, 3};
+  block.at(0, 15, 0) = {2053, 9};
+  return block;
+}
+
+const Grid& grid_of(const LoadedScene& loaded) {
+  return loaded.scene.grids()[loaded.scene.grids().handles().front()].grid;
+}
+
+LoadedScene load(const fs::path& path) {
+  auto loaded = load_scene(path);
+  EXPECT_TRUE(loaded) << to_string(loaded.error());
+  return loaded ? std::move(*loaded) : LoadedScene{};
+}
+
+void expect_some_block(const LoadedScene& loaded, IVec3 corner) {
+  const Grid& grid = grid_of(loaded);
+  const auto name = [&](IVec3 at) { return loaded.scene.types[grid.get(corner + at)].name; };
+  EXPECT_EQ(loaded.scene.voxel_count(), 3);
+  EXPECT_EQ(name({1, 2, 12}), "default:stone");
+  EXPECT_EQ(name({15, 0, 0}), "default:chest");
+  EXPECT_EQ(name({0, 15, 15}), "mod:unheard_of");
+  EXPECT_EQ(grid.data(corner + IVec3{15, 0, 0}).state, 3U);
+  EXPECT_EQ(grid.data(corner + IVec3{0, 15, 15}).state, 9U);
+  EXPECT_EQ(grid.data(corner + IVec3{1, 2, 12}).state, 0U);
+}
+
+TEST(LuantiMap, EveryVersionAndBothTablesGiveTheSameNodes) {
+  for (const bool by_three : {false, true}) {
+    for (int version = 25; version <= 29; ++version) {
+      for (const int width : {1, 2}) {
+        const WorldFolder folder;
+        Map(folder / "map.sqlite", by_three).put({-7, -3, 5}, row_of(some_block(), version, width));
+        const LoadedScene loaded = load(folder / "map.sqlite");
+        EXPECT_EQ(loaded.format, "luanti_map");
+        EXPECT_TRUE(loaded.warnings.empty()) << loaded.warnings.front();
+        expect_some_block(loaded, {-7 * 16, -3 * 16, -6 * 16});
+      }
+    }
+  }
+}
+
+TEST(LuantiMap, AFolderHasItsName) {
+  const WorldFolder folder;
+  Map(folder / "map.sqlite").put({0, 0, 0}, row_of(some_block(), 28));
+  ASSERT_TRUE(write_file(Bytes(), folder / "world.mt"));
+  EXPECT_TRUE(is_world_folder(folder.path()));
+  EXPECT_EQ(detect_format(folder.path()).value(), FileFormat::LuantiMap);
+  EXPECT_EQ(open_chunk_source(folder.path()).value()->info().name, folder.path().filename().string());
+  const std::string text = "gameid = minetest\n world_name =  Old town \r\nbackend = sqlite3\n";
+  ASSERT_TRUE(write_file(std::as_bytes(std::span(text)), folder / "world.mt"));
+  const auto source = open_chunk_source(folder.path());
+  ASSERT_TRUE(source);
+  EXPECT_EQ((*source)->info().name, "Old town");
+  EXPECT_EQ((*source)->info().spawn, DVec3(0.0, 0.0, -0.5));
+}
+
+TEST(LuantiMap, ThatIsKeptElsewhereIsSaid) {
+  const WorldFolder folder;
+  const std::string text = "backend = leveldb\n";
+  ASSERT_TRUE(write_file(std::as_bytes(std::span(text)), folder / "world.mt"));
+  const auto refused = load_scene(folder.path());
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
+  EXPECT_NE(refused.error().message.find("leveldb"), std::string::npos);
+}
+
+TEST(LuantiMap, IsKnownByItsTable) {
+  const WorldFolder folder;
+  Map(folder / "map.sqlite").put({0, 0, 0}, row_of(some_block(), 28));
+  auto bytes = read_file(folder / "map.sqlite").value();
+  EXPECT_EQ(detect_format(bytes), FileFormat::LuantiMap);
+  const auto loaded = load_scene(bytes);
+  ASSERT_TRUE(loaded);
+  expect_some_block(*loaded, {0, 0, -16});
+  bytes[68] = std::byte{1};  // the mark of another program
+  EXPECT_FALSE(is_luanti_map(bytes));
+  {
+    auto other = store::Connection::open((folder / "other").string(), store::Connection::Mode::Create).value();
+    ASSERT_TRUE(other.run("CREATE TABLE blocks_of_others (pos INT, data BLOB); CREATE TABLE players (blocks INT)"));
+  }
+  EXPECT_EQ(detect_format(folder / "other").value(), std::nullopt);
+  {
+    auto other = store::Connection::open((folder / "without").string(), store::Connection::Mode::Create).value();
+    ASSERT_TRUE(other.run("CREATE TABLE blocks (x INT)"));
+  }
+  const auto refused = load_scene(folder / "without");
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("no table of blocks"), std::string::npos);
+}
+
+TEST(LuantiMap, WhatIsBrokenIsNamedAndLeftOut) {
+  const WorldFolder folder;
+  Bytes cut = row_of(some_block(), 28);
+  cut.resize(cut.size() / 2);
+  Bytes old = row_of(some_block(), 28);
+  old[0] = std::byte{22};
+  Block nameless = some_block();
+  nameless.at(4, 0, 0) = {5, 0};
+  {
+    Map map(folder / "map.sqlite");
+    map.put({0, 0, 0}, row_of(some_block(), 29));
+    map.put({1, 0, 0}, cut);
+    map.put({2, 0, 0}, old);
+    map.put({3, 0, 0}, row_of(nameless, 29));
+    map.put({0, 1, 0}, {});
+    map.run("INSERT INTO blocks VALUES (16777216, NULL)");
+    map.put_number(std::int64_t{1} << 40, cut);
+    map.put_number(-(std::int64_t{1} << 40), cut);
+  }
+  const LoadedScene loaded = load(folder / "map.sqlite");
+  expect_some_block(loaded, {0, 0, -16});
+  const auto said = [&](std::string_view text) {
+    return std::ranges::any_of(loaded.warnings,
+                               [&](const std::string& line) { return line.find(text) != std::string::npos; });
+  };
+  EXPECT_EQ(loaded.warnings.size(), 6U);
+  EXPECT_TRUE(said("2 rows of places that there cannot be"));
+  EXPECT_TRUE(said("block (1, 0, 0): byte "));
+  EXPECT_TRUE(said("block (2, 0, 0): byte 0 of its row: version 22 of blocks"));
+  EXPECT_TRUE(said("node 4 has number 5, which has no name"));
+  EXPECT_TRUE(said("block (0, 1, 0): byte 0 of its row: an empty row"));
+  EXPECT_TRUE(said("block (0, 0, 1): a row without data"));
+}
+
+TEST(LuantiMap, ReadsRowsThatAreCutOffOrChangedAnywhere) {
+  store::luanti::MapBlockReader reader;
+  store::luanti::MapBlock block;
+  std::minstd_rand random(5);
+  for (const int version : {25, 28, 29}) {
+    const Bytes sound = row_of(some_block(), version);
+    ASSERT_TRUE(reader.read(sound, block));
+    for (std::size_t size = 0; size < sound.size(); ++size) {
+      const bool has_read = reader.read(std::span(sound).first(size), block).has_value();
+      EXPECT_TRUE(!has_read || size + 3 >= sound.size()) << version << " cut to " << size;  // the timers
+    }
+    for (int i = 0; i < 3000; ++i) {
+      Bytes changed = sound;
+      changed[random() % changed.size()] = static_cast<std::byte>(random());
+      if (!reader.read(changed, block)) continue;
+      for (const std::uint16_t node : block.nodes) ASSERT_LT(node, block.names.size());
+    }
+  }
+}
+
+TEST(LuantiMap, TheCorpusIsReadOrRefusedWithAnOffset) {
+  int read = 0;
+  int refused = 0;
+  for (const auto& entry : fs::directory_iterator(fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "luanti")) {
+    store::luanti::MapBlockReader reader;
+    store::luanti::MapBlock block;
+    const auto row = read_file(entry.path());
+    ASSERT_TRUE(row);
+    const auto done = reader.read(*row, block);
+    ++(done ? read : refused);
+    if (!done) {
+      EXPECT_TRUE(done.error().byte_offset) << entry.path();
+    }
+  }
+  EXPECT_EQ(read, 4);
+  EXPECT_EQ(refused, 1);
+}
+
+TEST(LuantiMap, AFrameThatExpandsToMuchIsCutOff) {
+  luanti_test::Writer content;
+  content.big(0, 7).big(0, 1).big(0xFFFF, 2).append(Bytes(std::size_t{64} << 20));
+  luanti_test::Writer row;
+  row.big(29, 1).append(luanti_test::zstd_of(content.bytes));
+  store::luanti::MapBlockReader reader;
+  store::luanti::MapBlock block;
+  EXPECT_FALSE(reader.read(row.bytes, block));
+}
+
+TEST(LuantiMap, AnImportThatWasStoppedEndsAsIfItHadNotBeen) {
+  const WorldFolder folder;
+  {
+    Map map(folder / "map.sqlite", true);
+    for (int i = 0; i < 12; ++i) map.put({8 * i, 4 * (i % 5) - 40, -8 * i}, row_of(some_block(), 25 + i % 5));
+  }
+  const auto open = [&] { return open_chunk_source(folder / "map.sqlite").value(); };
+  ASSERT_TRUE(import_world(*open(), folder / "whole.quoin", {1}));
+  int stopped = 0;
+  for (; stopped < 50; ++stopped) {
+    int calls = 0;
+    if (import_world(*open(), folder / "parts.quoin", {1}, [&](double) { return calls++ == 0; })) break;
+  }
+  EXPECT_GT(stopped, 1);
+  const auto scene = [&](const char* name) {
+    return load_world(WorldStore::open(folder / name, WorldAccess::Read).value()).value().loaded;
+  };
+  const LoadedScene whole = scene("whole.quoin");
+  const LoadedScene parts = scene("parts.quoin");
+  EXPECT_EQ(whole.scene.voxel_count(), 36);
+  ASSERT_EQ(grid_of(whole).chunks(), grid_of(parts).chunks());
+  for (const IVec3 place : grid_of(whole).chunks()) {
+    EXPECT_EQ(*grid_of(whole).find_chunk(place), *grid_of(parts).find_chunk(place));
+  }
+}
+
+TEST(LuantiMap, ARealWorldHasTheNodesThatItHas) {
+  const fs::path folder = fs::path(QUOIN_SOURCE_DIR) / "../shared/data/luanti/cornernote+minetest-mesecons-circuits";
+  if (!fs::exists(folder)) GTEST_SKIP() << folder << " is not there";
+  const auto source = open_chunk_source(folder);
+  ASSERT_TRUE(source) << to_string(source.error());
+  std::int64_t voxels = 0;
+  std::int64_t with_state = 0;
+  for (std::size_t i = 0; i < (*source)->parts().size(); ++i) {
+    const auto part = (*source)->read_part(i);
+    ASSERT_TRUE(part);
+    EXPECT_TRUE(part->broken.empty());
+    for (const SourceChunk& chunk : part->chunks) {
+      voxels += chunk.voxels.non_air_count();
+      chunk.voxels.for_each_data([&](IVec3, const VoxelData&) { ++with_state; });
+    }
+  }
+  // Counted by a program that shares nothing with this one.
+  EXPECT_EQ(voxels, 1'003'917);
+  EXPECT_EQ(with_state, 2'665);
+  EXPECT_EQ((*source)->types().size() - 1, 46U);
+}
+
+}  // namespace
+
+}  // namespace quoin

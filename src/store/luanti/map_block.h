@@ -1,0 +1,54 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+struct ZSTD_DCtx_s;
+
+namespace quoin::store::luanti {
+
+inline constexpr int kBlockEdge = 16;
+inline constexpr std::size_t kBlockNodes = 4096;
+
+/// A block of a map, 16^3 nodes, x fastest, then y, then z, in Luanti's axes.
+struct MapBlock {
+  std::vector<std::string> names;                  ///< of the nodes that are in it
+  std::array<std::uint16_t, kBlockNodes> nodes{};  ///< places in `names`
+  std::array<std::uint8_t, kBlockNodes>
+      param2{};  ///< turns, levels of what flows, colours: what it means its node says
+};
+
+/// Reads blocks as the database has them. Not read are what nodes hold (metadata), objects, timers, and light (param1).
+///
+/// Source: Luanti's doc/world_format.md.
+class MapBlockReader {
+ public:
+  MapBlockReader();
+
+  /// Puts what a row's bytes hold into `block`, whose memory is used again.
+  ///
+  /// Versions: 25 to 29.
+  /// Errors:   BadFormat with the offset in the row, or in what a row of version 29 expands to, as the message says;
+  ///           Unsupported for other versions. The block then means nothing.
+  /// Memory:   4 MiB of what it expands to.
+  [[nodiscard]] Status read(std::span<const std::byte> row, MapBlock& block);
+
+ private:
+  [[nodiscard]] Status expand(std::span<const std::byte> frame);
+
+  struct Free {
+    void operator()(ZSTD_DCtx_s* context) const;
+  };
+  std::unique_ptr<ZSTD_DCtx_s, Free> context_;
+  std::vector<std::byte> content_;
+  std::vector<std::uint32_t> name_of_;  // place in the block's names, by number of its table
+};
+
+}  // namespace quoin::store::luanti
