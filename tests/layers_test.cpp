@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 const std::map<std::string, int> kLevels = {
-    {"core", 0}, {"grid", 1},   {"mesh", 2}, {"trace", 2}, {"terrain", 2},   {"scene", 3},   {"light", 4},
+    {"core", 0}, {"grid", 1},   {"mesh", 2}, {"trace", 2}, {"terrain", 2},   {"voxelize", 2}, {"scene", 3},   {"light", 4},
     {"live", 5}, {"render", 5}, {"io", 5},   {"store", 6}, {"render_vk", 6}, {"formats", 7}, {"stream", 7}};
 constexpr int kAppsLevel = 8;
 
@@ -33,6 +33,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/density/cell_corners.h", {"mesh", "trace"}},
     {"grid/density/density_storage.h", {"mesh", "store", "trace"}},
     {"grid/density/stored_density.h", {"terrain"}},
+    {"grid/looks.h", {"io", "voxelize"}},
     {"grid/long_box.h", {"live", "scene", "stream"}},
     {"io/byte_order.h", {"store"}},
     {"io/byte_reader.h", {"store"}},

@@ -3,11 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include <quoin/core/result.h>
 #include <quoin/io/loaded_scene.h>
+
+#include "grid/looks.h"
 
 namespace quoin::models {
 
@@ -50,16 +51,10 @@ class ModelBuilder {
     Model model;
     std::size_t first = 0;  // run
   };
-  struct Look {
-    Rgba8 colour;
-    std::uint32_t material;
-  };
-  [[nodiscard]] Result<std::vector<VoxelType>> types_of_looks(VoxelRegistry& types);
 
   std::vector<Part> parts_;
   std::vector<Run> runs_;
-  std::vector<Look> looks_;
-  std::unordered_map<std::uint64_t, std::uint32_t> numbers_;  // of looks, by colour and material
+  Looks looks_;
   std::vector<VoxelProperties> materials_{VoxelProperties{}};
   std::uint32_t material_ = 0;
   std::vector<std::string> warnings_;

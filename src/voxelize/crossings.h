@@ -1,0 +1,80 @@
+#pragma once
+
+// What lines through the centres of voxels meet of a mesh, along each axis.
+//
+//   axis 0 (x): lines of (y, z)     a column is 64 x 64 lines: all that cross the chunks one behind the other
+//   axis 1 (y): lines of (x, z)     its lines' crossings lie one line after the other, each sorted along the line
+//   axis 2 (z): lines of (x, y)
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <quoin/core/parallel.h>
+#include <quoin/core/progress.h>
+#include <quoin/core/result.h>
+
+#include "core/progress_steps.h"
+#include "voxelize/frame.h"
+
+namespace quoin::voxelizing {
+
+/// One crossing: the first voxel whose centre lies at or behind it, whether it lies in the voxel before that one, and
+/// which side is met.
+class Crossing {
+ public:
+  Crossing() = default;
+  Crossing(int first_centre_behind, bool is_in_previous, bool enters)
+      : bits_(first_centre_behind * 4 + (is_in_previous ? 0 : 2) + (enters ? 1 : 0)) {}
+  /// The first voxel that is behind.
+  [[nodiscard]] int behind() const { return bits_ >> 2; }
+  /// The voxel in which it lies.
+  [[nodiscard]] int voxel() const { return (bits_ >> 2) - ((bits_ & 2) != 0 ? 0 : 1); }
+  /// +1 into the mesh, -1 out of it.
+  [[nodiscard]] int step() const { return (bits_ & 1) != 0 ? 1 : -1; }
+  bool operator<(const Crossing& other) const { return bits_ < other.bits_; }
+
+ private:
+  std::int32_t bits_ = 0;
+};
+
+inline constexpr std::size_t kLines = static_cast<std::size_t>(kChunkEdge) * kChunkEdge;
+
+/// 64 x 64 lines.
+struct Column {
+  std::vector<std::uint32_t> begin;  ///< of line u + 64 v in `crossings`, and one more; empty where there are none
+  std::vector<Crossing> crossings;
+
+  [[nodiscard]] std::span<const Crossing> line(std::size_t index) const {
+    if (begin.empty()) return {};
+    return {crossings.data() + begin[index], crossings.data() + begin[index + 1]};
+  }
+};
+
+/// The axes of the lines' plane.
+inline constexpr std::array<std::array<int, 2>, 3> kPlane = {{{1, 2}, {0, 2}, {0, 1}}};
+
+class Crossings {
+ public:
+  /// Errors: LimitExceeded, before anything is found; Cancelled.
+  [[nodiscard]] static Result<Crossings> find(const Frame& frame, Threads threads, const Progress& progress);
+
+  /// The lines along `axis` through a chunk of the frame.
+  [[nodiscard]] const Column& column(int axis, IVec3 chunk) const {
+    const auto [u, v] = kPlane[static_cast<std::size_t>(axis)];
+    return columns_[static_cast<std::size_t>(axis)]
+                   [static_cast<std::size_t>(chunk[u]) +
+                    static_cast<std::size_t>(chunks_[u]) * static_cast<std::size_t>(chunk[v])];
+  }
+
+ private:
+  std::array<std::vector<Column>, 3> columns_;
+  IVec3 chunks_{0};
+};
+
+/// Marks the voxels of a chunk in which a crossing lies: its 6-separating surface.
+void mark_crossed(const Crossings& crossings, IVec3 chunk, ChunkBits& bits);
+
+}  // namespace quoin::voxelizing

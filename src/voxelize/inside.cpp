@@ -1,0 +1,180 @@
+#include "voxelize/inside.h"
+
+#include <algorithm>
+#include <cstdlib>
+
+namespace quoin::voxelizing {
+
+namespace {
+
+// Of six rays: more than half of them.
+constexpr int kHalf = 3;
+// So that the sum of six fits the numbers, and beyond what a real mesh has.
+constexpr int kMostTurns = 4'000;
+
+/// What the two rays of a line say of a centre: `before` is the sum of the steps before it, `all` of all of the line.
+/// A ray back sees the steps before; a ray on sees what is behind, from the other side. In a closed mesh both are the
+/// winding number.
+int votes_of(SolidVoxels rule, int before, int all, int crossed, int crossings) {
+  if (rule == SolidVoxels::Parity) return (crossed & 1) + ((crossings - crossed) & 1);
+  return std::clamp(2 * before - all, -kMostTurns, kMostTurns);
+}
+
+/// How the votes of a line change within a chunk.
+class LineVotes {
+ public:
+  LineVotes(std::span<const Crossing> line, SolidVoxels rule, int first)
+      : line_(line), rule_(rule), end_(first + kChunkEdge) {
+    for (const Crossing& crossing : line) all_ += crossing.step();
+    while (next_ < line.size() && line[next_].behind() <= first) before_ += line[next_++].step();
+  }
+  /// Where the line enters the chunk.
+  [[nodiscard]] int votes() const {
+    return votes_of(rule_, before_, all_, static_cast<int>(next_), static_cast<int>(line_.size()));
+  }
+  /// Whether they change before the chunk's end; `at` is set to the voxel from which on.
+  [[nodiscard]] bool advance(int& at) {
+    if (next_ >= line_.size() || line_[next_].behind() >= end_) return false;
+    at = line_[next_].behind() - (end_ - kChunkEdge);
+    while (next_ < line_.size() && line_[next_].behind() - (end_ - kChunkEdge) == at) before_ += line_[next_++].step();
+    return true;
+  }
+
+ private:
+  std::span<const Crossing> line_;
+  SolidVoxels rule_;
+  int end_;
+  int before_ = 0;
+  int all_ = 0;
+  std::size_t next_ = 0;
+};
+
+using Plane = std::array<std::int16_t, kLines>;
+
+/// The votes of the lines where they enter a chunk; whether none of them changes in it.
+bool entering_votes(const Column& column, SolidVoxels rule, int first, Plane& votes) {
+  votes.fill(0);
+  if (column.begin.empty()) return true;
+  bool is_constant = true;
+  for (std::size_t i = 0; i < kLines; ++i) {
+    const auto line = column.line(i);
+    if (line.empty()) continue;
+    LineVotes at(line, rule, first);
+    votes[i] = static_cast<std::int16_t>(at.votes());
+    int where = 0;
+    if (is_constant && at.advance(where)) is_constant = false;
+  }
+  return is_constant;
+}
+
+bool is_uniform(const Plane& votes) {
+  return std::all_of(votes.begin(), votes.end(), [&](std::int16_t v) { return v == votes[0]; });
+}
+
+/// Adds the votes of lines along x: those that change do so within a row.
+void add_along_x(const Column& column, SolidVoxels rule, int first, const Plane& entering, std::int16_t* sums) {
+  for (std::size_t i = 0; i < kLines; ++i, sums += kChunkEdge) {
+    std::int16_t votes = entering[i];
+    int from = 0;
+    const auto line = column.line(i);
+    if (!line.empty()) {
+      LineVotes along(line, rule, first);
+      int at = 0;
+      while (along.advance(at)) {
+        for (int x = from; x < at; ++x) sums[x] = static_cast<std::int16_t>(sums[x] + votes);
+        votes = static_cast<std::int16_t>(along.votes());
+        from = at;
+      }
+    }
+    for (int x = from; x < kChunkEdge; ++x) sums[x] = static_cast<std::int16_t>(sums[x] + votes);
+  }
+}
+
+/// Adds the votes of 64 lines side by side, along y or z: rows of votes that change from one row to the next.
+class RowsOfVotes {
+ public:
+  void begin(const std::int16_t* entering) { std::copy_n(entering, kChunkEdge, now_.begin()); }
+  void collect(const Column& column, std::size_t first_line, SolidVoxels rule, int first) {
+    if (is_dirty_) changes_.fill(0);
+    is_dirty_ = false;
+    if (column.begin.empty()) return;
+    for (std::size_t x = 0; x < kChunkEdge; ++x) {
+      const auto line = column.line(first_line + x);
+      if (line.empty()) continue;
+      LineVotes along(line, rule, first);
+      int before = along.votes();
+      int at = 0;
+      while (along.advance(at)) {
+        const int after = along.votes();
+        std::int16_t& change = changes_[static_cast<std::size_t>(at) * kChunkEdge + x];
+        change = static_cast<std::int16_t>(change + after - before);
+        before = after;
+        is_dirty_ = true;
+      }
+    }
+  }
+  /// Of the row at `step` along the lines; rows come one after the other.
+  void add(std::size_t step, std::int16_t* sums) {
+    const std::int16_t* change = changes_.data() + step * kChunkEdge;
+    for (std::size_t x = 0; x < kChunkEdge; ++x) {
+      now_[x] = static_cast<std::int16_t>(now_[x] + change[x]);
+      sums[x] = static_cast<std::int16_t>(sums[x] + now_[x]);
+    }
+  }
+
+ private:
+  std::array<std::int16_t, kChunkEdge> now_{};
+  Plane changes_{};
+  bool is_dirty_ = false;
+};
+
+void add_along_y_and_z(const Crossings& crossings, IVec3 chunk, SolidVoxels rule, const std::array<Plane, 3>& entering,
+                       std::vector<std::int16_t>& sums) {
+  RowsOfVotes rows;
+  for (int axis = 1; axis < 3; ++axis) {
+    const Column& column = crossings.column(axis, chunk);
+    // Along y planes of one z, along z planes of one y.
+    const std::size_t along = axis == 1 ? kChunkEdge : kLines;
+    const std::size_t across = axis == 1 ? kLines : kChunkEdge;
+    for (std::size_t plane = 0; plane < kChunkEdge; ++plane) {
+      rows.collect(column, plane * kChunkEdge, rule, chunk[axis] * kChunkEdge);
+      rows.begin(entering[static_cast<std::size_t>(axis)].data() + plane * kChunkEdge);
+      for (std::size_t step = 0; step < kChunkEdge; ++step) rows.add(step, sums.data() + plane * across + step * along);
+    }
+  }
+}
+
+bool is_inside(int votes) {
+  return std::abs(votes) > kHalf;
+}
+
+}  // namespace
+
+Filled find_inside(const Crossings& crossings, IVec3 chunk, SolidVoxels rule, InsideScratch& scratch, ChunkBits& bits) {
+  std::array<Plane, 3> entering;
+  bool all_uniform = true;
+  int uniform = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    Plane& votes = entering[static_cast<std::size_t>(axis)];
+    all_uniform &=
+        entering_votes(crossings.column(axis, chunk), rule, chunk[axis] * kChunkEdge, votes) && is_uniform(votes);
+    uniform += votes[0];
+  }
+  if (all_uniform) return is_inside(uniform) ? Filled::All : Filled::None;
+  scratch.votes.assign(kChunkVoxels, 0);
+  add_along_x(crossings.column(0, chunk), rule, chunk.x * kChunkEdge, entering[0], scratch.votes.data());
+  add_along_y_and_z(crossings, chunk, rule, entering, scratch.votes);
+  std::uint64_t some = 0;
+  std::uint64_t all = ~std::uint64_t{0};
+  const std::int16_t* votes = scratch.votes.data();
+  for (std::uint64_t& row : bits) {
+    row = 0;
+    for (unsigned x = 0; x < kChunkEdge; ++x, ++votes) row |= std::uint64_t{is_inside(*votes)} << x;
+    some |= row;
+    all &= row;
+  }
+  if (some == 0) return Filled::None;
+  return all == ~std::uint64_t{0} ? Filled::All : Filled::Some;
+}
+
+}  // namespace quoin::voxelizing

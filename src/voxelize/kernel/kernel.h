@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "core/instruction_set.h"
+
+// What is compiled for each instruction set: which triangle is nearest, for a row of voxels. Every kernel gives the same
+// bits.
+
+namespace quoin::voxelizing {
+
+/// An edge as a row of points along x sees it. The row's point 0 is where offsets begin; others lie a voxel apart.
+struct EdgeInRow {
+  float at_x, at_y, at_z;        ///< from the edge's beginning to point 0
+  float edge_x, edge_y, edge_z;  ///< the edge
+  float per_square;              ///< of its length; 0 of an edge without one
+  float along;                   ///< dot product of both of these
+  float inwards, inwards_x;      ///< how far point 0 lies within the triangle, as seen from the edge, and its slope
+};
+
+struct TriangleInRow {
+  EdgeInRow edges[3];
+  float plane, plane_x;  ///< distance of point 0 from the plane, and its slope
+  float flat;            ///< 1 of a triangle without an area, else 0
+  std::int32_t number;
+};
+
+struct Kernel {
+  /// For points first to before end: where the triangle is nearer than `squared` says, that becomes the square of its
+  /// distance and `nearest` its number. Both have 64 places; points around the range may be looked at too.
+  void (*update_row)(const TriangleInRow& triangle, int first, int end, float* squared, std::int32_t* nearest);
+};
+
+extern const Kernel kPlainKernel;
+#ifdef QUOIN_X86_KERNELS
+extern const Kernel kAvx2Kernel;
+extern const Kernel kAvx512Kernel;
+inline constexpr const Kernel* kKernels[kInstructionSets] = {&kPlainKernel, &kAvx2Kernel, &kAvx512Kernel,
+                                                             &kAvx512Kernel};
+#endif
+
+/// That of the widest instructions that this machine has.
+[[nodiscard]] inline const Kernel& kernel() {
+#ifdef QUOIN_X86_KERNELS
+  return *kKernels[static_cast<std::size_t>(instruction_set())];
+#else
+  return kPlainKernel;
+#endif
+}
+
+}  // namespace quoin::voxelizing

@@ -1,0 +1,13 @@
+// The kernel for x86-64 processors with AVX2, BMI and BMI2; called only where all were found.
+
+#ifdef QUOIN_X86_KERNELS
+
+#include "voxelize/kernel/row.inl"
+
+namespace quoin::voxelizing {
+
+const Kernel kAvx2Kernel = {&update_row};
+
+}  // namespace quoin::voxelizing
+
+#endif

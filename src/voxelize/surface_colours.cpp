@@ -1,0 +1,198 @@
+#include "voxelize/surface_colours.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "core/srgb.h"
+
+namespace quoin::voxelizing {
+
+namespace {
+
+// What a mesh without materials has: a light grey that shows its shape, sRGB 200.
+constexpr float kGrey = 0.577580F;
+
+std::uint16_t unit_of(float value) {
+  return static_cast<std::uint16_t>(std::lround(std::clamp(value, 0.0F, 1.0F) * 65'535.0F));
+}
+
+Rgba8 encoded(glm::vec4 light) {
+  const SrgbEncoder& encode = SrgbEncoder::shared();
+  const float alpha = light.a > 0.0F ? std::min(light.a, 1.0F) : 0.0F;
+  return {encode(light.r), encode(light.g), encode(light.b), static_cast<std::uint8_t>(std::lround(alpha * 255.0F))};
+}
+
+/// A pixel's index within a picture.
+int wrapped(int at, int size, TextureWrap wrap) {
+  if (wrap == TextureWrap::Clamp) return std::clamp(at, 0, size - 1);
+  const int period = wrap == TextureWrap::Mirror ? 2 * size : size;
+  int within = at % period;
+  if (within < 0) within += period;
+  return within < size ? within : period - 1 - within;
+}
+
+/// A place in a picture; of what is not a number, or far beyond it, its corner.
+double sound_place(double at) {
+  constexpr double kFarthest = 1e6;
+  return std::abs(at) <= kFarthest ? at : 0.0;
+}
+
+}  // namespace
+
+SurfaceColours::SurfaceColours(const Frame& frame) : frame_(&frame), materials_(frame.mesh().materials) {
+  const TriangleMesh& mesh = frame.mesh();
+  if (materials_.empty()) {
+    materials_.emplace_back();
+    materials_.back().colour = {kGrey, kGrey, kGrey, 1.0F};
+    if (!mesh.colours.empty()) materials_.back().colour = glm::vec4(1.0F);
+  }
+  bool is_textured = false;
+  for (MeshMaterial& material : materials_) {
+    if (mesh.texture_places.empty()) material.texture.reset();
+    is_textured |= material.texture.has_value();
+    VoxelProperties type;
+    type.name = material.name;
+    type.roughness = std::clamp(material.roughness, 0.0F, 1.0F);
+    type.metalness = std::clamp(material.metalness, 0.0F, 1.0F);
+    type.emission = material.emission > 0.0F && std::isfinite(material.emission) ? material.emission : 0.0F;
+    properties_.push_back(std::move(type));
+  }
+  pictures_.resize(mesh.textures.size());
+  for (const MeshMaterial& material : materials_) {
+    if (material.texture && pictures_[*material.texture].levels.empty()) make_halves(*material.texture);
+  }
+  is_plain_ = materials_.size() == 1 && !is_textured && mesh.colours.empty() &&
+              (materials_[0].alpha_mode == AlphaMode::Opaque || materials_[0].colour.a >= 1.0F);
+  find_mean();
+}
+
+void SurfaceColours::make_halves(std::size_t texture) {
+  const AlphaImage& image = frame_->mesh().textures[texture].image;
+  std::vector<Level>& levels = pictures_[texture].levels;
+  levels.push_back({image.width, image.height, {}});
+  while (levels.back().width > 1 || levels.back().height > 1) {
+    const Level& finer = levels.back();
+    Level level{std::max(finer.width / 2, 1), std::max(finer.height / 2, 1), {}};
+    level.pixels.resize(std::size_t{4} * static_cast<std::size_t>(level.width) *
+                        static_cast<std::size_t>(level.height));
+    std::uint16_t* out = level.pixels.data();
+    for (int y = 0; y < level.height; ++y) {
+      for (int x = 0; x < level.width; ++x) {
+        // All pixels of odd sizes count: from where this one begins to where it ends.
+        const int end_x = (x + 1) * finer.width / level.width;
+        const int end_y = (y + 1) * finer.height / level.height;
+        glm::vec4 sum(0.0F);
+        int count = 0;
+        for (int j = y * finer.height / level.height; j < end_y; ++j) {
+          for (int i = x * finer.width / level.width; i < end_x; ++i, ++count) {
+            sum += texel(texture, levels.size() - 1, i, j);
+          }
+        }
+        sum /= static_cast<float>(count);
+        for (int channel = 0; channel < 4; ++channel) *out++ = unit_of(sum[channel]);
+      }
+    }
+    levels.push_back(std::move(level));
+  }
+}
+
+/// Linear light times alpha, and alpha.
+glm::vec4 SurfaceColours::texel(std::size_t texture, std::size_t level, int x, int y) const {
+  const Level& of = pictures_[texture].levels[level];
+  const std::size_t at =
+      std::size_t{4} * (static_cast<std::size_t>(y) * static_cast<std::size_t>(of.width) + static_cast<std::size_t>(x));
+  if (level > 0) {
+    const std::uint16_t* p = of.pixels.data() + at;
+    return glm::vec4(p[0], p[1], p[2], p[3]) * (1.0F / 65'535.0F);
+  }
+  const std::uint8_t* p = frame_->mesh().textures[texture].image.rgba.data() + at;
+  const float alpha = static_cast<float>(p[3]) * (1.0F / 255.0F);
+  return {linear_from_srgb(p[0]) * alpha, linear_from_srgb(p[1]) * alpha, linear_from_srgb(p[2]) * alpha, alpha};
+}
+
+glm::vec4 SurfaceColours::sample(std::size_t texture, std::size_t level, DVec3 place) const {
+  const Level& of = pictures_[texture].levels[level];
+  const MeshTexture& how = frame_->mesh().textures[texture];
+  const double u = sound_place(place.x) * of.width;
+  const double v = sound_place(place.y) * of.height;
+  const auto at = [&](double x, double y) {
+    return texel(texture, level, wrapped(static_cast<int>(x), of.width, how.wrap_u),
+                 wrapped(static_cast<int>(y), of.height, how.wrap_v));
+  };
+  if (!how.is_smooth && level == 0) return at(std::floor(u), std::floor(v));
+  const double left = std::floor(u - 0.5);
+  const double top = std::floor(v - 0.5);
+  const auto share_u = static_cast<float>(u - 0.5 - left);
+  const auto share_v = static_cast<float>(v - 0.5 - top);
+  return glm::mix(glm::mix(at(left, top), at(left + 1.0, top), share_u),
+                  glm::mix(at(left, top + 1.0), at(left + 1.0, top + 1.0), share_u), share_v);
+}
+
+/// The level a pixel of which is about as large as a voxel.
+std::size_t SurfaceColours::level_of(std::uint32_t triangle, std::size_t texture) const {
+  const Corners corners = frame_->corners(triangle);
+  const double area = glm::length(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));
+  const glm::vec2* places = frame_->mesh().texture_places.data() + std::size_t{3} * triangle;
+  const glm::vec2 a = places[1] - places[0];
+  const glm::vec2 b = places[2] - places[0];
+  const std::vector<Level>& levels = pictures_[texture].levels;
+  const double pixels = std::abs(double{a.x} * b.y - double{a.y} * b.x) * levels[0].width * levels[0].height;
+  if (!(area > 0.0) || !(pixels > area)) return 0;
+  const double level = std::floor(0.5 * std::log2(pixels / area) + 0.5);
+  return static_cast<std::size_t>(std::clamp(level, 0.0, static_cast<double>(levels.size() - 1)));
+}
+
+glm::vec4 SurfaceColours::light(std::uint32_t triangle, DVec3 shares) const {
+  const TriangleMesh& mesh = frame_->mesh();
+  const MeshMaterial& material = material_of(triangle);
+  glm::vec4 light = material.colour;
+  if (!mesh.colours.empty()) {
+    const auto& corner = mesh.triangles[triangle];
+    light *= mesh.colours[corner[0]] * static_cast<float>(shares.x) +
+             mesh.colours[corner[1]] * static_cast<float>(shares.y) +
+             mesh.colours[corner[2]] * static_cast<float>(shares.z);
+  }
+  if (material.texture) {
+    const glm::vec2* p = mesh.texture_places.data() + std::size_t{3} * triangle;
+    const glm::vec2 place =
+        p[0] * static_cast<float>(shares.x) + p[1] * static_cast<float>(shares.y) + p[2] * static_cast<float>(shares.z);
+    glm::vec4 seen = sample(*material.texture, level_of(triangle, *material.texture), DVec3(place.x, place.y, 0.0));
+    if (seen.a > 0.0F) seen = glm::vec4(glm::vec3(seen) / seen.a, seen.a);
+    light *= seen;
+  }
+  return light;
+}
+
+bool SurfaceColours::has_surface(std::uint32_t triangle, DVec3 shares) const {
+  const MeshMaterial& material = material_of(triangle);
+  if (material.alpha_mode == AlphaMode::Opaque) return true;
+  const float alpha = light(triangle, shares).a;
+  return material.alpha_mode == AlphaMode::Mask ? alpha >= material.alpha_cutoff : encoded({0, 0, 0, alpha}).a > 0;
+}
+
+Rgba8 SurfaceColours::colour(std::uint32_t triangle, DVec3 shares) const {
+  glm::vec4 seen = light(triangle, shares);
+  if (material_of(triangle).alpha_mode != AlphaMode::Blend) seen.a = 1.0F;
+  return encoded(seen);
+}
+
+void SurfaceColours::find_mean() {
+  glm::dvec4 sum(0.0);
+  for (std::size_t i = 0; i < frame_->triangle_count(); ++i) {
+    const auto triangle = static_cast<std::uint32_t>(i);
+    const Corners c = frame_->corners(i);
+    const DVec3 third(1.0 / 3.0);
+    const double area = glm::length(glm::cross(c[1] - c[0], c[2] - c[0]));
+    if (!has_surface(triangle, third)) continue;
+    sum += glm::dvec4(glm::vec3(light(triangle, third)), 1.0) * area;
+  }
+  const glm::vec4 plain = materials_[0].colour;
+  const bool has_area = sum.a > 0.0;
+  mean_ = encoded(has_area ? glm::vec4(glm::vec3(sum / sum.a), 1.0F) : glm::vec4(glm::vec3(plain), 1.0F));
+}
+
+}  // namespace quoin::voxelizing

@@ -1,0 +1,334 @@
+#include <quoin/voxelize/voxelize.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include <quoin/grid/chunk.h>
+
+#include "core/lender.h"
+#include "core/progress_steps.h"
+#include "grid/looks.h"
+#include "voxelize/crossings.h"
+#include "voxelize/frame.h"
+#include "voxelize/inside.h"
+#include "voxelize/nearest.h"
+#include "voxelize/overlap.h"
+#include "voxelize/surface_colours.h"
+
+namespace quoin {
+
+namespace voxelizing {
+namespace {
+
+// How far from the surface voxels have its colours: those of which one side is seen lie within 1.
+constexpr float kColourReach = 1.25F;
+// Of samples: a corner of the cell that the surface passes lies within the cell's diagonal.
+constexpr float kFieldColourReach = 1.75F;
+// A cube that the surface meets has its centre within half its diagonal.
+constexpr float kCubeReach = 0.8661F;
+
+/// The colour of a voxel.
+struct Coloured {
+  std::uint32_t voxel;  // in the chunk, x fastest
+  std::uint32_t material;
+  Rgba8 colour;
+};
+
+/// What was found of a chunk, before there are types.
+struct Found {
+  Filled filled = Filled::None;
+  std::unique_ptr<ChunkBits> bits;  // of Some
+  std::vector<Coloured> coloured;   // ascending
+  std::optional<DensityChunk> densities;
+};
+
+constexpr std::size_t kRows = kLines;
+constexpr float kMostBand = 64.0F;
+// Of the work, what is told as progress.
+constexpr double kLinesShare = 0.2;
+constexpr double kFoundShare = 0.9;
+
+/// All of what a run needs, made once.
+struct Parts {
+  Frame frame;
+  std::optional<Crossings> crossings;
+  std::optional<ChunkTriangles> triangles;
+  std::optional<SurfaceColours> colours;
+};
+
+/// What a thread uses again.
+struct Scratch {
+  InsideScratch inside;
+  Nearest nearest;
+};
+
+Filled filled(const ChunkBits& bits) {
+  const auto is = [&](std::uint64_t all) {
+    return std::all_of(bits.begin(), bits.end(), [&](std::uint64_t row) { return row == all; });
+  };
+  if (is(0)) return Filled::None;
+  return is(~std::uint64_t{0}) ? Filled::All : Filled::Some;
+}
+
+/// The bits of what find_inside found.
+void find_solid(const Parts& parts, IVec3 chunk, SolidVoxels rule, Scratch& scratch, ChunkBits& solid) {
+  Filled within = Filled::None;
+  if (rule != SolidVoxels::None) within = find_inside(*parts.crossings, chunk, rule, scratch.inside, solid);
+  if (within != Filled::Some) solid.fill(within == Filled::All ? ~std::uint64_t{0} : 0);
+}
+
+void find_nearest_of(const Parts& parts, std::size_t index, const Wanted& wanted, bool holes_count, Nearest& nearest) {
+  const SurfaceColours& colours = *parts.colours;
+  const auto may_have_holes = [&](std::uint32_t triangle) { return holes_count && colours.may_have_holes(triangle); };
+  const auto has_surface = [&](std::uint32_t triangle, DVec3 shares) { return colours.has_surface(triangle, shares); };
+  find_nearest(parts.frame, parts.frame.chunk_at(index), parts.triangles->of(index), wanted,
+               {may_have_holes, has_surface}, nearest);
+}
+
+Coloured coloured_voxel(const Parts& parts, IVec3 chunk, std::size_t voxel, std::int32_t nearest) {
+  const auto triangle = static_cast<std::uint32_t>(nearest);
+  const IVec3 local(static_cast<int>(voxel % kChunkEdge), static_cast<int>(voxel / kChunkEdge % kChunkEdge),
+                    static_cast<int>(voxel / kRows));
+  const DVec3 centre = DVec3(chunk * kChunkEdge + local) + 0.5;
+  const DVec3 shares = nearest_shares(parts.frame.corners(triangle), centre);
+  return {static_cast<std::uint32_t>(voxel), parts.colours->material_index(triangle),
+          parts.colours->colour(triangle, shares)};
+}
+
+void mark_surface(const Parts& parts, std::size_t index, SurfaceVoxels which, ChunkBits& surface) {
+  const IVec3 chunk = parts.frame.chunk_at(index);
+  if (which == SurfaceVoxels::Separating6) mark_crossed(*parts.crossings, chunk, surface);
+  if (which != SurfaceVoxels::Separating26) return;
+  for (const std::uint32_t triangle : parts.triangles->of(index)) {
+    mark_overlapping(parts.frame.corners(triangle), chunk, surface);
+  }
+}
+
+/// Colours what lies near the surface; takes from `all` what is cut out of it.
+void colour_voxels(const Parts& parts, std::size_t index, const Nearest& nearest, const ChunkBits& solid,
+                   ChunkBits& all, std::vector<Coloured>& coloured) {
+  const IVec3 chunk = parts.frame.chunk_at(index);
+  for (std::size_t row = 0; row < kRows; ++row) {
+    for (std::uint64_t rest = all[row]; rest != 0; rest &= rest - 1) {
+      const auto x = static_cast<unsigned>(std::countr_zero(rest));
+      const std::size_t voxel = row * kChunkEdge + x;
+      const bool is_solid = (solid[row] >> x & 1U) != 0;
+      if (!is_solid && nearest.squared[voxel] > kCubeReach * kCubeReach) {
+        all[row] &= ~(std::uint64_t{1} << x);
+      } else if (nearest.triangles[voxel] != kNoTriangle) {
+        coloured.push_back(coloured_voxel(parts, chunk, voxel, nearest.triangles[voxel]));
+      }
+    }
+  }
+}
+
+Found find_voxels(const Parts& parts, std::size_t index, const VoxelizeOptions& options, Scratch& scratch) {
+  Found found;
+  ChunkBits solid;
+  find_solid(parts, parts.frame.chunk_at(index), options.solid, scratch, solid);
+  ChunkBits all = solid;
+  mark_surface(parts, index, options.surface, all);
+  if (!parts.colours->is_plain() && !parts.triangles->of(index).empty()) {
+    find_nearest_of(parts, index, {&all, kColourReach}, true, scratch.nearest);
+    colour_voxels(parts, index, scratch.nearest, solid, all, found.coloured);
+  }
+  found.filled = filled(all);
+  if (found.filled == Filled::Some) found.bits = std::make_unique<ChunkBits>(all);
+  return found;
+}
+
+/// Distances with the signs of what is solid.
+DensityChunk signed_densities(const Nearest& nearest, const ChunkBits& solid, float band) {
+  const Half far = stored_density(band, band);
+  DensityChunk densities(far);
+  std::array<Half, kChunkEdge> halves{};
+  for (std::size_t row = 0; row < kRows; ++row) {
+    const float* squared = nearest.squared.data() + row * kChunkEdge;
+    for (unsigned x = 0; x < kChunkEdge; ++x) {
+      const float distance = std::sqrt(squared[x]);
+      // What lies on the surface counts as its inner side, as voxels do.
+      const bool is_solid = (solid[row] >> x & 1U) != 0;
+      halves[x] = stored_density(is_solid ? -std::max(distance, 1e-6F) : distance, band);
+    }
+    densities.write_row(static_cast<int>(row % kChunkEdge), static_cast<int>(row / kChunkEdge), halves);
+  }
+  densities.unite_slabs();
+  return densities;
+}
+
+Found find_densities(const Parts& parts, std::size_t index, const DistanceFieldOptions& options, Scratch& scratch) {
+  Found found;
+  ChunkBits solid;
+  const IVec3 chunk = parts.frame.chunk_at(index);
+  find_solid(parts, chunk, options.solid, scratch, solid);
+  found.filled = filled(solid);
+  const float band = options.band;
+  if (parts.triangles->of(index).empty() && found.filled != Filled::Some) {
+    if (found.filled == Filled::All) found.densities = DensityChunk(stored_density(-band, band));
+    return found;
+  }
+  find_nearest_of(parts, index, {nullptr, band}, false, scratch.nearest);
+  found.densities = signed_densities(scratch.nearest, solid, band);
+  if (found.filled == Filled::Some) found.bits = std::make_unique<ChunkBits>(solid);
+  if (parts.colours->is_plain() || found.filled == Filled::None) return found;
+  const float reach = std::min(kFieldColourReach, band);
+  for (std::size_t voxel = 0; voxel < kChunkVoxels; ++voxel) {
+    const bool is_solid = (solid[voxel / kChunkEdge] >> (voxel % kChunkEdge) & 1U) != 0;
+    if (!is_solid || !(scratch.nearest.squared[voxel] < reach * reach)) continue;
+    found.coloured.push_back(coloured_voxel(parts, chunk, voxel, scratch.nearest.triangles[voxel]));
+  }
+  return found;
+}
+
+/// Finds all chunks. Errors: Cancelled.
+template <class Find>
+Result<std::vector<Found>> find_all(const Frame& frame, Threads threads, const Progress& progress, const Find& find) {
+  std::vector<Found> found(frame.chunk_count());
+  ProgressSteps steps(progress, found.size());
+  Lender<Scratch> scratches;
+  parallel_for(found.size(), threads, [&](std::size_t i) {
+    if (steps.cancelled()) return;
+    scratches.with([&](Scratch& scratch) { found[i] = find(i, scratch); });
+    steps.step();
+  });
+  if (steps.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
+  return found;
+}
+
+std::size_t count_of(const Found& found) {
+  if (found.filled != Filled::Some) return found.filled == Filled::All ? kChunkVoxels : 0;
+  std::size_t count = 0;
+  for (const std::uint64_t row : *found.bits) count += static_cast<std::size_t>(std::popcount(row));
+  return count;
+}
+
+/// The types of what was found: of what lies deep, and of looks by number.
+struct Types {
+  VoxelType deep = kAir;
+  std::vector<VoxelType> by_look;
+};
+
+/// Numbers looks in the order of chunks and voxels; each `Coloured::material` becomes the look's number.
+Result<Types> find_types(const SurfaceColours& colours, std::vector<Found>& found, VoxelRegistry& registry,
+                         std::vector<std::string>& warnings) {
+  std::vector<VoxelProperties> materials = colours.materials();
+  // Of what is deep: of the one material, or of none.
+  const std::uint32_t deep_material = colours.is_plain() ? 0 : static_cast<std::uint32_t>(materials.size());
+  materials.emplace_back();
+  Looks looks;
+  bool has_deep = false;
+  for (Found& chunk : found) {
+    for (Coloured& voxel : chunk.coloured) voxel.material = looks.number_of(voxel.colour, voxel.material);
+    has_deep |= count_of(chunk) > chunk.coloured.size();
+  }
+  std::uint32_t deep = 0;
+  if (has_deep) deep = looks.number_of(colours.mean(), deep_material);
+  auto types = looks.add_to(registry, materials, warnings);
+  if (!types) return types.error();
+  return Types{has_deep ? (*types)[deep] : kAir, std::move(*types)};
+}
+
+/// The types of a chunk's voxels.
+Chunk types_of(const Found& found, const Types& types) {
+  if (found.filled != Filled::Some && found.coloured.empty()) {
+    return Chunk(found.filled == Filled::All ? types.deep : kAir);
+  }
+  Chunk chunk(found.filled == Filled::All ? types.deep : kAir);
+  std::array<VoxelType, kChunkEdge> row{};
+  auto next = found.coloured.begin();
+  for (std::size_t i = 0; i < kRows; ++i) {
+    const std::uint64_t bits = found.bits == nullptr ? ~std::uint64_t{0} : (*found.bits)[i];
+    if (bits == 0) continue;
+    const auto y = static_cast<int>(i % kChunkEdge);
+    const auto z = static_cast<int>(i / kChunkEdge);
+    std::uint64_t coloured = 0;
+    for (; next != found.coloured.end() && next->voxel / kChunkEdge == i; ++next) {
+      const std::size_t x = next->voxel % kChunkEdge;
+      row[x] = types.by_look[next->material];
+      coloured |= std::uint64_t{1} << x;
+    }
+    if (const std::uint64_t deep = bits & ~coloured; deep != 0) chunk.fill_row(y, z, deep, types.deep);
+    if (coloured != 0) chunk.write_row(y, z, coloured, row);
+  }
+  return chunk;
+}
+
+Result<Parts> prepare(const TriangleMesh& mesh, const VoxelLattice& lattice, double margin, bool needs_lines,
+                      Threads threads, const Progress& progress) {
+  auto frame = Frame::make(mesh, lattice, margin);
+  if (!frame) return frame.error();
+  Parts parts{std::move(*frame), {}, {}, {}};
+  if (!needs_lines || parts.frame.chunk_count() == 0) return parts;
+  auto crossings = Crossings::find(parts.frame, threads, progress);
+  if (!crossings) return crossings.error();
+  parts.crossings = std::move(*crossings);
+  return parts;
+}
+
+}  // namespace
+}  // namespace voxelizing
+
+using namespace voxelizing;
+
+Result<VoxelizedMesh> voxelize(const TriangleMesh& mesh, const VoxelizeOptions& options, VoxelRegistry& types,
+                               Threads threads, const Progress& progress) {
+  const bool needs_lines = options.surface == SurfaceVoxels::Separating6 || options.solid != SolidVoxels::None;
+  auto parts = prepare(mesh, options.lattice, 0.0, needs_lines, threads, part_of(progress, 0.0, kLinesShare));
+  if (!parts) return parts.error();
+  VoxelizedMesh made;
+  if (parts->frame.chunk_count() == 0) return made;
+  parts->colours.emplace(parts->frame);
+  parts->triangles.emplace(parts->frame, parts->colours->is_plain() ? 0.0 : double{kColourReach});
+  auto found = find_all(parts->frame, threads, part_of(progress, kLinesShare, kFoundShare),
+                        [&](std::size_t i, Scratch& scratch) { return find_voxels(*parts, i, options, scratch); });
+  if (!found) return found.error();
+  const auto by_look = find_types(*parts->colours, *found, types, made.warnings);
+  if (!by_look) return by_look.error();
+  std::vector<Chunk> chunks(found->size());
+  parallel_for(found->size(), threads, [&](std::size_t i) { chunks[i] = types_of((*found)[i], *by_look); });
+  for (std::size_t i = 0; i < chunks.size(); ++i) {
+    made.grid.put_chunk(parts->frame.first_chunk() + parts->frame.chunk_at(i), std::move(chunks[i]));
+  }
+  if (progress) (void)progress(1.0);
+  return made;
+}
+
+Result<FieldOfMesh> distance_field(const TriangleMesh& mesh, const DistanceFieldOptions& options, VoxelRegistry& types,
+                                   Threads threads, const Progress& progress) {
+  if (options.solid == SolidVoxels::None) {
+    return make_error(ErrorCode::InvalidArgument, "a field needs a rule for what is solid");
+  }
+  if (!(options.band > 0.0F && options.band <= kMostBand)) {
+    return make_error(ErrorCode::InvalidArgument, "a band that is not within 0 and 64");
+  }
+  FieldOfMesh made{DensityGrid(options.band), {}};
+  DistanceFieldOptions own = options;
+  own.band = made.field.band();
+  auto parts = prepare(mesh, options.lattice, own.band + 1.0, true, threads, part_of(progress, 0.0, kLinesShare));
+  if (!parts) return parts.error();
+  if (parts->frame.chunk_count() == 0) return made;
+  parts->colours.emplace(parts->frame);
+  parts->triangles.emplace(parts->frame, own.band);
+  auto found = find_all(parts->frame, threads, part_of(progress, kLinesShare, kFoundShare),
+                        [&](std::size_t i, Scratch& scratch) { return find_densities(*parts, i, own, scratch); });
+  if (!found) return found.error();
+  const auto by_look = find_types(*parts->colours, *found, types, made.warnings);
+  if (!by_look) return by_look.error();
+  parallel_for(found->size(), threads, [&](std::size_t i) {
+    if (auto& densities = (*found)[i].densities) densities->materials() = types_of((*found)[i], *by_look);
+  });
+  for (std::size_t i = 0; i < found->size(); ++i) {
+    auto& densities = (*found)[i].densities;
+    if (!densities) continue;
+    made.field.put_chunk(parts->frame.first_chunk() + parts->frame.chunk_at(i), std::move(*densities));
+  }
+  if (progress) (void)progress(1.0);
+  return made;
+}
+
+}  // namespace quoin
