@@ -38,8 +38,10 @@ void add_raw_options(CLI::App& command, VolumeTexts& texts) {
 }
 
 void add_volume_options(CLI::App& command, VolumeTexts& texts) {
-  command.add_option("--iso", texts.iso,
-                     "Surface value of a volume; what is above is solid (default: between its two groups of values)");
+  command.add_option(
+      "--iso", texts.iso,
+      "Surface value of a volume, or of the fog of a .vdb; what is above is solid (default: between its two groups of "
+      "values)");
   add_raw_options(command, texts);
 }
 
@@ -69,6 +71,11 @@ Result<bool> holds_volume(const CommonOptions& options) {
   const auto format = detect_format(options.input);
   if (!format) return format.error();
   return *format && format_info(**format).is_volume;
+}
+
+bool heeds_iso(const CommonOptions& options) {
+  const auto format = detect_format(options.input);
+  return holds_volume(options).value_or(false) || (format && *format == FileFormat::Vdb);
 }
 
 Result<Volume> read_input_volume(const CommonOptions& options, const Progress& progress) {

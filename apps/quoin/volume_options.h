@@ -36,6 +36,9 @@ struct VolumeArguments {
 /// Whether a command's input is a volume, by what the options say or by what it holds. Errors: CannotRead.
 [[nodiscard]] Result<bool> holds_volume(const CommonOptions& options);
 
+/// Whether --iso means something to a command's input: a volume, or what may hold fog (.vdb).
+[[nodiscard]] bool heeds_iso(const CommonOptions& options);
+
 /// Reads it as one. Errors: those of read_volume and read_raw_volume.
 [[nodiscard]] Result<Volume> read_input_volume(const CommonOptions& options, const Progress& progress);
 

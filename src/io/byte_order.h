@@ -44,4 +44,13 @@ template <class T>
   return std::bit_cast<T>(order == std::endian::native ? word : Word::swapped(word));
 }
 
+/// Puts a number where `bytes` begin, in either order. Requires: room for sizeof(T) bytes; T is a number.
+template <class T>
+void put_number(std::byte* bytes, T value, std::endian order) {
+  using Word = byte_order::Word<sizeof(T)>;
+  const auto native = std::bit_cast<typename Word::Type>(value);
+  const typename Word::Type word = order == std::endian::native ? native : Word::swapped(native);
+  std::memcpy(bytes, &word, sizeof(T));
+}
+
 }  // namespace quoin

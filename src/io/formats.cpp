@@ -19,6 +19,8 @@
 #include "io/models/models.h"
 #include "io/models/write/write_models.h"
 #include "io/source/luanti_map.h"
+#include "io/vdb/vdb.h"
+#include "io/vdb/vdb_tree.h"
 #include "io/volume/header.h"
 #include "io/volume/write.h"
 #include "io/whole_file.h"
@@ -38,8 +40,8 @@ constexpr std::array kFormats = {
     FormatInfo{FileFormat::Schematic, "schematic", ".schem",
                "pieces of Minecraft's worlds, also .schematic, .litematic and structures (.nbt)", true, true, false,
                false, ".schematic .litematic .nbt"},
-    FormatInfo{FileFormat::Qubicle, "qubicle", ".qb", "Qubicle, also .qbt and .qef", true, true, false, false,
-               ".qbt .qef"},
+    FormatInfo{FileFormat::Qubicle, "qubicle", ".qb", "Qubicle, also .qbt, .qbcl and .qef", true, true, false, false,
+               ".qbt .qbcl .qef"},
     FormatInfo{FileFormat::Goxel, "goxel", ".gox", "Goxel", true, true, false, false},
     FormatInfo{FileFormat::Voxlap, "voxlap", ".vxl",
                "maps of Voxlap and Ace of Spades, also models: .kv6, .kvx and SLAB6's .vox", true, true, false, false,
@@ -51,6 +53,8 @@ constexpr std::array kFormats = {
                false, false, false},
     FormatInfo{FileFormat::Heights, "heights", ".hgt", "heights of SRTM, and pictures of heights (.png) by --heights",
                true, false, false, false},
+    FormatInfo{FileFormat::Vdb, "vdb", ".vdb", "grids of OpenVDB, also NanoVDB's (.nvdb)", true, true, false, false,
+               ".nvdb"},
     FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, true, false, true},
     FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes", true, false, false, true},
     FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true, false},
@@ -207,6 +211,7 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
   }
   if (format == FileFormat::LuantiMap) return read_around_spawn(open_luanti(bytes), options, threads, progress);
   if (format == FileFormat::Schematic) return minecraft::read_schematic(bytes, progress);
+  if (format == FileFormat::Vdb) return vdb::read_vdb(bytes, options, threads, progress);
   if (const ReadModel read = model_reader(format); read != nullptr) return read(bytes);
   if (is_volume(format)) return read_volume_as_scene(bytes, options, threads, progress);
   Error error = unrecognised(bytes);
@@ -227,6 +232,12 @@ std::vector<std::string> lost_with_source(const Saved& saved) {
   if (saved.loaded == nullptr || saved.loaded->source == nullptr) return {};
   std::vector<std::string> lines = only_in_source(*saved.loaded->source);
   for (std::string& line : lines) line.insert(0, "left out, which only .vox keeps: ");
+  return lines;
+}
+
+std::vector<std::string> lost_in_vdb(const Saved& saved) {
+  std::vector<std::string> lines = lost_with_source(saved);
+  std::ranges::move(vdb::losses_of_vdb(saved.scene), std::back_inserter(lines));
   return lines;
 }
 
@@ -277,6 +288,11 @@ Result<SavedScene> save(const Saved& saved, const std::filesystem::path& path, T
     if (!written) return written.error();
     return SavedScene{written->bytes, lost_with_source(saved)};
   }
+  if (*format == FileFormat::Vdb) {
+    const auto written = write_whole(path, vdb::write_vdb(saved.scene));
+    if (!written) return written.error();
+    return SavedScene{*written, lost_in_vdb(saved)};
+  }
   auto file = with_path(scene_file_of(saved.scene), path);
   if (!file) return file.error();
   if (saved.loaded != nullptr) {
@@ -296,6 +312,7 @@ Result<std::vector<std::string>> losses(const Saved& saved, const std::filesyste
     if (!file) return file.error();
     return all_lost(std::move(file->warnings), saved);
   }
+  if (*format == FileFormat::Vdb) return lost_in_vdb(saved);
   if (*format != FileFormat::Vox) return lost_with_source(saved);
   return with_path(saved.loaded != nullptr ? losses_of_vox(*saved.loaded) : losses_of_vox(saved.scene), path);
 }
@@ -336,6 +353,7 @@ std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
   if (begins_with(bytes, "VOX ")) return FileFormat::Vox;
   if (is_world_format(bytes)) return FileFormat::World;
   if (is_luanti_map(bytes)) return FileFormat::LuantiMap;
+  if (vdb::is_vdb(bytes) || vdb::is_nvdb(bytes)) return FileFormat::Vdb;
   if (is_scene_file(bytes)) return FileFormat::Scene;
   if (minecraft::is_region_file(bytes)) return FileFormat::Minecraft;
   const auto first = first_bytes(bytes, nifti::kMaxHeaderBytes);

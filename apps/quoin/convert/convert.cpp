@@ -271,7 +271,7 @@ std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
   const LoadOptions& load = options.common.load;
   if (is_volume)
     return load.show_hidden || load.frame != 0 ? "--hidden and --frame are for voxels, not for volumes" : "";
-  return options.iso ? "--iso is for volumes, and the input holds voxels" : "";
+  return options.iso && !heeds_iso(options.common) ? "--iso is for volumes, and the input holds voxels" : "";
 }
 
 Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format, bool is_volume, std::string& fault) {
@@ -280,12 +280,7 @@ Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format,
                       "a volume of values becomes a mesh (.glb, .gltf, .obj, .ply) or a field (.json), not .vox",
                       options.common.input.string());
   }
-  if (is_volume && !format.is_mesh) {
-    ConvertOptions as_scene = options;
-    if (options.iso) as_scene.common.load.iso = static_cast<float>(*options.iso);
-    return convert_scene(as_scene, format, fault);
-  }
-  return is_volume ? convert_volume(options, format) : convert_scene(options, format, fault);
+  return is_volume && format.is_mesh ? convert_volume(options, format) : convert_scene(options, format, fault);
 }
 
 /// Makes files of what is named "-". Returns what is wrong with that, or "".
@@ -481,6 +476,7 @@ std::string read_texts(const CLI::App& command, const VolumeTexts& texts, Conver
   VolumeArguments volume;
   std::string fault = read_volume_options(command, texts, volume);
   options.iso = volume.iso;
+  if (volume.iso) options.common.load.iso = static_cast<float>(*volume.iso);
   options.common.load.raw = volume.raw;
   return fault;
 }

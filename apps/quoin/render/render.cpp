@@ -158,7 +158,7 @@ Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume, int f
   options.keep_source = false;
   ProgressBar bar;
   auto loaded = load_scene(arguments.common.input, options, arguments.common.threads, bar.listener("reading"));
-  if (loaded && arguments.volume.iso && !is_volume) {
+  if (loaded && arguments.volume.iso && !is_volume && !heeds_iso(arguments.common)) {
     return make_error(ErrorCode::InvalidArgument, "--iso is for volumes, and the input holds voxels");
   }
   if (loaded) scale_emission(loaded->scene, arguments.emission_scale);

@@ -38,7 +38,7 @@ inline constexpr std::uint32_t kVoxlapMagic = 0x09072000;
 [[nodiscard]] bool is_vxl(std::span<const std::byte> whole);
 [[nodiscard]] Result<LoadedScene> read_vxl(std::span<const std::byte> bytes);
 
-/// Qubicle's .qb, .qbt and .qef.
+/// Qubicle's .qb, .qbt, .qbcl and .qef.
 [[nodiscard]] bool is_qubicle(std::span<const std::byte> beginning);
 [[nodiscard]] Result<LoadedScene> read_qubicle(std::span<const std::byte> bytes);
 

@@ -25,7 +25,7 @@ class Writer {
  public:
   std::vector<std::byte> bytes;
   Writer& number(std::uint64_t value, int size) {
-    for (int i = 0; i < size; ++i) bytes.push_back(static_cast<std::byte>(value >> (8 * i)));
+    for (int i = 0; i < size; ++i) bytes.push_back(static_cast<std::byte>(i < 8 ? value >> (8 * i) : 0));
     return *this;
   }
   Writer& big(std::uint64_t value, int size) {
@@ -131,6 +131,24 @@ std::vector<std::byte> qbt(bool has_map) {
   has_map ? writer.u32s({2, kBlue, kRed}) : writer.u32s({0});
   return writer.text("DATATREE").number(1, 4).number(model.bytes.size(), 4).append(model.bytes).bytes;
 }
+/// A compound of two voxels, made of a matrix that is not read; a run of one, whose other bytes say nothing.
+std::vector<std::byte> qbcl() {
+  const auto matrix = [](Writer& writer, int kind, std::span<const std::byte> voxels) {
+    writer.u32s({static_cast<std::uint32_t>(kind), 1}).number(1, 4).text("m").number(0x0101, 3);
+    writer.u32s({2, 1, 1, 0, 0, 0, 0, 0, 0}).number(voxels.size(), 4).append(voxels);
+  };
+  Writer voxels;
+  voxels.number(2, 2).u32s({0x02696001, kRed}).number(1, 2).u32s({0x40FF0000});
+  Writer others;
+  others.number(0, 2).number(0, 2);
+  Writer writer;
+  writer.text("QBCL").u32s({0x203, 2, 1, 1, 0x12345678}).u32s({0, 0, 3}).text("tag").u32s({0, 0, 0, 0});
+  writer.number(0, 16).u32s({1, 1}).number(5, 4).text("Model").number(0x0101, 3).number(0, 36).number(1, 4);
+  matrix(writer, 2, zlib_stored(voxels.bytes));
+  writer.number(1, 4);
+  matrix(writer, 0, zlib_stored(others.bytes));
+  return writer.bytes;
+}
 std::vector<std::byte> qef() {
   Writer writer;
   return writer
@@ -177,6 +195,7 @@ std::vector<Kind> all_kinds() {
           {"qb, left-handed", qb(true, false), FileFormat::Qubicle},
           {"qbt", qbt(false), FileFormat::Qubicle},
           {"qbt, with a map", qbt(true), FileFormat::Qubicle},
+          {"qbcl", qbcl(), FileFormat::Qubicle},
           {"qef", qef(), FileFormat::Qubicle},
           {"goxel", goxel(), FileFormat::Goxel},
           {"mts", mts(), FileFormat::LuantiSchematic, false}};
@@ -342,6 +361,9 @@ TEST(Models, RealOnesHaveTheirCounts) {
                              Known{"qb/vengi-voxel+vengi/65bf26__data__tests__robo.qb", 1'291, 3},
                              Known{"qb/vengi-voxel+vengi/4e1abb__data__tests__rgb.qb", 99, 1},
                              Known{"qb/vengi-voxel+vengi/8eed5f__data__tests__rgb.qef", 99, 1},
+                             Known{"qb/vengi-voxel+vengi/fd7931__data__tests__rgb.qbcl", 99, 1},
+                             Known{"qb/vengi-voxel+vengi/30db40__data__tests__crabby.qbcl", 100, 2},
+                             Known{"qb/vengi-voxel+vengi/c282ae__data__tests__rgb_small.qbcl", 3, 1},
                              Known{"cub/vengi-voxel+vengi/data__tests__rgb_small.cub", 3, 1},
                              Known{"vxl/iamgreaser+iceball/pkg__maps__mesa.vxl", 6'443'387, 1}};
   for (const Known& known : kKnown) {
@@ -349,6 +371,22 @@ TEST(Models, RealOnesHaveTheirCounts) {
     ASSERT_TRUE(loaded) << known.file << ": " << to_string(loaded.error());
     EXPECT_EQ(loaded->scene.voxel_count(), known.voxels) << known.file;
     EXPECT_EQ(loaded->scene.grids().size(), known.grids) << known.file;
+  }
+}
+
+TEST(Models, AProjectOfQubiclesHoldsWhatItsExportHolds) {
+  const fs::path folder = fs::path(QUOIN_SOURCE_DIR).parent_path() / "shared" / "data" / "qb" / "vengi-voxel+vengi";
+  if (!fs::exists(folder)) GTEST_SKIP() << "real files are not here";
+  const auto project = load_scene(folder / "fd7931__data__tests__rgb.qbcl");
+  const auto exported = load_scene(folder / "4e1abb__data__tests__rgb.qb");
+  ASSERT_TRUE(project && exported);
+  for (int i = 0; i < 32 * 32 * 32; ++i) {
+    const IVec3 at{i & 31, i >> 5 & 31, i >> 10};
+    const bool is_there = only_grid(*project).grid.get(at) != kAir;
+    ASSERT_EQ(is_there, only_grid(*exported).grid.get(at) != kAir) << at.x << ", " << at.y << ", " << at.z;
+    if (is_there) {
+      ASSERT_EQ(colour_at(*project, at), colour_at(*exported, at)) << at.x << ", " << at.y << ", " << at.z;
+    }
   }
 }
 

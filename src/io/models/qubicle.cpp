@@ -3,6 +3,7 @@
 //
 //   .qb    matrices of colours, as they are or as runs a slice
 //   .qbt   a tree of matrices, each a zlib stream
+//   .qbcl  projects: the same tree with a thumbnail before it, columns as runs
 //   .qef   text: colours, then voxels
 
 #include <array>
@@ -22,6 +23,7 @@ namespace quoin::models {
 namespace {
 
 constexpr std::string_view kTree = "QB 2";
+constexpr std::string_view kProject = "QBCL";
 constexpr std::string_view kExchange = "Qubicle Exchange Format";
 constexpr std::int32_t kMaxPlace = 1 << 26;
 constexpr std::uint32_t kMaxEdge = 1 << 14;
@@ -265,6 +267,146 @@ Status QbtReader::put_voxels(const Matrix& matrix, std::span<const std::byte> pa
   return {};
 }
 
+/// Projects. Strings are u32 size and bytes:
+///
+///   "QBCL", 8 bytes of versions, u32 width and height of a thumbnail and its pixels, 7 strings, 16 bytes of times; a node
+///   a node: u32 kind, u32, string name, 3 bytes (is it shown, is it locked ...)
+///   a model: 36 bytes, u32 nodes, these; a matrix: size, place, pivot, u32 bytes, a zlib stream; a compound: both
+///   a stream: of each column (x slowest, then z) u16 entries, each of 4 bytes: r, g, b and which faces are seen, where 2
+///   says that the next is there r times
+class QbclReader {
+ public:
+  explicit QbclReader(std::span<const std::byte> bytes) : reader_(bytes) {}
+
+  Result<LoadedScene> read() {
+    static_cast<void>(reader_.take(4 + 4));
+    const std::size_t version_at = reader_.position();
+    const std::uint32_t version = reader_.u32();
+    constexpr std::uint32_t kVersion = 2;
+    if (!reader_.failed() && version != kVersion) {
+      return make_error(ErrorCode::Unsupported, "version " + std::to_string(version) + " of Qubicle's projects", {},
+                        version_at);
+    }
+    const std::uint64_t pixels = std::uint64_t{reader_.u32()} * reader_.u32();
+    if (pixels > reader_.remaining() / 4) return bad_at(version_at + 4, "a thumbnail that ends behind its file");
+    static_cast<void>(reader_.take(pixels * 4));
+    for (int i = 0; i < 7; ++i) static_cast<void>(reader_.take(reader_.u32()));
+    static_cast<void>(reader_.take(16));
+    if (auto done = read_node(0, true, true); !done) return done.error();
+    return builder_.take("qubicle");
+  }
+
+ private:
+  [[nodiscard]] Error too_short() const { return bad_at(reader_.position(), "it ends before its nodes do"); }
+  Status read_node(int depth, bool is_used, bool is_shown);
+  Status read_matrix(std::string name, bool is_used, bool is_shown);
+  Status put_columns(const Matrix& matrix, std::span<const std::byte> packed, std::size_t at);
+  Status read_children(int depth, bool is_used, bool is_shown);
+
+  ByteReader reader_;
+  ModelBuilder builder_;
+};
+
+/// `is_used`: not of what a compound was made of.
+Status QbclReader::read_node(int depth, bool is_used, bool is_shown) {
+  enum class Kind : std::uint32_t { Matrix, Model, Compound };
+  constexpr int kDeepest = 64;
+  const std::size_t at = reader_.position();
+  const auto kind = static_cast<Kind>(reader_.u32());
+  static_cast<void>(reader_.u32());
+  std::string name(reader_.text(reader_.u32()));
+  is_shown &= reader_.u8() != 0;
+  static_cast<void>(reader_.take(2));
+  if (reader_.failed()) return too_short();
+  if (depth > kDeepest) return make_error(ErrorCode::LimitExceeded, "nodes within 64 others", {}, at);
+  if (kind == Kind::Model) {
+    static_cast<void>(reader_.take(36));
+    return read_children(depth, is_used, is_shown);
+  }
+  // Nothing says how long a node is.
+  if (kind != Kind::Matrix && kind != Kind::Compound) return bad_at(at, "a node of an unknown kind");
+  if (auto done = read_matrix(std::move(name), is_used, is_shown); !done) return done;
+  return kind == Kind::Compound ? read_children(depth, false, is_shown) : Status();
+}
+
+Status QbclReader::read_children(int depth, bool is_used, bool is_shown) {
+  const std::size_t at = reader_.position();
+  const std::size_t children = reader_.count(15);
+  if (reader_.failed()) return bad_at(at, "a node of more nodes than there is room for");
+  for (std::size_t i = 0; i < children; ++i) {
+    if (auto done = read_node(depth + 1, is_used, is_shown); !done) return done;
+  }
+  return {};
+}
+
+Status QbclReader::read_matrix(std::string name, bool is_used, bool is_shown) {
+  const std::size_t at = reader_.position();
+  Matrix matrix;
+  matrix.name = std::move(name);
+  const auto size = read_size(reader_);
+  const auto place = read_place(reader_);
+  if (reader_.failed()) return too_short();
+  if (!size || !place) return bad_at(at, "a matrix whose size or place is out of range");
+  std::array<float, 3> pivot{};
+  for (float& part : pivot) part = reader_.f32();
+  const std::size_t packed_at = reader_.position() + 4;
+  const auto packed = reader_.take(reader_.u32());
+  if (reader_.failed()) return too_short();
+  if (!is_used) return {};
+  matrix.size = *size;
+  matrix.place = *place;
+  Model model;
+  model.name = matrix.name;
+  model.canvas = {IVec3(0), matrix.size};
+  model.visible = is_shown;
+  const DVec3 turned(pivot[0], pivot[1], pivot[2]);
+  if (is_finite(turned) && glm::length(turned) < 1e6) model.pivot = turned;
+  model.position = DVec3(matrix.place) + model.pivot;
+  builder_.begin(std::move(model));
+  return put_columns(matrix, packed, packed_at);
+}
+
+Status QbclReader::put_columns(const Matrix& matrix, std::span<const std::byte> packed, std::size_t at) {
+  constexpr std::uint32_t kRun = 2;
+  if (matrix.size.x == 0 || matrix.size.y == 0 || matrix.size.z == 0) return {};
+  ByteStream stream(packed, 0, Compression::Zlib);
+  std::vector<std::byte> entries;
+  const auto read = [&](std::size_t count) -> Status {
+    entries.resize(count);
+    const auto got = stream.read(entries);
+    if (!got) return make_error(got.error().code, got.error().message, {}, at + got.error().byte_offset.value_or(0));
+    return *got == count ? Status() : Status(bad_at(at, "a matrix of fewer voxels than its size says"));
+  };
+  for (int x = 0; x < matrix.size.x; ++x) {
+    for (int z = 0; z < matrix.size.z; ++z) {
+      if (auto done = read(2); !done) return done;
+      const std::size_t count = ByteReader(entries).u16();
+      if (auto done = read(count * 4); !done) return done;
+      ByteReader column(entries);
+      std::uint32_t y = 0;
+      while (column.remaining() > 0) {
+        std::uint32_t entry = column.u32();
+        std::uint32_t length = 1;
+        if (entry >> 24 == kRun) {
+          length = entry & 0xFFU;  // the other bytes may hold anything
+          entry = column.u32();
+        }
+        if (column.failed() || length > static_cast<std::uint32_t>(matrix.size.y) - y) {
+          return bad_at(at, "a column of more voxels than its matrix has");
+        }
+        Rgba8 colour = colour_of(entry, false);
+        if (colour.a != 0 && length > 0) {
+          colour.a = 255;
+          const IVec3 first{x, static_cast<int>(y), z};
+          if (auto put = builder_.put(first, colour, static_cast<int>(length), 1); !put) return put;
+        }
+        y += length;
+      }
+    }
+  }
+  return {};
+}
+
 /// Numbers of a text, line by line.
 class NumberReader {
  public:
@@ -347,14 +489,12 @@ bool is_qb(std::span<const std::byte> beginning) {
 
 bool is_qubicle(std::span<const std::byte> beginning) {
   const std::string_view text = text_of(beginning);
-  return text.starts_with(kTree) || text.starts_with(kExchange) || text.starts_with("QBCL") || is_qb(beginning);
+  return text.starts_with(kTree) || text.starts_with(kExchange) || text.starts_with(kProject) || is_qb(beginning);
 }
 
 Result<LoadedScene> read_qubicle(std::span<const std::byte> bytes) {
   const std::string_view text = text_of(bytes);
-  if (text.starts_with("QBCL")) {
-    return make_error(ErrorCode::Unsupported, "a project of Qubicle's (.qbcl): export it as .qb, .qbt or .qef", {}, 0);
-  }
+  if (text.starts_with(kProject)) return QbclReader(bytes).read();
   if (text.starts_with(kExchange)) return read_qef(bytes);
   if (text.starts_with(kTree)) return QbtReader(bytes).read();
   return QbReader(bytes).read();

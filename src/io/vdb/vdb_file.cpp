@@ -1,0 +1,481 @@
+// A file, all numbers little-endian (strings: u32 size, bytes):
+//
+//   i64 "VDB ", u32 version, u32 major, u32 minor, u8 offsets are there, 36 bytes of an id, metadata, u32 grids
+//   of a grid, its descriptor: string name, string type, string name of the grid whose tree it shares; i64 where it
+//   begins, where its buffers do, and where it ends
+//   there: u32 compression, metadata, string kind of map, its doubles
+//          i32 1, background, u32 tiles, u32 nodes; tiles: 3 i32, value, u8 active; nodes: 3 i32, then as below
+//          a node: bits that say which of its places have children, bits of active ones, values of all places; children
+//          of leaves: bits of active voxels
+//   buffers: of each leaf: bits of active voxels, values
+//   values: u8 code, up to two values of what is not active, bits that choose between them; those of active ones alone,
+//   or all, as they are, or i64 size and a zlib stream or a frame of Blosc (or minus a size, and as they are)
+
+#include "io/vdb/vdb_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include <quoin/core/half.h>
+
+#include "io/byte_order.h"
+#include "io/byte_reader.h"
+#include "io/byte_stream.h"
+#include "io/text.h"
+#include "io/vdb/blosc.h"
+
+namespace quoin::vdb {
+
+namespace {
+
+constexpr std::string_view kMagic{" BDV\0\0\0\0", 8};
+constexpr std::uint32_t kOldest = 222;
+constexpr std::uint32_t kNewest = 225;
+constexpr std::uint32_t kZip = 1;
+constexpr std::uint32_t kActiveAlone = 2;
+constexpr std::uint32_t kBlosc = 4;
+constexpr std::string_view kHalfSuffix = "_HalfFloat";
+/// Coordinates beyond have no room for what looks past them.
+constexpr std::int32_t kMaxCoordinate = 1 << 30;
+
+/// How a tree has its values.
+enum class Scalar : std::uint8_t { Float, Double, Bool, Mask };
+
+struct Descriptor {
+  std::string name;
+  std::string type;
+  std::string parent;
+  std::uint64_t begin = 0;
+  std::size_t at = 0;
+};
+
+std::string read_string(ByteReader& reader) {
+  return std::string(reader.text(reader.u32()));
+}
+
+std::uint64_t read_u64(ByteReader& reader) {
+  const std::uint64_t low = reader.u32();
+  return low | std::uint64_t{reader.u32()} << 32;
+}
+
+double read_f64(ByteReader& reader) {
+  return std::bit_cast<double>(read_u64(reader));
+}
+
+/// What of metadata is asked for; the rest is passed over.
+struct Metadata {
+  std::string kind;  // "class"
+  bool is_half = false;
+};
+
+Metadata read_metadata(ByteReader& reader) {
+  Metadata metadata;
+  const std::size_t count = reader.count(12);
+  for (std::size_t i = 0; i < count && !reader.failed(); ++i) {
+    const std::string name = read_string(reader);
+    const std::string type = read_string(reader);
+    const std::string_view value = reader.text(reader.u32());
+    if (name == "class" && type == "string") metadata.kind = value;
+    if (name == "is_saved_as_half_float") metadata.is_half = !value.empty() && value[0] != '\0';
+  }
+  return metadata;
+}
+
+/// Nothing for maps that are no matrix.
+std::optional<glm::dmat4> read_map(ByteReader& reader, const std::string& kind) {
+  glm::dmat4 matrix(1.0);
+  const auto vector = [&] {
+    DVec3 v(0.0);
+    for (int axis = 0; axis < 3; ++axis) v[axis] = read_f64(reader);
+    return v;
+  };
+  if (kind == "AffineMap" || kind == "UnitaryMap") {
+    for (int column = 0; column < 4; ++column) {
+      for (int row = 0; row < 4; ++row) matrix[column][row] = read_f64(reader);
+    }
+    return matrix;
+  }
+  const bool is_moved = kind == "TranslationMap" || kind == "ScaleTranslateMap" || kind == "UniformScaleTranslateMap";
+  const bool is_scaled = kind.ends_with("ScaleMap") || kind.ends_with("ScaleTranslateMap");
+  if (!is_moved && !is_scaled) return std::nullopt;
+  if (is_moved) matrix[3] = glm::dvec4(vector(), 1.0);
+  if (is_scaled) {
+    const DVec3 scale = vector();
+    for (int axis = 0; axis < 3; ++axis) matrix[axis][axis] = scale[axis];
+    static_cast<void>(reader.take(std::size_t{4} * 3 * 8));  // what follows from it
+  }
+  return matrix;
+}
+
+bool bit_of(std::span<const std::byte> bits, std::size_t i) {
+  return (std::to_integer<unsigned>(bits[i >> 3]) >> (i & 7U) & 1U) != 0;
+}
+
+std::size_t count_of(std::span<const std::byte> bits) {
+  std::size_t count = 0;
+  for (const std::byte byte : bits) count += static_cast<std::size_t>(std::popcount(std::to_integer<unsigned>(byte)));
+  return count;
+}
+
+/// Reads one grid's tree.
+class TreeReader {
+ public:
+  TreeReader(ByteReader& reader, Scalar scalar, std::uint32_t compression, bool is_half, Grid& grid)
+      : reader_(reader), scalar_(scalar), compression_(compression), is_half_(is_half), grid_(grid) {}
+
+  Status read() {
+    const std::size_t at = reader_.position();
+    if (reader_.u32() != 1) return bad_at(at, "a tree of several buffers");
+    if (auto done = read_root(); !done) return done;
+    if (scalar_ != Scalar::Bool && scalar_ != Scalar::Mask) grid_.values.reserve(grid_.leaves.size() * kLeafVoxels);
+    for (Leaf& leaf : grid_.leaves) {
+      if (auto done = read_buffer(leaf); !done) return done;
+    }
+    return {};
+  }
+
+ private:
+  [[nodiscard]] bool is_truth() const { return scalar_ == Scalar::Bool || scalar_ == Scalar::Mask; }
+  [[nodiscard]] std::size_t value_bytes() const {
+    return scalar_ == Scalar::Float ? 4 : scalar_ == Scalar::Double ? 8 : 1;
+  }
+  [[nodiscard]] Error too_short() const { return bad_at(reader_.position(), "it ends before its trees do"); }
+
+  float read_value() {
+    if (scalar_ == Scalar::Float) return reader_.f32();
+    if (scalar_ == Scalar::Double) return static_cast<float>(read_f64(reader_));
+    return reader_.u8() != 0 ? 1.0F : 0.0F;
+  }
+
+  Result<IVec3> read_origin(int edge) {
+    const std::size_t at = reader_.position();
+    IVec3 origin{0};
+    for (int axis = 0; axis < 3; ++axis) {
+      origin[axis] = reader_.i32();
+      if (origin[axis] < -kMaxCoordinate || origin[axis] >= kMaxCoordinate || (origin[axis] & (edge - 1)) != 0) {
+        return bad_at(at, "a node at a place that there cannot be");
+      }
+    }
+    return origin;
+  }
+
+  Status read_root();
+  Status read_upper(IVec3 origin);
+  Status read_lower(IVec3 origin);
+  Result<std::vector<float>> read_values(std::size_t count, std::span<const std::byte> active);
+  Status read_data(std::size_t count, std::span<float> out);
+  Status read_buffer(Leaf& leaf);
+  void add_tile(IVec3 origin, int edge, float value, bool is_active) {
+    // Of a mask what is active is there, of a bool grid what is true besides.
+    if (scalar_ == Scalar::Mask) value = is_active ? 1.0F : 0.0F;
+    if (!is_active && value == grid_.background) return;
+    grid_.tiles.push_back({origin, edge, value, is_active});
+  }
+
+  ByteReader& reader_;
+  Scalar scalar_;
+  std::uint32_t compression_;
+  bool is_half_;
+  Grid& grid_;
+  std::vector<std::byte> expanded_;
+};
+
+Status TreeReader::read_root() {
+  grid_.background = read_value();
+  const std::size_t tiles = reader_.u32();
+  const std::size_t nodes = reader_.u32();
+  for (std::size_t i = 0; i < tiles; ++i) {
+    const auto origin = read_origin(kUpperEdge);
+    if (!origin) return origin.error();
+    const float value = read_value();
+    const bool is_active = reader_.u8() != 0;
+    if (reader_.failed()) return too_short();
+    add_tile(*origin, kUpperEdge, value, is_active);
+  }
+  for (std::size_t i = 0; i < nodes; ++i) {
+    const auto origin = read_origin(kUpperEdge);
+    if (!origin) return origin.error();
+    if (reader_.failed()) return too_short();
+    if (auto done = read_upper(*origin); !done) return done;
+  }
+  return {};
+}
+
+Status TreeReader::read_upper(IVec3 origin) {
+  constexpr std::size_t kPlaces = 32 * 32 * 32;
+  const auto children = reader_.take(kPlaces / 8);
+  const auto active = reader_.take(kPlaces / 8);
+  if (reader_.failed()) return too_short();
+  const auto values = read_values(kPlaces, active);
+  if (!values) return values.error();
+  const auto place = [&](std::size_t i) {
+    const auto at = static_cast<int>(i);
+    return origin + IVec3{at >> 10, at >> 5 & 31, at & 31} * kLowerEdge;
+  };
+  for (std::size_t i = 0; i < kPlaces; ++i) {
+    if (!bit_of(children, i)) add_tile(place(i), kLowerEdge, (*values)[i], bit_of(active, i));
+  }
+  for (std::size_t i = 0; i < kPlaces; ++i) {
+    if (!bit_of(children, i)) continue;
+    if (auto done = read_lower(place(i)); !done) return done;
+  }
+  return {};
+}
+
+Status TreeReader::read_lower(IVec3 origin) {
+  constexpr std::size_t kPlaces = 16 * 16 * 16;
+  const auto children = reader_.take(kPlaces / 8);
+  const auto active = reader_.take(kPlaces / 8);
+  if (reader_.failed()) return too_short();
+  const auto values = read_values(kPlaces, active);
+  if (!values) return values.error();
+  for (std::size_t i = 0; i < kPlaces; ++i) {
+    const auto at = static_cast<int>(i);
+    const IVec3 place = origin + IVec3{at >> 8, at >> 4 & 15, at & 15} * kLeafEdge;
+    if (!bit_of(children, i)) {
+      add_tile(place, kLeafEdge, (*values)[i], bit_of(active, i));
+      continue;
+    }
+    static_cast<void>(reader_.take(kLeafVoxels / 8));  // again in its buffer
+    if (reader_.failed()) return too_short();
+    grid_.leaves.push_back({place, {}});
+  }
+  return {};
+}
+
+Result<std::vector<float>> TreeReader::read_values(std::size_t count, std::span<const std::byte> active) {
+  enum Code : std::uint8_t { Background, MinusBackground, OneValue, MaskOfBackground, MaskOfOne, MaskOfTwo, All };
+  const std::size_t at = reader_.position();
+  const unsigned code = reader_.u8();
+  if (code > All) return bad_at(at, "values stored in an unknown way");
+  float first = code == Background ? grid_.background : is_truth() ? 1.0F - grid_.background : -grid_.background;
+  float second = grid_.background;
+  if (code == OneValue || code == MaskOfOne || code == MaskOfTwo) first = read_value();
+  if (code == MaskOfTwo) second = read_value();
+  std::span<const std::byte> choice;
+  if (code == MaskOfBackground || code == MaskOfOne || code == MaskOfTwo) choice = reader_.take(count / 8);
+  if (reader_.failed()) return too_short();
+  const bool are_active_alone = (compression_ & kActiveAlone) != 0 && code != All;
+  const std::size_t stored = are_active_alone ? count_of(active) : count;
+  std::vector<float> values(count);
+  if (auto done = read_data(stored, std::span(values).first(stored)); !done) return done.error();
+  if (stored == count) return values;
+  // From behind, so that none is written over before it is moved.
+  std::size_t next = stored;
+  for (std::size_t i = count; i-- > 0;) {
+    if (bit_of(active, i)) {
+      values[i] = values[--next];
+    } else {
+      values[i] = !choice.empty() && bit_of(choice, i) ? second : first;
+    }
+  }
+  return values;
+}
+
+Status TreeReader::read_data(std::size_t count, std::span<float> out) {
+  const bool is_half = is_half_ && !is_truth();
+  const std::size_t size = is_half ? 2 : value_bytes();
+  if (is_half && count == 0) return {};  // of other values there is a size even then
+  const std::size_t bytes = count * size;
+  std::span<const std::byte> data;
+  if ((compression_ & (kZip | kBlosc)) == 0) {
+    data = reader_.take(bytes);
+    if (reader_.failed()) return too_short();
+  } else {
+    const std::size_t at = reader_.position();
+    const auto claimed = static_cast<std::int64_t>(read_u64(reader_));
+    const std::uint64_t packed_size =
+        claimed < 0 ? 0 - static_cast<std::uint64_t>(claimed) : static_cast<std::uint64_t>(claimed);
+    if (reader_.failed() || packed_size > reader_.remaining()) return bad_at(at, "values that end behind the file");
+    const auto packed = reader_.take(packed_size);
+    if (claimed <= 0) {
+      if (packed_size != bytes) return bad_at(at, "not as many values as the node has");
+      data = packed;
+    } else {
+      expanded_.resize(bytes);
+      if ((compression_ & kBlosc) != 0) {
+        if (auto done = expand_blosc(packed, expanded_); !done) {
+          return make_error(done.error().code, done.error().message, {}, at + 8 + done.error().byte_offset.value_or(0));
+        }
+      } else {
+        ByteStream stream(packed, 0, Compression::Zlib);
+        const auto read = stream.read(expanded_);
+        if (!read || *read != bytes) return bad_at(at + 8, "a zlib stream that is damaged");
+      }
+      data = expanded_;
+    }
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::byte* const value = data.data() + i * size;
+    if (is_half) {
+      out[i] = float_from_half(load<std::uint16_t>(value, std::endian::little));
+    } else if (scalar_ == Scalar::Float) {
+      out[i] = load<float>(value, std::endian::little);
+    } else if (scalar_ == Scalar::Double) {
+      out[i] = static_cast<float>(load<double>(value, std::endian::little));
+    } else {
+      out[i] = *value != std::byte{0} ? 1.0F : 0.0F;
+    }
+  }
+  return {};
+}
+
+Status TreeReader::read_buffer(Leaf& leaf) {
+  constexpr std::size_t kMaskBytes = kLeafVoxels / 8;
+  const auto active = reader_.take(kMaskBytes);
+  if (reader_.failed()) return too_short();
+  const auto load_mask = [](std::span<const std::byte> bytes) {
+    LeafMask mask{};
+    for (std::size_t i = 0; i < mask.size(); ++i)
+      mask[i] = load<std::uint64_t>(bytes.data() + 8 * i, std::endian::little);
+    return mask;
+  };
+  leaf.active = load_mask(active);
+  if (!is_truth()) {
+    const auto values = read_values(kLeafVoxels, active);
+    if (!values) return values.error();
+    grid_.values.insert(grid_.values.end(), values->begin(), values->end());
+    return {};
+  }
+  static_cast<void>(reader_.take(12));  // origin
+  if (scalar_ == Scalar::Bool) {
+    const auto truth = reader_.take(kMaskBytes);
+    if (reader_.failed()) return too_short();
+    const LeafMask is_true = load_mask(truth);
+    for (std::size_t i = 0; i < is_true.size(); ++i) leaf.active[i] &= is_true[i];
+  }
+  return reader_.failed() ? Status(too_short()) : Status();
+}
+
+std::optional<Scalar> scalar_of(std::string_view type) {
+  if (type == "Tree_float_5_4_3") return Scalar::Float;
+  if (type == "Tree_double_5_4_3") return Scalar::Double;
+  if (type == "Tree_bool_5_4_3") return Scalar::Bool;
+  if (type == "Tree_mask_5_4_3") return Scalar::Mask;
+  return std::nullopt;
+}
+
+/// A name that is there several times has a number behind it.
+std::string shown_name(const std::string& name) {
+  return printable(std::string_view(name).substr(0, name.find('\x1e')));
+}
+
+class FileReader {
+ public:
+  explicit FileReader(std::span<const std::byte> bytes) : bytes_(bytes), reader_(bytes) {}
+
+  Result<File> read() {
+    static_cast<void>(reader_.take(kMagic.size()));
+    const std::uint32_t version = reader_.u32();
+    if (version < kOldest || version > kNewest) {
+      return make_error(ErrorCode::Unsupported, "version " + std::to_string(version) + " of .vdb (222 to 225 are read)",
+                        {}, kMagic.size());
+    }
+    static_cast<void>(reader_.take(8));  // of the library
+    const std::size_t offsets_at = reader_.position();
+    const bool has_offsets = reader_.u8() != 0;
+    static_cast<void>(reader_.take(36));
+    static_cast<void>(read_metadata(reader_));
+    const std::size_t count = reader_.count(12 + 24);
+    if (reader_.failed()) return bad_at(bytes_.size(), "it ends before its grids do");
+    if (!has_offsets) {
+      return make_error(ErrorCode::Unsupported, "a stream of .vdb, which does not say where its grids are", {},
+                        offsets_at);
+    }
+    std::vector<Descriptor> descriptors;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (auto done = read_next(descriptors); !done) return done.error();
+    }
+    for (std::size_t i = 0; i < descriptors.size(); ++i) {
+      if (auto done = read_grid(descriptors[i], i); !done) return done.error();
+    }
+    for (const auto& [grid, parent] : parents_) {
+      const auto found = place_of_.find(parent);
+      if (found != place_of_.end() && file_.grids[found->second].same_as == SIZE_MAX) {
+        file_.grids[grid].same_as = found->second;
+        file_.grids[grid].meaning = file_.grids[found->second].meaning;
+      } else {
+        file_.warnings.push_back("left out: " + file_.grids[grid].name + ", whose tree is not there");
+      }
+    }
+    return std::move(file_);
+  }
+
+ private:
+  /// A descriptor, and goes on to where the next begins.
+  Status read_next(std::vector<Descriptor>& descriptors) {
+    Descriptor next;
+    next.at = reader_.position();
+    next.name = read_string(reader_);
+    next.type = read_string(reader_);
+    next.parent = read_string(reader_);
+    next.begin = read_u64(reader_);
+    static_cast<void>(read_u64(reader_));
+    const std::uint64_t end = read_u64(reader_);
+    if (reader_.failed() || next.begin < reader_.position() || end < next.begin || end > bytes_.size()) {
+      return bad_at(next.at, "a grid that begins or ends where it cannot");
+    }
+    // So grids do not overlap, and each byte is read once.
+    reader_ = ByteReader(bytes_, end, bytes_.size());
+    ends_.push_back(end);
+    descriptors.push_back(std::move(next));
+    return {};
+  }
+
+  Status read_grid(const Descriptor& descriptor, std::size_t number) {
+    ByteReader reader(bytes_, descriptor.begin, ends_[number]);
+    const std::uint32_t compression = reader.u32();
+    const Metadata metadata = read_metadata(reader);
+    const std::string map = read_string(reader);
+    if (reader.failed()) return bad_at(descriptor.begin, "a grid that ends before its tree");
+    Grid grid;
+    grid.name = shown_name(descriptor.name);
+    std::string type = descriptor.type;
+    const bool has_suffix = type.ends_with(kHalfSuffix);
+    if (has_suffix) type.resize(type.size() - kHalfSuffix.size());
+    const auto scalar = scalar_of(type);
+    const auto matrix = read_map(reader, map);
+    if (!scalar || !matrix) {
+      file_.warnings.push_back("left out: the grid \"" + grid.name + "\", " +
+                               (scalar ? "which is bent (" + printable(map) + ")" : "of " + printable(type)));
+      return {};
+    }
+    grid.world_from_index = *matrix;
+    grid.meaning = *scalar == Scalar::Bool || *scalar == Scalar::Mask ? Meaning::Mask
+                   : metadata.kind == "level set"                     ? Meaning::LevelSet
+                                                                      : Meaning::Fog;
+    if (!descriptor.parent.empty()) {
+      parents_.emplace_back(file_.grids.size(), descriptor.parent);
+    } else if (auto done = TreeReader(reader, *scalar, compression, metadata.is_half || has_suffix, grid).read();
+               !done) {
+      return done;
+    }
+    place_of_.emplace(descriptor.name, file_.grids.size());
+    file_.grids.push_back(std::move(grid));
+    return {};
+  }
+
+  std::span<const std::byte> bytes_;
+  ByteReader reader_;
+  File file_;
+  std::vector<std::uint64_t> ends_;
+  std::map<std::string, std::size_t> place_of_;
+  std::vector<std::pair<std::size_t, std::string>> parents_;
+};
+
+}  // namespace
+
+bool is_vdb(std::span<const std::byte> beginning) {
+  return text_of(beginning).starts_with(kMagic);
+}
+
+Result<File> read_vdb_file(std::span<const std::byte> bytes) {
+  return FileReader(bytes).read();
+}
+
+}  // namespace quoin::vdb

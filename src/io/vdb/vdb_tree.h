@@ -1,0 +1,83 @@
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <glm/mat4x4.hpp>
+
+#include <quoin/core/result.h>
+#include <quoin/core/vec.h>
+
+// Trees of OpenVDB's, of the usual shape: a root of nodes of 32^3, of nodes of 16^3, of leaves of 8^3 voxels. In all of
+// them z is the fastest axis.
+
+namespace quoin::vdb {
+
+inline constexpr int kLeafEdge = 8;
+inline constexpr int kLowerEdge = 16 * kLeafEdge;
+inline constexpr int kUpperEdge = 32 * kLowerEdge;
+inline constexpr std::size_t kLeafVoxels = 512;
+
+/// The place of a leaf's voxel among its values, and in its masks.
+[[nodiscard]] constexpr std::size_t place_in_leaf(int x, int y, int z) {
+  return static_cast<std::size_t>(x << 6 | y << 3 | z);
+}
+
+/// What the values mean.
+enum class Meaning : std::uint8_t {
+  LevelSet,  ///< signed distances in world units, negative inside
+  Fog,       ///< densities: the more the denser
+  Mask,      ///< voxels that are there
+};
+
+using LeafMask = std::array<std::uint64_t, kLeafVoxels / 64>;
+
+struct Leaf {
+  IVec3 origin{0};
+  LeafMask active{};
+};
+
+/// A cube of one value.
+struct Tile {
+  IVec3 origin{0};
+  std::int32_t edge = kLeafEdge;
+  float value = 0.0F;
+  bool is_active = false;
+};
+
+struct Grid {
+  std::string name;
+  Meaning meaning = Meaning::Fog;
+  float background = 0.0F;
+  std::vector<Leaf> leaves;
+  std::vector<float> values;  ///< 512 a leaf, in order; of masks none, and `active` says which are there
+  std::vector<Tile> tiles;    ///< those that are active, or differ from the background
+  glm::dmat4 world_from_index{1.0};
+  std::size_t same_as = SIZE_MAX;  ///< the place of the grid whose tree it shares; it has none itself
+};
+
+struct File {
+  std::vector<Grid> grids;
+  std::vector<std::string> warnings;  ///< of grids that are left out
+};
+
+/// " BDV" and zeros.
+[[nodiscard]] bool is_vdb(std::span<const std::byte> beginning);
+/// Reads a file, versions 222 (OpenVDB 1.1) to 225: grids of float, double and bool, and masks; plain, zip and Blosc.
+///
+/// Source: openvdb/io and openvdb/tree of OpenVDB 10.
+/// Errors: BadFormat with the offset; LimitExceeded; Unsupported.
+/// Memory: 2 KiB a leaf, each of which takes 128 bytes of the file at least; 24 bytes a tile that is no background.
+[[nodiscard]] Result<File> read_vdb_file(std::span<const std::byte> bytes);
+
+/// "NanoVDB0".
+[[nodiscard]] bool is_nvdb(std::span<const std::byte> beginning);
+/// The same of NanoVDB's files, version 32. Errors: as read_vdb_file.
+[[nodiscard]] Result<File> read_nvdb_file(std::span<const std::byte> bytes);
+
+}  // namespace quoin::vdb
