@@ -149,6 +149,23 @@ std::string fault_of_blocks(const ConvertOptions& options) {
   return is_of_smooth ? "--smoothness, --colours and --no-unite need --mesher smooth" : "";
 }
 
+/// Whether it is the name of a format of triangles.
+bool format_is_mesh(const std::string& name) {
+  const auto all = file_formats();
+  return std::any_of(all.begin(), all.end(), [&](const FormatInfo& info) { return info.is_mesh && info.name == name; });
+}
+
+/// Of a mesh's voxels, for formats whose voxels have no size: one unit each, from the origin on.
+void stand_at_unit_size(Scene& scene, const FormatInfo& format, std::vector<std::string>& warnings) {
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    Instance& placed = scene.edit(handle);
+    warnings.push_back(std::string(format.extension) + " keeps no size of voxels: they are " +
+                       digits_for_people(placed.voxel_size) + " of the mesh's units");
+    placed.voxel_size = 1.0;
+    placed.position = DVec3(0.0);
+  }
+}
+
 /// How the scene is meshed where nobody said it: as blocks, but for fields alone, which are smooth in any case.
 std::string mesher_for(const Scene& scene, const ConvertOptions& options) {
   if (!options.mesher.empty()) return options.mesher;
@@ -191,6 +208,9 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
     return outcome;
   }
   keep_what_is_asked_for(options, format, *loaded, outcome.warnings);
+  const bool is_from_mesh = format_is_mesh(loaded->format);
+  const bool keeps_scale = format.format == FileFormat::Scene || format.format == FileFormat::World;
+  if (is_from_mesh && !keeps_scale) stand_at_unit_size(loaded->scene, format, outcome.warnings);
   outcome.files = {options.output};
   outcome.faces = count_faces(loaded->scene, options.common.instances(), options.common.threads);
   ProgressBar bar(!options.is_one_of_many);
@@ -314,9 +334,10 @@ std::string fault_of_mesh_input(const ConvertOptions& options) {
 
 Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format, bool is_volume, std::string& fault) {
   if (is_volume && format.format == FileFormat::Vox) {
-    return make_error(ErrorCode::Unsupported,
-                      "a volume of values becomes a mesh (.glb, .gltf, .obj, .ply) or a field (.json), not .vox",
-                      options.common.input.string());
+    return make_error(
+        ErrorCode::Unsupported,
+        "a volume of values becomes a mesh (.glb, .gltf, .obj, .ply, .stl, .3mf) or a field (.json), not .vox",
+        options.common.input.string());
   }
   if (is_volume && !format.is_mesh) {
     ConvertOptions as_scene = options;
@@ -694,7 +715,7 @@ std::string read_options(const CLI::App& command, const VolumeTexts& texts, cons
   options.mesh_only = given > 0 || options.has_field_occlusion;
   std::string fault = read_texts(command, texts, options);
   if (fault.empty()) fault = read_mesh_input_options(command, triangles, options.common.load.mesh);
-  if (const char* given = given_mesh_input(command)) options.mesh_input = given;
+  if (const char* name = given_mesh_input(command)) options.mesh_input = name;
   if (fault.empty()) fault = read_occlusion(command, options);
   if (command.count("--light") > 0 && command.get_option("--light")->as<std::string>() == "propagated") {
     options.light = natural_light();

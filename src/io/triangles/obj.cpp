@@ -26,36 +26,38 @@ namespace quoin::triangles {
 
 namespace {
 
-bool is_keyword(std::string_view word) {
-  constexpr std::string_view kKnown[] = {"v",     "vt",  "vn",     "vp",     "vw",       "f",       "l",
-                                         "p",     "o",   "g",      "s",      "mtllib",   "mg",      "usemtl",
-                                         "bevel", "lod", "usemap", "maplib", "c_interp", "d_interp"};
+bool is_other_keyword(std::string_view word) {
+  constexpr std::string_view kKnown[] = {"vp", "vw",    "l",   "p",      "o",      "g",        "s",       "t",
+                                         "mg", "bevel", "lod", "usemap", "maplib", "c_interp", "d_interp"};
   return std::find(std::begin(kKnown), std::end(kKnown), word) != std::end(kKnown);
 }
 
 }  // namespace
 
 bool is_obj(std::span<const std::byte> beginning) {
+  constexpr std::size_t kBeginning = 1 << 16;
   const std::string_view text = text_of(beginning);
-  bool has_geometry = false;
-  for (std::size_t at = 0; at < text.size();) {
+  std::size_t known = 0;
+  std::size_t unknown = 0;
+  std::size_t geometry = 0;
+  for (std::size_t at = 0; at < text.size() && at < kBeginning;) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
-    const std::string_view line = text.substr(at, end - at);
     // The last line of a beginning may be cut off.
-    if (end == text.size() && at > 0) break;
+    if (end == text.size() && text.size() >= kBeginning) break;
+    Words words(text.substr(at, end - at));
     at = end + 1;
-    Words words(line);
     const auto key = words.next();
     if (!key || key->starts_with('#')) continue;
-    if (!is_keyword(*key)) return false;
-    has_geometry |= (*key == "v" || *key == "f") && words.next().has_value();
-    has_geometry |= *key == "mtllib" || *key == "usemtl";
+    const auto first = words.next();
+    const bool is_number =
+        first && !first->empty() && std::string_view("+-.0123456789nN").find((*first)[0]) != std::string_view::npos;
+    const bool is_geometry = is_number && (*key == "v" || *key == "f" || *key == "vt" || *key == "vn");
+    const bool is_material = first && (*key == "mtllib" || *key == "usemtl");
+    geometry += is_geometry || is_material ? 1 : 0;
+    ++(is_geometry || is_material || is_other_keyword(*key) ? known : unknown);
   }
-  // A file of one line.
-  if (!has_geometry && text.find('\n') == std::string_view::npos) {
-    return text.starts_with("f ") || text.starts_with("v ");
-  }
-  return has_geometry;
+  // Programs add words of their own.
+  return geometry > 0 && unknown * 4 <= known;
 }
 
 #ifdef QUOIN_HAVE_TINYOBJLOADER
