@@ -56,7 +56,8 @@ Status check_replaced(const std::filesystem::path& output, const FileSet& inputs
   const auto format = detect_format(output);
   // What cannot be read may be a model, too.
   if (!format) return make_error(ErrorCode::CannotWrite, "there already, and cannot be read", output.string());
-  if (!*format) return {};
+  // Meshes are products, made anew, also where they can be read.
+  if (!*format || format_info(**format).is_mesh) return {};
   return make_error(ErrorCode::InvalidArgument,
                     "there already, a " + std::string(format_info(**format).name) + " file; --force replaces it",
                     output.string());

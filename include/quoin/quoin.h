@@ -63,6 +63,7 @@
 #include <quoin/live/live_meshes.h>
 #include <quoin/mesh/array_surface.h>
 #include <quoin/mesh/blocky.h>
+#include <quoin/mesh/closed_surface.h>
 #include <quoin/mesh/label_surfaces.h>
 #include <quoin/mesh/mesh_view.h>
 #include <quoin/mesh/occlusion.h>
@@ -112,3 +113,5 @@
 #include <quoin/trace/packet.h>
 #include <quoin/trace/ray.h>
 #include <quoin/version.h>
+#include <quoin/voxelize/triangle_mesh.h>
+#include <quoin/voxelize/voxelize.h>

@@ -21,6 +21,7 @@
 #include "io/source/luanti_map.h"
 #include "io/vdb/vdb.h"
 #include "io/vdb/vdb_tree.h"
+#include "io/triangles/triangles.h"
 #include "io/volume/header.h"
 #include "io/volume/write.h"
 #include "io/whole_file.h"
@@ -29,6 +30,17 @@
 namespace quoin {
 
 namespace {
+
+#ifdef QUOIN_HAVE_TINYGLTF
+constexpr bool kReadsGltf = true;
+#else
+constexpr bool kReadsGltf = false;
+#endif
+#ifdef QUOIN_HAVE_TINYOBJLOADER
+constexpr bool kReadsObj = true;
+#else
+constexpr bool kReadsObj = false;
+#endif
 
 constexpr std::array kFormats = {
     FormatInfo{FileFormat::Vox, "vox", ".vox", "MagicaVoxel", true, true, false, false},
@@ -57,10 +69,14 @@ constexpr std::array kFormats = {
                ".nvdb"},
     FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, true, false, true},
     FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes", true, false, false, true},
-    FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", false, true, true, false},
-    FormatInfo{FileFormat::Gltf, "gltf", ".gltf", "glTF 2.0, JSON and .bin", false, true, true, false},
-    FormatInfo{FileFormat::Obj, "obj", ".obj", "Wavefront OBJ with .mtl and palette images", false, true, true, false},
-    FormatInfo{FileFormat::Ply, "ply", ".ply", "Polygon File Format, binary", false, true, true, false},
+    FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", kReadsGltf, true, true, false},
+    FormatInfo{FileFormat::Gltf, "gltf", ".gltf", "glTF 2.0, JSON and .bin", kReadsGltf, true, true, false},
+    FormatInfo{FileFormat::Obj, "obj", ".obj", "Wavefront OBJ with .mtl and palette images", kReadsObj, true, true,
+               false},
+    FormatInfo{FileFormat::Ply, "ply", ".ply", "Polygon File Format, binary (read as text too)", true, true, true,
+               false},
+    FormatInfo{FileFormat::Stl, "stl", ".stl", "STL, for printing", true, true, true, false},
+    FormatInfo{FileFormat::ThreeMf, "3mf", ".3mf", "3MF, for printing, with colours", false, true, true, false},
 };
 
 bool begins_with(std::span<const std::byte> bytes, std::string_view text) {
@@ -185,8 +201,22 @@ std::optional<FileFormat> detect_model(std::span<const std::byte> beginning) {
   return std::nullopt;
 }
 
+bool is_triangles(const std::optional<FileFormat>& format) {
+  return format && format_info(*format).is_mesh;
+}
+
+/// `source`: a path, or bytes.
+template <class Source>
+Result<LoadedScene> read_triangles(const Source& source, const std::string& name, const LoadOptions& options,
+                                   Threads threads, const Progress& progress) {
+  auto loaded = read_mesh(source, options.mesh.up);
+  if (!loaded) return loaded.error();
+  return triangles::scene_from_mesh(std::move(*loaded), options.mesh, name, threads, progress);
+}
+
 /// Of those whose whole length has to fit what they say.
 std::optional<FileFormat> detect_headerless(std::span<const std::byte> whole) {
+  if (triangles::is_stl(whole)) return FileFormat::Stl;
   if (models::is_cub(whole)) return FileFormat::CubeWorld;
   if (models::is_slab6(whole) || models::is_kvx(whole) || models::is_vxl(whole)) return FileFormat::Voxlap;
   return std::nullopt;
@@ -213,6 +243,7 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
   if (format == FileFormat::Schematic) return minecraft::read_schematic(bytes, progress);
   if (format == FileFormat::Vdb) return vdb::read_vdb(bytes, options, threads, progress);
   if (const ReadModel read = model_reader(format); read != nullptr) return read(bytes);
+  if (is_triangles(format)) return read_triangles(bytes, "mesh", options, threads, progress);
   if (is_volume(format)) return read_volume_as_scene(bytes, options, threads, progress);
   Error error = unrecognised(bytes);
   // The reader knows more of what else goes by this name.
@@ -361,6 +392,7 @@ std::optional<FileFormat> detect_format(std::span<const std::byte> bytes) {
   if (first && nrrd::is_header(*first)) return FileFormat::Nrrd;
   if (minecraft::begins_nbt(bytes)) return FileFormat::Schematic;
   if (const auto model = detect_model(bytes)) return model;
+  if (const auto mesh = triangles::detect(bytes)) return mesh;
   return detect_headerless(bytes);
 }
 
@@ -378,7 +410,7 @@ Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& pat
   if (!bytes) return bytes.error();
   if (const auto format = detect_format(*bytes); format || bytes->size() < kEnough) return format;
   const std::string extension = lower_case_extension(path);
-  constexpr std::array<std::string_view, 4> kHeaderless = {".vxl", ".kvx", ".vox", ".cub"};
+  constexpr std::array<std::string_view, 5> kHeaderless = {".vxl", ".kvx", ".vox", ".cub", ".stl"};
   if (std::ranges::find(kHeaderless, extension) == kHeaderless.end()) return std::optional<FileFormat>();
   const auto whole = read_file(path);
   if (!whole) return whole.error();
@@ -423,6 +455,10 @@ std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path
   if (!format || !*format) return {};
   if (**format == FileFormat::Scene) return files_named_in_scene(path);
   if (**format == FileFormat::World) return {path.string() + "-wal"};
+  if (is_triangles(*format)) {
+    const auto mesh = read_mesh(path);
+    return mesh ? mesh->beside : std::vector<std::filesystem::path>();
+  }
   return **format == FileFormat::Nifti ? files_of_pair(path) : std::vector<std::filesystem::path>();
 }
 
@@ -447,6 +483,8 @@ Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOpti
   // Of the whole file, which some formats are known by only then, and which may be another by now.
   const auto of_all = detect_format(*bytes);
   if (of_all == FileFormat::Scene) return read_scene_file(path, options, threads, progress);
+  if (is_triangles(of_all))
+    return with_path(read_triangles(path, stem_of_file(path), options, threads, progress), path);
   return with_path(read_bytes(path, *bytes, of_all, options, threads, progress), path);
 }
 

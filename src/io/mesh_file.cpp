@@ -27,8 +27,13 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
     return make_error(ErrorCode::Unsupported,
                       std::string("only .glb and .gltf are ") + (options.compress ? "compressed" : "quantized"));
   }
-  if (!meshes.atlas.rgb.empty() && format == FileFormat::Ply) {
-    return make_error(ErrorCode::Unsupported, "PLY has no textures; .glb, .gltf and .obj have");
+  const bool is_print = format == FileFormat::Stl || format == FileFormat::ThreeMf;
+  if (!meshes.atlas.rgb.empty() && (is_print || format == FileFormat::Ply)) {
+    return make_error(ErrorCode::Unsupported,
+                      std::string(format_info(format).extension) + " has no textures; .glb, .gltf and .obj have");
+  }
+  if (is_print && options.occlusion_in == OcclusionIn::Attribute) {
+    return make_error(ErrorCode::Unsupported, "there is no occlusion in files for printing");
   }
   if (has_light(meshes) && !is_gltf) {
     return make_error(ErrorCode::Unsupported, "only .glb and .gltf have light at vertices");
@@ -47,6 +52,10 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
       return plan_obj(meshes, path);
     case FileFormat::Ply:
       return plan_ply(meshes, path, options);
+    case FileFormat::Stl:
+      return plan_stl(meshes, path);
+    case FileFormat::ThreeMf:
+      return plan_three_mf(meshes, path);
     case FileFormat::Vox:
     case FileFormat::Scene:
     case FileFormat::World:

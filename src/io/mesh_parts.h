@@ -35,6 +35,9 @@ using PlanMeshFiles = Result<std::vector<MeshFile>>(const SceneMeshes& meshes, c
 [[nodiscard]] PlanMeshFiles plan_ply;
 /// Which has no place for occlusion but colours.
 [[nodiscard]] Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::filesystem::path& path);
+/// Of files for printing.
+[[nodiscard]] Result<std::vector<MeshFile>> plan_stl(const SceneMeshes& meshes, const std::filesystem::path& path);
+[[nodiscard]] Result<std::vector<MeshFile>> plan_three_mf(const SceneMeshes& meshes, const std::filesystem::path& path);
 
 /// What goes beside `path`.
 [[nodiscard]] std::vector<std::filesystem::path> gltf_companions(const SceneMeshes& meshes,

@@ -1,6 +1,7 @@
 #include "voxelize/surface_colours.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -24,6 +25,16 @@ Rgba8 encoded(glm::vec4 light) {
   const SrgbEncoder& encode = SrgbEncoder::shared();
   const float alpha = light.a > 0.0F ? std::min(light.a, 1.0F) : 0.0F;
   return {encode(light.r), encode(light.g), encode(light.b), static_cast<std::uint8_t>(std::lround(alpha * 255.0F))};
+}
+
+/// linear_from_srgb of every byte, which takes long to compute.
+const std::array<float, 256>& linear_of_bytes() {
+  static const std::array<float, 256> all = [] {
+    std::array<float, 256> made{};
+    for (std::size_t i = 0; i < made.size(); ++i) made[i] = linear_from_srgb(static_cast<std::uint8_t>(i));
+    return made;
+  }();
+  return all;
 }
 
 /// A pixel's index within a picture.
@@ -111,7 +122,8 @@ glm::vec4 SurfaceColours::texel(std::size_t texture, std::size_t level, int x, i
   }
   const std::uint8_t* p = frame_->mesh().textures[texture].image.rgba.data() + at;
   const float alpha = static_cast<float>(p[3]) * (1.0F / 255.0F);
-  return {linear_from_srgb(p[0]) * alpha, linear_from_srgb(p[1]) * alpha, linear_from_srgb(p[2]) * alpha, alpha};
+  const std::array<float, 256>& linear = linear_of_bytes();
+  return {linear[p[0]] * alpha, linear[p[1]] * alpha, linear[p[2]] * alpha, alpha};
 }
 
 glm::vec4 SurfaceColours::sample(std::size_t texture, std::size_t level, DVec3 place) const {

@@ -1,18 +1,22 @@
 #include "convert/convert.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <memory>
 
 #include <quoin/io/chunk_source.h>
 #include <quoin/io/mesh_file.h>
 #include <quoin/io/vox.h>
 #include <quoin/light/lit_meshes.h>
+#include <quoin/mesh/closed_surface.h>
 #include <quoin/store/world_import.h>
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
 
 #include "field_occlusion.h"
 #include "interrupt.h"
+#include "mesh_input.h"
 #include "output.h"
 #include "output_files.h"
 #include "parse.h"
@@ -27,6 +31,28 @@ namespace quoin::tool {
 
 namespace {
 
+/// The surface of a grid as printers want it.
+Result<MeshPart> part_for_printing(const Scene& scene, GridHandle grid, MeshStats& stats) {
+  auto surface = closed_surface(scene.grids()[grid].grid);
+  if (!surface) return surface.error();
+  const auto quads = static_cast<std::int64_t>(surface->positions.size() / 4);
+  stats.faces_total += 6 * scene.grids()[grid].grid.voxel_count();
+  stats.faces_visible += quads;
+  stats.quads += quads;
+  BlockyMesh mesh;
+  mesh.surfaces[0] = std::move(*surface);
+  return mesh_part({}, std::move(mesh));
+}
+
+/// How many units of the file a unit of the world has, so that the smallest voxels have a size in it.
+double scale_for_voxels(const Scene& scene, double voxel) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    least = std::min(least, scene.instances()[handle].voxel_size);
+  }
+  return std::isfinite(least) ? voxel / least : voxel;
+}
+
 /// Meshes the scene blockily and writes it, filling in `outcome`.
 Status convert_blockily(const Scene& scene, const SceneAnimation& animation, const ConvertOptions& options,
                         Outcome& outcome) {
@@ -38,6 +64,9 @@ Status convert_blockily(const Scene& scene, const SceneAnimation& animation, con
   wanted.mesh = {outcome.mesher == "greedy", !options.occlusion_off, options.watertight};
   wanted.instances = filter;
   wanted.atlas = options.texture == "atlas";
+  if (is_for_printing(format_for_writing(options.output)->format)) {
+    wanted.part_of = [&scene](GridHandle grid, MeshStats& stats) { return part_for_printing(scene, grid, stats); };
+  }
   const Progress progress = bar.listener("meshing");
   auto meshes = options.light ? mesh_lit_scene(scene, *options.light, wanted, options.common.threads, progress)
                               : mesh_scene(scene, wanted, options.common.threads, progress);
@@ -120,6 +149,23 @@ std::string fault_of_blocks(const ConvertOptions& options) {
   return is_of_smooth ? "--smoothness, --colours and --no-unite need --mesher smooth" : "";
 }
 
+/// Whether it is the name of a format of triangles.
+bool format_is_mesh(const std::string& name) {
+  const auto all = file_formats();
+  return std::any_of(all.begin(), all.end(), [&](const FormatInfo& info) { return info.is_mesh && info.name == name; });
+}
+
+/// Of a mesh's voxels, for formats whose voxels have no size: one unit each, from the origin on.
+void stand_at_unit_size(Scene& scene, const FormatInfo& format, std::vector<std::string>& warnings) {
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    Instance& placed = scene.edit(handle);
+    warnings.push_back(std::string(format.extension) + " keeps no size of voxels: they are " +
+                       digits_for_people(placed.voxel_size) + " of the mesh's units");
+    placed.voxel_size = 1.0;
+    placed.position = DVec3(0.0);
+  }
+}
+
 /// How the scene is meshed where nobody said it: as blocks, but for fields alone, which are smooth in any case.
 std::string mesher_for(const Scene& scene, const ConvertOptions& options) {
   if (!options.mesher.empty()) return options.mesher;
@@ -154,6 +200,7 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   if (format.is_mesh) {
     ConvertOptions settled = options;
     settled.mesher = mesher_for(loaded->scene, options);
+    if (options.voxel_mm) settled.scale = scale_for_voxels(loaded->scene, *options.voxel_mm);
     if (settled.light && loaded->sun) settled.light->sun = *loaded->sun;
     fault = settled.mesher == "smooth" ? "" : fault_of_blocks(settled);
     if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault, options.common.input.string());
@@ -161,6 +208,9 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
     return outcome;
   }
   keep_what_is_asked_for(options, format, *loaded, outcome.warnings);
+  const bool is_from_mesh = format_is_mesh(loaded->format);
+  const bool keeps_scale = format.format == FileFormat::Scene || format.format == FileFormat::World;
+  if (is_from_mesh && !keeps_scale) stand_at_unit_size(loaded->scene, format, outcome.warnings);
   outcome.files = {options.output};
   outcome.faces = count_faces(loaded->scene, options.common.instances(), options.common.threads);
   ProgressBar bar(!options.is_one_of_many);
@@ -274,11 +324,20 @@ std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
   return options.iso && !heeds_iso(options.common) ? "--iso is for volumes, and the input holds voxels" : "";
 }
 
+/// What contradicts an input that holds no triangles; empty when nothing does.
+std::string fault_of_mesh_input(const ConvertOptions& options) {
+  if (options.mesh_input.empty()) return "";
+  const auto format = detect_format(options.common.input);
+  const bool is_mesh = format && *format && format_info(**format).is_mesh;
+  return is_mesh || !format ? "" : options.mesh_input + " is for files of triangles, and the input holds none";
+}
+
 Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format, bool is_volume, std::string& fault) {
   if (is_volume && format.format == FileFormat::Vox) {
-    return make_error(ErrorCode::Unsupported,
-                      "a volume of values becomes a mesh (.glb, .gltf, .obj, .ply) or a field (.json), not .vox",
-                      options.common.input.string());
+    return make_error(
+        ErrorCode::Unsupported,
+        "a volume of values becomes a mesh (.glb, .gltf, .obj, .ply, .stl, .3mf) or a field (.json), not .vox",
+        options.common.input.string());
   }
   return is_volume && format.is_mesh ? convert_volume(options, format) : convert_scene(options, format, fault);
 }
@@ -418,9 +477,11 @@ void add_mesh_file_options(CLI::App& command, ConvertOptions& options) {
       ->check(CLI::Range(0.001, 1000.0));
   command.add_option("--scale", options.scale, "Units of the mesh a voxel (default 1; 0.1: ten voxels are a metre)")
       ->check(positive());
+  command.add_option("--voxel-mm", options.voxel_mm, "Millimetres a voxel, in .stl and .3mf (default 1)")
+      ->check(positive());
   command
       .add_option("--up", options.up,
-                  "Which axis of the mesh points up: y or z (default y; z in .ply, as Blender has it)")
+                  "Which axis of the mesh points up: y or z (default y; z in .ply, .stl and .3mf, as Blender has it)")
       ->check(CLI::IsMember({"y", "z"}));
   command.add_flag("--compress", options.compress,
                    "glTF that is a fraction of the size, for clients with EXT_meshopt_compression (loses nothing)");
@@ -515,6 +576,13 @@ std::string fault_of_format(const ConvertOptions& options, const FormatInfo& for
   if (options.texture == "atlas" && format.format == FileFormat::Ply) {
     return "--texture atlas: .ply has no textures; .glb, .gltf and .obj have";
   }
+  if (options.voxel_mm && !is_for_printing(format.format))
+    return "--voxel-mm is for .stl and .3mf; --scale is for others";
+  if (options.voxel_mm && options.scale) return "--voxel-mm and --scale exclude each other";
+  if (is_for_printing(format.format) && (options.texture == "atlas" || options.occlusion_apart)) {
+    return std::string(options.occlusion_apart ? "--ao-attribute" : "--texture atlas") + ": " +
+           std::string(format.extension) + " has no place for it; .glb, .gltf and .obj have";
+  }
   const bool is_gltf = format.format == FileFormat::Glb || format.format == FileFormat::Gltf;
   if (options.light && !is_gltf) {
     return "--light: " + std::string(format.extension) + " has no materials without light; .glb and .gltf have";
@@ -534,6 +602,7 @@ Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& fo
   const auto is_volume = holds_volume(options.common);
   if (!is_volume) return is_volume.error();
   fault = fault_of_usage(options, *is_volume);
+  if (fault.empty() && !options.is_one_of_many) fault = fault_of_mesh_input(options);
   if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault, options.common.input.string());
   if (auto kept = check_replaced(options.output, options.inputs, options.force); !kept) return kept.error();
   if (options.is_one_of_many) {
@@ -568,8 +637,15 @@ Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, Pr
   file.quantize = options.quantize;
   if (options.scale) file.scale = *options.scale;
   const auto format = format_for_writing(options.output);
-  const bool is_ply = format && format->format == FileFormat::Ply;
-  if (options.up == "z" || (options.up.empty() && is_ply)) file.up = UpAxis::Z;
+  const bool is_print = format && is_for_printing(format->format);
+  const bool is_z = is_print || (format && format->format == FileFormat::Ply);
+  if (options.up == "z" || (options.up.empty() && is_z)) file.up = UpAxis::Z;
+  if (is_print) {
+    if (const std::uint64_t open = count_open_edges(meshes); open > 0) {
+      outcome.warnings.push_back(with_thousands(static_cast<std::int64_t>(open)) +
+                                 " edges are not between two triangles: the mesh is not closed for printing");
+    }
+  }
   const auto bytes = write_mesh(meshes, options.output, file, bar.listener("writing"));
   if (!bytes) return bytes.error();
   outcome.bytes = *bytes;
@@ -606,6 +682,8 @@ std::string footer() {
          "names. Volumes in millimetres are in metres in glTF, and keep their unit in the other formats.\n"
          "A .json holds a scene without loss: any rotation and scale, any number of types; a .vox what MagicaVoxel "
          "can.\n"
+         "Files of triangles become voxels first, at their own size in the world, also on the way to a mesh.\n"
+         ".stl and .3mf are closed and manifold, in millimetres, for printing.\n"
          "From .vox to .vox all is kept: animation, layers, cameras, notes; with --frame only that frame.\n"
          "IN and OUT may be -: standard input and output.\n"
          "A file that holds a model or a world is replaced only with --force, and one that is read never.\n"
@@ -614,11 +692,14 @@ std::string footer() {
          "Example: quoin convert fleet.json whole_fleet.json\n"
          "Example: quoin convert castle.vox castle.ply --mesher smooth --simplify 0.1\n"
          "Example: quoin convert scan.nii.gz scan.glb --iso 300\n"
+         "Example: quoin convert statue.glb statue.vox --size 200\n"
+         "Example: quoin convert statue.obj statue.json --voxel 0.05 --field\n"
+         "Example: quoin convert castle.vox castle.3mf --voxel-mm 0.8\n"
          "Example: quoin convert scan.nii.gz scan.ply --ao-form weighted --ao-spread 4 --ao-attribute";
 }
 
 /// Reads what CLI11 left as text, and what only all options together say; returns what is wrong, or "".
-std::string read_options(const CLI::App& command, const VolumeTexts& texts,
+std::string read_options(const CLI::App& command, const VolumeTexts& texts, const MeshInputTexts& triangles,
                          const std::vector<std::filesystem::path>& rest, ConvertOptions& options, ManyOptions& many) {
   std::size_t given = 0;
   for (const char* name :
@@ -629,6 +710,8 @@ std::string read_options(const CLI::App& command, const VolumeTexts& texts,
   options.has_field_occlusion = given_field_occlusion(command) != nullptr;
   options.mesh_only = given > 0 || options.has_field_occlusion;
   std::string fault = read_texts(command, texts, options);
+  if (fault.empty()) fault = read_mesh_input_options(command, triangles, options.common.load.mesh);
+  if (const char* name = given_mesh_input(command)) options.mesh_input = name;
   if (fault.empty()) fault = read_occlusion(command, options);
   if (command.count("--light") > 0 && command.get_option("--light")->as<std::string>() == "propagated") {
     options.light = natural_light();
@@ -649,6 +732,7 @@ void add_convert_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand("convert", "Turn a file into another format, by OUT's ending");
   const auto options = std::make_shared<ConvertOptions>();
   const auto texts = std::make_shared<VolumeTexts>();
+  const auto triangles = std::make_shared<MeshInputTexts>();
   const auto many = std::make_shared<ManyOptions>();
   const auto rest = std::make_shared<std::vector<std::filesystem::path>>();
   add_common_options(*command, options->common);
@@ -656,9 +740,10 @@ void add_convert_command(CLI::App& app, int& status) {
   add_meshing_options(*command, *options);
   add_mesh_file_options(*command, *options);
   add_volume_options(*command, *texts);
+  add_mesh_input_options(*command, *triangles, options->common.load.mesh);
   command->footer(footer());
-  command->callback([command, options, texts, many, rest, &status] {
-    if (const std::string fault = read_options(*command, *texts, *rest, *options, *many); !fault.empty()) {
+  command->callback([command, options, texts, triangles, many, rest, &status] {
+    if (const std::string fault = read_options(*command, *texts, *triangles, *rest, *options, *many); !fault.empty()) {
       print_error(fault + " (try --help)");
       status = kWrongUsage;
       return;

@@ -47,11 +47,13 @@ struct ConvertOptions {
   double frames_per_second = 10.0;    ///< of `animate`
   bool apart = false;                 ///< instances are not united
   std::optional<double> scale;
-  std::string up;          ///< "y", "z"; empty: z for .ply, else y
-  bool compress = false;   ///< of glTF, as MeshFileOptions has it
-  bool quantize = false;   ///< of glTF, as MeshFileOptions has it
-  bool mesh_only = false;  ///< any option that only meshes heed was given
-  bool watch = false;      ///< goes on whenever the input changes
+  std::optional<double> voxel_mm;  ///< millimetres a voxel, of files for printing
+  std::string up;                  ///< "y", "z"; empty: z for .ply, .stl and .3mf, else y
+  bool compress = false;           ///< of glTF, as MeshFileOptions has it
+  bool quantize = false;           ///< of glTF, as MeshFileOptions has it
+  bool mesh_only = false;          ///< any option that only meshes heed was given
+  std::string mesh_input;          ///< an option that is of triangles alone, if one was given
+  bool watch = false;              ///< goes on whenever the input changes
 };
 
 struct Seconds {
@@ -77,6 +79,11 @@ struct Outcome {
 
 /// Converts one file. Where the options contradict what the file holds, `fault` says how, as the error does.
 [[nodiscard]] Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& format, std::string& fault);
+
+/// Whether a format is for printers: meshes are to be closed.
+[[nodiscard]] inline bool is_for_printing(FileFormat format) {
+  return format == FileFormat::Stl || format == FileFormat::ThreeMf;
+}
 
 /// What is wrong with the options for files of a format; empty when nothing is.
 [[nodiscard]] std::string fault_of_format(const ConvertOptions& options, const FormatInfo& format);

@@ -13,6 +13,7 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/look.h>
 #include <quoin/scene/scene.h>
+#include <quoin/voxelize/voxelize.h>
 
 namespace quoin {
 
@@ -40,6 +41,21 @@ struct LoadedScene {
   std::shared_ptr<const VoxSource> source = nullptr;  ///< of a .vox file, with LoadOptions::keep_source
 };
 
+/// Which axis of a file points up. glTF knows +Y alone; programs that read other formats differ.
+enum class UpAxis : std::uint8_t { Y, Z };
+
+/// How a file of triangles becomes voxels.
+struct MeshLoadOptions {
+  std::optional<int> size = std::nullopt;           ///< voxels along the longest side; without both kDefaultMeshSize
+  std::optional<double> voxel_size = std::nullopt;  ///< or of this size, in the file's unit
+  SurfaceVoxels surface = SurfaceVoxels::Separating6;
+  SolidVoxels solid = SolidVoxels::Winding;
+  bool as_field = false;                    ///< a field of distances instead, of what is solid
+  float band = 8.0F;                        ///< of the field, in samples
+  std::optional<UpAxis> up = std::nullopt;  ///< without: Z of STL and PLY, Y of all others
+};
+inline constexpr int kDefaultMeshSize = 128;
+
 struct LoadOptions {
   bool show_hidden = false;  ///< what is hidden (instances, groups, layers) becomes visible
   int frame = 0;             ///< which animation frame to show
@@ -56,6 +72,7 @@ struct LoadOptions {
   /// The file holds the heights of a landscape. Nothing tells such a picture from another, so it has to be said; of
   /// .hgt files, which say it by their name and size, it only says how they become voxels.
   std::optional<HeightOptions> heights = std::nullopt;
+  MeshLoadOptions mesh{};  ///< of files of triangles
 };
 
 /// What saving a scene gave.

@@ -4,12 +4,15 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 #include <quoin/io/formats.h>
 #include <quoin/scene/scene_meshes.h>
+#include <quoin/voxelize/triangle_mesh.h>
 
 namespace quoin {
 
@@ -19,9 +22,6 @@ enum class OcclusionIn : std::uint8_t {
   Attribute,  ///< as a float a vertex of its own, beside colours without it: what of ambient light arrives, 1 open to 0
               ///< dark, as in glTF's occlusion textures; for a shader that dims ambient light alone
 };
-
-/// Which axis of a file points up. glTF knows +Y alone; programs that read other formats differ.
-enum class UpAxis : std::uint8_t { Y, Z };
 
 struct MeshFileOptions {
   std::optional<FileFormat> format{};  ///< of the mesh formats; without, that of the path's extension
@@ -81,6 +81,11 @@ struct MeshFileOptions {
 /// PLY:       version 1.0, binary, little-endian, in world units: x y z and nx ny nz as floats, red green blue as bytes
 ///            (sRGB; occlusion is multiplied in linear light), triangles as lists of int. Transparency, metal and
 ///            emission are lost. OcclusionIn::Attribute: a float ao after these, 1 where a mesh has no occlusion.
+/// STL, 3MF:  for printing, in millimetres: `scale` is those of a world unit. Programs for printing want closed, manifold
+///            meshes with +Z up: those of closed_surface, as BlockySceneOptions::part_of may give them, and smooth ones;
+///            count_open_edges tells. STL: binary, no colours. 3MF: an object a placement, its vertices joined by their
+///            places, a colour (sRGB) a corner or a triangle, by the materials extension; compressed in memory before it
+///            is written. No occlusion in either.
 /// Occlusion: in meshes 0 is open, and 3 (of blocks) or 1 is dark. Files have what it leaves, 1 open to 0 dark, as a
 ///            factor of colours or as the attribute: 1 - occlusion / 4 of blocks (1, 0.75, 0.5, 0.25), 1 - occlusion of
 ///            smooth meshes.
@@ -113,5 +118,39 @@ struct MeshFileOptions {
 [[nodiscard]] Result<std::vector<std::filesystem::path>> mesh_files(const SceneMeshes& meshes,
                                                                     const std::filesystem::path& path,
                                                                     const MeshFileOptions& options = {});
+
+/// Edges of placed meshes, of which each joins the vertices of one part by their positions, that are not in just two
+/// triangles, once in each direction: 0 of what is closed and manifold. Requires: the meshes are sound.
+[[nodiscard]] std::uint64_t count_open_edges(const SceneMeshes& meshes);
+
+/// A mesh as a file holds it.
+struct LoadedMesh {
+  TriangleMesh mesh;
+  std::string format;                         ///< "obj", "gltf", "glb", "ply" or "stl"
+  std::vector<std::string> warnings;          ///< one line each: what was left out, and why
+  std::vector<std::filesystem::path> beside;  ///< files that were read beside it
+};
+
+/// Reads the triangles of a file, all nodes of its scene in one mesh, with colours, in the axes of Quoin.
+///
+/// OBJ:    polygons of any size, colours after coordinates (sRGB), of .mtl files Kd (sRGB) or map_Kd in its place, d, Ke,
+///         Pr and Pm. Needs tinyobjloader in the build.
+/// glTF:   version 2.0, .gltf and .glb: the default scene's nodes with their transforms, as they stand (no animation, no
+///         skin), triangles, strips and fans, of materials base colour, alpha mode, roughness, metalness, emission,
+///         KHR_materials_emissive_strength and KHR_texture_transform, COLOR_0. Needs tinygltf in the build.
+/// PLY:    version 1.0, as text or binary of either byte order; red, green, blue and alpha of vertices (sRGB); polygons
+///         are taken as fans; strips too.
+/// STL:    text or binary, with colours as VisCAM or Magics write them.
+/// Beside: a file that another names is looked for at or below that one's own folder; where a path leads out of it, by
+///         its name alone. A picture that is not there, or cannot be read, is left out with a warning, a .mtl too; of
+///         glTF's buffers that is an error. PNG, JPEG and WebP.
+/// Left out, with a warning: triangles with a corner that is not finite or not there; points and lines.
+/// `up`:   of the file; without, Z of STL and PLY, Y of all others.
+/// Errors: CannotRead, BadFormat (with the byte offset where there is one), Unsupported for other formats, for those
+///         that the build cannot read, and for glTF that requires an extension that is not known; LimitExceeded beyond
+///         2^27 triangles. Memory stays within a multiple of what the files hold.
+[[nodiscard]] Result<LoadedMesh> read_mesh(const std::filesystem::path& path, std::optional<UpAxis> up = {});
+/// The same of bytes, without what lies beside.
+[[nodiscard]] Result<LoadedMesh> read_mesh(std::span<const std::byte> bytes, std::optional<UpAxis> up = {});
 
 }  // namespace quoin

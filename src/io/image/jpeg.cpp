@@ -6,6 +6,7 @@
 
 #include <quoin/io/picture_files.h>
 
+#include "io/image/decode.h"
 #include "io/whole_file.h"
 
 #ifdef QUOIN_HAVE_JPEG
@@ -105,6 +106,64 @@ bool has_jpeg() {
 
 Result<std::vector<std::byte>> write_jpeg(const Image& picture, int quality) {
   if (Status status = check(picture, quality); !status) return status.error();
+  return make_error(ErrorCode::Unsupported, "Quoin was built without libjpeg");
+}
+
+#endif
+
+#ifdef QUOIN_HAVE_JPEG
+
+namespace {
+
+// Everything that libjpeg may jump out of: to a size, then to pixels. Nothing here needs a destructor.
+bool read_header(std::span<const std::byte> bytes, jpeg_decompress_struct& info, Failure& failure) {
+  info.err = jpeg_std_error(&failure.errors);
+  failure.errors.error_exit = jump_back;
+  failure.errors.output_message = stay_silent;
+  if (setjmp(failure.back) != 0) return false;
+  jpeg_create_decompress(&info);
+  jpeg_mem_src(&info, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+  jpeg_read_header(&info, TRUE);
+  info.out_color_space = JCS_EXT_RGBA;
+  info.dct_method = JDCT_ISLOW;
+  return true;
+}
+
+bool read_pixels(jpeg_decompress_struct& info, Failure& failure, std::uint8_t* pixels) {
+  if (setjmp(failure.back) != 0) return false;
+  jpeg_start_decompress(&info);
+  while (info.output_scanline < info.output_height) {
+    JSAMPROW row = pixels + std::size_t{4} * info.output_scanline * info.output_width;
+    jpeg_read_scanlines(&info, &row, 1);
+  }
+  jpeg_finish_decompress(&info);
+  return true;
+}
+
+}  // namespace
+
+Result<AlphaImage> decode_jpeg(std::span<const std::byte> bytes) {
+  jpeg_decompress_struct info{};
+  Failure failure{};
+  AlphaImage image;
+  bool done = read_header(bytes, info, failure);
+  const std::size_t pixels = std::size_t{info.image_width} * info.image_height;
+  // A file of so many bytes has no more pixels than blocks, and half a bit takes one.
+  const bool is_small = pixels <= kMostPicturePixels && pixels / 1024 <= bytes.size();
+  if (done && is_small) {
+    image = {static_cast<int>(info.image_width), static_cast<int>(info.image_height), {}};
+    image.rgba.resize(4 * pixels);
+    done = read_pixels(info, failure, image.rgba.data());
+  }
+  jpeg_destroy_decompress(&info);
+  if (!done) return make_error(ErrorCode::BadFormat, "a JPEG that cannot be decoded");
+  if (!is_small) return make_error(ErrorCode::LimitExceeded, "a JPEG with too many pixels for its size");
+  return image;
+}
+
+#else
+
+Result<AlphaImage> decode_jpeg(std::span<const std::byte>) {
   return make_error(ErrorCode::Unsupported, "Quoin was built without libjpeg");
 }
 

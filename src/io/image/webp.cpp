@@ -2,9 +2,11 @@
 
 #include <quoin/io/picture_files.h>
 
+#include "io/image/decode.h"
 #include "io/whole_file.h"
 
 #ifdef QUOIN_HAVE_WEBP
+#include <webp/decode.h>
 #include <webp/encode.h>
 #endif
 
@@ -62,6 +64,27 @@ Result<std::vector<std::byte>> write_webp(const AlphaImage& picture) {
 #ifdef QUOIN_HAVE_WEBP
   return encoded(picture.rgba, picture.width, picture.height, 4, WebPEncodeLosslessRGBA);
 #else
+  return make_error(ErrorCode::Unsupported, "Quoin was built without libwebp");
+#endif
+}
+
+Result<AlphaImage> decode_webp(std::span<const std::byte> bytes) {
+#ifdef QUOIN_HAVE_WEBP
+  const auto* const data = reinterpret_cast<const std::uint8_t*>(bytes.data());
+  AlphaImage image;
+  if (WebPGetInfo(data, bytes.size(), &image.width, &image.height) == 0) {
+    return make_error(ErrorCode::BadFormat, "a WebP that cannot be decoded");
+  }
+  const std::size_t size =
+      std::size_t{4} * static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
+  if (size / 4 > kMostPicturePixels) return make_error(ErrorCode::LimitExceeded, "a WebP beyond 2^28 pixels");
+  image.rgba.resize(size);
+  if (WebPDecodeRGBAInto(data, bytes.size(), image.rgba.data(), size, 4 * image.width) == nullptr) {
+    return make_error(ErrorCode::BadFormat, "a WebP that cannot be decoded");
+  }
+  return image;
+#else
+  (void)bytes;
   return make_error(ErrorCode::Unsupported, "Quoin was built without libwebp");
 #endif
 }

@@ -1,0 +1,132 @@
+// STL as text and as bytes. Source: 3D Systems, "StereoLithography Interface Specification" (1989); colours as VisCAM
+// and Magics put them into the two bytes that the format leaves unused.
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <optional>
+#include <string_view>
+
+#include <glm/vec4.hpp>
+
+#include "core/srgb.h"
+#include "io/byte_reader.h"
+#include "io/triangles/triangles.h"
+#include "io/triangles/words.h"
+
+namespace quoin::triangles {
+
+namespace {
+
+constexpr std::size_t kHeader = 80;
+constexpr std::size_t kRecord = 50;
+
+/// A colour of 5 bits a channel, in linear light.
+glm::vec4 colour_of(unsigned r, unsigned g, unsigned b) {
+  const auto channel = [](unsigned five) { return linear_from_srgb(static_cast<float>(five & 31U) / 31.0F); };
+  return {channel(r), channel(g), channel(b), 1.0F};
+}
+
+/// What the two bytes after a triangle say; nothing where they say none.
+std::optional<glm::vec4> colour_of(std::uint16_t bits, const std::optional<glm::vec4>& of_all) {
+  const bool is_set = (bits & 0x8000U) != 0;
+  // Magics: a colour for all stands in the header, and the highest bit says that it holds.
+  if (of_all) return is_set ? *of_all : colour_of(bits, bits >> 5U, bits >> 10U);
+  if (is_set) return colour_of(bits >> 10U, bits >> 5U, bits);
+  return std::nullopt;
+}
+
+std::optional<glm::vec4> colour_of_header(std::string_view header) {
+  constexpr std::string_view kKey = "COLOR=";
+  const std::size_t at = header.find(kKey);
+  if (at == std::string_view::npos || at + kKey.size() + 4 > header.size()) return std::nullopt;
+  const auto channel = [&](std::size_t i) {
+    return linear_from_srgb(static_cast<std::uint8_t>(header[at + kKey.size() + i]));
+  };
+  return glm::vec4{channel(0), channel(1), channel(2), 1.0F};
+}
+
+Result<LoadedMesh> read_bytes(std::span<const std::byte> bytes) {
+  ByteReader reader(bytes);
+  const auto of_all = colour_of_header(reader.text(kHeader));
+  const std::uint32_t count = reader.u32();
+  if (reader.failed()) return bad_at(bytes.size(), "the file ends within the header of an STL");
+  if (count > reader.remaining() / kRecord) {
+    return bad_at(kHeader, "claims " + std::to_string(count) + " triangles, and has bytes for " +
+                               std::to_string(reader.remaining() / kRecord));
+  }
+  LoadedMesh loaded;
+  MeshBuilder builder(loaded);
+  std::vector<glm::vec4> colours;
+  bool has_colours = of_all.has_value();
+  constexpr float kGrey = 0.577580F;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    (void)reader.take(12);  // the normal: corners say it too
+    const std::size_t first = loaded.mesh.positions.size();
+    for (int corner = 0; corner < 3; ++corner) {
+      const float x = reader.f32();
+      const float y = reader.f32();
+      const float z = reader.f32();
+      loaded.mesh.positions.emplace_back(x, y, z);
+    }
+    const auto colour = colour_of(reader.u16(), of_all);
+    has_colours |= colour.has_value();
+    colours.insert(colours.end(), 3, colour.value_or(glm::vec4(kGrey, kGrey, kGrey, 1.0F)));
+    if (const auto added = builder.add(first, first + 1, first + 2); !added) return added.error();
+  }
+  if (has_colours) loaded.mesh.colours = std::move(colours);
+  builder.finish();
+  return loaded;
+}
+
+Result<LoadedMesh> read_text(std::span<const std::byte> bytes) {
+  LoadedMesh loaded;
+  MeshBuilder builder(loaded);
+  Words words(text_of(bytes));
+  std::size_t corners = 0;
+  while (const auto word = words.next()) {
+    if (*word == "facet" || *word == "endfacet") {
+      if (*word == "endfacet" && corners != 3) return bad_at(words.position(), "a facet without three corners");
+      corners = 0;
+    }
+    if (*word != "vertex") continue;
+    std::array<double, 3> at{};
+    for (double& number : at) {
+      const auto value = words.next_number();
+      if (!value) return bad_at(words.position(), "a vertex without three numbers");
+      number = *value;
+    }
+    loaded.mesh.positions.emplace_back(at[0], at[1], at[2]);
+    const std::size_t end = loaded.mesh.positions.size();
+    if (++corners != 3) continue;
+    if (const auto added = builder.add(end - 3, end - 2, end - 1); !added) return added.error();
+  }
+  if (corners != 0 && corners != 3) return bad_at(bytes.size(), "the file ends within a facet");
+  builder.finish();
+  return loaded;
+}
+
+}  // namespace
+
+bool is_stl_text(std::span<const std::byte> beginning) {
+  const std::string_view text = text_of(beginning);
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  if (first == std::string_view::npos || !text.substr(first).starts_with("solid")) return false;
+  return text.find("facet") != std::string_view::npos || text.find("endsolid") != std::string_view::npos;
+}
+
+bool is_stl(std::span<const std::byte> whole) {
+  if (whole.size() < kHeader + 4) return false;
+  ByteReader reader(whole);
+  (void)reader.take(kHeader);
+  const std::uint64_t count = reader.u32();
+  return count > 0 && whole.size() == kHeader + 4 + count * kRecord;
+}
+
+Result<LoadedMesh> read_stl(std::span<const std::byte> bytes, Beside&) {
+  // Some programs begin binary files with "solid" too.
+  return is_stl(bytes) || !is_stl_text(bytes) ? read_bytes(bytes) : read_text(bytes);
+}
+
+}  // namespace quoin::triangles

@@ -1,0 +1,191 @@
+#include "io/triangles/triangles.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <quoin/core/thousands.h>
+#include <quoin/io/file.h>
+
+#include "core/progress_steps.h"
+#include "io/image/decode.h"
+#include "io/whole_file.h"
+
+namespace quoin {
+
+namespace triangles {
+
+namespace {
+
+/// A path below the folder: no root, no way up.
+bool stays_below(const std::filesystem::path& name) {
+  return name.is_relative() && !name.has_root_name() &&
+         std::none_of(name.begin(), name.end(), [](const auto& part) { return part == ".."; });
+}
+
+std::string with_slashes(std::string name) {
+  std::replace(name.begin(), name.end(), '\\', '/');
+  return name;
+}
+
+/// Points of a file whose z axis points up, in Quoin's axes.
+void turn_up(TriangleMesh& mesh) {
+  for (DVec3& p : mesh.positions) p = {p.x, p.z, -p.y};
+}
+
+using Read = Result<LoadedMesh> (*)(std::span<const std::byte>, Beside&);
+
+Result<LoadedMesh> read_any(std::span<const std::byte> bytes, Beside& beside, std::optional<UpAxis> up) {
+  const auto format = detect_format(bytes);
+  Read read = nullptr;
+  if (format == FileFormat::Obj) read = read_obj;
+  if (format == FileFormat::Ply) read = read_ply;
+  if (format == FileFormat::Stl) read = read_stl;
+  if (format == FileFormat::Glb || format == FileFormat::Gltf) read = read_gltf;
+  if (read == nullptr) {
+    return make_error(ErrorCode::Unsupported, format ? std::string(format_info(*format).name) + " holds no triangles"
+                                                     : "not a file of triangles that Quoin reads");
+  }
+  auto loaded = read(bytes, beside);
+  if (!loaded) return loaded;
+  loaded->format = format_info(*format).name;
+  const bool is_z = format == FileFormat::Stl || format == FileFormat::Ply;
+  const UpAxis own = is_z ? UpAxis::Z : UpAxis::Y;
+  if (up.value_or(own) == UpAxis::Z) turn_up(loaded->mesh);
+  loaded->beside = std::move(beside.files());
+  return loaded;
+}
+
+}  // namespace
+
+Result<std::vector<std::byte>> Beside::read(const std::string& name) {
+  if (!is_there_) return make_error(ErrorCode::CannotRead, "there is no folder to look in");
+  std::filesystem::path path = with_slashes(name);
+  if (!stays_below(path)) path = path.filename();
+  // "C:model.png" has none on every system.
+  const std::filesystem::path found = folder_ / path;
+  auto bytes = read_file(found);
+  if (!bytes) return make_error(bytes.error().code, bytes.error().message);
+  if (std::find(files_.begin(), files_.end(), found) == files_.end()) files_.push_back(found);
+  return bytes;
+}
+
+Result<bool> MeshBuilder::add(std::size_t a, std::size_t b, std::size_t c) {
+  TriangleMesh& mesh = loaded_.mesh;
+  const std::size_t count = mesh.positions.size();
+  if (a >= count || b >= count || c >= count) {
+    ++not_there_;
+    return false;
+  }
+  if (!is_finite(mesh.positions[a]) || !is_finite(mesh.positions[b]) || !is_finite(mesh.positions[c])) {
+    ++not_finite_;
+    return false;
+  }
+  if (mesh.triangles.size() == kMostTriangles) {
+    return make_error(ErrorCode::LimitExceeded, "more than 2^27 triangles");
+  }
+  mesh.triangles.push_back(
+      {static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b), static_cast<std::uint32_t>(c)});
+  return true;
+}
+
+void MeshBuilder::finish() {
+  const auto warn = [&](std::size_t count, const char* what) {
+    if (count == 0) return;
+    loaded_.warnings.push_back("left out " + with_thousands(static_cast<std::int64_t>(count)) + " triangles with " +
+                               what);
+  };
+  warn(not_there_, "a corner that is not there");
+  warn(not_finite_, "a corner that is no number");
+}
+
+std::optional<std::size_t> add_texture(std::span<const std::byte> picture, const std::string& name,
+                                       LoadedMesh& loaded) {
+  auto image = decode_picture(picture);
+  if (!image) {
+    loaded.warnings.push_back("left out the texture " + name + ": " + image.error().message);
+    return std::nullopt;
+  }
+  MeshTexture texture;
+  texture.image = std::move(*image);
+  loaded.mesh.textures.push_back(std::move(texture));
+  return loaded.mesh.textures.size() - 1;
+}
+
+std::optional<FileFormat> detect(std::span<const std::byte> beginning) {
+  if (is_glb(beginning)) return FileFormat::Glb;
+  if (is_gltf(beginning)) return FileFormat::Gltf;
+  if (is_ply(beginning)) return FileFormat::Ply;
+  if (is_stl_text(beginning)) return FileFormat::Stl;
+  if (is_obj(beginning)) return FileFormat::Obj;
+  return std::nullopt;
+}
+
+namespace {
+
+Result<VoxelLattice> lattice_of(const TriangleMesh& mesh, const MeshLoadOptions& options) {
+  if (options.voxel_size) return lattice_of_voxel(mesh, *options.voxel_size);
+  return lattice_of_size(mesh, options.size.value_or(kDefaultMeshSize));
+}
+
+std::string number_of(double value) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.6g", value);
+  return text;
+}
+
+}  // namespace
+
+Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& options, const std::string& name,
+                                    Threads threads, const Progress& progress) {
+  if (loaded.mesh.triangles.empty()) return make_error(ErrorCode::Unsupported, "there is no triangle in it");
+  const auto lattice = lattice_of(loaded.mesh, options);
+  if (!lattice) return lattice.error();
+  LoadedScene scene;
+  scene.format = loaded.format;
+  scene.warnings = std::move(loaded.warnings);
+  if (!options.size && !options.voxel_size) {
+    scene.warnings.push_back("voxelised at " + std::to_string(kDefaultMeshSize) +
+                             " voxels along its longest side, a voxel being " + number_of(lattice->voxel_size) +
+                             " of its units, since no size was given");
+  }
+  SceneGrid grid;
+  grid.name = name;
+  Instance instance;
+  instance.name = name;
+  instance.voxel_size = lattice->voxel_size;
+  instance.position = lattice->origin;
+  if (options.as_field) {
+    DistanceFieldOptions wanted{*lattice, options.solid, options.band};
+    auto made = distance_field(loaded.mesh, wanted, scene.scene.types, threads, progress);
+    if (!made) return made.error();
+    if (made->field.chunk_count() == 0) scene.warnings.emplace_back("the mesh encloses nothing");
+    grid.field = std::move(made->field);
+    instance.position += DVec3(0.5 * lattice->voxel_size);
+    scene.warnings.insert(scene.warnings.end(), made->warnings.begin(), made->warnings.end());
+  } else {
+    auto made = voxelize(loaded.mesh, {*lattice, options.surface, options.solid}, scene.scene.types, threads, progress);
+    if (!made) return made.error();
+    if (made->grid.voxel_count() == 0) scene.warnings.emplace_back("no voxel came of the mesh");
+    grid.grid = std::move(made->grid);
+    scene.warnings.insert(scene.warnings.end(), made->warnings.begin(), made->warnings.end());
+  }
+  instance.grid = scene.scene.add_grid(std::move(grid));
+  scene.scene.add_instance(std::move(instance));
+  return scene;
+}
+
+}  // namespace triangles
+
+Result<LoadedMesh> read_mesh(std::span<const std::byte> bytes, std::optional<UpAxis> up) {
+  triangles::Beside nothing;
+  return triangles::read_any(bytes, nothing, up);
+}
+
+Result<LoadedMesh> read_mesh(const std::filesystem::path& path, std::optional<UpAxis> up) {
+  return read_whole(path, [&](std::span<const std::byte> bytes) {
+    triangles::Beside beside(path);
+    return triangles::read_any(bytes, beside, up);
+  });
+}
+
+}  // namespace quoin

@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <quoin/core/progress.h>
+#include <quoin/io/formats.h>
+#include <quoin/io/mesh_file.h>
+
+// Files of triangles. docs/formats/meshes.md says what of each is read.
+//
+// Recognition is by content: `is_...` take what a file begins with (64 KiB suffice), or the whole of binary STL, which
+// only its length tells.
+
+namespace quoin::triangles {
+
+inline constexpr std::size_t kMostTriangles = std::size_t{1} << 27;
+
+/// Files beside another, which that one names. Of bytes without a path there are none.
+class Beside {
+ public:
+  Beside() = default;
+  explicit Beside(const std::filesystem::path& file) : folder_(file.parent_path()), is_there_(true) {}
+
+  /// A file at or below the folder; where `name` leads out of it, the file of that name in the folder.
+  /// Errors: CannotRead. They name no path: `name` is said by who asks.
+  [[nodiscard]] Result<std::vector<std::byte>> read(const std::string& name);
+  /// What was read.
+  [[nodiscard]] std::vector<std::filesystem::path>& files() { return files_; }
+
+ private:
+  std::filesystem::path folder_;
+  std::vector<std::filesystem::path> files_;
+  bool is_there_ = false;
+};
+
+/// Appends what belongs together, and counts what is left out.
+class MeshBuilder {
+ public:
+  explicit MeshBuilder(LoadedMesh& loaded) : loaded_(loaded) {}
+  /// A triangle of positions that are there; false, and nothing is added, where one is not, or not finite.
+  /// Errors: LimitExceeded.
+  [[nodiscard]] Result<bool> add(std::size_t a, std::size_t b, std::size_t c);
+  /// Warns of what was left out. Call at the end.
+  void finish();
+
+ private:
+  LoadedMesh& loaded_;
+  std::size_t not_finite_ = 0;
+  std::size_t not_there_ = 0;
+};
+
+/// Adds a picture as a texture; nothing, with a warning, where it cannot be decoded.
+[[nodiscard]] std::optional<std::size_t> add_texture(std::span<const std::byte> picture, const std::string& name,
+                                                     LoadedMesh& loaded);
+
+// Readers: the mesh in the file's own axes.
+
+[[nodiscard]] bool is_stl_text(std::span<const std::byte> beginning);
+[[nodiscard]] bool is_stl(std::span<const std::byte> whole);
+[[nodiscard]] Result<LoadedMesh> read_stl(std::span<const std::byte> bytes, Beside& beside);
+
+[[nodiscard]] bool is_ply(std::span<const std::byte> beginning);
+[[nodiscard]] Result<LoadedMesh> read_ply(std::span<const std::byte> bytes, Beside& beside);
+
+[[nodiscard]] bool is_obj(std::span<const std::byte> beginning);
+[[nodiscard]] bool has_obj();
+[[nodiscard]] Result<LoadedMesh> read_obj(std::span<const std::byte> bytes, Beside& beside);
+
+[[nodiscard]] bool is_glb(std::span<const std::byte> beginning);
+[[nodiscard]] bool is_gltf(std::span<const std::byte> beginning);
+[[nodiscard]] bool has_gltf();
+[[nodiscard]] Result<LoadedMesh> read_gltf(std::span<const std::byte> bytes, Beside& beside);
+
+/// Of those by which a beginning is known.
+[[nodiscard]] std::optional<FileFormat> detect(std::span<const std::byte> beginning);
+
+/// A mesh as a scene of one grid. `name`: of the grid.
+[[nodiscard]] Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& options,
+                                                  const std::string& name, Threads threads, const Progress& progress);
+
+}  // namespace quoin::triangles

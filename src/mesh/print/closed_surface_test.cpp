@@ -1,0 +1,180 @@
+#include <quoin/mesh/closed_surface.h>
+
+#include <array>
+#include <cmath>
+#include <map>
+#include <random>
+#include <tuple>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include "mesh/print/corner_sheets.h"
+
+namespace quoin {
+namespace {
+
+using Place = std::tuple<float, float, float>;
+
+Place place_of(const Vec3& v) {
+  return {v.x, v.y, v.z};
+}
+
+BlockyTriangles surface_of(const Grid& grid) {
+  auto surface = closed_surface(grid);
+  if (!surface) {
+    ADD_FAILURE() << to_string(surface.error());
+    return {};
+  }
+  return std::move(*surface);
+}
+
+struct Soundness {
+  std::size_t bad_edges = 0;     ///< not in two triangles, once in each direction
+  std::size_t bad_vertices = 0;  ///< without one fan of triangles around them
+  std::size_t flat = 0;          ///< triangles without an area
+  double volume = 0.0;
+};
+
+/// What somebody finds who joins vertices of one place.
+Soundness soundness_of(const BlockyTriangles& mesh) {
+  Soundness found;
+  std::map<Place, std::uint32_t> numbers;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    std::array<std::uint32_t, 3> triangle{};
+    std::array<DVec3, 3> corner{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3& at = mesh.positions[mesh.indices[i + k]];
+      triangle[k] = numbers.try_emplace(place_of(at), static_cast<std::uint32_t>(numbers.size())).first->second;
+      corner[k] = DVec3(at);
+    }
+    found.volume += glm::dot(corner[0], glm::cross(corner[1], corner[2])) / 6.0;
+    found.flat += glm::length(glm::cross(corner[1] - corner[0], corner[2] - corner[0])) < 1e-6 ? 1 : 0;
+    triangles.push_back(triangle);
+  }
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> uses;
+  // Around each vertex, from each neighbour to the next.
+  std::map<std::uint32_t, std::map<std::uint32_t, std::uint32_t>> next;
+  for (const auto& t : triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      ++uses[{t[k], t[(k + 1) % 3]}];
+      next[t[k]][t[(k + 1) % 3]] = t[(k + 2) % 3];
+    }
+  }
+  for (const auto& [edge, count] : uses) {
+    const auto back = uses.find({edge.second, edge.first});
+    if (count != 1 || back == uses.end() || back->second != 1) ++found.bad_edges;
+  }
+  for (const auto& [vertex, ring] : next) {
+    std::size_t steps = 0;
+    std::uint32_t at = ring.begin()->first;
+    do {
+      const auto following = ring.find(at);
+      if (following == ring.end()) break;
+      at = following->second;
+      ++steps;
+    } while (at != ring.begin()->first && steps <= ring.size());
+    if (steps != ring.size()) ++found.bad_vertices;
+  }
+  return found;
+}
+
+void expect_sound(const Grid& grid, double volume_error = 0.0) {
+  const Soundness found = soundness_of(surface_of(grid));
+  EXPECT_EQ(found.bad_edges, 0U);
+  EXPECT_EQ(found.bad_vertices, 0U);
+  EXPECT_EQ(found.flat, 0U);
+  EXPECT_NEAR(found.volume, static_cast<double>(grid.voxel_count()), 1e-3 + volume_error);
+}
+
+TEST(ClosedSurface, of_a_voxel_is_a_cube) {
+  Grid grid;
+  grid.set({5, -3, 7}, 2);
+  const BlockyTriangles mesh = surface_of(grid);
+  EXPECT_EQ(mesh.positions.size(), 24U);
+  EXPECT_EQ(mesh.indices.size(), 36U);
+  EXPECT_EQ(mesh.types, std::vector<VoxelType>(24, 2));
+  expect_sound(grid);
+}
+
+TEST(ClosedSurface, goes_across_chunks_without_a_seam) {
+  Grid grid;
+  grid.fill_box({IVec3(-3), IVec3(70, 66, 5)}, 1);
+  grid.fill_box({IVec3(0, 70, 0), IVec3(3, 72, 2)}, 2);
+  expect_sound(grid);
+  EXPECT_EQ(surface_of(grid).indices.size(),
+            6U * static_cast<std::size_t>(2 * (73 * 69 + 73 * 8 + 69 * 8) + 2 * (6 + 6 + 4)));
+}
+
+TEST(ClosedSurface, is_parted_where_voxels_touch_by_an_edge_or_a_corner) {
+  Grid edge;
+  edge.set({0, 0, 0}, 1);
+  edge.set({1, 1, 0}, 1);
+  expect_sound(edge, 0.1);
+  Grid corner;
+  corner.set({0, 0, 0}, 1);
+  corner.set({1, 1, 1}, 1);
+  expect_sound(corner, 0.1);
+  // The edge of two voxels that are joined above and below it: no way of giving corners to sides parts it.
+  Grid joined;
+  joined.fill_box({IVec3(0), IVec3(2, 2, 3)}, 1);
+  joined.set({1, 0, 1}, kAir);
+  joined.set({0, 1, 1}, kAir);
+  expect_sound(joined, 0.1);
+}
+
+TEST(ClosedSurface, is_manifold_whatever_eight_voxels_there_are) {
+  for (unsigned solid = 1; solid < 256; ++solid) {
+    Grid grid;
+    // And as hollows in a block.
+    Grid block;
+    block.fill_box({IVec3(-1), IVec3(3)}, 1);
+    for (int cell = 0; cell < 8; ++cell) {
+      if ((solid >> cell & 1U) == 0) continue;
+      const IVec3 at(cell & 1, cell >> 1 & 1, cell >> 2);
+      grid.set(at, 1);
+      block.set(at, kAir);
+    }
+    for (const Grid* each : {&grid, &block}) {
+      const Soundness found = soundness_of(surface_of(*each));
+      EXPECT_EQ(found.bad_edges, 0U) << solid;
+      EXPECT_EQ(found.bad_vertices, 0U) << solid;
+      EXPECT_EQ(found.flat, 0U) << solid;
+      EXPECT_NEAR(found.volume, static_cast<double>(each->voxel_count()), 0.4) << solid;
+    }
+  }
+}
+
+TEST(ClosedSurface, is_manifold_of_any_voxels) {
+  for (const unsigned percent : {10U, 30U, 50U, 70U, 90U}) {
+    std::mt19937 random(percent);
+    Grid grid;
+    grid.edit({IVec3(58), IVec3(72)},
+              [&](IVec3, VoxelType) { return static_cast<VoxelType>(random() % 100 < percent); });
+    const Soundness found = soundness_of(surface_of(grid));
+    EXPECT_EQ(found.bad_edges, 0U) << percent;
+    EXPECT_EQ(found.bad_vertices, 0U) << percent;
+    EXPECT_EQ(found.flat, 0U) << percent;
+  }
+}
+
+TEST(ClosedSurface, moves_only_what_touches) {
+  const auto& offsets = print::corner_offsets();
+  for (unsigned solid : {0b1U, 0b11U, 0b1111U, 0b111U, 0b10111U, 0b11111110U}) {
+    for (const Vec3& offset : offsets[solid]) EXPECT_EQ(offset, Vec3(0.0F)) << solid;
+  }
+  // Two voxels by a corner: each vertex a hundredth into its own.
+  const Vec3 into = offsets[0b10000001][print::corner_face(0, 0)];
+  EXPECT_NEAR(glm::length(into), kApart, 1e-6F);
+  EXPECT_LT(into.x, 0.0F);
+}
+
+TEST(ClosedSurface, refuses_what_is_too_far) {
+  Grid grid;
+  grid.set({70'000, 0, 0}, 1);
+  EXPECT_EQ(closed_surface(grid).error().code, ErrorCode::LimitExceeded);
+}
+
+}  // namespace
+}  // namespace quoin
