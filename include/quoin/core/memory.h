@@ -11,9 +11,9 @@ namespace quoin {
 
 /// From now on each large block (of 32 KiB or more) that this process frees goes back to the system at once, so that
 /// what is resident follows what is used: a streamed world keeps its budget by it, and takes a fifth more without. It
-/// is a setting of the whole process, for programs that stream worlds: call it first in `main`. The price is the system's
-/// time for new pages, some 8 % of a flight's. False, and nothing is changed, where the C library is not glibc; no
-/// effect where another allocator took its place. See docs/performance.md, "Worlds larger than memory".
+/// is a setting of the whole process, for programs that stream worlds: call it first in `main`. The price is time for
+/// new pages, 8 to 20 % of a flight's. False, and nothing is changed, where the C library is not glibc; no effect where
+/// another allocator took its place. See docs/performance.md, "Worlds larger than memory".
 bool return_freed_memory();
 
 }  // namespace quoin
