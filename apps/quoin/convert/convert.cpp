@@ -187,6 +187,10 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   Stopwatch watch;
   LoadOptions load = options.common.load;
   load.keep_source = !format.is_mesh || options.animate;
+  constexpr std::size_t kTypesOfVox = 255;
+  if (format.format == FileFormat::Vox) {
+    load.mesh.max_types = std::min(load.mesh.max_types.value_or(kTypesOfVox), kTypesOfVox);
+  }
   auto loaded = [&] {
     ProgressBar bar(!options.is_one_of_many);
     return load_scene(options.common.input, load, options.common.threads, bar.listener("reading"));
