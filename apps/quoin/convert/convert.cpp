@@ -39,6 +39,8 @@ Result<MeshPart> part_for_printing(const Scene& scene, GridHandle grid, MeshStat
   stats.faces_total += 6 * scene.grids()[grid].grid.voxel_count();
   stats.faces_visible += quads;
   stats.quads += quads;
+  stats.triangles += static_cast<std::int64_t>(surface->indices.size() / 3);
+  stats.vertices += static_cast<std::int64_t>(surface->positions.size());
   BlockyMesh mesh;
   mesh.surfaces[0] = std::move(*surface);
   return mesh_part({}, std::move(mesh));
