@@ -561,6 +561,7 @@ TEST_F(Tool, InfoAndRenderReadStandardInput) {
 
 TEST_F(Tool, ConvertReadsAndWritesStandardStreams) {
   ASSERT_EQ(run("convert tiny.vox tiny.glb").status, 0);
+  std::ofstream(folder_.file("nothing.txt")) << "of no format";
   const ToolRun through = shell("'" QUOIN_TOOL "' convert - - --to glb < tiny.vox > streamed.glb");
   EXPECT_EQ(through.status, 0);
   EXPECT_EQ(through.err, "");
@@ -568,7 +569,7 @@ TEST_F(Tool, ConvertReadsAndWritesStandardStreams) {
   EXPECT_EQ(shell("'" QUOIN_TOOL "' convert - named.glb --from vox < tiny.vox").status, 0);
   for (const auto& [arguments, error] : std::vector<std::array<std::string, 2>>{
            {"convert - x.glb --from nifti < tiny.vox", "quoin: standard input: is vox, not nifti\n"},
-           {"convert - x.glb < tiny.glb", "quoin: standard input: not a file of any format that Quoin reads"},
+           {"convert - x.glb < nothing.txt", "quoin: standard input: not a file of any format that Quoin reads"},
            {"convert tiny.vox -", "quoin: OUT is standard output: --to says as what"},
            {"convert tiny.vox - --to obj", "quoin: .obj is several files, and standard output is one\n"},
            {"convert tiny.vox - --to glb --json", "quoin: --json prints on standard output, where OUT goes\n"},

@@ -4,8 +4,8 @@ namespace quoin::tool {
 
 namespace {
 
-constexpr const char* kNames[] = {"--size",       "--voxel",  "--solid", "--surface", "--field",
-                                  "--separating", "--parity", "--band",  "--input-up"};
+constexpr const char* kNames[] = {"--size",       "--voxel",  "--solid", "--surface",     "--field",
+                                  "--separating", "--parity", "--band",  "--max-colours", "--input-up"};
 
 }  // namespace
 
@@ -35,6 +35,11 @@ void add_mesh_input_options(CLI::App& command, MeshInputTexts& texts, MeshLoadOp
       ->group(kGroup);
   command.add_option("--band", options.band, "Of --field: how far distances are kept, in voxels (default 8)")
       ->check(CLI::Range(1.0, 64.0))
+      ->group(kGroup);
+  command
+      .add_option("--max-colours", options.max_types,
+                  "Colours to tell apart; near ones become one (default: as many as OUT holds)")
+      ->check(CLI::Range(1, 65'535))
       ->group(kGroup);
   command
       .add_option("--input-up", texts.up, "Which axis of the file points up: y or z (default y; z of .stl and .ply)")

@@ -19,7 +19,7 @@ struct MeshInputTexts {
   std::string up;
 };
 
-/// Adds --size, --voxel, --solid, --surface, --field, --separating, --parity, --band and --input-up.
+/// Adds --size, --voxel, --solid, --surface, --field, --separating, --parity, --band, --max-colours and --input-up.
 void add_mesh_input_options(CLI::App& command, MeshInputTexts& texts, MeshLoadOptions& options);
 
 /// Reads those that were given; returns what is wrong with them, or "".

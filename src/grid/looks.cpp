@@ -1,5 +1,10 @@
 #include "grid/looks.h"
 
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <numeric>
+#include <queue>
 #include <utility>
 
 #include <quoin/core/assert.h>
@@ -13,57 +18,145 @@ std::uint64_t key_of(Rgba8 colour, std::uint32_t material) {
          std::uint64_t{colour.b} << 8 | colour.a;
 }
 
-// To the middle of what has the same first bits.
-std::uint8_t rounded(std::uint8_t channel, int bits_lost) {
-  if (bits_lost == 0) return channel;
-  const unsigned low = (1U << bits_lost) - 1U;
-  return static_cast<std::uint8_t>((channel & ~low) | (low >> 1));
+using Channels = std::array<int, 4>;
+
+Channels channels_of(Rgba8 colour) {
+  return {colour.r, colour.g, colour.b, colour.a};
 }
 
-Rgba8 rounded(Rgba8 colour, int bits_lost) {
-  return {rounded(colour.r, bits_lost), rounded(colour.g, bits_lost), rounded(colour.b, bits_lost), colour.a};
-}
+/// Looks that become one: a stretch of a list.
+struct Group {
+  std::size_t first = 0;
+  std::size_t end = 0;
+  std::size_t channel = 0;  // in which they differ most
+  std::int64_t spread = 0;  // how much, by how many voxels
+
+  bool operator<(const Group& other) const {
+    return spread != other.spread ? spread < other.spread : first > other.first;
+  }
+};
 
 }  // namespace
 
 std::uint32_t Looks::number_of(Rgba8 colour, std::uint32_t material) {
   const auto [known, is_new] =
       numbers_.try_emplace(key_of(colour, material), static_cast<std::uint32_t>(looks_.size()));
-  if (is_new) looks_.push_back({colour, material});
+  if (is_new) looks_.push_back({colour, material, 0});
+  ++looks_[known->second].voxels;
   return known->second;
 }
 
-Result<std::vector<VoxelType>> Looks::add_to(VoxelRegistry& types, std::span<const VoxelProperties> materials,
-                                             std::vector<std::string>& warnings) const {
-  constexpr int kMostLost = 4;
-  const std::size_t first = types.size();
-  const std::size_t room = kMaxVoxelTypes + 1 - first;
-  for (int lost = 0; lost <= kMostLost; ++lost) {
-    std::unordered_map<std::uint64_t, VoxelType> by_key;
-    std::vector<VoxelType> found;
-    found.reserve(looks_.size());
-    for (const Look& look : looks_) {
-      const auto next = static_cast<VoxelType>(first + by_key.size());
-      found.push_back(by_key.try_emplace(key_of(rounded(look.colour, lost), look.material), next).first->second);
-      if (by_key.size() > room) break;
+Result<std::vector<Rgba8>> Looks::reduced(std::size_t most) const {
+  std::vector<Rgba8> colours;
+  for (const Look& look : looks_) colours.push_back(look.colour);
+  if (looks_.size() <= most) return colours;
+  // Glass and what is opaque are never one.
+  const auto is_opaque = [](const Look& look) { return look.colour.a == 255; };
+  std::vector<std::uint32_t> order(looks_.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return std::pair(looks_[a].material, is_opaque(looks_[a])) < std::pair(looks_[b].material, is_opaque(looks_[b]));
+  });
+  const auto group_of = [&](std::size_t first, std::size_t end) {
+    Channels low{255, 255, 255, 255};
+    Channels high{};
+    std::int64_t voxels = 0;
+    for (std::size_t i = first; i < end; ++i) {
+      const Channels channels = channels_of(looks_[order[i]].colour);
+      for (std::size_t c = 0; c < channels.size(); ++c) {
+        low[c] = std::min(low[c], channels[c]);
+        high[c] = std::max(high[c], channels[c]);
+      }
+      voxels += looks_[order[i]].voxels;
     }
-    if (by_key.size() > room) continue;
-    if (lost > 0) {
-      warnings.push_back("its " + std::to_string(looks_.size()) + " colours were rounded to " +
-                         std::to_string(by_key.size()) + ", of " + std::to_string(8 - lost) + " bits a channel");
+    Group group{first, end};
+    for (std::size_t c = 1; c < low.size(); ++c) {
+      if (high[c] - low[c] > high[group.channel] - low[group.channel]) group.channel = c;
     }
-    for (std::size_t i = 0; i < looks_.size(); ++i) {
-      if (found[i] < types.size()) continue;
-      VoxelProperties type = materials[looks_[i].material];
-      type.colour = rounded(looks_[i].colour, lost);
-      type.visibility = type.colour.a < 255 ? Visibility::Transparent : Visibility::Opaque;
-      const auto added = types.add(std::move(type));
-      if (!added) return added.error();
-      QUOIN_ASSERT(*added == found[i], "types are numbered as they come");
+    const std::int64_t extent = high[group.channel] - low[group.channel];
+    // Large differences count for more than many voxels.
+    group.spread =
+        extent * extent * (1 + static_cast<std::int64_t>(std::bit_width(static_cast<std::uint64_t>(voxels))));
+    return group;
+  };
+  std::priority_queue<Group> groups;
+  for (std::size_t first = 0; first < order.size();) {
+    std::size_t end = first;
+    const Look& one = looks_[order[first]];
+    while (end < order.size() && looks_[order[end]].material == one.material &&
+           is_opaque(looks_[order[end]]) == is_opaque(one)) {
+      ++end;
     }
-    return found;
+    groups.push(group_of(first, end));
+    first = end;
   }
-  return make_error(ErrorCode::LimitExceeded, "too many colours and materials: " + std::to_string(looks_.size()));
+  if (groups.size() > most) {
+    return make_error(ErrorCode::LimitExceeded,
+                      "too many materials for " + std::to_string(most) + " types: " + std::to_string(groups.size()));
+  }
+  while (groups.size() < most && groups.top().spread > 0) {
+    const Group group = groups.top();
+    groups.pop();
+    const auto begin = order.begin() + static_cast<std::ptrdiff_t>(group.first);
+    const auto end = order.begin() + static_cast<std::ptrdiff_t>(group.end);
+    const auto value = [&](std::uint32_t look) { return channels_of(looks_[look].colour)[group.channel]; };
+    std::stable_sort(begin, end, [&](std::uint32_t a, std::uint32_t b) { return value(a) < value(b); });
+    // Between two values next to the middle.
+    auto middle = begin + (end - begin) / 2;
+    while (middle != end && value(*middle) == value(*(middle - 1))) ++middle;
+    if (middle == end) {
+      middle = begin + (end - begin) / 2;
+      while (value(*middle) == value(*(middle - 1))) --middle;
+    }
+    const auto cut = static_cast<std::size_t>(middle - order.begin());
+    groups.push(group_of(group.first, cut));
+    groups.push(group_of(cut, group.end));
+  }
+  for (; !groups.empty(); groups.pop()) {
+    const Group& group = groups.top();
+    std::array<std::uint64_t, 4> sums{};
+    std::uint64_t voxels = 0;
+    for (std::size_t i = group.first; i < group.end; ++i) {
+      const Look& look = looks_[order[i]];
+      const Channels channels = channels_of(look.colour);
+      for (std::size_t c = 0; c < sums.size(); ++c) sums[c] += static_cast<std::uint64_t>(channels[c]) * look.voxels;
+      voxels += look.voxels;
+    }
+    const auto mean = [&](std::size_t c) { return static_cast<std::uint8_t>((sums[c] + voxels / 2) / voxels); };
+    Rgba8 colour{mean(0), mean(1), mean(2), mean(3)};
+    // A mean of glass is glass.
+    if (looks_[order[group.first]].colour.a < 255) colour.a = std::min<std::uint8_t>(colour.a, 254);
+    for (std::size_t i = group.first; i < group.end; ++i) colours[order[i]] = colour;
+  }
+  return colours;
+}
+
+Result<std::vector<VoxelType>> Looks::add_to(VoxelRegistry& types, std::span<const VoxelProperties> materials,
+                                             std::vector<std::string>& warnings, std::size_t most) const {
+  const std::size_t first = types.size();
+  most = std::min(most, kMaxVoxelTypes + 1 - first);
+  const auto colours = reduced(most);
+  if (!colours) return colours.error();
+  std::unordered_map<std::uint64_t, VoxelType> by_key;
+  std::vector<VoxelType> found;
+  found.reserve(looks_.size());
+  for (std::size_t i = 0; i < looks_.size(); ++i) {
+    const auto next = static_cast<VoxelType>(first + by_key.size());
+    const auto [known, is_new] = by_key.try_emplace(key_of((*colours)[i], looks_[i].material), next);
+    found.push_back(known->second);
+    if (!is_new) continue;
+    VoxelProperties type = materials[looks_[i].material];
+    type.colour = (*colours)[i];
+    type.visibility = type.colour.a < 255 ? Visibility::Transparent : Visibility::Opaque;
+    const auto added = types.add(std::move(type));
+    if (!added) return added.error();
+    QUOIN_ASSERT(*added == next, "types are numbered as they come");
+  }
+  if (looks_.size() > most) {
+    warnings.push_back("its " + std::to_string(looks_.size()) + " colours were reduced to " +
+                       std::to_string(by_key.size()));
+  }
+  return found;
 }
 
 }  // namespace quoin

@@ -15,22 +15,28 @@ namespace quoin {
 /// Numbers the colours that voxels have, each with the material that it is of, and makes types of them.
 class Looks {
  public:
-  /// The number of a colour of a material, the same for the same two; they count up from 0.
+  /// The number of a colour of a material, the same for the same two; they count up from 0. Each call counts as one
+  /// voxel of it.
   [[nodiscard]] std::uint32_t number_of(Rgba8 colour, std::uint32_t material);
   [[nodiscard]] std::size_t size() const { return looks_.size(); }
 
   /// Adds a type for each look and returns them by number: `materials` of the look's, its colour, transparent where
-  /// alpha is below 255. Where there are more looks than there is room for, the last bits of all colours are rounded,
-  /// and `warnings` gets a line.
-  /// Errors: LimitExceeded when four bits are not enough. Requires: every look's material is one of `materials`.
+  /// alpha is below 255. Where there are more than `most`, or than there is room for, near ones of one material become
+  /// one, their mean by voxels, and `warnings` gets a line.
+  /// Errors: LimitExceeded where materials alone are too many. Requires: every look's material is one of `materials`.
+  /// Source: P. Heckbert, "Color Image Quantization for Frame Buffer Display" (1982): median cut.
   [[nodiscard]] Result<std::vector<VoxelType>> add_to(VoxelRegistry& types, std::span<const VoxelProperties> materials,
-                                                      std::vector<std::string>& warnings) const;
+                                                      std::vector<std::string>& warnings,
+                                                      std::size_t most = kMaxVoxelTypes) const;
 
  private:
   struct Look {
     Rgba8 colour;
     std::uint32_t material;
+    std::uint32_t voxels;
   };
+  /// The colours of looks, some of which are the same afterwards. Errors: LimitExceeded.
+  [[nodiscard]] Result<std::vector<Rgba8>> reduced(std::size_t most) const;
   std::vector<Look> looks_;
   std::unordered_map<std::uint64_t, std::uint32_t> numbers_;  // by colour and material
 };

@@ -197,9 +197,27 @@ TEST(SurfaceColours, are_rounded_where_there_are_too_many) {
   const Made made = surface_of(mesh);
   EXPECT_EQ(made.grid.voxel_count(), kWide * kWide);
   EXPECT_LE(made.types.size(), kMaxVoxelTypes + 1);
-  EXPECT_GT(made.types.size(), 10'000U);
+  EXPECT_GT(made.types.size(), 60'000U);
   ASSERT_EQ(made.warnings.size(), 1U);
-  EXPECT_NE(made.warnings[0].find("rounded"), std::string::npos);
+  EXPECT_NE(made.warnings[0].find("reduced"), std::string::npos);
+}
+
+TEST(SurfaceColours, are_as_few_as_is_asked) {
+  TriangleMesh mesh = square();
+  mesh.textures.push_back(texture(kSide, [](int x, int y) {
+    return Rgba8{static_cast<std::uint8_t>(x < 8 ? x : 200 + x), static_cast<std::uint8_t>(y * 2), 0, 255};
+  }));
+  mesh.textures[0].is_smooth = false;
+  VoxelRegistry types;
+  VoxelizeOptions options;
+  options.solid = SolidVoxels::None;
+  options.max_types = 2;
+  const auto made = voxelize(mesh, options, types);
+  ASSERT_TRUE(made);
+  ASSERT_EQ(types.size(), 3U);
+  EXPECT_EQ(made->warnings.size(), 1U);
+  EXPECT_EQ(types[made->grid.get({0, 0, 0})].colour, (Rgba8{4, 15, 0, 255}));
+  EXPECT_EQ(types[made->grid.get({15, 0, 15})].colour, (Rgba8{212, 15, 0, 255}));
 }
 
 }  // namespace

@@ -215,7 +215,7 @@ struct Types {
 
 /// Numbers looks in the order of chunks and voxels; each `Coloured::material` becomes the look's number.
 Result<Types> find_types(const SurfaceColours& colours, std::vector<Found>& found, VoxelRegistry& registry,
-                         std::vector<std::string>& warnings) {
+                         std::size_t most, std::vector<std::string>& warnings) {
   std::vector<VoxelProperties> materials = colours.materials();
   // Of what is deep: of the one material, or of none.
   const std::uint32_t deep_material = colours.is_plain() ? 0 : static_cast<std::uint32_t>(materials.size());
@@ -228,7 +228,7 @@ Result<Types> find_types(const SurfaceColours& colours, std::vector<Found>& foun
   }
   std::uint32_t deep = 0;
   if (has_deep) deep = looks.number_of(colours.mean(), deep_material);
-  auto types = looks.add_to(registry, materials, warnings);
+  auto types = looks.add_to(registry, materials, warnings, most);
   if (!types) return types.error();
   return Types{has_deep ? (*types)[deep] : kAir, std::move(*types)};
 }
@@ -287,7 +287,7 @@ Result<VoxelizedMesh> voxelize(const TriangleMesh& mesh, const VoxelizeOptions& 
   auto found = find_all(parts->frame, threads, part_of(progress, kLinesShare, kFoundShare),
                         [&](std::size_t i, Scratch& scratch) { return find_voxels(*parts, i, options, scratch); });
   if (!found) return found.error();
-  const auto by_look = find_types(*parts->colours, *found, types, made.warnings);
+  const auto by_look = find_types(*parts->colours, *found, types, options.max_types, made.warnings);
   if (!by_look) return by_look.error();
   std::vector<Chunk> chunks(found->size());
   parallel_for(found->size(), threads, [&](std::size_t i) { chunks[i] = types_of((*found)[i], *by_look); });
@@ -317,7 +317,7 @@ Result<FieldOfMesh> distance_field(const TriangleMesh& mesh, const DistanceField
   auto found = find_all(parts->frame, threads, part_of(progress, kLinesShare, kFoundShare),
                         [&](std::size_t i, Scratch& scratch) { return find_densities(*parts, i, own, scratch); });
   if (!found) return found.error();
-  const auto by_look = find_types(*parts->colours, *found, types, made.warnings);
+  const auto by_look = find_types(*parts->colours, *found, types, options.max_types, made.warnings);
   if (!by_look) return by_look.error();
   parallel_for(found->size(), threads, [&](std::size_t i) {
     if (auto& densities = (*found)[i].densities) densities->materials() = types_of((*found)[i], *by_look);

@@ -39,6 +39,8 @@ Result<MeshPart> part_for_printing(const Scene& scene, GridHandle grid, MeshStat
   stats.faces_total += 6 * scene.grids()[grid].grid.voxel_count();
   stats.faces_visible += quads;
   stats.quads += quads;
+  stats.triangles += static_cast<std::int64_t>(surface->indices.size() / 3);
+  stats.vertices += static_cast<std::int64_t>(surface->positions.size());
   BlockyMesh mesh;
   mesh.surfaces[0] = std::move(*surface);
   return mesh_part({}, std::move(mesh));
@@ -187,6 +189,10 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   Stopwatch watch;
   LoadOptions load = options.common.load;
   load.keep_source = !format.is_mesh || options.animate;
+  constexpr std::size_t kTypesOfVox = 255;
+  if (format.format == FileFormat::Vox) {
+    load.mesh.max_types = std::min(load.mesh.max_types.value_or(kTypesOfVox), kTypesOfVox);
+  }
   auto loaded = [&] {
     ProgressBar bar(!options.is_one_of_many);
     return load_scene(options.common.input, load, options.common.threads, bar.listener("reading"));

@@ -50,9 +50,10 @@ struct MeshLoadOptions {
   std::optional<double> voxel_size = std::nullopt;  ///< or of this size, in the file's unit
   SurfaceVoxels surface = SurfaceVoxels::Separating6;
   SolidVoxels solid = SolidVoxels::Winding;
-  bool as_field = false;                    ///< a field of distances instead, of what is solid
-  float band = 8.0F;                        ///< of the field, in samples
-  std::optional<UpAxis> up = std::nullopt;  ///< without: Z of STL and PLY, Y of all others
+  bool as_field = false;                                ///< a field of distances instead, of what is solid
+  float band = 8.0F;                                    ///< of the field, in samples
+  std::optional<std::size_t> max_types = std::nullopt;  ///< colours that are told apart, at most
+  std::optional<UpAxis> up = std::nullopt;              ///< without: Z of STL and PLY, Y of all others
 };
 inline constexpr int kDefaultMeshSize = 128;
 

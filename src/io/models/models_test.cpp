@@ -303,7 +303,7 @@ TEST(Models, NodesThatMayBePlacedAre) {
   }
 }
 
-TEST(Models, TooManyColoursAreRoundedWithAWord) {
+TEST(Models, TooManyColoursAreReducedWithAWord) {
   ModelBuilder builder;
   builder.begin({});
   for (int i = 0; i < 70'000; ++i) {
@@ -315,8 +315,8 @@ TEST(Models, TooManyColoursAreRoundedWithAWord) {
   ASSERT_TRUE(loaded) << to_string(loaded.error());
   EXPECT_EQ(loaded->scene.voxel_count(), 70'000);
   ASSERT_EQ(loaded->warnings.size(), 1U);
-  EXPECT_NE(loaded->warnings[0].find("70000 colours were rounded"), std::string::npos);
-  EXPECT_LT(loaded->scene.types.size(), 65'535U);
+  EXPECT_NE(loaded->warnings[0].find("70000 colours were reduced"), std::string::npos);
+  EXPECT_EQ(loaded->scene.types.size(), kMaxVoxelTypes + 1);
 }
 
 TEST(Models, AMapOfSpansIsSolidBelowItsSurface) {

@@ -154,8 +154,9 @@ Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& op
   instance.name = name;
   instance.voxel_size = lattice->voxel_size;
   instance.position = lattice->origin;
+  const std::size_t most = options.max_types.value_or(kMaxVoxelTypes);
   if (options.as_field) {
-    DistanceFieldOptions wanted{*lattice, options.solid, options.band};
+    const DistanceFieldOptions wanted{*lattice, options.solid, options.band, most};
     auto made = distance_field(loaded.mesh, wanted, scene.scene.types, threads, progress);
     if (!made) return made.error();
     if (made->field.chunk_count() == 0) scene.warnings.emplace_back("the mesh encloses nothing");
@@ -163,7 +164,8 @@ Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& op
     instance.position += DVec3(0.5 * lattice->voxel_size);
     scene.warnings.insert(scene.warnings.end(), made->warnings.begin(), made->warnings.end());
   } else {
-    auto made = voxelize(loaded.mesh, {*lattice, options.surface, options.solid}, scene.scene.types, threads, progress);
+    auto made =
+        voxelize(loaded.mesh, {*lattice, options.surface, options.solid, most}, scene.scene.types, threads, progress);
     if (!made) return made.error();
     if (made->grid.voxel_count() == 0) scene.warnings.emplace_back("no voxel came of the mesh");
     grid.grid = std::move(made->grid);

@@ -379,5 +379,41 @@ TEST(Triangles, become_scenes_at_their_own_size) {
   EXPECT_FALSE(load_scene(bytes_of("solid nothing\nendsolid nothing\n")));
 }
 
+TEST(Triangles, of_the_corpus_are_read_as_scenes) {
+  std::size_t read = 0;
+  for (const auto& entry : fs::directory_iterator(fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "triangles")) {
+    const auto loaded = load_scene(entry.path());
+    const auto format = detect_format(entry.path());
+    ASSERT_TRUE(format && *format) << entry.path();
+    EXPECT_EQ(loaded.has_value(), reads(**format)) << entry.path() << (loaded ? "" : to_string(loaded.error()));
+    if (!loaded) continue;
+    EXPECT_GT(loaded->scene.voxel_count(), 0) << entry.path();
+    ++read;
+  }
+  EXPECT_GE(read, 6U);
+}
+
+TEST(Triangles, of_real_files_have_their_counts) {
+  const fs::path folder = fs::path(QUOIN_SOURCE_DIR).parent_path() / "shared" / "data" / "mesh";
+  if (!fs::exists(folder)) GTEST_SKIP() << "the files are not here";
+  const fs::path models = folder / "alecjacobson+common-3d-test-models";
+  const fs::path lox = folder / "LukasKalbertodt+lox";
+  for (const auto& [path, triangles] : std::vector<std::pair<fs::path, std::size_t>>{
+           {models / "data__stanford-bunny.obj", 69'451},
+           {models / "data__spot.obj", 5'856},
+           {models / "data__teapot.obj", 6'320},
+           {folder / "Forceflow+cuda_voxelizer" / "test_models__bunny.OBJ", 5'110},
+           {lox / "old_code__tests__files__ply__sphere_bbe.ply", 768},
+           {lox / "old_code__tests__files__ply__sphere_ascii.ply", 768},
+           {lox / "old_code__tests__files__stl__sphere_binary.stl", 768},
+           {lox / "old_code__tests__files__stl__sphere_ascii.stl", 768}}) {
+    const auto format = detect_format(path);
+    if (!format || !*format || !reads(**format)) continue;
+    const auto loaded = read_mesh(path);
+    ASSERT_TRUE(loaded) << to_string(loaded.error());
+    EXPECT_EQ(loaded->mesh.triangles.size(), triangles) << path;
+  }
+}
+
 }  // namespace
 }  // namespace quoin
