@@ -55,11 +55,12 @@ TEST(Formats, NamesDecideWhatIsWritten) {
   EXPECT_EQ(format_for_writing("b.c.vox")->format, FileFormat::Vox);
   EXPECT_EQ(format_for_writing("b.json")->format, FileFormat::Scene);
   EXPECT_EQ(format_for_writing("b.Quoin")->format, FileFormat::World);
+  EXPECT_EQ(format_for_writing("b.vdb")->format, FileFormat::Vdb);
   for (const char* name : {"b", "b.", "glb", ".glb", "b.glb.bak", "b.glbx"}) {
     const auto format = format_for_writing(name);
     ASSERT_FALSE(format) << name;
     EXPECT_EQ(format.error().code, ErrorCode::Unsupported);
-    EXPECT_NE(format.error().message.find(".glb, .gltf, .json, .obj, .ply, .quoin, .vox"), std::string::npos)
+    EXPECT_NE(format.error().message.find(".glb, .gltf, .json, .obj, .ply, .quoin, .vdb, .vox"), std::string::npos)
         << format.error().message;
   }
 }
