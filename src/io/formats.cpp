@@ -78,6 +78,7 @@ std::string extensions_with(bool FormatInfo::*ability) {
   for (const FormatInfo& info : kFormats) {
     if (!(info.*ability)) continue;
     sorted.push_back(info.extension);
+    if (ability != &FormatInfo::readable) continue;  // kin are read alone
     for (std::string_view rest = info.also; !rest.empty();) {
       const std::size_t end = std::min(rest.find(' '), rest.size());
       sorted.push_back(rest.substr(0, end));
