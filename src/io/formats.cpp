@@ -125,7 +125,8 @@ Error unrecognised(std::span<const std::byte> bytes) {
   }
   if (heights::is_png(bytes)) {
     return {ErrorCode::BadFormat,
-            "a picture; what it shows may be heights: --heights grey, mapbox or terrarium says so",
+            "not a file of any format that Quoin reads, but a picture, which --heights grey, mapbox or terrarium reads "
+            "as heights",
             {},
             {}};
   }

@@ -55,6 +55,7 @@ TEST(Formats, NamesDecideWhatIsWritten) {
   EXPECT_EQ(format_for_writing("b.c.vox")->format, FileFormat::Vox);
   EXPECT_EQ(format_for_writing("b.json")->format, FileFormat::Scene);
   EXPECT_EQ(format_for_writing("b.Quoin")->format, FileFormat::World);
+  EXPECT_EQ(format_for_writing("b.vdb")->format, FileFormat::Vdb);
   for (const char* name : {"b", "b.", "glb", ".glb", "b.glb.bak", "b.glbx"}) {
     const auto format = format_for_writing(name);
     ASSERT_FALSE(format) << name;

@@ -161,8 +161,9 @@ TEST(Vdb, WhatIsWrittenIsReadAgain) {
     for (const IVec3 place : was.field.chunks()) {
       const DensityChunk& a = *is.field.find_chunk(place);
       const DensityChunk& b = *was.field.find_chunk(place);
-      for (int i = 0; i < static_cast<int>(kChunkVoxels); ++i) {
-        const IVec3 at{i & 63, i >> 6 & 63, i >> 12};
+      for (std::size_t i = 0; i < kChunkVoxels; ++i) {
+        const auto n = static_cast<int>(i);
+        const IVec3 at{n & 63, n >> 6 & 63, n >> 12};
         ASSERT_EQ(a.get(at), b.get(at)) << before.name << " " << at.x << ", " << at.y << ", " << at.z;
       }
     }
