@@ -36,7 +36,6 @@ quoin::Status run(const char* output) {
   if (!field) return field.error();
   const std::int64_t bite = field->field.remove_sphere({112.0, 16.0, 64.0}, 20.0, 4.0);
   std::printf("a bite out of the field changed %lld samples\n", static_cast<long long>(bite));
-
   // For printing: each edge between two triangles, half a millimetre a voxel, +Z up.
   auto surface = quoin::closed_surface(voxels->grid);
   if (!surface) return surface.error();
@@ -53,7 +52,6 @@ quoin::Status run(const char* output) {
 }
 
 }  // namespace
-
 int main(int argc, char** argv) {
   const quoin::Status done = run(argc > 1 ? argv[1] : "ring.3mf");
   if (!done) std::fprintf(stderr, "%s\n", quoin::to_string(done.error()).c_str());

@@ -692,7 +692,7 @@ TEST_F(Tool, WrongUsageNamesTheArgument) {
       {"convert tiny.vox", "quoin: OUT is required"},
       {"convert tiny.vox a.vox b.vox", "quoin: 3 files; several are converted by --to FORMAT, --out-dir DIR"},
       {"convert tiny.vox a.glb --out-dir x", "quoin: --out-dir needs --to"},
-      {"convert tiny.vox --to xyz", "quoin: --to: the name must end in one of .glb"},
+      {"convert tiny.vox --to xyz", "quoin: --to: the name must end in one of .3mf"},
       {"convert tiny.vox --to vox --no-ao", "quoin: --mesher, --no-ao"},
       {"", "quoin: no command; there are info, convert"},
       {"bogus", "quoin: no command \"bogus\"; there are info, convert"},

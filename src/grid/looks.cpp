@@ -48,6 +48,7 @@ std::uint32_t Looks::number_of(Rgba8 colour, std::uint32_t material) {
 
 Result<std::vector<Rgba8>> Looks::reduced(std::size_t most) const {
   std::vector<Rgba8> colours;
+  colours.reserve(looks_.size());
   for (const Look& look : looks_) colours.push_back(look.colour);
   if (looks_.size() <= most) return colours;
   // Glass and what is opaque are never one.

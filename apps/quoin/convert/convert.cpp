@@ -14,9 +14,9 @@
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
 
+#include "convert/mesh_input.h"
 #include "field_occlusion.h"
 #include "interrupt.h"
-#include "mesh_input.h"
 #include "output.h"
 #include "output_files.h"
 #include "parse.h"

@@ -444,6 +444,7 @@ class GltfReader {
       glm::dmat4 world_from_parent;
     };
     std::vector<Waiting> waiting;
+    waiting.reserve(roots.size());
     for (const int root : roots) waiting.push_back({root, glm::dmat4(1.0)});
     std::reverse(waiting.begin(), waiting.end());
     while (!waiting.empty()) {

@@ -268,7 +268,8 @@ class PlyReader {
     }
     const std::size_t at = values_.position();
     const double count = values_.next(*property.count);
-    if (!(count >= 0.0) || count > static_cast<double>(values_.remaining() / values_.least_bytes(property.type) + 1)) {
+    const std::size_t room = values_.remaining() / values_.least_bytes(property.type);
+    if (!(count >= 0.0) || count > static_cast<double>(room + 1)) {
       return bad_at(at, "a list longer than the file");
     }
     for (auto i = static_cast<std::size_t>(count); i > 0 && !values_.failed(); --i) {

@@ -1,4 +1,4 @@
-#include "mesh_input.h"
+#include "convert/mesh_input.h"
 
 namespace quoin::tool {
 
