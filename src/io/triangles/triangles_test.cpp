@@ -257,8 +257,12 @@ TEST(Gltf, reads_sparse_strips_and_fans) {
     ASSERT_EQ(loaded.mesh.triangles.size(), 2U);
     EXPECT_EQ(loaded.mesh.positions[3], DVec3(5.0, 5.0, 0.0));
     const auto& t = loaded.mesh.triangles;
-    if (mode == 5) EXPECT_EQ(t[1], (std::array<std::uint32_t, 3>{1, 3, 2}));
-    if (mode == 6) EXPECT_EQ(t[1], (std::array<std::uint32_t, 3>{2, 3, 0}));
+    if (mode == 5) {
+      EXPECT_EQ(t[1], (std::array<std::uint32_t, 3>{1, 3, 2}));
+    }
+    if (mode == 6) {
+      EXPECT_EQ(t[1], (std::array<std::uint32_t, 3>{2, 3, 0}));
+    }
   }
 }
 
@@ -330,8 +334,12 @@ TEST(Triangles, look_for_files_below_their_folder_alone) {
   red.rgb.assign(12, 0);
   for (std::size_t i = 0; i < 12; i += 3) red.rgb[i] = 255;
   ASSERT_TRUE(write_png(red, folder.path / "red.png"));
-  if (has_jpeg()) ASSERT_TRUE(write_jpeg(red, folder.path / "below" / "red.jpg"));
-  if (has_webp()) ASSERT_TRUE(write_webp(red, folder.path / "red.webp"));
+  if (has_jpeg()) {
+    ASSERT_TRUE(write_jpeg(red, folder.path / "below" / "red.jpg"));
+  }
+  if (has_webp()) {
+    ASSERT_TRUE(write_webp(red, folder.path / "red.webp"));
+  }
   folder.write("one.obj",
                "mtllib one.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
                "usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 3/3 2/2\nusemtl c\nf 1/1 2/2 3/3\nusemtl d\nf 1/1 2/2 3/3\n");
