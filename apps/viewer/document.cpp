@@ -1,6 +1,7 @@
 #include "document.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -43,8 +44,10 @@ Status write_as_glb(const Scene& scene, const std::filesystem::path& path, const
 }
 
 Result<FileFormat> format_to_write(const std::filesystem::path& path) {
+  // Not what is for other programs alone: such a file holds more than what was read of it.
+  constexpr std::array kFormats = {FileFormat::World, FileFormat::Vox, FileFormat::Scene, FileFormat::Glb};
   const auto format = format_for_writing(path);
-  if (format && (!format->is_mesh || format->format == FileFormat::Glb)) return format->format;
+  if (format && std::ranges::find(kFormats, format->format) != kFormats.end()) return format->format;
   return make_error(ErrorCode::Unsupported,
                     "the viewer saves .quoin, .vox, .json and .glb; `quoin convert` writes the others", path.string());
 }

@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <new>
+#include <set>
 
 #include <quoin/core/parallel.h>
 #include <quoin/io/file.h>
@@ -38,11 +40,13 @@ bool is_named_to_be_read(const fs::path& file) {
   });
 }
 
-/// Files in a folder and below that can be read, or should be, in the order of their names; not those below `without`.
-/// `errors` gets the folders that cannot be read.
+/// Files in a folder and below that can be read, or should be, in the order of their names; not those below `without`,
+/// nor meshes beside models of their name, which were made of them. `errors` gets the folders that cannot be read.
 Result<std::vector<fs::path>> files_below(const fs::path& folder, const std::optional<fs::path>& without,
                                           std::vector<Error>& errors) {
   std::vector<fs::path> found;
+  std::vector<fs::path> meshes;
+  std::set<fs::path> models;  // without their extensions
   std::error_code code;
   fs::recursive_directory_iterator at(folder, code);
   for (; !code && at != fs::recursive_directory_iterator(); at.increment(code)) {
@@ -57,9 +61,14 @@ Result<std::vector<fs::path>> files_below(const fs::path& folder, const std::opt
     if (!at->is_regular_file(is_broken)) continue;
     const auto format = detect_format(at->path());
     // What cannot be opened is to be heard of; what is no format of ours is not meant.
-    if (!format || *format || is_named_to_be_read(at->path())) found.push_back(at->path());
+    if (format && !*format && !is_named_to_be_read(at->path())) continue;
+    const bool is_mesh = format && *format && format_info(**format).is_mesh;
+    (is_mesh ? meshes : found).push_back(at->path());
+    if (!is_mesh) models.insert(at->path().parent_path() / stem_of_file(at->path()));
   }
   if (code) return error_of(folder, code);
+  std::ranges::copy_if(meshes, std::back_inserter(found),
+                       [&](const fs::path& mesh) { return !models.contains(mesh.parent_path() / stem_of_file(mesh)); });
   std::sort(found.begin(), found.end());
   return found;
 }
@@ -89,7 +98,10 @@ std::vector<Task> plan(const ManyOptions& many, const std::string& extension, st
     }
     if (files->empty())
       errors.push_back(make_error(ErrorCode::CannotRead, "no file in it can be read", input.string()));
-    for (const fs::path& file : *files) add(file, file.parent_path(), file.parent_path().lexically_relative(input));
+    for (const fs::path& file : *files) {
+      const bool is_product = !many.folder && file.extension() == extension;
+      if (!is_product) add(file, file.parent_path(), file.parent_path().lexically_relative(input));
+    }
   }
   return tasks;
 }

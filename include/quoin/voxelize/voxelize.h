@@ -28,13 +28,13 @@ struct VoxelLattice {
 /// many voxels as hold it along each axis. Along the longest its outermost points are a thousandth of a voxel from the
 /// sides, so that what is flat there lies in one layer, not between two.
 ///
-/// Errors: InvalidArgument where `voxels` is not positive or the mesh has no triangle; LimitExceeded beyond 2^20.
+/// Errors: InvalidArgument where `voxels` is not positive or the mesh has no triangle; LimitExceeded beyond 2^14.
 [[nodiscard]] Result<VoxelLattice> lattice_of_size(const TriangleMesh& mesh, int voxels);
 /// A lattice whose voxels have this size and which the mesh's origin is a corner of, so that meshes of one space fit
 /// together. Its own origin is a whole number of voxels from there, at or below the mesh's least corner.
 ///
 /// Errors: InvalidArgument where the size is not positive and finite or the mesh has no triangle; LimitExceeded where
-///         its longest side has more than 2^20 voxels.
+///         its longest side has more than 2^14 voxels.
 [[nodiscard]] Result<VoxelLattice> lattice_of_voxel(const TriangleMesh& mesh, double voxel_size);
 
 /// Which voxels a surface takes.
@@ -89,7 +89,7 @@ struct VoxelizedMesh {
 /// Order:    the same voxels and types at any thread count.
 /// Memory:   some 60 bytes a triangle, 12 bytes for each voxel of the surface, 1 MiB a thread, the grid.
 /// Cost:     about 0.2 s for 70,000 triangles in 512^3 on one thread, 1 s with colours.
-/// Errors:   those of check_mesh; InvalidArgument for a lattice without a size; LimitExceeded beyond 2^20 voxels along
+/// Errors:   those of check_mesh; InvalidArgument for a lattice without a size; LimitExceeded beyond 2^14 voxels along
 ///           an axis, 2^32 crossings of lines, or types; Cancelled.
 /// Source:   the test of cube and triangle: M. Schwarz, H.-P. Seidel, "Fast Parallel Surface and Solid Voxelization on
 ///           GPUs" (2010). What separates: S. Laine, "A Topological Approach to Voxelization" (2013). The winding

@@ -22,9 +22,9 @@ namespace quoin::minecraft {
 namespace {
 
 constexpr models::FormatHolds kHolds = {
-    .extension = ".schem", .transparency = true, .materials = true, .type_names = true};
+    .extension = ".schem", .names = true, .transparency = true, .materials = true, .type_names = true};
 constexpr int kMaxEdge = 65'535;
-constexpr std::int64_t kMaxBlocks = std::int64_t{1} << 30;
+constexpr std::int64_t kMaxBlocks = (std::int64_t{1} << 30) - (std::int64_t{1} << 20);
 constexpr std::int32_t kVersion = 2;
 // The game's 1.20.1.
 constexpr std::int32_t kDataVersion = 3465;
@@ -77,6 +77,33 @@ class Blocks {
   std::vector<std::pair<std::string, Rgba8>> all_;
 };
 
+/// A type that was read of the game, or is named as one of its blocks.
+bool is_block(const VoxelProperties& type) {
+  constexpr std::string_view kGame = "minecraft:";
+  if (!type.name.starts_with(kGame) && !type.attributes.contains(kStatesAttribute)) return false;
+  const std::string_view name = std::string_view(type.name).substr(0, type.name.find('['));
+  return std::ranges::count(name, ':') == 1 && std::ranges::all_of(name, [](char c) {
+           return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') ||
+                  std::string_view("_.-/:").find(c) != std::string_view::npos;
+         });
+}
+
+/// With what block_state leaves out where the game takes something else for it: that these do not burn, and that leaves,
+/// whose distance from wood nobody knows any more, do not decay.
+BlockText as_in_game(BlockText block) {
+  const auto has = [&](std::string_view key) {
+    return std::ranges::any_of(block.properties, [&](const Property& property) { return property.first == key; });
+  };
+  constexpr std::array<std::string_view, 4> kBurning = {"minecraft:campfire", "minecraft:soul_campfire",
+                                                        "minecraft:redstone_torch", "minecraft:redstone_wall_torch"};
+  if (std::ranges::find(kBurning, block.name) != kBurning.end() && !has("lit")) {
+    block.properties.emplace_back("lit", "false");
+  }
+  if (block.name.ends_with("_leaves") && !has("persistent")) block.properties.emplace_back("persistent", "true");
+  std::ranges::sort(block.properties);
+  return block;
+}
+
 /// The blocks of a scene's types, and their numbers.
 class Palette {
  public:
@@ -84,7 +111,9 @@ class Palette {
     static_cast<void>(number_of("minecraft:air"));
     plain_.assign(types.size(), kNone);
     plain_[kAir] = 0;
+    for (std::size_t i = 1; i < types.size(); ++i) of_game_[i] = is_block(types[static_cast<VoxelType>(i)]);
   }
+  [[nodiscard]] bool is_of_game(VoxelType type) const { return of_game_[type]; }
   [[nodiscard]] std::int32_t number(VoxelType type, std::uint32_t state) {
     if (state == 0 && plain_[type] != kNone) return plain_[type];
     const std::int32_t number = number_of(text_of(type, state));
@@ -102,9 +131,7 @@ class Palette {
   }
   [[nodiscard]] std::string text_of(VoxelType type, std::uint32_t state) {
     const VoxelProperties& properties = types_[type];
-    const bool is_block =
-        properties.attributes.contains(kStatesAttribute) || properties.name.find(':') != std::string::npos;
-    if (is_block) return to_string(block_text(properties, state));
+    if (is_of_game(type)) return to_string(as_in_game(block_text(properties, state)));
     guessed_[type] = true;
     static const Blocks kPlain(plain_blocks());
     static const Blocks kGlass(glass_blocks());
@@ -117,6 +144,7 @@ class Palette {
   std::map<std::string, std::int32_t> numbers_;
   std::vector<std::int32_t> plain_;  // of types without a state
   std::vector<bool> guessed_;
+  std::vector<bool> of_game_ = std::vector<bool>(types_.size(), false);
 };
 
 /// Seven bits a byte, the lowest first; the eighth says that more is to come.
@@ -125,8 +153,9 @@ void put_varint(std::uint32_t value, std::vector<std::byte>& out) {
   out.push_back(static_cast<std::byte>(value));
 }
 
-Result<std::vector<std::byte>> blocks_of(const VoxelRegistry& types, const models::MergedGrid& merged, Palette& palette,
+Result<std::vector<std::byte>> blocks_of(const models::MergedGrid& merged, Palette& palette, std::int64_t& lost_data,
                                          const Progress& progress) {
+  const bool has_data = merged.voxels.data_count() != 0;
   const IBox& box = merged.box;
   std::vector<std::byte> blocks;
   std::vector<VoxelType> row(static_cast<std::size_t>(box.size().x));
@@ -135,9 +164,11 @@ Result<std::vector<std::byte>> blocks_of(const VoxelRegistry& types, const model
     for (int z = box.min.z; z < box.max.z; ++z) {
       models::read_voxels(merged.voxels, {box.min.x, y, z}, row);
       for (std::size_t x = 0; x < row.size(); ++x) {
-        const bool has_state = row[x] != kAir && types[row[x]].state_bits != 0;
         const IVec3 voxel{box.min.x + static_cast<int>(x), y, z};
-        const std::uint32_t state = has_state ? merged.voxels.data(voxel).state : 0;
+        const VoxelData data = has_data && row[x] != kAir ? merged.voxels.data(voxel) : VoxelData();
+        const bool is_kept = data.bytes.empty() && (data.state == 0 || palette.is_of_game(row[x]));
+        lost_data += is_kept ? 0 : 1;
+        const std::uint32_t state = palette.is_of_game(row[x]) ? data.state : 0;
         put_varint(static_cast<std::uint32_t>(palette.number(row[x], state)), blocks);
       }
     }
@@ -155,10 +186,11 @@ Result<models::ModelBytes> write_schematic(const Scene& scene, const Progress& p
   if (merged->box.empty()) return make_error(ErrorCode::Unsupported, "there are no voxels, and .schem needs some");
   const IVec3 size = merged->box.size();
   if (std::max({size.x, size.y, size.z}) > kMaxEdge || std::int64_t{size.x} * size.y > kMaxBlocks / size.z) {
-    return make_error(ErrorCode::LimitExceeded, "more than 65,535 blocks a side, or 2^30 in all");
+    return make_error(ErrorCode::LimitExceeded, "more than 65,535 blocks a side, or some 2^30 in all");
   }
   Palette palette(scene.types);
-  const auto blocks = blocks_of(scene.types, *merged, palette, progress);
+  std::int64_t lost_data = 0;
+  const auto blocks = blocks_of(*merged, palette, lost_data, progress);
   if (!blocks) return blocks.error();
   nbt::DocumentWriter out;
   out.begin("Schematic");
@@ -186,8 +218,13 @@ Result<models::ModelBytes> write_schematic(const Scene& scene, const Progress& p
     merged->warnings.push_back("types that are no blocks of the game became those of the nearest colour: " +
                                with_thousands(palette.guessed()));
   }
-  constexpr std::size_t kMost = (std::size_t{1} << 31) - 1;
-  if (out.document().size() > kMost) return make_error(ErrorCode::LimitExceeded, "more than 2 GiB of blocks");
+  if (lost_data != 0) {
+    merged->warnings.push_back("voxels whose data is left out, which .schem does not hold: " +
+                               with_thousands(lost_data));
+  }
+  // What readers take.
+  constexpr std::size_t kMost = std::size_t{1} << 30;
+  if (out.document().size() > kMost) return make_error(ErrorCode::LimitExceeded, "more than 1 GiB of blocks");
   constexpr int kLevel = 6;
   return models::ModelBytes{gzipped(out.document(), kLevel), std::move(merged->warnings)};
 }

@@ -8,8 +8,11 @@
 
 #include <glm/gtc/quaternion.hpp>
 #include <quoin/core/axis_orientation.h>
+#include <quoin/core/function_ref.h>
 #include <quoin/core/thousands.h>
 #include <quoin/grid/copy_box.h>
+
+#include "io/text.h"
 
 namespace quoin::models {
 
@@ -38,7 +41,7 @@ std::optional<AxisOrientation> orientation_of(const Instance& instance) {
 
 std::string text_of(const Instance& instance, const SceneGrid& grid) {
   std::string text = "the instance \"";
-  return text.append(instance.name.empty() ? grid.name : instance.name).append("\"");
+  return text.append(printable(instance.name.empty() ? grid.name : instance.name)).append("\"");
 }
 
 /// Counts what a format does not hold.
@@ -50,28 +53,38 @@ class Losses {
   std::int64_t rounded = 0;
   std::int64_t hidden = 0;
   std::int64_t without_voxels = 0;
+  std::int64_t without_place = 0;
   std::int64_t nameless = 0;
+  std::int64_t turned_states = 0;
 
-  void count_all(const std::vector<PlacedGrid>& placed) {
-    add("instances between voxels moved to the nearest", rounded);
+  /// One that is in the file. Requires: of a scene's types, as `Losses` was made for.
+  void count(const PlacedGrid& grid, bool is_turned) {
+    ++placed_;
+    const std::int64_t states = grid.voxels.data_count();
+    states_ += states;
+    if (is_turned) turned_states += states;
+    for (const VoxelType type : grid.voxels.types()) {
+      if (type < used_.size()) used_[type] = true;
+    }
+  }
+
+  std::vector<std::string> take() {
+    if (rounded != 0) lines.push_back("instances between voxels moved to the nearest: " + with_thousands(rounded));
     add("hidden instances left out", hidden);
     add("instances without voxels left out", without_voxels);
-    if (!holds_.several && placed.size() > 1)
-      add("instances became one model", static_cast<std::int64_t>(placed.size()));
+    add("instances without a place left out", without_place);
+    if (!holds_.several && placed_ > 1) add("instances became one model", placed_);
     if (!holds_.names) add("names left out", nameless);
     add("groups left out", static_cast<std::int64_t>(scene_.groups().size()));
     add("layers left out", static_cast<std::int64_t>(scene_.layers().size()));
     add("lamps left out", static_cast<std::int64_t>(scene_.lamps.size()));
-    std::int64_t states = 0;
-    std::vector<bool> used(scene_.types.size(), false);
-    for (const PlacedGrid& grid : placed) {
-      states += grid.voxels.data_count();
-      for (const VoxelType type : grid.voxels.types()) {
-        if (type < used.size()) used[type] = true;
-      }
+    if (!holds_.type_names) add("voxels whose data is left out", states_);
+    if (holds_.type_names && turned_states != 0) {
+      lines.push_back("voxels of turned instances whose states say the same directions as before: " +
+                      with_thousands(turned_states));
     }
-    if (!holds_.type_names) add("voxels whose data is left out", states);
-    count_types(used);
+    count_types();
+    return std::move(lines);
   }
 
  private:
@@ -80,20 +93,22 @@ class Losses {
     lines.push_back(std::string(what).append(", which ").append(holds_.extension).append(" does not hold: "));
     lines.back().append(with_thousands(count));
   }
-  void count_types(const std::vector<bool>& used) {
+  void count_types() {
     std::int64_t colours = 0;
     std::int64_t transparent = 0;
     std::int64_t materials = 0;
     std::int64_t names = 0;
-    for (std::size_t i = 1; i < used.size(); ++i) {
-      if (!used[i]) continue;
+    std::int64_t others = 0;
+    for (std::size_t i = 1; i < used_.size(); ++i) {
+      if (!used_[i]) continue;
       const VoxelProperties& type = scene_.types[static_cast<VoxelType>(i)];
       const VoxelProperties plain;
       ++colours;
       transparent += type.visibility == Visibility::Transparent ? 1 : 0;
-      const bool has_material = type.roughness != plain.roughness || type.metalness != plain.metalness ||
-                                type.emission != plain.emission || type.scattering != plain.scattering;
+      const bool has_material =
+          type.roughness != plain.roughness || type.metalness != plain.metalness || type.emission != plain.emission;
       materials += has_material ? 1 : 0;
+      others += type.scattering != plain.scattering || type.ior != plain.ior || !type.collides ? 1 : 0;
       names += type.name.empty() && type.attributes.empty() ? 0 : 1;
     }
     if (!holds_.colours) {
@@ -102,48 +117,60 @@ class Losses {
     }
     if (!holds_.transparency) add("types that are no longer transparent", transparent);
     if (!holds_.materials) add("types whose roughness, metalness or light is left out", materials);
+    if (!holds_.type_names) add("types whose scattering, refraction or passage is left out", others);
     if (!holds_.type_names) add("types whose names and attributes are left out", names);
   }
 
   const Scene& scene_;
   const FormatHolds& holds_;
+  std::vector<bool> used_ = std::vector<bool>(scene_.types.size(), false);
+  std::int64_t placed_ = 0;
+  std::int64_t states_ = 0;
 };
 
+/// Hands over each placement, in the order of the instances' handles.
 class Placer {
  public:
-  Placer(const Scene& scene, const FormatHolds& holds) : scene_(scene), holds_(holds), losses_(scene, holds) {}
+  using Take = FunctionRef<void(PlacedGrid&&)>;
+  Placer(const Scene& scene, const FormatHolds& holds, Take take)
+      : scene_(scene), holds_(holds), take_(take), losses_(scene, holds) {}
 
-  Result<PlacedGrids> run() {
+  Status run() {
     Status done;
     scene_.instances().for_each([&](InstanceHandle, const Instance& instance) {
       if (done) done = place(instance);
     });
-    if (!done) return done.error();
-    losses_.count_all(placed_.grids);
-    placed_.warnings = std::move(losses_.lines);
-    return std::move(placed_);
+    return done;
   }
+  [[nodiscard]] double voxel_size() const { return voxel_size_; }
+  [[nodiscard]] std::vector<std::string> warnings() { return losses_.take(); }
 
  private:
   Status place(const Instance& instance) {
     const SceneGrid* const grid = scene_.grids().find(instance.grid);
-    if (grid == nullptr || !has_place(instance)) return {};
-    if (grid->field.chunk_count() != 0) {
-      return make_error(ErrorCode::Unsupported, "the grid \"" + grid->name + "\" holds a field of densities, which " +
-                                                    std::string(holds_.extension) + " does not");
+    if (grid == nullptr) return {};
+    if (!has_place(instance)) {
+      ++losses_.without_place;
+      return {};
     }
     const bool visible = is_shown(scene_, instance);
     if (!visible && !holds_.hidden) {
       ++losses_.hidden;
       return {};
     }
+    if (grid->field.chunk_count() != 0) {
+      return make_error(ErrorCode::Unsupported, "the grid \"" + printable(grid->name) +
+                                                    "\" holds a field of densities, which " +
+                                                    std::string(holds_.extension) + " does not");
+    }
     const IBox box = grid->declared_box();
     if (box.empty()) {
       ++losses_.without_voxels;
       return {};
     }
-    if (placed_.grids.empty()) placed_.voxel_size = instance.voxel_size;
-    if (std::abs(instance.voxel_size - placed_.voxel_size) > kRounding * placed_.voxel_size) {
+    if (is_first_) voxel_size_ = instance.voxel_size;
+    is_first_ = false;
+    if (std::abs(instance.voxel_size - voxel_size_) > kRounding * voxel_size_) {
       return make_error(ErrorCode::Unsupported, text_of(instance, *grid) +
                                                     " has voxels of another size than others, which " +
                                                     std::string(holds_.extension) + " does not hold");
@@ -157,10 +184,11 @@ class Placer {
       return make_error(ErrorCode::Unsupported, text_of(instance, grid) + " is not turned by quarter turns, as " +
                                                     std::string(holds_.extension) + " requires");
     }
-    const DVec3 a = world_from_grid(instance, grid, DVec3(box.min)) / placed_.voxel_size;
-    const DVec3 b = world_from_grid(instance, grid, DVec3(box.max)) / placed_.voxel_size;
+    const DVec3 a = world_from_grid(instance, grid, DVec3(box.min)) / voxel_size_;
+    const DVec3 b = world_from_grid(instance, grid, DVec3(box.max)) / voxel_size_;
     const DVec3 least = glm::min(a, b);
-    const DVec3 nearest = glm::round(least);
+    // Halves all go the same way, so that what touches still does.
+    const DVec3 nearest = glm::floor(least + 0.5);
     const IVec3 size = orientation->size_of(box.size());
     const double reach = std::max({std::abs(nearest.x), std::abs(nearest.y), std::abs(nearest.z)}) +
                          static_cast<double>(std::max({size.x, size.y, size.z}));
@@ -176,7 +204,8 @@ class Placer {
     placed.box = {min, min + size};
     copy_box(grid.grid, box, placed.voxels, min, *orientation);
     if (!placed.name.empty()) ++losses_.nameless;
-    placed_.grids.push_back(std::move(placed));
+    losses_.count(placed, *orientation != AxisOrientation());
+    take_(std::move(placed));
     return {};
   }
 
@@ -184,25 +213,29 @@ class Placer {
   static constexpr double kNearestVoxel = 1e-4;
   const Scene& scene_;
   const FormatHolds& holds_;
+  Take take_;
   Losses losses_;
-  PlacedGrids placed_;
+  double voxel_size_ = 1.0;
+  bool is_first_ = true;
 };
 
 }  // namespace
 
 Result<PlacedGrids> place_grids(const Scene& scene, const FormatHolds& holds) {
-  return Placer(scene, holds).run();
+  PlacedGrids placed;
+  const auto take = [&](PlacedGrid&& grid) { placed.grids.push_back(std::move(grid)); };
+  Placer placer(scene, holds, take);
+  if (auto done = placer.run(); !done) return done.error();
+  placed.voxel_size = placer.voxel_size();
+  placed.warnings = placer.warnings();
+  return placed;
 }
 
 Result<MergedGrid> merge_grids(const Scene& scene, const FormatHolds& holds) {
-  auto placed = place_grids(scene, holds);
-  if (!placed) return placed.error();
   MergedGrid merged;
-  merged.voxel_size = placed->voxel_size;
-  merged.warnings = std::move(placed->warnings);
   CopyOptions solid;
   solid.copy_air = false;
-  for (PlacedGrid& grid : placed->grids) {
+  const auto take = [&](PlacedGrid&& grid) {
     if (merged.box.empty()) {
       merged.name = std::move(grid.name);
       merged.voxels = std::move(grid.voxels);
@@ -210,8 +243,20 @@ Result<MergedGrid> merge_grids(const Scene& scene, const FormatHolds& holds) {
       copy_box(grid.voxels, grid.box, merged.voxels, grid.box.min, {}, solid);
     }
     merged.box = unite(merged.box, grid.box);
-  }
+  };
+  Placer placer(scene, holds, take);
+  if (auto done = placer.run(); !done) return done.error();
+  merged.voxel_size = placer.voxel_size();
+  merged.warnings = placer.warnings();
   return merged;
+}
+
+std::string cut_name(const std::string& name, std::size_t bytes, std::vector<std::string>& warnings) {
+  if (name.size() <= bytes) return name;
+  std::size_t end = bytes;
+  while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0U) == 0x80U) --end;
+  warnings.push_back("a name cut to " + std::to_string(end) + " bytes: \"" + printable(name) + "\"");
+  return name.substr(0, end);
 }
 
 void read_voxels(const Grid& grid, IVec3 first, std::span<VoxelType> out) {

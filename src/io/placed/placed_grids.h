@@ -49,13 +49,13 @@ struct PlacedGrids {
 };
 
 /// Turns and moves each placement of a scene. Instances between voxels move to the nearest, with a warning; what the
-/// format does not hold is counted in others.
+/// format does not hold is counted in others. States of voxels (VoxelData) are not turned, which is warned of, too.
 ///
 /// Errors: Unsupported for fields of densities, turns that are none by quarters, and voxels of different sizes;
 ///         LimitExceeded for what lies farther out than 2^26 voxels.
 [[nodiscard]] Result<PlacedGrids> place_grids(const Scene& scene, const FormatHolds& holds);
 
-/// The same as one grid; where several have a voxel, it is that of the last.
+/// The same as one grid; where several have a voxel, it is that of the last. Memory: of all, and one of them turned.
 struct MergedGrid {
   std::string name;
   Grid voxels{};
@@ -64,6 +64,9 @@ struct MergedGrid {
   std::vector<std::string> warnings;
 };
 [[nodiscard]] Result<MergedGrid> merge_grids(const Scene& scene, const FormatHolds& holds);
+
+/// So much of a text as fits, without a part of a character at its end; warns where that is not all.
+[[nodiscard]] std::string cut_name(const std::string& name, std::size_t bytes, std::vector<std::string>& warnings);
 
 /// Types of the voxels from `first` on along x.
 void read_voxels(const Grid& grid, IVec3 first, std::span<VoxelType> out);

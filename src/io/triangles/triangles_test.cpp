@@ -211,7 +211,7 @@ TEST(Triangles, of_polygons_are_cut_and_of_bad_corners_left_out) {
   EXPECT_NE(loaded.warnings.front().find("no finite number"), std::string::npos);
 }
 
-TEST(Gltf, has_the_transforms_of_nodes) {
+TEST(GltfTriangles, has_the_transforms_of_nodes) {
   if (!reads(FileFormat::Gltf)) return;
   const LoadedMesh loaded = mesh_of(tetrahedron_gltf(
       R"([{"children":[1,2],"translation":[10,0,0]},{"mesh":0,"scale":[2,2,2]},{"mesh":0,"scale":[-1,1,1]}])"));
@@ -222,7 +222,7 @@ TEST(Gltf, has_the_transforms_of_nodes) {
   EXPECT_NEAR(volume_of(loaded.mesh), 9.0 / 6.0, 1e-9);
 }
 
-TEST(Gltf, has_base_colours_textures_and_cut_outs) {
+TEST(GltfTriangles, has_base_colours_textures_and_cut_outs) {
   if (!reads(FileFormat::Gltf)) return;
   const LoadedMesh loaded = mesh_of(tetrahedron_gltf(
       R"([{"mesh":0}])",
@@ -240,7 +240,7 @@ TEST(Gltf, has_base_colours_textures_and_cut_outs) {
   EXPECT_EQ(leaf.emission, 2.0F);
 }
 
-TEST(Gltf, reads_sparse_strips_and_fans) {
+TEST(GltfTriangles, reads_sparse_strips_and_fans) {
   if (!reads(FileFormat::Gltf)) return;
   std::string bytes;
   for (const float at : {0.0F, 0.0F, 0.0F, 1.0F, 0.0F, 0.0F, 0.0F, 1.0F, 0.0F, 1.0F, 1.0F, 0.0F}) put(bytes, at);
@@ -266,7 +266,7 @@ TEST(Gltf, reads_sparse_strips_and_fans) {
   }
 }
 
-TEST(Gltf, refuses_what_contradicts_itself) {
+TEST(GltfTriangles, refuses_what_contradicts_itself) {
   if (!reads(FileFormat::Gltf)) return;
   EXPECT_EQ(error_of(tetrahedron_gltf(R"([{"mesh":0}])", "", 5)).code, ErrorCode::BadFormat);
   EXPECT_EQ(error_of(tetrahedron_gltf(R"([{"mesh":0}])", "", 2'147'483'647)).code, ErrorCode::BadFormat);

@@ -30,6 +30,7 @@ constexpr std::int16_t kUInt16 = 512;
 constexpr std::int16_t kFloat32 = 16;
 constexpr std::int16_t kIntentLabel = 1002;
 constexpr std::int16_t kScanner = 1;
+constexpr std::size_t kLongestName = 15;
 
 /// What the file holds besides its samples.
 struct Header {
@@ -120,7 +121,7 @@ Result<models::ModelBytes> write_labels(const Scene& scene, const Progress& prog
   header.bytes = is_wide ? 2 : 1;
   header.intent = kIntentLabel;
   header.description = "Quoin: the numbers of voxels' types";
-  header.name = merged->name;
+  header.name = models::cut_name(merged->name, kLongestName, merged->warnings);
   ByteWriter out;
   write_header(header, out);
   std::vector<VoxelType> row(static_cast<std::size_t>(merged->box.size().x));
@@ -148,15 +149,18 @@ Result<models::ModelBytes> write_densities(const Instance& instance, const Scene
   header.datatype = kFloat32;
   header.bytes = 4;
   header.description = "Quoin: densities, solid above 0";
-  header.name = instance.name.empty() ? grid.name : instance.name;
+  models::ModelBytes file;
+  header.name = models::cut_name(instance.name.empty() ? grid.name : instance.name, kLongestName, file.warnings);
   ByteWriter out;
   write_header(header, out);
   auto done = for_each_row(box, progress, [&](IVec3 first) {
     for (; first.x < box.max.x; ++first.x) out.f32(-grid.field.density(first));
   });
   if (!done) return done.error();
-  models::ModelBytes file{out.take(), {}};
-  file.warnings.emplace_back("materials, colours and lamps are left out, which .nii does not hold");
+  file.bytes = out.take();
+  file.warnings.emplace_back("materials, colours, hidden instances and lamps are left out, which .nii does not hold");
+  file.warnings.push_back("values are densities within " + std::to_string(around.x) +
+                          " samples of the surface, in no unit, not those of a file that was read");
   return file;
 }
 
@@ -171,8 +175,8 @@ Result<models::ModelBytes> write_nifti(const Scene& scene, const Progress& progr
     if (grid == nullptr || !has_place(instance) || !is_shown(scene, instance)) return;
     const bool is_field = grid->field.chunk_count() != 0;
     if (is_field) shown = &instance;
-    ++(is_field ? fields : others);
-    if (is_field && grid->grid.chunk_count() != 0) ++others;
+    fields += is_field ? 1 : 0;
+    others += grid->grid.chunk_count() != 0 ? 1 : 0;
   });
   if (fields == 0) return write_labels(scene, progress);
   if (fields > 1 || others > 0) {

@@ -293,6 +293,10 @@ class LuantiSource final : public ChunkSource {
       tell(fault_of_database(found.error(), {}));
       return {};
     }
+    if (!found && found.error().code == ErrorCode::LimitExceeded) {
+      tell(found.error());
+      return {};
+    }
     if (!found) return fault_of_database(found.error(), readers_->path());
     if (!*found) return {};
     const std::span<const std::byte> row = reader.row.bytes(0);

@@ -32,6 +32,7 @@ constexpr int kFirstOfZstd = 29;
 constexpr int kNewest = 29;
 /// Of what a row expands to. What is read stands before what nodes hold.
 constexpr std::size_t kMaxContent = std::size_t{4} << 20;
+constexpr std::size_t kMaxMetadata = std::size_t{16} << 20;
 constexpr std::uint32_t kUnnamed = 0xFFFFFFFF;
 
 std::uint16_t read_u16(ByteReader& reader) {
@@ -130,7 +131,9 @@ Status read_zlib(std::span<const std::byte> row, int version, std::vector<std::u
   if (*count != nodes.size() || *more != 0) return bad_at(nodes_at, "not the bytes of 4096 nodes");
   put_nodes(nodes, *width, block);
   ByteStream metadata(row, node_stream.position(), Compression::Zlib);
-  if (const auto skipped = metadata.skip(metadata.max_bytes() + 1); !skipped) return skipped.error();
+  const auto skipped = metadata.skip(kMaxMetadata + 1);
+  if (!skipped) return skipped.error();
+  if (*skipped > kMaxMetadata) return bad_at(node_stream.position(), "metadata of more than 16 MiB");
   ByteReader rest(row, metadata.position(), row.size());
   if (auto done = skip_objects(rest); !done) return done;
   static_cast<void>(rest.u32());  // time

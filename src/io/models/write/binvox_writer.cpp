@@ -61,6 +61,12 @@ Result<ModelBytes> write_binvox(const Scene& scene, const Progress& progress) {
   if (longest > kMaxEdge || volume > kMaxVoxels / size.z) {
     return make_error(ErrorCode::LimitExceeded, "more than 16,384 voxels a side, or 2^32 in all");
   }
+  // What readers take for a size.
+  constexpr double kLeastVoxel = 1e-8;
+  constexpr double kMostVoxel = 1e8;
+  if (!(merged->voxel_size > kLeastVoxel && merged->voxel_size < kMostVoxel)) {
+    return make_error(ErrorCode::Unsupported, "voxels smaller than 1e-8 units, or larger than 1e8");
+  }
   const auto numbers = [](const DVec3& v) { return text_of(v.x) + " " + text_of(v.y) + " " + text_of(v.z); };
   ByteWriter out;
   out.text("#binvox 1\n");

@@ -8,6 +8,7 @@
 #include "io/byte_writer.h"
 #include "io/models/write/write_models.h"
 #include "io/placed/placed_grids.h"
+#include "io/text.h"
 
 namespace quoin::models {
 
@@ -31,14 +32,14 @@ std::uint32_t word_of(Rgba8 colour) {
 class RunWriter {
  public:
   explicit RunWriter(ByteWriter& out) : out_(out) {}
-  void put(std::uint32_t word) {
+  void put(std::uint32_t word, std::uint32_t count = 1) {
     if (count_ != 0 && word == word_) {
-      ++count_;
+      count_ += count;
       return;
     }
     end_run();
     word_ = word;
-    count_ = 1;
+    count_ = count;
   }
   void end_slice() {
     end_run();
@@ -64,12 +65,14 @@ class RunWriter {
   std::uint32_t count_ = 0;
 };
 
-Status write_matrix(const PlacedGrid& grid, const std::vector<Rgba8>& colours, ByteWriter& out) {
+Status write_matrix(const PlacedGrid& grid, const std::vector<Rgba8>& colours, ByteWriter& out,
+                    std::vector<std::string>& warnings, ProgressSteps& steps) {
   const IVec3 size = grid.box.size();
   if (std::max({size.x, size.y, size.z}) > kMaxEdge) {
-    return make_error(ErrorCode::LimitExceeded, "\"" + grid.name + "\" has more than 16,384 voxels a side");
+    std::string line = "16,384 voxels a side are the most, and there are more in ";
+    return make_error(ErrorCode::LimitExceeded, line.append(printable(grid.name)));
   }
-  const std::string name = grid.name.substr(0, kLongestName);
+  const std::string name = cut_name(grid.name, kLongestName, warnings);
   out.u8(static_cast<std::uint8_t>(name.size()));
   out.text(name);
   for (int axis = 0; axis < 3; ++axis) out.i32(size[axis]);
@@ -79,9 +82,15 @@ Status write_matrix(const PlacedGrid& grid, const std::vector<Rgba8>& colours, B
   for (int z = grid.box.min.z; z < grid.box.max.z; ++z) {
     for (int y = grid.box.min.y; y < grid.box.max.y; ++y) {
       read_voxels(grid.voxels, {grid.box.min.x, y, z}, row);
-      for (const VoxelType type : row) runs.put(word_of(colours[type]));
+      if (std::ranges::all_of(row, [&](VoxelType type) { return type == row.front(); })) {
+        runs.put(word_of(colours[row.front()]), static_cast<std::uint32_t>(row.size()));
+      } else {
+        for (const VoxelType type : row) runs.put(word_of(colours[type]));
+      }
     }
     runs.end_slice();
+    steps.step();
+    if (steps.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
     if (out.size() > kMaxBytes) return make_error(ErrorCode::LimitExceeded, "more than 4 GiB of voxels");
   }
   return {};
@@ -94,6 +103,7 @@ Result<ModelBytes> write_qb(const Scene& scene, const Progress& progress) {
   if (!placed) return placed.error();
   if (placed->voxel_size != 1.0)
     placed->warnings.emplace_back("the size of voxels is left out, which .qb does not hold");
+  if (placed->grids.empty()) return make_error(ErrorCode::Unsupported, "there are no voxels, and .qb needs some");
   const std::vector<Rgba8> colours = colours_of(scene.types);
   ByteWriter out;
   out.u32(kVersion);
@@ -102,11 +112,11 @@ Result<ModelBytes> write_qb(const Scene& scene, const Progress& progress) {
   out.u32(1);  // runs
   out.u32(0);  // alpha is alpha, not which faces are seen
   out.u32(static_cast<std::uint32_t>(placed->grids.size()));
-  ProgressSteps steps(progress, placed->grids.size());
+  std::size_t slices = 0;
+  for (const PlacedGrid& grid : placed->grids) slices += static_cast<std::size_t>(grid.box.size().z);
+  ProgressSteps steps(progress, slices);
   for (const PlacedGrid& grid : placed->grids) {
-    if (auto done = write_matrix(grid, colours, out); !done) return done.error();
-    steps.step();
-    if (steps.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
+    if (auto done = write_matrix(grid, colours, out, placed->warnings, steps); !done) return done.error();
   }
   return ModelBytes{out.take(), std::move(placed->warnings)};
 }

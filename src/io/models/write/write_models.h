@@ -9,7 +9,7 @@
 // Scenes as files of other programs: docs/formats/models.md says what each of them holds. What it does not is warned of,
 // or is an error where the file would show something else.
 //
-// Read again by Quoin each gives the voxels and colours that were written, at the same places.
+// Read again by Quoin each gives the voxels that were written, and but for .binvox their colours, at the same places.
 // Errors of all: Unsupported for fields of densities, turns that are none by quarters, and voxels of different sizes;
 //                LimitExceeded for what is larger than the format's limits; Cancelled.
 

@@ -14,6 +14,8 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/volume.h>
 
+#include "io/byte_reader.h"
+#include "io/byte_stream.h"
 #include "io/minecraft/schematic.h"
 #include "io/models/models.h"
 #include "io/placed/placed_grids.h"
@@ -282,6 +284,71 @@ TEST(WriteModels, SchematicsHaveBlocksOfTheNearestColour) {
   const auto again = minecraft::write_schematic(read->scene);
   ASSERT_TRUE(again);
   EXPECT_TRUE(again->bytes == file->bytes);
+}
+
+/// What the reader of blocks leaves out because it looks the same is in what the game reads.
+TEST(WriteModels, SchematicsSayWhatTheGameWouldTakeOtherwise) {
+  Scene scene;
+  SceneGrid grid;
+  int x = 0;
+  for (const char* const name :
+       {"minecraft:oak_leaves", "minecraft:campfire", "my:odd name [with] {x}\n", "default:stone"}) {
+    grid.grid.set(x++, 0, 0, *scene.types.add(type_of({100, 100, 100, 255}, name)));
+  }
+  const std::array<std::byte, 3> bytes = {};
+  EXPECT_TRUE(grid.grid.set_data({3, 0, 0}, {0, bytes}));
+  Instance instance;
+  instance.grid = scene.add_grid(std::move(grid));
+  scene.add_instance(instance);
+  const auto file = minecraft::write_schematic(scene);
+  ASSERT_TRUE(file) << to_string(file.error());
+  const std::string text = [&] {
+    const auto expanded = first_bytes(file->bytes, std::size_t{1} << 20);
+    return std::string(text_of(*expanded));
+  }();
+  EXPECT_NE(text.find("minecraft:oak_leaves[persistent=true]"), std::string::npos);
+  EXPECT_NE(text.find("minecraft:campfire[lit=false]"), std::string::npos);
+  EXPECT_EQ(text.find("odd"), std::string::npos);
+  EXPECT_EQ(text.find("default:"), std::string::npos);
+  const auto has = [&](std::string_view line) {
+    return std::ranges::find(file->warnings, line) != file->warnings.end();
+  };
+  EXPECT_TRUE(has("types that are no blocks of the game became those of the nearest colour: 2"));
+  EXPECT_TRUE(has("voxels whose data is left out, which .schem does not hold: 1"));
+  EXPECT_TRUE(minecraft::read_schematic(file->bytes));
+}
+
+TEST(PlacedGrids, HalvesOfVoxelsAllGoTheSameWay) {
+  Scene scene;
+  const VoxelType type = *scene.types.add(type_of({1, 2, 3, 255}));
+  SceneGrid grid;
+  grid.name = "two\nlines";
+  grid.grid.set(0, 0, 0, type);
+  const GridHandle handle = scene.add_grid(std::move(grid));
+  for (const double x : {-1.5, -0.5, 0.5, 1.5}) {
+    Instance instance;
+    instance.grid = handle;
+    instance.position.x = x;
+    scene.add_instance(instance);
+  }
+  FormatHolds holds;
+  holds.extension = ".test";
+  const auto merged = merge_grids(scene, holds);
+  ASSERT_TRUE(merged);
+  EXPECT_EQ(merged->voxels.bounds(), (IBox{{-1, 0, 0}, {3, 1, 1}}));
+  EXPECT_EQ(merged->voxels.voxel_count(), 4);
+  ASSERT_FALSE(merged->warnings.empty());
+  EXPECT_EQ(merged->warnings.front(), "instances between voxels moved to the nearest: 4");
+  // A hidden field is left out with all that is hidden; names of two lines are told in one.
+  scene.edit(handle).field.add_sphere({0.0, 0.0, 0.0}, 2.0, type);
+  const auto refused = merge_grids(scene, holds);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message.find('\n'), std::string::npos);
+  for (const InstanceHandle each : scene.instances().handles()) scene.edit(each).visible = false;
+  EXPECT_TRUE(merge_grids(scene, holds));
+  std::vector<std::string> warnings;
+  EXPECT_EQ(cut_name("h\u00e4ll", 2, warnings), "h");
+  EXPECT_EQ(warnings.size(), 1U);
 }
 
 TEST(WriteModels, VolumesHoldTypesOrDensities) {
