@@ -83,7 +83,7 @@ std::optional<std::uint64_t> available_memory() {
 
 bool return_freed_memory() {
 #ifdef __GLIBC__
-  // A size that is set stays: glibc would raise it to the largest block that was freed, and keep all below in its arenas.
+  // A size that is set stays: glibc would raise it to the largest block that was freed, and keep all below.
   constexpr int kLargeBlock = 32 * 1024;
   return ::mallopt(M_MMAP_THRESHOLD, kLargeBlock) == 1;
 #else

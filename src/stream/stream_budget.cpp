@@ -19,8 +19,9 @@ constexpr double kGuessedRatio = 1.5;
 // rest comes later.
 constexpr double kRises = 3.0;
 constexpr double kFalls = 8.0;
-// Of the budget: the rest is what nobody counts (journals, plans, what workers and the store's cache keep), and what the
-// allocator keeps between what is used. In flights of half an hour it came to a tenth on average, and an eighth at most.
+// Of the budget: the rest is what nobody counts (journals, plans, what workers and the store's cache keep), and what
+// the allocator keeps between what is used. In flights of half an hour it came to a tenth on average, and an eighth at
+// most.
 constexpr double kShareOfBudget = 0.86;
 
 }  // namespace

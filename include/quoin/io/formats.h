@@ -85,8 +85,8 @@ struct FormatInfo {
 // several are used) and Progress (of what may take long) come last, in this order, and may be left out.
 
 /// Reads a file of any readable format, or a folder that holds a world. A volume becomes a field, as scene_from_volume
-/// makes it, at surface_value. Triangles become voxels or a field, as LoadOptions::mesh says, placed where the mesh is, in
-/// its unit. Of worlds that open_chunk_source reads it is what lies around their spawn.
+/// makes it, at surface_value. Triangles become voxels or a field, as LoadOptions::mesh says, placed where the mesh is,
+/// in its unit. Of worlds that open_chunk_source reads it is what lies around their spawn.
 ///
 /// The content decides, unless `LoadOptions::raw` does; the name only helps to say what is wrong with a file that is of
 /// no known format.

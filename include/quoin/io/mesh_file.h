@@ -81,11 +81,11 @@ struct MeshFileOptions {
 /// PLY:       version 1.0, binary, little-endian, in world units: x y z and nx ny nz as floats, red green blue as bytes
 ///            (sRGB; occlusion is multiplied in linear light), triangles as lists of int. Transparency, metal and
 ///            emission are lost. OcclusionIn::Attribute: a float ao after these, 1 where a mesh has no occlusion.
-/// STL, 3MF:  for printing, in millimetres: `scale` is those of a world unit. Programs for printing want closed, manifold
-///            meshes with +Z up: those of closed_surface, as BlockySceneOptions::part_of may give them, and smooth ones;
-///            count_open_edges tells. STL: binary, no colours. 3MF: an object a placement, its vertices joined by their
-///            places, a colour (sRGB) a corner or a triangle, by the materials extension; compressed in memory before it
-///            is written. No occlusion in either.
+/// STL, 3MF:  for printing, in millimetres: `scale` is those of a world unit. Programs for printing want closed,
+///            manifold meshes with +Z up: those of closed_surface, as BlockySceneOptions::part_of may give them, and
+///            smooth ones; count_open_edges tells. STL: binary, no colours. 3MF: an object a placement, its vertices
+///            joined by their places, a colour (sRGB) a corner or a triangle, by the materials extension; compressed in
+///            memory before it is written. No occlusion in either.
 /// Occlusion: in meshes 0 is open, and 3 (of blocks) or 1 is dark. Files have what it leaves, 1 open to 0 dark, as a
 ///            factor of colours or as the attribute: 1 - occlusion / 4 of blocks (1, 0.75, 0.5, 0.25), 1 - occlusion of
 ///            smooth meshes.
@@ -133,10 +133,10 @@ struct LoadedMesh {
 
 /// Reads the triangles of a file, all nodes of its scene in one mesh, with colours, in the axes of Quoin.
 ///
-/// OBJ:    polygons of any size, colours after coordinates (sRGB), of .mtl files Kd (sRGB) or map_Kd in its place, d, Ke,
-///         Pr and Pm. Needs tinyobjloader in the build.
-/// glTF:   version 2.0, .gltf and .glb: the default scene's nodes with their transforms, as they stand (no animation, no
-///         skin), triangles, strips and fans, of materials base colour, alpha mode, roughness, metalness, emission,
+/// OBJ:    polygons of any size, colours after coordinates (sRGB), of .mtl files Kd (sRGB) or map_Kd in its place, d,
+///         Ke, Pr and Pm. Needs tinyobjloader in the build.
+/// glTF:   version 2.0, .gltf and .glb: the default scene's nodes with their transforms, as they stand (no animation,
+///         no skin), triangles, strips and fans, of materials base colour, alpha mode, roughness, metalness, emission,
 ///         KHR_materials_emissive_strength and KHR_texture_transform, COLOR_0. Needs tinygltf in the build.
 /// PLY:    version 1.0, as text or binary of either byte order; red, green, blue and alpha of vertices (sRGB); polygons
 ///         are taken as fans; strips too.

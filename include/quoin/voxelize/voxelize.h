@@ -24,9 +24,9 @@ struct VoxelLattice {
   [[nodiscard]] DVec3 grid_from_mesh(DVec3 point) const { return (point - origin) / voxel_size; }
 };
 
-/// A lattice in which the mesh's longest side takes `voxels`, from voxel (0, 0, 0) on: the mesh lies in the middle of as
-/// many voxels as hold it along each axis. Along the longest its outermost points are a thousandth of a voxel from the
-/// sides, so that what is flat there lies in one layer, not between two.
+/// A lattice in which the mesh's longest side takes `voxels`, from voxel (0, 0, 0) on: the mesh lies in the middle of
+/// as many voxels as hold it along each axis. Along the longest its outermost points are a thousandth of a voxel from
+/// the sides, so that what is flat there lies in one layer, not between two.
 ///
 /// Errors: InvalidArgument where `voxels` is not positive or the mesh has no triangle; LimitExceeded beyond 2^14.
 [[nodiscard]] Result<VoxelLattice> lattice_of_size(const TriangleMesh& mesh, int voxels);

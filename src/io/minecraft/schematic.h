@@ -22,7 +22,8 @@ namespace quoin::minecraft {
 [[nodiscard]] bool begins_nbt(std::span<const std::byte> beginning);
 
 /// Reads any of them, by what stands in it. A grid for each region, in blocks from its least corner, at the offset that
-/// a .schem says; those of a litematic are placed as they stand to each other; regions of equal names are told apart by their number.
+/// a .schem says; those of a litematic are placed as they stand to each other; regions of equal names are told apart by
+/// their number.
 ///
 /// Types and states: as worlds have them, docs/formats/minecraft.md.
 /// Warnings: what is left out: entities, what blocks hold, biomes.

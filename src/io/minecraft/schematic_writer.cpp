@@ -88,8 +88,8 @@ bool is_block(const VoxelProperties& type) {
          });
 }
 
-/// With what block_state leaves out where the game takes something else for it: that these do not burn, and that leaves,
-/// whose distance from wood nobody knows any more, do not decay.
+/// With what block_state leaves out where the game takes something else for it: that these do not burn, and that
+/// leaves, whose distance from wood nobody knows any more, do not decay.
 BlockText as_in_game(BlockText block) {
   const auto has = [&](std::string_view key) {
     return std::ranges::any_of(block.properties, [&](const Property& property) { return property.first == key; });

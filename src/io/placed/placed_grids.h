@@ -10,7 +10,7 @@
 #include <quoin/core/result.h>
 #include <quoin/scene/scene.h>
 
-// Scenes as formats have them that know whole voxels in one lattice: what stands where, and what of it they do not hold.
+// Scenes as formats have them that know whole voxels in one lattice: what stands where, and what of it they leave out.
 
 namespace quoin::models {
 

@@ -1,10 +1,11 @@
-// A file: segments, each of u64 "NanoVDB0", u32 version, u16 grids, u16 codec; of each grid 176 bytes and its name; then
-// of each grid its bytes, as they are or as u64 size and a zlib stream or frames of Blosc. A grid's bytes:
+// A file: segments, each of u64 "NanoVDB0", u32 version, u16 grids, u16 codec; of each grid 176 bytes and its name;
+// then of each grid its bytes, as they are or as u64 size and a zlib stream or frames of Blosc. A grid's bytes:
 //
 //   at     0  u64 "NanoVDB0"; 384: 9 doubles, the rows of a matrix; 528: where it puts 0; 632: u32 class; 636: u32 type
 //        672  the tree: 4 u64, of which the last says where its root is
 //   root       u32 tiles at 24, background behind it; tiles of 32 bytes: u64 place, i64 child, u32 active, value
-//   nodes      bits of active places at 32, bits of children, places of 8 bytes (a value or an i64 child) on multiples of 32
+//   nodes      bits of active places at 32, bits of children, places of 8 bytes (a value or an i64 child) on
+//              multiples of 32
 //   leaves     bits of active voxels at 16, values
 // Children are said by how far they lie from their parent.
 

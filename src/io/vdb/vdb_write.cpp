@@ -1,5 +1,5 @@
-// What vdb_file.cpp reads, by zip and with active values alone. Densities are a level set with a band as wide as theirs;
-// voxels are true where they are there.
+// What vdb_file.cpp reads, by zip and with active values alone. Densities are a level set with a band as wide as
+// theirs; voxels are true where they are there.
 
 #include <zlib.h>
 

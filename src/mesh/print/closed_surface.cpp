@@ -1,9 +1,9 @@
 // Faces of single voxels, whose corners know the eight voxels around them:
 //
 //        6 ---- 7      a corner's voxels, by bits x, y, z; between two that differ in one bit lies one of its twelve
-//       /|     /|      faces. Faces that share an edge from the corner are joined: a corner of one sheet has one vertex,
-//      2 ---- 3 |      a corner of several one for each. On an edge with four faces those of one solid voxel are joined.
-//      | 4 ---| 5
+//       /|     /|      faces. Faces that share an edge from the corner are joined: a corner of one sheet has one
+//      2 ---- 3 |      vertex, one of several has one for each. On an edge with four faces those of one solid voxel
+//      | 4 ---| 5      are joined.
 //      0 ---- 1
 
 #include <quoin/mesh/closed_surface.h>

@@ -71,7 +71,8 @@ struct Block {
   Node& at(int x, int y, int z) { return nodes[static_cast<std::size_t>((z * 16 + y) * 16 + x)]; }
 };
 
-/// A row of any version from 25 to 29. `width`: bytes of a node's number; with 1, numbers from 2048 to 4095 go on in param2.
+/// A row of any version from 25 to 29. `width`: bytes of a node's number; with 1, numbers from 2048 to 4095 go on in
+/// param2.
 inline Bytes row_of(const Block& block, int version, int width = 2) {
   Writer names;
   names.big(0, 1).big(block.names.size(), 2);

@@ -5,8 +5,8 @@
 
 #include "core/instruction_set.h"
 
-// What is compiled for each instruction set: which triangle is nearest, for a row of voxels. Every kernel gives the same
-// bits.
+// What is compiled for each instruction set: which triangle is nearest, for a row of voxels. Every kernel gives the
+// same bits.
 
 namespace quoin::voxelizing {
 

@@ -6,8 +6,8 @@
 
 #include "io/placed/placed_grids.h"
 
-// Scenes as files of other programs: docs/formats/models.md says what each of them holds. What it does not is warned of,
-// or is an error where the file would show something else.
+// Scenes as files of other programs: docs/formats/models.md says what each of them holds. What it does not is warned
+// of, or is an error where the file would show something else.
 //
 // Read again by Quoin each gives the voxels that were written, and but for .binvox their colours, at the same places.
 // Errors of all: Unsupported for fields of densities, turns that are none by quarters, and voxels of different sizes;
