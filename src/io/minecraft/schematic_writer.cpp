@@ -48,6 +48,7 @@ std::vector<std::string> plain_blocks() {
 
 std::vector<std::string> glass_blocks() {
   std::vector<std::string> names;
+  names.reserve(kDyes.size());
   for (const std::string_view dye : kDyes) names.push_back(std::string(dye).append("_stained_glass"));
   return names;
 }
@@ -133,11 +134,11 @@ class Palette {
     const VoxelProperties& properties = types_[type];
     if (is_of_game(type)) return to_string(as_in_game(block_text(properties, state)));
     guessed_[type] = true;
-    static const Blocks kPlain(plain_blocks());
-    static const Blocks kGlass(glass_blocks());
-    static const Blocks kLights(light_blocks());
-    if (properties.emission > 0.0F) return kLights.nearest(properties.colour);
-    return (properties.visibility == Visibility::Transparent ? kGlass : kPlain).nearest(properties.colour);
+    static const Blocks plain(plain_blocks());
+    static const Blocks glass(glass_blocks());
+    static const Blocks lights(light_blocks());
+    if (properties.emission > 0.0F) return lights.nearest(properties.colour);
+    return (properties.visibility == Visibility::Transparent ? glass : plain).nearest(properties.colour);
   }
 
   const VoxelRegistry& types_;
@@ -185,7 +186,8 @@ Result<models::ModelBytes> write_schematic(const Scene& scene, const Progress& p
   if (!merged) return merged.error();
   if (merged->box.empty()) return make_error(ErrorCode::Unsupported, "there are no voxels, and .schem needs some");
   const IVec3 size = merged->box.size();
-  if (std::max({size.x, size.y, size.z}) > kMaxEdge || std::int64_t{size.x} * size.y > kMaxBlocks / size.z) {
+  if (std::max({size.x, size.y, size.z}) > kMaxEdge ||
+      std::int64_t{size.x} * size.y > kMaxBlocks / std::max(size.z, 1)) {
     return make_error(ErrorCode::LimitExceeded, "more than 65,535 blocks a side, or some 2^30 in all");
   }
   Palette palette(scene.types);

@@ -45,7 +45,8 @@ struct Header {
 
 Status check_size(const IBox& box) {
   const IVec3 size = box.size();
-  if (std::max({size.x, size.y, size.z}) <= kMaxEdge && std::int64_t{size.x} * size.y <= kMaxSamples / size.z)
+  if (std::max({size.x, size.y, size.z}) <= kMaxEdge &&
+      std::int64_t{size.x} * size.y <= kMaxSamples / std::max(size.z, 1))
     return {};
   return make_error(ErrorCode::LimitExceeded, "more than 32,767 samples a side, or 2^30 in all");
 }

@@ -16,9 +16,13 @@ namespace quoin::store {
 
 namespace {
 
+bool is_without_locks(int number) {
+  return number == ENOLCK || number == EOPNOTSUPP || number == ENOSYS || number == EINVAL;
+}
+
 Error refused(int number) {
   if (number == EWOULDBLOCK) return make_error(ErrorCode::CannotWrite, "another program is writing it");
-  if (number == ENOLCK || number == EOPNOTSUPP || number == ENOSYS || number == EINVAL) {
+  if (is_without_locks(number)) {
     return make_error(ErrorCode::CannotWrite,
                       "there are no locks on its file system, so that it cannot be written safely");
   }
@@ -48,6 +52,7 @@ Result<WorldLock> WorldLock::take(const std::filesystem::path& world) {
     const int number = ::flock(lock.descriptor_, LOCK_EX | LOCK_NB) == 0 ? 0 : errno;
     if (number == 0 && is_named(lock.descriptor_, lock.file_)) return lock;
     ::close(std::exchange(lock.descriptor_, -1));
+    if (is_without_locks(number)) ::unlink(lock.file_.c_str());
     if (number != 0) return refused(number);
   }
   return refused(EWOULDBLOCK);
@@ -66,6 +71,16 @@ WorldLock::~WorldLock() {
   if (descriptor_ < 0) return;
   ::unlink(file_.c_str());  // while it is locked: whoever waits finds that the name is another file's
   ::close(descriptor_);
+}
+
+bool has_locks(const std::filesystem::path& world) {
+  // Of the folder: a descriptor of the world itself would take this process's locks on it along when it is closed.
+  const std::filesystem::path folder = world.parent_path();
+  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return true;
+  const int number = ::flock(descriptor, LOCK_SH | LOCK_NB) == 0 ? 0 : errno;
+  ::close(descriptor);
+  return !is_without_locks(number);
 }
 
 bool is_on_network(const std::filesystem::path& world) {

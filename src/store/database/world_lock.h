@@ -22,6 +22,9 @@ class WorldLock {
   int descriptor_ = -1;
 };
 
+/// Whether the file system of a world's folder knows locks. True where that cannot be told.
+[[nodiscard]] bool has_locks(const std::filesystem::path& world);
+
 /// Whether a world's folder is on another machine, so that programs cannot share memory about it.
 [[nodiscard]] bool is_on_network(const std::filesystem::path& world);
 

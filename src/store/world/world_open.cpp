@@ -39,6 +39,28 @@ Status roll_back(const std::filesystem::path& path) {
   return connection->close();
 }
 
+/// As a file that nobody changes.
+Result<WorldReader> open_alone(const std::filesystem::path& path) {
+  auto alone = Connection::open(path.string(), Connection::Mode::ReadImmutable);
+  if (!alone) return alone.error();
+  if (auto done = check_schema(*alone); !done) return done.error();
+  return WorldReader(std::move(*alone));
+}
+
+/// On a file system without locks nobody may write, so it stays as it is; unless it came there while it was written.
+Result<WorldReader> open_unlocked(const std::filesystem::path& path) {
+  std::error_code unknown;
+  for (const char* const log : {"-wal", "-journal"}) {
+    const std::uintmax_t bytes = std::filesystem::file_size(path.string() + log, unknown);
+    if (!unknown && bytes != 0) {
+      return make_error(ErrorCode::CannotRead,
+                        "it was not closed, and there are no locks on its file system: copy it elsewhere, with " +
+                            path.filename().string() + log);
+    }
+  }
+  return open_alone(path);
+}
+
 }  // namespace
 
 Status begin_writing(Connection& connection, bool is_network) {
@@ -68,6 +90,7 @@ Result<WorldReader> open_reader(const std::filesystem::path& path, const char* v
   if (!connection) return connection.error();
   auto sound = check_schema(*connection);
   if (sound) return WorldReader(std::move(*connection));
+  if (sound.error().code == ErrorCode::CannotWrite && vfs == nullptr && !has_locks(path)) return open_unlocked(path);
   // A transaction that a crash cut off in rollback mode is undone by whoever may write.
   if (sound.error().code == ErrorCode::CannotWrite && vfs == nullptr) {
     if (auto undone = roll_back(path); !undone) return undone.error();
@@ -82,10 +105,7 @@ Result<WorldReader> open_reader(const std::filesystem::path& path, const char* v
   const bool has_log = std::filesystem::exists(path.string() + "-wal", error);
   const bool may_write = ::access(folder.empty() ? "." : folder.c_str(), W_OK) == 0;
   if (sound.error().code != ErrorCode::CannotRead || has_log || may_write || vfs != nullptr) return sound.error();
-  auto alone = Connection::open(path.string(), Connection::Mode::ReadImmutable);
-  if (!alone) return alone.error();
-  if (auto done = check_schema(*alone); !done) return done.error();
-  return WorldReader(std::move(*alone));
+  return open_alone(path);
 }
 
 void remove_database_log(const std::filesystem::path& path) {

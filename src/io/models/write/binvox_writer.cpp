@@ -58,7 +58,7 @@ Result<ModelBytes> write_binvox(const Scene& scene, const Progress& progress) {
   const IVec3 size = box.size();
   const std::int64_t volume = std::int64_t{size.x} * size.y;
   const int longest = std::max({size.x, size.y, size.z});
-  if (longest > kMaxEdge || volume > kMaxVoxels / size.z) {
+  if (longest > kMaxEdge || volume > kMaxVoxels / std::max(size.z, 1)) {
     return make_error(ErrorCode::LimitExceeded, "more than 16,384 voxels a side, or 2^32 in all");
   }
   // What readers take for a size.
