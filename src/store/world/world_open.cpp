@@ -86,11 +86,10 @@ bool end_writing(Connection& connection) {
 }
 
 Result<WorldReader> open_reader(const std::filesystem::path& path, const char* vfs) {
+  if (vfs == nullptr && !has_locks(path)) return open_unlocked(path);
   auto connection = Connection::open(path.string(), Connection::Mode::Read, vfs);
-  if (!connection) return connection.error();
-  auto sound = check_schema(*connection);
+  const Status sound = connection ? check_schema(*connection) : Status(connection.error());
   if (sound) return WorldReader(std::move(*connection));
-  if (sound.error().code == ErrorCode::CannotWrite && vfs == nullptr && !has_locks(path)) return open_unlocked(path);
   // A transaction that a crash cut off in rollback mode is undone by whoever may write.
   if (sound.error().code == ErrorCode::CannotWrite && vfs == nullptr) {
     if (auto undone = roll_back(path); !undone) return undone.error();
