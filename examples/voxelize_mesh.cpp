@@ -13,7 +13,8 @@ quoin::TriangleMesh make_ring() {
   constexpr std::uint32_t kAcross = 32;
   quoin::TriangleMesh mesh;
   for (std::uint32_t i = 0; i < kAround * kAcross; ++i) {
-    const double a = 2.0 * std::numbers::pi * (i / kAcross) / kAround;
+    const std::uint32_t around = i / kAcross;
+    const double a = 2.0 * std::numbers::pi * around / kAround;
     const double b = 2.0 * std::numbers::pi * (i % kAcross) / kAcross;
     mesh.positions.emplace_back((3.0 + std::cos(b)) * std::cos(a), std::sin(b), -(3.0 + std::cos(b)) * std::sin(a));
     mesh.colours.emplace_back(0.5 + 0.5 * std::cos(a), 0.3, 0.5 + 0.5 * std::sin(b), 1.0F);

@@ -84,7 +84,7 @@ TEST_F(ToolMesh, ForPrintersIsClosed) {
   // Read again, it has the volume that it had: 32 voxels of 2 mm.
   const Json again = Json::parse(run("info a.stl --json").out);
   EXPECT_EQ(again["format"], "stl");
-  const Json bounds = again["bounds"];
+  const Json& bounds = again["bounds"];
   EXPECT_NEAR(bounds["max"][0].get<double>() - bounds["min"][0].get<double>(), 8.0, 0.1);
   // What is there is a product, made anew; what is no mesh is not touched.
   EXPECT_EQ(run("convert tiny.vox a.stl").status, 0);

@@ -363,7 +363,7 @@ TEST_F(Tool, FacesAreCountedAlikeByEveryCommand) {
   for (const std::string hidden : {"", " --hidden"}) {
     for (const std::string command : {"info hidden.vox", "convert hidden.vox a.glb", "convert hidden.vox a.vox --force",
                                       "render hidden.vox -o a.png --size 8x8"}) {
-      const ToolRun json = run(command + " --json" + hidden);
+      const ToolRun json = run(std::string(command).append(" --json").append(hidden));
       ASSERT_EQ(json.status, 0) << json.err;
       const Json object = Json::parse(json.out);
       counts.push_back({object["faces_visible"], object["faces_total"]});
@@ -401,7 +401,7 @@ TEST_F(Tool, TheInputIsNotReplacedByACompanion) {
            {"foo.bin", "foo.gltf"}, {"foo.mtl", "foo.obj"}, {"foo_palette.png", "foo.obj"}, {"link", "castle.gltf"}}) {
     std::ofstream(folder_.file(in == "link" ? "castle.bin" : in), std::ios::binary) << tiny_vox();
     if (in == "link") std::filesystem::create_symlink("castle.bin", folder_.file(in));
-    const ToolRun result = run("convert " + in + " " + out);
+    const ToolRun result = run(std::string("convert ").append(in).append(" ").append(out));
     EXPECT_EQ(result.status, 1) << in;
     expect_one_error_line(result);
     EXPECT_EQ(text_of(folder_.file(in)), tiny_vox()) << in;

@@ -131,8 +131,8 @@ TEST_F(ToolWorld, MeshesAreThoseOfTheSameSceneHeldWhole) {
   ASSERT_EQ(run("convert hills.quoin hills.json -q").status, 0);
   for (const std::string options : {"", "--mesher culled", "--no-ao", "--watertight"}) {
     for (const std::string ending : {"glb", "ply"}) {
-      ASSERT_EQ(run("convert hills.quoin a." + ending + " -q " + options).status, 0);
-      ASSERT_EQ(run("convert hills.json b." + ending + " -q " + options).status, 0);
+      ASSERT_EQ(run(std::string("convert hills.quoin a.").append(ending).append(" -q ").append(options)).status, 0);
+      ASSERT_EQ(run(std::string("convert hills.json b.").append(ending).append(" -q ").append(options)).status, 0);
       EXPECT_TRUE(text_of(folder_.file("a." + ending)) == text_of(folder_.file("b." + ending))) << options;
     }
   }

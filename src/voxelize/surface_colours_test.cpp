@@ -188,7 +188,8 @@ TEST(SurfaceColours, within_a_solid_are_their_mean) {
 TEST(SurfaceColours, are_rounded_where_there_are_too_many) {
   TriangleMesh mesh = square();
   constexpr int kWide = 300;
-  for (DVec3& p : mesh.positions) p *= DVec3(kWide / kSide + 0.75, 1.0, kWide / kSide + 0.75);
+  constexpr int kTimes = kWide / kSide;
+  for (DVec3& p : mesh.positions) p *= DVec3(kTimes + 0.75, 1.0, kTimes + 0.75);
   mesh.textures.push_back(texture(kWide, [](int x, int y) {
     const auto byte = [](int n) { return static_cast<std::uint8_t>(n); };
     return Rgba8{byte(x), byte(y), byte(x / 256 * 64 + y / 256 * 128), 255};

@@ -353,20 +353,20 @@ TEST(Models, RealOnesHaveTheirCounts) {
     std::int64_t voxels;
     std::size_t grids;
   };
-  const std::array kKnown = {Known{"binvox/maxorange+binvox_renderer/data__bunny.binvox", 3'694, 1},
-                             Known{"kv6/iamgreaser+iceball/pkg__base__kv6__bomb.kv6", 27'552, 1},
-                             Known{"kv6/vengi-voxel+vengi/data__tests__slab6_vox_test.kv6", 1'531, 1},
-                             Known{"kv6/vengi-voxel+vengi/data__tests__slab6_vox_test.kvx", 1'531, 1},
-                             Known{"qb/vengi-voxel+vengi/9fc03f__data__tests__qubicle.qb", 771, 10},
-                             Known{"qb/vengi-voxel+vengi/65bf26__data__tests__robo.qb", 1'291, 3},
-                             Known{"qb/vengi-voxel+vengi/4e1abb__data__tests__rgb.qb", 99, 1},
-                             Known{"qb/vengi-voxel+vengi/8eed5f__data__tests__rgb.qef", 99, 1},
-                             Known{"qb/vengi-voxel+vengi/fd7931__data__tests__rgb.qbcl", 99, 1},
-                             Known{"qb/vengi-voxel+vengi/30db40__data__tests__crabby.qbcl", 100, 2},
-                             Known{"qb/vengi-voxel+vengi/c282ae__data__tests__rgb_small.qbcl", 3, 1},
-                             Known{"cub/vengi-voxel+vengi/data__tests__rgb_small.cub", 3, 1},
-                             Known{"vxl/iamgreaser+iceball/pkg__maps__mesa.vxl", 6'443'387, 1}};
-  for (const Known& known : kKnown) {
+  const std::array known_files = {Known{"binvox/maxorange+binvox_renderer/data__bunny.binvox", 3'694, 1},
+                                  Known{"kv6/iamgreaser+iceball/pkg__base__kv6__bomb.kv6", 27'552, 1},
+                                  Known{"kv6/vengi-voxel+vengi/data__tests__slab6_vox_test.kv6", 1'531, 1},
+                                  Known{"kv6/vengi-voxel+vengi/data__tests__slab6_vox_test.kvx", 1'531, 1},
+                                  Known{"qb/vengi-voxel+vengi/9fc03f__data__tests__qubicle.qb", 771, 10},
+                                  Known{"qb/vengi-voxel+vengi/65bf26__data__tests__robo.qb", 1'291, 3},
+                                  Known{"qb/vengi-voxel+vengi/4e1abb__data__tests__rgb.qb", 99, 1},
+                                  Known{"qb/vengi-voxel+vengi/8eed5f__data__tests__rgb.qef", 99, 1},
+                                  Known{"qb/vengi-voxel+vengi/fd7931__data__tests__rgb.qbcl", 99, 1},
+                                  Known{"qb/vengi-voxel+vengi/30db40__data__tests__crabby.qbcl", 100, 2},
+                                  Known{"qb/vengi-voxel+vengi/c282ae__data__tests__rgb_small.qbcl", 3, 1},
+                                  Known{"cub/vengi-voxel+vengi/data__tests__rgb_small.cub", 3, 1},
+                                  Known{"vxl/iamgreaser+iceball/pkg__maps__mesa.vxl", 6'443'387, 1}};
+  for (const Known& known : known_files) {
     const auto loaded = load_scene(folder / known.file);
     ASSERT_TRUE(loaded) << known.file << ": " << to_string(loaded.error());
     EXPECT_EQ(loaded->scene.voxel_count(), known.voxels) << known.file;
