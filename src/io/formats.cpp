@@ -267,12 +267,6 @@ std::vector<std::string> lost_with_source(const Saved& saved) {
   return lines;
 }
 
-std::vector<std::string> lost_in_vdb(const Saved& saved) {
-  std::vector<std::string> lines = lost_with_source(saved);
-  std::ranges::move(vdb::losses_of_vdb(saved.scene), std::back_inserter(lines));
-  return lines;
-}
-
 Result<FileFormat> format_for_saving(const std::filesystem::path& path) {
   const auto format = format_for_writing(path);
   if (!format) return format.error();
@@ -323,7 +317,7 @@ Result<SavedScene> save(const Saved& saved, const std::filesystem::path& path, T
   if (*format == FileFormat::Vdb) {
     const auto written = write_whole(path, vdb::write_vdb(saved.scene));
     if (!written) return written.error();
-    return SavedScene{*written, lost_in_vdb(saved)};
+    return SavedScene{*written, all_lost(vdb::losses_of_vdb(saved.scene), saved)};
   }
   auto file = with_path(scene_file_of(saved.scene), path);
   if (!file) return file.error();
@@ -344,7 +338,7 @@ Result<std::vector<std::string>> losses(const Saved& saved, const std::filesyste
     if (!file) return file.error();
     return all_lost(std::move(file->warnings), saved);
   }
-  if (*format == FileFormat::Vdb) return lost_in_vdb(saved);
+  if (*format == FileFormat::Vdb) return all_lost(vdb::losses_of_vdb(saved.scene), saved);
   if (*format != FileFormat::Vox) return lost_with_source(saved);
   return with_path(saved.loaded != nullptr ? losses_of_vox(*saved.loaded) : losses_of_vox(saved.scene), path);
 }

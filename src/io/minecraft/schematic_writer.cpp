@@ -213,9 +213,6 @@ Result<models::ModelBytes> write_schematic(const Scene& scene, const Progress& p
   out.bytes("BlockData", *blocks);
   out.empty_list("BlockEntities");
   out.end();
-  if (merged->voxel_size != 1.0) {
-    merged->warnings.emplace_back("the size of voxels is left out, which .schem does not hold");
-  }
   if (palette.guessed() != 0) {
     merged->warnings.push_back("types that are no blocks of the game became those of the nearest colour: " +
                                with_thousands(palette.guessed()));

@@ -61,6 +61,17 @@ std::optional<IVec3> read_place(ByteReader& reader) {
   return place;
 }
 
+/// A matrix that turns about a pivot, in voxels from its place; about its place where that is out of range.
+Model model_about(const Matrix& matrix, const DVec3& pivot) {
+  constexpr double kFarthest = 1e6;
+  Model model;
+  model.name = matrix.name;
+  model.canvas = {IVec3(0), matrix.size};
+  if (is_finite(pivot) && glm::length(pivot) < kFarthest) model.pivot = pivot;
+  model.position = DVec3(matrix.place) + model.pivot;
+  return model;
+}
+
 class QbReader {
  public:
   explicit QbReader(std::span<const std::byte> bytes) : bytes_(bytes), reader_(bytes) {}
@@ -230,12 +241,7 @@ Status QbtReader::read_matrix(ByteReader& reader) {
   if (!size || !place) return bad_at(at, "a matrix whose size or place is out of range");
   matrix.size = *size;
   matrix.place = *place;
-  Model model;
-  model.name = matrix.name;
-  model.canvas = {IVec3(0), matrix.size};
-  const DVec3 turned(pivot[0], pivot[1], pivot[2]);
-  if (is_finite(turned) && glm::length(turned) < 1e6) model.pivot = turned;
-  model.position = DVec3(matrix.place) + model.pivot;
+  Model model = model_about(matrix, DVec3(pivot[0], pivot[1], pivot[2]));
   builder_.begin(std::move(model));
   return put_voxels(matrix, packed, packed_at);
 }
@@ -356,13 +362,8 @@ Status QbclReader::read_matrix(std::string name, bool is_used, bool is_shown) {
   if (!is_used) return {};
   matrix.size = *size;
   matrix.place = *place;
-  Model model;
-  model.name = matrix.name;
-  model.canvas = {IVec3(0), matrix.size};
+  Model model = model_about(matrix, DVec3(pivot[0], pivot[1], pivot[2]));
   model.visible = is_shown;
-  const DVec3 turned(pivot[0], pivot[1], pivot[2]);
-  if (is_finite(turned) && glm::length(turned) < 1e6) model.pivot = turned;
-  model.position = DVec3(matrix.place) + model.pivot;
   builder_.begin(std::move(model));
   return put_columns(matrix, packed, packed_at);
 }

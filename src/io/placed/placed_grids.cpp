@@ -143,7 +143,13 @@ class Placer {
     return done;
   }
   [[nodiscard]] double voxel_size() const { return voxel_size_; }
-  [[nodiscard]] std::vector<std::string> warnings() { return losses_.take(); }
+  [[nodiscard]] std::vector<std::string> warnings() {
+    std::vector<std::string> lines = losses_.take();
+    if (voxel_size_ != 1.0 && !holds_.place_in_units) {
+      lines.push_back("the size of voxels is left out, which " + std::string(holds_.extension) + " does not hold");
+    }
+    return lines;
+  }
 
  private:
   Status place(const Instance& instance) {

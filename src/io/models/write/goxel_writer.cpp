@@ -199,9 +199,6 @@ void GoxelWriter::write_layer(const PlacedGrid& grid, const Layer& layer, std::u
 Result<ModelBytes> GoxelWriter::run(const Progress& progress) {
   auto placed = place_grids(scene_, kHolds);
   if (!placed) return placed.error();
-  if (placed->voxel_size != 1.0) {
-    placed->warnings.emplace_back("the size of voxels is left out, which .gox does not hold");
-  }
   std::vector<std::pair<const PlacedGrid*, Layer>> layers;
   std::int64_t split = 0;
   std::size_t chunks = 0;

@@ -101,8 +101,6 @@ Status write_matrix(const PlacedGrid& grid, const std::vector<Rgba8>& colours, B
 Result<ModelBytes> write_qb(const Scene& scene, const Progress& progress) {
   auto placed = place_grids(scene, kHolds);
   if (!placed) return placed.error();
-  if (placed->voxel_size != 1.0)
-    placed->warnings.emplace_back("the size of voxels is left out, which .qb does not hold");
   if (placed->grids.empty()) return make_error(ErrorCode::Unsupported, "there are no voxels, and .qb needs some");
   const std::vector<Rgba8> colours = colours_of(scene.types);
   ByteWriter out;

@@ -201,8 +201,6 @@ Result<ModelBytes> write_vxl(const Scene& scene, const Progress& progress) {
     merged->warnings.push_back("moved to the middle of the map, by " + std::to_string(-min.x) + ", " +
                                std::to_string(-min.y) + ", " + std::to_string(-min.z));
   }
-  if (merged->voxel_size != 1.0)
-    merged->warnings.emplace_back("the size of voxels is left out, which .vxl does not hold");
   const std::vector<Rgba8> colours = colours_of(scene.types);
   MapWriter writer(*merged, colours, size, min);
   ByteWriter out;
