@@ -44,6 +44,10 @@ Status check_materials(const TriangleMesh& mesh) {
     if (material.texture && *material.texture >= mesh.textures.size()) {
       return make_error(ErrorCode::InvalidArgument, "a material with a texture that is not there");
     }
+    const glm::vec4& colour = material.colour;
+    const float sum = colour.x + colour.y + colour.z + colour.w + material.alpha_cutoff + material.roughness +
+                      material.metalness + material.emission;
+    if (!std::isfinite(sum)) return make_error(ErrorCode::InvalidArgument, "a material that is not finite");
   }
   for (const MeshTexture& texture : mesh.textures) {
     const AlphaImage& image = texture.image;

@@ -64,7 +64,8 @@ struct TriangleMesh {
 };
 
 /// What is wrong with a mesh, if anything: an index of nothing, arrays of other lengths, a position that triangles use
-/// and that is not finite, a picture of another size than it says. Errors: InvalidArgument.
+/// and that is not finite, a number of a material's that is not, a picture of another size than it says. Errors:
+/// InvalidArgument.
 [[nodiscard]] Status check_mesh(const TriangleMesh& mesh);
 
 }  // namespace quoin

@@ -18,6 +18,7 @@
 
 #include "core/srgb.h"
 #include "io/byte_reader.h"
+#include "io/triangles/gltf_meshopt.h"
 
 #ifdef QUOIN_HAVE_TINYGLTF
 #include <tiny_gltf.h>
@@ -323,6 +324,7 @@ class GltfReader {
                                            "KHR_materials_unlit",   "KHR_materials_emissive_strength",
                                            "KHR_lights_punctual",   "EXT_texture_webp"};
     for (const std::string& name : model_.extensionsRequired) {
+      if (name == "EXT_meshopt_compression" && has_meshopt()) continue;
       const bool is_look = name.starts_with("KHR_materials_");
       if (is_look || std::find(std::begin(kKnown), std::end(kKnown), name) != std::end(kKnown)) continue;
       return make_error(ErrorCode::Unsupported, "glTF that requires " + name);
@@ -620,7 +622,6 @@ Result<tinygltf::Model> parse(std::span<const std::byte> bytes, Asked& asked) {
   if (bytes.size() > std::numeric_limits<unsigned>::max()) {
     return make_error(ErrorCode::LimitExceeded, "glTF beyond 4 GiB");
   }
-  if (is_too_deep(json_of(bytes))) return make_error(ErrorCode::BadFormat, "its JSON is nested too deeply");
   tinygltf::TinyGLTF loader;
   loader.SetImageLoader(keep_picture, &asked);
   loader.SetFsCallbacks({is_there, as_it_is, read_beside, write_nothing, &asked});
@@ -647,8 +648,14 @@ Result<tinygltf::Model> parse(std::span<const std::byte> bytes, Asked& asked) {
 
 Result<LoadedMesh> read_gltf(std::span<const std::byte> bytes, Beside& beside) {
   Asked asked{&beside};
-  const auto model = parse(bytes, asked);
+  const std::string_view json = json_of(bytes);
+  if (is_too_deep(json)) return make_error(ErrorCode::BadFormat, "its JSON is nested too deeply");
+  const auto rewritten = without_fallback_buffers(bytes, json);
+  auto model = parse(rewritten.empty() ? bytes : rewritten, asked);
   if (!model) return model.error();
+  if (has_meshopt()) {
+    if (Status done = decode_views(*model); !done) return done.error();
+  }
   return GltfReader(*model, asked).read();
 }
 

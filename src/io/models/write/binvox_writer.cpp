@@ -18,6 +18,8 @@ namespace {
 constexpr FormatHolds kHolds = {.extension = ".binvox", .colours = false, .place_in_units = true};
 constexpr int kMaxEdge = 1 << 14;
 constexpr std::int64_t kMaxVoxels = std::int64_t{1} << 32;
+/// Up to here a cube is written: some readers take nothing else (trimesh), and it is a few bytes of air.
+constexpr int kMaxCube = 1 << 10;
 constexpr unsigned kLongestRun = 255;
 
 /// The shortest that gives the same number.
@@ -55,9 +57,9 @@ Result<ModelBytes> write_binvox(const Scene& scene, const Progress& progress) {
   if (!merged) return merged.error();
   if (merged->box.empty()) return make_error(ErrorCode::Unsupported, "there are no voxels, and .binvox needs some");
   const IBox& box = merged->box;
-  const IVec3 size = box.size();
+  const int longest = std::max({box.size().x, box.size().y, box.size().z});
+  const IVec3 size = longest <= kMaxCube ? IVec3(longest) : box.size();
   const std::int64_t volume = std::int64_t{size.x} * size.y;
-  const int longest = std::max({size.x, size.y, size.z});
   if (longest > kMaxEdge || volume > kMaxVoxels / std::max(size.z, 1)) {
     return make_error(ErrorCode::LimitExceeded, "more than 16,384 voxels a side, or 2^32 in all");
   }

@@ -1,0 +1,187 @@
+#include "io/triangles/gltf_meshopt.h"
+
+#ifdef QUOIN_HAVE_TINYGLTF
+
+#include <string>
+#include <string_view>
+#include <utility>
+
+#ifdef QUOIN_HAVE_MESHOPTIMIZER
+#include <meshoptimizer.h>
+#endif
+#include <nlohmann/json.hpp>
+#include <tiny_gltf.h>
+
+#include "io/byte_writer.h"
+#include "io/triangles/triangles.h"
+
+namespace quoin::triangles {
+
+namespace {
+
+constexpr const char* kExtension = "EXT_meshopt_compression";
+constexpr const char* kOneByte = "data:application/octet-stream;base64,AA==";
+// Of a GLB: magic, version, length; length and kind of its first chunk.
+constexpr std::size_t kJsonAt = 20;
+
+using Json = nlohmann::json;
+
+bool is_fallback(const Json& buffer) {
+  if (!buffer.is_object() || buffer.contains("uri")) return false;
+  const auto extensions = buffer.find("extensions");
+  return extensions != buffer.end() && extensions->is_object() && extensions->contains(kExtension);
+}
+
+/// A file with other JSON in place of `old`, which lies in it; of a GLB all that follows stays.
+std::vector<std::byte> with_json(std::span<const std::byte> file, std::string_view old, std::string json) {
+  ByteWriter out;
+  if (!is_glb(file)) {
+    out.text(json);
+    return out.take();
+  }
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  const auto rest = file.subspan(kJsonAt + old.size());
+  const std::size_t size = kJsonAt + json.size() + rest.size();
+  out.reserve(size);
+  out.raw(file.first(8));
+  out.u32(static_cast<std::uint32_t>(size));
+  out.u32(static_cast<std::uint32_t>(json.size()));
+  out.raw(file.subspan(16, 4));
+  out.text(json);
+  out.raw(rest);
+  return out.take();
+}
+
+#ifdef QUOIN_HAVE_MESHOPTIMIZER
+
+/// What a view's extension says.
+struct CodedView {
+  std::span<const unsigned char> coded;
+  std::size_t count = 0;
+  std::size_t stride = 0;
+  std::string mode;
+  std::string filter;
+};
+
+std::size_t whole_in(const tinygltf::Value& object, const char* key) {
+  if (!object.Has(key) || !object.Get(key).IsNumber()) return 0;
+  const double number = object.Get(key).GetNumberAsDouble();
+  return number >= 0.0 && number < 0x1p40 ? static_cast<std::size_t>(number) : 0;
+}
+
+std::string text_in(const tinygltf::Value& object, const char* key) {
+  return object.Has(key) && object.Get(key).IsString() ? object.Get(key).Get<std::string>() : std::string();
+}
+
+Result<CodedView> coded_view(const tinygltf::Model& model, const tinygltf::Value& extension) {
+  const auto bad = [](const char* what) { return make_error(ErrorCode::BadFormat, what); };
+  if (!extension.IsObject()) return bad("its compression is no object");
+  const std::size_t buffer = whole_in(extension, "buffer");
+  const std::size_t offset = whole_in(extension, "byteOffset");
+  const std::size_t length = whole_in(extension, "byteLength");
+  CodedView view;
+  view.count = whole_in(extension, "count");
+  view.stride = whole_in(extension, "byteStride");
+  view.mode = text_in(extension, "mode");
+  view.filter = text_in(extension, "filter");
+  if (buffer >= model.buffers.size()) return bad("it is coded in a buffer that is not there");
+  const auto& bytes = model.buffers[buffer].data;
+  if (offset > bytes.size() || length > bytes.size() - offset) return bad("its code ends beyond its buffer");
+  view.coded = std::span(bytes).subspan(offset, length);
+  const bool is_attributes = view.mode == "ATTRIBUTES";
+  const bool has_stride = is_attributes ? view.stride != 0 && view.stride % 4 == 0 && view.stride <= 256
+                                        : view.stride == 2 || view.stride == 4;
+  if (!has_stride) return bad("elements of a size that is not coded");
+  // Of 64 bytes that are alike one is left; a triangle of the smallest takes one.
+  constexpr std::size_t kMostPacked = 64;
+  if (view.count > (length + 1) * kMostPacked * 4 / view.stride) return bad("more elements than its code can hold");
+  return view;
+}
+
+Result<std::vector<unsigned char>> decoded(const CodedView& view) {
+  std::vector<unsigned char> bytes(view.count * view.stride);
+  int failed = 1;
+  if (view.mode == "ATTRIBUTES") {
+    failed = meshopt_decodeVertexBuffer(bytes.data(), view.count, view.stride, view.coded.data(), view.coded.size());
+  } else if (view.mode == "TRIANGLES" && view.count % 3 == 0) {
+    failed = meshopt_decodeIndexBuffer(bytes.data(), view.count, view.stride, view.coded.data(), view.coded.size());
+  } else if (view.mode == "INDICES") {
+    failed = meshopt_decodeIndexSequence(bytes.data(), view.count, view.stride, view.coded.data(), view.coded.size());
+  }
+  if (failed != 0) return make_error(ErrorCode::BadFormat, "it cannot be decoded");
+  if (view.filter.empty() || view.filter == "NONE") return bytes;
+  if (view.mode != "ATTRIBUTES") return make_error(ErrorCode::BadFormat, "a filter of indices");
+  if (view.filter == "OCTAHEDRAL" && (view.stride == 4 || view.stride == 8)) {
+    meshopt_decodeFilterOct(bytes.data(), view.count, view.stride);
+  } else if (view.filter == "QUATERNION" && view.stride == 8) {
+    meshopt_decodeFilterQuat(bytes.data(), view.count, view.stride);
+  } else if (view.filter == "EXPONENTIAL") {
+    meshopt_decodeFilterExp(bytes.data(), view.count, view.stride);
+  } else {
+    return make_error(ErrorCode::BadFormat, "a filter that is not known");
+  }
+  return bytes;
+}
+
+#endif
+
+}  // namespace
+
+std::vector<std::byte> without_fallback_buffers(std::span<const std::byte> file, std::string_view text) {
+  if (text.find(kExtension) == std::string_view::npos) return {};
+  Json document = Json::parse(text, nullptr, false);
+  if (!document.is_object() || !document.contains("buffers") || !document["buffers"].is_array()) return {};
+  bool is_changed = false;
+  for (Json& buffer : document["buffers"]) {
+    if (!is_fallback(buffer)) continue;
+    buffer["uri"] = kOneByte;
+    buffer["byteLength"] = 1;
+    is_changed = true;
+  }
+  if (!is_changed) return {};
+  return with_json(file, text, document.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+#ifdef QUOIN_HAVE_MESHOPTIMIZER
+
+bool has_meshopt() {
+  return true;
+}
+
+Status decode_views(tinygltf::Model& model) {
+  for (std::size_t i = 0; i < model.bufferViews.size(); ++i) {
+    tinygltf::BufferView& view = model.bufferViews[i];
+    const auto extension = view.extensions.find(kExtension);
+    if (extension == view.extensions.end()) continue;
+    const auto fail = [&](const Error& why) {
+      return make_error(why.code, "buffer view " + std::to_string(i) + ": " + why.message);
+    };
+    const auto coded = coded_view(model, extension->second);
+    if (!coded) return fail(coded.error());
+    auto bytes = decoded(*coded);
+    if (!bytes) return fail(bytes.error());
+    tinygltf::Buffer buffer;
+    buffer.data = std::move(*bytes);
+    view.buffer = static_cast<int>(model.buffers.size());
+    view.byteOffset = 0;
+    view.byteLength = buffer.data.size();
+    model.buffers.push_back(std::move(buffer));
+  }
+  return {};
+}
+
+#else
+
+bool has_meshopt() {
+  return false;
+}
+
+Status decode_views(tinygltf::Model&) {
+  return make_error(ErrorCode::Unsupported, "compressed glTF, which this build has no meshoptimizer for");
+}
+
+#endif
+
+}  // namespace quoin::triangles
+
+#endif

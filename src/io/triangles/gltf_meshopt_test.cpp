@@ -1,0 +1,105 @@
+#include "io/triangles/gltf_meshopt.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <quoin/io/formats.h>
+#include <quoin/io/mesh_file.h>
+
+#include "io/gltf/gltf_for_tests.h"
+#include "io/gltf/gltf_layout.h"
+
+namespace quoin {
+namespace {
+
+bool reads_and_writes() {
+  return format_info(FileFormat::Glb).readable && can_compress_gltf();
+}
+
+std::vector<std::byte> castle(bool quantize, bool compress) {
+  Scene scene;
+  const GridHandle grid = add_asymmetric_grid(scene, "castle");
+  (void)place(scene, grid, {3.0, -2.0, 1.0}, "castle");
+  (void)place(scene, grid, {-9.0, 5.0, 0.5}, "another");
+  const auto meshes = mesh_scene(scene, {});
+  EXPECT_TRUE(meshes.has_value());
+  MeshFileOptions options;
+  options.quantize = quantize;
+  options.compress = compress;
+  auto bytes = write_mesh(*meshes, FileFormat::Glb, options);
+  EXPECT_TRUE(bytes.has_value());
+  return std::move(*bytes);
+}
+
+using Triangle = std::array<std::array<double, 3>, 3>;
+
+/// Each from its least corner on, and in order: the codec turns triangles, and may change their order.
+std::vector<Triangle> triangles_of(const TriangleMesh& mesh) {
+  std::vector<Triangle> all;
+  for (const auto& corners : mesh.triangles) {
+    Triangle triangle{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const DVec3& p = mesh.positions[corners[i]];
+      triangle[i] = {p.x, p.y, p.z};
+    }
+    std::rotate(triangle.begin(), std::min_element(triangle.begin(), triangle.end()), triangle.end());
+    all.push_back(triangle);
+  }
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+TEST(GltfMeshopt, WhatIsCompressedIsReadAsIfItWereNot) {
+  if (!reads_and_writes()) GTEST_SKIP() << "this build has no tinygltf or no meshoptimizer";
+  for (const bool quantize : {false, true}) {
+    const auto plain = read_mesh(castle(quantize, false));
+    const auto packed = read_mesh(castle(quantize, true));
+    ASSERT_TRUE(plain) << to_string(plain.error());
+    ASSERT_TRUE(packed) << to_string(packed.error());
+    EXPECT_FALSE(plain->mesh.triangles.empty());
+    EXPECT_EQ(triangles_of(packed->mesh), triangles_of(plain->mesh));
+    EXPECT_EQ(packed->mesh.materials.size(), plain->mesh.materials.size());
+    EXPECT_EQ(packed->warnings, plain->warnings);
+  }
+}
+
+/// The same file with other text of the same length in its JSON.
+std::vector<std::byte> with(std::vector<std::byte> file, std::string_view old, std::string_view text) {
+  const auto from = std::as_bytes(std::span(old));
+  const auto found = std::search(file.begin(), file.end(), from.begin(), from.end());
+  EXPECT_NE(found, file.end()) << old;
+  EXPECT_EQ(old.size(), text.size());
+  if (found != file.end()) std::copy_n(std::as_bytes(std::span(text)).begin(), text.size(), found);
+  return file;
+}
+
+TEST(GltfMeshopt, CodesThatLieAreRefusedWithTheirView) {
+  if (!reads_and_writes()) GTEST_SKIP() << "this build has no tinygltf or no meshoptimizer";
+  const auto file = castle(true, true);
+  const std::pair<std::string_view, std::string_view> lies[] = {
+      {R"("mode":"ATTRIBUTES")", R"("mode":"TRIANGLES" )"},
+      {R"("mode":"TRIANGLES")", R"("mode":"TRIANGLEX")"},
+      {R"("EXT_meshopt_compression":{"buffer":0)", R"("EXT_meshopt_compression":{"buffer":9)"},
+      {R"("mode":"TRIANGLES")", R"("mode":"INDICES"  )"},
+  };
+  for (const auto& [old, text] : lies) {
+    const auto loaded = read_mesh(with(file, old, text));
+    ASSERT_FALSE(loaded) << text;
+    EXPECT_EQ(loaded.error().code, ErrorCode::BadFormat) << text;
+    EXPECT_NE(loaded.error().message.find("buffer view"), std::string::npos) << loaded.error().message;
+  }
+  // Code that is cut, or other bytes: an error or other numbers, and nothing beyond.
+  for (std::size_t at = file.size() - 200; at < file.size(); at += 7) {
+    auto damaged = file;
+    damaged[at] ^= std::byte{0xFF};
+    (void)read_mesh(damaged);
+  }
+}
+
+}  // namespace
+}  // namespace quoin
