@@ -227,6 +227,15 @@ BiomeTints tints_of_biome(std::string_view name) {
   return found != std::end(kBiomes) ? found->tints : BiomeTints();
 }
 
+std::uint8_t index_of_tints(std::vector<BiomeTints>& all, const BiomeTints& tints) {
+  constexpr std::size_t kMost = 255;
+  const auto found = std::ranges::find(all, tints);
+  if (found != all.end()) return static_cast<std::uint8_t>(found - all.begin());
+  if (all.size() >= kMost) return 0;
+  all.push_back(tints);
+  return static_cast<std::uint8_t>(all.size() - 1);
+}
+
 std::string_view name_of_biome(std::int64_t number) {
   const auto found = std::ranges::find(kNumbers, number, &Numbered::number);
   return found != std::end(kNumbers) ? found->name : "plains";

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace quoin::minecraft {
 
@@ -19,5 +20,8 @@ struct BiomeTints {
 [[nodiscard]] BiomeTints tints_of_biome(std::string_view name);
 /// The name of a biome by its number, as worlds had it before 1.18; "plains" for one that is not known.
 [[nodiscard]] std::string_view name_of_biome(std::int64_t number);
+
+/// The index of tints in a list, which they are added to where they are new; beyond 255 of them the first's.
+[[nodiscard]] std::uint8_t index_of_tints(std::vector<BiomeTints>& all, const BiomeTints& tints);
 
 }  // namespace quoin::minecraft

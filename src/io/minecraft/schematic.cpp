@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "io/byte_stream.h"
+#include "io/minecraft/biomes.h"
 #include "io/minecraft/block_types.h"
 #include "io/minecraft/column_builder.h"
 #include "io/minecraft/legacy_blocks.h"
@@ -34,12 +35,22 @@ std::string text_of(IVec3 size) {
   return std::to_string(size.x) + " x " + std::to_string(size.y) + " x " + std::to_string(size.z);
 }
 
+/// What colours the grass of columns: of all of their height, or of each slab of 16 layers.
+struct ColumnBiomes {
+  std::vector<BiomeTints> tints;
+  std::vector<std::uint8_t> of_columns;  ///< by slab, z, x; empty: all have the first, or plains'
+
+  /// Those of 16 x 16 columns from (x, z) on; beyond the region the first's.
+  void put_into(Section& section, IVec3 corner, IVec3 size) const;
+};
+
 /// Blocks that one array holds.
 struct Region {
   std::string name;
   IVec3 min{0};
   IVec3 size{0};
   std::vector<Block> palette;
+  ColumnBiomes biomes;
   /// Fills a layer: indices in the palette, by z, then x. Called for each layer once, from below. May be empty of a
   /// region of one block.
   std::function<Status(int y, std::span<std::uint16_t> layer)> read_layer;
@@ -66,6 +77,8 @@ class SchematicReader {
   Status read_litematic_region(nbt::Value from);
   Status read_structure();
   Status put_structure(Region& region, nbt::Value blocks);
+  void take_biomes(Region& region, nbt::Value palette, nbt::Value data, int layers);
+  void take_numbered_biomes(Region& region, nbt::Value numbers);
   Status put(const Region& region);
   Status fill(const Region& region, int first_y, std::span<const std::uint16_t> layers);
   Result<IVec3> size_of(nbt::Value schematic) const;
@@ -78,7 +91,7 @@ class SchematicReader {
   ColumnBuilder builder_{types_};
   std::size_t entities_ = 0;
   std::size_t block_entities_ = 0;
-  bool has_biomes_ = false;
+  bool has_lost_biomes_ = false;
 };
 
 std::uint64_t volume_of(IVec3 size) {
@@ -197,7 +210,11 @@ Status SchematicReader::read_sponge(nbt::Value schematic) {
   region.palette = std::move(*palette);
   block_entities_ += nbt::first_of(holder, "BlockEntities", "TileEntities").count();
   entities_ += schematic["Entities"].count();
-  has_biomes_ = schematic["BiomeData"] || schematic["Biomes"];
+  if (const nbt::Value second = schematic["BiomeData"]) {
+    take_biomes(region, schematic["BiomePalette"], second, 1);
+  } else if (const nbt::Value third = schematic["Biomes"]) {
+    take_biomes(region, third["Palette"], third["Data"], region.size.y);
+  }
   if (data.bytes().size() < volume_of(*size)) {
     return fault(
         "a schematic of " + text_of(*size) + " with " + std::to_string(data.bytes().size()) + " bytes of blocks",
@@ -214,6 +231,44 @@ Status SchematicReader::read_sponge(nbt::Value schematic) {
     return {};
   };
   return put(region);
+}
+
+// Indices of a palette of names: of columns, or of all blocks, of which each column's lowest of 16 is taken.
+void SchematicReader::take_biomes(Region& region, nbt::Value palette, nbt::Value data, int layers) {
+  ColumnBiomes& biomes = region.biomes;
+  std::vector<std::uint8_t> of_palette;
+  palette.for_each([&](nbt::Value entry) {
+    const auto index = entry.integer();
+    if (!index || *index < 0 || static_cast<std::uint64_t>(*index) >= kMaxPalette) return;
+    const auto at = static_cast<std::size_t>(*index);
+    if (of_palette.size() <= at) of_palette.resize(at + 1);
+    of_palette[at] = index_of_tints(biomes.tints, tints_of_biome(entry.name()));
+  });
+  const auto area = static_cast<std::size_t>(region.size.x) * static_cast<std::size_t>(region.size.z);
+  VarintReader indices(data.bytes());
+  for (int y = 0; y < layers; ++y) {
+    for (std::size_t i = 0; i < area; ++i) {
+      const auto next = indices.next();
+      if (!next || *next >= of_palette.size()) {
+        has_lost_biomes_ = true;
+        biomes = {};
+        return;
+      }
+      if (y % kSectionEdge == 0) biomes.of_columns.push_back(of_palette[*next]);
+    }
+  }
+}
+
+// A number for each column.
+void SchematicReader::take_numbered_biomes(Region& region, nbt::Value numbers) {
+  if (numbers.count() == 0) return;
+  const auto area = static_cast<std::size_t>(region.size.x) * static_cast<std::size_t>(region.size.z);
+  has_lost_biomes_ = !numbers.is_integers() || numbers.count() != area;
+  if (has_lost_biomes_) return;
+  for (std::size_t i = 0; i < area; ++i) {
+    const BiomeTints tints = tints_of_biome(name_of_biome(numbers.integer(i) & 255));
+    region.biomes.of_columns.push_back(index_of_tints(region.biomes.tints, tints));
+  }
 }
 
 // Blocks by the numbers that they had before 1.13.
@@ -242,7 +297,7 @@ Status SchematicReader::read_mcedit() {
   region.size = *size;
   block_entities_ += root_["TileEntities"].count();
   entities_ += root_["Entities"].count();
-  has_biomes_ = root_["Biomes"].count() > 0;
+  take_numbered_biomes(region, root_["Biomes"]);
   std::vector<std::uint16_t> index_of(std::size_t{4096} * 16, kNoIndex);
   const auto code_of = [&](std::size_t i) {
     const int id = nibble(add, i) << 8 | std::to_integer<int>(blocks[i]);
@@ -335,6 +390,23 @@ Status SchematicReader::read_structure() {
   return put_structure(region, root_["blocks"]);
 }
 
+void ColumnBiomes::put_into(Section& section, IVec3 corner, IVec3 size) const {
+  section.biomes = tints;
+  if (section.biomes.empty()) section.biomes.emplace_back();
+  section.biome_indices.assign(of_columns.empty() ? 64 : 256, 0);
+  if (of_columns.empty()) return;
+  const auto width = static_cast<std::size_t>(size.x);
+  const std::size_t area = width * static_cast<std::size_t>(size.z);
+  const std::size_t slab = of_columns.size() == area ? 0 : static_cast<std::size_t>(corner.y / kSectionEdge);
+  const auto row = static_cast<std::size_t>(std::min(kSectionEdge, size.x - corner.x));
+  for (int dz = 0; dz < std::min(kSectionEdge, size.z - corner.z); ++dz) {
+    const std::size_t from =
+        slab * area + static_cast<std::size_t>(corner.z + dz) * width + static_cast<std::size_t>(corner.x);
+    std::copy_n(of_columns.begin() + static_cast<std::ptrdiff_t>(from), row,
+                section.biome_indices.begin() + static_cast<std::ptrdiff_t>(dz) * kSectionEdge);
+  }
+}
+
 // Where nothing is said there is air.
 Status SchematicReader::put_structure(Region& region, nbt::Value blocks) {
   struct Placed {
@@ -380,8 +452,6 @@ Status SchematicReader::fill(const Region& region, int first_y, std::span<const 
   Section section;
   section.palette = region.palette;
   section.palette.emplace_back();
-  section.biomes.emplace_back();
-  section.biome_indices.assign(64, 0);
   for (int z = 0; z < region.size.z; z += kSectionEdge) {
     for (int x = 0; x < region.size.x; x += kSectionEdge) {
       section.indices.fill(air);
@@ -400,6 +470,7 @@ Status SchematicReader::fill(const Region& region, int first_y, std::span<const 
         }
       }
       if (is_air) continue;
+      region.biomes.put_into(section, {x, first_y, z}, region.size);
       if (auto put = builder_.put(section, {x, first_y, z}); !put) return put;
     }
   }
@@ -441,8 +512,9 @@ void SchematicReader::note_left_out() {
   };
   note(block_entities_, "blocks' contents (chests, signs and the like)");
   note(entities_, "entities");
-  if (has_biomes_)
-    loaded_.warnings.emplace_back("left out: biomes; grass, leaves and water have the colours of plains");
+  if (has_lost_biomes_) {
+    loaded_.warnings.emplace_back("left out: biomes that are cut or not in their palette; what they colour is plains'");
+  }
 }
 
 Status SchematicReader::read_any() {

@@ -155,6 +155,54 @@ TEST(Schematic, LargerOnesThanASectionComeWhole) {
   EXPECT_EQ(loaded->scene.voxel_count(), kEdge * kEdge * kEdge - (kEdge * kEdge * kEdge + 2) / 3);
 }
 
+/// 2 x 18 x 1 blocks of grass; `biomes`: by column for versions 2 and 0 (MCEdit's), by block for version 3.
+std::vector<std::byte> meadow(int version, const std::vector<std::uint8_t>& biomes) {
+  NbtWriter nbt;
+  nbt.compound(version == 3 ? "" : "Schematic");
+  if (version == 3) nbt.compound("Schematic");
+  if (version != 0) nbt.integer("Version", version);
+  put_sizes(nbt, {2, 18, 1});
+  const std::vector<std::uint8_t> blocks(36, version == 0 ? 2 : 0);
+  if (version == 0) return nbt.byte_array("Blocks", blocks).byte_array("Biomes", biomes).end().bytes;
+  if (version == 3) nbt.compound("Blocks");
+  nbt.compound("Palette").integer("minecraft:grass_block", 0).end();
+  nbt.byte_array(version == 3 ? "Data" : "BlockData", blocks);
+  if (version == 3) nbt.end().compound("Biomes");
+  nbt.compound(version == 3 ? "Palette" : "BiomePalette");
+  nbt.integer("minecraft:plains", 0).integer("minecraft:desert", 1).end();
+  nbt.byte_array(version == 3 ? "Data" : "BiomeData", biomes);
+  if (version == 3) nbt.end().end();
+  return nbt.end().bytes;
+}
+
+TEST(Schematic, BiomesColourTheGrassOfColumns) {
+  constexpr std::uint8_t kDesert = 2;  // by number
+  std::vector<std::uint8_t> by_block(36, 0);
+  for (std::size_t y = 0; y < 16; ++y) by_block[2 * y + 1] = 1;
+  for (const auto& file : {meadow(2, {0, 1}), meadow(0, {1, kDesert}), meadow(3, by_block)}) {
+    const auto loaded = read_schematic(file);
+    ASSERT_TRUE(loaded) << to_string(loaded.error());
+    EXPECT_TRUE(loaded->warnings.empty());
+    const Grid& grid = loaded->scene.grids()[loaded->scene.grids().handles().front()].grid;
+    EXPECT_EQ(grid.voxel_count(), 36);
+    const VoxelType plains = grid.get({0, 0, 0});
+    EXPECT_NE(grid.get({1, 0, 0}), plains);
+    EXPECT_EQ(grid.get({0, 17, 0}), plains);
+    // Each slab of 16 layers by itself, where the file says it.
+    const bool is_by_block = file.size() == meadow(3, by_block).size();
+    EXPECT_EQ(grid.get({1, 17, 0}) == plains, is_by_block);
+  }
+  // Too few, or of none: plains, and a line.
+  for (const auto& file : {meadow(2, {0}), meadow(2, {0, 9}), meadow(0, {1}), meadow(3, {0, 1})}) {
+    const auto loaded = read_schematic(file);
+    ASSERT_TRUE(loaded) << to_string(loaded.error());
+    ASSERT_EQ(loaded->warnings.size(), 1U);
+    EXPECT_NE(loaded->warnings[0].find("biomes"), std::string::npos);
+    const Grid& grid = loaded->scene.grids()[loaded->scene.grids().handles().front()].grid;
+    EXPECT_EQ(grid.get({0, 0, 0}), grid.get({1, 0, 0}));
+  }
+}
+
 TEST(Schematic, WhatIsWrongIsSaidInALine) {
   EXPECT_EQ(read_schematic(structure({2, 1, 2})).error().code, ErrorCode::BadFormat);
   EXPECT_EQ(read_schematic(litematic({12, 1, 6})).error().code, ErrorCode::BadFormat);

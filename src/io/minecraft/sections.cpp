@@ -160,14 +160,7 @@ void SectionReader::read_biomes(nbt::Value section, nbt::Value level) {
   std::vector<std::uint8_t>& indices = section_.biome_indices;
   biomes.clear();
   indices.assign(64, 0);
-  constexpr std::size_t kMost = 255;
-  const auto index_of = [&](const BiomeTints& tints) {
-    const auto found = std::ranges::find(biomes, tints);
-    if (found != biomes.end()) return static_cast<std::uint8_t>(found - biomes.begin());
-    if (biomes.size() >= kMost) return std::uint8_t{0};
-    biomes.push_back(tints);
-    return static_cast<std::uint8_t>(biomes.size() - 1);
-  };
+  const auto index_of = [&](const BiomeTints& tints) { return index_of_tints(biomes, tints); };
   if (const nbt::Value palette = section["biomes"]["palette"]; palette.count() > 0) {
     std::vector<std::uint8_t> of_palette;
     palette.for_each(
