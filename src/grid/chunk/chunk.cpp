@@ -243,27 +243,32 @@ bool Chunk::set(int x, int y, int z, VoxelType type) {
   if (storage_ == nullptr) return type != uniform_ && set_anywhere(x, y, z, type);
   ChunkStorage& m = *storage_;
   const std::uint32_t slot = m.slabs[ChunkStorage::slab_index(y, z)];
-  if ((slot & ChunkStorage::kUniformSlab) != 0 || m.direct() || m.palette[m.recent] != type)
+  if ((slot & ChunkStorage::kUniformSlab) != 0 || m.direct() || storage_.is_shared())
     return set_anywhere(x, y, z, type);
+  std::uint32_t index = m.recent;
+  if (m.palette[index] != type) {
+    const auto found = std::find(m.palette.begin(), m.palette.end(), type);
+    if (found == m.palette.end()) return set_anywhere(x, y, z, type);
+    index = static_cast<std::uint32_t>(found - m.palette.begin());
+  }
   const auto bit = static_cast<unsigned>(x * m.bits);
   std::uint64_t& word = m.row(slot, ChunkStorage::row_in_slab(y, z))[bit >> 6];
   const std::uint32_t old = static_cast<std::uint32_t>(word >> (bit & 63U)) & ((1U << m.bits) - 1U);
-  if (old == m.recent) return false;
-  if (storage_.is_shared()) [[unlikely]]
-    return set_anywhere(x, y, z, type);
+  if (old == index) return false;
+  m.recent = index;
   types_will_change(y, z, std::uint64_t{1} << x);
-  word ^= std::uint64_t{old ^ m.recent} << (bit & 63U);
-  m.move_counts(old, m.recent, 1);
+  word ^= std::uint64_t{old ^ index} << (bit & 63U);
+  m.move_counts(old, index, 1);
   if (type == kAir) {
     m.count_voxel(x, y, z, -1);
   } else if (m.palette[old] == kAir) {
     m.count_voxel(x, y, z, 1);
   }
-  after_writing(y, z, m.recent, 1);
+  after_writing(y, z, index, 1);
   return true;
 }
 
-// Also where the slab has no voxels of its own yet, and for types that were not the last to be written.
+// Also where the slab has no voxels of its own yet, and for types that the chunk does not have.
 bool Chunk::set_anywhere(int x, int y, int z, VoxelType type) {
   const VoxelType old = storage_ == nullptr ? uniform_ : storage_->type(x, y, z);
   if (old == type) return false;
