@@ -252,7 +252,7 @@ Result<std::vector<std::string>> Document::losses(const std::filesystem::path& p
 
 Status Document::write(const std::filesystem::path& path, std::vector<std::string>& warnings,
                        const Progress& progress) const {
-  if (world_) return write_world(path);
+  if (world_) return write_world(path, warnings, progress);
   const auto format = format_to_write(path);
   if (!format) return format.error();
   if (*format == FileFormat::Glb) return write_as_glb(loaded_.scene, path, progress);
@@ -271,13 +271,31 @@ Status Document::write(const std::filesystem::path& path, std::vector<std::strin
   return {};
 }
 
-Status Document::write_world(const std::filesystem::path& path) const {
+Status Document::write_world(const std::filesystem::path& path, std::vector<std::string>& warnings,
+                             const Progress& progress) const {
   if (is_same_file(path, path_)) return world_->flush();
   const auto format = format_to_write(path);
-  if (format && *format == FileFormat::World) return world_->copy_to(path);
-  return make_error(ErrorCode::Unsupported,
-                    "only a part of a world is in memory here: it is copied as .quoin; `quoin convert` writes others",
-                    path.string());
+  if (!format || *format != FileFormat::World) {
+    return make_error(ErrorCode::Unsupported,
+                      "only a part of a world is in memory here: it is copied as .quoin; `quoin convert` writes others",
+                      path.string());
+  }
+  // Saves beside a world that are not in it yet would be lost with the name.
+  std::error_code none;
+  const auto waiting = std::filesystem::file_size(path.string() + "-wal", none);
+  if (!none && waiting > 0) {
+    return make_error(ErrorCode::CannotWrite, "the world there was not closed: open it once, or choose another name",
+                      path.string());
+  }
+  auto backup = FileBackup::of(path);
+  if (!backup) return backup.error();
+  const auto copied = world_->copy_to(path, progress);
+  if (!copied) return copied.error();
+  if (!copied->lost.empty()) {
+    warnings.push_back(std::to_string(copied->lost.size()) + " chunks are damaged, and not in the copy");
+  }
+  if (Status kept = backup->keep(); !kept) warnings.push_back(to_string(kept.error()));
+  return {};
 }
 
 std::filesystem::path Document::kept_as(const std::filesystem::path& path) const {

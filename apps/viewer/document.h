@@ -124,7 +124,8 @@ class Document {
   };
 
   [[nodiscard]] Scene& edited_scene() { return world_ ? world_->scene() : loaded_.scene; }
-  [[nodiscard]] Status write_world(const std::filesystem::path& path) const;
+  [[nodiscard]] Status write_world(const std::filesystem::path& path, std::vector<std::string>& warnings,
+                                   const Progress& progress) const;
   std::int64_t touch(IVec3 voxel);
   std::int64_t touch_surface(DVec3 point);
   std::int64_t drag_surface(const Ray& ray_in_world, const std::optional<SceneHit>& hit, const Instance& instance,

@@ -9,7 +9,6 @@
 
 #include <glm/geometric.hpp>
 #include <quoin/core/memory.h>
-#include <quoin/store/world_care.h>
 
 namespace quoin::viewer {
 
@@ -162,12 +161,11 @@ bool WorldWindow::is_loaded_at(DVec3 point) const {
   });
 }
 
-Status WorldWindow::copy_to(const std::filesystem::path& path) {
+Result<WorldCopy> WorldWindow::copy_to(const std::filesystem::path& path, const Progress& progress) {
   if (why_not_written_.empty()) {
-    if (Status saved = flush(); !saved) return saved;
+    if (Status saved = flush(); !saved) return saved.error();
   }
-  const auto copied = back_up_world(world_.store().path(), path);
-  return copied ? Status() : Status(copied.error());
+  return copy_world(world_.store().path(), path, progress);
 }
 
 std::string WorldWindow::text() const {

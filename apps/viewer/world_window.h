@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <quoin/scene/camera.h>
+#include <quoin/store/world_care.h>
 #include <quoin/stream/streamed_world.h>
 
 namespace quoin::viewer {
@@ -56,8 +57,8 @@ class WorldWindow {
   [[nodiscard]] bool is_loaded_at(DVec3 point) const;
   /// Saves all that was edited, and returns once it is on disk. Errors: as StreamedWorld::flush.
   Status flush() { return world_.flush(); }
-  /// Saves all, and copies the world to a file that is not there yet. Errors: as flush and back_up_world.
-  Status copy_to(const std::filesystem::path& path);
+  /// Saves all, and copies the world, in place of what is there. Errors: as flush and copy_world.
+  Result<WorldCopy> copy_to(const std::filesystem::path& path, const Progress& progress = {});
 
   /// For people: "1204 chunks, 96 MB, all within 420".
   [[nodiscard]] std::string text() const;

@@ -196,8 +196,29 @@ TEST_F(WorldWindowTest, IsCopiedAsAWorldAndAsNothingElse) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
   EXPECT_FALSE(std::filesystem::exists(other("copy.vox")));
-  EXPECT_FALSE(document->write(other("copy.quoin"), warnings)) << "it is there";
   EXPECT_TRUE(document->write(path(), warnings)) << "itself";
+  EXPECT_TRUE(warnings.empty());
+}
+
+TEST_F(WorldWindowTest, ACopyTakesThePlaceOfAWorldThatIsKept) {
+  make_endless();
+  const auto document = open(near_by());
+  settle(*document->world(), camera_at({0.0, 100.0, 0.0}));
+  std::vector<std::string> warnings;
+  ASSERT_TRUE(save_scene(small_scene(), other("copy.quoin")));
+  EXPECT_EQ(document->write(other("copy.quoin"), warnings, [](double) { return false; }).error().code,
+            ErrorCode::Cancelled);
+  EXPECT_EQ(load_scene(other("copy.quoin"))->scene.voxel_count(), small_scene().scene.voxel_count());
+  ASSERT_TRUE(document->write(other("copy.quoin"), warnings));
+  EXPECT_TRUE(warnings.empty());
+  EXPECT_NE(load_scene(other("copy.quoin"))->scene.voxel_count(), small_scene().scene.voxel_count());
+  const auto kept = load_scene(other("copy.quoin~"));
+  ASSERT_TRUE(kept) << to_string(kept.error());
+  EXPECT_EQ(kept->scene.voxel_count(), small_scene().scene.voxel_count());
+  // One that somebody has open, or that was left with saves beside it, stays.
+  const auto game = WorldStore::open(other("copy.quoin"), WorldAccess::Write);
+  ASSERT_TRUE(game);
+  EXPECT_EQ(document->write(other("copy.quoin"), warnings).error().code, ErrorCode::CannotWrite);
 }
 
 // Pictures of a flight are those of a world that is in memory as a whole, as far as all is loaded.

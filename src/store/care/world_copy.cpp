@@ -45,6 +45,7 @@ class Copy {
       : reader_(reader), to_(to), file_bytes_(file_bytes), progress_(progress) {}
 
   Result<WorldCopy> run() {
+    if (Status goes_on = tell(); !goes_on) return goes_on.error();
     // All of one moment.
     if (auto begun = reader_.connection().run("BEGIN"); !begun) return begun.error();
     auto rules = read_rules(reader_);
@@ -147,10 +148,13 @@ class Copy {
   Status advance(std::size_t bytes) {
     read_ += bytes;
     if (copied_.chunks % kGroup != 0) return {};
-    if (progress_ && !progress_(std::min(1.0, static_cast<double>(read_) / file_bytes_))) {
-      return make_error(ErrorCode::Cancelled, "cancelled");
-    }
+    if (Status goes_on = tell(); !goes_on) return goes_on;
     return to_.run("COMMIT; BEGIN");
+  }
+
+  Status tell() const {
+    if (!progress_ || progress_(std::min(1.0, static_cast<double>(read_) / file_bytes_))) return {};
+    return make_error(ErrorCode::Cancelled, "cancelled");
   }
 
   WorldReader& reader_;
