@@ -33,6 +33,15 @@ inline constinit std::atomic<std::uint8_t> instruction_set_in_use{0};
   return set <= instruction_set();
 }
 
+/// What is compiled once for each instruction set: one of each, several times where it has no better one.
+template <class Kernel>
+struct KernelTable {
+  const Kernel* of[kInstructionSets];
+
+  /// That of the widest instructions that this machine has.
+  [[nodiscard]] const Kernel& widest() const { return *of[static_cast<std::size_t>(instruction_set())]; }
+};
+
 /// What a processor has that has the set, for messages.
 [[nodiscard]] const char* name_of(InstructionSet set);
 

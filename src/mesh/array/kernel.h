@@ -133,16 +133,14 @@ extern const Kernel kPlainKernel;
 #ifdef QUOIN_X86_KERNELS
 extern const Kernel kAvx2Kernel;
 extern const Kernel kAvx512Kernel;
-inline constexpr const Kernel* kKernels[kInstructionSets] = {&kPlainKernel, &kAvx2Kernel, &kAvx2Kernel, &kAvx512Kernel};
+inline constexpr KernelTable<Kernel> kKernels = {{&kPlainKernel, &kAvx2Kernel, &kAvx2Kernel, &kAvx512Kernel}};
+#else
+inline constexpr KernelTable<Kernel> kKernels = {{&kPlainKernel}};
 #endif
 
 /// That of the widest instructions that this machine has.
 [[nodiscard]] inline const Kernel& kernel() {
-#ifdef QUOIN_X86_KERNELS
-  return *kKernels[static_cast<std::size_t>(instruction_set())];
-#else
-  return kPlainKernel;
-#endif
+  return kKernels.widest();
 }
 
 }  // namespace quoin::array

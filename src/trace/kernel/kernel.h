@@ -70,29 +70,20 @@ extern const Kernel kAvx2Kernel;
 extern const Kernel kAvx512Kernel;
 extern const FieldKernel kAvx2FieldKernel;
 extern const FieldKernel kAvx512FieldKernel;
-#endif
-
-#ifdef QUOIN_X86_KERNELS
-inline constexpr const Kernel* kKernels[kInstructionSets] = {&kPlainKernel, &kAvx2Kernel, &kAvx512Kernel,
-                                                             &kAvx512Kernel};
-inline constexpr const FieldKernel* kFieldKernels[kInstructionSets] = {&kPlainFieldKernel, &kAvx2FieldKernel,
-                                                                       &kAvx512FieldKernel, &kAvx512FieldKernel};
+inline constexpr KernelTable<Kernel> kKernels = {{&kPlainKernel, &kAvx2Kernel, &kAvx512Kernel, &kAvx512Kernel}};
+inline constexpr KernelTable<FieldKernel> kFieldKernels = {
+    {&kPlainFieldKernel, &kAvx2FieldKernel, &kAvx512FieldKernel, &kAvx512FieldKernel}};
+#else
+inline constexpr KernelTable<Kernel> kKernels = {{&kPlainKernel}};
+inline constexpr KernelTable<FieldKernel> kFieldKernels = {{&kPlainFieldKernel}};
 #endif
 
 /// That of the widest instructions that this machine has.
 [[nodiscard]] inline const Kernel& kernel() {
-#ifdef QUOIN_X86_KERNELS
-  return *kKernels[static_cast<std::size_t>(instruction_set())];
-#else
-  return kPlainKernel;
-#endif
+  return kKernels.widest();
 }
 [[nodiscard]] inline const FieldKernel& field_kernel() {
-#ifdef QUOIN_X86_KERNELS
-  return *kFieldKernels[static_cast<std::size_t>(instruction_set())];
-#else
-  return kPlainFieldKernel;
-#endif
+  return kFieldKernels.widest();
 }
 
 }  // namespace quoin::trace
