@@ -61,13 +61,17 @@ class Crossings {
   /// Errors: LimitExceeded, before anything is found; Cancelled.
   [[nodiscard]] static Result<Crossings> find(const Frame& frame, Threads threads, const Progress& progress);
 
-  /// The lines along `axis` through a chunk of the frame.
-  [[nodiscard]] const Column& column(int axis, IVec3 chunk) const {
+  /// All columns along `axis`.
+  [[nodiscard]] std::span<const Column> columns(int axis) const { return columns_[static_cast<std::size_t>(axis)]; }
+  /// Of these the one through a chunk of the frame.
+  [[nodiscard]] std::size_t column_index(int axis, IVec3 chunk) const {
     const auto [u, v] = kPlane[static_cast<std::size_t>(axis)];
-    return columns_[static_cast<std::size_t>(axis)]
-                   [static_cast<std::size_t>(chunk[u]) +
-                    static_cast<std::size_t>(chunks_[u]) * static_cast<std::size_t>(chunk[v])];
+    return static_cast<std::size_t>(chunk[u]) +
+           static_cast<std::size_t>(chunks_[u]) * static_cast<std::size_t>(chunk[v]);
   }
+  [[nodiscard]] const Column& column(int axis, IVec3 chunk) const { return columns(axis)[column_index(axis, chunk)]; }
+  /// Chunks of the frame along each axis.
+  [[nodiscard]] IVec3 chunks() const { return chunks_; }
 
  private:
   std::array<std::vector<Column>, 3> columns_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <limits>
 
 namespace quoin::voxelizing {
 
@@ -51,24 +52,51 @@ class LineVotes {
 
 using Plane = std::array<std::int16_t, kLines>;
 
-/// The votes of the lines where they enter a chunk; whether none of them changes in it.
-bool entering_votes(const Column& column, SolidVoxels rule, int first, Plane& votes) {
+/// The votes of the lines where they enter a chunk.
+void entering_votes(const Column& column, SolidVoxels rule, int first, Plane& votes) {
   votes.fill(0);
-  if (column.begin.empty()) return true;
-  bool is_constant = true;
+  if (column.begin.empty()) return;
   for (std::size_t i = 0; i < kLines; ++i) {
     const auto line = column.line(i);
-    if (line.empty()) continue;
-    LineVotes at(line, rule, first);
-    votes[i] = static_cast<std::int16_t>(at.votes());
-    int where = 0;
-    if (is_constant && at.advance(where)) is_constant = false;
+    if (!line.empty()) votes[i] = static_cast<std::int16_t>(LineVotes(line, rule, first).votes());
   }
-  return is_constant;
 }
 
-bool is_uniform(const Plane& votes) {
-  return std::all_of(votes.begin(), votes.end(), [&](std::int16_t v) { return v == votes[0]; });
+/// Widens the ranges of the chunks that a line passes by what it says in them: between two crossings it is the same.
+void add_line(std::span<const Crossing> line, SolidVoxels rule, std::span<VoteRange> chunks) {
+  const int end = static_cast<int>(chunks.size()) * kChunkEdge;
+  int all = 0;
+  for (const Crossing& crossing : line) all += crossing.step();
+  int before = 0;
+  int from = 0;
+  for (std::size_t next = 0; next <= line.size(); ++next) {
+    const int to = next == line.size() ? end : std::min(line[next].behind(), end);
+    if (from < to) {
+      const int said = votes_of(rule, before, all, static_cast<int>(next), static_cast<int>(line.size()));
+      const auto votes = static_cast<std::int16_t>(said);
+      for (int chunk = from / kChunkEdge; chunk <= (to - 1) / kChunkEdge; ++chunk) {
+        VoteRange& range = chunks[static_cast<std::size_t>(chunk)];
+        range.least = std::min(range.least, votes);
+        range.most = std::max(range.most, votes);
+      }
+      from = to;
+    }
+    if (next < line.size()) before += line[next].step();
+  }
+}
+
+/// The ranges of a column's chunks; where nothing is met they stay 0 to 0.
+void find_ranges(const Column& column, SolidVoxels rule, std::span<VoteRange> chunks) {
+  if (column.begin.empty()) return;
+  constexpr VoteRange kNone = {std::numeric_limits<std::int16_t>::max(), std::numeric_limits<std::int16_t>::min()};
+  std::fill(chunks.begin(), chunks.end(), kNone);
+  bool has_empty = false;
+  for (std::size_t i = 0; i < kLines; ++i) {
+    const auto line = column.line(i);
+    if (!line.empty()) add_line(line, rule, chunks);
+    has_empty |= line.empty();
+  }
+  if (has_empty) add_line({}, rule, chunks);
 }
 
 /// Adds the votes of lines along x: those that change do so within a row.
@@ -150,20 +178,37 @@ bool is_inside(int votes) {
 
 }  // namespace
 
-Filled find_inside(const Crossings& crossings, IVec3 chunk, SolidVoxels rule, InsideScratch& scratch, ChunkBits& bits) {
-  std::array<Plane, 3> entering;
-  bool all_uniform = true;
-  int uniform = 0;
+Inside::Inside(const Crossings& crossings, SolidVoxels rule, Threads threads) : crossings_(&crossings), rule_(rule) {
   for (int axis = 0; axis < 3; ++axis) {
-    Plane& votes = entering[static_cast<std::size_t>(axis)];
-    all_uniform &=
-        entering_votes(crossings.column(axis, chunk), rule, chunk[axis] * kChunkEdge, votes) && is_uniform(votes);
-    uniform += votes[0];
+    const auto columns = crossings.columns(axis);
+    const auto along = static_cast<std::size_t>(crossings.chunks()[axis]);
+    std::vector<VoteRange>& ranges = ranges_[static_cast<std::size_t>(axis)];
+    ranges.resize(columns.size() * along);
+    parallel_for(columns.size(), threads,
+                 [&](std::size_t i) { find_ranges(columns[i], rule, std::span(ranges).subspan(i * along, along)); });
   }
-  if (all_uniform) return is_inside(uniform) ? Filled::All : Filled::None;
+}
+
+Filled Inside::find(IVec3 chunk, InsideScratch& scratch, ChunkBits& bits) const {
+  int least = 0;
+  int most = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto along = static_cast<std::size_t>(crossings_->chunks()[axis]);
+    const VoteRange& range = ranges_[static_cast<std::size_t>(axis)][crossings_->column_index(axis, chunk) * along +
+                                                                     static_cast<std::size_t>(chunk[axis])];
+    least += range.least;
+    most += range.most;
+  }
+  if (least > kHalf || most < -kHalf) return Filled::All;
+  if (least >= -kHalf && most <= kHalf) return Filled::None;
+  std::array<Plane, 3> entering;
+  for (int axis = 0; axis < 3; ++axis) {
+    entering_votes(crossings_->column(axis, chunk), rule_, chunk[axis] * kChunkEdge,
+                   entering[static_cast<std::size_t>(axis)]);
+  }
   scratch.votes.assign(kChunkVoxels, 0);
-  add_along_x(crossings.column(0, chunk), rule, chunk.x * kChunkEdge, entering[0], scratch.votes.data());
-  add_along_y_and_z(crossings, chunk, rule, entering, scratch.votes);
+  add_along_x(crossings_->column(0, chunk), rule_, chunk.x * kChunkEdge, entering[0], scratch.votes.data());
+  add_along_y_and_z(*crossings_, chunk, rule_, entering, scratch.votes);
   std::uint64_t some = 0;
   std::uint64_t all = ~std::uint64_t{0};
   const std::int16_t* votes = scratch.votes.data();

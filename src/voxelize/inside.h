@@ -12,12 +12,30 @@ struct InsideScratch {
   std::vector<std::int16_t> votes;  ///< of every voxel, x fastest
 };
 
-/// Finds the voxels of a chunk whose centre is solid by `rule`; `bits` is set where that is some of them only.
+/// The least and the most votes of the lines along an axis, anywhere in a chunk.
+struct VoteRange {
+  std::int16_t least = 0;
+  std::int16_t most = 0;
+};
+
+/// Which voxels are within a mesh.
 ///
 /// Votes: by Winding each of the six rays from a centre along the axes says how often more it leaves the mesh than it
 ///        enters it; their sum is six times the winding number. By Parity each says whether it meets an odd number.
-/// Requires: `rule` is not None.
-[[nodiscard]] Filled find_inside(const Crossings& crossings, IVec3 chunk, SolidVoxels rule, InsideScratch& scratch,
-                                 ChunkBits& bits);
+/// What the lines of all axes say at least and at most decides most chunks, of open meshes too: `find` looks at the
+/// voxels of the others only.
+class Inside {
+ public:
+  /// Requires: `rule` is not None; `crossings` outlives it.
+  Inside(const Crossings& crossings, SolidVoxels rule, Threads threads);
+
+  /// Finds the voxels of a chunk whose centre is solid; `bits` is set where that is some of them only.
+  [[nodiscard]] Filled find(IVec3 chunk, InsideScratch& scratch, ChunkBits& bits) const;
+
+ private:
+  const Crossings* crossings_;
+  SolidVoxels rule_;
+  std::array<std::vector<VoteRange>, 3> ranges_;  // of an axis: chunks along it, column after column
+};
 
 }  // namespace quoin::voxelizing

@@ -56,7 +56,8 @@ constexpr double kFoundShare = 0.9;
 /// All of what a run needs, made once.
 struct Parts {
   Frame frame;
-  std::optional<Crossings> crossings;
+  std::unique_ptr<const Crossings> crossings;  // null where nobody asks them
+  std::optional<Inside> inside;                // of a rule for what is solid
   std::optional<ChunkTriangles> triangles;
   std::optional<SurfaceColours> colours;
 };
@@ -75,11 +76,13 @@ Filled filled(const ChunkBits& bits) {
   return is(~std::uint64_t{0}) ? Filled::All : Filled::Some;
 }
 
-/// The bits of what find_inside found.
-void find_solid(const Parts& parts, IVec3 chunk, SolidVoxels rule, Scratch& scratch, ChunkBits& solid) {
-  Filled within = Filled::None;
-  if (rule != SolidVoxels::None) within = find_inside(*parts.crossings, chunk, rule, scratch.inside, solid);
-  if (within != Filled::Some) solid.fill(within == Filled::All ? ~std::uint64_t{0} : 0);
+/// What of a chunk is solid; `solid` is set where that is some of it only.
+Filled find_solid(const Parts& parts, IVec3 chunk, Scratch& scratch, ChunkBits& solid) {
+  return parts.inside ? parts.inside->find(chunk, scratch.inside, solid) : Filled::None;
+}
+
+void fill_unless_some(Filled filled, ChunkBits& bits) {
+  if (filled != Filled::Some) bits.fill(filled == Filled::All ? ~std::uint64_t{0} : 0);
 }
 
 void find_nearest_of(const Parts& parts, std::size_t index, const Wanted& wanted, bool holes_count, Nearest& nearest) {
@@ -130,7 +133,9 @@ void colour_voxels(const Parts& parts, std::size_t index, const Nearest& nearest
 Found find_voxels(const Parts& parts, std::size_t index, const VoxelizeOptions& options, Scratch& scratch) {
   Found found;
   ChunkBits solid;
-  find_solid(parts, parts.frame.chunk_at(index), options.solid, scratch, solid);
+  found.filled = find_solid(parts, parts.frame.chunk_at(index), scratch, solid);
+  if (found.filled != Filled::Some && parts.triangles->of(index).empty()) return found;
+  fill_unless_some(found.filled, solid);
   ChunkBits all = solid;
   mark_surface(parts, index, options.surface, all);
   if (!parts.colours->is_plain() && !parts.triangles->of(index).empty()) {
@@ -165,13 +170,13 @@ Found find_densities(const Parts& parts, std::size_t index, const DistanceFieldO
   Found found;
   ChunkBits solid;
   const IVec3 chunk = parts.frame.chunk_at(index);
-  find_solid(parts, chunk, options.solid, scratch, solid);
-  found.filled = filled(solid);
+  found.filled = find_solid(parts, chunk, scratch, solid);
   const float band = options.band;
   if (parts.triangles->of(index).empty() && found.filled != Filled::Some) {
     if (found.filled == Filled::All) found.densities = DensityChunk(stored_density(-band, band));
     return found;
   }
+  fill_unless_some(found.filled, solid);
   find_nearest_of(parts, index, {nullptr, band}, false, scratch.nearest);
   found.densities = signed_densities(scratch.nearest, solid, band);
   if (found.filled == Filled::Some) found.bits = std::make_unique<ChunkBits>(solid);
@@ -185,15 +190,21 @@ Found find_densities(const Parts& parts, std::size_t index, const DistanceFieldO
   return found;
 }
 
+/// What was found of all chunks; null of those that have nothing.
+using AllFound = std::vector<std::unique_ptr<Found>>;
+
 /// Finds all chunks. Errors: Cancelled.
 template <class Find>
-Result<std::vector<Found>> find_all(const Frame& frame, Threads threads, const Progress& progress, const Find& find) {
-  std::vector<Found> found(frame.chunk_count());
+Result<AllFound> find_all(const Frame& frame, Threads threads, const Progress& progress, const Find& find) {
+  AllFound found(frame.chunk_count());
   ProgressSteps steps(progress, found.size());
   Lender<Scratch> scratches;
   parallel_for(found.size(), threads, [&](std::size_t i) {
     if (steps.cancelled()) return;
-    scratches.with([&](Scratch& scratch) { found[i] = find(i, scratch); });
+    scratches.with([&](Scratch& scratch) {
+      Found one = find(i, scratch);
+      if (one.filled != Filled::None || one.densities) found[i] = std::make_unique<Found>(std::move(one));
+    });
     steps.step();
   });
   if (steps.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
@@ -214,17 +225,18 @@ struct Types {
 };
 
 /// Numbers looks in the order of chunks and voxels; each `Coloured::material` becomes the look's number.
-Result<Types> find_types(const SurfaceColours& colours, std::vector<Found>& found, VoxelRegistry& registry,
-                         std::size_t most, std::vector<std::string>& warnings) {
+Result<Types> find_types(const SurfaceColours& colours, AllFound& found, VoxelRegistry& registry, std::size_t most,
+                         std::vector<std::string>& warnings) {
   std::vector<VoxelProperties> materials = colours.materials();
   // Of what is deep: of the one material, or of none.
   const std::uint32_t deep_material = colours.is_plain() ? 0 : static_cast<std::uint32_t>(materials.size());
   materials.emplace_back();
   Looks looks;
   bool has_deep = false;
-  for (Found& chunk : found) {
-    for (Coloured& voxel : chunk.coloured) voxel.material = looks.number_of(voxel.colour, voxel.material);
-    has_deep |= count_of(chunk) > chunk.coloured.size();
+  for (const auto& chunk : found) {
+    if (chunk == nullptr) continue;
+    for (Coloured& voxel : chunk->coloured) voxel.material = looks.number_of(voxel.colour, voxel.material);
+    has_deep |= count_of(*chunk) > chunk->coloured.size();
   }
   std::uint32_t deep = 0;
   if (has_deep) deep = looks.number_of(colours.mean(), deep_material);
@@ -258,15 +270,36 @@ Chunk types_of(const Found& found, const Types& types) {
   return chunk;
 }
 
+/// Makes what is found of chunks the voxels of grids, some chunks at a time: `make(i)` on any thread, `put(i, made)` in
+/// order. What was found is gone afterwards.
+template <class Make, class Put>
+void put_all(AllFound& found, Threads threads, const Make& make, const Put& put) {
+  constexpr std::size_t kAtOnce = 256;
+  std::vector<std::size_t> some;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (found[i] != nullptr) some.push_back(i);
+  }
+  std::vector<Chunk> chunks(std::min(kAtOnce, some.size()));
+  for (std::size_t first = 0; first < some.size(); first += kAtOnce) {
+    const std::size_t count = std::min(kAtOnce, some.size() - first);
+    parallel_for(count, threads, [&](std::size_t i) { chunks[i] = make(*found[some[first + i]]); });
+    for (std::size_t i = 0; i < count; ++i) {
+      put(some[first + i], *found[some[first + i]], std::move(chunks[i]));
+      found[some[first + i]].reset();
+    }
+  }
+}
+
 Result<Parts> prepare(const TriangleMesh& mesh, const VoxelLattice& lattice, double margin, bool needs_lines,
-                      Threads threads, const Progress& progress) {
+                      SolidVoxels solid, Threads threads, const Progress& progress) {
   auto frame = Frame::make(mesh, lattice, margin);
   if (!frame) return frame.error();
-  Parts parts{std::move(*frame), {}, {}, {}};
+  Parts parts{std::move(*frame), {}, {}, {}, {}};
   if (!needs_lines || parts.frame.chunk_count() == 0) return parts;
   auto crossings = Crossings::find(parts.frame, threads, progress);
   if (!crossings) return crossings.error();
-  parts.crossings = std::move(*crossings);
+  parts.crossings = std::make_unique<const Crossings>(std::move(*crossings));
+  if (solid != SolidVoxels::None) parts.inside.emplace(*parts.crossings, solid, threads);
   return parts;
 }
 
@@ -278,7 +311,8 @@ using namespace voxelizing;
 Result<VoxelizedMesh> voxelize(const TriangleMesh& mesh, const VoxelizeOptions& options, VoxelRegistry& types,
                                Threads threads, const Progress& progress) {
   const bool needs_lines = options.surface == SurfaceVoxels::Separating6 || options.solid != SolidVoxels::None;
-  auto parts = prepare(mesh, options.lattice, 0.0, needs_lines, threads, part_of(progress, 0.0, kLinesShare));
+  auto parts =
+      prepare(mesh, options.lattice, 0.0, needs_lines, options.solid, threads, part_of(progress, 0.0, kLinesShare));
   if (!parts) return parts.error();
   VoxelizedMesh made;
   if (parts->frame.chunk_count() == 0) return made;
@@ -289,11 +323,11 @@ Result<VoxelizedMesh> voxelize(const TriangleMesh& mesh, const VoxelizeOptions& 
   if (!found) return found.error();
   const auto by_look = find_types(*parts->colours, *found, types, options.max_types, made.warnings);
   if (!by_look) return by_look.error();
-  std::vector<Chunk> chunks(found->size());
-  parallel_for(found->size(), threads, [&](std::size_t i) { chunks[i] = types_of((*found)[i], *by_look); });
-  for (std::size_t i = 0; i < chunks.size(); ++i) {
-    made.grid.put_chunk(parts->frame.first_chunk() + parts->frame.chunk_at(i), std::move(chunks[i]));
-  }
+  put_all(
+      *found, threads, [&](const Found& chunk) { return types_of(chunk, *by_look); },
+      [&](std::size_t i, const Found&, Chunk&& voxels) {
+        made.grid.put_chunk(parts->frame.first_chunk() + parts->frame.chunk_at(i), std::move(voxels));
+      });
   if (progress) (void)progress(1.0);
   return made;
 }
@@ -309,7 +343,8 @@ Result<FieldOfMesh> distance_field(const TriangleMesh& mesh, const DistanceField
   FieldOfMesh made{DensityGrid(options.band), {}};
   DistanceFieldOptions own = options;
   own.band = made.field.band();
-  auto parts = prepare(mesh, options.lattice, own.band + 1.0, true, threads, part_of(progress, 0.0, kLinesShare));
+  auto parts =
+      prepare(mesh, options.lattice, own.band + 1.0, true, options.solid, threads, part_of(progress, 0.0, kLinesShare));
   if (!parts) return parts.error();
   if (parts->frame.chunk_count() == 0) return made;
   parts->colours.emplace(parts->frame);
@@ -319,14 +354,12 @@ Result<FieldOfMesh> distance_field(const TriangleMesh& mesh, const DistanceField
   if (!found) return found.error();
   const auto by_look = find_types(*parts->colours, *found, types, options.max_types, made.warnings);
   if (!by_look) return by_look.error();
-  parallel_for(found->size(), threads, [&](std::size_t i) {
-    if (auto& densities = (*found)[i].densities) densities->materials() = types_of((*found)[i], *by_look);
-  });
-  for (std::size_t i = 0; i < found->size(); ++i) {
-    auto& densities = (*found)[i].densities;
-    if (!densities) continue;
-    made.field.put_chunk(parts->frame.first_chunk() + parts->frame.chunk_at(i), std::move(*densities));
-  }
+  put_all(
+      *found, threads, [&](const Found& chunk) { return types_of(chunk, *by_look); },
+      [&](std::size_t i, Found& chunk, Chunk&& materials) {
+        chunk.densities->materials() = std::move(materials);
+        made.field.put_chunk(parts->frame.first_chunk() + parts->frame.chunk_at(i), std::move(*chunk.densities));
+      });
   if (progress) (void)progress(1.0);
   return made;
 }
