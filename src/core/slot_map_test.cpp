@@ -4,6 +4,7 @@
 #include <new>
 #include <random>
 #include <string>
+#include <unordered_map>
 
 #include <gtest/gtest.h>
 
@@ -35,6 +36,16 @@ TEST(SlotMap, AMapThatWasMovedFromIsEmptyAndCanBeUsed) {
   EXPECT_EQ(moved[again], 2);
   EXPECT_EQ(moved.size(), 1U);
   EXPECT_TRUE(map.empty());  // NOLINT(bugprone-use-after-move)
+}
+
+TEST(SlotMap, HandlesAreKeys) {
+  SlotMap<int> map;
+  const auto first = map.insert(1);
+  const auto second = map.insert(2);
+  std::unordered_map<Handle<int>, std::string> names{{first, "first"}, {second, "second"}};
+  EXPECT_EQ(names.at(first), "first");
+  map.remove(first);
+  EXPECT_FALSE(names.contains(map.insert(3))) << "another, in the same slot";
 }
 
 TEST(SlotMap, AHandleOfARemovedElementNamesNothingForEver) {

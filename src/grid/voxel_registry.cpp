@@ -104,6 +104,13 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   return type;
 }
 
+std::optional<VoxelType> VoxelRegistry::find(std::string_view name) const {
+  for (std::size_t type = 1; type < size(); ++type) {
+    if (content_->properties[type].name == name) return static_cast<VoxelType>(type);
+  }
+  return std::nullopt;
+}
+
 Result<VoxelType> VoxelRegistry::find_or_add(const VoxelProperties& properties) {
   const auto [first, last] = std::as_const(content_->by_hash).equal_range(hash_of(properties));
   for (auto it = first; it != last; ++it) {

@@ -44,10 +44,6 @@ class EmissiveChunks {
   }
 
  private:
-  struct ByZyx {
-    bool operator()(IVec3 a, IVec3 b) const { return by_zyx(a, b); }
-  };
-
   ChangeCursor followed_;
   ChangeCursor followed_types_;
   std::map<IVec3, std::vector<Item>, ByZyx> chunks_;  // those that hold some

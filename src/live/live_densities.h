@@ -14,7 +14,6 @@
 #include <quoin/grid/grid.h>
 #include <quoin/grid/voxel_registry.h>
 
-#include "core/coordinates/coordinate_hash.h"
 #include "grid/chunk/chunk_difference.h"
 
 namespace quoin {

@@ -10,7 +10,6 @@
 #include <quoin/live/live_meshes.h>
 #include <quoin/scene/scene.h>
 
-#include "core/coordinates/coordinate_hash.h"
 #include "live/live_densities.h"
 #include "live/live_source.h"
 

@@ -12,7 +12,6 @@
 #include <quoin/live/live_meshes.h>
 #include <quoin/scene/scene.h>
 
-#include "core/coordinates/coordinate_hash.h"
 #include "live/mesh_job_queue.h"
 
 namespace quoin {

@@ -18,7 +18,6 @@
 #include <quoin/mesh/blocky.h>
 #include <quoin/mesh/smooth.h>
 
-#include "core/coordinates/coordinate_hash.h"
 #include "live/live_densities.h"
 #include "mesh/surface/material.h"
 

@@ -97,12 +97,37 @@ glm::dmat4 camera_from_world(const Camera& camera) {
   return matrix;
 }
 
+namespace {
+
+/// Of a picture so many pixels high: how large a pixel is in the plane 1 in front of the camera, or in the world.
+double pixel_size(const Camera& camera, int height) {
+  const bool is_perspective = camera.projection == Camera::Projection::Perspective;
+  const double picture_height = is_perspective ? 2.0 * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height;
+  return picture_height / height;
+}
+
+}  // namespace
+
+std::optional<PicturePoint> picture_point(const Camera& camera, DVec3 point_in_world, int width, int height) {
+  QUOIN_ASSERT(width > 0 && height > 0, "a picture of positive size");
+  const DVec3 from_camera = point_in_world - camera.position;
+  double pixel = pixel_size(camera, height);
+  if (camera.projection == Camera::Projection::Perspective) {
+    const double ahead = glm::dot(from_camera, camera.forward);
+    if (!(ahead > 0.0)) return std::nullopt;
+    pixel *= ahead;
+  }
+  const PicturePoint point{0.5 * width + glm::dot(from_camera, camera.right) / pixel,
+                           0.5 * height - glm::dot(from_camera, camera.up) / pixel, width, height};
+  if (!std::isfinite(point.x) || !std::isfinite(point.y)) return std::nullopt;
+  return point;
+}
+
 Ray ray_through(const Camera& camera, const PicturePoint& point) {
   const auto [x, y, width, height] = point;
   QUOIN_ASSERT(width > 0 && height > 0, "a picture of positive size");
   const bool is_perspective = camera.projection == Camera::Projection::Perspective;
-  const double picture_height = is_perspective ? 2.0 * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height;
-  const double pixel = picture_height / height;
+  const double pixel = pixel_size(camera, height);
   const DVec3 across = camera.right * ((x - 0.5 * width) * pixel) + camera.up * ((0.5 * height - y) * pixel);
   if (!is_perspective) return {camera.position + across, camera.forward};
   return {camera.position, glm::normalize(camera.forward + across)};

@@ -260,6 +260,25 @@ Extent extent_of(const Camera& camera, double aspect, const Scene& scene, Instan
   return all;
 }
 
+TEST(Camera, APointIsSeenWhereItsRayGoes) {
+  for (const auto projection : {Camera::Projection::Perspective, Camera::Projection::Orthographic}) {
+    Camera camera = look_at({3.0, -2.0, 7.0}, {40.0, 12.0, -5.0}, 0.9).value();
+    camera.projection = projection;
+    camera.view_height = 20.0;
+    for (const auto& [x, y] : {std::pair{0.5, 0.5}, {640.0, 360.0}, {1279.5, 12.25}, {-40.0, 900.0}}) {
+      const Ray ray = ray_through(camera, {x, y, 1280, 720});
+      const auto seen = picture_point(camera, ray.origin + 37.0 * ray.direction, 1280, 720);
+      ASSERT_TRUE(seen);
+      EXPECT_NEAR(seen->x, x, 1e-9);
+      EXPECT_NEAR(seen->y, y, 1e-9);
+    }
+    const bool is_perspective = projection == Camera::Projection::Perspective;
+    EXPECT_EQ(picture_point(camera, camera.position - camera.forward, 64, 64).has_value(), !is_perspective);
+    EXPECT_EQ(picture_point(camera, camera.position, 64, 64).has_value(), !is_perspective);
+    EXPECT_FALSE(picture_point(camera, DVec3(std::nan("")), 64, 64));
+  }
+}
+
 TEST(Camera, FramedScenesFillThePictureWithTheirVoxels) {
   std::mt19937_64 random(7);
   for (int i = 0; i < 30; ++i) {

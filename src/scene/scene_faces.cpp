@@ -9,7 +9,6 @@
 
 #include <quoin/mesh/blocky.h>
 
-#include "core/coordinates/coordinate_hash.h"
 #include "core/moved_from.h"
 
 namespace quoin {

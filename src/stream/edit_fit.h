@@ -9,7 +9,6 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/stream/world_edit.h>
 
-#include "core/coordinates/coordinate_hash.h"
 
 // Edits come from elsewhere: what a world could not save is not done.
 

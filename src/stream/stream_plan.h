@@ -10,7 +10,6 @@
 #include <quoin/core/vec.h>
 #include <quoin/store/stored_chunk.h>
 
-#include "core/coordinates/coordinate_hash.h"
 
 namespace quoin::stream {
 

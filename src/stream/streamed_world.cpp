@@ -21,7 +21,6 @@
 #include <quoin/core/assert.h>
 #include <quoin/io/file.h>
 
-#include "core/coordinates/coordinate_hash.h"
 #include "core/worker_count.h"
 #include "stream/chunk_streamer.h"
 #include "stream/edit_fit.h"
@@ -656,6 +655,11 @@ Result<GridHandle> StreamedWorld::add_grid(SceneGrid grid, std::shared_ptr<const
   if (generator != nullptr) impl_->streamer.set_generator(*number, std::move(generator));
   impl_->must_plan = true;
   return handle;
+}
+
+std::optional<std::uint32_t> StreamedWorld::number_of(GridHandle grid) const {
+  const std::uint32_t* const number = impl_->number_of(grid);
+  return number == nullptr ? std::nullopt : std::optional(*number);
 }
 
 void StreamedWorld::use_generator(GridHandle grid, std::shared_ptr<const ChunkGenerator> generator) {

@@ -162,7 +162,10 @@ TEST_F(StreamedWorldTest, WhatWasEditedIsSavedThoughTheWorldJustEnds) {
     const Viewer viewer{.radius = 70.0};
     ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
     world.scene().edit(only_grid(world)).grid.set(1, 1, 1, 2);
-    ASSERT_TRUE(world.apply({0, WorldEdit::SetVoxels{{{{9000, 1, 1}, 3}}}}).has_value());
+    const auto number = world.number_of(world.scene().grids().handles().front());
+    ASSERT_TRUE(number);
+    EXPECT_FALSE(world.number_of(GridHandle{}));
+    ASSERT_TRUE(world.apply({*number, WorldEdit::SetVoxels{{{{9000, 1, 1}, 3}}}}).has_value());
   }
   EXPECT_TRUE(check_world(path())->damage.empty());
   const auto loaded = load_world(*WorldStore::open(path(), WorldAccess::Read));

@@ -60,12 +60,6 @@ Result<std::vector<IVec3>> chunks_of_voxels(std::span<const PlacedVoxel> voxels)
 
 }  // namespace
 
-bool WorldEdit::SetVoxels::operator==(const SetVoxels& other) const {
-  return std::ranges::equal(voxels, other.voxels, [](const PlacedVoxel& a, const PlacedVoxel& b) {
-    return a.voxel == b.voxel && a.type == b.type;
-  });
-}
-
 Result<std::vector<IVec3>> chunks_of_edit(const WorldEdit& edit, float band) {
   using Chunks = Result<std::vector<IVec3>>;
   return std::visit(

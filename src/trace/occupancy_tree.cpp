@@ -11,7 +11,6 @@
 
 #include "core/coordinates/chunk_boxes.h"
 #include "core/coordinates/chunk_order.h"
-#include "core/coordinates/coordinate_hash.h"
 #include "trace/cell_rows.h"
 #include "trace/chunk_rows.h"
 #include "trace/tree_view.h"

@@ -7,6 +7,11 @@
 
 #include <tl/expected.hpp>
 
+// X11's headers make these common words macros, by which nothing below could be read.
+#if defined(Status) || defined(None)
+#error "Xlib.h defines Status and None as macros: include Quoin before it, or #undef them first"
+#endif
+
 namespace quoin {
 
 enum class ErrorCode : std::uint8_t {

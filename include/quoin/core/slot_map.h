@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -160,3 +161,11 @@ class SlotMap {
 };
 
 }  // namespace quoin
+
+/// So that handles are keys of std::unordered_map.
+template <class T>
+struct std::hash<quoin::Handle<T>> {
+  [[nodiscard]] std::size_t operator()(const quoin::Handle<T>& handle) const noexcept {
+    return std::hash<std::uint64_t>()(handle.generation);  // no two elements have the same
+  }
+};

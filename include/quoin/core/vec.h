@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <concepts>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 
@@ -29,7 +30,8 @@ static_assert(sizeof(IVec3) == 12 && sizeof(Vec3) == 12 && sizeof(DVec3) == 24 &
                   sizeof(DQuat) == 32 && alignof(DQuat) == alignof(double),
               "Quoin needs glm's types packed, without GLM_FORCE_DEFAULT_ALIGNED_GENTYPES");
 
-/// A point, which is no voxel. What takes a voxel takes none: `voxel_of` says in which voxel it lies.
+/// A point, which is no voxel. Functions of a voxel or chunk refuse it, and `voxel_of` says in which voxel it lies. The
+/// members of IBox and PlacedVoxel cannot refuse it: see `box_around`.
 template <std::floating_point T>
 using Point = glm::vec<3, T, glm::defaultp>;
 
@@ -64,6 +66,25 @@ struct IBox {
   bool operator==(const IBox& other) const { return min == other.min && max == other.max; }
 };
 
+/// Orders coordinates by z, then y, then x, as chunks are listed: for std::map and std::sort.
+struct ByZyx {
+  [[nodiscard]] constexpr bool operator()(IVec3 a, IVec3 b) const {
+    if (a.z != b.z) return a.z < b.z;
+    return a.y != b.y ? a.y < b.y : a.x < b.x;
+  }
+};
+
+/// Spreads integer coordinates (of voxels, of chunks) over a hash table: for std::unordered_map.
+struct CoordinateHash {
+  [[nodiscard]] std::size_t operator()(IVec3 c) const {
+    std::uint64_t h = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      h = (h ^ static_cast<std::uint32_t>(c[axis])) * 0x9E37'79B9'7F4A'7C15U;
+    }
+    return static_cast<std::size_t>(h ^ (h >> 32));
+  }
+};
+
 /// The smallest box that contains both; an empty box adds nothing.
 [[nodiscard]] inline IBox unite(const IBox& a, const IBox& b) {
   if (a.empty()) return b;
@@ -88,6 +109,14 @@ struct DBox {
     max = glm::max(max, p);
   }
 };
+
+/// The voxels that a box of a grid's space meets, but in a face, edge or corner alone; a box without a volume has those
+/// in which its points lie. Empty of an empty one.
+[[nodiscard]] inline IBox box_around(const DBox& box) {
+  if (box.empty()) return {};
+  const IVec3 min = voxel_of(box.min);
+  return {min, glm::max(voxel_of(glm::ceil(box.max)), voxel_of(DVec3(min) + 1.0))};
+}
 
 /// Corner 0 to 7 of a box: at its greater x, y and z where bit 0, 1 and 2 of `index` are set.
 [[nodiscard]] inline DVec3 box_corner(const DBox& box, int index) {

@@ -40,7 +40,7 @@ inline constexpr std::size_t kMaxVoxelDataBytes = std::size_t{1} << 16;
 
 /// What a voxel holds besides its type: how a stair is turned, how high water stands, what is in a chest.
 ///
-///   world.set(at, stairs, {.state = 3});                    // type and data in one
+///   world.set(at, stairs, {.state = 3});                    // type and data in one; stairs has state_bits >= 2
 ///   world.set_data(at, {.state = world.data(at).state ^ 1});
 ///   world.set_data(chest, {.bytes = inventory});            // copied
 ///
@@ -65,7 +65,7 @@ inline constexpr IBox kWholeChunk = {IVec3{0}, IVec3{kChunkEdge}};
 /// 64^3 voxels, compressed by a palette to 1, 2, 4, 8 or 16 bits each.
 ///
 /// Voxels lie in rows of 64 along x, so one bit plane of a row is one word. 4x4 rows (64x4x4 voxels) are a slab, the
-/// unit of uniformity: a slab of one type holds no voxel data, a chunk of one type holds nothing but that type.
+/// unit of uniformity: a slab of one type has no planes, a chunk of one type only that type. VoxelData lies beside.
 /// Writes notice that a slab or the chunk became uniform and that fewer bits would do, so that edits and their undoing
 /// leave about the memory that a new chunk takes; `compact` gives back the rest.
 /// Writes keep, at all times, how many voxels there are of each type and in each of the 3 x 64 layers, so counts and

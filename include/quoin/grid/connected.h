@@ -23,7 +23,7 @@ struct ConnectedOptions {
   Connectivity connectivity = Connectivity::Faces6;
   /// Whether voxels of a type belong to pieces; empty: all do. Asked for each type of a chunk whenever that is looked
   /// at, possibly on several threads, so it has to say the same each time; never for air, which belongs to none.
-  std::function<bool(VoxelType)> belongs;
+  std::function<bool(VoxelType)> belongs{};
 };
 
 /// Voxels that hold together.

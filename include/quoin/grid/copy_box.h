@@ -15,7 +15,7 @@ struct CopyOptions {
   bool copy_air = true;  ///< false: air in the box leaves what is there
   /// [type]: the type that takes its place, which may be air. [0] means nothing: air stays air. Types beyond its end
   /// stay as they are. Lifetime: it must outlive the call.
-  std::span<const VoxelType> type_map;
+  std::span<const VoxelType> type_map{};
   /// The state (VoxelData) with which a voxel of this type arrives, where it has one: what is turned with its box says
   /// another direction there, which only the game knows. Empty: as it was.
   std::function<std::uint32_t(VoxelType type, std::uint32_t state)> map_state{};

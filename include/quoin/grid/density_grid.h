@@ -76,6 +76,10 @@ class DensityGrid {
   bool set(IVec3 sample, DensitySample value);
   template <std::floating_point T>
   bool set(Point<T> point, DensitySample value) = delete;
+  /// Both of a sample: what `set` puts there.
+  [[nodiscard]] DensitySample get(IVec3 sample) const { return {density(sample), material(sample)}; }
+  template <std::floating_point T>
+  DensitySample get(Point<T> point) const = delete;
 
   /// Unites the solid with a sphere, a box (`rounding` >= 0 rounds its edges, at most until its shortest side is
   /// round): the least of both distances; or takes it away: the greater of the density and minus the distance. Samples
@@ -147,6 +151,7 @@ class DensityGrid {
   [[nodiscard]] bool is_loaded_around(IVec3 chunk, int distance = 1) const;
   /// As that of Grid, of a box of samples. A point between samples is known where all eight around it are loaded.
   [[nodiscard]] bool is_loaded_within(const IBox& samples) const;
+  [[nodiscard]] std::vector<IVec3> loaded_chunks() const;
 
   /// Null where all is far air. Lifetime: as Grid::find_chunk.
   [[nodiscard]] const DensityChunk* find_chunk(IVec3 chunk) const;

@@ -22,6 +22,7 @@ namespace quoin {
 struct PlacedVoxel {
   IVec3 voxel{0};
   VoxelType type = kAir;
+  bool operator==(const PlacedVoxel&) const = default;
 };
 
 /// A sparse, unbounded field of voxels in chunks of 64^3. What was never set is air.
@@ -72,9 +73,11 @@ class Grid {
   /// Sets many voxels wherever they lie; of several for one place the last counts. Returns how many changed.
   /// Cost: of those that lie in one chunk one after the other a third of `set`.
   std::int64_t set(std::span<const PlacedVoxel> voxels);
-  /// Sets those of the 64 voxels of the row in which `row` lies whose bits are set in `mask`, from the row's own array;
-  /// one edit. Returns how many changed.
+  /// Of the row of 64 voxels along x in which `row` lies, sets those whose bits are set in `mask`: voxel i to
+  /// `types[i]`; one edit. Returns how many changed.
   std::int64_t write_row(IVec3 row, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types);
+  template <std::floating_point T>
+  std::int64_t write_row(Point<T> row, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types) = delete;
   /// Sets all voxels of a box (half open: `max` excluded; an empty one changes nothing). Returns how many changed.
   /// Cost: O(chunks of the box + rows of 64 voxels at its rim); uniform chunks take no memory per voxel, but each some
   /// hundred bytes: where a box is a user's own choice, say how much is too much by `progress`.
@@ -119,6 +122,8 @@ class Grid {
   bool unload_chunk(IVec3 chunk);
   /// Whether a chunk's voxels are in memory: always, unless the grid is partial.
   [[nodiscard]] bool is_loaded(IVec3 chunk) const;
+  template <std::floating_point T>
+  bool is_loaded(Point<T> point) const = delete;  // is_loaded(chunk_of(voxel_of(point)))
   /// Whether it and all that are at most so many chunks from it along each axis are.
   [[nodiscard]] bool is_loaded_around(IVec3 chunk, int distance = 1) const;
   /// Whether all chunks are that a box of voxels meets (half open: `max` excluded): whether what is read, counted or
@@ -129,12 +134,18 @@ class Grid {
 
   /// What the voxel holds besides its type; empty where nothing was put. Lifetime: until the grid's next edit.
   [[nodiscard]] VoxelData data(IVec3 voxel) const;
+  template <std::floating_point T>
+  VoxelData data(Point<T> point) const = delete;  // data(voxel_of(point))
   /// Puts that in the place of what there was; true when it was another. False, and nothing is put, where the voxel is
   /// air. No type changes: `changes_since` tells nothing of it, `data_changes_since` does.
   /// Requires: at most kMaxVoxelDataBytes bytes, which are copied.
   bool set_data(IVec3 voxel, const VoxelData& data);
+  template <std::floating_point T>
+  bool set_data(Point<T> point, const VoxelData& data) = delete;
   /// Type and data, which may be this grid's own: `set(at, opened_door, world.data(at))`. True when either changed.
   bool set(IVec3 voxel, VoxelType type, const VoxelData& data);
+  template <std::floating_point T>
+  bool set(Point<T> point, VoxelType type, const VoxelData& data) = delete;
   /// Voxels with data. Cost: O(1).
   [[nodiscard]] std::int64_t data_count() const;
   /// Calls `visit` for them: chunks as in `chunks`, then z, y, x; it must not edit the grid.
@@ -144,12 +155,16 @@ class Grid {
   /// no more than the pointer and is the caller's own.
   [[nodiscard]] const Chunk* find_chunk(IVec3 chunk) const { return find_chunk(chunk.x, chunk.y, chunk.z); }
   [[nodiscard]] const Chunk* find_chunk(int x, int y, int z) const;
+  template <std::floating_point T>
+  const Chunk* find_chunk(Point<T> point) const = delete;  // find_chunk(chunk_of(voxel_of(point)))
   /// Coordinates of all chunks that hold a voxel, sorted by z, then y, then x.
   [[nodiscard]] std::vector<IVec3> chunks() const;
   [[nodiscard]] std::size_t chunk_count() const;
-  /// The chunk and the 26 around it, for meshers; nothing where not all of them are loaded.
-  /// Lifetime: the grid must outlive it, and an edit ends it.
+  /// The chunk and the 26 around it, for meshers. Where not all of them are loaded, all 27 are null, as of air: ask
+  /// `is_loaded_around` first. Lifetime: the grid must outlive it, and an edit ends it.
   [[nodiscard]] Neighbourhood neighbourhood(IVec3 chunk) const;
+  template <std::floating_point T>
+  Neighbourhood neighbourhood(Point<T> point) const = delete;
 
   /// What edits changed since the cursor's last time, exactly; moves the cursor to the present.
   /// Cost: O(chunks that changed), whatever the size of the grid. See ChangeCursor.

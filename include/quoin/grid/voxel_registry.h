@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <quoin/core/assert.h>
@@ -37,8 +39,8 @@ struct Rgba8 {
 
 /// What there is to know of one kind of voxel.
 struct VoxelProperties {
-  std::string name;
-  Rgba8 colour;  ///< sRGB; alpha below 255 only matters for transparent types
+  std::string name{};
+  Rgba8 colour{};  ///< sRGB; alpha below 255 only matters for transparent types
   Visibility visibility = Visibility::Opaque;
   bool collides = true;    ///< stops a moving body
   float roughness = 1.0F;  ///< glTF's perceptual roughness, 0 to 1
@@ -46,13 +48,14 @@ struct VoxelProperties {
   float emission = 0.0F;   ///< radiance emitted, as a multiple of `colour` in linear light; 0 is none
   float ior = 1.5F;        ///< index of refraction, of use to transparent types
   /// Of clouds and the like, which are transparent: how often light is scattered on a voxel's length, on average, in
-  /// pictures by paths; what `colour` leaves of it goes on. 0: glass.
+  /// pictures by paths; `colour` is the albedo, the share of it that goes on. 0: glass.
   float scattering = 0.0F;
   float anisotropy = 0.0F;  ///< of that: the mean cosine of the angle by which light is scattered, -1 to 1
   /// What a file format says beyond the above ("_spec" -> "0.3"), kept so that writing it back loses nothing.
   std::map<std::string, std::string> attributes{};
   /// How many bits of a state word (VoxelData) voxels of this type may have, from the lowest up; 0: they have no state.
-  /// What a scene file holds is checked against it.
+  /// `Grid::set_data` does not know the types and takes any; saving (`save_scene`, WorldStore::save) refuses a scene in
+  /// which a state has more.
   std::uint8_t state_bits = 0;
 
   bool operator==(const VoxelProperties&) const = default;
@@ -91,6 +94,9 @@ class VoxelRegistry {
 
   /// The id of a type that equals `properties` in everything, or a new one. Errors: as `add`. Cost: O(log types).
   [[nodiscard]] Result<VoxelType> find_or_add(const VoxelProperties& properties);
+
+  /// The type of that name; of several the one with the lowest id. Cost: O(types).
+  [[nodiscard]] std::optional<VoxelType> find(std::string_view name) const;
 
   /// Replaces the properties of `type`. Meshes and pictures made before know nothing of it; `changes_since` tells.
   ///

@@ -70,8 +70,10 @@ struct FormatInfo {
 [[nodiscard]] const FormatInfo& format_info(FileFormat format);
 
 /// Returns the readable format that bytes are of, by what they begin with, within gzip too; nothing when it is none.
+/// Binary STL, .cub, .kvx, .vxl and SLAB6's .vox are known by their whole length: pass all bytes.
 [[nodiscard]] std::optional<FileFormat> detect_format(std::span<const std::byte> bytes);
-/// The same of a file, of which only the beginning is read, or of a folder that holds a world. Errors: CannotRead.
+/// The same of a file, or of a folder that holds a world. The first 64 KiB are read; of a .stl, .cub, .kvx, .vxl or
+/// .vox that these do not tell, all of it. Errors: CannotRead.
 [[nodiscard]] Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& path);
 
 /// Returns the format that a file of this name is written in, by its extension in any case.
@@ -99,13 +101,14 @@ struct FormatInfo {
 [[nodiscard]] Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
 
-/// What load_scene reads beside the file itself: the files that a scene file names, which need not be there, and the
-/// values of a NIfTI pair. Nothing where the file cannot be read.
+/// What load_scene reads beside the file itself: the files that a scene file names, which need not be there, the values
+/// of a NIfTI pair, a world's -wal, and the materials, buffers and pictures of a mesh. Nothing where the file cannot be
+/// read. Cost: of a mesh that of read_mesh.
 [[nodiscard]] std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path);
 
 /// Writes a scene as a file of voxels, in the format of the name's extension: .quoin (write_world) or .json
 /// (write_scene_file), both without loss, .vox (write_vox), or one of other programs: .qb, .gox, .vxl, .binvox, .schem,
-/// .nii. It appears whole or not at all. docs/formats/models.md says what each of these holds.
+/// .vdb, .nii. It appears whole or not at all. docs/formats/models.md says what each of these holds.
 ///
 /// Warnings: one line each of what the format does not hold.
 /// Errors:   Unsupported for other extensions; those of the format's writer; `path` is set in all.

@@ -37,7 +37,7 @@ struct LoadedScene {
   std::vector<FileCamera> cameras;                    ///< all of the file, in its order
   std::optional<FileLook> look;                       ///< how the file wants to be drawn, where it says it
   std::int64_t last_frame = 0;                        ///< of its animation; LoadOptions::frame says which one this is
-  std::vector<std::filesystem::path> named_files;     ///< whose models are in it, which saving would put into this one
+  std::vector<std::filesystem::path> named_files;     ///< other files that models are from; saving puts these into one
   std::shared_ptr<const VoxSource> source = nullptr;  ///< of a .vox file, with LoadOptions::keep_source
 };
 
@@ -46,8 +46,8 @@ enum class UpAxis : std::uint8_t { Y, Z };
 
 /// How a file of triangles becomes voxels.
 struct MeshLoadOptions {
-  std::optional<int> size = std::nullopt;           ///< voxels along the longest side; without both kDefaultMeshSize
-  std::optional<double> voxel_size = std::nullopt;  ///< or of this size, in the file's unit
+  std::optional<int> size = std::nullopt;           ///< voxels along the longest side; nothing: kDefaultMeshSize
+  std::optional<double> voxel_size = std::nullopt;  ///< in the file's unit; where it is given, `size` is not used
   SurfaceVoxels surface = SurfaceVoxels::Separating6;
   SolidVoxels solid = SolidVoxels::Winding;
   bool as_field = false;                                ///< a field of distances instead, of what is solid

@@ -95,7 +95,8 @@ struct MeshFileOptions {
 ///            copy of surfaces whose emission takes several materials; with `compress` also all that is compressed, and
 ///            the largest array as it is stored.
 /// Errors:    Unsupported for a format that is none of meshes, for light, `quantize` and `compress` in others than
-///            glTF, for an atlas in PLY with its occlusion, for OcclusionIn::Attribute in OBJ, and for `compress`
+///            glTF, for an atlas in PLY, STL and 3MF with its occlusion, for OcclusionIn::Attribute in OBJ, STL and
+///            3MF, and for `compress`
 ///            where the build has no meshoptimizer; CannotWrite; Cancelled; LimitExceeded beyond 4 GiB of GLB or 2^31 -
 ///            1 vertices or triangles of PLY; InvalidArgument when a transform is not finite, not affine or singular,
 ///            the scale is not positive, a vertex comes to lie beyond the range of floats, or when a mesh contradicts
@@ -106,7 +107,7 @@ struct MeshFileOptions {
 [[nodiscard]] Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesystem::path& path,
                                                const MeshFileOptions& options = {}, const Progress& progress = {});
 
-/// The same as bytes, for formats that are one file: GLB, PLY and OBJ of smooth meshes. `options.format` means nothing
+/// The same as bytes, for formats that are one file: GLB, PLY, STL, 3MF and OBJ of smooth meshes. `options.format` means nothing
 /// here.
 ///
 /// Errors: also Unsupported for what takes several files.

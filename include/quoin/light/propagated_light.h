@@ -1,11 +1,13 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
 #include <vector>
 
+#include <quoin/core/assert.h>
 #include <quoin/core/parallel.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/grid.h>
@@ -24,8 +26,9 @@ struct LightLevels {
   bool operator==(const LightLevels&) const = default;
 };
 
-/// In 16 bits, as meshes carry it: sky in the lowest four, then red, green and blue.
+/// In 16 bits, as meshes carry it: sky in the lowest four, then red, green and blue. Requires: levels of at most 15.
 [[nodiscard]] constexpr std::uint16_t packed(LightLevels levels) {
+  QUOIN_ASSERT(std::max({levels.sky, levels.red, levels.green, levels.blue}) <= 15, "levels from 0 to 15");
   return static_cast<std::uint16_t>(levels.sky | levels.red << 4 | levels.green << 8 | levels.blue << 12);
 }
 /// The levels of such a word.
@@ -39,7 +42,8 @@ struct LightLevels {
 [[nodiscard]] LightLevels lamp_levels(const VoxelProperties& properties);
 
 struct PropagatedLightOptions {
-  /// What types give off, for games with levels of their own; empty: `lamp_levels`. `sky` counts as 0.
+  /// What types give off, for games with levels of their own; empty: `lamp_levels`. `sky` counts as 0, and
+  /// what is above 15 as 15.
   std::function<LightLevels(VoxelType, const VoxelProperties&)> lamp{};
 };
 

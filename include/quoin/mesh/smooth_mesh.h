@@ -48,7 +48,7 @@ struct SmoothMeshOptions {
   bool keep_thin = false;
   /// The level of detail of a chunk, 0 to kMaxSmoothLevel; empty: 0 everywhere. Asked once a chunk, from the calling
   /// thread, also for neighbours that do not exist.
-  std::function<int(IVec3 chunk)> level_of;
+  std::function<int(IVec3 chunk)> level_of{};
 };
 
 /// Meshes a whole field, chunk by chunk, and welds the chunks' meshes.

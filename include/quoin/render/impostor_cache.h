@@ -14,7 +14,7 @@ namespace quoin {
 
 struct ImpostorCacheOptions {
   std::size_t max_bytes = std::size_t{1} << 30;  ///< of the impostors that are held
-  Threads workers;                               ///< unlike elsewhere 0 means one less than the machine has, at least 1
+  Threads workers{};                             ///< unlike elsewhere 0 means one less than the machine has, at least 1
 };
 
 /// Impostors of a scene's grids, built by worker threads when they are first asked for, and again after edits.

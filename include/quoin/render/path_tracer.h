@@ -40,13 +40,14 @@ struct PathPicture {
   std::vector<Vec3> scene;     ///< the same without what is seen of the background: radiance over black
   std::vector<float> alpha;    ///< the share of samples that show the scene, or its shadow; 0 to 1
   // Layers, of what pixels show first that is no glass; empty unless asked for.
-  std::vector<Vec3> albedo;              ///< means; black where nothing is
-  std::vector<Vec3> normal;              ///< means, in the world; not of unit length
-  FloatImage depth;                      ///< of the first sample, as Picture::depth
-  std::vector<VoxelType> types;          ///< of the first sample; kAir: nothing
-  std::vector<std::uint32_t> instances;  ///< likewise: 1 + the number of the instance among those traced; 0: nothing
-  std::int64_t rays = 0;                 ///< of every kind
-  std::int64_t pixels_hit = 0;           ///< of which some sample shows the scene
+  std::vector<Vec3> albedo;      ///< means; black where nothing is
+  std::vector<Vec3> normal;      ///< means, in the world; not of unit length
+  FloatImage depth;              ///< of the first sample, as Picture::depth
+  std::vector<VoxelType> types;  ///< of the first sample; kAir: nothing
+  /// Likewise: 1 + InstanceHandle::index (see SlotMap::handle_at); 0: nothing.
+  std::vector<std::uint32_t> instances;
+  std::int64_t rays = 0;        ///< of every kind
+  std::int64_t pixels_hit = 0;  ///< of which some sample shows the scene
 };
 
 /// Light by paths: the sun as a disc, a sky, what voxels emit, any number of bounces, gloss, metal and refracting

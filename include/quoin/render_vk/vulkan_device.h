@@ -108,7 +108,7 @@ struct BorrowedVulkanDevice {
   /// Vulkan wants one thread at a time to use a queue. Quoin submits from the thread that calls it, and only while it
   /// runs `use`, which this must do once, before it returns: with the lock held that guards the queue. Empty: nobody
   /// else uses the queue during calls of Quoin's that may draw, upload or read.
-  std::function<void(const std::function<void()>& use)> with_queue;
+  std::function<void(const std::function<void()>& use)> with_queue{};
 };
 
 }  // namespace quoin

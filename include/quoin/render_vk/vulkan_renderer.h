@@ -21,7 +21,7 @@ inline constexpr std::uint64_t kVulkanBlockBytes = std::uint64_t{64} << 20;
 
 struct VulkanOptions {
   /// Of `vulkan_devices`, as `choose_vulkan_device` understands it.
-  std::string device;
+  std::string device{};
   /// Voxels lie in blocks of device memory of this size, as many as it takes. Requires: at least 64 KiB.
   std::uint64_t block_bytes = kVulkanBlockBytes;
   /// Told what the validation layer says, which is then loaded: each message is a mistake in Quoin. May be called from

@@ -59,6 +59,12 @@ struct PicturePoint {
 /// Requires: width and height are positive.
 [[nodiscard]] Ray ray_through(const Camera& camera, const PicturePoint& point);
 
+/// Where a point of the world is seen in such a picture: the inverse of `ray_through`, for labels and marks; perhaps
+/// beside the picture. Nothing for what lies behind a perspective camera, beside it, or is not finite.
+/// Requires: width and height are positive.
+[[nodiscard]] std::optional<PicturePoint> picture_point(const Camera& camera, DVec3 point_in_world, int width,
+                                                        int height);
+
 /// The views that frame a whole scene by themselves. Front looks along -Z: what faces +Z is seen.
 enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };
 

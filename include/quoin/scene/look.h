@@ -69,17 +69,17 @@ struct Look {
   Vec3 sun_colour{1.0F};              ///< linear
   bool sun_is_seen = true;            ///< the disc, by the camera and in mirrors and glass
   SkyModel sky = SkyModel::Physical;
-  double sky_brightness = 1.0;                       ///< times the sky's light
-  Vec3 sky_colour{1.0F};                             ///< of SkyModel::Uniform, linear
-  AirOptions air{};                                  ///< of SkyModel::Physical
-  std::shared_ptr<const RadianceImage> environment;  ///< of SkyModel::Environment: longitude and latitude, +y up; its
-                                                     ///< middle is -z, its right half +x
-  double environment_turn_radians = 0.0;             ///< about the vertical, from -z towards +x
-  std::optional<Vec3> background;                    ///< linear; what the camera sees in place of sky and sun
+  double sky_brightness = 1.0;                         ///< times the sky's light
+  Vec3 sky_colour{1.0F};                               ///< of SkyModel::Uniform, linear
+  AirOptions air{};                                    ///< of SkyModel::Physical
+  std::shared_ptr<const RadianceImage> environment{};  ///< of SkyModel::Environment: longitude and latitude, +y up; its
+                                                       ///< middle is -z, its right half +x
+  double environment_turn_radians = 0.0;               ///< about the vertical, from -z towards +x
+  std::optional<Vec3> background{};                    ///< linear; what the camera sees in place of sky and sun
 
   double lamp_brightness = 1.0;  ///< times what lamps and glowing voxels give to others
-  std::optional<GroundPlane> ground;
-  std::optional<Fog> fog;
+  std::optional<GroundPlane> ground{};
+  std::optional<Fog> fog{};
 
   double lens_radius = 0.0;     ///< world units; more than 0: what is not in focus is blurred. Perspective cameras only
   double focus_distance = 1.0;  ///< world units along the camera's forward axis; more than 0

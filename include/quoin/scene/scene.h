@@ -29,7 +29,7 @@ struct Lamp {
     Point,  ///< shines into all directions alike
     Spot,   ///< into a cone around `direction`
   };
-  std::string name;
+  std::string name{};
   Kind kind = Kind::Point;
   DVec3 position{0.0};              ///< world units
   DVec3 direction{0.0, -1.0, 0.0};  ///< of a spot's middle; any length but 0
@@ -53,7 +53,9 @@ struct SceneGrid {
   /// lie outside after edits; `declared_box` says how large the grid counts as.
   IBox canvas{};
   /// The densities; its materials are types of the scene's registry. Pictures by rays see through transparent ones.
-  /// Where these meet opaque ones in the solid, samples of both are to have their distance to where they meet.
+  /// Where transparent and opaque ones meet inside the solid, the samples of both hold the distance to that border.
+  /// A field whose samples are voxels' centres (`field_from_grid`, `distance_field`) needs a grid of its own, whose
+  /// pivot is 0.5 less along each axis than that of the voxels.
   DensityGrid field = DensityGrid();
 
   /// The smallest box of whole coordinates around the voxels and the field's solid; empty where there are none.
@@ -72,8 +74,8 @@ using LayerHandle = Handle<SceneLayer>;
 /// One placement of a grid in the world. Moving it touches no voxel and no mesh. One without a place (`has_place`) is
 /// left out of pictures, queries and bounds.
 struct Instance {
-  std::string name;
-  GridHandle grid;
+  std::string name{};
+  GridHandle grid{};
   DVec3 position{0.0};  ///< of the grid's pivot, in world units
   /// World from grid. Of any length: what reads it makes it unit, and takes a zero one as no rotation.
   DQuat rotation{1.0, 0.0, 0.0, 0.0};
@@ -92,7 +94,7 @@ using InstanceHandle = Handle<Instance>;
 /// of the world, so a group's place says only where its own frame lies: the point and the turn that tools handle it by.
 /// `move_group` moves a group with all that is below it.
 struct SceneGroup {
-  std::string name;
+  std::string name{};
   GroupHandle parent = {};             ///< that it belongs to; one that names nothing: it stands at the top
   LayerHandle layer = {};              ///< that it lies on, with all below it
   DVec3 position{0.0};                 ///< of its frame, in world units
@@ -103,7 +105,7 @@ struct SceneGroup {
 
 /// Groups and instances that are shown and hidden together, wherever they stand in the hierarchy.
 struct SceneLayer {
-  std::string name;
+  std::string name{};
   bool visible = true;
 };
 

@@ -42,7 +42,7 @@ struct MeshKey {
 
 /// A group of placements and other groups: SceneGroup, as files of meshes have it.
 struct MeshGroup {
-  std::string name;
+  std::string name{};
   std::optional<std::size_t> parent{};  ///< index into SceneMeshes::groups, of one before it
   std::string layer{};                  ///< the name of its layer
   Similarity world_from_group{};        ///< without a scale
@@ -51,7 +51,7 @@ struct MeshGroup {
 /// One place of a part in the world.
 struct MeshPlacement {
   std::size_t part = 0;  ///< index into SceneMeshes::parts
-  std::string name;      ///< empty: that of the part
+  std::string name{};    ///< empty: that of the part
   /// Takes points of the part, relative to its pivot, to the world. A matrix must be affine; a negative determinant
   /// mirrors.
   std::variant<Similarity, glm::dmat4> world_from_part{Similarity{}};

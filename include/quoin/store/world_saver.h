@@ -34,9 +34,11 @@ struct WorldView {
 ///   auto loaded = quoin::load_world(*world);
 ///   quoin::Scene& scene = loaded->loaded.scene;
 ///   while (play(scene)) {
-///     if (it_is_time()) loaded->saver.save(*world, scene);    // the world writes on its own thread
+///     if (!it_is_time()) continue;
+///     const auto begun = loaded->saver.save(*world, scene);   // the world writes on its own thread
+///     if (!begun) complain(begun.error());
 ///   }
-///   loaded->saver.save(*world, scene);
+///   if (const auto begun = loaded->saver.save(*world, scene); !begun) complain(begun.error());
 ///   if (const auto saved = world->flush(); !saved) complain(saved.error());
 ///
 /// A chunk that edits emptied is kept as air (StoredChunk). Numbers of grids, instances, groups and layers stay theirs.

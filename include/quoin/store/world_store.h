@@ -50,6 +50,7 @@ class WorldChanges {
   void remove_chunk(const ChunkPlace& place);
   /// The types of a registry, from one on. A type that chunks use may change, but not go.
   void put_types(const VoxelRegistry& types, VoxelType first = 1);
+  /// Requires: not air.
   void put_type(VoxelType type, const VoxelProperties& properties);
   void put_grid(std::uint32_t number, const WorldGrid& grid);
   /// The grid and all its chunks.
@@ -88,7 +89,7 @@ struct WorldStats {
 ///   auto world = quoin::WorldStore::open("home.quoin", quoin::WorldAccess::Write);
 ///   quoin::WorldChanges changes;
 ///   changes.put_chunk({.chunk = {0, 1, 0}}, {*grid.find_chunk({0, 1, 0})});
-///   world->save(std::move(changes));   // on a thread of its own
+///   if (const auto begun = world->save(std::move(changes)); !begun) complain(begun.error());  // on its own thread
 ///   if (const auto saved = world->flush(); !saved) complain(saved.error());
 ///
 /// Safety:  what `wait`, `flush` or a callback said was saved survives kill -9 and power cuts. Until then it is there
@@ -146,6 +147,7 @@ class WorldStore {
   /// Requires: open for writing.
   Result<SaveTicket> save(WorldChanges changes, std::function<void(const Status&)> on_saved = {});
   /// Waits until that save is on disk. Errors: CannotWrite (a full disk ...): it is not, but kept.
+  /// Requires: a ticket of this world.
   [[nodiscard]] Status wait(SaveTicket ticket);
   /// Waits for all that was saved before; of what failed it tries again. Errors: as `wait`.
   [[nodiscard]] Status flush();

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -53,9 +54,10 @@ struct StreamStats {
   std::size_t missing_chunks = 0;  ///< of these, that are not loaded yet
   bool is_complete = false;        ///< all that was wanted in the last `update` or `plan` is in place
   std::size_t waiting_edits = 0;   ///< chunks that edits wait for
-  double complete_radius = 0.0;    ///< world units around every viewer within which all is loaded; less a chunk meshed
-  std::uint64_t chunks_read = 0;   ///< since it was opened: from the world's file
-  std::uint64_t chunks_made = 0;   ///< likewise: by generators
+  /// World units: so far around every viewer all is loaded. Meshes are there up to a chunk (64 voxels) less.
+  double complete_radius = 0.0;
+  std::uint64_t chunks_read = 0;  ///< since it was opened: from the world's file
+  std::uint64_t chunks_made = 0;  ///< likewise: by generators
   std::uint64_t chunks_unloaded = 0;
   std::uint64_t chunks_dropped = 0;     ///< that came when nobody wanted them any more
   double longest_update_seconds = 0.0;  ///< since `stats` was called last
@@ -71,9 +73,12 @@ struct WorldExtent {
 /// A world of which only what lies around viewers is in memory; what is edited is saved, and comes back.
 ///
 ///   auto world = quoin::StreamedWorld::open_or_create("home.quoin");
-///   if (world->is_new()) world->add_terrain({.seed = 7});
+///   if (world->is_new()) {
+///     if (const auto land = world->add_terrain({.seed = 7}); !land) complain(land.error());
+///   }
 ///   while (play(world->scene())) {             // edits its grids like any scene's
-///     world->update({{.position = player, .direction = looks}});
+///     const quoin::Viewer eye{.position = player, .direction = looks};
+///     if (const auto saved = world->update({&eye, 1}); !saved) complain(saved.error());
 ///     meshes.update(world->scene(), player);   // and all else that follows scenes
 ///   }
 ///   if (const auto saved = world->flush(); !saved) complain(saved.error());
@@ -116,6 +121,7 @@ class StreamedWorld {
   /// places it. Requires: neither voxels nor densities. Errors: CannotWrite; as WorldSaver::save.
   Result<GridHandle> add_grid(SceneGrid grid, std::shared_ptr<const ChunkGenerator> generator = nullptr);
   /// Who makes what of a grid is not in the world's file; to be called before the first `update`.
+  /// Requires: the world had the grid, or `add_grid` added it.
   void use_generator(GridHandle grid, std::shared_ptr<const ChunkGenerator> generator);
   /// Adds a grid of generated landscape, placed at the origin. Which is written in the world's file, so that it goes on
   /// when that is opened again.
@@ -139,12 +145,17 @@ class StreamedWorld {
   [[nodiscard]] bool is_loaded(GridHandle grid, IVec3 chunk) const;
   /// Edits what is loaded at once, and what is not once it is: chunks are brought into memory for it, and saved.
   /// Edits of one chunk happen in the order in which they were applied.
+  /// Data that is set on air, or that has more bits of state than its voxel's type, is left out, without an error.
   /// Errors: InvalidArgument, and nothing is changed: the grid is not there, or is not one that
-  ///         the world had or `add_grid` added; LimitExceeded: both as chunks_of_edit.
+  ///         the world had or `add_grid` added, or a type is not registered; and as chunks_of_edit.
   Status apply(const WorldEdit& edit);
+  /// The number that edits (WorldEdit::grid) and the store (ChunkPlace::grid) name a grid by; nothing for grids that
+  /// are not streamed. Cost: O(log grids).
+  [[nodiscard]] std::optional<std::uint32_t> number_of(GridHandle grid) const;
 
   /// Saves what was edited, also by edits that wait for chunks, and returns once it is on disk.
-  /// Errors: CannotWrite; what could not be saved is kept in memory.
+  /// Errors: CannotWrite; what could not be saved is kept in memory. CannotRead where edits wait for a chunk that is
+  ///         damaged; the rest is saved.
   Status flush();
   /// What went wrong with single chunks since the last call: that were damaged (which stay not loaded) or could not be
   /// made (which are air).

@@ -21,13 +21,13 @@ struct WorldEdit {
   /// As Grid::set of several.
   struct SetVoxels {
     std::vector<PlacedVoxel> voxels;
-    bool operator==(const SetVoxels&) const;
+    bool operator==(const SetVoxels&) const = default;
   };
   /// As Grid::set_data.
   struct SetData {
     IVec3 voxel{0};
     std::uint32_t state = 0;
-    std::vector<std::byte> bytes;
+    std::vector<std::byte> bytes{};
     bool operator==(const SetData&) const = default;
   };
   /// As Grid::fill_box.
@@ -62,7 +62,7 @@ struct WorldEdit {
   };
   using Content = std::variant<SetVoxels, SetData, FillBox, FillSphere, FieldSphere, FieldBox>;
 
-  std::uint32_t grid = 0;  ///< the grid's number in the world: WorldSaver::number_of, the same on all machines
+  std::uint32_t grid = 0;  ///< the grid's number in the world (StreamedWorld::number_of), the same on all machines
   Content content;
 
   bool operator==(const WorldEdit&) const = default;

@@ -52,7 +52,7 @@ class OccupancyTree {
   /// Cost: as that of a grid.
   [[nodiscard]] static OccupancyTree build(const DensityGrid& field);
 
-  /// Of a field: of those cells the ones with a solid corner of a transparent material. Cost: 40 to 100 microseconds a
+  /// Of a field, another tree: of those cells only the ones with a solid corner of a transparent material. Cost: 40 to 100 microseconds a
   /// chunk that has such.
   [[nodiscard]] static OccupancyTree build(const DensityGrid& field, const VoxelRegistry& types);
 
@@ -68,7 +68,8 @@ class OccupancyTree {
   /// The same of the field of which it was built. Cost: as that of a grid; for an edit on a chunk's lower faces also
   /// the chunks below.
   void update(const DensityGrid& field, const DensityChanges& changes);
-  /// The same of what is transparent of the field.
+  /// The same of what is transparent of the field. Requires: it was built of that; which of both updates suits a tree
+  /// is not checked.
   void update(const DensityGrid& field, const VoxelRegistry& types, const DensityChanges& changes);
 
   /// The smallest box around the occupied voxels, to the voxel.

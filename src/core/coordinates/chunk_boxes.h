@@ -9,8 +9,6 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
-#include "core/coordinates/coordinate_hash.h"
-
 namespace quoin {
 
 /// The boxes of what chunks hold, and the box around all of them, which follows every change at a cost of O(log

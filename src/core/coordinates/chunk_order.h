@@ -8,10 +8,7 @@
 namespace quoin {
 
 /// The order in which grids list their chunks: by z, then y, then x.
-inline constexpr auto by_zyx = [](IVec3 a, IVec3 b) {
-  if (a.z != b.z) return a.z < b.z;
-  return a.y != b.y ? a.y < b.y : a.x < b.x;
-};
+inline constexpr ByZyx by_zyx{};
 
 inline void sort_and_unite(std::vector<IVec3>& chunks) {
   std::sort(chunks.begin(), chunks.end(), by_zyx);

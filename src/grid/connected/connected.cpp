@@ -55,9 +55,6 @@ struct Entry {
   std::size_t first_node = 0;             // its parts are nodes from here on
 };
 
-struct ByZyx {
-  bool operator()(IVec3 a, IVec3 b) const { return by_zyx(a, b); }
-};
 using Entries = std::map<IVec3, Entry, ByZyx>;
 
 // Finds which parts of two chunks touch, the second at `offset` from the first.

@@ -70,6 +70,11 @@ bool DensityGrid::is_loaded_around(IVec3 chunk, int distance) const {
   return impl().store.loaded().has_around(chunk, distance);
 }
 
+std::vector<IVec3> DensityGrid::loaded_chunks() const {
+  const LoadedChunks& loaded = impl().store.loaded();
+  return loaded.is_partial() ? loaded.sorted() : chunks();
+}
+
 bool DensityGrid::is_loaded_within(const IBox& samples) const {
   return impl().store.loaded().has_within(samples);
 }

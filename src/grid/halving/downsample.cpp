@@ -18,10 +18,6 @@
 namespace quoin {
 namespace {
 
-struct ByZyx {
-  bool operator()(IVec3 a, IVec3 b) const { return by_zyx(a, b); }
-};
-
 IVec3 halved_coordinates(IVec3 chunk) {
   return {chunk.x >> 1, chunk.y >> 1, chunk.z >> 1};
 }

@@ -10,7 +10,6 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
-#include "core/coordinates/coordinate_hash.h"
 
 namespace quoin::propagated {
 

@@ -15,7 +15,6 @@
 #include <quoin/core/ref.h>
 
 #include "core/coordinates/chunk_order.h"
-#include "core/coordinates/coordinate_hash.h"
 #include "core/moved_from.h"
 #include "light/propagated/light_domain.h"
 #include "light/propagated/light_quads.h"
@@ -48,6 +47,9 @@ std::vector<TypeLight> type_lights(const VoxelRegistry& types, const PropagatedL
     const VoxelProperties& properties = types[type];
     LightLevels lamp = options.lamp ? options.lamp(type, properties) : lamp_levels(properties);
     lamp.sky = 0;
+    for (std::uint8_t* level : {&lamp.red, &lamp.green, &lamp.blue}) {
+      *level = static_cast<std::uint8_t>(std::min<unsigned>(*level, kBrightest));
+    }
     lights[i].lamp = packed(lamp);
     if (types.is_opaque(type)) {
       lights[i].passes = 0;
@@ -113,7 +115,7 @@ struct PropagatedLight::Impl {
 
   /// Voxels whose light may be another.
   using Dirty = std::array<IBox, kChannels>;  // [channel]
-  using Queue = std::map<IVec3, IBox, bool (*)(IVec3, IVec3)>;
+  using Queue = std::map<IVec3, IBox, ByZyx>;
 
   [[nodiscard]] const std::vector<TypeLight>& lights() const { return *shared_lights; }
   [[nodiscard]] const LightDomain& domain() const { return shared_domain->columns; }
@@ -142,7 +144,7 @@ struct PropagatedLight::Impl {
   Ref<SharedDomain> shared_domain = make_ref<SharedDomain>();
   LightStore store;          // of the chunks of the domain
   std::vector<Dirty> dirty;  // boxes that are to be solved by themselves
-  Queue queue{by_zyx};       // boxes of chunks that are to be solved, a layer at a time
+  Queue queue;                // boxes of chunks that are to be solved, a layer at a time
   std::unordered_map<IVec3, std::unique_ptr<ChunkMasks>, CoordinateHash> masks;  // during an update
 };
 

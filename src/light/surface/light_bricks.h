@@ -14,7 +14,6 @@
 #include <quoin/light/scene_light.h>
 #include <quoin/scene/scene.h>
 
-#include "core/coordinates/coordinate_hash.h"
 
 namespace quoin {
 

@@ -9,7 +9,6 @@
 
 #include <tsl/robin_map.h>
 
-#include "core/coordinates/coordinate_hash.h"
 #include "core/lender.h"
 #include "core/moved_from.h"
 #include "core/progress_steps.h"

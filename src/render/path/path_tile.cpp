@@ -285,7 +285,10 @@ void PathTile::note_layers(Path& path, const Vertex& vertex, double t, VoxelType
   sums.normal += vertex.normal;
   if (!path.is_first_sample) return;
   sums.type = type;
-  sums.instance = vertex.is_ground ? 0 : static_cast<std::uint32_t>(vertex.placed) + 1;
+  if (!vertex.is_ground) {
+    const auto placed = static_cast<std::size_t>(vertex.placed);
+    sums.instance = placed_in(context_->view->tracer())[placed].instance.index + 1;
+  }
   if (path.is_first) sums.depth = static_cast<float>(t);
 }
 

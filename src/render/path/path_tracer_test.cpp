@@ -383,7 +383,7 @@ TEST(PathTracer, LayersSayWhatPixelsShow) {
   EXPECT_NEAR(picture.normal[middle].y, 1.0F, 1e-6F);
   EXPECT_NEAR(picture.depth.values[middle], 12.0F, 1e-4F);
   EXPECT_EQ(picture.types[middle], 1);
-  EXPECT_EQ(picture.instances[middle], 1U);
+  EXPECT_EQ(picture.instances[middle], 1U + scene.instances().handles().front().index);
   EXPECT_EQ(picture.alpha[middle], 1.0F);
   EXPECT_EQ(picture.alpha[0], 0.0F);
   EXPECT_EQ(picture.types[0], kAir);

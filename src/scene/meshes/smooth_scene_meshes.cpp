@@ -16,7 +16,6 @@
 #include <quoin/grid/voxel_field.h>
 
 #include "core/coordinates/chunk_order.h"
-#include "core/coordinates/coordinate_hash.h"
 #include "mesh/surface/bodies.h"
 #include "mesh/surface/build.h"
 #include "scene/meshes/lattices.h"

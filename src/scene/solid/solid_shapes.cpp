@@ -18,7 +18,6 @@
 #include <quoin/mesh/quad_triangles.h>
 
 #include "core/coordinates/chunk_order.h"
-#include "core/coordinates/coordinate_hash.h"
 #include "core/moved_from.h"
 #include "trace/chunk_rows.h"
 

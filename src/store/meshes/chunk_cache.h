@@ -12,7 +12,6 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/store/world_store.h>
 
-#include "core/coordinates/coordinate_hash.h"
 
 namespace quoin::store {
 
