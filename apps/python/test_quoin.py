@@ -120,6 +120,73 @@ class Scenes(unittest.TestCase):
         self.assertTrue((hits.normal == [0, 1, 0]).all())
 
 
+    def test_instances_are_placed_and_moved(self):
+        _, scene = self.scene()
+        twice = np.diag([2.0, 2.0, 2.0, 1.0])
+        twice[:3, 3] = 100, 0, 0
+        self.assertEqual(scene.place(scene.grids[0], twice, "large", visible=False), 1)
+        small, large = scene.instances
+        self.assertTrue((small.matrix == np.eye(4)).all() and small.shown)
+        self.assertTrue((large.matrix == twice).all())
+        self.assertEqual((large.name, large.grid, large.visible, large.group), ("large", 0, False, None))
+        self.assertEqual(scene.bounds[1][0], 10)
+        scene.move(1, twice, visible=True)
+        self.assertEqual(scene.bounds, ((0, 0, 0), (120, 10, 16)))
+        self.assertEqual(scene.rays([[101, 50, 1]], [[0, -1, 0]]).t[0], 46)
+        with self.assertRaises(quoin.QuoinError):
+            scene.move(0, [[1, 1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]])
+        with self.assertRaises(ValueError):
+            scene.place(scene.grids[0], np.eye(3))
+
+    def test_scene_files_say_what_else_they_hold(self):
+        scene = quoin.load_bytes(b"""{"quoin_scene": 4, "grids": [{"voxels": []}], "layers": [{"name": "upper"}],
+            "groups": [{"name": "house"}, {"name": "room", "parent": 0}], "instances": [{"grid": 0, "group": 1, "layer": 0}],
+            "lamps": [{"position": [1, 2, 3], "intensity": 5}], "sun": [0, 1, 0],
+            "camera": {"position": [0, 0, 50], "look_at": [0, 0, 0], "fov": 40}}""")
+        self.assertEqual(scene.groups[scene.instances[0].group], quoin.Group("room", 0, True, ""))
+        self.assertEqual(scene.instances[0].layer, "upper")
+        self.assertEqual((scene.lamps[0].position, scene.lamps[0].direction, scene.sun), ((1, 2, 3), None, (0, 1, 0)))
+        camera = scene.cameras[0]
+        self.assertEqual((camera.position, camera.forward, camera.view_height), ((0, 0, 50), (0, 0, -1), None))
+        self.assertAlmostEqual(camera.fov, 40)
+
+    def test_triangles_become_voxels(self):
+        corners = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [4, 4, 0], [0, 0, 4], [4, 0, 4], [0, 4, 4], [4, 4, 4]])
+        cube = [[0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4], [2, 6, 7], [2, 7, 3], [0, 4, 6],
+                [0, 6, 2], [1, 3, 7], [1, 7, 5]]
+        scene = quoin.Scene()
+        glass = quoin.VoxelType((9, 200, 9, 100), roughness=0.1)
+        grid = scene.voxelize(corners, cube, 0.5, types=[(200, 0, 0), glass], materials=[0] * 6 + [1] * 6, fill="solid")
+        self.assertEqual((grid.shape, grid.voxels), ((8, 8, 8), 512))
+        self.assertIn((9, 200, 9, 100), [one.rgba for one in scene.types])
+        painted = scene.voxelize(corners, cube, colours=np.tile([0, 0, 1, 1], (8, 1)), fill="surface")
+        self.assertTrue((scene.palette[painted.to_numpy()[0, 0, 0]] == [0, 0, 255, 255]).all())
+        for wrong in (dict(fill="half"), dict(colours=[[1, 1, 1, 1]]), dict(materials=[0])):
+            with self.assertRaises(ValueError):
+                scene.voxelize(corners, cube, **wrong)
+
+    def test_progress_is_told_and_ends_a_call(self):
+        _, scene = self.scene()
+        told = []
+        with quoin.progress(told.append):
+            scene.render(64, 64)
+        self.assertEqual(told, sorted(told))
+        self.assertEqual(told[-1], 1)
+        with self.assertRaises(quoin.QuoinError) as ended, quoin.progress(lambda fraction: fraction < 0.5):
+            scene.render(64, 64)
+        self.assertEqual(ended.exception.status, 7)
+        with self.assertRaises(ZeroDivisionError), quoin.progress(lambda fraction: 1 / 0):
+            scene.render(64, 64)
+        self.assertEqual(scene.render(64, 64).shape, (64, 64, 3))
+
+    def test_a_mesh_of_blocks_says_its_types(self):
+        _, scene = self.scene()
+        mesh = scene.grids[0].mesh()
+        self.assertEqual(set(mesh.types), {1, 2})
+        self.assertTrue((scene.palette[mesh.types] == mesh.colours).all())
+        self.assertIsNone(scene.grids[0].mesh(smooth=True).types)
+
+
 class BadInput(unittest.TestCase):
     def test_is_told_and_never_a_crash(self):
         array, nan = np.zeros((4, 4, 4), np.uint8), float("nan")
@@ -155,7 +222,11 @@ class BadInput(unittest.TestCase):
 
 
 def load_tests(loader, tests, pattern):
-    tests.addTests(doctest.DocTestSuite(quoin))
+    names = {**vars(quoin), "np": np}
+    for module in (quoin, quoin._mesh, quoin._scene):
+        suite = doctest.DocTestSuite(module, extraglobs=names)
+        assert suite.countTestCases() > 1, "a module without examples"
+        tests.addTests(suite)
     return tests
 
 
