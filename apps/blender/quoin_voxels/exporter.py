@@ -83,15 +83,25 @@ class _Writer:
             triangles = triangles[:, ::-1]
         points = points.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
         looks = [materials.seen(one) for one in slots or [None]]
+        types, numbers = [one for one, _ in looks], np.minimum(numbers, len(looks) - 1)
         colours = None
         if any(materials.has_attribute(node) for _, node in looks):
             colours = _colours_of(mesh)
-        for one, (_, node) in zip(slots, looks):
-            if node is not None and not (materials.has_attribute(node) and colours is not None):
-                self.made.warnings.append(f"{name}: the texture of {one.name} is left out; its viewport colour stands for it")
+        for slot, (one, node) in enumerate(looks):
+            if node is None or (materials.has_attribute(node) and colours is not None):
+                continue
+            texels = _texels_of(mesh, node, np.flatnonzero(numbers == slot))
+            if texels is None:
+                self.made.warnings.append(f"{name}: what colours {slots[slot].name} is left out; its viewport colour stands "
+                                          "for it")
+                continue
+            found, which = np.unique(texels, axis=0, return_inverse=True)
+            numbers[numbers == slot] = len(types) + which.ravel()
+            types += [one._replace(rgba=(*(int(v) for v in rgb), one.rgba[3])) for rgb in found]
+            if node.interpolation != "Closest":
+                self.made.warnings.append(f"{name}: of the texture of {slots[slot].name} a triangle has one colour")
         self.scene.voxelize(axes.points_to_quoin(points, self.options.scale), triangles,
-                            types=[one for one, _ in looks], colours=colours, fill=self.options.fill, name=name,
-                            materials=np.minimum(numbers, len(looks) - 1))
+                            types=types, colours=colours, fill=self.options.fill, name=name, materials=numbers)
         self.made.voxelized += 1
 
 
@@ -109,6 +119,26 @@ def _colours_of(mesh):
     out = np.ones((len(mesh.vertices), 4), np.float32)
     out[corners] = values
     return out
+
+
+def _texels_of(mesh, node, triangles):
+    """The colours, sRGB bytes (n, 3), that a texture has in the middle of triangles; None where there is no such texture."""
+    layer = mesh.uv_layers.active
+    image = node.image if node.type == "TEX_IMAGE" else None
+    if image is None or layer is None or not image.size[0]:
+        return None
+    corners = np.empty((len(mesh.loop_triangles), 3), np.int32)
+    mesh.loop_triangles.foreach_get("loops", corners.ravel())
+    places = np.empty((len(mesh.loops), 2), np.float32)
+    layer.data.foreach_get("uv", places.ravel())
+    middle = places[corners[triangles]].mean(1) % 1.0
+    width, height = image.size
+    pixels = np.empty(width * height * image.channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(height, width, image.channels)
+    colours = pixels[(middle[:, 1] * height).astype(int), (middle[:, 0] * width).astype(int)]
+    colours = np.repeat(colours, 3, axis=1) if image.channels < 3 else colours[:, :3]
+    return materials.srgb(colours) if image.is_float else np.rint(255.0 * colours).astype(int)
 
 
 _SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}

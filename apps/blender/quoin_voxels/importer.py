@@ -58,6 +58,18 @@ def _quads(triangles):
     return base[:, None] + (((first & 3)[:, None] + np.arange(4, dtype=np.int32)) & 3)
 
 
+def _edges_of_quads(mesh, quads):
+    """Four edges a face: no two faces share a corner, so that nothing has to be looked for."""
+    edges = np.empty((len(quads), 4, 2), np.int32)
+    edges[:, :, 0] = quads
+    edges[:, :3, 1] = quads[:, 1:]
+    edges[:, 3, 1] = quads[:, 0]
+    mesh.edges.add(quads.size)
+    mesh.edges.foreach_set("vertices", edges.ravel())
+    mesh.loops.foreach_set("edge_index", np.arange(quads.size, dtype=np.int32))
+    mesh.update()
+
+
 def _open(found, blocks):
     """What light arrives at vertices, as glTF and PLY files have it: of blocks a quarter at least."""
     open_ = np.ones(len(found.positions), np.float32)
@@ -136,7 +148,10 @@ def mesh_of(grid, name, looks, options):
         light[:, :3] = table[found.colours[:, :3]]
         _colours(mesh, materials.COLOUR, light)
     _colours(mesh, materials.OCCLUSION, np.broadcast_to(_open(found, blocks)[:, None], (len(found.positions), 4)))
-    mesh.update(calc_edges=True)
+    if len(rest):
+        mesh.update(calc_edges=True)
+    else:
+        _edges_of_quads(mesh, quads)
     return mesh, slots
 
 
@@ -265,6 +280,8 @@ def import_file(context, path, options):
     top = bpy.data.collections.new(name)
     context.scene.collection.children.link(top)
     looks = _Looks(name, scene.types, options)
+    if options.surface == "SMOOTH" and any(one.transparent or one.emission > 0.0 for one in looks.types):
+        made.warnings.append(f"{name}: smooth surfaces are opaque and do not shine; types of it are transparent, or lamps")
     window = context.window_manager
     window.progress_begin(0.0, 1.0)
     try:
