@@ -21,16 +21,20 @@ Arrays of voxels have the axes x, y (up) and z, in this order. Calls that take l
 from __future__ import annotations
 
 import contextlib
+import struct
+import zlib
 from typing import Any, Callable, Iterator, List
 
+import numpy as np
+
 from . import _c
-from ._c import QuoinError
+from ._c import NdArray, QuoinError
 from ._mesh import Mesh, mesh_labels, surface_nets
 from ._scene import (Camera, Format, Grid, Group, Hits, Instance, Lamp, Scene, VoxelType, formats, from_numpy, load,
                      load_bytes)
 
 __all__ = ["Camera", "Format", "Grid", "Group", "Hits", "Instance", "Lamp", "Mesh", "QuoinError", "Scene", "VoxelType",
-           "formats", "from_numpy", "load", "load_bytes", "mesh_labels", "progress", "surface_nets", "version"]
+           "formats", "from_numpy", "load", "load_bytes", "mesh_labels", "png", "progress", "surface_nets", "version"]
 
 
 def version() -> str:
@@ -40,6 +44,26 @@ def version() -> str:
     2
     """
     return _c.text_of(_c.lib.quoin_version())
+
+
+def png(picture: NdArray) -> bytes:
+    """A picture, uint8 (height, width, 3) or (height, width, 4), as a PNG file: for notebooks, and to be written.
+
+    >>> png(np.zeros((2, 3, 3), np.uint8))[:8]
+    b'\\x89PNG\\r\\n\\x1a\\n'
+    """
+    if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] not in (3, 4) or not picture.size:
+        raise ValueError("a picture is uint8, (height, width, 3) or (height, width, 4)")
+    height, width, channels = picture.shape
+    rows = np.zeros((height, 1 + width * channels), np.uint8)  # each begins with its filter: none
+    rows[:, 1:] = picture.reshape(height, -1)
+
+    def chunk(name: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 2 if channels == 3 else 6, 0, 0, 0)
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows.tobytes(), 9))
+            + chunk(b"IEND", b""))
 
 
 @contextlib.contextmanager
