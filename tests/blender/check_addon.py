@@ -96,6 +96,7 @@ def check_castle(quoin, path, folder):
         require(np.array_equal(points_of(again), points_of(scene)), f"{name} has other voxels")
         require(len(again.instances) == len(placed) and len(again.grids) == len({one.grid for one in placed}),
                 f"{name}: {len(again.grids)} grids, {len(again.instances)} instances")
+        require({one.name for one in again.instances} == {one.name for one in placed}, f"{name}: names")
         # Looks, whatever the types' numbers.
         looks = lambda of: {tuple(round(float(v), 4) for v in (*one.rgba, one.emission, one.metalness, one.roughness))
                             for one in of.types[1:] }

@@ -22,6 +22,7 @@ class _Writer:
         self.made = Exported()
         self._types = {}  # numbers in the scene
         self._grids = {}  # by mesh and materials
+        self._places = 0
 
     def type_number(self, one):
         key = tuple(one)
@@ -52,10 +53,11 @@ class _Writer:
             moved = np.eye(4)
             moved[:3, 3] = found.origin
             self._grids[key] = (grid, moved)
-            self.scene.move(len(self.scene.instances) - 1, matrix @ moved)
+            self.scene.move(self._places, matrix @ moved, name=name)
         else:
             grid, moved = self._grids[key]
             self.scene.place(grid, matrix @ moved, name)
+        self._places += 1
         self.made.kept += 1
 
     def add_voxelized(self, evaluated, world, name):
@@ -102,6 +104,7 @@ class _Writer:
                 self.made.warnings.append(f"{name}: of the texture of {slots[slot].name} a triangle has one colour")
         self.scene.voxelize(axes.points_to_quoin(points, self.options.scale), triangles,
                             types=types, colours=colours, fill=self.options.fill, name=name, materials=numbers)
+        self._places += 1
         self.made.voxelized += 1
 
 

@@ -243,16 +243,16 @@ def _lights(context, scene, top, name, options, made):
 
 def _place(scene, top, name, looks, options, made, progress):
     groups = _collections(scene, top)
-    grids, meshes = scene.grids, {}
+    grids, places, meshes = scene.grids, scene.instances, {}
     empty = 0
-    for i, one in enumerate(scene.instances):
+    for i, one in enumerate(places):
         if one.grid not in meshes:
             grid = grids[one.grid]
             mesh, slots = mesh_of(grid, grid.name or one.name or name, looks, options)
             if mesh is not None:
                 _keep(mesh, grid, looks, slots, options, made)
             meshes[one.grid] = mesh
-            progress(i / len(scene.instances))
+            progress(i / len(places))
         mesh = meshes[one.grid]
         if mesh is None:
             empty += 1

@@ -2,8 +2,6 @@
 
 import bpy
 
-IS_4 = bpy.app.version >= (4, 0, 0)
-
 
 def input_of(principled, name):
     """A socket of the Principled shader, by its name in Blender 3."""
@@ -30,12 +28,3 @@ def shade_flat(mesh):
     """Faces are flat unless told otherwise, but for those of Blender 4.1 on."""
     if hasattr(mesh, "shade_flat"):
         mesh.shade_flat()
-
-
-def blend(material):
-    """Has the viewport draw what is transparent as such."""
-    if hasattr(material, "surface_render_method"):
-        material.surface_render_method = "BLENDED"
-    else:
-        material.blend_method = "BLEND"
-        material.show_transparent_back = False

@@ -335,13 +335,15 @@ class Scene:
         _c.check(_c.lib.quoin_instance_add(self._owner.handle, ctypes.byref(given), ctypes.byref(out)))
         return out.value
 
-    def move(self, instance: int, matrix: Any, visible: Optional[bool] = None) -> None:
-        """Puts an instance elsewhere, and shows or hides it."""
+    def move(self, instance: int, matrix: Any, visible: Optional[bool] = None, name: Optional[str] = None) -> None:
+        """Puts an instance elsewhere, shows or hides it, and names it."""
         given = _c.sized(_c.Instance)
         _c.check(_c.lib.quoin_instance_get(self._owner.handle, instance, ctypes.byref(given)))
         given.world_from_grid[:] = _rows_of(matrix)
         if visible is not None:
             given.visible = int(visible)
+        if name is not None:
+            given.name = _c.bytes_of(name)
         _c.check(_c.lib.quoin_instance_set(self._owner.handle, instance, ctypes.byref(given)))
 
     def voxelize(self, positions: Any, triangles: Any, voxel_size: float = 1.0, *, colours: Any = None,
