@@ -238,7 +238,8 @@ class Pages(unittest.TestCase):
                 for block in blocks:
                     # trimesh is the one package that is not asked for; and pictures need not be as large.
                     block = "\n".join(line for line in block.split("\n") if "to_trimesh" not in line).replace("960, 540", "96, 54")
-                    exec(compile(block, name, "exec"), names)
+                    with contextlib.redirect_stdout(io.StringIO()):
+                        exec(compile(block, name, "exec"), names)
             finally:
                 os.chdir(home)
         return len(blocks)
