@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "quoin.h"
-#include "test_structs.h"
+#include "structs_for_tests.h"
 
 namespace {
 

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "quoin.h"
-#include "test_structs.h"
+#include "structs_for_tests.h"
 
 namespace {
 
