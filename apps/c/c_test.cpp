@@ -11,17 +11,11 @@
 #include <gtest/gtest.h>
 
 #include "quoin.h"
+#include "structs_for_tests.h"
 
 namespace {
 
 constexpr int kEdge = 12;
-
-template <class T>
-T sized() {
-  T made{};
-  made.size = sizeof made;
-  return made;
-}
 
 template <class T>
 quoin_array array_of(const std::vector<T>& values, quoin_scalar scalar, int edge = kEdge) {

@@ -1,28 +1,56 @@
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <exception>
 #include <memory>
 #include <mutex>
 #include <new>
+#include <optional>
+#include <shared_mutex>
 #include <string>
+#include <string_view>
 #include <unordered_map>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include <quoin/core/parallel.h>
+#include <quoin/core/progress.h>
 #include <quoin/io/loaded_scene.h>
 #include <quoin/mesh/array_surface.h>
 #include <quoin/mesh/label_surfaces.h>
+#include <quoin/scene/scene_tracer.h>
 
 #include "quoin.h"
 
 /// What the functions of quoin.h share: handles, and how they fail.
 namespace quoin::c {
 
+/// What things of a scene are called by outside, and inside.
+struct SceneNumbers {
+  std::vector<GridHandle> grids;
+  std::vector<InstanceHandle> instances;
+  std::vector<GroupHandle> groups;  // from the top; the first has the number 1
+  std::unordered_map<std::uint32_t, std::size_t> grid_of_slot;
+  std::unordered_map<std::uint32_t, std::size_t> group_of_slot;  // from 1
+};
+
+/// What rays go through, brought up to date by the first who asks after a change.
+struct KeptTracer {
+  std::mutex mutex;
+  std::optional<SceneTracer> tracer;
+  ChangeCursor scene_cursor;
+  ChangeCursor types_cursor;
+};
+
 struct SceneBody {
+  std::shared_mutex mutex;  // shared by those who read
   LoadedScene loaded;
-  std::vector<GridHandle> grids;  // by their numbers
+  SceneNumbers numbers;
+  KeptTracer kept;
 };
 
 /// A mesh of a grid, with vertices of all its surfaces.
@@ -31,6 +59,7 @@ struct GridMesh {
   std::vector<Vec3> normals;
   std::vector<Rgba8> colours;
   std::vector<float> occlusion;
+  std::vector<VoxelType> types;  // none where it is smooth
   std::vector<std::uint32_t> indices;
 };
 struct LabelMesh {
@@ -93,16 +122,108 @@ quoin_status guarded(Work&& work) noexcept {
   }
 }
 
-/// The same with a scene.
+enum class Use : std::uint8_t { Read, Change };
+
+/// The same with a scene, for as long as `work` takes.
 template <class Work>
-quoin_status with_scene(quoin_scene handle, Work&& work) noexcept {
+quoin_status with_scene(quoin_scene handle, Use use, Work&& work) noexcept {
   return guarded([&] {
     const auto scene = handles().find<SceneBody>(handle);
-    return scene == nullptr ? fail(QUOIN_BAD_HANDLE, "no scene has this handle") : work(*scene);
+    if (scene == nullptr) return fail(QUOIN_BAD_HANDLE, "no scene has this handle");
+    if (use == Use::Read) {
+      const std::shared_lock lock(scene->mutex);
+      return work(*scene);
+    }
+    const std::unique_lock lock(scene->mutex);
+    return work(*scene);
   });
 }
 
+/// Writes a number that a scene has.
+template <class Count>
+quoin_status tell_count(quoin_scene handle, std::size_t* out, Count&& count) noexcept {
+  return with_scene(handle, Use::Read, [&](SceneBody& scene) {
+    if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
+    *out = count(scene);
+    return QUOIN_OK;
+  });
+}
+
+// Structs have grown at their ends: how large each was at first.
+template <class Struct>
+inline constexpr std::size_t kFirstSize = sizeof(Struct);
+template <>
+inline constexpr std::size_t kFirstSize<quoin_grid_info> = offsetof(quoin_grid_info, pivot);
+template <>
+inline constexpr std::size_t kFirstSize<quoin_type> = offsetof(quoin_type, transparent);
+template <>
+inline constexpr std::size_t kFirstSize<quoin_mesh_data> = offsetof(quoin_mesh_data, types);
+
+template <class Struct>
+bool has_fit_size(const Struct* given) {
+  return given != nullptr && given->size >= kFirstSize<Struct> && given->size <= sizeof(Struct);
+}
+
+/// A struct as this version has it, of one that may be shorter; nothing where it is null, or its size is of no version.
+template <class Struct>
+std::optional<Struct> taken(const Struct* given) {
+  if (!has_fit_size(given)) return std::nullopt;
+  Struct whole{};
+  std::memcpy(&whole, given, given->size);
+  return whole;
+}
+/// The same of options, which may be left out.
+template <class Struct>
+std::optional<Struct> taken_or_default(const Struct* given) {
+  return given == nullptr ? Struct{} : taken(given);
+}
+
+/// Fills in as much of a struct as there is room for.
+template <class Struct>
+quoin_status tell(Struct whole, Struct* out) {
+  if (!has_fit_size(out)) return fail(QUOIN_INVALID_ARGUMENT, "out is null, or its size");
+  whole.size = out->size;
+  std::memcpy(out, &whole, out->size);
+  return QUOIN_OK;
+}
+
+/// Writes a struct about the index-th of `count` things of a scene.
+template <class Struct, class Count, class Describe>
+quoin_status tell_of(quoin_scene handle, std::size_t index, Struct* out, Count&& count, Describe&& describe) noexcept {
+  return with_scene(handle, Use::Read, [&](SceneBody& scene) {
+    if (index >= count(scene)) return fail(QUOIN_INVALID_ARGUMENT, "nothing of the scene has this number");
+    Struct whole{};
+    describe(scene, whole);
+    return tell(whole, out);
+  });
+}
+
+/// What this thread has set.
+Progress progress();
+
+/// As many threads as the caller says; none less than 0, and not more than there may be.
+Threads threads_of(std::int32_t count);
+
+/// Numbers what is in a scene that was read.
+void number(SceneBody& scene);
+
+/// Shows a new grid unturned, its least corner at a point of the world; its number is told in `out`, if that is any.
+void place(SceneBody& scene, SceneGrid grid, DVec3 position, std::size_t* out);
+
+VoxelProperties properties_of(const quoin_type& type);
+/// What is wrong with a type; null where nothing is.
+const char* what_is_wrong(const quoin_type& type);
+
 /// Copies a text with its end into room for `capacity` bytes; cut off between characters.
-void copy_text(const std::string& text, char* to, std::size_t capacity);
+void copy_text(std::string_view text, char* to, std::size_t capacity);
+template <std::size_t Size>
+void copy_text(std::string_view text, char (&to)[Size]) {
+  copy_text(text, to, Size);
+}
+/// The text in such room, whether it has an end or not.
+template <std::size_t Size>
+std::string text_in(const char (&from)[Size]) {
+  return {from, strnlen(from, Size)};
+}
 
 }  // namespace quoin::c

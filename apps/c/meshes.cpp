@@ -18,15 +18,17 @@
 namespace quoin::c {
 namespace {
 
-Threads threads_of(std::int32_t count) {
-  return {static_cast<unsigned>(std::clamp(count, 0, 1024))};
-}
-
-const char* what_is_wrong(const quoin_array* array, quoin_mesh* out) {
-  if (array == nullptr || array->size != sizeof *array) return "array is null, or its size";
-  if (out == nullptr) return "out is null";
-  if (array->scalar < QUOIN_UINT8 || array->scalar > QUOIN_FLOAT64) return "no scalar has this number";
-  return nullptr;
+// Meshes an array, whose scalars have a number that there is.
+template <class Mesh>
+quoin_status mesh_array(const quoin_array* array, quoin_mesh* out, Mesh&& mesh) noexcept {
+  return guarded([&] {
+    const auto given = taken(array);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "array is null, or its size");
+    if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
+    if (given->scalar < QUOIN_UINT8 || given->scalar > QUOIN_FLOAT64)
+      return fail(QUOIN_INVALID_ARGUMENT, "no scalar has this number");
+    return mesh(*given);
+  });
 }
 
 ArrayView view_of(const quoin_array& array) {
@@ -48,22 +50,82 @@ std::uint8_t encoded(std::uint16_t linear) {
   return static_cast<std::uint8_t>(std::lround(255.0 * srgb));
 }
 
-void add_vertex(const MeshView& view, std::size_t i, const VoxelRegistry& types, GridMesh& mesh) {
-  mesh.positions.push_back(view.positions[i]);
-  if (view.has_albedo()) {
-    mesh.normals.push_back(view.normals[i]);
-    const LinearRgba16& colour = view.albedo[i];
-    mesh.colours.push_back(
-        {encoded(colour[0]), encoded(colour[1]), encoded(colour[2]), static_cast<std::uint8_t>(colour[3] / 257)});
-    mesh.occlusion.push_back(view.occlusion.empty() ? 0.0F : view.occlusion[i]);
-    return;
+// Colours of smooth vertices, which come in rows of few.
+class ColourEncoder {
+ public:
+  Rgba8 operator()(const LinearRgba16& colour) {
+    if (colour != last_) {
+      last_ = colour;
+      encoded_ = {encoded(colour[0]), encoded(colour[1]), encoded(colour[2]),
+                  static_cast<std::uint8_t>(colour[3] / 257)};
+    }
+    return encoded_;
   }
-  mesh.normals.emplace_back(normal_of(view.directions[i]));
-  const VoxelType type = view.types[i];
-  Rgba8 colour = types[type].colour;
-  if (types.is_opaque(type)) colour.a = 255;
-  mesh.colours.push_back(colour);
-  mesh.occlusion.push_back(view.block_occlusion.empty() ? 0.0F : static_cast<float>(view.block_occlusion[i]) / 3.0F);
+
+ private:
+  LinearRgba16 last_{};
+  Rgba8 encoded_{0, 0, 0, 0};
+};
+
+void add_smooth_vertices(const MeshView& view, std::size_t at, GridMesh& mesh) {
+  ColourEncoder encode;
+  std::copy(view.normals.begin(), view.normals.end(), mesh.normals.begin() + static_cast<std::ptrdiff_t>(at));
+  std::copy(view.occlusion.begin(), view.occlusion.end(), mesh.occlusion.begin() + static_cast<std::ptrdiff_t>(at));
+  for (std::size_t i = 0; i < view.positions.size(); ++i) mesh.colours[at + i] = encode(view.albedo[i]);
+}
+
+void add_block_vertices(const MeshView& view, std::size_t at, const std::vector<Rgba8>& palette, GridMesh& mesh) {
+  for (std::size_t i = 0; i < view.positions.size(); ++i) {
+    mesh.normals[at + i] = Vec3(normal_of(view.directions[i]));
+    mesh.colours[at + i] = palette[view.types[i]];
+    if (!view.block_occlusion.empty()) mesh.occlusion[at + i] = static_cast<float>(view.block_occlusion[i]) / 3.0F;
+  }
+  mesh.types.resize(mesh.positions.size());
+  std::copy(view.types.begin(), view.types.end(), mesh.types.begin() + static_cast<std::ptrdiff_t>(at));
+}
+
+std::vector<Rgba8> palette_of(const VoxelRegistry& types) {
+  std::vector<Rgba8> palette(types.size());
+  for (std::size_t i = 0; i < palette.size(); ++i) {
+    const auto type = static_cast<VoxelType>(i);
+    palette[i] = types[type].colour;
+    if (types.is_opaque(type)) palette[i].a = 255;
+  }
+  return palette;
+}
+
+Result<GridMesh> put_together(const SceneMeshes& meshes) {
+  std::size_t vertices = 0;
+  std::size_t indices = 0;
+  for (const MeshPart& part : meshes.parts) {
+    for (const MeshView& view : part.surfaces) {
+      vertices += view.positions.size();
+      indices += view.indices.size();
+    }
+  }
+  if (vertices > std::numeric_limits<std::uint32_t>::max())
+    return make_error(ErrorCode::LimitExceeded, "a mesh of more than 2^32 vertices");
+  GridMesh mesh;
+  mesh.positions.reserve(vertices);
+  mesh.indices.reserve(indices);
+  mesh.normals.resize(vertices);
+  mesh.colours.resize(vertices);
+  mesh.occlusion.resize(vertices);
+  const std::vector<Rgba8> palette = palette_of(meshes.types);
+  for (const MeshPart& part : meshes.parts) {
+    for (const MeshView& view : part.surfaces) {
+      const std::size_t at = mesh.positions.size();
+      const auto base = static_cast<std::uint32_t>(at);
+      mesh.positions.insert(mesh.positions.end(), view.positions.begin(), view.positions.end());
+      for (const std::uint32_t index : view.indices) mesh.indices.push_back(base + index);
+      if (view.has_albedo())
+        add_smooth_vertices(view, at, mesh);
+      else
+        add_block_vertices(view, at, palette, mesh);
+    }
+  }
+  if (!mesh.types.empty()) mesh.types.resize(vertices, kAir);
+  return mesh;
 }
 
 Result<GridMesh> mesh_of(const Scene& from, GridHandle handle, const quoin_mesh_options& options) {
@@ -78,20 +140,10 @@ Result<GridMesh> mesh_of(const Scene& from, GridHandle handle, const quoin_mesh_
   BlockySceneOptions blocks;
   blocks.mesh.bake_occlusion = options.no_occlusion == 0;
   const Threads threads = threads_of(options.threads);
-  const auto meshes =
-      options.smooth != 0 ? mesh_scene_smoothly(alone, {}, threads) : mesh_scene(alone, blocks, threads);
+  const auto meshes = options.smooth != 0 ? mesh_scene_smoothly(alone, {}, threads, progress())
+                                          : mesh_scene(alone, blocks, threads, progress());
   if (!meshes) return meshes.error();
-  GridMesh mesh;
-  for (const MeshPart& part : meshes->parts) {
-    for (const MeshView& view : part.surfaces) {
-      if (mesh.positions.size() + view.positions.size() > std::numeric_limits<std::uint32_t>::max())
-        return make_error(ErrorCode::LimitExceeded, "a mesh of more than 2^32 vertices");
-      const auto base = static_cast<std::uint32_t>(mesh.positions.size());
-      for (std::size_t i = 0; i < view.positions.size(); ++i) add_vertex(view, i, alone.types, mesh);
-      for (const std::uint32_t index : view.indices) mesh.indices.push_back(base + index);
-    }
-  }
-  return mesh;
+  return put_together(*meshes);
 }
 
 template <class Mesh>
@@ -107,6 +159,7 @@ void show(const GridMesh& mesh, quoin_mesh_data& data) {
   data.normals = reinterpret_cast<const float*>(mesh.normals.data());
   data.colours = reinterpret_cast<const std::uint8_t*>(mesh.colours.data());
   data.occlusion = mesh.occlusion.data();
+  data.types = mesh.types.empty() ? nullptr : mesh.types.data();
   data.indices = mesh.indices.data();
 }
 void show(const ArraySurface& mesh, quoin_mesh_data& data) {
@@ -148,7 +201,8 @@ Result<Image> picture_of(const Scene& scene, const quoin_render_options& options
     wanted.width = width;
     wanted.height = height;
     if (options.samples != 0) wanted.samples = options.samples;
-    const auto picture = PathTracer(scene, InstanceFilter::Visible, threads).render(*camera, wanted, threads);
+    const auto picture =
+        PathTracer(scene, InstanceFilter::Visible, threads).render(*camera, wanted, threads, progress());
     if (!picture) return picture.error();
     return develop(*picture);
   }
@@ -157,7 +211,7 @@ Result<Image> picture_of(const Scene& scene, const quoin_render_options& options
   wanted.height = height;
   wanted.samples = options.samples == 0 ? 4 : options.samples;
   wanted.light = natural_light();
-  auto picture = CpuRenderer(scene, InstanceFilter::Visible, threads).render(*camera, wanted, threads);
+  auto picture = CpuRenderer(scene, InstanceFilter::Visible, threads).render(*camera, wanted, threads, progress());
   if (!picture) return picture.error();
   return std::move(picture->colour);
 }
@@ -185,6 +239,21 @@ void put_hit(const std::optional<SceneHit>& hit, std::size_t i, const quoin_hits
   }
 }
 
+// The scene's tracer, of the scene as it is now: nobody changes it while readers hold its lock.
+const SceneTracer& current_tracer(SceneBody& body) {
+  KeptTracer& kept = body.kept;
+  const Scene& scene = body.loaded.scene;
+  const std::lock_guard lock(kept.mutex);
+  if (!kept.tracer) {
+    kept.tracer.emplace(scene);
+  } else if (scene.has_changed_since(kept.scene_cursor) || scene.types.has_changed_since(kept.types_cursor)) {
+    kept.tracer->update();
+  }
+  kept.scene_cursor = scene.cursor();
+  kept.types_cursor = scene.types.cursor();
+  return *kept.tracer;
+}
+
 }  // namespace
 }  // namespace quoin::c
 
@@ -192,36 +261,34 @@ using namespace quoin;
 using namespace quoin::c;
 
 quoin_status quoin_grid_mesh(quoin_scene scene, std::size_t grid, const quoin_mesh_options* options, quoin_mesh* out) {
-  return with_scene(scene, [&](SceneBody& body) {
+  return with_scene(scene, Use::Read, [&](SceneBody& body) {
     if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
-    if (options != nullptr && options->size != sizeof *options)
-      return fail(QUOIN_INVALID_ARGUMENT, "the size of the options");
-    if (grid >= body.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
-    auto mesh = mesh_of(body.loaded.scene, body.grids[grid], options == nullptr ? quoin_mesh_options{} : *options);
+    const auto given = taken_or_default(options);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "the size of the options");
+    if (grid >= body.numbers.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
+    auto mesh = mesh_of(body.loaded.scene, body.numbers.grids[grid], *given);
     return mesh ? give(std::move(*mesh), out) : fail(mesh.error());
   });
 }
 
 quoin_status quoin_surface_nets(const quoin_array* array, double iso, std::int32_t solid_below, std::int32_t threads,
                                 quoin_mesh* out) {
-  return guarded([&] {
-    if (const char* wrong = what_is_wrong(array, out)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+  return mesh_array(array, out, [&](const quoin_array& given) {
     ArraySurfaceOptions options;
     options.iso = iso;
     options.solid = solid_below == 0 ? SolidSide::Above : SolidSide::Below;
-    auto surface = surface_from_array(view_of(*array), options, threads_of(threads));
+    auto surface = surface_from_array(view_of(given), options, threads_of(threads), progress());
     return surface ? give(std::move(*surface), out) : fail(surface.error());
   });
 }
 
 quoin_status quoin_mesh_labels(const quoin_array* array, std::int64_t background, std::int32_t relaxation_steps,
                                std::int32_t threads, quoin_mesh* out) {
-  return guarded([&] {
-    if (const char* wrong = what_is_wrong(array, out)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+  return mesh_array(array, out, [&](const quoin_array& given) {
     LabelSurfaceOptions options;
     options.background = background;
     options.relaxation_steps = relaxation_steps;
-    auto surfaces = surfaces_from_labels(view_of(*array), options, threads_of(threads));
+    auto surfaces = surfaces_from_labels(view_of(given), options, threads_of(threads), progress());
     if (!surfaces) return fail(surfaces.error());
     LabelMesh mesh;
     for (const LabelInterface& one : surfaces->interfaces) {
@@ -237,37 +304,36 @@ quoin_status quoin_mesh_view(quoin_mesh mesh, quoin_mesh_data* out) {
   return guarded([&] {
     const auto body = handles().find<MeshBody>(mesh);
     if (body == nullptr) return fail(QUOIN_BAD_HANDLE, "no mesh has this handle");
-    if (out == nullptr || out->size != sizeof *out) return fail(QUOIN_INVALID_ARGUMENT, "out is null, or its size");
-    *out = {};
-    out->size = sizeof *out;
-    std::visit([&](const auto& one) { show(one, *out); }, *body);
-    return QUOIN_OK;
+    quoin_mesh_data data{};
+    std::visit([&](const auto& one) { show(one, data); }, *body);
+    return tell(data, out);
   });
 }
 
 quoin_status quoin_scene_render(quoin_scene scene, const quoin_render_options* options, std::uint8_t* rgb,
                                 std::size_t capacity) {
-  return with_scene(scene, [&](SceneBody& body) {
+  return with_scene(scene, Use::Read, [&](SceneBody& body) {
     if (rgb == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "rgb is null");
-    if (options != nullptr && options->size != sizeof *options)
-      return fail(QUOIN_INVALID_ARGUMENT, "the size of the options");
-    return render(body.loaded.scene, options == nullptr ? quoin_render_options{} : *options, rgb, capacity);
+    const auto given = taken_or_default(options);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "the size of the options");
+    return render(body.loaded.scene, *given, rgb, capacity);
   });
 }
 
 quoin_status quoin_scene_rays(quoin_scene scene, std::size_t count, const double* origins, const double* directions,
                               double max_t, const quoin_hits* out) {
-  return with_scene(scene, [&](SceneBody& body) {
-    if (out == nullptr || out->size != sizeof *out) return fail(QUOIN_INVALID_ARGUMENT, "out is null, or its size");
+  return with_scene(scene, Use::Read, [&](SceneBody& body) {
+    const auto hits = taken(out);
+    if (!hits) return fail(QUOIN_INVALID_ARGUMENT, "out is null, or its size");
     if (count == 0) return QUOIN_OK;
     if (origins == nullptr || directions == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "there are no rays");
-    const SceneTracer tracer(body.loaded.scene);
+    const SceneTracer& tracer = current_tracer(body);
     constexpr std::size_t kAtOnce = 1024;
-    parallel_for((count + kAtOnce - 1) / kAtOnce, {}, [&](std::size_t batch) {
+    parallel_for((count - 1) / kAtOnce + 1, {}, [&](std::size_t batch) {
       for (std::size_t i = batch * kAtOnce; i < std::min(count, (batch + 1) * kAtOnce); ++i) {
         const double* o = origins + 3 * i;
         const double* d = directions + 3 * i;
-        put_hit(first_hit(tracer, {{o[0], o[1], o[2]}, {d[0], d[1], d[2]}}, max_t), i, *out);
+        put_hit(first_hit(tracer, {{o[0], o[1], o[2]}, {d[0], d[1], d[2]}}, max_t), i, *hits);
       }
     });
     return QUOIN_OK;

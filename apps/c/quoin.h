@@ -5,9 +5,11 @@
  * Handles:  scenes and meshes are numbers. One that was freed, or never given, is QUOIN_BAD_HANDLE. 0 is none.
  * Arrays:   the caller owns what he gives and what he has filled. What quoin_mesh_view shows belongs to the mesh, and
  *           lasts until that is freed.
- * Structs:  set `size` to sizeof the struct (QUOIN_INIT does), so that later versions can add to its end.
+ * Structs:  set `size` to sizeof the struct (QUOIN_INIT does). Later versions add to its end: a program that was made
+ *           with an older header, whose struct is shorter, goes on as it was.
  * Axes:     right-handed, +Y up; a voxel (x, y, z) fills the cube from there to (x + 1, y + 1, z + 1).
- * Threads:  any thread may call, but a scene is read and changed by one at a time.
+ * Threads:  any thread may call. Any number read a scene at once; who changes it, or saves it, has it to himself
+ *           meanwhile, and others wait.
  */
 #ifndef QUOIN_C_H
 #define QUOIN_C_H
@@ -79,6 +81,7 @@ typedef struct quoin_grid_info {
   int32_t min[3]; /* of the tight box around its voxels, or its field's solid */
   int32_t extent[3];
   int32_t has_field; /* densities: the surface of a volume */
+  double pivot[3];   /* the point about which instances turn it, in its voxels */
 } quoin_grid_info;
 
 typedef struct quoin_type {
@@ -88,7 +91,77 @@ typedef struct quoin_type {
   float metalness; /* 0 to 1 */
   float roughness; /* 0 to 1; QUOIN_INIT's 0 is a mirror */
   char name[128];
+  int32_t transparent; /* given: 0 is what rgba's alpha says */
+  float ior;           /* index of refraction of what is transparent; given: 0 is 1.5 */
+  float scattering;    /* of clouds: how often light is scattered on a voxel's length; 0: glass */
+  float anisotropy;    /* of that: the mean cosine of the angle, -1 to 1 */
 } quoin_type;
+
+/* One placement of a grid in the world. */
+typedef struct quoin_instance {
+  size_t size;
+  char name[128];             /* UTF-8; cut off at its end where it is longer */
+  size_t grid;                /* its number; of an instance of no grid as many as there are */
+  double world_from_grid[12]; /* three rows of four: takes a point (x, y, z, 1) of the grid, in voxels, to the world */
+  int32_t visible;            /* its own switch */
+  int32_t shown;              /* told: whether its groups and its layer show it too */
+  size_t group;               /* that it belongs to, counted from 1; 0: none */
+  char layer[128];            /* told: the name of its layer */
+} quoin_instance;
+
+/* Instances, and groups, that belong together. Places are those of the world, whatever the groups. */
+typedef struct quoin_group {
+  size_t size;
+  char name[128];
+  size_t parent; /* counted from 1, less than its own number; 0: none */
+  int32_t shown;
+  char layer[128];
+} quoin_group;
+
+/* A camera of the file. right, up and forward are unit, and perpendicular. */
+typedef struct quoin_camera {
+  size_t size;
+  int32_t number;   /* that the file has it under */
+  int32_t is_first; /* to be looked through at first */
+  int32_t is_orthographic;
+  double position[3];
+  double right[3], up[3], forward[3];
+  double vertical_fov_degrees; /* of perspective */
+  double view_height;          /* of orthographic: world units from the picture's lower edge to its upper */
+  double focus_distance;       /* 0: not said */
+} quoin_camera;
+
+/* A light without a body; types that emit are lights by themselves. */
+typedef struct quoin_lamp {
+  size_t size;
+  char name[128];
+  int32_t is_spot; /* else it shines into all directions alike */
+  double position[3], direction[3];
+  float colour[3];                                 /* linear */
+  double intensity;                                /* the light of a white surface that faces it 1 world unit away */
+  double range;                                    /* infinity: without an end */
+  double inner_angle_degrees, outer_angle_degrees; /* of a spot, from its middle */
+} quoin_lamp;
+
+/* What a file says, or a scene is, as a whole. */
+typedef struct quoin_scene_info {
+  size_t size;
+  char format[32]; /* "vox"; empty of a scene that was not read */
+  double min[3];   /* the box around what is shown, in the world; all 0 where nothing is */
+  double max[3];
+  int32_t has_sun;
+  double sun[3];      /* from the scene towards it */
+  int64_t last_frame; /* of its animation */
+} quoin_scene_info;
+
+typedef struct quoin_format {
+  size_t size;
+  char name[32];
+  char extensions[64]; /* ".kv6 .kvx" */
+  char description[128];
+  int32_t readable, writable;
+  int32_t is_mesh; /* triangles */
+} quoin_format;
 
 /* What a mesh has; null where it has none. One entry a vertex, but for indices and interfaces. */
 typedef struct quoin_mesh_data {
@@ -102,6 +175,8 @@ typedef struct quoin_mesh_data {
   const float* occlusion;    /* [vertex_count], 0 open to 1 dark; of grids */
   const uint32_t* indices;   /* three a triangle, counter-clockwise from outside */
   const int64_t* interfaces; /* [interface_count][4]: back label, front label, first index, count; of labels */
+  const uint16_t* types;     /* [vertex_count], of grids meshed as blocks: first blocks, four vertices and six indices a
+                                face, then the surfaces of fields, whose type is 0 */
 } quoin_mesh_data;
 
 typedef struct quoin_mesh_options {
@@ -110,6 +185,44 @@ typedef struct quoin_mesh_options {
   int32_t no_occlusion; /* of blocks */
   int32_t threads;      /* 0: all */
 } quoin_mesh_options;
+
+typedef struct quoin_load_options {
+  size_t size;
+  int32_t threads;     /* 0: all */
+  int32_t show_hidden; /* what is hidden becomes visible */
+  int32_t frame;       /* of an animation */
+  int32_t radius;      /* of a world that is read by chunks: of 64 voxels, around its spawn; 0: 4 */
+  int32_t has_iso;     /* of a volume: what is above `iso` is solid; else a value is found */
+  float iso;
+  int32_t mesh_voxels; /* of a file of triangles: voxels along its longest side; 0: 128 */
+  double voxel_size;   /* or of this size, in the file's unit */
+} quoin_load_options;
+
+typedef enum quoin_fill {
+  QUOIN_FILL_ALL = 0,    /* what the triangles enclose, and what they pass through: thin parts stay */
+  QUOIN_FILL_SOLID = 1,  /* voxels whose centre they enclose */
+  QUOIN_FILL_SURFACE = 2 /* voxels that they pass through; hollow */
+} quoin_fill;
+
+/* Triangles to become voxels. Any soup will do. */
+typedef struct quoin_triangles {
+  size_t size;
+  size_t vertex_count, triangle_count;
+  const float* positions;    /* [vertex_count][3] */
+  const uint32_t* indices;   /* [triangle_count][3], counter-clockwise from outside */
+  const float* colours;      /* [vertex_count][4], linear light and alpha, times the materials'; null: white */
+  const uint32_t* materials; /* [triangle_count], of `types`; null: 0 */
+  const quoin_type* types;   /* [type_count], from the first on, each with its size; null: one, light grey */
+  size_t type_count;
+} quoin_triangles;
+
+typedef struct quoin_voxelize_options {
+  size_t size;
+  double voxel_size; /* in the unit of positions; 0: 1 */
+  int32_t fill;      /* quoin_fill */
+  int32_t max_types; /* colours that are told apart; 0: as many as there can be */
+  int32_t threads;
+} quoin_voxelize_options;
 
 typedef struct quoin_render_options {
   size_t size;
@@ -131,9 +244,15 @@ typedef struct quoin_hits {
   double* normal; /* [count][3], in the world */
 } quoin_hits;
 
+/* Told how far a long call has come, 0 to 1. Returns whether to go on: 0 ends the call with QUOIN_CANCELLED. Any thread
+ * calls it, one at a time, and it is to call nothing of Quoin's. */
+typedef int32_t (*quoin_progress)(double fraction, void* user);
+
 QUOIN_API const char* quoin_version(void);
 /* Of this thread's last call that failed. Lasts until its next call. Never null. */
 QUOIN_API const char* quoin_last_error(void);
+/* Of the calls that this thread makes from now on; null: nobody is told. `user` is handed through. */
+QUOIN_API quoin_status quoin_set_progress(quoin_progress progress, void* user);
 /* Frees a scene or a mesh; 0 is none, and fine. */
 QUOIN_API quoin_status quoin_free(uint64_t handle);
 
@@ -141,6 +260,12 @@ QUOIN_API quoin_status quoin_free(uint64_t handle);
 QUOIN_API quoin_status quoin_scene_create(quoin_scene* out);
 QUOIN_API quoin_status quoin_scene_load(const char* path, quoin_scene* out);
 QUOIN_API quoin_status quoin_scene_load_bytes(const void* data, size_t bytes, quoin_scene* out);
+/* The same with options; null: none. */
+QUOIN_API quoin_status quoin_scene_load_with(const char* path, const quoin_load_options* options, quoin_scene* out);
+QUOIN_API quoin_status quoin_scene_get_info(quoin_scene scene, quoin_scene_info* out);
+/* What files can be read and written. */
+QUOIN_API quoin_status quoin_format_count(size_t* out);
+QUOIN_API quoin_status quoin_format_get(size_t index, quoin_format* out);
 /* By the name's ending: .quoin, .json and .vox hold voxels; .glb, .gltf, .obj and .ply their meshes, of blocks. */
 QUOIN_API quoin_status quoin_scene_save(quoin_scene scene, const char* path);
 /* One line each, of what reading left out, and of the last save. */
@@ -163,6 +288,26 @@ QUOIN_API quoin_status quoin_grid_read(quoin_scene scene, size_t grid, const int
  * array->origin, which is rounded down to whole voxels. `name` may be null, and `out`, its number. */
 QUOIN_API quoin_status quoin_grid_add(quoin_scene scene, const quoin_array* array, const char* name, size_t* out);
 
+/* Makes voxels of triangles, and shows them where these are, in units of a voxel: what fills the cube from
+ * voxel_size * (x, y, z) on becomes the voxel at (x, y, z) of the world. Adds the types that it takes.
+ * `options`, `name` and `out` may be null. */
+QUOIN_API quoin_status quoin_grid_voxelize(quoin_scene scene, const quoin_triangles* triangles,
+                                           const quoin_voxelize_options* options, const char* name, size_t* out);
+
+/* Where grids stand, which group each place belongs to, and what else files hold; by number. */
+QUOIN_API quoin_status quoin_instance_count(quoin_scene scene, size_t* out);
+QUOIN_API quoin_status quoin_instance_get(quoin_scene scene, size_t index, quoin_instance* out);
+/* Places a grid once more, or puts an instance elsewhere. world_from_grid turns, mirrors, moves and scales, alike along
+ * all axes. Who adds is to say that it is visible. `out` may be null. */
+QUOIN_API quoin_status quoin_instance_add(quoin_scene scene, const quoin_instance* instance, size_t* out);
+QUOIN_API quoin_status quoin_instance_set(quoin_scene scene, size_t index, const quoin_instance* instance);
+QUOIN_API quoin_status quoin_group_count(quoin_scene scene, size_t* out);
+QUOIN_API quoin_status quoin_group_get(quoin_scene scene, size_t number, quoin_group* out); /* from 1 */
+QUOIN_API quoin_status quoin_camera_count(quoin_scene scene, size_t* out);
+QUOIN_API quoin_status quoin_camera_get(quoin_scene scene, size_t index, quoin_camera* out);
+QUOIN_API quoin_status quoin_lamp_count(quoin_scene scene, size_t* out);
+QUOIN_API quoin_status quoin_lamp_get(quoin_scene scene, size_t index, quoin_lamp* out);
+
 /* Meshes; `options` may be null. Of arrays nothing is copied. */
 QUOIN_API quoin_status quoin_grid_mesh(quoin_scene scene, size_t grid, const quoin_mesh_options* options,
                                        quoin_mesh* out);
@@ -177,7 +322,8 @@ QUOIN_API quoin_status quoin_mesh_view(quoin_mesh mesh, quoin_mesh_data* out);
 /* A picture, rows from the top, three bytes a pixel (sRGB), into rgb[capacity]. `options` may be null. */
 QUOIN_API quoin_status quoin_scene_render(quoin_scene scene, const quoin_render_options* options, uint8_t* rgb,
                                           size_t capacity);
-/* The nearest voxel or surface along each ray: origins[count][3] and directions[count][3], in the world. */
+/* The nearest voxel or surface along each ray: origins[count][3] and directions[count][3], in the world. The first call
+ * builds a tree, which the scene keeps and brings up to date. */
 QUOIN_API quoin_status quoin_scene_rays(quoin_scene scene, size_t count, const double* origins,
                                         const double* directions, double max_t, const quoin_hits* out);
 

@@ -19,16 +19,13 @@ namespace {
 thread_local std::string last_error;
 constexpr std::int64_t kFurthest = 1 << 30;  // of a voxel from its grid's origin
 
-void list_grids(SceneBody& scene) {
-  const auto all = scene.loaded.scene.grids().handles();
-  scene.grids.assign(all.begin(), all.end());
-}
+thread_local Progress listener;
 
 quoin_status give(Result<LoadedScene> loaded, quoin_scene* out) {
   if (!loaded) return fail(loaded.error());
   auto body = std::make_shared<SceneBody>();
   body->loaded = std::move(*loaded);
-  list_grids(*body);
+  number(*body);
   *out = handles().put(std::move(body));
   return QUOIN_OK;
 }
@@ -74,14 +71,7 @@ quoin_status add_grid(SceneBody& scene, const quoin_array& array, const char* na
     }
   });
   if (!is_known) return fail(QUOIN_INVALID_ARGUMENT, "the array has a type that the scene has not");
-  const GridHandle grid = scene.loaded.scene.add_grid(std::move(placed));
-  Instance instance;
-  instance.name = name == nullptr ? "" : name;
-  instance.grid = grid;
-  for (int axis = 0; axis < 3; ++axis) instance.position[axis] = std::floor(array.origin[axis]);
-  scene.loaded.scene.add_instance(instance);
-  scene.grids.push_back(grid);
-  if (out != nullptr) *out = scene.grids.size() - 1;
+  place(scene, std::move(placed), floor(DVec3(array.origin[0], array.origin[1], array.origin[2])), out);
   return QUOIN_OK;
 }
 
@@ -89,15 +79,35 @@ quoin_status save(SceneBody& scene, const char* path) {
   const auto format = format_for_writing(path);
   if (!format) return fail(format.error());
   if (!format->is_mesh) {
-    auto saved = save_scene(scene.loaded, path);
+    auto saved = save_scene(scene.loaded, path, {}, progress());
     if (!saved) return fail(saved.error());
     scene.loaded.warnings = std::move(saved->warnings);
     return QUOIN_OK;
   }
-  const auto meshes = mesh_scene(scene.loaded.scene);
+  const auto meshes = mesh_scene(scene.loaded.scene, {}, {}, progress());
   if (!meshes) return fail(meshes.error());
-  const auto written = write_mesh(*meshes, path);
+  const auto written = write_mesh(*meshes, path, {}, progress());
   return written ? QUOIN_OK : fail(written.error());
+}
+
+LoadOptions options_of(const quoin_load_options& given) {
+  LoadOptions options;
+  options.show_hidden = given.show_hidden != 0;
+  options.frame = given.frame;
+  if (given.radius != 0) options.radius = given.radius;
+  if (given.has_iso != 0) options.iso = given.iso;
+  if (given.mesh_voxels != 0) options.mesh.size = given.mesh_voxels;
+  if (given.voxel_size != 0.0) options.mesh.voxel_size = given.voxel_size;
+  return options;
+}
+
+const char* what_is_wrong(const quoin_load_options& options) {
+  if (options.frame < 0 || options.radius < 0 || options.radius > 1'024) return "a frame or a radius that cannot be";
+  if (options.has_iso != 0 && !std::isfinite(options.iso)) return "iso is not finite";
+  if (options.mesh_voxels < 0 || !(options.voxel_size >= 0.0) || !std::isfinite(options.voxel_size))
+    return "a size of voxels that cannot be";
+  if (options.mesh_voxels != 0 && options.voxel_size != 0.0) return "both sizes of voxels";
+  return nullptr;
 }
 
 }  // namespace
@@ -120,7 +130,60 @@ quoin_status fail(const Error& error) {
   return fail(static_cast<quoin_status>(static_cast<int>(error.code) + 1), to_string(error).c_str());
 }
 
-void copy_text(const std::string& text, char* to, std::size_t capacity) {
+Progress progress() {
+  return listener;
+}
+
+Threads threads_of(std::int32_t count) {
+  return {static_cast<unsigned>(std::clamp(count, 0, 1024))};
+}
+
+void number(SceneBody& scene) {
+  scene.numbers.grids = scene.loaded.scene.grids().handles();
+  scene.numbers.instances = scene.loaded.scene.instances().handles();
+  scene.numbers.groups = groups_from_top(scene.loaded.scene);
+  for (std::size_t i = 0; i < scene.numbers.grids.size(); ++i)
+    scene.numbers.grid_of_slot.emplace(scene.numbers.grids[i].index, i);
+  for (std::size_t i = 0; i < scene.numbers.groups.size(); ++i)
+    scene.numbers.group_of_slot.emplace(scene.numbers.groups[i].index, i + 1);
+}
+
+void place(SceneBody& scene, SceneGrid grid, DVec3 position, std::size_t* out) {
+  Instance instance;
+  instance.name = grid.name;
+  instance.position = position;
+  instance.grid = scene.loaded.scene.add_grid(std::move(grid));
+  scene.numbers.grid_of_slot.emplace(instance.grid.index, scene.numbers.grids.size());
+  scene.numbers.grids.push_back(instance.grid);
+  scene.numbers.instances.push_back(scene.loaded.scene.add_instance(std::move(instance)));
+  if (out != nullptr) *out = scene.numbers.grids.size() - 1;
+}
+
+const char* what_is_wrong(const quoin_type& type) {
+  const auto is_share = [](float x) { return x >= 0.0F && x <= 1.0F; };
+  const auto is_amount = [](float x) { return x >= 0.0F && std::isfinite(x); };
+  if (!is_share(type.metalness) || !is_share(type.roughness) || !is_amount(type.emission))
+    return "emission, metalness or roughness out of range";
+  if (!is_amount(type.ior) || !is_amount(type.scattering) || !is_share(std::abs(type.anisotropy)))
+    return "index of refraction, scattering or anisotropy out of range";
+  return nullptr;
+}
+
+VoxelProperties properties_of(const quoin_type& type) {
+  VoxelProperties properties;
+  properties.colour = {type.rgba[0], type.rgba[1], type.rgba[2], type.rgba[3]};
+  if (type.rgba[3] < 255 || type.transparent != 0) properties.visibility = Visibility::Transparent;
+  properties.emission = type.emission;
+  properties.metalness = type.metalness;
+  properties.roughness = type.roughness;
+  if (type.ior != 0.0F) properties.ior = type.ior;
+  properties.scattering = type.scattering;
+  properties.anisotropy = type.anisotropy;
+  properties.name = text_in(type.name);
+  return properties;
+}
+
+void copy_text(std::string_view text, char* to, std::size_t capacity) {
   std::size_t length = std::min(text.size(), capacity - 1);
   while (length < text.size() && length > 0 && (static_cast<unsigned char>(text[length]) & 0xC0U) == 0x80U) --length;
   std::memcpy(to, text.data(), length);
@@ -154,33 +217,48 @@ quoin_status quoin_scene_create(quoin_scene* out) {
 quoin_status quoin_scene_load(const char* path, quoin_scene* out) {
   return guarded([&] {
     if (path == nullptr || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "path or out is null");
-    return give(load_scene(std::filesystem::path(path)), out);
+    return give(load_scene(std::filesystem::path(path), {}, {}, progress()), out);
   });
 }
 
 quoin_status quoin_scene_load_bytes(const void* data, std::size_t bytes, quoin_scene* out) {
   return guarded([&] {
     if ((data == nullptr && bytes > 0) || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "data or out is null");
-    return give(load_scene(std::span(static_cast<const std::byte*>(data), bytes)), out);
+    return give(load_scene(std::span(static_cast<const std::byte*>(data), bytes), {}, {}, progress()), out);
+  });
+}
+
+quoin_status quoin_scene_load_with(const char* path, const quoin_load_options* options, quoin_scene* out) {
+  return guarded([&] {
+    if (path == nullptr || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "path or out is null");
+    const auto given = taken_or_default(options);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "the size of the options");
+    if (const char* wrong = what_is_wrong(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    return give(load_scene(std::filesystem::path(path), options_of(*given), threads_of(given->threads), progress()),
+                out);
+  });
+}
+
+quoin_status quoin_set_progress(quoin_progress progress, void* user) {
+  return guarded([&] {
+    listener = nullptr;
+    if (progress != nullptr) listener = [progress, user](double fraction) { return progress(fraction, user) != 0; };
+    return QUOIN_OK;
   });
 }
 
 quoin_status quoin_scene_save(quoin_scene scene, const char* path) {
-  return with_scene(scene, [&](SceneBody& body) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
     return path == nullptr ? fail(QUOIN_INVALID_ARGUMENT, "path is null") : save(body, path);
   });
 }
 
 quoin_status quoin_scene_warning_count(quoin_scene scene, std::size_t* out) {
-  return with_scene(scene, [&](SceneBody& body) {
-    if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
-    *out = body.loaded.warnings.size();
-    return QUOIN_OK;
-  });
+  return tell_count(scene, out, [](SceneBody& body) { return body.loaded.warnings.size(); });
 }
 
 quoin_status quoin_scene_warning(quoin_scene scene, std::size_t index, char* text, std::size_t capacity) {
-  return with_scene(scene, [&](SceneBody& body) {
+  return with_scene(scene, Use::Read, [&](SceneBody& body) {
     if (text == nullptr || capacity == 0) return fail(QUOIN_INVALID_ARGUMENT, "there is no room for a text");
     if (index >= body.loaded.warnings.size()) return fail(QUOIN_INVALID_ARGUMENT, "no warning has this number");
     copy_text(body.loaded.warnings[index], text, capacity);
@@ -189,46 +267,34 @@ quoin_status quoin_scene_warning(quoin_scene scene, std::size_t index, char* tex
 }
 
 quoin_status quoin_type_count(quoin_scene scene, std::size_t* out) {
-  return with_scene(scene, [&](SceneBody& body) {
-    if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
-    *out = body.loaded.scene.types.size();
-    return QUOIN_OK;
-  });
+  return tell_count(scene, out, [](SceneBody& body) { return body.loaded.scene.types.size(); });
 }
 
 quoin_status quoin_type_get(quoin_scene scene, std::size_t index, quoin_type* out) {
-  return with_scene(scene, [&](SceneBody& body) {
-    if (out == nullptr || out->size != sizeof *out) return fail(QUOIN_INVALID_ARGUMENT, "out is null, or its size");
-    if (index >= body.loaded.scene.types.size()) return fail(QUOIN_INVALID_ARGUMENT, "no type has this number");
-    const VoxelProperties& type = body.loaded.scene.types[static_cast<VoxelType>(index)];
-    const Rgba8 colour = type.colour;
-    const std::uint8_t alpha = index == kAir ? 0 : type.visibility == Visibility::Opaque ? 255 : colour.a;
-    const std::uint8_t rgba[] = {colour.r, colour.g, colour.b, alpha};
-    std::memcpy(out->rgba, rgba, sizeof rgba);
-    out->emission = type.emission;
-    out->metalness = type.metalness;
-    out->roughness = type.roughness;
-    copy_text(type.name, out->name, sizeof out->name);
-    return QUOIN_OK;
+  const auto count = [](SceneBody& body) { return body.loaded.scene.types.size(); };
+  return tell_of(scene, index, out, count, [&](SceneBody& body, quoin_type& type) {
+    const VoxelProperties& found = body.loaded.scene.types[static_cast<VoxelType>(index)];
+    const bool is_opaque = found.visibility == Visibility::Opaque;
+    const std::uint8_t alpha = index == kAir ? 0 : is_opaque ? 255 : found.colour.a;
+    const std::uint8_t rgba[] = {found.colour.r, found.colour.g, found.colour.b, alpha};
+    std::memcpy(type.rgba, rgba, sizeof rgba);
+    type.emission = found.emission;
+    type.metalness = found.metalness;
+    type.roughness = found.roughness;
+    type.transparent = found.visibility == Visibility::Transparent ? 1 : 0;
+    type.ior = found.ior;
+    type.scattering = found.scattering;
+    type.anisotropy = found.anisotropy;
+    copy_text(found.name, type.name);
   });
 }
 
 quoin_status quoin_type_add(quoin_scene scene, const quoin_type* type, std::uint16_t* out) {
-  return with_scene(scene, [&](SceneBody& body) {
-    if (type == nullptr || type->size != sizeof *type || out == nullptr)
-      return fail(QUOIN_INVALID_ARGUMENT, "type or out is null, or the type's size");
-    const auto is_share = [](float x) { return x >= 0.0F && x <= 1.0F; };
-    if (!is_share(type->metalness) || !is_share(type->roughness) || !(type->emission >= 0.0F) ||
-        !std::isfinite(type->emission))
-      return fail(QUOIN_INVALID_ARGUMENT, "emission, metalness or roughness out of range");
-    VoxelProperties properties;
-    properties.colour = {type->rgba[0], type->rgba[1], type->rgba[2], type->rgba[3]};
-    if (type->rgba[3] < 255) properties.visibility = Visibility::Transparent;
-    properties.emission = type->emission;
-    properties.metalness = type->metalness;
-    properties.roughness = type->roughness;
-    properties.name.assign(type->name, strnlen(type->name, sizeof type->name));
-    const auto added = body.loaded.scene.types.add(std::move(properties));
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    const auto given = taken(type);
+    if (!given || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "type or out is null, or the type's size");
+    if (const char* wrong = what_is_wrong(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    const auto added = body.loaded.scene.types.add(properties_of(*given));
     if (!added) return fail(added.error());
     *out = *added;
     return QUOIN_OK;
@@ -236,35 +302,30 @@ quoin_status quoin_type_add(quoin_scene scene, const quoin_type* type, std::uint
 }
 
 quoin_status quoin_grid_count(quoin_scene scene, std::size_t* out) {
-  return with_scene(scene, [&](SceneBody& body) {
-    if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
-    *out = body.grids.size();
-    return QUOIN_OK;
-  });
+  return tell_count(scene, out, [](SceneBody& body) { return body.numbers.grids.size(); });
 }
 
 quoin_status quoin_grid_get_info(quoin_scene scene, std::size_t grid, quoin_grid_info* out) {
-  return with_scene(scene, [&](SceneBody& body) {
-    if (out == nullptr || out->size != sizeof *out) return fail(QUOIN_INVALID_ARGUMENT, "out is null, or its size");
-    if (grid >= body.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
-    const SceneGrid& found = body.loaded.scene.grids()[body.grids[grid]];
+  const auto count = [](SceneBody& body) { return body.numbers.grids.size(); };
+  return tell_of(scene, grid, out, count, [&](SceneBody& body, quoin_grid_info& info) {
+    const SceneGrid& found = body.loaded.scene.grids()[body.numbers.grids[grid]];
     const IBox box = found.bounds();
-    copy_text(found.name, out->name, sizeof out->name);
-    out->voxels = found.grid.voxel_count();
+    copy_text(found.name, info.name);
+    info.voxels = found.grid.voxel_count();
     for (int axis = 0; axis < 3; ++axis) {
-      out->extent[axis] = std::max(box.max[axis] - box.min[axis], 0);
-      out->min[axis] = out->extent[axis] > 0 ? box.min[axis] : 0;
+      info.extent[axis] = std::max(box.max[axis] - box.min[axis], 0);
+      info.min[axis] = info.extent[axis] > 0 ? box.min[axis] : 0;
+      info.pivot[axis] = found.pivot[axis];
     }
-    out->has_field = found.field.bounds().min.x < found.field.bounds().max.x ? 1 : 0;
-    return QUOIN_OK;
+    info.has_field = found.field.bounds().empty() ? 0 : 1;
   });
 }
 
 quoin_status quoin_grid_read(quoin_scene scene, std::size_t grid, const std::int32_t min[3],
                              const std::int32_t shape[3], std::uint16_t* out, std::size_t capacity) {
-  return with_scene(scene, [&](SceneBody& body) {
+  return with_scene(scene, Use::Read, [&](SceneBody& body) {
     if (min == nullptr || shape == nullptr || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "an array is null");
-    if (grid >= body.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
+    if (grid >= body.numbers.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
     if (!is_in_range(min, shape)) return fail(QUOIN_INVALID_ARGUMENT, "a box that cannot be");
     std::size_t left = capacity;
     for (int axis = 0; axis < 3; ++axis) {
@@ -273,7 +334,7 @@ quoin_status quoin_grid_read(quoin_scene scene, std::size_t grid, const std::int
     }
     if (left == 0) return fail(QUOIN_INVALID_ARGUMENT, "the array has no room for the box");
     // x is the slowest axis of the array, and the fastest of a grid: whole runs along x are read.
-    GridReader reader(body.loaded.scene.grids()[body.grids[grid]].grid);
+    GridReader reader(body.loaded.scene.grids()[body.numbers.grids[grid]].grid);
     const auto plane = static_cast<std::size_t>(shape[1]) * static_cast<std::size_t>(shape[2]);
     for (std::int32_t z = 0; z < shape[2]; ++z) {
       for (std::int32_t y = 0; y < shape[1]; ++y) {
@@ -286,10 +347,10 @@ quoin_status quoin_grid_read(quoin_scene scene, std::size_t grid, const std::int
 }
 
 quoin_status quoin_grid_add(quoin_scene scene, const quoin_array* array, const char* name, std::size_t* out) {
-  return with_scene(scene, [&](SceneBody& body) {
-    if (array == nullptr || array->size != sizeof *array)
-      return fail(QUOIN_INVALID_ARGUMENT, "array is null, or its size");
-    if (const char* wrong = what_is_wrong(*array)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
-    return add_grid(body, *array, name, out);
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    const auto given = taken(array);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "array is null, or its size");
+    if (const char* wrong = what_is_wrong(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    return add_grid(body, *given, name, out);
   });
 }

@@ -1,7 +1,13 @@
 """Tests of the package, with nothing but NumPy: `python3 test_quoin.py`. They are skipped (77) where that is missing."""
 
+import contextlib
+import ctypes
 import doctest
 import gc
+import io
+import json
+import os
+import re
 import sys
 import tempfile
 import threading
@@ -64,15 +70,37 @@ class Meshes(unittest.TestCase):
             a, b, c = (mesh.positions[triangles[:, i]].astype(float) for i in range(3))
             self.assertGreater(np.einsum("ij,ij->i", a, np.cross(b, c)).sum(), 0, "turned outwards")
 
-    def test_python_goes_on_meanwhile(self):
-        array = ball(200, 80.0).astype(np.float32)
-        counted = []
-        work = threading.Thread(target=lambda: [quoin.surface_nets(array, 0.0, solid="below") for _ in range(3)])
-        work.start()
-        while work.is_alive():
-            counted.append(1)
-            time.sleep(0.0005)
-        self.assertGreater(len(counted), 3)
+    def meanwhile(self, call):
+        """How often another thread comes to its turn during one call, if Python itself would let it only after 60 s."""
+        begun, turns, ended = threading.Event(), 0, False
+
+        def work():
+            nonlocal ended
+            begun.set()
+            call()
+            ended = True
+
+        before = sys.getswitchinterval()
+        sys.setswitchinterval(60)
+        try:
+            thread = threading.Thread(target=work)
+            thread.start()
+            begun.wait()
+            while not ended:
+                time.sleep(0.001)
+                turns += not ended
+            thread.join()
+        finally:
+            sys.setswitchinterval(before)
+        return turns
+
+    def test_calls_release_pythons_lock(self):
+        array = quoin._c.array_of(ball(160, 60.0).astype(np.float32), (1, 1, 1), (0, 0, 0))
+        arguments = ctypes.byref(array), ctypes.c_double(0.0), 1, 1, ctypes.byref(ctypes.c_uint64())
+        self.assertGreater(self.meanwhile(lambda: quoin._c.lib.quoin_surface_nets(*arguments)), 0)
+        # What keeps the lock is told apart.
+        keeping = ctypes.PyDLL(quoin._c.lib._name)
+        self.assertEqual(self.meanwhile(lambda: keeping.quoin_surface_nets(*arguments)), 0)
 
 
 class Scenes(unittest.TestCase):
@@ -120,6 +148,126 @@ class Scenes(unittest.TestCase):
         self.assertTrue((hits.normal == [0, 1, 0]).all())
 
 
+    def test_instances_are_placed_and_moved(self):
+        _, scene = self.scene()
+        twice = np.diag([2.0, 2.0, 2.0, 1.0])
+        twice[:3, 3] = 100, 0, 0
+        self.assertEqual(scene.place(scene.grids[0], twice, "large", visible=False), 1)
+        small, large = scene.instances
+        self.assertTrue((small.matrix == np.eye(4)).all() and small.shown)
+        self.assertTrue((large.matrix == twice).all())
+        self.assertEqual((large.name, large.grid, large.visible, large.group), ("large", 0, False, None))
+        self.assertEqual(scene.bounds[1][0], 10)
+        scene.move(1, twice, visible=True)
+        self.assertEqual(scene.bounds, ((0, 0, 0), (120, 10, 16)))
+        self.assertEqual(scene.rays([[101, 50, 1]], [[0, -1, 0]]).t[0], 46)
+        with self.assertRaises(quoin.QuoinError):
+            scene.move(0, [[1, 1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]])
+        with self.assertRaises(ValueError):
+            scene.place(scene.grids[0], np.eye(3))
+
+    def test_scene_files_say_what_else_they_hold(self):
+        scene = quoin.load_bytes(b"""{"quoin_scene": 4, "grids": [{"voxels": []}], "layers": [{"name": "upper"}],
+            "groups": [{"name": "house"}, {"name": "room", "parent": 0}], "instances": [{"grid": 0, "group": 1, "layer": 0}],
+            "lamps": [{"position": [1, 2, 3], "intensity": 5}], "sun": [0, 1, 0],
+            "camera": {"position": [0, 0, 50], "look_at": [0, 0, 0], "fov": 40}}""")
+        self.assertEqual(scene.groups[scene.instances[0].group], quoin.Group("room", 0, True, ""))
+        self.assertEqual(scene.instances[0].layer, "upper")
+        self.assertEqual((scene.lamps[0].position, scene.lamps[0].direction, scene.sun), ((1, 2, 3), None, (0, 1, 0)))
+        camera = scene.cameras[0]
+        self.assertEqual((camera.position, camera.forward, camera.view_height), ((0, 0, 50), (0, 0, -1), None))
+        self.assertAlmostEqual(camera.fov, 40)
+
+    def test_triangles_become_voxels(self):
+        corners = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [4, 4, 0], [0, 0, 4], [4, 0, 4], [0, 4, 4], [4, 4, 4]])
+        cube = [[0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4], [2, 6, 7], [2, 7, 3], [0, 4, 6],
+                [0, 6, 2], [1, 3, 7], [1, 7, 5]]
+        scene = quoin.Scene()
+        glass = quoin.VoxelType((9, 200, 9, 100), roughness=0.1)
+        grid = scene.voxelize(corners, cube, 0.5, types=[(200, 0, 0), glass], materials=[0] * 6 + [1] * 6, fill="solid")
+        self.assertEqual((grid.shape, grid.voxels), ((8, 8, 8), 512))
+        self.assertIn((9, 200, 9, 100), [one.rgba for one in scene.types])
+        painted = scene.voxelize(corners, cube, colours=np.tile([0, 0, 1, 1], (8, 1)), fill="surface")
+        self.assertTrue((scene.palette[painted.to_numpy()[0, 0, 0]] == [0, 0, 255, 255]).all())
+        for wrong in (dict(fill="half"), dict(colours=[[1, 1, 1, 1]]), dict(materials=[0])):
+            with self.assertRaises(ValueError):
+                scene.voxelize(corners, cube, **wrong)
+
+    def test_progress_is_told_and_ends_a_call(self):
+        _, scene = self.scene()
+        told = []
+        with quoin.progress(told.append):
+            scene.render(64, 64)
+        self.assertEqual(told, sorted(told))
+        self.assertEqual(told[-1], 1)
+        with self.assertRaises(quoin.QuoinError) as ended, quoin.progress(lambda fraction: fraction < 0.5):
+            scene.render(64, 64)
+        self.assertEqual(ended.exception.status, 7)
+        with self.assertRaises(ZeroDivisionError), quoin.progress(lambda fraction: 1 / 0):
+            scene.render(64, 64)
+        self.assertEqual(scene.render(64, 64).shape, (64, 64, 3))
+
+    def test_a_mesh_of_blocks_says_its_types(self):
+        _, scene = self.scene()
+        mesh = scene.grids[0].mesh()
+        self.assertEqual(set(mesh.types), {1, 2})
+        self.assertTrue((scene.palette[mesh.types] == mesh.colours).all())
+        self.assertIsNone(scene.grids[0].mesh(smooth=True).types)
+
+
+class Pages(unittest.TestCase):
+    """What is written about the package works as it stands there. The tree has these pages; wheels do not."""
+
+    def page(self, name):
+        path = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", name)
+        if not os.path.exists(path):
+            self.skipTest(f"there is no {name} here")
+        with open(path, encoding="utf-8") as file:
+            return file.read()
+
+    def run_blocks(self, name):
+        values = np.linspace(0, 600, 20 ** 3).reshape(20, 20, 20)
+        names = {"volume": values.astype(np.float32), "segmentation": (values // 101).astype(np.int32),
+                 "origins": np.array([[5.5, 90.0, 5.5]]), "directions": np.array([[0.0, -1.0, 0.0]])}
+        blocks = re.findall(r"```python\n(.*?)```", self.page(name), re.S)
+        home = os.getcwd()
+        with tempfile.TemporaryDirectory() as folder:
+            os.chdir(folder)
+            try:
+                Scenes().scene()[1].save("castle.vox")
+                for block in blocks:
+                    # trimesh is the one package that is not asked for; and pictures need not be as large.
+                    block = "\n".join(line for line in block.split("\n") if "to_trimesh" not in line).replace("960, 540", "96, 54")
+                    with contextlib.redirect_stdout(io.StringIO()):
+                        exec(compile(block, name, "exec"), names)
+            finally:
+                os.chdir(home)
+        return len(blocks)
+
+    def test_the_readme(self):
+        self.assertGreaterEqual(self.run_blocks("README.md"), 1)
+
+    def test_the_packages_page(self):
+        self.assertGreaterEqual(self.run_blocks("docs/python.md"), 3)
+
+    def test_the_notebook(self):
+        tour = json.loads(self.page("examples/python/tour.ipynb"))
+        cells = [cell for cell in tour["cells"] if cell["cell_type"] == "code"]
+        names = {}
+        home = os.getcwd()
+        with tempfile.TemporaryDirectory() as folder:
+            os.chdir(folder)
+            try:
+                for cell in cells:
+                    with contextlib.redirect_stdout(io.StringIO()):
+                        exec(compile("".join(cell["source"]), "tour.ipynb", "exec"), names)
+            finally:
+                os.chdir(home)
+        self.assertTrue(all(cell["execution_count"] for cell in cells), "it was executed")
+        pictures = [output for cell in cells for output in cell["outputs"] if "image/png" in output.get("data", {})]
+        self.assertGreaterEqual(len(pictures), 3)
+
+
 class BadInput(unittest.TestCase):
     def test_is_told_and_never_a_crash(self):
         array, nan = np.zeros((4, 4, 4), np.uint8), float("nan")
@@ -147,6 +295,19 @@ class BadInput(unittest.TestCase):
             (lambda: scene.render(8, 8, camera=(nan, 0, 0)), quoin.QuoinError),
             (lambda: scene.render(8, 8, out=np.zeros((4, 4, 3), np.uint8)), ValueError),
             (lambda: scene.rays([1, 2, 3], [1, 2, 3]), ValueError),
+            (lambda: scene.voxelize([[0, 0, nan]] * 3, [[0, 1, 2]]), quoin.QuoinError),
+            (lambda: scene.voxelize([[0, 0, 0]] * 3, [[0, 1, 3]]), quoin.QuoinError),
+            (lambda: scene.voxelize([[0, 0, 0]] * 3, [[0, 1]]), ValueError),
+            (lambda: scene.voxelize([[0, 0, 0], [1e30, 0, 0], [0, 1, 0]], [[0, 1, 2]]), quoin.QuoinError),
+            (lambda: scene.voxelize(np.zeros((0, 3)), np.zeros((0, 3))), quoin.QuoinError),
+            (lambda: scene.move(0, np.eye(4)), quoin.QuoinError),
+            (lambda: scene.place(quoin.Grid(scene, 7), np.eye(4), "x"), quoin.QuoinError),
+            (lambda: quoin.Grid(scene, 7).to_numpy(), quoin.QuoinError),
+            (lambda: quoin.Grid(scene, 7).mesh(), quoin.QuoinError),
+            (lambda: quoin.load_bytes(b"VOX \x96\0\0\0MAIN"), quoin.QuoinError),
+            (lambda: quoin.load("x.vox", frame=-1), quoin.QuoinError),
+            (lambda: quoin.load("x.obj", size=3, voxel_size=2.0), quoin.QuoinError),
+            (lambda: quoin.png(np.zeros((2, 2), np.uint8)), ValueError),
         ]:
             with self.assertRaises(error):
                 wrong()
@@ -155,7 +316,11 @@ class BadInput(unittest.TestCase):
 
 
 def load_tests(loader, tests, pattern):
-    tests.addTests(doctest.DocTestSuite(quoin))
+    names = {**vars(quoin), "np": np}
+    for module in (quoin, quoin._mesh, quoin._scene):
+        suite = doctest.DocTestSuite(module, extraglobs=names)
+        assert suite.countTestCases() > 1, "a module without examples"
+        tests.addTests(suite)
     return tests
 
 

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import ctypes
 import os
-from typing import Any, Optional, Sequence, Tuple
+from typing import TYPE_CHECKING, Any, Optional, Sequence, Tuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    NdArray = np.ndarray[Any, Any]
+else:
+    NdArray = np.ndarray
 
 
 class QuoinError(Exception):
@@ -31,19 +36,77 @@ class Array(ctypes.Structure):
 
 class GridInfo(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("name", ctypes.c_char * 128), ("voxels", ctypes.c_int64),
-                ("min", ctypes.c_int32 * 3), ("extent", ctypes.c_int32 * 3), ("has_field", ctypes.c_int32)]
+                ("min", ctypes.c_int32 * 3), ("extent", ctypes.c_int32 * 3), ("has_field", ctypes.c_int32),
+                ("pivot", ctypes.c_double * 3)]
 
 
 class Type(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("rgba", ctypes.c_uint8 * 4), ("emission", ctypes.c_float),
-                ("metalness", ctypes.c_float), ("roughness", ctypes.c_float), ("name", ctypes.c_char * 128)]
+                ("metalness", ctypes.c_float), ("roughness", ctypes.c_float), ("name", ctypes.c_char * 128),
+                ("transparent", ctypes.c_int32), ("ior", ctypes.c_float), ("scattering", ctypes.c_float),
+                ("anisotropy", ctypes.c_float)]
+
+
+class Instance(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("name", ctypes.c_char * 128), ("grid", ctypes.c_size_t),
+                ("world_from_grid", ctypes.c_double * 12), ("visible", ctypes.c_int32), ("shown", ctypes.c_int32),
+                ("group", ctypes.c_size_t), ("layer", ctypes.c_char * 128)]
+
+
+class Group(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("name", ctypes.c_char * 128), ("parent", ctypes.c_size_t),
+                ("shown", ctypes.c_int32), ("layer", ctypes.c_char * 128)]
+
+
+class Camera(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("number", ctypes.c_int32), ("is_first", ctypes.c_int32),
+                ("is_orthographic", ctypes.c_int32), ("position", ctypes.c_double * 3), ("right", ctypes.c_double * 3),
+                ("up", ctypes.c_double * 3), ("forward", ctypes.c_double * 3),
+                ("vertical_fov_degrees", ctypes.c_double), ("view_height", ctypes.c_double),
+                ("focus_distance", ctypes.c_double)]
+
+
+class Lamp(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("name", ctypes.c_char * 128), ("is_spot", ctypes.c_int32),
+                ("position", ctypes.c_double * 3), ("direction", ctypes.c_double * 3), ("colour", ctypes.c_float * 3),
+                ("intensity", ctypes.c_double), ("range", ctypes.c_double), ("inner_angle_degrees", ctypes.c_double),
+                ("outer_angle_degrees", ctypes.c_double)]
+
+
+class SceneInfo(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("format", ctypes.c_char * 32), ("min", ctypes.c_double * 3),
+                ("max", ctypes.c_double * 3), ("has_sun", ctypes.c_int32), ("sun", ctypes.c_double * 3),
+                ("last_frame", ctypes.c_int64)]
+
+
+class Format(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("name", ctypes.c_char * 32), ("extensions", ctypes.c_char * 64),
+                ("description", ctypes.c_char * 128), ("readable", ctypes.c_int32), ("writable", ctypes.c_int32),
+                ("is_mesh", ctypes.c_int32)]
+
+
+class LoadOptions(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("threads", ctypes.c_int32), ("show_hidden", ctypes.c_int32),
+                ("frame", ctypes.c_int32), ("radius", ctypes.c_int32), ("has_iso", ctypes.c_int32),
+                ("iso", ctypes.c_float), ("mesh_voxels", ctypes.c_int32), ("voxel_size", ctypes.c_double)]
+
+
+class Triangles(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("vertex_count", ctypes.c_size_t), ("triangle_count", ctypes.c_size_t),
+                ("positions", ctypes.c_void_p), ("indices", ctypes.c_void_p), ("colours", ctypes.c_void_p),
+                ("materials", ctypes.c_void_p), ("types", ctypes.c_void_p), ("type_count", ctypes.c_size_t)]
+
+
+class VoxelizeOptions(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("voxel_size", ctypes.c_double), ("fill", ctypes.c_int32),
+                ("max_types", ctypes.c_int32), ("threads", ctypes.c_int32)]
 
 
 class MeshData(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("vertex_count", ctypes.c_size_t), ("index_count", ctypes.c_size_t),
                 ("interface_count", ctypes.c_size_t), ("positions", ctypes.c_void_p), ("normals", ctypes.c_void_p),
                 ("colours", ctypes.c_void_p), ("occlusion", ctypes.c_void_p), ("indices", ctypes.c_void_p),
-                ("interfaces", ctypes.c_void_p)]
+                ("interfaces", ctypes.c_void_p), ("types", ctypes.c_void_p)]
 
 
 class MeshOptions(ctypes.Structure):
@@ -63,12 +126,20 @@ class HitArrays(ctypes.Structure):
                 ("type", ctypes.c_void_p), ("normal", ctypes.c_void_p)]
 
 
+Progress = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_double, ctypes.c_void_p)
+NOBODY = ctypes.cast(0, Progress)
+
 _handle, _p, _n, _i = ctypes.c_uint64, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int32
 _SIGNATURES = {
     "quoin_free": (_handle,),
     "quoin_scene_create": (_p,),
     "quoin_scene_load": (ctypes.c_char_p, _p),
     "quoin_scene_load_bytes": (_p, _n, _p),
+    "quoin_scene_load_with": (ctypes.c_char_p, _p, _p),
+    "quoin_scene_get_info": (_handle, _p),
+    "quoin_set_progress": (Progress, _p),
+    "quoin_format_count": (_p,),
+    "quoin_format_get": (_n, _p),
     "quoin_scene_save": (_handle, ctypes.c_char_p),
     "quoin_scene_warning_count": (_handle, _p),
     "quoin_scene_warning": (_handle, _n, _p, _n),
@@ -79,6 +150,17 @@ _SIGNATURES = {
     "quoin_grid_get_info": (_handle, _n, _p),
     "quoin_grid_read": (_handle, _n, _p, _p, _p, _n),
     "quoin_grid_add": (_handle, _p, ctypes.c_char_p, _p),
+    "quoin_grid_voxelize": (_handle, _p, _p, ctypes.c_char_p, _p),
+    "quoin_instance_count": (_handle, _p),
+    "quoin_instance_get": (_handle, _n, _p),
+    "quoin_instance_add": (_handle, _p, _p),
+    "quoin_instance_set": (_handle, _n, _p),
+    "quoin_group_count": (_handle, _p),
+    "quoin_group_get": (_handle, _n, _p),
+    "quoin_camera_count": (_handle, _p),
+    "quoin_camera_get": (_handle, _n, _p),
+    "quoin_lamp_count": (_handle, _p),
+    "quoin_lamp_get": (_handle, _n, _p),
     "quoin_grid_mesh": (_handle, _n, _p, _p),
     "quoin_surface_nets": (_p, ctypes.c_double, _i, _i, _p),
     "quoin_mesh_labels": (_p, ctypes.c_int64, _i, _i, _p),
@@ -101,6 +183,28 @@ def check(status: int) -> None:
     error = QuoinError(lib.quoin_last_error().decode("utf-8", "replace"))
     error.status = status
     raise error
+
+
+class Owner:
+    """A handle of the library, freed with the last Python object that uses it."""
+
+    def __init__(self, handle: int) -> None:
+        self.handle = handle
+
+    def __del__(self) -> None:
+        if self.handle:
+            lib.quoin_free(self.handle)
+            self.handle = 0
+
+
+def text_of(field: bytes) -> str:
+    """A struct's text."""
+    return field.decode("utf-8", "replace")
+
+
+def bytes_of(text: str, room: int = 128) -> bytes:
+    """A text for a struct's field; cut off between characters where it is too long."""
+    return text.encode("utf-8", "replace")[: room - 1].decode("utf-8", "ignore").encode()
 
 
 def sized(structure: Any) -> Any:
@@ -136,6 +240,14 @@ def array_of(array: Any, spacing: Sequence[float], origin: Sequence[float]) -> A
     return given
 
 
+def rows_of(array: Any, width: int, dtype: Any, name: str) -> Any:
+    """An array (n, width) of a type as the library reads it; copied only where it lies otherwise."""
+    found = np.ascontiguousarray(array, dtype)
+    if found.ndim != 2 or found.shape[1] != width:
+        raise ValueError(f"{name} have the shape (n, {width})")
+    return found
+
+
 class _Block:
     # What NumPy asks for memory that another owns.
     def __init__(self, owner: Any, pointer: int, shape: Tuple[int, ...], dtype: Any) -> None:
@@ -143,6 +255,6 @@ class _Block:
         self.__array_interface__ = {"data": (pointer, True), "shape": shape, "typestr": dtype.str, "version": 3}
 
 
-def view_of(owner: Any, pointer: Optional[int], shape: Tuple[int, ...], dtype: Any) -> Optional[np.ndarray]:
+def view_of(owner: Any, pointer: Optional[int], shape: Tuple[int, ...], dtype: Any) -> Optional[NdArray]:
     """The library's own memory as a read-only array, which keeps `owner` alive."""
     return None if not pointer else np.asarray(_Block(owner, pointer, shape, dtype))

@@ -1,0 +1,293 @@
+"""Files of voxels as Blender's objects: a mesh a grid, an object a place."""
+
+import math
+import os
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from . import axes, kept, materials, quoin, versions
+
+
+class Imported:
+    """What an import made, and what it left out."""
+
+    def __init__(self):
+        self.objects = 0
+        self.warnings = []
+
+
+class _Looks:
+    """The materials of one import, made when they are needed."""
+
+    def __init__(self, name, types, options):
+        self.name, self.types, self.scale = name, types, options.scale
+        self.group = materials.occlusion_group(options.occlusion)
+        is_palette = options.materials == "PALETTE" or (
+            options.materials == "AUTO" and len(types) > materials.MOST_MATERIALS)
+        self.palette = materials.Palette(name, types, self.group) if is_palette else None
+        self._of = {}
+        self._smooth = None
+
+    def of(self, number):
+        """The material of a type."""
+        one = self.types[number]
+        if self.palette is not None and not one.transparent:
+            return self.palette.material
+        if number not in self._of:
+            self._of[number] = materials.of_type(one, number, self.group, self.scale)
+        return self._of[number]
+
+    def has_own(self, number):
+        return number in self._of
+
+    def smooth(self):
+        if self._smooth is None:
+            self._smooth = materials.smooth(self.name, self.group)
+        return self._smooth
+
+
+def _quads(triangles):
+    """Four corners of each face of blocks, from its two triangles: so that Blender cuts it along the same diagonal.
+
+    Quoin has the corners 0 1 2 3 of each face together, and the triangles 0 1 2, 0 2 3 or 1 2 3, 0 1 3."""
+    pairs = triangles.reshape(-1, 6)
+    first = pairs[:, 0].astype(np.int32)
+    base = first & ~3
+    return base[:, None] + (((first & 3)[:, None] + np.arange(4, dtype=np.int32)) & 3)
+
+
+def _edges_of_quads(mesh, quads):
+    """Four edges a face: no two faces share a corner, so that nothing has to be looked for."""
+    edges = np.empty((len(quads), 4, 2), np.int32)
+    edges[:, :, 0] = quads
+    edges[:, :3, 1] = quads[:, 1:]
+    edges[:, 3, 1] = quads[:, 0]
+    mesh.edges.add(quads.size)
+    mesh.edges.foreach_set("vertices", edges.ravel())
+    mesh.loops.foreach_set("edge_index", np.arange(quads.size, dtype=np.int32))
+    mesh.update()
+
+
+def _open(found, blocks):
+    """What light arrives at vertices, as glTF and PLY files have it: of blocks a quarter at least."""
+    open_ = np.ones(len(found.positions), np.float32)
+    if found.occlusion is not None:
+        open_ -= found.occlusion
+        open_[:blocks] = 1.0 - 0.75 * found.occlusion[:blocks]
+    return open_
+
+
+def _colours(mesh, name, values):
+    layer = mesh.color_attributes.new(name, "FLOAT_COLOR", "POINT")
+    layer.data.foreach_set("color", np.ascontiguousarray(values, np.float32).ravel())
+
+
+def _slots(mesh, looks, face_types, faces):
+    """Gives the mesh its materials, and its faces theirs. Returns the slots of types with materials of their own."""
+    occurs = np.flatnonzero(np.bincount(face_types, minlength=1))
+    occurs = occurs[occurs > 0]
+    slot_of = np.zeros(int(occurs.max(initial=0)) + 1, np.int32)
+    place = {}
+    for number in occurs:
+        material = looks.of(int(number))
+        if material.name not in place:
+            place[material.name] = len(mesh.materials)
+            mesh.materials.append(material)
+        slot_of[number] = place[material.name]
+    slots = np.zeros(faces, np.int32)
+    slots[:len(face_types)] = slot_of[face_types]
+    if faces > len(face_types):
+        slots[len(face_types):] = len(mesh.materials)
+        mesh.materials.append(looks.smooth())
+    if len(mesh.materials) > 1:
+        mesh.polygons.foreach_set("material_index", slots)
+    return {int(number): int(slot_of[number]) for number in occurs if looks.has_own(int(number))}
+
+
+def mesh_of(grid, name, looks, options):
+    """A mesh in Blender of one grid, with its attributes and materials, None where nothing is to be seen; and which
+    types have which slot of materials to themselves."""
+    found = grid.mesh(smooth=options.surface == "SMOOTH")
+    if not len(found.triangles):
+        return None, {}
+    blocks = 0 if found.types is None else int(np.count_nonzero(found.types))
+    quads = _quads(found.triangles[:blocks // 2])
+    rest = found.triangles[blocks // 2:].astype(np.int32)
+    corners = np.concatenate([quads.ravel(), rest.ravel()])
+    faces = len(quads) + len(rest)
+
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(found.positions))
+    mesh.vertices.foreach_set("co", axes.points_to_blender(found.positions, options.scale).ravel())
+    mesh.loops.add(len(corners))
+    mesh.loops.foreach_set("vertex_index", corners)
+    mesh.polygons.add(faces)
+    starts = np.concatenate([np.arange(len(quads)) * 4, len(quads) * 4 + np.arange(len(rest)) * 3])
+    counts = np.full(faces, 3, np.int32)
+    counts[:len(quads)] = 4
+    versions.set_faces(mesh, starts.astype(np.int32), counts)
+    if len(rest):
+        is_smooth = np.ones(faces, bool)
+        is_smooth[:len(quads)] = False
+        mesh.polygons.foreach_set("use_smooth", is_smooth)
+    else:
+        versions.shade_flat(mesh)
+
+    face_types = np.zeros(0, np.int64) if blocks == 0 else found.types[:blocks:4].astype(np.int64)
+    slots = _slots(mesh, looks, face_types, faces)
+    if looks.palette is not None and blocks:
+        layer = mesh.uv_layers.new(name="Palette", do_init=False)
+        places = np.zeros((len(corners), 2), np.float32)
+        places[:len(quads) * 4] = np.repeat(looks.palette.places(face_types), 4, axis=0)
+        layer.data.foreach_set("uv", places.ravel())
+    if len(rest):
+        light = np.ones((len(found.positions), 4), np.float32)
+        table = materials.linear(np.arange(256)).astype(np.float32)
+        light[:, :3] = table[found.colours[:, :3]]
+        _colours(mesh, materials.COLOUR, light)
+    _colours(mesh, materials.OCCLUSION, np.broadcast_to(_open(found, blocks)[:, None], (len(found.positions), 4)))
+    if len(rest):
+        mesh.update(calc_edges=True)
+    else:
+        _edges_of_quads(mesh, quads)
+    return mesh, slots
+
+
+def _keep(mesh, grid, looks, slots, options, made):
+    if not options.keep_voxels or not grid.voxels:
+        return
+    if not kept.keep(mesh, grid, looks.types, options.scale, slots):
+        made.warnings.append(f"{mesh.name}: its voxels are too many to be kept in the .blend; export will voxelize it")
+
+
+def _collections(scene, top):
+    """A collection for each group, within that of its parent."""
+    found = []
+    for group in scene.groups:
+        one = bpy.data.collections.new(group.name or "group")
+        (top if group.parent is None else found[group.parent]).children.link(one)
+        found.append(one)
+    return found
+
+
+def _camera(one, name, options, reach):
+    data = bpy.data.cameras.new(name)
+    data.sensor_fit = "VERTICAL"
+    if one.view_height is None:
+        data.angle_y = math.radians(one.fov)
+    else:
+        data.type, data.ortho_scale = "ORTHO", one.view_height * options.scale
+    if one.focus_distance > 0.0:
+        data.dof.focus_distance = one.focus_distance * options.scale
+    matrix = np.eye(4)
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = one.right, one.up, -np.array(one.forward)
+    matrix[:3, 3] = one.position
+    # The camera's own axes are the same in both.
+    matrix = axes.BLENDER_FROM_QUOIN @ matrix
+    matrix[:3, 3] *= options.scale
+    data.clip_end = max(data.clip_end, 2.0 * (np.linalg.norm(matrix[:3, 3]) + reach))
+    made = bpy.data.objects.new(name, data)
+    made.matrix_world = Matrix(matrix)
+    return made
+
+
+def _towards(direction):
+    """The turn of a light, which shines along its -z."""
+    along = axes.BLENDER_FROM_QUOIN[:3, :3] @ np.asarray(direction, float)
+    return Vector(along).to_track_quat("-Z", "Y").to_matrix().to_4x4()
+
+
+def _lamp(one, name, options):
+    data = bpy.data.lights.new(one.name or name, "POINT" if one.direction is None else "SPOT")
+    data.color = one.colour
+    # White that faces it at 1 shows `intensity`; in Blender, of a power P, P / (4 pi^2).
+    data.energy = one.intensity * 4.0 * math.pi ** 2 * options.scale ** 2
+    data.shadow_soft_size = 0.0
+    made = bpy.data.objects.new(data.name, data)
+    matrix = Matrix()
+    if one.direction is not None:
+        data.spot_size = math.radians(min(2.0 * one.outer_angle, 180.0))
+        data.spot_blend = 1.0 - min(one.inner_angle / max(one.outer_angle, 1e-6), 1.0)
+        matrix = _towards(one.direction)
+    matrix.translation = axes.BLENDER_FROM_QUOIN[:3, :3] @ np.array(one.position) * options.scale
+    made.matrix_world = matrix
+    return made
+
+
+def _sun(direction):
+    data = bpy.data.lights.new("Sun", "SUN")
+    data.energy = math.pi  # white that faces it shows 1
+    made = bpy.data.objects.new("Sun", data)
+    made.matrix_world = _towards([-v for v in direction])
+    return made
+
+
+def _lights(context, scene, top, name, options, made):
+    least, most = scene.bounds
+    reach = float(np.linalg.norm(np.abs([least, most]).max(0))) * options.scale
+    found = []
+    for i, one in enumerate(scene.cameras):
+        camera = _camera(one, f"{name} camera {one.number}" if i else f"{name} camera", options, reach)
+        if one.first and context.scene.camera is None:
+            context.scene.camera = camera
+        found.append(camera)
+    found += [_lamp(one, f"{name} lamp", options) for one in scene.lamps]
+    if scene.sun is not None:
+        found.append(_sun(scene.sun))
+    for one in found:
+        top.objects.link(one)
+        made.objects += 1
+
+
+def _place(scene, top, name, looks, options, made, progress):
+    groups = _collections(scene, top)
+    grids, places, meshes = scene.grids, scene.instances, {}
+    empty = 0
+    for i, one in enumerate(places):
+        if one.grid not in meshes:
+            grid = grids[one.grid]
+            mesh, slots = mesh_of(grid, grid.name or one.name or name, looks, options)
+            if mesh is not None:
+                _keep(mesh, grid, looks, slots, options, made)
+            meshes[one.grid] = mesh
+            progress(i / len(places))
+        mesh = meshes[one.grid]
+        if mesh is None:
+            empty += 1
+            continue
+        made_object = bpy.data.objects.new(one.name or mesh.name, mesh)
+        made_object.matrix_world = Matrix(axes.matrix_to_blender(one.matrix, options.scale))
+        made_object.hide_render = made_object.hide_viewport = not one.shown
+        if one.layer:
+            made_object["layer"] = one.layer
+        (top if one.group is None else groups[one.group]).objects.link(made_object)
+        made.objects += 1
+    if empty:
+        made.warnings.append(f"{name}: {empty} places of grids without a voxel are left out")
+    if unplaced := len(grids) - len(meshes):
+        made.warnings.append(f"{name}: {unplaced} grids that stand nowhere are left out")
+
+
+def import_file(context, path, options):
+    """Reads a file and puts what it holds into a collection of its own, as `options` (the operator's) say."""
+    scene = quoin.load(path, frame=options.frame, show_hidden=options.show_hidden, radius=options.radius,
+                       iso=options.iso if options.set_iso else None, size=options.size)
+    made = Imported()
+    name = os.path.splitext(os.path.basename(os.path.normpath(path)))[0]
+    made.warnings += [f"{name}: {line}" for line in scene.warnings]
+    top = bpy.data.collections.new(name)
+    context.scene.collection.children.link(top)
+    looks = _Looks(name, scene.types, options)
+    if options.surface == "SMOOTH" and any(one.transparent or one.emission > 0.0 for one in looks.types):
+        made.warnings.append(f"{name}: smooth surfaces are opaque and do not shine; types of it are transparent, or lamps")
+    window = context.window_manager
+    window.progress_begin(0.0, 1.0)
+    try:
+        _place(scene, top, name, looks, options, made, window.progress_update)
+    finally:
+        window.progress_end()
+    if options.lights:
+        _lights(context, scene, top, name, options, made)
+    return made

@@ -1,0 +1,221 @@
+"""Types of voxels as materials, and materials as types."""
+
+import bpy
+import numpy as np
+
+from . import quoin, versions
+
+OCCLUSION = "Occlusion"  # of what light arrives: 1 where it is open
+COLOUR = "Colour"
+MOST_MATERIALS = 256
+
+
+def linear(srgb):
+    """sRGB bytes as linear light."""
+    x = np.asarray(srgb, np.float64) / 255.0
+    return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4)
+
+
+def srgb(light):
+    """Linear light as sRGB bytes."""
+    x = np.clip(np.asarray(light, np.float64), 0.0, 1.0)
+    return np.rint(255.0 * np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)).astype(int)
+
+
+def occlusion_group(strength):
+    """The node group that darkens a colour by the attribute; its node Strength says how much, for all materials."""
+    tree = bpy.data.node_groups.new("Quoin Occlusion", "ShaderNodeTree")
+    versions.group_socket(tree, "Color", "NodeSocketColor", True)
+    versions.group_socket(tree, "Color", "NodeSocketColor", False)
+    given, out = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    attribute = tree.nodes.new("ShaderNodeAttribute")
+    attribute.attribute_name = OCCLUSION
+    amount = tree.nodes.new("ShaderNodeValue")
+    amount.name = amount.label = "Strength"
+    amount.outputs[0].default_value = strength
+
+    def math(operation, a, b):
+        node = tree.nodes.new("ShaderNodeMath")
+        node.operation = operation
+        for socket, value in zip(node.inputs, (a, b)):
+            if isinstance(value, float):
+                socket.default_value = value
+            else:
+                tree.links.new(value, socket)
+        return node.outputs[0]
+
+    # 1 - strength * (1 - open)
+    left = math("SUBTRACT", 1.0, math("MULTIPLY", amount.outputs[0], math("SUBTRACT", 1.0, attribute.outputs["Fac"])))
+    scaled = tree.nodes.new("ShaderNodeVectorMath")
+    scaled.operation = "SCALE"
+    tree.links.new(given.outputs[0], scaled.inputs[0])
+    tree.links.new(left, scaled.inputs["Scale"])
+    tree.links.new(scaled.outputs[0], out.inputs[0])
+    for place, node in enumerate(tree.nodes):
+        node.location = (180 * place - 700, 0)
+    return tree
+
+
+def _new(name, group):
+    """A material with the Principled shader, whose colour goes through the occlusion's group: both are returned."""
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    nodes = material.node_tree.nodes
+    shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
+    occlusion = nodes.new("ShaderNodeGroup")
+    occlusion.node_tree = group
+    occlusion.location = (shader.location.x - 250, shader.location.y)
+    material.node_tree.links.new(occlusion.outputs[0], shader.inputs["Base Color"])
+    return material, shader, occlusion
+
+
+def _scatter(material, one, scale):
+    # A cloud: no surface, and light that is scattered within.
+    nodes = material.node_tree.nodes
+    volume = nodes.new("ShaderNodeVolumeScatter")
+    volume.inputs["Color"].default_value = (*linear(one.rgba[:3]), 1.0)
+    volume.inputs["Density"].default_value = one.scattering / scale
+    volume.inputs["Anisotropy"].default_value = one.anisotropy
+    out = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
+    for link in list(out.inputs["Surface"].links):
+        material.node_tree.links.remove(link)
+    material.node_tree.links.new(volume.outputs[0], out.inputs["Volume"])
+
+
+def of_type(one, number, group, scale):
+    """The material of a type."""
+    material, shader, occlusion = _new(one.name or f"voxel {number}", group)
+    colour = linear(one.rgba[:3])
+    occlusion.inputs[0].default_value = (*colour, 1.0)
+    shader.inputs["Base Color"].default_value = (*colour, 1.0)
+    shader.inputs["Metallic"].default_value = one.metalness
+    shader.inputs["Roughness"].default_value = one.roughness
+    if one.emission > 0.0:
+        versions.input_of(shader, "Emission").default_value = (*colour, 1.0)
+        shader.inputs["Emission Strength"].default_value = one.emission
+    alpha = 1.0
+    if one.transparent:
+        alpha = one.rgba[3] / 255.0
+        versions.input_of(shader, "Transmission").default_value = 1.0 - alpha
+        shader.inputs["IOR"].default_value = one.ior
+        if hasattr(material, "use_screen_refraction"):
+            material.use_screen_refraction = True
+    if one.scattering > 0.0:
+        _scatter(material, one, scale)
+    material.diffuse_color = (*colour, max(alpha, 0.2))  # what the solid viewport shows
+    material.metallic, material.roughness = one.metalness, one.roughness
+    return material
+
+
+def _image(name, values, is_colour):
+    height, width = values.shape[:2]
+    image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=not is_colour, is_data=not is_colour)
+    image.pixels.foreach_set(np.ascontiguousarray(values, np.float32).ravel())
+    image.update()
+    image.pack()
+    return image
+
+
+class Palette:
+    """One material for all opaque types, which looks colours and surfaces up in two images."""
+
+    def __init__(self, name, types, group):
+        rows = (len(types) + 255) // 256
+        colours = np.zeros((rows * 256, 4), np.float32)
+        surfaces = np.zeros((rows * 256, 4), np.float32)
+        colours[:len(types)] = np.array([one.rgba for one in types], np.float32) / 255.0
+        colours[:, 3] = 1.0
+        surfaces[:len(types)] = [(one.emission, one.roughness, one.metalness, 1.0) for one in types]
+        self.rows = rows
+        self.material, shader, occlusion = _new(f"{name} palette", group)
+        tree = self.material.node_tree
+
+        def texture(label, values, is_colour, y):
+            node = tree.nodes.new("ShaderNodeTexImage")
+            node.image = _image(f"{name} {label}", values.reshape(rows, 256, 4), is_colour)
+            node.interpolation = "Closest"
+            node.location = (shader.location.x - 750, y)
+            return node
+
+        surface = texture("surfaces", surfaces, False, 0)
+        colour = texture("colours", colours, True, 300)
+        tree.nodes.active = colour
+        apart = tree.nodes.new("ShaderNodeSeparateColor")
+        apart.location = (shader.location.x - 450, 0)
+        tree.links.new(surface.outputs["Color"], apart.inputs[0])
+        tree.links.new(colour.outputs["Color"], occlusion.inputs[0])
+        tree.links.new(colour.outputs["Color"], versions.input_of(shader, "Emission"))
+        tree.links.new(apart.outputs[0], shader.inputs["Emission Strength"])
+        tree.links.new(apart.outputs[1], shader.inputs["Roughness"])
+        tree.links.new(apart.outputs[2], shader.inputs["Metallic"])
+        self.material.diffuse_color = (*linear(np.array([one.rgba[:3] for one in types[1:]] or [[0] * 3])).mean(0), 1.0)
+
+    def places(self, types):
+        """Texture coordinates of types, float32 (n, 2)."""
+        return np.stack([(types % 256 + 0.5) / 256.0, (types // 256 + 0.5) / self.rows], axis=1).astype(np.float32)
+
+
+def smooth(name, group):
+    """The material of smooth surfaces: their colour is an attribute."""
+    material, shader, occlusion = _new(f"{name} smooth", group)
+    attribute = material.node_tree.nodes.new("ShaderNodeAttribute")
+    attribute.attribute_name = COLOUR
+    attribute.location = (shader.location.x - 500, shader.location.y)
+    material.node_tree.links.new(attribute.outputs["Color"], occlusion.inputs[0])
+    shader.inputs["Roughness"].default_value = 1.0
+    return material
+
+
+def _followed(socket):
+    """Where a colour comes from: a socket that is not linked, or the node behind it."""
+    while socket.is_linked:
+        node = socket.links[0].from_node
+        if node.type != "GROUP" or not node.inputs or node.inputs[0].type != "RGBA":
+            return None, node
+        socket = node.inputs[0]
+    return socket.default_value, None
+
+
+def seen(material):
+    """What of a material voxels can have: a type without a name, and the node that its colour comes from, if any."""
+    shader = None
+    if material is not None and material.use_nodes:
+        shader = next((node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED"), None)
+    if shader is None:
+        colour = (0.8, 0.8, 0.8, 1.0) if material is None else material.diffuse_color
+        return quoin.VoxelType((*(int(v) for v in srgb(colour[:3])), 255)), None
+    colour, node = _followed(shader.inputs["Base Color"])
+    if colour is None:
+        colour = (1.0, 1.0, 1.0) if node.type in _ATTRIBUTES else material.diffuse_color
+    clear = versions.input_of(shader, "Transmission").default_value
+    alpha = (1.0 - clear) * shader.inputs["Alpha"].default_value
+    glow = max(versions.input_of(shader, "Emission").default_value[:3]) > 0.0
+    emission = shader.inputs["Emission Strength"].default_value if glow else 0.0
+    return quoin.VoxelType((*(int(v) for v in srgb(colour[:3])), int(round(255.0 * alpha))),
+                           emission=max(emission, 0.0), metalness=shader.inputs["Metallic"].default_value,
+                           roughness=shader.inputs["Roughness"].default_value, transparent=alpha < 1.0,
+                           ior=shader.inputs["IOR"].default_value), node
+
+
+_ATTRIBUTES = {"ATTRIBUTE", "VERTEX_COLOR"}
+
+
+def has_attribute(node):
+    """Whether a colour comes from the mesh's own."""
+    return node is not None and node.type in _ATTRIBUTES
+
+
+def edited(one, material):
+    """A type as its material is now: what nobody changed stays to the last bit."""
+    now, node = seen(material)
+    if node is not None or one.scattering > 0.0:
+        return one
+    changes = {}
+    if now.rgba[:3] != tuple(one.rgba[:3]):
+        changes["rgba"] = (*now.rgba[:3], one.rgba[3])
+    if one.transparent and abs(now.rgba[3] - one.rgba[3]) > 1:
+        changes["rgba"] = (*now.rgba[:3], now.rgba[3])
+    for name in ("metalness", "roughness", "emission") + (("ior",) if one.transparent else ()):
+        if abs(getattr(now, name) - getattr(one, name)) > 1e-5 * max(1.0, getattr(one, name)):
+            changes[name] = getattr(now, name)
+    return one._replace(**changes)

@@ -1,0 +1,259 @@
+// What stands where in a scene, what else its file holds, and what files there are.
+
+#include <cmath>
+#include <numbers>
+#include <string_view>
+
+#include <quoin/io/formats.h>
+
+#include "handles.h"
+
+namespace quoin::c {
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr double kRoughly = 1e-4;  // what turns and sizes that came through floats may be off by
+
+void copy(const DVec3& from, double (&to)[3]) {
+  for (int axis = 0; axis < 3; ++axis) to[axis] = from[axis];
+}
+
+std::string layer_of(const Scene& scene, LayerHandle handle) {
+  const SceneLayer* layer = scene.layers().find(handle);
+  return layer == nullptr ? std::string() : layer->name;
+}
+
+// The number of a group from 1, or 0.
+std::size_t number_of(const SceneBody& body, GroupHandle group) {
+  if (body.loaded.scene.groups().find(group) == nullptr) return 0;
+  return body.numbers.group_of_slot.at(group.index);
+}
+
+void describe(const SceneBody& body, const Instance& instance, quoin_instance& out) {
+  const Scene& scene = body.loaded.scene;
+  copy_text(instance.name, out.name);
+  const bool has_grid = scene.grids().find(instance.grid) != nullptr;
+  out.grid = has_grid ? body.numbers.grid_of_slot.at(instance.grid.index) : body.numbers.grids.size();
+  out.visible = instance.visible ? 1 : 0;
+  // What places nothing shows nothing.
+  out.shown = is_drawn(scene, instance, InstanceFilter::Visible) && has_place(instance) ? 1 : 0;
+  out.group = number_of(body, instance.group);
+  copy_text(layer_of(scene, instance.layer), out.layer);
+  if (!has_grid || !has_place(instance)) return;
+  const glm::dmat4 matrix = world_from_grid(instance, scene.grids()[instance.grid]);
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) out.world_from_grid[4 * row + column] = matrix[column][row];
+  }
+}
+
+// The turn of three unit columns: whole numbers where they are off those by less than floats are.
+DQuat turn_of(glm::dmat3 columns) {
+  for (int column = 0; column < 3; ++column) {
+    for (int row = 0; row < 3; ++row) {
+      double& entry = columns[column][row];
+      if (std::abs(entry - std::round(entry)) < 1e-6) entry = std::round(entry);
+    }
+  }
+  return glm::normalize(glm::quat_cast(columns));
+}
+
+// Whether three columns are perpendicular and of one length, which is then `length`.
+bool is_similar(const glm::dmat3& columns, double& length) {
+  length = std::cbrt(std::abs(glm::determinant(columns)));
+  if (!(length > 0.0) || !std::isfinite(length)) return false;
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const double wanted = i == k ? 1.0 : 0.0;
+      if (std::abs(glm::dot(columns[i] / length, columns[k] / length) - wanted) > kRoughly) return false;
+    }
+  }
+  return true;
+}
+
+/// Puts an instance where a struct says. Returns what is wrong with that; null: nothing.
+const char* put(const SceneBody& body, const quoin_instance& given, Instance& instance) {
+  if (given.grid >= body.numbers.grids.size()) return "no grid has this number";
+  if (given.group > body.numbers.groups.size()) return "no group has this number";
+  glm::dmat3 columns(1.0);
+  DVec3 moved(0.0);
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      const double entry = given.world_from_grid[4 * row + column];
+      if (!std::isfinite(entry)) return "a place that is not finite";
+      (column == 3 ? moved[row] : columns[column][row]) = entry;
+    }
+  }
+  double length = 0.0;
+  if (!is_similar(columns, length)) return "world_from_grid does not turn and scale alike along all axes";
+  instance.name = text_in(given.name);
+  instance.grid = body.numbers.grids[given.grid];
+  instance.visible = given.visible != 0;
+  instance.group = given.group == 0 ? GroupHandle{} : body.numbers.groups[given.group - 1];
+  instance.position = columns * body.loaded.scene.grids()[instance.grid].pivot + moved;
+  instance.voxel_size = std::abs(length - 1.0) < 1e-6 ? 1.0 : length;
+  instance.mirrored = glm::determinant(columns) < 0.0;
+  columns /= length;
+  if (instance.mirrored) columns[0] = -columns[0];
+  instance.rotation = turn_of(columns);
+  return nullptr;
+}
+
+void describe(const Camera& camera, quoin_camera& out) {
+  out.is_orthographic = camera.projection == Camera::Projection::Orthographic ? 1 : 0;
+  copy(camera.position, out.position);
+  copy(camera.right, out.right);
+  copy(camera.up, out.up);
+  copy(camera.forward, out.forward);
+  out.vertical_fov_degrees = camera.vertical_fov_radians * kDegrees;
+  out.view_height = camera.view_height;
+}
+
+// All of the file, and before them that to look through at first where it is none of these.
+std::vector<quoin_camera> cameras_of(const LoadedScene& loaded) {
+  std::vector<quoin_camera> all;
+  bool is_there = !loaded.camera;
+  for (const FileCamera& one : loaded.cameras) {
+    quoin_camera& out = all.emplace_back();
+    describe(one.camera, out);
+    out.number = one.number;
+    out.focus_distance = one.focus_distance;
+    if (is_there || one.camera != *loaded.camera) continue;
+    out.is_first = 1;
+    is_there = true;
+  }
+  if (is_there) return all;
+  quoin_camera& first = *all.emplace(all.begin());
+  describe(*loaded.camera, first);
+  first.is_first = 1;
+  return all;
+}
+
+}  // namespace
+}  // namespace quoin::c
+
+using namespace quoin;
+using namespace quoin::c;
+
+quoin_status quoin_instance_count(quoin_scene scene, std::size_t* out) {
+  return tell_count(scene, out, [](SceneBody& body) { return body.numbers.instances.size(); });
+}
+
+quoin_status quoin_instance_get(quoin_scene scene, std::size_t index, quoin_instance* out) {
+  const auto count = [](SceneBody& body) { return body.numbers.instances.size(); };
+  return tell_of(scene, index, out, count, [&](SceneBody& body, quoin_instance& instance) {
+    describe(body, body.loaded.scene.instances()[body.numbers.instances[index]], instance);
+  });
+}
+
+quoin_status quoin_instance_add(quoin_scene scene, const quoin_instance* instance, std::size_t* out) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    const auto given = taken(instance);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "instance is null, or its size");
+    Instance placed;
+    if (const char* wrong = put(body, *given, placed)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    body.numbers.instances.push_back(body.loaded.scene.add_instance(std::move(placed)));
+    if (out != nullptr) *out = body.numbers.instances.size() - 1;
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_instance_set(quoin_scene scene, std::size_t index, const quoin_instance* instance) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    const auto given = taken(instance);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "instance is null, or its size");
+    if (index >= body.numbers.instances.size()) return fail(QUOIN_INVALID_ARGUMENT, "no instance has this number");
+    const InstanceHandle handle = body.numbers.instances[index];
+    Instance placed = body.loaded.scene.instances()[handle];
+    if (const char* wrong = put(body, *given, placed)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    body.loaded.scene.edit(handle) = std::move(placed);
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_group_count(quoin_scene scene, std::size_t* out) {
+  return tell_count(scene, out, [](SceneBody& body) { return body.numbers.groups.size(); });
+}
+
+quoin_status quoin_group_get(quoin_scene scene, std::size_t number, quoin_group* out) {
+  const auto count = [](SceneBody& body) { return body.numbers.groups.size(); };
+  return tell_of(scene, number - 1, out, count, [&](SceneBody& body, quoin_group& group) {
+    const Scene& all = body.loaded.scene;
+    const GroupHandle handle = body.numbers.groups[number - 1];
+    const SceneGroup& found = all.groups()[handle];
+    copy_text(found.name, group.name);
+    group.parent = number_of(body, parent_of(all, handle));
+    group.shown = is_shown(all, found) ? 1 : 0;
+    copy_text(layer_of(all, found.layer), group.layer);
+  });
+}
+
+quoin_status quoin_camera_count(quoin_scene scene, std::size_t* out) {
+  return tell_count(scene, out, [](SceneBody& body) { return cameras_of(body.loaded).size(); });
+}
+
+quoin_status quoin_camera_get(quoin_scene scene, std::size_t index, quoin_camera* out) {
+  const auto count = [](SceneBody& body) { return cameras_of(body.loaded).size(); };
+  return tell_of(scene, index, out, count,
+                 [&](SceneBody& body, quoin_camera& camera) { camera = cameras_of(body.loaded)[index]; });
+}
+
+quoin_status quoin_lamp_count(quoin_scene scene, std::size_t* out) {
+  return tell_count(scene, out, [](SceneBody& body) { return body.loaded.scene.lamps.size(); });
+}
+
+quoin_status quoin_lamp_get(quoin_scene scene, std::size_t index, quoin_lamp* out) {
+  const auto count = [](SceneBody& body) { return body.loaded.scene.lamps.size(); };
+  return tell_of(scene, index, out, count, [&](SceneBody& body, quoin_lamp& lamp) {
+    const Lamp& found = body.loaded.scene.lamps[index];
+    copy_text(found.name, lamp.name);
+    lamp.is_spot = found.kind == Lamp::Kind::Spot ? 1 : 0;
+    copy(found.position, lamp.position);
+    copy(found.direction, lamp.direction);
+    for (int channel = 0; channel < 3; ++channel) lamp.colour[channel] = found.colour[channel];
+    lamp.intensity = found.intensity;
+    lamp.range = found.range;
+    lamp.inner_angle_degrees = found.inner_angle_radians * kDegrees;
+    lamp.outer_angle_degrees = found.outer_angle_radians * kDegrees;
+  });
+}
+
+quoin_status quoin_scene_get_info(quoin_scene scene, quoin_scene_info* out) {
+  return with_scene(scene, Use::Read, [&](SceneBody& body) {
+    quoin_scene_info info{};
+    copy_text(body.loaded.format, info.format);
+    const DBox box = body.loaded.scene.bounds();
+    if (!box.empty()) {
+      copy(box.min, info.min);
+      copy(box.max, info.max);
+    }
+    info.has_sun = body.loaded.sun ? 1 : 0;
+    if (body.loaded.sun) copy(*body.loaded.sun, info.sun);
+    info.last_frame = body.loaded.last_frame;
+    return tell(info, out);
+  });
+}
+
+quoin_status quoin_format_count(std::size_t* out) {
+  return guarded([&] {
+    if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
+    *out = file_formats().size();
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_format_get(std::size_t index, quoin_format* out) {
+  return guarded([&] {
+    if (index >= file_formats().size()) return fail(QUOIN_INVALID_ARGUMENT, "no format has this number");
+    const FormatInfo& found = file_formats()[index];
+    quoin_format format{};
+    copy_text(found.name, format.name);
+    std::string extensions(found.extension);
+    if (!found.also.empty()) extensions.append(1, ' ').append(found.also);
+    copy_text(extensions, format.extensions);
+    copy_text(found.description, format.description);
+    format.readable = found.readable ? 1 : 0;
+    format.writable = found.writable ? 1 : 0;
+    format.is_mesh = found.is_mesh ? 1 : 0;
+    return tell(format, out);
+  });
+}

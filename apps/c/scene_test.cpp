@@ -1,0 +1,346 @@
+// What the door tells of scenes: places, groups, cameras, lamps, types; and what it makes of triangles.
+
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "quoin.h"
+#include "structs_for_tests.h"
+
+namespace {
+
+// All that a scene file may hold but voxels.
+constexpr const char* kSceneFile = R"({
+  "quoin_scene": 4,
+  "grids": [{"name": "nothing", "voxels": []}],
+  "layers": [{"name": "upper", "visible": false}],
+  "groups": [{"name": "house"}, {"name": "room", "parent": 0, "layer": 0}],
+  "instances": [{"grid": 0, "name": "chair", "group": 1}],
+  "lamps": [{"name": "torch", "kind": "spot", "position": [1, 2, 3], "direction": [0, -1, 0], "intensity": 5}],
+  "sun": [0, 1, 0],
+  "camera": {"position": [0, 0, 50], "look_at": [0, 0, 0], "fov": 40}
+})";
+
+// Three voxels, one of glass between two that are opaque, 7 above the ground.
+class SceneOfARow : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(quoin_scene_create(&scene_), QUOIN_OK);
+    for (const int red : {100, 200}) {
+      auto type = sized<quoin_type>();
+      type.rgba[0] = static_cast<std::uint8_t>(red);
+      type.rgba[3] = red == 100 ? 255 : 90;
+      type.ior = 1.33F;
+      std::uint16_t number = 0;
+      ASSERT_EQ(quoin_type_add(scene_, &type, &number), QUOIN_OK);
+    }
+    const std::vector<std::uint8_t> voxels = {1, 2, 1};
+    auto array = sized<quoin_array>();
+    array.data = voxels.data();
+    array.scalar = QUOIN_UINT8;
+    array.shape[0] = 3;
+    array.shape[1] = array.shape[2] = 1;
+    array.strides[0] = array.strides[1] = array.strides[2] = 1;
+    array.origin[1] = 7.0;
+    ASSERT_EQ(quoin_grid_add(scene_, &array, "row", nullptr), QUOIN_OK);
+  }
+  void TearDown() override { EXPECT_EQ(quoin_free(scene_), QUOIN_OK); }
+
+  // What a ray straight down at (x, z) meets first.
+  double t_below(double x, double z) const {
+    const std::array<double, 3> origin = {x, 100.0, z};
+    const std::array<double, 3> down = {0.0, -1.0, 0.0};
+    double t = 0.0;
+    auto hits = sized<quoin_hits>();
+    hits.t = &t;
+    EXPECT_EQ(quoin_scene_rays(scene_, 1, origin.data(), down.data(), 1e9, &hits), QUOIN_OK);
+    return t;
+  }
+
+  quoin_scene scene_ = 0;
+};
+
+TEST_F(SceneOfARow, InstancesAreToldAddedAndMoved) {
+  auto place = sized<quoin_instance>();
+  ASSERT_EQ(quoin_instance_get(scene_, 0, &place), QUOIN_OK);
+  EXPECT_STREQ(place.name, "row");
+  EXPECT_EQ(place.grid, 0U);
+  EXPECT_TRUE(place.visible == 1 && place.shown == 1);
+  const std::array<double, 12> raised = {1, 0, 0, 0, 0, 1, 0, 7, 0, 0, 1, 0};
+  EXPECT_EQ(std::memcmp(place.world_from_grid, raised.data(), sizeof raised), 0);
+  EXPECT_EQ(t_below(0.5, 0.5), 92.0);
+
+  // A quarter turn about the vertical, mirrored and twice as large: x goes to -z.
+  const std::array<double, 12> turned = {0, 0, 2, 10, 0, 2, 0, 0, 2, 0, 0, 20};
+  std::memcpy(place.world_from_grid, turned.data(), sizeof turned);
+  std::size_t number = 0;
+  ASSERT_EQ(quoin_instance_add(scene_, &place, &number), QUOIN_OK) << quoin_last_error();
+  EXPECT_EQ(number, 1U);
+  auto again = sized<quoin_instance>();
+  ASSERT_EQ(quoin_instance_get(scene_, 1, &again), QUOIN_OK);
+  for (std::size_t i = 0; i < turned.size(); ++i) EXPECT_NEAR(again.world_from_grid[i], turned[i], 1e-12) << i;
+  EXPECT_EQ(t_below(11.0, 25.0), 98.0);  // the kept tree knows of it
+
+  place.visible = 0;
+  ASSERT_EQ(quoin_instance_set(scene_, 1, &place), QUOIN_OK);
+  EXPECT_TRUE(std::isinf(t_below(11.0, 25.0)));
+  place.world_from_grid[0] = 1.0;  // sheared
+  EXPECT_EQ(quoin_instance_set(scene_, 1, &place), QUOIN_INVALID_ARGUMENT);
+  place.world_from_grid[0] = std::nan("");
+  EXPECT_EQ(quoin_instance_add(scene_, &place, nullptr), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_instance_set(scene_, 2, &again), QUOIN_INVALID_ARGUMENT);
+  again.grid = 1;
+  EXPECT_EQ(quoin_instance_add(scene_, &again, nullptr), QUOIN_INVALID_ARGUMENT);
+  std::size_t count = 0;
+  ASSERT_EQ(quoin_instance_count(scene_, &count), QUOIN_OK);
+  EXPECT_EQ(count, 2U);
+}
+
+TEST_F(SceneOfARow, TypesTellWhatLightDoesInThem) {
+  auto type = sized<quoin_type>();
+  ASSERT_EQ(quoin_type_get(scene_, 2, &type), QUOIN_OK);
+  EXPECT_EQ(type.rgba[3], 90);
+  EXPECT_TRUE(type.transparent == 1 && type.ior == 1.33F);
+  ASSERT_EQ(quoin_type_get(scene_, 1, &type), QUOIN_OK);
+  EXPECT_EQ(type.transparent, 0);
+  auto info = sized<quoin_scene_info>();
+  ASSERT_EQ(quoin_scene_get_info(scene_, &info), QUOIN_OK);
+  EXPECT_TRUE(info.min[1] == 7.0 && info.max[0] == 3.0 && info.has_sun == 0);
+}
+
+TEST_F(SceneOfARow, BlocksSayTheirTypes) {
+  quoin_mesh mesh = 0;
+  ASSERT_EQ(quoin_grid_mesh(scene_, 0, nullptr, &mesh), QUOIN_OK);
+  auto data = sized<quoin_mesh_data>();
+  ASSERT_EQ(quoin_mesh_view(mesh, &data), QUOIN_OK);
+  ASSERT_NE(data.types, nullptr);
+  EXPECT_EQ(data.index_count / 6, data.vertex_count / 4);
+  bool has_both[3] = {};
+  for (std::size_t i = 0; i < data.vertex_count; ++i) {
+    has_both[data.types[i]] = true;
+    EXPECT_EQ(data.types[i], data.types[i / 4 * 4]);
+    EXPECT_EQ(data.colours[4 * i], data.types[i] == 1 ? 100 : 200);
+  }
+  EXPECT_TRUE(!has_both[0] && has_both[1] && has_both[2]);
+  EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
+}
+
+// As programs do that were made with the first header.
+TEST_F(SceneOfARow, ShorterStructsStayAsTheyAre) {
+  std::array<std::byte, sizeof(quoin_type)> room;
+  room.fill(std::byte{0xA5});
+  auto* type = reinterpret_cast<quoin_type*>(room.data());
+  type->size = offsetof(quoin_type, transparent);
+  ASSERT_EQ(quoin_type_get(scene_, 1, type), QUOIN_OK);
+  EXPECT_EQ(type->rgba[0], 100);
+  for (std::size_t i = type->size; i < room.size(); ++i) EXPECT_EQ(room[i], std::byte{0xA5});
+  std::uint16_t number = 0;
+  EXPECT_EQ(quoin_type_add(scene_, type, &number), QUOIN_OK);
+  for (const std::size_t size : {std::size_t{0}, type->size - 1, sizeof(quoin_type) + 1}) {
+    type->size = size;
+    EXPECT_EQ(quoin_type_get(scene_, 1, type), QUOIN_INVALID_ARGUMENT) << size;
+    EXPECT_EQ(quoin_type_add(scene_, type, &number), QUOIN_INVALID_ARGUMENT) << size;
+  }
+}
+
+TEST(CFile, GroupsLayersLampsAndCamerasAreTold) {
+  quoin_scene scene = 0;
+  ASSERT_EQ(quoin_scene_load_bytes(kSceneFile, std::strlen(kSceneFile), &scene), QUOIN_OK) << quoin_last_error();
+  auto info = sized<quoin_scene_info>();
+  ASSERT_EQ(quoin_scene_get_info(scene, &info), QUOIN_OK);
+  EXPECT_STREQ(info.format, "scene");
+  EXPECT_TRUE(info.has_sun == 1 && info.sun[1] == 1.0);
+  std::size_t count = 0;
+  ASSERT_EQ(quoin_group_count(scene, &count), QUOIN_OK);
+  ASSERT_EQ(count, 2U);
+  auto group = sized<quoin_group>();
+  ASSERT_EQ(quoin_group_get(scene, 2, &group), QUOIN_OK);
+  EXPECT_STREQ(group.name, "room");
+  EXPECT_EQ(group.parent, 1U);
+  EXPECT_STREQ(group.layer, "upper");
+  EXPECT_EQ(group.shown, 0);
+  auto chair = sized<quoin_instance>();
+  ASSERT_EQ(quoin_instance_get(scene, 0, &chair), QUOIN_OK);
+  EXPECT_EQ(chair.group, 2U);
+  EXPECT_TRUE(chair.visible == 1 && chair.shown == 0);
+  EXPECT_EQ(quoin_group_get(scene, 0, &group), QUOIN_INVALID_ARGUMENT);
+  auto lamp = sized<quoin_lamp>();
+  ASSERT_EQ(quoin_lamp_get(scene, 0, &lamp), QUOIN_OK);
+  EXPECT_STREQ(lamp.name, "torch");
+  EXPECT_TRUE(lamp.is_spot == 1 && lamp.position[2] == 3.0 && lamp.intensity == 5.0 && std::isinf(lamp.range));
+  EXPECT_NEAR(lamp.outer_angle_degrees, 45.0, 1e-6);
+  ASSERT_EQ(quoin_camera_count(scene, &count), QUOIN_OK);
+  ASSERT_EQ(count, 1U);
+  auto camera = sized<quoin_camera>();
+  ASSERT_EQ(quoin_camera_get(scene, 0, &camera), QUOIN_OK);
+  EXPECT_TRUE(camera.is_first == 1 && camera.position[2] == 50.0 && camera.forward[2] == -1.0);
+  EXPECT_NEAR(camera.vertical_fov_degrees, 40.0, 1e-9);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+}
+
+TEST(CFormats, SayWhatCanBeRead) {
+  std::size_t count = 0;
+  ASSERT_EQ(quoin_format_count(&count), QUOIN_OK);
+  std::string readable;
+  for (std::size_t i = 0; i < count; ++i) {
+    auto format = sized<quoin_format>();
+    ASSERT_EQ(quoin_format_get(i, &format), QUOIN_OK);
+    if (format.readable != 0) readable += format.extensions + std::string(" ");
+  }
+  for (const char* one : {".vox ", ".qb ", ".kvx ", ".vdb "}) EXPECT_NE(readable.find(one), std::string::npos) << one;
+  auto format = sized<quoin_format>();
+  EXPECT_EQ(quoin_format_get(count, &format), QUOIN_INVALID_ARGUMENT);
+}
+
+// A cube of 4 units, red but for its top, whose corners are at -2 and 2: its sides lie between voxels.
+TEST(CTriangles, BecomeVoxelsWhereTheyAre) {
+  std::vector<float> positions;
+  for (int corner = 0; corner < 8; ++corner) {
+    for (int axis = 0; axis < 3; ++axis) positions.push_back((corner >> axis & 1) != 0 ? 2.0F : -2.0F);
+  }
+  const std::vector<std::uint32_t> indices = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
+                                              2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
+  std::vector<std::uint32_t> materials(12, 0);
+  materials[6] = materials[7] = 1;
+  std::vector<quoin_type> types(2, sized<quoin_type>());
+  types[0].rgba[0] = types[1].rgba[1] = 255;
+  types[0].rgba[3] = types[1].rgba[3] = 255;
+  types[1].roughness = 0.25F;
+  auto triangles = sized<quoin_triangles>();
+  triangles.vertex_count = 8;
+  triangles.triangle_count = 12;
+  triangles.positions = positions.data();
+  triangles.indices = indices.data();
+  triangles.materials = materials.data();
+  triangles.types = types.data();
+  triangles.type_count = types.size();
+  auto options = sized<quoin_voxelize_options>();
+  options.voxel_size = 0.5;
+  options.fill = QUOIN_FILL_SOLID;
+  quoin_scene scene = 0;
+  ASSERT_EQ(quoin_scene_create(&scene), QUOIN_OK);
+  ASSERT_EQ(quoin_grid_voxelize(scene, &triangles, &options, "cube", nullptr), QUOIN_OK) << quoin_last_error();
+  auto info = sized<quoin_grid_info>();
+  ASSERT_EQ(quoin_grid_get_info(scene, 0, &info), QUOIN_OK);
+  auto box = sized<quoin_scene_info>();
+  ASSERT_EQ(quoin_scene_get_info(scene, &box), QUOIN_OK);
+  for (int axis = 0; axis < 3; ++axis) EXPECT_TRUE(box.min[axis] == -4.0 && box.max[axis] == 4.0) << axis;
+  EXPECT_EQ(info.voxels, 8 * 8 * 8);
+  const std::array<double, 3> origin = {0.5, 50.0, 0.5};
+  const std::array<double, 3> down = {0.0, -1.0, 0.0};
+  std::uint16_t met = 0;
+  auto hits = sized<quoin_hits>();
+  hits.type = &met;
+  ASSERT_EQ(quoin_scene_rays(scene, 1, origin.data(), down.data(), 1e9, &hits), QUOIN_OK);
+  auto type = sized<quoin_type>();
+  ASSERT_EQ(quoin_type_get(scene, met, &type), QUOIN_OK);
+  EXPECT_TRUE(type.rgba[1] == 255 && type.rgba[0] == 0 && type.roughness == 0.25F);
+
+  std::size_t before = 0;
+  ASSERT_EQ(quoin_type_count(scene, &before), QUOIN_OK);
+  materials[3] = 2;
+  EXPECT_EQ(quoin_grid_voxelize(scene, &triangles, &options, nullptr, nullptr), QUOIN_INVALID_ARGUMENT);
+  materials[3] = 0;
+  positions[5] = std::nanf("");
+  EXPECT_EQ(quoin_grid_voxelize(scene, &triangles, &options, nullptr, nullptr), QUOIN_INVALID_ARGUMENT);
+  positions[5] = 1e30F;
+  EXPECT_NE(quoin_grid_voxelize(scene, &triangles, &options, nullptr, nullptr), QUOIN_OK);
+  positions[5] = -2.0F;
+  options.fill = 3;
+  EXPECT_EQ(quoin_grid_voxelize(scene, &triangles, &options, nullptr, nullptr), QUOIN_INVALID_ARGUMENT);
+  options.fill = QUOIN_FILL_ALL;
+  options.voxel_size = -1.0;
+  EXPECT_EQ(quoin_grid_voxelize(scene, &triangles, &options, nullptr, nullptr), QUOIN_INVALID_ARGUMENT);
+  options.voxel_size = 1e-30;
+  EXPECT_EQ(quoin_grid_voxelize(scene, &triangles, &options, nullptr, nullptr), QUOIN_LIMIT_EXCEEDED);
+  std::vector<std::uint32_t> wrong(36, 8);
+  triangles.indices = wrong.data();
+  EXPECT_EQ(quoin_grid_voxelize(scene, &triangles, nullptr, nullptr, nullptr), QUOIN_INVALID_ARGUMENT);
+  std::size_t after = 0;
+  ASSERT_EQ(quoin_type_count(scene, &after), QUOIN_OK);
+  EXPECT_EQ(after, before);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+}
+
+struct Listener {
+  std::atomic<int> calls = 0;
+  int stop_at = -1;
+};
+std::int32_t listen(double fraction, void* user) {
+  auto* listener = static_cast<Listener*>(user);
+  EXPECT_TRUE(fraction >= 0.0 && fraction <= 1.0);
+  return ++listener->calls == listener->stop_at ? 0 : 1;
+}
+
+TEST_F(SceneOfARow, ProgressIsToldAndMayEndAWork) {
+  Listener listener;
+  ASSERT_EQ(quoin_set_progress(listen, &listener), QUOIN_OK);
+  auto options = sized<quoin_render_options>();
+  options.width = options.height = 64;
+  options.samples = 1;
+  std::vector<std::uint8_t> picture(std::size_t{3} * 64 * 64);
+  EXPECT_EQ(quoin_scene_render(scene_, &options, picture.data(), picture.size()), QUOIN_OK);
+  const int calls = listener.calls;
+  EXPECT_GT(calls, 2);
+  std::thread([&] {  // whose calls tell nobody
+    EXPECT_EQ(quoin_scene_render(scene_, &options, picture.data(), picture.size()), QUOIN_OK);
+  })
+      .join();
+  EXPECT_EQ(listener.calls, calls);
+  listener.stop_at = calls + 2;
+  EXPECT_EQ(quoin_scene_render(scene_, &options, picture.data(), picture.size()), QUOIN_CANCELLED);
+  ASSERT_EQ(quoin_set_progress(nullptr, nullptr), QUOIN_OK);
+  EXPECT_EQ(quoin_scene_render(scene_, &options, picture.data(), picture.size()), QUOIN_OK);
+  EXPECT_EQ(listener.calls, calls + 2);
+}
+
+// What the header says of threads: those that read, and one that changes, need no lock of their own.
+TEST_F(SceneOfARow, ThreadsShareIt) {
+  std::vector<std::thread> readers;
+  readers.reserve(4);
+  for (int i = 0; i < 4; ++i) {
+    readers.emplace_back([&] {
+      for (int turn = 0; turn < 50; ++turn) EXPECT_GT(t_below(0.5, 0.5), 0.0);
+    });
+  }
+  auto place = sized<quoin_instance>();
+  ASSERT_EQ(quoin_instance_get(scene_, 0, &place), QUOIN_OK);
+  for (int turn = 0; turn < 50; ++turn) {
+    place.world_from_grid[7] = turn;
+    EXPECT_EQ(quoin_instance_set(scene_, 0, &place), QUOIN_OK);
+  }
+  for (std::thread& reader : readers) reader.join();
+  EXPECT_EQ(t_below(0.5, 0.5), 50.0);
+}
+
+TEST(CLoading, TakesOptions) {
+  quoin_scene scene = 0;
+  std::ofstream("c_test.obj") << "v 0 0 0\nv 8 0 0\nv 0 8 0\nv 0 0 8\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  auto options = sized<quoin_load_options>();
+  options.mesh_voxels = 20;
+  ASSERT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_OK) << quoin_last_error();
+  auto info = sized<quoin_grid_info>();
+  ASSERT_EQ(quoin_grid_get_info(scene, 0, &info), QUOIN_OK);
+  EXPECT_EQ(info.extent[0], 20);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+  options.voxel_size = 1.0;
+  EXPECT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_INVALID_ARGUMENT);
+  options.mesh_voxels = 0;
+  options.voxel_size = std::nan("");
+  EXPECT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_INVALID_ARGUMENT);
+  options = sized<quoin_load_options>();
+  options.frame = -1;
+  EXPECT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_INVALID_ARGUMENT);
+  options.size = 3;
+  EXPECT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_INVALID_ARGUMENT);
+}
+
+}  // namespace

@@ -1,0 +1,107 @@
+"""Meshes, and what makes them of arrays."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any, Optional, Sequence, Tuple
+
+import numpy as np
+
+from . import _c
+from ._c import NdArray
+
+
+class Mesh:
+    """Triangles. Its arrays are views of the library's own memory, read-only, and keep it alive.
+
+    >>> mesh = surface_nets(np.indices((9, 9, 9)).sum(0).astype(np.float32), 12.0)
+    >>> mesh.positions.flags.owndata, mesh.positions.flags.writeable
+    (False, False)
+    >>> bool(np.isclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-3).all())
+    True
+    """
+
+    positions: NdArray  #: float32, (vertices, 3)
+    triangles: NdArray  #: uint32, (triangles, 3), counter-clockwise from outside
+    normals: Optional[NdArray]  #: float32, (vertices, 3); of labels none
+    colours: Optional[NdArray]  #: uint8, (vertices, 4), sRGB; of grids alone
+    occlusion: Optional[NdArray]  #: float32, (vertices,), 0 open to 1 dark; of grids alone
+    types: Optional[NdArray]  #: uint16, (vertices,); of grids as blocks: faces of four vertices and two triangles
+    interfaces: Optional[NdArray]  #: int64, (n, 4): back and front label, first index, count; of labels alone
+
+    def __init__(self, owner: _c.Owner) -> None:
+        data = _c.sized(_c.MeshData)
+        _c.check(_c.lib.quoin_mesh_view(owner.handle, ctypes.byref(data)))
+        self._owner = owner
+        n = data.vertex_count
+
+        def view(pointer: Any, shape: Tuple[int, ...], dtype: Any) -> Optional[NdArray]:
+            return _c.view_of(owner, pointer, shape, np.dtype(dtype))
+
+        empty = np.zeros((0, 3), np.float32)
+        found = view(data.positions, (n, 3), np.float32)
+        self.positions = empty if found is None else found
+        found = view(data.indices, (data.index_count // 3, 3), np.uint32)
+        self.triangles = empty.astype(np.uint32) if found is None else found
+        self.normals = view(data.normals, (n, 3), np.float32)
+        self.colours = view(data.colours, (n, 4), np.uint8)
+        self.occlusion = view(data.occlusion, (n,), np.float32)
+        self.types = view(data.types, (n,), np.uint16)
+        self.interfaces = view(data.interfaces, (data.interface_count, 4), np.int64)
+
+    def __repr__(self) -> str:
+        return f"<quoin.Mesh: {len(self.positions)} vertices, {len(self.triangles)} triangles>"
+
+    def of_label(self, label: int) -> NdArray:
+        """The triangles around one label, turned outwards: indices into `positions`.
+
+        >>> array = np.zeros((4, 4, 4), np.uint8); array[1:3, 1:3, 1:3] = 7
+        >>> len(mesh_labels(array).of_label(7)) == len(mesh_labels(array).triangles)
+        True
+        """
+        if self.interfaces is None:
+            raise ValueError("only meshes of labels have labels")
+        parts = [np.zeros((0, 3), np.uint32)]
+        for back, front, first, count in self.interfaces:
+            triangles = self.triangles[first // 3 : (first + count) // 3]
+            if back == label:
+                parts.append(triangles)
+            elif front == label:
+                parts.append(triangles[:, ::-1])
+        return np.concatenate(parts)
+
+    def to_trimesh(self) -> Any:
+        """A trimesh.Trimesh of copies. Needs the package trimesh."""
+        import trimesh
+
+        return trimesh.Trimesh(self.positions, self.triangles.astype(np.int64), vertex_normals=self.normals,
+                               vertex_colors=self.colours, process=False)
+
+
+def surface_nets(array: NdArray, iso: float, spacing: Sequence[float] = (1, 1, 1),
+                 origin: Sequence[float] = (0, 0, 0), solid: str = "above", threads: int = 0) -> Mesh:
+    """The surface where an array [x, y, z] of any number type and strides has the value `iso`; nothing is copied.
+
+    `solid`: "above" where greater values are solid (scans), "below" for signed distances.
+
+    >>> x, y, z = np.mgrid[-8:9, -8:9, -8:9]
+    >>> ball = surface_nets(np.sqrt(x * x + y * y + z * z), 6.0, origin=(-8, -8, -8), solid="below")
+    >>> bool(np.allclose(np.linalg.norm(ball.positions, axis=1), 6.0, atol=0.2))
+    True
+    """
+    if solid not in ("above", "below"):
+        raise ValueError('solid is "above" or "below"')
+    given = _c.array_of(array, spacing, origin)
+    out = ctypes.c_uint64()
+    _c.check(_c.lib.quoin_surface_nets(ctypes.byref(given), iso, int(solid == "below"), threads, ctypes.byref(out)))
+    return Mesh(_c.Owner(out.value))
+
+
+def mesh_labels(array: NdArray, background: int = 0, spacing: Sequence[float] = (1, 1, 1),
+                origin: Sequence[float] = (0, 0, 0), relaxation_steps: int = 4, threads: int = 0) -> Mesh:
+    """The surfaces between the whole numbers of an array, as one mesh: neighbours share their faces; see
+    `Mesh.interfaces` and `Mesh.of_label`. Nothing is copied."""
+    given = _c.array_of(array, spacing, origin)
+    out = ctypes.c_uint64()
+    _c.check(_c.lib.quoin_mesh_labels(ctypes.byref(given), background, relaxation_steps, threads, ctypes.byref(out)))
+    return Mesh(_c.Owner(out.value))

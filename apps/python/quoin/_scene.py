@@ -1,0 +1,486 @@
+"""Scenes, their grids and types, and where these stand."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from typing import Any, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple, Union
+
+import numpy as np
+
+from . import _c
+from ._c import NdArray
+from ._mesh import Mesh
+
+Path = Union[str, "os.PathLike[str]"]
+Colour = Sequence[int]
+_FILLS = {"all": 0, "solid": 1, "surface": 2}
+
+
+class VoxelType(NamedTuple):
+    """A kind of voxel. `rgba` is sRGB, 0 to 255; an alpha below 255 makes it transparent."""
+
+    rgba: Tuple[int, ...]
+    name: str = ""
+    emission: float = 0.0
+    metalness: float = 0.0
+    roughness: float = 1.0
+    transparent: bool = False  #: also with an alpha of 255
+    ior: float = 1.5  #: of what is transparent
+    scattering: float = 0.0  #: of clouds: how often light is scattered on a voxel's length
+    anisotropy: float = 0.0
+
+
+class Instance(NamedTuple):
+    """A grid's place. `matrix` (4, 4) takes points of the grid, in voxels, to the world."""
+
+    grid: int
+    matrix: NdArray
+    name: str = ""
+    visible: bool = True
+    shown: bool = True  #: whether its groups and its layer show it too
+    group: Optional[int] = None  #: a place in `Scene.groups`
+    layer: str = ""
+
+
+class Group(NamedTuple):
+    """Instances, and groups, that belong together."""
+
+    name: str
+    parent: Optional[int]  #: a place in `Scene.groups`
+    shown: bool
+    layer: str
+
+
+class Camera(NamedTuple):
+    """A camera of a file. The axes are unit, and perpendicular."""
+
+    position: Tuple[float, ...]
+    right: Tuple[float, ...]
+    up: Tuple[float, ...]
+    forward: Tuple[float, ...]
+    fov: float  #: vertical, in degrees; of perspective
+    view_height: Optional[float]  #: of orthographic ones: from the picture's lower edge to its upper
+    focus_distance: float  #: 0: not said
+    number: int
+    first: bool  #: to be looked through at first
+
+
+class Lamp(NamedTuple):
+    """A light without a body."""
+
+    name: str
+    position: Tuple[float, ...]
+    direction: Optional[Tuple[float, ...]]  #: of a spot; None: into all directions alike
+    colour: Tuple[float, ...]  #: linear
+    intensity: float  #: the light of a white surface that faces it 1 world unit away
+    range: float
+    inner_angle: float  #: of a spot, in degrees from its middle
+    outer_angle: float
+
+
+class Format(NamedTuple):
+    """A file format."""
+
+    name: str
+    extensions: Tuple[str, ...]
+    description: str
+    readable: bool
+    writable: bool
+    is_mesh: bool
+
+
+class Hits(NamedTuple):
+    """What rays met, an entry a ray. `t` is infinite where nothing was."""
+
+    t: NdArray
+    voxel: NdArray
+    type: NdArray
+    normal: NdArray
+
+
+def _struct_of(type: Union[VoxelType, Colour]) -> Any:
+    if not isinstance(type, VoxelType):
+        rgba = tuple(int(v) for v in type)
+        if len(rgba) not in (3, 4):
+            raise ValueError("a colour is three or four numbers")
+        type = VoxelType((rgba + (255,))[:4])
+    if len(type.rgba) != 4 or not all(0 <= v <= 255 for v in type.rgba):
+        raise ValueError("a colour's numbers are 0 to 255")
+    one = _c.sized(_c.Type)
+    one.rgba[:] = type.rgba
+    one.name = _c.bytes_of(type.name)
+    one.emission, one.metalness, one.roughness = type.emission, type.metalness, type.roughness
+    one.transparent, one.ior = int(type.transparent), type.ior
+    one.scattering, one.anisotropy = type.scattering, type.anisotropy
+    return one
+
+
+def _rows_of(matrix: Any) -> List[float]:
+    found = np.asarray(matrix, np.float64)
+    if found.shape not in ((4, 4), (3, 4)):
+        raise ValueError("a matrix has the shape (4, 4) or (3, 4)")
+    return [float(v) for v in found[:3].ravel()]
+
+
+def _instance_of(grid: int, matrix: Any, name: str, visible: bool) -> Any:
+    given = _c.sized(_c.Instance)
+    given.grid, given.name, given.visible = grid, _c.bytes_of(name), int(visible)
+    given.world_from_grid[:] = _rows_of(matrix)
+    return given
+
+
+class Grid:
+    """A grid of a scene: voxels, or the field of a volume."""
+
+    def __init__(self, scene: "Scene", number: int) -> None:
+        self._scene = scene
+        self._number = number
+
+    @property
+    def number(self) -> int:
+        """Its place in `Scene.grids`."""
+        return self._number
+
+    def _info(self) -> Any:
+        info = _c.sized(_c.GridInfo)
+        _c.check(_c.lib.quoin_grid_get_info(self._scene._owner.handle, self._number, ctypes.byref(info)))
+        return info
+
+    @property
+    def name(self) -> str:
+        return _c.text_of(self._info().name)
+
+    @property
+    def voxels(self) -> int:
+        """How many voxels are not air."""
+        return int(self._info().voxels)
+
+    @property
+    def origin(self) -> Tuple[int, int, int]:
+        """The least voxel of the tight box around its voxels."""
+        x, y, z = self._info().min
+        return x, y, z
+
+    @property
+    def shape(self) -> Tuple[int, int, int]:
+        """Voxels of that box along x, y and z."""
+        x, y, z = self._info().extent
+        return x, y, z
+
+    @property
+    def has_field(self) -> bool:
+        """Whether it has densities, as volumes do: their surface is smooth."""
+        return bool(self._info().has_field)
+
+    def to_numpy(self, origin: Optional[Sequence[int]] = None, shape: Optional[Sequence[int]] = None) -> NdArray:
+        """The types of its voxels as uint16 [x, y, z]: of the tight box around them, or of the box that is given."""
+        info = self._info()
+        at = [int(v) for v in (info.min if origin is None else origin)]
+        extent = [int(v) for v in (info.extent if shape is None else shape)]
+        if len(at) != 3 or len(extent) != 3 or min(extent) < 0:
+            raise ValueError("origin and shape are three whole numbers")
+        out = np.zeros(extent, np.uint16)
+        three = ctypes.c_int32 * 3
+        _c.check(_c.lib.quoin_grid_read(self._scene._owner.handle, self._number, three(*at), three(*extent),
+                                        out.ctypes.data, out.size))
+        return out
+
+    def mesh(self, smooth: bool = False, occlusion: bool = True, threads: int = 0) -> Mesh:
+        """Its surface: merged faces of blocks, or a smooth one around them."""
+        options = _c.sized(_c.MeshOptions)
+        options.smooth, options.no_occlusion, options.threads = int(smooth), int(not occlusion), threads
+        out = ctypes.c_uint64()
+        _c.check(_c.lib.quoin_grid_mesh(self._scene._owner.handle, self._number, ctypes.byref(options),
+                                        ctypes.byref(out)))
+        return Mesh(_c.Owner(out.value))
+
+    def __repr__(self) -> str:
+        return f"<quoin.Grid {self.name!r}: {self.voxels} voxels, {'x'.join(map(str, self.shape))}>"
+
+
+class Scene:
+    """Grids and their types; an empty one, unless `load` or `from_numpy` made it."""
+
+    def __init__(self, _owner: Optional[_c.Owner] = None) -> None:
+        if _owner is None:
+            out = ctypes.c_uint64()
+            _c.check(_c.lib.quoin_scene_create(ctypes.byref(out)))
+            _owner = _c.Owner(out.value)
+        self._owner = _owner
+
+    def _count(self, function: Any) -> int:
+        out = ctypes.c_size_t()
+        _c.check(function(self._owner.handle, ctypes.byref(out)))
+        return out.value
+
+    @property
+    def grids(self) -> List[Grid]:
+        return [Grid(self, i) for i in range(self._count(_c.lib.quoin_grid_count))]
+
+    def _all(self, count: Any, get: Any, structure: Any, first: int = 0) -> Iterator[Any]:
+        for i in range(first, first + self._count(count)):
+            one = _c.sized(structure)
+            _c.check(get(self._owner.handle, i, ctypes.byref(one)))
+            yield one
+
+    def _info(self) -> Any:
+        info = _c.sized(_c.SceneInfo)
+        _c.check(_c.lib.quoin_scene_get_info(self._owner.handle, ctypes.byref(info)))
+        return info
+
+    @property
+    def format(self) -> str:
+        """Of the file that it was read from: "vox"; empty where there is none."""
+        return _c.text_of(self._info().format)
+
+    @property
+    def bounds(self) -> Tuple[Tuple[float, ...], Tuple[float, ...]]:
+        """The box around what is shown, in the world: its least and its greatest corner."""
+        info = self._info()
+        return tuple(info.min), tuple(info.max)
+
+    @property
+    def sun(self) -> Optional[Tuple[float, ...]]:
+        """From the scene towards the sun, where its file says it."""
+        info = self._info()
+        return tuple(info.sun) if info.has_sun else None
+
+    @property
+    def last_frame(self) -> int:
+        """Of its file's animation; `load` takes a frame."""
+        return int(self._info().last_frame)
+
+    @property
+    def instances(self) -> List[Instance]:
+        """Where the grids stand.
+
+        >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0)], "box")
+        >>> scene.place(scene.grids[0], [[0, 0, 1, 5], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
+        1
+        >>> [one.name for one in scene.instances], scene.instances[1].matrix[0].tolist()
+        (['box', 'box'], [0.0, 0.0, 1.0, 5.0])
+        """
+        found = []
+        for one in self._all(_c.lib.quoin_instance_count, _c.lib.quoin_instance_get, _c.Instance):
+            matrix = np.eye(4)
+            matrix[:3] = np.array(one.world_from_grid).reshape(3, 4)
+            found.append(Instance(one.grid, matrix, _c.text_of(one.name), bool(one.visible), bool(one.shown),
+                                  one.group - 1 if one.group else None, _c.text_of(one.layer)))
+        return found
+
+    @property
+    def groups(self) -> List[Group]:
+        """What instances belong to; each after its parent."""
+        return [Group(_c.text_of(one.name), one.parent - 1 if one.parent else None, bool(one.shown),
+                      _c.text_of(one.layer))
+                for one in self._all(_c.lib.quoin_group_count, _c.lib.quoin_group_get, _c.Group, 1)]
+
+    @property
+    def cameras(self) -> List[Camera]:
+        """Those of its file."""
+        return [Camera(tuple(one.position), tuple(one.right), tuple(one.up), tuple(one.forward),
+                       one.vertical_fov_degrees, one.view_height if one.is_orthographic else None,
+                       one.focus_distance, one.number, bool(one.is_first))
+                for one in self._all(_c.lib.quoin_camera_count, _c.lib.quoin_camera_get, _c.Camera)]
+
+    @property
+    def lamps(self) -> List[Lamp]:
+        """Lights without a body; types that emit are lights by themselves."""
+        return [Lamp(_c.text_of(one.name), tuple(one.position), tuple(one.direction) if one.is_spot else None,
+                     tuple(one.colour), one.intensity, one.range, one.inner_angle_degrees, one.outer_angle_degrees)
+                for one in self._all(_c.lib.quoin_lamp_count, _c.lib.quoin_lamp_get, _c.Lamp)]
+
+    @property
+    def types(self) -> List[VoxelType]:
+        """All types; the first is air."""
+        return [VoxelType(tuple(one.rgba), _c.text_of(one.name), one.emission, one.metalness, one.roughness,
+                          bool(one.transparent), one.ior, one.scattering, one.anisotropy)
+                for one in self._all(_c.lib.quoin_type_count, _c.lib.quoin_type_get, _c.Type)]
+
+    @property
+    def palette(self) -> NdArray:
+        """The types' colours, uint8 (types, 4): `palette[grid.to_numpy()]` is a picture of its voxels."""
+        return np.array([one.rgba for one in self.types], np.uint8)
+
+    @property
+    def warnings(self) -> List[str]:
+        """What reading, or the last save, left out."""
+        text = ctypes.create_string_buffer(4096)
+        found = []
+        for i in range(self._count(_c.lib.quoin_scene_warning_count)):
+            _c.check(_c.lib.quoin_scene_warning(self._owner.handle, i, text, len(text)))
+            found.append(_c.text_of(text.value))
+        return found
+
+    def add_type(self, type: Union[VoxelType, Colour]) -> int:
+        """Adds a type, or a colour of three or four bytes, and returns its number."""
+        one = _struct_of(type)
+        out = ctypes.c_uint16()
+        _c.check(_c.lib.quoin_type_add(self._owner.handle, ctypes.byref(one), ctypes.byref(out)))
+        return out.value
+
+    def add(self, array: NdArray, origin: Sequence[float] = (0, 0, 0), name: str = "") -> Grid:
+        """Adds a grid of the types in an array [x, y, z] of uint8 or uint16, 0 for air, which is read as it lies."""
+        given = _c.array_of(array, (1, 1, 1), origin)
+        out = ctypes.c_size_t()
+        _c.check(_c.lib.quoin_grid_add(self._owner.handle, ctypes.byref(given), name.encode(), ctypes.byref(out)))
+        return Grid(self, out.value)
+
+    def place(self, grid: Grid, matrix: Any, name: Optional[str] = None, visible: bool = True) -> int:
+        """Places a grid once more, and returns the instance's number. `matrix` (4, 4), or (3, 4), takes its voxels to the
+        world; it may turn, mirror, move and scale alike along all axes. Without a name it is the grid's."""
+        given = _instance_of(grid.number, matrix, grid.name if name is None else name, visible)
+        out = ctypes.c_size_t()
+        _c.check(_c.lib.quoin_instance_add(self._owner.handle, ctypes.byref(given), ctypes.byref(out)))
+        return out.value
+
+    def move(self, instance: int, matrix: Any, visible: Optional[bool] = None, name: Optional[str] = None) -> None:
+        """Puts an instance elsewhere, shows or hides it, and names it."""
+        given = _c.sized(_c.Instance)
+        _c.check(_c.lib.quoin_instance_get(self._owner.handle, instance, ctypes.byref(given)))
+        given.world_from_grid[:] = _rows_of(matrix)
+        if visible is not None:
+            given.visible = int(visible)
+        if name is not None:
+            given.name = _c.bytes_of(name)
+        _c.check(_c.lib.quoin_instance_set(self._owner.handle, instance, ctypes.byref(given)))
+
+    def voxelize(self, positions: Any, triangles: Any, voxel_size: float = 1.0, *, colours: Any = None,
+                 materials: Any = None, types: Sequence[Union[VoxelType, Colour]] = (), fill: str = "all",
+                 name: str = "", max_types: int = 0, threads: int = 0) -> Grid:
+        """Adds the voxels of triangles (n, 3), whose positions are (m, 3), and shows them where these are, in units of a
+        voxel. `colours` (m, 4): linear light and alpha; `materials` (n,): of `types`, from 0. `fill`: "all", "solid" for
+        voxels whose centre is enclosed, or "surface".
+
+        >>> corners = [[0, 0, 0], [8, 0, 0], [0, 8, 0], [0, 0, 8]]
+        >>> Scene().voxelize(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], types=[(200, 0, 0)]).shape
+        (8, 8, 8)
+        """
+        if fill not in _FILLS:
+            raise ValueError('fill is "all", "solid" or "surface"')
+        corners = _c.rows_of(positions, 3, np.float32, "positions")
+        indices = _c.rows_of(triangles, 3, np.uint32, "triangles")
+        given = _c.sized(_c.Triangles)
+        given.vertex_count, given.triangle_count = len(corners), len(indices)
+        given.positions, given.indices = corners.ctypes.data, indices.ctypes.data
+        if colours is not None:
+            colours = _c.rows_of(colours, 4, np.float32, "colours")
+            if len(colours) != len(corners):
+                raise ValueError("there is a colour a position")
+            given.colours = colours.ctypes.data
+        if materials is not None:
+            materials = np.ascontiguousarray(materials, np.uint32)
+            if materials.shape != (len(indices),):
+                raise ValueError("there is a material a triangle")
+            given.materials = materials.ctypes.data
+        structs = (_c.Type * len(types))(*[_struct_of(one) for one in types])
+        given.types, given.type_count = ctypes.addressof(structs) if types else None, len(types)
+        options = _c.sized(_c.VoxelizeOptions)
+        options.voxel_size, options.fill = voxel_size, _FILLS[fill]
+        options.max_types, options.threads = max_types, threads
+        out = ctypes.c_size_t()
+        _c.check(_c.lib.quoin_grid_voxelize(self._owner.handle, ctypes.byref(given), ctypes.byref(options),
+                                            name.encode(), ctypes.byref(out)))
+        return Grid(self, out.value)
+
+    def save(self, path: Path) -> None:
+        """Writes a file by its ending: .vox, .json, .quoin; or meshes: .glb, .gltf, .obj, .ply."""
+        _c.check(_c.lib.quoin_scene_save(self._owner.handle, os.fsencode(path)))
+
+    def render(self, width: int = 1280, height: int = 720, *, samples: int = 0, paths: bool = False,
+               camera: Optional[Sequence[float]] = None, look_at: Sequence[float] = (0, 0, 0), fov: float = 45.0,
+               out: Optional[NdArray] = None, threads: int = 0) -> NdArray:
+        """A picture, uint8 (height, width, 3), sRGB. Without a camera the whole scene is shown. `paths`: light with its
+        bounces and soft shadows, which takes longer. `out` is filled in place where it is given."""
+        if width <= 0 or height <= 0:
+            raise ValueError("a picture has pixels")
+        options = _c.sized(_c.RenderOptions)
+        options.width, options.height, options.samples = width, height, samples
+        options.paths, options.threads = int(paths), threads
+        if camera is not None:
+            options.has_camera, options.fov_degrees = 1, fov
+            options.camera[:], options.look_at[:] = camera, look_at
+        if out is None:
+            out = np.empty((height, width, 3), np.uint8)
+        elif out.shape != (height, width, 3) or out.dtype != np.uint8 or not out.flags.c_contiguous \
+                or not out.flags.writeable:
+            raise ValueError("out is a writable uint8 array (height, width, 3) without gaps")
+        _c.check(_c.lib.quoin_scene_render(self._owner.handle, ctypes.byref(options), out.ctypes.data, out.size))
+        return out
+
+    def rays(self, origins: Any, directions: Any, max_t: float = np.inf) -> Hits:
+        """What each ray (n, 3) meets first. The tree for it is built once, and follows changes.
+
+        >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0)])
+        >>> scene.rays([[0.5, 9, 0.5]], [[0, -1, 0]]).t
+        array([7.])
+        """
+        start = _c.rows_of(origins, 3, np.float64, "origins and directions")
+        way = _c.rows_of(directions, 3, np.float64, "origins and directions")
+        if way.shape != start.shape:
+            raise ValueError("there is a direction an origin")
+        n = len(start)
+        hits = Hits(np.empty(n), np.empty((n, 3), np.int32), np.empty(n, np.uint16), np.empty((n, 3)))
+        given = _c.sized(_c.HitArrays)
+        given.t, given.voxel, given.type, given.normal = (one.ctypes.data for one in hits)
+        _c.check(_c.lib.quoin_scene_rays(self._owner.handle, n, start.ctypes.data, way.ctypes.data, max_t,
+                                         ctypes.byref(given)))
+        return hits
+
+    def __repr__(self) -> str:
+        return f"<quoin.Scene: {len(self.grids)} grids, {len(self.types) - 1} types>"
+
+
+def load(path: Path, *, frame: int = 0, show_hidden: bool = False, radius: int = 0, iso: Optional[float] = None,
+         size: int = 0, voxel_size: float = 0.0, threads: int = 0) -> Scene:
+    """Reads a file of any format that Quoin reads (`formats`), or a folder that holds a world.
+
+    `frame`: of an animation. `radius`: of a world, in chunks of 64 voxels around its spawn; 0 is 4. `iso`: of a volume.
+    `size`, `voxel_size`: of a file of triangles, voxels along its longest side, or their size.
+
+    >>> load("nothing.vox")
+    Traceback (most recent call last):
+    ...
+    quoin._c.QuoinError: nothing.vox: No such file or directory
+    """
+    options = _c.sized(_c.LoadOptions)
+    options.frame, options.show_hidden, options.radius, options.threads = frame, int(show_hidden), radius, threads
+    options.has_iso, options.iso = int(iso is not None), iso or 0.0
+    options.mesh_voxels, options.voxel_size = size, voxel_size
+    out = ctypes.c_uint64()
+    _c.check(_c.lib.quoin_scene_load_with(os.fsencode(path), ctypes.byref(options), ctypes.byref(out)))
+    return Scene(_c.Owner(out.value))
+
+
+def load_bytes(data: bytes) -> Scene:
+    """The same of what a file holds."""
+    out = ctypes.c_uint64()
+    _c.check(_c.lib.quoin_scene_load_bytes(data, len(data), ctypes.byref(out)))
+    return Scene(_c.Owner(out.value))
+
+
+def from_numpy(array: NdArray, palette: Iterable[Union[VoxelType, Colour]], name: str = "") -> Scene:
+    """A scene of one grid. `array` [x, y, z] has 0 for air and i for the i-th entry of the palette, from 1 on."""
+    scene = Scene()
+    for one in palette:
+        scene.add_type(one)
+    scene.add(array, name=name)
+    return scene
+
+
+def formats() -> List[Format]:
+    """What files can be read and written.
+
+    >>> [one.extensions for one in formats() if one.name == "vox"]
+    [('.vox',)]
+    """
+    count = ctypes.c_size_t()
+    _c.check(_c.lib.quoin_format_count(ctypes.byref(count)))
+    found = []
+    for i in range(count.value):
+        one = _c.sized(_c.Format)
+        _c.check(_c.lib.quoin_format_get(i, ctypes.byref(one)))
+        found.append(Format(_c.text_of(one.name), tuple(_c.text_of(one.extensions).split()),
+                            _c.text_of(one.description), bool(one.readable), bool(one.writable), bool(one.is_mesh)))
+    return found

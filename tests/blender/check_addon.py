@@ -1,0 +1,274 @@
+"""Installs the add-on's zip into a fresh profile and uses it: import, export, what goes wrong.
+
+Run: blender -b --factory-startup -P check_addon.py -- ADDON.zip CASTLE.vox FOLDER
+with BLENDER_USER_CONFIG and BLENDER_USER_SCRIPTS in an empty folder. FOLDER is for what is written.
+Exit status: 0 all right, 1 not.
+"""
+
+import math
+import os
+import sys
+import time
+import traceback
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+SCENE_FILE = """{"quoin_scene": 5,
+  "types": [{"name": "gold", "colour": [250, 200, 60, 255], "metalness": 1, "roughness": 0.25},
+            {"name": "glass", "colour": [10, 200, 250, 90], "visibility": "transparent", "ior": 1.33, "roughness": 0},
+            {"name": "lamp", "colour": [255, 240, 200, 255], "emission": 8}],
+  "grids": [%s],
+  "groups": [{"name": "house"}, {"name": "room", "parent": 0}],
+  "layers": [{"name": "attic", "visible": false}],
+  "instances": [{"grid": 0, "name": "first", "group": 1},
+                {"grid": 0, "name": "turned", "position": [20, 0, 0], "rotation": {"axis": [0, 1, 0], "degrees": 90}},
+                {"grid": 0, "name": "slanting", "position": [40, 0, 0], "rotation": {"axis": [0, 1, 0], "degrees": 30}},
+                {"grid": 0, "name": "away", "position": [60, 0, 0], "layer": 0}],
+  "lamps": [{"name": "torch", "kind": "spot", "position": [1, 2, 3], "direction": [0, -1, 0], "intensity": 5}],
+  "sun": [0, 1, 0],
+  "camera": {"position": [10, 20, 50], "look_at": [10, 20, 0], "fov": 40}}"""
+
+
+def require(condition, message):
+    if not condition:
+        raise AssertionError(message)
+
+
+def empty():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.preferences.addon_enable(module="quoin_voxels")
+
+
+def run(operator, **options):
+    require(operator(**options) == {"FINISHED"}, f"{operator} did not finish")
+
+
+def refused(operator, words, **options):
+    """Whether it is told what is wrong; in the background Blender raises what an operator reports."""
+    try:
+        operator(**options)
+    except RuntimeError as error:
+        require(words in str(error), f"{operator}: {error}")
+    else:
+        raise AssertionError(f"{operator} says nothing of {options}")
+
+
+def points_of(scene):
+    """All voxels that a scene shows, as rows of place and colour, in order."""
+    rows = []
+    grids = [(one.to_numpy(), one.origin) for one in scene.grids]
+    for one in scene.instances:
+        if not one.shown:
+            continue
+        types, origin = grids[one.grid]
+        at = np.argwhere(types)
+        centres = (at + origin + 0.5) @ one.matrix[:3, :3].T + one.matrix[:3, 3]
+        rows.append(np.concatenate([np.floor(centres), scene.palette[types[tuple(at.T)]]], axis=1))
+    rows = np.unique(np.concatenate(rows).astype(np.int64), axis=0)
+    return rows
+
+
+def check_castle(quoin, path, folder):
+    empty()
+    begin = time.perf_counter()
+    run(bpy.ops.import_scene.quoin, filepath=path)
+    print(f"the castle in {time.perf_counter() - begin:.2f} s")
+    scene = quoin.load(path)
+    placed = [one for one in scene.instances if scene.grids[one.grid].voxels]
+    objects = [one for one in bpy.data.objects if one.type == "MESH"]
+    require(len(objects) == len(placed), f"{len(objects)} objects of {len(placed)} instances")
+    require(len({one.data.name for one in objects}) == len({one.grid for one in placed}), "instances share meshes")
+    bpy.context.view_layer.update()
+    corners = np.array([one.matrix_world @ Vector(c) for one in objects for c in one.bound_box])
+    least, most = (np.array(one) * 0.1 for one in scene.bounds)
+    # Quoin's y is Blender's z, its z Blender's -y.
+    require(np.allclose(corners.min(0), [least[0], -most[2], least[1]], atol=1e-4), f"from {corners.min(0)}")
+    require(np.allclose(corners.max(0), [most[0], -least[2], most[1]], atol=1e-4), f"to {corners.max(0)}")
+    for mesh in bpy.data.meshes:
+        require(not mesh.validate(), f"{mesh.name} is not valid")
+        check_mesh(mesh, next(one for one in scene.grids if one.name == mesh.name).mesh())
+
+    for name, engine in (("castle.vox", quoin.load), ("castle.json", quoin.load)):
+        run(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, name))
+        again = engine(os.path.join(folder, name))
+        require(np.array_equal(points_of(again), points_of(scene)), f"{name} has other voxels")
+        require(len(again.instances) == len(placed) and len(again.grids) == len({one.grid for one in placed}),
+                f"{name}: {len(again.grids)} grids, {len(again.instances)} instances")
+        require({one.name for one in again.instances} == {one.name for one in placed}, f"{name}: names")
+        # Looks, whatever the types' numbers.
+        looks = lambda of: {tuple(round(float(v), 4) for v in (*one.rgba, one.emission, one.metalness, one.roughness))
+                            for one in of.types[1:] }
+        require(looks(again) <= looks(scene), f"{name}: types {looks(again) - looks(scene)}")
+
+    # In the .blend the voxels stay.
+    bpy.ops.wm.save_as_mainfile(filepath=os.path.join(folder, "castle.blend"))
+    bpy.ops.wm.open_mainfile(filepath=os.path.join(folder, "castle.blend"))
+    run(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "again.vox"))
+    require(np.array_equal(points_of(quoin.load(os.path.join(folder, "again.vox"))), points_of(scene)), "the .blend")
+
+
+def check_mesh(mesh, wanted):
+    """Faces are whole voxels, look outwards and have their types' colours and their occlusion, as the library has them."""
+    values = np.empty(len(mesh.vertices) * 4, np.float32)
+    mesh.color_attributes["Occlusion"].data.foreach_get("color", values)
+    require(set(np.round(np.unique(values), 4)) <= {0.25, 0.5, 0.75, 1.0}, f"{mesh.name}: occlusion {np.unique(values)}")
+    require(len(np.unique(values)) > 1, f"{mesh.name} has no occlusion")
+    points = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", points.ravel())
+    points = points.astype(float)
+    require(np.allclose(points / 0.1, np.round(points / 0.1), atol=1e-3), f"{mesh.name}: corners between voxels")
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    a, b, c, d = (points[corners.reshape(-1, 4)[:, i]] for i in range(4))
+    areas = np.linalg.norm(np.cross(b - a, d - a), axis=1)
+    normals = np.cross(b - a, d - a) / areas[:, None]
+    of_face = wanted.normals[::4]
+    require(np.allclose(normals, np.stack([of_face[:, 0], -of_face[:, 2], of_face[:, 1]], axis=1), atol=1e-4),
+            f"{mesh.name}: faces look elsewhere")
+    slots = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("material_index", slots)
+    colours = np.array([one.diffuse_color[:3] for one in mesh.materials])[slots]
+    light = wanted.colours[::4, :3] / 255.0
+    light = np.where(light <= 0.04045, light / 12.92, ((light + 0.055) / 1.055) ** 2.4)
+    require(np.allclose(colours, light, atol=1e-5), f"{mesh.name}: faces have other colours")
+    require((areas > 0.0099).all() and np.allclose(a + c, b + d, atol=1e-5), f"{mesh.name}: faces that are no rectangles")
+
+
+def check_file(quoin, folder):
+    """Groups, layers, lamps, cameras; materials of metal, glass and light; what is turned."""
+    array = np.zeros((6, 3, 4), np.uint8)
+    array[:, 0], array[1, 1, 1], array[4, 1, 2], array[0, 2, 0] = 1, 2, 3, 1
+    made = quoin.from_numpy(array, [(1, 1, 1), (2, 2, 2), (3, 3, 3)], "box")
+    made.save(os.path.join(folder, "box.json"))
+    with open(os.path.join(folder, "box.json")) as file:
+        text = file.read()
+    grid = text[text.index("[", text.index('"grids"')) + 1 : text.index('"instances"')].rsplit("]", 1)[0]
+    path = os.path.join(folder, "all.json")
+    with open(path, "w") as file:
+        file.write(SCENE_FILE % grid)
+    for look in ("TYPES", "PALETTE"):
+        empty()
+        run(bpy.ops.import_scene.quoin, filepath=path, materials=look, scale=0.5)
+        bpy.context.view_layer.update()
+        require(bpy.data.objects["first"].users_collection[0].name == "room", "groups are collections")
+        require("room" in bpy.data.collections["house"].children, "groups lie within groups")
+        require(bpy.data.objects["away"].hide_render and not bpy.data.objects["first"].hide_render, "layers hide")
+        camera = bpy.context.scene.camera
+        require(camera is not None and np.allclose(camera.matrix_world.translation, (5, -25, 10)), "a camera's place")
+        forward = np.array(camera.matrix_world)[:3, :3] @ (0, 0, -1)
+        require(np.allclose(forward, (0, 1, 0), atol=1e-6), f"a camera looks along {forward}")
+        require(abs(math.degrees(camera.data.angle_y) - 40) < 1e-3, "a camera's angle")
+        lamp = bpy.data.objects["torch"]
+        require(lamp.data.type == "SPOT" and np.allclose(lamp.matrix_world.translation, (0.5, -1.5, 1)), "a lamp's place")
+        require(abs(lamp.data.energy - 5 * 4 * math.pi**2 * 0.25) < 1e-3, "a lamp's power")
+        # Two that stand at right angles keep their voxels, the third is voxelized.
+        run(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "turned.vox"), scale=0.5, fill="solid")
+        again = quoin.load(os.path.join(folder, "turned.vox"))
+        require(len(again.instances) == 3, f"{len(again.instances)} instances")
+        colours = lambda of: {tuple(row) for row in points_of(of)[:, 3:6]}
+        require(colours(again) == colours(quoin.load(path)), f"{look}: colours {colours(again)}")
+        run(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "turned.json"), scale=0.5)
+        turned = quoin.load(os.path.join(folder, "turned.json"))
+        require(len(turned.grids) == 1 and np.array_equal(points_of(turned), points_of(quoin.load(path))), "turned.json")
+    empty()
+    run(bpy.ops.import_scene.quoin, filepath=path, materials="TYPES")
+    shader = lambda name: next(n for n in bpy.data.materials[name].node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+    value = lambda name, old, new=None: (shader(name).inputs.get(old) or shader(name).inputs[new]).default_value
+    require(value("gold", "Metallic") == 1 and abs(value("gold", "Roughness") - 0.25) < 1e-6, "gold")
+    require(abs(value("glass", "Transmission", "Transmission Weight") - (1 - 90 / 255)) < 1e-6, "glass lets light through")
+    require(abs(value("glass", "IOR") - 1.33) < 1e-6, "glass refracts")
+    require(value("lamp", "Emission Strength") == 8, "a lamp shines")
+    require(abs(bpy.data.materials["gold"].diffuse_color[0] - ((250 / 255 + 0.055) / 1.055) ** 2.4) < 1e-5, "gold's colour")
+    # What is edited in Blender is what is written.
+    group = next(n for n in bpy.data.materials["gold"].node_tree.nodes if n.type == "GROUP")
+    group.inputs[0].default_value = (0, 0, 1, 1)
+    run(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "blue.json"))
+    blue = [one for one in quoin.load(os.path.join(folder, "blue.json")).types if one.name == "gold"]
+    require([tuple(one.rgba) for one in blue] == [(0, 0, 255, 255)] and blue[0].metalness == 1, f"blue gold: {blue}")
+
+
+def check_voxelized(quoin, folder):
+    """Any mesh becomes voxels: places, colours, modifiers, instances."""
+    empty()
+    bpy.ops.mesh.primitive_cube_add(size=2, location=(5, 0, 1))
+    cube = bpy.context.object
+    red = bpy.data.materials.new("red")
+    red.use_nodes = True
+    red.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (1, 0, 0, 1)
+    cube.data.materials.append(red)
+    path = os.path.join(folder, "cube.vox")
+    run(bpy.ops.export_scene.quoin, filepath=path, fill="solid")
+    scene = quoin.load(path)
+    points = points_of(scene)
+    require(len(points) == 8000, f"{len(points)} voxels of 20 x 20 x 20")
+    require((points[:, :3].min(0) == (40, 0, -10)).all() and (points[:, :3].max(0) == (59, 19, 9)).all(), "their place")
+    require((points[:, 3:] == (255, 0, 0, 255)).all(), "their colour")
+    cube.modifiers.new("array", "ARRAY").count = 3
+    run(bpy.ops.export_scene.quoin, filepath=path, fill="solid")
+    require(len(points_of(quoin.load(path))) == 24000, "modifiers count")
+    # What was imported and then edited is voxelized as it is now.
+    empty()
+    quoin.from_numpy(np.ones((4, 4, 4), np.uint8), [(9, 9, 9)]).save(path)
+    run(bpy.ops.import_scene.quoin, filepath=path, lights=False)
+    for vertex in next(one for one in bpy.data.objects).data.vertices:
+        vertex.co *= 2
+    run(bpy.ops.export_scene.quoin, filepath=path, fill="solid")
+    require(len(points_of(quoin.load(path))) == 512, "edited meshes are voxelized")
+
+
+def check_refusals(folder):
+    empty()
+    refused(bpy.ops.import_scene.quoin, "No such file", filepath=os.path.join(folder, "nothing.vox"))
+    bad = os.path.join(folder, "bad.vox")
+    with open(bad, "wb") as file:
+        file.write(b"VOX \x96\0\0\0MAIN")
+    refused(bpy.ops.import_scene.quoin, "bad.vox", filepath=bad)
+    refused(bpy.ops.export_scene.quoin, "nothing to export", filepath=os.path.join(folder, "x.vox"))
+    bpy.ops.mesh.primitive_cube_add()
+    refused(bpy.ops.export_scene.quoin, "x.unknown", filepath=os.path.join(folder, "x.unknown"))
+    refused(bpy.ops.export_scene.quoin, "16384", filepath=os.path.join(folder, "x.vox"), scale=1e-6)
+    refused(bpy.ops.export_scene.quoin, "there is no folder", filepath=os.path.join(folder, "none", "x.vox"))
+
+
+def check_surfaces(path):
+    """Smooth surfaces, with colours and occlusion, and their own faces."""
+    empty()
+    run(bpy.ops.import_scene.quoin, filepath=path, surface="SMOOTH", occlusion=0.5)
+    mesh = max(bpy.data.meshes, key=lambda one: len(one.polygons))
+    require({"Colour", "Occlusion"} <= set(mesh.color_attributes.keys()), "attributes")
+    require(all(one.loop_total == 3 for one in mesh.polygons[:50]), "triangles")
+    group = next(one for one in bpy.data.node_groups if one.name.startswith("Quoin Occlusion"))
+    require(group.nodes["Strength"].outputs[0].default_value == 0.5, "the occlusion's strength")
+
+
+def main():
+    addon, castle, folder = sys.argv[sys.argv.index("--") + 1 :]
+    bpy.ops.preferences.addon_install(filepath=addon)
+    bpy.ops.preferences.addon_enable(module="quoin_voxels")
+    import quoin_voxels
+
+    scripts = os.environ["BLENDER_USER_SCRIPTS"]
+    require(quoin_voxels.__file__.startswith(scripts), f"installed in {quoin_voxels.__file__}")
+    require(quoin_voxels.quoin.__file__.startswith(scripts), "with its own package")
+    menus = (bpy.types.TOPBAR_MT_file_import, bpy.types.TOPBAR_MT_file_export)
+    require(all(any("quoin_voxels" in one.__module__ for one in menu._dyn_ui_initialize()) for menu in menus), "menus")
+    quoin = quoin_voxels.quoin
+    check_castle(quoin, castle, folder)
+    check_file(quoin, folder)
+    check_voxelized(quoin, folder)
+    check_refusals(folder)
+    check_surfaces(castle)
+    empty()
+    bpy.ops.preferences.addon_disable(module="quoin_voxels")
+    require(not hasattr(bpy.types, "IMPORT_SCENE_OT_quoin"), "it goes without a trace")
+    print("the add-on: all right")
+
+
+try:
+    main()
+except Exception:
+    traceback.print_exc()
+    sys.stdout.flush()
+    os._exit(1)
