@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/change_journal.h"
+#include "core/srgb.h"
 #include "grid/make_room.h"
 
 namespace quoin {
@@ -102,6 +103,15 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   if (visibility == Visibility::Transparent) ++c.transparent_count;
   note({type, visibility != Visibility::Opaque, true});
   return type;
+}
+
+Vec3 linear_colour(Rgba8 colour) {
+  return {linear_from_srgb(colour.r), linear_from_srgb(colour.g), linear_from_srgb(colour.b)};
+}
+
+Rgba8 srgb_colour(Vec3 light) {
+  const SrgbEncoder& encode = SrgbEncoder::shared();
+  return {encode(light.x), encode(light.y), encode(light.z), 255};
 }
 
 std::optional<VoxelType> VoxelRegistry::find(std::string_view name) const {

@@ -4,17 +4,12 @@
 #include <cmath>
 #include <limits>
 
-#include "core/srgb.h"
 
 namespace quoin {
 
 std::optional<float> glass_ior(const VoxelProperties& properties) {
   if (!(properties.ior >= 1.0F) || !std::isfinite(properties.ior)) return std::nullopt;
   return properties.ior;
-}
-
-Vec3 linear_colour(Rgba8 colour) {
-  return {linear_from_srgb(colour.r), linear_from_srgb(colour.g), linear_from_srgb(colour.b)};
 }
 
 void set_absorption(float alpha, Surface& surface) {

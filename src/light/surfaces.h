@@ -31,9 +31,6 @@ struct Surface {
 /// less than that of air, infinite or not a number.
 [[nodiscard]] std::optional<float> glass_ior(const VoxelProperties& properties);
 
-/// Without its alpha.
-[[nodiscard]] Vec3 linear_colour(Rgba8 colour);
-
 /// Sets what a voxel's length of a transparent surface lets through, by its colour and alpha.
 void set_absorption(float alpha, Surface& surface);
 

@@ -85,7 +85,7 @@ inline float depth_at(const Picture& picture, int x, int y) {
 }
 
 inline Vec3 linear(Rgba8 colour) {
-  return {linear_from_srgb(colour.r), linear_from_srgb(colour.g), linear_from_srgb(colour.b)};
+  return linear_colour(colour);
 }
 
 inline Pixel encoded(Vec3 light) {

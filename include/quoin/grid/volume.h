@@ -108,11 +108,12 @@ struct VolumeFieldOptions {
 struct ArrayView {
   const void* data = nullptr;
   ScalarType type = ScalarType::Float32;
-  std::array<std::int64_t, 3> size{};     ///< samples along each axis
-  std::array<std::int64_t, 3> strides{};  ///< bytes from a sample to the next, of any sign; 0 repeats the same ones;
-                                          ///< samples need not be aligned
-  DVec3 spacing{1.0};                     ///< of neighbours, in the caller's unit; of either sign, not 0
-  DVec3 origin{0.0};                      ///< where sample (0, 0, 0) lies
+  std::array<std::int64_t, 3> size{};  ///< samples along each axis
+  /// Bytes from a sample to the next, of any sign; samples need not be aligned. 0, as they are by default, repeats the
+  /// same ones: set them, by `strides_of_last_fastest` for one.
+  std::array<std::int64_t, 3> strides{};
+  DVec3 spacing{1.0};  ///< of neighbours, in the caller's unit; of either sign, not 0
+  DVec3 origin{0.0};   ///< where sample (0, 0, 0) lies
 };
 
 /// The strides of a packed array whose last axis runs through neighbouring bytes, as C and NumPy lay it out.

@@ -13,6 +13,7 @@
 #include <quoin/core/changes.h>
 #include <quoin/core/ref.h>
 #include <quoin/core/result.h>
+#include <quoin/core/vec.h>
 
 namespace quoin {
 
@@ -36,6 +37,11 @@ struct Rgba8 {
   std::uint8_t a = 255;
   bool operator==(const Rgba8&) const = default;
 };
+
+/// The light that a colour stands for, 0 to 1 a channel, without its alpha: what lamps, looks and vertices are made of.
+[[nodiscard]] Vec3 linear_colour(Rgba8 colour);
+/// The opaque colour of that light, each channel to the nearest; what is beyond 0 to 1 is cut, NaN is 0.
+[[nodiscard]] Rgba8 srgb_colour(Vec3 light);
 
 /// What there is to know of one kind of voxel.
 struct VoxelProperties {
