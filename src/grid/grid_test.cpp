@@ -28,6 +28,20 @@ TEST(Grid, VoxelMinusOneLiesInChunkMinusOne) {
   EXPECT_EQ(grid.bounds(), (IBox{{-1, -65, 63}, {0, -64, 64}}));
 }
 
+// A point is no voxel: it would be cut towards 0.
+template <class Place>
+constexpr bool takes_any_of(Place) {
+  return requires(Grid& grid, Place at) { grid.get(at); } || requires(Grid& grid, Place at) { grid.set(at, 1); } ||
+         requires(Grid& grid, Place at) { grid.data(at); } ||
+         requires(Grid& grid, Place at) { grid.set_data(at, {}); } ||
+         requires(Grid& grid, Place at) { grid.set(at, 1, {}); } ||
+         requires(Grid& grid, Place at) { grid.find_chunk(at); } ||
+         requires(Grid& grid, Place at) { grid.neighbourhood(at); } ||
+         requires(Grid& grid, Place at) { grid.is_loaded(at); } || requires(Place at) { chunk_of(at); };
+}
+static_assert(takes_any_of(IVec3{}));
+static_assert(!takes_any_of(DVec3{}) && !takes_any_of(Vec3{}));
+
 TEST(Grid, SettingAirErasesAndDropsTheChunk) {
   Grid grid;
   grid.set({3, 3, 3}, 1);
