@@ -2,6 +2,7 @@
 //
 // What the header asks of callers is kept: memory is as large as shapes and strides say, and paths name no file.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -73,6 +74,16 @@ class Program {
     const std::uint8_t b = byte();
     return b < 200 ? (b - 100) / 4.0 : kOdd.at(b % kOdd.size());
   }
+  std::int64_t whole() {
+    constexpr std::array<std::int64_t, 4> kFar = {std::numeric_limits<std::int64_t>::max(),
+                                                  std::numeric_limits<std::int64_t>::min(), std::int64_t{1} << 31, -1};
+    const std::uint8_t b = byte();
+    return b < 200 ? b - 20 : kFar.at(b % kFar.size());
+  }
+  float single() {
+    const double one = number();
+    return std::isfinite(one) ? static_cast<float>(std::clamp(one, -3e38, 3e38)) : std::nanf("");
+  }
   std::uint64_t handle() {
     const std::uint8_t b = byte();
     if (handles_.empty() || b > 250) return b;
@@ -109,7 +120,7 @@ class Program {
     std::int64_t first = 0;
     std::int64_t last = 8;
     for (int axis = 0; axis < 3; ++axis) {
-      one.shape[axis] = is_there ? byte() % 24 : static_cast<std::int64_t>(number());
+      one.shape[axis] = is_there ? byte() % 24 : whole();
       one.strides[axis] = small();
       const std::int64_t reach = one.strides[axis] * (is_there ? one.shape[axis] : 0);
       (reach < 0 ? first : last) += reach;
@@ -140,12 +151,12 @@ class Program {
   void type() {
     auto one = made<quoin_type>();
     for (std::uint8_t& channel : one.rgba) channel = byte();
-    one.emission = static_cast<float>(std::abs(number()));
+    one.emission = std::abs(single());
     one.metalness = static_cast<float>(byte()) / 250.0F;
     one.roughness = static_cast<float>(byte()) / 250.0F;
     std::memset(one.name, 'x', byte() % 2 == 0 ? 3 : sizeof one.name);
     one.transparent = byte() % 2;
-    one.ior = bit() ? 0.0F : static_cast<float>(number());
+    one.ior = bit() ? 0.0F : single();
     std::uint16_t number = 0;
     took(quoin_type_add(handle(), perhaps(&one), perhaps(&number)));
   }
@@ -215,7 +226,7 @@ class Program {
   void read() {
     std::array<std::int32_t, 3> min{};
     std::array<std::int32_t, 3> shape{};
-    for (std::int32_t& each : min) each = byte() < 200 ? small() : static_cast<std::int32_t>(number());
+    for (std::int32_t& each : min) each = byte() < 200 ? small() : static_cast<std::int32_t>(whole());
     for (std::int32_t& each : shape) each = byte() < 200 ? byte() % 16 : std::numeric_limits<std::int32_t>::max();
     std::array<std::uint16_t, 1024> types{};
     took(quoin_grid_read(handle(), index(), perhaps(min.data()), shape.data(), perhaps(types.data()), types.size()));
@@ -263,7 +274,7 @@ class Program {
     auto options = made<quoin_load_options>();
     options.frame = small();
     options.radius = small();
-    options.iso = static_cast<float>(number());
+    options.iso = single();
     options.voxel_size = number();
     took(quoin_scene_load_with("", perhaps(&options), &scene), &scene);
   }
