@@ -28,7 +28,7 @@ TEST(CHostile, TheCorpusIsReplayed) {
 
 TEST(CHostile, ProgramsByChanceReturnAStatusEachCall) {
   std::mt19937 random(20261126);
-  for (int turn = 0; turn < 400; ++turn) {
+  for (int turn = 0; turn < 200; ++turn) {
     // A scene first, so that calls find one; then anything.
     std::vector<std::uint8_t> program = {0};
     const std::size_t length = 40 + random() % 600;

@@ -159,6 +159,9 @@ def main():
     print(f"Quoin {quoin.version()}, NumPy {np.__version__}, Python {platform.python_version()}, {os.cpu_count()} processors")
     print("not installed: " + ", ".join(missing) if missing else "all peers are installed")
     pairs = [*surfaces(given.edge), *labels(given.edge // 2), *files(given.file), *blocks(given.edge)]
+    if not pairs:
+        print("there is nothing to compare with")
+        sys.exit(77)
     print("| task | Quoin, ms | peer, ms | times | peer |\n|---|---|---|---|---|")
     for pair in pairs:
         pair.check()
