@@ -68,6 +68,11 @@ void __cxa_free_exception(void* thrown) noexcept {
   std::abort();
 }
 
+// An instance is thrown away whole, with what its one thread holds.
+int __cxa_thread_atexit(void (* /*end*/)(void*), void* /*object*/, void* /*library*/) {
+  return 0;
+}
+
 }  // extern "C"
 
 void* operator new(std::size_t bytes) {

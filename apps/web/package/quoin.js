@@ -81,10 +81,10 @@ class Instance {
     return new DataView(this.exports.memory.buffer);
   }
 
-  text(at, most = Infinity) {
-    const bytes = new Uint8Array(this.exports.memory.buffer, at);
+  text(at) {
+    const bytes = new Uint8Array(this.exports.memory.buffer, at >>> 0);
     const end = bytes.indexOf(0);
-    return new TextDecoder().decode(bytes.slice(0, Math.min(end, most)));
+    return new TextDecoder().decode(bytes.slice(0, end));
   }
 
   /** A copy of count numbers; null where the address is. */
