@@ -6,7 +6,7 @@ import { pathToFileURL } from 'node:url';
 
 const [packageFolder, goodFile] = process.argv.slice(2);
 const { load, surfaceNets, QuoinError, version } = await import(pathToFileURL(join(packageFolder, 'quoin.js')));
-const good = readFileSync(goodFile);
+const good = new Uint8Array(readFileSync(goodFile));
 const before = (await load(good)).glb();
 let checked = 0;
 let failed = 0;
