@@ -1,8 +1,8 @@
 // What the C and C++ libraries for WebAssembly lack: exceptions, and what a process knows of its memory.
 //
-// They are built without exceptions, so nothing can be caught there. What throws ends the instance: JavaScript throws an
-// Error with the exception's text through it, and the package starts a fresh one. Quoin throws only where memory runs
-// out, or a library that it uses does: for text that is no JSON.
+// They are built without exceptions, so nothing can be caught there. What throws ends the instance: JavaScript throws
+// an Error with the exception's text through it, and the package starts a fresh one. Quoin throws only where memory
+// runs out, or a library that it uses does: for text that is no JSON.
 
 #include <cstdint>
 #include <cstdlib>

@@ -74,7 +74,7 @@ export class Scene {
   readonly grids: readonly GridInfo[];
   /** 0 is air. */
   readonly types: readonly VoxelType[];
-  /** A glTF 2.0 binary, with its materials, instances and animation: the same bytes that `quoin mesh` writes. */
+  /** A glTF 2.0 binary, with its materials, instances and animation: the same bytes that `quoin convert` writes. */
   glb(options?: MeshOptions): Uint8Array<ArrayBuffer>;
   /** A file by its extension: .glb, .ply, .stl, .3mf, .vox. */
   file(extension: string, options?: MeshOptions): Uint8Array<ArrayBuffer>;
