@@ -9,7 +9,7 @@
 #include <exception>
 #include <mutex>
 #include <vector>
-#else
+#elif !defined(QUOIN_PARALLEL_ON_ONE_THREAD)
 #include <map>
 
 #include <oneapi/tbb/info.h>
@@ -18,6 +18,19 @@
 #endif
 
 namespace quoin {
+
+#ifdef QUOIN_PARALLEL_ON_ONE_THREAD
+
+// WebAssembly: there are neither threads nor oneTBB.
+unsigned thread_count(Threads /*threads*/) {
+  return 1;
+}
+
+void parallel_for(std::size_t count, Threads /*threads*/, FunctionRef<void(std::size_t i)> body) {
+  for (std::size_t i = 0; i < count; ++i) body(i);
+}
+
+#else
 
 unsigned thread_count(Threads threads) {
   return threads.count != 0 ? threads.count : std::max(1U, std::thread::hardware_concurrency());
@@ -71,6 +84,7 @@ void parallel_for(std::size_t count, Threads threads, FunctionRef<void(std::size
   arena_of(workers).execute([&] { oneapi::tbb::parallel_for(std::size_t{0}, count, body); });
 }
 
+#endif
 #endif
 
 }  // namespace quoin

@@ -76,12 +76,13 @@ std::size_t size_of(ScalarType type) {
 float volume_threshold(const Volume& volume) {
   if (!(volume.min < volume.max)) return volume.min;
   const auto variance = variance_between(histogram_of(volume));
-  const auto* const first = std::max_element(variance.begin(), variance.end());
+  const double* const begin = variance.data();
+  const double* const end = begin + variance.size();
+  const double* const first = std::max_element(begin, end);
   // Bins that hold nothing leave the variance as it is: the threshold goes amid them.
-  const auto* last = first;
-  while (last + 1 != variance.end() && *(last + 1) == *first) ++last;
-  const double bins =
-      (static_cast<double>(first - variance.begin()) + static_cast<double>(last - variance.begin())) / 2;
+  const double* last = first;
+  while (last + 1 != end && *(last + 1) == *first) ++last;
+  const double bins = (static_cast<double>(first - begin) + static_cast<double>(last - begin)) / 2;
   const double min = volume.min;
   const auto threshold = static_cast<float>(min + (bins + 1.0) * ((static_cast<double>(volume.max) - min) / kBins));
   // Amid two values that follow each other there is no float, and nothing is above the greater.

@@ -175,7 +175,8 @@ class Builder {
     for (std::size_t i = 0; i < parts.size(); ++i) {
       const InterfaceTable::Slot& slot = parts[i].slot;
       if (i == 0 || parts[i - 1].slot.back != slot.back || parts[i - 1].slot.front != slot.front) {
-        out_.interfaces.push_back({code_.label_of(slot.back), code_.label_of(slot.front), 6 * quads, 0});
+        out_.interfaces.push_back(
+            {code_.label_of(slot.back), code_.label_of(slot.front), static_cast<std::size_t>(6 * quads), 0});
       }
       tables_[parts[i].slab].slot(slot.back, slot.front).number = quads;
       quads += slot.number;

@@ -108,6 +108,8 @@ QUOIN_INLINE SlabRange slabs_around(const IBox& region) {
 // Four words: the rows of a slab in one plane.
 using Four __attribute__((vector_size(32))) = std::uint64_t;
 using UnalignedFour __attribute__((vector_size(32), aligned(8))) = std::uint64_t;
+// Four pointers, as numbers.
+using FourAddresses __attribute__((vector_size(4 * sizeof(std::uintptr_t)))) = std::uintptr_t;
 
 // Where each row's packed voxels lie; those of uniform slabs are written out once.
 void find_rows(const ChunkStorage& voxels, const SlabRange& range, Scratch& s) {
@@ -120,11 +122,11 @@ void find_rows(const ChunkStorage& voxels, const SlabRange& range, Scratch& s) {
         const std::uint64_t pattern = packed_row::repeat(voxels.bits, entry & ~ChunkStorage::kUniformSlab);
         for (int i = 0; i < voxels.bits; ++i) s.patterns[slab][i] = pattern;
       }
-      const auto first = reinterpret_cast<std::uint64_t>(is_uniform ? s.patterns[slab] : voxels.row(entry, 0));
-      const std::uint64_t step = is_uniform ? 0 : static_cast<std::uint64_t>(voxels.bits) * 8;
-      Four four = Four{0, step, 2 * step, 3 * step} + first;
+      const auto first = reinterpret_cast<std::uintptr_t>(is_uniform ? s.patterns[slab] : voxels.row(entry, 0));
+      const std::uintptr_t step = is_uniform ? 0 : static_cast<std::uintptr_t>(voxels.bits) * 8;
+      FourAddresses four = FourAddresses{0, step, 2 * step, 3 * step} + first;
       for (int i = 0; i < 4; ++i) {
-        static_assert(sizeof(s.rows[0]) == sizeof(std::uint64_t));
+        static_assert(sizeof(s.rows[0]) == sizeof(std::uintptr_t));
         __builtin_memcpy(s.rows + (z + i) * 64 + y, &four, sizeof(four));
         four += 4 * step;
       }

@@ -21,7 +21,7 @@ constexpr std::uint32_t kNextSlice = 6;
 constexpr std::size_t kLongestName = 255;
 // What readers take.
 constexpr int kMaxEdge = 1 << 14;
-constexpr std::size_t kMaxBytes = std::size_t{1} << 32;
+constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 32;
 
 std::uint32_t word_of(Rgba8 colour) {
   const auto shifted = [](std::uint8_t channel, int bits) { return static_cast<std::uint32_t>(channel) << bits; };

@@ -1,0 +1,20 @@
+/* What JavaScript calls beside quoin.h: files as bytes, since there are no paths. */
+#ifndef QUOIN_WEB_DOOR_H
+#define QUOIN_WEB_DOOR_H
+#include "quoin.h"
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A scene as the bytes of a file. `extension` is ".glb", ".ply", ".stl" or ".3mf", of blocks or, with options->smooth,
+ * smooth surfaces, or ".vox". `out` is freed with free(). Errors: those of the format's writer. */
+QUOIN_API quoin_status quoin_web_write(quoin_scene scene, const char* extension, const quoin_mesh_options* options,
+                                       uint8_t** out, size_t* bytes);
+/* A quoin_mesh_options and so on, all 0 but its size, for whom structs are bytes: `kind` is 0 array, 1 grid_info,
+ * 2 type, 3 mesh_data, 4 mesh_options, 5 render_options; null: no memory, or another kind. Freed with free(). */
+QUOIN_API void* quoin_web_struct(int32_t kind);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,121 @@
+/** Reads voxel files of any format, and makes meshes, GLB files and pictures of them. See docs/web.md.
+ *
+ * Axes: right-handed, +Y up. Colours: sRGB. All arrays that are returned are the caller's.
+ * Errors: every function throws (or rejects with) a QuoinError. One of code "trap" or "out_of_memory" ended the instance
+ * that the scene lived in: that scene is gone, and the next `load` starts a fresh one.
+ */
+export type ErrorCode =
+  | 'invalid_argument' | 'cannot_read' | 'cannot_write' | 'bad_format' | 'unsupported' | 'limit_exceeded' | 'cancelled'
+  | 'device_lost' | 'bad_handle' | 'out_of_memory' | 'internal' | 'trap';
+
+export class QuoinError extends Error {
+  readonly code: ErrorCode;
+}
+
+export type Vec3 = [number, number, number];
+
+export interface GridInfo {
+  name: string;
+  voxels: number;
+  /** Of the tight box around its voxels, or its field's solid. */
+  min: Vec3;
+  extent: Vec3;
+  /** Densities: the surface of a volume. */
+  hasField: boolean;
+}
+
+export interface VoxelType {
+  name: string;
+  /** sRGB; alpha below 255: transparent. */
+  rgba: [number, number, number, number];
+  emission: number;
+  metalness: number;
+  roughness: number;
+}
+
+export interface Mesh {
+  /** Three a vertex. */
+  positions: Float32Array;
+  /** Three a vertex, of unit length. */
+  normals: Float32Array;
+  /** Four a vertex, sRGB, without occlusion; of grids. */
+  colours: Uint8Array | null;
+  /** One a vertex, 0 open to 1 dark; of grids. */
+  occlusion: Float32Array | null;
+  /** Three a triangle, counter-clockwise from outside. */
+  indices: Uint32Array;
+}
+
+export interface MeshOptions {
+  /** Smooth surfaces in place of blocks. Default: of grids that have a field. */
+  smooth?: boolean;
+}
+
+export interface RenderOptions {
+  width?: number;
+  height?: number;
+  /** Samples a pixel; default 4. */
+  samples?: number;
+  /** In place of a view of the whole scene. */
+  camera?: { position: Vec3; lookAt: Vec3; fovDegrees?: number };
+}
+
+export interface Picture {
+  width: number;
+  height: number;
+  /** Rows from the top, four bytes a pixel: an ImageData's. */
+  rgba: Uint8ClampedArray<ArrayBuffer>;
+}
+
+export class Scene {
+  private constructor();
+  /** What reading left out, a line each. */
+  readonly warnings: readonly string[];
+  readonly grids: readonly GridInfo[];
+  /** 0 is air. */
+  readonly types: readonly VoxelType[];
+  /** A glTF 2.0 binary, with its materials, instances and animation: the same bytes that `quoin convert` writes. */
+  glb(options?: MeshOptions): Uint8Array<ArrayBuffer>;
+  /** A file by its extension: .glb, .ply, .stl, .3mf, .vox. */
+  file(extension: string, options?: MeshOptions): Uint8Array<ArrayBuffer>;
+  /** The mesh of one grid, in its own space. */
+  mesh(grid: number, options?: MeshOptions): Mesh;
+  /** The types of a box of voxels, x slowest and z fastest. */
+  read(grid: number, min: Vec3, shape: Vec3): Uint16Array;
+  /** A picture by ray marching, on one thread. */
+  render(options?: RenderOptions): Picture;
+  /** Gives its memory back. The scene is of no use then. */
+  free(): void;
+}
+
+/** Starts the WebAssembly module. It is not needed: `load` and others do the same. `module`: its bytes, or where they are,
+ *  in place of quoin.wasm beside quoin.js. */
+export function start(module?: BufferSource | URL | string): Promise<void>;
+
+/** Reads a file of any format, which its content decides. */
+export function load(bytes: ArrayBuffer | ArrayBufferView): Promise<Scene>;
+
+export interface ArrayOptions {
+  /** Of neighbours, default 1. */
+  spacing?: Vec3;
+  /** Where sample (0, 0, 0) lies, default 0. */
+  origin?: Vec3;
+  /** What is less than `iso` is solid, as of signed distances. Default: what is more. */
+  solidBelow?: boolean;
+}
+
+export type Samples =
+  | Uint8Array | Int8Array | Uint16Array | Int16Array | Uint32Array | Int32Array | Float32Array | Float64Array;
+
+/** The surface where an array has the value `iso`. shape: samples along x, y and z, of which z is the fastest. */
+export function surfaceNets(array: Samples, shape: Vec3, iso: number, options?: ArrayOptions): Promise<Mesh>;
+
+/** A three.js group of a scene, with its materials. `GLTFLoader`: that of three/addons/loaders/GLTFLoader.js. */
+export function toThree<Group>(
+  scene: Scene,
+  GLTFLoader: new () => { parseAsync(data: ArrayBuffer, path: string): Promise<{ scene: Group }> },
+  options?: MeshOptions,
+): Promise<Group>;
+
+/** The version of the library: "1.2.3". */
+export function version(): Promise<string>;

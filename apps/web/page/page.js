@@ -1,0 +1,366 @@
+// The page: drop a file, see it, turn it, measure it, take it away.
+import * as THREE from 'three';
+import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
+import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+
+const $ = (id) => document.getElementById(id);
+const degrees = Math.PI / 180;
+const canvas = $('view');
+const renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
+renderer.shadowMap.enabled = true;
+renderer.toneMapping = THREE.NoToneMapping;
+const stage = new THREE.Scene();
+const camera = new THREE.PerspectiveCamera(45, 1, 0.1, 1000);
+const controls = new OrbitControls(camera, canvas);
+const sky = new THREE.HemisphereLight(0xdfeaff, 0x8a8478, 1.4);
+const sun = new THREE.DirectionalLight(0xfff1dc, 2.4);
+sun.castShadow = true;
+sun.shadow.mapSize.set(2048, 2048);
+sun.shadow.normalBias = 0.4;
+const tape = new THREE.Line(new THREE.BufferGeometry(),
+                            new THREE.LineBasicMaterial({ color: 0xff3b7a, depthTest: false, transparent: true }));
+tape.renderOrder = 1;
+tape.visible = false;
+stage.add(sky, sun, sun.target, tape);
+
+let file;      // { name, bytes }
+let model;     // what is shown of it
+let glb;       // its bytes
+let radius = 1;
+let centre = new THREE.Vector3();
+let measured;  // the points that were clicked
+let frame = 0;
+
+function say(text, isError = false) {
+  $('status').textContent = text;
+  $('status').classList.toggle('error', isError);
+}
+
+// ---- The worker. One that is busy with what nobody waits for is replaced.
+let worker;
+let jobs = new Map();
+let lastJob = 0;
+
+function newWorker() {
+  worker?.terminate();
+  for (const { reject } of jobs.values()) reject(new Error('it was stopped'));
+  jobs = new Map();
+  worker = new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
+  worker.onmessage = ({ data: { id, answer, error } }) => {
+    const job = jobs.get(id);
+    jobs.delete(id);
+    if (error === undefined) job?.resolve(answer);
+    else job?.reject(new Error(error.message));
+  };
+  worker.onerror = (event) => {
+    const text = event.message ?? 'the worker ended';
+    for (const { reject } of jobs.values()) reject(new Error(text));
+    jobs = new Map();
+  };
+}
+
+function ask(name, options) {
+  const id = ++lastJob;
+  return new Promise((resolve, reject) => {
+    jobs.set(id, { resolve, reject });
+    worker.postMessage({ id, name, options });
+  });
+}
+
+// ---- Drawing, only when something changed.
+function draw() {
+  frame = 0;
+  renderer.render(stage, camera);
+}
+
+function redraw() {
+  frame ||= requestAnimationFrame(draw);
+}
+
+function resize() {
+  renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+  renderer.setSize(innerWidth, innerHeight, false);
+  camera.aspect = innerWidth / innerHeight;
+  camera.updateProjectionMatrix();
+  redraw();
+}
+
+function placeSun() {
+  const around = $('around').valueAsNumber * degrees;
+  const height = $('height').valueAsNumber * degrees;
+  const to = new THREE.Vector3(Math.cos(height) * Math.sin(around), Math.sin(height), Math.cos(height) * Math.cos(around));
+  sun.position.copy(centre).addScaledVector(to, 2 * radius);
+  sun.target.position.copy(centre);
+  Object.assign(sun.shadow.camera, { left: -radius, right: radius, top: radius, bottom: -radius, near: radius / 10,
+                                     far: 4 * radius });
+  sun.shadow.camera.updateProjectionMatrix();
+  redraw();
+}
+
+function home() {
+  const distance = radius / Math.sin(camera.fov * degrees / 2) / Math.min(1, camera.aspect) * 0.85;
+  camera.position.copy(centre).add(new THREE.Vector3(1, 0.8, 1).normalize().multiplyScalar(distance));
+  controls.target.copy(centre);
+  controls.update();
+  redraw();
+}
+
+// ---- A link has the view in it: #camera=...&at=...&sun=...
+const rounded = (...numbers) => numbers.map((n) => Number(n.toPrecision(6))).join(',');
+
+function viewAsText() {
+  const at = controls.target;
+  return `camera=${rounded(...camera.position)}&at=${rounded(...at)}&sun=${rounded($('around').valueAsNumber,
+    $('height').valueAsNumber)}`;
+}
+
+function viewFromText(text) {
+  const given = new URLSearchParams(text.replace(/^#/, ''));
+  const numbers = (name, count) => {
+    const all = (given.get(name) ?? '').split(',').map(Number);
+    return all.length === count && given.get(name) !== '' && all.every(Number.isFinite) ? all : null;
+  };
+  const turned = numbers('sun', 2);
+  if (turned) [$('around').value, $('height').value] = turned;
+  const position = numbers('camera', 3);
+  const at = numbers('at', 3);
+  if (position && at) {
+    camera.position.fromArray(position);
+    controls.target.fromArray(at);
+    controls.update();
+  }
+  placeSun();
+}
+
+// ---- Files.
+async function show(bytes) {
+  const { scene } = await new GLTFLoader().parseAsync(bytes.buffer, '');
+  model?.removeFromParent();
+  model?.traverse((object) => {
+    object.geometry?.dispose();
+    object.material?.map?.dispose();
+    object.material?.dispose();
+  });
+  model = scene;
+  model.traverse((object) => {
+    if (!object.isMesh) return;
+    object.castShadow = !object.material.transparent;
+    object.receiveShadow = true;
+  });
+  stage.add(model);
+  const box = new THREE.Box3().setFromObject(model);
+  if (box.isEmpty()) box.set(new THREE.Vector3(-1, -1, -1), new THREE.Vector3(1, 1, 1));
+  centre = box.getCenter(new THREE.Vector3());
+  radius = box.getSize(new THREE.Vector3()).length() / 2;
+  Object.assign(camera, { near: radius / 500, far: radius * 50 });
+  camera.updateProjectionMatrix();
+  measured = undefined;
+  tape.visible = false;
+}
+
+async function open(name, bytes) {
+  const began = performance.now();
+  say(`Reading ${name} ...`);
+  if (jobs.size > 0) newWorker();
+  try {
+    const answer = await ask('load', { bytes });
+    glb = answer.glb;
+    await show(answer.glb.slice());
+    file = { name, bytes };
+    home();
+    viewFromText(location.hash);
+    draw();
+    describe(name, answer);
+    const total = performance.now() - began;
+    say(`${name}: read in ${answer.milliseconds.load.toFixed(0)} ms, meshed in ${
+      answer.milliseconds.mesh.toFixed(0)} ms, on the screen in ${total.toFixed(0)} ms.`);
+    window.quoinPage = { ...answer.milliseconds, total };
+  } catch (error) {
+    say(`${name}: ${error.message}`, true);
+  }
+}
+
+function describe(name, { grids, types, warnings }) {
+  $('welcome').hidden = true;
+  $('panel').hidden = false;
+  $('name').textContent = name;
+  const voxels = grids.reduce((sum, grid) => sum + grid.voxels, 0);
+  const fields = grids.filter((grid) => grid.hasField).length;
+  $('facts').textContent = `${voxels.toLocaleString()} voxels, ${grids.length.toLocaleString()} grids${
+    fields ? ` (${fields} with a surface)` : ''}, ${types} colours`;
+  $('smooth').checked = fields > 0;
+  $('warnings').hidden = warnings.length === 0;
+  $('warnings').querySelector('summary').textContent = `Left out: ${warnings.length}`;
+  $('warnings').querySelector('ul').replaceChildren(...warnings.map((text) => {
+    const line = document.createElement('li');
+    line.textContent = text;
+    return line;
+  }));
+}
+
+async function openFile(chosen) {
+  if (chosen === undefined || chosen === null) return;
+  try {
+    await open(chosen.name, await chosen.arrayBuffer());
+  } catch (error) {
+    say(`${chosen.name}: ${error.message}`, true);
+  }
+}
+
+async function openAddress(address) {
+  const url = new URL(address, location.href);
+  if (url.origin !== location.origin) return say('The link names a file of another site, which is not asked for.', true);
+  try {
+    const response = await fetch(url);
+    if (!response.ok) throw new Error(`${response.status} ${response.statusText}`);
+    await open(decodeURIComponent(url.pathname.split('/').pop()), await response.arrayBuffer());
+  } catch (error) {
+    say(`${address}: ${error.message}`, true);
+  }
+}
+
+function give(blob, extension) {
+  const link = document.createElement('a');
+  link.href = URL.createObjectURL(blob);
+  link.download = file.name.replace(/\.[^.]*$/, '') + extension;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+// ---- Measuring: two points of surfaces.
+function measure(x, y) {
+  const pointer = new THREE.Vector2(2 * x / innerWidth - 1, 1 - 2 * y / innerHeight);
+  const ray = new THREE.Raycaster();
+  ray.setFromCamera(pointer, camera);
+  const hit = ray.intersectObject(model, true)[0];
+  if (hit === undefined) return say('There is nothing to measure here.');
+  measured = measured?.length === 1 ? [measured[0], hit.point] : [hit.point];
+  tape.visible = measured.length === 2;
+  if (measured.length === 1) {
+    say(`From ${rounded(...hit.point.toArray())}; click the other end.`);
+  } else {
+    tape.geometry.setFromPoints(measured);
+    tape.frustumCulled = false;
+    const by = measured[1].clone().sub(measured[0]);
+    say(`${rounded(by.length())} units: ${rounded(...by.toArray().map(Math.abs))} along x, y and z.`);
+  }
+  redraw();
+}
+
+const isMeasuring = () => $('measure').getAttribute('aria-pressed') === 'true';
+let pressed;
+canvas.addEventListener('pointerdown', (event) => { pressed = [event.clientX, event.clientY]; });
+canvas.addEventListener('pointerup', (event) => {
+  const moved = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]);
+  if (model && isMeasuring() && moved < 5) measure(event.clientX, event.clientY);
+});
+
+// ---- What the page's parts do.
+function turn(around, up) {
+  const offset = new THREE.Spherical().setFromVector3(camera.position.clone().sub(controls.target));
+  offset.theta += around;
+  offset.phi = Math.min(Math.max(offset.phi + up, 0.01), Math.PI - 0.01);
+  camera.position.copy(controls.target).add(new THREE.Vector3().setFromSpherical(offset));
+  controls.update();
+}
+
+function zoom(factor) {
+  camera.position.sub(controls.target).multiplyScalar(factor).add(controls.target);
+  controls.update();
+}
+
+function slide(id, by) {
+  $(id).valueAsNumber += by;
+  placeSun();
+}
+
+const keys = {
+  ArrowLeft: () => turn(-0.1, 0), ArrowRight: () => turn(0.1, 0), ArrowUp: () => turn(0, -0.1),
+  ArrowDown: () => turn(0, 0.1), '+': () => zoom(0.9), '=': () => zoom(0.9), '-': () => zoom(1 / 0.9),
+  a: () => slide('around', -5), d: () => slide('around', 5), w: () => slide('height', 5), s: () => slide('height', -5),
+  m: () => $('measure').click(), h: home, o: () => $('other').click(),
+};
+addEventListener('keydown', (event) => {
+  if (event.target.tagName === 'INPUT' || event.ctrlKey || event.metaKey || event.altKey) return;
+  const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+  if (!act || !model) return;
+  event.preventDefault();
+  act();
+});
+controls.addEventListener('change', redraw);
+addEventListener('resize', resize);
+$('around').addEventListener('input', placeSun);
+$('height').addEventListener('input', placeSun);
+for (const id of ['file', 'other']) {
+  $(id).addEventListener('change', () => {
+    openFile($(id).files[0]);
+    $(id).value = '';
+  });
+}
+addEventListener('dragover', (event) => {
+  event.preventDefault();
+  document.body.classList.add('over');
+});
+addEventListener('dragleave', () => document.body.classList.remove('over'));
+addEventListener('drop', (event) => {
+  event.preventDefault();
+  document.body.classList.remove('over');
+  openFile(event.dataTransfer.files[0]);
+});
+$('measure').addEventListener('click', () => {
+  $('measure').setAttribute('aria-pressed', String(!isMeasuring()));
+  measured = undefined;
+  tape.visible = false;
+  say(isMeasuring() ? 'Click two points.' : '');
+  redraw();
+});
+$('home').addEventListener('click', home);
+$('smooth').addEventListener('change', async () => {
+  say('Meshing ...');
+  try {
+    glb = (await ask('glb', { smooth: $('smooth').checked })).glb;
+    await show(glb.slice());
+    placeSun();
+    say('');
+  } catch (error) {
+    say(error.message, true);
+    // Its instance may have ended: the next one gets the file again.
+    ask('load', { bytes: file.bytes }).catch(() => {});
+  }
+});
+$('glb').addEventListener('click', () => give(new Blob([glb], { type: 'model/gltf-binary' }), '.glb'));
+$('picture').addEventListener('click', () => {
+  draw();
+  canvas.toBlob((blob) => give(blob, '.png'), 'image/png');
+});
+$('march').addEventListener('click', async () => {
+  say('Drawing by rays, on one thread ...');
+  const began = performance.now();
+  try {
+    const { width, height, rgba } = await ask('march', {
+      width: innerWidth, height: innerHeight, samples: 4,
+      camera: { position: camera.position.toArray(), lookAt: controls.target.toArray(), fovDegrees: camera.fov },
+    });
+    const picture = new OffscreenCanvas(width, height);
+    picture.getContext('2d').putImageData(new ImageData(rgba, width, height), 0, 0);
+    give(await picture.convertToBlob({ type: 'image/png' }), '.png');
+    say(`Drawn in ${((performance.now() - began) / 1000).toFixed(1)} s.`);
+  } catch (error) {
+    say(error.message, true);
+  }
+});
+$('share').addEventListener('click', async () => {
+  history.replaceState(null, '', `#${viewAsText()}`);
+  try {
+    await navigator.clipboard.writeText(location.href);
+    say('The link is copied. Who opens it sees this view of the same file.');
+  } catch {
+    say('The link is in the address bar.');
+  }
+});
+addEventListener('hashchange', () => model && viewFromText(location.hash));
+
+newWorker();
+resize();
+const asked = new URLSearchParams(location.search).get('file');
+if (asked) openAddress(asked);

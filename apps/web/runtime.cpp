@@ -1,0 +1,100 @@
+// What the C and C++ libraries for WebAssembly lack: exceptions, and what a process knows of its memory.
+//
+// They are built without exceptions, so nothing can be caught there. What throws ends the instance: JavaScript throws
+// an Error with the exception's text through it, and the package starts a fresh one. Quoin throws only where memory
+// runs out, or a library that it uses does: for text that is no JSON.
+
+#include <cstdint>
+#include <cstdlib>
+#include <exception>
+#include <new>
+#include <typeinfo>
+
+#include <quoin/core/memory.h>
+
+extern "C" [[noreturn]] __attribute__((import_module("quoin"), import_name("fail"))) void quoin_web_fail(
+    const char* text);
+
+namespace {
+
+// Classes with one base class, as the Itanium ABI lays their type_info out.
+struct SingleBase {
+  const void* table;
+  const char* name;
+  const std::type_info* base;
+};
+
+bool is_exception(const std::type_info& type) {
+  class Derived : public std::exception {};
+  if (type == typeid(std::exception)) return true;
+  // All of one kind have the same table of virtual functions.
+  const void* const table_of_single = *reinterpret_cast<const void* const*>(&typeid(Derived));
+  const auto& layout = reinterpret_cast<const SingleBase&>(type);
+  return layout.table == table_of_single && is_exception(*layout.base);
+}
+
+[[noreturn]] void out_of_memory() {
+  quoin_web_fail("out of memory");
+}
+
+void* allocate(std::size_t bytes, std::size_t alignment) {
+  void* const found = alignment == 0 ? std::malloc(bytes) : std::aligned_alloc(alignment, bytes);
+  if (found == nullptr && bytes > 0) out_of_memory();
+  return found;
+}
+
+}  // namespace
+
+extern "C" {
+
+void* __cxa_allocate_exception(std::size_t bytes) {
+  return allocate(bytes, 0);
+}
+
+[[noreturn]] void __cxa_throw(void* thrown, std::type_info* type, void (* /*end*/)(void*)) {
+  if (is_exception(*type)) quoin_web_fail(static_cast<const std::exception*>(thrown)->what());
+  quoin_web_fail(type->name());
+}
+
+// Never reached: no handler is ever entered.
+void* __cxa_begin_catch(void* thrown) noexcept {
+  return thrown;
+}
+void __cxa_end_catch() {}
+void __cxa_free_exception(void* thrown) noexcept {
+  std::free(thrown);
+}
+[[noreturn]] void __cxa_rethrow() {
+  std::abort();
+}
+
+// An instance is thrown away whole, with what its one thread holds.
+int __cxa_thread_atexit(void (* /*end*/)(void*), void* /*object*/, void* /*library*/) {
+  return 0;
+}
+
+}  // extern "C"
+
+void* operator new(std::size_t bytes) {
+  return allocate(bytes == 0 ? 1 : bytes, 0);
+}
+void* operator new[](std::size_t bytes) {
+  return allocate(bytes == 0 ? 1 : bytes, 0);
+}
+void* operator new(std::size_t bytes, std::align_val_t alignment) {
+  const auto step = static_cast<std::size_t>(alignment);
+  return allocate((bytes + step - 1) / step * step + (bytes == 0 ? step : 0), step);
+}
+
+namespace quoin {
+
+std::optional<std::uint64_t> available_memory() {
+  constexpr std::uint64_t kPage = 65'536;
+  return (std::uint64_t{1} << 32) - __builtin_wasm_memory_size(0) * kPage;
+}
+
+bool return_freed_memory() {
+  return false;
+}
+
+}  // namespace quoin

@@ -1,0 +1,90 @@
+// What is no file, or a broken one, is an Error, and the next file is read.
+//   node bad.mjs PACKAGE GOOD_FILE
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { pathToFileURL } from 'node:url';
+
+const [packageFolder, goodFile] = process.argv.slice(2);
+const { load, surfaceNets, QuoinError, version } = await import(pathToFileURL(join(packageFolder, 'quoin.js')));
+const good = new Uint8Array(readFileSync(goodFile));
+const before = (await load(good)).glb();
+let checked = 0;
+let failed = 0;
+
+function check(isRight, what) {
+  ++checked;
+  if (isRight) return;
+  ++failed;
+  console.log(`WRONG: ${what}`);
+}
+
+/** That `work` throws a QuoinError, of these codes where they are given. */
+async function refuses(what, work, ...codes) {
+  try {
+    await work();
+    check(false, `${what}: no error`);
+  } catch (error) {
+    check(error instanceof QuoinError && error.message !== '' && (codes.length === 0 || codes.includes(error.code)),
+          `${what}: ${error?.code} ${error}`);
+  }
+}
+
+/** That it ends, with a scene or a QuoinError. */
+async function survives(what, bytes) {
+  try {
+    (await load(bytes)).free();
+    check(true);
+  } catch (error) {
+    check(error instanceof QuoinError, `${what}: ${error}`);
+  }
+}
+
+let seed = 12345;
+const random = () => (seed = (Math.imul(seed, 1664525) + 1013904223) >>> 0) / 2 ** 32;
+
+await refuses('nothing', () => load(new Uint8Array(0)));
+await refuses('a string', () => load('castle.vox'), 'invalid_argument');
+await refuses('noise', () => load(Uint8Array.from({ length: 4096 }, () => 256 * random())));
+await refuses('no JSON', () => load(new TextEncoder().encode('{"quoin_scene": 1, "grids": [')));
+for (const size of [4, 8, 20, 60, good.length >> 1, good.length - 1]) await survives(`cut to ${size}`, good.subarray(0, size));
+for (let i = 0; i < 60; ++i) {
+  const bytes = good.slice(0, 20_000 + (i % 2) * (good.length - 20_000));
+  for (let n = 0; n < 8; ++n) bytes[Math.floor(bytes.length * (n < 4 ? random() * 0.01 : random()))] = 256 * random();
+  await survives(`damage ${i}`, bytes);
+}
+// A volume whose header claims two gigabytes, and one that claims more than there is address space.
+for (const size of ['1024 1024 512', '4096 4096 4096']) {
+  const header = `NRRD0004\ntype: float\ndimension: 3\nsizes: ${size}\nencoding: raw\nendian: little\n\n`;
+  await refuses(`a header of ${size}`, () => load(new TextEncoder().encode(header)));
+}
+// Samples that take all of the memory: the instance ends, the page does not.
+const many = new Uint8Array(600 * 600 * 600);
+for (let i = 0; i < many.length; ++i) many[i] = (i * 2654435761) >>> 31;
+await refuses('more triangles than memory', () => surfaceNets(many, [600, 600, 600], 0.5),
+              'out_of_memory', 'trap', 'limit_exceeded');
+await refuses('a shape that does not fit', () => surfaceNets(new Float32Array(8), [2, 2, 3], 0), 'invalid_argument');
+await refuses('strings', () => surfaceNets(['a'], [1, 1, 1], 0), 'invalid_argument');
+await refuses('an iso that is none', () => surfaceNets(new Float32Array(8), [2, 2, 2], NaN), 'invalid_argument');
+const scene = await load(good);
+await refuses('no grid', () => scene.mesh(99_999), 'invalid_argument');
+await refuses('a fraction of a grid', () => scene.mesh(0.5), 'invalid_argument');
+await refuses('no extension', () => scene.file('.xyz'), 'unsupported');
+await refuses('a picture without a size', () => scene.render({ width: 0 }), 'invalid_argument');
+await refuses('a camera nowhere', () => scene.render({ camera: { position: [NaN, 0, 0], lookAt: [0, 0, 0] } }));
+scene.free();
+await refuses('a scene that was freed', () => scene.glb(), 'bad_handle');
+
+const after = (await load(good)).glb();
+check(Buffer.from(before).equals(Buffer.from(after)), 'after all that the good file has another GLB');
+check(/^\d+\.\d+\.\d+$/.test(await version()), 'the version');
+const ball = Float32Array.from({ length: 20 ** 3 }, (_, i) =>
+  8 - Math.hypot(Math.floor(i / 400) - 9.5, Math.floor(i / 20) % 20 - 9.5, i % 20 - 9.5));
+const mesh = await surfaceNets(ball, [20, 20, 20], 0);
+let furthest = 0;
+for (let i = 0; i < mesh.positions.length; i += 3) {
+  const at = [0, 1, 2].map((axis) => mesh.positions[i + axis] - 9.5);
+  furthest = Math.max(furthest, Math.abs(Math.hypot(...at) - 8));
+}
+check(mesh.indices.length > 3000 && furthest < 0.1, `a ball's surface is off by ${furthest}`);
+console.log(`${checked} checks, ${failed} failed`);
+if (failed > 0) process.exit(1);

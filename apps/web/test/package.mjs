@@ -1,0 +1,45 @@
+// The npm package as a user gets it: installed in an empty folder, compiled with strict types, run.
+//   node package.mjs QUOIN.tgz TSC FILE
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join, resolve } from 'node:path';
+
+const [tarball, tsc, file] = process.argv.slice(2).map((path) => resolve(path));
+const folder = mkdtempSync(join(tmpdir(), 'quoin-package-'));
+const run = (program, ...args) => execFileSync(program, args, { cwd: folder, stdio: ['ignore', 'pipe', 'inherit'] });
+
+writeFileSync(join(folder, 'package.json'), '{"type": "module", "private": true}\n');
+run('npm', 'install', '--silent', '--no-audit', '--no-fund', '--offline', tarball);
+writeFileSync(join(folder, 'use.ts'), `
+import { load, surfaceNets, toThree, QuoinError, type ErrorCode, type Mesh, type Scene } from 'quoin';
+
+export async function use(bytes: Uint8Array): Promise<number> {
+  const scene: Scene = await load(bytes);
+  const glb: Uint8Array = scene.glb({ smooth: false });
+  const mesh: Mesh = await surfaceNets(new Float32Array(8), [2, 2, 2], 0.5, { spacing: [1, 1, 2] });
+  const picture = scene.render({ width: 8, height: 8, camera: { position: [1, 2, 3], lookAt: [0, 0, 0] } });
+  class Loader { async parseAsync(_data: ArrayBuffer, _path: string) { return { scene: { name: 'group' } }; } }
+  const group = await toThree(scene, Loader);
+  try {
+    scene.mesh(0);
+  } catch (error) {
+    if (error instanceof QuoinError) { const code: ErrorCode = error.code; console.log(code); }
+  }
+  scene.free();
+  return glb.length + mesh.indices.length + picture.rgba.length + group.name.length + (mesh.colours?.length ?? 0);
+}
+// @ts-expect-error: bytes, not a path
+void load('castle.vox');
+`);
+run(process.execPath, tsc, '--strict', '--noEmit', '--exactOptionalPropertyTypes', '--noUncheckedIndexedAccess', '--target',
+    'es2022', '--module', 'nodenext', 'use.ts', 'node_modules/quoin/quoin.d.ts');
+writeFileSync(join(folder, 'use.mjs'), `
+import { readFileSync } from 'node:fs';
+import { load } from 'quoin';
+const scene = await load(readFileSync(process.argv[2]));
+if (scene.glb().length < 1000 || scene.grids.length === 0) process.exit(1);
+console.log(\`package: \${scene.grids.length} grids, a GLB of \${scene.glb().length} bytes\`);
+`);
+process.stdout.write(run(process.execPath, 'use.mjs', file));
+rmSync(folder, { recursive: true });

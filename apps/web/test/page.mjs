@@ -1,0 +1,126 @@
+// The page in a headless Chromium, on a server of static files, as a user handles it.
+//   node page.mjs PAGE FILE.vox NATIVE.glb PICTURE.png
+import { existsSync } from 'node:fs';
+import { readFile, writeFile } from 'node:fs/promises';
+import { createServer } from 'node:http';
+import { createRequire } from 'node:module';
+import { basename, extname, join, normalize, resolve } from 'node:path';
+
+const [page, file, nativeGlb, picture] = process.argv.slice(2);
+const require = createRequire(new URL('../../../tests/web/package.json', import.meta.url));
+const { chromium } = require('playwright-core');
+const executablePath = process.env.CHROMIUM ?? '/usr/bin/chromium';
+if (!existsSync(executablePath)) {
+  console.log(`skipped: no browser at ${executablePath} (set CHROMIUM)`);
+  process.exit(77);
+}
+const types = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.wasm': 'application/wasm' };
+const server = createServer(async (request, response) => {
+  const path = normalize(decodeURIComponent(new URL(request.url, 'http://localhost').pathname));
+  try {
+    const from = path === '/' ? join(page, 'index.html') : path === '/castle.vox' ? file : join(page, path);
+    const body = await readFile(from);
+    response.writeHead(200, { 'Content-Type': types[extname(from)] ?? 'application/octet-stream' });
+    response.end(body);
+  } catch {
+    response.writeHead(404).end();
+  }
+});
+await new Promise((done) => server.listen(0, '127.0.0.1', done));
+const site = `http://127.0.0.1:${server.address().port}/`;
+
+let failed = 0;
+function check(isRight, what) {
+  if (!isRight) ++failed;
+  console.log(`${isRight ? 'right' : 'WRONG'}: ${what}`);
+}
+
+const browser = await chromium.launch({
+  executablePath, headless: true,
+  args: ['--no-sandbox', '--disable-gpu', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
+         '--disable-background-networking', '--no-first-run'],
+});
+try {
+  const tab = await browser.newPage({ viewport: { width: 1280, height: 720 }, acceptDownloads: true });
+  const errors = [];
+  const elsewhere = [];
+  tab.on('pageerror', (error) => errors.push(String(error)));
+  tab.on('console', (message) => message.type() === 'error' && errors.push(message.text()));
+  tab.on('request', (request) => /^(blob|data):/.test(request.url()) || request.url().startsWith(site) ||
+    elsewhere.push(request.url()));
+  const status = () => tab.textContent('#status');
+  const shown = (name) => tab.waitForFunction(
+    (text) => document.querySelector('#status').textContent.startsWith(`${text}: `), name, { timeout: 60_000 });
+
+  await tab.goto(site);
+  await tab.setInputFiles('#file', file);
+  await shown(basename(file));
+  const cold = await tab.evaluate(() => window.quoinPage);
+  check(cold !== undefined, `the file is shown: ${await status()}`);
+  const colours = async () => {
+    const shot = await tab.screenshot();
+    const counted = await tab.evaluate(async (bytes) => {
+      const bitmap = await createImageBitmap(new Blob([new Uint8Array(bytes)]));
+      const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+      context.drawImage(bitmap, 0, 0);
+      const { data } = context.getImageData(100, 60, 850, 560);
+      const seen = new Set();
+      for (let i = 0; i < data.length; i += 4) seen.add((data[i] >> 3 << 10) | (data[i + 1] >> 3 << 5) | data[i + 2] >> 3);
+      return seen.size;
+    }, [...shot]);
+    return { shot, counted };
+  };
+  const first = await colours();
+  check(first.counted > 100, `the picture has ${first.counted} colours`);
+  if (picture) await writeFile(picture, first.shot);
+
+  const download = async (button) => {
+    const [got] = await Promise.all([tab.waitForEvent('download', { timeout: 60_000 }), tab.click(button)]);
+    return { name: got.suggestedFilename(), bytes: await readFile(await got.path()) };
+  };
+  const glb = await download('#glb');
+  check(glb.bytes.equals(await readFile(nativeGlb)), `${glb.name} is the native tool's, ${glb.bytes.length} bytes`);
+  const png = await download('#picture');
+  check(png.bytes.toString('latin1', 1, 4) === 'PNG', `${png.name} is a PNG of ${png.bytes.length} bytes`);
+  const marched = await download('#march');
+  check(marched.bytes.toString('latin1', 1, 4) === 'PNG', `${marched.name}, marched: ${await status()}`);
+  if (picture) await writeFile(picture.replace(/\.png$/, '-marched.png'), marched.bytes);
+
+  await tab.focus('#view');
+  await tab.keyboard.press('ArrowLeft');
+  await tab.keyboard.press('a');
+  await tab.waitForTimeout(200);
+  check(!(await tab.screenshot()).equals(first.shot), 'keys turn the camera and the sun');
+  await tab.keyboard.press('m');
+  await tab.mouse.click(560, 420);
+  await tab.mouse.click(620, 400);
+  check(/units: /.test(await status()), `measured: ${await status()}`);
+  await tab.keyboard.press('m');
+  await tab.click('#share');
+  const link = tab.url();
+  check(/#camera=.*&at=.*&sun=/.test(link), `the link: ${link.slice(site.length)}`);
+
+  const other = await browser.newPage({ viewport: { width: 1280, height: 720 } });
+  await other.goto(link.replace('/#', '/?file=castle.vox#'));
+  await other.waitForFunction(() => window.quoinPage !== undefined, undefined, { timeout: 60_000 });
+  await other.click('#share');
+  check(other.url().split('#')[1] === link.split('#')[1], 'who opens the link has the same view');
+  await other.close();
+
+  await tab.setInputFiles('#other', { name: 'noise.vox', mimeType: '', buffer: Buffer.from('VOX \x96\0\0\0MAIN nothing') });
+  await tab.waitForSelector('#status.error');
+  check(/^noise.vox: /.test(await status()), `a broken file says so: ${await status()}`);
+  await tab.setInputFiles('#other', file);
+  await shown(basename(file));
+  check(!(await tab.isVisible('#status.error')), `and the next one is shown: ${await status()}`);
+  await tab.emulateMedia({ colorScheme: 'dark' });
+  await tab.setViewportSize({ width: 390, height: 800 });
+  await tab.waitForTimeout(300);
+  if (picture) await writeFile(picture.replace(/\.png$/, '-phone.png'), await tab.screenshot());
+  check(elsewhere.length === 0, `no request to anywhere else${elsewhere.map((url) => ` ${url}`)}`);
+  check(errors.length === 0, `no error in the page${errors.map((text) => ` ${text}`)}`);
+} finally {
+  await browser.close();
+  server.close();
+}
+process.exit(failed > 0 ? 1 : 0);
