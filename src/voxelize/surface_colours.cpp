@@ -81,6 +81,13 @@ SurfaceColours::SurfaceColours(const Frame& frame) : frame_(&frame), materials_(
   find_mean();
 }
 
+std::optional<std::uint32_t> SurfaceColours::only_material() const {
+  const auto& of = frame_->mesh().material_of;
+  if (of.empty()) return 0;
+  const bool is_one = std::all_of(of.begin(), of.end(), [&](std::uint32_t material) { return material == of.front(); });
+  return is_one ? std::optional(of.front()) : std::nullopt;
+}
+
 void SurfaceColours::make_halves(std::size_t texture) {
   const AlphaImage& image = frame_->mesh().textures[texture].image;
   std::vector<Level>& levels = pictures_[texture].levels;

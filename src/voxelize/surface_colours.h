@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <glm/vec4.hpp>
@@ -30,6 +31,8 @@ class SurfaceColours {
     const auto& of = frame_->mesh().material_of;
     return of.empty() ? 0 : of[triangle];
   }
+  /// The material that all triangles are of; nothing where there are several.
+  [[nodiscard]] std::optional<std::uint32_t> only_material() const;
   /// The mean colour, by area, of what lies at the triangles' middles.
   [[nodiscard]] Rgba8 mean() const { return mean_; }
   /// What types have of the materials besides their colour.

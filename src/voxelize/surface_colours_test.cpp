@@ -185,6 +185,24 @@ TEST(SurfaceColours, within_a_solid_are_their_mean) {
   EXPECT_EQ(types[made->grid.get({10, 10, 0})].colour, (Rgba8{0, 0, 255, 255}));
 }
 
+TEST(SurfaceColours, of_one_material_are_of_it_deep_inside_too) {
+  TriangleMesh mesh = shapes::box({0.25, 0.25, 0.25}, {9.75, 9.75, 9.75});
+  MeshMaterial glass;
+  glass.name = "glass";
+  glass.colour = {0.2F, 0.8F, 0.2F, 0.5F};
+  glass.alpha_mode = AlphaMode::Blend;
+  glass.emission = 2.0F;
+  mesh.materials = {MeshMaterial{}, glass};
+  mesh.material_of.assign(mesh.triangles.size(), 1);
+  VoxelRegistry types;
+  const auto made = voxelize(mesh, {}, types);
+  ASSERT_TRUE(made) << to_string(made.error());
+  const VoxelProperties& deep = types[made->grid.get({5, 5, 5})];
+  EXPECT_EQ(deep.name, "glass");
+  EXPECT_EQ(deep.emission, 2.0F);
+  EXPECT_EQ(deep.visibility, Visibility::Transparent);
+}
+
 TEST(SurfaceColours, are_rounded_where_there_are_too_many) {
   TriangleMesh mesh = square();
   constexpr int kWide = 300;

@@ -228,8 +228,8 @@ struct Types {
 Result<Types> find_types(const SurfaceColours& colours, AllFound& found, VoxelRegistry& registry, std::size_t most,
                          std::vector<std::string>& warnings) {
   std::vector<VoxelProperties> materials = colours.materials();
-  // Of what is deep: of the one material, or of none.
-  const std::uint32_t deep_material = colours.is_plain() ? 0 : static_cast<std::uint32_t>(materials.size());
+  // Of what is deep: of the one material that all triangles have, or of none.
+  const std::uint32_t deep_material = colours.only_material().value_or(static_cast<std::uint32_t>(materials.size()));
   materials.emplace_back();
   Looks looks;
   bool has_deep = false;

@@ -140,6 +140,59 @@ TEST(VoxelizeSolid, bridges_holes) {
               0.01 * static_cast<double>(whole.size()));
 }
 
+/// What six rays along the axes from a centre say together, each triangle by itself.
+int votes_of(const TriangleMesh& mesh, SolidVoxels rule, DVec3 centre) {
+  int votes = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int u = (axis + 1) % 3;
+    const int v = (axis + 2) % 3;
+    int ahead = 0, behind = 0, met_ahead = 0, met_behind = 0;
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+      auto [a, b, c] = shapes::corners(mesh, i);
+      a -= centre, b -= centre, c -= centre;
+      const double e0 = a[u] * b[v] - a[v] * b[u], e1 = b[u] * c[v] - b[v] * c[u], e2 = c[u] * a[v] - c[v] * a[u];
+      const bool is_met = (e0 > 0.0 && e1 > 0.0 && e2 > 0.0) || (e0 < 0.0 && e1 < 0.0 && e2 < 0.0);
+      if (!is_met) continue;
+      const double area = e0 + e1 + e2;
+      const bool is_ahead = (a[axis] * e1 + b[axis] * e2 + c[axis] * e0) / area > 0.0;
+      (is_ahead ? ahead : behind) += (area > 0.0) == is_ahead ? 1 : -1;
+      ++(is_ahead ? met_ahead : met_behind);
+    }
+    votes += rule == SolidVoxels::Parity ? (met_ahead & 1) + (met_behind & 1) : ahead + behind;
+  }
+  return votes;
+}
+
+// Triangles by chance, open on all sides, over several chunks: most of these are decided without looking at voxels.
+TEST(VoxelizeSolid, of_any_triangles_is_what_six_rays_say) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> place(0.0, 150.0);
+  for (const int count : {1, 4, 13, 34}) {
+    TriangleMesh mesh;
+    for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(count); ++i) {
+      for (int corner = 0; corner < 3; ++corner) {
+        mesh.positions.emplace_back(place(random), place(random), place(random));
+      }
+      mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    for (const SolidVoxels rule : {SolidVoxels::Winding, SolidVoxels::Parity}) {
+      VoxelRegistry types;
+      VoxelizeOptions options;
+      options.surface = SurfaceVoxels::None;
+      options.solid = rule;
+      const auto made = voxelize(mesh, options, types);
+      ASSERT_TRUE(made) << to_string(made.error());
+      for (int i = 0; i < 2'000; ++i) {
+        const IVec3 voxel(static_cast<int>(random() % 150), static_cast<int>(random() % 150),
+                          static_cast<int>(random() % 150));
+        const bool expected = std::abs(votes_of(mesh, rule, DVec3(voxel) + 0.5)) > 3;
+        ASSERT_EQ(made->grid.get(voxel) != kAir, expected)
+            << count << ": " << voxel.x << " " << voxel.y << " " << voxel.z;
+      }
+    }
+  }
+}
+
 TEST(VoxelizeSurface, thick_is_every_cube_that_the_mesh_meets) {
   for (const TriangleMesh& mesh : closed_meshes()) {
     const Voxels expected = shapes::surface_by_boxes(mesh);

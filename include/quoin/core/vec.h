@@ -111,7 +111,7 @@ struct DBox {
 };
 
 /// The voxels that a box of a grid's space meets, but in a face, edge or corner alone; a box without a volume has those
-/// in which its points lie. Empty of an empty one.
+/// in which its points lie. Empty of an empty one, and of one beyond the int32 range.
 [[nodiscard]] inline IBox box_around(const DBox& box) {
   if (box.empty()) return {};
   const IVec3 min = voxel_of(box.min);

@@ -2,6 +2,8 @@
 
 #ifdef QUOIN_HAVE_TINYGLTF
 
+#include <cmath>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -29,7 +31,9 @@ using Json = nlohmann::json;
 bool is_fallback(const Json& buffer) {
   if (!buffer.is_object() || buffer.contains("uri")) return false;
   const auto extensions = buffer.find("extensions");
-  return extensions != buffer.end() && extensions->is_object() && extensions->contains(kExtension);
+  if (extensions == buffer.end() || !extensions->is_object()) return false;
+  const auto extension = extensions->find(kExtension);
+  return extension != extensions->end() && extension->is_object() && extension->value("fallback", Json()) == true;
 }
 
 /// A file with other JSON in place of `old`, which lies in it; of a GLB all that follows stays.
@@ -54,6 +58,9 @@ std::vector<std::byte> with_json(std::span<const std::byte> file, std::string_vi
 
 #ifdef QUOIN_HAVE_MESHOPTIMIZER
 
+/// Bytes that one of code can stand for: of 64 that are alike one is left, and indices of one byte become four.
+constexpr std::size_t kMostPacked = 256;
+
 /// What a view's extension says.
 struct CodedView {
   std::span<const unsigned char> coded;
@@ -63,10 +70,12 @@ struct CodedView {
   std::string filter;
 };
 
-std::size_t whole_in(const tinygltf::Value& object, const char* key) {
-  if (!object.Has(key) || !object.Get(key).IsNumber()) return 0;
+/// Nothing where it is no whole number.
+std::optional<std::size_t> whole_in(const tinygltf::Value& object, const char* key) {
+  if (!object.Has(key) || !object.Get(key).IsNumber()) return std::nullopt;
   const double number = object.Get(key).GetNumberAsDouble();
-  return number >= 0.0 && number < 0x1p40 ? static_cast<std::size_t>(number) : 0;
+  if (!(number >= 0.0 && number < 0x1p40) || number != std::floor(number)) return std::nullopt;
+  return static_cast<std::size_t>(number);
 }
 
 std::string text_in(const tinygltf::Value& object, const char* key) {
@@ -76,25 +85,26 @@ std::string text_in(const tinygltf::Value& object, const char* key) {
 Result<CodedView> coded_view(const tinygltf::Model& model, const tinygltf::Value& extension) {
   const auto bad = [](const char* what) { return make_error(ErrorCode::BadFormat, what); };
   if (!extension.IsObject()) return bad("its compression is no object");
-  const std::size_t buffer = whole_in(extension, "buffer");
-  const std::size_t offset = whole_in(extension, "byteOffset");
-  const std::size_t length = whole_in(extension, "byteLength");
+  const auto buffer = whole_in(extension, "buffer");
+  const auto offset = extension.Has("byteOffset") ? whole_in(extension, "byteOffset") : std::size_t{0};
+  const auto length = whole_in(extension, "byteLength");
+  const auto count = whole_in(extension, "count");
+  const auto stride = whole_in(extension, "byteStride");
+  if (!buffer || !offset || !length || !count || !stride) return bad("its compression lacks a number");
   CodedView view;
-  view.count = whole_in(extension, "count");
-  view.stride = whole_in(extension, "byteStride");
+  view.count = *count;
+  view.stride = *stride;
   view.mode = text_in(extension, "mode");
   view.filter = text_in(extension, "filter");
-  if (buffer >= model.buffers.size()) return bad("it is coded in a buffer that is not there");
-  const auto& bytes = model.buffers[buffer].data;
-  if (offset > bytes.size() || length > bytes.size() - offset) return bad("its code ends beyond its buffer");
-  view.coded = std::span(bytes).subspan(offset, length);
+  if (*buffer >= model.buffers.size()) return bad("it is coded in a buffer that is not there");
+  const auto& bytes = model.buffers[*buffer].data;
+  if (*offset > bytes.size() || *length > bytes.size() - *offset) return bad("its code ends beyond its buffer");
+  view.coded = std::span(bytes).subspan(*offset, *length);
   const bool is_attributes = view.mode == "ATTRIBUTES";
   const bool has_stride = is_attributes ? view.stride != 0 && view.stride % 4 == 0 && view.stride <= 256
                                         : view.stride == 2 || view.stride == 4;
   if (!has_stride) return bad("elements of a size that is not coded");
-  // Of 64 bytes that are alike one is left; a triangle of the smallest takes one.
-  constexpr std::size_t kMostPacked = 64;
-  if (view.count > (length + 1) * kMostPacked * 4 / view.stride) return bad("more elements than its code can hold");
+  if (view.count > (*length + 1) * kMostPacked / view.stride) return bad("more elements than its code can hold");
   return view;
 }
 
@@ -149,6 +159,9 @@ bool has_meshopt() {
 }
 
 Status decode_views(tinygltf::Model& model) {
+  // Any number of views may be of the same code.
+  std::size_t most = kMostPacked;
+  for (const tinygltf::Buffer& buffer : model.buffers) most += kMostPacked * buffer.data.size();
   for (std::size_t i = 0; i < model.bufferViews.size(); ++i) {
     tinygltf::BufferView& view = model.bufferViews[i];
     const auto extension = view.extensions.find(kExtension);
@@ -158,6 +171,9 @@ Status decode_views(tinygltf::Model& model) {
     };
     const auto coded = coded_view(model, extension->second);
     if (!coded) return fail(coded.error());
+    const std::size_t size = coded->count * coded->stride;
+    if (size > most) return fail(make_error(ErrorCode::BadFormat, "more elements than all code can hold"));
+    most -= size;
     auto bytes = decoded(*coded);
     if (!bytes) return fail(bytes.error());
     tinygltf::Buffer buffer;

@@ -26,7 +26,7 @@ namespace quoin::triangles {
 
 /// Decodes all coded views into buffers of their own, which the views are of afterwards.
 ///
-/// Memory: bounded by the file: more than a codec can pack is refused before it is made.
+/// Memory: at most 256 times the file's buffers: what is more is refused before it is made.
 /// Errors: BadFormat with the view's number; Unsupported without meshoptimizer.
 [[nodiscard]] Status decode_views(tinygltf::Model& model);
 

@@ -11,6 +11,7 @@
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
 
+#include "io/base64.h"
 #include "io/gltf/gltf_for_tests.h"
 #include "io/gltf/gltf_layout.h"
 
@@ -68,6 +69,31 @@ TEST(GltfMeshopt, WhatIsCompressedIsReadAsIfItWereNot) {
   }
 }
 
+// 64 views of one code that stands for a mebibyte.
+TEST(GltfMeshopt, OneCodeIsNotDecodedAnyNumberOfTimes) {
+  if (!reads_and_writes()) GTEST_SKIP() << "this build has no tinygltf or no meshoptimizer";
+  const std::vector<std::byte> zeros(std::size_t{1} << 20);
+  GltfArray array;
+  array.kind = GltfArrayKind::Position;
+  array.stride = 16;
+  const auto code = compress_gltf_array(array, zeros);
+  std::string views;
+  for (int i = 0; i < 64; ++i) {
+    views.append(i == 0 ? "" : ",")
+        .append(R"({"buffer":0,"byteLength":1048576,"byteStride":16,"extensions":{"EXT_meshopt_compression":)")
+        .append(R"({"buffer":0,"byteLength":)")
+        .append(std::to_string(code.size()))
+        .append(R"(,"byteStride":16,"count":65536,"mode":"ATTRIBUTES"}}})");
+  }
+  const std::string json = R"({"asset":{"version":"2.0"},"extensionsUsed":["EXT_meshopt_compression"],"buffers":[)"
+                           R"({"byteLength":)" +
+                           std::to_string(code.size()) + R"(,"uri":"data:application/octet-stream;base64,)" +
+                           to_base64(code) + R"("}],"bufferViews":[)" + views + "]}";
+  const auto loaded = read_mesh(std::as_bytes(std::span(json.data(), json.size())));
+  ASSERT_FALSE(loaded);
+  EXPECT_NE(loaded.error().message.find("all code can hold"), std::string::npos) << loaded.error().message;
+}
+
 /// The same file with other text of the same length in its JSON.
 std::vector<std::byte> with(std::vector<std::byte> file, std::string_view old, std::string_view text) {
   const auto from = std::as_bytes(std::span(old));
@@ -93,6 +119,10 @@ TEST(GltfMeshopt, CodesThatLieAreRefusedWithTheirView) {
     EXPECT_EQ(loaded.error().code, ErrorCode::BadFormat) << text;
     EXPECT_NE(loaded.error().message.find("buffer view"), std::string::npos) << loaded.error().message;
   }
+  // No fallback unless it says so: the file's own buffer.
+  const auto own = castle(true, false);
+  const auto named = with(own, R"({"byteLength":)", R"({"bytelength":)");
+  EXPECT_FALSE(read_mesh(named)) << "no length";
   // Code that is cut, or other bytes: an error or other numbers, and nothing beyond.
   for (std::size_t at = file.size() - 200; at < file.size(); at += 7) {
     auto damaged = file;

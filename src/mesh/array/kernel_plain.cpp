@@ -33,4 +33,10 @@ void vertices(const CornerBatch& corners, std::size_t count, const Placement& pl
 
 const Kernel kPlainKernel = make_kernel();
 
+#ifdef QUOIN_X86_KERNELS
+constinit const KernelTable<Kernel> kKernels = {{&kPlainKernel, &kAvx2Kernel, &kAvx2Kernel, &kAvx512Kernel}};
+#else
+constinit const KernelTable<Kernel> kKernels = {{&kPlainKernel}};
+#endif
+
 }  // namespace quoin::array

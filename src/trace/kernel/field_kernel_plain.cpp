@@ -133,4 +133,11 @@ bool walk_in_field(const OccupancyTree& cells, const FieldView& field, const Ray
 
 const FieldKernel kPlainFieldKernel = {nullptr, nullptr, nullptr, nullptr};
 
+#ifdef QUOIN_X86_KERNELS
+constinit const KernelTable<FieldKernel> kFieldKernels = {
+    {&kPlainFieldKernel, &kAvx2FieldKernel, &kAvx512FieldKernel, &kAvx512FieldKernel}};
+#else
+constinit const KernelTable<FieldKernel> kFieldKernels = {{&kPlainFieldKernel}};
+#endif
+
 }  // namespace quoin::trace

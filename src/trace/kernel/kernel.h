@@ -63,20 +63,15 @@ struct FieldKernel {
 bool walk_in_field(const OccupancyTree& cells, const FieldView& field, const Ray& ray, double max_t, bool asks_where,
                    FieldHit& hit);
 
+// Those of wider instructions are there only where they are compiled; tables have what there is.
 extern const Kernel kPlainKernel;
-extern const FieldKernel kPlainFieldKernel;
-#ifdef QUOIN_X86_KERNELS
 extern const Kernel kAvx2Kernel;
 extern const Kernel kAvx512Kernel;
+extern const FieldKernel kPlainFieldKernel;
 extern const FieldKernel kAvx2FieldKernel;
 extern const FieldKernel kAvx512FieldKernel;
-inline constexpr KernelTable<Kernel> kKernels = {{&kPlainKernel, &kAvx2Kernel, &kAvx512Kernel, &kAvx512Kernel}};
-inline constexpr KernelTable<FieldKernel> kFieldKernels = {
-    {&kPlainFieldKernel, &kAvx2FieldKernel, &kAvx512FieldKernel, &kAvx512FieldKernel}};
-#else
-inline constexpr KernelTable<Kernel> kKernels = {{&kPlainKernel}};
-inline constexpr KernelTable<FieldKernel> kFieldKernels = {{&kPlainFieldKernel}};
-#endif
+extern const KernelTable<Kernel> kKernels;
+extern const KernelTable<FieldKernel> kFieldKernels;
 
 /// That of the widest instructions that this machine has.
 [[nodiscard]] inline const Kernel& kernel() {

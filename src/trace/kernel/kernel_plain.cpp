@@ -315,4 +315,10 @@ std::uint32_t any_one_by_one(const TreeView& tree, const RayPacket& rays, std::u
 
 const Kernel kPlainKernel = {first_single<PlainTracer>, any_single<PlainTracer>, first_one_by_one, any_one_by_one};
 
+#ifdef QUOIN_X86_KERNELS
+constinit const KernelTable<Kernel> kKernels = {{&kPlainKernel, &kAvx2Kernel, &kAvx512Kernel, &kAvx512Kernel}};
+#else
+constinit const KernelTable<Kernel> kKernels = {{&kPlainKernel}};
+#endif
+
 }  // namespace quoin::trace

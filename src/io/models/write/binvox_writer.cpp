@@ -18,8 +18,17 @@ namespace {
 constexpr FormatHolds kHolds = {.extension = ".binvox", .colours = false, .place_in_units = true};
 constexpr int kMaxEdge = 1 << 14;
 constexpr std::int64_t kMaxVoxels = std::int64_t{1} << 32;
-/// Up to here a cube is written: some readers take nothing else (trimesh), and it is a few bytes of air.
-constexpr int kMaxCube = 1 << 10;
+/// Some readers take nothing but cubes (trimesh): written where that is little more, or little at all.
+constexpr int kMaxCube = 1 << 8;
+constexpr std::int64_t kMostAir = 8;  // times the box
+
+bool is_better_a_cube(const IVec3& size, int longest) {
+  if (longest <= kMaxCube) return true;
+  const std::int64_t volume = std::int64_t{size.x} * size.y * size.z;
+  constexpr int kAlways = 1 << 11;  // so that the cube is no overflow
+  return longest <= kAlways && std::int64_t{longest} * longest * longest <= kMostAir * volume;
+}
+
 constexpr unsigned kLongestRun = 255;
 
 /// The shortest that gives the same number.
@@ -58,7 +67,7 @@ Result<ModelBytes> write_binvox(const Scene& scene, const Progress& progress) {
   if (merged->box.empty()) return make_error(ErrorCode::Unsupported, "there are no voxels, and .binvox needs some");
   const IBox& box = merged->box;
   const int longest = std::max({box.size().x, box.size().y, box.size().z});
-  const IVec3 size = longest <= kMaxCube ? IVec3(longest) : box.size();
+  const IVec3 size = is_better_a_cube(box.size(), longest) ? IVec3(longest) : box.size();
   const std::int64_t volume = std::int64_t{size.x} * size.y;
   if (longest > kMaxEdge || volume > kMaxVoxels / std::max(size.z, 1)) {
     return make_error(ErrorCode::LimitExceeded, "more than 16,384 voxels a side, or 2^32 in all");

@@ -177,11 +177,31 @@ TEST(WriteModels, BinvoxKeepsPlaceAndSize) {
   FormatHolds all;
   const auto before = merge_grids(scene, all);
   const auto after = merge_grids(read->scene, all);
-  // A cube, which some readers want.
-  const IVec3 size = before->box.size();
-  EXPECT_EQ(after->box, (IBox{before->box.min, before->box.min + std::max({size.x, size.y, size.z})}));
+  EXPECT_EQ(after->box, before->box);
   EXPECT_EQ(after->voxels.voxel_count(), before->voxels.voxel_count());
   after->voxels.for_each([&](IVec3 v, VoxelType) { EXPECT_NE(before->voxels.get(v), kAir); });
+}
+
+TEST(WriteModels, ABinvoxIsNoCubeWhereThatWouldBeAirAlone) {
+  Scene scene;
+  const VoxelType grey = scene.types.add({.name = "grey"}).value();
+  SceneGrid grid;
+  grid.grid.fill_box({{0, 0, 0}, {1'000, 1, 1}}, grey);
+  Instance rod;
+  rod.grid = scene.add_grid(std::move(grid));
+  scene.add_instance(rod);
+  const auto file = write_binvox(scene);
+  ASSERT_TRUE(file) << to_string(file.error());
+  EXPECT_LT(file->bytes.size(), 200U);
+  const auto read = read_binvox(file->bytes);
+  ASSERT_TRUE(read) << to_string(read.error());
+  EXPECT_EQ(read->scene.voxel_count(), 1'000);
+  // A smaller one is: some readers want nothing else.
+  scene.edit(rod.grid).grid.fill_box({{100, 0, 0}, {1'000, 1, 1}}, kAir);
+  const auto small = write_binvox(scene);
+  ASSERT_TRUE(small);
+  const std::string text(reinterpret_cast<const char*>(small->bytes.data()), small->bytes.size());
+  EXPECT_NE(text.find("dim 100 100 100"), std::string::npos);
 }
 
 TEST(WriteModels, MapsKeepEveryColourAndGetGround) {

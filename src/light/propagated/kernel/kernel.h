@@ -90,14 +90,11 @@ struct Kernel {
   void (*unpack_row)(const SlabUnits& of, const std::uint32_t* units, std::size_t row, std::uint64_t* planes);
 };
 
+// Those of wider instructions are there only where they are compiled; tables have what there is.
 extern const Kernel kPlainKernel;
-#ifdef QUOIN_X86_KERNELS
 extern const Kernel kAvx2Kernel;
 extern const Kernel kAvx512Kernel;
-inline constexpr KernelTable<Kernel> kKernels = {{&kPlainKernel, &kAvx2Kernel, &kAvx512Kernel, &kAvx512Kernel}};
-#else
-inline constexpr KernelTable<Kernel> kKernels = {{&kPlainKernel}};
-#endif
+extern const KernelTable<Kernel> kKernels;
 
 /// That of the widest instructions that this machine has.
 [[nodiscard]] inline const Kernel& kernel() {
