@@ -200,18 +200,25 @@ Rgba8 SurfaceColours::colour(std::uint32_t triangle, DVec3 shares) const {
 }
 
 void SurfaceColours::find_mean() {
+  // Several materials have a core that is opaque, one of glass is glass throughout.
+  const auto one = only_material();
+  const bool has_alpha = one && materials_[*one].alpha_mode == AlphaMode::Blend;
   glm::dvec4 sum(0.0);
+  double alpha = 0.0;
   for (std::size_t i = 0; i < frame_->triangle_count(); ++i) {
     const auto triangle = static_cast<std::uint32_t>(i);
     const Corners c = frame_->corners(i);
     const DVec3 third(1.0 / 3.0);
     const double area = glm::length(glm::cross(c[1] - c[0], c[2] - c[0]));
     if (!has_surface(triangle, third)) continue;
-    sum += glm::dvec4(glm::vec3(light(triangle, third)), 1.0) * area;
+    const glm::vec4 seen = light(triangle, third);
+    sum += glm::dvec4(glm::vec3(seen), 1.0) * area;
+    alpha += (has_alpha ? seen.a : 1.0) * area;
   }
   const glm::vec4 plain = materials_[0].colour;
   const bool has_area = sum.a > 0.0;
-  mean_ = encoded(has_area ? glm::vec4(glm::vec3(sum / sum.a), 1.0F) : glm::vec4(glm::vec3(plain), 1.0F));
+  mean_ = encoded(has_area ? glm::vec4(glm::vec3(sum / sum.a), static_cast<float>(alpha / sum.a))
+                           : glm::vec4(glm::vec3(plain), 1.0F));
 }
 
 }  // namespace quoin::voxelizing

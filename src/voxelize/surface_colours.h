@@ -33,7 +33,7 @@ class SurfaceColours {
   }
   /// The material that all triangles are of; nothing where there are several.
   [[nodiscard]] std::optional<std::uint32_t> only_material() const;
-  /// The mean colour, by area, of what lies at the triangles' middles.
+  /// The mean colour, by area, of what lies at the triangles' middles; with its alpha where one material alone blends.
   [[nodiscard]] Rgba8 mean() const { return mean_; }
   /// What types have of the materials besides their colour.
   [[nodiscard]] const std::vector<VoxelProperties>& materials() const { return properties_; }
