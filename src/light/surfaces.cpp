@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-
 namespace quoin {
 
 std::optional<float> glass_ior(const VoxelProperties& properties) {

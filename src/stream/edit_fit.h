@@ -9,7 +9,6 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/stream/world_edit.h>
 
-
 // Edits come from elsewhere: what a world could not save is not done.
 
 namespace quoin::stream {

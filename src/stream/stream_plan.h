@@ -10,7 +10,6 @@
 #include <quoin/core/vec.h>
 #include <quoin/store/stored_chunk.h>
 
-
 namespace quoin::stream {
 
 /// A viewer in the space of a grid.

@@ -84,7 +84,7 @@ struct ExrChannel {
   enum class Type : std::uint8_t { Float16, Float32, Uint32 };
   std::string name;  ///< "R", "albedo.R", "Z"; readers group by what stands before the last dot
   Type type = Type::Float16;
-  std::vector<float> values{};         ///< a number a pixel, of floats; what is too large for a half is its largest
+  std::vector<float> values{};           ///< a number a pixel, of floats; what is too large for a half is its largest
   std::vector<std::uint32_t> numbers{};  ///< of Uint32
 };
 

@@ -52,7 +52,8 @@ class OccupancyTree {
   /// Cost: as that of a grid.
   [[nodiscard]] static OccupancyTree build(const DensityGrid& field);
 
-  /// Of a field, another tree: of those cells only the ones with a solid corner of a transparent material. Cost: 40 to 100 microseconds a
+  /// Of a field, another tree: of those cells only the ones with a solid corner of a transparent material. Cost: 40 to
+  /// 100 microseconds a
   /// chunk that has such.
   [[nodiscard]] static OccupancyTree build(const DensityGrid& field, const VoxelRegistry& types);
 

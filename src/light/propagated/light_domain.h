@@ -10,7 +10,6 @@
 #include <quoin/core/assert.h>
 #include <quoin/core/vec.h>
 
-
 namespace quoin::propagated {
 
 /// The chunks whose light is kept: those within one of a chunk with voxels, and what lies between these in a column.

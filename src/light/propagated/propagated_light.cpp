@@ -144,7 +144,7 @@ struct PropagatedLight::Impl {
   Ref<SharedDomain> shared_domain = make_ref<SharedDomain>();
   LightStore store;          // of the chunks of the domain
   std::vector<Dirty> dirty;  // boxes that are to be solved by themselves
-  Queue queue;                // boxes of chunks that are to be solved, a layer at a time
+  Queue queue;               // boxes of chunks that are to be solved, a layer at a time
   std::unordered_map<IVec3, std::unique_ptr<ChunkMasks>, CoordinateHash> masks;  // during an update
 };
 

@@ -14,7 +14,6 @@
 #include <quoin/light/scene_light.h>
 #include <quoin/scene/scene.h>
 
-
 namespace quoin {
 
 class LightRows;

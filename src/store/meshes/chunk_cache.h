@@ -12,7 +12,6 @@
 #include <quoin/grid/chunk.h>
 #include <quoin/store/world_store.h>
 
-
 namespace quoin::store {
 
 /// The chunks of a grid of a world, level 0, of which the last ones used are in memory.
