@@ -206,6 +206,67 @@ class Scenes(unittest.TestCase):
         with self.assertRaises(ZeroDivisionError), quoin.progress(lambda fraction: 1 / 0):
             scene.render(64, 64)
         self.assertEqual(scene.render(64, 64).shape, (64, 64, 3))
+        with self.assertRaises(quoin.QuoinError), quoin.progress(lambda fraction: np.bool_(fraction < 0.5)):
+            scene.render(64, 64)
+
+    def test_what_a_listener_raises_at_the_end_is_raised(self):
+        _, scene = self.scene()
+
+        def listen(fraction):
+            if fraction == 1:
+                raise ZeroDivisionError
+
+        with self.assertRaises(ZeroDivisionError), quoin.progress(listen):
+            scene.render(64, 64)
+        # What was raised belongs to its call, and to no later one.
+        answers = [KeyError("first")]
+
+        def once(fraction):
+            if answers:
+                raise answers.pop()
+
+        with quoin.progress(once):
+            with self.assertRaises(KeyError):
+                scene.render(64, 64)
+            with self.assertRaises(quoin.QuoinError):
+                quoin.load_bytes(b"VOX nothing")
+            scene.render(64, 64)
+
+    def test_progress_within_progress(self):
+        _, scene = self.scene()
+        outer, inner = [], []
+        with quoin.progress(outer.append):
+            with quoin.progress(inner.append):
+                scene.render(64, 64)
+            self.assertFalse(outer)
+            scene.render(64, 64)
+        self.assertEqual((outer[-1], inner[-1]), (1, 1))
+        count = len(outer)
+        scene.render(64, 64)
+        self.assertEqual(len(outer), count)
+
+    def test_a_listener_may_be_left_on_another_thread(self):
+        _, scene = self.scene()
+        told, pictures = [], []
+
+        def listening():
+            with quoin.progress(told.append):
+                yield
+
+        def first():
+            generator = listening()
+            next(generator)
+            thread = threading.Thread(target=generator.close)
+            thread.start()
+            thread.join()
+            del generator
+            gc.collect()
+            pictures.append(scene.render(64, 64))
+
+        thread = threading.Thread(target=first)  # which takes its listeners along
+        thread.start()
+        thread.join()
+        self.assertEqual((len(pictures), told), (1, []))
 
     def test_a_mesh_of_blocks_says_its_types(self):
         _, scene = self.scene()

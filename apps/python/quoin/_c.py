@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import os
-from typing import TYPE_CHECKING, Any, Optional, Sequence, Tuple
+import threading
+from typing import TYPE_CHECKING, Any, Callable, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -176,10 +177,50 @@ for _name in ("quoin_version", "quoin_last_error"):
     getattr(lib, _name).restype = ctypes.c_char_p
 
 
+class Listener:
+    """What the library calls while `progress` listens on a thread."""
+
+    def __init__(self, listener: Callable[[float], Any]) -> None:
+        self._listener = listener
+        self._raised: List[BaseException] = []
+        self.is_over = False
+        self.function = Progress(self._tell)
+
+    def _tell(self, fraction: float, _: Any) -> int:
+        if self._raised:  # it has asked for the end
+            return 0
+        if self.is_over:
+            return 1
+        try:
+            answer = self._listener(fraction)
+        except BaseException as error:
+            self._raised.append(error)
+            return 0
+        return 0 if isinstance(answer, (bool, np.bool_)) and not answer else 1
+
+    def raise_what_it_raised(self) -> None:
+        """Raises it, once."""
+        if self._raised:
+            raise self._raised.pop()
+
+
+class Listeners(threading.local):
+    """Those of one thread, the outermost first. The library knows the last one; they live as long as it may call them."""
+
+    def __init__(self) -> None:
+        self.all: List[Listener] = []
+
+
+listeners = Listeners()
+_CANCELLED = 7
+
+
 def check(status: int) -> None:
-    """Raises what a status says, with the library's words."""
+    """Raises what a status says, with the library's words; or what the listener raised that ended the call."""
     if status == 0:
         return
+    if status == _CANCELLED and listeners.all:
+        listeners.all[-1].raise_what_it_raised()
     error = QuoinError(lib.quoin_last_error().decode("utf-8", "replace"))
     error.status = status
     raise error
