@@ -159,7 +159,8 @@ def _keep(mesh, grid, looks, slots, options, made):
     if not options.keep_voxels or not grid.voxels:
         return
     if not kept.keep(mesh, grid, looks.types, options.scale, slots):
-        made.warnings.append(f"{mesh.name}: its voxels are too many to be kept in the .blend; export will voxelize it")
+        made.warnings.append(f"{mesh.name}: its voxels are too many, or too scattered, to be kept in the .blend; export "
+                             "will voxelize it")
 
 
 def _collections(scene, top):
