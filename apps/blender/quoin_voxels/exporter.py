@@ -16,7 +16,8 @@ class Exported:
         self.warnings = []
 
 
-_ANY_PLACE = {".json", ".quoin"}  # formats with grids of any turn, place and size; others have quarter turns and whole places
+# Formats with grids of any turn, place and size; others have quarter turns and whole places.
+_ANY_PLACE = {".json", ".quoin"}
 
 
 class _Writer:
@@ -47,10 +48,10 @@ class _Writer:
     def add_kept(self, source, matrix, name):
         """Places the voxels that a mesh carries."""
         mesh = source.data
-        key = (mesh.name_full, tuple(slot.material.name_full if slot.material else "" for slot in source.material_slots))
+        slots = [slot.material for slot in source.material_slots]
+        key = (mesh.name_full, tuple(one.name_full if one else "" for one in slots))
         if key not in self._grids:
             found = kept.Kept(mesh)
-            slots = [slot.material for slot in source.material_slots]
             types = [materials.edited(one, slots[slot]) if 0 <= slot < len(slots) else one
                      for one, slot in zip(found.types, found.slots)]
             self._warn_of_images(slots, {slot for slot in found.slots if slot >= 0}, name)
@@ -76,8 +77,8 @@ class _Writer:
                 self.made.warnings.append(f"{name}: what colours {material.name} is not read; its type stays as it was "
                                           "imported")
             elif materials.is_edited_palette(material):
-                self.made.warnings.append(f"{name}: the images of {material.name} were edited and are not read; its types "
-                                          "stay as they were imported")
+                self.made.warnings.append(f"{name}: the images of {material.name} were edited and are not read; its "
+                                          "types stay as they were imported")
 
     def add_voxelized(self, evaluated, world, name):
         """Voxelizes what an object looks like."""
@@ -119,8 +120,8 @@ class _Writer:
         self.made.voxelized += 1
 
     def _colour(self, mesh, slots, looks, numbers, name):
-        """The types of slots, and what the corners of triangles multiply them with, (n, 3, 4) in linear light; None where
-        that is nothing."""
+        """The types of slots, and what the corners of triangles multiply them with, (n, 3, 4) in linear light; None
+        where that is nothing."""
         types, colours = [one for one, _ in looks], None
         for slot, (one, node) in enumerate(looks):
             own = np.flatnonzero(numbers == slot)
@@ -133,8 +134,8 @@ class _Writer:
                 found = _texels_of(mesh, node, own)
                 found = None if found is None else materials.opaque(found)[:, None]
             if found is None:
-                self.made.warnings.append(f"{name}: what colours {slots[slot].name} is left out; its viewport colour stands "
-                                          "for it")
+                self.made.warnings.append(f"{name}: what colours {slots[slot].name} is left out; its viewport colour "
+                                          "stands for it")
                 continue
             if colours is None:
                 colours = np.ones((len(numbers), 3, 4), np.float32)
@@ -166,7 +167,8 @@ def _place_in(share, size):
 
 
 def _texels_of(mesh, node, triangles):
-    """The colours, sRGB bytes (n, 3), that a texture has in the middle of triangles; None where there is no such texture."""
+    """The colours, sRGB bytes (n, 3), that a texture has in the middle of triangles; None where there is no such
+    texture."""
     layer = mesh.uv_layers.active
     image = node.image if node.type == "TEX_IMAGE" else None
     if image is None or layer is None or not image.size[0]:
@@ -224,8 +226,8 @@ def export_file(context, path, options):
             if writer.can_place(matrix):
                 writer.add_kept(source, matrix, name)
                 continue
-            writer.made.warnings.append(f"{name}: {writer.ending} has no place for voxels that are turned or scaled so; it is "
-                                        "voxelized")
+            writer.made.warnings.append(f"{name}: {writer.ending} has no place for voxels that are turned or scaled "
+                                        "so; it is voxelized")
         writer.add_voxelized(evaluated, world, name)
     if writer.made.kept + writer.made.voxelized == 0:
         raise ValueError("There is nothing to export" + (": nothing is selected" if options.use_selection else ""))

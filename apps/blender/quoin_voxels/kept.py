@@ -33,8 +33,8 @@ def _slices(voxels):
 
 
 def keep(mesh, grid, types, scale, slots):
-    """Puts a grid's voxels into its mesh. `slots`: of types that have a material of their own, which. Returns False, and
-    does nothing, where the voxels are too many, or too scattered."""
+    """Puts a grid's voxels into its mesh. `slots`: of types that have a material of their own, which. Returns False,
+    and does nothing, where the voxels are too many, or too scattered."""
     cells = int(np.prod(grid.shape, dtype=np.int64))
     if cells > min(MOST_CELLS, max(FREE_CELLS, MOST_CELLS_A_VOXEL * grid.voxels)):
         return False

@@ -240,8 +240,8 @@ def has_attribute(node):
 
 
 def edited(one, material):
-    """A type as its material is now: what nobody changed stays to the last bit. One that is coloured by a texture, or was
-    a cloud, stays as it was."""
+    """A type as its material is now: what nobody changed stays to the last bit. One that is coloured by a texture, or
+    was a cloud, stays as it was."""
     now, node = seen(material)
     if node is not None or one.scattering > 0.0:
         return one

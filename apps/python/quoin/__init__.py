@@ -68,9 +68,9 @@ def png(picture: NdArray) -> bytes:
 
 @contextlib.contextmanager
 def progress(listener: Callable[[float], Any]) -> Iterator[None]:
-    """Tells `listener` how far the calls within, of this thread, have come, 0 to 1. It may be called from another thread,
-    and ends the call by returning False, or by raising: that call raises the same, or, where it was over already, the end of
-    the `with`. Within another `progress` the inner one listens, and after it the outer one again.
+    """Tells `listener` how far the calls within, of this thread, have come, 0 to 1. It may be called from another
+    thread, and ends the call by returning False, or by raising: that call raises the same, or, where it was over
+    already, the end of the `with`. Within another `progress` the inner one listens, and after it the outer one again.
 
     >>> told = []
     >>> with progress(told.append):
