@@ -49,6 +49,7 @@ struct KeptTracer {
 struct SceneBody {
   std::shared_mutex mutex;  // shared by those who read
   LoadedScene loaded;
+  std::vector<std::string> save_warnings;  // of the last save
   SceneNumbers numbers;
   KeptTracer kept;
 };

@@ -43,21 +43,14 @@ ArrayView view_of(const quoin_array& array) {
   return view;
 }
 
-// A colour of smooth meshes is linear light in 16 bits.
-std::uint8_t encoded(std::uint16_t linear) {
-  const double x = linear / 65535.0;
-  const double srgb = x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1.0 / 2.4) - 0.055;
-  return static_cast<std::uint8_t>(std::lround(255.0 * srgb));
-}
-
-// Colours of smooth vertices, which come in rows of few.
+// Colours, of linear light in 16 bits, of smooth vertices, which come in rows of few.
 class ColourEncoder {
  public:
   Rgba8 operator()(const LinearRgba16& colour) {
     if (colour != last_) {
       last_ = colour;
-      encoded_ = {encoded(colour[0]), encoded(colour[1]), encoded(colour[2]),
-                  static_cast<std::uint8_t>(colour[3] / 257)};
+      encoded_ = srgb_colour(Vec3(colour[0], colour[1], colour[2]) / 65535.0F);
+      encoded_.a = static_cast<std::uint8_t>(colour[3] / 257);
     }
     return encoded_;
   }

@@ -85,7 +85,10 @@ const char* put(const SceneBody& body, const quoin_instance& given, Instance& in
   }
   double length = 0.0;
   if (!is_similar(columns, length)) return "world_from_grid does not turn and scale alike along all axes";
-  instance.name = text_in(given.name);
+  // A name that is told back as it was told, cut off, stays whole.
+  char told[sizeof given.name];
+  copy_text(instance.name, told);
+  if (std::string name = text_in(given.name); name != told) instance.name = std::move(name);
   instance.grid = body.numbers.grids[given.grid];
   instance.visible = given.visible != 0;
   instance.group = given.group == 0 ? GroupHandle{} : body.numbers.groups[given.group - 1];

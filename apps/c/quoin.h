@@ -28,7 +28,8 @@ extern "C" {
 #define QUOIN_API
 #endif
 
-/* An empty struct of `type`: every number 0, which means its default. */
+/* An empty struct of `type`: every number 0, which means its default, but for three: of quoin_type alpha (0: nothing is
+ * to be seen of it) and roughness (0: a mirror), of quoin_instance visible (0: hidden). */
 #define QUOIN_INIT(type) \
   { .size = sizeof(type) }
 
@@ -210,7 +211,8 @@ typedef struct quoin_triangles {
   size_t vertex_count, triangle_count;
   const float* positions;    /* [vertex_count][3] */
   const uint32_t* indices;   /* [triangle_count][3], counter-clockwise from outside */
-  const float* colours;      /* [vertex_count][4], linear light and alpha, times the materials'; null: white */
+  const float* colours;      /* [vertex_count][4], linear light and alpha, times the materials'; null: white. Where
+                                alpha is 0 there is no surface, below 1 the voxels are transparent */
   const uint32_t* materials; /* [triangle_count], of `types`; null: 0 */
   const quoin_type* types;   /* [type_count], from the first on, each with its size; null: one, light grey */
   size_t type_count;
@@ -220,7 +222,8 @@ typedef struct quoin_voxelize_options {
   size_t size;
   double voxel_size; /* in the unit of positions; 0: 1 */
   int32_t fill;      /* quoin_fill */
-  int32_t max_types; /* colours that are told apart; 0: as many as there can be */
+  int32_t max_types; /* that are added: near colours are merged, also of types that differ in colour alone; 0: as many
+                        as there can be */
   int32_t threads;
 } quoin_voxelize_options;
 
@@ -268,7 +271,7 @@ QUOIN_API quoin_status quoin_format_count(size_t* out);
 QUOIN_API quoin_status quoin_format_get(size_t index, quoin_format* out);
 /* By the name's ending: .quoin, .json and .vox hold voxels; .glb, .gltf, .obj and .ply their meshes, of blocks. */
 QUOIN_API quoin_status quoin_scene_save(quoin_scene scene, const char* path);
-/* One line each, of what reading left out, and of the last save. */
+/* One line each: first of what reading left out, and voxelizing merged, then of what the last save left out. */
 QUOIN_API quoin_status quoin_scene_warning_count(quoin_scene scene, size_t* out);
 QUOIN_API quoin_status quoin_scene_warning(quoin_scene scene, size_t index, char* text, size_t capacity);
 

@@ -1,13 +1,16 @@
 // What the door tells of scenes: places, groups, cameras, lamps, types; and what it makes of triangles.
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -270,13 +273,130 @@ TEST(CTriangles, BecomeVoxelsWhereTheyAre) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
+// Two sheets at x = 0 and x = 4, of 8 x 8 voxels each, of two types.
+class TwoSheets : public testing::Test {
+ protected:
+  void SetUp() override {
+    for (const float x : {0.5F, 4.5F}) {
+      for (const auto& [y, z] : {std::pair{0.0F, 0.0F}, {8.0F, 0.0F}, {8.0F, 8.0F}, {0.0F, 8.0F}})
+        positions_.insert(positions_.end(), {x, y, z});
+    }
+    types_[0].rgba[0] = types_[1].rgba[0] = 100;
+    types_[1].rgba[0] = 104;
+    types_[0].rgba[3] = types_[1].rgba[3] = 255;
+    triangles_.vertex_count = 8;
+    triangles_.triangle_count = 4;
+    triangles_.positions = positions_.data();
+    triangles_.indices = indices_.data();
+    triangles_.materials = materials_.data();
+    triangles_.types = types_.data();
+    triangles_.type_count = types_.size();
+    ASSERT_EQ(quoin_scene_create(&scene_), QUOIN_OK);
+  }
+  void TearDown() override { EXPECT_EQ(quoin_free(scene_), QUOIN_OK); }
+
+  // The types that are added.
+  std::vector<quoin_type> added(int max_types = 0) {
+    auto options = sized<quoin_voxelize_options>();
+    options.fill = QUOIN_FILL_SURFACE;
+    options.max_types = max_types;
+    std::size_t before = 0;
+    std::size_t after = 0;
+    EXPECT_EQ(quoin_type_count(scene_, &before), QUOIN_OK);
+    EXPECT_EQ(quoin_grid_voxelize(scene_, &triangles_, &options, nullptr, nullptr), QUOIN_OK) << quoin_last_error();
+    EXPECT_EQ(quoin_type_count(scene_, &after), QUOIN_OK);
+    std::vector<quoin_type> found(after - before, sized<quoin_type>());
+    for (std::size_t i = before; i < after; ++i) EXPECT_EQ(quoin_type_get(scene_, i, &found[i - before]), QUOIN_OK);
+    return found;
+  }
+
+  std::vector<float> positions_;
+  const std::vector<std::uint32_t> indices_ = {0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7};
+  const std::vector<std::uint32_t> materials_ = {0, 0, 1, 1};
+  std::vector<quoin_type> types_ = std::vector<quoin_type>(2, sized<quoin_type>());
+  quoin_triangles triangles_ = sized<quoin_triangles>();
+  quoin_scene scene_ = 0;
+};
+
+TEST_F(TwoSheets, KeepAllOfTheirTypes) {
+  std::strcpy(types_[0].name, "ice");
+  types_[0].transparent = 1;
+  types_[0].ior = 1.31F;
+  std::strcpy(types_[1].name, "cloud");
+  types_[1].rgba[3] = 90;
+  types_[1].scattering = 0.5F;
+  types_[1].anisotropy = 0.25F;
+  const auto found = added();
+  ASSERT_EQ(found.size(), 2U);
+  const bool is_first = std::string(found[0].name) == "ice";
+  const quoin_type& ice = found[is_first ? 0 : 1];
+  const quoin_type& cloud = found[is_first ? 1 : 0];
+  EXPECT_STREQ(ice.name, "ice");
+  EXPECT_TRUE(ice.transparent == 1 && ice.ior == 1.31F && ice.rgba[3] == 255 && ice.rgba[0] == 100);
+  EXPECT_STREQ(cloud.name, "cloud");
+  EXPECT_TRUE(cloud.transparent == 1 && cloud.scattering == 0.5F && cloud.anisotropy == 0.25F && cloud.rgba[3] == 90);
+}
+
+TEST_F(TwoSheets, MergeTypesThatDifferInColourAlone) {
+  auto found = added();
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(std::max(found[0].rgba[0], found[1].rgba[0]), 104);
+  EXPECT_EQ(std::min(found[0].rgba[0], found[1].rgba[0]), 100);
+  found = added(1);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].rgba[0], 102);
+  std::size_t warnings = 0;
+  ASSERT_EQ(quoin_scene_warning_count(scene_, &warnings), QUOIN_OK);
+  EXPECT_EQ(warnings, 1U);
+  // A save does not take away what was said before it, nor say it twice.
+  ASSERT_EQ(quoin_scene_save(scene_, "c_test_sheets.json"), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_scene_save(scene_, "c_test_sheets.glb"), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_scene_warning_count(scene_, &warnings), QUOIN_OK);
+  EXPECT_EQ(warnings, 1U);
+}
+
+TEST_F(TwoSheets, HaveTheAlphaOfTheirColours) {
+  std::vector<float> colours;
+  for (int corner = 0; corner < 8; ++corner)
+    colours.insert(colours.end(), {1.0F, 1.0F, 1.0F, corner < 4 ? 0.0F : 0.5F});
+  triangles_.colours = colours.data();
+  const auto found = added();
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_TRUE(found[0].rgba[3] == 128 && found[0].rgba[0] == 104 && found[0].transparent == 1);
+}
+
+TEST_F(SceneOfARow, AnInstanceKeepsALongName) {
+  const std::string name(300, 'n');
+  const std::string path = "c_test_name.json";
+  std::ofstream(path) << R"({"quoin_scene": 4, "grids": [{"voxels": []}], "instances": [{"grid": 0, "name": ")" << name
+                      << R"("}]})";
+  quoin_scene scene = 0;
+  ASSERT_EQ(quoin_scene_load(path.c_str(), &scene), QUOIN_OK) << quoin_last_error();
+  auto place = sized<quoin_instance>();
+  ASSERT_EQ(quoin_instance_get(scene, 0, &place), QUOIN_OK);
+  const std::array<double, 12> moved = {1, 0, 0, 5, 0, 1, 0, 0, 0, 0, 1, 0};
+  std::memcpy(place.world_from_grid, moved.data(), sizeof moved);
+  const auto saved = [&] {
+    EXPECT_EQ(quoin_instance_set(scene, 0, &place), QUOIN_OK) << quoin_last_error();
+    EXPECT_EQ(quoin_scene_save(scene, path.c_str()), QUOIN_OK) << quoin_last_error();
+    std::ifstream file(path);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  EXPECT_NE(saved().find(name), std::string::npos);
+  std::strcpy(place.name, "short");
+  EXPECT_EQ(saved().find("nnn"), std::string::npos);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+}
+
 struct Listener {
   std::atomic<int> calls = 0;
   int stop_at = -1;
+  double last = 0.0;  // of the call
 };
 std::int32_t listen(double fraction, void* user) {
   auto* listener = static_cast<Listener*>(user);
-  EXPECT_TRUE(fraction >= 0.0 && fraction <= 1.0);
+  EXPECT_TRUE(fraction >= listener->last && fraction <= 1.0) << fraction << " after " << listener->last;
+  listener->last = fraction;
   return ++listener->calls == listener->stop_at ? 0 : 1;
 }
 
@@ -295,11 +415,39 @@ TEST_F(SceneOfARow, ProgressIsToldAndMayEndAWork) {
   })
       .join();
   EXPECT_EQ(listener.calls, calls);
+  listener.last = 0.0;
   listener.stop_at = calls + 2;
   EXPECT_EQ(quoin_scene_render(scene_, &options, picture.data(), picture.size()), QUOIN_CANCELLED);
   ASSERT_EQ(quoin_set_progress(nullptr, nullptr), QUOIN_OK);
   EXPECT_EQ(quoin_scene_render(scene_, &options, picture.data(), picture.size()), QUOIN_OK);
   EXPECT_EQ(listener.calls, calls + 2);
+}
+
+TEST_F(SceneOfARow, ProgressOfSavingAndAddingNeverFalls) {
+  Listener listener;
+  const std::vector<std::uint16_t> voxels(std::size_t{200} * 80 * 80, 1);
+  auto array = sized<quoin_array>();
+  array.data = voxels.data();
+  array.scalar = QUOIN_UINT16;
+  array.shape[0] = 200;
+  array.shape[1] = array.shape[2] = 80;
+  array.strides[0] = std::int64_t{2} * 80 * 80;
+  array.strides[1] = 2 * 80;
+  array.strides[2] = 2;
+  ASSERT_EQ(quoin_set_progress(listen, &listener), QUOIN_OK);
+  ASSERT_EQ(quoin_grid_add(scene_, &array, "wall", nullptr), QUOIN_OK) << quoin_last_error();
+  EXPECT_GT(listener.calls, 2);
+  EXPECT_EQ(listener.last, 1.0);
+  listener.last = 0.0;
+  EXPECT_EQ(quoin_scene_save(scene_, "c_test_wall.glb"), QUOIN_OK) << quoin_last_error();
+  EXPECT_EQ(listener.last, 1.0);
+  listener.last = 0.0;
+  listener.stop_at = listener.calls + 2;
+  EXPECT_EQ(quoin_grid_add(scene_, &array, "wall", nullptr), QUOIN_CANCELLED);
+  std::size_t count = 0;
+  EXPECT_EQ(quoin_grid_count(scene_, &count), QUOIN_OK);
+  EXPECT_EQ(count, 2U);
+  EXPECT_EQ(quoin_set_progress(nullptr, nullptr), QUOIN_OK);
 }
 
 // What the header says of threads: those that read, and one that changes, need no lock of their own.

@@ -62,31 +62,49 @@ quoin_status add_grid(SceneBody& scene, const quoin_array& array, const char* na
   const IVec3 size(array.shape[0], array.shape[1], array.shape[2]);
   const std::size_t types = scene.loaded.scene.types.size();
   bool is_known = true;
+  bool is_wanted = true;
   SceneGrid placed;
   placed.name = name == nullptr ? "" : name;
-  placed.grid.edit_rows({IVec3(0), size}, [&](IVec3 first, std::span<VoxelType> row) {
-    for (VoxelType& type : row) {
-      type = type_at(array, first.x++, first.y, first.z);
-      is_known = is_known && type < types;
-    }
-  });
+  const Progress told = progress();
+  placed.grid.edit_rows(
+      {IVec3(0), size},
+      [&](IVec3 first, std::span<VoxelType> row) {
+        if (!is_known) return;
+        for (VoxelType& type : row) {
+          type = type_at(array, first.x++, first.y, first.z);
+          is_known = is_known && type < types;
+        }
+      },
+      [&](double fraction) {
+        is_wanted = is_wanted && (!told || told(fraction));
+        return is_wanted && is_known;
+      });
+  if (!is_wanted) return fail(QUOIN_CANCELLED, "cancelled");
   if (!is_known) return fail(QUOIN_INVALID_ARGUMENT, "the array has a type that the scene has not");
   place(scene, std::move(placed), floor(DVec3(array.origin[0], array.origin[1], array.origin[2])), out);
   return QUOIN_OK;
 }
 
+// A listener for a share of a call's work.
+Progress share_of(const Progress& whole, double begin, double end) {
+  if (!whole) return {};
+  return [whole, begin, end](double fraction) { return whole(begin + fraction * (end - begin)); };
+}
+
 quoin_status save(SceneBody& scene, const char* path) {
+  scene.save_warnings.clear();
   const auto format = format_for_writing(path);
   if (!format) return fail(format.error());
   if (!format->is_mesh) {
     auto saved = save_scene(scene.loaded, path, {}, progress());
     if (!saved) return fail(saved.error());
-    scene.loaded.warnings = std::move(saved->warnings);
+    scene.save_warnings = std::move(saved->warnings);
     return QUOIN_OK;
   }
-  const auto meshes = mesh_scene(scene.loaded.scene, {}, {}, progress());
+  constexpr double kMeshed = 0.5;
+  const auto meshes = mesh_scene(scene.loaded.scene, {}, {}, share_of(progress(), 0.0, kMeshed));
   if (!meshes) return fail(meshes.error());
-  const auto written = write_mesh(*meshes, path, {}, progress());
+  const auto written = write_mesh(*meshes, path, {}, share_of(progress(), kMeshed, 1.0));
   return written ? QUOIN_OK : fail(written.error());
 }
 
@@ -254,14 +272,16 @@ quoin_status quoin_scene_save(quoin_scene scene, const char* path) {
 }
 
 quoin_status quoin_scene_warning_count(quoin_scene scene, std::size_t* out) {
-  return tell_count(scene, out, [](SceneBody& body) { return body.loaded.warnings.size(); });
+  return tell_count(scene, out,
+                    [](SceneBody& body) { return body.loaded.warnings.size() + body.save_warnings.size(); });
 }
 
 quoin_status quoin_scene_warning(quoin_scene scene, std::size_t index, char* text, std::size_t capacity) {
   return with_scene(scene, Use::Read, [&](SceneBody& body) {
     if (text == nullptr || capacity == 0) return fail(QUOIN_INVALID_ARGUMENT, "there is no room for a text");
-    if (index >= body.loaded.warnings.size()) return fail(QUOIN_INVALID_ARGUMENT, "no warning has this number");
-    copy_text(body.loaded.warnings[index], text, capacity);
+    const std::size_t made = body.loaded.warnings.size();
+    if (index >= made + body.save_warnings.size()) return fail(QUOIN_INVALID_ARGUMENT, "no warning has this number");
+    copy_text(index < made ? body.loaded.warnings[index] : body.save_warnings[index - made], text, capacity);
     return QUOIN_OK;
   });
 }

@@ -1,7 +1,10 @@
 // Triangles that become voxels.
 
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <string>
+#include <unordered_map>
 
 #include <quoin/voxelize/voxelize.h>
 
@@ -10,21 +13,61 @@
 namespace quoin::c {
 namespace {
 
-float linear(std::uint8_t srgb) {
-  const float x = static_cast<float>(srgb) / 255.0F;
-  return x <= 0.04045F ? x / 12.92F : std::pow((x + 0.055F) / 1.055F, 2.4F);
+glm::vec4 light_of(const VoxelProperties& type) {
+  return {linear_colour(type.colour), static_cast<float>(type.colour.a) / 255.0F};
 }
 
-MeshMaterial material_of(const quoin_type& type) {
+// Types that are given, those that differ in colour alone as one look: so that near colours of it can be merged.
+struct Given {
+  std::vector<VoxelProperties> looks;  // their colour, and whether that is transparent, are of the first
+  std::vector<std::size_t> look_of;    // of each type
+  std::vector<glm::vec4> light;        // of each type
+  std::vector<bool> is_clear;          // of each look: transparent whatever the alpha
+  std::unordered_map<std::string, std::size_t> by_key;  // looks, by all that is told of them
+
+  [[nodiscard]] bool has_shared_looks() const { return looks.size() < look_of.size(); }
+};
+
+void add(Given& given, const quoin_type& type) {
+  VoxelProperties look = properties_of(type);
+  given.light.push_back(light_of(look));
+  const bool is_clear = type.transparent != 0;
+  std::string key = look.name;
+  for (const float value : {look.emission, look.metalness, look.roughness, look.ior, look.scattering, look.anisotropy,
+                            is_clear ? 1.0F : 0.0F})
+    key.append(1, '\0').append(std::to_string(std::bit_cast<std::uint32_t>(value)));
+  const auto [known, is_new] = given.by_key.try_emplace(std::move(key), given.looks.size());
+  if (is_new) {
+    given.looks.push_back(std::move(look));
+    given.is_clear.push_back(is_clear);
+  }
+  given.look_of.push_back(known->second);
+}
+
+// What is told of a material's look goes through voxelization by its number, as its name.
+MeshMaterial material_of(const VoxelProperties& look, std::size_t number, glm::vec4 light, bool is_blended) {
   MeshMaterial material;
-  material.name = text_in(type.name);
-  material.colour = {linear(type.rgba[0]), linear(type.rgba[1]), linear(type.rgba[2]),
-                     static_cast<float>(type.rgba[3]) / 255.0F};
-  if (type.rgba[3] < 255) material.alpha_mode = AlphaMode::Blend;
-  material.roughness = type.roughness;
-  material.metalness = type.metalness;
-  material.emission = type.emission;
+  material.name = std::to_string(number);
+  material.colour = light;
+  if (is_blended) material.alpha_mode = AlphaMode::Blend;
+  material.roughness = look.roughness;
+  material.metalness = look.metalness;
+  material.emission = look.emission;
   return material;
+}
+
+// Types that were added, from `first` on, become what their look says beyond materials.
+void finish_types(VoxelRegistry& types, std::size_t first, const Given& given) {
+  for (std::size_t i = first; i < types.size(); ++i) {
+    const auto number = static_cast<VoxelType>(i);
+    const VoxelProperties& made = types[number];
+    if (made.name.empty()) continue;  // of what is deep within, of no material
+    const std::size_t look = std::stoull(made.name);
+    VoxelProperties whole = given.looks[look];
+    whole.colour = made.colour;
+    whole.visibility = given.is_clear[look] ? Visibility::Transparent : made.visibility;
+    types.replace(number, std::move(whole));
+  }
 }
 
 const char* wrong_triangles(const quoin_triangles& given) {
@@ -37,7 +80,41 @@ const char* wrong_triangles(const quoin_triangles& given) {
   return nullptr;
 }
 
-// Positions in units of a voxel, so that those of the scene and of the lattice are the same.
+// The types, each with a size of its own, which says where the next one lies.
+Result<Given> types_of(const quoin_triangles& triangles) {
+  Given given;
+  const auto* at = reinterpret_cast<const std::byte*>(triangles.types);
+  for (std::size_t i = 0; i < triangles.type_count; ++i) {
+    const auto type = taken(reinterpret_cast<const quoin_type*>(at));
+    if (!type) return make_error(ErrorCode::InvalidArgument, "the size of a type");
+    if (const char* wrong = what_is_wrong(*type)) return make_error(ErrorCode::InvalidArgument, wrong);
+    add(given, *type);
+    at += type->size;
+  }
+  return given;
+}
+
+// Gives each corner a vertex, and that the colour of its triangle's type.
+Result<TriangleMesh> with_coloured_corners(const TriangleMesh& mesh, const Given& given) {
+  TriangleMesh apart;
+  if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max() / 3)
+    return make_error(ErrorCode::LimitExceeded, "more than 2^32 corners, which types have colours for");
+  apart.positions.reserve(3 * mesh.triangles.size());
+  apart.colours.reserve(3 * mesh.triangles.size());
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const std::size_t type = mesh.material_of.empty() ? 0 : mesh.material_of[i];
+    for (const std::uint32_t corner : mesh.triangles[i]) {
+      apart.positions.push_back(mesh.positions[corner]);
+      apart.colours.push_back(given.light[type] * (mesh.colours.empty() ? glm::vec4(1.0F) : mesh.colours[corner]));
+    }
+    const auto first = static_cast<std::uint32_t>(3 * i);
+    apart.triangles.push_back({first, first + 1, first + 2});
+  }
+  return apart;
+}
+
+// Positions in units of a voxel, so that those of the scene and of the lattice are the same. Materials are those of
+// types; `with_materials` makes them those of looks.
 Result<TriangleMesh> mesh_of(const quoin_triangles& given, double voxel_size) {
   TriangleMesh mesh;
   mesh.positions.reserve(given.vertex_count);
@@ -53,15 +130,6 @@ Result<TriangleMesh> mesh_of(const quoin_triangles& given, double voxel_size) {
     const std::uint32_t* at = given.indices + 3 * i;
     mesh.triangles.push_back({at[0], at[1], at[2]});
   }
-  // Each has a size of its own, which says where the next one lies.
-  const auto* at = reinterpret_cast<const std::byte*>(given.types);
-  for (std::size_t i = 0; i < given.type_count; ++i) {
-    const auto type = taken(reinterpret_cast<const quoin_type*>(at));
-    if (!type) return make_error(ErrorCode::InvalidArgument, "the size of a type");
-    if (const char* wrong = what_is_wrong(*type)) return make_error(ErrorCode::InvalidArgument, wrong);
-    mesh.materials.push_back(material_of(*type));
-    at += type->size;
-  }
   if (given.materials == nullptr) return mesh;
   const std::size_t materials = std::max(given.type_count, std::size_t{1});
   mesh.material_of.assign(given.materials, given.materials + given.triangle_count);
@@ -71,11 +139,45 @@ Result<TriangleMesh> mesh_of(const quoin_triangles& given, double voxel_size) {
   return mesh;
 }
 
+Result<TriangleMesh> with_materials(TriangleMesh mesh, const Given& given) {
+  if (given.looks.empty()) {
+    if (!mesh.colours.empty()) mesh.materials.push_back({.alpha_mode = AlphaMode::Blend});
+    return mesh;
+  }
+  const bool is_shared = given.has_shared_looks();
+  const bool is_blended = !mesh.colours.empty();
+  std::vector<bool> has_alpha(given.looks.size(), is_blended);
+  for (std::size_t i = 0; i < given.light.size(); ++i) {
+    if (given.light[i].a < 1.0F) has_alpha[given.look_of[i]] = true;
+  }
+  std::vector<MeshMaterial> materials;
+  for (std::size_t i = 0; i < given.looks.size(); ++i) {
+    // Where looks are shared the corners have the colours; else there is a look a type, in the same order.
+    const glm::vec4 light = is_shared ? glm::vec4(1.0F) : given.light[i];
+    materials.push_back(material_of(given.looks[i], i, light, has_alpha[i]));
+  }
+  if (is_shared) {
+    auto apart = with_coloured_corners(mesh, given);
+    if (!apart) return apart.error();
+    apart->material_of = std::move(mesh.material_of);
+    mesh = std::move(*apart);
+    for (std::uint32_t& material : mesh.material_of) material = static_cast<std::uint32_t>(given.look_of[material]);
+  }
+  mesh.materials = std::move(materials);
+  return mesh;
+}
+
 quoin_status voxelize_into(SceneBody& scene, const quoin_triangles& given, const quoin_voxelize_options& options,
                            const char* name, std::size_t* out) {
-  const auto mesh = mesh_of(given, options.voxel_size == 0.0 ? 1.0 : options.voxel_size);
+  const auto looks = types_of(given);
+  if (!looks) return fail(looks.error());
+  auto soup = mesh_of(given, options.voxel_size == 0.0 ? 1.0 : options.voxel_size);
+  if (!soup) return fail(soup.error());
+  if (given.type_count > 0) soup->materials.resize(given.type_count);  // to be checked as they were given
+  if (const Status sound = check_mesh(*soup); !sound) return fail(sound.error());
+  soup->materials.clear();
+  const auto mesh = with_materials(std::move(*soup), *looks);
   if (!mesh) return fail(mesh.error());
-  if (const Status sound = check_mesh(*mesh); !sound) return fail(sound.error());
   const auto lattice = lattice_of_voxel(*mesh, 1.0);
   if (!lattice) return fail(lattice.error());
   VoxelizeOptions wanted;
@@ -86,6 +188,7 @@ quoin_status voxelize_into(SceneBody& scene, const quoin_triangles& given, const
   VoxelRegistry types = scene.loaded.scene.types;  // which stay as they are where this fails
   auto made = voxelize(*mesh, wanted, types, threads_of(options.threads), progress());
   if (!made) return fail(made.error());
+  finish_types(types, scene.loaded.scene.types.size(), *looks);
   scene.loaded.scene.types = std::move(types);
   for (std::string& warning : made->warnings) scene.loaded.warnings.push_back(std::move(warning));
   SceneGrid grid;

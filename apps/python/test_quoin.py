@@ -1,4 +1,5 @@
-"""Tests of the package, with nothing but NumPy: `python3 test_quoin.py`. They are skipped (77) where that is missing."""
+"""Tests of the package, with nothing but NumPy: `python3 test_quoin.py`. They are skipped (77) where that is
+missing."""
 
 import contextlib
 import ctypes
@@ -129,6 +130,17 @@ class Scenes(unittest.TestCase):
         self.assertTrue((box[1:11, 1:7, 1:9] == array).all())
         self.assertEqual(int(box.astype(bool).sum()), int(array.astype(bool).sum()))
 
+    def test_types_and_bytes_are_taken_as_they_come(self):
+        array, scene = self.scene()
+        ink = scene.add_type(quoin.VoxelType((1, 2, 3), "ink"))
+        self.assertEqual(scene.types[ink].rgba, (1, 2, 3, 255))
+        with tempfile.TemporaryDirectory() as folder:
+            scene.save(f"{folder}/house.json")
+            with open(f"{folder}/house.json", "rb") as file:
+                data = file.read()
+        for one in (data, bytearray(data), memoryview(data), np.frombuffer(data, np.uint8)):
+            self.assertTrue((quoin.load_bytes(one).grids[0].to_numpy() == array[:, :5]).all())
+
     def test_pictures_are_put_into_arrays(self):
         _, scene = self.scene()
         out = np.zeros((40, 60, 3), np.uint8)
@@ -168,7 +180,8 @@ class Scenes(unittest.TestCase):
 
     def test_scene_files_say_what_else_they_hold(self):
         scene = quoin.load_bytes(b"""{"quoin_scene": 4, "grids": [{"voxels": []}], "layers": [{"name": "upper"}],
-            "groups": [{"name": "house"}, {"name": "room", "parent": 0}], "instances": [{"grid": 0, "group": 1, "layer": 0}],
+            "groups": [{"name": "house"}, {"name": "room", "parent": 0}],
+            "instances": [{"grid": 0, "group": 1, "layer": 0}],
             "lamps": [{"position": [1, 2, 3], "intensity": 5}], "sun": [0, 1, 0],
             "camera": {"position": [0, 0, 50], "look_at": [0, 0, 0], "fov": 40}}""")
         self.assertEqual(scene.groups[scene.instances[0].group], quoin.Group("room", 0, True, ""))
@@ -206,6 +219,67 @@ class Scenes(unittest.TestCase):
         with self.assertRaises(ZeroDivisionError), quoin.progress(lambda fraction: 1 / 0):
             scene.render(64, 64)
         self.assertEqual(scene.render(64, 64).shape, (64, 64, 3))
+        with self.assertRaises(quoin.QuoinError), quoin.progress(lambda fraction: np.bool_(fraction < 0.5)):
+            scene.render(64, 64)
+
+    def test_what_a_listener_raises_at_the_end_is_raised(self):
+        _, scene = self.scene()
+
+        def listen(fraction):
+            if fraction == 1:
+                raise ZeroDivisionError
+
+        with self.assertRaises(ZeroDivisionError), quoin.progress(listen):
+            scene.render(64, 64)
+        # What was raised belongs to its call, and to no later one.
+        answers = [KeyError("first")]
+
+        def once(fraction):
+            if answers:
+                raise answers.pop()
+
+        with quoin.progress(once):
+            with self.assertRaises(KeyError):
+                scene.render(64, 64)
+            with self.assertRaises(quoin.QuoinError):
+                quoin.load_bytes(b"VOX nothing")
+            scene.render(64, 64)
+
+    def test_progress_within_progress(self):
+        _, scene = self.scene()
+        outer, inner = [], []
+        with quoin.progress(outer.append):
+            with quoin.progress(inner.append):
+                scene.render(64, 64)
+            self.assertFalse(outer)
+            scene.render(64, 64)
+        self.assertEqual((outer[-1], inner[-1]), (1, 1))
+        count = len(outer)
+        scene.render(64, 64)
+        self.assertEqual(len(outer), count)
+
+    def test_a_listener_may_be_left_on_another_thread(self):
+        _, scene = self.scene()
+        told, pictures = [], []
+
+        def listening():
+            with quoin.progress(told.append):
+                yield
+
+        def first():
+            generator = listening()
+            next(generator)
+            thread = threading.Thread(target=generator.close)
+            thread.start()
+            thread.join()
+            del generator
+            gc.collect()
+            pictures.append(scene.render(64, 64))
+
+        thread = threading.Thread(target=first)  # which takes its listeners along
+        thread.start()
+        thread.join()
+        self.assertEqual((len(pictures), told), (1, []))
 
     def test_a_mesh_of_blocks_says_its_types(self):
         _, scene = self.scene()
@@ -237,7 +311,8 @@ class Pages(unittest.TestCase):
                 Scenes().scene()[1].save("castle.vox")
                 for block in blocks:
                     # trimesh is the one package that is not asked for; and pictures need not be as large.
-                    block = "\n".join(line for line in block.split("\n") if "to_trimesh" not in line).replace("960, 540", "96, 54")
+                    block = "\n".join(line for line in block.split("\n") if "to_trimesh" not in line)
+                    block = block.replace("960, 540", "96, 54")
                     with contextlib.redirect_stdout(io.StringIO()):
                         exec(compile(block, name, "exec"), names)
             finally:
@@ -271,7 +346,7 @@ class Pages(unittest.TestCase):
 class BadInput(unittest.TestCase):
     def test_is_told_and_never_a_crash(self):
         array, nan = np.zeros((4, 4, 4), np.uint8), float("nan")
-        scene = quoin.Scene()
+        scene, full = quoin.Scene(), quoin.from_numpy(array + 1, [(1, 2, 3)])
         for wrong, error in [
             (lambda: quoin.surface_nets(array[0], 0.5), ValueError),
             (lambda: quoin.surface_nets(array[:0], 0.5), ValueError),
@@ -308,6 +383,30 @@ class BadInput(unittest.TestCase):
             (lambda: quoin.load("x.vox", frame=-1), quoin.QuoinError),
             (lambda: quoin.load("x.obj", size=3, voxel_size=2.0), quoin.QuoinError),
             (lambda: quoin.png(np.zeros((2, 2), np.uint8)), ValueError),
+            # What would be cut off on its way to C.
+            (lambda: full.grids[0].to_numpy((2**32, 0, 0), (1, 1, 1)), ValueError),
+            (lambda: full.grids[0].to_numpy((0.5, 0, 0), (1, 1, 1)), TypeError),
+            (lambda: full.render(8, 8, samples=2**32 + 1), ValueError),
+            (lambda: full.render(8, 8, samples=1.5), TypeError),
+            (lambda: full.render(8, 2**32 + 8), ValueError),
+            (lambda: full.render(8, 8, out=[0] * 192), TypeError),
+            (lambda: full.move(2**64, np.eye(4)), ValueError),
+            (lambda: quoin.mesh_labels(array, background=2**64), ValueError),
+            (lambda: scene.voxelize([[0, 0, 0]] * 3, [[0, 1, -1]]), ValueError),
+            (lambda: scene.voxelize([[0, 0, 0]] * 3, [[0, 1, 2**32]]), ValueError),
+            (lambda: scene.voxelize([[0, 0, 0]] * 3, [[0, 1, 1.5]]), TypeError),
+            (lambda: scene.voxelize([[0, 0, 0]] * 3, [[0, 1, 2]], materials=[0.0]), TypeError),
+            (lambda: scene.place(full.grids[0], np.eye(4)), ValueError),
+            (lambda: scene.add(array + 1, name="a\0b"), ValueError),
+            (lambda: full.place(full.grids[0], np.eye(4), "a\0b"), ValueError),
+            (lambda: full.place(full.grids[0], np.eye(4), 5), TypeError),
+            (lambda: scene.add_type(quoin.VoxelType((1, 2, 3, 4), "a\0b")), ValueError),
+            (lambda: scene.add_type((0.5, 0.5, 0.5)), TypeError),
+            (lambda: full.save("a\0b.vox"), ValueError),
+            (lambda: quoin.load("a\0b.vox"), ValueError),
+            (lambda: quoin.load("a.vox", frame=2**32), ValueError),
+            (lambda: quoin.load_bytes("VOX "), TypeError),
+            (lambda: quoin.load_bytes(b""), quoin.QuoinError),
         ]:
             with self.assertRaises(error):
                 wrong()

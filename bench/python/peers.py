@@ -1,7 +1,7 @@
 """Quoin beside what else Python programmers use, in one process. Usage: peers.py [FILE.vox] [--edge N] [--turns N]
 
-Runs what is installed of scikit-image, zmesh, trimesh and py-vox-io, and says what is not. Each pair is checked to do the
-same before it is timed: times are the least of some turns, by turns. `numpy`, and `quoin` on the path, are needed.
+Runs what is installed of scikit-image, zmesh, trimesh and py-vox-io, and says what is not. Each pair is checked to do
+the same before it is timed: times are the least of some turns, by turns. `numpy`, and `quoin` on the path, are needed.
 """
 
 import argparse
@@ -156,7 +156,8 @@ def main():
     given = options.parse_args()
     names = {"skimage": "scikit-image", "zmesh": "zmesh", "trimesh": "trimesh", "pyvox": "py-vox-io"}
     missing = [shown for name, shown in names.items() if package(name) is None]
-    print(f"Quoin {quoin.version()}, NumPy {np.__version__}, Python {platform.python_version()}, {os.cpu_count()} processors")
+    print(f"Quoin {quoin.version()}, NumPy {np.__version__}, Python {platform.python_version()}, "
+          f"{os.cpu_count()} processors")
     print("not installed: " + ", ".join(missing) if missing else "all peers are installed")
     pairs = [*surfaces(given.edge), *labels(given.edge // 2), *files(given.file), *blocks(given.edge)]
     if not pairs:

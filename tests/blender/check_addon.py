@@ -110,11 +110,13 @@ def check_castle(quoin, path, folder):
 
 
 def check_mesh(mesh, wanted):
-    """Faces are whole voxels, look outwards and have their types' colours and their occlusion, as the library has them."""
+    """Faces are whole voxels, look outwards and have their types' colours and their occlusion, as the library has
+    them."""
     values = np.empty(len(mesh.vertices) * 4, np.float32)
     mesh.color_attributes["Occlusion"].data.foreach_get("color", values)
-    require(set(np.round(np.unique(values), 4)) <= {0.25, 0.5, 0.75, 1.0}, f"{mesh.name}: occlusion {np.unique(values)}")
-    require(len(np.unique(values)) > 1, f"{mesh.name} has no occlusion")
+    found = np.unique(values)
+    require(set(np.round(found, 4)) <= {0.25, 0.5, 0.75, 1.0}, f"{mesh.name}: occlusion {found}")
+    require(len(found) > 1, f"{mesh.name} has no occlusion")
     points = np.empty((len(mesh.vertices), 3), np.float32)
     mesh.vertices.foreach_get("co", points.ravel())
     points = points.astype(float)
@@ -133,7 +135,8 @@ def check_mesh(mesh, wanted):
     light = wanted.colours[::4, :3] / 255.0
     light = np.where(light <= 0.04045, light / 12.92, ((light + 0.055) / 1.055) ** 2.4)
     require(np.allclose(colours, light, atol=1e-5), f"{mesh.name}: faces have other colours")
-    require((areas > 0.0099).all() and np.allclose(a + c, b + d, atol=1e-5), f"{mesh.name}: faces that are no rectangles")
+    require((areas > 0.0099).all() and np.allclose(a + c, b + d, atol=1e-5),
+            f"{mesh.name}: faces that are no rectangles")
 
 
 def check_file(quoin, folder):
@@ -161,7 +164,8 @@ def check_file(quoin, folder):
         require(np.allclose(forward, (0, 1, 0), atol=1e-6), f"a camera looks along {forward}")
         require(abs(math.degrees(camera.data.angle_y) - 40) < 1e-3, "a camera's angle")
         lamp = bpy.data.objects["torch"]
-        require(lamp.data.type == "SPOT" and np.allclose(lamp.matrix_world.translation, (0.5, -1.5, 1)), "a lamp's place")
+        require(lamp.data.type == "SPOT" and np.allclose(lamp.matrix_world.translation, (0.5, -1.5, 1)),
+                "a lamp's place")
         require(abs(lamp.data.energy - 5 * 4 * math.pi**2 * 0.25) < 1e-3, "a lamp's power")
         # Two that stand at right angles keep their voxels, the third is voxelized.
         run(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "turned.vox"), scale=0.5, fill="solid")
@@ -171,16 +175,19 @@ def check_file(quoin, folder):
         require(colours(again) == colours(quoin.load(path)), f"{look}: colours {colours(again)}")
         run(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "turned.json"), scale=0.5)
         turned = quoin.load(os.path.join(folder, "turned.json"))
-        require(len(turned.grids) == 1 and np.array_equal(points_of(turned), points_of(quoin.load(path))), "turned.json")
+        require(len(turned.grids) == 1 and np.array_equal(points_of(turned), points_of(quoin.load(path))),
+                "turned.json")
     empty()
     run(bpy.ops.import_scene.quoin, filepath=path, materials="TYPES")
     shader = lambda name: next(n for n in bpy.data.materials[name].node_tree.nodes if n.type == "BSDF_PRINCIPLED")
     value = lambda name, old, new=None: (shader(name).inputs.get(old) or shader(name).inputs[new]).default_value
     require(value("gold", "Metallic") == 1 and abs(value("gold", "Roughness") - 0.25) < 1e-6, "gold")
-    require(abs(value("glass", "Transmission", "Transmission Weight") - (1 - 90 / 255)) < 1e-6, "glass lets light through")
+    require(abs(value("glass", "Transmission", "Transmission Weight") - (1 - 90 / 255)) < 1e-6,
+            "glass lets light through")
     require(abs(value("glass", "IOR") - 1.33) < 1e-6, "glass refracts")
     require(value("lamp", "Emission Strength") == 8, "a lamp shines")
-    require(abs(bpy.data.materials["gold"].diffuse_color[0] - ((250 / 255 + 0.055) / 1.055) ** 2.4) < 1e-5, "gold's colour")
+    require(abs(bpy.data.materials["gold"].diffuse_color[0] - ((250 / 255 + 0.055) / 1.055) ** 2.4) < 1e-5,
+            "gold's colour")
     # What is edited in Blender is what is written.
     group = next(n for n in bpy.data.materials["gold"].node_tree.nodes if n.type == "GROUP")
     group.inputs[0].default_value = (0, 0, 1, 1)
@@ -216,6 +223,175 @@ def check_voxelized(quoin, folder):
         vertex.co *= 2
     run(bpy.ops.export_scene.quoin, filepath=path, fill="solid")
     require(len(points_of(quoin.load(path))) == 512, "edited meshes are voxelized")
+
+
+def imported_box(quoin, folder, **options):
+    """Two types: a floor of the first under 4 x 4 x 4 voxels of the second."""
+    empty()
+    path = os.path.join(folder, "two.json")
+    array = np.full((4, 5, 4), 2, np.uint8)
+    array[:, 0] = 1
+    types = [quoin.VoxelType((200, 0, 0), "red"), quoin.VoxelType((0, 0, 200), "blue")]
+    quoin.from_numpy(array, types).save(path)
+    run(bpy.ops.import_scene.quoin, filepath=path, lights=False, **options)
+    return next(one for one in bpy.data.objects if one.type == "MESH")
+
+
+def check_edits(quoin, folder):
+    """Whatever is edited is what is written."""
+    path = os.path.join(folder, "edited.json")
+
+    def exported(**options):
+        run(bpy.ops.export_scene.quoin, filepath=path, fill="solid", **options)
+        return quoin.load(path)
+
+    def counts(scene):
+        colours, of = np.unique(points_of(scene)[:, 3:6], axis=0, return_counts=True)
+        return {tuple(colour): int(count) for colour, count in zip(colours, of)}
+
+    imported_box(quoin, folder)
+    require(counts(exported()) == {(200, 0, 0): 16, (0, 0, 200): 64}, "as it was")
+    mesh = imported_box(quoin, folder).data
+    for face in mesh.polygons:
+        face.material_index = 0
+    require(set(counts(exported())) == {(200, 0, 0)}, "faces given another material")
+    one = imported_box(quoin, folder)
+    bpy.context.view_layer.objects.active = one
+    bpy.ops.object.mode_set(mode="EDIT")
+    import bmesh
+    edit = bmesh.from_edit_mesh(one.data)
+    for vertex in edit.verts:
+        vertex.co *= 2
+    bmesh.update_edit_mesh(one.data)
+    found = counts(exported())
+    require(sum(found.values()) == 640, f"edits in Edit Mode: {found}")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    one = imported_box(quoin, folder)
+    one.shape_key_add(name="Basis")
+    key = one.shape_key_add(name="large")
+    for point in key.data:
+        point.co *= 2
+    key.value = 1.0
+    found = counts(exported())
+    require(sum(found.values()) == 640, f"shape keys: {found}")
+    mesh = imported_box(quoin, folder).data
+    from quoin_voxels import kept
+    before = kept.fingerprint(mesh)
+    corners = [mesh.loops[i].vertex_index for i in range(4)]
+    mesh.loops[0].vertex_index = corners[1]
+    require(kept.fingerprint(mesh) != before, "a face with other corners")
+
+    # Materials that become clear.
+    imported_box(quoin, folder)
+    shader = next(n for n in bpy.data.materials["red"].node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+    shader.inputs["Alpha"].default_value = 0.4
+    shader.inputs["IOR"].default_value = 1.25
+    red = next(one for one in exported().types if one.name == "red")
+    require(red.rgba == (200, 0, 0, 102) and red.transparent and abs(red.ior - 1.25) < 1e-6, f"clear red: {red}")
+    # A palette's images are not read, which is said where they were edited.
+    one = imported_box(quoin, folder, materials="PALETTE")
+    from quoin_voxels import materials
+    require(not materials.is_edited_palette(one.data.materials[0]), "the palette as it was")
+    bpy.ops.wm.save_as_mainfile(filepath=os.path.join(folder, "palette.blend"))
+    bpy.ops.wm.open_mainfile(filepath=os.path.join(folder, "palette.blend"))
+    material = next(one for one in bpy.data.objects if one.type == "MESH").data.materials[0]
+    require(not materials.is_edited_palette(material), "the palette in the .blend")
+    image = next(n.image for n in material.node_tree.nodes if n.type == "TEX_IMAGE" and "colours" in n.image.name)
+    image.pixels[4] = 0.1
+    require(materials.is_edited_palette(material), "an edited palette")
+
+    # Places that a format has not are voxelized.
+    one = imported_box(quoin, folder)
+    one.rotation_euler = (0, 0, math.radians(30))
+    for ending in (".qb", ".gox", ".vxl", ".binvox", ".schem", ".vox"):
+        other = os.path.join(folder, "turned" + ending)
+        run(bpy.ops.export_scene.quoin, filepath=other, fill="solid")
+        count = len(points_of(quoin.load(other)))
+        ground = 512 * 512 if ending == ".vxl" else 0
+        require(40 < count < ground + 120, f"{ending}: {count} voxels")
+    # Two voxels far apart are not kept.
+    far = np.zeros((512, 512, 512), np.uint8)
+    far[0, 0, 0] = far[-1, -1, -1] = 1
+    scene = quoin.from_numpy(far, [(9, 9, 9)])
+    mesh = bpy.data.meshes.new("far")
+    require(not kept.keep(mesh, scene.grids[0], scene.types, 0.1, {}), "a box of two voxels")
+
+
+def plane(faces):
+    """A square of faces x faces quads at z = 0.05, whose places on a texture are its own."""
+    x, y = np.meshgrid(np.arange(faces + 1), np.arange(faces + 1))
+    points = np.stack([x.ravel() * 0.1, y.ravel() * 0.1, np.full(x.size, 0.05)], axis=1)
+    first = (np.arange(faces)[:, None] * (faces + 1) + np.arange(faces)).ravel()
+    mesh = bpy.data.meshes.new("plane")
+    quads = np.stack([first, first + 1, first + faces + 2, first + faces + 1], axis=1)
+    mesh.from_pydata(points.tolist(), [], quads.tolist())
+    layer = mesh.uv_layers.new(name="uv")
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    places = (points[corners, :2] / (0.1 * faces)).astype(np.float32)
+    layer.data.foreach_set("uv", places.ravel())
+    bpy.context.collection.objects.link(bpy.data.objects.new("plane", mesh))
+    return mesh, layer, places
+
+
+def painted(name, kind):
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    nodes = material.node_tree.nodes
+    shader = next(n for n in nodes if n.type == "BSDF_PRINCIPLED")
+    node = nodes.new(kind)
+    material.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+    return material, node
+
+
+def check_colours(quoin, folder):
+    """Textures and colours of vertices."""
+    path = os.path.join(folder, "painted.json")
+    colours = lambda: {tuple(row) for row in points_of(quoin.load(path))[:, 3:6]}
+    for edge in (8, 264):  # of the larger one there are more colours than types
+        empty()
+        mesh, layer, places = plane(edge)
+        material, node = painted("picture", "ShaderNodeTexImage")
+        node.image = bpy.data.images.new("picture", edge, edge)
+        node.interpolation = "Closest"
+        pixels = np.ones((edge * edge, 4), np.float32)
+        number = np.arange(edge * edge)
+        pixels[:, 0], pixels[:, 1], pixels[:, 2] = number % 256 / 255, number // 256 % 256 / 255, number // 65536 / 255
+        node.image.pixels.foreach_set(pixels.ravel())
+        mesh.materials.append(material)
+        run(bpy.ops.export_scene.quoin, filepath=path, fill="surface")
+        if edge == 8:
+            require(colours() == {(i, 0, 0) for i in range(64)}, f"texels: {colours()}")
+        else:
+            require(len(colours()) > 1000, f"{len(colours())} colours")
+    empty()
+    mesh, layer, places = plane(8)
+    material, node = painted("picture", "ShaderNodeTexImage")
+    node.image = bpy.data.images.new("picture", 4, 4, float_buffer=False)
+    mesh.materials.append(material)
+    places = np.full_like(places, -1e-9)
+    places[4:8] = np.nan
+    layer.data.foreach_set("uv", places.ravel())
+    run(bpy.ops.export_scene.quoin, filepath=path, fill="surface")
+    require(len(points_of(quoin.load(path))) == 64, "places just below 0, and none")
+
+    # Colours of vertices are those of one material alone.
+    empty()
+    mesh, layer, places = plane(8)
+    layer = mesh.color_attributes.new("Colour", "FLOAT_COLOR", "POINT")
+    layer.data.foreach_set("color", np.tile(np.array([0, 1, 0, 0], np.float32), len(mesh.vertices)))
+    material, node = painted("vertices", "ShaderNodeVertexColor")
+    node.layer_name = "Colour"
+    red = bpy.data.materials.new("red")
+    red.use_nodes = True
+    shader = next(n for n in red.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+    shader.inputs["Base Color"].default_value = (1, 0, 0, 1)
+    mesh.materials.append(material)
+    mesh.materials.append(red)
+    for face in mesh.polygons[32:]:
+        face.material_index = 1
+    run(bpy.ops.export_scene.quoin, filepath=path, fill="surface")
+    require(colours() == {(0, 255, 0), (255, 0, 0)}, f"colours of vertices: {colours()}")
 
 
 def check_refusals(folder):
@@ -258,6 +434,8 @@ def main():
     check_castle(quoin, castle, folder)
     check_file(quoin, folder)
     check_voxelized(quoin, folder)
+    check_edits(quoin, folder)
+    check_colours(quoin, folder)
     check_refusals(folder)
     check_surfaces(castle)
     empty()

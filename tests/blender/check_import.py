@@ -34,7 +34,8 @@ class Glb:
         json_bytes = struct.unpack_from("<I", data, 12)[0]
         self.json = json.loads(data[20 : 20 + json_bytes])
         self.binary = data[28 + json_bytes :]
-        self.above = {child: i for i, node in enumerate(self.json.get("nodes", [])) for child in node.get("children", [])}
+        nodes = enumerate(self.json.get("nodes", []))
+        self.above = {child: i for i, node in nodes for child in node.get("children", [])}
 
     def accessor(self, index):
         accessor = self.json["accessors"][index]
@@ -42,7 +43,8 @@ class Glb:
         width = WIDTHS[accessor["type"]]
         offset = self.json["bufferViews"][accessor["bufferView"]]["byteOffset"]
         count = accessor["count"] * width
-        return numpy.frombuffer(self.binary, "<" + {"B": "u1", "H": "u2", "I": "u4", "f": "f4"}[letter], count, offset).reshape(-1, width)
+        kind = "<" + {"B": "u1", "H": "u2", "I": "u4", "f": "f4"}[letter]
+        return numpy.frombuffer(self.binary, kind, count, offset).reshape(-1, width)
 
     def world(self, number):
         """The transform of a node and of all above it."""
@@ -184,14 +186,16 @@ def check(path):
     for number, node in enumerate(nodes):
         matrix = BLENDER_FROM_GLTF @ glb.world(number) @ BLENDER_FROM_GLTF.inverted()
         distance = lambda o: max(abs(a - b) for r, s in zip(o.matrix_world, matrix) for a, b in zip(r, s))
-        named = [o for o in remaining if not node.get("name") or o.name.rsplit(".", 1)[0] == node["name"] or o.name == node["name"]]
+        named = [o for o in remaining
+                 if not node.get("name") or o.name.rsplit(".", 1)[0] == node["name"] or o.name == node["name"]]
         require(named, f"no object called {node.get('name')}")
         imported = min(named, key=distance)
         require(distance(imported) < 1e-3, f"{imported.name}: its transform is off by {distance(imported)}")
         remaining.remove(imported)
         if "mesh" not in node:
             continue
-        require(rounded(imported_triangles(imported)) == rounded(expected_triangles(glb, number)), f"{imported.name}: triangles differ")
+        require(rounded(imported_triangles(imported)) == rounded(expected_triangles(glb, number)),
+                f"{imported.name}: triangles differ")
         check_outward(glb, node, imported)
         check_texels(glb, node, imported)
         check_occlusion(glb, node, imported)

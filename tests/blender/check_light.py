@@ -124,7 +124,8 @@ def read(path, size):
 
 
 def read_quoin(path, size):
-    """Blender gives scripts no pixels of files with layers. Scan lines of OpenEXR in blocks of 16, compressed by zlib."""
+    """Blender gives scripts no pixels of files with layers. Scan lines of OpenEXR in blocks of 16, compressed by
+    zlib."""
     with open(path, "rb") as file:
         data = file.read()
     at, channels, compression = 8, [], None

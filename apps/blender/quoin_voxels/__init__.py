@@ -74,8 +74,9 @@ class QUOIN_OT_import(bpy.types.Operator, ImportHelper):
         ("TYPES", "One a Type", "A material for each type of voxel"),
         ("PALETTE", "Palette", "One material, whose colours and surfaces are in two small images")])
     occlusion: FloatProperty(name="Occlusion", default=0.0, min=0.0, max=1.0, subtype="FACTOR",
-                             description="How much of the occlusion that is kept in the attribute Occlusion the materials "
-                                         "show. It can be turned later: the node group Quoin Occlusion has it")
+                             description="How much of the occlusion that is kept in the attribute Occlusion the "
+                                         "materials show. It can be turned later: the node group Quoin Occlusion "
+                                         "has it")
     keep_voxels: BoolProperty(name="Keep Voxels", default=True, description="Keep the voxels themselves in the .blend, "
                               "so that export writes them as they were, with those inside")
     lights: BoolProperty(name="Cameras and Lights", default=True, description="Of the file: cameras, lamps, the sun")

@@ -29,7 +29,8 @@ def matrix_to_blender(matrix, scale):
 
 
 def matrix_to_quoin(matrix, mesh_scale, scale):
-    """The inverse, for a mesh in units of `mesh_scale` and a world in units of `scale`; whole numbers where it is close."""
+    """The inverse, for a mesh in units of `mesh_scale` and a world in units of `scale`; whole numbers where it is
+    close."""
     out = QUOIN_FROM_BLENDER @ matrix @ BLENDER_FROM_QUOIN
     out[:3, :3] *= mesh_scale / scale
     out[:3, 3] /= scale

@@ -1,5 +1,7 @@
 """Blender's objects as files of voxels: those that were imported as they were, others voxelized."""
 
+import os
+
 import numpy as np
 
 from . import axes, kept, materials, quoin
@@ -14,11 +16,15 @@ class Exported:
         self.warnings = []
 
 
+# Formats with grids of any turn, place and size; others have quarter turns and whole places.
+_ANY_PLACE = {".json", ".quoin"}
+
+
 class _Writer:
     def __init__(self, path, options):
         self.options = options
         self.scene = quoin.Scene()
-        self.is_vox = path.lower().endswith(".vox")
+        self.ending = os.path.splitext(path)[1].lower()
         self.made = Exported()
         self._types = {}  # numbers in the scene
         self._grids = {}  # by mesh and materials
@@ -33,7 +39,7 @@ class _Writer:
     def can_place(self, matrix):
         """Whether the format has a place for a grid that stands so; others are voxelized where they are."""
         linear = matrix[:3, :3]
-        if self.is_vox:
+        if self.ending not in _ANY_PLACE:
             return bool((np.abs(linear).sum(0) == 1.0).all() and (np.abs(linear).sum(1) == 1.0).all()
                         and (matrix == np.round(matrix)).all())
         size = np.cbrt(abs(np.linalg.det(linear)))
@@ -42,11 +48,13 @@ class _Writer:
     def add_kept(self, source, matrix, name):
         """Places the voxels that a mesh carries."""
         mesh = source.data
-        key = (mesh.name_full, tuple(slot.material.name_full if slot.material else "" for slot in source.material_slots))
+        slots = [slot.material for slot in source.material_slots]
+        key = (mesh.name_full, tuple(one.name_full if one else "" for one in slots))
         if key not in self._grids:
             found = kept.Kept(mesh)
-            types = [materials.edited(one, source.material_slots[slot].material) if 0 <= slot < len(source.material_slots)
-                     else one for one, slot in zip(found.types, found.slots)]
+            types = [materials.edited(one, slots[slot]) if 0 <= slot < len(slots) else one
+                     for one, slot in zip(found.types, found.slots)]
+            self._warn_of_images(slots, {slot for slot in found.slots if slot >= 0}, name)
             numbers = np.array([0] + [self.type_number(one) for one in types], np.uint16)
             grid = self.scene.add(numbers[found.voxels], name=mesh.name)
             # It stands where its array begins; grids begin at 0.
@@ -59,6 +67,18 @@ class _Writer:
             self.scene.place(grid, matrix @ moved, name)
         self._places += 1
         self.made.kept += 1
+
+    def _warn_of_images(self, slots, own, name):
+        # `own`: slots of one type each.
+        for slot, material in enumerate(slots):
+            if material is None:
+                continue
+            if slot in own and materials.seen(material)[1] is not None:
+                self.made.warnings.append(f"{name}: what colours {material.name} is not read; its type stays as it was "
+                                          "imported")
+            elif materials.is_edited_palette(material):
+                self.made.warnings.append(f"{name}: the images of {material.name} were edited and are not read; its "
+                                          "types stay as they were imported")
 
     def add_voxelized(self, evaluated, world, name):
         """Voxelizes what an object looks like."""
@@ -81,51 +101,74 @@ class _Writer:
         mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
         numbers = np.zeros(count, np.int32)
         mesh.loop_triangles.foreach_get("material_index", numbers)
-        if np.linalg.det(world[:3, :3]) < 0.0:
+        is_mirrored = np.linalg.det(world[:3, :3]) < 0.0
+        if is_mirrored:
             triangles = triangles[:, ::-1]
         points = points.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
         looks = [materials.seen(one) for one in slots or [None]]
-        types, numbers = [one for one, _ in looks], np.minimum(numbers, len(looks) - 1)
-        colours = None
-        if any(materials.has_attribute(node) for _, node in looks):
-            colours = _colours_of(mesh)
-        for slot, (one, node) in enumerate(looks):
-            if node is None or (materials.has_attribute(node) and colours is not None):
-                continue
-            texels = _texels_of(mesh, node, np.flatnonzero(numbers == slot))
-            if texels is None:
-                self.made.warnings.append(f"{name}: what colours {slots[slot].name} is left out; its viewport colour stands "
-                                          "for it")
-                continue
-            found, which = np.unique(texels, axis=0, return_inverse=True)
-            numbers[numbers == slot] = len(types) + which.ravel()
-            types += [one._replace(rgba=(*(int(v) for v in rgb), one.rgba[3])) for rgb in found]
-            if node.interpolation != "Closest":
-                self.made.warnings.append(f"{name}: of the texture of {slots[slot].name} a triangle has one colour")
+        numbers = np.clip(numbers, 0, len(looks) - 1)
+        types, colours = self._colour(mesh, slots, looks, numbers, name)
+        if colours is not None:  # corners have colours of their own
+            points = points[triangles].reshape(-1, 3)
+            triangles = np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
+            if is_mirrored:
+                colours = colours[:, ::-1]
+            colours = colours.reshape(-1, 4)
         self.scene.voxelize(axes.points_to_quoin(points, self.options.scale), triangles,
                             types=types, colours=colours, fill=self.options.fill, name=name, materials=numbers)
         self._places += 1
         self.made.voxelized += 1
 
+    def _colour(self, mesh, slots, looks, numbers, name):
+        """The types of slots, and what the corners of triangles multiply them with, (n, 3, 4) in linear light; None
+        where that is nothing."""
+        types, colours = [one for one, _ in looks], None
+        for slot, (one, node) in enumerate(looks):
+            own = np.flatnonzero(numbers == slot)
+            if node is None or not len(own):
+                continue
+            if materials.has_attribute(node):
+                found = _colours_of(mesh, node)
+                found = None if found is None else found[own]
+            else:
+                found = _texels_of(mesh, node, own)
+                found = None if found is None else materials.opaque(found)[:, None]
+            if found is None:
+                self.made.warnings.append(f"{name}: what colours {slots[slot].name} is left out; its viewport colour "
+                                          "stands for it")
+                continue
+            if colours is None:
+                colours = np.ones((len(numbers), 3, 4), np.float32)
+            colours[own] = found
+            types[slot] = one._replace(rgba=(255, 255, 255, one.rgba[3]))
+            if not materials.has_attribute(node) and node.interpolation != "Closest":
+                self.made.warnings.append(f"{name}: of the texture of {slots[slot].name} a triangle has one colour")
+        return types, colours
 
-def _colours_of(mesh):
-    """The colours of its vertices, in linear light; None where it has none."""
-    layer = mesh.color_attributes.get(materials.COLOUR) or mesh.color_attributes.active_color
+
+def _colours_of(mesh, node):
+    """The colours of its triangles' corners that a node shows, (n, 3, 4) in linear light; None where it has none."""
+    named = node.attribute_name if node.type == "ATTRIBUTE" else node.layer_name
+    found = mesh.color_attributes
+    layer = found.get(named) or found.get(materials.COLOUR) or found.active_color
     if layer is None:
         return None
     values = np.empty((len(layer.data), 4), np.float32)
     layer.data.foreach_get("color", values.ravel())
-    if layer.domain == "POINT":
-        return values
-    corners = np.empty(len(mesh.loops), np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
-    out = np.ones((len(mesh.vertices), 4), np.float32)
-    out[corners] = values
-    return out
+    values[:, 3] = 1.0  # the alpha of materials is what counts
+    corners = np.empty((len(mesh.loop_triangles), 3), np.int32)
+    mesh.loop_triangles.foreach_get("vertices" if layer.domain == "POINT" else "loops", corners.ravel())
+    return values[corners]
+
+
+def _place_in(share, size):
+    """The pixels of a row or a column that shares of it lie in."""
+    return np.minimum((np.nan_to_num(share) * size).astype(int), size - 1)
 
 
 def _texels_of(mesh, node, triangles):
-    """The colours, sRGB bytes (n, 3), that a texture has in the middle of triangles; None where there is no such texture."""
+    """The colours, sRGB bytes (n, 3), that a texture has in the middle of triangles; None where there is no such
+    texture."""
     layer = mesh.uv_layers.active
     image = node.image if node.type == "TEX_IMAGE" else None
     if image is None or layer is None or not image.size[0]:
@@ -134,12 +177,13 @@ def _texels_of(mesh, node, triangles):
     mesh.loop_triangles.foreach_get("loops", corners.ravel())
     places = np.empty((len(mesh.loops), 2), np.float32)
     layer.data.foreach_get("uv", places.ravel())
-    middle = places[corners[triangles]].mean(1) % 1.0
+    with np.errstate(invalid="ignore"):  # coordinates that are no numbers are those of the first pixel
+        middle = places[corners[triangles]].mean(1) % 1.0
     width, height = image.size
     pixels = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(pixels)
     pixels = pixels.reshape(height, width, image.channels)
-    colours = pixels[(middle[:, 1] * height).astype(int), (middle[:, 0] * width).astype(int)]
+    colours = pixels[_place_in(middle[:, 1], height), _place_in(middle[:, 0], width)]
     colours = np.repeat(colours, 3, axis=1) if image.channels < 3 else colours[:, :3]
     return materials.srgb(colours) if image.is_float else np.rint(255.0 * colours).astype(int)
 
@@ -157,8 +201,17 @@ def _is_wanted(one, options):
     return not owner.hide_render
 
 
+def _is_changed(source):
+    """Whether what an object shows is not its mesh."""
+    return bool(source.modifiers) or source.data.shape_keys is not None
+
+
 def export_file(context, path, options):
     """Writes what the scene shows as a file, in the format of its name's ending."""
+    for one in context.scene.objects:
+        if one.type == "MESH" and one.mode == "EDIT":
+            one.update_from_editmode()
+            one.data.update_tag()
     graph = context.evaluated_depsgraph_get()
     writer = _Writer(path, options)
     for one in graph.object_instances:
@@ -168,12 +221,13 @@ def export_file(context, path, options):
         source = evaluated.original
         world = np.array(one.matrix_world)
         name = source.name
-        if source.type == "MESH" and kept.is_kept(source.data) and not source.modifiers:
+        if source.type == "MESH" and kept.is_kept(source.data) and not _is_changed(source):
             matrix = axes.matrix_to_quoin(world, kept.scale_of(source.data), options.scale)
             if writer.can_place(matrix):
                 writer.add_kept(source, matrix, name)
                 continue
-            writer.made.warnings.append(f"{name}: .vox has no place for voxels that are turned or scaled so; it is voxelized")
+            writer.made.warnings.append(f"{name}: {writer.ending} has no place for voxels that are turned or scaled "
+                                        "so; it is voxelized")
         writer.add_voxelized(evaluated, world, name)
     if writer.made.kept + writer.made.voxelized == 0:
         raise ValueError("There is nothing to export" + (": nothing is selected" if options.use_selection else ""))

@@ -159,7 +159,8 @@ def _keep(mesh, grid, looks, slots, options, made):
     if not options.keep_voxels or not grid.voxels:
         return
     if not kept.keep(mesh, grid, looks.types, options.scale, slots):
-        made.warnings.append(f"{mesh.name}: its voxels are too many to be kept in the .blend; export will voxelize it")
+        made.warnings.append(f"{mesh.name}: its voxels are too many, or too scattered, to be kept in the .blend; "
+                             "export will voxelize it")
 
 
 def _collections(scene, top):
@@ -281,7 +282,8 @@ def import_file(context, path, options):
     context.scene.collection.children.link(top)
     looks = _Looks(name, scene.types, options)
     if options.surface == "SMOOTH" and any(one.transparent or one.emission > 0.0 for one in looks.types):
-        made.warnings.append(f"{name}: smooth surfaces are opaque and do not shine; types of it are transparent, or lamps")
+        made.warnings.append(f"{name}: smooth surfaces are opaque and do not shine; types of it are transparent, or "
+                             "lamps")
     window = context.window_manager
     window.progress_begin(0.0, 1.0)
     try:

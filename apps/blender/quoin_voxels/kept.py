@@ -9,30 +9,46 @@ from . import quoin
 
 _VOXELS, _ABOUT = "quoin_voxels", "quoin_about"
 MOST_CELLS = 1 << 29
+# A box takes room by its cells: one of more than this is to have a voxel for so many of them.
+FREE_CELLS, MOST_CELLS_A_VOXEL = 1 << 24, 256
+_SLICE = 1 << 22  # cells at once
+
+
+def _read(items, name, width, dtype):
+    values = np.empty(len(items) * width, dtype)
+    items.foreach_get(name, values)
+    return values.tobytes()
 
 
 def fingerprint(mesh):
-    """Of a mesh's shape: other when its points, or its faces' materials, are edited."""
-    points = np.empty(len(mesh.vertices) * 3, np.float32)
-    mesh.vertices.foreach_get("co", points)
-    return f"{len(mesh.polygons)} {zlib.crc32(points.tobytes()):08x}"
+    """Of a mesh's shape: other when its points, its faces' corners or their materials are edited."""
+    parts = [_read(mesh.vertices, "co", 3, np.float32), _read(mesh.loops, "vertex_index", 1, np.int32),
+             _read(mesh.polygons, "loop_total", 1, np.int32), _read(mesh.polygons, "material_index", 1, np.int32)]
+    return f"{len(mesh.polygons)} " + " ".join(f"{zlib.crc32(one):08x}" for one in parts)
+
+
+def _slices(voxels):
+    step = max(1, _SLICE // max(1, voxels[:1].size))
+    return [voxels[x : x + step] for x in range(0, len(voxels), step)]
 
 
 def keep(mesh, grid, types, scale, slots):
-    """Puts a grid's voxels into its mesh. `slots`: of types that have a material of their own, which. Returns False, and
-    does nothing, where the voxels are too many."""
-    if int(np.prod(grid.shape, dtype=np.int64)) > MOST_CELLS:
+    """Puts a grid's voxels into its mesh. `slots`: of types that have a material of their own, which. Returns False,
+    and does nothing, where the voxels are too many, or too scattered."""
+    cells = int(np.prod(grid.shape, dtype=np.int64))
+    if cells > min(MOST_CELLS, max(FREE_CELLS, MOST_CELLS_A_VOXEL * grid.voxels)):
         return False
     voxels = grid.to_numpy()
-    occurs = np.flatnonzero(np.bincount(voxels.ravel(), minlength=1))
+    counts = sum(np.bincount(one.ravel(), minlength=len(types)) for one in _slices(voxels))
+    occurs = np.flatnonzero(counts)
     occurs = occurs[occurs > 0]
     small = np.zeros(int(occurs.max()) + 1, np.uint8 if len(occurs) < 256 else np.uint16)
     small[occurs] = np.arange(1, len(occurs) + 1)
-    voxels = small[voxels]
-    about = {"shape": voxels.shape, "origin": grid.origin, "scale": scale, "bytes": voxels.itemsize,
+    about = {"shape": voxels.shape, "origin": grid.origin, "scale": scale, "bytes": small.itemsize,
              "fingerprint": fingerprint(mesh), "types": [list(types[i]) for i in occurs],
              "slots": [slots.get(int(i), -1) for i in occurs]}
-    mesh[_VOXELS] = zlib.compress(voxels.tobytes(), 1)
+    packer = zlib.compressobj(1)
+    mesh[_VOXELS] = b"".join([packer.compress(small[one].tobytes()) for one in _slices(voxels)] + [packer.flush()])
     mesh[_ABOUT] = json.dumps(about)
     return True
 

@@ -1,5 +1,7 @@
 """Types of voxels as materials, and materials as types."""
 
+import zlib
+
 import bpy
 import numpy as np
 
@@ -8,12 +10,20 @@ from . import quoin, versions
 OCCLUSION = "Occlusion"  # of what light arrives: 1 where it is open
 COLOUR = "Colour"
 MOST_MATERIALS = 256
+_PALETTE, _MADE = "quoin_palette", "quoin_made"
 
 
 def linear(srgb):
     """sRGB bytes as linear light."""
     x = np.asarray(srgb, np.float64) / 255.0
     return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4)
+
+
+def opaque(srgb):
+    """sRGB bytes (n, 3) as linear light and alpha, float32 (n, 4)."""
+    out = np.ones((len(srgb), 4), np.float32)
+    out[:, :3] = linear(srgb)
+    return out
 
 
 def srgb(light):
@@ -113,6 +123,7 @@ def _image(name, values, is_colour):
     image.pixels.foreach_set(np.ascontiguousarray(values, np.float32).ravel())
     image.update()
     image.pack()
+    image[_MADE] = zlib.compress(_pixels(image).tobytes())
     return image
 
 
@@ -137,6 +148,7 @@ class Palette:
             node.location = (shader.location.x - 750, y)
             return node
 
+        self.material[_PALETTE] = 2  # images
         surface = texture("surfaces", surfaces, False, 0)
         colour = texture("colours", colours, True, 300)
         tree.nodes.active = colour
@@ -153,6 +165,28 @@ class Palette:
     def places(self, types):
         """Texture coordinates of types, float32 (n, 2)."""
         return np.stack([(types % 256 + 0.5) / 256.0, (types // 256 + 0.5) / self.rows], axis=1).astype(np.float32)
+
+
+def _pixels(image):
+    values = np.empty(image.size[0] * image.size[1] * image.channels, np.float32)
+    image.pixels.foreach_get(values)
+    return values
+
+
+def is_edited_palette(material):
+    """Whether a palette's images are not those that it was made with."""
+    if material.get(_PALETTE) is None:
+        return False
+    images = [node.image for node in material.node_tree.nodes if node.type == "TEX_IMAGE" and node.image]
+    made = [one for one in images if one.get(_MADE) is not None]
+    if len(made) < material[_PALETTE]:
+        return True
+    for image in made:
+        wanted, found = np.frombuffer(zlib.decompress(image[_MADE]), np.float32), _pixels(image)
+        # A .blend keeps them less precisely.
+        if wanted.shape != found.shape or not np.allclose(found, wanted, rtol=4e-3, atol=2e-3):
+            return True
+    return False
 
 
 def smooth(name, group):
@@ -206,16 +240,18 @@ def has_attribute(node):
 
 
 def edited(one, material):
-    """A type as its material is now: what nobody changed stays to the last bit."""
+    """A type as its material is now: what nobody changed stays to the last bit. One that is coloured by a texture, or
+    was a cloud, stays as it was."""
     now, node = seen(material)
     if node is not None or one.scattering > 0.0:
         return one
     changes = {}
     if now.rgba[:3] != tuple(one.rgba[:3]):
         changes["rgba"] = (*now.rgba[:3], one.rgba[3])
-    if one.transparent and abs(now.rgba[3] - one.rgba[3]) > 1:
-        changes["rgba"] = (*now.rgba[:3], now.rgba[3])
-    for name in ("metalness", "roughness", "emission") + (("ior",) if one.transparent else ()):
+    if abs(now.rgba[3] - one.rgba[3]) > 1:
+        changes.update(rgba=now.rgba, transparent=now.transparent)
+    is_clear = changes.get("transparent", one.transparent)
+    for name in ("metalness", "roughness", "emission") + (("ior",) if is_clear else ()):
         if abs(getattr(now, name) - getattr(one, name)) > 1e-5 * max(1.0, getattr(one, name)):
             changes[name] = getattr(now, name)
     return one._replace(**changes)

@@ -23,7 +23,7 @@ from __future__ import annotations
 import contextlib
 import struct
 import zlib
-from typing import Any, Callable, Iterator, List
+from typing import Any, Callable, Iterator
 
 import numpy as np
 
@@ -68,8 +68,9 @@ def png(picture: NdArray) -> bytes:
 
 @contextlib.contextmanager
 def progress(listener: Callable[[float], Any]) -> Iterator[None]:
-    """Tells `listener` how far the calls within have come, 0 to 1. It may be called from another thread, and ends the
-    call by returning False, or by raising: that call then raises.
+    """Tells `listener` how far the calls within, of this thread, have come, 0 to 1. It may be called from another
+    thread, and ends the call by returning False, or by raising: that call raises the same, or, where it was over
+    already, the end of the `with`. Within another `progress` the inner one listens, and after it the outer one again.
 
     >>> told = []
     >>> with progress(told.append):
@@ -77,22 +78,24 @@ def progress(listener: Callable[[float], Any]) -> Iterator[None]:
     >>> told[-1]
     1.0
     """
-    raised: List[BaseException] = []
-
-    def tell(fraction: float, _: Any) -> int:
-        try:
-            return 0 if listener(fraction) is False else 1
-        except BaseException as error:
-            raised.append(error)
-            return 0
-
-    function = _c.Progress(tell)
-    _c.check(_c.lib.quoin_set_progress(function, None))
+    mine = _c.Listener(listener)
+    _c.check(_c.lib.quoin_set_progress(mine.function, None))
+    _c.listeners.all.append(mine)
     try:
         yield
-    except QuoinError:
-        if raised:
-            raise raised[0]
-        raise
     finally:
-        _c.lib.quoin_set_progress(_c.NOBODY, None)
+        _leave(mine)
+    mine.raise_what_it_raised()
+
+
+def _leave(mine: _c.Listener) -> None:
+    # A generator may be closed on another thread, of whose listeners this one is none. It stays with its own, and is
+    # told nothing any more.
+    mine.is_over = True
+    if mine not in _c.listeners.all:
+        return
+    was_last = _c.listeners.all[-1] is mine
+    _c.listeners.all.remove(mine)
+    if was_last:
+        former = _c.listeners.all[-1].function if _c.listeners.all else _c.NOBODY
+        _c.lib.quoin_set_progress(former, None)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ctypes
+import operator
 import os
-from typing import TYPE_CHECKING, Any, Optional, Sequence, Tuple
+import threading
+from typing import TYPE_CHECKING, Any, Callable, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -176,10 +178,51 @@ for _name in ("quoin_version", "quoin_last_error"):
     getattr(lib, _name).restype = ctypes.c_char_p
 
 
+class Listener:
+    """What the library calls while `progress` listens on a thread."""
+
+    def __init__(self, listener: Callable[[float], Any]) -> None:
+        self._listener = listener
+        self._raised: List[BaseException] = []
+        self.is_over = False
+        self.function = Progress(self._tell)
+
+    def _tell(self, fraction: float, _: Any) -> int:
+        if self._raised:  # it has asked for the end
+            return 0
+        if self.is_over:
+            return 1
+        try:
+            answer = self._listener(fraction)
+        except BaseException as error:
+            self._raised.append(error)
+            return 0
+        return 0 if isinstance(answer, (bool, np.bool_)) and not answer else 1
+
+    def raise_what_it_raised(self) -> None:
+        """Raises it, once."""
+        if self._raised:
+            raise self._raised.pop()
+
+
+class Listeners(threading.local):
+    """Those of one thread, the outermost first. The library knows the last one; they live as long as it may
+    call them."""
+
+    def __init__(self) -> None:
+        self.all: List[Listener] = []
+
+
+listeners = Listeners()
+_CANCELLED = 7
+
+
 def check(status: int) -> None:
-    """Raises what a status says, with the library's words."""
+    """Raises what a status says, with the library's words; or what the listener raised that ended the call."""
     if status == 0:
         return
+    if status == _CANCELLED and listeners.all:
+        listeners.all[-1].raise_what_it_raised()
     error = QuoinError(lib.quoin_last_error().decode("utf-8", "replace"))
     error.status = status
     raise error
@@ -202,9 +245,42 @@ def text_of(field: bytes) -> str:
     return field.decode("utf-8", "replace")
 
 
+def whole(value: Any, name: str, least: int = -2**31, most: int = 2**31 - 1) -> int:
+    """A whole number that fits where it goes: what ctypes would cut off is told."""
+    try:
+        found = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name}: a whole number is needed, not {type(value).__name__}") from None
+    if not least <= found <= most:
+        raise ValueError(f"{name}: {found} is out of range")
+    return found
+
+
+def size(value: Any, name: str) -> int:
+    """The same of what counts from 0."""
+    return whole(value, name, 0, 2 ** (8 * ctypes.sizeof(ctypes.c_size_t)) - 1)
+
+
+def path_of(path: Any) -> bytes:
+    """A path as the library takes it."""
+    found = os.fsencode(path)
+    if b"\0" in found:
+        raise ValueError("the path has a NUL in it")
+    return found
+
+
+def name_of(text: str) -> bytes:
+    """A name as the library takes it."""
+    if not isinstance(text, str):
+        raise TypeError(f"a name is a str, not {type(text).__name__}")
+    if "\0" in text:
+        raise ValueError("the name has a NUL in it")
+    return text.encode("utf-8", "replace")
+
+
 def bytes_of(text: str, room: int = 128) -> bytes:
-    """A text for a struct's field; cut off between characters where it is too long."""
-    return text.encode("utf-8", "replace")[: room - 1].decode("utf-8", "ignore").encode()
+    """A name for a struct's field; cut off between characters where it is too long."""
+    return name_of(text)[: room - 1].decode("utf-8", "ignore").encode()
 
 
 def sized(structure: Any) -> Any:
@@ -246,6 +322,16 @@ def rows_of(array: Any, width: int, dtype: Any, name: str) -> Any:
     if found.ndim != 2 or found.shape[1] != width:
         raise ValueError(f"{name} have the shape (n, {width})")
     return found
+
+
+def indices_of(array: Any, name: str) -> Any:
+    """Numbers of things, uint32; what is none of these is told, and not rounded or cut off."""
+    found = np.asarray(array)
+    if found.size and found.dtype.kind not in "iu":
+        raise TypeError(f"{name} are whole numbers, not {found.dtype}")
+    if found.size and (found.min() < 0 or found.max() > 2**32 - 1):
+        raise ValueError(f"{name} are 0 to 2^32 - 1")
+    return np.ascontiguousarray(found, np.uint32)
 
 
 class _Block:

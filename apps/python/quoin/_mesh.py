@@ -93,7 +93,8 @@ def surface_nets(array: NdArray, iso: float, spacing: Sequence[float] = (1, 1, 1
         raise ValueError('solid is "above" or "below"')
     given = _c.array_of(array, spacing, origin)
     out = ctypes.c_uint64()
-    _c.check(_c.lib.quoin_surface_nets(ctypes.byref(given), iso, int(solid == "below"), threads, ctypes.byref(out)))
+    _c.check(_c.lib.quoin_surface_nets(ctypes.byref(given), iso, int(solid == "below"), _c.whole(threads, "threads"),
+                                       ctypes.byref(out)))
     return Mesh(_c.Owner(out.value))
 
 
@@ -103,5 +104,7 @@ def mesh_labels(array: NdArray, background: int = 0, spacing: Sequence[float] = 
     `Mesh.interfaces` and `Mesh.of_label`. Nothing is copied."""
     given = _c.array_of(array, spacing, origin)
     out = ctypes.c_uint64()
-    _c.check(_c.lib.quoin_mesh_labels(ctypes.byref(given), background, relaxation_steps, threads, ctypes.byref(out)))
+    _c.check(_c.lib.quoin_mesh_labels(ctypes.byref(given), _c.whole(background, "background", -2**63, 2**63 - 1),
+                                      _c.whole(relaxation_steps, "relaxation_steps"), _c.whole(threads, "threads"),
+                                      ctypes.byref(out)))
     return Mesh(_c.Owner(out.value))

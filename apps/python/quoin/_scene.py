@@ -18,7 +18,7 @@ _FILLS = {"all": 0, "solid": 1, "surface": 2}
 
 
 class VoxelType(NamedTuple):
-    """A kind of voxel. `rgba` is sRGB, 0 to 255; an alpha below 255 makes it transparent."""
+    """A kind of voxel. `rgba` is sRGB, 0 to 255; an alpha below 255 makes it transparent; without it is 255."""
 
     rgba: Tuple[int, ...]
     name: str = ""
@@ -101,14 +101,12 @@ class Hits(NamedTuple):
 
 def _struct_of(type: Union[VoxelType, Colour]) -> Any:
     if not isinstance(type, VoxelType):
-        rgba = tuple(int(v) for v in type)
-        if len(rgba) not in (3, 4):
-            raise ValueError("a colour is three or four numbers")
-        type = VoxelType((rgba + (255,))[:4])
-    if len(type.rgba) != 4 or not all(0 <= v <= 255 for v in type.rgba):
-        raise ValueError("a colour's numbers are 0 to 255")
+        type = VoxelType(tuple(type))
+    rgba = tuple(_c.whole(v, "a colour", 0, 255) for v in type.rgba)
+    if len(rgba) not in (3, 4):
+        raise ValueError("a colour is three or four numbers")
     one = _c.sized(_c.Type)
-    one.rgba[:] = type.rgba
+    one.rgba[:] = (rgba + (255,))[:4]
     one.name = _c.bytes_of(type.name)
     one.emission, one.metalness, one.roughness = type.emission, type.metalness, type.roughness
     one.transparent, one.ior = int(type.transparent), type.ior
@@ -176,8 +174,8 @@ class Grid:
     def to_numpy(self, origin: Optional[Sequence[int]] = None, shape: Optional[Sequence[int]] = None) -> NdArray:
         """The types of its voxels as uint16 [x, y, z]: of the tight box around them, or of the box that is given."""
         info = self._info()
-        at = [int(v) for v in (info.min if origin is None else origin)]
-        extent = [int(v) for v in (info.extent if shape is None else shape)]
+        at = [_c.whole(v, "origin") for v in (info.min if origin is None else origin)]
+        extent = [_c.whole(v, "shape") for v in (info.extent if shape is None else shape)]
         if len(at) != 3 or len(extent) != 3 or min(extent) < 0:
             raise ValueError("origin and shape are three whole numbers")
         out = np.zeros(extent, np.uint16)
@@ -189,7 +187,8 @@ class Grid:
     def mesh(self, smooth: bool = False, occlusion: bool = True, threads: int = 0) -> Mesh:
         """Its surface: merged faces of blocks, or a smooth one around them."""
         options = _c.sized(_c.MeshOptions)
-        options.smooth, options.no_occlusion, options.threads = int(smooth), int(not occlusion), threads
+        options.smooth, options.no_occlusion = int(smooth), int(not occlusion)
+        options.threads = _c.whole(threads, "threads")
         out = ctypes.c_uint64()
         _c.check(_c.lib.quoin_grid_mesh(self._scene._owner.handle, self._number, ctypes.byref(options),
                                         ctypes.byref(out)))
@@ -305,7 +304,7 @@ class Scene:
 
     @property
     def warnings(self) -> List[str]:
-        """What reading, or the last save, left out."""
+        """What reading left out, and voxelizing merged; then what the last save left out."""
         text = ctypes.create_string_buffer(4096)
         found = []
         for i in range(self._count(_c.lib.quoin_scene_warning_count)):
@@ -324,12 +323,15 @@ class Scene:
         """Adds a grid of the types in an array [x, y, z] of uint8 or uint16, 0 for air, which is read as it lies."""
         given = _c.array_of(array, (1, 1, 1), origin)
         out = ctypes.c_size_t()
-        _c.check(_c.lib.quoin_grid_add(self._owner.handle, ctypes.byref(given), name.encode(), ctypes.byref(out)))
+        _c.check(_c.lib.quoin_grid_add(self._owner.handle, ctypes.byref(given), _c.name_of(name), ctypes.byref(out)))
         return Grid(self, out.value)
 
     def place(self, grid: Grid, matrix: Any, name: Optional[str] = None, visible: bool = True) -> int:
-        """Places a grid once more, and returns the instance's number. `matrix` (4, 4), or (3, 4), takes its voxels to the
-        world; it may turn, mirror, move and scale alike along all axes. Without a name it is the grid's."""
+        """Places a grid of this scene once more, and returns the instance's number. `matrix` (4, 4), or (3, 4), takes
+        its voxels to the world; it may turn, mirror, move and scale alike along all axes. Without a name it is the
+        grid's."""
+        if grid._scene._owner is not self._owner:
+            raise ValueError("the grid is another scene's")
         given = _instance_of(grid.number, matrix, grid.name if name is None else name, visible)
         out = ctypes.c_size_t()
         _c.check(_c.lib.quoin_instance_add(self._owner.handle, ctypes.byref(given), ctypes.byref(out)))
@@ -338,6 +340,7 @@ class Scene:
     def move(self, instance: int, matrix: Any, visible: Optional[bool] = None, name: Optional[str] = None) -> None:
         """Puts an instance elsewhere, shows or hides it, and names it."""
         given = _c.sized(_c.Instance)
+        instance = _c.size(instance, "instance")
         _c.check(_c.lib.quoin_instance_get(self._owner.handle, instance, ctypes.byref(given)))
         given.world_from_grid[:] = _rows_of(matrix)
         if visible is not None:
@@ -349,9 +352,9 @@ class Scene:
     def voxelize(self, positions: Any, triangles: Any, voxel_size: float = 1.0, *, colours: Any = None,
                  materials: Any = None, types: Sequence[Union[VoxelType, Colour]] = (), fill: str = "all",
                  name: str = "", max_types: int = 0, threads: int = 0) -> Grid:
-        """Adds the voxels of triangles (n, 3), whose positions are (m, 3), and shows them where these are, in units of a
-        voxel. `colours` (m, 4): linear light and alpha; `materials` (n,): of `types`, from 0. `fill`: "all", "solid" for
-        voxels whose centre is enclosed, or "surface".
+        """Adds the voxels of triangles (n, 3), whose positions are (m, 3), and shows them where these are, in units of
+        a voxel. `colours` (m, 4): linear light and alpha; `materials` (n,): of `types`, from 0. `fill`: "all", "solid"
+        for voxels whose centre is enclosed, or "surface". `max_types`: near colours are merged beyond that.
 
         >>> corners = [[0, 0, 0], [8, 0, 0], [0, 8, 0], [0, 0, 8]]
         >>> Scene().voxelize(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], types=[(200, 0, 0)]).shape
@@ -360,7 +363,7 @@ class Scene:
         if fill not in _FILLS:
             raise ValueError('fill is "all", "solid" or "surface"')
         corners = _c.rows_of(positions, 3, np.float32, "positions")
-        indices = _c.rows_of(triangles, 3, np.uint32, "triangles")
+        indices = _c.rows_of(_c.indices_of(triangles, "triangles"), 3, np.uint32, "triangles")
         given = _c.sized(_c.Triangles)
         given.vertex_count, given.triangle_count = len(corners), len(indices)
         given.positions, given.indices = corners.ctypes.data, indices.ctypes.data
@@ -370,7 +373,7 @@ class Scene:
                 raise ValueError("there is a colour a position")
             given.colours = colours.ctypes.data
         if materials is not None:
-            materials = np.ascontiguousarray(materials, np.uint32)
+            materials = _c.indices_of(materials, "materials")
             if materials.shape != (len(indices),):
                 raise ValueError("there is a material a triangle")
             given.materials = materials.ctypes.data
@@ -378,31 +381,34 @@ class Scene:
         given.types, given.type_count = ctypes.addressof(structs) if types else None, len(types)
         options = _c.sized(_c.VoxelizeOptions)
         options.voxel_size, options.fill = voxel_size, _FILLS[fill]
-        options.max_types, options.threads = max_types, threads
+        options.max_types, options.threads = _c.whole(max_types, "max_types"), _c.whole(threads, "threads")
         out = ctypes.c_size_t()
         _c.check(_c.lib.quoin_grid_voxelize(self._owner.handle, ctypes.byref(given), ctypes.byref(options),
-                                            name.encode(), ctypes.byref(out)))
+                                            _c.name_of(name), ctypes.byref(out)))
         return Grid(self, out.value)
 
     def save(self, path: Path) -> None:
         """Writes a file by its ending: .vox, .json, .quoin; or meshes: .glb, .gltf, .obj, .ply."""
-        _c.check(_c.lib.quoin_scene_save(self._owner.handle, os.fsencode(path)))
+        _c.check(_c.lib.quoin_scene_save(self._owner.handle, _c.path_of(path)))
 
     def render(self, width: int = 1280, height: int = 720, *, samples: int = 0, paths: bool = False,
                camera: Optional[Sequence[float]] = None, look_at: Sequence[float] = (0, 0, 0), fov: float = 45.0,
                out: Optional[NdArray] = None, threads: int = 0) -> NdArray:
         """A picture, uint8 (height, width, 3), sRGB. Without a camera the whole scene is shown. `paths`: light with its
         bounces and soft shadows, which takes longer. `out` is filled in place where it is given."""
+        width, height = (_c.whole(v, "the picture's size") for v in (width, height))
         if width <= 0 or height <= 0:
             raise ValueError("a picture has pixels")
         options = _c.sized(_c.RenderOptions)
-        options.width, options.height, options.samples = width, height, samples
-        options.paths, options.threads = int(paths), threads
+        options.width, options.height, options.samples = width, height, _c.whole(samples, "samples")
+        options.paths, options.threads = int(paths), _c.whole(threads, "threads")
         if camera is not None:
             options.has_camera, options.fov_degrees = 1, fov
             options.camera[:], options.look_at[:] = camera, look_at
         if out is None:
             out = np.empty((height, width, 3), np.uint8)
+        elif not isinstance(out, np.ndarray):
+            raise TypeError("out is a NumPy array")
         elif out.shape != (height, width, 3) or out.dtype != np.uint8 or not out.flags.c_contiguous \
                 or not out.flags.writeable:
             raise ValueError("out is a writable uint8 array (height, width, 3) without gaps")
@@ -445,18 +451,21 @@ def load(path: Path, *, frame: int = 0, show_hidden: bool = False, radius: int =
     quoin._c.QuoinError: nothing.vox: No such file or directory
     """
     options = _c.sized(_c.LoadOptions)
-    options.frame, options.show_hidden, options.radius, options.threads = frame, int(show_hidden), radius, threads
+    options.frame, options.show_hidden = _c.whole(frame, "frame"), int(show_hidden)
+    options.radius, options.threads = _c.whole(radius, "radius"), _c.whole(threads, "threads")
     options.has_iso, options.iso = int(iso is not None), iso or 0.0
-    options.mesh_voxels, options.voxel_size = size, voxel_size
+    options.mesh_voxels, options.voxel_size = _c.whole(size, "size"), voxel_size
     out = ctypes.c_uint64()
-    _c.check(_c.lib.quoin_scene_load_with(os.fsencode(path), ctypes.byref(options), ctypes.byref(out)))
+    _c.check(_c.lib.quoin_scene_load_with(_c.path_of(path), ctypes.byref(options), ctypes.byref(out)))
     return Scene(_c.Owner(out.value))
 
 
-def load_bytes(data: bytes) -> Scene:
-    """The same of what a file holds."""
+def load_bytes(data: Union[bytes, bytearray, memoryview]) -> Scene:
+    """The same of what a file holds: bytes, or whatever lies in memory as they do, which is not copied."""
+    held = memoryview(data).cast("B")
+    array = np.frombuffer(held, np.uint8) if held.nbytes else np.zeros(0, np.uint8)
     out = ctypes.c_uint64()
-    _c.check(_c.lib.quoin_scene_load_bytes(data, len(data), ctypes.byref(out)))
+    _c.check(_c.lib.quoin_scene_load_bytes(array.ctypes.data, array.size, ctypes.byref(out)))
     return Scene(_c.Owner(out.value))
 
 
