@@ -32,8 +32,8 @@ export async function use(bytes: Uint8Array): Promise<number> {
 // @ts-expect-error: bytes, not a path
 void load('castle.vox');
 `);
-run(process.execPath, tsc, '--strict', '--noEmit', '--exactOptionalPropertyTypes', '--noUncheckedIndexedAccess', '--target',
-    'es2022', '--module', 'nodenext', 'use.ts', 'node_modules/quoin/quoin.d.ts');
+run(process.execPath, tsc, '--strict', '--noEmit', '--exactOptionalPropertyTypes', '--noUncheckedIndexedAccess',
+    '--target', 'es2022', '--module', 'nodenext', 'use.ts', 'node_modules/quoin/quoin.d.ts');
 writeFileSync(join(folder, 'use.mjs'), `
 import { readFileSync } from 'node:fs';
 import { load } from 'quoin';

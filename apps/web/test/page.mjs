@@ -65,7 +65,8 @@ try {
       context.drawImage(bitmap, 0, 0);
       const { data } = context.getImageData(100, 60, 850, 560);
       const seen = new Set();
-      for (let i = 0; i < data.length; i += 4) seen.add((data[i] >> 3 << 10) | (data[i + 1] >> 3 << 5) | data[i + 2] >> 3);
+      for (let i = 0; i < data.length; i += 4)
+        seen.add((data[i] >> 3 << 10) | (data[i + 1] >> 3 << 5) | data[i + 2] >> 3);
       return seen.size;
     }, [...shot]);
     return { shot, counted };
@@ -107,7 +108,8 @@ try {
   check(other.url().split('#')[1] === link.split('#')[1], 'who opens the link has the same view');
   await other.close();
 
-  await tab.setInputFiles('#other', { name: 'noise.vox', mimeType: '', buffer: Buffer.from('VOX \x96\0\0\0MAIN nothing') });
+  const noise = Buffer.from('VOX \x96\0\0\0MAIN nothing');
+  await tab.setInputFiles('#other', { name: 'noise.vox', mimeType: '', buffer: noise });
   await tab.waitForSelector('#status.error');
   check(/^noise.vox: /.test(await status()), `a broken file says so: ${await status()}`);
   await tab.setInputFiles('#other', file);
