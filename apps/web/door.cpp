@@ -50,7 +50,7 @@ using namespace quoin::c;
 
 quoin_status quoin_web_write(quoin_scene scene, const char* extension, const quoin_mesh_options* options,
                              std::uint8_t** out, std::size_t* bytes) {
-  return with_scene(scene, [&](SceneBody& body) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
     if (extension == nullptr || out == nullptr || bytes == nullptr)
       return fail(QUOIN_INVALID_ARGUMENT, "extension, out or bytes is null");
     return write(body, extension, options == nullptr ? quoin_mesh_options{} : *options, out, bytes);

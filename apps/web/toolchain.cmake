@@ -1,5 +1,5 @@
-# Cross-compiles to WebAssembly: Debian's clang 19 with the C and C++ libraries of npm's @yowasp/clang, which `./dev web`
-# unpacks into QUOIN_WEB_ROOT. Those libraries are built without exceptions: see apps/web/runtime.cpp.
+# Cross-compiles to WebAssembly: Debian's clang 19 with the C and C++ libraries of npm's @yowasp/clang, which
+# `./dev web` unpacks into QUOIN_WEB_ROOT. Those libraries are built without exceptions: see apps/web/runtime.cpp.
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR wasm32)
 set(CMAKE_C_COMPILER clang-19)

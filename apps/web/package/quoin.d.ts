@@ -1,8 +1,8 @@
 /** Reads voxel files of any format, and makes meshes, GLB files and pictures of them. See docs/web.md.
  *
  * Axes: right-handed, +Y up. Colours: sRGB. All arrays that are returned are the caller's.
- * Errors: every function throws (or rejects with) a QuoinError. One of code "trap" or "out_of_memory" ended the instance
- * that the scene lived in: that scene is gone, and the next `load` starts a fresh one.
+ * Errors: every function throws (or rejects with) a QuoinError. One of code "trap" or "out_of_memory" ended the
+ * instance that the scene lived in: that scene is gone, and the next `load` starts a fresh one.
  */
 export type ErrorCode =
   | 'invalid_argument' | 'cannot_read' | 'cannot_write' | 'bad_format' | 'unsupported' | 'limit_exceeded' | 'cancelled'
@@ -88,8 +88,8 @@ export class Scene {
   free(): void;
 }
 
-/** Starts the WebAssembly module. It is not needed: `load` and others do the same. `module`: its bytes, or where they are,
- *  in place of quoin.wasm beside quoin.js. */
+/** Starts the WebAssembly module. It is not needed: `load` and others do the same. `module`: its bytes, or where they
+ *  are, in place of quoin.wasm beside quoin.js. */
 export function start(module?: BufferSource | URL | string): Promise<void>;
 
 /** Reads a file of any format, which its content decides. */

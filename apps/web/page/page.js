@@ -88,7 +88,8 @@ function resize() {
 function placeSun() {
   const around = $('around').valueAsNumber * degrees;
   const height = $('height').valueAsNumber * degrees;
-  const to = new THREE.Vector3(Math.cos(height) * Math.sin(around), Math.sin(height), Math.cos(height) * Math.cos(around));
+  const flat = Math.cos(height);
+  const to = new THREE.Vector3(flat * Math.sin(around), Math.sin(height), flat * Math.cos(around));
   sun.position.copy(centre).addScaledVector(to, 2 * radius);
   sun.target.position.copy(centre);
   Object.assign(sun.shadow.camera, { left: -radius, right: radius, top: radius, bottom: -radius, near: radius / 10,
@@ -209,7 +210,8 @@ async function openFile(chosen) {
 
 async function openAddress(address) {
   const url = new URL(address, location.href);
-  if (url.origin !== location.origin) return say('The link names a file of another site, which is not asked for.', true);
+  if (url.origin !== location.origin)
+    return say('The link names a file of another site, which is not asked for.', true);
   try {
     const response = await fetch(url);
     if (!response.ok) throw new Error(`${response.status} ${response.statusText}`);

@@ -46,7 +46,8 @@ await refuses('nothing', () => load(new Uint8Array(0)));
 await refuses('a string', () => load('castle.vox'), 'invalid_argument');
 await refuses('noise', () => load(Uint8Array.from({ length: 4096 }, () => 256 * random())));
 await refuses('no JSON', () => load(new TextEncoder().encode('{"quoin_scene": 1, "grids": [')));
-for (const size of [4, 8, 20, 60, good.length >> 1, good.length - 1]) await survives(`cut to ${size}`, good.subarray(0, size));
+for (const size of [4, 8, 20, 60, good.length >> 1, good.length - 1])
+  await survives(`cut to ${size}`, good.subarray(0, size));
 for (let i = 0; i < 60; ++i) {
   const bytes = good.slice(0, 20_000 + (i % 2) * (good.length - 20_000));
   for (let n = 0; n < 8; ++n) bytes[Math.floor(bytes.length * (n < 4 ? random() * 0.01 : random()))] = 256 * random();

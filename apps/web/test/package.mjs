@@ -1,7 +1,7 @@
 // The npm package as a user gets it: installed in an empty folder, compiled with strict types, run.
 //   node package.mjs QUOIN.tgz TSC FILE
 import { execFileSync } from 'node:child_process';
-import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 
@@ -32,8 +32,8 @@ export async function use(bytes: Uint8Array): Promise<number> {
 // @ts-expect-error: bytes, not a path
 void load('castle.vox');
 `);
-run(process.execPath, tsc, '--strict', '--noEmit', '--exactOptionalPropertyTypes', '--noUncheckedIndexedAccess', '--target',
-    'es2022', '--module', 'nodenext', 'use.ts', 'node_modules/quoin/quoin.d.ts');
+run(process.execPath, tsc, '--strict', '--noEmit', '--exactOptionalPropertyTypes', '--noUncheckedIndexedAccess',
+    '--target', 'es2022', '--module', 'nodenext', 'use.ts', 'node_modules/quoin/quoin.d.ts');
 writeFileSync(join(folder, 'use.mjs'), `
 import { readFileSync } from 'node:fs';
 import { load } from 'quoin';
@@ -42,4 +42,7 @@ if (scene.glb().length < 1000 || scene.grids.length === 0) process.exit(1);
 console.log(\`package: \${scene.grids.length} grids, a GLB of \${scene.glb().length} bytes\`);
 `);
 process.stdout.write(run(process.execPath, 'use.mjs', file));
+const licences = readFileSync(join(folder, 'node_modules/quoin/LICENSES'), 'utf8');
+for (const name of ['zlib', 'libpng', 'LLVM', 'wasi-libc', 'GLM', 'nlohmann-json', 'robin-map', 'tl::expected'])
+  if (!licences.includes(`======== ${name}`)) throw new Error(`the package does not have the licence of ${name}`);
 rmSync(folder, { recursive: true });

@@ -1,7 +1,8 @@
 // How long reading and meshing takes: the module, the native tool on one thread, three.js' VOXLoader. By turns.
 //   node speed.mjs PACKAGE TOOL THREE FILE.vox [TURNS]
 import { execFileSync } from 'node:child_process';
-import { readFileSync } from 'node:fs';
+import { readFileSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 
@@ -9,7 +10,9 @@ const [packageFolder, tool, three, file, turns = '5'] = process.argv.slice(2);
 const { load } = await import(pathToFileURL(join(packageFolder, 'quoin.js')));
 const { VOXLoader } = await import(pathToFileURL(resolve(three, 'examples/jsm/loaders/VOXLoader.js')));
 const bytes = readFileSync(file);
-const times = { 'module: load': [], 'module: glb': [], 'module: picture': [], 'three.js VOXLoader': [], 'tool: convert': [] };
+const out = join(tmpdir(), `quoin-speed-${process.pid}.glb`);
+const times = { 'module: load': [], 'module: glb': [], 'module: picture': [], 'three.js VOXLoader': [],
+                'tool: convert': [] };
 const timed = async (name, work) => {
   const began = performance.now();
   const result = await work();
@@ -22,12 +25,15 @@ for (let turn = 0; turn < Number(turns); ++turn) {
   await timed('module: picture', () => scene.render({ width: 640, height: 360, samples: 4 }));
   scene.free();
   await timed('three.js VOXLoader', () => {
-    const { chunks = [], scene: made } = new VOXLoader().parse(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
+    const copy = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length);
+    const { chunks = [], scene: made } = new VOXLoader().parse(copy);
     return [chunks, made];
   });
-  await timed('tool: convert', () => execFileSync(tool, ['convert', file, '/tmp/quoin-speed.glb', '--threads', '1', '-q']));
+  await timed('tool: convert', () => execFileSync(tool, ['convert', file, out, '--threads', '1', '-q']));
 }
 for (const [name, all] of Object.entries(times)) {
   all.sort((a, b) => a - b);
-  console.log(`${name.padEnd(20)} ${all[all.length >> 1].toFixed(1)} ms (median of ${all.length}), ${all[0].toFixed(1)} least`);
+  const [median, least] = [all[all.length >> 1], all[0]].map((time) => time.toFixed(1));
+  console.log(`${name.padEnd(20)} ${median} ms (median of ${all.length}), ${least} least`);
 }
+rmSync(out, { force: true });
