@@ -53,8 +53,7 @@ class OccupancyTree {
   [[nodiscard]] static OccupancyTree build(const DensityGrid& field);
 
   /// Of a field, another tree: of those cells only the ones with a solid corner of a transparent material. Cost: 40 to
-  /// 100 microseconds a
-  /// chunk that has such.
+  /// 100 microseconds a chunk that has such.
   [[nodiscard]] static OccupancyTree build(const DensityGrid& field, const VoxelRegistry& types);
 
   /// Takes over what edits changed, as `grid.changes_since` tells of it, in place; builds it anew when all has changed.
