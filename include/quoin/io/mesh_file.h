@@ -107,8 +107,8 @@ struct MeshFileOptions {
 [[nodiscard]] Result<std::uint64_t> write_mesh(const SceneMeshes& meshes, const std::filesystem::path& path,
                                                const MeshFileOptions& options = {}, const Progress& progress = {});
 
-/// The same as bytes, for formats that are one file: GLB, PLY, STL, 3MF and OBJ of smooth meshes. `options.format` means
-/// nothing here.
+/// The same as bytes, for formats that are one file: GLB, PLY, STL, 3MF and OBJ of smooth meshes. `options.format`
+/// means nothing here.
 ///
 /// Errors: also Unsupported for what takes several files.
 [[nodiscard]] Result<std::vector<std::byte>> write_mesh(const SceneMeshes& meshes, FileFormat format,
