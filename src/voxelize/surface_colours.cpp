@@ -22,9 +22,10 @@ std::uint16_t unit_of(float value) {
 }
 
 Rgba8 encoded(glm::vec4 light) {
-  const SrgbEncoder& encode = SrgbEncoder::shared();
+  Rgba8 colour = srgb_colour(glm::vec3(light));
   const float alpha = light.a > 0.0F ? std::min(light.a, 1.0F) : 0.0F;
-  return {encode(light.r), encode(light.g), encode(light.b), static_cast<std::uint8_t>(std::lround(alpha * 255.0F))};
+  colour.a = static_cast<std::uint8_t>(std::lround(alpha * 255.0F));
+  return colour;
 }
 
 /// linear_from_srgb of every byte, which takes long to compute.

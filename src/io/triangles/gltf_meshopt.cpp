@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 #include <tiny_gltf.h>
 
+#include "io/byte_reader.h"
 #include "io/byte_writer.h"
 #include "io/triangles/triangles.h"
 
@@ -23,8 +24,6 @@ namespace {
 
 constexpr const char* kExtension = "EXT_meshopt_compression";
 constexpr const char* kOneByte = "data:application/octet-stream;base64,AA==";
-// Of a GLB: magic, version, length; length and kind of its first chunk.
-constexpr std::size_t kJsonAt = 20;
 
 using Json = nlohmann::json;
 
@@ -44,13 +43,13 @@ std::vector<std::byte> with_json(std::span<const std::byte> file, std::string_vi
     return out.take();
   }
   json.resize((json.size() + 3) / 4 * 4, ' ');
-  const auto rest = file.subspan(kJsonAt + old.size());
-  const std::size_t size = kJsonAt + json.size() + rest.size();
+  const auto at = static_cast<std::size_t>(old.data() - text_of(file).data());
+  const auto rest = file.subspan(at + old.size());
+  const std::size_t size = at + json.size() + rest.size();
   out.reserve(size);
-  out.raw(file.first(8));
-  out.u32(static_cast<std::uint32_t>(size));
-  out.u32(static_cast<std::uint32_t>(json.size()));
-  out.raw(file.subspan(16, 4));
+  out.raw(file.first(at));
+  out.patch(8, size);
+  out.patch(12, json.size());
   out.text(json);
   out.raw(rest);
   return out.take();

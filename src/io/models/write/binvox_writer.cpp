@@ -23,10 +23,9 @@ constexpr int kMaxCube = 1 << 8;
 constexpr std::int64_t kMostAir = 8;  // times the box
 
 bool is_better_a_cube(const IVec3& size, int longest) {
-  if (longest <= kMaxCube) return true;
-  const std::int64_t volume = std::int64_t{size.x} * size.y * size.z;
-  constexpr int kAlways = 1 << 11;  // so that the cube is no overflow
-  return longest <= kAlways && std::int64_t{longest} * longest * longest <= kMostAir * volume;
+  if (longest <= kMaxCube || longest > kMaxEdge) return longest <= kMaxCube;
+  const std::int64_t cube = std::int64_t{longest} * longest * longest;
+  return cube <= kMaxVoxels && cube <= kMostAir * size.x * size.y * size.z;
 }
 
 constexpr unsigned kLongestRun = 255;
