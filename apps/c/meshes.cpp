@@ -68,11 +68,14 @@ void add_smooth_vertices(const MeshView& view, std::size_t at, GridMesh& mesh) {
 }
 
 void add_block_vertices(const MeshView& view, std::size_t at, const std::vector<Rgba8>& palette, GridMesh& mesh) {
+  std::array<Vec3, 6> normals;
+  for (std::size_t i = 0; i < normals.size(); ++i) normals[i] = Vec3(normal_of(static_cast<Direction>(i)));
   for (std::size_t i = 0; i < view.positions.size(); ++i) {
-    mesh.normals[at + i] = Vec3(normal_of(view.directions[i]));
+    mesh.normals[at + i] = normals[static_cast<std::size_t>(view.directions[i])];
     mesh.colours[at + i] = palette[view.types[i]];
-    if (!view.block_occlusion.empty()) mesh.occlusion[at + i] = static_cast<float>(view.block_occlusion[i]) / 3.0F;
   }
+  for (std::size_t i = 0; i < view.block_occlusion.size(); ++i)
+    mesh.occlusion[at + i] = static_cast<float>(view.block_occlusion[i]) / 3.0F;
   mesh.types.resize(mesh.positions.size());
   std::copy(view.types.begin(), view.types.end(), mesh.types.begin() + static_cast<std::ptrdiff_t>(at));
 }
@@ -100,17 +103,18 @@ Result<GridMesh> put_together(const SceneMeshes& meshes) {
     return make_error(ErrorCode::LimitExceeded, "a mesh of more than 2^32 vertices");
   GridMesh mesh;
   mesh.positions.reserve(vertices);
-  mesh.indices.reserve(indices);
+  mesh.indices.resize(indices);
   mesh.normals.resize(vertices);
   mesh.colours.resize(vertices);
   mesh.occlusion.resize(vertices);
   const std::vector<Rgba8> palette = palette_of(meshes.types);
+  std::uint32_t* next = mesh.indices.data();
   for (const MeshPart& part : meshes.parts) {
     for (const MeshView& view : part.surfaces) {
       const std::size_t at = mesh.positions.size();
       const auto base = static_cast<std::uint32_t>(at);
       mesh.positions.insert(mesh.positions.end(), view.positions.begin(), view.positions.end());
-      for (const std::uint32_t index : view.indices) mesh.indices.push_back(base + index);
+      for (const std::uint32_t index : view.indices) *next++ = base + index;
       if (view.has_albedo())
         add_smooth_vertices(view, at, mesh);
       else

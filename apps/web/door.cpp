@@ -9,8 +9,16 @@
 
 #include "handles.h"
 
+extern "C" __attribute__((import_module("quoin"), import_name("told"))) std::int32_t quoin_web_told(double fraction);
+
 namespace quoin::c {
 namespace {
+
+// Of what is meshed and written, a listener for the one or the other.
+Progress half_of(const Progress& whole, double begin) {
+  if (!whole) return {};
+  return [whole, begin](double fraction) { return whole(begin + fraction / 2.0); };
+}
 
 quoin_status give(std::span<const std::byte> bytes, std::uint8_t** out, std::size_t* count) {
   *out = static_cast<std::uint8_t*>(std::malloc(bytes.size()));
@@ -25,14 +33,16 @@ quoin_status write(SceneBody& body, const char* extension, const quoin_mesh_opti
   const auto format = format_for_writing(std::string("scene") + extension);
   if (!format) return fail(format.error());
   if (format->format == FileFormat::Vox) {
-    auto written = write_vox(body.loaded);
+    auto written = write_vox(body.loaded, progress());
     if (!written) return fail(written.error());
     body.loaded.warnings = std::move(written->warnings);
     return give(written->bytes, out, count);
   }
-  const auto meshes = options.smooth != 0 ? mesh_scene_smoothly(body.loaded.scene) : mesh_scene(body.loaded.scene);
+  const Progress meshing = half_of(progress(), 0.0);
+  const auto meshes = options.smooth != 0 ? mesh_scene_smoothly(body.loaded.scene, {}, {}, meshing)
+                                          : mesh_scene(body.loaded.scene, {}, {}, meshing);
   if (!meshes) return fail(meshes.error());
-  const auto written = write_mesh(*meshes, format->format);
+  const auto written = write_mesh(*meshes, format->format, {}, half_of(progress(), 0.5));
   return written ? give(*written, out, count) : fail(written.error());
 }
 
@@ -57,6 +67,10 @@ quoin_status quoin_web_write(quoin_scene scene, const char* extension, const quo
   });
 }
 
+void quoin_web_listen(std::int32_t listens) {
+  quoin_set_progress(listens == 0 ? nullptr : [](double fraction, void*) { return quoin_web_told(fraction); }, nullptr);
+}
+
 void* quoin_web_struct(std::int32_t kind) {
   switch (kind) {
     case 0:
@@ -71,6 +85,8 @@ void* quoin_web_struct(std::int32_t kind) {
       return empty_struct<quoin_mesh_options>();
     case 5:
       return empty_struct<quoin_render_options>();
+    case 6:
+      return empty_struct<quoin_hits>();
     default:
       return nullptr;
   }

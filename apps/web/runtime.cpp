@@ -4,11 +4,14 @@
 // an Error with the exception's text through it, and the package starts a fresh one. Quoin throws only where memory
 // runs out, or a library that it uses does: for text that is no JSON.
 
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <exception>
 #include <new>
 #include <typeinfo>
+
+#include <wasm_simd128.h>
 
 #include <quoin/core/memory.h>
 
@@ -46,6 +49,20 @@ void* allocate(std::size_t bytes, std::size_t alignment) {
 }  // namespace
 
 extern "C" {
+
+// wasi-libc's goes byte by byte.
+int memcmp(const void* left, const void* right, std::size_t bytes) {
+  const auto* a = static_cast<const unsigned char*>(left);
+  const auto* b = static_cast<const unsigned char*>(right);
+  constexpr std::size_t kStep = sizeof(v128_t);
+  for (; bytes >= kStep; bytes -= kStep, a += kStep, b += kStep) {
+    if (!wasm_i8x16_all_true(wasm_i8x16_eq(wasm_v128_load(a), wasm_v128_load(b)))) break;
+  }
+  for (; bytes > 0; --bytes, ++a, ++b) {
+    if (*a != *b) return *a < *b ? -1 : 1;
+  }
+  return 0;
+}
 
 void* __cxa_allocate_exception(std::size_t bytes) {
   return allocate(bytes, 0);

@@ -46,12 +46,19 @@ export interface Mesh {
   indices: Uint32Array;
 }
 
-export interface MeshOptions {
+/** What long calls take. */
+export interface Progress {
+  /** Told how far the call has come, 0 to 1. Returning false ends it with a QuoinError of code "cancelled"; what it
+   *  throws, the call throws. It calls nothing of this package. */
+  progress?: (fraction: number) => boolean | void;
+}
+
+export interface MeshOptions extends Progress {
   /** Smooth surfaces in place of blocks. Default: of grids that have a field. */
   smooth?: boolean;
 }
 
-export interface RenderOptions {
+export interface RenderOptions extends Progress {
   width?: number;
   height?: number;
   /** Samples a pixel; default 4. */
@@ -65,6 +72,18 @@ export interface Picture {
   height: number;
   /** Rows from the top, four bytes a pixel: an ImageData's. */
   rgba: Uint8ClampedArray<ArrayBuffer>;
+}
+
+/** What rays met, an entry a ray. */
+export interface Hits {
+  /** In lengths of the direction; Infinity: nothing was met. */
+  t: Float64Array;
+  /** Three a ray, in the world; 0 where nothing was met. */
+  normal: Float64Array;
+  /** Three a ray, in its grid. */
+  voxel: Int32Array;
+  /** 0 where nothing was met. */
+  type: Uint16Array;
 }
 
 export class Scene {
@@ -84,6 +103,9 @@ export class Scene {
   read(grid: number, min: Vec3, shape: Vec3): Uint16Array;
   /** A picture by ray marching, on one thread. */
   render(options?: RenderOptions): Picture;
+  /** The nearest voxel or surface along each ray: three numbers a ray, in the world. The first call builds a tree,
+   *  which the scene keeps. maxT: how far they go, in lengths of their direction. */
+  rays(origins: ArrayLike<number>, directions: ArrayLike<number>, options?: { maxT?: number }): Hits;
   /** Gives its memory back. The scene is of no use then. */
   free(): void;
 }
@@ -93,22 +115,57 @@ export class Scene {
 export function start(module?: BufferSource | URL | string): Promise<void>;
 
 /** Reads a file of any format, which its content decides. */
-export function load(bytes: ArrayBuffer | ArrayBufferView): Promise<Scene>;
+export function load(bytes: ArrayBuffer | ArrayBufferView, options?: Progress): Promise<Scene>;
 
-export interface ArrayOptions {
+export interface ArrayOptions extends Progress {
   /** Of neighbours, default 1. */
   spacing?: Vec3;
   /** Where sample (0, 0, 0) lies, default 0. */
   origin?: Vec3;
+}
+
+export interface SurfaceOptions extends ArrayOptions {
   /** What is less than `iso` is solid, as of signed distances. Default: what is more. */
   solidBelow?: boolean;
 }
 
-export type Samples =
-  | Uint8Array | Int8Array | Uint16Array | Int16Array | Uint32Array | Int32Array | Float32Array | Float64Array;
+export type Labels =
+  | Uint8Array | Int8Array | Uint16Array | Int16Array | Uint32Array | Int32Array | BigUint64Array | BigInt64Array;
+export type Samples = Labels | Float32Array | Float64Array;
 
 /** The surface where an array has the value `iso`. shape: samples along x, y and z, of which z is the fastest. */
-export function surfaceNets(array: Samples, shape: Vec3, iso: number, options?: ArrayOptions): Promise<Mesh>;
+export function surfaceNets(array: Samples, shape: Vec3, iso: number, options?: SurfaceOptions): Promise<Mesh>;
+
+export interface LabelOptions<Label> extends ArrayOptions {
+  /** The label of what is no object, and of all beyond the array; default 0. */
+  background?: Label;
+  /** How often vertices go towards their neighbours, which makes stairs smooth: 0 to 1,000, default 4. */
+  relaxationSteps?: number;
+}
+
+/** The faces between two labels: a range of the indices. */
+export interface LabelInterface<Label> {
+  /** Behind the faces; never the background. */
+  back: Label;
+  /** In front of them: the background, or else the lesser of both. */
+  front: Label;
+  firstIndex: number;
+  indexCount: number;
+}
+
+export interface LabelMesh<Label> {
+  /** Three a vertex. Neighbours share theirs. */
+  positions: Float32Array;
+  /** Three a triangle, counter-clockwise seen from its front label. */
+  indices: Uint32Array;
+  /** By `back`, then `front`, the background first; they cover the indices. */
+  interfaces: LabelInterface<Label>[];
+}
+
+/** The surfaces between the labels of a segmentation: one closed surface a label. shape: as of surfaceNets. Labels of
+ *  arrays of 64 bits are bigints. */
+export function meshLabels<Array extends Labels>(array: Array, shape: Vec3, options?: LabelOptions<Array[number]>):
+  Promise<LabelMesh<Array[number]>>;
 
 /** A three.js group of a scene, with its materials. `GLTFLoader`: that of three/addons/loaders/GLTFLoader.js. */
 export function toThree<Group>(

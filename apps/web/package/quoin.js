@@ -12,9 +12,9 @@ export class QuoinError extends Error {
 }
 
 // What quoin_web_struct calls its structs, and where their fields are: pointers and size_t have 4 bytes.
-const structs = { array: 0, gridInfo: 1, type: 2, meshData: 3, meshOptions: 4, renderOptions: 5 };
-const scalars = [Uint8Array, Int8Array, Uint16Array, Int16Array, Uint32Array, Int32Array, null, null, Float32Array,
-                 Float64Array];
+const structs = { array: 0, gridInfo: 1, type: 2, meshData: 3, meshOptions: 4, renderOptions: 5, hits: 6 };
+const scalars = [Uint8Array, Int8Array, Uint16Array, Int16Array, Uint32Array, Int32Array, BigUint64Array, BigInt64Array,
+                 Float32Array, Float64Array];
 
 let compiled;  // a promise of the WebAssembly.Module
 let instance;  // a promise of the Instance that lives; undefined where there is none, or it died
@@ -55,6 +55,7 @@ class Instance {
         const what = this.text(text);
         throw new QuoinError(what === 'out of memory' ? 'out_of_memory' : 'internal', what);
       },
+      told: (fraction) => this.told(fraction),
     };
     return imports;
   }
@@ -62,12 +63,45 @@ class Instance {
   /** Calls an export. What is thrown through it leaves it in no state to go on. */
   run(name, ...values) {
     if (this.dead) throw new QuoinError('bad_handle', 'the instance that this belongs to has ended');
+    if (this.isTelling) throw new QuoinError('invalid_argument', 'progress is to call nothing of the package');
     try {
       return this.exports[name](...values);
     } catch (error) {
       this.dead = true;
       if (error instanceof QuoinError) throw error;
       throw new QuoinError('trap', `the module stopped: ${error.message}`);
+    }
+  }
+
+  /** Asks the one who listens whether to go on. What he throws is not thrown through the module, but after it. */
+  told(fraction) {
+    const { listener } = this;
+    if (listener.threw !== undefined) return 0;
+    this.isTelling = true;
+    try {
+      return listener.tell(fraction) === false ? 0 : 1;
+    } catch (error) {
+      listener.threw = { error };
+      return 0;
+    } finally {
+      this.isTelling = false;
+    }
+  }
+
+  /** Runs work that tells `tell`, where there is one, how far it has come. */
+  listened(tell, work) {
+    if (tell === undefined) return work();
+    if (typeof tell !== 'function') throw new QuoinError('invalid_argument', 'progress is no function');
+    const listener = { tell };
+    this.run('quoin_web_listen', 1);
+    this.listener = listener;
+    try {
+      return work();
+    } catch (error) {
+      throw listener.threw === undefined ? error : listener.threw.error;
+    } finally {
+      this.listener = undefined;
+      if (!this.dead) this.run('quoin_web_listen', 0);
     }
   }
 
@@ -103,10 +137,15 @@ class Instance {
     }
   }
 
+  /** Copies an array of numbers in. */
+  put(array, at) {
+    const bytes = new Uint8Array(array.buffer, array.byteOffset, array.byteLength);
+    new Uint8Array(this.exports.memory.buffer, at, bytes.length).set(bytes);
+  }
+
   withBytes(bytes, use) {
     return this.with(bytes.byteLength, (at) => {
-      new Uint8Array(this.exports.memory.buffer, at, bytes.byteLength).set(
-        new Uint8Array(bytes.buffer, bytes.byteOffset, bytes.byteLength));
+      this.put(bytes, at);
       return use(at);
     });
   }
@@ -139,24 +178,45 @@ class Instance {
     });
   }
 
-  /** Copies a mesh out, and frees it. */
-  takeMesh(mesh) {
+  /** Calls use(field of quoin_mesh_data by its number) with what a mesh has, and frees it. */
+  withMesh(mesh, use) {
     try {
       return this.withStruct('meshData', (at) => {
         this.call('quoin_mesh_view', mesh, at);
-        const field = (index) => this.view().getUint32(at + 4 * index, true);
-        const vertices = field(1);
-        return {
-          positions: this.numbers(Float32Array, field(4), 3 * vertices) ?? new Float32Array(),
-          normals: this.numbers(Float32Array, field(5), 3 * vertices) ?? new Float32Array(),
-          colours: this.numbers(Uint8Array, field(6), 4 * vertices),
-          occlusion: this.numbers(Float32Array, field(7), vertices),
-          indices: this.numbers(Uint32Array, field(8), field(2)) ?? new Uint32Array(),
-        };
+        return use((index) => this.view().getUint32(at + 4 * index, true));
       });
     } finally {
       if (!this.dead) this.run('quoin_free', mesh);
     }
+  }
+
+  takeMesh(mesh) {
+    return this.withMesh(mesh, (field) => {
+      const vertices = field(1);
+      return {
+        positions: this.numbers(Float32Array, field(4), 3 * vertices) ?? new Float32Array(),
+        normals: this.numbers(Float32Array, field(5), 3 * vertices) ?? new Float32Array(),
+        colours: this.numbers(Uint8Array, field(6), 4 * vertices),
+        occlusion: this.numbers(Float32Array, field(7), vertices),
+        indices: this.numbers(Uint32Array, field(8), field(2)) ?? new Uint32Array(),
+      };
+    });
+  }
+
+  /** `label`: what a label of 64 bits is called. */
+  takeLabels(mesh, label) {
+    return this.withMesh(mesh, (field) => {
+      const numbers = this.numbers(BigInt64Array, field(9), 4 * field(3)) ?? [];
+      return {
+        positions: this.numbers(Float32Array, field(4), 3 * field(1)) ?? new Float32Array(),
+        indices: this.numbers(Uint32Array, field(8), field(2)) ?? new Uint32Array(),
+        interfaces: Array.from({ length: numbers.length / 4 }, (_, i) => {
+          const [back, front, firstIndex, indexCount] = numbers.slice(4 * i, 4 * i + 4);
+          return { back: label(back), front: label(front), firstIndex: Number(firstIndex),
+                   indexCount: Number(indexCount) };
+        }),
+      };
+    });
   }
 }
 
@@ -255,7 +315,7 @@ export class Scene {
     }));
   }
 
-  #isSmooth({ smooth } = {}) {
+  #isSmooth(smooth) {
     return (smooth ?? this.grids.some((grid) => grid.hasField)) ? 1 : 0;
   }
 
@@ -263,24 +323,26 @@ export class Scene {
     return this.file('.glb', options);
   }
 
-  file(extension, options) {
+  file(extension, { smooth, progress } = {}) {
     const of = this.#instance;
-    return of.withStruct('meshOptions', (wanted) => of.withText(extension, (name) => of.with(8, (out) => {
-      of.view().setInt32(wanted + 4, this.#isSmooth(options), true);
+    const write = (wanted, name, out) => {
+      of.view().setInt32(wanted + 4, this.#isSmooth(smooth), true);
       of.call('quoin_web_write', this.#handle, name, wanted, out, out + 4);
       const at = of.view().getUint32(out, true);
       const bytes = of.numbers(Uint8Array, at, of.view().getUint32(out + 4, true));
       of.run('free', at);
       return bytes;
-    })));
+    };
+    return of.listened(progress, () => of.withStruct('meshOptions', (wanted) =>
+      of.withText(extension, (name) => of.with(8, (out) => write(wanted, name, out)))));
   }
 
-  mesh(grid, options) {
+  mesh(grid, { smooth, progress } = {}) {
     const of = this.#instance;
-    return of.withStruct('meshOptions', (wanted) => {
-      of.view().setInt32(wanted + 4, this.#isSmooth(options), true);
+    return of.listened(progress, () => of.withStruct('meshOptions', (wanted) => {
+      of.view().setInt32(wanted + 4, this.#isSmooth(smooth), true);
       return of.takeMesh(of.handle('quoin_grid_mesh', this.#handle, index(grid), wanted));
-    });
+    }));
   }
 
   read(grid, min, shape) {
@@ -293,12 +355,12 @@ export class Scene {
     }));
   }
 
-  render({ width = 1280, height = 720, samples = 4, camera } = {}) {
+  render({ width = 1280, height = 720, samples = 4, camera, progress } = {}) {
     const of = this.#instance;
     const pixels = width * height;
     if (!(Number.isInteger(width) && Number.isInteger(height) && width > 0 && height > 0 && pixels <= 2 ** 28))
       throw new QuoinError('invalid_argument', 'a size of a picture is two whole numbers, at most 2^28 pixels');
-    return of.withStruct('renderOptions', (wanted) => of.with(3 * pixels, (out) => {
+    return of.listened(progress, () => of.withStruct('renderOptions', (wanted) => of.with(3 * pixels, (out) => {
       const view = of.view();
       [width, height, samples].forEach((value, i) => view.setInt32(wanted + 4 + 4 * i, value, true));
       if (camera !== undefined) {
@@ -315,6 +377,27 @@ export class Scene {
         rgba[4 * i + 2] = rgb[3 * i + 2];
       }
       return { width, height, rgba };
+    })));
+  }
+
+  rays(origins, directions, { maxT = Infinity } = {}) {
+    const [from, along] = [origins, directions].map(doubles);
+    const count = from.length / 3;
+    if (typeof maxT !== 'number' || Number.isNaN(maxT)) throw new QuoinError('invalid_argument', 'maxT is no number');
+    if (!Number.isInteger(count) || along.length !== from.length)
+      throw new QuoinError('invalid_argument', `${from.length} and ${along.length} numbers are no rays of three each`);
+    const of = this.#instance;
+    // Of a ray: where it begins and goes, t and the normal are doubles, the voxel whole numbers, then the type.
+    const at = [0, 24, 48, 56, 80, 92].map((bytes) => bytes * count);
+    return of.withStruct('hits', (hits) => of.with(94 * count, (memory) => {
+      of.put(from, memory);
+      of.put(along, memory + at[1]);
+      [2, 4, 5, 3].forEach((part, i) => of.view().setUint32(hits + 4 + 4 * i, memory + at[part], true));
+      of.call('quoin_scene_rays', this.#handle, count, memory, memory + at[1], maxT, hits);
+      return { t: of.numbers(Float64Array, memory + at[2], count),
+               normal: of.numbers(Float64Array, memory + at[3], 3 * count),
+               voxel: of.numbers(Int32Array, memory + at[4], 3 * count),
+               type: of.numbers(Uint16Array, memory + at[5], count) };
     }));
   }
 
@@ -329,27 +412,34 @@ function index(grid) {
   return Number.isInteger(grid) && grid >= 0 ? grid : -1;
 }
 
+function doubles(list) {
+  if (typeof list?.length !== 'number') throw new QuoinError('invalid_argument', 'rays are lists of numbers');
+  return Float64Array.from(list, Number);
+}
+
 function asBytes(given) {
   if (given instanceof ArrayBuffer) return new Uint8Array(given);
   if (ArrayBuffer.isView(given)) return given;
   throw new QuoinError('invalid_argument', 'bytes are an ArrayBuffer or a typed array');
 }
 
-export async function load(given) {
+export async function load(given, { progress } = {}) {
   const bytes = asBytes(given);
   const of = await alive();
-  const handle = of.withBytes(bytes, (at) => of.handle('quoin_scene_load_bytes', at, bytes.byteLength));
+  const handle = of.listened(progress, () =>
+    of.withBytes(bytes, (at) => of.handle('quoin_scene_load_bytes', at, bytes.byteLength)));
   return new Scene(of, handle);
 }
 
-export async function surfaceNets(array, shape, iso, { spacing = [1, 1, 1], origin = [0, 0, 0], solidBelow } = {}) {
+/** Calls use(instance, the address of the array's description). */
+async function withArray(array, shape, { spacing = [1, 1, 1], origin = [0, 0, 0], progress } = {}, use) {
   const scalar = scalars.findIndex((Kind) => Kind !== null && array instanceof Kind);
   if (scalar < 0) throw new QuoinError('invalid_argument', 'the array is none of the typed arrays that are read');
   if (shape.length !== 3 || shape.some((n) => !Number.isInteger(n) || n < 0) ||
       shape[0] * shape[1] * shape[2] !== array.length)
     throw new QuoinError('invalid_argument', `a shape of ${shape} does not fit ${array.length} samples`);
   const of = await alive();
-  return of.withBytes(array, (data) => of.withStruct('array', (at) => {
+  return of.listened(progress, () => of.withBytes(array, (data) => of.withStruct('array', (at) => {
     const view = of.view();
     const size = array.BYTES_PER_ELEMENT;
     view.setUint32(at + 4, data, true);
@@ -357,11 +447,30 @@ export async function surfaceNets(array, shape, iso, { spacing = [1, 1, 1], orig
     const strides = [size * shape[1] * shape[2], size * shape[2], size];
     [...shape, ...strides].forEach((value, i) => view.setBigInt64(at + 16 + 8 * i, BigInt(value), true));
     [...spacing, ...origin].forEach((value, i) => view.setFloat64(at + 64 + 8 * i, value, true));
-    return of.takeMesh(of.handle('quoin_surface_nets', at, iso, solidBelow ? 1 : 0, 0));
-  }));
+    return use(of, at);
+  })));
 }
 
-export async function toThree(scene, GLTFLoader, options) {
+export async function surfaceNets(array, shape, iso, options = {}) {
+  return withArray(array, shape, options, (of, at) =>
+    of.takeMesh(of.handle('quoin_surface_nets', at, Number(iso), options.solidBelow ? 1 : 0, 0)));
+}
+
+export async function meshLabels(array, shape, options = {}) {
+  const { background = 0, relaxationSteps = 4 } = options;
+  const isUnsigned = array instanceof BigUint64Array;
+  const bits = isUnsigned ? BigInt.asUintN : BigInt.asIntN;
+  const isWhole = typeof background === 'bigint' || Number.isSafeInteger(background);
+  if (!isWhole || bits(64, BigInt(background)) !== BigInt(background))
+    throw new QuoinError('invalid_argument', `${background} is no label`);
+  if (!Number.isInteger(relaxationSteps) || Math.abs(relaxationSteps) >= 2 ** 31)
+    throw new QuoinError('invalid_argument', `${relaxationSteps} is no number of steps`);
+  const label = isUnsigned || array instanceof BigInt64Array ? (number) => bits(64, number) : Number;
+  return withArray(array, shape, options, (of, at) =>
+    of.takeLabels(of.handle('quoin_mesh_labels', at, BigInt(background), relaxationSteps, 0), label));
+}
+
+export async function toThree(scene, GLTFLoader, options = {}) {
   return (await new GLTFLoader().parseAsync(scene.glb(options).buffer, '')).scene;
 }
 

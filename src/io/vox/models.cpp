@@ -23,16 +23,6 @@ constexpr std::uint32_t kPlaceMask = (1U << kTypeShift) - 1U;
 constexpr unsigned kChunksShift = 2;
 static_assert((kChunkEdge << kChunksShift) == kMaxModelEdge);
 
-std::size_t chunk_number(IVec3 chunk) {
-  QUOIN_ASSERT((chunk.x | chunk.y | chunk.z) >= 0 && (chunk.x | chunk.y | chunk.z) < 1 << kChunksShift,
-               "a chunk of a model");
-  return static_cast<std::size_t>((chunk.z << (2 * kChunksShift)) | (chunk.y << kChunksShift) | chunk.x);
-}
-
-std::uint32_t place_in_chunk(IVec3 local) {
-  return static_cast<std::uint32_t>((local.z << (2 * kChunkShift)) | (local.y << kChunkShift) | local.x);
-}
-
 IVec3 local_from_place(std::uint32_t place) {
   const auto p = static_cast<int>(place);
   return {p & (kChunkEdge - 1), (p >> kChunkShift) & (kChunkEdge - 1), p >> (2 * kChunkShift)};
@@ -42,39 +32,39 @@ IVec3 chunks_of(IVec3 size) {
   return (size + (kChunkEdge - 1)) >> kChunkShift;
 }
 
-/// Where a grid's voxel lies among dense chunks, one after the other, as the sum of one share an axis.
-struct DensePlaces {
-  std::array<std::uint32_t, kMaxModelEdge> of_x{};  ///< by the model's axes
-  std::array<std::uint32_t, kMaxModelEdge> of_y{};
-  std::array<std::uint32_t, kMaxModelEdge> of_z{};
+/// Where a grid's voxel lies: its place in its chunk in bits 0-17, the chunk's number above, as the sum of one share an
+/// axis of the model's. Beyond the model shares are so large that no sum with one is a place.
+struct Places {
+  static constexpr std::uint32_t kOutside = 1U << 28;
+  std::array<std::uint32_t, 256> of_x{};
+  std::array<std::uint32_t, 256> of_y{};
+  std::array<std::uint32_t, 256> of_z{};
 };
+static_assert(kMaxModelEdge <= 256 && (64U << kTypeShift) < Places::kOutside);
 
-DensePlaces dense_places(IVec3 model_size) {
-  const IVec3 chunks = chunks_of(canvas_of(model_size).max);
-  const auto share = [](int voxel, int chunk_stride, int shift) {
-    const int chunk = (voxel >> kChunkShift) * chunk_stride;
+/// `strides`: what one chunk further along the grid's axes adds to the chunk's number.
+Places places_in(IVec3 model_size, IVec3 strides) {
+  const auto share = [](int voxel, int stride, int shift) {
+    const int chunk = (voxel >> kChunkShift) * stride;
     return static_cast<std::uint32_t>(chunk << kTypeShift | (voxel & (kChunkEdge - 1)) << shift);
   };
-  DensePlaces places;
-  for (int i = 0; i < model_size.x; ++i) places.of_x[static_cast<std::size_t>(i)] = share(i, 1, 0);
-  for (int i = 0; i < model_size.z; ++i) places.of_z[static_cast<std::size_t>(i)] = share(i, chunks.x, kChunkShift);
+  Places places;
+  for (auto* shares : {&places.of_x, &places.of_y, &places.of_z}) shares->fill(Places::kOutside);
+  for (int i = 0; i < model_size.x; ++i) places.of_x[static_cast<std::size_t>(i)] = share(i, strides.x, 0);
+  for (int i = 0; i < model_size.z; ++i) places.of_z[static_cast<std::size_t>(i)] = share(i, strides.y, kChunkShift);
   for (int i = 0; i < model_size.y; ++i) {
-    places.of_y[static_cast<std::size_t>(model_size.y - 1 - i)] = share(i, chunks.x * chunks.y, 2 * kChunkShift);
+    places.of_y[static_cast<std::size_t>(model_size.y - 1 - i)] = share(i, strides.z, 2 * kChunkShift);
   }
   return places;
 }
 
-/// Calls `visit(grid voxel, colour index)` for every voxel inside the model.
+/// Calls `visit(place, colour index)` for every voxel of a model, also those outside it.
 template <class Visit>
-void for_each_voxel(const Model& model, Visit visit) {
+void for_each_voxel(const Model& model, const Places& places, Visit visit) {
   for (std::size_t i = 0; i + 3 < model.voxels.size(); i += 4) {
     std::array<std::uint8_t, 4> bytes{};  // as one load
     std::memcpy(bytes.data(), model.voxels.data() + i, bytes.size());
-    const int x = bytes[0];
-    const int y = bytes[1];
-    const int z = bytes[2];
-    if (x >= model.size.x || y >= model.size.y || z >= model.size.z) continue;
-    visit(IVec3{x, z, model.size.y - 1 - y}, bytes[3]);
+    visit(places.of_x[bytes[0]] + places.of_y[bytes[1]] + places.of_z[bytes[2]], bytes[3]);
   }
 }
 
@@ -90,25 +80,25 @@ DVec3 pivot_of(IVec3 model_size) {
 }
 
 void ModelBuilder::sort_into_chunks(const Model& model) {
+  const Places places = places_in(model.size, {1, 1 << kChunksShift, 1 << (2 * kChunksShift)});
   std::array<std::size_t, 65> counts{};
-  std::int64_t inside = 0;
-  for_each_voxel(model, [&](IVec3 voxel, std::uint8_t colour_index) {
-    ++inside;
-    if (colour_index == 0) {
+  for_each_voxel(model, places, [&](std::uint32_t place, std::uint8_t colour_index) {
+    if (place >= Places::kOutside) {
+      ++losses_.outside;
+    } else if (colour_index == 0) {
       ++losses_.colourless;
     } else {
-      ++counts[chunk_number(chunk_of(voxel))];
+      ++counts[place >> kTypeShift];
     }
   });
-  losses_.outside += static_cast<std::int64_t>(model.voxels.size() / 4) - inside;
   chunk_begins_[0] = 0;
   for (std::size_t i = 0; i < 64; ++i) chunk_begins_[i + 1] = chunk_begins_[i] + counts[i];
   sorted_.resize(chunk_begins_[64]);
   std::array<std::size_t, 65> next = chunk_begins_;
-  for_each_voxel(model, [&](IVec3 voxel, std::uint8_t colour_index) {
-    if (colour_index == 0) return;
+  for_each_voxel(model, places, [&](std::uint32_t place, std::uint8_t colour_index) {
+    if (place >= Places::kOutside || colour_index == 0) return;
     const std::uint32_t type = type_of_[colour_index];
-    sorted_[next[chunk_number(chunk_of(voxel))]++] = place_in_chunk(local_of(voxel)) | type << kTypeShift;
+    sorted_[next[place >> kTypeShift]++] = (place & kPlaceMask) | type << kTypeShift;
   });
 }
 
@@ -135,20 +125,18 @@ void ModelBuilder::fill_chunk(IVec3 chunk, std::size_t first, std::size_t count,
 
 void ModelBuilder::build_densely(const Model& model, Grid& grid) {
   const IVec3 chunks = chunks_of(canvas_of(model.size).max);
-  const DensePlaces places = dense_places(model.size);
+  const Places places = places_in(model.size, {1, chunks.x, chunks.x * chunks.y});
   QUOIN_ASSERT(chunks.x * chunks.y * chunks.z <= 64, "no more chunks than a model has");
   dense_.assign(static_cast<std::size_t>(chunks.x * chunks.y * chunks.z) * kChunkVoxels, kAir);
-  for (std::size_t i = 0; i + 3 < model.voxels.size(); i += 4) {
-    std::array<std::uint8_t, 4> bytes{};  // as one load
-    std::memcpy(bytes.data(), model.voxels.data() + i, bytes.size());
-    if (bytes[0] >= model.size.x || bytes[1] >= model.size.y || bytes[2] >= model.size.z) {
+  for_each_voxel(model, places, [&](std::uint32_t place, std::uint8_t colour_index) {
+    if (place >= Places::kOutside) {
       ++losses_.outside;
-    } else if (bytes[3] == 0) {
+    } else if (colour_index == 0) {
       ++losses_.colourless;
     } else {
-      dense_[places.of_x[bytes[0]] + places.of_y[bytes[1]] + places.of_z[bytes[2]]] = type_of_[bytes[3]];
+      dense_[place] = type_of_[colour_index];
     }
-  }
+  });
   const std::span<const VoxelType> all = dense_;
   for (int i = 0; i < chunks.x * chunks.y * chunks.z; ++i) {
     const IVec3 place{i % chunks.x, i / chunks.x % chunks.y, i / (chunks.x * chunks.y)};

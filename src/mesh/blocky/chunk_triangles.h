@@ -18,6 +18,9 @@ class ChunkTriangles {
   [[nodiscard]] Status append(const QuadBuffer& quads, IVec3 chunk, BlockyMesh& mesh);
 
  private:
+  [[nodiscard]] SurfaceClass class_of(const Quad& quad) const;
+  [[nodiscard]] Status append_outlines(const QuadBuffer& quads, IVec3 origin, BlockyMesh& mesh);
+
   std::vector<SurfaceClass> classes_;  // [VoxelType]
   bool watertight_;
   OutlineFinder finder_;
