@@ -20,30 +20,32 @@ Progress half_of(const Progress& whole, double begin) {
   return [whole, begin](double fraction) { return whole(begin + fraction / 2.0); };
 }
 
-quoin_status give(std::span<const std::byte> bytes, std::uint8_t** out, std::size_t* count) {
-  *out = static_cast<std::uint8_t*>(std::malloc(bytes.size()));
-  if (*out == nullptr) return fail(QUOIN_OUT_OF_MEMORY, "out of memory");
-  std::memcpy(*out, bytes.data(), bytes.size());
-  *count = bytes.size();
+// The last file that was written, which JavaScript copies from where it is.
+std::vector<std::byte> file;
+
+quoin_status give(std::vector<std::byte> bytes, const std::uint8_t** out, std::size_t* count) {
+  file = std::move(bytes);
+  *out = reinterpret_cast<const std::uint8_t*>(file.data());
+  *count = file.size();
   return QUOIN_OK;
 }
 
-quoin_status write(SceneBody& body, const char* extension, const quoin_mesh_options& options, std::uint8_t** out,
-                   std::size_t* count) {
+quoin_status write(SceneBody& body, const char* extension, const quoin_mesh_options& options,
+                   const std::uint8_t** out, std::size_t* count) {
   const auto format = format_for_writing(std::string("scene") + extension);
   if (!format) return fail(format.error());
   if (format->format == FileFormat::Vox) {
     auto written = write_vox(body.loaded, progress());
     if (!written) return fail(written.error());
     body.loaded.warnings = std::move(written->warnings);
-    return give(written->bytes, out, count);
+    return give(std::move(written->bytes), out, count);
   }
   const Progress meshing = half_of(progress(), 0.0);
   const auto meshes = options.smooth != 0 ? mesh_scene_smoothly(body.loaded.scene, {}, {}, meshing)
                                           : mesh_scene(body.loaded.scene, {}, {}, meshing);
   if (!meshes) return fail(meshes.error());
-  const auto written = write_mesh(*meshes, format->format, {}, half_of(progress(), 0.5));
-  return written ? give(*written, out, count) : fail(written.error());
+  auto written = write_mesh(*meshes, format->format, {}, half_of(progress(), 0.5));
+  return written ? give(std::move(*written), out, count) : fail(written.error());
 }
 
 template <class Struct>
@@ -59,12 +61,16 @@ void* empty_struct() {
 using namespace quoin::c;
 
 quoin_status quoin_web_write(quoin_scene scene, const char* extension, const quoin_mesh_options* options,
-                             std::uint8_t** out, std::size_t* bytes) {
+                             const std::uint8_t** out, std::size_t* bytes) {
   return with_scene(scene, Use::Change, [&](SceneBody& body) {
     if (extension == nullptr || out == nullptr || bytes == nullptr)
       return fail(QUOIN_INVALID_ARGUMENT, "extension, out or bytes is null");
     return write(body, extension, options == nullptr ? quoin_mesh_options{} : *options, out, bytes);
   });
+}
+
+void quoin_web_release() {
+  file = {};
 }
 
 void quoin_web_listen(std::int32_t listens) {

@@ -7,9 +7,11 @@ extern "C" {
 #endif
 
 /* A scene as the bytes of a file. `extension` is ".glb", ".ply", ".stl" or ".3mf", of blocks or, with options->smooth,
- * smooth surfaces, or ".vox". `out` is freed with free(). Errors: those of the format's writer. */
+ * smooth surfaces, or ".vox". `out` lasts until quoin_web_release, or the next file. Errors: those of the format's
+ * writer. */
 QUOIN_API quoin_status quoin_web_write(quoin_scene scene, const char* extension, const quoin_mesh_options* options,
-                                       uint8_t** out, size_t* bytes);
+                                       const uint8_t** out, size_t* bytes);
+QUOIN_API void quoin_web_release(void);
 /* Whether JavaScript's quoin.told(fraction) is told how far the calls from now on have come; it returns whether to go on:
  * 0 ends the call with QUOIN_CANCELLED. */
 QUOIN_API void quoin_web_listen(int32_t listens);

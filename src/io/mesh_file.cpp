@@ -187,6 +187,7 @@ Result<std::vector<std::byte>> write_mesh(const SceneMeshes& meshes, FileFormat 
   if (!files) return files.error();
   if (files->size() > 1) return make_error(ErrorCode::Unsupported, "the meshes take several files in this format");
   std::vector<std::byte> bytes;
+  bytes.reserve(static_cast<std::size_t>(files->front().expected_bytes));
   const auto sink = [&](std::span<const std::byte> block) {
     bytes.insert(bytes.end(), block.begin(), block.end());
     return Status();

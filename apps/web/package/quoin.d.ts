@@ -110,12 +110,19 @@ export class Scene {
   free(): void;
 }
 
-/** Starts the WebAssembly module. It is not needed: `load` and others do the same. `module`: its bytes, or where they
- *  are, in place of quoin.wasm beside quoin.js. */
-export function start(module?: BufferSource | URL | string): Promise<void>;
+export interface Small {
+  /** The small module, quoin-small.wasm, in place of the whole one. It reads .vox alone. Scenes of it have no `render`
+   *  and no `rays`: they throw a QuoinError of code "unsupported". Less than half as much is fetched and compiled. */
+  small?: boolean;
+}
 
-/** Reads a file of any format, which its content decides. */
-export function load(bytes: ArrayBuffer | ArrayBufferView, options?: Progress): Promise<Scene>;
+/** Starts a WebAssembly module. It is not needed: `load` and others do the same. `module`: its bytes, or where they are,
+ *  in place of quoin.wasm, or quoin-small.wasm, beside quoin.js. */
+export function start(module?: BufferSource | URL | string, options?: Small): Promise<void>;
+
+/** Reads a file of any format, which its content decides. With `small` the whole module reads, and is fetched for, what
+ *  the small one does not. */
+export function load(bytes: ArrayBuffer | ArrayBufferView, options?: Progress & Small): Promise<Scene>;
 
 export interface ArrayOptions extends Progress {
   /** Of neighbours, default 1. */

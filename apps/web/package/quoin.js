@@ -16,9 +16,6 @@ const structs = { array: 0, gridInfo: 1, type: 2, meshData: 3, meshOptions: 4, r
 const scalars = [Uint8Array, Int8Array, Uint16Array, Int16Array, Uint32Array, Int32Array, BigUint64Array, BigInt64Array,
                  Float32Array, Float64Array];
 
-let compiled;  // a promise of the WebAssembly.Module
-let instance;  // a promise of the Instance that lives; undefined where there is none, or it died
-
 /** One instance of the module. What ends it is thrown as a QuoinError, and it is never called again. */
 class Instance {
   constructor(module) {
@@ -64,6 +61,8 @@ class Instance {
   run(name, ...values) {
     if (this.dead) throw new QuoinError('bad_handle', 'the instance that this belongs to has ended');
     if (this.isTelling) throw new QuoinError('invalid_argument', 'progress is to call nothing of the package');
+    if (this.exports[name] === undefined)
+      throw new QuoinError('unsupported', 'the small module has none of this: load without { small: true }');
     try {
       return this.exports[name](...values);
     } catch (error) {
@@ -220,45 +219,57 @@ class Instance {
   }
 }
 
-async function bytesOf(module) {
-  if (module instanceof ArrayBuffer || ArrayBuffer.isView(module)) return module;
-  const url = module ?? new URL('./quoin.wasm', import.meta.url);
-  if (String(url).startsWith('file:')) {
+const isBytes = (given) => given instanceof ArrayBuffer || ArrayBuffer.isView(given);
+
+/** The WebAssembly.Module of `given`: its bytes, or where they are. */
+async function compile(given) {
+  if (isBytes(given)) return WebAssembly.compile(given);
+  if (String(given).startsWith('file:')) {
     const { readFile } = await import('node:fs/promises');
-    return readFile(new URL(url));
+    return WebAssembly.compile(await readFile(new URL(given)));
   }
-  const response = await fetch(url);
-  if (!response.ok) throw new QuoinError('cannot_read', `${url}: ${response.status} ${response.statusText}`);
-  return response.arrayBuffer();
-}
-
-async function compile(module) {
-  const given = module instanceof ArrayBuffer || ArrayBuffer.isView(module);
-  const url = String(given ? '' : module ?? new URL('./quoin.wasm', import.meta.url));
+  const response = await fetch(given);
+  if (!response.ok) throw new QuoinError('cannot_read', `${given}: ${response.status} ${response.statusText}`);
   // Compiled while it arrives, where the server says that it is WebAssembly.
-  if (!given && !url.startsWith('file:')) {
-    const response = await fetch(url);
-    if (response.ok && response.headers.get('Content-Type') === 'application/wasm')
-      return WebAssembly.compileStreaming(response);
-  }
-  return WebAssembly.compile(await bytesOf(module));
+  if (response.headers.get('Content-Type') === 'application/wasm') return WebAssembly.compileStreaming(response);
+  return WebAssembly.compile(await response.arrayBuffer());
 }
 
-export async function start(module) {
-  if (module !== undefined || compiled === undefined) {
-    compiled = compile(module);
-    compiled.catch(() => { compiled = undefined; });
-    instance = undefined;
+/** One of the two modules, and the instance of it that lives. */
+class Engine {
+  #usual;     // where it is
+  #compiled;  // a promise of the WebAssembly.Module
+  #instance;  // a promise of the Instance that lives; undefined where there is none
+
+  constructor(usual) {
+    this.#usual = usual;
   }
-  await alive();
+
+  async start(given) {
+    if (given !== undefined || this.#compiled === undefined) {
+      const compiled = compile(given ?? this.#usual());
+      compiled.catch(() => { if (this.#compiled === compiled) this.#compiled = undefined; });
+      this.#compiled = compiled;
+      this.#instance = undefined;
+    }
+    await this.alive();
+  }
+
+  /** The instance for new work: where the last one ended, a fresh one. */
+  async alive() {
+    if (this.#compiled === undefined) await this.start();
+    const last = await this.#instance;
+    if (last === undefined || last.dead) this.#instance = this.#compiled.then((module) => new Instance(module));
+    return this.#instance;
+  }
 }
 
-/** The instance for new work: where the last one ended, a fresh one. */
-async function alive() {
-  if (compiled === undefined) await start();
-  const last = await instance;
-  if (last === undefined || last.dead) instance = compiled.then((module) => new Instance(module));
-  return instance;
+// Bundlers know these expressions.
+const whole = new Engine(() => new URL('./quoin.wasm', import.meta.url));
+const small = new Engine(() => new URL('./quoin-small.wasm', import.meta.url));
+
+export async function start(module, options = {}) {
+  await (options.small ? small : whole).start(module);
 }
 
 const registry = new FinalizationRegistry(({ instance: of, handle }) => {
@@ -330,7 +341,7 @@ export class Scene {
       of.call('quoin_web_write', this.#handle, name, wanted, out, out + 4);
       const at = of.view().getUint32(out, true);
       const bytes = of.numbers(Uint8Array, at, of.view().getUint32(out + 4, true));
-      of.run('free', at);
+      of.run('quoin_web_release');
       return bytes;
     };
     return of.listened(progress, () => of.withStruct('meshOptions', (wanted) =>
@@ -423,12 +434,23 @@ function asBytes(given) {
   throw new QuoinError('invalid_argument', 'bytes are an ArrayBuffer or a typed array');
 }
 
-export async function load(given, { progress } = {}) {
+export async function load(given, options = {}) {
   const bytes = asBytes(given);
-  const of = await alive();
-  const handle = of.listened(progress, () =>
-    of.withBytes(bytes, (at) => of.handle('quoin_scene_load_bytes', at, bytes.byteLength)));
-  return new Scene(of, handle);
+  if (options.small) {
+    const scene = loaded(await small.alive(), bytes, options);
+    if (scene !== undefined) return scene;
+  }
+  return loaded(await whole.alive(), bytes, options);
+}
+
+/** The scene that a module reads; undefined where it does not read such files. */
+function loaded(of, bytes, { progress }) {
+  return of.withBytes(bytes, (at) => {
+    if (of.exports.quoin_web_reads !== undefined && of.run('quoin_web_reads', at, bytes.byteLength) === 0)
+      return undefined;
+    const handle = of.listened(progress, () => of.handle('quoin_scene_load_bytes', at, bytes.byteLength));
+    return new Scene(of, handle);
+  });
 }
 
 /** Calls use(instance, the address of the array's description). */
@@ -438,7 +460,7 @@ async function withArray(array, shape, { spacing = [1, 1, 1], origin = [0, 0, 0]
   if (shape.length !== 3 || shape.some((n) => !Number.isInteger(n) || n < 0) ||
       shape[0] * shape[1] * shape[2] !== array.length)
     throw new QuoinError('invalid_argument', `a shape of ${shape} does not fit ${array.length} samples`);
-  const of = await alive();
+  const of = await whole.alive();
   return of.listened(progress, () => of.withBytes(array, (data) => of.withStruct('array', (at) => {
     const view = of.view();
     const size = array.BYTES_PER_ELEMENT;
@@ -475,6 +497,6 @@ export async function toThree(scene, GLTFLoader, options = {}) {
 }
 
 export async function version() {
-  const of = await alive();
+  const of = await whole.alive();
   return of.text(of.run('quoin_version'));
 }

@@ -9,6 +9,12 @@ const { load, meshLabels, surfaceNets, toThree, QuoinError } = await import(
   pathToFileURL(join(packageFolder, 'quoin.js')));
 const THREE = await import(pathToFileURL(resolve(three, 'build/three.module.js')));
 const { GLTFLoader } = await import(pathToFileURL(resolve(three, 'examples/jsm/loaders/GLTFLoader.js')));
+// What three.js' loader takes of a browser: pictures of known size.
+globalThis.self = globalThis;
+globalThis.createImageBitmap = async (blob) => {
+  const png = new DataView(await blob.arrayBuffer());
+  return { width: png.getUint32(16), height: png.getUint32(20), close() {} };
+};
 let checked = 0;
 let failed = 0;
 
@@ -44,7 +50,8 @@ const scene = await load(bytes);
     if (!object.isMesh) return;
     ++meshes;
     triangles += object.geometry.index.count / 3;
-    check(object.material.isMeshStandardMaterial, `${object.name} has ${object.material.type}`);
+    const { material } = object;
+    check(material.isMeshStandardMaterial && material.map.image.width > 0, `${object.name} has ${material.type}`);
   });
   const inGlb = JSON.parse(Buffer.from(scene.glb().buffer, 20, new DataView(scene.glb().buffer).getUint32(12, true)));
   check(triangles > 0 && meshes >= inGlb.meshes.length, `${meshes} meshes of three.js of ${inGlb.meshes.length}`);
@@ -56,7 +63,8 @@ const scene = await load(bytes);
   const origins = [];
   const directions = [];
   for (let i = 0; i < count; ++i) {
-    const from = new THREE.Vector3(random() - 0.5, random() / 2 + 0.05, random() - 0.5).setLength(1.5 * radius).add(middle);
+    const from = new THREE.Vector3(random() - 0.5, random() / 2 + 0.05, random() - 0.5);
+    from.setLength(1.5 * radius).add(middle);
     const at = new THREE.Vector3(random() - 0.5, random() - 0.5, random() - 0.5);
     const along = at.multiply(box.getSize(new THREE.Vector3())).add(middle).sub(from).normalize();
     origins.push(...from);

@@ -1,0 +1,32 @@
+// quoin-small.wasm: what reads .vox alone, for pages that show blocks soon. All else is that of quoin.wasm, and has its
+// names.
+
+#include <quoin/io/formats.h>
+#include <quoin/io/vox.h>
+
+#include "handles.h"
+
+#define QUOIN_EXPORT(name) __attribute__((export_name(name)))
+
+namespace quoin::c {
+
+// Whether this module reads a file of these bytes; quoin.wasm, which has no such function, reads all that there are.
+QUOIN_EXPORT("quoin_web_reads") std::int32_t reads(const std::byte* data, std::size_t bytes) {
+  return detect_format(std::span(data, bytes)) == FileFormat::Vox ? 1 : 0;
+}
+
+QUOIN_EXPORT("quoin_scene_load_bytes")
+quoin_status load_bytes(const std::byte* data, std::size_t bytes, quoin_scene* out) {
+  return guarded([&] {
+    if (data == nullptr || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "data or out is null");
+    auto loaded = read_vox(std::span(data, bytes), {}, progress());
+    if (!loaded) return fail(loaded.error());
+    auto body = std::make_shared<SceneBody>();
+    body->loaded = std::move(*loaded);
+    number(*body);
+    *out = handles().put(std::move(body));
+    return QUOIN_OK;
+  });
+}
+
+}  // namespace quoin::c
