@@ -2,11 +2,14 @@
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import { isDrawnByProgram, PlainModel, prepare } from './plain.js';
 
 const $ = (id) => document.getElementById(id);
 const degrees = Math.PI / 180;
 const canvas = $('view');
-const renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
+const isSlow = isDrawnByProgram();
+const renderer = new THREE.WebGLRenderer({ canvas, antialias: !isSlow, alpha: true, preserveDrawingBuffer: true });
+renderer.debug.checkShaderErrors = false;  // asking for them waits
 renderer.shadowMap.enabled = true;
 renderer.toneMapping = THREE.NoToneMapping;
 const stage = new THREE.Scene();
@@ -14,7 +17,7 @@ const camera = new THREE.PerspectiveCamera(45, 1, 0.1, 1000);
 const controls = new OrbitControls(camera, canvas);
 const sky = new THREE.HemisphereLight(0xdfeaff, 0x8a8478, 1.4);
 const sun = new THREE.DirectionalLight(0xfff1dc, 2.4);
-sun.castShadow = true;
+sun.castShadow = !isSlow;
 sun.shadow.mapSize.set(2048, 2048);
 sun.shadow.normalBias = 0.4;
 const tape = new THREE.Line(new THREE.BufferGeometry(),
@@ -25,6 +28,7 @@ stage.add(sky, sun, sun.target, tape);
 
 let file;      // { name, bytes }
 let model;     // what is shown of it
+let plain;     // the same, plainly; where a program draws
 let glb;       // its bytes
 let radius = 1;
 let centre = new THREE.Vector3();
@@ -45,7 +49,9 @@ function newWorker() {
   worker?.terminate();
   for (const { reject } of jobs.values()) reject(new Error('it was stopped'));
   jobs = new Map();
-  worker = new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
+  // The first one was begun by start.js.
+  worker = globalThis.quoinWorker ?? new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
+  globalThis.quoinWorker = undefined;
   worker.onmessage = ({ data: { id, answer, error } }) => {
     const job = jobs.get(id);
     jobs.delete(id);
@@ -68,13 +74,36 @@ function ask(name, options) {
 }
 
 // ---- Drawing, only when something changed.
+let rest;  // the timer after which what was drawn plainly is drawn well
+
 function draw() {
   frame = 0;
+  clearTimeout(rest);
+  rest = undefined;
+  plain?.show(false);
+  sun.castShadow = true;
   renderer.render(stage, camera);
 }
 
+/** Draws at once, on a program plainly until nothing has changed for a while. */
+function drawSoon() {
+  if (!isSlow) return draw();
+  frame = 0;
+  plain?.show(true);
+  sun.castShadow = false;
+  renderer.render(stage, camera);
+  clearTimeout(rest);
+  rest = plain && setTimeout(draw, 600);
+}
+
 function redraw() {
-  frame ||= requestAnimationFrame(draw);
+  frame ||= requestAnimationFrame(drawSoon);
+}
+
+/** Until what was drawn is there. */
+function waitForPicture() {
+  const gl = renderer.getContext();
+  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
 }
 
 function resize() {
@@ -136,6 +165,7 @@ function viewFromText(text) {
 // ---- Files.
 async function show(bytes) {
   const { scene } = await new GLTFLoader().parseAsync(bytes.buffer, '');
+  plain?.dispose();
   model?.removeFromParent();
   model?.traverse((object) => {
     object.geometry?.dispose();
@@ -149,6 +179,7 @@ async function show(bytes) {
     object.receiveShadow = true;
   });
   stage.add(model);
+  if (isSlow) plain = new PlainModel(model);
   const box = new THREE.Box3().setFromObject(model);
   if (box.isEmpty()) box.set(new THREE.Vector3(-1, -1, -1), new THREE.Vector3(1, 1, 1));
   centre = box.getCenter(new THREE.Vector3());
@@ -170,8 +201,9 @@ async function open(name, bytes) {
     file = { name, bytes };
     home();
     viewFromText(location.hash);
-    draw();
+    drawSoon();
     describe(name, answer);
+    waitForPicture();
     const total = performance.now() - began;
     say(`${name}: read in ${answer.milliseconds.load.toFixed(0)} ms, meshed in ${
       answer.milliseconds.mesh.toFixed(0)} ms, on the screen in ${total.toFixed(0)} ms.`);
@@ -366,3 +398,4 @@ newWorker();
 resize();
 const asked = new URLSearchParams(location.search).get('file');
 if (asked) openAddress(asked);
+if (isSlow) prepare(renderer, stage, camera);
