@@ -40,6 +40,8 @@ function say(text, isError = false) {
   $('status').classList.toggle('error', isError);
 }
 
+const percent = (fraction) => `${Math.round(100 * fraction)} %`;
+
 // ---- The worker. One that is busy with what nobody waits for is replaced.
 let worker;
 let jobs = new Map();
@@ -52,8 +54,9 @@ function newWorker() {
   // The first one was begun by start.js.
   worker = globalThis.quoinWorker ?? new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
   globalThis.quoinWorker = undefined;
-  worker.onmessage = ({ data: { id, answer, error } }) => {
+  worker.onmessage = ({ data: { id, fraction, answer, error } }) => {
     const job = jobs.get(id);
+    if (fraction !== undefined) return job?.tell?.(fraction);
     jobs.delete(id);
     if (error === undefined) job?.resolve(answer);
     else job?.reject(new Error(error.message));
@@ -65,10 +68,11 @@ function newWorker() {
   };
 }
 
-function ask(name, options) {
+/** tell: told how far it has come, where that takes long. */
+function ask(name, options, tell) {
   const id = ++lastJob;
   return new Promise((resolve, reject) => {
-    jobs.set(id, { resolve, reject });
+    jobs.set(id, { resolve, reject, tell });
     worker.postMessage({ id, name, options });
   });
 }
@@ -195,7 +199,7 @@ async function open(name, bytes) {
   say(`Reading ${name} ...`);
   if (jobs.size > 0) newWorker();
   try {
-    const answer = await ask('load', { bytes });
+    const answer = await ask('load', { bytes }, (fraction) => say(`Reading ${name}: ${percent(fraction)} ...`));
     glb = answer.glb;
     await show(answer.glb.slice());
     file = { name, bytes };
@@ -352,7 +356,8 @@ $('home').addEventListener('click', home);
 $('smooth').addEventListener('change', async () => {
   say('Meshing ...');
   try {
-    glb = (await ask('glb', { smooth: $('smooth').checked })).glb;
+    const tell = (fraction) => say(`Meshing: ${percent(fraction)} ...`);
+    glb = (await ask('glb', { smooth: $('smooth').checked }, tell)).glb;
     await show(glb.slice());
     placeSun();
     say('');
@@ -374,7 +379,7 @@ $('march').addEventListener('click', async () => {
     const { width, height, rgba } = await ask('march', {
       width: innerWidth, height: innerHeight, samples: 4,
       camera: { position: camera.position.toArray(), lookAt: controls.target.toArray(), fovDegrees: camera.fov },
-    });
+    }, (fraction) => say(`Drawing by rays, on one thread: ${percent(fraction)} ...`));
     const picture = new OffscreenCanvas(width, height);
     picture.getContext('2d').putImageData(new ImageData(rgba, width, height), 0, 0);
     give(await picture.convertToBlob({ type: 'image/png' }), '.png');

@@ -20,29 +20,36 @@ async function wholeScene() {
 }
 
 const work = {
-  async load({ bytes, smooth }) {
+  async load({ bytes, smooth }, tell) {
     scene?.free();
     scene = undefined;
     isWhole = false;
     file = bytes;
     const began = performance.now();
-    scene = await load(bytes, { small: true });
+    scene = await load(bytes, { small: true, progress: (fraction) => tell(fraction / 2) });
     const loaded = performance.now();
-    const glb = scene.glb(smooth === undefined ? {} : { smooth });
+    const progress = (fraction) => tell(0.5 + fraction / 2);
+    const glb = scene.glb(smooth === undefined ? { progress } : { smooth, progress });
     return { glb, warnings: scene.warnings, grids: scene.grids, types: scene.types.length - 1,
              milliseconds: { load: loaded - began, mesh: performance.now() - loaded } };
   },
-  async glb({ smooth }) {
-    return { glb: scene.glb({ smooth }) };
+  async glb({ smooth }, tell) {
+    return { glb: scene.glb({ smooth, progress: tell }) };
   },
-  async march(options) {
-    return (await wholeScene()).render(options);
+  async march(options, tell) {
+    return (await wholeScene()).render({ ...options, progress: tell });
   },
 };
 
 onmessage = async ({ data: { id, name, options } }) => {
+  let told = performance.now();
+  const tell = (fraction) => {
+    if (performance.now() - told < 100) return;
+    told = performance.now();
+    postMessage({ id, fraction });
+  };
   try {
-    const answer = await work[name](options);
+    const answer = await work[name](options, tell);
     postMessage({ id, answer }, [(answer.glb ?? answer.rgba).buffer]);
   } catch (error) {
     postMessage({ id, error: { message: error.message, code: error.code } });

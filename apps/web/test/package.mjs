@@ -12,13 +12,20 @@ const run = (program, ...args) => execFileSync(program, args, { cwd: folder, std
 writeFileSync(join(folder, 'package.json'), '{"type": "module", "private": true}\n');
 run('npm', 'install', '--silent', '--no-audit', '--no-fund', '--offline', tarball);
 writeFileSync(join(folder, 'use.ts'), `
-import { load, surfaceNets, toThree, QuoinError, type ErrorCode, type Mesh, type Scene } from 'quoin';
+import { load, meshLabels, start, surfaceNets, toThree, QuoinError } from 'quoin';
+import type { ErrorCode, Hits, LabelMesh, Mesh, Scene } from 'quoin';
 
 export async function use(bytes: Uint8Array): Promise<number> {
-  const scene: Scene = await load(bytes);
+  await start(undefined, { small: true });
+  const scene: Scene = await load(bytes, { small: true, progress: (fraction) => fraction < 2 });
   const glb: Uint8Array = scene.glb({ smooth: false });
   const mesh: Mesh = await surfaceNets(new Float32Array(8), [2, 2, 2], 0.5, { spacing: [1, 1, 2] });
   const picture = scene.render({ width: 8, height: 8, camera: { position: [1, 2, 3], lookAt: [0, 0, 0] } });
+  const hits: Hits = scene.rays([0, 9, 0], new Float32Array([0, -1, 0]), { maxT: 20 });
+  const labels: LabelMesh<number> = await meshLabels(new Uint8Array(8), [2, 2, 2], { background: 1 });
+  const large: LabelMesh<bigint> = await meshLabels(new BigInt64Array(8), [2, 2, 2], { relaxationSteps: 0 });
+  const behind: bigint | undefined = large.interfaces[0]?.back;
+  console.log(hits.t.length + hits.voxel.length, labels.interfaces.length, behind);
   class Loader { async parseAsync(_data: ArrayBuffer, _path: string) { return { scene: { name: 'group' } }; } }
   const group = await toThree(scene, Loader);
   try {
@@ -31,6 +38,8 @@ export async function use(bytes: Uint8Array): Promise<number> {
 }
 // @ts-expect-error: bytes, not a path
 void load('castle.vox');
+// @ts-expect-error: labels are whole numbers
+void meshLabels(new Float32Array(8), [2, 2, 2]);
 `);
 run(process.execPath, tsc, '--strict', '--noEmit', '--exactOptionalPropertyTypes', '--noUncheckedIndexedAccess',
     '--target', 'es2022', '--module', 'nodenext', 'use.ts', 'node_modules/quoin/quoin.d.ts');
@@ -43,6 +52,7 @@ console.log(\`package: \${scene.grids.length} grids, a GLB of \${scene.glb().len
 `);
 process.stdout.write(run(process.execPath, 'use.mjs', file));
 const licences = readFileSync(join(folder, 'node_modules/quoin/LICENSES'), 'utf8');
-for (const name of ['zlib', 'libpng', 'LLVM', 'wasi-libc', 'GLM', 'nlohmann-json', 'robin-map', 'tl::expected'])
+for (const name of ['zlib', 'libpng', 'LLVM', 'wasi-libc', 'GLM', 'nlohmann-json', 'robin-map', 'tl::expected',
+                    'tinygltf', 'tinyobjloader'])
   if (!licences.includes(`======== ${name}`)) throw new Error(`the package does not have the licence of ${name}`);
 rmSync(folder, { recursive: true });
