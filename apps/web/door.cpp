@@ -30,8 +30,8 @@ quoin_status give(std::vector<std::byte> bytes, const std::uint8_t** out, std::s
   return QUOIN_OK;
 }
 
-quoin_status write(SceneBody& body, const char* extension, const quoin_mesh_options& options,
-                   const std::uint8_t** out, std::size_t* count) {
+quoin_status write(SceneBody& body, const char* extension, const quoin_mesh_options& options, const std::uint8_t** out,
+                   std::size_t* count) {
   const auto format = format_for_writing(std::string("scene") + extension);
   if (!format) return fail(format.error());
   if (format->format == FileFormat::Vox) {
@@ -74,7 +74,8 @@ void quoin_web_release() {
 }
 
 void quoin_web_listen(std::int32_t listens) {
-  quoin_set_progress(listens == 0 ? nullptr : [](double fraction, void*) { return quoin_web_told(fraction); }, nullptr);
+  quoin_set_progress(
+      listens == 0 ? nullptr : [](double fraction, void*) { return quoin_web_told(fraction); }, nullptr);
 }
 
 void* quoin_web_struct(std::int32_t kind) {

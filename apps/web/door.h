@@ -12,11 +12,12 @@ extern "C" {
 QUOIN_API quoin_status quoin_web_write(quoin_scene scene, const char* extension, const quoin_mesh_options* options,
                                        const uint8_t** out, size_t* bytes);
 QUOIN_API void quoin_web_release(void);
-/* Whether JavaScript's quoin.told(fraction) is told how far the calls from now on have come; it returns whether to go on:
- * 0 ends the call with QUOIN_CANCELLED. */
+/* Whether JavaScript's quoin.told(fraction) is told how far the calls from now on have come; it returns whether to go
+ * on: 0 ends the call with QUOIN_CANCELLED. */
 QUOIN_API void quoin_web_listen(int32_t listens);
 /* A quoin_mesh_options and so on, all 0 but its size, for whom structs are bytes: `kind` is 0 array, 1 grid_info,
- * 2 type, 3 mesh_data, 4 mesh_options, 5 render_options, 6 hits; null: no memory, or another kind. Freed with free(). */
+ * 2 type, 3 mesh_data, 4 mesh_options, 5 render_options, 6 hits; null: no memory, or another kind. Freed with
+ * free(). */
 QUOIN_API void* quoin_web_struct(int32_t kind);
 
 #ifdef __cplusplus

@@ -116,8 +116,8 @@ export interface Small {
   small?: boolean;
 }
 
-/** Starts a WebAssembly module. It is not needed: `load` and others do the same. `module`: its bytes, or where they are,
- *  in place of quoin.wasm, or quoin-small.wasm, beside quoin.js. */
+/** Starts a WebAssembly module. It is not needed: `load` and others do the same. `module`: its bytes, or where they
+ *  are, in place of quoin.wasm, or quoin-small.wasm, beside quoin.js. */
 export function start(module?: BufferSource | URL | string, options?: Small): Promise<void>;
 
 /** Reads a file of any format, which its content decides. With `small` the whole module reads, and is fetched for, what

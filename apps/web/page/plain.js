@@ -12,11 +12,10 @@ export function isDrawnByProgram() {
 }
 
 function plainOf(material) {
-  const { name, map, color, vertexColors, alphaTest, depthWrite, side, emissive, emissiveMap, emissiveIntensity } = material;
-  // What is behind glass shows through as much of it as glass lets through.
-  const through = material.transmission ?? 0;
+  const { map, color, vertexColors, alphaTest, depthWrite, side, emissive, emissiveMap, emissiveIntensity } = material;
+  const through = material.transmission ?? 0;  // of the light; half of it counts, by eye
   return new THREE.MeshLambertMaterial({
-    name, map, color, vertexColors, alphaTest, depthWrite, side, emissive, emissiveMap, emissiveIntensity,
+    map, color, vertexColors, alphaTest, depthWrite, side, emissive, emissiveMap, emissiveIntensity,
     transparent: material.transparent || through > 0, opacity: material.opacity * (1 - through / 2),
   });
 }

@@ -33,7 +33,8 @@ void put_quad(const Quad& quad, IVec3 origin, std::size_t number, BlockyTriangle
     out.types[first + i] = vertex.type;
   });
   std::uint32_t* index = out.indices.data() + 6 * number;
-  for (const std::uint8_t corner : triangle_corners(quad.flipped())) *index++ = static_cast<std::uint32_t>(first) + corner;
+  for (const std::uint8_t corner : triangle_corners(quad.flipped()))
+    *index++ = static_cast<std::uint32_t>(first) + corner;
 }
 
 void append_outline(const Quad& quad, IVec3 origin, const std::vector<OutlinePoint>& outline, BlockyTriangles& out) {
