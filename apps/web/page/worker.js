@@ -2,11 +2,15 @@
 import { load } from '../package/quoin.js';
 
 let scene;
+let shaders;  // of it; what WebGPU marches it by
+
+const samplesOfAPixel = 16;
 
 const work = {
   async load({ bytes, smooth }) {
+    shaders?.free();
     scene?.free();
-    scene = undefined;
+    shaders = scene = undefined;
     const began = performance.now();
     scene = await load(bytes);
     const loaded = performance.now();
@@ -20,12 +24,21 @@ const work = {
   async march(options) {
     return scene.render(options);
   },
+  async shaders() {
+    shaders?.free();
+    shaders = scene.forShaders();
+    const { bytes, has } = shaders;
+    return { bytes, has, samples: Array.from({ length: samplesOfAPixel }, (_, i) => shaders.sample(i)) };
+  },
+  async frame(options) {
+    return { frame: shaders.frame(options) };
+  },
 };
 
 onmessage = async ({ data: { id, name, options } }) => {
   try {
     const answer = await work[name](options);
-    postMessage({ id, answer }, [(answer.glb ?? answer.rgba).buffer]);
+    postMessage({ id, answer }, [(answer.glb ?? answer.rgba ?? answer.bytes ?? answer.frame).buffer]);
   } catch (error) {
     postMessage({ id, error: { message: error.message, code: error.code } });
   }
