@@ -198,8 +198,8 @@ Result<Image> picture_of(const Scene& scene, const quoin_render_options& options
     if (!picture) return picture.error();
     return develop(*picture);
   }
-  auto picture = CpuRenderer(scene, InstanceFilter::Visible, threads)
-                     .render(taking.camera, taking.options, threads, progress());
+  auto picture =
+      CpuRenderer(scene, InstanceFilter::Visible, threads).render(taking.camera, taking.options, threads, progress());
   if (!picture) return picture.error();
   return std::move(picture->colour);
 }

@@ -17,7 +17,8 @@ const flagsAt = 536;
 // A perspective, lit, with shadows, rays of occlusion in fixed directions; lamps and surfaces of glass there may be.
 const neededFlags = 1 | 2 | 4 | 8 | 64;
 const knownFlags = neededFlags | 2048 | 4096;
-const tileEdge = 256;
+const tileEdge = 128;
+const patience = 50;  // milliseconds of work that nothing can end
 const pushBytes = 256;  // what a dynamic offset is a multiple of; a Push has 96
 const pointBytes = 48;
 
@@ -31,7 +32,7 @@ export async function openDevice() {
   return { device, name: [adapter.info.vendor, adapter.info.architecture].filter(Boolean).join(' ') };
 }
 
-const megabytes = (bytes) => `${(bytes / 2 ** 20).toFixed(0)} MiB`;
+const sizeOf = (bytes) => (bytes < 2 ** 20 ? `${Math.ceil(bytes / 1024)} KiB` : `${Math.ceil(bytes / 2 ** 20)} MiB`);
 
 /** One scene on a device, and the picture that is made of it, sample by sample. */
 export class Marcher {
@@ -47,6 +48,7 @@ export class Marcher {
   #pushes;
   #groups;
   #shown;
+  #atOnce = 1;  // tiles
   /** Of the picture so far. */
   samples = 0;
 
@@ -55,8 +57,8 @@ export class Marcher {
     const marcher = new Marcher();
     const most = device.limits.maxStorageBufferBindingSize;
     if (scene.bytes.byteLength > most)
-      throw new Error(`the scene takes ${megabytes(scene.bytes.byteLength)} there, and the adapter binds ${
-        megabytes(most)} at most`);
+      throw new Error(`the scene takes ${sizeOf(scene.bytes.byteLength)} there, and the adapter binds ${
+        sizeOf(most)} at most`);
     marcher.#device = device;
     marcher.#samples = scene.samples;
     device.pushErrorScope('validation');
@@ -135,7 +137,8 @@ export class Marcher {
     for (const buffer of Object.values(this.#picture ?? {})) buffer.destroy();
     this.#size = [width, height];
     const { STORAGE, COPY_SRC } = GPUBufferUsage;
-    this.#picture = { points: this.#buffer(Math.min(tileEdge, width) * Math.min(tileEdge, height) * pointBytes, STORAGE),
+    const ofTile = Math.min(tileEdge, width) * Math.min(tileEdge, height);
+    this.#picture = { points: this.#buffer(ofTile * pointBytes, STORAGE),
                       sums: this.#buffer(width * height * 16, STORAGE),
                       colours: this.#buffer(width * height * 4, STORAGE | COPY_SRC) };
     this.#pushes?.destroy();
@@ -173,27 +176,36 @@ export class Marcher {
       pushes.set(this.#samples[this.samples], i * pushBytes);
       const view = new DataView(pushes.buffer, i * pushBytes);
       [x, y, columns, rows].forEach((value, k) => view.setInt32(8 + 4 * k, value, true));
-      [this.samples, y * this.#size[0] + x, this.#size[0]].forEach((value, k) => view.setUint32(68 + 4 * k, value, true));
+      const [sample, place, pitch] = [this.samples, y * this.#size[0] + x, this.#size[0]];
+      [sample, place, pitch].forEach((value, k) => view.setUint32(68 + 4 * k, value, true));
     });
     this.#device.queue.writeBuffer(this.#pushes, 0, pushes);
-    // One at a time, so that nothing thinks that the device hangs, and what nobody wants ends.
-    for (const [i, [, , columns, rows]] of tiles.entries()) {
-      this.#addTile(i * pushBytes, Math.ceil(columns / 8), Math.ceil(rows / 8));
+    // As many at a time as keep the device busy; so nothing thinks that it hangs, and what nobody wants ends.
+    for (let next = 0; next < tiles.length;) {
+      const began = performance.now();
+      const end = Math.min(next + this.#atOnce, tiles.length);
+      this.#addTiles(tiles, next, end);
       await this.#device.queue.onSubmittedWorkDone();
       if (!isWanted()) return false;
+      const took = performance.now() - began;
+      if (took < patience / 3 && end - next === this.#atOnce) this.#atOnce *= 2;
+      if (took > patience) this.#atOnce = Math.max(Math.floor(this.#atOnce / 2), 1);
+      next = end;
     }
     this.samples += 1;
     return true;
   }
 
-  #addTile(offset, columns, rows) {
+  #addTiles(tiles, begin, end) {
     const commands = this.#device.createCommandEncoder();
     const pass = commands.beginComputePass();
     pass.setBindGroup(0, this.#groups[0]);
-    pass.setBindGroup(1, this.#groups[1], [offset]);
-    for (const pipeline of [this.#pipelines.points, this.#pipelines.lights, this.#pipelines.resolves]) {
-      pass.setPipeline(pipeline);
-      pass.dispatchWorkgroups(columns, rows);
+    for (let i = begin; i < end; ++i) {
+      pass.setBindGroup(1, this.#groups[1], [i * pushBytes]);
+      for (const pipeline of [this.#pipelines.points, this.#pipelines.lights, this.#pipelines.resolves]) {
+        pass.setPipeline(pipeline);
+        pass.dispatchWorkgroups(Math.ceil(tiles[i][2] / 8), Math.ceil(tiles[i][3] / 8));
+      }
     }
     pass.end();
     this.#device.queue.submit([commands.finish()]);
@@ -209,8 +221,8 @@ export class Marcher {
     const texture = context.getCurrentTexture();
     this.#shown ??= this.#buffer(16, GPUBufferUsage.UNIFORM);
     this.#device.queue.writeBuffer(this.#shown, 0, new Uint32Array([...this.#size, texture.width, texture.height]));
-    const group = this.#device.createBindGroup({ layout: this.#pipelines.shows.getBindGroupLayout(0), entries: [
-      { binding: 0, resource: { buffer: this.#picture.colours } }, { binding: 1, resource: { buffer: this.#shown } }] });
+    const entries = [this.#picture.colours, this.#shown].map((buffer, binding) => ({ binding, resource: { buffer } }));
+    const group = this.#device.createBindGroup({ layout: this.#pipelines.shows.getBindGroupLayout(0), entries });
     const commands = this.#device.createCommandEncoder();
     const pass = commands.beginRenderPass({ colorAttachments: [
       { view: texture.createView(), loadOp: 'clear', storeOp: 'store' }] });

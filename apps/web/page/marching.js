@@ -1,5 +1,5 @@
-// The mode in which the page's view is marched: by WebGPU where there is an adapter that has room for the scene, else by
-// the module in the worker, once the view rests.
+// The mode in which the page's view is marched: by WebGPU where there is an adapter with room for the scene, else by the
+// module in the worker, once the view rests.
 import { Marcher, openDevice } from './march.js';
 
 const rest = 250;           // milliseconds without a change
@@ -75,7 +75,6 @@ class ByModule {
   }
 
   async draw(view, factor, isWanted, shown) {
-    if (factor !== 1) return;
     const began = performance.now();
     const { width, height, rgba } = await this.ask('march', { ...view, samples: 1 });
     if (!isWanted()) return;
@@ -184,39 +183,48 @@ export class MarchedView {
     this.#canvas.dataset.shown = isShown;
   }
 
+  // Every change is shown at once, coarsely; and finely where no other follows.
   async #run(isCurrent) {
-    let drawn = 0;  // as of which change; complete where the view rested
+    let drawn = 0;  // as of which change
     let isComplete = false;
     while (isCurrent()) {
-      if (drawn === this.#changes && isComplete) await new Promise((wake) => { this.#wake = wake; });
-      if (!isCurrent()) return;
-      const by = this.#by;
-      const moving = performance.now() - this.#changed < rest;
-      const view = this.#page.view();
-      const factor = moving ? by.factor(view.width * view.height) : 1;
-      if (moving && drawn === this.#changes || factor === Infinity) {
-        await new Promise((done) => setTimeout(done, 30));
+      const isNew = drawn !== this.#changes;
+      if (!isNew && isComplete) {
+        await new Promise((wake) => { this.#wake = wake; });
         continue;
       }
+      const by = this.#by;
+      const view = this.#page.view();
+      const factor = isNew ? by.factor(view.width * view.height) : 1;
       const change = this.#changes;
-      const isWanted = () => isCurrent() && by === this.#by && (factor > 1 || change === this.#changes);
-      try {
-        if (this.#canvas.width !== view.width || this.#canvas.height !== view.height)
-          Object.assign(this.#canvas, { width: view.width, height: view.height });
-        await by.draw(view, factor, isWanted, (facts) => {
-          this.#show(true);
-          this.#page.shown(facts);
-        });
-      } catch (error) {
-        if (!isCurrent()) return;
-        if (by instanceof ByModule) {
-          this.#page.said(error.message);
-        } else if (by === this.#by) {
-          this.#fallBack(error.message);
+      if (factor !== Infinity) {
+        if (!isNew && performance.now() - this.#changed < rest) {
+          await new Promise((done) => setTimeout(done, 30));
+          continue;
         }
+        const isWanted = () => isCurrent() && by === this.#by && (isNew && factor > 1 || change === this.#changes);
+        await this.#draw(by, view, factor, isWanted);
       }
       drawn = change;
       isComplete = factor === 1;
+    }
+  }
+
+  async #draw(by, view, factor, isWanted) {
+    if (this.#canvas.width !== view.width || this.#canvas.height !== view.height)
+      Object.assign(this.#canvas, { width: view.width, height: view.height });
+    try {
+      await by.draw(view, factor, isWanted, (facts) => {
+        this.#show(true);
+        this.#page.shown(facts);
+      });
+    } catch (error) {
+      if (!isWanted()) return;
+      if (by instanceof ByModule) {
+        this.#page.said(error.message);
+      } else {
+        this.#fallBack(error.message);
+      }
     }
   }
 }

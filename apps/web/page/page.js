@@ -99,8 +99,8 @@ const marched = new MarchedView({
     return viewOf(Math.floor(innerWidth * ratio), Math.floor(innerHeight * ratio));
   },
   shown: (facts) => {
-    $('marching').textContent = `${facts.by}: ${facts.width} x ${facts.height}, ${facts.milliseconds.toFixed(0)} ms a sample, ${
-      facts.samples} of a pixel`;
+    const { by, width, height, milliseconds, samples } = facts;
+    $('marching').textContent = `${by}: ${width} x ${height}, ${milliseconds.toFixed(0)} ms a sample, ${samples} a pixel`;
     window.quoinMarched = facts;
     redraw();
   },

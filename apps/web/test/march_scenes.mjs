@@ -53,9 +53,9 @@ function halfOf(value) {
 const sceneOf = (body) => Buffer.from(JSON.stringify({ quoin_scene: 3, ...body }));
 
 const types = [
-  { colour: [150, 150, 140, 255] }, { colour: [190, 60, 40, 255] }, { colour: [60, 120, 190, 110], visibility: 'transparent' },
-  { colour: [250, 220, 160, 255], emission: 3 }, { colour: [80, 200, 120, 60], visibility: 'transparent', ior: 1.33 },
-  { colour: [90, 140, 60, 255] },
+  { colour: [150, 150, 140, 255] }, { colour: [190, 60, 40, 255] },
+  { colour: [60, 120, 190, 110], visibility: 'transparent' }, { colour: [250, 220, 160, 255], emission: 3 },
+  { colour: [80, 200, 120, 60], visibility: 'transparent', ior: 1.33 }, { colour: [90, 140, 60, 255] },
 ];
 
 // A floor, pillars, a wall with a window, a basin of water, lanterns.

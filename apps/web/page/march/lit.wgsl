@@ -77,7 +77,8 @@ fn lamps_around(voxel: vec4i) -> vec2u {
 }
 
 // Of a lamp, which has thirteen vectors: position (w: its reach), three axes (w: what is added to the distance's
-// square, cosines of a spot's angles), six powers, low (w: 1 where it is a point, 2 where it is a spot), high, direction.
+// square, cosines of a spot's angles), six powers, low (w: 1 where it is a point, 2 where it is a spot), high and
+// direction.
 fn lamp_vector(lamp: u32, field: u32) -> vec4f {
   return vector_at(frame.lamps.x, 13u * lamp + field);
 }
