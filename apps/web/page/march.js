@@ -55,20 +55,34 @@ export class Marcher {
   /** `scene`: { bytes, has, samples } as a worker gives them. Rejects where the device has no room for it. */
   static async open(device, scene) {
     const marcher = new Marcher();
-    const most = device.limits.maxStorageBufferBindingSize;
-    if (scene.bytes.byteLength > most)
-      throw new Error(`the scene takes ${sizeOf(scene.bytes.byteLength)} there, and the adapter binds ${
-        sizeOf(most)} at most`);
     marcher.#device = device;
     marcher.#samples = scene.samples;
+    marcher.#checkSize('the scene', scene.bytes.byteLength);
+    try {
+      await marcher.#put(scene);
+    } catch (error) {
+      marcher.close();
+      throw error;
+    }
+    return marcher;
+  }
+
+  #checkSize(what, bytes) {
+    const most = this.#device.limits.maxStorageBufferBindingSize;
+    if (bytes > most) throw new Error(`${what} takes ${sizeOf(bytes)} there, and the adapter binds ${sizeOf(most)}`);
+  }
+
+  async #put(scene) {
+    const device = this.#device;
     device.pushErrorScope('validation');
     device.pushErrorScope('out-of-memory');
-    marcher.#scene = marcher.#buffer(scene.bytes.byteLength, GPUBufferUsage.STORAGE, scene.bytes);
-    marcher.#uniform = marcher.#buffer(frameBytes, GPUBufferUsage.UNIFORM);
-    await marcher.#compile(scene.has);
-    const errors = [await device.popErrorScope(), await device.popErrorScope()].filter((error) => error !== null);
-    if (errors.length > 0) throw new Error(errors[0].message);
-    return marcher;
+    this.#scene = this.#buffer(scene.bytes.byteLength, GPUBufferUsage.STORAGE, scene.bytes);
+    this.#uniform = this.#buffer(frameBytes, GPUBufferUsage.UNIFORM);
+    const errors = [device.popErrorScope(), device.popErrorScope()];
+    for (const error of await Promise.all(errors)) {
+      if (error !== null) throw new Error(error.message);
+    }
+    await this.#compile(scene.has);
   }
 
   /** Frees what the device keeps of it. */
@@ -134,6 +148,7 @@ export class Marcher {
 
   #resize(width, height) {
     if (this.#size[0] === width && this.#size[1] === height) return;
+    this.#checkSize('the picture', width * height * 16);
     for (const buffer of Object.values(this.#picture ?? {})) buffer.destroy();
     this.#size = [width, height];
     const { STORAGE, COPY_SRC } = GPUBufferUsage;

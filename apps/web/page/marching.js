@@ -1,10 +1,10 @@
-// The mode in which the page's view is marched: by WebGPU where there is an adapter with room for the scene, else by the
-// module in the worker, once the view rests.
+// The mode in which the page's view is marched: by WebGPU where there is an adapter with room for the scene, else by
+// the module in the worker, once the view rests.
 import { Marcher, openDevice } from './march.js';
 
 const rest = 250;           // milliseconds without a change
 const movingFrame = 60;     // milliseconds that a picture of a moving view may take
-const factors = [1, 2, 3, 4, 6, 8, 12, 16];  // by which such a picture is coarser
+const factors = [1, 2, 3, 4, 6, 8, 12];  // by which such a picture is coarser
 
 let opening;  // a promise of the device, which all scenes share
 
@@ -33,23 +33,24 @@ class ByDevice {
   /** How much coarser pictures are while the view moves. */
   factor(pixels) {
     const most = this.pixelsPerMillisecond * movingFrame;
-    return factors.find((factor) => pixels / factor ** 2 <= most) ?? factors.at(this.pixelsPerMillisecond ? -1 : 3);
+    return factors.find((factor) => pixels / factor ** 2 <= most) ?? factors.at(this.pixelsPerMillisecond ? -1 : 5);
   }
 
-  /** Draws until the picture is finished, or `isWanted()` is not. Calls `shown` after each sample. */
-  async draw(view, factor, isWanted, shown) {
+  /** Draws the first sample while `wanted.first()` is true, and where the picture is not coarse more of them while
+   *  `wanted.isSame()` is. Calls `shown` after each. */
+  async draw(view, factor, wanted, shown) {
     const [width, height] = [view.width, view.height].map((edge) => Math.max(Math.round(edge / factor), 1));
     const { frame } = await this.ask('frame', { ...view, width, height });
-    if (!isWanted()) return;
+    if (!wanted.first()) return;
     this.marcher.begin(frame, width, height);
     do {
       const began = performance.now();
-      if (!await this.marcher.addSample(isWanted)) return;
+      if (!await this.marcher.addSample(this.marcher.samples === 0 ? wanted.first : wanted.isSame)) return;
       const milliseconds = performance.now() - began;
       this.pixelsPerMillisecond = width * height / milliseconds;
       this.marcher.show(this.context);
       shown({ by: this.name, milliseconds, width, height, samples: this.marcher.samples });
-    } while (factor === 1 && !this.marcher.isFinished && isWanted());
+    } while (factor === 1 && !this.marcher.isFinished && wanted.isSame());
   }
 
   async read() {
@@ -74,10 +75,10 @@ class ByModule {
     return Infinity;
   }
 
-  async draw(view, factor, isWanted, shown) {
+  async draw(view, factor, wanted, shown) {
     const began = performance.now();
     const { width, height, rgba } = await this.ask('march', { ...view, samples: 1 });
-    if (!isWanted()) return;
+    if (!wanted.isSame()) return;
     this.picture = { width, height, rgba };
     this.context.putImageData(new ImageData(rgba, width, height), 0, 0);
     shown({ by: this.name, milliseconds: performance.now() - began, width, height, samples: 1 });
@@ -183,43 +184,45 @@ export class MarchedView {
     this.#canvas.dataset.shown = isShown;
   }
 
-  // Every change is shown at once, coarsely; and finely where no other follows.
+  // Every change is shown at once, coarsely; and finer and finer where no other follows.
   async #run(isCurrent) {
-    let drawn = 0;  // as of which change
-    let isComplete = false;
+    let drawn = 0;  // as of which change, and how coarsely
+    let factor = 1;
     while (isCurrent()) {
       const isNew = drawn !== this.#changes;
-      if (!isNew && isComplete) {
+      if (!isNew && factor === 1) {
         await new Promise((wake) => { this.#wake = wake; });
         continue;
       }
       const by = this.#by;
       const view = this.#page.view();
-      const factor = isNew ? by.factor(view.width * view.height) : 1;
+      const finer = factor === Infinity ? 1 : Math.ceil(factor / 2);
+      const next = isNew ? by.factor(view.width * view.height) : finer;
       const change = this.#changes;
-      if (factor !== Infinity) {
+      if (next !== Infinity) {
         if (!isNew && performance.now() - this.#changed < rest) {
           await new Promise((done) => setTimeout(done, 30));
           continue;
         }
-        const isWanted = () => isCurrent() && by === this.#by && (isNew && factor > 1 || change === this.#changes);
-        await this.#draw(by, view, factor, isWanted);
+        const isHere = () => isCurrent() && by === this.#by;
+        const isSame = () => isHere() && change === this.#changes;
+        await this.#draw(by, view, next, { isHere, isSame, first: isNew ? isHere : isSame });
       }
       drawn = change;
-      isComplete = factor === 1;
+      factor = next;
     }
   }
 
-  async #draw(by, view, factor, isWanted) {
+  async #draw(by, view, factor, wanted) {
     if (this.#canvas.width !== view.width || this.#canvas.height !== view.height)
       Object.assign(this.#canvas, { width: view.width, height: view.height });
     try {
-      await by.draw(view, factor, isWanted, (facts) => {
+      await by.draw(view, factor, wanted, (facts) => {
         this.#show(true);
         this.#page.shown(facts);
       });
     } catch (error) {
-      if (!isWanted()) return;
+      if (!wanted.isHere()) return;
       if (by instanceof ByModule) {
         this.#page.said(error.message);
       } else {

@@ -100,7 +100,8 @@ const marched = new MarchedView({
   },
   shown: (facts) => {
     const { by, width, height, milliseconds, samples } = facts;
-    $('marching').textContent = `${by}: ${width} x ${height}, ${milliseconds.toFixed(0)} ms a sample, ${samples} a pixel`;
+    const pace = `${milliseconds.toFixed(0)} ms a sample, ${samples} a pixel`;
+    $('marching').textContent = `${by}: ${width} x ${height}, ${pace}`;
     window.quoinMarched = facts;
     redraw();
   },

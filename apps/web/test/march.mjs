@@ -162,7 +162,8 @@ async function usePage(browser, errors) {
   const later = await download(tab, '#march');
   const other = await meanDifference(tab, before, later);
   const again = await meanDifference(tab, await download(tab, '#picture'), later);
-  check(other > 4 && again < 2, `the page's sun is that of both: ${other.toFixed(2)} off before, ${again.toFixed(2)} now`);
+  check(other > 4 && again < 2, `the page's sun is that of both: ${again.toFixed(2)} off, ${
+    other.toFixed(2)} from before`);
   await tab.keyboard.press('ArrowLeft');
   await tab.waitForFunction(() => window.quoinMarched.width < innerWidth, undefined, { timeout: 60_000 });
   check(true, `what moves is coarser: ${await note()}`);
