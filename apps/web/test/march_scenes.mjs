@@ -72,11 +72,13 @@ const turn = (axis, degrees) => ({ axis, degrees });
 /** By the names of files. */
 export function scenes() {
   const voxels = [chunk(yard)];
+  const stones = [chunk((...at) => [0, 1, 2, 6, 1, 2, 6][yard(...at)])];
   const ball = (x, y, z) => Math.hypot(x - 30, y - 28, z - 32) - 20 + 2 * Math.sin(x / 3) * Math.cos(z / 4);
   const hollow = (x, y, z) => Math.max(ball(x, y, z), 12 - Math.hypot(x - 30, y - 34, z - 40));
   const stripes = (x, y) => 1 + (y >> 3) % 2;
   const halves = (x, y, z) => (z > 34 ? 3 : x > 32 ? 5 : y > 20 ? 2 : 1);
   return {
+    'stones.json': sceneOf({ types, grids: [{ voxels: stones }], instances: [{ grid: 0 }] }),
     'yard.json': sceneOf({ types, grids: [{ voxels }], instances: [{ grid: 0 }] }),
     'many_places.json': sceneOf({
       types, grids: [{ voxels, pivot: [32, 0, 32] }],
