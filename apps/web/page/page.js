@@ -2,7 +2,6 @@
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
-import { MarchedView } from './marching.js';
 
 const $ = (id) => document.getElementById(id);
 const degrees = Math.PI / 180;
@@ -72,7 +71,7 @@ function ask(name, options) {
 function draw() {
   frame = 0;
   // What is marched lies below.
-  if (model) model.visible = !marched.isShown;
+  if (model) model.visible = !marched?.isShown;
   renderer.render(stage, camera);
 }
 
@@ -92,24 +91,31 @@ const viewOf = (width, height) => ({
   camera: { position: camera.position.toArray(), lookAt: controls.target.toArray(), fovDegrees: camera.fov },
 });
 
-const marched = new MarchedView({
-  ask, below: canvas,
-  view: () => {
-    const ratio = Math.min(devicePixelRatio, 2);
-    return viewOf(Math.floor(innerWidth * ratio), Math.floor(innerHeight * ratio));
-  },
-  shown: (facts) => {
-    const { by, width, height, milliseconds, samples } = facts;
-    const pace = `${milliseconds.toFixed(0)} ms a sample, ${samples} a pixel`;
-    $('marching').textContent = `${by}: ${width} x ${height}, ${pace}`;
-    window.quoinMarched = facts;
-    redraw();
-  },
-  said: (text) => say(text, true),
-});
+let marched;  // the mode in which rays draw the view; loaded when it is first wanted
+
+async function marchedView() {
+  if (marched) return marched;
+  const { MarchedView } = await import(new URL('./marching.js', import.meta.url));
+  marched ??= new MarchedView({
+    ask, below: canvas,
+    view: () => {
+      const ratio = Math.min(devicePixelRatio, 2);
+      return viewOf(Math.floor(innerWidth * ratio), Math.floor(innerHeight * ratio));
+    },
+    shown: (facts) => {
+      const { by, width, height, milliseconds, samples } = facts;
+      const pace = `${milliseconds.toFixed(0)} ms a sample, ${samples} a pixel`;
+      $('marching').textContent = `${by}: ${width} x ${height}, ${pace}`;
+      window.quoinMarched = facts;
+      redraw();
+    },
+    said: (text) => say(text, true),
+  });
+  return marched;
+}
 
 function changed() {
-  marched.change();
+  marched?.change();
   redraw();
 }
 
@@ -194,7 +200,7 @@ async function show(bytes) {
 async function open(name, bytes) {
   const began = performance.now();
   say(`Reading ${name} ...`);
-  marched.stop();
+  marched?.stop();
   if (jobs.size > 0) newWorker();
   try {
     const answer = await ask('load', { bytes });
@@ -365,12 +371,19 @@ async function march() {
   $('marching').textContent = '';
   window.quoinMarched = undefined;
   if (!isPressed('rays')) {
-    marched.stop();
+    marched?.stop();
     redraw();
     return;
   }
   $('marching').textContent = 'Preparing the shaders ...';
-  await marched.start();
+  try {
+    const mode = await marchedView();
+    if (isPressed('rays')) await mode.start();
+  } catch (error) {
+    $('rays').setAttribute('aria-pressed', 'false');
+    $('marching').textContent = '';
+    say(error.message, true);
+  }
 }
 $('rays').addEventListener('click', () => {
   $('rays').setAttribute('aria-pressed', String(!isPressed('rays')));
@@ -392,7 +405,7 @@ $('smooth').addEventListener('change', async () => {
 });
 $('glb').addEventListener('click', () => give(new Blob([glb], { type: 'model/gltf-binary' }), '.glb'));
 $('picture').addEventListener('click', async () => {
-  if (marched.isShown) return givePicture(await marched.read());
+  if (marched?.isShown) return givePicture(await marched.read());
   draw();
   canvas.toBlob((blob) => give(blob, '.png'), 'image/png');
 });
