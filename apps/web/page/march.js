@@ -29,7 +29,8 @@ export async function openDevice() {
   if (adapter === null) throw new Error('WebGPU has no adapter here');
   const { maxStorageBufferBindingSize, maxBufferSize } = adapter.limits;
   const device = await adapter.requestDevice({ requiredLimits: { maxStorageBufferBindingSize, maxBufferSize } });
-  return { device, name: [adapter.info.vendor, adapter.info.architecture].filter(Boolean).join(' ') };
+  const { vendor, architecture } = adapter.info ?? {};
+  return { device, name: [vendor, architecture].filter(Boolean).join(' ') };
 }
 
 const sizeOf = (bytes) => (bytes < 2 ** 20 ? `${Math.ceil(bytes / 1024)} KiB` : `${Math.ceil(bytes / 2 ** 20)} MiB`);

@@ -151,7 +151,7 @@ async function usePage(browser, errors) {
   await drawnBy(tab, 'WebGPU', 4);
   const note = () => tab.textContent('#marching');
   check(await tab.isVisible('canvas.marched'), `the page marches: ${await note()}`);
-  await writeFile(join(out, 'marched-page.png'), await tab.screenshot());
+  await writeFile(join(out, 'marched-page.png'), await tab.screenshot({ timeout: 120_000 }));
   const before = await download(tab, '#march');
   const same = await meanDifference(tab, await download(tab, '#picture'), before);
   check(same < 2, `by WebGPU the page has the module's picture but for its samples: ${same.toFixed(2)} off`);
