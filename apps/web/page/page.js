@@ -71,8 +71,7 @@ function ask(name, options) {
 function draw() {
   frame = 0;
   // What is marched lies below.
-  if (model) model.visible = !marched?.isShown;
-  renderer.render(stage, camera);
+  renderer.render(marched?.isShown ? tape : stage, camera);
 }
 
 function redraw() {
