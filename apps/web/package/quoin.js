@@ -295,9 +295,7 @@ export class Scene {
 
   render({ width = 1280, height = 720, ...options } = {}) {
     const of = this.#instance;
-    const pixels = width * height;
-    if (!(Number.isInteger(width) && Number.isInteger(height) && width > 0 && height > 0 && pixels <= 2 ** 28))
-      throw new QuoinError('invalid_argument', 'a size of a picture is two whole numbers, at most 2^28 pixels');
+    const pixels = pixelsOf(width, height);
     return of.withStruct('renderOptions', (wanted) => of.with(3 * pixels, (out) => {
       putRenderOptions(of.view(), wanted, { width, height, ...options });
       of.call('quoin_scene_render', this.#handle, wanted, out, 3 * pixels);
@@ -320,6 +318,13 @@ export class Scene {
     registry.unregister(this);
     if (!this.#instance.dead) this.#instance.run('quoin_free', this.#handle);
   }
+}
+
+function pixelsOf(width, height) {
+  const pixels = width * height;
+  if (!(Number.isInteger(width) && Number.isInteger(height) && width > 0 && height > 0 && pixels <= 2 ** 28))
+    throw new QuoinError('invalid_argument', 'a size of a picture is two whole numbers, at most 2^28 pixels');
+  return pixels;
 }
 
 /** Writes a quoin_render_options. */
@@ -357,6 +362,7 @@ export class ShaderScene {
 
   frame({ width = 1280, height = 720, ...options } = {}) {
     const of = this.#instance;
+    pixelsOf(width, height);
     return of.withStruct('renderOptions', (wanted) => of.with(8, (out) => {
       putRenderOptions(of.view(), wanted, { width, height, ...options });
       of.call('quoin_web_march_frame', this.#march, wanted, out, out + 4);

@@ -204,6 +204,9 @@ try {
     await comparePictures(tab);
     const small = await tab.evaluate(([from]) => window.openOnSmallDevice(from, 1024), [[...given.keys()][0].slice(1)]);
     check(/scene takes .* there, and the adapter binds 1 KiB/.test(small), `a device without room says so: ${small}`);
+    const codes = await tab.evaluate((from) => window.misuse(from), inPage);
+    const isRefused = codes.slice(0, -1).every((code) => code === 'invalid_argument') && codes.at(-1) === 'bad_handle';
+    check(isRefused, `what cannot be is refused: ${codes.join(', ')}`);
     await tab.close();
     await usePage(browser, errors);
     check(errors.length === 0, `no error of shaders or page${errors.map((text) => ` ${text}`).join('')}`);

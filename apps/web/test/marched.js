@@ -68,6 +68,26 @@ window.compare = async (address, views, { samples, keeps }) => {
   return { has: pictures.has, bytes: pictures.bytes, opening: pictures.opening, name: opened.name, found };
 };
 
+/** The codes of what goes wrong with a scene's tables. */
+window.misuse = async (address) => {
+  const scene = await load(await (await fetch(address)).arrayBuffer());
+  const shaders = scene.forShaders();
+  const code = (work) => {
+    try {
+      return work() && 'none';
+    } catch (error) {
+      return error.code;
+    }
+  };
+  const codes = [() => shaders.frame({ width: 0 }), () => shaders.frame({ width: 2 ** 20, height: 2 ** 20 }),
+                 () => shaders.frame({ sun: [0, 0, 0] }), () => shaders.sample(-1)].map(code);
+  shaders.free();
+  codes.push(code(() => shaders.frame({})));
+  scene.free();
+  codes.push(code(() => scene.forShaders()));
+  return codes;
+};
+
 /** What a device says that binds less than a scene takes. */
 window.openOnSmallDevice = async (address, most) => {
   const scene = await load(await (await fetch(address)).arrayBuffer());
