@@ -141,6 +141,44 @@ TEST(C, LabelsAndGridsAreMeshed) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
+TEST(C, PicturesHaveTheSunThatIsAskedFor) {
+  std::vector<std::uint16_t> voxels;
+  const quoin_scene scene = made_scene(voxels);
+  auto options = sized<quoin_render_options>();
+  options.width = 32;
+  options.height = 24;
+  options.samples = 1;
+  const auto taken = [&] {
+    std::vector<std::uint8_t> picture(std::size_t{3} * 32 * 24);
+    EXPECT_EQ(quoin_scene_render(scene, &options, picture.data(), picture.size()), QUOIN_OK) << quoin_last_error();
+    return picture;
+  };
+  for (const int paths : {0, 1}) {
+    options.paths = paths;
+    options.has_sun = 0;
+    options.sun[0] = options.sun[1] = options.sun[2] = 0.0;
+    const auto without = taken();
+    options.has_sun = 1;
+    options.sun[0] = -0.48;
+    options.sun[1] = 0.72;
+    options.sun[2] = 0.5;
+    EXPECT_EQ(taken(), without) << "Quoin's own";
+    options.sun[0] = 0.9;
+    options.sun[1] = 0.2;
+    EXPECT_NE(taken(), without);
+    options.size = offsetof(quoin_render_options, has_sun);  // as programs of before have it
+    EXPECT_EQ(taken(), without);
+    options.size = sizeof options;
+  }
+  std::vector<std::uint8_t> picture(std::size_t{3} * 32 * 24);
+  for (const double wrong : {0.0, std::nan("")}) {
+    options.sun[0] = options.sun[1] = options.sun[2] = wrong;
+    EXPECT_EQ(quoin_scene_render(scene, &options, picture.data(), picture.size()), QUOIN_INVALID_ARGUMENT);
+    EXPECT_NE(std::string(quoin_last_error()).find("sun"), std::string::npos);
+  }
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+}
+
 TEST(C, PicturesAndRaysSeeTheScene) {
   std::vector<std::uint16_t> voxels;
   const quoin_scene scene = made_scene(voxels);

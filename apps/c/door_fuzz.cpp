@@ -243,6 +243,9 @@ class Program {
     for (double& each : options.camera) each = number();
     for (double& each : options.look_at) each = number();
     options.fov_degrees = number();
+    // Of no bytes of their own, so that programs that were found stay what they are.
+    options.has_sun = options.has_camera;
+    std::copy(std::begin(options.look_at), std::end(options.look_at), options.sun);
     if (options.width == 0) options.width = 4;
     if (options.height == 0) options.height = 4;
     std::array<std::uint8_t, 256> picture{};

@@ -22,6 +22,8 @@
 #include <quoin/io/loaded_scene.h>
 #include <quoin/mesh/array_surface.h>
 #include <quoin/mesh/label_surfaces.h>
+#include <quoin/render/cpu_renderer.h>
+#include <quoin/scene/camera.h>
 #include <quoin/scene/scene_tracer.h>
 
 #include "quoin.h"
@@ -159,6 +161,8 @@ template <>
 inline constexpr std::size_t kFirstSize<quoin_type> = offsetof(quoin_type, transparent);
 template <>
 inline constexpr std::size_t kFirstSize<quoin_mesh_data> = offsetof(quoin_mesh_data, types);
+template <>
+inline constexpr std::size_t kFirstSize<quoin_render_options> = offsetof(quoin_render_options, has_sun);
 
 template <class Struct>
 bool has_fit_size(const Struct* given) {
@@ -214,6 +218,13 @@ void place(SceneBody& scene, SceneGrid grid, DVec3 position, std::size_t* out);
 VoxelProperties properties_of(const quoin_type& type);
 /// What is wrong with a type; null where nothing is.
 const char* what_is_wrong(const quoin_type& type);
+
+/// What a picture by rays is taken with. Errors: InvalidArgument for what no picture has.
+struct PictureTaking {
+  Camera camera;
+  RenderOptions options;
+};
+Result<PictureTaking> taking_of(const Scene& scene, const quoin_render_options& options);
 
 /// Copies a text with its end into room for `capacity` bytes; cut off between characters.
 void copy_text(std::string_view text, char* to, std::size_t capacity);

@@ -189,38 +189,32 @@ Result<Camera> camera_of(const Scene& scene, const quoin_render_options& options
                  {options.look_at[0], options.look_at[1], options.look_at[2]}, degrees * std::numbers::pi / 180.0);
 }
 
-Result<Image> picture_of(const Scene& scene, const quoin_render_options& options, int width, int height) {
-  const auto camera = camera_of(scene, options, width, height);
-  if (!camera) return camera.error();
+Result<Image> picture_of(const Scene& scene, const quoin_render_options& options, const PictureTaking& taking) {
   const Threads threads = threads_of(options.threads);
   if (options.paths != 0) {
     PathOptions wanted;
-    wanted.width = width;
-    wanted.height = height;
+    wanted.width = taking.options.width;
+    wanted.height = taking.options.height;
+    wanted.sun = taking.options.light.sun;
     if (options.samples != 0) wanted.samples = options.samples;
     const auto picture =
-        PathTracer(scene, InstanceFilter::Visible, threads).render(*camera, wanted, threads, progress());
+        PathTracer(scene, InstanceFilter::Visible, threads).render(taking.camera, wanted, threads, progress());
     if (!picture) return picture.error();
     return develop(*picture);
   }
-  RenderOptions wanted;
-  wanted.width = width;
-  wanted.height = height;
-  wanted.samples = options.samples == 0 ? 4 : options.samples;
-  wanted.light = natural_light();
-  auto picture = CpuRenderer(scene, InstanceFilter::Visible, threads).render(*camera, wanted, threads, progress());
+  auto picture =
+      CpuRenderer(scene, InstanceFilter::Visible, threads).render(taking.camera, taking.options, threads, progress());
   if (!picture) return picture.error();
   return std::move(picture->colour);
 }
 
 quoin_status render(const Scene& scene, const quoin_render_options& options, std::uint8_t* rgb, std::size_t capacity) {
-  if (options.width < 0 || options.height < 0 || options.samples < 0)
-    return fail(QUOIN_INVALID_ARGUMENT, "a size or a number of samples below 0");
-  const int width = options.width == 0 ? 1280 : options.width;
-  const int height = options.height == 0 ? 720 : options.height;
-  if (capacity / 3 / static_cast<std::size_t>(width) < static_cast<std::size_t>(height))
+  const auto taking = taking_of(scene, options);
+  if (!taking) return fail(taking.error());
+  const auto width = static_cast<std::size_t>(taking->options.width);
+  if (capacity / 3 / width < static_cast<std::size_t>(taking->options.height))
     return fail(QUOIN_INVALID_ARGUMENT, "the array has no room for the picture");
-  const auto picture = picture_of(scene, options, width, height);
+  const auto picture = picture_of(scene, options, *taking);
   if (!picture) return fail(picture.error());
   std::memcpy(rgb, picture->rgb.data(), picture->rgb.size());
   return QUOIN_OK;
@@ -252,6 +246,24 @@ const SceneTracer& current_tracer(SceneBody& body) {
 }
 
 }  // namespace
+
+Result<PictureTaking> taking_of(const Scene& scene, const quoin_render_options& options) {
+  if (options.width < 0 || options.height < 0 || options.samples < 0)
+    return make_error(ErrorCode::InvalidArgument, "a size or a number of samples below 0");
+  PictureTaking taking;
+  RenderOptions& wanted = taking.options;
+  wanted.width = options.width == 0 ? 1280 : options.width;
+  wanted.height = options.height == 0 ? 720 : options.height;
+  wanted.samples = options.samples == 0 ? 4 : options.samples;
+  wanted.light = natural_light();
+  if (options.has_sun != 0) wanted.light.sun = {options.sun[0], options.sun[1], options.sun[2]};
+  if (Status right = check(wanted.light); !right) return right.error();
+  const auto camera = camera_of(scene, options, wanted.width, wanted.height);
+  if (!camera) return camera.error();
+  taking.camera = *camera;
+  return taking;
+}
+
 }  // namespace quoin::c
 
 using namespace quoin;

@@ -236,6 +236,8 @@ typedef struct quoin_render_options {
   int32_t has_camera;    /* 0: the whole scene, seen from in front, the right and above */
   double camera[3], look_at[3];
   double fov_degrees; /* vertical; 0: 45 */
+  int32_t has_sun;    /* 0: beside the camera that is in front, the right and above */
+  double sun[3];      /* from the scene towards the sun; any length but 0. The sky follows it */
 } quoin_render_options;
 
 /* What rays met; arrays of the caller, of one entry a ray; null: not wanted. */

@@ -148,6 +148,10 @@ class Scenes(unittest.TestCase):
         self.assertGreater(out.std(), 5)
         self.assertFalse((scene.render(60, 40, paths=True, samples=2) == out).all())
         self.assertEqual(scene.render(60, 40, camera=(30, 20, 30), look_at=(5, 2, 4)).shape, (40, 60, 3))
+        self.assertTrue((scene.render(60, 40, sun=(-0.48, 0.72, 0.5)) == out).all())
+        self.assertFalse((scene.render(60, 40, sun=(0.9, 0.1, 0.2)) == out).all())
+        with self.assertRaises(quoin.QuoinError):
+            scene.render(60, 40, sun=(0, 0, 0))
 
     def test_rays_in_batches(self):
         array, scene = self.scene()

@@ -20,6 +20,20 @@ QUOIN_API void quoin_web_listen(int32_t listens);
  * free(). */
 QUOIN_API void* quoin_web_struct(int32_t kind);
 
+/* A scene for shaders that march it (page/march.js), which lasts until quoin_web_march_free: what
+ * src/render_vk/shaders/data.glsl declares, where addresses have 32 bits. The scene stays, and is not edited. */
+typedef struct quoin_web_march quoin_web_march;
+QUOIN_API quoin_status quoin_web_march_begin(quoin_scene scene, quoin_web_march** out);
+/* What does not depend on the picture; in `has`, by bits: transparent voxels, fields, transparent ones of these. */
+QUOIN_API quoin_status quoin_web_march_data(const quoin_web_march* march, const uint8_t** data, size_t* bytes,
+                                            int32_t* has);
+/* A picture's Frame, and behind it the tables that are its own, which count from there; until the next call. */
+QUOIN_API quoin_status quoin_web_march_frame(quoin_web_march* march, const quoin_render_options* options,
+                                             const uint8_t** out, size_t* bytes);
+/* What shaders are pushed for a sample: 96 bytes, shaders/compute.glsl. */
+QUOIN_API quoin_status quoin_web_march_sample(int32_t sample, uint8_t* out, size_t bytes);
+QUOIN_API void quoin_web_march_free(quoin_web_march* march); /* null is none */
+
 #ifdef __cplusplus
 }
 #endif

@@ -120,7 +120,7 @@ class RenderOptions(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("width", ctypes.c_int32), ("height", ctypes.c_int32),
                 ("samples", ctypes.c_int32), ("paths", ctypes.c_int32), ("threads", ctypes.c_int32),
                 ("has_camera", ctypes.c_int32), ("camera", ctypes.c_double * 3), ("look_at", ctypes.c_double * 3),
-                ("fov_degrees", ctypes.c_double)]
+                ("fov_degrees", ctypes.c_double), ("has_sun", ctypes.c_int32), ("sun", ctypes.c_double * 3)]
 
 
 class HitArrays(ctypes.Structure):

@@ -393,9 +393,10 @@ class Scene:
 
     def render(self, width: int = 1280, height: int = 720, *, samples: int = 0, paths: bool = False,
                camera: Optional[Sequence[float]] = None, look_at: Sequence[float] = (0, 0, 0), fov: float = 45.0,
-               out: Optional[NdArray] = None, threads: int = 0) -> NdArray:
+               sun: Optional[Sequence[float]] = None, out: Optional[NdArray] = None, threads: int = 0) -> NdArray:
         """A picture, uint8 (height, width, 3), sRGB. Without a camera the whole scene is shown. `paths`: light with its
-        bounces and soft shadows, which takes longer. `out` is filled in place where it is given."""
+        bounces and soft shadows, which takes longer. `sun`: from the scene towards it, of any length; the sky follows
+        it. `out` is filled in place where it is given."""
         width, height = (_c.whole(v, "the picture's size") for v in (width, height))
         if width <= 0 or height <= 0:
             raise ValueError("a picture has pixels")
@@ -405,6 +406,8 @@ class Scene:
         if camera is not None:
             options.has_camera, options.fov_degrees = 1, fov
             options.camera[:], options.look_at[:] = camera, look_at
+        if sun is not None:
+            options.has_sun, options.sun[:] = 1, sun
         if out is None:
             out = np.empty((height, width, 3), np.uint8)
         elif not isinstance(out, np.ndarray):

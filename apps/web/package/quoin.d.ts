@@ -65,6 +65,8 @@ export interface RenderOptions extends Progress {
   samples?: number;
   /** In place of a view of the whole scene. */
   camera?: { position: Vec3; lookAt: Vec3; fovDegrees?: number };
+  /** From the scene towards the sun, of any length. Default: one that stands left of the view of the whole scene. */
+  sun?: Vec3;
 }
 
 export interface Picture {
@@ -106,13 +108,30 @@ export class Scene {
   /** The nearest voxel or surface along each ray: three numbers a ray, in the world. The first call builds a tree,
    *  which the scene keeps. maxT: how far they go, in lengths of their direction. */
   rays(origins: ArrayLike<number>, directions: ArrayLike<number>, options?: { maxT?: number }): Hits;
+  /** For shaders of your own that march it. */
+  forShaders(): ShaderScene;
   /** Gives its memory back. The scene is of no use then. */
   free(): void;
 }
 
+/** A scene as shaders march it: the tables that src/render_vk/shaders/data.glsl of Quoin's sources declares, whose
+ *  addresses have 32 bits here. Quoin's page, apps/web/page/march.js, is the example. */
+export class ShaderScene {
+  private constructor();
+  /** What is the same for all pictures. Addresses of trees, grids, types and lamps' lists count from its first byte. */
+  readonly bytes: Uint8Array<ArrayBuffer>;
+  /** 1: transparent voxels, 2: surfaces of densities, 4: transparent ones; added up. */
+  readonly has: number;
+  /** Of a picture: a Frame and the tables behind it, whose addresses count from its first byte. */
+  frame(options?: RenderOptions): Uint8Array<ArrayBuffer>;
+  /** What shaders are pushed for the sample of that number. */
+  sample(number: number): Uint8Array<ArrayBuffer>;
+  free(): void;
+}
+
 export interface Small {
-  /** The small module, quoin-small.wasm, in place of the whole one. It reads .vox alone. Scenes of it have no `render`
-   *  and no `rays`: they throw a QuoinError of code "unsupported". Less than half as much is fetched and compiled. */
+  /** The small module, quoin-small.wasm, in place of the whole one. It reads .vox alone. Scenes of it have no `render`,
+   *  `rays` and `forShaders`: they throw a QuoinError of code "unsupported". Less than half as much is fetched and compiled. */
   small?: boolean;
 }
 

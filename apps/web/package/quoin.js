@@ -366,19 +366,11 @@ export class Scene {
     }));
   }
 
-  render({ width = 1280, height = 720, samples = 4, camera, progress } = {}) {
+  render({ width = 1280, height = 720, progress, ...options } = {}) {
     const of = this.#instance;
-    const pixels = width * height;
-    if (!(Number.isInteger(width) && Number.isInteger(height) && width > 0 && height > 0 && pixels <= 2 ** 28))
-      throw new QuoinError('invalid_argument', 'a size of a picture is two whole numbers, at most 2^28 pixels');
+    const pixels = pixelsOf(width, height);
     return of.listened(progress, () => of.withStruct('renderOptions', (wanted) => of.with(3 * pixels, (out) => {
-      const view = of.view();
-      [width, height, samples].forEach((value, i) => view.setInt32(wanted + 4 + 4 * i, value, true));
-      if (camera !== undefined) {
-        view.setInt32(wanted + 24, 1, true);
-        [...camera.position, ...camera.lookAt, camera.fovDegrees ?? 45].forEach(
-          (value, i) => view.setFloat64(wanted + 32 + 8 * i, value, true));
-      }
+      putRenderOptions(of.view(), wanted, { width, height, ...options });
       of.call('quoin_scene_render', this.#handle, wanted, out, 3 * pixels);
       const rgb = new Uint8Array(of.exports.memory.buffer, out, 3 * pixels);
       const rgba = new Uint8ClampedArray(4 * pixels).fill(255);
@@ -412,9 +404,78 @@ export class Scene {
     }));
   }
 
+  forShaders() {
+    return new ShaderScene(this.#instance, this.#handle);
+  }
+
   free() {
     registry.unregister(this);
     if (!this.#instance.dead) this.#instance.run('quoin_free', this.#handle);
+  }
+}
+
+function pixelsOf(width, height) {
+  const pixels = width * height;
+  if (!(Number.isInteger(width) && Number.isInteger(height) && width > 0 && height > 0 && pixels <= 2 ** 28))
+    throw new QuoinError('invalid_argument', 'a size of a picture is two whole numbers, at most 2^28 pixels');
+  return pixels;
+}
+
+/** Writes a quoin_render_options. */
+function putRenderOptions(view, at, { width, height, samples = 4, camera, sun }) {
+  [width, height, samples].forEach((value, i) => view.setInt32(at + 4 + 4 * i, value, true));
+  const put = (flag, from, numbers) => {
+    view.setInt32(at + flag, 1, true);
+    numbers.forEach((value, i) => view.setFloat64(at + from + 8 * i, value, true));
+  };
+  if (camera !== undefined) put(24, 32, [...camera.position, ...camera.lookAt, camera.fovDegrees ?? 45]);
+  if (sun !== undefined) put(88, 96, sun);
+}
+
+/** What shaders march a scene by. */
+export class ShaderScene {
+  #instance;
+  #march;
+
+  constructor(of, scene) {
+    this.#instance = of;
+    this.#march = of.with(4, (out) => {
+      of.call('quoin_web_march_begin', scene, out);
+      return of.view().getUint32(out, true);
+    });
+    [this.bytes, this.has] = of.with(12, (out) => {
+      of.call('quoin_web_march_data', this.#march, out, out + 4, out + 8);
+      return [this.#taken(out), of.view().getInt32(out + 8, true)];
+    });
+  }
+
+  #taken(out) {
+    const view = this.#instance.view();
+    return this.#instance.numbers(Uint8Array, view.getUint32(out, true), view.getUint32(out + 4, true));
+  }
+
+  frame({ width = 1280, height = 720, ...options } = {}) {
+    const of = this.#instance;
+    pixelsOf(width, height);
+    return of.withStruct('renderOptions', (wanted) => of.with(8, (out) => {
+      putRenderOptions(of.view(), wanted, { width, height, ...options });
+      of.call('quoin_web_march_frame', this.#march, wanted, out, out + 4);
+      return this.#taken(out);
+    }));
+  }
+
+  sample(number) {
+    const of = this.#instance;
+    const bytes = 96;
+    return of.with(bytes, (out) => {
+      of.call('quoin_web_march_sample', index(number), out, bytes);
+      return of.numbers(Uint8Array, out, bytes);
+    });
+  }
+
+  free() {
+    if (!this.#instance.dead) this.#instance.run('quoin_web_march_free', this.#march);
+    this.#march = 0;
   }
 }
 

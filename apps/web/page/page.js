@@ -86,12 +86,13 @@ function draw() {
   rest = undefined;
   plain?.show(false);
   sun.castShadow = true;
-  renderer.render(stage, camera);
+  // What is marched lies below.
+  renderer.render(marched?.isShown ? tape : stage, camera);
 }
 
 /** Draws at once, on a program plainly until nothing has changed for a while. */
 function drawSoon() {
-  if (!isSlow) return draw();
+  if (!isSlow || marched?.isShown) return draw();
   frame = 0;
   plain?.show(true);
   sun.castShadow = false;
@@ -110,25 +111,61 @@ function waitForPicture() {
   gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
 }
 
+const toSun = () => {
+  const around = $('around').valueAsNumber * degrees;
+  const height = $('height').valueAsNumber * degrees;
+  return new THREE.Vector3(Math.cos(height) * Math.sin(around), Math.sin(height), Math.cos(height) * Math.cos(around));
+};
+
+/** What the worker draws the view by. */
+const viewOf = (width, height) => ({
+  width, height, sun: toSun().toArray(),
+  camera: { position: camera.position.toArray(), lookAt: controls.target.toArray(), fovDegrees: camera.fov },
+});
+
+let marched;  // the mode in which rays draw the view; loaded when it is first wanted
+
+async function marchedView() {
+  if (marched) return marched;
+  const { MarchedView } = await import(new URL('./marching.js', import.meta.url));
+  marched ??= new MarchedView({
+    ask, below: canvas,
+    view: () => {
+      const ratio = Math.min(devicePixelRatio, 2);
+      return viewOf(Math.floor(innerWidth * ratio), Math.floor(innerHeight * ratio));
+    },
+    shown: (facts) => {
+      const { by, width, height, milliseconds, samples } = facts;
+      const pace = `${milliseconds.toFixed(0)} ms a sample, ${samples} a pixel`;
+      $('marching').textContent = `${by}: ${width} x ${height}, ${pace}`;
+      window.quoinMarched = facts;
+      redraw();
+    },
+    said: (text) => say(text, true),
+  });
+  return marched;
+}
+
+function changed() {
+  marched?.change();
+  redraw();
+}
+
 function resize() {
   renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
   renderer.setSize(innerWidth, innerHeight, false);
   camera.aspect = innerWidth / innerHeight;
   camera.updateProjectionMatrix();
-  redraw();
+  changed();
 }
 
 function placeSun() {
-  const around = $('around').valueAsNumber * degrees;
-  const height = $('height').valueAsNumber * degrees;
-  const flat = Math.cos(height);
-  const to = new THREE.Vector3(flat * Math.sin(around), Math.sin(height), flat * Math.cos(around));
-  sun.position.copy(centre).addScaledVector(to, 2 * radius);
+  sun.position.copy(centre).addScaledVector(toSun(), 2 * radius);
   sun.target.position.copy(centre);
   Object.assign(sun.shadow.camera, { left: -radius, right: radius, top: radius, bottom: -radius, near: radius / 10,
                                      far: 4 * radius });
   sun.shadow.camera.updateProjectionMatrix();
-  redraw();
+  changed();
 }
 
 function home() {
@@ -136,7 +173,7 @@ function home() {
   camera.position.copy(centre).add(new THREE.Vector3(1, 0.8, 1).normalize().multiplyScalar(distance));
   controls.target.copy(centre);
   controls.update();
-  redraw();
+  changed();
 }
 
 // ---- A link has the view in it: #camera=...&at=...&sun=...
@@ -197,6 +234,7 @@ async function show(bytes) {
 async function open(name, bytes) {
   const began = performance.now();
   say(`Reading ${name} ...`);
+  marched?.stop();
   if (jobs.size > 0) newWorker();
   try {
     const answer = await ask('load', { bytes }, (fraction) => say(`Reading ${name}: ${percent(fraction)} ...`));
@@ -209,10 +247,14 @@ async function open(name, bytes) {
     describe(name, answer);
     waitForPicture();
     const total = performance.now() - began;
+    if (isPressed('rays')) march();
     say(`${name}: read in ${answer.milliseconds.load.toFixed(0)} ms, meshed in ${
       answer.milliseconds.mesh.toFixed(0)} ms, on the screen in ${total.toFixed(0)} ms.`);
     window.quoinPage = { ...answer.milliseconds, total };
   } catch (error) {
+    $('rays').setAttribute('aria-pressed', 'false');
+    $('marching').textContent = '';
+    redraw();
     say(`${name}: ${error.message}`, true);
   }
 }
@@ -265,6 +307,12 @@ function give(blob, extension) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
+async function givePicture({ width, height, rgba }) {
+  const picture = new OffscreenCanvas(width, height);
+  picture.getContext('2d').putImageData(new ImageData(rgba, width, height), 0, 0);
+  give(await picture.convertToBlob({ type: 'image/png' }), '.png');
+}
+
 // ---- Measuring: two points of surfaces.
 function measure(x, y) {
   const pointer = new THREE.Vector2(2 * x / innerWidth - 1, 1 - 2 * y / innerHeight);
@@ -285,7 +333,8 @@ function measure(x, y) {
   redraw();
 }
 
-const isMeasuring = () => $('measure').getAttribute('aria-pressed') === 'true';
+const isPressed = (id) => $(id).getAttribute('aria-pressed') === 'true';
+const isMeasuring = () => isPressed('measure');
 let pressed;
 canvas.addEventListener('pointerdown', (event) => { pressed = [event.clientX, event.clientY]; });
 canvas.addEventListener('pointerup', (event) => {
@@ -316,7 +365,7 @@ const keys = {
   ArrowLeft: () => turn(-0.1, 0), ArrowRight: () => turn(0.1, 0), ArrowUp: () => turn(0, -0.1),
   ArrowDown: () => turn(0, 0.1), '+': () => zoom(0.9), '=': () => zoom(0.9), '-': () => zoom(1 / 0.9),
   a: () => slide('around', -5), d: () => slide('around', 5), w: () => slide('height', 5), s: () => slide('height', -5),
-  m: () => $('measure').click(), h: home, o: () => $('other').click(),
+  r: () => $('rays').click(), m: () => $('measure').click(), h: home, o: () => $('other').click(),
 };
 addEventListener('keydown', (event) => {
   if (event.target.tagName === 'INPUT' || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -325,7 +374,7 @@ addEventListener('keydown', (event) => {
   event.preventDefault();
   act();
 });
-controls.addEventListener('change', redraw);
+controls.addEventListener('change', changed);
 addEventListener('resize', resize);
 $('around').addEventListener('input', placeSun);
 $('height').addEventListener('input', placeSun);
@@ -352,6 +401,29 @@ $('measure').addEventListener('click', () => {
   say(isMeasuring() ? 'Click two points.' : '');
   redraw();
 });
+/** Has the view marched, or no more, as the button says. */
+async function march() {
+  $('marching').textContent = '';
+  window.quoinMarched = undefined;
+  if (!isPressed('rays')) {
+    marched?.stop();
+    redraw();
+    return;
+  }
+  $('marching').textContent = 'Preparing the shaders ...';
+  try {
+    const mode = await marchedView();
+    if (isPressed('rays')) await mode.start();
+  } catch (error) {
+    $('rays').setAttribute('aria-pressed', 'false');
+    $('marching').textContent = '';
+    say(error.message, true);
+  }
+}
+$('rays').addEventListener('click', () => {
+  $('rays').setAttribute('aria-pressed', String(!isPressed('rays')));
+  march();
+});
 $('home').addEventListener('click', home);
 $('smooth').addEventListener('change', async () => {
   say('Meshing ...');
@@ -368,7 +440,8 @@ $('smooth').addEventListener('change', async () => {
   }
 });
 $('glb').addEventListener('click', () => give(new Blob([glb], { type: 'model/gltf-binary' }), '.glb'));
-$('picture').addEventListener('click', () => {
+$('picture').addEventListener('click', async () => {
+  if (marched?.isShown) return givePicture(await marched.read());
   draw();
   canvas.toBlob((blob) => give(blob, '.png'), 'image/png');
 });
@@ -376,13 +449,8 @@ $('march').addEventListener('click', async () => {
   say('Drawing by rays, on one thread ...');
   const began = performance.now();
   try {
-    const { width, height, rgba } = await ask('march', {
-      width: innerWidth, height: innerHeight, samples: 4,
-      camera: { position: camera.position.toArray(), lookAt: controls.target.toArray(), fovDegrees: camera.fov },
-    }, (fraction) => say(`Drawing by rays, on one thread: ${percent(fraction)} ...`));
-    const picture = new OffscreenCanvas(width, height);
-    picture.getContext('2d').putImageData(new ImageData(rgba, width, height), 0, 0);
-    give(await picture.convertToBlob({ type: 'image/png' }), '.png');
+    const tell = (fraction) => say(`Drawing by rays, on one thread: ${percent(fraction)} ...`);
+    await givePicture(await ask('march', { ...viewOf(innerWidth, innerHeight), samples: 4 }, tell));
     say(`Drawn in ${((performance.now() - began) / 1000).toFixed(1)} s.`);
   } catch (error) {
     say(error.message, true);

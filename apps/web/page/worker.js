@@ -19,10 +19,15 @@ async function wholeScene() {
   return scene;
 }
 
+let shaders;  // of it; what WebGPU marches it by
+
+const samplesOfAPixel = 16;
+
 const work = {
   async load({ bytes, smooth }, tell) {
+    shaders?.free();
     scene?.free();
-    scene = undefined;
+    shaders = scene = undefined;
     isWhole = false;
     file = bytes;
     const began = performance.now();
@@ -39,6 +44,15 @@ const work = {
   async march(options, tell) {
     return (await wholeScene()).render({ ...options, progress: tell });
   },
+  async shaders() {
+    shaders?.free();
+    shaders = (await wholeScene()).forShaders();
+    const { bytes, has } = shaders;
+    return { bytes, has, samples: Array.from({ length: samplesOfAPixel }, (_, i) => shaders.sample(i)) };
+  },
+  async frame(options) {
+    return { frame: shaders.frame(options) };
+  },
 };
 
 onmessage = async ({ data: { id, name, options } }) => {
@@ -50,7 +64,7 @@ onmessage = async ({ data: { id, name, options } }) => {
   };
   try {
     const answer = await work[name](options, tell);
-    postMessage({ id, answer }, [(answer.glb ?? answer.rgba).buffer]);
+    postMessage({ id, answer }, [(answer.glb ?? answer.rgba ?? answer.bytes ?? answer.frame).buffer]);
   } catch (error) {
     postMessage({ id, error: { message: error.message, code: error.code } });
   }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "render_vk/device/device.h"
+#include "render_vk/trees/shader_memory.h"
 
 namespace quoin::vulkan {
 
@@ -52,31 +53,18 @@ class Buffer {
   std::byte* mapped_ = nullptr;
 };
 
-/// A part of a block of device memory. Shaders know it by its address, a multiple of 32.
-struct Place {
-  std::size_t block = 0;
-  VkDeviceSize offset = 0;
-  VkDeviceSize size = 0;  ///< 0: nothing
-  VkDeviceAddress address = 0;
-};
-
 /// Device memory, in as many blocks as it takes, each a buffer that is cut up; and the way there.
-class DeviceMemory {
+class DeviceMemory final : public ShaderMemory {
  public:
-  static constexpr VkDeviceSize kAlignment = 32;
-
   DeviceMemory(Device& device, VkDeviceSize block_bytes) : device_(&device), block_bytes_(block_bytes) {}
 
   /// What is larger than a block gets a block of its own. Errors: LimitExceeded when the device's memory is full.
-  [[nodiscard]] Result<Place> allocate(VkDeviceSize size, const std::string& doing);
-  /// Leaves `place` empty. Requires: no commands that use it run.
-  void release(Place& place);
+  [[nodiscard]] Result<Place> allocate(VkDeviceSize size, const std::string& doing) override;
+  void release(Place& place) override;
 
-  /// Puts bytes in place, before what `flush` is followed by.
-  [[nodiscard]] Status write(const Place& place, std::span<const std::byte> bytes, VkDeviceSize offset = 0);
-  [[nodiscard]] Status flush();
-  /// Forgets what was written since the last `flush`.
-  void discard();
+  [[nodiscard]] Status write(const Place& place, std::span<const std::byte> bytes, VkDeviceSize offset = 0) override;
+  [[nodiscard]] Status flush() override;
+  void discard() override;
 
   /// The buffer that a place lies in, at its offset.
   [[nodiscard]] VkBuffer buffer_of(const Place& place) const { return blocks_[place.block]->buffer.handle(); }

@@ -181,7 +181,7 @@ Status DeviceScene::try_update(const Scene& scene, InstanceFilter filter, Thread
   return put_grids();
 }
 
-Status DeviceLamps::put(DeviceMemory& memory, std::shared_ptr<const LampTable> now) {
+Status DeviceLamps::put(ShaderMemory& memory, std::shared_ptr<const LampTable> now) {
   if (now == table) return {};
   table = nullptr;
   if (now == nullptr) return {};
@@ -193,7 +193,7 @@ Status DeviceLamps::put(DeviceMemory& memory, std::shared_ptr<const LampTable> n
 }
 
 // Numbers have room for some more bricks.
-Status DeviceLevels::put_changes(DeviceMemory& memory, const LightBricks& now, const LightBricks::Changed& changed) {
+Status DeviceLevels::put_changes(ShaderMemory& memory, const LightBricks& now, const LightBricks::Changed& changed) {
   const auto all_bricks = std::as_bytes(now.bricks());
   const auto all_numbers = std::as_bytes(now.numbers());
   if (changed.all || table == nullptr || all_numbers.size() > numbers.size) {
@@ -217,7 +217,7 @@ Status DeviceLevels::put_changes(DeviceMemory& memory, const LightBricks& now, c
   return done;
 }
 
-Status DeviceLevels::put(DeviceMemory& memory, LightBricks& now) {
+Status DeviceLevels::put(ShaderMemory& memory, LightBricks& now) {
   const LightBricks::Changed changed = now.take_changes();
   if (table != nullptr && !changed.all && changed.slots.empty()) return {};
   Status done = put_changes(memory, now, changed);
@@ -236,7 +236,7 @@ std::vector<LampPlace> DeviceScene::lamp_places(const Scene& scene) const {
   return places;
 }
 
-Status put_table(DeviceMemory& memory, Place& place, std::span<const std::byte> bytes) {
+Status put_table(ShaderMemory& memory, Place& place, std::span<const std::byte> bytes) {
   if (bytes.size() > place.size || place.size == 0) {
     memory.release(place);
     const auto larger = memory.allocate(bytes.size(), "uploading the scene");

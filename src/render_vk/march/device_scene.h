@@ -13,7 +13,6 @@
 #include "light/surface/light_bricks.h"
 #include "light/surfaces.h"
 #include "render/impostor/raster/faces.h"
-#include "render_vk/device/memory.h"
 #include "render_vk/trees/device_grid.h"
 #include "scene/tracer/instance_tree.h"
 #include "scene/tracer/placed_grid.h"
@@ -52,7 +51,7 @@ struct Placement {
   std::vector<ShaderFar> far;    ///< what shows of impostors, in the order of the instances
 };
 /// Puts a table in place, or in a larger one.
-[[nodiscard]] Status put_table(DeviceMemory& memory, Place& place, std::span<const std::byte> bytes);
+[[nodiscard]] Status put_table(ShaderMemory& memory, Place& place, std::span<const std::byte> bytes);
 [[nodiscard]] bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b);
 
 /// Adds what a type looks like, as shaders have it: three vectors, the last of whose numbers is `last`.
@@ -67,7 +66,7 @@ struct DeviceLamps {
   Place lists;
 
   /// After an error it holds nothing.
-  [[nodiscard]] Status put(DeviceMemory& memory, std::shared_ptr<const LampTable> now);
+  [[nodiscard]] Status put(ShaderMemory& memory, std::shared_ptr<const LampTable> now);
 };
 
 /// Levels of light around surfaces in device memory.
@@ -77,10 +76,10 @@ struct DeviceLevels {
   Place numbers;
 
   /// Sends what changed since the last time. After an error it holds nothing, and sends all the next time.
-  [[nodiscard]] Status put(DeviceMemory& memory, LightBricks& now);
+  [[nodiscard]] Status put(ShaderMemory& memory, LightBricks& now);
 
  private:
-  [[nodiscard]] Status put_changes(DeviceMemory& memory, const LightBricks& now, const LightBricks::Changed& changed);
+  [[nodiscard]] Status put_changes(ShaderMemory& memory, const LightBricks& now, const LightBricks::Changed& changed);
 };
 
 /// What light of a picture is looked up in.
@@ -92,7 +91,7 @@ struct DeviceLight {
 /// A scene's voxels in device memory, and its instances.
 class DeviceScene {
  public:
-  explicit DeviceScene(DeviceMemory& memory) : memory_(&memory) {}
+  explicit DeviceScene(ShaderMemory& memory) : memory_(&memory) {}
 
   /// As VulkanRenderer::update. After an error it holds nothing.
   [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter, Threads threads);
@@ -123,7 +122,7 @@ class DeviceScene {
   Status put_surfaces(const VoxelRegistry& types);
   Status put_grids();
 
-  DeviceMemory* memory_;
+  ShaderMemory* memory_;
   std::map<GridHandle, KnownGrid> grids_;
   ChangeCursor followed_types_;
   ChangeCursor followed_visibility_;

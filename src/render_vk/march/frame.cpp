@@ -272,6 +272,12 @@ FrameData make_frame(const Placement& scene, const Camera& camera, const RenderO
   return data;
 }
 
+void put_scene(const DeviceScene& scene, const Placement& placement, FrameData& data) {
+  data.frame.grids = placement.grids;
+  data.frame.last_surface = scene.last_surface();
+  data.frame.surfaces = scene.surfaces_address();
+}
+
 std::vector<ShaderLamp> shader_lamps(const LampTable& table, DVec3 camera, DVec3 view_origin) {
   std::vector<ShaderLamp> lamps;
   lamps.reserve(table.lamps.size());
@@ -313,6 +319,22 @@ void put_levels(const DeviceLevels& levels, const Scene& scene, const Placement&
     const GridHandle grid = scene.instances()[placement.placed[i].placed.instance].grid;
     data.placed[i].start_base.w = levels.table->index_of(grid);
   }
+}
+
+void set_sample(int sample, int occlusion_rays, ShaderPush& push) {
+  const PixelPoint point = sample_point(sample);
+  push.point_x = static_cast<float>(point.x);
+  push.point_y = static_cast<float>(point.y);
+  push.point_low_x = static_cast<float>(point.x - static_cast<double>(push.point_x));
+  push.point_low_y = static_cast<float>(point.y - static_cast<double>(push.point_y));
+  push.seed = hash_of(static_cast<std::uint32_t>(sample), 0);
+  const OcclusionDirections::Turn turn = OcclusionDirections::turn_of(sample, occlusion_rays);
+  push.turn_cosine = static_cast<float>(turn.about_normal.cosine);
+  push.turn_sine = static_cast<float>(turn.about_normal.sine);
+  for (int axis = 0; axis < 3; ++axis) {
+    push.upright[static_cast<std::size_t>(axis)] = static_cast<float>(turn.upright[axis]);
+  }
+  push.first = sample == 0 ? 1 : 0;
 }
 
 std::vector<float> srgb_thresholds() {

@@ -25,6 +25,9 @@ struct FrameData {
 /// All that is in the world is made relative to the camera here, in double precision. Cost: O(instances).
 [[nodiscard]] FrameData make_frame(const Placement& scene, const Camera& camera, const RenderOptions& options);
 
+/// Has a frame show a scene's grids in the colours of its types. Requires: `placement` is of `scene`.
+void put_scene(const DeviceScene& scene, const Placement& placement, FrameData& data);
+
 /// Has a frame lit by lamps, which the shaders are to find where the result is put.
 /// Requires: `lamps` has a table, in device memory; `data` is of `camera`.
 [[nodiscard]] std::vector<ShaderLamp> put_lamps(const DeviceLamps& lamps, const Camera& camera, FrameData& data);
@@ -35,6 +38,9 @@ void put_levels(const DeviceLevels& levels, const Scene& scene, const Placement&
 
 /// A table's lamps, from where view space has its origin in the world.
 [[nodiscard]] std::vector<ShaderLamp> shader_lamps(const LampTable& table, DVec3 camera, DVec3 view_origin);
+
+/// Has shaders take a sample of every pixel, the `sample`-th. `occlusion_rays`: as LightOptions has them.
+void set_sample(int sample, int occlusion_rays, ShaderPush& push);
 
 /// The least light of each byte but the first: SrgbEncoder as a table.
 [[nodiscard]] std::vector<float> srgb_thresholds();

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cstring>
 
-#include "light/occlusion_directions.h"
-#include "render/camera_rays.h"
 #include "render/picture_request.h"
 
 namespace quoin::vulkan {
@@ -39,14 +37,12 @@ const std::vector<float>& thresholds() {
 
 Status PicturePass::put_frame(const Camera& camera, const RenderOptions& options) {
   FrameData data = make_frame(*placement_, camera, options);
+  put_scene(*scene_, *placement_, data);
   occlusion_rays_ = options.light.occlusion_rays;
   std::vector<ShaderLamp> lamps;
   if (light_.lamps.table != nullptr) lamps = put_lamps(light_.lamps, camera, data);
   if (light_.levels.table != nullptr) put_levels(light_.levels, *content_, *placement_, options.light, data);
   frame_ = data.frame;
-  frame_.grids = placement_->grids;
-  frame_.last_surface = scene_->last_surface();
-  frame_.surfaces = scene_->surfaces_address();
   Status done = places_.upload(data.placed, frame_.placed);
   if (done) done = places_.upload(data.tree, frame_.tree);
   if (done) done = places_.upload(data.leaves, frame_.leaves);
@@ -124,19 +120,7 @@ ShaderPush PicturePass::push_for(const Tile& tile) const {
 
 ShaderPush PicturePass::push_for_sample(const Tile& tile, int sample) const {
   ShaderPush push = push_for(tile);
-  const PixelPoint point = sample_point(sample);
-  push.point_x = static_cast<float>(point.x);
-  push.point_y = static_cast<float>(point.y);
-  push.point_low_x = static_cast<float>(point.x - static_cast<double>(push.point_x));
-  push.point_low_y = static_cast<float>(point.y - static_cast<double>(push.point_y));
-  push.seed = hash_of(static_cast<std::uint32_t>(sample), 0);
-  const OcclusionDirections::Turn turn = OcclusionDirections::turn_of(sample, occlusion_rays_);
-  push.turn_cosine = static_cast<float>(turn.about_normal.cosine);
-  push.turn_sine = static_cast<float>(turn.about_normal.sine);
-  for (int axis = 0; axis < 3; ++axis) {
-    push.upright[static_cast<std::size_t>(axis)] = static_cast<float>(turn.upright[axis]);
-  }
-  push.first = sample == 0 ? 1 : 0;
+  set_sample(sample, occlusion_rays_, push);
   return push;
 }
 

@@ -16,7 +16,7 @@ ShaderTree shader_tree(const DeviceTree& tree, const OccupancyTree* of, IVec3 or
 
 }  // namespace
 
-Status DeviceTree::put(DeviceMemory& memory, std::vector<ChunkNodeAt> chunks) {
+Status DeviceTree::put(ShaderMemory& memory, std::vector<ChunkNodeAt> chunks) {
   TopTree top = build_top_tree(chunks, place_.address);
   const std::size_t bytes = top.nodes.size() * sizeof(Node);
   if (bytes > place_.size) {
@@ -43,7 +43,7 @@ Status DeviceTree::put(DeviceMemory& memory, std::vector<ChunkNodeAt> chunks) {
   return {};
 }
 
-void DeviceTree::release(DeviceMemory& memory) {
+void DeviceTree::release(ShaderMemory& memory) {
   memory.release(place_);
   *this = {};
 }
@@ -57,7 +57,7 @@ ShaderTree DeviceTree::shader_tree(const IBox& bounds, IVec3 origin) const {
   return shader;
 }
 
-void DeviceGrid::release(DeviceMemory& memory) {
+void DeviceGrid::release(ShaderMemory& memory) {
   for (Chunks* const chunks : {&chunks_, &field_chunks_, &glass_chunks_}) drop_all(memory, *chunks);
   for (DeviceTree* const tree : {&opaque_, &transparent_, &field_, &glass_}) tree->release(memory);
   *this = {};
@@ -71,7 +71,7 @@ std::uint64_t DeviceGrid::bytes() const {
   return sum;
 }
 
-Status DeviceGrid::update(DeviceMemory& memory, const Content& content) {
+Status DeviceGrid::update(ShaderMemory& memory, const Content& content) {
   const DensityGrid* const field = content.field == nullptr ? nullptr : &content.field->field();
   const DensityGrid* const glass = content.glass == nullptr ? nullptr : &content.glass->field();
   const auto is_same = [](const DensityGrid* now, const Chunks& chunks, const ChangeCursor& followed) {
@@ -96,7 +96,7 @@ Status DeviceGrid::update(DeviceMemory& memory, const Content& content) {
 }
 
 // What lies above the chunks.
-Status DeviceGrid::update_tops(DeviceMemory& memory, const Content& content) {
+Status DeviceGrid::update_tops(ShaderMemory& memory, const Content& content) {
   const OccupancyTree* const cells = content.field == nullptr ? nullptr : &content.field->cells();
   const OccupancyTree* const glass = content.glass == nullptr ? nullptr : &content.glass->cells();
   IBox bounds = content.voxels->bounds();
@@ -114,7 +114,7 @@ Status DeviceGrid::update_tops(DeviceMemory& memory, const Content& content) {
   return {};
 }
 
-Status DeviceGrid::update_voxels(DeviceMemory& memory, const Content& content) {
+Status DeviceGrid::update_voxels(ShaderMemory& memory, const Content& content) {
   ChangeCursor now = followed_;
   const GridChanges changes = content.voxels->changes_since(now);
   if (changes.all) {
@@ -132,7 +132,7 @@ Status DeviceGrid::update_voxels(DeviceMemory& memory, const Content& content) {
 
 // Null: there is none.
 template <class PutChunk>
-Status DeviceGrid::update_field(DeviceMemory& memory, const DensityGrid* field, Chunks& chunks, ChangeCursor& followed,
+Status DeviceGrid::update_field(ShaderMemory& memory, const DensityGrid* field, Chunks& chunks, ChangeCursor& followed,
                                 const PutChunk& put_chunk) {
   if (field == nullptr) {
     drop_all(memory, chunks);
@@ -149,19 +149,19 @@ Status DeviceGrid::update_field(DeviceMemory& memory, const DensityGrid* field, 
   return {};
 }
 
-void DeviceGrid::drop(DeviceMemory& memory, Chunks& chunks, IVec3 chunk) {
+void DeviceGrid::drop(ShaderMemory& memory, Chunks& chunks, IVec3 chunk) {
   const auto old = chunks.find(chunk);
   if (old == chunks.end()) return;
   memory.release(old->second.place);
   chunks.erase(old);
 }
 
-void DeviceGrid::drop_all(DeviceMemory& memory, Chunks& chunks) {
+void DeviceGrid::drop_all(ShaderMemory& memory, Chunks& chunks) {
   for (auto& [at, chunk] : chunks) memory.release(chunk.place);
   chunks.clear();
 }
 
-Status DeviceGrid::put_voxels(DeviceMemory& memory, const Content& content, IVec3 chunk) {
+Status DeviceGrid::put_voxels(ShaderMemory& memory, const Content& content, IVec3 chunk) {
   const Chunk* voxels = content.voxels->find_chunk(chunk);
   if (voxels == nullptr) {
     drop(memory, chunks_, chunk);
@@ -170,7 +170,7 @@ Status DeviceGrid::put_voxels(DeviceMemory& memory, const Content& content, IVec
   return put_record(memory, chunks_[chunk], pack_chunk(*content.opaque, content.transparent, *voxels, chunk));
 }
 
-Status DeviceGrid::put_field(DeviceMemory& memory, Chunks& chunks, IVec3 chunk, ChunkRecord record) {
+Status DeviceGrid::put_field(ShaderMemory& memory, Chunks& chunks, IVec3 chunk, ChunkRecord record) {
   if (record.field.mask == 0 && record.glass.mask == 0) {
     drop(memory, chunks, chunk);
     return {};
@@ -178,7 +178,7 @@ Status DeviceGrid::put_field(DeviceMemory& memory, Chunks& chunks, IVec3 chunk, 
   return put_record(memory, chunks[chunk], std::move(record));
 }
 
-Status DeviceGrid::put_record(DeviceMemory& memory, DeviceChunk& entry, ChunkRecord record) {
+Status DeviceGrid::put_record(ShaderMemory& memory, DeviceChunk& entry, ChunkRecord record) {
   memory.release(entry.place);
   const auto place = memory.allocate(record.words.size() * 4, "uploading voxels");
   if (!place) return place.error();
@@ -191,7 +191,7 @@ Status DeviceGrid::put_record(DeviceMemory& memory, DeviceChunk& entry, ChunkRec
   return memory.write(entry.place, std::as_bytes(std::span(record.words)));
 }
 
-Status DeviceGrid::put_top(DeviceMemory& memory, DeviceTree& tree, const Chunks& chunks,
+Status DeviceGrid::put_top(ShaderMemory& memory, DeviceTree& tree, const Chunks& chunks,
                            Node DeviceChunk::*node) const {
   std::vector<ChunkNodeAt> nodes;
   for (const auto& [at, chunk] : chunks) {

@@ -8,7 +8,7 @@
 #include <quoin/trace/density_ray.h>
 #include <quoin/trace/occupancy_tree.h>
 
-#include "render_vk/device/memory.h"
+#include "render_vk/trees/shader_memory.h"
 #include "render_vk/trees/tree_packing.h"
 
 namespace quoin::vulkan {
@@ -22,8 +22,8 @@ struct ByPlace {
 class DeviceTree {
  public:
   /// Writes the nodes that changed.
-  [[nodiscard]] Status put(DeviceMemory& memory, std::vector<ChunkNodeAt> chunks);
-  void release(DeviceMemory& memory);
+  [[nodiscard]] Status put(ShaderMemory& memory, std::vector<ChunkNodeAt> chunks);
+  void release(ShaderMemory& memory);
 
   [[nodiscard]] bool empty() const { return top_.root.mask == 0; }
   [[nodiscard]] std::uint64_t bytes() const { return place_.size; }
@@ -51,8 +51,8 @@ class DeviceGrid {
   /// memory is flushed. After an error it is to be released.
   ///
   /// Requires: the types' visibility is that of the last time.
-  [[nodiscard]] Status update(DeviceMemory& memory, const Content& content);
-  void release(DeviceMemory& memory);
+  [[nodiscard]] Status update(ShaderMemory& memory, const Content& content);
+  void release(ShaderMemory& memory);
 
   [[nodiscard]] IVec3 origin() const { return origin_ * kChunkEdge; }  ///< of the trees' coordinates, in the grid
   [[nodiscard]] bool has_transparent() const { return !transparent_.empty() || has_field_glass(); }
@@ -74,17 +74,17 @@ class DeviceGrid {
   };
   using Chunks = std::map<IVec3, DeviceChunk, ByPlace>;
 
-  Status update_voxels(DeviceMemory& memory, const Content& content);
+  Status update_voxels(ShaderMemory& memory, const Content& content);
   template <class PutChunk>
-  static Status update_field(DeviceMemory& memory, const DensityGrid* field, Chunks& chunks, ChangeCursor& followed,
+  static Status update_field(ShaderMemory& memory, const DensityGrid* field, Chunks& chunks, ChangeCursor& followed,
                              const PutChunk& put_chunk);
-  Status update_tops(DeviceMemory& memory, const Content& content);
-  Status put_voxels(DeviceMemory& memory, const Content& content, IVec3 chunk);
-  static Status put_field(DeviceMemory& memory, Chunks& chunks, IVec3 chunk, ChunkRecord record);
-  static Status put_record(DeviceMemory& memory, DeviceChunk& entry, ChunkRecord record);
-  static void drop(DeviceMemory& memory, Chunks& chunks, IVec3 chunk);
-  static void drop_all(DeviceMemory& memory, Chunks& chunks);
-  Status put_top(DeviceMemory& memory, DeviceTree& tree, const Chunks& chunks, Node DeviceChunk::*node) const;
+  Status update_tops(ShaderMemory& memory, const Content& content);
+  Status put_voxels(ShaderMemory& memory, const Content& content, IVec3 chunk);
+  static Status put_field(ShaderMemory& memory, Chunks& chunks, IVec3 chunk, ChunkRecord record);
+  static Status put_record(ShaderMemory& memory, DeviceChunk& entry, ChunkRecord record);
+  static void drop(ShaderMemory& memory, Chunks& chunks, IVec3 chunk);
+  static void drop_all(ShaderMemory& memory, Chunks& chunks);
+  Status put_top(ShaderMemory& memory, DeviceTree& tree, const Chunks& chunks, Node DeviceChunk::*node) const;
 
   ChangeCursor followed_;
   ChangeCursor followed_field_;

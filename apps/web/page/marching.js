@@ -1,0 +1,233 @@
+// The mode in which the page's view is marched: by WebGPU where there is an adapter with room for the scene, else by
+// the module in the worker, once the view rests.
+import { Marcher, openDevice } from './march.js';
+
+const rest = 250;           // milliseconds without a change
+const movingFrame = 60;     // milliseconds that a picture of a moving view may take
+const factors = [1, 2, 3, 4, 6, 8, 12];  // by which such a picture is coarser
+
+let opening;  // a promise of the device, which all scenes share
+
+/** On the device. `lost` is called when that is gone. */
+class ByDevice {
+  static async open(ask, canvas, lost) {
+    opening ??= openDevice();
+    const { device, name } = await opening.catch((error) => {
+      opening = undefined;
+      throw error;
+    });
+    device.lost.then(({ message }) => {
+      opening = undefined;
+      lost(message || 'the device is lost');
+    });
+    const by = new ByDevice();
+    by.ask = ask;
+    by.name = `WebGPU, ${name || 'an adapter without a name'}`;
+    by.marcher = await Marcher.open(device, await ask('shaders', {}));
+    by.context = canvas.getContext('webgpu');
+    by.context.configure({ device, format: navigator.gpu.getPreferredCanvasFormat(), alphaMode: 'opaque' });
+    by.pixelsPerMillisecond = 0;
+    return by;
+  }
+
+  /** How much coarser pictures are while the view moves. */
+  factor(pixels) {
+    const most = this.pixelsPerMillisecond * movingFrame;
+    return factors.find((factor) => pixels / factor ** 2 <= most) ?? factors.at(this.pixelsPerMillisecond ? -1 : 5);
+  }
+
+  /** Draws the first sample while `wanted.first()` is true, and where the picture is not coarse more of them while
+   *  `wanted.isSame()` is. Calls `shown` after each. */
+  async draw(view, factor, wanted, shown) {
+    const [width, height] = [view.width, view.height].map((edge) => Math.max(Math.round(edge / factor), 1));
+    const { frame } = await this.ask('frame', { ...view, width, height });
+    if (!wanted.first()) return;
+    this.marcher.begin(frame, width, height);
+    do {
+      const began = performance.now();
+      if (!await this.marcher.addSample(this.marcher.samples === 0 ? wanted.first : wanted.isSame)) return;
+      const milliseconds = performance.now() - began;
+      this.pixelsPerMillisecond = width * height / milliseconds;
+      this.marcher.show(this.context);
+      shown({ by: this.name, milliseconds, width, height, samples: this.marcher.samples });
+    } while (factor === 1 && !this.marcher.isFinished && wanted.isSame());
+  }
+
+  async read() {
+    return this.marcher.read();
+  }
+
+  close() {
+    this.marcher.close();
+    this.context.unconfigure();
+  }
+}
+
+/** By the module: one picture, and nothing while the view moves. */
+class ByModule {
+  constructor(ask, canvas, name) {
+    this.ask = ask;
+    this.name = name;
+    this.context = canvas.getContext('2d');
+  }
+
+  factor() {
+    return Infinity;
+  }
+
+  async draw(view, factor, wanted, shown) {
+    const began = performance.now();
+    const { width, height, rgba } = await this.ask('march', { ...view, samples: 1 });
+    if (!wanted.isSame()) return;
+    this.picture = { width, height, rgba };
+    this.context.putImageData(new ImageData(rgba, width, height), 0, 0);
+    shown({ by: this.name, milliseconds: performance.now() - began, width, height, samples: 1 });
+  }
+
+  async read() {
+    return this.picture;
+  }
+
+  close() {}
+}
+
+export class MarchedView {
+  #page;
+  #by;       // one of the above; undefined: the mode is off
+  #canvas;
+  #changes = 0;
+  #changed = 0;  // when
+  #wake = () => {};
+  #generation = 0;
+
+  /** `page`: { ask, below (an element), view() => what the worker's `frame` takes, shown(facts), said(text) }. */
+  constructor(page) {
+    this.#page = page;
+  }
+
+  get isOn() {
+    return this.#by !== undefined;
+  }
+
+  /** Whether what is on the screen is of the view as it is; without, others draw it. */
+  get isShown() {
+    return this.isOn && this.#canvas.dataset.shown === 'true';
+  }
+
+  /** Begins with the scene that the worker has. */
+  async start() {
+    this.stop();
+    const generation = ++this.#generation;
+    const isCurrent = () => generation === this.#generation;
+    const by = await this.#open((why) => isCurrent() && this.#fallBack(why));
+    if (!isCurrent()) return by.close();
+    this.#by = by;
+    this.change();
+    this.#run(isCurrent);
+  }
+
+  async #open(lost) {
+    this.#newCanvas();
+    try {
+      return await ByDevice.open(this.#page.ask, this.#canvas, lost);
+    } catch (error) {
+      return this.#byModule(error.message);
+    }
+  }
+
+  #byModule(why) {
+    this.#page.said(`${why}: the processor draws, where the view rests.`);
+    this.#newCanvas();
+    return new ByModule(this.#page.ask, this.#canvas, 'the processor');
+  }
+
+  #fallBack(why) {
+    if (!this.isOn) return;
+    this.#by = this.#byModule(why);
+    this.change();
+  }
+
+  // A canvas has one kind of context for good.
+  #newCanvas() {
+    this.#canvas?.remove();
+    this.#canvas = document.createElement('canvas');
+    this.#canvas.className = 'marched';
+    this.#canvas.hidden = true;
+    this.#page.below.before(this.#canvas);
+  }
+
+  stop() {
+    ++this.#generation;
+    this.#by?.close();
+    this.#by = undefined;
+    this.#canvas?.remove();
+    this.#canvas = undefined;
+    this.#wake();
+  }
+
+  /** The view is another one, or the sun. */
+  change() {
+    if (!this.isOn) return;
+    ++this.#changes;
+    this.#changed = performance.now();
+    if (this.#by instanceof ByModule) this.#show(false);
+    this.#wake();
+  }
+
+  /** The picture that is shown. */
+  async read() {
+    return this.#by.read();
+  }
+
+  #show(isShown) {
+    this.#canvas.hidden = !isShown;
+    this.#canvas.dataset.shown = isShown;
+  }
+
+  // Every change is shown at once, coarsely; and finer and finer where no other follows.
+  async #run(isCurrent) {
+    let drawn = 0;  // as of which change, and how coarsely
+    let factor = 1;
+    while (isCurrent()) {
+      const isNew = drawn !== this.#changes;
+      if (!isNew && factor === 1) {
+        await new Promise((wake) => { this.#wake = wake; });
+        continue;
+      }
+      const by = this.#by;
+      const view = this.#page.view();
+      const finer = factor === Infinity ? 1 : Math.ceil(factor / 2);
+      const next = isNew ? by.factor(view.width * view.height) : finer;
+      const change = this.#changes;
+      if (next !== Infinity) {
+        if (!isNew && performance.now() - this.#changed < rest) {
+          await new Promise((done) => setTimeout(done, 30));
+          continue;
+        }
+        const isHere = () => isCurrent() && by === this.#by;
+        const isSame = () => isHere() && change === this.#changes;
+        await this.#draw(by, view, next, { isHere, isSame, first: isNew ? isHere : isSame });
+      }
+      drawn = change;
+      factor = next;
+    }
+  }
+
+  async #draw(by, view, factor, wanted) {
+    if (this.#canvas.width !== view.width || this.#canvas.height !== view.height)
+      Object.assign(this.#canvas, { width: view.width, height: view.height });
+    try {
+      await by.draw(view, factor, wanted, (facts) => {
+        this.#show(true);
+        this.#page.shown(facts);
+      });
+    } catch (error) {
+      if (!wanted.isHere()) return;
+      if (by instanceof ByModule) {
+        this.#page.said(error.message);
+      } else {
+        this.#fallBack(error.message);
+      }
+    }
+  }
+}

@@ -1,0 +1,23 @@
+#include "render_vk/trees/shader_memory.h"
+
+#include <algorithm>
+
+#include <quoin/core/assert.h>
+
+namespace quoin::vulkan {
+
+Result<Place> ShaderBytes::allocate(std::uint64_t size, const std::string& doing) {
+  const std::uint64_t room = (size + kAlignment - 1) / kAlignment * kAlignment;
+  const std::uint64_t begin = bytes_.size();
+  if (room > kMost - begin) return make_error(ErrorCode::LimitExceeded, doing + ": more than 2 GiB for shaders");
+  bytes_.resize(static_cast<std::size_t>(begin + room));
+  return Place{0, begin, room, begin};
+}
+
+Status ShaderBytes::write(const Place& place, std::span<const std::byte> bytes, std::uint64_t offset) {
+  QUOIN_ASSERT(offset + bytes.size() <= place.size || bytes.empty(), "bytes within the place");
+  std::copy(bytes.begin(), bytes.end(), bytes_.begin() + static_cast<std::ptrdiff_t>(place.offset + offset));
+  return {};
+}
+
+}  // namespace quoin::vulkan
