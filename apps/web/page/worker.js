@@ -6,16 +6,15 @@ start(undefined, { small: true }).catch(() => {});  // `load` says why
 
 let file;   // its bytes
 let scene;
-let isWhole;
+let whole;  // a promise of the same in the module that does everything
 
-/** The scene in the module that does everything. */
 async function wholeScene() {
-  if (!isWhole) {
-    const last = scene;
-    scene = await load(file);
-    isWhole = true;
-    last.free();
-  }
+  if (!scene.isSmall) return scene;
+  whole ??= load(file).then((made) => {
+    scene.free();
+    scene = made;
+  }).finally(() => { whole = undefined; });
+  await whole;
   return scene;
 }
 
@@ -23,7 +22,6 @@ const work = {
   async load({ bytes, smooth }, tell) {
     scene?.free();
     scene = undefined;
-    isWhole = false;
     file = bytes;
     const began = performance.now();
     scene = await load(bytes, { small: true, progress: (fraction) => tell(fraction / 2) });
