@@ -90,6 +90,8 @@ export interface Hits {
 
 export class Scene {
   private constructor();
+  /** Whether it is of the small module. */
+  readonly isSmall: boolean;
   /** What reading left out, a line each. */
   readonly warnings: readonly string[];
   readonly grids: readonly GridInfo[];

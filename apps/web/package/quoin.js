@@ -21,6 +21,7 @@ class Instance {
   constructor(module) {
     this.dead = false;
     this.exports = new WebAssembly.Instance(module, this.imports(module)).exports;
+    this.isSmall = this.exports.quoin_web_reads !== undefined;
     this.run('__wasm_call_ctors');
   }
 
@@ -283,6 +284,7 @@ export class Scene {
   constructor(of, handle) {
     this.#instance = of;
     this.#handle = handle;
+    this.isSmall = of.isSmall;
     this.warnings = Object.freeze(this.#texts());
     this.grids = Object.freeze(this.#grids());
     this.types = Object.freeze(this.#types());
@@ -507,8 +509,7 @@ export async function load(given, options = {}) {
 /** The scene that a module reads; undefined where it does not read such files. */
 function loaded(of, bytes, { progress }) {
   return of.withBytes(bytes, (at) => {
-    if (of.exports.quoin_web_reads !== undefined && of.run('quoin_web_reads', at, bytes.byteLength) === 0)
-      return undefined;
+    if (of.isSmall && of.run('quoin_web_reads', at, bytes.byteLength) === 0) return undefined;
     const handle = of.listened(progress, () => of.handle('quoin_scene_load_bytes', at, bytes.byteLength));
     return new Scene(of, handle);
   });

@@ -6,16 +6,15 @@ start(undefined, { small: true }).catch(() => {});  // `load` says why
 
 let file;   // its bytes
 let scene;
-let isWhole;
+let whole;  // a promise of the same in the module that does everything
 
-/** The scene in the module that does everything. */
 async function wholeScene() {
-  if (!isWhole) {
-    const last = scene;
-    scene = await load(file);
-    isWhole = true;
-    last.free();
-  }
+  if (!scene.isSmall) return scene;
+  whole ??= load(file).then((made) => {
+    scene.free();
+    scene = made;
+  }).finally(() => { whole = undefined; });
+  await whole;
   return scene;
 }
 
@@ -28,7 +27,6 @@ const work = {
     shaders?.free();
     scene?.free();
     shaders = scene = undefined;
-    isWhole = false;
     file = bytes;
     const began = performance.now();
     scene = await load(bytes, { small: true, progress: (fraction) => tell(fraction / 2) });

@@ -28,13 +28,13 @@ async function tried(bytes, options) {
   }
 }
 
-/** Whether a scene is the small module's, which has no rays. */
+/** Whether a scene is the small module's, and has no rays. */
 function isSmall(scene) {
   try {
     scene.rays([], []);
-    return false;
+    return scene.isSmall;
   } catch (error) {
-    if (error.code !== 'unsupported') throw error;
+    if (error.code !== 'unsupported' || !scene.isSmall) throw error;
     return true;
   }
 }
