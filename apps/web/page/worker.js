@@ -1,8 +1,25 @@
 // Reads files and draws pictures beside the page, which goes on meanwhile.
 import { load, start } from '../package/quoin.js';
 
-// Compiled before there is a file.
-start(undefined, { small: true }).catch(() => {});  // `load` says why
+/** A .vox file of a block of two colours. */
+function block() {
+  const [width, height] = [32, 16];
+  const voxels = Uint32Array.from({ length: width * width * height }, (_, i) =>
+    i % width | (Math.floor(i / width) % width) << 8 | Math.floor(i / width / width) << 16 | (1 + i % 2) << 24);
+  const id = (name) => new DataView(new TextEncoder().encode(name).buffer).getUint32(0, true);
+  return Uint32Array.of(id('VOX '), 150, id('MAIN'), 0, 40 + voxels.byteLength, id('SIZE'), 12, 0, width, width, height,
+                        id('XYZI'), 4 + voxels.byteLength, 0, voxels.length, ...voxels);
+}
+
+/** Compiles the small module before there is a file, and what a first file takes of it: functions are compiled when they
+ *  are first called. */
+async function prepare() {
+  await start(undefined, { small: true });
+  const small = await load(block(), { small: true });
+  small.glb();
+  small.free();
+}
+prepare().catch(() => {});  // `load` says why
 
 let file;   // its bytes
 let scene;

@@ -53,6 +53,20 @@ for (let i = 0; i < 60; ++i) {
   for (let n = 0; n < 8; ++n) bytes[Math.floor(bytes.length * (n < 4 ? random() * 0.01 : random()))] = 256 * random();
   await survives(`damage ${i}`, bytes);
 }
+// Triangles: broken files, and damaged ones.
+const text = (string) => new TextEncoder().encode(string);
+await refuses('a GLB without an end', () => load(text('glTF\x02\0\0\0\xff\xff\0\0')));
+await refuses('a glTF whose meshes are a number', () => load(text('{"asset": {"version": "2.0"}, "meshes": 5}')));
+await refuses('a glTF without triangles', () => load(text('{"asset": {"version": "2.0"}, "scenes": [{"nodes": []}]}')));
+await refuses('a glTF that is cut off', () => load(text('{"asset": {"version": "2.0"}, "meshes": [')));
+const triangles = { glb: new Uint8Array(before), obj: text('v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\nf 1 2 3\nf 1 2 -1\n') };
+for (const [kind, whole] of Object.entries(triangles)) {
+  for (let i = 0; i < 20; ++i) {
+    const bytes = whole.slice(0, Math.min(whole.length, 6000 + Math.floor(6000 * random())));
+    for (let n = 0; n < 4; ++n) bytes[Math.floor(bytes.length * random())] = 256 * random();
+    await survives(`${kind}, damage ${i}`, bytes);
+  }
+}
 // A volume whose header claims two gigabytes, and one that claims more than there is address space.
 for (const size of ['1024 1024 512', '4096 4096 4096']) {
   const header = `NRRD0004\ntype: float\ndimension: 3\nsizes: ${size}\nencoding: raw\nendian: little\n\n`;
