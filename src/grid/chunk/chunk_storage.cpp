@@ -279,7 +279,7 @@ void Chunk::compact() {
   if (storage_ == nullptr) return;
   if (is_one_entry()) return fill(get(0, 0, 0));
   // What others share they would keep all the same.
-  if (storage_.is_shared()) return;
+  if (storage_.is_shared() || storage_->words.has_shared_pages()) return;
   repack(bits_for(used_types()));
   storage_->palette.shrink_to_fit();
   storage_->counts.shrink_to_fit();

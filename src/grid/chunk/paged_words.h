@@ -78,6 +78,10 @@ class PagedWords {
       visit(std::span(pages_[first / kPageWords]->words(), std::min(kPageWords, size_ - first)));
     }
   }
+  /// Whether others have some of the pages, too.
+  [[nodiscard]] bool has_shared_pages() const {
+    return std::ranges::any_of(pages_, [](const Ref<Page>& page) { return page.is_shared(); });
+  }
   /// Bytes allocated, those that are shared too.
   [[nodiscard]] std::size_t allocated() const;
 

@@ -52,11 +52,14 @@ TEST(PagedWords, AWriteToACopyCopiesOnePage) {
     EXPECT_EQ(first.at(word) == second.at(word), word / PagedWords::kPageWords != 2'500 / PagedWords::kPageWords)
         << word;
   }
+  EXPECT_TRUE(first.has_shared_pages());
   // The first has that page to itself now, and finds out when it asks.
   const std::uint64_t* const place = first.at(2'500);
   first.make_own(2'500);
   EXPECT_TRUE(first.owns(2'500));
   EXPECT_EQ(first.at(2'500), place);
+  second = PagedWords();
+  EXPECT_FALSE(first.has_shared_pages());
 }
 
 TEST(PagedWords, GrowAndShrinkWithoutTouchingCopies) {
