@@ -34,11 +34,12 @@ quoin_status write(SceneBody& body, const char* extension, const quoin_mesh_opti
     body.loaded.warnings = std::move(written->warnings);
     return give(std::move(written->bytes), out, count);
   }
-  const Progress meshing = part_of(progress(), 0.0, 0.5);
+  const Progress told = progress();
+  const Progress meshing = part_of(told, 0.0, 0.5);
   const auto meshes = options.smooth != 0 ? mesh_scene_smoothly(body.loaded.scene, {}, {}, meshing)
                                           : mesh_scene(body.loaded.scene, {}, {}, meshing);
   if (!meshes) return fail(meshes.error());
-  auto written = write_mesh(*meshes, format->format, {}, part_of(progress(), 0.5, 1.0));
+  auto written = write_mesh(*meshes, format->format, {}, part_of(told, 0.5, 1.0));
   return written ? give(std::move(*written), out, count) : fail(written.error());
 }
 
