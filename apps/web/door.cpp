@@ -14,12 +14,6 @@ extern "C" __attribute__((import_module("quoin"), import_name("told"))) std::int
 namespace quoin::c {
 namespace {
 
-// Of what is meshed and written, a listener for the one or the other.
-Progress half_of(const Progress& whole, double begin) {
-  if (!whole) return {};
-  return [whole, begin](double fraction) { return whole(begin + fraction / 2.0); };
-}
-
 // The last file that was written, which JavaScript copies from where it is.
 std::vector<std::byte> file;
 
@@ -40,11 +34,12 @@ quoin_status write(SceneBody& body, const char* extension, const quoin_mesh_opti
     body.loaded.warnings = std::move(written->warnings);
     return give(std::move(written->bytes), out, count);
   }
-  const Progress meshing = half_of(progress(), 0.0);
+  const Progress told = progress();
+  const Progress meshing = part_of(told, 0.0, 0.5);
   const auto meshes = options.smooth != 0 ? mesh_scene_smoothly(body.loaded.scene, {}, {}, meshing)
                                           : mesh_scene(body.loaded.scene, {}, {}, meshing);
   if (!meshes) return fail(meshes.error());
-  auto written = write_mesh(*meshes, format->format, {}, half_of(progress(), 0.5));
+  auto written = write_mesh(*meshes, format->format, {}, part_of(told, 0.5, 1.0));
   return written ? give(std::move(*written), out, count) : fail(written.error());
 }
 
