@@ -1,4 +1,4 @@
-// The README's commands and code are what is tested, not a copy of it.
+// The commands and the code of the README and the guide are what is tested, not a copy of it.
 
 #include <cstdlib>
 #include <filesystem>
@@ -22,9 +22,9 @@ std::string read_text(const fs::path& path) {
   return text.str();
 }
 
-// The contents of the README's fenced blocks of one language.
-std::vector<std::string> blocks(const std::string& language) {
-  const std::string readme = read_text(fs::path(QUOIN_SOURCE_DIR) / "README.md");
+// The contents of a page's fenced blocks of one language.
+std::vector<std::string> blocks(const std::string& language, const std::string& page = "README.md") {
+  const std::string readme = read_text(fs::path(QUOIN_SOURCE_DIR) / page);
   const std::string fence = "```" + language + "\n";
   std::vector<std::string> found;
   for (std::size_t at = readme.find(fence); at != std::string::npos; at = readme.find(fence, at)) {
@@ -57,14 +57,39 @@ TEST(Readme, EveryToolCommandWorks) {
   fs::remove_all(work);
 }
 
-TEST(Readme, ItsCodeIsAnExampleThatIsBuiltAndRun) {
+TEST(Readme, ItsCodeAndTheGuidesAreExamplesThatAreBuiltAndRun) {
   std::string examples;
   for (const auto& entry : fs::directory_iterator(fs::path(QUOIN_SOURCE_DIR) / "examples")) {
     if (entry.path().extension() == ".cpp") examples += read_text(entry.path());
   }
-  const std::vector<std::string> code = blocks("cpp");
-  EXPECT_FALSE(code.empty());
-  for (const std::string& block : code) EXPECT_NE(examples.find(block), std::string::npos) << block;
+  for (const char* const page : {"README.md", "docs/guide.md"}) {
+    const std::vector<std::string> code = blocks("cpp", page);
+    EXPECT_GE(code.size(), 5U) << page;
+    for (const std::string& block : code) EXPECT_NE(examples.find(block), std::string::npos) << page << "\n" << block;
+  }
+}
+
+// What one page says of another, of a header or of an example by a link is there.
+TEST(Readme, LinksOfThePagesLeadSomewhere) {
+  const fs::path root = QUOIN_SOURCE_DIR;
+  std::vector<fs::path> pages{root / "README.md", root / "CONTRIBUTING.md", root / "CHANGELOG.md"};
+  for (const auto& entry : fs::recursive_directory_iterator(root / "docs")) {
+    if (entry.path().extension() == ".md") pages.push_back(entry.path());
+  }
+  int links = 0;
+  for (const fs::path& page : pages) {
+    const std::string text = read_text(page);
+    for (std::size_t at = text.find("]("); at != std::string::npos; at = text.find("](", at)) {
+      at += 2;
+      const std::string target = text.substr(at, text.find_first_of(")#\n", at) - at);
+      if (target.empty() || target.find("://") != std::string::npos ||
+          target.find_first_of(" ,;{}<>") != std::string::npos)
+        continue;
+      EXPECT_TRUE(fs::exists(page.parent_path() / target)) << page << ": " << target;
+      ++links;
+    }
+  }
+  EXPECT_GT(links, 100);
 }
 
 TEST(Readme, EveryDevCommandExists) {

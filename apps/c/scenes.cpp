@@ -85,12 +85,6 @@ quoin_status add_grid(SceneBody& scene, const quoin_array& array, const char* na
   return QUOIN_OK;
 }
 
-// A listener for a share of a call's work.
-Progress share_of(const Progress& whole, double begin, double end) {
-  if (!whole) return {};
-  return [whole, begin, end](double fraction) { return whole(begin + fraction * (end - begin)); };
-}
-
 quoin_status save(SceneBody& scene, const char* path) {
   scene.save_warnings.clear();
   const auto format = format_for_writing(path);
@@ -102,9 +96,10 @@ quoin_status save(SceneBody& scene, const char* path) {
     return QUOIN_OK;
   }
   constexpr double kMeshed = 0.5;
-  const auto meshes = mesh_scene(scene.loaded.scene, {}, {}, share_of(progress(), 0.0, kMeshed));
+  const Progress whole = progress();
+  const auto meshes = mesh_scene(scene.loaded.scene, {}, {}, part_of(whole, 0.0, kMeshed));
   if (!meshes) return fail(meshes.error());
-  const auto written = write_mesh(*meshes, path, {}, share_of(progress(), kMeshed, 1.0));
+  const auto written = write_mesh(*meshes, path, {}, part_of(whole, kMeshed, 1.0));
   return written ? QUOIN_OK : fail(written.error());
 }
 

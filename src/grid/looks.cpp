@@ -36,6 +36,111 @@ struct Group {
   }
 };
 
+/// Looks in groups that become one colour each: the median cut.
+class MedianCut {
+ public:
+  explicit MedianCut(std::span<const Looks::Look> looks) : looks_(looks), order_(looks.size()) {
+    std::iota(order_.begin(), order_.end(), 0U);
+    std::stable_sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return std::pair(looks_[a].material, is_opaque(looks_[a])) < std::pair(looks_[b].material, is_opaque(looks_[b]));
+    });
+    for (std::size_t first = 0; first < order_.size();) {
+      std::size_t end = first;
+      while (end < order_.size() && belong_together(look(first), look(end))) ++end;
+      groups_.push(group_of(first, end));
+      first = end;
+    }
+  }
+
+  [[nodiscard]] std::size_t groups() const { return groups_.size(); }
+
+  /// Cuts groups in two until there are so many, or none has two colours.
+  void cut(std::size_t most) {
+    while (groups_.size() < most && groups_.top().spread > 0) {
+      const Group group = groups_.top();
+      groups_.pop();
+      const std::size_t middle = middle_of(group);
+      groups_.push(group_of(group.first, middle));
+      groups_.push(group_of(middle, group.end));
+    }
+  }
+
+  /// Gives each look the mean colour of its group, which has none then.
+  void take_means(std::vector<Rgba8>& colours) {
+    for (; !groups_.empty(); groups_.pop()) {
+      const Group& group = groups_.top();
+      const Rgba8 colour = mean_of(group);
+      for (std::size_t i = group.first; i < group.end; ++i) colours[order_[i]] = colour;
+    }
+  }
+
+ private:
+  static bool is_opaque(const Looks::Look& look) { return look.colour.a == 255; }
+  // Glass and what is opaque are never one.
+  static bool belong_together(const Looks::Look& a, const Looks::Look& b) {
+    return a.material == b.material && is_opaque(a) == is_opaque(b);
+  }
+  [[nodiscard]] const Looks::Look& look(std::size_t place) const { return looks_[order_[place]]; }
+
+  [[nodiscard]] Group group_of(std::size_t first, std::size_t end) const {
+    Channels low{255, 255, 255, 255};
+    Channels high{};
+    std::int64_t voxels = 0;
+    for (std::size_t i = first; i < end; ++i) {
+      const Channels channels = channels_of(look(i).colour);
+      for (std::size_t c = 0; c < channels.size(); ++c) {
+        low[c] = std::min(low[c], channels[c]);
+        high[c] = std::max(high[c], channels[c]);
+      }
+      voxels += look(i).voxels;
+    }
+    Group group{first, end};
+    for (std::size_t c = 1; c < low.size(); ++c) {
+      if (high[c] - low[c] > high[group.channel] - low[group.channel]) group.channel = c;
+    }
+    const std::int64_t extent = high[group.channel] - low[group.channel];
+    // Large differences count for more than many voxels.
+    group.spread =
+        extent * extent * (1 + static_cast<std::int64_t>(std::bit_width(static_cast<std::uint64_t>(voxels))));
+    return group;
+  }
+
+  // Sorts the group, and finds a place between two values next to the middle. Requires: it has two.
+  std::size_t middle_of(const Group& group) {
+    const auto begin = order_.begin() + static_cast<std::ptrdiff_t>(group.first);
+    const auto end = order_.begin() + static_cast<std::ptrdiff_t>(group.end);
+    const auto value = [&](std::uint32_t number) { return channels_of(looks_[number].colour)[group.channel]; };
+    std::stable_sort(begin, end, [&](std::uint32_t a, std::uint32_t b) { return value(a) < value(b); });
+    auto middle = begin + (end - begin) / 2;
+    while (middle != end && value(*middle) == value(*(middle - 1))) ++middle;
+    if (middle == end) {
+      middle = begin + (end - begin) / 2;
+      while (value(*middle) == value(*(middle - 1))) --middle;
+    }
+    return static_cast<std::size_t>(middle - order_.begin());
+  }
+
+  [[nodiscard]] Rgba8 mean_of(const Group& group) const {
+    std::array<std::uint64_t, 4> sums{};
+    std::uint64_t voxels = 0;
+    for (std::size_t i = group.first; i < group.end; ++i) {
+      const Channels channels = channels_of(look(i).colour);
+      for (std::size_t c = 0; c < sums.size(); ++c) sums[c] += static_cast<std::uint64_t>(channels[c]) * look(i).voxels;
+      voxels += look(i).voxels;
+    }
+    QUOIN_ASSERT(voxels != 0, "looks of voxels");
+    const auto mean = [&](std::size_t c) { return static_cast<std::uint8_t>((sums[c] + voxels / 2) / voxels); };
+    Rgba8 colour{mean(0), mean(1), mean(2), mean(3)};
+    // A mean of glass is glass.
+    if (!is_opaque(look(group.first))) colour.a = std::min<std::uint8_t>(colour.a, 254);
+    return colour;
+  }
+
+  std::span<const Looks::Look> looks_;
+  std::vector<std::uint32_t> order_;
+  std::priority_queue<Group> groups_;
+};
+
 }  // namespace
 
 std::uint32_t Looks::number_of(Rgba8 colour, std::uint32_t material) {
@@ -51,84 +156,13 @@ Result<std::vector<Rgba8>> Looks::reduced(std::size_t most) const {
   colours.reserve(looks_.size());
   for (const Look& look : looks_) colours.push_back(look.colour);
   if (looks_.size() <= most) return colours;
-  // Glass and what is opaque are never one.
-  const auto is_opaque = [](const Look& look) { return look.colour.a == 255; };
-  std::vector<std::uint32_t> order(looks_.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return std::pair(looks_[a].material, is_opaque(looks_[a])) < std::pair(looks_[b].material, is_opaque(looks_[b]));
-  });
-  const auto group_of = [&](std::size_t first, std::size_t end) {
-    Channels low{255, 255, 255, 255};
-    Channels high{};
-    std::int64_t voxels = 0;
-    for (std::size_t i = first; i < end; ++i) {
-      const Channels channels = channels_of(looks_[order[i]].colour);
-      for (std::size_t c = 0; c < channels.size(); ++c) {
-        low[c] = std::min(low[c], channels[c]);
-        high[c] = std::max(high[c], channels[c]);
-      }
-      voxels += looks_[order[i]].voxels;
-    }
-    Group group{first, end};
-    for (std::size_t c = 1; c < low.size(); ++c) {
-      if (high[c] - low[c] > high[group.channel] - low[group.channel]) group.channel = c;
-    }
-    const std::int64_t extent = high[group.channel] - low[group.channel];
-    // Large differences count for more than many voxels.
-    group.spread =
-        extent * extent * (1 + static_cast<std::int64_t>(std::bit_width(static_cast<std::uint64_t>(voxels))));
-    return group;
-  };
-  std::priority_queue<Group> groups;
-  for (std::size_t first = 0; first < order.size();) {
-    std::size_t end = first;
-    const Look& one = looks_[order[first]];
-    while (end < order.size() && looks_[order[end]].material == one.material &&
-           is_opaque(looks_[order[end]]) == is_opaque(one)) {
-      ++end;
-    }
-    groups.push(group_of(first, end));
-    first = end;
-  }
-  if (groups.size() > most) {
+  MedianCut cut(looks_);
+  if (cut.groups() > most) {
     return make_error(ErrorCode::LimitExceeded,
-                      "too many materials for " + std::to_string(most) + " types: " + std::to_string(groups.size()));
+                      "too many materials for " + std::to_string(most) + " types: " + std::to_string(cut.groups()));
   }
-  while (groups.size() < most && groups.top().spread > 0) {
-    const Group group = groups.top();
-    groups.pop();
-    const auto begin = order.begin() + static_cast<std::ptrdiff_t>(group.first);
-    const auto end = order.begin() + static_cast<std::ptrdiff_t>(group.end);
-    const auto value = [&](std::uint32_t look) { return channels_of(looks_[look].colour)[group.channel]; };
-    std::stable_sort(begin, end, [&](std::uint32_t a, std::uint32_t b) { return value(a) < value(b); });
-    // Between two values next to the middle.
-    auto middle = begin + (end - begin) / 2;
-    while (middle != end && value(*middle) == value(*(middle - 1))) ++middle;
-    if (middle == end) {
-      middle = begin + (end - begin) / 2;
-      while (value(*middle) == value(*(middle - 1))) --middle;
-    }
-    const auto cut = static_cast<std::size_t>(middle - order.begin());
-    groups.push(group_of(group.first, cut));
-    groups.push(group_of(cut, group.end));
-  }
-  for (; !groups.empty(); groups.pop()) {
-    const Group& group = groups.top();
-    std::array<std::uint64_t, 4> sums{};
-    std::uint64_t voxels = 0;
-    for (std::size_t i = group.first; i < group.end; ++i) {
-      const Look& look = looks_[order[i]];
-      const Channels channels = channels_of(look.colour);
-      for (std::size_t c = 0; c < sums.size(); ++c) sums[c] += static_cast<std::uint64_t>(channels[c]) * look.voxels;
-      voxels += look.voxels;
-    }
-    const auto mean = [&](std::size_t c) { return static_cast<std::uint8_t>((sums[c] + voxels / 2) / voxels); };
-    Rgba8 colour{mean(0), mean(1), mean(2), mean(3)};
-    // A mean of glass is glass.
-    if (looks_[order[group.first]].colour.a < 255) colour.a = std::min<std::uint8_t>(colour.a, 254);
-    for (std::size_t i = group.first; i < group.end; ++i) colours[order[i]] = colour;
-  }
+  cut.cut(most);
+  cut.take_means(colours);
   return colours;
 }
 

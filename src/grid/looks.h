@@ -15,6 +15,12 @@ namespace quoin {
 /// Numbers the colours that voxels have, each with the material that it is of, and makes types of them.
 class Looks {
  public:
+  struct Look {
+    Rgba8 colour;
+    std::uint32_t material;
+    std::uint32_t voxels;
+  };
+
   /// The number of a colour of a material, the same for the same two; they count up from 0. Each call counts as one
   /// voxel of it.
   [[nodiscard]] std::uint32_t number_of(Rgba8 colour, std::uint32_t material);
@@ -30,11 +36,6 @@ class Looks {
                                                       std::size_t most = kMaxVoxelTypes) const;
 
  private:
-  struct Look {
-    Rgba8 colour;
-    std::uint32_t material;
-    std::uint32_t voxels;
-  };
   /// The colours of looks, some of which are the same afterwards. Errors: LimitExceeded.
   [[nodiscard]] Result<std::vector<Rgba8>> reduced(std::size_t most) const;
   std::vector<Look> looks_;

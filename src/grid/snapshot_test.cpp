@@ -1,6 +1,8 @@
 // Grids that share chunks until one of them is edited.
 
+#include <atomic>
 #include <map>
+#include <mutex>
 #include <random>
 #include <thread>
 #include <tuple>
@@ -161,6 +163,54 @@ TEST(Snapshot, IsReadOnOtherThreadsWhileTheGridIsEdited) {
     }
     if (readers.size() > 3) readers.erase(readers.begin());
   }
+}
+
+// Workers read snapshots, edit copies of their own and let go of both at any time, while the grid is edited.
+TEST(Snapshot, PagesOfVoxelsComeAndGoOnManyThreads) {
+  std::mt19937 random(3);
+  const auto below = [](std::mt19937& from, unsigned end) { return static_cast<int>(from() % end); };
+  const auto edit = [&](Grid& grid, std::mt19937& from) {
+    grid.set({below(from, 128), below(from, 64), below(from, 64)}, static_cast<VoxelType>(below(from, 200)));
+  };
+  const auto sum_of = [](const Grid& grid) {
+    std::int64_t sum = 0;
+    grid.for_each([&](IVec3, VoxelType type) { sum += type; });
+    return sum;
+  };
+  Grid grid;
+  for (int i = 0; i < 20'000; ++i) edit(grid, random);
+  std::mutex mutex;
+  std::vector<Grid> ready;
+  std::atomic<bool> is_done{false};
+  std::vector<std::jthread> workers;
+  for (unsigned worker = 0; worker < 3; ++worker) {
+    workers.emplace_back([&, own = std::mt19937(worker)]() mutable {
+      std::vector<Grid> kept;
+      while (!is_done) {
+        if (const std::lock_guard lock(mutex); !ready.empty()) {
+          kept.push_back(std::move(ready.back()));
+          ready.pop_back();
+        }
+        if (kept.empty()) continue;
+        const Grid& one = kept[own() % kept.size()];
+        const std::int64_t sum = sum_of(one);
+        Grid copy = one.snapshot();
+        for (int i = 0; i < 50; ++i) edit(copy, own);
+        EXPECT_EQ(sum_of(one), sum);
+        if (kept.size() > 3) kept.erase(kept.begin());
+        if (own() % 2 == 0) kept.push_back(std::move(copy));
+      }
+    });
+  }
+  for (int frame = 0; frame < 100; ++frame) {
+    for (int i = 0; i < 40; ++i) edit(grid, random);
+    if (frame % 7 == 0) {
+      grid.fill_box({{0, below(random, 60), 0}, {64, 64, 4}}, static_cast<VoxelType>(below(random, 200)));
+    }
+    const std::lock_guard lock(mutex);
+    if (ready.size() < 6) ready.push_back(grid.snapshot());
+  }
+  is_done = true;
 }
 
 TEST(Chunk, ItsHashIsOfWhatItHoldsHoweverItCameToHoldIt) {

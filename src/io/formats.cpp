@@ -10,7 +10,6 @@
 #include <quoin/io/vox.h>
 #include <quoin/scene/volume_scene.h>
 
-#include "core/progress_steps.h"
 #include "io/byte_stream.h"
 #include "io/heights/heights.h"
 #include "io/minecraft/minecraft_source.h"

@@ -8,6 +8,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "core/progress_steps.h"
+
 namespace quoin::voxelizing {
 
 namespace {

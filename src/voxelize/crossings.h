@@ -16,7 +16,6 @@
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
 
-#include "core/progress_steps.h"
 #include "voxelize/frame.h"
 
 namespace quoin::voxelizing {

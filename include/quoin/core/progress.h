@@ -12,4 +12,16 @@ namespace quoin {
 /// means nobody listens.
 using Progress = std::function<bool(double fraction)>;
 
+/// A listener for one of the stretches of a longer piece of work: what its fractions 0 to 1 are there is `begin` to
+/// `end` of the whole.
+///
+///   mesh_scene(scene, {}, {}, part_of(progress, 0.0, 0.5));
+///   write_mesh(*meshes, path, {}, part_of(progress, 0.5, 1.0));
+///
+/// Lifetime: `whole` must outlive it.
+[[nodiscard]] inline Progress part_of(const Progress& whole, double begin, double end) {
+  if (!whole) return {};
+  return [&whole, begin, end](double fraction) { return whole(begin + fraction * (end - begin)); };
+}
+
 }  // namespace quoin

@@ -40,8 +40,8 @@ struct PlacedVoxel {
 ///           read as air, which is not what they are: edits leave them as they are, no mesh is made of a chunk unless
 ///           all around it are loaded, and queries of a scene know of them (UnloadedChunks). What counts or reads
 ///           voxels here tells of what is loaded: `is_loaded_within` says whether that is all.
-/// Sharing:  `snapshot` is a copy that costs a pointer. What the two share is copied when one of them is edited, a
-///           chunk at a time.
+/// Sharing:  `snapshot` is a copy that costs a pointer. What the two share is copied when one of them is edited, some
+///           4 KiB of a chunk at a time.
 /// Threads:  any number may read at once, and take snapshots; an edit needs the grid to itself. A snapshot is a grid of
 ///           its own: it may be read and destroyed on another thread while this one is edited.
 /// Moving:   a grid that was moved from may only be assigned to or destroyed.
@@ -54,8 +54,8 @@ class Grid {
   ~Grid();
   /// The voxels as they are now; later edits of either do not reach the other. A cursor that read this grid's changes
   /// reads on in the snapshot, and the other way round, until the snapshot is edited itself.
-  /// Cost: a fraction of a microsecond. The first edit of each chunk afterwards copies that chunk, as long as a
-  /// snapshot shares it.
+  /// Cost: a fraction of a microsecond. The first edit of each place afterwards copies what lies around it, some 4 KiB,
+  /// and of its chunk the rest of some 3 KiB, as long as a snapshot shares it.
   [[nodiscard]] Grid snapshot() const;
 
   /// The voxel's type; kAir where nothing was set.

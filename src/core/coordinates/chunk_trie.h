@@ -161,7 +161,12 @@ class ChunkTrie {
     const int shift = kLog * (level + 1);
     return {at[0] >> shift, at[1] >> shift, at[2] >> shift};
   }
-  static bool covers(const Node& node, const Place& at) { return prefix_of(at, node.level) == node.prefix; }
+  // Number by number: arrays that were just made of numbers are not compared at once without waiting for these.
+  static bool covers(const Node& node, const Place& at) {
+    const int shift = kLog * (node.level + 1);
+    return ((at[0] >> shift ^ node.prefix[0]) | (at[1] >> shift ^ node.prefix[1]) |
+            (at[2] >> shift ^ node.prefix[2])) == 0;
+  }
   static unsigned slot_of(const Place& at, int level) {
     const int shift = kLog * level;
     return (at[0] >> shift & (kEdge - 1)) | (at[1] >> shift & (kEdge - 1)) << kLog |

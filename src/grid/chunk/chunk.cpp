@@ -205,7 +205,7 @@ std::uint32_t Chunk::replace(int y, int z, std::uint64_t changed, VoxelType type
   if (storage_ == nullptr) make_mixed();
   ChunkStorage& m = own();
   const std::uint32_t index = index_for(type);
-  std::uint64_t* row = m.row(slot_for_writing(ChunkStorage::slab_index(y, z)), ChunkStorage::row_in_slab(y, z));
+  std::uint64_t* row = m.own_row(slot_for_writing(ChunkStorage::slab_index(y, z)), ChunkStorage::row_in_slab(y, z));
   const std::uint32_t first = packed_row::read(row, m.bits, 0);
   if (packed_row::all_equal(row, m.bits, 1, first)) {
     m.move_counts(first, index, static_cast<std::uint32_t>(std::popcount(changed)));
@@ -252,7 +252,9 @@ bool Chunk::set(int x, int y, int z, VoxelType type) {
     index = static_cast<std::uint32_t>(found - m.palette.begin());
   }
   const auto bit = static_cast<unsigned>(x * m.bits);
-  std::uint64_t& word = m.row(slot, ChunkStorage::row_in_slab(y, z))[bit >> 6];
+  const std::size_t at = m.word_of(slot, ChunkStorage::row_in_slab(y, z)) + (bit >> 6);
+  if (!m.words.owns(at)) return set_anywhere(x, y, z, type);
+  std::uint64_t& word = *m.words.own_at(at);
   const std::uint32_t old = static_cast<std::uint32_t>(word >> (bit & 63U)) & ((1U << m.bits) - 1U);
   if (old == index) return false;
   m.recent = index;
@@ -277,8 +279,7 @@ bool Chunk::set_anywhere(int x, int y, int z, VoxelType type) {
   ChunkStorage& m = own();
   const std::uint32_t index = index_for(type);
   const std::size_t slab = ChunkStorage::slab_index(y, z);
-  const bool has_slot = (m.slabs[slab] & ChunkStorage::kUniformSlab) == 0;  // most have: a call less
-  std::uint64_t* row = m.row(has_slot ? m.slabs[slab] : slot_for_writing(slab), ChunkStorage::row_in_slab(y, z));
+  std::uint64_t* row = m.own_row(slot_for_writing(slab), ChunkStorage::row_in_slab(y, z));
   m.move_counts(packed_row::read(row, m.bits, x), index, 1);
   packed_row::write(row, m.bits, x, index);
   if ((old == kAir) != (type == kAir)) m.count_voxel(x, y, z, type == kAir ? -1 : 1);
@@ -381,7 +382,8 @@ Chunk Chunk::from_dense(std::span<const VoxelType, kChunkVoxels> types) {
     m.counts = std::move(counts);
   }
   m.used = static_cast<std::uint32_t>(m.counts.size() - static_cast<std::size_t>(std::ranges::count(m.counts, 0U)));
-  for (std::size_t slab = 0; slab < m.slabs.size(); ++slab) chunk.pack_slab(slab, types, index_of);
+  for (std::size_t i = 0; i < m.slabs.size(); ++i) chunk.pack_slab(slab_in_order(i), types, index_of);
+  m.words.shrink_to_fit();
   return chunk;
 }
 
@@ -404,7 +406,7 @@ void Chunk::pack_slab(std::size_t slab, std::span<const VoxelType, kChunkVoxels>
     if (!is_uniform) {
       solid = 0;
       for_each_run(row_of(y, z), [&](VoxelType type, std::uint64_t voxels) {
-        packed_row::write_masked(m.row(slot, stored), m.bits, voxels, index_of[type]);
+        packed_row::write_masked(m.own_row(slot, stored), m.bits, voxels, index_of[type]);
         if (type != kAir) solid |= voxels;
       });
     }

@@ -47,8 +47,9 @@ bool is_stored_alike(const ChunkStorage& a, const ChunkStorage& b, int y, int z)
   const std::uint32_t in_a = a.slabs[ChunkStorage::slab_index(y, z)];
   const std::uint32_t in_b = b.slabs[ChunkStorage::slab_index(y, z)];
   if (((in_a | in_b) & ChunkStorage::kUniformSlab) != 0) return in_a == in_b;
-  const int row = ChunkStorage::row_in_slab(y, z);
-  return are_rows_equal(a.row(in_a, row), b.row(in_b, row), a.bits);
+  const std::uint64_t* const row_in_a = a.row(in_a, ChunkStorage::row_in_slab(y, z));
+  const std::uint64_t* const row_in_b = b.row(in_b, ChunkStorage::row_in_slab(y, z));
+  return row_in_a == row_in_b || are_rows_equal(row_in_a, row_in_b, a.bits);  // most pages are shared
 }
 
 const Chunk& or_air(const Chunk* chunk) {

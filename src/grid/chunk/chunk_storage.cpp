@@ -138,32 +138,36 @@ std::uint32_t Chunk::find_or_add(VoxelType type) {
   return static_cast<std::uint32_t>(m.palette.size() - 1);
 }
 
-// A slot of its own for a slab, filled with the slab's type where it had none.
+// A slot of its own for a slab, filled with the slab's type where it had none; in a page of this chunk alone.
 std::uint32_t Chunk::slot_for_writing(std::size_t slab) {
   ChunkStorage& m = *storage_;
   const std::uint32_t entry = m.slabs[slab];
-  if ((entry & ChunkStorage::kUniformSlab) == 0) return entry;
+  if ((entry & ChunkStorage::kUniformSlab) == 0) {
+    m.words.make_own(m.word_of(entry, 0));
+    return entry;
+  }
   const auto slab_words = static_cast<std::size_t>(kSlabRows * m.bits);
   std::uint32_t slot = m.first_free;
   QUOIN_ASSERT((slot == ChunkStorage::kNoSlot) == (m.free_count == 0), "free slots are counted");
   if (slot != ChunkStorage::kNoSlot) {
+    m.words.make_own(m.word_of(slot, 0));
     m.first_free = static_cast<std::uint32_t>(*m.row(slot, 0));
     --m.free_count;
   } else {
-    m.words.resize(m.words.size() + slab_words);
+    m.words.grow(m.words.size() + slab_words);
     slot = m.slot_count++;
   }
-  std::fill_n(m.row(slot, 0), slab_words, packed_row::repeat(m.bits, entry & ~ChunkStorage::kUniformSlab));
+  std::fill_n(m.own_row(slot, 0), slab_words, packed_row::repeat(m.bits, entry & ~ChunkStorage::kUniformSlab));
   m.slabs[slab] = slot;
   return slot;
 }
 
-// Requires: every voxel of the slab has this index.
+// Requires: every voxel of the slab has this index, and it was just written.
 void Chunk::release_slot(std::size_t slab, std::uint32_t index) {
   ChunkStorage& m = *storage_;
   const std::uint32_t slot = std::exchange(m.slabs[slab], ChunkStorage::kUniformSlab | index);
   QUOIN_ASSERT(slot < m.slot_count && m.free_count < m.slot_count, "a slot that is not free");
-  *m.row(slot, 0) = m.first_free;
+  *m.own_row(slot, 0) = m.first_free;
   m.first_free = slot;
   ++m.free_count;
 }
@@ -229,16 +233,17 @@ void Chunk::repack(int bits) {
   const bool is_same = m.direct() ? bits == 16 : bits == m.bits && to.palette.size() == m.palette.size();
   const auto old_words = static_cast<std::size_t>(kSlabRows * m.bits);
   const auto new_words = static_cast<std::size_t>(kSlabRows * bits);
-  std::vector<std::uint64_t> words((m.slot_count - m.free_count) * new_words);
+  PagedWords words((m.slot_count - m.free_count) * new_words);
   std::array<std::uint32_t, 256> slabs{};
   std::uint32_t slots = 0;
-  for (std::size_t slab = 0; slab < slabs.size(); ++slab) {
+  for (std::size_t i = 0; i < slabs.size(); ++i) {
+    const std::size_t slab = slab_in_order(i);
     const std::uint32_t entry = m.slabs[slab];
     if ((entry & ChunkStorage::kUniformSlab) != 0) {
       slabs[slab] = ChunkStorage::kUniformSlab | to.new_index[entry & ~ChunkStorage::kUniformSlab];
       continue;
     }
-    std::uint64_t* out = words.data() + slots * new_words;
+    std::uint64_t* const out = words.own_at(slots * new_words);
     slabs[slab] = slots++;
     if (is_same) {
       std::copy_n(m.row(entry, 0), old_words, out);
@@ -267,14 +272,14 @@ std::size_t Chunk::bytes() const {
   if (storage_ == nullptr) return sizeof(Chunk) + of_data;
   const ChunkStorage& m = *storage_;
   return sizeof(Chunk) + of_data + sizeof(ChunkStorage) + m.palette.capacity() * sizeof(VoxelType) +
-         m.counts.capacity() * sizeof(std::uint32_t) + m.words.capacity() * sizeof(std::uint64_t);
+         m.counts.capacity() * sizeof(std::uint32_t) + m.words.allocated();
 }
 
 void Chunk::compact() {
   if (storage_ == nullptr) return;
   if (is_one_entry()) return fill(get(0, 0, 0));
   // What others share they would keep all the same.
-  if (storage_.is_shared()) return;
+  if (storage_.is_shared() || storage_->words.has_shared_pages()) return;
   repack(bits_for(used_types()));
   storage_->palette.shrink_to_fit();
   storage_->counts.shrink_to_fit();

@@ -10,6 +10,8 @@
 #include <quoin/core/assert.h>
 #include <quoin/grid/chunk.h>
 
+#include "grid/chunk/paged_words.h"
+
 namespace quoin {
 
 /// Rows of a slab, and bits that a palette of so many types takes for each voxel.
@@ -19,6 +21,11 @@ inline constexpr int kSlabRows = 16;
   if (types <= 4) return 2;
   if (types <= 16) return 4;
   return types <= 256 ? 8 : 16;
+}
+
+/// The slabs in the order in which their voxels are stored: those of one height lie together, since edits do.
+[[nodiscard]] inline std::size_t slab_in_order(std::size_t i) {
+  return i % 16 * 16 + i / 16;
 }
 
 /// The voxels of a chunk of several types. Shared by copies of the chunk until one of them is written.
@@ -33,7 +40,7 @@ struct ChunkStorage : RefCounted {
   std::vector<VoxelType> palette;          ///< type of each index; unused at 16 bits, where the index is the type
   std::vector<std::uint32_t> counts;       ///< voxels of each index; at 16 bits of each remainder by kRemainders
   std::array<std::uint32_t, 256> slabs{};  ///< [z / 4][y / 4]: kUniformSlab | index, or a slot in `words`
-  std::vector<std::uint64_t> words;        ///< [slot][z % 4][y % 4][bits]: 64 voxels along x, lowest bits first
+  PagedWords words;                        ///< [slot][z % 4][y % 4][bits]: 64 voxels along x, lowest bits first
   std::array<std::array<std::uint16_t, kChunkEdge>, 3> layer_counts{};  ///< non-air voxels by axis and layer
   int non_air = 0;
   std::uint32_t used = 0;              ///< entries of `counts` that are not 0
@@ -80,20 +87,23 @@ struct ChunkStorage : RefCounted {
     layer_counts[1][static_cast<std::size_t>(y)] += static_cast<std::uint16_t>(delta);
     layer_counts[2][static_cast<std::size_t>(z)] += static_cast<std::uint16_t>(delta);
   }
+  // By shifts: less latency than a multiplication. A slab lies in one page.
+  [[nodiscard]] std::size_t word_of(std::uint32_t slot, int row_in_slab) const {
+    const int log = std::countr_zero(static_cast<unsigned>(bits) | 16U);
+    return (std::size_t{slot} << (log + 4)) + (static_cast<std::size_t>(row_in_slab) << log);
+  }
   [[nodiscard]] const std::uint64_t* row(std::uint32_t slot, int row_in_slab) const {
     QUOIN_ASSERT(slot < slot_count, "a slab with voxels of its own");
-    return words.data() + (static_cast<std::size_t>(slot) * 16 + static_cast<std::size_t>(row_in_slab)) *
-                              static_cast<std::size_t>(bits);
+    return words.at(word_of(slot, row_in_slab));
   }
-  [[nodiscard]] std::uint64_t* row(std::uint32_t slot, int row_in_slab) {
-    return const_cast<std::uint64_t*>(std::as_const(*this).row(slot, row_in_slab));
+  /// The same, to be written. Requires: its page is this chunk's alone (Chunk::slot_for_writing).
+  [[nodiscard]] std::uint64_t* own_row(std::uint32_t slot, int row_in_slab) {
+    QUOIN_ASSERT(slot < slot_count, "a slab with voxels of its own");
+    return words.own_at(word_of(slot, row_in_slab));
   }
-  // By shifts: less latency than a multiplication.
   [[nodiscard]] std::uint32_t read(std::uint32_t slot, int row_in_slab, int x) const {
-    const int log = std::countr_zero(static_cast<unsigned>(bits) | 16U);
-    const unsigned bit = static_cast<unsigned>(x) << log;
-    const std::size_t in_slab = (static_cast<std::size_t>(row_in_slab) << log) + (bit >> 6);
-    const std::uint64_t word = words.data()[(std::size_t{slot} << (log + 4)) + in_slab];
+    const auto bit = static_cast<unsigned>(x * bits);
+    const std::uint64_t word = *words.at(word_of(slot, row_in_slab) + (bit >> 6));
     return static_cast<std::uint32_t>(word >> (bit & 63U)) & ((1U << bits) - 1U);
   }
   /// Requires: 0 <= x, y, z < 64.

@@ -6,7 +6,6 @@
 
 #include <quoin/io/formats.h>
 
-#include "core/progress_steps.h"
 #include "io/text.h"
 #include "io/whole_file.h"
 #include "scene/hierarchy.h"

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 #include <quoin/io/scene_file.h>
 
-#include "core/progress_steps.h"
 #include "io/scene_file/scene_parts.h"
 #include "io/scene_file/voxel_data.h"
 #include "io/whole_file.h"

@@ -506,20 +506,12 @@ class GltfReader {
       loaded_.mesh.positions.emplace_back(world_from_mesh * p);
     }
     if (Status done = take_colours(primitive, first, positions->count()); !done) return done;
-    std::optional<Accessor> places;
-    const PlaceTransform& transform = places_[material];
-    const int place = attribute(primitive, "TEXCOORD_" + std::to_string(transform.set));
-    if (loaded_.mesh.materials[material].texture && place >= 0) {
-      auto opened = Accessor::open(model_, place, 2);
-      if (!opened) return opened.error();
-      if (opened->count() < positions->count())
-        return make_error(ErrorCode::BadFormat, "fewer places in the texture than vertices");
-      places = std::move(*opened);
-      has_textures_ = true;
-    }
+    const auto places = texture_places(primitive, material, positions->count());
+    if (!places) return places.error();
     const auto place_at = [&](std::size_t vertex) {
-      if (!places) return glm::vec2(0.0F);
-      return transform.of({static_cast<float>(places->at(vertex, 0)), static_cast<float>(places->at(vertex, 1))});
+      if (!*places) return glm::vec2(0.0F);
+      const Accessor& at = **places;
+      return places_[material].of({static_cast<float>(at.at(vertex, 0)), static_cast<float>(at.at(vertex, 1))});
     };
     const bool is_mirrored = glm::determinant(glm::dmat3(world_from_mesh)) < 0.0;
     const auto add = [&](std::size_t a, std::size_t b, std::size_t c) -> Status {
@@ -541,6 +533,19 @@ class GltfReader {
     return add_all(
         mode, indices->count(),
         [&](std::size_t i) { return static_cast<std::size_t>(std::max(indices->at(i, 0), 0.0)); }, add);
+  }
+  // Where its vertices lie in their material's texture; nothing where it has none or does not say.
+  Result<std::optional<Accessor>> texture_places(const tinygltf::Primitive& primitive, std::size_t material,
+                                                 std::size_t vertices) {
+    const int place = attribute(primitive, "TEXCOORD_" + std::to_string(places_[material].set));
+    if (!loaded_.mesh.materials[material].texture || place < 0) return std::optional<Accessor>();
+    auto opened = Accessor::open(model_, place, 2);
+    if (!opened) return opened.error();
+    if (opened->count() < vertices) {
+      return make_error(ErrorCode::BadFormat, "fewer places in the texture than vertices");
+    }
+    has_textures_ = true;
+    return std::optional(std::move(*opened));
   }
   static bool is_known(std::size_t a, std::size_t b, std::size_t c, std::size_t count) {
     return a < count && b < count && c < count;

@@ -6,7 +6,6 @@
 #include <quoin/core/thousands.h>
 #include <quoin/io/file.h>
 
-#include "core/progress_steps.h"
 #include "io/image/decode.h"
 #include "io/whole_file.h"
 

@@ -263,6 +263,7 @@ class SceneMaker {
   }
 
   Status add_fog(std::size_t i);
+  void place_fog(const Scene& made, std::size_t i);
 
   File& file_;
   const LoadOptions& options_;
@@ -273,9 +274,8 @@ class SceneMaker {
   std::vector<IVec3> origins_;                      // of fog, likewise: its box's least corner
 };
 
-// Fog is a volume: the box around all that is in it.
-Status SceneMaker::add_fog(std::size_t i) {
-  Grid& grid = file_.grids[i];
+// The smallest box around all that is in a grid.
+IBox box_of(const Grid& grid) {
   IBox box;
   const auto extend = [&](IVec3 origin, int edge) {
     const IBox cube{origin, origin + edge};
@@ -283,20 +283,18 @@ Status SceneMaker::add_fog(std::size_t i) {
   };
   for (const Leaf& leaf : grid.leaves) extend(leaf.origin, kLeafEdge);
   for (const Tile& tile : grid.tiles) extend(tile.origin, tile.edge);
-  const DVec3 size = DVec3(box.max) - DVec3(box.min);
-  if (size.x * size.y * size.z > kMaxFog) {
-    return make_error(ErrorCode::LimitExceeded, "fog of more than 2^27 values (" + grid.name + ")");
-  }
-  Volume volume;
-  volume.size = box.size();
-  volume.format = "vdb";
-  volume.values.assign(static_cast<std::size_t>(size.x * size.y * size.z), grid.background);
+  return box;
+}
+
+// Requires: all that is in the grid lies in the box, of as many values as `values` has.
+void fill_values(const Grid& grid, const IBox& box, std::vector<float>& values) {
+  const IVec3 size = box.size();
   const auto at = [&](IVec3 place) -> float& {
     const IVec3 local = place - box.min;
-    return volume.values[static_cast<std::size_t>(local.x) +
-                         static_cast<std::size_t>(volume.size.x) *
-                             (static_cast<std::size_t>(local.y) +
-                              static_cast<std::size_t>(volume.size.y) * static_cast<std::size_t>(local.z))];
+    return values[static_cast<std::size_t>(local.x) +
+                  static_cast<std::size_t>(size.x) *
+                      (static_cast<std::size_t>(local.y) +
+                       static_cast<std::size_t>(size.y) * static_cast<std::size_t>(local.z))];
   };
   for (const Tile& tile : grid.tiles) {
     for (int z = 0; z < tile.edge; ++z) {
@@ -311,7 +309,11 @@ Status SceneMaker::add_fog(std::size_t i) {
       at(grid.leaves[leaf].origin + IVec3{place >> 6, place >> 3 & 7, place & 7}) = grid.values[leaf * kLeafVoxels + k];
     }
   }
-  std::tie(volume.min, volume.max) = std::pair(volume.values[0], volume.values[0]);
+}
+
+// The least and the greatest of the finite ones, 0 where there are none, and how many others.
+void find_range(Volume& volume) {
+  std::tie(volume.min, volume.max) = std::pair(0.0F, 0.0F);
   bool has_finite = false;
   for (const float value : volume.values) {
     volume.nan_count += std::isnan(value) ? 1 : 0;
@@ -321,7 +323,22 @@ Status SceneMaker::add_fog(std::size_t i) {
     volume.max = has_finite ? std::max(volume.max, value) : value;
     has_finite = true;
   }
-  if (!has_finite) volume.min = volume.max = 0.0F;
+}
+
+// Fog is a volume: the box around all that is in it.
+Status SceneMaker::add_fog(std::size_t i) {
+  const Grid& grid = file_.grids[i];
+  const IBox box = box_of(grid);
+  const DVec3 size = DVec3(box.max) - DVec3(box.min);
+  if (size.x * size.y * size.z > kMaxFog) {
+    return make_error(ErrorCode::LimitExceeded, "fog of more than 2^27 values (" + grid.name + ")");
+  }
+  Volume volume;
+  volume.size = box.size();
+  volume.format = "vdb";
+  volume.values.assign(static_cast<std::size_t>(size.x * size.y * size.z), grid.background);
+  fill_values(grid, box, volume.values);
+  find_range(volume);
   if (volume.min == volume.max) {
     loaded_.warnings.push_back("the fog \"" + grid.name + "\" is the same everywhere: nothing of it is solid");
   }
@@ -338,15 +355,21 @@ Status SceneMaker::add_fog(std::size_t i) {
     loaded_.warnings.push_back("left out: the grid \"" + grid.name + "\": " + made.error().message);
     return {};
   }
+  place_fog(*made, i);
+  return {};
+}
+
+// Puts the one grid of a scene of a volume into the scene that is made.
+void SceneMaker::place_fog(const Scene& made, std::size_t i) {
+  const std::string& name = file_.grids[i].name;
   SceneGrid content;
-  content.name = grid.name;
-  content.field = made->grids()[made->grids().handles().front()].field.snapshot();
+  content.name = name;
+  content.field = made.grids()[made.grids().handles().front()].field.snapshot();
   handles_[i] = loaded_.scene.add_grid(std::move(content));
-  Instance placed = made->instances()[made->instances().handles().front()];
-  placed.name = grid.name;
+  Instance placed = made.instances()[made.instances().handles().front()];
+  placed.name = name;
   placed.grid = *handles_[i];
   loaded_.scene.add_instance(std::move(placed));
-  return {};
 }
 
 }  // namespace

@@ -171,7 +171,9 @@ class RecordWriter {
       const std::uint32_t next = i + 1 < mixed->palette.size() ? mixed->palette[i + 1] : 0;
       record.words.push_back(mixed->palette[i] | next << 16);
     }
-    for (const std::uint64_t word : mixed->words) add(word);
+    mixed->words.for_each_page([this](std::span<const std::uint64_t> page) {
+      for (const std::uint64_t word : page) add(word);
+    });
   }
 
   ChunkRecord record;

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include <quoin/core/progress.h>
 #include <quoin/scene/scene_meshes.h>
 
-#include "core/progress_steps.h"
 
 namespace quoin {
 

@@ -226,7 +226,7 @@ class VoxelRunReader::Builder {
   Chunk finish() {
     ChunkStorage& m = *m_;
     m.bits = kBits;
-    m.words.assign(words_.begin(), words_.begin() + static_cast<std::ptrdiff_t>(m.slot_count) * kSlabRows * kBits);
+    m.words = PagedWords(std::span(words_).first(std::size_t{m.slot_count} * kSlabRows * kBits));
     m.non_air = static_cast<int>(kChunkVoxels - (air_ < counts_.size() ? counts_[air_] : 0));
     count_columns();
     if (kBits == 16) {
