@@ -99,6 +99,7 @@ export class MarchedView {
   #changed = 0;  // when
   #wake = () => {};
   #generation = 0;
+  #finished = -1;  // the change of which a whole picture is there
 
   /** `page`: { ask, below (an element), view() => what the worker's `frame` takes, shown(facts), said(text) }. */
   constructor(page) {
@@ -174,9 +175,10 @@ export class MarchedView {
     this.#wake();
   }
 
-  /** The picture that is shown. */
+  /** The picture of the view as it is, once it is there; undefined where the mode ends before. */
   async read() {
-    return this.#by.read();
+    while (this.isOn && this.#finished !== this.#changes) await new Promise((done) => setTimeout(done, 50));
+    return this.#by?.read();
   }
 
   #show(isShown) {
@@ -206,19 +208,20 @@ export class MarchedView {
         }
         const isHere = () => isCurrent() && by === this.#by;
         const isSame = () => isHere() && change === this.#changes;
-        await this.#draw(by, view, next, { isHere, isSame, first: isNew ? isHere : isSame });
+        await this.#draw(by, view, next, change, { isHere, isSame, first: isNew ? isHere : isSame });
       }
       drawn = change;
       factor = next;
     }
   }
 
-  async #draw(by, view, factor, wanted) {
+  async #draw(by, view, factor, change, wanted) {
     if (this.#canvas.width !== view.width || this.#canvas.height !== view.height)
       Object.assign(this.#canvas, { width: view.width, height: view.height });
     try {
       await by.draw(view, factor, wanted, (facts) => {
         this.#show(true);
+        if (factor === 1) this.#finished = change;
         this.#page.shown(facts);
       });
     } catch (error) {

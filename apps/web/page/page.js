@@ -441,7 +441,10 @@ $('smooth').addEventListener('change', async () => {
 });
 $('glb').addEventListener('click', () => give(new Blob([glb], { type: 'model/gltf-binary' }), '.glb'));
 $('picture').addEventListener('click', async () => {
-  if (marched?.isShown) return givePicture(await marched.read());
+  if (marched?.isOn) {
+    const picture = await marched.read();
+    return picture && givePicture(picture);
+  }
   draw();
   canvas.toBlob((blob) => give(blob, '.png'), 'image/png');
 });
