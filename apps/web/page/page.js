@@ -105,10 +105,19 @@ function redraw() {
   frame ||= requestAnimationFrame(drawSoon);
 }
 
-/** Until what was drawn is there. */
-function waitForPicture() {
+/** Resolves when what was drawn is there. */
+function pictureIsThere() {
   const gl = renderer.getContext();
-  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+  const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+  gl.flush();
+  return new Promise((resolve) => {
+    const look = () => {
+      if (gl.clientWaitSync(fence, 0, 0) === gl.TIMEOUT_EXPIRED) return setTimeout(look, 4);
+      gl.deleteSync(fence);
+      resolve();
+    };
+    look();
+  });
 }
 
 const toSun = () => {
@@ -245,7 +254,7 @@ async function open(name, bytes) {
     viewFromText(location.hash);
     drawSoon();
     describe(name, answer);
-    waitForPicture();
+    await pictureIsThere();
     const total = performance.now() - began;
     if (isPressed('rays')) march();
     say(`${name}: read in ${answer.milliseconds.load.toFixed(0)} ms, meshed in ${
