@@ -11,8 +11,8 @@ function block() {
                         id('XYZI'), 4 + voxels.byteLength, 0, voxels.length, ...voxels);
 }
 
-/** Compiles the small module before there is a file, and what a first file takes of it: functions are compiled when they
- *  are first called. */
+/** Compiles the small module before there is a file, and what a first file takes of it: functions are compiled when
+ *  they are first called. */
 async function prepare() {
   await start(undefined, { small: true });
   const small = await load(block(), { small: true });

@@ -74,8 +74,8 @@ inline constexpr IBox kWholeChunk = {IVec3{0}, IVec3{kChunkEdge}};
 /// stays when that is the type it has. A chunk without any pays a pointer; with some 2 KiB, and for each slab that has
 /// some 0.2 KiB, 4 bytes a state, and 80 bytes besides the bytes of a voxel.
 /// Copies share their storage until one of them is written, so that a copy costs no more than a pointer; a write to
-/// what is shared copies its own place first: 512 words of voxels, and what is kept of the chunk as a whole. Threads: copies may be read, written and destroyed on several threads, each copy by
-/// itself.
+/// what is shared copies its own place first: 512 words of voxels, and what is kept of the chunk as a whole.
+/// Threads: copies may be read, written and destroyed on several threads, each copy by itself.
 class Chunk {
  public:
   /// All voxels of one type.

@@ -11,7 +11,6 @@
 #include <quoin/core/progress.h>
 #include <quoin/scene/scene_meshes.h>
 
-
 namespace quoin {
 
 /// Errors: InvalidArgument, naming the first drawn instance that has no place.
