@@ -137,8 +137,10 @@ export class Marcher {
       throw new Error(`these shaders do not draw in a light of the flags ${flags}`);
     this.#resize(width, height);
     if (this.#tables === undefined || this.#tables.size < frame.byteLength) {
+      this.#checkSize('what stands in the scene', frame.byteLength);
       this.#tables?.destroy();
-      this.#tables = this.#buffer(frame.byteLength * 1.25, GPUBufferUsage.STORAGE);
+      const most = Math.floor(this.#device.limits.maxStorageBufferBindingSize / 32) * 32;
+      this.#tables = this.#buffer(Math.min(frame.byteLength * 1.25, most), GPUBufferUsage.STORAGE);
       this.#groups = undefined;
     }
     this.#device.queue.writeBuffer(this.#uniform, 0, frame, 0, frameBytes);

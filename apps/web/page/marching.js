@@ -100,6 +100,7 @@ export class MarchedView {
   #wake = () => {};
   #generation = 0;
   #finished = -1;  // the change of which a whole picture is there
+  #failed;         // { change, error } where there will be none
 
   /** `page`: { ask, below (an element), view() => what the worker's `frame` takes, shown(facts), said(text) }. */
   constructor(page) {
@@ -120,19 +121,20 @@ export class MarchedView {
     this.stop();
     const generation = ++this.#generation;
     const isCurrent = () => generation === this.#generation;
-    const by = await this.#open((why) => isCurrent() && this.#fallBack(why));
-    if (!isCurrent()) return by.close();
+    const by = await this.#open(isCurrent);
+    if (!isCurrent()) return by?.close();
     this.#by = by;
     this.change();
     this.#run(isCurrent);
   }
 
-  async #open(lost) {
+  // Undefined where that is of no use any more.
+  async #open(isCurrent) {
     this.#newCanvas();
     try {
-      return await ByDevice.open(this.#page.ask, this.#canvas, lost);
+      return await ByDevice.open(this.#page.ask, this.#canvas, (why) => isCurrent() && this.#fallBack(why));
     } catch (error) {
-      return this.#byModule(error.message);
+      return isCurrent() ? this.#byModule(error.message) : undefined;
     }
   }
 
@@ -144,6 +146,7 @@ export class MarchedView {
 
   #fallBack(why) {
     if (!this.isOn) return;
+    this.#by.close();
     this.#by = this.#byModule(why);
     this.change();
   }
@@ -175,9 +178,13 @@ export class MarchedView {
     this.#wake();
   }
 
-  /** The picture of the view as it is, once it is there; undefined where the mode ends before. */
+  /** The picture of the view as it is, once it is there; undefined where the mode ends before. Rejects where it cannot
+   *  be drawn. */
   async read() {
-    while (this.isOn && this.#finished !== this.#changes) await new Promise((done) => setTimeout(done, 50));
+    while (this.isOn && this.#finished !== this.#changes) {
+      if (this.#failed?.change === this.#changes) throw this.#failed.error;
+      await new Promise((done) => setTimeout(done, 50));
+    }
     return this.#by?.read();
   }
 
@@ -227,6 +234,7 @@ export class MarchedView {
     } catch (error) {
       if (!wanted.isHere()) return;
       if (by instanceof ByModule) {
+        this.#failed = { change, error };
         this.#page.said(error.message);
       } else {
         this.#fallBack(error.message);

@@ -62,10 +62,12 @@ function newWorker() {
     else job?.reject(new Error(error.message));
   };
   worker.onerror = (event) => {
-    const text = event.message ?? 'the worker ended';
+    const text = event.message ?? 'the worker could not be started';
+    event.target.hasFailed = true;
     for (const { reject } of jobs.values()) reject(new Error(text));
     jobs = new Map();
   };
+  if (file) ask('keep', { bytes: file.bytes }).catch(() => {});  // `load` says why
 }
 
 /** tell: told how far it has come, where that takes long. */
@@ -213,8 +215,12 @@ function viewFromText(text) {
 }
 
 // ---- Files.
-async function show(bytes) {
+let openings = 0;  // files that were chosen so far: only the last one is shown
+
+/** False where another file was chosen meanwhile, and nothing was done. */
+async function show(bytes, isCurrent) {
   const { scene } = await new GLTFLoader().parseAsync(bytes.buffer, '');
+  if (!isCurrent()) return false;
   plain?.dispose();
   model?.removeFromParent();
   model?.traverse((object) => {
@@ -238,29 +244,32 @@ async function show(bytes) {
   camera.updateProjectionMatrix();
   measured = undefined;
   tape.visible = false;
+  return true;
 }
 
-async function open(name, bytes) {
+async function open(name, bytes, isCurrent) {
   const began = performance.now();
   say(`Reading ${name} ...`);
   marched?.stop();
-  if (jobs.size > 0) newWorker();
+  if (jobs.size > 0 || worker.hasFailed) newWorker();
   try {
     const answer = await ask('load', { bytes }, (fraction) => say(`Reading ${name}: ${percent(fraction)} ...`));
+    if (!await show(answer.glb.slice(), isCurrent)) return;
     glb = answer.glb;
-    await show(answer.glb.slice());
     file = { name, bytes };
     home();
     viewFromText(location.hash);
     drawSoon();
     describe(name, answer);
     await pictureIsThere();
+    if (!isCurrent()) return;
     const total = performance.now() - began;
     if (isPressed('rays')) march();
     say(`${name}: read in ${answer.milliseconds.load.toFixed(0)} ms, meshed in ${
       answer.milliseconds.mesh.toFixed(0)} ms, on the screen in ${total.toFixed(0)} ms.`);
     window.quoinPage = { ...answer.milliseconds, total };
   } catch (error) {
+    if (!isCurrent()) return;
     $('rays').setAttribute('aria-pressed', 'false');
     $('marching').textContent = '';
     redraw();
@@ -288,8 +297,11 @@ function describe(name, { grids, types, warnings }) {
 
 async function openFile(chosen) {
   if (chosen === undefined || chosen === null) return;
+  const opening = ++openings;
+  const isCurrent = () => opening === openings;
   try {
-    await open(chosen.name, await chosen.arrayBuffer());
+    const bytes = await chosen.arrayBuffer();
+    if (isCurrent()) await open(chosen.name, bytes, isCurrent);
   } catch (error) {
     say(`${chosen.name}: ${error.message}`, true);
   }
@@ -299,10 +311,13 @@ async function openAddress(address) {
   const url = new URL(address, location.href);
   if (url.origin !== location.origin)
     return say('The link names a file of another site, which is not asked for.', true);
+  const opening = ++openings;
+  const isCurrent = () => opening === openings;
   try {
     const response = await fetch(url);
     if (!response.ok) throw new Error(`${response.status} ${response.statusText}`);
-    await open(decodeURIComponent(url.pathname.split('/').pop()), await response.arrayBuffer());
+    const bytes = await response.arrayBuffer();
+    if (isCurrent()) await open(decodeURIComponent(url.pathname.split('/').pop()), bytes, isCurrent);
   } catch (error) {
     say(`${address}: ${error.message}`, true);
   }
@@ -381,7 +396,7 @@ addEventListener('keydown', (event) => {
   const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
   if (!act || !model) return;
   event.preventDefault();
-  act();
+  if (!event.repeat || !'rmho'.includes(event.key.toLowerCase())) act();
 });
 controls.addEventListener('change', changed);
 addEventListener('resize', resize);
@@ -436,23 +451,29 @@ $('rays').addEventListener('click', () => {
 $('home').addEventListener('click', home);
 $('smooth').addEventListener('change', async () => {
   say('Meshing ...');
+  const opening = openings;
+  const isCurrent = () => opening === openings;
   try {
     const tell = (fraction) => say(`Meshing: ${percent(fraction)} ...`);
-    glb = (await ask('glb', { smooth: $('smooth').checked }, tell)).glb;
-    await show(glb.slice());
+    const answer = await ask('glb', { smooth: $('smooth').checked }, tell);
+    if (!await show(answer.glb.slice(), isCurrent)) return;
+    glb = answer.glb;
     placeSun();
     say('');
   } catch (error) {
-    say(error.message, true);
-    // Its instance may have ended: the next one gets the file again.
-    ask('load', { bytes: file.bytes }).catch(() => {});
+    if (isCurrent()) say(error.message, true);
   }
 });
 $('glb').addEventListener('click', () => give(new Blob([glb], { type: 'model/gltf-binary' }), '.glb'));
 $('picture').addEventListener('click', async () => {
   if (marched?.isOn) {
-    const picture = await marched.read();
-    return picture && givePicture(picture);
+    try {
+      const picture = await marched.read();
+      if (picture) await givePicture(picture);
+    } catch (error) {
+      say(error.message, true);
+    }
+    return;
   }
   draw();
   canvas.toBlob((blob) => give(blob, '.png'), 'image/png');

@@ -1,2 +1,4 @@
 // Before three.js is read the worker, which compiles its module, is on its way.
-globalThis.quoinWorker = new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
+const worker = new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
+worker.onerror = () => { worker.hasFailed = true; };  // until the page listens
+globalThis.quoinWorker = worker;

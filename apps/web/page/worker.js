@@ -21,56 +21,81 @@ async function prepare() {
 }
 prepare().catch(() => {});  // `load` says why
 
-let file;   // its bytes
-let scene;
-let whole;  // a promise of the same in the module that does everything
+let file;     // the bytes of what is shown
+let scene;    // of them; undefined where its instance ended, or a later file could not be read
+let shaders;  // of it, in the module that does everything; what WebGPU marches it by
 
-async function wholeScene() {
-  if (!scene.isSmall) return scene;
-  whole ??= load(file).then((made) => {
-    scene.free();
-    scene = made;
-  }).finally(() => { whole = undefined; });
-  await whole;
+async function current() {
+  if (file === undefined) throw new Error('there is no file yet');
+  scene ??= await load(file, { small: true });
   return scene;
 }
 
-let shaders;  // of it; what WebGPU marches it by
+/** The same in the module that does everything. */
+async function wholeScene() {
+  const now = await current();
+  if (!now.isSmall) return now;
+  const whole = await load(file);
+  now.free();
+  scene = whole;
+  return whole;
+}
+
+function forget() {
+  shaders?.free();
+  scene?.free();
+  shaders = scene = undefined;
+}
 
 const samplesOfAPixel = 16;
 
 const work = {
-  async load({ bytes, smooth }, tell) {
-    shaders?.free();
-    scene?.free();
-    shaders = scene = undefined;
+  /** What the page shows, for a worker that comes in place of another. */
+  async keep({ bytes }) {
     file = bytes;
+    return {};
+  },
+  async load({ bytes, smooth }, tell) {
+    forget();
     const began = performance.now();
-    scene = await load(bytes, { small: true, progress: (fraction) => tell(fraction / 2) });
+    const made = await load(bytes, { small: true, progress: (fraction) => tell(fraction / 2) });
     const loaded = performance.now();
     const progress = (fraction) => tell(0.5 + fraction / 2);
-    const glb = scene.glb(smooth === undefined ? { progress } : { smooth, progress });
+    let glb;
+    try {
+      glb = made.glb(smooth === undefined ? { progress } : { smooth, progress });
+    } catch (error) {
+      made.free();
+      throw error;
+    }
+    file = bytes;
+    scene = made;
     return { glb, warnings: scene.warnings, grids: scene.grids, types: scene.types.length - 1,
              milliseconds: { load: loaded - began, mesh: performance.now() - loaded } };
   },
   async glb({ smooth }, tell) {
-    return { glb: scene.glb({ smooth, progress: tell }) };
+    return { glb: (await current()).glb({ smooth, progress: tell }) };
   },
   async march(options, tell) {
     return (await wholeScene()).render({ ...options, progress: tell });
   },
   async shaders() {
+    const whole = await wholeScene();
     shaders?.free();
-    shaders = (await wholeScene()).forShaders();
+    shaders = undefined;
+    shaders = whole.forShaders();
     const { bytes, has } = shaders;
     return { bytes, has, samples: Array.from({ length: samplesOfAPixel }, (_, i) => shaders.sample(i)) };
   },
   async frame(options) {
+    if (shaders === undefined) throw new Error('what was marched is gone');
     return { frame: shaders.frame(options) };
   },
 };
 
-onmessage = async ({ data: { id, name, options } }) => {
+const endings = ['trap', 'out_of_memory', 'internal'];  // of an instance, with all that lived in it
+
+async function answerTo({ id, name, options }) {
   let told = performance.now();
   const tell = (fraction) => {
     if (performance.now() - told < 100) return;
@@ -79,8 +104,14 @@ onmessage = async ({ data: { id, name, options } }) => {
   };
   try {
     const answer = await work[name](options, tell);
-    postMessage({ id, answer }, [(answer.glb ?? answer.rgba ?? answer.bytes ?? answer.frame).buffer]);
+    const large = answer.glb ?? answer.rgba ?? answer.bytes ?? answer.frame;
+    postMessage({ id, answer }, large === undefined ? [] : [large.buffer]);
   } catch (error) {
+    if (endings.includes(error.code)) shaders = scene = undefined;
     postMessage({ id, error: { message: error.message, code: error.code } });
   }
-};
+}
+
+// One after the other: what one awaits no other changes.
+let last = Promise.resolve();
+onmessage = ({ data }) => { last = last.then(() => answerTo(data)); };

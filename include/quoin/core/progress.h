@@ -23,5 +23,6 @@ using Progress = std::function<bool(double fraction)>;
   if (!whole) return {};
   return [&whole, begin, end](double fraction) { return whole(begin + fraction * (end - begin)); };
 }
+Progress part_of(const Progress&& whole, double begin, double end) = delete;  // it would be gone
 
 }  // namespace quoin

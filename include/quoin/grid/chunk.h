@@ -153,7 +153,8 @@ class Chunk {
   [[nodiscard]] IBox bounds() const;
   /// Bytes held, this object included.
   [[nodiscard]] std::size_t bytes() const;
-  /// Gives back what edits left behind: unused palette entries, bits, slabs that became uniform.
+  /// Gives back what edits left behind: unused palette entries, bits, slabs that became uniform. Does nothing where
+  /// copies share some of it, which would keep that all the same.
   void compact();
 
  private:

@@ -185,9 +185,11 @@ TEST(ShaderBytes, MoreThanAddressesReachIsRefused) {
   const std::byte value{7};
   ASSERT_TRUE(memory.write(*first, {&value, 1}, 5));
   EXPECT_EQ(memory.bytes()[first->address + 5], value);
-  const auto second = memory.allocate(vulkan::ShaderBytes::kMost, "trying");
-  ASSERT_FALSE(second);
-  EXPECT_EQ(second.error().code, ErrorCode::LimitExceeded);
+  for (const std::uint64_t size : {vulkan::ShaderBytes::kMost, ~std::uint64_t{0}}) {
+    const auto second = memory.allocate(size, "trying");
+    ASSERT_FALSE(second) << size;
+    EXPECT_EQ(second.error().code, ErrorCode::LimitExceeded);
+  }
 }
 
 }  // namespace

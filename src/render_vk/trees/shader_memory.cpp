@@ -7,9 +7,10 @@
 namespace quoin::vulkan {
 
 Result<Place> ShaderBytes::allocate(std::uint64_t size, const std::string& doing) {
-  const std::uint64_t room = (size + kAlignment - 1) / kAlignment * kAlignment;
   const std::uint64_t begin = bytes_.size();
-  if (room > kMost - begin) return make_error(ErrorCode::LimitExceeded, doing + ": more than 2 GiB for shaders");
+  const std::uint64_t left = kMost - begin;
+  const std::uint64_t room = size > left ? size : (size + kAlignment - 1) / kAlignment * kAlignment;
+  if (room > left) return make_error(ErrorCode::LimitExceeded, doing + ": more than 1 GiB for shaders");
   bytes_.resize(static_cast<std::size_t>(begin + room));
   return Place{0, begin, room, begin};
 }

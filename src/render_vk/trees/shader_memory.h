@@ -45,8 +45,8 @@ class ShaderMemory {
 /// what is released is not given anew.
 class ShaderBytes final : public ShaderMemory {
  public:
-  /// Of addresses of 32 bits, whose last half shaders need for nothing.
-  static constexpr std::uint64_t kMost = std::uint64_t{1} << 31;
+  /// What programs of 32 bits can hold, also while it grows.
+  static constexpr std::uint64_t kMost = std::uint64_t{1} << 30;
 
   [[nodiscard]] Result<Place> allocate(std::uint64_t size, const std::string& doing) override;
   void release(Place& place) override { place = {}; }
