@@ -41,6 +41,12 @@ function check(isRight, what) {
   console.log(`${isRight ? 'right' : 'WRONG'}: ${what}`);
 }
 
+function oneVoxel() {
+  const id = (name) => Buffer.from(name).readUInt32LE();
+  return Buffer.from(Uint32Array.of(id('VOX '), 150, id('MAIN'), 0, 40, id('SIZE'), 12, 0, 1, 1, 1,
+                                    id('XYZI'), 8, 0, 1, 1 << 24).buffer);
+}
+
 const browser = await chromium.launch({
   executablePath, headless: true,
   args: ['--no-sandbox', '--disable-gpu', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
@@ -118,9 +124,27 @@ try {
   await tab.setInputFiles('#other', { name: 'noise.vox', mimeType: '', buffer: noise });
   await tab.waitForSelector('#status.error');
   check(/^noise.vox: /.test(await status()), `a broken file says so: ${await status()}`);
+  const still = await download('#march', 300_000);
+  check(still.bytes.toString('latin1', 1, 4) === 'PNG', `and what is shown can still be drawn: ${await status()}`);
   await tab.setInputFiles('#other', file);
   await shown(basename(file));
   check(!(await tab.isVisible('#status.error')), `and the next one is shown: ${await status()}`);
+  await tab.setInputFiles('#other', file);
+  await tab.setInputFiles('#other', { name: 'one.vox', mimeType: '', buffer: oneVoxel() });
+  await shown('one.vox');
+  await tab.waitForTimeout(1_500);
+  check(await tab.textContent('#name') === 'one.vox' && /^one.vox: /.test(await status()),
+        `of two files the last is shown: ${await status()}`);
+  await tab.setInputFiles('#other', file);
+  await shown(basename(file));
+
+  const broken = await browser.newPage();
+  await broken.route('**/worker.js', (route) => route.fulfill({ status: 404 }));
+  await broken.goto(site);
+  await broken.setInputFiles('#file', file);
+  await broken.waitForSelector('#status.error', { timeout: 20_000 });
+  check(true, `without a worker: ${await broken.textContent('#status')}`);
+  await broken.close();
   await tab.emulateMedia({ colorScheme: 'dark' });
   await tab.setViewportSize({ width: 390, height: 800 });
   await tab.waitForTimeout(300);
