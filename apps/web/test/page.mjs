@@ -43,7 +43,7 @@ function check(isRight, what) {
 
 function oneVoxel() {
   const id = (name) => Buffer.from(name).readUInt32LE();
-  return Buffer.from(Uint32Array.of(id('VOX '), 150, id('MAIN'), 0, 40, id('SIZE'), 12, 0, 1, 1, 1,
+  return Buffer.from(Uint32Array.of(id('VOX '), 150, id('MAIN'), 0, 44, id('SIZE'), 12, 0, 1, 1, 1,
                                     id('XYZI'), 8, 0, 1, 1 << 24).buffer);
 }
 
