@@ -509,7 +509,7 @@ function index(number) {
 
 /** `value`, which is to be a whole number of 32 bits. */
 function int32(value, what) {
-  if (!Number.isInteger(value) || Math.abs(value) >= 2 ** 31)
+  if (!Number.isInteger(value) || (value | 0) !== value)
     throw new QuoinError('invalid_argument', `${what}: no whole number of 32 bits`);
   return value;
 }
