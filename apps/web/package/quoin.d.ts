@@ -1,8 +1,9 @@
 /** Reads voxel files of any format, and makes meshes, GLB files and pictures of them. See docs/web.md.
  *
  * Axes: right-handed, +Y up. Colours: sRGB. All arrays that are returned are the caller's.
- * Errors: every function throws (or rejects with) a QuoinError. One of code "trap" or "out_of_memory" ended the
- * instance that the scene lived in: that scene is gone, and the next `load` starts a fresh one.
+ * Errors: every function throws (or rejects with) a QuoinError. One of code "trap", "internal" or "out_of_memory" may
+ * have ended the instance that all scenes lived in: these are gone then, their calls fail with "bad_handle", and the
+ * next `load` starts a fresh one.
  */
 export type ErrorCode =
   | 'invalid_argument' | 'cannot_read' | 'cannot_write' | 'bad_format' | 'unsupported' | 'limit_exceeded' | 'cancelled'
@@ -49,7 +50,8 @@ export interface Mesh {
 /** What long calls take. */
 export interface Progress {
   /** Told how far the call has come, 0 to 1. Returning false ends it with a QuoinError of code "cancelled"; what it
-   *  throws, the call throws. It calls nothing of this package. */
+   *  throws, the call throws. It is not waited for: the promise of an async function ends nothing, whatever it resolves
+   *  to. It calls nothing of this package. */
   progress?: (fraction: number) => boolean | void;
 }
 
@@ -128,12 +130,14 @@ export class ShaderScene {
   frame(options?: RenderOptions): Uint8Array<ArrayBuffer>;
   /** What shaders are pushed for the sample of that number. */
   sample(number: number): Uint8Array<ArrayBuffer>;
+  /** Gives its memory back; the garbage collector does too, later. */
   free(): void;
 }
 
 export interface Small {
   /** The small module, quoin-small.wasm, in place of the whole one. It reads .vox alone. Scenes of it have no `render`,
-   *  `rays` and `forShaders`: they throw a QuoinError of code "unsupported". Less than half as much is fetched and compiled. */
+   *  `rays` and `forShaders`: they throw a QuoinError of code "unsupported". Less than half as much is fetched and
+   *  compiled. */
   small?: boolean;
 }
 

@@ -128,7 +128,8 @@ class Instance {
 
   /** Calls use(address, view of it) with `bytes` of memory. */
   with(bytes, use) {
-    const at = this.run('malloc', Math.max(bytes, 1)) >>> 0;
+    // Its malloc gives less than half of the address space, and takes a size modulo 2^32.
+    const at = bytes < 2 ** 31 ? this.run('malloc', Math.max(bytes, 1)) >>> 0 : 0;
     if (at === 0) throw new QuoinError('out_of_memory', `no memory for ${bytes} bytes`);
     try {
       return use(at);
@@ -137,9 +138,10 @@ class Instance {
     }
   }
 
-  /** Copies an array of numbers in. */
+  /** Copies an ArrayBuffer or a typed array in. */
   put(array, at) {
-    const bytes = new Uint8Array(array.buffer, array.byteOffset, array.byteLength);
+    const { buffer = array, byteOffset = 0, byteLength } = array;
+    const bytes = new Uint8Array(buffer, byteOffset, byteLength);
     new Uint8Array(this.exports.memory.buffer, at, bytes.length).set(bytes);
   }
 
@@ -253,15 +255,23 @@ class Engine {
       this.#compiled = compiled;
       this.#instance = undefined;
     }
-    await this.alive();
+    return this.alive();
   }
 
-  /** The instance for new work: where the last one ended, a fresh one. */
+  /** The instance for new work: where the last one ended, a fresh one. All who wait at once get the same. */
   async alive() {
-    if (this.#compiled === undefined) await this.start();
-    const last = await this.#instance;
-    if (last === undefined || last.dead) this.#instance = this.#compiled.then((module) => new Instance(module));
-    return this.#instance;
+    if (this.#compiled === undefined) return this.start();
+    const promise = (this.#instance ??= this.#fresh());
+    const instance = await promise;
+    if (!instance.dead) return instance;
+    if (this.#instance === promise) this.#instance = undefined;
+    return this.alive();
+  }
+
+  #fresh() {
+    const fresh = this.#compiled.then((module) => new Instance(module));
+    fresh.catch(() => { if (this.#instance === fresh) this.#instance = undefined; });
+    return fresh;
   }
 }
 
@@ -273,8 +283,8 @@ export async function start(module, options = {}) {
   await (options.small ? small : whole).start(module);
 }
 
-const registry = new FinalizationRegistry(({ instance: of, handle }) => {
-  if (!of.dead) of.run('quoin_free', handle);
+const registry = new FinalizationRegistry(({ instance: of, free, handle }) => {
+  if (!of.dead) of.run(free, handle);
 });
 
 export class Scene {
@@ -284,11 +294,11 @@ export class Scene {
   constructor(of, handle) {
     this.#instance = of;
     this.#handle = handle;
+    registry.register(this, { instance: of, free: 'quoin_free', handle }, this);
     this.isSmall = of.isSmall;
     this.warnings = Object.freeze(this.#texts());
     this.grids = Object.freeze(this.#grids());
     this.types = Object.freeze(this.#types());
-    registry.register(this, { instance: of, handle }, this);
   }
 
   #texts() {
@@ -360,9 +370,10 @@ export class Scene {
 
   read(grid, min, shape) {
     const of = this.#instance;
-    const count = shape[0] * shape[1] * shape[2];
+    const numbers = [...three(min, 'min'), ...three(shape, 'shape')].map((value) => int32(value, 'min or shape'));
+    const count = numbers[3] * numbers[4] * numbers[5];
     if (!(count >= 0 && count <= 2 ** 30)) throw new QuoinError('invalid_argument', 'a box that cannot be');
-    return of.withBytes(Int32Array.from([...min, ...shape]), (box) => of.with(2 * count, (out) => {
+    return of.withBytes(Int32Array.from(numbers), (box) => of.with(2 * count, (out) => {
       of.call('quoin_grid_read', this.#handle, index(grid), box, box + 12, out, count);
       return of.numbers(Uint16Array, out, count);
     }));
@@ -411,27 +422,30 @@ export class Scene {
   }
 
   free() {
-    registry.unregister(this);
     if (!this.#instance.dead) this.#instance.run('quoin_free', this.#handle);
+    registry.unregister(this);
   }
 }
 
 function pixelsOf(width, height) {
-  const pixels = width * height;
-  if (!(Number.isInteger(width) && Number.isInteger(height) && width > 0 && height > 0 && pixels <= 2 ** 28))
+  if (!(Number.isInteger(width) && Number.isInteger(height) && width > 0 && height > 0 && width * height <= 2 ** 28))
     throw new QuoinError('invalid_argument', 'a size of a picture is two whole numbers, at most 2^28 pixels');
-  return pixels;
+  return width * height;
 }
 
 /** Writes a quoin_render_options. */
 function putRenderOptions(view, at, { width, height, samples = 4, camera, sun }) {
-  [width, height, samples].forEach((value, i) => view.setInt32(at + 4 + 4 * i, value, true));
+  [width, height, int32(samples, 'samples')].forEach((value, i) => view.setInt32(at + 4 + 4 * i, value, true));
   const put = (flag, from, numbers) => {
     view.setInt32(at + flag, 1, true);
     numbers.forEach((value, i) => view.setFloat64(at + from + 8 * i, value, true));
   };
-  if (camera !== undefined) put(24, 32, [...camera.position, ...camera.lookAt, camera.fovDegrees ?? 45]);
-  if (sun !== undefined) put(88, 96, sun);
+  if (camera !== undefined) {
+    const fovDegrees = camera?.fovDegrees ?? 45;
+    if (typeof fovDegrees !== 'number') throw new QuoinError('invalid_argument', 'camera.fovDegrees is no number');
+    put(24, 32, [...three(camera?.position, 'camera.position'), ...three(camera?.lookAt, 'camera.lookAt'), fovDegrees]);
+  }
+  if (sun !== undefined) put(88, 96, three(sun, 'sun'));
 }
 
 /** What shaders march a scene by. */
@@ -445,10 +459,16 @@ export class ShaderScene {
       of.call('quoin_web_march_begin', scene, out);
       return of.view().getUint32(out, true);
     });
-    [this.bytes, this.has] = of.with(12, (out) => {
-      of.call('quoin_web_march_data', this.#march, out, out + 4, out + 8);
-      return [this.#taken(out), of.view().getInt32(out + 8, true)];
-    });
+    registry.register(this, { instance: of, free: 'quoin_web_march_free', handle: this.#march }, this);
+    try {
+      [this.bytes, this.has] = of.with(12, (out) => {
+        of.call('quoin_web_march_data', this.#march, out, out + 4, out + 8);
+        return [this.#taken(out), of.view().getInt32(out + 8, true)];
+      });
+    } catch (error) {
+      this.free();
+      throw error;
+    }
   }
 
   #taken(out) {
@@ -477,33 +497,47 @@ export class ShaderScene {
 
   free() {
     if (!this.#instance.dead) this.#instance.run('quoin_web_march_free', this.#march);
+    registry.unregister(this);
     this.#march = 0;
   }
 }
 
-/** A number of a grid; -1, which none has, for what is no number of one. */
-function index(grid) {
-  return Number.isInteger(grid) && grid >= 0 ? grid : -1;
+/** A number of a grid, or of a sample; -1, which none has, for what is no number of one. */
+function index(number) {
+  return Number.isInteger(number) && number >= 0 && number < 2 ** 31 ? number : -1;
+}
+
+/** `value`, which is to be a whole number of 32 bits. */
+function int32(value, what) {
+  if (!Number.isInteger(value) || (value | 0) !== value)
+    throw new QuoinError('invalid_argument', `${what}: no whole number of 32 bits`);
+  return value;
+}
+
+/** The numbers of a list of three. Whether they are finite, quoin.h's functions say. */
+function three(list, what) {
+  const numbers = list?.length === 3 ? Array.from(list) : [];
+  if (numbers.length !== 3 || numbers.some((value) => typeof value !== 'number'))
+    throw new QuoinError('invalid_argument', `${what} is to be a list of three numbers`);
+  return numbers;
 }
 
 function doubles(list) {
   if (typeof list?.length !== 'number') throw new QuoinError('invalid_argument', 'rays are lists of numbers');
+  if (list.length >= 2 ** 28) throw new QuoinError('out_of_memory', `no memory for ${list.length} numbers of rays`);
   return Float64Array.from(list, Number);
 }
 
-function asBytes(given) {
-  if (given instanceof ArrayBuffer) return new Uint8Array(given);
-  if (ArrayBuffer.isView(given)) return given;
-  throw new QuoinError('invalid_argument', 'bytes are an ArrayBuffer or a typed array');
-}
-
-export async function load(given, options = {}) {
-  const bytes = asBytes(given);
+export async function load(bytes, options = {}) {
+  if (!isBytes(bytes)) throw new QuoinError('invalid_argument', 'bytes are an ArrayBuffer or a typed array');
   if (options.small) {
     const scene = loaded(await small.alive(), bytes, options);
     if (scene !== undefined) return scene;
   }
-  return loaded(await whole.alive(), bytes, options);
+  const scene = loaded(await whole.alive(), bytes, options);
+  if (scene === undefined)
+    throw new QuoinError('unsupported', 'the small module was started without { small: true }, and reads .vox alone');
+  return scene;
 }
 
 /** The scene that a module reads; undefined where it does not read such files. */
@@ -519,18 +553,19 @@ function loaded(of, bytes, { progress }) {
 async function withArray(array, shape, { spacing = [1, 1, 1], origin = [0, 0, 0], progress } = {}, use) {
   const scalar = scalars.findIndex((Kind) => Kind !== null && array instanceof Kind);
   if (scalar < 0) throw new QuoinError('invalid_argument', 'the array is none of the typed arrays that are read');
-  if (shape.length !== 3 || shape.some((n) => !Number.isInteger(n) || n < 0) ||
-      shape[0] * shape[1] * shape[2] !== array.length)
-    throw new QuoinError('invalid_argument', `a shape of ${shape} does not fit ${array.length} samples`);
+  const [nx, ny, nz] = three(shape, 'shape');
+  if ([nx, ny, nz].some((n) => !Number.isSafeInteger(n) || n < 0) || nx * ny * nz !== array.length)
+    throw new QuoinError('invalid_argument', `a shape of ${[nx, ny, nz]} does not fit ${array.length} samples`);
+  const placed = [...three(spacing, 'spacing'), ...three(origin, 'origin')];
   const of = await whole.alive();
   return of.listened(progress, () => of.withBytes(array, (data) => of.withStruct('array', (at) => {
     const view = of.view();
     const size = array.BYTES_PER_ELEMENT;
     view.setUint32(at + 4, data, true);
     view.setInt32(at + 8, scalar, true);
-    const strides = [size * shape[1] * shape[2], size * shape[2], size];
-    [...shape, ...strides].forEach((value, i) => view.setBigInt64(at + 16 + 8 * i, BigInt(value), true));
-    [...spacing, ...origin].forEach((value, i) => view.setFloat64(at + 64 + 8 * i, value, true));
+    const strides = [size * ny * nz, size * nz, size];
+    [nx, ny, nz, ...strides].forEach((value, i) => view.setBigInt64(at + 16 + 8 * i, BigInt(value), true));
+    placed.forEach((value, i) => view.setFloat64(at + 64 + 8 * i, value, true));
     return use(of, at);
   })));
 }
@@ -547,8 +582,7 @@ export async function meshLabels(array, shape, options = {}) {
   const isWhole = typeof background === 'bigint' || Number.isSafeInteger(background);
   if (!isWhole || bits(64, BigInt(background)) !== BigInt(background))
     throw new QuoinError('invalid_argument', `${background} is no label`);
-  if (!Number.isInteger(relaxationSteps) || Math.abs(relaxationSteps) >= 2 ** 31)
-    throw new QuoinError('invalid_argument', `${relaxationSteps} is no number of steps`);
+  int32(relaxationSteps, 'relaxationSteps');
   const label = isUnsigned || array instanceof BigInt64Array ? (number) => bits(64, number) : Number;
   return withArray(array, shape, options, (of, at) =>
     of.takeLabels(of.handle('quoin_mesh_labels', at, BigInt(background), relaxationSteps, 0), label));

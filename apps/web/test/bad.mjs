@@ -86,6 +86,55 @@ await refuses('a fraction of a grid', () => scene.mesh(0.5), 'invalid_argument')
 await refuses('no extension', () => scene.file('.xyz'), 'unsupported');
 await refuses('a picture without a size', () => scene.render({ width: 0 }), 'invalid_argument');
 await refuses('a camera nowhere', () => scene.render({ camera: { position: [NaN, 0, 0], lookAt: [0, 0, 0] } }));
+// What is written into the module is of the length and kind that it has there.
+const small = { width: 16, height: 8 };
+const picture = () => Buffer.from(scene.render(small).rgba);
+const pictureBefore = picture();
+const shaders = scene.forShaders();
+const [here, there] = [[0, 9, 9], [0, 0, 0]];
+const noThree = { 'nothing': null, 'a number': 3, 'an object': { x: 1, y: 1, z: 1 }, 'one number': [1],
+                  'two numbers': [1, 2], 'four numbers': [1, 1, 1, 1], '64 numbers': Array(64).fill(1),
+                  'two million numbers': Array(2e6).fill(1), 'texts': ['a', 'b', 'c'], 'a text': 'abc',
+                  'big integers': [1n, 1n, 1n] };
+for (const [what, list] of Object.entries(noThree)) {
+  for (const [where, options] of Object.entries({
+    'the sun': { sun: list }, 'the position': { camera: { position: list, lookAt: there } },
+    'what is looked at': { camera: { position: here, lookAt: list } } })) {
+    await refuses(`${what} for ${where}`, () => scene.render({ ...small, ...options }), 'invalid_argument');
+    await refuses(`${what} for ${where} of shaders`, () => shaders.frame({ ...small, ...options }), 'invalid_argument');
+  }
+  await refuses(`${what} for spacing`, () => surfaceNets(new Float32Array(8), [2, 2, 2], 0, { spacing: list }),
+                'invalid_argument');
+  await refuses(`${what} for an origin`, () => surfaceNets(new Float32Array(8), [2, 2, 2], 0, { origin: list }),
+                'invalid_argument');
+  await refuses(`${what} for a shape`, () => surfaceNets(new Float32Array(8), list, 0), 'invalid_argument');
+  await refuses(`${what} for a box's corner`, () => scene.read(0, list, [1, 1, 1]), 'invalid_argument');
+  await refuses(`${what} for a box's shape`, () => scene.read(0, [0, 0, 0], list), 'invalid_argument');
+}
+for (const camera of [null, 3, {}, { position: here }, { lookAt: there },
+                      { position: here, lookAt: there, fovDegrees: '45' }])
+  await refuses(`a camera of ${JSON.stringify(camera)}`, () => scene.render({ ...small, camera }), 'invalid_argument');
+for (const sun of [[NaN, 1, 1], [0, 0, 0]])
+  await refuses(`a sun at ${sun}`, () => scene.render({ ...small, sun }), 'invalid_argument');
+for (const samples of ['many', 0.5, -1, NaN, 2 ** 31, 2 ** 32 + 1])
+  await refuses(`${samples} samples`, () => scene.render({ ...small, samples }), 'invalid_argument');
+await refuses('a width that is a big integer', () => scene.render({ width: 8n, height: 8 }), 'invalid_argument');
+for (const number of [-1, 2 ** 31, 2 ** 32, '0']) {
+  await refuses(`grid ${number}`, () => scene.mesh(number), 'invalid_argument');
+  await refuses(`grid ${number} that is read`, () => scene.read(number, [0, 0, 0], [1, 1, 1]), 'invalid_argument');
+  await refuses(`sample ${number}`, () => shaders.sample(number), 'invalid_argument');
+}
+await refuses('a corner beyond 32 bits', () => scene.read(0, [2 ** 32, 0, 0], [1, 1, 1]), 'invalid_argument');
+await refuses('a shape beyond 32 bits', () => scene.read(0, [0, 0, 0], [2 ** 32, 1, 0]), 'invalid_argument');
+await refuses('half a voxel', () => scene.read(0, [0, 0, 0], [0.5, 2, 1]), 'invalid_argument');
+// More than the module can address; nobody touches these bytes.
+for (const bytes of [2 ** 31, 2 ** 32 + 64])
+  await refuses(`a file of ${bytes} bytes`, () => load(new ArrayBuffer(bytes)), 'out_of_memory');
+await refuses('more rays than memory', () => scene.rays({ length: 3 * 2 ** 33 }, { length: 3 * 2 ** 33 }),
+              'out_of_memory');
+check(picture().equals(pictureBefore), 'after what was refused the picture is another one');
+shaders.free();
+await refuses('shaders that were freed', () => shaders.frame(small), 'invalid_argument');
 scene.free();
 await refuses('a scene that was freed', () => scene.glb(), 'bad_handle');
 

@@ -3,9 +3,11 @@
 import { readFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
+import { setFlagsFromString } from 'node:v8';
+import { runInNewContext } from 'node:vm';
 
 const [packageFolder, three, file] = process.argv.slice(2);
-const { load, meshLabels, surfaceNets, toThree, QuoinError } = await import(
+const { load, meshLabels, start, surfaceNets, toThree, QuoinError } = await import(
   pathToFileURL(join(packageFolder, 'quoin.js')));
 const THREE = await import(pathToFileURL(resolve(three, 'build/three.module.js')));
 const { GLTFLoader } = await import(pathToFileURL(resolve(three, 'examples/jsm/loaders/GLTFLoader.js')));
@@ -199,6 +201,70 @@ scene.free();
 const other = await load(bytes);
 check(Buffer.from(whole).equals(Buffer.from(other.glb())), 'after all that the GLB is the same');
 await refuses('rays at a scene that was freed', () => scene.rays([0, 0, 0], [0, 0, 1]), 'bad_handle');
+
+// What an async function resolves to is not waited for.
+check(Buffer.from(whole).equals(Buffer.from(other.glb({ progress: async () => false }))), 'an async progress');
+
+// ---- Instances: how many are started, and what of theirs is freed, is counted.
+const RealInstance = WebAssembly.Instance;
+const counts = { instances: 0, quoin_free: 0, quoin_web_march_free: 0 };
+const fails = { start: false, copy: false };
+WebAssembly.Instance = class {
+  constructor(...given) {
+    ++counts.instances;
+    if (fails.start) throw new WebAssembly.LinkError('as where there is no memory');
+    const { exports } = new RealInstance(...given);
+    const counted = (name) => (handle) => { ++counts[name]; return exports[name](handle); };
+    const internal = 11;
+    this.exports = {
+      ...exports, quoin_free: counted('quoin_free'), quoin_web_march_free: counted('quoin_web_march_free'),
+      quoin_web_march_data: (...values) => fails.copy ? internal : exports.quoin_web_march_data(...values) };
+  }
+};
+const moduleOf = (name) => readFileSync(join(packageFolder, `${name}.wasm`));
+const wholeModule = moduleOf('quoin');
+fails.start = true;
+await start(wholeModule).then(() => check(false, 'an instance that fails is taken'), () => check(true));
+fails.start = false;
+counts.instances = 0;
+const atOnce = await Promise.all([load(bytes), load(bytes), load(bytes)]);
+check(counts.instances === 1, `three loads at once start ${counts.instances} instances`);
+check(atOnce.every((one) => Buffer.from(whole).equals(Buffer.from(one.glb()))), 'what was loaded at once is the same');
+
+// A scene that progress tries to free lives on; it is freed when nobody has it, as are shaders' scenes.
+const [kept] = atOnce;
+await refuses('freed in progress', () => atOnce[1].glb({ progress: () => kept.free() }));
+check(Buffer.from(whole).equals(Buffer.from(kept.glb())), 'it lives on');
+fails.copy = true;
+await refuses('shaders that cannot be copied', () => kept.forShaders(), 'internal');
+check(counts.quoin_web_march_free === 1, 'what could not be copied is freed');
+fails.copy = false;
+setFlagsFromString('--expose-gc');
+const collect = runInNewContext('gc');
+async function collected(name, wanted) {
+  for (let i = 0; i < 100 && counts[name] < wanted; ++i) {
+    collect();
+    await new Promise((done) => setTimeout(done, 10));
+  }
+  check(counts[name] === wanted, `${counts[name]} calls of ${name} in place of ${wanted}`);
+}
+for (let i = 0; i < 3; ++i) kept.forShaders();
+kept.forShaders().free();
+await collected('quoin_web_march_free', 1 + 1 + 3);
+atOnce.slice(1).forEach((one) => one.free());
+counts.quoin_free = 0;
+await (async () => {
+  const lost = await load(bytes);
+  await refuses('freed in progress', () => kept.glb({ progress: () => lost.free() }));
+})();
+await collected('quoin_free', 1);
+
+// The small module where the whole one is expected reads what it can, and refuses the rest.
+await start(moduleOf('quoin-small'));
+check((await load(bytes)).isSmall, 'the small module in place of the whole one');
+await refuses('a file that it does not read', () => load(new TextEncoder().encode('v 0 0 0\n')), 'unsupported');
+await start(wholeModule);
+WebAssembly.Instance = RealInstance;
 
 console.log(`rays, labels, progress, toThree: ${checked} checks, ${failed} failed`);
 if (failed > 0 || checked === 0) process.exit(1);
