@@ -1,4 +1,4 @@
-// A headless Chromium that shows viewer.html with models served from this machine.
+// A headless Chromium, a server of files from this machine, and viewer.html with models that it shows.
 import { existsSync } from 'node:fs';
 import { readFile } from 'node:fs/promises';
 import { createServer } from 'node:http';
@@ -6,12 +6,17 @@ import { extname, join, normalize } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
 const here = fileURLToPath(new URL('.', import.meta.url));
-const types = { '.html': 'text/html', '.js': 'text/javascript', '.mjs': 'text/javascript', '.glb': 'model/gltf-binary' };
+const types = { '.html': 'text/html', '.js': 'text/javascript', '.mjs': 'text/javascript', '.css': 'text/css',
+                '.wasm': 'application/wasm', '.glb': 'model/gltf-binary' };
 
-/** Ends the process with status 77 when something is missing. */
-async function requirements() {
+/** How the browser is started: without requests of its own, drawn by a program. */
+export const headless = ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
+                         '--disable-background-networking', '--no-first-run'];
+
+/** Ends the process with status 77 when something is missing; `skipped` is how it says so. */
+export async function requirements(skipped = 'skipped') {
   if (Number(process.versions.node.split('.')[0]) < 18) {
-    console.log(`skipped: Node.js ${process.versions.node} is older than 18`);
+    console.log(`${skipped}: Node.js ${process.versions.node} is older than 18`);
     process.exit(77);
   }
   const chromium = process.env.CHROMIUM ?? '/usr/bin/chromium';
@@ -19,21 +24,23 @@ async function requirements() {
     const { chromium: launcher } = await import('playwright-core');
     await import('three');
     if (existsSync(chromium)) return { chromium, launcher };
-    console.log(`skipped: no browser at ${chromium} (set CHROMIUM)`);
+    console.log(`${skipped}: no browser at ${chromium} (set CHROMIUM)`);
   } catch {
-    console.log('skipped: run npm install in this folder first');
+    console.log(`${skipped}: run npm install in tests/web first`);
   }
   process.exit(77);
 }
 
-function serve(models, truth) {
+/** A server on this machine. `contentAt(path)`: the name of a file, or bytes. */
+export function serve(contentAt) {
   const server = createServer(async (request, response) => {
     const path = normalize(decodeURIComponent(new URL(request.url, 'http://localhost').pathname));
-    const model = /^\/model\/(\d+)\.glb$/.exec(path);
-    const file = model ? models[Number(model[1])] : path === '/truth.vox' && truth ? truth : join(here, path);
     try {
-      const body = await readFile(file);
-      response.writeHead(200, { 'Content-Type': types[extname(file)] ?? 'application/octet-stream' });
+      const content = contentAt(path);
+      const isFile = typeof content === 'string';
+      const body = isFile ? await readFile(content) : content;
+      const type = types[extname(isFile ? content : path)] ?? 'application/octet-stream';
+      response.writeHead(200, { 'Content-Type': type });
       response.end(body);
     } catch {
       response.writeHead(404).end();
@@ -48,8 +55,7 @@ async function browserFor(launcher, executablePath) {
   launched ??= await launcher.launch({
     executablePath,
     headless: true,
-    args: ['--no-sandbox', '--disable-gpu', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
-           '--disable-background-networking', '--no-first-run'],
+    args: ['--disable-gpu', ...headless],
   });
   return launched;
 }
@@ -64,7 +70,10 @@ export async function closeBrowser() {
  *  file that the page may ask for. */
 export async function withViewer(models, size, use, truth) {
   const { chromium, launcher } = await requirements();
-  const server = await serve(models, truth);
+  const server = await serve((path) => {
+    const model = /^\/model\/(\d+)\.glb$/.exec(path);
+    return model ? models[Number(model[1])] : path === '/truth.vox' && truth ? truth : join(here, path);
+  });
   const browser = await browserFor(launcher, chromium);
   const page = await browser.newPage({ viewport: { width: size[0], height: size[1] } });
   try {

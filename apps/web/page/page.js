@@ -217,6 +217,12 @@ function viewFromText(text) {
 // ---- Files.
 let openings = 0;  // files that were chosen so far: only the last one is shown
 
+/** A function that says whether none was chosen since. */
+function untilTheNext() {
+  const now = openings;
+  return () => now === openings;
+}
+
 /** False where another file was chosen meanwhile, and nothing was done. */
 async function show(bytes, isCurrent) {
   const { scene } = await new GLTFLoader().parseAsync(bytes.buffer, '');
@@ -297,8 +303,8 @@ function describe(name, { grids, types, warnings }) {
 
 async function openFile(chosen) {
   if (chosen === undefined || chosen === null) return;
-  const opening = ++openings;
-  const isCurrent = () => opening === openings;
+  ++openings;
+  const isCurrent = untilTheNext();
   try {
     const bytes = await chosen.arrayBuffer();
     if (isCurrent()) await open(chosen.name, bytes, isCurrent);
@@ -311,8 +317,8 @@ async function openAddress(address) {
   const url = new URL(address, location.href);
   if (url.origin !== location.origin)
     return say('The link names a file of another site, which is not asked for.', true);
-  const opening = ++openings;
-  const isCurrent = () => opening === openings;
+  ++openings;
+  const isCurrent = untilTheNext();
   try {
     const response = await fetch(url);
     if (!response.ok) throw new Error(`${response.status} ${response.statusText}`);
@@ -451,8 +457,7 @@ $('rays').addEventListener('click', () => {
 $('home').addEventListener('click', home);
 $('smooth').addEventListener('change', async () => {
   say('Meshing ...');
-  const opening = openings;
-  const isCurrent = () => opening === openings;
+  const isCurrent = untilTheNext();
   try {
     const tell = (fraction) => say(`Meshing: ${percent(fraction)} ...`);
     const answer = await ask('glb', { smooth: $('smooth').checked }, tell);

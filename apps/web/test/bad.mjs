@@ -3,31 +3,13 @@
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
+import { check, found, refusing } from './checks.mjs';
 
 const [packageFolder, goodFile] = process.argv.slice(2);
 const { load, surfaceNets, QuoinError, version } = await import(pathToFileURL(join(packageFolder, 'quoin.js')));
 const good = new Uint8Array(readFileSync(goodFile));
 const before = (await load(good)).glb();
-let checked = 0;
-let failed = 0;
-
-function check(isRight, what) {
-  ++checked;
-  if (isRight) return;
-  ++failed;
-  console.log(`WRONG: ${what}`);
-}
-
-/** That `work` throws a QuoinError, of these codes where they are given. */
-async function refuses(what, work, ...codes) {
-  try {
-    await work();
-    check(false, `${what}: no error`);
-  } catch (error) {
-    check(error instanceof QuoinError && error.message !== '' && (codes.length === 0 || codes.includes(error.code)),
-          `${what}: ${error?.code} ${error}`);
-  }
-}
+const refuses = refusing(QuoinError);
 
 /** That it ends, with a scene or a QuoinError. */
 async function survives(what, bytes) {
@@ -150,5 +132,5 @@ for (let i = 0; i < mesh.positions.length; i += 3) {
   furthest = Math.max(furthest, Math.abs(Math.hypot(...at) - 8));
 }
 check(mesh.indices.length > 3000 && furthest < 0.1, `a ball's surface is off by ${furthest}`);
-console.log(`${checked} checks, ${failed} failed`);
-if (failed > 0) process.exit(1);
+console.log(`${found.checked} checks, ${found.failed} failed`);
+if (found.failed > 0) process.exit(1);

@@ -72,8 +72,8 @@ function sameness(expected, glb) {
   return nameless(expected) === nameless(glb) ? 'all but names' : 'arrays';
 }
 
-/** How much of it has to be. Bytes do not tell the file's name, which the tool gives volumes and voxelised triangles, nor
- *  the tool's metres of volumes. */
+/** How much of it has to be. Bytes do not tell the file's name, which the tool gives volumes and voxelised triangles,
+ *  nor the tool's metres of volumes. */
 function isEnough(same, file, scene) {
   if (isVolume.test(file)) return same !== undefined;
   return same === 'all' || (same === 'all but names' && scene.warnings.some((text) => text.startsWith('voxelised')));

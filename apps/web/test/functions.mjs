@@ -5,6 +5,7 @@ import { join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { setFlagsFromString } from 'node:v8';
 import { runInNewContext } from 'node:vm';
+import { check, found, refusing } from './checks.mjs';
 
 const [packageFolder, three, file] = process.argv.slice(2);
 const { load, meshLabels, start, surfaceNets, toThree, QuoinError } = await import(
@@ -17,24 +18,7 @@ globalThis.createImageBitmap = async (blob) => {
   const png = new DataView(await blob.arrayBuffer());
   return { width: png.getUint32(16), height: png.getUint32(20), close() {} };
 };
-let checked = 0;
-let failed = 0;
-
-function check(isRight, what) {
-  ++checked;
-  if (isRight) return;
-  ++failed;
-  console.log(`WRONG: ${what}`);
-}
-
-async function refuses(what, work, code = 'invalid_argument') {
-  try {
-    await work();
-    check(false, `${what}: no error`);
-  } catch (error) {
-    check(error instanceof QuoinError && error.code === code, `${what}: ${error?.code} ${error}`);
-  }
-}
+const refuses = (what, work, code = 'invalid_argument') => refusing(QuoinError)(what, work, code);
 
 let seed = 4711;
 const random = () => (seed = (Math.imul(seed, 1664525) + 1013904223) >>> 0) / 2 ** 32;
@@ -266,5 +250,5 @@ await refuses('a file that it does not read', () => load(new TextEncoder().encod
 await start(wholeModule);
 WebAssembly.Instance = RealInstance;
 
-console.log(`rays, labels, progress, toThree: ${checked} checks, ${failed} failed`);
-if (failed > 0 || checked === 0) process.exit(1);
+console.log(`rays, labels, progress, toThree: ${found.checked} checks, ${found.failed} failed`);
+if (found.failed > 0 || found.checked === 0) process.exit(1);

@@ -1,35 +1,16 @@
 // Pictures by WebGPU against those of the module, in headless Chromium with a processor for a graphics card: the same
 // scene, camera, sun and samples. And the mode of the page that shows them.
 //   node march.mjs PAGE ESBUILD OUT_FOLDER FILE...
-import { existsSync } from 'node:fs';
 import { mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
-import { createServer } from 'node:http';
-import { createRequire } from 'node:module';
 import { spawnSync } from 'node:child_process';
 import { tmpdir } from 'node:os';
-import { basename, extname, join } from 'node:path';
+import { basename, join } from 'node:path';
+import { headless, requirements, serve } from '../../../tests/web/browser.mjs';
+import { checkAloud as check, found as counts } from './checks.mjs';
 import { scenes } from './march_scenes.mjs';
 
 const [page, esbuild, out, ...files] = process.argv.slice(2);
-const require = createRequire(new URL('../../../tests/web/package.json', import.meta.url));
-const executablePath = process.env.CHROMIUM ?? '/usr/bin/chromium';
-function skip(why) {
-  console.log(`skipped, what is marched in the browser: ${why}`);
-  process.exit(77);
-}
-if (!existsSync(executablePath)) skip(`no browser at ${executablePath} (set CHROMIUM)`);
-let chromium;
-try {
-  ({ chromium } = require('playwright-core'));
-} catch {
-  skip('run npm install in tests/web first');
-}
-
-let failed = 0;
-function check(isRight, what) {
-  if (!isRight) ++failed;
-  console.log(`${isRight ? 'right' : 'WRONG'}: ${what}`);
-}
+const { chromium, launcher } = await requirements('skipped, what is marched in the browser');
 
 // ---- The site: the page, the harness in which pictures are compared, and the files.
 const work = await mkdtemp(join(tmpdir(), 'quoin-march-'));
@@ -40,28 +21,14 @@ const bundled = spawnSync(esbuild, [new URL('./marched.js', import.meta.url).pat
 if (bundled.status !== 0) process.exit(1);
 const given = new Map(Object.entries(scenes()).map(([name, bytes]) => [`/${name}`, bytes]));
 for (const file of files) given.set(`/${basename(file)}`, await readFile(file));
-const types = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.wasm': 'application/wasm' };
 const comparing = '<!doctype html><link rel="icon" href="data:,"><script type="module" src="marched.js"></script>';
-const server = createServer(async (request, response) => {
-  const path = decodeURIComponent(new URL(request.url, 'http://localhost').pathname);
-  try {
-    const body = path === '/compare.html' ? comparing
-      : path === '/marched.js' ? await readFile(harness)
-        : given.get(path) ?? await readFile(join(page, path === '/' ? 'index.html' : path));
-    const from = path === '/' ? '.html' : extname(path);
-    response.writeHead(200, { 'Content-Type': types[from] ?? 'application/octet-stream' });
-    response.end(body);
-  } catch {
-    response.writeHead(404).end();
-  }
-});
-await new Promise((done) => server.listen(0, '127.0.0.1', done));
+const own = new Map([['/compare.html', Buffer.from(comparing)], ['/marched.js', harness],
+                     ['/', join(page, 'index.html')], ...given]);
+const server = await serve((path) => own.get(path) ?? join(page, path));
 const site = `http://127.0.0.1:${server.address().port}/`;
 
-const launch = (...args) => chromium.launch({
-  executablePath, headless: true,
-  args: ['--no-sandbox', '--disable-background-networking', '--no-first-run', '--use-gl=angle',
-         '--use-angle=swiftshader', '--enable-unsafe-swiftshader', ...args],
+const launch = (...args) => launcher.launch({
+  executablePath: chromium, headless: true, args: [...headless, ...args],
 });
 const withWebGpu = ['--enable-unsafe-webgpu', '--ignore-gpu-blocklist', '--enable-features=Vulkan,WebGPU',
                     '--use-vulkan=swiftshader', '--use-webgpu-adapter=swiftshader'];
@@ -217,4 +184,4 @@ try {
   server.close();
   await rm(work, { recursive: true });
 }
-process.exit(failed > 0 ? 1 : process.exitCode ?? 0);
+process.exit(counts.failed > 0 ? 1 : process.exitCode ?? 0);

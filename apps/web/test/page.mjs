@@ -1,45 +1,14 @@
 // The page in a headless Chromium, on a server of static files, as a user handles it.
 //   node page.mjs PAGE FILE.vox NATIVE.glb PICTURE.png
-import { existsSync } from 'node:fs';
 import { readFile, writeFile } from 'node:fs/promises';
-import { createServer } from 'node:http';
-import { createRequire } from 'node:module';
-import { basename, extname, join, normalize, resolve } from 'node:path';
+import { basename, join } from 'node:path';
+import { headless, requirements, serve } from '../../../tests/web/browser.mjs';
+import { checkAloud as check, found } from './checks.mjs';
 
 const [page, file, nativeGlb, picture] = process.argv.slice(2);
-const require = createRequire(new URL('../../../tests/web/package.json', import.meta.url));
-const executablePath = process.env.CHROMIUM ?? '/usr/bin/chromium';
-function skip(why) {
-  console.log(`skipped, the page only: ${why}`);
-  process.exit(77);
-}
-if (!existsSync(executablePath)) skip(`no browser at ${executablePath} (set CHROMIUM)`);
-let chromium;
-try {
-  ({ chromium } = require('playwright-core'));
-} catch {
-  skip('run npm install in tests/web first');
-}
-const types = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.wasm': 'application/wasm' };
-const server = createServer(async (request, response) => {
-  const path = normalize(decodeURIComponent(new URL(request.url, 'http://localhost').pathname));
-  try {
-    const from = path === '/' ? join(page, 'index.html') : path === '/castle.vox' ? file : join(page, path);
-    const body = await readFile(from);
-    response.writeHead(200, { 'Content-Type': types[extname(from)] ?? 'application/octet-stream' });
-    response.end(body);
-  } catch {
-    response.writeHead(404).end();
-  }
-});
-await new Promise((done) => server.listen(0, '127.0.0.1', done));
+const { chromium, launcher } = await requirements('skipped, the page only');
+const server = await serve((path) => (path === '/castle.vox' ? file : join(page, path === '/' ? 'index.html' : path)));
 const site = `http://127.0.0.1:${server.address().port}/`;
-
-let failed = 0;
-function check(isRight, what) {
-  if (!isRight) ++failed;
-  console.log(`${isRight ? 'right' : 'WRONG'}: ${what}`);
-}
 
 function oneVoxel() {
   const id = (name) => Buffer.from(name).readUInt32LE();
@@ -47,10 +16,8 @@ function oneVoxel() {
                                     id('XYZI'), 8, 0, 1, 1 << 24).buffer);
 }
 
-const browser = await chromium.launch({
-  executablePath, headless: true,
-  args: ['--no-sandbox', '--disable-gpu', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
-         '--disable-background-networking', '--no-first-run'],
+const browser = await launcher.launch({
+  executablePath: chromium, headless: true, args: ['--disable-gpu', ...headless],
 });
 try {
   const tab = await browser.newPage({ viewport: { width: 1280, height: 720 }, acceptDownloads: true });
@@ -157,4 +124,4 @@ try {
   await browser.close();
   server.close();
 }
-process.exit(failed > 0 ? 1 : 0);
+process.exit(found.failed > 0 ? 1 : 0);

@@ -21,7 +21,7 @@ namespace quoin::vulkan {
 class ShaderScene {
  public:
   /// `light`: of whose lamps there is a table. Lifetime: the scene must outlive it, and is not edited meanwhile.
-  /// Errors: those of VulkanRenderer::update; LimitExceeded beyond 2 GiB.
+  /// Errors: those of VulkanRenderer::update; LimitExceeded beyond 1 GiB.
   [[nodiscard]] static Result<std::unique_ptr<ShaderScene>> of(const Scene& scene, InstanceFilter filter,
                                                                const LightOptions& light, Threads threads);
 
