@@ -167,6 +167,31 @@ inline void store(float* to, F a) {
 inline I operator|(I a, I b) {
   return {_mm256_or_si256(a.v, b.v)};
 }
+inline I operator^(I a, I b) {
+  return {_mm256_xor_si256(a.v, b.v)};
+}
+inline F sqrt(F a) {
+  return {_mm256_sqrt_ps(a.v)};
+}
+// Four numbers from `base + at[lane]` on.
+inline void load_four(const float* base, const std::int32_t (&at)[kWidth], F& a, F& b, F& c, F& d) {
+  // 128 bits of a register hold what belongs to four lanes side by side.
+  const auto rows = [&](int i) {
+    return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(base + at[i])), _mm_loadu_ps(base + at[i + 4]), 1);
+  };
+  const __m256 r0 = rows(0);
+  const __m256 r1 = rows(1);
+  const __m256 r2 = rows(2);
+  const __m256 r3 = rows(3);
+  const __m256d low01 = _mm256_castps_pd(_mm256_unpacklo_ps(r0, r1));
+  const __m256d low23 = _mm256_castps_pd(_mm256_unpacklo_ps(r2, r3));
+  const __m256d high01 = _mm256_castps_pd(_mm256_unpackhi_ps(r0, r1));
+  const __m256d high23 = _mm256_castps_pd(_mm256_unpackhi_ps(r2, r3));
+  a.v = _mm256_castpd_ps(_mm256_unpacklo_pd(low01, low23));
+  b.v = _mm256_castpd_ps(_mm256_unpackhi_pd(low01, low23));
+  c.v = _mm256_castpd_ps(_mm256_unpacklo_pd(high01, high23));
+  d.v = _mm256_castpd_ps(_mm256_unpackhi_pd(high01, high23));
+}
 // `a` where `which` has bits, else `b`.
 inline I merge(I which, I a, I b) {
   return {_mm256_or_si256(_mm256_and_si256(which.v, a.v), _mm256_andnot_si256(which.v, b.v))};

@@ -171,6 +171,34 @@ inline void store(float* to, F a) {
 inline I operator|(I a, I b) {
   return {_mm512_or_si512(a.v, b.v)};
 }
+inline I operator^(I a, I b) {
+  return {_mm512_xor_si512(a.v, b.v)};
+}
+inline F sqrt(F a) {
+  return {_mm512_sqrt_ps(a.v)};
+}
+// Four numbers from `base + at[lane]` on.
+inline void load_four(const float* base, const std::int32_t (&at)[kWidth], F& a, F& b, F& c, F& d) {
+  // 128 bits of a register hold what belongs to four lanes side by side.
+  const auto rows = [&](int i) {
+    __m512 four = _mm512_castps128_ps512(_mm_loadu_ps(base + at[i]));
+    four = _mm512_insertf32x4(four, _mm_loadu_ps(base + at[i + 4]), 1);
+    four = _mm512_insertf32x4(four, _mm_loadu_ps(base + at[i + 8]), 2);
+    return _mm512_insertf32x4(four, _mm_loadu_ps(base + at[i + 12]), 3);
+  };
+  const __m512 r0 = rows(0);
+  const __m512 r1 = rows(1);
+  const __m512 r2 = rows(2);
+  const __m512 r3 = rows(3);
+  const __m512d low01 = _mm512_castps_pd(_mm512_unpacklo_ps(r0, r1));
+  const __m512d low23 = _mm512_castps_pd(_mm512_unpacklo_ps(r2, r3));
+  const __m512d high01 = _mm512_castps_pd(_mm512_unpackhi_ps(r0, r1));
+  const __m512d high23 = _mm512_castps_pd(_mm512_unpackhi_ps(r2, r3));
+  a.v = _mm512_castpd_ps(_mm512_unpacklo_pd(low01, low23));
+  b.v = _mm512_castpd_ps(_mm512_unpackhi_pd(low01, low23));
+  c.v = _mm512_castpd_ps(_mm512_unpacklo_pd(high01, high23));
+  d.v = _mm512_castpd_ps(_mm512_unpackhi_pd(high01, high23));
+}
 // `a` where `which` has bits, else `b`.
 inline I merge(I which, I a, I b) {
   return {_mm512_ternarylogic_epi32(which.v, a.v, b.v, 0xCA)};

@@ -37,11 +37,17 @@ inline Mask operator&(Mask a, Mask b) {
 inline Mask operator|(Mask a, Mask b) {
   return {a.m | b.m};
 }
+inline Mask operator~(Mask a) {
+  return {~a.m & 0xFU};
+}
 inline bool any(Mask a) {
   return a.m != 0;
 }
 inline std::uint32_t bits(Mask a) {
   return a.m;
+}
+inline Mask mask_of(std::uint32_t b) {
+  return {b & 0xFU};
 }
 inline F all(float x) {
   return {{x, x, x, x}};
@@ -73,6 +79,59 @@ inline F abs(F a) {
 inline F floor(F a) {
   return each<F>([&](int i) { return std::floor(a.v[i]); });
 }
+inline F sqrt(F a) {
+  return each<F>([&](int i) { return std::sqrt(a.v[i]); });
+}
+// Of whole numbers all wraps around.
+template <class Of>
+inline I each_word(Of of) {
+  return each<I>([&](int i) { return static_cast<std::int32_t>(of(i)); });
+}
+inline std::uint32_t word(I a, int i) {
+  return static_cast<std::uint32_t>(a.v[i]);
+}
+inline I operator+(I a, I b) {
+  return each_word([&](int i) { return word(a, i) + word(b, i); });
+}
+inline I operator-(I a, I b) {
+  return each_word([&](int i) { return word(a, i) - word(b, i); });
+}
+inline I operator*(I a, I b) {
+  return each_word([&](int i) { return word(a, i) * word(b, i); });
+}
+inline I operator&(I a, I b) {
+  return each_word([&](int i) { return word(a, i) & word(b, i); });
+}
+inline I operator|(I a, I b) {
+  return each_word([&](int i) { return word(a, i) | word(b, i); });
+}
+inline I operator^(I a, I b) {
+  return each_word([&](int i) { return word(a, i) ^ word(b, i); });
+}
+template <int kBits>
+inline I shift_left(I a) {
+  return each_word([&](int i) { return word(a, i) << kBits; });
+}
+template <int kBits>
+inline I shift_right(I a) {
+  return each_word([&](int i) { return word(a, i) >> kBits; });
+}
+inline Mask equals(I a, int b) {
+  return mask_where([&](int i) { return a.v[i] == b; });
+}
+inline F to_float(I a) {
+  return each<F>([&](int i) { return static_cast<float>(a.v[i]); });
+}
+inline I as_int(F a) {
+  I b;
+  std::memcpy(b.v, a.v, sizeof(a.v));
+  return b;
+}
+inline F as_float(I a) {
+  F b;
+  std::memcpy(b.v, a.v, sizeof(a.v));
+  return b;
+}
 inline Mask operator<(F a, F b) {
   return mask_where([&](int i) { return a.v[i] < b.v[i]; });
 }
@@ -97,6 +156,15 @@ inline Mask test(I a, I b) {
 }
 inline I to_int(F a) {
   return each<I>([&](int i) { return static_cast<std::int32_t>(a.v[i]); });
+}
+// Four numbers from `base + at[lane]` on.
+inline void load_four(const float* base, const std::int32_t (&at)[kWidth], F& a, F& b, F& c, F& d) {
+  for (int i = 0; i < kWidth; ++i) {
+    a.v[i] = base[at[i]];
+    b.v[i] = base[at[i] + 1];
+    c.v[i] = base[at[i] + 2];
+    d.v[i] = base[at[i] + 3];
+  }
 }
 inline F load(const float* from) {
   return each<F>([&](int i) { return from[i]; });

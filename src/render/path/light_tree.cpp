@@ -166,68 +166,79 @@ class LightTree::Builder {
 };
 
 LightTree::LightTree(std::span<const LampBounds> lamps) {
-  if (!lamps.empty()) Builder(lamps, *this);
+  if (lamps.empty()) return;
+  Builder(lamps, *this);
+  set_branches();
+}
+
+void LightTree::set_branches() {
+  std::vector<std::int32_t> number(nodes_.size());  // of a node, as LampBranch::next
+  std::int32_t inner = 0;
+  for (std::size_t i = 0; i < nodes_.size(); ++i) number[i] = nodes_[i].lamp >= 0 ? ~nodes_[i].lamp : inner++;
+  if (nodes_.size() == 1) {
+    branches_.push_back({measures_of(nodes_[0].bounds), {}, {number[0], number[0]}});
+    return;
+  }
+  branches_.reserve(static_cast<std::size_t>(inner));
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    if (nodes_[i].lamp >= 0) continue;
+    const auto second = static_cast<std::size_t>(nodes_[i].second);
+    branches_.push_back(
+        {measures_of(nodes_[i + 1].bounds), measures_of(nodes_[second].bounds), {number[i + 1], number[second]}});
+  }
+}
+
+LampMeasures LightTree::measures_of(const LampBounds& bounds) {
+  const Vec3 half = (bounds.high - bounds.low) * 0.5F;
+  const Vec3 middle = bounds.low + half;
+  const bool is_one_sided = bounds.cos_edge > -1.0F && bounds.cos_spread > 0.9999F;
+  const Vec3 axis = is_one_sided ? bounds.axis : Vec3(0.0F);
+  LampMeasures measures;
+  for (int i = 0; i < 3; ++i) measures.middle[i] = middle[i], measures.half[i] = half[i], measures.axis[i] = axis[i];
+  measures.power = bounds.power;
+  measures.squared = std::max(glm::dot(half, half), 1e-12F);
+  measures.beyond = is_one_sided ? glm::dot(half, glm::abs(axis)) : std::numeric_limits<float>::infinity();
+  return measures;
 }
 
 // The form factor of the node's middle, times its power: exact for what is small, and never 0 where a part of the box
 // lies before the point and the point before a part of it. One square root.
-float LightTree::importance(const LampBounds& bounds, Vec3 point, Vec3 normal) {
-  const Vec3 half = (bounds.high - bounds.low) * 0.5F;
-  const Vec3 way = bounds.low + half - point;
-  const float radius2 = glm::dot(half, half);
-  const float distance2 = std::max(glm::dot(way, way), std::max(radius2, 1e-12F));
+float LightTree::importance(const LampMeasures& of, Vec3 point, Vec3 normal) {
+  const auto vec = [](const float(&v)[3]) { return Vec3(v[0], v[1], v[2]); };
+  const Vec3 way = vec(of.middle) - point;
+  const float distance2 = std::max(glm::dot(way, way), of.squared);
   // How far the box reaches before the surface, and the point before the lamps; at least a little of their distance.
   const float distance = std::sqrt(distance2);
-  const float before = is_black(glm::abs(normal)) ? distance : glm::dot(way, normal) + glm::dot(half, glm::abs(normal));
-  if (!(before > 0.0F)) return 0.0F;
-  float shone = distance;
-  if (bounds.cos_edge > -1.0F && bounds.cos_spread > 0.9999F) {
-    shone = glm::dot(half, glm::abs(bounds.axis)) - glm::dot(way, bounds.axis);
-    if (!(shone > 0.0F)) return 0.0F;
-    shone = std::min(shone, distance);
-  }
-  return bounds.power * std::min(before, distance) * shone / (distance2 * distance2);
+  const float before =
+      is_black(glm::abs(normal)) ? distance : glm::dot(way, normal) + glm::dot(vec(of.half), glm::abs(normal));
+  const float shone = of.beyond - glm::dot(way, vec(of.axis));
+  if (!(before > 0.0F) || !(shone > 0.0F)) return 0.0F;
+  return of.power * std::min(before, distance) * std::min(shone, distance) / (distance2 * distance2);
 }
 
 LightTree::Choice LightTree::choose(Vec3 point, Vec3 normal, float u) const {
-  if (nodes_.empty()) return {};
-  std::size_t at = 0;
-  float probability = 1.0F;
-  if (nodes_[0].lamp >= 0 && !(importance(nodes_[0].bounds, point, normal) > 0.0F)) return {};
-  while (nodes_[at].lamp < 0) {
-    const auto second = static_cast<std::size_t>(nodes_[at].second);
-    const float of_first = importance(nodes_[at + 1].bounds, point, normal);
-    const float of_second = importance(nodes_[second].bounds, point, normal);
-    const float both = of_first + of_second;
-    if (!(both > 0.0F)) return {};
-    const float share = of_first / both;
-    if (u < share) {
-      u = std::min(u / share, 0x1.fffffep-1F);
-      probability *= share;
-      at = at + 1;
-    } else {
-      u = std::min((u - share) / (1.0F - share), 0x1.fffffep-1F);
-      probability *= 1.0F - share;
-      at = second;
-    }
-  }
-  return {nodes_[at].lamp, probability};
+  if (branches_.empty()) return {};
+  LampBlock block;
+  for (int i = 0; i < 3; ++i) block.point[i][0] = point[i], block.normal[i][0] = normal[i];
+  block.u[0] = u;
+  block.active = 1;
+  kernel().choose_lamps(branches_.data(), block);
+  return {block.lamp[0], block.probability[0]};
 }
 
 float LightTree::probability(std::uint32_t lamp, Vec3 point, Vec3 normal) const {
   QUOIN_ASSERT(lamp < ways_.size(), "a lamp of the tree");
-  std::size_t at = 0;
+  std::int32_t at = 0;
   float probability = 1.0F;
-  if (nodes_[0].lamp >= 0 && !(importance(nodes_[0].bounds, point, normal) > 0.0F)) return 0.0F;
-  for (std::uint64_t way = ways_[lamp]; nodes_[at].lamp < 0; way >>= 1) {
-    const auto second = static_cast<std::size_t>(nodes_[at].second);
-    const float of_first = importance(nodes_[at + 1].bounds, point, normal);
-    const float of_second = importance(nodes_[second].bounds, point, normal);
+  for (std::uint64_t way = ways_[lamp]; at >= 0; way >>= 1) {
+    const LampBranch& branch = branches_[static_cast<std::size_t>(at)];
+    const float of_first = importance(branch.first, point, normal);
+    const float of_second = importance(branch.second, point, normal);
     const float both = of_first + of_second;
     if (!(both > 0.0F)) return 0.0F;
     const float share = of_first / both;
     probability *= (way & 1U) != 0 ? 1.0F - share : share;
-    at = (way & 1U) != 0 ? second : at + 1;
+    at = branch.next[way & 1U];
   }
   return probability;
 }

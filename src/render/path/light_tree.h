@@ -6,6 +6,8 @@
 
 #include <quoin/core/vec.h>
 
+#include "render/path/kernel/kernel.h"
+
 namespace quoin::path {
 
 /// What a tree of lamps knows of one.
@@ -45,6 +47,8 @@ class LightTree {
     std::int32_t second = -1;  ///< of an inner node: the first child comes right after it
     std::int32_t lamp = -1;    ///< of a leaf
   };
+  // For kernels, which choose for many points at once as `choose` does; null of a tree without lamps.
+  [[nodiscard]] const LampBranch* branches() const { return branches_.empty() ? nullptr : branches_.data(); }
   // For renderers that choose elsewhere.
   [[nodiscard]] std::span<const Node> nodes() const { return nodes_; }
   /// [lamp]: a bit a level from the root, 1: the second child.
@@ -52,10 +56,13 @@ class LightTree {
 
  private:
   class Builder;
-  [[nodiscard]] static float importance(const LampBounds& bounds, Vec3 point, Vec3 normal);
+  [[nodiscard]] static LampMeasures measures_of(const LampBounds& bounds);
+  [[nodiscard]] static float importance(const LampMeasures& of, Vec3 point, Vec3 normal);
+  void set_branches();
 
   std::vector<Node> nodes_;
-  std::vector<std::uint64_t> ways_;  // [lamp]: a bit a level, 1: the second child
+  std::vector<LampBranch> branches_;  // the inner nodes, in their order; of a lone lamp one whose second has no power
+  std::vector<std::uint64_t> ways_;   // [lamp]: a bit a level, 1: the second child
 };
 
 }  // namespace quoin::path

@@ -167,7 +167,10 @@ PathLamps::PathLamps(std::vector<PathLamp> lamps, DVec3 origin) : origin_(origin
 }
 
 LampSample PathLamps::sample(DVec3 point, Vec3 normal, float choice, Pair u) const {
-  const LightTree::Choice chosen = tree_.choose(Vec3(point - origin_), normal, choice);
+  return sample_of(tree_.choose(Vec3(point - origin_), normal, choice), point, u);
+}
+
+LampSample PathLamps::sample_of(LightTree::Choice chosen, DVec3 point, Pair u) const {
   if (chosen.lamp < 0 || !(chosen.probability > 0.0F)) return {};
   const PathLamp& lamp = lamps_[static_cast<std::size_t>(chosen.lamp)];
   LampSample sample = lamp.is_point ? sample_point_lamp(lamp, point) : sample_rectangle(lamp, point, u);

@@ -54,6 +54,11 @@ class PathLamps {
   /// A lamp and a point of it. `point`, `normal`: in the world; a normal of 0 is of a point in the air, which light
   /// reaches from everywhere. `choice`: 0 to less than 1.
   [[nodiscard]] LampSample sample(DVec3 point, Vec3 normal, float choice, Pair u) const;
+  /// The same in two steps, the first of which kernels take for many points at once: a lamp out of `tree`, whose points
+  /// are from `origin`, and a point of it.
+  [[nodiscard]] const LightTree& tree() const { return tree_; }
+  [[nodiscard]] DVec3 origin() const { return origin_; }  ///< in the world
+  [[nodiscard]] LampSample sample_of(LightTree::Choice chosen, DVec3 point, Pair u) const;
   /// With which `sample` finds the point of that lamp that lies in `direction` at `distance`.
   [[nodiscard]] float density(std::int32_t lamp, DVec3 point, Vec3 normal, Vec3 direction, float distance) const;
 
@@ -72,8 +77,6 @@ class PathLamps {
   };
   // For renderers that sample elsewhere.
   [[nodiscard]] std::span<const PathLamp> lamps() const { return lamps_; }
-  [[nodiscard]] const LightTree& tree() const { return tree_; }
-  [[nodiscard]] DVec3 origin() const { return origin_; }  ///< of the tree's bounds, in the world
   /// By their hash, as `lamp_of` looks them up; a power of two, or none.
   [[nodiscard]] std::span<const Face> faces() const { return faces_; }
 

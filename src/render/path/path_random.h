@@ -53,6 +53,9 @@ class Random {
   /// `pixel`: a hash of its place. `sample`: counts up from 0.
   Random(std::uint32_t pixel, std::uint32_t sample) : pixel_(pixel), sample_(sample) {}
 
+  [[nodiscard]] std::uint32_t pixel() const { return pixel_; }
+  [[nodiscard]] std::uint32_t sample() const { return sample_; }
+
   [[nodiscard]] Pair pair(std::uint32_t dimension) const {
     const std::uint32_t seed = mix_bits(pixel_ ^ dimension * 0x9E37'79B9U);
     const std::uint32_t index = reversed(scrambled(reversed(sample_), seed));

@@ -21,22 +21,10 @@ namespace quoin::path {
 namespace {
 
 constexpr int kBlock = CameraRays::kBlock;
-constexpr int kSureBounces = 3;              // before chance may end a path
-constexpr float kMostLikely = 0.95F;         // to go on
-constexpr std::uint32_t kBins = 1 + 6 * 16;  // of directions; the first is that of the sun
-
-// Rays of one bin point about the same way: by the largest component, and the other two in four steps each.
-std::uint32_t bin_of(Vec3 direction) {
-  const Vec3 size = glm::abs(direction);
-  const int axis = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
-  const float scale = 2.0F / std::max(size[axis], 1e-20F);
-  const auto step = [&](float v) {
-    return static_cast<std::uint32_t>(std::clamp(static_cast<int>(v * scale + 2.0F), 0, 3));
-  };
-  const std::uint32_t side = direction[axis] < 0.0F ? 1U : 0U;
-  return 1 + (static_cast<std::uint32_t>(axis) * 2 + side) * 16 + step(direction[(axis + 1) % 3]) * 4 +
-         step(direction[(axis + 2) % 3]);
-}
+constexpr std::size_t kBlockPixels = std::size_t{kBlock} * kBlock;
+static_assert(kBlockPixels == kBlockPoints);
+constexpr int kSureBounces = 3;       // before chance may end a path
+constexpr float kMostLikely = 0.95F;  // to go on
 
 // Calls `put(index)` in the order of keys, equal ones in theirs.
 template <class Key, class Put>
@@ -47,6 +35,29 @@ void sort_by_key(std::size_t count, std::size_t keys, std::vector<std::uint32_t>
   for (std::size_t i = 0; i < count; ++i) put(starts[key(i)]++, static_cast<std::uint32_t>(i));
 }
 
+void put(Vec3 v, BlockLanes<float> (&to)[3], std::size_t lane) {
+  for (int i = 0; i < 3; ++i) to[i][lane] = v[i];
+}
+Vec3 get(const BlockLanes<float> (&from)[3], std::size_t lane) {
+  return {from[0][lane], from[1][lane], from[2][lane]};
+}
+
+ShadeLight light_of(const SkyLight& sky, const PathLamps& lamps) {
+  ShadeLight light;
+  light.lamps = lamps.tree().branches();
+  light.has_sun = sky.has_sun();
+  const SkySample sun = sky.sun_sample(sky.to_sun());
+  const Frame frame(sky.to_sun());
+  light.one_less_cos = sky.one_less_cos();
+  light.sun_density = sun.density;
+  for (int i = 0; i < 3; ++i) {
+    light.to_sun[i] = sun.direction[i];
+    light.sun_radiance[i] = sun.radiance[i];
+    light.sun_frame[0][i] = frame.x[i], light.sun_frame[1][i] = frame.y[i], light.sun_frame[2][i] = frame.z[i];
+  }
+  return light;
+}
+
 DVec3 in_grid(const PlacedGrid& placed, Vec3 direction) {
   return DVec3(direction) * placed.world_axes / placed.voxel_size;  // the transposed matrix times it
 }
@@ -54,7 +65,18 @@ DVec3 in_grid(const PlacedGrid& placed, Vec3 direction) {
 }  // namespace
 
 PathTile::PathTile(const TileContext& context, int column, int row)
-    : context_(&context), column_(column), row_(row), sums_(kPixels) {
+    : context_(&context),
+      column_(column),
+      row_(row),
+      kernel_(&kernel()),
+      light_(light_of(*context.sky, *context.lamps)),
+      pixels_(kPixels),
+      sums_(kPixels) {
+  for (std::size_t i = 0; i < kPixels; ++i) {
+    const std::uint32_t place = hash_of(static_cast<std::uint32_t>(column + static_cast<int>(i) % kEdge),
+                                        static_cast<std::uint32_t>(row + static_cast<int>(i) / kEdge));
+    pixels_[i] = mix_bits(place ^ context.options->seed * 0x9E37'79B9U);
+  }
   if (context.options->ground) ground_ = context.options->ground->height - context.camera->position.y;
   if (context.options->fog) fog_top_ = context.options->fog->top - context.camera->position.y;
 }
@@ -68,7 +90,7 @@ bool PathTile::render(const std::function<bool(std::size_t)>& goes_on) {
       order_paths();
       meet();
       requests_.clear();
-      for (const Vertex& vertex : vertices_) shade(vertex);
+      shade_all();
       trace_requests();
       std::swap(active_, next_);
     }
@@ -92,12 +114,21 @@ void PathTile::begin(int first, int count) {
   const PathOptions& options = *context_->options;
   for (int block_y = 0; block_y < kEdge; block_y += kBlock) {
     for (int block_x = 0; block_x < kEdge; block_x += kBlock) {
+      std::array<std::size_t, kBlockPixels> pixel{};
+      BlockLanes<std::uint32_t> numbers;
+      for (std::size_t i = 0; i < kBlockPixels; ++i) {
+        pixel[i] =
+            (static_cast<std::size_t>(block_y) + i / kBlock) * kEdge + static_cast<std::size_t>(block_x) + i % kBlock;
+        numbers[i] = pixels_[pixel[i]];
+      }
       for (int sample = first; sample < first + count; ++sample) {
-        for (int i = 0; i < kBlock * kBlock; ++i) {
-          const int x = block_x + i % kBlock;
-          const int y = block_y + i / kBlock;
-          if (column_ + x >= options.width || row_ + y >= options.height) continue;
-          begin_path(static_cast<std::size_t>(y * kEdge + x), column_ + x, row_ + y, sample);
+        BlockLanes<float> x;
+        BlockLanes<float> y;
+        kernel_->pairs(numbers, static_cast<std::uint32_t>(sample), 0, x, y);
+        for (std::size_t i = 0; i < kBlockPixels; ++i) {
+          if (column_ + static_cast<int>(pixel[i] % kEdge) >= options.width) continue;
+          if (row_ + static_cast<int>(pixel[i] / kEdge) >= options.height) continue;
+          begin_path(pixel[i], {x[i], y[i]}, sample);
         }
       }
     }
@@ -123,17 +154,17 @@ Pair PathTile::on_lens(Pair u) const {
   return {out * (a.cosine + (b.cosine - a.cosine) * side), out * (a.sine + (b.sine - a.sine) * side)};
 }
 
-void PathTile::begin_path(std::size_t pixel, int x, int y, int sample) {
+void PathTile::begin_path(std::size_t pixel, Pair jitter, int sample) {
   const PathOptions& options = *context_->options;
   const CameraRays& rays = *context_->rays;
   const Camera& camera = *context_->camera;
   Path path;
   path.pixel = static_cast<std::uint16_t>(pixel);
-  const std::uint32_t place = hash_of(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
-  path.random = Random(mix_bits(place ^ options.seed * 0x9E37'79B9U), static_cast<std::uint32_t>(sample));
+  path.random = Random(pixels_[pixel], static_cast<std::uint32_t>(sample));
   path.is_first_sample = sample == 0;
   path.density = kNoOther;
-  const Pair jitter = path.random.pair(0);
+  const int x = column_ + static_cast<int>(pixel % kEdge);
+  const int y = row_ + static_cast<int>(pixel / kEdge);
   const DVec3 across = rays.corner() + rays.right() * (x + static_cast<double>(jitter.x)) +
                        rays.down() * (y + static_cast<double>(jitter.y));
   if (rays.is_perspective()) {
@@ -160,7 +191,7 @@ void PathTile::order_paths() {
   if (active_.empty() || paths_[active_.front()].is_first) return;
   next_.resize(active_.size());
   sort_by_key(
-      active_.size(), kBins, starts_, [&](std::size_t i) { return bin_of(paths_[active_[i]].direction); },
+      active_.size(), kBins, starts_, [&](std::size_t i) { return paths_[active_[i]].bin; },
       [&](std::uint32_t to, std::uint32_t from) { next_[to] = active_[from]; });
   std::swap(active_, next_);
 }
@@ -415,38 +446,69 @@ bool PathTile::goes_on(Path& path, bool in_medium) const {
   return true;
 }
 
-void PathTile::shade(const Vertex& vertex) {
-  Path& path = paths_[vertex.path];
-  const bool in_medium = vertex.is_medium;
-  const int left =
-      in_medium ? context_->options->max_scatterings - path.scatterings : context_->options->max_bounces - path.bounces;
-  if (left <= 0 || is_black(path.throughput)) return;
-  Vec3 normal = vertex.normal;
-  if (!in_medium) {
-    const float facing = -glm::dot(normal, path.direction);
-    // A smooth normal may look away from who sees the surface.
-    if (facing < 1e-3F) normal = glm::normalize(normal - path.direction * (1e-3F - facing));
+bool PathTile::may_scatter(const Vertex& vertex) const {
+  const Path& path = paths_[vertex.path];
+  const PathOptions& options = *context_->options;
+  const int left = vertex.is_medium ? options.max_scatterings - path.scatterings : options.max_bounces - path.bounces;
+  return left > 0 && !is_black(path.throughput);
+}
+
+void PathTile::shade_all() {
+  std::array<const Vertex*, kBlockPoints> of{};
+  std::size_t count = 0;
+  block_.in_air = 0;
+  const auto shade_block = [&] {
+    block_.lamps.active = (1U << count) - 1U;
+    kernel_->shade(light_, block_);
+    for (std::size_t i = 0; i < count; ++i) shade(*of[i], i);
+    block_.in_air = 0;
+    count = 0;
+  };
+  for (const Vertex& vertex : vertices_) {
+    if (!may_scatter(vertex)) continue;
+    of[count] = &vertex;
+    put_into_block(vertex, count);
+    if (++count == kBlockPoints) shade_block();
   }
-  const Frame frame(in_medium ? path.direction : normal);
+  if (count > 0) shade_block();
+}
+
+void PathTile::put_into_block(const Vertex& vertex, std::size_t lane) {
+  const Path& path = paths_[vertex.path];
+  block_.pixel[lane] = path.random.pixel();
+  block_.sample[lane] = path.random.sample();
+  block_.dimension[lane] = path.dimension;
+  put(path.direction, block_.direction, lane);
+  put(vertex.material.colour, block_.colour, lane);
+  put(path.throughput, block_.throughput, lane);
+  put(vertex.normal, block_.normal, lane);
+  if (vertex.is_medium) block_.in_air |= 1U << lane;
+  if (light_.lamps == nullptr) return;
+  put(Vec3(vertex.in_view + context_->camera->position - context_->lamps->origin()), block_.lamps.point, lane);
+}
+
+void PathTile::shade(const Vertex& vertex, std::size_t lane) {
+  Path& path = paths_[vertex.path];
+  const Vec3 normal = vertex.is_medium ? vertex.normal : get(block_.normal, lane);
+  const Frame frame(vertex.is_medium ? path.direction : normal);
   const Scatter scatter = scatter_at(vertex, path, frame);
-  ask_sun(vertex, path, frame, scatter);
+  ask_sun(vertex, lane, frame, scatter);
   ask_sky(vertex, path, frame, scatter);
-  ask_lamp(vertex, path, frame, scatter);
-  const Scattered next = scatter.sample(path.random.pair(path.dimension + dimension::kDirection),
-                                        path.random.one(path.dimension + dimension::kLobe));
+  ask_lamp(vertex, lane, frame, scatter);
+  const Scattered next = scattered(vertex, lane, frame, scatter);
   if (path.is_caught && path.bounces == 0) {
     const SkyLight& sky = *context_->sky;
-    const SkySample sun = sky.sample_sun(path.random.pair(path.dimension + dimension::kSun));
-    const float cosine = std::max(sun.direction.y, 0.0F);
-    Vec3 open = sky.sky(frame.to_world(next.direction)) * next.weight;
+    const float cosine = std::max(block_.sun[1][lane], 0.0F);
+    Vec3 open = sky.sky(next.direction) * next.weight;
     if (sky.has_sun()) open += sky.sun_irradiance() * vertex.material.colour * (cosine / kPi);
     sums_[path.pixel].open += open;
   }
   if (is_black(next.weight)) return;
   path.throughput *= next.weight;
-  if (!goes_on(path, in_medium)) return;
+  if (!goes_on(path, vertex.is_medium)) return;
   path.dimension += kDimensions;
-  path.direction = glm::normalize(frame.to_world(next.direction));
+  path.direction = next.direction;
+  path.bin = static_cast<std::uint8_t>(vertex.is_matte() ? block_.next_bin[lane] : bin_of(next.direction));
   path.density = next.density;
   path.origin = vertex.in_view;
   path.normal = normal;
@@ -456,13 +518,30 @@ void PathTile::shade(const Vertex& vertex) {
   next_.push_back(vertex.path);
 }
 
-void PathTile::ask_sun(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter) {
-  const SkyLight& sky = *context_->sky;
-  if (!sky.has_sun()) return;
-  const SkySample sun = sky.sample_sun(path.random.pair(path.dimension + dimension::kSun));
+Scattered PathTile::scattered(const Vertex& vertex, std::size_t lane, const Frame& frame,
+                              const Scatter& scatter) const {
+  if (vertex.is_matte()) {
+    const float density = block_.next_density[lane];
+    return {get(block_.next, lane), density > 0.0F ? vertex.material.colour : Vec3(0.0F), density};
+  }
+  const Path& path = paths_[vertex.path];
+  Scattered next =
+      scatter.sample({block_.pair[0][lane], block_.pair[1][lane]}, path.random.one(path.dimension + dimension::kLobe));
+  if (!is_black(next.weight)) next.direction = glm::normalize(frame.to_world(next.direction));
+  return next;
+}
+
+void PathTile::ask_sun(const Vertex& vertex, std::size_t lane, const Frame& frame, const Scatter& scatter) {
+  if (!light_.has_sun) return;
+  const Vec3 direction = get(block_.sun, lane);
+  if (vertex.is_matte()) {
+    ask(vertex, direction, kNoOther, get(block_.sun_light, lane), true);
+    return;
+  }
+  const SkySample sun = context_->sky->sun_sample(direction);
   const Vec3 in = frame.to_local(sun.direction);
   if (!(in.z > 0.0F) && !vertex.is_medium) return;
-  Vec3 light = path.throughput * scatter.value(in);
+  Vec3 light = paths_[vertex.path].throughput * scatter.value(in);
   if (sun.density < kNoOther) {
     light *= sun.radiance / sun.density * balance(sun.density, scatter.density(in));
   } else {
@@ -481,16 +560,15 @@ void PathTile::ask_sky(const Vertex& vertex, const Path& path, const Frame& fram
       false);
 }
 
-void PathTile::ask_lamp(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter) {
-  if (context_->lamps->empty()) return;
-  const Vec3 normal = vertex.is_medium ? Vec3(0.0F) : frame.z;
-  const LampSample lamp = context_->lamps->sample(vertex.in_view + context_->camera->position, normal,
-                                                  path.random.one(path.dimension + dimension::kLampChoice),
-                                                  path.random.pair(path.dimension + dimension::kLampPoint));
+void PathTile::ask_lamp(const Vertex& vertex, std::size_t lane, const Frame& frame, const Scatter& scatter) {
+  if (light_.lamps == nullptr) return;
+  const LightTree::Choice chosen{block_.lamps.lamp[lane], block_.lamps.probability[lane]};
+  const LampSample lamp = context_->lamps->sample_of(chosen, vertex.in_view + context_->camera->position,
+                                                     {block_.lamp_pair[0][lane], block_.lamp_pair[1][lane]});
   if (is_black(lamp.radiance)) return;
   const Vec3 in = frame.to_local(lamp.direction);
   if (!(in.z > 0.0F) && !vertex.is_medium) return;
-  Vec3 light = path.throughput * scatter.value(in) * lamp.radiance;
+  Vec3 light = paths_[vertex.path].throughput * scatter.value(in) * lamp.radiance;
   if (lamp.density < kNoOther) light *= balance(lamp.density, scatter.density(in));
   // A little before the lamp, for rounding.
   ask(vertex, lamp.direction, lamp.distance * (1.0F - 1e-4F), light, false);

@@ -14,6 +14,7 @@
 #include "light/surfaces.h"
 #include "render/camera_rays.h"
 #include "render/path/denoise.h"
+#include "render/path/kernel/kernel.h"
 #include "render/path/path_lamps.h"
 #include "render/path/path_random.h"
 #include "render/path/path_request.h"
@@ -38,7 +39,7 @@ struct TileContext {
 
 /// One square of a picture.
 ///
-///   begin -> [ order -> meet -> shade -> ask what shadows light ] until no path is left -> add
+///   begin -> [ order -> meet -> shade by sixteens -> ask what shadows light ] until no path is left -> add
 ///
 /// All paths of some samples go one step at a time, those that point the same way side by side, so that packets of rays
 /// are full and stay near each other. What a path finds depends on its pixel and sample alone.
@@ -82,6 +83,7 @@ class PathTile {
     bool is_caught = false;         // the ground only catches shadows where it went
     bool is_first_sample = false;
     bool is_noted = false;  // in the layers
+    std::uint8_t bin = 0;   // of its direction
   };
   // Where a path is scattered.
   struct Vertex {
@@ -94,6 +96,11 @@ class PathTile {
     bool is_ground = false;
     bool is_medium = false;   // in the air; it has no normal
     float anisotropy = 0.0F;  // of that
+
+    // Without any gloss.
+    [[nodiscard]] bool is_matte() const {
+      return !is_medium && material.roughness >= 1.0F && material.metalness <= 0.0F;
+    }
   };
   // Light that reaches a vertex if nothing is in between.
   struct Request {
@@ -113,7 +120,7 @@ class PathTile {
   void begin(int first, int count);
   // A point of the lens, of radius 1.
   [[nodiscard]] Pair on_lens(Pair u) const;
-  void begin_path(std::size_t pixel, int x, int y, int sample);
+  void begin_path(std::size_t pixel, Pair jitter, int sample);
   void order_paths();
   void meet();
   void meet_packet(std::span<const std::uint32_t> paths);
@@ -148,13 +155,20 @@ class PathTile {
   [[nodiscard]] SurfacePart& part_of(const Path& path);
   void note_part(Path& path, const Vertex& vertex, std::uint32_t surface, bool is_curved);
 
-  void shade(const Vertex& vertex);
+  void shade_all();
+  [[nodiscard]] bool may_scatter(const Vertex& vertex) const;
+  void put_into_block(const Vertex& vertex, std::size_t lane);
+  // Once the kernel knows of `block_` what it does.
+  void shade(const Vertex& vertex, std::size_t lane);
+  // Where a path goes that is scattered: into a direction of the world.
+  [[nodiscard]] Scattered scattered(const Vertex& vertex, std::size_t lane, const Frame& frame,
+                                    const Scatter& scatter) const;
   [[nodiscard]] Scatter scatter_at(const Vertex& vertex, const Path& path, const Frame& frame) const;
   // Counts the scattering that comes now, and by chance ends the path. Returns whether it goes on.
   [[nodiscard]] bool goes_on(Path& path, bool in_medium) const;
-  void ask_sun(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter);
+  void ask_sun(const Vertex& vertex, std::size_t lane, const Frame& frame, const Scatter& scatter);
   void ask_sky(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter);
-  void ask_lamp(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter);
+  void ask_lamp(const Vertex& vertex, std::size_t lane, const Frame& frame, const Scatter& scatter);
   void ask(const Vertex& vertex, Vec3 direction, float max_t, Vec3 light, bool is_sun);
   void trace_requests();
   void trace_request_packet(std::span<const std::uint32_t> requests);
@@ -165,6 +179,10 @@ class PathTile {
   double ground_ = 0.0;   // height in view space
   double fog_top_ = 0.0;  // likewise
   std::int64_t rays_ = 0;
+  const Kernel* kernel_;
+  ShadeLight light_;
+  ShadeBlock block_;
+  std::vector<std::uint32_t> pixels_;  // Random's, of the tile's
   std::vector<Path> paths_;
   std::vector<std::uint32_t> active_, next_;
   std::vector<Vertex> vertices_;

@@ -186,6 +186,7 @@ bool PathTile::leave_glass(std::uint32_t index) {
 void PathTile::turn_at(Path& path, const DVec3& point, Vec3 direction, Vec3 normal, double lift, VoxelType inside) {
   path.origin = point + DVec3(normal) * lift;
   path.direction = glm::normalize(direction);
+  path.bin = static_cast<std::uint8_t>(bin_of(path.direction));
   path.inside = inside;
   path.dimension += kDimensions;
   path.density = kNoOther;

@@ -6,6 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include <glm/common.hpp>
+
 #include <quoin/core/direction.h>
 #include <quoin/core/hash.h>
 #include <quoin/core/vec.h>
@@ -13,6 +15,7 @@
 #include "light/glass.h"
 #include "light/surfaces.h"
 #include "render/path/denoise.h"
+#include "render/path/kernel/kernel.h"
 #include "render/path/path_math.h"
 
 // What the two halves of PathTile share: path_tile.cpp has surfaces and light, path_tile_media.cpp glass, fog and
@@ -26,17 +29,18 @@ inline constexpr std::uint32_t kFog = 0x4000'0000;                         // ad
 inline constexpr std::uint32_t kFade = 0x5000'0000;
 inline constexpr std::uint32_t kGroundSurface = 2;  // beside what surface_id gives
 
-// The dimensions of a vertex.
-namespace dimension {
-inline constexpr std::uint32_t kSun = 0;
-inline constexpr std::uint32_t kLampChoice = 1;
-inline constexpr std::uint32_t kLampPoint = 2;
-inline constexpr std::uint32_t kSky = 3;
-inline constexpr std::uint32_t kDirection = 4;
-inline constexpr std::uint32_t kLobe = 5;
-inline constexpr std::uint32_t kRoulette = 6;
-inline constexpr std::uint32_t kGlass = 7;
-}  // namespace dimension
+// Of kBins.
+inline std::uint32_t bin_of(Vec3 direction) {
+  const Vec3 size = glm::abs(direction);
+  const int axis = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
+  const float scale = 2.0F / std::max(size[axis], 1e-20F);
+  const auto step = [&](float v) {
+    return static_cast<std::uint32_t>(std::clamp(static_cast<int>(v * scale + 2.0F), 0, 3));
+  };
+  const std::uint32_t side = direction[axis] < 0.0F ? 1U : 0U;
+  return 1 + (static_cast<std::uint32_t>(axis) * 2 + side) * 16 + step(direction[(axis + 1) % 3]) * 4 +
+         step(direction[(axis + 2) % 3]);
+}
 
 inline Vec3 tint_of(const Surface& surface, double voxels) {
   const auto length = static_cast<float>(voxels);

@@ -82,13 +82,18 @@ float SkyLight::sun_density(Vec3 direction) const {
 }
 
 SkySample SkyLight::sample_sun(Pair u) const {
-  if (!(one_less_cos_ > 0.0F)) return {to_sun_, sunlight_, std::numeric_limits<float>::infinity()};
+  if (!(one_less_cos_ > 0.0F)) return sun_sample(to_sun_);
   const float down = u.x * one_less_cos_;
   const float across = std::sqrt(down * (2.0F - down));
   const SineCosine turn = of_turns(u.y);
   const Vec3 direction = Frame(to_sun_).to_world({across * turn.cosine, across * turn.sine, 1.0F - down});
+  return sun_sample(glm::normalize(direction));
+}
+
+SkySample SkyLight::sun_sample(Vec3 direction) const {
+  if (!(one_less_cos_ > 0.0F)) return {direction, sunlight_, std::numeric_limits<float>::infinity()};
   const float density = 1.0F / (2.0F * kPi * one_less_cos_);
-  return {glm::normalize(direction), sunlight_ * density, density};
+  return {direction, sunlight_ * density, density};
 }
 
 SkySample SkyLight::sample_sky(Pair u) const {

@@ -25,6 +25,8 @@ class SkyLight {
   /// Whether there is a sun to sample.
   [[nodiscard]] bool has_sun() const { return largest(sunlight_) > 0.0F; }
   [[nodiscard]] SkySample sample_sun(Pair u) const;
+  /// That of such a direction.
+  [[nodiscard]] SkySample sun_sample(Vec3 direction) const;
   /// What a surface gets of it that faces it.
   [[nodiscard]] Vec3 sun_irradiance() const { return sunlight_; }
   /// With which `sample_sun` finds a direction.

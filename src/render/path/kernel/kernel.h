@@ -1,0 +1,119 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "core/instruction_set.h"
+
+// What is compiled for each instruction set of pictures by paths: random numbers, the choice of a lamp, and how matte
+// surfaces scatter light, for sixteen points side by side. Every kernel gives the same bits, those of path_random.h,
+// path_math.h, Scatter and SkyLight.
+
+namespace quoin::path {
+
+constexpr std::size_t kBlockPoints = 16;
+
+template <class T>
+using BlockLanes = T[kBlockPoints];
+
+/// How much light a node of a tree over lamps may send, for what LightTree asks of it.
+struct LampMeasures {
+  float middle[3] = {0.0F, 0.0F, 0.0F};
+  float power = 0.0F;
+  float half[3] = {0.0F, 0.0F, 0.0F};  ///< of its box's size
+  float squared = 1e-12F;              ///< of that half's length, at least a little
+  /// What shines to one side has an axis; `beyond` is how far the box reaches along it. Else 0 and infinity.
+  float axis[3] = {0.0F, 0.0F, 0.0F};
+  float beyond = 0.0F;
+};
+
+/// An inner node: both of its children.
+struct alignas(64) LampBranch {
+  LampMeasures first;
+  LampMeasures second;
+  std::int32_t next[2] = {-1, -1};  ///< of each an inner node, or ~lamp
+};
+
+/// Points that each ask a tree for a lamp.
+struct alignas(64) LampBlock {
+  BlockLanes<float> point[3] = {};   ///< from the tree's origin
+  BlockLanes<float> normal[3] = {};  ///< unit; 0 in the air
+  BlockLanes<float> u = {};
+  std::uint32_t active = 0;
+  BlockLanes<std::int32_t> lamp = {};  ///< -1: none
+  BlockLanes<float> probability = {};
+};
+
+/// Where paths are scattered.
+struct alignas(64) ShadeBlock {
+  // Asked.
+  BlockLanes<std::uint32_t> pixel = {};  ///< Random's
+  BlockLanes<std::uint32_t> sample = {};
+  BlockLanes<std::uint32_t> dimension = {};  ///< of the vertex
+  BlockLanes<float> direction[3] = {};       ///< unit, of the path that comes
+  BlockLanes<float> colour[3] = {};          ///< of what is matte
+  BlockLanes<float> throughput[3] = {};
+  std::uint32_t in_air = 0;  ///< those that have no normal
+
+  /// Asked, and turned a little where it looks away from the path.
+  BlockLanes<float> normal[3] = {};
+
+  // Answered.
+  BlockLanes<float> sun[3] = {};        ///< a direction, unit
+  BlockLanes<float> sun_light[3] = {};  ///< that matte surfaces scatter of it
+  BlockLanes<float> pair[2] = {};       ///< for the direction that follows
+  BlockLanes<float> lamp_pair[2] = {};
+  BlockLanes<float> next[3] = {};       ///< the direction in which matte surfaces scatter the path, unit
+  BlockLanes<float> next_density = {};  ///< of it, by solid angle; 0: the path ends
+  BlockLanes<std::int32_t> next_bin = {};
+
+  LampBlock lamps;  ///< of which `u` and `normal` are filled in
+};
+
+/// What is the same for all points of a picture.
+struct ShadeLight {
+  const LampBranch* lamps = nullptr;  ///< null: there are none
+  bool has_sun = false;
+  float to_sun[3] = {0.0F, 1.0F, 0.0F};
+  float sun_frame[3][3] = {};  ///< whose third axis that is
+  float one_less_cos = 0.0F;   ///< of half the angle of the sun's disc; 0: it has none
+  float sun_radiance[3] = {};  ///< without a disc: irradiance
+  float sun_density = 0.0F;
+};
+
+/// The dimensions of a vertex.
+namespace dimension {
+constexpr std::uint32_t kSun = 0;
+constexpr std::uint32_t kLampChoice = 1;
+constexpr std::uint32_t kLampPoint = 2;
+constexpr std::uint32_t kSky = 3;
+constexpr std::uint32_t kDirection = 4;
+constexpr std::uint32_t kLobe = 5;
+constexpr std::uint32_t kRoulette = 6;
+constexpr std::uint32_t kGlass = 7;
+}  // namespace dimension
+
+/// Rays of one bin point about the same way: by the largest component, and the other two in four steps each. The first
+/// is the sun's.
+constexpr std::uint32_t kBins = 1 + 6 * 16;
+
+struct Kernel {
+  void (*shade)(const ShadeLight& light, ShadeBlock& block);
+  void (*choose_lamps)(const LampBranch* branches, LampBlock& block);
+  /// Random::pair of one dimension.
+  void (*pairs)(const BlockLanes<std::uint32_t>& pixel, std::uint32_t sample, std::uint32_t dimension,
+                BlockLanes<float>& x, BlockLanes<float>& y);
+};
+
+// Those of wider instructions are there only where they are compiled; tables have what there is.
+extern const Kernel kPlainKernel;
+extern const Kernel kAvx2Kernel;
+extern const Kernel kAvx512Kernel;
+extern const KernelTable<Kernel> kKernels;
+
+/// That of the widest instructions that this machine has.
+[[nodiscard]] inline const Kernel& kernel() {
+  return kKernels.widest();
+}
+
+}  // namespace quoin::path
