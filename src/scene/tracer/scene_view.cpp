@@ -111,6 +111,30 @@ struct SceneView::Impl {
   PacketTree seen;                      // of these, those that `first_hits` meets, where not all
   std::vector<bool> left_to_impostors;  // none: sees all
   bool is_alone = false;                // there is one instance
+  PacketTree with_glass;                // of `instances`, those that hold something transparent, where these are several
+  std::vector<std::size_t> glass;       // which they are
+
+  void find_glass_instances() {
+    const std::vector<PlacedGrid>& placed = placed_in(*tracer);
+    std::vector<bool> left_out(placed.size());
+    for (std::size_t i = 0; i < placed.size(); ++i) {
+      left_out[i] = !has_transparent(placed[i]);
+      if (!left_out[i]) glass.push_back(i);
+    }
+    if (glass.size() > 1) with_glass = PacketTree(tracer->impl_->instances, origin, left_out);
+  }
+
+  // Which of the rays in view meet something transparent in that instance.
+  [[nodiscard]] std::uint32_t meet_glass(std::size_t index, std::uint32_t near, const RayPacket& in_view,
+                                         RayPacket& room) const {
+    const PlacedGrid& placed = placed_in(*tracer)[index];
+    move(grid_from_view[index], in_view, room);
+    room.active = near;
+    std::uint32_t met = placed.transparent == nullptr ? 0 : quoin::any_hits(*placed.transparent, room);
+    room.active &= ~met;
+    if (placed.glass != nullptr) met |= quoin::any_hits(placed.glass->cells(), room);
+    return met;
+  }
   [[nodiscard]] bool sees_all() const { return left_to_impostors.empty(); }
 
   void take_nearer(std::size_t placed, const PacketHits& found, RayPacket& rays, SceneHits& hits) const {
@@ -219,6 +243,7 @@ SceneView::SceneView(const SceneTracer& tracer, DVec3 origin) : impl_(std::make_
   impl_->origin = origin;
   impl_->instances = PacketTree(tracer.impl_->instances, origin);
   impl_->is_alone = placed_in(tracer).size() == 1;
+  impl_->find_glass_instances();
 }
 
 SceneView::SceneView(SceneView&&) noexcept = default;
@@ -288,23 +313,17 @@ std::uint32_t SceneView::any_hits(std::int32_t home, const RayPacket& rays_in_gr
 }
 
 std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
-  if (rays_in_view.active == 0 || !impl_->tracer->has_transparent()) return 0;
+  if (rays_in_view.active == 0 || impl_->glass.empty()) return 0;
+  RoomFor<RayPacket> room_for_rays;
+  if (impl_->glass.size() == 1) {
+    return impl_->meet_glass(impl_->glass.front(), rays_in_view.active, rays_in_view, *room_for_rays);
+  }
   RayPacket left = rays_in_view;
   const PacketBounds bounds(left);
   LanesWhenNeeded lanes(left, bounds);
-  RoomFor<RayPacket> room_for_rays;
-  RayPacket& rays = *room_for_rays;
-  impl_->instances.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
-    const PlacedGrid& placed = placed_in(*impl_->tracer)[i];
-    if (!has_transparent(placed)) return true;
+  impl_->with_glass.visit(bounds, [&](std::size_t i, const FourBoxes& boxes, std::size_t box) {
     const std::uint32_t near = (*lanes).meet(boxes, box) & left.active;
-    if (near == 0) return true;
-    move(impl_->grid_from_view[i], left, rays);
-    rays.active = near;
-    std::uint32_t met = placed.transparent == nullptr ? 0 : quoin::any_hits(*placed.transparent, rays);
-    rays.active &= ~met;
-    if (placed.glass != nullptr) met |= quoin::any_hits(placed.glass->cells(), rays);
-    left.active &= ~met;
+    if (near != 0) left.active &= ~impl_->meet_glass(i, near, left, *room_for_rays);
     return left.active != 0;
   });
   return rays_in_view.active & ~left.active;
@@ -313,14 +332,13 @@ std::uint32_t SceneView::any_transparent(const RayPacket& rays_in_view) const {
 void SceneView::visit_transparent(const Ray& ray_in_view, double max_t,
                                   FunctionRef<void(std::int32_t, const Ray&)> visit) const {
   const auto visit_one = [&](std::size_t i) {
-    if (!has_transparent(placed_in(*impl_->tracer)[i])) return;
     const Affine& to_grid = impl_->grid_from_view[i];
     visit(static_cast<std::int32_t>(i), {to_grid.point(ray_in_view.origin), to_grid.axes * ray_in_view.direction});
   };
-  if (impl_->is_alone) return visit_one(0);
+  if (impl_->glass.size() == 1) return visit_one(impl_->glass.front());
   RayPacket alone;
   alone.set(0, ray_in_view, max_t);
-  impl_->instances.visit(PacketBounds(alone), [&](std::size_t i, const FourBoxes&, std::size_t) {
+  impl_->with_glass.visit(PacketBounds(alone), [&](std::size_t i, const FourBoxes&, std::size_t) {
     visit_one(i);
     return true;
   });
