@@ -158,7 +158,8 @@ void PathTile::begin_path(std::size_t pixel, Pair jitter, int sample) {
   const PathOptions& options = *context_->options;
   const CameraRays& rays = *context_->rays;
   const Camera& camera = *context_->camera;
-  Path path;
+  active_.push_back(static_cast<std::uint32_t>(paths_.size()));
+  Path& path = paths_.emplace_back();
   path.pixel = static_cast<std::uint16_t>(pixel);
   path.random = Random(pixels_[pixel], static_cast<std::uint32_t>(sample));
   path.is_first_sample = sample == 0;
@@ -182,8 +183,6 @@ void PathTile::begin_path(std::size_t pixel, Pair jitter, int sample) {
     path.direction = Vec3(rays.forward());
   }
   path.dimension = 2;
-  active_.push_back(static_cast<std::uint32_t>(paths_.size()));
-  paths_.push_back(path);
 }
 
 void PathTile::order_paths() {
