@@ -10,9 +10,19 @@
 #include <pmmintrin.h>
 #include <xmmintrin.h>
 
+#include <glm/geometric.hpp>
+
 #include <quoin/mesh/blocky.h>
+#include <quoin/render/path_tracer.h>
 
 #include "bench/peers/peer_report.h"
+#include "bench/picture_workload.h"
+#include "light/light_model.h"
+#include "light/occlusion_directions.h"
+#include "render/camera_rays.h"
+#include "render/path/path_random.h"
+#include "render/path/path_tile_parts.h"
+#include "render/path/sky_light.h"
 
 namespace quoin::peers {
 namespace {
@@ -210,6 +220,135 @@ int any_in_packets(RTCScene scene, const std::vector<RayQuery>& rays, RTCInterse
   return hits;
 }
 
+// PathTracer's paths, number for number, on what Embree finds: of matte surfaces under the sun and the sky.
+class EmbreePaths {
+ public:
+  EmbreePaths(const Grid& grid, const VoxelRegistry& types)
+      : triangles_(triangles_of(grid)), scene_(triangles_, RTC_BUILD_QUALITY_HIGH) {
+    const path::Surfaces surfaces(types, Clouds::Scatter);
+    for (std::size_t i = 0; i < triangles_.indices.size(); i += 3) {
+      const auto corner = [&](std::size_t k) { return triangles_.positions[triangles_.indices[i + k]]; };
+      const Vec3 normal = glm::normalize(glm::cross(corner(1) - corner(0), corner(2) - corner(0)));
+      const Vec3 inside = (corner(0) + corner(1) + corner(2)) / 3.0F - normal * 0.5F;
+      faces_.push_back({normal, surfaces[grid.get(IVec3(glm::floor(inside)))].colour});
+    }
+  }
+
+  // The mean of all pixels.
+  Vec3 picture(const Camera& camera, const PathOptions& options) {
+    const FlushDenormals flush;
+    const path::SkyLight sky(options);
+    const CameraRays view(camera, options.width, options.height);
+    Vec3 sum(0.0F);
+    for (int y = 0; y < options.height; ++y) {
+      for (int x = 0; x < options.width; ++x) {
+        const std::uint32_t pixel = mix_bits(hash_of(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)) ^
+                                             options.seed * 0x9E37'79B9U);
+        for (int i = 0; i < options.samples; ++i) {
+          const path::Random random(pixel, static_cast<std::uint32_t>(i));
+          const path::Pair jitter = random.pair(0);
+          const DVec3 across = view.corner() + view.right() * (x + static_cast<double>(jitter.x)) +
+                               view.down() * (y + static_cast<double>(jitter.y));
+          sum += light_of(sky, random, Vec3(camera.position), Vec3(glm::normalize(view.forward() + across)),
+                          options.max_bounces);
+        }
+      }
+    }
+    return sum / static_cast<float>(options.width * options.height * options.samples);
+  }
+  [[nodiscard]] std::int64_t rays() const { return rays_; }
+
+ private:
+  struct Face {
+    Vec3 normal;
+    Vec3 colour;
+  };
+
+  static RTCRay ray_from(Vec3 origin, Vec3 direction) {
+    return ray_of({{DVec3(origin), DVec3(direction)}, std::numeric_limits<double>::infinity()});
+  }
+
+  Vec3 light_of(const path::SkyLight& sky, const path::Random& random, Vec3 origin, Vec3 direction, int max_bounces) {
+    Vec3 light(0.0F);
+    Vec3 throughput(1.0F);
+    float density = path::kNoOther;
+    std::uint32_t dimension = 2;
+    for (int bounces = 0;; ++bounces) {
+      RTCRayHit hit{};
+      hit.ray = ray_from(origin, direction);
+      hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+      rtcIntersect1(scene_.get(), &context_, &hit);
+      ++rays_;
+      if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
+        Vec3 found = sky.sky(direction);
+        if (const float sun = sky.sun_density(direction); sun > 0.0F)
+          found += sky.sun(direction) * (density < path::kNoOther ? path::balance(density, sun) : 1.0F);
+        return light + throughput * found;
+      }
+      if (bounces >= max_bounces) return light;
+      const Face& face = faces_[hit.hit.primID];
+      origin += direction * hit.ray.tfar + face.normal * static_cast<float>(kRayLift);
+      const path::SkySample sun = sky.sample_sun(random.pair(dimension + path::dimension::kSun));
+      const float cosine = glm::dot(sun.direction, face.normal);
+      if (cosine > 0.0F) {
+        RTCRay shadow = ray_from(origin, sun.direction);
+        rtcOccluded1(scene_.get(), &context_, &shadow);
+        ++rays_;
+        const float by_scatter = cosine / path::kPi;
+        if (!(shadow.tfar < 0.0F)) {
+          light += throughput * face.colour * by_scatter *
+                   (sun.radiance / sun.density * path::balance(sun.density, by_scatter));
+        }
+      }
+      const Vec3 local = path::cosine_weighted(random.pair(dimension + path::dimension::kDirection));
+      throughput *= face.colour;
+      if (bounces >= 3) {
+        const float likely = std::min(path::largest(throughput), 0.95F);
+        if (!(random.one(dimension + path::dimension::kRoulette) < likely)) return light;
+        throughput /= likely;
+      }
+      direction = glm::normalize(path::Frame(face.normal).to_world(local));
+      density = local.z / path::kPi;
+      dimension += path::kDimensions;
+    }
+  }
+
+  Triangles triangles_;
+  EmbreeScene scene_;
+  RTCIntersectContext context_ = [] {
+    RTCIntersectContext made;
+    rtcInitIntersectContext(&made);
+    return made;
+  }();
+  std::vector<Face> faces_;
+  std::int64_t rays_ = 0;
+};
+
+// As path/terrain/640x360.
+void paths(benchmark::State& state) {
+  static const Scene scene = workloads::picture_scene();
+  const SceneGrid& grid = *scene.grids().find(scene.grids().handles().front());
+  EmbreePaths tracer(grid.grid, scene.types);
+  PathOptions options;
+  options.width = 640;
+  options.height = 360;
+  options.samples = 4;
+  options.max_bounces = 4;
+  const Camera camera = frame_view(scene.bounds(), View::Iso, 16.0 / 9.0);
+  const PathPicture ours = PathTracer(scene, InstanceFilter::Visible, {1}).render(camera, options, {1}).value();
+  DVec3 expected(0.0);
+  for (const Vec3& each : ours.radiance) expected += DVec3(each) / static_cast<double>(ours.radiance.size());
+  std::int64_t rays = 0;
+  for (auto _ : state) {
+    const Vec3 mean = tracer.picture(camera, options);
+    const double apart = glm::length(DVec3(mean) - expected) / glm::length(expected);
+    workloads::fail_unless(apart < 1e-3, "the difference of pictures, in millionths,", std::llround(apart * 1e6));
+    rays = tracer.rays();
+  }
+  state.counters["rays"] = benchmark::Counter(static_cast<double>(rays), benchmark::Counter::kIsRate);
+  state.counters["rays_of_ours"] = static_cast<double>(ours.rays) * static_cast<double>(state.iterations());
+}
+
 void build(benchmark::State& state, RTCBuildQuality quality) {
   const Triangles triangles = triangles_of(workloads::ray_workload().grid);
   std::int64_t bytes = 0;
@@ -233,6 +372,9 @@ void build(benchmark::State& state, RTCBuildQuality quality) {
   const auto add_build = [](const char* name, RTCBuildQuality quality) {
     benchmark::RegisterBenchmark(name, build, quality)->Unit(benchmark::kMillisecond);
   };
+  benchmark::RegisterBenchmark("peer/embree/path/terrain/640x360", &paths)
+      ->Unit(benchmark::kMillisecond)
+      ->Iterations(3);
   add_build("peer/embree/rays/build", RTC_BUILD_QUALITY_HIGH);
   add_build("peer/embree/rays/build/medium", RTC_BUILD_QUALITY_MEDIUM);
   add_build("peer/embree/rays/build/low", RTC_BUILD_QUALITY_LOW);

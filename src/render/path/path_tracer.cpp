@@ -34,12 +34,23 @@ struct PathTracer::Impl {
     const std::lock_guard lock(mutex_);
     made_ = nullptr;
   }
+  // That of the last picture where it is the same.
+  [[nodiscard]] std::shared_ptr<const path::SkyLight> sky(const Look& look) {
+    const std::lock_guard lock(mutex_);
+    if (sky_ == nullptr || !path::is_same_sky(sky_of_, look)) {
+      sky_ = std::make_shared<const path::SkyLight>(look);
+      sky_of_ = look;
+    }
+    return sky_;
+  }
 
  private:
   std::mutex mutex_;
   path::PathLampCache cache_;
   std::shared_ptr<const path::PathLamps> made_;  // null: out of date
   double made_of_ = 0.0;
+  std::shared_ptr<const path::SkyLight> sky_;
+  Look sky_of_;
 };
 
 PathTracer::PathTracer(const Scene& scene, InstanceFilter filter, Threads threads)
@@ -61,14 +72,14 @@ Result<PathPicture> PathTracer::render(const Camera& camera, const PathOptions& 
   Impl& impl = content_of(impl_);
   const SceneView view(impl.tracer, camera.position);
   const std::shared_ptr<const path::PathLamps> lamps = impl.lamps(options.lamp_brightness);
-  const path::SkyLight sky(options);
+  const std::shared_ptr<const path::SkyLight> sky = impl.sky(options);
   const CameraRays rays(camera, options.width, options.height);
   std::optional<path::SurfaceParts> parts;
   if (options.denoise) parts.emplace(options.width, options.height);
   const path::TileContext context{&view,
                                   &impl.surfaces,
                                   lamps.get(),
-                                  &sky,
+                                  sky.get(),
                                   &rays,
                                   &camera,
                                   &options,

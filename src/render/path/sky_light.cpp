@@ -22,6 +22,19 @@ Vec3 turned_back(Vec3 v, SineCosine by) {
 
 }  // namespace
 
+bool is_same_sky(Look a, const Look& b) {
+  a.background = b.background;
+  a.ground = b.ground;
+  a.fog = b.fog;
+  a.lamp_brightness = b.lamp_brightness;
+  a.lens_radius = b.lens_radius;
+  a.focus_distance = b.focus_distance;
+  a.lens_blades = b.lens_blades;
+  a.lens_turn_radians = b.lens_turn_radians;
+  a.sun_is_seen = b.sun_is_seen;
+  return a == b;
+}
+
 SkyLight::SkyLight(const Look& options)
     : model_(options.sky), brightness_(static_cast<float>(options.sky_brightness)), uniform_(options.sky_colour) {
   LightOptions light;

@@ -12,7 +12,10 @@
 
 namespace quoin::path {
 
-/// The sun and the sky of a picture.
+/// Whether skies are the same; the rest of a look does not matter to them.
+[[nodiscard]] bool is_same_sky(Look a, const Look& b);
+
+/// The sun and the sky of a picture. Cost: of a physical sky 70 ms.
 class SkyLight {
  public:
   /// Requires: `check` accepts the options.

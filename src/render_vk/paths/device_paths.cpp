@@ -24,20 +24,6 @@ std::vector<Vec4> path_surface_table(const Surfaces& surfaces, std::size_t types
   return table;
 }
 
-// Whether skies are the same; the rest of a look does not matter to them.
-bool is_same_sky(Look a, const Look& b) {
-  a.background = b.background;
-  a.ground = b.ground;
-  a.fog = b.fog;
-  a.lamp_brightness = b.lamp_brightness;
-  a.lens_radius = b.lens_radius;
-  a.focus_distance = b.focus_distance;
-  a.lens_blades = b.lens_blades;
-  a.lens_turn_radians = b.lens_turn_radians;
-  a.sun_is_seen = b.sun_is_seen;
-  return a == b;
-}
-
 // Whether the same faces are part of the same lamps, which one finds by the same ways.
 bool has_same_faces(const path::PathLamps& a, const path::PathLamps& b) {
   return std::ranges::equal(a.faces(), b.faces()) && std::ranges::equal(a.tree().ways(), b.tree().ways());
@@ -134,7 +120,7 @@ Status DevicePaths::put_surfaces(DeviceMemory& memory) {
 }
 
 Status DevicePaths::put_sky(DeviceMemory& memory, const Look& look) {
-  if (look_ && is_same_sky(*look_, look)) return {};
+  if (look_ && path::is_same_sky(*look_, look)) return {};
   look_.reset();
   sky_ = std::make_unique<const path::SkyLight>(look);
   Status done;

@@ -111,8 +111,8 @@ struct SceneView::Impl {
   PacketTree seen;                      // of these, those that `first_hits` meets, where not all
   std::vector<bool> left_to_impostors;  // none: sees all
   bool is_alone = false;                // there is one instance
-  PacketTree with_glass;                // of `instances`, those that hold something transparent, where these are several
-  std::vector<std::size_t> glass;       // which they are
+  PacketTree with_glass;           // of `instances`, those that hold something transparent, where these are several
+  std::vector<std::size_t> glass;  // which they are
 
   void find_glass_instances() {
     const std::vector<PlacedGrid>& placed = placed_in(*tracer);
