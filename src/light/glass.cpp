@@ -19,11 +19,8 @@ constexpr double kClosed = -11.0;
 constexpr double kDiagonal = 1.7320508075688774;  // of a cube of 1
 constexpr double kLeastClosing = 1e-9;            // of what is clear
 
-// Lengths of t within which two bodies touch; the rounding of placed grids.
-constexpr double kTouching = 1e-6;
-
-bool continues(const GlassBody& body, const GlassBody& next) {
-  return next.type == body.type && reaches(body, next.t_enter);
+bool continues(const GlassBody& body, VoxelType type, double t_enter) {
+  return type == body.type && reaches(body, t_enter);
 }
 
 // The bodies of one placed grid along a ray, in their order.
@@ -44,15 +41,21 @@ class BodiesOfGrid {
     begin();
     GridReader voxels_of(*placed_.voxels);
     VoxelType type = kAir;
-    const auto largest = [&](IVec3 voxel) {
-      type = voxels_of.get(voxel);
-      return largest_block(type);
-    };
-    trace::visit_blocks(*placed_.transparent, ray_, max_t_, largest, [&](const trace::WalkSpan& span) {
-      GlassBody next = body_of(span.voxel, type, span.t_enter, std::min(span.t_exit, max_t_), span.starts_inside);
-      next.face = span.face;
-      next.exit_face = span.exit_face;
-      return add(next);
+    const auto largest = [&] { return largest_block(type); };
+    const auto enter = [&](IVec3 voxel) { type = voxels_of.get(voxel); };
+    trace::visit_blocks(*placed_.transparent, ray_, max_t_, enter, largest, [&](const trace::WalkSpan& span) {
+      const double t_exit = std::min(span.t_exit, max_t_);
+      const double voxels = voxels_between(span.t_enter, t_exit);
+      if (!(voxels > 0.0)) return true;  // an edge that it only touches
+      if (out_.size() > first_ && continues(out_.back(), type, span.t_enter)) {
+        // Most voxels of water are inside of it.
+        lengthen(t_exit, span.exit_face, voxels);
+      } else {
+        GlassBody& next = out_.emplace_back(body_of(span.voxel, type, span.t_enter, t_exit, span.starts_inside));
+        next.face = span.face;
+        next.exit_face = span.exit_face;
+      }
+      return is_seen_beyond(type, voxels);
     });
   }
 
@@ -88,22 +91,33 @@ class BodiesOfGrid {
     body.starts_inside = starts_inside;
     body.t_enter = t_enter;
     body.t_exit = t_exit;
-    body.voxels = (t_exit - t_enter) * length_ / placed_.voxel_size * voxels_per_cell_;
+    body.voxels = voxels_between(t_enter, t_exit);
     return body;
+  }
+  [[nodiscard]] double voxels_between(double t_enter, double t_exit) const {
+    return (t_exit - t_enter) * length_ / placed_.voxel_size * voxels_per_cell_;
+  }
+
+  void lengthen(double t_exit, Direction exit_face, double voxels) {
+    GlassBody& body = out_.back();
+    body.t_exit = t_exit;
+    body.exit_face = exit_face;
+    body.voxels += voxels;
+  }
+  bool is_seen_beyond(VoxelType type, double voxels) {
+    clarity_ += static_cast<double>(surfaces_[type].log_clarity) * voxels;
+    return clarity_ > kClosed;
   }
 
   // False where nothing is seen any more.
   bool add(const GlassBody& next) {
     if (!(next.voxels > 0.0)) return true;  // an edge that it only touches
-    if (out_.size() > first_ && continues(out_.back(), next)) {
-      out_.back().t_exit = next.t_exit;
-      out_.back().exit_face = next.exit_face;
-      out_.back().voxels += next.voxels;
+    if (out_.size() > first_ && continues(out_.back(), next.type, next.t_enter)) {
+      lengthen(next.t_exit, next.exit_face, next.voxels);
     } else {
       out_.push_back(next);
     }
-    clarity_ += static_cast<double>(surfaces_[next.type].log_clarity) * next.voxels;
-    return clarity_ > kClosed;
+    return is_seen_beyond(next.type, next.voxels);
   }
 
   const PlacedGrid& placed_;
@@ -125,7 +139,7 @@ void join_touching(std::vector<GlassBody>& bodies) {
   });
   std::size_t kept = 0;
   for (std::size_t i = 1; i < bodies.size(); ++i) {
-    if (continues(bodies[kept], bodies[i])) {
+    if (continues(bodies[kept], bodies[i].type, bodies[i].t_enter)) {
       if (bodies[i].t_exit > bodies[kept].t_exit) {
         bodies[kept].t_exit = bodies[i].t_exit;
         bodies[kept].exit_placed = bodies[i].exit_placed;
@@ -163,10 +177,6 @@ GlassLook look_of(const Surface& surface, const GlassBody& body) {
   for (int channel = 0; channel < 3; ++channel) look.passed[channel] = through(surface.log_transmittance[channel]);
   look.own = 1.0F - through(surface.log_clarity);
   return look;
-}
-
-bool reaches(const GlassBody& body, double t) {
-  return t <= body.t_exit + kTouching * std::max(1.0, body.t_exit);
 }
 
 bool lies_on_opaque(const SceneView& view, const Ray& ray_in_view, const GlassBody& body, double t) {

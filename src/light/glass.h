@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include <quoin/core/vec.h>
@@ -45,7 +46,10 @@ struct GlassLook {
 
 /// Whether the ray is in the body still, or just out of it, at `t`: so another body that begins there, or a surface,
 /// touches it.
-[[nodiscard]] bool reaches(const GlassBody& body, double t);
+[[nodiscard]] inline bool reaches(const GlassBody& body, double t) {
+  constexpr double kTouching = 1e-6;  // the rounding of placed grids
+  return t <= body.t_exit + kTouching * std::max(1.0, body.t_exit);
+}
 
 /// Whether something opaque at `t` leaves no air behind the body: a hundredth of a voxel is none, so that it does not
 /// matter how grids that stand on each other are rounded.

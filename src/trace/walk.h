@@ -78,10 +78,13 @@ class Walk {
   /// Leaves the voxel it is in.
   void leave_voxel() { step_voxel(); }
   /// Leaves the largest aligned block around the voxel that is known to be full of one type and has an edge of no more
-  /// than `largest`; else the voxel. After `find` was true, in a tree of transparent voxels.
-  void leave_block(double largest) {
-    int size = largest < 4.0 ? 1 : uniform_size();
-    while (size > 1 && size > largest) size /= 4;
+  /// than `largest()`; else the voxel. After `find` was true, in a tree of transparent voxels.
+  template <class Largest>
+  void leave_block(const Largest& largest) {
+    int size = uniform_size();
+    if (size == 1) return step_voxel();
+    const double most = largest();
+    while (size > 1 && size > most) size /= 4;
     step(size);
   }
   [[nodiscard]] bool is_within(double max_t) const {
@@ -311,12 +314,18 @@ void visit_spans(const OccupancyTree& tree, const Ray& ray, double max_t, const 
 }
 
 /// As `visit_hits`, of a tree of transparent voxels, for whole blocks of voxels of one type at a time: a span is that
-/// of a block, entered at its voxel. Together the spans are those of the voxels. `largest`: returns, for that voxel,
-/// how long the block's edge may be.
-template <class Largest, class Visit>
-void visit_blocks(const OccupancyTree& tree, const Ray& ray, double max_t, const Largest& largest, const Visit& visit) {
+/// of a block, entered at its voxel. Together the spans are those of the voxels. `enter`: told of that voxel first.
+/// `largest`: returns, where there is a block, how long its edge may be.
+template <class Enter, class Largest, class Visit>
+void visit_blocks(const OccupancyTree& tree, const Ray& ray, double max_t, const Enter& enter, const Largest& largest,
+                  const Visit& visit) {
   visit_spans(
-      tree, ray, max_t, [&](Walk& walk) { walk.leave_block(largest(walk.voxel())); }, visit);
+      tree, ray, max_t,
+      [&](Walk& walk) {
+        enter(walk.voxel());
+        walk.leave_block(largest);
+      },
+      visit);
 }
 
 }  // namespace quoin::trace

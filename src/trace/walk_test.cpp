@@ -57,8 +57,9 @@ class WalkOfBlocks : public ::testing::Test {
 
   std::vector<VoxelSpan> blocks(const OccupancyTree& tree, const Ray& ray, double max_t, double largest = 64.0) {
     std::vector<VoxelSpan> spans;
-    const auto any = [&](IVec3 /*voxel*/) { return largest; };
-    trace::visit_blocks(tree, ray, max_t, any, [&](const VoxelSpan& span) {
+    const auto no_matter = [](IVec3 /*voxel*/) {};
+    const auto any = [&] { return largest; };
+    trace::visit_blocks(tree, ray, max_t, no_matter, any, [&](const VoxelSpan& span) {
       spans.push_back(span);
       return true;
     });

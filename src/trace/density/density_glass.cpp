@@ -235,11 +235,9 @@ void visit_glass(const DensityGlass& glass, const Ray& ray, double max_t, Functi
                  FunctionRef<bool(const GlassSpan&)> visit) {
   CellReader reader(glass);
   BodiesInCell cell;
-  const auto largest_at = [&](IVec3 at) {
-    reader.read(at, cell);
-    return cell.is_full() ? largest(cell.transparent[0]) : 1.0;
-  };
-  trace::visit_blocks(glass.cells(), ray, max_t, largest_at, [&](const trace::WalkSpan& span) {
+  const auto enter = [&](IVec3 at) { reader.read(at, cell); };
+  const auto largest_here = [&] { return cell.is_full() ? largest(cell.transparent[0]) : 1.0; };
+  trace::visit_blocks(glass.cells(), ray, max_t, enter, largest_here, [&](const trace::WalkSpan& span) {
     const double t_exit = std::min(span.t_exit, max_t);
     if (!(t_exit > span.t_enter)) return true;  // an edge that it only touches
     if (!cell.is_full()) return visit_cell(cell, ray, span, t_exit, visit);
