@@ -166,6 +166,9 @@ inline void load_four(const float* base, const std::int32_t (&at)[kWidth], F& a,
     d.v[i] = base[at[i] + 3];
   }
 }
+inline I gather(const std::uint32_t* base, I at) {
+  return each_word([&](int i) { return base[at.v[i]]; });
+}
 inline F load(const float* from) {
   return each<F>([&](int i) { return from[i]; });
 }

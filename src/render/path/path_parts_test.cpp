@@ -10,8 +10,9 @@
 
 #include "render/path/atmosphere.h"
 #include "render/path/environment_light.h"
-#include "render/path/light_tree.h"
-#include "render/path/path_lamps.h"
+#include "render/path/lamps/lamp_memory.h"
+#include "render/path/lamps/light_tree.h"
+#include "render/path/lamps/path_lamps.h"
 #include "render/path/path_math.h"
 #include "render/path/path_random.h"
 #include "render/path/scatter.h"
@@ -227,6 +228,61 @@ double irradiance_by_lambert(const PathLamp& lamp, DVec3 point, DVec3 normal) {
   return std::abs(sum) * 0.5 * static_cast<double>(lamp.radiance.x);
 }
 
+// A row of lamps along x that shine down.
+std::vector<LampBounds> row_of_lamps(int count) {
+  std::vector<LampBounds> lamps(static_cast<std::size_t>(count));
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    LampBounds& lamp = lamps[i];
+    lamp.low = {static_cast<float>(i) - static_cast<float>(count) * 0.5F, 6.0F, 0.0F};
+    lamp.high = lamp.low + Vec3(0.5F, 0.0F, 0.5F);
+    lamp.axis = {0.0F, -1.0F, 0.0F};
+    lamp.power = 1.0F;
+  }
+  return lamps;
+}
+
+TEST(PathLampMemory, LeadsAwayFromLampsBehindWalls) {
+  const std::vector<LampBounds> lamps = row_of_lamps(16);
+  const LightTree tree(lamps);
+  const Vec3 point(0.0F);
+  const Vec3 up(0.0F, 1.0F, 0.0F);
+  LampMemory memory;
+  const std::int32_t place = memory.place_of(0, {3, 0, -5}, Direction::PosY);
+  ASSERT_GT(place, 0);
+  EXPECT_EQ(memory.place_of(0, {7, 7, -8}, Direction::PosY), place);
+  EXPECT_NE(memory.place_of(0, {8, 0, -5}, Direction::PosY), place);
+  EXPECT_NE(memory.place_of(0, {3, 0, -5}, Direction::NegY), place);
+  EXPECT_NE(memory.place_of(1, {3, 0, -5}, Direction::PosY), place);
+  const auto chance = [&](std::size_t lamp) {
+    return tree.probability(static_cast<std::uint32_t>(lamp), point, up, memory.table(place));
+  };
+  const float before = chance(0);
+  EXPECT_EQ(before, tree.probability(0, point, up));
+  // All of the second half stand behind a wall.
+  for (int sample = 0; sample < 400; ++sample) {
+    const auto lamp = static_cast<std::int32_t>(static_cast<std::size_t>(sample) % lamps.size());
+    memory.note(tree, place, lamp, 1.0F, 2 * static_cast<std::size_t>(lamp) >= lamps.size());
+    EXPECT_EQ(chance(0), before) << "what is noted counts later";
+  }
+  memory.learn();
+  float seen = 0.0F;
+  float hidden = 0.0F;
+  for (std::size_t i = 0; i < lamps.size(); ++i) (2 * i < lamps.size() ? seen : hidden) += chance(i);
+  EXPECT_NEAR(seen + hidden, 1.0F, 1e-4F);
+  EXPECT_GT(hidden, 0.0F);
+  EXPECT_LT(hidden, 0.25F);
+  EXPECT_EQ(tree.probability(0, point, up, memory.table(0)), before) << "of other places nothing is known";
+}
+
+TEST(PathLampMemory, ForgetsPlacesBeyondItsRoom) {
+  LampMemory memory;
+  std::int32_t last = 0;
+  for (int i = 0; i < 5000; ++i) last = memory.place_of(0, {8 * i, 0, 0}, Direction::PosX);
+  EXPECT_EQ(last, 0);
+  EXPECT_EQ(memory.place_of(0, {8, 0, 0}, Direction::PosX), 2);
+  EXPECT_EQ(memory.table(last)[0], 1.0F);
+}
+
 TEST(PathLamps, GiveTheIrradianceOfLambertsFormula) {
   for (const double height : {0.5, 3.0, 40.0}) {
     const PathLamp lamp = square_lamp({-1.0, height, -0.5}, 2.0F);
@@ -236,10 +292,11 @@ TEST(PathLamps, GiveTheIrradianceOfLambertsFormula) {
     constexpr std::uint32_t kSamples = 1U << 14;
     for (std::uint32_t i = 0; i < kSamples; ++i) {
       const Random random(3, i);
-      const LampSample sample = lamps.sample(DVec3(0.2, 0.0, 0.1), up, 0.5F, random.pair(0));
+      const DVec3 point(0.2, 0.0, 0.1);
+      const LightTree::Choice chosen = lamps.tree().choose(Vec3(point - lamps.origin()), up, 0.5F);
+      const LampSample sample = lamps.sample(chosen, point, random.pair(0));
       sum += static_cast<double>(sample.radiance.x * sample.direction.y);
-      EXPECT_NEAR(lamps.density(0, DVec3(0.2, 0.0, 0.1), up, sample.direction, sample.distance) / sample.density, 1.0F,
-                  1e-3F);
+      EXPECT_NEAR(lamps.density(0, point, sample.direction, sample.distance) / sample.density, 1.0F, 1e-3F);
     }
     const double expected = irradiance_by_lambert(lamp, {0.2, 0.0, 0.1}, {0.0, 1.0, 0.0});
     EXPECT_NEAR(sum / kSamples / expected, 1.0, 2e-3) << height;

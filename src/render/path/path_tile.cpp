@@ -94,6 +94,7 @@ bool PathTile::render(const std::function<bool(std::size_t)>& goes_on) {
       trace_requests();
       std::swap(active_, next_);
     }
+    if (light_.lamps != nullptr) memory_.learn();
     for (const Path& path : paths_) {
       PixelSums& sums = sums_[path.pixel];
       (path.is_caught ? sums.lit : sums.scene) += path.radiance;
@@ -302,7 +303,10 @@ void PathTile::add_emitted(Path& path, Vec3 emitted, std::int32_t lamp, float di
   float share = path.is_seen ? 1.0F : static_cast<float>(context_->options->lamp_brightness);
   if (lamp >= 0 && path.density < kNoOther) {
     const DVec3 vertex = path.origin + context_->camera->position;
-    share *= balance(path.density, context_->lamps->density(lamp, vertex, path.normal, path.direction, distance));
+    const PathLamps& lamps = *context_->lamps;
+    const float chance = lamps.tree().probability(static_cast<std::uint32_t>(lamp), Vec3(vertex - lamps.origin()),
+                                                  path.normal, memory_.table(path.place));
+    share *= balance(path.density, lamps.density(lamp, vertex, path.direction, distance) * chance);
   }
   path.radiance += path.throughput * emitted * share;
 }
@@ -375,6 +379,7 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
   }
   vertex.in_grid += normal * kRayLift;
   vertex.normal = glm::normalize(Vec3(placed.world_axes * normal));
+  if (light_.lamps != nullptr) vertex.place = memory_.place_of(vertex.placed, voxel, face);
   vertex.in_view = context_->view->view_from_grid(vertex.placed, vertex.in_grid);
   vertex.material = {surface.colour, surface.roughness, surface.metalness};
   if (!path.is_noted) {
@@ -458,6 +463,7 @@ void PathTile::shade_all() {
   block_.in_air = 0;
   const auto shade_block = [&] {
     block_.lamps.active = (1U << count) - 1U;
+    light_.shares = memory_.tables();
     kernel_->shade(light_, block_);
     for (std::size_t i = 0; i < count; ++i) shade(*of[i], i);
     block_.in_air = 0;
@@ -484,6 +490,7 @@ void PathTile::put_into_block(const Vertex& vertex, std::size_t lane) {
   if (vertex.is_medium) block_.in_air |= 1U << lane;
   if (light_.lamps == nullptr) return;
   put(Vec3(vertex.in_view + context_->camera->position - context_->lamps->origin()), block_.lamps.point, lane);
+  block_.lamps.table[lane] = vertex.place * static_cast<std::int32_t>(LightTree::kTopNodes);
 }
 
 void PathTile::shade(const Vertex& vertex, std::size_t lane) {
@@ -511,6 +518,7 @@ void PathTile::shade(const Vertex& vertex, std::size_t lane) {
   path.density = next.density;
   path.origin = vertex.in_view;
   path.normal = normal;
+  path.place = vertex.place;
   if (next.density < kNoOther) path.is_seen = false;
   path.is_first = false;
   path.inside = kAir;
@@ -534,7 +542,7 @@ void PathTile::ask_sun(const Vertex& vertex, std::size_t lane, const Frame& fram
   if (!light_.has_sun) return;
   const Vec3 direction = get(block_.sun, lane);
   if (vertex.is_matte()) {
-    ask(vertex, direction, kNoOther, get(block_.sun_light, lane), true);
+    (void)ask(vertex, direction, kNoOther, get(block_.sun_light, lane), true);
     return;
   }
   const SkySample sun = context_->sky->sun_sample(direction);
@@ -546,7 +554,7 @@ void PathTile::ask_sun(const Vertex& vertex, std::size_t lane, const Frame& fram
   } else {
     light *= sun.radiance;
   }
-  ask(vertex, sun.direction, kNoOther, light, true);
+  (void)ask(vertex, sun.direction, kNoOther, light, true);
 }
 
 void PathTile::ask_sky(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter) {
@@ -555,34 +563,40 @@ void PathTile::ask_sky(const Vertex& vertex, const Path& path, const Frame& fram
   const Vec3 in = frame.to_local(sky.direction);
   if ((!(in.z > 0.0F) && !vertex.is_medium) || !(sky.density > 0.0F)) return;
   const float share = balance(sky.density, scatter.density(in));
-  ask(vertex, sky.direction, kNoOther, path.throughput * scatter.value(in) * sky.radiance * (share / sky.density),
-      false);
+  (void)ask(vertex, sky.direction, kNoOther, path.throughput * scatter.value(in) * sky.radiance * (share / sky.density),
+            false);
 }
 
 void PathTile::ask_lamp(const Vertex& vertex, std::size_t lane, const Frame& frame, const Scatter& scatter) {
   if (light_.lamps == nullptr) return;
   const LightTree::Choice chosen{block_.lamps.lamp[lane], block_.lamps.probability[lane]};
-  const LampSample lamp = context_->lamps->sample_of(chosen, vertex.in_view + context_->camera->position,
-                                                     {block_.lamp_pair[0][lane], block_.lamp_pair[1][lane]});
+  const LampSample lamp = context_->lamps->sample(chosen, vertex.in_view + context_->camera->position,
+                                                  {block_.lamp_pair[0][lane], block_.lamp_pair[1][lane]});
   if (is_black(lamp.radiance)) return;
   const Vec3 in = frame.to_local(lamp.direction);
   if (!(in.z > 0.0F) && !vertex.is_medium) return;
-  Vec3 light = paths_[vertex.path].throughput * scatter.value(in) * lamp.radiance;
+  const Vec3 value = scatter.value(in);
+  Vec3 light = paths_[vertex.path].throughput * value * lamp.radiance;
   if (lamp.density < kNoOther) light *= balance(lamp.density, scatter.density(in));
   // A little before the lamp, for rounding.
-  ask(vertex, lamp.direction, lamp.distance * (1.0F - 1e-4F), light, false);
+  if (!ask(vertex, lamp.direction, lamp.distance * (1.0F - 1e-4F), light, false)) return;
+  Request& request = requests_.back();
+  request.lamp = chosen.lamp;
+  request.place = vertex.place;
+  request.brightness = luminance(value * lamp.radiance);
 }
 
-void PathTile::ask(const Vertex& vertex, Vec3 direction, float max_t, Vec3 light, bool is_sun) {
-  if (is_black(light)) return;
-  if (ground_at(vertex.in_view, direction) < static_cast<double>(max_t)) return;
+bool PathTile::ask(const Vertex& vertex, Vec3 direction, float max_t, Vec3 light, bool is_sun) {
+  if (is_black(light)) return false;
+  if (ground_at(vertex.in_view, direction) < static_cast<double>(max_t)) return false;
   if (const std::optional<Fog>& fog = context_->options->fog) {
     const Interval way = in_fog(vertex.in_view, direction, static_cast<double>(max_t));
     light *= exponential(static_cast<float>(-fog->density * (way.end - way.begin)));
-    if (is_black(light)) return;
+    if (is_black(light)) return false;
   }
   requests_.push_back(
       {vertex.in_grid, direction, max_t, light, vertex.placed, vertex.path, is_sun ? 0 : bin_of(direction)});
+  return true;
 }
 
 void PathTile::trace_requests() {
@@ -625,7 +639,12 @@ void PathTile::trace_request_packet(std::span<const std::uint32_t> requests) {
   rays_ += static_cast<std::int64_t>(requests.size());
   const std::uint32_t blocked = context_->view->any_hits(home, rays);
   for (std::size_t i = 0; i < requests.size(); ++i) {
-    if ((blocked >> i & 1U) != 0) requests_[requests[i]].light = Vec3(0.0F);
+    Request& request = requests_[requests[i]];
+    const bool is_blocked = (blocked >> i & 1U) != 0;
+    if (request.lamp >= 0) {
+      memory_.note(context_->lamps->tree(), request.place, request.lamp, request.brightness, is_blocked);
+    }
+    if (is_blocked) request.light = Vec3(0.0F);
   }
   rays.active &= ~blocked;
   if (!context_->view->tracer().has_transparent() || rays.active == 0) return;

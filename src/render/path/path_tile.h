@@ -15,7 +15,8 @@
 #include "render/camera_rays.h"
 #include "render/path/denoise.h"
 #include "render/path/kernel/kernel.h"
-#include "render/path/path_lamps.h"
+#include "render/path/lamps/lamp_memory.h"
+#include "render/path/lamps/path_lamps.h"
 #include "render/path/path_random.h"
 #include "render/path/path_request.h"
 #include "render/path/scatter.h"
@@ -78,6 +79,7 @@ class PathTile {
     std::uint16_t scatterings = 0;  // in fog and clouds
     std::uint8_t part = kNoPart;    // of the pixel's surfaces
     VoxelType inside = kAir;        // the glass in which it is
+    std::int32_t place = 0;         // where it was last scattered
     bool is_seen = true;            // by the camera, itself or by glass and mirrors
     bool is_first = true;           // nothing was met yet
     bool is_caught = false;         // the ground only catches shadows where it went
@@ -93,6 +95,7 @@ class PathTile {
     DVec3 in_view{0.0};  // there
     Vec3 normal{0.0F};   // in the world, on the side from which the path comes
     Material material;
+    std::int32_t place = 0;
     bool is_ground = false;
     bool is_medium = false;   // in the air; it has no normal
     float anisotropy = 0.0F;  // of that
@@ -111,6 +114,9 @@ class PathTile {
     std::int32_t home = 0;
     std::uint32_t path = 0;
     std::uint32_t bin = 0;
+    std::int32_t lamp = -1;  // that sends it
+    std::int32_t place = 0;
+    float brightness = 0.0F;  // of what the lamp sends there
   };
   struct Interval {
     double begin = 0.0;
@@ -169,7 +175,8 @@ class PathTile {
   void ask_sun(const Vertex& vertex, std::size_t lane, const Frame& frame, const Scatter& scatter);
   void ask_sky(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter);
   void ask_lamp(const Vertex& vertex, std::size_t lane, const Frame& frame, const Scatter& scatter);
-  void ask(const Vertex& vertex, Vec3 direction, float max_t, Vec3 light, bool is_sun);
+  // False: no light would come from there.
+  bool ask(const Vertex& vertex, Vec3 direction, float max_t, Vec3 light, bool is_sun);
   void trace_requests();
   void trace_request_packet(std::span<const std::uint32_t> requests);
 
@@ -182,6 +189,7 @@ class PathTile {
   const Kernel* kernel_;
   ShadeLight light_;
   ShadeBlock block_;
+  LampMemory memory_;
   std::vector<std::uint32_t> pixels_;  // Random's, of the tile's
   std::vector<Path> paths_;
   std::vector<std::uint32_t> active_, next_;

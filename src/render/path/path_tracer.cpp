@@ -5,7 +5,7 @@
 #include "core/moved_from.h"
 #include "light/surfaces.h"
 #include "render/path/denoise.h"
-#include "render/path/path_lamps.h"
+#include "render/path/lamps/path_lamps.h"
 #include "render/path/path_request.h"
 #include "render/path/path_tile.h"
 #include "render/path/sky_light.h"

@@ -32,6 +32,7 @@ struct alignas(64) LampBranch {
   LampMeasures first;
   LampMeasures second;
   std::int32_t next[2] = {-1, -1};  ///< of each an inner node, or ~lamp
+  std::int32_t top[2] = {0, 0};     ///< of each its place in a table of shares; 0: it has none
 };
 
 /// Points that each ask a tree for a lamp.
@@ -39,6 +40,7 @@ struct alignas(64) LampBlock {
   BlockLanes<float> point[3] = {};   ///< from the tree's origin
   BlockLanes<float> normal[3] = {};  ///< unit; 0 in the air
   BlockLanes<float> u = {};
+  BlockLanes<std::int32_t> table = {};  ///< where in `shares` its table begins
   std::uint32_t active = 0;
   BlockLanes<std::int32_t> lamp = {};  ///< -1: none
   BlockLanes<float> probability = {};
@@ -73,6 +75,8 @@ struct alignas(64) ShadeBlock {
 /// What is the same for all points of a picture.
 struct ShadeLight {
   const LampBranch* lamps = nullptr;  ///< null: there are none
+  /// Tables of what counts of each node; the first entry of each is 1.
+  const float* shares = nullptr;
   bool has_sun = false;
   float to_sun[3] = {0.0F, 1.0F, 0.0F};
   float sun_frame[3][3] = {};  ///< whose third axis that is
@@ -99,7 +103,7 @@ constexpr std::uint32_t kBins = 1 + 6 * 16;
 
 struct Kernel {
   void (*shade)(const ShadeLight& light, ShadeBlock& block);
-  void (*choose_lamps)(const LampBranch* branches, LampBlock& block);
+  void (*choose_lamps)(const LampBranch* branches, const float* shares, LampBlock& block);
   /// Random::pair of one dimension.
   void (*pairs)(const BlockLanes<std::uint32_t>& pixel, std::uint32_t sample, std::uint32_t dimension,
                 BlockLanes<float>& x, BlockLanes<float>& y);

@@ -12,7 +12,7 @@
 #include <quoin/core/hash.h>
 
 #include "core/instruction_sets_for_tests.h"
-#include "render/path/light_tree.h"
+#include "render/path/lamps/light_tree.h"
 #include "render/path/path_math.h"
 #include "render/path/path_random.h"
 #include "render/path/path_tile_parts.h"
@@ -137,6 +137,9 @@ TEST(PathKernel, ChoosesLampsWithTheirChances) {
   Numbers numbers;
   for (const std::size_t count : {1U, 2U, 3U, 200U}) {
     const LightTree tree(some_lamps(numbers, count));
+    std::vector<float> shares(2 * LightTree::kTopNodes, 1.0F);
+    for (std::size_t i = 1; i < LightTree::kTopNodes; ++i)
+      shares[LightTree::kTopNodes + i] = numbers.between(0.05F, 1.0F);
     std::size_t chosen = 0;
     for (int round = 0; round < 60; ++round) {
       LampBlock asked;
@@ -145,6 +148,7 @@ TEST(PathKernel, ChoosesLampsWithTheirChances) {
             i);
         put(i % 4 == 3 ? Vec3(0.0F) : numbers.direction(), asked.normal, i);
         asked.u[i] = numbers.unit();
+        asked.table[i] = i % 2 == 0 ? 0 : static_cast<std::int32_t>(LightTree::kTopNodes);
       }
       asked.active = round == 0 ? 0x5A5AU : 0xFFFFU;
       std::array<std::int32_t, kBlockPoints> first{};
@@ -152,15 +156,16 @@ TEST(PathKernel, ChoosesLampsWithTheirChances) {
         SCOPED_TRACE(name_of(set));
         const InstructionSetOverride over(set);
         LampBlock block = asked;
-        kernel().choose_lamps(tree.branches(), block);
+        kernel().choose_lamps(tree.branches(), shares.data(), block);
         for (std::size_t i = 0; i < kBlockPoints; ++i) {
           if (set == InstructionSet::Plain) first[i] = block.lamp[i];
           ASSERT_EQ(block.lamp[i], first[i]);
           ASSERT_TRUE((asked.active >> i & 1U) != 0 || block.lamp[i] == -1);
           if (block.lamp[i] < 0) continue;
           ++chosen;
-          ASSERT_EQ(block.probability[i], tree.probability(static_cast<std::uint32_t>(block.lamp[i]),
-                                                           get(asked.point, i), get(asked.normal, i)));
+          const float expected = tree.probability(static_cast<std::uint32_t>(block.lamp[i]), get(asked.point, i),
+                                                  get(asked.normal, i), shares.data() + asked.table[i]);
+          ASSERT_EQ(block.probability[i], expected);
         }
       }
     }

@@ -46,12 +46,17 @@ inline F importance_lanes(const Measures& of, const Vector& point, const Vector&
   return select((none < before) & (none < shone), light, none);
 }
 
+inline F share_at(const float* shares, I at) {
+  return as_float(gather(reinterpret_cast<const std::uint32_t*>(shares), at));
+}
+
 struct Chosen {
   I lamp;
   F probability;
 };
 
-inline Chosen choose_lanes(const LampBranch* branches, const Vector& point, const Vector& normal, F u, Mask active) {
+inline Chosen choose_lanes(const LampBranch* branches, const float* shares, I table, const Vector& point,
+                           const Vector& normal, F u, Mask active) {
   constexpr float kBelowOne = 0x1.fffffep-1F;
   static_assert(sizeof(LampBranch) == 128 && sizeof(LampMeasures) == 48);
   const Vector size{abs(normal.x), abs(normal.y), abs(normal.z)};
@@ -63,8 +68,12 @@ inline Chosen choose_lanes(const LampBranch* branches, const Vector& point, cons
   const auto* base = reinterpret_cast<const float*>(branches);
   while (any(active)) {
     store(at, shift_left<5>(node));
-    const F of_first = importance_lanes(measures_at(base, at), point, normal, size, in_air);
-    const F of_second = importance_lanes(measures_at(base + 12, at), point, normal, size, in_air);
+    F next[4];
+    load_four(base + 24, at, next[0], next[1], next[2], next[3]);
+    const F of_first = importance_lanes(measures_at(base, at), point, normal, size, in_air) *
+                       share_at(shares, table + as_int(next[2]));
+    const F of_second = importance_lanes(measures_at(base + 12, at), point, normal, size, in_air) *
+                        share_at(shares, table + as_int(next[3]));
     const F both = of_first + of_second;
     active = active & (all(0.0F) < both);
     const F share = of_first / both;
@@ -72,8 +81,6 @@ inline Chosen choose_lanes(const LampBranch* branches, const Vector& point, cons
     const F rest = all(1.0F) - share;
     u = min(select(is_first, u, u - share) / select(is_first, share, rest), all(kBelowOne));
     probability = probability * select(is_first, share, rest);
-    F next[4];
-    load_four(base + 24, at, next[0], next[1], next[2], next[3]);
     node = select(is_first, as_int(next[0]), as_int(next[1]));
     const Mask is_lamp = node < all(0);
     const Mask ends = active & is_lamp;
@@ -85,15 +92,17 @@ inline Chosen choose_lanes(const LampBranch* branches, const Vector& point, cons
   return chosen;
 }
 
-inline void choose(const LampBranch* branches, LampBlock& block, std::size_t at, const Vector& normal, F u) {
-  const Chosen chosen = choose_lanes(branches, load(block.point, at), normal, u, mask_of(block.active >> at));
+inline void choose(const LampBranch* branches, const float* shares, LampBlock& block, std::size_t at,
+                   const Vector& normal, F u) {
+  const Chosen chosen = choose_lanes(branches, shares, lanes::load(block.table + at), load(block.point, at), normal, u,
+                                     mask_of(block.active >> at));
   lanes::store(block.lamp + at, chosen.lamp);
   lanes::store(block.probability + at, chosen.probability);
 }
 
-void choose_lamps(const LampBranch* branches, LampBlock& block) {
+void choose_lamps(const LampBranch* branches, const float* shares, LampBlock& block) {
   for (std::size_t at = 0; at < kBlockPoints; at += kWidth) {
-    choose(branches, block, at, load(block.normal, at), lanes::load(block.u + at));
+    choose(branches, shares, block, at, load(block.normal, at), lanes::load(block.u + at));
   }
 }
 
@@ -152,7 +161,7 @@ inline void shade_lamps(const ShadeLight& light, ShadeBlock& block, std::size_t 
   lanes::store(block.lamp_pair[1] + at, u.y);
   const Mask in_air = mask_of(block.in_air >> at);
   const F none = all(0.0F);
-  choose(light.lamps, block.lamps, at, select(in_air, Vector{none, none, none}, normal),
+  choose(light.lamps, light.shares, block.lamps, at, select(in_air, Vector{none, none, none}, normal),
          numbers.one(dimension + word(dimension::kLampChoice)));
 }
 

@@ -1,4 +1,4 @@
-// Lamps of a picture by paths: render/path/path_lamps.h and light_tree.h on the processor's side.
+// Lamps of a picture by paths: render/path/lamps/path_lamps.h and light_tree.h on the processor's side.
 
 struct LampSample {
   vec3 direction;

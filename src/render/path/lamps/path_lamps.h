@@ -14,7 +14,7 @@
 #include "light/emissive_chunks.h"
 #include "light/lamp_table.h"
 #include "light/surfaces.h"
-#include "render/path/light_tree.h"
+#include "render/path/lamps/light_tree.h"
 #include "render/path/path_math.h"
 #include "scene/tracer/placed_grid.h"
 
@@ -51,16 +51,13 @@ class PathLamps {
 
   [[nodiscard]] bool empty() const { return lamps_.empty(); }
   [[nodiscard]] std::size_t size() const { return lamps_.size(); }
-  /// A lamp and a point of it. `point`, `normal`: in the world; a normal of 0 is of a point in the air, which light
-  /// reaches from everywhere. `choice`: 0 to less than 1.
-  [[nodiscard]] LampSample sample(DVec3 point, Vec3 normal, float choice, Pair u) const;
-  /// The same in two steps, the first of which kernels take for many points at once: a lamp out of `tree`, whose points
-  /// are from `origin`, and a point of it.
+  /// Lamps are chosen out of `tree`, whose points are from `origin`.
   [[nodiscard]] const LightTree& tree() const { return tree_; }
   [[nodiscard]] DVec3 origin() const { return origin_; }  ///< in the world
-  [[nodiscard]] LampSample sample_of(LightTree::Choice chosen, DVec3 point, Pair u) const;
-  /// With which `sample` finds the point of that lamp that lies in `direction` at `distance`.
-  [[nodiscard]] float density(std::int32_t lamp, DVec3 point, Vec3 normal, Vec3 direction, float distance) const;
+  /// A point of a lamp that was chosen, as it is seen from `point`, in the world.
+  [[nodiscard]] LampSample sample(LightTree::Choice chosen, DVec3 point, Pair u) const;
+  /// With which `sample` finds the point of that lamp, once it is chosen, that lies in `direction` at `distance`.
+  [[nodiscard]] float density(std::int32_t lamp, DVec3 point, Vec3 direction, float distance) const;
 
   /// Notes that a unit face of a placed grid's voxel is part of a lamp.
   void add_face(std::int32_t placed, IVec3 voxel, Direction face, std::int32_t lamp);

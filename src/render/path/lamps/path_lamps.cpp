@@ -1,4 +1,4 @@
-#include "render/path/path_lamps.h"
+#include "render/path/lamps/path_lamps.h"
 
 #include <bit>
 #include <limits>
@@ -166,11 +166,7 @@ PathLamps::PathLamps(std::vector<PathLamp> lamps, DVec3 origin) : origin_(origin
   tree_ = LightTree(bounds);
 }
 
-LampSample PathLamps::sample(DVec3 point, Vec3 normal, float choice, Pair u) const {
-  return sample_of(tree_.choose(Vec3(point - origin_), normal, choice), point, u);
-}
-
-LampSample PathLamps::sample_of(LightTree::Choice chosen, DVec3 point, Pair u) const {
+LampSample PathLamps::sample(LightTree::Choice chosen, DVec3 point, Pair u) const {
   if (chosen.lamp < 0 || !(chosen.probability > 0.0F)) return {};
   const PathLamp& lamp = lamps_[static_cast<std::size_t>(chosen.lamp)];
   LampSample sample = lamp.is_point ? sample_point_lamp(lamp, point) : sample_rectangle(lamp, point, u);
@@ -179,11 +175,10 @@ LampSample PathLamps::sample_of(LightTree::Choice chosen, DVec3 point, Pair u) c
   return sample;
 }
 
-float PathLamps::density(std::int32_t lamp, DVec3 point, Vec3 normal, Vec3 direction, float distance) const {
+float PathLamps::density(std::int32_t lamp, DVec3 point, Vec3 direction, float distance) const {
   QUOIN_ASSERT(lamp >= 0 && static_cast<std::size_t>(lamp) < lamps_.size(), "one of these lamps");
   const PathLamp& of = lamps_[static_cast<std::size_t>(lamp)];
-  const float here = density_of(of, seen_from(of, point), direction, distance);
-  return here > 0.0F ? here * tree_.probability(static_cast<std::uint32_t>(lamp), Vec3(point - origin_), normal) : 0.0F;
+  return density_of(of, seen_from(of, point), direction, distance);
 }
 
 std::size_t PathLamps::hash_of_face(std::int32_t placed, IVec3 voxel, Direction face) {

@@ -37,10 +37,32 @@ class LightTree {
     std::int32_t lamp = -1;  ///< none
     float probability = 0.0F;
   };
-  /// Requires: 0 <= u < 1; `normal` is unit. Cost: O(log(lamps)).
-  [[nodiscard]] Choice choose(Vec3 point, Vec3 normal, float u) const;
+  /// Nodes of the upper levels are numbered: the root is 0, the children of node i are 2 i + 1 and 2 i + 2.
+  static constexpr int kTopLevels = 6;
+  static constexpr std::size_t kTopNodes = (std::size_t{1} << (kTopLevels + 1)) - 1;
+  /// Shares of 1 of all of these.
+  [[nodiscard]] static const float* whole_shares();
+
+  /// `shares`: what counts of each of the upper nodes. Requires: 0 <= u < 1; `normal` is unit. Cost: O(log(lamps)).
+  [[nodiscard]] Choice choose(Vec3 point, Vec3 normal, float u, const float* shares = whole_shares()) const;
   /// With which `choose` finds that lamp.
-  [[nodiscard]] float probability(std::uint32_t lamp, Vec3 point, Vec3 normal) const;
+  [[nodiscard]] float probability(std::uint32_t lamp, Vec3 point, Vec3 normal,
+                                  const float* shares = whole_shares()) const;
+
+  /// Calls `visit(number)` for the upper nodes that a lamp is below of, and itself.
+  template <class Visit>
+  void for_each_top_node(std::uint32_t lamp, Visit&& visit) const {
+    std::uint64_t way = ways_[lamp];
+    std::size_t number = 0;
+    visit(number);
+    std::int32_t at = 0;
+    for (int level = 0; level < kTopLevels && at >= 0; ++level, way >>= 1) {
+      const auto side = static_cast<std::size_t>(way & 1U);
+      number = 2 * number + 1 + side;
+      visit(number);
+      at = branches_[static_cast<std::size_t>(at)].next[side];
+    }
+  }
 
   struct Node {
     LampBounds bounds;

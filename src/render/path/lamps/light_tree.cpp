@@ -1,4 +1,4 @@
-#include "render/path/light_tree.h"
+#include "render/path/lamps/light_tree.h"
 
 #include <algorithm>
 #include <array>
@@ -176,15 +176,24 @@ void LightTree::set_branches() {
   std::int32_t inner = 0;
   for (std::size_t i = 0; i < nodes_.size(); ++i) number[i] = nodes_[i].lamp >= 0 ? ~nodes_[i].lamp : inner++;
   if (nodes_.size() == 1) {
-    branches_.push_back({measures_of(nodes_[0].bounds), {}, {number[0], number[0]}});
+    branches_.push_back({measures_of(nodes_[0].bounds), {}, {number[0], number[0]}, {1, 2}});
     return;
   }
+  std::vector<std::size_t> top(nodes_.size(), kTopNodes);  // of nodes that have a number
+  top[0] = 0;
   branches_.reserve(static_cast<std::size_t>(inner));
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     if (nodes_[i].lamp >= 0) continue;
     const auto second = static_cast<std::size_t>(nodes_[i].second);
-    branches_.push_back(
-        {measures_of(nodes_[i + 1].bounds), measures_of(nodes_[second].bounds), {number[i + 1], number[second]}});
+    LampBranch& branch = branches_.emplace_back(LampBranch{measures_of(nodes_[i + 1].bounds),
+                                                           measures_of(nodes_[second].bounds),
+                                                           {number[i + 1], number[second]},
+                                                           {0, 0}});
+    if (2 * top[i] + 2 >= kTopNodes) continue;
+    top[i + 1] = 2 * top[i] + 1;
+    top[second] = 2 * top[i] + 2;
+    branch.top[0] = static_cast<std::int32_t>(top[i + 1]);
+    branch.top[1] = static_cast<std::int32_t>(top[second]);
   }
 }
 
@@ -216,24 +225,29 @@ float LightTree::importance(const LampMeasures& of, Vec3 point, Vec3 normal) {
   return of.power * std::min(before, distance) * std::min(shone, distance) / (distance2 * distance2);
 }
 
-LightTree::Choice LightTree::choose(Vec3 point, Vec3 normal, float u) const {
+const float* LightTree::whole_shares() {
+  static const std::vector<float> shares(kTopNodes, 1.0F);
+  return shares.data();
+}
+
+LightTree::Choice LightTree::choose(Vec3 point, Vec3 normal, float u, const float* shares) const {
   if (branches_.empty()) return {};
   LampBlock block;
   for (int i = 0; i < 3; ++i) block.point[i][0] = point[i], block.normal[i][0] = normal[i];
   block.u[0] = u;
   block.active = 1;
-  kernel().choose_lamps(branches_.data(), block);
+  kernel().choose_lamps(branches_.data(), shares, block);
   return {block.lamp[0], block.probability[0]};
 }
 
-float LightTree::probability(std::uint32_t lamp, Vec3 point, Vec3 normal) const {
+float LightTree::probability(std::uint32_t lamp, Vec3 point, Vec3 normal, const float* shares) const {
   QUOIN_ASSERT(lamp < ways_.size(), "a lamp of the tree");
   std::int32_t at = 0;
   float probability = 1.0F;
   for (std::uint64_t way = ways_[lamp]; at >= 0; way >>= 1) {
     const LampBranch& branch = branches_[static_cast<std::size_t>(at)];
-    const float of_first = importance(branch.first, point, normal);
-    const float of_second = importance(branch.second, point, normal);
+    const float of_first = importance(branch.first, point, normal) * shares[branch.top[0]];
+    const float of_second = importance(branch.second, point, normal) * shares[branch.top[1]];
     const float both = of_first + of_second;
     if (!(both > 0.0F)) return 0.0F;
     const float share = of_first / both;
