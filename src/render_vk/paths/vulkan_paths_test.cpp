@@ -163,10 +163,39 @@ TEST_F(VulkanPaths, GoThroughClouds) {
 }
 
 TEST_F(VulkanPaths, TakeOutTheProcessorsNoise) {
-  PathOptions options = small(8);
+  PathOptions options = small();
   options.denoise = true;
   options.fog = Fog{.density = 0.01, .colour = Vec3(1.0F), .anisotropy = 0.0, .top = 4.0};
   expect_same_light(town(), of_town(), options, "denoised");
+}
+
+// From the fifth sample on the processor's paths remember which lamps reach a place.
+TEST_F(VulkanPaths, ConvergeToWhatTheProcessorShows) {
+  const PathOptions options = small(48);
+  const Scene scene = town();
+  const PathPicture device = drawn(scene, of_town(), options);
+  const auto cpu = PathTracer(scene).render(of_town(), options);
+  ASSERT_TRUE(cpu);
+  EXPECT_NEAR(path_differences(device, *cpu).light, 1.0, 0.005);
+  constexpr int kBlock = 8;
+  double sum = 0.0;
+  int blocks = 0;
+  for (int y = 0; y < options.height; y += kBlock) {
+    for (int x = 0; x < options.width; x += kBlock) {
+      DVec3 of_device(0.0);
+      DVec3 of_cpu(0.0);
+      for (int i = 0; i < kBlock * kBlock; ++i) {
+        const auto at = static_cast<std::size_t>((y + i / kBlock) * options.width + x + i % kBlock);
+        of_device += DVec3(device.radiance[at]);
+        of_cpu += DVec3(cpu->radiance[at]);
+      }
+      const double apart = glm::length(of_device - of_cpu) / glm::length(of_cpu);
+      EXPECT_LT(apart, 0.15) << x << ' ' << y;
+      sum += apart * apart;
+      ++blocks;
+    }
+  }
+  EXPECT_LT(std::sqrt(sum / blocks), 0.03);
 }
 
 // Fields, one of them without materials, which is white; by night, since its shader takes a minute to compile, glass of
