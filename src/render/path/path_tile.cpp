@@ -352,7 +352,7 @@ void PathTile::note_part(Path& path, const Vertex& vertex, std::uint32_t surface
 void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane) {
   Path& path = paths_[index];
   const auto i = static_cast<std::size_t>(lane);
-  Vertex vertex;
+  Vertex& vertex = vertices_.emplace_back();  // filled in where it stays
   vertex.path = index;
   vertex.placed = hits.placed[i];
   const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(vertex.placed)];
@@ -375,6 +375,7 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
   if ((hits.grids.starts_inside >> lane & 1U) != 0) {  // from inside: its own colour, unlit
     path.radiance += path.throughput * (path.is_seen ? surface.colour : surface.emitted);
     if (path.is_first && path.is_first_sample) sums_[path.pixel].depth = 0.0F;
+    vertices_.pop_back();
     return;
   }
   vertex.in_grid += normal * kRayLift;
@@ -392,7 +393,6 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
     const std::int32_t lamp = in_field ? -1 : context_->lamps->lamp_of(vertex.placed, voxel, face);
     add_emitted(path, surface.emitted, lamp, static_cast<float>(hits.grids.t[i]));
   }
-  vertices_.push_back(vertex);
 }
 
 void PathTile::hit_ground(std::uint32_t index, double t) {
@@ -437,7 +437,7 @@ Scatter PathTile::scatter_at(const Vertex& vertex, const Path& path, const Frame
   return {vertex.material, glm::normalize(out)};
 }
 
-bool PathTile::goes_on(Path& path, bool in_medium) const {
+bool PathTile::survives(Path& path, bool in_medium) const {
   if (in_medium) ++path.scatterings;
   const bool is_sure = in_medium ? path.scatterings <= kSureBounces : path.bounces < kSureBounces;
   if (!is_sure) {
@@ -496,12 +496,32 @@ void PathTile::put_into_block(const Vertex& vertex, std::size_t lane) {
 void PathTile::shade(const Vertex& vertex, std::size_t lane) {
   Path& path = paths_[vertex.path];
   const Vec3 normal = vertex.is_medium ? vertex.normal : get(block_.normal, lane);
-  const Frame frame(vertex.is_medium ? path.direction : normal);
-  const Scatter scatter = scatter_at(vertex, path, frame);
-  ask_sun(vertex, lane, frame, scatter);
-  ask_sky(vertex, path, frame, scatter);
-  ask_lamp(vertex, lane, frame, scatter);
-  const Scattered next = scattered(vertex, lane, frame, scatter);
+  Scattered next;
+  if (vertex.is_matte()) {
+    if (light_.has_sun) (void)ask(vertex, get(block_.sun, lane), kNoOther, get(block_.sun_light, lane), true);
+    if (light_.lamps != nullptr || context_->sky->has_uneven_sky()) {
+      const Frame frame(normal);
+      const Scatter scatter = scatter_at(vertex, path, frame);
+      ask_sky(vertex, path, frame, scatter);
+      ask_lamp(vertex, lane, frame, scatter);
+    }
+    const float density = block_.next_density[lane];
+    next = {get(block_.next, lane), density > 0.0F ? vertex.material.colour : Vec3(0.0F), density};
+  } else {
+    const Frame frame(vertex.is_medium ? path.direction : normal);
+    const Scatter scatter = scatter_at(vertex, path, frame);
+    ask_sun(vertex, lane, frame, scatter);
+    ask_sky(vertex, path, frame, scatter);
+    ask_lamp(vertex, lane, frame, scatter);
+    next = scatter.sample({block_.pair[0][lane], block_.pair[1][lane]},
+                          path.random.one(path.dimension + dimension::kLobe));
+    if (!is_black(next.weight)) next.direction = glm::normalize(frame.to_world(next.direction));
+  }
+  go_on(vertex, lane, normal, next);
+}
+
+void PathTile::go_on(const Vertex& vertex, std::size_t lane, Vec3 normal, const Scattered& next) {
+  Path& path = paths_[vertex.path];
   if (path.is_caught && path.bounces == 0) {
     const SkyLight& sky = *context_->sky;
     const float cosine = std::max(block_.sun[1][lane], 0.0F);
@@ -511,7 +531,7 @@ void PathTile::shade(const Vertex& vertex, std::size_t lane) {
   }
   if (is_black(next.weight)) return;
   path.throughput *= next.weight;
-  if (!goes_on(path, vertex.is_medium)) return;
+  if (!survives(path, vertex.is_medium)) return;
   path.dimension += kDimensions;
   path.direction = next.direction;
   path.bin = static_cast<std::uint8_t>(vertex.is_matte() ? block_.next_bin[lane] : bin_of(next.direction));
@@ -525,27 +545,9 @@ void PathTile::shade(const Vertex& vertex, std::size_t lane) {
   next_.push_back(vertex.path);
 }
 
-Scattered PathTile::scattered(const Vertex& vertex, std::size_t lane, const Frame& frame,
-                              const Scatter& scatter) const {
-  if (vertex.is_matte()) {
-    const float density = block_.next_density[lane];
-    return {get(block_.next, lane), density > 0.0F ? vertex.material.colour : Vec3(0.0F), density};
-  }
-  const Path& path = paths_[vertex.path];
-  Scattered next =
-      scatter.sample({block_.pair[0][lane], block_.pair[1][lane]}, path.random.one(path.dimension + dimension::kLobe));
-  if (!is_black(next.weight)) next.direction = glm::normalize(frame.to_world(next.direction));
-  return next;
-}
-
 void PathTile::ask_sun(const Vertex& vertex, std::size_t lane, const Frame& frame, const Scatter& scatter) {
   if (!light_.has_sun) return;
-  const Vec3 direction = get(block_.sun, lane);
-  if (vertex.is_matte()) {
-    (void)ask(vertex, direction, kNoOther, get(block_.sun_light, lane), true);
-    return;
-  }
-  const SkySample sun = context_->sky->sun_sample(direction);
+  const SkySample sun = context_->sky->sun_sample(get(block_.sun, lane));
   const Vec3 in = frame.to_local(sun.direction);
   if (!(in.z > 0.0F) && !vertex.is_medium) return;
   Vec3 light = paths_[vertex.path].throughput * scatter.value(in);
@@ -594,8 +596,14 @@ bool PathTile::ask(const Vertex& vertex, Vec3 direction, float max_t, Vec3 light
     light *= exponential(static_cast<float>(-fog->density * (way.end - way.begin)));
     if (is_black(light)) return false;
   }
-  requests_.push_back(
-      {vertex.in_grid, direction, max_t, light, vertex.placed, vertex.path, is_sun ? 0 : bin_of(direction)});
+  Request& request = requests_.emplace_back();
+  request.origin = vertex.in_grid;
+  request.direction = direction;
+  request.max_t = max_t;
+  request.light = light;
+  request.home = vertex.placed;
+  request.path = vertex.path;
+  request.bin = is_sun ? 0 : bin_of(direction);
   return true;
 }
 

@@ -166,12 +166,11 @@ class PathTile {
   void put_into_block(const Vertex& vertex, std::size_t lane);
   // Once the kernel knows of `block_` what it does.
   void shade(const Vertex& vertex, std::size_t lane);
-  // Where a path goes that is scattered: into a direction of the world.
-  [[nodiscard]] Scattered scattered(const Vertex& vertex, std::size_t lane, const Frame& frame,
-                                    const Scatter& scatter) const;
+  // Sends a path on that is scattered, into a direction of the world.
+  void go_on(const Vertex& vertex, std::size_t lane, Vec3 normal, const Scattered& next);
   [[nodiscard]] Scatter scatter_at(const Vertex& vertex, const Path& path, const Frame& frame) const;
   // Counts the scattering that comes now, and by chance ends the path. Returns whether it goes on.
-  [[nodiscard]] bool goes_on(Path& path, bool in_medium) const;
+  [[nodiscard]] bool survives(Path& path, bool in_medium) const;
   void ask_sun(const Vertex& vertex, std::size_t lane, const Frame& frame, const Scatter& scatter);
   void ask_sky(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter);
   void ask_lamp(const Vertex& vertex, std::size_t lane, const Frame& frame, const Scatter& scatter);
