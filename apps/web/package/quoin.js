@@ -224,8 +224,19 @@ class Instance {
 
 const isBytes = (given) => given instanceof ArrayBuffer || ArrayBuffer.isView(given);
 
-/** The WebAssembly.Module of `given`: its bytes, or where they are. */
+/** The WebAssembly.Module of `given`: its bytes, or where they are. Errors: QuoinError. */
 async function compile(given) {
+  try {
+    return await compiled(given);
+  } catch (error) {
+    if (error instanceof QuoinError) throw error;
+    // A module that is none is told of as a file that is none; all else is that it cannot be had.
+    const code = error instanceof WebAssembly.CompileError ? 'bad_format' : 'cannot_read';
+    throw new QuoinError(code, `the WebAssembly module${isBytes(given) ? '' : ` ${given}`}: ${error.message}`);
+  }
+}
+
+async function compiled(given) {
   if (isBytes(given)) return WebAssembly.compile(given);
   if (String(given).startsWith('file:')) {
     const { readFile } = await import('node:fs/promises');
@@ -525,7 +536,10 @@ function three(list, what) {
 function doubles(list) {
   if (typeof list?.length !== 'number') throw new QuoinError('invalid_argument', 'rays are lists of numbers');
   if (list.length >= 2 ** 28) throw new QuoinError('out_of_memory', `no memory for ${list.length} numbers of rays`);
-  return Float64Array.from(list, Number);
+  return Float64Array.from(list, (number) => {
+    if (typeof number !== 'number') throw new QuoinError('invalid_argument', 'rays are lists of numbers');
+    return number;
+  });
 }
 
 export async function load(bytes, options = {}) {

@@ -6,7 +6,7 @@ import { pathToFileURL } from 'node:url';
 import { check, found, refusing } from './checks.mjs';
 
 const [packageFolder, goodFile] = process.argv.slice(2);
-const { load, surfaceNets, QuoinError, version } = await import(pathToFileURL(join(packageFolder, 'quoin.js')));
+const { load, start, surfaceNets, QuoinError, version } = await import(pathToFileURL(join(packageFolder, 'quoin.js')));
 const good = new Uint8Array(readFileSync(goodFile));
 const before = (await load(good)).glb();
 const refuses = refusing(QuoinError);
@@ -24,6 +24,9 @@ async function survives(what, bytes) {
 let seed = 12345;
 const random = () => (seed = (Math.imul(seed, 1664525) + 1013904223) >>> 0) / 2 ** 32;
 
+await refuses('a module that is none', () => start(new Uint8Array(8)), 'bad_format');
+await refuses('a module that is nowhere', () => start('file:///nowhere/quoin.wasm'), 'cannot_read');
+await refuses('a module of no address', () => start('quoin://nowhere'), 'cannot_read');
 await refuses('nothing', () => load(new Uint8Array(0)));
 await refuses('a string', () => load('castle.vox'), 'invalid_argument');
 await refuses('noise', () => load(Uint8Array.from({ length: 4096 }, () => 256 * random())));
@@ -112,6 +115,8 @@ await refuses('half a voxel', () => scene.read(0, [0, 0, 0], [0.5, 2, 1]), 'inva
 // More than the module can address; nobody touches these bytes.
 for (const bytes of [2 ** 31, 2 ** 32 + 64])
   await refuses(`a file of ${bytes} bytes`, () => load(new ArrayBuffer(bytes)), 'out_of_memory');
+for (const rays of ['abc', ['0', '0', '0'], [0, 0, undefined]])
+  await refuses(`rays of ${rays}`, () => scene.rays(rays, [0, 0, 1]), 'invalid_argument');
 await refuses('more rays than memory', () => scene.rays({ length: 3 * 2 ** 33 }, { length: 3 * 2 ** 33 }),
               'out_of_memory');
 check(picture().equals(pictureBefore), 'after what was refused the picture is another one');
