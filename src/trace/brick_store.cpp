@@ -8,20 +8,26 @@ namespace quoin::trace {
 namespace {
 
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
-constexpr std::size_t kLineWords = 8;
+constexpr unsigned kLineWords = 8;
 
 // Where the first word of a slab stands.
 std::size_t place_of(std::size_t slab) {
   return 4 * (slab >> 2) + 16 * (slab & 3);
 }
 
-// How many words from `begin` on are alike and all empty or all full, without the first of them, in lines.
-template <class Iterator>
-int lines_alike(Iterator begin, Iterator end) {
-  const std::uint64_t word = *begin;
+// Lines, of at most `most`, whose words are all as the one that follows them, empty or full: from the first place on, or
+// from the last one back.
+int lines_alike(const Node& words, bool is_from_last, int most) {
+  const auto word_at = [&](unsigned i) {
+    const unsigned place = is_from_last ? 63 - i : i;
+    return words[(place & 3) + 4 * (place >> 4) + 16 * (place >> 2 & 3)];
+  };
+  const std::uint64_t word = word_at(0);
   if (word != 0 && word != kAll) return 0;
-  const auto other = std::find_if(begin, end, [word](std::uint64_t each) { return each != word; });
-  return static_cast<int>((other - begin - 1) / static_cast<std::ptrdiff_t>(kLineWords));
+  const unsigned end = kLineWords * static_cast<unsigned>(most);
+  unsigned alike = 1;
+  while (alike <= end && word_at(alike) == word) ++alike;
+  return static_cast<int>((alike - 1) / kLineWords);
 }
 
 }  // namespace
@@ -58,17 +64,26 @@ std::uint32_t BrickStore::allocate(int lines) {
   return static_cast<std::uint32_t>(lines_.size() - wanted);
 }
 
-BrickCode BrickStore::add(const Node& words) {
-  std::array<std::uint64_t, 64> placed;
-  for (std::size_t slab = 0; slab < 16; ++slab) std::copy_n(&words[4 * slab], 4, &placed[place_of(slab)]);
-  const int before = std::min(lines_alike(placed.begin(), placed.end()), 4);
-  const int after = std::min(lines_alike(placed.rbegin(), placed.rend()), 3);
+BrickCode BrickStore::put(BrickCode brick, const Node& words) {
+  const int before = lines_alike(words, false, 4);
+  const int after = lines_alike(words, true, 3);
   BrickRun run;
   run.shift = before > after ? -before : after;
-  run.first = allocate(run.count());
-  const std::uint64_t* from = placed.data() + kLineWords * static_cast<std::size_t>(std::max(-run.shift, 0));
-  std::copy_n(from, kLineWords * static_cast<std::size_t>(run.count()), lines_[run.first].data());
-  ++count_;
+  const BrickRun old = BrickRun::of(brick);
+  if (brick > kFullBrick && old.count() == run.count()) {
+    run.first = old.first;
+  } else {
+    release(brick);
+    run.first = allocate(run.count());
+    ++count_;
+  }
+  std::uint64_t* const own = lines_[run.first].data();
+  const std::size_t skipped = kLineWords * static_cast<std::size_t>(std::max(-run.shift, 0));
+  const std::size_t end = skipped + kLineWords * static_cast<std::size_t>(run.count());
+  for (std::size_t slab = 0; slab < 16; ++slab) {
+    const std::size_t place = place_of(slab);
+    if (place >= skipped && place < end) std::copy_n(&words[4 * slab], 4, own + (place - skipped));
+  }
   return run.code();
 }
 
@@ -99,8 +114,7 @@ BrickCode BrickStore::put_slab(BrickCode brick, std::size_t slab, std::span<cons
   }
   Node all = this->words(brick).node();
   std::copy(words.begin(), words.end(), all.begin() + static_cast<std::ptrdiff_t>(4 * slab));
-  release(brick);
-  return add(all);
+  return put(brick, all);
 }
 
 void BrickStore::finish_build() {

@@ -33,7 +33,7 @@ class BrickStore {
  public:
   BrickStore();
 
-  /// As BrickWords takes them, until a brick is added or put.
+  /// As BrickWords takes them, until a brick is put.
   [[nodiscard]] const BrickLine* middle() const { return lines_.data() + kBrickLines / 2; }
   [[nodiscard]] BrickWords words(BrickCode brick) const { return {middle(), brick}; }
   [[nodiscard]] bool is_full(BrickCode brick) const;
@@ -42,8 +42,8 @@ class BrickStore {
   [[nodiscard]] std::size_t line_count() const { return lines_.size(); }
   [[nodiscard]] std::size_t bytes() const { return lines_.capacity() * sizeof(BrickLine); }
 
-  /// A brick with these words, of cells x + 4 y + 16 z. Requires: neither all empty nor all full.
-  [[nodiscard]] BrickCode add(const Node& words);
+  /// A brick with these words, of cells x + 4 y + 16 z, in place of `brick`. Requires: neither all empty nor all full.
+  [[nodiscard]] BrickCode put(BrickCode brick, const Node& words);
   /// Takes one back, if it is neither the empty nor the full one.
   void release(BrickCode brick);
   /// A brick with these words in one of its sixteen slabs, cells 4 `slab` and on, in place of `brick`. It may be full

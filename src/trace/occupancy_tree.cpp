@@ -200,24 +200,22 @@ struct OccupancyTree::Impl {
   // Puts the words of one brick in place; returns whether they are others than before.
   bool set_brick(ChunkNode& node, std::size_t brick, const Node& words) {
     if (bricks.words(node.bricks[brick]).node() == words) return false;
-    replace_brick(node, brick, words);
+    std::uint64_t cells = 0;
+    for (std::size_t i = 0; i < 64; ++i) cells |= std::uint64_t{words[i] != 0} << i;
+    replace_brick(node, brick, words, cells);
     return true;
   }
 
-  void replace_brick(ChunkNode& node, std::size_t brick, const Node& words) {
-    std::uint64_t cells = 0;
-    bool is_full = true;
-    for (std::size_t i = 0; i < 64; ++i) {
-      cells |= std::uint64_t{words[i] != 0} << i;
-      is_full &= words[i] == kAll;
-    }
+  // `cells` says which of the words are not 0.
+  void replace_brick(ChunkNode& node, std::size_t brick, const Node& words, std::uint64_t cells) {
+    const bool is_full =
+        cells == kAll && std::all_of(words.begin(), words.end(), [](auto word) { return word == kAll; });
     if (cells == 0 || is_full) {
       set_uniform(node, brick, is_full);
       return;
     }
     node.cells[brick] = cells;
-    bricks.release(node.bricks[brick]);
-    node.bricks[brick] = bricks.add(words);
+    node.bricks[brick] = bricks.put(node.bricks[brick], words);
   }
 
   bool set_uniform(ChunkNode& node, std::size_t brick, bool is_full) {
@@ -230,20 +228,19 @@ struct OccupancyTree::Impl {
     return true;
   }
 
+  // Which of a brick's cells are not empty, when one slab's are these.
+  static std::uint64_t with_slab(std::uint64_t cells, std::size_t slab, std::span<const std::uint64_t, 4> words) {
+    cells &= ~(std::uint64_t{15} << (4 * slab));
+    for (std::size_t i = 0; i < 4; ++i) cells |= std::uint64_t{words[i] != 0} << (4 * slab + i);
+    return cells;
+  }
+
   // Puts the words of one slab in place in a brick, four of its 64; returns whether they are others than before.
   bool set_slab(ChunkNode& node, std::size_t brick, std::size_t slab, std::span<const std::uint64_t, 4> words) {
     trace::BrickCode& code = node.bricks[brick];
-    const std::size_t first = 4 * slab;
-    const trace::BrickWords before = bricks.words(code);
-    bool is_same = true;
-    std::uint64_t cells = node.cells[brick] & ~(std::uint64_t{15} << first);
-    for (std::size_t i = 0; i < 4; ++i) {
-      is_same &= before[first + i] == words[i];
-      cells |= std::uint64_t{words[i] != 0} << (first + i);
-    }
-    if (is_same) return false;
+    if (bricks.words(code).has_four(4 * slab, words.data())) return false;
     code = bricks.put_slab(code, slab, words);
-    node.cells[brick] = cells;
+    const std::uint64_t cells = node.cells[brick] = with_slab(node.cells[brick], slab, words);
     const bool is_full = cells == kAll && bricks.is_full(code);
     if (cells == 0 || is_full) set_uniform(node, brick, is_full);
     return true;
@@ -298,22 +295,29 @@ struct OccupancyTree::Impl {
   std::uint64_t fill_row(ChunkNode& node, const Rows& rows, int row, std::uint32_t slabs, trace::RowsBox& box) {
     const std::size_t first = 4 * static_cast<std::size_t>(row);
     std::array<Node, 4> four;
+    std::array<std::uint64_t, 4> cells;
     std::array<bool, 4> is_other{};
-    for (std::size_t x = 0; x < 4; ++x) four[x] = bricks.words(node.bricks[first + x]).node();
     trace::SlabRows words;
     for (; slabs != 0; slabs &= slabs - 1) {
       const int slab = std::countr_zero(slabs);
       trace::read_cells(rows, (row & 3) * 16 + 4 * (slab & 3), (row >> 2) * 16 + 4 * (slab >> 2), words, box);
-      for (std::size_t i = 0; i < 16; ++i) {
-        std::uint64_t& word = four[i / 4][i % 4 + 4 * static_cast<std::size_t>(slab)];
-        is_other[i / 4] |= word != words[i];
-        word = words[i];
+      for (std::size_t x = 0; x < 4; ++x) {
+        const std::span<const std::uint64_t, 4> now(&words[4 * x], 4);
+        if (!is_other[x]) {
+          const trace::BrickWords before = bricks.words(node.bricks[first + x]);
+          if (before.has_four(4 * static_cast<std::size_t>(slab), now.data())) continue;
+          before.read(four[x]);
+          cells[x] = node.cells[first + x];
+          is_other[x] = true;
+        }
+        std::copy_n(now.begin(), 4, &four[x][4 * static_cast<std::size_t>(slab)]);
+        cells[x] = with_slab(cells[x], static_cast<std::size_t>(slab), now);
       }
     }
     std::uint64_t changed = 0;
     for (std::size_t x = 0; x < 4; ++x) {
       if (!is_other[x]) continue;
-      replace_brick(node, first + x, four[x]);
+      replace_brick(node, first + x, four[x], cells[x]);
       changed |= std::uint64_t{1} << (first + x);
     }
     return changed;

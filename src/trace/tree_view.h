@@ -22,6 +22,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 #include <quoin/core/assert.h>
 #include <quoin/trace/occupancy_tree.h>
@@ -82,18 +83,32 @@ class BrickWords {
   BrickWords(const BrickLine* middle, BrickCode code)
       : words_(middle->data() + std::size_t{code >> 4} * 8), places_(kBrickPlaces[code >> 1 & 7U].data()) {}
   const std::uint64_t& operator[](std::size_t cell) const { return words_[places_[cell]]; }
+  /// Whether four of them, from a cell with x = 0 on, are these.
+  [[nodiscard]] bool has_four(std::size_t cell, const std::uint64_t* four) const {
+    const std::uint64_t* const own = words_ + places_[cell];
+    const std::size_t step = is_kept(cell) ? 1 : 0;
+    return ((own[0] ^ four[0]) | (own[step] ^ four[1]) | (own[2 * step] ^ four[2]) | (own[3 * step] ^ four[3])) == 0;
+  }
+  void read(Node& all) const {
+    for (std::size_t cell = 0; cell < 64; cell += 4) {
+      const std::uint64_t* const own = words_ + places_[cell];
+      if (is_kept(cell)) {
+        std::memcpy(&all[cell], own, 4 * sizeof *own);
+      } else {
+        all[cell] = all[cell + 1] = all[cell + 2] = all[cell + 3] = *own;
+      }
+    }
+  }
   [[nodiscard]] Node node() const {
     Node all;
-    for (std::size_t cell = 0; cell < 64; cell += 4) {
-      // Four that lie side by side, or of which none is kept.
-      const std::uint64_t* const from = words_ + places_[cell];
-      const bool is_kept = places_[cell] != places_[cell + 1];
-      for (std::size_t i = 0; i < 4; ++i) all[cell + i] = from[is_kept ? i : 0];
-    }
+    read(all);
     return all;
   }
 
  private:
+  // Four cells lie side by side, or none of them is kept.
+  [[nodiscard]] bool is_kept(std::size_t cell) const { return places_[cell] != places_[cell + 1]; }
+
   const std::uint64_t* words_;
   const std::int8_t* places_;
 };
