@@ -106,7 +106,7 @@ std::uint64_t bricks_of(const trace::TreeNodes& nodes, IVec3 chunk) {
   const trace::ChunkNode* node = nodes.find_chunk(chunk);
   std::uint64_t held = 0;
   for (std::size_t brick = 0; node != nullptr && brick < 64; ++brick) {
-    held |= static_cast<std::uint64_t>(node->bricks[brick] != 0) << brick;
+    held |= static_cast<std::uint64_t>(node->bricks[brick] != trace::kEmptyBrick) << brick;
   }
   return held;
 }

@@ -11,6 +11,7 @@
 
 #include "core/coordinates/chunk_boxes.h"
 #include "core/coordinates/chunk_order.h"
+#include "trace/brick_store.h"
 #include "trace/cell_rows.h"
 #include "trace/chunk_rows.h"
 #include "trace/tree_view.h"
@@ -23,10 +24,10 @@ using trace::ChunkBricks, trace::ChunkNode, trace::Node, trace::RegionNode;
 // Two tables over the box of chunks around everything: what kernels of many rays read instead of regions and chunk
 // nodes, since an address is then a sum of products.
 struct FlatTables {
-  IVec3 origin{0};                    // the voxel at the least corner
-  IVec3 chunks{0};                    // size
-  std::vector<std::uint32_t> cells;   // a bit a cell of 4^3 voxels; one empty cell around everything
-  std::vector<std::uint32_t> bricks;  // indices into `bricks()`, x first, then y, then z
+  IVec3 origin{0};                       // the voxel at the least corner
+  IVec3 chunks{0};                       // size
+  std::vector<std::uint32_t> cells;      // a bit a cell of 4^3 voxels; one empty cell around everything
+  std::vector<trace::BrickCode> bricks;  // x first, then y, then z
 
   // Cells from one to the next along x, y, z; cell (0, 0, 0) is bit x + y + z of these.
   [[nodiscard]] IVec3 cell_strides() const { return {1, 16 * chunks.x + 2, (16 * chunks.x + 2) * (16 * chunks.y + 2)}; }
@@ -42,6 +43,8 @@ std::size_t place_in(IVec3 strides, IVec3 unit) {
 
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr int kRegionShift = 4;  // chunks, per axis
+// Of a row of four bricks more slabs than these are put together.
+constexpr int kFewSlabs = 2;
 // Flat tables up to this size are made however sparse the world is.
 constexpr std::int64_t kSmallTables = std::int64_t{1} << 20;
 
@@ -59,12 +62,6 @@ unsigned bit_of(IVec3 unit) {
 // A chunk and those below it, some of whose cells end in it.
 constexpr std::array<IVec3, 8> kBelow = {IVec3{0, 0, 0}, {-1, 0, 0},  {0, -1, 0},  {-1, -1, 0},
                                          {0, 0, -1},     {-1, 0, -1}, {0, -1, -1}, {-1, -1, -1}};
-
-// Where the next element would make it grow, an eighth more than there is: twice as much would be half of it for long.
-template <class T>
-void make_room(std::vector<T>& all) {
-  if (all.size() == all.capacity()) all.reserve(all.size() + std::max<std::size_t>(all.size() / 8, 64));
-}
 
 struct SlabsOfChunk {
   IVec3 chunk{0};
@@ -107,14 +104,14 @@ std::vector<IVec3> cells_of(const std::vector<IVec3>& chunks) {
   return cells;
 }
 
-trace::TreeView make_view(const FlatTables& tables, const trace::FlatChunk* chunks, const Node* bricks,
+trace::TreeView make_view(const FlatTables& tables, const trace::FlatChunk* chunks, const trace::BrickLine* lines,
                           const IBox& bounds) {
   trace::TreeView view{};
   view.cells = tables.cells.data();
   view.bricks = tables.bricks.data();
-  view.nodes = bricks;
+  view.lines = lines;
   view.chunks = chunks;
-  view.words = reinterpret_cast<const std::uint32_t*>(bricks);
+  view.words = reinterpret_cast<const std::uint32_t*>(lines);
   view.last_cell_word = static_cast<std::uint32_t>(tables.cells.size() - 1);
   view.cell_strides = tables.cell_strides();
   view.brick_strides = tables.brick_strides();
@@ -142,10 +139,9 @@ struct OccupancyTree::Impl {
   Occupancy which = Occupancy::NonAir;
   tsl::robin_map<IVec3, std::unique_ptr<RegionNode>, CoordinateHash> regions;
   std::vector<ChunkNode> chunk_nodes = std::vector<ChunkNode>(1);  // 0: none
-  std::vector<Node> bricks = std::vector<Node>(2);                 // 0: empty, 1: full
-  std::vector<trace::UniformBlocks> uniform;                       // of transparent voxels: of each of `chunk_nodes`
+  trace::BrickStore bricks;
+  std::vector<trace::UniformBlocks> uniform;  // of transparent voxels: of each of `chunk_nodes`
   std::vector<std::uint32_t> free_chunks;
-  std::vector<std::uint32_t> free_bricks;
   ChunkBoxes chunk_boxes;  // around the occupied voxels of each chunk, in grid coordinates
   IBox bounds;
   FlatTables flat;  // no chunks: none
@@ -155,24 +151,10 @@ struct OccupancyTree::Impl {
   trace::TreeView view{};
   bool is_built = false;  // until then what is kept may double: finish_build trims it
 
-  Impl() { bricks[1].fill(kAll); }
-
-  std::uint32_t allocate_brick() {
-    QUOIN_ASSERT(free_bricks.size() + 2 <= bricks.size(), "the empty and the full brick are never free");
-    if (!free_bricks.empty()) {
-      const std::uint32_t index = free_bricks.back();
-      free_bricks.pop_back();
-      return index;
-    }
-    if (is_built) make_room(bricks);
-    bricks.emplace_back();
-    return static_cast<std::uint32_t>(bricks.size() - 1);
-  }
-
   void release_bricks(ChunkNode& node) {
-    for (std::uint32_t& brick : node.bricks) {
-      if (brick > 1) free_bricks.push_back(brick);
-      brick = 0;
+    for (trace::BrickCode& brick : node.bricks) {
+      bricks.release(brick);
+      brick = trace::kEmptyBrick;
     }
     node.cells.fill(0);
   }
@@ -202,7 +184,7 @@ struct OccupancyTree::Impl {
     std::uint32_t& index = region->nodes[table_index(unit)];
     if (index == 0) {
       if (free_chunks.empty()) {
-        if (is_built) make_room(chunk_nodes);
+        if (is_built) trace::make_room(chunk_nodes);
         chunk_nodes.emplace_back();
         index = static_cast<std::uint32_t>(chunk_nodes.size() - 1);
       } else {
@@ -217,49 +199,49 @@ struct OccupancyTree::Impl {
 
   // Puts the words of one brick in place; returns whether they are others than before.
   bool set_brick(ChunkNode& node, std::size_t brick, const Node& words) {
-    std::uint32_t& index = node.bricks[brick];
-    if (bricks[index] == words) return false;
+    if (bricks.words(node.bricks[brick]).node() == words) return false;
     std::uint64_t cells = 0;
-    bool is_full = true;
-    for (std::size_t i = 0; i < 64; ++i) {
-      cells |= std::uint64_t{words[i] != 0} << i;
-      is_full &= words[i] == kAll;
-    }
-    if (cells == 0 || is_full) return set_uniform(node, brick, is_full);
-    node.cells[brick] = cells;
-    if (index <= 1) index = allocate_brick();
-    bricks[index] = words;
+    for (std::size_t i = 0; i < 64; ++i) cells |= std::uint64_t{words[i] != 0} << i;
+    replace_brick(node, brick, words, cells);
     return true;
   }
 
+  // `cells` says which of the words are not 0.
+  void replace_brick(ChunkNode& node, std::size_t brick, const Node& words, std::uint64_t cells) {
+    const bool is_full =
+        cells == kAll && std::all_of(words.begin(), words.end(), [](auto word) { return word == kAll; });
+    if (cells == 0 || is_full) {
+      set_uniform(node, brick, is_full);
+      return;
+    }
+    node.cells[brick] = cells;
+    node.bricks[brick] = bricks.put(node.bricks[brick], words);
+  }
+
   bool set_uniform(ChunkNode& node, std::size_t brick, bool is_full) {
-    std::uint32_t& index = node.bricks[brick];
-    if (index == (is_full ? 1 : 0)) return false;
-    if (index > 1) free_bricks.push_back(index);
-    index = is_full ? 1 : 0;
+    trace::BrickCode& code = node.bricks[brick];
+    const trace::BrickCode wanted = is_full ? trace::kFullBrick : trace::kEmptyBrick;
+    if (code == wanted) return false;
+    bricks.release(code);
+    code = wanted;
     node.cells[brick] = is_full ? kAll : 0;
     return true;
   }
 
+  // Which of a brick's cells are not empty, when one slab's are these.
+  static std::uint64_t with_slab(std::uint64_t cells, std::size_t slab, std::span<const std::uint64_t, 4> words) {
+    cells &= ~(std::uint64_t{15} << (4 * slab));
+    for (std::size_t i = 0; i < 4; ++i) cells |= std::uint64_t{words[i] != 0} << (4 * slab + i);
+    return cells;
+  }
+
   // Puts the words of one slab in place in a brick, four of its 64; returns whether they are others than before.
-  bool set_slab(ChunkNode& node, std::size_t brick, std::size_t slab, const std::uint64_t* words) {
-    std::uint32_t& index = node.bricks[brick];
-    const std::size_t first = 4 * slab;
-    if (std::equal(words, words + 4, bricks[index].begin() + static_cast<std::ptrdiff_t>(first))) return false;
-    if (index <= 1) {
-      const std::uint32_t uniform_brick = index;
-      index = allocate_brick();
-      bricks[index] = bricks[uniform_brick];
-    }
-    Node& own = bricks[index];
-    std::uint64_t cells = node.cells[brick] & ~(std::uint64_t{15} << first);
-    for (std::size_t i = 0; i < 4; ++i) {
-      own[first + i] = words[i];
-      cells |= std::uint64_t{words[i] != 0} << (first + i);
-    }
-    node.cells[brick] = cells;
-    QUOIN_ASSERT(index > 1, "the empty and the full brick are never written");
-    const bool is_full = cells == kAll && std::all_of(own.begin(), own.end(), [](auto word) { return word == kAll; });
+  bool set_slab(ChunkNode& node, std::size_t brick, std::size_t slab, std::span<const std::uint64_t, 4> words) {
+    trace::BrickCode& code = node.bricks[brick];
+    if (bricks.words(code).has_four(4 * slab, words.data())) return false;
+    code = bricks.put_slab(code, slab, words);
+    const std::uint64_t cells = node.cells[brick] = with_slab(node.cells[brick], slab, words);
+    const bool is_full = cells == kAll && bricks.is_full(code);
     if (cells == 0 || is_full) set_uniform(node, brick, is_full);
     return true;
   }
@@ -289,15 +271,54 @@ struct OccupancyTree::Impl {
     for (int row = 0; row < 16; ++row) {
       const int y = (row & 3) * 16;
       const int z = (row >> 2) * 16;
-      for (std::uint32_t slabs = wanted.block(y, z); slabs != 0; slabs &= slabs - 1) {
+      std::uint32_t slabs = wanted.block(y, z);
+      if (std::popcount(slabs) > kFewSlabs) {
+        changed |= fill_row(node, rows, row, slabs, box);
+        continue;
+      }
+      for (; slabs != 0; slabs &= slabs - 1) {
         const int slab = std::countr_zero(slabs);
         trace::read_cells(rows, y + 4 * (slab & 3), z + 4 * (slab >> 2), words, box);
         for (std::size_t x = 0; x < 4; ++x) {
           const std::size_t brick = x + 4 * static_cast<std::size_t>(row);
-          const bool is_other = set_slab(node, brick, static_cast<std::size_t>(slab), &words[4 * x]);
+          const std::span<const std::uint64_t, 4> four(&words[4 * x], 4);
+          const bool is_other = set_slab(node, brick, static_cast<std::size_t>(slab), four);
           changed |= std::uint64_t{is_other} << brick;
         }
       }
+    }
+    return changed;
+  }
+
+  // Some slabs of a row of four bricks, each brick put once.
+  template <class Rows>
+  std::uint64_t fill_row(ChunkNode& node, const Rows& rows, int row, std::uint32_t slabs, trace::RowsBox& box) {
+    const std::size_t first = 4 * static_cast<std::size_t>(row);
+    std::array<Node, 4> four;
+    std::array<std::uint64_t, 4> cells;
+    std::array<bool, 4> is_other{};
+    trace::SlabRows words;
+    for (; slabs != 0; slabs &= slabs - 1) {
+      const int slab = std::countr_zero(slabs);
+      trace::read_cells(rows, (row & 3) * 16 + 4 * (slab & 3), (row >> 2) * 16 + 4 * (slab >> 2), words, box);
+      for (std::size_t x = 0; x < 4; ++x) {
+        const std::span<const std::uint64_t, 4> now(&words[4 * x], 4);
+        if (!is_other[x]) {
+          const trace::BrickWords before = bricks.words(node.bricks[first + x]);
+          if (before.has_four(4 * static_cast<std::size_t>(slab), now.data())) continue;
+          before.read(four[x]);
+          cells[x] = node.cells[first + x];
+          is_other[x] = true;
+        }
+        std::copy_n(now.begin(), 4, &four[x][4 * static_cast<std::size_t>(slab)]);
+        cells[x] = with_slab(cells[x], static_cast<std::size_t>(slab), now);
+      }
+    }
+    std::uint64_t changed = 0;
+    for (std::size_t x = 0; x < 4; ++x) {
+      if (!is_other[x]) continue;
+      replace_brick(node, first + x, four[x], cells[x]);
+      changed |= std::uint64_t{1} << (first + x);
     }
     return changed;
   }
@@ -306,13 +327,14 @@ struct OccupancyTree::Impl {
   [[nodiscard]] IBox box_of(const ChunkNode& node) const {
     trace::RowsBox box;
     for (int i = 0; i < 64; ++i) {
-      const std::uint32_t brick = node.bricks[static_cast<std::size_t>(i)];
+      const trace::BrickCode brick = node.bricks[static_cast<std::size_t>(i)];
       const IVec3 at = 16 * IVec3{i & 3, i >> 2 & 3, i >> 4};
-      if (brick == 0 || box.covers_brick(at)) continue;
+      if (brick == trace::kEmptyBrick || box.covers_brick(at)) continue;
+      const trace::BrickWords words = bricks.words(brick);
       for (std::uint64_t cells = node.cells[static_cast<std::size_t>(i)]; cells != 0; cells &= cells - 1) {
         const int cell = std::countr_zero(cells);
         const IVec3 first = at + 4 * IVec3{cell & 3, cell >> 2 & 3, cell >> 4};
-        if (!box.covers_cell(first)) box.add_cell(first, bricks[brick][static_cast<std::size_t>(cell)]);
+        if (!box.covers_cell(first)) box.add_cell(first, words[static_cast<std::size_t>(cell)]);
       }
     }
     return box.box();
@@ -462,12 +484,12 @@ struct OccupancyTree::Impl {
   [[nodiscard]] bool can_be_flat(const IBox& chunks) const {
     const IVec3 size = chunks.size();
     const std::int64_t cells = (16 * std::int64_t{size.x} + 2) * (16 * std::int64_t{size.y} + 2);
-    const std::size_t used_bytes = (bricks.size() - free_bricks.size()) * sizeof(Node) +
-                                   (chunk_nodes.size() - free_chunks.size()) * sizeof(ChunkNode);
+    const std::size_t used_bytes =
+        bricks.count() * sizeof(Node) + (chunk_nodes.size() - free_chunks.size()) * sizeof(ChunkNode);
     const auto limit = static_cast<double>(std::max(kSmallTables, static_cast<std::int64_t>(used_bytes)));
     const double brick_bytes = 4.0 * 64.0 * size.x * static_cast<double>(size.y) * size.z;
     // Kernels count bits of cells, and halves of words of bricks, in 32 bits.
-    return !chunks.empty() && bricks.size() <= std::size_t{1} << 24 &&
+    return !chunks.empty() && bricks.line_count() <= trace::kMaxBrickLines &&
            bits_of(cells, size.z) / 8 + brick_bytes <= limit && bits_of(cells, size.z) <= 2e9;
   }
   static double bits_of(std::int64_t cells, int chunks_along_z) {
@@ -556,7 +578,7 @@ struct OccupancyTree::Impl {
   void finish(std::span<const ChunkBricks> changed) {
     renew_tables(changed);
     QUOIN_ASSERT(flat_chunks.empty() || flat_nodes.size() == volume(flat_chunks.size()), "tables of their chunks");
-    if (!flat_chunks.empty()) view = make_view(flat, flat_nodes.data(), bricks.data(), bounds);
+    if (!flat_chunks.empty()) view = make_view(flat, flat_nodes.data(), bricks.middle(), bounds);
   }
 
   [[nodiscard]] const trace::TreeView* kernel_view() const { return flat_chunks.empty() ? nullptr : &view; }
@@ -619,24 +641,10 @@ OccupancyTree OccupancyTree::build(const DensityGrid& field, const VoxelRegistry
   return tree;
 }
 
-namespace {
-
-// Leaves a little room where there is much: pages that nothing was written to take no memory, and the first edit then
-// copies nothing.
-template <class T>
-void trim(std::vector<T>& all) {
-  std::vector<T> exact;
-  exact.reserve(all.size() + (all.size() < 4096 ? 0 : all.size() / 64));
-  exact.assign(all.begin(), all.end());
-  all.swap(exact);
-}
-
-}  // namespace
-
 void OccupancyTree::finish_build() {
-  trim(impl_->chunk_nodes);
-  trim(impl_->bricks);
-  trim(impl_->uniform);
+  trace::trim(impl_->chunk_nodes);
+  impl_->bricks.finish_build();
+  trace::trim(impl_->uniform);
   impl_->is_built = true;
   impl_->finish({});
   view_ = impl_->kernel_view();
@@ -696,14 +704,15 @@ bool OccupancyTree::is_occupied(IVec3 voxel) const {
   const IVec3 chunk = (voxel >> kChunkShift) & 15;
   const ChunkNode& node = impl_->chunk_nodes[region->nodes[table_index(chunk)]];
   const IVec3 brick = (voxel >> 4) & 3;
-  const Node& words = impl_->bricks[node.bricks[static_cast<std::size_t>(brick.x + 4 * brick.y + 16 * brick.z)]];
+  const trace::BrickWords words =
+      impl_->bricks.words(node.bricks[static_cast<std::size_t>(brick.x + 4 * brick.y + 16 * brick.z)]);
   const IVec3 unit = voxel & 15;
   return (words[word_of(unit)] >> bit_of(unit) & 1U) != 0;
 }
 
 std::size_t OccupancyTree::bytes() const {
   return sizeof(OccupancyTree) + sizeof(Impl) + impl_->regions.size() * sizeof(RegionNode) +
-         impl_->chunk_nodes.capacity() * sizeof(ChunkNode) + impl_->bricks.capacity() * sizeof(Node) +
+         impl_->chunk_nodes.capacity() * sizeof(ChunkNode) + impl_->bricks.bytes() +
          impl_->uniform.capacity() * sizeof(trace::UniformBlocks) + impl_->chunk_boxes.bytes() +
          impl_->flat_nodes.capacity() * sizeof(trace::FlatChunk) +
          (impl_->flat.cells.capacity() + impl_->flat.bricks.capacity()) * sizeof(std::uint32_t);
@@ -712,7 +721,7 @@ std::size_t OccupancyTree::bytes() const {
 trace::TreeNodes::TreeNodes(const OccupancyTree& tree)
     : tree_((QUOIN_ASSERT(tree.impl_ != nullptr, "a tree that was not moved from"), tree.impl_.get())),
       chunks_(tree_->chunk_nodes.data()),
-      bricks_(tree_->bricks.data()),
+      lines_(tree_->bricks.middle()),
       uniform_(tree_->uniform.data()) {}
 
 const RegionNode* trace::TreeNodes::find_region(IVec3 region) const {

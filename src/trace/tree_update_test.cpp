@@ -53,7 +53,8 @@ void expect_equal(const OccupancyTree& followed, const OccupancyTree& built, Ran
         ASSERT_EQ(own == nullptr, other == nullptr) << x << " " << y << " " << z;
         if (own == nullptr) continue;
         ASSERT_EQ(own->cells, other->cells) << x << " " << y << " " << z;
-        for (std::size_t i = 0; i < 64; ++i) ASSERT_EQ(a.brick(own->bricks[i]), b.brick(other->bricks[i]));
+        for (std::size_t i = 0; i < 64; ++i)
+          ASSERT_EQ(a.brick(own->bricks[i]).node(), b.brick(other->bricks[i]).node());
         if (!has_blocks) continue;
         ASSERT_EQ(a.uniform_blocks(*own).cells, b.uniform_blocks(*other).cells);
         ASSERT_EQ(a.uniform_blocks(*own).bricks, b.uniform_blocks(*other).bricks);

@@ -3,15 +3,26 @@
 // How an occupancy tree lies in memory.
 //
 //   region, 1,024^3 voxels      16^3 chunks                Node: bits; and the index of each ChunkNode
-//     chunk, 64^3                 16^3 cells of 4^3          Node: bits; and the index of each of its 64 bricks
-//       brick, 16^3                 16^3 voxels                Node: bits
+//     chunk, 64^3                 16^3 cells of 4^3          Node: bits; and where each of its 64 bricks lies
+//       brick, 16^3                 16^3 voxels                a run of lines
 //
 // One shape serves all levels: a node is 16^3 units as 64 words, each the bits of 4^3 units (x + 4 y + 16 z). Beside
 // the tree lie flat tables over the box of chunks around everything, so that a kernel finds an address by adding.
+//
+// Of a brick the same 64 words are kept by layers of y (place x + 4 z + 16 y), as land lies, in lines of eight. Where
+// they begin or end with equal words, all empty or all full, up to half of the lines are left out:
+//
+//   place        0  1  2  3  4  5  6  7     lines
+//   kept         .  .  .  A  B  C  D  E     shift -3: places before line A read its first word
+//   kept         A  B  C  D  E  F  .  .     shift  2: places after line F read its last word
+//
+// A place plus the shift, as a number with a sign that saturates, is where in the run its word lies: one instruction
+// for all lanes of a kernel.
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 #include <quoin/core/assert.h>
 #include <quoin/trace/occupancy_tree.h>
@@ -21,10 +32,91 @@ namespace quoin::trace {
 /// Bits of 16^3 units: word [z / 4][y / 4][x / 4], bit x % 4 + 4 (y % 4) + 16 (z % 4).
 using Node = std::array<std::uint64_t, 64>;
 
+/// Eight words of a brick, as they are stored.
+using BrickLine = std::array<std::uint64_t, 8>;
+inline constexpr int kBrickLines = 8;
+
+/// Where a brick of 16^3 voxels lies: 28 bits of a line's number, three of the shift as two's complement, and a 0. So
+/// it is a count of half words, of 32 bits, once its lowest four bits are cleared.
+using BrickCode = std::uint32_t;
+inline constexpr BrickCode kEmptyBrick = 0;
+inline constexpr BrickCode kFullBrick = 16 * kBrickLines;
+/// Lines of all bricks that kernels can count.
+inline constexpr std::size_t kMaxBrickLines = std::size_t{1} << 27;
+
+/// The lines of a brick that are kept.
+struct BrickRun {
+  std::uint32_t first = 0;
+  int shift = 0;  ///< in lines, -4 to 3: less than 0 where the first ones are left out
+
+  static BrickRun of(BrickCode code) {
+    const int shift = static_cast<std::int32_t>(code << 28) >> 29;
+    return {(code >> 4) + static_cast<std::uint32_t>(shift > 0 ? shift : 0), shift};
+  }
+  [[nodiscard]] BrickCode code() const {
+    return (first - static_cast<std::uint32_t>(shift > 0 ? shift : 0)) << 4 | (static_cast<std::uint32_t>(shift) & 7U)
+                                                                                  << 1;
+  }
+  [[nodiscard]] int count() const { return kBrickLines - (shift < 0 ? -shift : shift); }
+};
+
+/// For each shift, by its three bits, where the word of a cell (x + 4 y + 16 z) lies, from the middle of a brick that
+/// has all its lines.
+inline constexpr auto kBrickPlaces = [] {
+  std::array<std::array<std::int8_t, 64>, 8> places{};
+  for (int shift = -4; shift < 4; ++shift) {
+    for (int cell = 0; cell < 64; ++cell) {
+      const int place = (cell & 3) + 4 * (cell >> 4) + 16 * (cell >> 2 & 3) - 32 + 8 * shift;
+      places[static_cast<std::size_t>(shift & 7)][static_cast<std::size_t>(cell)] =
+          static_cast<std::int8_t>(place < -32  ? -32
+                                   : place > 31 ? 31
+                                                : place);
+    }
+  }
+  return places;
+}();
+
+/// The 64 words of a brick, by cells: x + 4 y + 16 z.
+class BrickWords {
+ public:
+  /// `middle` is four lines after the first of all, those of the empty brick.
+  BrickWords(const BrickLine* middle, BrickCode code)
+      : words_(middle->data() + std::size_t{code >> 4} * 8), places_(kBrickPlaces[code >> 1 & 7U].data()) {}
+  const std::uint64_t& operator[](std::size_t cell) const { return words_[places_[cell]]; }
+  /// Whether four of them, from a cell with x = 0 on, are these.
+  [[nodiscard]] bool has_four(std::size_t cell, const std::uint64_t* four) const {
+    const std::uint64_t* const own = words_ + places_[cell];
+    const std::size_t step = is_kept(cell) ? 1 : 0;
+    return ((own[0] ^ four[0]) | (own[step] ^ four[1]) | (own[2 * step] ^ four[2]) | (own[3 * step] ^ four[3])) == 0;
+  }
+  void read(Node& all) const {
+    for (std::size_t cell = 0; cell < 64; cell += 4) {
+      const std::uint64_t* const own = words_ + places_[cell];
+      if (is_kept(cell)) {
+        std::memcpy(&all[cell], own, 4 * sizeof *own);
+      } else {
+        all[cell] = all[cell + 1] = all[cell + 2] = all[cell + 3] = *own;
+      }
+    }
+  }
+  [[nodiscard]] Node node() const {
+    Node all;
+    read(all);
+    return all;
+  }
+
+ private:
+  // Four cells lie side by side, or none of them is kept.
+  [[nodiscard]] bool is_kept(std::size_t cell) const { return places_[cell] != places_[cell + 1]; }
+
+  const std::uint64_t* words_;
+  const std::int8_t* places_;
+};
+
 /// Of 64^3 voxels: which 4^3 cells hold any, and where the bricks of 16^3 voxels lie.
 struct ChunkNode {
-  Node cells{};                            ///< word b: the cells of brick b
-  std::array<std::uint32_t, 64> bricks{};  ///< index of a brick; 0 is empty, 1 is full
+  Node cells{};                        ///< word b: the cells of brick b
+  std::array<BrickCode, 64> bricks{};  ///< kEmptyBrick and kFullBrick are shared by all
 };
 
 /// Of a chunk of transparent voxels: which aligned blocks are full of one type.
@@ -66,12 +158,12 @@ struct TreeView {
   alignas(16) std::int32_t high_voxel[4];
   alignas(16) std::int32_t chunk_strides[4];
   // As everything else reads it.
-  const std::uint32_t* cells;   ///< bits
-  const std::uint32_t* bricks;  ///< indices
-  const std::uint32_t* words;   ///< of bricks: 128 halves each, the lower half of a cell's word first
-  const Node* nodes;            ///< the bricks again
-  const FlatChunk* chunks;      ///< x first, then y, then z
-  DVec3 origin;                 ///< of the tables, in the grid
+  const std::uint32_t* cells;  ///< bits
+  const BrickCode* bricks;
+  const std::uint32_t* words;  ///< halves of the words of `lines`, the lower first
+  const BrickLine* lines;      ///< as BrickWords takes them
+  const FlatChunk* chunks;     ///< x first, then y, then z
+  DVec3 origin;                ///< of the tables, in the grid
   std::uint32_t last_cell_word;
   int first_cell;  ///< bit of the table's cell (0, 0, 0)
   IVec3 cell_strides;
@@ -90,7 +182,7 @@ class TreeNodes {
   /// Null where a chunk is empty. Chunk coordinates are voxel coordinates / 64, rounded down.
   [[nodiscard]] const ChunkNode* find_chunk(IVec3 chunk) const;
   [[nodiscard]] const ChunkNode& chunk(std::uint32_t index) const { return chunks_[index]; }
-  [[nodiscard]] const Node& brick(std::uint32_t index) const { return bricks_[index]; }
+  [[nodiscard]] BrickWords brick(BrickCode code) const { return {lines_, code}; }
   /// Of one of the tree's chunks. Requires: a tree of transparent voxels.
   [[nodiscard]] const UniformBlocks& uniform_blocks(const ChunkNode& chunk) const {
     QUOIN_ASSERT(uniform_ != nullptr && &chunk > chunks_, "a chunk of a tree of transparent voxels");
@@ -100,7 +192,7 @@ class TreeNodes {
  private:
   const OccupancyTree::Impl* tree_;
   const ChunkNode* chunks_;
-  const Node* bricks_;
+  const BrickLine* lines_;
   const UniformBlocks* uniform_;
 };
 

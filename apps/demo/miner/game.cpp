@@ -10,7 +10,6 @@
 #include <glm/gtc/quaternion.hpp>
 
 namespace miner {
-
 namespace {
 
 using quoin::DVec3;
@@ -19,6 +18,8 @@ using quoin::kAir;
 
 constexpr DVec3 kUp{0.0, 1.0, 0.0};
 constexpr std::uint32_t kLand = 1;  // of instances
+const quoin::QueryFilter kOnLand{.categories = kLand};
+constexpr quoin::Rgba8 kTorchColours[]{{255, 170, 60, 255}, {70, 130, 255, 255}, {90, 255, 110, 255}};
 
 quoin::SceneGrid ship_of(quoin::VoxelType hull, quoin::VoxelType light) {
   quoin::SceneGrid ship;
@@ -34,10 +35,9 @@ quoin::SceneGrid ship_of(quoin::VoxelType hull, quoin::VoxelType light) {
 
 quoin::Result<std::unique_ptr<Game>> Game::create(const GameOptions& options) {
   std::unique_ptr<Game> game(new Game(options));
-  if (const auto opened = game->open_world(); !opened) return opened.error();
-  if (const auto made = game->make_land(); !made) return made.error();
-  game->tracer_.emplace(game->scene_);
-  if (const auto made = game->add_ships(); !made) return made.error();
+  for (const auto part : {&Game::open_world, &Game::make_land, &Game::add_ships}) {
+    if (const quoin::Status made = (*game.*part)(); !made) return made.error();
+  }
   game->tracer_->update();
   game->place_player();
   game->known_ = game->land().snapshot();
@@ -56,12 +56,9 @@ quoin::Status Game::open_world() {
   scene_ = std::move(loaded->loaded.scene);
   saver_ = std::move(loaded->saver);
   for (const quoin::GridHandle grid : scene_.grids().handles()) {
-    if (scene_.grids()[grid].name == "land") {
-      land_ = grid;
-    } else {
-      scene_.remove_grid(grid);
-    }
+    if (scene_.grids()[grid].name != "land") scene_.remove_grid(grid);
   }
+  land_ = scene_.grids().handles().front();
   return {};
 }
 
@@ -82,13 +79,8 @@ quoin::Status Game::finish() {
 quoin::Status Game::make_land() {
   const auto types = quoin::add_terrain_types(scene_.types);
   if (!types) return types.error();
-  const std::array<quoin::Rgba8, 3> colours{{{255, 170, 60, 255}, {70, 130, 255, 255}, {90, 255, 110, 255}}};
-  for (std::size_t i = 0; i < colours.size(); ++i) {
-    quoin::VoxelProperties properties;
-    properties.colour = colours[i];
-    properties.collides = false;
-    properties.emission = 1.0F;
-    const auto torch = scene_.types.find_or_add(properties);
+  for (std::size_t i = 0; i < torches_.size(); ++i) {
+    const auto torch = scene_.types.find_or_add({.colour = kTorchColours[i], .collides = false, .emission = 1.0F});
     if (!torch) return torch.error();
     torches_[i] = *torch;
   }
@@ -102,35 +94,23 @@ quoin::Status Game::make_land() {
   auto grid = quoin::generate_terrain(terrain, *types);
   if (!grid) return grid.error();
   size_ = terrain.size * quoin::kTerrainUnit;
-  quoin::SceneGrid land;
-  land.name = "land";
-  land.canvas = {{0, 0, 0}, size_};
-  land.grid = std::move(*grid);
-  land_ = scene_.add_grid(std::move(land));
-  quoin::Instance instance{"land", land_};
-  instance.categories = kLand;
-  scene_.add_instance(instance);
+  land_ = scene_.add_grid({.name = "land", .grid = std::move(*grid), .canvas = {{0, 0, 0}, size_}});
+  scene_.add_instance({.name = "land", .grid = land_, .categories = kLand});
   return {};
 }
 
 quoin::Status Game::add_ships() {
-  for (int kind = 0; kind < 4; ++kind) {
-    const auto shade = static_cast<std::uint8_t>(40 * kind);
-    quoin::VoxelProperties hull;
-    hull.colour = {static_cast<std::uint8_t>(90 + shade), 100, static_cast<std::uint8_t>(200 - shade), 255};
-    const auto type = scene_.types.find_or_add(hull);
-    if (!type) return type.error();
-    const quoin::GridHandle grid = scene_.add_grid(ship_of(*type, torches_[0]));
-    for (int i = kind; i < options_.ships; i += 4) {
-      quoin::Instance ship{"ship", grid};
-      ship.position = {random(20.0, size_.x - 20.0), 0.0, random(20.0, size_.z - 20.0)};
-      ship.position.y = surface_at(int(ship.position.x), int(ship.position.z)) + random(10.0, 30.0);
-      ship.rotation = glm::angleAxis(random(0.0, 6.28), kUp);
-      ship.voxel_size = 0.5;
-      ship.categories = ~kLand;
-      const DVec3 velocity = ship.rotation * DVec3(0.0, random(-0.15, 0.15), 1.0) * random(6.0, 14.0);
-      ships_.push_back({scene_.add_instance(ship), {ship.position, {2.25, 1.0, 4.0}, ship.rotation}, velocity});
-    }
+  tracer_.emplace(scene_);
+  const auto hull = scene_.types.find_or_add({.colour = {130, 100, 160, 255}});
+  if (!hull) return hull.error();
+  const quoin::GridHandle grid = scene_.add_grid(ship_of(*hull, torches_[0]));
+  for (int i = 0; i < options_.ships; ++i) {
+    quoin::Instance ship{.name = "ship", .grid = grid, .voxel_size = 0.5, .categories = ~kLand};
+    ship.position = {random(20.0, size_.x - 20.0), random(10.0, 30.0), random(20.0, size_.z - 20.0)};
+    ship.position.y += surface_at(int(ship.position.x), int(ship.position.z));
+    ship.rotation = glm::angleAxis(random(0.0, 6.28), kUp);
+    const DVec3 velocity = ship.rotation * DVec3(0.0, random(-0.15, 0.15), 1.0) * random(6.0, 14.0);
+    ships_.push_back({scene_.add_instance(ship), {ship.position, {2.25, 1.0, 4.0}, ship.rotation}, velocity});
   }
   return {};
 }
@@ -150,86 +130,65 @@ double Game::random(double low, double high) {
 }
 
 int Game::surface_at(int x, int z) const {
-  quoin::QueryFilter filter;
-  filter.categories = kLand;
-  const auto hit = first_hit(*tracer_, {{x + 0.5, size_.y + 1.0, z + 0.5}, -kUp}, size_.y, filter);
+  const auto hit = first_hit(*tracer_, {{x + 0.5, size_.y + 1.0, z + 0.5}, -kUp}, size_.y, kOnLand);
   return hit ? hit->voxel.y : 0;
 }
 
 FrameTimes Game::step(const Input& input) {
-  using Clock = std::chrono::steady_clock;
-  FrameTimes times{};
-  auto last = Clock::now();
-  const auto done = [&](Part part) {
-    const auto now = Clock::now();
-    times.at(part) = std::chrono::duration<double, std::milli>(now - last).count();
-    times.at(Total) += times.at(part);
-    last = now;
+  FrameTimes times;
+  auto last = std::chrono::steady_clock::now();
+  const auto done = [&](const char* part) {
+    const auto before = std::exchange(last, std::chrono::steady_clock::now());
+    times["frame"] += times[part] = std::chrono::duration<double, std::milli>(last - before).count();
   };
   edit_elsewhere();
-  if (options_.slide_chunks > 0) slide();
   act(input);
-  done(Edits);
-  note_changes();
+  done("edits");
   drop_sand();
-  done(Sand);
+  done("sand");
   tracer_->update();
-  done(Tracer);
+  done("tracer");
   fly();
-  done(Ships);
+  done("ships");
   walk(input);
-  done(Player);
+  done("player");
   if (options_.meshes) meshes_.update(scene_, eye());
   (void)meshes_.take();  // a renderer would upload them
-  done(Meshes);
+  done("meshes");
   light_.update(scene_);
   light_.take();
-  done(Light);
+  done("light");
   if (++frame_ % 300 == 0) save();  // every five seconds
-  done(Saving);
+  done("saving");
   return times;
 }
 
-// Half of them dig, half build.
+// Half of them dig, half build; and a few voxels of sand over each of some chunks.
 void Game::edit_elsewhere() {
-  quoin::Grid& grid = land();
   for (int i = 0; i < options_.edits; ++i) {
-    IVec3 at(int(random(0.0, size_.x)), 0, int(random(0.0, size_.z)));
-    at.y = surface_at(at.x, at.z) + i % 2;
-    grid.set(at, i % 2 == 0 ? kAir : stone_);
+    const int x = int(random(0.0, size_.x)), z = int(random(0.0, size_.z));
+    land().set({x, surface_at(x, z) + i % 2, z}, i % 2 == 0 ? kAir : stone_);
   }
-}
-
-// A few voxels of sand over each of some chunks.
-void Game::slide() {
   std::vector<quoin::PlacedVoxel> voxels;
   const int wide = size_.x / quoin::kChunkEdge;
-  for (int i = 0; i < options_.slide_chunks; ++i) {
-    const int chunk = i % (wide * wide);
-    for (int n = 0; n < 3; ++n) {
-      const int x = chunk % wide * quoin::kChunkEdge + int(random(0.0, 64.0));
-      const int z = chunk / wide * quoin::kChunkEdge + int(random(0.0, 64.0));
-      voxels.push_back({{x, surface_at(x, z) + 4 + 60 * (i / (wide * wide)), z}, sand_});
-    }
+  for (int i = 0; i < 3 * options_.slide_chunks; ++i) {
+    const int chunk = i / 3 % (wide * wide), storey = i / 3 / (wide * wide);
+    const int x = chunk % wide * quoin::kChunkEdge + int(random(0.0, 64.0));
+    const int z = chunk / wide * quoin::kChunkEdge + int(random(0.0, 64.0));
+    voxels.push_back({{x, surface_at(x, z) + 4 + 60 * storey, z}, sand_});
   }
   land().set(voxels);
 }
 
-// What others than the sand changed since the last frame: the sand above and in it is loose.
-void Game::note_changes() {
+void Game::drop_sand() {
   quoin::Grid& grid = land();
-  const quoin::GridChanges changes = grid.changes_since(changes_);
-  if (changes.empty()) return;
-  visit_changes(known_, grid, changes, [&](const quoin::RowChange& row) {
+  // What others than the sand changed since the last frame: the sand above and in it is loose.
+  visit_changes(known_, grid, grid.changes_since(changes_), [&](const quoin::RowChange& row) {
     row.for_each([&](IVec3 voxel, quoin::VoxelType, quoin::VoxelType now) {
       if (now == kAir) loose_.push_back(voxel + IVec3{0, 1, 0});
       if (now == sand_) loose_.push_back(voxel);
     });
   });
-}
-
-void Game::drop_sand() {
-  quoin::Grid& grid = land();
   std::vector<quoin::PlacedVoxel> moves;
   for (const IVec3 voxel : std::exchange(loose_, {})) {
     const IVec3 below = voxel - IVec3{0, 1, 0};
@@ -248,9 +207,7 @@ void Game::drop_sand() {
 void Game::act(const Input& input) {
   gaze_ = quoin::direction_of(glm::degrees(input.yaw), glm::degrees(-input.pitch));
   if (!input.digs && !input.places && input.torch < 0 && !input.slides) return;
-  quoin::QueryFilter filter;
-  filter.categories = kLand;
-  const auto hit = first_hit(*tracer_, {eye(), gaze_}, input.slides ? 60.0 : 8.0, filter);
+  const auto hit = first_hit(*tracer_, {eye(), gaze_}, input.slides ? 60.0 : 8.0, kOnLand);
   if (!hit) return;
   const IVec3 before = quoin::voxel_of(hit->position + 0.5 * hit->normal);
   if (input.digs) land().fill_sphere(hit->position - 0.5 * hit->normal, 2.0, kAir);
@@ -262,10 +219,8 @@ void Game::act(const Input& input) {
 // Off whatever they meet, but for themselves, and off the ends of the world.
 void Game::fly() {
   for (Ship& ship : ships_) {
-    quoin::QueryFilter filter;
-    filter.ignored = {&ship.instance, 1};
     DVec3 way = ship.velocity * kFrame;
-    if (const auto hit = sweep_box(*tracer_, ship.box, way, filter)) {
+    if (const auto hit = sweep_box(*tracer_, ship.box, way, {.ignored = {&ship.instance, 1}})) {
       way *= std::max(0.0, hit->fraction - 0.01);
       ship.velocity -= 2.0 * std::min(glm::dot(ship.velocity, hit->normal), 0.0) * hit->normal;
       if (hit->depth > 0.0) way = hit->normal * std::min(hit->depth, 0.2);
@@ -285,17 +240,14 @@ void Game::fly() {
 
 void Game::walk(const Input& input) {
   // What it stood on may have moved meanwhile.
-  if (moved_.is_on_floor) {
-    const quoin::Instance* now = scene_.instances().find(moved_.floor.instance);
-    if (now != nullptr) player_.centre = carried_point(floor_, *now, player_.centre);
-  }
+  const quoin::Instance* floor = moved_.is_on_floor ? scene_.instances().find(moved_.floor.instance) : nullptr;
+  if (floor != nullptr) player_.centre = carried_point(floor_, *floor, player_.centre);
   falling_ -= kUp * (9.81 * 2.0 * kFrame);
   if (input.jumps && moved_.is_on_floor) falling_ = kUp * 8.0;
   const DVec3 ahead(-std::sin(input.yaw), 0.0, -std::cos(input.yaw));
   const DVec3 way = 5.0 * (input.ahead * ahead + input.aside * glm::cross(ahead, kUp));
-  quoin::SlideOptions on_foot;
-  on_foot.floor = quoin::FloorOptions{kUp, 50.0, 1.05, 0.3};
-  moved_ = move_and_slide(*tracer_, player_, (way + falling_) * kFrame, on_foot);
+  const quoin::FloorOptions on_foot{kUp, 50.0, 1.05, 0.3};
+  moved_ = move_and_slide(*tracer_, player_, (way + falling_) * kFrame, {.floor = on_foot});
   player_.centre = moved_.centre;
   falling_ = kUp * (glm::dot(moved_.displacement, kUp) / kFrame);
   if (moved_.is_on_floor) floor_ = scene_.instances()[moved_.floor.instance];

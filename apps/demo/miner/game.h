@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -32,11 +33,8 @@ struct Input {
   int torch = -1;                                     ///< one of that colour, 0 to 2, onto it; -1: none
 };
 
-/// What a frame took of the caller's thread, in milliseconds, by parts.
-enum Part : std::uint8_t { Total, Edits, Sand, Tracer, Ships, Player, Meshes, Light, Saving };
-inline constexpr std::array kParts = {"frame",  "edits",  "sand",  "tracer", "ships",
-                                      "player", "meshes", "light", "saving"};
-using FrameTimes = std::array<double, kParts.size()>;
+/// What a frame took of the caller's thread, and each part of it, in milliseconds.
+using FrameTimes = std::map<std::string, double>;
 
 /// A landscape of blocks with caves, a player who walks and digs in it, sand that falls, ships, and others' edits.
 class Game {
@@ -78,8 +76,6 @@ class Game {
   [[nodiscard]] quoin::Grid& land() { return scene_.edit(land_).grid; }
   [[nodiscard]] int surface_at(int x, int z) const;
   void edit_elsewhere();
-  void slide();
-  void note_changes();
   void drop_sand();
   void act(const Input& input);
   void fly();

@@ -43,21 +43,22 @@ double resident_bytes() {
   return 4096.0 * resident;
 }
 
-void play(miner::Game& game, int frames, bool paced, bool as_json) {
-  std::array<std::vector<double>, miner::kParts.size()> times;
+quoin::Status play(miner::Game& game, int frames, bool paced, bool as_json) {
+  std::map<std::string, std::vector<double>> times;
   game.meshes().finish(game.scene(), game.eye());
   game.light().finish(game.scene());
   auto next = std::chrono::steady_clock::now();
   for (int frame = -60; frame < frames; ++frame) {
-    const miner::FrameTimes taken = game.step(played(frame));
+    for (const auto& [part, milliseconds] : game.step(played(frame))) {
+      if (frame >= 0) times[part].push_back(milliseconds);
+    }
     next += std::chrono::microseconds(16'667);
     if (paced) std::this_thread::sleep_until(next);
-    for (std::size_t i = 0; frame >= 0 && i < taken.size(); ++i) times.at(i).push_back(taken.at(i));
   }
   const auto solid = double(game.scene().voxel_count());
   nlohmann::ordered_json json{{"frames", frames}, {"solid_voxels", game.scene().voxel_count()}};
-  json["frame_ms"] = percentiles(times.at(miner::Total));
-  for (std::size_t i = 1; i < times.size(); ++i) json["parts_ms"][miner::kParts.at(i)] = percentiles(times.at(i));
+  json["frame_ms"] = percentiles(times.extract("frame").mapped());
+  for (const auto& [part, all] : times) json["parts_ms"][part] = percentiles(all);
   const std::size_t trees = game.tracer().bytes(), light = game.light().shown().bytes();
   json["tree_bytes_a_voxel"] = double(trees) / solid;
   json["light_bytes_a_voxel"] = double(light) / solid;
@@ -67,13 +68,19 @@ void play(miner::Game& game, int frames, bool paced, bool as_json) {
   json["player"] = {game.player().centre.x, game.player().centre.y, game.player().centre.z};
   json["pending"] = game.meshes().pending();
   std::printf("%s\n", as_json ? json.dump(2).c_str() : json["frame_ms"].dump().c_str());
+  return {};
 }
 
 }  // namespace
 
+#ifndef MINER_HAS_WINDOW
+quoin::Status miner::play_in_window(Game&, const std::string&) {
+  return quoin::make_error(quoin::ErrorCode::Unsupported, "built without SDL2: no window; see --frames");
+}
+#endif
+
 int main(int argc, char** argv) {
-  CLI::App app(
-      "A small game on Quoin: walk (WASD, space, mouse), dig and place (buttons), torches (1 to 3), sand (L).");
+  CLI::App app("A small game: walk (WASD, space, mouse), dig and place (buttons), torches (1 to 3), sand (L).");
   miner::GameOptions options;
   int frames = 0;
   bool paced = true, as_json = false;
@@ -83,8 +90,7 @@ int main(int argc, char** argv) {
   app.add_option("--units", options.units, "of 32 voxels: how wide the world is")->check(CLI::Range(4, 128));
   app.add_option("--ships", options.ships, "how many fly about")->check(CLI::Range(0, 10'000));
   app.add_option("--edits", options.edits, "a frame, all over the land")->check(CLI::Range(0, 10'000));
-  app.add_option("--landslides", options.slide_chunks, "chunks in which sand falls a frame")
-      ->check(CLI::Range(0, 10'000));
+  app.add_option("--landslides", options.slide_chunks, "a frame, in chunks")->check(CLI::Range(0, 10'000));
   app.add_option("--world", options.world, "NAME.quoin: keeps the land, what was built, where the player is");
   app.add_option("--seed", options.seed, "of the land");
   app.add_flag("!--unpaced", paced, "without waiting for a sixtieth of a second a frame");
@@ -92,20 +98,10 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   options.meshes = frames > 0;
   const auto game = miner::Game::create(options);
-  quoin::Status ended = game ? quoin::Status{} : game.error();
-  if (game && frames > 0) {
-    play(**game, frames, paced, as_json);
-    ended = (*game)->finish();
-  }
-#ifdef MINER_HAS_WINDOW
-  if (game && frames == 0) {
-    ended = miner::play_in_window(**game, device);
-    if (const auto kept = (*game)->finish(); ended) ended = kept;
-  }
-#else
-  if (game && frames == 0)
-    ended = quoin::make_error(quoin::ErrorCode::Unsupported, "built without SDL2: no window; see --frames");
-#endif
+  quoin::Status ended = !game        ? quoin::Status(game.error())
+                        : frames > 0 ? play(**game, frames, paced, as_json)
+                                     : miner::play_in_window(**game, device);
+  if (const auto kept = game ? (*game)->finish() : quoin::Status{}; ended) ended = kept;
   if (!ended) std::fprintf(stderr, "quoin_miner: %s\n", quoin::to_string(ended.error()).c_str());
   return ended ? 0 : 1;
 }

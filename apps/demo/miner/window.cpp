@@ -12,7 +12,6 @@ namespace miner {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
 using Draw = std::function<quoin::Result<quoin::Picture>(const quoin::Camera&, const quoin::RenderOptions&)>;
 
 // By a graphics card or by the processor.
@@ -27,9 +26,7 @@ quoin::Result<Draw> drawn_by(Game& game, const std::string& name) {
       return processor->render(camera, options);
     });
   }
-  quoin::VulkanOptions with;
-  with.device = name;
-  auto made = quoin::VulkanRenderer::create(with);
+  auto made = quoin::VulkanRenderer::create({.device = name});
   if (!made) return made.error();
   auto card = std::make_shared<quoin::VulkanRenderer>(std::move(*made));
   card->use_light(&game.light().shown());
@@ -39,18 +36,15 @@ quoin::Result<Draw> drawn_by(Game& game, const std::string& name) {
   });
 }
 
-void show(SDL_Renderer* renderer, const quoin::Image& image) {
-  SDL_Texture* texture =
-      SDL_CreateTexture(renderer, SDL_PIXELFORMAT_RGB24, SDL_TEXTUREACCESS_STATIC, image.width, image.height);
-  SDL_UpdateTexture(texture, nullptr, image.rgb.data(), 3 * image.width);
-  SDL_RenderCopy(renderer, texture, nullptr, nullptr);
-  SDL_DestroyTexture(texture);
-  SDL_Rect all{};
-  SDL_RenderGetViewport(renderer, &all);
-  SDL_SetRenderDrawColor(renderer, 255, 255, 255, 255);
-  const SDL_Rect cross{all.w / 2 - 2, all.h / 2 - 2, 5, 5};
-  SDL_RenderFillRect(renderer, &cross);
-  SDL_RenderPresent(renderer);
+void show(SDL_Window* window, quoin::Image& image) {
+  SDL_Surface* const screen = SDL_GetWindowSurface(window);
+  SDL_Surface* const picture = SDL_CreateRGBSurfaceWithFormatFrom(image.rgb.data(), image.width, image.height, 24,
+                                                                  3 * image.width, SDL_PIXELFORMAT_RGB24);
+  SDL_BlitScaled(picture, nullptr, screen, nullptr);
+  SDL_FreeSurface(picture);
+  const SDL_Rect cross{screen->w / 2 - 2, screen->h / 2 - 2, 5, 5};
+  SDL_FillRect(screen, &cross, ~Uint32{0});
+  SDL_UpdateWindowSurface(window);
 }
 
 // What was pressed since the last frame; false: to end.
@@ -82,11 +76,10 @@ bool take_events(Input& input) {
 quoin::Status play_in_window(Game& game, const std::string& device) {
   const auto draw = drawn_by(game, device);
   if (!draw) return draw.error();
-  SDL_Window* window = nullptr;
-  SDL_Renderer* renderer = nullptr;
-  if (SDL_Init(SDL_INIT_VIDEO) != 0 ||
-      SDL_CreateWindowAndRenderer(960, 540, SDL_WINDOW_RESIZABLE, &window, &renderer) != 0)
-    return quoin::make_error(quoin::ErrorCode::Unsupported, SDL_GetError());
+  SDL_Init(SDL_INIT_VIDEO);
+  SDL_Window* const window =
+      SDL_CreateWindow("Miner", SDL_WINDOWPOS_UNDEFINED, SDL_WINDOWPOS_UNDEFINED, 960, 540, SDL_WINDOW_RESIZABLE);
+  if (window == nullptr) return quoin::make_error(quoin::ErrorCode::Unsupported, SDL_GetError());
   SDL_SetRelativeMouseMode(SDL_TRUE);
   quoin::RenderOptions options;
   options.light.model = quoin::LightModel::Propagated;
@@ -104,15 +97,15 @@ quoin::Status play_in_window(Game& game, const std::string& device) {
       input.digs = input.places = input.slides = false;
       input.torch = -1;
     }
-    SDL_GetRendererOutputSize(renderer, &options.width, &options.height);
+    SDL_GetWindowSize(window, &options.width, &options.height);
     options.width = std::max(options.width / coarse, 1);
     options.height = std::max(options.height / coarse, 1);
     const auto began = Clock::now();
-    const auto picture = (*draw)(game.camera(), options);
+    auto picture = (*draw)(game.camera(), options);
     if (!picture) return picture.error();
     const auto took = Clock::now() - began;
     coarse = std::clamp(coarse + int(took > 4 * step) - int(took < step), 1, 8);
-    show(renderer, picture->colour);
+    show(window, picture->colour);
     SDL_SetWindowTitle(window, game.status().c_str());
   }
   SDL_Quit();

@@ -65,9 +65,9 @@ void ImpostorShell::copy_chunk(const OccupancyTree& tree, IVec3 chunk) {
   if (node == nullptr) return;
   const IVec3 first = chunk * kCellsAChunk - floor_of(origin_, 2);
   for (int brick = 0; brick < 64; ++brick) {
-    const std::uint32_t at = node->bricks[static_cast<std::size_t>(brick)];
-    if (at == 0) continue;
-    const trace::Node& words = nodes.brick(at);
+    const trace::BrickCode at = node->bricks[static_cast<std::size_t>(brick)];
+    if (at == trace::kEmptyBrick) continue;
+    const trace::BrickWords words = nodes.brick(at);
     const IVec3 corner = first + IVec3{brick & 3, brick >> 2 & 3, brick >> 4} * kCellsABrick;
     for (int word = 0; word < 64; ++word) {
       const std::uint64_t bits = words[static_cast<std::size_t>(word)];

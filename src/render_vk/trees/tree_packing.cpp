@@ -112,9 +112,9 @@ class RecordWriter {
     bool is_full = root.mask == kAll;
     for (std::size_t i = 0; i < 64; ++i) {
       if (node->cells[i] == 0) continue;
-      is_full &= node->bricks[i] == 1;
+      is_full &= node->bricks[i] == trace::kFullBrick;
       put(at, node->cells[i]);
-      if (node->bricks[i] == 1) {
+      if (node->bricks[i] == trace::kFullBrick) {
         put(at + 2, 1);
       } else {
         put_address(at + 2, record.words.size());
@@ -210,13 +210,12 @@ class RecordWriter {
       if (node.cells[place] == 0) continue;
       const IVec3 first = IVec3{i & 3, i >> 2 & 3, i >> 4} * 16;
       put(at, node.cells[place]);
-      if (node.bricks[place] == 1 && is_plain(first)) {
+      if (node.bricks[place] == trace::kFullBrick && is_plain(first)) {
         put(at + 2, 1);
       } else {
         is_full = false;
         put_address(at + 2, record.words.size());
-        const trace::Node* const words = node.bricks[place] == 1 ? nullptr : &nodes.brick(node.bricks[place]);
-        add_numbered(node.cells[place], words, first,
+        add_numbered(node.cells[place], nodes.brick(node.bricks[place]), first,
                      [&](std::size_t cell, IVec3 word) { return number_of(place, cell, word); });
       }
       at += 4;
@@ -224,11 +223,11 @@ class RecordWriter {
     root.children = bricks * 4 + (is_full ? 1 : 0);
     return root;
   }
-  // The words of a brick's cells (null: all are full), and a number for each.
+  // The words of a brick's cells, and a number for each.
   template <class NumberOf>
-  void add_numbered(std::uint64_t mask, const trace::Node* words, IVec3 first, const NumberOf& number_of) {
+  void add_numbered(std::uint64_t mask, const trace::BrickWords& words, IVec3 first, const NumberOf& number_of) {
     for (std::size_t i = 0; i < 64; ++i) {
-      if ((mask >> i & 1) != 0) add(words == nullptr ? kAll : (*words)[i]);
+      if ((mask >> i & 1) != 0) add(words[i]);
     }
     std::size_t place = record.words.size();
     record.words.resize(place + static_cast<std::size_t>(std::popcount(mask)));
@@ -266,9 +265,9 @@ class RecordWriter {
       }
     }
   }
-  void add_words(const trace::Node& brick) {
-    for (const std::uint64_t word : brick) {
-      if (word != 0) add(word);
+  void add_words(const trace::BrickWords& brick) {
+    for (std::size_t i = 0; i < 64; ++i) {
+      if (brick[i] != 0) add(brick[i]);
     }
   }
 

@@ -35,9 +35,10 @@ class NearbyCells {
       knows_ = true;
       const ChunkNode* const chunk = nodes_.find_chunk(cell >> kChunkShift);
       const auto index = static_cast<std::size_t>((brick.x & 3) + 4 * (brick.y & 3) + 16 * (brick.z & 3));
-      words_ = chunk == nullptr ? nullptr : &nodes_.brick(chunk->bricks[index]);
+      words_.reset();
+      if (chunk != nullptr) words_ = nodes_.brick(chunk->bricks[index]);
     }
-    if (words_ == nullptr) return false;
+    if (!words_) return false;
     const auto word = static_cast<std::size_t>((cell.x >> 2 & 3) + 4 * (cell.y >> 2 & 3) + 16 * (cell.z >> 2 & 3));
     return ((*words_)[word] >> ((cell.x & 3) + 4 * (cell.y & 3) + 16 * (cell.z & 3)) & 1U) != 0;
   }
@@ -46,7 +47,7 @@ class NearbyCells {
   TreeNodes nodes_;
   IVec3 brick_{0};
   bool knows_ = false;
-  const Node* words_ = nullptr;
+  std::optional<BrickWords> words_;
 };
 
 // A ray's way from cell to cell at a field's surface: for processors without the kernels' instructions, and for rays

@@ -49,7 +49,8 @@ constexpr WindowTables make_window_tables() {
   }
   for (int c = 0; c < 2 * kWidth; ++c) {
     for (int axis = 0; axis < 3; ++axis) {
-      tables.spread[axis][c] = (c & 3) << (2 * axis) | (c >> 2 & 3) << (6 + 2 * axis) | (c >> 4) << (12 + axis);
+      const int cell = axis == 0 ? 6 : axis == 1 ? 10 : 8;
+      tables.spread[axis][c] = (c & 3) << (2 * axis) | (c >> 2 & 3) << cell | (c >> 4) << (12 + axis);
     }
   }
   return tables;
@@ -149,7 +150,7 @@ inline I sums(const CrossingWindow& window, int start, I4 step) {
   return sum;
 }
 
-// The eight bricks about a window, times 128.
+// The eight bricks about a window.
 inline I bricks_about(const TreeView& tree, I4 brick) {
   const I4 last = I4{tree.brick_sizes.x, tree.brick_sizes.y, tree.brick_sizes.z, 1} - 1;
   const auto clamped = [last](I4 at) {
@@ -176,8 +177,7 @@ inline Blocked any_in_window(const TreeView& tree, const WindowRay& ray) {
   const I code = sums(window, within[0] | within[1] << 5 | within[2] << 10, ray.forward ? step : -step);
   const I spread_code = from_32(kTables.spread[0], code) | from_32(kTables.spread[1], shift_right<5>(code)) |
                         from_32(kTables.spread[2], shift_right<10>(code));
-  const I half =
-      from_16(bricks_about(tree, brick), shift_right<12>(spread_code)) + (shift_right<5>(spread_code) & all(127));
+  const I half = half_of(from_16(bricks_about(tree, brick), shift_right<12>(spread_code)), shift_left<20>(spread_code));
   const Mask met = test_bit(gather(tree.words, half), spread_code) & window.valid;
   // By sums instead of a branch on whether it met anything, which no processor foresees.
   const auto none_is_sure = static_cast<std::int32_t>(bits(met & window.sure) - 1) >> 31;

@@ -233,10 +233,8 @@ inline std::uint64_t cell_word(const TreeView& tree, const SingleRay& ray, F4 lo
   const I4 brick = cell >> 2;
   const I4 within = cell & 3;
   const int index = brick[0] + brick[1] * tree.brick_strides.y + brick[2] * tree.brick_strides.z;
-  const auto place = static_cast<std::size_t>(within[0] + 4 * within[1] + 16 * within[2]);
-  std::uint64_t word;
-  std::memcpy(&word, tree.words + (std::size_t{tree.bricks[index]} * 64 + place) * 2, sizeof word);
-  return word;
+  return BrickWords(tree.lines,
+                    tree.bricks[index])[static_cast<std::size_t>(within[0] + 4 * within[1] + 16 * within[2])];
 }
 
 inline SingleHit trace_single(const TreeView& tree, const Ray& world_ray, double max_t) {

@@ -43,13 +43,18 @@ inline void split(const double* from, double corner, I& base, F& rest, F& whole)
   whole.v = _mm256_set_m128(w[1], w[0]);
 }
 
+// Bytes with signs.
+inline I add_saturated_bytes(I a, I b) {
+  return {_mm256_adds_epi8(a.v, b.v)};
+}
+
 inline F just_below(F a) {
   const __m256 less = _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_castps_si256(a.v), _mm256_set1_epi32(1)));
   const __m256 is_positive = _mm256_cmp_ps(a.v, _mm256_setzero_ps(), _CMP_GT_OQ);
   return {_mm256_blendv_ps(_mm256_set1_ps(-1e-30F), less, is_positive)};
 }
 
-// The indices of 4^3 bricks.
+// The codes of 4^3 bricks.
 class BrickWindow {
  public:
   BrickWindow(const TreeView& tree, const IVec3& origin) {
@@ -182,6 +187,9 @@ inline Mask test_bit(I a, I at) {
 }
 inline I merge(I which, I a, I b) {
   return {half::merge(which.low, a.low, b.low), half::merge(which.high, a.high, b.high)};
+}
+inline I add_saturated_bytes(I a, I b) {
+  return {half::add_saturated_bytes(a.low, b.low), half::add_saturated_bytes(a.high, b.high)};
 }
 inline I gather(const std::uint32_t* base, I at) {
   return {half::gather(base, at.low), half::gather(base, at.high)};

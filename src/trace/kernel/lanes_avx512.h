@@ -44,6 +44,11 @@ inline F just_below(F a) {
   return {_mm512_castsi512_ps(less)};
 }
 
+// Bytes with signs.
+inline I add_saturated_bytes(I a, I b) {
+  return {_mm512_adds_epi8(a.v, b.v)};
+}
+
 inline float least_of(F a) {
   return _mm512_reduce_min_ps(a.v);
 }
@@ -57,7 +62,7 @@ inline I from_32(const std::int32_t* table, I at) {
 inline F from_16(F table, I at) {
   return {_mm512_permutexvar_ps(at.v, table.v)};
 }
-// The eight brick indices x, y and z further than `corner` or not, times 128.
+// The codes of the eight bricks x, y and z further than `corner` or not.
 inline I eight_of(const std::uint32_t* corner, int x, int y, int z) {
   const __m256i xs = _mm256_setr_epi32(0, -1, 0, -1, 0, -1, 0, -1);
   const __m256i ys = _mm256_setr_epi32(0, 0, -1, -1, 0, 0, -1, -1);
@@ -66,10 +71,10 @@ inline I eight_of(const std::uint32_t* corner, int x, int y, int z) {
       _mm256_and_si256(xs, _mm256_set1_epi32(x)),
       _mm256_add_epi32(_mm256_and_si256(ys, _mm256_set1_epi32(y)), _mm256_and_si256(zs, _mm256_set1_epi32(z))));
   const __m256i bricks = _mm256_i32gather_epi32(reinterpret_cast<const int*>(corner), at, 4);
-  return {_mm512_castsi256_si512(_mm256_slli_epi32(bricks, 7))};
+  return {_mm512_castsi256_si512(bricks)};
 }
 
-// The indices of 4^3 bricks.
+// The codes of 4^3 bricks.
 class BrickWindow {
  public:
   BrickWindow(const TreeView& tree, const IVec3& origin) {

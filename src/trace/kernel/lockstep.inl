@@ -433,12 +433,23 @@ struct Cells {
   I x, y, z;
 };
 
+// Where a brick's run has what stands at a place of it, from TreeView::lines: the place with a sign, from -128 in the
+// highest byte, plus the shift, which saturates there.
+inline I place_in_run(I brick, I place) {
+  return add_saturated_bytes(place + all(std::numeric_limits<std::int32_t>::min()), shift_left<28>(brick));
+}
+// Which half of a word of TreeView::words has the voxel at a place of a brick, whose highest bits are those of the half
+// word, of 128.
+inline I half_of(I brick, I place) {
+  return (brick & all(~15)) + shift_right_signed<25>(place_in_run(brick, place));
+}
+
 inline void read_words(const TreeView& tree, const Cells& cells, Mask which, VoxelWalk& walk) {
   const I brick = shift_right<2>(cells.x) + shift_right<2>(cells.y) * all(tree.brick_strides.y) +
                   shift_right<2>(cells.z) * all(tree.brick_strides.z);
   const I index = gather(tree.bricks, select(which, brick, all(0)));
-  const I cell = (cells.x & all(3)) + shift_left<2>(cells.y & all(3)) + shift_left<4>(cells.z & all(3));
-  const I half = shift_left<7>(index) + shift_left<1>(cell);
+  const I place = shift_left<26>(cells.x & all(3)) + shift_left<28>(cells.z & all(3)) + shift_left<30>(cells.y);
+  const I half = (index & all(~15)) + shift_left<1>(shift_right_signed<26>(place_in_run(index, place)));
   walk.low_half = gather(tree.words, half);
   walk.high_half = gather(tree.words, half + all(1));
 }

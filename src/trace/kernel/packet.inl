@@ -185,8 +185,8 @@ inline void meet(BeamLanes& lanes, F4 voxel, Met& met) {
 }
 
 // Traces the lanes through a brick.
-inline void trace_brick(const Node& words, std::uint64_t cells, BeamLanes& lanes, const BeamPaths& paths, F4 brick,
-                        Met& met) {
+inline void trace_brick(const BrickWords& words, std::uint64_t cells, BeamLanes& lanes, const BeamPaths& paths,
+                        F4 brick, Met& met) {
   const Mirror mirrored(lanes.octant);
   for (; cells != 0; cells &= cells - 1) {
     const int cell = std::countr_zero(cells);
@@ -221,8 +221,8 @@ inline bool trace_chunks(const TreeView& tree, BeamLanes& lanes, const BeamPaths
       const auto at = static_cast<std::size_t>(brick ^ flip_of(lanes.octant));
       const std::uint64_t cells = paths.units<1>(in_brick);
       if (std::popcount(cells) > kWideBeam) return false;
-      trace_brick(tree.nodes[entry.node->bricks[at]], cells & mirrored(&entry.node->cells[at]), lanes, paths, in_brick,
-                  met);
+      const BrickWords words(tree.lines, entry.node->bricks[at]);
+      trace_brick(words, cells & mirrored(&entry.node->cells[at]), lanes, paths, in_brick, met);
       if (!any(lanes.left)) return true;
     }
   }
@@ -379,7 +379,9 @@ inline void trace_first(const TreeView& tree, const RayPacket& rays, PacketHits&
   }
 }
 
-constexpr int kAxisBits = 3 | 3 << 6 | 3 << 12;
+// A place in a window: bits of x, y, z within a cell, then of z above x and y above z, as bricks are stored, then of x,
+// y, z which brick.
+constexpr int kAxisBits[3] = {3 | 3 << 6 | 3 << 12, 3 << 2 | 3 << 10 | 3 << 14, 3 << 4 | 3 << 8 | 3 << 16};
 constexpr int kWindow = 64;
 // In voxels, along any axis; what goes further mostly leaves the window.
 constexpr float kShortReach = 22.0F;
@@ -387,8 +389,12 @@ constexpr float kShortReach = 22.0F;
 // the others.
 constexpr float kShortRatio = 2048.0F;
 
+template <int kAxis>
 inline I spread(I coordinate) {
-  return (coordinate & all(3)) + shift_left<4>(coordinate & all(12)) + shift_left<8>(coordinate & all(48));
+  constexpr int kInCell = 2 * kAxis;
+  constexpr int kCell = kAxis == 0 ? 4 : kAxis == 1 ? 8 : 6;
+  return shift_left<kInCell>(coordinate & all(3)) + shift_left<kCell>(coordinate & all(12)) +
+         shift_left<8 + kInCell>(coordinate & all(48));
 }
 
 // How one axis steps through spread numbers.
@@ -397,10 +403,10 @@ struct SpreadStep {
   I add;
 };
 
-template <int kShift>
+template <int kAxis>
 inline SpreadStep spread_step(const Axis& axis) {
-  return {select(axis.forward, all(~(kAxisBits << kShift)), all(0)),
-          select(axis.forward, all(1 << kShift), all(-(1 << kShift)))};
+  constexpr int kOne = 1 << (2 * kAxis);
+  return {select(axis.forward, all(~kAxisBits[kAxis]), all(0)), select(axis.forward, all(kOne), all(-kOne))};
 }
 
 // Rays where they start, in a window.
@@ -420,14 +426,14 @@ inline int place_window(double position, int bricks) {
 }
 
 // Sets up one axis; returns the lanes that stay within the window along it.
-template <int kShift>
+template <int kAxis>
 inline Mask start_in_window(ShortRays& rays, Axis& axis, F& plane, const double* position, double corner, F direction,
                             int origin) {
   F whole;
   axis = make_axis(position, corner, direction, whole);
   plane = select(axis.still, all(kNever), add_if(axis.forward, whole, all(1.0F)));
   const I at = to_int(whole) + axis.base - all(origin);
-  rays.code = rays.code + shift_left<kShift>(spread(at));
+  rays.code = rays.code + spread<kAxis>(at);
   const F reach = abs(axis.direction) * rays.max_t;
   const I margin = to_int(reach) + all(2);
   const I from = at - margin;
@@ -457,8 +463,8 @@ inline bool set_up_short(const TreeView& tree, const Rays& rays, Mask wanted, co
   const Mask is_negative = test(as_int(out.max_t), all(std::numeric_limits<std::int32_t>::min()));
   const Mask usual = ~is_negative & (all(0.0F) <= out.max_t) & (all(0x1p-20F) <= greatest) & (greatest <= all(0x1p20F));
   const Mask fits = start_in_window<0>(out, lanes.x, out.planes.x, rays.origins[0], tree.origin.x, dx, origin.x) &
-                    start_in_window<2>(out, lanes.y, out.planes.y, rays.origins[1], tree.origin.y, dy, origin.y) &
-                    start_in_window<4>(out, lanes.z, out.planes.z, rays.origins[2], tree.origin.z, dz, origin.z);
+                    start_in_window<1>(out, lanes.y, out.planes.y, rays.origins[1], tree.origin.y, dy, origin.y) &
+                    start_in_window<2>(out, lanes.z, out.planes.z, rays.origins[2], tree.origin.z, dz, origin.z);
   if (any(wanted & ~(usual & fits))) return false;
   out.doubt = all(0.0F);
   out.doubtful = mask_of(0);
@@ -475,8 +481,8 @@ inline Mask walk_short(const TreeView& tree, const IVec3& origin, ShortRays& ray
   const BrickWindow window(tree, origin);
   const Lanes& lanes = rays.lanes;
   const SpreadStep sx = spread_step<0>(lanes.x);
-  const SpreadStep sy = spread_step<2>(lanes.y);
-  const SpreadStep sz = spread_step<4>(lanes.z);
+  const SpreadStep sy = spread_step<1>(lanes.y);
+  const SpreadStep sz = spread_step<2>(lanes.z);
   const Planes one = steps_of(lanes, 1.0F);
   const F sure_t = rays.max_t - rays.doubt;
   const F last_t = rays.max_t + rays.doubt;
@@ -484,7 +490,7 @@ inline Mask walk_short(const TreeView& tree, const IVec3& origin, ShortRays& ray
   Mask hit = mask_of(0);
   Mask unsure = mask_of(0);
   for (;;) {
-    const I half = shift_left<7>(window.brick(shift_right<12>(rays.code))) + (shift_right<5>(rays.code) & all(127));
+    const I half = half_of(window.brick(shift_right<12>(rays.code)), shift_left<20>(rays.code));
     const Mask met = walking & test_bit(gather(tree.words, half), rays.code);
     hit = hit | met;
     rays.doubtful = rays.doubtful | (met & unsure);
@@ -492,7 +498,7 @@ inline Mask walk_short(const TreeView& tree, const IVec3& origin, ShortRays& ray
     Crossing crossing;
     const F now = first_of(crossings(lanes, rays.planes), crossing);
     step_over(crossing, one, rays.planes);
-    const I bits_of_axis = crossed(crossing, all(kAxisBits), all(kAxisBits << 2), all(kAxisBits << 4));
+    const I bits_of_axis = crossed(crossing, all(kAxisBits[0]), all(kAxisBits[1]), all(kAxisBits[2]));
     const I filled = (rays.code & bits_of_axis) | crossed(crossing, sx.fill, sy.fill, sz.fill);
     const I moved = filled + crossed(crossing, sx.add, sy.add, sz.add);
     rays.code = merge(bits_of_axis, moved, rays.code);

@@ -580,7 +580,7 @@ class PathWalk {
     return paths_.cells(chunk_, brick) & mirrored_(&node().cells[static_cast<std::size_t>(brick ^ flip_)]);
   }
   [[nodiscard, gnu::always_inline]] std::uint64_t voxels_of(const Paths::Block& block, int brick, int cell) const {
-    const Node& words = tree_.nodes[node().bricks[static_cast<std::size_t>(brick ^ flip_)]];
+    const BrickWords words(tree_.lines, node().bricks[static_cast<std::size_t>(brick ^ flip_)]);
     return paths_.voxels(block, cell) & mirrored_(&words[static_cast<std::size_t>(cell ^ flip_)]);
   }
 
