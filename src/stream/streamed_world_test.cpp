@@ -44,7 +44,8 @@ class PatternGround final : public ChunkGenerator {
   static Chunk of(IVec3 chunk) {
     if (chunk.y >= 0) return Chunk(kAir);
     Chunk made(1);
-    const auto noise = static_cast<unsigned>(chunk.x * 73'856'093 ^ chunk.y * 19'349'663 ^ chunk.z * 83'492'791);
+    const auto whole = [](int coordinate) { return static_cast<unsigned>(coordinate); };
+    const unsigned noise = whole(chunk.x) * 73'856'093U ^ whole(chunk.y) * 19'349'663U ^ whole(chunk.z) * 83'492'791U;
     made.set({static_cast<int>(noise % 64), static_cast<int>(noise / 64 % 64), static_cast<int>(noise / 4096 % 64)}, 2);
     return made;
   }

@@ -7,7 +7,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "render/path/path_math.h"
+#include "render/path/numbers/path_math.h"
 
 namespace quoin::path {
 namespace {

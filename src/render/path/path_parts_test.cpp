@@ -13,8 +13,8 @@
 #include "render/path/lamps/lamp_memory.h"
 #include "render/path/lamps/light_tree.h"
 #include "render/path/lamps/path_lamps.h"
-#include "render/path/path_math.h"
-#include "render/path/path_random.h"
+#include "render/path/numbers/path_math.h"
+#include "render/path/numbers/path_random.h"
 #include "render/path/scatter.h"
 
 namespace quoin::path {

@@ -8,7 +8,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "render/path/path_math.h"
+#include "render/path/numbers/path_math.h"
 #include "render/picture_request.h"
 
 namespace quoin::path {

@@ -17,7 +17,7 @@
 #include "render/path/kernel/kernel.h"
 #include "render/path/lamps/lamp_memory.h"
 #include "render/path/lamps/path_lamps.h"
-#include "render/path/path_random.h"
+#include "render/path/numbers/path_random.h"
 #include "render/path/path_request.h"
 #include "render/path/scatter.h"
 #include "render/path/sky_light.h"

@@ -16,7 +16,7 @@
 #include "light/surfaces.h"
 #include "render/path/denoise.h"
 #include "render/path/kernel/kernel.h"
-#include "render/path/path_math.h"
+#include "render/path/numbers/path_math.h"
 
 // What the two halves of PathTile share: path_tile.cpp has surfaces and light, path_tile_media.cpp glass, fog and
 // clouds.

@@ -7,7 +7,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "render/path/path_random.h"
+#include "render/path/numbers/path_random.h"
 
 namespace quoin::path {
 namespace {

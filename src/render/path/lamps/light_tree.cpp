@@ -11,7 +11,7 @@
 
 #include <quoin/core/assert.h>
 
-#include "render/path/path_math.h"
+#include "render/path/numbers/path_math.h"
 
 namespace quoin::path {
 namespace {
@@ -72,12 +72,14 @@ float cost_of(const LampBounds& bounds, float longest, float along) {
 
 class LightTree::Builder {
  public:
-  Builder(std::span<const LampBounds> lamps, LightTree& tree) : lamps_(lamps), tree_(tree), order_(lamps.size()) {
+  Builder(std::span<const LampBounds> lamps, LightTree& tree) : lamps_(lamps), tree_(tree), order_(lamps.size()) {}
+
+  void run() {
     std::iota(order_.begin(), order_.end(), 0U);
-    tree.nodes_.reserve(2 * lamps.size());
-    tree.ways_.resize(lamps.size());
-    build(0, lamps.size(), 0, 0);
-    QUOIN_ASSERT(tree.nodes_.size() == 2 * lamps.size() - 1, "each lamp in one leaf");
+    tree_.nodes_.reserve(2 * lamps_.size());
+    tree_.ways_.resize(lamps_.size());
+    build(0, lamps_.size(), 0, 0);
+    QUOIN_ASSERT(tree_.nodes_.size() == 2 * lamps_.size() - 1, "each lamp in one leaf");
   }
 
  private:
@@ -167,7 +169,7 @@ class LightTree::Builder {
 
 LightTree::LightTree(std::span<const LampBounds> lamps) {
   if (lamps.empty()) return;
-  Builder(lamps, *this);
+  Builder(lamps, *this).run();
   set_branches();
 }
 

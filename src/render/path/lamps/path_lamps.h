@@ -15,7 +15,7 @@
 #include "light/lamp_table.h"
 #include "light/surfaces.h"
 #include "render/path/lamps/light_tree.h"
-#include "render/path/path_math.h"
+#include "render/path/numbers/path_math.h"
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin::path {

@@ -1,4 +1,4 @@
-// What pictures by paths compute with, and the numbers of a path: render/path/path_math.h and path_random.h on the
+// What pictures by paths compute with, and the numbers of a path: render/path/numbers/path_math.h and path_random.h on the
 // processor's side, series for series, so that paths go the same ways.
 
 const float kPi = 3.14159265;
