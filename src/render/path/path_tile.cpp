@@ -85,6 +85,7 @@ bool PathTile::render(const std::function<bool(std::size_t)>& goes_on) {
   const int samples = context_->options->samples;
   for (int first = 0; first < samples; first += kSamplesAtOnce) {
     const int count = std::min(kSamplesAtOnce, samples - first);
+    if (std::has_single_bit(static_cast<unsigned>(first))) learn(first);
     begin(first, count);
     while (!active_.empty()) {
       order_paths();
@@ -94,7 +95,6 @@ bool PathTile::render(const std::function<bool(std::size_t)>& goes_on) {
       trace_requests();
       std::swap(active_, next_);
     }
-    if (light_.lamps != nullptr) memory_.learn();
     for (const Path& path : paths_) {
       PixelSums& sums = sums_[path.pixel];
       (path.is_caught ? sums.lit : sums.scene) += path.radiance;
@@ -107,6 +107,15 @@ bool PathTile::render(const std::function<bool(std::size_t)>& goes_on) {
     if (!goes_on(static_cast<std::size_t>(count))) return false;
   }
   return true;
+}
+
+// A pixel's numbers go where its earlier ones were not. What is learned by these would lead to lamps by numbers that
+// are chance no more, and what they give would come out too dark; so from now on lamps are chosen by others. These are
+// spread as well as before, since a sequence's samples from one power of two to the next are.
+void PathTile::learn(int first) {
+  static_assert(std::has_single_bit(static_cast<unsigned>(kSamplesAtOnce)));
+  memory_.learn();
+  light_.lamp_numbers = mix_bits(static_cast<std::uint32_t>(first));
 }
 
 void PathTile::begin(int first, int count) {

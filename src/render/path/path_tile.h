@@ -123,6 +123,8 @@ class PathTile {
     double end = 0.0;
   };
 
+  // What samples before `first`, a power of two, found out of lamps.
+  void learn(int first);
   void begin(int first, int count);
   // A point of the lens, of radius 1.
   [[nodiscard]] Pair on_lens(Pair u) const;

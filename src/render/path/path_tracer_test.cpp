@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include <quoin/core/hash.h>
 #include <quoin/grid/grid.h>
 #include <quoin/render/path_tracer.h>
 
@@ -440,6 +441,54 @@ TEST(PathTracer, AnEnvironmentOfOnePixelIsAUniformSky) {
   options.environment = std::make_shared<const RadianceImage>(RadianceImage{1, 1, {0.5F, 0.5F, 0.5F}});
   const float light = mean(path_picture(scene, from_above(4.0, 20.0, 4.0, 6.0), options)).x;
   EXPECT_NEAR(light, 0.5F * linear_from_srgb(std::uint8_t{188}), 0.01F);
+}
+
+// Walls and covered lamps at random on a floor of 256 voxels, black but for the floor.
+Scene dim_yard() {
+  Scene scene;
+  const VoxelType floor = add_type(scene, kGrey);
+  const VoxelType lamp = add_type(scene, kWhite, Visibility::Opaque, 8.0F);
+  const VoxelType black = add_type(scene, {0, 0, 0, 255});
+  std::uint32_t state = 1;
+  const auto below = [&](std::uint32_t count) {
+    return static_cast<int>((state = mix_bits(state + 0x9E37'79B9U)) % count);
+  };
+  constexpr int kEdge = 256;
+  Grid grid;
+  grid.fill_box({{0, -1, 0}, {kEdge, 0, kEdge}}, floor);
+  for (int x = 0; x < kEdge; x += 16) {
+    for (int z = 0; z < kEdge; z += 16) {
+      if (below(2) != 0) grid.fill_box({{x, 0, z}, {x + 1, 7, z + 14}}, black);
+      if (below(2) != 0) grid.fill_box({{x, 0, z}, {x + 14, 7, z + 1}}, black);
+    }
+  }
+  for (int i = 0; i < 60; ++i) {
+    const IVec3 at{below(kEdge), 2 + below(4), below(kEdge)};
+    grid.set(at, lamp);
+    grid.set(at + IVec3{0, 1, 0}, black);
+  }
+  place(scene, std::move(grid));
+  return scene;
+}
+
+// A pixel is as large as a place: what is remembered there was found out by the pixel's own samples.
+TEST(PathTracer, WhatPlacesRememberOfLampsDarkensNothing) {
+  const Scene scene = dim_yard();
+  const PathTracer tracer(scene);
+  PathOptions options = under_even_sky(32, 32, 4);
+  options.sky_brightness = 0.0;
+  options.max_bounces = 1;
+  double forgetful = 0.0;  // nothing is known to the first four samples
+  double remembering = 0.0;
+  for (options.seed = 0; options.seed < 100; ++options.seed) {
+    for (const int samples : {4, 8}) {
+      options.samples = samples;
+      const auto picture = tracer.render(from_above(128.0, 100.0, 128.0, 256.0), options);
+      ASSERT_TRUE(picture.has_value());
+      (samples == 4 ? forgetful : remembering) += static_cast<double>(mean(*picture).x);
+    }
+  }
+  EXPECT_NEAR(remembering / forgetful, 1.0, 0.02);
 }
 
 TEST(PathTracer, RefusesWhatCannotBe) {

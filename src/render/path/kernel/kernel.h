@@ -77,6 +77,7 @@ struct ShadeLight {
   const LampBranch* lamps = nullptr;  ///< null: there are none
   /// Tables of what counts of each node; the first entry of each is 1.
   const float* shares = nullptr;
+  std::uint32_t lamp_numbers = 0;  ///< for those that lamps are chosen by, bits of `pixel` that are turned over
   bool has_sun = false;
   float to_sun[3] = {0.0F, 1.0F, 0.0F};
   float sun_frame[3][3] = {};  ///< whose third axis that is

@@ -173,6 +173,52 @@ TEST(PathKernel, ChoosesLampsWithTheirChances) {
   }
 }
 
+// As one point does with choose and pairs of numbers, each of the pixel that is meant for lamps.
+TEST(PathKernel, ShadesByLampsOfNumbersOfTheirOwn) {
+  Numbers numbers;
+  const LightTree tree(some_lamps(numbers, 200));
+  std::size_t chosen = 0;
+  for (const std::uint32_t turned : {0U, 0x1234'5678U}) {
+    ShadeLight light;
+    light.lamps = tree.branches();
+    light.shares = LightTree::whole_shares();
+    light.lamp_numbers = turned;
+    ShadeBlock asked;
+    asked.in_air = 0x8421U;
+    asked.lamps.active = 0x7FFFU;
+    for (std::size_t i = 0; i < kBlockPoints; ++i) {
+      asked.pixel[i] = numbers.word(), asked.sample[i] = numbers.word() % 4096U, asked.dimension[i] = 8U * (i % 9U);
+      put({numbers.between(-40.0F, 40.0F), numbers.between(-8.0F, 8.0F), numbers.between(-40.0F, 40.0F)},
+          asked.lamps.point, i);
+      const Vec3 normal = numbers.direction();
+      put(normal, asked.normal, i);
+      put(-normal, asked.direction, i);
+    }
+    for (const InstructionSet set : sets_of_this_machine()) {
+      SCOPED_TRACE(name_of(set));
+      const InstructionSetOverride over(set);
+      ShadeBlock block = asked;
+      kernel().shade(light, block);
+      for (std::size_t i = 0; i < kBlockPoints; ++i) {
+        const Random own(asked.pixel[i], asked.sample[i]);
+        const Random of_lamps(asked.pixel[i] ^ turned, asked.sample[i]);
+        const Pair point = of_lamps.pair(asked.dimension[i] + dimension::kLampPoint);
+        ASSERT_EQ(block.lamp_pair[0][i], point.x);
+        ASSERT_EQ(block.lamp_pair[1][i], point.y);
+        ASSERT_EQ(block.pair[0][i], own.pair(asked.dimension[i] + dimension::kDirection).x);
+        const bool is_active = (asked.lamps.active >> i & 1U) != 0;
+        const Vec3 normal = (asked.in_air >> i & 1U) != 0 ? Vec3(0.0F) : get(asked.normal, i);
+        const LightTree::Choice expected =
+            tree.choose(get(asked.lamps.point, i), normal, of_lamps.one(asked.dimension[i] + dimension::kLampChoice));
+        ASSERT_EQ(block.lamps.lamp[i], is_active ? expected.lamp : -1);
+        ASSERT_EQ(block.lamps.probability[i], is_active ? expected.probability : 0.0F);
+        chosen += is_active && expected.lamp >= 0 ? 1U : 0U;
+      }
+    }
+  }
+  EXPECT_GT(chosen, 30U);
+}
+
 TEST(PathKernel, DrawsTheNumbersOfPixels) {
   Numbers numbers;
   for (std::uint32_t sample = 0; sample < 300; ++sample) {

@@ -174,7 +174,10 @@ void shade(const ShadeLight& light, ShadeBlock& block) {
     if (light.has_sun) {
       shade_sun(light, block, at, numbers, dimension, normal, load(block.throughput, at), load(block.colour, at));
     }
-    if (light.lamps != nullptr) shade_lamps(light, block, at, numbers, dimension, normal);
+    if (light.lamps != nullptr) {
+      const Numbers of_lamps{numbers.pixel ^ word(light.lamp_numbers), numbers.sample};
+      shade_lamps(light, block, at, of_lamps, dimension, normal);
+    }
     shade_next(block, at, numbers, dimension, normal);
   }
 }

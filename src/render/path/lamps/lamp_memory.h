@@ -34,6 +34,8 @@ class LampMemory {
 
   /// That a sample of a lamp would have brought so much light, divided by its chance, and whether a wall was between.
   void note(const LightTree& tree, std::int32_t place, std::int32_t lamp, float light, bool is_blocked);
+  /// Requires: lamps that are chosen from here on are chosen by numbers that those of before tell nothing of, also not
+  /// as later ones of one low-discrepancy sequence: these go where earlier ones were not.
   void learn();
 
  private:
