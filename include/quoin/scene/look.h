@@ -72,8 +72,8 @@ struct Look {
   double sky_brightness = 1.0;                         ///< times the sky's light
   Vec3 sky_colour{1.0F};                               ///< of SkyModel::Uniform, linear
   AirOptions air{};                                    ///< of SkyModel::Physical
-  std::shared_ptr<const RadianceImage> environment{};  ///< of SkyModel::Environment: longitude and latitude, +y up; its
-                                                       ///< middle is -z, its right half +x
+  std::shared_ptr<const RadianceImage> environment{};  ///< of SkyModel::Environment: longitude, latitude; +y up, middle
+                                                       ///< -z, right half +x; what was drawn is not to be changed
   double environment_turn_radians = 0.0;               ///< about the vertical, from -z towards +x
   std::optional<Vec3> background{};                    ///< linear; what the camera sees in place of sky and sun
 
