@@ -15,8 +15,8 @@ std::size_t place_of(std::size_t slab) {
   return 4 * (slab >> 2) + 16 * (slab & 3);
 }
 
-// Lines, of at most `most`, whose words are all as the one that follows them, empty or full: from the first place on, or
-// from the last one back.
+// Lines, of at most `most`, whose words are all as the one that follows them, empty or full: from the first place on,
+// or from the last one back.
 int lines_alike(const Node& words, bool is_from_last, int most) {
   const auto word_at = [&](unsigned i) {
     const unsigned place = is_from_last ? 63 - i : i;

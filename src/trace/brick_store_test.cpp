@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::uint64_t kEveryVoxel = ~std::uint64_t{0};
 
-// A brick that is full below layer `from` of its sixteen layers of four by four cells in places, and empty from `to` on,
-// or the other way round.
+// A brick that is full below layer `from` of its sixteen layers of four by four cells in places, and empty from `to`
+// on, or the other way round.
 Node layered(int from, int to, bool is_turned, std::mt19937_64& random) {
   Node words;
   for (int cell = 0; cell < 64; ++cell) {

@@ -1,5 +1,5 @@
-// What pictures by paths compute with, and the numbers of a path: render/path/numbers/path_math.h and path_random.h on the
-// processor's side, series for series, so that paths go the same ways.
+// What pictures by paths compute with, and the numbers of a path: render/path/numbers has them on the processor's side,
+// series for series, so that paths go the same ways.
 
 const float kPi = 3.14159265;
 const float kAlmostOne = 0.99999994;
