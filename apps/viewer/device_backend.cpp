@@ -28,7 +28,7 @@ struct DeviceBackend::Impl {
     bool has_scene = false;
     bool traces_light = false;
     bool is_processor = false;  // that acts as a device
-    std::array<bool, 4> is_slow{};
+    std::array<bool, kDrawModes> is_slow{};
   };
 
   Impl(const Scene& of_scene, const DeviceBackendOptions& given, OpenDevice opener, std::function<void()> listener)

@@ -571,6 +571,7 @@ TEST_F(DeviceBackendTest, ModesThatTakeTooLongAreToldOf) {
     EXPECT_EQ(backend->is_slow(DrawMode::Blocks), seconds < 1.0);
     EXPECT_FALSE(backend->is_slow(DrawMode::Rays));
     EXPECT_FALSE(backend->is_slow(DrawMode::Smooth));
+    EXPECT_FALSE(backend->is_slow(DrawMode::Paths));
   }
 }
 

@@ -113,7 +113,7 @@ class DeviceDrawer {
   Clock::time_point wanted_at_ = Clock::now();  // the request that is wanted now
   Clock::time_point mode_since_ = Clock::now();
   bool is_mode_drawn_ = false;
-  std::array<bool, 5> is_slow_{};
+  std::array<bool, kDrawModes> is_slow_{};
 
   std::shared_ptr<VulkanRenderer> renderer_;
   bool is_scene_new_ = true;  // to the renderer

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -40,6 +41,8 @@ enum class DrawMode : std::uint8_t {
   Density,  ///< the densities of its fields on a plane, from the positive end of an axis: draw_density_slice
   Paths,    ///< paths of light, which converge while one looks: PathTracer
 };
+
+inline constexpr std::size_t kDrawModes = 5;
 
 [[nodiscard]] inline bool has_meshes(DrawMode mode) {
   return mode == DrawMode::Blocks || mode == DrawMode::Smooth;
