@@ -2,6 +2,7 @@
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import { closeGapsOf, setPictureHeight } from './gaps.js';
 import { isDrawnByProgram, PlainModel, prepare } from './plain.js';
 
 const $ = (id) => document.getElementById(id);
@@ -165,6 +166,7 @@ function changed() {
 function resize() {
   renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
   renderer.setSize(innerWidth, innerHeight, false);
+  setPictureHeight(renderer, canvas.height);
   camera.aspect = innerWidth / innerHeight;
   camera.updateProjectionMatrix();
   changed();
@@ -240,6 +242,7 @@ async function show(bytes, isCurrent) {
     object.castShadow = !object.material.transparent;
     object.receiveShadow = true;
   });
+  closeGapsOf(model);
   stage.add(model);
   if (isSlow) plain = new PlainModel(model);
   const box = new THREE.Box3().setFromObject(model);
