@@ -84,7 +84,7 @@ function ask(name, options, tell) {
 let rest;  // the timer after which what was drawn plainly is drawn well
 
 function draw() {
-  frame = 0;
+  forgetFrame();
   clearTimeout(rest);
   rest = undefined;
   plain?.show(false);
@@ -93,15 +93,28 @@ function draw() {
   renderer.render(marched?.isShown ? tape : stage, camera);
 }
 
+/** Who draws now need not once more with the next frame. */
+function forgetFrame() {
+  cancelAnimationFrame(frame);
+  frame = 0;
+}
+
 /** Draws at once, on a program plainly until nothing has changed for a while. */
 function drawSoon() {
   if (!isSlow || marched?.isShown) return draw();
-  frame = 0;
+  forgetFrame();
   plain?.show(true);
   sun.castShadow = false;
   renderer.render(stage, camera);
+  if (plain) drawWellLater();
+}
+
+/** Draws well where nothing changes for a while after the plain picture is there, however long that takes. */
+async function drawWellLater() {
   clearTimeout(rest);
-  rest = plain && setTimeout(draw, 600);
+  const wanted = rest = setTimeout(() => {}, 0);
+  await pictureIsThere();
+  if (rest === wanted) rest = setTimeout(draw, 600);
 }
 
 function redraw() {
