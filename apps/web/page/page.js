@@ -238,9 +238,25 @@ function untilTheNext() {
   return () => now === openings;
 }
 
+/** For GLTFLoader, which would fetch the pictures that lie in the file it was given. */
+function picturesFromMemory(parser) {
+  const picture = async ({ bufferView, mimeType }) => {
+    const blob = new Blob([await parser.getDependency('bufferView', bufferView)], { type: mimeType });
+    const texture = new THREE.Texture(await createImageBitmap(blob, { premultiplyAlpha: 'none' }));
+    texture.needsUpdate = true;
+    return texture;
+  };
+  return {
+    name: 'pictures from memory',
+    async beforeRoot() {
+      (parser.json.images ?? []).forEach((image, i) => { parser.sourceCache[i] = picture(image); });
+    },
+  };
+}
+
 /** False where another file was chosen meanwhile, and nothing was done. */
 async function show(bytes, isCurrent) {
-  const { scene } = await new GLTFLoader().parseAsync(bytes.buffer, '');
+  const { scene } = await new GLTFLoader().register(picturesFromMemory).parseAsync(bytes.buffer, '');
   if (!isCurrent()) return false;
   plain?.dispose();
   model?.removeFromParent();
