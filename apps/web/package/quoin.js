@@ -611,7 +611,8 @@ function putLoadOptions(view, at, { showHidden, frame, radius, iso, meshVoxels, 
     ints(40, ...shape, numberOf(raw.type ?? 'uint8', scalarNames, 'raw.type'), raw.bigEndian ? 1 : 0);
   }
   if (heights !== undefined) {
-    const { encoding, metresPerLevel, metresPerPixel, metresPerVoxel, exaggeration, groundDepth, smooth } = heights ?? {};
+    const { encoding, metresPerLevel, metresPerPixel, metresPerVoxel, exaggeration, groundDepth, smooth } =
+      heights ?? {};
     ints(60, numberOf(encoding, heightEncodings, 'heights.encoding', 1));
     doubles(64, amount(metresPerLevel, 'heights.metresPerLevel'), amount(metresPerPixel, 'heights.metresPerPixel'),
             amount(metresPerVoxel, 'heights.metresPerVoxel'), amount(exaggeration, 'heights.exaggeration'));
