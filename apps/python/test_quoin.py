@@ -300,7 +300,7 @@ class Scenes(unittest.TestCase):
 
         def open_edges(mesh):
             _, same = np.unique(mesh.positions, axis=0, return_inverse=True)
-            corners = same.reshape(-1)[mesh.indices.reshape(-1, 3)]
+            corners = same.reshape(-1)[mesh.triangles]
             edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
             return int((np.unique(edges, axis=0, return_counts=True)[1] % 2).sum())
 
