@@ -90,7 +90,8 @@ async function compare(what, file, options, args, without = {}) {
   await refuses('heights that are no picture', () => load(new Uint8Array(64), { heights }), 'bad_format');
   for (const [name, value] of [['encoding', 'red'], ['encoding', 'none'], ['encoding', undefined],
                                ['metresPerLevel', 0], ['metresPerPixel', -1], ['metresPerVoxel', NaN],
-                               ['exaggeration', '2'], ['exaggeration', 1e9], ['groundDepth', 0], ['groundDepth', 5000], ['groundDepth', 1.5]])
+                               ['exaggeration', '2'], ['exaggeration', 1e9], ['groundDepth', 0], ['groundDepth', 5000],
+                               ['groundDepth', 1.5]])
     await refuses(`heights.${name}: ${value}`, () => load(bytes, { heights: { ...heights, [name]: value } }));
   await refuses('heights that are null', () => load(bytes, { heights: null }));
 }
