@@ -58,8 +58,8 @@ export function prepare(renderer, stage, camera) {
   const map = new THREE.DataTexture(new Uint8Array(4), 1, 1);
   map.colorSpace = THREE.SRGBColorSpace;
   map.needsUpdate = true;
-  const materials = [false, true].map((transparent) =>
-    new THREE.MeshLambertMaterial({ map, vertexColors: true, transparent }));
+  const kinds = [{}, { transparent: true }, { emissive: 0xffffff, emissiveMap: map }];
+  const materials = kinds.map((kind) => new THREE.MeshLambertMaterial({ map, vertexColors: true, ...kind }));
   materials.forEach(closeGaps);
   const triangles = materials.map((material) => new THREE.Mesh(geometry, material));
   for (const triangle of triangles) triangle.frustumCulled = false;
