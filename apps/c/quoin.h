@@ -177,7 +177,7 @@ typedef struct quoin_mesh_data {
   const uint32_t* indices;   /* three a triangle, counter-clockwise from outside */
   const int64_t* interfaces; /* [interface_count][4]: back label, front label, first index, count; of labels */
   const uint16_t* types;     /* [vertex_count], of grids meshed as blocks: first blocks, four vertices and six indices a
-                                face (watertight: three or more of both), then surfaces of fields, whose type is 0 */
+                                face (watertight: or more of both), then the surfaces of fields, whose type is 0 */
 } quoin_mesh_data;
 
 typedef struct quoin_mesh_options {

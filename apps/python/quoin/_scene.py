@@ -188,7 +188,7 @@ class Grid:
         """Its surface: merged faces of blocks, or a smooth one around them.
 
         `watertight`: of blocks, faces get further corners where others meet their edges, so that no gaps are seen there.
-        A face has then three vertices or more, in place of four. Smooth surfaces always are.
+        A face has then four vertices or more. Smooth surfaces always are.
         """
         options = _c.sized(_c.MeshOptions)
         options.smooth, options.no_occlusion = int(smooth), int(not occlusion)
