@@ -141,6 +141,54 @@ TEST(C, LabelsAndGridsAreMeshed) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
+// Vertices that lie inside an edge of a triangle: a plate, on whose middle a pillar of another type stands.
+std::size_t corners_in_edges(std::int32_t watertight) {
+  std::vector<std::uint16_t> voxels(std::size_t{kEdge} * kEdge * kEdge);
+  for (std::size_t i = 0; i < voxels.size(); ++i) {
+    const std::size_t y = i / kEdge % kEdge;
+    const bool is_pillar = i % kEdge == 5 && i / kEdge / kEdge == 5;
+    if (y == 0 || (is_pillar && y < 4)) voxels[i] = y == 0 ? 1 : 2;
+  }
+  std::vector<std::uint16_t> mixed;
+  const quoin_scene scene = made_scene(mixed);
+  const quoin_array array = array_of(voxels, QUOIN_UINT16);
+  std::size_t grid = 0;
+  EXPECT_EQ(quoin_grid_add(scene, &array, "plate", &grid), QUOIN_OK);
+  auto options = sized<quoin_mesh_options>();
+  options.watertight = watertight;
+  quoin_mesh mesh = 0;
+  EXPECT_EQ(quoin_grid_mesh(scene, grid, &options, &mesh), QUOIN_OK) << quoin_last_error();
+  auto data = sized<quoin_mesh_data>();
+  EXPECT_EQ(quoin_mesh_view(mesh, &data), QUOIN_OK);
+  const auto at = [&](std::size_t vertex, int axis) {
+    return data.positions[3 * vertex + static_cast<unsigned>(axis)];
+  };
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < data.index_count; ++i) {
+    const std::size_t a = data.indices[i];
+    const std::size_t b = data.indices[i % 3 == 2 ? i - 2 : i + 1];
+    for (std::size_t vertex = 0; vertex < data.vertex_count; ++vertex) {
+      double from_a = 0.0, from_b = 0.0, whole = 0.0;
+      for (int axis = 0; axis < 3; ++axis) {
+        from_a += std::pow(at(vertex, axis) - at(a, axis), 2);
+        from_b += std::pow(at(vertex, axis) - at(b, axis), 2);
+        whole += std::pow(at(b, axis) - at(a, axis), 2);
+      }
+      // Corners lie on whole numbers: what is between both is as far from them as they are from each other.
+      const bool is_between = std::abs(std::sqrt(from_a) + std::sqrt(from_b) - std::sqrt(whole)) < 1e-9;
+      if (is_between && from_a > 0.0 && from_b > 0.0) ++found;
+    }
+  }
+  EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+  return found;
+}
+
+TEST(C, WatertightMeshesHaveNoCornerInsideAnEdge) {
+  EXPECT_GT(corners_in_edges(0), 0U);
+  EXPECT_EQ(corners_in_edges(1), 0U);
+}
+
 TEST(C, PicturesHaveTheSunThatIsAskedFor) {
   std::vector<std::uint16_t> voxels;
   const quoin_scene scene = made_scene(voxels);

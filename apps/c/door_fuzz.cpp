@@ -280,6 +280,12 @@ class Program {
     options.iso = single();
     options.voxel_size = number();
     took(quoin_scene_load_with("", perhaps(&options), &scene), &scene);
+    // Of the same bytes, so that inputs of the corpus stay what they are.
+    for (std::int32_t& length : options.raw_shape) length = options.frame % 8;
+    options.raw_scalar = options.radius % 10;
+    options.heights = options.radius % 4;
+    options.metres_per_pixel = options.voxel_size;
+    took(quoin_scene_load_bytes_with(is_null ? nullptr : next_ - size, size, &options, &scene), &scene);
   }
 
   void mesh() {
@@ -287,6 +293,7 @@ class Program {
     auto options = made<quoin_mesh_options>();
     options.smooth = byte() % 2;
     options.threads = small();
+    options.watertight = options.threads % 2;
     const std::uint8_t which = byte() % 3;
     if (which == 0) {
       took(quoin_grid_mesh(handle(), index(), perhaps(&options), &out), &out);

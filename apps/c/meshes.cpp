@@ -136,6 +136,7 @@ Result<GridMesh> mesh_of(const Scene& from, GridHandle handle, const quoin_mesh_
   alone.add_instance(instance);
   BlockySceneOptions blocks;
   blocks.mesh.bake_occlusion = options.no_occlusion == 0;
+  blocks.mesh.watertight = options.watertight != 0;
   const Threads threads = threads_of(options.threads);
   const auto meshes = options.smooth != 0 ? mesh_scene_smoothly(alone, {}, threads, progress())
                                           : mesh_scene(alone, blocks, threads, progress());

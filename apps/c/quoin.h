@@ -177,7 +177,7 @@ typedef struct quoin_mesh_data {
   const uint32_t* indices;   /* three a triangle, counter-clockwise from outside */
   const int64_t* interfaces; /* [interface_count][4]: back label, front label, first index, count; of labels */
   const uint16_t* types;     /* [vertex_count], of grids meshed as blocks: first blocks, four vertices and six indices a
-                                face, then the surfaces of fields, whose type is 0 */
+                                face (watertight: or more of both), then the surfaces of fields, whose type is 0 */
 } quoin_mesh_data;
 
 typedef struct quoin_mesh_options {
@@ -185,7 +185,18 @@ typedef struct quoin_mesh_options {
   int32_t smooth;       /* 0: blocks; else smooth surfaces around them */
   int32_t no_occlusion; /* of blocks */
   int32_t threads;      /* 0: all */
+  int32_t reserved;     /* not read: padding of earlier versions */
+  int32_t watertight; /* of blocks: no corner of a face lies inside another's edge, so no gaps are seen there. Faces get
+                           more triangles. Smooth surfaces always are */
 } quoin_mesh_options;
+
+/* How a picture says heights. */
+typedef enum quoin_heights {
+  QUOIN_HEIGHTS_NONE = 0,
+  QUOIN_HEIGHTS_GREY = 1,     /* a height is a level, of 8 or 16 bits, times metres_per_level */
+  QUOIN_HEIGHTS_MAPBOX = 2,   /* terrain-RGB: (65,536 R + 256 G + B) / 10 - 10,000 metres */
+  QUOIN_HEIGHTS_TERRARIUM = 3 /* 256 R + G + B / 256 - 32,768 metres */
+} quoin_heights;
 
 typedef struct quoin_load_options {
   size_t size;
@@ -195,8 +206,19 @@ typedef struct quoin_load_options {
   int32_t radius;      /* of a world that is read by chunks: of 64 voxels, around its spawn; 0: 4 */
   int32_t has_iso;     /* of a volume: what is above `iso` is solid; else a value is found */
   float iso;
-  int32_t mesh_voxels; /* of a file of triangles: voxels along its longest side; 0: 128 */
-  double voxel_size;   /* or of this size, in the file's unit */
+  int32_t mesh_voxels;  /* of a file of triangles: voxels along its longest side; 0: 128 */
+  double voxel_size;    /* or of this size, in the file's unit */
+  int32_t raw_shape[3]; /* the file holds values alone, so many along each axis, the first one fastest; all 0: it is
+                            another file */
+  int32_t raw_scalar;   /* quoin_scalar, of these */
+  int32_t raw_big_endian;
+  int32_t heights;         /* quoin_heights: the file is a picture (PNG) of the heights of a landscape */
+  double metres_per_level; /* 0: 1 */
+  double metres_per_pixel; /* between neighbouring heights; 0: 1, with a warning */
+  double metres_per_voxel; /* 0: metres_per_pixel */
+  double exaggeration;     /* heights times this; 0: 1 */
+  int32_t ground_depth;    /* voxels of ground below the lowest height, up to 4,096; 0: 8 */
+  int32_t smooth_ground;   /* densities, whose surface is smooth, rather than voxels */
 } quoin_load_options;
 
 typedef enum quoin_fill {
@@ -267,6 +289,8 @@ QUOIN_API quoin_status quoin_scene_load(const char* path, quoin_scene* out);
 QUOIN_API quoin_status quoin_scene_load_bytes(const void* data, size_t bytes, quoin_scene* out);
 /* The same with options; null: none. */
 QUOIN_API quoin_status quoin_scene_load_with(const char* path, const quoin_load_options* options, quoin_scene* out);
+QUOIN_API quoin_status quoin_scene_load_bytes_with(const void* data, size_t bytes, const quoin_load_options* options,
+                                                   quoin_scene* out);
 QUOIN_API quoin_status quoin_scene_get_info(quoin_scene scene, quoin_scene_info* out);
 /* What files can be read and written. */
 QUOIN_API quoin_status quoin_format_count(size_t* out);

@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
@@ -489,6 +490,75 @@ TEST(CLoading, TakesOptions) {
   EXPECT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_INVALID_ARGUMENT);
   options.size = 3;
   EXPECT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_INVALID_ARGUMENT);
+}
+
+TEST(CLoading, TakesValuesAlone) {
+  // A box of 40 within 10, from (2, 0, 0) on, of 6 x 4 x 3 values of 16 bits, the most significant byte first.
+  std::vector<std::uint8_t> bytes;
+  for (int i = 0; i < 6 * 4 * 3; ++i) bytes.insert(bytes.end(), {0, static_cast<std::uint8_t>(i % 6 >= 2 ? 40 : 10)});
+  auto options = sized<quoin_load_options>();
+  options.raw_shape[0] = 6;
+  options.raw_shape[1] = 4;
+  options.raw_shape[2] = 3;
+  options.raw_scalar = QUOIN_UINT16;
+  options.raw_big_endian = 1;
+  options.has_iso = 1;
+  options.iso = 25.0F;
+  quoin_scene scene = 0;
+  const auto load = [&] { return quoin_scene_load_bytes_with(bytes.data(), bytes.size(), &options, &scene); };
+  ASSERT_EQ(load(), QUOIN_OK) << quoin_last_error();
+  auto info = sized<quoin_grid_info>();
+  ASSERT_EQ(quoin_grid_get_info(scene, 0, &info), QUOIN_OK);
+  EXPECT_NE(info.has_field, 0);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+  options.raw_shape[2] = 4;  // more than there are
+  EXPECT_EQ(load(), QUOIN_BAD_FORMAT);
+  options.raw_shape[2] = -3;
+  EXPECT_EQ(load(), QUOIN_INVALID_ARGUMENT);
+  options.raw_shape[2] = 3;
+  options.raw_scalar = 10;
+  EXPECT_EQ(load(), QUOIN_INVALID_ARGUMENT);
+  options.raw_scalar = QUOIN_UINT16;
+  options.heights = QUOIN_HEIGHTS_GREY;
+  EXPECT_EQ(load(), QUOIN_INVALID_ARGUMENT);
+  // A program of before has no such fields, and bytes are then of no known format.
+  options.size = offsetof(quoin_load_options, raw_shape);
+  EXPECT_EQ(load(), QUOIN_BAD_FORMAT);
+  EXPECT_EQ(quoin_scene_load_bytes_with(nullptr, 3, nullptr, &scene), QUOIN_INVALID_ARGUMENT);
+}
+
+TEST(CLoading, TakesHeights) {
+  const std::vector<char> png = [] {
+    std::ifstream file(QUOIN_SOURCE_DIR "/tests/corpus/png/grey_1_bit.png", std::ios::binary);
+    return std::vector<char>(std::istreambuf_iterator<char>(file), {});
+  }();
+  auto options = sized<quoin_load_options>();
+  quoin_scene scene = 0;
+  const auto load = [&] { return quoin_scene_load_bytes_with(png.data(), png.size(), &options, &scene); };
+  EXPECT_EQ(load(), QUOIN_BAD_FORMAT);
+  options.heights = QUOIN_HEIGHTS_GREY;
+  options.metres_per_pixel = 1.0;
+  const auto height_of = [&] {
+    EXPECT_EQ(load(), QUOIN_OK) << quoin_last_error();
+    auto info = sized<quoin_grid_info>();
+    EXPECT_EQ(quoin_grid_get_info(scene, 0, &info), QUOIN_OK);
+    EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+    return info.extent[1];
+  };
+  const std::int32_t low = height_of();
+  options.ground_depth = 18;
+  EXPECT_EQ(height_of(), low + 10);
+  options.exaggeration = 3.0;
+  EXPECT_GT(height_of(), low + 10);
+  options.exaggeration = -3.0;
+  EXPECT_EQ(load(), QUOIN_INVALID_ARGUMENT);
+  options.exaggeration = std::nan("");
+  EXPECT_EQ(load(), QUOIN_INVALID_ARGUMENT);
+  options.exaggeration = 0.0;
+  options.heights = 4;
+  EXPECT_EQ(load(), QUOIN_INVALID_ARGUMENT);
+  options.heights = QUOIN_HEIGHTS_NONE;
+  EXPECT_EQ(load(), QUOIN_INVALID_ARGUMENT);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Scenes, their types and their grids.
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -103,6 +104,22 @@ quoin_status save(SceneBody& scene, const char* path) {
   return written ? QUOIN_OK : fail(written.error());
 }
 
+bool is_raw(const quoin_load_options& options) {
+  return options.raw_shape[0] != 0 || options.raw_shape[1] != 0 || options.raw_shape[2] != 0;
+}
+
+HeightOptions heights_of(const quoin_load_options& given) {
+  HeightOptions heights;
+  heights.encoding = static_cast<HeightEncoding>(given.heights - QUOIN_HEIGHTS_GREY);
+  if (given.metres_per_level != 0.0) heights.metres_per_level = given.metres_per_level;
+  if (given.metres_per_pixel != 0.0) heights.metres_per_pixel = given.metres_per_pixel;
+  if (given.metres_per_voxel != 0.0) heights.metres_per_voxel = given.metres_per_voxel;
+  if (given.exaggeration != 0.0) heights.vertical_exaggeration = given.exaggeration;
+  if (given.ground_depth != 0) heights.depth = given.ground_depth;
+  heights.as_field = given.smooth_ground != 0;
+  return heights;
+}
+
 LoadOptions options_of(const quoin_load_options& given) {
   LoadOptions options;
   options.show_hidden = given.show_hidden != 0;
@@ -111,7 +128,26 @@ LoadOptions options_of(const quoin_load_options& given) {
   if (given.has_iso != 0) options.iso = given.iso;
   if (given.mesh_voxels != 0) options.mesh.size = given.mesh_voxels;
   if (given.voxel_size != 0.0) options.mesh.voxel_size = given.voxel_size;
+  if (is_raw(given)) {
+    options.raw = RawVolume{{given.raw_shape[0], given.raw_shape[1], given.raw_shape[2]},
+                            static_cast<ScalarType>(given.raw_scalar),
+                            given.raw_big_endian != 0 ? std::endian::big : std::endian::little};
+  }
+  if (given.heights != QUOIN_HEIGHTS_NONE) options.heights = heights_of(given);
   return options;
+}
+
+const char* what_is_wrong_with_landscape(const quoin_load_options& options) {
+  if (options.heights < QUOIN_HEIGHTS_NONE || options.heights > QUOIN_HEIGHTS_TERRARIUM)
+    return "heights are said in none of these ways";
+  // What they are in sum, and how deep the ground may be, the reader knows.
+  for (const double amount :
+       {options.metres_per_level, options.metres_per_pixel, options.metres_per_voxel, options.exaggeration}) {
+    if (!std::isfinite(amount)) return "an amount of heights that is not finite";
+    if (amount != 0.0 && options.heights == QUOIN_HEIGHTS_NONE) return "an amount of heights where there are none";
+  }
+  const bool has_ground = options.ground_depth != 0 || options.smooth_ground != 0;
+  return has_ground && options.heights == QUOIN_HEIGHTS_NONE ? "a ground of heights where there are none" : nullptr;
 }
 
 const char* what_is_wrong(const quoin_load_options& options) {
@@ -120,7 +156,9 @@ const char* what_is_wrong(const quoin_load_options& options) {
   if (options.mesh_voxels < 0 || !(options.voxel_size >= 0.0) || !std::isfinite(options.voxel_size))
     return "a size of voxels that cannot be";
   if (options.mesh_voxels != 0 && options.voxel_size != 0.0) return "both sizes of voxels";
-  return nullptr;
+  if (options.raw_scalar < QUOIN_UINT8 || options.raw_scalar > QUOIN_FLOAT64) return "no scalar has this number";
+  if (is_raw(options) && options.heights != QUOIN_HEIGHTS_NONE) return "a file of both values alone and heights";
+  return what_is_wrong_with_landscape(options);
 }
 
 }  // namespace
@@ -170,6 +208,13 @@ void place(SceneBody& scene, SceneGrid grid, DVec3 position, std::size_t* out) {
   scene.numbers.grids.push_back(instance.grid);
   scene.numbers.instances.push_back(scene.loaded.scene.add_instance(std::move(instance)));
   if (out != nullptr) *out = scene.numbers.grids.size() - 1;
+}
+
+Result<LoadOptions> load_options_of(const quoin_load_options* given) {
+  const auto whole = taken_or_default(given);
+  if (!whole) return make_error(ErrorCode::InvalidArgument, "the size of the options");
+  if (const char* wrong = what_is_wrong(*whole)) return make_error(ErrorCode::InvalidArgument, wrong);
+  return options_of(*whole);
 }
 
 const char* what_is_wrong(const quoin_type& type) {
@@ -244,11 +289,21 @@ quoin_status quoin_scene_load_bytes(const void* data, std::size_t bytes, quoin_s
 quoin_status quoin_scene_load_with(const char* path, const quoin_load_options* options, quoin_scene* out) {
   return guarded([&] {
     if (path == nullptr || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "path or out is null");
-    const auto given = taken_or_default(options);
-    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "the size of the options");
-    if (const char* wrong = what_is_wrong(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
-    return give(load_scene(std::filesystem::path(path), options_of(*given), threads_of(given->threads), progress()),
-                out);
+    const auto wanted = load_options_of(options);
+    if (!wanted) return fail(wanted.error());
+    const Threads threads = threads_of(options == nullptr ? 0 : options->threads);
+    return give(load_scene(std::filesystem::path(path), *wanted, threads, progress()), out);
+  });
+}
+
+quoin_status quoin_scene_load_bytes_with(const void* data, std::size_t bytes, const quoin_load_options* options,
+                                         quoin_scene* out) {
+  return guarded([&] {
+    if ((data == nullptr && bytes > 0) || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "data or out is null");
+    const auto wanted = load_options_of(options);
+    if (!wanted) return fail(wanted.error());
+    const Threads threads = threads_of(options == nullptr ? 0 : options->threads);
+    return give(load_scene(std::span(static_cast<const std::byte*>(data), bytes), *wanted, threads, progress()), out);
   });
 }
 

@@ -292,6 +292,23 @@ class Scenes(unittest.TestCase):
         self.assertTrue((scene.palette[mesh.types] == mesh.colours).all())
         self.assertIsNone(scene.grids[0].mesh(smooth=True).types)
 
+    def test_a_watertight_mesh_is_closed(self):
+        voxels = np.zeros((6, 6, 6), np.uint16)
+        voxels[1:5, 1, 1:5] = 1
+        voxels[2, 1:4, 2] = 2  # meets the middle of a face, whose corners lie elsewhere
+        grid = quoin.from_numpy(voxels, [(200, 0, 0), (0, 200, 0)]).grids[0]
+
+        def open_edges(mesh):
+            _, same = np.unique(mesh.positions, axis=0, return_inverse=True)
+            corners = same.reshape(-1)[mesh.triangles]
+            edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
+            return int((np.unique(edges, axis=0, return_counts=True)[1] % 2).sum())
+
+        self.assertGreater(open_edges(grid.mesh()), 0)
+        self.assertEqual(open_edges(grid.mesh(watertight=True)), 0)
+        with self.assertRaises((TypeError, ValueError)):
+            grid.mesh(watertight="wide")
+
 
 class Pages(unittest.TestCase):
     """What is written about the package works as it stands there. The tree has these pages; wheels do not."""

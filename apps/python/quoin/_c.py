@@ -113,7 +113,7 @@ class MeshData(ctypes.Structure):
 
 class MeshOptions(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("smooth", ctypes.c_int32), ("no_occlusion", ctypes.c_int32),
-                ("threads", ctypes.c_int32)]
+                ("threads", ctypes.c_int32), ("reserved", ctypes.c_int32), ("watertight", ctypes.c_int32)]
 
 
 class RenderOptions(ctypes.Structure):

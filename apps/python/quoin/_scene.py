@@ -184,10 +184,15 @@ class Grid:
                                         out.ctypes.data, out.size))
         return out
 
-    def mesh(self, smooth: bool = False, occlusion: bool = True, threads: int = 0) -> Mesh:
-        """Its surface: merged faces of blocks, or a smooth one around them."""
+    def mesh(self, smooth: bool = False, occlusion: bool = True, threads: int = 0, watertight: bool = False) -> Mesh:
+        """Its surface: merged faces of blocks, or a smooth one around them.
+
+        `watertight`: of blocks, faces get further corners where others meet their edges, so that no gaps are seen there.
+        A face has then four vertices or more. Smooth surfaces always are.
+        """
         options = _c.sized(_c.MeshOptions)
         options.smooth, options.no_occlusion = int(smooth), int(not occlusion)
+        options.watertight = int(watertight)
         options.threads = _c.whole(threads, "threads")
         out = ctypes.c_uint64()
         _c.check(_c.lib.quoin_grid_mesh(self._scene._owner.handle, self._number, ctypes.byref(options),

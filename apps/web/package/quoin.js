@@ -12,7 +12,8 @@ export class QuoinError extends Error {
 }
 
 // What quoin_web_struct calls its structs, and where their fields are: pointers and size_t have 4 bytes.
-const structs = { array: 0, gridInfo: 1, type: 2, meshData: 3, meshOptions: 4, renderOptions: 5, hits: 6 };
+const structs = { array: 0, gridInfo: 1, type: 2, meshData: 3, meshOptions: 4, renderOptions: 5, hits: 6,
+                  loadOptions: 7 };
 const scalars = [Uint8Array, Int8Array, Uint16Array, Int16Array, Uint32Array, Int32Array, BigUint64Array, BigInt64Array,
                  Float32Array, Float64Array];
 
@@ -349,34 +350,38 @@ export class Scene {
     }));
   }
 
-  #isSmooth(smooth) {
-    return (smooth ?? this.grids.some((grid) => grid.hasField)) ? 1 : 0;
+  /** Calls use(the address of a quoin_mesh_options). */
+  #withMeshOptions({ smooth, watertight }, use) {
+    const of = this.#instance;
+    return of.withStruct('meshOptions', (at) => {
+      const view = of.view();
+      view.setInt32(at + 4, (smooth ?? this.grids.some((grid) => grid.hasField)) ? 1 : 0, true);
+      view.setInt32(at + 20, watertight ? 1 : 0, true);
+      return use(at);
+    });
   }
 
   glb(options) {
     return this.file('.glb', options);
   }
 
-  file(extension, { smooth, progress } = {}) {
+  file(extension, { progress, ...options } = {}) {
     const of = this.#instance;
     const write = (wanted, name, out) => {
-      of.view().setInt32(wanted + 4, this.#isSmooth(smooth), true);
       of.call('quoin_web_write', this.#handle, name, wanted, out, out + 4);
       const at = of.view().getUint32(out, true);
       const bytes = of.numbers(Uint8Array, at, of.view().getUint32(out + 4, true));
       of.run('quoin_web_release');
       return bytes;
     };
-    return of.listened(progress, () => of.withStruct('meshOptions', (wanted) =>
+    return of.listened(progress, () => this.#withMeshOptions(options, (wanted) =>
       of.withText(extension, (name) => of.with(8, (out) => write(wanted, name, out)))));
   }
 
-  mesh(grid, { smooth, progress } = {}) {
+  mesh(grid, { progress, ...options } = {}) {
     const of = this.#instance;
-    return of.listened(progress, () => of.withStruct('meshOptions', (wanted) => {
-      of.view().setInt32(wanted + 4, this.#isSmooth(smooth), true);
-      return of.takeMesh(of.handle('quoin_grid_mesh', this.#handle, index(grid), wanted));
-    }));
+    return of.listened(progress, () => this.#withMeshOptions(options, (wanted) =>
+      of.takeMesh(of.handle('quoin_grid_mesh', this.#handle, index(grid), wanted))));
   }
 
   read(grid, min, shape) {
@@ -544,7 +549,8 @@ function doubles(list) {
 
 export async function load(bytes, options = {}) {
   if (!isBytes(bytes)) throw new QuoinError('invalid_argument', 'bytes are an ArrayBuffer or a typed array');
-  if (options.small) {
+  // What is said of the file itself, and not by it, the small module does not read.
+  if (options.small && options.raw === undefined && options.heights === undefined) {
     const scene = loaded(await small.alive(), bytes, options);
     if (scene !== undefined) return scene;
   }
@@ -555,12 +561,63 @@ export async function load(bytes, options = {}) {
 }
 
 /** The scene that a module reads; undefined where it does not read such files. */
-function loaded(of, bytes, { progress }) {
+function loaded(of, bytes, { progress, ...options }) {
   return of.withBytes(bytes, (at) => {
     if (of.isSmall && of.run('quoin_web_reads', at, bytes.byteLength) === 0) return undefined;
-    const handle = of.listened(progress, () => of.handle('quoin_scene_load_bytes', at, bytes.byteLength));
+    const handle = of.listened(progress, () => of.withStruct('loadOptions', (wanted) => {
+      putLoadOptions(of.view(), wanted, options);
+      return of.handle('quoin_scene_load_bytes_with', at, bytes.byteLength, wanted);
+    }));
     return new Scene(of, handle);
   });
+}
+
+const scalarNames = ['uint8', 'int8', 'uint16', 'int16', 'uint32', 'int32', 'uint64', 'int64', 'float32', 'float64'];
+const heightEncodings = ['none', 'grey', 'mapbox', 'terrarium'];
+
+/** The place of a name among others, of which the first `skipped` cannot be asked for. */
+function numberOf(name, names, what, skipped = 0) {
+  const found = names.indexOf(name);
+  if (found < skipped) throw new QuoinError('invalid_argument', `${what} is ${names.slice(skipped).join(', ')}`);
+  return found;
+}
+
+/** `value`, or 0, which stands for its default, where it is not given. */
+function amount(value, what) {
+  if (value === undefined) return 0;
+  if (typeof value !== 'number' || !(value > 0 && value < Infinity))
+    throw new QuoinError('invalid_argument', `${what} is to be a number above 0`);
+  return value;
+}
+
+function whole32(value, what, least) {
+  if (value === undefined) return 0;
+  if (int32(value, what) < least) throw new QuoinError('invalid_argument', `${what} is ${least} or more`);
+  return value;
+}
+
+/** Writes a quoin_load_options. */
+function putLoadOptions(view, at, { showHidden, frame, radius, iso, meshVoxels, voxelSize, raw, heights }) {
+  const ints = (from, ...values) => values.forEach((value, i) => view.setInt32(at + from + 4 * i, value, true));
+  const doubles = (from, ...values) => values.forEach((value, i) => view.setFloat64(at + from + 8 * i, value, true));
+  if (iso !== undefined && (typeof iso !== 'number' || !Number.isFinite(iso)))
+    throw new QuoinError('invalid_argument', 'iso is no number');
+  ints(8, showHidden ? 1 : 0, whole32(frame, 'frame', 0), whole32(radius, 'radius', 1), iso === undefined ? 0 : 1);
+  view.setFloat32(at + 24, iso ?? 0, true);
+  ints(28, whole32(meshVoxels, 'meshVoxels', 1));
+  doubles(32, amount(voxelSize, 'voxelSize'));
+  if (raw !== undefined) {
+    const shape = three(raw?.shape, 'raw.shape').map((length) => whole32(length, 'raw.shape', 1));
+    ints(40, ...shape, numberOf(raw.type ?? 'uint8', scalarNames, 'raw.type'), raw.bigEndian ? 1 : 0);
+  }
+  if (heights !== undefined) {
+    const { encoding, metresPerLevel, metresPerPixel, metresPerVoxel, exaggeration, groundDepth, smooth } =
+      heights ?? {};
+    ints(60, numberOf(encoding, heightEncodings, 'heights.encoding', 1));
+    doubles(64, amount(metresPerLevel, 'heights.metresPerLevel'), amount(metresPerPixel, 'heights.metresPerPixel'),
+            amount(metresPerVoxel, 'heights.metresPerVoxel'), amount(exaggeration, 'heights.exaggeration'));
+    ints(96, whole32(groundDepth, 'heights.groundDepth', 1), smooth ? 1 : 0);
+  }
 }
 
 /** Calls use(instance, the address of the array's description). */

@@ -2,6 +2,7 @@
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import { closeGapsOf, setPictureHeight } from './gaps.js';
 import { isDrawnByProgram, PlainModel, prepare } from './plain.js';
 
 const $ = (id) => document.getElementById(id);
@@ -83,7 +84,7 @@ function ask(name, options, tell) {
 let rest;  // the timer after which what was drawn plainly is drawn well
 
 function draw() {
-  frame = 0;
+  forgetFrame();
   clearTimeout(rest);
   rest = undefined;
   plain?.show(false);
@@ -92,15 +93,28 @@ function draw() {
   renderer.render(marched?.isShown ? tape : stage, camera);
 }
 
+/** Who draws now need not once more with the next frame. */
+function forgetFrame() {
+  cancelAnimationFrame(frame);
+  frame = 0;
+}
+
 /** Draws at once, on a program plainly until nothing has changed for a while. */
 function drawSoon() {
   if (!isSlow || marched?.isShown) return draw();
-  frame = 0;
+  forgetFrame();
   plain?.show(true);
   sun.castShadow = false;
   renderer.render(stage, camera);
+  if (plain) drawWellLater();
+}
+
+/** Draws well where nothing changes for a while after the plain picture is there, however long that takes. */
+async function drawWellLater() {
   clearTimeout(rest);
-  rest = plain && setTimeout(draw, 600);
+  const wanted = rest = setTimeout(() => {}, 0);
+  await pictureIsThere();
+  if (rest === wanted) rest = setTimeout(draw, 600);
 }
 
 function redraw() {
@@ -165,6 +179,7 @@ function changed() {
 function resize() {
   renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
   renderer.setSize(innerWidth, innerHeight, false);
+  setPictureHeight(renderer, canvas.height);
   camera.aspect = innerWidth / innerHeight;
   camera.updateProjectionMatrix();
   changed();
@@ -223,9 +238,25 @@ function untilTheNext() {
   return () => now === openings;
 }
 
+/** For GLTFLoader, which would fetch the pictures that lie in the file it was given. */
+function picturesFromMemory(parser) {
+  const picture = async ({ bufferView, mimeType }) => {
+    const blob = new Blob([await parser.getDependency('bufferView', bufferView)], { type: mimeType });
+    const texture = new THREE.Texture(await createImageBitmap(blob, { premultiplyAlpha: 'none' }));
+    texture.needsUpdate = true;
+    return texture;
+  };
+  return {
+    name: 'pictures from memory',
+    async beforeRoot() {
+      (parser.json.images ?? []).forEach((image, i) => { parser.sourceCache[i] = picture(image); });
+    },
+  };
+}
+
 /** False where another file was chosen meanwhile, and nothing was done. */
 async function show(bytes, isCurrent) {
-  const { scene } = await new GLTFLoader().parseAsync(bytes.buffer, '');
+  const { scene } = await new GLTFLoader().register(picturesFromMemory).parseAsync(bytes.buffer, '');
   if (!isCurrent()) return false;
   plain?.dispose();
   model?.removeFromParent();
@@ -240,6 +271,7 @@ async function show(bytes, isCurrent) {
     object.castShadow = !object.material.transparent;
     object.receiveShadow = true;
   });
+  closeGapsOf(model);
   stage.add(model);
   if (isSlow) plain = new PlainModel(model);
   const box = new THREE.Box3().setFromObject(model);

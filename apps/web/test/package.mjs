@@ -13,12 +13,15 @@ writeFileSync(join(folder, 'package.json'), '{"type": "module", "private": true}
 run('npm', 'install', '--silent', '--no-audit', '--no-fund', '--offline', tarball);
 writeFileSync(join(folder, 'use.ts'), `
 import { load, meshLabels, start, surfaceNets, toThree, QuoinError } from 'quoin';
-import type { ErrorCode, Hits, LabelMesh, Mesh, Scene } from 'quoin';
+import type { ErrorCode, Heights, Hits, LabelMesh, LoadOptions, Mesh, Scene } from 'quoin';
 
 export async function use(bytes: Uint8Array): Promise<number> {
   await start(undefined, { small: true });
-  const scene: Scene = await load(bytes, { small: true, progress: (fraction) => fraction < 2 });
-  const glb: Uint8Array = scene.glb({ smooth: false });
+  const scene: Scene = await load(bytes, { small: true, frame: 2, progress: (fraction) => fraction < 2 });
+  const glb: Uint8Array = scene.glb({ smooth: false, watertight: true });
+  const heights: Heights = { encoding: 'grey', metresPerPixel: 2 };
+  const options: LoadOptions = bytes.length === 8 ? { raw: { shape: [2, 2, 2], type: 'uint8' }, iso: 3 } : { heights };
+  await load(bytes, options);
   const mesh: Mesh = await surfaceNets(new Float32Array(8), [2, 2, 2], 0.5, { spacing: [1, 1, 2] });
   const picture = scene.render({ width: 8, height: 8, camera: { position: [1, 2, 3], lookAt: [0, 0, 0] } });
   const hits: Hits = scene.rays([0, 9, 0], new Float32Array([0, -1, 0]), { maxT: 20 });
@@ -38,6 +41,8 @@ export async function use(bytes: Uint8Array): Promise<number> {
 }
 // @ts-expect-error: bytes, not a path
 void load('castle.vox');
+// @ts-expect-error: no type of numbers
+void load(new Uint8Array(8), { raw: { shape: [2, 2, 2], type: 'int12' } });
 // @ts-expect-error: labels are whole numbers
 void meshLabels(new Float32Array(8), [2, 2, 2]);
 `);
@@ -53,6 +58,6 @@ console.log(\`package: \${scene.grids.length} grids, a GLB of \${scene.glb().len
 process.stdout.write(run(process.execPath, 'use.mjs', file));
 const licences = readFileSync(join(folder, 'node_modules/quoin/LICENSES'), 'utf8');
 for (const name of ['zlib', 'libpng', 'LLVM', 'wasi-libc', 'GLM', 'nlohmann-json', 'robin-map', 'tl::expected',
-                    'tinygltf', 'tinyobjloader'])
+                    'tinygltf', 'tinyobjloader', 'meshoptimizer'])
   if (!licences.includes(`======== ${name}`)) throw new Error(`the package does not have the licence of ${name}`);
 rmSync(folder, { recursive: true });

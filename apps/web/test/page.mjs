@@ -54,6 +54,34 @@ try {
   check(first.counted > 100, `the picture has ${first.counted} colours`);
   if (picture) await writeFile(picture, first.shot);
 
+  // Pixels unlike all their neighbours: what is behind shows there between faces of several sizes.
+  const lonely = (shot) => tab.evaluate(async (bytes) => {
+    const bitmap = await createImageBitmap(new Blob([new Uint8Array(bytes)]));
+    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+    context.drawImage(bitmap, 0, 0);
+    const { data, width, height } = context.getImageData(100, 60, 850, 560);
+    const steps = [-1, 0, 1].flatMap((y) => [-1, 0, 1].map((x) => 4 * (y * width + x))).filter((step) => step !== 0);
+    const differ = (one, other) => Math.max(...[0, 1, 2].map((k) => Math.abs(data[one + k] - data[other + k]))) > 60;
+    let count = 0;
+    for (let y = 1; y < height - 1; ++y) {
+      for (let x = 1; x < width - 1; ++x) {
+        const at = 4 * (y * width + x);
+        count += steps.every((step) => differ(at, at + step)) ? 1 : 0;
+      }
+    }
+    return count;
+  }, [...shot]);
+  const gaps = await lonely(first.shot);
+  const open = await browser.newPage({ viewport: { width: 1280, height: 720 } });
+  const script = await readFile(join(page, 'page.js'), 'utf8');
+  await open.route('**/page.js', (route) => route.fulfill({
+    contentType: 'text/javascript', body: script.replace('mvPosition.xyz += 1.414', 'mvPosition.xyz += 0.0') }));
+  await open.goto(`${site}?file=castle.vox`);
+  await open.waitForFunction(() => window.quoinPage !== undefined, undefined, { timeout: 60_000 });
+  const gapsBefore = await lonely(await open.screenshot());
+  await open.close();
+  check(gaps < 30 && gapsBefore > 60, `pixels unlike all their neighbours: ${gaps}; faces as they are: ${gapsBefore}`);
+
   const download = async (button, timeout = 60_000) => {
     const [got] = await Promise.all([tab.waitForEvent('download', { timeout }), tab.click(button)]);
     return { name: got.suggestedFilename(), bytes: await readFile(await got.path()) };
