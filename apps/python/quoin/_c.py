@@ -128,6 +128,15 @@ class HitArrays(ctypes.Structure):
                 ("type", ctypes.c_void_p), ("normal", ctypes.c_void_p)]
 
 
+class Layer(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("name", ctypes.c_char * 128), ("visible", ctypes.c_int32)]
+
+
+class Sun(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("direction", ctypes.c_double * 3), ("brightness", ctypes.c_double),
+                ("colour", ctypes.c_float * 3), ("angle_degrees", ctypes.c_double)]
+
+
 Progress = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_double, ctypes.c_void_p)
 NOBODY = ctypes.cast(0, Progress)
 
@@ -168,6 +177,15 @@ _SIGNATURES = {
     "quoin_mesh_labels": (_p, ctypes.c_int64, _i, _i, _p),
     "quoin_mesh_view": (_handle, _p),
     "quoin_scene_render": (_handle, _p, _p, _n),
+    "quoin_layer_count": (_handle, _p),
+    "quoin_layer_get": (_handle, _n, _p),
+    "quoin_layer_set": (_handle, _p),
+    "quoin_instance_set_layer": (_handle, _n, ctypes.c_char_p),
+    "quoin_group_add": (_handle, _p, _p),
+    "quoin_camera_add": (_handle, _p),
+    "quoin_lamp_add": (_handle, _p),
+    "quoin_sun_get": (_handle, _p),
+    "quoin_sun_set": (_handle, _p),
     "quoin_scene_rays": (_handle, _n, _p, _p, ctypes.c_double, _p),
 }
 for _name, _arguments in _SIGNATURES.items():
