@@ -70,7 +70,7 @@ typedef struct quoin_array {
   const void* data;
   int32_t scalar; /* quoin_scalar */
   int64_t shape[3];
-  int64_t strides[3]; /* bytes, of any sign */
+  int64_t strides[3]; /* bytes, of any sign; all three 0: without gaps, z fastest and x slowest */
   double spacing[3];  /* of neighbours; all three 0: 1 */
   double origin[3];   /* where sample (0, 0, 0) lies */
 } quoin_array;
@@ -271,7 +271,8 @@ QUOIN_API quoin_status quoin_scene_get_info(quoin_scene scene, quoin_scene_info*
 /* What files can be read and written. */
 QUOIN_API quoin_status quoin_format_count(size_t* out);
 QUOIN_API quoin_status quoin_format_get(size_t index, quoin_format* out);
-/* By the name's ending: .quoin, .json and .vox hold voxels; .glb, .gltf, .obj and .ply their meshes, of blocks. */
+/* By the name's ending: .quoin, .json, .vox and others hold voxels; .glb, .gltf, .obj, .ply, .stl and .3mf their
+ * meshes, of blocks. quoin_format_get tells all. */
 QUOIN_API quoin_status quoin_scene_save(quoin_scene scene, const char* path);
 /* One line each: first of what reading left out, and voxelizing merged, then of what the last save left out. */
 QUOIN_API quoin_status quoin_scene_warning_count(quoin_scene scene, size_t* out);
@@ -331,6 +332,11 @@ QUOIN_API quoin_status quoin_scene_render(quoin_scene scene, const quoin_render_
  * builds a tree, which the scene keeps and brings up to date. */
 QUOIN_API quoin_status quoin_scene_rays(quoin_scene scene, size_t count, const double* origins,
                                         const double* directions, double max_t, const quoin_hits* out);
+
+/* Changes the voxels of a grid from array->origin on, in its own voxels, rounded down: all of the box of the array
+ * become the types (QUOIN_UINT8 or QUOIN_UINT16) that it holds, 0 air. What quoin_grid_read read goes back so. Where
+ * the scene has not all of its types nothing changes. */
+QUOIN_API quoin_status quoin_grid_write(quoin_scene scene, size_t grid, const quoin_array* array);
 
 /* What is put into a scene beside its grids. Which of it a format holds, and what saving left out, warnings say. */
 

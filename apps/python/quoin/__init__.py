@@ -53,6 +53,8 @@ def png(picture: NdArray) -> bytes:
     >>> png(np.zeros((2, 3, 3), np.uint8))[:8]
     b'\\x89PNG\\r\\n\\x1a\\n'
     """
+    if not isinstance(picture, np.ndarray):
+        raise TypeError("a picture is a NumPy array")
     if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] not in (3, 4) or not picture.size:
         raise ValueError("a picture is uint8, (height, width, 3) or (height, width, 4)")
     height, width, channels = picture.shape

@@ -200,6 +200,20 @@ class Grid:
                                         out.ctypes.data, out.size))
         return out
 
+    def write(self, array: NdArray, origin: Optional[Sequence[float]] = None) -> None:
+        """Changes its voxels: the box of an array [x, y, z] of uint8 or uint16 from `origin` on becomes what that holds,
+        0 for air. Without it begins where `to_numpy` does. A file that was read keeps what else it has when it is saved.
+
+        >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0), (0, 0, 255)])
+        >>> types = scene.grids[0].to_numpy()
+        >>> types[0] = 2
+        >>> scene.grids[0].write(types)
+        >>> scene.grids[0].to_numpy()[:, 0, 0].tolist()
+        [2, 1]
+        """
+        given = _c.types_of(array, self.origin if origin is None else origin)
+        _c.check(_c.lib.quoin_grid_write(self._scene._owner.handle, self._number, ctypes.byref(given)))
+
     def mesh(self, smooth: bool = False, occlusion: bool = True, threads: int = 0) -> Mesh:
         """Its surface: merged faces of blocks, or a smooth one around them."""
         options = _c.sized(_c.MeshOptions)
@@ -352,7 +366,7 @@ class Scene:
 
     def add(self, array: NdArray, origin: Sequence[float] = (0, 0, 0), name: str = "") -> Grid:
         """Adds a grid of the types in an array [x, y, z] of uint8 or uint16, 0 for air, which is read as it lies."""
-        given = _c.array_of(array, (1, 1, 1), origin)
+        given = _c.types_of(array, origin)
         out = ctypes.c_size_t()
         _c.check(_c.lib.quoin_grid_add(self._owner.handle, ctypes.byref(given), _c.name_of(name), ctypes.byref(out)))
         return Grid(self, out.value)
@@ -490,11 +504,11 @@ class Scene:
         _c.check(_c.lib.quoin_scene_save(self._owner.handle, _c.path_of(path)))
 
     def render(self, width: int = 1280, height: int = 720, *, samples: int = 0, paths: bool = False,
-               camera: Optional[Sequence[float]] = None, look_at: Sequence[float] = (0, 0, 0), fov: float = 45.0,
+               camera: Optional[Sequence[float]] = None, look_at: Optional[Sequence[float]] = None, fov: float = 45.0,
                sun: Optional[Sequence[float]] = None, out: Optional[NdArray] = None, threads: int = 0) -> NdArray:
-        """A picture, uint8 (height, width, 3), sRGB. Without a camera the whole scene is shown. `paths`: light with its
-        bounces and soft shadows, which takes longer. `sun`: from the scene towards it, of any length; the sky follows
-        it. `out` is filled in place where it is given."""
+        """A picture, uint8 (height, width, 3), sRGB. Without a camera the whole scene is shown; one looks at (0, 0, 0)
+        unless `look_at` says otherwise. `paths`: light with its bounces and soft shadows, which takes longer. `sun`:
+        from the scene towards it, of any length; the sky follows it. `out` is filled in place where it is given."""
         width, height = (_c.whole(v, "the picture's size") for v in (width, height))
         if width <= 0 or height <= 0:
             raise ValueError("a picture has pixels")
@@ -503,9 +517,12 @@ class Scene:
         options.paths, options.threads = int(paths), _c.whole(threads, "threads")
         if camera is not None:
             options.has_camera, options.fov_degrees = 1, fov
-            options.camera[:], options.look_at[:] = camera, look_at
+            options.camera[:] = _c.three(camera, "camera")
+            options.look_at[:] = _c.three((0, 0, 0) if look_at is None else look_at, "look_at")
+        elif look_at is not None:
+            raise ValueError("look_at is of a camera, which is not given")
         if sun is not None:
-            options.has_sun, options.sun[:] = 1, sun
+            options.has_sun, options.sun[:] = 1, _c.three(sun, "sun")
         if out is None:
             out = np.empty((height, width, 3), np.uint8)
         elif not isinstance(out, np.ndarray):
@@ -574,6 +591,8 @@ def from_numpy(array: NdArray, palette: Iterable[Union[VoxelType, Colour]], name
     """A scene of one grid. `array` [x, y, z] has 0 for air and i for the i-th entry of the palette, from 1 on."""
     scene = Scene()
     for one in palette:
+        if not isinstance(one, Iterable):
+            raise TypeError("a palette is a list of colours: [(200, 40, 40), ...]")
         scene.add_type(one)
     scene.add(array, name=name)
     return scene
