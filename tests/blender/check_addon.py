@@ -610,6 +610,18 @@ def main():
     require(quoin_voxels.quoin.__file__.startswith(scripts), "with its own package")
     menus = (bpy.types.TOPBAR_MT_file_import, bpy.types.TOPBAR_MT_file_export)
     require(all(any("quoin_voxels" in one.__module__ for one in menu._dyn_ui_initialize()) for menu in menus), "menus")
+    # Installed over itself, as a newer version is, with its library in use.
+    before = quoin_voxels.quoin
+    kept = before.load(castle)
+    for stays in range(2):
+        with open(os.path.join(os.path.dirname(quoin_voxels.__file__), "stale.py"), "w") as file:
+            file.write("")
+        os.utime(quoin_voxels.__file__, (1e9, 1e9 + stays))
+        bpy.ops.preferences.addon_install(filepath=addon)
+        bpy.ops.preferences.addon_enable(module="quoin_voxels")
+        require(not os.path.exists(os.path.join(os.path.dirname(quoin_voxels.__file__), "stale.py")), "what was there goes")
+    require(quoin_voxels.quoin is not before and len(quoin_voxels.quoin.load(castle).grids) == len(kept.grids),
+            "the new library is loaded, and the old one still works")
     quoin = quoin_voxels.quoin
     check_castle(quoin, castle, folder)
     check_file(quoin, folder)

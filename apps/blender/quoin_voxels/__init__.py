@@ -14,7 +14,13 @@ bl_info = {
 }
 
 import os
+import sys
 import time
+
+if "bpy" in locals():  # reloaded, since another version was installed over this one: so is what belongs to it
+    for _name in [one for one in sys.modules if one.startswith(__name__ + ".")]:
+        globals().pop(_name[len(__name__) + 1:], None)
+        del sys.modules[_name]
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty

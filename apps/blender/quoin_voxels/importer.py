@@ -10,6 +10,10 @@ from mathutils import Matrix, Vector
 from . import axes, kept, materials, places, quoin, versions
 
 
+# Formats of Quoin's own, whose sizes are meant.
+_OUR_OWN = {"scene", "world"}
+
+
 class Imported:
     """What an import made, and what it left out."""
 
@@ -262,6 +266,18 @@ def _lights(context, scene, top, name, options, made):
         made.objects += 1
 
 
+def _on_lattice(scene, matrix):
+    """A place whose voxels are as large as they are to be, on the lattice: of the one grid of a file in a unit of its
+    own, such as one of triangles. Others stay as they are."""
+    size = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
+    if abs(size - 1.0) < 1e-6 or scene.format in _OUR_OWN or len(scene.instances) != 1 or not scene.grids[0].voxels:
+        return matrix
+    out = matrix / size
+    out[:3, 3] = np.round(out[:3, 3])
+    out[3, 3] = 1.0
+    return out
+
+
 def _place(scene, top, name, looks, options, made, progress):
     groups = _collections(scene, top)
     grids, instances, meshes = scene.grids, scene.instances, {}
@@ -280,7 +296,7 @@ def _place(scene, top, name, looks, options, made, progress):
             empty += 1
             continue
         made_object = bpy.data.objects.new(one.name or mesh.name, mesh)
-        made_object.matrix_world = Matrix(axes.matrix_to_blender(one.matrix, options.scale))
+        made_object.matrix_world = Matrix(axes.matrix_to_blender(_on_lattice(scene, one.matrix), options.scale))
         is_shown = one.shown or one.group in hidden_groups  # which their collections hide
         made_object.hide_render = made_object.hide_viewport = not (one.visible and is_shown)
         if one.layer:
