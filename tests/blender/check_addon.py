@@ -497,6 +497,28 @@ def check_edits(quoin, folder):
     require(not kept.keep(mesh, scene.grids[0], scene.types, 0.1, {}), "a box of two voxels")
 
 
+def check_many_types(quoin, folder):
+    """More types than a .vox holds: near colours are merged, what differs in more than colour is not."""
+    empty()
+    array = np.arange(1, 1001, dtype=np.uint16).reshape(10, 10, 10)
+    colours = [((i * 7) % 256, (i * 13) % 256, i // 4) for i in range(999)]
+    path = os.path.join(folder, "many.json")
+    quoin.from_numpy(array, colours + [quoin.VoxelType((9, 9, 9, 255), "lamp", emission=5.0)]).save(path)
+    run(bpy.ops.import_scene.quoin, filepath=path)
+    for ending, wanted in ((".vox", 255), (".json", 1000)):
+        told = reported(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "fewer" + ending))
+        made = quoin.load(os.path.join(folder, "fewer" + ending))
+        types = made.grids[0].to_numpy()
+        used = np.unique(types)
+        require(len(used) == wanted and types.size == 1000, f"{ending}: {len(used)} types")
+        require(any("of 1000 those" in one for one in told) == (ending == ".vox"), f"{ending}: {told}")
+        lamp = made.types[int(types[-1, -1, -1])]
+        require(lamp.emission == 5.0 and lamp.rgba[:3] == (9, 9, 9), f"{ending}: {lamp}")
+        found = made.palette[types][..., :3].reshape(-1, 3)[:999].astype(int)
+        off = np.abs(found - np.array(colours)).mean()
+        require(off < 16 if ending == ".vox" else off == 0, f"{ending}: colours are off by {off}")
+
+
 def plane(faces):
     """A square of faces x faces quads at z = 0.05, whose places on a texture are its own."""
     x, y = np.meshgrid(np.arange(faces + 1), np.arange(faces + 1))
@@ -627,6 +649,7 @@ def main():
     check_file(quoin, folder)
     check_round_trip(quoin, folder)
     check_own_scene(quoin, folder)
+    check_many_types(quoin, folder)
     check_voxelized(quoin, folder)
     check_edits(quoin, folder)
     check_colours(quoin, folder)

@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-from . import axes, kept, materials, places, quoin, views
+from . import axes, kept, materials, merging, places, quoin, views
 
 
 class Exported:
@@ -278,6 +278,9 @@ def export_file(context, path, options):
         raise ValueError("There is nothing to export" + (": nothing is selected" if options.use_selection else ""))
     if options.lights:
         writer.made.warnings += views.write(context, writer.scene, writer.ending, tree, options)
+    if merged := merging.merge(writer.scene, writer.ending):
+        writer.made.warnings.append(f"{writer.ending} holds {merging.MOST_TYPES[writer.ending]} types: of {merged} those "
+                                    "whose colours are alike were merged")
     writer.scene.save(path)
     writer.made.warnings += writer.scene.warnings
     return writer.made
