@@ -97,6 +97,7 @@ struct PathPart {
 
   PathTracer tracer;
   DBox bounds;
+  PathMemory memory;
 };
 
 /// What pictures of smooth surfaces are marched through.
@@ -143,6 +144,7 @@ struct CpuBackend::Impl {
   void publish(Result<Picture> picture, const ViewRequest& of, const Stage& stage, double seconds);
   [[nodiscard]] Stage first_stage() const;
   [[nodiscard]] std::optional<Stage> finest(bool is_draft, double patience) const;
+  [[nodiscard]] bool may_begin(int divisor) const;
   void note_speed(const Stage& drawn, const ViewRequest& of, double seconds);
   void tell() const {
     if (on_frame) on_frame();
@@ -208,6 +210,7 @@ void CpuBackend::Impl::work() {
 void CpuBackend::Impl::update(std::unique_lock<std::mutex>& lock) {
   lock.unlock();
   renderer.update(options.threads);
+  if (paths) paths->memory.note_edit();
   count_bytes();
   lock.lock();
   is_stale = false;
@@ -216,7 +219,8 @@ void CpuBackend::Impl::update(std::unique_lock<std::mutex>& lock) {
 // Paths are taken through structures of their own, as large as the others.
 void CpuBackend::Impl::count_bytes() {
   const std::size_t structures = renderer.tracer().bytes();
-  std::size_t all = paths ? 2 * structures : structures;
+  std::size_t all = structures;
+  if (paths) all += structures + paths->memory.bytes();
   if (smooth) all += smooth->fields.bytes() + (smooth->renderer ? smooth->renderer->tracer().bytes() : 0);
   held = all;
 }
@@ -227,10 +231,16 @@ std::optional<Stage> CpuBackend::Impl::finest(bool is_draft, double patience) co
   if (each <= 0.0) return chosen;
   for (const int divisor : kDivisors) {
     const Stage finer{divisor, 1, is_draft};
+    if (!may_begin(divisor)) continue;
     const bool is_as_before = divisor == first.divisor && is_draft == first.is_draft;
     if (finer.pixels(*request) * each <= patience * (is_as_before ? kConstancy : 1.0)) chosen = finer;
   }
   return chosen;
+}
+
+// After an edit pictures by paths go on from such as there were before it.
+bool CpuBackend::Impl::may_begin(int divisor) const {
+  return request->mode != DrawMode::Paths || !paths || paths->memory.may_begin(*request, divisor);
 }
 
 // As large as there is time for; a draft where a picture in full light would be smaller than a half.
@@ -238,7 +248,11 @@ Stage CpuBackend::Impl::first_stage() const {
   if (request->whole_only) return {};
   const double patience = options.first_frame_seconds * (is_camera_new ? 1.0 : kPatienceAfterEdits);
   const std::optional<Stage> full = finest(false, patience);
-  if (!has_drafts(*request)) return full.value_or(Stage{kDivisors.front()});
+  if (!has_drafts(*request)) {
+    if (full) return *full;
+    const auto* const coarsest = std::find_if(kDivisors.begin(), kDivisors.end(), [&](int d) { return may_begin(d); });
+    return {coarsest != kDivisors.end() ? *coarsest : kDivisors.front()};
+  }
   if (full && full->divisor <= 2) return *full;
   return finest(true, patience).value_or(Stage{kDivisors.front(), 1, true});
 }
@@ -298,6 +312,8 @@ Result<Picture> CpuBackend::Impl::path_picture(const ViewRequest& wanted, const 
       wanted.camera, path_options(wanted, now.width(wanted), now.height(wanted), now.samples, paths->bounds),
       options.threads, goes_on);
   if (!taken) return taken.error();
+  paths->memory.of(wanted).refine(*taken, now.samples, options.threads);
+  count_bytes();
   auto colour = develop(*taken, develop_options(wanted));
   if (!colour) return colour.error();
   Picture picture;
@@ -361,7 +377,7 @@ void CpuBackend::Impl::publish(Result<Picture> picture, const ViewRequest& of, c
     error = picture.error();
     return;
   }
-  const bool is_whole = drawn.divisor == 1;
+  const bool is_whole = picture->colour.width == of.width && picture->colour.height == of.height;
   frame = ViewFrame{std::move(picture->colour), nullptr, drawn.samples, is_whole,
                     drawn.is_last(of),          seconds, picture->rays};
   if (drawn.samples == 1) note_speed(drawn, of, seconds);

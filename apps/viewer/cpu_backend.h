@@ -26,7 +26,8 @@ struct CpuBackendOptions {
 /// A new request ends what is under way, but for the coarsest picture: however fast requests come, some are seen.
 ///
 /// DrawMode::Paths goes the same way, without noise within surfaces (PathOptions::denoise), up to 256 samples; what it
-/// needs is made before the first such picture, and let go of likewise.
+/// needs is made before the first such picture, and let go of likewise. After an edit what it did not change stays as
+/// it was while the rest converges anew (PathHistory).
 ///
 /// DrawMode::Smooth is marched as well, through the fields of a SmoothScene: these are made before the first such
 /// picture, follow edits, and are let go of with the first picture of another mode.

@@ -126,6 +126,50 @@ TEST(CpuBackend, PathsConvergeToThePathTracersPicture) {
   EXPECT_FALSE(watched.settle().empty());
 }
 
+TEST(CpuBackend, PathsGoOnAcrossEditsAndBeginAgainWithTheView) {
+  LoadedScene loaded = small_scene();
+  Watched watched(loaded.scene);
+  ViewRequest request = request_for(loaded.scene, View::Iso, 96, 64);
+  request.mode = DrawMode::Paths;
+  watched.backend.show(request);
+  const auto frames = watched.settle();
+  ASSERT_FALSE(frames.empty());
+  const Image before = frames.back().colour;
+  EXPECT_GT(frames.size(), 4U);
+  const GridHandle grid = loaded.scene.grids().handles().front();
+  const auto edited = [&](const IBox& box, VoxelType type) {
+    {
+      const ScenePause pause(watched.backend);
+      loaded.scene.edit(grid).grid.fill_box(box, type);
+    }
+    return watched.settle();
+  };
+  const IBox corner{{61, 0, 31}, {71, 4, 41}};  // of the hill's ground, all of one type
+  const auto after = edited(corner, kAir);
+  ASSERT_FALSE(after.empty());
+  ASSERT_EQ(after.front().colour.width, request.width) << "as large as the one of before, however coarse what is new";
+  EXPECT_TRUE(after.front().is_whole);
+  EXPECT_FALSE(after.front().is_settled);
+  EXPECT_LT(differing(after.front().colour, before, 8), 0.25) << "most of it stays";
+  EXPECT_GT(differing(after.back().colour, before, 8), 0.001);
+  EXPECT_EQ(after.back().samples, kPathSamples);
+  PathOptions options = path_options(request, request.width, request.height, kPathSamples, loaded.scene.bounds());
+  const auto picture = PathTracer(loaded.scene).render(request.camera, options, {2});
+  ASSERT_TRUE(picture.has_value());
+  EXPECT_EQ(after.back().colour.rgb, develop(*picture, develop_options(request)).value().rgb);
+  // What was taken back as well.
+  const auto again = edited(corner, 1);
+  ASSERT_FALSE(again.empty());
+  EXPECT_LT(differing(again.front().colour, before, 8), 0.25);
+  EXPECT_EQ(again.back().colour.rgb, before.rgb);
+  // Of another view nothing is known.
+  request.camera.position.x += 1.0;
+  watched.backend.show(request);
+  const auto elsewhere = watched.settle();
+  ASSERT_FALSE(elsewhere.empty());
+  EXPECT_LT(elsewhere.front().colour.width, request.width);
+}
+
 TEST(CpuBackend, TheSettledPictureIsTheRenderersToTheByte) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);

@@ -24,11 +24,11 @@ struct DeviceBackend::Impl {
     std::string name;
     std::string activity;
     std::vector<std::pair<std::string, std::string>> stats;
-    std::size_t mesh_bytes = 0;
+    std::size_t picture_bytes = 0;
     bool has_scene = false;
     bool traces_light = false;
     bool is_processor = false;  // that acts as a device
-    std::array<bool, 4> is_slow{};
+    std::array<bool, kDrawModes> is_slow{};
   };
 
   Impl(const Scene& of_scene, const DeviceBackendOptions& given, OpenDevice opener, std::function<void()> listener)
@@ -247,7 +247,7 @@ DeviceBackend::Impl::Told DeviceBackend::Impl::tell() const {
   Told now;
   if (drawer->renderer() != nullptr) now.name = drawer->renderer()->device().name;
   now.stats = drawer->stats();
-  now.mesh_bytes = drawer->mesh_bytes();
+  now.picture_bytes = drawer->picture_bytes();
   now.has_scene = drawer->has_scene();
   now.is_processor = drawer->is_processor();
   now.traces_light = drawer->renderer() != nullptr && !now.is_processor;
@@ -395,8 +395,8 @@ std::size_t DeviceBackend::bytes() const {
   const std::lock_guard lock(me.mutex);
   const bool is_here = !me.has_thread() && me.drawer;
   const bool has_scene = is_here ? me.drawer->has_scene() : me.told.has_scene;
-  const std::size_t mesh_bytes = is_here ? me.drawer->mesh_bytes() : me.told.mesh_bytes;
-  return me.cpu.bytes() * (has_scene ? 2 : 1) + mesh_bytes;
+  const std::size_t picture_bytes = is_here ? me.drawer->picture_bytes() : me.told.picture_bytes;
+  return me.cpu.bytes() * (has_scene ? 2 : 1) + picture_bytes;
 }
 
 std::string DeviceBackend::activity() const {

@@ -104,19 +104,6 @@ Image by_processor(const Document& document, const ViewRequest& request) {
   return by_processor(document.scene(), request);
 }
 
-/// The share of pixels that differ by more than `most` in a channel.
-double differing(const Image& a, const Image& b, int most) {
-  EXPECT_EQ(a.rgb.size(), b.rgb.size());
-  if (a.rgb.size() != b.rgb.size() || a.rgb.empty()) return 1.0;
-  int count = 0;
-  for (std::size_t i = 0; i < a.rgb.size(); i += 3) {
-    bool differs = false;
-    for (std::size_t c = i; c < i + 3; ++c) differs |= std::abs(a.rgb[c] - b.rgb[c]) > most;
-    count += differs ? 1 : 0;
-  }
-  return 3.0 * count / static_cast<double>(a.rgb.size());
-}
-
 void edit(Document& document, DeviceBackend& backend, IVec3 voxel) {
   const ScenePause pause(backend);
   SceneHit hit{};
@@ -210,7 +197,7 @@ TEST_F(DeviceBackendTest, EveryModeAndShadingDraws) {
   EXPECT_EQ(all.size(), 17U);
 }
 
-// By the device, and as the processor would; they converge, and begin anew with an edit.
+// By the device, and as the processor would; they converge, and go on across edits.
 TEST_F(DeviceBackendTest, PathsConvergeAndFollowEdits) {
   Document document = small_document();
   const auto backend = backend_of(document);
@@ -237,6 +224,14 @@ TEST_F(DeviceBackendTest, PathsConvergeAndFollowEdits) {
   const Image before = picture_of(4);
   EXPECT_LT(differing(before, by_paths(), 4), 0.02);
   edit(document, *backend, {30, 12, 20});
+  Image first;
+  EXPECT_TRUE(comes([&] {
+    const auto frame = backend->take();
+    if (frame) first = frame->on_device ? frame->on_device->read().value_or(Image{}) : frame->colour;
+    return frame.has_value();
+  }));
+  EXPECT_EQ(first.width, request.width) << "as large as the one of before";
+  EXPECT_LT(differing(first, before, 8), 0.3) << "most of it stays";
   const Image after = picture_of(4);
   EXPECT_GT(differing(before, after, 4), 0.001);
   EXPECT_LT(differing(after, by_paths(), 4), 0.02);
@@ -576,6 +571,7 @@ TEST_F(DeviceBackendTest, ModesThatTakeTooLongAreToldOf) {
     EXPECT_EQ(backend->is_slow(DrawMode::Blocks), seconds < 1.0);
     EXPECT_FALSE(backend->is_slow(DrawMode::Rays));
     EXPECT_FALSE(backend->is_slow(DrawMode::Smooth));
+    EXPECT_FALSE(backend->is_slow(DrawMode::Paths));
   }
 }
 

@@ -113,6 +113,7 @@ Result<std::optional<ViewFrame>> DeviceDrawer::draw() {
   const Clock::time_point start = Clock::now();
   if ((request_->mode == DrawMode::Paths) != (paths_ != nullptr)) {
     paths_ = paths_ ? nullptr : std::make_unique<VulkanPathPicture>(*renderer_);
+    path_memory_.clear();
     seconds_per_sample_ = 0.0;
   }
   const Result<bool> drawn = has_meshes(request_->mode) ? draw_meshes() : draw_rays();
@@ -166,6 +167,7 @@ void DeviceDrawer::renew_occlusion() {
 Status DeviceDrawer::update_renderer() {
   if (!std::exchange(is_scene_new_, false)) return {};
   is_request_new_ = true;
+  path_memory_.note_edit();
   return renderer_->update(*scene_, options_.cpu.instances, options_.cpu.threads);
 }
 
@@ -271,12 +273,15 @@ Result<bool> DeviceDrawer::draw_meshes() {
   return true;
 }
 
-int DeviceDrawer::first_divisor() const {
+// After an edit pictures by paths go on from such as there were before it.
+int DeviceDrawer::first_divisor() {
   const double pixels = static_cast<double>(request_->width) * request_->height;
-  int chosen = kRayDivisors.front();
+  const auto may_begin = [this](int divisor) { return !paths_ || path_memory_.may_begin(*request_, divisor); };
+  const auto* const coarsest = std::find_if(kRayDivisors.begin(), kRayDivisors.end(), may_begin);
+  int chosen = coarsest != kRayDivisors.end() ? *coarsest : kRayDivisors.front();
   if (seconds_per_sample_ <= 0.0) return chosen;
   for (const int finer : kRayDivisors) {
-    if (pixels / (finer * finer) * seconds_per_sample_ <= options_.frame_seconds) chosen = finer;
+    if (may_begin(finer) && pixels / (finer * finer) * seconds_per_sample_ <= options_.frame_seconds) chosen = finer;
   }
   return chosen;
 }
@@ -341,6 +346,7 @@ Result<bool> DeviceDrawer::draw_path_stage() {
   if (paths_->samples() < to_show) return false;
   auto taken = paths_->read(options_.cpu.threads);
   if (!taken) return taken.error();
+  path_memory_.of(*request_).refine(*taken, paths_->samples(), options_.cpu.threads);
   const auto colour = develop(*taken, develop_options(*request_));
   if (!colour) return colour.error();
   if (Status written = picture_->write(*colour); !written) return written.error();
@@ -352,7 +358,7 @@ ViewFrame DeviceDrawer::frame(double seconds) const {
   ViewFrame made;
   made.on_device = picture_;
   made.samples = paths_ ? shown_samples_ : picture_->samples();
-  made.is_whole = divisor_ == 1;
+  made.is_whole = picture_->width() == request_->width && picture_->height() == request_->height;
   made.is_settled = is_settled_;
   made.seconds = seconds;
   made.rays = picture_->rays();

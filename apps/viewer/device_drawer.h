@@ -51,8 +51,10 @@ class DeviceDrawer {
   /// Chunks that are meshed, and those that were to be when there was last nothing left to mesh; 0 of 0: none are.
   [[nodiscard]] std::pair<std::size_t, std::size_t> meshing() const;
   [[nodiscard]] std::vector<std::pair<std::string, std::string>> stats() const;
-  /// Of meshes, in the device's memory.
-  [[nodiscard]] std::size_t mesh_bytes() const { return meshes_ ? meshes_->renderer.stats().bytes : 0; }
+  /// Of meshes, in the device's memory, and of what pictures by paths remember.
+  [[nodiscard]] std::size_t picture_bytes() const {
+    return path_memory_.bytes() + (meshes_ ? meshes_->renderer.stats().bytes : 0);
+  }
   /// Whether the device has the scene's voxels.
   [[nodiscard]] bool has_scene() const { return renderer_ != nullptr && !is_scene_new_; }
   /// Whether pictures of the mode took longer than options allow when they were as small as they get, or the first of a
@@ -95,7 +97,7 @@ class DeviceDrawer {
   Result<bool> draw_rays();
   Status draw_stage();
   Result<bool> draw_path_stage();
-  [[nodiscard]] int first_divisor() const;
+  [[nodiscard]] int first_divisor();
   [[nodiscard]] Stage next_stage();
   [[nodiscard]] int samples_now(const Stage& stage, int before, int wanted) const;
   [[nodiscard]] ViewFrame frame(double seconds) const;
@@ -111,13 +113,14 @@ class DeviceDrawer {
   Clock::time_point wanted_at_ = Clock::now();  // the request that is wanted now
   Clock::time_point mode_since_ = Clock::now();
   bool is_mode_drawn_ = false;
-  std::array<bool, 5> is_slow_{};
+  std::array<bool, kDrawModes> is_slow_{};
 
   std::shared_ptr<VulkanRenderer> renderer_;
   bool is_scene_new_ = true;  // to the renderer
   std::shared_ptr<VulkanPicture> picture_;
   std::unique_ptr<VulkanPathPicture> paths_;  // null: the mode is another
-  int shown_samples_ = 0;                     // of these
+  PathMemory path_memory_;
+  int shown_samples_ = 0;  // of these
   std::unique_ptr<Meshes> meshes_;
   int divisor_ = 1;
   int samples_ = 1;

@@ -59,6 +59,7 @@ constexpr std::array kLightModels = {"rays", "propagated"};
 constexpr std::array kOcclusionModes = {"off", "rays", "vertex", "smooth"};
 constexpr std::array kForms = {"none", "share", "weighted", "weighted-published"};
 constexpr std::array kModes = {"rays", "blocks", "smooth", "density", "paths"};
+static_assert(kModes.size() == kDrawModes);
 constexpr std::array kAxes = {"x", "y", "z"};
 
 // One of an enumeration's names, in their order.

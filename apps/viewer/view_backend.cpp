@@ -1,5 +1,7 @@
 #include "view_backend.h"
 
+#include <utility>
+
 namespace quoin::viewer {
 
 double seconds_known(double known, double measured) {
@@ -34,6 +36,27 @@ PathOptions path_options(const ViewRequest& request, int width, int height, int 
     options.max_scatterings = request.look->max_scatterings;
   }
   return options;
+}
+
+PathHistory& PathMemory::of(const ViewRequest& request) {
+  ViewRequest wanted = request;
+  wanted.samples = kPathSamples;
+  if (!request_ || !is_same(*request_, wanted)) {
+    history_.clear();
+    request_ = std::move(wanted);
+  }
+  return history_;
+}
+
+void PathMemory::clear() {
+  history_.clear();
+  request_.reset();
+}
+
+bool PathMemory::may_begin(const ViewRequest& request, int divisor) {
+  const PathHistory& history = of(request);
+  const auto pixels = [divisor](int all) { return (all + divisor - 1) / divisor; };
+  return !history.has_earlier() || history.knows(pixels(request.width), pixels(request.height), 1);
 }
 
 DevelopOptions develop_options(const ViewRequest& request) {

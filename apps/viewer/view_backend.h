@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -10,6 +11,7 @@
 
 #include <quoin/core/image.h>
 #include <quoin/light/light_options.h>
+#include <quoin/render/path_history.h>
 #include <quoin/render/path_tracer.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>
 #include <quoin/render_vk/vulkan_picture.h>
@@ -39,6 +41,8 @@ enum class DrawMode : std::uint8_t {
   Density,  ///< the densities of its fields on a plane, from the positive end of an axis: draw_density_slice
   Paths,    ///< paths of light, which converge while one looks: PathTracer
 };
+
+inline constexpr std::size_t kDrawModes = 5;
 
 [[nodiscard]] inline bool has_meshes(DrawMode mode) {
   return mode == DrawMode::Blocks || mode == DrawMode::Smooth;
@@ -78,6 +82,22 @@ constexpr int kPathSamples = 256;  ///< of a settled picture by paths
                                        const DBox& bounds);
 /// And how it is developed.
 [[nodiscard]] DevelopOptions develop_options(const ViewRequest& request);
+
+/// What the pictures by paths of one request know of each other, across edits of the scene.
+class PathMemory {
+ public:
+  /// Forgets what it knows of another request.
+  PathHistory& of(const ViewRequest& request);
+  void note_edit() { history_.note_edit(); }
+  void clear();
+  /// Whether a request may begin with a picture that so many of its pixels along each axis are one of.
+  [[nodiscard]] bool may_begin(const ViewRequest& request, int divisor);
+  [[nodiscard]] std::size_t bytes() const { return history_.bytes(); }
+
+ private:
+  std::optional<ViewRequest> request_;
+  PathHistory history_;
+};
 
 /// A picture of what was asked for last, or of what was asked for a moment before.
 struct ViewFrame {

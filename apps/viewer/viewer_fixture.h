@@ -4,6 +4,7 @@
 
 #include <unistd.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <random>
 #include <string>
@@ -42,6 +43,19 @@ inline LoadedScene small_scene() {
   instance.mirrored = true;
   scene.add_instance(instance);
   return loaded;
+}
+
+/// The share of pixels that differ by more than `most` in a channel.
+inline double differing(const Image& a, const Image& b, int most) {
+  EXPECT_EQ(a.rgb.size(), b.rgb.size());
+  if (a.rgb.size() != b.rgb.size() || a.rgb.empty()) return 1.0;
+  int count = 0;
+  for (std::size_t i = 0; i < a.rgb.size(); i += 3) {
+    bool differs = false;
+    for (std::size_t c = i; c < i + 3; ++c) differs |= std::abs(a.rgb[c] - b.rgb[c]) > most;
+    count += differs ? 1 : 0;
+  }
+  return 3.0 * count / static_cast<double>(a.rgb.size());
 }
 
 inline Document small_document() {

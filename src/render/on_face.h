@@ -1,6 +1,6 @@
 #pragma once
 
-#include <glm/common.hpp>
+#include <algorithm>
 
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
@@ -13,10 +13,13 @@ namespace quoin {
   // whatever the rounding.
   constexpr double kRim = 1e-6;
   const FaceFrame& frame = frame_of(face);
-  const DVec3 low(voxel);
-  DVec3 point = glm::clamp(position, low + kRim, low + (1.0 - kRim));
-  point[frame.axis] = low[frame.axis] + (frame.sign > 0 ? 1.0 : 0.0);
-  return point;
+  const double front = frame.sign > 0 ? 1.0 : 0.0;
+  // By choice, and not by an index that is known late: what was written so would be waited for.
+  const auto along = [&](int axis, double at, int cell) {
+    const auto low = static_cast<double>(cell);
+    return axis == frame.axis ? low + front : std::clamp(at, low + kRim, low + (1.0 - kRim));
+  };
+  return {along(0, position.x, voxel.x), along(1, position.y, voxel.y), along(2, position.z, voxel.z)};
 }
 
 }  // namespace quoin

@@ -58,11 +58,31 @@ ShadeLight light_of(const SkyLight& sky, const PathLamps& lamps) {
   return light;
 }
 
+// By its direction: what lifts a point off a face, in the grid.
+std::array<DVec3, 6> lifts_off_faces() {
+  std::array<DVec3, 6> lifts{};
+  for (std::size_t face = 0; face < lifts.size(); ++face)
+    lifts[face] = DVec3(normal_of(static_cast<Direction>(face))) * kRayLift;
+  return lifts;
+}
+const std::array<DVec3, 6> kLifts = lifts_off_faces();
+
 DVec3 in_grid(const PlacedGrid& placed, Vec3 direction) {
   return DVec3(direction) * placed.world_axes / placed.voxel_size;  // the transposed matrix times it
 }
 
 }  // namespace
+
+FaceNormals face_normals(std::span<const PlacedGrid> placed) {
+  FaceNormals normals(placed.size());
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    for (std::size_t face = 0; face < normals[i].size(); ++face) {
+      const DVec3 normal(normal_of(static_cast<Direction>(face)));
+      normals[i][face] = glm::normalize(Vec3(placed[i].world_axes * normal));
+    }
+  }
+  return normals;
+}
 
 PathTile::PathTile(const TileContext& context, int column, int row)
     : context_(&context),
@@ -371,12 +391,14 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
   const Ray ray = rays.ray(lane);
   vertex.in_grid = context_->view->grid_from_view(vertex.placed, ray.origin + ray.direction * hits.grids.t[i]);
   VoxelType type = hits.material[i];
-  DVec3 normal;
   if (in_field) {
-    normal = DVec3(hits.normal(i));
+    const DVec3 normal(hits.normal(i));
+    vertex.in_grid += normal * kRayLift;
+    vertex.normal = glm::normalize(Vec3(placed.world_axes * normal));
   } else {
-    normal = DVec3(normal_of(face));
-    vertex.in_grid = on_face(vertex.in_grid, voxel, face);
+    const auto of_face = static_cast<std::size_t>(face);
+    vertex.in_grid = on_face(vertex.in_grid, voxel, face) + kLifts[of_face];
+    vertex.normal = (*context_->face_normals)[static_cast<std::size_t>(vertex.placed)][of_face];
     type = placed.voxels->get(voxel);
   }
   const Surface& surface = in_field ? context_->surfaces->of_field(type) : (*context_->surfaces)[type];
@@ -387,8 +409,6 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
     vertices_.pop_back();
     return;
   }
-  vertex.in_grid += normal * kRayLift;
-  vertex.normal = glm::normalize(Vec3(placed.world_axes * normal));
   if (light_.lamps != nullptr) vertex.place = memory_.place_of(vertex.placed, voxel, face);
   vertex.in_view = context_->view->view_from_grid(vertex.placed, vertex.in_grid);
   vertex.material = {surface.colour, surface.roughness, surface.metalness};

@@ -25,9 +25,14 @@
 
 namespace quoin::path {
 
+/// Of each placed grid, by the direction of a face: its normal in the world, unit.
+using FaceNormals = std::vector<std::array<Vec3, 6>>;
+[[nodiscard]] FaceNormals face_normals(std::span<const PlacedGrid> placed);
+
 /// What all tiles of a picture share.
 struct TileContext {
   const SceneView* view = nullptr;
+  const FaceNormals* face_normals = nullptr;  ///< of each placed grid
   const Surfaces* surfaces = nullptr;
   const PathLamps* lamps = nullptr;
   const SkyLight* sky = nullptr;

@@ -76,7 +76,9 @@ Result<PathPicture> PathTracer::render(const Camera& camera, const PathOptions& 
   const CameraRays rays(camera, options.width, options.height);
   std::optional<path::SurfaceParts> parts;
   if (options.denoise) parts.emplace(options.width, options.height);
+  const path::FaceNormals face_normals = path::face_normals(placed_in(impl.tracer));
   const path::TileContext context{&view,
+                                  &face_normals,
                                   &impl.surfaces,
                                   lamps.get(),
                                   sky.get(),

@@ -25,6 +25,18 @@ namespace {
 
 constexpr std::uint32_t kAllLanes = (std::uint32_t{1} << kWidth) - 1U;
 
+// Lanes in double precision, as many as a register holds.
+using Doubles = double __attribute__((vector_size(kDoubles * 8)));
+using Longs = std::int64_t __attribute__((vector_size(kDoubles * 8)));
+using Ints = std::int32_t __attribute__((vector_size(kDoubles * 4)));
+
+// 1, 2, 4 ...
+inline Longs lane_bits() {
+  Longs lane;
+  for (std::size_t i = 0; i < kDoubles; ++i) lane[i] = std::int64_t{1} << i;
+  return lane;
+}
+
 struct Axis {
   F origin;  // relative to `base`
   F direction;
@@ -172,20 +184,59 @@ inline Rays lanes_from(const RayPacket& rays, int first) {
           rays.max_t.data() + first};
 }
 
-// Moves the lanes of `far_lanes` to the bounds; returns those that miss them.
-inline std::uint32_t move_all_to_bounds(const TreeView& tree, const Rays& rays, std::uint32_t far_lanes,
-                                        Starts& starts) {
-  std::uint32_t missing = 0;
-  for (; far_lanes != 0; far_lanes &= far_lanes - 1) {
-    const int lane = std::countr_zero(far_lanes);
-    const double direction[3] = {rays.directions[0][lane], rays.directions[1][lane], rays.directions[2][lane]};
-    Move ray{{starts.position[0][lane], starts.position[1][lane], starts.position[2][lane]}, starts.max_t[lane], -1};
-    if (!move_to_bounds(tree, direction, ray)) missing |= 1U << lane;
-    for (int axis = 0; axis < 3; ++axis) starts.position[axis][lane] = ray.position[axis];
-    starts.max_t[lane] = ray.max_t;
-    starts.entered[lane] = ray.entered;
+// Some lanes of `Starts`.
+template <class Vector>
+inline Vector some(const void* from) {
+  Vector out;
+  std::memcpy(&out, from, sizeof out);
+  return out;
+}
+
+// Moves the lanes of `far_lanes` from `first` on to where they enter the bounds, as move_to_bounds does; those that
+// miss them get a `max_t` below 0.
+inline void move_some_to_bounds(const TreeView& tree, const Rays& rays, std::uint32_t far_lanes, std::size_t first,
+                                Starts& starts) {
+  const Longs is_far = (lane_bits() & static_cast<std::int64_t>(far_lanes >> first)) != 0;
+  Doubles enter_t = Doubles{} - 1.0;
+  Longs enter_axis = Longs{} - 1;
+  Longs missing{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto low = static_cast<double>(tree.box.min[axis]);
+    const auto high = static_cast<double>(tree.box.max[axis]);
+    const Doubles p = some<Doubles>(starts.position[axis] + first);
+    const Doubles d = some<Doubles>(rays.directions[axis] + first);
+    const Longs is_low = p < low;
+    const Longs is_out = is_low | ~(p < high);  // of what is no number too, which misses
+    missing |= is_out & ~(is_low ? d > 0.0 : d < 0.0);
+    missing |= ~(p == p);
+    const Doubles plane = is_low ? Doubles{} + low : Doubles{} + high;
+    const Doubles t = (plane - p) * (1.0 / d);
+    const Longs is_later = is_out & (t >= enter_t);
+    enter_t = is_later ? t : enter_t;
+    enter_axis = is_later ? Longs{} + axis : enter_axis;
   }
-  return missing;
+  const Longs enters = is_far & (enter_axis >= 0);
+  const Doubles max_t = some<Doubles>(starts.max_t + first);
+  // Not to the bit: the distance of the face decides in the end, and rounds otherwise.
+  missing |= enters & ~(enter_t <= max_t * 1.000001);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto low = static_cast<double>(tree.box.min[axis]);
+    const auto high = static_cast<double>(tree.box.max[axis]);
+    const Doubles p = some<Doubles>(starts.position[axis] + first);
+    const Doubles d = some<Doubles>(rays.directions[axis] + first);
+    const Doubles plane = d > 0.0 ? Doubles{} + low : Doubles{} + high;
+    const Doubles at = enter_axis == axis ? plane : p + enter_t * d;
+    // The others are inside by now, or never will be.
+    missing |= enters & ~((at >= low - 1e-3) & (at <= high + 1e-3));
+    const Doubles moved = enters ? at : p;
+    std::memcpy(starts.position[axis] + first, &moved, sizeof moved);
+  }
+  const Doubles rest = max_t - enter_t;
+  const Doubles left = enters ? (rest < 0.0 ? Doubles{} : rest) : max_t;
+  const Doubles limit = is_far & missing ? Doubles{} - 1.0 : left;
+  std::memcpy(starts.max_t + first, &limit, sizeof limit);
+  const Ints entered = __builtin_convertvector(enters ? enter_axis : Longs{} - 1, Ints);
+  std::memcpy(starts.entered + first, &entered, sizeof entered);
 }
 
 // Which lanes a kernel can serve, and where they start; the others are `unfinished`.
@@ -216,8 +267,11 @@ inline void find_starts(const TreeView& tree, const Rays& rays, std::uint32_t wa
   lanes.live = mask_of(wanted) & usual & ~leaves;
   lanes.unfinished = mask_of(wanted) & ~usual;
   lanes.reach_scale = greatest;
-  const std::uint32_t missing = move_all_to_bounds(tree, rays, bits(lanes.live & ~nearby), starts);
-  lanes.live = lanes.live & ~mask_of(missing);
+  const std::uint32_t far_lanes = bits(lanes.live & ~nearby);
+  if (far_lanes == 0) return;
+  for (std::size_t some_first = 0; some_first < kWidth; some_first += kDoubles)
+    move_some_to_bounds(tree, rays, far_lanes, some_first, starts);
+  lanes.live = lanes.live & (all(0.0F) <= narrow(starts.max_t));
 }
 
 // Clips the lanes to where they can meet anything, and finds where they enter.

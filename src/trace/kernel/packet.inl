@@ -305,11 +305,6 @@ inline void trace_packet(const TreeView& tree, const RayPacket& rays, LaneHits& 
   out.unfinished &= ~out.hit;
 }
 
-// Lanes in double precision, as many as a register holds.
-using Doubles = double __attribute__((vector_size(kDoubles * 8)));
-using Longs = std::int64_t __attribute__((vector_size(kDoubles * 8)));
-using Ints = std::int32_t __attribute__((vector_size(kDoubles * 4)));
-
 template <class Vector, class T>
 inline Vector lanes_at(const RayPacket::Lanes<T>& from, std::size_t first) {
   Vector out;
@@ -337,8 +332,7 @@ inline std::uint32_t measure_some(const TreeView& tree, const RayPacket& rays, c
   const Longs is_forward = direction > 0.0;
   const Doubles plane = lower + (is_forward ? Doubles{} : Doubles{} + 1.0);
   const Doubles distance = (plane - of_axis(rays.origin_x, rays.origin_y, rays.origin_z)) * (1.0 / direction);
-  Longs lane;
-  for (std::size_t i = 0; i < kDoubles; ++i) lane[i] = std::int64_t{1} << i;
+  const Longs lane = lane_bits();
   const Longs inside = (lane & static_cast<std::int64_t>(lanes.starts_inside >> first)) != 0;
   const Doubles result = inside ? Doubles{} : distance;
   std::memcpy(t.data() + first, &result, sizeof result);

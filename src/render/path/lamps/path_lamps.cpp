@@ -87,12 +87,14 @@ Seen seen_from(const PathLamp& lamp, DVec3 point) {
   return seen;
 }
 
-float density_of(const PathLamp& lamp, const Seen& seen, Vec3 direction, float distance) {
-  if (!seen.is_before) return 0.0F;
-  if (!seen.is_small) {
-    const double angle = SphericalRectangle(lamp, seen.to_corner).solid_angle();
-    return angle > 0.0 ? static_cast<float>(1.0 / angle) : 0.0F;
-  }
+// By solid angle, of a lamp that is seen under it.
+float density_of(const SphericalRectangle& seen) {
+  const double angle = seen.solid_angle();
+  return angle > 0.0 ? static_cast<float>(1.0 / angle) : 0.0F;
+}
+
+// Of a small one.
+float density_of(const PathLamp& lamp, Vec3 direction, float distance) {
   const float cosine = -glm::dot(direction, lamp.normal);
   return cosine > 0.0F ? distance * distance / (cosine * lamp.size_u * lamp.size_v) : 0.0F;
 }
@@ -122,14 +124,16 @@ LampSample sample_rectangle(const PathLamp& lamp, DVec3 point, Pair u) {
   if (seen.is_small) {
     way = seen.to_corner + lamp.u * (u.x * lamp.size_u) + lamp.v * (u.y * lamp.size_v);
   } else {
-    const DVec3 local = SphericalRectangle(lamp, seen.to_corner).sample(u);
+    const SphericalRectangle rectangle(lamp, seen.to_corner);
+    const DVec3 local = rectangle.sample(u);
     way = lamp.u * static_cast<float>(local.x) + lamp.v * static_cast<float>(local.y) +
           lamp.normal * static_cast<float>(local.z);
+    sample.density = density_of(rectangle);
   }
   sample.distance = glm::length(way);
-  if (!(sample.distance > 0.0F)) return sample;
+  if (!(sample.distance > 0.0F)) return {};
   sample.direction = way / sample.distance;
-  sample.density = density_of(lamp, seen, sample.direction, sample.distance);
+  if (seen.is_small) sample.density = density_of(lamp, sample.direction, sample.distance);
   if (sample.density > 0.0F) sample.radiance = lamp.radiance / sample.density;
   return sample;
 }
@@ -178,7 +182,9 @@ LampSample PathLamps::sample(LightTree::Choice chosen, DVec3 point, Pair u) cons
 float PathLamps::density(std::int32_t lamp, DVec3 point, Vec3 direction, float distance) const {
   QUOIN_ASSERT(lamp >= 0 && static_cast<std::size_t>(lamp) < lamps_.size(), "one of these lamps");
   const PathLamp& of = lamps_[static_cast<std::size_t>(lamp)];
-  return density_of(of, seen_from(of, point), direction, distance);
+  const Seen seen = seen_from(of, point);
+  if (!seen.is_before) return 0.0F;
+  return seen.is_small ? density_of(of, direction, distance) : density_of(SphericalRectangle(of, seen.to_corner));
 }
 
 std::size_t PathLamps::hash_of_face(std::int32_t placed, IVec3 voxel, Direction face) {

@@ -1,0 +1,205 @@
+#include <quoin/render/path_history.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "render/path/history/packed_light.h"
+
+namespace quoin {
+namespace {
+
+using path::pack_light;
+using path::unpack_light;
+
+constexpr int kReach = 2;  // pixels around each that its share is found from
+
+std::size_t index_of(int x, int y, int width) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+}
+
+std::size_t pixel_count(int width, int height) {
+  return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+}
+
+/// Where a pixel of a picture lies among the pixels of a smaller one along an axis.
+struct Between {
+  int low = 0;
+  int high = 0;
+  float share = 0.0F;  ///< of `high`
+};
+
+Between between(int at, int size, int of_size) {
+  if (size == of_size) return {at, at, 0.0F};
+  const double place = (at + 0.5) * of_size / size - 0.5;
+  const int low = static_cast<int>(std::floor(place));
+  const auto bounded = [of_size](int i) { return std::clamp(i, 0, of_size - 1); };
+  return {bounded(low), bounded(low + 1), static_cast<float>(place - low)};
+}
+
+/// Values of a smaller picture at the pixels of one row of a larger one.
+template <typename At>
+auto value_at(const Between& x, const Between& y, int width, const At& at) {
+  if (x.low == x.high && y.low == y.high) return at(index_of(x.low, y.low, width));
+  const auto along = [&](int row) {
+    return at(index_of(x.low, row, width)) * (1.0F - x.share) + at(index_of(x.high, row, width)) * x.share;
+  };
+  return along(y.low) * (1.0F - y.share) + along(y.high) * y.share;
+}
+
+/// Sums over the pixels within `kReach` of each.
+std::vector<float> sums_around(const std::vector<float>& values, int width, int height, Threads threads) {
+  std::vector<float> rows(values.size());
+  std::vector<float> sums(values.size());
+  parallel_for(static_cast<std::size_t>(height), threads, [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    for (int x = 0; x < width; ++x) {
+      float sum = 0.0F;
+      for (int i = std::max(x - kReach, 0); i <= std::min(x + kReach, width - 1); ++i)
+        sum += values[index_of(i, y, width)];
+      rows[index_of(x, y, width)] = sum;
+    }
+  });
+  parallel_for(static_cast<std::size_t>(height), threads, [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    for (int x = 0; x < width; ++x) {
+      float sum = 0.0F;
+      for (int i = std::max(y - kReach, 0); i <= std::min(y + kReach, height - 1); ++i)
+        sum += rows[index_of(x, i, width)];
+      sums[index_of(x, y, width)] = sum;
+    }
+  });
+  return sums;
+}
+
+/// The mean of a picture over what a pixel of a smaller one shows of it.
+Vec3 mean_over(const std::vector<std::uint32_t>& light, int width, int height, int x, int y, int of_width,
+               int of_height) {
+  const auto first = [](int at, int size, int of_size) {
+    return static_cast<int>(static_cast<std::int64_t>(at) * size / of_size);
+  };
+  const int left = first(x, width, of_width);
+  const int right = std::max(first(x + 1, width, of_width), left + 1);
+  const int top = first(y, height, of_height);
+  const int bottom = std::max(first(y + 1, height, of_height), top + 1);
+  Vec3 sum(0.0F);
+  for (int row = top; row < bottom; ++row)
+    for (int i = left; i < right; ++i) sum += unpack_light(light[index_of(i, row, width)]);
+  return sum / static_cast<float>((right - left) * (bottom - top));
+}
+
+float square(Vec3 difference) {
+  return glm::dot(difference, difference);
+}
+
+}  // namespace
+
+bool PathHistory::is_finer(const Taken& a, const Taken& b) {
+  const std::size_t pixels_a = pixel_count(a.width, a.height);
+  const std::size_t pixels_b = pixel_count(b.width, b.height);
+  return pixels_a != pixels_b ? pixels_a > pixels_b : a.samples > b.samples;
+}
+
+void PathHistory::clear() {
+  earlier_.clear();
+  now_.clear();
+}
+
+void PathHistory::note_edit() {
+  // What is kept of earlier scenes is finer than all since: see `refine`.
+  if (earlier_.empty()) earlier_ = std::move(now_);
+  now_.clear();
+}
+
+bool PathHistory::knows(int width, int height, int samples) const {
+  return std::any_of(earlier_.begin(), earlier_.end(), [&](const Taken& taken) {
+    return taken.width == width && taken.height == height && taken.samples == samples;
+  });
+}
+
+std::size_t PathHistory::bytes() const {
+  std::size_t all = 0;
+  for (const std::vector<Taken>* taken : {&earlier_, &now_})
+    for (const Taken& picture : *taken) all += picture.light.capacity() * sizeof(std::uint32_t);
+  return all;
+}
+
+void PathHistory::refine(PathPicture& picture, int samples, Threads threads) {
+  Taken taken{picture.width, picture.height, samples, std::vector<std::uint32_t>(picture.radiance.size())};
+  std::transform(picture.radiance.begin(), picture.radiance.end(), taken.light.begin(), pack_light);
+  if (!earlier_.empty() && !is_finer(earlier_.back(), taken)) earlier_.clear();
+  // Whoever begins again from few samples, without an edit, goes on from those.
+  while (!now_.empty() && !is_finer(taken, now_.back())) now_.pop_back();
+  now_.push_back(std::move(taken));
+  const auto before = std::find_if(earlier_.begin(), earlier_.end(), [&](const Taken& of) {
+    return of.width == picture.width && of.height == picture.height && of.samples == samples;
+  });
+  if (before == earlier_.end()) return;
+  const Taken& best = earlier_.back();
+  combine(*before, best, shares(now_.back(), *before, best, threads), threads, picture);
+}
+
+// For two pictures of equal noise around the same light, of which a share is common, the mean square of their
+// difference is 2 * (1 - share) times that of the noise.
+std::vector<float> PathHistory::shares(const Taken& now, const Taken& before, const Taken& best, Threads threads) {
+  std::vector<float> change(now.light.size());
+  std::vector<float> noise(now.light.size());
+  parallel_for(static_cast<std::size_t>(now.height), threads, [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    for (int x = 0; x < now.width; ++x) {
+      const std::size_t i = index_of(x, y, now.width);
+      const Vec3 known = unpack_light(before.light[i]);
+      change[i] = square(unpack_light(now.light[i]) - known);
+      noise[i] = square(mean_over(best.light, best.width, best.height, x, y, now.width, now.height) - known);
+    }
+  });
+  std::vector<float> shares = sums_around(change, now.width, now.height, threads);
+  const std::vector<float> noises = sums_around(noise, now.width, now.height, threads);
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    if (shares[i] == 0.0F) {
+      shares[i] = 1.0F;
+    } else {
+      shares[i] = noises[i] > 0.0F ? std::max(1.0F - shares[i] / (2.0F * noises[i]), 0.0F) : 0.0F;
+    }
+  }
+  return shares;
+}
+
+void PathHistory::combine(const Taken& before, const Taken& best, const std::vector<float>& shares, Threads threads,
+                          PathPicture& picture) {
+  const int of_width = picture.width;
+  const int of_height = picture.height;
+  const bool is_as_large = of_width == best.width && of_height == best.height;
+  const PathPicture taken = is_as_large ? picture : std::exchange(picture, PathPicture());
+  const std::size_t count = pixel_count(best.width, best.height);
+  picture.width = best.width;
+  picture.height = best.height;
+  picture.radiance.resize(count);
+  picture.scene.resize(count);
+  picture.alpha.resize(count);
+  parallel_for(static_cast<std::size_t>(best.height), threads, [&](std::size_t row) {
+    const Between y = between(static_cast<int>(row), best.height, of_height);
+    for (int column = 0; column < best.width; ++column) {
+      const Between x = between(column, best.width, of_width);
+      const auto seen = [&](const auto& at) { return value_at(x, y, of_width, at); };
+      const std::size_t i = index_of(column, static_cast<int>(row), best.width);
+      const Vec3 light = seen([&](std::size_t of) { return taken.radiance[of]; });
+      const Vec3 scene = seen([&](std::size_t of) { return taken.scene[of]; });
+      const Vec3 known = seen([&](std::size_t of) { return unpack_light(before.light[of]); });
+      const float share = seen([&](std::size_t of) { return shares[of]; });
+      const Vec3 shown = glm::max(light + share * (unpack_light(best.light[i]) - known), Vec3(0.0F));
+      picture.radiance[i] = shown;
+      picture.scene[i] = glm::max(shown - (light - scene), Vec3(0.0F));
+      picture.alpha[i] = seen([&](std::size_t of) { return taken.alpha[of]; });
+    }
+  });
+  picture.rays = taken.rays;
+  picture.pixels_hit = taken.pixels_hit;
+}
+
+}  // namespace quoin

@@ -1,0 +1,249 @@
+// Pictures by paths that go on across edits.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <quoin/core/hash.h>
+#include <quoin/grid/grid.h>
+#include <quoin/render/path_history.h>
+#include <quoin/render/path_tracer.h>
+
+#include "render/path/history/packed_light.h"
+#include "render/path/town_for_tests.h"
+#include "render/render_test_support.h"
+
+namespace quoin {
+namespace {
+
+using path::pack_light;
+using path::unpack_light;
+using render_test::add_type;
+using render_test::from_above;
+using render_test::place;
+using render_test::under_even_sky;
+
+constexpr int kEdge = 48;             // of pictures, in pixels
+constexpr IVec3 kTower{-16, 0, -16};  // what is built on the meadow
+constexpr std::array kSamples{1, 4, 16, 64};
+
+float greatest_difference(const PathPicture& a, const PathPicture& b, int from_x = 0) {
+  float most = 0.0F;
+  for (std::size_t i = 0; i < a.radiance.size(); ++i) {
+    if (static_cast<int>(i) % a.width < from_x) continue;
+    for (int axis = 0; axis < 3; ++axis) most = std::max(most, std::abs(a.radiance[i][axis] - b.radiance[i][axis]));
+  }
+  return most;
+}
+
+double mean_square(const PathPicture& a, const PathPicture& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.radiance.size(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double apart = static_cast<double>(a.radiance[i][axis]) - static_cast<double>(b.radiance[i][axis]);
+      sum += apart * apart;
+    }
+  }
+  return sum / (3.0 * static_cast<double>(a.radiance.size()));
+}
+
+/// A meadow with a wall and lamps seen from above, whose noise is plain to see.
+class PathHistoryTest : public testing::Test {
+ protected:
+  PathHistoryTest() : scene_(meadow(grid_)), tracer_(scene_), options_(under_even_sky(kEdge, kEdge, 1)) {
+    options_.sun_brightness = 1.0;
+    options_.sun = {0.5, 0.7, 0.2};
+    options_.max_bounces = 3;
+  }
+
+  static Scene meadow(GridHandle& made) {
+    Scene scene;
+    const VoxelType ground = add_type(scene, {120, 150, 90, 255});
+    const VoxelType lamp = add_type(scene, {255, 180, 90, 255}, Visibility::Opaque, 6.0F);
+    Grid grid;
+    grid.fill_box({{-24, -1, -24}, {24, 0, 24}}, ground);
+    grid.fill_box({{0, 0, -10}, {2, 6, 10}}, ground);
+    grid.fill_box({{6, 4, 6}, {8, 5, 8}}, lamp);
+    made = scene.instances()[place(scene, std::move(grid))].grid;
+    return scene;
+  }
+
+  PathPicture take(int edge, int samples, std::uint32_t seed = 0) {
+    options_.width = edge;
+    options_.height = edge;
+    options_.samples = samples;
+    options_.seed = seed;
+    return tracer_.render(from_above(0.0, 40.0, 0.0, 48.0), options_, {2}).value();
+  }
+
+  PathPicture refined(int edge, int samples, std::uint32_t seed = 0) {
+    PathPicture picture = take(edge, samples, seed);
+    history_.refine(picture, samples, {2});
+    return picture;
+  }
+
+  void converge(std::uint32_t seed = 0) {
+    for (const int samples : kSamples) static_cast<void>(refined(kEdge, samples, seed));
+  }
+
+  void edit(VoxelType type) {
+    scene_.edit(grid_).grid.fill_box({kTower, kTower + IVec3(2, 6, 2)}, type);
+    tracer_.update({2});
+    history_.note_edit();
+  }
+
+  GridHandle grid_;
+  Scene scene_;
+  PathTracer tracer_;
+  PathOptions options_;
+  PathHistory history_;
+};
+
+TEST(PackedLight, IsOffByAFewThousandthsOfItsGreatestPart) {
+  for (std::uint32_t i = 0; i < 4'096; ++i) {
+    const auto any = [i](std::uint32_t of) { return static_cast<float>(mix_bits(4 * i + of) >> 8) * 0x1p-24F; };
+    const float scale = std::exp2(any(3) * 24.0F - 9.0F);
+    const Vec3 light = Vec3(any(0), any(1), any(2)) * scale;
+    const float most = std::max({light.x, light.y, light.z});
+    const Vec3 kept = unpack_light(pack_light(light));
+    for (int axis = 0; axis < 3; ++axis) ASSERT_LE(std::abs(kept[axis] - light[axis]), most / 512.0F) << i;
+    ASSERT_EQ(pack_light(kept), pack_light(light)) << i;
+  }
+}
+
+TEST(PackedLight, IsBoundedAndNeverSomethingElse) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  EXPECT_EQ(pack_light(Vec3(0.0F)), 0U);
+  EXPECT_EQ(unpack_light(pack_light({-1.0F, 0.0F, 1.0F})), Vec3(0.0F, 0.0F, 1.0F));
+  EXPECT_EQ(unpack_light(pack_light({kInfinity, 1e9F, 0.0F})),
+            Vec3(path::kMaxPackedLight, path::kMaxPackedLight, 0.0F));
+  EXPECT_EQ(unpack_light(pack_light(Vec3(std::numeric_limits<float>::quiet_NaN()))), Vec3(0.0F));
+  EXPECT_EQ(unpack_light(pack_light(Vec3(511.9F))), Vec3(512.0F)) << "rounded up into the next exponent";
+}
+
+TEST_F(PathHistoryTest, WithoutAnEditPicturesStayAsTheyAre) {
+  for (const int samples : kSamples) {
+    const PathPicture taken = take(kEdge, samples);
+    PathPicture shown = taken;
+    history_.refine(shown, samples);
+    EXPECT_EQ(shown.radiance, taken.radiance);
+    EXPECT_FALSE(history_.has_earlier());
+  }
+  EXPECT_GE(history_.bytes(), 4U * kSamples.size() * kEdge * kEdge);
+}
+
+TEST_F(PathHistoryTest, WhatAnEditDidNotChangeStaysAsItWas) {
+  converge();
+  const PathPicture before = take(kEdge, kSamples.back());
+  edit(2);
+  ASSERT_TRUE(history_.has_earlier());
+  const PathPicture plain = take(kEdge, 1);
+  const PathPicture shown = refined(kEdge, 1);
+  const PathPicture converged = take(kEdge, 1'024);
+  // Behind the wall hardly a path comes by the tower.
+  EXPECT_LT(mean_square(shown, converged), 0.5 * mean_square(plain, converged));
+  EXPECT_GT(greatest_difference(plain, before, kEdge / 2), 0.2F);
+  int same = 0;
+  for (std::size_t i = 0; i < shown.radiance.size(); ++i) {
+    const Vec3 apart = shown.radiance[i] - before.radiance[i];
+    same += std::max({std::abs(apart.x), std::abs(apart.y), std::abs(apart.z)}) < 0.01F ? 1 : 0;
+  }
+  EXPECT_GT(same, kEdge * kEdge / 2);
+}
+
+TEST_F(PathHistoryTest, EndsWithThePictureOfANewTracer) {
+  converge();
+  edit(2);
+  PathPicture shown;
+  for (const int samples : kSamples) shown = refined(kEdge, samples);
+  EXPECT_EQ(shown.radiance, take(kEdge, kSamples.back()).radiance);
+  EXPECT_FALSE(history_.has_earlier()) << "what is new is as good as what was before";
+}
+
+TEST_F(PathHistoryTest, AnEditTakenBackHasThePictureOfBeforeWithTheFirstSample) {
+  converge();
+  const PathPicture before = take(kEdge, kSamples.back());
+  edit(2);
+  for (const int samples : {1, 4}) static_cast<void>(refined(kEdge, samples));
+  edit(kAir);
+  EXPECT_TRUE(history_.has_earlier());
+  EXPECT_LT(greatest_difference(refined(kEdge, 1), before), 0.02F);
+}
+
+// The mean of what is shown is that of the new scene, whatever was before it.
+TEST_F(PathHistoryTest, ShowsWhatTheNewSceneShowsInTheMean) {
+  constexpr int kTries = 48;
+  std::vector<DVec3> shown(static_cast<std::size_t>(kEdge) * kEdge, DVec3(0.0));
+  for (std::uint32_t seed = 1; seed <= kTries; ++seed) {
+    history_.clear();
+    converge(seed);
+    edit(2);
+    const PathPicture picture = refined(kEdge, 1, seed);
+    for (std::size_t i = 0; i < shown.size(); ++i) shown[i] += DVec3(picture.radiance[i]) / static_cast<double>(kTries);
+    edit(kAir);
+  }
+  edit(2);
+  const PathPicture converged = take(kEdge, 4'096);
+  DVec3 all(0.0);
+  DVec3 right(0.0);
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    all += shown[i];
+    right += DVec3(converged.radiance[i]);
+  }
+  for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(all[axis] / right[axis], 1.0, 0.005);
+}
+
+TEST_F(PathHistoryTest, SmallPicturesAreShownInTheLargeOnesPlace) {
+  for (const int edge : {kEdge / 4, kEdge / 2, kEdge}) static_cast<void>(refined(edge, 1));
+  converge();
+  const PathPicture before = take(kEdge, kSamples.back());
+  EXPECT_FALSE(history_.knows(kEdge / 4, kEdge / 4, 1)) << "known is what is of earlier scenes";
+  edit(2);
+  ASSERT_TRUE(history_.knows(kEdge / 4, kEdge / 4, 1));
+  EXPECT_FALSE(history_.knows(kEdge / 3, kEdge / 3, 1));
+  const PathPicture small = take(kEdge / 4, 1);
+  PathPicture plain = before;
+  for (int i = 0; i < kEdge * kEdge; ++i)
+    plain.radiance[static_cast<std::size_t>(i)] =
+        small.radiance[static_cast<std::size_t>(i / kEdge / 4 * (kEdge / 4) + i % kEdge / 4)];
+  const PathPicture shown = refined(kEdge / 4, 1);
+  ASSERT_EQ(shown.width, kEdge);
+  ASSERT_EQ(shown.radiance.size(), before.radiance.size());
+  ASSERT_EQ(shown.alpha.size(), before.radiance.size());
+  const PathPicture converged = take(kEdge, 1'024);
+  EXPECT_LT(mean_square(shown, converged), 0.5 * mean_square(plain, converged));
+  EXPECT_GT(greatest_difference(shown, before), 0.1F) << "and the tower is there";
+}
+
+TEST_F(PathHistoryTest, WhatIsNotKnownStaysAsItIs) {
+  converge();
+  edit(2);
+  const PathPicture taken = take(kEdge, 2);
+  EXPECT_EQ(refined(kEdge, 2).radiance, taken.radiance);
+  history_.clear();
+  EXPECT_FALSE(history_.has_earlier());
+  EXPECT_EQ(history_.bytes(), 0U);
+}
+
+TEST_F(PathHistoryTest, KeepsLayersOfPicturesAsLarge) {
+  options_.layers = true;
+  for (const int edge : {kEdge / 2, kEdge}) static_cast<void>(refined(edge, 1));
+  converge();
+  edit(2);
+  EXPECT_TRUE(refined(kEdge / 2, 1).albedo.empty());
+  const PathPicture taken = take(kEdge, 1);
+  const PathPicture shown = refined(kEdge, 1);
+  EXPECT_EQ(shown.albedo, taken.albedo);
+  EXPECT_EQ(shown.depth.values, taken.depth.values);
+  EXPECT_EQ(shown.alpha, taken.alpha);
+  EXPECT_EQ(shown.rays, taken.rays);
+}
+
+}  // namespace
+}  // namespace quoin
