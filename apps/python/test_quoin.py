@@ -267,6 +267,23 @@ class Scenes(unittest.TestCase):
                 self.assertAlmostEqual(again.cameras[0].focus_distance, 12.0, 4)
                 self.assertAlmostEqual(again.cameras[1].view_height, 9.0, 4)
 
+    def test_what_a_file_was_given_is_not_lost_in_silence(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "a.vox")
+            quoin.from_numpy(np.ones((4, 4, 4), np.uint8), [(9, 9, 9)]).save(path)
+            scene = quoin.load(path)
+            scene.add_camera(CAMERA)
+            scene.set_sun(quoin.Sun((0, 1, 0), 2.0))
+            scene.save(os.path.join(folder, "a.json"))
+            self.assertEqual(scene.warnings, ["cameras left out: 1", "the sun's brightness and colour are left out"])
+            scene.save(path)
+            self.assertEqual(scene.warnings, [])
+            again = quoin.load(path)
+            again.save(os.path.join(folder, "a.json"))
+        self.assertEqual(len(again.cameras), 1)
+        self.assertEqual(again.warnings, ["left out, which only .vox keeps: cameras: 1",
+                                          "left out, which only .vox keeps: render settings: 1"])
+
     def test_triangles_become_voxels(self):
         corners = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [4, 4, 0], [0, 0, 4], [4, 0, 4], [0, 4, 4], [4, 4, 4]])
         cube = [[0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4], [2, 6, 7], [2, 7, 3], [0, 4, 6],

@@ -269,9 +269,12 @@ std::vector<std::string> lost_with_source(const Saved& saved) {
 /// What stands beside a scene and a format other than .vox leaves out, `lost_with_source` aside.
 std::vector<std::string> lost_beside(const Saved& saved, FileFormat format) {
   std::vector<std::string> lines;
-  // Of a .vox file lost_with_source counts them.
-  if (saved.loaded == nullptr || saved.loaded->source != nullptr) return lines;
+  if (saved.loaded == nullptr) return lines;
   const LoadedScene& loaded = *saved.loaded;
+  // What the file had itself lost_with_source tells.
+  const auto is_told = [said = lost_with_source(saved)](std::string_view what) {
+    return std::ranges::any_of(said, [&](const std::string& line) { return line.find(what) != std::string::npos; });
+  };
   const bool holds_sun = format == FileFormat::Scene || format == FileFormat::World;
   std::ptrdiff_t cameras = std::ssize(loaded.cameras);
   if (format == FileFormat::World) cameras = 0;
@@ -279,8 +282,9 @@ std::vector<std::string> lost_beside(const Saved& saved, FileFormat format) {
     cameras =
         std::ranges::count_if(loaded.cameras, [&](const FileCamera& one) { return one.camera != *loaded.camera; });
   }
-  if (cameras > 0) lines.push_back("cameras left out: " + std::to_string(cameras));
+  if (cameras > 0 && !is_told("cameras: ")) lines.push_back("cameras left out: " + std::to_string(cameras));
   const Look usual;
+  if (is_told("render settings: ")) return lines;
   if (!holds_sun && loaded.sun) lines.emplace_back("the sun is left out");
   if (holds_sun && loaded.sun && loaded.look &&
       (loaded.look->look.sun_brightness != usual.sun_brightness || loaded.look->look.sun_colour != usual.sun_colour)) {
