@@ -181,6 +181,8 @@ std::optional<Struct> taken(const Struct* given) {
   std::memcpy(&whole, given, given->size);
   return whole;
 }
+/// The same of an array, with strides: where it has none its numbers lie without gaps, z fastest and x slowest.
+std::optional<quoin_array> taken_array(const quoin_array* given);
 /// The same of options, which may be left out.
 template <class Struct>
 std::optional<Struct> taken_or_default(const Struct* given) {

@@ -22,7 +22,7 @@ namespace {
 template <class Mesh>
 quoin_status mesh_array(const quoin_array* array, quoin_mesh* out, Mesh&& mesh) noexcept {
   return guarded([&] {
-    const auto given = taken(array);
+    const auto given = taken_array(array);
     if (!given) return fail(QUOIN_INVALID_ARGUMENT, "array is null, or its size");
     if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
     if (given->scalar < QUOIN_UINT8 || given->scalar > QUOIN_FLOAT64)

@@ -190,6 +190,161 @@ TEST(CFile, GroupsLayersLampsAndCamerasAreTold) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
+TEST_F(SceneOfARow, IsGivenLayersAndGroups) {
+  auto layer = sized<quoin_layer>();
+  EXPECT_EQ(quoin_layer_set(scene_, &layer), QUOIN_INVALID_ARGUMENT);  // without a name
+  std::strcpy(layer.name, "attic");
+  ASSERT_EQ(quoin_layer_set(scene_, &layer), QUOIN_OK);
+  auto group = sized<quoin_group>();
+  std::strcpy(group.name, "house");
+  group.shown = 1;
+  std::size_t house = 0;
+  ASSERT_EQ(quoin_group_add(scene_, &group, &house), QUOIN_OK);
+  std::strcpy(group.name, "room");
+  std::strcpy(group.layer, "attic");
+  group.parent = house;
+  std::size_t room = 0;
+  ASSERT_EQ(quoin_group_add(scene_, &group, &room), QUOIN_OK);
+  auto place = sized<quoin_instance>();
+  ASSERT_EQ(quoin_instance_get(scene_, 0, &place), QUOIN_OK);
+  place.group = room;
+  ASSERT_EQ(quoin_instance_set(scene_, 0, &place), QUOIN_OK);
+  ASSERT_EQ(quoin_instance_get(scene_, 0, &place), QUOIN_OK);
+  EXPECT_TRUE(place.group == room && place.visible == 1 && place.shown == 0);
+  EXPECT_STREQ(place.layer, "");
+  ASSERT_EQ(quoin_instance_set_layer(scene_, 0, "attic"), QUOIN_OK);
+  layer.visible = 1;
+  ASSERT_EQ(quoin_layer_set(scene_, &layer), QUOIN_OK);
+  std::size_t count = 0;
+  ASSERT_EQ(quoin_layer_count(scene_, &count), QUOIN_OK);
+  EXPECT_EQ(count, 1U);
+  ASSERT_EQ(quoin_instance_get(scene_, 0, &place), QUOIN_OK);
+  EXPECT_EQ(place.shown, 1);
+  EXPECT_STREQ(place.layer, "attic");
+  ASSERT_EQ(quoin_group_get(scene_, room, &group), QUOIN_OK);
+  EXPECT_EQ(group.parent, house);
+  EXPECT_EQ(quoin_instance_set_layer(scene_, 0, "cellar"), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_instance_set_layer(scene_, 1, nullptr), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_instance_set_layer(scene_, 0, nullptr), QUOIN_OK);
+  group.parent = 3;
+  EXPECT_EQ(quoin_group_add(scene_, &group, nullptr), QUOIN_INVALID_ARGUMENT);
+  group.parent = 0;
+  std::strcpy(group.layer, "cellar");
+  EXPECT_EQ(quoin_group_add(scene_, &group, nullptr), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_layer_get(scene_, 1, &layer), QUOIN_INVALID_ARGUMENT);
+}
+
+quoin_camera camera_ahead(std::int32_t number) {
+  auto camera = sized<quoin_camera>();
+  camera.number = number;
+  camera.position[2] = 50.0;
+  camera.right[0] = camera.up[1] = 1.0;
+  camera.forward[2] = -1.0;
+  camera.vertical_fov_degrees = 40.0;
+  return camera;
+}
+
+TEST_F(SceneOfARow, IsGivenCamerasLampsAndASun) {
+  quoin_camera camera = camera_ahead(4);
+  camera.is_first = 1;
+  ASSERT_EQ(quoin_camera_add(scene_, &camera), QUOIN_OK) << quoin_last_error();
+  EXPECT_EQ(quoin_camera_add(scene_, &camera), QUOIN_INVALID_ARGUMENT);  // the number is taken
+  auto told = sized<quoin_camera>();
+  ASSERT_EQ(quoin_camera_get(scene_, 0, &told), QUOIN_OK);
+  EXPECT_TRUE(told.number == 4 && told.is_first == 1 && told.position[2] == 50.0);
+  quoin_camera wrong = camera_ahead(5);
+  wrong.up[1] = 2.0;
+  EXPECT_EQ(quoin_camera_add(scene_, &wrong), QUOIN_INVALID_ARGUMENT);
+  wrong = camera_ahead(5);
+  wrong.right[0] = -1.0;  // left-handed
+  EXPECT_EQ(quoin_camera_add(scene_, &wrong), QUOIN_INVALID_ARGUMENT);
+  wrong = camera_ahead(5);
+  wrong.vertical_fov_degrees = 180.0;
+  EXPECT_EQ(quoin_camera_add(scene_, &wrong), QUOIN_INVALID_ARGUMENT);
+  wrong = camera_ahead(5);
+  wrong.is_orthographic = 1;  // of no height
+  EXPECT_EQ(quoin_camera_add(scene_, &wrong), QUOIN_INVALID_ARGUMENT);
+
+  auto lamp = sized<quoin_lamp>();
+  lamp.intensity = 3.0;
+  ASSERT_EQ(quoin_lamp_add(scene_, &lamp), QUOIN_OK);
+  ASSERT_EQ(quoin_lamp_get(scene_, 0, &lamp), QUOIN_OK);
+  EXPECT_TRUE(std::isinf(lamp.range) && lamp.intensity == 3.0);
+  lamp.is_spot = 1;
+  lamp.direction[1] = 0.0;
+  lamp.direction[0] = lamp.direction[2] = 0.0;
+  EXPECT_EQ(quoin_lamp_add(scene_, &lamp), QUOIN_INVALID_ARGUMENT);
+
+  auto sun = sized<quoin_sun>();
+  ASSERT_EQ(quoin_sun_get(scene_, &sun), QUOIN_OK);
+  EXPECT_EQ(sun.brightness, 0.0);
+  EXPECT_EQ(quoin_sun_set(scene_, &sun), QUOIN_INVALID_ARGUMENT);  // without a direction
+  sun.direction[1] = 2.0;
+  sun.brightness = 1.5;
+  sun.colour[0] = 1.0F;
+  ASSERT_EQ(quoin_sun_set(scene_, &sun), QUOIN_OK);
+  auto info = sized<quoin_scene_info>();
+  ASSERT_EQ(quoin_scene_get_info(scene_, &info), QUOIN_OK);
+  EXPECT_TRUE(info.has_sun == 1 && info.sun[1] == 1.0);
+  ASSERT_EQ(quoin_sun_get(scene_, &sun), QUOIN_OK);
+  EXPECT_TRUE(sun.brightness == 1.5 && sun.colour[0] == 1.0F && sun.colour[1] == 0.0F);
+}
+
+TEST_F(SceneOfARow, VoxelsAreWrittenBack) {
+  std::array<std::uint8_t, 4> types = {2, 0, 1, 2};  // x = 1, 2; y = 0; z = 0, 1
+  auto array = sized<quoin_array>();
+  array.data = types.data();
+  array.shape[0] = 2;
+  array.shape[1] = 1;
+  array.shape[2] = 2;
+  array.origin[0] = 1.25;  // rounded down
+  ASSERT_EQ(quoin_grid_write(scene_, 0, &array), QUOIN_OK) << quoin_last_error();
+  std::array<std::uint16_t, 6> read{};
+  const std::array<std::int32_t, 3> min = {0, 0, 0};
+  const std::array<std::int32_t, 3> shape = {3, 1, 2};
+  ASSERT_EQ(quoin_grid_read(scene_, 0, min.data(), shape.data(), read.data(), read.size()), QUOIN_OK);
+  EXPECT_EQ(read, (std::array<std::uint16_t, 6>{1, 0, 2, 0, 1, 2}));
+  EXPECT_EQ(t_below(2.5, 1.5), 100.0 - 8.0);  // rays see it
+  types[3] = 3;
+  EXPECT_EQ(quoin_grid_write(scene_, 0, &array), QUOIN_INVALID_ARGUMENT);
+  EXPECT_STREQ(quoin_last_error(), "the array has the type 3; those of the scene are 0 to 2");
+  types[0] = 1;
+  EXPECT_EQ(quoin_grid_write(scene_, 0, &array), QUOIN_INVALID_ARGUMENT);
+  ASSERT_EQ(quoin_grid_read(scene_, 0, min.data(), shape.data(), read.data(), read.size()), QUOIN_OK);
+  EXPECT_EQ(read[2], 2);  // nothing of it was written
+  EXPECT_EQ(quoin_grid_write(scene_, 1, &array), QUOIN_INVALID_ARGUMENT);
+  array.shape[1] = std::int64_t{1} << 62;
+  EXPECT_EQ(quoin_grid_write(scene_, 0, &array), QUOIN_INVALID_ARGUMENT);
+}
+
+TEST(CArrays, WithoutStridesHaveNoGaps) {
+  const std::array<std::uint16_t, 24> types = {1, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0};
+  quoin_scene scene = 0;
+  ASSERT_EQ(quoin_scene_create(&scene), QUOIN_OK);
+  auto type = sized<quoin_type>();
+  std::uint16_t number = 0;
+  ASSERT_EQ(quoin_type_add(scene, &type, &number), QUOIN_OK);
+  auto array = sized<quoin_array>();
+  array.data = types.data();
+  array.scalar = QUOIN_UINT16;
+  array.shape[0] = 2;
+  array.shape[1] = 3;
+  array.shape[2] = 4;
+  ASSERT_EQ(quoin_grid_add(scene, &array, nullptr, nullptr), QUOIN_OK);
+  std::array<std::uint16_t, 24> read{};
+  const std::array<std::int32_t, 3> min = {0, 0, 0};
+  const std::array<std::int32_t, 3> shape = {2, 3, 4};
+  ASSERT_EQ(quoin_grid_read(scene, 0, min.data(), shape.data(), read.data(), read.size()), QUOIN_OK);
+  EXPECT_EQ(read, types);
+  quoin_mesh mesh = 0;
+  ASSERT_EQ(quoin_mesh_labels(&array, 0, 0, 1, &mesh), QUOIN_OK);
+  auto data = sized<quoin_mesh_data>();
+  ASSERT_EQ(quoin_mesh_view(mesh, &data), QUOIN_OK);
+  EXPECT_GT(data.index_count, 0U);
+  EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+}
+
 TEST(CFormats, SayWhatCanBeRead) {
   std::size_t count = 0;
   ASSERT_EQ(quoin_format_count(&count), QUOIN_OK);

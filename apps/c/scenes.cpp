@@ -1,11 +1,13 @@
 // Scenes, their types and their grids.
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <span>
+#include <string>
 
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
@@ -59,10 +61,17 @@ const char* what_is_wrong(const quoin_array& array) {
   return nullptr;
 }
 
+// Why an array of types is none of a scene.
+quoin_status fail_of_type(VoxelType type, std::size_t types) {
+  return fail(QUOIN_INVALID_ARGUMENT, ("the array has the type " + std::to_string(type) +
+                                       "; those of the scene are 0 to " + std::to_string(types - 1))
+                                          .c_str());
+}
+
 quoin_status add_grid(SceneBody& scene, const quoin_array& array, const char* name, size_t* out) {
   const IVec3 size(array.shape[0], array.shape[1], array.shape[2]);
   const std::size_t types = scene.loaded.scene.types.size();
-  bool is_known = true;
+  VoxelType greatest = kAir;
   bool is_wanted = true;
   SceneGrid placed;
   placed.name = name == nullptr ? "" : name;
@@ -70,19 +79,39 @@ quoin_status add_grid(SceneBody& scene, const quoin_array& array, const char* na
   placed.grid.edit_rows(
       {IVec3(0), size},
       [&](IVec3 first, std::span<VoxelType> row) {
-        if (!is_known) return;
+        if (greatest >= types) return;
         for (VoxelType& type : row) {
           type = type_at(array, first.x++, first.y, first.z);
-          is_known = is_known && type < types;
+          greatest = std::max(greatest, type);
         }
       },
       [&](double fraction) {
         is_wanted = is_wanted && (!told || told(fraction));
-        return is_wanted && is_known;
+        return is_wanted && greatest < types;
       });
   if (!is_wanted) return fail(QUOIN_CANCELLED, "cancelled");
-  if (!is_known) return fail(QUOIN_INVALID_ARGUMENT, "the array has a type that the scene has not");
+  if (greatest >= types) return fail_of_type(greatest, types);
   place(scene, std::move(placed), floor(DVec3(array.origin[0], array.origin[1], array.origin[2])), out);
+  return QUOIN_OK;
+}
+
+// Nothing is changed where a type is not the scene's.
+quoin_status write_grid(SceneBody& scene, GridHandle grid, const quoin_array& array) {
+  const DVec3 origin = floor(DVec3(array.origin[0], array.origin[1], array.origin[2]));
+  const IVec3 min(origin);
+  const IVec3 size(array.shape[0], array.shape[1], array.shape[2]);
+  const std::size_t types = scene.loaded.scene.types.size();
+  for (std::int64_t x = 0; x < size.x; ++x) {
+    for (std::int64_t y = 0; y < size.y; ++y) {
+      for (std::int64_t z = 0; z < size.z; ++z) {
+        if (const VoxelType type = type_at(array, x, y, z); type >= types) return fail_of_type(type, types);
+      }
+    }
+  }
+  scene.loaded.scene.edit(grid).grid.edit_rows({min, min + size}, [&](IVec3 first, std::span<VoxelType> row) {
+    IVec3 at = first - min;
+    for (VoxelType& type : row) type = type_at(array, at.x++, at.y, at.z);
+  });
   return QUOIN_OK;
 }
 
@@ -179,6 +208,21 @@ quoin_status fail(quoin_status status, const char* why) noexcept {
 
 quoin_status fail(const Error& error) {
   return fail(static_cast<quoin_status>(static_cast<int>(error.code) + 1), to_string(error).c_str());
+}
+
+std::optional<quoin_array> taken_array(const quoin_array* given) {
+  constexpr std::array<std::int64_t, 10> kBytes = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
+  auto array = taken(given);
+  if (!array || array->strides[0] != 0 || array->strides[1] != 0 || array->strides[2] != 0) return array;
+  if (array->scalar < QUOIN_UINT8 || array->scalar > QUOIN_FLOAT64) return array;
+  std::int64_t stride = kBytes.at(static_cast<std::size_t>(array->scalar));
+  for (int axis = 2; axis >= 0; --axis) {
+    array->strides[axis] = stride;
+    // What is wrong with the shape is told by who reads it.
+    if (array->shape[axis] <= 0 || stride > std::numeric_limits<std::int64_t>::max() / array->shape[axis]) break;
+    stride *= array->shape[axis];
+  }
+  return array;
 }
 
 Progress progress() {
@@ -418,9 +462,19 @@ quoin_status quoin_grid_read(quoin_scene scene, std::size_t grid, const std::int
 
 quoin_status quoin_grid_add(quoin_scene scene, const quoin_array* array, const char* name, std::size_t* out) {
   return with_scene(scene, Use::Change, [&](SceneBody& body) {
-    const auto given = taken(array);
+    const auto given = taken_array(array);
     if (!given) return fail(QUOIN_INVALID_ARGUMENT, "array is null, or its size");
     if (const char* wrong = what_is_wrong(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
     return add_grid(body, *given, name, out);
+  });
+}
+
+quoin_status quoin_grid_write(quoin_scene scene, std::size_t grid, const quoin_array* array) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    const auto given = taken_array(array);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "array is null, or its size");
+    if (grid >= body.numbers.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
+    if (const char* wrong = what_is_wrong(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    return write_grid(body, body.numbers.grids[grid], *given);
   });
 }

@@ -2,12 +2,14 @@
 missing."""
 
 import contextlib
+import copy
 import ctypes
 import doctest
 import gc
 import io
 import json
 import os
+import pickle
 import re
 import sys
 import tempfile
@@ -22,6 +24,9 @@ except ImportError:
     sys.exit(77)
 
 import quoin
+
+
+CAMERA = quoin.Camera((3, 4, 30), (1, 0, 0), (0, 1, 0), (0, 0, -1), 40.0, focus_distance=12.0, number=2)
 
 
 def ball(edge=24, radius=8.0):
@@ -194,6 +199,90 @@ class Scenes(unittest.TestCase):
         camera = scene.cameras[0]
         self.assertEqual((camera.position, camera.forward, camera.view_height), ((0, 0, 50), (0, 0, -1), None))
         self.assertAlmostEqual(camera.fov, 40)
+
+    def test_voxels_of_a_file_are_edited_and_written_back(self):
+        array = np.zeros((6, 5, 4), np.uint8)
+        array[1:5, 1:4, 1:3] = 1
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "a.vox")
+            quoin.from_numpy(array, [(200, 0, 0), (0, 0, 200)]).save(path)
+            scene = quoin.load(path)
+            types = scene.grids[0].to_numpy()
+            types[types == 1] = 2
+            types[0, 0, 0] = 0
+            scene.grids[0].write(types)
+            scene.grids[0].write(np.ones((2, 1, 1), bool), origin=(-2, 0, 0))
+            scene.save(path)
+            again = quoin.load(path)
+        self.assertEqual(len(again.instances), 1)
+        found = again.palette[again.grids[0].to_numpy()][..., :3].reshape(-1, 3).tolist()
+        self.assertEqual(found.count([0, 0, 200]), 23)
+        self.assertEqual(found.count([200, 0, 0]), 2)
+
+    def test_arrays_of_one_value_have_no_strides(self):
+        ones = np.broadcast_to(np.uint8(1), (3, 4, 5))
+        self.assertEqual(quoin.from_numpy(ones, [(1, 2, 3)]).grids[0].shape, (3, 4, 5))
+        self.assertEqual(len(quoin.mesh_labels(ones).triangles), 2 * 2 * (3 * 4 + 4 * 5 + 5 * 3))
+
+    def test_groups_layers_cameras_and_the_sun_come_back(self):
+        scene = quoin.from_numpy(np.ones((4, 4, 4), np.uint8), [(9, 9, 9)], "box")
+        scene.set_layer("attic", visible=False)
+        house = scene.add_group("house")
+        room = scene.add_group("room", house, visible=True, layer="attic")
+        scene.assign(0, room, "attic")
+        flat = CAMERA._replace(view_height=9.0, number=5, position=(1, 2, 90))
+        scene.add_camera(CAMERA)
+        scene.add_camera(flat)
+        scene.set_sun(quoin.Sun((1, 2, 2), 2.5, (1, 0.5, 0.25), 3.0))
+        scene.add_lamp(quoin.Lamp("torch", (1, 2, 3), (0, -1, 0), (1, 1, 1), 5.0))
+        self.assertRaises(quoin.QuoinError, scene.add_camera, flat)  # the number is taken
+        with tempfile.TemporaryDirectory() as folder:
+            for ending in (".vox", ".quoin", ".json"):
+                path = os.path.join(folder, "all" + ending)
+                scene.save(path)
+                again = quoin.load(path)
+                self.assertEqual([(one.name, one.parent, one.layer) for one in again.groups],
+                                 [("house", None, ""), ("room", 0, "attic")])
+                self.assertEqual(again.instances[0].layer, "attic")
+                self.assertFalse(again.instances[0].shown)
+                self.assertIn(quoin.Layer("attic", False), again.layers)
+                self.assertEqual(len(again.lamps), 0 if ending == ".vox" else 1)
+                self.assertEqual(any("lamps left out" in one for one in scene.warnings), ending == ".vox", scene.warnings)
+                sun = again.sun_light
+                self.assertTrue(np.allclose(sun.direction, np.array([1, 2, 2]) / 3, atol=1e-6), ending)
+                if ending == ".vox":
+                    self.assertAlmostEqual(sun.brightness, 2.5, 5)
+                    self.assertTrue(np.allclose(sun.colour, (1, 0.5, 0.25), atol=5e-3))
+                    self.assertAlmostEqual(sun.angle, 3.0, 4)
+                else:
+                    self.assertTrue(any("sun" in one for one in scene.warnings), scene.warnings)
+                if ending == ".json":
+                    self.assertTrue(any("cameras" in one for one in scene.warnings), scene.warnings)
+                    continue
+                self.assertEqual([one.number for one in again.cameras], [2, 5])
+                for found, wanted in zip(again.cameras, (CAMERA, flat)):
+                    self.assertTrue(np.allclose(found.position, wanted.position, atol=1e-4), found)
+                    self.assertTrue(np.allclose(found.forward, wanted.forward, atol=1e-6), found)
+                self.assertAlmostEqual(again.cameras[0].fov, 40.0, 4)
+                self.assertAlmostEqual(again.cameras[0].focus_distance, 12.0, 4)
+                self.assertAlmostEqual(again.cameras[1].view_height, 9.0, 4)
+
+    def test_what_a_file_was_given_is_not_lost_in_silence(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "a.vox")
+            quoin.from_numpy(np.ones((4, 4, 4), np.uint8), [(9, 9, 9)]).save(path)
+            scene = quoin.load(path)
+            scene.add_camera(CAMERA)
+            scene.set_sun(quoin.Sun((0, 1, 0), 2.0))
+            scene.save(os.path.join(folder, "a.json"))
+            self.assertEqual(scene.warnings, ["cameras left out: 1", "the sun's brightness and colour are left out"])
+            scene.save(path)
+            self.assertEqual(scene.warnings, [])
+            again = quoin.load(path)
+            again.save(os.path.join(folder, "a.json"))
+        self.assertEqual(len(again.cameras), 1)
+        self.assertEqual(again.warnings, ["left out, which only .vox keeps: cameras: 1",
+                                          "left out, which only .vox keeps: render settings: 1"])
 
     def test_triangles_become_voxels(self):
         corners = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [4, 4, 0], [0, 0, 4], [4, 0, 4], [0, 4, 4], [4, 4, 4]])
@@ -380,7 +469,37 @@ class BadInput(unittest.TestCase):
             (lambda: quoin.mesh_labels(array.astype(float)), quoin.QuoinError),
             (lambda: quoin.mesh_labels(array, relaxation_steps=-1), quoin.QuoinError),
             (lambda: scene.add(array + 9), quoin.QuoinError),
-            (lambda: scene.add(array.astype(float)), quoin.QuoinError),
+            (lambda: scene.add(array.astype(float)), TypeError),
+            (lambda: scene.add(array.astype(int)), TypeError),
+            (lambda: quoin.from_numpy(array, (1, 2, 3)), TypeError),
+            (lambda: quoin.surface_nets(array, "0.5"), TypeError),
+            (lambda: quoin.surface_nets(array, 0.5, spacing=2), ValueError),
+            (lambda: full.render(8, 8, look_at=(1, 2, 3)), ValueError),
+            (lambda: full.render(8, 8, camera=(1, 2)), ValueError),
+            (lambda: full.grids[0].write(array + 9), quoin.QuoinError),
+            (lambda: full.grids[0].write(array.astype(int)), TypeError),
+            (lambda: quoin.Grid(full, 7).write(array), quoin.QuoinError),
+            (lambda: quoin.png([[[0, 0, 0]]]), TypeError),
+            (lambda: copy.copy(full._owner), TypeError),
+            (lambda: copy.deepcopy(full), TypeError),
+            (lambda: pickle.dumps(full), TypeError),
+            (lambda: scene.assign(0), quoin.QuoinError),
+            (lambda: full.assign(0, 3), quoin.QuoinError),
+            (lambda: full.assign(0, None, "nowhere"), quoin.QuoinError),
+            (lambda: full.add_group("a", 5), quoin.QuoinError),
+            (lambda: full.add_group("a", -1), ValueError),
+            (lambda: full.add_group("a", layer="nowhere"), quoin.QuoinError),
+            (lambda: full.set_layer(""), quoin.QuoinError),
+            (lambda: full.add_camera(CAMERA._replace(right=(2, 0, 0))), quoin.QuoinError),
+            (lambda: full.add_camera(CAMERA._replace(right=(-1, 0, 0))), quoin.QuoinError),
+            (lambda: full.add_camera(CAMERA._replace(fov=180.0)), quoin.QuoinError),
+            (lambda: full.add_camera(CAMERA._replace(view_height=0.0)), quoin.QuoinError),
+            (lambda: full.add_camera(CAMERA._replace(number=-1)), quoin.QuoinError),
+            (lambda: full.add_camera(CAMERA._replace(position=(nan, 0, 0))), quoin.QuoinError),
+            (lambda: full.add_lamp(quoin.Lamp("a", (0, 0, 0), (0, 0, 0), (1, 1, 1), 1.0)), quoin.QuoinError),
+            (lambda: full.add_lamp(quoin.Lamp("a", (0, 0, 0), None, (1, 1, 1), -1.0)), quoin.QuoinError),
+            (lambda: full.set_sun(quoin.Sun((0, 0, 0))), quoin.QuoinError),
+            (lambda: full.set_sun(quoin.Sun((0, 1, 0), nan)), quoin.QuoinError),
             (lambda: scene.add(array, origin=(nan, 0, 0)), quoin.QuoinError),
             (lambda: scene.add_type((1, 2)), ValueError),
             (lambda: scene.add_type((1, 2, 300)), ValueError),
