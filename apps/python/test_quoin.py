@@ -338,6 +338,37 @@ class Scenes(unittest.TestCase):
                 quoin.load_bytes(b"VOX nothing")
             scene.render(64, 64)
 
+    def test_values_alone(self):
+        place = np.indices((6, 5, 4), np.int16).sum(axis=0, dtype=np.int16)
+        mine = quoin.surface_nets(place, 5.5)
+        with tempfile.TemporaryDirectory() as folder:
+            for dtype in ("<i2", ">i2", "<f4", ">f8", "u1"):
+                held = place.astype(dtype).tobytes(order="F")
+                raw = quoin.Raw(place.shape, dtype)
+                found = quoin.load_bytes(held, raw=raw, iso=5.5).grids[0].mesh(smooth=True)
+                self.assertEqual(len(found.triangles), len(mine.triangles), dtype)
+                with open(f"{folder}/values.bin", "wb") as file:
+                    file.write(held)
+                again = quoin.load(f"{folder}/values.bin", raw=raw, iso=5.5).grids[0].mesh(smooth=True)
+                self.assertTrue((again.positions == found.positions).all())
+
+    def test_pictures_of_heights(self):
+        metres = np.array([[3, 5], [4, 9]])
+        code = (metres + 10_000) * 10
+        picture = np.stack([code >> 16, code >> 8 & 255, code & 255], axis=2).astype(np.uint8)
+        heights = quoin.Heights("mapbox", metres_per_pixel=1.0, ground_depth=2)
+        scene = quoin.load_bytes(quoin.png(picture), heights=heights)
+        self.assertEqual(scene.warnings, [])
+        filled = (scene.grids[0].to_numpy() > 0).sum(axis=1)
+        self.assertEqual(sorted(np.diff(sorted(filled.ravel())).tolist()), [1, 1, 4])
+        twice = quoin.load_bytes(quoin.png(picture), heights=quoin.Heights("mapbox", metres_per_pixel=1.0,
+                                                                           exaggeration=2.0, ground_depth=2))
+        self.assertGreater(twice.grids[0].shape[1], scene.grids[0].shape[1])
+        larger = np.repeat(np.repeat(picture, 4, axis=0), 4, axis=1)
+        smooth = quoin.load_bytes(quoin.png(larger), heights=quoin.Heights("mapbox", smooth=True))
+        self.assertTrue(smooth.grids[0].has_field)
+        self.assertIn("metres", " ".join(smooth.warnings))
+
     def test_progress_within_progress(self):
         _, scene = self.scene()
         outer, inner = [], []
@@ -547,6 +578,18 @@ class BadInput(unittest.TestCase):
             (lambda: quoin.load("a.vox", frame=2**32), ValueError),
             (lambda: quoin.load_bytes("VOX "), TypeError),
             (lambda: quoin.load_bytes(b""), quoin.QuoinError),
+            (lambda: quoin.Raw((2, 2)), ValueError),
+            (lambda: quoin.Raw((2, 2, 0)), ValueError),
+            (lambda: quoin.Raw((2, 2, 2), "complex64"), TypeError),
+            (lambda: quoin.Raw((2, 2.5, 2)), TypeError),
+            (lambda: quoin.load_bytes(b"1234567", raw=quoin.Raw((2, 2, 2))), quoin.QuoinError),
+            (lambda: quoin.load_bytes(b"12345678", raw=(2, 2, 2)), TypeError),
+            (lambda: quoin.Heights("colour"), ValueError),
+            (lambda: quoin.Heights(metres_per_pixel=0.0), ValueError),
+            (lambda: quoin.Heights(exaggeration=nan), ValueError),
+            (lambda: quoin.Heights(ground_depth=0), ValueError),
+            (lambda: quoin.load_bytes(b"no picture", heights=quoin.Heights()), quoin.QuoinError),
+            (lambda: quoin.load_bytes(quoin.png(np.zeros((2, 2, 3), np.uint8)), heights="mapbox"), TypeError),
         ]:
             with self.assertRaises(error):
                 wrong()

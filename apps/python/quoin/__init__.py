@@ -30,11 +30,11 @@ import numpy as np
 from . import _c
 from ._c import NdArray, QuoinError
 from ._mesh import Mesh, mesh_labels, surface_nets
-from ._scene import (Camera, Format, Grid, Group, Hits, Instance, Lamp, Layer, Scene, Sun, VoxelType, formats,
-                     from_numpy, load, load_bytes)
+from ._scene import (Camera, Format, Grid, Group, Heights, Hits, Instance, Lamp, Layer, Raw, Scene, Sun, VoxelType,
+                     formats, from_numpy, load, load_bytes)
 
-__all__ = ["Camera", "Format", "Grid", "Group", "Hits", "Instance", "Lamp", "Layer", "Mesh", "QuoinError", "Scene", "Sun",
-           "VoxelType", "formats", "from_numpy", "load", "load_bytes", "mesh_labels", "png", "progress", "surface_nets",
+__all__ = ["Camera", "Format", "Grid", "Group", "Heights", "Hits", "Instance", "Lamp", "Layer", "Mesh", "QuoinError", "Raw",
+           "Scene", "Sun", "VoxelType", "formats", "from_numpy", "load", "load_bytes", "mesh_labels", "png", "progress", "surface_nets",
            "version"]
 
 

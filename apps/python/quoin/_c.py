@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import operator
 import os
+import sys
 import threading
 from typing import TYPE_CHECKING, Any, Callable, List, Optional, Sequence, Tuple
 
@@ -90,7 +91,11 @@ class Format(ctypes.Structure):
 class LoadOptions(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("threads", ctypes.c_int32), ("show_hidden", ctypes.c_int32),
                 ("frame", ctypes.c_int32), ("radius", ctypes.c_int32), ("has_iso", ctypes.c_int32),
-                ("iso", ctypes.c_float), ("mesh_voxels", ctypes.c_int32), ("voxel_size", ctypes.c_double)]
+                ("iso", ctypes.c_float), ("mesh_voxels", ctypes.c_int32), ("voxel_size", ctypes.c_double),
+                ("raw_shape", ctypes.c_int32 * 3), ("raw_scalar", ctypes.c_int32), ("raw_big_endian", ctypes.c_int32),
+                ("heights", ctypes.c_int32), ("metres_per_level", ctypes.c_double),
+                ("metres_per_pixel", ctypes.c_double), ("metres_per_voxel", ctypes.c_double),
+                ("exaggeration", ctypes.c_double), ("ground_depth", ctypes.c_int32), ("smooth_ground", ctypes.c_int32)]
 
 
 class Triangles(ctypes.Structure):
@@ -145,7 +150,7 @@ _SIGNATURES = {
     "quoin_free": (_handle,),
     "quoin_scene_create": (_p,),
     "quoin_scene_load": (ctypes.c_char_p, _p),
-    "quoin_scene_load_bytes": (_p, _n, _p),
+    "quoin_scene_load_bytes_with": (_p, _n, _p, _p),
     "quoin_scene_load_with": (ctypes.c_char_p, _p, _p),
     "quoin_scene_get_info": (_handle, _p),
     "quoin_set_progress": (Progress, _p),
@@ -341,6 +346,15 @@ def types_of(array: Any, origin: Sequence[float]) -> Any:
     if isinstance(array, np.ndarray) and array.dtype not in (np.uint8, np.uint16, np.bool_):
         raise TypeError(f"types of voxels are uint8 or uint16, not {array.dtype}; convert it with astype")
     return array_of(array, (1, 1, 1), origin)
+
+
+def scalar_of(dtype: Any, name: str) -> Tuple[int, bool]:
+    """The number of a type of numbers, and whether its greatest byte comes first."""
+    found = np.dtype(dtype)
+    native = found.newbyteorder("=")
+    if native not in _SCALARS:
+        raise TypeError(f"{name} of {found} are not read")
+    return _SCALARS[native], not found.isnative if sys.byteorder == "little" else found.isnative and found.itemsize > 1
 
 
 def array_of(array: Any, spacing: Sequence[float], origin: Sequence[float]) -> Any:

@@ -561,34 +561,106 @@ class Scene:
         return f"<quoin.Scene: {len(self.grids)} grids, {len(self.types) - 1} types>"
 
 
+class Raw:
+    """A file of values alone: how many along each axis, the first one fastest, and what each is.
+
+    `dtype`: of NumPy, in any order of bytes: "uint8", ">i2", np.float32.
+    """
+
+    def __init__(self, shape: Sequence[int], dtype: Any = "uint8") -> None:
+        self.shape = tuple(_c.whole(length, "shape") for length in shape)
+        if len(self.shape) != 3 or min(self.shape) < 1:
+            raise ValueError(f"values alone have three axes that are not empty, not {self.shape}")
+        self.dtype = np.dtype(dtype)
+        self._scalar, self._is_big_endian = _c.scalar_of(dtype, "values")
+
+
+class Heights:
+    """A picture (PNG) of the heights of a landscape.
+
+    `encoding`: "grey", a level times `metres_per_level`; "mapbox" or "terrarium", metres in red, green and blue.
+    `metres_per_pixel`: between neighbouring heights; without it 1, with a warning. `metres_per_voxel`: without it that.
+    `ground_depth`: voxels of ground below the lowest height. `smooth`: densities rather than voxels.
+    """
+
+    ENCODINGS = ("grey", "mapbox", "terrarium")
+
+    def __init__(self, encoding: str = "grey", *, metres_per_level: float = 1.0,
+                 metres_per_pixel: Optional[float] = None, metres_per_voxel: Optional[float] = None,
+                 exaggeration: float = 1.0, ground_depth: int = 8, smooth: bool = False) -> None:
+        if encoding not in self.ENCODINGS:
+            raise ValueError(f"encoding is one of {', '.join(self.ENCODINGS)}, not {encoding!r}")
+        self.encoding = encoding
+        # To the library 0 stands for what is not given.
+        for name, given in (("metres_per_level", metres_per_level), ("metres_per_pixel", metres_per_pixel),
+                            ("metres_per_voxel", metres_per_voxel), ("exaggeration", exaggeration)):
+            if given is not None and not given > 0.0:
+                raise ValueError(f"{name} is more than 0, not {given}")
+        self.metres_per_level, self.exaggeration = metres_per_level, exaggeration
+        self.metres_per_pixel, self.metres_per_voxel = metres_per_pixel, metres_per_voxel
+        self.ground_depth = _c.whole(ground_depth, "ground_depth")
+        if self.ground_depth < 1:
+            raise ValueError(f"ground_depth is at least 1, not {ground_depth}")
+        self.smooth = smooth
+
+
+def _load_options(frame: int, show_hidden: bool, radius: int, iso: Optional[float], size: int, voxel_size: float,
+                  threads: int, raw: Optional[Raw], heights: Optional[Heights]) -> Any:
+    options = _c.sized(_c.LoadOptions)
+    options.frame, options.show_hidden = _c.whole(frame, "frame"), int(show_hidden)
+    options.radius, options.threads = _c.whole(radius, "radius"), _c.whole(threads, "threads")
+    options.has_iso, options.iso = int(iso is not None), iso or 0.0
+    options.mesh_voxels, options.voxel_size = _c.whole(size, "size"), voxel_size
+    if raw is not None:
+        if not isinstance(raw, Raw):
+            raise TypeError("raw is a quoin.Raw")
+        options.raw_shape[:] = raw.shape
+        options.raw_scalar, options.raw_big_endian = raw._scalar, int(raw._is_big_endian)
+    if heights is not None:
+        if not isinstance(heights, Heights):
+            raise TypeError("heights is a quoin.Heights")
+        options.heights = 1 + Heights.ENCODINGS.index(heights.encoding)
+        options.metres_per_level, options.exaggeration = heights.metres_per_level, heights.exaggeration
+        options.metres_per_pixel = heights.metres_per_pixel or 0.0
+        options.metres_per_voxel = heights.metres_per_voxel or 0.0
+        options.ground_depth, options.smooth_ground = heights.ground_depth, int(heights.smooth)
+    return options
+
+
 def load(path: Path, *, frame: int = 0, show_hidden: bool = False, radius: int = 0, iso: Optional[float] = None,
-         size: int = 0, voxel_size: float = 0.0, threads: int = 0) -> Scene:
+         size: int = 0, voxel_size: float = 0.0, threads: int = 0, raw: Optional[Raw] = None,
+         heights: Optional[Heights] = None) -> Scene:
     """Reads a file of any format that Quoin reads (`formats`), or a folder that holds a world.
 
     `frame`: of an animation. `radius`: of a world, in chunks of 64 voxels around its spawn; 0 is 4. `iso`: of a volume.
-    `size`, `voxel_size`: of a file of triangles, voxels along its longest side, or their size.
+    `size`, `voxel_size`: of a file of triangles, voxels along its longest side, or their size. `raw`, `heights`: the
+    file is one of values alone, or a picture of a landscape's heights.
 
     >>> load("nothing.vox")
     Traceback (most recent call last):
     ...
     quoin._c.QuoinError: nothing.vox: No such file or directory
     """
-    options = _c.sized(_c.LoadOptions)
-    options.frame, options.show_hidden = _c.whole(frame, "frame"), int(show_hidden)
-    options.radius, options.threads = _c.whole(radius, "radius"), _c.whole(threads, "threads")
-    options.has_iso, options.iso = int(iso is not None), iso or 0.0
-    options.mesh_voxels, options.voxel_size = _c.whole(size, "size"), voxel_size
+    options = _load_options(frame, show_hidden, radius, iso, size, voxel_size, threads, raw, heights)
     out = ctypes.c_uint64()
     _c.check(_c.lib.quoin_scene_load_with(_c.path_of(path), ctypes.byref(options), ctypes.byref(out)))
     return Scene(_c.Owner(out.value))
 
 
-def load_bytes(data: Union[bytes, bytearray, memoryview]) -> Scene:
-    """The same of what a file holds: bytes, or whatever lies in memory as they do, which is not copied."""
+def load_bytes(data: Union[bytes, bytearray, memoryview], *, frame: int = 0, show_hidden: bool = False, radius: int = 0,
+               iso: Optional[float] = None, size: int = 0, voxel_size: float = 0.0, threads: int = 0,
+               raw: Optional[Raw] = None, heights: Optional[Heights] = None) -> Scene:
+    """The same of what a file holds: bytes, or whatever lies in memory as they do, which is not copied.
+
+    >>> values = np.arange(8, dtype=">u2").reshape(2, 2, 2)
+    >>> load_bytes(values.tobytes(), raw=Raw((2, 2, 2), ">u2"), iso=3.5).grids[0].has_field
+    True
+    """
+    options = _load_options(frame, show_hidden, radius, iso, size, voxel_size, threads, raw, heights)
     held = memoryview(data).cast("B")
     array = np.frombuffer(held, np.uint8) if held.nbytes else np.zeros(0, np.uint8)
     out = ctypes.c_uint64()
-    _c.check(_c.lib.quoin_scene_load_bytes(array.ctypes.data, array.size, ctypes.byref(out)))
+    _c.check(_c.lib.quoin_scene_load_bytes_with(array.ctypes.data, array.size, ctypes.byref(options), ctypes.byref(out)))
     return Scene(_c.Owner(out.value))
 
 
