@@ -240,7 +240,9 @@ async function compile(given) {
 async function compiled(given) {
   if (isBytes(given)) return WebAssembly.compile(given);
   if (String(given).startsWith('file:')) {
-    const { readFile } = await import('node:fs/promises');
+    // Written so that those who bundle for browsers do not look for it.
+    const name = ['node:fs', 'promises'].join('/');
+    const { readFile } = await import(/* webpackIgnore: true */ /* @vite-ignore */ name);
     return WebAssembly.compile(await readFile(new URL(given)));
   }
   const response = await fetch(given);
