@@ -125,7 +125,7 @@ Error unrecognised(std::span<const std::byte> bytes) {
   if (heights::is_png(bytes)) {
     return {ErrorCode::BadFormat,
             "not a file of any format that Quoin reads, but a picture, which --heights grey, mapbox or terrarium reads "
-            "as heights",
+            "as heights (in programs the option heights)",
             {},
             {}};
   }

@@ -3,7 +3,7 @@
  * Axes: right-handed, +Y up. Colours: sRGB. All arrays that are returned are the caller's.
  * Errors: every function throws (or rejects with) a QuoinError. One of code "trap", "internal" or "out_of_memory" may
  * have ended the instance that all scenes lived in: these are gone then, their calls fail with "bad_handle", and the
- * next `load` starts a fresh one.
+ * next `load` starts a fresh one. Options of a name that is not declared here are "invalid_argument".
  */
 export type ErrorCode =
   | 'invalid_argument' | 'cannot_read' | 'cannot_write' | 'bad_format' | 'unsupported' | 'limit_exceeded' | 'cancelled'
@@ -66,7 +66,7 @@ export interface MeshOptions extends Progress {
 export interface RenderOptions extends Progress {
   width?: number;
   height?: number;
-  /** Samples a pixel; default 4. */
+  /** Samples a pixel, 1 to 4,096; default 4. */
   samples?: number;
   /** In place of a view of the whole scene. */
   camera?: { position: Vec3; lookAt: Vec3; fovDegrees?: number };
@@ -97,7 +97,7 @@ export class Scene {
   private constructor();
   /** Whether it is of the small module. */
   readonly isSmall: boolean;
-  /** What reading left out, a line each. */
+  /** What reading left out, or chose where nothing was said; a line each. */
   readonly warnings: readonly string[];
   readonly grids: readonly GridInfo[];
   /** 0 is air. */

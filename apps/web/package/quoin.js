@@ -240,7 +240,9 @@ async function compile(given) {
 async function compiled(given) {
   if (isBytes(given)) return WebAssembly.compile(given);
   if (String(given).startsWith('file:')) {
-    const { readFile } = await import('node:fs/promises');
+    // Written so that those who bundle for browsers do not look for it.
+    const name = ['node:fs', 'promises'].join('/');
+    const { readFile } = await import(/* webpackIgnore: true */ /* @vite-ignore */ name);
     return WebAssembly.compile(await readFile(new URL(given)));
   }
   const response = await fetch(given);
@@ -292,6 +294,7 @@ const whole = new Engine(() => new URL('./quoin.wasm', import.meta.url));
 const small = new Engine(() => new URL('./quoin-small.wasm', import.meta.url));
 
 export async function start(module, options = {}) {
+  known(options, ['small']);
   await (options.small ? small : whole).start(module);
 }
 
@@ -351,7 +354,8 @@ export class Scene {
   }
 
   /** Calls use(the address of a quoin_mesh_options). */
-  #withMeshOptions({ smooth, watertight }, use) {
+  #withMeshOptions(options, use) {
+    const { smooth, watertight } = known(options, ['smooth', 'watertight', 'progress']);
     const of = this.#instance;
     return of.withStruct('meshOptions', (at) => {
       const view = of.view();
@@ -365,8 +369,12 @@ export class Scene {
     return this.file('.glb', options);
   }
 
-  file(extension, { progress, ...options } = {}) {
+  file(extension, options = {}) {
     const of = this.#instance;
+    const { progress } = known(options, ['smooth', 'watertight', 'progress']);
+    const kinds = ['.glb', '.ply', '.stl', '.3mf', '.vox'];
+    if (!kinds.some((kind) => typeof extension === 'string' && extension.toLowerCase().endsWith(kind)))
+      throw new QuoinError('unsupported', `${String(extension)} is none of ${kinds.join(', ')}`);
     const write = (wanted, name, out) => {
       of.call('quoin_web_write', this.#handle, name, wanted, out, out + 4);
       const at = of.view().getUint32(out, true);
@@ -378,8 +386,9 @@ export class Scene {
       of.withText(extension, (name) => of.with(8, (out) => write(wanted, name, out)))));
   }
 
-  mesh(grid, { progress, ...options } = {}) {
+  mesh(grid, options = {}) {
     const of = this.#instance;
+    const { progress } = known(options, ['smooth', 'watertight', 'progress']);
     return of.listened(progress, () => this.#withMeshOptions(options, (wanted) =>
       of.takeMesh(of.handle('quoin_grid_mesh', this.#handle, index(grid), wanted))));
   }
@@ -395,11 +404,12 @@ export class Scene {
     }));
   }
 
-  render({ width = 1280, height = 720, progress, ...options } = {}) {
+  render(options = {}) {
     const of = this.#instance;
+    const { width = 1280, height = 720, progress } = known(options, renderNames);
     const pixels = pixelsOf(width, height);
     return of.listened(progress, () => of.withStruct('renderOptions', (wanted) => of.with(3 * pixels, (out) => {
-      putRenderOptions(of.view(), wanted, { width, height, ...options });
+      putRenderOptions(of.view(), wanted, { ...options, width, height });
       of.call('quoin_scene_render', this.#handle, wanted, out, 3 * pixels);
       const rgb = new Uint8Array(of.exports.memory.buffer, out, 3 * pixels);
       const rgba = new Uint8ClampedArray(4 * pixels).fill(255);
@@ -412,7 +422,8 @@ export class Scene {
     })));
   }
 
-  rays(origins, directions, { maxT = Infinity } = {}) {
+  rays(origins, directions, options = {}) {
+    const { maxT = Infinity } = known(options, ['maxT']);
     const [from, along] = [origins, directions].map(doubles);
     const count = from.length / 3;
     if (typeof maxT !== 'number' || Number.isNaN(maxT)) throw new QuoinError('invalid_argument', 'maxT is no number');
@@ -443,6 +454,8 @@ export class Scene {
   }
 }
 
+const renderNames = ['width', 'height', 'samples', 'camera', 'sun', 'progress'];
+
 function pixelsOf(width, height) {
   if (!(Number.isInteger(width) && Number.isInteger(height) && width > 0 && height > 0 && width * height <= 2 ** 28))
     throw new QuoinError('invalid_argument', 'a size of a picture is two whole numbers, at most 2^28 pixels');
@@ -451,15 +464,15 @@ function pixelsOf(width, height) {
 
 /** Writes a quoin_render_options. */
 function putRenderOptions(view, at, { width, height, samples = 4, camera, sun }) {
-  [width, height, int32(samples, 'samples')].forEach((value, i) => view.setInt32(at + 4 + 4 * i, value, true));
+  [width, height, whole32(samples, 'samples', 1)].forEach((value, i) => view.setInt32(at + 4 + 4 * i, value, true));
   const put = (flag, from, numbers) => {
     view.setInt32(at + flag, 1, true);
     numbers.forEach((value, i) => view.setFloat64(at + from + 8 * i, value, true));
   };
   if (camera !== undefined) {
-    const fovDegrees = camera?.fovDegrees ?? 45;
+    const { fovDegrees = 45 } = known(camera, ['position', 'lookAt', 'fovDegrees'], 'camera');
     if (typeof fovDegrees !== 'number') throw new QuoinError('invalid_argument', 'camera.fovDegrees is no number');
-    put(24, 32, [...three(camera?.position, 'camera.position'), ...three(camera?.lookAt, 'camera.lookAt'), fovDegrees]);
+    put(24, 32, [...three(camera.position, 'camera.position'), ...three(camera.lookAt, 'camera.lookAt'), fovDegrees]);
   }
   if (sun !== undefined) put(88, 96, three(sun, 'sun'));
 }
@@ -492,11 +505,12 @@ export class ShaderScene {
     return this.#instance.numbers(Uint8Array, view.getUint32(out, true), view.getUint32(out + 4, true));
   }
 
-  frame({ width = 1280, height = 720, ...options } = {}) {
+  frame(options = {}) {
     const of = this.#instance;
+    const { width = 1280, height = 720 } = known(options, renderNames);
     pixelsOf(width, height);
     return of.withStruct('renderOptions', (wanted) => of.with(8, (out) => {
-      putRenderOptions(of.view(), wanted, { width, height, ...options });
+      putRenderOptions(of.view(), wanted, { ...options, width, height });
       of.call('quoin_web_march_frame', this.#march, wanted, out, out + 4);
       return this.#taken(out);
     }));
@@ -516,6 +530,16 @@ export class ShaderScene {
     registry.unregister(this);
     this.#march = 0;
   }
+}
+
+/** `options`, whose names are all to be among `names`: one that is misspelt would do nothing. */
+function known(options, names, what = 'options') {
+  if (typeof options !== 'object' || options === null)
+    throw new QuoinError('invalid_argument', `${what} is to be an object of ${names.join(', ')}`);
+  const other = Object.keys(options).find((name) => !names.includes(name));
+  if (other !== undefined)
+    throw new QuoinError('invalid_argument', `${what}: ${other} is none of ${names.join(', ')}`);
+  return options;
 }
 
 /** A number of a grid, or of a sample; -1, which none has, for what is no number of one. */
@@ -547,8 +571,27 @@ function doubles(list) {
   });
 }
 
+/** Throws where `given` is no bytes, and says how they are had of what others give. */
+function checkBytes(given) {
+  if (!isBytes(given)) {
+    const kind = given === null || given === undefined ? String(given) : given.constructor?.name ?? typeof given;
+    const how = typeof given?.arrayBuffer === 'function' ? ': await its arrayBuffer()' :
+      typeof given?.then === 'function' ? ': await it' : '';
+    throw new QuoinError('invalid_argument', `bytes are an ArrayBuffer or a typed array, not ${kind}${how}`);
+  }
+  try {
+    new Uint8Array(given.buffer ?? given, 0, 0);
+  } catch {
+    throw new QuoinError('invalid_argument', 'these bytes are gone: their ArrayBuffer was transferred');
+  }
+}
+
+const loadNames = ['showHidden', 'frame', 'radius', 'iso', 'meshVoxels', 'voxelSize', 'raw', 'heights', 'small',
+                   'progress'];
+
 export async function load(bytes, options = {}) {
-  if (!isBytes(bytes)) throw new QuoinError('invalid_argument', 'bytes are an ArrayBuffer or a typed array');
+  checkBytes(bytes);
+  known(options, loadNames);
   // What is said of the file itself, and not by it, the small module does not read.
   if (options.small && options.raw === undefined && options.heights === undefined) {
     const scene = loaded(await small.alive(), bytes, options);
@@ -607,12 +650,14 @@ function putLoadOptions(view, at, { showHidden, frame, radius, iso, meshVoxels, 
   ints(28, whole32(meshVoxels, 'meshVoxels', 1));
   doubles(32, amount(voxelSize, 'voxelSize'));
   if (raw !== undefined) {
-    const shape = three(raw?.shape, 'raw.shape').map((length) => whole32(length, 'raw.shape', 1));
+    known(raw, ['shape', 'type', 'bigEndian'], 'raw');
+    const shape = three(raw.shape, 'raw.shape').map((length) => whole32(length, 'raw.shape', 1));
     ints(40, ...shape, numberOf(raw.type ?? 'uint8', scalarNames, 'raw.type'), raw.bigEndian ? 1 : 0);
   }
   if (heights !== undefined) {
     const { encoding, metresPerLevel, metresPerPixel, metresPerVoxel, exaggeration, groundDepth, smooth } =
-      heights ?? {};
+      known(heights, ['encoding', 'metresPerLevel', 'metresPerPixel', 'metresPerVoxel', 'exaggeration', 'groundDepth',
+                      'smooth'], 'heights');
     ints(60, numberOf(encoding, heightEncodings, 'heights.encoding', 1));
     doubles(64, amount(metresPerLevel, 'heights.metresPerLevel'), amount(metresPerPixel, 'heights.metresPerPixel'),
             amount(metresPerVoxel, 'heights.metresPerVoxel'), amount(exaggeration, 'heights.exaggeration'));
@@ -621,7 +666,7 @@ function putLoadOptions(view, at, { showHidden, frame, radius, iso, meshVoxels, 
 }
 
 /** Calls use(instance, the address of the array's description). */
-async function withArray(array, shape, { spacing = [1, 1, 1], origin = [0, 0, 0], progress } = {}, use) {
+async function withArray(array, shape, { spacing = [1, 1, 1], origin = [0, 0, 0], progress }, use) {
   const scalar = scalars.findIndex((Kind) => Kind !== null && array instanceof Kind);
   if (scalar < 0) throw new QuoinError('invalid_argument', 'the array is none of the typed arrays that are read');
   const [nx, ny, nz] = three(shape, 'shape');
@@ -642,12 +687,15 @@ async function withArray(array, shape, { spacing = [1, 1, 1], origin = [0, 0, 0]
 }
 
 export async function surfaceNets(array, shape, iso, options = {}) {
+  known(options, ['spacing', 'origin', 'solidBelow', 'progress']);
+  if (typeof iso !== 'number') throw new QuoinError('invalid_argument', 'iso is no number');
   return withArray(array, shape, options, (of, at) =>
-    of.takeMesh(of.handle('quoin_surface_nets', at, Number(iso), options.solidBelow ? 1 : 0, 0)));
+    of.takeMesh(of.handle('quoin_surface_nets', at, iso, options.solidBelow ? 1 : 0, 0)));
 }
 
 export async function meshLabels(array, shape, options = {}) {
-  const { background = 0, relaxationSteps = 4 } = options;
+  const { background = 0, relaxationSteps = 4 } =
+    known(options, ['spacing', 'origin', 'background', 'relaxationSteps', 'progress']);
   const isUnsigned = array instanceof BigUint64Array;
   const bits = isUnsigned ? BigInt.asUintN : BigInt.asIntN;
   const isWhole = typeof background === 'bigint' || Number.isSafeInteger(background);
@@ -660,6 +708,9 @@ export async function meshLabels(array, shape, options = {}) {
 }
 
 export async function toThree(scene, GLTFLoader, options = {}) {
+  if (!(scene instanceof Scene)) throw new QuoinError('invalid_argument', 'scene is none that load gave');
+  if (typeof GLTFLoader?.prototype?.parseAsync !== 'function')
+    throw new QuoinError('invalid_argument', 'GLTFLoader is to be the class in three/addons/loaders/GLTFLoader.js');
   return (await new GLTFLoader().parseAsync(scene.glb(options).buffer, '')).scene;
 }
 

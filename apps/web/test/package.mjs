@@ -1,11 +1,12 @@
-// The npm package as a user gets it: installed in an empty folder, compiled with strict types, run.
-//   node package.mjs QUOIN.tgz TSC FILE
+// The npm package as a user gets it: installed in an empty folder, compiled with strict types, run, bundled.
+//   node package.mjs QUOIN.tgz TSC FILE ESBUILD
 import { execFileSync } from 'node:child_process';
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
+import { pathToFileURL } from 'node:url';
 
-const [tarball, tsc, file] = process.argv.slice(2).map((path) => resolve(path));
+const [tarball, tsc, file, esbuild] = process.argv.slice(2).map((path) => resolve(path));
 const folder = mkdtempSync(join(tmpdir(), 'quoin-package-'));
 const run = (program, ...args) => execFileSync(program, args, { cwd: folder, stdio: ['ignore', 'pipe', 'inherit'] });
 
@@ -56,6 +57,16 @@ if (scene.glb().length < 1000 || scene.grids.length === 0) process.exit(1);
 console.log(\`package: \${scene.grids.length} grids, a GLB of \${scene.glb().length} bytes\`);
 `);
 process.stdout.write(run(process.execPath, 'use.mjs', file));
+// Bundled for browsers, where there is nothing of Node.js, with the modules beside what is made.
+writeFileSync(join(folder, 'page.mjs'), `
+import { load } from 'quoin';
+export const lengthOfGlb = async (bytes) => (await load(bytes)).glb().length;
+`);
+run(esbuild, 'page.mjs', '--bundle', '--minify', '--format=esm', '--platform=browser', '--log-level=error',
+    '--outfile=bundled/page.mjs');
+cpSync(join(folder, 'node_modules/quoin/quoin.wasm'), join(folder, 'bundled/quoin.wasm'));
+const { lengthOfGlb } = await import(pathToFileURL(join(folder, 'bundled/page.mjs')));
+console.log(`bundled: a GLB of ${await lengthOfGlb(readFileSync(file))} bytes`);
 const licences = readFileSync(join(folder, 'node_modules/quoin/LICENSES'), 'utf8');
 for (const name of ['zlib', 'libpng', 'LLVM', 'wasi-libc', 'GLM', 'nlohmann-json', 'robin-map', 'tl::expected',
                     'tinygltf', 'tinyobjloader', 'meshoptimizer'])
