@@ -146,7 +146,7 @@ export interface Small {
 
 /** Starts a WebAssembly module. It is not needed: `load` and others do the same. `module`: its bytes, or where they
  *  are, in place of quoin.wasm, or quoin-small.wasm, beside quoin.js. */
-export function start(module?: BufferSource | URL | string, options?: Small): Promise<void>;
+export function start(module?: ArrayBuffer | ArrayBufferView | URL | string, options?: Small): Promise<void>;
 
 /** The file holds values alone: a volume. */
 export interface RawVolume {

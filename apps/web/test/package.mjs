@@ -49,6 +49,10 @@ void meshLabels(new Float32Array(8), [2, 2, 2]);
 `);
 run(process.execPath, tsc, '--strict', '--noEmit', '--exactOptionalPropertyTypes', '--noUncheckedIndexedAccess',
     '--target', 'es2022', '--module', 'nodenext', 'use.ts', 'node_modules/quoin/quoin.d.ts');
+// Where there is no browser, whose types a project for Node.js does not have.
+writeFileSync(join(folder, 'node.d.ts'), 'declare class URL { constructor(text: string); }\n');
+run(process.execPath, tsc, '--strict', '--noEmit', '--target', 'es2022', '--lib', 'es2022', '--module', 'nodenext',
+    'node.d.ts', 'node_modules/quoin/quoin.d.ts');
 writeFileSync(join(folder, 'use.mjs'), `
 import { readFileSync } from 'node:fs';
 import { load } from 'quoin';

@@ -58,14 +58,18 @@ ShadeLight light_of(const SkyLight& sky, const PathLamps& lamps) {
   return light;
 }
 
-// By its direction: what lifts a point off a face, in the grid.
-std::array<DVec3, 6> lifts_off_faces() {
+// By its direction: what lifts a point off a face, in the grid. Known before the program starts, so that pictures may be
+// taken for what is initialized then.
+constexpr std::array<DVec3, 6> lifts_off_faces() {
   std::array<DVec3, 6> lifts{};
-  for (std::size_t face = 0; face < lifts.size(); ++face)
-    lifts[face] = DVec3(normal_of(static_cast<Direction>(face))) * kRayLift;
+  for (std::size_t face = 0; face < lifts.size(); ++face) {
+    const FaceFrame& frame = kFaceFrames[face];
+    const double lift = frame.sign * kRayLift;
+    lifts[face] = DVec3(frame.axis == 0 ? lift : 0.0, frame.axis == 1 ? lift : 0.0, frame.axis == 2 ? lift : 0.0);
+  }
   return lifts;
 }
-const std::array<DVec3, 6> kLifts = lifts_off_faces();
+constexpr std::array<DVec3, 6> kLifts = lifts_off_faces();
 
 DVec3 in_grid(const PlacedGrid& placed, Vec3 direction) {
   return DVec3(direction) * placed.world_axes / placed.voxel_size;  // the transposed matrix times it
