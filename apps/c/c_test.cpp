@@ -68,20 +68,20 @@ TEST(C, ArraysComeBackAsTheyWent) {
 TEST(C, FilesKeepThem) {
   std::vector<std::uint16_t> voxels;
   const quoin_scene scene = made_scene(voxels);
-  ASSERT_EQ(quoin_scene_save(scene, "c_test.json"), QUOIN_OK) << quoin_last_error();
-  ASSERT_EQ(quoin_scene_save(scene, "c_test.glb"), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_scene_save(scene, test_file("c_test.json").c_str()), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_scene_save(scene, test_file("c_test.glb").c_str()), QUOIN_OK) << quoin_last_error();
   quoin_scene again = 0;
-  ASSERT_EQ(quoin_scene_load("c_test.json", &again), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_scene_load(test_file("c_test.json").c_str(), &again), QUOIN_OK) << quoin_last_error();
   const std::array<std::int32_t, 3> min{};
   const std::array<std::int32_t, 3> shape{kEdge, kEdge, kEdge};
   std::vector<std::uint16_t> read(voxels.size());
   ASSERT_EQ(quoin_grid_read(again, 0, min.data(), shape.data(), read.data(), read.size()), QUOIN_OK);
   EXPECT_EQ(read, voxels);
   EXPECT_EQ(quoin_free(again), QUOIN_OK);
-  EXPECT_EQ(quoin_scene_load("c_test.nothing", &again), QUOIN_CANNOT_READ);
+  EXPECT_EQ(quoin_scene_load(test_file("c_test.nothing").c_str(), &again), QUOIN_CANNOT_READ);
   EXPECT_NE(std::string(quoin_last_error()).find("c_test.nothing"), std::string::npos);
   EXPECT_EQ(quoin_scene_load_bytes("VOX ????", 8, &again), QUOIN_BAD_FORMAT);
-  EXPECT_EQ(quoin_scene_save(scene, "c_test.unknown"), QUOIN_UNSUPPORTED);
+  EXPECT_EQ(quoin_scene_save(scene, test_file("c_test.unknown").c_str()), QUOIN_UNSUPPORTED);
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 

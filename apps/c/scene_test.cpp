@@ -505,8 +505,8 @@ TEST_F(TwoSheets, MergeTypesThatDifferInColourAlone) {
   ASSERT_EQ(quoin_scene_warning_count(scene_, &warnings), QUOIN_OK);
   EXPECT_EQ(warnings, 1U);
   // A save does not take away what was said before it, nor say it twice.
-  ASSERT_EQ(quoin_scene_save(scene_, "c_test_sheets.json"), QUOIN_OK) << quoin_last_error();
-  ASSERT_EQ(quoin_scene_save(scene_, "c_test_sheets.glb"), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_scene_save(scene_, test_file("c_test_sheets.json").c_str()), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_scene_save(scene_, test_file("c_test_sheets.glb").c_str()), QUOIN_OK) << quoin_last_error();
   ASSERT_EQ(quoin_scene_warning_count(scene_, &warnings), QUOIN_OK);
   EXPECT_EQ(warnings, 1U);
 }
@@ -523,7 +523,7 @@ TEST_F(TwoSheets, HaveTheAlphaOfTheirColours) {
 
 TEST_F(SceneOfARow, AnInstanceKeepsALongName) {
   const std::string name(300, 'n');
-  const std::string path = "c_test_name.json";
+  const std::string path = test_file("c_test_name.json");
   std::ofstream(path) << R"({"quoin_scene": 4, "grids": [{"voxels": []}], "instances": [{"grid": 0, "name": ")" << name
                       << R"("}]})";
   quoin_scene scene = 0;
@@ -595,7 +595,7 @@ TEST_F(SceneOfARow, ProgressOfSavingAndAddingNeverFalls) {
   EXPECT_GT(listener.calls, 2);
   EXPECT_EQ(listener.last, 1.0);
   listener.last = 0.0;
-  EXPECT_EQ(quoin_scene_save(scene_, "c_test_wall.glb"), QUOIN_OK) << quoin_last_error();
+  EXPECT_EQ(quoin_scene_save(scene_, test_file("c_test_wall.glb").c_str()), QUOIN_OK) << quoin_last_error();
   EXPECT_EQ(listener.last, 1.0);
   listener.last = 0.0;
   listener.stop_at = listener.calls + 2;
@@ -627,24 +627,24 @@ TEST_F(SceneOfARow, ThreadsShareIt) {
 
 TEST(CLoading, TakesOptions) {
   quoin_scene scene = 0;
-  std::ofstream("c_test.obj") << "v 0 0 0\nv 8 0 0\nv 0 8 0\nv 0 0 8\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  std::ofstream(test_file("c_test.obj")) << "v 0 0 0\nv 8 0 0\nv 0 8 0\nv 0 0 8\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
   auto options = sized<quoin_load_options>();
   options.mesh_voxels = 20;
-  ASSERT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_scene_load_with(test_file("c_test.obj").c_str(), &options, &scene), QUOIN_OK) << quoin_last_error();
   auto info = sized<quoin_grid_info>();
   ASSERT_EQ(quoin_grid_get_info(scene, 0, &info), QUOIN_OK);
   EXPECT_EQ(info.extent[0], 20);
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
   options.voxel_size = 1.0;
-  EXPECT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_scene_load_with(test_file("c_test.obj").c_str(), &options, &scene), QUOIN_INVALID_ARGUMENT);
   options.mesh_voxels = 0;
   options.voxel_size = std::nan("");
-  EXPECT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_scene_load_with(test_file("c_test.obj").c_str(), &options, &scene), QUOIN_INVALID_ARGUMENT);
   options = sized<quoin_load_options>();
   options.frame = -1;
-  EXPECT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_scene_load_with(test_file("c_test.obj").c_str(), &options, &scene), QUOIN_INVALID_ARGUMENT);
   options.size = 3;
-  EXPECT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_scene_load_with(test_file("c_test.obj").c_str(), &options, &scene), QUOIN_INVALID_ARGUMENT);
 }
 
 TEST(CLoading, TakesValuesAlone) {
