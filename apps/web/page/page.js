@@ -204,6 +204,7 @@ function home() {
 
 // ---- A link has the view in it: #camera=...&at=...&sun=...
 const rounded = (...numbers) => numbers.map((n) => Number(n.toPrecision(6))).join(',');
+const spaced = (...numbers) => rounded(...numbers).replaceAll(',', ', ');
 
 function viewAsText() {
   const at = controls.target;
@@ -419,12 +420,12 @@ function measure(x, y) {
   measured = measured?.length === 1 ? [measured[0], hit.point] : [hit.point];
   tape.visible = measured.length === 2;
   if (measured.length === 1) {
-    say(`From ${rounded(...hit.point.toArray())}; click the other end.`);
+    say(`From ${spaced(...hit.point.toArray())}; click the other end.`);
   } else {
     tape.geometry.setFromPoints(measured);
     tape.frustumCulled = false;
     const by = measured[1].clone().sub(measured[0]);
-    say(`${rounded(by.length())} units: ${rounded(...by.toArray().map(Math.abs))} along x, y and z.`);
+    say(`${rounded(by.length())} units: ${spaced(...by.toArray().map(Math.abs))} along x, y and z.`);
   }
   redraw();
 }

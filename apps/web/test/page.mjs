@@ -210,6 +210,9 @@ try {
   if (picture) await writeFile(picture.replace(/\.png$/, '-phone.png'), await tab.screenshot());
   const [view, panel] = [await tab.locator('#view').boundingBox(), await tab.locator('#panel').boundingBox()];
   check(view.height > 400 && view.y + view.height <= panel.y + 1, 'on a phone the view lies above the panel');
+  await tab.setViewportSize({ width: 800, height: 390 });
+  const [wide, beside] = [await tab.locator('#view').boundingBox(), await tab.locator('#panel').boundingBox()];
+  check(wide.width > 500 && wide.x + wide.width <= beside.x + 1, 'in a small window it lies beside it');
   for (const name of ['LICENSE', 'LICENSES', 'LICENSE.three', 'NOTICE'])
     check((await tab.request.get(site + name)).ok(), `${name} lies beside the page`);
   check(elsewhere.length === 0, `no request to anywhere else${elsewhere.map((url) => ` ${url}`)}`);
