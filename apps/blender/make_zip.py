@@ -28,6 +28,11 @@ def main():
     path = os.path.join(folder, f"{NAME}-{version}.zip")
     when = (2026, 1, 1, 0, 0, 0)
     with zipfile.ZipFile(path + ".new", "w", zipfile.ZIP_DEFLATED) as out:
+        # By its folder Blender knows what to remove first when it is installed over another version: else it would write
+        # into the library that it has loaded.
+        folder_entry = zipfile.ZipInfo(f"{NAME}/", when)
+        folder_entry.external_attr = 0o40755 << 16 | 0x10
+        out.writestr(folder_entry, b"")
         for name in sorted(os.listdir(os.path.join(HERE, NAME))):
             if name.endswith((".py", ".toml")):
                 with open(os.path.join(HERE, NAME, name), "rb") as file:

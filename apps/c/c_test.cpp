@@ -68,20 +68,20 @@ TEST(C, ArraysComeBackAsTheyWent) {
 TEST(C, FilesKeepThem) {
   std::vector<std::uint16_t> voxels;
   const quoin_scene scene = made_scene(voxels);
-  ASSERT_EQ(quoin_scene_save(scene, "c_test.json"), QUOIN_OK) << quoin_last_error();
-  ASSERT_EQ(quoin_scene_save(scene, "c_test.glb"), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_scene_save(scene, test_file("c_test.json").c_str()), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_scene_save(scene, test_file("c_test.glb").c_str()), QUOIN_OK) << quoin_last_error();
   quoin_scene again = 0;
-  ASSERT_EQ(quoin_scene_load("c_test.json", &again), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_scene_load(test_file("c_test.json").c_str(), &again), QUOIN_OK) << quoin_last_error();
   const std::array<std::int32_t, 3> min{};
   const std::array<std::int32_t, 3> shape{kEdge, kEdge, kEdge};
   std::vector<std::uint16_t> read(voxels.size());
   ASSERT_EQ(quoin_grid_read(again, 0, min.data(), shape.data(), read.data(), read.size()), QUOIN_OK);
   EXPECT_EQ(read, voxels);
   EXPECT_EQ(quoin_free(again), QUOIN_OK);
-  EXPECT_EQ(quoin_scene_load("c_test.nothing", &again), QUOIN_CANNOT_READ);
+  EXPECT_EQ(quoin_scene_load(test_file("c_test.nothing").c_str(), &again), QUOIN_CANNOT_READ);
   EXPECT_NE(std::string(quoin_last_error()).find("c_test.nothing"), std::string::npos);
   EXPECT_EQ(quoin_scene_load_bytes("VOX ????", 8, &again), QUOIN_BAD_FORMAT);
-  EXPECT_EQ(quoin_scene_save(scene, "c_test.unknown"), QUOIN_UNSUPPORTED);
+  EXPECT_EQ(quoin_scene_save(scene, test_file("c_test.unknown").c_str()), QUOIN_UNSUPPORTED);
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
@@ -139,6 +139,54 @@ TEST(C, LabelsAndGridsAreMeshed) {
     EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
   }
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+}
+
+// Vertices that lie inside an edge of a triangle: a plate, on whose middle a pillar of another type stands.
+std::size_t corners_in_edges(std::int32_t watertight) {
+  std::vector<std::uint16_t> voxels(std::size_t{kEdge} * kEdge * kEdge);
+  for (std::size_t i = 0; i < voxels.size(); ++i) {
+    const std::size_t y = i / kEdge % kEdge;
+    const bool is_pillar = i % kEdge == 5 && i / kEdge / kEdge == 5;
+    if (y == 0 || (is_pillar && y < 4)) voxels[i] = y == 0 ? 1 : 2;
+  }
+  std::vector<std::uint16_t> mixed;
+  const quoin_scene scene = made_scene(mixed);
+  const quoin_array array = array_of(voxels, QUOIN_UINT16);
+  std::size_t grid = 0;
+  EXPECT_EQ(quoin_grid_add(scene, &array, "plate", &grid), QUOIN_OK);
+  auto options = sized<quoin_mesh_options>();
+  options.watertight = watertight;
+  quoin_mesh mesh = 0;
+  EXPECT_EQ(quoin_grid_mesh(scene, grid, &options, &mesh), QUOIN_OK) << quoin_last_error();
+  auto data = sized<quoin_mesh_data>();
+  EXPECT_EQ(quoin_mesh_view(mesh, &data), QUOIN_OK);
+  const auto at = [&](std::size_t vertex, int axis) {
+    return data.positions[3 * vertex + static_cast<unsigned>(axis)];
+  };
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < data.index_count; ++i) {
+    const std::size_t a = data.indices[i];
+    const std::size_t b = data.indices[i % 3 == 2 ? i - 2 : i + 1];
+    for (std::size_t vertex = 0; vertex < data.vertex_count; ++vertex) {
+      double from_a = 0.0, from_b = 0.0, whole = 0.0;
+      for (int axis = 0; axis < 3; ++axis) {
+        from_a += std::pow(at(vertex, axis) - at(a, axis), 2);
+        from_b += std::pow(at(vertex, axis) - at(b, axis), 2);
+        whole += std::pow(at(b, axis) - at(a, axis), 2);
+      }
+      // Corners lie on whole numbers: what is between both is as far from them as they are from each other.
+      const bool is_between = std::abs(std::sqrt(from_a) + std::sqrt(from_b) - std::sqrt(whole)) < 1e-9;
+      if (is_between && from_a > 0.0 && from_b > 0.0) ++found;
+    }
+  }
+  EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+  return found;
+}
+
+TEST(C, WatertightMeshesHaveNoCornerInsideAnEdge) {
+  EXPECT_GT(corners_in_edges(0), 0U);
+  EXPECT_EQ(corners_in_edges(1), 0U);
 }
 
 TEST(C, PicturesHaveTheSunThatIsAskedFor) {

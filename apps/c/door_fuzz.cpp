@@ -127,6 +127,9 @@ class Program {
       one.spacing[axis] = bit() ? 0.0 : number();
       one.origin[axis] = bit() ? 0.0 : number();
     }
+    // Without strides an array has no gaps.
+    if (one.strides[0] == 0 && one.strides[1] == 0 && one.strides[2] == 0 && is_there)
+      last = std::int64_t{8} * one.shape[0] * one.shape[1] * one.shape[2];
     if (is_there && last - first < static_cast<std::int64_t>(kRoom)) one.data = room_.data() - first;
     return one;
   }
@@ -172,6 +175,68 @@ class Program {
       took(quoin_instance_add(handle(), perhaps(&one), nullptr));
     else
       took(quoin_instance_set(handle(), index(), perhaps(&one)));
+  }
+
+  template <std::size_t Count>
+  void numbers(double (&out)[Count]) {
+    for (double& each : out) each = number();
+  }
+
+  void layers_and_groups() {
+    constexpr std::array<const char*, 4> kNames = {"", "a", "b", "c"};
+    auto layer = made<quoin_layer>();
+    layer.name[0] = kNames.at(byte() % 4)[0];
+    layer.visible = byte() % 2;
+    took(quoin_layer_set(handle(), perhaps(&layer)));
+    took(quoin_layer_get(handle(), index(), perhaps(&layer)));
+    std::size_t count = 0;
+    took(quoin_layer_count(handle(), perhaps(&count)));
+    took(quoin_instance_set_layer(handle(), index(), perhaps(kNames.at(byte() % 4))));
+    auto group = made<quoin_group>();
+    group.parent = index();
+    group.shown = byte() % 2;
+    group.layer[0] = kNames.at(byte() % 4)[0];
+    took(quoin_group_add(handle(), perhaps(&group), perhaps(&count)));
+  }
+
+  void views() {
+    auto camera = made<quoin_camera>();
+    camera.number = small();
+    camera.is_first = byte() % 2;
+    camera.is_orthographic = byte() % 2;
+    camera.right[0] = camera.up[1] = 1.0;
+    camera.forward[2] = -1.0;
+    numbers(camera.position);
+    if (bit()) numbers(camera.up);
+    camera.vertical_fov_degrees = number();
+    camera.view_height = number();
+    camera.focus_distance = number();
+    took(quoin_camera_add(handle(), perhaps(&camera)));
+    auto lamp = made<quoin_lamp>();
+    lamp.is_spot = byte() % 2;
+    numbers(lamp.position);
+    numbers(lamp.direction);
+    for (float& each : lamp.colour) each = single();
+    lamp.intensity = number();
+    lamp.range = number();
+    lamp.inner_angle_degrees = number();
+    lamp.outer_angle_degrees = number();
+    took(quoin_lamp_add(handle(), perhaps(&lamp)));
+    auto sun = made<quoin_sun>();
+    numbers(sun.direction);
+    sun.brightness = number();
+    for (float& each : sun.colour) each = single();
+    sun.angle_degrees = number();
+    took(quoin_sun_set(handle(), perhaps(&sun)));
+    took(quoin_sun_get(handle(), perhaps(&sun)));
+  }
+
+  // What came later, of bytes that meant little before, so that programs that were found stay nearly what they are.
+  void step_of_later(std::uint8_t which) {
+    if (which % 4 == 0) return layers_and_groups();
+    if (which % 4 == 1) return views();
+    const quoin_array given = array();
+    took(quoin_grid_write(handle(), index(), perhaps(&given)));
   }
 
   void voxelize() {
@@ -280,6 +345,12 @@ class Program {
     options.iso = single();
     options.voxel_size = number();
     took(quoin_scene_load_with("", perhaps(&options), &scene), &scene);
+    // Of the same bytes, so that inputs of the corpus stay what they are.
+    for (std::int32_t& length : options.raw_shape) length = options.frame % 8;
+    options.raw_scalar = options.radius % 10;
+    options.heights = options.radius % 4;
+    options.metres_per_pixel = options.voxel_size;
+    took(quoin_scene_load_bytes_with(is_null ? nullptr : next_ - size, size, &options, &scene), &scene);
   }
 
   void mesh() {
@@ -287,6 +358,7 @@ class Program {
     auto options = made<quoin_mesh_options>();
     options.smooth = byte() % 2;
     options.threads = small();
+    options.watertight = options.threads % 2;
     const std::uint8_t which = byte() % 3;
     if (which == 0) {
       took(quoin_grid_mesh(handle(), index(), perhaps(&options), &out), &out);
@@ -304,7 +376,10 @@ class Program {
 
   void step() {
     quoin_scene scene = 0;
-    switch (byte() % 14) {
+    constexpr std::uint8_t kLater = 252;
+    const std::uint8_t which = byte();
+    if (which >= kLater) return step_of_later(which);
+    switch (which % 14) {
       case 0:
         took(quoin_scene_create(&scene), &scene);
         break;

@@ -162,6 +162,10 @@ inline constexpr std::size_t kFirstSize<quoin_type> = offsetof(quoin_type, trans
 template <>
 inline constexpr std::size_t kFirstSize<quoin_mesh_data> = offsetof(quoin_mesh_data, types);
 template <>
+inline constexpr std::size_t kFirstSize<quoin_mesh_options> = offsetof(quoin_mesh_options, watertight);
+template <>
+inline constexpr std::size_t kFirstSize<quoin_load_options> = offsetof(quoin_load_options, raw_shape);
+template <>
 inline constexpr std::size_t kFirstSize<quoin_render_options> = offsetof(quoin_render_options, has_sun);
 
 template <class Struct>
@@ -177,6 +181,8 @@ std::optional<Struct> taken(const Struct* given) {
   std::memcpy(&whole, given, given->size);
   return whole;
 }
+/// The same of an array, with strides: where it has none its numbers lie without gaps, z fastest and x slowest.
+std::optional<quoin_array> taken_array(const quoin_array* given);
 /// The same of options, which may be left out.
 template <class Struct>
 std::optional<Struct> taken_or_default(const Struct* given) {
@@ -214,6 +220,9 @@ void number(SceneBody& scene);
 
 /// Shows a new grid unturned, its least corner at a point of the world; its number is told in `out`, if that is any.
 void place(SceneBody& scene, SceneGrid grid, DVec3 position, std::size_t* out);
+
+/// What a file is read with. Errors: InvalidArgument for what no file is, or where the size is none of the struct's.
+Result<LoadOptions> load_options_of(const quoin_load_options* given);
 
 VoxelProperties properties_of(const quoin_type& type);
 /// What is wrong with a type; null where nothing is.

@@ -22,7 +22,7 @@ namespace {
 template <class Mesh>
 quoin_status mesh_array(const quoin_array* array, quoin_mesh* out, Mesh&& mesh) noexcept {
   return guarded([&] {
-    const auto given = taken(array);
+    const auto given = taken_array(array);
     if (!given) return fail(QUOIN_INVALID_ARGUMENT, "array is null, or its size");
     if (out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "out is null");
     if (given->scalar < QUOIN_UINT8 || given->scalar > QUOIN_FLOAT64)
@@ -136,6 +136,7 @@ Result<GridMesh> mesh_of(const Scene& from, GridHandle handle, const quoin_mesh_
   alone.add_instance(instance);
   BlockySceneOptions blocks;
   blocks.mesh.bake_occlusion = options.no_occlusion == 0;
+  blocks.mesh.watertight = options.watertight != 0;
   const Threads threads = threads_of(options.threads);
   const auto meshes = options.smooth != 0 ? mesh_scene_smoothly(alone, {}, threads, progress())
                                           : mesh_scene(alone, blocks, threads, progress());

@@ -1,8 +1,11 @@
-// What stands where in a scene, what else its file holds, and what files there are.
+// What stands where in a scene, what else its file holds or is to hold, and what files there are.
 
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <string>
 #include <string_view>
+#include <utility>
 
 #include <quoin/io/formats.h>
 
@@ -12,7 +15,7 @@ namespace quoin::c {
 namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr double kRoughly = 1e-4;  // what turns and sizes that came through floats may be off by
+constexpr double kRoughly = 1e-4;  // what turns, axes and sizes that came through floats may be off by
 
 void copy(const DVec3& from, double (&to)[3]) {
   for (int axis = 0; axis < 3; ++axis) to[axis] = from[axis];
@@ -129,6 +132,120 @@ std::vector<quoin_camera> cameras_of(const LoadedScene& loaded) {
   describe(*loaded.camera, first);
   first.is_first = 1;
   return all;
+}
+
+constexpr double kFurthest = 1e9;  // of cameras and lamps, so that floats of files hold them
+
+DVec3 point_of(const double (&given)[3]) {
+  return {given[0], given[1], given[2]};
+}
+
+bool is_within(DVec3 point, double most) {
+  return std::abs(point.x) <= most && std::abs(point.y) <= most && std::abs(point.z) <= most;
+}
+
+bool is_amount(double value) {
+  return value >= 0.0 && value <= kMaxBrightness;
+}
+
+bool is_colour(const float (&colour)[3]) {
+  return is_amount(static_cast<double>(colour[0])) && is_amount(static_cast<double>(colour[1])) &&
+         is_amount(static_cast<double>(colour[2]));
+}
+
+// The layer of a name, and of an empty one none; nothing where the scene has no such layer.
+std::optional<LayerHandle> layer_named(const Scene& scene, std::string_view name) {
+  if (name.empty()) return LayerHandle{};
+  for (const LayerHandle handle : scene.layers().handles()) {
+    // Names are told cut off, and are to be known so.
+    char told[sizeof quoin_layer::name];
+    copy_text(scene.layers()[handle].name, told);
+    if (name == told || name == scene.layers()[handle].name) return handle;
+  }
+  return std::nullopt;
+}
+
+constexpr const char* kNoLayer = "the scene has no layer of this name";
+
+/// Takes a camera; returns what is wrong with it, or null.
+const char* take(const quoin_camera& given, const LoadedScene& loaded, FileCamera& out) {
+  if (given.number < 0) return "a camera's number is less than 0";
+  for (const FileCamera& one : loaded.cameras) {
+    if (one.number == given.number) return "another camera has this number";
+  }
+  Camera& camera = out.camera;
+  camera.position = point_of(given.position);
+  camera.right = point_of(given.right);
+  camera.up = point_of(given.up);
+  camera.forward = point_of(given.forward);
+  if (!is_within(camera.position, kFurthest)) return "a camera too far away";
+  const auto is = [](double value, double wanted) { return std::abs(value - wanted) <= kRoughly; };
+  for (const DVec3& axis : {camera.right, camera.up, camera.forward}) {
+    if (!is(glm::dot(axis, axis), 1.0)) return "right, up and forward are to be unit";
+  }
+  const DVec3 right = glm::cross(camera.forward, camera.up);
+  if (!is(right.x, camera.right.x) || !is(right.y, camera.right.y) || !is(right.z, camera.right.z))
+    return "right is to be forward x up";
+  if (given.is_orthographic != 0) {
+    if (!(given.view_height > 0.0 && given.view_height <= kFurthest)) return "a view_height that cannot be";
+    camera.projection = Camera::Projection::Orthographic;
+    camera.view_height = given.view_height;
+  } else {
+    if (!(given.vertical_fov_degrees > 0.0 && given.vertical_fov_degrees < 180.0))
+      return "a field of view that is not between 0 and 180 degrees";
+    camera.vertical_fov_radians = given.vertical_fov_degrees / kDegrees;
+  }
+  if (!(given.focus_distance >= 0.0 && given.focus_distance <= kFurthest)) return "a focus that cannot be";
+  out.number = given.number;
+  out.focus_distance = given.focus_distance;
+  return nullptr;
+}
+
+const char* take(const quoin_lamp& given, Lamp& lamp) {
+  if (!is_within(point_of(given.position), kFurthest)) return "a lamp too far away";
+  if (!is_colour(given.colour) || !is_amount(given.intensity)) return "light that cannot be";
+  if (!(given.range >= 0.0)) return "a range that is less than 0";
+  lamp.name = text_in(given.name);
+  lamp.position = point_of(given.position);
+  lamp.colour = {given.colour[0], given.colour[1], given.colour[2]};
+  lamp.intensity = given.intensity;
+  if (given.range > 0.0) lamp.range = given.range;
+  if (given.is_spot == 0) return nullptr;
+  lamp.kind = Lamp::Kind::Spot;
+  lamp.direction = point_of(given.direction);
+  const double length = glm::length(lamp.direction);
+  if (!(length > 0.0) || !std::isfinite(length)) return "a spot needs a direction";
+  lamp.direction /= length;
+  const double outer = given.outer_angle_degrees == 0.0 ? 45.0 : given.outer_angle_degrees;
+  if (!(outer > 0.0 && outer <= 180.0) || !(given.inner_angle_degrees >= 0.0 && given.inner_angle_degrees <= outer))
+    return "angles of a spot that cannot be";
+  lamp.outer_angle_radians = outer / kDegrees;
+  lamp.inner_angle_radians = given.inner_angle_degrees / kDegrees;
+  return nullptr;
+}
+
+/// The same of a sun, in what is to be drawn.
+const char* take(const quoin_sun& given, Look& look) {
+  const DVec3 direction = point_of(given.direction);
+  const double length = glm::length(direction);
+  if (!(length > 0.0) || !std::isfinite(length)) return "a sun needs a direction";
+  if (!is_amount(given.brightness) || !is_colour(given.colour)) return "light that cannot be";
+  if (!(given.angle_degrees >= 0.0 && given.angle_degrees / kDegrees <= kMaxSunAngleRadians))
+    return "an angle of the sun's disc that cannot be";
+  look.sun = direction / length;
+  look.sun_brightness = given.brightness;
+  look.sun_colour = {given.colour[0], given.colour[1], given.colour[2]};
+  look.sun_angle_radians = given.angle_degrees / kDegrees;
+  return nullptr;
+}
+
+/// What the scene's sun is; nothing where nothing says it.
+std::optional<Look> sun_of(const LoadedScene& loaded) {
+  if (loaded.look) return loaded.look->look;
+  if (!loaded.sun) return std::nullopt;
+  Look look;
+  look.sun = *loaded.sun;
+  return look;
 }
 
 }  // namespace
@@ -258,5 +375,119 @@ quoin_status quoin_format_get(std::size_t index, quoin_format* out) {
     format.writable = found.writable ? 1 : 0;
     format.is_mesh = found.is_mesh ? 1 : 0;
     return tell(format, out);
+  });
+}
+
+quoin_status quoin_layer_count(quoin_scene scene, std::size_t* out) {
+  return tell_count(scene, out, [](SceneBody& body) { return body.loaded.scene.layers().size(); });
+}
+
+quoin_status quoin_layer_get(quoin_scene scene, std::size_t index, quoin_layer* out) {
+  const auto count = [](SceneBody& body) { return body.loaded.scene.layers().size(); };
+  return tell_of(scene, index, out, count, [&](SceneBody& body, quoin_layer& layer) {
+    const auto& layers = body.loaded.scene.layers();
+    const SceneLayer& found = layers[layers.handles()[index]];
+    copy_text(found.name, layer.name);
+    layer.visible = found.visible ? 1 : 0;
+  });
+}
+
+quoin_status quoin_layer_set(quoin_scene scene, const quoin_layer* layer) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    const auto given = taken(layer);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "layer is null, or its size");
+    const std::string name = text_in(given->name);
+    if (name.empty()) return fail(QUOIN_INVALID_ARGUMENT, "a layer needs a name");
+    Scene& all = body.loaded.scene;
+    if (const auto known = layer_named(all, name))
+      all.edit(*known).visible = given->visible != 0;
+    else
+      all.add_layer({name, given->visible != 0});
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_instance_set_layer(quoin_scene scene, std::size_t index, const char* layer) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    if (index >= body.numbers.instances.size()) return fail(QUOIN_INVALID_ARGUMENT, "no instance has this number");
+    const auto found = layer_named(body.loaded.scene, layer == nullptr ? "" : layer);
+    if (!found) return fail(QUOIN_INVALID_ARGUMENT, kNoLayer);
+    body.loaded.scene.edit(body.numbers.instances[index]).layer = *found;
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_group_add(quoin_scene scene, const quoin_group* group, std::size_t* out) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    const auto given = taken(group);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "group is null, or its size");
+    auto& groups = body.numbers.groups;
+    if (given->parent > groups.size()) return fail(QUOIN_INVALID_ARGUMENT, "no group has the parent's number");
+    const auto layer = layer_named(body.loaded.scene, text_in(given->layer));
+    if (!layer) return fail(QUOIN_INVALID_ARGUMENT, kNoLayer);
+    SceneGroup made;
+    made.name = text_in(given->name);
+    made.visible = given->shown != 0;
+    made.layer = *layer;
+    if (given->parent != 0) made.parent = groups[given->parent - 1];
+    groups.push_back(body.loaded.scene.add_group(std::move(made)));
+    body.numbers.group_of_slot[groups.back().index] = groups.size();
+    if (out != nullptr) *out = groups.size();
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_camera_add(quoin_scene scene, const quoin_camera* camera) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    const auto given = taken(camera);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "camera is null, or its size");
+    FileCamera made;
+    if (const char* wrong = take(*given, body.loaded, made)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    body.loaded.cameras.push_back(made);
+    if (given->is_first != 0) body.loaded.camera = made.camera;
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_lamp_add(quoin_scene scene, const quoin_lamp* lamp) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    const auto given = taken(lamp);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "lamp is null, or its size");
+    Lamp made;
+    if (const char* wrong = take(*given, made)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    body.loaded.scene.lamps.push_back(std::move(made));
+    return QUOIN_OK;
+  });
+}
+
+quoin_status quoin_sun_get(quoin_scene scene, quoin_sun* out) {
+  return with_scene(scene, Use::Read, [&](SceneBody& body) {
+    quoin_sun sun{};
+    if (const auto look = sun_of(body.loaded)) {
+      for (int axis = 0; axis < 3; ++axis) {
+        sun.direction[axis] = look->sun[axis];
+        sun.colour[axis] = look->sun_colour[axis];
+      }
+      sun.brightness = look->sun_brightness;
+      sun.angle_degrees = look->sun_angle_radians * kDegrees;
+    }
+    return tell(sun, out);
+  });
+}
+
+quoin_status quoin_sun_set(quoin_scene scene, const quoin_sun* sun) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    const auto given = taken(sun);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "sun is null, or its size");
+    LoadedScene& loaded = body.loaded;
+    FileLook look;
+    // As of a .vox file that says nothing but its sun.
+    look.look.sky = SkyModel::Uniform;
+    look.develop.tone = ToneCurve::Aces;
+    if (loaded.look) look = *loaded.look;
+    if (const char* wrong = take(*given, look.look)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    loaded.sun = look.look.sun_brightness > 0.0 ? std::optional(look.look.sun) : std::nullopt;
+    loaded.look = std::move(look);
+    return QUOIN_OK;
   });
 }

@@ -70,7 +70,7 @@ typedef struct quoin_array {
   const void* data;
   int32_t scalar; /* quoin_scalar */
   int64_t shape[3];
-  int64_t strides[3]; /* bytes, of any sign */
+  int64_t strides[3]; /* bytes, of any sign; all three 0: without gaps, z fastest and x slowest */
   double spacing[3];  /* of neighbours; all three 0: 1 */
   double origin[3];   /* where sample (0, 0, 0) lies */
 } quoin_array;
@@ -177,7 +177,7 @@ typedef struct quoin_mesh_data {
   const uint32_t* indices;   /* three a triangle, counter-clockwise from outside */
   const int64_t* interfaces; /* [interface_count][4]: back label, front label, first index, count; of labels */
   const uint16_t* types;     /* [vertex_count], of grids meshed as blocks: first blocks, four vertices and six indices a
-                                face, then the surfaces of fields, whose type is 0 */
+                                face (watertight: or more of both), then the surfaces of fields, whose type is 0 */
 } quoin_mesh_data;
 
 typedef struct quoin_mesh_options {
@@ -185,7 +185,18 @@ typedef struct quoin_mesh_options {
   int32_t smooth;       /* 0: blocks; else smooth surfaces around them */
   int32_t no_occlusion; /* of blocks */
   int32_t threads;      /* 0: all */
+  int32_t reserved;     /* not read: padding of earlier versions */
+  int32_t watertight; /* of blocks: no corner of a face lies inside another's edge, so no gaps are seen there. Faces get
+                           more triangles. Smooth surfaces always are */
 } quoin_mesh_options;
+
+/* How a picture says heights. */
+typedef enum quoin_heights {
+  QUOIN_HEIGHTS_NONE = 0,
+  QUOIN_HEIGHTS_GREY = 1,     /* a height is a level, of 8 or 16 bits, times metres_per_level */
+  QUOIN_HEIGHTS_MAPBOX = 2,   /* terrain-RGB: (65,536 R + 256 G + B) / 10 - 10,000 metres */
+  QUOIN_HEIGHTS_TERRARIUM = 3 /* 256 R + G + B / 256 - 32,768 metres */
+} quoin_heights;
 
 typedef struct quoin_load_options {
   size_t size;
@@ -195,8 +206,19 @@ typedef struct quoin_load_options {
   int32_t radius;      /* of a world that is read by chunks: of 64 voxels, around its spawn; 0: 4 */
   int32_t has_iso;     /* of a volume: what is above `iso` is solid; else a value is found */
   float iso;
-  int32_t mesh_voxels; /* of a file of triangles: voxels along its longest side; 0: 128 */
-  double voxel_size;   /* or of this size, in the file's unit */
+  int32_t mesh_voxels;  /* of a file of triangles: voxels along its longest side; 0: 128 */
+  double voxel_size;    /* or of this size, in the file's unit */
+  int32_t raw_shape[3]; /* the file holds values alone, so many along each axis, the first one fastest; all 0: it is
+                            another file */
+  int32_t raw_scalar;   /* quoin_scalar, of these */
+  int32_t raw_big_endian;
+  int32_t heights;         /* quoin_heights: the file is a picture (PNG) of the heights of a landscape */
+  double metres_per_level; /* 0: 1 */
+  double metres_per_pixel; /* between neighbouring heights; 0: 1, with a warning */
+  double metres_per_voxel; /* 0: metres_per_pixel */
+  double exaggeration;     /* heights times this; 0: 1 */
+  int32_t ground_depth;    /* voxels of ground below the lowest height, up to 4,096; 0: 8 */
+  int32_t smooth_ground;   /* densities, whose surface is smooth, rather than voxels */
 } quoin_load_options;
 
 typedef enum quoin_fill {
@@ -267,11 +289,14 @@ QUOIN_API quoin_status quoin_scene_load(const char* path, quoin_scene* out);
 QUOIN_API quoin_status quoin_scene_load_bytes(const void* data, size_t bytes, quoin_scene* out);
 /* The same with options; null: none. */
 QUOIN_API quoin_status quoin_scene_load_with(const char* path, const quoin_load_options* options, quoin_scene* out);
+QUOIN_API quoin_status quoin_scene_load_bytes_with(const void* data, size_t bytes, const quoin_load_options* options,
+                                                   quoin_scene* out);
 QUOIN_API quoin_status quoin_scene_get_info(quoin_scene scene, quoin_scene_info* out);
 /* What files can be read and written. */
 QUOIN_API quoin_status quoin_format_count(size_t* out);
 QUOIN_API quoin_status quoin_format_get(size_t index, quoin_format* out);
-/* By the name's ending: .quoin, .json and .vox hold voxels; .glb, .gltf, .obj and .ply their meshes, of blocks. */
+/* By the name's ending: .quoin, .json, .vox and others hold voxels; .glb, .gltf, .obj, .ply, .stl and .3mf their
+ * meshes, of blocks. quoin_format_get tells all. */
 QUOIN_API quoin_status quoin_scene_save(quoin_scene scene, const char* path);
 /* One line each: first of what reading left out, and voxelizing merged, then of what the last save left out. */
 QUOIN_API quoin_status quoin_scene_warning_count(quoin_scene scene, size_t* out);
@@ -331,6 +356,48 @@ QUOIN_API quoin_status quoin_scene_render(quoin_scene scene, const quoin_render_
  * builds a tree, which the scene keeps and brings up to date. */
 QUOIN_API quoin_status quoin_scene_rays(quoin_scene scene, size_t count, const double* origins,
                                         const double* directions, double max_t, const quoin_hits* out);
+
+/* Changes the voxels of a grid from array->origin on, in its own voxels, rounded down: all of the box of the array
+ * become the types (QUOIN_UINT8 or QUOIN_UINT16) that it holds, 0 air. What quoin_grid_read read goes back so. Where
+ * the scene has not all of its types nothing changes. */
+QUOIN_API quoin_status quoin_grid_write(quoin_scene scene, size_t grid, const quoin_array* array);
+
+/* What is put into a scene beside its grids. Which of it a format holds, and what saving left out, warnings say. */
+
+/* Instances and groups that are shown and hidden together, wherever they stand. Layers are known by their names; of
+ * several with one name the first is meant. */
+typedef struct quoin_layer {
+  size_t size;
+  char name[128];
+  int32_t visible;
+} quoin_layer;
+
+/* The one sun of a scene, infinitely far away. */
+typedef struct quoin_sun {
+  size_t size;
+  double direction[3];  /* from the scene towards it, of any length but 0 */
+  double brightness;    /* that of a white surface that faces it; 0: there is no sun */
+  float colour[3];      /* linear */
+  double angle_degrees; /* of its disc, across; 0: a point */
+} quoin_sun;
+
+QUOIN_API quoin_status quoin_layer_count(quoin_scene scene, size_t* out);
+QUOIN_API quoin_status quoin_layer_get(quoin_scene scene, size_t index, quoin_layer* out);
+/* Adds a layer, or shows or hides that of this name, which is not to be empty. */
+QUOIN_API quoin_status quoin_layer_set(quoin_scene scene, const quoin_layer* layer);
+/* Puts an instance on the layer of this name, which the scene has; null or empty: on none. */
+QUOIN_API quoin_status quoin_instance_set_layer(quoin_scene scene, size_t index, const char* layer);
+/* Adds a group, into which quoin_instance_set and _add put instances. `shown` is its own switch here, and `layer` the
+ * name of one that the scene has, or empty. `out`, its number, may be null. */
+QUOIN_API quoin_status quoin_group_add(quoin_scene scene, const quoin_group* group, size_t* out);
+/* Adds a camera under its number, which no other has. right is forward x up. */
+QUOIN_API quoin_status quoin_camera_add(quoin_scene scene, const quoin_camera* camera);
+/* Adds a lamp. A range of 0 is one without an end; an outer angle of 0 that of 45 degrees. */
+QUOIN_API quoin_status quoin_lamp_add(quoin_scene scene, const quoin_lamp* lamp);
+/* Of a scene without a sun the brightness is 0, and all else. What a file does not say is as usual: white, of
+ * brightness 1 and half a degree. */
+QUOIN_API quoin_status quoin_sun_get(quoin_scene scene, quoin_sun* out);
+QUOIN_API quoin_status quoin_sun_set(quoin_scene scene, const quoin_sun* sun);
 
 #ifdef __cplusplus
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
@@ -189,6 +190,161 @@ TEST(CFile, GroupsLayersLampsAndCamerasAreTold) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
+TEST_F(SceneOfARow, IsGivenLayersAndGroups) {
+  auto layer = sized<quoin_layer>();
+  EXPECT_EQ(quoin_layer_set(scene_, &layer), QUOIN_INVALID_ARGUMENT);  // without a name
+  std::strcpy(layer.name, "attic");
+  ASSERT_EQ(quoin_layer_set(scene_, &layer), QUOIN_OK);
+  auto group = sized<quoin_group>();
+  std::strcpy(group.name, "house");
+  group.shown = 1;
+  std::size_t house = 0;
+  ASSERT_EQ(quoin_group_add(scene_, &group, &house), QUOIN_OK);
+  std::strcpy(group.name, "room");
+  std::strcpy(group.layer, "attic");
+  group.parent = house;
+  std::size_t room = 0;
+  ASSERT_EQ(quoin_group_add(scene_, &group, &room), QUOIN_OK);
+  auto place = sized<quoin_instance>();
+  ASSERT_EQ(quoin_instance_get(scene_, 0, &place), QUOIN_OK);
+  place.group = room;
+  ASSERT_EQ(quoin_instance_set(scene_, 0, &place), QUOIN_OK);
+  ASSERT_EQ(quoin_instance_get(scene_, 0, &place), QUOIN_OK);
+  EXPECT_TRUE(place.group == room && place.visible == 1 && place.shown == 0);
+  EXPECT_STREQ(place.layer, "");
+  ASSERT_EQ(quoin_instance_set_layer(scene_, 0, "attic"), QUOIN_OK);
+  layer.visible = 1;
+  ASSERT_EQ(quoin_layer_set(scene_, &layer), QUOIN_OK);
+  std::size_t count = 0;
+  ASSERT_EQ(quoin_layer_count(scene_, &count), QUOIN_OK);
+  EXPECT_EQ(count, 1U);
+  ASSERT_EQ(quoin_instance_get(scene_, 0, &place), QUOIN_OK);
+  EXPECT_EQ(place.shown, 1);
+  EXPECT_STREQ(place.layer, "attic");
+  ASSERT_EQ(quoin_group_get(scene_, room, &group), QUOIN_OK);
+  EXPECT_EQ(group.parent, house);
+  EXPECT_EQ(quoin_instance_set_layer(scene_, 0, "cellar"), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_instance_set_layer(scene_, 1, nullptr), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_instance_set_layer(scene_, 0, nullptr), QUOIN_OK);
+  group.parent = 3;
+  EXPECT_EQ(quoin_group_add(scene_, &group, nullptr), QUOIN_INVALID_ARGUMENT);
+  group.parent = 0;
+  std::strcpy(group.layer, "cellar");
+  EXPECT_EQ(quoin_group_add(scene_, &group, nullptr), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_layer_get(scene_, 1, &layer), QUOIN_INVALID_ARGUMENT);
+}
+
+quoin_camera camera_ahead(std::int32_t number) {
+  auto camera = sized<quoin_camera>();
+  camera.number = number;
+  camera.position[2] = 50.0;
+  camera.right[0] = camera.up[1] = 1.0;
+  camera.forward[2] = -1.0;
+  camera.vertical_fov_degrees = 40.0;
+  return camera;
+}
+
+TEST_F(SceneOfARow, IsGivenCamerasLampsAndASun) {
+  quoin_camera camera = camera_ahead(4);
+  camera.is_first = 1;
+  ASSERT_EQ(quoin_camera_add(scene_, &camera), QUOIN_OK) << quoin_last_error();
+  EXPECT_EQ(quoin_camera_add(scene_, &camera), QUOIN_INVALID_ARGUMENT);  // the number is taken
+  auto told = sized<quoin_camera>();
+  ASSERT_EQ(quoin_camera_get(scene_, 0, &told), QUOIN_OK);
+  EXPECT_TRUE(told.number == 4 && told.is_first == 1 && told.position[2] == 50.0);
+  quoin_camera wrong = camera_ahead(5);
+  wrong.up[1] = 2.0;
+  EXPECT_EQ(quoin_camera_add(scene_, &wrong), QUOIN_INVALID_ARGUMENT);
+  wrong = camera_ahead(5);
+  wrong.right[0] = -1.0;  // left-handed
+  EXPECT_EQ(quoin_camera_add(scene_, &wrong), QUOIN_INVALID_ARGUMENT);
+  wrong = camera_ahead(5);
+  wrong.vertical_fov_degrees = 180.0;
+  EXPECT_EQ(quoin_camera_add(scene_, &wrong), QUOIN_INVALID_ARGUMENT);
+  wrong = camera_ahead(5);
+  wrong.is_orthographic = 1;  // of no height
+  EXPECT_EQ(quoin_camera_add(scene_, &wrong), QUOIN_INVALID_ARGUMENT);
+
+  auto lamp = sized<quoin_lamp>();
+  lamp.intensity = 3.0;
+  ASSERT_EQ(quoin_lamp_add(scene_, &lamp), QUOIN_OK);
+  ASSERT_EQ(quoin_lamp_get(scene_, 0, &lamp), QUOIN_OK);
+  EXPECT_TRUE(std::isinf(lamp.range) && lamp.intensity == 3.0);
+  lamp.is_spot = 1;
+  lamp.direction[1] = 0.0;
+  lamp.direction[0] = lamp.direction[2] = 0.0;
+  EXPECT_EQ(quoin_lamp_add(scene_, &lamp), QUOIN_INVALID_ARGUMENT);
+
+  auto sun = sized<quoin_sun>();
+  ASSERT_EQ(quoin_sun_get(scene_, &sun), QUOIN_OK);
+  EXPECT_EQ(sun.brightness, 0.0);
+  EXPECT_EQ(quoin_sun_set(scene_, &sun), QUOIN_INVALID_ARGUMENT);  // without a direction
+  sun.direction[1] = 2.0;
+  sun.brightness = 1.5;
+  sun.colour[0] = 1.0F;
+  ASSERT_EQ(quoin_sun_set(scene_, &sun), QUOIN_OK);
+  auto info = sized<quoin_scene_info>();
+  ASSERT_EQ(quoin_scene_get_info(scene_, &info), QUOIN_OK);
+  EXPECT_TRUE(info.has_sun == 1 && info.sun[1] == 1.0);
+  ASSERT_EQ(quoin_sun_get(scene_, &sun), QUOIN_OK);
+  EXPECT_TRUE(sun.brightness == 1.5 && sun.colour[0] == 1.0F && sun.colour[1] == 0.0F);
+}
+
+TEST_F(SceneOfARow, VoxelsAreWrittenBack) {
+  std::array<std::uint8_t, 4> types = {2, 0, 1, 2};  // x = 1, 2; y = 0; z = 0, 1
+  auto array = sized<quoin_array>();
+  array.data = types.data();
+  array.shape[0] = 2;
+  array.shape[1] = 1;
+  array.shape[2] = 2;
+  array.origin[0] = 1.25;  // rounded down
+  ASSERT_EQ(quoin_grid_write(scene_, 0, &array), QUOIN_OK) << quoin_last_error();
+  std::array<std::uint16_t, 6> read{};
+  const std::array<std::int32_t, 3> min = {0, 0, 0};
+  const std::array<std::int32_t, 3> shape = {3, 1, 2};
+  ASSERT_EQ(quoin_grid_read(scene_, 0, min.data(), shape.data(), read.data(), read.size()), QUOIN_OK);
+  EXPECT_EQ(read, (std::array<std::uint16_t, 6>{1, 0, 2, 0, 1, 2}));
+  EXPECT_EQ(t_below(2.5, 1.5), 100.0 - 8.0);  // rays see it
+  types[3] = 3;
+  EXPECT_EQ(quoin_grid_write(scene_, 0, &array), QUOIN_INVALID_ARGUMENT);
+  EXPECT_STREQ(quoin_last_error(), "the array has the type 3; those of the scene are 0 to 2");
+  types[0] = 1;
+  EXPECT_EQ(quoin_grid_write(scene_, 0, &array), QUOIN_INVALID_ARGUMENT);
+  ASSERT_EQ(quoin_grid_read(scene_, 0, min.data(), shape.data(), read.data(), read.size()), QUOIN_OK);
+  EXPECT_EQ(read[2], 2);  // nothing of it was written
+  EXPECT_EQ(quoin_grid_write(scene_, 1, &array), QUOIN_INVALID_ARGUMENT);
+  array.shape[1] = std::int64_t{1} << 62;
+  EXPECT_EQ(quoin_grid_write(scene_, 0, &array), QUOIN_INVALID_ARGUMENT);
+}
+
+TEST(CArrays, WithoutStridesHaveNoGaps) {
+  const std::array<std::uint16_t, 24> types = {1, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0};
+  quoin_scene scene = 0;
+  ASSERT_EQ(quoin_scene_create(&scene), QUOIN_OK);
+  auto type = sized<quoin_type>();
+  std::uint16_t number = 0;
+  ASSERT_EQ(quoin_type_add(scene, &type, &number), QUOIN_OK);
+  auto array = sized<quoin_array>();
+  array.data = types.data();
+  array.scalar = QUOIN_UINT16;
+  array.shape[0] = 2;
+  array.shape[1] = 3;
+  array.shape[2] = 4;
+  ASSERT_EQ(quoin_grid_add(scene, &array, nullptr, nullptr), QUOIN_OK);
+  std::array<std::uint16_t, 24> read{};
+  const std::array<std::int32_t, 3> min = {0, 0, 0};
+  const std::array<std::int32_t, 3> shape = {2, 3, 4};
+  ASSERT_EQ(quoin_grid_read(scene, 0, min.data(), shape.data(), read.data(), read.size()), QUOIN_OK);
+  EXPECT_EQ(read, types);
+  quoin_mesh mesh = 0;
+  ASSERT_EQ(quoin_mesh_labels(&array, 0, 0, 1, &mesh), QUOIN_OK);
+  auto data = sized<quoin_mesh_data>();
+  ASSERT_EQ(quoin_mesh_view(mesh, &data), QUOIN_OK);
+  EXPECT_GT(data.index_count, 0U);
+  EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+}
+
 TEST(CFormats, SayWhatCanBeRead) {
   std::size_t count = 0;
   ASSERT_EQ(quoin_format_count(&count), QUOIN_OK);
@@ -349,8 +505,8 @@ TEST_F(TwoSheets, MergeTypesThatDifferInColourAlone) {
   ASSERT_EQ(quoin_scene_warning_count(scene_, &warnings), QUOIN_OK);
   EXPECT_EQ(warnings, 1U);
   // A save does not take away what was said before it, nor say it twice.
-  ASSERT_EQ(quoin_scene_save(scene_, "c_test_sheets.json"), QUOIN_OK) << quoin_last_error();
-  ASSERT_EQ(quoin_scene_save(scene_, "c_test_sheets.glb"), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_scene_save(scene_, test_file("c_test_sheets.json").c_str()), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_scene_save(scene_, test_file("c_test_sheets.glb").c_str()), QUOIN_OK) << quoin_last_error();
   ASSERT_EQ(quoin_scene_warning_count(scene_, &warnings), QUOIN_OK);
   EXPECT_EQ(warnings, 1U);
 }
@@ -367,7 +523,7 @@ TEST_F(TwoSheets, HaveTheAlphaOfTheirColours) {
 
 TEST_F(SceneOfARow, AnInstanceKeepsALongName) {
   const std::string name(300, 'n');
-  const std::string path = "c_test_name.json";
+  const std::string path = test_file("c_test_name.json");
   std::ofstream(path) << R"({"quoin_scene": 4, "grids": [{"voxels": []}], "instances": [{"grid": 0, "name": ")" << name
                       << R"("}]})";
   quoin_scene scene = 0;
@@ -439,7 +595,7 @@ TEST_F(SceneOfARow, ProgressOfSavingAndAddingNeverFalls) {
   EXPECT_GT(listener.calls, 2);
   EXPECT_EQ(listener.last, 1.0);
   listener.last = 0.0;
-  EXPECT_EQ(quoin_scene_save(scene_, "c_test_wall.glb"), QUOIN_OK) << quoin_last_error();
+  EXPECT_EQ(quoin_scene_save(scene_, test_file("c_test_wall.glb").c_str()), QUOIN_OK) << quoin_last_error();
   EXPECT_EQ(listener.last, 1.0);
   listener.last = 0.0;
   listener.stop_at = listener.calls + 2;
@@ -471,24 +627,93 @@ TEST_F(SceneOfARow, ThreadsShareIt) {
 
 TEST(CLoading, TakesOptions) {
   quoin_scene scene = 0;
-  std::ofstream("c_test.obj") << "v 0 0 0\nv 8 0 0\nv 0 8 0\nv 0 0 8\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  std::ofstream(test_file("c_test.obj")) << "v 0 0 0\nv 8 0 0\nv 0 8 0\nv 0 0 8\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
   auto options = sized<quoin_load_options>();
   options.mesh_voxels = 20;
-  ASSERT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_OK) << quoin_last_error();
+  ASSERT_EQ(quoin_scene_load_with(test_file("c_test.obj").c_str(), &options, &scene), QUOIN_OK) << quoin_last_error();
   auto info = sized<quoin_grid_info>();
   ASSERT_EQ(quoin_grid_get_info(scene, 0, &info), QUOIN_OK);
   EXPECT_EQ(info.extent[0], 20);
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
   options.voxel_size = 1.0;
-  EXPECT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_scene_load_with(test_file("c_test.obj").c_str(), &options, &scene), QUOIN_INVALID_ARGUMENT);
   options.mesh_voxels = 0;
   options.voxel_size = std::nan("");
-  EXPECT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_scene_load_with(test_file("c_test.obj").c_str(), &options, &scene), QUOIN_INVALID_ARGUMENT);
   options = sized<quoin_load_options>();
   options.frame = -1;
-  EXPECT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_scene_load_with(test_file("c_test.obj").c_str(), &options, &scene), QUOIN_INVALID_ARGUMENT);
   options.size = 3;
-  EXPECT_EQ(quoin_scene_load_with("c_test.obj", &options, &scene), QUOIN_INVALID_ARGUMENT);
+  EXPECT_EQ(quoin_scene_load_with(test_file("c_test.obj").c_str(), &options, &scene), QUOIN_INVALID_ARGUMENT);
+}
+
+TEST(CLoading, TakesValuesAlone) {
+  // A box of 40 within 10, from (2, 0, 0) on, of 6 x 4 x 3 values of 16 bits, the most significant byte first.
+  std::vector<std::uint8_t> bytes;
+  for (int i = 0; i < 6 * 4 * 3; ++i) bytes.insert(bytes.end(), {0, static_cast<std::uint8_t>(i % 6 >= 2 ? 40 : 10)});
+  auto options = sized<quoin_load_options>();
+  options.raw_shape[0] = 6;
+  options.raw_shape[1] = 4;
+  options.raw_shape[2] = 3;
+  options.raw_scalar = QUOIN_UINT16;
+  options.raw_big_endian = 1;
+  options.has_iso = 1;
+  options.iso = 25.0F;
+  quoin_scene scene = 0;
+  const auto load = [&] { return quoin_scene_load_bytes_with(bytes.data(), bytes.size(), &options, &scene); };
+  ASSERT_EQ(load(), QUOIN_OK) << quoin_last_error();
+  auto info = sized<quoin_grid_info>();
+  ASSERT_EQ(quoin_grid_get_info(scene, 0, &info), QUOIN_OK);
+  EXPECT_NE(info.has_field, 0);
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+  options.raw_shape[2] = 4;  // more than there are
+  EXPECT_EQ(load(), QUOIN_BAD_FORMAT);
+  options.raw_shape[2] = -3;
+  EXPECT_EQ(load(), QUOIN_INVALID_ARGUMENT);
+  options.raw_shape[2] = 3;
+  options.raw_scalar = 10;
+  EXPECT_EQ(load(), QUOIN_INVALID_ARGUMENT);
+  options.raw_scalar = QUOIN_UINT16;
+  options.heights = QUOIN_HEIGHTS_GREY;
+  EXPECT_EQ(load(), QUOIN_INVALID_ARGUMENT);
+  // A program of before has no such fields, and bytes are then of no known format.
+  options.size = offsetof(quoin_load_options, raw_shape);
+  EXPECT_EQ(load(), QUOIN_BAD_FORMAT);
+  EXPECT_EQ(quoin_scene_load_bytes_with(nullptr, 3, nullptr, &scene), QUOIN_INVALID_ARGUMENT);
+}
+
+TEST(CLoading, TakesHeights) {
+  const std::vector<char> png = [] {
+    std::ifstream file(QUOIN_SOURCE_DIR "/tests/corpus/png/grey_1_bit.png", std::ios::binary);
+    return std::vector<char>(std::istreambuf_iterator<char>(file), {});
+  }();
+  auto options = sized<quoin_load_options>();
+  quoin_scene scene = 0;
+  const auto load = [&] { return quoin_scene_load_bytes_with(png.data(), png.size(), &options, &scene); };
+  EXPECT_EQ(load(), QUOIN_BAD_FORMAT);
+  options.heights = QUOIN_HEIGHTS_GREY;
+  options.metres_per_pixel = 1.0;
+  const auto height_of = [&] {
+    EXPECT_EQ(load(), QUOIN_OK) << quoin_last_error();
+    auto info = sized<quoin_grid_info>();
+    EXPECT_EQ(quoin_grid_get_info(scene, 0, &info), QUOIN_OK);
+    EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+    return info.extent[1];
+  };
+  const std::int32_t low = height_of();
+  options.ground_depth = 18;
+  EXPECT_EQ(height_of(), low + 10);
+  options.exaggeration = 3.0;
+  EXPECT_GT(height_of(), low + 10);
+  options.exaggeration = -3.0;
+  EXPECT_EQ(load(), QUOIN_INVALID_ARGUMENT);
+  options.exaggeration = std::nan("");
+  EXPECT_EQ(load(), QUOIN_INVALID_ARGUMENT);
+  options.exaggeration = 0.0;
+  options.heights = 4;
+  EXPECT_EQ(load(), QUOIN_INVALID_ARGUMENT);
+  options.heights = QUOIN_HEIGHTS_NONE;
+  EXPECT_EQ(load(), QUOIN_INVALID_ARGUMENT);
 }
 
 }  // namespace

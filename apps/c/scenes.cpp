@@ -1,10 +1,13 @@
 // Scenes, their types and their grids.
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <span>
+#include <string>
 
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
@@ -58,10 +61,17 @@ const char* what_is_wrong(const quoin_array& array) {
   return nullptr;
 }
 
+// Why an array of types is none of a scene.
+quoin_status fail_of_type(VoxelType type, std::size_t types) {
+  return fail(QUOIN_INVALID_ARGUMENT, ("the array has the type " + std::to_string(type) +
+                                       "; those of the scene are 0 to " + std::to_string(types - 1))
+                                          .c_str());
+}
+
 quoin_status add_grid(SceneBody& scene, const quoin_array& array, const char* name, size_t* out) {
   const IVec3 size(array.shape[0], array.shape[1], array.shape[2]);
   const std::size_t types = scene.loaded.scene.types.size();
-  bool is_known = true;
+  VoxelType greatest = kAir;
   bool is_wanted = true;
   SceneGrid placed;
   placed.name = name == nullptr ? "" : name;
@@ -69,19 +79,39 @@ quoin_status add_grid(SceneBody& scene, const quoin_array& array, const char* na
   placed.grid.edit_rows(
       {IVec3(0), size},
       [&](IVec3 first, std::span<VoxelType> row) {
-        if (!is_known) return;
+        if (greatest >= types) return;
         for (VoxelType& type : row) {
           type = type_at(array, first.x++, first.y, first.z);
-          is_known = is_known && type < types;
+          greatest = std::max(greatest, type);
         }
       },
       [&](double fraction) {
         is_wanted = is_wanted && (!told || told(fraction));
-        return is_wanted && is_known;
+        return is_wanted && greatest < types;
       });
   if (!is_wanted) return fail(QUOIN_CANCELLED, "cancelled");
-  if (!is_known) return fail(QUOIN_INVALID_ARGUMENT, "the array has a type that the scene has not");
+  if (greatest >= types) return fail_of_type(greatest, types);
   place(scene, std::move(placed), floor(DVec3(array.origin[0], array.origin[1], array.origin[2])), out);
+  return QUOIN_OK;
+}
+
+// Nothing is changed where a type is not the scene's.
+quoin_status write_grid(SceneBody& scene, GridHandle grid, const quoin_array& array) {
+  const DVec3 origin = floor(DVec3(array.origin[0], array.origin[1], array.origin[2]));
+  const IVec3 min(origin);
+  const IVec3 size(array.shape[0], array.shape[1], array.shape[2]);
+  const std::size_t types = scene.loaded.scene.types.size();
+  for (std::int64_t x = 0; x < size.x; ++x) {
+    for (std::int64_t y = 0; y < size.y; ++y) {
+      for (std::int64_t z = 0; z < size.z; ++z) {
+        if (const VoxelType type = type_at(array, x, y, z); type >= types) return fail_of_type(type, types);
+      }
+    }
+  }
+  scene.loaded.scene.edit(grid).grid.edit_rows({min, min + size}, [&](IVec3 first, std::span<VoxelType> row) {
+    IVec3 at = first - min;
+    for (VoxelType& type : row) type = type_at(array, at.x++, at.y, at.z);
+  });
   return QUOIN_OK;
 }
 
@@ -103,6 +133,22 @@ quoin_status save(SceneBody& scene, const char* path) {
   return written ? QUOIN_OK : fail(written.error());
 }
 
+bool is_raw(const quoin_load_options& options) {
+  return options.raw_shape[0] != 0 || options.raw_shape[1] != 0 || options.raw_shape[2] != 0;
+}
+
+HeightOptions heights_of(const quoin_load_options& given) {
+  HeightOptions heights;
+  heights.encoding = static_cast<HeightEncoding>(given.heights - QUOIN_HEIGHTS_GREY);
+  if (given.metres_per_level != 0.0) heights.metres_per_level = given.metres_per_level;
+  if (given.metres_per_pixel != 0.0) heights.metres_per_pixel = given.metres_per_pixel;
+  if (given.metres_per_voxel != 0.0) heights.metres_per_voxel = given.metres_per_voxel;
+  if (given.exaggeration != 0.0) heights.vertical_exaggeration = given.exaggeration;
+  if (given.ground_depth != 0) heights.depth = given.ground_depth;
+  heights.as_field = given.smooth_ground != 0;
+  return heights;
+}
+
 LoadOptions options_of(const quoin_load_options& given) {
   LoadOptions options;
   options.show_hidden = given.show_hidden != 0;
@@ -111,7 +157,26 @@ LoadOptions options_of(const quoin_load_options& given) {
   if (given.has_iso != 0) options.iso = given.iso;
   if (given.mesh_voxels != 0) options.mesh.size = given.mesh_voxels;
   if (given.voxel_size != 0.0) options.mesh.voxel_size = given.voxel_size;
+  if (is_raw(given)) {
+    options.raw = RawVolume{{given.raw_shape[0], given.raw_shape[1], given.raw_shape[2]},
+                            static_cast<ScalarType>(given.raw_scalar),
+                            given.raw_big_endian != 0 ? std::endian::big : std::endian::little};
+  }
+  if (given.heights != QUOIN_HEIGHTS_NONE) options.heights = heights_of(given);
   return options;
+}
+
+const char* what_is_wrong_with_landscape(const quoin_load_options& options) {
+  if (options.heights < QUOIN_HEIGHTS_NONE || options.heights > QUOIN_HEIGHTS_TERRARIUM)
+    return "heights are said in none of these ways";
+  // What they are in sum, and how deep the ground may be, the reader knows.
+  for (const double amount :
+       {options.metres_per_level, options.metres_per_pixel, options.metres_per_voxel, options.exaggeration}) {
+    if (!std::isfinite(amount)) return "an amount of heights that is not finite";
+    if (amount != 0.0 && options.heights == QUOIN_HEIGHTS_NONE) return "an amount of heights where there are none";
+  }
+  const bool has_ground = options.ground_depth != 0 || options.smooth_ground != 0;
+  return has_ground && options.heights == QUOIN_HEIGHTS_NONE ? "a ground of heights where there are none" : nullptr;
 }
 
 const char* what_is_wrong(const quoin_load_options& options) {
@@ -120,7 +185,9 @@ const char* what_is_wrong(const quoin_load_options& options) {
   if (options.mesh_voxels < 0 || !(options.voxel_size >= 0.0) || !std::isfinite(options.voxel_size))
     return "a size of voxels that cannot be";
   if (options.mesh_voxels != 0 && options.voxel_size != 0.0) return "both sizes of voxels";
-  return nullptr;
+  if (options.raw_scalar < QUOIN_UINT8 || options.raw_scalar > QUOIN_FLOAT64) return "no scalar has this number";
+  if (is_raw(options) && options.heights != QUOIN_HEIGHTS_NONE) return "a file of both values alone and heights";
+  return what_is_wrong_with_landscape(options);
 }
 
 }  // namespace
@@ -141,6 +208,21 @@ quoin_status fail(quoin_status status, const char* why) noexcept {
 
 quoin_status fail(const Error& error) {
   return fail(static_cast<quoin_status>(static_cast<int>(error.code) + 1), to_string(error).c_str());
+}
+
+std::optional<quoin_array> taken_array(const quoin_array* given) {
+  constexpr std::array<std::int64_t, 10> kBytes = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
+  auto array = taken(given);
+  if (!array || array->strides[0] != 0 || array->strides[1] != 0 || array->strides[2] != 0) return array;
+  if (array->scalar < QUOIN_UINT8 || array->scalar > QUOIN_FLOAT64) return array;
+  std::int64_t stride = kBytes.at(static_cast<std::size_t>(array->scalar));
+  for (int axis = 2; axis >= 0; --axis) {
+    array->strides[axis] = stride;
+    // What is wrong with the shape is told by who reads it.
+    if (array->shape[axis] <= 0 || stride > std::numeric_limits<std::int64_t>::max() / array->shape[axis]) break;
+    stride *= array->shape[axis];
+  }
+  return array;
 }
 
 Progress progress() {
@@ -170,6 +252,13 @@ void place(SceneBody& scene, SceneGrid grid, DVec3 position, std::size_t* out) {
   scene.numbers.grids.push_back(instance.grid);
   scene.numbers.instances.push_back(scene.loaded.scene.add_instance(std::move(instance)));
   if (out != nullptr) *out = scene.numbers.grids.size() - 1;
+}
+
+Result<LoadOptions> load_options_of(const quoin_load_options* given) {
+  const auto whole = taken_or_default(given);
+  if (!whole) return make_error(ErrorCode::InvalidArgument, "the size of the options");
+  if (const char* wrong = what_is_wrong(*whole)) return make_error(ErrorCode::InvalidArgument, wrong);
+  return options_of(*whole);
 }
 
 const char* what_is_wrong(const quoin_type& type) {
@@ -244,11 +333,21 @@ quoin_status quoin_scene_load_bytes(const void* data, std::size_t bytes, quoin_s
 quoin_status quoin_scene_load_with(const char* path, const quoin_load_options* options, quoin_scene* out) {
   return guarded([&] {
     if (path == nullptr || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "path or out is null");
-    const auto given = taken_or_default(options);
-    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "the size of the options");
-    if (const char* wrong = what_is_wrong(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
-    return give(load_scene(std::filesystem::path(path), options_of(*given), threads_of(given->threads), progress()),
-                out);
+    const auto wanted = load_options_of(options);
+    if (!wanted) return fail(wanted.error());
+    const Threads threads = threads_of(options == nullptr ? 0 : options->threads);
+    return give(load_scene(std::filesystem::path(path), *wanted, threads, progress()), out);
+  });
+}
+
+quoin_status quoin_scene_load_bytes_with(const void* data, std::size_t bytes, const quoin_load_options* options,
+                                         quoin_scene* out) {
+  return guarded([&] {
+    if ((data == nullptr && bytes > 0) || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "data or out is null");
+    const auto wanted = load_options_of(options);
+    if (!wanted) return fail(wanted.error());
+    const Threads threads = threads_of(options == nullptr ? 0 : options->threads);
+    return give(load_scene(std::span(static_cast<const std::byte*>(data), bytes), *wanted, threads, progress()), out);
   });
 }
 
@@ -363,9 +462,19 @@ quoin_status quoin_grid_read(quoin_scene scene, std::size_t grid, const std::int
 
 quoin_status quoin_grid_add(quoin_scene scene, const quoin_array* array, const char* name, std::size_t* out) {
   return with_scene(scene, Use::Change, [&](SceneBody& body) {
-    const auto given = taken(array);
+    const auto given = taken_array(array);
     if (!given) return fail(QUOIN_INVALID_ARGUMENT, "array is null, or its size");
     if (const char* wrong = what_is_wrong(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
     return add_grid(body, *given, name, out);
+  });
+}
+
+quoin_status quoin_grid_write(quoin_scene scene, std::size_t grid, const quoin_array* array) {
+  return with_scene(scene, Use::Change, [&](SceneBody& body) {
+    const auto given = taken_array(array);
+    if (!given) return fail(QUOIN_INVALID_ARGUMENT, "array is null, or its size");
+    if (grid >= body.numbers.grids.size()) return fail(QUOIN_INVALID_ARGUMENT, "no grid has this number");
+    if (const char* wrong = what_is_wrong(*given)) return fail(QUOIN_INVALID_ARGUMENT, wrong);
+    return write_grid(body, body.numbers.grids[grid], *given);
   });
 }

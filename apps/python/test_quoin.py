@@ -2,12 +2,14 @@
 missing."""
 
 import contextlib
+import copy
 import ctypes
 import doctest
 import gc
 import io
 import json
 import os
+import pickle
 import re
 import sys
 import tempfile
@@ -22,6 +24,9 @@ except ImportError:
     sys.exit(77)
 
 import quoin
+
+
+CAMERA = quoin.Camera((3, 4, 30), (1, 0, 0), (0, 1, 0), (0, 0, -1), 40.0, focus_distance=12.0, number=2)
 
 
 def ball(edge=24, radius=8.0):
@@ -195,6 +200,90 @@ class Scenes(unittest.TestCase):
         self.assertEqual((camera.position, camera.forward, camera.view_height), ((0, 0, 50), (0, 0, -1), None))
         self.assertAlmostEqual(camera.fov, 40)
 
+    def test_voxels_of_a_file_are_edited_and_written_back(self):
+        array = np.zeros((6, 5, 4), np.uint8)
+        array[1:5, 1:4, 1:3] = 1
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "a.vox")
+            quoin.from_numpy(array, [(200, 0, 0), (0, 0, 200)]).save(path)
+            scene = quoin.load(path)
+            types = scene.grids[0].to_numpy()
+            types[types == 1] = 2
+            types[0, 0, 0] = 0
+            scene.grids[0].write(types)
+            scene.grids[0].write(np.ones((2, 1, 1), bool), origin=(-2, 0, 0))
+            scene.save(path)
+            again = quoin.load(path)
+        self.assertEqual(len(again.instances), 1)
+        found = again.palette[again.grids[0].to_numpy()][..., :3].reshape(-1, 3).tolist()
+        self.assertEqual(found.count([0, 0, 200]), 23)
+        self.assertEqual(found.count([200, 0, 0]), 2)
+
+    def test_arrays_of_one_value_have_no_strides(self):
+        ones = np.broadcast_to(np.uint8(1), (3, 4, 5))
+        self.assertEqual(quoin.from_numpy(ones, [(1, 2, 3)]).grids[0].shape, (3, 4, 5))
+        self.assertEqual(len(quoin.mesh_labels(ones).triangles), 2 * 2 * (3 * 4 + 4 * 5 + 5 * 3))
+
+    def test_groups_layers_cameras_and_the_sun_come_back(self):
+        scene = quoin.from_numpy(np.ones((4, 4, 4), np.uint8), [(9, 9, 9)], "box")
+        scene.set_layer("attic", visible=False)
+        house = scene.add_group("house")
+        room = scene.add_group("room", house, visible=True, layer="attic")
+        scene.assign(0, room, "attic")
+        flat = CAMERA._replace(view_height=9.0, number=5, position=(1, 2, 90))
+        scene.add_camera(CAMERA)
+        scene.add_camera(flat)
+        scene.set_sun(quoin.Sun((1, 2, 2), 2.5, (1, 0.5, 0.25), 3.0))
+        scene.add_lamp(quoin.Lamp("torch", (1, 2, 3), (0, -1, 0), (1, 1, 1), 5.0))
+        self.assertRaises(quoin.QuoinError, scene.add_camera, flat)  # the number is taken
+        with tempfile.TemporaryDirectory() as folder:
+            for ending in (".vox", ".quoin", ".json"):
+                path = os.path.join(folder, "all" + ending)
+                scene.save(path)
+                again = quoin.load(path)
+                self.assertEqual([(one.name, one.parent, one.layer) for one in again.groups],
+                                 [("house", None, ""), ("room", 0, "attic")])
+                self.assertEqual(again.instances[0].layer, "attic")
+                self.assertFalse(again.instances[0].shown)
+                self.assertIn(quoin.Layer("attic", False), again.layers)
+                self.assertEqual(len(again.lamps), 0 if ending == ".vox" else 1)
+                self.assertEqual(any("lamps left out" in one for one in scene.warnings), ending == ".vox", scene.warnings)
+                sun = again.sun_light
+                self.assertTrue(np.allclose(sun.direction, np.array([1, 2, 2]) / 3, atol=1e-6), ending)
+                if ending == ".vox":
+                    self.assertAlmostEqual(sun.brightness, 2.5, 5)
+                    self.assertTrue(np.allclose(sun.colour, (1, 0.5, 0.25), atol=5e-3))
+                    self.assertAlmostEqual(sun.angle, 3.0, 4)
+                else:
+                    self.assertTrue(any("sun" in one for one in scene.warnings), scene.warnings)
+                if ending == ".json":
+                    self.assertTrue(any("cameras" in one for one in scene.warnings), scene.warnings)
+                    continue
+                self.assertEqual([one.number for one in again.cameras], [2, 5])
+                for found, wanted in zip(again.cameras, (CAMERA, flat)):
+                    self.assertTrue(np.allclose(found.position, wanted.position, atol=1e-4), found)
+                    self.assertTrue(np.allclose(found.forward, wanted.forward, atol=1e-6), found)
+                self.assertAlmostEqual(again.cameras[0].fov, 40.0, 4)
+                self.assertAlmostEqual(again.cameras[0].focus_distance, 12.0, 4)
+                self.assertAlmostEqual(again.cameras[1].view_height, 9.0, 4)
+
+    def test_what_a_file_was_given_is_not_lost_in_silence(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "a.vox")
+            quoin.from_numpy(np.ones((4, 4, 4), np.uint8), [(9, 9, 9)]).save(path)
+            scene = quoin.load(path)
+            scene.add_camera(CAMERA)
+            scene.set_sun(quoin.Sun((0, 1, 0), 2.0))
+            scene.save(os.path.join(folder, "a.json"))
+            self.assertEqual(scene.warnings, ["cameras left out: 1", "the sun's brightness and colour are left out"])
+            scene.save(path)
+            self.assertEqual(scene.warnings, [])
+            again = quoin.load(path)
+            again.save(os.path.join(folder, "a.json"))
+        self.assertEqual(len(again.cameras), 1)
+        self.assertEqual(again.warnings, ["left out, which only .vox keeps: cameras: 1",
+                                          "left out, which only .vox keeps: render settings: 1"])
+
     def test_triangles_become_voxels(self):
         corners = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [4, 4, 0], [0, 0, 4], [4, 0, 4], [0, 4, 4], [4, 4, 4]])
         cube = [[0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4], [2, 6, 7], [2, 7, 3], [0, 4, 6],
@@ -249,6 +338,37 @@ class Scenes(unittest.TestCase):
                 quoin.load_bytes(b"VOX nothing")
             scene.render(64, 64)
 
+    def test_values_alone(self):
+        place = np.indices((6, 5, 4), np.int16).sum(axis=0, dtype=np.int16)
+        mine = quoin.surface_nets(place, 5.5)
+        with tempfile.TemporaryDirectory() as folder:
+            for dtype in ("<i2", ">i2", "<f4", ">f8", "u1"):
+                held = place.astype(dtype).tobytes(order="F")
+                raw = quoin.Raw(place.shape, dtype)
+                found = quoin.load_bytes(held, raw=raw, iso=5.5).grids[0].mesh(smooth=True)
+                self.assertEqual(len(found.triangles), len(mine.triangles), dtype)
+                with open(f"{folder}/values.bin", "wb") as file:
+                    file.write(held)
+                again = quoin.load(f"{folder}/values.bin", raw=raw, iso=5.5).grids[0].mesh(smooth=True)
+                self.assertTrue((again.positions == found.positions).all())
+
+    def test_pictures_of_heights(self):
+        metres = np.array([[3, 5], [4, 9]])
+        code = (metres + 10_000) * 10
+        picture = np.stack([code >> 16, code >> 8 & 255, code & 255], axis=2).astype(np.uint8)
+        heights = quoin.Heights("mapbox", metres_per_pixel=1.0, ground_depth=2)
+        scene = quoin.load_bytes(quoin.png(picture), heights=heights)
+        self.assertEqual(scene.warnings, [])
+        filled = (scene.grids[0].to_numpy() > 0).sum(axis=1)
+        self.assertEqual(sorted(np.diff(sorted(filled.ravel())).tolist()), [1, 1, 4])
+        twice = quoin.load_bytes(quoin.png(picture), heights=quoin.Heights("mapbox", metres_per_pixel=1.0,
+                                                                           exaggeration=2.0, ground_depth=2))
+        self.assertGreater(twice.grids[0].shape[1], scene.grids[0].shape[1])
+        larger = np.repeat(np.repeat(picture, 4, axis=0), 4, axis=1)
+        smooth = quoin.load_bytes(quoin.png(larger), heights=quoin.Heights("mapbox", smooth=True))
+        self.assertTrue(smooth.grids[0].has_field)
+        self.assertIn("metres", " ".join(smooth.warnings))
+
     def test_progress_within_progress(self):
         _, scene = self.scene()
         outer, inner = [], []
@@ -291,6 +411,23 @@ class Scenes(unittest.TestCase):
         self.assertEqual(set(mesh.types), {1, 2})
         self.assertTrue((scene.palette[mesh.types] == mesh.colours).all())
         self.assertIsNone(scene.grids[0].mesh(smooth=True).types)
+
+    def test_a_watertight_mesh_is_closed(self):
+        voxels = np.zeros((6, 6, 6), np.uint16)
+        voxels[1:5, 1, 1:5] = 1
+        voxels[2, 1:4, 2] = 2  # meets the middle of a face, whose corners lie elsewhere
+        grid = quoin.from_numpy(voxels, [(200, 0, 0), (0, 200, 0)]).grids[0]
+
+        def open_edges(mesh):
+            _, same = np.unique(mesh.positions, axis=0, return_inverse=True)
+            corners = same.reshape(-1)[mesh.triangles]
+            edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
+            return int((np.unique(edges, axis=0, return_counts=True)[1] % 2).sum())
+
+        self.assertGreater(open_edges(grid.mesh()), 0)
+        self.assertEqual(open_edges(grid.mesh(watertight=True)), 0)
+        with self.assertRaises((TypeError, ValueError)):
+            grid.mesh(watertight="wide")
 
 
 class Pages(unittest.TestCase):
@@ -363,7 +500,37 @@ class BadInput(unittest.TestCase):
             (lambda: quoin.mesh_labels(array.astype(float)), quoin.QuoinError),
             (lambda: quoin.mesh_labels(array, relaxation_steps=-1), quoin.QuoinError),
             (lambda: scene.add(array + 9), quoin.QuoinError),
-            (lambda: scene.add(array.astype(float)), quoin.QuoinError),
+            (lambda: scene.add(array.astype(float)), TypeError),
+            (lambda: scene.add(array.astype(int)), TypeError),
+            (lambda: quoin.from_numpy(array, (1, 2, 3)), TypeError),
+            (lambda: quoin.surface_nets(array, "0.5"), TypeError),
+            (lambda: quoin.surface_nets(array, 0.5, spacing=2), ValueError),
+            (lambda: full.render(8, 8, look_at=(1, 2, 3)), ValueError),
+            (lambda: full.render(8, 8, camera=(1, 2)), ValueError),
+            (lambda: full.grids[0].write(array + 9), quoin.QuoinError),
+            (lambda: full.grids[0].write(array.astype(int)), TypeError),
+            (lambda: quoin.Grid(full, 7).write(array), quoin.QuoinError),
+            (lambda: quoin.png([[[0, 0, 0]]]), TypeError),
+            (lambda: copy.copy(full._owner), TypeError),
+            (lambda: copy.deepcopy(full), TypeError),
+            (lambda: pickle.dumps(full), TypeError),
+            (lambda: scene.assign(0), quoin.QuoinError),
+            (lambda: full.assign(0, 3), quoin.QuoinError),
+            (lambda: full.assign(0, None, "nowhere"), quoin.QuoinError),
+            (lambda: full.add_group("a", 5), quoin.QuoinError),
+            (lambda: full.add_group("a", -1), ValueError),
+            (lambda: full.add_group("a", layer="nowhere"), quoin.QuoinError),
+            (lambda: full.set_layer(""), quoin.QuoinError),
+            (lambda: full.add_camera(CAMERA._replace(right=(2, 0, 0))), quoin.QuoinError),
+            (lambda: full.add_camera(CAMERA._replace(right=(-1, 0, 0))), quoin.QuoinError),
+            (lambda: full.add_camera(CAMERA._replace(fov=180.0)), quoin.QuoinError),
+            (lambda: full.add_camera(CAMERA._replace(view_height=0.0)), quoin.QuoinError),
+            (lambda: full.add_camera(CAMERA._replace(number=-1)), quoin.QuoinError),
+            (lambda: full.add_camera(CAMERA._replace(position=(nan, 0, 0))), quoin.QuoinError),
+            (lambda: full.add_lamp(quoin.Lamp("a", (0, 0, 0), (0, 0, 0), (1, 1, 1), 1.0)), quoin.QuoinError),
+            (lambda: full.add_lamp(quoin.Lamp("a", (0, 0, 0), None, (1, 1, 1), -1.0)), quoin.QuoinError),
+            (lambda: full.set_sun(quoin.Sun((0, 0, 0))), quoin.QuoinError),
+            (lambda: full.set_sun(quoin.Sun((0, 1, 0), nan)), quoin.QuoinError),
             (lambda: scene.add(array, origin=(nan, 0, 0)), quoin.QuoinError),
             (lambda: scene.add_type((1, 2)), ValueError),
             (lambda: scene.add_type((1, 2, 300)), ValueError),
@@ -411,6 +578,18 @@ class BadInput(unittest.TestCase):
             (lambda: quoin.load("a.vox", frame=2**32), ValueError),
             (lambda: quoin.load_bytes("VOX "), TypeError),
             (lambda: quoin.load_bytes(b""), quoin.QuoinError),
+            (lambda: quoin.Raw((2, 2)), ValueError),
+            (lambda: quoin.Raw((2, 2, 0)), ValueError),
+            (lambda: quoin.Raw((2, 2, 2), "complex64"), TypeError),
+            (lambda: quoin.Raw((2, 2.5, 2)), TypeError),
+            (lambda: quoin.load_bytes(b"1234567", raw=quoin.Raw((2, 2, 2))), quoin.QuoinError),
+            (lambda: quoin.load_bytes(b"12345678", raw=(2, 2, 2)), TypeError),
+            (lambda: quoin.Heights("colour"), ValueError),
+            (lambda: quoin.Heights(metres_per_pixel=0.0), ValueError),
+            (lambda: quoin.Heights(exaggeration=nan), ValueError),
+            (lambda: quoin.Heights(ground_depth=0), ValueError),
+            (lambda: quoin.load_bytes(b"no picture", heights=quoin.Heights()), quoin.QuoinError),
+            (lambda: quoin.load_bytes(quoin.png(np.zeros((2, 2, 3), np.uint8)), heights="mapbox"), TypeError),
         ]:
             with self.assertRaises(error):
                 wrong()

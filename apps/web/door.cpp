@@ -36,8 +36,10 @@ quoin_status write(SceneBody& body, const char* extension, const quoin_mesh_opti
   }
   const Progress told = progress();
   const Progress meshing = part_of(told, 0.0, 0.5);
+  BlockySceneOptions blocks;
+  blocks.mesh.watertight = options.watertight != 0;
   const auto meshes = options.smooth != 0 ? mesh_scene_smoothly(body.loaded.scene, {}, {}, meshing)
-                                          : mesh_scene(body.loaded.scene, {}, {}, meshing);
+                                          : mesh_scene(body.loaded.scene, blocks, {}, meshing);
   if (!meshes) return fail(meshes.error());
   auto written = write_mesh(*meshes, format->format, {}, part_of(told, 0.5, 1.0));
   return written ? give(std::move(*written), out, count) : fail(written.error());
@@ -89,6 +91,8 @@ void* quoin_web_struct(std::int32_t kind) {
       return empty_struct<quoin_render_options>();
     case 6:
       return empty_struct<quoin_hits>();
+    case 7:
+      return empty_struct<quoin_load_options>();
     default:
       return nullptr;
   }

@@ -16,8 +16,8 @@ QUOIN_API void quoin_web_release(void);
  * on: 0 ends the call with QUOIN_CANCELLED. */
 QUOIN_API void quoin_web_listen(int32_t listens);
 /* A quoin_mesh_options and so on, all 0 but its size, for whom structs are bytes: `kind` is 0 array, 1 grid_info,
- * 2 type, 3 mesh_data, 4 mesh_options, 5 render_options, 6 hits; null: no memory, or another kind. Freed with
- * free(). */
+ * 2 type, 3 mesh_data, 4 mesh_options, 5 render_options, 6 hits, 7 load_options; null: no memory, or another kind.
+ * Freed with free(). */
 QUOIN_API void* quoin_web_struct(int32_t kind);
 
 /* A scene for shaders that march it (page/march.js), which lasts until quoin_web_march_free: what

@@ -15,11 +15,13 @@ QUOIN_EXPORT("quoin_web_reads") std::int32_t reads(const std::byte* data, std::s
   return detect_format(std::span(data, bytes)) == FileFormat::Vox ? 1 : 0;
 }
 
-QUOIN_EXPORT("quoin_scene_load_bytes")
-quoin_status load_bytes(const std::byte* data, std::size_t bytes, quoin_scene* out) {
+QUOIN_EXPORT("quoin_scene_load_bytes_with")
+quoin_status load_bytes(const std::byte* data, std::size_t bytes, const quoin_load_options* options, quoin_scene* out) {
   return guarded([&] {
     if (data == nullptr || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "data or out is null");
-    auto loaded = read_vox(std::span(data, bytes), {}, progress());
+    const auto wanted = load_options_of(options);
+    if (!wanted) return fail(wanted.error());
+    auto loaded = read_vox(std::span(data, bytes), *wanted, progress());
     if (!loaded) return fail(loaded.error());
     auto body = std::make_shared<SceneBody>();
     body->loaded = std::move(*loaded);

@@ -78,6 +78,7 @@
 #include <quoin/render/density_slice.h>
 #include <quoin/render/impostor.h>
 #include <quoin/render/impostor_cache.h>
+#include <quoin/render/path_history.h>
 #include <quoin/render/path_tracer.h>
 #include <quoin/render_vk/vulkan_device.h>
 #include <quoin/render_vk/vulkan_mesh_renderer.h>

@@ -125,7 +125,7 @@ Error unrecognised(std::span<const std::byte> bytes) {
   if (heights::is_png(bytes)) {
     return {ErrorCode::BadFormat,
             "not a file of any format that Quoin reads, but a picture, which --heights grey, mapbox or terrarium reads "
-            "as heights",
+            "as heights (in programs the option heights)",
             {},
             {}};
   }
@@ -266,6 +266,33 @@ std::vector<std::string> lost_with_source(const Saved& saved) {
   return lines;
 }
 
+/// What stands beside a scene and a format other than .vox leaves out, `lost_with_source` aside.
+std::vector<std::string> lost_beside(const Saved& saved, FileFormat format) {
+  std::vector<std::string> lines;
+  if (saved.loaded == nullptr) return lines;
+  const LoadedScene& loaded = *saved.loaded;
+  // What the file had itself lost_with_source tells.
+  const auto is_told = [said = lost_with_source(saved)](std::string_view what) {
+    return std::ranges::any_of(said, [&](const std::string& line) { return line.find(what) != std::string::npos; });
+  };
+  const bool holds_sun = format == FileFormat::Scene || format == FileFormat::World;
+  std::ptrdiff_t cameras = std::ssize(loaded.cameras);
+  if (format == FileFormat::World) cameras = 0;
+  if (format == FileFormat::Scene && loaded.camera) {
+    cameras =
+        std::ranges::count_if(loaded.cameras, [&](const FileCamera& one) { return one.camera != *loaded.camera; });
+  }
+  if (cameras > 0 && !is_told("cameras: ")) lines.push_back("cameras left out: " + std::to_string(cameras));
+  const Look usual;
+  if (is_told("render settings: ")) return lines;
+  if (!holds_sun && loaded.sun) lines.emplace_back("the sun is left out");
+  if (holds_sun && loaded.sun && loaded.look &&
+      (loaded.look->look.sun_brightness != usual.sun_brightness || loaded.look->look.sun_colour != usual.sun_colour)) {
+    lines.emplace_back("the sun's brightness and colour are left out");
+  }
+  return lines;
+}
+
 Result<FileFormat> format_for_saving(const std::filesystem::path& path) {
   const auto format = format_for_writing(path);
   if (!format) return format.error();
@@ -285,17 +312,18 @@ WriteModel model_writer(FileFormat format) {
   return nullptr;
 }
 
-std::vector<std::string> all_lost(std::vector<std::string> lines, const Saved& saved) {
-  std::vector<std::string> more = lost_with_source(saved);
-  std::ranges::move(more, std::back_inserter(lines));
+std::vector<std::string> all_lost(std::vector<std::string> lines, const Saved& saved, FileFormat format) {
+  std::ranges::move(lost_with_source(saved), std::back_inserter(lines));
+  std::ranges::move(lost_beside(saved, format), std::back_inserter(lines));
   return lines;
 }
 
-Result<SavedScene> save_model(Result<models::ModelBytes> file, const Saved& saved, const std::filesystem::path& path) {
+Result<SavedScene> save_model(Result<models::ModelBytes> file, const Saved& saved, FileFormat format,
+                              const std::filesystem::path& path) {
   if (!file) return file.error();
   const auto bytes = write_whole(path, std::move(file->bytes));
   if (!bytes) return bytes.error();
-  return SavedScene{*bytes, all_lost(std::move(file->warnings), saved)};
+  return SavedScene{*bytes, all_lost(std::move(file->warnings), saved, format)};
 }
 
 Result<SavedScene> save(const Saved& saved, const std::filesystem::path& path, Threads threads,
@@ -303,7 +331,7 @@ Result<SavedScene> save(const Saved& saved, const std::filesystem::path& path, T
   const auto format = format_for_saving(path);
   if (!format) return format.error();
   if (const WriteModel write = model_writer(*format); write != nullptr) {
-    return save_model(with_path(write(saved.scene, progress), path), saved, path);
+    return save_model(with_path(write(saved.scene, progress), path), saved, *format, path);
   }
   if (*format == FileFormat::Vox) {
     return saved.loaded != nullptr ? write_vox(*saved.loaded, path, progress) : write_vox(saved.scene, path, progress);
@@ -311,12 +339,12 @@ Result<SavedScene> save(const Saved& saved, const std::filesystem::path& path, T
   if (*format == FileFormat::World) {
     auto written = write_world_format(saved.scene, saved.loaded, path, threads, progress);
     if (!written) return written.error();
-    return SavedScene{written->bytes, lost_with_source(saved)};
+    return SavedScene{written->bytes, all_lost({}, saved, *format)};
   }
   if (*format == FileFormat::Vdb) {
     const auto written = write_whole(path, vdb::write_vdb(saved.scene));
     if (!written) return written.error();
-    return SavedScene{*written, all_lost(vdb::losses_of_vdb(saved.scene), saved)};
+    return SavedScene{*written, all_lost(vdb::losses_of_vdb(saved.scene), saved, *format)};
   }
   auto file = with_path(scene_file_of(saved.scene), path);
   if (!file) return file.error();
@@ -326,7 +354,7 @@ Result<SavedScene> save(const Saved& saved, const std::filesystem::path& path, T
   }
   const auto bytes = write_scene_file(*file, path, threads, progress);
   if (!bytes) return bytes.error();
-  return SavedScene{*bytes, lost_with_source(saved)};
+  return SavedScene{*bytes, all_lost({}, saved, *format)};
 }
 
 Result<std::vector<std::string>> losses(const Saved& saved, const std::filesystem::path& path) {
@@ -335,10 +363,10 @@ Result<std::vector<std::string>> losses(const Saved& saved, const std::filesyste
   if (const WriteModel write = model_writer(*format); write != nullptr) {
     auto file = with_path(write(saved.scene, {}), path);
     if (!file) return file.error();
-    return all_lost(std::move(file->warnings), saved);
+    return all_lost(std::move(file->warnings), saved, *format);
   }
-  if (*format == FileFormat::Vdb) return all_lost(vdb::losses_of_vdb(saved.scene), saved);
-  if (*format != FileFormat::Vox) return lost_with_source(saved);
+  if (*format == FileFormat::Vdb) return all_lost(vdb::losses_of_vdb(saved.scene), saved, *format);
+  if (*format != FileFormat::Vox) return all_lost({}, saved, *format);
   return with_path(saved.loaded != nullptr ? losses_of_vox(*saved.loaded) : losses_of_vox(saved.scene), path);
 }
 

@@ -186,14 +186,15 @@ bool lies_on_opaque(const SceneView& view, const Ray& ray_in_view, const GlassBo
 
 DVec3 normal_entered(const SceneView& view, const Ray& ray_in_view, const GlassBody& body) {
   if (!body.in_field) return DVec3(normal_of(body.face));
-  const DVec3 point = view.grid_from_view(body.placed, ray_in_view.origin + ray_in_view.direction * body.t_enter);
+  const DVec3 point = view.grid_from_view(body.placed).point(ray_in_view.origin + ray_in_view.direction * body.t_enter);
   const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(body.placed)];
   return glass_normal(*placed.glass, body.voxel, point, body.type, body.before);
 }
 
 DVec3 normal_left(const SceneView& view, const Ray& ray_in_view, const GlassBody& body) {
   if (!body.exit_in_field) return DVec3(normal_of(body.exit_face));
-  const DVec3 point = view.grid_from_view(body.exit_placed, ray_in_view.origin + ray_in_view.direction * body.t_exit);
+  const DVec3 point =
+      view.grid_from_view(body.exit_placed).point(ray_in_view.origin + ray_in_view.direction * body.t_exit);
   const PlacedGrid& placed = placed_in(view.tracer())[static_cast<std::size_t>(body.exit_placed)];
   return glass_normal(*placed.glass, IVec3(0), point, body.type, kAir);
 }

@@ -100,7 +100,7 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   point.voxel = {hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
   point.face = hits.grids.face[i];
   point.placed = hits.placed[i];
-  point.position = context_->view->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]);
+  point.position = context_->view->grid_from_view(point.placed).point(ray.origin + ray.direction * hits.grids.t[i]);
   point.in_field = (hits.in_field >> lane & 1U) != 0;
   if (point.in_field) {
     point.normal = hits.normal(i);
@@ -146,7 +146,7 @@ void Tile::fill_in(const Ray& ray, const GlassBody& body, const DVec3& normal, S
   point.voxel = body.voxel;
   point.face = body.face;
   point.placed = body.placed;
-  point.position = context_->view->grid_from_view(body.placed, ray.origin + ray.direction * body.t_enter);
+  point.position = context_->view->grid_from_view(body.placed).point(ray.origin + ray.direction * body.t_enter);
   if (body.in_field) {
     point.in_field = true;
     point.normal = Vec3(normal);

@@ -170,7 +170,12 @@ def check_file(quoin, folder):
         # Two that stand at right angles keep their voxels, the third is voxelized.
         run(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "turned.vox"), scale=0.5, fill="solid")
         again = quoin.load(os.path.join(folder, "turned.vox"))
-        require(len(again.instances) == 3, f"{len(again.instances)} instances")
+        require(len(again.instances) == 4, f"{len(again.instances)} instances")
+        away = next(one for one in again.instances if one.name == "away")
+        require(away.layer == "attic" and away.visible and not away.shown, f"what a layer hides: {away}")
+        first = next(one for one in again.instances if one.name == "first")
+        require([one.name for one in again.groups] == ["house", "room"] and again.groups[first.group].name == "room",
+                f"groups: {again.groups}")
         colours = lambda of: {tuple(row) for row in points_of(of)[:, 3:6]}
         require(colours(again) == colours(quoin.load(path)), f"{look}: colours {colours(again)}")
         run(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "turned.json"), scale=0.5)
@@ -194,6 +199,181 @@ def check_file(quoin, folder):
     run(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "blue.json"))
     blue = [one for one in quoin.load(os.path.join(folder, "blue.json")).types if one.name == "gold"]
     require([tuple(one.rgba) for one in blue] == [(0, 0, 255, 255)] and blue[0].metalness == 1, f"blue gold: {blue}")
+
+
+def arrangement(quoin, path):
+    """What belongs where in a file, by names."""
+    scene = quoin.load(path)
+    name = lambda number: "" if number is None else scene.groups[number].name
+    return {
+        "groups": sorted((one.name, name(one.parent), one.shown, one.layer) for one in scene.groups),
+        "instances": sorted((one.name, name(one.group), one.visible, one.shown, one.layer) for one in scene.instances),
+        "layers": sorted((one.name, one.visible) for one in scene.layers),
+    }
+
+
+def same_cameras(found, wanted):
+    require([one.number for one in found] == [one.number for one in wanted], f"cameras {[one.number for one in found]}")
+    for a, b in zip(found, wanted):
+        for name in ("position", "right", "up", "forward", "fov", "focus_distance"):
+            require(np.allclose(getattr(a, name), getattr(b, name), atol=2e-4), f"camera {b.number}: {name} {a} {b}")
+        require((a.view_height is None) == (b.view_height is None), f"camera {b.number}: projection")
+        require(b.view_height is None or abs(a.view_height - b.view_height) < 1e-4, f"camera {b.number}: height")
+
+
+def check_round_trip(quoin, folder):
+    """Groups, layers, what is hidden, cameras and the sun: from a file to Blender to a file."""
+    box = np.ones((3, 4, 5), np.uint8)
+    scene = quoin.from_numpy(box, [(200, 30, 30)], "free")
+    scene.set_layer("ground")
+    scene.set_layer("attic", visible=False)
+    house = scene.add_group("house")
+    room = scene.add_group("room", house, layer="ground")
+    cellar = scene.add_group("cellar", house, visible=False)
+    below = scene.add_group("below", cellar)
+    upstairs = scene.add_group("upstairs", house, layer="attic")
+    loft = scene.add_group("loft", upstairs)
+    for number, (name, group, layer, visible) in enumerate([
+            ("chair", room, "", True), ("ghost", room, "ground", False), ("barrel", below, "", True),
+            ("trunk", loft, "", True), ("bird", None, "attic", True)]):
+        matrix = np.eye(4)
+        matrix[0, 3] = 10 * (number + 1)
+        place = scene.place(scene.grids[0], matrix, name, visible)
+        scene.assign(place, group, layer)
+    turn = lambda axis, degrees: np.roll(np.roll(np.array(
+        [[1, 0, 0], [0, math.cos(math.radians(degrees)), -math.sin(math.radians(degrees))],
+         [0, math.sin(math.radians(degrees)), math.cos(math.radians(degrees))]]), axis, 0), axis, 1)
+    wanted = []
+    for number, (angles, height) in enumerate([((20, 130, 15), None), ((-90, 30, 0), None), ((0, 0, 0), None),
+                                               ((-30, 45, 0), 70.0), ((90, 0, 0), None)]):
+        axes = turn(1, angles[1]) @ turn(0, angles[0]) @ turn(2, angles[2])
+        place = 5.0 + number - 200.0 * -axes[:, 2]
+        wanted.append(quoin.Camera(tuple(place), tuple(axes[:, 0]), tuple(axes[:, 1]), tuple(-axes[:, 2]),
+                                   45.0 if height else 25.0 + 10 * number, height, 81.0 if height else 30.0, 2 * number))
+        if height:  # the file's radius says how high it sees
+            wanted[-1] = wanted[-1]._replace(focus_distance=height / (2 * math.tan(math.radians(22.5))))
+        scene.add_camera(wanted[-1])
+    scene.set_sun(quoin.Sun((0.3, 0.5, -0.8), 2.0, (1.0, 0.6, 0.3), 4.0))
+    before, path = os.path.join(folder, "before.vox"), os.path.join(folder, "after.vox")
+    scene.save(before)
+    same_cameras(quoin.load(before).cameras, wanted)
+    for scale in (0.1, 1.0):
+        empty()
+        run(bpy.ops.import_scene.quoin, filepath=before, scale=scale)
+        bpy.context.view_layer.update()
+        require(bpy.data.collections["cellar"].hide_render and not bpy.data.objects["barrel"].hide_render,
+                "a hidden group is a hidden collection")
+        require(bpy.data.objects["trunk"].hide_render, "what a hidden layer hides is hidden")
+        require(bpy.context.scene.camera.name == "before camera", "the first camera is looked through")
+        run(bpy.ops.export_scene.quoin, filepath=path, scale=scale)
+        a, b = arrangement(quoin, before), arrangement(quoin, path)
+        for name in a:
+            require(a[name] == b[name], f"{name}: {b[name]} instead of {a[name]}")
+        again = quoin.load(path)
+        require(np.array_equal(points_of(again), points_of(quoin.load(before))), "voxels")
+        same_cameras(again.cameras, wanted)
+        sun, first = again.sun_light, quoin.load(before).sun_light
+        require(np.allclose(sun.direction, first.direction, atol=1e-5), f"the sun's direction {sun}")
+        require(np.allclose([sun.brightness, sun.angle], [2.0, 4.0], atol=1e-4), f"the sun {sun}")
+        require(np.allclose(sun.colour, (1.0, 0.6, 0.3), atol=5e-3), f"the sun's colour {sun}")
+    # What is shown in Blender is shown in the file, with its layer.
+    bpy.data.objects["bird"].hide_render = bpy.data.objects["bird"].hide_viewport = False
+    bpy.data.collections["cellar"].hide_render = bpy.data.collections["cellar"].hide_viewport = False
+    run(bpy.ops.export_scene.quoin, filepath=path, scale=1.0)
+    shown = {one.name: one.shown for one in quoin.load(path).instances}
+    require(shown == {"free": True, "chair": True, "ghost": False, "barrel": True, "trunk": False, "bird": True},
+            f"shown: {shown}")
+    run(bpy.ops.export_scene.quoin, filepath=path, scale=1.0, hidden=False, lights=False, collections="NONE")
+    again = quoin.load(path)
+    require({one.name for one in again.instances} == {"free", "chair", "barrel", "bird"}, "without what is hidden")
+    require(not again.groups and not again.cameras and again.sun_light is None, "without all else")
+
+
+def reported(operator, **options):
+    """What it warns of, as its own module tells it."""
+    from quoin_voxels import exporter
+    told, write = [], exporter.export_file
+
+    def listen(*arguments):
+        made = write(*arguments)
+        told.extend(made.warnings)
+        return made
+
+    exporter.export_file = listen
+    try:
+        run(operator, **options)
+    finally:
+        exporter.export_file = write
+    return told
+
+
+def check_own_scene(quoin, folder):
+    """What an artist made in Blender: collections as groups or layers, cameras as renders see, lights by name."""
+    empty()
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = 300, 400
+    garden = bpy.data.collections.new("garden")
+    trees = bpy.data.collections.new("trees")
+    unseen = bpy.data.collections.new("unseen")
+    scene.collection.children.link(garden)
+    garden.children.link(trees)
+    scene.collection.children.link(unseen)
+    unseen.hide_render = True
+    for collection, place in ((scene.collection, 0), (garden, 2), (trees, 4), (unseen, 6)):
+        bpy.ops.mesh.primitive_cube_add(size=1, location=(place, 0, 0.5))
+        cube = bpy.context.object
+        cube.name = f"cube of {collection.name}"
+        for one in list(cube.users_collection):
+            one.objects.unlink(cube)
+        collection.objects.link(cube)
+    for kind in ("POINT", "SPOT", "AREA", "SUN", "SUN"):
+        light = bpy.data.lights.new(f"my {kind}", kind)
+        light.energy = 1.0 + len(bpy.data.lights)
+        scene.collection.objects.link(bpy.data.objects.new(light.name, light))
+    for kind, fit in (("PERSP", "AUTO"), ("PERSP", "HORIZONTAL"), ("ORTHO", "AUTO"), ("PANO", "AUTO")):
+        data = bpy.data.cameras.new(f"{kind} {fit}")
+        data.type, data.sensor_fit, data.lens, data.ortho_scale = kind, fit, 35.0, 8.0
+        made = bpy.data.objects.new(data.name, data)
+        made.location, made.rotation_euler, made.scale = (4, -9, 3), (1.2, 0.1, 0.3), (2, 2, 2)
+        scene.collection.objects.link(made)
+        if fit == "HORIZONTAL":
+            scene.camera = made
+            data.shift_x = 0.1
+    bpy.context.view_layer.update()
+    path = os.path.join(folder, "own.vox")
+    told = reported(bpy.ops.export_scene.quoin, filepath=path, fill="solid")
+    line = next(one for one in told if "leaves out" in one)
+    for name in ("point light my POINT", "spot light my SPOT", "area light my AREA", "sun my SUN",
+                 "panoramic camera PANO AUTO"):
+        require(name in line, f"{name} is not told: {told}")
+    require(line.count("my SUN") == 1, f"one sun stays: {line}")
+    require(any("PERSP HORIZONTAL" in one and "shifted" in one for one in told), f"the shift is not told: {told}")
+    made = quoin.load(path)
+    require({one.name for one in made.instances} ==
+            {f"cube of {name}" for name in ("garden", "trees", scene.collection.name)}, "what renders show")
+    require([(one.name, one.parent) for one in made.groups] == [("garden", None), ("trees", 0)], f"{made.groups}")
+    require(abs(made.sun_light.brightness - (1.0 + 5) / math.pi) < 1e-5, f"the stronger sun: {made.sun_light}")
+    # 36 mm across 300 pixels are 48 mm across 400.
+    high = 2 * math.degrees(math.atan(24 / 35))
+    auto = 2 * math.degrees(math.atan(18 / 35))
+    fovs = [one.fov for one in made.cameras if one.view_height is None]
+    require(np.allclose(fovs, [high, auto], atol=1e-3), f"lenses {fovs}, not {[high, auto]}")
+    heights = [one.view_height for one in made.cameras if one.view_height is not None]
+    require(np.allclose(heights, [80.0], atol=1e-3), f"heights {heights}")
+    for one in made.cameras:
+        require(one.view_height is not None or np.allclose(one.position, (40, 30, 90), atol=1e-3), f"a place {one}")
+    for ending, lamps in ((".json", 2), (".quoin", 2)):
+        told = reported(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "own" + ending), fill="solid")
+        made = quoin.load(os.path.join(folder, "own" + ending))
+        require(len(made.lamps) == lamps, f"{ending}: {len(made.lamps)} lamps")
+        require(any("area light my AREA" in one for one in told), f"{ending}: {told}")
+    told = reported(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "own.qb"), fill="solid")
+    require(any("camera PERSP AUTO" in one and "sun my SUN" in one for one in told), f".qb: {told}")
+    run(bpy.ops.export_scene.quoin, filepath=path, fill="solid", collections="LAYERS")
+    made = quoin.load(path)
+    require({one.name: one.layer for one in made.instances} == {
+        "cube of garden": "garden", "cube of trees": "garden", f"cube of {scene.collection.name}": ""}, "layers")
+    require([one.name for one in made.groups] == ["trees"], f"groups in layers: {made.groups}")
 
 
 def check_voxelized(quoin, folder):
@@ -317,6 +497,28 @@ def check_edits(quoin, folder):
     require(not kept.keep(mesh, scene.grids[0], scene.types, 0.1, {}), "a box of two voxels")
 
 
+def check_many_types(quoin, folder):
+    """More types than a .vox holds: near colours are merged, what differs in more than colour is not."""
+    empty()
+    array = np.arange(1, 1001, dtype=np.uint16).reshape(10, 10, 10)
+    colours = [((i * 7) % 256, (i * 13) % 256, i // 4) for i in range(999)]
+    path = os.path.join(folder, "many.json")
+    quoin.from_numpy(array, colours + [quoin.VoxelType((9, 9, 9, 255), "lamp", emission=5.0)]).save(path)
+    run(bpy.ops.import_scene.quoin, filepath=path)
+    for ending, wanted in ((".vox", 255), (".json", 1000)):
+        told = reported(bpy.ops.export_scene.quoin, filepath=os.path.join(folder, "fewer" + ending))
+        made = quoin.load(os.path.join(folder, "fewer" + ending))
+        types = made.grids[0].to_numpy()
+        used = np.unique(types)
+        require(len(used) == wanted and types.size == 1000, f"{ending}: {len(used)} types")
+        require(any("of 1000 those" in one for one in told) == (ending == ".vox"), f"{ending}: {told}")
+        lamp = made.types[int(types[-1, -1, -1])]
+        require(lamp.emission == 5.0 and lamp.rgba[:3] == (9, 9, 9), f"{ending}: {lamp}")
+        found = made.palette[types][..., :3].reshape(-1, 3)[:999].astype(int)
+        off = np.abs(found - np.array(colours)).mean()
+        require(off < 16 if ending == ".vox" else off == 0, f"{ending}: colours are off by {off}")
+
+
 def plane(faces):
     """A square of faces x faces quads at z = 0.05, whose places on a texture are its own."""
     x, y = np.meshgrid(np.arange(faces + 1), np.arange(faces + 1))
@@ -430,9 +632,24 @@ def main():
     require(quoin_voxels.quoin.__file__.startswith(scripts), "with its own package")
     menus = (bpy.types.TOPBAR_MT_file_import, bpy.types.TOPBAR_MT_file_export)
     require(all(any("quoin_voxels" in one.__module__ for one in menu._dyn_ui_initialize()) for menu in menus), "menus")
+    # Installed over itself, as a newer version is, with its library in use.
+    before = quoin_voxels.quoin
+    kept = before.load(castle)
+    for stays in range(2):
+        with open(os.path.join(os.path.dirname(quoin_voxels.__file__), "stale.py"), "w") as file:
+            file.write("")
+        os.utime(quoin_voxels.__file__, (1e9, 1e9 + stays))
+        bpy.ops.preferences.addon_install(filepath=addon)
+        bpy.ops.preferences.addon_enable(module="quoin_voxels")
+        require(not os.path.exists(os.path.join(os.path.dirname(quoin_voxels.__file__), "stale.py")), "what was there goes")
+    require(quoin_voxels.quoin is not before and len(quoin_voxels.quoin.load(castle).grids) == len(kept.grids),
+            "the new library is loaded, and the old one still works")
     quoin = quoin_voxels.quoin
     check_castle(quoin, castle, folder)
     check_file(quoin, folder)
+    check_round_trip(quoin, folder)
+    check_own_scene(quoin, folder)
+    check_many_types(quoin, folder)
     check_voxelized(quoin, folder)
     check_edits(quoin, folder)
     check_colours(quoin, folder)

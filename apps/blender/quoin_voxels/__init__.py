@@ -14,7 +14,13 @@ bl_info = {
 }
 
 import os
+import sys
 import time
+
+if "bpy" in locals():  # reloaded, since another version was installed over this one: so is what belongs to it
+    for _name in [one for one in sys.modules if one.startswith(__name__ + ".")]:
+        globals().pop(_name[len(__name__) + 1:], None)
+        del sys.modules[_name]
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
@@ -133,6 +139,14 @@ class QUOIN_OT_export(bpy.types.Operator, ExportHelper):
     scale: FloatProperty(name="Voxel Size", description="Of a voxel, in Blender's units", default=0.1, min=1e-6,
                          soft_max=10.0, subtype="DISTANCE")
     use_selection: BoolProperty(name="Selected Only", default=False, description="Else all that renders show")
+    collections: EnumProperty(name="Collections", default="GROUPS", items=[
+        ("GROUPS", "As Groups", "A group for each collection with objects in it; layers are the property `layer`"),
+        ("LAYERS", "As Layers", "A layer for each collection of the scene's, and groups for those in them"),
+        ("NONE", "Not Written", "Objects alone; layers are the property `layer`")])
+    hidden: BoolProperty(name="Hidden Voxels", default=True, description="Write objects that were imported and are "
+                         "hidden too, hidden, where the format can say that")
+    lights: BoolProperty(name="Cameras and Lights", default=True, description="Those that the format holds; a sun, "
+                         "cameras, lamps. What it does not hold is said")
     fill: EnumProperty(name="Fill", default="all", items=[
         ("all", "All", "What a mesh encloses, and what it passes through: thin parts stay"),
         ("solid", "Solid", "Voxels whose centre it encloses"),

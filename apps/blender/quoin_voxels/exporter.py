@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-from . import axes, kept, materials, quoin
+from . import axes, kept, materials, merging, places, quoin, views
 
 
 class Exported:
@@ -20,10 +20,15 @@ class Exported:
 _ANY_PLACE = {".json", ".quoin"}
 
 
+# Formats with groups and layers, and what is hidden.
+_GROUPS = {".json", ".quoin", ".vox"}
+
+
 class _Writer:
     def __init__(self, path, options):
         self.options = options
         self.scene = quoin.Scene()
+        self.belonging = None
         self.ending = os.path.splitext(path)[1].lower()
         self.made = Exported()
         self._types = {}  # numbers in the scene
@@ -45,7 +50,14 @@ class _Writer:
         size = np.cbrt(abs(np.linalg.det(linear)))
         return size > 0.0 and np.allclose(linear.T @ linear, size * size * np.eye(3), atol=1e-5 * size * size)
 
-    def add_kept(self, source, matrix, name):
+    def _belong(self, owner, is_hidden=False):
+        """Puts the next instance where it belongs: into the groups and onto the layer of its owner. Returns whether
+        its own switch is to be on."""
+        number = self._places
+        self._places += 1
+        return self.belonging is None or self.belonging.add(number, owner, is_hidden)
+
+    def add_kept(self, source, matrix, name, owner, is_hidden=False):
         """Places the voxels that a mesh carries."""
         mesh = source.data
         slots = [slot.material for slot in source.material_slots]
@@ -65,7 +77,8 @@ class _Writer:
         else:
             grid, moved = self._grids[key]
             self.scene.place(grid, matrix @ moved, name)
-        self._places += 1
+        if not self._belong(owner, is_hidden):
+            self.scene.move(self._places - 1, matrix @ moved, visible=False)
         self.made.kept += 1
 
     def _warn_of_images(self, slots, own, name):
@@ -80,17 +93,17 @@ class _Writer:
                 self.made.warnings.append(f"{name}: the images of {material.name} were edited and are not read; its "
                                           "types stay as they were imported")
 
-    def add_voxelized(self, evaluated, world, name):
+    def add_voxelized(self, evaluated, world, name, owner):
         """Voxelizes what an object looks like."""
         mesh = evaluated.to_mesh()
         if mesh is None:
             return
         try:
-            self._voxelize(mesh, [slot.material for slot in evaluated.material_slots], world, name)
+            self._voxelize(mesh, [slot.material for slot in evaluated.material_slots], world, name, owner)
         finally:
             evaluated.to_mesh_clear()
 
-    def _voxelize(self, mesh, slots, world, name):
+    def _voxelize(self, mesh, slots, world, name, owner):
         mesh.calc_loop_triangles()
         count = len(mesh.loop_triangles)
         if count == 0:
@@ -116,7 +129,7 @@ class _Writer:
             colours = colours.reshape(-1, 4)
         self.scene.voxelize(axes.points_to_quoin(points, self.options.scale), triangles,
                             types=types, colours=colours, fill=self.options.fill, name=name, materials=numbers)
-        self._places += 1
+        self._belong(owner)
         self.made.voxelized += 1
 
     def _colour(self, mesh, slots, looks, numbers, name):
@@ -191,19 +204,57 @@ def _texels_of(mesh, node, triangles):
 _SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 
 
-def _is_wanted(one, options):
+def _owner(one):
+    """The object that stands in the scene for what is seen."""
+    return one.parent.original if one.is_instance else one.object.original
+
+
+def _is_wanted(one, options, tree):
     source = one.instance_object.original if one.is_instance else one.object.original
-    owner = one.parent.original if one.is_instance else source
+    owner = _owner(one)
     if source.type not in _SOLID or (one.is_instance is False and not one.show_self):
         return False
     if options.use_selection:
         return owner.select_get()
-    return not owner.hide_render
+    return not owner.hide_render and not tree.is_hidden(tree.path(owner))
 
 
 def _is_changed(source):
     """Whether what an object shows is not its mesh."""
     return bool(source.modifiers) or source.data.shape_keys is not None
+
+
+def _hidden(context, options, tree):
+    """Objects with kept voxels that are not seen."""
+    if options.use_selection or not options.hidden:
+        return []
+    return [one for one in context.scene.objects
+            if one.type == "MESH" and kept.is_kept(one.data) and not _is_changed(one)
+            and tree.is_hidden_object(one)]
+
+
+def _add_hidden(writer, hidden, options):
+    for source in hidden:
+        matrix = axes.matrix_to_quoin(np.array(source.matrix_world), kept.scale_of(source.data), options.scale)
+        if writer.can_place(matrix):
+            writer.add_kept(source, matrix, source.name, source, True)
+        else:
+            writer.made.warnings.append(f"{source.name}: it is hidden, and {writer.ending} has no place for voxels that "
+                                        "are turned or scaled so; it is left out")
+
+
+def _add_seen(writer, one, options):
+    evaluated, owner = one.object, _owner(one)
+    source, world = evaluated.original, np.array(one.matrix_world)
+    name = source.name
+    if source.type == "MESH" and kept.is_kept(source.data) and not _is_changed(source):
+        matrix = axes.matrix_to_quoin(world, kept.scale_of(source.data), options.scale)
+        if writer.can_place(matrix):
+            writer.add_kept(source, matrix, name, owner)
+            return
+        writer.made.warnings.append(f"{name}: {writer.ending} has no place for voxels that are turned or scaled "
+                                    "so; it is voxelized")
+    writer.add_voxelized(evaluated, world, name, owner)
 
 
 def export_file(context, path, options):
@@ -214,23 +265,22 @@ def export_file(context, path, options):
             one.data.update_tag()
     graph = context.evaluated_depsgraph_get()
     writer = _Writer(path, options)
+    tree = places.Tree(context.view_layer)
+    hidden = _hidden(context, options, tree) if writer.ending in _GROUPS else []
+    if writer.ending in _GROUPS:
+        owners = [_owner(one) for one in graph.object_instances if _is_wanted(one, options, tree)]
+        writer.belonging = places.Belonging(writer.scene, context.scene, tree, options.collections, owners)
     for one in graph.object_instances:
-        if not _is_wanted(one, options):
-            continue
-        evaluated = one.object
-        source = evaluated.original
-        world = np.array(one.matrix_world)
-        name = source.name
-        if source.type == "MESH" and kept.is_kept(source.data) and not _is_changed(source):
-            matrix = axes.matrix_to_quoin(world, kept.scale_of(source.data), options.scale)
-            if writer.can_place(matrix):
-                writer.add_kept(source, matrix, name)
-                continue
-            writer.made.warnings.append(f"{name}: {writer.ending} has no place for voxels that are turned or scaled "
-                                        "so; it is voxelized")
-        writer.add_voxelized(evaluated, world, name)
+        if _is_wanted(one, options, tree):
+            _add_seen(writer, one, options)
+    _add_hidden(writer, hidden, options)
     if writer.made.kept + writer.made.voxelized == 0:
         raise ValueError("There is nothing to export" + (": nothing is selected" if options.use_selection else ""))
+    if options.lights:
+        writer.made.warnings += views.write(context, writer.scene, writer.ending, tree, options)
+    if merged := merging.merge(writer.scene, writer.ending):
+        writer.made.warnings.append(f"{writer.ending} holds {merging.MOST_TYPES[writer.ending]} types: of {merged} those "
+                                    "whose colours are alike were merged")
     writer.scene.save(path)
     writer.made.warnings += writer.scene.warnings
     return writer.made

@@ -7,7 +7,11 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from . import axes, kept, materials, quoin, versions
+from . import axes, kept, materials, places, quoin, versions
+
+
+# Formats of Quoin's own, whose sizes are meant.
+_OUR_OWN = {"scene", "world"}
 
 
 class Imported:
@@ -164,13 +168,29 @@ def _keep(mesh, grid, looks, slots, options, made):
 
 
 def _collections(scene, top):
-    """A collection for each group, within that of its parent."""
+    """A collection for each group, within that of its parent, hidden where the group's own switch hides it."""
     found = []
-    for group in scene.groups:
+    groups = scene.groups
+    hidden = {one.name for one in scene.layers if not one.visible}
+    for group in groups:
         one = bpy.data.collections.new(group.name or "group")
         (top if group.parent is None else found[group.parent]).children.link(one)
+        above = group.parent is None or groups[group.parent].shown
+        one.hide_render = one.hide_viewport = above and not group.shown and group.layer not in hidden
+        if group.layer:
+            one[places.LAYER] = group.layer
         found.append(one)
+    places.set_layers(top, scene.layers)
     return found
+
+
+def _hidden_groups(scene, collections):
+    """The numbers of groups that their collections, or those above, hide."""
+    hidden = set()
+    for i, group in enumerate(scene.groups):
+        if collections[i].hide_render or group.parent in hidden:
+            hidden.add(i)
+    return hidden
 
 
 def _camera(one, name, options, reach):
@@ -191,6 +211,7 @@ def _camera(one, name, options, reach):
     data.clip_end = max(data.clip_end, 2.0 * (np.linalg.norm(matrix[:3, 3]) + reach))
     made = bpy.data.objects.new(name, data)
     made.matrix_world = Matrix(matrix)
+    made[places.CAMERA] = one.number
     return made
 
 
@@ -217,11 +238,13 @@ def _lamp(one, name, options):
     return made
 
 
-def _sun(direction):
+def _sun(sun):
     data = bpy.data.lights.new("Sun", "SUN")
-    data.energy = math.pi  # white that faces it shows 1
+    data.energy = math.pi * sun.brightness  # white that faces it shows the brightness
+    data.color = sun.colour
+    data.angle = math.radians(sun.angle)
     made = bpy.data.objects.new("Sun", data)
-    made.matrix_world = _towards([-v for v in direction])
+    made.matrix_world = _towards([-v for v in sun.direction])
     return made
 
 
@@ -229,40 +252,55 @@ def _lights(context, scene, top, name, options, made):
     least, most = scene.bounds
     reach = float(np.linalg.norm(np.abs([least, most]).max(0))) * options.scale
     found = []
-    for i, one in enumerate(scene.cameras):
-        camera = _camera(one, f"{name} camera {one.number}" if i else f"{name} camera", options, reach)
-        if one.first and context.scene.camera is None:
-            context.scene.camera = camera
-        found.append(camera)
+    cameras = scene.cameras
+    for i, one in enumerate(cameras):
+        found.append(_camera(one, f"{name} camera {one.number}" if i else f"{name} camera", options, reach))
+    if cameras and context.scene.camera is None:
+        first = next((i for i, one in enumerate(cameras) if one.first), 0)
+        context.scene.camera = found[first]
     found += [_lamp(one, f"{name} lamp", options) for one in scene.lamps]
-    if scene.sun is not None:
-        found.append(_sun(scene.sun))
+    if scene.sun_light is not None:
+        found.append(_sun(scene.sun_light))
     for one in found:
         top.objects.link(one)
         made.objects += 1
 
 
+def _on_lattice(scene, matrix):
+    """A place whose voxels are as large as they are to be, on the lattice: of the one grid of a file in a unit of its
+    own, such as one of triangles. Others stay as they are."""
+    size = np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
+    if abs(size - 1.0) < 1e-6 or scene.format in _OUR_OWN or len(scene.instances) != 1 or not scene.grids[0].voxels:
+        return matrix
+    out = matrix / size
+    out[:3, 3] = np.round(out[:3, 3])
+    out[3, 3] = 1.0
+    return out
+
+
 def _place(scene, top, name, looks, options, made, progress):
     groups = _collections(scene, top)
-    grids, places, meshes = scene.grids, scene.instances, {}
+    grids, instances, meshes = scene.grids, scene.instances, {}
+    hidden_groups = _hidden_groups(scene, groups)
     empty = 0
-    for i, one in enumerate(places):
+    for i, one in enumerate(instances):
         if one.grid not in meshes:
             grid = grids[one.grid]
             mesh, slots = mesh_of(grid, grid.name or one.name or name, looks, options)
             if mesh is not None:
                 _keep(mesh, grid, looks, slots, options, made)
             meshes[one.grid] = mesh
-            progress(i / len(places))
+            progress(i / len(instances))
         mesh = meshes[one.grid]
         if mesh is None:
             empty += 1
             continue
         made_object = bpy.data.objects.new(one.name or mesh.name, mesh)
-        made_object.matrix_world = Matrix(axes.matrix_to_blender(one.matrix, options.scale))
-        made_object.hide_render = made_object.hide_viewport = not one.shown
+        made_object.matrix_world = Matrix(axes.matrix_to_blender(_on_lattice(scene, one.matrix), options.scale))
+        is_shown = one.shown or one.group in hidden_groups  # which their collections hide
+        made_object.hide_render = made_object.hide_viewport = not (one.visible and is_shown)
         if one.layer:
-            made_object["layer"] = one.layer
+            made_object[places.LAYER] = one.layer
         (top if one.group is None else groups[one.group]).objects.link(made_object)
         made.objects += 1
     if empty:
@@ -279,6 +317,7 @@ def import_file(context, path, options):
     name = os.path.splitext(os.path.basename(os.path.normpath(path)))[0]
     made.warnings += [f"{name}: {line}" for line in scene.warnings]
     top = bpy.data.collections.new(name)
+    top[places.FILE] = name
     context.scene.collection.children.link(top)
     looks = _Looks(name, scene.types, options)
     if options.surface == "SMOOTH" and any(one.transparent or one.emission > 0.0 for one in looks.types):

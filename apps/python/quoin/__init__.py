@@ -30,11 +30,12 @@ import numpy as np
 from . import _c
 from ._c import NdArray, QuoinError
 from ._mesh import Mesh, mesh_labels, surface_nets
-from ._scene import (Camera, Format, Grid, Group, Hits, Instance, Lamp, Scene, VoxelType, formats, from_numpy, load,
-                     load_bytes)
+from ._scene import (Camera, Format, Grid, Group, Heights, Hits, Instance, Lamp, Layer, Raw, Scene, Sun, VoxelType,
+                     formats, from_numpy, load, load_bytes)
 
-__all__ = ["Camera", "Format", "Grid", "Group", "Hits", "Instance", "Lamp", "Mesh", "QuoinError", "Scene", "VoxelType",
-           "formats", "from_numpy", "load", "load_bytes", "mesh_labels", "png", "progress", "surface_nets", "version"]
+__all__ = ["Camera", "Format", "Grid", "Group", "Heights", "Hits", "Instance", "Lamp", "Layer", "Mesh", "QuoinError", "Raw",
+           "Scene", "Sun", "VoxelType", "formats", "from_numpy", "load", "load_bytes", "mesh_labels", "png", "progress", "surface_nets",
+           "version"]
 
 
 def version() -> str:
@@ -52,6 +53,8 @@ def png(picture: NdArray) -> bytes:
     >>> png(np.zeros((2, 3, 3), np.uint8))[:8]
     b'\\x89PNG\\r\\n\\x1a\\n'
     """
+    if not isinstance(picture, np.ndarray):
+        raise TypeError("a picture is a NumPy array")
     if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] not in (3, 4) or not picture.size:
         raise ValueError("a picture is uint8, (height, width, 3) or (height, width, 4)")
     height, width, channels = picture.shape

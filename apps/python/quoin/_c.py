@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import operator
 import os
+import sys
 import threading
 from typing import TYPE_CHECKING, Any, Callable, List, Optional, Sequence, Tuple
 
@@ -90,7 +91,11 @@ class Format(ctypes.Structure):
 class LoadOptions(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("threads", ctypes.c_int32), ("show_hidden", ctypes.c_int32),
                 ("frame", ctypes.c_int32), ("radius", ctypes.c_int32), ("has_iso", ctypes.c_int32),
-                ("iso", ctypes.c_float), ("mesh_voxels", ctypes.c_int32), ("voxel_size", ctypes.c_double)]
+                ("iso", ctypes.c_float), ("mesh_voxels", ctypes.c_int32), ("voxel_size", ctypes.c_double),
+                ("raw_shape", ctypes.c_int32 * 3), ("raw_scalar", ctypes.c_int32), ("raw_big_endian", ctypes.c_int32),
+                ("heights", ctypes.c_int32), ("metres_per_level", ctypes.c_double),
+                ("metres_per_pixel", ctypes.c_double), ("metres_per_voxel", ctypes.c_double),
+                ("exaggeration", ctypes.c_double), ("ground_depth", ctypes.c_int32), ("smooth_ground", ctypes.c_int32)]
 
 
 class Triangles(ctypes.Structure):
@@ -113,7 +118,7 @@ class MeshData(ctypes.Structure):
 
 class MeshOptions(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("smooth", ctypes.c_int32), ("no_occlusion", ctypes.c_int32),
-                ("threads", ctypes.c_int32)]
+                ("threads", ctypes.c_int32), ("reserved", ctypes.c_int32), ("watertight", ctypes.c_int32)]
 
 
 class RenderOptions(ctypes.Structure):
@@ -128,6 +133,15 @@ class HitArrays(ctypes.Structure):
                 ("type", ctypes.c_void_p), ("normal", ctypes.c_void_p)]
 
 
+class Layer(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("name", ctypes.c_char * 128), ("visible", ctypes.c_int32)]
+
+
+class Sun(ctypes.Structure):
+    _fields_ = [("size", ctypes.c_size_t), ("direction", ctypes.c_double * 3), ("brightness", ctypes.c_double),
+                ("colour", ctypes.c_float * 3), ("angle_degrees", ctypes.c_double)]
+
+
 Progress = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_double, ctypes.c_void_p)
 NOBODY = ctypes.cast(0, Progress)
 
@@ -136,7 +150,7 @@ _SIGNATURES = {
     "quoin_free": (_handle,),
     "quoin_scene_create": (_p,),
     "quoin_scene_load": (ctypes.c_char_p, _p),
-    "quoin_scene_load_bytes": (_p, _n, _p),
+    "quoin_scene_load_bytes_with": (_p, _n, _p, _p),
     "quoin_scene_load_with": (ctypes.c_char_p, _p, _p),
     "quoin_scene_get_info": (_handle, _p),
     "quoin_set_progress": (Progress, _p),
@@ -152,6 +166,7 @@ _SIGNATURES = {
     "quoin_grid_get_info": (_handle, _n, _p),
     "quoin_grid_read": (_handle, _n, _p, _p, _p, _n),
     "quoin_grid_add": (_handle, _p, ctypes.c_char_p, _p),
+    "quoin_grid_write": (_handle, _n, _p),
     "quoin_grid_voxelize": (_handle, _p, _p, ctypes.c_char_p, _p),
     "quoin_instance_count": (_handle, _p),
     "quoin_instance_get": (_handle, _n, _p),
@@ -168,6 +183,15 @@ _SIGNATURES = {
     "quoin_mesh_labels": (_p, ctypes.c_int64, _i, _i, _p),
     "quoin_mesh_view": (_handle, _p),
     "quoin_scene_render": (_handle, _p, _p, _n),
+    "quoin_layer_count": (_handle, _p),
+    "quoin_layer_get": (_handle, _n, _p),
+    "quoin_layer_set": (_handle, _p),
+    "quoin_instance_set_layer": (_handle, _n, ctypes.c_char_p),
+    "quoin_group_add": (_handle, _p, _p),
+    "quoin_camera_add": (_handle, _p),
+    "quoin_lamp_add": (_handle, _p),
+    "quoin_sun_get": (_handle, _p),
+    "quoin_sun_set": (_handle, _p),
     "quoin_scene_rays": (_handle, _n, _p, _p, ctypes.c_double, _p),
 }
 for _name, _arguments in _SIGNATURES.items():
@@ -234,6 +258,10 @@ class Owner:
     def __init__(self, handle: int) -> None:
         self.handle = handle
 
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        # Two would free it twice, and another process has no such handle.
+        raise TypeError("scenes, grids and meshes are not copied or pickled; save the scene, or copy the arrays")
+
     def __del__(self) -> None:
         if self.handle:
             lib.quoin_free(self.handle)
@@ -295,6 +323,40 @@ _SCALARS = {np.dtype(name): number for number, name in enumerate(
 _SCALARS[np.dtype("bool")] = 0
 
 
+def number(value: Any, name: str) -> float:
+    """A number, where one is needed."""
+    if isinstance(value, (str, bytes)):
+        raise TypeError(f"{name}: a number is needed, not {type(value).__name__}")
+    return float(value)
+
+
+def three(values: Any, name: str) -> List[float]:
+    """Three numbers, where these are needed."""
+    try:
+        found = [float(v) for v in values]
+    except TypeError:
+        found = []
+    if len(found) != 3:
+        raise ValueError(f"{name}: three numbers are needed, not {values!r:.80}")
+    return found
+
+
+def types_of(array: Any, origin: Sequence[float]) -> Any:
+    """The same of an array of types."""
+    if isinstance(array, np.ndarray) and array.dtype not in (np.uint8, np.uint16, np.bool_):
+        raise TypeError(f"types of voxels are uint8 or uint16, not {array.dtype}; convert it with astype")
+    return array_of(array, (1, 1, 1), origin)
+
+
+def scalar_of(dtype: Any, name: str) -> Tuple[int, bool]:
+    """The number of a type of numbers, and whether its greatest byte comes first."""
+    found = np.dtype(dtype)
+    native = found.newbyteorder("=")
+    if native not in _SCALARS:
+        raise TypeError(f"{name} of {found} are not read")
+    return _SCALARS[native], not found.isnative if sys.byteorder == "little" else found.isnative and found.itemsize > 1
+
+
 def array_of(array: Any, spacing: Sequence[float], origin: Sequence[float]) -> Any:
     """An array as the library reads it, where it lies."""
     if not isinstance(array, np.ndarray):
@@ -303,15 +365,15 @@ def array_of(array: Any, spacing: Sequence[float], origin: Sequence[float]) -> A
         raise ValueError(f"the array has the shape {array.shape}, and is to have three axes that are not empty")
     if array.dtype not in _SCALARS or not array.dtype.isnative:
         raise TypeError(f"arrays of {array.dtype} are not read; convert it with astype")
-    if len(spacing) != 3 or len(origin) != 3:
-        raise ValueError("spacing and origin are three numbers")
+    spacing, origin = three(spacing, "spacing"), three(origin, "origin")
+    if not any(array.strides):  # which to the library means that there are no gaps
+        array = array.copy()
     given = sized(Array)
     given.data = array.ctypes.data
     given.scalar = _SCALARS[array.dtype]
     given.shape[:] = array.shape
     given.strides[:] = array.strides
-    given.spacing[:] = [float(v) for v in spacing]
-    given.origin[:] = [float(v) for v in origin]
+    given.spacing[:], given.origin[:] = spacing, origin
     given.kept = array  # until the call is over
     return given
 

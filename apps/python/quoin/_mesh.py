@@ -93,7 +93,7 @@ def surface_nets(array: NdArray, iso: float, spacing: Sequence[float] = (1, 1, 1
         raise ValueError('solid is "above" or "below"')
     given = _c.array_of(array, spacing, origin)
     out = ctypes.c_uint64()
-    _c.check(_c.lib.quoin_surface_nets(ctypes.byref(given), iso, int(solid == "below"), _c.whole(threads, "threads"),
+    _c.check(_c.lib.quoin_surface_nets(ctypes.byref(given), _c.number(iso, "iso"), int(solid == "below"), _c.whole(threads, "threads"),
                                        ctypes.byref(out)))
     return Mesh(_c.Owner(out.value))
 

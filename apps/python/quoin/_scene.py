@@ -52,18 +52,25 @@ class Group(NamedTuple):
     layer: str
 
 
+class Layer(NamedTuple):
+    """Instances and groups that are shown and hidden together, wherever they stand."""
+
+    name: str
+    visible: bool = True
+
+
 class Camera(NamedTuple):
-    """A camera of a file. The axes are unit, and perpendicular."""
+    """A camera of a file. The axes are unit, and perpendicular: right is forward x up."""
 
     position: Tuple[float, ...]
     right: Tuple[float, ...]
     up: Tuple[float, ...]
     forward: Tuple[float, ...]
     fov: float  #: vertical, in degrees; of perspective
-    view_height: Optional[float]  #: of orthographic ones: from the picture's lower edge to its upper
-    focus_distance: float  #: 0: not said
-    number: int
-    first: bool  #: to be looked through at first
+    view_height: Optional[float] = None  #: of orthographic ones: from the picture's lower edge to its upper
+    focus_distance: float = 0.0  #: 0: not said
+    number: int = 0
+    first: bool = False  #: to be looked through at first
 
 
 class Lamp(NamedTuple):
@@ -74,9 +81,18 @@ class Lamp(NamedTuple):
     direction: Optional[Tuple[float, ...]]  #: of a spot; None: into all directions alike
     colour: Tuple[float, ...]  #: linear
     intensity: float  #: the light of a white surface that faces it 1 world unit away
-    range: float
-    inner_angle: float  #: of a spot, in degrees from its middle
-    outer_angle: float
+    range: float = float("inf")
+    inner_angle: float = 0.0  #: of a spot, in degrees from its middle
+    outer_angle: float = 45.0
+
+
+class Sun(NamedTuple):
+    """The one sun of a scene, infinitely far away."""
+
+    direction: Tuple[float, ...]  #: from the scene towards it
+    brightness: float = 1.0  #: that of a white surface that faces it; 0: there is none
+    colour: Tuple[float, ...] = (1.0, 1.0, 1.0)  #: linear
+    angle: float = 0.53  #: of its disc, across, in degrees
 
 
 class Format(NamedTuple):
@@ -184,10 +200,29 @@ class Grid:
                                         out.ctypes.data, out.size))
         return out
 
-    def mesh(self, smooth: bool = False, occlusion: bool = True, threads: int = 0) -> Mesh:
-        """Its surface: merged faces of blocks, or a smooth one around them."""
+    def write(self, array: NdArray, origin: Optional[Sequence[float]] = None) -> None:
+        """Changes its voxels: the box of an array [x, y, z] of uint8 or uint16 from `origin` on becomes what that holds,
+        0 for air. Without it begins where `to_numpy` does. A file that was read keeps what else it has when it is saved.
+
+        >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0), (0, 0, 255)])
+        >>> types = scene.grids[0].to_numpy()
+        >>> types[0] = 2
+        >>> scene.grids[0].write(types)
+        >>> scene.grids[0].to_numpy()[:, 0, 0].tolist()
+        [2, 1]
+        """
+        given = _c.types_of(array, self.origin if origin is None else origin)
+        _c.check(_c.lib.quoin_grid_write(self._scene._owner.handle, self._number, ctypes.byref(given)))
+
+    def mesh(self, smooth: bool = False, occlusion: bool = True, threads: int = 0, watertight: bool = False) -> Mesh:
+        """Its surface: merged faces of blocks, or a smooth one around them.
+
+        `watertight`: of blocks, faces get further corners where others meet their edges, so that no gaps are seen there.
+        A face has then four vertices or more. Smooth surfaces always are.
+        """
         options = _c.sized(_c.MeshOptions)
         options.smooth, options.no_occlusion = int(smooth), int(not occlusion)
+        options.watertight = int(watertight)
         options.threads = _c.whole(threads, "threads")
         out = ctypes.c_uint64()
         _c.check(_c.lib.quoin_grid_mesh(self._scene._owner.handle, self._number, ctypes.byref(options),
@@ -276,6 +311,12 @@ class Scene:
                 for one in self._all(_c.lib.quoin_group_count, _c.lib.quoin_group_get, _c.Group, 1)]
 
     @property
+    def layers(self) -> List[Layer]:
+        """Those that instances and groups may lie on, by their names."""
+        return [Layer(_c.text_of(one.name), bool(one.visible))
+                for one in self._all(_c.lib.quoin_layer_count, _c.lib.quoin_layer_get, _c.Layer)]
+
+    @property
     def cameras(self) -> List[Camera]:
         """Those of its file."""
         return [Camera(tuple(one.position), tuple(one.right), tuple(one.up), tuple(one.forward),
@@ -289,6 +330,15 @@ class Scene:
         return [Lamp(_c.text_of(one.name), tuple(one.position), tuple(one.direction) if one.is_spot else None,
                      tuple(one.colour), one.intensity, one.range, one.inner_angle_degrees, one.outer_angle_degrees)
                 for one in self._all(_c.lib.quoin_lamp_count, _c.lib.quoin_lamp_get, _c.Lamp)]
+
+    @property
+    def sun_light(self) -> Optional[Sun]:
+        """The sun with its light, where its file says it; what that leaves out is as usual."""
+        one = _c.sized(_c.Sun)
+        _c.check(_c.lib.quoin_sun_get(self._owner.handle, ctypes.byref(one)))
+        if not one.brightness > 0.0:
+            return None
+        return Sun(tuple(one.direction), one.brightness, tuple(one.colour), one.angle_degrees)
 
     @property
     def types(self) -> List[VoxelType]:
@@ -321,7 +371,7 @@ class Scene:
 
     def add(self, array: NdArray, origin: Sequence[float] = (0, 0, 0), name: str = "") -> Grid:
         """Adds a grid of the types in an array [x, y, z] of uint8 or uint16, 0 for air, which is read as it lies."""
-        given = _c.array_of(array, (1, 1, 1), origin)
+        given = _c.types_of(array, origin)
         out = ctypes.c_size_t()
         _c.check(_c.lib.quoin_grid_add(self._owner.handle, ctypes.byref(given), _c.name_of(name), ctypes.byref(out)))
         return Grid(self, out.value)
@@ -348,6 +398,73 @@ class Scene:
         if name is not None:
             given.name = _c.bytes_of(name)
         _c.check(_c.lib.quoin_instance_set(self._owner.handle, instance, ctypes.byref(given)))
+
+    def set_layer(self, name: str, visible: bool = True) -> None:
+        """Adds a layer, or shows or hides that of this name.
+
+        >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0)], "box")
+        >>> scene.set_layer("attic", visible=False)
+        >>> scene.assign(0, scene.add_group("house"), "attic")
+        >>> scene.instances[0].group, scene.instances[0].layer, scene.instances[0].shown
+        (0, 'attic', False)
+        """
+        given = _c.sized(_c.Layer)
+        given.name, given.visible = _c.bytes_of(name), int(visible)
+        _c.check(_c.lib.quoin_layer_set(self._owner.handle, ctypes.byref(given)))
+
+    def add_group(self, name: str, parent: Optional[int] = None, visible: bool = True, layer: str = "") -> int:
+        """Adds a group, within another where `parent` is its place in `groups`, and returns its own. The scene has the
+        layer already."""
+        given = _c.sized(_c.Group)
+        given.name, given.layer, given.shown = _c.bytes_of(name), _c.bytes_of(layer), int(visible)
+        given.parent = 0 if parent is None else _c.size(parent, "parent") + 1
+        out = ctypes.c_size_t()
+        _c.check(_c.lib.quoin_group_add(self._owner.handle, ctypes.byref(given), ctypes.byref(out)))
+        return out.value - 1
+
+    def assign(self, instance: int, group: Optional[int] = None, layer: str = "") -> None:
+        """Puts an instance into a group and onto a layer, both of which the scene has. It stays where it stands."""
+        given = _c.sized(_c.Instance)
+        instance = _c.size(instance, "instance")
+        _c.check(_c.lib.quoin_instance_get(self._owner.handle, instance, ctypes.byref(given)))
+        given.group = 0 if group is None else _c.size(group, "group") + 1
+        _c.check(_c.lib.quoin_instance_set(self._owner.handle, instance, ctypes.byref(given)))
+        _c.check(_c.lib.quoin_instance_set_layer(self._owner.handle, instance, _c.name_of(layer)))
+
+    def add_camera(self, camera: Camera) -> None:
+        """Adds a camera under its number, which no other has. .quoin and .vox hold all, .json the first to be looked
+        through.
+
+        >>> scene = from_numpy(np.ones((2, 2, 2), np.uint8), [(255, 0, 0)])
+        >>> scene.add_camera(Camera((0, 1, 9), (1, 0, 0), (0, 1, 0), (0, 0, -1), 40.0))
+        >>> scene.cameras[0].fov
+        40.0
+        """
+        one = _c.sized(_c.Camera)
+        one.number, one.is_first = _c.whole(camera.number, "number"), int(camera.first)
+        one.position[:], one.right[:] = camera.position, camera.right
+        one.up[:], one.forward[:] = camera.up, camera.forward
+        one.vertical_fov_degrees, one.focus_distance = camera.fov, camera.focus_distance
+        if camera.view_height is not None:
+            one.is_orthographic, one.view_height = 1, camera.view_height
+        _c.check(_c.lib.quoin_camera_add(self._owner.handle, ctypes.byref(one)))
+
+    def add_lamp(self, lamp: Lamp) -> None:
+        """Adds a lamp. .quoin and .json hold them."""
+        one = _c.sized(_c.Lamp)
+        one.name, one.position[:], one.colour[:] = _c.bytes_of(lamp.name), lamp.position, lamp.colour
+        one.intensity, one.range = lamp.intensity, lamp.range
+        if lamp.direction is not None:
+            one.is_spot, one.direction[:] = 1, lamp.direction
+            one.inner_angle_degrees, one.outer_angle_degrees = lamp.inner_angle, lamp.outer_angle
+        _c.check(_c.lib.quoin_lamp_add(self._owner.handle, ctypes.byref(one)))
+
+    def set_sun(self, sun: Sun) -> None:
+        """Gives the scene its sun, or another one. .vox holds all of it, .json and .quoin its direction."""
+        one = _c.sized(_c.Sun)
+        one.direction[:], one.colour[:] = sun.direction, sun.colour
+        one.brightness, one.angle_degrees = sun.brightness, sun.angle
+        _c.check(_c.lib.quoin_sun_set(self._owner.handle, ctypes.byref(one)))
 
     def voxelize(self, positions: Any, triangles: Any, voxel_size: float = 1.0, *, colours: Any = None,
                  materials: Any = None, types: Sequence[Union[VoxelType, Colour]] = (), fill: str = "all",
@@ -392,11 +509,11 @@ class Scene:
         _c.check(_c.lib.quoin_scene_save(self._owner.handle, _c.path_of(path)))
 
     def render(self, width: int = 1280, height: int = 720, *, samples: int = 0, paths: bool = False,
-               camera: Optional[Sequence[float]] = None, look_at: Sequence[float] = (0, 0, 0), fov: float = 45.0,
+               camera: Optional[Sequence[float]] = None, look_at: Optional[Sequence[float]] = None, fov: float = 45.0,
                sun: Optional[Sequence[float]] = None, out: Optional[NdArray] = None, threads: int = 0) -> NdArray:
-        """A picture, uint8 (height, width, 3), sRGB. Without a camera the whole scene is shown. `paths`: light with its
-        bounces and soft shadows, which takes longer. `sun`: from the scene towards it, of any length; the sky follows
-        it. `out` is filled in place where it is given."""
+        """A picture, uint8 (height, width, 3), sRGB. Without a camera the whole scene is shown; one looks at (0, 0, 0)
+        unless `look_at` says otherwise. `paths`: light with its bounces and soft shadows, which takes longer. `sun`:
+        from the scene towards it, of any length; the sky follows it. `out` is filled in place where it is given."""
         width, height = (_c.whole(v, "the picture's size") for v in (width, height))
         if width <= 0 or height <= 0:
             raise ValueError("a picture has pixels")
@@ -405,9 +522,12 @@ class Scene:
         options.paths, options.threads = int(paths), _c.whole(threads, "threads")
         if camera is not None:
             options.has_camera, options.fov_degrees = 1, fov
-            options.camera[:], options.look_at[:] = camera, look_at
+            options.camera[:] = _c.three(camera, "camera")
+            options.look_at[:] = _c.three((0, 0, 0) if look_at is None else look_at, "look_at")
+        elif look_at is not None:
+            raise ValueError("look_at is of a camera, which is not given")
         if sun is not None:
-            options.has_sun, options.sun[:] = 1, sun
+            options.has_sun, options.sun[:] = 1, _c.three(sun, "sun")
         if out is None:
             out = np.empty((height, width, 3), np.uint8)
         elif not isinstance(out, np.ndarray):
@@ -441,34 +561,106 @@ class Scene:
         return f"<quoin.Scene: {len(self.grids)} grids, {len(self.types) - 1} types>"
 
 
+class Raw:
+    """A file of values alone: how many along each axis, the first one fastest, and what each is.
+
+    `dtype`: of NumPy, in any order of bytes: "uint8", ">i2", np.float32.
+    """
+
+    def __init__(self, shape: Sequence[int], dtype: Any = "uint8") -> None:
+        self.shape = tuple(_c.whole(length, "shape") for length in shape)
+        if len(self.shape) != 3 or min(self.shape) < 1:
+            raise ValueError(f"values alone have three axes that are not empty, not {self.shape}")
+        self.dtype = np.dtype(dtype)
+        self._scalar, self._is_big_endian = _c.scalar_of(dtype, "values")
+
+
+class Heights:
+    """A picture (PNG) of the heights of a landscape.
+
+    `encoding`: "grey", a level times `metres_per_level`; "mapbox" or "terrarium", metres in red, green and blue.
+    `metres_per_pixel`: between neighbouring heights; without it 1, with a warning. `metres_per_voxel`: without it that.
+    `ground_depth`: voxels of ground below the lowest height. `smooth`: densities rather than voxels.
+    """
+
+    ENCODINGS = ("grey", "mapbox", "terrarium")
+
+    def __init__(self, encoding: str = "grey", *, metres_per_level: float = 1.0,
+                 metres_per_pixel: Optional[float] = None, metres_per_voxel: Optional[float] = None,
+                 exaggeration: float = 1.0, ground_depth: int = 8, smooth: bool = False) -> None:
+        if encoding not in self.ENCODINGS:
+            raise ValueError(f"encoding is one of {', '.join(self.ENCODINGS)}, not {encoding!r}")
+        self.encoding = encoding
+        # To the library 0 stands for what is not given.
+        for name, given in (("metres_per_level", metres_per_level), ("metres_per_pixel", metres_per_pixel),
+                            ("metres_per_voxel", metres_per_voxel), ("exaggeration", exaggeration)):
+            if given is not None and not given > 0.0:
+                raise ValueError(f"{name} is more than 0, not {given}")
+        self.metres_per_level, self.exaggeration = metres_per_level, exaggeration
+        self.metres_per_pixel, self.metres_per_voxel = metres_per_pixel, metres_per_voxel
+        self.ground_depth = _c.whole(ground_depth, "ground_depth")
+        if self.ground_depth < 1:
+            raise ValueError(f"ground_depth is at least 1, not {ground_depth}")
+        self.smooth = smooth
+
+
+def _load_options(frame: int, show_hidden: bool, radius: int, iso: Optional[float], size: int, voxel_size: float,
+                  threads: int, raw: Optional[Raw], heights: Optional[Heights]) -> Any:
+    options = _c.sized(_c.LoadOptions)
+    options.frame, options.show_hidden = _c.whole(frame, "frame"), int(show_hidden)
+    options.radius, options.threads = _c.whole(radius, "radius"), _c.whole(threads, "threads")
+    options.has_iso, options.iso = int(iso is not None), iso or 0.0
+    options.mesh_voxels, options.voxel_size = _c.whole(size, "size"), voxel_size
+    if raw is not None:
+        if not isinstance(raw, Raw):
+            raise TypeError("raw is a quoin.Raw")
+        options.raw_shape[:] = raw.shape
+        options.raw_scalar, options.raw_big_endian = raw._scalar, int(raw._is_big_endian)
+    if heights is not None:
+        if not isinstance(heights, Heights):
+            raise TypeError("heights is a quoin.Heights")
+        options.heights = 1 + Heights.ENCODINGS.index(heights.encoding)
+        options.metres_per_level, options.exaggeration = heights.metres_per_level, heights.exaggeration
+        options.metres_per_pixel = heights.metres_per_pixel or 0.0
+        options.metres_per_voxel = heights.metres_per_voxel or 0.0
+        options.ground_depth, options.smooth_ground = heights.ground_depth, int(heights.smooth)
+    return options
+
+
 def load(path: Path, *, frame: int = 0, show_hidden: bool = False, radius: int = 0, iso: Optional[float] = None,
-         size: int = 0, voxel_size: float = 0.0, threads: int = 0) -> Scene:
+         size: int = 0, voxel_size: float = 0.0, threads: int = 0, raw: Optional[Raw] = None,
+         heights: Optional[Heights] = None) -> Scene:
     """Reads a file of any format that Quoin reads (`formats`), or a folder that holds a world.
 
     `frame`: of an animation. `radius`: of a world, in chunks of 64 voxels around its spawn; 0 is 4. `iso`: of a volume.
-    `size`, `voxel_size`: of a file of triangles, voxels along its longest side, or their size.
+    `size`, `voxel_size`: of a file of triangles, voxels along its longest side, or their size. `raw`, `heights`: the
+    file is one of values alone, or a picture of a landscape's heights.
 
     >>> load("nothing.vox")
     Traceback (most recent call last):
     ...
     quoin._c.QuoinError: nothing.vox: No such file or directory
     """
-    options = _c.sized(_c.LoadOptions)
-    options.frame, options.show_hidden = _c.whole(frame, "frame"), int(show_hidden)
-    options.radius, options.threads = _c.whole(radius, "radius"), _c.whole(threads, "threads")
-    options.has_iso, options.iso = int(iso is not None), iso or 0.0
-    options.mesh_voxels, options.voxel_size = _c.whole(size, "size"), voxel_size
+    options = _load_options(frame, show_hidden, radius, iso, size, voxel_size, threads, raw, heights)
     out = ctypes.c_uint64()
     _c.check(_c.lib.quoin_scene_load_with(_c.path_of(path), ctypes.byref(options), ctypes.byref(out)))
     return Scene(_c.Owner(out.value))
 
 
-def load_bytes(data: Union[bytes, bytearray, memoryview]) -> Scene:
-    """The same of what a file holds: bytes, or whatever lies in memory as they do, which is not copied."""
+def load_bytes(data: Union[bytes, bytearray, memoryview], *, frame: int = 0, show_hidden: bool = False, radius: int = 0,
+               iso: Optional[float] = None, size: int = 0, voxel_size: float = 0.0, threads: int = 0,
+               raw: Optional[Raw] = None, heights: Optional[Heights] = None) -> Scene:
+    """The same of what a file holds: bytes, or whatever lies in memory as they do, which is not copied.
+
+    >>> values = np.arange(8, dtype=">u2").reshape(2, 2, 2)
+    >>> load_bytes(values.tobytes(), raw=Raw((2, 2, 2), ">u2"), iso=3.5).grids[0].has_field
+    True
+    """
+    options = _load_options(frame, show_hidden, radius, iso, size, voxel_size, threads, raw, heights)
     held = memoryview(data).cast("B")
     array = np.frombuffer(held, np.uint8) if held.nbytes else np.zeros(0, np.uint8)
     out = ctypes.c_uint64()
-    _c.check(_c.lib.quoin_scene_load_bytes(array.ctypes.data, array.size, ctypes.byref(out)))
+    _c.check(_c.lib.quoin_scene_load_bytes_with(array.ctypes.data, array.size, ctypes.byref(options), ctypes.byref(out)))
     return Scene(_c.Owner(out.value))
 
 
@@ -476,6 +668,8 @@ def from_numpy(array: NdArray, palette: Iterable[Union[VoxelType, Colour]], name
     """A scene of one grid. `array` [x, y, z] has 0 for air and i for the i-th entry of the palette, from 1 on."""
     scene = Scene()
     for one in palette:
+        if not isinstance(one, Iterable):
+            raise TypeError("a palette is a list of colours: [(200, 40, 40), ...]")
         scene.add_type(one)
     scene.add(array, name=name)
     return scene

@@ -3,7 +3,7 @@
  * Axes: right-handed, +Y up. Colours: sRGB. All arrays that are returned are the caller's.
  * Errors: every function throws (or rejects with) a QuoinError. One of code "trap", "internal" or "out_of_memory" may
  * have ended the instance that all scenes lived in: these are gone then, their calls fail with "bad_handle", and the
- * next `load` starts a fresh one.
+ * next `load` starts a fresh one. Options of a name that is not declared here are "invalid_argument".
  */
 export type ErrorCode =
   | 'invalid_argument' | 'cannot_read' | 'cannot_write' | 'bad_format' | 'unsupported' | 'limit_exceeded' | 'cancelled'
@@ -58,12 +58,15 @@ export interface Progress {
 export interface MeshOptions extends Progress {
   /** Smooth surfaces in place of blocks. Default: of grids that have a field. */
   smooth?: boolean;
+  /** Of blocks: no corner of a face lies inside another's edge, where pixels of what is behind may be seen. Faces get
+   *  more triangles. Smooth surfaces always are. Default: false. */
+  watertight?: boolean;
 }
 
 export interface RenderOptions extends Progress {
   width?: number;
   height?: number;
-  /** Samples a pixel; default 4. */
+  /** Samples a pixel, 1 to 4,096; default 4. */
   samples?: number;
   /** In place of a view of the whole scene. */
   camera?: { position: Vec3; lookAt: Vec3; fovDegrees?: number };
@@ -94,7 +97,7 @@ export class Scene {
   private constructor();
   /** Whether it is of the small module. */
   readonly isSmall: boolean;
-  /** What reading left out, a line each. */
+  /** What reading left out, or chose where nothing was said; a line each. */
   readonly warnings: readonly string[];
   readonly grids: readonly GridInfo[];
   /** 0 is air. */
@@ -145,9 +148,55 @@ export interface Small {
  *  are, in place of quoin.wasm, or quoin-small.wasm, beside quoin.js. */
 export function start(module?: BufferSource | URL | string, options?: Small): Promise<void>;
 
-/** Reads a file of any format, which its content decides. With `small` the whole module reads, and is fetched for, what
- *  the small one does not. */
-export function load(bytes: ArrayBuffer | ArrayBufferView, options?: Progress & Small): Promise<Scene>;
+/** The file holds values alone: a volume. */
+export interface RawVolume {
+  /** How many along each axis, of which the first is the fastest. */
+  shape: Vec3;
+  /** Default: 'uint8'. */
+  type?: 'uint8' | 'int8' | 'uint16' | 'int16' | 'uint32' | 'int32' | 'uint64' | 'int64' | 'float32' | 'float64';
+  /** Default: false. */
+  bigEndian?: boolean;
+}
+
+/** The file is a picture (PNG) of the heights of a landscape. Lengths are 0.000001 to 1,000,000. */
+export interface Heights {
+  /** Levels, or terrain-RGB as Mapbox or Terrarium have it. */
+  encoding: 'grey' | 'mapbox' | 'terrarium';
+  /** Of levels, default 1. */
+  metresPerLevel?: number;
+  /** Between neighbouring heights. Default: 1, with a warning. */
+  metresPerPixel?: number;
+  /** Along a voxel's edge. Default: metresPerPixel. */
+  metresPerVoxel?: number;
+  /** Heights are multiplied by it, default 1. */
+  exaggeration?: number;
+  /** Voxels of ground below the lowest height: 1 to 4,096, default 8. */
+  groundDepth?: number;
+  /** Densities, whose surface is smooth, rather than voxels. */
+  smooth?: boolean;
+}
+
+/** What files are read with. Of those that are of no use to a file it takes no notice. */
+export interface LoadOptions extends Progress, Small {
+  /** What is hidden becomes visible. */
+  showHidden?: boolean;
+  /** Of an animation, default 0. */
+  frame?: number;
+  /** Of a world that is read by chunks: how far around its spawn, in chunks of 64 voxels; default 4. */
+  radius?: number;
+  /** Of a volume: what is above is solid. Default: a value between its two groups. */
+  iso?: number;
+  /** Of a file of triangles: voxels along its longest side, default 128. */
+  meshVoxels?: number;
+  /** Or their size, in the file's unit. */
+  voxelSize?: number;
+  raw?: RawVolume;
+  heights?: Heights;
+}
+
+/** Reads a file of any format, which its content decides, unless `raw` or `heights` does. With `small` the whole module
+ *  reads, and is fetched for, what the small one does not. */
+export function load(bytes: ArrayBuffer | ArrayBufferView, options?: LoadOptions): Promise<Scene>;
 
 export interface ArrayOptions extends Progress {
   /** Of neighbours, default 1. */

@@ -12,7 +12,8 @@ export class QuoinError extends Error {
 }
 
 // What quoin_web_struct calls its structs, and where their fields are: pointers and size_t have 4 bytes.
-const structs = { array: 0, gridInfo: 1, type: 2, meshData: 3, meshOptions: 4, renderOptions: 5, hits: 6 };
+const structs = { array: 0, gridInfo: 1, type: 2, meshData: 3, meshOptions: 4, renderOptions: 5, hits: 6,
+                  loadOptions: 7 };
 const scalars = [Uint8Array, Int8Array, Uint16Array, Int16Array, Uint32Array, Int32Array, BigUint64Array, BigInt64Array,
                  Float32Array, Float64Array];
 
@@ -239,7 +240,9 @@ async function compile(given) {
 async function compiled(given) {
   if (isBytes(given)) return WebAssembly.compile(given);
   if (String(given).startsWith('file:')) {
-    const { readFile } = await import('node:fs/promises');
+    // Written so that those who bundle for browsers do not look for it.
+    const name = ['node:fs', 'promises'].join('/');
+    const { readFile } = await import(/* webpackIgnore: true */ /* @vite-ignore */ name);
     return WebAssembly.compile(await readFile(new URL(given)));
   }
   const response = await fetch(given);
@@ -291,6 +294,7 @@ const whole = new Engine(() => new URL('./quoin.wasm', import.meta.url));
 const small = new Engine(() => new URL('./quoin-small.wasm', import.meta.url));
 
 export async function start(module, options = {}) {
+  known(options, ['small']);
   await (options.small ? small : whole).start(module);
 }
 
@@ -349,34 +353,44 @@ export class Scene {
     }));
   }
 
-  #isSmooth(smooth) {
-    return (smooth ?? this.grids.some((grid) => grid.hasField)) ? 1 : 0;
+  /** Calls use(the address of a quoin_mesh_options). */
+  #withMeshOptions(options, use) {
+    const { smooth, watertight } = known(options, ['smooth', 'watertight', 'progress']);
+    const of = this.#instance;
+    return of.withStruct('meshOptions', (at) => {
+      const view = of.view();
+      view.setInt32(at + 4, (smooth ?? this.grids.some((grid) => grid.hasField)) ? 1 : 0, true);
+      view.setInt32(at + 20, watertight ? 1 : 0, true);
+      return use(at);
+    });
   }
 
   glb(options) {
     return this.file('.glb', options);
   }
 
-  file(extension, { smooth, progress } = {}) {
+  file(extension, options = {}) {
     const of = this.#instance;
+    const { progress } = known(options, ['smooth', 'watertight', 'progress']);
+    const kinds = ['.glb', '.ply', '.stl', '.3mf', '.vox'];
+    if (!kinds.some((kind) => typeof extension === 'string' && extension.toLowerCase().endsWith(kind)))
+      throw new QuoinError('unsupported', `${String(extension)} is none of ${kinds.join(', ')}`);
     const write = (wanted, name, out) => {
-      of.view().setInt32(wanted + 4, this.#isSmooth(smooth), true);
       of.call('quoin_web_write', this.#handle, name, wanted, out, out + 4);
       const at = of.view().getUint32(out, true);
       const bytes = of.numbers(Uint8Array, at, of.view().getUint32(out + 4, true));
       of.run('quoin_web_release');
       return bytes;
     };
-    return of.listened(progress, () => of.withStruct('meshOptions', (wanted) =>
+    return of.listened(progress, () => this.#withMeshOptions(options, (wanted) =>
       of.withText(extension, (name) => of.with(8, (out) => write(wanted, name, out)))));
   }
 
-  mesh(grid, { smooth, progress } = {}) {
+  mesh(grid, options = {}) {
     const of = this.#instance;
-    return of.listened(progress, () => of.withStruct('meshOptions', (wanted) => {
-      of.view().setInt32(wanted + 4, this.#isSmooth(smooth), true);
-      return of.takeMesh(of.handle('quoin_grid_mesh', this.#handle, index(grid), wanted));
-    }));
+    const { progress } = known(options, ['smooth', 'watertight', 'progress']);
+    return of.listened(progress, () => this.#withMeshOptions(options, (wanted) =>
+      of.takeMesh(of.handle('quoin_grid_mesh', this.#handle, index(grid), wanted))));
   }
 
   read(grid, min, shape) {
@@ -390,11 +404,12 @@ export class Scene {
     }));
   }
 
-  render({ width = 1280, height = 720, progress, ...options } = {}) {
+  render(options = {}) {
     const of = this.#instance;
+    const { width = 1280, height = 720, progress } = known(options, renderNames);
     const pixels = pixelsOf(width, height);
     return of.listened(progress, () => of.withStruct('renderOptions', (wanted) => of.with(3 * pixels, (out) => {
-      putRenderOptions(of.view(), wanted, { width, height, ...options });
+      putRenderOptions(of.view(), wanted, { ...options, width, height });
       of.call('quoin_scene_render', this.#handle, wanted, out, 3 * pixels);
       const rgb = new Uint8Array(of.exports.memory.buffer, out, 3 * pixels);
       const rgba = new Uint8ClampedArray(4 * pixels).fill(255);
@@ -407,7 +422,8 @@ export class Scene {
     })));
   }
 
-  rays(origins, directions, { maxT = Infinity } = {}) {
+  rays(origins, directions, options = {}) {
+    const { maxT = Infinity } = known(options, ['maxT']);
     const [from, along] = [origins, directions].map(doubles);
     const count = from.length / 3;
     if (typeof maxT !== 'number' || Number.isNaN(maxT)) throw new QuoinError('invalid_argument', 'maxT is no number');
@@ -438,6 +454,8 @@ export class Scene {
   }
 }
 
+const renderNames = ['width', 'height', 'samples', 'camera', 'sun', 'progress'];
+
 function pixelsOf(width, height) {
   if (!(Number.isInteger(width) && Number.isInteger(height) && width > 0 && height > 0 && width * height <= 2 ** 28))
     throw new QuoinError('invalid_argument', 'a size of a picture is two whole numbers, at most 2^28 pixels');
@@ -446,15 +464,15 @@ function pixelsOf(width, height) {
 
 /** Writes a quoin_render_options. */
 function putRenderOptions(view, at, { width, height, samples = 4, camera, sun }) {
-  [width, height, int32(samples, 'samples')].forEach((value, i) => view.setInt32(at + 4 + 4 * i, value, true));
+  [width, height, whole32(samples, 'samples', 1)].forEach((value, i) => view.setInt32(at + 4 + 4 * i, value, true));
   const put = (flag, from, numbers) => {
     view.setInt32(at + flag, 1, true);
     numbers.forEach((value, i) => view.setFloat64(at + from + 8 * i, value, true));
   };
   if (camera !== undefined) {
-    const fovDegrees = camera?.fovDegrees ?? 45;
+    const { fovDegrees = 45 } = known(camera, ['position', 'lookAt', 'fovDegrees'], 'camera');
     if (typeof fovDegrees !== 'number') throw new QuoinError('invalid_argument', 'camera.fovDegrees is no number');
-    put(24, 32, [...three(camera?.position, 'camera.position'), ...three(camera?.lookAt, 'camera.lookAt'), fovDegrees]);
+    put(24, 32, [...three(camera.position, 'camera.position'), ...three(camera.lookAt, 'camera.lookAt'), fovDegrees]);
   }
   if (sun !== undefined) put(88, 96, three(sun, 'sun'));
 }
@@ -487,11 +505,12 @@ export class ShaderScene {
     return this.#instance.numbers(Uint8Array, view.getUint32(out, true), view.getUint32(out + 4, true));
   }
 
-  frame({ width = 1280, height = 720, ...options } = {}) {
+  frame(options = {}) {
     const of = this.#instance;
+    const { width = 1280, height = 720 } = known(options, renderNames);
     pixelsOf(width, height);
     return of.withStruct('renderOptions', (wanted) => of.with(8, (out) => {
-      putRenderOptions(of.view(), wanted, { width, height, ...options });
+      putRenderOptions(of.view(), wanted, { ...options, width, height });
       of.call('quoin_web_march_frame', this.#march, wanted, out, out + 4);
       return this.#taken(out);
     }));
@@ -511,6 +530,16 @@ export class ShaderScene {
     registry.unregister(this);
     this.#march = 0;
   }
+}
+
+/** `options`, whose names are all to be among `names`: one that is misspelt would do nothing. */
+function known(options, names, what = 'options') {
+  if (typeof options !== 'object' || options === null)
+    throw new QuoinError('invalid_argument', `${what} is to be an object of ${names.join(', ')}`);
+  const other = Object.keys(options).find((name) => !names.includes(name));
+  if (other !== undefined)
+    throw new QuoinError('invalid_argument', `${what}: ${other} is none of ${names.join(', ')}`);
+  return options;
 }
 
 /** A number of a grid, or of a sample; -1, which none has, for what is no number of one. */
@@ -542,9 +571,29 @@ function doubles(list) {
   });
 }
 
+/** Throws where `given` is no bytes, and says how they are had of what others give. */
+function checkBytes(given) {
+  if (!isBytes(given)) {
+    const kind = given === null || given === undefined ? String(given) : given.constructor?.name ?? typeof given;
+    const how = typeof given?.arrayBuffer === 'function' ? ': await its arrayBuffer()' :
+      typeof given?.then === 'function' ? ': await it' : '';
+    throw new QuoinError('invalid_argument', `bytes are an ArrayBuffer or a typed array, not ${kind}${how}`);
+  }
+  try {
+    new Uint8Array(given.buffer ?? given, 0, 0);
+  } catch {
+    throw new QuoinError('invalid_argument', 'these bytes are gone: their ArrayBuffer was transferred');
+  }
+}
+
+const loadNames = ['showHidden', 'frame', 'radius', 'iso', 'meshVoxels', 'voxelSize', 'raw', 'heights', 'small',
+                   'progress'];
+
 export async function load(bytes, options = {}) {
-  if (!isBytes(bytes)) throw new QuoinError('invalid_argument', 'bytes are an ArrayBuffer or a typed array');
-  if (options.small) {
+  checkBytes(bytes);
+  known(options, loadNames);
+  // What is said of the file itself, and not by it, the small module does not read.
+  if (options.small && options.raw === undefined && options.heights === undefined) {
     const scene = loaded(await small.alive(), bytes, options);
     if (scene !== undefined) return scene;
   }
@@ -555,16 +604,69 @@ export async function load(bytes, options = {}) {
 }
 
 /** The scene that a module reads; undefined where it does not read such files. */
-function loaded(of, bytes, { progress }) {
+function loaded(of, bytes, { progress, ...options }) {
   return of.withBytes(bytes, (at) => {
     if (of.isSmall && of.run('quoin_web_reads', at, bytes.byteLength) === 0) return undefined;
-    const handle = of.listened(progress, () => of.handle('quoin_scene_load_bytes', at, bytes.byteLength));
+    const handle = of.listened(progress, () => of.withStruct('loadOptions', (wanted) => {
+      putLoadOptions(of.view(), wanted, options);
+      return of.handle('quoin_scene_load_bytes_with', at, bytes.byteLength, wanted);
+    }));
     return new Scene(of, handle);
   });
 }
 
+const scalarNames = ['uint8', 'int8', 'uint16', 'int16', 'uint32', 'int32', 'uint64', 'int64', 'float32', 'float64'];
+const heightEncodings = ['none', 'grey', 'mapbox', 'terrarium'];
+
+/** The place of a name among others, of which the first `skipped` cannot be asked for. */
+function numberOf(name, names, what, skipped = 0) {
+  const found = names.indexOf(name);
+  if (found < skipped) throw new QuoinError('invalid_argument', `${what} is ${names.slice(skipped).join(', ')}`);
+  return found;
+}
+
+/** `value`, or 0, which stands for its default, where it is not given. */
+function amount(value, what) {
+  if (value === undefined) return 0;
+  if (typeof value !== 'number' || !(value > 0 && value < Infinity))
+    throw new QuoinError('invalid_argument', `${what} is to be a number above 0`);
+  return value;
+}
+
+function whole32(value, what, least) {
+  if (value === undefined) return 0;
+  if (int32(value, what) < least) throw new QuoinError('invalid_argument', `${what} is ${least} or more`);
+  return value;
+}
+
+/** Writes a quoin_load_options. */
+function putLoadOptions(view, at, { showHidden, frame, radius, iso, meshVoxels, voxelSize, raw, heights }) {
+  const ints = (from, ...values) => values.forEach((value, i) => view.setInt32(at + from + 4 * i, value, true));
+  const doubles = (from, ...values) => values.forEach((value, i) => view.setFloat64(at + from + 8 * i, value, true));
+  if (iso !== undefined && (typeof iso !== 'number' || !Number.isFinite(iso)))
+    throw new QuoinError('invalid_argument', 'iso is no number');
+  ints(8, showHidden ? 1 : 0, whole32(frame, 'frame', 0), whole32(radius, 'radius', 1), iso === undefined ? 0 : 1);
+  view.setFloat32(at + 24, iso ?? 0, true);
+  ints(28, whole32(meshVoxels, 'meshVoxels', 1));
+  doubles(32, amount(voxelSize, 'voxelSize'));
+  if (raw !== undefined) {
+    known(raw, ['shape', 'type', 'bigEndian'], 'raw');
+    const shape = three(raw.shape, 'raw.shape').map((length) => whole32(length, 'raw.shape', 1));
+    ints(40, ...shape, numberOf(raw.type ?? 'uint8', scalarNames, 'raw.type'), raw.bigEndian ? 1 : 0);
+  }
+  if (heights !== undefined) {
+    const { encoding, metresPerLevel, metresPerPixel, metresPerVoxel, exaggeration, groundDepth, smooth } =
+      known(heights, ['encoding', 'metresPerLevel', 'metresPerPixel', 'metresPerVoxel', 'exaggeration', 'groundDepth',
+                      'smooth'], 'heights');
+    ints(60, numberOf(encoding, heightEncodings, 'heights.encoding', 1));
+    doubles(64, amount(metresPerLevel, 'heights.metresPerLevel'), amount(metresPerPixel, 'heights.metresPerPixel'),
+            amount(metresPerVoxel, 'heights.metresPerVoxel'), amount(exaggeration, 'heights.exaggeration'));
+    ints(96, whole32(groundDepth, 'heights.groundDepth', 1), smooth ? 1 : 0);
+  }
+}
+
 /** Calls use(instance, the address of the array's description). */
-async function withArray(array, shape, { spacing = [1, 1, 1], origin = [0, 0, 0], progress } = {}, use) {
+async function withArray(array, shape, { spacing = [1, 1, 1], origin = [0, 0, 0], progress }, use) {
   const scalar = scalars.findIndex((Kind) => Kind !== null && array instanceof Kind);
   if (scalar < 0) throw new QuoinError('invalid_argument', 'the array is none of the typed arrays that are read');
   const [nx, ny, nz] = three(shape, 'shape');
@@ -585,12 +687,15 @@ async function withArray(array, shape, { spacing = [1, 1, 1], origin = [0, 0, 0]
 }
 
 export async function surfaceNets(array, shape, iso, options = {}) {
+  known(options, ['spacing', 'origin', 'solidBelow', 'progress']);
+  if (typeof iso !== 'number') throw new QuoinError('invalid_argument', 'iso is no number');
   return withArray(array, shape, options, (of, at) =>
-    of.takeMesh(of.handle('quoin_surface_nets', at, Number(iso), options.solidBelow ? 1 : 0, 0)));
+    of.takeMesh(of.handle('quoin_surface_nets', at, iso, options.solidBelow ? 1 : 0, 0)));
 }
 
 export async function meshLabels(array, shape, options = {}) {
-  const { background = 0, relaxationSteps = 4 } = options;
+  const { background = 0, relaxationSteps = 4 } =
+    known(options, ['spacing', 'origin', 'background', 'relaxationSteps', 'progress']);
   const isUnsigned = array instanceof BigUint64Array;
   const bits = isUnsigned ? BigInt.asUintN : BigInt.asIntN;
   const isWhole = typeof background === 'bigint' || Number.isSafeInteger(background);
@@ -603,6 +708,9 @@ export async function meshLabels(array, shape, options = {}) {
 }
 
 export async function toThree(scene, GLTFLoader, options = {}) {
+  if (!(scene instanceof Scene)) throw new QuoinError('invalid_argument', 'scene is none that load gave');
+  if (typeof GLTFLoader?.prototype?.parseAsync !== 'function')
+    throw new QuoinError('invalid_argument', 'GLTFLoader is to be the class in three/addons/loaders/GLTFLoader.js');
   return (await new GLTFLoader().parseAsync(scene.glb(options).buffer, '')).scene;
 }
 

@@ -2,6 +2,7 @@
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import { closeGapsOf, setPictureHeight } from './gaps.js';
 import { isDrawnByProgram, PlainModel, prepare } from './plain.js';
 
 const $ = (id) => document.getElementById(id);
@@ -26,7 +27,7 @@ tape.renderOrder = 1;
 tape.visible = false;
 stage.add(sky, sun, sun.target, tape);
 
-let file;      // { name, bytes }
+let file;      // { name, bytes, heights }
 let model;     // what is shown of it
 let plain;     // the same, plainly; where a program draws
 let glb;       // its bytes
@@ -67,7 +68,7 @@ function newWorker() {
     for (const { reject } of jobs.values()) reject(new Error(text));
     jobs = new Map();
   };
-  if (file) ask('keep', { bytes: file.bytes }).catch(() => {});  // `load` says why
+  if (file) ask('keep', { bytes: file.bytes, heights: file.heights }).catch(() => {});  // `load` says why
 }
 
 /** tell: told how far it has come, where that takes long. */
@@ -83,7 +84,7 @@ function ask(name, options, tell) {
 let rest;  // the timer after which what was drawn plainly is drawn well
 
 function draw() {
-  frame = 0;
+  forgetFrame();
   clearTimeout(rest);
   rest = undefined;
   plain?.show(false);
@@ -92,15 +93,28 @@ function draw() {
   renderer.render(marched?.isShown ? tape : stage, camera);
 }
 
+/** Who draws now need not once more with the next frame. */
+function forgetFrame() {
+  cancelAnimationFrame(frame);
+  frame = 0;
+}
+
 /** Draws at once, on a program plainly until nothing has changed for a while. */
 function drawSoon() {
   if (!isSlow || marched?.isShown) return draw();
-  frame = 0;
+  forgetFrame();
   plain?.show(true);
   sun.castShadow = false;
   renderer.render(stage, camera);
+  if (plain) drawWellLater();
+}
+
+/** Draws well where nothing changes for a while after the plain picture is there, however long that takes. */
+async function drawWellLater() {
   clearTimeout(rest);
-  rest = plain && setTimeout(draw, 600);
+  const wanted = rest = setTimeout(() => {}, 0);
+  await pictureIsThere();
+  if (rest === wanted) rest = setTimeout(draw, 600);
 }
 
 function redraw() {
@@ -143,7 +157,7 @@ async function marchedView() {
     ask, below: canvas,
     view: () => {
       const ratio = Math.min(devicePixelRatio, 2);
-      return viewOf(Math.floor(innerWidth * ratio), Math.floor(innerHeight * ratio));
+      return viewOf(Math.floor(canvas.clientWidth * ratio), Math.floor(canvas.clientHeight * ratio));
     },
     shown: (facts) => {
       const { by, width, height, milliseconds, samples } = facts;
@@ -164,8 +178,9 @@ function changed() {
 
 function resize() {
   renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-  renderer.setSize(innerWidth, innerHeight, false);
-  camera.aspect = innerWidth / innerHeight;
+  renderer.setSize(canvas.clientWidth, canvas.clientHeight, false);
+  setPictureHeight(renderer, canvas.height);
+  camera.aspect = canvas.clientWidth / canvas.clientHeight;
   camera.updateProjectionMatrix();
   changed();
 }
@@ -223,9 +238,25 @@ function untilTheNext() {
   return () => now === openings;
 }
 
+/** For GLTFLoader, which would fetch the pictures that lie in the file it was given. */
+function picturesFromMemory(parser) {
+  const picture = async ({ bufferView, mimeType }) => {
+    const blob = new Blob([await parser.getDependency('bufferView', bufferView)], { type: mimeType });
+    const texture = new THREE.Texture(await createImageBitmap(blob, { premultiplyAlpha: 'none' }));
+    texture.needsUpdate = true;
+    return texture;
+  };
+  return {
+    name: 'pictures from memory',
+    async beforeRoot() {
+      (parser.json.images ?? []).forEach((image, i) => { parser.sourceCache[i] = picture(image); });
+    },
+  };
+}
+
 /** False where another file was chosen meanwhile, and nothing was done. */
 async function show(bytes, isCurrent) {
-  const { scene } = await new GLTFLoader().parseAsync(bytes.buffer, '');
+  const { scene } = await new GLTFLoader().register(picturesFromMemory).parseAsync(bytes.buffer, '');
   if (!isCurrent()) return false;
   plain?.dispose();
   model?.removeFromParent();
@@ -240,6 +271,7 @@ async function show(bytes, isCurrent) {
     object.castShadow = !object.material.transparent;
     object.receiveShadow = true;
   });
+  closeGapsOf(model);
   stage.add(model);
   if (isSlow) plain = new PlainModel(model);
   const box = new THREE.Box3().setFromObject(model);
@@ -253,26 +285,46 @@ async function show(bytes, isCurrent) {
   return true;
 }
 
+const isPng = (bytes) => bytes.byteLength >= 8 && new DataView(bytes).getUint32(0) === 0x89504e47;
+
+/** How a picture has heights, which it does not say itself; undefined where nobody wants to say it. */
+async function heightsOf(name) {
+  const dialog = $('heights');
+  dialog.querySelector('h2').textContent = name;
+  dialog.returnValue = '';
+  if (!dialog.open) dialog.showModal();
+  await new Promise((done) => dialog.addEventListener('close', done, { once: true }));
+  if (dialog.returnValue !== 'read') return undefined;
+  return { encoding: $('encoding').value, metresPerPixel: $('metres').valueAsNumber };
+}
+
 async function open(name, bytes, isCurrent) {
+  const heights = isPng(bytes) ? await heightsOf(name) : $('heights').close('');
+  if (!isCurrent()) return;
+  if (isPng(bytes) && heights === undefined) return say('');
   const began = performance.now();
   say(`Reading ${name} ...`);
   marched?.stop();
   if (jobs.size > 0 || worker.hasFailed) newWorker();
   try {
-    const answer = await ask('load', { bytes }, (fraction) => say(`Reading ${name}: ${percent(fraction)} ...`));
+    const tell = (fraction) => say(`Reading ${name}: ${percent(fraction)} ...`);
+    const answer = await ask('load', { bytes, heights }, tell);
     if (!await show(answer.glb.slice(), isCurrent)) return;
     glb = answer.glb;
-    file = { name, bytes };
+    file = { name, bytes, heights };
+    describe(name, answer);
+    resize();
     home();
     viewFromText(location.hash);
     drawSoon();
-    describe(name, answer);
     await pictureIsThere();
     if (!isCurrent()) return;
     const total = performance.now() - began;
     if (isPressed('rays')) march();
-    say(`${name}: read in ${answer.milliseconds.load.toFixed(0)} ms, meshed in ${
-      answer.milliseconds.mesh.toFixed(0)} ms, on the screen in ${total.toFixed(0)} ms.`);
+    const { load, mesh } = answer.milliseconds;
+    say(isEmpty(answer) ? `${name}: read, but nothing in it is solid.` :
+      `${name}: read in ${load.toFixed(0)} ms, meshed in ${mesh.toFixed(0)} ms, on the screen in ${
+        total.toFixed(0)} ms.`);
     window.quoinPage = { ...answer.milliseconds, total };
   } catch (error) {
     if (!isCurrent()) return;
@@ -283,17 +335,24 @@ async function open(name, bytes, isCurrent) {
   }
 }
 
+const isEmpty = ({ grids }) => grids.every((grid) => grid.voxels === 0 && !grid.hasField);
+const counted = (count, one, many) => `${count.toLocaleString()} ${count === 1 ? one : many}`;
+
 function describe(name, { grids, types, warnings }) {
+  document.body.classList.add('full');
   $('welcome').hidden = true;
   $('panel').hidden = false;
   $('name').textContent = name;
   const voxels = grids.reduce((sum, grid) => sum + grid.voxels, 0);
   const fields = grids.filter((grid) => grid.hasField).length;
-  $('facts').textContent = `${voxels.toLocaleString()} voxels, ${grids.length.toLocaleString()} grids${
-    fields ? ` (${fields} with a surface)` : ''}, ${types} colours`;
+  $('facts').textContent = [
+    ...(voxels > 0 || fields === 0 ? [counted(voxels, 'voxel', 'voxels')] : []),
+    ...(fields > 0 ? [counted(fields, 'surface', 'surfaces')] : []),
+    counted(grids.length, 'grid', 'grids'), counted(types, 'colour', 'colours')].join(', ');
   $('smooth').checked = fields > 0;
   $('warnings').hidden = warnings.length === 0;
-  $('warnings').querySelector('summary').textContent = `Left out: ${warnings.length}`;
+  $('warnings').open = isEmpty({ grids });  // they say why
+  $('warnings').querySelector('summary').textContent = counted(warnings.length, 'note', 'notes');
   $('warnings').querySelector('ul').replaceChildren(...warnings.map((text) => {
     const line = document.createElement('li');
     line.textContent = text;
@@ -301,8 +360,15 @@ function describe(name, { grids, types, warnings }) {
   }));
 }
 
+// The module's memory holds less in one piece, and browsers give no more.
+const tooManyBytes = 2 ** 31;
+
 async function openFile(chosen) {
   if (chosen === undefined || chosen === null) return;
+  if (chosen.size >= tooManyBytes) {
+    const gigabytes = (chosen.size / 1e9).toFixed(1);
+    return say(`${chosen.name}: a file of ${gigabytes} GB; the page reads less than 2.1 GB.`, true);
+  }
   ++openings;
   const isCurrent = untilTheNext();
   try {
@@ -345,7 +411,7 @@ async function givePicture({ width, height, rgba }) {
 
 // ---- Measuring: two points of surfaces.
 function measure(x, y) {
-  const pointer = new THREE.Vector2(2 * x / innerWidth - 1, 1 - 2 * y / innerHeight);
+  const pointer = new THREE.Vector2(2 * x / canvas.clientWidth - 1, 1 - 2 * y / canvas.clientHeight);
   const ray = new THREE.Raycaster();
   ray.setFromCamera(pointer, camera);
   const hit = ray.intersectObject(model, true)[0];
@@ -398,7 +464,9 @@ const keys = {
   r: () => $('rays').click(), m: () => $('measure').click(), h: home, o: () => $('other').click(),
 };
 addEventListener('keydown', (event) => {
-  if (event.target.tagName === 'INPUT' || event.ctrlKey || event.metaKey || event.altKey) return;
+  if ($('heights').open || event.ctrlKey || event.metaKey || event.altKey) return;
+  // Sliders have arrows of their own; no input takes letters.
+  if (event.target.tagName === 'INPUT' && event.key.startsWith('Arrow')) return;
   const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
   if (!act || !model) return;
   event.preventDefault();
@@ -422,7 +490,11 @@ addEventListener('dragleave', () => document.body.classList.remove('over'));
 addEventListener('drop', (event) => {
   event.preventDefault();
   document.body.classList.remove('over');
-  openFile(event.dataTransfer.files[0]);
+  const { files, items } = event.dataTransfer;
+  if (files.length !== 1) return say(`Drop one file; here are ${files.length || 'none'}.`, true);
+  if (items[0]?.webkitGetAsEntry?.()?.isDirectory)
+    return say(`${files[0].name} is a folder. Worlds in folders are not read here; drop one file.`, true);
+  openFile(files[0]);
 });
 $('measure').addEventListener('click', () => {
   $('measure').setAttribute('aria-pressed', String(!isMeasuring()));
@@ -437,6 +509,7 @@ async function march() {
   window.quoinMarched = undefined;
   if (!isPressed('rays')) {
     marched?.stop();
+    say('');
     redraw();
     return;
   }
@@ -488,7 +561,7 @@ $('march').addEventListener('click', async () => {
   const began = performance.now();
   try {
     const tell = (fraction) => say(`Drawing by rays, on one thread: ${percent(fraction)} ...`);
-    await givePicture(await ask('march', { ...viewOf(innerWidth, innerHeight), samples: 4 }, tell));
+    await givePicture(await ask('march', { ...viewOf(canvas.clientWidth, canvas.clientHeight), samples: 4 }, tell));
     say(`Drawn in ${((performance.now() - began) / 1000).toFixed(1)} s.`);
   } catch (error) {
     say(error.message, true);
@@ -508,5 +581,7 @@ addEventListener('hashchange', () => model && viewFromText(location.hash));
 newWorker();
 resize();
 const asked = new URLSearchParams(location.search).get('file');
+if (location.hash.includes('camera='))
+  $('invitation').textContent = 'This link has a view of a file: drop the same file here. It stays on this machine.';
 if (asked) openAddress(asked);
 if (isSlow) prepare(renderer, stage, camera);

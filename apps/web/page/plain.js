@@ -1,6 +1,7 @@
 // Plain pictures, for where a program draws in place of a graphics card: without shadows, gloss and what is behind
 // glass they take it a tenth of the time.
 import * as THREE from 'three';
+import { closeGaps } from './gaps.js';
 
 /** Whether a program draws. */
 export function isDrawnByProgram() {
@@ -14,10 +15,12 @@ export function isDrawnByProgram() {
 function plainOf(material) {
   const { map, color, vertexColors, alphaTest, depthWrite, side, emissive, emissiveMap, emissiveIntensity } = material;
   const through = material.transmission ?? 0;  // of the light; half of it counts, by eye
-  return new THREE.MeshLambertMaterial({
+  const plain = new THREE.MeshLambertMaterial({
     map, color, vertexColors, alphaTest, depthWrite, side, emissive, emissiveMap, emissiveIntensity,
     transparent: material.transparent || through > 0, opacity: material.opacity * (1 - through / 2),
   });
+  if (material.userData.hasClosedGaps) closeGaps(plain);
+  return plain;
 }
 
 /** A model that is drawn plainly or as it is. Materials that parts share stay shared. */
@@ -55,8 +58,9 @@ export function prepare(renderer, stage, camera) {
   const map = new THREE.DataTexture(new Uint8Array(4), 1, 1);
   map.colorSpace = THREE.SRGBColorSpace;
   map.needsUpdate = true;
-  const materials = [false, true].map((transparent) =>
-    new THREE.MeshLambertMaterial({ map, vertexColors: true, transparent }));
+  const kinds = [{}, { transparent: true }, { emissive: 0xffffff, emissiveMap: map }];
+  const materials = kinds.map((kind) => new THREE.MeshLambertMaterial({ map, vertexColors: true, ...kind }));
+  materials.forEach(closeGaps);
   const triangles = materials.map((material) => new THREE.Mesh(geometry, material));
   for (const triangle of triangles) triangle.frustumCulled = false;
   stage.add(...triangles);

@@ -22,12 +22,13 @@ async function prepare() {
 prepare().catch(() => {});  // `load` says why
 
 let file;     // the bytes of what is shown
+let heights;  // how it has heights, where it is a picture
 let scene;    // of them; undefined where its instance ended, or a later file could not be read
 let shaders;  // of it, in the module that does everything; what WebGPU marches it by
 
 async function current() {
   if (file === undefined) throw new Error('there is no file yet');
-  scene ??= await load(file, { small: true });
+  scene ??= await load(file, { small: true, heights });
   return scene;
 }
 
@@ -35,7 +36,7 @@ async function current() {
 async function wholeScene() {
   const now = await current();
   if (!now.isSmall) return now;
-  const whole = await load(file);
+  const whole = await load(file, { heights });
   now.free();
   scene = whole;
   return whole;
@@ -51,14 +52,14 @@ const samplesOfAPixel = 16;
 
 const work = {
   /** What the page shows, for a worker that comes in place of another. */
-  async keep({ bytes }) {
-    file = bytes;
+  async keep(kept) {
+    ({ bytes: file, heights } = kept);
     return {};
   },
-  async load({ bytes, smooth }, tell) {
+  async load({ bytes, smooth, heights: asHeights }, tell) {
     forget();
     const began = performance.now();
-    const made = await load(bytes, { small: true, progress: (fraction) => tell(fraction / 2) });
+    const made = await load(bytes, { small: true, heights: asHeights, progress: (fraction) => tell(fraction / 2) });
     const loaded = performance.now();
     const progress = (fraction) => tell(0.5 + fraction / 2);
     let glb;
@@ -69,6 +70,7 @@ const work = {
       throw error;
     }
     file = bytes;
+    heights = asHeights;
     scene = made;
     return { glb, warnings: scene.warnings, grids: scene.grids, types: scene.types.length - 1,
              milliseconds: { load: loaded - began, mesh: performance.now() - loaded } };

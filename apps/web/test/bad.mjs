@@ -6,7 +6,8 @@ import { pathToFileURL } from 'node:url';
 import { check, found, refusing } from './checks.mjs';
 
 const [packageFolder, goodFile] = process.argv.slice(2);
-const { load, start, surfaceNets, QuoinError, version } = await import(pathToFileURL(join(packageFolder, 'quoin.js')));
+const { load, meshLabels, start, surfaceNets, toThree, QuoinError, version } =
+  await import(pathToFileURL(join(packageFolder, 'quoin.js')));
 const good = new Uint8Array(readFileSync(goodFile));
 const before = (await load(good)).glb();
 const refuses = refusing(QuoinError);
@@ -29,6 +30,23 @@ await refuses('a module that is nowhere', () => start('file:///nowhere/quoin.was
 await refuses('a module of no address', () => start('quoin://nowhere'), 'cannot_read');
 await refuses('nothing', () => load(new Uint8Array(0)));
 await refuses('a string', () => load('castle.vox'), 'invalid_argument');
+/** That the message says what helps. */
+async function tells(what, work, words) {
+  try {
+    await work();
+    check(false, `${what}: no error`);
+  } catch (error) {
+    check(error instanceof QuoinError && error.code === 'invalid_argument' && words.test(error.message),
+          `${what}: ${error}`);
+  }
+}
+await tells('a file of the browser', () => load(new Blob([good])), /not Blob: await its arrayBuffer\(\)/);
+await tells('a response', () => load(new Response(good)), /not Response: await its arrayBuffer\(\)/);
+await tells('a promise', () => load(Promise.resolve(good)), /not Promise: await it/);
+await tells('nothing at all', () => load(), /not undefined/);
+const gone = good.slice();
+structuredClone(gone.buffer, { transfer: [gone.buffer] });
+for (const bytes of [gone, gone.buffer]) await tells('bytes that are gone', () => load(bytes), /transferred/);
 await refuses('noise', () => load(Uint8Array.from({ length: 4096 }, () => 256 * random())));
 await refuses('no JSON', () => load(new TextEncoder().encode('{"quoin_scene": 1, "grids": [')));
 for (const size of [4, 8, 20, 60, good.length >> 1, good.length - 1])
@@ -71,12 +89,38 @@ await refuses('a fraction of a grid', () => scene.mesh(0.5), 'invalid_argument')
 await refuses('no extension', () => scene.file('.xyz'), 'unsupported');
 await refuses('a picture without a size', () => scene.render({ width: 0 }), 'invalid_argument');
 await refuses('a camera nowhere', () => scene.render({ camera: { position: [NaN, 0, 0], lookAt: [0, 0, 0] } }));
+for (const extension of [undefined, null, 3, '', 'glb', '.obj', '.json', '.quoin'])
+  await refuses(`files of the kind ${extension}`, () => scene.file(extension), 'unsupported');
+// Options that are misspelt, or none.
+const eight = new Uint8Array(8);
+const cube = [2, 2, 2];
+const takesOptions = {
+  load: (options) => load(good, options), start: (options) => start(undefined, options),
+  raw: (raw) => load(eight, { raw: { shape: cube, ...raw } }),
+  glb: (options) => scene.glb(options), file: (options) => scene.file('.ply', options),
+  mesh: (options) => scene.mesh(0, options), render: (options) => scene.render(options),
+  camera: (camera) => scene.render({ width: 8, height: 8, camera }), shaders: (options) => shaders.frame(options),
+  heights: (heights) => load(good, { heights }), rays: (options) => scene.rays([0, 9, 0], [0, -1, 0], options),
+  surfaceNets: (options) => surfaceNets(eight, cube, 0, options),
+  meshLabels: (options) => meshLabels(eight, cube, options),
+};
 // What is written into the module is of the length and kind that it has there.
 const small = { width: 16, height: 8 };
 const picture = () => Buffer.from(scene.render(small).rgba);
 const pictureBefore = picture();
 const shaders = scene.forShaders();
 const [here, there] = [[0, 9, 9], [0, 0, 0]];
+for (const [what, call] of Object.entries(takesOptions)) {
+  await tells(`${what}, misspelt`, async () => call({ watertigt: true }), /watertigt is none of \w+/);
+  if (what === 'raw') continue;  // of which these would be spread into an object
+  for (const none of [null, 3, 'small'])
+    await tells(`${what}: ${none}`, async () => call(none), /is to be an object of/);
+}
+await tells('no loader', () => toThree(scene), /GLTFLoader is to be the class/);
+await tells('a loader that is an object', () => toThree(scene, { parseAsync() {} }), /GLTFLoader is to be the class/);
+await tells('no scene', () => toThree(undefined, class { async parseAsync() {} }), /scene is none/);
+for (const iso of [null, '0', 1n, undefined, {}])
+  await tells(`an iso of ${iso}`, () => surfaceNets(eight, cube, iso), /iso is no number/);
 const noThree = { 'nothing': null, 'a number': 3, 'an object': { x: 1, y: 1, z: 1 }, 'one number': [1],
                   'two numbers': [1, 2], 'four numbers': [1, 1, 1, 1], '64 numbers': Array(64).fill(1),
                   'two million numbers': Array(2e6).fill(1), 'texts': ['a', 'b', 'c'], 'a text': 'abc',
@@ -101,7 +145,7 @@ for (const camera of [null, 3, {}, { position: here }, { lookAt: there },
   await refuses(`a camera of ${JSON.stringify(camera)}`, () => scene.render({ ...small, camera }), 'invalid_argument');
 for (const sun of [[NaN, 1, 1], [0, 0, 0]])
   await refuses(`a sun at ${sun}`, () => scene.render({ ...small, sun }), 'invalid_argument');
-for (const samples of ['many', 0.5, -1, NaN, 2 ** 31, 2 ** 32 + 1])
+for (const samples of ['many', 0.5, 0, -1, NaN, 2 ** 31, 2 ** 32 + 1])
   await refuses(`${samples} samples`, () => scene.render({ ...small, samples }), 'invalid_argument');
 await refuses('a width that is a big integer', () => scene.render({ width: 8n, height: 8 }), 'invalid_argument');
 for (const number of [-1, 2 ** 31, 2 ** 32, '0']) {

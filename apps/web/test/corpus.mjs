@@ -14,7 +14,7 @@ const scratch = mkdtempSync(join(tmpdir(), 'quoin-web-'));
 /** What the module says that it lacks, as its libraries or the files beside the one that was given; else undefined. */
 function lacks(message) {
   if (/only from a path|beside it/.test(message)) return 'files beside them';
-  return /LZ4|without (tinyobjloader|tinygltf|meshoptimizer)/.exec(message)?.[0].replace('without ', '');
+  return /LZ4|without (tinyobjloader|tinygltf)/.exec(message)?.[0].replace('without ', '');
 }
 
 function filesBelow(path) {

@@ -1,11 +1,12 @@
-// The npm package as a user gets it: installed in an empty folder, compiled with strict types, run.
-//   node package.mjs QUOIN.tgz TSC FILE
+// The npm package as a user gets it: installed in an empty folder, compiled with strict types, run, bundled.
+//   node package.mjs QUOIN.tgz TSC FILE ESBUILD
 import { execFileSync } from 'node:child_process';
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { cpSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
+import { pathToFileURL } from 'node:url';
 
-const [tarball, tsc, file] = process.argv.slice(2).map((path) => resolve(path));
+const [tarball, tsc, file, esbuild] = process.argv.slice(2).map((path) => resolve(path));
 const folder = mkdtempSync(join(tmpdir(), 'quoin-package-'));
 const run = (program, ...args) => execFileSync(program, args, { cwd: folder, stdio: ['ignore', 'pipe', 'inherit'] });
 
@@ -13,12 +14,15 @@ writeFileSync(join(folder, 'package.json'), '{"type": "module", "private": true}
 run('npm', 'install', '--silent', '--no-audit', '--no-fund', '--offline', tarball);
 writeFileSync(join(folder, 'use.ts'), `
 import { load, meshLabels, start, surfaceNets, toThree, QuoinError } from 'quoin';
-import type { ErrorCode, Hits, LabelMesh, Mesh, Scene } from 'quoin';
+import type { ErrorCode, Heights, Hits, LabelMesh, LoadOptions, Mesh, Scene } from 'quoin';
 
 export async function use(bytes: Uint8Array): Promise<number> {
   await start(undefined, { small: true });
-  const scene: Scene = await load(bytes, { small: true, progress: (fraction) => fraction < 2 });
-  const glb: Uint8Array = scene.glb({ smooth: false });
+  const scene: Scene = await load(bytes, { small: true, frame: 2, progress: (fraction) => fraction < 2 });
+  const glb: Uint8Array = scene.glb({ smooth: false, watertight: true });
+  const heights: Heights = { encoding: 'grey', metresPerPixel: 2 };
+  const options: LoadOptions = bytes.length === 8 ? { raw: { shape: [2, 2, 2], type: 'uint8' }, iso: 3 } : { heights };
+  await load(bytes, options);
   const mesh: Mesh = await surfaceNets(new Float32Array(8), [2, 2, 2], 0.5, { spacing: [1, 1, 2] });
   const picture = scene.render({ width: 8, height: 8, camera: { position: [1, 2, 3], lookAt: [0, 0, 0] } });
   const hits: Hits = scene.rays([0, 9, 0], new Float32Array([0, -1, 0]), { maxT: 20 });
@@ -38,6 +42,8 @@ export async function use(bytes: Uint8Array): Promise<number> {
 }
 // @ts-expect-error: bytes, not a path
 void load('castle.vox');
+// @ts-expect-error: no type of numbers
+void load(new Uint8Array(8), { raw: { shape: [2, 2, 2], type: 'int12' } });
 // @ts-expect-error: labels are whole numbers
 void meshLabels(new Float32Array(8), [2, 2, 2]);
 `);
@@ -51,8 +57,18 @@ if (scene.glb().length < 1000 || scene.grids.length === 0) process.exit(1);
 console.log(\`package: \${scene.grids.length} grids, a GLB of \${scene.glb().length} bytes\`);
 `);
 process.stdout.write(run(process.execPath, 'use.mjs', file));
+// Bundled for browsers, where there is nothing of Node.js, with the modules beside what is made.
+writeFileSync(join(folder, 'page.mjs'), `
+import { load } from 'quoin';
+export const lengthOfGlb = async (bytes) => (await load(bytes)).glb().length;
+`);
+run(esbuild, 'page.mjs', '--bundle', '--minify', '--format=esm', '--platform=browser', '--log-level=error',
+    '--outfile=bundled/page.mjs');
+cpSync(join(folder, 'node_modules/quoin/quoin.wasm'), join(folder, 'bundled/quoin.wasm'));
+const { lengthOfGlb } = await import(pathToFileURL(join(folder, 'bundled/page.mjs')));
+console.log(`bundled: a GLB of ${await lengthOfGlb(readFileSync(file))} bytes`);
 const licences = readFileSync(join(folder, 'node_modules/quoin/LICENSES'), 'utf8');
 for (const name of ['zlib', 'libpng', 'LLVM', 'wasi-libc', 'GLM', 'nlohmann-json', 'robin-map', 'tl::expected',
-                    'tinygltf', 'tinyobjloader'])
+                    'tinygltf', 'tinyobjloader', 'meshoptimizer'])
   if (!licences.includes(`======== ${name}`)) throw new Error(`the package does not have the licence of ${name}`);
 rmSync(folder, { recursive: true });

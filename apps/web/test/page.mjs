@@ -1,11 +1,11 @@
 // The page in a headless Chromium, on a server of static files, as a user handles it.
-//   node page.mjs PAGE FILE.vox NATIVE.glb PICTURE.png
+//   node page.mjs PAGE FILE.vox NATIVE.glb PICTURE.png CORPUS
 import { readFile, writeFile } from 'node:fs/promises';
 import { basename, join } from 'node:path';
 import { headless, requirements, serve } from '../../../tests/web/browser.mjs';
 import { checkAloud as check, found } from './checks.mjs';
 
-const [page, file, nativeGlb, picture] = process.argv.slice(2);
+const [page, file, nativeGlb, picture, corpus] = process.argv.slice(2);
 const { chromium, launcher } = await requirements('skipped, the page only');
 const server = await serve((path) => (path === '/castle.vox' ? file : join(page, path === '/' ? 'index.html' : path)));
 const site = `http://127.0.0.1:${server.address().port}/`;
@@ -14,6 +14,15 @@ function oneVoxel() {
   const id = (name) => Buffer.from(name).readUInt32LE();
   return Buffer.from(Uint32Array.of(id('VOX '), 150, id('MAIN'), 0, 44, id('SIZE'), 12, 0, 1, 1, 1,
                                     id('XYZI'), 8, 0, 1, 1 << 24).buffer);
+}
+
+/** A volume: a ball, or nothing but `value`. */
+function ball(value) {
+  const n = 16;
+  const samples = Buffer.from(Uint8Array.from({ length: n ** 3 }, (_, i) =>
+    value ?? Math.max(0, 200 - 20 * Math.hypot(i % n - 8, Math.floor(i / n) % n - 8, Math.floor(i / n / n) - 8))));
+  const header = `NRRD0004\ntype: uint8\ndimension: 3\nsizes: ${n} ${n} ${n}\nencoding: raw\n\n`;
+  return Buffer.concat([Buffer.from(header), samples]);
 }
 
 const browser = await launcher.launch({
@@ -30,6 +39,18 @@ try {
   const status = () => tab.textContent('#status');
   const shown = (name) => tab.waitForFunction(
     (text) => document.querySelector('#status').textContent.startsWith(`${text}: `), name, { timeout: 60_000 });
+
+  // Drops them, as a hand does.
+  const drop = async (...files) => {
+    const contents = files.map(({ name, bytes }) => ({ name, text: bytes.toString('base64') }));
+    const dropped = await tab.evaluateHandle((given) => {
+      const transfer = new DataTransfer();
+      for (const { name, text } of given)
+        transfer.items.add(new File([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))], name));
+      return transfer;
+    }, contents);
+    await tab.dispatchEvent('body', 'drop', { dataTransfer: dropped });
+  };
 
   await tab.goto(site);
   await tab.setInputFiles('#file', file);
@@ -53,6 +74,34 @@ try {
   const first = await colours();
   check(first.counted > 100, `the picture has ${first.counted} colours`);
   if (picture) await writeFile(picture, first.shot);
+
+  // Pixels unlike all their neighbours: what is behind shows there between faces of several sizes.
+  const lonely = (shot) => tab.evaluate(async (bytes) => {
+    const bitmap = await createImageBitmap(new Blob([new Uint8Array(bytes)]));
+    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+    context.drawImage(bitmap, 0, 0);
+    const { data, width, height } = context.getImageData(100, 60, 850, 560);
+    const steps = [-1, 0, 1].flatMap((y) => [-1, 0, 1].map((x) => 4 * (y * width + x))).filter((step) => step !== 0);
+    const differ = (one, other) => Math.max(...[0, 1, 2].map((k) => Math.abs(data[one + k] - data[other + k]))) > 60;
+    let count = 0;
+    for (let y = 1; y < height - 1; ++y) {
+      for (let x = 1; x < width - 1; ++x) {
+        const at = 4 * (y * width + x);
+        count += steps.every((step) => differ(at, at + step)) ? 1 : 0;
+      }
+    }
+    return count;
+  }, [...shot]);
+  const gaps = await lonely(first.shot);
+  const open = await browser.newPage({ viewport: { width: 1280, height: 720 } });
+  const script = await readFile(join(page, 'page.js'), 'utf8');
+  await open.route('**/page.js', (route) => route.fulfill({
+    contentType: 'text/javascript', body: script.replace('mvPosition.xyz += 1.414', 'mvPosition.xyz += 0.0') }));
+  await open.goto(`${site}?file=castle.vox`);
+  await open.waitForFunction(() => window.quoinPage !== undefined, undefined, { timeout: 60_000 });
+  const gapsBefore = await lonely(await open.screenshot());
+  await open.close();
+  check(gaps < 30 && gapsBefore > 60, `pixels unlike all their neighbours: ${gaps}; faces as they are: ${gapsBefore}`);
 
   const download = async (button, timeout = 60_000) => {
     const [got] = await Promise.all([tab.waitForEvent('download', { timeout }), tab.click(button)]);
@@ -81,6 +130,8 @@ try {
   check(/#camera=.*&at=.*&sun=/.test(link), `the link: ${link.slice(site.length)}`);
 
   const other = await browser.newPage({ viewport: { width: 1280, height: 720 } });
+  await other.goto(link);
+  check(/drop the same file/.test(await other.textContent('#invitation')), 'a link says what to drop');
   await other.goto(link.replace('/#', '/?file=castle.vox#'));
   await other.waitForFunction(() => window.quoinPage !== undefined, undefined, { timeout: 60_000 });
   await other.click('#share');
@@ -99,11 +150,52 @@ try {
   await tab.setInputFiles('#other', file);
   await tab.setInputFiles('#other', { name: 'one.vox', mimeType: '', buffer: oneVoxel() });
   await shown('one.vox');
+  const facts = await tab.textContent('#facts');
+  check(/^1 voxel, 1 grid, \d+ colours$/.test(facts), `of one voxel: ${facts}`);
   await tab.waitForTimeout(1_500);
   check(await tab.textContent('#name') === 'one.vox' && /^one.vox: /.test(await status()),
         `of two files the last is shown: ${await status()}`);
   await tab.setInputFiles('#other', file);
   await shown(basename(file));
+
+  await drop({ name: 'a.vox', bytes: oneVoxel() }, { name: 'b.vox', bytes: oneVoxel() });
+  check(/one file; here are 2/.test(await status()), `two files: ${await status()}`);
+  await drop();
+  check(/one file; here are none/.test(await status()), `no file: ${await status()}`);
+  await tab.evaluate(() => {
+    const large = new File(['VOX '], 'large.vox');
+    Object.defineProperty(large, 'size', { value: 5e9 });
+    Object.defineProperty(document.querySelector('#other'), 'files', { value: [large], configurable: true });
+    document.querySelector('#other').dispatchEvent(new Event('change'));
+    delete document.querySelector('#other').files;
+  });
+  check(/large.vox: a file of 5.0 GB/.test(await status()), `a file without end: ${await status()}`);
+  // A picture is asked how it has heights.
+  const picture8 = await readFile(join(corpus, 'heights/grey_8_bits.png'));
+  await drop({ name: 'hill.png', bytes: picture8 });
+  await tab.waitForSelector('#heights[open]');
+  await tab.keyboard.press('Escape');
+  check(await tab.textContent('#name') === basename(file), 'of a picture that nobody tells of nothing is shown');
+  await drop({ name: 'hill.png', bytes: picture8 });
+  await tab.waitForSelector('#heights[open]');
+  await tab.fill('#metres', '2');
+  await tab.click('#heights button[value=read]');
+  await shown('hill.png');
+  check(/ voxels, 1 grid, /.test(await tab.textContent('#facts')), `heights: ${await tab.textContent('#facts')}`);
+  check((await download('#march', 300_000)).name === 'hill.png', 'which the whole module reads the same');
+  await drop({ name: 'ball.nrrd', bytes: ball() });
+  await shown('ball.nrrd');
+  check(/^1 surface, 1 grid, /.test(await tab.textContent('#facts')), `a volume: ${await tab.textContent('#facts')}`);
+  await drop({ name: 'nothing.nrrd', bytes: ball(0) });
+  await shown('nothing.nrrd');
+  check(/nothing in it is solid/.test(await status()), `nothing to see: ${await status()}`);
+  await tab.setInputFiles('#other', file);
+  await shown(basename(file));
+  await tab.focus('#around');
+  await tab.keyboard.press('ArrowRight');
+  await tab.keyboard.press('m');
+  check(await tab.getAttribute('#measure', 'aria-pressed') === 'true', 'letters are keys where a slider has the focus');
+  await tab.keyboard.press('m');
 
   const broken = await browser.newPage();
   await broken.route('**/worker.js', (route) => route.fulfill({ status: 404 }));
@@ -116,6 +208,8 @@ try {
   await tab.setViewportSize({ width: 390, height: 800 });
   await tab.waitForTimeout(300);
   if (picture) await writeFile(picture.replace(/\.png$/, '-phone.png'), await tab.screenshot());
+  const [view, panel] = [await tab.locator('#view').boundingBox(), await tab.locator('#panel').boundingBox()];
+  check(view.height > 400 && view.y + view.height <= panel.y + 1, 'on a phone the view lies above the panel');
   for (const name of ['LICENSE', 'LICENSES', 'LICENSE.three', 'NOTICE'])
     check((await tab.request.get(site + name)).ok(), `${name} lies beside the page`);
   check(elsewhere.length === 0, `no request to anywhere else${elsewhere.map((url) => ` ${url}`)}`);

@@ -114,8 +114,8 @@ struct FormatInfo {
 /// Errors:   Unsupported for other extensions; those of the format's writer; `path` is set in all.
 [[nodiscard]] Result<SavedScene> save_scene(const Scene& scene, const std::filesystem::path& path, Threads threads = {},
                                             const Progress& progress = {});
-/// The same of a scene that was read, with what its file had beside it: in .quoin and .json its sun and camera, in
-/// .vox what `source` holds.
+/// The same of a scene that was read, with what its file had beside it: in .quoin and .json its sun and camera (.quoin
+/// has all cameras), in .vox what `source` holds, its cameras and its sun.
 [[nodiscard]] Result<SavedScene> save_scene(const LoadedScene& loaded, const std::filesystem::path& path,
                                             Threads threads = {}, const Progress& progress = {});
 

@@ -81,8 +81,8 @@ struct VoxBytes {
                                            const Progress& progress = {});
 
 /// A scene that was read from a .vox file, with what was changed since, as a .vox file that keeps all else of the first
-/// one: chunks that no change concerns are the same bytes in the same order, so that a scene without a change is the
-/// same file. Without `source`: as above.
+/// one: chunks that no change concerns are the same bytes in the same order, so a scene without a change is the same
+/// file. Cameras and the sun (of `look`, else `sun`) are written where they changed. Without `source`: else as above.
 ///
 /// Voxels:   of a model that was changed the file's order stays, new ones follow.
 /// Frames:   moving an instance or a group that moves by itself sets a key at the frame that was read; other frames

@@ -28,7 +28,6 @@ namespace {
 constexpr std::uint32_t kVersion = 224;
 constexpr std::uint32_t kZipOfActive = 3;
 constexpr int kLeavesOfChunk = kChunkEdge / kLeafEdge;
-constexpr int kChunksOfLower = kLowerEdge / kChunkEdge;
 
 class Writer {
  public:

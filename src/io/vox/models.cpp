@@ -82,23 +82,39 @@ DVec3 pivot_of(IVec3 model_size) {
 void ModelBuilder::sort_into_chunks(const Model& model) {
   const Places places = places_in(model.size, {1, 1 << kChunksShift, 1 << (2 * kChunksShift)});
   std::array<std::size_t, 65> counts{};
+  // Most voxels lie in the chunk of the one before, whose count, and below whose end, need not go through memory.
+  std::size_t chunk = 64;
+  std::size_t in_a_row = 0;
   for_each_voxel(model, places, [&](std::uint32_t place, std::uint8_t colour_index) {
     if (place >= Places::kOutside) {
       ++losses_.outside;
     } else if (colour_index == 0) {
       ++losses_.colourless;
     } else {
-      ++counts[place >> kTypeShift];
+      if (place >> kTypeShift != chunk) {
+        counts[chunk] += in_a_row;
+        chunk = place >> kTypeShift;
+        in_a_row = 0;
+      }
+      ++in_a_row;
     }
   });
+  counts[chunk] += in_a_row;
   chunk_begins_[0] = 0;
   for (std::size_t i = 0; i < 64; ++i) chunk_begins_[i + 1] = chunk_begins_[i] + counts[i];
   sorted_.resize(chunk_begins_[64]);
   std::array<std::size_t, 65> next = chunk_begins_;
+  chunk = 64;
+  std::uint32_t* end = sorted_.data() + next[chunk];
   for_each_voxel(model, places, [&](std::uint32_t place, std::uint8_t colour_index) {
     if (place >= Places::kOutside || colour_index == 0) return;
+    if (place >> kTypeShift != chunk) {
+      next[chunk] = static_cast<std::size_t>(end - sorted_.data());
+      chunk = place >> kTypeShift;
+      end = sorted_.data() + next[chunk];
+    }
     const std::uint32_t type = type_of_[colour_index];
-    sorted_[next[place >> kTypeShift]++] = (place & kPlaceMask) | type << kTypeShift;
+    *end++ = (place & kPlaceMask) | type << kTypeShift;
   });
 }
 

@@ -179,7 +179,8 @@ void make_quads(const Work& work, const Slice& slice, std::size_t count, std::ui
     I q[4];
     for (int c = 0; c < 4; ++c) {
       const int is_last = Cells::is_last[static_cast<std::size_t>(c)] ? 1 : 0;
-      corners[c] = gather(work.vertices[(slice.z ^ is_last) & 1] - Cells::back[static_cast<std::size_t>(c)], place);
+      const int back = static_cast<int>(Cells::back[static_cast<std::size_t>(c)]);
+      corners[c] = gather(work.vertices[(slice.z ^ is_last) & 1], place - all(back));
       q[c] = (corners[c] & all(static_cast<int>(kVertexMask))) + firsts[is_last];
     }
     const Mask flip =

@@ -68,7 +68,7 @@ class FarTile {
       point.voxel = {hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
       point.face = hits.grids.face[i];
       point.placed = hits.placed[i];
-      point.position = view_->grid_from_view(point.placed, ray.origin + ray.direction * hits.grids.t[i]);
+      point.position = view_->grid_from_view(point.placed).point(ray.origin + ray.direction * hits.grids.t[i]);
       point.in_field = (hits.in_field >> lane & 1U) != 0;
       if (point.in_field) {
         point.normal = hits.normal(i);

@@ -239,12 +239,14 @@ void PathTile::meet() {
 }
 
 void PathTile::meet_packet(std::span<const std::uint32_t> indices) {
-  RayPacket rays;
+  // Kept: to clear them for each packet takes longer than to fill them.
+  RayPacket& rays = packet_;
+  SceneHits& hits = hits_;
+  rays.active = 0;
   for (std::size_t i = 0; i < indices.size(); ++i) {
     const Path& path = paths_[indices[i]];
     rays.set(static_cast<int>(i), {path.origin, DVec3(path.direction)}, kInfinite);
   }
-  SceneHits hits;
   context_->view->first_hits(rays, hits);
   rays_ += static_cast<std::int64_t>(indices.size());
   std::uint32_t through_glass = 0;
@@ -354,7 +356,7 @@ void PathTile::note_layers(Path& path, const Vertex& vertex, double t, VoxelType
   sums.type = type;
   if (!vertex.is_ground) {
     const auto placed = static_cast<std::size_t>(vertex.placed);
-    sums.instance = placed_in(context_->view->tracer())[placed].instance.index + 1;
+    sums.instance = context_->placed[placed].instance.index + 1;
   }
   if (path.is_first) sums.depth = static_cast<float>(t);
 }
@@ -388,12 +390,12 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
   Vertex& vertex = vertices_.emplace_back();  // filled in where it stays
   vertex.path = index;
   vertex.placed = hits.placed[i];
-  const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(vertex.placed)];
+  const PlacedGrid& placed = context_->placed[static_cast<std::size_t>(vertex.placed)];
   const IVec3 voxel{hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
   const Direction face = hits.grids.face[i];
   const bool in_field = (hits.in_field >> lane & 1U) != 0;
   const Ray ray = rays.ray(lane);
-  vertex.in_grid = context_->view->grid_from_view(vertex.placed, ray.origin + ray.direction * hits.grids.t[i]);
+  vertex.in_grid = context_->view->grid_from_view(vertex.placed).point(ray.origin + ray.direction * hits.grids.t[i]);
   VoxelType type = hits.material[i];
   if (in_field) {
     const DVec3 normal(hits.normal(i));
@@ -414,7 +416,7 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
     return;
   }
   if (light_.lamps != nullptr) vertex.place = memory_.place_of(vertex.placed, voxel, face);
-  vertex.in_view = context_->view->view_from_grid(vertex.placed, vertex.in_grid);
+  vertex.in_view = context_->view->view_from_grid(vertex.placed).point(vertex.in_grid);
   vertex.material = {surface.colour, surface.roughness, surface.metalness};
   if (!path.is_noted) {
     // What shines or glows differs by its type; what is matte differs by its colour alone.
@@ -457,7 +459,7 @@ void PathTile::hit_ground(std::uint32_t index, double t) {
     note_layers(path, vertex, t, kAir);
   }
   // Shadows are asked for in a grid: the first.
-  if (!placed_in(context_->view->tracer()).empty()) vertex.in_grid = context_->view->grid_from_view(0, vertex.in_view);
+  if (!context_->placed.empty()) vertex.in_grid = context_->view->grid_from_view(0).point(vertex.in_view);
   vertices_.push_back(vertex);
 }
 
@@ -641,7 +643,7 @@ bool PathTile::ask(const Vertex& vertex, Vec3 direction, float max_t, Vec3 light
 }
 
 void PathTile::trace_requests() {
-  const std::size_t placed = placed_in(context_->view->tracer()).size();
+  const std::size_t placed = context_->placed.size();
   if (placed == 0) {
     for (const Request& request : requests_) paths_[request.path].radiance += request.light;
     return;
@@ -670,7 +672,7 @@ void PathTile::trace_requests() {
 
 void PathTile::trace_request_packet(std::span<const std::uint32_t> requests) {
   const std::int32_t home = requests_[requests.front()].home;
-  const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(home)];
+  const PlacedGrid& placed = context_->placed[static_cast<std::size_t>(home)];
   RayPacket rays;
   for (std::size_t i = 0; i < requests.size(); ++i) {
     const Request& request = requests_[requests[i]];

@@ -32,6 +32,7 @@ using FaceNormals = std::vector<std::array<Vec3, 6>>;
 /// What all tiles of a picture share.
 struct TileContext {
   const SceneView* view = nullptr;
+  std::span<const PlacedGrid> placed;         ///< of the view's tracer
   const FaceNormals* face_normals = nullptr;  ///< of each placed grid
   const Surfaces* surfaces = nullptr;
   const PathLamps* lamps = nullptr;
@@ -71,6 +72,7 @@ class PathTile {
   static constexpr std::uint8_t kNoPart = 255;
 
   struct Path {
+    Path() {}              // NOLINT: a defaulted one is cleared whole before its members are made, which takes longer
     DVec3 origin{0.0};     // of its next ray, in view space
     Vec3 direction{0.0F};  // unit
     float density = 0.0F;  // with which that was found; infinite where nothing else could find it
@@ -94,6 +96,7 @@ class PathTile {
   };
   // Where a path is scattered.
   struct Vertex {
+    Vertex() {}  // NOLINT: as Path
     std::uint32_t path = 0;
     std::int32_t placed = 0;
     DVec3 in_grid{0.0};  // a hundredth of a voxel above the surface, so that rays start before it
@@ -204,6 +207,8 @@ class PathTile {
   std::vector<std::uint32_t> order_;
   std::vector<std::uint32_t> starts_;  // of counting sorts
   std::vector<GlassBody> glass_;
+  RayPacket packet_;  // of `meet_packet`
+  SceneHits hits_;
   std::vector<PixelSums> sums_;
 };
 

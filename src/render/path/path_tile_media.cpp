@@ -112,7 +112,7 @@ bool PathTile::enter_glass(std::uint32_t index) {
     return leave_glass(index);
   }
   const DVec3 in_grid_normal = normal_entered(*context_->view, ray, body);
-  const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(body.placed)];
+  const PlacedGrid& placed = context_->placed[static_cast<std::size_t>(body.placed)];
   Vec3 normal(placed.world_axes * in_grid_normal);
   const float cosine = std::clamp(-glm::dot(normal, path.direction), 1e-4F, 1.0F);
   if (path.is_first) {
@@ -152,7 +152,7 @@ bool PathTile::leave_glass(std::uint32_t index) {
   const GlassBody body = glass_.front();
   const Surface& surface = (*context_->surfaces)[body.type];
   path.throughput *= tint_of(surface, body.voxels);
-  const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(body.exit_placed)];
+  const PlacedGrid& placed = context_->placed[static_cast<std::size_t>(body.exit_placed)];
   const double lift = kRayLift * placed.voxel_size;
   if (!(body.t_exit < kInfinite)) return false;
   const bool has_next = glass_.size() > 1 && reaches(body, glass_[1].t_enter);
@@ -201,12 +201,13 @@ void PathTile::hit_glass(std::uint32_t index, const GlassBody& body, const DVec3
   Vertex vertex;
   vertex.path = index;
   vertex.placed = body.placed;
-  const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(body.placed)];
-  vertex.in_grid = context_->view->grid_from_view(body.placed, path.origin + DVec3(path.direction) * body.t_enter);
+  const PlacedGrid& placed = context_->placed[static_cast<std::size_t>(body.placed)];
+  vertex.in_grid =
+      context_->view->grid_from_view(body.placed).point(path.origin + DVec3(path.direction) * body.t_enter);
   if (!body.in_field) vertex.in_grid = on_face(vertex.in_grid, body.voxel, body.face);
   vertex.in_grid += normal_in_grid * kRayLift;
   vertex.normal = glm::normalize(Vec3(placed.world_axes * normal_in_grid));
-  vertex.in_view = context_->view->view_from_grid(body.placed, vertex.in_grid);
+  vertex.in_view = context_->view->view_from_grid(body.placed).point(vertex.in_grid);
   vertex.material = {surface.colour, 1.0F, 0.0F};
   if (path.is_first) sums_[path.pixel].scene_share += 1.0F;
   note_layers(path, vertex, body.t_enter, body.type);
@@ -235,8 +236,8 @@ void PathTile::hit_air(std::uint32_t index, double t, Vec3 colour, float anisotr
   vertex.anisotropy = anisotropy;
   vertex.in_view = path.origin + DVec3(path.direction) * t;
   vertex.material.colour = colour;
-  if (!placed_in(context_->view->tracer()).empty()) {
-    vertex.in_grid = context_->view->grid_from_view(placed, vertex.in_view);
+  if (!context_->placed.empty()) {
+    vertex.in_grid = context_->view->grid_from_view(placed).point(vertex.in_view);
   }
   PixelSums& sums = sums_[path.pixel];
   if (path.is_first) {
@@ -257,7 +258,7 @@ void PathTile::note_behind(Path& path, const SceneHits& hits, int lane, double t
   if ((hits.grids.hit >> lane & 1U) != 0 && hits.grids.t[i] <= t) {
     const IVec3 voxel{hits.grids.x[i], hits.grids.y[i], hits.grids.z[i]};
     const bool in_field = (hits.in_field >> lane & 1U) != 0;
-    const PlacedGrid& placed = placed_in(context_->view->tracer())[static_cast<std::size_t>(hits.placed[i])];
+    const PlacedGrid& placed = context_->placed[static_cast<std::size_t>(hits.placed[i])];
     const VoxelType type = in_field ? hits.material[i] : placed.voxels->get(voxel);
     note_part(path, whole, surface_id(voxel, hits.grids.face[i], in_field, hits.placed[i], type), false);
   } else {

@@ -76,8 +76,10 @@ Result<PathPicture> PathTracer::render(const Camera& camera, const PathOptions& 
   const CameraRays rays(camera, options.width, options.height);
   std::optional<path::SurfaceParts> parts;
   if (options.denoise) parts.emplace(options.width, options.height);
-  const path::FaceNormals face_normals = path::face_normals(placed_in(impl.tracer));
+  const std::span<const PlacedGrid> placed = placed_in(impl.tracer);
+  const path::FaceNormals face_normals = path::face_normals(placed);
   const path::TileContext context{&view,
+                                  placed,
                                   &face_normals,
                                   &impl.surfaces,
                                   lamps.get(),

@@ -47,13 +47,6 @@ class LanesWhenNeeded {
   bool is_made_ = false;
 };
 
-// Moves points and directions from one space to another.
-struct Affine {
-  glm::dmat3 axes{1.0};
-  DVec3 offset{0.0};
-  [[nodiscard]] DVec3 point(DVec3 p) const { return axes * p + offset; }
-};
-
 void turn(const glm::dmat3& axes, const RayPacket::Lanes<double> (&from)[3], DVec3 offset, RayPacket::Lanes<double>& x,
           RayPacket::Lanes<double>& y, RayPacket::Lanes<double>& z) {
   for (std::size_t i = 0; i < kLanes; ++i) {
@@ -344,12 +337,12 @@ void SceneView::visit_transparent(const Ray& ray_in_view, double max_t,
   });
 }
 
-DVec3 SceneView::grid_from_view(std::int32_t placed, DVec3 point_in_view) const {
-  return impl_->grid_from_view[static_cast<std::size_t>(placed)].point(point_in_view);
+const Affine& SceneView::grid_from_view(std::int32_t placed) const {
+  return impl_->grid_from_view[static_cast<std::size_t>(placed)];
 }
 
-DVec3 SceneView::view_from_grid(std::int32_t placed, DVec3 point_in_grid) const {
-  return impl_->view_from_grid[static_cast<std::size_t>(placed)].point(point_in_grid);
+const Affine& SceneView::view_from_grid(std::int32_t placed) const {
+  return impl_->view_from_grid[static_cast<std::size_t>(placed)];
 }
 
 RayPacket SceneView::view_from_grid(std::int32_t placed, const RayPacket& rays_in_grid) const {

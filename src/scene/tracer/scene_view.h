@@ -4,6 +4,8 @@
 #include <memory>
 #include <span>
 
+#include <glm/mat3x3.hpp>
+
 #include <quoin/core/function_ref.h>
 #include <quoin/scene/scene_tracer.h>
 #include <quoin/trace/packet.h>
@@ -12,6 +14,13 @@
 #include "scene/tracer/placed_grid.h"
 
 namespace quoin {
+
+/// Moves points and directions from one space to another.
+struct Affine {
+  glm::dmat3 axes{1.0};
+  DVec3 offset{0.0};
+  [[nodiscard]] DVec3 point(const DVec3& p) const { return axes * p + offset; }
+};
 
 /// What a packet of rays met in a scene, voxels or fields; lanes whose bit in `grids.hit` is not set hold nothing of
 /// meaning.
@@ -63,8 +72,8 @@ class SceneView {
   void visit_transparent(const Ray& ray_in_view, double max_t,
                          FunctionRef<void(std::int32_t placed, const Ray& ray_in_grid)> visit) const;
 
-  [[nodiscard]] DVec3 grid_from_view(std::int32_t placed, DVec3 point_in_view) const;
-  [[nodiscard]] DVec3 view_from_grid(std::int32_t placed, DVec3 point_in_grid) const;
+  [[nodiscard]] const Affine& grid_from_view(std::int32_t placed) const;
+  [[nodiscard]] const Affine& view_from_grid(std::int32_t placed) const;
   [[nodiscard]] RayPacket view_from_grid(std::int32_t placed, const RayPacket& rays_in_grid) const;
 
  private:

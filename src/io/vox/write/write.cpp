@@ -17,6 +17,7 @@
 #include "io/vox/write/graph_revision.h"
 #include "io/vox/write/model_plan.h"
 #include "io/vox/write/node_content.h"
+#include "io/vox/write/view_plan.h"
 #include "io/vox/write/write.h"
 #include "io/whole_file.h"
 
@@ -99,6 +100,11 @@ class Writer {
  public:
   Writer(const Scene& scene, const VoxSource& source, const Progress& progress = {})
       : scene_(scene), source_(source), progress_(progress) {}
+  /// What a scene was read with is written too.
+  Writer(const LoadedScene& loaded, const VoxSource& source, const Progress& progress = {})
+      : Writer(loaded.scene, source, progress) {
+    view_ = vox::plan_view(loaded, source, is_new());
+  }
 
   Result<VoxBytes> run();
   /// Only what `run` would warn of. Errors: those of `run`, but for the size.
@@ -128,7 +134,9 @@ class Writer {
   [[nodiscard]] std::optional<Chunk> revised_layer(const vox::ChunkPlace& place) const;
   [[nodiscard]] std::optional<Chunk> revised_material(const vox::ChunkPlace& place) const;
   [[nodiscard]] std::optional<Chunk> revised_palette(const vox::ChunkPlace& place) const;
+  [[nodiscard]] std::optional<Chunk> revised_view(const vox::ChunkPlace& place);
   [[nodiscard]] bool is_removed(const vox::ChunkPlace& place) const;
+  [[nodiscard]] std::string_view id_of(const vox::ChunkPlace& place) const;
   [[nodiscard]] std::span<const std::byte> content_of(const vox::ChunkPlace& place) const;
   [[nodiscard]] const SceneLayer* layer_of(std::size_t number) const;
   [[nodiscard]] vox::Attributes material(std::size_t index) const;
@@ -141,6 +149,7 @@ class Writer {
   void write_new_layers();
   void write_new_palette();
   void write_new_materials();
+  void write_new_view();
 
   const Scene& scene_;
   const VoxSource& source_;
@@ -149,6 +158,9 @@ class Writer {
   vox::RevisedTypes types_;
   vox::ModelPlan models_;
   vox::RevisedGraph graph_;
+  vox::ViewPlan view_;
+  std::vector<std::int32_t> written_cameras_;  // numbers of `view_` that chunks of the source had
+  bool has_written_sun_ = false;               // likewise
   std::vector<std::string> lost_;              ///< with the file's scene graph, where it is written anew
   std::vector<const vox::GridPlan*> plan_of_;  // by the source's models; null where the model is no grid any more
   std::vector<std::uint32_t> number_of_;  // of models, by their numbers in the plan; kGone for those that are left out
@@ -285,6 +297,7 @@ void Writer::warn(std::vector<std::string>& warnings) const {
   scene_.grids().for_each([&](GridHandle, const SceneGrid& grid) { with_data += grid.grid.data_count(); });
   count("voxels whose data is left out, which .vox does not hold (a .json keeps it)", with_data);
   count("instances whose categories are left out, which .vox does not hold (a .json keeps them)", categories);
+  if (view_.has_more_settings) warnings.emplace_back("render settings left out, but for the sun's");
   warnings.insert(warnings.end(), lost_.begin(), lost_.end());
 }
 
@@ -313,6 +326,10 @@ std::vector<std::string> Writer::lost_with_graph() const {
   return lost;
 }
 
+std::string_view Writer::id_of(const vox::ChunkPlace& place) const {
+  return {reinterpret_cast<const char*>(source_.bytes.data()) + place.begin, 4};
+}
+
 std::span<const std::byte> Writer::content_of(const vox::ChunkPlace& place) const {
   return std::span(source_.bytes).subspan(place.begin + vox::kChunkHeaderBytes, place.content_bytes);
 }
@@ -333,6 +350,10 @@ bool Writer::is_removed(const vox::ChunkPlace& place) const {
       return graph_.is_removed[place.number];
     case vox::ChunkKind::Layer:
       return source_.layer_of[place.number] != vox::kNone && layer_of(place.number) == nullptr;
+    case vox::ChunkKind::Other: {
+      const auto camera = vox::camera_number(id_of(place), content_of(place));
+      return camera && std::ranges::find(view_.removed, *camera) != view_.removed.end();
+    }
     default:
       return false;
   }
@@ -420,7 +441,7 @@ std::optional<Chunk> Writer::revised_material(const vox::ChunkPlace& place) cons
   // MATT has no keys: a MATL takes its place.
   vox::Attributes wanted = material(index);
   vox::ChunkWriter::Entries entries;
-  const std::string_view id(reinterpret_cast<const char*>(source_.bytes.data()) + place.begin, 4);
+  const std::string_view id = id_of(place);
   if (id == "MATL") {
     for (const auto& [key, value] : reader.dict().entries) {
       const auto found = wanted.find(std::string(key));
@@ -459,6 +480,29 @@ std::optional<Chunk> Writer::revised_palette(const vox::ChunkPlace& place) const
   return Chunk{"RGBA", std::move(content)};
 }
 
+/// Of a camera, or the sun.
+std::optional<Chunk> Writer::revised_view(const vox::ChunkPlace& place) {
+  const std::span<const std::byte> bytes = content_of(place);
+  const auto number = vox::camera_number(id_of(place), bytes);
+  const auto camera = number ? view_.cameras.find(*number) : view_.cameras.end();
+  const bool is_sun = view_.sun && vox::is_sun(id_of(place), bytes);
+  if (camera == view_.cameras.end() && !is_sun) return std::nullopt;
+  vox::ChunkReader reader(bytes, id_of(place), place.begin, 0, bytes.size());
+  vox::ChunkWriter content;
+  if (!is_sun) content.i32(reader.i32());
+  vox::Entries keys(reader.dict());
+  if (is_sun) {
+    vox::set_sun_keys(*view_.sun, keys);
+    has_written_sun_ = true;
+  } else {
+    vox::set_camera_keys(camera->second, keys);
+    written_cameras_.push_back(*number);
+  }
+  content.dict(keys.all());
+  content.raw(reader.take(reader.remaining()));
+  return Chunk{is_sun ? "rOBJ" : "rCAM", content.take()};
+}
+
 /// The chunk as it is now; nothing when it is as it was.
 std::optional<Chunk> Writer::revised(const vox::ChunkPlace& place) {
   switch (place.kind) {
@@ -478,7 +522,7 @@ std::optional<Chunk> Writer::revised(const vox::ChunkPlace& place) {
     case vox::ChunkKind::Layer:
       return revised_layer(place);
     case vox::ChunkKind::Other:
-      return std::nullopt;
+      return revised_view(place);
   }
   return std::nullopt;
 }
@@ -598,6 +642,27 @@ void Writer::write_new_materials() {
   }
 }
 
+/// Where the source had no such chunk.
+void Writer::write_new_view() {
+  const auto write = [&](std::string_view id, const vox::Entries& keys, const auto& write_number) {
+    const std::size_t chunk = out_.begin_chunk(id);
+    write_number();
+    out_.dict(keys.all());
+    out_.end_chunk(chunk);
+  };
+  if (view_.sun && !has_written_sun_) {
+    vox::Entries keys;
+    vox::set_sun_keys(*view_.sun, keys);
+    write("rOBJ", keys, [] {});
+  }
+  for (const std::int32_t number : view_.order) {
+    if (std::ranges::find(written_cameras_, number) != written_cameras_.end()) continue;
+    vox::Entries keys;
+    vox::set_camera_keys(view_.cameras.at(number), keys);
+    write("rCAM", keys, [&] { out_.i32(number); });
+  }
+}
+
 /// What is new follows the last chunk of its kind.
 void Writer::write_after(std::size_t chunk) {
   if (anchors_.models == chunk) write_new_models();
@@ -613,6 +678,7 @@ void Writer::write_chunks() {
     write_chunk(source_.document.chunks[i]);
     write_after(i);
   }
+  write_new_view();
 }
 
 Result<VoxBytes> Writer::run() {
@@ -667,7 +733,7 @@ Result<VoxBytes> write_vox(const Scene& scene, const Progress& progress) {
 }
 
 Result<VoxBytes> write_vox(const LoadedScene& loaded, const Progress& progress) {
-  return Writer(loaded.scene, source_of(loaded), progress).run();
+  return Writer(loaded, source_of(loaded), progress).run();
 }
 
 Result<SavedScene> write_vox(const Scene& scene, const std::filesystem::path& path, const Progress& progress) {
@@ -683,7 +749,7 @@ Result<std::vector<std::string>> losses_of_vox(const Scene& scene) {
 }
 
 Result<std::vector<std::string>> losses_of_vox(const LoadedScene& loaded) {
-  return Writer(loaded.scene, source_of(loaded)).losses();
+  return Writer(loaded, source_of(loaded)).losses();
 }
 
 }  // namespace quoin
