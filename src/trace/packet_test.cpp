@@ -236,6 +236,39 @@ TEST_P(Packets, OfShortRaysAtTheEndsOfAWorldAgree) {
   EXPECT_GT(hits, 1'000);
 }
 
+// Rays that are brought to the bounds, and enter them where planes meet, or all but miss them.
+TEST_P(Packets, OfRaysFromAfarTowardsEdgesAndCornersOfAWorldAgree) {
+  Grid grid;
+  const IVec3 corner{whole(-40, 40), whole(-40, 40), whole(-40, 40)};
+  grid.fill_box({corner, corner + IVec3{whole(1, 40), whole(1, 40), whole(1, 40)}}, VoxelType{1});
+  const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
+  const IBox bounds = tree.bounds();
+  const auto toward_bounds = [&] {
+    Ray ray{DVec3(0.0), {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)}};
+    if (whole(0, 1) == 0) ray.direction = glm::sign(ray.direction) * std::exp2(whole(-4, 4));
+    if (whole(0, 3) == 0) ray.direction[whole(0, 2)] = whole(0, 1) == 0 ? 0.0 : -0.0;
+    const double distance = whole(0, 1) == 0 ? whole(100, 5'000) : uniform(100, 5'000);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double ends[] = {static_cast<double>(bounds.min[axis]), static_cast<double>(bounds.max[axis])};
+      const double end = ends[whole(0, 1)];
+      const double targets[] = {end, end, end + uniform(-2e-3, 2e-3), uniform(ends[0], ends[1])};
+      ray.origin[axis] = targets[whole(0, 3)] - ray.direction[axis] * distance;
+    }
+    return ray;
+  };
+  int hits = 0;
+  for (int i = 0; i < 2'000; ++i) {
+    RayPacket rays;
+    for (int lane = 0; lane < RayPacket::kSize; ++lane)
+      rays.set(lane, toward_bounds(), whole(0, 3) == 0 ? uniform(0, 10'000) : kInfinity);
+    hits += hits_if_all_agree(tree, rays, set());
+    limit_to_hits(tree, rays, set(), random_);
+    hits_if_all_agree(tree, rays, set());
+    ASSERT_FALSE(HasFatalFailure()) << "packet " << i;
+  }
+  EXPECT_GT(hits, 1'000);
+}
+
 // Further than the 4^3 chunks that a beam looks at together, and further than single precision goes.
 TEST_P(Packets, OfRaysThatGoTheSameWayThroughALongWorldAgree) {
   Grid grid;

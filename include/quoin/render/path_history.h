@@ -16,9 +16,10 @@ namespace quoin {
 ///
 ///   shown = new(n) + share * (before(best) - before(n))
 ///
-/// takes the noise of n samples away again where it is known, and has no other mean than `new(n)`. The share is found
-/// around each pixel: 1 where nothing changed, 0 where nothing of before is left. With as many samples as the best
-/// picture before the edit had, what is shown is the new picture and nothing else.
+/// takes the noise of n samples away again where it is known. The share is found around each pixel: 1 where nothing
+/// changed, 0 where nothing of before is left. With as many samples as the best picture before the edit had, what is
+/// shown is the new picture and nothing else. Until then it leans towards what was: light that few samples find, and
+/// that an edit took away, goes over the first of them and not at once (docs/decisions/119).
 ///
 ///   PathHistory history;
 ///   for (const int samples : {1, 4, 16, 64}) {

@@ -27,6 +27,7 @@ using path::unpack_light;
 using render_test::add_type;
 using render_test::from_above;
 using render_test::place;
+using render_test::towards;
 using render_test::under_even_sky;
 
 constexpr int kEdge = 48;             // of pictures, in pixels
@@ -176,7 +177,7 @@ TEST_F(PathHistoryTest, AnEditTakenBackHasThePictureOfBeforeWithTheFirstSample) 
   EXPECT_LT(greatest_difference(refined(kEdge, 1), before), 0.02F);
 }
 
-// The mean of what is shown is that of the new scene, whatever was before it.
+// Where an edit takes away little of the light.
 TEST_F(PathHistoryTest, ShowsWhatTheNewSceneShowsInTheMean) {
   constexpr int kTries = 48;
   std::vector<DVec3> shown(static_cast<std::size_t>(kEdge) * kEdge, DVec3(0.0));
@@ -197,6 +198,40 @@ TEST_F(PathHistoryTest, ShowsWhatTheNewSceneShowsInTheMean) {
     right += DVec3(converged.radiance[i]);
   }
   for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(all[axis] / right[axis], 1.0, 0.005);
+}
+
+// What shines through a window is found by few samples: where they find none, nothing tells that the window is gone.
+TEST(PathHistory, ARoomThatIsWalledUpBecomesDarkWithinAFewSamples) {
+  constexpr IBox kWindow{{32, 12, 12}, {33, 18, 18}};
+  Scene scene;
+  const VoxelType wall = add_type(scene, {200, 200, 200, 255});
+  Grid grid;
+  grid.fill_box({{-1, -1, -1}, {33, 25, 33}}, wall);
+  grid.fill_box({{0, 0, 0}, {32, 24, 32}}, kAir);
+  grid.fill_box(kWindow, kAir);
+  const GridHandle room = scene.instances()[place(scene, std::move(grid))].grid;
+  PathTracer tracer(scene);
+  PathOptions options = under_even_sky(kEdge, kEdge, 1);
+  options.max_bounces = 4;
+  PathHistory history;
+  const auto mean_shown = [&](int samples) {
+    options.samples = samples;
+    PathPicture picture = tracer.render(towards({2, 16, 2}, {20, 6, 18}, 1.1), options, {2}).value();
+    history.refine(picture, samples, {2});
+    double sum = 0.0;
+    for (const Vec3& light : picture.radiance) sum += static_cast<double>(light.y);
+    return sum / static_cast<double>(picture.radiance.size());
+  };
+  double before = 0.0;
+  for (const int samples : kSamples) before = mean_shown(samples);
+  ASSERT_GT(before, 0.01);
+  scene.edit(room).grid.fill_box(kWindow, wall);
+  tracer.update({2});
+  history.note_edit();
+  EXPECT_LT(mean_shown(1), 0.3 * before);
+  EXPECT_LT(mean_shown(4), 0.2 * before);
+  EXPECT_LT(mean_shown(16), 0.08 * before);
+  EXPECT_EQ(mean_shown(kSamples.back()), 0.0);
 }
 
 TEST_F(PathHistoryTest, SmallPicturesAreShownInTheLargeOnesPlace) {
