@@ -58,8 +58,8 @@ ShadeLight light_of(const SkyLight& sky, const PathLamps& lamps) {
   return light;
 }
 
-// By its direction: what lifts a point off a face, in the grid. Known before the program starts, so that pictures may be
-// taken for what is initialized then.
+// By its direction: what lifts a point off a face, in the grid. Known before the program starts, so that pictures may
+// be taken for what is initialized then.
 constexpr std::array<DVec3, 6> lifts_off_faces() {
   std::array<DVec3, 6> lifts{};
   for (std::size_t face = 0; face < lifts.size(); ++face) {
