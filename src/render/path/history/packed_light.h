@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 
 #include <quoin/core/vec.h>
@@ -31,7 +32,7 @@ inline constexpr float kMaxPackedLight = 65'408.0F;
   };
   if (most * scale_of(exponent) + 0.5F >= 512.0F) ++exponent;
   const float scale = scale_of(exponent);
-  const auto part = [scale](float x) { return static_cast<std::uint32_t>(x * scale + 0.5F); };
+  const auto part = [scale](float x) { return static_cast<std::uint32_t>(std::lrint(x * scale)); };
   return static_cast<std::uint32_t>(exponent) << 27 | part(kept.z) << 18 | part(kept.y) << 9 | part(kept.x);
 }
 
