@@ -208,7 +208,7 @@ inline void move_some_to_bounds(const TreeView& tree, const Rays& rays, std::uin
     const Longs is_low = p < low;
     const Longs is_out = is_low | ~(p < high);  // of what is no number too, which misses
     missing |= is_out & ~(is_low ? d > 0.0 : d < 0.0);
-    missing |= ~(p == p);
+    missing |= ~(is_low | (p >= low));  // what is no number
     const Doubles plane = is_low ? Doubles{} + low : Doubles{} + high;
     const Doubles t = (plane - p) * (1.0 / d);
     const Longs is_later = is_out & (t >= enter_t);
