@@ -240,7 +240,7 @@ std::optional<Stage> CpuBackend::Impl::finest(bool is_draft, double patience) co
 
 // After an edit pictures by paths go on from such as there were before it.
 bool CpuBackend::Impl::may_begin(int divisor) const {
-  return request->mode != DrawMode::Paths || !paths || paths->memory.may_begin(*request, divisor);
+  return !paths || paths->memory.may_begin(*request, divisor);
 }
 
 // As large as there is time for; a draft where a picture in full light would be smaller than a half.
@@ -250,8 +250,7 @@ Stage CpuBackend::Impl::first_stage() const {
   const std::optional<Stage> full = finest(false, patience);
   if (!has_drafts(*request)) {
     if (full) return *full;
-    const auto* const coarsest = std::find_if(kDivisors.begin(), kDivisors.end(), [&](int d) { return may_begin(d); });
-    return {coarsest != kDivisors.end() ? *coarsest : kDivisors.front()};
+    return {paths ? paths->memory.first_divisor(*request, kDivisors) : kDivisors.front()};
   }
   if (full && full->divisor <= 2) return *full;
   return finest(true, patience).value_or(Stage{kDivisors.front(), 1, true});

@@ -274,14 +274,13 @@ Result<bool> DeviceDrawer::draw_meshes() {
 }
 
 // After an edit pictures by paths go on from such as there were before it.
-int DeviceDrawer::first_divisor() {
+int DeviceDrawer::first_divisor() const {
   const double pixels = static_cast<double>(request_->width) * request_->height;
-  const auto may_begin = [this](int divisor) { return !paths_ || path_memory_.may_begin(*request_, divisor); };
-  const auto* const coarsest = std::find_if(kRayDivisors.begin(), kRayDivisors.end(), may_begin);
-  int chosen = coarsest != kRayDivisors.end() ? *coarsest : kRayDivisors.front();
+  int chosen = path_memory_.first_divisor(*request_, kRayDivisors);
   if (seconds_per_sample_ <= 0.0) return chosen;
   for (const int finer : kRayDivisors) {
-    if (may_begin(finer) && pixels / (finer * finer) * seconds_per_sample_ <= options_.frame_seconds) chosen = finer;
+    if (!path_memory_.may_begin(*request_, finer)) continue;
+    if (pixels / (finer * finer) * seconds_per_sample_ <= options_.frame_seconds) chosen = finer;
   }
   return chosen;
 }

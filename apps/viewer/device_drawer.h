@@ -97,7 +97,7 @@ class DeviceDrawer {
   Result<bool> draw_rays();
   Status draw_stage();
   Result<bool> draw_path_stage();
-  [[nodiscard]] int first_divisor();
+  [[nodiscard]] int first_divisor() const;
   [[nodiscard]] Stage next_stage();
   [[nodiscard]] int samples_now(const Stage& stage, int before, int wanted) const;
   [[nodiscard]] ViewFrame frame(double seconds) const;

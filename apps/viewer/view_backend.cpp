@@ -1,6 +1,6 @@
 #include "view_backend.h"
 
-#include <utility>
+#include <algorithm>
 
 namespace quoin::viewer {
 
@@ -38,12 +38,17 @@ PathOptions path_options(const ViewRequest& request, int width, int height, int 
   return options;
 }
 
-PathHistory& PathMemory::of(const ViewRequest& request) {
+bool PathMemory::is_of(const ViewRequest& request) const {
   ViewRequest wanted = request;
   wanted.samples = kPathSamples;
-  if (!request_ || !is_same(*request_, wanted)) {
+  return request_ && is_same(*request_, wanted);
+}
+
+PathHistory& PathMemory::of(const ViewRequest& request) {
+  if (!is_of(request)) {
     history_.clear();
-    request_ = std::move(wanted);
+    request_ = request;
+    request_->samples = kPathSamples;
   }
   return history_;
 }
@@ -53,10 +58,15 @@ void PathMemory::clear() {
   request_.reset();
 }
 
-bool PathMemory::may_begin(const ViewRequest& request, int divisor) {
-  const PathHistory& history = of(request);
+bool PathMemory::may_begin(const ViewRequest& request, int divisor) const {
+  if (!is_of(request) || !history_.has_earlier()) return true;
   const auto pixels = [divisor](int all) { return (all + divisor - 1) / divisor; };
-  return !history.has_earlier() || history.knows(pixels(request.width), pixels(request.height), 1);
+  return history_.knows(pixels(request.width), pixels(request.height), 1);
+}
+
+int PathMemory::first_divisor(const ViewRequest& request, std::span<const int> divisors) const {
+  const auto found = std::ranges::find_if(divisors, [&](int divisor) { return may_begin(request, divisor); });
+  return found != divisors.end() ? *found : divisors.front();
 }
 
 DevelopOptions develop_options(const ViewRequest& request) {

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -91,11 +92,15 @@ class PathMemory {
   void note_edit() { history_.note_edit(); }
   void clear();
   /// Whether a request may begin with a picture that so many of its pixels along each axis are one of.
-  [[nodiscard]] bool may_begin(const ViewRequest& request, int divisor);
+  [[nodiscard]] bool may_begin(const ViewRequest& request, int divisor) const;
+  /// The first of these that it may begin with; of all that are none, the first.
+  [[nodiscard]] int first_divisor(const ViewRequest& request, std::span<const int> divisors) const;
   [[nodiscard]] std::size_t bytes() const { return history_.bytes(); }
 
  private:
-  std::optional<ViewRequest> request_;
+  [[nodiscard]] bool is_of(const ViewRequest& request) const;
+
+  std::optional<ViewRequest> request_;  // with the samples of a settled picture
   PathHistory history_;
 };
 

@@ -45,7 +45,9 @@ class PathHistory {
   /// Whether pictures would be made better: one of an earlier scene has more pixels or samples than any since.
   [[nodiscard]] bool has_earlier() const { return !earlier_.empty(); }
   /// Whether that was led to by a picture of this size and so many samples. Only such ones are made better.
-  [[nodiscard]] bool knows(int width, int height, int samples) const;
+  [[nodiscard]] bool knows(int width, int height, int samples) const {
+    return find_earlier(width, height, samples) != nullptr;
+  }
 
   /// Remembers the light of a picture, and makes it what is to be shown: of the best earlier picture's size, with light
   /// as above. Layers, rays and counts stay those of the picture; layers that are of another size are left out.
@@ -66,6 +68,7 @@ class PathHistory {
     std::vector<std::uint32_t> light;
   };
 
+  [[nodiscard]] const Taken* find_earlier(int width, int height, int samples) const;
   [[nodiscard]] static bool is_finer(const Taken& a, const Taken& b);
   [[nodiscard]] static std::vector<float> shares(const Taken& now, const Taken& before, const Taken& best,
                                                  Threads threads);

@@ -52,29 +52,29 @@ auto value_at(const Between& x, const Between& y, int width, const At& at) {
   return along(y.low) * (1.0F - y.share) + along(y.high) * y.share;
 }
 
-/// Sums over the pixels within `kReach` of each.
-std::vector<float> sums_around(const std::vector<float>& values, int width, int height, Threads threads) {
-  std::vector<float> rows(values.size());
+enum class Along : std::uint8_t { Rows, Columns };
+
+/// Sums over the pixels within `kReach` of each, along one axis.
+std::vector<float> sums_along(Along axis, const std::vector<float>& values, int width, int height, Threads threads) {
+  const bool is_row = axis == Along::Rows;
+  const int last = (is_row ? width : height) - 1;
   std::vector<float> sums(values.size());
   parallel_for(static_cast<std::size_t>(height), threads, [&](std::size_t row) {
     const int y = static_cast<int>(row);
     for (int x = 0; x < width; ++x) {
+      const int at = is_row ? x : y;
       float sum = 0.0F;
-      for (int i = std::max(x - kReach, 0); i <= std::min(x + kReach, width - 1); ++i)
-        sum += values[index_of(i, y, width)];
-      rows[index_of(x, y, width)] = sum;
-    }
-  });
-  parallel_for(static_cast<std::size_t>(height), threads, [&](std::size_t row) {
-    const int y = static_cast<int>(row);
-    for (int x = 0; x < width; ++x) {
-      float sum = 0.0F;
-      for (int i = std::max(y - kReach, 0); i <= std::min(y + kReach, height - 1); ++i)
-        sum += rows[index_of(x, i, width)];
+      for (int i = std::max(at - kReach, 0); i <= std::min(at + kReach, last); ++i)
+        sum += values[is_row ? index_of(i, y, width) : index_of(x, i, width)];
       sums[index_of(x, y, width)] = sum;
     }
   });
   return sums;
+}
+
+/// The same along both.
+std::vector<float> sums_around(const std::vector<float>& values, int width, int height, Threads threads) {
+  return sums_along(Along::Columns, sums_along(Along::Rows, values, width, height, threads), width, height, threads);
 }
 
 /// The mean of a picture over what a pixel of a smaller one shows of it.
@@ -116,10 +116,11 @@ void PathHistory::note_edit() {
   now_.clear();
 }
 
-bool PathHistory::knows(int width, int height, int samples) const {
-  return std::any_of(earlier_.begin(), earlier_.end(), [&](const Taken& taken) {
+const PathHistory::Taken* PathHistory::find_earlier(int width, int height, int samples) const {
+  const auto found = std::find_if(earlier_.begin(), earlier_.end(), [&](const Taken& taken) {
     return taken.width == width && taken.height == height && taken.samples == samples;
   });
+  return found != earlier_.end() ? &*found : nullptr;
 }
 
 std::size_t PathHistory::bytes() const {
@@ -136,10 +137,8 @@ void PathHistory::refine(PathPicture& picture, int samples, Threads threads) {
   // Whoever begins again from few samples, without an edit, goes on from those.
   while (!now_.empty() && !is_finer(taken, now_.back())) now_.pop_back();
   now_.push_back(std::move(taken));
-  const auto before = std::find_if(earlier_.begin(), earlier_.end(), [&](const Taken& of) {
-    return of.width == picture.width && of.height == picture.height && of.samples == samples;
-  });
-  if (before == earlier_.end()) return;
+  const Taken* before = find_earlier(picture.width, picture.height, samples);
+  if (before == nullptr) return;
   const Taken& best = earlier_.back();
   combine(*before, best, shares(now_.back(), *before, best, threads), threads, picture);
 }
@@ -174,14 +173,21 @@ void PathHistory::combine(const Taken& before, const Taken& best, const std::vec
                           PathPicture& picture) {
   const int of_width = picture.width;
   const int of_height = picture.height;
+  // One that is as large is changed in its place: each pixel is read before it is written, and by no other.
+  PathPicture smaller;
   const bool is_as_large = of_width == best.width && of_height == best.height;
-  const PathPicture taken = is_as_large ? picture : std::exchange(picture, PathPicture());
-  const std::size_t count = pixel_count(best.width, best.height);
-  picture.width = best.width;
-  picture.height = best.height;
-  picture.radiance.resize(count);
-  picture.scene.resize(count);
-  picture.alpha.resize(count);
+  if (!is_as_large) {
+    smaller = std::exchange(picture, PathPicture());
+    const std::size_t count = pixel_count(best.width, best.height);
+    picture.width = best.width;
+    picture.height = best.height;
+    picture.radiance.resize(count);
+    picture.scene.resize(count);
+    picture.alpha.resize(count);
+    picture.rays = smaller.rays;
+    picture.pixels_hit = smaller.pixels_hit;
+  }
+  const PathPicture& taken = is_as_large ? picture : smaller;
   parallel_for(static_cast<std::size_t>(best.height), threads, [&](std::size_t row) {
     const Between y = between(static_cast<int>(row), best.height, of_height);
     for (int column = 0; column < best.width; ++column) {
@@ -198,8 +204,6 @@ void PathHistory::combine(const Taken& before, const Taken& best, const std::vec
       picture.alpha[i] = seen([&](std::size_t of) { return taken.alpha[of]; });
     }
   });
-  picture.rays = taken.rays;
-  picture.pixels_hit = taken.pixels_hit;
 }
 
 }  // namespace quoin
