@@ -1,7 +1,6 @@
 // Scenes, their types and their grids.
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -211,11 +210,10 @@ quoin_status fail(const Error& error) {
 }
 
 std::optional<quoin_array> taken_array(const quoin_array* given) {
-  constexpr std::array<std::int64_t, 10> kBytes = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
   auto array = taken(given);
   if (!array || array->strides[0] != 0 || array->strides[1] != 0 || array->strides[2] != 0) return array;
   if (array->scalar < QUOIN_UINT8 || array->scalar > QUOIN_FLOAT64) return array;
-  std::int64_t stride = kBytes.at(static_cast<std::size_t>(array->scalar));
+  auto stride = static_cast<std::int64_t>(size_of(static_cast<ScalarType>(array->scalar)));
   for (int axis = 2; axis >= 0; --axis) {
     array->strides[axis] = stride;
     // What is wrong with the shape is told by who reads it.
@@ -317,17 +315,11 @@ quoin_status quoin_scene_create(quoin_scene* out) {
 }
 
 quoin_status quoin_scene_load(const char* path, quoin_scene* out) {
-  return guarded([&] {
-    if (path == nullptr || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "path or out is null");
-    return give(load_scene(std::filesystem::path(path), {}, {}, progress()), out);
-  });
+  return quoin_scene_load_with(path, nullptr, out);
 }
 
 quoin_status quoin_scene_load_bytes(const void* data, std::size_t bytes, quoin_scene* out) {
-  return guarded([&] {
-    if ((data == nullptr && bytes > 0) || out == nullptr) return fail(QUOIN_INVALID_ARGUMENT, "data or out is null");
-    return give(load_scene(std::span(static_cast<const std::byte*>(data), bytes), {}, {}, progress()), out);
-  });
+  return quoin_scene_load_bytes_with(data, bytes, nullptr, out);
 }
 
 quoin_status quoin_scene_load_with(const char* path, const quoin_load_options* options, quoin_scene* out) {
