@@ -184,7 +184,7 @@ inline Rays lanes_from(const RayPacket& rays, int first) {
           rays.max_t.data() + first};
 }
 
-// Some lanes of `Starts`.
+// Lanes from a place in memory on.
 template <class Vector>
 inline Vector some(const void* from) {
   Vector out;

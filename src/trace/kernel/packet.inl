@@ -307,9 +307,7 @@ inline void trace_packet(const TreeView& tree, const RayPacket& rays, LaneHits& 
 
 template <class Vector, class T>
 inline Vector lanes_at(const RayPacket::Lanes<T>& from, std::size_t first) {
-  Vector out;
-  std::memcpy(&out, from.data() + first, sizeof out);
-  return out;
+  return some<Vector>(from.data() + first);
 }
 
 // The distances of the faces met by the lanes from `first` on, in double precision, and which way rays go through them,

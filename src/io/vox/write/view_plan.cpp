@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <set>
+#include <tuple>
 
 #include "core/srgb.h"
 #include "io/text.h"
@@ -22,9 +23,10 @@ bool is_same(const FileCamera& a, const FileCamera& b) {
   return a.camera == b.camera && a.focus_distance == b.focus_distance;
 }
 
-bool has_same_sun(const Look& a, const Look& b) {
-  return a.sun == b.sun && a.sun_angle_radians == b.sun_angle_radians && a.sun_brightness == b.sun_brightness &&
-         a.sun_colour == b.sun_colour && a.sun_is_seen == b.sun_is_seen;
+// What of a look the sun is: of one that may be changed, or not.
+template <class AnyLook>
+auto sun_of(AnyLook& look) {
+  return std::tie(look.sun, look.sun_angle_radians, look.sun_brightness, look.sun_colour, look.sun_is_seen);
 }
 
 std::vector<FileCamera> wanted_cameras(const LoadedScene& loaded, const Document& document) {
@@ -59,11 +61,7 @@ void plan_cameras(const LoadedScene& loaded, const VoxSource& source, ViewPlan& 
 bool says_more(const FileLook& all) {
   FileLook only_sun;
   only_sun.look.sky = SkyModel::Uniform;
-  only_sun.look.sun = all.look.sun;
-  only_sun.look.sun_angle_radians = all.look.sun_angle_radians;
-  only_sun.look.sun_brightness = all.look.sun_brightness;
-  only_sun.look.sun_colour = all.look.sun_colour;
-  only_sun.look.sun_is_seen = all.look.sun_is_seen;
+  sun_of(only_sun.look) = sun_of(all.look);
   only_sun.develop.tone = ToneCurve::Aces;
   return all.look != only_sun.look || all.develop != only_sun.develop || !all.environment.empty();
 }
@@ -86,7 +84,7 @@ ViewPlan plan_view(const LoadedScene& loaded, const VoxSource& source, bool is_n
     return plan;
   }
   const auto before = look_of(source.document);
-  if (!before || !has_same_sun(before->look, wanted)) plan.sun = wanted;
+  if (!before || sun_of(before->look) != sun_of(wanted)) plan.sun = wanted;
   plan.has_more_settings = is_new && loaded.look && says_more(*loaded.look);
   return plan;
 }
