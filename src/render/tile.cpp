@@ -45,7 +45,7 @@ void Tile::take_sample(int sample) {
   sample_seed_ = hash_of(static_cast<std::uint32_t>(sample), 0);
   sample_number_ = sample;
   const PixelPoint point = sample_point(sample);
-  if (far_ != nullptr) context_->impostors->draw(column_, row_, point, *far_);
+  if (far_ != nullptr) context_->impostors->draw(column_, row_, sample, *far_);
   RayPacket rays;
   for (int y = 0; y < kEdge; y += kBlock) {
     for (int x = 0; x < kEdge; x += kBlock) {

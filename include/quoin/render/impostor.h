@@ -38,28 +38,28 @@ class DensityTree;
 struct ImpostorFaces;
 
 struct ImpostorOptions {
-  /// Texels a side of the finest snapshots; twice as many for grids that are wider than so many voxels.
-  /// Requires: 16 to 1,024.
+  /// Texels a side of the snapshots; twice as many for grids that are wider than so many voxels. Requires: 16 to 1,024.
   int edge = 128;
 };
 
-/// What 26 snapshots from all around see of a grid's opaque voxels and of its field, by which it is drawn where it is
-/// small in the picture.
+/// The opaque surface of a grid and its field as 26 snapshots from all around see it, by which the grid is drawn where
+/// it is small in the image.
 ///
-/// A texel of a snapshot knows exactly which face of which voxel it saw. An impostor holds these faces, each once, with
-/// the views that saw it, and draws those that the views nearest to the camera's direction saw: as exact squares where
-/// voxels are larger than texels, as squares of a texel's size where they are smaller. The texels of coarser snapshots,
-/// each of half as many a side, are among those of the finest one, so their faces serve for grids that span fewer
-/// pixels. Holds types and not colours: what the registry says of a type counts when it is drawn. Transparent voxels
-/// are left out: whoever draws an impostor traces them besides.
+/// Where a pixel spans few voxels, each face is drawn as it is. Where it spans many, the surface is drawn in cells of
+/// 2, 4, 8, 16 or 32 voxels: each has 4^3 bits that say where in it the surface lies, and for each of the 26 views a
+/// face that this view saw there. A ray is followed through the bits, which contain the whole surface, so there are no
+/// holes; the bit that it meets is lit with the face of one of the three views around the direction to the camera. One
+/// size of cells fades into the next as the distance grows, pixel by pixel; an image never depends on the images before.
+/// Impostors hold types and not colours: the registry's colours at the time of drawing count. Transparent voxels are
+/// left out; the renderer traces them.
 ///
-/// The surface of a field is held in pieces of its tangent planes, one at each edge of the lattice of samples that it
-/// crosses, with the normal of the traced surface; they are drawn by the same code, and hide voxels and are hidden.
+/// The surface of a field is held in pieces of its tangent planes (surfels), one at each edge of the lattice of samples
+/// that it crosses, with the normal of the traced surface.
 ///
-/// Copies share what they hold. Memory: 36 bytes a face and 20 for each coarser size that shows it.
+/// Copies share what they hold. Memory: about 70 bytes per face.
 /// Threads: any number may read at once.
 /// Source: surfels of H. Pfister et al., "Surfels: surface elements as rendering primitives" (2000), taken from layered
-///         views as there, but of known shape.
+///         views as there; shading chosen from views as C. Buehler et al., "Unstructured lumigraph rendering" (2001).
 class Impostor {
  public:
   /// Of no grid.

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -11,6 +12,7 @@
 
 #include "light/corner_light.h"
 #include "light/occlusion_directions.h"
+#include "render/impostor/cells.h"
 #include "render/impostor/seen.h"
 #include "render/shell/shell.h"
 #include "scene/tracer/tree_cache.h"
@@ -24,6 +26,13 @@ constexpr std::int64_t kMaxVoxels = std::int64_t{1} << 26;  // of the box that f
 int edge_for(const ContentSphere& content, const ImpostorOptions& options) {
   const double voxels = 2.0 * snapshot_camera(content, 0, options.edge).half_size();
   return voxels <= options.edge ? options.edge : 2 * options.edge;
+}
+
+// The log2 of the width of cells whose bits are as wide as a snapshot's texels.
+int first_width_for(const ContentSphere& content, int edge) {
+  int log2_width = 2;
+  while (log2_width < 10 && std::ldexp(edge, log2_width - 2) < 2.0 * content.radius) ++log2_width;
+  return log2_width;
 }
 
 std::uint8_t packed(const FaceOcclusion& corners) {
@@ -128,6 +137,7 @@ struct Subject {
   ContentSphere content;
   IBox box;  // of what is drawn
   int edge = 0;
+  int first_width = 0;                 // see ImpostorFaces
   std::optional<ImpostorShell> shell;  // none where there are very many faces
   FieldSurfels surfels;
   bool is_left_to_rays = false;
@@ -142,6 +152,7 @@ struct Subject {
     // Beyond that, a ray for each texel takes less time.
     const std::int64_t max_faces = std::int64_t{kImpostorViews} * edge * edge;
     shell = ImpostorShell::build(tree, kMaxVoxels, max_faces);
+    if (!shell) first_width = first_width_for(content, edge);
     if (field == nullptr) return;
     auto found = surfels_of(field->field(), static_cast<std::size_t>(max_faces));
     is_left_to_rays = !shell || !found;
@@ -180,16 +191,33 @@ void put_faces(const Subject& subject, const std::vector<SeenFace>& seen, KnownF
   count_open_rays(*subject.opaque, subject.field, fresh, out);
 }
 
+void put_levels(const Subject& subject, const std::vector<SeenFace>& seen, ImpostorFaces& out) {
+  std::size_t level = 0;
+  int width = subject.first_width;  // log2
+  if (width == 0) {
+    out.levels[level++] = seen_faces(seen, subject.content);
+    out.unseen = unseen_faces(seen, subject.content);
+    ++width;
+  }
+  SurfaceCells cells(seen, subject.content, subject.edge, width);
+  if (!subject.shell) cells.fill_from(*subject.opaque);
+  const auto is_solid = [&](IVec3 voxel) {
+    return subject.shell ? subject.shell->is_occupied(voxel) : subject.opaque->is_occupied(voxel);
+  };
+  for (; level < out.levels.size(); ++level) {
+    out.levels[level] = cells.level(is_solid);
+    cells.halve();
+  }
+}
+
 std::shared_ptr<const ImpostorFaces> faces_of(const Subject& subject, const std::vector<SeenFace>& seen,
                                               KnownFaces known) {
   auto faces = std::make_shared<ImpostorFaces>();
   faces->edge = subject.edge;
   faces->is_whole = subject.shell.has_value() && subject.field == nullptr;
   faces->centre = subject.content.centre;
-  for (std::size_t level = 0; level < faces->levels.size(); ++level) {
-    faces->levels[level] = faces_of_level(seen, level, subject.edge >> level, subject.content);
-  }
-  faces->unseen = unseen_faces(seen, subject.content);
+  faces->first_width = subject.first_width;
+  put_levels(subject, seen, *faces);
   put_faces(subject, seen, std::move(known), *faces);
   return faces;
 }

@@ -28,7 +28,7 @@ class FarTile {
       : pass_(&pass), view_(&view), rays_(&rays), lighting_(&lighting), mode_(mode), picture_(&picture) {}
 
   void draw(int column, int row) {
-    pass_->draw(column, row, PixelPoint{}, *far_);
+    pass_->draw(column, row, 0, *far_);
     RayPacket rays;
     for (int y = row; y < row + kTile; y += kBlock) {
       for (int x = column; x < column + kTile; x += kBlock) {

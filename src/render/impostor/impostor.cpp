@@ -82,8 +82,8 @@ SnapshotCamera snapshot_camera(const ContentSphere& content, int view, int edge)
 std::size_t ImpostorFaces::bytes() const {
   const auto of_level = [](const Level& level) {
     return level.views.size() * (3 * sizeof(float) + 2 * sizeof(std::uint32_t)) +
-           level.slope[0].size() * 4 * sizeof(float) +
-           level.groups.views.size() * (6 * sizeof(float) + sizeof(std::uint32_t));
+           (level.reach[0].size() + level.slope[0].size()) * 2 * sizeof(float) +
+           level.groups.views.size() * (6 * sizeof(float) + sizeof(std::uint32_t)) + level.cells.size() * sizeof(Cell);
   };
   std::size_t sum = sizeof(*this) + faces.size() * sizeof(Face) + surfels.size() * sizeof(Surfel) + of_level(unseen);
   for (const Level& level : levels) sum += of_level(level);

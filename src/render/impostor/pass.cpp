@@ -1,4 +1,5 @@
 #include "render/impostor/pass.h"
+#include "render/impostor/level.h"
 #include "scene/tracer/placed_grid.h"
 
 #include <algorithm>
@@ -16,6 +17,8 @@ namespace {
 
 constexpr int kBlock = CameraRays::kBlock;
 constexpr std::size_t kLanes = RayPacket::kSize;
+// In the numbers of jobs: levels, and the crevices.
+constexpr std::int32_t kParts = ImpostorFaces::kLevels + 1;
 
 // Its index in SceneTracer::placed; -1 where it is not there.
 std::int32_t index_of(const std::vector<PlacedGrid>& placed, InstanceHandle instance) {
@@ -43,6 +46,7 @@ ImpostorPass::ImpostorPass(const SceneTracer& tracer, std::span<const FarInstanc
       height_(height),
       across_((width + kTile - 1) / kTile),
       down_((height + kTile - 1) / kTile),
+      forward_(camera.forward),
       draw_(raster::draw()) {
   const std::vector<PlacedGrid>& placed = placed_in(tracer);
   const ImpostorScreen screen(camera, width, height);
@@ -77,26 +81,32 @@ const std::vector<std::uint32_t>& ImpostorPass::bin_of(int column, int row) cons
   return bins_[static_cast<std::size_t>(row / kTile * across_ + column / kTile)];
 }
 
-void ImpostorPass::draw(int column, int row, PixelPoint point, raster::Canvas& canvas) const {
+void ImpostorPass::draw(int column, int row, int sample, raster::Canvas& canvas) const {
   canvas.clear();
+  const PixelPoint point = sample_point(sample);
   const double x = column + point.x - 0.5 * width_;
   const double y = row + point.y - 0.5 * height_;
+  const std::vector<std::uint32_t>& bin = bin_of(column, row);
+  if (std::any_of(bin.begin(), bin.end(), [&](std::uint32_t i) { return drawn_[i].coarser > 0; })) {
+    canvas.set_pattern(column, row, static_cast<std::uint32_t>(sample));
+  }
   raster::Job job;
-  for (const std::uint32_t i : bin_of(column, row)) {
+  job.views = kAllImpostorViews;
+  for (const std::uint32_t i : bin) {
     const DrawnImpostor& drawn = drawn_[i];
     const PixelArea& area = drawn.area;
-    job.id = static_cast<std::int32_t>(i);
     job.left = std::max(area.left - column, 0), job.right = std::min(area.right - column, kTile);
     job.top = std::max(area.top - row, 0), job.bottom = std::min(area.bottom - row, kTile);
     if (is_hidden(drawn, job, canvas)) continue;
-    job.level = &drawn.faces->levels[drawn.level];
-    job.views = drawn.views;
     raster::set_aim(drawn.aim, x, y, job);
-    draw_(job, canvas);
-    if (!drawn.has_unseen()) continue;
-    job.level = &drawn.faces->unseen;
-    job.views = ~0U;
-    draw_(job, canvas);
+    std::array<DrawnImpostor::Part, DrawnImpostor::kMaxParts> room;
+    for (const DrawnImpostor::Part& part : drawn.parts(room)) {
+      job.id = static_cast<std::int32_t>(i) * kParts + static_cast<std::int32_t>(part.level);
+      job.level = &drawn.faces->level(part.level);
+      job.share = part.share;
+      job.near = drawn.near;
+      draw_(job, canvas);
+    }
   }
 }
 
@@ -109,15 +119,14 @@ bool ImpostorPass::is_hidden(const DrawnImpostor& drawn, const raster::Job& job,
   return true;
 }
 
-double ImpostorPass::distance_to(const DrawnImpostor& drawn, std::size_t number, const Ray& ray) {
-  const ImpostorFaces::Face& face = drawn.faces->faces[number];
-  if (face.in_field) return distance_to_surfel(drawn, face, drawn.faces->surfel_of(number), ray);
-  const FaceFrame& frame = frame_of(face.direction);
-  const int axis = frame.axis;
-  const double plane = face.voxel[axis] + (frame.sign > 0 ? 1.0 : 0.0) - drawn.faces->centre[axis];
-  const DVec3 row{drawn.axes[0][axis], drawn.axes[1][axis], drawn.axes[2][axis]};
-  return ((plane - drawn.offset[axis]) * drawn.aim.voxel_size - glm::dot(row, ray.origin)) /
-         glm::dot(row, ray.direction);
+double ImpostorPass::distance_to(const DrawnImpostor& drawn, const ImpostorFaces::Level& level, std::size_t number,
+                                 const Ray& ray) {
+  const auto after = std::upper_bound(level.begin.begin(), level.begin.end(), static_cast<std::uint32_t>(number));
+  const std::size_t axis = static_cast<std::size_t>(after - level.begin.begin() - 1) / 2;
+  const auto a = static_cast<int>(axis);
+  const double plane = level.centre[axis][number];
+  const DVec3 row{drawn.axes[0][a], drawn.axes[1][a], drawn.axes[2][a]};
+  return ((plane - drawn.offset[a]) * drawn.aim.voxel_size - glm::dot(row, ray.origin)) / glm::dot(row, ray.direction);
 }
 
 double ImpostorPass::distance_to_surfel(const DrawnImpostor& drawn, const ImpostorFaces::Face& face,
@@ -145,10 +154,21 @@ void ImpostorPass::find(int column, int row, const RayPacket& rays, const raster
     const auto i = static_cast<std::size_t>(lane);
     const std::uint32_t bit = 1U << lane;
     if (std::isinf(canvas.depth[first + i])) continue;
-    const DrawnImpostor& drawn = drawn_[static_cast<std::size_t>(canvas.id[first + i])];
-    const auto number = static_cast<std::size_t>(canvas.face[first + i]);
+    const std::int32_t id = canvas.id[first + i];
+    const DrawnImpostor& drawn = drawn_[static_cast<std::size_t>(id / kParts)];
+    const ImpostorFaces::Level& level = drawn.faces->level(static_cast<std::size_t>(id % kParts));
+    const raster::Met met = raster::Met::of(canvas.face[first + i]);
+    const std::size_t number = raster::face_of(level, met);
     const ImpostorFaces::Face& face = drawn.faces->faces[number];
-    const double t = distance_to(drawn, number, rays.ray(lane));
+    const Ray ray = rays.ray(lane);
+    double t = 0.0;
+    if (!level.cells.empty()) {
+      t = (canvas.depth[first + i] - glm::dot(ray.origin, forward_)) / glm::dot(ray.direction, forward_);
+    } else if (met.rectangle < level.begin[ImpostorFaces::kSides / 2]) {
+      t = distance_to(drawn, level, met.rectangle, ray);
+    } else {
+      t = distance_to_surfel(drawn, face, drawn.faces->surfel_of(number), ray);
+    }
     const bool is_hit = (hits.grids.hit & bit) != 0;
     if (is_hit ? hits.grids.t[i] < t || (hits.grids.t[i] == t && hits.placed[i] < drawn.placed) : rays.max_t[i] < t) {
       continue;

@@ -14,7 +14,7 @@
 
 namespace quoin {
 
-/// Of the lanes whose bit is set, what an impostor's face says beside what SceneHits hold.
+/// For the lanes whose bit is set, the face of an impostor with which the hit is lit.
 struct FarFaces {
   std::uint32_t found = 0;
   RayPacket::Lanes<const ImpostorFaces::Face*> face{};
@@ -32,11 +32,12 @@ class ImpostorPass {
   /// Whether anything may show in the tile from (`column`, `row`), multiples of kTile.
   [[nodiscard]] bool may_show(int column, int row) const { return !bin_of(column, row).empty(); }
 
-  /// Draws what shows in that tile, of rays through `point` of each pixel. Cost: about 10 ns a face.
-  void draw(int column, int row, PixelPoint point, raster::Canvas& canvas) const;
+  /// Draws the impostors that show in that tile, for the rays of one sample of each pixel. Cost: about 10 ns per
+  /// rectangle.
+  void draw(int column, int row, int sample, raster::Canvas& canvas) const;
 
   /// Puts what is nearer than `hits` into them: for the 4x4 pixels from (`column`, `row`), whose rays from the camera
-  /// these are. Faces are as if traced; voxels are those behind the faces.
+  /// these are. Faces and voxels are those with which the hit is lit.
   /// Requires: `canvas` is that of the tile.
   void find(int column, int row, const RayPacket& rays_in_view, const raster::Canvas& canvas, SceneHits& hits,
             FarFaces& faces) const;
@@ -45,8 +46,9 @@ class ImpostorPass {
   void fill_bins();
   [[nodiscard]] const std::vector<std::uint32_t>& bin_of(int column, int row) const;
   [[nodiscard]] static bool is_hidden(const DrawnImpostor& drawn, const raster::Job& job, const raster::Canvas& canvas);
-  // Along a ray to the plane of a face.
-  [[nodiscard]] static double distance_to(const DrawnImpostor& drawn, std::size_t face, const Ray& ray);
+  // Along a ray to the plane of a rectangle that lies along the axes.
+  [[nodiscard]] static double distance_to(const DrawnImpostor& drawn, const ImpostorFaces::Level& level,
+                                          std::size_t number, const Ray& ray);
   [[nodiscard]] static double distance_to_surfel(const DrawnImpostor& drawn, const ImpostorFaces::Face& face,
                                                  const ImpostorFaces::Surfel& surfel, const Ray& ray);
 
@@ -54,6 +56,7 @@ class ImpostorPass {
   int height_;
   int across_;
   int down_;
+  DVec3 forward_;
   raster::Draw draw_;
   std::vector<DrawnImpostor> drawn_;              // in the order of `placed`
   std::vector<std::vector<std::uint32_t>> bins_;  // of tiles: indices of these, nearest first

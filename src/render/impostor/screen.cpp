@@ -15,10 +15,15 @@ namespace quoin {
 namespace {
 
 constexpr double kRoom = 1.0 + 1e-6;  // for rounding
-// Faces are drawn from snapshots with at least as many texels a pixel.
-constexpr double kTexelsAPixel = 3.0;
-// Views whose faces are drawn, by level: more make fewer holes and cost more.
-constexpr std::array<int, ImpostorFaces::kLevels> kViews = {26, 6, 4, 4, 4};
+// Voxels per pixel from which on cells of 2^`log2_width` voxels are drawn. The bits of cells of 2 and 4 voxels are
+// exact; wider ones are a sixteenth of a pixel at most, so that outlines of 8 pixels stay (docs/decisions/120).
+double least_voxels(int log2_width) {
+  if (log2_width <= 2) return log2_width < 1 ? 0.0 : 3.0 * std::exp2(log2_width);
+  return 4.0 * std::exp2(log2_width);
+}
+// The share of a level's range, by the logarithm of distance, over which the next one comes in.
+constexpr double kFade = 0.4;
+constexpr std::int32_t kAllPixels = 1 << 24;
 
 // How far to one side of a camera a sphere at (across, deep) may be seen, at a distance of 1: never less than it is.
 // Requires: the sphere is in front of the camera's plane.
@@ -31,24 +36,41 @@ int clamped(double pixel, int size) {
   return static_cast<int>(std::clamp(pixel, 0.0, static_cast<double>(size)));
 }
 
-// The nearest views to a direction, as bits. Requires: it is finite and not 0.
-std::uint32_t nearest_views(DVec3 direction, int count) {
-  const DVec3 size = glm::abs(direction);
-  direction /= std::max({size.x, size.y, size.z});
-  std::array<std::pair<double, int>, kImpostorViews> order;
-  for (int i = 0; i < kImpostorViews; ++i)
-    order[static_cast<std::size_t>(i)] = {-glm::dot(direction, impostor_view(i)), i};
-  std::partial_sort(order.begin(), order.begin() + count, order.end());
-  std::uint32_t views = 0;
-  for (int i = 0; i < count; ++i) views |= 1U << order[static_cast<std::size_t>(i)].second;
-  return views;
+// Chooses the coarsest level for so many voxels per pixel, and how much of the next one is mixed in.
+void choose_level(double voxels, DrawnImpostor& drawn) {
+  const auto least = [&](std::size_t level) {
+    return least_voxels(drawn.faces->first_width + static_cast<int>(level));
+  };
+  while (drawn.level + 1 < ImpostorFaces::kLevels && voxels >= least(drawn.level + 1)) ++drawn.level;
+  if (drawn.level + 1 == ImpostorFaces::kLevels) return;
+  const double next = least(drawn.level + 1);
+  const double fade = std::pow(next / std::max(least(drawn.level), 1.0), kFade);
+  const double share = 1.0 - std::log(next / voxels) / std::log(fade);
+  drawn.coarser = static_cast<std::int32_t>(std::clamp(share, 0.0, 1.0) * (kAllPixels - 1));
 }
 
-// The coarsest level with kTexelsAPixel texels for each pixel that the content spans; the finest where none has.
-std::size_t level_for(int edge, double diameter_pixels) {
-  int level = 0;
-  while (level + 1 < ImpostorFaces::kLevels && (edge >> (level + 1)) >= kTexelsAPixel * diameter_pixels) ++level;
-  return static_cast<std::size_t>(level);
+// The views at the corners of the spherical triangle around a direction: a face of the cube around the grid, one of its
+// edges and one of its corners. Each is chosen as often as the direction, as their sum, has of it. `towards`: from the
+// content to the camera, of any length but 0.
+raster::NearViews near_views(DVec3 towards) {
+  const DVec3 size = glm::abs(towards);
+  std::array<int, 3> order = {0, 1, 2};
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return size[a] > size[b]; });
+  raster::NearViews near;
+  std::array<double, 3> shares{};
+  DVec3 view(0.0);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const int axis = order.at(i);
+    view[axis] = towards[axis] < 0.0 ? -1.0 : 1.0;
+    near.view.at(i) = static_cast<std::uint8_t>(*nearest_impostor_view(view));
+    const double next = i < 2 ? size[order.at(i + 1)] : 0.0;
+    shares.at(i) = (size[axis] - next) * std::sqrt(static_cast<double>(i + 1));
+  }
+  const double sum = shares[0] + shares[1] + shares[2];
+  for (std::size_t i = 0; i < 2; ++i) {
+    near.share.at(i) = static_cast<std::uint16_t>(std::lround(shares.at(i) / sum * (1 << 14)));
+  }
+  return near;
 }
 
 }  // namespace
@@ -87,6 +109,17 @@ std::optional<PixelArea> ImpostorScreen::area_of(const Sphere& sphere) const {
   return area;
 }
 
+std::span<const DrawnImpostor::Part> DrawnImpostor::parts(std::array<Part, kMaxParts>& room) const {
+  std::size_t count = 0;
+  const auto add = [&](std::size_t number, raster::Share share) {
+    if (share.first < share.end && faces->level(number).count() > 0) room.at(count++) = {number, share};
+  };
+  add(level, {coarser, kAllPixels});
+  if (level + 1 < ImpostorFaces::kLevels) add(level + 1, {0, coarser});
+  if (level == 0) add(ImpostorFaces::kLevels, {coarser, kAllPixels});
+  return std::span(room).first(count);
+}
+
 std::optional<DrawnImpostor> ImpostorScreen::drawn(const PlacedGrid& placed, std::int32_t index,
                                                    const Impostor& impostor) const {
   if (impostor.empty() || placed.level != 0) return std::nullopt;
@@ -101,14 +134,13 @@ std::optional<DrawnImpostor> ImpostorScreen::drawn(const PlacedGrid& placed, std
   const std::optional<PixelArea> area = area_of(sphere);
   if (!area) return std::nullopt;
   const glm::dmat3 axes = glm::transpose(placed.world_axes);
-  const DVec3 towards_camera = axes * (is_perspective_ ? -centre : -camera_.forward);
-  if (!is_finite(towards_camera) || towards_camera == DVec3(0.0)) return std::nullopt;
+  if (!is_finite(axes * centre) || centre == DVec3(0.0)) return std::nullopt;
   DrawnImpostor drawn;
   drawn.area = *area;
   drawn.placed = index;
   drawn.faces = &ImpostorFaces::of(impostor);
-  drawn.level = level_for(ImpostorFaces::of(impostor).edge, sphere.diameter);
-  drawn.views = nearest_views(towards_camera, kViews[drawn.level]);
+  drawn.near = near_views(axes * (is_perspective_ ? -centre : -camera_.forward));
+  choose_level((is_perspective_ ? sphere.seen.z : 1.0) / (focal_ * size), drawn);
   drawn.nearest = sphere.seen.z - sphere.radius * kRoom;
   drawn.axes = axes;
   drawn.offset = axes * centre * (-1.0 / size);

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include <quoin/render/impostor.h>
 #include <quoin/scene/camera.h>
@@ -26,16 +28,25 @@ struct PixelArea {
 struct DrawnImpostor {
   std::int32_t placed = 0;  ///< index into SceneTracer::placed
   const ImpostorFaces* faces = nullptr;
-  std::size_t level = 0;    ///< of the faces
-  std::uint32_t views = 0;  ///< faces that none of these saw are left out
-  PixelArea area;           ///< where it may show
-  double nearest = 0.0;     ///< depth
+  std::size_t level = 0;  ///< of the rectangles
+  /// Of how many of 2^24 pixels the next coarser level is drawn instead, so that none is seen to change. Depends on the
+  /// distance alone.
+  std::int32_t coarser = 0;
+  raster::NearViews near;
+  PixelArea area;        ///< where it may show
+  double nearest = 0.0;  ///< depth
   raster::Aim aim;
   glm::dmat3 axes{1.0};  ///< a point p of the view is axes * p / voxel_size + offset in the grid, about the
   DVec3 offset{0.0};     ///< content's centre
 
-  /// With the finest level, crevices that no view looked into are drawn too.
-  [[nodiscard]] bool has_unseen() const { return level == 0; }
+  /// A level and the pixels at which it is drawn.
+  struct Part {
+    std::size_t level = 0;  ///< of ImpostorFaces::level
+    raster::Share share;
+  };
+  static constexpr std::size_t kMaxParts = 3;
+  /// Those that are drawn, in this order. Crevices that no view looked into are drawn with level 0.
+  [[nodiscard]] std::span<const Part> parts(std::array<Part, kMaxParts>& room) const;
 };
 
 /// A picture that impostors are drawn into.

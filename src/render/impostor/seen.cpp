@@ -9,27 +9,12 @@
 
 #include <quoin/trace/packet.h>
 
+#include "render/impostor/morton.h"
 #include "render/impostor/raster/raster.h"
 #include "render/impostor/snapshot.h"
 
 namespace quoin {
 namespace {
-
-using Views = std::array<std::uint32_t, ImpostorFaces::kLevels>;
-
-// Whether a texel of the finest snapshot stands for those around it in one that is so often halved.
-bool is_sample(int level, int column, int row) {
-  const int mask = (1 << level) - 1;
-  const int middle = (1 << level) / 2;
-  return (column & mask) == middle && (row & mask) == middle;
-}
-
-void mark(Views& views, std::uint32_t bit, int column, int row) {
-  views[0] |= bit;
-  for (int level = 1; level < ImpostorFaces::kLevels; ++level) {
-    if (is_sample(level, column, row)) views[static_cast<std::size_t>(level)] |= bit;
-  }
-}
 
 raster::Aim aim_of(const SnapshotCamera& camera) {
   raster::Aim aim;
@@ -59,7 +44,8 @@ void draw_texels(const ImpostorFaces::Level& level, std::uint32_t views, const S
       for (int y = job.top; y < job.bottom; ++y) {
         for (int x = job.left; x < job.right; ++x) {
           const std::size_t i = raster::index_of(x, y);
-          if (!std::isinf(canvas.depth[i])) visit(column + x, row + y, static_cast<std::size_t>(canvas.face[i]));
+          if (!std::isinf(canvas.depth[i]))
+            visit(column + x, row + y, raster::face_of(level, raster::Met::of(canvas.face[i])));
         }
       }
     }
@@ -91,19 +77,17 @@ class SeenAgain {
       if (moved != kGone) affected_.push_back(moved);
     });
     draw_texels(now_level_, ~0U, camera, edge_, around, canvas_, [&](int column, int row, std::size_t face) {
-      mark(found_[face], bit, column, row);
+      found_[face] |= bit;
       shown_.push_back(static_cast<std::uint32_t>(face));
       if (column >= core.left && column < core.right && row >= core.top && row < core.bottom) {
         affected_.push_back(static_cast<std::uint32_t>(face));
       }
     });
     for (const std::uint32_t face : affected_) {
-      for (std::size_t level = 0; level < ImpostorFaces::kLevels; ++level) {
-        std::uint32_t& views = (*now_)[face].views[level];
-        views = (views & ~bit) | found_[face][level];
-      }
+      std::uint32_t& views = (*now_)[face].views;
+      views = (views & ~bit) | found_[face];
     }
-    for (const std::uint32_t face : shown_) found_[face] = {};
+    for (const std::uint32_t face : shown_) found_[face] = 0;
     shown_.clear();
     affected_.clear();
   }
@@ -126,21 +110,19 @@ class SeenAgain {
   ImpostorFaces::Level now_level_;
   const std::vector<std::uint32_t>* now_of_old_;
   std::vector<SeenFace>* now_;
-  std::vector<Views> found_;             // by face; all 0 between calls
+  std::vector<std::uint32_t> found_;     // views by face; all 0 between calls
   std::vector<std::uint32_t> shown_;     // those that are not
   std::vector<std::uint32_t> affected_;  // may come more than once
   raster::Canvas canvas_;
 };
 
-// With the views that its levels tell.
+// Requires: `faces` are whole.
 std::vector<SeenFace> seen_of(const ImpostorFaces& faces) {
   std::vector<SeenFace> seen(faces.faces.size());
   for (std::size_t i = 0; i < seen.size(); ++i) seen[i].face = {faces.faces[i].voxel, faces.faces[i].direction};
-  for (std::size_t level = 0; level < ImpostorFaces::kLevels; ++level) {
-    const ImpostorFaces::Level& from = faces.levels[level];
-    for (std::size_t i = 0; i < from.views.size(); ++i) {
-      if (from.views[i] != 0) seen[from.face[i]].views[level] = from.views[i];
-    }
+  const ImpostorFaces::Level& from = faces.levels[0];
+  for (std::size_t i = 0; i < from.views.size(); ++i) {
+    if (from.views[i] != 0) seen[from.face[i]].views = from.views[i];
   }
   return seen;
 }
@@ -180,7 +162,7 @@ class MetFaces {
           const int lane = std::countr_zero(left);
           const auto i = static_cast<std::size_t>(lane);
           SeenFace& seen = at({{hits.x[i], hits.y[i], hits.z[i]}, hits.face[i]});
-          mark(seen.views, 1U << view, column + lane % kTexelBlock, row + lane / kTexelBlock);
+          seen.views |= 1U << view;
         }
       }
     }
@@ -191,7 +173,7 @@ class MetFaces {
     for (const SeenFace& seen : found) {
       const FaceFrame& frame = frame_of(seen.face.direction);
       for (const int axis : {frame.u, frame.v}) {
-        for (const int sign : {-1, 1}) at(face_beside(seen.face, axis, sign, opaque)).views[0] |= seen.views[0];
+        for (const int sign : {-1, 1}) at(face_beside(seen.face, axis, sign, opaque)).views |= seen.views;
       }
     }
   }
@@ -202,7 +184,7 @@ class MetFaces {
   SeenFace& at(const VoxelFace& face) {
     if (last_ < faces_.size() && faces_[last_].face == face) return faces_[last_];
     const auto [found, is_new] = index_.try_emplace(face, static_cast<std::uint32_t>(faces_.size()));
-    if (is_new) faces_.push_back({face, nullptr, {}});
+    if (is_new) faces_.push_back({face, nullptr, 0});
     last_ = found->second;
     return faces_[last_];
   }
@@ -220,26 +202,13 @@ std::vector<SeenFace> unseen_of(const ImpostorShell& shell) {
   return faces;
 }
 
-// The bits of 21-bit numbers, three places apart.
-std::uint64_t spread(std::uint64_t bits) {
-  bits &= 0x1F'FFFF;
-  bits = (bits | bits << 32) & 0x001F'0000'0000'FFFF;
-  bits = (bits | bits << 16) & 0x001F'0000'FF00'00FF;
-  bits = (bits | bits << 8) & 0x100F'00F0'0F00'F00F;
-  bits = (bits | bits << 4) & 0x10C3'0C30'C30C'30C3;
-  return (bits | bits << 2) & 0x1249'2492'4924'9249;
-}
-
 // By direction, then along a curve that keeps neighbours together.
 std::vector<SeenFace> sorted(const std::vector<SeenFace>& faces, IVec3 least) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keys;
   keys.reserve(faces.size());
   for (const SeenFace& seen : faces) {
-    std::uint64_t key = static_cast<std::uint64_t>(seen.face.direction) << 61;
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto coordinate = static_cast<std::uint64_t>(std::int64_t{seen.face.voxel[axis]} - least[axis]);
-      key |= spread(std::min<std::uint64_t>(coordinate, 0xF'FFFF)) << axis;
-    }
+    const IVec3 from_least = glm::min(seen.face.voxel - least, IVec3(0xF'FFFF));
+    const std::uint64_t key = static_cast<std::uint64_t>(seen.face.direction) << 61 | morton_code(from_least);
     keys.emplace_back(key, static_cast<std::uint32_t>(keys.size()));
   }
   std::sort(keys.begin(), keys.end());
@@ -254,13 +223,13 @@ std::vector<SeenFace> sorted(const std::vector<SeenFace>& faces, IVec3 least) {
 std::vector<SeenFace> faces_seen_of(const ImpostorShell& shell, const FieldSurfels& field, const IBox& box,
                                     const ContentSphere& content, int edge) {
   std::vector<SeenFace> faces = unseen_of(shell);
-  for (std::size_t i = 0; i < field.faces.size(); ++i) faces.push_back({field.faces[i], &field.surfels[i], {}});
+  for (std::size_t i = 0; i < field.faces.size(); ++i) faces.push_back({field.faces[i], &field.surfels[i], 0});
   const ImpostorFaces::Level level = all_faces(faces, content);
   raster::Canvas canvas;
   for (int view = 0; view < kImpostorViews; ++view) {
     const SnapshotCamera camera = snapshot_camera(content, view, edge);
     draw_texels(level, ~0U, camera, edge, texels_of(camera, box, edge), canvas,
-                [&](int column, int row, std::size_t face) { mark(faces[face].views, 1U << view, column, row); });
+                [&](int, int, std::size_t face) { faces[face].views |= 1U << view; });
   }
   return faces;
 }

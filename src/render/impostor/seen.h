@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -15,15 +14,11 @@
 
 namespace quoin {
 
-/// A face and the views that saw it, by level.
+/// A face and the views that saw it.
 struct SeenFace {
   VoxelFace face;
   const ImpostorFaces::Surfel* surfel = nullptr;  ///< null: of a voxel
-  std::array<std::uint32_t, ImpostorFaces::kLevels> views{};
-
-  [[nodiscard]] std::size_t side() const {
-    return static_cast<std::size_t>(face.direction) + (surfel == nullptr ? 0 : ImpostorFaces::kSides / 2);
-  }
+  std::uint32_t views = 0;
 };
 
 /// All faces of a shell and of a field, with what the 26 snapshots of `edge` texels a side see of them: by side,
@@ -40,24 +35,19 @@ struct SeenFace {
 [[nodiscard]] std::vector<SeenFace> faces_seen_after(const ImpostorFaces& before, const ImpostorShell& shell,
                                                      const ContentSphere& content, std::span<const IBox> changed);
 
-/// Those that were seen, by a ray for each texel, whatever the number of faces; at the finest level those too that
-/// share an edge with one that was seen: slivers that no texel's ray met. Cost: about 0.15 microseconds a covered
-/// texel.
+/// Returns the faces that a ray for each texel meets, and those that share an edge with one of these (slivers that no
+/// texel's ray meets); in any number of faces. Cost: about 0.15 microseconds per covered texel.
 [[nodiscard]] std::vector<SeenFace> faces_seen_by_rays(const OccupancyTree& opaque, const ContentSphere& content,
                                                        int edge);
 
-/// Those of `faces` that any view saw at a level, of snapshots `edge` texels a side there. Level::face counts in
-/// `faces`, which are sorted by direction.
-[[nodiscard]] ImpostorFaces::Level faces_of_level(const std::vector<SeenFace>& faces, std::size_t level, int edge,
-                                                  const ContentSphere& content);
-
-/// Those that no view saw at the finest level, as if every view had seen them.
-[[nodiscard]] ImpostorFaces::Level unseen_faces(const std::vector<SeenFace>& faces, const ContentSphere& content);
-
-/// Those that any view saw at the finest level, of their own size.
+/// Returns the level of the faces that any view saw. Level::face counts in `faces`, which are sorted by direction,
+/// those of voxels first.
 [[nodiscard]] ImpostorFaces::Level seen_faces(const std::vector<SeenFace>& faces, const ContentSphere& content);
 
-/// All of them, as if every view had seen them, of their own size.
+/// Returns the level of the faces that no view saw, as if every view had seen them.
+[[nodiscard]] ImpostorFaces::Level unseen_faces(const std::vector<SeenFace>& faces, const ContentSphere& content);
+
+/// Returns the level of all faces, as if every view had seen them.
 [[nodiscard]] ImpostorFaces::Level all_faces(const std::vector<SeenFace>& faces, const ContentSphere& content);
 
 }  // namespace quoin

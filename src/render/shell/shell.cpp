@@ -35,6 +35,31 @@ bool comes_before(const VoxelFace& a, const VoxelFace& b) {
   return false;
 }
 
+std::uint64_t exposed_bits(std::uint64_t own, std::uint64_t next, Direction direction) {
+  std::uint64_t neighbours = 0;
+  switch (direction) {
+    case Direction::PosX:
+      neighbours = (own >> 1 & 0x7777'7777'7777'7777U) | (next << 3 & 0x8888'8888'8888'8888U);
+      break;
+    case Direction::NegX:
+      neighbours = (own << 1 & 0xEEEE'EEEE'EEEE'EEEEU) | (next >> 3 & 0x1111'1111'1111'1111U);
+      break;
+    case Direction::PosY:
+      neighbours = (own >> 4 & 0x0FFF'0FFF'0FFF'0FFFU) | (next << 12 & 0xF000'F000'F000'F000U);
+      break;
+    case Direction::NegY:
+      neighbours = (own << 4 & 0xFFF0'FFF0'FFF0'FFF0U) | (next >> 12 & 0x000F'000F'000F'000FU);
+      break;
+    case Direction::PosZ:
+      neighbours = own >> 16 | next << 48;
+      break;
+    case Direction::NegZ:
+      neighbours = own << 16 | next >> 48;
+      break;
+  }
+  return own & ~neighbours;
+}
+
 ImpostorShell::ImpostorShell(const IBox& box) : origin_((floor_of(box.min, 2) - 1) * 4), size_(cells_around(box)) {
   cells_.resize(static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y) *
                 static_cast<std::size_t>(size_.z));
@@ -79,34 +104,10 @@ void ImpostorShell::copy_chunk(const OccupancyTree& tree, IVec3 chunk) {
 }
 
 std::uint64_t ImpostorShell::exposed(Direction direction, std::size_t cell) const {
-  const std::uint64_t own = cells_[cell];
-  const std::ptrdiff_t row = size_.x;
-  const std::ptrdiff_t layer = row * size_.y;
-  const auto beside = [&](std::ptrdiff_t step) {
-    return cells_[static_cast<std::size_t>(static_cast<std::ptrdiff_t>(cell) + step)];
-  };
-  std::uint64_t neighbours = 0;
-  switch (direction) {
-    case Direction::PosX:
-      neighbours = (own >> 1 & 0x7777'7777'7777'7777U) | (beside(1) << 3 & 0x8888'8888'8888'8888U);
-      break;
-    case Direction::NegX:
-      neighbours = (own << 1 & 0xEEEE'EEEE'EEEE'EEEEU) | (beside(-1) >> 3 & 0x1111'1111'1111'1111U);
-      break;
-    case Direction::PosY:
-      neighbours = (own >> 4 & 0x0FFF'0FFF'0FFF'0FFFU) | (beside(row) << 12 & 0xF000'F000'F000'F000U);
-      break;
-    case Direction::NegY:
-      neighbours = (own << 4 & 0xFFF0'FFF0'FFF0'FFF0U) | (beside(-row) >> 12 & 0x000F'000F'000F'000FU);
-      break;
-    case Direction::PosZ:
-      neighbours = own >> 16 | beside(layer) << 48;
-      break;
-    case Direction::NegZ:
-      neighbours = own << 16 | beside(-layer) >> 48;
-      break;
-  }
-  return own & ~neighbours;
+  const IVec3 towards = normal_of(direction);
+  const std::ptrdiff_t step = (std::ptrdiff_t{towards.z} * size_.y + towards.y) * size_.x + towards.x;
+  return exposed_bits(cells_[cell], cells_[static_cast<std::size_t>(static_cast<std::ptrdiff_t>(cell) + step)],
+                      direction);
 }
 
 std::int64_t ImpostorShell::count_faces() const {

@@ -21,6 +21,10 @@ struct VoxelFace {
 /// The order in which ImpostorShell lists faces: by direction, then by cell of 4^3 voxels, then by voxel; by z, y, x.
 [[nodiscard]] bool comes_before(const VoxelFace& a, const VoxelFace& b);
 
+/// Returns the voxels of a cell of 4^3 that have a face in `direction`: bit x + 4 y + 16 z. `next`: the cell on that
+/// side.
+[[nodiscard]] std::uint64_t exposed_bits(std::uint64_t own, std::uint64_t next, Direction direction);
+
 /// The faces between the voxels of a tree and what is not of them, as bits over the box around these voxels.
 ///
 /// Memory: a bit a voxel of the box and of what lies within four voxels of it.

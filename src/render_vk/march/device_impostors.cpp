@@ -18,17 +18,12 @@ constexpr std::uint32_t kFacesAGroup = 512;  // as far.comp has it
 constexpr std::uint32_t kSides = ImpostorFaces::kSides;
 constexpr std::uint32_t kIsSurfel = 8;  // as far.glsl has it
 constexpr std::uint32_t kSurfelHalvesShift = 4;
-constexpr std::uint32_t kAllViews = (1U << kImpostorViews) - 1U;
 
 Vec4 to_vec4(const raster::Vector& v, float w = 0.0F) {
   return {v[0], v[1], v[2], w};
 }
 
-const ImpostorFaces::Level& level_of(const ImpostorFaces& faces, std::size_t level) {
-  return level < ImpostorFaces::kLevels ? faces.levels[level] : faces.unseen;
-}
-
-// What fills groups up no view saw, so shaders pass it by.
+// Shaders skip the rectangles that fill groups up, which no view saw.
 std::vector<ShaderFarFace> packed(const ImpostorFaces& impostor, const ImpostorFaces::Level& level, std::size_t first,
                                   std::size_t count) {
   std::vector<ShaderFarFace> faces;
@@ -41,16 +36,28 @@ std::vector<ShaderFarFace> packed(const ImpostorFaces& impostor, const ImpostorF
     face.face = level.face[i];
     face.views = level.views[i];
     face.direction = direction;
-    if (direction < kSides / 2) continue;
+    if (direction < kSides / 2) {
+      const bool has_reach = !level.reach[0].empty();
+      face.centre.w = has_reach ? level.reach[0][i] : 0.5F;
+      face.along_v = has_reach ? level.reach[1][i] : 0.5F;
+      continue;
+    }
     face.direction = (direction - kSides / 2) | kIsSurfel;
     for (std::size_t k = 0; k < 2; ++k) {
       const float half = impostor.surfel_of(level.face[i]).half[k];
       face.direction |= static_cast<std::uint32_t>(std::lround(1024.0F * half)) << (kSurfelHalvesShift + 12 * k);
     }
     face.centre.w = level.slope[0][i];
-    face.slope_v = level.slope[1][i];
+    face.along_v = level.slope[1][i];
   }
   return faces;
+}
+
+std::vector<ShaderFarCell> packed(std::span<const ImpostorFaces::Cell> cells) {
+  std::vector<ShaderFarCell> out;
+  out.reserve(cells.size());
+  for (const ImpostorFaces::Cell& cell : cells) out.push_back({Vec4(cell.corner, 0.0F), cell.bits, cell.face});
+  return out;
 }
 
 std::vector<ShaderVoxelFace> packed(const ImpostorFaces& impostor, std::size_t first, std::size_t count) {
@@ -83,9 +90,9 @@ std::size_t entries_of(const ImpostorFaces& impostor) {
   return impostor.faces.size() + 2 * impostor.surfels.size();
 }
 
-// From a face's middle to where rays still meet it; as draw_faces has it.
-float reach_of(const ImpostorFaces::Level& level) {
-  return level.half + 1e-5F + 2e-6F * level.size;
+// How far beyond a rectangle's sides rays still meet it; as draw_faces has it.
+float room_of(const ImpostorFaces::Level& level) {
+  return 1e-5F + 2e-6F * level.size;
 }
 
 // Bits of the directions whose faces any ray of the area may go against. What is linear is least or greatest in a
@@ -120,10 +127,8 @@ void set_aim(const DrawnImpostor& drawn, int width, int height, ShaderFar& far) 
   far.across = to_vec4(job.across, job.across_at);
   far.down = to_vec4(job.down, job.down_at);
   far.ahead = to_vec4(job.ahead, job.ahead_at);
-  far.at = {job.column_at, job.row_at, 0.0F, 0.0F};
-  for (ShaderFarLevel* level : {&far.level, &far.unseen}) {
-    level->views = (level->views & kAllViews) | seen_sides(job, drawn.area) << kImpostorViews;
-  }
+  far.at = {job.column_at, job.row_at, room_of(drawn.faces->levels[drawn.level]), static_cast<float>(drawn.coarser)};
+  for (ShaderFarLevel* level : {&far.level, &far.coarser, &far.unseen}) level->sides = seen_sides(job, drawn.area);
   far.area = {drawn.area.left, drawn.area.top, drawn.area.right, drawn.area.bottom};
 }
 
@@ -162,14 +167,21 @@ Status DeviceImpostors::begin(const std::shared_ptr<const Impostor>& impostor, S
   const ImpostorFaces& from = ImpostorFaces::of(*impostor);
   std::uint64_t bytes = 0;
   for (std::size_t i = 0; i < sent.levels.size(); ++i) {
-    const std::size_t count = level_of(from, i).views.size();
-    sent.levels[i] = {bytes, static_cast<std::uint32_t>(count), ~0U};
+    const std::size_t count = from.level(i).count();
+    sent.levels[i] = {bytes, static_cast<std::uint32_t>(count), 0, 0, from.level(i).step, 0};
     bytes += count * sizeof(ShaderFarFace);
+  }
+  for (std::size_t i = 0; i < sent.levels.size(); ++i) {
+    sent.levels[i].cells = from.level(i).cells.empty() ? 0 : bytes;
+    bytes += from.level(i).cells.size() * sizeof(ShaderFarCell);
   }
   const auto place = memory_->allocate(bytes + entries_of(from) * sizeof(ShaderVoxelFace), "uploading impostors");
   if (!place) return place.error();
   sent.place = *place;
-  for (ShaderFarLevel& level : sent.levels) level.faces += place->address;
+  for (ShaderFarLevel& level : sent.levels) {
+    level.faces += place->address;
+    if (level.cells != 0) level.cells += place->address;
+  }
   sent.faces = place->address + bytes;
   sent.impostor = impostor;
   return {};
@@ -179,11 +191,19 @@ Status DeviceImpostors::send_some(Sent& sent, std::size_t& faces_left) {
   const ImpostorFaces& from = ImpostorFaces::of(*sent.impostor);
   Status done;
   while (done && sent.part < kParts && faces_left > 0) {
-    const bool is_level = sent.part < sent.levels.size();
-    const std::size_t all = is_level ? level_of(from, sent.part).views.size() : entries_of(from);
+    constexpr std::size_t kLevels = ImpostorFaces::kLevels + 1;
+    const bool is_level = sent.part < kLevels;
+    const bool is_cells = !is_level && sent.part < 2 * kLevels;
+    const ImpostorFaces::Level& level = from.level(sent.part % kLevels);
+    const std::size_t all = is_level ? level.count() : is_cells ? level.cells.size() : entries_of(from);
     const std::size_t count = std::min(all - sent.at, faces_left);
-    if (is_level) {
-      const std::vector<ShaderFarFace> some = packed(from, level_of(from, sent.part), sent.at, count);
+    if (is_cells) {
+      const std::vector<ShaderFarCell> some = packed(std::span(level.cells).subspan(sent.at, count));
+      const std::uint64_t first = sent.levels[sent.part % kLevels].cells - sent.place.address;
+      if (count > 0)
+        done = memory_->write(sent.place, std::as_bytes(std::span(some)), first + sent.at * sizeof(ShaderFarCell));
+    } else if (is_level) {
+      const std::vector<ShaderFarFace> some = packed(from, level, sent.at, count);
       const std::uint64_t first = sent.levels[sent.part].faces - sent.place.address;
       done = memory_->write(sent.place, std::as_bytes(std::span(some)), first + sent.at * sizeof(ShaderFarFace));
     } else {
@@ -266,24 +286,28 @@ Status DeviceImpostors::draw(const Scene& scene, std::span<const FarInstance> se
     ShaderFar shown = shader_far(entry.whole, *drawn);
     set_aim(*drawn, width, height, shown);
     shown.origin = IVec4(next->origin, index);
+    shown.centre = Vec4(Vec3(drawn->faces->centre - DVec3(next->origin)), 0.0F);
     shown.first_number = static_cast<std::uint32_t>(number);
     placement.far.push_back(shown);
-    number += drawn->faces->faces.size();
-    if (number <= std::numeric_limits<std::uint32_t>::max()) continue;
-    return make_error(ErrorCode::LimitExceeded, "vulkan: impostors of more than 2^32 faces in a picture");
+    number += std::uint64_t{shown.level.count} + shown.coarser.count + shown.unseen.count;
+    // Shaders put the chosen view below the number.
+    if (number <= std::numeric_limits<std::uint32_t>::max() / 4) continue;
+    return make_error(ErrorCode::LimitExceeded, "vulkan: impostors of more than 2^30 rectangles in an image");
   }
   return {};
 }
 
 // What it is drawn from.
 ShaderFar DeviceImpostors::shader_far(const Sent& sent, const DrawnImpostor& drawn) {
-  const ImpostorFaces::Level& level = drawn.faces->levels[drawn.level];
-  const ImpostorFaces::Level& unseen = drawn.faces->unseen;
   ShaderFar far;
-  far.size = {level.half, unseen.half, reach_of(level), reach_of(unseen)};
-  far.level = sent.levels[drawn.level];
-  far.level.views = drawn.views;
-  if (drawn.has_unseen()) far.unseen = sent.levels.back();
+  std::array<DrawnImpostor::Part, DrawnImpostor::kMaxParts> room;
+  for (const DrawnImpostor::Part& part : drawn.parts(room)) {
+    const bool is_unseen = part.level == ImpostorFaces::kLevels;
+    (is_unseen ? far.unseen : part.level == drawn.level ? far.level : far.coarser) = sent.levels.at(part.level);
+  }
+  const raster::NearViews& near = drawn.near;
+  far.near = {std::uint32_t{near.view[0]} | std::uint32_t{near.view[1]} << 8 | std::uint32_t{near.view[2]} << 16,
+              near.share[0], near.share[1], 0};
   far.faces = sent.faces;
   far.voxel_faces = static_cast<std::uint32_t>(drawn.faces->faces.size() - drawn.faces->surfels.size());
   return far;
@@ -313,10 +337,11 @@ FarTiles far_tiles(const std::vector<ShaderFar>& far, int edge, int width, int h
     for (int y = area.y / edge; y <= (area.w - 1) / edge; ++y) {
       for (int x = area.x / edge; x <= (area.z - 1) / edge; ++x) {
         const auto tile = static_cast<std::size_t>(y * across + x);
-        for (std::uint32_t is_unseen = 0; is_unseen < 2; ++is_unseen) {
-          const std::uint32_t groups = groups_of((is_unseen == 0 ? far[i].level : far[i].unseen).count);
+        const std::array parts = {far[i].level, far[i].coarser, far[i].unseen};
+        for (std::size_t part = 0; part < parts.size(); ++part) {
+          const std::uint32_t groups = groups_of(parts.at(part).count);
           if (groups == 0) continue;
-          lists[tile].push_back({static_cast<std::uint32_t>(2 * i + is_unseen), tiles.ranges[tile].groups});
+          lists[tile].push_back({static_cast<std::uint32_t>(4 * i + part), tiles.ranges[tile].groups});
           tiles.ranges[tile].groups += groups;
         }
       }

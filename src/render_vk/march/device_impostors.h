@@ -51,7 +51,8 @@ class DeviceImpostors {
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:
-  static constexpr std::size_t kParts = ImpostorFaces::kLevels + 2;  // levels, those that no view saw, faces
+  // The rectangles of levels and unseen faces, the cells of these, and faces.
+  static constexpr std::size_t kParts = 2 * (ImpostorFaces::kLevels + 1) + 1;
 
   // An impostor in device memory, as far as it has been sent.
   struct Sent {

@@ -29,7 +29,7 @@ struct DevicePlaced {
   DVec3 high{0.0};
   bool is_far = false;                      ///< drawn from its impostor: the camera's rays pass it by
   const ImpostorFaces* impostor = nullptr;  ///< of that, until the next picture
-  std::size_t impostor_level = 0;           ///< of its faces
+  std::size_t impostor_level = 0;           ///< the finest one that is drawn
 };
 
 /// Where an instance is among those from `begin` on, or the one after it. They are in the order of their handles.

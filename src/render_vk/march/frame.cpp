@@ -335,6 +335,7 @@ void set_sample(int sample, int occlusion_rays, ShaderPush& push) {
     push.upright[static_cast<std::size_t>(axis)] = static_cast<float>(turn.upright[axis]);
   }
   push.first = sample == 0 ? 1 : 0;
+  push.sample = static_cast<std::uint32_t>(sample);
 }
 
 std::vector<float> srgb_thresholds() {

@@ -135,16 +135,17 @@ void add_far(const Space& space, View& view, MeshFrameData& data) {
   const bool is_perspective = view.rays.is_perspective();
   const DBox box{offset - impostor.radius, offset + impostor.radius};
   const std::uint8_t seen = visible_faces(box, space.eye, is_perspective);
-  for (const MeshImpostor::Part* part : {&impostor.level, &impostor.unseen}) {
-    FarDraw draw{part->faces,
+  for (const MeshImpostor::Part& part : impostor.parts) {
+    FarDraw draw{part.faces,
                  {},
                  impostor.faces,
                  instance,
                  Vec3(offset),
-                 part == &impostor.unseen,
+                 impostor.coarser << kMeshShareShift | (part.is_coarser ? kMeshIsCoarser : 0) |
+                     (part.faces.cells != 0 ? kMeshHasCells : 0),
                  is_perspective ? glm::length(middle) : depth};
-    for (std::size_t face = 0; face < 6 && part->faces.count > 0; ++face) {
-      if ((seen >> face & 1) != 0) append_run(part->begin[face], part->begin[face + 1], draw.runs);
+    for (std::size_t face = 0; face < 6; ++face) {
+      if ((seen >> face & 1) != 0) append_run(part.begin[face], part.begin[face + 1], draw.runs);
     }
     if (!draw.runs.empty()) data.far.push_back(std::move(draw));
   }
@@ -152,9 +153,14 @@ void add_far(const Space& space, View& view, MeshFrameData& data) {
 
 // Its faces say in which voxel of the grid they lie.
 void set_impostor(const Space& space, ShaderMeshInstance& out) {
+  const MeshImpostor& impostor = space.instance->impostor;
   out.home = IVec4(-space.instance->origin, space.instance->placed);
-  out.far_half = space.instance->impostor.half;
-  out.unseen_half = space.instance->impostor.unseen_half;
+  for (const MeshImpostor::Part& part : impostor.parts) {
+    out.far_steps.at(part.is_coarser ? 1 : 0) = part.faces.step;
+    out.far_cells.at(part.is_coarser ? 1 : 0) = part.faces.cells;
+  }
+  out.far_near = impostor.near;
+  out.far_centre = Vec4(Vec3(impostor.centre - DVec3(space.instance->origin)), 0.0F);
 }
 
 // A vector in view, or with w = 1 a point, in clip space.
@@ -300,7 +306,7 @@ Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInst
       const Space space(instance, grid->low, grid->high, camera);
       if (add_draws(space, *grid, view, data)) keep(space);
     }
-    if (instance.impostor.level.faces.count == 0) continue;
+    if (instance.impostor.parts.empty()) continue;
     const IVec3 chunk(glm::floor(instance.impostor.centre / kEdge));
     const Space space(instance, chunk, chunk, camera);
     add_far(space, view, data);

@@ -20,18 +20,18 @@ namespace quoin::vulkan {
 
 /// An impostor in device memory, as one instance shows it.
 struct MeshImpostor {
-  /// Of its faces some.
+  /// The rectangles of a level.
   struct Part {
-    ShaderFarLevel faces;                  ///< of no address: none
-    std::array<std::uint32_t, 7> begin{};  ///< of each direction of voxels' faces; the end of the last
+    ShaderFarLevel faces;                  ///< count 0: none
+    std::array<std::uint32_t, 7> begin{};  ///< of each direction; the end of the last
+    bool is_coarser = false;
   };
-  Part level;
-  Part unseen;
-  std::uint64_t faces = 0;
-  float half = 0.5F;  ///< from the middle of a face to its edges, voxels
-  float unseen_half = 0.5F;
-  DVec3 centre{0.0};    ///< of the content, in the grid
-  double radius = 0.0;  ///< of it, voxels: no face lies further away
+  std::vector<Part> parts;              ///< the levels that are drawn
+  std::uint32_t coarser = 0;            ///< the share of pixels, of 2^24, at which the coarser level is drawn
+  std::array<std::uint32_t, 4> near{};  ///< as ShaderFar
+  std::uint64_t faces = 0;              ///< address
+  DVec3 centre{0.0};                    ///< of the content, in the grid
+  double radius = 0.0;                  ///< of the content, voxels: no face lies further away
 };
 
 /// An instance whose meshes are drawn.
@@ -69,8 +69,8 @@ struct FarDraw {
   QuadRuns runs;  ///< of its faces, those whose direction the camera may see
   std::uint64_t faces = 0;
   std::uint32_t instance = 0;
-  Vec3 offset{0.0F};  ///< of the content's centre
-  bool is_unseen = false;
+  Vec3 offset{0.0F};          ///< of the content's centre
+  std::uint32_t numbers = 0;  ///< of ShaderMeshPush: the share of the pixels
   double distance = 0.0;
 };
 

@@ -13,7 +13,6 @@ const char* const kDoing = "drawing meshes";
 // Quads that 16-bit indices reach; more of them take several draws.
 constexpr std::uint32_t kQuadsAtOnce = 16'384;
 constexpr VkDeviceSize kAlignment = 32;
-constexpr std::uint32_t kAllViews = (1U << kImpostorViews) - 1U;
 
 VkDeviceSize aligned(VkDeviceSize size) {
   return (size + kAlignment - 1) / kAlignment * kAlignment;
@@ -350,8 +349,7 @@ void MeshPass::draw_far(VkCommandBuffer commands, const MeshFrameData& data, con
     values.instance = draw.instance;
     values.data = draw.level.faces;
     values.far_faces = draw.faces;
-    values.numbers |= step.mode | (draw.level.views & kAllViews) << kMeshViewsShift;
-    if (draw.is_unseen) values.numbers |= kMeshIsUnseen;
+    values.numbers |= step.mode | draw.numbers;
     push(commands, values);
     for (const auto& [first, end] : draw.runs) draw_quads(commands, first, end);
   }

@@ -82,6 +82,9 @@ constexpr std::uint32_t kBlockyFragment[] = {
 constexpr std::uint32_t kFarVertex[] = {
 #include "far.vert.inc"
 };
+constexpr std::uint32_t kFarFragment[] = {
+#include "far.frag.inc"
+};
 constexpr std::uint32_t kSmoothVertex[] = {
 #include "smooth.vert.inc"
 };
@@ -96,9 +99,9 @@ constexpr std::uint32_t kSmoothGlassFragment[] = {
 #include "smooth_glass.frag.inc"
 };
 
-constexpr std::array<std::span<const std::uint32_t>, 9> kCode = {
-    kSkyVertex,      kSkyFragment, kBlockyVertex,        kBlockyFragment,     kSmoothVertex,
-    kSmoothFragment, kFarVertex,   kBlockyGlassFragment, kSmoothGlassFragment};
+constexpr std::array<std::span<const std::uint32_t>, 10> kCode = {
+    kSkyVertex,      kSkyFragment, kBlockyVertex,        kBlockyFragment,      kSmoothVertex,
+    kSmoothFragment, kFarVertex,   kBlockyGlassFragment, kSmoothGlassFragment, kFarFragment};
 
 // Of vertices and of fragments, in `kCode`. Those that see through glass take seconds to compile on a processor, and
 // are apart from all others.
@@ -114,7 +117,7 @@ std::array<std::size_t, 2> shaders_of(const MeshWay& way) {
     case MeshWay::What::Smooth:
       return {4, 5};
     case MeshWay::What::Far:
-      return {6, 3};
+      return {6, 9};
   }
   return {};
 }

@@ -16,9 +16,11 @@ struct ShaderMeshInstance {
   std::array<Vec4, 2> diffuse{};
   IVec4 home{0, 0, 0, -1};
   float room = 0.0F;
-  float far_half = 0.0F;
-  float unseen_half = 0.0F;
   float first_sample = 0.5F;
+  std::array<float, 2> far_steps{};
+  std::array<std::uint64_t, 2> far_cells{};
+  std::array<std::uint32_t, 4> far_near{};
+  Vec4 far_centre{0.0F};
 };
 
 struct ShaderGlassDraw {
@@ -58,9 +60,10 @@ constexpr std::uint32_t kDrawGlassAdded = 9;
 [[nodiscard]] constexpr bool is_nearest_glass(std::uint32_t mode) {
   return mode >= kDrawGlassDepth && mode <= kDrawGlassAdded;
 }
-// and of an impostor which views count, and whether its faces are those that none saw.
-constexpr int kMeshViewsShift = 4;
-constexpr std::uint32_t kMeshIsUnseen = std::uint32_t{1} << 30;
+// and for an impostor the share of pixels, of 2^24, at which the coarser level is drawn, and whether that is this one.
+constexpr int kMeshShareShift = 4;
+constexpr std::uint32_t kMeshIsCoarser = std::uint32_t{1} << 28;
+constexpr std::uint32_t kMeshHasCells = std::uint32_t{1} << 29;
 
 struct ShaderMeshPush {
   std::array<Vec4, 4> clip{};
@@ -74,7 +77,7 @@ struct ShaderMeshPush {
   std::uint32_t numbers = 0;
 };
 
-static_assert(sizeof(ShaderMeshInstance) == 192 && sizeof(ShaderGlassDraw) == 32 && sizeof(ShaderGlassQuad) == 8);
+static_assert(sizeof(ShaderMeshInstance) == 240 && sizeof(ShaderGlassDraw) == 32 && sizeof(ShaderGlassQuad) == 8);
 static_assert(sizeof(ShaderMeshFrame) == 3 * 16 && sizeof(ShaderMeshPush) == 128);
 
 }  // namespace quoin::vulkan

@@ -58,14 +58,19 @@ std::array<std::uint32_t, 7> sides_of(const ImpostorFaces::Level& level) {
 
 vulkan::MeshImpostor impostor_of(const vulkan::ShaderFar& far, const vulkan::DevicePlaced& placed) {
   vulkan::MeshImpostor impostor;
-  impostor.level = {far.level, sides_of(placed.impostor->levels.at(placed.impostor_level))};
-  impostor.unseen = {far.unseen, sides_of(placed.impostor->unseen)};
+  const ImpostorFaces& faces = *placed.impostor;
+  const auto add = [&](const vulkan::ShaderFarLevel& part, std::size_t level, bool is_coarser) {
+    if (part.count > 0) impostor.parts.push_back({part, sides_of(faces.level(level)), is_coarser});
+  };
+  add(far.level, placed.impostor_level, false);
+  add(far.coarser, placed.impostor_level + 1, true);
+  add(far.unseen, ImpostorFaces::kLevels, false);
+  impostor.coarser = static_cast<std::uint32_t>(far.at.w);
+  impostor.near = far.near;
   impostor.faces = far.faces;
-  impostor.half = far.size.x;
-  impostor.unseen_half = far.size.y;
-  impostor.centre = placed.impostor->centre;
-  // Those in the corners of the largest box that there can be, with room for the faces' own size.
-  impostor.radius = 1.7321 * placed.impostor->levels.at(placed.impostor_level).size + 2.0 * far.size.x;
+  impostor.centre = faces.centre;
+  // The corners of the largest box in the content's sphere, with room for rounding.
+  impostor.radius = 1.7321 * faces.levels[0].size + 1.0;
   return impostor;
 }
 
@@ -240,7 +245,7 @@ Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(con
     // mesh, some may still be on their way.
     const vulkan::MeshStore::StoredGrid* mesh = store.find(found->mesh);
     found->is_far = mesh == nullptr || mesh->chunks.size() < scene->grids()[found->mesh.grid].grid.chunk_count() ||
-                    mesh->opaque_quads > std::int64_t{far.level.count} + far.unseen.count;
+                    mesh->opaque_quads > std::int64_t{far.level.count} + far.coarser.count + far.unseen.count;
     if (found->is_far) found->impostor = impostor_of(far, placed);
   }
   return shown_as;

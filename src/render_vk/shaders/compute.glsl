@@ -17,6 +17,8 @@ layout(push_constant) uniform Push {
   uint far_first;   // the tile's part of the list of impostors, and how many workgroups draw it
   uint far_count;
   uint far_groups;
+  uint sample_number;
+  uint pad;
 } push;
 
 #include "tile.glsl"

@@ -1,13 +1,14 @@
 #version 460
-// Draws the impostors of a tile, some faces an invocation: first the depth of the nearest at each pixel, then which
-// face that is. Of equally near ones the lower number: that of the instance that comes first, of its lower face.
+// Draws the impostors of a tile, some rectangles per invocation: first the depth of the nearest at each pixel, then
+// which rectangle that is. Among equally near ones the lower number wins: the instance that comes first, then its part
+// (level, coarser level, unseen faces), then the rectangle.
 #include "compute.glsl"
+#include "hash.glsl"
 #include "far.glsl"
 #include "faces.glsl"
 
 layout(constant_id = 0) const bool kFindsFaces = false;
 
-const uint kViews = 26;
 const uint kFacesAGroup = 512;
 const float kMargin = 0.01;  // pixels: for rounding
 
@@ -51,11 +52,22 @@ void put(ivec2 pixel, float depth, uint number) {
   }
 }
 
-void draw(Far far, vec3 q, uint side, uint number, float half_size, float reach) {
+// The pixels at which the part is drawn: those whose pattern is from x to before y.
+ivec2 share;
+
+bool is_shared(Far far, vec2 pixel) {
+  int pattern = pattern_at(far.area.xy + ivec2(pixel), push.sample_number);
+  return pattern >= share.x && pattern < share.y;
+}
+
+void draw(Far far, FarLevel level, vec3 q, uint side, vec2 reach, uint face, uint number) {
   int axis = int(side >> 1);
+  int u = kFaceU[side];
+  int v = kFaceV[side];
   float sign = (side & 1) == 0 ? 1.0 : -1.0;
-  vec3 half_box = vec3(half_size);
-  half_box[axis] = 0.0;
+  vec3 half_box = vec3(0.0);
+  half_box[u] = reach.x;
+  half_box[v] = reach.y;
   Rectangle rectangle = rectangle_of(far, q, half_box);
   if (!rectangle.is_shown) return;
   ivec2 to_tile = far.area.xy - push.corner;
@@ -68,9 +80,17 @@ void draw(Far far, vec3 q, uint side, uint number, float half_size, float reach)
       precise float along = (q[axis] - point[axis]) / towards;
       precise float depth = far.point.w + along * far.direction.w;
       vec3 off = abs(point + along * direction - q);
-      off[axis] = 0.0;
-      bool is_met = max(max(off.x, off.y), off.z) <= reach && towards * sign < 0.0 && 0.0 < depth;
-      if (is_met) put(ivec2(x, y) + to_tile, depth, number);
+      bool is_met = off[u] <= reach.x + far.at.z && off[v] <= reach.y + far.at.z && towards * sign < 0.0 && 0.0 < depth;
+      if (!is_met || !is_shared(far, vec2(x, y))) continue;
+      uint chosen = 0;
+      if ((level.cells.x | level.cells.y) != 0) {
+        FarCell cell = FarCells(level.cells.xy).at[face];
+        int bit = follow(cell, uintBitsToFloat(level.cells.z), axis, point, direction, along);
+        if (bit < 0) continue;
+        depth = max(depth, far.point.w + along * far.direction.w);
+        chosen = chosen_view(far.near, 64 * face + uint(bit));
+      }
+      put(ivec2(x, y) + to_tile, depth, number | chosen);
     }
   }
 }
@@ -98,8 +118,8 @@ void draw_surfel(Far far, vec3 q, vec2 slope, vec2 reach, uint side, uint number
       precise float along = rise / towards;
       precise float depth = far.point.w + along * far.direction.w;
       vec3 off = abs(from + along * direction);
-      bool is_met = off[u] <= reach.x && off[v] <= reach.y && towards * sign < 0.0 && 0.0 < depth;
-      if (is_met) put(ivec2(x, y) + to_tile, depth, number);
+      bool is_met = off[u] <= reach.x + far.at.z && off[v] <= reach.y + far.at.z && towards * sign < 0.0 && 0.0 < depth;
+      if (is_met && is_shared(far, vec2(x, y))) put(ivec2(x, y) + to_tile, depth, number);
     }
   }
 }
@@ -124,26 +144,33 @@ void main() {
   uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
   if (group >= push.far_groups) return;
   uvec2 part = part_of(group);
-  Far far = Fars(frame().fars).at[part.x >> 1];
-  bool is_unseen = (part.x & 1) != 0;
-  uvec4 level = is_unseen ? far.unseen : far.level;
-  uint sides = level.w >> kViews;
-  uint views = level.w & ((1u << kViews) - 1);
-  float half_size = is_unseen ? far.size.y : far.size.x;
-  float reach = is_unseen ? far.size.w : far.size.z;
+  Far far = Fars(frame().fars).at[part.x >> 2];
+  uint which = part.x & 3;
+  FarLevel level = far.level;
+  uint before = 0;
+  if (which == 1) {
+    before = level.faces.z;
+    level = far.coarser;
+  } else if (which == 2) {
+    before = level.faces.z + far.coarser.faces.z;
+    level = far.unseen;
+  }
+  int coarser = int(far.at.w);
+  share = which == 1 ? ivec2(0, coarser) : ivec2(coarser, 1 << 24);
   uint first = (group - part.y) * kFacesAGroup;
-  uint end = min(first + kFacesAGroup, level.z);
+  uint end = min(first + kFacesAGroup, level.faces.z);
   for (uint i = first + gl_LocalInvocationIndex; i < end; i += 64) {
-    uvec4 what = FarFaces(level.xy).at[i].what;
-    if ((what.y & views) == 0) continue;
+    uvec4 what = FarFaces(level.faces.xy).at[i].what;
+    if (what.y == 0) continue;
+    uint number = (far.faces.z + before + i) << 2;
     if ((what.z & kIsSurfel) != 0) {
-      vec4 centre = FarFaces(level.xy).at[i].centre;
+      vec4 centre = FarFaces(level.faces.xy).at[i].centre;
       vec2 halves = vec2(what.z >> kSurfelHalvesShift & 0xFFF, what.z >> (kSurfelHalvesShift + 12) & 0xFFF) / 1024.0;
-      draw_surfel(far, centre.xyz, vec2(centre.w, uintBitsToFloat(what.w)), halves + (half_size - 0.5 + kSurfelRoom),
-                  what.z & 7, far.faces.z + what.x);
+      draw_surfel(far, centre.xyz, vec2(centre.w, uintBitsToFloat(what.w)), halves + kSurfelRoom, what.z & 7, number);
       continue;
     }
-    if ((sides >> what.z & 1) == 0) continue;
-    draw(far, FarFaces(level.xy).at[i].centre.xyz, what.z, far.faces.z + what.x, half_size, reach);
+    if ((level.faces.w >> what.z & 1) == 0) continue;
+    vec4 centre = FarFaces(level.faces.xy).at[i].centre;
+    draw(far, level, centre.xyz, what.z, vec2(centre.w, uintBitsToFloat(what.w)), what.x, number);
   }
 }

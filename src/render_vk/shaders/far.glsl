@@ -1,14 +1,26 @@
-// Impostors: the faces of far instances, as render/impostor/raster/raster.inl draws them on the processor's side.
+// Impostors: the rectangles of far instances, as render/impostor/raster/raster.inl draws them on the processor.
 
-// A face of a level: the voxel's face that it stands for, and which of 26 views saw it.
+// A rectangle of a level.
 struct FarFace {
-  vec4 centre;  // voxels from the content's centre; w: of a surfel, its slope along u
-  uvec4 what;   // index among the impostor's faces, views, direction, of a surfel with kIsSurfel and half its
-                // sides; its slope along v
+  vec4 centre;  // voxels from the content's centre; w: half its side along u, or a surfel's slope along u
+  uvec4 what;   // index of the face that lights it, or of its cell; 0 for fillers; direction (for surfels with
+                // kIsSurfel and half its sides); half its side along v, or a surfel's slope along v
+};
+
+// The surface in a cube of 4^3 bits.
+struct FarCell {
+  vec4 corner;    // the least one, voxels from the content's centre
+  uvec2 bits;     // bit x + 4 y + 16 z
+  uint face[26];  // that a view saw there
+};
+
+struct FarLevel {
+  uvec4 faces;  // address of its rectangles, their number; bits of the sides that show
+  uvec4 cells;  // address of its cells, 0 where rectangles are faces; as a float, the width of their bits, voxels
 };
 
 // An instance in the picture. Vectors are in its grid, about the content's centre; rays depend on the pixel linearly,
-// from the upper left corner of its area. x, y, z of each vector; what stands at w is told besides.
+// from the upper left corner of its area. Each vector is x, y, z; w holds the value named after it.
 struct Far {
   vec4 point;  // of a pixel's ray, in the plane through the centre; w: the depth of that plane
   vec4 point_x;
@@ -19,23 +31,29 @@ struct Far {
   vec4 across;  // where points lie in the picture: ((across . q + across.w) / (ahead . q + ahead.w) + at.x, ...)
   vec4 down;
   vec4 ahead;
-  vec4 at;
-  vec4 size;    // xy: from a face's middle to its edges, at the level and of those that no view saw; zw: a bit further
-  ivec4 area;   // pixels: left, top, right, bottom, the last two exclusive
-  ivec4 origin; // of the tree's coordinates, in the grid; w: the instance
-  uvec4 level;  // address of its faces, how many; bits of views that count, and above them of directions that do
-  uvec4 unseen; // of those that no view saw: the same, all of them count
-  uvec4 faces;  // address of what is the same at all levels; number of the first among those of the picture; how many
-                // are of voxels
+  vec4 at;        // z: how far rays still meet a rectangle beyond its sides; w: the share of pixels, of 2^24, at which
+                  // the coarser level is drawn
+  vec4 centre;    // of the content, in the tree's coordinates
+  ivec4 area;     // pixels: left, top, right, bottom, the last two exclusive
+  ivec4 origin;   // of the tree's coordinates, in the grid; w: the instance
+  FarLevel level;
+  FarLevel coarser;
+  FarLevel unseen;  // the faces that no view saw
+  uvec4 near;       // the views around the direction to the camera, a byte each; how often the first two are chosen
+  uvec4 faces;    // address of VoxelFaces; number of the first rectangle among those of the picture; how many of the
+                  // faces are of voxels
 };
 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer FarFaces {
   FarFace at[];
 };
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer FarCells {
+  FarCell at[];
+};
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fars {
   Far at[];
 };
-// Which instances show in a tile: twice the instance, and one more for what no view saw; and the first workgroup.
+// Which instances show in a tile: ShaderFarPart.
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer FarParts {
   uvec2 at[];
 };
@@ -51,3 +69,49 @@ const float kSurfelRoom = 0.05;  // as render/impostor/raster/faces.h has them
 const float kSurfelLift = 0.5;
 
 const uint kNoFace = 0xFFFFFFFFu;
+
+// Which of two levels is drawn at a pixel: raster::Pattern.
+int pattern_at(ivec2 pixel, uint sample_number) {
+  return int((uint(pixel.x) * 12664745u + uint(pixel.y) * 9560333u + sample_number * 10368889u) & 0xFFFFFFu);
+}
+
+// The view whose face lights a bit of a cell, by lot: 0 to 2 of those in `near`.
+uint chosen_view(uvec4 near, uint number) {
+  uint at = mixed(number) >> 18;
+  return at < near.y ? 0 : at < near.y + near.z ? 1 : 2;
+}
+uint view_of(uvec4 near, uint chosen) {
+  return near.x >> 8 * chosen & 0xFF;
+}
+
+// Follows a ray, `point` + t * `direction` from the content's centre, through the bits of a cell, from where it enters
+// the cell's box at `along` through a side across axis `side`.
+// Returns the bit that it meets, with `along` there, or -1.
+int follow(FarCell cell, float bit_width, int side, vec3 point, vec3 direction, inout float along) {
+  const float kPast = 1e-3;  // bits: beyond the side that was entered, whatever the rounding
+  float scale = 1.0 / bit_width;
+  precise vec3 from = (point - cell.corner.xyz) * scale;
+  precise vec3 steps = direction * scale;
+  precise vec3 entered = from + along * steps;
+  entered[side] += steps[side] > 0.0 ? kPast : -kPast;
+  ivec3 at = ivec3(clamp(entered, vec3(0.0), vec3(3.0)));
+  for (int i = 0; i < 12; ++i) {
+    int bit = at.x + 4 * at.y + 16 * at.z;
+    if (((bit < 32 ? cell.bits.x : cell.bits.y) >> (bit & 31) & 1) != 0) return bit;
+    int next = -1;
+    float nearest = uintBitsToFloat(0x7F800000u);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (steps[axis] == 0.0) continue;
+      precise float until = (float(at[axis] + (steps[axis] > 0.0 ? 1 : 0)) - from[axis]) / steps[axis];
+      if (until < nearest) {
+        nearest = until;
+        next = axis;
+      }
+    }
+    if (next < 0) return -1;
+    at[next] += steps[next] > 0.0 ? 1 : -1;
+    if (at[next] < 0 || at[next] > 3) return -1;
+    along = max(along, nearest);
+  }
+  return -1;
+}

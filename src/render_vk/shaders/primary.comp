@@ -6,6 +6,7 @@
 #include "pairs.glsl"
 #include "camera.glsl"
 #include "count.glsl"
+#include "hash.glsl"
 #include "far.glsl"
 #include "faces.glsl"
 
@@ -34,7 +35,7 @@ vec3 place_on_surfel(ExactRay ray, Pair from_voxel, uint side, vec3 shape, vec2 
   return near + rest * d;
 }
 
-// The impostor that a face is of, by the face's number among those of all.
+// The impostor of a rectangle, by its number among those of all.
 Far far_with(uint number) {
   Fars fars = Fars(frame().fars);
   uint low = 0;
@@ -50,15 +51,39 @@ Far far_with(uint number) {
   return fars.at[low];
 }
 
-// Puts what is drawn of impostors at the pixel into `point`; answers the start of the instance's ray, and how far
-// behind it the face lies.
+// The level of a rectangle, by its number among those of the impostor's parts, which becomes that in its level.
+FarLevel level_with(Far far, inout uint index) {
+  if (index < far.level.faces.z) return far.level;
+  index -= far.level.faces.z;
+  if (index < far.coarser.faces.z) return far.coarser;
+  index -= far.coarser.faces.z;
+  return far.unseen;
+}
+
+// How far along a ray the plane of a rectangle is. `voxel`: from whose corner the ray's start is counted.
+Pair distance_to_rectangle(ExactRay ray, Pair from_voxel, Far far, FarFace rectangle, ivec3 voxel) {
+  int axis = int(rectangle.what.z >> 1);
+  float centre = far.centre[axis] - float(voxel[axis]);
+  Pair plane = sum_of(Pair(vec3(centre), vec3(0.0)), Pair(vec3(rectangle.centre[axis]), vec3(0.0)));
+  Pair from_plane = sum_of(plane, component(Pair(-from_voxel.high, -from_voxel.low), axis));
+  return quotient_of(from_plane, component(ray.direction, axis));
+}
+
+// Puts the impostor that shows at the pixel into `point`. Returns the start of the instance's ray, and how far behind
+// it the rectangle lies.
 bool find_far(Pair direction, float scale, inout Point point, out float depth, out float nearest) {
   uint number = FarPixels(frame().far_numbers).at[slot_of_pixel()];
   if (number == kNoFace) return false;
-  Far far = far_with(number);
-  uint index = number - far.faces.z;
-  bool is_surfel = index >= far.faces.w;
-  if (is_surfel) index = 3 * index - 2 * far.faces.w;
+  Far far = far_with(number >> 2);
+  uint index = (number >> 2) - far.faces.z;
+  FarLevel level = level_with(far, index);
+  FarFace rectangle = FarFaces(level.faces.xy).at[index];
+  bool is_cell = (level.cells.x | level.cells.y) != 0;
+  index = rectangle.what.x;
+  if (is_cell) index = FarCells(level.cells.xy).at[index].face[view_of(far.near, number & 3)];
+  bool is_surfel = (rectangle.what.z & kIsSurfel) != 0;
+  bool is_of_field = index >= far.faces.w;
+  if (is_of_field) index = 3 * index - 2 * far.faces.w;
   ivec4 face = VoxelFaces(far.faces.xy).at[index];
   uint what = uint(face.w);
   uint side = what >> 24 & 7;
@@ -68,20 +93,31 @@ bool find_far(Pair direction, float scale, inout Point point, out float depth, o
   ivec3 voxel = face.xyz - far.origin.xyz;
   ExactRay ray = exact_ray_in(placed, direction);
   depth = placed.start.w;
+  Pair start = start_from(ray, placed, voxel);
+  Pair t = Pair(vec3(0.0), vec3(0.0));
+  vec3 at;
   if (kHasFields && is_surfel) {
-    ivec4 shape = VoxelFaces(far.faces.xy).at[index + 1];
-    point.inside.xyz = place_on_surfel(ray, start_from(ray, placed, voxel), side, intBitsToFloat(shape.xyz),
-                                       intBitsToFloat(VoxelFaces(far.faces.xy).at[index + 2].xy), nearest);
-    point.inside.xyz += kSurfelLift * normal_of(uint(shape.w));
-    point.voxel = ivec4(voxel, i);
-    point.inside.w = depth * scale + nearest;
-    point.what = uvec4(what & 0xFFFF, uint(shape.w), kIsField | kSurface | kIsFar | light << 8,
-                       floatBitsToUint(nearest));
-    return true;
+    at = place_on_surfel(ray, start, side, intBitsToFloat(VoxelFaces(far.faces.xy).at[index + 1].xyz),
+                         intBitsToFloat(VoxelFaces(far.faces.xy).at[index + 2].xy), nearest);
+  } else {
+    t = distance_to_rectangle(ray, start, far, rectangle, voxel);
+    if (is_cell) {
+      float met = uintBitsToFloat(FarPixels(frame().far_depths).at[slot_of_pixel()]);
+      t = Pair(vec3((met - depth) * scale), vec3(0.0));
+    }
+    nearest = t.high.x;
+    at = sum_of(start, product_of(t, ray.direction)).high;
   }
-  nearest = distance_to_face(ray, start_from(ray, placed, voxel), side).high.x;
   point.voxel = ivec4(voxel, i);
   point.inside.w = depth * scale + nearest;
+  if (kHasFields && is_of_field) {
+    uint normal = uint(VoxelFaces(far.faces.xy).at[index + 1].w);
+    point.inside.xyz = at + kSurfelLift * normal_of(normal);
+    point.what = uvec4(what & 0xFFFF, normal, kIsField | kSurface | kIsFar | light << 8, floatBitsToUint(nearest));
+    return true;
+  }
+  // Light puts it onto the face, which may lie elsewhere in the rectangle's cell.
+  point.inside.xyz = at;
   point.what = uvec4(what & 0xFFFF, side, kSurface | kIsFar | light << 8, floatBitsToUint(nearest));
   return true;
 }
@@ -151,8 +187,9 @@ Point first_hit(vec2 at) {
       meet_content(content, i, placed, direction, scale, nearest, point);
     }
   }
-  // Inside a voxel the place does not count.
-  if (point.voxel.w >= 0 && kind_of(point) == kSurface && !is_of_field(point)) {
+  // Inside a voxel the position does not count; that on an impostor is known.
+  bool is_far = (point.what.z & kIsFar) != 0;
+  if (point.voxel.w >= 0 && kind_of(point) == kSurface && !is_of_field(point) && !is_far) {
     point.inside.xyz = exact_place(placed_at(point.voxel.w), direction, point.voxel.xyz, point.what.y);
   }
   return point;

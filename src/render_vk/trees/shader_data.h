@@ -76,13 +76,13 @@ struct ShaderLamp {
   Vec4 direction{0.0F};
 };
 
-/// An entry of a level of an impostor's; see far.glsl.
+/// A rectangle of a level of an impostor; see far.glsl.
 struct ShaderFarFace {
   Vec4 centre{0.0F};
   std::uint32_t face = 0;
   std::uint32_t views = 0;
   std::uint32_t direction = 0;
-  float slope_v = 0.0F;
+  float along_v = 0.0F;
 };
 
 struct ShaderVoxelFace {
@@ -90,10 +90,20 @@ struct ShaderVoxelFace {
   std::uint32_t what = 0;
 };
 
+/// The surface in a cube of 4^3 bits.
+struct ShaderFarCell {
+  Vec4 corner{0.0F};
+  std::uint64_t bits = 0;
+  std::array<std::uint32_t, 26> face{};
+};
+
 struct ShaderFarLevel {
   std::uint64_t faces = 0;
   std::uint32_t count = 0;
-  std::uint32_t views = 0;
+  std::uint32_t sides = 0;
+  std::uint64_t cells = 0;  ///< 0: faces themselves
+  float step = 0.0F;
+  std::uint32_t pad = 0;
 };
 
 struct ShaderFar {
@@ -107,18 +117,21 @@ struct ShaderFar {
   Vec4 down{0.0F};
   Vec4 ahead{0.0F};
   Vec4 at{0.0F};
-  Vec4 size{0.0F};
+  Vec4 centre{0.0F};
   IVec4 area{0};
   IVec4 origin{0};
   ShaderFarLevel level;
+  ShaderFarLevel coarser;
   ShaderFarLevel unseen;
+  std::array<std::uint32_t, 4> near{};
   std::uint64_t faces = 0;
   std::uint32_t first_number = 0;
   std::uint32_t voxel_faces = 0;
 };
 
 struct ShaderFarPart {
-  std::uint32_t draw = 0;  ///< twice the impostor, and one more for what no view saw
+  std::uint32_t draw =
+      0;  ///< four times the impostor, plus the part: 0 its level, 1 the coarser one, 2 the unseen faces
   std::uint32_t first_group = 0;
 };
 
@@ -244,6 +257,8 @@ struct ShaderPush {
   std::uint32_t far_first = 0;
   std::uint32_t far_count = 0;
   std::uint32_t far_groups = 0;
+  std::uint32_t sample = 0;
+  std::uint32_t pad = 0;
 };
 
 // What src/render_vk/shaders/swap.comp declares.
@@ -256,9 +271,10 @@ struct SwapPush {
 
 static_assert(sizeof(SwapPush) == 24);
 static_assert(sizeof(Node) == 16 && sizeof(ShaderTree) == 48 && sizeof(ShaderGrid) == 192);
-static_assert(sizeof(ShaderFarFace) == 32 && sizeof(ShaderVoxelFace) == 16 && sizeof(ShaderFar) == 16 * 16);
+static_assert(sizeof(ShaderFarFace) == 32 && sizeof(ShaderVoxelFace) == 16 && sizeof(ShaderFar) == 21 * 16 &&
+              sizeof(ShaderFarCell) == 128);
 static_assert(sizeof(ShaderPlaced) == 384 && sizeof(ShaderFrame) == 20 * 16 + 26 * 8 + 20 * 4);
 static_assert(sizeof(ShaderLamp) == 13 * 16);
-static_assert(sizeof(ShaderPush) == 96 && sizeof(ShaderCounters) == 16);
+static_assert(sizeof(ShaderPush) == 104 && sizeof(ShaderCounters) == 16);
 
 }  // namespace quoin::vulkan

@@ -18,29 +18,46 @@ namespace quoin {
 struct ImpostorFaces {
   [[nodiscard]] static const ImpostorFaces& of(const Impostor& impostor) { return *impostor.faces_; }
 
-  static constexpr int kLevels = 5;          ///< snapshots, each of half as many texels a side as the one before
+  static constexpr int kLevels = 6;          ///< the faces themselves, then cells of 2, 4, 8, 16, 32 voxels
   static constexpr std::size_t kGroup = 16;  ///< faces that are projected at once
   static constexpr std::size_t kSides = 12;  ///< the six directions of voxels' faces, then those of surfels
 
-  /// Faces that lie close together in space. Positions are those of Level. Some fillers at the end let kernels read on.
+  /// Rectangles that lie close together in space. Positions are those of Level. Fillers at the end let kernels read on.
   struct Groups {
     std::array<std::vector<float>, 3> centre;
     std::array<std::vector<float>, 3> half;  ///< from the centre to the sides of the box around them
     std::vector<std::uint32_t> views;        ///< that saw any of them
   };
 
-  /// What the snapshots of one size show: arrays over faces, by direction, those of voxels before those of the field,
-  /// each direction's number rounded up to whole groups with faces that no view saw.
+  /// The surface in a cube of 4^3 bits.
+  struct Cell {
+    Vec3 corner{0.0F};                                 ///< the least one, voxels from the content's centre
+    std::uint64_t bits = 0;                            ///< bit x + 4 y + 16 z
+    std::array<std::uint32_t, kImpostorViews> face{};  ///< index into `faces`: one that the view saw here
+    bool operator==(const Cell&) const = default;
+  };
+
+  /// The rectangles that are drawn at one size: arrays over rectangles, by direction, those that lie along the axes
+  /// before those that are inclined (surfels). Each direction's number is rounded up to whole groups with rectangles
+  /// that no view saw.
+  ///
+  /// Level 0 holds the faces and surfels themselves. Each coarser level holds the sides of boxes, one around all that
+  /// shows in a Cell. A ray that meets a box is followed through the bits of its cell. Boxes and bits contain every
+  /// face, so a ray that meets the grid's surface meets a bit: no level has holes.
   struct Level {
-    std::array<std::vector<float>, 3> centre;       ///< of the face, voxels from the content's centre
-    std::vector<std::uint32_t> views;               ///< bit i: view i saw it
-    std::vector<std::uint32_t> face;                ///< index into `faces`
-    std::array<std::vector<float>, 2> slope;        ///< see Surfel; empty where there is no field
-    std::array<std::vector<float>, 2> reach;        ///< of surfels: `half`, and what texels are larger than a sample
+    std::array<std::vector<float>, 3> centre;       ///< of the rectangle, voxels from the content's centre
+    std::vector<std::uint32_t> views;               ///< bit i: view i saw it; coarser levels: all
+    std::vector<std::uint32_t> face;                ///< index into `faces`, or into `cells` where there are any
+    std::array<std::vector<float>, 2> reach;        ///< from the middle to the sides along kFaceFrames' u and v; empty:
+                                                    ///< 0.5 everywhere
+    std::array<std::vector<float>, 2> slope;        ///< see Surfel; empty where there are no surfels
     std::array<std::uint32_t, kSides + 1> begin{};  ///< of each side; the end of the last
-    Groups groups;                                  ///< of each kGroup faces
-    float size = 0.0F;                              ///< of the largest coordinate
-    float half = 0.5F;  ///< from a face's middle to its edges, voxels: more than a voxel's where texels are larger
+    Groups groups;                                  ///< of each kGroup rectangles
+    std::vector<Cell> cells;
+    float step = 0.0F;  ///< the width of a bit of these, voxels
+    float size = 0.0F;  ///< no coordinate is larger
+
+    [[nodiscard]] std::size_t count() const { return views.size(); }
   };
 
   /// What is the same at all levels.
@@ -71,15 +88,18 @@ struct ImpostorFaces {
   /// From a surfel along its normal to where rays of light start, for what it leaves out of the surface's curvature.
   static constexpr float kSurfelLift = 0.5F;
 
-  int edge = 0;           ///< texels a side of the finest snapshots
+  int edge = 0;           ///< texels a side of the snapshots
+  int first_width = 0;    ///< log2 of the width in voxels of level 0's cells; 0: level 0 holds the faces themselves
   bool is_whole = false;  ///< `faces` are all that the opaque voxels have, in the order of ImpostorShell::faces
   DVec3 centre{0.0};      ///< of the content, in the grid
   std::array<Level, kLevels> levels;
-  /// Faces in crevices that no snapshot looked into but a camera may: drawn with the finest level, where nothing of
-  /// that is before them. Of grids with very many faces they are not known.
+  /// Faces in crevices that no snapshot shows but a camera may see: drawn after level 0, where nothing of that level
+  /// hides them. Empty for grids with so many faces that level 0 holds cells.
   Level unseen;
   std::vector<Face> faces;
   std::vector<Surfel> surfels;  ///< of the last of `faces`
+  /// The rectangles of one part of a drawn impostor: `level` of `levels`, or `unseen` for kLevels.
+  [[nodiscard]] const Level& level(std::size_t number) const { return number < kLevels ? levels[number] : unseen; }
   [[nodiscard]] const Surfel& surfel_of(std::size_t face) const {
     return surfels[face - (faces.size() - surfels.size())];
   }

@@ -37,6 +37,12 @@ void Canvas::clear() {
   id.fill(std::numeric_limits<std::int32_t>::max());
 }
 
+void Canvas::set_pattern(int column, int row, std::uint32_t sample) {
+  for (int y = 0; y < kTile; ++y) {
+    for (int x = 0; x < kTile; ++x) pattern[index_of(x, y)] = Pattern::at(column + x, row + y, sample);
+  }
+}
+
 Draw draw() {
 #ifdef QUOIN_X86_KERNELS
   if (has_instruction_set(InstructionSet::Avx512)) return kDrawAvx512;

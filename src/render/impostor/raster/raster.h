@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <quoin/core/hash.h>
+
 #include "render/impostor/raster/faces.h"
 
 /// Draws the faces of an impostor into a square of a picture: in single precision relative to the content's centre, in
@@ -29,11 +31,50 @@ struct LinearVector {
   Vector y{};
 };
 
+/// The pixels at which one of two levels is drawn: those whose number of Pattern is from `first` to before `end`.
+struct Share {
+  std::int32_t first = 0;
+  std::int32_t end = 1 << 24;
+  [[nodiscard]] bool is_whole() const { return first == 0 && end == 1 << 24; }
+};
+
+/// Even numbers of 24 bits for the pixels of a picture, any share of which is spread evenly over it, and over the
+/// samples of each pixel.
+///
+/// Source: the sequence R2, as `sample_point`.
+struct Pattern {
+  static constexpr std::uint32_t kColumn = 12'664'745;  ///< 0.7548776662 of 2^24
+  static constexpr std::uint32_t kRow = 9'560'333;      ///< 0.5698402910
+  static constexpr std::uint32_t kSample = 10'368'889;  ///< 0.6180339887
+
+  /// `sample`: of the point within the pixel.
+  [[nodiscard]] static constexpr std::int32_t at(int column, int row, std::uint32_t sample) {
+    return static_cast<std::int32_t>(
+        (static_cast<std::uint32_t>(column) * kColumn + static_cast<std::uint32_t>(row) * kRow + sample * kSample) &
+        0xFF'FFFFU);
+  }
+};
+
+/// The three views around a direction, and how often each is chosen, of 2^14.
+struct NearViews {
+  std::array<std::uint8_t, 3> view{};
+  std::array<std::uint16_t, 2> share{1 << 14, 0};  ///< of the first two
+
+  /// The view whose face lights a bit of a cell, by lot.
+  [[nodiscard]] std::uint32_t chosen(std::uint32_t number) const {
+    const std::uint32_t at = mix_bits(number) >> 18;
+    if (at < share[0]) return view[0];
+    return at < std::uint32_t{share[0]} + share[1] ? view[1] : view[2];
+  }
+};
+
 /// What is drawn from where.
 struct Job {
   const ImpostorFaces::Level* level = nullptr;
   std::uint32_t views = 0;  ///< faces that none of these saw are left out
   std::int32_t id = 0;
+  Share share;  ///< of the pixels
+  NearViews near;
   // The ray of a pixel: a point of it in the plane through the content's centre, and how it goes on.
   LinearVector point;
   LinearVector direction;
@@ -74,14 +115,35 @@ struct Aim {
 /// Sets all that depends on the camera. Pixel (0, 0) of the tile lies at (`x`, `y`) pixels from the picture's middle.
 void set_aim(const Aim& aim, double x, double y, Job& job);
 
+/// What a ray met: a rectangle of a level, by its number, and of a cell the view whose face lights it.
+struct Met {
+  std::uint32_t rectangle = 0;
+  std::uint32_t view = 0;
+
+  [[nodiscard]] static constexpr Met of(std::int32_t packed) {
+    const auto bits = static_cast<std::uint32_t>(packed);
+    return {bits >> 5, bits & 31U};
+  }
+  [[nodiscard]] constexpr std::int32_t packed() const { return static_cast<std::int32_t>(rectangle << 5 | view); }
+};
+
+/// The face that lights what a ray met: an index into ImpostorFaces::faces.
+[[nodiscard]] inline std::uint32_t face_of(const ImpostorFaces::Level& level, Met met) {
+  const std::uint32_t at = level.face[met.rectangle];
+  return level.cells.empty() ? at : level.cells[at].face[met.view];
+}
+
 /// What is nearest so far, in the order of index_of.
 struct Canvas {
   alignas(64) std::array<float, kPixels> depth{};        ///< infinite: nothing
   alignas(64) std::array<std::int32_t, kPixels> id{};    ///< of the job
-  alignas(64) std::array<std::int32_t, kPixels> face{};  ///< ImpostorFaces::faces
+  alignas(64) std::array<std::int32_t, kPixels> face{};  ///< see Met
   std::array<float, kPixels / 16> furthest{};            ///< depth of each 4x4 pixels
+  std::array<std::int32_t, kPixels> pattern{};           ///< see Pattern; all 0 where nobody asks for shares
 
   void clear();
+  /// For a tile from (`column`, `row`) of a picture. Cost: a microsecond.
+  void set_pattern(int column, int row, std::uint32_t sample);
 };
 
 /// Puts each face where a pixel's ray meets it, if it is nearer than what is there, or as near and of a lower id, or

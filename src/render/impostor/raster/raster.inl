@@ -1,11 +1,12 @@
 // The kernel of raster.h for lanes of any width, each of which holds a face.
 //
-//   Groups      boxes around 16 faces     | box 0 | box 1 | ...      which tile's pixels may each show in?
-//     Level       faces of one direction    | face 0 | face 1 | ...    which pixels may each show in?
-//       pixels      of each lane's face one, until the largest has none left
+//   Groups      boxes around 16 rectangles   | box 0 | box 1 | ...      which pixels of the tile may each show in?
+//     Level       rectangles of one side       | 0 | 1 | ...              which pixels may each show in?
+//       pixels      one of each lane's rectangle, until the largest has none left
 
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <limits>
@@ -21,15 +22,14 @@ using namespace lanes;
 constexpr std::size_t kLanes = kWidth;
 constexpr float kMargin = 0.01F;  // pixels: for rounding
 
-// What is the same for all faces of one direction.
+// What is the same for all rectangles of one side.
 struct Side {
   std::size_t axis;
   std::size_t u;
   std::size_t v;
   float sign;
   bool is_inclined;  // surfels
-  float half;        // from a face's middle to its edges
-  float reach;       // and a little further, since faces that share an edge meet at slightly different points of it
+  float room;        // added to the reach: rectangles that share an edge meet at slightly different points of it
 };
 
 // Pixels, all inclusive.
@@ -84,48 +84,97 @@ inline void project(const Job& job, const F (&q)[3], const F (&half)[3], Areas& 
   areas.shown = (areas.left <= areas.right) & (areas.top <= areas.bottom) & (all(0.0F) < ahead + deep);
 }
 
-inline void put(std::size_t pixel, float depth, std::int32_t id, std::uint32_t face, Canvas& canvas) {
-  const auto index = static_cast<std::int32_t>(face);
-  const float nearest = canvas.depth[pixel];
-  // Squares of one plane may overlap, and wide registers come to them in another order than narrow ones.
-  const bool is_lower = id < canvas.id[pixel] || (id == canvas.id[pixel] && index < canvas.face[pixel]);
-  if (!(depth < nearest) && !(depth == nearest && is_lower)) return;
-  canvas.depth[pixel] = depth;
-  canvas.id[pixel] = id;
-  canvas.face[pixel] = index;
+inline float linear(const LinearVector& vector, std::size_t axis, float x, float y) {
+  return vector.at[axis] + vector.x[axis] * x + vector.y[axis] * y;
 }
 
-// Puts what rays meet in place.
-inline void put_met(const Job& job, F x, F y, F depth, Mask met, const std::uint32_t* faces, Canvas& canvas) {
-  std::uint32_t left = bits(met);
-  if (left == 0) return;
-  alignas(64) float depths[kLanes];
-  alignas(64) std::int32_t columns[kLanes];
-  alignas(64) std::int32_t rows[kLanes];
-  store(depths, depth), store(columns, to_int(x)), store(rows, to_int(y));
-  for (; left != 0; left &= left - 1) {
-    const auto lane = static_cast<std::size_t>(std::countr_zero(left));
-    put(index_of(columns[lane], rows[lane]), depths[lane], job.id, faces[lane], canvas);
+// Follows the ray of a pixel through the bits of a cell, from where it enters the cell's box at `along` through a side
+// across axis `side`. Returns the bit that it meets, with `along` there, or -1.
+inline int follow(const Job& job, const ImpostorFaces::Cell& cell, std::size_t side, float x, float y, float& along) {
+  constexpr float kPast = 1e-3F;  // bits: beyond the side that was entered, whatever the rounding
+  const float scale = 1.0F / job.level->step;
+  float from[3];
+  float steps[3];
+  int at[3];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    from[axis] = (linear(job.point, axis, x, y) - cell.corner[static_cast<int>(axis)]) * scale;
+    steps[axis] = linear(job.direction, axis, x, y) * scale;
+    float entered = from[axis] + along * steps[axis];
+    if (axis == side) entered += steps[axis] > 0.0F ? kPast : -kPast;
+    at[axis] = static_cast<int>(std::min(std::max(entered, 0.0F), 3.0F));
+  }
+  for (;;) {
+    const int bit = at[0] + 4 * at[1] + 16 * at[2];
+    if ((cell.bits >> bit & 1U) != 0) return bit;
+    std::size_t next = 3;
+    float nearest = std::numeric_limits<float>::infinity();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (steps[axis] == 0.0F) continue;
+      const float end = static_cast<float>(at[axis] + (steps[axis] > 0.0F ? 1 : 0));
+      const float until = (end - from[axis]) / steps[axis];
+      if (until < nearest) nearest = until, next = axis;
+    }
+    if (next == 3) return -1;
+    at[next] += steps[next] > 0.0F ? 1 : -1;
+    if (at[next] < 0 || at[next] > 3) return -1;
+    along = std::max(along, nearest);
   }
 }
 
-// Of each lane's face one pixel: where its ray meets the face's plane.
-inline void meet(const Job& job, const Side& side, const F (&q)[3], F x, F y, Mask wanted, const std::uint32_t* faces,
-                 Canvas& canvas) {
+inline void put(const Job& job, std::size_t side, float x, float y, float depth, std::uint32_t rectangle,
+                Canvas& canvas) {
+  const std::size_t pixel = index_of(static_cast<int>(x), static_cast<int>(y));
+  const float nearest = canvas.depth[pixel];
+  if (nearest < depth || canvas.pattern[pixel] < job.share.first || canvas.pattern[pixel] >= job.share.end) return;
+  std::uint32_t view = 0;
+  if (!job.level->cells.empty()) {
+    float along = (depth - job.depth_at) / job.depth_step;
+    const std::uint32_t number = job.level->face[rectangle];
+    const ImpostorFaces::Cell& cell = job.level->cells[number];
+    const int bit = follow(job, cell, side, x, y, along);
+    if (bit < 0) return;
+    view = job.near.chosen(64 * number + static_cast<std::uint32_t>(bit));
+    depth = std::max(depth, job.depth_at + along * job.depth_step);
+  }
+  const std::int32_t met = Met{rectangle, view}.packed();
+  // Rectangles of one plane may overlap, and wide registers come to them in another order than narrow ones.
+  const bool is_lower = job.id < canvas.id[pixel] || (job.id == canvas.id[pixel] && met < canvas.face[pixel]);
+  if (!(depth < nearest) && !(depth == nearest && is_lower)) return;
+  canvas.depth[pixel] = depth;
+  canvas.id[pixel] = job.id;
+  canvas.face[pixel] = met;
+}
+
+// Puts what rays meet in place.
+inline void put_met(const Job& job, const Side& side, F x, F y, F depth, Mask met, std::size_t first, Canvas& canvas) {
+  std::uint32_t left = bits(met);
+  if (left == 0) return;
+  alignas(64) float depths[kLanes];
+  alignas(64) float columns[kLanes];
+  alignas(64) float rows[kLanes];
+  store(depths, depth), store(columns, x), store(rows, y);
+  for (; left != 0; left &= left - 1) {
+    const auto lane = static_cast<std::size_t>(std::countr_zero(left));
+    put(job, side.axis, columns[lane], rows[lane], depths[lane], static_cast<std::uint32_t>(first + lane), canvas);
+  }
+}
+
+// Of each lane's rectangle one pixel: where its ray meets the rectangle's plane. `first`: the number of lane 0's.
+inline void meet(const Job& job, const Side& side, const F (&q)[3], const F (&reach)[2], F x, F y, Mask wanted,
+                 std::size_t first, Canvas& canvas) {
   const F towards = linear(job.direction, side.axis, x, y);
   const F along = (q[side.axis] - linear(job.point, side.axis, x, y)) / towards;
   const F at_u = linear(job.point, side.u, x, y) + along * linear(job.direction, side.u, x, y);
   const F at_v = linear(job.point, side.v, x, y) + along * linear(job.direction, side.v, x, y);
   const F depth = all(job.depth_at) + along * all(job.depth_step);
-  const F reach = all(side.reach);
-  const Mask met = wanted & (abs(at_u - q[side.u]) <= reach) & (abs(at_v - q[side.v]) <= reach) &
+  const Mask met = wanted & (abs(at_u - q[side.u]) <= reach[0]) & (abs(at_v - q[side.v]) <= reach[1]) &
                    (towards * all(side.sign) < all(0.0F)) & (all(0.0F) < depth);
-  put_met(job, x, y, depth, met, faces, canvas);
+  put_met(job, side, x, y, depth, met, first, canvas);
 }
 
 // The same of a surfel: a plane that rises by a slope along each side.
 inline void meet_inclined(const Job& job, const Side& side, const F (&q)[3], const F (&slope)[2], const F (&reach)[2],
-                          F x, F y, Mask wanted, const std::uint32_t* faces, Canvas& canvas) {
+                          F x, F y, Mask wanted, std::size_t first, Canvas& canvas) {
   const F direction_u = linear(job.direction, side.u, x, y);
   const F direction_v = linear(job.direction, side.v, x, y);
   const F from_u = linear(job.point, side.u, x, y) - q[side.u];
@@ -137,45 +186,52 @@ inline void meet_inclined(const Job& job, const Side& side, const F (&q)[3], con
   const Mask met = wanted & (abs(from_u + along * direction_u) <= reach[0]) &
                    (abs(from_v + along * direction_v) <= reach[1]) & (towards * all(side.sign) < all(0.0F)) &
                    (all(0.0F) < depth);
-  put_met(job, x, y, depth, met, faces, canvas);
+  put_met(job, side, x, y, depth, met, first, canvas);
+}
+
+// Puts the rectangle of each lane at each of its pixels.
+inline void put_all(const Job& job, const Side& side, const F (&q)[3], const F (&slope)[2], const F (&reach)[2],
+                    const Areas& areas, Mask shown, std::size_t first, Canvas& canvas) {
+  const F none = all(-1.0F);
+  const float width = greatest_of(select(shown, areas.right - areas.left, none));
+  const float height = greatest_of(select(shown, areas.bottom - areas.top, none));
+  const F met_reach[2] = {reach[0] + all(side.room), reach[1] + all(side.room)};
+  for (float down = 0.0F; down <= height; down += 1.0F) {
+    const F y = areas.top + all(down);
+    const Mask in_row = shown & (y <= areas.bottom);
+    for (float across = 0.0F; across <= width; across += 1.0F) {
+      const F x = areas.left + all(across);
+      const Mask wanted = in_row & (x <= areas.right);
+      if (side.is_inclined) {
+        meet_inclined(job, side, q, slope, met_reach, x, y, wanted, first, canvas);
+      } else {
+        meet(job, side, q, met_reach, x, y, wanted, first, canvas);
+      }
+    }
+  }
 }
 
 void draw_group(const Job& job, const Side& side, std::size_t begin, Canvas& canvas) {
   const ImpostorFaces::Level& level = *job.level;
-  F half[3] = {all(side.half), all(side.half), all(side.half)};
-  half[side.axis] = all(0.0F);
+  const bool has_reach = !level.reach[0].empty();
   Areas areas;
   for (std::size_t first = begin; first < begin + ImpostorFaces::kGroup; first += kLanes) {
     const F q[3] = {load(level.centre[0].data() + first), load(level.centre[1].data() + first),
                     load(level.centre[2].data() + first)};
     F slope[2] = {all(0.0F), all(0.0F)};
-    F reach[2] = {all(0.0F), all(0.0F)};
+    F reach[2] = {all(0.5F), all(0.5F)};
+    if (has_reach) reach[0] = load(level.reach[0].data() + first), reach[1] = load(level.reach[1].data() + first);
+    F half[3];
+    half[side.u] = reach[0], half[side.v] = reach[1];
+    half[side.axis] = all(0.0F);
     if (side.is_inclined) {
       slope[0] = load(level.slope[0].data() + first), slope[1] = load(level.slope[1].data() + first);
-      reach[0] = load(level.reach[0].data() + first), reach[1] = load(level.reach[1].data() + first);
-      half[side.u] = reach[0], half[side.v] = reach[1];
       half[side.axis] = reach[0] * abs(slope[0]) + reach[1] * abs(slope[1]);
     }
     project(job, q, half, areas);
     const auto* views = reinterpret_cast<const std::int32_t*>(level.views.data() + first);
     const Mask shown = areas.shown & test(load(views), all(static_cast<int>(job.views)));
-    if (!any(shown)) continue;
-    const F none = all(-1.0F);
-    const float width = greatest_of(select(shown, areas.right - areas.left, none));
-    const float height = greatest_of(select(shown, areas.bottom - areas.top, none));
-    for (float down = 0.0F; down <= height; down += 1.0F) {
-      const F y = areas.top + all(down);
-      const Mask in_row = shown & (y <= areas.bottom);
-      for (float across = 0.0F; across <= width; across += 1.0F) {
-        const F x = areas.left + all(across);
-        const Mask wanted = in_row & (x <= areas.right);
-        if (side.is_inclined) {
-          meet_inclined(job, side, q, slope, reach, x, y, wanted, level.face.data() + first, canvas);
-        } else {
-          meet(job, side, q, x, y, wanted, level.face.data() + first, canvas);
-        }
-      }
-    }
+    if (any(shown)) put_all(job, side, q, slope, reach, areas, shown, first, canvas);
   }
 }
 
@@ -247,9 +303,8 @@ void draw_faces(const Job& job, Canvas& canvas) {
     if (begin == end) continue;
     const bool is_inclined = i >= ImpostorFaces::kSides / 2;
     const FaceFrame& frame = kFaceFrames[i % (ImpostorFaces::kSides / 2)];
-    const float half = job.level->half;
-    const float reach = half + 1e-5F + 2e-6F * job.level->size;
-    const Side side{frame.axis, frame.u, frame.v, static_cast<float>(frame.sign), is_inclined, half, reach};
+    const float room = 1e-5F + 2e-6F * job.level->size;
+    const Side side{frame.axis, frame.u, frame.v, static_cast<float>(frame.sign), is_inclined, room};
     if (is_inclined || is_seen(job, side)) draw_side(job, side, begin, end, canvas);
   }
   find_furthest(job, canvas);

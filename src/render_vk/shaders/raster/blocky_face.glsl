@@ -1,10 +1,18 @@
-// What fragments of faces of voxels are told, and where they lie.
+// The face of a voxel on which a fragment lies. Impostors choose it themselves: they define IS_IMPOSTOR.
 
+#ifdef IS_IMPOSTOR
+vec4 place;
+ivec4 base;
+vec4 edges;
+uvec2 what;
+vec4 colour;
+#else
 layout(location = 0) centroid in vec4 place;
 layout(location = 1) flat in ivec4 base;
 layout(location = 2) flat in vec4 edges;
 layout(location = 3) flat in uvec2 what;
 layout(location = 4) centroid in vec4 colour;
+#endif
 
 // On the face, a little inside its edges, and from there a little before it: what is interpolated can lie beside both.
 vec3 before_face(uint face, float lift) {

@@ -1,7 +1,11 @@
 #version 460
-// A corner of a face of an impostor, which stands for a face of one voxel.
+// A corner of a rectangle of an impostor, which is lit by the face of one voxel.
 #include "quad.glsl"
+#include "hash.glsl"
 #include "far.glsl"
+
+layout(location = 5) out vec3 met;         // where the ray enters, voxels from the content's centre
+layout(location = 6) flat out uvec2 cell;  // with cells the number of its own, and of the rectangle's direction
 
 // Which corner the triangles of such a face begin with: light/corner_light.h.
 uint first_corner(uint corners) {
@@ -12,32 +16,35 @@ void main() {
   uint index = uint(gl_VertexIndex);
   FarFaces faces = FarFaces(push.data);
   uvec4 which = faces.at[index >> 2].what;
-  if ((which.y & push.numbers >> 4 & 0x3FFFFFF) == 0) {
+  if (which.y == 0) {
     hide_corner();
     return;
   }
-  uint face = which.z;
-  ivec4 voxel = VoxelFaces(push.far_faces).at[which.x];
+  // A fragment chooses the face of a cell.
+  bool has_cells = (push.numbers >> 29 & 1) != 0;
+  ivec4 voxel = VoxelFaces(push.far_faces).at[has_cells ? 0 : which.x];
+  uint face = uint(voxel.w) >> 24 & 7;
+  uint side = which.z;
+  cell = which.xz;
   uint corners = uint(voxel.w) >> 16 & 0xFF;
   uint corner = ((index & 3) + first_corner(corners)) & 3;
   bool is_east = corner == 1 || corner == 2;
   bool is_north = corner >= 2;
-  bool is_unseen = (push.numbers >> 30 & 1) != 0;
-  MeshFrame f = mesh_frame();
-  float half_size = is_unseen ? f.instances[push.instance].unseen_half : f.instances[push.instance].far_half;
-  int u = kFaceU[face];
-  int v = kFaceV[face];
   vec4 centre = faces.at[index >> 2].centre;
+  vec2 reach = vec2(centre.w, uintBitsToFloat(which.w));
   precise vec3 point = push.offset + centre.xyz;
-  point[u] += is_east ? half_size : -half_size;
-  point[v] += is_north ? half_size : -half_size;
+  point[kFaceU[side]] += is_east ? reach.x : -reach.x;
+  point[kFaceV[side]] += is_north ? reach.y : -reach.y;
   Seen seen = Seen(push.clip, push.eye, push.room);
   vec3 widened;
-  if (!put_corner(seen, face, point, is_east, is_north, widened)) {
+  if (!put_corner(seen, side, point, is_east, is_north, widened)) {
     hide_corner();
     return;
   }
-  // Of the voxel that is stood for, whatever the size of what is drawn.
+  met = point + widened - push.offset;
+  // Light is that of the whole face of the voxel, however large the rectangle.
+  int u = kFaceU[face];
+  int v = kFaceV[face];
   vec3 low = vec3(0.0);
   if ((face & 1) == 0) low[axis_of(face)] = 1.0;
   vec3 high = low;
@@ -45,7 +52,7 @@ void main() {
   vec3 local = low;
   if (is_east) local[u] = 1.0;
   if (is_north) local[v] = 1.0;
-  ivec4 home = f.instances[push.instance].home;
+  ivec4 home = mesh_frame().instances[push.instance].home;
   put_face(face, uint(voxel.w) & 0xFFFF, push.instance, local, low, high, voxel.xyz + home.xyz,
            openness_of(corners, corner));
 }

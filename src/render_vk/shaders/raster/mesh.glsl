@@ -21,10 +21,12 @@ struct MeshInstance {
   vec4 diffuse[2];  // the sun's light on its faces
   ivec4 home;       // that point in its tree's coordinates (an impostor's: the grid's origin), and which instance of
                     // the frame it is: -1 where none
-  float room;       // voxels per clip w by which faces are widened
-  float far_half;   // of an impostor: from the middle of a face to its edges, and of one that no view saw
-  float unseen_half;
+  float room;          // voxels per clip w by which faces are widened
   float first_sample;  // where in voxel 0 sample 0 of a smooth mesh lies: 0.5, the voxel's middle; of fields 0
+  vec2 far_steps;   // of an impostor: the width of the bits of its level's cells, and of the coarser level's
+  uvec4 far_cells;  // addresses of both levels' cells
+  uvec4 far_near;   // as Far has it
+  vec4 far_centre;  // of the content, in the tree's coordinates
 };
 
 struct MeshDraw {
@@ -56,7 +58,8 @@ layout(push_constant) uniform Push {
   uvec2 data;       // of the chunk, or of the impostor's level
   uvec2 far_faces;  // of an impostor
   float room;       // of the instance; the sky's: turns the way from the picture's middle into the tangent of an angle
-  uint numbers;     // bits 0-3 what is drawn; of an impostor 4-29 the views that count, 30 whether none saw its faces
+  uint numbers;     // bits 0-3 what is drawn; of an impostor 4-27 the share of pixels at which the coarser level is
+                    // drawn, 28 whether that is this one, 29 whether it has cells
 } push;
 
 MeshFrame mesh_frame() {

@@ -1,0 +1,387 @@
+#include "render/impostor/cells.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include <glm/common.hpp>
+
+#include <tsl/robin_map.h>
+
+#include <quoin/core/assert.h>
+#include <quoin/core/hash.h>
+
+#include "render/impostor/level.h"
+#include "render/impostor/morton.h"
+#include "render/impostor/snapshot.h"
+#include "trace/tree_view.h"
+
+namespace quoin {
+namespace {
+
+constexpr int kWidest = 10;           // log2 of the voxels to which the Morton curve's origin is aligned
+constexpr std::uint32_t kNone = ~0U;  // as a rank
+
+IVec3 cells_below(IVec3 voxel, int shift) {
+  return {voxel.x >> shift, voxel.y >> shift, voxel.z >> shift};
+}
+
+std::uint32_t hash_of(const VoxelFace& face) {
+  std::uint32_t hash =
+      mix_bits(static_cast<std::uint32_t>(face.voxel.x) * 8U + static_cast<std::uint32_t>(face.direction));
+  hash = mix_bits(hash ^ static_cast<std::uint32_t>(face.voxel.y));
+  return mix_bits(hash ^ static_cast<std::uint32_t>(face.voxel.z));
+}
+
+// Ranks of faces for the views that saw them.
+class Ranks {
+ public:
+  // `texel`: its width, voxels.
+  explicit Ranks(double texel) {
+    for (int view = 0; view < kImpostorViews; ++view) {
+      for (const Direction direction : kDirections) {
+        const double turned = std::max(glm::dot(impostor_view(view), DVec3(normal_of(direction))), 1e-3);
+        // Faces smaller than a texel are seen the more often the larger they show; they count alike then.
+        const double texels = turned / (texel * texel);
+        const double size = texels / (1.0 - std::exp(-texels)) / std::max(1.0, 1.0 / (texel * texel));
+        // The largest faces have ranks below 2^27, smaller ones more.
+        at(static_cast<std::size_t>(view), direction) =
+            static_cast<std::uint32_t>(std::lround(4096.0 / std::max(size, 1e-3)));
+      }
+    }
+  }
+  [[nodiscard]] std::uint32_t rank(std::uint32_t hash, std::size_t view, Direction direction) const {
+    const std::uint64_t rank = std::uint64_t{hash} * factors_[6 * view + static_cast<std::size_t>(direction)] >> 17;
+    return static_cast<std::uint32_t>(std::min<std::uint64_t>(rank, 0x7FFF'FFFFU));
+  }
+
+ private:
+  [[nodiscard]] std::uint32_t& at(std::size_t view, Direction direction) {
+    return factors_.at(6 * view + static_cast<std::size_t>(direction));
+  }
+  std::array<std::uint32_t, std::size_t{6} * kImpostorViews> factors_{};
+};
+
+constexpr std::uint32_t kUnseen = 0x8000'0000U;  // the least rank of a face that no view saw
+
+// For each view all of them, the nearest first: itself.
+const std::array<std::array<std::uint8_t, kImpostorViews>, kImpostorViews>& views_by_distance() {
+  static const auto all = [] {
+    std::array<std::array<std::uint8_t, kImpostorViews>, kImpostorViews> lists{};
+    for (int view = 0; view < kImpostorViews; ++view) {
+      auto& list = lists.at(static_cast<std::size_t>(view));
+      std::iota(list.begin(), list.end(), std::uint8_t{0});
+      const auto turned = [&](std::uint8_t other) { return glm::dot(impostor_view(view), impostor_view(other)); };
+      std::stable_sort(list.begin(), list.end(), [&](std::uint8_t a, std::uint8_t b) { return turned(a) > turned(b); });
+    }
+    return lists;
+  }();
+  return all;
+}
+
+// The words of a tree, 4^3 voxels each, with the bricks that were read last.
+class TreeWords {
+ public:
+  explicit TreeWords(const OccupancyTree& tree) : nodes_(tree) {}
+
+  [[nodiscard]] std::uint64_t word(IVec3 at) {
+    const IVec3 brick = cells_below(at, 2);
+    Kept& kept = kept_[static_cast<std::size_t>((brick.x & 3) + 4 * (brick.y & 3) + 16 * (brick.z & 3))];
+    if (!kept.is_known || kept.brick != brick) read(brick, kept);
+    const IVec3 within = at - brick * 4;
+    return kept.words[static_cast<std::size_t>(within.x + 4 * within.y + 16 * within.z)];
+  }
+
+ private:
+  struct Kept {
+    IVec3 brick{0};
+    bool is_known = false;
+    std::array<std::uint64_t, 64> words{};
+  };
+  void read(IVec3 brick, Kept& kept) {
+    kept.brick = brick;
+    kept.is_known = true;
+    kept.words.fill(0);
+    const IVec3 chunk = cells_below(brick, 2);
+    const trace::ChunkNode* node = nodes_.find_chunk(chunk);
+    if (node == nullptr) return;
+    const IVec3 within = brick - chunk * 4;
+    const trace::BrickCode code = node->bricks[static_cast<std::size_t>(within.x + 4 * within.y + 16 * within.z)];
+    if (code == trace::kEmptyBrick) return;
+    const trace::BrickWords words = nodes_.brick(code);
+    for (std::size_t i = 0; i < 64; ++i) kept.words[i] = words[i];
+  }
+
+  trace::TreeNodes nodes_;
+  std::array<Kept, 64> kept_;
+};
+
+// The box around the faces of a word's voxels, and which voxels these are.
+struct WordFaces {
+  std::uint64_t voxels = 0;
+  IVec3 low{0};
+  IVec3 high{0};
+};
+
+WordFaces faces_of_word(TreeWords& words, IVec3 at) {
+  WordFaces found;
+  const std::uint64_t own = words.word(at);
+  if (own == 0) return found;
+  for (const Direction direction : kDirections) {
+    const FaceFrame& frame = frame_of(direction);
+    const std::uint64_t exposed = exposed_bits(own, words.word(at + normal_of(direction)), direction);
+    for (std::uint64_t left = exposed; left != 0; left &= left - 1) {
+      const int bit = std::countr_zero(left);
+      IVec3 low = at * 4 + IVec3{bit & 3, bit >> 2 & 3, bit >> 4};
+      IVec3 high = low + 1;
+      (frame.sign > 0 ? low : high)[frame.axis] = (frame.sign > 0 ? high : low)[frame.axis];
+      found.low = found.voxels == 0 ? low : glm::min(found.low, low);
+      found.high = found.voxels == 0 ? high : glm::max(found.high, high);
+      found.voxels |= std::uint64_t{1} << bit;
+    }
+  }
+  return found;
+}
+
+// The bits of a voxel in its cell, which is 2^`log2_width` voxels wide: eight where it is 2 wide.
+std::uint64_t bits_of_voxel(IVec3 in_cell, int log2_width) {
+  const IVec3 at = log2_width == 1 ? in_cell * 2 : cells_below(in_cell, log2_width - 2);
+  const std::uint64_t cube = log2_width == 1 ? 0x0033'0033U : 1U;
+  return cube << (at.x + 4 * at.y + 16 * at.z);
+}
+
+// The bit of an eighth of a voxel. `half`: 0.5 where it is the upper half along an axis, else 0.
+std::uint64_t bit_of_eighth(IVec3 in_cell, DVec3 half, int log2_width) {
+  if (log2_width > 1) return bits_of_voxel(in_cell, log2_width);
+  const IVec3 at = in_cell * 2 + IVec3(half * 2.0);
+  return std::uint64_t{1} << (at.x + 4 * at.y + 16 * at.z);
+}
+
+// The 4^3 bits of a cell as 2^3 bits of the cell of twice the width, in whose octant it lies.
+std::uint64_t halved_bits(std::uint64_t bits, unsigned octant) {
+  bits |= bits >> 1, bits |= bits >> 4, bits |= bits >> 16;
+  const std::uint64_t low = (bits & 1U) | (bits >> 1 & 2U) | (bits >> 4 & 16U) | (bits >> 5 & 32U);
+  const std::uint64_t upper = bits >> 32;
+  const std::uint64_t high = (upper & 1U) | (upper >> 1 & 2U) | (upper >> 4 & 16U) | (upper >> 5 & 32U);
+  const unsigned shift = 2U * (octant & 1U) + 8U * (octant >> 1 & 1U) + 32U * (octant >> 2);
+  return (low | high << 16) << shift;
+}
+
+}  // namespace
+
+// Makes cells of faces, one after the other.
+class SurfaceCells::Collector {
+ public:
+  Collector(SurfaceCells& into, double texel) : into_(&into), ranks_(texel) {}
+
+  void add_face(const SeenFace& seen, std::uint32_t index) {
+    const FaceFrame& frame = frame_of(seen.face.direction);
+    DVec3 low(seen.face.voxel);
+    DVec3 high = low + 1.0;
+    (frame.sign > 0 ? low : high)[frame.axis] = (frame.sign > 0 ? high : low)[frame.axis];
+    Cell& cell = add(seen.face.voxel, low, high, seen, index);
+    cell.bits |= bits_of_voxel(in_cell(seen.face.voxel), into_->log2_width_);
+  }
+
+  // As the eighths of voxels that it passes through, and those below, so that no ray slips through between two of them.
+  void add_surfel(const SeenFace& seen, std::uint32_t index) {
+    const FaceFrame& frame = frame_of(seen.face.direction);
+    const ImpostorFaces::Surfel& surfel = *seen.surfel;
+    DVec3 middle(seen.face.voxel);
+    middle[frame.axis] += double{surfel.offset};
+    middle[frame.u] += double{surfel.shift[0]}, middle[frame.v] += double{surfel.shift[1]};
+    for (int i = 0; i < 16; ++i) {
+      const double u = (i % 4 - 1.5) * 0.5 * surfel.half[0];
+      const double v = (i / 4 - 1.5) * 0.5 * surfel.half[1];
+      DVec3 point = middle;
+      point[frame.u] += u, point[frame.v] += v;
+      point[frame.axis] += u * surfel.slope[0] + v * surfel.slope[1];
+      for (int below = 0; below < 2; ++below) {
+        const IVec3 voxel = voxel_of(point);
+        const DVec3 eighth = glm::floor(point * 2.0) * 0.5;
+        // The part of the eighth that the surfel may fill.
+        const DVec3 low = glm::max(eighth, point - 0.3);
+        const DVec3 high = glm::min(eighth + 0.5, point + 0.3);
+        Cell& cell = add(voxel, low, high, seen, index);
+        cell.has_field = true;
+        cell.bits |= bit_of_eighth(in_cell(voxel), eighth - DVec3(voxel), into_->log2_width_);
+        point[frame.axis] -= 0.5 * frame.sign;
+      }
+    }
+  }
+
+ private:
+  [[nodiscard]] IVec3 in_cell(IVec3 voxel) const { return (voxel - into_->origin_) & ((1 << into_->log2_width_) - 1); }
+
+  // `low` and `high`: of the part of the face that lies in the voxel's cell.
+  Cell& add(IVec3 voxel, DVec3 low, DVec3 high, const SeenFace& seen, std::uint32_t index) {
+    Cell& cell = cell_at(voxel);
+    const DVec3 centre = into_->content_.centre;
+    cell.low = glm::min(cell.low, Vec3(low - centre)), cell.high = glm::max(cell.high, Vec3(high - centre));
+    const std::uint32_t hash = hash_of(seen.face);
+    if (seen.views == 0) {
+      // Of cells with such faces alone, every view shows one.
+      const std::uint32_t rank = kUnseen | hash >> 2;
+      for (std::size_t view = 0; view < (rank < cell.rank[0] ? kImpostorViews : 0); ++view) {
+        if (rank < cell.rank[view]) cell.rank[view] = rank, cell.face[view] = index;
+      }
+    }
+    for (std::uint32_t left = seen.views; left != 0; left &= left - 1) {
+      const auto view = static_cast<std::size_t>(std::countr_zero(left));
+      const std::uint32_t rank = ranks_.rank(hash, view, seen.face.direction);
+      if (rank < cell.rank[view]) cell.rank[view] = rank, cell.face[view] = index;
+    }
+    return cell;
+  }
+
+  Cell& cell_at(IVec3 voxel) {
+    const IVec3 at = cells_below(voxel - into_->origin_, into_->log2_width_);
+    const std::uint64_t code = morton_code(at);
+    // Faces that follow each other mostly lie in one cell.
+    if (!into_->cells_.empty() && into_->cells_[last_].code == code) return into_->cells_[last_];
+    const auto [found, is_new] = index_.try_emplace(code, static_cast<std::uint32_t>(into_->cells_.size()));
+    if (is_new) {
+      Cell& cell = into_->cells_.emplace_back();
+      cell.code = code;
+      constexpr float kInfinity = std::numeric_limits<float>::infinity();
+      cell.low = Vec3(kInfinity), cell.high = Vec3(-kInfinity);
+      cell.rank.fill(kNone);
+    }
+    last_ = found->second;
+    return into_->cells_[last_];
+  }
+
+  SurfaceCells* into_;
+  Ranks ranks_;
+  tsl::robin_map<std::uint64_t, std::uint32_t, MortonHash> index_;
+  std::size_t last_ = 0;
+};
+
+SurfaceCells::SurfaceCells(const std::vector<SeenFace>& faces, const ContentSphere& content, int edge, int log2_width)
+    : content_(content), log2_width_(log2_width) {
+  QUOIN_ASSERT(log2_width >= 1 && log2_width <= kWidest, "cells of 2 to 1,024 voxels");
+  if (faces.empty()) return;
+  IVec3 least = faces[0].face.voxel;
+  for (const SeenFace& seen : faces) least = glm::min(least, seen.face.voxel);
+  origin_ = cells_below(least - 4, kWidest) * (1 << kWidest);
+  Collector collector(*this, 2.0 * snapshot_camera(content, 0, edge).half_size() / edge);
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    const auto index = static_cast<std::uint32_t>(i);
+    faces[i].surfel == nullptr ? collector.add_face(faces[i], index) : collector.add_surfel(faces[i], index);
+  }
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
+  for (std::size_t i = 0; i < cells_.size(); ++i) order.emplace_back(cells_[i].code, static_cast<std::uint32_t>(i));
+  std::sort(order.begin(), order.end());
+  std::vector<Cell> sorted;
+  sorted.reserve(cells_.size());
+  for (const auto& [code, i] : order) sorted.push_back(cells_[i]);
+  cells_ = std::move(sorted);
+}
+
+IVec3 SurfaceCells::corner_of(const Cell& cell) const {
+  return origin_ + morton_position(cell.code) * (1 << log2_width_);
+}
+
+void SurfaceCells::halve() {
+  ++log2_width_;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < cells_.size(); ++i) {
+    Cell cell = cells_[i];
+    cell.bits = halved_bits(cell.bits, static_cast<unsigned>(cell.code & 7U));
+    cell.code >>= 3;
+    if (count == 0 || cells_[count - 1].code != cell.code) {
+      cells_[count++] = cell;
+      continue;
+    }
+    Cell& into = cells_[count - 1];
+    into.bits |= cell.bits;
+    into.low = glm::min(into.low, cell.low), into.high = glm::max(into.high, cell.high);
+    into.has_field |= cell.has_field;
+    for (std::size_t view = 0; view < kImpostorViews; ++view) {
+      if (cell.rank[view] < into.rank[view]) into.rank[view] = cell.rank[view], into.face[view] = cell.face[view];
+    }
+  }
+  cells_.resize(count);
+}
+
+void SurfaceCells::fill_from(const OccupancyTree& tree) {
+  QUOIN_ASSERT(log2_width_ >= 2, "cells of whole words");
+  TreeWords words(tree);
+  const int across = 1 << (log2_width_ - 2);
+  for (Cell& cell : cells_) {
+    QUOIN_ASSERT(!cell.has_field, "cells without surfels");
+    const IVec3 corner = corner_of(cell);
+    for (int i = 0; i < across * across * across; ++i) {
+      const IVec3 in_cell{i % across, i / across % across, i / across / across};
+      const WordFaces found = faces_of_word(words, cells_below(corner, 2) + in_cell);
+      if (found.voxels == 0) continue;
+      cell.low = glm::min(cell.low, Vec3(DVec3(found.low) - content_.centre));
+      cell.high = glm::max(cell.high, Vec3(DVec3(found.high) - content_.centre));
+      for (std::uint64_t left = found.voxels; left != 0; left &= left - 1) {
+        const int bit = std::countr_zero(left);
+        cell.bits |= bits_of_voxel(in_cell * 4 + IVec3{bit & 3, bit >> 2 & 3, bit >> 4}, log2_width_);
+      }
+    }
+  }
+}
+
+// Whether solid voxels lie against all of a side.
+bool SurfaceCells::is_covered(const Cell& cell, Direction direction, const std::function<bool(IVec3)>& is_solid) const {
+  if (cell.has_field) return false;
+  const FaceFrame& frame = frame_of(direction);
+  IVec3 low = voxel_of(DVec3(cell.low) + content_.centre + 0.5);
+  IVec3 high = voxel_of(DVec3(cell.high) + content_.centre + 0.5);
+  const int layer = frame.sign > 0 ? high[frame.axis] : low[frame.axis] - 1;
+  low[frame.axis] = layer, high[frame.axis] = layer + 1;
+  for (int z = low.z; z < high.z; ++z) {
+    for (int y = low.y; y < high.y; ++y) {
+      for (int x = low.x; x < high.x; ++x) {
+        if (!is_solid({x, y, z})) return false;
+      }
+    }
+  }
+  return true;
+}
+
+// The face that a view shows: one that it saw, or else that of the nearest view which saw any.
+std::uint32_t SurfaceCells::shown_to(std::size_t view, const Cell& cell) {
+  for (const std::uint8_t other : views_by_distance()[view]) {
+    if (cell.rank[other] < kUnseen) return cell.face[other];
+  }
+  return cell.face[view];
+}
+
+ImpostorFaces::Cell SurfaceCells::finished(const Cell& cell) const {
+  ImpostorFaces::Cell out;
+  out.corner = Vec3(DVec3(corner_of(cell)) - content_.centre);
+  out.bits = cell.bits;
+  for (std::size_t view = 0; view < kImpostorViews; ++view) out.face[view] = shown_to(view, cell);
+  return out;
+}
+
+ImpostorFaces::Level SurfaceCells::level(const std::function<bool(IVec3)>& is_solid) const {
+  LevelMaker maker(content_);
+  for (const Direction direction : kDirections) {
+    const FaceFrame& frame = frame_of(direction);
+    for (std::size_t i = 0; i < cells_.size(); ++i) {
+      const Cell& cell = cells_[i];
+      Rectangle side;
+      side.centre = 0.5F * (cell.low + cell.high);
+      side.centre[frame.axis] = (frame.sign > 0 ? cell.high : cell.low)[frame.axis];
+      side.direction = direction;
+      side.reach = {0.5F * (cell.high - cell.low)[frame.u], 0.5F * (cell.high - cell.low)[frame.v]};
+      if (!(side.reach[0] > 0.0F && side.reach[1] > 0.0F) || is_covered(cell, direction, is_solid)) continue;
+      maker.add(side, kAllImpostorViews, static_cast<std::uint32_t>(i));
+    }
+  }
+  ImpostorFaces::Level level = std::move(maker).level();
+  level.step = static_cast<float>(std::ldexp(0.25, log2_width_));
+  level.cells.reserve(cells_.size());
+  for (const Cell& cell : cells_) level.cells.push_back(finished(cell));
+  return level;
+}
+
+}  // namespace quoin
