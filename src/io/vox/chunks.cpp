@@ -134,9 +134,15 @@ Status parse_packed_voxels(ChunkReader& chunk, bool has_size, Document& out) {
   return {};
 }
 
+/// The 256th entry belongs to air, and Teardown does not write it. Other programs write the colours that they use.
 Status parse_palette(ChunkReader& chunk, Document& out) {
-  if (chunk.remaining() < kColours * 4) return chunk.too_short();
-  out.palette = chunk.take(kColours * 4);
+  const std::size_t entries = std::min(chunk.remaining() / 4, kColours);
+  if (entries == 0) return chunk.too_short();
+  if (entries + 1 < kColours) {
+    out.warnings.push_back("the palette has " + std::to_string(entries) +
+                           " of 255 colours; the others are the default");
+  }
+  out.palette = chunk.take(entries * 4);
   return {};
 }
 
@@ -237,6 +243,29 @@ Status parse_chunks(std::span<const std::byte> bytes, std::size_t begin, std::si
   return {};
 }
 
+/// Returns true if chunks follow each other from `begin` to the end of the file.
+bool is_chain(std::span<const std::byte> bytes, std::size_t begin) {
+  std::size_t at = begin;
+  while (at < bytes.size()) {
+    const Result<ChunkHeader> header = read_header(bytes, at, bytes.size());
+    if (!header) return false;
+    at += kChunkHeaderBytes + header->content_bytes + header->children_bytes;
+  }
+  return at == bytes.size() && at > begin;
+}
+
+/// Returns the offset of MAIN's children. MAIN has no content, even where a writer put another number into that field.
+std::size_t begin_of_children(std::span<const std::byte> bytes, const ChunkHeader& main, Document& out) {
+  const std::size_t content = kFileHeaderBytes + kChunkHeaderBytes;
+  const std::size_t claimed = content + main.content_bytes;
+  out.main_content = main.content_bytes;
+  if (main.content_bytes == 0 || !is_chain(bytes, content)) return claimed;
+  out.warnings.push_back("MAIN claims " + std::to_string(main.content_bytes) +
+                         " bytes of content and has none; ignored");
+  out.main_content = 0;
+  return content;
+}
+
 }  // namespace
 
 std::string_view Dict::get(std::string_view key) const {
@@ -273,8 +302,7 @@ Result<Document> parse_document(std::span<const std::byte> bytes) {
   if (main->id != "MAIN") {
     return bad_at(kFileHeaderBytes, "the first chunk must be MAIN, not \"" + printable(main->id) + "\"");
   }
-  const std::size_t begin = kFileHeaderBytes + kChunkHeaderBytes + main->content_bytes;
-  document.main_content = main->content_bytes;
+  const std::size_t begin = begin_of_children(bytes, *main, document);
   const std::size_t claimed_end = begin + main->children_bytes;
   const std::size_t end = std::min(claimed_end, bytes.size());
   document.chunks_begin = begin;

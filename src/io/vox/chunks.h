@@ -108,7 +108,7 @@ using Attributes = std::map<std::string, std::string>;
 struct Document {
   std::int32_t version = 0;
   std::vector<Model> models;
-  std::span<const std::byte> palette;          ///< RGBA's content: entry i is colour index i + 1; empty without one
+  std::span<const std::byte> palette;          ///< RGBA's entries: entry i is colour index i + 1; may be fewer than 255
   std::span<const std::byte> index_map;        ///< IMAP's 256 bytes, or empty
   std::array<Attributes, kColours> materials;  ///< by colour index
   std::vector<Node> nodes;

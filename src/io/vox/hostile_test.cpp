@@ -148,7 +148,7 @@ TEST(VoxHostile, CountsBeyondTheBytesAreErrors) {
   EXPECT_EQ(text_of(with_words("nSHP", {0, 0, kMost})), "byte 64: chunk nSHP ends before its content does");
   EXPECT_EQ(text_of(with_words("MATL", {0, kMost})), "byte 64: chunk MATL ends before its content does");
   EXPECT_EQ(text_of(with_words("MATT", {0, 0, 0, kMost})), "byte 64: chunk MATT ends before its content does");
-  EXPECT_EQ(text_of(with_words("RGBA", {0})), "byte 64: chunk RGBA ends before its content does");
+  EXPECT_EQ(text_of(with_words("RGBA", {})), "byte 64: chunk RGBA ends before its content does");
   EXPECT_EQ(text_of(with_words("IMAP", {0})), "byte 64: chunk IMAP ends before its content does");
 }
 

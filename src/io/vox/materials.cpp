@@ -31,6 +31,7 @@ constexpr std::array<OldProperty, 8> kOldProperties = {{{"_plastic", true},
                                                         {"_total_power", false}}};
 constexpr std::array<const char*, 4> kOldTypes = {"_diffuse", "_metal", "_glass", "_emit"};
 
+/// Requires: the palette has that entry.
 Rgba8 palette_entry(std::span<const std::byte> palette, std::size_t colour_index) {
   const std::span<const std::byte> entry = palette.subspan((colour_index - 1) * 4, 4);
   return {static_cast<std::uint8_t>(entry[0]), static_cast<std::uint8_t>(entry[1]), static_cast<std::uint8_t>(entry[2]),
@@ -141,7 +142,8 @@ Status register_palette(const Document& document, const std::array<std::uint8_t,
   for (std::size_t i = 0; i < kColours; ++i) colour_index_of_type[type_of[i]] = i;
   for (std::size_t type = 1; type < kColours; ++type) {
     const std::size_t index = colour_index_of_type[type];
-    const Rgba8 colour = document.palette.empty() ? fallback[index] : palette_entry(document.palette, index);
+    const bool has_entry = 4 * index <= document.palette.size();
+    const Rgba8 colour = has_entry ? palette_entry(document.palette, index) : fallback[index];
     const std::string name = default_type_name(static_cast<int>(type));
     const Result<VoxelType> added = types.add(decode_material(name, colour, document.materials[index]));
     if (!added) return added.error();

@@ -180,7 +180,9 @@ void GraphRevision::remove_what_is_gone() {
 /// Where the pivot that the file gives the grid's first piece goes.
 Result<Motion> GraphRevision::place(const Instance& instance, const GridPlan& plan) {
   if (instance.voxel_size != 1.0) {
-    return make_error(ErrorCode::Unsupported, instance_text(instance) + " is scaled, which a .vox file cannot say");
+    return make_error(
+        ErrorCode::Unsupported,
+        instance_text(instance) + " has voxels of another size than others, which a .vox file cannot say");
   }
   const auto orientation = orientation_from_turn({instance.rotation, instance.mirrored});
   if (!orientation.has_value()) {

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdio>
 #include <limits>
 #include <optional>
 #include <span>
@@ -35,6 +37,7 @@ Status check_has_no_field(const SceneGrid& grid) {
 constexpr std::uint32_t kVersion = 150;
 constexpr std::uint32_t kGone = std::numeric_limits<std::uint32_t>::max();
 // Of a file: its name, its version, and what MAIN's header says.
+constexpr std::size_t kContentOfMain = 12;
 constexpr std::size_t kChildrenOfMain = 16;
 
 /// A file without anything, of which a scene that came from nowhere is a revision.
@@ -470,6 +473,7 @@ std::optional<Chunk> Writer::revised_palette(const vox::ChunkPlace& place) const
   if (chunk != palette_chunk_ || !has_changed_colour()) return std::nullopt;
   const std::span<const std::byte> bytes = content_of(place);
   std::vector<std::byte> content(bytes.begin(), bytes.end());
+  content.resize(std::max(content.size(), vox::kColours * 4), std::byte{255});
   for (std::size_t index = 1; index < vox::kColours; ++index) {
     const Rgba8& colour = types_.table.by_index[index].colour;
     const std::size_t entry = 4 * (index - 1);
@@ -703,6 +707,7 @@ Result<VoxBytes> Writer::run() {
   const auto before =
       file.subspan(source_.document.chunks_begin, source_.document.chunks_end - source_.document.chunks_begin);
   if (!is_new() && std::ranges::equal(out_.bytes().subspan(begin), before)) return VoxBytes{source_.bytes, warnings};
+  out_.patch(kContentOfMain, source_.document.main_content);
   out_.patch(kChildrenOfMain, out_.size() - begin);
   out_.raw(file.subspan(source_.document.chunks_end));
   return VoxBytes{out_.take(), warnings};
@@ -726,14 +731,93 @@ const VoxSource& source_of(const LoadedScene& loaded) {
   return loaded.source != nullptr ? *loaded.source : no_source();
 }
 
+/// The size of voxels that all instances have in common, where it is not 1: .vox knows no other.
+std::optional<double> common_voxel_size(const Scene& scene) {
+  constexpr double kRounding = 1e-6;
+  std::optional<double> common;
+  bool is_same = true;
+  scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
+    if (!common) common = instance.voxel_size;
+    is_same = is_same && std::abs(instance.voxel_size - *common) <= kRounding * *common;
+  });
+  const bool is_scaled = common && is_same && *common != 1.0 && *common > 0.0 && std::isfinite(*common);
+  return is_scaled ? common : std::nullopt;
+}
+
+Scene divided(const Scene& given, double voxel_size) {
+  Scene scene = given.snapshot();
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    Instance& instance = scene.edit(handle);
+    instance.voxel_size = 1.0;
+    instance.position /= voxel_size;
+  }
+  for (const GroupHandle handle : scene.groups().handles()) scene.edit(handle).position /= voxel_size;
+  return scene;
+}
+
+LoadedScene divided(const LoadedScene& given, double voxel_size) {
+  LoadedScene unit;
+  unit.scene = divided(given.scene, voxel_size);
+  unit.format = given.format;
+  unit.sun = given.sun;
+  unit.camera = given.camera;
+  unit.cameras = given.cameras;
+  unit.look = given.look;
+  unit.last_frame = given.last_frame;
+  unit.source = given.source;
+  if (unit.camera) unit.camera->position /= voxel_size;
+  for (FileCamera& each : unit.cameras) {
+    each.camera.position /= voxel_size;
+    each.focus_distance /= voxel_size;
+  }
+  return unit;
+}
+
+const Scene& scene_in(const Scene& scene) {
+  return scene;
+}
+const Scene& scene_in(const LoadedScene& loaded) {
+  return loaded.scene;
+}
+const VoxSource& source_of(const Scene&) {
+  return no_source();
+}
+
+std::string size_warning(double voxel_size) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.6g", voxel_size);
+  return std::string("the size of voxels is left out, which .vox does not hold: a voxel was ") + text + " units long";
+}
+
+/// `given`: a Scene, or a LoadedScene.
+template <class Given>
+Result<VoxBytes> write_any(const Given& given, const Progress& progress) {
+  const auto voxel_size = common_voxel_size(scene_in(given));
+  if (!voxel_size) return Writer(given, source_of(given), progress).run();
+  const Given unit = divided(given, *voxel_size);
+  auto written = Writer(unit, source_of(unit), progress).run();
+  if (written) written->warnings.push_back(size_warning(*voxel_size));
+  return written;
+}
+
+template <class Given>
+Result<std::vector<std::string>> losses_of_any(const Given& given) {
+  const auto voxel_size = common_voxel_size(scene_in(given));
+  if (!voxel_size) return Writer(given, source_of(given)).losses();
+  const Given unit = divided(given, *voxel_size);
+  auto lines = Writer(unit, source_of(unit)).losses();
+  if (lines) lines->push_back(size_warning(*voxel_size));
+  return lines;
+}
+
 }  // namespace
 
 Result<VoxBytes> write_vox(const Scene& scene, const Progress& progress) {
-  return Writer(scene, no_source(), progress).run();
+  return write_any(scene, progress);
 }
 
 Result<VoxBytes> write_vox(const LoadedScene& loaded, const Progress& progress) {
-  return Writer(loaded, source_of(loaded), progress).run();
+  return write_any(loaded, progress);
 }
 
 Result<SavedScene> write_vox(const Scene& scene, const std::filesystem::path& path, const Progress& progress) {
@@ -745,11 +829,11 @@ Result<SavedScene> write_vox(const LoadedScene& loaded, const std::filesystem::p
 }
 
 Result<std::vector<std::string>> losses_of_vox(const Scene& scene) {
-  return Writer(scene, no_source()).losses();
+  return losses_of_any(scene);
 }
 
 Result<std::vector<std::string>> losses_of_vox(const LoadedScene& loaded) {
-  return Writer(loaded, source_of(loaded)).losses();
+  return losses_of_any(loaded);
 }
 
 }  // namespace quoin

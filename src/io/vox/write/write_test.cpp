@@ -276,7 +276,13 @@ TEST(VoxWrite, WhatVoxCannotSayIsRefused) {
   };
   EXPECT_EQ(code(), std::nullopt);
   scene.edit(instance).voxel_size = 2.0;
-  EXPECT_EQ(code(), ErrorCode::Unsupported);
+  EXPECT_EQ(code(), std::nullopt) << "a size that all have is left out, with a warning";
+  ASSERT_FALSE(warnings.empty());
+  EXPECT_NE(warnings.back().find("2 units"), std::string::npos) << warnings.back();
+  const InstanceHandle other = scene.add_instance(scene.instances()[instance]);
+  scene.edit(other).voxel_size = 1.0;
+  EXPECT_EQ(code(), ErrorCode::Unsupported) << "two sizes";
+  ASSERT_TRUE(scene.remove_instance(other));
   scene.edit(instance).voxel_size = 1.0;
   scene.edit(instance).rotation = glm::angleAxis(0.5, DVec3(0, 1, 0));
   EXPECT_EQ(code(), ErrorCode::Unsupported);
