@@ -2,15 +2,20 @@
 //
 //   BL16   16^3 voxels as a PNG of 64 x 64 pixels
 //   MATE   a material
-//   LAYR   a layer: which blocks stand where, and what is said of it
+//   LAYR   a layer: its blocks with their positions, and its properties; without blocks a shape in the box from -1 to
+//          1, which `mat` places
 
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 
 #include "io/byte_reader.h"
 #include "io/image/png.h"
@@ -48,6 +53,8 @@ class GoxelReader {
   void read_material(ByteReader& chunk);
   Status read_layer(ByteReader& chunk);
   Status put_block(const Block& block, const Material& material);
+  Status put_shape(const Dict& dict, const Material& material, std::size_t at);
+  Rgba8 tinted(const std::uint8_t* rgba, const Material& material) const;
   static Dict read_dict(ByteReader& chunk);
 
   std::span<const std::byte> bytes_;
@@ -180,16 +187,93 @@ Status GoxelReader::read_layer(ByteReader& chunk) {
   if (const auto name = dict.find("name"); name != dict.end()) model.name = text_of(name->second);
   ByteReader visible = value("visible");
   model.visible = visible.remaining() == 0 || visible.u8() != 0;
-  ByteReader base = value("base_id");
-  if (count == 0 && (base.u32() != 0 || dict.contains("shape"))) ++left_out_["layers that are clones or shapes"];
+  const bool is_shape = count == 0 && dict.contains("shape");
+  if (count == 0 && !is_shape && value("base_id").u32() != 0) ++left_out_["layers that are clones"];
   const std::int32_t index = value("material").i32();
   const bool has_material =
       dict.contains("material") && index >= 0 && static_cast<std::size_t>(index) < materials_.size();
   const Material material = has_material ? materials_[static_cast<std::size_t>(index)] : Material{};
   builder_.begin(std::move(model));
   builder_.use_material(material.number);
+  if (is_shape) return put_shape(dict, material, at);
   for (const Block& block : blocks) {
     if (auto put = put_block(block, material); !put) return put;
+  }
+  return {};
+}
+
+enum class Shape : std::uint8_t { Sphere, Cube, Cylinder };
+
+std::optional<Shape> shape_named(std::string_view name) {
+  if (name == "sphere") return Shape::Sphere;
+  if (name == "cube") return Shape::Cube;
+  if (name == "cylinder") return Shape::Cylinder;
+  return std::nullopt;
+}
+
+/// Returns true for points of a shape that fills the box from -1 to 1.
+bool is_inside(Shape shape, const DVec3& p) {
+  if (shape == Shape::Sphere) return glm::dot(p, p) <= 1.0;
+  if (shape == Shape::Cylinder) return p.x * p.x + p.y * p.y <= 1.0 && std::abs(p.z) <= 1.0;
+  return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) <= 1.0;
+}
+
+/// The voxels that the box from -1 to 1 may reach, placed by a matrix.
+DBox box_of_shape(const glm::dmat4& placed) {
+  DVec3 reach(0.0);
+  for (int axis = 0; axis < 3; ++axis) reach += glm::abs(DVec3(placed[axis]));
+  const DVec3 middle(placed[3]);
+  return {glm::floor(middle - reach), glm::ceil(middle + reach)};
+}
+
+Rgba8 GoxelReader::tinted(const std::uint8_t* rgba, const Material& material) const {
+  const auto times = [&](std::uint8_t channel, std::size_t i) {
+    return static_cast<std::uint8_t>(std::lround(channel * std::clamp(material.colour.at(i), 0.0F, 1.0F)));
+  };
+  return {times(rgba[0], 0), times(rgba[1], 1), times(rgba[2], 2), std::max<std::uint8_t>(times(255, 3), 1)};
+}
+
+// A voxel is there where its centre is inside.
+Status GoxelReader::put_shape(const Dict& dict, const Material& material, std::size_t at) {
+  const std::string_view name = text_of(dict.find("shape")->second);
+  const auto shape = shape_named(name);
+  const auto mat = dict.find("mat");
+  std::array<float, 16> numbers{};
+  for (std::size_t i = 0; i < 4; ++i) numbers[5 * i] = 1.0F;
+  if (mat != dict.end()) read_numbers(mat->second, numbers);
+  glm::dmat4 placed(1.0);
+  for (std::size_t i = 0; i < 16; ++i) placed[static_cast<int>(i / 4)][static_cast<int>(i % 4)] = double{numbers[i]};
+  if (!shape || glm::determinant(glm::dmat3(placed)) == 0.0) {
+    ++left_out_[shape ? "shapes without a volume" : "shapes of unknown kinds"];
+    return {};
+  }
+  std::array<std::uint8_t, 4> rgba{255, 255, 255, 255};
+  if (const auto colour = dict.find("color"); colour != dict.end() && colour->second.size() >= rgba.size()) {
+    std::memcpy(rgba.data(), colour->second.data(), rgba.size());
+  }
+  constexpr double kMostVoxels = 1 << 27;
+  const DBox box = box_of_shape(placed);
+  const DVec3 size = box.max - box.min;
+  const double farthest = std::max(glm::length(box.min), glm::length(box.max));
+  if (!(size.x * size.y * size.z <= kMostVoxels) || !(farthest < kMaxPlace)) {
+    return make_error(ErrorCode::LimitExceeded, "a shape of more than 2^27 voxels, or too far out", {}, at);
+  }
+  const glm::dmat4 shape_from_voxel = glm::inverse(placed);
+  const Rgba8 colour = tinted(rgba.data(), material);
+  const IVec3 first(box.min);
+  const IVec3 end(box.max);
+  for (int z = first.z; z < end.z; ++z) {
+    for (int y = first.y; y < end.y; ++y) {
+      int run = 0;
+      for (int x = first.x; x <= end.x; ++x) {
+        const DVec3 centre = DVec3(x, y, z) + 0.5;
+        const bool is_set = x < end.x && is_inside(*shape, DVec3(shape_from_voxel * glm::dvec4(centre, 1.0)));
+        if (is_set) ++run;
+        if (is_set || run == 0) continue;
+        if (auto put = builder_.put({x - run, z, -y - 1}, colour, run, 0); !put) return put;
+        run = 0;
+      }
+    }
   }
   return {};
 }
@@ -197,16 +281,11 @@ Status GoxelReader::read_layer(ByteReader& chunk) {
 Status GoxelReader::put_block(const Block& block, const Material& material) {
   constexpr std::uint8_t kSolid = 127;
   const std::vector<std::uint8_t>& pixels = blocks_[block.index];
-  const auto times = [&](std::uint8_t channel, std::size_t i) {
-    return static_cast<std::uint8_t>(std::lround(channel * std::clamp(material.colour.at(i), 0.0F, 1.0F)));
-  };
   for (int i = 0; i < kBlockEdge * kBlockEdge * kBlockEdge; ++i) {
     const std::uint8_t* const rgba = pixels.data() + std::size_t{4} * static_cast<std::size_t>(i);
     if (rgba[3] < kSolid) continue;
     const IVec3 at = block.place + IVec3(i % 16, i / 16 % 16, i / 256);
-    const Rgba8 colour{times(rgba[0], 0), times(rgba[1], 1), times(rgba[2], 2),
-                       std::max<std::uint8_t>(times(255, 3), 1)};
-    if (auto put = builder_.put({at.x, at.z, -at.y - 1}, colour); !put) return put;
+    if (auto put = builder_.put({at.x, at.z, -at.y - 1}, tinted(rgba, material)); !put) return put;
   }
   return {};
 }

@@ -17,6 +17,7 @@
 #include "io/byte_stream.h"
 #include "io/models/model_builder.h"
 #include "io/models/models.h"
+#include "io/text.h"
 
 namespace quoin::models {
 
@@ -35,7 +36,7 @@ Rgba8 colour_of(std::uint32_t rgba, bool is_bgra) {
           static_cast<std::uint8_t>(rgba >> 24)};
 }
 
-/// A matrix's place and size.
+/// A matrix's place and size. Qubicle gives an empty matrix any place.
 struct Matrix {
   std::string name;
   IVec3 size{0};
@@ -44,21 +45,31 @@ struct Matrix {
 
 std::optional<IVec3> read_size(ByteReader& reader) {
   IVec3 size{0};
+  bool is_sound = true;
   for (int axis = 0; axis < 3; ++axis) {
     const std::uint32_t edge = reader.u32();
-    if (edge > kMaxEdge) return std::nullopt;
+    is_sound &= edge <= kMaxEdge;
     size[axis] = static_cast<int>(edge);
   }
-  return size;
+  return is_sound ? std::optional(size) : std::nullopt;
+}
+
+bool is_empty(IVec3 size) {
+  return size.x == 0 || size.y == 0 || size.z == 0;
+}
+
+std::string empty_text(const std::string& name) {
+  return "left out: the matrix \"" + printable(name) + "\", which has no voxels";
 }
 
 std::optional<IVec3> read_place(ByteReader& reader) {
   IVec3 place{0};
+  bool is_sound = true;
   for (int axis = 0; axis < 3; ++axis) {
     place[axis] = reader.i32();
-    if (place[axis] < -kMaxPlace || place[axis] > kMaxPlace) return std::nullopt;
+    is_sound &= place[axis] >= -kMaxPlace && place[axis] <= kMaxPlace;
   }
-  return place;
+  return is_sound ? std::optional(place) : std::nullopt;
 }
 
 /// A matrix that turns about a pivot, in voxels from its place; about its place where that is out of range.
@@ -79,7 +90,7 @@ class QbReader {
   Result<LoadedScene> read() {
     static_cast<void>(reader_.u32());  // version
     is_bgra_ = reader_.u32() == 1;
-    is_mirrored_ = reader_.u32() == 0;  // left-handed
+    static_cast<void>(reader_.u32());  // z axis: how Qubicle showed it; the data are the same
     is_packed_ = reader_.u32() != 0;
     has_masks_ = reader_.u32() != 0;
     const std::uint32_t matrices = reader_.u32();
@@ -91,6 +102,7 @@ class QbReader {
 
  private:
   Status read_matrix();
+  Status read_slices(const Matrix& matrix);
   Status read_run(const Matrix& matrix, int z, std::uint64_t& at, std::uint64_t count, std::uint32_t data);
   Status read_slice(const Matrix& matrix, int z);
   [[nodiscard]] Error too_short() const { return bad_at(bytes_.size(), "it ends before its matrices do"); }
@@ -99,7 +111,6 @@ class QbReader {
   ByteReader reader_;
   ModelBuilder builder_;
   bool is_bgra_ = false;
-  bool is_mirrored_ = false;
   bool is_packed_ = false;
   bool has_masks_ = false;
 };
@@ -111,16 +122,22 @@ Status QbReader::read_matrix() {
   const auto size = read_size(reader_);
   const auto place = read_place(reader_);
   if (reader_.failed()) return too_short();
-  if (!size || !place) return bad_at(at, "a matrix whose size or place is out of range");
+  if (!size || (!place && !is_empty(*size))) return bad_at(at, "a matrix whose size or place is out of range");
   matrix.size = *size;
+  if (is_empty(matrix.size)) {
+    builder_.warn(empty_text(matrix.name));
+    return read_slices(matrix);  // which end in the packed form
+  }
   matrix.place = *place;
   Model model;
   model.name = matrix.name;
-  IVec3 corner = matrix.place;
-  if (is_mirrored_) corner.z = -matrix.place.z - matrix.size.z;
-  model.position = DVec3(corner);
+  model.position = DVec3(matrix.place);
   model.canvas = {IVec3(0), matrix.size};
   builder_.begin(std::move(model));
+  return read_slices(matrix);
+}
+
+Status QbReader::read_slices(const Matrix& matrix) {
   for (int z = 0; z < matrix.size.z; ++z) {
     if (auto done = read_slice(matrix, z); !done) return done;
   }
@@ -163,9 +180,8 @@ Status QbReader::read_run(const Matrix& matrix, int z, std::uint64_t& at, std::u
     at = end;
     return {};
   }
-  const int placed_z = is_mirrored_ ? matrix.size.z - 1 - z : z;
   while (at < end) {
-    const IVec3 voxel{static_cast<int>(at % width), static_cast<int>(at / width), placed_z};
+    const IVec3 voxel{static_cast<int>(at % width), static_cast<int>(at / width), z};
     const std::uint64_t row = std::min(end - at, width - at % width);
     if (auto put = builder_.put(voxel, colour, static_cast<int>(row), 0); !put) return put;
     at += row;
@@ -238,7 +254,11 @@ Status QbtReader::read_matrix(ByteReader& reader) {
   const std::size_t packed_at = reader.position() + 4;
   const auto packed = reader.take(reader.u32());
   if (reader.failed()) return bad_at(at, "a matrix that ends too early");
-  if (!size || !place) return bad_at(at, "a matrix whose size or place is out of range");
+  if (!size || (!place && !is_empty(*size))) return bad_at(at, "a matrix whose size or place is out of range");
+  if (is_empty(*size)) {
+    builder_.warn(empty_text(matrix.name));
+    return {};
+  }
   matrix.size = *size;
   matrix.place = *place;
   Model model = model_about(matrix, DVec3(pivot[0], pivot[1], pivot[2]));
@@ -248,7 +268,6 @@ Status QbtReader::read_matrix(ByteReader& reader) {
 
 // x changes slowest, then z, then y. The last byte says which faces are seen: none of what is empty.
 Status QbtReader::put_voxels(const Matrix& matrix, std::span<const std::byte> packed, std::size_t at) {
-  if (matrix.size.x == 0 || matrix.size.y == 0 || matrix.size.z == 0) return {};
   ByteStream stream(packed, 0, Compression::Zlib);
   std::vector<std::byte> column(static_cast<std::size_t>(matrix.size.y) * 4);
   for (int x = 0; x < matrix.size.x; ++x) {
@@ -353,13 +372,17 @@ Status QbclReader::read_matrix(std::string name, bool is_used, bool is_shown) {
   const auto size = read_size(reader_);
   const auto place = read_place(reader_);
   if (reader_.failed()) return too_short();
-  if (!size || !place) return bad_at(at, "a matrix whose size or place is out of range");
+  if (!size || (!place && !is_empty(*size))) return bad_at(at, "a matrix whose size or place is out of range");
   std::array<float, 3> pivot{};
   for (float& part : pivot) part = reader_.f32();
   const std::size_t packed_at = reader_.position() + 4;
   const auto packed = reader_.take(reader_.u32());
   if (reader_.failed()) return too_short();
   if (!is_used) return {};
+  if (is_empty(*size)) {
+    builder_.warn(empty_text(matrix.name));
+    return {};
+  }
   matrix.size = *size;
   matrix.place = *place;
   Model model = model_about(matrix, DVec3(pivot[0], pivot[1], pivot[2]));
@@ -370,7 +393,6 @@ Status QbclReader::read_matrix(std::string name, bool is_used, bool is_shown) {
 
 Status QbclReader::put_columns(const Matrix& matrix, std::span<const std::byte> packed, std::size_t at) {
   constexpr std::uint32_t kRun = 2;
-  if (matrix.size.x == 0 || matrix.size.y == 0 || matrix.size.z == 0) return {};
   ByteStream stream(packed, 0, Compression::Zlib);
   std::vector<std::byte> entries;
   const auto read = [&](std::size_t count) -> Status {

@@ -207,16 +207,18 @@ Result<LoadedScene> read_slab6(std::span<const std::byte> bytes) {
 
 namespace {
 
-constexpr Sizes kAceOfSpades{512, 512, 64};
+// Maps of Ace of Spades have no header: 64 high, and 240 since version 1.0, where columns may be empty.
+constexpr std::array<Sizes, 2> kAceOfSpades = {{{512, 512, 64}, {512, 512, 240}}};
 constexpr Sizes kVoxlapMap{1024, 1024, 256};
 
 /// Where the columns of a map begin, and how many there are.
 struct VxlLayout {
-  Sizes sizes = kAceOfSpades;
+  Sizes sizes = kAceOfSpades[0];
   std::size_t columns = 0;
 };
 
-VxlLayout vxl_layout(std::span<const std::byte> whole) {
+/// The layout that a header says; none has that of the lower map.
+VxlLayout layout_in_header(std::span<const std::byte> whole) {
   ByteReader reader(whole);
   if (reader.u32() != kVoxlapMagic) return {};
   // The two sizes, and where one stands first: a place and three axes.
@@ -265,10 +267,8 @@ bool read_column(ByteReader& reader, int depth, Take take) {
   }
 }
 
-}  // namespace
-
-bool is_vxl(std::span<const std::byte> whole) {
-  const VxlLayout layout = vxl_layout(whole);
+/// Returns true if all columns fit a map, and its file where that has no header.
+bool fits(std::span<const std::byte> whole, const VxlLayout& layout) {
   if (layout.columns > whole.size() || layout.sizes.x == 0 || layout.sizes.y == 0) return false;
   ByteReader reader(whole, layout.columns, whole.size());
   const std::int64_t columns = std::int64_t{layout.sizes.x} * layout.sizes.y;
@@ -276,6 +276,22 @@ bool is_vxl(std::span<const std::byte> whole) {
     if (!read_column(reader, layout.sizes.z, [](int, int, const std::span<const std::byte>*) {})) return false;
   }
   return layout.columns != 0 || reader.remaining() == 0;
+}
+
+/// The lowest map that the columns fit, where there is no header to say it.
+VxlLayout vxl_layout(std::span<const std::byte> whole) {
+  const VxlLayout said = layout_in_header(whole);
+  if (said.columns != 0) return said;
+  for (const Sizes& sizes : kAceOfSpades) {
+    if (fits(whole, {sizes, 0})) return {sizes, 0};
+  }
+  return said;
+}
+
+}  // namespace
+
+bool is_vxl(std::span<const std::byte> whole) {
+  return fits(whole, vxl_layout(whole));
 }
 
 Result<LoadedScene> read_vxl(std::span<const std::byte> bytes) {
