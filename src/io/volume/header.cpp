@@ -187,26 +187,39 @@ std::string claim(const Volume& volume, std::uint64_t bytes) {
 
 }  // namespace
 
+std::uint64_t bytes_of_values(const VolumeHeader& header) {
+  const IVec3 size = header.volume.size;
+  return static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) * static_cast<std::uint64_t>(size.z) *
+         size_of(header.volume.type) * header.components;
+}
+
 Status read_values(ByteStream& stream, VolumeHeader& header, std::uint64_t offset) {
   Volume& volume = header.volume;
   const auto count = static_cast<std::size_t>(volume.size.x) * static_cast<std::size_t>(volume.size.y) *
                      static_cast<std::size_t>(volume.size.z);
   const std::size_t width = size_of(volume.type);
+  const std::size_t stride = width * header.components;
   const auto cut_off = [&](std::uint64_t held, const char* how) {
     return make_error(ErrorCode::BadFormat,
-                      claim(volume, count * width) + ", but there are " + how + std::to_string(held), {}, offset);
+                      claim(volume, bytes_of_values(header)) + ", but there are " + how + std::to_string(held), {},
+                      offset);
   };
   const std::uint64_t most = stream.is_compressed() ? stream.max_bytes() : stream.remaining();
-  if (count * width > most) return cut_off(most, stream.is_compressed() ? "at most " : "");
-  std::vector<std::byte> piece(std::min(count, kValuesAtOnce) * width);
+  if (count > most / stride) return cut_off(most, stream.is_compressed() ? "at most " : "");
+  const std::size_t at_once = std::max<std::size_t>(kValuesAtOnce / header.components, 1);
+  std::vector<std::byte> piece(std::min(count, at_once) * stride);
   // Reserved memory costs nothing until values come to fill it.
   volume.values.reserve(count);
   Survey survey;
   for (std::size_t done = 0; done < count;) {
-    const std::size_t now = std::min(count - done, kValuesAtOnce);
-    const auto read = stream.read(std::span(piece).first(now * width));
+    const std::size_t now = std::min(count - done, at_once);
+    const auto read = stream.read(std::span(piece).first(now * stride));
     if (!read) return read.error();
-    if (*read < now * width) return cut_off(done * width + *read, "");
+    if (*read < now * stride) return cut_off(done * stride + *read, "");
+    for (std::size_t i = 1; i < now && stride > width; ++i) {
+      std::copy_n(piece.begin() + static_cast<std::ptrdiff_t>(i * stride), width,
+                  piece.begin() + static_cast<std::ptrdiff_t>(i * width));
+    }
     volume.values.resize(done + now);
     const std::span<float> values = std::span(volume.values).subspan(done, now);
     decode(volume.type, piece.data(), header.order, {header.slope, header.intercept}, values);

@@ -6,6 +6,8 @@
 #include <glm/mat4x4.hpp>
 #include <optional>
 #include <span>
+#include <string>
+#include <vector>
 
 #include <quoin/core/progress.h>
 #include <quoin/io/volume.h>
@@ -13,6 +15,9 @@
 #include "io/byte_stream.h"
 
 namespace quoin {
+
+/// Encodings of the values of a volume, apart from a compression of the whole file.
+enum class DataEncoding : std::uint8_t { Raw, Gzip, Bzip2, Ascii, Hex };
 
 /// What the header of a volume says: all of the volume but its values, and where and how those are stored.
 struct VolumeHeader {
@@ -22,11 +27,14 @@ struct VolumeHeader {
   double slope = 1.0;  ///< a value is slope times what is stored, plus intercept
   double intercept = 0.0;
 
-  std::uint64_t data_at = 0;                         ///< where the values, or their compressed form, begin
-  Compression data_compression = Compression::None;  ///< of the values alone (NRRD's gzip encoding)
-  std::uint64_t skip = 0;                            ///< bytes before the values, once decompressed
-  bool is_data_at_end = false;                       ///< the values are the file's last bytes, wherever they begin
-  bool is_data_elsewhere = false;                    ///< in the other file of a pair
+  std::uint64_t data_at = 0;                       ///< where the values, or their encoded form, begin
+  DataEncoding data_encoding = DataEncoding::Raw;  ///< of the values alone
+  std::size_t components = 1;                      ///< values per voxel; the first is read
+  std::uint64_t lines_to_skip = 0;                 ///< of the file that `data_file` names, before `skip`
+  std::uint64_t skip = 0;                          ///< bytes before the values, once decompressed
+  bool is_data_at_end = false;                     ///< the values are the file's last bytes, wherever they begin
+  bool is_data_elsewhere = false;                  ///< in another file: `data_file`, or the other of a NIfTI pair
+  std::string data_file{};                         ///< a plain name: it lies next to the header
 };
 
 /// The frames in which files give positions.
@@ -56,6 +64,9 @@ enum class VolumeSpace : std::uint8_t { RightFrontHead, LeftFrontHead, LeftBackH
 /// Errors:   BadFormat when there are fewer values than `size` says.
 [[nodiscard]] Status read_values(ByteStream& stream, VolumeHeader& header, std::uint64_t offset);
 
+/// Bytes that the values of a header take, with all components.
+[[nodiscard]] std::uint64_t bytes_of_values(const VolumeHeader& header);
+
 }  // namespace quoin
 
 namespace quoin::nifti {
@@ -82,5 +93,12 @@ inline constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 16;
 /// Reads a header; sources as in read_volume. `bytes` may be the file's first kMaxHeaderBytes.
 /// Requires: is_header(bytes). Offsets in errors count from `bytes`.
 [[nodiscard]] Result<VolumeHeader> read_header(std::span<const std::byte> bytes, const VolumeOptions& options);
+
+/// Decodes values that are no raw bytes and no gzip stream (ascii, hex, bzip2), from `begin` on, to raw bytes of the
+/// header's order; of bzip2 as many as the header needs, with the bytes to skip before them.
+/// Memory: that of the decoded bytes. Requires: begin <= bytes.size().
+/// Errors: BadFormat, with the offset; Unsupported for bzip2 in builds without it.
+[[nodiscard]] Result<std::vector<std::byte>> decode_values(std::span<const std::byte> bytes, std::size_t begin,
+                                                           const VolumeHeader& header);
 
 }  // namespace quoin::nrrd

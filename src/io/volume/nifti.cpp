@@ -138,10 +138,25 @@ glm::dmat4 qform(const Fields& fields, DVec3 spacing) {
   return affine;
 }
 
+/// Programs that go by the qform show a volume mirrored, or turned round, where the sform says something else.
+void compare_forms(const glm::dmat4& sform, const glm::dmat4& qform, std::vector<std::string>& warnings) {
+  const glm::dmat3 a(sform);
+  const glm::dmat3 b(qform);
+  if (glm::determinant(a) * glm::determinant(b) < 0.0) {
+    warnings.emplace_back("the sform and the qform disagree on left and right; the sform is used");
+    return;
+  }
+  bool is_opposite = false;
+  for (int axis = 0; axis < 3; ++axis) is_opposite |= glm::dot(a[axis], b[axis]) < 0.0;
+  if (is_opposite) warnings.emplace_back("the sform and the qform turn the axes differently; the sform is used");
+}
+
 /// The first of sform and qform that the header gives and that places samples in space.
 std::optional<glm::dmat4> given(const Fields& fields, DVec3 spacing, std::vector<std::string>& warnings) {
   if (fields.code(kSformCode) > 0) {
     const glm::dmat4 affine = sform(fields);
+    const glm::dmat4 other = fields.code(kQformCode) > 0 ? qform(fields, spacing) : affine;
+    if (is_sound(affine) && is_sound(other)) compare_forms(affine, other, warnings);
     if (is_sound(affine)) return affine;
     warnings.emplace_back("the sform places no sample; it is left out");
   }

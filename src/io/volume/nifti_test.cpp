@@ -121,6 +121,22 @@ TEST(Nifti, TheSformGoesBeforeTheQform) {
   expect_near(position_of(placed(file), {0, 0, 0}), {-7, 7, 7});
 }
 
+TEST(Nifti, FormsThatDisagreeAreWarnedOf) {
+  NiftiFile file;
+  file.qform_code = 1;
+  file.sform_code = 1;
+  file.srow = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+  EXPECT_FALSE(warns(placed(file), "disagree")) << "the same";
+  file.srow = {-1, 0, 0, 9, 0, 1, 0, 0, 0, 0, 1, 0};
+  Volume volume = placed(file);
+  EXPECT_TRUE(warns(volume, "the sform and the qform disagree on left and right; the sform is used"));
+  expect_near(position_of(volume, {1, 0, 0}), {-8, 0, 0});
+  file.srow = {-1, 0, 0, 9, 0, -1, 0, 0, 0, 0, 1, 0};
+  EXPECT_TRUE(warns(placed(file), "turn the axes differently"));
+  file.qform_code = 0;
+  EXPECT_FALSE(warns(placed(file), "turn the axes differently"));
+}
+
 TEST(Nifti, TheQformTurnsAndQfacFlipsTheThirdAxis) {
   for (const bool is_second : {false, true}) {
     NiftiFile file{.is_second = is_second, .order = std::endian::big};

@@ -1,5 +1,6 @@
 #include "io/volume/header.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -199,34 +200,46 @@ bool is_spatial(std::string_view kind) {
   return name == "domain" || name == "space" || name == "???" || name == "none";
 }
 
+/// The axes of a file: those of its values, and which of these is the first of space.
+struct Axes {
+  std::size_t count = 0;
+  std::size_t first = 0;  ///< 1: axis 1 counts the components of a value, or slices in time
+};
+
 /// Values of several components, and slices in time, come before space in some files.
-Status check_kinds(const Fields& fields) {
+Result<Axes> read_axes(const Fields& fields, std::size_t dimensions) {
+  Axes axes{dimensions, 0};
+  const Field* const directions = fields.find("spacedirections");
+  if (directions != nullptr && dimensions > 3 && directions->text.starts_with("none")) axes.first = 1;
   const Field* field = fields.find("kinds");
-  if (field == nullptr) return {};
+  if (field == nullptr) return axes;
   const auto kinds = words_of(field->text);
-  for (std::size_t axis = 0; axis < kinds.size() && axis < 3; ++axis) {
+  if (dimensions > 3 && !kinds.empty() && !is_spatial(kinds[0])) axes.first = 1;
+  for (std::size_t axis = axes.first; axis < kinds.size() && axis < axes.first + 3; ++axis) {
     if (!is_spatial(kinds[axis])) {
       return unsupported("axis " + std::to_string(axis + 1) + " is of kind \"" + printable(kinds[axis]) +
-                             "\"; the first three must be space",
+                             "\"; three axes of space must come first, or after one other",
                          *field);
     }
   }
-  return {};
+  return axes;
 }
 
 bool is_vector(const std::vector<double>& numbers) {
   return numbers.size() == 3 && is_finite({numbers[0], numbers[1], numbers[2]});
 }
 
-Status read_directions(const Field& field, std::size_t dimensions, glm::dmat4& space_from_voxel) {
+Status read_directions(const Field& field, const Axes& axes, glm::dmat4& space_from_voxel) {
   const auto vectors = parse_vectors(field.text);
-  if (!vectors || vectors->size() != dimensions) {
-    return bad("the space directions are not " + std::to_string(dimensions) + " vectors", field);
+  if (!vectors || vectors->size() != axes.count) {
+    return bad("the space directions are not " + std::to_string(axes.count) + " vectors", field);
   }
   for (int axis = 0; axis < 3; ++axis) {
-    const std::vector<double>& v = (*vectors)[static_cast<std::size_t>(axis)];
+    const std::size_t place = axes.first + static_cast<std::size_t>(axis);
+    const std::vector<double>& v = (*vectors)[place];
     if (v.empty()) {
-      return unsupported("axis " + std::to_string(axis + 1) + " has no direction; the first three must be space",
+      return unsupported("axis " + std::to_string(place + 1) +
+                             " has no direction; three axes of space must come first, or after one other",
                          field);
     }
     if (!is_vector(v)) return bad("a space direction is no vector of 3 finite numbers", field);
@@ -251,16 +264,16 @@ Status read_origin(const Fields& fields, glm::dmat4& space_from_voxel) {
   return {};
 }
 
-Status read_spacings(const Field& field, std::size_t dimensions, Volume& volume) {
+Status read_spacings(const Field& field, const Axes& axes, Volume& volume) {
   const auto words = words_of(field.text);
-  if (words.size() != dimensions) {
-    return bad("the spacings are not " + std::to_string(dimensions) + " numbers", field);
+  if (words.size() != axes.count) {
+    return bad("the spacings are not " + std::to_string(axes.count) + " numbers", field);
   }
   bool is_amiss = false;
   bool is_turned = false;
   for (int axis = 0; axis < 3; ++axis) {
-    const auto number = parse_number(words[static_cast<std::size_t>(axis)]);
-    if (!number) return bad("the spacings are not " + std::to_string(dimensions) + " numbers", field);
+    const auto number = parse_number(words[axes.first + static_cast<std::size_t>(axis)]);
+    if (!number) return bad("the spacings are not " + std::to_string(axes.count) + " numbers", field);
     const double spacing = std::abs(*number);
     const bool is_good = is_distance(spacing);
     volume.spacing[axis] = is_good ? spacing : 1.0;
@@ -284,17 +297,16 @@ std::string units_of(const Fields& fields) {
   return printable(field->text.substr(open + 1, close - open - 1));
 }
 
-Status place(const Fields& fields, std::size_t dimensions, Volume& volume) {
-  if (auto status = check_kinds(fields); !status) return status;
+Status place(const Fields& fields, const Axes& axes, Volume& volume) {
   const auto space = space_of(fields);
   if (!space) return space.error();
   glm::dmat4 space_from_voxel(1.0);
   if (const Field* directions = fields.find("spacedirections")) {
-    if (auto status = read_directions(*directions, dimensions, space_from_voxel); !status) return status;
+    if (auto status = read_directions(*directions, axes, space_from_voxel); !status) return status;
     for (int axis = 0; axis < 3; ++axis) volume.spacing[axis] = glm::length(DVec3(space_from_voxel[axis]));
   } else {
     if (const Field* spacings = fields.find("spacings")) {
-      if (auto status = read_spacings(*spacings, dimensions, volume); !status) return status;
+      if (auto status = read_spacings(*spacings, axes, volume); !status) return status;
     }
     for (int axis = 0; axis < 3; ++axis) space_from_voxel[axis][axis] = volume.spacing[axis];
   }
@@ -371,34 +383,67 @@ Result<std::size_t> read_dimensions(const Fields& fields) {
   return unsupported("it has " + std::to_string(*dimensions) + " dimensions; a volume has 3", field->at);
 }
 
-Status read_sizes(const Fields& fields, std::size_t dimensions, const VolumeOptions& options, Volume& volume) {
+/// The kind of an axis as the file names it.
+std::string kind_of(const Fields& fields, std::size_t axis) {
+  const Field* const field = fields.find("kinds");
+  const auto kinds = field != nullptr ? words_of(field->text) : std::vector<std::string_view>();
+  return axis < kinds.size() ? printable(kinds[axis]) : "none";
+}
+
+Status take_components(const Fields& fields, std::int64_t count, std::size_t at, VolumeHeader& header) {
+  constexpr std::int64_t kMost = 1 << 20;
+  if (count > kMost) return bad("axis 1 has " + std::to_string(count) + " values per voxel", at);
+  header.components = static_cast<std::size_t>(count);
+  if (count == 1) return {};
+  header.volume.warnings.push_back("axis 1 (kind " + kind_of(fields, 0) + ") has " + std::to_string(count) +
+                                   " values per voxel; the first of them is read");
+  return {};
+}
+
+Status read_sizes(const Fields& fields, const Axes& axes, const VolumeOptions& options, VolumeHeader& header) {
   const auto field = required(fields, "sizes");
   if (!field) return field.error();
   const auto words = words_of(field->text);
-  if (words.size() != dimensions) return bad("the sizes are not " + std::to_string(dimensions) + " numbers", field->at);
+  if (words.size() != axes.count) return bad("the sizes are not " + std::to_string(axes.count) + " numbers", field->at);
   std::array<std::int64_t, 3> extents{};
   bool has_more = false;
-  for (std::size_t axis = 0; axis < dimensions; ++axis) {
+  for (std::size_t axis = 0; axis < axes.count; ++axis) {
     const auto extent = parse_integer(words[axis]);
     if (!extent || *extent < 1) return bad("a size is " + quoted(words[axis]), field->at);
-    if (axis < 3) extents[axis] = *extent;
-    has_more |= axis >= 3 && *extent > 1;
+    if (axis < axes.first) {
+      if (auto taken = take_components(fields, *extent, field->at, header); !taken) return taken;
+    } else if (axis < axes.first + 3) {
+      extents[axis - axes.first] = *extent;
+    } else {
+      has_more |= *extent > 1;
+    }
   }
   if (has_more) {
-    volume.warnings.push_back("it has " + std::to_string(dimensions) + " dimensions; the first volume is taken");
+    header.volume.warnings.push_back("it has " + std::to_string(axes.count) + " dimensions; the first volume is taken");
   }
-  return set_size(extents, options, field->at, volume);
+  return set_size(extents, options, field->at, header.volume);
 }
 
 Status read_encoding(const Fields& fields, VolumeHeader& header) {
   const auto field = required(fields, "encoding");
   if (!field) return field.error();
   const std::string encoding = normalised(field->text);
-  if (encoding == "raw") return {};
-  if (encoding != "gzip" && encoding != "gz") {
-    return unsupported("the encoding is " + quoted(field->text) + "; only raw and gzip are read", field->at);
+  using Names = std::pair<std::string_view, DataEncoding>;
+  constexpr std::array<Names, 9> kNames = {{{"raw", DataEncoding::Raw},
+                                            {"gzip", DataEncoding::Gzip},
+                                            {"gz", DataEncoding::Gzip},
+                                            {"bzip2", DataEncoding::Bzip2},
+                                            {"bz2", DataEncoding::Bzip2},
+                                            {"txt", DataEncoding::Ascii},
+                                            {"text", DataEncoding::Ascii},
+                                            {"ascii", DataEncoding::Ascii},
+                                            {"hex", DataEncoding::Hex}}};
+  const auto* const known = std::ranges::find(kNames, encoding, &Names::first);
+  if (known == kNames.end()) {
+    return unsupported("the encoding is " + quoted(field->text) + "; raw, gzip, bzip2, ascii and hex are read",
+                       field->at);
   }
-  header.data_compression = Compression::Gzip;
+  header.data_encoding = known->second;
   return {};
 }
 
@@ -418,26 +463,45 @@ Status read_skips(const Fields& fields, std::string_view bytes, VolumeHeader& he
   const auto skip = read_count(fields, "byteskip", -1);
   if (!skip) return skip.error();
   std::size_t at = fields.end;
-  for (std::int64_t line = 0; line < *lines; ++line) {
+  if (header.is_data_elsewhere) {
+    header.lines_to_skip = static_cast<std::uint64_t>(*lines);
+    at = 0;
+  }
+  for (std::int64_t line = 0; line < *lines && !header.is_data_elsewhere; ++line) {
     const std::size_t end = bytes.find('\n', at);
     if (end == std::string_view::npos) return bad("the lines to skip do not end soon enough", at);
     at = end + 1;
   }
   header.data_at = at;
   header.is_data_at_end = *skip == -1;
-  if (header.is_data_at_end && header.data_compression != Compression::None) {
+  if (header.is_data_at_end && header.data_encoding != DataEncoding::Raw) {
     return bad("the byte skip is -1, which only raw data may have", fields.find("byteskip")->at);
   }
   header.skip = header.is_data_at_end ? 0 : static_cast<std::uint64_t>(*skip);
   return {};
 }
 
-Status check_attached(const Fields& fields) {
-  if (const Field* file = fields.find("datafile")) {
-    return unsupported("a detached header, whose values are in a file of their own (" + quoted(file->text) + ")",
+/// The values lie in the file itself, or in a file next to it. Files elsewhere are not opened.
+Status read_data_file(const Fields& fields, VolumeHeader& header) {
+  const Field* const file = fields.find("datafile");
+  if (file == nullptr) {
+    if (!fields.has_end) return bad("no empty line ends the header", fields.end);
+    return {};
+  }
+  std::string_view name = file->text;
+  if (name.starts_with("./")) name.remove_prefix(2);
+  if (name.starts_with("LIST") || name.find('%') != std::string_view::npos) {
+    return unsupported("the values are in several files (" + quoted(file->text) + "); one is read", file->at);
+  }
+  const bool is_plain =
+      !name.empty() && name != "." && name != ".." && name.find_first_of("/\\:") == std::string_view::npos;
+  if (!is_plain) {
+    return unsupported("the values are in the file " + quoted(file->text) +
+                           "; only a file in the folder of the header is read, named without its folder",
                        file->at);
   }
-  if (!fields.has_end) return bad("no empty line ends the header", fields.end);
+  header.is_data_elsewhere = true;
+  header.data_file = name;
   return {};
 }
 
@@ -460,14 +524,16 @@ Result<VolumeHeader> read_header(std::span<const std::byte> bytes, const VolumeO
   VolumeHeader header;
   header.volume.format = "nrrd";
   if (const Field* content = fields->find("content")) header.volume.name = printable(content->text);
-  if (auto status = check_attached(*fields); !status) return status.error();
+  if (auto status = read_data_file(*fields, header); !status) return status.error();
   const auto dimensions = read_dimensions(*fields);
   if (!dimensions) return dimensions.error();
-  Status status = read_sizes(*fields, *dimensions, options, header.volume);
+  const auto axes = read_axes(*fields, *dimensions);
+  if (!axes) return axes.error();
+  Status status = read_sizes(*fields, *axes, options, header);
   if (status) status = read_type(*fields, header);
   if (status) status = read_encoding(*fields, header);
   if (status) status = read_skips(*fields, text, header);
-  if (status) status = place(*fields, *dimensions, header.volume);
+  if (status) status = place(*fields, *axes, header.volume);
   if (!status) return status.error();
   return header;
 }

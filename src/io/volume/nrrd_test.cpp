@@ -1,6 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include <glm/matrix.hpp>
+#include <quoin/io/file.h>
+#include <quoin/io/formats.h>
 
 #include "io/volume/volume_for_tests.h"
 
@@ -135,10 +139,67 @@ TEST(Nrrd, ValuesBeyondThreeDimensionsAreLeftOut) {
       file_of(header + "sizes: 3 2 2 9\nspace: LPS\nspace directions: (1,0,0) (0,1,0) (0,0,1) none\n\n", data));
   EXPECT_EQ(volume.values, kTwelveFloats);
   ASSERT_EQ(volume.warnings.size(), 1U);
-  EXPECT_EQ(error_of(file_of(header + "sizes: 3 2 2 1\nkinds: RGB-color domain domain domain\n\n", data)),
-            "byte 63: axis 1 is of kind \"RGB-color\"; the first three must be space");
-  EXPECT_EQ(error_of(file_of(header + "sizes: 3 2 2 1\nspace directions: none (1,0,0) (0,1,0) (0,0,1)\n\n", data)),
-            "byte 63: axis 1 has no direction; the first three must be space");
+}
+
+TEST(Nrrd, ReadsTheFirstOfSeveralComponents) {
+  const std::string header = "NRRD0004\ntype: uint8\ndimension: 4\nencoding: raw\nsizes: 3 2 2 1\n";
+  const Bytes data = encode(kTwelve, ScalarType::UInt8);
+  const std::vector<float> first = {1, 4, 7, 10};
+  for (const std::string lines : {"kinds: RGB-color domain domain domain\nspacings: nan 2 3 4\n",
+                                  "space: LPS\nspace directions: none (2,0,0) (0,3,0) (0,0,4)\n"}) {
+    const Volume volume = volume_of(file_of(header + lines + "\n", data));
+    EXPECT_EQ(volume.values, first) << lines;
+    EXPECT_EQ(volume.size, IVec3(2, 2, 1));
+    EXPECT_EQ(volume.spacing, DVec3(2, 3, 4));
+    ASSERT_EQ(volume.warnings.size(), 1U);
+    EXPECT_NE(volume.warnings[0].find("3 values per voxel; the first of them is read"), std::string::npos);
+  }
+  EXPECT_EQ(error_of(file_of(header + "kinds: domain domain vector domain\n\n", data)),
+            "byte 63: axis 3 is of kind \"vector\"; three axes of space must come first, or after one other");
+  EXPECT_EQ(error_of(file_of(header + "space directions: (1,0,0) none (0,1,0) (0,0,1)\n\n", data)),
+            "byte 63: axis 2 has no direction; three axes of space must come first, or after one other");
+  EXPECT_EQ(error_of(file_of(header + "kinds: vector domain domain domain\n\n", Bytes(11))),
+            "byte 99: 2 x 2 x 1 values of uint8 take 12 bytes, but there are 11");
+}
+
+TEST(Nrrd, ReadsValuesAsText) {
+  const auto file = [](const std::string& type, const std::string& encoding, const std::string& text) {
+    const std::string header = "NRRD0004\ndimension: 3\nsizes: 3 2 2\nendian: big\ntype: ";
+    return file_of(header + type + "\nencoding: " + encoding + "\n\n" + text, {});
+  };
+  EXPECT_EQ(volume_of(file("float", "ascii", "1 2\t+3\n4,5, 6 7.0 8 9e0 10\r\n11 12\n")).values, kTwelveFloats);
+  EXPECT_EQ(volume_of(file("int16", "txt", "1 2 3 4 5 6 7 8 9 10 11 12 and more")).values, kTwelveFloats);
+  EXPECT_EQ(volume_of(file("uint8", "hex", "0102 030405\n060708090a0B0c")).values, kTwelveFloats);
+  EXPECT_EQ(volume_of(file("ushort", "hex", "000100020003000400050006000700080009000A000B000C")).values, kTwelveFloats);
+  EXPECT_EQ(error_of(file("uint8", "ascii", "1 2 256")), "byte 80: \"256\" is no value of the type uint8");
+  EXPECT_EQ(error_of(file("uint8", "hex", "01 0x")), "byte 78: \"x\" is no hexadecimal digit");
+  EXPECT_NE(error_of(file("uint8", "ascii", "1 2 3")), "none");
+}
+
+TEST(Nrrd, ReadsValuesOfTheFileNextToADetachedHeader) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "quoin_detached";
+  std::filesystem::create_directories(folder);
+  const auto write = [&](const char* name, const Bytes& bytes) { ASSERT_TRUE(write_file(bytes, folder / name)); };
+  const std::string header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 3 2 2\n";
+  const Bytes data = encode(kTwelve, ScalarType::UInt8);
+  write("a.nhdr", file_of(header + "encoding: raw\nline skip: 1\nbyte skip: 2\ndata file: ./a.raw\n", {}));
+  Bytes skipped;
+  volume_test::append_text(skipped, "a line\n..");
+  skipped.insert(skipped.end(), data.begin(), data.end());
+  write("a.raw", skipped);
+  write("b.nhdr", file_of(header + "encoding: gzip\ndata file: b.raw.gz\n", {}));
+  write("b.raw.gz", gzipped(data));
+  for (const char* name : {"a.nhdr", "b.nhdr"}) {
+    const auto volume = read_volume(folder / name);
+    ASSERT_TRUE(volume) << to_string(volume.error());
+    EXPECT_EQ(volume->values, kTwelveFloats) << name;
+  }
+  EXPECT_EQ(files_read_beside(folder / "b.nhdr"), std::vector<std::filesystem::path>{folder / "b.raw.gz"});
+  write("c.nhdr", file_of(header + "encoding: raw\ndata file: c.raw\n", {}));
+  const auto missing = read_volume(folder / "c.nhdr");
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, ErrorCode::CannotRead);
+  std::filesystem::remove_all(folder);
 }
 
 TEST(Nrrd, WhatIsAmissIsSaidInOneLine) {
@@ -153,8 +214,11 @@ TEST(Nrrd, WhatIsAmissIsSaidInOneLine) {
   EXPECT_EQ(header("dimension: 3\nsizes: 1 -2 3\n\n"), "byte 22: a size is \"-2\"");
   EXPECT_EQ(header("dimension: 3\nsizes: 4294967296 4294967296 4294967296\n\n"),
             "byte 22: it claims 4294967296 x 4294967296 x 4294967296 values; at most 1073741824 are read");
-  EXPECT_EQ(header("data file: ../../secret\n"),
-            "byte 9: a detached header, whose values are in a file of their own (\"../../secret\")");
+  EXPECT_EQ(
+      header("data file: ../../secret\n"),
+      "byte 9: the values are in the file \"../../secret\"; only a file in the folder of the header is read, named "
+      "without its folder");
+  EXPECT_EQ(header("data file: LIST\n"), "byte 9: the values are in several files (\"LIST\"); one is read");
   EXPECT_EQ(error_of(file_of("NRRD0009\n\n", {})), "byte 0: a NRRD of version 9; 1 to 5 are read");
   const auto field = [](const std::string& lines) { return error_of(tiny(lines)); };
   EXPECT_EQ(field("space directions: (1,0,0) (0,1,0)\n"), "byte 73: the space directions are not 3 vectors");
@@ -172,8 +236,8 @@ TEST(Nrrd, WhatIsAmissIsSaidInOneLine) {
 
 TEST(Nrrd, OtherEncodingsAndTypesAreRefused) {
   const std::string header = "NRRD0004\ndimension: 3\nsizes: 1 1 1\n";
-  EXPECT_EQ(error_of(file_of(header + "type: uint8\nencoding: ascii\n\n", {})),
-            "byte 47: the encoding is \"ascii\"; only raw and gzip are read");
+  EXPECT_EQ(error_of(file_of(header + "type: uint8\nencoding: zrl\n\n", {})),
+            "byte 47: the encoding is \"zrl\"; raw, gzip, bzip2, ascii and hex are read");
   EXPECT_EQ(error_of(file_of(header + "type: block\nencoding: raw\n\n", {})),
             "byte 35: the values are blocks, not numbers");
   EXPECT_EQ(error_of(file_of(header + "type: int16\nencoding: raw\n\n", {})),

@@ -64,21 +64,28 @@ Result<Volume> read_stream(ByteStream& stream, std::uint64_t skipped, VolumeHead
 
 /// Skips to values that are the last bytes of a file.
 Result<Volume> read_from_end(std::span<const std::byte> bytes, VolumeHeader& header) {
-  const IVec3 size = header.volume.size;
-  const std::uint64_t taken = static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *
-                              static_cast<std::uint64_t>(size.z) * size_of(header.volume.type);
+  const std::uint64_t taken = bytes_of_values(header);
   const std::uint64_t room = bytes.size() - header.data_at;
   ByteStream stream(bytes, 0, Compression::None);
   return read_stream(stream, header.data_at + (room > taken ? room - taken : 0), header);
 }
 
 Result<Volume> read_data(std::span<const std::byte> bytes, Compression compression, VolumeHeader& header) {
-  if (header.data_compression == Compression::None) {
+  if (header.data_encoding == DataEncoding::Raw) {
     if (header.is_data_at_end && compression == Compression::None) return read_from_end(bytes, header);
     ByteStream stream(bytes, 0, compression);
     return read_stream(stream, header.data_at + header.skip, header);
   }
   const auto begin = static_cast<std::size_t>(header.data_at);
+  if (header.data_encoding != DataEncoding::Gzip) {
+    const auto raw = nrrd::decode_values(bytes, begin, header);
+    if (!raw) return raw.error();
+    ByteStream stream(*raw, 0, Compression::None);
+    const std::uint64_t skipped = header.data_encoding == DataEncoding::Bzip2 ? header.skip : 0;
+    auto volume = read_stream(stream, skipped, header);
+    if (!volume) volume.error().byte_offset = begin;
+    return volume;
+  }
   if (!begins_gzip(bytes.subspan(begin))) {
     return make_error(ErrorCode::BadFormat, "the encoding is gzip, but the data are not", {}, begin);
   }
@@ -88,9 +95,9 @@ Result<Volume> read_data(std::span<const std::byte> bytes, Compression compressi
 
 Status check_combination(const VolumeHeader& header, Compression compression) {
   if (compression == Compression::None) return {};
-  if (header.data_compression == Compression::None && !header.is_data_at_end) return {};
+  if (header.data_encoding == DataEncoding::Raw && !header.is_data_at_end) return {};
   return make_error(ErrorCode::Unsupported,
-                    "a NRRD within gzip whose data are compressed once more or counted from the end");
+                    "a NRRD within gzip whose data are encoded once more or counted from the end");
 }
 
 std::filesystem::path image_beside(const std::filesystem::path& header_path) {
@@ -104,11 +111,33 @@ std::filesystem::path image_beside(const std::filesystem::path& header_path) {
   return std::filesystem::exists(compressed, ignored) ? compressed : image;
 }
 
+/// The file that holds the values of a header. Requires: they are elsewhere.
+std::filesystem::path data_file_of(const std::filesystem::path& header_path, const VolumeHeader& header) {
+  return header.data_file.empty() ? image_beside(header_path) : header_path.parent_path() / header.data_file;
+}
+
+Status skip_lines(std::span<const std::byte> bytes, VolumeHeader& header) {
+  for (; header.lines_to_skip > 0; --header.lines_to_skip) {
+    const auto first = bytes.begin() + static_cast<std::ptrdiff_t>(header.data_at);
+    const auto end = std::find(first, bytes.end(), std::byte{'\n'});
+    if (end == bytes.end()) {
+      return make_error(ErrorCode::BadFormat, "the lines to skip do not end soon enough", {}, header.data_at);
+    }
+    header.data_at = static_cast<std::uint64_t>(end - bytes.begin()) + 1;
+  }
+  return {};
+}
+
 Result<Volume> read_pair(const std::filesystem::path& header_path, VolumeHeader& header) {
-  const std::filesystem::path path = image_beside(header_path);
+  const std::filesystem::path path = data_file_of(header_path, header);
   const auto bytes = read_file(path);
   if (!bytes) return bytes.error();
-  auto volume = read_data(*bytes, begins_gzip(*bytes) ? Compression::Gzip : Compression::None, header);
+  const auto read = [&]() -> Result<Volume> {
+    if (auto done = skip_lines(*bytes, header); !done) return done.error();
+    const bool is_nifti = header.data_file.empty();
+    return read_data(*bytes, is_nifti && begins_gzip(*bytes) ? Compression::Gzip : Compression::None, header);
+  };
+  auto volume = read();
   if (!volume) volume.error().path = path.string();
   return volume;
 }
@@ -126,7 +155,9 @@ Result<Volume> decode(std::span<const std::byte> bytes, const std::filesystem::p
   }
   if (!header->is_data_elsewhere) return read_data(bytes, beginning->compression, *header);
   if (!path.empty()) return read_pair(path, *header);
-  return make_error(ErrorCode::Unsupported, "the header of a pair, whose values are in a file of their own (.img)");
+  const std::string name = header->data_file.empty() ? std::string(".img") : printable(header->data_file);
+  return make_error(ErrorCode::Unsupported,
+                    "the header of a pair, whose values are in a file of their own (" + name + ")");
 }
 
 std::string name_from(const std::filesystem::path& path) {
@@ -153,7 +184,7 @@ std::vector<std::filesystem::path> files_of_pair(const std::filesystem::path& pa
   if (!beginning) return {};
   const auto header = header_of(*beginning, {});
   if (!header || !header->is_data_elsewhere) return {};
-  return {image_beside(path)};
+  return {data_file_of(path, *header)};
 }
 
 Result<Volume> read_raw_volume(std::span<const std::byte> bytes, const RawVolume& raw, const VolumeOptions& options,
