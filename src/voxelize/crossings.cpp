@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include <glm/common.hpp>
@@ -44,13 +46,38 @@ Passing passing(const Seen& from, const Seen& to, double v) {
   return {low.u + share * (high.u - low.u), low.w + share * (high.w - low.w), rises};
 }
 
-/// Calls `visit(u, v, w, enters)` for the lines within [first, first + 64) that meet a triangle.
+/// Returns true for a place at the centre of a voxel.
+bool is_centre(double place) {
+  return place - 0.5 == std::floor(place - 0.5);
+}
+
+/// Calls `touch(u, v, w)` for the lines through the topmost corner, or edge, of a triangle.
+template <class Touch>
+void for_each_touch_at_top(const std::array<Seen, 3>& corners, double high, int first_u, const Touch& touch) {
+  const Seen* left = nullptr;
+  const Seen* right = nullptr;
+  for (const Seen& corner : corners) {
+    if (corner.v != high) continue;
+    if (left == nullptr || corner.u < left->u) left = &corner;
+    if (right == nullptr || corner.u > right->u) right = &corner;
+  }
+  const int v = first_centre(high);
+  const int end_u = std::min(static_cast<int>(std::floor(right->u - 0.5)) + 1, first_u + kChunkEdge);
+  for (int u = std::max(first_centre(left->u), first_u); u < end_u; ++u) {
+    const double share = right->u > left->u ? (u + 0.5 - left->u) / (right->u - left->u) : 0.0;
+    touch(u, v, left->w + share * (right->w - left->w));
+  }
+}
+
+/// Calls `visit(u, v, w, enters)` for the lines within [first, first + 64) that meet a triangle, and `touch(u, v, w)`
+/// for those that meet nothing but its border, which belongs to another one.
 ///
 /// A row of lines passes two edges of it, or none; the lines from the left one up to before the right one meet it. That
 /// gives every line through a shared edge or corner to one triangle, and each edge counts once up and once down in a
 /// closed mesh, so that as many crossings enter as leave on every line.
-template <class Visit>
-void for_each_crossing(const std::array<Seen, 3>& corners, bool is_mirrored, int first_u, int first_v, Visit&& visit) {
+template <class Visit, class Touch>
+void for_each_crossing(const std::array<Seen, 3>& corners, bool is_mirrored, int first_u, int first_v,
+                       const Visit& visit, const Touch& touch) {
   const auto [low, high] = std::minmax({corners[0].v, corners[1].v, corners[2].v});
   const auto [nearest, farthest] = std::minmax({corners[0].w, corners[1].w, corners[2].w});
   const int end_v = std::min(first_centre(high), first_v + kChunkEdge);
@@ -73,7 +100,11 @@ void for_each_crossing(const std::array<Seen, 3>& corners, bool is_mirrored, int
       const double share = (u + 0.5 - left.u) / (right.u - left.u);
       visit(u, v, std::clamp(left.w + share * (right.w - left.w), nearest, farthest), enters);
     }
+    const bool is_on_line = is_centre(right.u) && right.u >= first_u && right.u < first_u + kChunkEdge;
+    if (is_on_line) touch(first_centre(right.u), v, std::clamp(right.w, nearest, farthest));
   }
+  const bool has_top = low < high && is_centre(high) && high >= first_v && high < first_v + kChunkEdge;
+  if (has_top) for_each_touch_at_top(corners, high, first_u, touch);
 }
 
 std::array<Seen, 3> seen_along(int axis, const Corners& corners) {
@@ -97,7 +128,10 @@ ColumnTriangles triangles_of_columns(const Frame& frame, int axis) {
     for (std::size_t i = 0; i < frame.triangle_count(); ++i) {
       const Corners c = frame.corners(i);
       const auto low = [&](int a) { return first_centre(std::min({c[0][a], c[1][a], c[2][a]})); };
-      const auto end = [&](int a) { return first_centre(std::max({c[0][a], c[1][a], c[2][a]})); };
+      // Closed: lines through the border are touched.
+      const auto end = [&](int a) {
+        return static_cast<int>(std::floor(std::max({c[0][a], c[1][a], c[2][a]}) - 0.5)) + 1;
+      };
       const int low_u = low(u), end_u = end(u), low_v = low(v), end_v = end(v);
       if (low_u >= end_u || low_v >= end_v) continue;
       for (int b = low_v >> kChunkShift; b <= (end_v - 1) >> kChunkShift; ++b) {
@@ -117,28 +151,109 @@ ColumnTriangles triangles_of_columns(const Frame& frame, int axis) {
   return found;
 }
 
-Column find_column(const Frame& frame, int axis, std::span<const std::uint32_t> triangles, int first_u, int first_v) {
-  Column column;
-  std::vector<std::pair<std::uint16_t, Crossing>> met;
-  for (const std::uint32_t triangle : triangles) {
-    // Of the three planes (x, z) alone is seen from behind.
-    for_each_crossing(seen_along(axis, frame.corners(triangle)), axis == 1, first_u, first_v,
-                      [&](int u, int v, double w, bool enters) {
-                        const int behind = first_centre(w);
-                        const int line = (u - first_u) + kChunkEdge * (v - first_v);
-                        met.emplace_back(static_cast<std::uint16_t>(line),
-                                         Crossing(behind, std::floor(w) < behind, enters));
-                      });
+/// A place of a line that meets the surface, or touches a triangle's border.
+struct Met {
+  std::uint16_t line = 0;
+  bool enters = false;
+  std::uint32_t triangle = 0;
+  double w = 0.0;
+};
+
+/// For triangles that lie between voxels and are touched: true if their inner side is the one behind them.
+using Sides = std::map<std::uint32_t, bool>;
+
+/// Depth within the mesh along a line: the inner side of the surface is the deeper one.
+class Depth {
+ public:
+  explicit Depth(SolidVoxels rule) : rule_(rule) {}
+  /// Passes a crossing. Returns true where its inner side is the one behind it.
+  bool is_deeper_behind(bool enters) {
+    const int before = depth();
+    turns_ += enters ? 1 : -1;
+    ++crossings_;
+    return depth() > before;
   }
+
+ private:
+  [[nodiscard]] int depth() const { return rule_ == SolidVoxels::Parity ? crossings_ & 1 : std::abs(turns_); }
+  SolidVoxels rule_;
+  int turns_ = 0;
+  int crossings_ = 0;
+};
+
+bool is_between_voxels(double w) {
+  return w == std::floor(w);
+}
+
+/// The crossings of a line. Requires: sorted by w.
+void add_crossings(std::span<const Met> line, SolidVoxels rule, std::vector<Crossing>& crossings, Sides& sides) {
+  const std::size_t first = crossings.size();
+  Depth depth(rule);
+  for (const Met& met : line) {
+    const int behind = first_centre(met.w);
+    const bool is_between = is_between_voxels(met.w);
+    const bool is_deeper_behind = depth.is_deeper_behind(met.enters);
+    crossings.emplace_back(behind, is_between ? !is_deeper_behind : std::floor(met.w) < behind, met.enters);
+    if (const auto side = sides.find(met.triangle); is_between && side != sides.end()) side->second = is_deeper_behind;
+  }
+  std::sort(crossings.begin() + static_cast<std::ptrdiff_t>(first), crossings.end());
+}
+
+Column column_of(std::span<const Met> met, SolidVoxels rule, Sides& sides) {
+  Column column;
   if (met.empty()) return column;
   column.begin.assign(kLines + 1, 0);
-  for (const auto& [line, crossing] : met) ++column.begin[line + std::size_t{1}];
+  for (const Met& each : met) ++column.begin[each.line + std::size_t{1}];
   for (std::size_t i = 1; i <= kLines; ++i) column.begin[i] += column.begin[i - 1];
-  column.crossings.resize(met.size());
-  std::vector<std::uint32_t> next(column.begin.begin(), column.begin.end() - 1);
-  for (const auto& [line, crossing] : met) column.crossings[next[line]++] = crossing;
+  column.crossings.reserve(met.size());
   for (std::size_t i = 0; i < kLines; ++i) {
-    std::sort(column.crossings.begin() + column.begin[i], column.crossings.begin() + column.begin[i + 1]);
+    add_crossings(met.subspan(column.begin[i], column.begin[i + 1] - column.begin[i]), rule, column.crossings, sides);
+  }
+  return column;
+}
+
+/// Twice the area of a triangle as lines along an axis see it, positive where it turns from u to v.
+double seen_area(const std::array<Seen, 3>& c) {
+  return (c[1].u - c[0].u) * (c[2].v - c[0].v) - (c[1].v - c[0].v) * (c[2].u - c[0].u);
+}
+
+Column find_column(const Frame& frame, int axis, SolidVoxels rule, std::span<const std::uint32_t> triangles,
+                   int first_u, int first_v) {
+  std::vector<Met> met;
+  std::vector<Met> touched;
+  const auto line_of = [&](int u, int v) {
+    return static_cast<std::uint16_t>((u - first_u) + kChunkEdge * (v - first_v));
+  };
+  for (const std::uint32_t triangle : triangles) {
+    const std::array<Seen, 3> seen = seen_along(axis, frame.corners(triangle));
+    const bool is_mirrored = axis == 1;  // of the three planes (x, z) alone is seen from behind
+    const auto visit = [&](int u, int v, double w, bool enters) {
+      met.push_back({line_of(u, v), enters, triangle, w});
+    };
+    const double area = seen_area(seen);
+    const auto touch = [&](int u, int v, double w) {
+      // One that is seen edge-on has its border in common with others that are not.
+      if (area != 0.0) touched.push_back({line_of(u, v), (area < 0.0) != is_mirrored, triangle, w});
+    };
+    for_each_crossing(seen, is_mirrored, first_u, first_v, visit, touch);
+  }
+  const auto order = [](const Met& m) { return std::tuple(m.line, m.w, m.enters, m.triangle); };
+  std::ranges::sort(met, {}, order);
+  // A line that touches one triangle may cross its neighbour.
+  std::erase_if(touched, [&](const Met& each) {
+    constexpr double kSame = 1e-9;
+    const auto near = std::ranges::lower_bound(met, std::pair(each.line, each.w - kSame), {},
+                                               [](const Met& m) { return std::pair(m.line, m.w); });
+    return near != met.end() && near->line == each.line && near->w <= each.w + kSame;
+  });
+  Sides sides;
+  for (const Met& each : touched) {
+    if (is_between_voxels(each.w)) sides.emplace(each.triangle, each.enters);
+  }
+  Column column = column_of(met, rule, sides);
+  for (const Met& each : touched) {
+    const bool is_before = is_between_voxels(each.w) && !sides[each.triangle];
+    column.touched.emplace_back(each.line, static_cast<int>(std::floor(each.w)) - (is_before ? 1 : 0));
   }
   return column;
 }
@@ -156,7 +271,7 @@ double expected_crossings(const Frame& frame) {
 
 }  // namespace
 
-Result<Crossings> Crossings::find(const Frame& frame, Threads threads, const Progress& progress) {
+Result<Crossings> Crossings::find(const Frame& frame, SolidVoxels rule, Threads threads, const Progress& progress) {
   if (const double expected = expected_crossings(frame); !(expected <= kMostCrossings)) {
     return make_error(ErrorCode::LimitExceeded,
                       "the mesh would take more than 2^30 crossings of lines: its surface is " +
@@ -180,9 +295,10 @@ Result<Crossings> Crossings::find(const Frame& frame, Threads threads, const Pro
     const auto a = static_cast<std::size_t>(axis);
     const auto across = static_cast<std::size_t>(frame.chunks()[kPlane[a][0]]);
     const std::vector<std::uint64_t>& begin = triangles[a].begin;
-    found.columns_[a][index] = find_column(
-        frame, axis, {triangles[a].triangles.data() + begin[index], triangles[a].triangles.data() + begin[index + 1]},
-        static_cast<int>(index % across) * kChunkEdge, static_cast<int>(index / across) * kChunkEdge);
+    found.columns_[a][index] =
+        find_column(frame, axis, rule,
+                    {triangles[a].triangles.data() + begin[index], triangles[a].triangles.data() + begin[index + 1]},
+                    static_cast<int>(index % across) * kChunkEdge, static_cast<int>(index / across) * kChunkEdge);
     steps.step();
   });
   if (steps.cancelled()) return make_error(ErrorCode::Cancelled, "cancelled");
@@ -192,19 +308,20 @@ Result<Crossings> Crossings::find(const Frame& frame, Threads threads, const Pro
 void mark_crossed(const Crossings& crossings, IVec3 chunk, ChunkBits& bits) {
   for (int axis = 0; axis < 3; ++axis) {
     const Column& column = crossings.column(axis, chunk);
-    if (column.begin.empty()) continue;
     const int first = chunk[axis] * kChunkEdge;
     const auto [u_axis, v_axis] = kPlane[static_cast<std::size_t>(axis)];
+    const auto mark = [&, u_axis = u_axis, v_axis = v_axis](std::size_t line, int along) {
+      if (along < first || along >= first + kChunkEdge) return;
+      IVec3 voxel;
+      voxel[axis] = along - first;
+      voxel[u_axis] = static_cast<int>(line % kChunkEdge);
+      voxel[v_axis] = static_cast<int>(line / kChunkEdge);
+      bits[row_of(voxel.y, voxel.z)] |= std::uint64_t{1} << static_cast<unsigned>(voxel.x);
+    };
+    for (const auto& [line, voxel] : column.touched) mark(line, voxel);
+    if (column.begin.empty()) continue;
     for (std::size_t line = 0; line < kLines; ++line) {
-      for (const Crossing& crossing : column.line(line)) {
-        const int along = crossing.voxel() - first;
-        if (along < 0 || along >= kChunkEdge) continue;
-        IVec3 voxel;
-        voxel[axis] = along;
-        voxel[u_axis] = static_cast<int>(line % kChunkEdge);
-        voxel[v_axis] = static_cast<int>(line / kChunkEdge);
-        bits[row_of(voxel.y, voxel.z)] |= std::uint64_t{1} << static_cast<unsigned>(voxel.x);
-      }
+      for (const Crossing& crossing : column.line(line)) mark(line, crossing.voxel());
     }
   }
 }

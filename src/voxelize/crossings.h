@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <quoin/core/parallel.h>
@@ -21,7 +22,7 @@
 namespace quoin::voxelizing {
 
 /// One crossing: the first voxel whose centre lies at or behind it, whether it lies in the voxel before that one, and
-/// which side is met.
+/// which side is met. Where it lies between two voxels it belongs to the one on the inner side of the surface.
 class Crossing {
  public:
   Crossing() = default;
@@ -45,6 +46,8 @@ inline constexpr std::size_t kLines = static_cast<std::size_t>(kChunkEdge) * kCh
 struct Column {
   std::vector<std::uint32_t> begin;  ///< of line u + 64 v in `crossings`, and one more; empty where there are none
   std::vector<Crossing> crossings;
+  /// Voxels of lines that touch the border of a triangle without crossing it, by line: of the surface, and no crossing.
+  std::vector<std::pair<std::uint16_t, int>> touched;
 
   [[nodiscard]] std::span<const Crossing> line(std::size_t index) const {
     if (begin.empty()) return {};
@@ -57,8 +60,10 @@ inline constexpr std::array<std::array<int, 2>, 3> kPlane = {{{1, 2}, {0, 2}, {0
 
 class Crossings {
  public:
+  /// `rule`: which side of the surface is the inner one; None as Winding.
   /// Errors: LimitExceeded, before anything is found; Cancelled.
-  [[nodiscard]] static Result<Crossings> find(const Frame& frame, Threads threads, const Progress& progress);
+  [[nodiscard]] static Result<Crossings> find(const Frame& frame, SolidVoxels rule, Threads threads,
+                                              const Progress& progress);
 
   /// All columns along `axis`.
   [[nodiscard]] std::span<const Column> columns(int axis) const { return columns_[static_cast<std::size_t>(axis)]; }
@@ -77,7 +82,7 @@ class Crossings {
   IVec3 chunks_{0};
 };
 
-/// Marks the voxels of a chunk in which a crossing lies: its 6-separating surface.
+/// Marks the voxels of a chunk in which a crossing lies, or that are touched: its 6-separating surface.
 void mark_crossed(const Crossings& crossings, IVec3 chunk, ChunkBits& bits);
 
 }  // namespace quoin::voxelizing

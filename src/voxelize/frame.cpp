@@ -122,6 +122,21 @@ Result<VoxelLattice> lattice_of_voxel(const TriangleMesh& mesh, double voxel_siz
 
 namespace voxelizing {
 
+namespace {
+
+/// Moves a position that rounding put next to a side or a centre of voxels onto it, so that the rules for these hold.
+DVec3 snapped(const DVec3& position) {
+  constexpr double kRounding = 1e-7;
+  DVec3 result = position;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double nearest = 0.5 * std::round(2.0 * position[axis]);
+    if (std::abs(position[axis] - nearest) <= kRounding) result[axis] = nearest;
+  }
+  return result;
+}
+
+}  // namespace
+
 Result<Frame> Frame::make(const TriangleMesh& mesh, const VoxelLattice& lattice, double margin) {
   if (!(lattice.voxel_size > 0.0) || !std::isfinite(lattice.voxel_size) || !is_finite(lattice.origin)) {
     return make_error(ErrorCode::InvalidArgument, "a lattice without a size or a place");
@@ -146,7 +161,9 @@ Result<Frame> Frame::make(const TriangleMesh& mesh, const VoxelLattice& lattice,
   frame.chunks_ = chunk_of(last) - frame.first_chunk_ + 1;
   const DVec3 corner = DVec3(frame.first_chunk_) * static_cast<double>(kChunkEdge);
   frame.positions_.reserve(mesh.positions.size());
-  for (const DVec3& position : mesh.positions) frame.positions_.push_back(lattice.grid_from_mesh(position) - corner);
+  for (const DVec3& position : mesh.positions) {
+    frame.positions_.push_back(snapped(lattice.grid_from_mesh(position) - corner));
+  }
   return frame;
 }
 

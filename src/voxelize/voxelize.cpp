@@ -296,7 +296,7 @@ Result<Parts> prepare(const TriangleMesh& mesh, const VoxelLattice& lattice, dou
   if (!frame) return frame.error();
   Parts parts{std::move(*frame), {}, {}, {}, {}};
   if (!needs_lines || parts.frame.chunk_count() == 0) return parts;
-  auto crossings = Crossings::find(parts.frame, threads, progress);
+  auto crossings = Crossings::find(parts.frame, solid, threads, progress);
   if (!crossings) return crossings.error();
   parts.crossings = std::make_unique<const Crossings>(std::move(*crossings));
   if (solid != SolidVoxels::None) parts.inside.emplace(*parts.crossings, solid, threads);

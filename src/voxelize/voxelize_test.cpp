@@ -209,10 +209,47 @@ TEST(VoxelizeSurface, thin_is_every_voxel_whose_centre_lines_the_mesh_meets) {
     const Voxels expected = shapes::surface_by_lines(mesh);
     EXPECT_TRUE(voxelized(mesh, SurfaceVoxels::Separating6, SolidVoxels::None) == expected) << expected.size();
   }
-  const TriangleMesh box = shapes::box(DVec3(0.0), DVec3(4.0));
-  // Between voxels the greater one: 5 layers along each axis, of lines that meet the box.
-  const Voxels thin = voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::None);
-  EXPECT_EQ(thin.size(), 4U * 4U * 4U - 3U * 3U * 3U + 3U * 4U * 4U);
+}
+
+TEST(VoxelizeSurface, between_voxels_belongs_to_its_inner_side) {
+  TriangleMesh box = shapes::box(DVec3(0.0), DVec3(4.0));
+  constexpr std::size_t kShell = 4U * 4U * 4U - 2U * 2U * 2U;
+  EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::None).size(), kShell);
+  EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::Winding).size(), 64U);
+  for (auto& triangle : box.triangles) std::swap(triangle[0], triangle[1]);
+  EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::None).size(), kShell) << "turned inside out";
+  std::mt19937 random(7);
+  for (auto& triangle : box.triangles) {
+    if ((random() & 1U) != 0) std::swap(triangle[0], triangle[1]);
+  }
+  EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::Parity).size(), 64U) << "turned any way";
+  // A cavity: its walls are as thick as without one.
+  TriangleMesh hollow = shapes::box(DVec3(0.0), DVec3(10.0));
+  TriangleMesh cavity = shapes::box(DVec3(3.0), DVec3(7.0));
+  for (auto& triangle : cavity.triangles) std::swap(triangle[0], triangle[1]);
+  shapes::append(hollow, cavity);
+  EXPECT_EQ(voxelized(hollow, SurfaceVoxels::Separating6, SolidVoxels::Winding).size(), 1000U - 64U);
+}
+
+TEST(VoxelizeSurface, on_centres_takes_all_that_it_passes_on_every_side) {
+  const TriangleMesh box = shapes::box(DVec3(0.5), DVec3(3.5));
+  EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::Winding).size(), 64U);
+  EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::None).size(), 56U);
+  // Across chunks, and with one side that lies between voxels.
+  const TriangleMesh long_box = shapes::box(DVec3(0.5, 0.0, 60.5), DVec3(3.5, 4.0, 70.5));
+  EXPECT_EQ(voxelized(long_box, SurfaceVoxels::Separating6, SolidVoxels::Winding).size(), 4U * 4U * 11U);
+}
+
+TEST(VoxelizeSurface, what_rounding_puts_next_to_a_side_lies_on_it) {
+  for (const double size : {0.1, 0.02, 1.0 / 3.0, 0.7}) {
+    const TriangleMesh box = shapes::box(DVec3(3.0 * size, -7.0 * size, 11.0 * size), DVec3(17.0 * size));
+    VoxelRegistry types;
+    VoxelizeOptions options;
+    options.lattice = *lattice_of_voxel(box, size);
+    const auto made = voxelize(box, options, types);
+    ASSERT_TRUE(made);
+    EXPECT_EQ(made->grid.voxel_count(), 14 * 24 * 6) << size;
+  }
 }
 
 TEST(VoxelizeSurface, of_a_slanted_plane_is_one_layer) {
