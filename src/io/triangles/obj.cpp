@@ -3,6 +3,7 @@
 #include "io/triangles/triangles.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <istream>
@@ -15,6 +16,7 @@
 
 #include "core/srgb.h"
 #include "io/byte_reader.h"
+#include "io/triangles/polygon.h"
 #include "io/triangles/words.h"
 
 #ifdef QUOIN_HAVE_TINYOBJLOADER
@@ -26,6 +28,9 @@ namespace quoin::triangles {
 
 namespace {
 
+// The mark of UTF-8, with which programs for Windows begin a text.
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+
 bool is_other_keyword(std::string_view word) {
   constexpr std::string_view kKnown[] = {"vp", "vw",    "l",   "p",      "o",      "g",        "s",       "t",
                                          "mg", "bevel", "lod", "usemap", "maplib", "c_interp", "d_interp"};
@@ -36,12 +41,13 @@ bool is_other_keyword(std::string_view word) {
 
 bool is_obj(std::span<const std::byte> beginning) {
   constexpr std::size_t kBeginning = 1 << 16;
-  const std::string_view text = text_of(beginning);
+  std::string_view text = text_of(beginning);
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   std::size_t known = 0;
   std::size_t unknown = 0;
   std::size_t geometry = 0;
   for (std::size_t at = 0; at < text.size() && at < kBeginning;) {
-    const std::size_t end = std::min(text.find('\n', at), text.size());
+    const std::size_t end = std::min(text.find_first_of("\r\n", at), text.size());
     // The last line of a beginning may be cut off.
     if (end == text.size() && text.size() >= kBeginning) break;
     Words words(text.substr(at, end - at));
@@ -112,6 +118,96 @@ class MaterialFiles : public tinyobj::MaterialReader {
   LoadedMesh& loaded_;
 };
 
+/// The text as tinyobjloader reads it, of the same length: without a byte order mark, with lines that a backslash
+/// continues as one, and with indices that end in slashes ("1//") without these.
+std::string prepared(std::string_view text) {
+  std::string out(text);
+  if (text.starts_with(kByteOrderMark)) out.replace(0, kByteOrderMark.size(), kByteOrderMark.size(), ' ');
+  for (std::size_t at = out.find('\\'); at != std::string::npos; at = out.find('\\', at + 1)) {
+    const bool is_long = out.compare(at + 1, 2, "\r\n") == 0;
+    const bool continues = is_long || out.compare(at + 1, 1, "\n") == 0 || out.compare(at + 1, 1, "\r") == 0;
+    if (continues) out.replace(at, is_long ? 3 : 2, is_long ? 3 : 2, ' ');
+  }
+  for (std::size_t at = out.find('/'); at != std::string::npos; at = out.find('/', at + 1)) {
+    const std::size_t end = out.find_first_not_of('/', at);
+    const bool is_last =
+        end == std::string::npos || std::string_view(" \t\r\n").find(out[end]) != std::string_view::npos;
+    const bool follows_number = at > 0 && std::isdigit(static_cast<unsigned char>(out[at - 1])) != 0;
+    if (is_last && follows_number)
+      std::fill(out.begin() + static_cast<std::ptrdiff_t>(at),
+                end == std::string::npos ? out.end() : out.begin() + static_cast<std::ptrdiff_t>(end), ' ');
+  }
+  return out;
+}
+
+/// The corners of a face line as words; empty for other lines.
+std::vector<std::string_view> face_words(std::string_view line) {
+  Words words(line);
+  std::vector<std::string_view> corners;
+  if (words.next() != "f") return corners;
+  while (const auto word = words.next()) corners.push_back(*word);
+  return corners;
+}
+
+/// The number of the vertex that a corner names, from 0; far beyond any where it is none.
+std::size_t vertex_of(std::string_view corner, std::size_t vertices) {
+  const auto number = number_in(corner.substr(0, corner.find('/')));
+  if (!number || *number == 0.0 || std::abs(*number) > 1e15) return std::string_view::npos;
+  const auto index = static_cast<std::int64_t>(*number);
+  return static_cast<std::size_t>(index > 0 ? index - 1 : static_cast<std::int64_t>(vertices) + index);
+}
+
+/// Cuts faces of more corners than tinyobjloader counts (255) into triangles, in the text.
+std::string without_large_faces(const std::string& text) {
+  constexpr std::size_t kMost = 255;
+  std::string out;
+  std::vector<DVec3> positions;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find_first_of("\r\n", at), text.size());
+    const std::string_view line = std::string_view(text).substr(at, end - at);
+    at = end + 1;
+    Words words(line);
+    const auto key = words.next();
+    if (key == "v") {
+      const double x = words.next_number().value_or(0.0);
+      const double y = words.next_number().value_or(0.0);
+      positions.emplace_back(x, y, words.next_number().value_or(0.0));
+    }
+    const auto corners = key == "f" && line.size() > 2 * kMost ? face_words(line) : std::vector<std::string_view>();
+    if (corners.size() <= kMost) {
+      out.append(line).append(1, '\n');
+      continue;
+    }
+    std::vector<DVec3> polygon;
+    for (const std::string_view corner : corners) {
+      const std::size_t vertex = vertex_of(corner, positions.size());
+      polygon.push_back(vertex < positions.size() && is_finite(positions[vertex]) ? positions[vertex] : DVec3(0.0));
+    }
+    triangles.clear();
+    (void)cut_polygon(polygon, triangles);
+    for (const auto& [a, b, c] : triangles) {
+      out.append("f ")
+          .append(corners[a])
+          .append(1, ' ')
+          .append(corners[b])
+          .append(1, ' ')
+          .append(corners[c])
+          .append(1, '\n');
+    }
+  }
+  return out;
+}
+
+bool has_large_face(std::string_view text) {
+  constexpr std::size_t kLeastBytes = 2 * 256;
+  for (std::size_t at = text.find("\nf"); at != std::string_view::npos; at = text.find("\nf", at + 1)) {
+    const std::size_t end = std::min(text.find_first_of("\r\n", at + 1), text.size());
+    if (end - at > kLeastBytes && face_words(text.substr(at + 1, end - at - 1)).size() > 255) return true;
+  }
+  return false;
+}
+
 /// Coordinates that are no numbers, which tinyobjloader takes for 0.
 std::size_t count_bad_numbers(std::string_view text) {
   std::size_t bad = 0;
@@ -136,8 +232,11 @@ class ObjReader {
  public:
   explicit ObjReader(Beside& beside) : beside_(beside) {}
 
-  Result<LoadedMesh> read(std::span<const std::byte> bytes) {
-    if (const std::size_t bad = count_bad_numbers(text_of(bytes)); bad > 0) {
+  Result<LoadedMesh> read(std::span<const std::byte> file) {
+    std::string text = prepared(text_of(file));
+    if (has_large_face(text)) text = without_large_faces(text);
+    const std::span<const std::byte> bytes = std::as_bytes(std::span(text));
+    if (const std::size_t bad = count_bad_numbers(text); bad > 0) {
       loaded_.warnings.push_back(with_thousands(static_cast<std::int64_t>(bad)) +
                                  " coordinates are no finite numbers, and count as 0");
     }
@@ -146,7 +245,7 @@ class ObjReader {
     MaterialFiles files(beside_, loaded_);
     std::string warnings;
     std::string errors;
-    if (!tinyobj::LoadObj(&attributes_, &shapes_, &materials_, &warnings, &errors, &stream, &files, true, false)) {
+    if (!tinyobj::LoadObj(&attributes_, &shapes_, &materials_, &warnings, &errors, &stream, &files, false, false)) {
       return make_error(ErrorCode::BadFormat, first_line(errors.empty() ? "the file cannot be parsed" : errors));
     }
     warn_of(warnings);
@@ -157,6 +256,7 @@ class ObjReader {
       has_others_ |= !shape.lines.indices.empty() || !shape.points.indices.empty();
     }
     if (has_others_) loaded_.warnings.emplace_back("left out points and lines");
+    show_what_is_all_invisible();
     if (!has_textures_) loaded_.mesh.texture_places.clear();
     builder_.finish();
     return std::move(loaded_);
@@ -229,20 +329,40 @@ class ObjReader {
     if (has_holes && material.alpha_mode == AlphaMode::Opaque) material.alpha_mode = AlphaMode::Mask;
   }
   Status take(const tinyobj::mesh_t& from) {
-    for (std::size_t i = 0; 3 * i + 2 < from.indices.size(); ++i) {
-      const tinyobj::index_t* const corner = from.indices.data() + 3 * i;
-      const auto index = [&](int k) {
-        return static_cast<std::size_t>(static_cast<std::ptrdiff_t>(corner[k].vertex_index));
-      };
-      const auto added = builder_.add(index(0), index(1), index(2));
-      if (!added) return added.error();
-      if (!*added) continue;
-      for (int k = 0; k < 3; ++k) loaded_.mesh.texture_places.push_back(place_of(corner[k].texcoord_index));
+    std::size_t first = 0;
+    for (std::size_t i = 0; i < from.num_face_vertices.size(); ++i) {
+      const std::size_t count = from.num_face_vertices[i];
+      if (count > from.indices.size() - first) return {};
+      const std::span<const tinyobj::index_t> face = std::span(from.indices).subspan(first, count);
+      first += count;
+      polygon_.clear();
+      for (const tinyobj::index_t& corner : face) {
+        polygon_.push_back(static_cast<std::size_t>(static_cast<std::ptrdiff_t>(corner.vertex_index)));
+      }
       const int material = i < from.material_ids.size() ? from.material_ids[i] : -1;
       const bool is_there = material >= 0 && static_cast<std::size_t>(material) < no_material_;
-      loaded_.mesh.material_of.push_back(static_cast<std::uint32_t>(is_there ? material : no_material_));
+      const Status added = builder_.add_polygon(polygon_, [&](const std::array<std::uint32_t, 3>& corners) {
+        for (const std::uint32_t k : corners) {
+          loaded_.mesh.texture_places.push_back(place_of(face[k].texcoord_index));
+        }
+        loaded_.mesh.material_of.push_back(static_cast<std::uint32_t>(is_there ? material : no_material_));
+      });
+      if (!added) return added;
     }
     return {};
+  }
+  /// Some programs write opacity where others write transparency. A model that is all invisible is such a mistake.
+  void show_what_is_all_invisible() {
+    TriangleMesh& mesh = loaded_.mesh;
+    const auto is_invisible = [&](std::uint32_t material) { return mesh.materials[material].colour.a == 0.0F; };
+    if (mesh.material_of.empty() || !std::ranges::all_of(mesh.material_of, is_invisible)) return;
+    for (MeshMaterial& material : mesh.materials) {
+      if (material.colour.a != 0.0F) continue;
+      material.colour.a = 1.0F;
+      if (material.alpha_mode == AlphaMode::Blend) material.alpha_mode = AlphaMode::Opaque;
+    }
+    loaded_.warnings.emplace_back(
+        "its materials make all of the model invisible (Tr 1 or d 0); they are read as opaque");
   }
   /// Of OBJ (0, 0) is the picture's bottom left corner.
   [[nodiscard]] glm::vec2 place_of(int index) const {
@@ -259,6 +379,7 @@ class ObjReader {
   std::vector<tinyobj::shape_t> shapes_;
   std::vector<tinyobj::material_t> materials_;
   std::map<std::string, std::optional<std::size_t>> textures_;
+  std::vector<std::size_t> polygon_;
   std::size_t no_material_ = 0;
   bool has_textures_ = false;
   bool has_others_ = false;

@@ -66,10 +66,16 @@ struct Header {
   std::size_t end = 0;
 };
 
+/// Returns the character that ends the lines of a header: old programs for the Macintosh wrote a carriage return alone.
+/// The first line decides, since a line feed behind the last may be the first byte of the values.
+char line_end(std::string_view text) {
+  return text.starts_with("ply\r") && !text.starts_with("ply\r\n") ? '\r' : '\n';
+}
+
 /// A line without its end, and where the next begins.
-std::string_view line_at(std::string_view text, std::size_t& at) {
+std::string_view line_at(std::string_view text, char line_end, std::size_t& at) {
   const std::size_t first = at;
-  const std::size_t end = std::min(text.find('\n', first), text.size());
+  const std::size_t end = std::min(text.find(line_end, first), text.size());
   at = std::min(end + 1, text.size());
   std::string_view line = text.substr(first, end - first);
   if (line.ends_with('\r')) line.remove_suffix(1);
@@ -107,7 +113,7 @@ Result<Header> read_header(std::string_view text) {
   bool has_format = false;
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t line = at;
-    Words words(line_at(text, at));
+    Words words(line_at(text, line_end(text), at));
     const auto key = words.next();
     if (!key) continue;
     if (*key == "end_header") {
@@ -254,7 +260,7 @@ class PlyReader {
         if (Status done = read_list(property); !done) return done;
         if (values_.failed()) return ends_within(values_, element);
         if (!is_corners) continue;
-        if (Status done = is_strips ? add_strip() : add_fan(); !done) return done;
+        if (Status done = is_strips ? add_strip() : add_polygon(); !done) return done;
       }
     }
     return {};
@@ -284,11 +290,10 @@ class PlyReader {
         builder_.add(static_cast<std::size_t>(a), static_cast<std::size_t>(b), static_cast<std::size_t>(c));
     return added ? Status() : Status(added.error());
   }
-  Status add_fan() {
-    for (std::size_t i = 2; i < list_.size(); ++i) {
-      if (Status done = add(list_[0], list_[i - 1], list_[i]); !done) return done;
-    }
-    return {};
+  Status add_polygon() {
+    corners_.clear();
+    for (const std::int64_t corner : list_) corners_.push_back(static_cast<std::size_t>(corner));
+    return builder_.add_polygon(corners_, [](const std::array<std::uint32_t, 3>&) {});
   }
   /// Strips end at -1; every other triangle is turned.
   Status add_strip() {
@@ -335,6 +340,7 @@ class PlyReader {
   LoadedMesh loaded_;
   MeshBuilder builder_{loaded_};
   std::vector<std::int64_t> list_;
+  std::vector<std::size_t> corners_;
   bool has_faces_ = false;
 };
 

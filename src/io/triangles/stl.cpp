@@ -52,11 +52,16 @@ Result<LoadedMesh> read_bytes(std::span<const std::byte> bytes) {
   const auto of_all = colour_of_header(reader.text(kHeader));
   const std::uint32_t count = reader.u32();
   if (reader.failed()) return bad_at(bytes.size(), "the file ends within the header of an STL");
-  if (count > reader.remaining() / kRecord) {
-    return bad_at(kHeader, "claims " + std::to_string(count) + " triangles, and has bytes for " +
-                               std::to_string(reader.remaining() / kRecord));
+  const std::uint64_t promised = kHeader + 4 + std::uint64_t{count} * kRecord;
+  if (promised > bytes.size()) {
+    return bad_at(kHeader, "the header promises " + std::to_string(count) + " triangles, which take " +
+                               std::to_string(promised) + " bytes, and the file has " + std::to_string(bytes.size()));
   }
   LoadedMesh loaded;
+  if (promised < bytes.size()) {
+    loaded.warnings.push_back("left out the last " + std::to_string(bytes.size() - promised) +
+                              " bytes, which follow the triangles");
+  }
   MeshBuilder builder(loaded);
   std::vector<glm::vec4> colours;
   bool has_colours = of_all.has_value();
@@ -122,6 +127,12 @@ bool is_stl(std::span<const std::byte> whole) {
   (void)reader.take(kHeader);
   const std::uint64_t count = reader.u32();
   return count > 0 && whole.size() == kHeader + 4 + count * kRecord;
+}
+
+bool is_stl_by_name(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return extension == ".stl" && bytes.size() >= kHeader + 4;
 }
 
 Result<LoadedMesh> read_stl(std::span<const std::byte> bytes, Beside&) {

@@ -7,6 +7,7 @@
 #include <quoin/io/file.h>
 
 #include "io/image/decode.h"
+#include "io/triangles/polygon.h"
 #include "io/whole_file.h"
 
 namespace quoin {
@@ -33,8 +34,8 @@ void turn_up(TriangleMesh& mesh) {
 
 using Read = Result<LoadedMesh> (*)(std::span<const std::byte>, Beside&);
 
-Result<LoadedMesh> read_any(std::span<const std::byte> bytes, Beside& beside, std::optional<UpAxis> up) {
-  const auto format = detect_format(bytes);
+Result<LoadedMesh> read_any(std::span<const std::byte> bytes, std::optional<FileFormat> format, Beside& beside,
+                            std::optional<UpAxis> up) {
   Read read = nullptr;
   if (format == FileFormat::Obj) read = read_obj;
   if (format == FileFormat::Ply) read = read_ply;
@@ -87,6 +88,25 @@ Result<bool> MeshBuilder::add(std::size_t a, std::size_t b, std::size_t c) {
   return true;
 }
 
+Status MeshBuilder::add_polygon(std::span<const std::size_t> corners,
+                                FunctionRef<void(const std::array<std::uint32_t, 3>&)> added) {
+  const std::vector<DVec3>& positions = loaded_.mesh.positions;
+  polygon_.clear();
+  cut_.clear();
+  for (const std::size_t corner : corners) {
+    const bool is_sound = corner < positions.size() && is_finite(positions[corner]);
+    // `add` counts the triangles of missing corners.
+    polygon_.push_back(is_sound ? positions[corner] : DVec3(0.0));
+  }
+  too_large_ += cut_polygon(polygon_, cut_) ? 0 : 1;
+  for (const auto& triangle : cut_) {
+    const auto is_added = add(corners[triangle[0]], corners[triangle[1]], corners[triangle[2]]);
+    if (!is_added) return is_added.error();
+    if (*is_added) added(triangle);
+  }
+  return {};
+}
+
 void MeshBuilder::finish() {
   const auto warn = [&](std::size_t count, const char* what) {
     if (count == 0) return;
@@ -95,6 +115,11 @@ void MeshBuilder::finish() {
   };
   warn(not_there_, "a corner that is not there");
   warn(not_finite_, "a corner that is no number");
+  if (too_large_ > 0) {
+    loaded_.warnings.push_back(
+        "polygons of more than " + with_thousands(std::int64_t{kMostCornersOfConcave}) +
+        " corners, filled as if they were convex: " + with_thousands(static_cast<std::int64_t>(too_large_)));
+  }
 }
 
 std::optional<std::size_t> add_texture(std::span<const std::byte> picture, const std::string& name,
@@ -179,13 +204,15 @@ Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& op
 
 Result<LoadedMesh> read_mesh(std::span<const std::byte> bytes, std::optional<UpAxis> up) {
   triangles::Beside nothing;
-  return triangles::read_any(bytes, nothing, up);
+  return triangles::read_any(bytes, detect_format(bytes), nothing, up);
 }
 
 Result<LoadedMesh> read_mesh(const std::filesystem::path& path, std::optional<UpAxis> up) {
   return read_whole(path, [&](std::span<const std::byte> bytes) {
     triangles::Beside beside(path);
-    return triangles::read_any(bytes, beside, up);
+    auto format = detect_format(bytes);
+    if (!format && triangles::is_stl_by_name(path, bytes)) format = FileFormat::Stl;
+    return triangles::read_any(bytes, format, beside, up);
   });
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -8,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <quoin/core/function_ref.h>
 #include <quoin/core/progress.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
@@ -46,6 +49,10 @@ class MeshBuilder {
   /// A triangle of positions that are there; false, and nothing is added, where one is not, or not finite.
   /// Errors: LimitExceeded.
   [[nodiscard]] Result<bool> add(std::size_t a, std::size_t b, std::size_t c);
+  /// The triangles of a polygon, as cut_polygon cuts it. `added` gets the corners of each triangle that is added, as
+  /// places in `corners`. Errors: LimitExceeded.
+  [[nodiscard]] Status add_polygon(std::span<const std::size_t> corners,
+                                   FunctionRef<void(const std::array<std::uint32_t, 3>&)> added);
   /// Warns of what was left out. Call at the end.
   void finish();
 
@@ -53,6 +60,9 @@ class MeshBuilder {
   LoadedMesh& loaded_;
   std::size_t not_finite_ = 0;
   std::size_t not_there_ = 0;
+  std::size_t too_large_ = 0;
+  std::vector<DVec3> polygon_;
+  std::vector<std::array<std::uint32_t, 3>> cut_;
 };
 
 /// Adds a picture as a texture; nothing, with a warning, where it cannot be decoded.
@@ -63,6 +73,9 @@ class MeshBuilder {
 
 [[nodiscard]] bool is_stl_text(std::span<const std::byte> beginning);
 [[nodiscard]] bool is_stl(std::span<const std::byte> whole);
+/// Returns true for a binary STL by its name: of one that was cut off, or has bytes behind its triangles, the content
+/// does not tell.
+[[nodiscard]] bool is_stl_by_name(const std::filesystem::path& path, std::span<const std::byte> bytes);
 [[nodiscard]] Result<LoadedMesh> read_stl(std::span<const std::byte> bytes, Beside& beside);
 
 [[nodiscard]] bool is_ply(std::span<const std::byte> beginning);

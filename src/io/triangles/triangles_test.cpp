@@ -5,6 +5,7 @@
 #include <fstream>
 #include <string>
 
+#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
 #include <quoin/io/formats.h>
@@ -420,6 +421,37 @@ TEST(Triangles, of_real_files_have_their_counts) {
     const auto loaded = read_mesh(path);
     ASSERT_TRUE(loaded) << to_string(loaded.error());
     EXPECT_EQ(loaded->mesh.triangles.size(), triangles) << path;
+  }
+}
+
+TEST(MeshFiles, PolygonsOfManyCornersAreRead) {
+  if (!reads(FileFormat::Obj)) GTEST_SKIP() << "without OBJ";
+  // A comb of 1,000 teeth: more corners than a byte counts, and not convex.
+  std::string text;
+  std::string face = "f";
+  for (int i = 0; i < 1000; ++i) {
+    text += "v " + std::to_string(2 * i) + " 0 0\nv " + std::to_string(2 * i + 1) + " 9 0\n";
+  }
+  text += "v 1999 -1 0\nv 0 -1 0\n";
+  for (int i = 1; i <= 2002; ++i) face += " " + std::to_string(i);
+  const LoadedMesh loaded = mesh_of(text + face + "\nf -1 -2 1\n");
+  EXPECT_EQ(loaded.mesh.triangles.size(), 2001U);
+  double area = 0.0;
+  for (std::size_t i = 0; i < 2000; ++i) {
+    const auto& t = loaded.mesh.triangles[i];
+    const auto& p = loaded.mesh.positions;
+    area += 0.5 * glm::length(glm::cross(p[t[1]] - p[t[0]], p[t[2]] - p[t[0]]));
+  }
+  EXPECT_NEAR(area, 1999.0 * 1.0 + 1999.0 * 4.5 + 0.0, 1e-6 * area);
+  EXPECT_TRUE(loaded.warnings.empty());
+}
+
+TEST(MeshFiles, ObjLinesMayEndInAnyWay) {
+  if (!reads(FileFormat::Obj)) GTEST_SKIP() << "without OBJ";
+  for (const std::string end : {"\r", "\r\n", "\n"}) {
+    const std::string text =
+        "v 0 0 0" + end + "v 1 0 \\" + end + "0" + end + "v 0 1 0" + end + "vt 0 0" + end + "f 1/1/ 2/1/ 3/1/" + end;
+    EXPECT_EQ(mesh_of(text).mesh.triangles.size(), 1U) << static_cast<int>(end[0]);
   }
 }
 
