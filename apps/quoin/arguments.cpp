@@ -3,6 +3,8 @@
 #include <optional>
 #include <string>
 
+#include <quoin/io/formats.h>
+
 #include "commands.h"
 #include "output.h"
 #include "parse.h"
@@ -99,6 +101,28 @@ void add_height_options(CLI::App& command, std::optional<HeightOptions>& heights
 
 }  // namespace
 
+void add_dimension_option(CLI::App& command, LoadOptions& load) {
+  command
+      .add_option(
+          "--dimension", load.dimension,
+          "Dimension of a Minecraft world: overworld, nether, end or NAMESPACE:NAME (default overworld; quoin info "
+          "lists those of a world)")
+      ->check(CLI::Validator(
+          [](const std::string& text) { return std::string(text.empty() ? "must name a dimension" : ""); }, ""));
+}
+
+Status check_dimension(const std::filesystem::path& path, const LoadOptions& load) {
+  if (load.dimension.empty()) return {};
+  const auto format = detect_format(path);
+  if (!format) return format.error();
+  const bool is_heeded = *format == FileFormat::Minecraft || *format == FileFormat::Scene;
+  if (is_heeded) return {};
+  const std::string found = *format ? std::string(format_info(**format).name) : "of no format that is known";
+  return make_error(ErrorCode::InvalidArgument,
+                    "cannot choose a dimension: --dimension is for worlds of Minecraft, and this is " + found,
+                    path.string());
+}
+
 void add_common_options(CLI::App& command, CommonOptions& options) {
   command.add_option("IN", options.input, "File to read")->required()->check(file_name());
   command.add_flag("--hidden", options.load.show_hidden, "Include hidden layers and nodes");
@@ -108,6 +132,7 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
                   "side (default 4; "
                   "converted to .quoin it is all there)")
       ->check(CLI::Range(0, 1'000));
+  add_dimension_option(command, options.load);
   command.add_option("--frame", options.load.frame, "Animation frame to take (default 0)")
       ->check(not_negative_whole())
       ->each([&options](const std::string&) { options.takes_frame = true; });

@@ -26,7 +26,12 @@ struct CommonOptions {
   }
 };
 
-/// Adds IN, --json, --threads, --hidden and --frame to a command.
+/// Adds --dimension.
+void add_dimension_option(CLI::App& command, LoadOptions& load);
+/// Refuses --dimension for a file that has no dimensions.
+[[nodiscard]] Status check_dimension(const std::filesystem::path& path, const LoadOptions& load);
+
+/// Adds IN, --json, --threads, --hidden, --dimension and --frame to a command.
 void add_common_options(CLI::App& command, CommonOptions& options);
 
 /// What --force is for.

@@ -186,6 +186,8 @@ Json info_json(const LoadedScene& loaded, InstanceFilter filter, const FaceCount
                  {"groups", hierarchy.groups()},
                  {"layers", hierarchy.layers()},
                  {"kept", kept_by(loaded)},
+                 {"dimension", loaded.dimension.empty() ? Json() : Json(loaded.dimension)},
+                 {"dimensions", loaded.dimensions},
                  {"warnings", loaded.warnings}};
   for (const GridReport& report : report_grids(loaded.scene)) object["grids"].push_back(grid_json(report, hierarchy));
   return object;
@@ -251,12 +253,23 @@ std::string hierarchy_text(const LoadedScene& loaded) {
   return kept.empty() ? text : text + "Kept when saved as .vox: " + kept + "\n";
 }
 
+std::string dimension_text(const LoadedScene& loaded) {
+  if (loaded.dimension.empty()) return {};
+  std::string others;
+  for (const std::string& name : loaded.dimensions) {
+    if (name != loaded.dimension) others += (others.empty() ? "" : ", ") + on_one_line(name);
+  }
+  return "Dimension: " + on_one_line(loaded.dimension) +
+         (others.empty() ? "" : " (--dimension chooses another: " + others + ")") + "\n";
+}
+
 std::string info_text(const CommonOptions& options, const std::string& name, const LoadedScene& loaded,
                       const FaceCounts& faces) {
   const Scene& scene = loaded.scene;
   std::string text = name + ": " + loaded.format + ", " +
                      count_of(static_cast<std::int64_t>(scene.grids().size()), "grid") + ", " +
                      count_of(static_cast<std::int64_t>(scene.instances().size()), "instance") + "\n";
+  text += dimension_text(loaded);
   text += content_text({scene.voxel_count(), solid_samples(scene)}) + " of " +
           count_of(static_cast<std::int64_t>(distinct_types(scene)), "type") + "\n";
   if (scene.voxel_count() > 0 || solid_samples(scene) == 0) text += to_string(faces) + "\n";
@@ -277,6 +290,7 @@ std::string info_text(const CommonOptions& options, const std::string& name, con
 
 Result<int> info(const CommonOptions& options, const StandardStreams& streams) {
   if (holds_volume(options).value_or(false)) return run_volume_info(options, streams);
+  if (Status sound = check_dimension(options.input, options.load); !sound) return sound.error();
   const auto loaded = [&] {
     ProgressBar bar;
     return load_scene(options.input, options.load, options.threads, bar.listener("reading"));

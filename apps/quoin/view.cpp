@@ -75,6 +75,7 @@ int run_view(const ViewArguments& arguments) {
   if (arguments.backend == "cpu") options.backend = viewer::ViewerBackend::Processor;
   if (arguments.backend == "vulkan") options.backend = viewer::ViewerBackend::Vulkan;
   Status status = check_input(arguments.input, arguments.load.raw.has_value());
+  if (status && !arguments.input.empty()) status = check_dimension(arguments.input, arguments.load);
   if (status) status = check_outputs({arguments.screenshot});
   if (status) {
     catch_interrupts();
@@ -131,6 +132,7 @@ void add_view_command(CLI::App& app, int& status) {
   command->add_option("IN", arguments->input, "File to open (default: an empty window, to drop files on)")
       ->check(file_name());
   command->add_flag("--hidden", arguments->load.show_hidden, "Include hidden layers and nodes");
+  add_dimension_option(*command, arguments->load);
   command->add_option("--frame", arguments->load.frame, "Animation frame to take (default 0)")
       ->check(not_negative_whole());
   add_volume_options(*command, arguments->volume_texts);

@@ -13,10 +13,11 @@
 #include "io/byte_stream.h"
 #include "io/heights/heights.h"
 #include "io/minecraft/minecraft_source.h"
-#include "io/minecraft/region_file.h"
+#include "io/minecraft/region/region_file.h"
 #include "io/minecraft/schematic.h"
 #include "io/models/models.h"
 #include "io/models/write/write_models.h"
+#include "io/source/detect_world.h"
 #include "io/source/luanti_map.h"
 #include "io/triangles/triangles.h"
 #include "io/vdb/vdb.h"
@@ -67,7 +68,8 @@ constexpr std::array kFormats = {
     FormatInfo{FileFormat::Vdb, "vdb", ".vdb", "grids of OpenVDB, also NanoVDB's (.nvdb)", true, true, false, false,
                ".nvdb"},
     FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, true, false, true},
-    FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes", true, false, false, true},
+    FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes, also .nhdr with a file of values", true, false, false,
+               true, ".nhdr"},
     FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", kReadsGltf, true, true, false},
     FormatInfo{FileFormat::Gltf, "gltf", ".gltf", "glTF 2.0, JSON and .bin", kReadsGltf, true, true, false},
     FormatInfo{FileFormat::Obj, "obj", ".obj", "Wavefront OBJ with .mtl and palette images", kReadsObj, true, true,
@@ -113,8 +115,18 @@ std::string extensions_with(bool FormatInfo::*ability) {
   return list;
 }
 
+/// The readable format of a name's extension.
+const FormatInfo* format_by_name(const std::filesystem::path& path) {
+  const std::string extension = lower_case_extension(path);
+  const auto* const found = std::ranges::find_if(kFormats, [&](const FormatInfo& info) {
+    const std::string all = std::string(info.extension) + " " + std::string(info.also) + " ";
+    return info.readable && !extension.empty() && all.find(extension + " ") != std::string::npos;
+  });
+  return found == kFormats.end() ? nullptr : found;
+}
+
 /// Why a file of no known format is refused.
-Error unrecognised(std::span<const std::byte> bytes) {
+Error unrecognised(std::span<const std::byte> bytes, const std::filesystem::path& path) {
   if (bytes.empty()) return {ErrorCode::BadFormat, "the file is empty", {}, {}};
   if (begins_with(bytes, "version https://git-lfs.github.com/spec/")) {
     return {ErrorCode::BadFormat, "a Git LFS pointer, not the file itself (git lfs pull fetches it)", {}, 0};
@@ -128,6 +140,14 @@ Error unrecognised(std::span<const std::byte> bytes) {
             "as heights (in programs the option heights)",
             {},
             {}};
+  }
+  if (const FormatInfo* const named = format_by_name(path)) {
+    return {
+        ErrorCode::BadFormat,
+        "its name ends in " + lower_case_extension(path) + ", but its content is not " + std::string(named->name) +
+            ", nor any other format that Quoin reads; it may be damaged, or of another program's format of that name",
+        {},
+        {}};
   }
   return {ErrorCode::BadFormat, "not a file of any format that Quoin reads (" + readable_extensions() + ")", {}, {}};
 }
@@ -245,7 +265,7 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
   if (const ReadModel read = model_reader(format); read != nullptr) return read(bytes);
   if (is_triangles(format)) return read_triangles(bytes, "mesh", options, threads, progress);
   if (is_volume(format)) return read_volume_as_scene(bytes, options, threads, progress);
-  Error error = unrecognised(bytes);
+  Error error = unrecognised(bytes, path);
   // The reader knows more of what else goes by this name.
   const bool named_vox = !bytes.empty() && !error.byte_offset && lower_case_extension(path) == ".vox";
   if (named_vox) return read_vox(bytes, options, progress);
@@ -423,20 +443,31 @@ Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& pat
   if (lower_case_extension(path) == ".hgt" && heights::is_hgt_size(std::filesystem::file_size(path, unknown_size))) {
     return FileFormat::Heights;
   }
-  if (is_world_folder(path)) {
-    return minecraft::is_minecraft_folder(path) ? FileFormat::Minecraft : FileFormat::LuantiMap;
+  if (const auto world = detect_world(path)) return world;
+  if (std::filesystem::is_directory(path, unknown_size)) {
+    return make_error(
+        ErrorCode::CannotRead,
+        "it is a folder, and no world that Quoin reads: of Minecraft's (level.dat and region/r.X.Z.mca) or "
+        "Luanti's (world.mt)",
+        path.string());
   }
   // What decompresses to a header, with room for names and comments in gzip's own.
   constexpr std::size_t kEnough = 1 << 16;
   const auto bytes = read_file_beginning(path, kEnough);
   if (!bytes) return bytes.error();
-  if (const auto format = detect_format(*bytes); format || bytes->size() < kEnough) return format;
+  if (const auto format = detect_format(*bytes)) return format;
+  // A damaged region is recognised by its name alone.
+  if (minecraft::parse_region_name(path)) return FileFormat::Minecraft;
+  if (bytes->size() < kEnough) {
+    return triangles::is_stl_by_name(path, *bytes) ? std::optional(FileFormat::Stl) : std::nullopt;
+  }
   const std::string extension = lower_case_extension(path);
   constexpr std::array<std::string_view, 5> kHeaderless = {".vxl", ".kvx", ".vox", ".cub", ".stl"};
   if (std::ranges::find(kHeaderless, extension) == kHeaderless.end()) return std::optional<FileFormat>();
   const auto whole = read_file(path);
   if (!whole) return whole.error();
-  return detect_headerless(*whole);
+  const auto headerless = detect_headerless(*whole);
+  return !headerless && triangles::is_stl_by_name(path, *whole) ? FileFormat::Stl : headerless;
 }
 
 Result<FormatInfo> format_for_writing(const std::filesystem::path& path) {
@@ -481,7 +512,7 @@ std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path
     const auto mesh = read_mesh(path);
     return mesh ? mesh->beside : std::vector<std::filesystem::path>();
   }
-  return **format == FileFormat::Nifti ? files_of_pair(path) : std::vector<std::filesystem::path>();
+  return is_volume(*format) ? files_of_pair(path) : std::vector<std::filesystem::path>();
 }
 
 Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options, Threads threads,
@@ -496,7 +527,8 @@ Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOpti
     });
   }
   if (is_read_by_chunks(*format)) {
-    return with_path(read_around_spawn(open_chunk_source(path), options, threads, progress), path);
+    const auto source = open_chunk_source(path, options.dimension);
+    return with_path(read_around_spawn(source, options, threads, progress), path);
   }
   if (*format == FileFormat::World) return with_path(read_world_format(path, options, threads, progress), path);
   if (is_volume(*format)) return with_path(read_volume_as_scene(path, options, threads, progress), path);
@@ -505,7 +537,7 @@ Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOpti
   // Of the whole file, which some formats are known by only then, and which may be another by now.
   const auto of_all = detect_format(*bytes);
   if (of_all == FileFormat::Scene) return read_scene_file(path, options, threads, progress);
-  if (is_triangles(of_all))
+  if (is_triangles(of_all) || (!of_all && is_triangles(*format)))
     return with_path(read_triangles(path, stem_of_file(path), options, threads, progress), path);
   return with_path(read_bytes(path, *bytes, of_all, options, threads, progress), path);
 }

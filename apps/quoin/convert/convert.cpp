@@ -247,7 +247,7 @@ Status add_thumbnail(const ChunkSource& source, const ConvertOptions& options) {
 /// Puts a world that is read by chunks into one of Quoin's, whatever its size.
 Result<Outcome> convert_by_chunks(const ConvertOptions& options) {
   Stopwatch watch;
-  const auto source = open_chunk_source(options.common.input);
+  const auto source = open_chunk_source(options.common.input, options.common.load.dimension);
   if (!source) return source.error();
   catch_interrupts();
   Outcome outcome;
@@ -259,7 +259,9 @@ Result<Outcome> convert_by_chunks(const ConvertOptions& options) {
   outcome.content.voxels = static_cast<std::int64_t>(imported->voxels);
   outcome.bytes = imported->bytes;
   if (auto done = add_thumbnail(**source, options); !done) return done.error();
+  outcome.warnings = (*source)->info().warnings;
   for (const std::string& line : imported->broken) outcome.warnings.push_back("left out: " + line);
+  if (!imported->invisible.empty()) outcome.warnings.push_back(text_of_invisible(imported->invisible));
   if (!imported->guessed.empty()) {
     std::string names;
     for (const std::string& name : imported->guessed) names += (names.empty() ? "" : ", ") + name;
@@ -334,8 +336,9 @@ std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
 std::string fault_of_mesh_input(const ConvertOptions& options) {
   if (options.mesh_input.empty()) return "";
   const auto format = detect_format(options.common.input);
-  const bool is_mesh = format && *format && format_info(**format).is_mesh;
-  return is_mesh || !format ? "" : options.mesh_input + " is for files of triangles, and the input holds none";
+  // Reading says why nothing recognises a file, which may be one of triangles.
+  if (!format || !*format || format_info(**format).is_mesh) return "";
+  return options.mesh_input + " is for files of triangles, and the input is " + std::string(format_info(**format).name);
 }
 
 Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format, bool is_volume, std::string& fault) {
@@ -605,6 +608,7 @@ std::string fault_of_format(const ConvertOptions& options, const FormatInfo& for
 
 Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& format, std::string& fault) {
   if (Status sound = check_input(options); !sound) return sound.error();
+  if (Status sound = check_dimension(options.common.input, options.common.load); !sound) return sound.error();
   const auto is_volume = holds_volume(options.common);
   if (!is_volume) return is_volume.error();
   fault = fault_of_usage(options, *is_volume);

@@ -157,6 +157,7 @@ Result<LoadedScene> load(const RenderArguments& arguments, bool is_volume, int f
   options.frame = frame;
   options.keep_source = false;
   ProgressBar bar;
+  if (Status sound = check_dimension(arguments.common.input, options); !sound) return sound.error();
   auto loaded = load_scene(arguments.common.input, options, arguments.common.threads, bar.listener("reading"));
   if (loaded && arguments.volume.iso && !is_volume && !heeds_iso(arguments.common)) {
     return make_error(ErrorCode::InvalidArgument, "--iso is for volumes, and the input holds voxels");

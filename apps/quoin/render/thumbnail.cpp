@@ -37,6 +37,7 @@ Result<Thumbnail> draw(const ThumbnailArguments& arguments) {
   if (auto writable = check_outputs({arguments.output}); !writable) return writable.error();
   LoadOptions load = arguments.common.load;
   load.keep_source = false;
+  if (Status sound = check_dimension(arguments.common.input, load); !sound) return sound.error();
   auto loaded = load_scene(arguments.common.input, load, arguments.common.threads);
   if (!loaded) return loaded.error();
   catch_interrupts();

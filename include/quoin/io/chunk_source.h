@@ -3,10 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <quoin/core/parallel.h>
@@ -17,18 +19,22 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/loaded_scene.h>
+#include <quoin/scene/scene.h>
 
 namespace quoin {
 
 /// What a source says of itself before anything is read of it.
 struct ChunkSourceInfo {
-  std::string format;           ///< "minecraft", "luanti_map"
-  std::string version;          ///< of what wrote it, for a person: "1.18.2"; empty: it is not said
-  std::string name;             ///< of the world, where it has one
-  double spacing = 1.0;         ///< world units along a voxel's edge
-  IBox chunks;                  ///< in chunk coordinates: all that there is lies within
-  std::optional<DVec3> spawn;   ///< where a player begins, in voxels of the source's grid
-  std::vector<Error> broken{};  ///< files that cannot be read at all, which are left out
+  std::string format;                     ///< "minecraft", "luanti_map"
+  std::string version;                    ///< of what wrote it, for a person: "1.18.2"; empty: it is not said
+  std::string name;                       ///< of the world, where it has one
+  double spacing = 1.0;                   ///< world units along a voxel's edge
+  IBox chunks;                            ///< in chunk coordinates: all that there is lies within
+  std::optional<DVec3> spawn;             ///< where a player begins, in voxels of the source's grid
+  std::vector<Error> broken{};            ///< files that cannot be read at all, which are left out
+  std::vector<std::string> warnings{};    ///< one line per assumption
+  std::string dimension{};                ///< of Minecraft's worlds, "minecraft:overworld"; empty: it has no name
+  std::vector<std::string> dimensions{};  ///< all of that world, the chosen one too
 };
 
 /// A chunk of a source, in its types.
@@ -41,6 +47,8 @@ struct SourceChunk {
 struct SourcePart {
   std::vector<SourceChunk> chunks;  ///< by y; those that are all air are left out
   std::vector<Error> broken{};      ///< what could not be read and is left out, with file and byte offset
+  std::map<std::string, std::uint64_t> invisible{};  ///< voxels that are read as air and have a name, by that name
+  std::vector<Lamp> lamps{};                         ///< lights without a body, in voxels of the source's grid
 };
 
 /// A world that is read chunk by chunk, without being held whole: a folder of region files, a database, a large model.
@@ -121,10 +129,16 @@ class SourceTypes {
 /// Whether files of a format, as detect_format says it, are what open_chunk_source reads.
 [[nodiscard]] bool is_read_by_chunks(std::optional<FileFormat> format);
 
-/// Opens a world: a folder of Minecraft's (Java), or one of its region files; a folder of Luanti's, or its map.sqlite.
+/// Opens a world: a folder of Minecraft's (Java), its level.dat, or one of its region files; a folder of Luanti's, or
+/// its map.sqlite. `dimension`: as LoadOptions::dimension.
 ///
-/// Errors: CannotRead; BadFormat, Unsupported where it is nothing that Quoin reads.
-[[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_chunk_source(const std::filesystem::path& path);
+/// Errors: CannotRead; BadFormat, Unsupported where it is nothing that Quoin reads; InvalidArgument for a dimension
+/// that is not there.
+[[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_chunk_source(const std::filesystem::path& path,
+                                                                     std::string_view dimension = {});
+
+/// Returns a warning that names voxels with a name that are read as air (SourcePart::invisible); empty for none.
+[[nodiscard]] std::string text_of_invisible(const std::map<std::string, std::uint64_t>& invisible);
 
 /// Puts what lies in a box of chunk coordinates into a scene: one grid, one instance. What was broken, and that there
 /// is more outside, are warnings.
@@ -135,7 +149,7 @@ class SourceTypes {
                                               const Progress& progress = {});
 
 /// The box of chunks around a source's spawn (or its middle, where it has none), `radius` chunks to each side, as high
-/// as the source is.
+/// as the source is. Where no part lies in it, the box around the part that is nearest to the spawn.
 [[nodiscard]] IBox chunks_around_spawn(const ChunkSource& source, int radius);
 
 }  // namespace quoin

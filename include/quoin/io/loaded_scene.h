@@ -39,6 +39,8 @@ struct LoadedScene {
   std::int64_t last_frame = 0;                        ///< of its animation; LoadOptions::frame says which one this is
   std::vector<std::filesystem::path> named_files;     ///< other files that models are from; saving puts these into one
   std::shared_ptr<const VoxSource> source = nullptr;  ///< of a .vox file, with LoadOptions::keep_source
+  std::string dimension{};                            ///< of a world of Minecraft's: the one that was read
+  std::vector<std::string> dimensions{};  ///< of a world of Minecraft's: all; LoadOptions::dimension chooses
 };
 
 /// Which axis of a file points up. glTF knows +Y alone; programs that read other formats differ.
@@ -68,6 +70,9 @@ struct LoadOptions {
   std::optional<float> iso = std::nullopt;
   /// Of a world that is read by chunks (ChunkSource): how far around its spawn, in chunks of 64 voxels to each side.
   int radius = 4;
+  /// The dimension of a Minecraft world: "overworld", "nether", "end" or NAMESPACE:NAME; empty: the overworld, or the
+  /// first that the world has. Other formats ignore it.
+  std::string dimension{};
   /// The file holds values alone, as many as this says: a volume.
   std::optional<RawVolume> raw = std::nullopt;
   /// The file holds the heights of a landscape. Nothing tells such a picture from another, so it has to be said; of

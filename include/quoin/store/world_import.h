@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -14,12 +15,13 @@ namespace quoin {
 
 /// What putting a world into another file gave.
 struct ImportedWorld {
-  std::uint64_t bytes = 0;           ///< of the file
-  std::uint64_t chunks = 0;          ///< that were written, by an earlier run too
-  std::uint64_t voxels = 0;          ///< of these
-  std::size_t resumed_parts = 0;     ///< of the source, that an earlier run had put there
-  std::vector<std::string> broken;   ///< what could not be read and is left out, a line each
-  std::vector<std::string> guessed;  ///< names of types whose looks are guesses
+  std::uint64_t bytes = 0;                         ///< of the file
+  std::uint64_t chunks = 0;                        ///< that were written, by an earlier run too
+  std::uint64_t voxels = 0;                        ///< of these
+  std::size_t resumed_parts = 0;                   ///< of the source, that an earlier run had put there
+  std::vector<std::string> broken;                 ///< what could not be read and is left out, a line each
+  std::vector<std::string> guessed;                ///< names of types whose looks are guesses
+  std::map<std::string, std::uint64_t> invisible;  ///< SourcePart::invisible of all parts
 };
 
 /// Puts all of a source into a world on disk, part by part, without holding it.

@@ -17,6 +17,7 @@ namespace {
 /// How a block takes part in pictures.
 enum class Kind : std::uint8_t {
   Air,
+  Invisible,  // air to the eye, and a block to the game
   Solid,
   Plant,   // thin leaves and stalks, which one walks through: mostly air
   Thin,    // rails, plates and the like: mostly air
@@ -45,9 +46,9 @@ constexpr Entry kBlocks[] = {
     {"air", 0, K::Air},
     {"cave_air", 0, K::Air},
     {"void_air", 0, K::Air},
-    {"structure_void", 0, K::Air},
-    {"light", 0, K::Air},
-    {"barrier", 0, K::Air},
+    {"structure_void", 0, K::Invisible},
+    {"light", 0, K::Invisible},
+    {"barrier", 0, K::Invisible},
     // Stone.
     {"stone", 0x7D7D7D},
     {"infested_stone", 0x7D7D7D},
@@ -500,20 +501,20 @@ struct Shape {
   bool is_thin;
 };
 constexpr Shape kShapes[] = {
-    {"_wall_hanging_sign", true},
-    {"_hanging_sign", true},
+    {"_wall_hanging_sign", false},
+    {"_hanging_sign", false},
     {"_pressure_plate", true},
     {"_double_slab", false},
-    {"_fence_gate", true},
-    {"_wall_sign", true},
-    {"_trapdoor", true},
+    {"_fence_gate", false},
+    {"_wall_sign", false},
+    {"_trapdoor", false},
     {"_stairs", false},
     {"_button", true},
-    {"_fence", true},
+    {"_fence", false},
     {"_slab", false},
     {"_wall", false},
     {"_door", false},
-    {"_sign", true},
+    {"_sign", false},
     {"_shelf", false},
     {"_pane", false},
 };
@@ -536,7 +537,9 @@ BlockLook look_of(std::uint32_t hex, Kind kind) {
   look.colour = rgb(hex);
   switch (kind) {
     case Kind::Air:
+    case Kind::Invisible:
       look.is_air = true;
+      look.is_invisible = kind == Kind::Invisible;
       break;
     case Kind::Plant:
     case Kind::Herb:
@@ -643,11 +646,18 @@ std::optional<BlockLook> look_of_dyed(std::string_view name) {
   return std::nullopt;
 }
 
+bool is_no_material(Kind kind) {
+  return kind == Kind::Air || kind == Kind::Invisible || kind == Kind::Plant || kind == Kind::Herb ||
+         kind == Kind::Vine || kind == Kind::Flame;
+}
+
 /// A block of that name, or of the names that a shape's may stand for: "brick" of "brick_stairs".
-std::optional<BlockLook> look_of_material(std::string_view name) {
+std::optional<BlockLook> look_of_material(std::string_view name, bool is_of_shape) {
   for (const std::string_view ending : {"", "s", "_planks", "_block"}) {
     const std::string full = std::string(name) + std::string(ending);
-    if (const Entry* const entry = find_entry(full)) return look_of(entry->rgb, entry->kind);
+    const Entry* const entry = find_entry(full);
+    // A shape is made of no plant: "bamboo_stairs" are of the wood of that name.
+    if (entry != nullptr && !(is_of_shape && is_no_material(entry->kind))) return look_of(entry->rgb, entry->kind);
     if (auto wood = look_of_wood(full)) return wood;
     if (auto dyed = look_of_dyed(full)) return dyed;
   }
@@ -663,10 +673,10 @@ BlockLook thinned(BlockLook look, bool is_thin) {
 }
 
 std::optional<BlockLook> look_in_table(std::string_view name) {
-  if (auto look = look_of_material(name)) return look;
+  if (auto look = look_of_material(name, false)) return look;
   for (const Shape& shape : kShapes) {
     if (!name.ends_with(shape.suffix) || name.size() == shape.suffix.size()) continue;
-    if (auto look = look_of_material(name.substr(0, name.size() - shape.suffix.size()))) {
+    if (auto look = look_of_material(name.substr(0, name.size() - shape.suffix.size()), true)) {
       return thinned(*look, shape.is_thin);
     }
   }
@@ -766,9 +776,9 @@ constexpr Entry kWords[] = {
     {"barrel", 0x86643A},
     {"bookshelf", 0x75603D},
     {"shelf", 0x8A6B40},
-    {"fence", 0xA2834F, K::Thin},
+    {"fence", 0xA2834F},
     {"door", 0xA2834F},
-    {"sign", 0xA2834F, K::Thin},
+    {"sign", 0xA2834F},
     {"ladder", 0x7C6036, K::Thin},
     {"button", 0x8A8A8A, K::Thin},
     {"plate", 0x8A8A8A, K::Thin},

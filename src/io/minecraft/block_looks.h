@@ -30,6 +30,7 @@ enum class Knowledge : std::uint8_t {
 struct BlockLook {
   Rgba8 colour;  ///< sRGB, alpha below 255 where it is transparent
   bool is_air = false;
+  bool is_invisible = false;  ///< air to the eye, and a block to the game: a barrier, a light
   bool collides = true;
   float emission = 0.0F;
   float roughness = 1.0F;

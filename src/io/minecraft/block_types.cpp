@@ -1,7 +1,11 @@
 #include "io/minecraft/block_types.h"
 
+#include <algorithm>
 #include <array>
+#include <charconv>
 #include <utility>
+
+#include <quoin/core/assert.h>
 
 namespace quoin::minecraft {
 
@@ -24,6 +28,20 @@ VoxelProperties properties_of(const BlockState& state, const BlockLook& look) {
   return type;
 }
 
+/// The light level that the property "level" says, 15 where it is absent.
+std::uint8_t level_of(const std::vector<Property>& properties) {
+  constexpr int kMaxLevel = 15;
+  const auto found = std::ranges::find(properties, "level", &Property::first);
+  if (found == properties.end()) return kMaxLevel;
+  int level = kMaxLevel;
+  std::from_chars(found->second.data(), found->second.data() + found->second.size(), level);
+  return static_cast<std::uint8_t>(std::clamp(level, 0, kMaxLevel));
+}
+
+bool is_light_block(std::string_view name) {
+  return name == "minecraft:light" || name == "light";
+}
+
 }  // namespace
 
 Result<Block> BlockTypes::block(std::string_view name, const std::vector<Property>& properties) {
@@ -33,10 +51,11 @@ Result<Block> BlockTypes::block(std::string_view name, const std::vector<Propert
     const std::shared_lock lock(mutex_);
     if (const auto known = blocks_.find(key); known != blocks_.end()) return known->second;
   }
-  return add(key, block_state(name, properties));
+  const std::uint8_t light = is_light_block(name) ? level_of(properties) : std::uint8_t{0};
+  return add(key, block_state(name, properties), light);
 }
 
-Result<Block> BlockTypes::add(const std::string& key, const BlockState& state) {
+Result<Block> BlockTypes::add(const std::string& key, const BlockState& state, std::uint8_t light) {
   const std::string_view name = std::string_view(state.name).substr(0, state.name.find('['));
   const BlockLook look = look_of_block(name, state.is_lit, state.is_snowy);
   Block block;
@@ -46,6 +65,11 @@ Result<Block> BlockTypes::add(const std::string& key, const BlockState& state) {
     const auto type = types_.find_or_add(properties_of(state, look));
     if (!type) return type.error();
     block.type = *type;
+  } else if (look.is_invisible) {
+    const auto known = std::ranges::find(invisible_, name);
+    block.invisible = static_cast<std::uint16_t>(known - invisible_.begin() + 1);
+    block.light = light;
+    if (known == invisible_.end()) invisible_.emplace_back(name);
   } else if (!look.is_air) {
     block.tint = look.tint;
     VoxelProperties type = properties_of(state, look);
@@ -73,6 +97,12 @@ Result<VoxelType> BlockTypes::tinted(const Block& block, const BiomeTints& tints
   auto added = types_.find_or_add(type);
   if (added) tinted_types_[key] = *added;
   return added;
+}
+
+std::string BlockTypes::invisible_name(std::uint16_t number) const {
+  const std::shared_lock lock(mutex_);
+  QUOIN_ASSERT(number > 0 && number <= invisible_.size(), "an invisible block");
+  return invisible_[number - 1U];
 }
 
 VoxelRegistry BlockTypes::types() const {

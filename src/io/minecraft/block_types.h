@@ -23,9 +23,12 @@ struct Block {
   VoxelType type = kAir;  ///< kAir too where it is tinted
   std::uint32_t state = 0;
   Tint tint = Tint::None;
-  std::uint32_t number = 0;  ///< of the block among those with a tint
+  std::uint32_t number = 0;     ///< of the block among those with a tint
+  std::uint16_t invisible = 0;  ///< not 0: it is read as air, and BlockTypes::invisible_name has its name
+  std::uint8_t light = 0;       ///< light level of an invisible block, 0 to 15
 
-  [[nodiscard]] bool is_air() const { return type == kAir && tint == Tint::None; }
+  /// Returns true if nothing is to be said of the block: air of any kind.
+  [[nodiscard]] bool is_air() const { return type == kAir && tint == Tint::None && invisible == 0; }
 };
 
 /// The types of the blocks that were met so far. Threads: any function from any thread, also at once.
@@ -36,12 +39,15 @@ class BlockTypes {
   /// The type of a block with a tint, in a biome. Errors: LimitExceeded.
   [[nodiscard]] Result<VoxelType> tinted(const Block& block, const BiomeTints& tints);
   [[nodiscard]] VoxelRegistry types() const;
+  /// The name of an invisible block: "minecraft:barrier". Requires: `number` is some Block::invisible, not 0.
+  [[nodiscard]] std::string invisible_name(std::uint16_t number) const;
 
  private:
-  [[nodiscard]] Result<Block> add(const std::string& key, const BlockState& state);
+  [[nodiscard]] Result<Block> add(const std::string& key, const BlockState& state, std::uint8_t light);
   mutable std::shared_mutex mutex_;
   VoxelRegistry types_;
   std::unordered_map<std::string, Block> blocks_;
+  std::vector<std::string> invisible_;                         // by Block::invisible - 1
   std::vector<VoxelProperties> tinted_;                        // by Block::number, before their tint
   std::unordered_map<std::uint64_t, VoxelType> tinted_types_;  // by number and colour
 };

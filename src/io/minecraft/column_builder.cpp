@@ -1,9 +1,20 @@
 #include "io/minecraft/column_builder.h"
 
 #include <algorithm>
+#include <iterator>
+#include <numbers>
 #include <tuple>
 
 namespace quoin::minecraft {
+
+namespace {
+
+bool is_unseen(const Section& section) {
+  return std::ranges::all_of(section.palette,
+                             [](const Block& block) { return block.type == kAir && block.tint == Tint::None; });
+}
+
+}  // namespace
 
 ColumnBuilder::Cell& ColumnBuilder::cell(IVec3 place) {
   const auto found = std::ranges::find(cells_, place, &Cell::place);
@@ -66,7 +77,41 @@ void ColumnBuilder::fill(const Section& section, Cell& cell, IVec3 first) const 
   }
 }
 
+// A lamp shines as a voxel of the same level and emission 1 does: a face of area 1 and radiance 1 lights a white
+// surface 1 unit away by 1 / pi.
+void ColumnBuilder::count_invisible(const Section& section, IVec3 corner) {
+  constexpr double kMaxLevel = 15.0;
+  for (std::size_t i = 0; i < kSectionBlocks; ++i) {
+    const Block& block = section.palette[section.indices[i]];
+    if (block.invisible == 0) continue;
+    if (invisible_.size() <= block.invisible) invisible_.resize(std::size_t{block.invisible} + 1);
+    ++invisible_[block.invisible];
+    if (block.light == 0) continue;
+    const auto at = static_cast<int>(i);
+    Lamp lamp;
+    lamp.name = types_.invisible_name(block.invisible);
+    lamp.position = DVec3(corner + IVec3(at & 15, at >> 8, at >> 4 & 15)) + 0.5;
+    lamp.intensity = block.light / kMaxLevel / std::numbers::pi;
+    lamp.range = block.light;
+    lamps_.push_back(std::move(lamp));
+  }
+}
+
+void ColumnBuilder::take_invisible(SourcePart& part) {
+  for (std::size_t number = 1; number < invisible_.size(); ++number) {
+    if (invisible_[number] == 0) continue;
+    part.invisible[types_.invisible_name(static_cast<std::uint16_t>(number))] += invisible_[number];
+  }
+  std::ranges::move(lamps_, std::back_inserter(part.lamps));
+  invisible_.clear();
+  lamps_.clear();
+}
+
 Status ColumnBuilder::put(const Section& section, IVec3 corner) {
+  if (std::ranges::any_of(section.palette, [](const Block& block) { return block.invisible != 0; })) {
+    count_invisible(section, corner);
+    if (is_unseen(section)) return {};
+  }
   if (auto found = find_types(section); !found) return found;
   fill(section, cell(chunk_of(corner)), local_of(corner));
   return {};

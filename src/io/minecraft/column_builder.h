@@ -18,8 +18,10 @@ class ColumnBuilder {
 
   /// Puts a section where its least corner is, which is a multiple of 16. Errors: LimitExceeded, of types.
   [[nodiscard]] Status put(const Section& section, IVec3 corner);
-  /// The chunks, by y, then z, then x; those that are all air are left out. The builder is empty then.
+  /// The chunks, by y, then z, then x; those that are all air are left out. The builder keeps invisible blocks alone.
   [[nodiscard]] std::vector<SourceChunk> take();
+  /// Moves the counts of invisible blocks so far, and a lamp for each that gives light, to `part`.
+  void take_invisible(SourcePart& part);
 
  private:
   struct Cell {
@@ -30,11 +32,14 @@ class ColumnBuilder {
   [[nodiscard]] Cell& cell(IVec3 place);
   [[nodiscard]] Status find_types(const Section& section);
   void fill(const Section& section, Cell& cell, IVec3 first) const;
+  void count_invisible(const Section& section, IVec3 corner);
 
   BlockTypes& types_;
   std::vector<Cell> cells_;
-  std::vector<Cell> spare_;          // whose memory is used again
-  std::vector<VoxelType> types_of_;  // [biome][index in the palette]
+  std::vector<Cell> spare_;               // whose memory is used again
+  std::vector<VoxelType> types_of_;       // [biome][index in the palette]
+  std::vector<std::uint64_t> invisible_;  // by Block::invisible
+  std::vector<Lamp> lamps_;
   bool has_states_ = false;
   bool has_tints_ = false;
 };

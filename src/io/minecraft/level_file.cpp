@@ -1,7 +1,7 @@
 #include "io/minecraft/level_file.h"
 
 #include "io/minecraft/nbt.h"
-#include "io/minecraft/region_file.h"
+#include "io/minecraft/region/region_file.h"
 
 namespace quoin::minecraft {
 
@@ -19,6 +19,7 @@ Result<LevelFile> parse_level_file(std::span<const std::byte> bytes) {
   const nbt::Value place = data["spawn"]["pos"];
   if (place.is_integers() && place.count() == 3) {
     level.spawn = DVec3(place.integer(0), place.integer(1), place.integer(2));
+    if (const auto name = data["spawn"]["dimension"].text()) level.spawn_dimension = *name;
   } else if (const auto x = data["SpawnX"].integer(), y = data["SpawnY"].integer(), z = data["SpawnZ"].integer();
              x && y && z) {
     level.spawn = DVec3(*x, *y, *z);

@@ -15,6 +15,7 @@ struct LevelFile {
   std::string name;
   std::string version;  ///< "1.18.2"; empty before 1.9
   std::optional<DVec3> spawn;
+  std::string spawn_dimension = "minecraft:overworld";
 };
 
 /// Errors: BadFormat, with the offset (in what it expands to, where it is compressed); LimitExceeded.

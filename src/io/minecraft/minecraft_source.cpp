@@ -16,7 +16,8 @@
 #include "io/minecraft/column_builder.h"
 #include "io/minecraft/level_file.h"
 #include "io/minecraft/nbt.h"
-#include "io/minecraft/region_file.h"
+#include "io/minecraft/region/dimensions.h"
+#include "io/minecraft/region/region_file.h"
 #include "io/minecraft/sections.h"
 
 namespace quoin::minecraft {
@@ -55,9 +56,7 @@ std::vector<Region> regions_in(const fs::path& folder, std::vector<Error>& broke
     }
     regions.push_back({.path = entry->path(), .name = *name});
   }
-  const auto place = [](const Region& r) {
-    return std::tuple(r.name.z, r.name.x, r.name.is_mcregion, r.path.string());
-  };
+  const auto place = [](const Region& r) { return std::tuple(r.name.z, r.name.x, r.name.kind, r.path.string()); };
   std::ranges::sort(regions, {}, place);
   // What the game turned into Anvil it leaves beside it.
   for (std::size_t i = 1; i < regions.size();) {
@@ -74,39 +73,6 @@ std::vector<Region> regions_in(const fs::path& folder, std::vector<Error>& broke
   return regions;
 }
 
-bool has_regions(const fs::path& folder) {
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    if (parse_region_name(entry->path())) return true;
-  }
-  return false;
-}
-
-/// Where the region files of a world lie, if it is one.
-std::optional<fs::path> region_folder(const fs::path& path) {
-  for (const fs::path& folder : {path / "region", path}) {
-    if (has_regions(folder)) return folder;
-  }
-  return std::nullopt;
-}
-
-/// level.dat of a world, or of the one that a dimension belongs to.
-std::optional<fs::path> level_file_of(const fs::path& path) {
-  std::error_code error;
-  const fs::path whole = fs::absolute(path, error).lexically_normal();
-  fs::path folder = whole.has_filename() ? whole : whole.parent_path();
-  constexpr int kMaxLevels = 5;  // WORLD/dimensions/NAMESPACE/NAME/region
-  for (int i = 0; i < kMaxLevels && folder.has_relative_path(); ++i, folder = folder.parent_path()) {
-    if (fs::is_regular_file(folder / "level.dat", error)) return folder / "level.dat";
-  }
-  return std::nullopt;
-}
-
-bool is_overworld(const fs::path& regions, const fs::path& level) {
-  std::error_code error;
-  return fs::equivalent(regions, level.parent_path() / "region", error);
-}
-
 /// Regions that are open, a few at a time.
 class OpenRegions {
  public:
@@ -116,6 +82,7 @@ class OpenRegions {
 
   Result<std::shared_ptr<const RegionFile>> open(std::size_t i) {
     constexpr std::size_t kMaxOpen = 16;
+    constexpr std::size_t kMaxExpanded = 3;
     if (regions_[i].file != nullptr) return regions_[i].file;
     const std::scoped_lock lock(mutex_);
     const auto known = std::ranges::find(open_, i, &Open::index);
@@ -126,7 +93,8 @@ class OpenRegions {
     auto file = RegionFile::open(regions_[i].path, regions_[i].name);
     if (!file) return file.error();
     open_.push_front({i, std::move(*file)});
-    if (open_.size() > kMaxOpen) open_.pop_back();
+    const std::size_t most = open_.front().file->is_expanded_whole() ? kMaxExpanded : kMaxOpen;
+    while (open_.size() > most) open_.pop_back();
     return open_.front().file;
   }
 
@@ -150,9 +118,9 @@ std::vector<IBox> columns_of(const RegionFile& file, RegionName name) {
         is_there |= file.has(cx * kChunksOfColumn + i % kChunksOfColumn, cz * kChunksOfColumn + i / kChunksOfColumn);
       }
       if (!is_there) continue;
-      const IVec3 place{name.x * kColumnsOfRegion + cx, name.is_mcregion ? 0 : kLowestChunk,
-                        name.z * kColumnsOfRegion + cz};
-      columns.push_back({place, {place.x + 1, name.is_mcregion ? 2 : kHighestChunk, place.z + 1}});
+      const bool is_old = name.kind == RegionKind::McRegion;
+      const IVec3 place{name.x * kColumnsOfRegion + cx, is_old ? 0 : kLowestChunk, name.z * kColumnsOfRegion + cz};
+      columns.push_back({place, {place.x + 1, is_old ? 2 : kHighestChunk, place.z + 1}});
     }
   }
   return columns;
@@ -189,6 +157,7 @@ class MinecraftSource final : public ChunkSource {
       if (auto read = read_chunk(**file, name, chunk, reader, builder, result.broken); !read) return read.error();
     }
     result.chunks = builder.take();
+    builder.take_invisible(result);
     return result;
   }
 
@@ -238,7 +207,7 @@ class MinecraftSource final : public ChunkSource {
   mutable BlockTypes types_;
 };
 
-void read_level(const fs::path& path, bool has_spawn, ChunkSourceInfo& info) {
+void read_level(const fs::path& path, ChunkSourceInfo& info) {
   const auto bytes = read_file_beginning(path, std::size_t{16} << 20);
   auto level = bytes ? parse_level_file(*bytes) : Result<LevelFile>(bytes.error());
   if (!level) {
@@ -248,29 +217,91 @@ void read_level(const fs::path& path, bool has_spawn, ChunkSourceInfo& info) {
   }
   info.name = level->name;
   info.version = level->version;
-  if (has_spawn) info.spawn = level->spawn;
+  if (level->spawn_dimension == info.dimension) info.spawn = level->spawn;
+}
+
+/// The dimension that was asked for, else the first.
+Result<Dimension> choose_dimension(const WorldFolder& world, std::string_view wanted, const fs::path& path) {
+  QUOIN_ASSERT(!world.dimensions.empty(), "a world with regions");
+  if (wanted.empty()) return world.dimensions.front();
+  const std::string name = dimension_name(wanted);
+  const auto found = std::ranges::find(world.dimensions, name, &Dimension::name);
+  if (found != world.dimensions.end()) return *found;
+  std::string names;
+  for (const Dimension& each : world.dimensions) {
+    names += (names.empty() ? "" : ", ") + (each.name.empty() ? std::string("one without a name") : each.name);
+  }
+  return make_error(ErrorCode::InvalidArgument, "cannot read the dimension " + name + ": the world has " + names,
+                    path.string());
+}
+
+/// Refuses regions of entities and of points of interest, which the game keeps apart from blocks.
+Status check_holds_blocks(const RegionFile& file) {
+  for (int i = 0; i < kRegionEdge * kRegionEdge; ++i) {
+    const int x = i % kRegionEdge;
+    const int z = i / kRegionEdge;
+    const auto bytes = file.has(x, z) ? file.read(x, z) : Result<std::vector<std::byte>>(Error{});
+    const auto document = bytes ? nbt::Document::parse(*bytes) : Result<nbt::Document>(Error{});
+    if (!document) continue;
+    const nbt::Value root = document->root();
+    const bool is_entities = root["Entities"] && root["Position"] && !root["sections"] && !root["Level"];
+    const bool is_points = root["Sections"].tag() == nbt::Tag::Compound;
+    if (!is_entities && !is_points) return {};
+    return make_error(ErrorCode::Unsupported,
+                      std::string("a region of ") + (is_entities ? "entities" : "points of interest") +
+                          ", not of blocks; those are in the folder \"region\" next to it: name that, or the world",
+                      file.path().string());
+  }
+  return {};
+}
+
+struct WorldRegions {
+  ChunkSourceInfo info;
+  std::vector<Region> regions;
+};
+
+Result<WorldRegions> find_regions(const fs::path& path, std::string_view dimension) {
+  WorldRegions found;
+  found.info.format = "minecraft";
+  std::error_code error;
+  if (const auto name = parse_region_name(path); name && fs::is_regular_file(path, error)) {
+    if (is_too_far(*name)) return make_error(ErrorCode::Unsupported, "lies too far out", path.string());
+    if (!dimension.empty()) {
+      return make_error(ErrorCode::InvalidArgument,
+                        "cannot choose a dimension of one region file; name the world's folder", path.string());
+    }
+    found.regions.push_back({.path = path, .name = *name});
+    return found;
+  }
+  const WorldFolder world = find_dimensions(path);
+  const bool is_renamed = fs::is_regular_file(path, error) && path.filename() != "level.dat" && dimension.empty();
+  if (is_renamed) {
+    found.regions.push_back({.path = path, .name = {}});
+    found.info.warnings.emplace_back("its name does not say where it lies (r.X.Z.mca): placed as r.0.0.mca");
+    return found;
+  }
+  if (world.dimensions.empty()) return no_regions(path);
+  const auto chosen = choose_dimension(world, dimension, path);
+  if (!chosen) return chosen.error();
+  found.info.dimension = chosen->name;
+  for (const Dimension& each : world.dimensions) found.info.dimensions.push_back(each.name);
+  found.info.warnings = world.warnings;
+  found.regions = regions_in(chosen->regions, found.info.broken);
+  if (world.level) read_level(*world.level, found.info);
+  return found;
 }
 
 }  // namespace
 
 bool is_minecraft_folder(const fs::path& path) {
-  return region_folder(path).has_value();
+  return !find_dimensions(path).dimensions.empty();
 }
 
-Result<std::unique_ptr<ChunkSource>> open_minecraft(const fs::path& path) {
-  ChunkSourceInfo info;
-  info.format = "minecraft";
-  std::vector<Region> regions;
-  std::error_code error;
-  if (const auto name = parse_region_name(path); name && fs::is_regular_file(path, error)) {
-    if (is_too_far(*name)) return make_error(ErrorCode::Unsupported, "lies too far out", path.string());
-    regions.push_back({.path = path, .name = *name});
-  } else if (const auto folder = region_folder(path)) {
-    regions = regions_in(*folder, info.broken);
-    if (const auto level = level_file_of(path)) read_level(*level, is_overworld(*folder, *level), info);
-  } else {
-    return make_error(ErrorCode::BadFormat, "there are no region files (r.X.Z.mca) in it", path.string());
-  }
+Result<std::unique_ptr<ChunkSource>> open_minecraft(const fs::path& path, std::string_view dimension) {
+  auto found = find_regions(path, dimension);
+  if (!found) return found.error();
+  ChunkSourceInfo& info = found->info;
+  std::vector<Region>& regions = found->regions;
   std::vector<IBox> parts;
   std::vector<std::uint32_t> region_of;
   for (std::size_t i = 0; i < regions.size(); ++i) {
@@ -280,7 +311,11 @@ Result<std::unique_ptr<ChunkSource>> open_minecraft(const fs::path& path) {
       info.broken.push_back(file.error());
       continue;
     }
-    for (const IBox& column : columns_of(**file, regions[i].name)) {
+    const std::vector<IBox> columns = columns_of(**file, regions[i].name);
+    if (parts.empty() && !columns.empty()) {
+      if (auto holds_blocks = check_holds_blocks(**file); !holds_blocks) return holds_blocks.error();
+    }
+    for (const IBox& column : columns) {
       info.chunks = unite(info.chunks, column);
       parts.push_back(column);
       region_of.push_back(static_cast<std::uint32_t>(i));
@@ -293,6 +328,7 @@ Result<std::unique_ptr<ChunkSource>> open_minecraft(const fs::path& path) {
 Result<std::unique_ptr<ChunkSource>> open_minecraft(std::span<const std::byte> region) {
   auto file = RegionFile::of(region);
   if (!file) return file.error();
+  if (auto holds_blocks = check_holds_blocks(**file); !holds_blocks) return holds_blocks.error();
   ChunkSourceInfo info;
   info.format = "minecraft";
   std::vector<IBox> parts = columns_of(**file, {});

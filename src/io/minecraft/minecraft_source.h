@@ -4,17 +4,22 @@
 #include <filesystem>
 #include <memory>
 #include <span>
+#include <string_view>
 
 #include <quoin/io/chunk_source.h>
 
 namespace quoin::minecraft {
 
-/// Whether a folder holds region files, or a folder "region" that does.
+/// Returns true if a folder is a world of Minecraft's (Java), one of its dimensions, or holds region files; also of the
+/// path of its level.dat.
 [[nodiscard]] bool is_minecraft_folder(const std::filesystem::path& path);
 
-/// A world of Minecraft's (Java): its folder, that of another dimension (DIM-1), a folder of region files, or one of
-/// these. Errors: CannotRead; BadFormat where there is no region that can be read.
-[[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_minecraft(const std::filesystem::path& path);
+/// Opens a world of Minecraft's (Java): its folder or level.dat, the folder of a dimension, a folder of region files,
+/// or a region file. `dimension`: "overworld", "nether", "end" or NAMESPACE:NAME; empty: the overworld, or the first.
+/// Errors: CannotRead; BadFormat where there is no region that can be read; Unsupported for regions of entities or
+/// points of interest; InvalidArgument for a dimension that is not there, naming those that are.
+[[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_minecraft(const std::filesystem::path& path,
+                                                                  std::string_view dimension = {});
 
 /// A region file's bytes, which are copied. Errors: BadFormat.
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_minecraft(std::span<const std::byte> region);

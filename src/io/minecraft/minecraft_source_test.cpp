@@ -11,7 +11,7 @@
 #include "io/minecraft/level_file.h"
 #include "io/minecraft/minecraft_for_tests.h"
 #include "io/minecraft/nbt.h"
-#include "io/minecraft/region_file.h"
+#include "io/minecraft/region/region_file.h"
 #include "io/minecraft/sections.h"
 
 namespace quoin {

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,10 +16,12 @@
 #include "io/minecraft/biomes.h"
 #include "io/minecraft/block_types.h"
 #include "io/minecraft/column_builder.h"
+#include "io/minecraft/large_nbt.h"
 #include "io/minecraft/legacy_blocks.h"
 #include "io/minecraft/nbt.h"
-#include "io/minecraft/region_file.h"
+#include "io/minecraft/region/region_file.h"
 #include "io/minecraft/sections.h"
+#include "io/text.h"
 
 namespace quoin::minecraft {
 
@@ -54,11 +57,51 @@ struct Region {
   /// Fills a layer: indices in the palette, by z, then x. Called for each layer once, from below. May be empty of a
   /// region of one block.
   std::function<Status(int y, std::span<std::uint16_t> layer)> read_layer;
+  /// The index that all blocks of the next layers have, which are read then; nothing where they differ, or where
+  /// nothing is known. May be empty.
+  std::function<std::optional<std::uint16_t>(int layers)> read_uniform{};
+};
+
+/// Numbers of seven bits a byte, the lowest first, that say more is to come by the eighth: of an array of the document,
+/// or of a long one apart from it.
+class VarintReader {
+ public:
+  VarintReader(std::span<const std::byte> bytes, const PagedBytes* pages)
+      : bytes_(bytes), pages_(pages), size_(pages != nullptr ? pages->size() : bytes.size()) {}
+
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  [[nodiscard]] std::optional<std::uint32_t> next() {
+    std::uint32_t value = 0;
+    for (int shift = 0; shift < 35 && at_ < size_; shift += 7) {
+      const auto byte = std::to_integer<std::uint32_t>(pages_ != nullptr ? (*pages_)[at_] : bytes_[at_]);
+      ++at_;
+      value |= (byte & 127U) << shift;
+      if (byte < 128U) return value;
+    }
+    return std::nullopt;
+  }
+  /// The number that the next `count` numbers are, past which it then is; nothing, and it stays, where they differ, or
+  /// it would take long to find out.
+  [[nodiscard]] std::optional<std::uint32_t> next_same(std::uint64_t count) {
+    if (pages_ == nullptr || count == 0 || count > size_ - at_) return std::nullopt;
+    const auto value = pages_->uniform(at_, at_ + count);
+    if (!value || std::to_integer<unsigned>(*value) > 127U) return std::nullopt;
+    at_ += count;
+    return std::to_integer<std::uint32_t>(*value);
+  }
+
+ private:
+  std::span<const std::byte> bytes_;
+  const PagedBytes* pages_;
+  std::uint64_t size_;
+  std::uint64_t at_ = 0;
 };
 
 class SchematicReader {
  public:
-  SchematicReader(nbt::Value root, const Progress& progress) : root_(root), progress_(progress) {}
+  /// `arrays`: long arrays that are not in the document, by where their elements would begin.
+  SchematicReader(nbt::Value root, const std::map<std::size_t, PagedBytes>& arrays, const Progress& progress)
+      : root_(root), arrays_(arrays), progress_(progress) {}
 
   Result<LoadedScene> read() {
     loaded_.format = "schematic";
@@ -80,17 +123,23 @@ class SchematicReader {
   void take_biomes(Region& region, nbt::Value palette, nbt::Value data, int layers);
   void take_numbered_biomes(Region& region, nbt::Value numbers);
   Status put(const Region& region);
+  void take_invisible(const Region& region);
   Status fill(const Region& region, int first_y, std::span<const std::uint16_t> layers);
   Result<IVec3> size_of(nbt::Value schematic) const;
   void note_left_out();
 
+  [[nodiscard]] VarintReader varints(nbt::Value array) const;
+  bool put_uniform(const Region& region, int first_y, int height, Grid& grid);
+
   nbt::Value root_;
+  const std::map<std::size_t, PagedBytes>& arrays_;
   const Progress& progress_;
   BlockTypes types_;
   LoadedScene loaded_;
   ColumnBuilder builder_{types_};
   std::size_t entities_ = 0;
   std::size_t block_entities_ = 0;
+  std::map<std::string, std::uint64_t> invisible_;
   bool has_lost_biomes_ = false;
 };
 
@@ -145,25 +194,6 @@ Result<IVec3> SchematicReader::size_of(nbt::Value schematic) const {
   return size;
 }
 
-/// Numbers of seven bits a byte, the lowest first, that say more is to come by the eighth.
-class VarintReader {
- public:
-  explicit VarintReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
-  [[nodiscard]] std::optional<std::uint32_t> next() {
-    std::uint32_t value = 0;
-    for (int shift = 0; shift < 35 && at_ < bytes_.size(); shift += 7) {
-      const auto byte = std::to_integer<std::uint32_t>(bytes_[at_++]);
-      value |= (byte & 127U) << shift;
-      if (byte < 128U) return value;
-    }
-    return std::nullopt;
-  }
-
- private:
-  std::span<const std::byte> bytes_;
-  std::size_t at_ = 0;
-};
-
 // A compound of blocks as texts, with their indices.
 Result<std::vector<Block>> palette_of_texts(nbt::Value palette, BlockTypes& types) {
   std::vector<Block> blocks;
@@ -215,12 +245,11 @@ Status SchematicReader::read_sponge(nbt::Value schematic) {
   } else if (const nbt::Value third = schematic["Biomes"]) {
     take_biomes(region, third["Palette"], third["Data"], region.size.y);
   }
-  if (data.bytes().size() < volume_of(*size)) {
-    return fault(
-        "a schematic of " + text_of(*size) + " with " + std::to_string(data.bytes().size()) + " bytes of blocks",
-        schematic);
+  VarintReader indices = varints(data);
+  if (indices.size() < volume_of(*size)) {
+    return fault("a schematic of " + text_of(*size) + " with " + std::to_string(indices.size()) + " bytes of blocks",
+                 schematic);
   }
-  VarintReader indices(data.bytes());
   region.read_layer = [&indices, data, kinds = region.palette.size()](int y, std::span<std::uint16_t> layer) -> Status {
     for (std::uint16_t& index : layer) {
       const auto next = indices.next();
@@ -230,7 +259,20 @@ Status SchematicReader::read_sponge(nbt::Value schematic) {
     }
     return {};
   };
+  const std::uint64_t area = volume_of({size->x, 1, size->z});
+  region.read_uniform = [&indices, area, kinds = region.palette.size()](int layers) -> std::optional<std::uint16_t> {
+    VarintReader ahead = indices;
+    const auto index = ahead.next_same(area * static_cast<std::uint64_t>(layers));
+    if (!index || *index >= kinds) return std::nullopt;
+    indices = ahead;
+    return static_cast<std::uint16_t>(*index);
+  };
   return put(region);
+}
+
+VarintReader SchematicReader::varints(nbt::Value array) const {
+  const auto found = arrays_.find(array.offset());
+  return {array.bytes(), found != arrays_.end() ? &found->second : nullptr};
 }
 
 // Indices of a palette of names: of columns, or of all blocks, of which each column's lowest of 16 is taken.
@@ -245,8 +287,13 @@ void SchematicReader::take_biomes(Region& region, nbt::Value palette, nbt::Value
     of_palette[at] = index_of_tints(biomes.tints, tints_of_biome(entry.name()));
   });
   const auto area = static_cast<std::size_t>(region.size.x) * static_cast<std::size_t>(region.size.z);
-  VarintReader indices(data.bytes());
+  VarintReader indices = varints(data);
   for (int y = 0; y < layers; ++y) {
+    const bool is_taken = y % kSectionEdge == 0;
+    if (const auto same = indices.next_same(area); same && *same < of_palette.size()) {
+      if (is_taken) biomes.of_columns.insert(biomes.of_columns.end(), area, of_palette[*same]);
+      continue;
+    }
     for (std::size_t i = 0; i < area; ++i) {
       const auto next = indices.next();
       if (!next || *next >= of_palette.size()) {
@@ -254,7 +301,7 @@ void SchematicReader::take_biomes(Region& region, nbt::Value palette, nbt::Value
         biomes = {};
         return;
       }
-      if (y % kSectionEdge == 0) biomes.of_columns.push_back(of_palette[*next]);
+      if (is_taken) biomes.of_columns.push_back(of_palette[*next]);
     }
   }
 }
@@ -350,6 +397,13 @@ Status SchematicReader::read_litematic_region(nbt::Value from) {
   block_entities_ += from["TileEntities"].count();
   entities_ += from["Entities"].count();
   const nbt::Value states = from["BlockStates"];
+  if (kinds == 1 && states.count() == 0) {
+    region.read_layer = [](int, std::span<std::uint16_t> layer) -> Status {
+      std::ranges::fill(layer, std::uint16_t{0});
+      return {};
+    };
+    return put(region);
+  }
   const int bits = bits_of_palette(kinds, 2);
   if (states.count() < (volume_of(region.size) * static_cast<std::uint64_t>(bits) + 63) / 64) {
     return fault("indices of " + text_of(region.size) + " blocks in " + std::to_string(states.count()) + " longs",
@@ -477,12 +531,42 @@ Status SchematicReader::fill(const Region& region, int first_y, std::span<const 
   return {};
 }
 
+void SchematicReader::take_invisible(const Region& region) {
+  SourcePart part;
+  builder_.take_invisible(part);
+  for (const auto& [name, count] : part.invisible) invisible_[name] += count;
+  for (Lamp& lamp : part.lamps) {
+    lamp.position += DVec3(region.min);
+    loaded_.scene.lamps.push_back(std::move(lamp));
+  }
+}
+
+// Puts layers of one block, up to the next border of chunks, without looking at each. Returns false and reads nothing
+// where a block has more than its type, or where blocks differ.
+bool SchematicReader::put_uniform(const Region& region, int first_y, int height, Grid& grid) {
+  const auto is_plain = [](const Block& b) { return b.state == 0 && b.tint == Tint::None && b.invisible == 0; };
+  if (!region.read_uniform || !std::ranges::all_of(region.palette, is_plain)) return false;
+  const auto index = region.read_uniform(height);
+  if (!index) return false;
+  const VoxelType type = region.palette[*index].type;
+  if (type == kAir) return true;
+  grid.fill_box({{0, first_y, 0}, {region.size.x, first_y + height, region.size.z}}, type);
+  return true;
+}
+
 Status SchematicReader::put(const Region& region) {
   SceneGrid grid;
   grid.name = region.name;
   const auto area = static_cast<std::size_t>(region.size.x) * static_cast<std::size_t>(region.size.z);
   std::vector<std::uint16_t> layers;
+  const auto cancelled = [&](int done) { return progress_ && !progress_(static_cast<double>(done) / region.size.y); };
   for (int y = 0; y < region.size.y; y += kSectionEdge) {
+    const int rest = std::min(kChunkEdge, region.size.y - y);
+    if (y % kChunkEdge == 0 && put_uniform(region, y, rest, grid.grid)) {
+      if (cancelled(y + rest)) return make_error(ErrorCode::Cancelled, "cancelled");
+      y += rest - kSectionEdge;
+      continue;
+    }
     const int height = std::min(kSectionEdge, region.size.y - y);
     layers.resize(area * static_cast<std::size_t>(height));
     for (int dy = 0; dy < height; ++dy) {
@@ -493,10 +577,9 @@ Status SchematicReader::put(const Region& region) {
     const bool is_chunk_done = (y + height) % kChunkEdge == 0 || y + height == region.size.y;
     if (!is_chunk_done) continue;
     for (SourceChunk& chunk : builder_.take()) grid.grid.put_chunk(chunk.place, std::move(chunk.voxels));
-    if (progress_ && !progress_(static_cast<double>(y + height) / region.size.y)) {
-      return make_error(ErrorCode::Cancelled, "cancelled");
-    }
+    if (cancelled(y + height)) return make_error(ErrorCode::Cancelled, "cancelled");
   }
+  take_invisible(region);
   grid.canvas = {IVec3(0), region.size};
   Instance instance;
   instance.name = region.name;
@@ -512,6 +595,7 @@ void SchematicReader::note_left_out() {
   };
   note(block_entities_, "blocks' contents (chests, signs and the like)");
   note(entities_, "entities");
+  if (!invisible_.empty()) loaded_.warnings.push_back(text_of_invisible(invisible_));
   if (has_lost_biomes_) {
     loaded_.warnings.emplace_back("left out: biomes that are cut or not in their palette; what they colour is plains'");
   }
@@ -526,10 +610,25 @@ Status SchematicReader::read_any() {
   std::string keys;
   root_.for_each([&](nbt::Value value) {
     constexpr std::size_t kEnough = 80;
-    if (keys.size() < kEnough) keys.append(keys.empty() ? "" : ", ").append(value.name());
+    if (keys.size() < kEnough) keys.append(keys.empty() ? "" : ", ").append(printable(value.name()));
   });
   return make_error(ErrorCode::Unsupported,
                     "a file of NBT that is no schematic: it has " + (keys.empty() ? std::string("nothing") : keys));
+}
+
+// NBT with the least significant byte first: a compound without a name, whose first value has a name of printable
+// characters that way round.
+bool is_bedrock_structure(std::span<const std::byte> bytes) {
+  constexpr std::size_t kNameAt = 6;
+  const auto at = [&](std::size_t i) { return std::to_integer<unsigned>(bytes[i]); };
+  if (bytes.size() < kNameAt || at(0) != static_cast<unsigned>(nbt::Tag::Compound) || at(1) != 0 || at(2) != 0)
+    return false;
+  const std::size_t length = at(4) | at(5) << 8;
+  if (at(5) != 0 || length == 0 || bytes.size() < kNameAt + length) return false;
+  return std::ranges::all_of(bytes.subspan(kNameAt, length), [](std::byte b) {
+    const auto c = std::to_integer<unsigned>(b);
+    return c >= 0x20 && c < 0x7F;
+  });
 }
 
 }  // namespace
@@ -557,11 +656,25 @@ bool begins_nbt(std::span<const std::byte> beginning) {
 }
 
 Result<LoadedScene> read_schematic(std::span<const std::byte> bytes, const Progress& progress) {
-  const auto expanded = decompress_file(bytes, kMaxBytes);
-  if (!expanded) return expanded.error();
-  const auto document = nbt::Document::parse(*expanded, {.depth = 512, .nodes = std::size_t{1} << 24});
+  if (is_bedrock_structure(bytes)) {
+    return make_error(
+        ErrorCode::Unsupported,
+        "a structure of Minecraft's Bedrock edition (.mcstructure), which Quoin does not read; load it in "
+        "the game or an editor of worlds, and save it as a structure or schematic of the Java edition");
+  }
+  LargeNbt content;
+  if (begins_gzip(bytes)) {
+    auto large = read_large_nbt(bytes, kMaxBytes);
+    if (!large) return large.error();
+    content = std::move(*large);
+  } else {
+    auto expanded = decompress_file(bytes, kMaxBytes);
+    if (!expanded) return expanded.error();
+    content.bytes = std::move(*expanded);
+  }
+  const auto document = nbt::Document::parse(content.bytes, {.depth = 512, .nodes = std::size_t{1} << 24});
   if (!document) return document.error();
-  return SchematicReader(document->root(), progress).read();
+  return SchematicReader(document->root(), content.arrays, progress).read();
 }
 
 }  // namespace quoin::minecraft

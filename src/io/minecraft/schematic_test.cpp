@@ -7,6 +7,7 @@
 
 #include "io/byte_stream.h"
 #include "io/minecraft/block_states.h"
+#include "io/minecraft/large_nbt.h"
 #include "io/minecraft/minecraft_for_tests.h"
 
 namespace quoin::minecraft {
@@ -258,6 +259,89 @@ TEST(Schematic, RealOnesHaveTheirCounts) {
     const SceneGrid& grid = loaded->scene.grids()[loaded->scene.grids().handles().front()];
     EXPECT_EQ(grid.canvas.size(), known.size) << known.file;
   }
+}
+
+// A large schematic of layers of one block, except for 40 blocks in the middle.
+std::vector<std::byte> large_sponge(int version, bool has_states) {
+  constexpr IVec3 kSize(100, 230, 90);
+  std::vector<std::uint8_t> data(static_cast<std::size_t>(kSize.x) * kSize.y * kSize.z, 1);
+  const std::size_t layer = static_cast<std::size_t>(kSize.x) * kSize.z;
+  std::fill_n(data.begin(), 64 * layer, std::uint8_t{0});
+  for (std::size_t i = 0; i < 40; ++i) data[(140 + i) * layer + 37 * i] = static_cast<std::uint8_t>(i % 3);
+  NbtWriter nbt;
+  nbt.compound(version == 3 ? "" : "Schematic");
+  if (version == 3) nbt.compound("Schematic");
+  nbt.integer("Version", version);
+  put_sizes(nbt, kSize);
+  if (version == 3) nbt.compound("Blocks");
+  nbt.compound("Palette").integer("minecraft:air", 0).integer("minecraft:stone", 1);
+  nbt.integer(has_states ? "minecraft:oak_stairs[facing=west]" : "minecraft:dirt", 2).end();
+  nbt.byte_array(version == 3 ? "Data" : "BlockData", data);
+  if (version == 3) nbt.end().end();
+  return nbt.end().bytes;
+}
+
+TEST(Schematic, LongArraysAreReadInPages) {
+  for (const int version : {2, 3}) {
+    for (const bool has_states : {false, true}) {
+      const std::vector<std::byte> plain = large_sponge(version, has_states);
+      const auto expected = load_scene(plain);
+      const auto loaded = load_scene(gzipped(plain, 1));
+      ASSERT_TRUE(expected && loaded);
+      const Grid& a = expected->scene.grids()[expected->scene.grids().handles()[0]].grid;
+      const Grid& b = loaded->scene.grids()[loaded->scene.grids().handles()[0]].grid;
+      ASSERT_EQ(a.voxel_count(), b.voxel_count());
+      EXPECT_EQ(a.data_count(), b.data_count());
+      EXPECT_EQ(a.bounds().min, b.bounds().min);
+      EXPECT_EQ(a.bounds().max, b.bounds().max);
+      for (int i = 0; i < 40; ++i) {
+        const IVec3 at(37 * i % 100, 140 + i, 37 * i / 100);
+        EXPECT_EQ(expected->scene.types[a.get(at)].name, loaded->scene.types[b.get(at)].name);
+        EXPECT_EQ(a.data(at).state, b.data(at).state);
+      }
+    }
+  }
+}
+
+TEST(Schematic, LongArraysThatAreCutOffAreErrors) {
+  const std::vector<std::byte> plain = large_sponge(2, false);
+  for (const std::size_t size : {plain.size() - 1, plain.size() - 1'000'000, plain.size() / 2}) {
+    EXPECT_FALSE(load_scene(gzipped(std::span(plain).first(size), 1))) << size;
+  }
+  std::vector<std::byte> packed = gzipped(plain, 1);
+  packed.resize(packed.size() / 2);
+  EXPECT_FALSE(load_scene(packed));
+}
+
+TEST(PagedBytes, HoldWhatWasAppended) {
+  PagedBytes pages;
+  std::vector<std::byte> bytes(3 * PagedBytes::kPageBytes + 100, std::byte{7});
+  bytes[PagedBytes::kPageBytes + 5] = std::byte{8};
+  pages.append(bytes);
+  ASSERT_EQ(pages.size(), bytes.size());
+  for (std::size_t i = 0; i < bytes.size(); ++i) ASSERT_EQ(pages[i], bytes[i]) << i;
+  EXPECT_EQ(pages.uniform(0, PagedBytes::kPageBytes + 5), std::byte{7});
+  EXPECT_EQ(pages.uniform(0, PagedBytes::kPageBytes + 6), std::nullopt);
+  EXPECT_EQ(pages.uniform(PagedBytes::kPageBytes + 5, PagedBytes::kPageBytes + 6), std::byte{8});
+  EXPECT_EQ(pages.uniform(PagedBytes::kPageBytes + 6, bytes.size()), std::byte{7});
+}
+
+TEST(Schematic, OfTheBedrockEditionIsNamed) {
+  // The least significant byte first: {"format_version": 1}.
+  std::vector<std::byte> bytes = {std::byte{10}, std::byte{0}, std::byte{0}, std::byte{3}, std::byte{14}, std::byte{0}};
+  for (const char c : std::string("format_version")) bytes.push_back(static_cast<std::byte>(c));
+  for (const int b : {1, 0, 0, 0, 0}) bytes.push_back(static_cast<std::byte>(b));
+  const auto loaded = load_scene(bytes);
+  ASSERT_FALSE(loaded);
+  EXPECT_NE(loaded.error().message.find("Bedrock edition (.mcstructure)"), std::string::npos);
+}
+
+TEST(Schematic, OfNoKindIsNamedByWhatItHasInPrint) {
+  NbtWriter nbt;
+  nbt.compound("").integer("a\n\x01", 1).end();
+  const auto loaded = load_scene(nbt.bytes);
+  ASSERT_FALSE(loaded);
+  for (const char c : loaded.error().message) EXPECT_GE(c, ' ');
 }
 
 }  // namespace

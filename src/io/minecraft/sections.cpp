@@ -205,9 +205,12 @@ Status SectionReader::read_section(nbt::Value section, nbt::Value level) {
     if (auto read = read_block_palette(palette, types_, section_.palette); !read) return read;
     const std::size_t size = section_.palette.size();
     if (size == 0 || size > kSectionBlocks) return fault("a palette of " + std::to_string(size) + " blocks", palette);
-    if (data) {
+    // Some servers write the array of a section of one block, without longs.
+    if (data && (size > 1 || data.count() > 0)) {
       if (is_air()) return {};
-      if (!unpack_indices(data, bits_of_palette(size, 4), section_.indices)) {
+      // The game takes 4 bits at least, some servers no more than the palette needs.
+      if (!unpack_indices(data, bits_of_palette(size, 4), section_.indices) &&
+          !unpack_indices(data, bits_of_palette(size, 1), section_.indices)) {
         return fault("indices of " + std::to_string(size) + " blocks in " + std::to_string(data.count()) + " longs",
                      data);
       }

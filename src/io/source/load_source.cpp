@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <atomic>
+#include <map>
 #include <mutex>
 #include <utility>
 
+#include <quoin/core/thousands.h>
 #include <quoin/io/chunk_source.h>
 
 namespace quoin {
@@ -14,6 +16,28 @@ constexpr std::size_t kMaxLines = 20;
 
 bool meet(const IBox& a, const IBox& b) {
   return !intersect(a, b).empty();
+}
+
+std::string text_of(const IBox& chunks) {
+  const IVec3 middle = (chunks.min + (chunks.size() - 1) / 2) * kChunkEdge;
+  return std::to_string(middle.x) + ", " + std::to_string(middle.z);
+}
+
+bool is_over(const IBox& chunks, IVec3 chunk) {
+  return chunk.x >= chunks.min.x && chunk.x < chunks.max.x && chunk.z >= chunks.min.z && chunk.z < chunks.max.z;
+}
+
+void warn_of_outside(const ChunkSource& source, const IBox& chunks, std::size_t read,
+                     std::vector<std::string>& warnings) {
+  const std::size_t all = source.parts().size();
+  if (read == all) return;
+  const auto& spawn = source.info().spawn;
+  const bool is_at_spawn = !spawn || is_over(chunks, chunk_of(voxel_of(*spawn)));
+  const std::string where =
+      is_at_spawn ? "only the surroundings of its spawn are read: "
+                  : "there are no chunks around its spawn; only those around (" + text_of(chunks) + ") are read: ";
+  warnings.push_back(where + std::to_string(read) + " of " + std::to_string(all) +
+                     " parts of the world (converted to .quoin it is all there)");
 }
 
 void add_lines(const std::vector<Error>& broken, std::vector<std::string>& warnings) {
@@ -54,6 +78,14 @@ struct Reading {
 
 }  // namespace
 
+std::string text_of_invisible(const std::map<std::string, std::uint64_t>& invisible) {
+  std::string names;
+  for (const auto& [name, count] : invisible) {
+    names += (names.empty() ? "" : ", ") + with_thousands(static_cast<std::int64_t>(count)) + " " + name;
+  }
+  return names.empty() ? names : "left out, since they cannot be seen: " + names;
+}
+
 Result<LoadedScene> load_source(const ChunkSource& source, const IBox& chunks, Threads threads,
                                 const Progress& progress) {
   Reading reading{source};
@@ -70,6 +102,7 @@ Result<LoadedScene> load_source(const ChunkSource& source, const IBox& chunks, T
   SceneGrid grid;
   grid.name = source.info().name;
   std::vector<Error> broken = source.info().broken;
+  std::map<std::string, std::uint64_t> invisible;
   for (SourcePart& part : reading.read) {
     for (SourceChunk& chunk : part.chunks) {
       if (!chunks.contains(chunk.place)) continue;
@@ -77,14 +110,20 @@ Result<LoadedScene> load_source(const ChunkSource& source, const IBox& chunks, T
       grid.grid.put_chunk(chunk.place, std::move(chunk.voxels));
     }
     std::ranges::move(part.broken, std::back_inserter(broken));
+    for (const auto& [name, count] : part.invisible) invisible[name] += count;
+    for (Lamp& lamp : part.lamps) {
+      if (!chunks.contains(chunk_of(voxel_of(lamp.position)))) continue;
+      lamp.position *= source.info().spacing;
+      lamp.range *= source.info().spacing;
+      loaded.scene.lamps.push_back(std::move(lamp));
+    }
   }
+  loaded.warnings = source.info().warnings;
   add_lines(broken, loaded.warnings);
-  const std::size_t outside = source.parts().size() - reading.wanted.size();
-  if (outside > 0) {
-    loaded.warnings.push_back("only what lies around its spawn: " + std::to_string(reading.wanted.size()) + " of " +
-                              std::to_string(source.parts().size()) +
-                              " parts of the world (converted to .quoin it is all there)");
-  }
+  if (!invisible.empty()) loaded.warnings.push_back(text_of_invisible(invisible));
+  warn_of_outside(source, chunks, reading.wanted.size(), loaded.warnings);
+  loaded.dimension = source.info().dimension;
+  loaded.dimensions = source.info().dimensions;
   const GridHandle handle = loaded.scene.add_grid(std::move(grid));
   Instance instance;
   instance.name = source.info().name;
@@ -96,10 +135,22 @@ Result<LoadedScene> load_source(const ChunkSource& source, const IBox& chunks, T
 
 IBox chunks_around_spawn(const ChunkSource& source, int radius) {
   const IBox& all = source.info().chunks;
+  const auto around = [&](IVec3 middle) {
+    return intersect(all, {{middle.x - radius, all.min.y, middle.z - radius},
+                           {middle.x + radius + 1, all.max.y, middle.z + radius + 1}});
+  };
   IVec3 middle = all.min + all.size() / 2;
   if (source.info().spawn) middle = chunk_of(voxel_of(*source.info().spawn));
-  return intersect(all, {{middle.x - radius, all.min.y, middle.z - radius},
-                         {middle.x + radius + 1, all.max.y, middle.z + radius + 1}});
+  const std::span<const IBox> parts = source.parts();
+  const IBox wanted = around(middle);
+  const bool has_parts = std::ranges::any_of(parts, [&](const IBox& part) { return meet(part, wanted); });
+  if (has_parts || parts.empty()) return wanted;
+  const auto distance = [middle](const IBox& part) {
+    const std::int64_t x = std::int64_t{part.min.x} - middle.x;
+    const std::int64_t z = std::int64_t{part.min.z} - middle.z;
+    return x * x + z * z;
+  };
+  return around(std::ranges::min_element(parts, {}, distance)->min);
 }
 
 }  // namespace quoin

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <deque>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -16,6 +17,8 @@
 #include "io/models/luanti_nodes.h"
 #include "io/whole_file.h"
 #include "store/scene/put_world.h"
+#include "store/world/part_text.h"
+#include "store/world/world_changes.h"
 
 namespace quoin {
 
@@ -50,6 +53,8 @@ struct Done {
   std::uint64_t voxels = 0;
   std::uint64_t broken_count = 0;
   std::vector<std::string> broken;
+  std::uint64_t lamps = 0;
+  std::map<std::string, std::uint64_t> invisible;
 
   void add_broken(const Error& error) {
     if (broken_count++ < kMaxLines) broken.push_back(to_string(error));
@@ -58,7 +63,8 @@ struct Done {
 
 std::vector<std::byte> bytes_of(const Done& done, const std::string& identity) {
   const Json json = {{"source", identity},    {"parts", done.parts},         {"chunks", done.chunks},
-                     {"voxels", done.voxels}, {"broken", done.broken_count}, {"lines", done.broken}};
+                     {"voxels", done.voxels}, {"broken", done.broken_count}, {"lines", done.broken},
+                     {"lamps", done.lamps},   {"invisible", done.invisible}};
   const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
   const auto* const begin = reinterpret_cast<const std::byte*>(text.data());
   return {begin, begin + text.size()};
@@ -83,6 +89,10 @@ Result<Done> parse_done(std::span<const std::byte> bytes, const std::string& ide
   done.broken_count = number("broken");
   for (const Json& line : json.value("lines", Json::array())) {
     if (line.is_string()) done.broken.push_back(line.get<std::string>());
+  }
+  done.lamps = number("lamps");
+  for (const auto& [name, count] : json.value("invisible", Json::object()).items()) {
+    if (count.is_number_unsigned()) done.invisible[name] = count.get<std::uint64_t>();
   }
   return done;
 }
@@ -114,6 +124,7 @@ class Import {
     result.voxels = done_.voxels;
     result.resumed_parts = resumed_;
     result.broken = std::move(done_.broken);
+    result.invisible = std::move(done_.invisible);
     if (done_.broken_count > kMaxLines) {
       result.broken.push_back("and " + std::to_string(done_.broken_count - kMaxLines) + " more");
     }
@@ -205,11 +216,21 @@ class Import {
         changes.put_chunk({grid_, 0, chunk.place}, std::move(stored));
       }
       for (const Error& error : (*part)->broken) done_.add_broken(error);
+      take_invisible(**part, changes);
       ++done_.parts;
     }
     if (types_.size() > known_types) changes.put_types(types_, static_cast<VoxelType>(known_types));
     changes.put_value(kProgressValue, bytes_of(done_, identity_));
     return save(std::move(changes));
+  }
+
+  void take_invisible(SourcePart& part, WorldChanges& changes) {
+    for (const auto& [name, count] : part.invisible) done_.invisible[name] += count;
+    for (Lamp& lamp : part.lamps) {
+      lamp.position *= source_.info().spacing;
+      lamp.range *= source_.info().spacing;
+      WorldParts::put(changes, part::kLamp, static_cast<std::int64_t>(done_.lamps++), text_of(lamp));
+    }
   }
 
   Status save(WorldChanges changes) {

@@ -11,7 +11,10 @@
 
 #include <quoin/core/result.h>
 
-// Files of 32 x 32 chunks: Anvil (.mca) and McRegion (.mcr), https://minecraft.wiki/w/Region_file_format.
+#include "io/minecraft/region/linear_region.h"
+
+// Files of 32 x 32 chunks: Anvil (.mca) and McRegion (.mcr), https://minecraft.wiki/w/Region_file_format, and Linear
+// (.linear), see linear_region.h.
 //
 //   1,024 x (uint24 first sector, uint8 sectors), by z, then x; 1,024 x uint32 times; sectors of 4,096 bytes
 //   a chunk: uint32 bytes that follow; uint8 compression (| 128: in c.X.Z.mcc beside it); the compressed NBT
@@ -31,16 +34,19 @@ enum class ChunkCompression : std::uint8_t { Gzip = 1, Zlib = 2, None = 3, Lz4 =
 /// A file of NBT, as it is or within gzip or zlib, by how it begins. Errors: as `decompress`.
 [[nodiscard]] Result<std::vector<std::byte>> decompress_file(std::span<const std::byte> bytes, std::size_t max_bytes);
 
+enum class RegionKind : std::uint8_t { Anvil, Linear, McRegion };
+
 /// Where a region's name says that it lies: (x, z) of "r.X.Z.mca", whatever stands before it.
 struct RegionName {
   int x = 0;
   int z = 0;
-  bool is_mcregion = false;
+  RegionKind kind = RegionKind::Anvil;
 };
 [[nodiscard]] std::optional<RegionName> parse_region_name(const std::filesystem::path& path);
 
-/// Whether a file that begins so may be one: its table names sectors that there can be, and the first one of those that
-/// are among the bytes holds a chunk. Of a file without chunks nobody can tell.
+/// Returns true if a file that begins with these bytes is a region: a Linear file, or a table whose entries mostly name
+/// sectors that can exist, with chunks in most of the sectors that lie within the bytes. A few damaged entries do not
+/// matter. Returns false for a region without chunks.
 [[nodiscard]] bool is_region_file(std::span<const std::byte> beginning);
 
 /// A region that is open for reading. Threads: any number at once.
@@ -54,21 +60,25 @@ class RegionFile {
   RegionFile& operator=(const RegionFile&) = delete;
   ~RegionFile();
 
-  /// Whether a chunk is there. Requires: 0 <= x, z < 32.
-  [[nodiscard]] bool has(int x, int z) const { return entry(x, z) != 0; }
+  /// Returns true if a chunk is there. Requires: 0 <= x, z < 32.
+  [[nodiscard]] bool has(int x, int z) const { return linear_ ? linear_->has(index_of(x, z)) : entry(x, z) != 0; }
   /// The NBT of a chunk, decompressed. Requires: has(x, z).
   /// Errors: BadFormat, Unsupported, LimitExceeded, CannotRead; with the file, and the offset in it.
   [[nodiscard]] Result<std::vector<std::byte>> read(int x, int z) const;
-  /// Where a chunk begins in the file.
-  [[nodiscard]] std::uint64_t offset(int x, int z) const { return std::uint64_t{entry(x, z) >> 8} * 4096; }
+  /// The offset of a chunk in the file; in a Linear file that of all compressed data.
+  [[nodiscard]] std::uint64_t offset(int x, int z) const {
+    return linear_ ? LinearRegion::kDataOffset : std::uint64_t{entry(x, z) >> 8} * 4096;
+  }
+  /// Returns true if all chunks of the file are held in memory once one is read.
+  [[nodiscard]] bool is_expanded_whole() const { return linear_ != nullptr; }
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:
   RegionFile(std::filesystem::path path, RegionName name, int descriptor);
   [[nodiscard]] Status read_table();
-  [[nodiscard]] std::uint32_t entry(int x, int z) const {
-    return table_[static_cast<std::size_t>(z * kRegionEdge + x)];
-  }
+  [[nodiscard]] Status read_linear();
+  static std::size_t index_of(int x, int z) { return static_cast<std::size_t>(z * kRegionEdge + x); }
+  [[nodiscard]] std::uint32_t entry(int x, int z) const { return table_[index_of(x, z)]; }
   [[nodiscard]] Result<std::vector<std::byte>> read_sectors(int x, int z, std::uint8_t& compression) const;
   [[nodiscard]] Result<std::vector<std::byte>> read_external(int x, int z) const;
   [[nodiscard]] Result<std::size_t> read_at(std::uint64_t offset, std::span<std::byte> out) const;
@@ -80,6 +90,7 @@ class RegionFile {
   std::vector<std::byte> bytes_;  // of a file that has no name
   std::uint64_t size_ = 0;
   std::array<std::uint32_t, kRegionEdge * kRegionEdge> table_{};
+  std::unique_ptr<const LinearRegion> linear_;
 };
 
 }  // namespace quoin::minecraft

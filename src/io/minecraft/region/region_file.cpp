@@ -1,4 +1,4 @@
-#include "io/minecraft/region_file.h"
+#include "io/minecraft/region/region_file.h"
 
 #include <sys/stat.h>
 #include <unistd.h>
@@ -15,7 +15,7 @@
 #include "io/byte_order.h"
 #include "io/byte_stream.h"
 #include "io/held_files.h"
-#include "io/minecraft/lz4_blocks.h"
+#include "io/minecraft/region/lz4_blocks.h"
 
 namespace quoin::minecraft {
 
@@ -94,14 +94,18 @@ std::optional<RegionName> parse_region_name(const std::filesystem::path& path) {
   const std::string name = path.filename().string();
   std::string_view text = name;
   const auto extension = take_last(text);
-  if (!extension || (*extension != "mca" && *extension != "mcr")) return std::nullopt;
+  if (!extension) return std::nullopt;
+  constexpr std::array<std::pair<std::string_view, RegionKind>, 3> kKinds = {
+      {{"mca", RegionKind::Anvil}, {"linear", RegionKind::Linear}, {"mcr", RegionKind::McRegion}}};
+  const auto* const kind = std::ranges::find(kKinds, *extension, [](const auto& each) { return each.first; });
+  if (kind == kKinds.end()) return std::nullopt;
   const auto z = take_last(text);
   const auto x = z ? take_last(text) : std::nullopt;
   if (!x || !text.ends_with('r')) return std::nullopt;
   const auto x_number = whole_number(*x);
   const auto z_number = whole_number(*z);
   if (!x_number || !z_number) return std::nullopt;
-  return RegionName{*x_number, *z_number, *extension == "mcr"};
+  return RegionName{*x_number, *z_number, kind->second};
 }
 
 RegionFile::RegionFile(std::filesystem::path path, RegionName name, int descriptor)
@@ -112,19 +116,25 @@ RegionFile::~RegionFile() {
 }
 
 bool is_region_file(std::span<const std::byte> beginning) {
+  if (LinearRegion::begins(beginning)) return true;
   if (beginning.size() < 2 * kSectorBytes) return false;
-  std::uint32_t first = 0;
+  std::size_t sound = 0;
+  std::size_t damaged = 0;
+  std::size_t chunks = 0;
+  std::size_t no_chunks = 0;
   for (std::size_t i = 0; i < kSectorBytes / 4; ++i) {
     const auto entry = load<std::uint32_t>(beginning.data() + 4 * i, std::endian::big);
     if (entry == 0) continue;
-    if (entry >> 8 < 2 || (entry & 255U) == 0) return false;
-    first = first == 0 ? entry >> 8 : std::min(first, entry >> 8);
+    const std::uint64_t at = std::uint64_t{entry >> 8} * kSectorBytes;
+    const bool is_sound = at >= 2 * kSectorBytes && (entry & 255U) != 0;
+    ++(is_sound ? sound : damaged);
+    if (!is_sound || at + kChunkHeader > beginning.size()) continue;
+    const auto size = load<std::uint32_t>(beginning.data() + at, std::endian::big);
+    const auto compression = std::to_integer<unsigned>(beginning[at + 4]) & ~unsigned{kExternal};
+    const bool is_chunk = size >= 1 && size <= kMaxChunkBytes && compression >= 1 && compression <= 4;
+    ++(is_chunk ? chunks : no_chunks);
   }
-  const std::size_t at = std::size_t{first} * kSectorBytes;
-  if (first == 0 || beginning.size() - 2 * kSectorBytes < at - 2 * kSectorBytes + kChunkHeader) return false;
-  const auto size = load<std::uint32_t>(beginning.data() + at, std::endian::big);
-  const auto compression = std::to_integer<unsigned>(beginning[at + 4]) & ~unsigned{kExternal};
-  return size >= 1 && size <= kMaxChunkBytes && compression >= 1 && compression <= 4;
+  return chunks > no_chunks && sound >= damaged;
 }
 
 Result<std::unique_ptr<RegionFile>> RegionFile::of(std::span<const std::byte> bytes) {
@@ -150,8 +160,30 @@ Result<std::unique_ptr<RegionFile>> RegionFile::open(const std::filesystem::path
   return file;
 }
 
+Status RegionFile::read_linear() {
+  std::vector<std::byte> bytes(static_cast<std::size_t>(size_));
+  const auto count = read_at(0, bytes);
+  if (!count) return count.error();
+  bytes.resize(*count);
+  auto linear = LinearRegion::parse(std::move(bytes));
+  if (!linear) {
+    Error error = linear.error();
+    error.path = path_.string();
+    return error;
+  }
+  linear_ = std::move(*linear);
+  return {};
+}
+
 Status RegionFile::read_table() {
   if (size_ == 0) return {};  // as the game leaves files that it made and did not fill
+  std::array<std::byte, 8> magic{};
+  if (const auto count = read_at(0, magic); count && LinearRegion::begins(std::span(magic).first(*count))) {
+    return read_linear();
+  }
+  if (name_.kind == RegionKind::Linear) {
+    return make_error(ErrorCode::BadFormat, "a .linear file that does not begin as a Linear region", path_.string(), 0);
+  }
   std::array<std::byte, kSectorBytes> table{};
   const auto count = read_at(0, table);
   if (!count) return count.error();
@@ -222,6 +254,11 @@ Result<std::vector<std::byte>> RegionFile::read_external(int x, int z) const {
 }
 
 Result<std::vector<std::byte>> RegionFile::read(int x, int z) const {
+  if (linear_) {
+    auto chunk = linear_->read(index_of(x, z));
+    if (!chunk) chunk.error().path = path_.string();
+    return chunk;
+  }
   std::uint8_t compression = 0;
   auto content = read_sectors(x, z, compression);
   if (!content) return content;

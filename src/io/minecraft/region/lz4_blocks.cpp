@@ -1,4 +1,4 @@
-#include "io/minecraft/lz4_blocks.h"
+#include "io/minecraft/region/lz4_blocks.h"
 
 #include <algorithm>
 #include <cstdint>

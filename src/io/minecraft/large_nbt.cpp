@@ -1,0 +1,220 @@
+#include "io/minecraft/large_nbt.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <quoin/core/assert.h>
+
+#include "io/byte_order.h"
+#include "io/byte_stream.h"
+#include "io/minecraft/nbt.h"
+
+namespace quoin::minecraft {
+
+namespace {
+
+using nbt::Tag;
+
+constexpr std::size_t kLeastLong = std::size_t{1} << 20;
+constexpr int kMaxDepth = 512;
+
+bool is_uniform(std::span<const std::byte> bytes) {
+  return std::memcmp(bytes.data(), bytes.data() + 1, bytes.size() - 1) == 0;
+}
+
+/// Bytes of a number, or of an array's element; 0 for tags without a fixed size.
+std::size_t bytes_of_tag(Tag tag) {
+  constexpr std::array<std::size_t, 13> kBytes = {0, 1, 2, 4, 8, 4, 8, 1, 0, 0, 0, 4, 8};
+  return kBytes.at(static_cast<std::size_t>(tag));
+}
+
+/// Walks through a document and copies it.
+class Walker {
+ public:
+  Walker(std::span<const std::byte> gzip, std::size_t max_bytes)
+      : stream_(gzip, 0, Compression::Gzip), max_bytes_(max_bytes), buffer_(kBufferBytes) {}
+
+  Result<LargeNbt> run() {
+    if (auto done = walk_named({}, 0); !done) return done.error();
+    return std::move(out_);
+  }
+
+ private:
+  [[nodiscard]] Error cut_off() const {
+    return make_error(ErrorCode::BadFormat, "NBT: cut off", {}, stream_.position());
+  }
+  Status fill() {
+    const auto count = stream_.read(buffer_);
+    if (!count) return count.error();
+    at_ = 0;
+    end_ = *count;
+    return end_ == 0 ? Status(cut_off()) : Status();
+  }
+  /// Copies bytes to the document.
+  Status copy(std::uint64_t count) {
+    if (count > max_bytes_ - out_.bytes.size()) {
+      return make_error(ErrorCode::LimitExceeded, "expands to too much", {}, stream_.position());
+    }
+    while (count > 0) {
+      if (at_ == end_) {
+        if (auto filled = fill(); !filled) return filled;
+      }
+      const auto now = static_cast<std::size_t>(std::min<std::uint64_t>(count, end_ - at_));
+      const auto first = buffer_.begin() + static_cast<std::ptrdiff_t>(at_);
+      out_.bytes.insert(out_.bytes.end(), first, first + static_cast<std::ptrdiff_t>(now));
+      at_ += now;
+      count -= now;
+    }
+    return {};
+  }
+  /// Copies a number. Its bytes are the last of the document then.
+  template <class T>
+  Result<T> number() {
+    if (auto copied = copy(sizeof(T)); !copied) return copied.error();
+    return load<T>(out_.bytes.data() + out_.bytes.size() - sizeof(T), std::endian::big);
+  }
+  Result<std::uint32_t> count() {
+    const auto count = number<std::int32_t>();
+    if (!count) return count.error();
+    if (*count < 0) {
+      return make_error(ErrorCode::BadFormat, "NBT: a length of " + std::to_string(*count), {}, stream_.position());
+    }
+    return static_cast<std::uint32_t>(*count);
+  }
+  Result<Tag> tag() {
+    const auto tag = number<std::uint8_t>();
+    if (!tag) return tag.error();
+    if (*tag <= static_cast<std::uint8_t>(Tag::LongArray)) return static_cast<Tag>(*tag);
+    return make_error(ErrorCode::BadFormat, "NBT: unknown tag " + std::to_string(*tag), {}, stream_.position());
+  }
+  Result<std::string> text() {
+    const auto length = number<std::uint16_t>();
+    if (!length) return length.error();
+    if (auto copied = copy(*length); !copied) return copied.error();
+    const auto* const first = reinterpret_cast<const char*>(out_.bytes.data() + out_.bytes.size() - *length);
+    return std::string(first, *length);
+  }
+
+  /// A tag, a name and a payload. Returns false for the end of a compound.
+  Result<bool> walk_named(const std::string& parent, int depth) {
+    const auto kind = tag();
+    if (!kind) return kind.error();
+    if (*kind == Tag::End) return false;
+    const auto name = text();
+    if (!name) return name.error();
+    const bool is_data =
+        *name == "BlockData" || *name == "BiomeData" || (*name == "Data" && (parent == "Blocks" || parent == "Biomes"));
+    if (*kind == Tag::ByteArray && is_data) {
+      if (auto done = walk_long_array(); !done) return done.error();
+      return true;
+    }
+    if (auto done = walk_payload(*kind, *name, depth); !done) return done.error();
+    return true;
+  }
+
+  Status walk_payload(Tag kind, const std::string& name, int depth) {
+    if (depth >= kMaxDepth) return make_error(ErrorCode::LimitExceeded, "NBT: deeper than 512 levels");
+    if (kind == Tag::String) {
+      const auto read = text();
+      return read ? Status() : Status(read.error());
+    }
+    if (kind == Tag::Compound) {
+      for (;;) {
+        const auto more = walk_named(name, depth + 1);
+        if (!more) return more.error();
+        if (!*more) return {};
+      }
+    }
+    if (kind == Tag::List) return walk_list(depth);
+    const bool is_array = kind == Tag::ByteArray || kind == Tag::IntArray || kind == Tag::LongArray;
+    const auto elements = is_array ? count() : Result<std::uint32_t>(1U);
+    if (!elements) return elements.error();
+    return copy(std::uint64_t{*elements} * bytes_of_tag(kind));
+  }
+
+  Status walk_list(int depth) {
+    const auto element = tag();
+    if (!element) return element.error();
+    const auto elements = count();
+    if (!elements) return elements.error();
+    const bool is_number = *element >= Tag::Byte && *element <= Tag::Double;
+    if (is_number) return copy(std::uint64_t{*elements} * bytes_of_tag(*element));
+    if (*element == Tag::End) return {};  // the parser reports the mistake
+    for (std::uint32_t i = 0; i < *elements; ++i) {
+      if (auto done = walk_payload(*element, {}, depth + 1); !done) return done;
+    }
+    return {};
+  }
+
+  /// Puts a long array apart; in the document it gets the length 0.
+  Status walk_long_array() {
+    const auto elements = count();
+    if (!elements) return elements.error();
+    if (*elements < kLeastLong) return copy(*elements);
+    std::fill_n(out_.bytes.end() - 4, 4, std::byte{0});
+    PagedBytes& array = out_.arrays[out_.bytes.size()];
+    std::vector<std::byte> pages(kBufferBytes);
+    for (std::uint64_t left = *elements; left > 0;) {
+      const auto now = static_cast<std::size_t>(std::min<std::uint64_t>(left, pages.size()));
+      const std::size_t held = std::min(now, end_ - at_);
+      std::copy_n(buffer_.begin() + static_cast<std::ptrdiff_t>(at_), held, pages.begin());
+      at_ += held;
+      const auto read = stream_.read(std::span(pages).subspan(held, now - held));
+      if (!read) return read.error();
+      if (*read < now - held) return cut_off();
+      array.append(std::span(pages).first(now));
+      left -= now;
+    }
+    return {};
+  }
+
+  static constexpr std::size_t kBufferBytes = 64 * PagedBytes::kPageBytes;
+  ByteStream stream_;
+  std::size_t max_bytes_;
+  std::vector<std::byte> buffer_;
+  std::size_t at_ = 0;
+  std::size_t end_ = 0;
+  LargeNbt out_;
+};
+
+}  // namespace
+
+void PagedBytes::append(std::span<const std::byte> bytes) {
+  QUOIN_ASSERT(size_ % kPageBytes == 0, "whole pages before");
+  for (std::size_t at = 0; at < bytes.size(); at += kPageBytes) {
+    const std::span<const std::byte> content = bytes.subspan(at, std::min(kPageBytes, bytes.size() - at));
+    Page page;
+    page.value = content.front();
+    if (!is_uniform(content)) {
+      page.bytes = std::make_unique<std::byte[]>(kPageBytes);  // NOLINT
+      std::ranges::copy(content, page.bytes.get());
+    }
+    pages_.push_back(std::move(page));
+  }
+  size_ += bytes.size();
+}
+
+std::optional<std::byte> PagedBytes::uniform(std::uint64_t begin, std::uint64_t end) const {
+  QUOIN_ASSERT(begin < end && end <= size_, "a range of the array");
+  const std::byte value = (*this)[begin];
+  for (std::uint64_t at = begin; at < end;) {
+    const Page& page = pages_[at / kPageBytes];
+    const std::uint64_t page_end = std::min(end, (at / kPageBytes + 1) * kPageBytes);
+    if (!page.bytes && page.value != value) return std::nullopt;
+    for (std::uint64_t i = at; page.bytes && i < page_end; ++i) {
+      if (page.bytes[i % kPageBytes] != value) return std::nullopt;
+    }
+    at = page_end;
+  }
+  return value;
+}
+
+Result<LargeNbt> read_large_nbt(std::span<const std::byte> gzip, std::size_t max_bytes) {
+  return Walker(gzip, max_bytes).run();
+}
+
+}  // namespace quoin::minecraft
