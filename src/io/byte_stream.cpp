@@ -31,7 +31,8 @@ bool begins_gzip(std::span<const std::byte> bytes) {
 
 struct ByteStream::Inflater {
   explicit Inflater(Compression compression) : has_members(compression == Compression::Gzip) {
-    if (inflateInit2(&state, has_members ? kGzipWindow : kWindow) != Z_OK) throw std::bad_alloc();
+    const int window = has_members ? kGzipWindow : compression == Compression::Deflate ? -kWindow : kWindow;
+    if (inflateInit2(&state, window) != Z_OK) throw std::bad_alloc();
   }
   ~Inflater() { inflateEnd(&state); }
   Inflater(const Inflater&) = delete;

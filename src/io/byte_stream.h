@@ -13,8 +13,8 @@ namespace quoin {
 /// Whether a gzip stream (RFC 1952) begins here.
 [[nodiscard]] bool begins_gzip(std::span<const std::byte> bytes);
 
-/// Gzip (RFC 1952) and Zlib (RFC 1950) are two wrappings of the same compressed data.
-enum class Compression : std::uint8_t { None, Gzip, Zlib };
+/// Gzip (RFC 1952) and Zlib (RFC 1950) are two wrappings of the same compressed data, Deflate (RFC 1951).
+enum class Compression : std::uint8_t { None, Gzip, Zlib, Deflate };
 
 /// The bytes of a file from some place to its end, in order, decompressed where they are a compressed stream.
 ///

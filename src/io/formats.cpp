@@ -42,6 +42,12 @@ constexpr bool kReadsObj = true;
 constexpr bool kReadsObj = false;
 #endif
 
+#ifdef QUOIN_HAVE_EXPAT
+constexpr bool kReadsThreeMf = true;
+#else
+constexpr bool kReadsThreeMf = false;
+#endif
+
 constexpr std::array kFormats = {
     FormatInfo{FileFormat::Vox, "vox", ".vox", "MagicaVoxel", true, true, false, false},
     FormatInfo{FileFormat::Scene, "scene", ".json", "Quoin's scene files", true, true, false, false},
@@ -77,7 +83,8 @@ constexpr std::array kFormats = {
     FormatInfo{FileFormat::Ply, "ply", ".ply", "Polygon File Format, binary (read as text too)", true, true, true,
                false},
     FormatInfo{FileFormat::Stl, "stl", ".stl", "STL, for printing", true, true, true, false},
-    FormatInfo{FileFormat::ThreeMf, "3mf", ".3mf", "3MF, for printing, with colours", false, true, true, false},
+    FormatInfo{FileFormat::Off, "off", ".off", "Object File Format, as text", true, false, true, false},
+    FormatInfo{FileFormat::ThreeMf, "3mf", ".3mf", "3MF, for printing, with colours", kReadsThreeMf, true, true, false},
 };
 
 bool begins_with(std::span<const std::byte> bytes, std::string_view text) {
@@ -458,16 +465,14 @@ Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& pat
   if (const auto format = detect_format(*bytes)) return format;
   // A damaged region is recognised by its name alone.
   if (minecraft::parse_region_name(path)) return FileFormat::Minecraft;
-  if (bytes->size() < kEnough) {
-    return triangles::is_stl_by_name(path, *bytes) ? std::optional(FileFormat::Stl) : std::nullopt;
-  }
+  if (bytes->size() < kEnough) return triangles::detect_by_name(path, *bytes);
   const std::string extension = lower_case_extension(path);
   constexpr std::array<std::string_view, 5> kHeaderless = {".vxl", ".kvx", ".vox", ".cub", ".stl"};
-  if (std::ranges::find(kHeaderless, extension) == kHeaderless.end()) return std::optional<FileFormat>();
+  if (std::ranges::find(kHeaderless, extension) == kHeaderless.end()) return triangles::detect_by_name(path, *bytes);
   const auto whole = read_file(path);
   if (!whole) return whole.error();
   const auto headerless = detect_headerless(*whole);
-  return !headerless && triangles::is_stl_by_name(path, *whole) ? FileFormat::Stl : headerless;
+  return headerless ? headerless : triangles::detect_by_name(path, *whole);
 }
 
 Result<FormatInfo> format_for_writing(const std::filesystem::path& path) {

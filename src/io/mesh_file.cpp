@@ -56,6 +56,7 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
       return plan_stl(meshes, path);
     case FileFormat::ThreeMf:
       return plan_three_mf(meshes, path);
+    case FileFormat::Off:
     case FileFormat::Vox:
     case FileFormat::Scene:
     case FileFormat::World:

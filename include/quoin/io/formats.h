@@ -39,7 +39,8 @@ enum class FileFormat : std::uint8_t {
   Obj,
   Ply,
   Stl,
-  ThreeMf
+  ThreeMf,
+  Off
 };
 
 /// What Quoin can do with a file format.

@@ -47,6 +47,10 @@ class Walker {
   [[nodiscard]] Error cut_off() const {
     return make_error(ErrorCode::BadFormat, "NBT: cut off", {}, stream_.position());
   }
+  [[nodiscard]] Error too_much() const {
+    return make_error(ErrorCode::LimitExceeded, "expands to more than " + std::to_string(max_bytes_) + " bytes", {},
+                      stream_.position());
+  }
   Status fill() {
     const auto count = stream_.read(buffer_);
     if (!count) return count.error();
@@ -56,9 +60,7 @@ class Walker {
   }
   /// Copies bytes to the document.
   Status copy(std::uint64_t count) {
-    if (count > max_bytes_ - out_.bytes.size()) {
-      return make_error(ErrorCode::LimitExceeded, "expands to too much", {}, stream_.position());
-    }
+    if (held_bytes_ + out_.bytes.size() > max_bytes_ || count > max_bytes_ - out_.bytes.size()) return too_much();
     while (count > 0) {
       if (at_ == end_) {
         if (auto filled = fill(); !filled) return filled;
@@ -166,7 +168,10 @@ class Walker {
       const auto read = stream_.read(std::span(pages).subspan(held, now - held));
       if (!read) return read.error();
       if (*read < now - held) return cut_off();
+      const std::uint64_t held_before = array.held_bytes();
       array.append(std::span(pages).first(now));
+      held_bytes_ += array.held_bytes() - held_before;
+      if (held_bytes_ > max_bytes_) return too_much();
       left -= now;
     }
     return {};
@@ -178,6 +183,7 @@ class Walker {
   std::vector<std::byte> buffer_;
   std::size_t at_ = 0;
   std::size_t end_ = 0;
+  std::uint64_t held_bytes_ = 0;  // of pages
   LargeNbt out_;
 };
 
@@ -191,6 +197,7 @@ void PagedBytes::append(std::span<const std::byte> bytes) {
     page.value = content.front();
     if (!is_uniform(content)) {
       page.bytes = std::make_unique<std::byte[]>(kPageBytes);  // NOLINT
+      held_bytes_ += kPageBytes;
       std::ranges::copy(content, page.bytes.get());
     }
     pages_.push_back(std::move(page));

@@ -18,6 +18,8 @@ class PagedBytes {
   static constexpr std::size_t kPageBytes = 4096;
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
+  /// Bytes of pages of several values, which take memory.
+  [[nodiscard]] std::uint64_t held_bytes() const { return held_bytes_; }
   /// Appends bytes. Requires: all calls before the last one append whole pages.
   void append(std::span<const std::byte> bytes);
   /// Requires: at < size().
@@ -36,6 +38,7 @@ class PagedBytes {
   };
   std::vector<Page> pages_;
   std::uint64_t size_ = 0;
+  std::uint64_t held_bytes_ = 0;
 };
 
 /// A compressed NBT document without its longest arrays of bytes.
@@ -46,7 +49,7 @@ struct LargeNbt {
 };
 
 /// Reads a gzip stream of NBT, and puts apart the blocks and biomes of a Sponge schematic (BlockData, BiomeData, Data
-/// of Blocks or Biomes) where they have 1 MiB or more. Memory: `max_bytes` for the rest, and pages of the arrays.
+/// of Blocks or Biomes) where they have 1 MiB or more. Memory: `max_bytes`, and 16 bytes per page.
 /// Errors: BadFormat; LimitExceeded.
 [[nodiscard]] Result<LargeNbt> read_large_nbt(std::span<const std::byte> gzip, std::size_t max_bytes);
 

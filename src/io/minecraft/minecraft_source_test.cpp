@@ -173,6 +173,33 @@ TEST(MinecraftSource, IndicesThatSpanLongsAreRead) {
   }
 }
 
+TEST(MinecraftSource, CountsInvisibleBlocksAndMakesLampsOfLight) {
+  NbtWriter nbt;
+  nbt.compound("").integer("DataVersion", 2975).list("sections", 10, 1);
+  nbt.byte("Y", 2).compound("block_states").list("palette", 10, 3);
+  nbt.string("Name", "minecraft:air").end();
+  nbt.string("Name", "minecraft:barrier").end();
+  nbt.string("Name", "minecraft:light").compound("Properties").string("level", "5").end().end();
+  std::vector<std::uint64_t> words(256, 0);
+  words[0] = 0x121;  // barrier, light, barrier
+  nbt.longs("data", words).end().end().end();
+  const auto source = minecraft::open_minecraft(region_with(nbt.bytes, 1, 0));
+  ASSERT_TRUE(source);
+  const auto part = (*source)->read_part(0);
+  ASSERT_TRUE(part);
+  EXPECT_TRUE(part->chunks.empty());
+  EXPECT_TRUE(part->broken.empty());
+  EXPECT_EQ(part->invisible, (std::map<std::string, std::uint64_t>{{"minecraft:barrier", 2}, {"minecraft:light", 1}}));
+  ASSERT_EQ(part->lamps.size(), 1U);
+  EXPECT_EQ(part->lamps[0].position, DVec3(17.5, 32.5, 0.5));
+  EXPECT_EQ(part->lamps[0].range, 5.0);
+  const auto loaded = load_source(**source, (*source)->info().chunks);
+  ASSERT_TRUE(loaded);
+  EXPECT_EQ(loaded->scene.lamps.size(), 1U);
+  ASSERT_EQ(loaded->warnings.size(), 1U);
+  EXPECT_EQ(loaded->warnings[0], "left out, since they cannot be seen: 2 minecraft:barrier, 1 minecraft:light");
+}
+
 TEST(MinecraftSource, NumbersOfTypesDoNotDependOnWhatWasReadBefore) {
   const auto bytes = region_with(chunk_of_stairs(0));
   const auto a = minecraft::open_minecraft(bytes);

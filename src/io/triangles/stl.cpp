@@ -129,12 +129,6 @@ bool is_stl(std::span<const std::byte> whole) {
   return count > 0 && whole.size() == kHeader + 4 + count * kRecord;
 }
 
-bool is_stl_by_name(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return extension == ".stl" && bytes.size() >= kHeader + 4;
-}
-
 Result<LoadedMesh> read_stl(std::span<const std::byte> bytes, Beside&) {
   // Some programs begin binary files with "solid" too.
   return is_stl(bytes) || !is_stl_text(bytes) ? read_bytes(bytes) : read_text(bytes);

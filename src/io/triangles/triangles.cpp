@@ -40,6 +40,8 @@ Result<LoadedMesh> read_any(std::span<const std::byte> bytes, std::optional<File
   if (format == FileFormat::Obj) read = read_obj;
   if (format == FileFormat::Ply) read = read_ply;
   if (format == FileFormat::Stl) read = read_stl;
+  if (format == FileFormat::Off) read = read_off;
+  if (format == FileFormat::ThreeMf) read = read_three_mf;
   if (format == FileFormat::Glb || format == FileFormat::Gltf) read = read_gltf;
   if (read == nullptr) {
     return make_error(ErrorCode::Unsupported, format ? std::string(format_info(*format).name) + " holds no triangles"
@@ -48,7 +50,7 @@ Result<LoadedMesh> read_any(std::span<const std::byte> bytes, std::optional<File
   auto loaded = read(bytes, beside);
   if (!loaded) return loaded;
   loaded->format = format_info(*format).name;
-  const bool is_z = format == FileFormat::Stl || format == FileFormat::Ply;
+  const bool is_z = format == FileFormat::Stl || format == FileFormat::Ply || format == FileFormat::ThreeMf;
   const UpAxis own = is_z ? UpAxis::Z : UpAxis::Y;
   if (up.value_or(own) == UpAxis::Z) turn_up(loaded->mesh);
   loaded->beside = std::move(beside.files());
@@ -140,8 +142,19 @@ std::optional<FileFormat> detect(std::span<const std::byte> beginning) {
   if (is_gltf(beginning)) return FileFormat::Gltf;
   if (is_ply(beginning)) return FileFormat::Ply;
   if (is_stl_text(beginning)) return FileFormat::Stl;
+  if (is_three_mf(beginning)) return FileFormat::ThreeMf;
+  if (is_off(beginning)) return FileFormat::Off;
   if (is_obj(beginning)) return FileFormat::Obj;
   return std::nullopt;
+}
+
+std::optional<FileFormat> detect_by_name(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  constexpr std::size_t kStlHeader = 84;
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  if (extension == ".stl" && bytes.size() >= kStlHeader) return FileFormat::Stl;
+  const bool is_zip = bytes.size() >= 2 && bytes[0] == std::byte{'P'} && bytes[1] == std::byte{'K'};
+  return extension == ".3mf" && is_zip ? std::optional(FileFormat::ThreeMf) : std::nullopt;
 }
 
 namespace {
@@ -211,7 +224,7 @@ Result<LoadedMesh> read_mesh(const std::filesystem::path& path, std::optional<Up
   return read_whole(path, [&](std::span<const std::byte> bytes) {
     triangles::Beside beside(path);
     auto format = detect_format(bytes);
-    if (!format && triangles::is_stl_by_name(path, bytes)) format = FileFormat::Stl;
+    if (!format) format = triangles::detect_by_name(path, bytes);
     return triangles::read_any(bytes, format, beside, up);
   });
 }

@@ -73,9 +73,6 @@ class MeshBuilder {
 
 [[nodiscard]] bool is_stl_text(std::span<const std::byte> beginning);
 [[nodiscard]] bool is_stl(std::span<const std::byte> whole);
-/// Returns true for a binary STL by its name: of one that was cut off, or has bytes behind its triangles, the content
-/// does not tell.
-[[nodiscard]] bool is_stl_by_name(const std::filesystem::path& path, std::span<const std::byte> bytes);
 [[nodiscard]] Result<LoadedMesh> read_stl(std::span<const std::byte> bytes, Beside& beside);
 
 [[nodiscard]] bool is_ply(std::span<const std::byte> beginning);
@@ -90,8 +87,19 @@ class MeshBuilder {
 [[nodiscard]] bool has_gltf();
 [[nodiscard]] Result<LoadedMesh> read_gltf(std::span<const std::byte> bytes, Beside& beside);
 
+[[nodiscard]] bool is_off(std::span<const std::byte> beginning);
+[[nodiscard]] Result<LoadedMesh> read_off(std::span<const std::byte> bytes, Beside& beside);
+
+[[nodiscard]] bool is_three_mf(std::span<const std::byte> beginning);
+[[nodiscard]] bool has_three_mf();
+[[nodiscard]] Result<LoadedMesh> read_three_mf(std::span<const std::byte> bytes, Beside& beside);
+
 /// Of those by which a beginning is known.
 [[nodiscard]] std::optional<FileFormat> detect(std::span<const std::byte> beginning);
+/// Returns the format of a file whose content alone does not show it: a binary STL that was cut off or has bytes behind
+/// its triangles, and a zip file whose names lie behind its beginning.
+[[nodiscard]] std::optional<FileFormat> detect_by_name(const std::filesystem::path& path,
+                                                       std::span<const std::byte> bytes);
 
 /// A mesh as a scene of one grid. `name`: of the grid.
 [[nodiscard]] Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& options,

@@ -28,7 +28,10 @@ void check(Read read, std::span<const std::byte> bytes) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::span bytes(reinterpret_cast<const std::byte*>(data), size);
-  for (const Read read : {quoin::triangles::read_stl, quoin::triangles::read_ply}) check(read, bytes);
+  for (const Read read : {quoin::triangles::read_stl, quoin::triangles::read_ply, quoin::triangles::read_off,
+                          quoin::triangles::read_three_mf}) {
+    check(read, bytes);
+  }
   // By libraries: what is not of their format they have nothing to do with.
   if (quoin::triangles::is_obj(bytes)) check(quoin::triangles::read_obj, bytes);
   if (quoin::triangles::is_gltf(bytes) || quoin::triangles::is_glb(bytes)) check(quoin::triangles::read_gltf, bytes);

@@ -8,9 +8,11 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
 #include <quoin/io/picture_files.h>
+#include <quoin/scene/scene_meshes.h>
 
 #include "io/base64.h"
 #include "io/triangles/triangles.h"
@@ -452,6 +454,103 @@ TEST(MeshFiles, ObjLinesMayEndInAnyWay) {
     const std::string text =
         "v 0 0 0" + end + "v 1 0 \\" + end + "0" + end + "v 0 1 0" + end + "vt 0 0" + end + "f 1/1/ 2/1/ 3/1/" + end;
     EXPECT_EQ(mesh_of(text).mesh.triangles.size(), 1U) << static_cast<int>(end[0]);
+  }
+}
+
+std::string corpus_file(const char* name) {
+  const auto bytes = read_file(fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "triangles" / name);
+  EXPECT_TRUE(bytes);
+  return bytes ? std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size()) : std::string();
+}
+
+TEST(OffFiles, HaveCornersFacesAndColours) {
+  const LoadedMesh plain = mesh_of(corpus_file("off"), std::nullopt);
+  EXPECT_EQ(plain.format, "off");
+  EXPECT_EQ(plain.mesh.positions[3], DVec3(0, 0, 1)) << "y is up";
+  EXPECT_EQ(plain.mesh.triangles.size(), 4U);
+  EXPECT_TRUE(plain.warnings.empty());
+  const LoadedMesh coloured = mesh_of(corpus_file("off__colours"));
+  EXPECT_EQ(coloured.mesh.triangles.size(), 5U);
+  ASSERT_EQ(coloured.mesh.colours.size(), 5U);
+  EXPECT_EQ(coloured.mesh.colours[0], glm::vec4(1, 0, 0, 1));
+  EXPECT_NEAR(coloured.mesh.colours[3].a, 128.0 / 255.0, 1e-6);
+  ASSERT_EQ(coloured.mesh.materials.size(), 3U);
+  EXPECT_EQ(coloured.mesh.material_of, (std::vector<std::uint32_t>{0, 0, 0, 1, 2}));
+  EXPECT_NEAR(coloured.mesh.materials[1].colour.r, 0.214, 1e-3) << "0.5 of sRGB";
+  EXPECT_EQ(coloured.mesh.materials[2].colour, glm::vec4(1, 0, 0, 1));
+}
+
+TEST(OffFiles, HeadersMayStandOnOneLineAndNormalsAreLeftOut) {
+  EXPECT_EQ(mesh_of("OFF 3 1 3\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").mesh.triangles.size(), 1U);
+  EXPECT_EQ(mesh_of("# first\n\nSTCNOFF\n3 1 0\n0 0 0 0 0 1 1 1 1 1 0.5 0.5\n1 0 0 0 0 1 1 1 1 1 0 0\n"
+                    "0 1 0 0 0 1 1 1 1 1 1 1\n3 0 1 2\n")
+                .mesh.colours[0],
+            glm::vec4(1.0F / 255.0F / 12.92F, 1.0F / 255.0F / 12.92F, 1.0F / 255.0F / 12.92F, 1.0F / 255.0F));
+}
+
+TEST(OffFiles, DamageIsNamedWithItsPlace) {
+  EXPECT_EQ(error_of("OFF\n9999999 1 0\n0 0 0\n").message, "claims 9999999 vertices and 1 faces in 6 bytes");
+  EXPECT_EQ(error_of("OFF\n2 1 0\n0 0 0\n1 x 0\n3 0 1 1\n").byte_offset, 16U);
+  EXPECT_EQ(error_of("OFF\n2 1 0\n0 0 0\n1 0 0\n3 0 1\n").message, "a face without its corners");
+  EXPECT_EQ(error_of("4OFF\n1 0 0\n0 0 0 1\n").code, ErrorCode::Unsupported);
+  EXPECT_EQ(error_of("OFF BINARY\n????").code, ErrorCode::Unsupported);
+}
+
+TEST(ThreeMfFiles, PlaceObjectsInMillimetresWithTheirColours) {
+  if (!reads(FileFormat::ThreeMf)) GTEST_SKIP() << "without expat";
+  const LoadedMesh loaded = mesh_of(corpus_file("3mf__components"));
+  EXPECT_EQ(loaded.format, "3mf");
+  const TriangleMesh& mesh = loaded.mesh;
+  ASSERT_EQ(mesh.triangles.size(), 12U);
+  const DBox box = mesh.bounds();
+  EXPECT_EQ(box.min, DVec3(0, 0, 50));
+  EXPECT_EQ(box.max, DVec3(100, 220, 70));
+  // Each of three tetrahedra is closed and turned outwards, the mirrored one too.
+  for (std::size_t part = 0; part < 3; ++part) {
+    double volume = 0.0;
+    for (std::size_t i = 4 * part; i < 4 * part + 4; ++i) {
+      const auto& t = mesh.triangles[i];
+      const DVec3 a = mesh.positions[t[0]] - box.min;
+      volume += glm::dot(a, glm::cross(mesh.positions[t[1]] - box.min, mesh.positions[t[2]] - box.min)) / 6.0;
+    }
+    EXPECT_NEAR(volume, (part == 2 ? 8.0 : 1.0) * 1000.0 / 6.0, 1e-6) << part;
+  }
+  const auto colour = [&](std::size_t triangle, std::size_t corner) {
+    return mesh.colours[mesh.triangles[triangle][corner]];
+  };
+  EXPECT_EQ(colour(0, 0), glm::vec4(1, 0, 0, 1)) << "of its object";
+  EXPECT_EQ(colour(1, 2), glm::vec4(0, 1, 0, 1)) << "of the triangle";
+  EXPECT_EQ(colour(2, 0), glm::vec4(0, 1, 0, 1));
+  EXPECT_NEAR(colour(2, 1).a, 128.0 / 255.0, 1e-6);
+  EXPECT_EQ(mesh.materials[0].alpha_mode, AlphaMode::Blend);
+  ASSERT_EQ(loaded.warnings.size(), 1U) << "a group that is not there";
+  const LoadedMesh up = mesh_of(corpus_file("3mf"), std::nullopt);
+  EXPECT_EQ(up.mesh.bounds().max, DVec3(1, 1, 0)) << "z is up";
+}
+
+TEST(ThreeMfFiles, OnesThatQuoinWritesAreRead) {
+  if (!reads(FileFormat::ThreeMf) || !reads(FileFormat::Obj)) GTEST_SKIP() << "without expat or OBJ";
+  LoadedScene scene = load_scene(bytes_of(kObj), {.mesh = {.size = 6}}).value();
+  const fs::path path = fs::path(testing::TempDir()) / "quoin_again.3mf";
+  const auto meshes = mesh_scene(scene.scene, {});
+  ASSERT_TRUE(meshes);
+  ASSERT_TRUE(write_mesh(*meshes, path));
+  const auto again = read_mesh(path);
+  ASSERT_TRUE(again) << to_string(again.error());
+  EXPECT_GT(again->mesh.triangles.size(), 20U);
+  EXPECT_TRUE(again->warnings.empty());
+  fs::remove(path);
+}
+
+TEST(ThreeMfFiles, DamageAnywhereGivesErrorsAndNoCrash) {
+  for (const char* name : {"3mf", "3mf__components"}) {
+    const std::string whole = corpus_file(name);
+    for (std::size_t size = 0; size < whole.size(); size += 3) (void)read_mesh(bytes_of(whole.substr(0, size)));
+    for (std::size_t at = 0; at < whole.size(); ++at) {
+      std::string turned = whole;
+      turned[at] = static_cast<char>(turned[at] ^ 4);
+      (void)read_mesh(bytes_of(turned));
+    }
   }
 }
 

@@ -67,6 +67,21 @@ TEST_F(WorldImport, HoldsAllThatCanBeReadAndNamesTheRest) {
   EXPECT_NE(grid.data({-3 * 512 + 1, -64, 512}).state, 0U);
 }
 
+TEST_F(WorldImport, KeepsTheLampsOfLightBlocks) {
+  minecraft_test::NbtWriter nbt;
+  nbt.compound("").list("sections", 10, 1).byte("Y", 0).compound("block_states").list("palette", 10, 1);
+  nbt.string("Name", "minecraft:light").end().end().end().end();
+  ASSERT_TRUE(write_file(minecraft_test::region_with(nbt.bytes), folder / "region" / "r.20.20.mca"));
+  const auto source = open();
+  const auto imported = import_world(*source, folder / "out.quoin");
+  ASSERT_TRUE(imported) << to_string(imported.error());
+  EXPECT_EQ(imported->invisible, (std::map<std::string, std::uint64_t>{{"minecraft:light", 4096}}));
+  const Scene scene = scene_of(folder / "out.quoin");
+  ASSERT_EQ(scene.lamps.size(), 4096U);
+  EXPECT_EQ(scene.lamps.front().position, DVec3(20 * 512 + 0.5, 0.5, 20 * 512 + 0.5));
+  EXPECT_EQ(scene.lamps.front().range, 15.0);
+}
+
 TEST_F(WorldImport, WhatWasStoppedAnywhereEndsAsIfItHadNotBeen) {
   const auto source = open();
   ASSERT_TRUE(import_world(*source, folder / "whole.quoin", {1}));

@@ -1,0 +1,431 @@
+// 3MF. Source: 3MF Consortium, "3D Manufacturing Format" core specification 1.3, its materials extension 1.2.1 (colour
+// groups) and its production extension 1.1.2 (objects in other parts).
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include <glm/mat4x4.hpp>
+#include <glm/matrix.hpp>
+#include <quoin/core/thousands.h>
+#include <quoin/grid/voxel_registry.h>
+
+#include "core/srgb.h"
+#include "io/byte_reader.h"
+#include "io/text.h"
+#include "io/triangles/triangles.h"
+#include "io/triangles/words.h"
+#include "io/triangles/zip_parts.h"
+
+#ifdef QUOIN_HAVE_EXPAT
+#include <expat.h>
+#endif
+
+namespace quoin::triangles {
+
+bool is_three_mf(std::span<const std::byte> beginning) {
+  const std::string_view text = text_of(beginning);
+  return text.starts_with("PK\3\4") && text.find("3D/") != std::string_view::npos &&
+         text.find(".model") != std::string_view::npos;
+}
+
+#ifdef QUOIN_HAVE_EXPAT
+
+bool has_three_mf() {
+  return true;
+}
+
+namespace {
+
+constexpr std::int64_t kNone = -1;
+
+struct Triangle {
+  std::array<std::uint32_t, 3> corners{};
+  std::int64_t group = kNone;  // of colours; kNone: that of its object
+  std::array<std::int64_t, 3> colours{kNone, kNone, kNone};
+};
+
+/// Another object within an object, or one that is to be built.
+struct Placed {
+  std::string path;  // of its part; empty: the same
+  std::int64_t object = kNone;
+  glm::dmat4 transform{1.0};
+};
+
+struct Object {
+  std::vector<DVec3> vertices;
+  std::vector<Triangle> triangles;
+  std::vector<Placed> components;
+  std::int64_t group = kNone;
+  std::int64_t colour = kNone;
+};
+
+/// A file of objects in the package.
+struct Part {
+  double millimetres = 1.0;  // per unit
+  std::map<std::int64_t, Object> objects;
+  std::map<std::int64_t, std::vector<Rgba8>> colours;  // by group
+  std::vector<Placed> build;
+  std::map<std::string, std::size_t, std::less<>> left_out;  // elements by name
+  std::string target;                                        // of relationships: where the root part lies
+};
+
+/// The attributes of an element. Lifetime: of the call.
+class Attributes {
+ public:
+  explicit Attributes(const char** pairs) : pairs_(pairs) {}
+  /// The value of that name in any namespace; empty without one.
+  [[nodiscard]] std::string_view operator[](std::string_view name) const {
+    for (const char** pair = pairs_; *pair != nullptr; pair += 2) {
+      const std::string_view key = *pair;
+      if (key.substr(key.rfind('|') + 1) == name) return pair[1];
+    }
+    return {};
+  }
+  [[nodiscard]] std::optional<double> number(std::string_view name) const { return number_in((*this)[name]); }
+  /// A whole number of at least 0, else kNone.
+  [[nodiscard]] std::int64_t index(std::string_view name) const {
+    const auto value = number(name);
+    const bool is_index = value && *value >= 0.0 && *value <= 4294967295.0 && *value == std::floor(*value);
+    return is_index ? static_cast<std::int64_t>(*value) : kNone;
+  }
+
+ private:
+  const char** pairs_;
+};
+
+/// "#RRGGBB" or "#RRGGBBAA".
+std::optional<Rgba8> colour_in(std::string_view text) {
+  if (!text.starts_with('#') || (text.size() != 7 && text.size() != 9)) return std::nullopt;
+  std::uint32_t value = 0;
+  const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), value, 16);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  if (text.size() == 7) value = value << 8 | 255U;
+  const auto byte = [value](unsigned shift) { return static_cast<std::uint8_t>(value >> shift); };
+  return Rgba8{byte(24), byte(16), byte(8), byte(0)};
+}
+
+/// Twelve numbers: the images of the axes, and of the origin.
+std::optional<glm::dmat4> transform_in(std::string_view text) {
+  glm::dmat4 matrix(1.0);
+  if (text.empty()) return matrix;
+  Words words(text);
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 3; ++row) {
+      const auto number = words.next_number();
+      if (!number || !std::isfinite(*number)) return std::nullopt;
+      matrix[column][row] = *number;
+    }
+  }
+  return matrix;
+}
+
+double millimetres_of(std::string_view unit) {
+  constexpr std::array<std::pair<std::string_view, double>, 6> kUnits = {{{"micron", 0.001},
+                                                                          {"millimeter", 1.0},
+                                                                          {"centimeter", 10.0},
+                                                                          {"inch", 25.4},
+                                                                          {"foot", 304.8},
+                                                                          {"meter", 1000.0}}};
+  for (const auto& [name, size] : kUnits) {
+    if (name == unit) return size;
+  }
+  return 1.0;
+}
+
+/// Takes a part from its XML.
+class PartReader {
+ public:
+  explicit PartReader(std::string name)
+      : name_(std::move(name)), parser_(XML_ParserCreateNS(nullptr, '|'), &XML_ParserFree) {
+    if (!parser_) throw std::bad_alloc();
+    XML_SetUserData(parser_.get(), this);
+    XML_SetElementHandler(parser_.get(), &PartReader::on_start, &PartReader::on_end);
+    // Packages have none, and each could stand for any number of bytes.
+    XML_SetEntityDeclHandler(parser_.get(), &PartReader::on_entity);
+  }
+
+  Result<Part> read(std::span<const std::byte> xml) {
+    constexpr std::size_t kAtOnce = std::size_t{1} << 24;
+    for (std::size_t at = 0; at < xml.size() || at == 0; at += kAtOnce) {
+      const auto piece = xml.subspan(at, std::min(kAtOnce, xml.size() - at));
+      const bool is_last = at + piece.size() >= xml.size();
+      const auto outcome = XML_Parse(parser_.get(), reinterpret_cast<const char*>(piece.data()),
+                                     static_cast<int>(piece.size()), is_last ? 1 : 0);
+      if (outcome != XML_STATUS_OK) return error();
+      if (is_last) break;
+    }
+    return std::move(part_);
+  }
+
+ private:
+  [[nodiscard]] Error error() const {
+    const std::string why =
+        fault_.empty() ? std::string("no XML: ") + XML_ErrorString(XML_GetErrorCode(parser_.get())) : fault_;
+    const auto byte = static_cast<std::int64_t>(XML_GetCurrentByteIndex(parser_.get()));
+    return make_error(ErrorCode::BadFormat, printable(name_) + ", byte " + std::to_string(byte) + ": " + why);
+  }
+  void fail(std::string why) {
+    if (fault_.empty()) fault_ = std::move(why);
+    XML_StopParser(parser_.get(), XML_FALSE);
+  }
+  static void on_entity(void* self, const char*, int, const char*, int, const char*, const char*, const char*,
+                        const char*) {
+    static_cast<PartReader*>(self)->fail("it declares an entity, which no 3MF does");
+  }
+  static void on_start(void* self, const char* name, const char** attributes) {
+    const std::string_view whole = name;
+    static_cast<PartReader*>(self)->start(whole.substr(whole.rfind('|') + 1), Attributes(attributes));
+  }
+  static void on_end(void* self, const char* name) {
+    const std::string_view whole = name;
+    static_cast<PartReader*>(self)->end(whole.substr(whole.rfind('|') + 1));
+  }
+
+  void start(std::string_view element, const Attributes& attributes) {
+    if (element == "vertex") return add_vertex(attributes);
+    if (element == "triangle") return add_triangle(attributes);
+    if (element == "component") return add_placed(attributes, object_ != nullptr ? &object_->components : nullptr);
+    if (element == "item") return add_placed(attributes, &part_.build);
+    if (element == "object") return begin_object(attributes);
+    if (element == "basematerials" || element == "colorgroup") group_ = attributes.index("id");
+    if (element == "base") return add_colour(attributes["displaycolor"]);
+    if (element == "color") return add_colour(attributes["color"]);
+    if (element == "model") part_.millimetres = millimetres_of(attributes["unit"]);
+    constexpr std::string_view kRoot = "/3dmodel";
+    if (element == "Relationship" && attributes["Type"].ends_with(kRoot)) part_.target = attributes["Target"];
+    constexpr std::array<std::string_view, 5> kLeftOut = {"texture2dgroup", "compositematerials", "multiproperties",
+                                                          "beamlattice", "slicestack"};
+    if (std::ranges::find(kLeftOut, element) != kLeftOut.end()) ++part_.left_out[std::string(element)];
+  }
+  void end(std::string_view element) {
+    if (element == "object") object_ = nullptr;
+    if (element == "basematerials" || element == "colorgroup") group_ = kNone;
+  }
+
+  void begin_object(const Attributes& attributes) {
+    const std::int64_t id = attributes.index("id");
+    if (id == kNone) return fail("an object without a number");
+    object_ = &part_.objects[id];
+    *object_ = {};
+    object_->group = attributes.index("pid");
+    object_->colour = attributes.index("pindex");
+  }
+  void add_vertex(const Attributes& attributes) {
+    const auto x = attributes.number("x");
+    const auto y = attributes.number("y");
+    const auto z = attributes.number("z");
+    if (object_ == nullptr || !x || !y || !z) return fail("a vertex outside of an object, or without three numbers");
+    object_->vertices.emplace_back(*x, *y, *z);
+  }
+  void add_triangle(const Attributes& attributes) {
+    Triangle triangle;
+    constexpr std::array<std::string_view, 3> kCorners = {"v1", "v2", "v3"};
+    constexpr std::array<std::string_view, 3> kColours = {"p1", "p2", "p3"};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::int64_t corner = attributes.index(kCorners[i]);
+      if (object_ == nullptr || corner == kNone) return fail("a triangle outside of an object, or without corners");
+      triangle.corners[i] = static_cast<std::uint32_t>(corner);
+      triangle.colours[i] = attributes.index(kColours[i]);
+      if (triangle.colours[i] == kNone) triangle.colours[i] = triangle.colours[0];
+    }
+    triangle.group = attributes.index("pid");
+    object_->triangles.push_back(triangle);
+  }
+  void add_placed(const Attributes& attributes, std::vector<Placed>* list) {
+    const auto transform = transform_in(attributes["transform"]);
+    const std::int64_t object = attributes.index("objectid");
+    if (list == nullptr || object == kNone) return fail("a component or an item without its object");
+    if (!transform) return fail("a transform that is not 12 numbers");
+    list->push_back({std::string(attributes["path"]), object, *transform});
+  }
+  void add_colour(std::string_view text) {
+    if (group_ == kNone) return;
+    const auto colour = colour_in(text);
+    if (!colour) return fail("the colour \"" + printable(text.substr(0, 20)) + "\"");
+    part_.colours[group_].push_back(*colour);
+  }
+
+  std::string name_;
+  std::unique_ptr<XML_ParserStruct, decltype(&XML_ParserFree)> parser_;
+  Part part_;
+  Object* object_ = nullptr;
+  std::int64_t group_ = kNone;
+  std::string fault_;
+};
+
+/// Puts all that is to be built into one mesh, in millimetres.
+class Package {
+ public:
+  explicit Package(ZipParts zip) : zip_(std::move(zip)) {}
+
+  Result<LoadedMesh> read() {
+    const auto root = root_name();
+    if (!root) return root.error();
+    const auto part = part_named(*root);
+    if (!part) return part.error();
+    const glm::dmat4 scale(glm::dmat3((*part)->millimetres));
+    for (const Placed& item : (*part)->build) {
+      if (auto done = add(item, *root, scale, 0); !done) return done.error();
+    }
+    builder_.finish();
+    finish();
+    return std::move(loaded_);
+  }
+
+ private:
+  Result<std::string> root_name() {
+    constexpr const char* kRelations = "_rels/.rels";
+    if (zip_.has(kRelations)) {
+      const auto relations = part_named(kRelations);
+      if (!relations) return relations.error();
+      if (const std::string& target = (*relations)->target; !target.empty()) return without_slash(target);
+    }
+    for (const std::string& name : zip_.names()) {
+      if (name.starts_with("3D/") && name.ends_with(".model")) return name;
+    }
+    return make_error(ErrorCode::BadFormat, "a 3MF without a model (3D/3dmodel.model)");
+  }
+  static std::string without_slash(std::string_view name) {
+    return std::string(name.starts_with('/') ? name.substr(1) : name);
+  }
+  /// Reads each part once.
+  Result<const Part*> part_named(const std::string& name) {
+    if (const auto known = parts_.find(name); known != parts_.end()) return &known->second;
+    if (!zip_.has(name)) return make_error(ErrorCode::BadFormat, "a 3MF without its part " + printable(name));
+    const auto xml = zip_.read(name);
+    if (!xml) return xml.error();
+    auto part = PartReader(name).read(*xml);
+    if (!part) return part.error();
+    for (const auto& [id, object] : part->objects) defined_ += object.triangles.size();
+    for (const auto& [what, count] : part->left_out) left_out_[what] += count;
+    return &parts_.emplace(name, std::move(*part)).first->second;
+  }
+
+  Status add(const Placed& placed, const std::string& from, const glm::dmat4& above, int depth) {
+    constexpr int kDeepest = 32;
+    if (depth > kDeepest) return make_error(ErrorCode::LimitExceeded, "components within 32 others");
+    const std::string name = placed.path.empty() ? from : without_slash(placed.path);
+    const auto part = part_named(name);
+    if (!part) return part.error();
+    const auto found = (*part)->objects.find(placed.object);
+    if (found == (*part)->objects.end()) {
+      return make_error(ErrorCode::BadFormat,
+                        "an object " + std::to_string(placed.object) + " that " + printable(name) + " does not have");
+    }
+    const glm::dmat4 transform = above * placed.transform;
+    if (auto done = add_mesh(found->second, **part, transform); !done) return done;
+    for (const Placed& component : found->second.components) {
+      if (auto done = count_component(); !done) return done;
+      if (auto done = add(component, name, transform, depth + 1); !done) return done;
+    }
+    return {};
+  }
+  // Components of components would grow without bounds.
+  Status count_component() {
+    constexpr std::size_t kMost = std::size_t{1} << 20;
+    if (++components_ <= kMost) return {};
+    return make_error(ErrorCode::LimitExceeded, "more than 2^20 components are placed");
+  }
+
+  Status add_mesh(const Object& object, const Part& part, const glm::dmat4& transform) {
+    constexpr std::size_t kFree = std::size_t{1} << 22;
+    constexpr std::size_t kTimes = 64;
+    placed_ += object.triangles.size() + object.vertices.size() / 8;
+    if (placed_ > kFree + kTimes * defined_) {
+      return make_error(ErrorCode::LimitExceeded, "its components place far more triangles than the file has");
+    }
+    const bool is_mirrored = glm::determinant(glm::dmat3(transform)) < 0.0;
+    std::unordered_map<std::uint64_t, std::size_t> known;
+    for (const Triangle& triangle : object.triangles) {
+      std::array<std::size_t, 3> corners{};
+      for (std::size_t i = 0; i < 3; ++i) {
+        const Rgba8 colour = colour_of(object, part, triangle, i);
+        const std::uint32_t vertex = triangle.corners[i];
+        if (vertex >= object.vertices.size()) {
+          corners[i] = std::string_view::npos;
+          continue;
+        }
+        const std::uint64_t key = std::uint64_t{vertex} << 32 | std::uint64_t{colour.r} << 24 |
+                                  std::uint64_t{colour.g} << 16 | std::uint64_t{colour.b} << 8 | colour.a;
+        const auto [place, is_new] = known.try_emplace(key, loaded_.mesh.positions.size());
+        if (is_new) add_corner(DVec3(transform * glm::dvec4(object.vertices[vertex], 1.0)), colour);
+        corners[i] = place->second;
+      }
+      if (is_mirrored) std::swap(corners[1], corners[2]);
+      if (const auto added = builder_.add(corners[0], corners[1], corners[2]); !added) return added.error();
+    }
+    return {};
+  }
+  void add_corner(const DVec3& position, Rgba8 colour) {
+    loaded_.mesh.positions.push_back(position);
+    const Vec3 light = linear_colour(colour);
+    loaded_.mesh.colours.emplace_back(light.x, light.y, light.z, static_cast<float>(colour.a) / 255.0F);
+    is_clear_ |= colour.a < 255;
+  }
+  Rgba8 colour_of(const Object& object, const Part& part, const Triangle& triangle, std::size_t corner) {
+    constexpr Rgba8 kGrey{200, 200, 200, 255};
+    const bool is_own = triangle.colours[0] != kNone;
+    const std::int64_t group = triangle.group != kNone ? triangle.group : object.group;
+    const std::int64_t index = is_own ? triangle.colours[corner] : object.colour;
+    if (group == kNone || index == kNone) return kGrey;
+    const auto found = part.colours.find(group);
+    const bool is_there = found != part.colours.end() && static_cast<std::size_t>(index) < found->second.size();
+    without_colour_ += is_there ? 0 : 1;
+    return is_there ? found->second[static_cast<std::size_t>(index)] : kGrey;
+  }
+
+  void finish() {
+    MeshMaterial plain;
+    if (is_clear_) plain.alpha_mode = AlphaMode::Blend;
+    loaded_.mesh.materials.push_back(std::move(plain));
+    for (const auto& [what, count] : left_out_) {
+      loaded_.warnings.push_back("left out: " + what + ": " + with_thousands(static_cast<std::int64_t>(count)));
+    }
+    if (without_colour_ > 0) {
+      loaded_.warnings.push_back("corners whose colour is left out: " +
+                                 with_thousands(static_cast<std::int64_t>(without_colour_)));
+    }
+  }
+
+  ZipParts zip_;
+  std::map<std::string, Part> parts_;
+  LoadedMesh loaded_;
+  MeshBuilder builder_{loaded_};
+  std::map<std::string, std::size_t> left_out_;
+  std::size_t defined_ = 0;  // triangles
+  std::size_t placed_ = 0;
+  std::size_t components_ = 0;
+  std::size_t without_colour_ = 0;
+  bool is_clear_ = false;
+};
+
+}  // namespace
+
+Result<LoadedMesh> read_three_mf(std::span<const std::byte> bytes, Beside&) {
+  auto zip = ZipParts::open(bytes);
+  if (!zip) return zip.error();
+  return Package(std::move(*zip)).read();
+}
+
+#else
+
+bool has_three_mf() {
+  return false;
+}
+
+Result<LoadedMesh> read_three_mf(std::span<const std::byte>, Beside&) {
+  return make_error(ErrorCode::Unsupported, "Quoin was built without expat (Debian: libexpat1-dev), which reads 3MF");
+}
+
+#endif
+
+}  // namespace quoin::triangles

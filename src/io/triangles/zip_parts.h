@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <quoin/core/result.h>
+
+namespace quoin::triangles {
+
+/// The files in a zip file, by its directory at the end: stored, or compressed by deflate.
+/// Source: PKWARE, ".ZIP File Format Specification" 6.3.3. Lifetime: of the bytes.
+class ZipParts {
+ public:
+  /// Errors: BadFormat, with the offset; Unsupported for zip64 and files in several parts.
+  [[nodiscard]] static Result<ZipParts> open(std::span<const std::byte> zip);
+
+  /// Names as they stand in the directory.
+  [[nodiscard]] std::vector<std::string> names() const;
+  [[nodiscard]] bool has(const std::string& name) const { return entries_.contains(name); }
+  /// A file's content. Memory: its size, which its compressed bytes justify.
+  /// Errors: BadFormat; Unsupported for other compressions and for encrypted files. Requires: has(name).
+  [[nodiscard]] Result<std::vector<std::byte>> read(const std::string& name) const;
+
+ private:
+  struct Entry {
+    std::uint32_t flags = 0;
+    std::uint32_t method = 0;
+    std::uint32_t packed = 0;
+    std::uint32_t size = 0;
+    std::uint32_t at = 0;
+  };
+  std::span<const std::byte> bytes_;
+  std::map<std::string, Entry> entries_;
+};
+
+}  // namespace quoin::triangles
