@@ -199,12 +199,27 @@ void add_crossings(std::span<const Met> line, SolidVoxels rule, std::vector<Cros
   std::sort(crossings.begin() + static_cast<std::ptrdiff_t>(first), crossings.end());
 }
 
-Column column_of(std::span<const Met> met, SolidVoxels rule, Sides& sides) {
+/// Sorts by line, then along it. Returns where each line begins.
+std::vector<std::uint32_t> sort_by_lines(std::vector<Met>& met) {
+  std::vector<std::uint32_t> begin(kLines + 1, 0);
+  for (const Met& each : met) ++begin[each.line + std::size_t{1}];
+  for (std::size_t i = 1; i <= kLines; ++i) begin[i] += begin[i - 1];
+  std::vector<Met> sorted(met.size());
+  std::vector<std::uint32_t> next(begin.begin(), begin.end() - 1);
+  for (const Met& each : met) sorted[next[each.line]++] = each;
+  const auto comes_before = [](const Met& a, const Met& b) {
+    return std::tie(a.w, a.enters, a.triangle) < std::tie(b.w, b.enters, b.triangle);
+  };
+  for (std::size_t i = 0; i < kLines; ++i) {
+    std::sort(sorted.begin() + begin[i], sorted.begin() + begin[i + 1], comes_before);
+  }
+  met = std::move(sorted);
+  return begin;
+}
+
+Column column_of(std::span<const Met> met, std::vector<std::uint32_t> begin, SolidVoxels rule, Sides& sides) {
   Column column;
-  if (met.empty()) return column;
-  column.begin.assign(kLines + 1, 0);
-  for (const Met& each : met) ++column.begin[each.line + std::size_t{1}];
-  for (std::size_t i = 1; i <= kLines; ++i) column.begin[i] += column.begin[i - 1];
+  column.begin = std::move(begin);
   column.crossings.reserve(met.size());
   for (std::size_t i = 0; i < kLines; ++i) {
     add_crossings(met.subspan(column.begin[i], column.begin[i + 1] - column.begin[i]), rule, column.crossings, sides);
@@ -237,20 +252,19 @@ Column find_column(const Frame& frame, int axis, SolidVoxels rule, std::span<con
     };
     for_each_crossing(seen, is_mirrored, first_u, first_v, visit, touch);
   }
-  const auto order = [](const Met& m) { return std::tuple(m.line, m.w, m.enters, m.triangle); };
-  std::ranges::sort(met, {}, order);
+  std::vector<std::uint32_t> begin = met.empty() ? std::vector<std::uint32_t>() : sort_by_lines(met);
   // A line that touches one triangle may cross its neighbour.
   std::erase_if(touched, [&](const Met& each) {
     constexpr double kSame = 1e-9;
-    const auto near = std::ranges::lower_bound(met, std::pair(each.line, each.w - kSame), {},
-                                               [](const Met& m) { return std::pair(m.line, m.w); });
-    return near != met.end() && near->line == each.line && near->w <= each.w + kSame;
+    if (begin.empty()) return false;
+    const auto line = std::span(met).subspan(begin[each.line], begin[each.line + std::size_t{1}] - begin[each.line]);
+    return std::ranges::any_of(line, [&](const Met& m) { return std::abs(m.w - each.w) <= kSame; });
   });
   Sides sides;
   for (const Met& each : touched) {
     if (is_between_voxels(each.w)) sides.emplace(each.triangle, each.enters);
   }
-  Column column = column_of(met, rule, sides);
+  Column column = begin.empty() ? Column() : column_of(met, std::move(begin), rule, sides);
   for (const Met& each : touched) {
     const bool is_before = is_between_voxels(each.w) && !sides[each.triangle];
     column.touched.emplace_back(each.line, static_cast<int>(std::floor(each.w)) - (is_before ? 1 : 0));

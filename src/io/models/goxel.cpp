@@ -218,6 +218,16 @@ bool is_inside(Shape shape, const DVec3& p) {
   return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) <= 1.0;
 }
 
+/// A matrix by columns; the numbers that are missing are those of no turn.
+glm::dmat4 matrix_of(std::span<const std::byte> bytes) {
+  std::array<float, 16> numbers{};
+  for (std::size_t i = 0; i < 4; ++i) numbers[5 * i] = 1.0F;
+  read_numbers(bytes, numbers);
+  glm::dmat4 matrix(1.0);
+  for (std::size_t i = 0; i < 16; ++i) matrix[static_cast<int>(i / 4)][static_cast<int>(i % 4)] = double{numbers[i]};
+  return matrix;
+}
+
 /// The voxels that the box from -1 to 1 may reach, placed by a matrix.
 DBox box_of_shape(const glm::dmat4& placed) {
   DVec3 reach(0.0);
@@ -238,11 +248,7 @@ Status GoxelReader::put_shape(const Dict& dict, const Material& material, std::s
   const std::string_view name = text_of(dict.find("shape")->second);
   const auto shape = shape_named(name);
   const auto mat = dict.find("mat");
-  std::array<float, 16> numbers{};
-  for (std::size_t i = 0; i < 4; ++i) numbers[5 * i] = 1.0F;
-  if (mat != dict.end()) read_numbers(mat->second, numbers);
-  glm::dmat4 placed(1.0);
-  for (std::size_t i = 0; i < 16; ++i) placed[static_cast<int>(i / 4)][static_cast<int>(i % 4)] = double{numbers[i]};
+  const glm::dmat4 placed = matrix_of(mat != dict.end() ? mat->second : std::span<const std::byte>());
   if (!shape || glm::determinant(glm::dmat3(placed)) == 0.0) {
     ++left_out_[shape ? "shapes without a volume" : "shapes of unknown kinds"];
     return {};
