@@ -559,6 +559,43 @@ TEST_F(Tool, InfoAndRenderReadStandardInput) {
   }
 }
 
+TEST_F(Tool, DimensionsAreListedAndChosen) {
+  const std::string world = QUOIN_SOURCE_DIR "/tests/corpus/cases/minecraft-26.1-layout";
+  const Json all = Json::parse(run("info '" + world + "' --json").out);
+  EXPECT_EQ(all["dimension"], "minecraft:overworld");
+  EXPECT_EQ(all["dimensions"], Json({"minecraft:overworld", "minecraft:the_nether"}));
+  const ToolRun text = run("info '" + world + "' --dimension nether");
+  EXPECT_NE(text.out.find("Dimension: minecraft:the_nether (--dimension chooses another: minecraft:overworld)\n"),
+            std::string::npos)
+      << text.out;
+  for (const char* command : {"convert 'W' nether.glb", "convert 'W' nether.quoin",
+                              "render 'W' -o nether.png --size 64x64", "thumbnail 'W' small.png"}) {
+    std::string line = command;
+    line.replace(line.find('W'), 1, world);
+    const ToolRun missing = run(line + " --dimension end");
+    EXPECT_EQ(missing.status, 1) << command;
+    expect_one_error_line(missing);
+    EXPECT_NE(missing.err.find("cannot read the dimension minecraft:the_end"), std::string::npos) << missing.err;
+    EXPECT_EQ(run(line + " --dimension nether").status, 0) << command;
+  }
+  const ToolRun none = run("info tiny.vox --dimension nether");
+  EXPECT_EQ(none.status, 1);
+  EXPECT_EQ(Json::parse(run("info tiny.vox --json").out)["dimension"], Json());
+  EXPECT_NE(none.err.find("tiny.vox: cannot choose a dimension"), std::string::npos) << none.err;
+}
+
+TEST_F(Tool, AFileOfTrianglesThatIsNotRecognisedIsNoMisuseOfVoxel) {
+  std::ofstream(folder_.file("broken.ply")) << "hello";
+  const ToolRun result = run("convert broken.ply out.vox --voxel 1");
+  EXPECT_EQ(result.status, 1);
+  expect_one_error_line(result);
+  EXPECT_NE(result.err.find("broken.ply: its name ends in .ply, but its content is not ply"), std::string::npos)
+      << result.err;
+  const ToolRun misuse = run("convert tiny.vox out.qb --voxel 1");
+  EXPECT_EQ(misuse.status, 2);
+  EXPECT_NE(misuse.err.find("--voxel is for files of triangles, and the input is vox"), std::string::npos);
+}
+
 TEST_F(Tool, ConvertReadsAndWritesStandardStreams) {
   ASSERT_EQ(run("convert tiny.vox tiny.glb").status, 0);
   std::ofstream(folder_.file("nothing.txt")) << "of no format";
