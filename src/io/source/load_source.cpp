@@ -32,10 +32,10 @@ void warn_of_outside(const ChunkSource& source, const IBox& chunks, std::size_t 
   const std::size_t all = source.parts().size();
   if (read == all) return;
   const auto& spawn = source.info().spawn;
-  const bool is_at_spawn = !spawn || is_over(chunks, chunk_of(voxel_of(*spawn)));
-  const std::string where =
-      is_at_spawn ? "only the surroundings of its spawn are read: "
-                  : "there are no chunks around its spawn; only those around (" + text_of(chunks) + ") are read: ";
+  const bool is_at_spawn = spawn && is_over(chunks, chunk_of(voxel_of(*spawn)));
+  const std::string why = spawn ? "there are no chunks around its spawn" : "it has no spawn";
+  const std::string where = is_at_spawn ? "only the surroundings of its spawn are read: "
+                                        : why + "; only the chunks around (" + text_of(chunks) + ") are read: ";
   warnings.push_back(where + std::to_string(read) + " of " + std::to_string(all) +
                      " parts of the world (converted to .quoin it is all there)");
 }
