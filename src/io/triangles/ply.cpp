@@ -7,6 +7,7 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include <glm/vec4.hpp>
 
@@ -249,7 +250,11 @@ class PlyReader {
       return bad_at(values_.position(), "claims " + std::to_string(element.count) + " of " + element.name +
                                             ", and has bytes for " + std::to_string(values_.remaining() / least));
     }
-    if (element.name == "vertex") return read_vertices(element);
+    if (element.name == "vertex") {
+      // Their properties may differ, and indices would not say which of them they mean.
+      if (std::exchange(has_vertices_, true)) return bad_at(values_.position(), "a second element named vertex");
+      return read_vertices(element);
+    }
     const bool is_strips = element.name == "tristrips";
     const bool is_faces = element.name == "face" || is_strips;
     has_faces_ |= is_faces;
@@ -342,6 +347,7 @@ class PlyReader {
   std::vector<std::int64_t> list_;
   std::vector<std::size_t> corners_;
   bool has_faces_ = false;
+  bool has_vertices_ = false;
 };
 
 }  // namespace

@@ -463,6 +463,14 @@ std::string corpus_file(const char* name) {
   return bytes ? std::string(reinterpret_cast<const char*>(bytes->data()), bytes->size()) : std::string();
 }
 
+TEST(Triangles, RefuseSecondVertexElement) {
+  const auto bytes = read_file(fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "cases" / "fuzz-ply-unsound.ply");
+  ASSERT_TRUE(bytes.has_value());
+  const auto loaded = read_mesh(*bytes);
+  ASSERT_FALSE(loaded.has_value());
+  EXPECT_NE(to_string(loaded.error()).find("a second element named vertex"), std::string::npos);
+}
+
 TEST(OffFiles, HaveCornersFacesAndColours) {
   const LoadedMesh plain = mesh_of(corpus_file("off"), std::nullopt);
   EXPECT_EQ(plain.format, "off");
