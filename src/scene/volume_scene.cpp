@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -75,9 +77,15 @@ float mix(float a, float b, float share) {
 Result<Volume> with_even_spacing(const Volume& volume, const Lattice& lattice, double step, Threads threads) {
   double samples = 1.0;
   for (int axis = 0; axis < 3; ++axis) samples *= station_count(volume.size[axis], lattice.spacing[axis], step);
+  // A small file whose spacings differ by a factor of a million must not take memory and minutes.
   constexpr double kMostSamples = 0x1p31;
-  if (!(samples <= kMostSamples)) {
-    return make_error(ErrorCode::LimitExceeded, "with even spacing the volume has more than 2^31 samples");
+  constexpr double kMostTimes = 1024.0;
+  constexpr double kFew = 0x1p22;
+  const double most = std::min(kMostSamples, kFew + kMostTimes * static_cast<double>(volume.values.size()));
+  if (!(samples <= most)) {
+    return make_error(ErrorCode::LimitExceeded,
+                      "cannot resample the volume: its spacings differ so much that it would have more than " +
+                          std::to_string(static_cast<std::int64_t>(most)) + " samples; make them more alike");
   }
   const std::vector<Between> x = stations(volume.size.x, lattice.spacing.x, step);
   const std::vector<Between> y = stations(volume.size.y, lattice.spacing.y, step);

@@ -43,7 +43,7 @@ glm::dmat4 placed(const glm::dmat3& axes, DVec3 spacing, IVec3 size) {
 }
 
 TEST(VolumeScene, SpacingsThatWouldNeedTooManySamplesAreRefusedBeforeAnyIsMade) {
-  for (const double spacing : {1e-9, 1e-25}) {
+  for (const double spacing : {1e-7, 1e-9, 1e-25}) {
     const auto scene = scene_from_volume(ball({2, 2, 2}, placed(glm::dmat3(1.0), {spacing, 1, 1}, {2, 2, 2})), {64.0F});
     ASSERT_FALSE(scene);
     EXPECT_EQ(scene.error().code, ErrorCode::LimitExceeded) << scene.error().message;
