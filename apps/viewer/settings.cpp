@@ -90,6 +90,8 @@ void read_light(const Json& object, LightOptions& light) {
   read_flag(object, "lit", is_lit);  // what earlier versions wrote
   if (!is_lit) light.shading = Shading::Unlit;
   read_name(object, "shading", kShadings, light.shading);
+  // Shadings for debugging are not kept: the next start would look broken.
+  if (light.shading == Shading::Occlusion || light.shading == Shading::Normals) light.shading = Shading::Lit;
   read_name(object, "model", kLightModels, light.model);
   read_number(object, "least_light", 0.0, 100.0, light.least_light);
   read_flag(object, "shadows", light.shadows);

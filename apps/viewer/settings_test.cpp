@@ -59,6 +59,14 @@ TEST(Settings, ComeBackAsTheyWere) {
   EXPECT_EQ(back.recent[1], "/tmp/a.vox");
 }
 
+TEST(Settings, ForgetsShadingsForDebugging) {
+  for (const Shading shading : {Shading::Occlusion, Shading::Normals}) {
+    Settings settings;
+    settings.light.shading = shading;
+    EXPECT_EQ(parse_settings(to_json(settings)).light.shading, Shading::Lit);
+  }
+}
+
 TEST(Settings, WhatEarlierVersionsWroteIsRead) {
   const LightOptions light = parse_settings(R"({"light": {"lit": false, "shadows": true, "occlusion": false}})").light;
   EXPECT_EQ(light.shading, Shading::Unlit);
