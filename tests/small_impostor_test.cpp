@@ -34,6 +34,8 @@ struct SmallModel {
   std::string name;
   Scene scene;
   Scene white;
+  std::unique_ptr<CpuRenderer> renderer;  // of both, which keep their impostors
+  std::unique_ptr<CpuRenderer> white_renderer;
   double radius = 0.0;
   // Fields are held less exactly than blocks: surfels that are drawn one by one leave a few gaps where surfaces meet,
   // and cells are up to half a sample thicker than the surface.
@@ -54,6 +56,8 @@ struct SmallModel {
       properties.colour = {255, 255, 255, 255};
       white.types.replace(type, properties);
     }
+    renderer = std::make_unique<CpuRenderer>(scene);
+    white_renderer = std::make_unique<CpuRenderer>(white);
   }
 };
 
@@ -150,11 +154,10 @@ Camera camera_at(const SmallModel& model, DVec3 direction, double pixels, int si
   return camera;
 }
 
-// Takes a picture of a scene; with `detail` all is drawn from impostors.
-using Taker = std::function<Image(const Scene&, const Camera&, RenderOptions)>;
-
-Image take_by_processor(const Scene& scene, const Camera& camera, RenderOptions options) {
-  return taken(scene, camera, options).colour;
+Image taken_by(const CpuRenderer& renderer, const Camera& camera, const RenderOptions& options) {
+  auto picture = renderer.render(camera, options);
+  EXPECT_TRUE(picture.has_value());
+  return picture ? std::move(picture->colour) : Image{};
 }
 
 RenderOptions all_far(RenderOptions options) {
@@ -174,14 +177,14 @@ Vec3 linear_at(const Image& image, std::size_t pixel) {
   return linear_colour({image.rgb[3 * pixel], image.rgb[3 * pixel + 1], image.rgb[3 * pixel + 2], 255});
 }
 
-Seen seen_in(const SmallModel& model, const Camera& camera, RenderOptions options, const Taker& take) {
+Seen seen_in(const SmallModel& model, const Camera& camera, const RenderOptions& options) {
   RenderOptions flat = options;
   flat.light.shading = Shading::Unlit;
   flat.light.sky_brightness = 0.0;
-  const Image covered = take(model.white, camera, flat);
+  const Image covered = taken_by(*model.white_renderer, camera, flat);
   Seen seen;
   for (std::size_t i = 0; i < covered.rgb.size() / 3; ++i) seen.coverage.push_back(linear_at(covered, i).x);
-  seen.image = take(model.scene, camera, options);
+  seen.image = taken_by(*model.renderer, camera, options);
   return seen;
 }
 
@@ -249,7 +252,7 @@ struct Views {
   bool is_nightly = std::getenv("QUOIN_NIGHTLY") != nullptr;
 };
 
-Findings look_at(const SmallModel& model, int pixels, const Views& views, const Taker& take) {
+Findings look_at(const SmallModel& model, int pixels, const Views& views) {
   Findings found;
   const int size = pixels + 8;
   // Small images take little time, and few pixels say little.
@@ -258,11 +261,11 @@ Findings look_at(const SmallModel& model, int pixels, const Views& views, const 
     const Camera camera = camera_at(model, direction_of(i, views.directions), pixels, size, 0.31 * i);
     RenderOptions options = sized(size, size);
     options.samples = views.samples;
-    const Seen truth = seen_in(model, camera, options, take_by_processor);
-    const Seen seen = seen_in(model, camera, all_far(options), take);
+    const Seen truth = seen_in(model, camera, options);
+    const Seen seen = seen_in(model, camera, all_far(options));
     RenderOptions single = all_far(options);
     single.samples = 1;
-    const Seen once = seen_in(model, camera, single, take);
+    const Seen once = seen_in(model, camera, single);
     const std::vector<std::size_t> inside = interior_of(truth, size);
     found.interior += static_cast<std::int64_t>(inside.size());
     for (const std::size_t pixel : inside) found.holes += once.coverage[pixel] < 0.5F;
@@ -276,9 +279,9 @@ std::vector<int> sizes_of(const Views& views) {
   return {48, 21, 8};
 }
 
-void expect_like_the_traced_image(const SmallModel& model, const Taker& take, const Views& views = {}) {
+void expect_like_the_traced_image(const SmallModel& model, const Views& views = {}) {
   for (const int pixels : sizes_of(views)) {
-    const Findings found = look_at(model, pixels, views, take);
+    const Findings found = look_at(model, pixels, views);
     std::printf("%s, %d px: holes %.3f %% of %lld, overlap %.3f (worst %.3f), colour %.1f (worst %.1f)\n",
                 model.name.c_str(), pixels, 100.0 * found.hole_share(), static_cast<long long>(found.interior),
                 found.overlap(), found.worst_overlap, found.colour(), found.worst_colour);
@@ -290,7 +293,7 @@ void expect_like_the_traced_image(const SmallModel& model, const Taker& take, co
 
 TEST(SmallImpostors, LookLikeTheTracedImage) {
   for (const Source& source : made_models()) {
-    expect_like_the_traced_image(SmallModel(source.name, source.make()), take_by_processor);
+    expect_like_the_traced_image(SmallModel(source.name, source.make()));
   }
 }
 
@@ -299,7 +302,7 @@ TEST(SmallImpostors, OfRealFilesLookLikeTheTracedImage) {
   for (const char* name : kFiles) {
     auto loaded = load_scene(folder_of_files() / name);
     ASSERT_TRUE(loaded.has_value()) << name;
-    expect_like_the_traced_image(SmallModel(name, std::move(loaded->scene)), take_by_processor);
+    expect_like_the_traced_image(SmallModel(name, std::move(loaded->scene)));
   }
 }
 
@@ -322,8 +325,8 @@ Changes changes_of(const SmallModel& model, int direction, double from_pixels, d
   Image last_traced;
   for (double pixels = from_pixels; pixels > to_pixels; pixels /= 1.005) {
     const Camera camera = camera_at(model, direction_of(direction, 24), pixels, kSize, 0.31 * direction);
-    Image traced = taken(model.scene, camera, sized(kSize, kSize)).colour;
-    Image drawn = taken(model.scene, camera, all_far(sized(kSize, kSize))).colour;
+    Image traced = taken_by(*model.renderer, camera, sized(kSize, kSize));
+    Image drawn = taken_by(*model.renderer, camera, all_far(sized(kSize, kSize)));
     if (!last.rgb.empty()) {
       // Over as many pixels as the model's sphere spans.
       const double scale = kSize * kSize / (pixels * pixels);
