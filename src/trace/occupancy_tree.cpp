@@ -148,6 +148,10 @@ struct OccupancyTree::Impl {
   std::vector<trace::FlatChunk> flat_nodes;
   const ChunkNode* known_nodes = nullptr;  // where they were when `flat_nodes` was made
   IBox flat_chunks;
+  // A chunk far from all others makes the tables too large. They are kept without it until it is gone again, with the
+  // changes that they have not got.
+  bool is_flat = false;
+  std::vector<ChunkBricks> missed;
   trace::TreeView view{};
   bool is_built = false;  // until then what is kept may double: finish_build trims it
 
@@ -578,31 +582,49 @@ struct OccupancyTree::Impl {
   void finish(std::span<const ChunkBricks> changed) {
     renew_tables(changed);
     QUOIN_ASSERT(flat_chunks.empty() || flat_nodes.size() == volume(flat_chunks.size()), "tables of their chunks");
-    if (!flat_chunks.empty()) view = make_view(flat, flat_nodes.data(), bricks.middle(), bounds);
+    if (is_flat) view = make_view(flat, flat_nodes.data(), bricks.middle(), bounds);
   }
 
-  [[nodiscard]] const trace::TreeView* kernel_view() const { return flat_chunks.empty() ? nullptr : &view; }
+  [[nodiscard]] const trace::TreeView* kernel_view() const { return is_flat ? &view : nullptr; }
+
+  void drop_tables() {
+    flat = {};
+    flat_nodes = {};
+    flat_chunks = {};
+    missed = {};
+  }
+  // Keeps changes for tables that are not in use, as long as these are few.
+  void miss(std::span<const ChunkBricks> changed) {
+    constexpr std::size_t kMostMissed = 1024;
+    if (flat_chunks.empty()) return;
+    missed.insert(missed.end(), changed.begin(), changed.end());
+    if (missed.size() > kMostMissed) drop_tables();
+  }
+  void put_changes(std::span<const ChunkBricks> changed) {
+    for (const auto& [chunk, changed_bricks] : changed) {
+      if (flat_chunks.contains(chunk)) flatten(chunk, changed_bricks);
+    }
+  }
 
   void renew_tables(std::span<const ChunkBricks> changed) {
     bounds = chunk_boxes.bounds();
     const IBox chunks = bounds.empty() ? IBox{} : IBox{chunk_of(bounds.min), chunk_of(bounds.max - 1) + 1};
     // As a tree built from scratch would have it.
-    if (!can_be_flat(chunks)) {
-      flat = {};
-      flat_nodes = {};
-      flat_chunks = {};
-      return;
-    }
+    is_flat = can_be_flat(chunks);
+    if (!is_flat) return miss(changed);
     const bool is_little = !flat_chunks.empty() && volume(chunks.size()) < volume(flat_chunks.size()) / 4;
-    if (flat_chunks.empty() || is_little) return make_flat(chunks);
+    if (flat_chunks.empty() || (is_little && !can_be_flat(flat_chunks))) {
+      missed = {};
+      return make_flat(chunks);
+    }
     if (!(intersect(chunks, flat_chunks) == chunks)) move_flat(with_room(chunks));
     if (chunk_nodes.data() != known_nodes) {
       known_nodes = chunk_nodes.data();
       for (const auto& [chunk, box] : chunk_boxes) name_node(chunk);
     }
-    for (const auto& [chunk, changed_bricks] : changed) {
-      if (flat_chunks.contains(chunk)) flatten(chunk, changed_bricks);
-    }
+    put_changes(missed);
+    missed.clear();
+    put_changes(changed);
   }
 };
 

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include <benchmark/benchmark.h>
@@ -79,6 +80,38 @@ void one_voxel(benchmark::State& state) {
   expect_up_to_date(tracer, scene);
 }
 BENCHMARK(one_voxel)->Name("scene/update10000/one_voxel")->Unit(benchmark::kMicrosecond);
+
+// One world of 16x4x16 chunks, with default threads: a voxel far from all others is set and removed. Both are timed.
+void edit_far(benchmark::State& state) {
+  Scene scene;
+  VoxelProperties properties;
+  fail_unless(scene.types.add(properties).has_value(), "no type");
+  SceneGrid world;
+  for (int x = 0; x < 16; ++x) {
+    for (int z = 0; z < 16; ++z) {
+      const IVec3 corner{64 * x, 0, 64 * z};
+      world.grid.fill_box({corner, corner + IVec3{63, 20 + x + z, 63}}, 1);
+    }
+  }
+  const GridHandle handle = scene.add_grid(std::move(world));
+  scene.add_instance({"", handle});
+  SceneTracer tracer(scene);
+  Grid& grid = scene.edit(handle).grid;
+  bool is_there = false;
+  for (auto _ : state) {
+    is_there = !is_there;
+    grid.set({1'000'000, 77, -3'000}, is_there ? 1 : kAir);
+    fail_unless(tracer.update(), "the edit was not seen");
+  }
+}
+BENCHMARK(edit_far)->Name("scene/edit_far")->Unit(benchmark::kMicrosecond);
+
+void update_idle(benchmark::State& state) {
+  const Scene scene = mixed_scene(kInstances);
+  SceneTracer tracer(scene);
+  for (auto _ : state) fail_unless(!tracer.update(), "something changed");
+}
+BENCHMARK(update_idle)->Name("scene/update_idle")->Unit(benchmark::kMicrosecond);
 
 void nothing(benchmark::State& state) {
   const Scene scene = mixed_scene(kInstances);

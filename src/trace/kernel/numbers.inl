@@ -47,7 +47,8 @@ constexpr int kCodeY = 4 + 256 * 8;
 constexpr int kCodeZ = 16 + 256 * 64;
 constexpr int kLeft = 256 * (4 + 4 * 8 + 4 * 64);
 
-// Four numbers side by side: x, y, z and one that means nothing.
+// Four numbers side by side: x, y, z and an unused one. Divisors have 1 there: processors take a slow path for
+// subnormal numbers, in lanes without data too.
 using F4 = float __attribute__((vector_size(16)));
 using I4 = std::int32_t __attribute__((vector_size(16)));
 using D4 = double __attribute__((vector_size(32)));
@@ -110,7 +111,7 @@ inline RayNumbers read_ray(const TreeView& tree, const Ray& ray) {
   std::memcpy(&position, &ray.origin.x, sizeof position);
   std::memcpy(&direction, &ray.origin.z, sizeof direction);
   std::memcpy(&corner, tree.corner, sizeof corner);
-  const F4 d = __builtin_convertvector(__builtin_shufflevector(direction, direction, 1, 2, 3, 3), F4);
+  const F4 d = __builtin_convertvector(__builtin_shufflevector(direction, D4{1.0, 1.0, 1.0, 1.0}, 1, 2, 3, 4), F4);
   const F4 size = max4(d, -d);
   return {position - corner, d, size, greatest3(size)};
 }

@@ -463,7 +463,8 @@ inline SetUp set_up_path(const TreeView& tree, const Ray& ray, double max_t, Pat
   out.forward = (d > 0.0F) & ~still;
   // A still axis never comes to a plane.
   out.origin = still ? whole + 0.5F : mirrored_planes(origin, out.backward);
-  out.inverse = still ? all4(kStillInverse) : 1.0F / size;
+  const F4 inverse = 1.0F / (still ? all4(1.0F) : size);
+  out.inverse = still ? all4(kStillInverse) : inverse;
   const PathBox box = box_of(tree, out, origin, still ? all4(0.0F) : d, limit, greatest);
   return clip_path(out, box, still ? all4(0.0F) : size, moved);
 }
