@@ -268,7 +268,7 @@ TEST_F(ToolRender, WhatNoOptionSaysTheFileSays) {
   file.with("rOBJ", [&](auto& out) { out.dict({{"_type", "_env"}, {"_mode", "2"}}); });
   file.with("rOBJ", [&](auto& out) { out.dict({{"_type", "_ibl"}, {"_path", "C:\\hdr\\green.hdr"}, {"_i", "1"}}); });
   ASSERT_TRUE(write_file(file.file(), folder_.file("look.vox")));
-  EXPECT_NE(drawn(base)["warnings"].dump().find("does not lie beside it"), std::string::npos);
+  EXPECT_NE(drawn(base)["warnings"].dump().find("uniform sky instead of the file's sky"), std::string::npos);
   std::ofstream(folder_.file("green.hdr"), std::ios::binary) << "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n"
                                                              << std::string("\0\x80\0\x80", 4);
   drawn(base);

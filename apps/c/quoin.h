@@ -219,6 +219,7 @@ typedef struct quoin_load_options {
   double exaggeration;     /* heights times this; 0: 1 */
   int32_t ground_depth;    /* voxels of ground below the lowest height, up to 4,096; 0: 8 */
   int32_t smooth_ground;   /* densities, whose surface is smooth, rather than voxels */
+  int32_t allow_outside_files; /* the file may name files outside its folder: for input from a trusted source only */
 } quoin_load_options;
 
 typedef enum quoin_fill {

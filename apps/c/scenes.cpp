@@ -162,6 +162,7 @@ LoadOptions options_of(const quoin_load_options& given) {
                             given.raw_big_endian != 0 ? std::endian::big : std::endian::little};
   }
   if (given.heights != QUOIN_HEIGHTS_NONE) options.heights = heights_of(given);
+  if (given.allow_outside_files != 0) options.sidecar_files = SidecarFiles::Anywhere;
   return options;
 }
 

@@ -53,6 +53,12 @@ void add_quiet_option(CLI::App& command) {
       "-q,--quiet", [] { be_quiet(); }, "Print errors alone, and what --json prints; no progress, no warnings");
 }
 
+void add_outside_files_option(CLI::App& command, LoadOptions& options) {
+  command.add_flag_callback(
+      "--allow-outside-files", [&options] { options.sidecar_files = SidecarFiles::Anywhere; },
+      "Read files that IN names outside its folder (only for input that you trust)");
+}
+
 namespace {
 
 /// Adds options that say how heights become a landscape; any of them makes the input one.
@@ -137,6 +143,7 @@ void add_common_options(CLI::App& command, CommonOptions& options) {
       ->check(not_negative_whole())
       ->each([&options](const std::string&) { options.takes_frame = true; });
   add_height_options(command, options.load.heights);
+  add_outside_files_option(command, options.load);
   command.add_flag("--json", options.json, "Print one JSON object instead of text");
   add_quiet_option(command);
   command.add_option("--threads", options.threads.count, "Threads to use (default: all)")->check(CLI::Range(1U, 1024U));

@@ -34,6 +34,9 @@ void add_dimension_option(CLI::App& command, LoadOptions& load);
 /// Adds IN, --json, --threads, --hidden, --dimension and --frame to a command.
 void add_common_options(CLI::App& command, CommonOptions& options);
 
+/// Adds --allow-outside-files.
+void add_outside_files_option(CLI::App& command, LoadOptions& options);
+
 /// What --force is for.
 inline constexpr const char* kForceHelp = "Replace OUT even where it holds a model or a world";
 

@@ -80,7 +80,9 @@ bool heeds_iso(const CommonOptions& options) {
 
 Result<Volume> read_input_volume(const CommonOptions& options, const Progress& progress) {
   if (options.load.raw) return read_raw_volume(options.input, *options.load.raw, {}, progress);
-  return read_volume(options.input, {}, progress);
+  VolumeOptions allowed;
+  allowed.sidecar_files = options.load.sidecar_files;
+  return read_volume(options.input, allowed, progress);
 }
 
 }  // namespace quoin::tool

@@ -66,8 +66,8 @@ Stamps stamps_of(const std::vector<fs::path>& paths) {
   return stamps;
 }
 
-std::vector<fs::path> files_read(const fs::path& input) {
-  std::vector<fs::path> files = files_read_beside(input);
+std::vector<fs::path> files_read(const fs::path& input, SidecarFiles allowed) {
+  std::vector<fs::path> files = files_read_beside(input, allowed);
   files.insert(files.begin(), input);
   return files;
 }

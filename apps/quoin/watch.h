@@ -22,7 +22,7 @@ using Stamps = std::map<std::filesystem::path, std::optional<FileStamp>>;
 [[nodiscard]] Stamps stamps_of(const std::vector<std::filesystem::path>& paths);
 
 /// A file, and all that is read beside it, as far as can be known before.
-[[nodiscard]] std::vector<std::filesystem::path> files_read(const std::filesystem::path& input);
+[[nodiscard]] std::vector<std::filesystem::path> files_read(const std::filesystem::path& input, SidecarFiles allowed);
 
 /// Does a piece of work, and again whenever what it read has changed and rests, until the program is interrupted, which
 /// ends it. `read`: what it will read, as far as is known. Returns only where the first time was wrong usage. Files are

@@ -51,6 +51,7 @@
 #include <quoin/io/mesh_file.h>
 #include <quoin/io/picture_files.h>
 #include <quoin/io/scene_file.h>
+#include <quoin/io/sidecar_file.h>
 #include <quoin/io/volume.h>
 #include <quoin/io/vox.h>
 #include <quoin/light/light_colour.h>

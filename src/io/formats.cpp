@@ -168,8 +168,10 @@ template <class Source>
 Result<LoadedScene> read_volume_as_scene(const Source& source, const LoadOptions& options, Threads threads,
                                          const Progress& progress) {
   const Progress reading = part_of(progress, 0.0, 0.5);
+  VolumeOptions allowed;
+  allowed.sidecar_files = options.sidecar_files;
   const auto volume =
-      options.raw ? read_raw_volume(source, *options.raw, {}, reading) : read_volume(source, {}, reading);
+      options.raw ? read_raw_volume(source, *options.raw, allowed, reading) : read_volume(source, allowed, reading);
   if (!volume) return volume.error();
   const auto iso = surface_value(*volume, options.iso);
   if (!iso) return iso.error();
@@ -232,11 +234,8 @@ bool is_triangles(const std::optional<FileFormat>& format) {
   return format && format_info(*format).is_mesh;
 }
 
-/// `source`: a path, or bytes.
-template <class Source>
-Result<LoadedScene> read_triangles(const Source& source, const std::string& name, const LoadOptions& options,
-                                   Threads threads, const Progress& progress) {
-  auto loaded = read_mesh(source, options.mesh.up);
+Result<LoadedScene> scene_of_triangles(Result<LoadedMesh> loaded, const std::string& name, const LoadOptions& options,
+                                       Threads threads, const Progress& progress) {
   if (!loaded) return loaded.error();
   return triangles::scene_from_mesh(std::move(*loaded), options.mesh, name, threads, progress);
 }
@@ -270,7 +269,9 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
   if (format == FileFormat::Schematic) return minecraft::read_schematic(bytes, progress);
   if (format == FileFormat::Vdb) return vdb::read_vdb(bytes, options, threads, progress);
   if (const ReadModel read = model_reader(format); read != nullptr) return read(bytes);
-  if (is_triangles(format)) return read_triangles(bytes, "mesh", options, threads, progress);
+  if (is_triangles(format)) {
+    return scene_of_triangles(read_mesh(bytes, options.mesh.up), "mesh", options, threads, progress);
+  }
   if (is_volume(format)) return read_volume_as_scene(bytes, options, threads, progress);
   Error error = unrecognised(bytes, path);
   // The reader knows more of what else goes by this name.
@@ -508,13 +509,13 @@ Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptio
   return read_bytes({}, bytes, detect_format(bytes), options, threads, progress);
 }
 
-std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path) {
+std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path, SidecarFiles allowed) {
   const auto format = detect_format(path);
   if (!format || !*format) return {};
   if (**format == FileFormat::Scene) return files_named_in_scene(path);
   if (**format == FileFormat::World) return {path.string() + "-wal"};
   if (is_triangles(*format)) {
-    const auto mesh = read_mesh(path);
+    const auto mesh = read_mesh(path, {}, allowed);
     return mesh ? mesh->beside : std::vector<std::filesystem::path>();
   }
   return is_volume(*format) ? files_of_pair(path) : std::vector<std::filesystem::path>();
@@ -542,8 +543,10 @@ Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOpti
   // Of the whole file, which some formats are known by only then, and which may be another by now.
   const auto of_all = detect_format(*bytes);
   if (of_all == FileFormat::Scene) return read_scene_file(path, options, threads, progress);
-  if (is_triangles(of_all) || (!of_all && is_triangles(*format)))
-    return with_path(read_triangles(path, stem_of_file(path), options, threads, progress), path);
+  if (is_triangles(of_all) || (!of_all && is_triangles(*format))) {
+    auto mesh = read_mesh(path, options.mesh.up, options.sidecar_files);
+    return with_path(scene_of_triangles(std::move(mesh), stem_of_file(path), options, threads, progress), path);
+  }
   return with_path(read_bytes(path, *bytes, of_all, options, threads, progress), path);
 }
 

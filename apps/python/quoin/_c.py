@@ -95,7 +95,8 @@ class LoadOptions(ctypes.Structure):
                 ("raw_shape", ctypes.c_int32 * 3), ("raw_scalar", ctypes.c_int32), ("raw_big_endian", ctypes.c_int32),
                 ("heights", ctypes.c_int32), ("metres_per_level", ctypes.c_double),
                 ("metres_per_pixel", ctypes.c_double), ("metres_per_voxel", ctypes.c_double),
-                ("exaggeration", ctypes.c_double), ("ground_depth", ctypes.c_int32), ("smooth_ground", ctypes.c_int32)]
+                ("exaggeration", ctypes.c_double), ("ground_depth", ctypes.c_int32), ("smooth_ground", ctypes.c_int32),
+                ("allow_outside_files", ctypes.c_int32)]
 
 
 class Triangles(ctypes.Structure):

@@ -382,7 +382,7 @@ WatchedWork run_one(ConvertOptions& options, const ManyOptions& many) {
   const bool is_to_stream = options.output == kStandardStream;
   StandardStreams streams;
   WatchedWork work;
-  if (options.watch) work.read = files_read(options.common.input);
+  if (options.watch) work.read = files_read(options.common.input, options.common.load.sidecar_files);
   const auto ended = [&](int status) {
     work.status = status;
     return work;
@@ -434,7 +434,8 @@ int run(ConvertOptions& options, const ManyOptions& many) {
   Converted done;
   const auto work = [&] { return many.inputs.empty() ? run_one(options, many) : run_many(options, many, done); };
   if (!options.watch) return work().status;
-  return watch(many.inputs.empty() ? files_read(options.common.input) : many.inputs, work);
+  const SidecarFiles allowed = options.common.load.sidecar_files;
+  return watch(many.inputs.empty() ? files_read(options.common.input, allowed) : many.inputs, work);
 }
 
 /// How meshes are made.

@@ -151,7 +151,7 @@ void run_task(const ConvertOptions& wanted, const FormatInfo& format, Task& task
 void leave_out(const Converted& done, std::vector<Task>& tasks, WatchedWork& work) {
   for (Task& task : tasks) {
     work.written.push_back(task.output);
-    const std::vector<fs::path> read = files_read(task.input);
+    const std::vector<fs::path> read = files_read(task.input, options.common.load.sidecar_files);
     work.read.insert(work.read.end(), read.begin(), read.end());
     task.stamps = stamps_of(read);
   }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <quoin/io/picture_files.h>
+#include <quoin/io/sidecar_file.h>
 
 #include "parse.h"
 #include "render/text_options.h"
@@ -99,10 +100,12 @@ ToneCurve tone_of(const std::string& name) {
   return name == "aces" ? ToneCurve::Aces : ToneCurve::Neutral;
 }
 
-// The picture of a .vox file's sky, if it lies beside it: MagicaVoxel has it in a folder of its own.
-Result<RadianceImage> environment_beside(const std::filesystem::path& input, std::string name) {
-  std::ranges::replace(name, '\\', '/');
-  return read_radiance(input.parent_path() / std::filesystem::path(name).filename());
+// The image of a .vox file's sky, if it lies in the file's folder: MagicaVoxel has it in a folder of its own.
+Result<RadianceImage> environment_beside(const CommonOptions& common, const std::string& name) {
+  const std::string file = name.substr(name.find_last_of("/\\") + 1);
+  const auto path = sidecar_path(common.input, file, common.load.sidecar_files);
+  if (!path) return path.error();
+  return read_radiance(*path);
 }
 
 void take_file_look(const FileLook& file, PathPlan& plan) {
@@ -118,7 +121,7 @@ void take_file_look(const FileLook& file, PathPlan& plan) {
   }
 }
 
-Status take_sky(const PathArguments& arguments, const LoadedScene& loaded, const std::filesystem::path& input,
+Status take_sky(const PathArguments& arguments, const LoadedScene& loaded, const CommonOptions& common,
                 PathPlan& plan) {
   PathOptions& options = plan.options;
   if (arguments.has("--sky")) {
@@ -137,12 +140,12 @@ Status take_sky(const PathArguments& arguments, const LoadedScene& loaded, const
     options.environment = std::make_shared<const RadianceImage>(std::move(*image));
     options.environment_turn_radians = arguments.sky_turn_degrees * kRadians;
   } else if (options.sky == SkyModel::Environment) {
-    auto image = environment_beside(input, loaded.look->environment);
+    auto image = environment_beside(common, loaded.look->environment);
     if (image) {
       options.environment = std::make_shared<const RadianceImage>(std::move(*image));
     } else {
-      plan.warnings.push_back("the file's sky \"" + loaded.look->environment +
-                              "\" does not lie beside it: a uniform sky instead");
+      plan.warnings.push_back("uniform sky instead of the file's sky \"" + loaded.look->environment +
+                              "\": " + image.error().message);
       options.sky = SkyModel::Uniform;
     }
   }
@@ -256,7 +259,7 @@ bool is_sky_file(const PathArguments& arguments) {
 }
 
 Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions& render, const LoadedScene& loaded,
-                            InstanceFilter filter, const std::filesystem::path& input, std::optional<int> file_camera) {
+                            InstanceFilter filter, const CommonOptions& common, std::optional<int> file_camera) {
   PathPlan plan;
   PathOptions& options = plan.options;
   options.sun = render.light.sun;
@@ -277,7 +280,7 @@ Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions&
   }
   if (!has_look || arguments.has("--sun-angle")) options.sun_angle_radians = arguments.sun_angle_degrees * kRadians;
   options.lamp_brightness = render.light.lamp_brightness;
-  if (Status sky = take_sky(arguments, loaded, input, plan); !sky) return sky.error();
+  if (Status sky = take_sky(arguments, loaded, common, plan); !sky) return sky.error();
   if (arguments.has("--sky-brightness")) options.sky_brightness = render.light.sky_brightness;
   take_lens(arguments, loaded, file_camera, plan);
 

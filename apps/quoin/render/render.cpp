@@ -226,7 +226,7 @@ Result<VulkanRenderer> device_for(const Scene& scene, const RenderArguments& arg
 Status draw_by_paths(const LoadedScene& loaded, const RenderArguments& arguments, const RenderOptions& options,
                      const std::vector<Shot>& shots, Stopwatch& watch, Outcome& outcome) {
   const InstanceFilter filter = arguments.common.instances();
-  auto plan = plan_paths(arguments.path, options, loaded, filter, arguments.common.input, arguments.file_camera);
+  auto plan = plan_paths(arguments.path, options, loaded, filter, arguments.common, arguments.file_camera);
   if (!plan) return plan.error();
   if (has_ending(arguments.output, ".jpg")) plan->is_transparent = false;  // it has no alpha
   for (std::string& warning : plan->warnings) {
@@ -462,7 +462,8 @@ Result<Outcome> render_from(RenderArguments& arguments, StandardStreams& streams
 WatchedWork run_render(RenderArguments& arguments) {
   StandardStreams streams;
   WatchedWork work;
-  if (arguments.watch) work.read = files_read(arguments.common.input);
+  const SidecarFiles allowed = arguments.common.load.sidecar_files;
+  if (arguments.watch) work.read = files_read(arguments.common.input, allowed);
   const auto outcome = render_from(arguments, streams);
   if (!outcome) {
     const Error error = streams.named(outcome.error());
@@ -507,7 +508,8 @@ void add_render_command(CLI::App& app, int& status) {
       return;
     }
     const auto work = [&] { return run_render(*arguments); };
-    status = arguments->watch ? watch(files_read(arguments->common.input), work) : work().status;
+    const CommonOptions& common = arguments->common;
+    status = arguments->watch ? watch(files_read(common.input, common.load.sidecar_files), work) : work().status;
   });
 }
 

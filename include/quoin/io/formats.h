@@ -104,8 +104,9 @@ struct FormatInfo {
 
 /// What load_scene reads beside the file itself: the files that a scene file names, which need not be there, the values
 /// of a NIfTI pair, a world's -wal, and the materials, buffers and pictures of a mesh. Nothing where the file cannot be
-/// read. Cost: of a mesh that of read_mesh.
-[[nodiscard]] std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path);
+/// read. Cost: of a mesh that of read_mesh. `allowed`: as LoadOptions::sidecar_files.
+[[nodiscard]] std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path,
+                                                                   SidecarFiles allowed = SidecarFiles::WithinFolder);
 
 /// Writes a scene as a file of voxels, in the format of the name's extension: .quoin (write_world) or .json
 /// (write_scene_file), both without loss, .vox (write_vox), or one of other programs: .qb, .gox, .vxl, .binvox, .schem,

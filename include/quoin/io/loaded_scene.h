@@ -9,6 +9,7 @@
 
 #include <quoin/core/vec.h>
 #include <quoin/io/heights.h>
+#include <quoin/io/sidecar_file.h>
 #include <quoin/io/volume.h>
 #include <quoin/scene/camera.h>
 #include <quoin/scene/look.h>
@@ -79,6 +80,8 @@ struct LoadOptions {
   /// .hgt files, which say it by their name and size, it only says how they become voxels.
   std::optional<HeightOptions> heights = std::nullopt;
   MeshLoadOptions mesh{};  ///< of files of triangles
+  /// Which files the input may name: buffers, images, materials, values, models of a scene file.
+  SidecarFiles sidecar_files = SidecarFiles::WithinFolder;
 };
 
 /// What saving a scene gave.

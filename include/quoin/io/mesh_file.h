@@ -142,15 +142,17 @@ struct LoadedMesh {
 /// PLY:    version 1.0, as text or binary of either byte order; red, green, blue and alpha of vertices (sRGB); polygons
 ///         are taken as fans; strips too.
 /// STL:    text or binary, with colours as VisCAM or Magics write them.
-/// Beside: a file that another names is looked for at or below that one's own folder; where a path leads out of it, by
-///         its name alone. A picture that is not there, or cannot be read, is left out with a warning, a .mtl too; of
-///         glTF's buffers that is an error. PNG, JPEG and WebP.
+/// Sidecar files: sidecar_path resolves them, with `sidecar_files`. glTF that names a file outside its folder is
+///         refused. OBJ and MTL often hold absolute paths of another machine: the file of the same name in the folder
+///         is read instead, and a warning names the file if there is none. Missing images (PNG, JPEG, WebP) and .mtl
+///         files are left out with a warning; missing glTF buffers are an error.
 /// Left out, with a warning: triangles with a corner that is not finite or not there; points and lines.
 /// `up`:   of the file; without, Z of STL and PLY, Y of all others.
 /// Errors: CannotRead, BadFormat (with the byte offset where there is one), Unsupported for other formats, for those
 ///         that the build cannot read, and for glTF that requires an extension that is not known; LimitExceeded beyond
 ///         2^27 triangles. Memory stays within a multiple of what the files hold.
-[[nodiscard]] Result<LoadedMesh> read_mesh(const std::filesystem::path& path, std::optional<UpAxis> up = {});
+[[nodiscard]] Result<LoadedMesh> read_mesh(const std::filesystem::path& path, std::optional<UpAxis> up = {},
+                                           SidecarFiles sidecar_files = SidecarFiles::WithinFolder);
 /// The same of bytes, without what lies beside.
 [[nodiscard]] Result<LoadedMesh> read_mesh(std::span<const std::byte> bytes, std::optional<UpAxis> up = {});
 

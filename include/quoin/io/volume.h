@@ -10,12 +10,15 @@
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/volume.h>
+#include <quoin/io/sidecar_file.h>
 
 namespace quoin {
 
 struct VolumeOptions {
   /// More values than this are refused; 2^30 take 4 GiB. A few megabytes of gzip can hold that many.
   std::int64_t max_values = std::int64_t{1} << 30;
+  /// Which files a header may name for its values.
+  SidecarFiles sidecar_files = SidecarFiles::WithinFolder;
 };
 
 /// Reads a volume: NIfTI-1 and -2, NRRD, each of them also within gzip; recognised by content.

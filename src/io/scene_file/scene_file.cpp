@@ -5,6 +5,7 @@
 #include <optional>
 
 #include <quoin/io/formats.h>
+#include <quoin/io/sidecar_file.h>
 
 #include "io/text.h"
 #include "io/whole_file.h"
@@ -148,7 +149,7 @@ Instance placed(const Instance& inner, const SceneFile::Placement& outer, bool i
   return instance;
 }
 
-Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& folder, const LoadOptions& options,
+Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& path, const LoadOptions& options,
                                  Threads threads, const Progress& progress);
 
 Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOptions& options, Threads threads,
@@ -172,8 +173,8 @@ Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOpt
 
 using Bodies = std::map<std::string, Body, std::less<>>;
 
-/// Reads the files that a scene file in `folder` names.
-Result<Bodies> read_sources(const std::vector<SceneFile::Source>& sources, const std::filesystem::path& folder,
+/// Reads the files that the scene file `path` names.
+Result<Bodies> read_sources(const std::vector<SceneFile::Source>& sources, const std::filesystem::path& path,
                             const LoadOptions& options, Threads threads, LoadedScene& loaded,
                             const Progress& progress) {
   Bodies bodies;
@@ -182,7 +183,8 @@ Result<Bodies> read_sources(const std::vector<SceneFile::Source>& sources, const
       return static_cast<double>(read) / static_cast<double>(sources.size());
     };
     const Progress of_source = part_of(progress, share(bodies.size()), share(bodies.size() + 1));
-    auto part = load_source(folder / source.file, options, threads, of_source);
+    const auto file = sidecar_path(path, source.file, options.sidecar_files);
+    auto part = file ? load_source(*file, options, threads, of_source) : Result<LoadedScene>(file.error());
     if (!part) {
       Error error = part.error();
       error.message += " (source \"" + printable(source.id) + "\" of the scene file)";
@@ -192,7 +194,7 @@ Result<Bodies> read_sources(const std::vector<SceneFile::Source>& sources, const
     auto body = take_over(part->scene, loaded.scene);
     if (!body) return body.error();
     bodies.emplace(source.id, std::move(*body));
-    loaded.named_files.push_back(folder / source.file);
+    loaded.named_files.push_back(*file);
   }
   return bodies;
 }
@@ -287,12 +289,12 @@ class Placer {
   std::vector<GroupHandle> groups_;
 };
 
-/// `folder`: which the sources' names start from.
-Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& folder, const LoadOptions& options,
+/// `path`: of the scene file, whose folder the sources' names start from.
+Result<LoadedScene> put_together(SceneFile& file, const std::filesystem::path& path, const LoadOptions& options,
                                  Threads threads, const Progress& progress) {
   std::vector<GridHandle> grids;
   LoadedScene loaded = begin_scene(file, grids);
-  const auto bodies = read_sources(file.sources, folder, options, threads, loaded, progress);
+  const auto bodies = read_sources(file.sources, path, options, threads, loaded, progress);
   if (!bodies) return bodies.error();
   Placer(file, grids, *bodies, loaded.scene).place();
   if (options.show_hidden) show_all(loaded.scene);
@@ -305,7 +307,7 @@ Result<LoadedScene> read_scene_file(const std::filesystem::path& path, const Loa
                                     const Progress& progress) {
   auto file = parse_scene_file(path, threads);
   if (!file) return file.error();
-  return with_path(put_together(*file, path.parent_path(), options, threads, progress), path);
+  return with_path(put_together(*file, path, options, threads, progress), path);
 }
 
 std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::path& path) {

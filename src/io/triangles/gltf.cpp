@@ -657,6 +657,7 @@ Result<LoadedMesh> read_gltf(std::span<const std::byte> bytes, Beside& beside) {
   if (is_too_deep(json)) return make_error(ErrorCode::BadFormat, "its JSON is nested too deeply");
   const auto rewritten = without_fallback_buffers(bytes, json);
   auto model = parse(rewritten.empty() ? bytes : rewritten, asked);
+  if (beside.refused()) return *beside.refused();
   if (!model) return model.error();
   if (has_meshopt()) {
     if (Status done = decode_views(*model); !done) return done.error();

@@ -102,7 +102,7 @@ class MaterialFiles : public tinyobj::MaterialReader {
 
   bool operator()(const std::string& name, std::vector<tinyobj::material_t>* materials,
                   std::map<std::string, int>* numbers, std::string* warnings, std::string* errors) override {
-    const auto bytes = beside_.read(name);
+    const auto bytes = beside_.read_or_same_name(name);
     if (!bytes) {
       loaded_.warnings.push_back("left out the materials " + name + ": " + bytes.error().message);
       return false;
@@ -312,7 +312,7 @@ class ObjReader {
     const std::string& name = from.diffuse_texname;
     const auto [known, is_new] = textures_.try_emplace(name);
     if (is_new) {
-      const auto bytes = beside_.read(name);
+      const auto bytes = beside_.read_or_same_name(name);
       if (!bytes) loaded_.warnings.push_back("left out the texture " + name + ": " + bytes.error().message);
       if (bytes) known->second = add_texture(*bytes, name, loaded_);
     }

@@ -16,17 +16,6 @@ namespace triangles {
 
 namespace {
 
-/// A path below the folder: no root, no way up.
-bool stays_below(const std::filesystem::path& name) {
-  return name.is_relative() && !name.has_root_name() &&
-         std::none_of(name.begin(), name.end(), [](const auto& part) { return part == ".."; });
-}
-
-std::string with_slashes(std::string name) {
-  std::replace(name.begin(), name.end(), '\\', '/');
-  return name;
-}
-
 /// Points of a file whose z axis points up, in Quoin's axes.
 void turn_up(TriangleMesh& mesh) {
   for (DVec3& p : mesh.positions) p = {p.x, p.z, -p.y};
@@ -59,16 +48,28 @@ Result<LoadedMesh> read_any(std::span<const std::byte> bytes, std::optional<File
 
 }  // namespace
 
-Result<std::vector<std::byte>> Beside::read(const std::string& name) {
-  if (!is_there_) return make_error(ErrorCode::CannotRead, "there is no folder to look in");
-  std::filesystem::path path = with_slashes(name);
-  if (!stays_below(path)) path = path.filename();
-  // "C:model.png" has none on every system.
-  const std::filesystem::path found = folder_ / path;
-  auto bytes = read_file(found);
+Result<std::vector<std::byte>> Beside::read_path(const std::filesystem::path& path) {
+  auto bytes = read_file(path);
   if (!bytes) return make_error(bytes.error().code, bytes.error().message);
-  if (std::find(files_.begin(), files_.end(), found) == files_.end()) files_.push_back(found);
+  if (std::find(files_.begin(), files_.end(), path) == files_.end()) files_.push_back(path);
   return bytes;
+}
+
+Result<std::vector<std::byte>> Beside::read(const std::string& name) {
+  if (file_.empty()) return make_error(ErrorCode::CannotRead, "there is no folder to look in");
+  const auto path = sidecar_path(file_, name, allowed_);
+  if (path) return read_path(*path);
+  if (!refused_) refused_ = path.error();
+  return path.error();
+}
+
+Result<std::vector<std::byte>> Beside::read_or_same_name(const std::string& name) {
+  if (file_.empty()) return make_error(ErrorCode::CannotRead, "there is no folder to look in");
+  const auto path = sidecar_path(file_, name, allowed_);
+  if (path) return read_path(*path);
+  const auto same_name = sidecar_path(file_, name.substr(name.find_last_of("/\\") + 1), allowed_);
+  auto bytes = same_name ? read_path(*same_name) : Result<std::vector<std::byte>>(path.error());
+  return bytes ? std::move(bytes) : path.error();
 }
 
 Result<bool> MeshBuilder::add(std::size_t a, std::size_t b, std::size_t c) {
@@ -220,9 +221,9 @@ Result<LoadedMesh> read_mesh(std::span<const std::byte> bytes, std::optional<UpA
   return triangles::read_any(bytes, detect_format(bytes), nothing, up);
 }
 
-Result<LoadedMesh> read_mesh(const std::filesystem::path& path, std::optional<UpAxis> up) {
+Result<LoadedMesh> read_mesh(const std::filesystem::path& path, std::optional<UpAxis> up, SidecarFiles sidecar_files) {
   return read_whole(path, [&](std::span<const std::byte> bytes) {
-    triangles::Beside beside(path);
+    triangles::Beside beside(path, sidecar_files);
     auto format = detect_format(bytes);
     if (!format) format = triangles::detect_by_name(path, bytes);
     return triangles::read_any(bytes, format, beside, up);

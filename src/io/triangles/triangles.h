@@ -14,6 +14,7 @@
 #include <quoin/core/progress.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
+#include <quoin/io/sidecar_file.h>
 
 // Files of triangles. docs/formats/meshes.md says what of each is read.
 //
@@ -28,18 +29,25 @@ inline constexpr std::size_t kMostTriangles = std::size_t{1} << 27;
 class Beside {
  public:
   Beside() = default;
-  explicit Beside(const std::filesystem::path& file) : folder_(file.parent_path()), is_there_(true) {}
+  Beside(std::filesystem::path file, SidecarFiles allowed) : file_(std::move(file)), allowed_(allowed) {}
 
-  /// A file at or below the folder; where `name` leads out of it, the file of that name in the folder.
-  /// Errors: CannotRead. They name no path: `name` is said by who asks.
+  /// Reads a file that sidecar_path allows. Errors: CannotRead, for the caller to complete with `name`, except that a
+  /// refusal has the name and becomes `refused` too.
   [[nodiscard]] Result<std::vector<std::byte>> read(const std::string& name);
+  /// Reads such a file, or the file of the same name in the folder if `name` leads out of it. Errors: as `read`.
+  [[nodiscard]] Result<std::vector<std::byte>> read_or_same_name(const std::string& name);
+  /// The first refusal of `read`.
+  [[nodiscard]] const std::optional<Error>& refused() const { return refused_; }
   /// What was read.
   [[nodiscard]] std::vector<std::filesystem::path>& files() { return files_; }
 
  private:
-  std::filesystem::path folder_;
+  [[nodiscard]] Result<std::vector<std::byte>> read_path(const std::filesystem::path& path);
+
+  std::filesystem::path file_;  // empty: there is none
+  SidecarFiles allowed_ = SidecarFiles::WithinFolder;
   std::vector<std::filesystem::path> files_;
-  bool is_there_ = false;
+  std::optional<Error> refused_;
 };
 
 /// Appends what belongs together, and counts what is left out.

@@ -112,8 +112,10 @@ std::filesystem::path image_beside(const std::filesystem::path& header_path) {
 }
 
 /// The file that holds the values of a header. Requires: they are elsewhere.
-std::filesystem::path data_file_of(const std::filesystem::path& header_path, const VolumeHeader& header) {
-  return header.data_file.empty() ? image_beside(header_path) : header_path.parent_path() / header.data_file;
+Result<std::filesystem::path> data_file_of(const std::filesystem::path& header_path, const VolumeHeader& header,
+                                           const VolumeOptions& options) {
+  const std::string name = header.data_file.empty() ? image_beside(header_path).filename().string() : header.data_file;
+  return sidecar_path(header_path, name, options.sidecar_files);
 }
 
 Status skip_lines(std::span<const std::byte> bytes, VolumeHeader& header) {
@@ -128,9 +130,10 @@ Status skip_lines(std::span<const std::byte> bytes, VolumeHeader& header) {
   return {};
 }
 
-Result<Volume> read_pair(const std::filesystem::path& header_path, VolumeHeader& header) {
-  const std::filesystem::path path = data_file_of(header_path, header);
-  const auto bytes = read_file(path);
+Result<Volume> read_pair(const std::filesystem::path& header_path, const VolumeOptions& options, VolumeHeader& header) {
+  const auto path = data_file_of(header_path, header, options);
+  if (!path) return path.error();
+  const auto bytes = read_file(*path);
   if (!bytes) return bytes.error();
   const auto read = [&]() -> Result<Volume> {
     if (auto done = skip_lines(*bytes, header); !done) return done.error();
@@ -138,7 +141,7 @@ Result<Volume> read_pair(const std::filesystem::path& header_path, VolumeHeader&
     return read_data(*bytes, is_nifti && begins_gzip(*bytes) ? Compression::Gzip : Compression::None, header);
   };
   auto volume = read();
-  if (!volume) volume.error().path = path.string();
+  if (!volume) volume.error().path = path->string();
   return volume;
 }
 
@@ -154,7 +157,7 @@ Result<Volume> decode(std::span<const std::byte> bytes, const std::filesystem::p
     return status.error();
   }
   if (!header->is_data_elsewhere) return read_data(bytes, beginning->compression, *header);
-  if (!path.empty()) return read_pair(path, *header);
+  if (!path.empty()) return read_pair(path, options, *header);
   const std::string name = header->data_file.empty() ? std::string(".img") : printable(header->data_file);
   return make_error(ErrorCode::Unsupported,
                     "the header of a pair, whose values are in a file of their own (" + name + ")");

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string_view>
+
+#include <quoin/core/result.h>
+
+namespace quoin {
+
+/// The files that another file may name: buffers and images of glTF, materials and textures of OBJ, values of NRRD and
+/// NIfTI, models of scene files, skies.
+enum class SidecarFiles : std::uint8_t {
+  WithinFolder,  ///< in the folder of the file that names them, or below it; symbolic links count where they lead
+  Anywhere       ///< every file that the process can read: for input from a trusted source only
+};
+
+/// Returns the path of the file that `from` names `name`, relative to the folder of `from`. Backslashes separate
+/// folders too. The file need not exist; if it does not, reading the path says so.
+///
+/// Requires: `name` is decoded (no percent-encoding).
+/// Cost:     resolves both paths in the file system.
+/// Errors:   BadFormat for an empty name; CannotRead, with `name` in the message, for a file outside the folder (an
+///           absolute path, a drive, `..`, a symbolic link) unless `allowed` is Anywhere.
+[[nodiscard]] Result<std::filesystem::path> sidecar_path(const std::filesystem::path& from, std::string_view name,
+                                                         SidecarFiles allowed = SidecarFiles::WithinFolder);
+
+}  // namespace quoin
