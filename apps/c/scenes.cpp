@@ -10,6 +10,7 @@
 
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
+#include <quoin/scene/near_grids.h>
 #include <quoin/scene/scene_meshes.h>
 #include <quoin/version.h>
 
@@ -126,7 +127,7 @@ quoin_status save(SceneBody& scene, const char* path) {
   }
   constexpr double kMeshed = 0.5;
   const Progress whole = progress();
-  const auto meshes = mesh_scene(scene.loaded.scene, {}, {}, part_of(whole, 0.0, kMeshed));
+  const auto meshes = mesh_scene(near_grids(scene.loaded.scene), {}, {}, part_of(whole, 0.0, kMeshed));
   if (!meshes) return fail(meshes.error());
   const auto written = write_mesh(*meshes, path, {}, part_of(whole, kMeshed, 1.0));
   return written ? QUOIN_OK : fail(written.error());

@@ -10,6 +10,7 @@
 #include <quoin/io/file.h>
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
+#include <quoin/scene/near_grids.h>
 
 namespace quoin::viewer {
 
@@ -36,7 +37,7 @@ Status write_as_glb(const Scene& scene, const std::filesystem::path& path, const
     if (!progress) return {};
     return [&progress, offset](double fraction) { return progress(offset + 0.5 * fraction); };
   };
-  const auto meshes = mesh_scene(scene, {}, {}, half(0.0));
+  const auto meshes = mesh_scene(near_grids(scene), {}, {}, half(0.0));
   if (!meshes) return meshes.error();
   const auto written = write_mesh(*meshes, path, {.format = FileFormat::Glb}, half(0.5));
   if (!written) return written.error();

@@ -88,6 +88,7 @@
 #include <quoin/scene/camera.h>
 #include <quoin/scene/level_of_detail.h>
 #include <quoin/scene/look.h>
+#include <quoin/scene/near_grids.h>
 #include <quoin/scene/scene.h>
 #include <quoin/scene/scene_animation.h>
 #include <quoin/scene/scene_edit.h>

@@ -199,6 +199,13 @@ Result<std::vector<std::byte>> write_mesh(const SceneMeshes& meshes, FileFormat 
   return bytes;
 }
 
+DVec3 mesh_file_offset(const SceneMeshes& meshes, FileFormat format, const MeshFileOptions& options) {
+  const bool has_offset = format == FileFormat::Ply || format == FileFormat::Stl;
+  const auto written = as_written(meshes, options);
+  if (!has_offset || !written || !check_meshes(*written)) return DVec3(0.0);
+  return file_origin(*written, format == FileFormat::Ply ? kMostStepsOfPly : kMostStepsOfStl);
+}
+
 Result<std::vector<std::filesystem::path>> mesh_files(const SceneMeshes& meshes, const std::filesystem::path& path,
                                                       const MeshFileOptions& options) {
   const auto format = format_of(path, options);

@@ -257,6 +257,48 @@ VertexTransform::VertexTransform(const glm::dmat4& world_from_part, DVec3 pivot)
   normal_matrix_ /= mirrors_ ? -largest : largest;
 }
 
+double VertexTransform::least_step() const {
+  return std::min({glm::length(linear_[0]), glm::length(linear_[1]), glm::length(linear_[2])});
+}
+
+VertexTransform VertexTransform::relative_to(const DVec3& origin) const {
+  VertexTransform moved = *this;
+  moved.translation_ -= origin;
+  return moved;
+}
+
+DBox bounds_of(const MeshPart& part, const VertexTransform& transform) {
+  DBox box;
+  for (const MeshView& view : part.surfaces) {
+    if (view.positions.empty()) continue;
+    const DBox own = bounds_of(view);
+    for (int i = 0; i < 8; ++i) box.extend(transform.position(Vec3(box_corner(own, i))));
+  }
+  return box;
+}
+
+DVec3 float_origin(const DBox& bounds, double most) {
+  if (bounds.empty()) return DVec3(0.0);
+  const DVec3 far = glm::max(glm::abs(bounds.min), glm::abs(bounds.max));
+  if (std::max({far.x, far.y, far.z}) <= most) return DVec3(0.0);
+  return glm::round(0.5 * (bounds.min + bounds.max));
+}
+
+DVec3 file_origin(const SceneMeshes& meshes, double most_steps) {
+  DBox all;
+  double step = std::numeric_limits<double>::infinity();
+  for (const MeshPlacement& placement : meshes.placements) {
+    const MeshPart& part = meshes.parts[placement.part];
+    const VertexTransform transform(placement.matrix(), part.pivot);
+    const DBox box = bounds_of(part, transform);
+    if (box.empty()) continue;
+    all.extend(box.min);
+    all.extend(box.max);
+    step = std::min(step, transform.least_step());
+  }
+  return float_origin(all, most_steps * step);
+}
+
 DVec3 VertexTransform::normal(Vec3 in_part) const {
   const DVec3 turned = normal_matrix_ * DVec3(in_part);
   const double length = glm::length(turned);

@@ -54,6 +54,15 @@ using PlanMeshFiles = Result<std::vector<MeshFile>>(const SceneMeshes& meshes, c
 /// The box of all vertices; empty without one.
 [[nodiscard]] DBox bounds_of(const MeshView& view);
 
+/// The coordinates up to which floats are exact enough, in steps: units of the part.
+inline constexpr double kMostStepsOfPly = 1 << 20;
+/// Surfaces for printers are parted by a hundredth of a voxel.
+inline constexpr double kMostStepsOfStl = 1 << 16;
+
+/// Returns the point that positions of all placements are relative to in a file with floats in world units: 0, unless
+/// vertices lie more than `most_steps` steps from the origin.
+[[nodiscard]] DVec3 file_origin(const SceneMeshes& meshes, double most_steps);
+
 /// The placements, by part, and in their order within a part.
 [[nodiscard]] std::vector<const MeshPlacement*> placements_by_part(const SceneMeshes& meshes);
 
@@ -76,6 +85,10 @@ class VertexTransform {
   }
   /// Whether triangles are to be turned round.
   [[nodiscard]] bool mirrors() const { return mirrors_; }
+  /// The length of the shortest axis once it is moved.
+  [[nodiscard]] double least_step() const;
+  /// The same, but with positions relative to `origin`.
+  [[nodiscard]] VertexTransform relative_to(const DVec3& origin) const;
 
  private:
   glm::dmat3 linear_;
@@ -84,6 +97,13 @@ class VertexTransform {
   DVec3 pivot_;
   bool mirrors_;
 };
+
+/// The bounds of a part's vertices once they are moved; empty without a vertex.
+[[nodiscard]] DBox bounds_of(const MeshPart& part, const VertexTransform& transform);
+
+/// Returns the point that positions are stored relative to: 0, or the whole coordinates in the middle of `bounds` where
+/// these go beyond `most` along an axis.
+[[nodiscard]] DVec3 float_origin(const DBox& bounds, double most);
 
 /// The corners of the triangle whose indices begin at `i`, in the order in which they are written.
 [[nodiscard]] inline std::array<std::uint32_t, 3> corners_of(const MeshView& view, std::size_t i, bool turned) {

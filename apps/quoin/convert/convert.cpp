@@ -10,6 +10,7 @@
 #include <quoin/io/vox.h>
 #include <quoin/light/lit_meshes.h>
 #include <quoin/mesh/closed_surface.h>
+#include <quoin/scene/near_grids.h>
 #include <quoin/store/world_import.h>
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
@@ -140,7 +141,9 @@ Status convert_to_meshes(const LoadedScene& loaded, const ConvertOptions& option
     outcome.seconds.read += watch.lap();
   }
   const auto convert = options.mesher == "smooth" ? convert_smoothly : convert_blockily;
-  return convert(options.animate ? animation.scene() : loaded.scene, animation, options, outcome);
+  // Models of .vox files, which alone are animated, never lie far from their origins.
+  if (options.animate) return convert(animation.scene(), animation, options, outcome);
+  return convert(near_grids(loaded.scene), animation, options, outcome);
 }
 
 /// What contradicts meshing blocks; empty when nothing does.
@@ -656,6 +659,11 @@ Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, Pr
       outcome.warnings.push_back(with_thousands(static_cast<std::int64_t>(open)) +
                                  " edges are not between two triangles: the mesh is not closed for printing");
     }
+  }
+  if (const DVec3 offset = mesh_file_offset(meshes, format->format, file); offset != DVec3(0.0)) {
+    outcome.warnings.push_back("coordinates in the file are relative to (" + number_for_people(offset.x) + ", " +
+                               number_for_people(offset.y) + ", " + number_for_people(offset.z) +
+                               "): floats do not tell voxels apart that far from the origin");
   }
   const auto bytes = write_mesh(meshes, options.output, file, bar.listener("writing"));
   if (!bytes) return bytes.error();

@@ -148,10 +148,10 @@ void run_task(const ConvertOptions& wanted, const FormatInfo& format, Task& task
 }
 
 /// What would come of what has not changed is there already.
-void leave_out(const Converted& done, std::vector<Task>& tasks, WatchedWork& work) {
+void leave_out(const Converted& done, SidecarFiles allowed, std::vector<Task>& tasks, WatchedWork& work) {
   for (Task& task : tasks) {
     work.written.push_back(task.output);
-    const std::vector<fs::path> read = files_read(task.input, options.common.load.sidecar_files);
+    const std::vector<fs::path> read = files_read(task.input, allowed);
     work.read.insert(work.read.end(), read.begin(), read.end());
     task.stamps = stamps_of(read);
   }
@@ -276,7 +276,7 @@ WatchedWork run_many(const ConvertOptions& options, const ManyOptions& many, Con
   ConvertOptions wanted = options;
   wanted.inputs = inputs_of(tasks);
   const bool is_again = !done.empty();
-  if (options.watch) leave_out(done, tasks, work);
+  if (options.watch) leave_out(done, options.common.load.sidecar_files, tasks, work);
   run_tasks(wanted, *format, tasks);
   die_if_interrupted();
   if (options.watch) note(tasks, done, work);

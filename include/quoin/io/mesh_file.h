@@ -43,7 +43,8 @@ struct MeshFileOptions {
 ///            A group is a node too, of translation and rotation, whose children are what belongs to it; the name of a
 ///            layer is `extras.layer`.
 ///            Placements share the part's mesh, mirrored ones a second, reflected mesh, those that shear one that is
-///            sheared, since nodes cannot. `.gltf` is the same as text, with a file of the same name ending in ".bin"
+///            sheared, since nodes cannot. Vertices more than 65,536 from the pivot are relative to the middle of
+///            their mesh instead, where the node stands then. `.gltf` is the same as text, with a file of the same name ending in ".bin"
 ///            beside it (none when nothing is drawn).
 ///            Blocks have a palette texture, 256 texels wide, with one texel a voxel type (nearest, clamped), and one
 ///            with roughness (green) and metalness (blue); occlusion is grey in COLOR_0. Materials are opaque,
@@ -72,6 +73,8 @@ struct MeshFileOptions {
 ///            scale; normals have 16 bits.
 ///            `compress` needs clients that know EXT_meshopt_compression, and loses nothing but the order of vertices
 ///            and which corner of a triangle is its first.
+/// Far away:  vertices of a part are floats: of grids beyond 2^16 voxels mesh near_grids(scene). OBJ has all digits.
+///            mesh_file_offset says what PLY and STL are relative to; 3MF has it as the transform of its items.
 /// OBJ:       an object a placement, in world units. Blocks: coordinates to a millionth of a unit, and beside NAME.obj
 ///            NAME.mtl, NAME_palette.png and, where something emits light, NAME_emissive.png, and of meshes with an
 ///            atlas NAME_atlas.png; other occlusion is grey after
@@ -114,6 +117,12 @@ struct MeshFileOptions {
 [[nodiscard]] Result<std::vector<std::byte>> write_mesh(const SceneMeshes& meshes, FileFormat format,
                                                         const MeshFileOptions& options = {},
                                                         const Progress& progress = {});
+
+/// Returns the point that write_mesh makes the coordinates of a PLY or STL file relative to, in the file's units and
+/// axes: whole numbers, (0, 0, 0) unless vertices lie so far from the origin that floats would join them. Add it to
+/// the file's coordinates; the PLY header has it as a comment, the STL header behind "offset". (0, 0, 0) of other
+/// formats and of meshes that are not sound.
+[[nodiscard]] DVec3 mesh_file_offset(const SceneMeshes& meshes, FileFormat format, const MeshFileOptions& options = {});
 
 /// The files that write_mesh writes or replaces, `path` first. Errors: Unsupported.
 [[nodiscard]] Result<std::vector<std::filesystem::path>> mesh_files(const SceneMeshes& meshes,

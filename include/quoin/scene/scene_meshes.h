@@ -124,8 +124,8 @@ struct BlockySceneOptions {
   bool atlas = false;
   /// As BlockyMeshOptions::cut, of each grid; instead of that of `mesh`.
   std::function<void(GridHandle grid, IVec3 chunk, QuadBuffer& quads)> cut{};
-  /// Where given, makes the surfaces of a grid, whose name and pivot it need not know, in the place of
-  /// build_blocky_mesh, and adds their numbers to `stats`: for grids that nobody holds whole (mesh_world). Not for an
+  /// Where given, makes the surfaces of a grid instead of build_blocky_mesh; its name is not read, and its pivot is
+  /// added to that of the grid. Adds their numbers to `stats`: for grids that nobody holds whole (mesh_world). Not for an
   /// atlas.
   std::function<Result<MeshPart>(GridHandle grid, MeshStats& stats)> part_of{};
 };
@@ -134,6 +134,7 @@ struct BlockySceneOptions {
 /// grids' handles, a placement per drawn instance in that of theirs, under the groups of the scene. After
 /// these come the surfaces of the grids' fields, as build_smooth_mesh makes them, with placements of their own.
 ///
+/// Far:    vertices are floats: of grids beyond 2^16 voxels mesh near_grids(scene).
 /// Order:  the same bytes at any thread count.
 /// Errors: those of build_blocky_mesh; InvalidArgument when a drawn instance's transform is not finite or its voxel
 ///         size not positive, and for an atlas of faces that are not merged, cut, watertight or without occlusion;

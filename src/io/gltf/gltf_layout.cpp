@@ -1,4 +1,5 @@
 #include <quoin/core/assert.h>
+#include <quoin/scene/near_grids.h>
 
 #include "io/gltf/gltf_layout.h"
 #include "scene/instance_axes.h"
@@ -246,9 +247,9 @@ Status add_images(const Image& atlas, GltfLayout& layout) {
   return {};
 }
 
-/// Of a mesh whose positions are stored so, what a node of `transform` has.
+/// The transform of a node whose mesh has its positions stored so.
 GltfTransform from_stored(const GltfQuantization& stored, GltfTransform transform) {
-  if (stored.component == GltfComponent::Float) return transform;
+  if (stored.step == 1.0 && stored.origin == DVec3(0.0)) return transform;
   transform.translation += transform.rotation * (transform.scale * stored.origin);
   transform.scale *= stored.step;
   return transform;
@@ -304,8 +305,12 @@ class MeshLayout {
     const DVec3& pivot = meshes_.parts[part].pivot;
     const auto& surfaces = layout_.surfaces[part].surfaces();
     GltfMesh mesh{std::move(name), {glm::dmat4(baked), pivot}};
-    if (options_.quantize) {
-      mesh.stored = quantize_positions(mesh.transform, surfaces);
+    if (options_.quantize) mesh.stored = quantize_positions(mesh.transform, surfaces);
+    if (mesh.stored.component == GltfComponent::Float) {
+      mesh.stored.origin =
+          float_origin(bounds_of(meshes_.parts[part], mesh.transform), kNearVoxels * mesh.transform.least_step());
+    }
+    if (mesh.stored.step != 1.0 || mesh.stored.origin != DVec3(0.0)) {
       glm::dmat4 stored_from_part(baked / mesh.stored.step);
       stored_from_part[3] = glm::dvec4(-mesh.stored.origin / mesh.stored.step, 1.0);
       mesh.transform = VertexTransform(stored_from_part, pivot);

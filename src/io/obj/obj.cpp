@@ -66,7 +66,7 @@ class ObjLines {
 
   /// `value` rounded to a millionth.
   [[nodiscard]] static std::string text_of(double value);
-  /// "KEYWORD x y z", without a line's end; `digits` 0: to a millionth.
+  /// "KEYWORD x y z", without a line's end; `digits` 0: to a millionth, as far from the origin.
   void triple(std::string_view keyword, const DVec3& v, int digits = 0);
   /// "o NAME" and a line's end: the name as one word, told apart from those before by a number; "object" for an empty
   /// one.
@@ -87,7 +87,10 @@ void ObjLines::triple(std::string_view keyword, const DVec3& v, int digits) {
   at = std::copy(keyword.begin(), keyword.end(), at);
   for (int axis = 0; axis < 3; ++axis) {
     *at++ = ' ';
-    at = digits == 0 ? write_number(v[axis], at)
+    // Nine digits have fractions only near the origin.
+    constexpr double kMostOfDigits = 1 << 16;
+    const bool is_to_a_millionth = digits == 0 || std::abs(v[axis]) > kMostOfDigits;
+    at = is_to_a_millionth ? write_number(v[axis], at)
                      : std::to_chars(at, at + kMaxDigits, v[axis] + 0.0, std::chars_format::general, digits).ptr;
   }
   out_.advance(at);

@@ -1,6 +1,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <memory>
 #include <string>
@@ -28,9 +29,17 @@ struct Counts {
   std::uint64_t faces = 0;
 };
 
-std::string header_of(const Counts& counts, OcclusionIn occlusion) {
+/// "20000000 64 0": whole numbers.
+std::string text_of(const DVec3& v) {
+  std::array<char, 128> text{};
+  return {text.data(), static_cast<std::size_t>(std::snprintf(text.data(), text.size(), "%.0f %.0f %.0f", v.x + 0.0,
+                                                              v.y + 0.0, v.z + 0.0))};
+}
+
+std::string header_of(const Counts& counts, OcclusionIn occlusion, const DVec3& origin) {
   std::string text = "ply\nformat binary_little_endian 1.0\ncomment Quoin ";
   text.append(version()).append("\n");
+  if (origin != DVec3(0.0)) text += "comment offset " + text_of(origin) + " (add it to x y z)\n";
   text += "element vertex " + std::to_string(counts.vertices) + "\n";
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) text += "property float " + std::string(name) + "\n";
   for (const char* name : {"red", "green", "blue"}) text += "property uchar " + std::string(name) + "\n";
@@ -99,26 +108,33 @@ void write_faces(const MeshView& view, bool turned, std::uint64_t first, BlockWr
   }
 }
 
-/// Calls `use(view, transform)` for every surface with a triangle, in every place of its part.
+/// Calls `use(view, transform)` for every surface with a triangle, in every placement of its part, relative to `origin`.
 template <class Use>
-void for_each_surface(const SceneMeshes& meshes, Use use) {
+void for_each_surface(const SceneMeshes& meshes, const DVec3& origin, Use use) {
   for (const MeshPlacement* placement : placements_by_part(meshes)) {
     const MeshPart& part = meshes.parts[placement->part];
-    const VertexTransform transform(placement->matrix(), part.pivot);
+    const VertexTransform transform = VertexTransform(placement->matrix(), part.pivot).relative_to(origin);
     for (const MeshView& view : part.surfaces) {
       if (!view.indices.empty()) use(view, transform);
     }
   }
 }
 
-void write_content(const SceneMeshes& meshes, OcclusionIn occlusion, const std::string& header, BlockWriter& out) {
+/// All of a file but the meshes.
+struct PlyPlan {
+  std::string header;
+  OcclusionIn occlusion{};
+  DVec3 origin{0.0};
+};
+
+void write_content(const SceneMeshes& meshes, const PlyPlan& plan, BlockWriter& out) {
   const std::vector<Srgb> colours = colours_of(meshes.types);
-  out.put_text(header);
-  for_each_surface(meshes, [&](const MeshView& view, const VertexTransform& transform) {
-    write_vertices(view, transform, colours, occlusion, out);
+  out.put_text(plan.header);
+  for_each_surface(meshes, plan.origin, [&](const MeshView& view, const VertexTransform& transform) {
+    write_vertices(view, transform, colours, plan.occlusion, out);
   });
   std::uint64_t first = 0;
-  for_each_surface(meshes, [&](const MeshView& view, const VertexTransform& transform) {
+  for_each_surface(meshes, plan.origin, [&](const MeshView& view, const VertexTransform& transform) {
     write_faces(view, transform.mirrors(), first, out);
     first += view.positions.size();
   });
@@ -128,9 +144,9 @@ void write_content(const SceneMeshes& meshes, OcclusionIn occlusion, const std::
 
 Result<std::vector<MeshFile>> plan_ply(const SceneMeshes& meshes, const std::filesystem::path& path,
                                        const MeshFileOptions& options) {
-  const OcclusionIn occlusion = options.occlusion_in;
+  PlyPlan plan{{}, options.occlusion_in, file_origin(meshes, kMostStepsOfPly)};
   Counts counts;
-  for_each_surface(meshes, [&](const MeshView& view, const VertexTransform&) {
+  for_each_surface(meshes, plan.origin, [&](const MeshView& view, const VertexTransform&) {
     counts.vertices += view.positions.size();
     counts.faces += view.indices.size() / 3;
   });
@@ -140,12 +156,11 @@ Result<std::vector<MeshFile>> plan_ply(const SceneMeshes& meshes, const std::fil
                                                     " vertices and " + std::to_string(counts.faces) +
                                                     " triangles, and a PLY file holds 2147483647 of each");
   }
-  std::string header = header_of(counts, occlusion);
-  const std::size_t of_vertex = kVertexBytes + (occlusion == OcclusionIn::Attribute ? sizeof(float) : 0);
-  const std::uint64_t bytes = header.size() + counts.vertices * of_vertex + counts.faces * kFaceBytes;
-  return std::vector<MeshFile>{{path, bytes, [&meshes, occlusion, text = std::move(header)](BlockWriter& out) {
-                                  write_content(meshes, occlusion, text, out);
-                                }}};
+  plan.header = header_of(counts, plan.occlusion, plan.origin);
+  const std::size_t of_vertex = kVertexBytes + (plan.occlusion == OcclusionIn::Attribute ? sizeof(float) : 0);
+  const std::uint64_t bytes = plan.header.size() + counts.vertices * of_vertex + counts.faces * kFaceBytes;
+  return std::vector<MeshFile>{
+      {path, bytes, [&meshes, plan = std::move(plan)](BlockWriter& out) { write_content(meshes, plan, out); }}};
 }
 
 }  // namespace quoin

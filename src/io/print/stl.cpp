@@ -2,6 +2,7 @@
 
 #include <array>
 #include <bit>
+#include <cstdio>
 #include <cstring>
 #include <string>
 
@@ -31,15 +32,24 @@ void put_triangle(const std::array<Vec3, 3>& corners, BlockWriter& out) {
   out.advance(at + kRecord);
 }
 
+/// ", offset 20000000 64 0", whole numbers: as much as the header has room for.
+std::string offset_text(const DVec3& offset) {
+  std::array<char, kHeader> text{};
+  std::snprintf(text.data(), text.size(), ", offset %.0f %.0f %.0f", offset.x + 0.0, offset.y + 0.0, offset.z + 0.0);
+  return text.data();
+}
+
 void write_content(const SceneMeshes& meshes, std::uint32_t triangles, BlockWriter& out) {
+  const DVec3 origin = file_origin(meshes, kMostStepsOfStl);
   std::string header = "Quoin ";
   header.append(version()).append(", millimetres");
+  if (origin != DVec3(0.0)) header += offset_text(origin);
   header.resize(kHeader, ' ');
   out.put_text(header);
   out.put(triangles);
   for (const MeshPlacement* placement : placements_by_part(meshes)) {
     const MeshPart& part = meshes.parts[placement->part];
-    const VertexTransform transform(placement->matrix(), part.pivot);
+    const VertexTransform transform = VertexTransform(placement->matrix(), part.pivot).relative_to(origin);
     for (const MeshView& view : part.surfaces) {
       for (std::size_t i = 0; i < view.indices.size() && !out.failed(); i += 3) {
         std::array<Vec3, 3> corners{};

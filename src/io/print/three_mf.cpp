@@ -122,7 +122,9 @@ class ModelWriter {
       if (has_triangle(*placement)) write_object(*placement, object++);
     }
     text_ += "</resources>\n<build>\n";
-    for (std::size_t i = kFirstObject; i < object; ++i) text_ += "<item objectid=\"" + std::to_string(i) + "\"/>\n";
+    for (std::size_t i = kFirstObject; i < object; ++i) {
+      text_ += "<item objectid=\"" + std::to_string(i) + "\"" + transform_text(origins_[i - kFirstObject]) + "/>\n";
+    }
     text_ += "</build>\n</model>\n";
     zip_.put(text_);
   }
@@ -164,7 +166,9 @@ class ModelWriter {
   }
   void write_object(const MeshPlacement& placement, std::size_t id) {
     const MeshPart& part = meshes_.parts[placement.part];
-    const VertexTransform transform(placement.matrix(), part.pivot);
+    const VertexTransform in_world(placement.matrix(), part.pivot);
+    origins_.push_back(float_origin(bounds_of(part, in_world), kMostStepsOfStl * in_world.least_step()));
+    const VertexTransform transform = in_world.relative_to(origins_.back());
     text_ += "<object id=\"" + std::to_string(id) + "\" type=\"model\" pid=\"1\" pindex=\"0\" name=\"" +
              escaped(name_of(meshes_, placement)) + "\">\n<mesh>\n<vertices>\n";
     // Vertices of one place are one, which is what makes neighbours of triangles.
@@ -188,6 +192,14 @@ class ModelWriter {
     text_ += "</vertices>\n<triangles>\n";
     for (const MeshView& view : part.surfaces) write_triangles(view, transform.mirrors(), numbers);
     text_ += "</triangles>\n</mesh>\n</object>\n";
+  }
+  /// Where an object stands whose vertices are relative to `origin`.
+  static std::string transform_text(const DVec3& origin) {
+    if (origin == DVec3(0.0)) return {};
+    std::array<char, 160> text{};
+    std::snprintf(text.data(), text.size(), " transform=\"1 0 0 0 1 0 0 0 1 %.0f %.0f %.0f\"", origin.x + 0.0,
+                  origin.y + 0.0, origin.z + 0.0);
+    return text.data();
   }
   void write_triangles(const MeshView& view, bool turned,
                        const std::unordered_map<Vec3, std::uint32_t, PositionHash>& numbers) {
@@ -215,6 +227,7 @@ class ModelWriter {
   ZipFile& zip_;
   Colours colours_;
   std::string text_;
+  std::vector<DVec3> origins_;  ///< of objects
 };
 
 }  // namespace

@@ -243,7 +243,7 @@ Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& opt
       auto made = options.part_of(grids[i], meshes.stats);
       if (!made) return made.error();
       made->name = grid.name;
-      made->pivot = grid.pivot;
+      made->pivot += grid.pivot;
       meshes.parts.push_back(std::move(*made));
     } else {
       add_stats(**results[i], meshes.stats);

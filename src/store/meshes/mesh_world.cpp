@@ -8,7 +8,10 @@
 #include <thread>
 #include <utility>
 
+#include <glm/common.hpp>
+
 #include <quoin/core/assert.h>
+#include <quoin/scene/near_grids.h>
 #include <quoin/store/world_meshes.h>
 
 #include "core/coordinates/chunk_order.h"
@@ -103,8 +106,11 @@ class SpooledMesh {
 /// Reads voxels of a grid, whichever chunks they are in.
 class CachedReader {
  public:
-  CachedReader(ChunkCache& cache, Threads threads) : cache_(cache), threads_(threads) {}
-  VoxelType get(IVec3 voxel) {
+  /// `origin`: the chunk whose corner voxels are counted from.
+  CachedReader(ChunkCache& cache, IVec3 origin, Threads threads)
+      : cache_(cache), origin_(origin * kChunkEdge), threads_(threads) {}
+  VoxelType get(IVec3 from_origin) {
+    const IVec3 voxel = origin_ + from_origin;
     const IVec3 place = chunk_of(voxel);
     if (chunk_ == nullptr || place != place_) {
       cache_.trim();
@@ -117,6 +123,7 @@ class CachedReader {
 
  private:
   ChunkCache& cache_;
+  IVec3 origin_;
   Threads threads_;
   const Chunk* chunk_ = nullptr;
   IVec3 place_{0};
@@ -183,10 +190,12 @@ class WorldMesher {
     auto spooled = std::make_shared<SpooledMesh>();
     ChunkTriangles triangles(loaded_.loaded.scene.types, options_.scene.mesh.watertight);
     const std::span<const IVec3> places = cache.places();
+    const auto origin = origin_of(places);
+    if (!origin) return origin.error();
     for (std::size_t i = 0; i < places.size(); i += kBatch) {
       const auto batch = places.subspan(i, std::min(kBatch, places.size() - i));
       BlockyMesh mesh;
-      Status done = mesh_batch(batch, cache, triangles, mesh);
+      Status done = mesh_batch(batch, *origin, cache, triangles, mesh);
       if (!done) return done.error();
       if (auto spool = spooled->append(mesh, options_.folder); !spool) return of_folder(spool.error());
       stats.faces_visible += mesh.faces_visible;
@@ -201,13 +210,31 @@ class WorldMesher {
     stats.faces_total += 6 * cache.voxels();
     count(cache);
     if (auto done = spooled->finish(); !done) return of_folder(done.error());
-    MeshPart part{{}, spooled->views(), DVec3(0.0), spooled};
-    CachedReader reader(cache, threads_);
+    MeshPart part{{}, spooled->views(), DVec3(-*origin * kChunkEdge), spooled};
+    CachedReader reader(cache, *origin, threads_);
     part.thickness = glass_thickness(reader, part.surfaces);
     return part;
   }
 
-  Status mesh_batch(std::span<const IVec3> batch, ChunkCache& cache, ChunkTriangles& triangles,
+  /// The chunk that vertices are relative to: floats are exact near it.
+  static Result<IVec3> origin_of(std::span<const IVec3> places) {
+    constexpr int kMostChunks = (1 << 24) / kChunkEdge;
+    constexpr int kNearChunks = kNearVoxels / kChunkEdge;
+    if (places.empty()) return IVec3(0);
+    IVec3 min = places.front();
+    IVec3 max = min;
+    for (const IVec3 place : places) {
+      min = glm::min(min, place);
+      max = glm::max(max, place);
+    }
+    const IVec3 far = glm::max(glm::abs(min), glm::abs(max + 1));
+    if (std::max({far.x, far.y, far.z}) <= kNearChunks) return IVec3(0);
+    const IVec3 size = max + 1 - min;
+    if (std::max({size.x, size.y, size.z}) <= kMostChunks) return min;
+    return make_error(ErrorCode::Unsupported, "its chunks lie so far apart that they are meshed as several grids");
+  }
+
+  Status mesh_batch(std::span<const IVec3> batch, IVec3 origin, ChunkCache& cache, ChunkTriangles& triangles,
                     BlockyMesh& mesh) const {
     std::vector<IVec3> around;
     for (const IVec3 chunk : batch) {
@@ -234,7 +261,7 @@ class WorldMesher {
       }
     });
     for (std::size_t i = 0; i < batch.size(); ++i) {
-      if (auto done = triangles.append(quads[i], batch[i], mesh); !done) return done;
+      if (auto done = triangles.append(quads[i], batch[i] - origin, mesh); !done) return done;
     }
     return {};
   }
