@@ -42,6 +42,12 @@ std::optional<Offset> rounded(DVec3 point, bool& is_exact) {
   return vox_from_quoin(offset);
 }
 
+/// Returns true for positions that MagicaVoxel does not show.
+bool is_beyond_magica(const DVec3& position) {
+  constexpr double kMost = 1'000.0;
+  return std::max({std::abs(position.x), std::abs(position.y), std::abs(position.z)}) > kMost;
+}
+
 template <class Placed>
 bool has_same_place(const Placed& a, const Placed& b) {
   return a.position == b.position && a.rotation == b.rotation && a.mirrored == b.mirrored;
@@ -196,6 +202,10 @@ Result<Motion> GraphRevision::place(const Instance& instance, const GridPlan& pl
     return make_error(ErrorCode::LimitExceeded, instance_text(instance) + " lies too far out for a .vox file");
   }
   if (!is_exact) ++out_.rounded;
+  const bool is_far = std::ranges::any_of(plan.pieces, [&](const auto& piece) {
+    return is_beyond_magica(world_from_grid(instance, scene_.grids()[plan.grid], pivot_of(piece)));
+  });
+  if (is_far) ++out_.beyond_limit;
   return Motion{*orientation, *translation};
 }
 

@@ -23,6 +23,7 @@ struct RevisedGraph {
   std::vector<std::int32_t> layer_ids;  ///< by slots of the scene's layers
   bool adds_only_layer = false;         ///< the file has none, and its shapes lie on layer 0
   std::int64_t rounded = 0;             ///< instances between voxels, which were moved
+  std::int64_t beyond_limit = 0;        ///< instances farther out than MagicaVoxel shows
   std::int64_t turns_left_out = 0;      ///< groups whose turn or mirror the file cannot say
   std::int64_t frames_left_out = 0;     ///< of a file without a graph: nothing of what they were is there any more
   bool has_empty_model = false;         ///< shapes show one that has no voxel, whose number is the plan's count

@@ -285,6 +285,7 @@ void Writer::warn(std::vector<std::string>& warnings) const {
     if (number > 0) warnings.push_back(std::string(of_what) + ": " + std::to_string(number));
   };
   count("instances between voxels moved to the nearest", graph_.rounded);
+  count("instances more than 1,000 voxels from the origin, where the world of MagicaVoxel ends", graph_.beyond_limit);
   count("groups whose turn a .vox file cannot say are not turned", graph_.turns_left_out);
   count("frames of the file's animation left out, since the model that they are of was removed",
         graph_.frames_left_out);
