@@ -44,9 +44,13 @@ Status check_materials(const TriangleMesh& mesh) {
     if (material.texture && *material.texture >= mesh.textures.size()) {
       return make_error(ErrorCode::InvalidArgument, "a material with a texture that is not there");
     }
+    if (material.emissive_texture && *material.emissive_texture >= mesh.textures.size()) {
+      return make_error(ErrorCode::InvalidArgument, "a material with an emissive texture that is not there");
+    }
     const glm::vec4& colour = material.colour;
     const float sum = colour.x + colour.y + colour.z + colour.w + material.alpha_cutoff + material.roughness +
-                      material.metalness + material.emission;
+                      material.metalness + material.emission + material.emissive_tint.x + material.emissive_tint.y +
+                      material.emissive_tint.z;
     if (!std::isfinite(sum)) return make_error(ErrorCode::InvalidArgument, "a material that is not finite");
   }
   for (const MeshTexture& texture : mesh.textures) {
@@ -74,7 +78,7 @@ Status check_mesh(const TriangleMesh& mesh) {
   if (triangles > 0x7FFF'FFFFU) return make_error(ErrorCode::LimitExceeded, "2^31 triangles or more");
   const auto fits = [](std::size_t size, std::size_t wanted) { return size == 0 || size == wanted; };
   if (!fits(mesh.colours.size(), mesh.positions.size()) || !fits(mesh.material_of.size(), triangles) ||
-      !fits(mesh.texture_places.size(), 3 * triangles)) {
+      !fits(mesh.texture_places.size(), 3 * triangles) || !fits(mesh.emissive_places.size(), 3 * triangles)) {
     return make_error(ErrorCode::InvalidArgument, "a mesh whose arrays are of different lengths");
   }
   for (std::size_t i = 0; i < triangles; ++i) {

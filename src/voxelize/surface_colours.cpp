@@ -14,6 +14,9 @@ namespace quoin::voxelizing {
 
 namespace {
 
+// Emission within a texture is told apart in steps of a 16th of the material's.
+constexpr std::uint32_t kEmissionSteps = 16;
+
 // What a mesh without materials has: a light grey that shows its shape, sRGB 200.
 constexpr float kGrey = 0.577580F;
 
@@ -65,7 +68,9 @@ SurfaceColours::SurfaceColours(const Frame& frame) : frame_(&frame), materials_(
   bool is_textured = false;
   for (MeshMaterial& material : materials_) {
     if (mesh.texture_places.empty()) material.texture.reset();
-    is_textured |= material.texture.has_value();
+    if (material.emissive_texture && mesh.emissive_places.empty()) material.emission = 0.0F;
+    if (mesh.emissive_places.empty()) material.emissive_texture.reset();
+    is_textured |= material.texture.has_value() || material.emissive_texture.has_value();
     VoxelProperties type;
     type.name = material.name;
     type.roughness = std::clamp(material.roughness, 0.0F, 1.0F);
@@ -75,7 +80,18 @@ SurfaceColours::SurfaceColours(const Frame& frame) : frame_(&frame), materials_(
   }
   pictures_.resize(mesh.textures.size());
   for (const MeshMaterial& material : materials_) {
-    if (material.texture && pictures_[*material.texture].levels.empty()) make_halves(*material.texture);
+    for (const auto& texture : {material.texture, material.emissive_texture}) {
+      if (texture && pictures_[*texture].levels.empty()) make_halves(*texture);
+    }
+  }
+  for (std::size_t i = 0; i < materials_.size(); ++i) {
+    first_steps_.push_back(static_cast<std::uint32_t>(properties_.size()));
+    if (!materials_[i].emissive_texture) continue;
+    for (std::uint32_t step = 0; step < kEmissionSteps; ++step) {
+      VoxelProperties part = properties_[i];
+      part.emission *= static_cast<float>(step) / static_cast<float>(kEmissionSteps);
+      properties_.push_back(std::move(part));
+    }
   }
   is_plain_ = materials_.size() == 1 && !is_textured && mesh.colours.empty() &&
               (materials_[0].alpha_mode == AlphaMode::Opaque || materials_[0].colour.a >= 1.0F);
@@ -87,6 +103,33 @@ std::optional<std::uint32_t> SurfaceColours::only_material() const {
   if (of.empty()) return 0;
   const bool is_one = std::all_of(of.begin(), of.end(), [&](std::uint32_t material) { return material == of.front(); });
   return is_one ? std::optional(of.front()) : std::nullopt;
+}
+
+std::uint32_t SurfaceColours::look_of(std::uint32_t material, float share) const {
+  const auto step = static_cast<std::uint32_t>(std::lround(share * static_cast<float>(kEmissionSteps)));
+  return step >= kEmissionSteps ? material : first_steps_[material] + step;
+}
+
+std::uint32_t SurfaceColours::look_index(std::uint32_t triangle, DVec3 shares) const {
+  return look_of(material_index(triangle), emission_share(triangle, shares));
+}
+
+std::optional<std::uint32_t> SurfaceColours::deep_look() const {
+  const auto material = only_material();
+  return material ? std::optional(look_of(*material, mean_emission_)) : std::nullopt;
+}
+
+float SurfaceColours::emission_share(std::uint32_t triangle, DVec3 shares) const {
+  const MeshMaterial& material = material_of(triangle);
+  if (!material.emissive_texture) return 1.0F;
+  const glm::vec2* const places = frame_->mesh().emissive_places.data() + std::size_t{3} * triangle;
+  const glm::vec3 glow = glm::vec3(colour_in(*material.emissive_texture, triangle, places, shares)) * material.emissive_tint;
+  const float most = std::max({glow.r, glow.g, glow.b});
+  constexpr float kDark = 1.0F / 255.0F;
+  if (!(most > kDark)) return 0.0F;
+  // A type emits its own colour: the share is relative to that, so that what was written is read again.
+  const glm::vec4 base = light(triangle, shares);
+  return std::min(most / std::max({base.r, base.g, base.b, most}), 1.0F);
 }
 
 void SurfaceColours::make_halves(std::size_t texture) {
@@ -153,10 +196,9 @@ glm::vec4 SurfaceColours::sample(std::size_t texture, std::size_t level, DVec3 p
 }
 
 /// The level a pixel of which is about as large as a voxel.
-std::size_t SurfaceColours::level_of(std::uint32_t triangle, std::size_t texture) const {
+std::size_t SurfaceColours::level_of(std::uint32_t triangle, const glm::vec2* places, std::size_t texture) const {
   const Corners corners = frame_->corners(triangle);
   const double area = glm::length(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));
-  const glm::vec2* places = frame_->mesh().texture_places.data() + std::size_t{3} * triangle;
   const glm::vec2 a = places[1] - places[0];
   const glm::vec2 b = places[2] - places[0];
   const std::vector<Level>& levels = pictures_[texture].levels;
@@ -164,6 +206,14 @@ std::size_t SurfaceColours::level_of(std::uint32_t triangle, std::size_t texture
   if (!(area > 0.0) || !(pixels > area)) return 0;
   const double level = std::floor(0.5 * std::log2(pixels / area) + 0.5);
   return static_cast<std::size_t>(std::clamp(level, 0.0, static_cast<double>(levels.size() - 1)));
+}
+
+glm::vec4 SurfaceColours::colour_in(std::size_t texture, std::uint32_t triangle, const glm::vec2* places,
+                               DVec3 shares) const {
+  const glm::vec2 place = places[0] * static_cast<float>(shares.x) + places[1] * static_cast<float>(shares.y) +
+                          places[2] * static_cast<float>(shares.z);
+  const glm::vec4 found = sample(texture, level_of(triangle, places, texture), DVec3(place.x, place.y, 0.0));
+  return found.a > 0.0F ? glm::vec4(glm::vec3(found) / found.a, found.a) : found;
 }
 
 glm::vec4 SurfaceColours::light(std::uint32_t triangle, DVec3 shares) const {
@@ -177,12 +227,7 @@ glm::vec4 SurfaceColours::light(std::uint32_t triangle, DVec3 shares) const {
              mesh.colours[corner[2]] * static_cast<float>(shares.z);
   }
   if (material.texture) {
-    const glm::vec2* p = mesh.texture_places.data() + std::size_t{3} * triangle;
-    const glm::vec2 place =
-        p[0] * static_cast<float>(shares.x) + p[1] * static_cast<float>(shares.y) + p[2] * static_cast<float>(shares.z);
-    glm::vec4 seen = sample(*material.texture, level_of(triangle, *material.texture), DVec3(place.x, place.y, 0.0));
-    if (seen.a > 0.0F) seen = glm::vec4(glm::vec3(seen) / seen.a, seen.a);
-    light *= seen;
+    light *= colour_in(*material.texture, triangle, mesh.texture_places.data() + std::size_t{3} * triangle, shares);
   }
   return light;
 }
@@ -206,6 +251,7 @@ void SurfaceColours::find_mean() {
   const bool has_alpha = one && materials_[*one].alpha_mode == AlphaMode::Blend;
   glm::dvec4 sum(0.0);
   double alpha = 0.0;
+  double emission = 0.0;
   for (std::size_t i = 0; i < frame_->triangle_count(); ++i) {
     const auto triangle = static_cast<std::uint32_t>(i);
     const Corners c = frame_->corners(i);
@@ -215,9 +261,11 @@ void SurfaceColours::find_mean() {
     const glm::vec4 seen = light(triangle, third);
     sum += glm::dvec4(glm::vec3(seen), 1.0) * area;
     alpha += (has_alpha ? seen.a : 1.0) * area;
+    emission += (one ? emission_share(triangle, third) : 1.0) * area;
   }
   const glm::vec4 plain = materials_[0].colour;
   const bool has_area = sum.a > 0.0;
+  if (has_area) mean_emission_ = static_cast<float>(emission / sum.a);
   mean_ = encoded(has_area ? glm::vec4(glm::vec3(sum / sum.a), static_cast<float>(alpha / sum.a))
                            : glm::vec4(glm::vec3(plain), 1.0F));
 }

@@ -31,12 +31,14 @@ class SurfaceColours {
     const auto& of = frame_->mesh().material_of;
     return of.empty() ? 0 : of[triangle];
   }
-  /// The material that all triangles are of; nothing where there are several.
-  [[nodiscard]] std::optional<std::uint32_t> only_material() const;
+  /// The index into `looks` of a point: of its material, with the emission that its texture has there.
+  [[nodiscard]] std::uint32_t look_index(std::uint32_t triangle, DVec3 shares) const;
+  /// The look of the one material that all triangles have, with its mean emission; nothing if there are several.
+  [[nodiscard]] std::optional<std::uint32_t> deep_look() const;
   /// The mean colour, by area, of what lies at the triangles' middles; with its alpha where one material alone blends.
   [[nodiscard]] Rgba8 mean() const { return mean_; }
-  /// What types have of the materials besides their colour.
-  [[nodiscard]] const std::vector<VoxelProperties>& materials() const { return properties_; }
+  /// The properties of types except their colour: of the materials, then of those with parts of their emission.
+  [[nodiscard]] const std::vector<VoxelProperties>& looks() const { return properties_; }
 
  private:
   /// A texture's picture and its halves down to one pixel.
@@ -52,19 +54,29 @@ class SurfaceColours {
   [[nodiscard]] const MeshMaterial& material_of(std::uint32_t triangle) const {
     return materials_[material_index(triangle)];
   }
+  /// The material that all triangles are of; nothing where there are several.
+  [[nodiscard]] std::optional<std::uint32_t> only_material() const;
+  /// The look of a material with this share of its emission.
+  [[nodiscard]] std::uint32_t look_of(std::uint32_t material, float share) const;
+  /// The share of its material's emission, 0 to 1.
+  [[nodiscard]] float emission_share(std::uint32_t triangle, DVec3 shares) const;
+  /// The texture's colour at a point of a triangle, whose corners have these places in it.
+  [[nodiscard]] glm::vec4 colour_in(std::size_t texture, std::uint32_t triangle, const glm::vec2* places, DVec3 shares) const;
   /// Linear light and alpha.
   [[nodiscard]] glm::vec4 light(std::uint32_t triangle, DVec3 shares) const;
   [[nodiscard]] glm::vec4 texel(std::size_t texture, std::size_t level, int x, int y) const;
   [[nodiscard]] glm::vec4 sample(std::size_t texture, std::size_t level, DVec3 place) const;
-  [[nodiscard]] std::size_t level_of(std::uint32_t triangle, std::size_t texture) const;
+  [[nodiscard]] std::size_t level_of(std::uint32_t triangle, const glm::vec2* places, std::size_t texture) const;
   void make_halves(std::size_t texture);
   void find_mean();
 
   const Frame* frame_;
   std::vector<MeshMaterial> materials_;
   std::vector<VoxelProperties> properties_;
+  std::vector<std::uint32_t> first_steps_;  ///< of materials: the look with no emission, of those with a texture of it
   std::vector<Pictures> pictures_;
   Rgba8 mean_;
+  float mean_emission_ = 1.0F;  ///< share, by area
   bool is_plain_ = false;
 };
 

@@ -8,7 +8,9 @@
 #include <optional>
 #include <utility>
 
+#include <quoin/core/thousands.h>
 #include <quoin/grid/chunk.h>
+#include <quoin/grid/grid.h>
 
 #include "core/lender.h"
 #include "core/progress_steps.h"
@@ -99,7 +101,7 @@ Coloured coloured_voxel(const Parts& parts, IVec3 chunk, std::size_t voxel, std:
                     static_cast<int>(voxel / kRows));
   const DVec3 centre = DVec3(chunk * kChunkEdge + local) + 0.5;
   const DVec3 shares = nearest_shares(parts.frame.corners(triangle), centre);
-  return {static_cast<std::uint32_t>(voxel), parts.colours->material_index(triangle),
+  return {static_cast<std::uint32_t>(voxel), parts.colours->look_index(triangle, shares),
           parts.colours->colour(triangle, shares)};
 }
 
@@ -227,9 +229,9 @@ struct Types {
 /// Numbers looks in the order of chunks and voxels; each `Coloured::material` becomes the look's number.
 Result<Types> find_types(const SurfaceColours& colours, AllFound& found, VoxelRegistry& registry, std::size_t most,
                          std::vector<std::string>& warnings) {
-  std::vector<VoxelProperties> materials = colours.materials();
+  std::vector<VoxelProperties> materials = colours.looks();
   // Of what is deep: of the one material that all triangles have, or of none.
-  const std::uint32_t deep_material = colours.only_material().value_or(static_cast<std::uint32_t>(materials.size()));
+  const std::uint32_t deep_material = colours.deep_look().value_or(static_cast<std::uint32_t>(materials.size()));
   materials.emplace_back();
   Looks looks;
   bool has_deep = false;
@@ -303,6 +305,35 @@ Result<Parts> prepare(const TriangleMesh& mesh, const VoxelLattice& lattice, dou
   return parts;
 }
 
+bool has_voxel_near(GridReader& voxels, IVec3 at) {
+  if (voxels.get(at) != kAir) return true;
+  for (int i = 0; i < 27; ++i) {
+    if (voxels.get(at + IVec3(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1)) != kAir) return true;
+  }
+  return false;
+}
+
+/// Warns of corners without a voxel next to them: a thin surface leaves out tips and pieces that no line through
+/// centres meets. Corners whose material cuts parts out do not count.
+void warn_of_thin_parts(const TriangleMesh& mesh, const VoxelLattice& lattice, const SurfaceColours& colours,
+                        const Grid& grid, std::vector<std::string>& warnings) {
+  GridReader voxels(grid);
+  std::vector<bool> is_known(mesh.positions.size());
+  std::int64_t lost = 0;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    if (colours.may_have_holes(static_cast<std::uint32_t>(i))) continue;
+    for (const std::uint32_t index : mesh.triangles[i]) {
+      if (is_known[index]) continue;
+      is_known[index] = true;
+      lost += has_voxel_near(voxels, voxel_of(lattice.grid_from_mesh(mesh.positions[index]))) ? 0 : 1;
+    }
+  }
+  if (lost == 0) return;
+  warnings.push_back("parts thinner than a voxel left out: " + with_thousands(lost) +
+                     " corners of the mesh have no voxel next to them (--separating 26, in programs "
+                     "SurfaceVoxels::Separating26, keeps them)");
+}
+
 }  // namespace
 }  // namespace voxelizing
 
@@ -328,6 +359,9 @@ Result<VoxelizedMesh> voxelize(const TriangleMesh& mesh, const VoxelizeOptions& 
       [&](std::size_t i, const Found&, Chunk&& voxels) {
         made.grid.put_chunk(parts->frame.first_chunk() + parts->frame.chunk_at(i), std::move(voxels));
       });
+  if (options.surface == SurfaceVoxels::Separating6) {
+    warn_of_thin_parts(mesh, options.lattice, *parts->colours, made.grid, made.warnings);
+  }
   if (progress) (void)progress(1.0);
   return made;
 }

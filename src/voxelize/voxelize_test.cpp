@@ -313,6 +313,26 @@ TEST(VoxelizeSurface, separates) {
   EXPECT_GT(thin_ones_with_gaps, 0);
 }
 
+TEST(VoxelizeSurface, WarnsOfTipsThatAreThinnerThanAVoxel) {
+  // A spike of 20 voxels, 0.4 thick at its base, between the lines through centres.
+  TriangleMesh mesh;
+  mesh.positions = {{0.05, 0, 0.05}, {0.45, 0, 0.05}, {0.05, 0, 0.45}, {0.1, 20, 0.1}};
+  mesh.triangles = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
+  TriangleMesh with_box = shapes::box(DVec3(-4.0, -4.0, -4.0), DVec3(4.0, 0.0, 4.0));
+  shapes::append(with_box, mesh);
+  VoxelizeOptions options;
+  VoxelRegistry types;
+  const auto thin = voxelize(with_box, options, types);
+  ASSERT_TRUE(thin);
+  ASSERT_EQ(thin->warnings.size(), 1U);
+  EXPECT_NE(thin->warnings[0].find("1 corners of the mesh"), std::string::npos) << thin->warnings[0];
+  options.surface = SurfaceVoxels::Separating26;
+  const auto thick = voxelize(with_box, options, types);
+  ASSERT_TRUE(thick);
+  EXPECT_TRUE(thick->warnings.empty());
+  EXPECT_GE(thick->grid.bounds().max.y, 20);
+}
+
 TEST(VoxelizeField, has_the_distances_of_the_mesh) {
   for (const TriangleMesh& mesh : closed_meshes()) {
     VoxelRegistry types;

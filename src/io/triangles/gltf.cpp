@@ -18,9 +18,12 @@
 
 #include "core/srgb.h"
 #include "io/byte_reader.h"
+#include "io/text.h"
+#include "io/triangles/gltf_draco.h"
 #include "io/triangles/gltf_meshopt.h"
 
 #ifdef QUOIN_HAVE_TINYGLTF
+#include <nlohmann/json.hpp>
 #include <tiny_gltf.h>
 #endif
 
@@ -325,6 +328,7 @@ class GltfReader {
                                            "KHR_lights_punctual",   "EXT_texture_webp"};
     for (const std::string& name : model_.extensionsRequired) {
       if (name == "EXT_meshopt_compression" && has_meshopt()) continue;
+      if (name == "KHR_draco_mesh_compression") continue;  // decode_draco refuses it without Draco
       const bool is_look = name.starts_with("KHR_materials_");
       if (is_look || std::find(std::begin(kKnown), std::end(kKnown), name) != std::end(kKnown)) continue;
       return make_error(ErrorCode::Unsupported, "glTF that requires " + name);
@@ -336,6 +340,7 @@ class GltfReader {
     no_material_ = loaded_.mesh.materials.size();
     loaded_.mesh.materials.emplace_back();
     places_.emplace_back();
+    glow_places_.emplace_back();
   }
   void take_material(const tinygltf::Material& from) {
     const auto& pbr = from.pbrMetallicRoughness;
@@ -357,14 +362,70 @@ class GltfReader {
                           : from.alphaMode == "BLEND" ? AlphaMode::Blend
                                                       : AlphaMode::Opaque;
     material.alpha_cutoff = static_cast<float>(from.alphaCutoff);
-    material.emission = emission_of(from);
     PlaceTransform place;
     if (pbr.baseColorTexture.index >= 0) {
       place = place_of(pbr.baseColorTexture);
       material.texture = texture_of(pbr.baseColorTexture.index);
     }
+    const auto specular = from.extensions.find("KHR_materials_pbrSpecularGlossiness");
+    if (specular != from.extensions.end()) take_specular(specular->second, material, place);
+    glow_places_.push_back(take_emission(from, material));
     loaded_.mesh.materials.push_back(std::move(material));
     places_.push_back(place);
+  }
+  /// Takes the diffuse colour and texture and the glossiness, which replace those of metal and roughness. Specular
+  /// colours have no place in voxel types.
+  void take_specular(const tinygltf::Value& from, MeshMaterial& material, PlaceTransform& place) {
+    material.colour = glm::vec4(1.0F);
+    if (from.Has("diffuseFactor") && from.Get("diffuseFactor").IsArray()) {
+      const tinygltf::Value& factor = from.Get("diffuseFactor");
+      for (int i = 0; i < static_cast<int>(std::min<std::size_t>(factor.ArrayLen(), 4)); ++i) {
+        if (!factor.Get(i).IsNumber()) continue;
+        material.colour[i] = static_cast<float>(std::clamp(factor.Get(i).GetNumberAsDouble(), 0.0, 1.0));
+      }
+    }
+    material.metalness = 0.0F;
+    material.roughness = 1.0F;
+    if (!from.Has("specularGlossinessTexture")) {
+      material.roughness = static_cast<float>(1.0 - std::clamp(number_in(from, "glossinessFactor", 1.0), 0.0, 1.0));
+    }
+    material.texture.reset();
+    if (!from.Has("diffuseTexture") || !from.Get("diffuseTexture").IsObject()) return;
+    const tinygltf::TextureInfo info = info_of(from.Get("diffuseTexture"));
+    place = place_of(info);
+    material.texture = texture_of(info.index);
+  }
+  static tinygltf::TextureInfo info_of(const tinygltf::Value& from) {
+    tinygltf::TextureInfo info;
+    const auto whole = [&](const char* key, int otherwise) {
+      return static_cast<int>(std::clamp(number_in(from, key, otherwise), -1.0, 1e9));
+    };
+    info.index = whole("index", -1);
+    info.texCoord = whole("texCoord", 0);
+    if (from.Has("extensions") && from.Get("extensions").Has("KHR_texture_transform")) {
+      info.extensions["KHR_texture_transform"] = from.Get("extensions").Get("KHR_texture_transform");
+    }
+    return info;
+  }
+  /// Takes the emissive factor and texture; returns where the texture lies.
+  PlaceTransform take_emission(const tinygltf::Material& from, MeshMaterial& material) {
+    material.emission = emission_of(from);
+    if (from.emissiveTexture.index < 0 || !(material.emission > 0.0F)) return {};
+    // A texture that cannot be read has left a warning: the factor alone would make all of it glow.
+    material.emissive_texture = texture_of(from.emissiveTexture.index);
+    if (!material.emissive_texture) {
+      material.emission = 0.0F;
+      return {};
+    }
+    const double most = *std::max_element(from.emissiveFactor.begin(), from.emissiveFactor.end());
+    for (int i = 0; i < 3; ++i) {
+      material.emissive_tint[i] = static_cast<float>(from.emissiveFactor[static_cast<std::size_t>(i)] / most);
+    }
+    tinygltf::TextureInfo info = info_of({});
+    info.index = from.emissiveTexture.index;
+    info.texCoord = from.emissiveTexture.texCoord;
+    info.extensions = from.emissiveTexture.extensions;
+    return place_of(info);
   }
   static float emission_of(const tinygltf::Material& from) {
     double most = 0.0;
@@ -506,12 +567,18 @@ class GltfReader {
       loaded_.mesh.positions.emplace_back(world_from_mesh * p);
     }
     if (Status done = take_colours(primitive, first, positions->count()); !done) return done;
-    const auto places = texture_places(primitive, material, positions->count());
+    const MeshMaterial& look = loaded_.mesh.materials[material];
+    const PlaceTransform& colour_place = places_[material];
+    const PlaceTransform& glow_place = glow_places_[material];
+    const auto places = texture_places(primitive, look.texture.has_value(), colour_place, positions->count());
     if (!places) return places.error();
-    const auto place_at = [&](std::size_t vertex) {
-      if (!*places) return glm::vec2(0.0F);
-      const Accessor& at = **places;
-      return places_[material].of({static_cast<float>(at.at(vertex, 0)), static_cast<float>(at.at(vertex, 1))});
+    const auto glows = texture_places(primitive, look.emissive_texture.has_value(), glow_place, positions->count());
+    if (!glows) return glows.error();
+    has_textures_ |= places->has_value();
+    has_glows_ |= glows->has_value();
+    const auto place_at = [](const std::optional<Accessor>& at, const PlaceTransform& place, std::size_t vertex) {
+      if (!at) return glm::vec2(0.0F);
+      return place.of({static_cast<float>(at->at(vertex, 0)), static_cast<float>(at->at(vertex, 1))});
     };
     const bool is_mirrored = glm::determinant(glm::dmat3(world_from_mesh)) < 0.0;
     const auto add = [&](std::size_t a, std::size_t b, std::size_t c) -> Status {
@@ -521,7 +588,10 @@ class GltfReader {
       if (!added) return added.error();
       if (!*added) return {};
       loaded_.mesh.material_of.push_back(static_cast<std::uint32_t>(material));
-      for (const std::size_t vertex : {a, b, c}) loaded_.mesh.texture_places.push_back(place_at(vertex));
+      for (const std::size_t vertex : {a, b, c}) {
+        loaded_.mesh.texture_places.push_back(place_at(*places, colour_place, vertex));
+        loaded_.mesh.emissive_places.push_back(place_at(*glows, glow_place, vertex));
+      }
       return {};
     };
     if (primitive.indices < 0) {
@@ -534,17 +604,16 @@ class GltfReader {
         mode, indices->count(),
         [&](std::size_t i) { return static_cast<std::size_t>(std::max(indices->at(i, 0), 0.0)); }, add);
   }
-  // Where its vertices lie in their material's texture; nothing where it has none or does not say.
-  Result<std::optional<Accessor>> texture_places(const tinygltf::Primitive& primitive, std::size_t material,
-                                                 std::size_t vertices) {
-    const int place = attribute(primitive, "TEXCOORD_" + std::to_string(places_[material].set));
-    if (!loaded_.mesh.materials[material].texture || place < 0) return std::optional<Accessor>();
+  /// Returns where the vertices lie in a texture; nothing where there is no texture, or no coordinates for it.
+  Result<std::optional<Accessor>> texture_places(const tinygltf::Primitive& primitive, bool has_texture,
+                                                 const PlaceTransform& transform, std::size_t vertices) const {
+    const int place = attribute(primitive, "TEXCOORD_" + std::to_string(transform.set));
+    if (!has_texture || place < 0) return std::optional<Accessor>();
     auto opened = Accessor::open(model_, place, 2);
     if (!opened) return opened.error();
     if (opened->count() < vertices) {
       return make_error(ErrorCode::BadFormat, "fewer places in the texture than vertices");
     }
-    has_textures_ = true;
     return std::optional(std::move(*opened));
   }
   static bool is_known(std::size_t a, std::size_t b, std::size_t c, std::size_t count) {
@@ -590,6 +659,7 @@ class GltfReader {
   }
   void finish() {
     if (!has_textures_) loaded_.mesh.texture_places.clear();
+    if (!has_glows_) loaded_.mesh.emissive_places.clear();
     if (has_others_) loaded_.warnings.emplace_back("left out points and lines");
     if (has_skins_) loaded_.warnings.emplace_back("skins are left out: the mesh is as it was modelled");
     if (!model_.animations.empty())
@@ -602,12 +672,14 @@ class GltfReader {
   const Asked& asked_;
   LoadedMesh loaded_;
   MeshBuilder builder_{loaded_};
-  std::vector<PlaceTransform> places_;  // of materials
+  std::vector<PlaceTransform> places_;       // of materials' colours
+  std::vector<PlaceTransform> glow_places_;  // of materials' emission
   std::vector<std::optional<std::size_t>> known_textures_;
   std::vector<bool> asked_textures_;
   std::vector<bool> seen_;
   std::size_t no_material_ = 0;
   bool has_textures_ = false;
+  bool has_glows_ = false;
   bool has_others_ = false;
   bool has_skins_ = false;
 };
@@ -621,6 +693,21 @@ std::string_view json_of(std::span<const std::byte> bytes) {
   (void)reader.take(12);
   const std::uint32_t length = reader.u32();
   return text.size() <= kJsonAt ? std::string_view() : text.substr(kJsonAt, length);
+}
+
+/// Returns the version that the file states if it is not 2; nothing for version 2 and for files that state none.
+std::optional<std::string> other_version(std::span<const std::byte> bytes, std::string_view json) {
+  if (is_glb(bytes) && bytes.size() >= 8) {
+    ByteReader reader(bytes);
+    (void)reader.take(4);
+    if (const std::uint32_t container = reader.u32(); container != 2) return std::to_string(container) + ".0";
+  }
+  const auto document = nlohmann::json::parse(json, nullptr, false);
+  if (!document.is_object() || !document.contains("asset") || !document["asset"].is_object()) return std::nullopt;
+  const auto version = document["asset"].find("version");
+  if (version == document["asset"].end()) return std::nullopt;
+  const std::string text = version->is_string() ? version->get<std::string>() : version->dump();
+  return text.starts_with("2") ? std::nullopt : std::optional(printable(text));
 }
 
 Result<tinygltf::Model> parse(std::span<const std::byte> bytes, Asked& asked) {
@@ -658,7 +745,13 @@ Result<LoadedMesh> read_gltf(std::span<const std::byte> bytes, Beside& beside) {
   const auto rewritten = without_fallback_buffers(bytes, json);
   auto model = parse(rewritten.empty() ? bytes : rewritten, asked);
   if (beside.refused()) return *beside.refused();
+  if (!model || !model->asset.version.starts_with("2")) {
+    if (const auto version = other_version(bytes, json)) {
+      return make_error(ErrorCode::Unsupported, "glTF " + *version + " is not supported (version 2 is)");
+    }
+  }
   if (!model) return model.error();
+  if (Status done = decode_draco(*model); !done) return done.error();
   if (has_meshopt()) {
     if (Status done = decode_views(*model); !done) return done.error();
   }

@@ -257,6 +257,7 @@ class ObjReader {
     }
     if (has_others_) loaded_.warnings.emplace_back("left out points and lines");
     show_what_is_all_invisible();
+    if (has_glows_) loaded_.mesh.emissive_places = loaded_.mesh.texture_places;
     if (!has_textures_) loaded_.mesh.texture_places.clear();
     builder_.finish();
     return std::move(loaded_);
@@ -299,6 +300,7 @@ class ObjReader {
       material.metalness = static_cast<float>(std::clamp(from.metallic, 0.0, 1.0));
       material.emission = static_cast<float>(std::max({from.emission[0], from.emission[1], from.emission[2], 0.0}));
       if (!from.diffuse_texname.empty()) take_texture(from, material);
+      if (!from.emissive_texname.empty() && material.emission > 0.0F) take_emission(from, material);
       loaded_.mesh.materials.push_back(std::move(material));
     }
     // What names no material, or one that is not there.
@@ -308,15 +310,29 @@ class ObjReader {
     plain.colour = {grey, grey, grey, 1.0F};
     loaded_.mesh.materials.push_back(std::move(plain));
   }
-  void take_texture(const tinyobj::material_t& from, MeshMaterial& material) {
-    const std::string& name = from.diffuse_texname;
+  std::optional<std::size_t> texture_of(const std::string& name) {
     const auto [known, is_new] = textures_.try_emplace(name);
     if (is_new) {
       const auto bytes = beside_.read_or_same_name(name);
       if (!bytes) loaded_.warnings.push_back("left out the texture " + name + ": " + bytes.error().message);
       if (bytes) known->second = add_texture(*bytes, name, loaded_);
     }
-    material.texture = known->second;
+    return known->second;
+  }
+  /// Takes Ke times map_Ke. Without the image, which left a warning, nothing glows.
+  void take_emission(const tinyobj::material_t& from, MeshMaterial& material) {
+    material.emissive_texture = texture_of(from.emissive_texname);
+    if (!material.emissive_texture) {
+      material.emission = 0.0F;
+      return;
+    }
+    has_glows_ = true;
+    for (int i = 0; i < 3; ++i) {
+      material.emissive_tint[i] = static_cast<float>(std::max(from.emission[i], 0.0)) / material.emission;
+    }
+  }
+  void take_texture(const tinyobj::material_t& from, MeshMaterial& material) {
+    material.texture = texture_of(from.diffuse_texname);
     if (!material.texture) return;
     has_textures_ = true;
     MeshTexture& texture = loaded_.mesh.textures[*material.texture];
@@ -382,6 +398,7 @@ class ObjReader {
   std::vector<std::size_t> polygon_;
   std::size_t no_material_ = 0;
   bool has_textures_ = false;
+  bool has_glows_ = false;
   bool has_others_ = false;
 };
 
