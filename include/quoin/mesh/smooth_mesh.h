@@ -69,7 +69,8 @@ struct SmoothMeshOptions {
 /// allowed.
 ///
 /// Error:    the greatest distance, in samples, of a vertex of the mesh before from the surface after. It is measured;
-///           where meshoptimizer, which bounds a mean, goes beyond it, less is removed, or nothing at all.
+///           where meshoptimizer, which bounds a mean, goes beyond it, less is removed. A try that goes beyond it and
+///           removes no more than one triangle in 1,000 ends the search: nothing is removed then.
 /// Kept:     vertices that stay keep normal, occlusion, albedo and type, and their position, but for those below.
 ///           Vertices of one place that differ in these count as one: lines between colours stay where they are, to the
 ///           error. A closed mesh stays closed.

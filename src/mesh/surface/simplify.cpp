@@ -48,11 +48,17 @@ bool has_finite_positions(const SmoothMesh& mesh) {
 constexpr float kApart = 1.0F / 1024.0F;
 /// The share of the error that the library is allowed: it bounds a mean of squares, and single vertices of smooth
 /// surfaces are up to twice as far off.
-constexpr float kMeanShare = 0.6F;
-/// Where no more than one of so many places is too far off, the mesh stays as it was around those; else less error is
-/// allowed everywhere.
-constexpr std::size_t kFewPlaces = 50;
+constexpr float kMeanShare = 0.8F;
+/// If no more than one of so many places is too far off, the mesh stays as it was around those, and after some rounds
+/// a little less error is allowed; else much less is allowed everywhere.
+constexpr std::size_t kFewPlaces = 20;
+constexpr float kLittleLess = 0.8F;
+constexpr float kMuchLess = 0.6F;
 constexpr int kMaxTries = 16;
+/// Rounds in which triangles stay before a little less error is allowed.
+constexpr int kRounds = 4;
+/// A try that removes no more than one of so many triangles, and is too far off, is the last one.
+constexpr std::size_t kHardlyAny = 1'000;
 
 /// The vertices of each place, which colours and normals may have made several: by vertex, the first of its place.
 std::vector<std::uint32_t> places_of(const SmoothMesh& mesh) {
@@ -180,8 +186,12 @@ float simplify_within(SmoothMesh& mesh, float error_in_samples, std::vector<std:
   const std::vector<std::uint32_t> place = places_of(mesh);
   float allowed = kMeanShare * error_in_samples;
   std::vector<bool> stays(mesh.indices.size() / 3);
+  bool had_few = false;
+  int rounds = 0;
   for (int tries = 0; tries < kMaxTries; ++tries) {
-    Triangulation simple = triangulation_of(mesh, remove_triangles(mesh, allowed, scale, stays), place);
+    std::vector<std::uint32_t> left = remove_triangles(mesh, allowed, scale, stays);
+    const bool is_hopeless = left.size() + mesh.indices.size() / kHardlyAny >= mesh.indices.size();
+    Triangulation simple = triangulation_of(mesh, std::move(left), place);
     // A neck three edges round, say, is drawn together to one edge.
     make_manifold(simple, std::min(kApart, 0.25F * error_in_samples));
     Deviation found = deviation_of(mesh, place, simple, error_in_samples);
@@ -189,17 +199,21 @@ float simplify_within(SmoothMesh& mesh, float error_in_samples, std::vector<std:
       take_over(mesh, simple, tags);
       return found.most;
     }
+    if (is_hopeless) return 0.0F;
     const bool are_many = found.beyond > found.places / kFewPlaces || simple.indices.empty();
-    if (tries + 1 == kMaxTries / 2) {
+    had_few = had_few || !are_many;
+    if (tries + 1 == kMaxTries / 2 && !had_few) {
       // Less error did not help: a mesh that is round everywhere, say, and hardly to be made simpler.
       allowed = kMeanShare * error_in_samples;
       stays.assign(stays.size(), false);
     } else if (are_many && tries < kMaxTries / 2) {
       // What had to stay for more error need not for less.
-      allowed *= 0.5F;
+      allowed *= kMuchLess;
       stays.assign(stays.size(), false);
     } else {
       keep_around(mesh, place, std::move(found.is_beyond), stays);
+      // Other triangles are removed where these stay, so that new places may be too far off in every try.
+      if (++rounds > kRounds) allowed *= kLittleLess;
     }
   }
   return 0.0F;
