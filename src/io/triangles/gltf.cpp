@@ -635,11 +635,26 @@ class GltfReader {
     }
     return {};
   }
+  /// Returns true for the vertex colours that Quoin writes for blocks: the ambient light that arrives, no surface colour.
+  [[nodiscard]] bool is_baked_occlusion(const tinygltf::Primitive& primitive, int index) const {
+    const tinygltf::Accessor* const of = entry(model_.accessors, index);
+    const bool may_be = of != nullptr && model_.asset.generator.starts_with("Quoin ") &&
+                        of->componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE && of->normalized &&
+                        attribute(primitive, "TEXCOORD_0") >= 0;
+    if (!may_be) return false;
+    const auto colours = Accessor::open(model_, index, 3);
+    if (!colours) return false;
+    for (std::size_t i = 0; i < colours->count(); ++i) {
+      const double grey = colours->at(i, 0);
+      if (!is_occlusion_grey(grey) || colours->at(i, 1) != grey || colours->at(i, 2) != grey) return false;
+    }
+    return true;
+  }
   /// White where there are none, once any primitive has some.
   Status take_colours(const tinygltf::Primitive& primitive, std::size_t first, std::size_t count) {
     auto& all = loaded_.mesh.colours;
     const int index = attribute(primitive, "COLOR_0");
-    if (index < 0) {
+    if (index < 0 || is_baked_occlusion(primitive, index)) {
       if (!all.empty()) all.resize(first + count, glm::vec4(1.0F));
       return {};
     }

@@ -44,7 +44,8 @@ std::optional<std::size_t> index_in(const tinygltf::Value& object, const std::st
 }
 
 /// The bytes that an extension names.
-Result<std::pair<const char*, std::size_t>> coded_bytes(const tinygltf::Model& model, const tinygltf::Value& extension) {
+Result<std::pair<const char*, std::size_t>> coded_bytes(const tinygltf::Model& model,
+                                                        const tinygltf::Value& extension) {
   const auto view = index_in(extension, "bufferView");
   if (!view || *view >= model.bufferViews.size()) return bad("it is coded in a buffer view that is not there");
   const tinygltf::BufferView& of = model.bufferViews[*view];

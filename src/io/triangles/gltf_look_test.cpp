@@ -8,6 +8,7 @@
 
 #include <quoin/io/formats.h>
 #include <quoin/io/mesh_file.h>
+#include <quoin/scene/scene_meshes.h>
 
 #include "io/base64.h"
 #include "io/image/png.h"
@@ -105,9 +106,8 @@ TEST(GltfLook, DoesNotGlowWithoutTheEmissiveImage) {
 
 TEST(GltfLook, ReadsSpecularGlossiness) {
   if (!format_info(FileFormat::Gltf).readable) GTEST_SKIP() << "the build reads no glTF";
-  const std::string material =
-      R"({"extensions":{"KHR_materials_pbrSpecularGlossiness":{"diffuseFactor":[1,0.5,1,1],)"
-      R"("diffuseTexture":{"index":0},"glossinessFactor":0.25}}})";
+  const std::string material = R"({"extensions":{"KHR_materials_pbrSpecularGlossiness":{"diffuseFactor":[1,0.5,1,1],)"
+                               R"("diffuseTexture":{"index":0},"glossinessFactor":0.25}}})";
   const auto columns = columns_of(square_gltf(material, {image_of({{255, 0, 0, 255}, {0, 255, 0, 255}})}));
   ASSERT_EQ(columns.size(), 4U);
   EXPECT_EQ(columns[0].colour, (Rgba8{255, 0, 0, 255}));
@@ -130,6 +130,46 @@ TEST(GltfLook, RefusesOtherVersionsByTheirNumber) {
   const auto read = read_mesh(text_bytes(binary));
   ASSERT_FALSE(read);
   EXPECT_NE(read.error().message.find("glTF 1.0 is not supported"), std::string::npos) << read.error().message;
+}
+
+/// A staircase of three types, with occlusion in its corners.
+Scene scene_of_stairs() {
+  Scene scene;
+  SceneGrid grid;
+  std::vector<VoxelType> types;
+  for (const Rgba8 colour : {Rgba8{200, 30, 30, 255}, Rgba8{30, 200, 30, 255}, Rgba8{30, 30, 200, 255}}) {
+    VoxelProperties type;
+    type.colour = colour;
+    types.push_back(*scene.types.find_or_add(type));
+  }
+  for (int i = 0; i < 8 * 8 * 8; ++i) {
+    const IVec3 at(i % 8, i / 8 % 8, i / 64);
+    if (at.y <= at.x) grid.grid.set(at, types[static_cast<std::size_t>((at.x + at.z) % 3)]);
+  }
+  Instance instance;
+  instance.grid = scene.add_grid(std::move(grid));
+  scene.add_instance(instance);
+  return scene;
+}
+
+TEST(GltfLook, TakesOcclusionOfQuoinsFilesForNoColour) {
+  const auto meshes = mesh_scene(scene_of_stairs());
+  ASSERT_TRUE(meshes);
+  const auto folder = std::filesystem::temp_directory_path() / "quoin_gltf_look_test";
+  std::filesystem::create_directories(folder);
+  for (const FileFormat format : {FileFormat::Glb, FileFormat::Obj}) {
+    if (!format_info(format).readable) continue;
+    const auto path = folder / ("stairs" + std::string(format_info(format).extension));
+    ASSERT_TRUE(write_mesh(*meshes, path));
+    LoadOptions options;
+    options.mesh.voxel_size = 1.0;
+    const auto loaded = load_scene(path, options);
+    ASSERT_TRUE(loaded) << to_string(loaded.error());
+    // Air, the three types, and the mean colour of voxels deep inside.
+    EXPECT_LE(loaded->scene.types.size(), 5U) << path;
+    EXPECT_EQ(loaded->scene.voxel_count(), 8 * 36) << path;
+  }
+  std::filesystem::remove_all(folder);
 }
 
 /// A tetrahedron with its corner at the origin and colours a corner, coded by Draco 1.5.
@@ -182,7 +222,7 @@ TEST(GltfLook, RefusesDracoThatContradictsTheFile) {
   for (std::size_t at = 16; at < broken.size() - 4; at += 7) {
     std::string other = broken;
     other[at] = other[at] == 'A' ? '/' : 'A';
-    // Whatever it makes of it, it is no crash.
+    // An error or a mesh, but no crash.
     (void)read_mesh(text_bytes(draco_gltf(4, other)));
   }
 }

@@ -249,6 +249,7 @@ class ObjReader {
       return make_error(ErrorCode::BadFormat, first_line(errors.empty() ? "the file cannot be parsed" : errors));
     }
     warn_of(warnings);
+    drop_baked_occlusion(text_of(bytes));
     take_positions();
     take_materials();
     for (const tinyobj::shape_t& shape : shapes_) {
@@ -278,6 +279,16 @@ class ObjReader {
       if (++count <= kMost) loaded_.warnings.push_back(std::move(line));
     }
     if (count > kMost) loaded_.warnings.push_back("and " + std::to_string(count - kMost) + " lines more like these");
+  }
+  /// Drops the vertex colours that Quoin writes for blocks: the ambient light that arrives, no surface colour. Colours
+  /// of its smooth meshes, which have no materials, stay.
+  void drop_baked_occlusion(std::string_view text) {
+    const auto& c = attributes_.colors;
+    if (!text.starts_with("# Quoin ") || materials_.empty()) return;
+    for (std::size_t i = 0; i + 2 < c.size(); i += 3) {
+      if (!is_occlusion_grey(c[i]) || c[i + 1] != c[i] || c[i + 2] != c[i]) return;
+    }
+    attributes_.colors.clear();
   }
   void take_positions() {
     const auto& v = attributes_.vertices;

@@ -125,6 +125,12 @@ void MeshBuilder::finish() {
   }
 }
 
+bool is_occlusion_grey(double linear) {
+  constexpr double kHalfByte = 0.5 / 255.0 + 1e-6;
+  const double quarters = std::round(linear * 4.0);
+  return quarters >= 1.0 && quarters <= 4.0 && std::abs(linear - quarters / 4.0) <= kHalfByte;
+}
+
 std::optional<std::size_t> add_texture(std::span<const std::byte> picture, const std::string& name,
                                        LoadedMesh& loaded) {
   auto image = decode_picture(picture);

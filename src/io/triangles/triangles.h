@@ -73,6 +73,9 @@ class MeshBuilder {
   std::vector<std::array<std::uint32_t, 3>> cut_;
 };
 
+/// Returns true for the greys of occlusion that Quoin writes after the corners of blocks: quarters, as bytes or exactly.
+[[nodiscard]] bool is_occlusion_grey(double linear);
+
 /// Adds a picture as a texture; nothing, with a warning, where it cannot be decoded.
 [[nodiscard]] std::optional<std::size_t> add_texture(std::span<const std::byte> picture, const std::string& name,
                                                      LoadedMesh& loaded);

@@ -275,9 +275,8 @@ TEST(GltfTriangles, refuses_what_contradicts_itself) {
   EXPECT_EQ(error_of(tetrahedron_gltf(R"([{"mesh":0}])", "", 2'147'483'647)).code, ErrorCode::BadFormat);
   EXPECT_EQ(error_of(tetrahedron_gltf(R"([{"mesh":7}])")).code, ErrorCode::BadFormat);
   EXPECT_EQ(error_of(tetrahedron_gltf(R"([{"children":[1]},{"children":[0]}])")).code, ErrorCode::BadFormat);
-  EXPECT_EQ(
-      error_of(tetrahedron_gltf(R"([{"mesh":0}])", R"("extensionsRequired":["KHR_made_up"],)")).code,
-      ErrorCode::Unsupported);
+  EXPECT_EQ(error_of(tetrahedron_gltf(R"([{"mesh":0}])", R"("extensionsRequired":["KHR_made_up"],)")).code,
+            ErrorCode::Unsupported);
   std::string deep = R"({"asset":{"version":"2.0"},"extras":)";
   deep.append(100'000, '[');
   EXPECT_EQ(error_of(deep).code, ErrorCode::BadFormat);
