@@ -131,24 +131,30 @@ GlassBodies::GlassBodies(const SceneMeshes& meshes) {
       if (!is_transparent(view.surface) || view.indices.empty()) continue;
       if (view.has_albedo()) {
         smooth_.push_back({quoin::thickness_of(view), unit, area_of(view) * squares[i]});
+        if (!view.types.empty()) add_by_type({}, view, unit, squares[i], smooth_by_type_);
       } else {
-        add_blocks(meshes.parts[i], view, unit, squares[i]);
+        add_by_type(meshes.parts[i], view, unit, squares[i], by_type_);
       }
     }
   }
 }
 
-void GlassBodies::add_blocks(const MeshPart& part, const MeshView& view, double unit, double times) {
+void GlassBodies::add_by_type(const MeshPart& part, const MeshView& view, double unit, double times, ByType& all) {
   std::map<VoxelType, double> areas;
   for (std::size_t i = 0; i + 2 < view.indices.size(); i += 3) {
     areas[view.types[view.indices[i]]] += area_of(view, i) * times;
   }
-  for (const auto& [type, area] : areas) by_type_[type].push_back({thickness_of(part, view, type), unit, area});
+  for (const auto& [type, area] : areas) all[type].push_back({thickness_of(part, view, type), unit, area});
 }
 
 GlassBodies::Typical GlassBodies::typical(VoxelType type) const {
   const auto found = by_type_.find(type);
   return found == by_type_.end() ? Typical{} : typical_of(found->second);
+}
+
+GlassBodies::Typical GlassBodies::typical_of_smooth(VoxelType type) const {
+  const auto found = smooth_by_type_.find(type);
+  return found == smooth_by_type_.end() ? Typical{} : typical_of(found->second);
 }
 
 GlassBodies::Typical GlassBodies::typical_of(std::vector<Seen> seen) {

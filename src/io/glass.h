@@ -55,6 +55,8 @@ class GlassBodies {
   explicit GlassBodies(const SceneMeshes& meshes);
 
   [[nodiscard]] Typical typical(VoxelType type) const;
+  /// The same of smooth surfaces of a type.
+  [[nodiscard]] Typical typical_of_smooth(VoxelType type) const;
   [[nodiscard]] float thickness_of_smooth() const { return smooth_.empty() ? 1.0F : typical_of(smooth_).thickness; }
 
  private:
@@ -64,10 +66,14 @@ class GlassBodies {
     double area = 0.0;  // in the world
   };
 
-  void add_blocks(const MeshPart& part, const MeshView& view, double unit, double times);
+  using ByType = std::map<VoxelType, std::vector<Seen>>;
+
+  /// `times`: the area of its placements in the world.
+  static void add_by_type(const MeshPart& part, const MeshView& view, double unit, double times, ByType& all);
   static Typical typical_of(std::vector<Seen> seen);
 
-  std::map<VoxelType, std::vector<Seen>> by_type_;
+  ByType by_type_;
+  ByType smooth_by_type_;
   std::vector<Seen> smooth_;
 };
 

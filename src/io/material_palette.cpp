@@ -28,6 +28,18 @@ std::uint32_t copy_vertex(const MeshView& source, std::size_t from, BlockyTriang
   return static_cast<std::uint32_t>(target.positions.size() - 1);
 }
 
+/// Appends vertex `from` of a smooth surface; returns its index in `target`.
+std::uint32_t copy_vertex(const MeshView& source, std::size_t from, SmoothMesh& target,
+                          std::vector<LinearRgba16>& light) {
+  target.positions.push_back(source.positions[from]);
+  target.normals.push_back(source.normals[from]);
+  target.albedo.push_back(source.albedo[from]);
+  target.types.push_back(source.types[from]);
+  if (!source.occlusion.empty()) target.occlusion.push_back(source.occlusion[from]);
+  if (!source.light.empty()) light.push_back(source.light[from]);
+  return static_cast<std::uint32_t>(target.positions.size() - 1);
+}
+
 /// What the file can say: finite and not negative.
 float clamped_emission(float emission) {
   return emission > 0.0F ? std::min(emission, std::numeric_limits<float>::max()) : 0.0F;
@@ -76,16 +88,14 @@ MaterialPalette::MaterialPalette(const SceneMeshes& meshes) : types_(meshes.type
   for (auto& types : used) types.resize(types_.size());
   for (const MeshPart& part : meshes.parts) {
     for (const MeshView& view : part.surfaces) {
-      if (view.has_albedo()) {
-        has_smooth_[is_transparent(view.surface) ? 1 : 0] |= !view.indices.empty();
-        continue;
-      }
+      if (view.has_albedo()) continue;
       for (const VoxelType type : view.types) used[static_cast<std::size_t>(view.surface)][type] = true;
     }
   }
   find_bands(used);
   make_materials(used);
   find_glass(meshes);
+  make_smooth_materials(meshes);
 }
 
 void MaterialPalette::find_bands(const Usage& used) {
@@ -142,8 +152,7 @@ void MaterialPalette::make_materials(const Usage& used) {
 }
 
 void MaterialPalette::find_glass(const SceneMeshes& meshes) {
-  GlassBodies bodies(meshes);
-  smooth_thickness_ = bodies.thickness_of_smooth();
+  const GlassBodies bodies(meshes);
   const Surfaces looks(types_);
   for (SurfaceMaterial& material : materials_) {
     if (!material.is_transparent()) continue;
@@ -151,6 +160,75 @@ void MaterialPalette::find_glass(const SceneMeshes& meshes) {
     material.glass = glass_material(looks[material.type], thickness);
     material.unit = unit;
   }
+}
+
+MaterialPalette::SmoothLook MaterialPalette::smooth_look(const MeshView& view, std::uint32_t vertex) const {
+  SmoothLook look;
+  look.is_transparent = is_transparent(view.surface);
+  const VoxelType type = view.types.empty() ? kAir : view.types[vertex];
+  if (type == kAir || type >= types_.size()) return look;
+  const VoxelProperties& properties = types_[type];
+  if (look.is_transparent || clamped_emission(properties.emission) > 0.0F) look.type = type;
+  look.roughness = properties.roughness;
+  look.metalness = properties.metalness;
+  return look;
+}
+
+SurfaceMaterial MaterialPalette::smooth_material_of(const SmoothLook& look) const {
+  SurfaceMaterial material;
+  material.surface = look.is_transparent ? SurfaceClass::Transparent : SurfaceClass::Opaque;
+  material.name = look.is_transparent ? "smooth transparent" : "smooth";
+  material.type = look.type;
+  material.roughness = std::clamp(look.roughness, 0.0F, 1.0F);
+  material.metalness = std::clamp(look.metalness, 0.0F, 1.0F);
+  const VoxelProperties& properties = types_[look.type];
+  const float emission = look.type == kAir ? 0.0F : clamped_emission(properties.emission);
+  if (!(emission > 0.0F)) return material;
+  material.surface = look.is_transparent ? SurfaceClass::EmissiveTransparent : SurfaceClass::Emissive;
+  material.emission = emission;
+  const Rgba8 colour = properties.colour;
+  material.emission_colour = {linear_from_srgb(colour.r), linear_from_srgb(colour.g), linear_from_srgb(colour.b)};
+  return material;
+}
+
+void MaterialPalette::make_smooth_materials(const SceneMeshes& meshes) {
+  const GlassBodies bodies(meshes);
+  smooth_thickness_ = bodies.thickness_of_smooth();
+  for (const MeshPart& part : meshes.parts) {
+    for (const MeshView& view : part.surfaces) {
+      for (std::size_t i = 0; view.has_albedo() && i < view.indices.size(); i += 3) {
+        smooth_by_look_.try_emplace(smooth_look(view, view.indices[i]));
+      }
+    }
+  }
+  const Surfaces looks(types_);
+  std::array<std::size_t, 2> counts{};
+  for (const auto& [look, number] : smooth_by_look_) ++counts[look.is_transparent ? 1 : 0];
+  std::array<std::size_t, 2> numbers{};
+  for (auto& [look, number] : smooth_by_look_) {
+    number = smooth_materials_.size();
+    SurfaceMaterial material = smooth_material_of(look);
+    const std::size_t which = look.is_transparent ? 1 : 0;
+    if (counts[which] > 1) material.name.append(1, ' ').append(std::to_string(++numbers[which]));
+    if (look.is_transparent && look.type != kAir) {
+      const auto [thickness, unit] = bodies.typical_of_smooth(look.type);
+      material.glass = glass_material(looks[look.type], thickness);
+      material.unit = unit;
+    }
+    smooth_materials_.push_back(std::move(material));
+  }
+}
+
+std::size_t MaterialPalette::smooth_material(const MeshView& view, std::uint32_t vertex) const {
+  const auto found = smooth_by_look_.find(smooth_look(view, vertex));
+  QUOIN_ASSERT(found != smooth_by_look_.end(), "a triangle that the meshes have");
+  return materials_.size() + found->second;
+}
+
+float MaterialPalette::smooth_thickness(std::size_t material) const {
+  QUOIN_ASSERT(material >= materials_.size() && material - materials_.size() < smooth_materials_.size());
+  const SurfaceMaterial& of = smooth_materials_[material - materials_.size()];
+  return of.type == kAir ? smooth_thickness_ : of.glass.thickness;
 }
 
 std::size_t MaterialPalette::material_of(SurfaceClass surface, VoxelType type) const {
@@ -226,9 +304,7 @@ MaterialSurfaces::MaterialSurfaces(const MeshPart& part, const MaterialPalette& 
 }
 
 void MaterialSurfaces::add(const MeshView& view, const MaterialPalette& palette) {
-  if (view.has_albedo()) {
-    return surfaces_.push_back({view, palette.smooth_material(is_transparent(view.surface))});
-  }
+  if (view.has_albedo()) return add_smooth(view, palette);
   std::map<std::size_t, Owned*> by_material;
   if (emits(view.surface) || is_transparent(view.surface)) {
     for (const VoxelType type : view.types) by_material.try_emplace(palette.material_of(view.surface, type));
@@ -248,6 +324,32 @@ void MaterialSurfaces::add(const MeshView& view, const MaterialPalette& palette)
   }
   for (const auto& [material, owned] : by_material) {
     surfaces_.push_back({view_of(owned->triangles, view.surface), material});
+    surfaces_.back().view.light = owned->light;
+  }
+}
+
+void MaterialSurfaces::add_smooth(const MeshView& view, const MaterialPalette& palette) {
+  constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
+  std::map<std::size_t, OwnedSmooth*> by_material;
+  for (std::size_t i = 0; i < view.indices.size(); i += 3) {
+    by_material.try_emplace(palette.smooth_material(view, view.indices[i]));
+  }
+  if (by_material.size() == 1) return surfaces_.push_back({view, by_material.begin()->first});
+  for (auto& [material, owned] : by_material) {
+    owned = owned_smooth_.emplace_back(std::make_unique<OwnedSmooth>()).get();
+    owned->moved_to.assign(view.positions.size(), kNowhere);
+  }
+  for (std::size_t i = 0; i < view.indices.size(); ++i) {
+    OwnedSmooth& owned = *by_material.at(palette.smooth_material(view, view.indices[i / 3 * 3]));
+    std::uint32_t& vertex = owned.moved_to[view.indices[i]];
+    if (vertex == kNowhere) vertex = copy_vertex(view, view.indices[i], owned.mesh, owned.light);
+    owned.mesh.indices.push_back(vertex);
+  }
+  for (const auto& [material, owned] : by_material) {
+    owned->moved_to = {};
+    surfaces_.push_back({view_of(owned->mesh), material});
+    surfaces_.back().view.surface = view.surface;
+    surfaces_.back().view.types = owned->mesh.types;
     surfaces_.back().view.light = owned->light;
   }
 }

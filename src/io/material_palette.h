@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -27,6 +28,10 @@ struct SurfaceMaterial {
   VoxelType type = kAir;  ///< a transparent material's only one
   GlassMaterial glass{};  ///< of it
   float unit = 1.0F;      ///< of it: the size of its voxels in the world, the mean of its placements
+  // For smooth surfaces, which have no textures:
+  float roughness = 1.0F;
+  float metalness = 0.0F;
+  Vec3 emission_colour{0.0F};  ///< linear, times `emission`
 
   [[nodiscard]] bool is_transparent() const {
     return surface == SurfaceClass::Transparent || surface == SurfaceClass::EmissiveTransparent;
@@ -55,12 +60,12 @@ class MaterialPalette {
   /// Requires: the meshes have a triangle of this class and type.
   [[nodiscard]] std::size_t material_of(SurfaceClass surface, VoxelType type) const;
   [[nodiscard]] bool has_emission() const;
-  /// Whether any smooth surface is opaque, or transparent: those have a material each, after all others.
-  [[nodiscard]] bool has_smooth(bool transparent) const { return has_smooth_[transparent ? 1 : 0]; }
-  /// Requires: has_smooth of the same.
-  [[nodiscard]] std::size_t smooth_material(bool transparent) const {
-    return materials_.size() + (transparent && has_smooth_[0] ? 1 : 0);
-  }
+  /// The materials of smooth surfaces, which come after all others: one for each roughness and metalness, and for each
+  /// type that emits or is transparent.
+  [[nodiscard]] const std::vector<SurfaceMaterial>& smooth_materials() const { return smooth_materials_; }
+  /// The number of the material of a triangle of a smooth surface, by its first vertex.
+  /// Requires: the meshes have such a triangle.
+  [[nodiscard]] std::size_t smooth_material(const MeshView& view, std::uint32_t vertex) const;
 
   /// Rows of every texture, a power of two.
   [[nodiscard]] std::uint32_t rows() const { return rows_; }
@@ -73,8 +78,8 @@ class MaterialPalette {
             (static_cast<float>(row) + 0.5F) * row_height_};
   }
 
-  /// How thick the bodies of all smooth transparent surfaces are, in voxels or samples.
-  [[nodiscard]] float smooth_thickness() const { return smooth_thickness_; }
+  /// Returns the thickness of the bodies of a smooth transparent material, in voxels or samples.
+  [[nodiscard]] float smooth_thickness(std::size_t material) const;
 
   /// sRGB colour and linear alpha: of transparent types that blocks of the meshes use that of their glass, 255 of
   /// opaque types.
@@ -88,11 +93,22 @@ class MaterialPalette {
 
  private:
   using Usage = std::array<std::vector<bool>, kSurfaceClasses>;
+  /// The key of a smooth material: the type if it emits or is transparent, else its roughness and metalness.
+  struct SmoothLook {
+    bool is_transparent = false;
+    VoxelType type = kAir;
+    float roughness = 1.0F;
+    float metalness = 0.0F;
+    auto operator<=>(const SmoothLook&) const = default;
+  };
 
   void find_bands(const Usage& used);
   void make_materials(const Usage& used);
   void add_material(SurfaceClass surface, std::size_t group, std::string name);
   void find_glass(const SceneMeshes& meshes);
+  void make_smooth_materials(const SceneMeshes& meshes);
+  [[nodiscard]] SmoothLook smooth_look(const MeshView& view, std::uint32_t vertex) const;
+  [[nodiscard]] SurfaceMaterial smooth_material_of(const SmoothLook& look) const;
   [[nodiscard]] float strength_of(SurfaceClass surface, VoxelType type) const;
   [[nodiscard]] std::size_t group_of(SurfaceClass surface, VoxelType type) const;
   [[nodiscard]] PngImage blank(std::uint32_t channels) const;
@@ -103,13 +119,13 @@ class MaterialPalette {
   std::vector<float> bands_;  ///< strongest of each, descending
   std::vector<std::uint16_t> band_of_type_;
   std::vector<SurfaceMaterial> materials_;
-  std::array<bool, 2> has_smooth_{};  // opaque, transparent
-  float smooth_thickness_ = 1.0F;
+  std::vector<SurfaceMaterial> smooth_materials_;
+  std::map<SmoothLook, std::size_t> smooth_by_look_;
+  float smooth_thickness_ = 1.0F;  ///< of all transparent surfaces without types
   std::map<std::pair<SurfaceClass, std::size_t>, std::size_t> by_class_and_group_;
 };
 
-/// The surfaces of a part, one a material. Those that need one material only are borrowed, not copied; smooth ones have
-/// the materials after the palette's last.
+/// The surfaces of a part, one a material. Those that need one material only are borrowed, not copied.
 ///
 /// Requires: the part's arrays outlive this.
 class MaterialSurfaces {
@@ -125,6 +141,7 @@ class MaterialSurfaces {
 
  private:
   void add(const MeshView& view, const MaterialPalette& palette);
+  void add_smooth(const MeshView& view, const MaterialPalette& palette);
 
   std::vector<Surface> surfaces_;
   struct Owned {
@@ -132,6 +149,12 @@ class MaterialSurfaces {
     std::vector<LinearRgba16> light;
   };
   std::vector<std::unique_ptr<Owned>> owned_;
+  struct OwnedSmooth {
+    SmoothMesh mesh;
+    std::vector<LinearRgba16> light;
+    std::vector<std::uint32_t> moved_to;  ///< by vertex of the whole surface
+  };
+  std::vector<std::unique_ptr<OwnedSmooth>> owned_smooth_;
 };
 
 }  // namespace quoin

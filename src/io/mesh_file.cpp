@@ -102,12 +102,30 @@ Similarity placed_in(const MeshFileOptions& options, Similarity place) {
   return place;
 }
 
+/// Lamps keep how bright they light a surface at a distance that is scaled as they are.
+void place_lights(const MeshFileOptions& options, SceneMeshes& meshes) {
+  const auto direction = [&](const DVec3& v) { return options.up == UpAxis::Z ? turned(v) : v; };
+  for (Lamp& lamp : meshes.lamps) {
+    lamp.position = direction(lamp.position) * options.scale;
+    lamp.direction = direction(lamp.direction);
+    lamp.intensity *= options.scale * options.scale;
+    lamp.range *= options.scale;
+  }
+  for (MeshCamera& each : meshes.cameras) {
+    Camera& camera = each.camera;
+    camera.position = direction(camera.position) * options.scale;
+    for (DVec3* const axis : {&camera.right, &camera.up, &camera.forward}) *axis = direction(*axis);
+    camera.view_height *= options.scale;
+  }
+}
+
 /// The same meshes in the units and axes of the file.
 Result<SceneMeshes> in_axes_of_file(SceneMeshes meshes, const MeshFileOptions& options) {
   if (!(options.scale > 0.0) || !std::isfinite(options.scale)) {
     return make_error(ErrorCode::InvalidArgument, "the scale must be more than 0");
   }
   if (options.scale == 1.0 && options.up == UpAxis::Y) return meshes;
+  place_lights(options, meshes);
   for (MeshGroup& group : meshes.groups) group.world_from_group = placed_in(options, group.world_from_group);
   for (MeshPlacement& placement : meshes.placements) {
     for (MeshKey& key : placement.keys) {

@@ -50,10 +50,11 @@ const char* fault_of_blocks(const MeshView& view, std::size_t types) {
   return largest_of(view.block_occlusion) > 3 ? "an occlusion beyond 3" : nullptr;
 }
 
-const char* fault_of_smooth(const MeshView& view) {
+const char* fault_of_smooth(const MeshView& view, std::size_t types) {
   const bool has_all = is_one_a_vertex(view.normals, view) && is_one_a_vertex(view.albedo, view) &&
-                       is_none_or_one_a_vertex(view.occlusion, view);
+                       is_none_or_one_a_vertex(view.occlusion, view) && is_none_or_one_a_vertex(view.types, view);
   if (!has_all) return "arrays of different lengths";
+  if (!view.types.empty() && largest_of(view.types) >= types) return "a type that is not registered";
   if (!all_finite(view.normals)) return "a normal that is not finite";
   const auto is_no_share = [](float occlusion) { return !(occlusion >= 0.0F && occlusion <= 1.0F); };
   return std::ranges::any_of(view.occlusion, is_no_share) ? "an occlusion beyond 0 to 1" : nullptr;
@@ -61,7 +62,7 @@ const char* fault_of_smooth(const MeshView& view) {
 
 /// What is wrong with a mesh; null when nothing is.
 const char* fault_of(const MeshView& view, std::size_t types) {
-  if (const char* fault = view.has_albedo() ? fault_of_smooth(view) : fault_of_blocks(view, types)) return fault;
+  if (const char* fault = view.has_albedo() ? fault_of_smooth(view, types) : fault_of_blocks(view, types)) return fault;
   if (!is_none_or_one_a_vertex(view.light, view)) return "arrays of different lengths";
   if (!view.light.empty() && !view.atlas.empty()) return "light beside an atlas";
   if (view.indices.size() % 3 != 0) return "indices that make no whole triangles";

@@ -54,7 +54,7 @@ using PlanMeshFiles = Result<std::vector<MeshFile>>(const SceneMeshes& meshes, c
 /// The box of all vertices; empty without one.
 [[nodiscard]] DBox bounds_of(const MeshView& view);
 
-/// The coordinates up to which floats are exact enough, in steps: units of the part.
+/// The largest coordinates that floats hold exactly enough, in steps: units of the part.
 inline constexpr double kMostStepsOfPly = 1 << 20;
 /// Surfaces for printers are parted by a hundredth of a voxel.
 inline constexpr double kMostStepsOfStl = 1 << 16;

@@ -109,7 +109,8 @@ std::size_t count_degenerate(const TriangleMesh& mesh) {
 
 TEST(NearGrids, KeepShapesInFilesOfMeshes) {
   std::vector<IVec3> voxels;
-  for (int i = 0; i < 125; ++i) voxels.emplace_back(20'000'001 + 2 * (i % 5), 2 * (i / 5 % 5), -20'000'001 + i / 25 * 2);
+  for (int i = 0; i < 125; ++i)
+    voxels.emplace_back(20'000'001 + 2 * (i % 5), 2 * (i / 5 % 5), -20'000'001 + i / 25 * 2);
   const Scene near = near_grids(scene_of(voxels));
   const DVec3 first = DVec3(voxels.front()) - DVec3(1.0, 2.0, 3.0) + DVec3(10.0, 0.0, -5.0);
   for (const bool is_smooth : {false, true}) {

@@ -53,8 +53,9 @@ struct MeshFileOptions {
 ///            texture, so that its 8 bits cost them at most one more bit. Transparent types have a material each,
 ///            blended, with KHR_materials_transmission, KHR_materials_volume and KHR_materials_ior; those and alpha say
 ///            what pictures show through the type's bodies of typical thickness (MeshPart::thickness).
-///            Smooth meshes have COLOR_0, 16 bits a channel in linear light, albedo times 1 - occlusion,
-///            and one rough, opaque material.
+///            Smooth meshes have COLOR_0, 16 bits a channel in linear light, albedo times 1 - occlusion. Those with
+///            MeshView::types have a material for each roughness and metalness, and for each type that emits or is
+///            transparent; a triangle has that of its first corner. Others have one rough, opaque material.
 ///            Of meshes with light at their vertices (MeshView::light; then all have it) materials are those of
 ///            KHR_materials_unlit, and COLOR_0 has 16 bits a channel: light, of smooth meshes times albedo, times what
 ///            occlusion leaves. Such materials have no roughness, no emission and no glass but its alpha.
@@ -63,6 +64,8 @@ struct MeshFileOptions {
 ///            Of meshes with an atlas, opaque blocks that emit nothing have that as their colours, with a linear filter
 ///            and without mipmaps, in TEXCOORD_0, no COLOR_0 and no occlusion of their own, and the palette's roughness
 ///            in TEXCOORD_1.
+///            SceneMeshes::lamps are nodes with KHR_lights_punctual (a lamp of intensity 1 has pi candela; cones of
+///            spots end at 90 degrees), SceneMeshes::cameras nodes with cameras. Other formats have neither.
 ///            Keys of placements are one animation, "frames", of translations, rotations and scales, each value from
 ///            its time on; what is hidden has a scale of 0. Other formats have the placements as they stand.
 ///            `quantize` needs clients that know KHR_mesh_quantization. Blocks lose nothing by it: positions are

@@ -18,7 +18,7 @@ namespace quoin {
 /// is one of two kinds:
 ///
 /// Blocks: `directions` and `types`, whose properties say how it looks; `block_occlusion`, or `atlas`, or none.
-/// Smooth: `normals` and `albedo`; `occlusion`, or none.
+/// Smooth: `normals` and `albedo`; `occlusion`, or none; `types`, or none, whose properties except the colour say how it looks.
 /// Both: `light`, or none.
 ///
 /// Lifetime: owns nothing; the arrays must outlive it, unchanged.
@@ -28,7 +28,7 @@ struct MeshView {
 
   SurfaceClass surface = SurfaceClass::Opaque;
   std::span<const Direction> directions;          ///< of the face
-  std::span<const VoxelType> types;               ///< of blocks
+  std::span<const VoxelType> types;               ///< of blocks; of smooth surfaces of a scene too
   std::span<const std::uint8_t> block_occlusion;  ///< 0 (open) to 3 (dark)
   /// Of opaque blocks whose colours and occlusion are in a texture (SceneMeshes::atlas): texture coordinates from its
   /// upper left corner.

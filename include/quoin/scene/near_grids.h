@@ -4,7 +4,7 @@
 
 namespace quoin {
 
-/// How far from a grid's origin vertices keep fractions of 1/128 voxel as floats, in voxels.
+/// The range around a grid's origin in which float vertices keep fractions of 1/128 voxel, in voxels.
 inline constexpr int kNearVoxels = 1 << 16;
 
 /// Returns a snapshot whose grids lie near their own origins, for meshers, whose vertices are floats: at 20,000,000

@@ -20,6 +20,7 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/mesh/array_surface.h>
 #include <quoin/mesh/mesh_view.h>
+#include <quoin/scene/camera.h>
 #include <quoin/scene/scene.h>
 
 namespace quoin {
@@ -100,18 +101,27 @@ struct MeshStats {
   std::int64_t quads = 0;          ///< of blocks
   std::int64_t triangles = 0;
   std::int64_t vertices = 0;
-  std::int64_t solid_samples = 0;  ///< of a volume
-  float simplify_error = 0.0F;     ///< the largest that was reached, in voxels or samples
+  std::int64_t solid_samples = 0;    ///< of a volume
+  float simplify_error = 0.0F;       ///< the largest that was reached, in voxels or samples
+  std::int64_t simplified_away = 0;  ///< triangles that simplifying removed
+};
+
+/// A camera of a file of meshes.
+struct MeshCamera {
+  std::string name{};
+  Camera camera{};
 };
 
 /// Meshes and where they stand: what files of meshes are written from, whoever made them.
 struct SceneMeshes {
   std::vector<MeshPart> parts;
   std::vector<MeshPlacement> placements;
-  std::vector<MeshGroup> groups{};  ///< parents first; of scenes those with a placement below
-  VoxelRegistry types;              ///< the materials of blocks
-  double seconds = 0.0;             ///< how long its placements' keys take; 0 without any
-  Image atlas{};                    ///< what MeshView::atlas points into, colours times occlusion; perhaps empty
+  std::vector<MeshGroup> groups{};    ///< parents first; of scenes those with a placement below
+  VoxelRegistry types;                ///< the materials of blocks and of smooth surfaces with MeshView::types
+  double seconds = 0.0;               ///< how long its placements' keys take; 0 without any
+  Image atlas{};                      ///< what MeshView::atlas points into, colours times occlusion; perhaps empty
+  std::vector<Lamp> lamps{};          ///< to be written too, where the format has lamps; mesh_scene leaves it empty
+  std::vector<MeshCamera> cameras{};  ///< to be written too, where the format has cameras
   MeshStats stats;
 };
 
@@ -124,8 +134,8 @@ struct BlockySceneOptions {
   bool atlas = false;
   /// As BlockyMeshOptions::cut, of each grid; instead of that of `mesh`.
   std::function<void(GridHandle grid, IVec3 chunk, QuadBuffer& quads)> cut{};
-  /// Where given, makes the surfaces of a grid instead of build_blocky_mesh; its name is not read, and its pivot is
-  /// added to that of the grid. Adds their numbers to `stats`: for grids that nobody holds whole (mesh_world). Not for an
+  /// If given, makes the surfaces of a grid instead of build_blocky_mesh; its name is not read, and its pivot is
+  /// added to that of the grid. Adds their numbers to `stats`: for grids that are too large for memory (mesh_world). Not for an
   /// atlas.
   std::function<Result<MeshPart>(GridHandle grid, MeshStats& stats)> part_of{};
 };
@@ -167,7 +177,7 @@ struct SmoothSceneOptions {
 /// Bodies: all opaque voxels of a part are one surface, each transparent type is a closed one of its own, all of these
 ///         in one view. In a cell that several share, their vertices are the same, but where a body touches itself by
 ///         edges and with `simplify_error`: each body is simplified by itself. Transparent voxels occlude no others.
-/// Types:  emission is left out.
+/// Types:  MeshView::types of every vertex, in the scene's types.
 /// Cost:   what touches is found by boxes: O(n log n + pairs that overlap along one axis) of instances. Each
 ///         transparent type is meshed for itself, in the chunks that have it and those around them.
 /// Errors: also those of build_smooth_mesh and simplify_smooth_mesh.

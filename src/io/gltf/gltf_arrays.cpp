@@ -83,8 +83,7 @@ std::uint8_t occlusion_grey(std::uint8_t occlusion) {
 }
 
 /// Glass has the alpha of its body.
-void write_smooth_colours(const MaterialPalette& palette, const MeshView& view, BlockWriter& out) {
-  const float thickness = palette.smooth_thickness();
+void write_smooth_colours(float thickness, const MeshView& view, BlockWriter& out) {
   std::uint16_t alpha = 0;
   for (std::size_t i = 0; i < view.positions.size(); ++i) {
     LinearRgba16 colour = linear_colour(view, i);
@@ -110,8 +109,8 @@ void write_light(const MeshView& view, BlockWriter& out) {
   }
 }
 
-void write_colours(const MaterialPalette& palette, const MeshView& view, BlockWriter& out) {
-  if (view.has_albedo()) return write_smooth_colours(palette, view, out);
+void write_colours(const MaterialPalette& palette, std::size_t material, const MeshView& view, BlockWriter& out) {
+  if (view.has_albedo()) return write_smooth_colours(palette.smooth_thickness(material), view, out);
   if (!view.light.empty()) return write_light(view, out);
   std::array<std::array<std::uint8_t, 4>, 4> greys;
   for (std::size_t i = 0; i < greys.size(); ++i) {
@@ -208,8 +207,8 @@ void write_gltf_array(const MaterialPalette& palette, const GltfMesh& mesh, cons
     case GltfArrayKind::PaletteCoordinate:
       return write_texture_coordinates(palette, view, array.component, out);
     case GltfArrayKind::Colour:
-      return write_colours(palette, has_array(primitive, GltfArrayKind::Occlusion) ? without_occlusion(view) : view,
-                           out);
+      return write_colours(palette, primitive.material,
+                           has_array(primitive, GltfArrayKind::Occlusion) ? without_occlusion(view) : view, out);
     case GltfArrayKind::Occlusion:
       for (std::size_t i = 0; i < view.positions.size(); ++i) out.put(openness_at(view, i));
       return;

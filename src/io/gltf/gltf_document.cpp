@@ -1,8 +1,13 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <string>
 #include <utility>
+
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
 
 #include <quoin/version.h>
 
@@ -24,6 +29,7 @@ constexpr int kClampToEdge = 33071;
 constexpr const char* kEmissiveStrength = "KHR_materials_emissive_strength";
 constexpr const char* kCompression = "EXT_meshopt_compression";
 constexpr const char* kQuantization = "KHR_mesh_quantization";
+constexpr const char* kLights = "KHR_lights_punctual";
 constexpr const char* kIor = "KHR_materials_ior";
 constexpr const char* kTransmission = "KHR_materials_transmission";
 constexpr const char* kUnlit = "KHR_materials_unlit";
@@ -180,6 +186,23 @@ Json unlit_json(const std::string& name, bool transparent, std::optional<std::si
   return entry;
 }
 
+/// A material of smooth surfaces, whose colours are in the vertices.
+Json smooth_json(const SurfaceMaterial& material, const MaterialPalette& palette) {
+  Json entry = {
+      {"name", material.name},
+      {"pbrMetallicRoughness", {{"metallicFactor", material.metalness}, {"roughnessFactor", material.roughness}}}};
+  if (material.is_emissive()) {
+    entry["emissiveFactor"] = json_from(material.emission_colour * std::min(material.emission, 1.0F));
+    entry["extensions"][kEmissiveStrength] = {{"emissiveStrength", std::max(material.emission, 1.0F)}};
+  }
+  if (material.is_transparent() && material.type != kAir) {
+    add_glass(material, palette.types()[material.type], entry);
+  } else if (material.is_transparent()) {
+    entry["alphaMode"] = "BLEND";
+  }
+  return entry;
+}
+
 Json materials_json(const GltfLayout& layout) {
   Json materials = Json::array();
   for (const SurfaceMaterial& material : layout.palette.materials()) {
@@ -200,16 +223,9 @@ Json materials_json(const GltfLayout& layout) {
     if (material.is_transparent()) add_glass(material, layout.palette.types()[material.type], entry);
     materials.push_back(std::move(entry));
   }
-  for (const bool transparent : {false, true}) {
-    if (!layout.palette.has_smooth(transparent)) continue;
-    const char* const name = transparent ? "smooth transparent" : "smooth";
-    if (layout.is_unlit) {
-      materials.push_back(unlit_json(name, transparent, std::nullopt));
-      continue;
-    }
-    Json entry = {{"name", name}, {"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}}};
-    if (transparent) entry["alphaMode"] = "BLEND";
-    materials.push_back(std::move(entry));
+  for (const SurfaceMaterial& material : layout.palette.smooth_materials()) {
+    materials.push_back(layout.is_unlit ? unlit_json(material.name, material.is_transparent(), std::nullopt)
+                                        : smooth_json(material, layout.palette));
   }
   return materials;
 }
@@ -245,6 +261,80 @@ Json node_json(const GltfNode& node) {
   return entry;
 }
 
+/// A node that looks, or shines, along its -Z; `right` and `up` need not be unit.
+Json node_along(const std::string& name, const DVec3& position, const glm::dmat3& axes) {
+  Json entry = Json::object();
+  if (!name.empty()) entry["name"] = name;
+  if (position != DVec3(0.0)) entry["translation"] = json_from(position);
+  const DQuat rotation = glm::normalize(glm::quat_cast(axes));
+  if (rotation != DQuat(1, 0, 0, 0)) entry["rotation"] = json_from(rotation);
+  return entry;
+}
+
+/// Any axes with -Z along `direction`. Requires: it is not 0.
+glm::dmat3 axes_along(const DVec3& direction) {
+  const DVec3 back = -glm::normalize(direction);
+  const DVec3 aside = std::abs(back.y) < 0.9 ? DVec3(0, 1, 0) : DVec3(1, 0, 0);
+  const DVec3 right = glm::normalize(glm::cross(aside, back));
+  return {right, glm::cross(back, right), back};
+}
+
+/// A white surface that faces a lamp of 1 candela one unit away sends out 1 / pi.
+Json lamp_json(const Lamp& lamp) {
+  const float most = std::max({lamp.colour.r, lamp.colour.g, lamp.colour.b});
+  const bool is_spot = lamp.kind == Lamp::Kind::Spot;
+  Json entry = Json::object();
+  if (!lamp.name.empty()) entry["name"] = lamp.name;
+  entry["type"] = is_spot ? "spot" : "point";
+  entry["color"] = json_from(glm::max(lamp.colour, Vec3(0.0F)) / most);
+  entry["intensity"] = lamp.intensity * double{most} * std::numbers::pi;
+  if (std::isfinite(lamp.range)) entry["range"] = lamp.range;
+  if (!is_spot) return entry;
+  constexpr double kLeast = 1e-4;
+  const double outer = std::clamp(lamp.outer_angle_radians, kLeast, std::numbers::pi / 2.0);
+  const double inner = std::clamp(lamp.inner_angle_radians, 0.0, outer - kLeast / 2.0);
+  entry["spot"] = {{"innerConeAngle", inner}, {"outerConeAngle", outer}};
+  return entry;
+}
+
+Json camera_json(const MeshCamera& each) {
+  // Clients clip everything nearer, and with parallel rays everything farther.
+  constexpr double kNear = 0.01;
+  constexpr double kFar = 1e6;
+  const Camera& camera = each.camera;
+  Json entry = Json::object();
+  if (!each.name.empty()) entry["name"] = each.name;
+  if (camera.projection == Camera::Projection::Perspective) {
+    entry["type"] = "perspective";
+    entry["perspective"] = {{"yfov", camera.vertical_fov_radians}, {"znear", kNear}};
+  } else {
+    const double half = camera.view_height / 2.0;
+    entry["type"] = "orthographic";
+    entry["orthographic"] = {{"xmag", half}, {"ymag", half}, {"znear", 0.0}, {"zfar", kFar}};
+  }
+  return entry;
+}
+
+void add_lights(const GltfLayout& layout, Json& nodes, Json& numbers, Json& document) {
+  for (std::size_t i = 0; i < layout.lamps.size(); ++i) {
+    const Lamp& lamp = layout.lamps[i];
+    const bool is_spot = lamp.kind == Lamp::Kind::Spot;
+    Json node = node_along(lamp.name, lamp.position, is_spot ? axes_along(lamp.direction) : glm::dmat3(1.0));
+    node["extensions"][kLights] = {{"light", i}};
+    document["extensions"][kLights]["lights"].push_back(lamp_json(lamp));
+    numbers.push_back(nodes.size());
+    nodes.push_back(std::move(node));
+  }
+  for (std::size_t i = 0; i < layout.cameras.size(); ++i) {
+    const Camera& camera = layout.cameras[i].camera;
+    Json node = node_along(layout.cameras[i].name, camera.position, {camera.right, camera.up, -camera.forward});
+    node["camera"] = i;
+    document["cameras"].push_back(camera_json(layout.cameras[i]));
+    numbers.push_back(nodes.size());
+    nodes.push_back(std::move(node));
+  }
+}
+
 void add_nodes(const GltfLayout& layout, Json& document) {
   Json nodes = Json::array();
   Json numbers = Json::array();
@@ -252,6 +342,7 @@ void add_nodes(const GltfLayout& layout, Json& document) {
     if (node.is_at_top) numbers.push_back(nodes.size());
     nodes.push_back(node_json(node));
   }
+  add_lights(layout, nodes, numbers, document);
   Json scene = Json::object();
   document["scene"] = 0;
   if (!nodes.empty()) scene["nodes"] = std::move(numbers);
@@ -306,13 +397,19 @@ void add_extensions(const GltfLayout& layout, Json& document) {
   const MaterialPalette& palette = layout.palette;
   Json used = Json::array();
   if (layout.is_unlit) used.push_back(kUnlit);
-  if (!layout.is_unlit && palette.has_emission()) used.push_back(kEmissiveStrength);
+  bool has_emission = false;
   bool has_ior = false;
   bool has_glass = false;
-  for (const SurfaceMaterial& material : palette.materials()) {
-    has_glass |= !layout.is_unlit && material.is_transparent();
-    has_ior |= !layout.is_unlit && material.is_transparent() && glass_ior(palette.types()[material.type]).has_value();
+  for (const auto* const materials : {&palette.materials(), &palette.smooth_materials()}) {
+    for (const SurfaceMaterial& material : *materials) {
+      const bool is_glass = material.is_transparent() && material.type != kAir;
+      has_emission |= !layout.is_unlit && material.is_emissive();
+      has_glass |= !layout.is_unlit && is_glass;
+      has_ior |= !layout.is_unlit && is_glass && glass_ior(palette.types()[material.type]).has_value();
+    }
   }
+  if (has_emission) used.push_back(kEmissiveStrength);
+  if (!layout.lamps.empty()) used.push_back(kLights);
   if (has_glass) used.insert(used.end(), {kTransmission, kVolume});
   if (has_ior) used.push_back(kIor);
   Json required = Json::array();

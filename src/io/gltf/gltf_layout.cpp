@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <tuple>
@@ -447,6 +448,24 @@ void add_channels(const SceneMeshes& meshes, GltfLayout& layout) {
   }
 }
 
+/// Returns true if a file can say it: finite numbers, some light and, of spots, a direction.
+bool can_light(const Lamp& lamp) {
+  const bool is_finite_lamp = is_finite(lamp.position) && is_finite(lamp.direction) && is_finite(DVec3(lamp.colour)) &&
+                              std::isfinite(lamp.intensity) && std::isfinite(lamp.inner_angle_radians) &&
+                              std::isfinite(lamp.outer_angle_radians);
+  const float most = std::max({lamp.colour.r, lamp.colour.g, lamp.colour.b});
+  const bool has_direction = lamp.kind == Lamp::Kind::Point || glm::length(lamp.direction) > 0.0;
+  return is_finite_lamp && lamp.intensity > 0.0 && most > 0.0F && lamp.range > 0.0 && has_direction;
+}
+
+bool can_look(const Camera& camera) {
+  const bool is_sound =
+      is_finite(camera.position) && is_finite(camera.right) && is_finite(camera.up) && is_finite(camera.forward);
+  const double size =
+      camera.projection == Camera::Projection::Perspective ? camera.vertical_fov_radians : camera.view_height;
+  return is_sound && size > 0.0 && std::isfinite(size);
+}
+
 }  // namespace
 
 std::optional<std::size_t> GltfLayout::texture(GltfImageKind kind) const {
@@ -477,6 +496,9 @@ Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, const MeshFileOptions
     if (auto added = add_images(meshes.atlas, layout); !added) return added.error();
   }
   add_channels(meshes, layout);
+  std::ranges::copy_if(meshes.lamps, std::back_inserter(layout.lamps), can_light);
+  std::ranges::copy_if(meshes.cameras, std::back_inserter(layout.cameras),
+                       [](const MeshCamera& each) { return can_look(each.camera); });
   return layout;
 }
 

@@ -130,6 +130,8 @@ struct GltfLayout {
   std::vector<GltfImage> images;           ///< of blocks; the first is the first texture
   std::vector<MaterialSurfaces> surfaces;  ///< of every part
   std::vector<GltfChannel> channels{};     ///< of its animation; lies after the images
+  std::vector<Lamp> lamps{};               ///< that light something; their nodes come after `nodes`
+  std::vector<MeshCamera> cameras{};       ///< their nodes come last
   std::uint64_t buffer_bytes = 0;
   std::uint64_t decoded_bytes = 0;  ///< of a compressed file, of the buffer that its arrays are decoded into; else 0
 

@@ -91,7 +91,7 @@ void ObjLines::triple(std::string_view keyword, const DVec3& v, int digits) {
     constexpr double kMostOfDigits = 1 << 16;
     const bool is_to_a_millionth = digits == 0 || std::abs(v[axis]) > kMostOfDigits;
     at = is_to_a_millionth ? write_number(v[axis], at)
-                     : std::to_chars(at, at + kMaxDigits, v[axis] + 0.0, std::chars_format::general, digits).ptr;
+                           : std::to_chars(at, at + kMaxDigits, v[axis] + 0.0, std::chars_format::general, digits).ptr;
   }
   out_.advance(at);
 }
@@ -160,9 +160,10 @@ std::string mtl_text(const SceneMeshes& meshes, const MaterialPalette& palette, 
   return text;
 }
 
-/// Smooth meshes need no materials.
+/// Returns true if there are blocks: smooth meshes have no materials.
 bool has_materials(const SceneMeshes& meshes) {
-  return meshes.types.size() > 1;
+  return std::ranges::any_of(
+      meshes.parts, [](const MeshPart& part) { return !part.surfaces.empty() && !part.surfaces.front().has_albedo(); });
 }
 
 /// Writes the lines of one OBJ file, counting from 1 as OBJ does across all objects.
@@ -203,17 +204,20 @@ class ObjText {
 
   void write_object(const MeshPlacement& placement) {
     const MeshPart& part = meshes_.parts[placement.part];
-    const MaterialSurfaces split(part, palette_);
-    if (split.surfaces().empty()) return;
+    const auto has_triangle = [](const MeshView& view) { return !view.indices.empty(); };
+    if (std::ranges::none_of(part.surfaces, has_triangle)) return;
     const VertexTransform transform(placement.matrix(), part.pivot);
     lines_.object(name_of(meshes_, placement));
-    const bool is_smooth = part.surfaces.front().has_albedo();
-    if (!is_smooth) write_face_normals(transform);
+    if (!part.surfaces.front().has_albedo()) return write_blocks(part, transform);
+    for (const MeshView& view : part.surfaces) {
+      if (has_triangle(view)) write_smooth(view, transform);
+    }
+  }
+
+  void write_blocks(const MeshPart& part, const VertexTransform& transform) {
+    const MaterialSurfaces split(part, palette_);
+    write_face_normals(transform);
     for (const auto& [view, material] : split.surfaces()) {
-      if (is_smooth) {
-        write_smooth(view, transform);
-        continue;
-      }
       write_vertices(view, transform);
       out_.put_text("usemtl " + mtl_name(palette_.materials()[material]) + "\n");
       for (const std::array<float, 2>& uv : view.atlas) write_texture_coordinate(uv);
@@ -224,7 +228,7 @@ class ObjText {
       vertices_ += view.positions.size();
       textures_ += view.atlas.size();
     }
-    if (!is_smooth) normals_ += kDirections.size();
+    normals_ += kDirections.size();
   }
 
   void write_face_normals(const VertexTransform& transform) {

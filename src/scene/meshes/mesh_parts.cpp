@@ -72,8 +72,10 @@ MeshPlacement MeshHierarchy::place(InstanceHandle handle, std::size_t part) {
 Status simplify_and_count(SmoothMesh& mesh, std::optional<float> error, std::vector<std::uint32_t>& tags,
                           MeshStats& stats) {
   if (error) {
+    const std::size_t before = mesh.indices.size() / 3;
     const auto reached = simplify_tagged(mesh, *error, tags);
     if (!reached) return reached.error();
+    stats.simplified_away += static_cast<std::int64_t>(before) - static_cast<std::int64_t>(mesh.indices.size() / 3);
     stats.simplify_error = std::max(stats.simplify_error, *reached);
   }
   stats.triangles += static_cast<std::int64_t>(mesh.indices.size() / 3);
@@ -112,6 +114,7 @@ MeshPart part_of_bodies(std::string name, SmoothBodies bodies, const DVec3& pivo
     if (mesh.indices.empty()) continue;
     part.surfaces.push_back(view_of(mesh));
     part.surfaces.back().surface = &mesh == owner->data() ? SurfaceClass::Opaque : SurfaceClass::Transparent;
+    part.surfaces.back().types = mesh.types;
   }
   return part;
 }

@@ -303,6 +303,7 @@ Result<SceneMeshes> mesh_scene_smoothly(const Scene& scene, const SmoothSceneOpt
                                         const Progress& progress) {
   if (auto sound = check_instances(scene, options.instances); !sound) return sound.error();
   SceneMeshes meshes;
+  meshes.types = scene.types;
   MeshHierarchy hierarchy(scene, meshes);
   const Mesher mesher(scene, options, threads, meshes.stats);
   std::vector<Unit> units = units_of(scene, options);

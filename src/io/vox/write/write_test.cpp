@@ -165,9 +165,28 @@ TEST(VoxWrite, GridsOfAnyBoundsAndPivotStandWhereTheyStood) {
   }
   std::vector<std::string> warnings;
   const Scene again = reread(scene, warnings);
-  EXPECT_TRUE(warnings.empty());
+  ASSERT_EQ(warnings.size(), 1U) << "positions beyond MagicaVoxel's world";
+  EXPECT_NE(warnings[0].find("1,000 voxels from the origin"), std::string::npos) << warnings[0];
   EXPECT_EQ(world_voxels(again), world_voxels(scene));
   EXPECT_EQ(again.grids().size(), 1U);
+}
+
+TEST(VoxWrite, WarnsOfPositionsBeyondTheWorldOfMagicaVoxel) {
+  for (const auto& [position, count] : {std::pair(DVec3(1000, -1000, 1000), 0), std::pair(DVec3(0, 0, -1001), 1)}) {
+    Scene scene = scene_with_types(2);
+    SceneGrid grid;
+    grid.canvas = vox::canvas_of({1, 1, 1});
+    grid.pivot = vox::pivot_of({1, 1, 1});
+    grid.grid.set({0, 0, 0}, 1);
+    const GridHandle handle = scene.add_grid(std::move(grid));
+    for (int i = 0; i < count + 1; ++i) scene.add_instance({"i", handle, i == 0 ? position : DVec3(0.0)});
+    const auto written = write_vox(scene);
+    ASSERT_TRUE(written);
+    ASSERT_EQ(written->warnings.size(), static_cast<std::size_t>(count));
+    if (count > 0) {
+      EXPECT_TRUE(written->warnings[0].ends_with("ends: 1")) << written->warnings[0];
+    }
+  }
 }
 
 TEST(VoxWrite, GridsBeyond256AreCutAndStillStandWhereTheyStood) {
