@@ -43,14 +43,17 @@ class SidecarFile : public testing::Test {
 
   /// A glTF file whose buffer of 6 bytes, and whose image, have these names.
   void write_gltf(const std::string& buffer, const std::string& image) const {
-    write("in/main.gltf",
-          R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
-          R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]}],)"
-          R"("materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],)"
-          R"("textures":[{"source":0}],"images":[{"uri":")" + image + R"("}],)"
-          R"("buffers":[{"byteLength":36,"uri":")" + buffer + R"("}],)"
-          R"("bufferViews":[{"buffer":0,"byteLength":36}],)"
-          R"("accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}]})");
+    write("in/main.gltf", R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+                          R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]}],)"
+                          R"("materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],)"
+                          R"("textures":[{"source":0}],"images":[{"uri":")" +
+                              image +
+                              R"("}],)"
+                              R"("buffers":[{"byteLength":36,"uri":")" +
+                              buffer +
+                              R"("}],)"
+                              R"("bufferViews":[{"buffer":0,"byteLength":36}],)"
+                              R"("accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}]})");
   }
   [[nodiscard]] Result<LoadedMesh> read_gltf(SidecarFiles allowed = SidecarFiles::WithinFolder) const {
     return read_mesh(folder_ / "in" / "main.gltf", {}, allowed);
@@ -60,7 +63,8 @@ class SidecarFile : public testing::Test {
 };
 
 TEST_F(SidecarFile, IsFoundInTheFolderAndBelow) {
-  for (const std::string name : {"plain", "./plain", "below/deep", "below\\deep", "below/../plain", "inner", "missing"}) {
+  for (const std::string name :
+       {"plain", "./plain", "below/deep", "below\\deep", "below/../plain", "inner", "missing"}) {
     const auto path = path_of(name);
     ASSERT_TRUE(path) << name << to_string(path.error());
     EXPECT_EQ(path->parent_path().lexically_normal().string().find((folder_ / "in").string()), 0U) << name;
@@ -142,8 +146,9 @@ TEST_F(SidecarFile, OfASceneIsRefusedOutsideTheFolder) {
   instance.grid = scene.add_grid(std::move(grid));
   scene.add_instance(instance);
   ASSERT_TRUE(save_scene(scene, folder_ / "outer.vox"));
-  write("in/main.json",
-        R"({"quoin_scene":1,"files":[{"id":"a","path":"../outer.vox"}],"instances":[{"file":"a","position":[0,0,0]}]})");
+  write(
+      "in/main.json",
+      R"({"quoin_scene":1,"files":[{"id":"a","path":"../outer.vox"}],"instances":[{"file":"a","position":[0,0,0]}]})");
   const auto refused = load_scene(folder_ / "in" / "main.json");
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().message.find("../outer.vox"), std::string::npos) << to_string(refused.error());

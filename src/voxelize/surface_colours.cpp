@@ -14,7 +14,7 @@ namespace quoin::voxelizing {
 
 namespace {
 
-// Emission within a texture is told apart in steps of a 16th of the material's.
+// Emission within a texture has steps of a 16th of the material's.
 constexpr std::uint32_t kEmissionSteps = 16;
 
 // What a mesh without materials has: a light grey that shows its shape, sRGB 200.
@@ -123,11 +123,12 @@ float SurfaceColours::emission_share(std::uint32_t triangle, DVec3 shares) const
   const MeshMaterial& material = material_of(triangle);
   if (!material.emissive_texture) return 1.0F;
   const glm::vec2* const places = frame_->mesh().emissive_places.data() + std::size_t{3} * triangle;
-  const glm::vec3 glow = glm::vec3(colour_in(*material.emissive_texture, triangle, places, shares)) * material.emissive_tint;
+  const glm::vec3 glow =
+      glm::vec3(colour_in(*material.emissive_texture, triangle, places, shares)) * material.emissive_tint;
   const float most = std::max({glow.r, glow.g, glow.b});
   constexpr float kDark = 1.0F / 255.0F;
   if (!(most > kDark)) return 0.0F;
-  // A type emits its own colour: the share is relative to that, so that what was written is read again.
+  // A type emits its own colour: the share is relative to that, so that a written file is read as it was.
   const glm::vec4 base = light(triangle, shares);
   return std::min(most / std::max({base.r, base.g, base.b, most}), 1.0F);
 }
@@ -209,7 +210,7 @@ std::size_t SurfaceColours::level_of(std::uint32_t triangle, const glm::vec2* pl
 }
 
 glm::vec4 SurfaceColours::colour_in(std::size_t texture, std::uint32_t triangle, const glm::vec2* places,
-                               DVec3 shares) const {
+                                    DVec3 shares) const {
   const glm::vec2 place = places[0] * static_cast<float>(shares.x) + places[1] * static_cast<float>(shares.y) +
                           places[2] * static_cast<float>(shares.z);
   const glm::vec4 found = sample(texture, level_of(triangle, places, texture), DVec3(place.x, place.y, 0.0));

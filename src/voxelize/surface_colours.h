@@ -61,7 +61,8 @@ class SurfaceColours {
   /// The share of its material's emission, 0 to 1.
   [[nodiscard]] float emission_share(std::uint32_t triangle, DVec3 shares) const;
   /// The texture's colour at a point of a triangle, whose corners have these places in it.
-  [[nodiscard]] glm::vec4 colour_in(std::size_t texture, std::uint32_t triangle, const glm::vec2* places, DVec3 shares) const;
+  [[nodiscard]] glm::vec4 colour_in(std::size_t texture, std::uint32_t triangle, const glm::vec2* places,
+                                    DVec3 shares) const;
   /// Linear light and alpha.
   [[nodiscard]] glm::vec4 light(std::uint32_t triangle, DVec3 shares) const;
   [[nodiscard]] glm::vec4 texel(std::size_t texture, std::size_t level, int x, int y) const;

@@ -4,13 +4,16 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numbers>
 
 #include <quoin/io/chunk_source.h>
 #include <quoin/io/mesh_file.h>
 #include <quoin/io/vox.h>
 #include <quoin/light/lit_meshes.h>
 #include <quoin/mesh/closed_surface.h>
+#include <quoin/mesh/smooth_mesh.h>
 #include <quoin/scene/near_grids.h>
+#include <quoin/scene/volume_scene.h>
 #include <quoin/store/world_import.h>
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
@@ -78,7 +81,7 @@ Status convert_blockily(const Scene& scene, const SceneAnimation& animation, con
   outcome.faces = {meshes->stats.faces_visible, meshes->stats.faces_total};
   outcome.seconds.mesh = watch.lap();
   warn_of_left_out(scene, filter, outcome.warnings);
-  warn_of_lamps(scene, outcome.warnings);
+  add_lights(scene, options, *meshes, outcome.warnings);
   warn_of_data(voxels_with_data(scene), outcome.warnings);
   return write_meshes(*meshes, options, bar, outcome);
 }
@@ -160,17 +163,6 @@ bool format_is_mesh(const std::string& name) {
   return std::any_of(all.begin(), all.end(), [&](const FormatInfo& info) { return info.is_mesh && info.name == name; });
 }
 
-/// Of a mesh's voxels, for formats whose voxels have no size: one unit each, from the origin on.
-void stand_at_unit_size(Scene& scene, const FormatInfo& format, std::vector<std::string>& warnings) {
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    Instance& placed = scene.edit(handle);
-    warnings.push_back(std::string(format.extension) + " keeps no size of voxels: they are " +
-                       digits_for_people(placed.voxel_size) + " of the mesh's units");
-    placed.voxel_size = 1.0;
-    placed.position = DVec3(0.0);
-  }
-}
-
 /// How the scene is meshed where nobody said it: as blocks, but for fields alone, which are smooth in any case.
 std::string mesher_for(const Scene& scene, const ConvertOptions& options) {
   if (!options.mesher.empty()) return options.mesher;
@@ -188,7 +180,43 @@ Result<SavedScene> save(const LoadedScene& loaded, const FormatInfo& format, con
   return write_world(loaded, options.output, threads, progress, std::move(more));
 }
 
-Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& format, std::string& fault) {
+/// Reads a scene; a volume becomes a field at its surface value, which the outcome then has.
+Result<LoadedScene> read_scene(const ConvertOptions& options, const LoadOptions& load, bool is_volume,
+                               Outcome& outcome) {
+  ProgressBar bar(!options.is_one_of_many);
+  const Progress progress = bar.listener("reading");
+  if (!is_volume) return load_scene(options.common.input, load, options.common.threads, progress);
+  const auto volume = read_input_volume(options.common, part_of(progress, 0.0, 0.5));
+  if (!volume) return volume.error();
+  const auto iso = surface_value(*volume, load.iso);
+  if (!iso) return make_error(iso.error().code, iso.error().message, options.common.input.string());
+  outcome.is_iso_found = !load.iso && volume->min < volume->max;
+  outcome.iso = options.iso ? *options.iso : static_cast<double>(*iso);
+  VolumeSceneOptions wanted;
+  wanted.iso = *iso;
+  auto scene = scene_from_volume(*volume, wanted, options.common.threads, part_of(progress, 0.5, 1.0));
+  if (!scene) return make_error(scene.error().code, scene.error().message, options.common.input.string());
+  LoadedScene loaded;
+  loaded.scene = std::move(*scene);
+  loaded.format = volume->format;
+  loaded.warnings = volume->warnings;
+  return loaded;
+}
+
+/// Makes a scene fit a format of voxels.
+void fit_voxels(const ConvertOptions& options, const FormatInfo& format, bool is_volume, LoadedScene& loaded,
+                std::vector<std::string>& warnings) {
+  const bool is_scan = is_volume || loaded.format == "vdb";
+  const bool only_voxels = holds_only_voxels(format);
+  if (only_voxels || options.as_voxels) make_voxels_of_fields(loaded.scene, options.common.threads, warnings);
+  if (is_scan && only_voxels) turn_by_quarters(loaded.scene, warnings);
+  const bool keeps_scale = format.format == FileFormat::Scene || format.format == FileFormat::World;
+  const bool may_have_size = format_is_mesh(loaded.format) ? !keeps_scale : is_scan && only_voxels;
+  if (may_have_size) stand_at_unit_size(loaded.scene, format, warnings);
+}
+
+Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& format, bool is_volume,
+                              std::string& fault) {
   Stopwatch watch;
   LoadOptions load = options.common.load;
   load.keep_source = !format.is_mesh || options.animate;
@@ -196,12 +224,9 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
   if (format.format == FileFormat::Vox) {
     load.mesh.max_types = std::min(load.mesh.max_types.value_or(kTypesOfVox), kTypesOfVox);
   }
-  auto loaded = [&] {
-    ProgressBar bar(!options.is_one_of_many);
-    return load_scene(options.common.input, load, options.common.threads, bar.listener("reading"));
-  }();
-  if (!loaded) return loaded.error();
   Outcome outcome;
+  auto loaded = read_scene(options, load, is_volume, outcome);
+  if (!loaded) return loaded.error();
   outcome.content = {loaded->scene.voxel_count(), solid_samples(loaded->scene)};
   outcome.warnings = std::move(loaded->warnings);
   outcome.seconds.read = watch.lap();
@@ -211,15 +236,15 @@ Result<Outcome> convert_scene(const ConvertOptions& options, const FormatInfo& f
     settled.mesher = mesher_for(loaded->scene, options);
     if (options.voxel_mm) settled.scale = scale_for_voxels(loaded->scene, *options.voxel_mm);
     if (settled.light && loaded->sun) settled.light->sun = *loaded->sun;
+    settled.cameras = loaded->cameras;
     fault = settled.mesher == "smooth" ? "" : fault_of_blocks(settled);
     if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault, options.common.input.string());
     if (auto done = convert_to_meshes(*loaded, settled, watch, outcome); !done) return done.error();
     return outcome;
   }
   keep_what_is_asked_for(options, format, *loaded, outcome.warnings);
-  const bool is_from_mesh = format_is_mesh(loaded->format);
-  const bool keeps_scale = format.format == FileFormat::Scene || format.format == FileFormat::World;
-  if (is_from_mesh && !keeps_scale) stand_at_unit_size(loaded->scene, format, outcome.warnings);
+  fit_voxels(options, format, is_volume, *loaded, outcome.warnings);
+  outcome.content = {loaded->scene.voxel_count(), solid_samples(loaded->scene)};
   outcome.files = {options.output};
   outcome.faces = count_faces(loaded->scene, options.common.instances(), options.common.threads);
   ProgressBar bar(!options.is_one_of_many);
@@ -271,6 +296,7 @@ Result<Outcome> convert_by_chunks(const ConvertOptions& options) {
     outcome.warnings.push_back("blocks that Quoin does not know, whose looks are guesses by their names: " + names);
   }
   outcome.seconds.write = watch.lap();
+  if (Status counted = count_faces_of_output(options, outcome); !counted) return counted.error();
   return outcome;
 }
 
@@ -286,6 +312,9 @@ std::string outcome_text(const Outcome& outcome) {
                                         : content_text(outcome.content)) +
                      "\n";
   if (outcome.faces.total > 0) text += to_string(outcome.faces) + "\n";
+  const bool is_field = outcome.content.voxels == 0 && outcome.content.solid_samples > 0;
+  if (is_field && !outcome.mesher.empty())
+    text += "Faces: " + with_thousands(outcome.meshes.triangles) + " triangles\n";
   if (outcome.iso) {
     text += "Iso: " + digits_for_people(*outcome.iso) +
             (outcome.is_iso_found ? " (between the two groups of values; --iso sets another)\n" : "\n");
@@ -317,8 +346,24 @@ std::string fault_of_light(const ConvertOptions& options) {
   return options.watertight && options.mesher != "smooth" ? what + "not with --watertight" : "";
 }
 
+/// Returns true if any content of the input is meshed as blocks: known before it is read, which may take long.
+bool is_surely_blocks(const ConvertOptions& options, bool is_volume) {
+  if (!options.mesher.empty()) return options.mesher != "smooth";
+  const LoadOptions& load = options.common.load;
+  if (is_volume || load.mesh.as_field || (load.heights && load.heights->as_field)) return false;
+  const auto format = detect_format(options.common.input);
+  return format && *format && *format != FileFormat::Scene && *format != FileFormat::World &&
+         *format != FileFormat::Vdb;
+}
+
 /// What contradicts the kind of input; empty when nothing does.
 std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
+  if (options.simplify && !can_simplify()) {
+    return "--simplify: this build was made without meshoptimizer (libmeshoptimizer-dev in Debian)";
+  }
+  if (options.mesh_only && is_surely_blocks(options, is_volume)) {
+    if (const std::string fault = fault_of_blocks(options); !fault.empty()) return fault;
+  }
   if (is_volume && !options.mesher.empty() && options.mesher != "smooth") {
     return "--mesher " + options.mesher + " is for voxels, and the input is a volume of values; smooth meshes it";
   }
@@ -336,22 +381,22 @@ std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
 }
 
 /// What contradicts an input that holds no triangles; empty when nothing does.
-std::string fault_of_mesh_input(const ConvertOptions& options) {
+std::string fault_of_mesh_input(const ConvertOptions& options, const FormatInfo& to) {
   if (options.mesh_input.empty()) return "";
   const auto format = detect_format(options.common.input);
   // Reading says why nothing recognises a file, which may be one of triangles.
   if (!format || !*format || format_info(**format).is_mesh) return "";
+  const bool may_have_field =
+      heeds_iso(options.common) || *format == FileFormat::Scene || *format == FileFormat::World;
+  if (options.mesh_input == "--solid" && may_have_field) {
+    return to.is_mesh ? "--solid makes voxels of fields, and " + std::string(to.extension) + " holds a mesh" : "";
+  }
   return options.mesh_input + " is for files of triangles, and the input is " + std::string(format_info(**format).name);
 }
 
 Result<Outcome> convert(const ConvertOptions& options, const FormatInfo& format, bool is_volume, std::string& fault) {
-  if (is_volume && format.format == FileFormat::Vox) {
-    return make_error(
-        ErrorCode::Unsupported,
-        "a volume of values becomes a mesh (.glb, .gltf, .obj, .ply, .stl, .3mf) or a field (.json), not .vox",
-        options.common.input.string());
-  }
-  return is_volume && format.is_mesh ? convert_volume(options, format) : convert_scene(options, format, fault);
+  return is_volume && format.is_mesh ? convert_volume(options, format)
+                                     : convert_scene(options, format, is_volume, fault);
 }
 
 /// Makes files of what is named "-". Returns what is wrong with that, or "".
@@ -496,6 +541,8 @@ void add_mesh_file_options(CLI::App& command, ConvertOptions& options) {
       .add_option("--up", options.up,
                   "Which axis of the mesh points up: y or z (default y; z in .ply, .stl and .3mf, as Blender has it)")
       ->check(CLI::IsMember({"y", "z"}));
+  command.add_flag("--lights", options.lights,
+                   "Lamps (KHR_lights_punctual) and cameras of the input too (.glb, .gltf)");
   command.add_flag("--compress", options.compress,
                    "glTF that is a fraction of the size, for clients with EXT_meshopt_compression (loses nothing)");
   command.add_flag("--quantize", options.quantize,
@@ -557,6 +604,13 @@ std::string read_texts(const CLI::App& command, const VolumeTexts& texts, Conver
 
 }  // namespace
 
+/// Faces of blocks. A field that is meshed has triangles instead; one that is not has no faces that could be counted.
+Json faces_json(const Outcome& outcome, std::int64_t of_blocks) {
+  const bool is_field = outcome.content.voxels == 0 && outcome.content.solid_samples > 0;
+  if (!is_field) return of_blocks;
+  return outcome.mesher.empty() ? Json() : Json(outcome.meshes.triangles);
+}
+
 Json outcome_json(const Outcome& outcome) {
   Json files = Json::array();
   for (const auto& file : outcome.files) files.push_back(file.string());
@@ -565,8 +619,8 @@ Json outcome_json(const Outcome& outcome) {
       {"solid_samples", outcome.content.solid_samples},
       {"mesher", outcome.mesher.empty() ? Json() : Json(outcome.mesher)},
       {"iso", outcome.iso ? Json(*outcome.iso) : Json()},
-      {"faces_visible", outcome.is_volume ? Json() : Json(outcome.faces.visible)},
-      {"faces_total", outcome.is_volume ? Json() : Json(outcome.faces.total)},
+      {"faces_visible", faces_json(outcome, outcome.faces.visible)},
+      {"faces_total", faces_json(outcome, outcome.faces.total)},
       {"quads", outcome.meshes.quads},
       {"triangles", outcome.meshes.triangles},
       {"vertices", outcome.meshes.vertices},
@@ -580,7 +634,7 @@ Json outcome_json(const Outcome& outcome) {
 std::string fault_of_format(const ConvertOptions& options, const FormatInfo& format) {
   if (!format.is_mesh && options.mesh_only) {
     return "--mesher, --no-ao, --ao-..., --watertight, --smoothness, --colours, --no-unite, --simplify, "
-           "--scale, --up, --texture, --light, --animate, --compress and --quantize are for mesh formats; " +
+           "--scale, --up, --texture, --light, --lights, --animate, --compress and --quantize are for mesh formats; " +
            (options.output.empty() ? std::string(format.extension) : options.output.string()) + " is none";
   }
   if (options.occlusion_apart && format.format == FileFormat::Obj) {
@@ -597,6 +651,9 @@ std::string fault_of_format(const ConvertOptions& options, const FormatInfo& for
            std::string(format.extension) + " has no place for it; .glb, .gltf and .obj have";
   }
   const bool is_gltf = format.format == FileFormat::Glb || format.format == FileFormat::Gltf;
+  if (options.lights && !is_gltf) {
+    return "--lights: " + std::string(format.extension) + " has no lamps and cameras; .glb and .gltf have";
+  }
   if (options.light && !is_gltf) {
     return "--light: " + std::string(format.extension) + " has no materials without light; .glb and .gltf have";
   }
@@ -616,7 +673,7 @@ Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& fo
   const auto is_volume = holds_volume(options.common);
   if (!is_volume) return is_volume.error();
   fault = fault_of_usage(options, *is_volume);
-  if (fault.empty() && !options.is_one_of_many) fault = fault_of_mesh_input(options);
+  if (fault.empty() && !options.is_one_of_many) fault = fault_of_mesh_input(options, format);
   if (!fault.empty()) return make_error(ErrorCode::InvalidArgument, fault, options.common.input.string());
   if (auto kept = check_replaced(options.output, options.inputs, options.force); !kept) return kept.error();
   if (options.is_one_of_many) {
@@ -634,9 +691,60 @@ Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& fo
   return convert(options, format, *is_volume, fault);
 }
 
-Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar, Outcome& outcome) {
+void add_lights(const Scene& scene, const ConvertOptions& options, SceneMeshes& meshes,
+                std::vector<std::string>& warnings) {
+  if (!options.lights) return warn_of_lamps(scene, warnings);
+  meshes.lamps = scene.lamps;
+  for (const FileCamera& each : options.cameras) {
+    meshes.cameras.push_back({"camera " + std::to_string(each.number), each.camera});
+  }
+  const bool has_wide_spot = std::ranges::any_of(scene.lamps, [](const Lamp& lamp) {
+    return lamp.kind == Lamp::Kind::Spot && lamp.outer_angle_radians > std::numbers::pi / 2.0;
+  });
+  if (has_wide_spot) warnings.emplace_back("cones of lamps that are wider than glTF's half circle end there");
+}
+
+namespace {
+
+MeshFileOptions mesh_file_options(const ConvertOptions& options, FileFormat format) {
+  MeshFileOptions file;
+  if (options.occlusion_apart) file.occlusion_in = OcclusionIn::Attribute;
+  file.compress = options.compress;
+  file.quantize = options.quantize;
+  if (options.scale) file.scale = *options.scale;
+  const bool is_z = is_for_printing(format) || format == FileFormat::Ply;
+  if (options.up == "z" || (options.up.empty() && is_z)) file.up = UpAxis::Z;
+  return file;
+}
+
+/// Warns of open edges in files for printers, and of coordinates that are relative to a point.
+void warn_of_meshes(const SceneMeshes& meshes, FileFormat format, const MeshFileOptions& file,
+                    std::vector<std::string>& warnings) {
+  if (is_for_printing(format)) {
+    if (const std::uint64_t open = count_open_edges(meshes); open > 0) {
+      warnings.push_back(with_thousands(static_cast<std::int64_t>(open)) +
+                         " edges are not between two triangles: the mesh is not closed for printing");
+    }
+  }
+  if (const DVec3 offset = mesh_file_offset(meshes, format, file); offset != DVec3(0.0)) {
+    warnings.push_back("coordinates in the file are relative to (" + number_for_people(offset.x) + ", " +
+                       number_for_people(offset.y) + ", " + number_for_people(offset.z) +
+                       "): floats do not tell voxels apart that far from the origin");
+  }
+}
+
+}  // namespace
+
+Status write_meshes(SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar, Outcome& outcome) {
   Stopwatch watch;
+  for (MeshPart& part : meshes.parts) {
+    if (part.name.empty()) part.name = stem_of_file(options.common.input);
+  }
   outcome.meshes = meshes.stats;
+  if (options.simplify && outcome.meshes.triangles > 0 && outcome.meshes.simplified_away == 0) {
+    outcome.warnings.push_back("--simplify " + digits_for_people(*options.simplify) +
+                               " removes no triangle: without one, the surface would be farther off than that");
+  }
   if (outcome.meshes.triangles == 0) outcome.warnings.emplace_back("nothing to draw");
   const auto files = mesh_files(meshes, options.output);
   if (!files) return files.error();
@@ -645,26 +753,10 @@ Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, Pr
   for (const auto& file : *files) {
     if (auto kept = check_replaced(file, options.inputs, options.force); !kept) return kept;
   }
-  MeshFileOptions file;
-  if (options.occlusion_apart) file.occlusion_in = OcclusionIn::Attribute;
-  file.compress = options.compress;
-  file.quantize = options.quantize;
-  if (options.scale) file.scale = *options.scale;
   const auto format = format_for_writing(options.output);
-  const bool is_print = format && is_for_printing(format->format);
-  const bool is_z = is_print || (format && format->format == FileFormat::Ply);
-  if (options.up == "z" || (options.up.empty() && is_z)) file.up = UpAxis::Z;
-  if (is_print) {
-    if (const std::uint64_t open = count_open_edges(meshes); open > 0) {
-      outcome.warnings.push_back(with_thousands(static_cast<std::int64_t>(open)) +
-                                 " edges are not between two triangles: the mesh is not closed for printing");
-    }
-  }
-  if (const DVec3 offset = mesh_file_offset(meshes, format->format, file); offset != DVec3(0.0)) {
-    outcome.warnings.push_back("coordinates in the file are relative to (" + number_for_people(offset.x) + ", " +
-                               number_for_people(offset.y) + ", " + number_for_people(offset.z) +
-                               "): floats do not tell voxels apart that far from the origin");
-  }
+  if (!format) return format.error();
+  const MeshFileOptions file = mesh_file_options(options, format->format);
+  warn_of_meshes(meshes, format->format, file, outcome.warnings);
   const auto bytes = write_mesh(meshes, options.output, file, bar.listener("writing"));
   if (!bytes) return bytes.error();
   outcome.bytes = *bytes;
@@ -721,9 +813,9 @@ std::string footer() {
 std::string read_options(const CLI::App& command, const VolumeTexts& texts, const MeshInputTexts& triangles,
                          const std::vector<std::filesystem::path>& rest, ConvertOptions& options, ManyOptions& many) {
   std::size_t given = 0;
-  for (const char* name :
-       {"--mesher", "--no-ao", "--ao-attribute", "--watertight", "--smoothness", "--colours", "--no-unite",
-        "--simplify", "--scale", "--up", "--texture", "--light", "--compress", "--quantize", "--animate", "--fps"}) {
+  for (const char* name : {"--mesher", "--no-ao", "--ao-attribute", "--watertight", "--smoothness", "--colours",
+                           "--no-unite", "--simplify", "--scale", "--up", "--texture", "--light", "--lights",
+                           "--compress", "--quantize", "--animate", "--fps"}) {
     given += command.count(name);
   }
   options.has_field_occlusion = given_field_occlusion(command) != nullptr;
@@ -731,6 +823,7 @@ std::string read_options(const CLI::App& command, const VolumeTexts& texts, cons
   std::string fault = read_texts(command, texts, options);
   if (fault.empty()) fault = read_mesh_input_options(command, triangles, options.common.load.mesh);
   if (const char* name = given_mesh_input(command)) options.mesh_input = name;
+  options.as_voxels = command.count("--solid") > 0;
   if (fault.empty()) fault = read_occlusion(command, options);
   if (command.count("--light") > 0 && command.get_option("--light")->as<std::string>() == "propagated") {
     options.light = natural_light();

@@ -47,13 +47,16 @@ struct ConvertOptions {
   double frames_per_second = 10.0;    ///< of `animate`
   bool apart = false;                 ///< instances are not united
   std::optional<double> scale;
-  std::optional<double> voxel_mm;  ///< millimetres a voxel, of files for printing
-  std::string up;                  ///< "y", "z"; empty: z for .ply, .stl and .3mf, else y
-  bool compress = false;           ///< of glTF, as MeshFileOptions has it
-  bool quantize = false;           ///< of glTF, as MeshFileOptions has it
-  bool mesh_only = false;          ///< any option that only meshes heed was given
-  std::string mesh_input;          ///< an option that is of triangles alone, if one was given
-  bool watch = false;              ///< goes on whenever the input changes
+  std::optional<double> voxel_mm;     ///< millimetres a voxel, of files for printing
+  std::string up;                     ///< "y", "z"; empty: z for .ply, .stl and .3mf, else y
+  bool compress = false;              ///< of glTF, as MeshFileOptions has it
+  bool quantize = false;              ///< of glTF, as MeshFileOptions has it
+  bool mesh_only = false;             ///< any option that only meshes heed was given
+  std::string mesh_input;             ///< an option that is of triangles alone, if one was given
+  bool lights = false;                ///< of glTF: lamps and cameras too
+  std::vector<FileCamera> cameras{};  ///< of the file, where `lights` wants them
+  bool as_voxels = false;             ///< --solid: fields become voxels in formats that hold fields too
+  bool watch = false;                 ///< goes on whenever the input changes
 };
 
 struct Seconds {
@@ -79,6 +82,26 @@ struct Outcome {
 
 /// Converts one file. Where the options contradict what the file holds, `fault` says how, as the error does.
 [[nodiscard]] Result<Outcome> convert_file(const ConvertOptions& options, const FormatInfo& format, std::string& fault);
+
+/// Returns true for formats that hold voxels and no fields.
+[[nodiscard]] inline bool holds_only_voxels(const FormatInfo& format) {
+  return !format.is_mesh && !format.is_volume && format.format != FileFormat::Scene &&
+         format.format != FileFormat::World && format.format != FileFormat::Vdb;
+}
+
+/// Puts voxels in place of all fields of a scene: one for each solid sample.
+void make_voxels_of_fields(Scene& scene, Threads threads, std::vector<std::string>& warnings);
+
+/// Turns instances that no quarter turns place to the nearest ones.
+void turn_by_quarters(Scene& scene, std::vector<std::string>& warnings);
+
+/// Makes voxels one unit long, for formats whose voxels have no size. The first instance moves to the origin, the
+/// others stay where they are relative to it.
+void stand_at_unit_size(Scene& scene, const FormatInfo& format, std::vector<std::string>& warnings);
+
+/// Adds lamps and cameras where they are wanted; else warns of lamps.
+void add_lights(const Scene& scene, const ConvertOptions& options, SceneMeshes& meshes,
+                std::vector<std::string>& warnings);
 
 /// Whether a format is for printers: meshes are to be closed.
 [[nodiscard]] inline bool is_for_printing(FileFormat format) {
@@ -106,7 +129,7 @@ using Converted = std::map<std::filesystem::path, Stamps>;
 [[nodiscard]] WatchedWork run_many(const ConvertOptions& options, const ManyOptions& many, Converted& done);
 
 /// Writes what has been meshed, filling in `outcome`.
-[[nodiscard]] Status write_meshes(const SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar,
+[[nodiscard]] Status write_meshes(SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar,
                                   Outcome& outcome);
 
 /// Meshes a scene smoothly and writes it, filling in `outcome`. With `options.animate` it is that of the animation.
@@ -115,6 +138,9 @@ using Converted = std::map<std::filesystem::path, Stamps>;
 
 /// Copies a world (.quoin) to another, row by row.
 [[nodiscard]] Result<Outcome> copy_world_file(const ConvertOptions& options);
+
+/// Counts the faces of the world OUT, for --json: it takes a second reading of the world.
+[[nodiscard]] Status count_faces_of_output(const ConvertOptions& options, Outcome& outcome);
 
 /// Whether what is asked for is made of a world chunk by chunk.
 [[nodiscard]] bool meshes_by_chunks(const ConvertOptions& options);

@@ -40,9 +40,9 @@ SmoothSceneOptions scene_options(const ConvertOptions& options) {
   return wanted;
 }
 
-/// The smooth mesher knows no light, and the colours of vertices in .obj and .ply have no alpha.
-void warn_of_looks(const Scene& scene, InstanceFilter filter, const std::filesystem::path& output,
-                   std::vector<std::string>& warnings) {
+/// The colours of vertices in formats other than glTF have neither light nor alpha.
+void warn_of_looks(const Scene& scene, const ConvertOptions& options, std::vector<std::string>& warnings) {
+  const InstanceFilter filter = options.common.instances();
   std::set<GridHandle> drawn;
   for (const InstanceHandle handle : scene.instances().handles()) {
     const Instance& instance = scene.instances()[handle];
@@ -56,10 +56,12 @@ void warn_of_looks(const Scene& scene, InstanceFilter filter, const std::filesys
       is_transparent |= scene.types.is_transparent(type);
     }
   }
-  const std::string extension = output.extension().string();
+  const std::string extension = options.output.extension().string();
   const bool has_alpha = extension != ".obj" && extension != ".ply";
   if (is_transparent && !has_alpha) warnings.push_back("transparent voxels look opaque in " + extension);
-  if (is_lost) warnings.emplace_back("glowing voxels become surfaces that do not glow");
+  const auto format = format_for_writing(options.output);
+  const bool is_gltf = format && (format->format == FileFormat::Glb || format->format == FileFormat::Gltf);
+  if (is_lost && (!is_gltf || options.light)) warnings.emplace_back("glowing voxels become surfaces that do not glow");
 }
 
 /// Puts a volume into the file's unit: glTF's is the metre, the others have none.
@@ -88,9 +90,9 @@ Status convert_smoothly(const Scene& scene, const SceneAnimation& animation, con
   outcome.faces = count_faces(scene, filter, options.common.threads);
   outcome.seconds.mesh = watch.lap();
   warn_of_left_out(scene, filter, outcome.warnings);
-  warn_of_lamps(scene, outcome.warnings);
+  add_lights(scene, options, *meshes, outcome.warnings);
   warn_of_data(voxels_with_data(scene), outcome.warnings);
-  warn_of_looks(scene, filter, options.output, outcome.warnings);
+  warn_of_looks(scene, options, outcome.warnings);
   return write_meshes(*meshes, options, bar, outcome);
 }
 

@@ -25,6 +25,20 @@ void tell_lost(const std::vector<std::string>& lines, std::vector<std::string>& 
 
 }  // namespace
 
+Status count_faces_of_output(const ConvertOptions& options, Outcome& outcome) {
+  if (!options.common.json) return {};
+  const auto world = WorldStore::open(options.output, WorldAccess::Read, options.common.threads);
+  if (!world) return world.error();
+  const auto loaded = load_partial_world(*world);
+  if (!loaded) return loaded.error();
+  ProgressBar bar(!options.is_one_of_many);
+  const auto faces = count_world_faces(*world, *loaded, options.common.instances(), options.common.threads,
+                                       bar.listener("counting faces"));
+  if (!faces) return faces.error();
+  outcome.faces = *faces;
+  return {};
+}
+
 Result<Outcome> copy_world_file(const ConvertOptions& options) {
   Stopwatch watch;
   catch_interrupts();
@@ -39,6 +53,7 @@ Result<Outcome> copy_world_file(const ConvertOptions& options) {
   for (const WorldDamage& lost : copied->lost) lines.push_back("left out: " + lost.what);
   tell_lost(lines, outcome.warnings);
   outcome.seconds.write = watch.lap();
+  if (Status counted = count_faces_of_output(options, outcome); !counted) return counted.error();
   return outcome;
 }
 
@@ -78,7 +93,9 @@ Result<std::optional<Outcome>> mesh_world_file(const ConvertOptions& options) {
   warn_of_values(values->size(), outcome.warnings);
   const Scene& scene = loaded->loaded.scene;
   warn_of_left_out(scene, wanted.scene.instances, outcome.warnings);
-  warn_of_lamps(scene, outcome.warnings);
+  ConvertOptions with_cameras = options;
+  with_cameras.cameras = loaded->loaded.cameras;
+  add_lights(scene, with_cameras, made->meshes, outcome.warnings);
   warn_of_data(made->voxels_with_data, outcome.warnings);
   if (auto done = write_meshes(made->meshes, options, bar, outcome); !done) return done.error();
   return std::optional(std::move(outcome));

@@ -17,7 +17,10 @@ void add_mesh_input_options(CLI::App& command, MeshInputTexts& texts, MeshLoadOp
   command.add_option("--voxel", options.voxel_size, "Size of a voxel in the mesh's unit, instead of --size")
       ->check(positive())
       ->group(kGroup);
-  command.add_flag("--solid", texts.is_solid, "Only what the mesh encloses: voxels whose centre is within")
+  command
+      .add_flag("--solid", texts.is_solid,
+                "Only voxels whose centre the mesh encloses; of fields: voxels, also in formats that hold "
+                "fields (.json, .quoin)")
       ->group(kGroup);
   command.add_flag("--surface", texts.is_surface, "Only its surface (default: surface and what it encloses)")
       ->group(kGroup);

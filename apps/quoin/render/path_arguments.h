@@ -69,10 +69,10 @@ void add_path_options(CLI::App& command, PathArguments& arguments);
 /// Whether the sky is a file, which is then read when the picture is taken.
 [[nodiscard]] bool is_sky_file(const PathArguments& arguments);
 
-/// What the options say, else the file that the scene is of (IN), else the defaults. `file_camera`: the number of
+/// Takes the options, else the settings of the scene's file (IN), else the defaults. `file_camera`: the number of
 /// its camera that looks. Errors: of the sky's file where an option names it; the file's own is named in a warning.
 [[nodiscard]] Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions& render,
-                                          const LoadedScene& loaded, InstanceFilter filter,
-                                          const CommonOptions& common, std::optional<int> file_camera);
+                                          const LoadedScene& loaded, InstanceFilter filter, const CommonOptions& common,
+                                          std::optional<int> file_camera);
 
 }  // namespace quoin::tool

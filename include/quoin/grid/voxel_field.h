@@ -26,6 +26,14 @@ namespace quoin {
 [[nodiscard]] Result<DensityGrid> field_from_grid(const Grid& grid, Threads threads = {},
                                                   const Progress& progress = {});
 
+/// The voxels of a field: one at each sample that is solid, of the sample's material.
+///
+/// Space:     voxel (i, j, k) has sample (i, j, k) at its centre: as field_from_grid, the other way round.
+/// Materials: `unnamed` in place of those that are air.
+/// Order:     the same voxels at any thread count.
+/// Cost:      O(rows of 64 samples) of the field's chunks.
+[[nodiscard]] Grid grid_from_field(const DensityGrid& field, VoxelType unnamed, Threads threads = {});
+
 /// How far, in voxels, the density of a sample looks: an edit that is farther than this from a chunk leaves its
 /// densities as they were.
 inline constexpr int kVoxelFieldReach = 10;

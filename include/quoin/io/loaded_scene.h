@@ -80,7 +80,7 @@ struct LoadOptions {
   /// .hgt files, which say it by their name and size, it only says how they become voxels.
   std::optional<HeightOptions> heights = std::nullopt;
   MeshLoadOptions mesh{};  ///< of files of triangles
-  /// Which files the input may name: buffers, images, materials, values, models of a scene file.
+  /// The files that the input may name: buffers, images, materials, values, models of a scene file.
   SidecarFiles sidecar_files = SidecarFiles::WithinFolder;
 };
 

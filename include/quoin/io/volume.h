@@ -17,7 +17,7 @@ namespace quoin {
 struct VolumeOptions {
   /// More values than this are refused; 2^30 take 4 GiB. A few megabytes of gzip can hold that many.
   std::int64_t max_values = std::int64_t{1} << 30;
-  /// Which files a header may name for its values.
+  /// The files that a header may name for its values.
   SidecarFiles sidecar_files = SidecarFiles::WithinFolder;
 };
 

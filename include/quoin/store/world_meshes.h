@@ -10,6 +10,7 @@
 #include <quoin/core/parallel.h>
 #include <quoin/core/progress.h>
 #include <quoin/core/result.h>
+#include <quoin/mesh/visible_faces.h>
 #include <quoin/scene/scene_meshes.h>
 #include <quoin/store/world_saver.h>
 #include <quoin/store/world_store.h>
@@ -44,6 +45,16 @@ struct WorldMeshes {
 [[nodiscard]] Result<WorldMeshes> mesh_world(const WorldStore& world, const LoadedWorld& loaded,
                                              const WorldMeshOptions& options, Threads threads = {},
                                              const Progress& progress = {});
+
+/// Counts the faces of the voxels that a world's instances place and show, each grid's once, as count_faces does of a
+/// scene, without holding the world. `loaded`: of load_partial_world. Damaged chunks count as air.
+///
+/// Cost:   reads all chunks of these grids.
+/// Memory: as mesh_world, without its triangles.
+/// Errors: those of reading; Cancelled.
+[[nodiscard]] Result<FaceCounts> count_world_faces(const WorldStore& world, const LoadedWorld& loaded,
+                                                   InstanceFilter filter = InstanceFilter::Visible,
+                                                   Threads threads = {}, const Progress& progress = {});
 
 /// About how many bytes of memory a world takes that is loaded whole (load_world), from some of its chunks; nothing
 /// where these cannot be read.

@@ -44,8 +44,8 @@ struct MeshMaterial {
   float roughness = 1.0F;
   float metalness = 0.0F;
   float emission = 0.0F;  ///< as VoxelProperties::emission
-  /// Emission is multiplied by the brightest channel of this texture times the tint (linear light), relative to that
-  /// of the colour, at most 1: voxels emit their own colour.
+  /// Emission is multiplied by the brightest channel of this texture times the tint (linear light), relative to the
+  /// colour, at most 1: voxels emit their own colour.
   std::optional<std::size_t> emissive_texture{};
   glm::vec3 emissive_tint{1.0F};
 
@@ -60,7 +60,7 @@ struct TriangleMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< indices of positions
   std::vector<glm::vec4> colours;                       ///< linear light and alpha, one a position; empty: white
   std::vector<glm::vec2> texture_places;   ///< three a triangle, (0, 0) is the picture's top left corner; or empty
-  std::vector<glm::vec2> emissive_places;  ///< likewise in the emissive texture; empty: nothing glows that has one
+  std::vector<glm::vec2> emissive_places;  ///< the same in the emissive texture; empty: materials with one emit nothing
   std::vector<std::uint32_t> material_of;  ///< one a triangle; empty: all of material 0
   std::vector<MeshMaterial> materials;     ///< empty: one that is light grey
   std::vector<MeshTexture> textures;

@@ -44,8 +44,8 @@ enum class SurfaceVoxels : std::uint8_t {
   /// to face. No path from voxel to voxel through faces crosses a closed surface. Where the surface lies between two
   /// voxels it takes the one on its inner side (of an open surface the greater one), so that a cube whose sides lie
   /// between voxels has the voxels within it and no more. Where it lies on centres it takes all voxels that it passes:
-  /// a cube from 0.5 to 3.5 has 4 voxels along each side. Tips and pieces that no
-  /// such line meets are left out, with a warning.
+  /// a cube from 0.5 to 3.5 has 4 voxels along each side. Tips and pieces that no such line meets are left out, with a
+  /// warning.
   Separating6,
   /// 26-separating, thick: voxels whose closed cube has a point of the surface, so that no path through edges and
   /// corners crosses it either. Where the surface lies between voxels it takes all of them.

@@ -305,6 +305,41 @@ void update_density_of_voxels(const Neighbourhood& chunks, const IBox& changed, 
   write_window(*scratch, window, largest_within(kBand), densities);
 }
 
+namespace {
+
+/// The materials of a chunk's solid samples; air elsewhere.
+Chunk solid_materials(const DensityChunk& samples, VoxelType unnamed) {
+  Chunk made(kAir);
+  std::array<VoxelType, kChunkEdge> row{};
+  for (int z = 0; z < kChunkEdge; ++z) {
+    for (int y = 0; y < kChunkEdge; ++y) {
+      const std::uint64_t solid = samples.solid_row(y, z);
+      if (solid == 0) continue;
+      samples.materials().read_row(y, z, row);
+      for (VoxelType& type : row) type = type == kAir ? unnamed : type;
+      made.write_row(y, z, solid, row);
+    }
+  }
+  made.compact();
+  return made;
+}
+
+}  // namespace
+
+Grid grid_from_field(const DensityGrid& field, VoxelType unnamed, Threads threads) {
+  Grid grid;
+  const std::vector<IVec3> places = field.chunks();
+  constexpr std::size_t kBatch = 64;
+  std::vector<Chunk> made(std::min(kBatch, places.size()));
+  for (std::size_t first = 0; first < places.size(); first += kBatch) {
+    const std::size_t count = std::min(kBatch, places.size() - first);
+    parallel_for(count, threads,
+                 [&](std::size_t i) { made[i] = solid_materials(*field.find_chunk(places[first + i]), unnamed); });
+    for (std::size_t i = 0; i < count; ++i) grid.put_chunk(places[first + i], std::move(made[i]));
+  }
+  return grid;
+}
+
 Result<DensityGrid> field_from_grid(const Grid& grid, Threads threads, const Progress& progress) {
   DensityGrid field(kBand);
   const std::vector<IVec3> places = chunks_near(grid);

@@ -32,8 +32,8 @@ struct Counts {
 /// "20000000 64 0": whole numbers.
 std::string text_of(const DVec3& v) {
   std::array<char, 128> text{};
-  return {text.data(), static_cast<std::size_t>(std::snprintf(text.data(), text.size(), "%.0f %.0f %.0f", v.x + 0.0,
-                                                              v.y + 0.0, v.z + 0.0))};
+  return {text.data(), static_cast<std::size_t>(
+                           std::snprintf(text.data(), text.size(), "%.0f %.0f %.0f", v.x + 0.0, v.y + 0.0, v.z + 0.0))};
 }
 
 std::string header_of(const Counts& counts, OcclusionIn occlusion, const DVec3& origin) {

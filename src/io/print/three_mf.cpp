@@ -193,7 +193,7 @@ class ModelWriter {
     for (const MeshView& view : part.surfaces) write_triangles(view, transform.mirrors(), numbers);
     text_ += "</triangles>\n</mesh>\n</object>\n";
   }
-  /// Where an object stands whose vertices are relative to `origin`.
+  /// Returns the attribute that places an object whose vertices are relative to `origin`.
   static std::string transform_text(const DVec3& origin) {
     if (origin == DVec3(0.0)) return {};
     std::array<char, 160> text{};

@@ -129,6 +129,50 @@ class CachedReader {
   IVec3 place_{0};
 };
 
+/// The chunks of a batch and those around them, read by way of the cache.
+Result<Grid> window_around(std::span<const IVec3> batch, ChunkCache& cache, Threads threads) {
+  std::vector<IVec3> around;
+  for (const IVec3 chunk : batch) {
+    for (int i = 0; i < 27; ++i) around.push_back(chunk + IVec3(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
+  }
+  sort_and_unite(around);
+  cache.load(around, threads);
+  if (!cache.status()) return cache.status().error();
+  Grid window;
+  for (const IVec3 place : around) {
+    if (const Chunk* const chunk = cache.find(place)) window.put_chunk(place, *chunk);
+  }
+  cache.trim();
+  return window;
+}
+
+/// The faces of one grid of a world. Errors: those of reading; Cancelled.
+Result<FaceCounts> count_grid_faces(ChunkCache& cache, const VoxelRegistry& types, Threads threads,
+                                    const Progress& progress) {
+  FaceCounts counts;
+  const std::span<const IVec3> places = cache.places();
+  for (std::size_t i = 0; i < places.size(); i += kBatch) {
+    const auto batch = places.subspan(i, std::min(kBatch, places.size() - i));
+    const auto window = window_around(batch, cache, threads);
+    if (!window) return window.error();
+    std::vector<std::int64_t> visible(batch.size());
+    const std::size_t tasks = std::min<std::size_t>(batch.size(), thread_count(threads));
+    parallel_for(tasks, threads, [&](std::size_t task) {
+      BlockyMesher mesher;
+      for (std::size_t k = task; k < batch.size(); k += tasks) {
+        visible[k] = mesher.count_faces(window->neighbourhood(batch[k]), types);
+      }
+    });
+    for (const std::int64_t count : visible) counts.visible += count;
+    if (progress && !progress(static_cast<double>(i) / static_cast<double>(places.size()))) {
+      return make_error(ErrorCode::Cancelled, "cancelled");
+    }
+  }
+  if (!cache.status()) return cache.status().error();
+  counts.total = 6 * cache.voxels();
+  return counts;
+}
+
 class WorldMesher {
  public:
   WorldMesher(const WorldStore& world, const LoadedWorld& loaded, const WorldMeshOptions& options, Threads threads,
@@ -236,19 +280,9 @@ class WorldMesher {
 
   Status mesh_batch(std::span<const IVec3> batch, IVec3 origin, ChunkCache& cache, ChunkTriangles& triangles,
                     BlockyMesh& mesh) const {
-    std::vector<IVec3> around;
-    for (const IVec3 chunk : batch) {
-      for (int i = 0; i < 27; ++i) around.push_back(chunk + IVec3(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
-    }
-    sort_and_unite(around);
-    cache.load(around, threads_);
-    if (!cache.status()) return cache.status();
+    const auto window = window_around(batch, cache, threads_);
+    if (!window) return window.error();
     if (cache.has_densities()) return densities();
-    Grid window;
-    for (const IVec3 place : around) {
-      if (const Chunk* const chunk = cache.find(place)) window.put_chunk(place, *chunk);
-    }
-    cache.trim();
     std::vector<QuadBuffer> quads(batch.size());
     const std::size_t tasks = std::min<std::size_t>(batch.size(), thread_count(threads_));
     parallel_for(tasks, threads_, [&](std::size_t task) {
@@ -257,7 +291,7 @@ class WorldMesher {
       options.merge = options_.scene.mesh.merge;
       options.bake_occlusion = options_.scene.mesh.bake_occlusion;
       for (std::size_t i = task; i < batch.size(); i += tasks) {
-        mesher.mesh(window.neighbourhood(batch[i]), loaded_.loaded.scene.types, options, quads[i]);
+        mesher.mesh(window->neighbourhood(batch[i]), loaded_.loaded.scene.types, options, quads[i]);
       }
     });
     for (std::size_t i = 0; i < batch.size(); ++i) {
@@ -281,6 +315,29 @@ Result<WorldMeshes> mesh_world(const WorldStore& world, const LoadedWorld& loade
                                Threads threads, const Progress& progress) {
   QUOIN_ASSERT(!options.scene.atlas && !options.scene.cut && !options.scene.mesh.cut, "as the header says");
   return with_path(WorldMesher(world, loaded, options, threads, progress).run(), world.path());
+}
+
+Result<FaceCounts> count_world_faces(const WorldStore& world, const LoadedWorld& loaded, InstanceFilter filter,
+                                     Threads threads, const Progress& progress) {
+  const Scene& scene = loaded.loaded.scene;
+  std::set<GridHandle> drawn;
+  for (const InstanceHandle handle : scene.instances().handles()) {
+    const Instance& instance = scene.instances()[handle];
+    if (is_drawn(scene, instance, filter)) drawn.insert(instance.grid);
+  }
+  FaceCounts counts;
+  std::size_t done = 0;
+  for (const GridHandle grid : drawn) {
+    const auto number = loaded.saver.number_of(grid);
+    QUOIN_ASSERT(number.has_value(), "a grid that was read has a number");
+    ChunkCache cache(world, *number, WorldMeshOptions().cache_bytes);
+    const auto share = [&](std::size_t i) { return static_cast<double>(i) / static_cast<double>(drawn.size()); };
+    const auto more = count_grid_faces(cache, scene.types, threads, part_of(progress, share(done), share(done + 1)));
+    if (!more) return with_path(Result<FaceCounts>(more.error()), world.path());
+    counts += *more;
+    ++done;
+  }
+  return counts;
 }
 
 std::optional<std::uint64_t> memory_of_world(const WorldStore& world) {

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 #include <quoin/io/mesh_file.h>
+#include <quoin/scene/scene_faces.h>
 #include <quoin/terrain/terrain.h>
 
 #include "store/world/world_for_tests.h"
@@ -46,6 +47,14 @@ Result<WorldMeshes> meshed(const std::filesystem::path& path, const WorldMeshOpt
   const auto world = WorldStore::open(path, WorldAccess::Read);
   const auto loaded = load_partial_world(*world);
   return mesh_world(*world, *loaded, options);
+}
+
+FaceCounts faces_in(const std::filesystem::path& path, InstanceFilter filter) {
+  const auto world = WorldStore::open(path, WorldAccess::Read);
+  const auto loaded = load_partial_world(*world);
+  const auto counts = count_world_faces(*world, *loaded, filter);
+  EXPECT_TRUE(counts);
+  return counts.value_or(FaceCounts());
 }
 
 void expect_equal(const SceneMeshes& a, const SceneMeshes& b) {
@@ -100,6 +109,18 @@ TEST(WorldMeshes, AreThoseOfTheWholeScene) {
     EXPECT_EQ(made->voxels, scene.voxel_count());
     EXPECT_EQ(made->voxels_with_data, 1);
     EXPECT_TRUE(made->broken.empty());
+  }
+}
+
+TEST(WorldFaces, AreThoseOfTheWholeScene) {
+  const Scene scene = landscape();
+  const WorldFolder folder;
+  const auto path = folder / "w.quoin";
+  ASSERT_TRUE(write_world(scene, path));
+  for (const InstanceFilter filter : {InstanceFilter::Visible, InstanceFilter::All}) {
+    const FaceCounts whole = count_faces(scene, filter);
+    EXPECT_GT(whole.visible, 0);
+    EXPECT_EQ(faces_in(path, filter), whole);
   }
 }
 
