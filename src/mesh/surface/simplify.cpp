@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -179,44 +180,99 @@ void take_over(SmoothMesh& mesh, const Triangulation& simple, std::vector<std::u
   mesh.indices = std::move(indices);
 }
 
+/// A try to remove triangles.
+struct Attempt {
+  Triangulation simple;
+  Deviation deviation;
+  bool removes_hardly_any = false;
+
+  [[nodiscard]] bool is_within() const { return deviation.beyond == 0 && !simple.indices.empty(); }
+  [[nodiscard]] bool is_far_off() const {
+    return deviation.beyond > deviation.places / kFewPlaces || simple.indices.empty();
+  }
+};
+
+/// Searches for the fewest triangles that stay within an error.
+class Search {
+ public:
+  Search(const SmoothMesh& mesh, float scale, float error_in_samples)
+      : mesh_(mesh),
+        place_(places_of(mesh)),
+        scale_(scale),
+        error_(error_in_samples),
+        allowed_(kMeanShare * error_in_samples),
+        stays_(mesh.indices.size() / 3) {}
+
+  /// Nothing if no try is within the error.
+  std::optional<Attempt> run() {
+    std::optional<Attempt> best;
+    for (int tries = 0; tries < kMaxTries; ++tries) {
+      Attempt attempt = try_once();
+      if (!attempt.is_within()) {
+        if (best || attempt.removes_hardly_any) break;
+        change(tries, std::move(attempt));
+        continue;
+      }
+      if (!best || attempt.simple.indices.size() < best->simple.indices.size()) best = std::move(attempt);
+      if (rounds_ == 0) break;
+      // Fewer triangles may be left where less error is allowed and none has to stay.
+      restart(allowed_before_rounds_ * kMuchLess);
+    }
+    return best;
+  }
+
+ private:
+  [[nodiscard]] Attempt try_once() const {
+    Attempt attempt;
+    std::vector<std::uint32_t> left = remove_triangles(mesh_, allowed_, scale_, stays_);
+    attempt.removes_hardly_any = left.size() + mesh_.indices.size() / kHardlyAny >= mesh_.indices.size();
+    attempt.simple = triangulation_of(mesh_, std::move(left), place_);
+    // A neck three edges round, say, is drawn together to one edge.
+    make_manifold(attempt.simple, std::min(kApart, 0.25F * error_));
+    attempt.deviation = deviation_of(mesh_, place_, attempt.simple, error_);
+    return attempt;
+  }
+  /// Changes the next try after one that was not within the error.
+  void change(int tries, Attempt attempt) {
+    had_few_ = had_few_ || !attempt.is_far_off();
+    if (tries + 1 == kMaxTries / 2 && !had_few_) {
+      // Less error did not help: a mesh that is round everywhere, say, and hardly to be made simpler.
+      restart(kMeanShare * error_);
+    } else if (attempt.is_far_off() && tries < kMaxTries / 2) {
+      // Triangles that had to stay for more error need not for less.
+      restart(allowed_ * kMuchLess);
+    } else {
+      if (rounds_ == 0) allowed_before_rounds_ = allowed_;
+      keep_around(mesh_, place_, std::move(attempt.deviation.is_beyond), stays_);
+      // Other triangles are removed where these stay, so that new places may be too far off in every try.
+      if (++rounds_ > kRounds) allowed_ *= kLittleLess;
+    }
+  }
+  void restart(float allowed) {
+    allowed_ = allowed;
+    rounds_ = 0;
+    stays_.assign(stays_.size(), false);
+  }
+
+  const SmoothMesh& mesh_;
+  std::vector<std::uint32_t> place_;
+  float scale_;
+  float error_;
+  float allowed_;
+  float allowed_before_rounds_ = 0.0F;
+  std::vector<bool> stays_;
+  bool had_few_ = false;
+  int rounds_ = 0;  ///< in which triangles had to stay
+};
+
 /// Returns the error reached, in samples.
 float simplify_within(SmoothMesh& mesh, float error_in_samples, std::vector<std::uint32_t>& tags) {
   const float scale = meshopt_simplifyScale(&mesh.positions[0].x, mesh.positions.size(), sizeof(Vec3));
   if (!(scale > 0.0F)) return 0.0F;
-  const std::vector<std::uint32_t> place = places_of(mesh);
-  float allowed = kMeanShare * error_in_samples;
-  std::vector<bool> stays(mesh.indices.size() / 3);
-  bool had_few = false;
-  int rounds = 0;
-  for (int tries = 0; tries < kMaxTries; ++tries) {
-    std::vector<std::uint32_t> left = remove_triangles(mesh, allowed, scale, stays);
-    const bool is_hopeless = left.size() + mesh.indices.size() / kHardlyAny >= mesh.indices.size();
-    Triangulation simple = triangulation_of(mesh, std::move(left), place);
-    // A neck three edges round, say, is drawn together to one edge.
-    make_manifold(simple, std::min(kApart, 0.25F * error_in_samples));
-    Deviation found = deviation_of(mesh, place, simple, error_in_samples);
-    if (found.beyond == 0 && !simple.indices.empty()) {
-      take_over(mesh, simple, tags);
-      return found.most;
-    }
-    if (is_hopeless) return 0.0F;
-    const bool are_many = found.beyond > found.places / kFewPlaces || simple.indices.empty();
-    had_few = had_few || !are_many;
-    if (tries + 1 == kMaxTries / 2 && !had_few) {
-      // Less error did not help: a mesh that is round everywhere, say, and hardly to be made simpler.
-      allowed = kMeanShare * error_in_samples;
-      stays.assign(stays.size(), false);
-    } else if (are_many && tries < kMaxTries / 2) {
-      // What had to stay for more error need not for less.
-      allowed *= kMuchLess;
-      stays.assign(stays.size(), false);
-    } else {
-      keep_around(mesh, place, std::move(found.is_beyond), stays);
-      // Other triangles are removed where these stay, so that new places may be too far off in every try.
-      if (++rounds > kRounds) allowed *= kLittleLess;
-    }
-  }
-  return 0.0F;
+  const std::optional<Attempt> found = Search(mesh, scale, error_in_samples).run();
+  if (!found) return 0.0F;
+  take_over(mesh, found->simple, tags);
+  return found->deviation.most;
 }
 
 template <class T>
