@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <limits>
 #include <numeric>
 #include <queue>
 #include <utility>
@@ -142,6 +143,24 @@ class MedianCut {
 };
 
 }  // namespace
+
+Rgba8 Looks::nearest(Rgba8 colour, std::uint32_t material) const {
+  const Channels wanted = channels_of(colour);
+  Rgba8 found = colour;
+  int least = std::numeric_limits<int>::max();
+  for (const Look& look : looks_) {
+    if (look.material != material || look.colour.a != colour.a) continue;
+    const Channels channels = channels_of(look.colour);
+    int distance = 0;
+    for (std::size_t i = 0; i < channels.size(); ++i) {
+      distance += (channels[i] - wanted[i]) * (channels[i] - wanted[i]);
+    }
+    if (distance >= least) continue;
+    least = distance;
+    found = look.colour;
+  }
+  return found;
+}
 
 std::uint32_t Looks::number_of(Rgba8 colour, std::uint32_t material) {
   const auto [known, is_new] =

@@ -25,6 +25,8 @@ class Looks {
   /// voxel of it.
   [[nodiscard]] std::uint32_t number_of(Rgba8 colour, std::uint32_t material);
   [[nodiscard]] std::size_t size() const { return looks_.size(); }
+  /// Returns the colour of a material, of the same alpha, that is nearest to `colour`; `colour` if there is none.
+  [[nodiscard]] Rgba8 nearest(Rgba8 colour, std::uint32_t material) const;
 
   /// Adds a type for each look and returns them by number: `materials` of the look's, its colour, transparent where
   /// alpha is below 255. Where there are more than `most`, or than there is room for, near ones of one material become

@@ -241,7 +241,11 @@ Result<Types> find_types(const SurfaceColours& colours, AllFound& found, VoxelRe
     has_deep |= count_of(*chunk) > chunk->coloured.size();
   }
   std::uint32_t deep = 0;
-  if (has_deep) deep = looks.number_of(colours.mean(), deep_material);
+  // A model of few colours keeps these: the mean would be one more.
+  constexpr std::size_t kFewLooks = 256;
+  const bool has_few = colours.deep_look() && looks.size() <= kFewLooks;
+  const Rgba8 deep_colour = has_few ? looks.nearest(colours.mean(), deep_material) : colours.mean();
+  if (has_deep) deep = looks.number_of(deep_colour, deep_material);
   auto types = looks.add_to(registry, materials, warnings, most);
   if (!types) return types.error();
   return Types{has_deep ? (*types)[deep] : kAir, std::move(*types)};
