@@ -165,7 +165,7 @@ void MaterialPalette::find_glass(const SceneMeshes& meshes) {
 MaterialPalette::SmoothLook MaterialPalette::smooth_look(const MeshView& view, std::uint32_t vertex) const {
   SmoothLook look;
   look.is_transparent = is_transparent(view.surface);
-  const VoxelType type = view.types.empty() ? kAir : view.types[vertex];
+  const VoxelType type = view.types.empty() || has_light_ ? kAir : view.types[vertex];
   if (type == kAir || type >= types_.size()) return look;
   const VoxelProperties& properties = types_[type];
   if (look.is_transparent || clamped_emission(properties.emission) > 0.0F) look.type = type;
@@ -192,6 +192,7 @@ SurfaceMaterial MaterialPalette::smooth_material_of(const SmoothLook& look) cons
 }
 
 void MaterialPalette::make_smooth_materials(const SceneMeshes& meshes) {
+  has_light_ = has_light(meshes);
   const GlassBodies bodies(meshes);
   smooth_thickness_ = bodies.thickness_of_smooth();
   for (const MeshPart& part : meshes.parts) {

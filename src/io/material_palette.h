@@ -121,6 +121,7 @@ class MaterialPalette {
   std::vector<SurfaceMaterial> materials_;
   std::vector<SurfaceMaterial> smooth_materials_;
   std::map<SmoothLook, std::size_t> smooth_by_look_;
+  bool has_light_ = false;         ///< colours of vertices have all light in them: types do not matter
   float smooth_thickness_ = 1.0F;  ///< of all transparent surfaces without types
   std::map<std::pair<SurfaceClass, std::size_t>, std::size_t> by_class_and_group_;
 };

@@ -160,10 +160,18 @@ std::string mtl_text(const SceneMeshes& meshes, const MaterialPalette& palette, 
   return text;
 }
 
+bool has_triangle(const MeshView& view) {
+  return !view.indices.empty();
+}
+
+bool has_blocks(const MeshPart& part) {
+  return std::ranges::any_of(part.surfaces,
+                             [](const MeshView& view) { return has_triangle(view) && !view.has_albedo(); });
+}
+
 /// Returns true if there are blocks: smooth meshes have no materials.
 bool has_materials(const SceneMeshes& meshes) {
-  return std::ranges::any_of(
-      meshes.parts, [](const MeshPart& part) { return !part.surfaces.empty() && !part.surfaces.front().has_albedo(); });
+  return std::ranges::any_of(meshes.parts, has_blocks);
 }
 
 /// Writes the lines of one OBJ file, counting from 1 as OBJ does across all objects.
@@ -204,11 +212,10 @@ class ObjText {
 
   void write_object(const MeshPlacement& placement) {
     const MeshPart& part = meshes_.parts[placement.part];
-    const auto has_triangle = [](const MeshView& view) { return !view.indices.empty(); };
     if (std::ranges::none_of(part.surfaces, has_triangle)) return;
     const VertexTransform transform(placement.matrix(), part.pivot);
     lines_.object(name_of(meshes_, placement));
-    if (!part.surfaces.front().has_albedo()) return write_blocks(part, transform);
+    if (has_blocks(part)) return write_blocks(part, transform);
     for (const MeshView& view : part.surfaces) {
       if (has_triangle(view)) write_smooth(view, transform);
     }

@@ -757,7 +757,7 @@ Result<LoadedMesh> read_gltf(std::span<const std::byte> bytes, Beside& beside) {
   Asked asked{&beside};
   const std::string_view json = json_of(bytes);
   if (is_too_deep(json)) return make_error(ErrorCode::BadFormat, "its JSON is nested too deeply");
-  const auto rewritten = without_fallback_buffers(bytes, json);
+  const auto rewritten = readable_by_tinygltf(bytes, json);
   auto model = parse(rewritten.empty() ? bytes : rewritten, asked);
   if (beside.refused()) return *beside.refused();
   if (!model || !model->asset.version.starts_with("2")) {

@@ -173,7 +173,9 @@ Status decode(const tinygltf::Primitive& primitive, const tinygltf::Value& exten
   }
   const auto mesh = decoded_mesh(coded->first, coded->second);
   if (!mesh) return mesh.error();
-  if (Status done = take_indices(**mesh, primitive.indices, model); !done) return done;
+  const auto indices = index_in(extension, "indices");
+  if (!indices) return bad("coded triangles without indices");
+  if (Status done = take_indices(**mesh, static_cast<int>(*indices), model); !done) return done;
   if (!extension.Has("attributes") || !extension.Get("attributes").IsObject()) return bad("code without attributes");
   const tinygltf::Value& ids = extension.Get("attributes");
   for (const auto& [name, accessor] : primitive.attributes) {
@@ -214,6 +216,8 @@ Status decode_draco(tinygltf::Model& model) {
         return make_error(done.error().code, "mesh " + std::to_string(i) + ", primitive " + std::to_string(k) + ": " +
                                                  done.error().message);
       }
+      // readable_by_tinygltf put them aside.
+      model.meshes[i].primitives[k].indices = static_cast<int>(extension->second.Get("indices").GetNumberAsDouble());
     }
   }
   return {};

@@ -23,6 +23,7 @@ namespace quoin::triangles {
 namespace {
 
 constexpr const char* kExtension = "EXT_meshopt_compression";
+constexpr const char* kDraco = "KHR_draco_mesh_compression";
 constexpr const char* kOneByte = "data:application/octet-stream;base64,AA==";
 
 using Json = nlohmann::json;
@@ -33,6 +34,40 @@ bool is_fallback(const Json& buffer) {
   if (extensions == buffer.end() || !extensions->is_object()) return false;
   const auto extension = extensions->find(kExtension);
   return extension != extensions->end() && extension->is_object() && extension->value("fallback", Json()) == true;
+}
+
+/// Returns true if any was replaced.
+bool replace_fallback_buffers(Json& document) {
+  if (!document.contains("buffers") || !document["buffers"].is_array()) return false;
+  bool is_changed = false;
+  for (Json& buffer : document["buffers"]) {
+    if (!is_fallback(buffer)) continue;
+    buffer["uri"] = kOneByte;
+    buffer["byteLength"] = 1;
+    is_changed = true;
+  }
+  return is_changed;
+}
+
+/// Moves the indices of one primitive. Returns true if there were any.
+bool move_indices_of(Json& primitive) {
+  if (!primitive.is_object() || !primitive.contains("extensions") || !primitive.contains("indices")) return false;
+  Json& extensions = primitive["extensions"];
+  if (!extensions.is_object() || !extensions.contains(kDraco) || !extensions[kDraco].is_object()) return false;
+  extensions[kDraco]["indices"] = primitive["indices"];
+  primitive.erase("indices");
+  return true;
+}
+
+/// Returns true if any were moved.
+bool move_draco_indices(Json& document) {
+  if (!document.contains("meshes") || !document["meshes"].is_array()) return false;
+  bool is_changed = false;
+  for (Json& mesh : document["meshes"]) {
+    if (!mesh.is_object() || !mesh.contains("primitives") || !mesh["primitives"].is_array()) continue;
+    for (Json& primitive : mesh["primitives"]) is_changed |= move_indices_of(primitive);
+  }
+  return is_changed;
 }
 
 /// A file with other JSON in place of `old`, which lies in it; of a GLB all that follows stays.
@@ -136,18 +171,14 @@ Result<std::vector<unsigned char>> decoded(const CodedView& view) {
 
 }  // namespace
 
-std::vector<std::byte> without_fallback_buffers(std::span<const std::byte> file, std::string_view text) {
-  if (text.find(kExtension) == std::string_view::npos) return {};
+std::vector<std::byte> readable_by_tinygltf(std::span<const std::byte> file, std::string_view text) {
+  const bool may_be_coded =
+      text.find(kExtension) != std::string_view::npos || text.find(kDraco) != std::string_view::npos;
+  if (!may_be_coded) return {};
   Json document = Json::parse(text, nullptr, false);
-  if (!document.is_object() || !document.contains("buffers") || !document["buffers"].is_array()) return {};
-  bool is_changed = false;
-  for (Json& buffer : document["buffers"]) {
-    if (!is_fallback(buffer)) continue;
-    buffer["uri"] = kOneByte;
-    buffer["byteLength"] = 1;
-    is_changed = true;
-  }
-  if (!is_changed) return {};
+  if (!document.is_object()) return {};
+  const bool has_fallback = replace_fallback_buffers(document);
+  if (!move_draco_indices(document) && !has_fallback) return {};
   return with_json(file, text, document.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 

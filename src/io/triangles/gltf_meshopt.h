@@ -20,9 +20,11 @@ namespace quoin::triangles {
 /// Whether this build decodes them.
 [[nodiscard]] bool has_meshopt();
 
-/// The same file with a byte in place of each buffer that stands for decoded views alone, which tinygltf would look
-/// for; empty where there is none. `json`: the file's, within it. What cannot be parsed is left to tinygltf.
-[[nodiscard]] std::vector<std::byte> without_fallback_buffers(std::span<const std::byte> file, std::string_view json);
+/// Returns the file as tinygltf reads it; empty if it does so already. Buffers that stand for decoded views alone, which
+/// tinygltf would look for, become one byte. Indices that Draco codes, whose accessor tinygltf refuses since it has no
+/// view, move into the primitive's extension. `json`: the file's, within it. JSON that cannot be parsed is left to
+/// tinygltf.
+[[nodiscard]] std::vector<std::byte> readable_by_tinygltf(std::span<const std::byte> file, std::string_view json);
 
 /// Decodes all coded views into buffers of their own, which the views are of afterwards.
 ///
