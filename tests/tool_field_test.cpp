@@ -114,7 +114,17 @@ TEST_F(ToolField, RefusesSimplifyingBlocksBeforeItReadsThem) {
 
 TEST_F(ToolField, SaysThatNothingCanBeSimplified) {
   if (!can_simplify()) GTEST_SKIP() << "this build cannot simplify";
-  const Json made = said("convert ball.nrrd a.glb --iso 60 --simplify 0");
+  // No two triangles of it lie in one plane.
+  {
+    std::ofstream out(folder_.file("round.nrrd"), std::ios::binary);
+    out << "NRRD0005\ntype: float\ndimension: 3\nsizes: 24 24 24\nencoding: raw\nendian: little\n\n";
+    for (int i = 0; i < kSide * kSide * kSide; ++i) {
+      const DVec3 away = DVec3(i % kSide, i / kSide % kSide, i / kSide / kSide) - DVec3(11.31, 12.17, 11.73);
+      const auto value = static_cast<float>(100.0 - 5.0 * glm::length(away));
+      out.write(reinterpret_cast<const char*>(&value), sizeof(value));
+    }
+  }
+  const Json made = said("convert round.nrrd a.glb --iso 60 --simplify 0.0000001");
   EXPECT_NE(made["warnings"].dump().find("removes no triangle"), std::string::npos) << made["warnings"];
   EXPECT_EQ(said("convert ball.nrrd a.glb --iso 60 --simplify 0.5")["warnings"].dump().find("removes no"),
             std::string::npos);

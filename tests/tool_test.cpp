@@ -597,12 +597,20 @@ TEST_F(Tool, AFileOfTrianglesThatIsNotRecognisedIsNoMisuseOfVoxel) {
 }
 
 TEST_F(Tool, ConvertReadsAndWritesStandardStreams) {
-  ASSERT_EQ(run("convert tiny.vox tiny.glb").status, 0);
+  ASSERT_EQ(run("convert tiny.vox tiny.ply").status, 0);
   std::ofstream(folder_.file("nothing.txt")) << "of no format";
-  const ToolRun through = shell("'" QUOIN_TOOL "' convert - - --to glb < tiny.vox > streamed.glb");
+  const ToolRun through = shell("'" QUOIN_TOOL "' convert - - --to ply < tiny.vox > streamed.ply");
   EXPECT_EQ(through.status, 0);
   EXPECT_EQ(through.err, "");
-  EXPECT_EQ(text_of(folder_.file("streamed.glb")), text_of(folder_.file("tiny.glb")));
+  EXPECT_EQ(text_of(folder_.file("streamed.ply")), text_of(folder_.file("tiny.ply")));
+  // Models without a name have that of their file; standard input has none.
+  ASSERT_EQ(run("convert tiny.vox tiny.glb").status, 0);
+  EXPECT_EQ(shell("'" QUOIN_TOOL "' convert - - --to glb < tiny.vox > streamed.glb").status, 0);
+  const auto node_in = [&](const char* name) {
+    return parse_glb(read_file(folder_.file(name)).value()).document["nodes"][0];
+  };
+  EXPECT_EQ(node_in("tiny.glb")["name"], "tiny");
+  EXPECT_FALSE(node_in("streamed.glb").contains("name"));
   EXPECT_EQ(shell("'" QUOIN_TOOL "' convert - named.glb --from vox < tiny.vox").status, 0);
   for (const auto& [arguments, error] : std::vector<std::array<std::string, 2>>{
            {"convert - x.glb --from nifti < tiny.vox", "quoin: standard input: is vox, not nifti\n"},

@@ -26,16 +26,16 @@ class ToolWatch : public ToolTest {
 };
 
 TEST_F(ToolWatch, AChangedInputIsConvertedAgain) {
-  ASSERT_EQ(run("convert tiny.vox first.glb").status, 0);
-  ASSERT_EQ(run("convert other.vox second.glb").status, 0);
+  ASSERT_EQ(run("convert tiny.vox first.ply").status, 0);
+  ASSERT_EQ(run("convert other.vox second.ply").status, 0);
   const ToolRun result = script(
-      "start convert tiny.vox out.glb --watch\n"
+      "start convert tiny.vox out.ply --watch\n"
       "until_true 'grep -q watching log'\n"
-      "cp out.glb seen.glb; cp other.vox tiny.vox\n"
-      "until_true 'cmp -s out.glb second.glb'\n"
+      "cp out.ply seen.ply; cp other.vox tiny.vox\n"
+      "until_true 'cmp -s out.ply second.ply'\n"
       "finish INT");
-  EXPECT_EQ(bytes("seen.glb"), bytes("first.glb"));
-  EXPECT_EQ(bytes("out.glb"), bytes("second.glb"));
+  EXPECT_EQ(bytes("seen.ply"), bytes("first.ply"));
+  EXPECT_EQ(bytes("out.ply"), bytes("second.ply"));
   EXPECT_NE(result.out.find("status 130"), std::string::npos) << result.out;
   EXPECT_NE(result.err.find("quoin: watching tiny.vox; Ctrl-C ends"), std::string::npos) << result.err;
 }

@@ -446,7 +446,8 @@ WatchedWork run_one(ConvertOptions& options, const ManyOptions& many) {
     print_error(fault);
     return ended(kWrongUsage);
   };
-  if (is_to_stream || options.common.input == kStandardStream) catch_interrupts();
+  options.is_from_stream = options.common.input == kStandardStream;
+  if (is_to_stream || options.is_from_stream) catch_interrupts();
   const auto fault_of_streams = open_streams(options, many, streams);
   if (!fault_of_streams) return failed(fault_of_streams.error());
   const auto format = format_for_writing(options.output);
@@ -738,7 +739,7 @@ void warn_of_meshes(const SceneMeshes& meshes, FileFormat format, const MeshFile
 Status write_meshes(SceneMeshes& meshes, const ConvertOptions& options, ProgressBar& bar, Outcome& outcome) {
   Stopwatch watch;
   for (MeshPart& part : meshes.parts) {
-    if (part.name.empty()) part.name = stem_of_file(options.common.input);
+    if (part.name.empty() && !options.is_from_stream) part.name = stem_of_file(options.common.input);
   }
   outcome.meshes = meshes.stats;
   if (options.simplify && outcome.meshes.triangles > 0 && outcome.meshes.simplified_away == 0) {

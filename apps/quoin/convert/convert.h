@@ -30,6 +30,7 @@ struct ConvertOptions {
   FileSet inputs;    ///< what is never replaced: all that are read
   std::string from;  ///< the only format that is read; empty: any
   bool force = false;
+  bool is_from_stream = false;  ///< IN is standard input, which has no name
   bool is_one_of_many = false;  ///< shows no progress of its own
   std::string mesher;           ///< empty: greedy for voxels, smooth for volumes
   bool occlusion_off = false;
