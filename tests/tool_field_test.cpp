@@ -133,7 +133,7 @@ TEST_F(ToolField, SaysThatNothingCanBeSimplified) {
 using Point = std::array<float, 3>;
 using PointEdge = std::pair<Point, Point>;
 
-/// What is wrong with a surface whose vertices are joined by their positions.
+/// The faults of a surface whose vertices are joined by their positions.
 struct SurfaceFaults {
   std::size_t flat = 0;
   std::size_t crowded_edges = 0;

@@ -212,13 +212,13 @@ typedef struct quoin_load_options {
                             another file */
   int32_t raw_scalar;   /* quoin_scalar, of these */
   int32_t raw_big_endian;
-  int32_t heights;         /* quoin_heights: the file is a picture (PNG) of the heights of a landscape */
-  double metres_per_level; /* 0: 1 */
-  double metres_per_pixel; /* between neighbouring heights; 0: 1, with a warning */
-  double metres_per_voxel; /* 0: metres_per_pixel */
-  double exaggeration;     /* heights times this; 0: 1 */
-  int32_t ground_depth;    /* voxels of ground below the lowest height, up to 4,096; 0: 8 */
-  int32_t smooth_ground;   /* densities, whose surface is smooth, rather than voxels */
+  int32_t heights;             /* quoin_heights: the file is a picture (PNG) of the heights of a landscape */
+  double metres_per_level;     /* 0: 1 */
+  double metres_per_pixel;     /* between neighbouring heights; 0: 1, with a warning */
+  double metres_per_voxel;     /* 0: metres_per_pixel */
+  double exaggeration;         /* heights times this; 0: 1 */
+  int32_t ground_depth;        /* voxels of ground below the lowest height, up to 4,096; 0: 8 */
+  int32_t smooth_ground;       /* densities, whose surface is smooth, rather than voxels */
   int32_t allow_outside_files; /* the file may name files outside its folder: for input from a trusted source only */
 } quoin_load_options;
 

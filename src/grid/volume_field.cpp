@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -17,9 +18,9 @@ namespace {
 
 constexpr float kBand = 8.0F;
 constexpr Half kSolidSign = 0x8000;
-// The least distance of the surface from a sample. In files of whole numbers many values equal that of the surface;
-// the vertices of the cells around such a sample would be one point, and triangles between them would have no area.
-constexpr float kClosest = 1.0F / 256.0F;
+// The density of samples whose value is that of the surface, as many are in files of whole numbers. With 0 the vertices
+// of the cells around such a sample would be one point, and triangles between them would have no area.
+constexpr float kAtSurface = 1.0F / 256.0F;
 
 // Positive sizes whose product is the number of values, without overflow.
 bool is_consistent(const Volume& volume) {
@@ -169,8 +170,11 @@ class ChunkMaker {
     if (exact <= -double{kBand}) return static_cast<Half>(far_ | kSolidSign);
     if (std::isnan(value)) return far_;
     // Equal infinities have no difference; the value of the surface is air.
-    const float magnitude = value == options_.iso ? kClosest : std::max(std::abs(static_cast<float>(exact)), kClosest);
-    return stored_within(value > options_.iso ? -magnitude : magnitude, far_);
+    if (value == options_.iso) return stored_within(kAtSurface, far_);
+    const auto scaled = static_cast<float>(exact);
+    if (scaled != 0.0F) return stored_within(scaled, far_);
+    constexpr float kLeast = std::numeric_limits<float>::min();
+    return stored_within(value > options_.iso ? -kLeast : kLeast, far_);
   }
 
   const Samples& samples_;

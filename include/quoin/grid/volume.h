@@ -89,7 +89,7 @@ struct VolumeFieldOptions {
 /// Density:   (iso - value) / slope within a band of 8, where `slope` is the median steepness of the volume where
 ///            the surface crosses its edges, so that densities are about distances in samples; where nothing is
 ///            crossed, the slope is that which takes the volume's range, or 1 where that is 0, to 8. The value `iso`
-///            itself is air. No density is closer to 0 than 1/256, so that no triangles of the surface are points.
+///            itself is air, at a density of 1/256, so that no triangles of the surface are points.
 /// Values:    NaN is air; infinities are far air and deep solid.
 /// Order:     the same densities at any thread count.
 /// Errors:    InvalidArgument when `iso` is NaN, a size is not positive or there are not as many values as the size

@@ -85,8 +85,8 @@ struct VoxelizedMesh {
 ///           its triangles, so that closed meshes have no leaks; a centre on the surface counts as its greater side.
 /// Colours:  of a voxel within 1.25 of the surface, that of the surface's nearest point: material times texture times
 ///           vertices, in linear light; of a texture the mean of what a voxel covers (a level of halved pictures,
-///           between pixels bilinear). What lies deeper takes the mean colour of the surface,
-///           of a mesh of one material and at most 256 colours the nearest of these.
+///           between pixels bilinear). Deeper voxels take the mean colour of the surface, of
+///           a mesh of one material and at most 256 colours the nearest of these.
 /// Cut-outs: where alpha says there is no surface a surface voxel is left out; what is enclosed stays.
 /// Types:    one for each colour and material is added to `types`. Where there are more than `max_types`, or than there
 ///           can be, near colours become one (median cut), with a warning.
