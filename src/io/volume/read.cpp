@@ -187,7 +187,8 @@ std::vector<std::filesystem::path> files_of_pair(const std::filesystem::path& pa
   if (!beginning) return {};
   const auto header = header_of(*beginning, {});
   if (!header || !header->is_data_elsewhere) return {};
-  return {data_file_of(path, *header)};
+  const auto data = data_file_of(path, *header, {});
+  return data ? std::vector{*data} : std::vector<std::filesystem::path>();
 }
 
 Result<Volume> read_raw_volume(std::span<const std::byte> bytes, const RawVolume& raw, const VolumeOptions& options,
