@@ -386,8 +386,7 @@ std::string fault_of_mesh_input(const ConvertOptions& options, const FormatInfo&
   const auto format = detect_format(options.common.input);
   // Reading says why nothing recognises a file, which may be one of triangles.
   if (!format || !*format || format_info(**format).is_mesh) return "";
-  const bool may_have_field =
-      heeds_iso(options.common) || *format == FileFormat::Scene || *format == FileFormat::World;
+  const bool may_have_field = heeds_iso(options.common) || *format == FileFormat::Scene || *format == FileFormat::World;
   if (options.mesh_input == "--solid" && may_have_field) {
     return to.is_mesh ? "--solid makes voxels of fields, and " + std::string(to.extension) + " holds a mesh" : "";
   }

@@ -44,8 +44,8 @@ struct MeshFileOptions {
 ///            layer is `extras.layer`.
 ///            Placements share the part's mesh, mirrored ones a second, reflected mesh, those that shear one that is
 ///            sheared, since nodes cannot. Vertices more than 65,536 from the pivot are relative to the middle of
-///            their mesh instead, where the node stands then. `.gltf` is the same as text, with a file of the same name ending in ".bin"
-///            beside it (none when nothing is drawn).
+///            their mesh instead, where the node stands then. `.gltf` is the same as text, with a file of the same
+///            name ending in ".bin" next to it (none when nothing is drawn).
 ///            Blocks have a palette texture, 256 texels wide, with one texel a voxel type (nearest, clamped), and one
 ///            with roughness (green) and metalness (blue); occlusion is grey in COLOR_0. Materials are opaque,
 ///            transparent, and emissive: texture times emissiveFactor times

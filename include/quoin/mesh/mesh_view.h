@@ -18,7 +18,8 @@ namespace quoin {
 /// is one of two kinds:
 ///
 /// Blocks: `directions` and `types`, whose properties say how it looks; `block_occlusion`, or `atlas`, or none.
-/// Smooth: `normals` and `albedo`; `occlusion`, or none; `types`, or none, whose properties except the colour say how it looks.
+/// Smooth: `normals` and `albedo`; `occlusion`, or none; `types`, or none, whose properties except the colour say how
+///         it looks.
 /// Both: `light`, or none.
 ///
 /// Lifetime: owns nothing; the arrays must outlive it, unchanged.

@@ -49,7 +49,7 @@ struct ImpostorOptions {
 /// 2, 4, 8, 16 or 32 voxels: each has 4^3 bits that say where in it the surface lies, and for each of the 26 views a
 /// face that this view saw there. A ray is followed through the bits, which contain the whole surface, so there are no
 /// holes; the bit that it meets is lit with the face of one of the three views around the direction to the camera. One
-/// size of cells fades into the next as the distance grows, pixel by pixel; an image never depends on the images before.
+/// size of cells fades into the next as the distance grows, pixel by pixel; no image depends on the images before it.
 /// Impostors hold types and not colours: the registry's colours at the time of drawing count. Transparent voxels are
 /// left out; the renderer traces them.
 ///

@@ -135,8 +135,8 @@ struct BlockySceneOptions {
   /// As BlockyMeshOptions::cut, of each grid; instead of that of `mesh`.
   std::function<void(GridHandle grid, IVec3 chunk, QuadBuffer& quads)> cut{};
   /// If given, makes the surfaces of a grid instead of build_blocky_mesh; its name is not read, and its pivot is
-  /// added to that of the grid. Adds their numbers to `stats`: for grids that are too large for memory (mesh_world). Not for an
-  /// atlas.
+  /// added to that of the grid. Adds their numbers to `stats`: for grids that are too large for memory (mesh_world).
+  /// Not for an atlas.
   std::function<Result<MeshPart>(GridHandle grid, MeshStats& stats)> part_of{};
 };
 

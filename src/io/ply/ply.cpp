@@ -108,7 +108,7 @@ void write_faces(const MeshView& view, bool turned, std::uint64_t first, BlockWr
   }
 }
 
-/// Calls `use(view, transform)` for every surface with a triangle, in every placement of its part, relative to `origin`.
+/// Calls `use(view, transform)` for every surface with a triangle, in each placement of its part, relative to `origin`.
 template <class Use>
 void for_each_surface(const SceneMeshes& meshes, const DVec3& origin, Use use) {
   for (const MeshPlacement* placement : placements_by_part(meshes)) {

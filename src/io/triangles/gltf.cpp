@@ -635,7 +635,7 @@ class GltfReader {
     }
     return {};
   }
-  /// Returns true for the vertex colours that Quoin writes for blocks: the ambient light that arrives, no surface colour.
+  /// Returns true for the vertex colours that Quoin writes for blocks: the ambient light that arrives, not a colour.
   [[nodiscard]] bool is_baked_occlusion(const tinygltf::Primitive& primitive, int index) const {
     const tinygltf::Accessor* const of = entry(model_.accessors, index);
     const bool may_be = of != nullptr && model_.asset.generator.starts_with("Quoin ") &&

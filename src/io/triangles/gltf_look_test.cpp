@@ -185,7 +185,8 @@ std::string draco_gltf(int vertices, const std::string& code) {
          R"("}],"bufferViews":[{"buffer":0,"byteLength":115}],)"
          R"("accessors":[{"componentType":5126,"count":)" +
          std::to_string(vertices) +
-         R"(,"type":"VEC3","min":[0,0,0],"max":[1,1,1]},{"componentType":5121,"normalized":true,"count":4,"type":"VEC4"},)"
+         R"(,"type":"VEC3","min":[0,0,0],"max":[1,1,1]},)"
+         R"({"componentType":5121,"normalized":true,"count":4,"type":"VEC4"},)"
          R"({"componentType":5123,"count":12,"type":"SCALAR"}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,)"
          R"("COLOR_0":1},"indices":2,"extensions":{"KHR_draco_mesh_compression":{"bufferView":0,)"
          R"("attributes":{"POSITION":0,"COLOR_0":1}}}}]}],"nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}],"scene":0})";

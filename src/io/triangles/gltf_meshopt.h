@@ -20,10 +20,10 @@ namespace quoin::triangles {
 /// Whether this build decodes them.
 [[nodiscard]] bool has_meshopt();
 
-/// Returns the file as tinygltf reads it; empty if it does so already. Buffers that stand for decoded views alone, which
-/// tinygltf would look for, become one byte. Indices that Draco codes, whose accessor tinygltf refuses since it has no
-/// view, move into the primitive's extension. `json`: the file's, within it. JSON that cannot be parsed is left to
-/// tinygltf.
+/// Returns the file as tinygltf reads it; empty if it does so already. Buffers that stand for decoded views alone,
+/// which tinygltf would look for, become one byte. Indices that Draco codes, whose accessor tinygltf refuses since it
+/// has no view, move into the primitive's extension. `json`: the file's, within it. JSON that cannot be parsed is left
+/// to tinygltf.
 [[nodiscard]] std::vector<std::byte> readable_by_tinygltf(std::span<const std::byte> file, std::string_view json);
 
 /// Decodes all coded views into buffers of their own, which the views are of afterwards.

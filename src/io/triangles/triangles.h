@@ -73,7 +73,7 @@ class MeshBuilder {
   std::vector<std::array<std::uint32_t, 3>> cut_;
 };
 
-/// Returns true for the greys of occlusion that Quoin writes after the corners of blocks: quarters, as bytes or exactly.
+/// Returns true for the greys of occlusion that Quoin writes after the corners of blocks: quarters, exact or as bytes.
 [[nodiscard]] bool is_occlusion_grey(double linear);
 
 /// Adds a picture as a texture; nothing, with a warning, where it cannot be decoded.

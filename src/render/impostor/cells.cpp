@@ -223,7 +223,7 @@ class SurfaceCells::Collector {
     cell.low = glm::min(cell.low, Vec3(low - centre)), cell.high = glm::max(cell.high, Vec3(high - centre));
     const std::uint32_t hash = hash_of(seen.face);
     if (seen.views == 0) {
-      // Of cells with such faces alone, every view shows one.
+      // In cells that hold only such faces, every view shows one.
       const std::uint32_t rank = kUnseen | hash >> 2;
       for (std::size_t view = 0; view < (rank < cell.rank[0] ? kImpostorViews : 0); ++view) {
         if (rank < cell.rank[view]) cell.rank[view] = rank, cell.face[view] = index;
@@ -328,7 +328,7 @@ void SurfaceCells::fill_from(const OccupancyTree& tree) {
   }
 }
 
-// Whether solid voxels lie against all of a side.
+// Returns true if solid voxels lie against all of a side.
 bool SurfaceCells::is_covered(const Cell& cell, Direction direction, const std::function<bool(IVec3)>& is_solid) const {
   if (cell.has_field) return false;
   const FaceFrame& frame = frame_of(direction);

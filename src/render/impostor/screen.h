@@ -29,8 +29,8 @@ struct DrawnImpostor {
   std::int32_t placed = 0;  ///< index into SceneTracer::placed
   const ImpostorFaces* faces = nullptr;
   std::size_t level = 0;  ///< of the rectangles
-  /// Of how many of 2^24 pixels the next coarser level is drawn instead, so that none is seen to change. Depends on the
-  /// distance alone.
+  /// The number of pixels, of 2^24, that show the next coarser level instead, so that the change is not seen. Depends
+  /// only on the distance.
   std::int32_t coarser = 0;
   raster::NearViews near;
   PixelArea area;        ///< where it may show
@@ -39,7 +39,7 @@ struct DrawnImpostor {
   glm::dmat3 axes{1.0};  ///< a point p of the view is axes * p / voxel_size + offset in the grid, about the
   DVec3 offset{0.0};     ///< content's centre
 
-  /// A level and the pixels at which it is drawn.
+  /// A level and the pixels that show it.
   struct Part {
     std::size_t level = 0;  ///< of ImpostorFaces::level
     raster::Share share;

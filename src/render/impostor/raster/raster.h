@@ -31,14 +31,14 @@ struct LinearVector {
   Vector y{};
 };
 
-/// The pixels at which one of two levels is drawn: those whose number of Pattern is from `first` to before `end`.
+/// The pixels that show one of two levels: those whose number of Pattern is from `first` to before `end`.
 struct Share {
   std::int32_t first = 0;
   std::int32_t end = 1 << 24;
   [[nodiscard]] bool is_whole() const { return first == 0 && end == 1 << 24; }
 };
 
-/// Even numbers of 24 bits for the pixels of a picture, any share of which is spread evenly over it, and over the
+/// Numbers of 24 bits for the pixels of an image. Each range of them is spread evenly over the image, and over the
 /// samples of each pixel.
 ///
 /// Source: the sequence R2, as `sample_point`.
@@ -115,7 +115,7 @@ struct Aim {
 /// Sets all that depends on the camera. Pixel (0, 0) of the tile lies at (`x`, `y`) pixels from the picture's middle.
 void set_aim(const Aim& aim, double x, double y, Job& job);
 
-/// What a ray met: a rectangle of a level, by its number, and of a cell the view whose face lights it.
+/// A hit: the number of a rectangle of a level and, for a cell, the view whose face lights it.
 struct Met {
   std::uint32_t rectangle = 0;
   std::uint32_t view = 0;
@@ -127,7 +127,7 @@ struct Met {
   [[nodiscard]] constexpr std::int32_t packed() const { return static_cast<std::int32_t>(rectangle << 5 | view); }
 };
 
-/// The face that lights what a ray met: an index into ImpostorFaces::faces.
+/// Returns the face that lights a hit: an index into ImpostorFaces::faces.
 [[nodiscard]] inline std::uint32_t face_of(const ImpostorFaces::Level& level, Met met) {
   const std::uint32_t at = level.face[met.rectangle];
   return level.cells.empty() ? at : level.cells[at].face[met.view];
@@ -139,7 +139,7 @@ struct Canvas {
   alignas(64) std::array<std::int32_t, kPixels> id{};    ///< of the job
   alignas(64) std::array<std::int32_t, kPixels> face{};  ///< see Met
   std::array<float, kPixels / 16> furthest{};            ///< depth of each 4x4 pixels
-  std::array<std::int32_t, kPixels> pattern{};           ///< see Pattern; all 0 where nobody asks for shares
+  std::array<std::int32_t, kPixels> pattern{};           ///< see Pattern; 0 where all parts are drawn whole
 
   void clear();
   /// For a tile from (`column`, `row`) of a picture. Cost: a microsecond.

@@ -22,7 +22,7 @@ using namespace lanes;
 constexpr std::size_t kLanes = kWidth;
 constexpr float kMargin = 0.01F;  // pixels: for rounding
 
-// What is the same for all rectangles of one side.
+// Constants of all rectangles of one side.
 struct Side {
   std::size_t axis;
   std::size_t u;
@@ -91,7 +91,7 @@ inline float linear(const LinearVector& vector, std::size_t axis, float x, float
 // Follows the ray of a pixel through the bits of a cell, from where it enters the cell's box at `along` through a side
 // across axis `side`. Returns the bit that it meets, with `along` there, or -1.
 inline int follow(const Job& job, const ImpostorFaces::Cell& cell, std::size_t side, float x, float y, float& along) {
-  constexpr float kPast = 1e-3F;  // bits: beyond the side that was entered, whatever the rounding
+  constexpr float kPast = 1e-3F;  // bits: how far past the entered side, so that rounding does not matter
   const float scale = 1.0F / job.level->step;
   float from[3];
   float steps[3];
@@ -159,7 +159,7 @@ inline void put_met(const Job& job, const Side& side, F x, F y, F depth, Mask me
   }
 }
 
-// Of each lane's rectangle one pixel: where its ray meets the rectangle's plane. `first`: the number of lane 0's.
+// Meets one pixel of each lane's rectangle with the rectangle's plane. `first`: the number of lane 0's rectangle.
 inline void meet(const Job& job, const Side& side, const F (&q)[3], const F (&reach)[2], F x, F y, Mask wanted,
                  std::size_t first, Canvas& canvas) {
   const F towards = linear(job.direction, side.axis, x, y);
