@@ -21,8 +21,8 @@ double least_voxels(int log2_width) {
   if (log2_width <= 2) return log2_width < 1 ? 0.0 : 3.0 * std::exp2(log2_width);
   return 4.0 * std::exp2(log2_width);
 }
-// The share of a level's range, by the logarithm of distance, over which the next one comes in.
-constexpr double kFade = 0.4;
+// The factor of distance, up to the end of a level's range, over which the next level comes in.
+constexpr double kFade = 1.3;
 constexpr std::int32_t kAllPixels = 1 << 24;
 
 // How far to one side of a camera a sphere at (across, deep) may be seen, at a distance of 1: never less than it is.
@@ -44,8 +44,7 @@ void choose_level(double voxels, DrawnImpostor& drawn) {
   while (drawn.level + 1 < ImpostorFaces::kLevels && voxels >= least(drawn.level + 1)) ++drawn.level;
   if (drawn.level + 1 == ImpostorFaces::kLevels) return;
   const double next = least(drawn.level + 1);
-  const double fade = std::pow(next / std::max(least(drawn.level), 1.0), kFade);
-  const double share = 1.0 - std::log(next / voxels) / std::log(fade);
+  const double share = 1.0 - std::log(next / voxels) / std::log(kFade);
   drawn.coarser = static_cast<std::int32_t>(std::clamp(share, 0.0, 1.0) * (kAllPixels - 1));
 }
 
