@@ -1,9 +1,11 @@
 // Levels of detail and impostors of what is rasterised.
 
+#include <algorithm>
 #include <array>
 #include <random>
 #include <set>
 
+#include "render/impostor/test_support.h"
 #include "render_vk/march/vulkan_detail_support.h"
 #include "render_vk/raster/mesh_for_tests.h"
 
@@ -91,6 +93,50 @@ TEST_F(VulkanMeshDetail, ImpostorsAreThoseOfTheProcessor) {
   // What is merged is simpler than its impostor.
   compare_all(camera, options, "mesh_far_merged", true);
   EXPECT_LT(triangles_of(camera, with_mesh_light(options)), with);
+}
+
+// A hole is a pixel of sky whose neighbours and itself the traced model covers whole.
+TEST_F(VulkanMeshDetail, SmallImpostorsHaveNoHoles) {
+  using render_test::Model;
+  for (const Model model : {Model::Ball, Model::Castle, Model::Terrain, Model::Comb}) {
+    render_test::ImpostorWorld world(model);
+    for (VoxelType type = 1; type < world.scene.types.size(); ++type) {
+      VoxelProperties white;
+      white.colour = {255, 255, 255, 255};
+      world.scene.types.replace(type, white);
+    }
+    meshes_->clear();
+    put(world.scene, blocky_surfaces(world.scene, false));
+    const CpuRenderer traced(world.scene);
+    int inside = 0;
+    int holes = 0;
+    for (const int pixels : {64, 42, 32, 21, 16, 11}) {
+      const int size = pixels + 8;
+      const Camera camera = render_test::orbiting(world, 0.7 + pixels, 0.4, 0.1 * pixels, pixels, size);
+      RenderOptions options = sized(size, size);
+      options.light.shading = Shading::Unlit;
+      options.light.sky_brightness = 0.0;
+      options.samples = 64;
+      const auto truth = traced.render(camera, options);
+      ASSERT_TRUE(truth.has_value());
+      options.detail = always(Detail::Far, 0.4).detail;
+      options.samples = 1;
+      const Image image = drawn(camera, mesh_options(options));
+      for (int i = 0; i < (size - 2) * (size - 2); ++i) {
+        const int x = 1 + i % (size - 2);
+        const int y = 1 + i / (size - 2);
+        float least = 255.0F;
+        for (int k = 0; k < 9; ++k) {
+          least = std::min(least, vulkan_test::byte_at(truth->colour, x - 1 + k % 3, y - 1 + k / 3).x);
+        }
+        if (least < 255.0F) continue;
+        ++inside;
+        holes += vulkan_test::byte_at(image, x, y).x < 128.0F;
+      }
+    }
+    EXPECT_GT(inside, 300);
+    EXPECT_LE(holes * 2000, inside) << static_cast<int>(model) << ": " << holes << " of " << inside;
+  }
 }
 
 TEST_F(VulkanMeshDetail, AllThreeInOnePicture) {
