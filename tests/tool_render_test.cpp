@@ -221,7 +221,7 @@ TEST_F(ToolRender, EveryOptionOfPathsChangesThePicture) {
   const std::string base = "many.vox -o out.png --size 64x48 --light path --samples 4";
   drawn(base);
   const std::string plain = bytes("out.png");
-  for (const std::string flags : {"--bounces 1",        "--sky gradient",
+  for (const std::string flags : {"--bounces 1",        "--sky physical",
                                   "--sky uniform",      "--tone clamp",
                                   "--tone agx",         "--tone aces",
                                   "--sun-angle 20",     "--ground",
@@ -237,9 +237,26 @@ TEST_F(ToolRender, EveryOptionOfPathsChangesThePicture) {
     EXPECT_NE(bytes("out.png"), plain) << flags;
   }
   drawn(base +
-        " --bounces 8 --sky physical --tone neutral --sun-angle 0.53 --exposure 1 --emission-scale 1 --look file "
+        " --bounces 8 --sky gradient --tone neutral --sun-angle 0.53 --exposure 1.3 --emission-scale 1 --look file "
         "--no-ground --bloom 0 --vignette 0 --fog 0");
   EXPECT_EQ(bytes("out.png"), plain) << "these are the defaults";
+}
+
+TEST_F(ToolRender, PathTracedImagesHaveABrightBackground) {
+  std::ofstream(folder_.file("many.vox"), std::ios::binary) << checkerboard_vox(4);
+  const auto corners = [&](const std::string& flags) {
+    drawn("many.vox -o out.png --size 32x24 --light path --samples 4 " + flags);
+    const auto image = read_png(folder_.file("out.png"));
+    EXPECT_TRUE(image.has_value());
+    if (!image) return std::array{0, 0};
+    const std::size_t last = image->rgb.size() - 3;
+    return std::array{int{*std::min_element(image->rgb.begin(), image->rgb.begin() + 3)},
+                      int{*std::min_element(image->rgb.begin() + static_cast<std::ptrdiff_t>(last), image->rgb.end())}};
+  };
+  for (const int corner : corners("")) EXPECT_GE(corner, 150);
+  for (const int corner : corners("--sky physical")) EXPECT_GE(corner, 150);
+  for (const int corner : corners("--sky uniform")) EXPECT_GE(corner, 250);
+  for (const int corner : corners("--sky uniform --ground")) EXPECT_GE(corner, 250);
 }
 
 TEST_F(ToolRender, WhatNoOptionSaysTheFileSays) {

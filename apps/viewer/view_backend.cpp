@@ -18,7 +18,7 @@ bool is_same(const ViewRequest& a, const ViewRequest& b) {
 
 PathOptions path_options(const ViewRequest& request, int width, int height, int samples, const DBox& bounds) {
   PathOptions options;
-  if (request.look) static_cast<Look&>(options) = request.look->look;
+  static_cast<Look&>(options) = request.look ? request.look->look : natural_look().look;
   if (options.sky == SkyModel::Environment) options.sky = SkyModel::Uniform;  // its picture is not loaded here
   options.lens_radius = 0.0;
   options.width = width;
@@ -70,7 +70,7 @@ int PathMemory::first_divisor(const ViewRequest& request, std::span<const int> d
 }
 
 DevelopOptions develop_options(const ViewRequest& request) {
-  DevelopOptions options = request.look ? request.look->develop : DevelopOptions{};
+  DevelopOptions options = request.look ? request.look->develop : natural_look().develop;
   options.exposure *= request.light.exposure;
   return options;
 }

@@ -11,11 +11,11 @@ namespace quoin {
 namespace {
 
 // Zenith, horizon, ground and ambient light, three channels each.
-using Look = std::array<float, 12>;
+using Colours = std::array<float, 12>;
 
 struct Hour {
   float elevation = 0.0F;  // of the sun, degrees
-  Look look{};
+  Colours look{};
 };
 
 constexpr Vec3 kZ = sky::kZenith;
@@ -50,7 +50,7 @@ float slope(std::size_t hour, std::size_t channel) {
   return before * after > 0.0F ? 2.0F * before * after / (before + after) : 0.0F;
 }
 
-Look look_at_elevation(float degrees) {
+Colours look_at_elevation(float degrees) {
   const float elevation = std::clamp(degrees, kHours.front().elevation, kHours.back().elevation);
   std::size_t hour = 0;
   while (hour + 2 < kHours.size() && elevation >= kHours.at(hour + 1).elevation) ++hour;
@@ -59,7 +59,7 @@ Look look_at_elevation(float degrees) {
   const float width = to.elevation - from.elevation;
   const float s = (elevation - from.elevation) / width;
   const float r = 1.0F - s;
-  Look look{};
+  Colours look{};
   for (std::size_t i = 0; i < look.size(); ++i) {
     // Where nothing changes the bits stay.
     look.at(i) = from.look.at(i) + (to.look.at(i) - from.look.at(i)) * (s * s * (3.0F - 2.0F * s)) +
@@ -93,7 +93,7 @@ Daylight daylight_of(const LightOptions& options) {
   daylight.sun_brightness = options.sun_brightness;
   if (!options.sky_follows_sun) return daylight;
   const double degrees = std::asin(std::clamp(to_sun(options).y, -1.0, 1.0)) * 180.0 / std::numbers::pi;
-  const Look look = look_at_elevation(static_cast<float>(degrees));
+  const Colours look = look_at_elevation(static_cast<float>(degrees));
   daylight.sky = {{look[0], look[1], look[2]}, {look[3], look[4], look[5]}, {look[6], look[7], look[8]}};
   daylight.ambient = {look[9], look[10], look[11]};
   daylight.sun = sun_through_air(degrees);

@@ -15,6 +15,21 @@ LightOptions natural_light() {
   return options;
 }
 
+NaturalLook natural_look(SkyModel sky) {
+  constexpr double kGradientExposure = 1.3;
+  constexpr double kPhysicalExposure = 2.0;
+  NaturalLook natural;
+  natural.look.sun = natural_light().sun;
+  natural.look.sky = sky;
+  if (sky == SkyModel::Gradient) natural.develop.exposure = kGradientExposure;
+  if (sky == SkyModel::Physical) natural.develop.exposure = kPhysicalExposure;
+  if (sky == SkyModel::Uniform) {
+    natural.develop.tone = ToneCurve::Clamp;
+    natural.ground_colour = Vec3(1.0F);
+  }
+  return natural;
+}
+
 Status check(const LightOptions& options) {
   const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
   if (!is_finite(options.sun)) return refuse("sun: must be finite");

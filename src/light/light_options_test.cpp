@@ -30,6 +30,16 @@ TEST(LightOptions, NaturalLightStandsBesideTheIsoCamera) {
   EXPECT_FALSE(LightOptions{}.glass_surfaces);
 }
 
+TEST(LightOptions, NaturalLookIsBrightUnderEverySky) {
+  EXPECT_EQ(natural_look().look.sky, SkyModel::Gradient);
+  EXPECT_EQ(natural_look().look.sun, natural_light().sun);
+  EXPECT_GT(natural_look(SkyModel::Physical).develop.exposure, natural_look().develop.exposure);
+  EXPECT_EQ(natural_look(SkyModel::Uniform).develop.tone, ToneCurve::Clamp);
+  EXPECT_EQ(natural_look(SkyModel::Uniform).ground_colour, Vec3(1.0F));
+  EXPECT_EQ(natural_look(SkyModel::Environment).develop, DevelopOptions{});
+  EXPECT_EQ(Look{}.sky, SkyModel::Physical) << "the library's default stays";
+}
+
 TEST(LightOptions, ImpossibleOnesAreRefusedByName) {
   const auto expect_refused = [](const std::string& name, const std::function<void(LightOptions&)>& change) {
     LightOptions options;

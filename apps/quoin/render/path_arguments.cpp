@@ -121,15 +121,18 @@ void take_file_look(const FileLook& file, PathPlan& plan) {
   }
 }
 
+SkyModel sky_of(const PathArguments& arguments) {
+  if (arguments.sky == "gradient") return SkyModel::Gradient;
+  if (arguments.sky == "uniform") return SkyModel::Uniform;
+  return is_sky_file(arguments) ? SkyModel::Environment : SkyModel::Physical;
+}
+
 Status take_sky(const PathArguments& arguments, const LoadedScene& loaded, const CommonOptions& common,
                 PathPlan& plan) {
   PathOptions& options = plan.options;
   if (arguments.has("--sky")) {
     const Look plain;
-    options.sky = arguments.sky == "gradient"  ? SkyModel::Gradient
-                  : arguments.sky == "uniform" ? SkyModel::Uniform
-                  : is_sky_file(arguments)     ? SkyModel::Environment
-                                               : SkyModel::Physical;
+    options.sky = sky_of(arguments);
     options.sky_brightness = plain.sky_brightness;
     options.sky_colour = plain.sky_colour;
     options.air = plain.air;
@@ -170,14 +173,15 @@ void add_path_options(CLI::App& command, PathArguments& arguments) {
   command
       .add_option(
           "--sky", arguments.sky,
-          "Of --light path: physical, a clear sky by the sun's height; gradient, that of --light rays; uniform, "
-          "white from everywhere; or a picture of all directions, .hdr or .exr (default physical)")
+          "Of --light path: gradient, the sky of --light rays; physical, a clear sky by the sun's height; uniform, "
+          "white light from all directions, also on the ground; or an image of all directions, .hdr or .exr (default "
+          "gradient)")
       ->type_name("NAME|FILE");
   add_text_option(command, "--sky-turn", "DEGREES", "Turns a sky that is a file about the vertical (default 0)");
   command
       .add_option("--tone", arguments.tone,
                   "Of --light path: how bright light becomes colours: clamp, neutral (Khronos PBR), agx or aces "
-                  "(default neutral)")
+                  "(default neutral; under --sky uniform clamp)")
       ->check(CLI::IsMember({"clamp", "neutral", "agx", "aces"}));
   add_text_option(command, "--sun-angle", "DEGREES",
                   "Of --light path: how wide the sun is, which makes shadows soft; 0 to 170 (default 0.53)");
@@ -262,8 +266,11 @@ Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions&
                             InstanceFilter filter, const CommonOptions& common, std::optional<int> file_camera) {
   PathPlan plan;
   PathOptions& options = plan.options;
-  options.sun = render.light.sun;
   const bool has_look = loaded.look && arguments.look == "file";
+  const NaturalLook natural = natural_look(sky_of(arguments));
+  static_cast<Look&>(options) = natural.look;
+  plan.develop = natural.develop;
+  options.sun = render.light.sun;
   if (has_look) take_file_look(*loaded.look, plan);
   options.width = render.width;
   options.height = render.height;
@@ -284,7 +291,7 @@ Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions&
   if (arguments.has("--sky-brightness")) options.sky_brightness = render.light.sky_brightness;
   take_lens(arguments, loaded, file_camera, plan);
 
-  if (!has_look || arguments.has("--tone")) plan.develop.tone = tone_of(arguments.tone);
+  if (arguments.has("--tone")) plan.develop.tone = tone_of(arguments.tone);
   if (arguments.has("--exposure")) plan.develop.exposure = render.light.exposure;
   if (arguments.has("--bloom")) plan.develop.bloom = arguments.bloom;
   if (arguments.has("--vignette")) plan.develop.vignette = arguments.vignette;
@@ -295,7 +302,7 @@ Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions&
   if (arguments.has("--ground") && !arguments.has_ground) {
     options.ground.reset();
   } else if (arguments.has_ground && !options.ground) {
-    options.ground.emplace();
+    options.ground.emplace().colour = natural.ground_colour;
   }
   if (options.ground) options.ground->only_shadows = plan.is_transparent;
   if (arguments.fog) {

@@ -25,7 +25,7 @@ struct FogPlace {
 struct PathArguments {
   std::set<std::string> given;  ///< the names of the options that were; what was not says the file, or the default
   int bounces = 8;
-  std::string sky = "physical";  ///< or the name of a file
+  std::string sky = "gradient";  ///< or the name of a file
   std::string tone = "neutral";
   std::string look = "file";
   double sun_angle_degrees = 0.53;

@@ -6,6 +6,7 @@
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 #include <quoin/mesh/smooth.h>
+#include <quoin/scene/look.h>
 
 namespace quoin {
 
@@ -83,6 +84,22 @@ struct LightOptions {
 /// View::Iso, so that one sees shadows, a sky that follows it, lamps, and surfaces of glass. LightOptions{} is the
 /// reference model, whose pictures stay what they are.
 [[nodiscard]] LightOptions natural_light();
+
+/// The counterpart of `natural_light` for path-traced images.
+struct NaturalLook {
+  Look look;
+  DevelopOptions develop;
+  Vec3 ground_colour{0.5F};  ///< GroundPlane::colour where the user asks for a ground; linear
+};
+
+/// Returns the environment, exposure and tone curve of the command-line tool and the viewer under `sky`, for scenes
+/// whose file has no render settings. Look{} and DevelopOptions{} are the library's defaults and differ.
+///
+/// Gradient:    the default: a pale background and bright shadows.
+/// Physical:    twice the light, which a clear sky's dark blue shadows need.
+/// Uniform:     colours as they are and a white ground: a white surface is as white as the background.
+/// Environment: the image's own light.
+[[nodiscard]] NaturalLook natural_look(SkyModel sky = SkyModel::Gradient);
 
 /// Errors: InvalidArgument, with the option's name, when a number is not finite (but for shadow_distance_voxels) or out
 ///         of range: a sun of length 0, fewer than 1 or more than 4,096 occlusion rays, negative distances or exposure,

@@ -95,8 +95,9 @@ class PathTracer {
 };
 
 /// The exposure that shows a picture in the middle of the tones: its scene's mean logarithm of light becomes 0.18, but
-/// what is brightest stays within four times white. 1 of a black one.
-[[nodiscard]] double find_exposure(const PathPicture& picture);
+/// what is brightest stays within four times white. 1 of a black one. Under other curves than ToneCurve::Neutral:
+/// the exposure at which the mean of the developed bytes, the background included, is the neutral curve's.
+[[nodiscard]] double find_exposure(const PathPicture& picture, ToneCurve tone = ToneCurve::Neutral);
 
 /// The picture as bytes, sRGB, the background included.
 /// Errors: InvalidArgument, with the option's name, for what DevelopOptions do not allow. Memory: with bloom the light

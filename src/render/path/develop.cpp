@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <glm/common.hpp>
@@ -224,9 +225,8 @@ class Developer {
   const SrgbEncoder& encode_ = SrgbEncoder::shared();
 };
 
-}  // namespace
-
-double find_exposure(const PathPicture& picture) {
+// The exposure of the neutral curve. None: nothing shines.
+std::optional<double> neutral_exposure(const PathPicture& picture) {
   constexpr double kMiddle = 0.18;
   constexpr double kBrightest = 4.0;
   constexpr double kBrightShare = 0.99;
@@ -238,13 +238,45 @@ double find_exposure(const PathPicture& picture) {
     lights.push_back(light);
     sum += static_cast<double>(log_of_two(light));
   }
-  if (lights.empty()) return 1.0;
+  if (lights.empty()) return std::nullopt;
   const auto mean = static_cast<float>(sum / static_cast<double>(lights.size()));
   const double by_mean = kMiddle / std::max(static_cast<double>(path::power_of_two(mean)), 1e-12);
   const auto bright =
       lights.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(lights.size() - 1) * kBrightShare);
   std::nth_element(lights.begin(), bright, lights.end());
   return std::min(by_mean, kBrightest / static_cast<double>(*bright));
+}
+
+// Of the developed bytes, by a sample of some thousand pixels.
+double mean_byte(const std::vector<Vec3>& light, double exposure, ToneCurve tone) {
+  constexpr std::size_t kPixels = 1U << 14U;
+  const std::size_t step = light.size() / kPixels + 1;
+  const SrgbEncoder& encode = SrgbEncoder::shared();
+  std::int64_t sum = 0;
+  std::int64_t count = 0;
+  for (std::size_t i = 0; i < light.size(); i += step) {
+    const Vec3 shown = toned(light[i], static_cast<float>(exposure), tone);
+    for (int channel = 0; channel < 3; ++channel) sum += encode(shown[channel]);
+    count += 3;
+  }
+  return static_cast<double>(sum) / static_cast<double>(std::max<std::int64_t>(count, 1));
+}
+
+}  // namespace
+
+double find_exposure(const PathPicture& picture, ToneCurve tone) {
+  constexpr double kWidest = 256.0;  // how far the curves' exposures are apart at most, as a factor
+  constexpr int kHalvings = 24;
+  const std::optional<double> neutral = neutral_exposure(picture);
+  if (!neutral || tone == ToneCurve::Neutral) return neutral.value_or(1.0);
+  const double wanted = mean_byte(picture.radiance, *neutral, ToneCurve::Neutral);
+  double low = *neutral / kWidest;
+  double high = *neutral * kWidest;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = std::sqrt(low * high);
+    (mean_byte(picture.radiance, middle, tone) < wanted ? low : high) = middle;
+  }
+  return std::sqrt(low * high);
 }
 
 Result<Image> develop(const PathPicture& picture, const DevelopOptions& options) {

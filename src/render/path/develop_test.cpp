@@ -69,6 +69,28 @@ TEST(PathDevelop, FindsTheExposureThatShowsThePicture) {
   EXPECT_EQ(find_exposure(picture), 1.0);
 }
 
+// Dark and bright, colourful and grey: every curve shows the mean that the neutral curve shows.
+TEST(PathDevelop, AutomaticExposureGivesEveryCurveTheSameMean) {
+  PathPicture picture = picture_of(64, 64, Vec3(0.0F));
+  for (std::size_t i = 0; i < picture.radiance.size(); ++i) {
+    const float light = std::pow(1.4F, static_cast<float>(i % 23) - 18.0F);
+    picture.radiance[i] = light * Vec3(1.0F, 0.4F + 0.1F * static_cast<float>(i % 5), 0.3F);
+  }
+  picture.scene = picture.radiance;
+  const auto mean_of = [&](ToneCurve tone) {
+    const auto image = develop(picture, {find_exposure(picture, tone), tone});
+    EXPECT_TRUE(image.has_value());
+    return image ? std::accumulate(image->rgb.begin(), image->rgb.end(), 0.0) / static_cast<double>(image->rgb.size())
+                 : 0.0;
+  };
+  const double neutral = mean_of(ToneCurve::Neutral);
+  EXPECT_GT(neutral, 60.0);
+  for (const ToneCurve tone : {ToneCurve::Clamp, ToneCurve::Agx, ToneCurve::Aces}) {
+    EXPECT_NEAR(mean_of(tone) / neutral, 1.0, 0.01) << static_cast<int>(tone);
+  }
+  EXPECT_EQ(find_exposure(picture_of(2, 2, Vec3(0.0F)), ToneCurve::Aces), 1.0);
+}
+
 // A bright pixel in the middle of a dark picture gives light to its surroundings, and keeps the rest.
 TEST(PathDevelop, BloomSpreadsWhatIsBright) {
   PathPicture picture = picture_of(65, 65, Vec3(0.1F));

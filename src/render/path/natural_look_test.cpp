@@ -1,0 +1,91 @@
+#include <algorithm>
+#include <cstdint>
+
+#include <gtest/gtest.h>
+
+#include <quoin/light/light_options.h>
+#include <quoin/render/path_tracer.h>
+
+#include "render/path/town_for_tests.h"
+
+namespace quoin {
+namespace {
+
+using namespace render_test;
+
+constexpr int kSize = 24;
+
+Scene white_block() {
+  Scene scene;
+  Grid grid;
+  grid.fill_box({{0, 0, 0}, {8, 8, 8}}, add_type(scene, {255, 255, 255, 255}));
+  place(scene, std::move(grid));
+  return scene;
+}
+
+// `from`: the camera's direction from the block's middle.
+Image natural_image(DVec3 from, SkyModel sky, bool has_ground) {
+  const Scene scene = white_block();
+  const NaturalLook natural = natural_look(sky);
+  PathOptions options;
+  static_cast<Look&>(options) = natural.look;
+  options.width = options.height = kSize;
+  options.samples = 32;
+  if (has_ground) options.ground.emplace().colour = natural.ground_colour;
+  const DVec3 middle(4.0);
+  const PathPicture picture = path_picture(scene, towards(middle + from * 24.0, middle, 0.9), options);
+  auto image = develop(picture, natural.develop);
+  EXPECT_TRUE(image.has_value());
+  return image ? std::move(*image) : Image{};
+}
+
+// The least channel's mean over a square of pixels.
+double darkest_channel(const Image& image, int x, int y, int size) {
+  double least = 255.0;
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    double sum = 0.0;
+    for (int i = 0; i < size * size; ++i) {
+      const auto pixel = static_cast<std::size_t>((y + i / size) * image.width + x + i % size);
+      sum += image.rgb[3 * pixel + channel];
+    }
+    least = std::min(least, sum / (size * size));
+  }
+  return least;
+}
+
+double middle_of_image(const Image& image) {
+  return darkest_channel(image, kSize / 2 - 2, kSize / 2 - 2, 4);
+}
+
+TEST(NaturalLook, BackgroundsOfTheIsoViewAreBright) {
+  const Image image = natural_image(glm::normalize(DVec3(1.0, 1.0, 1.0)), SkyModel::Gradient, false);
+  for (const int y : {0, kSize - 3}) {
+    EXPECT_GE(darkest_channel(image, 0, y, 3), 150.0);
+    EXPECT_GE(darkest_channel(image, kSize - 3, y, 3), 150.0);
+  }
+}
+
+TEST(NaturalLook, WhiteInFullShadowIsNotDark) {
+  // The sun stands at -x and +z: the block's sides towards +x and -z lie in shadow.
+  for (const SkyModel sky : {SkyModel::Gradient, SkyModel::Physical}) {
+    for (const DVec3& side : {DVec3(1.0, 0.05, 0.0), DVec3(0.0, 0.05, -1.0)}) {
+      const double shadow = middle_of_image(natural_image(glm::normalize(side), sky, false));
+      EXPECT_GE(shadow, 60.0) << static_cast<int>(sky);
+      const double lit = middle_of_image(natural_image(glm::normalize(DVec3(-side.x, 0.05, -side.z)), sky, false));
+      EXPECT_GT(lit, shadow + 10.0) << static_cast<int>(sky) << ": shadows still show";
+    }
+  }
+}
+
+TEST(NaturalLook, WhiteUnderAUniformSkyIsWhite) {
+  for (const bool has_ground : {false, true}) {
+    for (const DVec3& side : {DVec3(1.0, 0.05, 0.0), DVec3(-1.0, 0.05, 0.0), DVec3(0.1, 1.0, 0.1)}) {
+      const Image image = natural_image(glm::normalize(side), SkyModel::Uniform, has_ground);
+      EXPECT_GE(middle_of_image(image), 250.0) << has_ground << side.x;
+      EXPECT_GE(darkest_channel(image, 0, 0, 3), 250.0) << has_ground << side.x;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace quoin
