@@ -69,7 +69,8 @@ Result<Picture> PathPictures::render(const Camera& camera, const RenderOptions& 
                        : device_->render_paths(camera, wanted, threads, progress);
   if (!taken) return taken.error();
   last_ = std::move(*taken);
-  if (!exposure_) exposure_ = plan_.is_exposure_automatic ? find_exposure(last_, plan_.develop.tone) : plan_.develop.exposure;
+  if (!exposure_)
+    exposure_ = plan_.is_exposure_automatic ? find_exposure(last_, plan_.develop.tone) : plan_.develop.exposure;
   plan_.develop.exposure = *exposure_;
   auto image = develop(last_, plan_.develop);
   if (!image) return image.error();
