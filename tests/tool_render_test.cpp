@@ -259,6 +259,38 @@ TEST_F(ToolRender, PathTracedImagesHaveABrightBackground) {
   for (const int corner : corners("--sky uniform --ground")) EXPECT_GE(corner, 250);
 }
 
+// A cave is wider than blocks' rooms. A distance that is asked for is the fields' too.
+TEST_F(ToolRender, OcclusionShapesACaveOfAField) {
+  ASSERT_EQ(run("generate smooth-terrain s.json --chunks 3x2x3").status, 0);
+  const std::string base =
+      "s.json -o out.png --size 64x48 --camera 98,35,161 --look-at 100.8,41.2,142.2 --fov 80 --exposure 3 ";
+  const auto rock = [&](const std::string& flags) {  // its mean and its standard deviation
+    drawn(base + flags);
+    const auto image = read_png(folder_.file("out.png"));
+    double sum = 0.0;
+    double squares = 0.0;
+    double count = 0.0;
+    for (std::size_t i = 0; image && i < image->rgb.size(); i += 3) {
+      const int green = image->rgb[i + 1];
+      if (std::abs(green - image->rgb[i]) > 8) continue;  // grass
+      sum += green;
+      squares += green * green;
+      count += 1.0;
+    }
+    EXPECT_GT(count, 2000.0);
+    const double mean = sum / std::max(count, 1.0);
+    return std::array{mean, std::sqrt(squares / std::max(count, 1.0) - mean * mean)};
+  };
+  const auto plain = rock("");
+  const auto open = rock("--preset no-ao");
+  EXPECT_LE(plain[0], open[0]);
+  EXPECT_GE(plain[1], 15.0);
+  EXPECT_GT(plain[1], open[1] + 5.0) << "it is not the sun's light that varies";
+  const auto far = rock("--ao-distance 18 --ao-rays 9");
+  EXPECT_NEAR(plain[0], far[0], 1e-9);
+  EXPECT_GT(rock("--ao-distance 6")[0], plain[0] + 10.0);
+}
+
 TEST_F(ToolRender, WhatNoOptionSaysTheFileSays) {
   vox_test::FileBuilder file;
   file.model(4, 4, 4, {{0, 0, 0, 1}, {3, 0, 0, 2}, {0, 3, 3, 3}});

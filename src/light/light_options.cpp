@@ -12,6 +12,7 @@ LightOptions natural_light() {
   options.sky_follows_sun = true;
   options.max_lamps = 64;
   options.glass_surfaces = true;
+  options.field_occlusion_reach = 3.0;
   return options;
 }
 
@@ -39,6 +40,9 @@ Status check(const LightOptions& options) {
   }
   if (!std::isfinite(options.occlusion_distance_voxels) || options.occlusion_distance_voxels < 0.0) {
     return refuse("occlusion distance: must be finite and not negative");
+  }
+  if (!(options.field_occlusion_reach >= 0.0 && options.field_occlusion_reach <= 1024.0)) {
+    return refuse("field occlusion reach: must be 0 to 1024");
   }
   if (!(options.shadow_distance_voxels >= 0.0)) return refuse("shadow distance: must not be negative");
   if (!std::isfinite(options.exposure) || options.exposure < 0.0) {

@@ -40,6 +40,11 @@ TEST(LightOptions, NaturalLookIsBrightUnderEverySky) {
   EXPECT_EQ(Look{}.sky, SkyModel::Physical) << "the library's default stays";
 }
 
+TEST(LightOptions, FieldsHaveLongerOcclusionRaysInNaturalLightAlone) {
+  EXPECT_EQ(LightOptions{}.field_occlusion_reach, 1.0);
+  EXPECT_EQ(natural_light().field_occlusion_reach, 3.0);
+}
+
 TEST(LightOptions, ImpossibleOnesAreRefusedByName) {
   const auto expect_refused = [](const std::string& name, const std::function<void(LightOptions&)>& change) {
     LightOptions options;

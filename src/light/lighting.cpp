@@ -369,7 +369,10 @@ std::int64_t Lighting::trace_openness(const Group& group, std::uint32_t lanes, s
   std::array<int, RayPacket::kSize> open{};
   RayPacket rays = group.origins;
   rays.active = lanes;
-  rays.max_t.fill(options_.occlusion_distance_voxels / voxels_per_cell(group.placed));
+  const double reach = options_.occlusion_distance_voxels / voxels_per_cell(group.placed);
+  for (std::size_t i = 0; i < group.size; ++i) {
+    rays.max_t[i] = group.points[i]->in_field ? reach * options_.field_occlusion_reach : reach;
+  }
   const int count = directions_.count();
   for (int ray = 0; ray < count && rays.active != 0; ++ray) {
     set_occlusion_directions(group, ray, rays);

@@ -109,13 +109,16 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
                   "volumes that of their smooth meshes, see --ao-form (default rays)")
       ->check(CLI::IsMember({"rays", "vertex", "smooth"}));
   add_field_occlusion_options(command);
-  command.add_option("--ao-rays", arguments.render.light.occlusion_rays, "Rays a point for --ao rays (default 9)")
+  command
+      .add_option("--ao-rays", arguments.render.light.occlusion_rays,
+                  "Rays per point for --ao rays (default 9; 16 where --ao-distance is more than 12)")
       ->check(CLI::Range(1, kMaxSamples));
   command
       .add_option("--ao-affects", arguments.occlusion_affects,
                   "What occlusion darkens: ambient light, or all (default ambient)")
       ->check(CLI::IsMember({"ambient", "all"}));
-  add_text_option(command, "--ao-distance", "VOXELS", "How far the rays of --ao rays reach (default 6)");
+  add_text_option(command, "--ao-distance", "VOXELS",
+                  "How far the rays of --ao rays reach (default 6; from surfaces of fields 18)");
   add_text_option(command, "--shadow-distance", "VOXELS", "How far shadows reach (default: any distance)");
   add_text_option(command, "--exposure", "X|auto",
                   "Times this much light (default 1); auto, of --light path: as the first picture needs it");
@@ -437,6 +440,16 @@ std::string read_texts(const CLI::App& command, RenderArguments& arguments) {
   return wrong == faults.end() ? "" : *wrong;
 }
 
+// A distance that the user gives is that of fields too. Fixed directions, which all pixels share, show bands where they
+// reach far: more rays, turned from pixel to pixel, do not.
+void settle_occlusion_rays(const CLI::App& command, LightOptions& light) {
+  constexpr double kFar = 12.0;
+  constexpr int kRaysOfFar = 16;
+  if (command.count("--ao-distance") == 0) return;
+  light.field_occlusion_reach = 1.0;
+  if (command.count("--ao-rays") == 0 && light.occlusion_distance_voxels > kFar) light.occlusion_rays = kRaysOfFar;
+}
+
 }  // namespace
 
 DVec3 RenderArguments::forward() const {
@@ -496,6 +509,7 @@ std::string settle(const CLI::App& command, RenderArguments& arguments) {
   if (arguments.light_model == "propagated") light.model = LightModel::Propagated;
   if (arguments.has_fixed_sky) light.sky_follows_sun = false;
   if (arguments.has_plain_glass) light.glass_surfaces = false;
+  settle_occlusion_rays(command, light);
   if (arguments.occlusion == "vertex") light.occlusion_mode = OcclusionMode::Vertex;
   if (arguments.occlusion == "smooth") light.occlusion_mode = OcclusionMode::Smooth;
   if (arguments.occlusion_affects == "all") light.occlusion_affects = OcclusionAffects::All;

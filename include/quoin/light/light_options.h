@@ -58,6 +58,8 @@ struct LightOptions {
   OcclusionAffects occlusion_affects = OcclusionAffects::Ambient;
   int occlusion_rays = 9;  ///< 6: the reference's set; 9: the symmetric one; others are spread per pixel
   double occlusion_distance_voxels = 6.0;
+  double field_occlusion_reach = 1.0;  ///< times occlusion_distance_voxels at surfaces of fields, 0 to 1,024: caves,
+                                       ///< which are wider than rooms of blocks, get their shape from longer rays
   SmoothOcclusionOptions smooth_occlusion{};                                ///< of OcclusionMode::Smooth
   double shadow_distance_voxels = std::numeric_limits<double>::infinity();  ///< beyond it nothing casts a shadow
   double exposure = 1.0;        ///< times all light of a surface, before it is clamped to 0..1

@@ -229,7 +229,8 @@ float capped(double value) {
 void set_light(const RenderOptions& options, ShaderFrame& frame) {
   const LightOptions& light = options.light;
   const auto sky = static_cast<float>(light.sky_brightness);
-  frame.light = {sky * kAmbient, sky * kAmbientWithoutOcclusion, kLeastOfAll, 0.0F};
+  frame.light = {sky * kAmbient, sky * kAmbientWithoutOcclusion, kLeastOfAll,
+                 static_cast<float>(light.field_occlusion_reach)};
   frame.lift = static_cast<float>(kRayLift);
   const Daylight daylight = daylight_of(light);
   frame.ambient = {daylight.ambient, 0.0F};

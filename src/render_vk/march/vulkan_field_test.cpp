@@ -58,6 +58,8 @@ TEST_F(VulkanField, HillsWithAHouseAndGlass) {
   const Camera camera = towards({110, 70, 130}, {10, 0, 10});
   RenderOptions options = sized(160, 120);
   compare(scene, camera, options, "field_village");
+  options.light.field_occlusion_reach = 3.0;
+  compare(scene, camera, options, "field_village_reach");
   options.light.occlusion_rays = 16;
   compare(scene, camera, options, "field_village_16");
   options.light.occlusion_mode = OcclusionMode::Vertex;

@@ -186,7 +186,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   vec4 sky_zenith;
   vec4 sky_horizon;
   vec4 sky_ground;
-  vec4 light;  // ambient, ambient without occlusion, what occlusion leaves of all
+  vec4 light;  // ambient, ambient without occlusion, what occlusion leaves of all, reach of its rays at fields
   vec4 ambient;  // colours: of the ambient light, of the sun's
   vec4 sun;
   vec4 level_sky;  // what light of level 15 is like, of the sky, of lamps; and what shines everywhere

@@ -131,7 +131,8 @@ LightRays rays_of(Point point, Placed placed, GridRay from) {
 // be asked.
 bool aim(int number, LightRays rays, Placed placed, inout GridRay ray, out float max_t, out vec3 brought) {
   brought = vec3(0.0);
-  max_t = (number < 0 ? frame().shadow_distance : frame().occlusion_distance) / placed.ref_view.w;
+  float occlusion_distance = frame().occlusion_distance * (rays.is_field ? frame().light.w : 1.0);
+  max_t = (number < 0 ? frame().shadow_distance : occlusion_distance) / placed.ref_view.w;
   if (number < 0) {
     ray.direction = placed.to_sun.xyz;
   } else if (number < rays.open_count) {

@@ -139,7 +139,8 @@ fn trace_light(point: Point) -> Lit {
   var of_lamps = vec3f();
   var open = 0;
   for (var k = select(0, -1, cosine > 0.0); k < frame.occlusion_count + i32(lamps.y); k++) {
-    var max_t = select(frame.occlusion_distance, frame.shadow_distance, k < 0) / cell_size;
+    let occlusion_distance = frame.occlusion_distance * select(1.0, frame.light.w, is_field);
+    var max_t = select(occlusion_distance, frame.shadow_distance, k < 0) / cell_size;
     var brought = vec3f();
     if (k < 0) {
       ray.direction = to_sun.xyz;
