@@ -94,9 +94,10 @@ class PathTracer {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The exposure that shows a picture in the middle of the tones: its scene's mean logarithm of light becomes 0.18, but
-/// what is brightest stays within four times white. 1 of a black one. Under other curves than ToneCurve::Neutral:
-/// the exposure at which the mean of the developed bytes, the background included, is the neutral curve's.
+/// Returns the exposure that brings an image to middle tones; 1 for a black image.
+///
+/// Neutral: the scene's mean logarithm of light becomes 0.18, and the brightest 1 % stays within 4 times white.
+/// Others:  the developed image, background included, has the same mean byte as under the neutral curve.
 [[nodiscard]] double find_exposure(const PathPicture& picture, ToneCurve tone = ToneCurve::Neutral);
 
 /// The picture as bytes, sRGB, the background included.

@@ -247,7 +247,7 @@ std::optional<double> neutral_exposure(const PathPicture& picture) {
   return std::min(by_mean, kBrightest / static_cast<double>(*bright));
 }
 
-// Of the developed bytes, by a sample of some thousand pixels.
+// Returns the mean of the developed bytes, estimated from some thousand pixels.
 double mean_byte(const std::vector<Vec3>& light, double exposure, ToneCurve tone) {
   constexpr std::size_t kPixels = 1U << 14U;
   const std::size_t step = light.size() / kPixels + 1;
