@@ -121,7 +121,8 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
                   "How far the rays of --ao rays reach (default 6; from surfaces of fields 18)");
   add_text_option(command, "--shadow-distance", "VOXELS", "How far shadows reach (default: any distance)");
   add_text_option(command, "--exposure", "X|auto",
-                  "Times this much light (default 1); auto, of --light path: as the first picture needs it");
+                  "Factor of all light (default 1; with --light path 1.3, under --sky physical 2); auto, with --light "
+                  "path: as the first image needs it");
   add_text_option(command, "--emission-scale", "X", "Times this much of what voxels emit (default 1)");
   add_path_options(command, arguments.path);
 }
