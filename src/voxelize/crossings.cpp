@@ -162,6 +162,13 @@ struct Met {
 /// For triangles that lie between voxels and are touched: true if their inner side is the one behind them.
 using Sides = std::map<std::uint32_t, bool>;
 
+/// Puts crossings that rounding moved off the border between two voxels onto it.
+double snapped(double w) {
+  constexpr double kRounding = 1e-9;
+  const double border = std::round(w);
+  return std::abs(w - border) < kRounding ? border : w;
+}
+
 /// Depth within the mesh along a line: the inner side of the surface is the deeper one.
 class Depth {
  public:
@@ -173,13 +180,23 @@ class Depth {
     ++crossings_;
     return depth() > before;
   }
+  [[nodiscard]] int depth() const { return rule_ == SolidVoxels::Parity ? crossings_ & 1 : std::abs(turns_); }
 
  private:
-  [[nodiscard]] int depth() const { return rule_ == SolidVoxels::Parity ? crossings_ & 1 : std::abs(turns_); }
   SolidVoxels rule_;
   int turns_ = 0;
   int crossings_ = 0;
 };
+
+/// Returns true if the crossings that lie where the first one does go into the mesh and out again: a tip that ends there.
+/// `depth`: before them.
+bool is_tip(std::span<const Met> line, Depth depth) {
+  if (depth.depth() != 0 || line.size() < 2 || line[1].w != line[0].w) return false;
+  for (std::size_t i = 0; i < line.size() && line[i].w == line[0].w; ++i) {
+    static_cast<void>(depth.is_deeper_behind(line[i].enters));
+  }
+  return depth.depth() == 0;
+}
 
 bool is_between_voxels(double w) {
   return w == std::floor(w);
@@ -189,10 +206,14 @@ bool is_between_voxels(double w) {
 void add_crossings(std::span<const Met> line, SolidVoxels rule, std::vector<Crossing>& crossings, Sides& sides) {
   const std::size_t first = crossings.size();
   Depth depth(rule);
-  for (const Met& met : line) {
+  bool is_in_tip = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const Met& met = line[i];
     const int behind = first_centre(met.w);
     const bool is_between = is_between_voxels(met.w);
-    const bool is_deeper_behind = depth.is_deeper_behind(met.enters);
+    if (i == 0 || line[i - 1].w != met.w) is_in_tip = is_tip(line.subspan(i), depth);
+    // A tip has no inner side: it takes the greater voxel, as open surfaces do.
+    const bool is_deeper_behind = depth.is_deeper_behind(met.enters) || is_in_tip;
     crossings.emplace_back(behind, is_between ? !is_deeper_behind : std::floor(met.w) < behind, met.enters);
     if (const auto side = sides.find(met.triangle); is_between && side != sides.end()) side->second = is_deeper_behind;
   }
@@ -243,12 +264,12 @@ Column find_column(const Frame& frame, int axis, SolidVoxels rule, std::span<con
     const std::array<Seen, 3> seen = seen_along(axis, frame.corners(triangle));
     const bool is_mirrored = axis == 1;  // of the three planes (x, z) alone is seen from behind
     const auto visit = [&](int u, int v, double w, bool enters) {
-      met.push_back({line_of(u, v), enters, triangle, w});
+      met.push_back({line_of(u, v), enters, triangle, snapped(w)});
     };
     const double area = seen_area(seen);
     const auto touch = [&](int u, int v, double w) {
       // One that is seen edge-on has its border in common with others that are not.
-      if (area != 0.0) touched.push_back({line_of(u, v), (area < 0.0) != is_mirrored, triangle, w});
+      if (area != 0.0) touched.push_back({line_of(u, v), (area < 0.0) != is_mirrored, triangle, snapped(w)});
     };
     for_each_crossing(seen, is_mirrored, first_u, first_v, visit, touch);
   }
@@ -265,8 +286,12 @@ Column find_column(const Frame& frame, int axis, SolidVoxels rule, std::span<con
     if (is_between_voxels(each.w)) sides.emplace(each.triangle, each.enters);
   }
   Column column = begin.empty() ? Column() : column_of(met, std::move(begin), rule, sides);
+  // Where triangles of both directions touch a line they end in a tip.
+  std::map<std::pair<std::uint16_t, double>, unsigned> directions;
+  for (const Met& each : touched) directions[{each.line, each.w}] |= each.enters ? 1U : 2U;
   for (const Met& each : touched) {
-    const bool is_before = is_between_voxels(each.w) && !sides[each.triangle];
+    const bool is_tip = directions[{each.line, each.w}] == 3U;
+    const bool is_before = is_between_voxels(each.w) && !is_tip && !sides[each.triangle];
     column.touched.emplace_back(each.line, static_cast<int>(std::floor(each.w)) - (is_before ? 1 : 0));
   }
   return column;

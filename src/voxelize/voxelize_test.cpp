@@ -231,6 +231,20 @@ TEST(VoxelizeSurface, between_voxels_belongs_to_its_inner_side) {
   EXPECT_EQ(voxelized(hollow, SurfaceVoxels::Separating6, SolidVoxels::Winding).size(), 1000U - 64U);
 }
 
+// Where a slanted side ends between voxels it has no inner side.
+TEST(VoxelizeSurface, KeepsTipsOnTheLatticeWithinBounds) {
+  TriangleMesh tip;
+  tip.positions = {{0, 0, 0}, {8, 0, 0}, {0, 8, 0}, {0, 0, 8}};
+  tip.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  for (const SolidVoxels solid : {SolidVoxels::None, SolidVoxels::Winding}) {
+    const Voxels voxels = voxelized(tip, SurfaceVoxels::Separating6, solid);
+    EXPECT_GT(voxels.size(), 50U);
+    for (const auto& [z, y, x] : voxels) {
+      EXPECT_TRUE(std::min({x, y, z}) >= 0 && std::max({x, y, z}) < 8) << x << ' ' << y << ' ' << z;
+    }
+  }
+}
+
 TEST(VoxelizeSurface, on_centres_takes_all_that_it_passes_on_every_side) {
   const TriangleMesh box = shapes::box(DVec3(0.5), DVec3(3.5));
   EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::Winding).size(), 64U);
