@@ -736,7 +736,7 @@ std::size_t OccupancyTree::bytes() const {
   return sizeof(OccupancyTree) + sizeof(Impl) + impl_->regions.size() * sizeof(RegionNode) +
          impl_->chunk_nodes.capacity() * sizeof(ChunkNode) + impl_->bricks.bytes() +
          impl_->uniform.capacity() * sizeof(trace::UniformBlocks) + impl_->chunk_boxes.bytes() +
-         impl_->flat_nodes.capacity() * sizeof(trace::FlatChunk) +
+         impl_->flat_nodes.capacity() * sizeof(trace::FlatChunk) + impl_->missed.capacity() * sizeof(ChunkBricks) +
          (impl_->flat.cells.capacity() + impl_->flat.bricks.capacity()) * sizeof(std::uint32_t);
 }
 

@@ -188,7 +188,7 @@ class Depth {
   int crossings_ = 0;
 };
 
-/// Returns true if the crossings that lie where the first one does go into the mesh and out again: a tip that ends there.
+/// Returns true if the crossings at the position of the first one go into the mesh and out again: a tip ends there.
 /// `depth`: before them.
 bool is_tip(std::span<const Met> line, Depth depth) {
   if (depth.depth() != 0 || line.size() < 2 || line[1].w != line[0].w) return false;
@@ -286,7 +286,7 @@ Column find_column(const Frame& frame, int axis, SolidVoxels rule, std::span<con
     if (is_between_voxels(each.w)) sides.emplace(each.triangle, each.enters);
   }
   Column column = begin.empty() ? Column() : column_of(met, std::move(begin), rule, sides);
-  // Where triangles of both directions touch a line they end in a tip.
+  // Triangles of both directions that touch a line at one point end in a tip.
   std::map<std::pair<std::uint16_t, double>, unsigned> directions;
   for (const Met& each : touched) directions[{each.line, each.w}] |= each.enters ? 1U : 2U;
   for (const Met& each : touched) {

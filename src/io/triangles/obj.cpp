@@ -28,7 +28,7 @@ namespace quoin::triangles {
 
 namespace {
 
-// The mark of UTF-8, with which programs for Windows begin a text.
+// The mark of UTF-8 that programs for Windows write before a text.
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 bool is_other_keyword(std::string_view word) {

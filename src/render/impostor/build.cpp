@@ -45,12 +45,7 @@ constexpr double kOcclusionReach = LightOptions{}.occlusion_distance_voxels;
 
 // A point before the middle of a surfel, in the grid.
 DVec3 place_of(const ImpostorFaces::Face& face, const ImpostorFaces::Surfel& surfel, double lift) {
-  const FaceFrame& frame = frame_of(face.direction);
-  DVec3 point = DVec3(face.voxel) + lift * DVec3(surfel.normal);
-  point[frame.axis] += double{surfel.offset};
-  point[frame.u] += double{surfel.shift[0]};
-  point[frame.v] += double{surfel.shift[1]};
-  return point;
+  return surfel.middle(DVec3(face.voxel) + lift * DVec3(surfel.normal), face.direction);
 }
 
 // Bit i: ray i meets a voxel or the field, if there is one.

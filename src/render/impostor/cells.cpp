@@ -22,11 +22,15 @@
 namespace quoin {
 namespace {
 
-constexpr int kWidest = 10;           // log2 of the voxels to which the Morton curve's origin is aligned
+constexpr int kWidest = 10;           // log2 of the widest cells, voxels; the Morton curve's origin is a multiple
 constexpr std::uint32_t kNone = ~0U;  // as a rank
 
-IVec3 cells_below(IVec3 voxel, int shift) {
-  return {voxel.x >> shift, voxel.y >> shift, voxel.z >> shift};
+// The face's rectangle, as a box without thickness.
+IBox box_of(const VoxelFace& face) {
+  const FaceFrame& frame = frame_of(face.direction);
+  IBox box{face.voxel, face.voxel + 1};
+  (frame.sign > 0 ? box.min : box.max)[frame.axis] = (frame.sign > 0 ? box.max : box.min)[frame.axis];
+  return box;
 }
 
 std::uint32_t hash_of(const VoxelFace& face) {
@@ -88,7 +92,7 @@ class TreeWords {
   explicit TreeWords(const OccupancyTree& tree) : nodes_(tree) {}
 
   [[nodiscard]] std::uint64_t word(IVec3 at) {
-    const IVec3 brick = cells_below(at, 2);
+    const IVec3 brick = at >> 2;
     Kept& kept = kept_[static_cast<std::size_t>((brick.x & 3) + 4 * (brick.y & 3) + 16 * (brick.z & 3))];
     if (!kept.is_known || kept.brick != brick) read(brick, kept);
     const IVec3 within = at - brick * 4;
@@ -105,7 +109,7 @@ class TreeWords {
     kept.brick = brick;
     kept.is_known = true;
     kept.words.fill(0);
-    const IVec3 chunk = cells_below(brick, 2);
+    const IVec3 chunk = brick >> 2;
     const trace::ChunkNode* node = nodes_.find_chunk(chunk);
     if (node == nullptr) return;
     const IVec3 within = brick - chunk * 4;
@@ -119,7 +123,7 @@ class TreeWords {
   std::array<Kept, 64> kept_;
 };
 
-// The box around the faces of a word's voxels, and which voxels these are.
+// The voxels of a word that have faces, and the box around these faces.
 struct WordFaces {
   std::uint64_t voxels = 0;
   IVec3 low{0};
@@ -131,15 +135,12 @@ WordFaces faces_of_word(TreeWords& words, IVec3 at) {
   const std::uint64_t own = words.word(at);
   if (own == 0) return found;
   for (const Direction direction : kDirections) {
-    const FaceFrame& frame = frame_of(direction);
     const std::uint64_t exposed = exposed_bits(own, words.word(at + normal_of(direction)), direction);
     for (std::uint64_t left = exposed; left != 0; left &= left - 1) {
       const int bit = std::countr_zero(left);
-      IVec3 low = at * 4 + IVec3{bit & 3, bit >> 2 & 3, bit >> 4};
-      IVec3 high = low + 1;
-      (frame.sign > 0 ? low : high)[frame.axis] = (frame.sign > 0 ? high : low)[frame.axis];
-      found.low = found.voxels == 0 ? low : glm::min(found.low, low);
-      found.high = found.voxels == 0 ? high : glm::max(found.high, high);
+      const IBox box = box_of({at * 4 + IVec3{bit & 3, bit >> 2 & 3, bit >> 4}, direction});
+      found.low = found.voxels == 0 ? box.min : glm::min(found.low, box.min);
+      found.high = found.voxels == 0 ? box.max : glm::max(found.high, box.max);
       found.voxels |= std::uint64_t{1} << bit;
     }
   }
@@ -148,7 +149,7 @@ WordFaces faces_of_word(TreeWords& words, IVec3 at) {
 
 // The bits of a voxel in its cell, which is 2^`log2_width` voxels wide: eight where it is 2 wide.
 std::uint64_t bits_of_voxel(IVec3 in_cell, int log2_width) {
-  const IVec3 at = log2_width == 1 ? in_cell * 2 : cells_below(in_cell, log2_width - 2);
+  const IVec3 at = log2_width == 1 ? in_cell * 2 : in_cell >> (log2_width - 2);
   const std::uint64_t cube = log2_width == 1 ? 0x0033'0033U : 1U;
   return cube << (at.x + 4 * at.y + 16 * at.z);
 }
@@ -178,11 +179,8 @@ class SurfaceCells::Collector {
   Collector(SurfaceCells& into, double texel) : into_(&into), ranks_(texel) {}
 
   void add_face(const SeenFace& seen, std::uint32_t index) {
-    const FaceFrame& frame = frame_of(seen.face.direction);
-    DVec3 low(seen.face.voxel);
-    DVec3 high = low + 1.0;
-    (frame.sign > 0 ? low : high)[frame.axis] = (frame.sign > 0 ? high : low)[frame.axis];
-    Cell& cell = add(seen.face.voxel, low, high, seen, index);
+    const IBox box = box_of(seen.face);
+    Cell& cell = add(seen.face.voxel, DVec3(box.min), DVec3(box.max), seen, index);
     cell.bits |= bits_of_voxel(in_cell(seen.face.voxel), into_->log2_width_);
   }
 
@@ -190,9 +188,7 @@ class SurfaceCells::Collector {
   void add_surfel(const SeenFace& seen, std::uint32_t index) {
     const FaceFrame& frame = frame_of(seen.face.direction);
     const ImpostorFaces::Surfel& surfel = *seen.surfel;
-    DVec3 middle(seen.face.voxel);
-    middle[frame.axis] += double{surfel.offset};
-    middle[frame.u] += double{surfel.shift[0]}, middle[frame.v] += double{surfel.shift[1]};
+    const DVec3 middle = surfel.middle(DVec3(seen.face.voxel), seen.face.direction);
     for (int i = 0; i < 16; ++i) {
       const double u = (i % 4 - 1.5) * 0.5 * surfel.half[0];
       const double v = (i / 4 - 1.5) * 0.5 * surfel.half[1];
@@ -238,7 +234,7 @@ class SurfaceCells::Collector {
   }
 
   Cell& cell_at(IVec3 voxel) {
-    const IVec3 at = cells_below(voxel - into_->origin_, into_->log2_width_);
+    const IVec3 at = (voxel - into_->origin_) >> into_->log2_width_;
     const std::uint64_t code = morton_code(at);
     // Faces that follow each other mostly lie in one cell.
     if (!into_->cells_.empty() && into_->cells_[last_].code == code) return into_->cells_[last_];
@@ -266,7 +262,7 @@ SurfaceCells::SurfaceCells(const std::vector<SeenFace>& faces, const ContentSphe
   if (faces.empty()) return;
   IVec3 least = faces[0].face.voxel;
   for (const SeenFace& seen : faces) least = glm::min(least, seen.face.voxel);
-  origin_ = cells_below(least - 4, kWidest) * (1 << kWidest);
+  origin_ = ((least - 4) >> kWidest) * (1 << kWidest);
   Collector collector(*this, 2.0 * snapshot_camera(content, 0, edge).half_size() / edge);
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const auto index = static_cast<std::uint32_t>(i);
@@ -316,7 +312,7 @@ void SurfaceCells::fill_from(const OccupancyTree& tree) {
     const IVec3 corner = corner_of(cell);
     for (int i = 0; i < across * across * across; ++i) {
       const IVec3 in_cell{i % across, i / across % across, i / across / across};
-      const WordFaces found = faces_of_word(words, cells_below(corner, 2) + in_cell);
+      const WordFaces found = faces_of_word(words, (corner >> 2) + in_cell);
       if (found.voxels == 0) continue;
       cell.low = glm::min(cell.low, Vec3(DVec3(found.low) - content_.centre));
       cell.high = glm::max(cell.high, Vec3(DVec3(found.high) - content_.centre));

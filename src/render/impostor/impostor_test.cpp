@@ -304,6 +304,9 @@ TEST(Impostor, MoreTexelsSeeSmallerFaces) {
     return ImpostorFaces::of(Impostor::build(grid, types, ImpostorOptions{edge})).unseen.count();
   };
   EXPECT_GT(unseen(64), unseen(512));
+  // With 32 texels a side the faces are too many to be held one by one.
+  const auto bytes = [&](int edge) { return Impostor::build(grid, types, ImpostorOptions{edge}).bytes(); };
+  EXPECT_LT(bytes(16), bytes(64));
 }
 
 TEST(Impostor, PicturesAreThoseOfTheRenderer) {

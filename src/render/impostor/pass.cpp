@@ -136,10 +136,7 @@ double ImpostorPass::distance_to_surfel(const DrawnImpostor& drawn, const Impost
   upright[frame.axis] = 1.0;
   upright[frame.u] = -double{surfel.slope[0]};
   upright[frame.v] = -double{surfel.slope[1]};
-  DVec3 centre = DVec3(face.voxel) - drawn.faces->centre;
-  centre[frame.axis] += double{surfel.offset};
-  centre[frame.u] += double{surfel.shift[0]};
-  centre[frame.v] += double{surfel.shift[1]};
+  const DVec3 centre = surfel.middle(DVec3(face.voxel) - drawn.faces->centre, face.direction);
   const DVec3 in_view = upright * drawn.axes;  // the transposed matrix times it
   return (glm::dot(upright, centre - drawn.offset) * drawn.aim.voxel_size - glm::dot(in_view, ray.origin)) /
          glm::dot(in_view, ray.direction);

@@ -14,7 +14,7 @@
 
 namespace quoin {
 
-/// For the lanes whose bit is set, the face of an impostor with which the hit is lit.
+/// The face of an impostor that lights the hit, for the lanes whose bit is set.
 struct FarFaces {
   std::uint32_t found = 0;
   RayPacket::Lanes<const ImpostorFaces::Face*> face{};
@@ -37,7 +37,7 @@ class ImpostorPass {
   void draw(int column, int row, int sample, raster::Canvas& canvas) const;
 
   /// Puts what is nearer than `hits` into them: for the 4x4 pixels from (`column`, `row`), whose rays from the camera
-  /// these are. Faces and voxels are those with which the hit is lit.
+  /// these are. Faces and voxels are those that light the hit.
   /// Requires: `canvas` is that of the tile.
   void find(int column, int row, const RayPacket& rays_in_view, const raster::Canvas& canvas, SceneHits& hits,
             FarFaces& faces) const;

@@ -15,7 +15,7 @@ namespace quoin {
 namespace {
 
 constexpr double kRoom = 1.0 + 1e-6;  // for rounding
-// Voxels per pixel from which on cells of 2^`log2_width` voxels are drawn. The bits of cells of 2 and 4 voxels are
+// The least number of voxels per pixel for cells of 2^`log2_width` voxels. The bits of cells of 2 and 4 voxels are
 // exact; wider ones are a sixteenth of a pixel at most, so that outlines of 8 pixels stay (docs/decisions/120).
 double least_voxels(int log2_width) {
   if (log2_width <= 2) return log2_width < 1 ? 0.0 : 3.0 * std::exp2(log2_width);

@@ -78,11 +78,7 @@ TEST(Surfels, DepthsAndNormalsAreThoseOfTheSurface) {
   EXPECT_LE(sum / both, 0.04);
   const FieldSurfels surfels = *surfels_of(field_of(Model::SmoothBall), 100'000);
   for (std::size_t i = 0; i < surfels.faces.size(); ++i) {
-    DVec3 place(surfels.faces[i].voxel);
-    const FaceFrame& frame = frame_of(surfels.faces[i].direction);
-    place[frame.axis] += double{surfels.surfels[i].offset};
-    place[frame.u] += double{surfels.surfels[i].shift[0]};
-    place[frame.v] += double{surfels.surfels[i].shift[1]};
+    const DVec3 place = surfels.surfels[i].middle(DVec3(surfels.faces[i].voxel), surfels.faces[i].direction);
     const DVec3 out = glm::normalize(place - DVec3(20.3, 21.1, 19.7));
     EXPECT_GT(glm::dot(out, DVec3(surfels.surfels[i].normal)), 0.998);
     EXPECT_NEAR(glm::length(place - DVec3(20.3, 21.1, 19.7)), 20.0, 0.25);

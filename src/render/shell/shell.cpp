@@ -11,13 +11,9 @@ namespace {
 constexpr int kCellsAChunk = 16;
 constexpr int kCellsABrick = 4;
 
-IVec3 floor_of(IVec3 v, int shift) {
-  return {v.x >> shift, v.y >> shift, v.z >> shift};
-}
-
 // How many cells along each axis touch the box or lie beside one that does.
 IVec3 cells_around(const IBox& box) {
-  return floor_of(box.max - 1, 2) - floor_of(box.min, 2) + 3;
+  return ((box.max - 1) >> 2) - (box.min >> 2) + 3;
 }
 
 }  // namespace
@@ -60,7 +56,7 @@ std::uint64_t exposed_bits(std::uint64_t own, std::uint64_t next, Direction dire
   return own & ~neighbours;
 }
 
-ImpostorShell::ImpostorShell(const IBox& box) : origin_((floor_of(box.min, 2) - 1) * 4), size_(cells_around(box)) {
+ImpostorShell::ImpostorShell(const IBox& box) : origin_(((box.min >> 2) - 1) * 4), size_(cells_around(box)) {
   cells_.resize(static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y) *
                 static_cast<std::size_t>(size_.z));
 }
@@ -73,8 +69,8 @@ std::optional<ImpostorShell> ImpostorShell::build(const OccupancyTree& tree, std
   for (int axis = 0; axis < 3; ++axis) max_cells /= size[axis];
   if (max_cells == 0) return std::nullopt;
   ImpostorShell shell(box);
-  const IVec3 low = floor_of(box.min, 6);
-  const IVec3 high = floor_of(box.max - 1, 6);
+  const IVec3 low = box.min >> 6;
+  const IVec3 high = (box.max - 1) >> 6;
   for (int z = low.z; z <= high.z; ++z) {
     for (int y = low.y; y <= high.y; ++y) {
       for (int x = low.x; x <= high.x; ++x) shell.copy_chunk(tree, {x, y, z});
@@ -88,7 +84,7 @@ void ImpostorShell::copy_chunk(const OccupancyTree& tree, IVec3 chunk) {
   const trace::TreeNodes nodes(tree);
   const trace::ChunkNode* node = nodes.find_chunk(chunk);
   if (node == nullptr) return;
-  const IVec3 first = chunk * kCellsAChunk - floor_of(origin_, 2);
+  const IVec3 first = chunk * kCellsAChunk - (origin_ >> 2);
   for (int brick = 0; brick < 64; ++brick) {
     const trace::BrickCode at = node->bricks[static_cast<std::size_t>(brick)];
     if (at == trace::kEmptyBrick) continue;

@@ -90,11 +90,6 @@ std::size_t entries_of(const ImpostorFaces& impostor) {
   return impostor.faces.size() + 2 * impostor.surfels.size();
 }
 
-// How far beyond a rectangle's sides rays still meet it; as draw_faces has it.
-float room_of(const ImpostorFaces::Level& level) {
-  return 1e-5F + 2e-6F * level.size;
-}
-
 // Bits of the directions whose faces any ray of the area may go against. What is linear is least or greatest in a
 // corner.
 std::uint32_t seen_sides(const raster::Job& job, const PixelArea& area) {
@@ -127,7 +122,7 @@ void set_aim(const DrawnImpostor& drawn, int width, int height, ShaderFar& far) 
   far.across = to_vec4(job.across, job.across_at);
   far.down = to_vec4(job.down, job.down_at);
   far.ahead = to_vec4(job.ahead, job.ahead_at);
-  far.at = {job.column_at, job.row_at, room_of(drawn.faces->levels[drawn.level]), static_cast<float>(drawn.coarser)};
+  far.at = {job.column_at, job.row_at, drawn.faces->levels[drawn.level].room(), static_cast<float>(drawn.coarser)};
   for (ShaderFarLevel* level : {&far.level, &far.coarser, &far.unseen}) level->sides = seen_sides(job, drawn.area);
   far.area = {drawn.area.left, drawn.area.top, drawn.area.right, drawn.area.bottom};
 }

@@ -27,7 +27,7 @@ struct MeshImpostor {
     bool is_coarser = false;
   };
   std::vector<Part> parts;              ///< the levels that are drawn
-  std::uint32_t coarser = 0;            ///< the share of pixels, of 2^24, at which the coarser level is drawn
+  std::uint32_t coarser = 0;            ///< the number of pixels, of 2^24, that show the coarser level
   std::array<std::uint32_t, 4> near{};  ///< as ShaderFar
   std::uint64_t faces = 0;              ///< address
   DVec3 centre{0.0};                    ///< of the content, in the grid

@@ -58,6 +58,9 @@ struct ImpostorFaces {
     float size = 0.0F;  ///< no coordinate is larger
 
     [[nodiscard]] std::size_t count() const { return views.size(); }
+    /// The distance, in voxels, beyond a rectangle's sides at which rays still meet it: rectangles that share an edge
+    /// meet at points that differ by rounding.
+    [[nodiscard]] float room() const { return 1e-5F + 2e-6F * size; }
   };
 
   /// What is the same at all levels.
@@ -82,6 +85,15 @@ struct ImpostorFaces {
     std::array<float, 2> half{};   ///< from the middle to the sides along these, at most 1: whole 1/1,024
     /// How much the plane rises along the direction's axis by a sample along these.
     std::array<float, 2> slope{};
+
+    /// Returns its middle. `edge`: the lower end of the edge that it lies on.
+    [[nodiscard]] DVec3 middle(DVec3 edge, Direction direction) const {
+      const FaceFrame& frame = frame_of(direction);
+      edge[frame.axis] += double{offset};
+      edge[frame.u] += double{shift[0]};
+      edge[frame.v] += double{shift[1]};
+      return edge;
+    }
   };
   static constexpr float kSurfelRoom =
       0.05F;  ///< by which rays meet a surfel beyond its edges, since they are not flush

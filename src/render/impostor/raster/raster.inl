@@ -29,7 +29,7 @@ struct Side {
   std::size_t v;
   float sign;
   bool is_inclined;  // surfels
-  float room;        // added to the reach: rectangles that share an edge meet at slightly different points of it
+  float room;        // of the level, added to the reach
 };
 
 // Pixels, all inclusive.
@@ -303,8 +303,7 @@ void draw_faces(const Job& job, Canvas& canvas) {
     if (begin == end) continue;
     const bool is_inclined = i >= ImpostorFaces::kSides / 2;
     const FaceFrame& frame = kFaceFrames[i % (ImpostorFaces::kSides / 2)];
-    const float room = 1e-5F + 2e-6F * job.level->size;
-    const Side side{frame.axis, frame.u, frame.v, static_cast<float>(frame.sign), is_inclined, room};
+    const Side side{frame.axis, frame.u, frame.v, static_cast<float>(frame.sign), is_inclined, job.level->room()};
     if (is_inclined || is_seen(job, side)) draw_side(job, side, begin, end, canvas);
   }
   find_furthest(job, canvas);
