@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <optional>
 #include <span>
@@ -19,6 +18,7 @@
 #include "io/vox/write/graph_revision.h"
 #include "io/vox/write/model_plan.h"
 #include "io/vox/write/node_content.h"
+#include "io/vox/write/unit_voxels.h"
 #include "io/vox/write/view_plan.h"
 #include "io/vox/write/write.h"
 #include "io/whole_file.h"
@@ -732,48 +732,6 @@ const VoxSource& source_of(const LoadedScene& loaded) {
   return loaded.source != nullptr ? *loaded.source : no_source();
 }
 
-/// The size of voxels that all instances have in common, where it is not 1: .vox knows no other.
-std::optional<double> common_voxel_size(const Scene& scene) {
-  constexpr double kRounding = 1e-6;
-  std::optional<double> common;
-  bool is_same = true;
-  scene.instances().for_each([&](InstanceHandle, const Instance& instance) {
-    if (!common) common = instance.voxel_size;
-    is_same = is_same && std::abs(instance.voxel_size - *common) <= kRounding * *common;
-  });
-  const bool is_scaled = common && is_same && *common != 1.0 && *common > 0.0 && std::isfinite(*common);
-  return is_scaled ? common : std::nullopt;
-}
-
-Scene divided(const Scene& given, double voxel_size) {
-  Scene scene = given.snapshot();
-  for (const InstanceHandle handle : scene.instances().handles()) {
-    Instance& instance = scene.edit(handle);
-    instance.voxel_size = 1.0;
-    instance.position /= voxel_size;
-  }
-  for (const GroupHandle handle : scene.groups().handles()) scene.edit(handle).position /= voxel_size;
-  return scene;
-}
-
-LoadedScene divided(const LoadedScene& given, double voxel_size) {
-  LoadedScene unit;
-  unit.scene = divided(given.scene, voxel_size);
-  unit.format = given.format;
-  unit.sun = given.sun;
-  unit.camera = given.camera;
-  unit.cameras = given.cameras;
-  unit.look = given.look;
-  unit.last_frame = given.last_frame;
-  unit.source = given.source;
-  if (unit.camera) unit.camera->position /= voxel_size;
-  for (FileCamera& each : unit.cameras) {
-    each.camera.position /= voxel_size;
-    each.focus_distance /= voxel_size;
-  }
-  return unit;
-}
-
 const Scene& scene_in(const Scene& scene) {
   return scene;
 }
@@ -784,30 +742,24 @@ const VoxSource& source_of(const Scene&) {
   return no_source();
 }
 
-std::string size_warning(double voxel_size) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.6g", voxel_size);
-  return std::string("the size of voxels is left out, which .vox does not hold: a voxel was ") + text + " units long";
-}
-
 /// `given`: a Scene, or a LoadedScene.
 template <class Given>
 Result<VoxBytes> write_any(const Given& given, const Progress& progress) {
-  const auto voxel_size = common_voxel_size(scene_in(given));
+  const auto voxel_size = vox::common_voxel_size(scene_in(given));
   if (!voxel_size) return Writer(given, source_of(given), progress).run();
-  const Given unit = divided(given, *voxel_size);
+  const Given unit = vox::divided(given, *voxel_size);
   auto written = Writer(unit, source_of(unit), progress).run();
-  if (written) written->warnings.push_back(size_warning(*voxel_size));
+  if (written) written->warnings.push_back(vox::size_warning(*voxel_size));
   return written;
 }
 
 template <class Given>
 Result<std::vector<std::string>> losses_of_any(const Given& given) {
-  const auto voxel_size = common_voxel_size(scene_in(given));
+  const auto voxel_size = vox::common_voxel_size(scene_in(given));
   if (!voxel_size) return Writer(given, source_of(given)).losses();
-  const Given unit = divided(given, *voxel_size);
+  const Given unit = vox::divided(given, *voxel_size);
   auto lines = Writer(unit, source_of(unit)).losses();
-  if (lines) lines->push_back(size_warning(*voxel_size));
+  if (lines) lines->push_back(vox::size_warning(*voxel_size));
   return lines;
 }
 

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <quoin/io/loaded_scene.h>
+#include <quoin/scene/scene.h>
+
+/// Scenes whose voxels have another size than 1, the only one that .vox holds.
+namespace quoin::vox {
+
+/// Returns the size of voxels that all instances have in common; nothing if it is 1 or they differ.
+[[nodiscard]] std::optional<double> common_voxel_size(const Scene& scene);
+
+/// Returns the scene with voxels of size 1 and all positions divided by their size.
+[[nodiscard]] Scene divided(const Scene& given, double voxel_size);
+[[nodiscard]] LoadedScene divided(const LoadedScene& given, double voxel_size);
+
+/// Returns the warning that the file does not hold the size.
+[[nodiscard]] std::string size_warning(double voxel_size);
+
+}  // namespace quoin::vox
