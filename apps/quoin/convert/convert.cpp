@@ -362,7 +362,7 @@ std::string fault_of_usage(const ConvertOptions& options, bool is_volume) {
     return "--simplify: this build was made without meshoptimizer (libmeshoptimizer-dev in Debian)";
   }
   if (options.mesh_only && is_surely_blocks(options, is_volume)) {
-    if (const std::string fault = fault_of_blocks(options); !fault.empty()) return fault;
+    if (std::string fault = fault_of_blocks(options); !fault.empty()) return fault;
   }
   if (is_volume && !options.mesher.empty() && options.mesher != "smooth") {
     return "--mesher " + options.mesher + " is for voxels, and the input is a volume of values; smooth meshes it";

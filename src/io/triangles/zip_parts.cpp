@@ -70,6 +70,7 @@ Result<ZipParts> ZipParts::open(std::span<const std::byte> zip) {
 
 std::vector<std::string> ZipParts::names() const {
   std::vector<std::string> names;
+  names.reserve(entries_.size());
   for (const auto& [name, entry] : entries_) names.push_back(name);
   return names;
 }

@@ -190,8 +190,9 @@ class SurfaceCells::Collector {
     const ImpostorFaces::Surfel& surfel = *seen.surfel;
     const DVec3 middle = surfel.middle(DVec3(seen.face.voxel), seen.face.direction);
     for (int i = 0; i < 16; ++i) {
-      const double u = (i % 4 - 1.5) * 0.5 * surfel.half[0];
-      const double v = (i / 4 - 1.5) * 0.5 * surfel.half[1];
+      const int column = i % 4, row = i / 4;
+      const double u = (column - 1.5) * 0.5 * surfel.half[0];
+      const double v = (row - 1.5) * 0.5 * surfel.half[1];
       DVec3 point = middle;
       point[frame.u] += u, point[frame.v] += v;
       point[frame.axis] += u * surfel.slope[0] + v * surfel.slope[1];

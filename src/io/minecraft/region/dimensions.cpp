@@ -54,7 +54,10 @@ void add_nested(const fs::path& folder, const std::string& name, int depth, int&
   for (const fs::path& inner : folders_in(folder)) {
     const std::string part = inner.filename().string();
     if (part == "region" || --folders_left < 0) continue;
-    add_nested(inner, depth == 0 ? part : name + (depth == 1 ? ":" : "/") + part, depth + 1, folders_left, found);
+    std::string nested = name;
+    if (depth > 0) nested += depth == 1 ? ':' : '/';
+    nested += part;
+    add_nested(inner, nested, depth + 1, folders_left, found);
   }
 }
 

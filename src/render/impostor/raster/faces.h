@@ -86,13 +86,13 @@ struct ImpostorFaces {
     /// How much the plane rises along the direction's axis by a sample along these.
     std::array<float, 2> slope{};
 
-    /// Returns its middle. `edge`: the lower end of the edge that it lies on.
-    [[nodiscard]] DVec3 middle(DVec3 edge, Direction direction) const {
+    /// Returns its middle. `lower_end`: of the lattice's edge that it lies on.
+    [[nodiscard]] DVec3 middle(DVec3 lower_end, Direction direction) const {
       const FaceFrame& frame = frame_of(direction);
-      edge[frame.axis] += double{offset};
-      edge[frame.u] += double{shift[0]};
-      edge[frame.v] += double{shift[1]};
-      return edge;
+      lower_end[frame.axis] += double{offset};
+      lower_end[frame.u] += double{shift[0]};
+      lower_end[frame.v] += double{shift[1]};
+      return lower_end;
     }
   };
   static constexpr float kSurfelRoom =
