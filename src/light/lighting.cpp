@@ -404,9 +404,14 @@ void Lighting::set_occlusion_directions(const Group& group, int ray, RayPacket& 
   }
 }
 
-const Surface& Lighting::surface_at(const SurfacePoint& point) const {
+Surface Lighting::surface_at(const SurfacePoint& point) const {
   const bool is_bare = point.in_field && point.type == kAir;
-  if (!detail_surfaces_.empty() && !is_bare) return detail_surfaces_[static_cast<std::size_t>(point.placed)];
+  const auto placed = static_cast<std::size_t>(point.placed);
+  if (!detail_surfaces_.empty() && !is_bare) return detail_surfaces_[placed];
+  if (point.is_blended) {
+    const DensityGrid& field = placed_in(view_->tracer())[placed].opaque_field->field();
+    return surfaces_->blend_of_field(field, point.voxel, point.position - DVec3(point.voxel), point.type);
+  }
   return point.in_field ? surfaces_->of_field(point.type) : (*surfaces_)[point.type];
 }
 
@@ -439,7 +444,7 @@ Vec3 Lighting::shade(const SurfacePoint& point, Vec3 direct, float openness) con
 }
 
 Vec3 Lighting::shade_lit(const SurfacePoint& point, Vec3 direct, float openness) const {
-  const Surface& surface = surface_at(point);
+  const Surface surface = surface_at(point);
   if (point.kind == PointKind::Unlit) return surface.colour;
   Vec3 colour = surface.emitted;
   if (point.kind == PointKind::Surface) {

@@ -33,7 +33,8 @@ struct SurfacePoint {
   VoxelType type = kAir;
   Direction face = Direction::PosX;  ///< of a field the one to which the normal is nearest
   bool in_field = false;
-  Vec3 normal{0.0F};  ///< of a field, in its grid, of unit length or 0
+  bool is_blended = false;  ///< of a field: not of one material, but of those around, as Surfaces::blend_of_field
+  Vec3 normal{0.0F};        ///< of a field, in its grid, of unit length or 0
   PointKind kind = PointKind::Surface;
   std::uint32_t pixel = 0;  ///< seeds what is random: a number of pixel and sample
   float openness = -1.0F;   ///< 0 to 1 where it is known, whatever the options' way to find it; less than 0: it is not
@@ -90,7 +91,7 @@ class Lighting {
   [[nodiscard]] float smooth_openness(const SurfacePoint& point) const;
   std::int64_t trace_openness(const Group& group, std::uint32_t lanes, std::span<float> openness) const;
   void set_occlusion_directions(const Group& group, int ray, RayPacket& rays) const;
-  [[nodiscard]] const Surface& surface_at(const SurfacePoint& point) const;
+  [[nodiscard]] Surface surface_at(const SurfacePoint& point) const;
   [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 direct, float openness) const;
   [[nodiscard]] Vec3 shade_lit(const SurfacePoint& point, Vec3 direct, float openness) const;
   // Of the sun, without shadows.

@@ -7,6 +7,7 @@
 
 #include <quoin/core/changes.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/density_grid.h>
 #include <quoin/grid/voxel_registry.h>
 
 namespace quoin {
@@ -55,6 +56,14 @@ class Surfaces {
   }
   /// Of a field's material; kAir: it has none, and is white as in smooth meshes.
   [[nodiscard]] const Surface& of_field(VoxelType material) const;
+  /// The colour, emission, roughness and metalness at a point of a field's surface: those of the solid samples of the
+  /// 27 around it, each by its share. A flat smooth mesh has the same colours: at the middle of a cell the samples of
+  /// its corners have equal shares, and between the middles of cells the shares change linearly.
+  ///
+  /// `inside`: where in the cell, 0 to 1 on each axis. `nearest`: the material where no sample around is solid.
+  /// Cost: 9 rows of samples, and 27 materials where these differ.
+  [[nodiscard]] Surface blend_of_field(const DensityGrid& field, IVec3 cell, const DVec3& inside,
+                                       VoxelType nearest) const;
 
  private:
   Clouds clouds_;

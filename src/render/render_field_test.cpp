@@ -1,13 +1,16 @@
 // Pictures of fields of densities, lit as blocks are.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <glm/gtc/quaternion.hpp>
 
+#include <quoin/mesh/smooth_mesh.h>
 #include <quoin/mesh/smooth_occlusion.h>
 
 #include "light/occlusion_directions.h"
+#include "render/path/town_for_tests.h"
 #include "render/render_test_support.h"
 
 namespace quoin {
@@ -184,6 +187,83 @@ TEST(RenderField, MaterialsColourIt) {
   const Picture night = taken(scene, from_above(25, 50, 5, 20), options);
   EXPECT_EQ(pixel_at(night, 10, 10), (Pixel{0, 0, 0}));
   EXPECT_GT(pixel_at(night, 30, 10)[1], 200);
+}
+
+// A flat floor at y = 10 in patches of three materials.
+DensityGrid patchwork(Scene& scene) {
+  const std::array<VoxelType, 3> types{add_type(scene, {220, 40, 30, 255}), add_type(scene, {40, 200, 60, 255}),
+                                       add_type(scene, {30, 60, 240, 255})};
+  DensityGrid field;
+  field.edit({{-4, 0, -4}, {76, 16, 76}}, [&](IVec3 p, DensitySample) {
+    const int patch = (p.x * p.x + 5 * p.z * p.z + p.x * p.z) / 7 % 3;
+    return DensitySample{static_cast<float>(p.y) - 10.0F, types[static_cast<std::size_t>(patch)]};
+  });
+  return field;
+}
+
+// Seen from above, the floor has the colours that the mesh's vertices have, and between them those in between.
+TEST(RenderField, MaterialsBlendAsThoseOfItsMesh) {
+  Scene scene;
+  DensityGrid field = patchwork(scene);
+  const SmoothMesh mesh = build_smooth_mesh(field, scene.types, {}).value();
+  constexpr int kFirst = 8;  // of the cells that are seen, on both axes
+  constexpr int kCells = 64;
+  std::array<std::array<Vec3, kCells + 1>, kCells + 1> colours{};
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const IVec3 cell(glm::floor(mesh.positions[i]));
+    const IVec3 from = cell - kFirst;
+    if (cell.y < 9 || std::min(from.x, from.z) < 0 || std::max(from.x, from.z) > kCells) continue;
+    const LinearRgba16 albedo = mesh.albedo[i];
+    colours[static_cast<std::size_t>(from.z)][static_cast<std::size_t>(from.x)] =
+        Vec3(albedo[0], albedo[1], albedo[2]) / 65'535.0F;
+  }
+  place_field(scene, std::move(field));
+  RenderOptions options = sized(4 * kCells, 4 * kCells);
+  options.light.shading = Shading::Unlit;
+  constexpr double kMiddle = kFirst + 0.5 + 0.5 * kCells;
+  const Picture picture = taken(scene, from_above(kMiddle, 50, kMiddle, kCells), options);
+  int blended = 0;
+  for (int y = 0; y < 4 * kCells; ++y) {
+    for (int x = 0; x < 4 * kCells; ++x) {
+      const Vec3 at((static_cast<float>(x) + 0.5F) / 4.0F, 0.0F, (static_cast<float>(y) + 0.5F) / 4.0F);
+      const auto column = static_cast<std::size_t>(at.x);
+      const auto row = static_cast<std::size_t>(at.z);
+      const Vec3 part = glm::fract(at);
+      const Vec3 above = glm::mix(colours[row][column], colours[row][column + 1], part.x);
+      const Vec3 below = glm::mix(colours[row + 1][column], colours[row + 1][column + 1], part.x);
+      const Pixel expected = encoded(glm::mix(above, below, part.z));
+      const Pixel found = pixel_at(picture, x, y);
+      for (std::size_t c = 0; c < 3; ++c) ASSERT_NEAR(found[c], expected[c], 1) << x << ' ' << y;
+      blended += std::abs(above.x - below.x) > 0.01F ? 1 : 0;
+    }
+  }
+  EXPECT_GT(blended, 10'000);
+}
+
+// Emission, and what paths meet, blend by the same shares.
+TEST(RenderField, WhatGlowsBlendsToo) {
+  Scene scene;
+  const VoxelType dark = add_type(scene, {0, 0, 0, 255});
+  const VoxelType glow = add_type(scene, {255, 255, 255, 255}, Visibility::Opaque, 0.5F);
+  DensityGrid field;
+  field.edit({{0, 0, 0}, {40, 16, 40}}, [&](IVec3 p, DensitySample) {
+    return DensitySample{static_cast<float>(p.y) - 10.0F, p.x < 20 ? dark : glow};
+  });
+  place_field(scene, std::move(field));
+  RenderOptions options = sized(40, 40);
+  options.light.sun_brightness = options.light.sky_brightness = 0.0;
+  const Camera camera = from_above(19.5, 50, 20, 4);
+  const Picture picture = taken(scene, camera, options);
+  PathOptions paths = under_even_sky(40, 40, 16);
+  paths.sky_brightness = 0.0;
+  paths.max_bounces = 0;
+  const PathPicture traced = path_picture(scene, camera, paths);
+  for (int x = 0; x < 40; ++x) {
+    // 0 from 1 before the middle between both materials, 1 from 1 beyond it.
+    const float share = std::clamp(0.5F * (1.0F + (static_cast<float>(x) + 0.5F - 20.0F) / 10.0F), 0.0F, 1.0F);
+    EXPECT_NEAR(pixel_at(picture, x, 20)[0], encoded(Vec3(0.5F * share))[0], 1) << x;
+    EXPECT_NEAR(traced.radiance[static_cast<std::size_t>(20 * 40 + x)].x, 0.5F * share, 0.01F) << x;
+  }
 }
 
 TEST(RenderField, DirectionsTurnWithTheNormal) {

@@ -109,7 +109,9 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
     point.position = on_face(point.position, point.voxel, point.face);
   }
   if ((hits.grids.starts_inside >> lane & 1U) != 0) point.kind = PointKind::Unlit;
-  if ((far_faces_.found >> lane & 1U) == 0) return;
+  const bool is_far = (far_faces_.found >> lane & 1U) != 0;
+  point.is_blended = point.in_field && point.kind == PointKind::Surface && !is_far;
+  if (!is_far) return;
   if (point.in_field) point.position += double{ImpostorFaces::kSurfelLift} * DVec3(point.normal);
   point.type = far_faces_.face[i]->type;
   point.openness = openness_of(*far_faces_.face[i], context_->options->light.occlusion_mode, point.position);

@@ -397,7 +397,12 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
   const Ray ray = rays.ray(lane);
   vertex.in_grid = context_->view->grid_from_view(vertex.placed).point(ray.origin + ray.direction * hits.grids.t[i]);
   VoxelType type = hits.material[i];
+  const bool starts_inside = (hits.grids.starts_inside >> lane & 1U) != 0;
+  Surface surface;
   if (in_field) {
+    const DVec3 inside = vertex.in_grid - DVec3(voxel);
+    surface = starts_inside ? context_->surfaces->of_field(type)
+                            : context_->surfaces->blend_of_field(placed.opaque_field->field(), voxel, inside, type);
     const DVec3 normal(hits.normal(i));
     vertex.in_grid += normal * kRayLift;
     vertex.normal = glm::normalize(Vec3(placed.world_axes * normal));
@@ -406,10 +411,10 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
     vertex.in_grid = on_face(vertex.in_grid, voxel, face) + kLifts[of_face];
     vertex.normal = (*context_->face_normals)[static_cast<std::size_t>(vertex.placed)][of_face];
     type = placed.voxels->get(voxel);
+    surface = (*context_->surfaces)[type];
   }
-  const Surface& surface = in_field ? context_->surfaces->of_field(type) : (*context_->surfaces)[type];
   if (path.is_first) sums_[path.pixel].scene_share += 1.0F;
-  if ((hits.grids.starts_inside >> lane & 1U) != 0) {  // from inside: its own colour, unlit
+  if (starts_inside) {  // its own colour, unlit
     path.radiance += path.throughput * (path.is_seen ? surface.colour : surface.emitted);
     if (path.is_first && path.is_first_sample) sums_[path.pixel].depth = 0.0F;
     vertices_.pop_back();

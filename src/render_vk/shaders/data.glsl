@@ -112,6 +112,7 @@ const uint kUnlit = 1;
 const uint kGlow = 2;
 const uint kIsFar = 4;
 const uint kIsField = 8;
+const uint kIsBlended = 16;  // of a field: not of one material, but of those around, see blend_of_field
 
 uint kind_of(Point point) {
   return point.what.z & 3;

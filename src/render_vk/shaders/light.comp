@@ -16,6 +16,7 @@ layout(constant_id = 0) const bool kHasGlass = true;
 #include "lamps.glsl"
 #include "rays.glsl"
 #include "faces.glsl"
+#include "field_blend.glsl"
 #include "corners.glsl"
 #include "levels.glsl"
 #include "see_through.glsl"
@@ -195,17 +196,22 @@ void trace_light(Point point, Placed placed, uint slot, out vec3 light, out floa
   openness = openness_of(point, placed, open);
 }
 
-vec3 light_of(Point point, uint slot) {
-  Surface surface = surface_of(point.what.x);
-  Placed placed = placed_at(point.voxel.w);
+Surface surface_at(Point point, Placed placed) {
+  bool is_bare = is_of_field(point) && point.what.x == 0;
+  Surface surface = is_bare ? white_surface() : surface_of(point.what.x);
   if (has(kDetailColours)) {
+    if (is_bare) return surface;
     surface.colour = placed.detail_colour.xyz;
     surface.emitted = vec3(0.0);
+  } else if (is_of_field(point) && (point.what.z & kIsBlended) != 0) {
+    return blend_of_field(opaque_tree(placed, 1), point.voxel.xyz, point.inside.xyz, point.what.x);
   }
-  // As in smooth meshes, a field without materials is white.
-  if (is_of_field(point) && point.what.x == 0) {
-    surface = Surface(vec3(1.0), surface.log_clarity, vec3(0.0), vec3(0.0), 1.0);
-  }
+  return surface;
+}
+
+vec3 light_of(Point point, uint slot) {
+  Placed placed = placed_at(point.voxel.w);
+  Surface surface = surface_at(point, placed);
   uint kind = kind_of(point);
   bool is_lit = has(kLit);
   if (!is_lit && kind != kSurface) {

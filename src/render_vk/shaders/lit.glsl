@@ -17,6 +17,17 @@ Surface surface_of(uint type) {
   return Surface(colour.xyz, colour.w, emitted.xyz, surfaces.at[i + 2].xyz, emitted.w);
 }
 
+// The look of a field without materials.
+Surface white_surface() {
+  return Surface(vec3(1.0), 0.0, vec3(0.0), vec3(0.0), 1.0);
+}
+
+// Takes over a share, 0 to 1, of how another surface looks.
+void mix_look(Surface look, float share, inout Surface mixed) {
+  mixed.colour = mix(mixed.colour, look.colour, share);
+  mixed.emitted = mix(mixed.emitted, look.emitted, share);
+}
+
 // `has_own_length`: else it counts as one voxel long at least.
 vec3 passed_by(Surface surface, float voxels, bool has_own_length) {
   float length = max(voxels, has_own_length ? 0.0 : 1.0);

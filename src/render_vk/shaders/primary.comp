@@ -159,7 +159,7 @@ void meet_content(int content, int i, Placed placed, Pair direction, float scale
     bool is_inside = hit.starts_inside && moved < 0;
     point.inside.xyz = hit.inside;
     point.what = uvec4(material_found(tree, hit.inside), packed_normal(normal_found(hit.inside)),
-                       kIsField | (is_inside ? kUnlit : kSurface), floatBitsToUint(found_t));
+                       kIsField | (is_inside ? kUnlit : kSurface | kIsBlended), floatBitsToUint(found_t));
   } else {
     point.what = uvec4(type_found(), face_found(), walk_axis < 0 ? kUnlit : kSurface, floatBitsToUint(found_t));
   }

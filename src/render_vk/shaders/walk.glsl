@@ -249,15 +249,18 @@ float sample_of(Numbers block, ivec3 at) {
   return (i & 1) == 0 ? two.x : two.y;
 }
 
-// Those of the cell that was found. False where all of them are solid, as those around it are.
-bool block_found(out Numbers block) {
-  if (walk_level > 0) return false;
-  uvec4 brick = walk_stack[1];
-  uint child = child_of(brick, index_in(walk_voxel, 1));
+// Those around a cell of a brick, whose chunk has that record. False where all of them are solid.
+bool block_in(uvec4 brick, uvec2 record, ivec3 cell, out Numbers block) {
+  uint child = child_of(brick, index_in(cell, 1));
   uint words = bitCount(brick.x) + bitCount(brick.y);
   uint from = Numbers(address_after(brick.zw, 8 * words)).at[child];
-  block = Numbers(address_after(record_found(), 4 * from));
+  block = Numbers(address_after(record, 4 * from));
   return from != 0;
+}
+
+// Those of the cell that was found. False where all of them are solid, as those around it are.
+bool block_found(out Numbers block) {
+  return walk_level == 0 && block_in(walk_stack[1], record_found(), walk_voxel, block);
 }
 
 // A cubic in powers of s.
@@ -439,6 +442,19 @@ vec3 normal_found(vec3 inside) {
   return block_found(block) ? normal_in(block, (walk_voxel & 3) + 1, inside) : vec3(0.0);
 }
 
+// The type of a sample of a field; 0 where the tree has no chunk.
+uint type_at(Tree field, ivec3 at) {
+  if (any(lessThan(at, field.low.xyz)) || any(greaterThanEqual(at, field.high.xyz))) return 0;
+  uvec4 node = field.root;
+  for (int level = field.low.w; level > 2; --level) {
+    if ((node.z & 1) != 0) break;
+    uint index = index_in(at, level);
+    if (!has_child(node, index)) return 0;
+    node = Nodes(node.zw).at[child_of(node, index)];
+  }
+  return type_in(record_of(node), at & 63);
+}
+
 // The material of the solid sample that is nearest to the hit.
 uint material_found(Tree field, vec3 inside) {
   ivec3 nearest = ivec3(greaterThan(inside, vec3(0.5)));
@@ -457,15 +473,7 @@ uint material_found(Tree field, vec3 inside) {
   ivec3 at = walk_voxel + nearest;
   if (((at ^ walk_voxel) & ~63) == ivec3(0)) return type_in(record_found(), at & 63);
   // Of the next chunk, whose own cell there touches the sample.
-  if (any(greaterThanEqual(at, field.high.xyz))) return 0;
-  uvec4 node = field.root;
-  for (int level = field.low.w; level > 2; --level) {
-    if ((node.z & 1) != 0) break;
-    uint index = index_in(at, level);
-    if (!has_child(node, index)) return 0;
-    node = Nodes(node.zw).at[child_of(node, index)];
-  }
-  return type_in(record_of(node), at & 63);
+  return type_at(field, at);
 }
 
 // No unit vector's word.

@@ -25,6 +25,15 @@ Surface surface_of(uint type) {
 }
 
 // As lit.glsl.
+Surface white_surface() {
+  return Surface(vec3(1.0), 0.0, vec3(0.0), vec3(0.0), 1.0, 1.0, 0.0, 0.0, 0.0);
+}
+void mix_look(Surface look, float share, inout Surface mixed) {
+  mixed.colour = mix(mixed.colour, look.colour, share);
+  mixed.emitted = mix(mixed.emitted, look.emitted, share);
+  mixed.roughness = mix(mixed.roughness, look.roughness, share);
+  mixed.metalness = mix(mixed.metalness, look.metalness, share);
+}
 vec3 passed_by(Surface surface, float voxels, bool has_own_length) {
   float length = max(voxels, has_own_length ? 0.0 : 1.0);
   return length > 0.0 ? exponential(surface.log_transmittance * length) : vec3(1.0);

@@ -17,6 +17,7 @@ layout(constant_id = 0) const bool kHasGlass = true;
 #include "paths/path_sky.glsl"
 #include "paths/path_lamps.glsl"
 #include "faces.glsl"
+#include "field_blend.glsl"
 
 // Of a dispatch. Where there is glass, paths part that take several: see docs/decisions/105.
 const uint kSteps = kHasGlass ? 1 : 4;
@@ -323,13 +324,11 @@ void count_scene() {
   if (is(kIsFirst)) add_sum(kSumBackground, vec4(0.0, 0.0, 0.0, 1.0));
 }
 
-Surface surface_met(uint type, bool in_field) {
-  Surface surface = surface_of(type);
-  // As in smooth meshes, a field without materials is white.
-  if (in_field && type == 0) {
-    surface = Surface(vec3(1.0), surface.log_clarity, vec3(0.0), vec3(0.0), 1.0, 1.0, 0.0, 0.0, 0.0);
-  }
-  return surface;
+Surface surface_met(Hit hit) {
+  if (!hit.in_field) return surface_of(hit.type);
+  if (hit.starts_inside) return surface_of_material(hit.type);
+  Tree field = opaque_tree(placed_at(hit.voxel.w), 1);
+  return blend_of_field(field, hit.voxel.xyz, hit.inside, hit.type);
 }
 
 // Puts the vertex on a surface of an instance, a little before it.
@@ -352,7 +351,7 @@ ivec3 voxel_of_grid(ivec4 voxel) {
 }
 
 uint hit_matter(Hit hit, vec3 origin) {
-  Surface surface = surface_met(hit.type, hit.in_field);
+  Surface surface = surface_met(hit);
   count_scene();
   if (hit.starts_inside) {  // from inside: its own colour, unlit
     path.radiance.xyz += path.throughput.xyz * (is(kIsSeen) ? surface.colour : surface.emitted);
