@@ -368,7 +368,7 @@ class ObjReader {
       }
       const int material = i < from.material_ids.size() ? from.material_ids[i] : -1;
       const bool is_there = material >= 0 && static_cast<std::size_t>(material) < no_material_;
-      const Status added = builder_.add_polygon(polygon_, [&](const std::array<std::uint32_t, 3>& corners) {
+      Status added = builder_.add_polygon(polygon_, [&](const std::array<std::uint32_t, 3>& corners) {
         for (const std::uint32_t k : corners) {
           loaded_.mesh.texture_places.push_back(place_of(face[k].texcoord_index));
         }
