@@ -37,8 +37,7 @@ struct SmallModel {
   std::unique_ptr<CpuRenderer> renderer;  // of both, which keep their impostors
   std::unique_ptr<CpuRenderer> white_renderer;
   double radius = 0.0;
-  // Fields are held less exactly than blocks: surfels that are drawn one by one leave a few gaps where surfaces meet,
-  // and cells are up to half a sample thicker than the surface.
+  // Cells hold the surface of a field less exactly than that of blocks.
   double most_holes = 0.0005;
   double most_colour = 3.0;
 
@@ -48,7 +47,7 @@ struct SmallModel {
     for (const InstanceHandle handle : scene.instances().handles()) scene.edit(handle).position -= centre;
     radius = 0.5 * glm::length(box.max - box.min);
     scene.grids().for_each([&](GridHandle, const SceneGrid& grid) {
-      if (grid.field.chunk_count() > 0) most_holes = 0.004, most_colour = 6.0;
+      if (grid.field.chunk_count() > 0) most_colour = 3.5;
     });
     white = scene.snapshot();
     for (VoxelType type = 1; type < white.types.size(); ++type) {

@@ -187,18 +187,21 @@ void put_faces(const Subject& subject, const std::vector<SeenFace>& seen, KnownF
 }
 
 void put_levels(const Subject& subject, const std::vector<SeenFace>& seen, ImpostorFaces& out) {
+  const auto is_solid = [&](IVec3 voxel) {
+    return subject.shell ? subject.shell->is_occupied(voxel) : subject.opaque->is_occupied(voxel);
+  };
   std::size_t level = 0;
   int width = subject.first_width;  // log2
   if (width == 0) {
     out.levels[level++] = seen_faces(seen, subject.content);
-    out.unseen = unseen_faces(seen, subject.content);
+    out.unseen =
+        subject.surfels.surfels.empty()
+            ? unseen_faces(seen, subject.content)
+            : SurfaceCells::behind(seen, subject.field->field(), subject.content, subject.edge).level(is_solid);
     ++width;
   }
   SurfaceCells cells(seen, subject.content, subject.edge, width);
   if (!subject.shell) cells.fill_from(*subject.opaque);
-  const auto is_solid = [&](IVec3 voxel) {
-    return subject.shell ? subject.shell->is_occupied(voxel) : subject.opaque->is_occupied(voxel);
-  };
   for (; level < out.levels.size(); ++level) {
     out.levels[level] = cells.level(is_solid);
     cells.halve();

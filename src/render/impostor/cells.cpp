@@ -86,6 +86,18 @@ const std::array<std::array<std::uint8_t, kImpostorViews>, kImpostorViews>& view
   return all;
 }
 
+IVec3 least_voxel(const std::vector<SeenFace>& faces) {
+  if (faces.empty()) return IVec3(0);
+  IVec3 least = faces[0].face.voxel;
+  for (const SeenFace& seen : faces) least = glm::min(least, seen.face.voxel);
+  return least;
+}
+
+// The width of a texel of snapshots of `edge` texels a side, voxels.
+double texel_of(const ContentSphere& content, int edge) {
+  return 2.0 * snapshot_camera(content, 0, edge).half_size() / edge;
+}
+
 // The words of a tree, 4^3 voxels each, with the bricks that were read last.
 class TreeWords {
  public:
@@ -173,6 +185,34 @@ std::uint64_t halved_bits(std::uint64_t bits, unsigned octant) {
 
 }  // namespace
 
+// The cells of a field's lattice of which all eight corners are solid.
+class SolidCells {
+ public:
+  explicit SolidCells(const DensityGrid& field) : field_(&field) {}
+  // `cell`: its least corner.
+  [[nodiscard]] bool has(IVec3 cell) {
+    for (int row = 0; row < 4; ++row) {
+      const IVec3 low = cell + IVec3{0, row & 1, row >> 1};
+      if (!is_solid(low) || !is_solid(low + IVec3{1, 0, 0})) return false;
+    }
+    return true;
+  }
+
+ private:
+  [[nodiscard]] bool is_solid(IVec3 sample) {
+    const IVec3 at = chunk_of(sample);
+    if (!is_known_ || at != at_) chunk_ = field_->find_chunk(at), at_ = at, is_known_ = true;
+    if (chunk_ == nullptr) return false;
+    const IVec3 local = local_of(sample);
+    return (chunk_->solid_row(local.y, local.z) >> local.x & 1U) != 0;
+  }
+
+  const DensityGrid* field_;
+  const DensityChunk* chunk_ = nullptr;  // that at `at_`
+  IVec3 at_{0};
+  bool is_known_ = false;
+};
+
 // Makes cells of faces, one after the other.
 class SurfaceCells::Collector {
  public:
@@ -184,7 +224,8 @@ class SurfaceCells::Collector {
     cell.bits |= bits_of_voxel(in_cell(seen.face.voxel), into_->log2_width_);
   }
 
-  // As the eighths of voxels that it passes through, and those below, so that no ray slips through between two of them.
+  // As the eighths of voxels whose middles lie just below it: two of each column, so that no ray slips through between
+  // two columns.
   void add_surfel(const SeenFace& seen, std::uint32_t index) {
     const FaceFrame& frame = frame_of(seen.face.direction);
     const ImpostorFaces::Surfel& surfel = *seen.surfel;
@@ -196,16 +237,39 @@ class SurfaceCells::Collector {
       DVec3 point = middle;
       point[frame.u] += u, point[frame.v] += v;
       point[frame.axis] += u * surfel.slope[0] + v * surfel.slope[1];
-      for (int below = 0; below < 2; ++below) {
+      for (int kept = 0; kept < 2; point[frame.axis] -= 0.5 * frame.sign) {
         const IVec3 voxel = voxel_of(point);
         const DVec3 eighth = glm::floor(point * 2.0) * 0.5;
+        const DVec3 from_middle = eighth + 0.25 - middle;
+        const double plane = from_middle[frame.u] * surfel.slope[0] + from_middle[frame.v] * surfel.slope[1];
+        if ((from_middle[frame.axis] - plane) * frame.sign > 0.0) continue;
+        ++kept;
         // The part of the eighth that the surfel may fill.
         const DVec3 low = glm::max(eighth, point - 0.3);
         const DVec3 high = glm::min(eighth + 0.5, point + 0.3);
         Cell& cell = add(voxel, low, high, seen, index);
         cell.has_field = true;
         cell.bits |= bit_of_eighth(in_cell(voxel), eighth - DVec3(voxel), into_->log2_width_);
-        point[frame.axis] -= 0.5 * frame.sign;
+      }
+    }
+  }
+
+  // As the first solid cells of the lattice below it, and those below them, in the four columns around its edge.
+  void add_behind(const SeenFace& seen, std::uint32_t index, SolidCells& solid) {
+    constexpr int kDeepest = 4;
+    const FaceFrame& frame = frame_of(seen.face.direction);
+    for (int column = 0; column < 4; ++column) {
+      IVec3 at = seen.face.voxel;
+      at[frame.u] -= column & 1;
+      at[frame.v] -= column >> 1;
+      int found = 0;
+      for (int depth = 1; depth <= kDeepest && found < 2; ++depth) {
+        at[frame.axis] -= frame.sign > 0 ? 1 : -1;
+        if (!solid.has(at)) continue;
+        ++found;
+        Cell& cell = add(at, DVec3(at), DVec3(at + 1), seen, index);
+        cell.has_field = true;
+        cell.bits |= bits_of_voxel(in_cell(at), into_->log2_width_);
       }
     }
   }
@@ -257,18 +321,39 @@ class SurfaceCells::Collector {
   std::size_t last_ = 0;
 };
 
-SurfaceCells::SurfaceCells(const std::vector<SeenFace>& faces, const ContentSphere& content, int edge, int log2_width)
-    : content_(content), log2_width_(log2_width) {
+SurfaceCells::SurfaceCells(const ContentSphere& content, IVec3 least, int log2_width)
+    : content_(content), origin_(((least - 4) >> kWidest) * (1 << kWidest)), log2_width_(log2_width) {
   QUOIN_ASSERT(log2_width >= 1 && log2_width <= kWidest, "cells of 2 to 1,024 voxels");
-  if (faces.empty()) return;
-  IVec3 least = faces[0].face.voxel;
-  for (const SeenFace& seen : faces) least = glm::min(least, seen.face.voxel);
-  origin_ = ((least - 4) >> kWidest) * (1 << kWidest);
-  Collector collector(*this, 2.0 * snapshot_camera(content, 0, edge).half_size() / edge);
+}
+
+SurfaceCells::SurfaceCells(const std::vector<SeenFace>& faces, const ContentSphere& content, int edge, int log2_width)
+    : SurfaceCells(content, least_voxel(faces), log2_width) {
+  Collector collector(*this, texel_of(content, edge));
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const auto index = static_cast<std::uint32_t>(i);
     faces[i].surfel == nullptr ? collector.add_face(faces[i], index) : collector.add_surfel(faces[i], index);
   }
+  sort();
+}
+
+SurfaceCells SurfaceCells::behind(const std::vector<SeenFace>& faces, const DensityGrid& field,
+                                  const ContentSphere& content, int edge) {
+  SurfaceCells cells(content, least_voxel(faces), 1);
+  Collector collector(cells, texel_of(content, edge));
+  SolidCells solid(field);
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    const auto index = static_cast<std::uint32_t>(i);
+    if (faces[i].surfel != nullptr) {
+      collector.add_behind(faces[i], index, solid);
+    } else if (faces[i].views == 0) {
+      collector.add_face(faces[i], index);
+    }
+  }
+  cells.sort();
+  return cells;
+}
+
+void SurfaceCells::sort() {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
   for (std::size_t i = 0; i < cells_.size(); ++i) order.emplace_back(cells_[i].code, static_cast<std::uint32_t>(i));
   std::sort(order.begin(), order.end());

@@ -7,6 +7,7 @@
 
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
+#include <quoin/grid/density_grid.h>
 
 #include "render/impostor/raster/faces.h"
 #include "render/impostor/seen.h"
@@ -27,6 +28,12 @@ class SurfaceCells {
   /// Groups `faces` into cells of 2^`log2_width` voxels, 1 to 10. Cost: some 50 ns per face, 1 us per surfel.
   /// `edge`: texels a side of the snapshots that saw them.
   SurfaceCells(const std::vector<SeenFace>& faces, const ContentSphere& content, int edge, int log2_width);
+
+  /// Cells of 2 voxels behind `faces`, which show through the gaps between surfels: the faces that no view saw, and of
+  /// each surfel the nearest of the field's lattice cells below it of which all corners are solid. None of these
+  /// reaches the field's surface, so outlines stay. Cost: about 2 us per surfel.
+  [[nodiscard]] static SurfaceCells behind(const std::vector<SeenFace>& faces, const DensityGrid& field,
+                                           const ContentSphere& content, int edge);
 
   /// Joins each 2x2x2 cells to one. Cost: about 20 ns per cell.
   void halve();
@@ -53,6 +60,8 @@ class SurfaceCells {
   };
   class Collector;
 
+  SurfaceCells(const ContentSphere& content, IVec3 least, int log2_width);
+  void sort();
   [[nodiscard]] IVec3 corner_of(const Cell& cell) const;
   [[nodiscard]] bool is_covered(const Cell& cell, Direction direction,
                                 const std::function<bool(IVec3)>& is_solid) const;

@@ -43,7 +43,8 @@ struct ImpostorFaces {
   ///
   /// Level 0 holds the faces and surfels themselves. Each coarser level holds the sides of boxes, one around all that
   /// shows in a Cell. A ray that meets a box is followed through the bits of its cell. Boxes and bits contain every
-  /// face, so a ray that meets the grid's surface meets a bit: no level has holes.
+  /// face of a voxel, and lie closed below surfels, so a ray that meets the grid's surface meets a bit: no level has
+  /// holes.
   struct Level {
     std::array<std::vector<float>, 3> centre;       ///< of the rectangle, voxels from the content's centre
     std::vector<std::uint32_t> views;               ///< bit i: view i saw it; coarser levels: all
@@ -107,6 +108,8 @@ struct ImpostorFaces {
   std::array<Level, kLevels> levels;
   /// Faces in crevices that no snapshot shows but a camera may see: drawn after level 0, where nothing of that level
   /// hides them. Empty for grids with so many faces that level 0 holds cells.
+  ///
+  /// Where level 0 holds surfels: such faces, and solid cells behind the surfels, in cells; see SurfaceCells::behind.
   Level unseen;
   std::vector<Face> faces;
   std::vector<Surfel> surfels;  ///< of the last of `faces`
