@@ -495,8 +495,8 @@ TEST_F(ToolRender, FieldsShowTheirDensitiesAndTheOcclusionOfTheirMeshes) {
   };
   const std::string smooth = picture("ao --ao smooth");
   EXPECT_NE(smooth, picture("ao"));
-  EXPECT_EQ(smooth, picture("ao --ao smooth --ao-form share --ao-spread 2"));
-  for (const std::string flags : {"--ao-form none", "--ao-spread 4", "--ao-form weighted",
+  EXPECT_EQ(smooth, picture("ao --ao smooth --ao-form soft-share --ao-spread 2"));
+  for (const std::string flags : {"--ao-form none", "--ao-form share", "--ao-spread 4", "--ao-form weighted",
                                   "--ao-form weighted-published --ao-offset 0.2", "--ao-form weighted --ao-power 5"}) {
     EXPECT_NE(picture("ao --ao smooth " + flags), smooth) << flags;
   }
@@ -596,7 +596,7 @@ TEST_F(ToolRender, WrongUsageIsOneLineAndStatus2) {
       {out + "--samples 4097", "--samples: "},
       {out + "--samples 2.5", "--samples: "},
       {out + "--ao-form weighted", "--ao-form needs --ao smooth"},
-      {out + "--ao smooth --ao-form deep", "--ao-form: must be none, share, weighted or weighted-published, not"},
+      {out + "--ao smooth --ao-form deep", "--ao-form: must be none, soft-share, share, weighted or weighted-published, not"},
       {out + "--ao smooth --ao-spread 5", "--ao-spread: must be 0.0625 to 4, not \"5\""},
       {out + "--ao smooth --ao-power 3", "--ao-power needs --ao-form weighted"},
       {out + "--ao smooth --backend vulkan", "--ao smooth: the backend vulkan has none"},

@@ -171,10 +171,11 @@ TEST_F(ToolSmooth, OcclusionHasTheFormAndThePlaceThatAreAskedFor) {
     return read_file(folder_.file("out.glb")).value();
   };
   const auto plain = glb("");
-  EXPECT_EQ(glb("--ao-form share --ao-spread 2"), plain);
+  EXPECT_EQ(glb("--ao-form soft-share --ao-spread 2"), plain);
   EXPECT_EQ(glb("--ao-form none"), glb("--no-ao"));
-  for (const std::string flags : {"--ao-form weighted", "--ao-form weighted-published", "--ao-spread 0.5",
-                                  "--ao-form weighted --ao-offset 0.1", "--ao-form weighted --ao-power 4"}) {
+  for (const std::string flags :
+       {"--ao-form share", "--ao-form weighted", "--ao-form weighted-published", "--ao-spread 0.5",
+        "--ao-form weighted --ao-offset 0.1", "--ao-form weighted --ao-power 4"}) {
     EXPECT_NE(glb(flags), plain) << flags;
   }
   const ParsedGlb apart = parse_glb(glb("--ao-attribute"));
@@ -190,7 +191,8 @@ TEST_F(ToolSmooth, OcclusionHasTheFormAndThePlaceThatAreAskedFor) {
 TEST_F(ToolSmooth, WrongWishesForOcclusionAreStatus2) {
   const std::vector<std::pair<std::string, std::string>> errors = {
       {"out.glb --ao-form share", "--ao-form, --ao-spread, --ao-offset and --ao-power need --mesher smooth"},
-      {"out.glb --mesher smooth --ao-form rays", "--ao-form: must be none, share, weighted or weighted-published"},
+      {"out.glb --mesher smooth --ao-form rays",
+       "--ao-form: must be none, soft-share, share, weighted or weighted-published"},
       {"out.glb --mesher smooth --ao-spread 0", "--ao-spread: must be 0.0625 to 4, not \"0\""},
       {"out.glb --mesher smooth --ao-spread nan", "--ao-spread: must be 0.0625 to 4"},
       {"out.glb --mesher smooth --ao-form weighted --ao-offset 1", "--ao-offset: must be 0 to 0.99, not \"1\""},

@@ -10,8 +10,9 @@ namespace quoin::tool {
 
 namespace {
 
-constexpr std::array<std::pair<const char*, SmoothOcclusion>, 4> kForms = {
+constexpr std::array<std::pair<const char*, SmoothOcclusion>, 5> kForms = {
     {{"none", SmoothOcclusion::None},
+     {"soft-share", SmoothOcclusion::SoftShare},
      {"share", SmoothOcclusion::SolidShare},
      {"weighted", SmoothOcclusion::Weighted},
      {"weighted-published", SmoothOcclusion::WeightedPublished}}};
@@ -42,7 +43,7 @@ std::string read_form(const CLI::App& command, SmoothOcclusion& form) {
     form = value;
     return "";
   }
-  return "--ao-form: must be none, share, weighted or weighted-published, not \"" + text + "\"";
+  return "--ao-form: must be none, soft-share, share, weighted or weighted-published, not \"" + text + "\"";
 }
 
 std::string read_number(const CLI::App& command, const NumberOption& option, SmoothOcclusionOptions& options) {
@@ -63,8 +64,9 @@ void add_field_occlusion_options(CLI::App& command) {
     command.add_option(name, description)->type_name(type);
   };
   add("--ao-form", "FORM",
-      "Occlusion of smooth surfaces from 27 samples around a place: the share of them that is solid, weighted by how "
-      "deep they lie, weighted-published (the published curve, on which open is not quite 0), or none (default share)");
+      "Occlusion of smooth surfaces, from 27 samples of the densities around a place. soft-share: how many of them are "
+      "solid, without steps; share: the plain count; weighted: how deep they lie in the solid; weighted-published: the "
+      "same by the published curve, where open is not quite 0; none (default soft-share)");
   add("--ao-spread", "SAMPLES", "How far these samples lie apart, 0.0625 to 4 (default 2)");
   add("--ao-offset", "X", "Of the weighted forms: added to the weight, 0 to 0.99; more is darker (default 0.4)");
   add("--ao-power", "X", "Of the weighted forms: the sum to this power, 0.0625 to 64 (default 2)");

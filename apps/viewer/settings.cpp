@@ -57,7 +57,7 @@ void read_sun(const Json& object, DVec3& sun) {
 constexpr std::array kShadings = {"lit", "unlit", "unlit with occlusion", "occlusion", "normals"};
 constexpr std::array kLightModels = {"rays", "propagated"};
 constexpr std::array kOcclusionModes = {"off", "rays", "vertex", "smooth"};
-constexpr std::array kForms = {"none", "share", "weighted", "weighted-published"};
+constexpr std::array kForms = {"none", "share", "weighted", "weighted-published", "soft-share"};
 constexpr std::array kModes = {"rays", "blocks", "smooth", "density", "paths"};
 static_assert(kModes.size() == kDrawModes);
 constexpr std::array kAxes = {"x", "y", "z"};

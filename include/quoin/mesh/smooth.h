@@ -18,20 +18,24 @@ enum class SmoothOcclusion : std::uint8_t {
   Weighted,           ///< how deep the samples lie in the solid, against the deepest, or `spread` if that is more
   WeightedPublished,  ///< against the deepest alone, as published: jumps where a sample turns slightly solid, and what
                       ///< is open has offset^power
+  SoftShare,          ///< as SolidShare, but a sample of a cell that the surface crosses counts in part: without the
+                      ///< steps of a count
 };
 
-/// Settings of the occlusion; lengths, and densities as depths, in samples of the level that is meshed: a field twice
-/// as large, one level coarser, is as dark.
+/// Settings of the occlusion. Lengths, and densities as depths, are in samples of level 0, so that a surface is as dark
+/// at every level of detail.
 ///
 /// The samples lie `spread` apart on each axis, about the vertex moved along its unit normal n by
 /// spread * (|nx| + |ny| + |nz|) + 0.1, so that a flat or convex surface is exactly 0. Weighted:
 /// 1 - clamp((1 - (ratio + offset)^power) / (1 - offset^power), 0, 1); as published:
-/// 1 - clamp(1 - (ratio + offset)^power, 0, 1). Numbers out of their range count as its nearest end, NaN as the
+/// 1 - clamp(1 - (ratio + offset)^power, 0, 1). The soft share counts a sample by d / (the same interpolation of the
+/// solid corners alone), where its density d is less than 0: 0 on the surface, 1 where all eight corners are solid.
+/// Numbers out of their range count as its nearest end, NaN as the
 /// default.
 struct SmoothOcclusionOptions {
-  SmoothOcclusion method = SmoothOcclusion::SolidShare;
-  float spread = 2.0F;  ///< 1/16 to 4, at the coarsest level to 2, rounded to 1/65,536; 1 and 2 are several times
-                        ///< faster than others
+  SmoothOcclusion method = SmoothOcclusion::SoftShare;
+  float spread = 2.0F;  ///< 1/16 to 4, rounded to 1/65,536 of a cell; 1 and 2 cells are several times faster than
+                        ///< others
   float offset = 0.4F;  ///< of the weighted forms: 0 to 0.99
   float power = 2.0F;   ///< of the weighted forms: 1/16 to 64
 

@@ -30,8 +30,9 @@ Vec3 unit_or_up(Vec3 normal) {
 }
 
 float open_occlusion(const SmoothOcclusionOptions& options) {
-  if (options.method == SmoothOcclusion::None) return 0.0F;
-  return options.method == SmoothOcclusion::SolidShare ? solid_share(27) : weighted_occlusion(0.0F, 0.0F, options);
+  const bool is_weighted =
+      options.method == SmoothOcclusion::Weighted || options.method == SmoothOcclusion::WeightedPublished;
+  return is_weighted ? weighted_occlusion(0.0F, 0.0F, options) : 0.0F;
 }
 
 Sampling::Sampling(const SmoothOcclusionOptions& wanted, int wanted_level)

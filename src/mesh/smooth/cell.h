@@ -162,6 +162,20 @@ struct SampleAxis {
   return 1.0F - static_cast<float>(in_air) * (1.0F / 27.0F);
 }
 
+/// A sample in solid that is no deeper than this counts as solid in part. Less gives spikes beside corners that are
+/// hardly solid.
+inline constexpr float kWholeDepth = 0.25F;
+
+/// How solid a sample is, 0 to 1. `solid`: interpolated as its density is, but with 0 for the corners in air.
+[[gnu::always_inline]] inline float solidity(float density, float solid) {
+  return std::min(std::min(density, 0.0F) / std::min(solid, -kWholeDepth), 1.0F);
+}
+
+/// The soft share from the sum of 27 samples' solidity.
+[[gnu::always_inline]] inline float soft_share(float sum) {
+  return std::min(sum * (1.0F / 27.0F), 1.0F);
+}
+
 /// What the weighted forms make of the sum of the depths and the deepest (both at most 0).
 [[gnu::always_inline]] inline float weighted_occlusion(float sum, float least, const SmoothOcclusionOptions& options) {
   float ratio = 0.0F;
@@ -179,9 +193,10 @@ struct SampleAxis {
   return 1.0F - std::clamp((1.0F - darkness) / (1.0F - open), 0.0F, 1.0F);
 }
 
-/// Occlusion from the samples' densities, which come by z, then y, then x.
+/// Occlusion from the samples' densities, which come by z, then y, then x; of the soft share from their solidity.
 [[gnu::always_inline]] inline float occlusion_of(const std::array<float, 27>& samples,
                                                  const SmoothOcclusionOptions& options) {
+  const bool is_soft = options.method == SmoothOcclusion::SoftShare;
   if (options.method == SmoothOcclusion::SolidShare) {
     const auto open = std::count_if(samples.begin(), samples.end(), [](float v) { return v >= 0.0F; });
     return solid_share(static_cast<int>(open));
@@ -190,12 +205,12 @@ struct SampleAxis {
   std::array<std::array<float, 3>, 2> sums{};
   float least = 0.0F;
   for (std::size_t i = 0; i < 27; ++i) {
-    const float v = std::min(samples[i], 0.0F);
+    const float v = is_soft ? samples[i] : std::min(samples[i], 0.0F);
     sums[i / 3 % 2][i % 3] += v;
     least = std::min(least, v);
   }
   const float sum = ((sums[0][0] + sums[1][0]) + (sums[0][1] + sums[1][1])) + (sums[0][2] + sums[1][2]);
-  return weighted_occlusion(sum, least, options);
+  return is_soft ? soft_share(sum) : weighted_occlusion(sum, least, options);
 }
 
 /// The occlusion of a vertex at a place in its cell; `density(x, y, z)` is the lattice point at that offset from the
@@ -214,16 +229,26 @@ template <class Density>
     const int x = axes[0].base[ix];
     const int y = axes[1].base[iy];
     const int z = axes[2].base[iz];
-    const auto along_z = [&](int dx, int dy) {
-      const float low = density(x + dx, y + dy, z);
-      return low + axes[2].fraction[iz] * (density(x + dx, y + dy, z + 1) - low);
+    const auto interpolated = [&](auto&& corner) {
+      const auto along_z = [&](int dx, int dy) {
+        const float low = corner(x + dx, y + dy, z);
+        return low + axes[2].fraction[iz] * (corner(x + dx, y + dy, z + 1) - low);
+      };
+      const auto along_y = [&](int dx) {
+        const float low = along_z(dx, 0);
+        return low + axes[1].fraction[iy] * (along_z(dx, 1) - low);
+      };
+      const float low = along_y(0);
+      return low + axes[0].fraction[ix] * (along_y(1) - low);
     };
-    const auto along_y = [&](int dx) {
-      const float low = along_z(dx, 0);
-      return low + axes[1].fraction[iy] * (along_z(dx, 1) - low);
-    };
-    const float low = along_y(0);
-    samples[i] = low + axes[0].fraction[ix] * (along_y(1) - low);
+    samples[i] = interpolated(density);
+    if (options.method != SmoothOcclusion::SoftShare) continue;
+    if (samples[i] < 0.0F) {
+      const auto solid = [&](int cx, int cy, int cz) { return std::min(density(cx, cy, cz), 0.0F); };
+      samples[i] = solidity(samples[i], interpolated(solid));
+    } else {
+      samples[i] = 0.0F;
+    }
   }
   return occlusion_of(samples, options);
 }

@@ -129,8 +129,8 @@ SmoothOcclusionOptions within_limits(SmoothOcclusionOptions occlusion, int level
   const auto limit = [](float& value, float least, float most, float otherwise) {
     value = std::isnan(value) ? otherwise : std::clamp(value, least, most);
   };
-  limit(occlusion.spread, 1.0F / 16.0F, level == kMaxSmoothLevel ? 2.0F : 4.0F, defaults.spread);
-  occlusion.spread = snap(occlusion.spread);
+  limit(occlusion.spread, 1.0F / 16.0F, 4.0F, defaults.spread);
+  occlusion.spread = snap(occlusion.spread * depth_unit(level));
   limit(occlusion.offset, 0.0F, 0.99F, defaults.offset);
   limit(occlusion.power, 1.0F / 16.0F, 64.0F, defaults.power);
   return occlusion;

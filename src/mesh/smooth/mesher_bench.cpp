@@ -142,6 +142,7 @@ BENCHMARK(world)
       {SmoothOcclusion::None, "normals"},
       {SmoothOcclusion::SolidShare, "normals_ao"},
       {SmoothOcclusion::Weighted, "normals_weighted_ao"},
+      {SmoothOcclusion::SoftShare, "normals_soft_ao"},
   };
   const std::pair<InstructionSet, const char*> kSets[] = {
       {instruction_set(), ""}, {InstructionSet::Avx2, "/avx2"}, {InstructionSet::Plain, "/plain"}};

@@ -36,7 +36,7 @@ TEST_P(SmoothSets, GiveTheBytesOfThePlainKernel) {
   SmoothMesher other = made_with<SmoothMesher>(GetParam());
   for (const World& world : worlds) {
     for (const SmoothOcclusion form : {SmoothOcclusion::None, SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted,
-                                       SmoothOcclusion::WeightedPublished}) {
+                                       SmoothOcclusion::WeightedPublished, SmoothOcclusion::SoftShare}) {
       for (const float spread : {0.4F, 1.0F, 2.0F, 2.5F}) {
         for (const int level : {0, 1, 3}) {
           if ((form == SmoothOcclusion::None) != (spread == 0.4F) && level != 1) continue;
@@ -126,8 +126,8 @@ TEST(SmoothMesher, SurvivesInfinitiesAndNaN) {
   });
   SmoothMesher mesher;
   SmoothChunkMesh mesh;
-  for (const SmoothOcclusion form :
-       {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted, SmoothOcclusion::WeightedPublished}) {
+  for (const SmoothOcclusion form : {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted,
+                                     SmoothOcclusion::WeightedPublished, SmoothOcclusion::SoftShare}) {
     mesher.mesh(world.around(), with(form), mesh);
     ASSERT_GT(mesh.positions.size(), 10'000U);
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {

@@ -46,12 +46,20 @@ inline Centres find_centres(const Work& work, const Slice& slice, std::size_t fi
   return centres;
 }
 
+// What of the points' densities is interpolated.
+enum class Part { All, Solid };
+
+template <Part kPart>
+inline F part_of(F density) {
+  return kPart == Part::All ? density : min(density, all(0.0F));
+}
+
 // The nine rows along x that are left after interpolating along z and y, and one of zeros.
 struct NineRows {
   F v[10];
 };
 
-template <int kSpread>
+template <int kSpread, Part kPart>
 inline NineRows rows_around(const Work& work, const Centres& centres, std::size_t lane) {
   const float* lowest[kVerticesAtOnce];
   for (std::size_t i = 0; i < kVerticesAtOnce; ++i) {
@@ -66,14 +74,19 @@ inline NineRows rows_around(const Work& work, const Centres& centres, std::size_
       F along_z[2];
       for (int i = 0; i < 2; ++i) {
         const int at = k * kSpread * kDecodedSlice + (j * kSpread + i) * kDecodedStride;
-        const F low = load_rows(lowest, at);
-        along_z[i] = low + fz * (load_rows(lowest, at + kDecodedSlice) - low);
+        const F low = part_of<kPart>(load_rows(lowest, at));
+        const F high = part_of<kPart>(load_rows(lowest, at + kDecodedSlice));
+        along_z[i] = low + fz * (high - low);
       }
       rows.v[3 * k + j] = along_z[0] + fy * (along_z[1] - along_z[0]);
     }
   }
   rows.v[9] = all(0.0F);
   return rows;
+}
+
+inline F solidity(F density, F solid) {
+  return min(min(density, all(0.0F)) / min(solid, all(-kWholeDepth)), all(1.0F));
 }
 
 // Two rows' samples in the lowest six lanes of each vertex.
@@ -100,6 +113,19 @@ inline void store_counted(const Samples& samples, float* out) {
   }
 }
 
+// The sum of a vertex' six lanes, in the order of occlusion_of.
+inline float sum_of_lanes(const float* s) {
+  return ((s[0] + s[3]) + (s[1] + s[4])) + (s[2] + s[5]);
+}
+
+inline void store_soft(const Samples& samples, const Samples& solid, float* out) {
+  F sum = all(0.0F);
+  for (int i = 0; i < 5; ++i) sum = sum + solidity(samples.v[i], solid.v[i]);
+  alignas(64) float sums[kWidth];
+  store(sums, sum);
+  for (int i = 0; i < kVerticesAtOnce; ++i) out[i] = soft_share(sum_of_lanes(sums + 8 * i));
+}
+
 inline void store_weighted(const Samples& samples, const SmoothOcclusionOptions& options, float* out) {
   const F zero = all(0.0F);
   F sum = zero;
@@ -117,7 +143,7 @@ inline void store_weighted(const Samples& samples, const SmoothOcclusionOptions&
     const float* const s = sums + 8 * i;
     const float* const l = leasts + 8 * i;
     const float deepest = std::min({l[0], l[1], l[2], l[3], l[4], l[5]});
-    out[i] = weighted_occlusion(((s[0] + s[3]) + (s[1] + s[4])) + (s[2] + s[5]), deepest, options);
+    out[i] = weighted_occlusion(sum_of_lanes(s), deepest, options);
   }
 }
 
@@ -125,15 +151,19 @@ template <int kSpread>
 void add_occlusion_of_spread(const Work& work, const Slice& slice, std::size_t count, float* occlusion) {
   const Thirds low_lanes(kSpread, 0);
   const Thirds high_lanes(kSpread, 1);
-  const bool is_counted = work.occlusion.method == SmoothOcclusion::SolidShare;
+  const SmoothOcclusion method = work.occlusion.method;
   for (std::size_t first = 0; first < count; first += kWidth) {
     const Centres centres = find_centres(work, slice, first);
     const std::size_t lanes = std::min<std::size_t>(kWidth, count - first);
     for (std::size_t lane = 0; lane < lanes; lane += kVerticesAtOnce) {
-      const NineRows rows = rows_around<kSpread>(work, centres, lane);
-      const Samples samples = samples_of(rows, spread_out(centres.fx + lane), low_lanes, high_lanes);
-      if (is_counted) {
+      const F fx = spread_out(centres.fx + lane);
+      const Samples samples =
+          samples_of(rows_around<kSpread, Part::All>(work, centres, lane), fx, low_lanes, high_lanes);
+      if (method == SmoothOcclusion::SolidShare) {
         store_counted(samples, occlusion + first + lane);
+      } else if (method == SmoothOcclusion::SoftShare) {
+        const NineRows solid = rows_around<kSpread, Part::Solid>(work, centres, lane);
+        store_soft(samples, samples_of(solid, fx, low_lanes, high_lanes), occlusion + first + lane);
       } else {
         store_weighted(samples, work.occlusion, occlusion + first + lane);
       }

@@ -18,7 +18,7 @@ namespace quoin {
 namespace {
 
 constexpr SmoothOcclusion kForms[] = {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted,
-                                      SmoothOcclusion::WeightedPublished};
+                                      SmoothOcclusion::WeightedPublished, SmoothOcclusion::SoftShare};
 
 /// What a surface has that is open: 0, but by the published curve.
 float when_open(SmoothOcclusion form) {
@@ -167,20 +167,20 @@ World enlarged(const World& small, int level) {
   });
 }
 
-TEST(SmoothOcclusion, IsTheSameAtEveryLevelOfAFieldThatGrowsWithIt) {
+TEST(SmoothOcclusion, IsTheSameOfAFieldThatGrowsWithItsCellsAndSpread) {
   // Within the band at every size.
   const World small(
       [](IVec3 p) { return 0.3 * (std::sin(0.7 * p.x) + std::sin(0.9 * p.y + 1.0) + std::cos(0.8 * p.z)); });
   for (int level = 1; level <= kMaxSmoothLevel; ++level) {
     const World large = enlarged(small, level);
     for (const SmoothOcclusion form : kForms) {
-      for (const float spread : {0.7F, 2.0F}) {
+      for (const float spread : {0.3F, 0.5F}) {
         const SmoothChunkMesh fine = mesh_of(small, form, spread);
         std::map<std::uint32_t, float> expected;
         for (std::size_t i = 0; i < fine.cells.size(); ++i) expected[fine.cells[i].bits] = fine.occlusion[i];
         SmoothMesher mesher;
         SmoothChunkMesh coarse;
-        mesher.mesh(large.around(), with(form, level, spread), coarse);
+        mesher.mesh(large.around(), with(form, level, std::ldexp(spread, level)), coarse);
         ASSERT_GT(coarse.cells.size(), 40U);
         EXPECT_GT(*std::max_element(coarse.occlusion.begin(), coarse.occlusion.end()), 0.0F);
         for (std::size_t i = 0; i < coarse.cells.size(); ++i) {
@@ -191,6 +191,57 @@ TEST(SmoothOcclusion, IsTheSameAtEveryLevelOfAFieldThatGrowsWithIt) {
       }
     }
   }
+}
+
+// Hills and caves, as far as meshes of level 2 may read.
+World rugged() {
+  return World([](IVec3 p) {
+    const DVec3 at(p);
+    const double hills = 9.0 * std::sin(0.11 * at.x + 0.5) * std::cos(0.13 * at.z);
+    const double height = 30.0 + hills + 4.0 * std::sin(0.42 * at.x) * std::cos(0.37 * at.z + 1.0);
+    const double cave = glm::distance(at, DVec3(30.0, 22.0, 34.0)) - 11.0;
+    return std::max(0.8 * (at.y - height), -cave);
+  });
+}
+
+// How dark surfaces are of the same field at several levels: lengths are in samples of level 0.
+TEST(SmoothOcclusion, IsAboutTheSameAtEveryLevel) {
+  const World world = rugged();
+  for (const SmoothOcclusion form :
+       {SmoothOcclusion::SolidShare, SmoothOcclusion::SoftShare, SmoothOcclusion::Weighted}) {
+    std::array<double, 3> means{};
+    for (int level = 0; level < 3; ++level) {
+      SmoothMesher mesher;
+      SmoothChunkMesh mesh;
+      mesher.mesh(world.around(), with(form, level), mesh);
+      const double sum = std::accumulate(mesh.occlusion.begin(), mesh.occlusion.end(), 0.0);
+      means[static_cast<std::size_t>(level)] = sum / static_cast<double>(mesh.occlusion.size());
+    }
+    EXPECT_GT(means[0], 0.002);
+    EXPECT_NEAR(means[1], means[0], 0.02) << static_cast<int>(form);
+    EXPECT_NEAR(means[2], means[0], 0.02) << static_cast<int>(form);
+  }
+}
+
+// The soft share follows the plain one, but takes values between the 28 that a count has.
+TEST(SmoothOcclusion, TheSoftShareHasNoSteps) {
+  const World world = rugged();
+  const SmoothChunkMesh soft = mesh_of(world, SmoothOcclusion::SoftShare);
+  const SmoothChunkMesh counted = mesh_of(world, SmoothOcclusion::SolidShare);
+  std::size_t dark = 0;
+  std::size_t on_steps = 0;
+  double difference = 0.0;
+  for (std::size_t i = 0; i < soft.occlusion.size(); ++i) {
+    ASSERT_LE(soft.occlusion[i], counted.occlusion[i] + 1e-6F);
+    if (!(soft.occlusion[i] > 0.0F)) continue;
+    ++dark;
+    difference += static_cast<double>(counted.occlusion[i] - soft.occlusion[i]);
+    const float steps = soft.occlusion[i] * 27.0F;
+    on_steps += std::abs(steps - std::round(steps)) < 1e-4F ? 1 : 0;
+  }
+  ASSERT_GT(dark, 1'500U);
+  EXPECT_LT(on_steps, dark / 10);
+  EXPECT_LT(difference / static_cast<double>(dark), 0.05);
 }
 
 TEST(SmoothOcclusion, TurnsAndMirrorsWithTheField) {
@@ -209,7 +260,8 @@ TEST(SmoothOcclusion, TurnsAndMirrorsWithTheField) {
   };
   const std::vector<Symmetry> all = symmetries();
   ASSERT_EQ(all.size(), 48U);
-  for (const SmoothOcclusion form : {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted}) {
+  for (const SmoothOcclusion form :
+       {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted, SmoothOcclusion::SoftShare}) {
     // The sum is held to all 48, the count, which shares all but its last step, to every fifth.
     const std::size_t step = form == SmoothOcclusion::SolidShare ? 5 : 1;
     const auto expected = occlusion_by_cell(all[0], form);

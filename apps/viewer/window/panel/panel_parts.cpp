@@ -254,7 +254,7 @@ void draw_picture_part(ViewState& state) {
 // Of smooth surfaces: 27 samples of the densities around a place.
 void draw_smooth_occlusion(SmoothOcclusionOptions& options) {
   int form = static_cast<int>(options.method);
-  if (ImGui::Combo("smooth form", &form, "none\0share solid\0weighted\0weighted, published\0")) {
+  if (ImGui::Combo("smooth form", &form, "none\0share\0weighted\0weighted, published\0soft share\0")) {
     options.method = static_cast<SmoothOcclusion>(form);
   }
   ImGui::BeginDisabled(options.method == SmoothOcclusion::None);
