@@ -71,6 +71,8 @@ struct SmoothMeshOptions {
 /// Error:    the greatest distance, in samples, of a vertex of the mesh before from the surface after. It is measured;
 ///           where meshoptimizer, which bounds a mean, goes beyond it, less is removed. A try that goes beyond it and
 ///           removes no more than one triangle in 1,000 ends the search: nothing is removed then.
+/// Large:    a mesh of 48,000 triangles or more is searched on a sample of about 12,000 first. If the sample loses no
+///           more than 1 % of its triangles, nothing is removed.
 /// Kept:     vertices that stay keep normal, occlusion, albedo and type, and their position, but for those below.
 ///           Vertices of one place that differ in these count as one: lines between colours stay where they are, to the
 ///           error. A closed mesh stays closed.

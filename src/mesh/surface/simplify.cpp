@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <quoin/core/assert.h>
+#include <quoin/core/hash.h>
 
 #include "mesh/surface/simplify_tagged.h"
 
@@ -50,16 +51,31 @@ constexpr float kApart = 1.0F / 1024.0F;
 /// The share of the error that the library is allowed: it bounds a mean of squares, and single vertices of smooth
 /// surfaces are up to twice as far off.
 constexpr float kMeanShare = 0.8F;
-/// If no more than one of so many places is too far off, the mesh stays as it was around those, and after some rounds
-/// a little less error is allowed; else much less is allowed everywhere.
+/// Errors that the library is allowed in turn, each this share of the one before. A larger step makes the number of
+/// triangles jump up and down as the error grows.
+constexpr float kLevelShare = 0.84F;
+constexpr int kLevels = 16;
+/// If no more than one of so many places is too far off, the mesh stays as it was around those; else the next level is
+/// tried.
 constexpr std::size_t kFewPlaces = 20;
-constexpr float kLittleLess = 0.8F;
-constexpr float kMuchLess = 0.6F;
-constexpr int kMaxTries = 16;
-/// Rounds in which triangles stay before a little less error is allowed.
-constexpr int kRounds = 4;
+/// Tries at one level, all but the first with triangles that stay. A sample has fewer places that may be too far off.
+constexpr int kRounds = 8;
+constexpr int kRoundsOfSample = 4;
+/// Rounds in which most triangles stay, where no level has few places that are too far off: meshes that are round
+/// everywhere. Behind the first ones each has the next level.
+constexpr int kMostStayRounds = 12;
+constexpr int kRoundsOfFirstLevel = 4;
+/// Such a search in place of a level's number.
+constexpr int kMostStay = kLevels;
 /// A try that removes no more than one of so many triangles, and is too far off, is the last one.
 constexpr std::size_t kHardlyAny = 1'000;
+/// The level of a mesh with more triangles than this is found on a sample of about so many.
+constexpr std::size_t kSampleTriangles = 12'000;
+constexpr std::size_t kLeastSampled = 4 * kSampleTriangles;
+/// The edge of the boxes that the sample consists of, in samples of the field.
+constexpr double kSampleBox = 24.0;
+/// If the sample loses no more than one of so many triangles, the mesh cannot be simplified.
+constexpr std::size_t kLeastLoss = 100;
 
 /// The vertices of each place, which colours and normals may have made several: by vertex, the first of its place.
 std::vector<std::uint32_t> places_of(const SmoothMesh& mesh) {
@@ -74,13 +90,14 @@ std::vector<std::uint32_t> places_of(const SmoothMesh& mesh) {
   return place;
 }
 
-/// Fewer triangles, in the vertices of the mesh; those that are to stay do, and what they border on too.
-std::vector<std::uint32_t> remove_triangles(const SmoothMesh& mesh, float error_in_samples, float scale,
+/// Removes triangles, but neither those that stay nor their borders, nor the border of a sample. Returns indices of the
+/// mesh's vertices.
+std::vector<std::uint32_t> remove_triangles(const SmoothMesh& mesh, float error_in_samples, float scale, bool is_sample,
                                             const std::vector<bool>& stays) {
   std::vector<std::uint32_t> kept;
   std::vector<std::uint32_t> others;
   for (std::size_t i = 0; i < mesh.indices.size(); ++i) (stays[i / 3] ? kept : others).push_back(mesh.indices[i]);
-  const unsigned options = kept.empty() ? 0 : meshopt_SimplifyLockBorder;
+  const unsigned options = kept.empty() && !is_sample ? 0 : meshopt_SimplifyLockBorder;
   std::vector<std::uint32_t> left(others.size());
   left.resize(meshopt_simplify(left.data(), others.data(), others.size(), &mesh.positions[0].x, mesh.positions.size(),
                                sizeof(Vec3), 0, error_in_samples / scale, options, nullptr));
@@ -195,36 +212,68 @@ struct Attempt {
 /// Searches for the fewest triangles that stay within an error.
 class Search {
  public:
-  Search(const SmoothMesh& mesh, float scale, float error_in_samples)
+  Search(const SmoothMesh& mesh, float scale, float error_in_samples, bool is_sample)
       : mesh_(mesh),
         place_(places_of(mesh)),
         scale_(scale),
         error_(error_in_samples),
-        allowed_(kMeanShare * error_in_samples),
-        stays_(mesh.indices.size() / 3) {}
+        is_sample_(is_sample),
+        rounds_(is_sample ? kRoundsOfSample : kRounds) {}
 
-  /// Nothing if no try is within the error.
-  std::optional<Attempt> run() {
-    std::optional<Attempt> best;
-    for (int tries = 0; tries < kMaxTries; ++tries) {
-      Attempt attempt = try_once();
-      if (!attempt.is_within()) {
-        if (best || attempt.removes_hardly_any) break;
-        change(tries, std::move(attempt));
-        continue;
+  struct Found {
+    Attempt attempt;
+    int level = 0;
+  };
+  /// The try with the fewest triangles, of all levels. Nothing if no try is within the error.
+  std::optional<Found> best_of_levels() {
+    std::optional<Found> best;
+    for (int level = 0; level < kLevels; ++level) {
+      std::optional<Attempt> attempt = run(level);
+      if (is_fruitless_) break;
+      if (best && first_triangles_ >= best->attempt.simple.indices.size()) break;
+      if (!attempt) continue;
+      if (!best || attempt->simple.indices.size() < best->attempt.simple.indices.size()) {
+        best = Found{std::move(*attempt), level};
       }
-      if (!best || attempt.simple.indices.size() < best->simple.indices.size()) best = std::move(attempt);
-      if (rounds_ == 0) break;
-      // Fewer triangles may be left where less error is allowed and none has to stay.
-      restart(allowed_before_rounds_ * kMuchLess);
+      if (last_round_ == 0) break;
+    }
+    const bool is_good = best && 4 * best->attempt.simple.indices.size() <= 3 * mesh_.indices.size();
+    if (is_good || is_fruitless_) return best;
+    std::optional<Attempt> attempt = run(kMostStay);
+    if (attempt && (!best || attempt->simple.indices.size() < best->attempt.simple.indices.size())) {
+      best = Found{std::move(*attempt), kMostStay};
     }
     return best;
   }
+  /// The try of the first level from `level` on that is within the error.
+  std::optional<Attempt> first_from(int level) {
+    for (; level <= kMostStay; ++level) {
+      std::optional<Attempt> attempt = run(level);
+      if (attempt || is_fruitless_) return attempt;
+    }
+    return std::nullopt;
+  }
 
  private:
-  [[nodiscard]] Attempt try_once() const {
+  /// Tries one level, in rounds in which more and more triangles stay. Nothing if the level is given up.
+  std::optional<Attempt> run(int level) {
+    const bool most_stay = level == kMostStay;
+    std::vector<bool> stays(mesh_.indices.size() / 3);
+    for (last_round_ = 0; last_round_ < (most_stay ? kMostStayRounds : rounds_); ++last_round_) {
+      const int lowered = most_stay ? std::max(last_round_ + 1 - kRoundsOfFirstLevel, 0) : level;
+      const float allowed = kMeanShare * error_ * std::pow(kLevelShare, static_cast<float>(lowered));
+      Attempt attempt = try_once(allowed, stays);
+      if (last_round_ == 0) first_triangles_ = attempt.simple.indices.size();
+      if (attempt.is_within()) return attempt;
+      is_fruitless_ = attempt.removes_hardly_any;
+      if (is_fruitless_ || (attempt.is_far_off() && !most_stay)) break;
+      keep_around(mesh_, place_, std::move(attempt.deviation.is_beyond), stays);
+    }
+    return std::nullopt;
+  }
+  [[nodiscard]] Attempt try_once(float allowed, const std::vector<bool>& stays) const {
     Attempt attempt;
-    std::vector<std::uint32_t> left = remove_triangles(mesh_, allowed_, scale_, stays_);
+    std::vector<std::uint32_t> left = remove_triangles(mesh_, allowed, scale_, is_sample_, stays);
     attempt.removes_hardly_any = left.size() + mesh_.indices.size() / kHardlyAny >= mesh_.indices.size();
     attempt.simple = triangulation_of(mesh_, std::move(left), place_);
     // A neck three edges round, say, is drawn together to one edge.
@@ -232,44 +281,75 @@ class Search {
     attempt.deviation = deviation_of(mesh_, place_, attempt.simple, error_);
     return attempt;
   }
-  /// Changes the next try after one that was not within the error.
-  void change(int tries, Attempt attempt) {
-    had_few_ = had_few_ || !attempt.is_far_off();
-    if (tries + 1 == kMaxTries / 2 && !had_few_) {
-      // Less error did not help: a mesh that is round everywhere, say, and hardly to be made simpler.
-      restart(kMeanShare * error_);
-    } else if (attempt.is_far_off() && tries < kMaxTries / 2) {
-      // Triangles that had to stay for more error need not for less.
-      restart(allowed_ * kMuchLess);
-    } else {
-      if (rounds_ == 0) allowed_before_rounds_ = allowed_;
-      keep_around(mesh_, place_, std::move(attempt.deviation.is_beyond), stays_);
-      // Other triangles are removed where these stay, so that new places may be too far off in every try.
-      if (++rounds_ > kRounds) allowed_ *= kLittleLess;
-    }
-  }
-  void restart(float allowed) {
-    allowed_ = allowed;
-    rounds_ = 0;
-    stays_.assign(stays_.size(), false);
-  }
 
   const SmoothMesh& mesh_;
   std::vector<std::uint32_t> place_;
   float scale_;
   float error_;
-  float allowed_;
-  float allowed_before_rounds_ = 0.0F;
-  std::vector<bool> stays_;
-  bool had_few_ = false;
-  int rounds_ = 0;  ///< in which triangles had to stay
+  bool is_sample_;
+  int rounds_;
+  std::size_t first_triangles_ = 0;  ///< indices that the last level's first round left
+  int last_round_ = 0;
+  bool is_fruitless_ = false;
 };
+
+/// The positions and triangles of about kSampleTriangles triangles of a mesh: of boxes that lie anywhere in it.
+SmoothMesh sample_of(const SmoothMesh& mesh) {
+  const auto box_of = [&](std::size_t i) {
+    const IVec3 at = voxel_of(DVec3(mesh.positions[mesh.indices[i]]) / kSampleBox);
+    const auto part = [&](int axis) { return static_cast<std::uint32_t>(at[axis]); };
+    return mix_bits(mix_bits(mix_bits(part(0)) ^ part(1)) ^ part(2));
+  };
+  std::map<std::uint32_t, std::size_t> triangles_of;
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) ++triangles_of[box_of(i)];
+  std::size_t count = 0;
+  std::uint32_t last = 0;
+  for (auto box = triangles_of.begin(); box != triangles_of.end() && count < kSampleTriangles; ++box) {
+    count += box->second;
+    last = box->first;
+  }
+  SmoothMesh sample;
+  std::vector<std::uint32_t> vertex_of(mesh.positions.size(), ~0U);
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    if (box_of(i) > last) continue;
+    for (std::size_t k = 0; k < 3; ++k) {
+      std::uint32_t& vertex = vertex_of[mesh.indices[i + k]];
+      if (vertex == ~0U) {
+        vertex = static_cast<std::uint32_t>(sample.positions.size());
+        sample.positions.push_back(mesh.positions[mesh.indices[i + k]]);
+      }
+      sample.indices.push_back(vertex);
+    }
+  }
+  return sample;
+}
+
+float scale_of(const SmoothMesh& mesh) {
+  return meshopt_simplifyScale(&mesh.positions[0].x, mesh.positions.size(), sizeof(Vec3));
+}
+
+/// The try that simplifies a mesh; nothing if it cannot be simplified.
+std::optional<Attempt> find_simpler(const SmoothMesh& mesh, float scale, float error_in_samples) {
+  Search search(mesh, scale, error_in_samples, false);
+  if (mesh.indices.size() / 3 < kLeastSampled) {
+    std::optional<Search::Found> found = search.best_of_levels();
+    return found ? std::optional(std::move(found->attempt)) : std::nullopt;
+  }
+  const SmoothMesh sample = sample_of(mesh);
+  const float scale_of_sample = scale_of(sample);
+  if (!(scale_of_sample > 0.0F)) return search.first_from(0);
+  const auto found = Search(sample, scale_of_sample, error_in_samples, true).best_of_levels();
+  if (!found) return std::nullopt;
+  const std::size_t left = found->attempt.simple.indices.size();
+  if (left + sample.indices.size() / kLeastLoss >= sample.indices.size()) return std::nullopt;
+  return search.first_from(found->level);
+}
 
 /// Returns the error reached, in samples.
 float simplify_within(SmoothMesh& mesh, float error_in_samples, std::vector<std::uint32_t>& tags) {
-  const float scale = meshopt_simplifyScale(&mesh.positions[0].x, mesh.positions.size(), sizeof(Vec3));
+  const float scale = scale_of(mesh);
   if (!(scale > 0.0F)) return 0.0F;
-  const std::optional<Attempt> found = Search(mesh, scale, error_in_samples).run();
+  const std::optional<Attempt> found = find_simpler(mesh, scale, error_in_samples);
   if (!found) return 0.0F;
   take_over(mesh, found->simple, tags);
   return found->deviation.most;

@@ -228,6 +228,50 @@ TEST_F(Simplify, MoreErrorLeavesFewerTriangles) {
   }
 }
 
+TEST_F(Simplify, SlightlyMoreErrorLeavesFewerTriangles) {
+  const Field ball = [](Vec3 p) { return glm::length(p - 45.1F) - 40.5F; };
+  const Field waves = [](Vec3 p) {
+    const Vec3 q = p * 0.5236F;
+    const Vec3 away = glm::abs(p - 18.0F);
+    const float wave = std::sin(q.x) * std::cos(q.y) + std::sin(q.y) * std::cos(q.z) + std::sin(q.z) * std::cos(q.x);
+    return std::max(wave, std::max({away.x, away.y, away.z}) - 16.5F);
+  };
+  struct Case {
+    const Field& field;
+    int edge;
+    float less;
+    float more;
+  };
+  for (const Case& each : {Case{ball, 90, 0.04F, 0.06F}, Case{waves, 36, 0.4F, 0.5F}, Case{waves, 36, 0.1F, 0.12F}}) {
+    const SmoothMesh whole = surface_of(each.field, each.edge);
+    SmoothMesh of_less = whole;
+    SmoothMesh of_more = whole;
+    ASSERT_TRUE(simplify_smooth_mesh(of_less, each.less) && simplify_smooth_mesh(of_more, each.more));
+    EXPECT_LT(of_less.indices.size(), whole.indices.size());
+    EXPECT_LT(of_more.indices.size(), of_less.indices.size()) << each.more;
+  }
+}
+
+// Less than 1 % of the triangles of this noise could go with the lower error.
+TEST_F(Simplify, LeavesALargeMeshThatHardlyShrinks) {
+  std::mt19937 random(3);
+  std::vector<float> values(std::size_t{27} * 27 * 27);
+  for (float& value : values) value = static_cast<float>(random()) * 0x1p-31F - 1.0F;
+  const auto noise = [&](Vec3 p) {
+    const IVec3 at = glm::min(IVec3(p), IVec3(26));
+    const bool is_border = at.x % 26 == 0 || at.y % 26 == 0 || at.z % 26 == 0;
+    return is_border ? 1.0F : values[static_cast<std::size_t>((at.z * 27 + at.y) * 27 + at.x)];
+  };
+  const SmoothMesh whole = surface_of(noise, 26);
+  ASSERT_GT(whole.indices.size() / 3, 48'000U);
+  SmoothMesh mesh = whole;
+  EXPECT_EQ(simplify_smooth_mesh(mesh, 0.02F).value(), 0.0F);
+  EXPECT_EQ(mesh.indices.size(), whole.indices.size());
+  mesh = whole;
+  EXPECT_GT(simplify_smooth_mesh(mesh, 0.3F).value(), 0.0F);
+  EXPECT_LT(mesh.indices.size(), whole.indices.size() * 9 / 10);
+}
+
 TEST_F(Simplify, ColoursStayWhereTheyAreAndTheMeshIsManifoldByPlaces) {
   // A ball of voxels in two halves, the lesser with a checkerboard of small fields.
   Grid grid;
