@@ -18,9 +18,6 @@ namespace {
 
 constexpr float kBand = 8.0F;
 constexpr Half kSolidSign = 0x8000;
-// The density of samples whose value is that of the surface, as many are in files of whole numbers. With 0 the vertices
-// of the cells around such a sample would be one point, and triangles between them would have no area.
-constexpr float kAtSurface = 1.0F / 256.0F;
 
 // Positive sizes whose product is the number of values, without overflow.
 bool is_consistent(const Volume& volume) {
@@ -170,7 +167,7 @@ class ChunkMaker {
     if (exact <= -double{kBand}) return static_cast<Half>(far_ | kSolidSign);
     if (std::isnan(value)) return far_;
     // Equal infinities have no difference; the value of the surface is air.
-    if (value == options_.iso) return stored_within(kAtSurface, far_);
+    if (value == options_.iso) return stored_within(kDensityAtSurface, far_);
     const auto scaled = static_cast<float>(exact);
     if (scaled != 0.0F) return stored_within(scaled, far_);
     constexpr float kLeast = std::numeric_limits<float>::min();

@@ -42,7 +42,8 @@ struct ArraySurface {
 /// The surface where an array has the value `iso`, straight from the array.
 ///
 /// Vertices: one in each cell of eight samples that differ, at the mean of the crossings of its edges, to 1/65,536 of a
-///           cell.
+///           cell. A sample whose value is `iso` is 1/257 of an edge away from the surface, so that no triangles are
+///           points.
 /// Quads:    one around each crossed edge, split along the diagonal that is shorter in space.
 /// Normals:  the gradient of the trilinear field at the vertex, in space; (0, 1, 0) where that is 0.
 /// Winding:  counter-clockwise seen from the air whatever the strides and the signs of the spacing: nothing is

@@ -259,6 +259,40 @@ TYPED_TEST(ArrayTypes, AllMakeTheSameSurface) {
   }
 }
 
+std::size_t triangles_without_area(const ArraySurface& surface) {
+  std::size_t flat = 0;
+  for (std::size_t i = 0; i < surface.indices.size(); i += 3) {
+    const Vec3 a = surface.positions[surface.indices[i]];
+    const Vec3 b = surface.positions[surface.indices[i + 1]];
+    const Vec3 c = surface.positions[surface.indices[i + 2]];
+    flat += a == b || b == c || c == a ? 1 : 0;
+  }
+  return flat;
+}
+
+// Waves and noise of few values, so that many are that of the surface.
+TYPED_TEST(ArrayTypes, HaveNoTrianglesWithoutAreaWhereValuesEqualIso) {
+  const TestArray<float> random = noise({20, 21, 66}, 9);
+  for (const double levels : {2.0, 6.0}) {
+    const TestArray<TypeParam> samples(random.size(), [&](DVec3 p) {
+      const double wave = std::sin(0.4 * p.x) + std::sin(0.3 * p.y) + std::sin(0.5 * p.z);
+      return static_cast<TypeParam>(std::floor(20.0 + levels * (wave + 0.3 * double{random.at(IVec3(p))})));
+    });
+    for (const SolidSide side : {SolidSide::Above, SolidSide::Below}) {
+      for (const bool splits : {false, true}) {
+        const ArraySurfaceOptions options{20.0, side, ArrayBorder::Closed, splits};
+        const ArraySurface surface = surface_of(samples.view(), options);
+        ASSERT_GT(surface.indices.size(), 1'000U);
+        EXPECT_EQ(triangles_without_area(surface), 0U);
+        for (const InstructionSet set : sets_of_this_machine()) {
+          const InstructionSetOverride over(set);
+          expect_same(surface_of(samples.view(), options), surface);
+        }
+      }
+    }
+  }
+}
+
 TYPED_TEST(ArrayTypes, KnowLimitsOutOfTheirRange) {
   const TestArray<TypeParam> samples({3, 4, 50}, [](DVec3 p) {
     return p.z == 7 ? std::numeric_limits<TypeParam>::max() : std::numeric_limits<TypeParam>::lowest();

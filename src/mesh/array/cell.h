@@ -25,6 +25,12 @@ inline void make_finite(Corners& d) {
   for (float& density : d) density = std::isnan(density) ? most : density;
 }
 
+// The crossing of an edge between densities of different signs, as a fraction of the edge.
+inline float crossing_of(float a, float b) {
+  const float t = a / (a - b);
+  return a == 0.0F ? kLeastFraction : b == 0.0F ? 1.0F - kLeastFraction : t;
+}
+
 // The mean of a cell's crossings.
 inline Vec3 mean_crossing(const Corners& d) {
   float sum[3];
@@ -41,7 +47,7 @@ inline Vec3 mean_crossing(const Corners& d) {
       const float a = d[starts[i]];
       const float b = d[starts[i] + step];
       const bool is_crossed = (a < 0.0F) != (b < 0.0F);
-      t[i] = is_crossed ? a / (a - b) : 0.0F;
+      t[i] = is_crossed ? crossing_of(a, b) : 0.0F;
       one[i] = is_crossed ? 1.0F : 0.0F;
     }
     sum[axis] = (t[0] + t[1]) + (t[2] + t[3]);

@@ -9,6 +9,7 @@
 #include <quoin/grid/volume.h>
 
 #include "core/instruction_set.h"
+#include "grid/density/stored_density.h"
 #include "mesh/array/interfaces.h"
 #include "mesh/array/placement.h"
 
@@ -17,6 +18,10 @@
 namespace quoin::array {
 
 inline constexpr std::size_t kScalarTypes = 10;
+
+// The crossing of an edge whose first sample equals iso, as a fraction of the edge: the sample counts as
+// kDensityAtSurface if the other end's density is -1.
+inline constexpr float kLeastFraction = kDensityAtSurface / (kDensityAtSurface + 1.0F);
 
 // How many cells are worked on at a time.
 inline constexpr std::size_t kBatch = 128;

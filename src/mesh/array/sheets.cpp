@@ -47,8 +47,7 @@ smooth::CellVertex vertex_of_sheet(const smooth::Corners& d, const smooth::Sheet
     at[(axis + 1) % 3] = static_cast<float>(edge & 1U);
     at[(axis + 2) % 3] = static_cast<float>(edge >> 1U & 1U);
     const auto first = static_cast<std::size_t>(at.x + 2.0F * at.y + 4.0F * at.z);
-    const float low = d[first];
-    at[axis] = low / (low - d[first + (std::size_t{1} << axis)]);
+    at[axis] = crossing_of(d[first], d[first + (std::size_t{1} << axis)]);
     sum += at;
     count += 1.0F;
   }

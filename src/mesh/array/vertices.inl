@@ -35,7 +35,8 @@ inline void make_finite(F* d) {
 inline F crossing_of(F a, F b, F& one) {
   const Mask is_crossed = signs_differ(a, b);
   one = only(is_crossed, all(1.0F));
-  return only(is_crossed, a / (a - b));
+  const F t = select(a == all(0.0F), all(kLeastFraction), a / (a - b));
+  return only(is_crossed, select(b == all(0.0F), all(1.0F - kLeastFraction), t));
 }
 
 // The mean of a cell's crossings.
