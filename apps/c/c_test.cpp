@@ -1,5 +1,6 @@
 // The door for C: what it makes, and that bad input is an error and never a crash.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -116,6 +117,31 @@ TEST(C, MeshesAreSeenWhereTheyLie) {
   EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
   EXPECT_EQ(quoin_mesh_labels(&array, 0, 4, 0, &mesh), QUOIN_INVALID_ARGUMENT);
   EXPECT_EQ(quoin_surface_nets(&array, std::nan(""), 0, 0, &mesh), QUOIN_INVALID_ARGUMENT);
+}
+
+TEST(C, SurfacesHaveNoPointsWhereValuesEqualIso) {
+  std::vector<std::uint8_t> values(std::size_t{kEdge} * kEdge * kEdge);
+  for (int i = 0; i < kEdge * kEdge * kEdge; ++i) {
+    const int x = i / (kEdge * kEdge) - 5;
+    const int y = i / kEdge % kEdge - 5;
+    const int z = i % kEdge - 5;
+    values[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(std::abs(x) + std::abs(y) + std::abs(z));
+  }
+  const quoin_array array = array_of(values, QUOIN_UINT8);
+  quoin_mesh mesh = 0;
+  ASSERT_EQ(quoin_surface_nets(&array, 4.0, 1, 0, &mesh), QUOIN_OK) << quoin_last_error();
+  auto data = sized<quoin_mesh_data>();
+  ASSERT_EQ(quoin_mesh_view(mesh, &data), QUOIN_OK);
+  ASSERT_GT(data.index_count, 100U);
+  const auto is_one_point = [&](std::uint32_t a, std::uint32_t b) {
+    return std::equal(data.positions + 3 * a, data.positions + 3 * a + 3, data.positions + 3 * b);
+  };
+  for (std::size_t i = 0; i < data.index_count; i += 3) {
+    const std::uint32_t* corner = data.indices + i;
+    EXPECT_FALSE(is_one_point(corner[0], corner[1]) || is_one_point(corner[1], corner[2]) ||
+                 is_one_point(corner[2], corner[0]));
+  }
+  EXPECT_EQ(quoin_free(mesh), QUOIN_OK);
 }
 
 TEST(C, LabelsAndGridsAreMeshed) {

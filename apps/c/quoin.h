@@ -220,6 +220,8 @@ typedef struct quoin_load_options {
   int32_t ground_depth;        /* voxels of ground below the lowest height, up to 4,096; 0: 8 */
   int32_t smooth_ground;       /* densities, whose surface is smooth, rather than voxels */
   int32_t allow_outside_files; /* the file may name files outside its folder: for input from a trusted source only */
+  const char* dimension; /* of a Minecraft world: "overworld", "nether", "end" or "NAMESPACE:NAME"; null or "": the
+                                  overworld, or the first that the world has. Other files ignore it */
 } quoin_load_options;
 
 typedef enum quoin_fill {

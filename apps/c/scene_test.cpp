@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
@@ -645,6 +646,40 @@ TEST(CLoading, TakesOptions) {
   EXPECT_EQ(quoin_scene_load_with(test_file("c_test.obj").c_str(), &options, &scene), QUOIN_INVALID_ARGUMENT);
   options.size = 3;
   EXPECT_EQ(quoin_scene_load_with(test_file("c_test.obj").c_str(), &options, &scene), QUOIN_INVALID_ARGUMENT);
+}
+
+TEST(CLoading, ChoosesADimension) {
+  // A world of two dimensions, the overworld with the region of another.
+  namespace fs = std::filesystem;
+  const fs::path cases = QUOIN_SOURCE_DIR "/tests/corpus/cases";
+  const std::string world = test_file("dimensions");
+  fs::copy(cases / "minecraft-26.1-layout", world, fs::copy_options::recursive);
+  fs::copy(cases / "minecraft-section-without-longs/region/r.0.0.mca",
+           fs::path(world) / "dimensions/minecraft/overworld/region/r.0.0.mca", fs::copy_options::overwrite_existing);
+  auto options = sized<quoin_load_options>();
+  quoin_scene scene = 0;
+  // The voxels of the world's first grid.
+  const auto voxels_of = [&](const char* dimension) {
+    options.dimension = dimension;
+    EXPECT_EQ(quoin_scene_load_with(world.c_str(), &options, &scene), QUOIN_OK) << quoin_last_error();
+    auto info = sized<quoin_grid_info>();
+    EXPECT_EQ(quoin_grid_get_info(scene, 0, &info), QUOIN_OK);
+    EXPECT_EQ(quoin_free(scene), QUOIN_OK);
+    return info.voxels;
+  };
+  EXPECT_EQ(voxels_of(nullptr), 8192);
+  EXPECT_EQ(voxels_of(""), 8192);
+  EXPECT_EQ(voxels_of("minecraft:overworld"), 8192);
+  EXPECT_EQ(voxels_of("nether"), 8704);
+  options.dimension = "end";
+  EXPECT_EQ(quoin_scene_load_with(world.c_str(), &options, &scene), QUOIN_INVALID_ARGUMENT);
+  EXPECT_NE(std::string(quoin_last_error()).find("the world has minecraft:overworld, minecraft:the_nether"),
+            std::string::npos)
+      << quoin_last_error();
+  // A program that was compiled with an older header has no such field.
+  options.size = offsetof(quoin_load_options, dimension);
+  EXPECT_EQ(quoin_scene_load_with(world.c_str(), &options, &scene), QUOIN_OK) << quoin_last_error();
+  EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
 TEST(CLoading, TakesValuesAlone) {

@@ -164,6 +164,7 @@ LoadOptions options_of(const quoin_load_options& given) {
   }
   if (given.heights != QUOIN_HEIGHTS_NONE) options.heights = heights_of(given);
   if (given.allow_outside_files != 0) options.sidecar_files = SidecarFiles::Anywhere;
+  if (given.dimension != nullptr) options.dimension = given.dimension;
   return options;
 }
 

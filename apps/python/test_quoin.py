@@ -11,6 +11,7 @@ import json
 import os
 import pickle
 import re
+import shutil
 import sys
 import tempfile
 import threading
@@ -352,6 +353,32 @@ class Scenes(unittest.TestCase):
                 again = quoin.load(f"{folder}/values.bin", raw=raw, iso=5.5).grids[0].mesh(smooth=True)
                 self.assertTrue((again.positions == found.positions).all())
 
+    def test_chooses_a_dimension(self):
+        world = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tests", "corpus", "cases",
+                             "minecraft-26.1-layout")
+        if not os.path.exists(world):
+            self.skipTest("there is no corpus here")
+        with tempfile.TemporaryDirectory() as folder:
+            # The overworld gets the region of another world, so that it differs from the nether.
+            copied = shutil.copytree(world, f"{folder}/world")
+            shutil.copy(os.path.join(world, "..", "minecraft-section-without-longs", "region", "r.0.0.mca"),
+                        f"{copied}/dimensions/minecraft/overworld/region/r.0.0.mca")
+            voxels = {name: quoin.load(copied, dimension=name).grids[0].voxels
+                      for name in (None, "", "minecraft:overworld", "nether")}
+            self.assertEqual(voxels, {None: 8192, "": 8192, "minecraft:overworld": 8192, "nether": 8704})
+            with self.assertRaisesRegex(quoin.QuoinError, "the world has minecraft:overworld, minecraft:the_nether"):
+                quoin.load(copied, dimension="end")
+
+    def test_surfaces_have_no_points_where_values_equal_iso(self):
+        x, y, z = np.indices((24, 24, 24)) - 11.5
+        for dtype in (np.uint8, np.int16, np.float32):
+            values = np.round(60.0 - 4.0 * np.sqrt(x * x + y * y + z * z)).clip(0).astype(dtype)
+            self.assertGreater(int((values == 30).sum()), 100)
+            mesh = quoin.surface_nets(values, 30.0)
+            corners = mesh.positions[mesh.triangles].astype(np.float64)
+            areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+            self.assertGreater(areas.min(), 0.0)
+
     def test_pictures_of_heights(self):
         metres = np.array([[3, 5], [4, 9]])
         code = (metres + 10_000) * 10
@@ -552,6 +579,8 @@ class BadInput(unittest.TestCase):
             (lambda: quoin.Grid(scene, 7).mesh(), quoin.QuoinError),
             (lambda: quoin.load_bytes(b"VOX \x96\0\0\0MAIN"), quoin.QuoinError),
             (lambda: quoin.load("x.vox", frame=-1), quoin.QuoinError),
+            (lambda: quoin.load("x.vox", dimension=1), TypeError),
+            (lambda: quoin.load("x.vox", dimension="a\0b"), ValueError),
             (lambda: quoin.load("x.obj", size=3, voxel_size=2.0), quoin.QuoinError),
             (lambda: quoin.png(np.zeros((2, 2), np.uint8)), ValueError),
             # What would be cut off on its way to C.

@@ -96,7 +96,7 @@ class LoadOptions(ctypes.Structure):
                 ("heights", ctypes.c_int32), ("metres_per_level", ctypes.c_double),
                 ("metres_per_pixel", ctypes.c_double), ("metres_per_voxel", ctypes.c_double),
                 ("exaggeration", ctypes.c_double), ("ground_depth", ctypes.c_int32), ("smooth_ground", ctypes.c_int32),
-                ("allow_outside_files", ctypes.c_int32)]
+                ("allow_outside_files", ctypes.c_int32), ("dimension", ctypes.c_char_p)]
 
 
 class Triangles(ctypes.Structure):

@@ -629,13 +629,15 @@ def _load_options(frame: int, show_hidden: bool, radius: int, iso: Optional[floa
 
 def load(path: Path, *, frame: int = 0, show_hidden: bool = False, radius: int = 0, iso: Optional[float] = None,
          size: int = 0, voxel_size: float = 0.0, threads: int = 0, raw: Optional[Raw] = None,
-         heights: Optional[Heights] = None, allow_outside_files: bool = False) -> Scene:
+         heights: Optional[Heights] = None, allow_outside_files: bool = False,
+         dimension: Optional[str] = None) -> Scene:
     """Reads a file of any format that Quoin reads (`formats`), or a folder that holds a world.
 
     `frame`: of an animation. `radius`: of a world, in chunks of 64 voxels around its spawn; 0 is 4. `iso`: of a volume.
     `size`, `voxel_size`: of a file of triangles, voxels along its longest side, or their size. `raw`, `heights`: the
     file is one of values alone, or a picture of a landscape's heights. `allow_outside_files`: the file may name files
-    outside its folder (buffers, images, models); for input from a trusted source only.
+    outside its folder (buffers, images, models); for input from a trusted source only. `dimension`: of a Minecraft
+    world, "overworld", "nether", "end" or "NAMESPACE:NAME"; without it the overworld, or the first that the world has.
 
     >>> load("nothing.vox")
     Traceback (most recent call last):
@@ -644,6 +646,7 @@ def load(path: Path, *, frame: int = 0, show_hidden: bool = False, radius: int =
     """
     options = _load_options(frame, show_hidden, radius, iso, size, voxel_size, threads, raw, heights)
     options.allow_outside_files = int(allow_outside_files)
+    options.dimension = None if dimension is None else _c.name_of(dimension)
     out = ctypes.c_uint64()
     _c.check(_c.lib.quoin_scene_load_with(_c.path_of(path), ctypes.byref(options), ctypes.byref(out)))
     return Scene(_c.Owner(out.value))
