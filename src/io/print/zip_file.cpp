@@ -17,7 +17,8 @@ constexpr std::size_t kLocalHeader = 30;
 constexpr std::size_t kSumAt = 14;
 
 void put_number(std::vector<std::byte>& to, std::uint64_t value, int bytes) {
-  for (int i = 0; i < bytes; ++i) to.push_back(static_cast<std::byte>(value >> (8 * i)));
+  // Runs of zeros are longer than a number.
+  for (int i = 0; i < bytes; ++i) to.push_back(i < 8 ? static_cast<std::byte>(value >> (8 * i)) : std::byte{0});
 }
 
 void set_number(std::vector<std::byte>& in, std::uint64_t at, std::uint64_t value) {
