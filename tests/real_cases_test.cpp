@@ -267,6 +267,14 @@ TEST(GoxelCases, ReadsShapeLayers) {
   EXPECT_TRUE(loaded.warnings.empty());
 }
 
+// 65,535 names are promised in a file of 15 bytes: none of them is looked up.
+TEST(LuantiCases, RefusesNamesThatAreCutOff) {
+  const auto loaded = load_scene(case_file("mts-names-cut-off.mts"));
+  ASSERT_FALSE(loaded);
+  EXPECT_EQ(loaded.error().message, "it ends before its nodes do");
+  EXPECT_EQ(loaded.error().byte_offset, 15U);
+}
+
 std::vector<std::byte> unpacked(const fs::path& path) {
   const auto packed = read_file(path);
   EXPECT_TRUE(packed);

@@ -1,8 +1,10 @@
 // Luanti's schematics: names of nodes, and three arrays in a zlib stream. Its axes are left-handed: z is turned round.
 
+#include <algorithm>
 #include <bit>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -41,9 +43,13 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
   const int size_y = read_u16(reader);
   const int size_z = read_u16(reader);
   if (version >= 3) static_cast<void>(reader.take(static_cast<std::size_t>(size_y)));  // how likely each layer is
-  std::vector<std::optional<VoxelProperties>> nodes(read_u16(reader));                 // nothing: air
-  for (auto& node : nodes) node = node_properties(reader.text(read_u16(reader)));
-  if (reader.failed()) return bad_at(bytes.size(), "it ends before its nodes do");
+  // A name has two bytes at least. Of a file that ends too early no node is looked up: that takes longer than reading.
+  const std::size_t count = read_u16(reader);
+  std::vector<std::string_view> names(count <= reader.remaining() / 2 ? count : 0);
+  for (std::string_view& name : names) name = reader.text(read_u16(reader));
+  if (reader.failed() || names.size() < count) return bad_at(bytes.size(), "it ends before its nodes do");
+  std::vector<std::optional<VoxelProperties>> nodes(count);  // nothing: air
+  std::ranges::transform(names, nodes.begin(), node_properties);
   const std::size_t begin = reader.position();
   const std::uint64_t volume =
       static_cast<std::uint64_t>(size_x) * static_cast<std::uint64_t>(size_y) * static_cast<std::uint64_t>(size_z);
