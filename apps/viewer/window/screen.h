@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include <quoin/core/image.h>
 #include <quoin/core/result.h>
@@ -79,7 +80,11 @@ class Screen {
   SdlPointer<SDL_Window> window_;
 };
 
-/// A window that SDL draws in. `width` and `height` are in the display's units. Errors: Unsupported.
+/// Returns true if an OpenGL renderer of that name (GL_RENDERER) draws by the processor.
+[[nodiscard]] bool is_software_opengl(std::string_view name);
+
+/// Opens a window that SDL draws in, by its software renderer where OpenGL would draw by the processor as well. `width`
+/// and `height` are in the display's units. Errors: Unsupported.
 [[nodiscard]] Result<std::unique_ptr<Screen>> open_sdl_screen(int width, int height);
 
 /// A window that a graphics device draws in and shows. `device` as VulkanOptions::device. Errors: Unsupported.

@@ -1,6 +1,7 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -23,6 +24,7 @@ class SdlScreen final : public Screen {
   Status show(const SDL_Rect& place, const ImDrawData& gui) override;
 
  private:
+  void open_renderer();
   Status set_image(const Image& image);
   void draw(const ImDrawData& data);
   void draw(const ImDrawList& list, const ImDrawCmd& command, const ImDrawData& data);
@@ -38,10 +40,36 @@ Error cannot(const std::string& what) {
   return make_error(ErrorCode::Unsupported, "cannot " + what + ": " + sdl_says());
 }
 
+// GL_RENDERER of a renderer that draws through OpenGL; else empty.
+std::string opengl_name(SDL_Renderer* renderer) {
+  using GetString = const unsigned char* (*)(unsigned);
+  constexpr unsigned kRenderer = 0x1F01;
+  SDL_RendererInfo info{};
+  if (SDL_GetRendererInfo(renderer, &info) != 0 || !std::string_view(info.name).starts_with("opengl")) return "";
+  const auto get_string = reinterpret_cast<GetString>(SDL_GL_GetProcAddress("glGetString"));
+  const unsigned char* const name = get_string != nullptr ? get_string(kRenderer) : nullptr;
+  return name != nullptr ? reinterpret_cast<const char*>(name) : "";
+}
+
+// The renderer that SDL prefers, unless that is OpenGL on the processor: SDL's own software renderer takes less of it.
+// OpenGL stays if the software renderer cannot show anything, as on Wayland.
+void SdlScreen::open_renderer() {
+  const auto open_preferred = [this] { renderer_.reset(SDL_CreateRenderer(window(), -1, SDL_RENDERER_PRESENTVSYNC)); };
+  open_preferred();
+  const char* const chosen = SDL_GetHint(SDL_HINT_RENDER_DRIVER);
+  const bool is_chosen = chosen != nullptr && *chosen != '\0';
+  const bool is_slow = renderer_ && !is_chosen && is_software_opengl(opengl_name(renderer_.get()));
+  if (renderer_ && !is_slow) return;
+  // Without this hint SDL would show the software renderer's image through OpenGL.
+  if (is_slow) SDL_SetHint(SDL_HINT_FRAMEBUFFER_ACCELERATION, "0");
+  renderer_.reset();
+  renderer_.reset(SDL_CreateRenderer(window(), -1, SDL_RENDERER_SOFTWARE));
+  if (!renderer_ && is_slow) open_preferred();
+}
+
 Status SdlScreen::open(int width, int height) {
   if (Status opened = open_window(width, height, 0); !opened) return opened;
-  renderer_.reset(SDL_CreateRenderer(window(), -1, SDL_RENDERER_PRESENTVSYNC));
-  if (!renderer_) renderer_.reset(SDL_CreateRenderer(window(), -1, SDL_RENDERER_SOFTWARE));
+  open_renderer();
   if (!renderer_) return cannot("draw in a window");
   SDL_RendererInfo info{};
   SDL_GetRendererInfo(renderer_.get(), &info);
@@ -128,6 +156,11 @@ void SdlScreen::draw(const ImDrawList& list, const ImDrawCmd& command, const ImD
 }
 
 }  // namespace
+
+bool is_software_opengl(std::string_view name) {
+  return std::ranges::any_of(std::array{"llvmpipe", "softpipe", "swrast", "Software Rasterizer"},
+                             [name](std::string_view driver) { return name.find(driver) != std::string_view::npos; });
+}
 
 Result<std::unique_ptr<Screen>> open_sdl_screen(int width, int height) {
   auto screen = std::make_unique<SdlScreen>();
