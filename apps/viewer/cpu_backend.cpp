@@ -161,6 +161,7 @@ struct CpuBackend::Impl {
   std::atomic<bool> are_paths_stale{true};
   std::atomic<std::size_t> held{0};     // bytes of what is made of the scene
   std::atomic<int> smooth_percent{-1};  // of what is made for it; -1: nothing is
+  std::atomic<bool> is_preparing_paths{false};
 
   mutable std::mutex mutex;  // guards what follows, but for the atomic ones
   std::condition_variable wake;
@@ -181,6 +182,7 @@ struct CpuBackend::Impl {
   Stage first{kDivisors.front()};             // what the last request began with
 
   std::atomic<std::uint64_t> request_number{0};
+  std::atomic<std::uint64_t> mode_number{0};  // of the last request that changed the mode
   std::atomic<bool> halt{false};
 
   std::thread worker;
@@ -266,12 +268,14 @@ void CpuBackend::Impl::draw(std::unique_lock<std::mutex>& lock) {
   if (wanted.mode == DrawMode::Paths) wanted.samples = kPathSamples;
   const Stage now = *stage;
   const std::uint64_t number = request_number;
+  const std::uint64_t mode = mode_number;
   lock.unlock();
   const Clock::time_point start = Clock::now();
-  auto picture = picture_of(wanted, now, [&](double) { return !halt && (is_kept_on || request_number == number); });
+  auto picture = picture_of(
+      wanted, now, [&](double) { return !halt && mode_number == mode && (is_kept_on || request_number == number); });
   const double seconds = seconds_since(start);
   lock.lock();
-  if (!picture && picture.error().code == ErrorCode::Cancelled) return;
+  if (mode_number != mode || (!picture && picture.error().code == ErrorCode::Cancelled)) return;
   if (refusal && wanted.mode == DrawMode::Smooth) {
     is_done = request_number == number;
     return;
@@ -323,12 +327,15 @@ Result<Picture> CpuBackend::Impl::path_picture(const ViewRequest& wanted, const 
 
 void CpuBackend::Impl::prepare_paths() {
   if (!are_paths_stale) return;
+  is_preparing_paths = true;
+  tell();
   if (paths) {
     paths->tracer.update(options.threads);
     paths->bounds = scene.bounds(options.instances);
   } else {
     paths = std::make_unique<PathPart>(scene, options);
   }
+  is_preparing_paths = false;
   are_paths_stale = false;
   count_bytes();
 }
@@ -377,7 +384,7 @@ void CpuBackend::Impl::publish(Result<Picture> picture, const ViewRequest& of, c
     return;
   }
   const bool is_whole = picture->colour.width == of.width && picture->colour.height == of.height;
-  frame = ViewFrame{std::move(picture->colour), nullptr, drawn.samples, is_whole,
+  frame = ViewFrame{std::move(picture->colour), nullptr, of.mode,      drawn.samples, is_whole,
                     drawn.is_last(of),          seconds, picture->rays};
   if (drawn.samples == 1) note_speed(drawn, of, seconds);
 }
@@ -400,7 +407,11 @@ void CpuBackend::show(const ViewRequest& request) {
     const std::lock_guard lock(impl_->mutex);
     if (impl_->request && is_same(*impl_->request, request)) return;
     impl_->is_camera_new = !impl_->request || impl_->request->camera != request.camera || impl_->is_camera_new;
-    if (impl_->request && impl_->request->mode != request.mode) impl_->seconds_per_pixel = {};
+    if (impl_->request && impl_->request->mode != request.mode) {
+      impl_->seconds_per_pixel = {};
+      impl_->frame.reset();
+      ++impl_->mode_number;
+    }
     impl_->request = request;
     impl_->stage.reset();
     impl_->is_done = false;
@@ -421,6 +432,7 @@ std::size_t CpuBackend::bytes() const {
 }
 
 std::string CpuBackend::activity() const {
+  if (impl_->is_preparing_paths) return "preparing path tracing";
   const int percent = impl_->smooth_percent;
   return percent < 0 ? "" : "preparing light " + std::to_string(percent) + " %";
 }

@@ -23,7 +23,8 @@ struct CpuBackendOptions {
 /// samples a pixel up to what was asked for. A settled frame is CpuRenderer's picture to the byte. Where full light
 /// would make the first picture smaller than a half it is a draft: with few lamps, and the occlusion of vertices.
 ///
-/// A new request ends what is under way, but for the coarsest picture: however fast requests come, some are seen.
+/// A new request ends the image under way, except the coarsest one of the same mode: however fast requests come, some
+/// are seen.
 ///
 /// DrawMode::Paths goes the same way, without noise within surfaces (PathOptions::denoise), up to 256 samples; what it
 /// needs is made before the first such picture, and let go of likewise. After an edit what it did not change stays as

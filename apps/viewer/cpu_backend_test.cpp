@@ -186,6 +186,26 @@ TEST(CpuBackend, TheSettledPictureIsTheRenderersToTheByte) {
   }
 }
 
+TEST(CpuBackend, ShowsNoFrameOfTheModeBefore) {
+  const LoadedScene loaded = small_scene();
+  Watched watched(loaded.scene);
+  ViewRequest request = request_for(loaded.scene, View::Iso);
+  watched.backend.show(request);
+  for (const DrawMode mode : {DrawMode::Paths, DrawMode::Rays, DrawMode::Paths}) {
+    // A frame of the mode before may be ready, or under way.
+    ASSERT_TRUE(watched.bell.wait());
+    request.mode = mode;
+    watched.backend.show(request);
+    const auto frame = watched.backend.take();
+    EXPECT_TRUE(!frame || frame->mode == mode);
+    const auto frames = watched.settle();
+    ASSERT_FALSE(frames.empty());
+    for (const ViewFrame& one : frames) EXPECT_EQ(one.mode, mode);
+    request.camera.position.x += 0.5;
+    watched.backend.show(request);
+  }
+}
+
 TEST(CpuBackend, PicturesBecomeFiner) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);

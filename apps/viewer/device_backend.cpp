@@ -23,6 +23,7 @@ struct DeviceBackend::Impl {
   struct Told {
     std::string name;
     std::string activity;
+    std::optional<double> progress;  // of `activity`
     std::vector<std::pair<std::string, std::string>> stats;
     std::size_t picture_bytes = 0;
     bool has_scene = false;
@@ -255,7 +256,10 @@ DeviceBackend::Impl::Told DeviceBackend::Impl::tell() const {
     now.is_slow.at(mode) = drawer->is_slow(static_cast<DrawMode>(mode));
   }
   const auto [meshed, all] = drawer->meshing();
-  if (all > 0) now.activity = "meshing " + std::to_string(meshed) + "/" + std::to_string(all);
+  if (all > 0) {
+    now.activity = "meshing " + std::to_string(meshed) + "/" + std::to_string(all);
+    now.progress = static_cast<double>(meshed) / static_cast<double>(all);
+  }
   return now;
 }
 
@@ -293,7 +297,9 @@ std::optional<ViewFrame> DeviceBackend::Impl::take_light() {
     return std::nullopt;
   }
   auto lit = cpu.take();
-  return lit && lit->is_whole ? lit : std::nullopt;
+  if (!lit || !lit->is_whole) return std::nullopt;
+  lit->mode = request->mode;
+  return lit;
 }
 
 void DeviceBackend::Impl::give_up_device() {
@@ -402,11 +408,18 @@ std::size_t DeviceBackend::bytes() const {
 std::string DeviceBackend::activity() const {
   const Impl& me = *impl_;
   const std::lock_guard lock(me.mutex);
-  if (!me.uses_device() || !me.drawer) return {};
+  if (!me.uses_device() || !me.drawer) return me.cpu.activity();
   if (!me.has_thread()) return me.tell().activity;
   if (!me.told.activity.empty()) return me.told.activity;
   if (me.is_refused && me.request->mode == DrawMode::Smooth) return "too large for shadows";
   return me.rests ? me.cpu.activity() : "";
+}
+
+std::optional<double> DeviceBackend::progress() const {
+  const Impl& me = *impl_;
+  const std::lock_guard lock(me.mutex);
+  if (!me.uses_device() || !me.drawer) return std::nullopt;
+  return me.has_thread() ? me.told.progress : me.tell().progress;
 }
 
 bool DeviceBackend::is_slow(DrawMode mode) const {

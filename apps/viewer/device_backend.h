@@ -26,10 +26,10 @@ struct DeviceBackendOptions {
 
 /// Pictures by a graphics device: ray-marched ones get better sample by sample, meshes follow edits as workers finish
 /// them. What is pointed at is found by the processor, which also draws where the device cannot, and rays until the
-/// device has its first picture of meshes. Where a processor acts as the device, meshes have no light that takes rays;
-/// once the view rests the processor draws them by rays: blocks, fields, and smooth meshes of voxels through the fields
-/// that these are made from. Where the latter take too much memory their picture stays the device's, and `activity`
-/// says so.
+/// device has drawn the first meshed chunks. Where a processor acts as the device, meshes have no light that takes
+/// rays; once the view rests the processor draws them by rays: blocks, fields, and smooth meshes of voxels through the
+/// fields that these are made from. Where the latter take too much memory their picture stays the device's, and
+/// `activity` says so.
 ///
 /// After a fault of the device it is not used again.
 class DeviceBackend final : public ViewBackend {
@@ -49,6 +49,7 @@ class DeviceBackend final : public ViewBackend {
   [[nodiscard]] std::vector<std::pair<std::string, std::string>> stats() const override;
   [[nodiscard]] std::size_t bytes() const override;
   [[nodiscard]] std::string activity() const override;
+  [[nodiscard]] std::optional<double> progress() const override;
   [[nodiscard]] bool is_slow(DrawMode mode) const override;
   [[nodiscard]] bool ends_late() const override;
   [[nodiscard]] std::optional<Error> fault() override;

@@ -589,9 +589,15 @@ TEST_F(DeviceBackendTest, ChunksStillToMeshAreCounted) {
   const auto backend = backend_of(document, false);
   backend->show(request_for(document, DrawMode::Blocks));
   std::vector<std::string> told;
+  double furthest = -1.0;
   ASSERT_TRUE(comes([&] {
     const std::string now = backend->activity();
     if (told.empty() || told.back() != now) told.push_back(now);
+    if (const auto progress = backend->progress()) {
+      EXPECT_GE(*progress, 0.0);
+      EXPECT_LT(*progress, 1.0);
+      furthest = std::max(furthest, *progress);
+    }
     const auto frame = backend->take();
     return frame && frame->is_settled;
   }));
@@ -599,6 +605,33 @@ TEST_F(DeviceBackendTest, ChunksStillToMeshAreCounted) {
       std::find_if(told.begin(), told.end(), [](const std::string& text) { return text.starts_with("meshing "); }),
       told.end());
   EXPECT_EQ(backend->activity(), "");
+  EXPECT_GT(furthest, 0.0);
+  EXPECT_FALSE(backend->progress());
+}
+
+// An image of the sky alone would not be better than the rays that stand in.
+TEST_F(DeviceBackendTest, TheFirstImageOfMeshesShowsSome) {
+  const Document document = wide_document();
+  const Scene sky;
+  for (const DrawMode mode : {DrawMode::Blocks, DrawMode::Smooth}) {
+    const auto backend = backend_of(document, false);
+    ViewRequest request = request_for(document, mode);
+    request.light.shadows = false;
+    request.width = 640;
+    request.height = 400;
+    backend->show(request);
+    std::optional<ViewFrame> frame;
+    ASSERT_TRUE(comes([&] {
+      frame = backend->take();
+      const bool is_stand_in = frame && frame->mode != mode;
+      EXPECT_TRUE(!is_stand_in || frame->mode == DrawMode::Rays);
+      return frame && frame->mode == mode;
+    }));
+    request.width = frame->colour.width;
+    request.height = frame->colour.height;
+    request.samples = 1;
+    EXPECT_GT(differing(frame->colour, by_processor(sky, request), 8), 0.0);
+  }
 }
 
 TEST_F(DeviceBackendTest, PausesWithoutAnEditLoseNothing) {

@@ -256,6 +256,10 @@ Result<bool> DeviceDrawer::draw_meshes() {
   const bool is_moving = std::exchange(is_request_new_, false);
   if (is_moving) is_settled_ = false;
   if (is_settled_ || (!is_moving && (meshes_->live->pending() > 0 || rests_until()))) return false;
+  // Marched rays stand in for meshes until there are some: an image of the sky alone would be worse.
+  const bool has_stand_in = !options_.rays_on_device;
+  const bool is_empty = meshes_->renderer.stats().triangles == 0 && meshes_->live->pending() > 0;
+  if (has_stand_in && !is_mode_drawn_ && is_empty) return false;
   divisor_ = is_moving ? moving_divisor() : 1;
   samples_ = is_moving && is_processor() ? 1 : std::min(request_->samples, kMeshSamples);
   // What is shown for a moment does not wait for impostors: what has none is shown halved till then.
@@ -356,6 +360,7 @@ Result<bool> DeviceDrawer::draw_path_stage() {
 ViewFrame DeviceDrawer::frame(double seconds) const {
   ViewFrame made;
   made.on_device = picture_;
+  made.mode = request_->mode;
   made.samples = paths_ ? shown_samples_ : picture_->samples();
   made.is_whole = picture_->width() == request_->width && picture_->height() == request_->height;
   made.is_settled = is_settled_;

@@ -104,14 +104,15 @@ class PathMemory {
   PathHistory history_;
 };
 
-/// A picture of what was asked for last, or of what was asked for a moment before.
+/// An image for the last request, or for a request shortly before it.
 struct ViewFrame {
   Image colour;  ///< perhaps smaller than was asked for: to be stretched
   /// Instead of `colour` where the picture stays on a graphics device. The next frame may be drawn into it.
   std::shared_ptr<const VulkanPicture> on_device;
-  int samples = 0;          ///< a pixel
-  bool is_whole = false;    ///< as large as was asked for
-  bool is_settled = false;  ///< nothing better will come of this request
+  DrawMode mode = DrawMode::Rays;  ///< the mode that it shows; a stand-in shows another mode than the request
+  int samples = 0;                 ///< a pixel
+  bool is_whole = false;           ///< as large as was asked for
+  bool is_settled = false;         ///< nothing better will come of this request
   double seconds = 0.0;
   std::int64_t rays = 0;
 };
@@ -141,7 +142,8 @@ class ViewBackend {
   /// From now on this is wanted. The same request again changes nothing.
   virtual void show(const ViewRequest& request) = 0;
 
-  /// The newest frame, if it has not been taken yet.
+  /// The newest frame, if it has not been taken yet. After a change of mode no frame shows the mode before, except
+  /// marched rays that stand in for meshes.
   [[nodiscard]] virtual std::optional<ViewFrame> take() = 0;
 
   /// Whether `take` would have something to draw, so that it should be called soon. Other frames are told of.
@@ -154,8 +156,11 @@ class ViewBackend {
   /// fixed size.
   [[nodiscard]] virtual std::size_t bytes() const { return 0; }
 
-  /// For people, what a picture still waits for: "meshing 120/480"; empty: nothing but its drawing.
+  /// For people, the work that an image waits for: "meshing 120/480". Empty: the image is being drawn.
   [[nodiscard]] virtual std::string activity() const { return {}; }
+
+  /// The completed fraction of meshing, in [0, 1]; nothing while nothing is meshed.
+  [[nodiscard]] virtual std::optional<double> progress() const { return std::nullopt; }
 
   /// Whether pictures of the mode turned out to take too long for anybody to want to start with them.
   [[nodiscard]] virtual bool is_slow(DrawMode /*mode*/) const { return false; }

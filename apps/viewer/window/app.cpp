@@ -139,7 +139,7 @@ bool App::is_moving() const {
 
 bool App::is_animating() const {
   if (screen_->is_minimised()) return is_streaming();
-  return is_moving() || is_streaming() || state_.loader || state_.saver || state_.message ||
+  return is_moving() || is_streaming() || state_.loader || state_.saver || state_.message || state_.waiting_since ||
          ImGui::GetIO().WantTextInput;
 }
 
@@ -237,8 +237,7 @@ void App::place_picture(float top, float right, float bottom) {
                           std::max(output.y - pixels(top) - pixels(bottom), 0)};
 }
 
-void App::ask_for_picture() {
-  if (!state_.open.backend || !state_.has_picture_place()) return;
+ViewRequest App::request_now() const {
   ViewRequest request;
   request.camera = state_.camera.camera();
   request.width = state_.picture_place.w;
@@ -251,6 +250,12 @@ void App::ask_for_picture() {
   request.wireframe = state_.settings.wireframe;
   request.slice = state_.settings.slice;
   request.look = state_.open.look;
+  return request;
+}
+
+void App::ask_for_picture() {
+  if (!state_.open.backend || !state_.has_picture_place()) return;
+  const ViewRequest request = request_now();
   // What was drawn before is another picture, however good.
   if (!asked_ || !is_same(*asked_, request)) state_.stats.is_settled = false;
   asked_ = request;

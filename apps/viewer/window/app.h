@@ -47,6 +47,7 @@ class App {
   void process(const SDL_Event& event);
   void frame();
   void place_picture(float left_top, float right, float bottom);
+  [[nodiscard]] ViewRequest request_now() const;
   void ask_for_picture();
   void take_picture();
   /// Whether what is shown is all that was asked for last.
@@ -99,6 +100,7 @@ class App {
   void take_saved();
   void ask_where_to_save();
   void want_picture();
+  [[nodiscard]] std::optional<Result<Image>> image_in_mode(DrawMode mode) const;
   void save_wanted_pictures();
   void save_picture(const Result<Image>& picture);
   void write_screenshot(const std::filesystem::path& path);
@@ -109,12 +111,12 @@ class App {
     std::vector<std::string> losses;
   };
 
-  /// A picture to be saved: what was asked for when the user wanted it, once that has settled; and what was shown then,
-  /// in case something else is asked for before.
+  /// An image to be saved once its request has settled. If the view changes before that, `shown` is saved: the image on
+  /// the screen when the user pressed the key, or the first one of the request's mode if the mode had just changed.
   struct WantedPicture {
     ViewRequest request;
     ChangeCursor scene;
-    Result<Image> shown;
+    std::optional<Result<Image>> shown;
   };
 
   /// What a look at the levels of detail changed.

@@ -196,26 +196,43 @@ void App::take_saved() {
   if (leaving_ && !state_.open.document->is_dirty()) go_on_leaving();
 }
 
-// What is on the screen now, however soon the view moves on: finished if it is left that long, else as it is.
+// Saves the view of this moment: finished if it stays that long, else as it is shown now. The keys before this one may
+// have changed the view since it was last drawn.
 void App::want_picture() {
-  if (!state_.open.backend || !asked_ || state_.stats.width == 0) return;
-  if (is_settled()) return save_picture(image_of(state_.picture));
-  // A key that is held down asks for one picture.
-  const bool is_wanted = !wanted_.empty() && is_same(wanted_.back().request, *asked_) &&
+  if (!state_.open.backend || !state_.has_picture_place()) return;
+  const ViewRequest request = request_now();
+  if (asked_ && is_same(*asked_, request) && is_settled()) return save_picture(image_of(state_.picture));
+  // A key that is held down asks for one image.
+  const bool is_wanted = !wanted_.empty() && is_same(wanted_.back().request, request) &&
                          !state_.scene().has_changed_since(wanted_.back().scene);
-  if (!is_wanted) wanted_.push_back({*asked_, state_.scene().cursor(), image_of(state_.picture)});
-  state_.tell("the picture is saved once it is done");
+  if (!is_wanted) wanted_.push_back({request, state_.scene().cursor(), image_in_mode(request.mode)});
+  state_.tell("the image is saved once it is done");
+}
+
+// The image on the screen if it shows that mode.
+std::optional<Result<Image>> App::image_in_mode(DrawMode mode) const {
+  if (state_.stats.width == 0 || state_.picture.mode != mode) return std::nullopt;
+  return image_of(state_.picture);
 }
 
 void App::save_wanted_pictures() {
-  if (wanted_.empty()) return;
-  std::erase_if(wanted_, [&](const WantedPicture& wanted) {
-    const bool is_same_scene = !state_.scene().has_changed_since(wanted.scene);
-    const bool is_wanted_still = state_.open.backend && asked_ && is_same(*asked_, wanted.request) && is_same_scene;
-    if (is_wanted_still && !is_settled()) return false;
-    save_picture(is_wanted_still ? image_of(state_.picture) : wanted.shown);
-    return true;
-  });
+  std::vector<WantedPicture> waiting;
+  for (WantedPicture& wanted : std::exchange(wanted_, {})) {
+    const bool is_drawing = state_.open.backend && asked_;
+    const bool is_current =
+        is_drawing && is_same(*asked_, wanted.request) && !state_.scene().has_changed_since(wanted.scene);
+    const bool is_done = is_current && is_settled();
+    if (is_done || !wanted.shown) wanted.shown = image_in_mode(wanted.request.mode);
+    const bool may_come = is_drawing && asked_->mode == wanted.request.mode;
+    if (!is_done && (is_current || (!wanted.shown && may_come))) {
+      waiting.push_back(std::move(wanted));
+    } else if (wanted.shown) {
+      save_picture(*wanted.shown);
+    } else {
+      state_.tell(make_error(ErrorCode::Cancelled, "cannot save the image: the mode changed before it was drawn"));
+    }
+  }
+  wanted_ = std::move(waiting);
 }
 
 void App::save_picture(const Result<Image>& picture) {

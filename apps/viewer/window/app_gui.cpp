@@ -74,6 +74,7 @@ void App::draw_gui() {
 // Nothing but what went wrong stands before the picture.
 void App::draw_bare() {
   place_picture(0.0F, 0.0F, 0.0F);
+  draw_progress(state_, static_cast<float>(gui_->scale()), 0.0F);
   if (state_.message && !state_.message->is_error) state_.message.reset();
   if (state_.message) draw_message(state_, 0.0F);
 }
@@ -87,6 +88,7 @@ void App::draw_bars() {
   place_picture(top, right, bottom);
   draw_help(state_, scale);
   if (!state_.open.backend && !state_.loader && !chooser_.is_shown()) draw_welcome(state_, choice);
+  draw_progress(state_, scale, top);
   if (state_.message) draw_message(state_, bottom);
   for (const Command command : choice.commands) run_command(command);
   if (choice.recent) leave({false, *choice.recent});

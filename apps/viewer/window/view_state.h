@@ -72,6 +72,8 @@ struct ViewState {
   double last_wait_seconds = 0.0;
   std::chrono::steady_clock::time_point edited_at{};  ///< the document, last
 
+  /// Since when the image shows another mode than the settings, or chunks remain to be meshed.
+  std::optional<std::chrono::steady_clock::time_point> waiting_since;
   std::optional<Message> message;
   bool is_help_shown = false;
   std::unique_ptr<Loader> loader;

@@ -1,6 +1,7 @@
 #include "viewer.h"
 
 #include <SDL.h>
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <utility>
@@ -10,12 +11,30 @@
 #include <gtest/gtest.h>
 #include <quoin/io/picture_files.h>
 #include <quoin/render/cpu_renderer.h>
+#include <quoin/render/path_tracer.h>
 
 #include "viewer/viewer_fixture.h"
 #include "viewer/window/process_facts_for_tests.h"
 
 namespace quoin::viewer {
 namespace {
+
+/// Changes the working folder for a while, where the viewer saves images and starts to look for files.
+class WorkingFolder {
+ public:
+  explicit WorkingFolder(const std::filesystem::path& folder) : before_(std::filesystem::current_path()) {
+    std::filesystem::current_path(folder);
+  }
+  WorkingFolder(const WorkingFolder&) = delete;
+  WorkingFolder& operator=(const WorkingFolder&) = delete;
+  ~WorkingFolder() {
+    std::error_code ignored;
+    std::filesystem::current_path(before_, ignored);
+  }
+
+ private:
+  std::filesystem::path before_;
+};
 
 /// A viewer whose window nobody sees.
 class ViewerTest : public ::testing::Test {
@@ -113,6 +132,73 @@ TEST_F(ViewerTest, ADroppedFileIsOpened) {
   });
   ASSERT_TRUE(status) << to_string(status.error());
   EXPECT_TRUE(std::filesystem::exists(given.screenshot));
+}
+
+SDL_Event key(SDL_Keycode code, bool is_down, int modifiers = 0) {
+  SDL_Event event{};
+  event.type = is_down ? SDL_KEYDOWN : SDL_KEYUP;
+  event.key.keysym.sym = code;
+  event.key.keysym.scancode = SDL_GetScancodeFromKey(code);
+  event.key.keysym.mod = static_cast<Uint16>(modifiers);
+  return event;
+}
+
+void press(SDL_Keycode code, int modifiers = 0) {
+  for (const bool is_down : {true, false}) {
+    SDL_Event event = key(code, is_down, modifiers);
+    SDL_PushEvent(&event);
+  }
+}
+
+bool is_open(const std::string& file) {
+  for (Uint32 id = 1; id < 1000; ++id) {
+    SDL_Window* const window = SDL_GetWindowFromID(id);
+    if (window != nullptr && std::string(SDL_GetWindowTitle(window)).starts_with(file)) return true;
+  }
+  return false;
+}
+
+/// Ends a viewer that never comes to the state that a test waits for.
+class Deadline {
+ public:
+  [[nodiscard]] bool is_over() const { return std::chrono::steady_clock::now() > end_; }
+
+ private:
+  std::chrono::steady_clock::time_point end_ = std::chrono::steady_clock::now() + std::chrono::seconds(200);
+};
+
+// The key for the mode and the one for the image come within one frame.
+TEST_F(ViewerTest, SavesAnImageOfTheModeThatWasJustChosen) {
+  ViewerOptions given = options(320, 240);
+  given.screenshot.clear();
+  const WorkingFolder inside(folder_.file(""));
+  const auto marched = folder_.file("hill-1.png");
+  const auto traced = folder_.file("hill-2.png");
+  const Deadline deadline;
+  bool has_asked = false;
+  bool has_asked_before = false;
+  const Status status = run_viewer(given, [&] {
+    if (!std::filesystem::exists(marched)) {
+      if (is_open("hill.vox") && !std::exchange(has_asked_before, true)) press(SDLK_F12);
+    } else if (!std::exchange(has_asked, true)) {
+      press(SDLK_F3);
+      press(SDLK_F12);
+    }
+    return std::filesystem::exists(traced) || deadline.is_over();
+  });
+  ASSERT_TRUE(status) << to_string(status.error());
+  const auto shot = read_png(traced);
+  ASSERT_TRUE(shot) << "nothing was saved";
+  const auto document = Document::open(given.file);
+  ASSERT_TRUE(document);
+  const Scene& scene = (*document)->scene();
+  ViewRequest request;
+  request.mode = DrawMode::Paths;
+  request.light = natural_light();
+  const auto picture = PathTracer(scene).render(frame_scene(scene, View::Iso, 320.0 / 240.0),
+                                                path_options(request, 320, 240, kPathSamples, scene.bounds()));
+  ASSERT_TRUE(picture);
+  EXPECT_EQ(shot->rgb, develop(*picture, develop_options(request)).value().rgb);
 }
 
 TEST_F(ViewerTest, EndsAtOnceWhenInterrupted) {

@@ -85,6 +85,11 @@ void draw_view_menu(const ViewState& state, MenuChoice& choice) {
   ImGui::EndMenu();
 }
 
+/// As the menu has it.
+const char* mode_name(DrawMode mode) {
+  return info_of(static_cast<Command>(static_cast<int>(Command::DrawRays) + static_cast<int>(mode))).name;
+}
+
 std::string hover_text(const ViewState& state) {
   if (state.loader) return state.loader->stage() + " " + state.loader->path().filename().string();
   if (!state.hover) return state.open.backend ? "" : "no file";
@@ -224,6 +229,35 @@ void draw_message(ViewState& state, float bottom) {
   ImGui::PopStyleColor();
   ImGui::PopStyleVar();
   if (is_clicked) state.message.reset();
+}
+
+void draw_progress(ViewState& state, float scale, float top) {
+  constexpr std::chrono::milliseconds kShort{250};  // a note that soon goes again is only in the way
+  const bool has_image = state.open.backend != nullptr && state.stats.width > 0;
+  const bool is_stand_in = has_image && state.picture.mode != state.settings.mode;
+  const auto progress = has_image ? state.open.backend->progress() : std::nullopt;
+  if (!is_stand_in && !progress) {
+    state.waiting_since.reset();
+    return;
+  }
+  const auto now = std::chrono::steady_clock::now();
+  if (!state.waiting_since) state.waiting_since = now;
+  if (now - *state.waiting_since < kShort) return;
+  const auto unit = static_cast<float>(1.0 / state.pixels_per_unit);
+  const SDL_Rect& place = state.picture_place;
+  const float middle = (static_cast<float>(place.x) + 0.5F * static_cast<float>(place.w)) * unit;
+  ImGui::SetNextWindowPos({middle, top + 12.0F}, ImGuiCond_Always, {0.5F, 0.0F});
+  ImGui::SetNextWindowBgAlpha(0.92F);
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 6.0F);
+  ImGui::Begin("progress", nullptr,
+               bar_flags() | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoFocusOnAppearing |
+                   ImGuiWindowFlags_NoInputs);
+  const std::string activity = state.open.backend->activity();
+  ImGui::Text("%s: %s", mode_name(state.settings.mode), activity.empty() ? "drawing" : activity.c_str());
+  if (progress) ImGui::ProgressBar(static_cast<float>(*progress), {220.0F * scale, 6.0F * scale}, "");
+  if (is_stand_in) ImGui::TextDisabled("shown until then: %s", mode_name(state.picture.mode));
+  ImGui::End();
+  ImGui::PopStyleVar();
 }
 
 void draw_welcome(const ViewState& state, MenuChoice& choice) {

@@ -27,6 +27,9 @@ float draw_panel(ViewState& state, float scale, float top, float bottom, MenuCho
 void draw_help(ViewState& state, float scale);
 /// A note over the picture: errors, what was saved. Requires: `state.message`.
 void draw_message(ViewState& state, float bottom);
+/// A note over the image while it does not show the mode of the settings, or not all of it: the work that is left, how
+/// far it has come, and the mode that is shown meanwhile.
+void draw_progress(ViewState& state, float scale, float top);
 /// What an empty window says.
 void draw_welcome(const ViewState& state, MenuChoice& choice);
 
