@@ -189,6 +189,7 @@ struct CpuBackend::Impl {
 };
 
 void CpuBackend::Impl::work() {
+  yield_to_window();
   std::unique_lock lock(mutex);
   for (;;) {
     wake.wait(lock, [this] { return has_work(); });

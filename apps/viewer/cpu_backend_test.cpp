@@ -2,8 +2,14 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <filesystem>
 #include <mutex>
 #include <random>
+#include <string>
+
+#ifdef __linux__
+#include <sys/resource.h>
+#endif
 
 #include <gtest/gtest.h>
 #include <quoin/render/cpu_renderer.h>
@@ -205,6 +211,25 @@ TEST(CpuBackend, ShowsNoFrameOfTheModeBefore) {
     watched.backend.show(request);
   }
 }
+
+#ifdef __linux__
+TEST(CpuBackend, DrawsAtALowerPriorityThanTheWindow) {
+  const auto yielding = [] {
+    int count = 0;
+    for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
+      const auto thread = static_cast<id_t>(std::stoul(task.path().filename().string()));
+      count += ::getpriority(PRIO_PROCESS, thread) > ::getpriority(PRIO_PROCESS, 0) ? 1 : 0;
+    }
+    return count;
+  };
+  const int before = yielding();
+  const LoadedScene loaded = small_scene();
+  Watched watched(loaded.scene);
+  watched.backend.show(request_for(loaded.scene, View::Iso));
+  ASSERT_FALSE(watched.settle().empty());
+  EXPECT_GT(yielding(), before);
+}
+#endif
 
 TEST(CpuBackend, PicturesBecomeFiner) {
   const LoadedScene loaded = small_scene();

@@ -165,6 +165,7 @@ void DeviceBackend::Impl::wait_for_work(std::unique_lock<std::mutex>& lock) {
 }
 
 void DeviceBackend::Impl::work() {
+  yield_to_window();
   std::unique_lock lock(mutex);
   for (;;) {
     wait_for_work(lock);

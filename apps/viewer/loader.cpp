@@ -18,6 +18,7 @@ Loader::Loader(std::filesystem::path path, const LoadOptions& options, const Wor
                MakeBackend make_backend, std::function<void()> on_done)
     : path_(std::move(path)) {
   thread_ = std::thread([this, options, world, make = std::move(make_backend), done = std::move(on_done)] {
+    yield_to_window();
     try {
       work(options, world, make);
     } catch (const std::bad_alloc&) {
@@ -72,6 +73,7 @@ Result<OpenDocument> Loader::take() {
 Saver::Saver(const Document& document, std::filesystem::path path, bool accepts_losses, std::function<void()> on_done)
     : path_(std::move(path)), state_(document.history().state()) {
   thread_ = std::thread([this, &document, accepts_losses, done = std::move(on_done)] {
+    yield_to_window();
     try {
       status_ = work(document, accepts_losses);
     } catch (const std::bad_alloc&) {

@@ -2,7 +2,20 @@
 
 #include <algorithm>
 
+#ifdef __linux__
+#include <sys/resource.h>
+#include <unistd.h>
+#endif
+
 namespace quoin::viewer {
+
+void yield_to_window() {
+#ifdef __linux__
+  constexpr int kNice = 5;  // a third of the processor time of a thread at 0, where both want all of it
+  const auto thread = static_cast<id_t>(::gettid());
+  if (::getpriority(PRIO_PROCESS, thread) < kNice) ::setpriority(PRIO_PROCESS, thread, kNice);
+#endif
+}
 
 double seconds_known(double known, double measured) {
   constexpr double kNews = 0.3;  // the share of what is new

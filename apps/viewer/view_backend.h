@@ -28,6 +28,10 @@ inline double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+/// Lowers the priority of the calling thread and of the threads that it starts, so that threads that draw do not delay
+/// the window's thread, nor the display's process. Does nothing where the system has no priority for a thread.
+void yield_to_window();
+
 /// Times as long as a picture in motion should take is what lets its size be as it was: it does not go to and fro.
 inline constexpr double kConstancy = 1.3;
 /// What is known of a time, in seconds, after one more measurement of it; 0: nothing was known. One measurement says

@@ -160,16 +160,20 @@ void App::wait_and_process() {
     has_event = patience > 0 ? SDL_WaitEventTimeout(&event, patience) != 0 : SDL_PollEvent(&event) != 0;
   }
   std::set<SDL_Scancode> pressed;
+  std::set<Uint8> used_buttons;
   bool is_mouse_moved = false;
   for (; has_event; has_event = SDL_PollEvent(&event) != 0) {
-    // The GUI looks at keys once a frame: one that is let go at once would never have been down. It also learns there
-    // what the mouse is over, which whoever presses a button has to know.
+    // The GUI reads keys and buttons once per frame: it would miss a key or a button that is released within a frame,
+    // and a click of a double click. It also finds the part under the mouse there, which a click depends on.
     const bool is_let_go = event.type == SDL_KEYUP && pressed.contains(event.key.keysym.scancode);
-    if (is_let_go || (event.type == SDL_MOUSEBUTTONDOWN && is_mouse_moved)) {
+    const bool is_button = event.type == SDL_MOUSEBUTTONDOWN || event.type == SDL_MOUSEBUTTONUP;
+    const bool is_second_use = is_button && used_buttons.contains(event.button.button);
+    if (is_let_go || is_second_use || (event.type == SDL_MOUSEBUTTONDOWN && is_mouse_moved)) {
       postponed_ = event;
       return;
     }
     if (event.type == SDL_KEYDOWN) pressed.insert(event.key.keysym.scancode);
+    if (is_button) used_buttons.insert(event.button.button);
     is_mouse_moved |= event.type == SDL_MOUSEMOTION;
     process(event);
   }

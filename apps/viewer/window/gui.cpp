@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 namespace quoin::viewer {
 
@@ -116,7 +117,19 @@ void Gui::process(const SDL_Event& event) {
   if (event.type == SDL_MOUSEBUTTONDOWN) {
     mouse_ = {static_cast<float>(event.button.x), static_cast<float>(event.button.y)};
   }
-  if (event.type == SDL_WINDOWEVENT && event.window.event == SDL_WINDOWEVENT_LEAVE) mouse_ = {-1e6F, -1e6F};
+  if (event.type == SDL_MOUSEBUTTONDOWN || event.type == SDL_MOUSEBUTTONUP) note_button(event.button);
+  if (event.type != SDL_WINDOWEVENT) return;
+  if (event.window.event == SDL_WINDOWEVENT_LEAVE) mouse_ = {-1e6F, -1e6F};
+  if (event.window.event == SDL_WINDOWEVENT_FOCUS_LOST) is_down_ = {};
+}
+
+void Gui::note_button(const SDL_MouseButtonEvent& button) {
+  constexpr std::array kButtons = {SDL_BUTTON_LEFT, SDL_BUTTON_RIGHT, SDL_BUTTON_MIDDLE};  // in ImGui's order
+  for (std::size_t i = 0; i < kButtons.size(); ++i) {
+    if (button.button != kButtons.at(i)) continue;
+    is_down_.at(i) = button.type == SDL_MOUSEBUTTONDOWN;
+    if (is_down_.at(i)) clicks_.at(i) = button.clicks;
+  }
 }
 
 void Gui::begin_frame() {
@@ -124,9 +137,18 @@ void Gui::begin_frame() {
   // The backend asks OpenGL for the output's size, which the renderer need not be.
   const auto ratio = static_cast<float>(screen_->pixels_per_unit());
   ImGui::GetIO().DisplayFramebufferScale = {ratio, ratio};
-  // It also asks the display where the mouse is, which may not know yet what the events say.
-  ImGui::GetIO().MousePos = mouse_;
+  // It also asks the display for the mouse, whose state may be newer than the events of this frame.
+  ImGuiIO& io = ImGui::GetIO();
+  io.MousePos = mouse_;
+  for (std::size_t i = 0; i < is_down_.size(); ++i) io.MouseDown[i] = is_down_.at(i);
   ImGui::NewFrame();
+  // ImGui counts clicks by the times of frames, which are late while a frame takes long. The events know better.
+  for (std::size_t i = 0; i < clicks_.size(); ++i) {
+    const int clicks = std::exchange(clicks_.at(i), 0);
+    if (clicks == 0 || !io.MouseClicked[i]) continue;
+    io.MouseClickedCount[i] = io.MouseClickedLastCount[i] = static_cast<ImU16>(clicks);
+    io.MouseDoubleClicked[i] = clicks == 2;
+  }
 }
 
 const ImDrawData& Gui::end_frame() {

@@ -3,6 +3,8 @@
 #include <SDL.h>
 #include <imgui.h>
 
+#include <array>
+
 #include "screen.h"
 
 namespace quoin::viewer {
@@ -29,11 +31,14 @@ class Gui {
 
  private:
   Status load_font();
+  void note_button(const SDL_MouseButtonEvent& button);
 
   Screen* screen_;
   double scale_;
   Status status_;
   ImVec2 mouse_{-1e6F, -1e6F};
+  std::array<bool, 3> is_down_{};  // left, right, middle, by the events so far
+  std::array<int, 3> clicks_{};    // of the buttons pressed since the last frame, as SDL counts them
 };
 
 /// How large things should be on the display that shows the screen's window: 1 where it has some 96 dots an inch.

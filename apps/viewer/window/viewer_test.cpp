@@ -150,6 +150,34 @@ void press(SDL_Keycode code, int modifiers = 0) {
   }
 }
 
+SDL_Event button(bool is_down, int x, int y, int clicks) {
+  SDL_Event event{};
+  event.type = is_down ? SDL_MOUSEBUTTONDOWN : SDL_MOUSEBUTTONUP;
+  event.button = {event.type,
+                  0,
+                  0,
+                  0,
+                  SDL_BUTTON_LEFT,
+                  static_cast<Uint8>(is_down ? SDL_PRESSED : SDL_RELEASED),
+                  static_cast<Uint8>(clicks),
+                  0,
+                  x,
+                  y};
+  return event;
+}
+
+void click(int x, int y, int clicks) {
+  SDL_Event motion{};
+  motion.type = SDL_MOUSEMOTION;
+  motion.motion.x = x;
+  motion.motion.y = y;
+  SDL_PushEvent(&motion);
+  for (const bool is_down : {true, false}) {
+    SDL_Event event = button(is_down, x, y, clicks);
+    SDL_PushEvent(&event);
+  }
+}
+
 bool is_open(const std::string& file) {
   for (Uint32 id = 1; id < 1000; ++id) {
     SDL_Window* const window = SDL_GetWindowFromID(id);
@@ -199,6 +227,37 @@ TEST_F(ViewerTest, SavesAnImageOfTheModeThatWasJustChosen) {
                                                 path_options(request, 320, 240, kPathSamples, scene.bounds()));
   ASSERT_TRUE(picture);
   EXPECT_EQ(shot->rgb, develop(*picture, develop_options(request)).value().rgb);
+}
+
+// However long frames take, SDL says which click is a double one.
+TEST_F(ViewerTest, OpensTheFileThatIsDoubleClicked) {
+  using std::chrono::milliseconds;
+  const WorkingFolder inside(folder_.file(""));
+  ::setenv("XDG_CONFIG_HOME", folder_.file("config").c_str(), 1);
+  ViewerOptions given = options(480, 320);
+  given.file.clear();
+  given.is_bare = false;
+  // Within one frame; and further apart than ImGui allows, but not SDL.
+  for (const milliseconds apart : {milliseconds(0), milliseconds(400)}) {
+    std::filesystem::remove(given.screenshot);
+    const auto start = std::chrono::steady_clock::now();
+    int clicks = 0;
+    const Status status = run_viewer(given, [&] {
+      constexpr milliseconds kPause(800);
+      constexpr int kRows = 10;  // tried upwards for the line of the file, to below the button above the list
+      const int row = clicks / 2;
+      const int y = 129 - 7 * row;
+      if (clicks == 0) press(SDLK_o, KMOD_CTRL);
+      if (is_open("hill.vox")) return std::chrono::steady_clock::now() - start > std::chrono::seconds(60);
+      const auto due = (row + 1) * kPause + (clicks % 2) * apart;
+      if (std::chrono::steady_clock::now() - start < due) return false;
+      click(240, y, 1 + clicks++ % 2);
+      if (clicks % 2 == 1 && apart == milliseconds(0)) click(240, y, 1 + clicks++ % 2);
+      return row >= kRows;
+    });
+    ASSERT_TRUE(status) << to_string(status.error());
+    EXPECT_TRUE(std::filesystem::exists(given.screenshot)) << "clicks " << apart.count() << " ms apart open nothing";
+  }
 }
 
 TEST_F(ViewerTest, EndsAtOnceWhenInterrupted) {
