@@ -1,9 +1,11 @@
 #include "cpu_backend.h"
 
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <filesystem>
 #include <mutex>
+#include <numbers>
 #include <random>
 #include <string>
 
@@ -189,6 +191,29 @@ TEST(CpuBackend, TheSettledPictureIsTheRenderersToTheByte) {
     EXPECT_TRUE(frames.back().is_whole);
     EXPECT_EQ(frames.back().samples, 4);
     EXPECT_GT(frames.back().rays, 0);
+  }
+}
+
+// Path-traced images of the night are no darker than half of the marched ones.
+TEST(CpuBackend, PathsShowTheNightAsRaysDo) {
+  const LoadedScene loaded = small_scene();
+  const auto mean = [](const Image& image) {
+    double sum = 0.0;
+    for (const auto value : image.rgb) sum += value;
+    return sum / static_cast<double>(image.rgb.size());
+  };
+  for (const double degrees : {30.0, -5.0, -20.0, -60.0}) {
+    const double radians = degrees * std::numbers::pi / 180.0;
+    ViewRequest request = request_for(loaded.scene, View::Iso, 48, 32);
+    request.light = natural_light();
+    request.light.sun = {0.0, std::sin(radians), std::cos(radians)};
+    const double marched = mean(expected(loaded.scene, request));
+    const auto options = path_options(request, 48, 32, 16, loaded.scene.bounds());
+    const auto picture = PathTracer(loaded.scene).render(request.camera, options, {2});
+    ASSERT_TRUE(picture.has_value());
+    const double traced = mean(develop(*picture, develop_options(request)).value());
+    EXPECT_GT(traced, 0.5 * marched) << degrees;
+    EXPECT_LT(traced, 2.0 * marched) << degrees;
   }
 }
 

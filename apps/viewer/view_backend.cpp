@@ -83,7 +83,8 @@ int PathMemory::first_divisor(const ViewRequest& request, std::span<const int> d
 }
 
 DevelopOptions develop_options(const ViewRequest& request) {
-  DevelopOptions options = request.look ? request.look->develop : natural_look().develop;
+  DevelopOptions options =
+      request.look ? request.look->develop : natural_look(SkyModel::Gradient, request.light.sun).develop;
   options.exposure *= request.light.exposure;
   return options;
 }

@@ -1,8 +1,12 @@
 #include <quoin/light/light_options.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <utility>
+
+#include "light/light_model.h"
 
 namespace quoin {
 
@@ -16,13 +20,29 @@ LightOptions natural_light() {
   return options;
 }
 
-NaturalLook natural_look(SkyModel sky) {
+namespace {
+
+// Times the exposure of the day.
+double night_exposure(DVec3 sun) {
+  constexpr double kDusk = -4.0;  // degrees above the horizon
+  constexpr double kNight = -14.0;
+  constexpr double kGain = 4.0;
+  LightOptions light;
+  light.sun = sun;
+  const double degrees = std::asin(std::clamp(to_sun(light).y, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+  const double s = std::clamp((kDusk - degrees) / (kDusk - kNight), 0.0, 1.0);
+  return 1.0 + (kGain - 1.0) * s * s * (3.0 - 2.0 * s);
+}
+
+}  // namespace
+
+NaturalLook natural_look(SkyModel sky, DVec3 sun) {
   constexpr double kGradientExposure = 1.3;
   constexpr double kPhysicalExposure = 2.0;
   NaturalLook natural;
-  natural.look.sun = natural_light().sun;
+  natural.look.sun = sun;
   natural.look.sky = sky;
-  if (sky == SkyModel::Gradient) natural.develop.exposure = kGradientExposure;
+  if (sky == SkyModel::Gradient) natural.develop.exposure = kGradientExposure * night_exposure(sun);
   if (sky == SkyModel::Physical) natural.develop.exposure = kPhysicalExposure;
   if (sky == SkyModel::Uniform) {
     natural.develop.tone = ToneCurve::Clamp;

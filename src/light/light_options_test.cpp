@@ -1,6 +1,8 @@
 #include <quoin/light/light_options.h>
 
+#include <cmath>
 #include <functional>
+#include <numbers>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -38,6 +40,22 @@ TEST(LightOptions, NaturalLookIsBrightUnderEverySky) {
   EXPECT_EQ(natural_look(SkyModel::Uniform).ground_colour, Vec3(1.0F));
   EXPECT_EQ(natural_look(SkyModel::Environment).develop, DevelopOptions{});
   EXPECT_EQ(Look{}.sky, SkyModel::Physical) << "the library's default stays";
+}
+
+TEST(LightOptions, NaturalLookBrightensTheNight) {
+  const auto exposure = [](double degrees, SkyModel sky = SkyModel::Gradient) {
+    const double radians = degrees * std::numbers::pi / 180.0;
+    return natural_look(sky, {2.0 * std::cos(radians), 2.0 * std::sin(radians), 0.0}).develop.exposure;
+  };
+  const double day = natural_look().develop.exposure;
+  for (const double degrees : {90.0, 30.0, 0.0, -3.9}) EXPECT_EQ(exposure(degrees), day) << degrees;
+  for (double degrees = 0.0; degrees > -90.0; degrees -= 0.5) {
+    EXPECT_GE(exposure(degrees - 0.5), exposure(degrees)) << degrees;
+    EXPECT_LT(exposure(degrees - 0.5), 1.15 * exposure(degrees)) << degrees << ": dusk is no step";
+  }
+  EXPECT_DOUBLE_EQ(exposure(-20.0), 4.0 * day);
+  EXPECT_EQ(exposure(-60.0), exposure(-20.0));
+  EXPECT_EQ(exposure(-60.0, SkyModel::Uniform), exposure(60.0, SkyModel::Uniform)) << "its light does not change";
 }
 
 TEST(LightOptions, FieldsHaveLongerOcclusionRaysInNaturalLightAlone) {

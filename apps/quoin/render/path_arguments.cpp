@@ -267,7 +267,7 @@ Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions&
   PathPlan plan;
   PathOptions& options = plan.options;
   const bool has_look = loaded.look && arguments.look == "file";
-  const NaturalLook natural = natural_look(sky_of(arguments));
+  const NaturalLook natural = natural_look(sky_of(arguments), render.light.sun);
   static_cast<Look&>(options) = natural.look;
   plan.develop = natural.develop;
   options.sun = render.light.sun;

@@ -95,13 +95,15 @@ struct NaturalLook {
 };
 
 /// Returns the environment, exposure and tone curve of the command-line tool and the viewer under `sky`, for scenes
-/// whose file has no render settings. Look{} and DevelopOptions{} are the library's defaults and differ.
+/// whose file has no render settings. `sun` points towards the sun; any length but 0. Look{} and DevelopOptions{} are the
+/// library's defaults and differ.
 ///
-/// Gradient:    the default: a pale background and bright shadows.
+/// Gradient:    the default: a pale background and bright shadows. While the sun sinks from 4 to 14 degrees below the
+///              horizon the exposure rises to four times that of the day, or the tone curve would leave the night black.
 /// Physical:    twice the light, which a clear sky's dark blue shadows need.
 /// Uniform:     colours as they are and a white ground: a white surface is as white as the background.
 /// Environment: the image's own light.
-[[nodiscard]] NaturalLook natural_look(SkyModel sky = SkyModel::Gradient);
+[[nodiscard]] NaturalLook natural_look(SkyModel sky = SkyModel::Gradient, DVec3 sun = natural_light().sun);
 
 /// Errors: InvalidArgument, with the option's name, when a number is not finite (but for shadow_distance_voxels) or out
 ///         of range: a sun of length 0, fewer than 1 or more than 4,096 occlusion rays, negative distances or exposure,

@@ -1,5 +1,8 @@
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -24,9 +27,9 @@ Scene white_block() {
 }
 
 // `from`: the camera's direction from the block's middle.
-Image natural_image(DVec3 from, SkyModel sky, bool has_ground) {
+Image natural_image(DVec3 from, SkyModel sky, bool has_ground, DVec3 sun = natural_light().sun) {
   const Scene scene = white_block();
-  const NaturalLook natural = natural_look(sky);
+  const NaturalLook natural = natural_look(sky, sun);
   PathOptions options;
   static_cast<Look&>(options) = natural.look;
   options.width = options.height = kSize;
@@ -39,18 +42,20 @@ Image natural_image(DVec3 from, SkyModel sky, bool has_ground) {
   return image ? std::move(*image) : Image{};
 }
 
-// The least channel's mean over a square of pixels.
-double darkest_channel(const Image& image, int x, int y, int size) {
-  double least = 255.0;
+// Each channel's mean over a square of pixels.
+std::array<double, 3> channel_means(const Image& image, int x, int y, int size) {
+  std::array<double, 3> means{};
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    double sum = 0.0;
     for (int i = 0; i < size * size; ++i) {
       const auto pixel = static_cast<std::size_t>((y + i / size) * image.width + x + i % size);
-      sum += image.rgb[3 * pixel + channel];
+      means.at(channel) += static_cast<double>(image.rgb[3 * pixel + channel]) / (size * size);
     }
-    least = std::min(least, sum / (size * size));
   }
-  return least;
+  return means;
+}
+
+double darkest_channel(const Image& image, int x, int y, int size) {
+  return std::ranges::min(channel_means(image, x, y, size));
 }
 
 double middle_of_image(const Image& image) {
@@ -73,6 +78,22 @@ TEST(NaturalLook, WhiteInFullShadowIsNotDark) {
       EXPECT_GE(shadow, 60.0) << static_cast<int>(sky);
       const double lit = middle_of_image(natural_image(glm::normalize(DVec3(-side.x, 0.05, -side.z)), sky, false));
       EXPECT_GT(lit, shadow + 10.0) << static_cast<int>(sky) << ": shadows still show";
+    }
+  }
+}
+
+// As marched images show it: dark, but not black.
+TEST(NaturalLook, WhiteIsSeenAfterSunset) {
+  for (const double degrees : {-5.0, -20.0, -60.0}) {
+    const double radians = degrees * std::numbers::pi / 180.0;
+    const DVec3 sun{0.6 * std::cos(radians), std::sin(radians), 0.8 * std::cos(radians)};
+    for (const DVec3& side : {DVec3(1.0, 0.05, 0.0), DVec3(0.0, 0.05, -1.0), DVec3(0.1, 1.0, 0.1)}) {
+      const Image image = natural_image(glm::normalize(side), SkyModel::Gradient, false, sun);
+      const double white = std::ranges::max(channel_means(image, kSize / 2 - 2, kSize / 2 - 2, 4));
+      const double sky = std::ranges::max(channel_means(image, 0, 0, 3));
+      EXPECT_GE(white, 60.0) << degrees << ", " << side.x;
+      EXPECT_LE(white, 170.0) << degrees << ", " << side.x;
+      EXPECT_GE(sky, 45.0) << degrees << ", " << side.x;
     }
   }
 }
