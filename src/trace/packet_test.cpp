@@ -191,6 +191,48 @@ TEST_P(Packets, AgreeWithPlainOnesAndOneByOne) {
   EXPECT_GT(hits, 500);
 }
 
+// Numbers in lanes without data change no bit, however small they are.
+TEST_P(Packets, AreTheSameWhateverInactiveLanesHold) {
+  const InstructionSetOverride over(set());
+  int hits = 0;
+  for (int i = 0; i < 1'000; ++i) {
+    RayPacket rays = whole(0, 2) == 0 ? bunch() : packet();
+    rays.active &= static_cast<std::uint32_t>(whole(1, 0xFFFF));
+    PacketHits expected;
+    first_hits(tree_, rays, expected);
+    const std::uint32_t blocked = any_hits(tree_, rays);
+    hits += std::popcount(blocked);
+    for (const double number : {0.0, 1e-40, -1e-310, 1e-310, 1e300, kInfinity, std::nan("")}) {
+      for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+        if ((rays.active >> lane & 1U) != 0) continue;
+        const std::uint32_t active = rays.active;
+        rays.set(lane, {DVec3(number), DVec3(number)}, number);
+        rays.active = active;
+      }
+      PacketHits found;
+      first_hits(tree_, rays, found);
+      ASSERT_NO_FATAL_FAILURE(expect_same(expected, found)) << "packet " << i << " with " << number;
+      ASSERT_EQ(any_hits(tree_, rays), blocked) << "packet " << i << " with " << number;
+    }
+  }
+  EXPECT_GT(hits, 100);
+}
+
+TEST_P(Packets, OfRaysThatNearlyStandStillAlongAnAxisAgree) {
+  int hits = 0;
+  for (int i = 0; i < 1'000; ++i) {
+    RayPacket rays;
+    for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+      Ray tiny = ray();
+      tiny.direction[whole(0, 2)] = whole(0, 1) == 0 ? 1e-40 : -1e-310;
+      rays.set(lane, tiny, whole(0, 1) == 0 ? 6.0 : kInfinity);
+    }
+    hits += hits_if_all_agree(tree_, rays, set());
+    ASSERT_FALSE(HasFatalFailure()) << "packet " << i;
+  }
+  EXPECT_GT(hits, 100);
+}
+
 TEST_P(Packets, OfRaysThatGoTheSameWayAgree) {
   int hits = 0;
   for (int i = 0; i < 4'000; ++i) {

@@ -1,6 +1,9 @@
 // rays/*: the 256x128x256 terrain, primary, shadow and occlusion rays, one at a time and in packets; rays/random600.
+// rays/*/subnormal_lanes: the same with subnormal numbers in lanes without data, and how many times as long that takes as
+// with zeros (ratio_to_zeroed, at most 1.1).
 
 #include <bit>
+#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -60,35 +63,105 @@ const Case kShuffled[] = {
      workloads::kOcclusionHits},
 };
 
+int count_hits(Ask ask, const std::vector<RayQuery>& rays) {
+  const OccupancyTree& tree = ray_workload().tree;
+  int hits = 0;
+  for (const RayQuery& query : rays) {
+    hits +=
+        ask == Ask::First ? first_hit(tree, query.ray, query.max_t).has_value() : any_hit(tree, query.ray, query.max_t);
+  }
+  return hits;
+}
+
+int count_hits(Ask ask, const std::vector<RayPacket>& packets) {
+  const OccupancyTree& tree = ray_workload().tree;
+  PacketHits found;
+  int hits = 0;
+  for (const RayPacket& packet : packets) {
+    if (ask == Ask::First) first_hits(tree, packet, found);
+    hits += std::popcount(ask == Ask::First ? found.hit : any_hits(tree, packet));
+  }
+  return hits;
+}
+
 void trace(benchmark::State& state, const Case& c, InstructionSet set) {
   const InstructionSetOverride over(set);
-  const OccupancyTree& tree = ray_workload().tree;
   const std::vector<RayQuery>& rays = c.rays();
   int hits = 0;
-  for (auto _ : state) {
-    hits = 0;
-    for (const RayQuery& query : rays) {
-      hits += c.ask == Ask::First ? first_hit(tree, query.ray, query.max_t).has_value()
-                                  : any_hit(tree, query.ray, query.max_t);
-    }
-  }
+  for (auto _ : state) hits = count_hits(c.ask, rays);
   report(state, rays.size(), hits, c.expected);
 }
 
 void trace_packets(benchmark::State& state, const Case& c, InstructionSet set) {
   const InstructionSetOverride over(set);
-  const OccupancyTree& tree = ray_workload().tree;
   const std::vector<RayPacket> packets = workloads::ray_packets(c.rays());
-  PacketHits found;
   int hits = 0;
-  for (auto _ : state) {
-    hits = 0;
-    for (const RayPacket& packet : packets) {
-      if (c.ask == Ask::First) first_hits(tree, packet, found);
-      hits += std::popcount(c.ask == Ask::First ? found.hit : any_hits(tree, packet));
+  for (auto _ : state) hits = count_hits(c.ask, packets);
+  report(state, c.rays().size(), hits, c.expected);
+}
+
+// Subnormal as a float, and as a double.
+constexpr double kSubnormalFloat = 1e-40;
+constexpr double kSubnormalDouble = 1e-310;
+
+// Rays that stand still along x, by a component that is 0 or subnormal as a float. It follows the origin in memory: a
+// kernel that reads four numbers there has it in its unused lane too.
+std::vector<RayQuery> still_rays(std::vector<RayQuery> rays, double x) {
+  for (RayQuery& query : rays) query.ray.direction.x = x;
+  return rays;
+}
+
+// Makes every second lane of the packets inactive and puts these numbers into it.
+std::vector<RayPacket> sparse_packets(const std::vector<RayQuery>& rays, double xz, double y) {
+  std::vector<RayPacket> packets = workloads::ray_packets(rays);
+  for (RayPacket& packet : packets) {
+    packet.active &= 0x5555U;
+    for (std::size_t i = 1; i < RayPacket::kSize; i += 2) {
+      packet.origin_x[i] = packet.origin_z[i] = packet.direction_x[i] = packet.direction_z[i] = xz;
+      packet.origin_y[i] = packet.direction_y[i] = y;
     }
   }
-  report(state, c.rays().size(), hits, c.expected);
+  return packets;
+}
+
+template <class Rays>
+void compare(benchmark::State& state, Ask ask, const Rays& zeroed, const Rays& subnormal) {
+  using Clock = std::chrono::steady_clock;
+  const auto seconds = [](Clock::time_point from, Clock::time_point to) {
+    return std::chrono::duration<double>(to - from).count();
+  };
+  double of_zeroed = 0.0;
+  double of_subnormal = 0.0;
+  int expected = 0;
+  int hits = 0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    const Clock::time_point start = Clock::now();
+    expected = count_hits(ask, zeroed);
+    state.ResumeTiming();
+    const Clock::time_point middle = Clock::now();
+    hits = count_hits(ask, subnormal);
+    const Clock::time_point end = Clock::now();
+    of_zeroed += seconds(start, middle);
+    of_subnormal += seconds(middle, end);
+  }
+  if (hits != expected || hits == 0) {
+    std::fprintf(stderr, "ray benchmark: %d hits with subnormal lanes, %d with zeroed ones\n", hits, expected);
+    std::exit(1);
+  }
+  state.counters["hits"] = hits;
+  state.counters["ratio_to_zeroed"] = of_subnormal / of_zeroed;
+}
+
+void trace_subnormal(benchmark::State& state, const Case& c, InstructionSet set) {
+  const InstructionSetOverride over(set);
+  compare(state, c.ask, still_rays(c.rays(), 0.0), still_rays(c.rays(), kSubnormalFloat));
+}
+
+void trace_subnormal_packets(benchmark::State& state, const Case& c, InstructionSet set) {
+  const InstructionSetOverride over(set);
+  compare(state, c.ask, sparse_packets(c.rays(), 0.0, 0.0),
+          sparse_packets(c.rays(), kSubnormalFloat, kSubnormalDouble));
 }
 
 [[maybe_unused]] const bool registered = [] {
@@ -100,6 +173,15 @@ void trace_packets(benchmark::State& state, const Case& c, InstructionSet set) {
         ->Unit(benchmark::kMillisecond);
   };
   for (const Case& c : kCases) add(c, "", instruction_set());
+  const auto add_subnormal = [](const Case& c, const char* kind, auto run) {
+    benchmark::RegisterBenchmark(("rays/" + std::string(c.name) + kind + "/subnormal_lanes").c_str(), run, c,
+                                 instruction_set())
+        ->Unit(benchmark::kMillisecond);
+  };
+  for (const Case& c : kCases) {
+    add_subnormal(c, "/single", trace_subnormal);
+    add_subnormal(c, "/packet", trace_subnormal_packets);
+  }
   for (const Case& c : kShuffled) add(c, "/shuffled", instruction_set());
   for (const Case& c : kCases) add(c, "/avx2", InstructionSet::Avx2);
   for (const Case& c : kCases) add(c, "/plain", InstructionSet::Plain);

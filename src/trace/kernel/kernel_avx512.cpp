@@ -80,12 +80,12 @@ inline bool set_up_in_window(const TreeView& tree, const Ray& ray, double max_t,
   const RayNumbers numbers = read_ray(tree, ray);
   const D4 p = numbers.position;
   const F4 d = numbers.direction;
-  const F4 size = numbers.size;
+  const I4 still = numbers.size < all4(0x1p-100F);
+  const F4 size = still ? all4(0.0F) : numbers.size;  // products of subnormal numbers are slow
   const float greatest = numbers.greatest;
   out.max_t = static_cast<float>(max_t);
   const F4 reach = size * out.max_t;
   if (!(out.max_t >= 0.0F && greatest >= 0x1p-20F && greatest <= 0x1p20F)) return false;
-  const I4 still = size < all4(0x1p-100F);
   const I4 own = __builtin_convertvector(floor4(p), I4);
   const I4 last = I4{tree.brick_sizes.x, tree.brick_sizes.y, tree.brick_sizes.z, 0} * 16 - kWindowMargin;
   const I4 is_outside = (own < kWindowMargin) | (own >= last) | ((size * kWindowRatio < greatest) & ~still);

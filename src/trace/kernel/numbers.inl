@@ -47,8 +47,8 @@ constexpr int kCodeY = 4 + 256 * 8;
 constexpr int kCodeZ = 16 + 256 * 64;
 constexpr int kLeft = 256 * (4 + 4 * 8 + 4 * 64);
 
-// Four numbers side by side: x, y, z and an unused one. Divisors have 1 there: processors take a slow path for
-// subnormal numbers, in lanes without data too.
+// Four numbers side by side: x, y, z and an unused one. Divisors have 1 there, positions 0: processors take a slow path
+// for subnormal numbers, in lanes without data too.
 using F4 = float __attribute__((vector_size(16)));
 using I4 = std::int32_t __attribute__((vector_size(16)));
 using D4 = double __attribute__((vector_size(32)));
@@ -113,7 +113,8 @@ inline RayNumbers read_ray(const TreeView& tree, const Ray& ray) {
   std::memcpy(&corner, tree.corner, sizeof corner);
   const F4 d = __builtin_convertvector(__builtin_shufflevector(direction, D4{1.0, 1.0, 1.0, 1.0}, 1, 2, 3, 4), F4);
   const F4 size = max4(d, -d);
-  return {position - corner, d, size, greatest3(size)};
+  position = __builtin_shufflevector(position - corner, D4{}, 0, 1, 2, 4);  // its last lane held the direction's x
+  return {position, d, size, greatest3(size)};
 }
 
 struct SingleHit {
@@ -167,7 +168,7 @@ inline bool bring_near(const TreeView& tree, const Ray& ray, double max_t, D4& p
   const double direction[3] = {ray.direction.x, ray.direction.y, ray.direction.z};
   Move move{{position[0], position[1], position[2]}, max_t, -1};
   if (!move_to_bounds(tree, direction, move)) return false;
-  position = D4{move.position[0], move.position[1], move.position[2], move.position[2]};
+  position = D4{move.position[0], move.position[1], move.position[2], 0.0};
   limit = static_cast<float>(move.max_t);
   moved = move.entered;
   return true;

@@ -329,8 +329,10 @@ inline std::uint32_t measure_some(const TreeView& tree, const RayPacket& rays, c
   const Doubles direction = of_axis(rays.direction_x, rays.direction_y, rays.direction_z);
   const Longs is_forward = direction > 0.0;
   const Doubles plane = lower + (is_forward ? Doubles{} : Doubles{} + 1.0);
-  const Doubles distance = (plane - of_axis(rays.origin_x, rays.origin_y, rays.origin_z)) * (1.0 / direction);
   const Longs lane = lane_bits();
+  const Longs is_hit = (lane & static_cast<std::int64_t>(lanes.hit >> first)) != 0;
+  const Doubles divisor = is_hit ? direction : Doubles{} + 1.0;
+  const Doubles distance = (plane - of_axis(rays.origin_x, rays.origin_y, rays.origin_z)) * (1.0 / divisor);
   const Longs inside = (lane & static_cast<std::int64_t>(lanes.starts_inside >> first)) != 0;
   const Doubles result = inside ? Doubles{} : distance;
   std::memcpy(t.data() + first, &result, sizeof result);
@@ -351,7 +353,8 @@ inline std::uint32_t measure(const TreeView& tree, const RayPacket& rays, const 
   return within & lanes.hit;
 }
 
-inline void trace_first(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished) {
+inline void trace_first_lanes(const TreeView& tree, const RayPacket& rays, PacketHits& hits,
+                              std::uint32_t& unfinished) {
   LaneHits lanes;
   trace_packet(tree, rays, lanes);
   unfinished = lanes.unfinished;
@@ -369,6 +372,37 @@ inline void trace_first(const TreeView& tree, const RayPacket& rays, PacketHits&
     hits.z[i] = lanes.z[i] + corner.z;
     hits.face[i] = static_cast<Direction>(2 * lanes.axis[i] + forward[i]);
   }
+}
+
+// Copies a packet, with an ordinary ray in its inactive lanes: numbers there may be subnormal, which is slow.
+inline RayPacket fill_inactive(const RayPacket& rays) {
+  RayPacket filled;
+  filled.active = rays.active;
+  const auto fill = [&](const RayPacket::Lanes<double>& from, double other, RayPacket::Lanes<double>& to) {
+    for (std::size_t first = 0; first < RayPacket::kSize; first += kDoubles) {
+      const Longs is_active = (lane_bits() & static_cast<std::int64_t>(rays.active >> first)) != 0;
+      const Doubles numbers = is_active ? some<Doubles>(from.data() + first) : Doubles{} + other;
+      std::memcpy(to.data() + first, &numbers, sizeof numbers);
+    }
+  };
+  fill(rays.origin_x, 0.0, filled.origin_x);
+  fill(rays.origin_y, 0.0, filled.origin_y);
+  fill(rays.origin_z, 0.0, filled.origin_z);
+  fill(rays.direction_x, 1.0, filled.direction_x);
+  fill(rays.direction_y, 1.0, filled.direction_y);
+  fill(rays.direction_z, 1.0, filled.direction_z);
+  fill(rays.max_t, 0.0, filled.max_t);
+  return filled;
+}
+
+inline bool is_full(const RayPacket& rays) {
+  constexpr std::uint32_t kAll = (1U << RayPacket::kSize) - 1;
+  return (rays.active & kAll) == kAll;
+}
+
+inline void trace_first(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished) {
+  if (!is_full(rays)) return trace_first_lanes(tree, fill_inactive(rays), hits, unfinished);
+  trace_first_lanes(tree, rays, hits, unfinished);
 }
 
 // A place in a window: bits of x, y, z within a cell, then of z above x and y above z, as bricks are stored, then of x,
@@ -519,7 +553,7 @@ inline bool trace_short(const TreeView& tree, const RayPacket& packet, int first
 }
 
 // Which rays are blocked: short ones in a window, others as they are.
-inline std::uint32_t trace_any(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished) {
+inline std::uint32_t trace_any_lanes(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished) {
   LaneHits others;
   std::uint32_t blocked = 0;
   std::uint32_t doubtful = 0;
@@ -553,6 +587,11 @@ inline std::uint32_t trace_any(const TreeView& tree, const RayPacket& rays, std:
     blocked = (blocked & ~(1U << lane)) | std::uint32_t{is_blocked} << lane;
   }
   return blocked;
+}
+
+inline std::uint32_t trace_any(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished) {
+  if (!is_full(rays)) return trace_any_lanes(tree, fill_inactive(rays), unfinished);
+  return trace_any_lanes(tree, rays, unfinished);
 }
 
 }  // namespace
