@@ -29,6 +29,8 @@ struct Block {
 
   /// Returns true if nothing is to be said of the block: air of any kind.
   [[nodiscard]] bool is_air() const { return type == kAir && tint == Tint::None && invisible == 0; }
+  /// Returns true if the type is all there is to the block, in every biome.
+  [[nodiscard]] bool is_plain() const { return state == 0 && tint == Tint::None && invisible == 0; }
 };
 
 /// The types of the blocks that were met so far. Threads: any function from any thread, also at once.

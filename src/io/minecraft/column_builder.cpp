@@ -5,6 +5,8 @@
 #include <numbers>
 #include <tuple>
 
+#include <quoin/core/assert.h>
+
 namespace quoin::minecraft {
 
 namespace {
@@ -115,6 +117,18 @@ Status ColumnBuilder::put(const Section& section, IVec3 corner) {
   if (auto found = find_types(section); !found) return found;
   fill(section, cell(chunk_of(corner)), local_of(corner));
   return {};
+}
+
+void ColumnBuilder::put_block(const Block& block, IVec3 corner) {
+  QUOIN_ASSERT(block.is_plain(), "a block that has only a type");
+  Cell& to = cell(chunk_of(corner));
+  const IVec3 first = local_of(corner);
+  for (int z = first.z; z < first.z + kSectionEdge; ++z) {
+    for (int y = first.y; y < first.y + kSectionEdge; ++y) {
+      const auto row = (z * kChunkEdge + y) * kChunkEdge + first.x;
+      std::fill_n(to.types.begin() + row, kSectionEdge, block.type);
+    }
+  }
 }
 
 std::vector<SourceChunk> ColumnBuilder::take() {

@@ -18,6 +18,8 @@ class ColumnBuilder {
 
   /// Puts a section where its least corner is, which is a multiple of 16. Errors: LimitExceeded, of types.
   [[nodiscard]] Status put(const Section& section, IVec3 corner);
+  /// Puts a section of one block. Requires: as `put`; block.is_plain().
+  void put_block(const Block& block, IVec3 corner);
   /// The chunks, by y, then z, then x; those that are all air are left out. The builder keeps invisible blocks alone.
   [[nodiscard]] std::vector<SourceChunk> take();
   /// Moves the counts of invisible blocks so far, and a lamp for each that gives light, to `part`.

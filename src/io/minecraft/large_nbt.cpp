@@ -187,19 +187,123 @@ class Walker {
   LargeNbt out_;
 };
 
+/// Bytes of a page of so many bits per byte, with its values.
+std::size_t bytes_of_page(std::uint8_t bits) {
+  if (bits == 8) return PagedBytes::kPageBytes;
+  return (std::size_t{1} << bits) + PagedBytes::kPageBytes * bits / 8;
+}
+
+/// The values of a page, in the order in which they come, as far as 4 bits can number them.
+struct PageValues {
+  static constexpr std::size_t kMost = 16;
+  std::array<std::byte, kMost> values{};
+  std::size_t count = 0;  ///< kMost + 1: there are more
+
+  explicit PageValues(std::span<const std::byte> content) {
+    constexpr std::size_t kStep = 64;
+    for (std::size_t at = 0; at < content.size() && count <= kMost; at += kStep) {
+      const auto some = content.subspan(at, std::min(kStep, content.size() - at));
+      if (count > 0 && count <= 4 && are_first_four(some)) continue;
+      for (const std::byte value : some) {
+        const auto known = std::span(values).first(std::min(count, kMost));
+        if (std::ranges::find(known, value) != known.end()) continue;
+        if (++count > kMost) break;
+        values[count - 1] = value;
+      }
+    }
+  }
+  [[nodiscard]] std::uint8_t bits() const { return count <= 2 ? 1 : count <= 4 ? 2 : count <= kMost ? 4 : 8; }
+  /// Writes the number of each byte's value.
+  void number(std::span<const std::byte> content, PagedBytes::PageContent& out) const {
+    if (count <= 4) {
+      for (std::size_t i = 0; i < content.size(); ++i) {
+        const std::byte value = content[i];
+        const int number = value == values[0] ? 0 : value == values[1] ? 1 : value == values[2] ? 2 : 3;
+        out[i] = static_cast<std::byte>(number);
+      }
+      return;
+    }
+    std::array<std::byte, 256> number_of{};
+    for (std::size_t i = 0; i < count; ++i) number_of[std::to_integer<std::size_t>(values[i])] = std::byte(i);
+    for (std::size_t i = 0; i < content.size(); ++i) out[i] = number_of[std::to_integer<std::size_t>(content[i])];
+  }
+
+ private:
+  /// Returns true if all are among the values so far. Requires: 0 < count <= 4.
+  [[nodiscard]] bool are_first_four(std::span<const std::byte> some) const {
+    const auto value = [&](std::size_t i) { return values[i < count ? i : 0]; };
+    const std::array<std::byte, 4> four = {value(0), value(1), value(2), value(3)};
+    unsigned others = 0;
+    for (const std::byte b : some) {
+      const auto differs = [&](std::size_t i) { return static_cast<unsigned>(b != four[i]); };
+      others |= differs(0) & differs(1) & differs(2) & differs(3);
+    }
+    return others == 0;
+  }
+};
+
+/// Unpacks numbers of `bits` each, the lowest first, and replaces them by their values.
+template <unsigned bits>
+void unpack(const std::byte* values, PagedBytes::PageContent& out) {
+  constexpr std::size_t kEach = 8 / bits;
+  const std::byte* const packed = values + (std::size_t{1} << bits);
+  for (std::size_t i = 0; i < out.size(); i += kEach) {
+    auto rest = std::to_integer<unsigned>(packed[i / kEach]);
+    for (std::size_t k = 0; k < kEach; ++k, rest >>= bits) out[i + k] = values[rest & ((1U << bits) - 1)];
+  }
+}
+
 }  // namespace
+
+PagedBytes::Page PagedBytes::packed(std::span<const std::byte> content) {
+  Page page;
+  page.value = content.front();
+  if (is_uniform(content)) return page;
+  const PageValues values(content);
+  page.bits = values.bits();
+  page.bytes = std::make_unique<std::byte[]>(bytes_of_page(page.bits));  // NOLINT
+  if (page.bits == 8) {
+    std::ranges::copy(content, page.bytes.get());
+    return page;
+  }
+  std::byte* const packed = std::copy_n(values.values.begin(), std::size_t{1} << page.bits, page.bytes.get());
+  PageContent numbers{};
+  values.number(content, numbers);
+  const std::size_t each = 8U / page.bits;
+  for (std::size_t i = 0; i < content.size(); i += each) {
+    unsigned byte = 0;
+    for (std::size_t k = 0; k < each; ++k) byte |= std::to_integer<unsigned>(numbers[i + k]) << (k * page.bits);
+    packed[i / each] = static_cast<std::byte>(byte);
+  }
+  return page;
+}
+
+void PagedBytes::read_page(std::size_t number, PageContent& out) const {
+  const Page& page = pages_[number];
+  switch (page.bits) {
+    case 0:
+      out.fill(page.value);
+      break;
+    case 1:
+      unpack<1>(page.bytes.get(), out);
+      break;
+    case 2:
+      unpack<2>(page.bytes.get(), out);
+      break;
+    case 4:
+      unpack<4>(page.bytes.get(), out);
+      break;
+    default:
+      std::copy_n(page.bytes.get(), kPageBytes, out.begin());
+  }
+}
 
 void PagedBytes::append(std::span<const std::byte> bytes) {
   QUOIN_ASSERT(size_ % kPageBytes == 0, "whole pages before");
   for (std::size_t at = 0; at < bytes.size(); at += kPageBytes) {
     const std::span<const std::byte> content = bytes.subspan(at, std::min(kPageBytes, bytes.size() - at));
-    Page page;
-    page.value = content.front();
-    if (!is_uniform(content)) {
-      page.bytes = std::make_unique<std::byte[]>(kPageBytes);  // NOLINT
-      held_bytes_ += kPageBytes;
-      std::ranges::copy(content, page.bytes.get());
-    }
+    Page page = packed(content);
+    held_bytes_ += page.bits == 0 ? 0 : bytes_of_page(page.bits);
     pages_.push_back(std::move(page));
   }
   size_ += bytes.size();
@@ -207,14 +311,20 @@ void PagedBytes::append(std::span<const std::byte> bytes) {
 
 std::optional<std::byte> PagedBytes::uniform(std::uint64_t begin, std::uint64_t end) const {
   QUOIN_ASSERT(begin < end && end <= size_, "a range of the array");
-  const std::byte value = (*this)[begin];
+  std::optional<std::byte> value;
+  PageContent content;
   for (std::uint64_t at = begin; at < end;) {
-    const Page& page = pages_[at / kPageBytes];
     const std::uint64_t page_end = std::min(end, (at / kPageBytes + 1) * kPageBytes);
-    if (!page.bytes && page.value != value) return std::nullopt;
-    for (std::uint64_t i = at; page.bytes && i < page_end; ++i) {
-      if (page.bytes[i % kPageBytes] != value) return std::nullopt;
+    const std::size_t page = at / kPageBytes;
+    std::optional<std::byte> found = uniform_page(page);
+    if (!found) {
+      read_page(page, content);
+      const auto part = std::span(content).subspan(at % kPageBytes, static_cast<std::size_t>(page_end - at));
+      if (!is_uniform(part)) return std::nullopt;
+      found = part.front();
     }
+    if (value && *value != *found) return std::nullopt;
+    value = found;
     at = page_end;
   }
   return value;

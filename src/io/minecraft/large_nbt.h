@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -12,21 +13,24 @@
 
 namespace quoin::minecraft {
 
-/// A long array of bytes in pages: a page of one value takes a byte.
+/// A long array of bytes in pages. A page of one value takes no memory of its own; pages of 2, 4 or 16 values have 1, 2 or
+/// 4 bits per byte.
 class PagedBytes {
  public:
   static constexpr std::size_t kPageBytes = 4096;
+  using PageContent = std::array<std::byte, kPageBytes>;
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
-  /// Bytes of pages of several values, which take memory.
+  /// Bytes of memory that pages of several values take.
   [[nodiscard]] std::uint64_t held_bytes() const { return held_bytes_; }
   /// Appends bytes. Requires: all calls before the last one append whole pages.
   void append(std::span<const std::byte> bytes);
-  /// Requires: at < size().
-  [[nodiscard]] std::byte operator[](std::uint64_t at) const {
-    const Page& page = pages_[at / kPageBytes];
-    return page.bytes ? page.bytes[at % kPageBytes] : page.value;
+  /// The value that a whole page has; nothing where bytes differ. Requires: page * kPageBytes < size().
+  [[nodiscard]] std::optional<std::byte> uniform_page(std::size_t page) const {
+    return pages_[page].bits == 0 ? std::optional(pages_[page].value) : std::nullopt;
   }
+  /// Writes the bytes of a page; those beyond the array's end are not specified. Requires: as uniform_page.
+  void read_page(std::size_t page, PageContent& out) const;
   /// The value that all bytes of a range have; nothing where they differ. Cost: O(pages).
   /// Requires: begin < end <= size().
   [[nodiscard]] std::optional<std::byte> uniform(std::uint64_t begin, std::uint64_t end) const;
@@ -34,8 +38,11 @@ class PagedBytes {
  private:
   struct Page {
     std::byte value{0};
-    std::unique_ptr<std::byte[]> bytes{};  // NOLINT: null where all have the value
+    std::uint8_t bits = 0;                 // per byte; 0: all have the value
+    std::unique_ptr<std::byte[]> bytes{};  // NOLINT: with less than 8 bits the values, then numbers of these
   };
+  [[nodiscard]] static Page packed(std::span<const std::byte> content);
+
   std::vector<Page> pages_;
   std::uint64_t size_ = 0;
   std::uint64_t held_bytes_ = 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <charconv>
 #include <cstdint>
 #include <functional>
@@ -73,12 +74,26 @@ class VarintReader {
   [[nodiscard]] std::optional<std::uint32_t> next() {
     std::uint32_t value = 0;
     for (int shift = 0; shift < 35 && at_ < size_; shift += 7) {
-      const auto byte = std::to_integer<std::uint32_t>(pages_ != nullptr ? (*pages_)[at_] : bytes_[at_]);
+      const auto byte = std::to_integer<std::uint32_t>(run().front());
       ++at_;
       value |= (byte & 127U) << shift;
       if (byte < 128U) return value;
     }
     return std::nullopt;
+  }
+  /// Reads numbers until `out` is full; those above 65,535 become that. Returns how many there were.
+  [[nodiscard]] std::size_t read(std::span<std::uint16_t> out) {
+    std::size_t count = 0;
+    while (count < out.size() && at_ < size_) {
+      const std::size_t small = read_small(out.subspan(count));
+      count += small;
+      at_ += small;
+      if (count == out.size() || at_ == size_) break;
+      const auto number = next();
+      if (!number) break;
+      out[count++] = static_cast<std::uint16_t>(std::min<std::uint32_t>(*number, kNoIndex));
+    }
+    return count;
   }
   /// The number that the next `count` numbers are, past which it then is; nothing, and it stays, where they differ, or
   /// it would take long to find out.
@@ -91,10 +106,42 @@ class VarintReader {
   }
 
  private:
+  /// The bytes that follow, as far as they lie together. Requires: at_ < size_.
+  [[nodiscard]] std::span<const std::byte> run() {
+    if (pages_ == nullptr) return bytes_.subspan(static_cast<std::size_t>(at_));
+    const auto page = static_cast<std::size_t>(at_ / PagedBytes::kPageBytes);
+    if (page != page_) pages_->read_page(page, content_);
+    page_ = page;
+    const auto first = static_cast<std::size_t>(at_ % PagedBytes::kPageBytes);
+    const auto end = std::min<std::uint64_t>(PagedBytes::kPageBytes, size_ - page * PagedBytes::kPageBytes);
+    return std::span(content_).subspan(first, static_cast<std::size_t>(end) - first);
+  }
+  /// Copies bytes below 128, by sixteens as long as all of them are. Does not move. Returns how many.
+  std::size_t read_small(std::span<std::uint16_t> out) {
+    constexpr std::size_t kStep = 16;
+    const std::span<const std::byte> bytes = run();
+    const std::size_t count = std::min(bytes.size(), out.size());
+    std::size_t done = 0;
+    for (; done + kStep <= count; done += kStep) {
+      std::array<std::byte, kStep> some;
+      std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(done), kStep, some.begin());
+      const auto any = std::bit_cast<std::array<std::uint64_t, 2>>(some);
+      if (((any[0] | any[1]) & 0x8080'8080'8080'8080U) != 0) return done;
+      for (std::size_t i = 0; i < kStep; ++i) out[done + i] = std::to_integer<std::uint16_t>(some[i]);
+    }
+    for (; done < count && std::to_integer<unsigned>(bytes[done]) < 128U; ++done) {
+      out[done] = std::to_integer<std::uint16_t>(bytes[done]);
+    }
+    return done;
+  }
+
+  static constexpr std::size_t kNoPage = ~std::size_t{0};
   std::span<const std::byte> bytes_;
   const PagedBytes* pages_;
   std::uint64_t size_;
   std::uint64_t at_ = 0;
+  std::size_t page_ = kNoPage;  ///< that `content_` holds
+  PagedBytes::PageContent content_;
 };
 
 class SchematicReader {
@@ -251,13 +298,12 @@ Status SchematicReader::read_sponge(nbt::Value schematic) {
                  schematic);
   }
   region.read_layer = [&indices, data, kinds = region.palette.size()](int y, std::span<std::uint16_t> layer) -> Status {
-    for (std::uint16_t& index : layer) {
-      const auto next = indices.next();
-      if (!next) return fault("its blocks end in layer " + std::to_string(y), data);
-      if (*next >= kinds) return fault("an index beyond the " + std::to_string(kinds) + " blocks of its palette", data);
-      index = static_cast<std::uint16_t>(*next);
+    const std::size_t count = indices.read(layer);
+    const auto read = layer.first(count);
+    if (count > 0 && *std::ranges::max_element(read) >= kinds) {
+      return fault("an index beyond the " + std::to_string(kinds) + " blocks of its palette", data);
     }
-    return {};
+    return count < layer.size() ? fault("its blocks end in layer " + std::to_string(y), data) : Status();
   };
   const std::uint64_t area = volume_of({size->x, 1, size->z});
   region.read_uniform = [&indices, area, kinds = region.palette.size()](int layers) -> std::optional<std::uint16_t> {
@@ -508,24 +554,32 @@ Status SchematicReader::fill(const Region& region, int first_y, std::span<const 
   section.palette.emplace_back();
   for (int z = 0; z < region.size.z; z += kSectionEdge) {
     for (int x = 0; x < region.size.x; x += kSectionEdge) {
-      section.indices.fill(air);
-      const int end_z = std::min(kSectionEdge, region.size.z - z);
-      const auto row = static_cast<std::size_t>(std::min(kSectionEdge, region.size.x - x));
-      bool is_air = true;
-      for (int dy = 0; dy < height; ++dy) {
-        for (int dz = 0; dz < end_z; ++dz) {
+      const IVec3 corner(x, first_y, z);
+      const IVec3 count = glm::min(IVec3(region.size.x - x, height, region.size.z - z), IVec3(kSectionEdge));
+      const bool is_whole = count == IVec3(kSectionEdge);
+      if (!is_whole) section.indices.fill(air);
+      const auto row = static_cast<std::size_t>(count.x);
+      const std::uint16_t first = layers[static_cast<std::size_t>(z) * width + static_cast<std::size_t>(x)];
+      std::uint16_t differences = 0;
+      for (int dy = 0; dy < count.y; ++dy) {
+        for (int dz = 0; dz < count.z; ++dz) {
           const std::uint16_t* const from = layers.data() + static_cast<std::size_t>(dy) * area +
                                             static_cast<std::size_t>(z + dz) * width + static_cast<std::size_t>(x);
           std::uint16_t* const to = section.indices.data() + (dy * kSectionEdge + dz) * kSectionEdge;
           for (std::size_t i = 0; i < row; ++i) {
             to[i] = from[i];
-            is_air = is_air && region.palette[from[i]].is_air();
+            differences |= static_cast<std::uint16_t>(from[i] ^ first);
           }
         }
       }
-      if (is_air) continue;
-      region.biomes.put_into(section, {x, first_y, z}, region.size);
-      if (auto put = builder_.put(section, {x, first_y, z}); !put) return put;
+      const Block& block = region.palette[first];
+      if (differences == 0 && block.is_air()) continue;
+      if (differences == 0 && is_whole && block.is_plain()) {
+        builder_.put_block(block, corner);
+        continue;
+      }
+      region.biomes.put_into(section, corner, region.size);
+      if (auto put = builder_.put(section, corner); !put) return put;
     }
   }
   return {};
@@ -544,8 +598,7 @@ void SchematicReader::take_invisible(const Region& region) {
 // Puts layers of one block, up to the next border of chunks, without looking at each. Returns false and reads nothing
 // where a block has more than its type, or where blocks differ.
 bool SchematicReader::put_uniform(const Region& region, int first_y, int height, Grid& grid) {
-  const auto is_plain = [](const Block& b) { return b.state == 0 && b.tint == Tint::None && b.invisible == 0; };
-  if (!region.read_uniform || !std::ranges::all_of(region.palette, is_plain)) return false;
+  if (!region.read_uniform || !std::ranges::all_of(region.palette, &Block::is_plain)) return false;
   const auto index = region.read_uniform(height);
   if (!index) return false;
   const VoxelType type = region.palette[*index].type;

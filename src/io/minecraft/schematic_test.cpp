@@ -1,5 +1,7 @@
 #include "io/minecraft/schematic.h"
 
+#include <random>
+
 #include <gtest/gtest.h>
 
 #include <quoin/io/file.h>
@@ -303,6 +305,44 @@ TEST(Schematic, LongArraysAreReadInPages) {
   }
 }
 
+// More than 128 blocks, so that indices take one or two bytes: in pages as in one array.
+TEST(Schematic, LongArraysOfManyBlocksAreReadInPages) {
+  constexpr IVec3 kSize(130, 41, 290);
+  constexpr unsigned kKinds = 200;
+  std::mt19937 random(6);
+  std::vector<std::uint8_t> data;
+  for (int i = 0; i < kSize.x * kSize.y * kSize.z; ++i) {
+    // Long runs of one block, others, and blocks that all differ.
+    const unsigned index = i / 50'000 % 3 == 0 ? 5 : i / 50'000 % 3 == 1 ? i / 700 % 9 : random() % kKinds;
+    if (index >= 128) data.push_back(static_cast<std::uint8_t>(index | 128U));
+    data.push_back(static_cast<std::uint8_t>(index >= 128 ? index >> 7 : index));
+  }
+  NbtWriter nbt;
+  nbt.compound("Schematic").integer("Version", 2);
+  put_sizes(nbt, kSize);
+  nbt.compound("Palette").integer("minecraft:air", 0);
+  for (unsigned i = 1; i < kKinds; ++i) nbt.integer("test:block_" + std::to_string(i), static_cast<int>(i));
+  const std::vector<std::byte> plain = nbt.end().byte_array("BlockData", data).end().bytes;
+  const auto expected = load_scene(plain);
+  const auto loaded = load_scene(gzipped(plain, 1));
+  ASSERT_TRUE(expected && loaded);
+  const Grid& a = expected->scene.grids()[expected->scene.grids().handles()[0]].grid;
+  const Grid& b = loaded->scene.grids()[loaded->scene.grids().handles()[0]].grid;
+  const VoxelRegistry& types = loaded->scene.types;
+  std::size_t at = 0;
+  for (int i = 0; i < kSize.x * kSize.y * kSize.z; ++i) {
+    unsigned index = data[at++];
+    if (index >= 128) index = (index & 127U) | unsigned{data[at++]} << 7U;
+    const IVec3 voxel(i % kSize.x, i / (kSize.x * kSize.z), i / kSize.x % kSize.z);
+    ASSERT_EQ(a.get(voxel), b.get(voxel)) << i;
+    if (index == 0) {
+      ASSERT_EQ(b.get(voxel), kAir);
+    } else {
+      ASSERT_EQ(types[b.get(voxel)].name, "test:block_" + std::to_string(index)) << i;
+    }
+  }
+}
+
 TEST(Schematic, LongArraysThatAreCutOffAreErrors) {
   const std::vector<std::byte> plain = large_sponge(2, false);
   for (const std::size_t size : {plain.size() - 1, plain.size() - 1'000'000, plain.size() / 2}) {
@@ -313,13 +353,40 @@ TEST(Schematic, LongArraysThatAreCutOffAreErrors) {
   EXPECT_FALSE(load_scene(packed));
 }
 
+std::vector<std::byte> bytes_of(const PagedBytes& pages) {
+  std::vector<std::byte> all;
+  PagedBytes::PageContent page;
+  for (std::size_t i = 0; all.size() < pages.size(); ++i) {
+    pages.read_page(i, page);
+    all.insert(all.end(), page.begin(), page.end());
+  }
+  all.resize(static_cast<std::size_t>(pages.size()));
+  return all;
+}
+
+TEST(PagedBytes, PagesOfFewValuesArePacked) {
+  std::mt19937 random(5);
+  std::uint64_t held = 0;
+  for (const unsigned kinds : {1U, 2U, 3U, 4U, 5U, 16U, 17U, 256U}) {
+    std::vector<std::byte> bytes(5 * PagedBytes::kPageBytes + 77);
+    for (std::byte& byte : bytes) byte = static_cast<std::byte>(255U - random() % kinds);
+    PagedBytes pages;
+    pages.append(bytes);
+    EXPECT_EQ(bytes_of(pages), bytes) << kinds;
+    EXPECT_GE(pages.held_bytes(), held) << kinds;
+    held = pages.held_bytes();
+    EXPECT_EQ(pages.uniform_page(0).has_value(), kinds == 1);
+    if (kinds <= 4) EXPECT_LE(held, 6 * (PagedBytes::kPageBytes / 4 + 16)) << kinds;
+  }
+}
+
 TEST(PagedBytes, HoldWhatWasAppended) {
   PagedBytes pages;
   std::vector<std::byte> bytes(3 * PagedBytes::kPageBytes + 100, std::byte{7});
   bytes[PagedBytes::kPageBytes + 5] = std::byte{8};
   pages.append(bytes);
   ASSERT_EQ(pages.size(), bytes.size());
-  for (std::size_t i = 0; i < bytes.size(); ++i) ASSERT_EQ(pages[i], bytes[i]) << i;
+  EXPECT_EQ(bytes_of(pages), bytes);
   EXPECT_EQ(pages.uniform(0, PagedBytes::kPageBytes + 5), std::byte{7});
   EXPECT_EQ(pages.uniform(0, PagedBytes::kPageBytes + 6), std::nullopt);
   EXPECT_EQ(pages.uniform(PagedBytes::kPageBytes + 5, PagedBytes::kPageBytes + 6), std::byte{8});

@@ -1,0 +1,87 @@
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "io/byte_stream.h"
+#include "io/minecraft/nbt_writer.h"
+#include "tool_for_tests.h"
+
+namespace quoin {
+
+namespace {
+
+constexpr int kEdge = 1'000;
+constexpr int kStoneLayers = 500;
+constexpr int kMixedLayers = 8;
+constexpr int kMixedTypes = 150;
+
+/// A layer of a schematic, as the bytes of its blocks.
+template <class Index>
+std::vector<std::byte> layer_of(Index index) {
+  std::vector<std::byte> bytes;
+  for (int z = 0; z < kEdge; ++z) {
+    for (int x = 0; x < kEdge; ++x) {
+      const unsigned value = index(x, z);
+      if (value >= 128) bytes.push_back(static_cast<std::byte>(value | 128U));
+      bytes.push_back(static_cast<std::byte>(value >= 128 ? value >> 7 : value));
+    }
+  }
+  return bytes;
+}
+
+/// Writes a .schem file of 10^9 blocks: stone with ores, a few layers of 150 types, air. Equal layers are compressed
+/// once, each layer as a gzip member of its own.
+void write_large_schematic(const std::filesystem::path& path) {
+  const std::vector<std::byte> stone = layer_of([](int x, int z) { return (x + kEdge * z) % 997 == 0 ? 2U : 1U; });
+  const std::vector<std::byte> air = layer_of([](int, int) { return 0U; });
+  const std::vector<std::byte> mixed =
+      layer_of([](int x, int z) { return 1U + static_cast<unsigned>(x * 7 + z * 13) % kMixedTypes; });
+  const std::size_t bytes =
+      kStoneLayers * stone.size() + kMixedLayers * mixed.size() + (kEdge - kStoneLayers - kMixedLayers) * air.size();
+  nbt::DocumentWriter nbt;
+  nbt.begin("Schematic");
+  nbt.int32("Version", 2);
+  for (const char* axis : {"Width", "Height", "Length"}) nbt.int16(axis, kEdge);
+  nbt.begin("Palette");
+  nbt.int32("minecraft:air", 0);
+  nbt.int32("minecraft:stone", 1);
+  nbt.int32("minecraft:iron_ore", 2);
+  for (int i = 3; i <= kMixedTypes; ++i) nbt.int32("test:block_" + std::to_string(i), i);
+  nbt.end();
+  nbt.bytes("BlockData", {});
+  std::vector<std::byte> head = nbt.document();
+  for (std::size_t i = 0; i < 4; ++i) head[head.size() - 1 - i] = static_cast<std::byte>(bytes >> (8 * i));
+  std::ofstream out(path, std::ios::binary);
+  const auto put = [&](const std::vector<std::byte>& member, int times) {
+    const std::vector<std::byte> packed = gzipped(member, 1);
+    for (int i = 0; i < times; ++i) {
+      out.write(reinterpret_cast<const char*>(packed.data()), static_cast<std::streamsize>(packed.size()));
+    }
+  };
+  put(head, 1);
+  put(stone, kStoneLayers);
+  put(mixed, kMixedLayers);
+  put(air, kEdge - kStoneLayers - kMixedLayers);
+  put({std::byte{0}}, 1);
+}
+
+class ToolMinecraft : public ToolTest {};
+
+// Blocks as an array of bytes and their indices would take 3 GB.
+TEST_F(ToolMinecraft, CountsAThousandMillionBlocksInLittleMemory) {
+  write_large_schematic(folder_.file("large.schem"));
+  const ToolRun told = shell("ulimit -v 400000; '" QUOIN_TOOL "' info large.schem --json --threads 1");
+  ASSERT_EQ(told.status, 0) << told.err;
+  const auto info = nlohmann::json::parse(told.out);
+  EXPECT_EQ(info["voxels"], std::int64_t{kEdge} * kEdge * (kStoneLayers + kMixedLayers));
+  EXPECT_EQ(info["types"], kMixedTypes);
+  EXPECT_EQ(info["grids"][0]["size"], nlohmann::json({kEdge, kStoneLayers + kMixedLayers, kEdge}));
+}
+
+}  // namespace
+
+}  // namespace quoin
