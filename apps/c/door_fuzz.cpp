@@ -20,6 +20,7 @@ namespace {
 
 constexpr std::size_t kRoom = 1 << 14;  // bytes that arrays may lie in
 constexpr int kMostCalls = 48;
+constexpr int kMostLongCalls = 1;  // of those that take most of the time: smooth voxels, images by path tracing
 
 class Program {
  public:
@@ -84,6 +85,9 @@ class Program {
     const double one = number();
     return std::isfinite(one) ? static_cast<float>(std::clamp(one, -3e38, 3e38)) : std::nanf("");
   }
+  // Many would only take long to start.
+  std::int32_t threads() { return small() % 4; }
+  bool may_take_long() { return long_calls_++ < kMostLongCalls; }
   std::uint64_t handle() {
     const std::uint8_t b = byte();
     if (handles_.empty() || b > 250) return b;
@@ -302,7 +306,7 @@ class Program {
     options.width = small() % 9;
     options.height = small() % 9;
     options.samples = byte() < 250 ? 1 : -5;
-    options.paths = byte() % 2;
+    options.paths = byte() % 2 != 0 && may_take_long() ? 1 : 0;
     options.threads = 1;
     options.has_camera = byte() % 8 == 0 ? 1 : 0;
     for (double& each : options.camera) each = number();
@@ -350,14 +354,15 @@ class Program {
     options.raw_scalar = options.radius % 10;
     options.heights = options.radius % 4;
     options.metres_per_pixel = options.voxel_size;
+    if (options.size == sizeof options && options.frame % 2 != 0) options.dimension = "nether";
     took(quoin_scene_load_bytes_with(is_null ? nullptr : next_ - size, size, &options, &scene), &scene);
   }
 
   void mesh() {
     quoin_mesh out = 0;
     auto options = made<quoin_mesh_options>();
-    options.smooth = byte() % 2;
-    options.threads = small();
+    options.smooth = byte() % 2 != 0 && may_take_long() ? 1 : 0;
+    options.threads = threads();
     options.watertight = options.threads % 2;
     const std::uint8_t which = byte() % 3;
     if (which == 0) {
@@ -365,9 +370,9 @@ class Program {
     } else {
       const quoin_array given = array();
       if (which == 1)
-        took(quoin_surface_nets(perhaps(&given), number(), byte() % 2, small(), &out), &out);
+        took(quoin_surface_nets(perhaps(&given), number(), byte() % 2, threads(), &out), &out);
       else
-        took(quoin_mesh_labels(perhaps(&given), small(), small(), small(), &out), &out);
+        took(quoin_mesh_labels(perhaps(&given), small(), small() % 8, threads(), &out), &out);
     }
     if (!handles_.empty()) look_at_mesh(handles_.back());
   }
@@ -433,6 +438,7 @@ class Program {
   std::array<std::uint8_t, kRoom> room_{};
   std::vector<std::uint64_t> handles_;
   int left_ = 0;
+  int long_calls_ = 0;
   double sink_ = 0.0;
 };
 
