@@ -73,13 +73,16 @@ class ToolMinecraft : public ToolTest {};
 
 // Blocks as an array of bytes and their indices would take 3 GB.
 TEST_F(ToolMinecraft, CountsAThousandMillionBlocksInLittleMemory) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers take more addresses than the limit";
+#endif
   write_large_schematic(folder_.file("large.schem"));
   const ToolRun told = shell("ulimit -v 400000; '" QUOIN_TOOL "' info large.schem --json --threads 1");
   ASSERT_EQ(told.status, 0) << told.err;
   const auto info = nlohmann::json::parse(told.out);
   EXPECT_EQ(info["voxels"], std::int64_t{kEdge} * kEdge * (kStoneLayers + kMixedLayers));
   EXPECT_EQ(info["types"], kMixedTypes);
-  EXPECT_EQ(info["grids"][0]["size"], nlohmann::json({kEdge, kStoneLayers + kMixedLayers, kEdge}));
+  EXPECT_EQ(info["grids"][0]["size"], nlohmann::json({kEdge, kEdge, kEdge}));
 }
 
 }  // namespace
