@@ -275,6 +275,13 @@ TEST(LuantiCases, RefusesNamesThatAreCutOff) {
   EXPECT_EQ(loaded.error().byte_offset, 15U);
 }
 
+// Of no width, but 38,400 x 65,280 rows.
+TEST(LuantiCases, RefusesASchematicWithoutNodes) {
+  const auto loaded = load_scene(case_file("mts-no-width.mts"));
+  ASSERT_FALSE(loaded);
+  EXPECT_EQ(loaded.error().message, "a schematic of 0 x 38400 x 65280 nodes");
+}
+
 std::vector<std::byte> unpacked(const fs::path& path) {
   const auto packed = read_file(path);
   EXPECT_TRUE(packed);

@@ -53,6 +53,10 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
   const std::size_t begin = reader.position();
   const std::uint64_t volume =
       static_cast<std::uint64_t>(size_x) * static_cast<std::uint64_t>(size_y) * static_cast<std::uint64_t>(size_z);
+  if (volume == 0) {
+    return bad_at(6, "a schematic of " + std::to_string(size_x) + " x " + std::to_string(size_y) + " x " +
+                         std::to_string(size_z) + " nodes");
+  }
   constexpr std::uint64_t kMaxNodes = std::uint64_t{1} << 24;
   if (volume > kMaxNodes) return make_error(ErrorCode::LimitExceeded, "a schematic of more than 2^24 nodes", {}, 6);
   ByteStream stream(bytes, begin, Compression::Zlib);
