@@ -275,7 +275,7 @@ TEST(LuantiCases, RefusesNamesThatAreCutOff) {
   EXPECT_EQ(loaded.error().byte_offset, 15U);
 }
 
-// Of no width, but 38,400 x 65,280 rows.
+// Its width is 0, but it has 38,400 x 65,280 rows.
 TEST(LuantiCases, RefusesASchematicWithoutNodes) {
   const auto loaded = load_scene(case_file("mts-no-width.mts"));
   ASSERT_FALSE(loaded);
