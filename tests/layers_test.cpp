@@ -33,7 +33,7 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/change_records.h", {"light"}},
     {"grid/density/cell_corners.h", {"mesh", "trace"}},
     {"grid/density/density_storage.h", {"mesh", "store", "trace"}},
-    {"grid/density/stored_density.h", {"terrain"}},
+    {"grid/density/stored_density.h", {"mesh", "terrain"}},
     {"grid/looks.h", {"io", "voxelize"}},
     {"grid/long_box.h", {"live", "scene", "stream"}},
     {"io/byte_order.h", {"store"}},

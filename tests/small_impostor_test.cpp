@@ -37,18 +37,12 @@ struct SmallModel {
   std::unique_ptr<CpuRenderer> renderer;  // of both, which keep their impostors
   std::unique_ptr<CpuRenderer> white_renderer;
   double radius = 0.0;
-  // Cells hold the surface of a field less exactly than that of blocks.
-  double most_holes = 0.0005;
-  double most_colour = 3.0;
 
   SmallModel(std::string of_name, Scene with) : name(std::move(of_name)), scene(std::move(with)) {
     const DBox box = scene.bounds();
     const DVec3 centre = 0.5 * (box.min + box.max);
     for (const InstanceHandle handle : scene.instances().handles()) scene.edit(handle).position -= centre;
     radius = 0.5 * glm::length(box.max - box.min);
-    scene.grids().for_each([&](GridHandle, const SceneGrid& grid) {
-      if (grid.field.chunk_count() > 0) most_colour = 3.5;
-    });
     white = scene.snapshot();
     for (VoxelType type = 1; type < white.types.size(); ++type) {
       VoxelProperties properties;
@@ -284,9 +278,9 @@ void expect_like_the_traced_image(const SmallModel& model, const Views& views = 
     std::printf("%s, %d px: holes %.3f %% of %lld, overlap %.3f (worst %.3f), colour %.1f (worst %.1f)\n",
                 model.name.c_str(), pixels, 100.0 * found.hole_share(), static_cast<long long>(found.interior),
                 found.overlap(), found.worst_overlap, found.colour(), found.worst_colour);
-    EXPECT_LE(found.hole_share(), model.most_holes) << model.name << ", " << pixels << " pixels";
+    EXPECT_LE(found.hole_share(), 0.0005) << model.name << ", " << pixels << " pixels";
     EXPECT_GE(found.overlap(), pixels >= 42 ? 0.97 : 0.95) << model.name << ", " << pixels << " pixels";
-    EXPECT_LE(found.colour(), model.most_colour) << model.name << ", " << pixels << " pixels";
+    EXPECT_LE(found.colour(), 3.0) << model.name << ", " << pixels << " pixels";
   }
 }
 

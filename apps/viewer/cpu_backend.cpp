@@ -328,7 +328,13 @@ Result<Picture> CpuBackend::Impl::path_picture(const ViewRequest& wanted, const 
 
 void CpuBackend::Impl::prepare_paths() {
   if (!are_paths_stale) return;
-  is_preparing_paths = true;
+  struct Preparing {
+    explicit Preparing(std::atomic<bool>& is_preparing) : flag(is_preparing) { flag = true; }
+    ~Preparing() { flag = false; }  // when memory runs out too
+    Preparing(const Preparing&) = delete;
+    Preparing& operator=(const Preparing&) = delete;
+    std::atomic<bool>& flag;
+  } const preparing(is_preparing_paths);
   tell();
   if (paths) {
     paths->tracer.update(options.threads);
@@ -336,7 +342,6 @@ void CpuBackend::Impl::prepare_paths() {
   } else {
     paths = std::make_unique<PathPart>(scene, options);
   }
-  is_preparing_paths = false;
   are_paths_stale = false;
   count_bytes();
 }

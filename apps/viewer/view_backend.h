@@ -29,7 +29,8 @@ inline double seconds_since(std::chrono::steady_clock::time_point start) {
 }
 
 /// Lowers the priority of the calling thread and of the threads that it starts, so that threads that draw do not delay
-/// the window's thread, nor the display's process. Does nothing where the system has no priority for a thread.
+/// the window's thread, nor the display's process. Does nothing where the system has no priority for a thread. The
+/// workers of parallel loops are shared: they keep the priority of the thread that ran the first such loop.
 void yield_to_window();
 
 /// Times as long as a picture in motion should take is what lets its size be as it was: it does not go to and fro.

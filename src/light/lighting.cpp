@@ -410,7 +410,9 @@ Surface Lighting::surface_at(const SurfacePoint& point) const {
   if (!detail_surfaces_.empty() && !is_bare) return detail_surfaces_[placed];
   if (point.is_blended) {
     const DensityGrid& field = placed_in(view_->tracer())[placed].opaque_field->field();
-    return surfaces_->blend_of_field(field, point.voxel, point.position - DVec3(point.voxel), point.type);
+    const DVec3 at = point.position - double{point.lift} * DVec3(point.normal);
+    const IVec3 cell = voxel_of(at);
+    return surfaces_->blend_of_field(field, cell, at - DVec3(cell), point.type);
   }
   return point.in_field ? surfaces_->of_field(point.type) : (*surfaces_)[point.type];
 }

@@ -35,6 +35,7 @@ struct SurfacePoint {
   bool in_field = false;
   bool is_blended = false;  ///< of a field: not of one material, but of those around, as Surfaces::blend_of_field
   Vec3 normal{0.0F};        ///< of a field, in its grid, of unit length or 0
+  float lift = 0.0F;        ///< of a field: how far above the surface the position lies, along the normal
   PointKind kind = PointKind::Surface;
   std::uint32_t pixel = 0;  ///< seeds what is random: a number of pixel and sample
   float openness = -1.0F;   ///< 0 to 1 where it is known, whatever the options' way to find it; less than 0: it is not

@@ -110,9 +110,12 @@ void Tile::add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, st
   }
   if ((hits.grids.starts_inside >> lane & 1U) != 0) point.kind = PointKind::Unlit;
   const bool is_far = (far_faces_.found >> lane & 1U) != 0;
-  point.is_blended = point.in_field && point.kind == PointKind::Surface && !is_far;
+  point.is_blended = point.in_field && point.kind == PointKind::Surface;
   if (!is_far) return;
-  if (point.in_field) point.position += double{ImpostorFaces::kSurfelLift} * DVec3(point.normal);
+  if (point.in_field) {
+    point.position = far_faces_.start_of_light(i, point.position);
+    point.lift = ImpostorFaces::kSurfelLift;
+  }
   point.type = far_faces_.face[i]->type;
   point.openness = openness_of(*far_faces_.face[i], context_->options->light.occlusion_mode, point.position);
 }

@@ -267,10 +267,16 @@ Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions&
   PathPlan plan;
   PathOptions& options = plan.options;
   const bool has_look = loaded.look && arguments.look == "file";
-  const NaturalLook natural = natural_look(sky_of(arguments), render.light.sun);
+  DVec3 sun = render.light.sun;
+  if (arguments.sun_time) {
+    const auto at_that_time = sun_direction(*arguments.sun_time);
+    if (!at_that_time) return at_that_time.error();
+    sun = *at_that_time;
+  }
+  const NaturalLook natural = natural_look(sky_of(arguments), sun);
   static_cast<Look&>(options) = natural.look;
   plan.develop = natural.develop;
-  options.sun = render.light.sun;
+  options.sun = sun;
   if (has_look) take_file_look(*loaded.look, plan);
   options.width = render.width;
   options.height = render.height;
@@ -280,11 +286,7 @@ Result<PathPlan> plan_paths(const PathArguments& arguments, const RenderOptions&
     options.sun = render.light.sun;
     if (render.light.sun_brightness == 0.0) options.sun_brightness = 0.0;
   }
-  if (arguments.sun_time) {
-    const auto sun = sun_direction(*arguments.sun_time);
-    if (!sun) return sun.error();
-    options.sun = *sun;
-  }
+  if (arguments.sun_time) options.sun = sun;
   if (!has_look || arguments.has("--sun-angle")) options.sun_angle_radians = arguments.sun_angle_degrees * kRadians;
   options.lamp_brightness = render.light.lamp_brightness;
   if (Status sky = take_sky(arguments, loaded, common, plan); !sky) return sky.error();

@@ -22,14 +22,14 @@ enum class SmoothOcclusion : std::uint8_t {
                       ///< steps of a count
 };
 
-/// Settings of the occlusion. Lengths, and densities as depths, are in samples of level 0, so that a surface is as dark
-/// at every level of detail.
+/// Settings of the occlusion. Lengths, and densities as depths, are in samples of level 0, so that a surface is about as
+/// dark at every level of detail; creases narrower than a few cells of a coarse level are lost with their shape.
 ///
 /// The samples lie `spread` apart on each axis, about the vertex moved along its unit normal n by
-/// spread * (|nx| + |ny| + |nz|) + 0.1, so that a flat or convex surface is exactly 0. Weighted:
+/// spread * (|nx| + |ny| + |nz|) + 0.1 cells, so that a flat or convex surface is exactly 0. Weighted:
 /// 1 - clamp((1 - (ratio + offset)^power) / (1 - offset^power), 0, 1); as published:
-/// 1 - clamp(1 - (ratio + offset)^power, 0, 1). The soft share counts a sample by d / (the same interpolation of the
-/// solid corners alone), where its density d is less than 0: 0 on the surface, 1 where all eight corners are solid.
+/// 1 - clamp(1 - (ratio + offset)^power, 0, 1). The soft share counts a sample whose density d is less than 0
+/// by d / min(s, -spread / 8), at most 1: s is interpolated as d is, but with 0 for the corners in air.
 /// Numbers out of their range count as its nearest end, NaN as the
 /// default.
 struct SmoothOcclusionOptions {

@@ -70,9 +70,9 @@ struct SmoothMeshOptions {
 ///
 /// Error:    the greatest distance, in samples, of a vertex of the mesh before from the surface after. It is measured;
 ///           where meshoptimizer, which bounds a mean, goes beyond it, less is removed. A try that goes beyond it and
-///           removes no more than one triangle in 1,000 ends the search: nothing is removed then.
-/// Large:    a mesh of 48,000 triangles or more is searched on a sample of about 12,000 first. If the sample loses no
-///           more than 1 % of its triangles, nothing is removed.
+///           removes no more than one triangle in 1,000 ends the search.
+/// Large:    a mesh of 48,000 triangles or more is searched on a sample first: at least 16 boxes of it, with about
+///           12,000 triangles. If the sample loses no more than 1 % of its triangles, nothing is removed.
 /// Kept:     vertices that stay keep normal, occlusion, albedo and type, and their position, but for those below.
 ///           Vertices of one place that differ in these count as one: lines between colours stay where they are, to the
 ///           error. A closed mesh stays closed.
@@ -82,7 +82,7 @@ struct SmoothMeshOptions {
 /// Requires: arrays of one length (but for empty occlusion), indices that name vertices, finite positions.
 /// Errors:   InvalidArgument when the error is not a number of at least 0; Unsupported in builds without meshoptimizer.
 ///           The mesh is as before then.
-/// Cost:     some microseconds a triangle, on one thread.
+/// Cost:     some to some tens of microseconds a triangle, on one thread.
 /// Source:   M. Garland, P. Heckbert, "Surface Simplification Using Quadric Error Metrics" (1997); meshoptimizer.
 [[nodiscard]] Result<float> simplify_smooth_mesh(SmoothMesh& mesh, float error_in_samples);
 

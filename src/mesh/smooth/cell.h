@@ -124,7 +124,7 @@ inline constexpr float kLift = 0.1F;
 /// The published form counts depths below this as none.
 inline constexpr float kLeastDepth = 0.001F;
 
-/// What densities are multiplied by, so that depths count in samples of the level, as the spread does.
+/// What densities and spreads are multiplied by, so that they count in cells of the level.
 [[gnu::always_inline]] inline float depth_unit(int level) {
   return 1.0F / static_cast<float>(1 << level);
 }
@@ -162,13 +162,15 @@ struct SampleAxis {
   return 1.0F - static_cast<float>(in_air) * (1.0F / 27.0F);
 }
 
-/// A sample in solid that is no deeper than this counts as solid in part. Less gives spikes beside corners that are
-/// hardly solid.
-inline constexpr float kWholeDepth = 0.25F;
+/// The depth, in cells, from which on a sample in solid counts as solid whatever lies around. Less would give spikes
+/// beside corners that are hardly solid.
+[[gnu::always_inline]] inline float whole_depth(float spread) {
+  return spread * 0.125F;
+}
 
 /// How solid a sample is, 0 to 1. `solid`: interpolated as its density is, but with 0 for the corners in air.
-[[gnu::always_inline]] inline float solidity(float density, float solid) {
-  return std::min(std::min(density, 0.0F) / std::min(solid, -kWholeDepth), 1.0F);
+[[gnu::always_inline]] inline float solidity(float density, float solid, float whole_depth) {
+  return std::min(std::min(density, 0.0F) / std::min(solid, -whole_depth), 1.0F);
 }
 
 /// The soft share from the sum of 27 samples' solidity.
@@ -245,7 +247,7 @@ template <class Density>
     if (options.method != SmoothOcclusion::SoftShare) continue;
     if (samples[i] < 0.0F) {
       const auto solid = [&](int cx, int cy, int cz) { return std::min(density(cx, cy, cz), 0.0F); };
-      samples[i] = solidity(samples[i], interpolated(solid));
+      samples[i] = solidity(samples[i], interpolated(solid), whole_depth(options.spread));
     } else {
       samples[i] = 0.0F;
     }

@@ -85,8 +85,8 @@ inline NineRows rows_around(const Work& work, const Centres& centres, std::size_
   return rows;
 }
 
-inline F solidity(F density, F solid) {
-  return min(min(density, all(0.0F)) / min(solid, all(-kWholeDepth)), all(1.0F));
+inline F solidity(F density, F solid, float whole_depth) {
+  return min(min(density, all(0.0F)) / min(solid, all(-whole_depth)), all(1.0F));
 }
 
 // Two rows' samples in the lowest six lanes of each vertex.
@@ -118,9 +118,10 @@ inline float sum_of_lanes(const float* s) {
   return ((s[0] + s[3]) + (s[1] + s[4])) + (s[2] + s[5]);
 }
 
-inline void store_soft(const Samples& samples, const Samples& solid, float* out) {
+inline void store_soft(const Samples& samples, const Samples& solid, float spread, float* out) {
+  const float deep = whole_depth(spread);
   F sum = all(0.0F);
-  for (int i = 0; i < 5; ++i) sum = sum + solidity(samples.v[i], solid.v[i]);
+  for (int i = 0; i < 5; ++i) sum = sum + solidity(samples.v[i], solid.v[i], deep);
   alignas(64) float sums[kWidth];
   store(sums, sum);
   for (int i = 0; i < kVerticesAtOnce; ++i) out[i] = soft_share(sum_of_lanes(sums + 8 * i));
@@ -163,7 +164,8 @@ void add_occlusion_of_spread(const Work& work, const Slice& slice, std::size_t c
         store_counted(samples, occlusion + first + lane);
       } else if (method == SmoothOcclusion::SoftShare) {
         const NineRows solid = rows_around<kSpread, Part::Solid>(work, centres, lane);
-        store_soft(samples, samples_of(solid, fx, low_lanes, high_lanes), occlusion + first + lane);
+        store_soft(samples, samples_of(solid, fx, low_lanes, high_lanes), work.occlusion.spread,
+                   occlusion + first + lane);
       } else {
         store_weighted(samples, work.occlusion, occlusion + first + lane);
       }

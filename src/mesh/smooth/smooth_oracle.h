@@ -82,7 +82,7 @@ class SmoothOracle {
     const IVec3 offset{cell.x < 0, cell.y < 0, cell.z < 0};
     out.cells.push_back(smooth::cell_name(cell & IVec3{n - 1}, offset));
     if (part_.occlusion.method == SmoothOcclusion::None) return;
-    // In samples of the level, as the spread is.
+    // In cells of the level, as the spread is by now.
     const auto from_cell = [&](int x, int y, int z) { return density_(cell + IVec3{x, y, z}) / size; };
     const SmoothOcclusionOptions occlusion = smooth::within_limits(part_.occlusion, part_.level);
     out.occlusion.push_back(smooth::occlusion_at_vertex(vertex.snapped, vertex.normal, occlusion, from_cell));

@@ -73,7 +73,9 @@ constexpr std::size_t kHardlyAny = 1'000;
 constexpr std::size_t kSampleTriangles = 12'000;
 constexpr std::size_t kLeastSampled = 4 * kSampleTriangles;
 /// The edge of the boxes that the sample consists of, in samples of the field.
-constexpr double kSampleBox = 24.0;
+constexpr double kSampleBox = 12.0;
+/// The least number of these boxes: one box says little about the others.
+constexpr int kSampleBoxes = 16;
 /// If the sample loses no more than one of so many triangles, the mesh cannot be simplified.
 constexpr std::size_t kLeastLoss = 100;
 
@@ -304,9 +306,12 @@ SmoothMesh sample_of(const SmoothMesh& mesh) {
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) ++triangles_of[box_of(i)];
   std::size_t count = 0;
   std::uint32_t last = 0;
-  for (auto box = triangles_of.begin(); box != triangles_of.end() && count < kSampleTriangles; ++box) {
+  int boxes = 0;
+  for (auto box = triangles_of.begin(); box != triangles_of.end(); ++box) {
+    if (count >= kSampleTriangles && boxes >= kSampleBoxes) break;
     count += box->second;
     last = box->first;
+    ++boxes;
   }
   SmoothMesh sample;
   std::vector<std::uint32_t> vertex_of(mesh.positions.size(), ~0U);

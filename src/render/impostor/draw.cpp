@@ -72,7 +72,9 @@ class FarTile {
       point.in_field = (hits.in_field >> lane & 1U) != 0;
       if (point.in_field) {
         point.normal = hits.normal(i);
-        point.position += double{ImpostorFaces::kSurfelLift} * DVec3(point.normal);
+        point.position = faces.start_of_light(i, point.position);
+        point.lift = ImpostorFaces::kSurfelLift;
+        point.is_blended = true;
       } else {
         point.position = on_face(point.position, point.voxel, point.face);
       }

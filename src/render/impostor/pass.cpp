@@ -174,8 +174,9 @@ void ImpostorPass::find(int column, int row, const RayPacket& rays, const raster
     hits.grids.starts_inside &= ~bit;
     hits.placed[i] = drawn.placed;
     hits.in_field &= ~bit;
+    faces.surfel[i] = face.in_field ? &drawn.faces->surfel_of(number) : nullptr;
     if (face.in_field) {
-      const Vec3 normal = drawn.faces->surfel_of(number).normal;
+      const Vec3 normal = faces.surfel[i]->normal;
       hits.normal_x[i] = normal.x, hits.normal_y[i] = normal.y, hits.normal_z[i] = normal.z;
       hits.material[i] = face.type;
       hits.in_field |= bit;

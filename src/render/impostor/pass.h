@@ -18,6 +18,12 @@ namespace quoin {
 struct FarFaces {
   std::uint32_t found = 0;
   RayPacket::Lanes<const ImpostorFaces::Face*> face{};
+  RayPacket::Lanes<const ImpostorFaces::Surfel*> surfel{};  ///< null: the face is a voxel's
+
+  /// Returns where rays of light start from a point of a lane's surfel, in the grid.
+  [[nodiscard]] DVec3 start_of_light(std::size_t lane, const DVec3& point) const {
+    return surfel[lane]->start_of_light(point, DVec3(face[lane]->voxel), face[lane]->direction);
+  }
 };
 
 /// The far instances of one picture: which may show in which part of it, and what rays meet of them.

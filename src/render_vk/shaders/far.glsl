@@ -38,7 +38,7 @@ struct Far {
   ivec4 origin;   // of the tree's coordinates, in the grid; w: the instance
   FarLevel level;
   FarLevel coarser;
-  FarLevel unseen;  // the faces that no view saw
+  FarLevel unseen;  // the faces that no view saw, or cells of these and of what lies behind surfels
   uvec4 near;       // the views around the direction to the camera, a byte each; how often the first two are chosen
   uvec4 faces;    // address of VoxelFaces; number of the first rectangle among those of the picture; how many of the
                   // faces are of voxels
@@ -66,7 +66,6 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Vo
 const uint kIsSurfel = 8;
 const uint kSurfelHalvesShift = 4;  // in whole 1/1,024, twelve bits each
 const float kSurfelRoom = 0.05;  // as render/impostor/raster/faces.h has them
-const float kSurfelLift = 0.5;
 
 const uint kNoFace = 0xFFFFFFFFu;
 

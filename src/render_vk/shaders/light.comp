@@ -204,7 +204,10 @@ Surface surface_at(Point point, Placed placed) {
     surface.colour = placed.detail_colour.xyz;
     surface.emitted = vec3(0.0);
   } else if (is_of_field(point) && (point.what.z & kIsBlended) != 0) {
-    return blend_of_field(opaque_tree(placed, 1), point.voxel.xyz, point.inside.xyz, point.what.x);
+    bool is_far = (point.what.z & kIsFar) != 0;
+    vec3 at = point.inside.xyz - (is_far ? kSurfelLift * normal_of(point.what.y) : vec3(0.0));
+    vec3 cell = floor(at);
+    return blend_of_field(opaque_tree(placed, 1), point.voxel.xyz + ivec3(cell), at - cell, point.what.x);
   }
   return surface;
 }

@@ -10,6 +10,15 @@
 #include "far.glsl"
 #include "faces.glsl"
 
+// The middle of a surfel, from the lower end of its edge.
+vec3 middle_of_surfel(uint side, vec3 shape, vec2 shift) {
+  vec3 middle = vec3(0.0);
+  middle[side >> 1] = shape.x;
+  middle[kFaceU[side]] = shift.x;
+  middle[kFaceV[side]] = shift.y;
+  return middle;
+}
+
 // Where a ray meets a surfel, from the lower end of its edge, and how far along: by the point of the ray that is
 // nearest to the surfel's middle, so that only small numbers are left to be rounded. `from_voxel`: the ray's start.
 vec3 place_on_surfel(ExactRay ray, Pair from_voxel, uint side, vec3 shape, vec2 shift, out float t) {
@@ -17,10 +26,7 @@ vec3 place_on_surfel(ExactRay ray, Pair from_voxel, uint side, vec3 shape, vec2 
   int u = kFaceU[side];
   int v = kFaceV[side];
   Pair back = Pair(-from_voxel.high, -from_voxel.low);
-  vec3 middle = vec3(0.0);
-  middle[axis] = shape.x;
-  middle[u] = shift.x;
-  middle[v] = shift.y;
+  vec3 middle = middle_of_surfel(side, shape, shift);
   back = sum_of(back, Pair(middle, vec3(0.0)));
   Pair products = product_of(back, ray.direction);
   Pair squares = product_of(ray.direction, ray.direction);
@@ -111,9 +117,12 @@ bool find_far(Pair direction, float scale, inout Point point, out float depth, o
   point.voxel = ivec4(voxel, i);
   point.inside.w = depth * scale + nearest;
   if (kHasFields && is_of_field) {
-    uint normal = uint(VoxelFaces(far.faces.xy).at[index + 1].w);
-    point.inside.xyz = at + kSurfelLift * normal_of(normal);
-    point.what = uvec4(what & 0xFFFF, normal, kIsField | kSurface | kIsFar | light << 8, floatBitsToUint(nearest));
+    ivec4 shape = VoxelFaces(far.faces.xy).at[index + 1];
+    vec2 shift = intBitsToFloat(VoxelFaces(far.faces.xy).at[index + 2].xy);
+    uint normal = uint(shape.w);
+    float below = dot(middle_of_surfel(side, intBitsToFloat(shape.xyz), shift) - at, normal_of(normal));
+    point.inside.xyz = at + (max(below, 0.0) + kSurfelLift) * normal_of(normal);
+    point.what = uvec4(what & 0xFFFF, normal, kIsField | kSurface | kIsBlended | kIsFar | light << 8, floatBitsToUint(nearest));
     return true;
   }
   // Light puts it onto the face, which may lie elsewhere in the rectangle's cell.

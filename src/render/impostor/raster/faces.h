@@ -1,9 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
+
+#include <glm/geometric.hpp>
 
 #include <quoin/core/direction.h>
 #include <quoin/core/vec.h>
@@ -75,6 +78,9 @@ struct ImpostorFaces {
     static constexpr int kRays = 9;
   };
 
+  /// How far above a surfel rays of light start, for what it leaves out of the surface's curvature.
+  static constexpr float kSurfelLift = 0.5F;
+
   /// A piece of a field's surface, where that crosses an edge of the lattice of samples: of a plane through that point
   /// what lies within half a sample to each side of the edge, or up to where the surface ends there, at a sharp edge or
   /// the foot of a wall. `Face::voxel` is the edge's lower end, `direction` along it. So the surfels of one direction
@@ -95,11 +101,16 @@ struct ImpostorFaces {
       lower_end[frame.v] += double{shift[1]};
       return lower_end;
     }
+
+    /// Returns where rays of light start from a point of the impostor that is lit with this surfel: off the plane
+    /// through its middle, along its normal. Points of cells may lie below that plane. `lower_end`: of its edge.
+    [[nodiscard]] DVec3 start_of_light(const DVec3& point, const DVec3& lower_end, Direction direction) const {
+      const double below = glm::dot(middle(lower_end, direction) - point, DVec3(normal));
+      return point + (std::max(below, 0.0) + double{kSurfelLift}) * DVec3(normal);
+    }
   };
   static constexpr float kSurfelRoom =
       0.05F;  ///< by which rays meet a surfel beyond its edges, since they are not flush
-  /// From a surfel along its normal to where rays of light start, for what it leaves out of the surface's curvature.
-  static constexpr float kSurfelLift = 0.5F;
 
   int edge = 0;           ///< texels a side of the snapshots
   int first_width = 0;    ///< log2 of the width in voxels of level 0's cells; 0: level 0 holds the faces themselves
