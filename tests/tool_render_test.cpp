@@ -257,6 +257,9 @@ TEST_F(ToolRender, PathTracedImagesHaveABrightBackground) {
   for (const int corner : corners("--sky physical")) EXPECT_GE(corner, 150);
   for (const int corner : corners("--sky uniform")) EXPECT_GE(corner, 250);
   for (const int corner : corners("--sky uniform --ground")) EXPECT_GE(corner, 250);
+  // By night the exposure rises, whichever option says where the sun is.
+  const std::string midnight = "--sun-time 12-21,0,48";
+  EXPECT_GT(corners(midnight)[0], corners(midnight + " --exposure 1.3")[0] + 10);
 }
 
 // A cave is wider than blocks' rooms. A distance that is asked for is the fields' too.

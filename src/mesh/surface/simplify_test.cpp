@@ -272,6 +272,30 @@ TEST_F(Simplify, LeavesALargeMeshThatHardlyShrinks) {
   EXPECT_LT(mesh.indices.size(), whole.indices.size() * 9 / 10);
 }
 
+// A third of the mesh is noise, the rest flat plates: what a sample shows of it must not depend on where it lies.
+TEST_F(Simplify, AMeshThatIsRoughInOnePlaceShrinksWhereverItLies) {
+  std::mt19937 random(3);
+  std::vector<float> values(std::size_t{23} * 23 * 23);
+  for (float& value : values) value = static_cast<float>(random()) * 0x1p-31F - 1.0F;
+  const auto rough = [&](Vec3 p) {
+    const IVec3 at(p);
+    if (at.y < 1 || at.y > 22 || at.z < 1 || at.z > 22) return 1.0F;
+    if (at.x >= 1 && at.x < 23 && at.y < 23 && at.z < 23) {
+      return values[static_cast<std::size_t>((at.z * 23 + at.y) * 23 + at.x)];
+    }
+    if (at.x >= 26 && at.x <= 70) return std::abs(static_cast<float>((at.y + 1) % 4) - 2.0F) - 0.6F;
+    return 1.0F;
+  };
+  const SmoothMesh whole = surface_of(rough, 74);
+  ASSERT_GT(whole.indices.size() / 3, 48'000U);
+  for (int i = 0; i < 4; ++i) {
+    SmoothMesh moved = whole;
+    for (Vec3& position : moved.positions) position.x += 24.0F * static_cast<float>(i);
+    ASSERT_TRUE(simplify_smooth_mesh(moved, 0.02F));
+    EXPECT_LT(moved.indices.size(), whole.indices.size() * 7 / 10) << i;
+  }
+}
+
 TEST_F(Simplify, ColoursStayWhereTheyAreAndTheMeshIsManifoldByPlaces) {
   // A ball of voxels in two halves, the lesser with a checkerboard of small fields.
   Grid grid;

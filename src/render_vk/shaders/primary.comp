@@ -122,7 +122,8 @@ bool find_far(Pair direction, float scale, inout Point point, out float depth, o
     uint normal = uint(shape.w);
     float below = dot(middle_of_surfel(side, intBitsToFloat(shape.xyz), shift) - at, normal_of(normal));
     point.inside.xyz = at + (max(below, 0.0) + kSurfelLift) * normal_of(normal);
-    point.what = uvec4(what & 0xFFFF, normal, kIsField | kSurface | kIsBlended | kIsFar | light << 8, floatBitsToUint(nearest));
+    uint kind = kIsField | kSurface | kIsBlended | kIsFar;
+    point.what = uvec4(what & 0xFFFF, normal, kind | light << 8, floatBitsToUint(nearest));
     return true;
   }
   // Light puts it onto the face, which may lie elsewhere in the rectangle's cell.
