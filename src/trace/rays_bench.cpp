@@ -1,6 +1,6 @@
 // rays/*: the 256x128x256 terrain, primary, shadow and occlusion rays, one at a time and in packets; rays/random600.
-// rays/*/subnormal_lanes: the same with subnormal numbers in lanes without data, and how many times as long that takes as
-// with zeros (ratio_to_zeroed, at most 1.1).
+// rays/*/subnormal_lanes: the same with subnormal numbers in lanes without data, and how many times as long that takes
+// as with zeros (ratio_to_zeroed, at most 1.1).
 
 #include <bit>
 #include <chrono>

@@ -95,11 +95,11 @@ struct NaturalLook {
 };
 
 /// Returns the environment, exposure and tone curve of the command-line tool and the viewer under `sky`, for scenes
-/// whose file has no render settings. `sun` points towards the sun; any length but 0. Look{} and DevelopOptions{} are the
-/// library's defaults and differ.
+/// whose file has no render settings. `sun` points towards the sun; any length but 0. Look{} and DevelopOptions{} are
+/// the library's defaults and differ.
 ///
 /// Gradient:    the default: a pale background and bright shadows. While the sun sinks from 4 to 14 degrees below the
-///              horizon the exposure rises to four times that of the day, or the tone curve would leave the night black.
+///              horizon the exposure rises to four times that of the day; the tone curve would leave the night black.
 /// Physical:    twice the light, which a clear sky's dark blue shadows need.
 /// Uniform:     colours as they are and a white ground: a white surface is as white as the background.
 /// Environment: the image's own light.

@@ -22,16 +22,15 @@ enum class SmoothOcclusion : std::uint8_t {
                       ///< steps of a count
 };
 
-/// Settings of the occlusion. Lengths, and densities as depths, are in samples of level 0, so that a surface is about as
-/// dark at every level of detail; creases narrower than a few cells of a coarse level are lost with their shape.
+/// Settings of the occlusion. Lengths, and densities as depths, are in samples of level 0, so that a surface is about
+/// as dark at every level; creases narrower than a few cells of a coarse level are lost with their shape.
 ///
 /// The samples lie `spread` apart on each axis, about the vertex moved along its unit normal n by
 /// spread * (|nx| + |ny| + |nz|) + 0.1 cells, so that a flat or convex surface is exactly 0. Weighted:
 /// 1 - clamp((1 - (ratio + offset)^power) / (1 - offset^power), 0, 1); as published:
-/// 1 - clamp(1 - (ratio + offset)^power, 0, 1). The soft share counts a sample whose density d is less than 0
-/// by d / min(s, -spread / 8), at most 1: s is interpolated as d is, but with 0 for the corners in air.
-/// Numbers out of their range count as its nearest end, NaN as the
-/// default.
+/// 1 - clamp(1 - (ratio + offset)^power, 0, 1). The soft share counts a sample whose density d is less than 0 by
+/// d / min(s, -spread / 8), at most 1: s is interpolated as d is, but with 0 for the corners in air. Numbers out of
+/// their range count as its nearest end, NaN as the default.
 struct SmoothOcclusionOptions {
   SmoothOcclusion method = SmoothOcclusion::SoftShare;
   float spread = 2.0F;  ///< 1/16 to 4, rounded to 1/65,536 of a cell; 1 and 2 cells are several times faster than

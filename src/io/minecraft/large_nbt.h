@@ -13,8 +13,8 @@
 
 namespace quoin::minecraft {
 
-/// A long array of bytes in pages. A page of one value takes no memory of its own; pages of 2, 4 or 16 values have 1, 2 or
-/// 4 bits per byte.
+/// A long array of bytes in pages. A page of one value takes no memory of its own; pages of 2, 4 or 16 values have 1, 2
+/// or 4 bits per byte.
 class PagedBytes {
  public:
   static constexpr std::size_t kPageBytes = 4096;

@@ -124,7 +124,7 @@ inline constexpr float kLift = 0.1F;
 /// The published form counts depths below this as none.
 inline constexpr float kLeastDepth = 0.001F;
 
-/// What densities and spreads are multiplied by, so that they count in cells of the level.
+/// Returns the factor from samples of level 0 to cells of the level, for densities and spreads.
 [[gnu::always_inline]] inline float depth_unit(int level) {
   return 1.0F / static_cast<float>(1 << level);
 }
@@ -162,13 +162,14 @@ struct SampleAxis {
   return 1.0F - static_cast<float>(in_air) * (1.0F / 27.0F);
 }
 
-/// The depth, in cells, from which on a sample in solid counts as solid whatever lies around. Less would give spikes
-/// beside corners that are hardly solid.
+/// Returns the depth, in cells, at which a sample counts as solid in any case. Less would give spikes next to corners
+/// that are hardly solid.
 [[gnu::always_inline]] inline float whole_depth(float spread) {
   return spread * 0.125F;
 }
 
-/// How solid a sample is, 0 to 1. `solid`: interpolated as its density is, but with 0 for the corners in air.
+/// Returns by how much a sample is solid, 0 to 1. `solid`: interpolated as its density is, but with 0 for the corners
+/// in air.
 [[gnu::always_inline]] inline float solidity(float density, float solid, float whole_depth) {
   return std::min(std::min(density, 0.0F) / std::min(solid, -whole_depth), 1.0F);
 }

@@ -46,7 +46,7 @@ inline Centres find_centres(const Work& work, const Slice& slice, std::size_t fi
   return centres;
 }
 
-// What of the points' densities is interpolated.
+// The part of the points' densities that is interpolated.
 enum class Part { All, Solid };
 
 template <Part kPart>

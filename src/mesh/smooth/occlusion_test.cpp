@@ -204,7 +204,7 @@ World rugged() {
   });
 }
 
-// How dark surfaces are of the same field at several levels: lengths are in samples of level 0.
+// Lengths are in samples of level 0, so the surface of one field is about as dark at several levels.
 TEST(SmoothOcclusion, IsAboutTheSameAtEveryLevel) {
   const World world = rugged();
   for (const SmoothOcclusion form :

@@ -272,7 +272,7 @@ TEST_F(Simplify, LeavesALargeMeshThatHardlyShrinks) {
   EXPECT_LT(mesh.indices.size(), whole.indices.size() * 9 / 10);
 }
 
-// A third of the mesh is noise, the rest flat plates: what a sample shows of it must not depend on where it lies.
+// A third of the mesh is noise, the rest flat plates. It shrinks alike at every place.
 TEST_F(Simplify, AMeshThatIsRoughInOnePlaceShrinksWhereverItLies) {
   std::mt19937 random(3);
   std::vector<float> values(std::size_t{23} * 23 * 23);

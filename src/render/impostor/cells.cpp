@@ -185,7 +185,7 @@ std::uint64_t halved_bits(std::uint64_t bits, unsigned octant) {
 
 }  // namespace
 
-// The cells of a field's lattice of which all eight corners are solid.
+// The cells of a field's lattice whose eight corners are all solid.
 class SolidCells {
  public:
   explicit SolidCells(const DensityGrid& field) : field_(&field) {}

@@ -29,9 +29,9 @@ class SurfaceCells {
   /// `edge`: texels a side of the snapshots that saw them.
   SurfaceCells(const std::vector<SeenFace>& faces, const ContentSphere& content, int edge, int log2_width);
 
-  /// Cells of 2 voxels behind `faces`, which show through the gaps between surfels: the faces that no view saw, and of
-  /// each surfel the nearest of the field's lattice cells below it of which all corners are solid. None of these
-  /// reaches the field's surface, so outlines stay. Cost: about 2 us per surfel.
+  /// Returns cells of 2 voxels that show through the gaps between surfels: the faces that no view saw, and for each
+  /// surfel the nearest lattice cells below it whose corners are all solid. None of these reaches the field's surface,
+  /// so outlines stay. Cost: about 2 us per surfel.
   [[nodiscard]] static SurfaceCells behind(const std::vector<SeenFace>& faces, const DensityGrid& field,
                                            const ContentSphere& content, int edge);
 

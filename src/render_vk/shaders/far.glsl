@@ -38,7 +38,7 @@ struct Far {
   ivec4 origin;   // of the tree's coordinates, in the grid; w: the instance
   FarLevel level;
   FarLevel coarser;
-  FarLevel unseen;  // the faces that no view saw, or cells of these and of what lies behind surfels
+  FarLevel unseen;  // the faces that no view saw, or cells of these and of the solid behind surfels
   uvec4 near;       // the views around the direction to the camera, a byte each; how often the first two are chosen
   uvec4 faces;    // address of VoxelFaces; number of the first rectangle among those of the picture; how many of the
                   // faces are of voxels

@@ -22,8 +22,8 @@ Surface surface_of_material(uint type) {
   return surface_of(type);
 }
 
-// The look at a point of a cell, `inside` it, blended from the solid samples of the 27 around. `nearest`: the material
-// of the nearest of them.
+// Returns the look at a point `inside` a cell, blended from the solid samples of the 27 around. `nearest`: the nearest
+// sample's material.
 Surface blend_of_field(Tree field, ivec3 cell, vec3 inside, uint nearest) {
   Surface blend = surface_of_material(nearest);
   Numbers block;

@@ -78,7 +78,7 @@ struct ImpostorFaces {
     static constexpr int kRays = 9;
   };
 
-  /// How far above a surfel rays of light start, for what it leaves out of the surface's curvature.
+  /// The height above a surfel at which rays of light start: it is flat, and the surface is curved.
   static constexpr float kSurfelLift = 0.5F;
 
   /// A piece of a field's surface, where that crosses an edge of the lattice of samples: of a plane through that point
@@ -120,7 +120,7 @@ struct ImpostorFaces {
   /// Faces in crevices that no snapshot shows but a camera may see: drawn after level 0, where nothing of that level
   /// hides them. Empty for grids with so many faces that level 0 holds cells.
   ///
-  /// Where level 0 holds surfels: such faces, and solid cells behind the surfels, in cells; see SurfaceCells::behind.
+  /// If level 0 holds surfels: cells of such faces and of the solid behind the surfels; see SurfaceCells::behind.
   Level unseen;
   std::vector<Face> faces;
   std::vector<Surfel> surfels;  ///< of the last of `faces`
