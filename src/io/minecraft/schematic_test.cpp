@@ -376,7 +376,9 @@ TEST(PagedBytes, PagesOfFewValuesArePacked) {
     EXPECT_GE(pages.held_bytes(), held) << kinds;
     held = pages.held_bytes();
     EXPECT_EQ(pages.uniform_page(0).has_value(), kinds == 1);
-    if (kinds <= 4) EXPECT_LE(held, 6 * (PagedBytes::kPageBytes / 4 + 16)) << kinds;
+    if (kinds <= 4) {
+      EXPECT_LE(held, 6 * (PagedBytes::kPageBytes / 4 + 16)) << kinds;
+    }
   }
 }
 
