@@ -9,7 +9,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <span>
 #include <string>
@@ -114,10 +113,10 @@ Scene field() {
   return scene;
 }
 
-/// Ends the program if a seed was not made.
+/// Ends the program if a file could not be written or read.
 void require(bool holds, const fs::path& path, const std::string& reason) {
   if (holds) return;
-  std::fprintf(stderr, "fuzz_seeds: cannot write %s: %s\n", path.c_str(), reason.c_str());
+  std::fprintf(stderr, "fuzz_seeds: %s: %s\n", path.c_str(), reason.c_str());
   std::exit(1);
 }
 
@@ -167,10 +166,9 @@ class Seeds {
 };
 
 std::vector<std::byte> read(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(in), {}};
-  const auto bytes = std::as_bytes(std::span(text));
-  return {bytes.begin(), bytes.end()};
+  auto bytes = read_file(path);
+  require(bytes.has_value(), path, bytes ? "" : to_string(bytes.error()));
+  return std::move(*bytes);
 }
 
 void put_pictures(const Seeds& seeds) {

@@ -183,8 +183,6 @@ std::uint64_t halved_bits(std::uint64_t bits, unsigned octant) {
   return (low | high << 16) << shift;
 }
 
-}  // namespace
-
 // The cells of a field's lattice whose eight corners are all solid.
 class SolidCells {
  public:
@@ -212,6 +210,8 @@ class SolidCells {
   IVec3 at_{0};
   bool is_known_ = false;
 };
+
+}  // namespace
 
 // Makes cells of faces, one after the other.
 class SurfaceCells::Collector {

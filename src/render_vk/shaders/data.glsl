@@ -107,7 +107,7 @@ struct State {
   vec4 colour;  // w: 0 once the sample is done, else 1 and the bodies to be lit in this round
 };
 
-// The height above a surfel at which rays of light start, as in render/impostor/raster/faces.h.
+// Rays of light start so high above a surfel, as in render/impostor/raster/faces.h.
 const float kSurfelLift = 0.5;
 
 const uint kSurface = 0;

@@ -78,7 +78,7 @@ struct ImpostorFaces {
     static constexpr int kRays = 9;
   };
 
-  /// The height above a surfel at which rays of light start: it is flat, and the surface is curved.
+  /// Rays of light start so high above a surfel, since it is flat and the surface is curved.
   static constexpr float kSurfelLift = 0.5F;
 
   /// A piece of a field's surface, where that crosses an edge of the lattice of samples: of a plane through that point
