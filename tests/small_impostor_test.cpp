@@ -305,7 +305,8 @@ double mean_difference(const Image& a, const Image& b) {
   return sum / static_cast<double>(a.rgb.size());
 }
 
-// The largest change of the impostor's image in steps of half a percent, and of the traced image over the same steps.
+// The largest changes of both images in steps of half a percent. A single step of a small image turns over a handful of
+// samples, and which of the two images it hits is chance; the largest of many steps is what is seen.
 struct Changes {
   double drawn = 0.0;
   double traced = 0.0;
@@ -331,22 +332,23 @@ Changes changes_of(const SmallModel& model, int direction, double from_pixels, d
   return most;
 }
 
-// Over every threshold between two levels.
-TEST(SmallImpostors, ChangeLittleMoreThanTheTracedImageAsTheDistanceDoes) {
+// Over every threshold between two levels, in windows of 45 steps.
+TEST(SmallImpostors, ChangeAtMostTwiceAsMuchAsTheTracedImageAsTheDistanceDoes) {
   const bool is_nightly = std::getenv("QUOIN_NIGHTLY") != nullptr;
   for (const Source& source : made_models()) {
     const SmallModel model(source.name, source.make());
     double worst = 0.0;
-    for (int direction = 0; direction < (is_nightly ? 24 : 10); direction += 5) {
-      for (double pixels = 64.0; pixels > 8.0; pixels /= 1.25) {
-        const Changes most = changes_of(model, direction, pixels, is_nightly ? pixels / 1.25 : pixels / 1.03);
+    int window = 0;
+    for (double pixels = 64.0; pixels > 8.0; pixels /= 1.25, ++window) {
+      const int first = is_nightly ? 0 : 7 * window % 24;
+      for (int direction = first; direction < (is_nightly ? 24 : first + 1); direction += 5) {
+        const Changes most = changes_of(model, direction, pixels, pixels / 1.25);
         // Less than one of 255 is not seen.
         worst = std::max(worst, most.drawn / std::max(most.traced, 1.0));
       }
     }
     std::printf("%s: up to %.2f times the change of the traced image\n", source.name, worst);
-    // Twice is the goal; the checks of the box, which are all edges of one size, change by 2.3 times as much.
-    EXPECT_LE(worst, 2.5) << source.name;
+    EXPECT_LE(worst, 2.0) << source.name;
   }
 }
 
