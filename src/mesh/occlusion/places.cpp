@@ -109,6 +109,7 @@ void PlaceKernel::occlude(const DensityNeighbourhood& chunks, const ChunkPlaces&
     for (const Entry& entry : slice(z)) rows.unite(RowSet::of_cells(entry.place >> kPlaceShift));
     if (!rows.empty()) add_occlusion_rows(work_, rows, z);
   }
+  work_.is_dense = false;
   begin_occlusion(work_);
   for (int z = work_.cells.first; z < work_.cells.last; ++z) {
     const std::size_t first = first_of_slice_[static_cast<std::size_t>(z + 1)];

@@ -16,16 +16,6 @@ namespace {
 
 constexpr std::uint64_t kAllSolid = ~std::uint64_t{0};
 
-// Every 2^level-th bit of a word, moved together.
-std::uint64_t thinned(std::uint64_t word, int level) {
-  QUOIN_ASSERT(level >= 0 && level <= kMaxSmoothLevel, "a level of detail");
-  if (level == 0) return word;
-  std::uint64_t out = 0;
-  const int n = kChunkEdge >> level;
-  for (int i = 0; i < n; ++i) out |= (word >> (i << level) & 1U) << i;
-  return out;
-}
-
 // A lattice coordinate as that of a chunk (-1, 0, 1) and of a sample in it.
 struct ChunkCoordinate {
   int chunk;
@@ -89,11 +79,18 @@ RowPart row_part(const DensityChunk* chunk, Half outside, ChunkCoordinate y, Chu
 
 // `kCount` points of a row of one chunk at level 0, from `first` on.
 template <int kCount>
-void copy_points(const RowPart& part, int first, Half* to) {
-  if (part.samples != nullptr) {
-    std::memcpy(to, part.samples + first, kCount * sizeof(Half));
+[[gnu::always_inline]] inline void copy_part(const DensityChunk* chunk, Half outside, ChunkCoordinate y,
+                                             ChunkCoordinate z, int first, Half* to) {
+  const DensityStorage* const storage = chunk == nullptr ? nullptr : DensityStorage::of(*chunk);
+  if (storage == nullptr) {
+    std::fill_n(to, kCount, chunk == nullptr ? outside : *chunk->uniform());
+    return;
+  }
+  const std::uint32_t slab = storage->slabs[static_cast<std::size_t>(z.sample / 4 * 16 + y.sample / 4)];
+  if ((slab & ChunkStorage::kUniformSlab) != 0) {
+    std::fill_n(to, kCount, static_cast<Half>(slab));
   } else {
-    std::fill_n(to, kCount, part.value);
+    std::memcpy(to, storage->row(slab, z.sample % 4 * 4 + y.sample % 4) + first, kCount * sizeof(Half));
   }
 }
 
@@ -101,6 +98,49 @@ void copy_points(const RowPart& part, int first, Half* to) {
 void copy_thinned(const RowPart& part, int level, Half* to) {
   const int n = kChunkEdge >> level;
   for (int i = 0; i < n; ++i) to[i] = part.samples == nullptr ? part.value : part.samples[i << level];
+}
+
+// A row of points of the chunk, and sixteen before and after: window 0 from column -16 on, window 1 from 16 on.
+struct Windows {
+  std::uint64_t first = 0;
+  std::uint64_t second = 0;
+};
+
+// The signs of a row of points of the level in a chunk.
+std::uint64_t signs_of(const DensityChunk* chunk, Half outside, int y, int z, int level) {
+  if (chunk == nullptr) return DensityChunk::is_solid(outside) ? ~std::uint64_t{0} : 0;
+  return thinned(chunk->solid_row(y, z), level);
+}
+
+Windows windows_of(std::uint64_t before, std::uint64_t own, std::uint64_t after, int n) {
+  const int side = std::min(n, kPointX);
+  Windows windows;
+  windows.first = (before >> (n - side) & low_bits(side)) << (kPointX - side) | own << kPointX;
+  if (n == kChunkEdge) {
+    windows.second = own >> kPointX | after << (kChunkEdge - kPointX);
+  } else {
+    windows.first = (windows.first & low_bits(kPointX + n)) | (after & low_bits(side)) << (kPointX + n);
+    windows.second = windows.first >> kSecondWindow;
+  }
+  return windows;
+}
+
+// 96 rows of signs of one chunk column at level 0: 16 of the chunk before along y, 64, 16 of the chunk after.
+void copy_column(const DensityNeighbourhood& chunks, int dx, int z, std::uint64_t* to) {
+  constexpr std::array<int, 3> kCounts = {kPointX, kChunkEdge, kPointX};
+  for (int dy = -1; dy <= 1; ++dy) {
+    const int count = kCounts[static_cast<std::size_t>(dy + 1)];
+    const int first = dy < 0 ? kChunkEdge - count : 0;
+    const DensityChunk* const chunk = chunks.at(dx, dy, z >> kChunkShift);
+    const DensityStorage* const storage = chunk == nullptr ? nullptr : DensityStorage::of(*chunk);
+    if (storage != nullptr) {
+      std::copy_n(storage->solid.data() + kChunkEdge * (z & (kChunkEdge - 1)) + first, count, to);
+    } else {
+      const Half value = chunk == nullptr ? chunks.outside : *chunk->uniform();
+      std::fill_n(to, count, DensityChunk::is_solid(value) ? ~std::uint64_t{0} : 0);
+    }
+    to += count;
+  }
 }
 
 // Nothing to mesh where the chunk and all that its cells touch are of one sign throughout.
@@ -153,13 +193,17 @@ std::array<RowPart, 3> row_parts(const Work& work, int y, int z) {
 }
 
 void gather_row(const Work& work, int y, int z, Half* row) {
-  const std::array<RowPart, 3> parts = row_parts(work, y, z);
   if (work.level == 0) {
-    copy_points<kPointX>(parts[0], kChunkEdge - kPointX, row - kPointX);
-    copy_points<kChunkEdge>(parts[1], 0, row);
-    copy_points<kPointX>(parts[2], 0, row + kChunkEdge);
+    const ChunkCoordinate cy = chunk_coordinate(y, 0);
+    const ChunkCoordinate cz = chunk_coordinate(z, 0);
+    const DensityNeighbourhood& chunks = *work.chunks;
+    const auto chunk = [&](int dx) { return chunks.at(dx, cy.chunk, cz.chunk); };
+    copy_part<kPointX>(chunk(-1), chunks.outside, cy, cz, kChunkEdge - kPointX, row - kPointX);
+    copy_part<kChunkEdge>(chunk(0), chunks.outside, cy, cz, 0, row);
+    copy_part<kPointX>(chunk(1), chunks.outside, cy, cz, 0, row + kChunkEdge);
     return;
   }
+  const std::array<RowPart, 3> parts = row_parts(work, y, z);
   std::array<Half, kChunkEdge> before{};
   copy_thinned(parts[0], work.level, before.data());
   const int side = std::min(work.n, kPointX);
@@ -179,13 +223,49 @@ void add_occlusion_rows(Work& work, RowSet rows, int z) {
   }
 }
 
+void find_signs(Work& work, int z) {
+  const DensityNeighbourhood& chunks = *work.chunks;
+  std::uint64_t* const first = work.signs[z & 1][0];
+  std::uint64_t* const second = work.signs[z & 1][1];
+  if (work.level == 0) {
+    alignas(64) std::uint64_t columns[3][kReachRows];
+    for (int dx = -1; dx <= 1; ++dx) copy_column(chunks, dx, z, columns[dx + 1]);
+    for (int row = 0; row < kReachRows; ++row) {
+      first[row] = columns[0][row] >> (kChunkEdge - kPointX) | columns[1][row] << kPointX;
+      second[row] = columns[1][row] >> kPointX | columns[2][row] << (kChunkEdge - kPointX);
+    }
+    return;
+  }
+  std::fill_n(first, kReachRows, 0);
+  std::fill_n(second, kReachRows, 0);
+  const RowSet& rows = work.occlusion_rows[static_cast<std::size_t>(z + kWidestApron)];
+  const int edge = kChunkEdge - 1;
+  const int sample_z = z * (1 << work.level);
+  rows.for_each([&](int y) {
+    const int sample_y = y * (1 << work.level);
+    const auto signs = [&](int dx) {
+      return signs_of(chunks.at(dx, sample_y >> kChunkShift, sample_z >> kChunkShift), chunks.outside, sample_y & edge,
+                      sample_z & edge, work.level);
+    };
+    const Windows windows = windows_of(signs(-1), signs(0), signs(1), work.n);
+    first[y + kPointX] = windows.first;
+    second[y + kPointX] = windows.second;
+  });
+}
+
 void begin_occlusion(Work& work) {
   // The slices from `apron` below a cell to as many above its upper points.
-  const int slices = work.apron <= 6 ? 16 : 32;
-  work.decoded_mask = slices - 1;
-  const std::size_t size = static_cast<std::size_t>(slices + kRepeatedSlices) * kDecodedSlice + 64;
-  if (work.decoded.size() < size) work.decoded.resize(size);
-  work.next_decoded = work.cells.first - work.apron;
+  const std::size_t slices = work.apron <= 6 ? 16 : kMostSlices;
+  work.ring_mask = static_cast<int>(slices) - 1;
+  work.next_slice = work.cells.first - work.apron;
+  const auto make_room = [](auto& values, std::size_t size) {
+    if (values.size() < size) values.resize(size);
+  };
+  if (work.is_dense) return make_room(work.decoded, (slices + kRepeatedSlices) * kDecodedSlice + 64);
+  // The first slice begins anew.
+  --work.next_slice;
+  make_room(work.cell_words, slices * 2 * Work::kSlots + 4);
+  make_room(work.sampled, slices * kSampledSlice + 64);
 }
 
 }  // namespace quoin::smooth

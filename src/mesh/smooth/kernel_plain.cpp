@@ -4,28 +4,35 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "mesh/smooth/cell.h"
+#include "mesh/smooth/listed.inl"
 #include "mesh/smooth/scratch.h"
 #include "mesh/smooth/slices.inl"
 
 namespace quoin::smooth {
 namespace {
 
-void decode_row(const Half* from, float* to, int count) {
-  for (int i = 0; i < count; ++i) to[i] = float_from_half(from[i]);
+// A place's column and row, from -1.
+int column_of(int place) {
+  return (place & (kPlaceStride - 1)) - 1;
+}
+int row_of(int place) {
+  return (place >> kPlaceShift) - 1;
 }
 
-Corners corners_at(const Half* low, const Half* high) {
-  return {float_from_half(low[0]),
-          float_from_half(low[1]),
-          float_from_half(low[kPlaceStride]),
-          float_from_half(low[kPlaceStride + 1]),
-          float_from_half(high[0]),
-          float_from_half(high[1]),
-          float_from_half(high[kPlaceStride]),
-          float_from_half(high[kPlaceStride + 1])};
+// A stored density, which is never infinite or NaN: moving its bits and mending the exponent is all.
+float density_of(Half half) {
+  const auto bits = static_cast<std::uint32_t>(std::int32_t{static_cast<std::int16_t>(half)}) << 13 & 0x8FFF'E000U;
+  return std::bit_cast<float>(bits) * 0x1p112F;
+}
+
+// By x + 2 y + 4 z, of rows that lie `stride` apart.
+Corners corners_at(const Half* low, const Half* high, std::ptrdiff_t stride) {
+  return {density_of(low[0]),  density_of(low[1]),  density_of(low[stride]),  density_of(low[stride + 1]),
+          density_of(high[0]), density_of(high[1]), density_of(high[stride]), density_of(high[stride + 1])};
 }
 
 // A vertex as a place remembers it.
@@ -41,7 +48,8 @@ void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChun
     const int place = work.places[i];
     const int x = column_of(place);
     const int y = row_of(place);
-    const CellVertex vertex = cell_vertex(corners_at(work.row(y, slice.z) + x, work.row(y, slice.z + 1) + x));
+    const CellVertex vertex =
+        cell_vertex(corners_at(work.row(y, slice.z) + x, work.row(y, slice.z + 1) + x, kPlaceStride));
     const std::size_t at = slice.first_vertex + i;
     out.positions.data()[at] = (Vec3(x, y, slice.z) + vertex.snapped) * scale;
     out.normals.data()[at] = vertex.normal;
@@ -54,9 +62,83 @@ void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChun
   }
 }
 
+template <int kSpread>
+void find_batch(const Work& work, const Slice& slice, std::size_t first, std::size_t count, Batch& batch) {
+  for (std::size_t v = 0; v < count; ++v) {
+    const std::size_t from = first + v;
+    const Vec3 snapped(work.fractions[0][from], work.fractions[1][from], work.fractions[2][from]);
+    const Vec3 normal(work.normals[0][from], work.normals[1][from], work.normals[2][from]);
+    const Vec3 centre = occlusion_centre(snapped, normal, work.occlusion.spread);
+    IVec3 lowest{0};
+    for (int axis = 0; axis < 3; ++axis) {
+      const SampleAxis samples = sample_axis(centre[axis], work.occlusion.spread);
+      lowest[axis] = samples.base[0];
+      for (std::size_t i = 0; i < 3; ++i) {
+        batch.steps[axis][i][v] = samples.base[i] - samples.base[0];
+        batch.fraction[axis][i][v] = samples.fraction[i];
+      }
+    }
+    const int place = work.places[from] & kPlaceMask;
+    batch.column[v] = column_of(place) + lowest.x + kPointX;
+    batch.row[v] = row_of(place) + lowest.y + kPointX;
+    batch.slice[v] = slice.z + lowest.z + kSliceBias;
+  }
+}
+
+// Along z, y and x in turn; corners by x + 2 y + 4 z.
+float interpolated(const Corners& d, Vec3 fraction) {
+  const auto between = [](float a, float b, float f) { return a + f * (b - a); };
+  std::array<float, 4> along_z{};
+  for (std::size_t i = 0; i < 4; ++i) along_z[i] = between(d[i], d[i + 4], fraction.z);
+  return between(between(along_z[0], along_z[2], fraction.y), between(along_z[1], along_z[3], fraction.y), fraction.x);
+}
+
+template <int kSpread, bool kCounted>
+bool find_values(const Work& work, std::size_t count, Batch& batch) {
+  const float unit = depth_unit(work.level);
+  const float deep = whole_depth(work.occlusion.spread);
+  bool is_any = false;
+  std::fill_n(batch.solid, count / 8 + 1, std::uint8_t{0});
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t v = batch.codes[i] >> kCodeShift;
+    const std::size_t sample = batch.codes[i] & ((1U << kCodeShift) - 1);
+    const std::array<std::size_t, 3> number = {sample % 3, sample / 3 % 3, sample / 9};
+    IVec3 step{0};
+    Vec3 fraction{0.0F};
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::size_t n = number.at(static_cast<std::size_t>(axis));
+      step[axis] = batch.steps[axis][n][v];
+      fraction[axis] = batch.fraction[axis][n][v];
+    }
+    const int x = batch.column[v] - kPointX + step.x;
+    const int y = batch.row[v] - kPointX + step.y;
+    const int z = batch.slice[v] - kSliceBias + step.z;
+    Corners corners = corners_at(work.sampled_row(y, z) + x, work.sampled_row(y, z + 1) + x, kSampledStride);
+    const float density = interpolated(corners, fraction) * unit;
+    const bool is_solid = density < 0.0F;
+    is_any |= is_solid;
+    batch.solid[i / 8] |= static_cast<std::uint8_t>(unsigned{is_solid} << (i % 8));
+    if constexpr (kCounted) continue;
+    batch.values[i] = std::min(density, 0.0F);
+    if (is_solid && work.occlusion.method == SmoothOcclusion::SoftShare) {
+      for (float& d : corners) d = std::min(d, 0.0F);
+      batch.values[i] = solidity(density, interpolated(corners, fraction) * unit, deep);
+    }
+  }
+  return is_any;
+}
+
+template <int kSpread, bool kCounted>
+std::size_t list_samples(const Work& work, std::size_t count, Batch& batch) {
+  return list_one_by_one<kSpread, kCounted>(work, count, batch);
+}
+
+void add_up(const Work& work, const Batch& batch, std::span<const std::uint32_t> which, float* occlusion) {
+  for (const std::uint32_t v : which) occlusion[v] = occlusion_of_sum(sum_of(batch, v), work.occlusion);
+}
+
 void add_occlusion(Work& work, const Slice& slice, std::size_t count, float* occlusion) {
-  decode_around(work, slice.z);
-  occlusion_one_by_one(work, slice, count, occlusion);
+  if (count != 0) occlude_by_lists(work, slice, count, occlusion);
 }
 
 // The squared length of a diagonal, in 64ths of a cell.

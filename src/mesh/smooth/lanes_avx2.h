@@ -50,6 +50,15 @@ inline F gather(const float* base, I place) {
 inline F look_up(const std::array<float, 16>& table, I index) {
   return gather(table.data(), index);
 }
+inline F look_up(const float (&table)[32], I index) {
+  return gather(table, index);
+}
+inline I gather(const std::int32_t* base, I at) {
+  return {_mm256_i32gather_epi32(base, at.v, 4)};
+}
+inline I look_up(const std::int32_t (&table)[32], I index) {
+  return gather(table, index);
+}
 // The first `count` lanes to their places.
 inline void scatter(std::uint32_t* base, I place, I value, std::size_t count) {
   alignas(32) std::uint32_t places[8];

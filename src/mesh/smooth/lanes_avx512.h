@@ -51,6 +51,16 @@ inline F gather(const float* base, I place) {
 inline F look_up(const std::array<float, 16>& table, I index) {
   return {_mm512_permutexvar_ps(index.v, _mm512_loadu_ps(table.data()))};
 }
+// Of a table in two registers.
+inline F look_up(const float (&table)[32], I index) {
+  return {_mm512_permutex2var_ps(_mm512_load_ps(table), index.v, _mm512_load_ps(table + 16))};
+}
+inline I look_up(const std::int32_t (&table)[32], I index) {
+  return {_mm512_permutex2var_epi32(_mm512_load_si512(table), index.v, _mm512_load_si512(table + 16))};
+}
+inline I gather(const std::int32_t* base, I at) {
+  return {_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), each_lane(), at.v, base, 4)};
+}
 // The first `count` lanes to their places.
 inline void scatter(std::uint32_t* base, I place, I value, std::size_t count) {
   const auto mask = static_cast<__mmask16>(count >= 16 ? 0xFFFF : (1U << count) - 1);

@@ -1,15 +1,65 @@
-// Occlusion with whole-number spreads, as many vertices at a time as a register holds eight lanes. All 27 samples share
-// one fraction then: six rows of points along x in each of six slices, interpolated along z, y and x in turn.
+// Occlusion where many cells are active, with whole-number spreads, as many vertices at a time as a register holds eight
+// lanes. All 27 samples share one fraction then: six rows of points along x in each of six slices, interpolated along z, y and x in turn.
 //
 //   slices z, z + 1 -> one; rows y, y + 1 -> one: nine rows of eight points     | . . . . . . . . |
 //   of two rows the points 0, s, 2 s each, s the spread                          | a a a b b b - - |
 
 #pragma once
 
-#include "mesh/smooth/vectors.inl"
+#include "mesh/smooth/listed_lanes.inl"
 
 namespace quoin::smooth {
 namespace {
+
+void decode_row(const Half* from, float* to, int count) {
+  for (int i = 0; i < count; i += kWidth) store(to + i, load_halves(from + i));
+}
+
+void decode_part(const RowPart& part, int first, int count, float* to) {
+  if (part.samples != nullptr) return decode_row(part.samples + first, to, count);
+  alignas(64) Half same[kChunkEdge];
+  std::fill_n(same, count, part.value);
+  decode_row(same, to, count);
+}
+
+// The row of points (y, z), with sixteen before and after; x = 0 is at `to`.
+void decode_points(const Work& work, int y, int z, float* to) {
+  if (work.level == 0) {
+    const std::array<RowPart, 3> parts = row_parts(work, y, z);
+    decode_part(parts[0], kChunkEdge - kPointX, kPointX, to - kPointX);
+    decode_part(parts[1], 0, kChunkEdge, to);
+    decode_part(parts[2], 0, kPointX, to + kChunkEdge);
+    return;
+  }
+  alignas(64) Half halves[kPlaceStride] = {};
+  gather_row(work, y, z, halves + kPointX);
+  const int count = work.n + 2 * kPointX;
+  decode_row(halves, to - kPointX, count);
+  // Exact: the unit is a power of two.
+  const float unit = depth_unit(work.level);
+  for (int i = 0; i < count; ++i) to[i - kPointX] *= unit;
+}
+
+void decode_slice(Work& work, int z) {
+  const RowSet& needed = work.occlusion_rows[static_cast<std::size_t>(z + kWidestApron)];
+  if (needed.empty()) return;
+  const int slices = work.ring_mask + 1;
+  const bool is_repeated = (z & work.ring_mask) < kRepeatedSlices;
+  for (int y = work.cells.first - work.apron; y <= work.cells.last + work.apron; ++y) {
+    if (!needed.has(y)) continue;
+    float* const row = work.decoded_row(y, z);
+    decode_points(work, y, z, row);
+    if (!is_repeated) continue;
+    std::memcpy(row - kPointX + std::ptrdiff_t{slices} * kDecodedSlice, row - kPointX, sizeof(float) * kDecodedStride);
+  }
+}
+
+// Makes sure that all is there that the vertices of slice z of cells are occluded by.
+void decode_around(Work& work, int z) {
+  const int last = z + work.apron + 1;
+  for (int next = std::max(work.next_slice, z - work.apron); next <= last; ++next) decode_slice(work, next);
+  work.next_slice = last + 1;
+}
 
 // Where each vertex of a slice is sampled: the lowest point that it reads, and the fractions that its samples share.
 struct Centres {
@@ -63,8 +113,7 @@ template <int kSpread, Part kPart>
 inline NineRows rows_around(const Work& work, const Centres& centres, std::size_t lane) {
   const float* lowest[kVerticesAtOnce];
   for (std::size_t i = 0; i < kVerticesAtOnce; ++i) {
-    lowest[i] =
-        work.decoded.data() + (centres.z[lane + i] & work.decoded_mask) * kDecodedSlice + centres.offset[lane + i];
+    lowest[i] = work.decoded.data() + (centres.z[lane + i] & work.ring_mask) * kDecodedSlice + centres.offset[lane + i];
   }
   const F fy = spread_out(centres.fy + lane);
   const F fz = spread_out(centres.fz + lane);
@@ -83,10 +132,6 @@ inline NineRows rows_around(const Work& work, const Centres& centres, std::size_
   }
   rows.v[9] = all(0.0F);
   return rows;
-}
-
-inline F solidity(F density, F solid, float whole_depth) {
-  return min(min(density, all(0.0F)) / min(solid, all(-whole_depth)), all(1.0F));
 }
 
 // Two rows' samples in the lowest six lanes of each vertex.
@@ -175,8 +220,8 @@ void add_occlusion_of_spread(const Work& work, const Slice& slice, std::size_t c
 
 void add_occlusion(Work& work, const Slice& slice, std::size_t count, float* occlusion) {
   if (count == 0) return;
+  if (!work.is_dense) return occlude_by_lists(work, slice, count, occlusion);
   decode_around(work, slice.z);
-  if (!is_whole_spread(work.occlusion)) return occlusion_one_by_one(work, slice, count, occlusion);
   if (work.occlusion.spread == 1.0F) {
     add_occlusion_of_spread<1>(work, slice, count, occlusion);
   } else {

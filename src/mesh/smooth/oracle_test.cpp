@@ -1,6 +1,9 @@
 // Every kernel gives the bytes of the slow, obvious mesher.
 
+#include <array>
 #include <cstring>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -14,10 +17,10 @@ namespace quoin {
 namespace {
 
 template <class T>
-void expect_same_bytes(const Buffer<T>& a, const Buffer<T>& b, const char* what) {
-  ASSERT_EQ(a.size(), b.size()) << what;
+void expect_same_bytes(const Buffer<T>& a, const Buffer<T>& b, const char* name) {
+  ASSERT_EQ(a.size(), b.size()) << name;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    ASSERT_EQ(std::memcmp(&a[i], &b[i], sizeof(T)), 0) << what << " " << i << " of " << a.size();
+    ASSERT_EQ(std::memcmp(&a[i], &b[i], sizeof(T)), 0) << name << " " << i << " of " << a.size();
   }
 }
 
@@ -70,6 +73,35 @@ TEST_P(SmoothKernels, GiveTheOraclesBytes) {
         mesher.mesh(chunks, options, mesh);
         expect_same_mesh(mesh, expected);
       }
+    }
+  }
+}
+
+// Few active cells are occluded by lists, many otherwise; spreads of 1 and 2 take other ways than the rest.
+TEST_P(SmoothKernels, GiveTheOraclesOcclusionInEveryFormWithAnySpread) {
+  const DensityGrid field = grid();
+  const DensityNeighbourhood chunks = field.neighbourhood(IVec3{0});
+  std::vector<SmoothMesher> meshers;
+  for (const InstructionSet set : sets_of_this_machine()) {
+    const InstructionSetOverride over(set);
+    meshers.emplace_back();
+  }
+  SmoothChunkMesh expected;
+  SmoothChunkMesh mesh;
+  constexpr std::array<std::pair<int, float>, 8> kCases = {
+      {{0, 1.0F}, {0, 1.7F}, {0, 2.0F}, {1, 0.8F}, {1, 2.0F}, {1, 4.0F}, {2, 4.0F}, {3, 2.0F}}};
+  unsigned form = GetParam();
+  for (const auto& [level, spread] : kCases) {
+    SmoothOptions options;
+    options.split_sheets = false;
+    options.levels.fill(static_cast<std::uint8_t>(level));
+    options.occlusion = {static_cast<SmoothOcclusion>(1 + form++ % 4), spread, 0.3F, level == 2 ? 1.5F : 2.0F};
+    SCOPED_TRACE(testing::Message() << "level " << level << ", spread " << spread << ", form "
+                                    << static_cast<int>(options.occlusion.method));
+    oracle::smooth_mesh(chunks, options, expected);
+    for (SmoothMesher& mesher : meshers) {
+      mesher.mesh(chunks, options, mesh);
+      expect_same_mesh(mesh, expected);
     }
   }
 }

@@ -35,6 +35,18 @@ inline constexpr int kDecodedStride = 96;
 inline constexpr int kDecodedSlice = kApronRows * kDecodedStride;
 inline constexpr int kRepeatedSlices = 5;
 
+// What occlusion may read: points -16 to 79 on each axis. Words hold 64 columns, from -16 or from 16 on.
+inline constexpr int kReachRows = 96;
+inline constexpr int kSecondWindow = 32;  // the first column of the second window, counted from -16
+inline constexpr int kSampledStride = kReachRows;
+inline constexpr int kSampledSlice = kReachRows * kSampledStride;
+inline constexpr int kMostSlices = 32;  // that occlusion reads at once
+
+// The lowest bits of a word.
+constexpr std::uint64_t low_bits(int count) {
+  return count == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1;
+}
+
 // Words of signs: rows -1 to 64 of a slice.
 inline constexpr int kSignRows = 72;
 
@@ -76,6 +88,23 @@ struct RowSet {
   // Towards larger rows.
   [[nodiscard]] RowSet raised() const { return {low << 1, high << 1 | low >> 63}; }
   [[nodiscard]] RowSet lowered() const { return {low >> 1 | high << 63, high >> 1}; }
+  void intersect(const RowSet& other) {
+    low &= other.low;
+    high &= other.high;
+  }
+  // Calls visit(y) for each row.
+  template <class Visit>
+  void for_each(Visit visit) const {
+    for (std::uint64_t left = low; left != 0; left &= left - 1) visit(std::countr_zero(left) - 16);
+    for (std::uint64_t left = high; left != 0; left &= left - 1) visit(std::countr_zero(left) + 48);
+  }
+};
+
+// A bit for each cell of a row in a window: a sample in it has to be interpolated; or else is solid for sure. Those with
+// neither are in air.
+struct CellWords {
+  std::uint64_t listed = 0;
+  std::uint64_t whole = 0;
 };
 
 // What the kernels read and write. Points are addressed by `point`.
@@ -111,20 +140,45 @@ struct Work {
   alignas(64) float fractions[3][kSlicePlaces / 2 + 64];
   alignas(64) float normals[3][kSlicePlaces / 2 + 64];
 
-  // Points as floats, of the slices that occlusion reads: [z & decoded_mask][y + kWidestApron][x + kPointX]. The first
-  // kRepeatedSlices follow the last again, so that what one vertex reads lies at fixed distances.
+  // Where many cells are active, occlusion interpolates all samples; else those that cells' words tell it to.
+  bool is_dense = false;
+  int ring_mask = 0;   // slices that occlusion reads are held as [z & ring_mask]
+  int next_slice = 0;  // the first slice that is not there yet
+  // By lists. Signs of points: [z & 1][window][y + 16]. Words of cells: [z & ring_mask][window][slot], rows y, y + 2,
+  // ... one after the other where `row_step` is 2, so that one register takes what a vertex' samples touch. Rows of
+  // cells that are listed: [z & ring_mask]. Points: [z & ring_mask][y + 16][x + 16].
+  std::uint64_t signs[2][2][kReachRows + 8];
+  int row_step = 1;
+  std::vector<CellWords> cell_words;
+  std::array<RowSet, kMostSlices> listed_rows;
+  std::vector<Half> sampled;
+  // All of them: points as floats, [z & ring_mask][y + kWidestApron][x + kPointX]. The first kRepeatedSlices follow the
+  // last again, so that what one vertex reads lies at fixed distances.
   std::vector<float> decoded;
-  int decoded_mask = 0;
-  int next_decoded = 0;  // the first slice that is not there yet
-  int apron = 0;         // how many points below and above a cell's own occlusion reads
+  int apron = 0;  // how many points below and above a cell's own occlusion reads
 
   // The row of points (y, z): x = 0 is at its begin.
   [[nodiscard]] Half* row(int y, int z) {
     return points.data() + static_cast<std::ptrdiff_t>(z & 1) * kPointSlice + (y + 1) * kPlaceStride + kPointX;
   }
   [[nodiscard]] float* decoded_row(int y, int z) {
-    return decoded.data() + static_cast<std::ptrdiff_t>(z & decoded_mask) * kDecodedSlice +
+    return decoded.data() + static_cast<std::ptrdiff_t>(z & ring_mask) * kDecodedSlice +
            (y + kWidestApron) * kDecodedStride + kPointX;
+  }
+  [[nodiscard]] Half* sampled_row(int y, int z) { return sampled.data() + sampled_offset(y, z); }
+  [[nodiscard]] const Half* sampled_row(int y, int z) const { return sampled.data() + sampled_offset(y, z); }
+  [[nodiscard]] std::ptrdiff_t sampled_offset(int y, int z) const {
+    return std::ptrdiff_t{z & ring_mask} * kSampledSlice + (y + kPointX) * kSampledStride + kPointX;
+  }
+  static constexpr int kOddRows = kReachRows / 2 + 4;  // their first slot; registers read four slots
+  static constexpr int kSlots = 2 * kOddRows;
+  // The slot of a row, which is counted from -16.
+  [[nodiscard]] int slot_of(int row) const { return row_step == 1 ? row : (row & 1) * kOddRows + row / 2; }
+  [[nodiscard]] const CellWords* cell_words_of(int z, int window) const {
+    return cell_words.data() + (std::ptrdiff_t{z & ring_mask} * 2 + window) * kSlots;
+  }
+  [[nodiscard]] CellWords* cell_words_of(int z, int window) {
+    return cell_words.data() + (std::ptrdiff_t{z & ring_mask} * 2 + window) * kSlots;
   }
 };
 
@@ -150,12 +204,26 @@ struct RowPart {
 };
 // The row of points (y, z) in the chunk before, the chunk and the chunk after.
 [[nodiscard]] std::array<RowPart, 3> row_parts(const Work& work, int y, int z);
+// Every 2^level-th bit of a word, moved together.
+[[nodiscard]] constexpr std::uint64_t thinned(std::uint64_t word, int level) {
+  for (; level > 0; --level) {
+    word &= 0x5555'5555'5555'5555U;
+    word = (word | word >> 1) & 0x3333'3333'3333'3333U;
+    word = (word | word >> 2) & 0x0F0F'0F0F'0F0F'0F0FU;
+    word = (word | word >> 4) & 0x00FF'00FF'00FF'00FFU;
+    word = (word | word >> 8) & 0x0000'FFFF'0000'FFFFU;
+    word = (word | word >> 16) & 0x0000'0000'FFFF'FFFFU;
+  }
+  return word;
+}
 // Copies the row of points (y, z), sixteen (or, at coarse levels, n) before and after the chunk's own included, to
 // where x = 0 is.
 void gather_row(const Work& work, int y, int z, Half* row);
+// Finds Work::signs of slice z of points; at coarse levels those of the rows that occlusion reads.
+void find_signs(Work& work, int z);
 // Adds to what occlusion reads the rows of points within the apron of those of slice z of cells.
 void add_occlusion_rows(Work& work, RowSet rows, int z);
-// Makes room for the slices that occlusion reads, from that of the first cells on.
+// Makes room for the slices that occlusion reads, from that of the first cells on. `is_dense` is set.
 void begin_occlusion(Work& work);
 
 void mesh_plain(Work& work, SmoothChunkMesh& out);

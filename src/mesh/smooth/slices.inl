@@ -4,7 +4,7 @@
 //   active cells   active[z + 1][y + 1]    a word a row of cells: the 2x2x2 points differ
 //   slice z        places of active cells  -> vertices, remembered by place for two slices
 //                  places of crossed edges -> quads of the vertices of this slice and the last
-//   points         decoded[z & mask]       floats of the last slices, for occlusion
+//   occlusion      by lists (listed.inl) or, where many cells are active, of decoded[z & ring_mask] (occlusion.inl)
 
 #pragma once
 
@@ -20,6 +20,13 @@
 namespace quoin::smooth {
 namespace {
 
+// Whether the kernel has a way for chunks with many active cells.
+#ifdef QUOIN_KERNEL_AVX2
+constexpr bool kHasDenseOcclusion = true;
+#else
+constexpr bool kHasDenseOcclusion = false;
+#endif
+
 // Room that the stores of the vector kernels may overrun.
 constexpr std::size_t kSlack = 32;
 
@@ -30,14 +37,6 @@ struct Slice {
   std::uint32_t first_vertex = 0;          // of this slice
   std::uint32_t first_vertex_of_last = 0;  // of the one before
 };
-
-// A place's column and row, from -1.
-int column_of(int place) {
-  return (place & (kPlaceStride - 1)) - 1;
-}
-int row_of(int place) {
-  return (place >> kPlaceShift) - 1;
-}
 
 SmoothCell cell_code(int x, int y, int z, int n) {
   const auto mask = static_cast<std::uint32_t>(n - 1);
@@ -78,8 +77,7 @@ constexpr std::array<int, 3> along_diagonal(int v_sign) {
   return along;
 }
 
-// What each kernel has of its own, beside finding the places of bits: halves as floats, vertices and quads.
-void decode_row(const Half* from, float* to, int count);
+// What each kernel has of its own, beside finding the places of bits: vertices, occlusion and quads.
 void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChunkMesh& out);
 void add_occlusion(Work& work, const Slice& slice, std::size_t count, float* occlusion);
 template <Axis kAxis>
@@ -154,68 +152,21 @@ bool find_needed(Work& work) {
   return is_any;
 }
 
+// True where so many cells are active that most samples would be listed.
+bool has_many_active(const Work& work) {
+  constexpr double kMany = 0.27;  // of all cells; measured: docs/decisions/123
+  std::int64_t active = 0;
+  for (int z = 0; z < work.cells.last; ++z) {
+    for (int y = 0; y < work.cells.last; ++y) active += std::popcount(work.active[z + 1][y + 1]);
+  }
+  return static_cast<double>(active) > kMany * work.n * work.n * work.n;
+}
+
 void gather_slice(Work& work, int z) {
   const RowSet& needed = work.corner_rows[static_cast<std::size_t>(z + kWidestApron)];
   if (needed.empty()) return;
   for (int y = -1; y <= work.n; ++y) {
     if (needed.has(y)) gather_row(work, y, z, work.row(y, z));
-  }
-}
-
-void decode_part(const RowPart& part, int first, int count, float* to) {
-  if (part.samples != nullptr) return decode_row(part.samples + first, to, count);
-  alignas(64) Half same[kChunkEdge];
-  std::fill_n(same, count, part.value);
-  decode_row(same, to, count);
-}
-
-// The row of points (y, z), with sixteen before and after; x = 0 is at `to`.
-void decode_points(const Work& work, int y, int z, float* to) {
-  if (work.level == 0) {
-    const std::array<RowPart, 3> parts = row_parts(work, y, z);
-    decode_part(parts[0], kChunkEdge - kPointX, kPointX, to - kPointX);
-    decode_part(parts[1], 0, kChunkEdge, to);
-    decode_part(parts[2], 0, kPointX, to + kChunkEdge);
-    return;
-  }
-  alignas(64) Half halves[kPlaceStride] = {};
-  gather_row(work, y, z, halves + kPointX);
-  const int count = work.n + 2 * kPointX;
-  decode_row(halves, to - kPointX, count);
-  // Exact: the unit is a power of two.
-  const float unit = depth_unit(work.level);
-  for (int i = 0; i < count; ++i) to[i - kPointX] *= unit;
-}
-
-void decode_slice(Work& work, int z) {
-  const RowSet& needed = work.occlusion_rows[static_cast<std::size_t>(z + kWidestApron)];
-  if (needed.empty()) return;
-  const int slices = work.decoded_mask + 1;
-  const bool is_repeated = (z & work.decoded_mask) < kRepeatedSlices;
-  for (int y = work.cells.first - work.apron; y <= work.cells.last + work.apron; ++y) {
-    if (!needed.has(y)) continue;
-    float* const row = work.decoded_row(y, z);
-    decode_points(work, y, z, row);
-    if (!is_repeated) continue;
-    std::memcpy(row - kPointX + std::ptrdiff_t{slices} * kDecodedSlice, row - kPointX, sizeof(float) * kDecodedStride);
-  }
-}
-
-// Makes sure that all is there that the vertices of slice z of cells are occluded by.
-void decode_around(Work& work, int z) {
-  const int last = z + work.apron + 1;
-  for (int next = std::max(work.next_decoded, z - work.apron); next <= last; ++next) decode_slice(work, next);
-  work.next_decoded = last + 1;
-}
-
-void occlusion_one_by_one(Work& work, const Slice& slice, std::size_t count, float* occlusion) {
-  for (std::size_t i = 0; i < count; ++i) {
-    const int place = work.places[i];
-    const Vec3 snapped(work.fractions[0][i], work.fractions[1][i], work.fractions[2][i]);
-    const Vec3 normal(work.normals[0][i], work.normals[1][i], work.normals[2][i]);
-    occlusion[i] = occlusion_at_vertex(snapped, normal, work.occlusion, [&](int x, int y, int z) {
-      return work.decoded_row(row_of(place) + y, slice.z + z)[column_of(place) + x];
-    });
   }
 }
 
@@ -283,7 +234,10 @@ void mesh_slices(Work& work, SmoothChunkMesh& out) {
   if (!find_needed(work)) return;
   const bool has_occlusion = work.occlusion.method != SmoothOcclusion::None;
   Slice slice;
-  if (has_occlusion) begin_occlusion(work);
+  if (has_occlusion) {
+    work.is_dense = kHasDenseOcclusion && is_whole_spread(work.occlusion) && has_many_active(work);
+    begin_occlusion(work);
+  }
   gather_slice(work, work.cells.first);
   for (slice.z = work.cells.first; slice.z < work.cells.last; ++slice.z) {
     slice.first_vertex_of_last = slice.first_vertex;

@@ -193,9 +193,5 @@ void make_quads(const Work& work, const Slice& slice, std::size_t count, std::ui
   }
 }
 
-void decode_row(const Half* from, float* to, int count) {
-  for (int i = 0; i < count; i += kWidth) store(to + i, load_halves(from + i));
-}
-
 }  // namespace
 }  // namespace quoin::smooth

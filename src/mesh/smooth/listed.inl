@@ -1,0 +1,200 @@
+// Occlusion by lists, for every kernel: a sample whose cell has eight corners of one sign needs no interpolation, since
+// with fractions below 1 the sign stays to the last bit. So each vertex looks its 27 cells up in words, and only those
+// samples are listed whose value is needed.
+//
+//   27 cells       | 0 | 0 | ? | 1 | ...      0: corners in air, adds nothing. 1: solid corners, counts as one where
+//                                             samples are counted. ?: listed
+//   codes          vertex << 5 | sample       of the listed samples of 32 vertices, one after the other
+//   values, bits   a number and a bit each    what a sample adds, and whether it is solid
+//
+// Kernels give find_batch and find_values; AVX-512 lists and adds up in its own way.
+
+#pragma once
+
+#include <span>
+
+#include "mesh/smooth/sampled_cells.inl"
+
+namespace quoin::smooth {
+namespace {
+
+constexpr int kBatch = 32;
+constexpr int kSamples = 27;
+constexpr int kCodeShift = 5;
+// Codes that kernels read beyond the last, a register's worth.
+constexpr std::size_t kCodeSlack = 32;
+
+// The place in Work::sampled of a column and row from -16 on, and of a slice's number above.
+constexpr int kSliceShift = 16;
+
+// Up to 32 vertices and the samples around them. Sample i + 3 j + 9 k is number i along x, j along y, k along z.
+struct Batch {
+  alignas(64) std::int32_t lowest[kBatch];       // column + 96 row + (slice << 16) of the cell of sample 0
+  alignas(64) std::int32_t column[kBatch];       // of it, from -16
+  alignas(64) std::int32_t row[kBatch];          // from -16
+  alignas(64) std::int32_t slice[kBatch];        // z + 16
+  alignas(64) std::int32_t steps[3][3][kBatch];  // [axis][i]: cells from sample 0 to sample i; whole spreads: unset
+  alignas(64) float fraction[3][3][kBatch];      // [axis][i]: within the cell; whole spreads: i = 0 is of all
+  alignas(64) std::uint16_t codes[kBatch * kSamples + kCodeSlack];
+  alignas(64) float values[kBatch * kSamples + kCodeSlack];
+  alignas(64) std::uint8_t solid[kBatch * kSamples / 8 + 16];  // a bit per code
+  std::uint32_t listed[kBatch];                                // a bit per sample; AVX-512 alone
+  std::int32_t first_code[kBatch + 1];
+  std::int32_t whole[kBatch];  // how many samples are solid without being listed
+};
+
+constexpr int kSliceBias = 16;
+
+// Which window holds the samples from a column (from -16) on.
+constexpr int window_of(int column) {
+  return column < kSecondWindow + kPointX ? 0 : 1;
+}
+
+// The bits of samples 0, 1, 2 along x, moved together. Spread 0: any, by `steps`.
+template <int kSpread>
+std::uint32_t three_bits(std::uint64_t word, int second, int third) {
+  const int a = kSpread != 0 ? kSpread : second;
+  const int b = kSpread != 0 ? 2 * kSpread : third;
+  return static_cast<std::uint32_t>((word & 1U) | (word >> a & 1U) << 1 | (word >> b & 1U) << 2);
+}
+
+struct SampleBits {
+  std::uint32_t listed = 0;
+  std::uint32_t whole = 0;
+};
+
+// What the words say of the 27 cells of vertex `v`.
+template <int kSpread, bool kCounted>
+SampleBits bits_of_samples(const Work& work, const Batch& batch, std::size_t v) {
+  const auto step = [&](int axis, int i) { return kSpread != 0 ? i * kSpread : batch.steps[axis][i][v]; };
+  const int column = batch.column[v];
+  const int window = window_of(column);
+  const int shift = column - kSecondWindow * window;
+  SampleBits bits;
+  for (int k = 0; k < 3; ++k) {
+    const CellWords* const words = work.cell_words_of(batch.slice[v] - kSliceBias + step(2, k), window);
+    for (int j = 0; j < 3; ++j) {
+      const CellWords& row = words[work.slot_of(batch.row[v] + step(1, j))];
+      const auto three = [&](std::uint64_t word) {
+        return three_bits<kSpread>(word >> shift, step(0, 1), step(0, 2)) << (3 * j + 9 * k);
+      };
+      bits.listed |= three(row.listed);
+      if constexpr (kCounted) bits.whole |= three(row.whole);
+    }
+  }
+  return bits;
+}
+
+// Returns how many samples the batch lists.
+std::size_t end_list(const std::uint16_t* end, std::size_t count, Batch& batch) {
+  const std::ptrdiff_t listed = end - batch.codes;
+  batch.first_code[count] = static_cast<std::int32_t>(listed);
+  return static_cast<std::size_t>(listed);
+}
+
+// Lists the samples that have to be interpolated, and returns how many there are.
+template <int kSpread, bool kCounted>
+std::size_t list_one_by_one(const Work& work, std::size_t count, Batch& batch) {
+  std::uint16_t* end = batch.codes;
+  for (std::size_t v = 0; v < count; ++v) {
+    const SampleBits bits = bits_of_samples<kSpread, kCounted>(work, batch, v);
+    batch.first_code[v] = static_cast<std::int32_t>(end - batch.codes);
+    batch.whole[v] = std::popcount(bits.whole);
+    for (std::uint32_t left = bits.listed; left != 0; left &= left - 1) {
+      *end++ = static_cast<std::uint16_t>(v << kCodeShift | static_cast<unsigned>(std::countr_zero(left)));
+    }
+  }
+  return end_list(end, count, batch);
+}
+
+// The bits of the vertex' listed samples that are solid.
+std::uint32_t solid_bits(const Batch& batch, std::size_t v) {
+  const auto first = static_cast<unsigned>(batch.first_code[v]);
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, batch.solid + first / 8, sizeof bits);
+  return static_cast<std::uint32_t>(bits >> (first & 7U) & low_bits(batch.first_code[v + 1] - batch.first_code[v]));
+}
+
+// The sum of all samples' values and the least, in the order of occlusion_of.
+struct Sum {
+  float sum = 0.0F;
+  float least = 0.0F;
+};
+
+#ifndef QUOIN_KERNEL_AVX512
+Sum sum_of(const Batch& batch, std::size_t v) {
+  std::array<float, 6> sums{};
+  Sum out;
+  for (std::int32_t i = batch.first_code[v]; i < batch.first_code[v + 1]; ++i) {
+    sums[(batch.codes[i] & ((1U << kCodeShift) - 1)) % 6] += batch.values[i];
+    out.least = std::min(out.least, batch.values[i]);
+  }
+  out.sum = ((sums[0] + sums[3]) + (sums[1] + sums[4])) + (sums[2] + sums[5]);
+  return out;
+}
+#endif
+
+// How the values of the samples become one number.
+float occlusion_of_sum(const Sum& sum, const SmoothOcclusionOptions& options) {
+  if (options.method == SmoothOcclusion::SoftShare) return soft_share(sum.sum);
+  return weighted_occlusion(sum.sum, sum.least, options);
+}
+
+// What each kernel has of its own: the cells and fractions of up to 32 vertices from `first` on; the values and solid
+// bits of `count` codes, as far as the form of occlusion needs them (returns whether any is solid); and, from these,
+// the occlusion of `count` vertices with a solid sample each, whose numbers are in `which`.
+template <int kSpread>
+void find_batch(const Work& work, const Slice& slice, std::size_t first, std::size_t count, Batch& batch);
+template <int kSpread, bool kCounted>
+bool find_values(const Work& work, std::size_t count, Batch& batch);
+template <int kSpread, bool kCounted>
+std::size_t list_samples(const Work& work, std::size_t count, Batch& batch);
+void add_up(const Work& work, const Batch& batch, std::span<const std::uint32_t> which, float* occlusion);
+
+template <int kSpread>
+void count_samples(const Work& work, std::size_t count, Batch& batch, float* occlusion) {
+  const std::size_t listed = list_samples<kSpread, true>(work, count, batch);
+  if (find_values<kSpread, true>(work, listed, batch)) {
+    for (std::size_t v = 0; v < count; ++v) batch.whole[v] += std::popcount(solid_bits(batch, v));
+  }
+  for (std::size_t v = 0; v < count; ++v) occlusion[v] = solid_share(kSamples - batch.whole[v]);
+}
+
+template <int kSpread>
+void weigh_samples(const Work& work, std::size_t count, Batch& batch, float* occlusion) {
+  const std::size_t listed = list_samples<kSpread, false>(work, count, batch);
+  std::fill_n(occlusion, count, occlusion_of_sum({}, work.occlusion));
+  if (!find_values<kSpread, false>(work, listed, batch)) return;
+  std::uint32_t dark[kBatch];
+  std::size_t size = 0;
+  for (std::size_t v = 0; v < count; ++v) {
+    dark[size] = static_cast<std::uint32_t>(v);
+    size += solid_bits(batch, v) != 0 ? 1 : 0;
+  }
+  add_up(work, batch, std::span(dark).first(size), occlusion);
+}
+
+template <int kSpread>
+void occlude_by_lists(Work& work, const Slice& slice, std::size_t count, float* occlusion) {
+  find_cells_around<kSpread>(work, slice.z);
+  Batch batch;
+  for (std::size_t first = 0; first < count; first += kBatch) {
+    const std::size_t size = std::min<std::size_t>(kBatch, count - first);
+    find_batch<kSpread>(work, slice, first, size, batch);
+    if (work.occlusion.method == SmoothOcclusion::SolidShare) {
+      count_samples<kSpread>(work, size, batch, occlusion + first);
+    } else {
+      weigh_samples<kSpread>(work, size, batch, occlusion + first);
+    }
+  }
+}
+
+void occlude_by_lists(Work& work, const Slice& slice, std::size_t count, float* occlusion) {
+  const float spread = work.occlusion.spread;
+  if (spread == 2.0F) return occlude_by_lists<2>(work, slice, count, occlusion);
+  if (spread == 1.0F) return occlude_by_lists<1>(work, slice, count, occlusion);
+  occlude_by_lists<0>(work, slice, count, occlusion);
+}
+
+}  // namespace
+}  // namespace quoin::smooth

@@ -1,0 +1,373 @@
+// The parts of listed.inl that kernels with registers have of their own.
+
+#pragma once
+
+// First: what these lanes append with is used by the lists.
+#include "mesh/smooth/vectors.inl"
+
+#include "mesh/smooth/listed.inl"
+
+namespace quoin::smooth {
+namespace {
+
+// Where the samples of vertices lie along an axis.
+struct AxisLanes {
+  I base[3];
+  F fraction[3];
+};
+
+template <bool kWhole>
+AxisLanes sample_axis(F place, F normal, F lift, const SmoothOcclusionOptions& options) {
+  const F centre = place + ((normal * lift + all(kSnapOffset)) - all(kSnapOffset));
+  AxisLanes axis;
+  for (int i = 0; i < (kWhole ? 1 : 3); ++i) {
+    const F at = kWhole ? centre : centre + all(static_cast<float>(i - 1) * options.spread);
+    const F below = floor(at);
+    axis.fraction[i] = at - below;
+    axis.base[i] = to_int(below);
+  }
+  if (kWhole) axis.base[0] = axis.base[0] - all(static_cast<int>(options.spread));
+  return axis;
+}
+
+template <int kSpread>
+void find_batch(const Work& work, const Slice& slice, std::size_t first, std::size_t count, Batch& batch) {
+  constexpr bool kWhole = kSpread != 0;
+  for (std::size_t at = 0; at < count; at += kWidth) {
+    F normal[3];
+    for (int i = 0; i < 3; ++i) normal[i] = load(work.normals[i] + first + at);
+    const F lift = all(work.occlusion.spread) * ((abs(normal[0]) + abs(normal[1])) + abs(normal[2])) + all(kLift);
+    I lowest[3];
+    for (int i = 0; i < 3; ++i) {
+      const F place = load(work.fractions[i] + first + at);
+      const AxisLanes axis = sample_axis<kWhole>(place, normal[i], lift, work.occlusion);
+      lowest[i] = axis.base[0];
+      store(batch.fraction[i][0] + at, axis.fraction[0]);
+      for (int k = 0; k < (kWhole ? 0 : 3); ++k) {
+        store(batch.fraction[i][k] + at, axis.fraction[k]);
+        store(batch.steps[i][k] + at, axis.base[k] - axis.base[0]);
+      }
+    }
+    const I place = load_words(work.places + first + at) & all(kPlaceMask);
+    const I column = (place & all(kPlaceStride - 1)) + lowest[0] + all(kPointX - 1);
+    const I row = shift_right<kPlaceShift>(place) + lowest[1] + all(kPointX - 1);
+    const I z = lowest[2] + all(slice.z + kSliceBias);
+    store(batch.column + at, column);
+    store(batch.row + at, row);
+    store(batch.slice + at, z);
+    store(batch.lowest + at, row * all(kSampledStride) + column + shift_left<kSliceShift>(z));
+  }
+}
+
+// Where sample s lies from sample 0, for whole spreads, as Batch::lowest; and 32 times its number along each axis.
+template <int kSpread>
+struct SampleTable {
+  alignas(64) std::int32_t offset[32]{};
+  alignas(64) std::int32_t number[3][32]{};
+  constexpr SampleTable() {
+    for (int s = 0; s < 32; ++s) {
+      const std::array<int, 3> i = {s % 3, s / 3 % 3, s / 9};
+      offset[s] = kSpread * (i[0] + i[1] * kSampledStride + (i[2] << kSliceShift));
+      for (std::size_t axis = 0; axis < 3; ++axis) number[axis][s] = kBatch * i[axis];
+    }
+  }
+};
+template <int kSpread>
+inline constexpr SampleTable<kSpread> kSampleTable{};
+
+// Where sixteen (or eight) listed samples' cells are, and where in them the samples lie.
+struct Listed {
+  I place;
+  F fraction[3];
+};
+
+template <int kSpread>
+Listed listed_at(const Batch& batch, const std::uint16_t* codes) {
+  const I code = load_words(codes);
+  const I sample = code & all((1 << kCodeShift) - 1);
+  const I vertex = shift_right<kCodeShift>(code);
+  const SampleTable<kSpread>& table = kSampleTable<kSpread>;
+  Listed listed;
+  listed.place = look_up(batch.lowest, vertex);
+  if constexpr (kSpread != 0) {
+    listed.place = listed.place + look_up(table.offset, sample);
+    for (int axis = 0; axis < 3; ++axis) listed.fraction[axis] = look_up(batch.fraction[axis][0], vertex);
+  } else {
+    I step[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const I at = look_up(table.number[axis], sample) + vertex;
+      step[axis] = gather(batch.steps[axis][0], at);
+      listed.fraction[axis] = gather(batch.fraction[axis][0], at);
+    }
+    listed.place = listed.place + step[0] + step[1] * all(kSampledStride) + shift_left<kSliceShift>(step[2]);
+  }
+  return listed;
+}
+
+// The eight corners of the listed samples' cells, by x + 2 y + 4 z.
+struct SampledCorners {
+  F d[8];
+};
+
+inline SampledCorners corners_of(const Work& work, I place) {
+  const I in_slice = place & all((1 << kSliceShift) - 1);
+  const I slice = shift_right<kSliceShift>(place) - all(kSliceBias);
+  SampledCorners corners;
+  for (int k = 0; k < 2; ++k) {
+    const I from = ((slice + all(k)) & all(work.ring_mask)) * all(kSampledSlice) + in_slice;
+    for (int j = 0; j < 2; ++j) {
+      const I pair = gather_pairs(work.sampled.data() + j * kSampledStride, from);
+      corners.d[2 * j + 4 * k] = low_half(pair);
+      corners.d[2 * j + 4 * k + 1] = high_half(pair);
+    }
+  }
+  return corners;
+}
+
+// Along z, y and x in turn.
+inline F interpolated(const SampledCorners& c, const F (&fraction)[3]) {
+  F along_z[4];
+  for (int i = 0; i < 4; ++i) along_z[i] = c.d[i] + fraction[2] * (c.d[i + 4] - c.d[i]);
+  F along_y[2];
+  for (int i = 0; i < 2; ++i) along_y[i] = along_z[i] + fraction[1] * (along_z[i + 2] - along_z[i]);
+  return along_y[0] + fraction[0] * (along_y[1] - along_y[0]);
+}
+
+inline F solidity(F density, F solid, float deep) {
+  return min(min(density, all(0.0F)) / min(solid, all(-deep)), all(1.0F));
+}
+
+template <int kSpread, bool kCounted>
+bool find_values(const Work& work, std::size_t count, Batch& batch) {
+  const bool is_soft = work.occlusion.method == SmoothOcclusion::SoftShare;
+  const F unit = all(depth_unit(work.level));
+  const F zero = all(0.0F);
+  std::fill_n(batch.codes + count, kWidth, std::uint16_t{0});
+  std::uint32_t any = 0;
+  for (std::size_t i = 0; i < count; i += kWidth) {
+    const Listed listed = listed_at<kSpread>(batch, batch.codes + i);
+    SampledCorners corners = corners_of(work, listed.place);
+    const F density = interpolated(corners, listed.fraction);
+    const std::uint32_t solid = bits(density < zero);
+    any |= solid;
+    std::memcpy(batch.solid + i / 8, &solid, kWidth / 8);
+    if constexpr (kCounted) continue;
+    if (is_soft) {
+      for (F& d : corners.d) d = min(d, zero);
+      const F of_solid = interpolated(corners, listed.fraction);
+      store(batch.values + i, solidity(density * unit, of_solid * unit, whole_depth(work.occlusion.spread)));
+    } else {
+      store(batch.values + i, min(density * unit, zero));
+    }
+  }
+  return any != 0;
+}
+
+// occlusion_of_sum for the forms whose power is 2.
+inline F occlusion_of_sum(F sum, F least, const SmoothOcclusionOptions& options) {
+  if (options.method == SmoothOcclusion::SoftShare) return min(sum * all(1.0F / 27.0F), all(1.0F));
+  const F minus_zero = all(-0.0F);
+  const F ratio = (minus_zero - sum) / (all(27.0F) * max(minus_zero - least, all(options.spread)));
+  const F base = ratio + all(options.offset);
+  const F part = (all(1.0F) - base * base) / all(1.0F - options.offset * options.offset);
+  return all(1.0F) - min(max(part, all(0.0F)), all(1.0F));
+}
+
+// The place in Work::cell_words of a vertex' first row in each slice, and how far its words are moved down.
+struct FirstWords {
+  alignas(64) std::int32_t word[3][kBatch];
+  alignas(64) std::int32_t shift[kBatch];
+};
+
+template <int kSpread>
+void find_first_words(const Work& work, std::size_t count, const Batch& batch, FirstWords& first) {
+  for (std::size_t v = 0; v < count; v += kWidth) {
+    const I column = load(batch.column + v);
+    const I row = load(batch.row + v);
+    const I z = load(batch.slice + v) - all(kSliceBias);
+    const Mask is_second = all(kSecondWindow + kPointX - 1) < column;
+    I slot = row;
+    if constexpr (kRowStep<kSpread> == 2) slot = shift_right<1>(row) + (row & all(1)) * all(Work::kOddRows);
+    slot = add_if(is_second, slot, all(Work::kSlots));
+    store(first.shift + v, add_if(is_second, column, all(-kSecondWindow)));
+    for (int k = 0; k < 3; ++k) {
+      const I slice = (z + all(k * kSpread)) & all(work.ring_mask);
+      store(first.word[k] + v, slot + slice * all(2 * Work::kSlots));
+    }
+  }
+}
+
+#ifdef QUOIN_KERNEL_AVX512
+
+// Where the words of a vertex' 27 cells are found. A register holds {listed, whole} of four rows, of three slices one
+// upon the other: of sample s word 8 j or 8 j + 4 of 16 bits, and in it a bit.
+template <int kSpread>
+struct WordTable {
+  static constexpr int kBitOfSlice[3] = {0, kSpread == 1 ? 3 : 1, 6};
+  alignas(64) std::uint16_t listed[32]{};
+  alignas(64) std::uint16_t whole[32]{};
+  alignas(64) std::uint16_t bit[32]{};
+  alignas(64) std::uint16_t sample[32]{};
+  constexpr WordTable() {
+    for (int s = 0; s < 32; ++s) {
+      const int i = s % 3, j = s / 3 % 3, k = s / 9;
+      sample[s] = static_cast<std::uint16_t>(s);
+      listed[s] = static_cast<std::uint16_t>(8 * j);
+      whole[s] = static_cast<std::uint16_t>(8 * j + 4);
+      bit[s] = static_cast<std::uint16_t>(s < kSamples ? 1 << (kBitOfSlice[k] + kSpread * i) : 0);
+    }
+  }
+  // The bits of slices 0, and of 0 and 1.
+  static constexpr int kFirst = kSpread == 1 ? 0x07 : 0x15;
+  static constexpr int kFirstTwo = 0x3F;
+};
+template <int kSpread>
+inline constexpr WordTable<kSpread> kWordTable{};
+
+template <int kSpread, bool kCounted>
+std::size_t list_samples(const Work& work, std::size_t count, Batch& batch) {
+  if constexpr (kSpread == 0) {
+    const std::size_t listed = list_one_by_one<kSpread, kCounted>(work, count, batch);
+    std::fill_n(batch.listed, count, 0);
+    for (std::size_t i = 0; i < listed; ++i) batch.listed[batch.codes[i] >> kCodeShift] |= 1U << (batch.codes[i] & 31U);
+    return listed;
+  } else {
+    using Table = WordTable<kSpread>;
+    const Table& table = kWordTable<kSpread>;
+    const __m512i listed_words = _mm512_load_si512(table.listed);
+    const __m512i whole_words = _mm512_load_si512(table.whole);
+    const __m512i bits = _mm512_load_si512(table.bit);
+    const __m512i samples = _mm512_load_si512(table.sample);
+    const CellWords* const words = work.cell_words.data();
+    FirstWords at;
+    find_first_words<kSpread>(work, count, batch, at);
+    std::uint16_t* end = batch.codes;
+    for (std::size_t v = 0; v < count; ++v) {
+      __m512i of_slice[3];
+      for (int k = 0; k < 3; ++k) {
+        const __m128i shift = _mm_cvtsi32_si128(at.shift[v] - Table::kBitOfSlice[k]);
+        of_slice[k] = _mm512_srl_epi64(_mm512_loadu_si512(words + at.word[k][v]), shift);
+      }
+      const __m512i two = _mm512_ternarylogic_epi64(_mm512_set1_epi64(Table::kFirst), of_slice[0], of_slice[1], 0xCA);
+      const __m512i three = _mm512_ternarylogic_epi64(_mm512_set1_epi64(Table::kFirstTwo), two, of_slice[2], 0xCA);
+      const __mmask32 listed = _mm512_test_epi16_mask(_mm512_permutexvar_epi16(listed_words, three), bits);
+      const __m512i first = _mm512_set1_epi16(static_cast<short>(v << kCodeShift));
+      _mm512_storeu_si512(end, _mm512_add_epi16(_mm512_maskz_compress_epi16(listed, samples), first));
+      batch.listed[v] = listed;
+      batch.first_code[v] = static_cast<std::int32_t>(end - batch.codes);
+      if constexpr (kCounted) {
+        const __mmask32 whole = _mm512_test_epi16_mask(_mm512_permutexvar_epi16(whole_words, three), bits);
+        batch.whole[v] = std::popcount(std::uint32_t{whole});
+      }
+      end += std::popcount(std::uint32_t{listed});
+    }
+    return end_list(end, count, batch);
+  }
+}
+
+// Sample s in lane s % 6 of group s / 6, from two registers of sixteen; 31 is always 0.
+alignas(64) constexpr auto kGroups = [] {
+  std::array<std::array<std::int32_t, 16>, 4> lanes{};
+  for (int group = 1; group < 5; ++group) {
+    for (int i = 0; i < 16; ++i) {
+      const int sample = 6 * group + i;
+      lanes[static_cast<std::size_t>(group - 1)][static_cast<std::size_t>(i)] =
+          i < 6 && sample < kSamples ? sample : 31;
+    }
+  }
+  return lanes;
+}();
+
+inline Sum sum_of(const Batch& batch, std::size_t v) {
+  const float* const from = batch.values + batch.first_code[v];
+  const std::uint32_t listed = batch.listed[v];
+  const int low_count = std::popcount(listed & 0xFFFFU);
+  const __m512 low = _mm512_maskz_expand_ps(static_cast<__mmask16>(listed), _mm512_loadu_ps(from));
+  const __m512 high = _mm512_maskz_expand_ps(static_cast<__mmask16>(listed >> 16), _mm512_loadu_ps(from + low_count));
+  __m512 sum = low;
+  for (const auto& group : kGroups) {
+    sum = _mm512_add_ps(sum, _mm512_permutex2var_ps(low, _mm512_load_si512(group.data()), high));
+  }
+  const __m256 six = _mm512_castps512_ps256(sum);
+  const __m256 upper = _mm256_permutevar8x32_ps(six, _mm256_setr_epi32(3, 4, 5, 0, 0, 0, 0, 0));
+  const __m128 three = _mm256_castps256_ps128(_mm256_add_ps(six, upper));
+  const __m128 two = _mm_add_ss(three, _mm_movehdup_ps(three));
+  return {_mm_cvtss_f32(_mm_add_ss(two, _mm_movehl_ps(three, three))), _mm512_reduce_min_ps(_mm512_min_ps(low, high))};
+}
+
+#else
+
+// Which sample each bit of a vertex' samples stands for: those of a row `kSpread` bits apart, then the next row, then
+// the next slice.
+template <int kSpread>
+constexpr int kBitsOfRow = 2 * kSpread + 1;
+template <int kSpread>
+constexpr auto kSampleOfBit = [] {
+  std::array<std::uint16_t, 64> samples{};
+  for (std::size_t s = 0; s < kSamples; ++s)
+    samples[s / 3 * kBitsOfRow<kSpread> + s % 3 * kSpread] = static_cast<std::uint16_t>(s);
+  return samples;
+}();
+
+template <int kSpread, bool kCounted>
+std::size_t list_samples(const Work& work, std::size_t count, Batch& batch) {
+  if constexpr (kSpread == 0) {
+    return list_one_by_one<kSpread, kCounted>(work, count, batch);
+  } else {
+    constexpr int kRow = kBitsOfRow<kSpread>;
+    constexpr int kThree = 1 | 1 << kSpread | 1 << 2 * kSpread;
+    const __m256i three = _mm256_set1_epi64x(kThree);
+    FirstWords at;
+    find_first_words<kSpread>(work, count, batch, at);
+    std::uint16_t* end = batch.codes;
+    for (std::size_t v = 0; v < count; ++v) {
+      const __m128i shift = _mm_cvtsi32_si128(at.shift[v]);
+      __m256i two_rows = _mm256_setzero_si256();
+      __m128i third_row = _mm_setzero_si128();
+      for (int k = 0; k < 3; ++k) {
+        const auto* const words = reinterpret_cast<const __m128i*>(work.cell_words.data() + at.word[k][v]);
+        const __m256i a = _mm256_srl_epi64(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(words)), shift);
+        const __m128i b = _mm_srl_epi64(_mm_loadu_si128(words + 2), shift);
+        const __m256i to = _mm256_setr_epi64x(3 * k * kRow, 3 * k * kRow, (3 * k + 1) * kRow, (3 * k + 1) * kRow);
+        two_rows = _mm256_or_si256(two_rows, _mm256_sllv_epi64(_mm256_and_si256(a, three), to));
+        third_row = _mm_or_si128(third_row,
+                                 _mm_slli_epi64(_mm_and_si128(b, _mm256_castsi256_si128(three)), (3 * k + 2) * kRow));
+      }
+      const __m128i bits = _mm_or_si128(
+          _mm_or_si128(_mm256_castsi256_si128(two_rows), _mm256_extracti128_si256(two_rows, 1)), third_row);
+      batch.first_code[v] = static_cast<std::int32_t>(end - batch.codes);
+      if constexpr (kCounted) batch.whole[v] = std::popcount(static_cast<std::uint64_t>(_mm_extract_epi64(bits, 1)));
+      const auto first = static_cast<unsigned>(v << kCodeShift);
+      for (auto left = static_cast<std::uint64_t>(_mm_cvtsi128_si64(bits)); left != 0; left &= left - 1) {
+        *end++ =
+            static_cast<std::uint16_t>(first | kSampleOfBit<kSpread>[static_cast<std::size_t>(std::countr_zero(left))]);
+      }
+    }
+    return end_list(end, count, batch);
+  }
+}
+
+#endif
+
+void add_up(const Work& work, const Batch& batch, std::span<const std::uint32_t> which, float* occlusion) {
+  const SmoothOcclusionOptions& options = work.occlusion;
+  const bool is_soft = options.method == SmoothOcclusion::SoftShare;
+  if (!is_soft && (options.method != SmoothOcclusion::Weighted || options.power != 2.0F)) {
+    for (const std::uint32_t v : which) occlusion[v] = occlusion_of_sum(sum_of(batch, v), options);
+    return;
+  }
+  alignas(64) float sums[kBatch + kWidth];
+  alignas(64) float leasts[kBatch + kWidth];
+  for (std::size_t i = 0; i < which.size(); ++i) {
+    const Sum sum = sum_of(batch, which[i]);
+    sums[i] = sum.sum;
+    leasts[i] = sum.least;
+  }
+  for (std::size_t i = 0; i < which.size(); i += kWidth) {
+    store(sums + i, occlusion_of_sum(load(sums + i), load(leasts + i), options));
+  }
+  for (std::size_t i = 0; i < which.size(); ++i) occlusion[which[i]] = sums[i];
+}
+
+}  // namespace
+}  // namespace quoin::smooth
