@@ -35,6 +35,7 @@ struct Batch {
   alignas(64) std::int32_t slice[kBatch];        // z + 16
   alignas(64) std::int32_t steps[3][3][kBatch];  // [axis][i]: cells from sample 0 to sample i; whole spreads: unset
   alignas(64) float fraction[3][3][kBatch];      // [axis][i]: within the cell; whole spreads: i = 0 is of all
+  alignas(64) float packed[kBatch][4];           // fractions of sample 0, and the bits of `lowest`; AVX2 alone
   alignas(64) std::uint16_t codes[kBatch * kSamples + kCodeSlack];
   alignas(64) float values[kBatch * kSamples + kCodeSlack];
   alignas(64) std::uint8_t solid[kBatch * kSamples / 8 + 16];  // a bit per code

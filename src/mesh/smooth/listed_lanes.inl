@@ -57,6 +57,12 @@ void find_batch(const Work& work, const Slice& slice, std::size_t first, std::si
     store(batch.slice + at, z);
     store(batch.lowest + at, row * all(kSampledStride) + column + shift_left<kSliceShift>(z));
   }
+#ifndef QUOIN_KERNEL_AVX512
+  for (std::size_t v = 0; kWhole && v < count; ++v) {
+    for (std::size_t axis = 0; axis < 3; ++axis) batch.packed[v][axis] = batch.fraction[axis][0][v];
+    batch.packed[v][3] = std::bit_cast<float>(batch.lowest[v]);
+  }
+#endif
 }
 
 // Where sample s lies from sample 0, for whole spreads, as Batch::lowest; and 32 times its number along each axis.
@@ -88,11 +94,21 @@ Listed listed_at(const Batch& batch, const std::uint16_t* codes) {
   const I vertex = shift_right<kCodeShift>(code);
   const SampleTable<kSpread>& table = kSampleTable<kSpread>;
   Listed listed;
-  listed.place = look_up(batch.lowest, vertex);
   if constexpr (kSpread != 0) {
-    listed.place = listed.place + look_up(table.offset, sample);
+#ifdef QUOIN_KERNEL_AVX512
+    const I lowest = look_up(batch.lowest, vertex);
     for (int axis = 0; axis < 3; ++axis) listed.fraction[axis] = look_up(batch.fraction[axis][0], vertex);
+#else
+    // One load a sample takes less time than four gathers.
+    std::int32_t at[kWidth];
+    for (int i = 0; i < kWidth; ++i) at[i] = 4 * (codes[i] >> kCodeShift);
+    F bits_of_lowest;
+    load_four(&batch.packed[0][0], at, listed.fraction[0], listed.fraction[1], listed.fraction[2], bits_of_lowest);
+    const I lowest = as_int(bits_of_lowest);
+#endif
+    listed.place = lowest + look_up(table.offset, sample);
   } else {
+    listed.place = look_up(batch.lowest, vertex);
     I step[3];
     for (int axis = 0; axis < 3; ++axis) {
       const I at = look_up(table.number[axis], sample) + vertex;
@@ -303,7 +319,7 @@ template <int kSpread>
 constexpr int kBitsOfRow = 2 * kSpread + 1;
 template <int kSpread>
 constexpr auto kSampleOfBit = [] {
-  std::array<std::uint16_t, 64> samples{};
+  std::array<std::uint16_t, 65> samples{};
   for (std::size_t s = 0; s < kSamples; ++s)
     samples[s / 3 * kBitsOfRow<kSpread> + s % 3 * kSpread] = static_cast<std::uint16_t>(s);
   return samples;
@@ -338,10 +354,17 @@ std::size_t list_samples(const Work& work, std::size_t count, Batch& batch) {
       batch.first_code[v] = static_cast<std::int32_t>(end - batch.codes);
       if constexpr (kCounted) batch.whole[v] = std::popcount(static_cast<std::uint64_t>(_mm_extract_epi64(bits, 1)));
       const auto first = static_cast<unsigned>(v << kCodeShift);
-      for (auto left = static_cast<std::uint64_t>(_mm_cvtsi128_si64(bits)); left != 0; left &= left - 1) {
-        *end++ =
-            static_cast<std::uint16_t>(first | kSampleOfBit<kSpread>[static_cast<std::size_t>(std::countr_zero(left))]);
-      }
+      auto left = static_cast<std::uint64_t>(_mm_cvtsi128_si64(bits));
+      const int listed = std::popcount(left);
+      // By fours, since how often a loop runs is hard to foresee; what is too much is overwritten.
+      std::uint16_t* to = end;
+      do {
+        for (int i = 0; i < 4; ++i, left &= left - 1) {
+          *to++ = static_cast<std::uint16_t>(first |
+                                             kSampleOfBit<kSpread>[static_cast<std::size_t>(std::countr_zero(left))]);
+        }
+      } while (left != 0);
+      end += listed;
     }
     return end_list(end, count, batch);
   }

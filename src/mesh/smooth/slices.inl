@@ -20,11 +20,14 @@
 namespace quoin::smooth {
 namespace {
 
-// Whether the kernel has a way for chunks with many active cells.
-#ifdef QUOIN_KERNEL_AVX2
-constexpr bool kHasDenseOcclusion = true;
+// The share of cells from which on, when active, interpolating all samples takes less time than listing those that need
+// it (docs/decisions/123).
+#ifdef QUOIN_KERNEL_AVX512
+constexpr double kManyActive = 0.38;
+#elif defined(QUOIN_KERNEL_AVX2)
+constexpr double kManyActive = 0.27;
 #else
-constexpr bool kHasDenseOcclusion = false;
+constexpr double kManyActive = 2.0;  // never
 #endif
 
 // Room that the stores of the vector kernels may overrun.
@@ -154,12 +157,11 @@ bool find_needed(Work& work) {
 
 // True where so many cells are active that most samples would be listed.
 bool has_many_active(const Work& work) {
-  constexpr double kMany = 0.27;  // of all cells; measured: docs/decisions/123
   std::int64_t active = 0;
   for (int z = 0; z < work.cells.last; ++z) {
     for (int y = 0; y < work.cells.last; ++y) active += std::popcount(work.active[z + 1][y + 1]);
   }
-  return static_cast<double>(active) > kMany * work.n * work.n * work.n;
+  return static_cast<double>(active) > kManyActive * work.n * work.n * work.n;
 }
 
 void gather_slice(Work& work, int z) {
@@ -235,7 +237,7 @@ void mesh_slices(Work& work, SmoothChunkMesh& out) {
   const bool has_occlusion = work.occlusion.method != SmoothOcclusion::None;
   Slice slice;
   if (has_occlusion) {
-    work.is_dense = kHasDenseOcclusion && is_whole_spread(work.occlusion) && has_many_active(work);
+    work.is_dense = kManyActive < 1.0 && is_whole_spread(work.occlusion) && has_many_active(work);
     begin_occlusion(work);
   }
   gather_slice(work, work.cells.first);
