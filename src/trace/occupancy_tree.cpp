@@ -27,12 +27,14 @@ struct FlatTables {
   IVec3 origin{0};                       // the voxel at the least corner
   IVec3 chunks{0};                       // size
   std::vector<std::uint32_t> cells;      // a bit a cell of 4^3 voxels; one empty cell around everything
-  std::vector<trace::BrickCode> bricks;  // x first, then y, then z
+  std::vector<trace::BrickCode> bricks;  // x first, then y, then z; an empty one before and after, for pairs along x
 
   // Cells from one to the next along x, y, z; cell (0, 0, 0) is bit x + y + z of these.
   [[nodiscard]] IVec3 cell_strides() const { return {1, 16 * chunks.x + 2, (16 * chunks.x + 2) * (16 * chunks.y + 2)}; }
   [[nodiscard]] IVec3 chunk_strides() const { return {1, chunks.x, chunks.x * chunks.y}; }
   [[nodiscard]] IVec3 brick_strides() const { return {1, 4 * chunks.x, 16 * chunks.x * chunks.y}; }
+  [[nodiscard]] const trace::BrickCode* first_brick() const { return bricks.data() + 1; }
+  [[nodiscard]] trace::BrickCode* first_brick() { return bricks.data() + 1; }
 };
 
 // Where a unit stands in a table with these strides.
@@ -108,7 +110,7 @@ trace::TreeView make_view(const FlatTables& tables, const trace::FlatChunk* chun
                           const IBox& bounds) {
   trace::TreeView view{};
   view.cells = tables.cells.data();
-  view.bricks = tables.bricks.data();
+  view.bricks = tables.first_brick();
   view.lines = lines;
   view.chunks = chunks;
   view.words = reinterpret_cast<const std::uint32_t*>(lines);
@@ -471,7 +473,7 @@ struct OccupancyTree::Impl {
     for (; changed != 0; changed &= changed - 1) {
       const int i = std::countr_zero(changed);
       const IVec3 brick = (chunk - flat_chunks.min) * 4 + IVec3{i & 3, i >> 2 & 3, i >> 4};
-      flat.bricks[place_in(bricks_at, brick)] = node.bricks[static_cast<std::size_t>(i)];
+      flat.first_brick()[place_in(bricks_at, brick)] = node.bricks[static_cast<std::size_t>(i)];
       for (int row = 0; row < 16; ++row) {
         const IVec3 cell = brick * 4 + IVec3{1, (row & 3) + 1, (row >> 2) + 1};
         put_bits(flat.cells, place_in(cells, cell), node.cells[static_cast<std::size_t>(i)] >> (4 * row) & 15U);
@@ -507,7 +509,7 @@ struct OccupancyTree::Impl {
     const std::int64_t cells = (16 * std::int64_t{size.x} + 2) * (16 * std::int64_t{size.y} + 2);
     flat.origin = chunks.min * kChunkEdge;
     flat.cells.assign(static_cast<std::size_t>(bits_of(cells, size.z)) / 32 + 2, 0);
-    flat.bricks.assign(64 * volume(size), 0);
+    flat.bricks.assign(64 * volume(size) + 2, trace::kEmptyBrick);
     flat_nodes.assign(volume(size), {0, chunk_nodes.data()});
     flat_chunks = chunks;
   }
@@ -558,8 +560,8 @@ struct OccupancyTree::Impl {
       std::copy_n(&old_nodes[place_in(old_rows, a)], size.x, &flat_nodes[place_in(rows, b)]);
     });
     for_each_row(4, [&](IVec3 a, IVec3 b) {
-      std::copy_n(&old.bricks[place_in(old.brick_strides(), a)], 4 * size.x,
-                  &flat.bricks[place_in(flat.brick_strides(), b)]);
+      std::copy_n(old.first_brick() + place_in(old.brick_strides(), a), 4 * size.x,
+                  flat.first_brick() + place_in(flat.brick_strides(), b));
     });
     for_each_row(16, [&](IVec3 a, IVec3 b) {
       copy_bits(old.cells, place_in(old.cell_strides(), a + 1), flat.cells, place_in(flat.cell_strides(), b + 1),
