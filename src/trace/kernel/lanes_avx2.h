@@ -54,16 +54,23 @@ inline F just_below(F a) {
   return {_mm256_blendv_ps(_mm256_set1_ps(-1e-30F), less, is_positive)};
 }
 
-// The codes of 4^3 bricks.
+// The codes of 4^3 bricks; those outside the table are empty.
 class BrickWindow {
  public:
   BrickWindow(const TreeView& tree, const IVec3& origin) {
+    const IVec3 first = origin >> 4;
     const std::uint32_t* corner =
-        tree.bricks + (origin.x >> 4) + (origin.y >> 4) * tree.brick_strides.y + (origin.z >> 4) * tree.brick_strides.z;
+        tree.bricks + first.x + first.y * tree.brick_strides.y + first.z * tree.brick_strides.z;
+    const __m128i columns = _mm_add_epi32(_mm_set1_epi32(first.x), _mm_setr_epi32(0, 1, 2, 3));
+    const __m128i is_in = _mm_and_si128(_mm_cmpgt_epi32(columns, _mm_set1_epi32(-1)),
+                                        _mm_cmpgt_epi32(_mm_set1_epi32(tree.brick_sizes.x), columns));
+    const auto is_below = [](int at, int size) { return static_cast<unsigned>(at) < static_cast<unsigned>(size); };
     for (int row = 0; row < 16; ++row) {
-      const std::uint32_t* from = corner + (row & 3) * tree.brick_strides.y + (row >> 2) * tree.brick_strides.z;
+      const int y = row & 3, z = row >> 2;
+      const bool has_row = is_below(first.y + y, tree.brick_sizes.y) && is_below(first.z + z, tree.brick_sizes.z);
+      const std::uint32_t* from = corner + y * tree.brick_strides.y + z * tree.brick_strides.z;
       _mm_store_si128(reinterpret_cast<__m128i*>(bricks_ + 4 * row),
-                      _mm_loadu_si128(reinterpret_cast<const __m128i*>(from)));
+                      has_row ? _mm_maskload_epi32(reinterpret_cast<const int*>(from), is_in) : _mm_setzero_si128());
     }
   }
   // By x + 4 y + 16 z; further bits do not count.
@@ -193,6 +200,11 @@ inline I add_saturated_bytes(I a, I b) {
 }
 inline I gather(const std::uint32_t* base, I at) {
   return {half::gather(base, at.low), half::gather(base, at.high)};
+}
+// Words of 64 bits, as their halves.
+inline void gather_words(const std::uint32_t* base, I at, I& low, I& high) {
+  low = gather(base, at);
+  high = gather(base, at + all(1));
 }
 inline I as_int(F a) {
   return {half::as_int(a.low), half::as_int(a.high)};

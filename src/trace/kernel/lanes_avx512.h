@@ -49,6 +49,19 @@ inline I add_saturated_bytes(I a, I b) {
   return {_mm512_adds_epi8(a.v, b.v)};
 }
 
+// Words of 64 bits, as their halves: two gathers of eight take half the time of two of sixteen.
+inline void gather_words(const std::uint32_t* base, I at, I& low, I& high) {
+  const auto each = static_cast<__mmask8>(each_lane());
+  const auto eight = [&](__m256i half) {
+    return _mm512_mask_i32gather_epi64(_mm512_setzero_si512(), each, half, base, sizeof *base);
+  };
+  const __m512i a = eight(_mm512_castsi512_si256(at.v));
+  const __m512i b = eight(_mm512_extracti64x4_epi64(at.v, 1));
+  const __m512i even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+  low.v = _mm512_permutex2var_epi32(a, even, b);
+  high.v = _mm512_permutex2var_epi32(a, _mm512_or_si512(even, _mm512_set1_epi32(1)), b);
+}
+
 inline float least_of(F a) {
   return _mm512_reduce_min_ps(a.v);
 }
@@ -62,28 +75,22 @@ inline I from_32(const std::int32_t* table, I at) {
 inline F from_16(F table, I at) {
   return {_mm512_permutexvar_ps(at.v, table.v)};
 }
-// The codes of the eight bricks x, y and z further than `corner` or not.
-inline I eight_of(const std::uint32_t* corner, int x, int y, int z) {
-  const __m256i xs = _mm256_setr_epi32(0, -1, 0, -1, 0, -1, 0, -1);
-  const __m256i ys = _mm256_setr_epi32(0, 0, -1, -1, 0, 0, -1, -1);
-  const __m256i zs = _mm256_setr_epi32(0, 0, 0, 0, -1, -1, -1, -1);
-  const __m256i at = _mm256_add_epi32(
-      _mm256_and_si256(xs, _mm256_set1_epi32(x)),
-      _mm256_add_epi32(_mm256_and_si256(ys, _mm256_set1_epi32(y)), _mm256_and_si256(zs, _mm256_set1_epi32(z))));
-  const __m256i bricks = _mm256_i32gather_epi32(reinterpret_cast<const int*>(corner), at, 4);
-  return {_mm512_castsi256_si512(bricks)};
-}
-
-// The codes of 4^3 bricks.
+// The codes of 4^3 bricks; those outside the table are empty.
 class BrickWindow {
  public:
   BrickWindow(const TreeView& tree, const IVec3& origin) {
+    const IVec3 first = origin >> 4;
     const std::uint32_t* corner =
-        tree.bricks + (origin.x >> 4) + (origin.y >> 4) * tree.brick_strides.y + (origin.z >> 4) * tree.brick_strides.z;
+        tree.bricks + first.x + first.y * tree.brick_strides.y + first.z * tree.brick_strides.z;
+    const __m128i columns = _mm_add_epi32(_mm_set1_epi32(first.x), _mm_setr_epi32(0, 1, 2, 3));
+    const __mmask8 is_in = _mm_cmplt_epu32_mask(columns, _mm_set1_epi32(tree.brick_sizes.x));
+    const auto is_below = [](int at, int size) { return static_cast<unsigned>(at) < static_cast<unsigned>(size); };
     for (int z = 0; z < 4; ++z) {
+      const bool has_layer = is_below(first.z + z, tree.brick_sizes.z);
       const auto row = [&](int y) {
-        return _mm_loadu_si128(
-            reinterpret_cast<const __m128i*>(corner + y * tree.brick_strides.y + z * tree.brick_strides.z));
+        const bool has_row = has_layer && is_below(first.y + y, tree.brick_sizes.y);
+        const auto columns_in = static_cast<__mmask8>(is_in & -static_cast<int>(has_row));
+        return _mm_maskz_loadu_epi32(columns_in, corner + y * tree.brick_strides.y + z * tree.brick_strides.z);
       };
       const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(row(0)), row(1), 1);
       const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(row(2)), row(3), 1);

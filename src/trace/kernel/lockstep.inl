@@ -96,11 +96,11 @@ inline Number crossed(const Crossing& crossing, Number x, Number y, Number z) {
 
 // The least of three, and which it is: the first axis at a tie.
 inline F first_of(const Planes& t, Crossing& which) {
-  const F least = min(min(t.x, t.y), t.z);
-  which.x = t.x == least;
-  which.y = (t.y == least) & ~which.x;
-  which.z = ~(which.x | which.y);
-  return least;
+  const F first = min(t.x, t.y);
+  which.x = t.x <= min(t.y, t.z);
+  which.z = t.z < first;
+  which.y = ~(which.x | which.z);
+  return min(first, t.z);
 }
 
 // Where rays start.
@@ -504,8 +504,7 @@ inline void read_words(const TreeView& tree, const Cells& cells, Mask which, Vox
   const I index = gather(tree.bricks, select(which, brick, all(0)));
   const I place = shift_left<26>(cells.x & all(3)) + shift_left<28>(cells.z & all(3)) + shift_left<30>(cells.y);
   const I half = (index & all(~15)) + shift_left<1>(shift_right_signed<26>(place_in_run(index, place)));
-  walk.low_half = gather(tree.words, half);
-  walk.high_half = gather(tree.words, half + all(1));
+  gather_words(tree.words, half, walk.low_half, walk.high_half);
 }
 
 // Where a lane stands within a cell before it crosses any of its planes.
