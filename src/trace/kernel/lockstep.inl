@@ -96,11 +96,11 @@ inline Number crossed(const Crossing& crossing, Number x, Number y, Number z) {
 
 // The least of three, and which it is: the first axis at a tie.
 inline F first_of(const Planes& t, Crossing& which) {
-  const F first = min(t.x, t.y);
-  which.x = t.x <= min(t.y, t.z);
-  which.z = t.z < first;
-  which.y = ~(which.x | which.z);
-  return min(first, t.z);
+  const F y_or_z = min(t.y, t.z);
+  which.x = t.x <= y_or_z;
+  which.y = (t.y <= t.z) & ~which.x;
+  which.z = ~(which.x | which.y);
+  return min(t.x, y_or_z);
 }
 
 // Where rays start.

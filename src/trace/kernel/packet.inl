@@ -469,8 +469,8 @@ inline Mask start_in_window(ShortRays& rays, Axis& axis, F& plane, const double*
   const F reach = abs(axis.direction) * rays.max_t;
   const I margin = to_int(reach) + all(2);
   const I from = at - margin;
-  // Starts too far away for whole numbers come out as any, but not as these.
-  const Mask is_near = equals(at & all(~(kWindow - 1)), 0);
+  // Starts too far away for whole numbers come out as any, but not as these; NaN and infinity are no numbers.
+  const Mask is_near = equals(at & all(~(kWindow - 1)), 0) & (whole <= all(kChunkSize));
   return is_near & (reach <= all(kShortReach)) & (all(-1) < from) & (from + margin + margin < all(kWindow));
 }
 
