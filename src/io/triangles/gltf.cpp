@@ -78,10 +78,11 @@ struct Asked {
   std::vector<std::vector<std::byte>> pictures{};
 };
 
-bool keep_picture(tinygltf::Image*, const int index, std::string*, std::string*, int, int, const unsigned char* bytes,
-                  int size, void* user) {
+// Pictures in buffer views are found by GltfReader: tinygltf hands them over without looking where the buffer ends.
+bool keep_picture(tinygltf::Image* image, const int index, std::string*, std::string*, int, int,
+                  const unsigned char* bytes, int size, void* user) {
   auto& pictures = static_cast<Asked*>(user)->pictures;
-  if (index < 0 || size < 0) return true;
+  if (image->bufferView >= 0 || index < 0 || size < 0) return true;
   if (pictures.size() <= static_cast<std::size_t>(index)) pictures.resize(static_cast<std::size_t>(index) + 1);
   const auto* const first = reinterpret_cast<const std::byte*>(bytes);
   pictures[static_cast<std::size_t>(index)].assign(first, first + size);
@@ -470,12 +471,13 @@ class GltfReader {
                              : !image->uri.empty() ? image->uri
                              : image->name.empty() ? "image " + std::to_string(source)
                                                    : image->name;
-    if (image == nullptr || static_cast<std::size_t>(source) >= asked_.pictures.size() ||
-        asked_.pictures[static_cast<std::size_t>(source)].empty()) {
+    const std::span<const std::byte> picture =
+        image == nullptr ? std::span<const std::byte>() : picture_of(*image, static_cast<std::size_t>(source));
+    if (picture.empty()) {
       loaded_.warnings.push_back("left out the texture " + name + ": its picture is not there");
       return std::nullopt;
     }
-    known_textures_[at] = add_texture(asked_.pictures[static_cast<std::size_t>(source)], name, loaded_);
+    known_textures_[at] = add_texture(picture, name, loaded_);
     const tinygltf::Sampler* const sampler = entry(model_.samplers, texture->sampler);
     if (known_textures_[at] && sampler != nullptr) {
       MeshTexture& made = loaded_.mesh.textures[*known_textures_[at]];
@@ -484,6 +486,19 @@ class GltfReader {
       made.is_smooth = sampler->magFilter != TINYGLTF_TEXTURE_FILTER_NEAREST;
     }
     return known_textures_[at];
+  }
+
+  /// Returns the file of an image; nothing where it is not there, or ends beyond its buffer.
+  [[nodiscard]] std::span<const std::byte> picture_of(const tinygltf::Image& image, std::size_t index) const {
+    if (image.bufferView < 0) {
+      return index < asked_.pictures.size() ? asked_.pictures[index] : std::span<const std::byte>();
+    }
+    const tinygltf::BufferView* const view = entry(model_.bufferViews, image.bufferView);
+    const tinygltf::Buffer* const buffer = view != nullptr ? entry(model_.buffers, view->buffer) : nullptr;
+    if (buffer == nullptr) return {};
+    const auto bytes = std::as_bytes(std::span(buffer->data));
+    const bool fits = view->byteOffset <= bytes.size() && view->byteLength <= bytes.size() - view->byteOffset;
+    return fits ? bytes.subspan(view->byteOffset, view->byteLength) : std::span<const std::byte>();
   }
 
   Status take_scene() {

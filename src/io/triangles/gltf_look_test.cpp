@@ -104,6 +104,29 @@ TEST(GltfLook, DoesNotGlowWithoutTheEmissiveImage) {
   EXPECT_NE(mesh->warnings[0].find("missing.png"), std::string::npos);
 }
 
+// tinygltf reads on beyond the buffer.
+TEST(GltfLook, LeavesOutAPictureThatEndsBeyondItsBuffer) {
+  if (!format_info(FileFormat::Gltf).readable) GTEST_SKIP() << "the build reads no glTF";
+  std::string gltf = square_gltf(R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}})", {"picture"});
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    ASSERT_NE(gltf.find(from), std::string::npos) << from;
+    gltf.replace(gltf.find(from), from.size(), to);
+  };
+  const std::string last_view = R"({"buffer":0,"byteOffset":48,"byteLength":32})";
+  replace(R"("uri":"picture")", R"("name":"picture","mimeType":"image/png","bufferView":2)");
+  for (const std::string place : {R"("byteOffset":5616,"byteLength":89)", R"("byteOffset":48,"byteLength":33)",
+                                  R"("byteOffset":81,"byteLength":1)", R"("byteOffset":4294967295,"byteLength":9)"}) {
+    const std::string before = gltf;
+    replace(last_view, last_view + R"(,{"buffer":0,)" + place + "}");
+    const auto mesh = read_mesh(text_bytes(gltf));
+    ASSERT_TRUE(mesh) << place << ": " << to_string(mesh.error());
+    EXPECT_TRUE(mesh->mesh.textures.empty()) << place;
+    ASSERT_EQ(mesh->warnings.size(), 1U) << place;
+    EXPECT_NE(mesh->warnings[0].find("picture"), std::string::npos) << mesh->warnings[0];
+    gltf = before;
+  }
+}
+
 TEST(GltfLook, ReadsSpecularGlossiness) {
   if (!format_info(FileFormat::Gltf).readable) GTEST_SKIP() << "the build reads no glTF";
   const std::string material = R"({"extensions":{"KHR_materials_pbrSpecularGlossiness":{"diffuseFactor":[1,0.5,1,1],)"
