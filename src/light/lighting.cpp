@@ -263,16 +263,55 @@ void Lighting::tint(const Group& group, const RayPacket& rays, std::span<Vec3> l
   }
 }
 
+// Where lamplight arrives: the group's points from their grid's pivot, and their normals, along the world's axes.
+struct Lighting::LampPlaces {
+  std::array<std::array<double, RayPacket::kSize>, 3> point{};
+  std::array<std::array<double, RayPacket::kSize>, 3> normal{};
+
+  [[nodiscard]] DVec3 point_of(std::size_t i) const { return {point[0][i], point[1][i], point[2][i]}; }
+  [[nodiscard]] DVec3 normal_of(std::size_t i) const { return {normal[0][i], normal[1][i], normal[2][i]}; }
+
+  // Returns the points that the lamp may light: within its reach and turned to it, but for rounding.
+  [[nodiscard]] std::uint32_t near(DVec3 lamp_from_pivot, double reach) const {
+    constexpr double kRoom = 1e-9;
+    const double most = reach * reach * (1.0 + kRoom);
+    std::array<std::uint8_t, RayPacket::kSize> is_near{};
+    for (std::size_t i = 0; i < RayPacket::kSize; ++i) {
+      const double x = lamp_from_pivot.x - point[0][i];
+      const double y = lamp_from_pivot.y - point[1][i];
+      const double z = lamp_from_pivot.z - point[2][i];
+      const double squared = x * x + y * y + z * z;
+      const double facing = x * normal[0][i] + y * normal[1][i] + z * normal[2][i];
+      is_near[i] =
+          static_cast<std::uint8_t>((squared <= most) & ((facing > 0.0) | (facing * facing <= kRoom * squared)));
+    }
+    std::uint32_t bits = 0;
+    for (std::size_t i = 0; i < RayPacket::kSize; ++i) bits |= std::uint32_t{is_near[i]} << i;
+    return bits;
+  }
+};
+
 // Points of one brick have the same list; each point adds its lamps in the list's order, whatever its group.
 std::int64_t Lighting::add_lamplight(const Group& group, std::span<Vec3> lamplight) const {
-  const int level = placed_in(view_->tracer())[static_cast<std::size_t>(group.placed)].level;
+  const PlacedGrid& placed = placed_in(view_->tracer())[static_cast<std::size_t>(group.placed)];
   std::array<std::span<const std::uint32_t>, RayPacket::kSize> lists;
+  LampPlaces places;
   std::uint32_t left = group.surfaces;
   for (std::uint32_t lanes = left; lanes != 0; lanes &= lanes - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(lanes));
-    const IVec3 voxel = group.points[i]->voxel << level;
+    const IVec3 voxel = group.points[i]->voxel << placed.level;
     lists[i] = lamps_->at({voxel.x >> 4, voxel.y >> 4, voxel.z >> 4}, group.placed);
-    if (lists[i].empty()) left &= ~(1U << i);
+    if (lists[i].empty()) {
+      left &= ~(1U << i);
+      continue;
+    }
+    const DVec3 origin{group.origins.origin_x[i], group.origins.origin_y[i], group.origins.origin_z[i]};
+    const DVec3 point = placed.world_axes * ((origin - placed.pivot) * placed.voxel_size);
+    const DVec3 normal = placed.world_axes * normal_at(*group.points[i]);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      places.point[axis][i] = point[static_cast<int>(axis)];
+      places.normal[axis][i] = normal[static_cast<int>(axis)];
+    }
   }
   std::int64_t rays = 0;
   while (left != 0) {
@@ -283,35 +322,41 @@ std::int64_t Lighting::add_lamplight(const Group& group, std::span<Vec3> lamplig
       if (lists[i].data() == list.data()) lanes |= 1U << i;
     }
     left &= ~lanes;
-    for (const std::uint32_t lamp : list) rays += add_lamp(group, lamps_->lamps[lamp], lanes, lamplight);
+    for (const std::uint32_t lamp : list) rays += add_lamp(group, places, lamps_->lamps[lamp], lanes, lamplight);
   }
   return rays;
 }
 
-std::int64_t Lighting::add_lamp(const Group& group, const PlacedLamp& lamp, std::uint32_t lanes,
-                                std::span<Vec3> lamplight) const {
+std::int64_t Lighting::add_lamp(const Group& group, const LampPlaces& places, const PlacedLamp& lamp,
+                                std::uint32_t lanes, std::span<Vec3> lamplight) const {
   const PlacedGrid& placed = placed_in(view_->tracer())[static_cast<std::size_t>(group.placed)];
   // The difference of two far positions is taken first: it is small.
   const DVec3 lamp_from_pivot = lamp.position - placed.position;
+  lanes &= places.near(lamp_from_pivot, lamp.reach);
+  if (lanes == 0) return 0;
   std::array<Vec3, RayPacket::kSize> light;
-  RayPacket rays = group.origins;
-  rays.active = 0;
+  std::array<LampRay, RayPacket::kSize> to_lamp;
   std::uint32_t lit = 0;
+  std::uint32_t traced = 0;
   for (; lanes != 0; lanes &= lanes - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(lanes));
-    const SurfacePoint& point = *group.points[i];
-    const DVec3 origin{group.origins.origin_x[i], group.origins.origin_y[i], group.origins.origin_z[i]};
-    const DVec3 point_from_pivot = placed.world_axes * ((origin - placed.pivot) * placed.voxel_size);
-    const LampRay ray = lamp_ray(lamp, lamp_from_pivot - point_from_pivot, placed.world_axes * normal_at(point));
-    if (ray.light == Vec3(0.0F)) continue;
-    light[i] = ray.light;
+    to_lamp[i] = lamp_ray(lamp, lamp_from_pivot - places.point_of(i), places.normal_of(i));
+    if (to_lamp[i].light == Vec3(0.0F)) continue;
+    light[i] = to_lamp[i].light;
     lit |= 1U << i;
-    if (!(ray.distance > 0.0)) continue;
-    rays.active |= 1U << i;
-    set_direction(rays, i, ray.direction * placed.world_axes);
-    rays.max_t[i] = ray.distance / placed.voxel_size;
+    if (to_lamp[i].distance > 0.0) traced |= 1U << i;
   }
-  const std::int64_t count = options_.shadows && rays.active != 0 ? shadow(group, rays, light) : 0;
+  std::int64_t count = 0;
+  if (options_.shadows && traced != 0) {
+    RayPacket rays = group.origins;
+    rays.active = traced;
+    for (std::uint32_t left = traced; left != 0; left &= left - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(left));
+      set_direction(rays, i, to_lamp[i].direction * placed.world_axes);
+      rays.max_t[i] = to_lamp[i].distance / placed.voxel_size;
+    }
+    count = shadow(group, rays, light);
+  }
   for (; lit != 0; lit &= lit - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(lit));
     lamplight[i] += light[i];

@@ -86,7 +86,8 @@ class Lighting {
   std::int64_t shadow(const Group& group, RayPacket& rays, std::span<Vec3> light) const;
   void tint(const Group& group, const RayPacket& rays, std::span<Vec3> light) const;
   std::int64_t add_lamplight(const Group& group, std::span<Vec3> lamplight) const;
-  std::int64_t add_lamp(const Group& group, const PlacedLamp& lamp, std::uint32_t lanes,
+  struct LampPlaces;
+  std::int64_t add_lamp(const Group& group, const LampPlaces& places, const PlacedLamp& lamp, std::uint32_t lanes,
                         std::span<Vec3> lamplight) const;
   std::int64_t find_openness(const Group& group, std::span<float> openness) const;
   [[nodiscard]] float smooth_openness(const SurfacePoint& point) const;

@@ -1,12 +1,16 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
 #include <quoin/core/assert.h>
 #include <quoin/core/half.h>
 #include <quoin/core/vec.h>
 #include <quoin/grid/density_chunk.h>
+
+#include "grid/density/density_storage.h"
 
 namespace quoin {
 
@@ -23,6 +27,27 @@ inline void read_cell_corners(IVec3 first, int size, const FindChunk& find_chunk
   const IVec3 local = local_of(first);
   const int last = kChunkEdge - 1 - size;  // from beyond which the next chunk is reached
   const unsigned beyond = unsigned{local.x > last} | unsigned{local.y > last} << 1 | unsigned{local.z > last} << 2;
+  if (beyond == 0) {
+    const DensityChunk* const one = find_chunk(chunk);
+    const DensityStorage* const storage = one == nullptr ? nullptr : DensityStorage::of(*one);
+    if (storage == nullptr) {
+      std::fill_n(corners, 8, one == nullptr ? Number{outside()} : Number{float_from_half(*one->uniform())});
+      return;
+    }
+    for (int row = 0; row < 4; ++row, corners += 2) {
+      const int y = local.y + (row & 1) * size;
+      const int z = local.z + (row >> 1) * size;
+      const std::uint32_t slab = storage->slabs[ChunkStorage::slab_index(y, z)];
+      if ((slab & ChunkStorage::kUniformSlab) != 0) {
+        corners[0] = corners[1] = float_from_half(static_cast<Half>(slab));
+        continue;
+      }
+      const Half* const samples = storage->row(slab, ChunkStorage::row_in_slab(y, z)) + local.x;
+      corners[0] = float_from_half(samples[0]);
+      corners[1] = float_from_half(samples[size]);
+    }
+    return;
+  }
   std::array<const DensityChunk*, 8> chunks;
   unsigned known = 0;
   for (unsigned i = 0; i < 8; ++i) {
