@@ -300,10 +300,15 @@ class SurfaceCells::Collector {
 
   Cell& cell_at(IVec3 voxel) {
     const IVec3 at = (voxel - into_->origin_) >> into_->log2_width_;
-    const std::uint64_t code = morton_code(at);
     // Faces that follow each other mostly lie in one cell.
-    if (!into_->cells_.empty() && into_->cells_[last_].code == code) return into_->cells_[last_];
+    if (at == last_at_) return into_->cells_[last_];
+    last_at_ = at;
+    const std::uint64_t code = morton_code(at);
+    // Those of the row before come again.
+    Recent& recent = recent_[MortonHash()(code) % recent_.size()];
+    if (recent.is_known && recent.code == code) return into_->cells_[last_ = recent.cell];
     const auto [found, is_new] = index_.try_emplace(code, static_cast<std::uint32_t>(into_->cells_.size()));
+    recent = {code, found->second, true};
     if (is_new) {
       Cell& cell = into_->cells_.emplace_back();
       cell.code = code;
@@ -315,10 +320,18 @@ class SurfaceCells::Collector {
     return into_->cells_[last_];
   }
 
+  struct Recent {
+    std::uint64_t code = 0;
+    std::uint32_t cell = 0;
+    bool is_known = false;
+  };
+
   SurfaceCells* into_;
   Ranks ranks_;
+  std::array<Recent, 1024> recent_{};
   tsl::robin_map<std::uint64_t, std::uint32_t, MortonHash> index_;
-  std::size_t last_ = 0;
+  IVec3 last_at_{-1};
+  std::size_t last_ = 0;  // the cell there
 };
 
 SurfaceCells::SurfaceCells(const ContentSphere& content, IVec3 least, int log2_width)
@@ -329,6 +342,7 @@ SurfaceCells::SurfaceCells(const ContentSphere& content, IVec3 least, int log2_w
 SurfaceCells::SurfaceCells(const std::vector<SeenFace>& faces, const ContentSphere& content, int edge, int log2_width)
     : SurfaceCells(content, least_voxel(faces), log2_width) {
   Collector collector(*this, texel_of(content, edge));
+  cells_.reserve(faces.size() / 4);
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const auto index = static_cast<std::uint32_t>(i);
     faces[i].surfel == nullptr ? collector.add_face(faces[i], index) : collector.add_surfel(faces[i], index);
@@ -428,19 +442,22 @@ bool SurfaceCells::is_covered(const Cell& cell, Direction direction, const std::
   return true;
 }
 
-// The face that a view shows: one that it saw, or else that of the nearest view which saw any.
-std::uint32_t SurfaceCells::shown_to(std::size_t view, const Cell& cell) {
-  for (const std::uint8_t other : views_by_distance()[view]) {
-    if (cell.rank[other] < kUnseen) return cell.face[other];
-  }
-  return cell.face[view];
-}
-
 ImpostorFaces::Cell SurfaceCells::finished(const Cell& cell) const {
   ImpostorFaces::Cell out;
   out.corner = Vec3(DVec3(corner_of(cell)) - content_.centre);
   out.bits = cell.bits;
-  for (std::size_t view = 0; view < kImpostorViews; ++view) out.face[view] = shown_to(view, cell);
+  out.face = cell.face;
+  std::uint32_t seeing = 0;
+  for (std::size_t view = 0; view < kImpostorViews; ++view) seeing |= std::uint32_t{cell.rank[view] < kUnseen} << view;
+  if (seeing == 0) return out;
+  // Views that saw none show the face of the nearest view that saw any.
+  for (std::uint32_t left = ~seeing & kAllImpostorViews; left != 0; left &= left - 1) {
+    const auto view = static_cast<std::size_t>(std::countr_zero(left));
+    const auto& others = views_by_distance()[view];
+    const auto nearest =
+        std::find_if(others.begin(), others.end(), [&](std::uint8_t other) { return (seeing >> other & 1U) != 0; });
+    out.face[view] = cell.face[*nearest];
+  }
   return out;
 }
 

@@ -66,7 +66,6 @@ class SurfaceCells {
   [[nodiscard]] bool is_covered(const Cell& cell, Direction direction,
                                 const std::function<bool(IVec3)>& is_solid) const;
   [[nodiscard]] ImpostorFaces::Cell finished(const Cell& cell) const;
-  [[nodiscard]] static std::uint32_t shown_to(std::size_t view, const Cell& cell);
 
   ContentSphere content_;
   IVec3 origin_{0};  // of the Morton curve, voxels
