@@ -557,8 +557,8 @@ inline std::uint32_t trace_short(const TreeView& tree, const RayPacket& packet, 
     const IVec3 origin{place_window(start.x), place_window(start.y), place_window(start.z)};
     ShortRays rays;
     const std::uint32_t here = set_up_short(tree, lanes_from(packet, first), mask_of(wanted), origin, rays);
-    // Packets that have little in common gain nothing by windows.
-    if (here == 0 || (i == 0 && 2 * std::popcount(here) < std::popcount(wanted))) return wanted;
+    // Rays that have little in common gain nothing by windows.
+    if (2 * std::popcount(here) < std::popcount(wanted)) return wanted;
     blocked |= bits(walk_short(tree, origin, rays)) << first;
     doubtful |= bits(rays.doubtful) << first;
     wanted &= ~here;
