@@ -1,5 +1,6 @@
-// Occlusion where many cells are active, with whole-number spreads, as many vertices at a time as a register holds eight
-// lanes. All 27 samples share one fraction then: six rows of points along x in each of six slices, interpolated along z, y and x in turn.
+// Occlusion where many cells are active, with whole-number spreads, as many vertices at a time as a register holds
+// eight lanes. All 27 samples share one fraction then: six rows of points along x in each of six slices, interpolated
+// along z, y and x in turn.
 //
 //   slices z, z + 1 -> one; rows y, y + 1 -> one: nine rows of eight points     | . . . . . . . . |
 //   of two rows the points 0, s, 2 s each, s the spread                          | a a a b b b - - |

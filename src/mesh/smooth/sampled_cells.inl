@@ -1,11 +1,11 @@
 // What occlusion needs to know of the cells around a slice, for every kernel: which of them have to be interpolated.
 //
 //   points        signs[z & 1][window][row]            a bit per point: it is solid
-//   cells         cell_words[z & mask][window][slot]   a bit per cell: a sample in it is to be listed; is solid for sure
+//   cells         cell_words[z & mask][window][slot]   two bits per cell: a sample in it is to be listed; it is solid
 //   points again  sampled[z & mask][row][column]       halves, of the rows that a listed cell touches
 //
-//   columns  -16        16                  48        79      Two windows of 64 columns, so that one word holds all that
-//            |- - - - - window 0 - - - - - -|                 the samples of a vertex touch in a row.
+//   columns  -16        16                  48        79      Two windows of 64 columns, so that one word holds
+//            |- - - - - window 0 - - - - - -|                 all that the samples of a vertex touch in a row.
 //                       |- - - - - window 1 - - - - - - -|
 
 #pragma once
@@ -24,8 +24,8 @@ template <int kSpread>
 constexpr int kRowStep = 1;
 #endif
 
-// Words of the cells of slice z in a window, from the signs of the points of slices z and z + 1. Returns which rows have
-// a listed cell.
+// Finds the words of the cells of slice z in a window, from the signs of the points of slices z and z + 1. Returns the
+// rows that have a listed cell.
 template <bool kCounted>
 RowSet find_cell_words(Work& work, int z, int window) {
   const std::uint64_t* const low = work.signs[z & 1][window];

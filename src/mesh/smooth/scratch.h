@@ -100,8 +100,8 @@ struct RowSet {
   }
 };
 
-// A bit for each cell of a row in a window: a sample in it has to be interpolated; or else is solid for sure. Those with
-// neither are in air.
+// A bit for each cell of a row in a window: a sample in it has to be interpolated; or else it is solid for sure. Those
+// with neither are in air.
 struct CellWords {
   std::uint64_t listed = 0;
   std::uint64_t whole = 0;

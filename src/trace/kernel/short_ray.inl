@@ -1,7 +1,6 @@
 // Whether one short ray is blocked, in sixteen lanes of AVX-512: all its crossings at once instead of one after the
-// other, so that nothing waits and the answer decides no branch. The same answers as the walk in
-// trace/kernel/kernel_plain.cpp: whatever lies so near to an edge, or to the ray's end, that rounding may decide is said
-// to be doubtful, and the walk is asked.
+// other, so that nothing waits and the answer decides no branch. The same answers as of trace/kernel/single.inl:
+// a crossing so near to an edge, or to the ray's end, that rounding may decide is doubtful, and the walk is asked.
 //
 //   lane       | 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 | 8 | 9 |10 |11 |12 |13 |14 |15 |
 //   crossing   | planes of x   | planes of y       | planes of z ...      |start|
