@@ -306,7 +306,7 @@ double mean_difference(const Image& a, const Image& b) {
 }
 
 // The largest changes of both images in steps of half a percent. A single step of a small image turns over a handful of
-// samples, and which of the two images it hits is chance; the largest of many steps is what is seen.
+// samples, of either image by chance; people see the largest of many steps.
 struct Changes {
   double drawn = 0.0;
   double traced = 0.0;

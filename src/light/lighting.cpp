@@ -263,7 +263,7 @@ void Lighting::tint(const Group& group, const RayPacket& rays, std::span<Vec3> l
   }
 }
 
-// Where lamplight arrives: the group's points from their grid's pivot, and their normals, along the world's axes.
+// A group's points, from their grid's pivot, and their normals, along the world's axes: lamps light them.
 struct Lighting::LampPlaces {
   std::array<std::array<double, RayPacket::kSize>, 3> point{};
   std::array<std::array<double, RayPacket::kSize>, 3> normal{};
@@ -271,7 +271,7 @@ struct Lighting::LampPlaces {
   [[nodiscard]] DVec3 point_of(std::size_t i) const { return {point[0][i], point[1][i], point[2][i]}; }
   [[nodiscard]] DVec3 normal_of(std::size_t i) const { return {normal[0][i], normal[1][i], normal[2][i]}; }
 
-  // Returns the points that the lamp may light: within its reach and turned to it, but for rounding.
+  // Returns the points that the lamp may light: within its reach and turned to it, with room for rounding.
   [[nodiscard]] std::uint32_t near(DVec3 lamp_from_pivot, double reach) const {
     constexpr double kRoom = 1e-9;
     const double most = reach * reach * (1.0 + kRoom);

@@ -262,7 +262,7 @@ void begin_occlusion(Work& work) {
     if (values.size() < size) values.resize(size);
   };
   if (work.is_dense) return make_room(work.decoded, (slices + kRepeatedSlices) * kDecodedSlice + 64);
-  // The first slice begins anew.
+  // The first slice is not there yet.
   --work.next_slice;
   make_room(work.cell_words, slices * 2 * Work::kSlots + 4);
   make_room(work.sampled, slices * kSampledSlice + 64);

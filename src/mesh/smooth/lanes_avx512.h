@@ -51,7 +51,7 @@ inline F gather(const float* base, I place) {
 inline F look_up(const std::array<float, 16>& table, I index) {
   return {_mm512_permutexvar_ps(index.v, _mm512_loadu_ps(table.data()))};
 }
-// Of a table in two registers.
+// Entries of a table in two registers.
 inline F look_up(const float (&table)[32], I index) {
   return {_mm512_permutex2var_ps(_mm512_load_ps(table), index.v, _mm512_load_ps(table + 16))};
 }

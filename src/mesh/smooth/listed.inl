@@ -5,7 +5,7 @@
 //   27 cells       | 0 | 0 | ? | 1 | ...      0: corners in air, adds nothing. 1: solid corners, counts as one where
 //                                             samples are counted. ?: listed
 //   codes          vertex << 5 | sample       of the listed samples of 32 vertices, one after the other
-//   values, bits   a number and a bit each    what a sample adds, and whether it is solid
+//   values, bits   a number and a bit each    the part that a sample adds; set if it is solid
 //
 // Kernels give find_batch and find_values; AVX-512 lists and adds up in its own way.
 
@@ -46,7 +46,7 @@ struct Batch {
 
 constexpr int kSliceBias = 16;
 
-// Which window holds the samples from a column (from -16) on.
+// Returns the window that holds the samples from a column (counted from -16) on.
 constexpr int window_of(int column) {
   return column < kSecondWindow + kPointX ? 0 : 1;
 }
@@ -64,7 +64,7 @@ struct SampleBits {
   std::uint32_t whole = 0;
 };
 
-// What the words say of the 27 cells of vertex `v`.
+// Looks up the 27 cells of vertex `v` in the words.
 template <int kSpread, bool kCounted>
 SampleBits bits_of_samples(const Work& work, const Batch& batch, std::size_t v) {
   const auto step = [&](int axis, int i) { return kSpread != 0 ? i * kSpread : batch.steps[axis][i][v]; };
@@ -135,13 +135,13 @@ Sum sum_of(const Batch& batch, std::size_t v) {
 }
 #endif
 
-// How the values of the samples become one number.
+// Makes one number of the samples' values.
 float occlusion_of_sum(const Sum& sum, const SmoothOcclusionOptions& options) {
   if (options.method == SmoothOcclusion::SoftShare) return soft_share(sum.sum);
   return weighted_occlusion(sum.sum, sum.least, options);
 }
 
-// What each kernel has of its own: the cells and fractions of up to 32 vertices from `first` on; the values and solid
+// Each kernel gives these: the cells and fractions of up to 32 vertices from `first` on; the values and solid
 // bits of `count` codes, as far as the form of occlusion needs them (returns whether any is solid); and, from these,
 // the occlusion of `count` vertices with a solid sample each, whose numbers are in `which`.
 template <int kSpread>

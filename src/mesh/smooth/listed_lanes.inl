@@ -10,7 +10,7 @@
 namespace quoin::smooth {
 namespace {
 
-// Where the samples of vertices lie along an axis.
+// The samples of vertices along an axis: cells, and fractions within them.
 struct AxisLanes {
   I base[3];
   F fraction[3];
@@ -65,7 +65,7 @@ void find_batch(const Work& work, const Slice& slice, std::size_t first, std::si
 #endif
 }
 
-// Where sample s lies from sample 0, for whole spreads, as Batch::lowest; and 32 times its number along each axis.
+// The place of sample s from sample 0, for whole spreads, as in Batch::lowest; and 32 times its number along each axis.
 template <int kSpread>
 struct SampleTable {
   alignas(64) std::int32_t offset[32]{};
@@ -81,7 +81,7 @@ struct SampleTable {
 template <int kSpread>
 inline constexpr SampleTable<kSpread> kSampleTable{};
 
-// Where sixteen (or eight) listed samples' cells are, and where in them the samples lie.
+// The cells of sixteen (or eight) listed samples, and the samples' places in them.
 struct Listed {
   I place;
   F fraction[3];
@@ -215,7 +215,7 @@ void find_first_words(const Work& work, std::size_t count, const Batch& batch, F
 
 #ifdef QUOIN_KERNEL_AVX512
 
-// Where the words of a vertex' 27 cells are found. A register holds {listed, whole} of four rows, of three slices one
+// Finds the words of a vertex' 27 cells. A register holds {listed, whole} of four rows, of three slices one
 // upon the other: of sample s word 8 j or 8 j + 4 of 16 bits, and in it a bit.
 template <int kSpread>
 struct WordTable {
@@ -313,7 +313,7 @@ inline Sum sum_of(const Batch& batch, std::size_t v) {
 
 #else
 
-// Which sample each bit of a vertex' samples stands for: those of a row `kSpread` bits apart, then the next row, then
+// The sample that each bit of a vertex stands for: those of a row `kSpread` bits apart, then the next row, then
 // the next slice.
 template <int kSpread>
 constexpr int kBitsOfRow = 2 * kSpread + 1;
@@ -356,7 +356,7 @@ std::size_t list_samples(const Work& work, std::size_t count, Batch& batch) {
       const auto first = static_cast<unsigned>(v << kCodeShift);
       auto left = static_cast<std::uint64_t>(_mm_cvtsi128_si64(bits));
       const int listed = std::popcount(left);
-      // By fours, since how often a loop runs is hard to foresee; what is too much is overwritten.
+      // By fours: the processor cannot foresee the end of a short loop. Later codes overwrite those that are too many.
       std::uint16_t* to = end;
       do {
         for (int i = 0; i < 4; ++i, left &= left - 1) {

@@ -1,4 +1,4 @@
-// What occlusion needs to know of the cells around a slice, for every kernel: which of them have to be interpolated.
+// The cells around a slice, for every kernel: says which of them occlusion has to interpolate.
 //
 //   points        signs[z & 1][window][row]            a bit per point: it is solid
 //   cells         cell_words[z & mask][window][slot]   two bits per cell: a sample in it is to be listed; it is solid

@@ -35,7 +35,7 @@ inline constexpr int kDecodedStride = 96;
 inline constexpr int kDecodedSlice = kApronRows * kDecodedStride;
 inline constexpr int kRepeatedSlices = 5;
 
-// What occlusion may read: points -16 to 79 on each axis. Words hold 64 columns, from -16 or from 16 on.
+// Occlusion reads points -16 to 79 on each axis. Words hold 64 columns, from -16 or from 16 on.
 inline constexpr int kReachRows = 96;
 inline constexpr int kSecondWindow = 32;  // the first column of the second window, counted from -16
 inline constexpr int kSampledStride = kReachRows;
@@ -140,12 +140,12 @@ struct Work {
   alignas(64) float fractions[3][kSlicePlaces / 2 + 64];
   alignas(64) float normals[3][kSlicePlaces / 2 + 64];
 
-  // Where many cells are active, occlusion interpolates all samples; else those that cells' words tell it to.
+  // True where many cells are active: occlusion interpolates all samples then, else those of listed cells.
   bool is_dense = false;
   int ring_mask = 0;   // slices that occlusion reads are held as [z & ring_mask]
   int next_slice = 0;  // the first slice that is not there yet
   // By lists. Signs of points: [z & 1][window][y + 16]. Words of cells: [z & ring_mask][window][slot], rows y, y + 2,
-  // ... one after the other where `row_step` is 2, so that one register takes what a vertex' samples touch. Rows of
+  // ... one after the other where `row_step` is 2, so that one register takes all rows of a vertex. Rows of
   // cells that are listed: [z & ring_mask]. Points: [z & ring_mask][y + 16][x + 16].
   std::uint64_t signs[2][2][kReachRows + 8];
   int row_step = 1;
@@ -153,7 +153,7 @@ struct Work {
   std::array<RowSet, kMostSlices> listed_rows;
   std::vector<Half> sampled;
   // All of them: points as floats, [z & ring_mask][y + kWidestApron][x + kPointX]. The first kRepeatedSlices follow the
-  // last again, so that what one vertex reads lies at fixed distances.
+  // last again, so that all that one vertex reads lies at fixed distances.
   std::vector<float> decoded;
   int apron = 0;  // how many points below and above a cell's own occlusion reads
 

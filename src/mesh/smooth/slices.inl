@@ -20,8 +20,8 @@
 namespace quoin::smooth {
 namespace {
 
-// The share of cells from which on, when active, interpolating all samples takes less time than listing those that need
-// it (docs/decisions/123).
+// If a larger share of the cells is active, interpolating all samples takes less time than listing those that need it
+// (docs/decisions/123).
 #ifdef QUOIN_KERNEL_AVX512
 constexpr double kManyActive = 0.38;
 #elif defined(QUOIN_KERNEL_AVX2)
@@ -80,7 +80,7 @@ constexpr std::array<int, 3> along_diagonal(int v_sign) {
   return along;
 }
 
-// What each kernel has of its own, beside finding the places of bits: vertices, occlusion and quads.
+// Each kernel gives these, and finds the places of bits: vertices, occlusion and quads.
 void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChunkMesh& out);
 void add_occlusion(Work& work, const Slice& slice, std::size_t count, float* occlusion);
 template <Axis kAxis>

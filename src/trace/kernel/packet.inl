@@ -452,7 +452,7 @@ struct ShortRays {
   Mask doubtful;  // may cross a plane of an axis of which no more than this can be said
 };
 
-// Where a window begins along an axis for rays that start near `position`, which it may do outside the table.
+// Returns the begin of a window along an axis for rays that start near `position`. It may lie outside the table.
 inline int place_window(double position) {
   return (static_cast<int>(position) - 24) & ~15;
 }

@@ -1,5 +1,5 @@
-// Whether one short ray is blocked, in sixteen lanes of AVX-512: all its crossings at once instead of one after the
-// other, so that nothing waits and the answer decides no branch. The same answers as of trace/kernel/single.inl:
+// Says whether one short ray is blocked, in sixteen lanes of AVX-512: all its crossings at once instead of one after
+// the other, so that nothing waits and the answer decides no branch. The same answers as of trace/kernel/single.inl:
 // a crossing so near to an edge, or to the ray's end, that rounding may decide is doubtful, and the walk is asked.
 //
 //   lane       | 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 | 8 | 9 |10 |11 |12 |13 |14 |15 |
@@ -27,25 +27,25 @@ namespace {
 constexpr float kShortRayReach = 11.0F;
 constexpr int kStartLane = 15;
 constexpr float kPlaceUnit = 65536.0F;
-// How near to an edge, in units of places, rounding might decide; places are moved up by as much, so that one test of
-// bits finds both sides. Rounding moves them by less than one unit.
+// Nearer to an edge than this, in units of places, rounding might decide; places are moved up by as much, so that one
+// test of bits finds both sides. Rounding moves them by less than one unit.
 constexpr int kNearEdge = 8;
 // Longer or shorter directions are for other ways, which scale them.
 constexpr float kLeastDirection = 0x1p-20F;
 constexpr float kGreatestDirection = 0x1p20F;
-// How much longer than any component the direction may be.
+// The direction may be this much longer than any of its components.
 constexpr float kShortRayRatio = 2048.0F;
 constexpr float kLeastMoving = 0x1p-100F;
 
 struct ShortRayTables {
-  // The spread bits of places, as in trace/kernel/packet.inl but for five bits an axis.
+  // The spread bits of places, as in trace/kernel/packet.inl, of five bits per axis.
   alignas(64) std::int32_t spread[3][32];
   // By how many planes of x and of y are crossed: the axis of each lane, and four times the number of its plane.
   alignas(16) std::uint8_t lanes[16][16][16];
-  // By which axes are mirrored: the spread bits that turn over. Along x these are not the brick's, since bricks come in
+  // For each set of mirrored axes: the spread bits that turn over. Along x these are not the brick's, as bricks come in
   // pairs along x, the lower one first. And the highest bit of the half word, as place_in_run takes it.
   std::int32_t flips[8];
-  // By which next bricks lie outside the table, and by whether x is mirrored: which of the eight bricks lie inside.
+  // For x mirrored or not, and each set of axes whose next brick lies outside the table: the bricks that lie inside.
   std::uint8_t inside[2][8];
 };
 
@@ -128,7 +128,7 @@ inline bool set_up(const TreeView& tree, const Ray& ray, double max_t, double le
   const unsigned outside = _mm_cmpge_epu32_mask(out.brick, load4(&tree.brick_sizes)) & 7U;
   if ((outside | is_long | is_creeping) != 0 || is_usual == 0) [[unlikely]]
     return false;
-  // Positions round as those of every walk: from a multiple of 64, and below the end of the voxel.
+  // Positions round as in every walk: from a multiple of 64, and below the end of the voxel.
   const __m256d base = _mm256_cvtepi32_pd(_mm_and_si128(own, _mm_set1_epi32(~63)));
   const __m128 whole = _mm_cvtepi32_ps(_mm_and_si128(own, _mm_set1_epi32(63)));
   const __m128 rest =
@@ -150,7 +150,7 @@ inline __m256i bricks_of(const TreeView& tree, const ShortRay& ray) {
   const __m128i next = _mm_add_epi32(ray.brick, _mm_or_si128(ray.backward, _mm_set1_epi32(1)));
   const unsigned outside = _mm_cmpge_epu32_mask(next, sizes) & 7U;
   const __mmask8 inside = kShortRay.inside[ray.octant & 1][outside];
-  // What lies outside is read from the own brick's row instead.
+  // Bricks outside are read from the own brick's row instead.
   const __m128i there = _mm_mask_mov_epi32(next, static_cast<__mmask8>(outside), ray.brick);
   const __m256i both = _mm256_mullo_epi32(_mm256_inserti128_si256(_mm256_castsi128_si256(ray.brick), there, 1),
                                           _mm256_broadcastsi128_si256(strides));
@@ -187,7 +187,7 @@ inline Blocked any_at_once(const TreeView& tree, const Ray& ray, double max_t, d
   const __m512 limit = _mm512_broadcastss_ps(own.limit);
   const __mmask16 maybe = _mm512_cmp_ps_mask(t, _mm512_add_ps(limit, doubt), _CMP_LT_OQ);
   const __mmask16 sure = _mm512_cmp_ps_mask(t, _mm512_sub_ps(limit, doubt), _CMP_LT_OQ) | 1U << kStartLane;
-  // Places, moved up by kNearEdge but for the axis that is crossed and for the start: there they are exact.
+  // Places, moved up by kNearEdge except on the axis that is crossed and at the start, where they are exact.
   const __m128 unit = _mm_set1_ps(kPlaceUnit), half = _mm_set1_ps(0.5F * kPlaceUnit);
   const __m512 from =
       _mm512_broadcast_f32x4(_mm_add_ps(_mm_mul_ps(own.origin, unit), _mm_set1_ps(static_cast<float>(kNearEdge))));
