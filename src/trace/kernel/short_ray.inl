@@ -107,8 +107,8 @@ struct ShortRay {
 
 // Returns false where another way is to be taken. `length`: |x| + |y| + |z| of the direction. Requires: it is short.
 inline bool set_up(const TreeView& tree, const Ray& ray, double max_t, double length, ShortRay& out) {
-  // One read for y of the origin, x, y, z.
-  const __m128 d = _mm256_cvtpd_ps(_mm256_loadu_pd(&ray.direction.x - 1));
+  static_assert(sizeof(Ray) == 6 * sizeof(double));
+  const __m128 d = _mm256_cvtpd_ps(_mm256_loadu_pd(&ray.origin.z));  // with the direction behind it
   const __m128 direction = _mm_blend_ps(_mm_permute_ps(d, 0x39), _mm_setzero_ps(), 8);
   const __m128 sign_bit = _mm_set1_ps(-0.0F);
   const __m128 size = _mm_andnot_ps(sign_bit, direction);
