@@ -7,7 +7,7 @@
 //   codes          vertex << 5 | sample       of the listed samples of 32 vertices, one after the other
 //   values, bits   a number and a bit each    the part that a sample adds; set if it is solid
 //
-// Kernels give find_batch and find_values; AVX-512 lists and adds up in its own way.
+// Kernels give find_batch, find_values, list_samples and add_up.
 
 #pragma once
 

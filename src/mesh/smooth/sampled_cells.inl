@@ -24,6 +24,12 @@ template <int kSpread>
 constexpr int kRowStep = 1;
 #endif
 
+// The cells of a window whose points are all known: the last column's lie partly beyond.
+std::uint64_t known_columns(const Work& work, int window) {
+  const int cells = kPointX + work.n + std::min(work.n, kPointX) - 1 - kSecondWindow * window;
+  return low_bits(std::clamp(cells, 0, kChunkEdge - 1));
+}
+
 // Finds the words of the cells of slice z in a window, from the signs of the points of slices z and z + 1. Returns the
 // rows that have a listed cell.
 template <bool kCounted>
@@ -31,6 +37,7 @@ RowSet find_cell_words(Work& work, int z, int window) {
   const std::uint64_t* const low = work.signs[z & 1][window];
   const std::uint64_t* const high = work.signs[(z + 1) & 1][window];
   CellWords* const words = work.cell_words_of(z, window);
+  const std::uint64_t columns = known_columns(work, window);
   std::uint64_t rows[2] = {};
 #ifdef QUOIN_KERNEL_AVX512
   // A register holds the listed and whole words of four rows: the even ones, and the odd ones.
@@ -42,6 +49,7 @@ RowSet find_cell_words(Work& work, int z, int window) {
     __m512i all = _mm512_and_si512(_mm512_ternarylogic_epi64(a, b, c, 0x80), d);
     any = _mm512_or_si512(any, _mm512_srli_epi64(any, 1));
     all = _mm512_and_si512(all, _mm512_srli_epi64(all, 1));
+    any = _mm512_and_si512(any, _mm512_set1_epi64(static_cast<long long>(columns)));
     const __m512i listed = kCounted ? _mm512_andnot_si512(all, any) : any;
     const __m512i whole = kCounted ? all : _mm512_setzero_si512();
     const __m512i even = _mm512_unpacklo_epi64(listed, whole), odd = _mm512_unpackhi_epi64(listed, whole);
@@ -61,6 +69,7 @@ RowSet find_cell_words(Work& work, int z, int window) {
     std::uint64_t any = low[row] | low[row + 1] | high[row] | high[row + 1];
     std::uint64_t all = low[row] & low[row + 1] & high[row] & high[row + 1];
     any |= any >> 1, all &= all >> 1;
+    any &= columns;
     const std::uint64_t listed = kCounted ? any & ~all : any;
     words[work.slot_of(row)] = {listed, kCounted ? all : 0};
     rows[row / 64] |= std::uint64_t{listed != 0} << (row & 63);

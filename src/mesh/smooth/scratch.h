@@ -147,7 +147,7 @@ struct Work {
   // By lists. Signs of points: [z & 1][window][y + 16]. Words of cells: [z & ring_mask][window][slot], rows y, y + 2,
   // ... one after the other where `row_step` is 2, so that one register takes all rows of a vertex. Rows of
   // cells that are listed: [z & ring_mask]. Points: [z & ring_mask][y + 16][x + 16].
-  std::uint64_t signs[2][2][kReachRows + 8];
+  std::uint64_t signs[2][2][kReachRows + 8]{};
   int row_step = 1;
   std::vector<CellWords> cell_words;
   std::array<RowSet, kMostSlices> listed_rows;
@@ -190,7 +190,7 @@ inline constexpr int kVertexBits = 13;
 // The options with every number brought into its range.
 [[nodiscard]] SmoothOcclusionOptions within_limits(SmoothOcclusionOptions occlusion, int level);
 
-// Whether the vector kernels serve this occlusion.
+// Whether the way for many active cells serves this occlusion.
 [[nodiscard]] inline bool is_whole_spread(const SmoothOcclusionOptions& occlusion) {
   return occlusion.spread == 1.0F || occlusion.spread == 2.0F;
 }

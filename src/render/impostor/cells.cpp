@@ -330,7 +330,7 @@ class SurfaceCells::Collector {
   Ranks ranks_;
   std::array<Recent, 1024> recent_{};
   tsl::robin_map<std::uint64_t, std::uint32_t, MortonHash> index_;
-  IVec3 last_at_{-1};
+  IVec3 last_at_{std::numeric_limits<int>::min()};
   std::size_t last_ = 0;  // the cell there
 };
 

@@ -7,8 +7,9 @@
 //   t          by the formula of every walk                                 0
 //   place      origin + t * direction in 65,536ths of a voxel; along the axis crossed the middle of the voxel beyond
 //
-// The ray is mirrored so that it goes forward along every axis, and its places count from the corner of its brick: 0 to
-// 15 in it, 16 to 31 in the next, along each axis. Three tables spread them into brick (of eight), half word and bit.
+// The ray is mirrored so that it goes forward along every axis, and its places count from the corner of its brick.
+// Along an axis 0 to 15 lie in it and 16 to 31 in the next; where that is mirrored -16 to -1 (in five bits 16 to 31)
+// lie in it and 0 to 15 in the next. Three tables spread them into brick (of eight), half word and bit.
 
 #pragma once
 
@@ -203,14 +204,14 @@ inline Blocked any_at_once(const TreeView& tree, const Ray& ray, double max_t, d
     const __mmask16 is_crossed = _mm512_cmpeq_epi32_mask(axis, _mm512_set1_epi32(kAxis));
     const __m512i place = _mm512_cvtps_epi32(_mm512_mask_mov_ps(along, is_crossed, beyond));
     apart = _mm512_mask_test_epi32_mask(apart, place, _mm512_set1_epi32(0xFFFF & ~(2 * kNearEdge - 1)));
-    return from_32(kShortRay.spread[kAxis], {_mm512_srli_epi32(place, 16)}).v;
+    return from_32(kShortRay.spread[kAxis], I{_mm512_srli_epi32(place, 16)}).v;
   };
   const __m512i x = spread.template operator()<0>();
   const __m512i y = spread.template operator()<1>();
   const __m512i z = spread.template operator()<2>();
   const I code = {
       _mm512_xor_si512(_mm512_ternarylogic_epi32(x, y, z, 0xFE), _mm512_set1_epi32(kShortRay.flips[own.octant]))};
-  const I brick = from_16({_mm512_castsi256_si512(bricks_of(tree, own))}, shift_right<12>(code));
+  const I brick = from_16(I{_mm512_castsi256_si512(bricks_of(tree, own))}, shift_right<12>(code));
   // As half_of; the code's highest bit is turned over already.
   const I in_run = add_saturated_bytes(shift_left<20>(code), shift_left<28>(brick));
   const I at = (brick & all(~15)) + shift_right_signed<25>(in_run);
