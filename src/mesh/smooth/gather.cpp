@@ -119,8 +119,8 @@ Windows windows_of(std::uint64_t before, std::uint64_t own, std::uint64_t after,
   if (n == kChunkEdge) {
     windows.second = own >> kPointX | after << (kChunkEdge - kPointX);
   } else {
-    QUOIN_ASSERT(n <= kChunkEdge / 2, "half a chunk's points at most");
-    windows.first = (windows.first & low_bits(kPointX + n)) | (after & low_bits(side)) << (kPointX + n);
+    const int end = kPointX + std::min(n, kChunkEdge / 2);  // n is half a chunk's at most
+    windows.first = (windows.first & low_bits(end)) | (after & low_bits(side)) << end;
     windows.second = windows.first >> kSecondWindow;
   }
   return windows;
