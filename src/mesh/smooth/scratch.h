@@ -190,7 +190,7 @@ inline constexpr int kVertexBits = 13;
 // The options with every number brought into its range.
 [[nodiscard]] SmoothOcclusionOptions within_limits(SmoothOcclusionOptions occlusion, int level);
 
-// Whether the way for many active cells serves this occlusion.
+// True if the way for many active cells serves this occlusion.
 [[nodiscard]] inline bool is_whole_spread(const SmoothOcclusionOptions& occlusion) {
   return occlusion.spread == 1.0F || occlusion.spread == 2.0F;
 }
