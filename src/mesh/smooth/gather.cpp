@@ -33,23 +33,29 @@ std::uint64_t solid_row(const DensityChunk* chunk, Half outside, ChunkCoordinate
   return chunk->solid_row(y.sample, z.sample);
 }
 
-// The signs of 64 rows of one chunk column at once, as they lie in storage.
-void copy_signs(const DensityChunk* chunk, Half outside, int z, std::uint64_t* to) {
-  if (chunk != nullptr && DensityStorage::of(*chunk) != nullptr) {
-    std::memcpy(to, DensityStorage::of(*chunk)->solid.data() + std::size_t{kChunkEdge} * static_cast<std::size_t>(z),
-                kChunkEdge * sizeof(std::uint64_t));
+// Some rows of a slice of a chunk.
+struct Rows {
+  int first = 0;
+  int count = kChunkEdge;
+};
+
+// The signs of rows of one chunk column at once, as they lie in storage.
+void copy_signs(const DensityChunk* chunk, Half outside, int z, Rows rows, std::uint64_t* to) {
+  const DensityStorage* const storage = chunk == nullptr ? nullptr : DensityStorage::of(*chunk);
+  if (storage != nullptr) {
+    std::copy_n(storage->solid.data() + kChunkEdge * z + rows.first, rows.count, to);
     return;
   }
   const Half value = chunk == nullptr ? outside : *chunk->uniform();
-  std::fill_n(to, kChunkEdge, DensityChunk::is_solid(value) ? kAllSolid : 0);
+  std::fill_n(to, rows.count, DensityChunk::is_solid(value) ? kAllSolid : 0);
 }
 
 // Rows 0 to 63 of slice z at level 0.
 void gather_inner_signs(const DensityNeighbourhood& chunks, int z, Work& work) {
   const ChunkCoordinate cz = chunk_coordinate(z, 0);
-  copy_signs(chunks.at(0, 0, cz.chunk), chunks.outside, cz.sample, work.solid[z + 1] + 1);
-  copy_signs(chunks.at(-1, 0, cz.chunk), chunks.outside, cz.sample, work.before[z + 1] + 1);
-  copy_signs(chunks.at(1, 0, cz.chunk), chunks.outside, cz.sample, work.after[z + 1] + 1);
+  copy_signs(chunks.at(0, 0, cz.chunk), chunks.outside, cz.sample, {}, work.solid[z + 1] + 1);
+  copy_signs(chunks.at(-1, 0, cz.chunk), chunks.outside, cz.sample, {}, work.before[z + 1] + 1);
+  copy_signs(chunks.at(1, 0, cz.chunk), chunks.outside, cz.sample, {}, work.after[z + 1] + 1);
   for (int y = 1; y <= kChunkEdge; ++y) work.before[z + 1][y] >>= kChunkEdge - 1;
   for (int y = 1; y <= kChunkEdge; ++y) work.after[z + 1][y] &= 1U;
 }
@@ -86,11 +92,11 @@ template <int kCount>
     std::fill_n(to, kCount, chunk == nullptr ? outside : *chunk->uniform());
     return;
   }
-  const std::uint32_t slab = storage->slabs[static_cast<std::size_t>(z.sample / 4 * 16 + y.sample / 4)];
+  const std::uint32_t slab = storage->slabs[ChunkStorage::slab_index(y.sample, z.sample)];
   if ((slab & ChunkStorage::kUniformSlab) != 0) {
     std::fill_n(to, kCount, static_cast<Half>(slab));
   } else {
-    std::memcpy(to, storage->row(slab, z.sample % 4 * 4 + y.sample % 4) + first, kCount * sizeof(Half));
+    std::memcpy(to, storage->row(slab, ChunkStorage::row_in_slab(y.sample, z.sample)) + first, kCount * sizeof(Half));
   }
 }
 
@@ -106,12 +112,6 @@ struct Windows {
   std::uint64_t second = 0;
 };
 
-// The signs of a row of points of the level in a chunk.
-std::uint64_t signs_of(const DensityChunk* chunk, Half outside, int y, int z, int level) {
-  if (chunk == nullptr) return DensityChunk::is_solid(outside) ? ~std::uint64_t{0} : 0;
-  return thinned(chunk->solid_row(y, z), level);
-}
-
 Windows windows_of(std::uint64_t before, std::uint64_t own, std::uint64_t after, int n) {
   const int side = std::min(n, kPointX);
   Windows windows;
@@ -120,27 +120,19 @@ Windows windows_of(std::uint64_t before, std::uint64_t own, std::uint64_t after,
     windows.second = own >> kPointX | after << (kChunkEdge - kPointX);
   } else {
     const int end = kPointX + std::min(n, kChunkEdge / 2);  // n is half a chunk's at most
-    windows.first = (windows.first & low_bits(end)) | (after & low_bits(side)) << end;
+    windows.first |= (after & low_bits(side)) << end;
     windows.second = windows.first >> kSecondWindow;
   }
   return windows;
 }
 
 // 96 rows of signs of one chunk column at level 0: 16 of the chunk before along y, 64, 16 of the chunk after.
-void copy_column(const DensityNeighbourhood& chunks, int dx, int z, std::uint64_t* to) {
-  constexpr std::array<int, 3> kCounts = {kPointX, kChunkEdge, kPointX};
+void copy_column(const DensityNeighbourhood& chunks, int dx, ChunkCoordinate z, std::uint64_t* to) {
+  constexpr std::array<Rows, 3> kRows = {{{kChunkEdge - kPointX, kPointX}, {}, {0, kPointX}}};
   for (int dy = -1; dy <= 1; ++dy) {
-    const int count = kCounts[static_cast<std::size_t>(dy + 1)];
-    const int first = dy < 0 ? kChunkEdge - count : 0;
-    const DensityChunk* const chunk = chunks.at(dx, dy, z >> kChunkShift);
-    const DensityStorage* const storage = chunk == nullptr ? nullptr : DensityStorage::of(*chunk);
-    if (storage != nullptr) {
-      std::copy_n(storage->solid.data() + kChunkEdge * (z & (kChunkEdge - 1)) + first, count, to);
-    } else {
-      const Half value = chunk == nullptr ? chunks.outside : *chunk->uniform();
-      std::fill_n(to, count, DensityChunk::is_solid(value) ? ~std::uint64_t{0} : 0);
-    }
-    to += count;
+    const Rows rows = kRows[static_cast<std::size_t>(dy + 1)];
+    copy_signs(chunks.at(dx, dy, z.chunk), chunks.outside, z.sample, rows, to);
+    to += rows.count;
   }
 }
 
@@ -228,9 +220,10 @@ void find_signs(Work& work, int z) {
   const DensityNeighbourhood& chunks = *work.chunks;
   std::uint64_t* const first = work.signs[z & 1][0];
   std::uint64_t* const second = work.signs[z & 1][1];
+  const ChunkCoordinate cz = chunk_coordinate(z, work.level);
   if (work.level == 0) {
     alignas(64) std::uint64_t columns[3][kReachRows];
-    for (int dx = -1; dx <= 1; ++dx) copy_column(chunks, dx, z, columns[dx + 1]);
+    for (int dx = -1; dx <= 1; ++dx) copy_column(chunks, dx, cz, columns[dx + 1]);
     for (int row = 0; row < kReachRows; ++row) {
       first[row] = columns[0][row] >> (kChunkEdge - kPointX) | columns[1][row] << kPointX;
       second[row] = columns[1][row] >> kPointX | columns[2][row] << (kChunkEdge - kPointX);
@@ -240,13 +233,10 @@ void find_signs(Work& work, int z) {
   std::fill_n(first, kReachRows, 0);
   std::fill_n(second, kReachRows, 0);
   const RowSet& rows = work.occlusion_rows[static_cast<std::size_t>(z + kWidestApron)];
-  const int edge = kChunkEdge - 1;
-  const int sample_z = z * (1 << work.level);
   rows.for_each([&](int y) {
-    const int sample_y = y * (1 << work.level);
+    const ChunkCoordinate cy = chunk_coordinate(y, work.level);
     const auto signs = [&](int dx) {
-      return signs_of(chunks.at(dx, sample_y >> kChunkShift, sample_z >> kChunkShift), chunks.outside, sample_y & edge,
-                      sample_z & edge, work.level);
+      return thinned(solid_row(chunks.at(dx, cy.chunk, cz.chunk), chunks.outside, cy, cz), work.level);
     };
     const Windows windows = windows_of(signs(-1), signs(0), signs(1), work.n);
     first[y + kPointX] = windows.first;

@@ -46,18 +46,35 @@ class SmoothKernels : public testing::TestWithParam<unsigned> {
         return oracle::grid_of(box, oracle::waves(GetParam(), 50.0));
     }
   }
+
+  // The mesh of every kernel is the oracle's.
+  void check(const DensityNeighbourhood& chunks, const SmoothOptions& options) {
+    oracle::smooth_mesh(chunks, options, expected_);
+    ASSERT_GT(expected_.indices.size(), 0U);
+    for (SmoothMesher& mesher : meshers_) {
+      mesher.mesh(chunks, options, mesh_);
+      expect_same_mesh(mesh_, expected_);
+    }
+  }
+
+ private:
+  static std::vector<SmoothMesher> meshers_of_all_sets() {
+    std::vector<SmoothMesher> meshers;
+    for (const InstructionSet set : sets_of_this_machine()) {
+      const InstructionSetOverride over(set);
+      meshers.emplace_back();
+    }
+    return meshers;
+  }
+
+  std::vector<SmoothMesher> meshers_ = meshers_of_all_sets();
+  SmoothChunkMesh expected_;
+  SmoothChunkMesh mesh_;
 };
 
 TEST_P(SmoothKernels, GiveTheOraclesBytes) {
   const DensityGrid field = grid();
   const DensityNeighbourhood chunks = field.neighbourhood(IVec3{0});
-  std::vector<SmoothMesher> meshers;
-  for (const InstructionSet set : sets_of_this_machine()) {
-    const InstructionSetOverride over(set);
-    meshers.emplace_back();
-  }
-  SmoothChunkMesh expected;
-  SmoothChunkMesh mesh;
   for (int level = 0; level <= kMaxSmoothLevel; ++level) {
     for (const SmoothBorder border : {SmoothBorder::Shared, SmoothBorder::Open}) {
       SmoothOptions options;
@@ -67,12 +84,7 @@ TEST_P(SmoothKernels, GiveTheOraclesBytes) {
       options.occlusion.method = static_cast<SmoothOcclusion>((GetParam() + static_cast<unsigned>(level)) % 4);
       options.occlusion.spread = level % 2 == 0 ? 2.0F : 0.4F;
       SCOPED_TRACE(testing::Message() << "seed " << GetParam() << ", level " << level);
-      oracle::smooth_mesh(chunks, options, expected);
-      ASSERT_GT(expected.indices.size(), 0U);
-      for (SmoothMesher& mesher : meshers) {
-        mesher.mesh(chunks, options, mesh);
-        expect_same_mesh(mesh, expected);
-      }
+      ASSERT_NO_FATAL_FAILURE(check(chunks, options));
     }
   }
 }
@@ -81,13 +93,6 @@ TEST_P(SmoothKernels, GiveTheOraclesBytes) {
 TEST_P(SmoothKernels, GiveTheOraclesOcclusionInEveryFormWithAnySpread) {
   const DensityGrid field = grid();
   const DensityNeighbourhood chunks = field.neighbourhood(IVec3{0});
-  std::vector<SmoothMesher> meshers;
-  for (const InstructionSet set : sets_of_this_machine()) {
-    const InstructionSetOverride over(set);
-    meshers.emplace_back();
-  }
-  SmoothChunkMesh expected;
-  SmoothChunkMesh mesh;
   constexpr std::array<std::pair<int, float>, 8> kCases = {
       {{0, 1.0F}, {0, 1.7F}, {0, 2.0F}, {1, 0.8F}, {1, 2.0F}, {1, 4.0F}, {2, 4.0F}, {3, 2.0F}}};
   unsigned form = GetParam();
@@ -98,11 +103,7 @@ TEST_P(SmoothKernels, GiveTheOraclesOcclusionInEveryFormWithAnySpread) {
     options.occlusion = {static_cast<SmoothOcclusion>(1 + form++ % 4), spread, 0.3F, level == 2 ? 1.5F : 2.0F};
     SCOPED_TRACE(testing::Message() << "level " << level << ", spread " << spread << ", form "
                                     << static_cast<int>(options.occlusion.method));
-    oracle::smooth_mesh(chunks, options, expected);
-    for (SmoothMesher& mesher : meshers) {
-      mesher.mesh(chunks, options, mesh);
-      expect_same_mesh(mesh, expected);
-    }
+    ASSERT_NO_FATAL_FAILURE(check(chunks, options));
   }
 }
 
