@@ -5,6 +5,8 @@
 
 #pragma once
 
+#include <bit>
+
 #include <immintrin.h>
 
 #include "core/lanes/lanes_avx2.h"
@@ -230,6 +232,27 @@ inline void split(const double* from, double corner, I& base, F& rest, F& whole)
   half::split(from, corner, base.low, rest.low, whole.low);
   half::split(from + half::kWidth, corner, base.high, rest.high, whole.high);
 }
+// Which lanes are written side by side.
+struct Packing {
+  __m256i low, high;  // for each number written the lane from which it comes
+  int low_count;
+};
+inline Packing packing_of(Mask which) {
+  const auto from = [](std::uint64_t lanes) {
+    const std::uint64_t bytes = _pdep_u64(lanes, 0x0101'0101'0101'0101U) * 0xFFU;
+    const std::uint64_t numbers = _pext_u64(0x0706'0504'0302'0100U, bytes);
+    return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<std::int64_t>(numbers)));
+  };
+  const std::uint32_t low = half::bits(which.low);
+  return {from(low), from(half::bits(which.high)), std::popcount(low)};
+}
+// Writes the lanes of a packing next to each other, and up to sixteen numbers in all.
+inline void store_packed(std::int32_t* to, const Packing& packing, I a) {
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(a.low.v, packing.low));
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + packing.low_count),
+                      _mm256_permutevar8x32_epi32(a.high.v, packing.high));
+}
+
 inline float least_of(F a) {
   const __m256 v = _mm256_min_ps(a.low.v, a.high.v);
   __m128 least = _mm_min_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));

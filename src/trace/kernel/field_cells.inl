@@ -1,0 +1,257 @@
+// Cells of a field side by side, in single precision: whether the field in them can become negative along a ray at all,
+// which few can. Those are then asked in double (trace/kernel/cell.inl), so that rounding here costs time alone.
+//
+//   x, y, z      | 0 | 1 | ... | 7 |    the cells; eight, or with AVX-512 also sixteen
+//   corners      | 0 | 1 | ... | 7 |    eight times: gathered from rows of halves, two of a row at once
+//   the cubic    | 0 | 1 | ... | 7 |    along the ray, or along a ray for each, in a stretch that is a little too long
+
+#pragma once
+
+#include <bit>
+#include <cstring>
+#include <limits>
+
+#include <immintrin.h>
+
+#include "grid/density/density_storage.h"
+#include "trace/kernel/cell.inl"
+#include "trace/kernel/kernel.h"
+
+namespace quoin::trace {
+namespace {
+
+// Vectors of that many lanes, as types that do not depend on the number (GCC 12 leaves the attribute out there).
+template <int kLanes>
+struct Vectors;
+template <>
+struct Vectors<8> {
+  using Floats = float __attribute__((vector_size(32)));
+  using Int32s = std::int32_t __attribute__((vector_size(32)));
+};
+template <>
+struct Vectors<16> {
+  using Floats = float __attribute__((vector_size(64)));
+  using Int32s = std::int32_t __attribute__((vector_size(64)));
+};
+template <int kLanes>
+using Floats = typename Vectors<kLanes>::Floats;
+template <int kLanes>
+using Int32s = typename Vectors<kLanes>::Int32s;
+using I8 = Int32s<8>;
+
+// How much longer a stretch is at each plane, in cells: more than rounding moves it along the ray, up to kReach.
+constexpr float kStretch = 1e-3F;
+// How far rounding may take a field's numbers, as a share of what the corners differ by: at the ray's start, and for
+// each cell that the ray has gone since.
+constexpr float kDoubtHere = 1e-4F;
+constexpr float kDoubtFurther = 2e-6F;
+
+inline std::uint32_t bits_of(I8 mask) {
+  return static_cast<std::uint32_t>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));
+}
+
+// Entries of a table, `kBytes` apart, in the lanes where the mask is set, else `others`.
+template <int kBytes>
+inline I8 gather_some(const void* table, I8 at, I8 mask, I8 others) {
+  return reinterpret_cast<I8>(_mm256_mask_i32gather_epi32(reinterpret_cast<__m256i>(others),
+                                                          static_cast<const int*>(table), reinterpret_cast<__m256i>(at),
+                                                          reinterpret_cast<__m256i>(mask), kBytes));
+}
+
+// Entries of a table of sixteen.
+inline I8 from_16(const std::int32_t* table, I8 at) {
+  const auto from = [&](const std::int32_t* eight) {
+    const __m256i entries = _mm256_load_si256(reinterpret_cast<const __m256i*>(eight));
+    return reinterpret_cast<I8>(_mm256_permutevar8x32_epi32(entries, reinterpret_cast<__m256i>(at)));
+  };
+  return (at & 8) != 0 ? from(table + 8) : from(table);
+}
+
+#ifdef QUOIN_KERNEL_AVX512
+constexpr int kCellsAtOnce = 16;
+
+inline std::uint32_t bits_of(Int32s<16> mask) {
+  return _mm512_movepi32_mask(reinterpret_cast<__m512i>(mask));
+}
+template <int kBytes>
+inline Int32s<16> gather_some(const void* table, Int32s<16> at, Int32s<16> mask, Int32s<16> others) {
+  return reinterpret_cast<Int32s<16>>(_mm512_mask_i32gather_epi32(reinterpret_cast<__m512i>(others),
+                                                                  static_cast<__mmask16>(bits_of(mask)),
+                                                                  reinterpret_cast<__m512i>(at), table, kBytes));
+}
+inline Int32s<16> from_16(const std::int32_t* table, Int32s<16> at) {
+  return reinterpret_cast<Int32s<16>>(
+      _mm512_permutexvar_epi32(reinterpret_cast<__m512i>(at), _mm512_load_si512(table)));
+}
+#else
+constexpr int kCellsAtOnce = 8;
+#endif
+
+template <int kLanes>
+inline Int32s<kLanes> mask_lanes(std::uint32_t bits) {
+  Int32s<kLanes> lane_bit;
+  for (int i = 0; i < kLanes; ++i) lane_bit[i] = 1 << i;
+  return ((Int32s<kLanes>{} + static_cast<int>(bits)) & lane_bit) != 0;
+}
+
+// Halves in bits 16 to 31 that are neither infinite nor NaN. As float_from_half: the product moves the exponent, and
+// makes subnormals normal.
+template <int kLanes>
+inline Floats<kLanes> floats_from_halves(Int32s<kLanes> high) {
+  using Signed = Int32s<kLanes>;
+  using Values = Floats<kLanes>;
+  const auto magnitude = reinterpret_cast<Signed>(reinterpret_cast<Values>((high & 0x7FFF'0000) >> 3) * 0x1p+112F);
+  return reinterpret_cast<Values>(magnitude | (high & std::numeric_limits<std::int32_t>::min()));
+}
+
+// The densities of samples x and x + 1 of rows of a chunk, as halves, the first in the lower bits; `x` below 63. Other
+// lanes than those of the mask keep `others`.
+template <class Places>
+inline Places pairs_of(const DensityStorage& chunk, Places x, Places y, Places z, Places mask, Places others) {
+  const Places slab = gather_some<4>(chunk.slabs.data(), (z >> 2) * 16 + (y >> 2), mask, Places{});
+  const Places is_uniform = slab < 0;
+  const Places row = (slab << 4) + (z & 3) * 4 + (y & 3);  // a uniform slab has its sign bit set, which goes
+  const Places known = is_uniform ? slab << 16 | (slab & 0xFFFF) : others;
+  return gather_some<sizeof(Half)>(chunk.values.data(), row * kChunkEdge + x, mask & ~is_uniform, known);
+}
+
+/// The chunk of a field that was asked for last.
+class LastChunk {
+ public:
+  /// Null where it is not there or uniform.
+  const DensityStorage* find(const FieldView& field, int x, int y, int z) {
+    if (!knows_ || x != at_[0] || y != at_[1] || z != at_[2]) {
+      knows_ = true;
+      at_[0] = x, at_[1] = y, at_[2] = z;
+      chunk_ = field.find(*field.grid, x, y, z);
+    }
+    return chunk_;
+  }
+
+ private:
+  bool knows_ = false;
+  int at_[3];
+  const DensityStorage* chunk_ = nullptr;
+};
+
+/// The densities of the corners of the cells at `at`, by x + 2 y + 4 z, in the lanes of `lanes`.
+template <int kLanes>
+inline void read_cells(const FieldView& field, LastChunk& last, const Int32s<kLanes> (&at)[3], std::uint32_t lanes,
+                       Floats<kLanes> (&corners)[8]) {
+  using Places = Int32s<kLanes>;
+  Places chunk[3];
+  Places cell[3];
+  Places is_within = Places{} == 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    chunk[axis] = at[axis] >> 6;
+    cell[axis] = at[axis] & 63;
+    is_within = is_within & (cell[axis] < 63);
+  }
+  std::uint32_t left = lanes & bits_of(is_within);
+  std::uint32_t apart = lanes & ~left;  // those with corners in several chunks, or in none that has a storage
+  Places pairs[4] = {};
+  // By chunk; mostly there is one.
+  while (left != 0) {
+    const int lane = std::countr_zero(left);
+    const int x = chunk[0][lane];
+    const int y = chunk[1][lane];
+    const int z = chunk[2][lane];
+    const Places here = mask_lanes<kLanes>(left) & (chunk[0] == x) & (chunk[1] == y) & (chunk[2] == z);
+    left &= ~bits_of(here);
+    const DensityStorage* const storage = last.find(field, x, y, z);
+    if (storage == nullptr) {
+      apart |= bits_of(here);
+      continue;
+    }
+    for (int row = 0; row < 4; ++row) {
+      pairs[row] = pairs_of(*storage, cell[0], cell[1] + (row & 1), cell[2] + (row >> 1), here, pairs[row]);
+    }
+  }
+  for (int row = 0; row < 4; ++row) {
+    corners[2 * row] = floats_from_halves<kLanes>(pairs[row] << 16);
+    corners[2 * row + 1] = floats_from_halves<kLanes>(pairs[row]);
+  }
+  for (; apart != 0; apart &= apart - 1) {
+    const int lane = std::countr_zero(apart);
+    float its[8];
+    field.read(*field.grid, at[0][lane], at[1][lane], at[2][lane], its);
+    for (int i = 0; i < 8; ++i) corners[i][lane] = its[i];
+  }
+}
+
+/// A ray in single precision, or several side by side, from a place near its start; by axis.
+template <class Number>
+struct NearRay {
+  Number origin[3];
+  Number direction[3];
+  Number inverse[3];  // huge where it stands still
+  Number entry[3];    // of a cell's two planes the one that it passes first, and the other, each beyond the cell
+  Number exit[3];
+  Number size;  // the direction's greatest component
+};
+
+/// The cells with these corners in which the field may become negative along the ray. `place`: the cells, from where
+/// the ray counts.
+template <int kLanes, class Number>
+inline Int32s<kLanes> may_be_negative(const NearRay<Number>& ray, const Floats<kLanes> (&corners)[8],
+                                      const Int32s<kLanes> (&place)[3]) {
+  using Values = Floats<kLanes>;
+  Values t_in = {};
+  Values t_out = Values{} + std::numeric_limits<float>::max();
+  Values start[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto lower = __builtin_convertvector(place[axis], Values);
+    start[axis] = ray.origin[axis] - lower;
+    t_in = greatest(t_in, (ray.entry[axis] - start[axis]) * ray.inverse[axis]);
+    t_out = least(t_out, (ray.exit[axis] - start[axis]) * ray.inverse[axis]);
+  }
+  const Values length = greatest(t_out - t_in, Values{});
+  Values entry[3];
+  Values way[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    entry[axis] = start[axis] + ray.direction[axis] * t_in;
+    way[axis] = ray.direction[axis] * length;
+  }
+  Values low = corners[0];
+  Values high = corners[0];
+  for (int i = 1; i < 8; ++i) low = least(low, corners[i]), high = greatest(high, corners[i]);
+  const CellCubic<Values> field = cubic_of(corners, entry, way);
+  const Values doubt = (high - low) * (t_in * ray.size * kDoubtFurther + kDoubtHere);
+  // Numbers that are none are in doubt, too.
+  return ~(least(curve_of<float>(field).low(), field.c0) > doubt);
+}
+
+/// Whether, and where, the field becomes negative along the ray in the cell that `hit` names, with its corners.
+template <bool kAsksWhere>
+inline bool meets(const CellRay& ray, FieldHit& hit) {
+  const double cell[3] = {static_cast<double>(hit.x), static_cast<double>(hit.y), static_cast<double>(hit.z)};
+  hit.t = meet_cell<kAsksWhere>(ray, cell, span_in(ray, cell), hit.corners);
+  return hit.t >= 0.0;
+}
+
+/// Cells that are to be asked in double, with what is known of them.
+template <int kLanes>
+struct Candidates {
+  std::uint32_t lanes = 0;
+  Int32s<kLanes> at[3];
+  alignas(64) float corners[8][kLanes];
+
+  void describe(int lane, FieldHit& hit) const {
+    hit.x = at[0][lane], hit.y = at[1][lane], hit.z = at[2][lane];
+    for (int i = 0; i < 8; ++i) hit.corners[i] = corners[i][lane];
+  }
+};
+
+/// Of the cells of `lanes` those that are to be asked in double. `base`: from where the ray counts, in the field.
+template <int kLanes, class Number, class Base>
+inline void screen(const FieldView& field, LastChunk& last, const NearRay<Number>& ray, const Base (&base)[3],
+                   std::uint32_t lanes, Candidates<kLanes>& cells) {
+  Floats<kLanes> corners[8];
+  read_cells<kLanes>(field, last, cells.at, lanes, corners);
+  const Int32s<kLanes> place[3] = {cells.at[0] - base[0], cells.at[1] - base[1], cells.at[2] - base[2]};
+  cells.lanes = bits_of(may_be_negative<kLanes>(ray, corners, place)) & lanes;
+  if (cells.lanes != 0) std::memcpy(cells.corners, corners, sizeof corners);
+}
+
+}  // namespace
+}  // namespace quoin::trace
