@@ -22,15 +22,17 @@
 namespace quoin::trace {
 namespace {
 
-/// A ray as cells see it, by axis.
-struct CellRay {
-  double origin[3];
-  double direction[3];
-  double inverse[3];  // huge where it stands still, so that it never leaves
-  double entry[3];    // of a cell's two planes the one that it passes first: 0 or 1
-  double exit[3];
-  double max_t;
+/// A ray as cells see it, or several side by side; by axis.
+template <class V>
+struct CellRayOf {
+  V origin[3];
+  V direction[3];
+  V inverse[3];  // huge where it stands still, so that it never leaves
+  V entry[3];    // of a cell's two planes the one that it passes first: 0 or 1
+  V exit[3];
+  V max_t;
 };
+using CellRay = CellRayOf<double>;
 
 inline CellRay cell_ray(const Ray& ray, double max_t) {
   CellRay out;
@@ -57,20 +59,22 @@ inline V greatest(V a, V b) {
 }
 
 /// The ray's stretch in a cell.
+template <class V>
 struct CellSpan {
-  double t_in;
-  double t_out;
+  V t_in;
+  V t_out;
 };
 
 /// `cell`: the least corner, by axis.
-inline CellSpan span_in(const CellRay& ray, const double (&cell)[3]) {
-  double first[3];
-  double last[3];
+template <class V>
+inline CellSpan<V> span_in(const CellRayOf<V>& ray, const V (&cell)[3]) {
+  V first[3];
+  V last[3];
   for (int axis = 0; axis < 3; ++axis) {
     first[axis] = (cell[axis] + ray.entry[axis] - ray.origin[axis]) * ray.inverse[axis];
     last[axis] = (cell[axis] + ray.exit[axis] - ray.origin[axis]) * ray.inverse[axis];
   }
-  const double t_in = greatest(greatest(first[0], first[1]), greatest(first[2], 0.0));
+  const V t_in = greatest(greatest(first[0], first[1]), greatest(first[2], V{}));
   // Rounding may have it leave before it came.
   return {t_in, greatest(least(least(last[0], last[1]), last[2]), t_in)};
 }
@@ -176,22 +180,29 @@ inline double first_negative(const CellCubic<double>& f) {
   return b3 < 0.0 ? root_between(f, low, 1.0) : -1.0;
 }
 
+/// The field of a cell along a ray, from where it comes in at `t_in` on for `length`.
+template <class V>
+inline CellCubic<V> cubic_along(const CellRayOf<V>& ray, const V (&cell)[3], V t_in, V length, const V (&corners)[8]) {
+  V entry[3];
+  V way[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const V at = ray.origin[axis] + ray.direction[axis] * t_in - cell[axis];
+    entry[axis] = least(greatest(at, V{}), V{} + 1.0);
+    way[axis] = ray.direction[axis] * length;
+  }
+  return cubic_of(corners, entry, way);
+}
+
 /// Where the ray first comes to a negative density in a cell, in t; a negative number where it does not, or only beyond
 /// its end.
 template <bool kAsksWhere>
-inline double meet_cell(const CellRay& ray, const double (&cell)[3], const CellSpan& span, const float (&corners)[8]) {
-  const double length = std::min(span.t_out, ray.max_t) - span.t_in;
+inline double meet_cell(const CellRay& ray, const double (&cell)[3], const CellSpan<double>& span,
+                        const float (&corners)[8]) {
+  const double length = least(span.t_out, ray.max_t) - span.t_in;
   if (length < 0.0) return -1.0;
   double density[8];
   std::copy_n(corners, 8, density);
-  double entry[3];
-  double way[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    const double at = ray.origin[axis] + ray.direction[axis] * span.t_in - cell[axis];
-    entry[axis] = least(greatest(at, 0.0), 1.0);
-    way[axis] = ray.direction[axis] * length;
-  }
-  const double s = first_negative<kAsksWhere>(cubic_of(density, entry, way));
+  const double s = first_negative<kAsksWhere>(cubic_along(ray, cell, span.t_in, length, density));
   return s < 0.0 ? -1.0 : span.t_in + s * length;
 }
 

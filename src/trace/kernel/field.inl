@@ -156,7 +156,8 @@ class FieldLanes {
  public:
   /// `hits`: of the packet's lanes; not written where kAsksWhere is false.
   FieldLanes(const FieldView& field, const RayPacket& rays, int first, const Lanes& lanes, FieldHit* hits)
-      : field_(field), rays_(rays), first_(first), hits_(hits) {
+      : field_(field), first_(first), hits_(hits), exact_from_(lanes_from(rays, first)) {
+    if (kAsksWhere) std::memset(&kept_, 0, sizeof kept_);
     const IVec3 origin(field.cells->origin);
     set_axis(lanes.x, 0, origin.x);
     set_axis(lanes.y, 1, origin.y);
@@ -185,8 +186,12 @@ class FieldLanes {
     return kAsksWhere ? ask(1) : mask_of(met_);
   }
 
-  /// Asks what is left of the list.
-  Mask finish() { return ask(1); }
+  /// Asks what is left of the list, and completes the hits.
+  Mask finish() {
+    const Mask met = ask(1);
+    if (kAsksWhere && met_ != 0) find_where();
+    return met;
+  }
 
  private:
   void set_axis(const Axis& axis, int index, int origin) {
@@ -246,24 +251,120 @@ class FieldLanes {
     }
     ray.size = of_lane(size_);
     screen(field_, last_, ray, base, (1U << count) - 1U, cells);
-    for (std::uint32_t left = cells.lanes; left != 0; left &= left - 1) {
-      const int i = std::countr_zero(left);
-      const int its_lane = lane_[first + i];
-      if ((met_ >> its_lane & 1U) != 0) continue;
-      FieldHit unused;
-      FieldHit& hit = kAsksWhere ? hits_[first_ + its_lane] : unused;
-      cells.describe(i, hit);
-      if (meets<kAsksWhere>(ray_of(its_lane), hit)) met_ |= 1U << its_lane;
+    if (cells.lanes != 0) meet(cells, lane);
+  }
+
+  // Asks the candidates in double.
+  void meet(const Candidates<kCellsAtOnce>& cells, Int32s<kCellsAtOnce> lane) {
+    using CellInts = Int32s<kCellsAtOnce>;
+    // Those that are to be asked come to the front.
+    const CellInts order = lane_numbers(Vectors<kCellsAtOnce>{}, cells.lanes);
+    alignas(64) std::int32_t from[kWidth] = {};
+    const auto front = [&](const auto& numbers, auto* to) {
+      std::memcpy(from, &numbers, sizeof(CellInts));
+      const CellInts first = from_16(from, order);
+      std::memcpy(to, &first, sizeof first);
+    };
+    alignas(64) std::int32_t its_lane[kCellsAtOnce];
+    alignas(64) std::int32_t at[3][kCellsAtOnce];
+    alignas(64) float corners[8][kCellsAtOnce];
+    front(lane, its_lane);
+    for (int axis = 0; axis < 3; ++axis) front(cells.at[axis], at[axis]);
+    for (int i = 0; i < 8; ++i) front(cells.corners[i], corners[i]);
+    const int count = std::popcount(cells.lanes);
+    for (int first = 0; first < count; first += int{kDoubles}) {
+      CellRayOf<Doubles> ray = rays_of(some<Ints>(its_lane + first));
+      Doubles cell[3];
+      Doubles density[8];
+      using FloatsToDoubles = float __attribute__((vector_size(kDoubles * 4)));
+      for (int axis = 0; axis < 3; ++axis) cell[axis] = __builtin_convertvector(some<Ints>(at[axis] + first), Doubles);
+      for (int i = 0; i < 8; ++i) {
+        density[i] = __builtin_convertvector(some<FloatsToDoubles>(corners[i] + first), Doubles);
+      }
+      const Meetings meetings = meet_cells<kAsksWhere>(ray, cell, density);
+      for (std::uint32_t left = bits_of(meetings.met); left != 0; left &= left - 1) {
+        const int place = std::countr_zero(left);
+        const int i = first + place;
+        if (i >= count) break;
+        const std::uint32_t bit = 1U << its_lane[i];
+        if ((met_ & bit) != 0) continue;
+        met_ |= bit;
+        if (!kAsksWhere) continue;
+        keep(meetings, place, its_lane[i]);
+        FieldHit& hit = hits_[first_ + its_lane[i]];
+        hit.x = at[0][i], hit.y = at[1][i], hit.z = at[2][i];
+        for (int corner = 0; corner < 8; ++corner) hit.corners[corner] = corners[corner][i];
+      }
     }
   }
 
-  const CellRay& ray_of(int lane) {
-    if ((exact_ready_ >> lane & 1U) == 0) {
-      exact_ready_ |= 1U << lane;
-      const int i = first_ + lane;
-      exact_[lane] = cell_ray(rays_.ray(i), rays_.max_t[static_cast<std::size_t>(i)]);
+  // What is known of a lane's hit.
+  void keep(const Meetings& from, int place, int lane) {
+    kept_.c0[lane] = from.field.c0[place];
+    kept_.c1[lane] = from.field.c1[place];
+    kept_.c2[lane] = from.field.c2[place];
+    kept_.c3[lane] = from.field.c3[place];
+    kept_.s[lane] = from.s[place];
+    kept_.t_in[lane] = from.t_in[place];
+    kept_.length[lane] = from.length[place];
+    kept_.has_root[lane] = from.has_root[place];
+  }
+
+  void find_where() {
+    constexpr int kGroups = 2;  // as many as registers hold
+    for (int first = 0; first < kWidth; first += kGroups * int{kDoubles}) {
+      CellCubic<Doubles> fields[kGroups];
+      Longs wanted[kGroups];
+      Doubles roots[kGroups];
+      for (int k = 0; k < kGroups; ++k) {
+        const int from = first + k * int{kDoubles};
+        fields[k] = {some<Doubles>(kept_.c0 + from), some<Doubles>(kept_.c1 + from), some<Doubles>(kept_.c2 + from),
+                     some<Doubles>(kept_.c3 + from)};
+        wanted[k] = some<Longs>(kept_.has_root + from);
+      }
+      const Longs has_root[kGroups] = {wanted[0], wanted[1]};
+      find_roots(fields, wanted, roots);
+      for (int k = 0; k < kGroups; ++k) {
+        const int from = first + k * int{kDoubles};
+        const Doubles s = has_root[k] ? roots[k] : some<Doubles>(kept_.s + from);
+        const Doubles t = some<Doubles>(kept_.t_in + from) + s * some<Doubles>(kept_.length + from);
+        std::memcpy(kept_.s + from, &t, sizeof t);
+      }
     }
-    return exact_[lane];
+    for (std::uint32_t left = met_; left != 0; left &= left - 1) {
+      const int lane = std::countr_zero(left);
+      hits_[first_ + lane].t = kept_.s[lane];
+    }
+  }
+
+  CellRayOf<Doubles> rays_of(Ints lanes) {
+    if (!knows_exact_) find_exact();
+    CellRayOf<Doubles> ray;
+    for (int axis = 0; axis < 3; ++axis) {
+      ray.origin[axis] = gather_doubles(exact_from_.origins[axis], lanes);
+      ray.direction[axis] = gather_doubles(exact_direction_[axis], lanes);
+      ray.inverse[axis] = gather_doubles(exact_inverse_[axis], lanes);
+      const Longs is_back = ray.direction[axis] < 0.0;
+      ray.entry[axis] = is_back ? Doubles{} + 1.0 : Doubles{};
+      ray.exit[axis] = is_back ? Doubles{} : Doubles{} + 1.0;
+    }
+    ray.max_t = gather_doubles(exact_from_.max_t, lanes);
+    return ray;
+  }
+
+  // As cell_ray of each lane.
+  void find_exact() {
+    knows_exact_ = true;
+    for (int axis = 0; axis < 3; ++axis) {
+      for (std::size_t i = 0; i < kWidth; i += kDoubles) {
+        const Doubles given = some<Doubles>(exact_from_.directions[axis] + i);
+        const Longs is_still = (given < 0x1p-100) & (given > -0x1p-100);
+        const Doubles inverse = is_still ? Doubles{} + 1e300 : 1.0 / (is_still ? Doubles{} + 1.0 : given);
+        const Doubles direction = is_still ? Doubles{} : given;
+        std::memcpy(exact_direction_[axis] + i, &direction, sizeof direction);
+        std::memcpy(exact_inverse_[axis] + i, &inverse, sizeof inverse);
+      }
+    }
   }
 
   struct NearRays {
@@ -275,7 +376,6 @@ class FieldLanes {
   };
 
   const FieldView& field_;
-  const RayPacket& rays_;
   int first_;
   FieldHit* hits_;
   int origin_[3];
@@ -289,8 +389,17 @@ class FieldLanes {
   alignas(64) std::int32_t lane_[3 * kWidth];
   alignas(64) std::int32_t at_[3][3 * kWidth];
   std::uint32_t met_ = 0;
-  std::uint32_t exact_ready_ = 0;
-  CellRay exact_[kWidth];
+  // What is known of hits, by lane; of lanes without one nothing is sought.
+  struct Kept {
+    double c0[kWidth], c1[kWidth], c2[kWidth], c3[kWidth], s[kWidth], t_in[kWidth], length[kWidth];
+    std::int64_t has_root[kWidth];
+  };
+  alignas(64) Kept kept_;
+  // In double.
+  Rays exact_from_;
+  bool knows_exact_ = false;
+  alignas(64) double exact_direction_[3][kWidth];
+  alignas(64) double exact_inverse_[3][kWidth];
 };
 
 // The lanes that come into the solid; `unfinished` are to be traced otherwise.

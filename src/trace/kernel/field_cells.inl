@@ -16,6 +16,7 @@
 #include "grid/density/density_storage.h"
 #include "trace/kernel/cell.inl"
 #include "trace/kernel/kernel.h"
+#include "trace/kernel/lockstep.inl"
 
 namespace quoin::trace {
 namespace {
@@ -79,12 +80,36 @@ inline Int32s<16> gather_some(const void* table, Int32s<16> at, Int32s<16> mask,
                                                                   static_cast<__mmask16>(bits_of(mask)),
                                                                   reinterpret_cast<__m512i>(at), table, kBytes));
 }
+// The numbers of the lanes of a mask, which come first; then any.
+inline Int32s<16> lane_numbers(Vectors<16>, std::uint32_t mask) {
+  const __m512i all = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  return reinterpret_cast<Int32s<16>>(_mm512_maskz_compress_epi32(static_cast<__mmask16>(mask), all));
+}
+inline std::uint32_t bits_of(Longs mask) {
+  return _mm512_movepi64_mask(reinterpret_cast<__m512i>(mask));
+}
+inline Doubles gather_doubles(const double* table, Ints at) {
+  return reinterpret_cast<Doubles>(_mm512_mask_i32gather_pd(_mm512_setzero_pd(), static_cast<__mmask8>(each_lane()),
+                                                            reinterpret_cast<__m256i>(at), table, sizeof(double)));
+}
 inline Int32s<16> from_16(const std::int32_t* table, Int32s<16> at) {
   return reinterpret_cast<Int32s<16>>(
       _mm512_permutexvar_epi32(reinterpret_cast<__m512i>(at), _mm512_load_si512(table)));
 }
 #else
 constexpr int kCellsAtOnce = 8;
+
+inline I8 lane_numbers(Vectors<8>, std::uint32_t mask) {
+  return reinterpret_cast<I8>(half::lane_numbers(mask));
+}
+inline std::uint32_t bits_of(Longs mask) {
+  return static_cast<std::uint32_t>(_mm256_movemask_pd(reinterpret_cast<__m256d>(mask)));
+}
+inline Doubles gather_doubles(const double* table, Ints at) {
+  const auto each = reinterpret_cast<__m256d>(Longs{} == 0);
+  return reinterpret_cast<Doubles>(
+      _mm256_mask_i32gather_pd(_mm256_setzero_pd(), table, reinterpret_cast<__m128i>(at), each, sizeof(double)));
+}
 #endif
 
 template <int kLanes>
@@ -251,6 +276,72 @@ inline void screen(const FieldView& field, LastChunk& last, const NearRay<Number
   const Int32s<kLanes> place[3] = {cells.at[0] - base[0], cells.at[1] - base[1], cells.at[2] - base[2]};
   cells.lanes = bits_of(may_be_negative<kLanes>(ray, corners, place)) & lanes;
   if (cells.lanes != 0) std::memcpy(cells.corners, corners, sizeof corners);
+}
+
+// Cells side by side in double: the same operations, in the same order, as for one (trace/kernel/cell.inl).
+
+/// What is known of rays in cells before roots are sought.
+struct Meetings {
+  Longs met;       // where the field becomes negative
+  Longs has_root;  // there where the cubic has one root, which is not known yet; elsewhere it is `s`
+  CellCubic<Doubles> field;
+  Doubles s;
+  Doubles t_in;  // as `length` of the ray's stretch in the cell
+  Doubles length;
+};
+
+/// As meet_cell, except for the root. Asked whether alone, `has_root` is false.
+template <bool kAsksWhere>
+inline Meetings meet_cells(const CellRayOf<Doubles>& ray, const Doubles (&cell)[3], const Doubles (&corners)[8]) {
+  const CellSpan<Doubles> span = span_in(ray, cell);
+  const Doubles length = least(span.t_out, ray.max_t) - span.t_in;
+  const CellCubic<Doubles> f = cubic_along(ray, cell, span.t_in, length, corners);
+  const CellCurve<Doubles> curve = curve_of<double>(f);
+  const Longs is_in = ~(length < 0.0);
+  const Longs starts_negative = is_in & (f.c0 < 0.0);
+  const Longs is_open = is_in & ~starts_negative & ~(curve.low() >= 0.0);
+  Longs is_simple = is_open & (curve.b3 < 0.0);
+  if (kAsksWhere) is_simple &= ~((curve.b1 < 0.0) & (curve.b2 >= 0.0));
+  Meetings out = {starts_negative | is_simple, kAsksWhere ? is_simple : Longs{}, f, {}, span.t_in, length};
+  // Few.
+  for (std::uint32_t left = bits_of(is_open & ~is_simple); left != 0; left &= left - 1) {
+    const int i = std::countr_zero(left);
+    out.s[i] = first_negative<kAsksWhere>(CellCubic<double>{f.c0[i], f.c1[i], f.c2[i], f.c3[i]});
+    out.met[i] = out.s[i] >= 0.0 ? -1 : 0;
+  }
+  return out;
+}
+
+/// As root_between of 0 and 1, of several at once in the lanes of `wanted`: each waits for its own divisions only.
+/// Others are any number.
+template <int kCount>
+inline void find_roots(const CellCubic<Doubles> (&f)[kCount], Longs (&wanted)[kCount], Doubles (&s)[kCount]) {
+  Doubles low[kCount];
+  Doubles high[kCount];
+  for (int k = 0; k < kCount; ++k) {
+    low[k] = Doubles{};
+    high[k] = Doubles{} + 1.0;
+    const Doubles f_low = f[k](low[k]);
+    const Doubles f_high = f[k](high[k]);
+    s[k] = low[k] + (high[k] - low[k]) * (f_low / (f_low - f_high));
+  }
+  for (int i = 0; i < 60; ++i) {
+    Longs any_wanted = {};
+    for (int k = 0; k < kCount; ++k) {
+      const Doubles value = f[k](s[k]);
+      const Longs is_beyond = value < 0.0;
+      high[k] = is_beyond ? s[k] : high[k];
+      low[k] = is_beyond ? low[k] : s[k];
+      wanted[k] &= high[k] - low[k] > 1e-15;
+      Doubles next = s[k] - value / f[k].slope(s[k]);
+      next = (next > low[k]) & (next < high[k]) ? next : 0.5 * (low[k] + high[k]);
+      const Doubles change = next - s[k];
+      s[k] = wanted[k] ? next : s[k];
+      wanted[k] &= ~((change <= 1e-13) & (change >= -1e-13));
+      any_wanted |= wanted[k];
+    }
+    if (bits_of(any_wanted) == 0) break;
+  }
 }
 
 }  // namespace

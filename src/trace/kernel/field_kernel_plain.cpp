@@ -119,7 +119,7 @@ class SurfaceWalk {
   CellRay in_cells_;
   IVec3 cell_{0};
   double at_[3] = {};  // the cell again
-  CellSpan span_{};
+  CellSpan<double> span_{};
 };
 
 }  // namespace

@@ -56,6 +56,13 @@ inline F just_below(F a) {
   return {_mm256_blendv_ps(_mm256_set1_ps(-1e-30F), less, is_positive)};
 }
 
+// The numbers of the lanes of a mask, which come first; then any.
+inline __m256i lane_numbers(std::uint32_t mask) {
+  const std::uint64_t bytes = _pdep_u64(mask, 0x0101'0101'0101'0101U) * 0xFFU;
+  const std::uint64_t numbers = _pext_u64(0x0706'0504'0302'0100U, bytes);
+  return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<std::int64_t>(numbers)));
+}
+
 // The codes of 4^3 bricks; those outside the table are empty.
 class BrickWindow {
  public:
@@ -238,13 +245,8 @@ struct Packing {
   int low_count;
 };
 inline Packing packing_of(Mask which) {
-  const auto from = [](std::uint64_t lanes) {
-    const std::uint64_t bytes = _pdep_u64(lanes, 0x0101'0101'0101'0101U) * 0xFFU;
-    const std::uint64_t numbers = _pext_u64(0x0706'0504'0302'0100U, bytes);
-    return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<std::int64_t>(numbers)));
-  };
   const std::uint32_t low = half::bits(which.low);
-  return {from(low), from(half::bits(which.high)), std::popcount(low)};
+  return {half::lane_numbers(low), half::lane_numbers(half::bits(which.high)), std::popcount(low)};
 }
 // Writes the lanes of a packing next to each other, and up to sixteen numbers in all.
 inline void store_packed(std::int32_t* to, const Packing& packing, I a) {
