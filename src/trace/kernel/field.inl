@@ -17,6 +17,7 @@
 #include "trace/kernel/kernel.h"
 #include "trace/kernel/lockstep.inl"
 #include "trace/kernel/single.inl"
+#include "trace/kernel/window.inl"
 
 namespace quoin::trace {
 namespace {
@@ -50,7 +51,7 @@ class CellGroup {
  public:
   /// `base`: from where the walk counts, in the field.
   CellGroup(const FieldView& field, const Ray& ray, double max_t, const PathRay& path, I4 base)
-      : field_(field), ray_(cell_ray(ray, max_t)), near_(near_ray(path, ray, base)) {
+      : field_(field), ray_(ray), max_t_(max_t), near_(near_ray(path, ray, base)) {
     for (int axis = 0; axis < 3; ++axis) backward_[axis] = path.backward[axis], base_[axis] = base[axis];
   }
 
@@ -85,25 +86,28 @@ class CellGroup {
     Candidates<kGroup> cells;
     for (int axis = 0; axis < 3; ++axis) {
       const I8 in_word = ((code >> 2 * axis & 3) ^ backward_[axis]) - backward_[axis];
-      cells.at[axis] = from_16(words_[axis], code >> 6) + in_word;
+      cells.at[axis] = from_8(words_[axis], code >> 6) + in_word;
     }
-    screen(field_, last_, near_, base_, (1U << count) - 1U, cells);
+    screen(field_, last_, near_, base_, count, cells);
+    if (cells.lanes == 0) return false;
+    const CellRay ray = cell_ray(ray_, max_t_);
     for (std::uint32_t left = cells.lanes; left != 0; left &= left - 1) {
       cells.describe(std::countr_zero(left), hit);
-      if (meets<kAsksWhere>(ray_, hit)) return true;
+      if (meets<kAsksWhere>(ray, hit)) return true;
     }
     return false;
   }
 
   const FieldView& field_;
-  CellRay ray_;
+  const Ray& ray_;
+  double max_t_;
   NearRay<float> near_;
   LastChunk last_;
   std::int32_t backward_[3];
   std::int32_t base_[3];
   int count_ = 0;
   int word_count_ = 0;
-  alignas(64) std::int32_t words_[3][16];            // where words begin, by axis; those of the group alone
+  alignas(32) std::int32_t words_[3][kGroup];        // where words begin, by axis
   alignas(32) std::int32_t codes_[64 + 2 * kGroup];  // cells: which word, six bits of which of its cells
 };
 
@@ -171,11 +175,12 @@ class FieldLanes {
   /// Takes the lanes of `walking` through the cells of a word, which begin at `word`; returns all lanes that are known
   /// to have come into the solid.
   Mask walk(const Lanes& lanes, const VoxelSteps& steps, const Cells& word, VoxelWalk& voxels, Mask walking) {
+    const I origin[3] = {all(origin_[0]), all(origin_[1]), all(origin_[2])};
     while (any(walking)) {
       const I half = select(test(voxels.code, all(32)), voxels.high_half, voxels.low_half);
       const Mask touching = test_bit(half, voxels.code) & walking;
       if (any(touching)) {
-        add(touching, voxels_at(word, voxels.code));
+        add(touching, voxels_at(word, voxels.code), origin);
         if (count_ >= kCellsAtOnce) walking = walking & ~ask(kCellsAtOnce);
       }
       Crossing crossing;
@@ -184,6 +189,16 @@ class FieldLanes {
       walking = walking & ~test(voxels.code, all(kLeft));
     }
     return kAsksWhere ? ask(1) : mask_of(met_);
+  }
+
+  /// The same of short rays, to their ends: in the window that begins at `window`.
+  void walk_short(const TreeView& tree, const IVec3& window, ShortRays& rays) {
+    const I origin[3] = {all(origin_[0] + window.x), all(origin_[1] + window.y), all(origin_[2] + window.z)};
+    walk_window(tree, window, rays, [&](Mask met, Mask) {
+      if (!any(met)) return mask_of(0);
+      add(met, {gathered<0>(rays.code), gathered<1>(rays.code), gathered<2>(rays.code)}, origin);
+      return count_ >= kCellsAtOnce ? ask(kCellsAtOnce) : mask_of(0);
+    });
   }
 
   /// Asks what is left of the list, and completes the hits.
@@ -205,12 +220,12 @@ class FieldLanes {
     store(rays_near_.exit[index], select(is_back, all(-kStretch), all(1.0F + kStretch)));
   }
 
-  void add(Mask which, const Cells& cells) {
+  void add(Mask which, const Cells& cells, const I (&origin)[3]) {
     const Packing packing = packing_of(which);
     store_packed(lane_ + count_, packing, lane_numbers_);
-    store_packed(at_[0] + count_, packing, cells.x + all(origin_[0]));
-    store_packed(at_[1] + count_, packing, cells.y + all(origin_[1]));
-    store_packed(at_[2] + count_, packing, cells.z + all(origin_[2]));
+    store_packed(at_[0] + count_, packing, cells.x + origin[0]);
+    store_packed(at_[1] + count_, packing, cells.y + origin[1]);
+    store_packed(at_[2] + count_, packing, cells.z + origin[2]);
     count_ += std::popcount(bits(which));
   }
 
@@ -250,7 +265,7 @@ class FieldLanes {
       ray.exit[axis] = of_lane(rays_near_.exit[axis]);
     }
     ray.size = of_lane(size_);
-    screen(field_, last_, ray, base, (1U << count) - 1U, cells);
+    screen(field_, last_, ray, base, count, cells);
     if (cells.lanes != 0) meet(cells, lane);
   }
 
@@ -410,7 +425,17 @@ inline std::uint32_t packet_in_field(const FieldView& field, const RayPacket& ra
   std::uint32_t hit = 0;
   unfinished = 0;
   for (int first = 0; first < RayPacket::kSize; first += kWidth) {
-    const std::uint32_t wanted = rays.active >> first & kAllLanes;
+    std::uint32_t wanted = rays.active >> first & kAllLanes;
+    if (!kAsksWhere) {
+      std::uint32_t doubtful = 0;
+      wanted = trace_short(tree, rays, first, wanted, [&](const IVec3& window, ShortRays& in_window) {
+        FieldLanes<kAsksWhere> cells(field, rays, first, in_window.lanes, hits);
+        cells.walk_short(tree, window, in_window);
+        hit |= bits(cells.finish()) << first;
+        doubtful |= bits(in_window.doubtful);
+      });
+      wanted |= doubtful;
+    }
     if (wanted == 0) continue;
     F t;
     Crossing entered;
@@ -429,13 +454,21 @@ inline std::uint32_t packet_in_field(const FieldView& field, const RayPacket& ra
   return hit;
 }
 
+template <bool kAsksWhere>
+inline std::uint32_t any_packet_in_field(const FieldView& field, const RayPacket& rays, FieldHit* hits,
+                                         std::uint32_t& unfinished) {
+  fetch_next(rays);
+  if (!is_full(rays)) return packet_in_field<kAsksWhere>(field, fill_inactive(rays), hits, unfinished);
+  return packet_in_field<kAsksWhere>(field, rays, hits, unfinished);
+}
+
 inline std::uint32_t first_hits_in_field(const FieldView& field, const RayPacket& rays, FieldHit* hits,
                                          std::uint32_t& unfinished) {
-  return packet_in_field<true>(field, rays, hits, unfinished);
+  return any_packet_in_field<true>(field, rays, hits, unfinished);
 }
 
 inline std::uint32_t any_hits_in_field(const FieldView& field, const RayPacket& rays, std::uint32_t& unfinished) {
-  return packet_in_field<false>(field, rays, nullptr, unfinished);
+  return any_packet_in_field<false>(field, rays, nullptr, unfinished);
 }
 
 }  // namespace

@@ -59,13 +59,23 @@ inline I8 gather_some(const void* table, I8 at, I8 mask, I8 others) {
                                                           reinterpret_cast<__m256i>(mask), kBytes));
 }
 
-// Entries of a table of sixteen.
+// A mask of the first `count` lanes.
+inline I8 first_lanes(Vectors<8>, int count) {
+  return I8{0, 1, 2, 3, 4, 5, 6, 7} < count;
+}
+
+// One lane's number in all lanes.
+inline I8 of_lane(I8 numbers, int lane) {
+  return reinterpret_cast<I8>(_mm256_permutevar8x32_epi32(reinterpret_cast<__m256i>(numbers), _mm256_set1_epi32(lane)));
+}
+
+// Entries of a table of eight, and of sixteen.
+inline I8 from_8(const std::int32_t* table, I8 at) {
+  const __m256i entries = _mm256_load_si256(reinterpret_cast<const __m256i*>(table));
+  return reinterpret_cast<I8>(_mm256_permutevar8x32_epi32(entries, reinterpret_cast<__m256i>(at)));
+}
 inline I8 from_16(const std::int32_t* table, I8 at) {
-  const auto from = [&](const std::int32_t* eight) {
-    const __m256i entries = _mm256_load_si256(reinterpret_cast<const __m256i*>(eight));
-    return reinterpret_cast<I8>(_mm256_permutevar8x32_epi32(entries, reinterpret_cast<__m256i>(at)));
-  };
-  return (at & 8) != 0 ? from(table + 8) : from(table);
+  return (at & 8) != 0 ? from_8(table + 8, at) : from_8(table, at);
 }
 
 #ifdef QUOIN_KERNEL_AVX512
@@ -79,6 +89,13 @@ inline Int32s<16> gather_some(const void* table, Int32s<16> at, Int32s<16> mask,
   return reinterpret_cast<Int32s<16>>(_mm512_mask_i32gather_epi32(reinterpret_cast<__m512i>(others),
                                                                   static_cast<__mmask16>(bits_of(mask)),
                                                                   reinterpret_cast<__m512i>(at), table, kBytes));
+}
+inline Int32s<16> first_lanes(Vectors<16>, int count) {
+  return Int32s<16>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15} < count;
+}
+inline Int32s<16> of_lane(Int32s<16> numbers, int lane) {
+  return reinterpret_cast<Int32s<16>>(
+      _mm512_permutexvar_epi32(_mm512_set1_epi32(lane), reinterpret_cast<__m512i>(numbers)));
 }
 // The numbers of the lanes of a mask, which come first; then any.
 inline Int32s<16> lane_numbers(Vectors<16>, std::uint32_t mask) {
@@ -112,13 +129,6 @@ inline Doubles gather_doubles(const double* table, Ints at) {
 }
 #endif
 
-template <int kLanes>
-inline Int32s<kLanes> mask_lanes(std::uint32_t bits) {
-  Int32s<kLanes> lane_bit;
-  for (int i = 0; i < kLanes; ++i) lane_bit[i] = 1 << i;
-  return ((Int32s<kLanes>{} + static_cast<int>(bits)) & lane_bit) != 0;
-}
-
 // Halves in bits 16 to 31 that are neither infinite nor NaN. As float_from_half: the product moves the exponent, and
 // makes subnormals normal.
 template <int kLanes>
@@ -145,8 +155,7 @@ class LastChunk {
  public:
   /// Null where it is not there or uniform.
   const DensityStorage* find(const FieldView& field, int x, int y, int z) {
-    if (!knows_ || x != at_[0] || y != at_[1] || z != at_[2]) {
-      knows_ = true;
+    if (x != at_[0] || y != at_[1] || z != at_[2]) {
       at_[0] = x, at_[1] = y, at_[2] = z;
       chunk_ = field.find(*field.grid, x, y, z);
     }
@@ -154,54 +163,58 @@ class LastChunk {
   }
 
  private:
-  bool knows_ = false;
-  int at_[3];
+  int at_[3] = {std::numeric_limits<int>::min(), 0, 0};  // no chunk is there
   const DensityStorage* chunk_ = nullptr;
 };
 
-/// The densities of the corners of the cells at `at`, by x + 2 y + 4 z, in the lanes of `lanes`.
+/// The densities of the corners of the cells at `at`, by x + 2 y + 4 z, in the lanes of `wanted`, of which the first is
+/// one.
 template <int kLanes>
-inline void read_cells(const FieldView& field, LastChunk& last, const Int32s<kLanes> (&at)[3], std::uint32_t lanes,
-                       Floats<kLanes> (&corners)[8]) {
+[[gnu::always_inline]] inline void read_cells(const FieldView& field, LastChunk& last, const Int32s<kLanes> (&at)[3],
+                                              Int32s<kLanes> wanted, Floats<kLanes> (&corners)[8]) {
   using Places = Int32s<kLanes>;
   Places chunk[3];
   Places cell[3];
-  Places is_within = Places{} == 0;
+  Places is_within = wanted;
   for (int axis = 0; axis < 3; ++axis) {
     chunk[axis] = at[axis] >> 6;
     cell[axis] = at[axis] & 63;
-    is_within = is_within & (cell[axis] < 63);
+    is_within &= cell[axis] < 63;
   }
-  std::uint32_t left = lanes & bits_of(is_within);
-  std::uint32_t apart = lanes & ~left;  // those with corners in several chunks, or in none that has a storage
+  std::uint32_t left = bits_of(is_within);
+  std::uint32_t apart = bits_of(wanted) & ~left;  // those with corners in several chunks, or in none with a storage
   Places pairs[4] = {};
-  // By chunk; mostly there is one.
-  while (left != 0) {
-    const int lane = std::countr_zero(left);
-    const int x = chunk[0][lane];
-    const int y = chunk[1][lane];
-    const int z = chunk[2][lane];
-    const Places here = mask_lanes<kLanes>(left) & (chunk[0] == x) & (chunk[1] == y) & (chunk[2] == z);
-    left &= ~bits_of(here);
-    const DensityStorage* const storage = last.find(field, x, y, z);
+  const auto read_chunk_of = [&](int lane) {
+    Places here = is_within;
+    for (const Places& at_axis : chunk) here &= at_axis == of_lane(at_axis, lane);
+    const std::uint32_t those = bits_of(here);
+    left &= ~those;
+    const DensityStorage* const storage = last.find(field, chunk[0][lane], chunk[1][lane], chunk[2][lane]);
     if (storage == nullptr) {
-      apart |= bits_of(here);
-      continue;
+      apart |= those;
+      return;
     }
     for (int row = 0; row < 4; ++row) {
       pairs[row] = pairs_of(*storage, cell[0], cell[1] + (row & 1), cell[2] + (row >> 1), here, pairs[row]);
     }
-  }
+  };
+  read_chunk_of(0);
+  // Mostly there is one.
+  while (left != 0) read_chunk_of(std::countr_zero(left));
   for (int row = 0; row < 4; ++row) {
     corners[2 * row] = floats_from_halves<kLanes>(pairs[row] << 16);
     corners[2 * row + 1] = floats_from_halves<kLanes>(pairs[row]);
   }
+  if (apart == 0) return;
+  alignas(64) float numbers[8][kLanes];  // of their own, so that the others stay in registers
+  std::memcpy(numbers, corners, sizeof numbers);
   for (; apart != 0; apart &= apart - 1) {
     const int lane = std::countr_zero(apart);
     float its[8];
     field.read(*field.grid, at[0][lane], at[1][lane], at[2][lane], its);
-    for (int i = 0; i < 8; ++i) corners[i][lane] = its[i];
+    for (int i = 0; i < 8; ++i) numbers[i][lane] = its[i];
   }
+  std::memcpy(corners, numbers, sizeof numbers);
 }
 
 /// A ray in single precision, or several side by side, from a place near its start; by axis.
@@ -267,14 +280,15 @@ struct Candidates {
   }
 };
 
-/// Of the cells of `lanes` those that are to be asked in double. `base`: from where the ray counts, in the field.
+/// Of the first `count` cells those that are to be asked in double. `base`: from where the ray counts, in the field.
 template <int kLanes, class Number, class Base>
-inline void screen(const FieldView& field, LastChunk& last, const NearRay<Number>& ray, const Base (&base)[3],
-                   std::uint32_t lanes, Candidates<kLanes>& cells) {
+[[gnu::always_inline]] inline void screen(const FieldView& field, LastChunk& last, const NearRay<Number>& ray,
+                                          const Base (&base)[3], int count, Candidates<kLanes>& cells) {
+  const Int32s<kLanes> wanted = first_lanes(Vectors<kLanes>{}, count);
   Floats<kLanes> corners[8];
-  read_cells<kLanes>(field, last, cells.at, lanes, corners);
+  read_cells<kLanes>(field, last, cells.at, wanted, corners);
   const Int32s<kLanes> place[3] = {cells.at[0] - base[0], cells.at[1] - base[1], cells.at[2] - base[2]};
-  cells.lanes = bits_of(may_be_negative<kLanes>(ray, corners, place)) & lanes;
+  cells.lanes = bits_of(may_be_negative<kLanes>(ray, corners, place) & wanted);
   if (cells.lanes != 0) std::memcpy(cells.corners, corners, sizeof corners);
 }
 

@@ -1,17 +1,11 @@
-// What packets of rays come to: the walks' voxels and faces, and their distances in double precision; and whether short
-// rays that start near each other are blocked: occlusion rays. These all lie in a window of 4^3 bricks, whose indices
-// are kept beside the lanes, and walk from voxel to voxel without cells in between.
-//
-//   a place in the window     bit | 17 16 | 15 14 | 13 12 | 11 10 | 9 8 | 7 6 | 5 4 | 3 2 | 1 0 |
-//                                 |   z       y       x   |   z     y     x   |  z     y     x  |
-//                                 | brick                 | cell of the brick | voxel of the cell |
-//
-// The upper six bits are the brick, the next seven the half word in it, and the lowest five the bit.
+// What packets of rays come to: the walks' voxels and faces, and their distances in double precision; and whether rays
+// are blocked, of which short ones that start near each other walk in windows (trace/kernel/window.inl).
 
 #pragma once
 
 #include "trace/kernel/lockstep.inl"
 #include "trace/kernel/single.inl"
+#include "trace/kernel/window.inl"
 
 namespace quoin::trace {
 namespace {
@@ -374,196 +368,10 @@ inline void trace_first_lanes(const TreeView& tree, const RayPacket& rays, Packe
   }
 }
 
-// Copies a packet, with an ordinary ray in its inactive lanes: numbers there may be subnormal, which is slow.
-inline RayPacket fill_inactive(const RayPacket& rays) {
-  RayPacket filled;
-  filled.active = rays.active;
-  const auto fill = [&](const RayPacket::Lanes<double>& from, double other, RayPacket::Lanes<double>& to) {
-    for (std::size_t first = 0; first < RayPacket::kSize; first += kDoubles) {
-      const Longs is_active = (lane_bits() & static_cast<std::int64_t>(rays.active >> first)) != 0;
-      const Doubles numbers = is_active ? some<Doubles>(from.data() + first) : Doubles{} + other;
-      std::memcpy(to.data() + first, &numbers, sizeof numbers);
-    }
-  };
-  fill(rays.origin_x, 0.0, filled.origin_x);
-  fill(rays.origin_y, 0.0, filled.origin_y);
-  fill(rays.origin_z, 0.0, filled.origin_z);
-  fill(rays.direction_x, 1.0, filled.direction_x);
-  fill(rays.direction_y, 1.0, filled.direction_y);
-  fill(rays.direction_z, 1.0, filled.direction_z);
-  fill(rays.max_t, 0.0, filled.max_t);
-  return filled;
-}
-
-// Asks for the packet that follows in memory, if one does: reading it takes a fifth of its time otherwise.
-inline void fetch_next(const RayPacket& rays) {
-  const auto* const next = reinterpret_cast<const char*>(&rays) + sizeof rays;
-  for (std::size_t i = 0; i < sizeof rays; i += 64) __builtin_prefetch(next + i);
-}
-
-inline bool is_full(const RayPacket& rays) {
-  constexpr std::uint32_t kAll = (1U << RayPacket::kSize) - 1;
-  return (rays.active & kAll) == kAll;
-}
-
 inline void trace_first(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished) {
   fetch_next(rays);
   if (!is_full(rays)) return trace_first_lanes(tree, fill_inactive(rays), hits, unfinished);
   trace_first_lanes(tree, rays, hits, unfinished);
-}
-
-// A place in a window: bits of x, y, z within a cell, then of z above x and y above z, as bricks are stored, then of x,
-// y, z which brick.
-constexpr int kAxisBits[3] = {3 | 3 << 6 | 3 << 12, 3 << 2 | 3 << 10 | 3 << 14, 3 << 4 | 3 << 8 | 3 << 16};
-constexpr int kWindow = 64;
-// In voxels, along any axis; what goes further mostly leaves the window.
-constexpr float kShortReach = 22.0F;
-// A component of a direction that is smaller than the greatest by more than this leaves its axis out of what is said of
-// the others.
-constexpr float kShortRatio = 2048.0F;
-
-template <int kAxis>
-inline I spread(I coordinate) {
-  constexpr int kInCell = 2 * kAxis;
-  constexpr int kCell = kAxis == 0 ? 4 : kAxis == 1 ? 8 : 6;
-  return shift_left<kInCell>(coordinate & all(3)) + shift_left<kCell>(coordinate & all(12)) +
-         shift_left<8 + kInCell>(coordinate & all(48));
-}
-
-// How one axis steps through spread numbers.
-struct SpreadStep {
-  I fill;
-  I add;
-};
-
-template <int kAxis>
-inline SpreadStep spread_step(const Axis& axis) {
-  constexpr int kOne = 1 << (2 * kAxis);
-  return {select(axis.forward, all(~kAxisBits[kAxis]), all(0)), select(axis.forward, all(kOne), all(-kOne))};
-}
-
-// Rays where they start, in a window.
-struct ShortRays {
-  Lanes lanes;
-  Planes planes;  // that they cross next
-  I code;         // the place
-  F max_t;
-  F doubt;        // how much later or earlier they may cross any plane
-  Mask doubtful;  // may cross a plane of an axis of which no more than this can be said
-};
-
-// Returns the begin of a window along an axis for rays that start near `position`. It may lie outside the table.
-inline int place_window(double position) {
-  return (static_cast<int>(position) - 24) & ~15;
-}
-
-// Sets up one axis; returns the lanes that stay within the window along it.
-template <int kAxis>
-inline Mask start_in_window(ShortRays& rays, Axis& axis, F& plane, const double* position, double corner, F direction,
-                            int origin) {
-  F whole;
-  axis = make_axis(position, corner, direction, whole);
-  plane = select(axis.still, all(kNever), add_if(axis.forward, whole, all(1.0F)));
-  const I at = to_int(whole) + axis.base - all(origin);
-  rays.code = rays.code + spread<kAxis>(at);
-  const F reach = abs(axis.direction) * rays.max_t;
-  const I margin = to_int(reach) + all(2);
-  const I from = at - margin;
-  // Starts too far away for whole numbers come out as any, but not as these; NaN and infinity are no numbers.
-  const Mask is_near = equals(at & all(~(kWindow - 1)), 0) & (whole <= all(kChunkSize));
-  return is_near & (reach <= all(kShortReach)) & (all(-1) < from) & (from + margin + margin < all(kWindow));
-}
-
-// What a ray's crossings of one axis leave in doubt.
-inline void doubt_axis(const Axis& axis, F plane, F greatest, ShortRays& rays) {
-  const F doubt = select(axis.still, all(0.0F), all(kDoubt) * abs(axis.inverse));
-  const Mask is_tiny = all(kDoubt * kShortRatio) < doubt * greatest;
-  rays.doubt = max(rays.doubt, select(is_tiny, all(0.0F), doubt));
-  rays.doubtful = rays.doubtful | (is_tiny & (crossing_t(axis, plane) <= rays.max_t + doubt));
-}
-
-// Returns the rays that stay within the window; others have to go another way.
-inline std::uint32_t set_up_short(const TreeView& tree, const Rays& rays, Mask wanted, const IVec3& origin,
-                                  ShortRays& out) {
-  const F dx = narrow(rays.directions[0]);
-  const F dy = narrow(rays.directions[1]);
-  const F dz = narrow(rays.directions[2]);
-  const F greatest = max(max(abs(dx), abs(dy)), abs(dz));
-  Lanes& lanes = out.lanes;
-  out.max_t = narrow(rays.max_t);
-  out.code = all(0);
-  // A limit just below zero may have become one.
-  const Mask is_negative = test(as_int(out.max_t), all(std::numeric_limits<std::int32_t>::min()));
-  const Mask usual = ~is_negative & (all(0.0F) <= out.max_t) & (all(0x1p-20F) <= greatest) & (greatest <= all(0x1p20F));
-  const Mask fits = start_in_window<0>(out, lanes.x, out.planes.x, rays.origins[0], tree.origin.x, dx, origin.x) &
-                    start_in_window<1>(out, lanes.y, out.planes.y, rays.origins[1], tree.origin.y, dy, origin.y) &
-                    start_in_window<2>(out, lanes.z, out.planes.z, rays.origins[2], tree.origin.z, dz, origin.z);
-  const Mask here = wanted & usual & fits;
-  out.doubt = all(0.0F);
-  out.doubtful = mask_of(0);
-  doubt_axis(lanes.x, out.planes.x, greatest, out);
-  doubt_axis(lanes.y, out.planes.y, greatest, out);
-  doubt_axis(lanes.z, out.planes.z, greatest, out);
-  lanes.live = here & ~out.doubtful;
-  out.doubtful = out.doubtful & here;
-  return bits(here);
-}
-
-// Returns the lanes that met a voxel; `doubtful` has those of which only double precision can tell.
-inline Mask walk_short(const TreeView& tree, const IVec3& origin, ShortRays& rays) {
-  const BrickWindow window(tree, origin);
-  const Lanes& lanes = rays.lanes;
-  const SpreadStep sx = spread_step<0>(lanes.x);
-  const SpreadStep sy = spread_step<1>(lanes.y);
-  const SpreadStep sz = spread_step<2>(lanes.z);
-  const Planes one = steps_of(lanes, 1.0F);
-  const F sure_t = rays.max_t - rays.doubt;
-  const F last_t = rays.max_t + rays.doubt;
-  Mask walking = lanes.live;
-  Mask hit = mask_of(0);
-  Mask unsure = mask_of(0);
-  for (;;) {
-    const I half = half_of(window.brick(shift_right<12>(rays.code)), shift_left<20>(rays.code));
-    const Mask met = walking & test_bit(gather(tree.words, half), rays.code);
-    hit = hit | met;
-    rays.doubtful = rays.doubtful | (met & unsure);
-    walking = walking & ~met;
-    Crossing crossing;
-    const F now = first_of(crossings(lanes, rays.planes), crossing);
-    step_over(crossing, one, rays.planes);
-    const I bits_of_axis = crossed(crossing, all(kAxisBits[0]), all(kAxisBits[1]), all(kAxisBits[2]));
-    const I filled = (rays.code & bits_of_axis) | crossed(crossing, sx.fill, sy.fill, sz.fill);
-    const I moved = filled + crossed(crossing, sx.add, sy.add, sz.add);
-    rays.code = merge(bits_of_axis, moved, rays.code);
-    unsure = sure_t <= now;
-    walking = walking & (now <= last_t);
-    if (!any(walking)) return hit;
-  }
-}
-
-// Traces short rays, window by window, and returns those that are left.
-inline std::uint32_t trace_short(const TreeView& tree, const RayPacket& packet, int first, std::uint32_t wanted,
-                                 std::uint32_t& blocked, std::uint32_t& doubtful) {
-  constexpr int kMostWindows = 3;
-  for (int i = 0; i < kMostWindows && wanted != 0; ++i) {
-    const auto lane = static_cast<std::size_t>(first + std::countr_zero(wanted));
-    const Ray ray = packet.ray(static_cast<int>(lane));
-    const DVec3 reach = glm::abs(ray.direction) * packet.max_t[lane];
-    if (!(std::max(std::max(reach.x, reach.y), reach.z) <= kShortReach)) return wanted;
-    const DVec3 start = ray.origin - tree.origin;
-    const IVec3 size = tree.brick_sizes * 16;
-    const auto is_in = [](double at, int end) { return at >= 0.0 && at < end; };
-    if (!(is_in(start.x, size.x) && is_in(start.y, size.y) && is_in(start.z, size.z))) return wanted;
-    const IVec3 origin{place_window(start.x), place_window(start.y), place_window(start.z)};
-    ShortRays rays;
-    const std::uint32_t here = set_up_short(tree, lanes_from(packet, first), mask_of(wanted), origin, rays);
-    // Rays that have little in common gain nothing by windows.
-    if (2 * std::popcount(here) < std::popcount(wanted)) return wanted;
-    blocked |= bits(walk_short(tree, origin, rays)) << first;
-    doubtful |= bits(rays.doubtful) << first;
-    wanted &= ~here;
-  }
-  return wanted;
 }
 
 // Which rays are blocked: short ones in a window, others as they are.
@@ -572,7 +380,11 @@ inline std::uint32_t trace_any_lanes(const TreeView& tree, const RayPacket& rays
   std::uint32_t blocked = 0;
   std::uint32_t doubtful = 0;
   for (int first = 0; first < RayPacket::kSize; first += kWidth) {
-    const std::uint32_t wanted = trace_short(tree, rays, first, rays.active >> first & kAllLanes, blocked, doubtful);
+    const std::uint32_t active = rays.active >> first & kAllLanes;
+    const std::uint32_t wanted = trace_short(tree, rays, first, active, [&](const IVec3& origin, ShortRays& in_window) {
+      blocked |= bits(walk_short(tree, origin, in_window)) << first;
+      doubtful |= bits(in_window.doubtful) << first;
+    });
     if (wanted == 0) continue;
     F t;
     Crossing entered;
