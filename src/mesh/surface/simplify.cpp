@@ -174,6 +174,42 @@ void keep_around(const SmoothMesh& mesh, const std::vector<std::uint32_t>& place
   }
 }
 
+/// Returns the vertices on a border: an edge there has a triangle on one side only, by vertex.
+///
+/// A closed fan leads to each neighbour as often as from it, so that the sum over both is 0. It is not 0 for one open
+/// fan; for several open fans of one vertex it is by chance, once in 2^32.
+std::vector<bool> vertices_on_border(const SmoothMesh& mesh) {
+  std::vector<std::uint32_t> balance(mesh.positions.size());
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    const std::uint32_t* at = mesh.indices.data() + i;
+    const std::array<std::uint32_t, 3> mixed = {mix_bits(at[0]), mix_bits(at[1]), mix_bits(at[2])};
+    for (std::size_t k = 0; k < 3; ++k) balance[at[k]] += mixed[(k + 1) % 3] - mixed[(k + 2) % 3];
+  }
+  std::vector<bool> is_on_border(balance.size());
+  for (std::size_t i = 0; i < balance.size(); ++i) is_on_border[i] = balance[i] != 0;
+  return is_on_border;
+}
+
+/// Merges the corners of each vertex of the simpler triangles into one. So a closed mesh stays closed by vertex, not by
+/// position alone. Corners differ where a zero-length edge had triangles, which are gone, and where surfaces touch.
+/// Corners on a border of the mesh keep apart: lines between colours are borders.
+void merge_corners(const SmoothMesh& mesh, Triangulation& simple) {
+  std::vector<std::uint32_t> first(simple.positions.size(), ~0U);
+  const auto joined = [&](std::size_t i) -> std::uint32_t {
+    std::uint32_t& corner = first[simple.indices[i]];
+    if (corner == ~0U) corner = simple.corners[i];
+    return corner;
+  };
+  std::size_t i = 0;
+  while (i < simple.corners.size() && joined(i) == simple.corners[i]) ++i;
+  if (i == simple.corners.size()) return;
+  const std::vector<bool> stays_apart = vertices_on_border(mesh);
+  std::ranges::fill(first, ~0U);
+  for (i = 0; i < simple.corners.size(); ++i) {
+    if (!stays_apart[simple.corners[i]]) simple.corners[i] = joined(i);
+  }
+}
+
 /// Puts simpler triangles in place of the mesh's: a vertex for each corner and place that is in use.
 void take_over(SmoothMesh& mesh, const Triangulation& simple, std::vector<std::uint32_t>& tags) {
   const auto before = static_cast<std::uint32_t>(mesh.positions.size());
@@ -354,8 +390,9 @@ std::optional<Attempt> find_simpler(const SmoothMesh& mesh, float scale, float e
 float simplify_within(SmoothMesh& mesh, float error_in_samples, std::vector<std::uint32_t>& tags) {
   const float scale = scale_of(mesh);
   if (!(scale > 0.0F)) return 0.0F;
-  const std::optional<Attempt> found = find_simpler(mesh, scale, error_in_samples);
+  std::optional<Attempt> found = find_simpler(mesh, scale, error_in_samples);
   if (!found) return 0.0F;
+  merge_corners(mesh, found->simple);
   take_over(mesh, found->simple, tags);
   return found->deviation.most;
 }
