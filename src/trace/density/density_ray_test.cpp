@@ -200,6 +200,43 @@ TEST_P(DensityRays, AreTheSameInPackets) {
   EXPECT_GT(hits, 1200);
 }
 
+// Packets of short rays walk in windows, others from cell to cell.
+TEST_P(DensityRays, ThatAreShortAreTheSameInPackets) {
+  std::mt19937 random(11);
+  int blocked = 0;
+  int free = 0;
+  // Where eight chunks meet, at the ends of a small world, and among thin solids.
+  const DensityGrid fields[] = {noise({58, 57, 59}, 12, 5, 0.6), noise({0, 0, 0}, 9, 6, 0.8),
+                                noise({-7, -70, -134}, 40, 7, 0.98)};
+  for (const DensityGrid& field : fields) {
+    const DensityTree tree(field);
+    const IBox box = tree.cells().bounds();
+    for (int i = 0; i < 1'500; ++i) {
+      RayPacket packet;
+      const DVec3 size(box.max - box.min);
+      const DVec3 place = DVec3(box.min) - 2.0 + random_in(random, 0.0, 1.0) * (size + 4.0);
+      for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+        if (random() % 16 == 0) continue;
+        Ray ray{place + random_in(random, -1.5, 1.5) * (i % 4 == 0 ? 8.0 : 1.0), random_in(random, -1.0, 1.0)};
+        if (i % 3 == 0) ray.origin = glm::round(ray.origin * 2.0) / 2.0;
+        if (i % 5 == 0) ray.direction = glm::round(ray.direction * 2.0);
+        if (random() % 8 == 0) ray.direction[static_cast<int>(random() % 3)] *= 1e-5;
+        const double max_t = random() % 64 == 0 ? -1.0 : static_cast<double>(random() % 24) * 0.5;
+        packet.set(lane, ray, random() % 64 == 0 ? kInfinity : max_t);
+      }
+      const std::uint32_t found = any_hits(tree, packet);
+      for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+        if ((packet.active >> lane & 1U) == 0) continue;
+        const bool is_blocked = any_hit(tree, packet.ray(lane), packet.max_t[static_cast<std::size_t>(lane)]);
+        ASSERT_EQ((found >> lane & 1U) != 0, is_blocked) << "packet " << i << " lane " << lane;
+        ++(is_blocked ? blocked : free);
+      }
+    }
+  }
+  EXPECT_GT(blocked, 4'000);
+  EXPECT_GT(free, 4'000);
+}
+
 TEST_P(DensityRays, MeetASphereWhereItIs) {
   for (const DVec3 centre : {DVec3(31.5), DVec3(64.0, -64.0, 0.0), DVec3(1'000'000.0, -2'000'000.0, 500'000.0)}) {
     DensityGrid field;

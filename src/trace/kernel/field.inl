@@ -138,27 +138,27 @@ inline bool first_in_field(const FieldView& field, const Ray& ray, double max_t,
   return is_hit;
 }
 
-// Packets of rays in a field of densities: the walk of trace/kernel/lockstep.inl through cells that touch the solid.
-// Lanes go on through such cells without waiting for an answer: the cells go onto a list, and as many as registers hold
-// are asked at once whether the field in them may become negative along their ray, and of those each alone where it
-// does. Lanes in which it does stop.
+// Packets of rays in a field of densities: the walk of trace/kernel/lockstep.inl, or of trace/kernel/window.inl for
+// short rays, through the cells with a solid corner. Lanes append such cells to a list and walk on. As soon as the list
+// fills registers its cells are tested: in single precision whether the field can become negative along the ray, then
+// the few candidates in double. Lanes stop after a hit.
 //
 //   lane          | 0 | 1 | 2 | ... | 15 |
-//   stands in     | A | . | B | ... |  C |    a cell that touches the solid, or not
-//   then in       | D | E | . | ... |  . |
+//   step 1        | A | . | B | ... |  C |    a cell with a solid corner, or none
+//   step 2        | D | E | . | ... |  . |
 //
-//   list          | A | B | C | D | E | ...    with the lane of each; those of a lane in the order in which it comes there
-//   may           | x |   | x |   |   | ...    in single precision
-//   met           | x |   |   |   |   | ...    in double, cell by cell: hits[lane] has t, cell and corners
+//   list          | A | B | C | D | E | ...    with the lane of each; the cells of a lane are in the order of its walk
+//   candidates    | x |   | x |   |   | ...    found in single precision
+//   hits          | x |   |   |   |   | ...    found in double; hits[lane] gets the cell and its corners
 //
-// Asked where rays hit, a list is asked to its end before lanes leave their words of 4^3 cells, so that lanes do not go
-// far beyond a hit.
+// The places of hits are roots, which are found at the end for all lanes at once. If they are wanted, the rest of the
+// list is tested at the end of each word of 4^3 cells, so that lanes do not walk far beyond a hit.
 
-// The lanes of a packet from `first_` on, as the cells of a field see them.
+/// The lanes of a packet from `first` on.
 template <bool kAsksWhere>
 class FieldLanes {
  public:
-  /// `hits`: of the packet's lanes; not written where kAsksWhere is false.
+  /// `hits`: by lane of the packet; not written if kAsksWhere is false.
   FieldLanes(const FieldView& field, const RayPacket& rays, int first, const Lanes& lanes, FieldHit* hits)
       : field_(field), first_(first), hits_(hits), exact_from_(lanes_from(rays, first)) {
     if (kAsksWhere) std::memset(&kept_, 0, sizeof kept_);
@@ -172,8 +172,7 @@ class FieldLanes {
     lane_numbers_ = load(lane);
   }
 
-  /// Takes the lanes of `walking` through the cells of a word, which begin at `word`; returns all lanes that are known
-  /// to have come into the solid.
+  /// Walks the lanes of `walking` through the 4^3 cells of a word. Returns all lanes with a hit so far.
   Mask walk(const Lanes& lanes, const VoxelSteps& steps, const Cells& word, VoxelWalk& voxels, Mask walking) {
     const I origin[3] = {all(origin_[0]), all(origin_[1]), all(origin_[2])};
     while (any(walking)) {
@@ -191,7 +190,7 @@ class FieldLanes {
     return kAsksWhere ? ask(1) : mask_of(met_);
   }
 
-  /// The same of short rays, to their ends: in the window that begins at `window`.
+  /// Walks short rays to their ends, in the window that begins at `window`.
   void walk_short(const TreeView& tree, const IVec3& window, ShortRays& rays) {
     const I origin[3] = {all(origin_[0] + window.x), all(origin_[1] + window.y), all(origin_[2] + window.z)};
     walk_window(tree, window, rays, [&](Mask met, Mask) {
@@ -201,7 +200,7 @@ class FieldLanes {
     });
   }
 
-  /// Asks what is left of the list, and completes the hits.
+  /// Tests the rest of the list, and completes the hits.
   Mask finish() {
     const Mask met = ask(1);
     if (kAsksWhere && met_ != 0) find_where();
@@ -229,7 +228,7 @@ class FieldLanes {
     count_ += std::popcount(bits(which));
   }
 
-  // Asks as long as there are that many cells; returns all lanes that are known to have come into the solid.
+  // Tests groups of cells while at least that many are left. Returns all lanes with a hit so far.
   Mask ask(int least_count) {
     int first = 0;
     for (; count_ - first >= least_count; first += kCellsAtOnce) {
@@ -248,7 +247,7 @@ class FieldLanes {
     using CellInts = Int32s<kCellsAtOnce>;
     CellInts lane;
     std::memcpy(&lane, lane_ + first, sizeof lane);
-    lane &= kWidth - 1;  // what is beyond the end is not set
+    lane &= kWidth - 1;  // entries beyond the end are not set
     Candidates<kCellsAtOnce> cells;
     CellInts base[3];
     NearRay<CellFloats> ray;
@@ -269,10 +268,10 @@ class FieldLanes {
     if (cells.lanes != 0) meet(cells, lane);
   }
 
-  // Asks the candidates in double.
+  // Tests the candidates in double.
   void meet(const Candidates<kCellsAtOnce>& cells, Int32s<kCellsAtOnce> lane) {
     using CellInts = Int32s<kCellsAtOnce>;
-    // Those that are to be asked come to the front.
+    // Without gaps.
     const CellInts order = lane_numbers(Vectors<kCellsAtOnce>{}, cells.lanes);
     alignas(64) std::int32_t from[kWidth] = {};
     const auto front = [&](const auto& numbers, auto* to) {
@@ -313,7 +312,7 @@ class FieldLanes {
     }
   }
 
-  // What is known of a lane's hit.
+  // Stores a lane's hit without its t.
   void keep(const Meetings& from, int place, int lane) {
     kept_.c0[lane] = from.field.c0[place];
     kept_.c1[lane] = from.field.c1[place];
@@ -404,7 +403,7 @@ class FieldLanes {
   alignas(64) std::int32_t lane_[3 * kWidth];
   alignas(64) std::int32_t at_[3][3 * kWidth];
   std::uint32_t met_ = 0;
-  // What is known of hits, by lane; of lanes without one nothing is sought.
+  // Hits by lane, without their t; has_root is 0 in lanes without a hit.
   struct Kept {
     double c0[kWidth], c1[kWidth], c2[kWidth], c3[kWidth], s[kWidth], t_in[kWidth], length[kWidth];
     std::int64_t has_root[kWidth];

@@ -1,5 +1,5 @@
-// Cells of a field side by side, in single precision: whether the field in them can become negative along a ray at all,
-// which few can. Those are then asked in double (trace/kernel/cell.inl), so that rounding here costs time alone.
+// Tests several cells of a field at once. In single precision it finds the few cells in which the field can become
+// negative along a ray. Those are then tested in double (trace/kernel/cell.inl), so rounding here costs time only.
 //
 //   x, y, z      | 0 | 1 | ... | 7 |    the cells; eight, or with AVX-512 also sixteen
 //   corners      | 0 | 1 | ... | 7 |    eight times: gathered from rows of halves, two of a row at once
@@ -40,10 +40,10 @@ template <int kLanes>
 using Int32s = typename Vectors<kLanes>::Int32s;
 using I8 = Int32s<8>;
 
-// How much longer a stretch is at each plane, in cells: more than rounding moves it along the ray, up to kReach.
+// Added to a ray's interval at each plane of a cell, in cells: more than rounding moves it along the ray, up to kReach.
 constexpr float kStretch = 1e-3F;
-// How far rounding may take a field's numbers, as a share of what the corners differ by: at the ray's start, and for
-// each cell that the ray has gone since.
+// Bounds of the rounding of a field's values, as a share of the difference between corners: at the ray's start, and for
+// each cell that the ray has passed since.
 constexpr float kDoubtHere = 1e-4F;
 constexpr float kDoubtFurther = 2e-6F;
 
@@ -97,7 +97,7 @@ inline Int32s<16> of_lane(Int32s<16> numbers, int lane) {
   return reinterpret_cast<Int32s<16>>(
       _mm512_permutexvar_epi32(_mm512_set1_epi32(lane), reinterpret_cast<__m512i>(numbers)));
 }
-// The numbers of the lanes of a mask, which come first; then any.
+// The numbers of the lanes of a mask, without gaps; then 0.
 inline Int32s<16> lane_numbers(Vectors<16>, std::uint32_t mask) {
   const __m512i all = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   return reinterpret_cast<Int32s<16>>(_mm512_maskz_compress_epi32(static_cast<__mmask16>(mask), all));
@@ -167,8 +167,8 @@ class LastChunk {
   const DensityStorage* chunk_ = nullptr;
 };
 
-/// The densities of the corners of the cells at `at`, by x + 2 y + 4 z, in the lanes of `wanted`, of which the first is
-/// one.
+/// Reads the densities of the corners of the cells at `at`, by x + 2 y + 4 z, in the lanes of `wanted`.
+/// Requires: lane 0 is wanted.
 template <int kLanes>
 [[gnu::always_inline]] inline void read_cells(const FieldView& field, LastChunk& last, const Int32s<kLanes> (&at)[3],
                                               Int32s<kLanes> wanted, Floats<kLanes> (&corners)[8]) {
@@ -267,7 +267,7 @@ inline bool meets(const CellRay& ray, FieldHit& hit) {
   return hit.t >= 0.0;
 }
 
-/// Cells that are to be asked in double, with what is known of them.
+/// Cells to test in double, with their corners.
 template <int kLanes>
 struct Candidates {
   std::uint32_t lanes = 0;
@@ -280,7 +280,8 @@ struct Candidates {
   }
 };
 
-/// Of the first `count` cells those that are to be asked in double. `base`: from where the ray counts, in the field.
+/// Finds the cells, among the first `count`, that must be tested in double. `base`: the ray's origin of coordinates, in
+/// the field.
 template <int kLanes, class Number, class Base>
 [[gnu::always_inline]] inline void screen(const FieldView& field, LastChunk& last, const NearRay<Number>& ray,
                                           const Base (&base)[3], int count, Candidates<kLanes>& cells) {
@@ -292,15 +293,15 @@ template <int kLanes, class Number, class Base>
   if (cells.lanes != 0) std::memcpy(cells.corners, corners, sizeof corners);
 }
 
-// Cells side by side in double: the same operations, in the same order, as for one (trace/kernel/cell.inl).
+// Several cells at once in double: the same operations, in the same order, as for one (trace/kernel/cell.inl).
 
-/// What is known of rays in cells before roots are sought.
+/// Results of the test in double, before roots are found.
 struct Meetings {
-  Longs met;       // where the field becomes negative
-  Longs has_root;  // there where the cubic has one root, which is not known yet; elsewhere it is `s`
+  Longs met;       // the field becomes negative
+  Longs has_root;  // the cubic has one root, which is not known yet; elsewhere the root is `s`
   CellCubic<Doubles> field;
   Doubles s;
-  Doubles t_in;  // as `length` of the ray's stretch in the cell
+  Doubles t_in;  // the ray's interval in the cell
   Doubles length;
 };
 
@@ -348,7 +349,7 @@ inline void find_roots(const CellCubic<Doubles> (&f)[kCount], Longs (&wanted)[kC
       low[k] = is_beyond ? low[k] : s[k];
       wanted[k] &= high[k] - low[k] > 1e-15;
       Doubles next = s[k] - value / f[k].slope(s[k]);
-      next = (next > low[k]) & (next < high[k]) ? next : 0.5 * (low[k] + high[k]);
+      next = ((next > low[k]) & (next < high[k])) ? next : 0.5 * (low[k] + high[k]);
       const Doubles change = next - s[k];
       s[k] = wanted[k] ? next : s[k];
       wanted[k] &= ~((change <= 1e-13) & (change >= -1e-13));

@@ -56,7 +56,7 @@ inline F just_below(F a) {
   return {_mm256_blendv_ps(_mm256_set1_ps(-1e-30F), less, is_positive)};
 }
 
-// The numbers of the lanes of a mask, which come first; then any.
+// The numbers of the lanes of a mask, without gaps. The numbers after them have no meaning.
 inline __m256i lane_numbers(std::uint32_t mask) {
   const std::uint64_t bytes = _pdep_u64(mask, 0x0101'0101'0101'0101U) * 0xFFU;
   const std::uint64_t numbers = _pext_u64(0x0706'0504'0302'0100U, bytes);
@@ -239,16 +239,16 @@ inline void split(const double* from, double corner, I& base, F& rest, F& whole)
   half::split(from, corner, base.low, rest.low, whole.low);
   half::split(from + half::kWidth, corner, base.high, rest.high, whole.high);
 }
-// Which lanes are written side by side.
+// Selects lanes that store_packed writes without gaps.
 struct Packing {
-  __m256i low, high;  // for each number written the lane from which it comes
+  __m256i low, high;  // the source lane of each number written
   int low_count;
 };
 inline Packing packing_of(Mask which) {
   const std::uint32_t low = half::bits(which.low);
   return {half::lane_numbers(low), half::lane_numbers(half::bits(which.high)), std::popcount(low)};
 }
-// Writes the lanes of a packing next to each other, and up to sixteen numbers in all.
+// Writes the selected lanes without gaps. The numbers after them, up to sixteen in all, have no meaning.
 inline void store_packed(std::int32_t* to, const Packing& packing, I a) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(a.low.v, packing.low));
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + packing.low_count),

@@ -62,12 +62,12 @@ inline void gather_words(const std::uint32_t* base, I at, I& low, I& high) {
   high.v = _mm512_permutex2var_epi32(a, _mm512_or_si512(even, _mm512_set1_epi32(1)), b);
 }
 
-// Which lanes are written side by side.
+// Selects lanes that store_packed writes without gaps.
 using Packing = Mask;
 inline Packing packing_of(Mask which) {
   return which;
 }
-// Writes the lanes of a packing next to each other, and up to sixteen numbers in all.
+// Writes the selected lanes without gaps. The numbers after them, up to sixteen in all, are 0.
 inline void store_packed(std::int32_t* to, Packing packing, I a) {
   _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(packing.m, a.v));
 }

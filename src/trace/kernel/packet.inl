@@ -1,5 +1,5 @@
-// What packets of rays come to: the walks' voxels and faces, and their distances in double precision; and whether rays
-// are blocked, of which short ones that start near each other walk in windows (trace/kernel/window.inl).
+// Packets of rays among voxels: finds the voxels and faces that rays hit, with distances in double precision, or only
+// the rays that are blocked. Short rays that start near each other walk in windows (trace/kernel/window.inl).
 
 #pragma once
 

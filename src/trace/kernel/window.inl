@@ -1,5 +1,5 @@
-// Short rays that start near each other: occlusion rays. These all lie in a window of 4^3 bricks, whose indices are kept
-// beside the lanes, and walk from voxel to voxel without cells in between.
+// Short rays that start near each other, as occlusion rays do. They all lie in a window of 4^3 bricks. Registers hold
+// the brick indices of the window, and the rays walk from voxel to voxel without a test of 4^3 cells first.
 //
 //   a place in the window     bit | 17 16 | 15 14 | 13 12 | 11 10 | 9 8 | 7 6 | 5 4 | 3 2 | 1 0 |
 //                                 |   z       y       x   |   z     y     x   |  z     y     x  |
@@ -14,7 +14,7 @@
 namespace quoin::trace {
 namespace {
 
-// Copies a packet, with an ordinary ray in its inactive lanes: numbers there may be subnormal, which is slow.
+// Copies a packet and puts an ordinary ray into its inactive lanes: subnormal numbers there would be slow.
 inline RayPacket fill_inactive(const RayPacket& rays) {
   RayPacket filled;
   filled.active = rays.active;
@@ -35,7 +35,7 @@ inline RayPacket fill_inactive(const RayPacket& rays) {
   return filled;
 }
 
-// Asks for the packet that follows in memory, if one does: reading it takes a fifth of its time otherwise.
+// Prefetches the packet that follows in memory, if there is one. Reading it takes a fifth of its time otherwise.
 inline void fetch_next(const RayPacket& rays) {
   const auto* const next = reinterpret_cast<const char*>(&rays) + sizeof rays;
   for (std::size_t i = 0; i < sizeof rays; i += 64) __builtin_prefetch(next + i);
@@ -50,10 +50,9 @@ inline bool is_full(const RayPacket& rays) {
 // y, z which brick.
 constexpr int kAxisBits[3] = {3 | 3 << 6 | 3 << 12, 3 << 2 | 3 << 10 | 3 << 14, 3 << 4 | 3 << 8 | 3 << 16};
 constexpr int kWindow = 64;
-// In voxels, along any axis; what goes further mostly leaves the window.
+// In voxels, along any axis. Most longer rays leave the window.
 constexpr float kShortReach = 22.0F;
-// A component of a direction that is smaller than the greatest by more than this leaves its axis out of what is said of
-// the others.
+// An axis with a direction component smaller than the greatest by more than this factor does not count in `doubt`.
 constexpr float kShortRatio = 2048.0F;
 
 template <int kAxis>
@@ -64,7 +63,7 @@ inline I spread(I coordinate) {
          shift_left<8 + kInCell>(coordinate & all(48));
 }
 
-// How one axis steps through spread numbers.
+// The step of one axis in spread numbers.
 struct SpreadStep {
   I fill;
   I add;
@@ -82,16 +81,16 @@ struct ShortRays {
   Planes planes;  // that they cross next
   I code;         // the place
   F max_t;
-  F doubt;        // how much later or earlier they may cross any plane
-  Mask doubtful;  // may cross a plane of an axis of which no more than this can be said
+  F doubt;        // bound of the error of the times when they cross planes
+  Mask doubtful;  // `doubt` is no bound for them; only double precision can decide
 };
 
-// Returns the begin of a window along an axis for rays that start near `position`. It may lie outside the table.
+// Returns the lower end of a window along an axis for rays that start near `position`; may lie outside the table.
 inline int place_window(double position) {
   return (static_cast<int>(position) - 24) & ~15;
 }
 
-// Sets up one axis; returns the lanes that stay within the window along it.
+// Sets up one axis. Returns the lanes that stay within the window along it.
 template <int kAxis>
 inline Mask start_in_window(ShortRays& rays, Axis& axis, F& plane, const double* position, double corner, F direction,
                             int origin) {
@@ -108,7 +107,7 @@ inline Mask start_in_window(ShortRays& rays, Axis& axis, F& plane, const double*
   return is_near & (reach <= all(kShortReach)) & (all(-1) < from) & (from + margin + margin < all(kWindow));
 }
 
-// What a ray's crossings of one axis leave in doubt.
+// Bounds the error of the times when rays cross planes of one axis.
 inline void doubt_axis(const Axis& axis, F plane, F greatest, ShortRays& rays) {
   const F doubt = select(axis.still, all(0.0F), all(kDoubt) * abs(axis.inverse));
   const Mask is_tiny = all(kDoubt * kShortRatio) < doubt * greatest;
@@ -116,7 +115,7 @@ inline void doubt_axis(const Axis& axis, F plane, F greatest, ShortRays& rays) {
   rays.doubtful = rays.doubtful | (is_tiny & (crossing_t(axis, plane) <= rays.max_t + doubt));
 }
 
-// Returns the rays that stay within the window; others have to go another way.
+// Returns the rays that stay within the window.
 inline std::uint32_t set_up_short(const TreeView& tree, const Rays& rays, Mask wanted, const IVec3& origin,
                                   ShortRays& out) {
   const F dx = narrow(rays.directions[0]);
@@ -144,9 +143,9 @@ inline std::uint32_t set_up_short(const TreeView& tree, const Rays& rays, Mask w
   return bits(here);
 }
 
-// Walks rays to their ends through the voxels of a window. `meet(met, unsure)`: lanes stand in occupied voxels, whose
-// places are in `rays.code`; of those of `unsure` only double precision can tell whether they get there. It returns the
-// lanes that stop.
+// Walks rays to their ends through the voxels of a window. Calls `meet(met, unsure)` at each step: the lanes of `met`
+// stand in occupied voxels, whose places are in `rays.code`; lanes of `unsure` may end before. It returns lanes that
+// stop.
 template <class Meet>
 [[gnu::always_inline]] inline void walk_window(const TreeView& tree, const IVec3& origin, ShortRays& rays,
                                                Meet&& meet) {
@@ -177,7 +176,7 @@ template <class Meet>
   }
 }
 
-// Returns the lanes that met a voxel; `doubtful` has those of which only double precision can tell.
+// Returns the lanes that hit a voxel. Only double precision can decide for those that it adds to `doubtful`.
 inline Mask walk_short(const TreeView& tree, const IVec3& origin, ShortRays& rays) {
   Mask hit = mask_of(0);
   walk_window(tree, origin, rays, [&](Mask met, Mask unsure) {
@@ -197,8 +196,8 @@ inline I gathered(I place) {
          (shift_right<8 + kInCell>(place) & all(48));
 }
 
-// Takes short rays window by window; returns those that are left. `walk(origin, rays)` gets those of a window, which
-// begins at `origin`.
+// Walks short rays, one window after the other, by `walk(origin, rays)`; a window begins at `origin`. Returns the other
+// rays.
 template <class Walk>
 [[gnu::always_inline]] inline std::uint32_t trace_short(const TreeView& tree, const RayPacket& packet, int first,
                                                         std::uint32_t wanted, Walk&& walk) {
