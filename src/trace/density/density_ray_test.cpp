@@ -205,7 +205,7 @@ TEST_P(DensityRays, ThatAreShortAreTheSameInPackets) {
   std::mt19937 random(11);
   int blocked = 0;
   int free = 0;
-  // Where eight chunks meet, at the ends of a small world, and among thin solids.
+  // A field in eight chunks, a small one, and one of thin solids.
   const DensityGrid fields[] = {noise({58, 57, 59}, 12, 5, 0.6), noise({0, 0, 0}, 9, 6, 0.8),
                                 noise({-7, -70, -134}, 40, 7, 0.98)};
   for (const DensityGrid& field : fields) {
