@@ -59,6 +59,7 @@ std::vector<Counted> mesh_work() {
           blocky("plain/blocky/w1/ao", Blocky::W1, true, InstructionSet::Plain),
           smooth("smooth/s4", Smooth::S4, SmoothOcclusion::None, instruction_set()),
           smooth("smooth/s1", Smooth::S1, SmoothOcclusion::None, instruction_set()),
+          smooth("smooth/s1/soft_share", Smooth::S1, SmoothOcclusion::SoftShare, instruction_set()),
           smooth("smooth/s1/openness", Smooth::S1, SmoothOcclusion::SolidShare, instruction_set()),
           smooth("plain/smooth/s1", Smooth::S1, SmoothOcclusion::None, InstructionSet::Plain)};
 }

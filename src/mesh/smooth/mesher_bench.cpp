@@ -45,6 +45,7 @@ struct Case {
   int chunks = 1;
   SmoothOcclusion occlusion = SmoothOcclusion::None;
   InstructionSet instructions = instruction_set();
+  int level = 0;
 };
 
 void run(benchmark::State& state, const Case& what) {
@@ -56,10 +57,11 @@ void run(benchmark::State& state, const Case& what) {
   options.border = SmoothBorder::Open;
   options.split_sheets = false;
   options.occlusion.method = what.occlusion;
+  options.levels.fill(static_cast<std::uint8_t>(what.level));
   auto mesher = made_with<SmoothMesher>(what.instructions);
   SmoothChunkMesh mesh;
   mesher.mesh(alone(chunks[0]), options, mesh);
-  check(what.which, mesh);
+  if (what.level == 0) check(what.which, mesh);
   state.counters["triangles"] = static_cast<double>(mesh.indices.size()) / 3;
   state.counters["vertices"] = static_cast<double>(mesh.positions.size());
   std::size_t next = 0;
@@ -159,6 +161,11 @@ BENCHMARK(world)
         }
       }
     }
+  }
+  for (int level = 1; level <= kMaxSmoothLevel; ++level) {
+    const std::string name = "smooth/s1/level" + std::to_string(level) + "/normals_soft_ao";
+    const Case what{name, Smooth::S1, 1, SmoothOcclusion::SoftShare, instruction_set(), level};
+    benchmark::RegisterBenchmark(name.c_str(), run, what)->Unit(benchmark::kMicrosecond);
   }
   return true;
 }();
