@@ -778,9 +778,16 @@ TEST_F(Tool, HelpHasAnExampleForEveryCommand) {
     const ToolRun help = run(command + " --help");
     EXPECT_EQ(help.status, 0);
     EXPECT_NE(help.out.find("Example: quoin " + command), std::string::npos) << help.out;
+    // Two screens.
+    EXPECT_LE(std::ranges::count(help.out, '\n'), 80) << command;
+    for (const ToolRun& each : {help, run(command + " --help-all")}) {
+      std::istringstream lines(each.out);
+      for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 100U) << line;
+    }
     for (const std::string option : {"--raw-size", "--raw-type", "--raw-order"}) {
       const bool reads_volumes_of_any_kind = command != "generate" && command != "thumbnail";
-      EXPECT_EQ(help.out.find(option) != std::string::npos, reads_volumes_of_any_kind) << command;
+      const ToolRun all_options = run(command + " --help-all");
+      EXPECT_EQ(all_options.out.find(option) != std::string::npos, reads_volumes_of_any_kind) << command;
     }
   }
   EXPECT_EQ(run("--version").out.substr(0, 6), "quoin ");

@@ -6,6 +6,7 @@
 #include <quoin/io/formats.h>
 
 #include "commands.h"
+#include "help.h"
 #include "output.h"
 #include "parse.h"
 
@@ -50,27 +51,25 @@ CLI::Validator file_name() {
 
 void add_quiet_option(CLI::App& command) {
   command.add_flag_callback(
-      "-q,--quiet", [] { be_quiet(); }, "Print errors alone, and what --json prints; no progress, no warnings");
+      "-q,--quiet", [] { be_quiet(); }, "Print errors only: no progress, no warnings");
 }
 
 void add_outside_files_option(CLI::App& command, LoadOptions& options) {
   command.add_flag_callback(
       "--allow-outside-files", [&options] { options.sidecar_files = SidecarFiles::Anywhere; },
-      "Read files that IN names outside its folder (only for input that you trust)");
+      "Read files outside the folder of IN if IN names them; only for trusted input");
 }
 
 namespace {
 
-/// Adds options that say how heights become a landscape; any of them makes the input one.
+/// Adds the options for height maps. Any of them makes the input a height map.
 void add_height_options(CLI::App& command, std::optional<HeightOptions>& heights) {
-  constexpr const char* kGroup = "Heights";
   const auto wanted = [&heights]() -> HeightOptions& { return heights ? *heights : heights.emplace(); };
   const auto number = [&](const char* name, const char* help, auto set) {
     command
         .add_option_function<double>(
             name, [wanted, set](const double& value) { set(wanted(), value); }, help)
-        ->check(positive())
-        ->group(kGroup);
+        ->check(positive());
   };
   command
       .add_option_function<std::string>(
@@ -80,29 +79,24 @@ void add_height_options(CLI::App& command, std::optional<HeightOptions>& heights
                                 : name == "mapbox" ? HeightEncoding::Mapbox
                                                    : HeightEncoding::Terrarium;
           },
-          "IN is a picture (.png) of heights: grey (of 8 or 16 bits), or terrain-RGB as mapbox or terrarium have it; "
-          ".hgt say so themselves")
-      ->check(CLI::IsMember({"grey", "mapbox", "terrarium"}))
-      ->group(kGroup);
-  number("--metres-per-level", "Of grey: the height of one level (default 1)",
+          "Read a .png as a height map: grey (8 or 16 bits), or the terrain-RGB encodings mapbox or terrarium")
+      ->check(CLI::IsMember({"grey", "mapbox", "terrarium"}));
+  number("--metres-per-level", "Height of one grey level in metres (default 1)",
          [](HeightOptions& options, double value) { options.metres_per_level = value; });
-  number("--metres-per-pixel", "Between neighbouring heights (default: of .hgt what its size says, else 1)",
+  number("--metres-per-pixel", "Distance of neighbouring heights in metres (default 1; for .hgt from the file)",
          [](HeightOptions& options, double value) { options.metres_per_pixel = value; });
-  number("--metres-per-voxel", "Edge of a voxel (default: as far as heights are apart)",
+  number("--metres-per-voxel", "Edge of a voxel in metres (default: --metres-per-pixel)",
          [](HeightOptions& options, double value) { options.metres_per_voxel = value; });
-  number("--exaggeration", "Heights times this (default 1)",
+  number("--exaggeration", "Factor of heights (default 1)",
          [](HeightOptions& options, double value) { options.vertical_exaggeration = value; });
   command
       .add_option_function<int>(
           "--ground-depth", [wanted](const int& value) { wanted().depth = value; },
-          "Voxels of ground below the lowest height (default 8)")
-      ->check(CLI::Range(1, 4096))
-      ->group(kGroup);
-  command
-      .add_flag_callback(
-          "--smooth-ground", [wanted] { wanted().as_field = true; },
-          "Heights become densities, whose surface is smooth, rather than voxels")
-      ->group(kGroup);
+          "Voxels of ground below the lowest height, 1 to 4096 (default 8)")
+      ->check(CLI::Range(1, 4096));
+  command.add_flag_callback(
+      "--smooth-ground", [wanted] { wanted().as_field = true; },
+      "Make a density field with a smooth surface instead of voxels");
 }
 
 }  // namespace
@@ -111,8 +105,8 @@ void add_dimension_option(CLI::App& command, LoadOptions& load) {
   command
       .add_option(
           "--dimension", load.dimension,
-          "Dimension of a Minecraft world: overworld, nether, end or NAMESPACE:NAME (default overworld; quoin info "
-          "lists those of a world)")
+          "Dimension of a Minecraft world: overworld, nether, end or NAMESPACE:NAME (default overworld). quoin info "
+          "lists the dimensions of a world")
       ->check(CLI::Validator(
           [](const std::string& text) { return std::string(text.empty() ? "must name a dimension" : ""); }, ""));
 }
@@ -130,23 +124,27 @@ Status check_dimension(const std::filesystem::path& path, const LoadOptions& loa
 }
 
 void add_common_options(CLI::App& command, CommonOptions& options) {
-  command.add_option("IN", options.input, "File to read")->required()->check(file_name());
+  command.add_option("IN", options.input, "File to read, or - for standard input")->required()->check(file_name());
+  set_heading(command, heading::kInput);
   command.add_flag("--hidden", options.load.show_hidden, "Include hidden layers and nodes");
-  command
-      .add_option("--around", options.load.radius,
-                  "Of a world of Minecraft's or Luanti's: how far around its spawn, in chunks of 64 blocks to each "
-                  "side (default 4; "
-                  "converted to .quoin it is all there)")
-      ->check(CLI::Range(0, 1'000));
-  add_dimension_option(command, options.load);
-  command.add_option("--frame", options.load.frame, "Animation frame to take (default 0)")
+  command.add_option("--frame", options.load.frame, "Animation frame (default 0)")
       ->check(not_negative_whole())
       ->each([&options](const std::string&) { options.takes_frame = true; });
-  add_height_options(command, options.load.heights);
   add_outside_files_option(command, options.load);
+  set_heading(command, heading::kWorlds);
+  command
+      .add_option("--around", options.load.radius,
+                  "Radius around the spawn in chunks of 64 blocks, 0 to 1000 (default 4). quoin convert WORLD "
+                  "NAME.quoin converts all of a world")
+      ->check(CLI::Range(0, 1'000));
+  add_dimension_option(command, options.load);
+  set_heading(command, heading::kHeights);
+  add_height_options(command, options.load.heights);
+  set_heading(command, heading::kGeneral);
   command.add_flag("--json", options.json, "Print one JSON object instead of text");
   add_quiet_option(command);
-  command.add_option("--threads", options.threads.count, "Threads to use (default: all)")->check(CLI::Range(1U, 1024U));
+  command.add_option("--threads", options.threads.count, "Number of threads, 1 to 1024 (default: all)")
+      ->check(CLI::Range(1U, 1024U));
 }
 
 }  // namespace quoin::tool

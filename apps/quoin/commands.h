@@ -38,7 +38,7 @@ void add_common_options(CLI::App& command, CommonOptions& options);
 void add_outside_files_option(CLI::App& command, LoadOptions& options);
 
 /// What --force is for.
-inline constexpr const char* kForceHelp = "Replace OUT even where it holds a model or a world";
+inline constexpr const char* kForceHelp = "Overwrite OUT even if it is a model or a world";
 
 /// Refuses what is not a number of at least 0 (a whole one), in words for a person.
 [[nodiscard]] CLI::Validator not_negative();

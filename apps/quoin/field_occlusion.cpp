@@ -64,12 +64,13 @@ void add_field_occlusion_options(CLI::App& command) {
     command.add_option(name, description)->type_name(type);
   };
   add("--ao-form", "FORM",
-      "Occlusion of smooth surfaces, from 27 samples of the densities around a place. soft-share: how many of them are "
-      "solid, without steps; share: the plain count; weighted: how deep they lie in the solid; weighted-published: the "
-      "same by the published curve, where open is not quite 0; none (default soft-share)");
-  add("--ao-spread", "SAMPLES", "How far these samples lie apart, 0.0625 to 4 (default 2)");
-  add("--ao-offset", "X", "Of the weighted forms: added to the weight, 0 to 0.99; more is darker (default 0.4)");
-  add("--ao-power", "X", "Of the weighted forms: the sum to this power, 0.0625 to 64 (default 2)");
+      "Ambient occlusion of smooth surfaces from 27 density samples around each vertex (default soft-share). "
+      "soft-share: share of solid samples, without steps. share: count of solid samples. weighted: by their depth in "
+      "the solid. weighted-published: by the published curve, which darkens open surfaces slightly. none: no "
+      "occlusion");
+  add("--ao-spread", "SAMPLES", "Distance of these samples, 0.0625 to 4 (default 2)");
+  add("--ao-offset", "X", "Offset of the weights of --ao-form weighted, 0 to 0.99; greater is darker (default 0.4)");
+  add("--ao-power", "X", "Exponent of --ao-form weighted, 0.0625 to 64 (default 2)");
 }
 
 const char* given_field_occlusion(const CLI::App& command) {

@@ -7,6 +7,7 @@
 #include <quoin/terrain/terrain.h>
 
 #include "commands.h"
+#include "help.h"
 #include "interrupt.h"
 #include "output.h"
 #include "output_files.h"
@@ -242,15 +243,17 @@ int run_generate(GenerateOptions& options) {
 std::shared_ptr<GenerateOptions> add_world(CLI::App& command, const char* files, const char* chunks, int& status) {
   auto options = std::make_shared<GenerateOptions>();
   command.add_option("OUT", options->output, files)->required()->check(file_name());
-  command.add_option("--seed", options->seed, "Which world: a whole number (default 42)");
-  command.add_option("--chunks", options->chunks, chunks);
+  set_heading(command, heading::kOutput);
+  command.add_option("--seed", options->seed, "Seed, a whole number (default 42)");
+  command.add_option("--chunks", options->chunks, chunks)->type_name("XxYxZ");
   command.add_flag("--endless", options->is_endless,
-                   "A .quoin that a program with StreamedWorld goes on making; made now is what lies within half of "
-                   "--chunks' width around the origin");
+                   "Write a .quoin without bounds, which programs with StreamedWorld extend; generates a square of the "
+                   "width of --chunks around the origin now");
   command.add_flag("--force", options->force, kForceHelp);
+  set_heading(command, heading::kGeneral);
   command.add_flag("--json", options->json, "Print one JSON object instead of text");
   add_quiet_option(command);
-  command.add_option("--threads", options->threads.count, "Threads to use (default: all)")
+  command.add_option("--threads", options->threads.count, "Number of threads, 1 to 1024 (default: all)")
       ->check(CLI::Range(1U, 1024U));
   command.callback([options, &status] { status = run_generate(*options); });
   return options;
@@ -259,25 +262,26 @@ std::shared_ptr<GenerateOptions> add_world(CLI::App& command, const char* files,
 }  // namespace
 
 void add_generate_command(CLI::App& app, int& status) {
-  CLI::App* command = app.add_subcommand("generate", "Make a world from a seed");
+  CLI::App* command = app.add_subcommand("generate", "Generate a world from a seed");
   command->require_subcommand(1);
   command->footer("Example: quoin generate terrain hills.vox");
   CLI::App* terrain = command->add_subcommand("terrain", "Hills, rivers, caves and woods");
   add_world(*terrain, "File to write: .quoin, .vox, .json",
-            "Width x height x depth in units of 32 voxels (default 4x2x4); 1024x32x1024 at most, 65,536 in all",
+            "Width, height and depth in units of 32 voxels (default 4x2x4); at most 1024x32x1024 and 65,536 units",
             status);
   terrain->footer(
-      "The same seed gives the same world on every machine. The landscape's forms grow with the world's height.\n"
+      "The same seed gives the same world on every machine. Taller worlds have larger hills.\n"
       "Example: quoin generate terrain hills.vox --seed 7 --chunks 8x3x8");
   CLI::App* smooth = command->add_subcommand("smooth-terrain", "Smooth hills with cliffs, arches and caves");
   const auto options = add_world(
       *smooth, "File to write: .quoin, .json",
-      "Width x height x depth in units of 64 samples (default 4x2x4); 512x16x512 at most, 8,192 in all", status);
+      "Width, height and depth in units of 64 samples (default 4x2x4); at most 512x16x512 and 8,192 units", status);
   options->is_smooth = true;
-  smooth->add_flag("!--no-overhangs", options->smooth.overhangs, "No cliffs that overhang, no arches");
-  smooth->add_flag("!--no-caves", options->smooth.caves, "No caves");
+  set_heading(*smooth, heading::kOutput);
+  smooth->add_flag("!--no-overhangs", options->smooth.overhangs, "Generate no overhangs and no arches");
+  smooth->add_flag("!--no-caves", options->smooth.caves, "Generate no caves");
   smooth->footer(
-      "The same seed gives the same world on every machine, of the same heights as `terrain` has.\n"
+      "The same seed gives the same world on every machine, with the heights of generate terrain.\n"
       "Example: quoin generate smooth-terrain hills.json && quoin render hills.json -o hills.png");
 }
 

@@ -318,14 +318,14 @@ int run_info(CommonOptions& options) {
 
 void add_info_command(CLI::App& app, int& status) {
   CLI::App* command = app.add_subcommand(
-      "info", "Say what is in a file: grids, sizes, voxels, faces, types, transforms; of volumes their values");
+      "info", "Print the contents of a file: grids, sizes, voxels, faces, types, transforms, values of volumes");
   const auto options = std::make_shared<CommonOptions>();
   const auto texts = std::make_shared<VolumeTexts>();
   add_common_options(*command, *options);
   add_raw_options(*command, *texts);
   command->footer("Reads " + readable_extensions() +
-                  "; - is standard input.\n"
-                  "Faces are those of the models that are placed and not hidden, each model's once.\n"
+                  ".\n"
+                  "Faces are counted once per model; only models that are placed and visible count.\n"
                   "Example: quoin info castle.vox\n"
                   "Example: quoin info scan.raw --raw-size 256x256x128 --raw-type uint16");
   command->callback([command, options, texts, &status] {

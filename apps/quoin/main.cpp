@@ -8,6 +8,7 @@
 #include <quoin/version.h>
 
 #include "commands.h"
+#include "help.h"
 #include "interrupt.h"
 #include "output.h"
 
@@ -90,11 +91,14 @@ int print_answer(const CLI::App& app, const CLI::ParseError& request) {
 
 int run(int argc, char** argv) {
   let_writes_fail();
-  CLI::App app("Voxel worlds in, lit meshes and pictures out.", "quoin");
-  app.set_version_flag("--version", "quoin " + std::string(version()));
+  CLI::App app("Converts, renders and edits voxel worlds.", "quoin");
+  app.formatter(help_formatter());
+  set_heading(app, heading::kGeneral);
+  app.set_help_flag("-h,--help", "Print help and exit");
+  app.set_help_all_flag("--help-all", "Print help with all options and exit");
+  app.set_version_flag("--version", "quoin " + std::string(version()), "Print the version and exit");
   app.require_subcommand(1);
-  app.get_formatter()->column_width(28);
-  app.footer("Example: quoin convert castle.vox castle.glb\n`quoin COMMAND --help` says more.");
+  app.footer("Example: quoin convert castle.vox castle.glb\n`quoin COMMAND --help` prints the help of a command.");
   int status = kDone;
   add_info_command(app, status);
   add_convert_command(app, status);

@@ -5,6 +5,7 @@
 #include <quoin/io/formats.h>
 
 #include "commands.h"
+#include "help.h"
 #include "interrupt.h"
 #include "output.h"
 #include "output_files.h"
@@ -127,44 +128,48 @@ std::string settle(const CLI::App& command, ViewArguments& arguments) {
 }  // namespace
 
 void add_view_command(CLI::App& app, int& status) {
-  CLI::App* command = app.add_subcommand("view", "Look at a file in a window, fly through it, edit it");
+  CLI::App* command = app.add_subcommand("view", "Open a file in a window to fly through it and edit it");
   const auto arguments = std::make_shared<ViewArguments>();
-  command->add_option("IN", arguments->input, "File to open (default: an empty window, to drop files on)")
+  command->add_option("IN", arguments->input, "File to open (default: an empty window; drop files on it)")
       ->check(file_name());
+  set_heading(*command, heading::kInput);
   command->add_flag("--hidden", arguments->load.show_hidden, "Include hidden layers and nodes");
   add_dimension_option(*command, arguments->load);
   add_outside_files_option(*command, arguments->load);
-  command->add_option("--frame", arguments->load.frame, "Animation frame to take (default 0)")
-      ->check(not_negative_whole());
+  command->add_option("--frame", arguments->load.frame, "Animation frame (default 0)")->check(not_negative_whole());
   add_volume_options(*command, arguments->volume_texts);
-  command->add_option("--size", "Of the window, 320x240 to 16384 a side (default: as it was last)")->type_name("WxH");
-  command->add_flag("--bare", arguments->is_bare, "The picture alone, without panels; nothing is remembered");
-  command->add_option("--screenshot", arguments->screenshot, "Write the picture (.png) once it is done, and end")
+  set_heading(*command, heading::kOutput);
+  command->add_option("--size", "Window size in pixels, 320x240 to 16384 per side (default: the last size)")
+      ->type_name("WxH");
+  command->add_flag("--bare", arguments->is_bare, "Show no panels and save no settings");
+  command->add_option("--screenshot", arguments->screenshot, "Write the finished image (.png) and exit")
+      ->type_name("FILE")
       ->check(file_name());
-  command->add_option("--draw", arguments->drawn, "What it is drawn as at first (default: as it was last)")
-      ->check(CLI::IsMember({"rays", "blocks", "smooth", "density", "paths"}));
   command
-      ->add_option("--light", arguments->light,
-                   "Light by rays, or propagated as games have it, at first (default: as it was last)")
+      ->add_option("--draw", arguments->drawn,
+                   "First view mode: rays, blocks, smooth, density or paths (default: the last mode)")
+      ->check(CLI::IsMember({"rays", "blocks", "smooth", "density", "paths"}));
+  command->add_option("--light", arguments->light, "First light model: rays or propagated (default: the last model)")
       ->check(CLI::IsMember({"rays", "propagated"}));
   command
       ->add_option("--backend", arguments->backend,
-                   "What marches rays: a graphics card if there is one, the processor, or any device")
+                   "Renderer of rays: auto (a graphics card if there is one), cpu, or vulkan (any device)")
       ->check(CLI::IsMember({"auto", "cpu", "vulkan"}))
       ->capture_default_str();
-  command->add_option("--device", arguments->device, "Device of Vulkan: its number or a part of its name");
+  command->add_option("--device", arguments->device, "Vulkan device: its number or a part of its name");
   command
       ->add_option("--memory", arguments->memory_mebibytes,
-                   "For what is loaded of a world (.quoin), and what is made of it, MiB (default: a quarter of all)")
+                   "Memory for the loaded part of a world (.quoin) in MiB (default: a quarter of the machine's)")
       ->check(CLI::Range(std::size_t{64}, std::size_t{1} << 24));
   command
       ->add_option("--distance", arguments->distance,
-                   "How far around the camera a world is loaded, world units (default: 640 voxels)")
+                   "Radius of the loaded part of a world around the camera in world units (default: 640 voxels)")
       ->check(CLI::Range(1.0, 1e6));
-  command->add_option("--threads", arguments->threads.count, "Threads to use (default: all)")
+  set_heading(*command, heading::kGeneral);
+  command->add_option("--threads", arguments->threads.count, "Number of threads, 1 to 1024 (default: all)")
       ->check(CLI::Range(1U, 1024U));
   command->footer(
-      "F1 in the window says what keys and mouse do.\n"
+      "F1 in the window shows the keys and mouse buttons.\n"
       "Example: quoin view castle.vox\n"
       "Example: quoin view scan.raw --raw-size 256x256x128 --raw-type uint16");
   command->callback([command, arguments, &status] {

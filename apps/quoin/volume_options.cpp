@@ -5,6 +5,7 @@
 
 #include <quoin/io/formats.h>
 
+#include "help.h"
 #include "parse.h"
 
 namespace quoin::tool {
@@ -28,20 +29,25 @@ std::string read_iso(const std::string& text, std::optional<double>& iso) {
 }  // namespace
 
 void add_raw_options(CLI::App& command, VolumeTexts& texts) {
-  command.add_option("--raw-size", texts.raw_size,
-                     "XxYxZ: IN is a file of values alone, x fastest, that many along each axis");
+  set_heading(command, heading::kVolumes);
+  command
+      .add_option("--raw-size", texts.raw_size,
+                  "Read IN as raw values without a header, x fastest: their number along each axis")
+      ->type_name("XxYxZ");
   command.add_option("--raw-type", texts.raw_type,
-                     "Of its values: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64 "
+                     "Type of raw values: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64 "
                      "(default uint8)");
-  command.add_option("--raw-order", texts.raw_order, "Byte order of its values: little or big (default little)")
+  command.add_option("--raw-order", texts.raw_order, "Byte order of raw values: little or big (default little)")
       ->check(CLI::IsMember({"little", "big"}));
 }
 
 void add_volume_options(CLI::App& command, VolumeTexts& texts) {
-  command.add_option(
-      "--iso", texts.iso,
-      "Surface value of a volume, or of the fog of a .vdb; what is above is solid (default: between its two groups of "
-      "values)");
+  set_heading(command, heading::kVolumes);
+  command
+      .add_option("--iso", texts.iso,
+                  "Surface value of a volume or of a fog grid of a .vdb. Greater values are solid (default: a value "
+                  "that separates the two main groups of values)")
+      ->type_name("X");
   add_raw_options(command, texts);
 }
 

@@ -164,7 +164,7 @@ std::shared_ptr<WorldOptions> add(CLI::App& command, CLI::App*& added, const cha
                                   int& status) {
   auto options = std::make_shared<WorldOptions>();
   added = command.add_subcommand(name, help);
-  added->add_option("WORLD", options->world, "A world, NAME.quoin")->required()->check(file_name());
+  added->add_option("WORLD", options->world, "World file, NAME.quoin")->required()->check(file_name());
   added->add_flag("--json", options->json, "Print one JSON object instead of text");
   add_quiet_option(*added);
   added->callback([options, run, &status] { status = run(*options); });
@@ -174,28 +174,30 @@ std::shared_ptr<WorldOptions> add(CLI::App& command, CLI::App*& added, const cha
 }  // namespace
 
 void add_world_command(CLI::App& app, int& status) {
-  CLI::App* command = app.add_subcommand("world", "Look after worlds on disk (.quoin)");
+  CLI::App* command = app.add_subcommand("world", "Check, repair, back up and compact world files (.quoin)");
   command->require_subcommand(1);
   command->footer("Example: quoin world check home.quoin");
   CLI::App* added = nullptr;
-  add(*command, added, "info", "What a world holds", run_info, status);
+  add(*command, added, "info", "Print the contents of a world", run_info, status);
   added->footer("Example: quoin world info home.quoin");
-  add(*command, added, "check", "Read all of a world; exit 1 and a line for each thing that is damaged", run_check,
-      status);
+  add(*command, added, "check",
+      "Read all of a world. Prints a line for each damaged part and exits with 1 if there is one", run_check, status);
   added->footer("Example: quoin world check home.quoin");
-  const auto repaired = add(*command, added, "repair", "Keep all that is sound of a damaged world", run_repair, status);
-  added->add_option("-o,--output", repaired->output, "File to write; without it the damaged one is kept as WORLD~")
+  const auto repaired = add(*command, added, "repair", "Keep the intact parts of a damaged world", run_repair, status);
+  added
+      ->add_option("-o,--output", repaired->output,
+                   "File to write (default: WORLD itself; the damaged file is kept as WORLD~)")
       ->check(file_name());
   added->footer("Example: quoin world repair home.quoin -o mended.quoin");
-  const auto backed_up = add(*command, added, "backup", "Copy a world, also while it is written", run_backup, status);
-  added->add_option("OUT", backed_up->output, "File to write, which must not be there")->required()->check(file_name());
+  const auto backed_up =
+      add(*command, added, "backup", "Copy a world, also while a program writes it", run_backup, status);
+  added->add_option("OUT", backed_up->output, "File to write; must not exist")->required()->check(file_name());
   added->footer("Example: quoin world backup home.quoin monday.quoin");
-  const auto shown = add(*command, added, "thumbnail", "Write the picture with which a world shows itself in lists",
-                         run_thumbnail, status);
-  added->add_option("OUT", shown->output, "Picture to write: .png")->required()->check(file_name());
+  const auto shown = add(*command, added, "thumbnail", "Write the preview image of a world", run_thumbnail, status);
+  added->add_option("OUT", shown->output, "Image to write: .png")->required()->check(file_name());
   added->add_flag("--force", shown->force, kForceHelp);
   added->footer("Example: quoin world thumbnail home.quoin home.png");
-  add(*command, added, "compact", "Give back the space that edits left unused", run_compact, status);
+  add(*command, added, "compact", "Shrink a world file by the space that edits left unused", run_compact, status);
   added->footer("Example: quoin world compact home.quoin");
 }
 

@@ -20,6 +20,7 @@
 
 #include "convert/mesh_input.h"
 #include "field_occlusion.h"
+#include "help.h"
 #include "interrupt.h"
 #include "output.h"
 #include "output_files.h"
@@ -486,67 +487,66 @@ int run(ConvertOptions& options, const ManyOptions& many) {
   return watch(many.inputs.empty() ? files_read(options.common.input, allowed) : many.inputs, work);
 }
 
-/// How meshes are made.
 void add_meshing_options(CLI::App& command, ConvertOptions& options) {
+  set_heading(command, heading::kMesh);
   command
-      .add_option("--mesher", options.mesher,
-                  "How to mesh: culled or greedy for blocks, smooth for rounded surfaces (default greedy; of volumes "
-                  "smooth, which is all they can be)")
+      .add_option(
+          "--mesher", options.mesher,
+          "Mesher: greedy or culled for blocks, smooth for rounded surfaces (default greedy; volumes and fields "
+          "always smooth)")
       ->check(CLI::IsMember({"culled", "greedy", "smooth"}));
-  command.add_flag("--no-ao", options.occlusion_off, "Leave ambient occlusion out");
-  command.add_flag(
-      "--ao-attribute", options.occlusion_apart,
-      "Occlusion as a float a vertex, 1 open to 0 dark, instead of in the colours: _AO in glTF, ao in PLY");
-  add_field_occlusion_options(command);
-  command.add_flag("--watertight", options.watertight,
-                   "No T-junctions: every edge meets its neighbours' corners (smooth meshes always are)");
+  command.add_option("--scale", options.scale, "Mesh units per voxel (default 1; 0.1 makes ten voxels a metre)")
+      ->check(positive());
+  command.add_option("--up", options.up, "Up axis of the mesh: y or z (default y; z for .ply, .stl and .3mf)")
+      ->check(CLI::IsMember({"y", "z"}));
+  command.add_option("--simplify", options.simplify, "Simplify with this maximum error in voxels (smooth only)")
+      ->check(not_negative());
   command
       .add_option("--smoothness", options.smoothness,
-                  "How round smooth surfaces around voxels are, from 0 (blocks) to 1 (default 1)")
+                  "Roundness of smooth surfaces around voxels, 0 (blocks) to 1 (default 1)")
       ->check(not_negative())
       ->check(CLI::Range(0.0, 1.0));
   command
       .add_option("--colours", options.colours,
-                  "Colours of smooth surfaces around voxels: sharp as the voxels' (default) or blended")
+                  "Colours of smooth surfaces around voxels: sharp or blended (default sharp)")
       ->check(CLI::IsMember({"sharp", "blended"}));
-  command.add_flag("--no-unite", options.apart,
-                   "Mesh models that touch on one lattice each by itself, not as one body (smooth only)");
   command
-      .add_option("--texture", options.texture,
-                  "Where colours of blocks are: in a palette, with occlusion a vertex (default), or in an atlas, with "
-                  "occlusion in it, which leaves about a third fewer triangles (.glb, .gltf, .obj)")
+      .add_option(
+          "--texture", options.texture,
+          "Colours of blocks (default palette). palette: a palette texture, with occlusion per vertex. atlas: an "
+          "atlas with occlusion, about a third fewer triangles (.glb, .gltf, .obj)")
       ->check(CLI::IsMember({"palette", "atlas"}));
-  command
-      .add_option("--light",
-                  "Light in the colours of vertices, for materials that clients show as they are: none (default), or "
-                  "propagated, as quoin render --light propagated (.glb, .gltf)")
-      ->type_name("TEXT")
-      ->check(CLI::IsMember({"none", "propagated"}));
-  command.add_option("--simplify", options.simplify, "Error in voxels allowed when simplifying (smooth only)")
-      ->check(not_negative());
+  command.add_flag("--no-ao", options.occlusion_off, "Write no ambient occlusion");
+  command.add_flag("--watertight", options.watertight,
+                   "Write no T-junctions: edges end at the corners of their neighbours. Smooth meshes never have them");
+  command.add_flag("--no-unite", options.apart, "Mesh touching models separately instead of as one body (smooth only)");
+  set_heading(command, heading::kOcclusion);
+  command.add_flag(
+      "--ao-attribute", options.occlusion_apart,
+      "Write occlusion as a vertex attribute, 1 (open) to 0 (dark), not in the colours: _AO in glTF, ao in "
+      "PLY");
+  add_field_occlusion_options(command);
 }
 
-/// How they are written.
 void add_mesh_file_options(CLI::App& command, ConvertOptions& options) {
-  command.add_flag(
-      "--animate", options.animate,
-      "All frames of a .vox file, as an animation of glTF (.glb, .gltf); smooth models are meshed each by itself");
-  command.add_option("--fps", options.frames_per_second, "Frames a second of --animate (default 10)")
-      ->check(CLI::Range(0.001, 1000.0));
-  command.add_option("--scale", options.scale, "Units of the mesh a voxel (default 1; 0.1: ten voxels are a metre)")
-      ->check(positive());
-  command.add_option("--voxel-mm", options.voxel_mm, "Millimetres a voxel, in .stl and .3mf (default 1)")
-      ->check(positive());
+  set_heading(command, heading::kMeshFile);
   command
-      .add_option("--up", options.up,
-                  "Which axis of the mesh points up: y or z (default y; z in .ply, .stl and .3mf, as Blender has it)")
-      ->check(CLI::IsMember({"y", "z"}));
-  command.add_flag("--lights", options.lights,
-                   "Lamps (KHR_lights_punctual) and cameras of the input too (.glb, .gltf)");
+      .add_option("--light",
+                  "Light in the vertex colours for viewers without lighting: none, or propagated as in quoin render "
+                  "(default none; .glb, .gltf)")
+      ->type_name("TEXT")
+      ->check(CLI::IsMember({"none", "propagated"}));
+  command.add_flag("--lights", options.lights, "Also write lamps (KHR_lights_punctual) and cameras (.glb, .gltf)");
+  command.add_flag("--animate", options.animate,
+                   "Write all frames of a .vox as an animation (.glb, .gltf); meshes smooth models separately");
+  command.add_option("--fps", options.frames_per_second, "Frames per second of --animate (default 10)")
+      ->check(CLI::Range(0.001, 1000.0));
   command.add_flag("--compress", options.compress,
-                   "glTF that is a fraction of the size, for clients with EXT_meshopt_compression (loses nothing)");
+                   "Compress glTF without loss, for viewers with EXT_meshopt_compression");
   command.add_flag("--quantize", options.quantize,
-                   "glTF with integers as vertices, for clients with KHR_mesh_quantization (blocks lose nothing)");
+                   "Write glTF positions as integers, for viewers with KHR_mesh_quantization; exact for blocks");
+  command.add_option("--voxel-mm", options.voxel_mm, "Millimetres per voxel in .stl and .3mf (default 1)")
+      ->check(positive());
 }
 
 /// Reads the options of smooth occlusion; returns what is wrong with them, or with others beside them, or "".
@@ -770,42 +770,44 @@ namespace {
 
 void add_file_options(CLI::App& command, ConvertOptions& options, ManyOptions& many,
                       std::vector<std::filesystem::path>& rest) {
-  command.add_option("OUT", rest, "File to write: " + writable_extensions() + "; with --to: more files to read")
+  command.add_option("OUT", rest, "File to write, or - for standard output; with --to more files to read")
       ->check(file_name());
+  set_heading(command, heading::kOutput);
+  command.add_flag("--force", options.force, kForceHelp);
+  command.add_flag("--watch", options.watch, "Convert again after each change of the input, until Ctrl-C");
+  set_heading(command, heading::kManyFiles);
   command
       .add_option("--to", many.to,
-                  "Convert every file that is named to this format: glb, vox, ...; of OUT where that is -")
+                  "Convert every named file to this format, as in glb; or the format of OUT if it is -")
+      ->type_name("FORMAT")
       ->check(file_name());
-  command.add_option("--out-dir", many.folder, "With --to: where the files go (default: beside those they are of)")
+  command.add_option("--out-dir", many.folder, "Folder of the written files (default: the folder of each input)")
+      ->type_name("FOLDER")
       ->check(file_name());
-  command.add_flag("--recursive", many.recursive,
-                   "With --to: of folders, all files in them and below that can be read");
-  command.add_option("--from", options.from, "Refuse what is not of this format: " + readable_names())
+  command.add_flag("--recursive", many.recursive, "Convert all readable files in folders and their subfolders");
+  set_heading(command, heading::kInput);
+  command.add_option("--from", options.from, "Reject input of any other format than this: " + readable_names())
+      ->type_name("FORMAT")
       ->check(file_name());
-  command.add_flag("--force", options.force, kForceHelp);
-  command.add_flag("--watch", options.watch, "Convert again whenever what is read changes, until Ctrl-C");
 }
 
 std::string footer() {
-  return "Reads " + readable_extensions() + "; writes " + writable_extensions() +
-         ".\nBeside NAME.gltf goes NAME.bin; beside NAME.obj go NAME.mtl, NAME_palette.png and, for what emits light,\n"
-         "NAME_emissive.png, and NAME_atlas.png with an atlas, but for smooth meshes, whose colours are in the "
-         "vertices. "
-         "They replace files of these\n"
-         "names. Volumes in millimetres are in metres in glTF, and keep their unit in the other formats.\n"
-         "A .json holds a scene without loss: any rotation and scale, any number of types; a .vox what MagicaVoxel "
-         "can.\n"
-         "Files of triangles become voxels first, at their own size in the world, also on the way to a mesh.\n"
-         ".stl and .3mf are closed and manifold, in millimetres, for printing.\n"
-         "From .vox to .vox all is kept: animation, layers, cameras, notes; with --frame only that frame.\n"
-         "IN and OUT may be -: standard input and output.\n"
-         "A file that holds a model or a world is replaced only with --force, and one that is read never.\n"
+  return "Reads " + readable_extensions() + ".\nWrites " + writable_extensions() +
+         ".\n"
+         "Existing models and worlds are overwritten only with --force. Inputs are never overwritten.\n"
+         "NAME.gltf comes with NAME.bin; NAME.obj with NAME.mtl, NAME_palette.png, and NAME_emissive.png and "
+         "NAME_atlas.png if needed. These replace files with the same names.\n"
+         ".json and .quoin keep everything. .vox keeps all that MagicaVoxel supports; from .vox to .vox nothing is "
+         "lost, and --frame writes one frame.\n"
+         "Triangles become voxels first, also on the way to a mesh.\n"
+         ".stl and .3mf are closed manifold meshes in millimetres, for 3D printing. Volumes in millimetres become "
+         "metres in glTF and keep their unit in other formats.\n"
          "Example: quoin convert castle.vox castle.glb\n"
          "Example: quoin convert models/*.vox --to glb --out-dir meshes\n"
-         "Example: quoin convert fleet.json whole_fleet.json\n"
          "Example: quoin convert castle.vox castle.ply --mesher smooth --simplify 0.1\n"
-         "Example: quoin convert scan.nii.gz scan.glb --iso 300\n"
          "Example: quoin convert statue.glb statue.vox --size 200\n"
+         "Example: quoin convert scan.nii.gz scan.glb --iso 300\n"
+         "Example: quoin convert fleet.json whole_fleet.json\n"
          "Example: quoin convert statue.obj statue.json --voxel 0.05 --field\n"
          "Example: quoin convert castle.vox castle.3mf --voxel-mm 0.8\n"
          "Example: quoin convert scan.nii.gz scan.ply --ao-form weighted --ao-spread 4 --ao-attribute";
@@ -843,7 +845,7 @@ std::string read_options(const CLI::App& command, const VolumeTexts& texts, cons
 }  // namespace
 
 void add_convert_command(CLI::App& app, int& status) {
-  CLI::App* command = app.add_subcommand("convert", "Turn a file into another format, by OUT's ending");
+  CLI::App* command = app.add_subcommand("convert", "Convert a file to the format of the extension of OUT");
   const auto options = std::make_shared<ConvertOptions>();
   const auto texts = std::make_shared<VolumeTexts>();
   const auto triangles = std::make_shared<MeshInputTexts>();

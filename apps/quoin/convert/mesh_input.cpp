@@ -1,5 +1,7 @@
 #include "convert/mesh_input.h"
 
+#include "help.h"
+
 namespace quoin::tool {
 
 namespace {
@@ -10,44 +12,30 @@ constexpr const char* kNames[] = {"--size",       "--voxel",  "--solid", "--surf
 }  // namespace
 
 void add_mesh_input_options(CLI::App& command, MeshInputTexts& texts, MeshLoadOptions& options) {
-  constexpr const char* kGroup = "From triangles (.obj, .glb, .gltf, .ply, .stl)";
-  command.add_option("--size", options.size, "Voxels along the longest side (default 128)")
-      ->check(CLI::Range(1, 16'384))
-      ->group(kGroup);
-  command.add_option("--voxel", options.voxel_size, "Size of a voxel in the mesh's unit, instead of --size")
-      ->check(positive())
-      ->group(kGroup);
-  command
-      .add_flag("--solid", texts.is_solid,
-                "Only voxels whose centre the mesh encloses; of fields: voxels, also in formats that hold "
-                "fields (.json, .quoin)")
-      ->group(kGroup);
-  command.add_flag("--surface", texts.is_surface, "Only its surface (default: surface and what it encloses)")
-      ->group(kGroup);
-  command.add_flag("--field", texts.is_field, "A field of distances to it, smooth and editable, instead of voxels")
-      ->group(kGroup);
+  set_heading(command, heading::kTriangles);
+  command.add_option("--size", options.size, "Voxels along the longest side, 1 to 16384 (default 128)")
+      ->check(CLI::Range(1, 16'384));
+  command.add_option("--voxel", options.voxel_size, "Edge of a voxel in the unit of the mesh, instead of --size")
+      ->check(positive());
+  command.add_flag("--solid", texts.is_solid,
+                   "Only voxels with a centre inside the mesh. Converts fields to voxels, also for .json and .quoin");
+  command.add_flag("--surface", texts.is_surface, "Only voxels on the surface (default: surface and inside)");
+  command.add_flag("--field", texts.is_field, "A distance field, smooth and editable, instead of voxels");
   command
       .add_option("--separating", texts.separating,
-                  "The surface: 6 is thin, closed against paths through faces (default); 26 is every voxel that it "
-                  "meets, closed against paths through edges and corners too")
-      ->check(CLI::IsMember({6, 26}))
-      ->group(kGroup);
-  command
-      .add_flag("--parity", texts.by_parity,
-                "Solid by counting triangles, whichever way they face, instead of by winding numbers")
-      ->group(kGroup);
-  command.add_option("--band", options.band, "Of --field: how far distances are kept, in voxels (default 8)")
-      ->check(CLI::Range(1.0, 64.0))
-      ->group(kGroup);
+                  "Thickness of the surface (default 6). 6: thin, no path through faces. 26: every voxel that the mesh "
+                  "touches, no path through edges and corners either")
+      ->check(CLI::IsMember({6, 26}));
+  command.add_flag("--parity", texts.by_parity,
+                   "Find the inside by counting triangles, not by winding numbers; ignores their orientation");
+  command.add_option("--band", options.band, "Range of distances of --field in voxels, 1 to 64 (default 8)")
+      ->check(CLI::Range(1.0, 64.0));
   command
       .add_option("--max-colours", options.max_types,
-                  "Colours to tell apart; near ones become one (default: as many as OUT holds)")
-      ->check(CLI::Range(1, 65'535))
-      ->group(kGroup);
-  command
-      .add_option("--input-up", texts.up, "Which axis of the file points up: y or z (default y; z of .stl and .ply)")
-      ->check(CLI::IsMember({"y", "z"}))
-      ->group(kGroup);
+                  "Maximum number of colours; similar colours are merged (default: as many as OUT can hold)")
+      ->check(CLI::Range(1, 65'535));
+  command.add_option("--input-up", texts.up, "Up axis of the input: y or z (default y; z for .stl and .ply)")
+      ->check(CLI::IsMember({"y", "z"}));
 }
 
 std::string read_mesh_input_options(const CLI::App& command, const MeshInputTexts& texts, MeshLoadOptions& options) {

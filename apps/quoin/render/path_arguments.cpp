@@ -166,50 +166,41 @@ void take_lens(const PathArguments& arguments, const LoadedScene& loaded, std::o
 }  // namespace
 
 void add_path_options(CLI::App& command, PathArguments& arguments) {
-  command
-      .add_option("--bounces", arguments.bounces,
-                  "Of --light path: how often light is scattered at most on its way, less one (default 8)")
+  command.add_option("--bounces", arguments.bounces, "Maximum number of bounces, 0 to 1024 (default 8)")
       ->check(CLI::Range(0, kMaxBounces));
   command
-      .add_option(
-          "--sky", arguments.sky,
-          "Of --light path: gradient, the sky of --light rays; physical, a clear sky by the sun's height; uniform, "
-          "white light from all directions, also on the ground; or an image of all directions, .hdr or .exr (default "
-          "gradient)")
+      .add_option("--sky", arguments.sky,
+                  "Sky (default gradient). gradient: as with --light rays. physical: a clear sky for the height of the "
+                  "sun. uniform: white from all directions. Or an environment image, .hdr or .exr")
       ->type_name("NAME|FILE");
-  add_text_option(command, "--sky-turn", "DEGREES", "Turns a sky that is a file about the vertical (default 0)");
+  add_text_option(command, "--sky-turn", "DEGREES", "Rotation of an environment image around the vertical (default 0)");
+  add_text_option(command, "--sun-angle", "DEGREES",
+                  "Angular diameter of the sun, 0 to 170; greater makes shadows softer (default 0.53)");
+  add_text_option(command, "--sun-time", "MM-DD,HOUR,LATITUDE",
+                  "Sun direction by date, solar time and latitude, as in 06-21,18.5,52. North is -z");
+  command.add_flag("--ground,!--no-ground", arguments.has_ground,
+                   "Place the scene on level ground; with --transparent the ground only catches shadows");
+  command.add_flag("--transparent", arguments.is_transparent, "Write alpha instead of a background");
+  add_text_option(command, "--lens-radius", "X",
+                  "Radius of the lens in world units; more than 0 gives depth of field (default 0)");
+  add_text_option(command, "--focus", "X", "Focus distance in world units (default: the middle of the scene)");
+  add_text_option(command, "--fog", "DENSITY[,TOP]",
+                  "Fog: scattering events per world unit, and its upper end (default: the top of the scene)");
+  add_text_option(command, "--fog-colour", "R,G,B", "Linear colour of the fog, 0 to 1 each (default 1,1,1)");
   command
       .add_option("--tone", arguments.tone,
-                  "Of --light path: how bright light becomes colours: clamp, neutral (Khronos PBR), agx or aces "
-                  "(default neutral; under --sky uniform clamp)")
+                  "Tone curve: clamp, neutral (Khronos PBR), agx or aces (default neutral; clamp with --sky uniform)")
       ->check(CLI::IsMember({"clamp", "neutral", "agx", "aces"}));
-  add_text_option(command, "--sun-angle", "DEGREES",
-                  "Of --light path: how wide the sun is, which makes shadows soft; 0 to 170 (default 0.53)");
-  add_text_option(command, "--sun-time", "MM-DD,HOUR,LATITUDE",
-                  "Of --light path: the sun of that day, solar time and latitude, with north at the back (-z), as in "
-                  "06-21,18.5,52");
-  command.add_flag("--ground,!--no-ground", arguments.has_ground,
-                   "Of --light path: stands the scene on level ground; with --transparent that only catches shadows");
-  command.add_flag("--transparent", arguments.is_transparent,
-                   "Of --light path: no background: the picture has alpha instead");
-  add_text_option(command, "--lens-radius", "X",
-                  "Of --light path: world units; with more than 0 what is out of focus is blurred (default 0)");
-  add_text_option(command, "--focus", "X",
-                  "Of --light path: the distance at which it is sharp (default: that of the scene's middle)");
-  add_text_option(command, "--fog", "DENSITY[,TOP]",
-                  "Of --light path: fog that scatters light so often by world unit, up to that height (default: the "
-                  "scene's top)");
-  add_text_option(command, "--fog-colour", "R,G,B", "Of --fog: linear, 0 to 1 each (default 1,1,1)");
   add_text_option(command, "--bloom", "MIX[,RADIUS[,THRESHOLD]]",
-                  "Of --light path: that share of light spreads, of the radius as a share of the height, where it is "
-                  "brighter than the threshold (default 0,0.02,0)");
-  add_text_option(command, "--vignette", "X", "Of --light path: how much darker corners are, 0 to 1 (default 0)");
+                  "Bloom: share of the light that spreads, radius as a share of the image height, least brightness "
+                  "(default 0,0.02,0)");
+  add_text_option(command, "--vignette", "X", "Darkening of the corners, 0 to 1 (default 0)");
   command
       .add_option("--look", arguments.look,
-                  "Of --light path: what no option says, the file says (its render settings and cameras' focus), or "
-                  "with plain the defaults (default file)")
+                  "Settings without an option: file (render settings and focus of the file) or plain (defaults) "
+                  "(default file)")
       ->check(CLI::IsMember({"file", "plain"}));
-  command.add_flag("--denoise", arguments.denoise, "Of --light path: removes noise within surfaces, not across edges");
+  command.add_flag("--denoise", arguments.denoise, "Remove noise within surfaces and keep their edges");
 }
 
 std::string given_path_option(const CLI::App& command) {

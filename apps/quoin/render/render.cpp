@@ -486,11 +486,11 @@ WatchedWork run_render(RenderArguments& arguments) {
 }  // namespace
 
 void add_render_command(CLI::App& app, int& status) {
-  CLI::App* command = app.add_subcommand("render", "Draw a picture, with sun, shadows and ambient occlusion");
+  CLI::App* command = app.add_subcommand("render", "Render an image with sun, shadows and ambient occlusion");
   const auto arguments = std::make_shared<RenderArguments>();
   add_render_options(*command, *arguments);
   command->footer("Reads " + readable_extensions() +
-                  "; - is standard input. Positions are in world units, +Y up, as `quoin info` gives them.\n"
+                  ".\nPositions are in world units, +Y up, as printed by quoin info.\n"
                   "Example: quoin render castle.vox -o castle.png --view iso --samples 16\n"
                   "Example: quoin render castle.vox -o gate.png --camera 30,60,160 --look-at 0,30,0 --fov 40\n"
                   "Example: quoin render castle.vox -o round.png --turntable 36 --elevation 20\n"

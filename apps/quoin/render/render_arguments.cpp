@@ -10,6 +10,7 @@
 #include <quoin/io/file.h>
 
 #include "field_occlusion.h"
+#include "help.h"
 #include "parse.h"
 #include "render/movie.h"
 #include "render/picture_output.h"
@@ -46,108 +47,103 @@ std::optional<PictureSize> read_size(const std::string& text) {
 }
 
 void add_camera_options(CLI::App& command, RenderArguments& arguments) {
+  set_heading(command, heading::kCamera);
   command
       .add_option("--view", arguments.view_name,
-                  "Frame the whole scene, seen from there: front, back, left, right, top or iso (default iso)")
+                  "Frame the whole scene from the front, back, left, right, top or iso (default iso)")
       ->check(CLI::IsMember({"front", "back", "left", "right", "top", "iso"}));
   add_text_option(command, "--azimuth", "DEGREES",
-                  "Frame the whole scene from so far to the right of the front (default 45)");
-  add_text_option(command, "--elevation", "DEGREES", "From so far above the horizon (default 35.26)");
+                  "Frame the whole scene from this angle, to the right of the front (default 45)");
+  add_text_option(command, "--elevation", "DEGREES", "Angle of --azimuth above the horizon (default 35.26)");
+  add_text_option(command, "--camera", "X,Y,Z|file:N",
+                  "Position of the camera, with --look-at; or camera N of the file, as listed by quoin info");
+  add_text_option(command, "--look-at", "X,Y,Z", "Point in the middle of the image");
+  add_text_option(command, "--fov", "DEGREES", "Vertical field of view of --camera (default 45)");
+  set_heading(command, heading::kSeries);
   command
       .add_option("--turntable", arguments.turns,
-                  "That many pictures once round the scene, framed alike: OUT-00.png, ...")
+                  "Render this number of images around the scene: OUT-00.png, OUT-01.png, ...")
       ->check(CLI::Range(2, 100'000));
-  add_text_option(command, "--frames", "A:B", "A picture of each of these frames of an animation, framed alike");
+  add_text_option(command, "--frames", "A:B", "Render each animation frame from A to B with one framing");
   command
       .add_option("--path", arguments.camera_path,
-                  "A picture of each camera in this JSON file, an array of what --json prints under \"camera\"; "
-                  "OUT-00.png, ...")
+                  "Render an image for each camera in this JSON file, an array of the \"camera\" objects of --json")
+      ->type_name("FILE")
       ->check(file_name());
-  command.add_flag("--resume", arguments.resume,
-                   "Of --turntable, --frames and --path: pictures that are there stay, and are not drawn again");
-  add_text_option(command, "--fps", "N", "Of a film in one file (.mp4, .webm): pictures a second (default 24)");
-  add_text_option(command, "--camera", "X,Y,Z|file:N",
-                  "Where the camera stands; with --look-at, instead of --view. Or camera N of the file, which "
-                  "quoin info lists");
-  add_text_option(command, "--look-at", "X,Y,Z", "The point in the middle of the picture");
-  add_text_option(command, "--fov", "DEGREES", "Vertical field of view of --camera (default 45)");
+  command.add_flag("--resume", arguments.resume, "Keep existing images of a series and render only the others");
+  add_text_option(command, "--fps", "N", "Images per second of a video (default 24)");
 }
 
 void add_light_options(CLI::App& command, RenderArguments& arguments) {
+  set_heading(command, heading::kLight);
+  command
+      .add_option("--light", arguments.light_model,
+                  "Light model (default rays). rays: hard shadows and occlusion rays. path: path tracing with all "
+                  "bounces, soft shadows, gloss and refraction, which takes minutes. propagated: light levels that "
+                  "spread from the sky and from glowing voxels, as in block games, without sun shadows")
+      ->check(CLI::IsMember({"rays", "path", "propagated"}));
   command
       .add_option(
-          "--light", arguments.light_model,
-          "Light by rays; path: paths of light with all its bounces, soft shadows, gloss and glass that refracts, "
-          "which takes minutes; or propagated: levels that spread from the sky and from glowing voxels, as games have "
-          "them, without shadows of the sun (default rays)")
-      ->check(CLI::IsMember({"rays", "path", "propagated"}));
-  add_text_option(command, "--least-light", "X",
-                  "Of --light propagated: what shines everywhere; with 0 closed rooms are black (default 0)");
-  add_text_option(
-      command, "--sun", "X,Y,Z|off",
-      "Direction towards the sun (default -0.48,0.72,0.5); the sky follows it, to dusk and night where y is "
-      "less than 0. Or off: no sun, and the sky as it is");
-  command.add_flag("--fixed-sky", arguments.has_fixed_sky,
-                   "The sky and the colour of light are a clear day's wherever the sun stands");
-  command.add_flag("--plain-glass", arguments.has_plain_glass,
-                   "Glass and water have no surfaces that mirror the sky: they only colour what lies behind them");
-  add_text_option(command, "--sky-brightness", "X", "Times this much light of the sky and from all around (default 1)");
+          "--preset", arguments.preset,
+          "Shading (default full): full, no-shadows, no-ao, unlit (colours only), ao (occlusion only, grey), or "
+          "density (a slice through fields and volumes)")
+      ->check(CLI::IsMember({"full", "no-shadows", "no-ao", "unlit", "ao", "density"}));
+  add_text_option(command, "--sun", "X,Y,Z|off",
+                  "Direction to the sun (default -0.48,0.72,0.5), or off. The sky follows the sun to dusk and night");
+  command.add_flag("--fixed-sky", arguments.has_fixed_sky, "Keep the sky of a clear day for every sun direction");
+  add_text_option(command, "--sky-brightness", "X", "Factor of the light of the sky (default 1)");
   command
       .add_option("--lamps", arguments.render.light.max_lamps,
-                  "How many lamps and glowing voxels light a surface at most; 0: they only show their own light "
-                  "(default 64)")
+                  "Maximum number of lamps and glowing voxels that light a surface, 0 to 1024 (default 64)")
       ->check(CLI::Range(0, 1024));
-  add_text_option(command, "--lamp-brightness", "X", "Times this much light of lamps on others (default 1)");
-  command
-      .add_option("--preset", arguments.preset,
-                  "Light: full, no-shadows, no-ao, unlit (own colours, with --ao times occlusion), or ao (occlusion "
-                  "alone, in grey); or density: a slice through fields and volumes, in colours (default full)")
-      ->check(CLI::IsMember({"full", "no-shadows", "no-ao", "unlit", "ao", "density"}));
+  add_text_option(command, "--lamp-brightness", "X", "Factor of the light that lamps cast (default 1)");
+  add_text_option(command, "--emission-scale", "X", "Factor of the light that voxels emit (default 1)");
+  add_text_option(command, "--exposure", "X|auto",
+                  "Factor of all light (default 1; 1.3 with --light path, 2 with --sky physical), or auto with --light "
+                  "path");
+  add_text_option(command, "--shadow-distance", "VOXELS", "Maximum length of shadows (default: unlimited)");
+  add_text_option(command, "--least-light", "X",
+                  "Minimum light of --light propagated; with 0 closed rooms are black (default 0)");
+  command.add_flag("--plain-glass", arguments.has_plain_glass, "Render glass and water without reflections of the sky");
+  set_heading(command, heading::kOcclusion);
   command
       .add_option("--ao", arguments.occlusion,
-                  "Ambient occlusion by rays; vertex: that of the vertices of blocky meshes; smooth: of fields and "
-                  "volumes that of their smooth meshes, see --ao-form (default rays)")
+                  "Ambient occlusion (default rays). rays: by rays. vertex: as in blocky meshes. smooth: fields and "
+                  "volumes as in smooth meshes, see --ao-form")
       ->check(CLI::IsMember({"rays", "vertex", "smooth"}));
-  add_field_occlusion_options(command);
   command
       .add_option("--ao-rays", arguments.render.light.occlusion_rays,
-                  "Rays per point for --ao rays (default 9; 16 where --ao-distance is more than 12)")
+                  "Rays per point (default 9; 16 if --ao-distance is more than 12)")
       ->check(CLI::Range(1, kMaxSamples));
+  add_text_option(command, "--ao-distance", "VOXELS", "Length of occlusion rays (default 6; on fields 18)");
   command
       .add_option("--ao-affects", arguments.occlusion_affects,
-                  "What occlusion darkens: ambient light, or all (default ambient)")
+                  "Light that occlusion darkens: ambient or all (default ambient)")
       ->check(CLI::IsMember({"ambient", "all"}));
-  add_text_option(command, "--ao-distance", "VOXELS",
-                  "How far the rays of --ao rays reach (default 6; from surfaces of fields 18)");
-  add_text_option(command, "--shadow-distance", "VOXELS", "How far shadows reach (default: any distance)");
-  add_text_option(command, "--exposure", "X|auto",
-                  "Factor of all light (default 1; with --light path 1.3, under --sky physical 2); auto, with --light "
-                  "path: as the first image needs it");
-  add_text_option(command, "--emission-scale", "X", "Times this much of what voxels emit (default 1)");
+  add_field_occlusion_options(command);
+  set_heading(command, heading::kPathTracing);
   add_path_options(command, arguments.path);
 }
 
 void add_detail_options(CLI::App& command, RenderArguments& arguments) {
+  set_heading(command, heading::kDetail);
   command
-      .add_option(
-          "--detail", arguments.detail,
-          "Draw far models in coarser cells: near (never), radius (by distance in radii of the model) or pixels "
-          "(where a voxel spans less than one) (default near)")
+      .add_option("--detail", arguments.detail,
+                  "Use coarser cells for far models: near (never), radius (by distance in model radii) or pixels (if a "
+                  "voxel is smaller than a pixel) (default near)")
       ->check(CLI::IsMember({"near", "radius", "pixels"}));
   command.add_flag("--lod-colours", arguments.render.detail.colours,
-                   "Colour models by their detail: near green, mid yellow to orange, far blue; alone, as with --detail "
-                   "pixels");
+                   "Colour models by level of detail, green (near) to blue (far); implies --detail pixels");
 }
 
 void add_backend_options(CLI::App& command, RenderArguments& arguments) {
+  set_heading(command, heading::kDevice);
   command
       .add_option("--backend", arguments.backend,
-                  "What draws: cpu, or vulkan, a graphics device, whose pictures are the same but for a pixel here and "
-                  "there (default cpu)")
+                  "Renderer: cpu or vulkan. Their images differ in a few pixels at most (default cpu)")
       ->check(CLI::IsMember({"cpu", "vulkan"}));
   command
-      .add_option("--device", arguments.device,
-                  "Which device --backend vulkan uses: its number or a part of its name (default: the best)")
+      .add_option("--device", arguments.device, "Vulkan device: its number or a part of its name (default: the best)")
       ->type_name("NAME|N");
 }
 
@@ -463,25 +459,29 @@ void add_render_options(CLI::App& command, RenderArguments& arguments) {
   add_common_options(command, arguments.common);
   arguments.render.light = natural_light();
   arguments.render.samples = 4;
+  set_heading(command, heading::kOutput);
   command
-      .add_option(
-          "-o,--output", arguments.output,
-          "Picture to write: .png, .jpg or .webp; .exr of --light path: linear light, and layers for compositing; or a "
-          "film, .mp4 or .webm, which the program ffmpeg makes")
+      .add_option("-o,--output", arguments.output,
+                  "Image to write: .png, .jpg or .webp; .exr with --light path (linear light, with layers for "
+                  "compositing). With an image series also a video, .mp4 or .webm, encoded by ffmpeg")
       ->required()
+      ->type_name("FILE")
       ->check(file_name());
-  add_text_option(command, "--size", "WxH", "Pixels (default 1280x720)");
-  add_camera_options(command, arguments);
-  add_light_options(command, arguments);
+  add_text_option(command, "--size", "WxH", "Image size in pixels (default 1280x720)");
   command
       .add_option("--samples", arguments.render.samples,
-                  "Samples a pixel, for smooth edges and even light (default 4; of --light path 64)")
+                  "Samples per pixel, 1 to 4096 (default 4; 64 with --light path)")
       ->check(CLI::Range(1, kMaxSamples));
+  command.add_option("--depth", arguments.depth, "Also write the distances from the camera: .pfm")
+      ->type_name("FILE")
+      ->check(file_name());
+  command.add_flag("--watch", arguments.watch, "Render again after each change of the input, until Ctrl-C");
+  add_camera_options(command, arguments);
+  add_light_options(command, arguments);
   add_volume_options(command, arguments.volume_texts);
-  add_text_option(command, "--slice", "AXIS:PLACE",
-                  "Of --preset density: where it cuts, x, y or z, from 0 to 1 of the fields' bounds (default y:0.5)");
-  command.add_option("--depth", arguments.depth, "Also write distances from the camera: .pfm")->check(file_name());
-  command.add_flag("--watch", arguments.watch, "Draw again whenever what is read changes, until Ctrl-C");
+  add_text_option(
+      command, "--slice", "AXIS:X",
+      "Position of the slice of --preset density: axis x, y or z, and 0 to 1 of the bounds (default y:0.5)");
   add_detail_options(command, arguments);
   add_backend_options(command, arguments);
 }

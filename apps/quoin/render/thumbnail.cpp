@@ -5,6 +5,7 @@
 #include <quoin/io/picture_files.h>
 
 #include "commands.h"
+#include "help.h"
 #include "interrupt.h"
 #include "output.h"
 #include "output_files.h"
@@ -81,12 +82,13 @@ int run_thumbnail(ThumbnailArguments& arguments) {
 }  // namespace
 
 void add_thumbnail_command(CLI::App& app, int& status) {
-  CLI::App* command = app.add_subcommand("thumbnail", "Draw a small picture at once, for lists and file managers");
+  CLI::App* command = app.add_subcommand("thumbnail", "Write a small image quickly, for lists and file managers");
   const auto arguments = std::make_shared<ThumbnailArguments>();
   add_common_options(*command, arguments->common);
-  command->add_option("OUT", arguments->output, "Picture to write: .png, clear where nothing is")
+  command->add_option("OUT", arguments->output, "Image to write: .png with a transparent background")
       ->required()
       ->check(file_name());
+  set_heading(*command, heading::kOutput);
   command->add_option("--size", arguments->size, "Pixels along each side (default 256)")
       ->check(CLI::Range(1, kMaxSize));
   command->footer("Example: quoin thumbnail castle.vox castle.png --size 128");

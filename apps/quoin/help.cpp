@@ -1,0 +1,157 @@
+#include "help.h"
+
+#include <algorithm>
+#include <array>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace quoin::tool {
+namespace {
+
+constexpr std::size_t kWidth = 100;
+constexpr std::size_t kIndent = 28;
+constexpr std::array kAlwaysShown = {heading::kInput, heading::kOutput, heading::kCamera,
+                                     heading::kLight, heading::kMesh,   heading::kGeneral};
+constexpr std::string_view kExample = "Example: ";
+
+bool is_always_shown(const std::string& group) {
+  return std::ranges::find(kAlwaysShown, group) != kAlwaysShown.end();
+}
+
+/// The heading of an option; those that CLI11 adds itself are general.
+std::string group_of(const CLI::Option& option) {
+  return option.get_group() == "Options" ? heading::kGeneral : option.get_group();
+}
+
+/// Words in lines of at most kWidth columns. The first line starts at `column`, the others after `indent` spaces.
+std::string wrapped(const std::string& text, std::size_t column, std::size_t indent) {
+  std::istringstream words(text);
+  std::string out;
+  std::string word;
+  bool is_first = true;
+  while (words >> word) {
+    if (!is_first && column + 1 + word.size() > kWidth) {
+      out += "\n" + std::string(indent, ' ');
+      column = indent;
+      is_first = true;
+    }
+    if (!is_first) out += ' ', ++column;
+    out += word;
+    column += word.size();
+    is_first = false;
+  }
+  return out;
+}
+
+/// A name at the left and its description in the second column.
+std::string entry(const std::string& name, const std::string& description) {
+  std::string line = "  " + name;
+  if (description.empty()) return line + "\n";
+  line += line.size() + 2 > kIndent ? "\n" + std::string(kIndent, ' ') : std::string(kIndent - line.size(), ' ');
+  return line + wrapped(description, kIndent, kIndent) + "\n";
+}
+
+/// "-o,--output FILE" from an option; without the choices and ranges that CLI11 appends to the type.
+std::string name_of(const CLI::Option& option) {
+  std::string name = option.get_positional() ? option.get_name(true, false) : option.get_name(false, true);
+  std::ranges::replace(name, '{', ' ');
+  name = name.substr(0, name.find(' '));
+  if (option.get_positional() || option.get_items_expected_max() == 0) return name;
+  std::string type = option.get_type_name();
+  type = type.substr(0, type.find(":{"));
+  if (type.starts_with("INT") || type.starts_with("UINT")) type = "N";
+  if (type.starts_with("FLOAT")) type = "X";
+  return name + " " + (type.empty() ? "VALUE" : type);
+}
+
+class HelpFormatter : public CLI::FormatterBase {
+ public:
+  std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override {
+    const bool shows_all = mode != CLI::AppFormatMode::Normal;
+    std::vector<std::string> examples;
+    std::string notes;
+    std::istringstream footer(app->get_footer());
+    for (std::string line; std::getline(footer, line);) {
+      if (line.starts_with(kExample)) {
+        examples.push_back(line.substr(kExample.size()));
+      } else {
+        notes += wrapped(line, 0, 0) + "\n";
+      }
+    }
+    std::string out = app->get_description() + "\n\nUsage: " + (name.empty() ? app->get_name() : name);
+    out += usage_of(*app) + "\n";
+    if (!examples.empty()) out += std::string(kExample) + examples.front() + "\n";
+    out += options_of(*app, shows_all) + commands_of(*app);
+    if (!notes.empty()) out += "\n" + notes;
+    if (examples.size() > 1) {
+      out += "\nMore examples:\n";
+      for (std::size_t i = 1; i < examples.size() && (shows_all || i < 4); ++i) out += "  " + examples[i] + "\n";
+    }
+    return out;
+  }
+
+ private:
+  static std::string usage_of(const CLI::App& app) {
+    std::string out;
+    const auto options = app.get_options([](const CLI::Option* option) { return option->nonpositional(); });
+    if (!options.empty()) out += " [OPTIONS]";
+    for (const CLI::Option* option : app.get_options([](const CLI::Option* o) { return o->get_positional(); })) {
+      const bool is_list = option->get_items_expected_max() >= CLI::detail::expected_max_vector_size;
+      const std::string its_name = name_of(*option) + (is_list ? "..." : "");
+      out += option->get_required() ? " " + its_name : " [" + its_name + "]";
+    }
+    for (const CLI::Option* option : options) {
+      if (option->get_required()) out += " --" + option->get_lnames().front() + " FILE";
+    }
+    if (!app.get_subcommands([](const CLI::App*) { return true; }).empty()) out += " COMMAND";
+    return out;
+  }
+
+  static std::string options_of(const CLI::App& app, bool shows_all) {
+    std::string out;
+    std::string positionals;
+    for (const CLI::Option* option : app.get_options([](const CLI::Option* o) { return o->get_positional(); })) {
+      positionals += entry(name_of(*option), option->get_description());
+    }
+    if (!positionals.empty()) out += "\n" + positionals;
+    std::vector<std::string> groups;
+    for (const CLI::Option* option : app.get_options([](const CLI::Option* o) { return o->nonpositional(); })) {
+      const std::string group = group_of(*option);
+      if (std::ranges::find(groups, group) == groups.end()) groups.push_back(group);
+    }
+    // The common ones come last.
+    std::ranges::stable_partition(groups, [](const std::string& group) { return group != heading::kGeneral; });
+    std::string hidden;
+    for (const std::string& group : groups) {
+      const auto options = app.get_options(
+          [&](const CLI::Option* option) { return group_of(*option) == group && option->nonpositional(); });
+      if (group.empty() || options.empty()) continue;
+      if (!shows_all && !is_always_shown(group)) {
+        hidden += (hidden.empty() ? "" : "; ") + group;
+        continue;
+      }
+      out += "\n" + group + ":\n";
+      for (const CLI::Option* option : options) out += entry(name_of(*option), option->get_description());
+    }
+    if (!hidden.empty()) out += "\n" + wrapped("More options with --help-all: " + hidden + ".", 0, 0) + "\n";
+    return out;
+  }
+
+  static std::string commands_of(const CLI::App& app) {
+    std::string out;
+    for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+      out += entry(command->get_name(), command->get_description());
+    }
+    return out.empty() ? out : "\nCommands:\n" + out;
+  }
+};
+
+}  // namespace
+
+std::shared_ptr<CLI::FormatterBase> help_formatter() {
+  return std::make_shared<HelpFormatter>();
+}
+
+}  // namespace quoin::tool
