@@ -6,9 +6,9 @@
 #include <quoin/io/formats.h>
 
 #include "commands.h"
-#include "help.h"
 #include "output.h"
 #include "parse.h"
+#include "shell/help.h"
 
 namespace quoin::tool {
 

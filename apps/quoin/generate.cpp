@@ -7,13 +7,13 @@
 #include <quoin/terrain/terrain.h>
 
 #include "commands.h"
-#include "help.h"
 #include "interrupt.h"
 #include "output.h"
 #include "output_files.h"
 #include "parse.h"
 #include "progress_bar.h"
 #include "render/small_picture.h"
+#include "shell/help.h"
 #include "stopwatch.h"
 
 namespace quoin::tool {

@@ -8,9 +8,9 @@
 #include <quoin/version.h>
 
 #include "commands.h"
-#include "help.h"
 #include "interrupt.h"
 #include "output.h"
+#include "shell/help.h"
 
 namespace quoin::tool {
 

@@ -5,11 +5,11 @@
 #include <quoin/io/formats.h>
 
 #include "commands.h"
-#include "help.h"
 #include "interrupt.h"
 #include "output.h"
 #include "output_files.h"
 #include "parse.h"
+#include "shell/help.h"
 #include "volume_options.h"
 #ifdef QUOIN_HAVE_VIEWER
 #include "viewer/window/viewer.h"

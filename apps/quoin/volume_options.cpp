@@ -5,8 +5,8 @@
 
 #include <quoin/io/formats.h>
 
-#include "help.h"
 #include "parse.h"
+#include "shell/help.h"
 
 namespace quoin::tool {
 

@@ -20,7 +20,6 @@
 
 #include "convert/mesh_input.h"
 #include "field_occlusion.h"
-#include "help.h"
 #include "interrupt.h"
 #include "output.h"
 #include "output_files.h"
@@ -28,6 +27,7 @@
 #include "progress_bar.h"
 #include "render/small_picture.h"
 #include "scene_content.h"
+#include "shell/help.h"
 #include "standard_streams.h"
 #include "stopwatch.h"
 #include "volume_options.h"

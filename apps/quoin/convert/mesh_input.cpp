@@ -1,6 +1,6 @@
 #include "convert/mesh_input.h"
 
-#include "help.h"
+#include "shell/help.h"
 
 namespace quoin::tool {
 

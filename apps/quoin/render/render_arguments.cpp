@@ -10,11 +10,11 @@
 #include <quoin/io/file.h>
 
 #include "field_occlusion.h"
-#include "help.h"
 #include "parse.h"
 #include "render/movie.h"
 #include "render/picture_output.h"
 #include "render/text_options.h"
+#include "shell/help.h"
 #include "standard_streams.h"
 #include "volume_options.h"
 

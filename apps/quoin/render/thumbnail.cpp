@@ -5,13 +5,13 @@
 #include <quoin/io/picture_files.h>
 
 #include "commands.h"
-#include "help.h"
 #include "interrupt.h"
 #include "output.h"
 #include "output_files.h"
 #include "progress_bar.h"
 #include "render/small_picture.h"
 #include "render/text_options.h"
+#include "shell/help.h"
 #include "standard_streams.h"
 #include "stopwatch.h"
 
