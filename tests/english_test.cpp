@@ -1,0 +1,244 @@
+// Counts phrases that make comments, documents and messages hard to read (nominal "what", "of which", "beside", ...). tests/english_limits.txt holds the number of such lines per file. A file must not exceed
+// its limit; a file without a limit must have none. `./dev english --accept` lowers the limits.
+
+#include <algorithm>
+#include <cctype>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace quoin::english {
+namespace {
+
+namespace fs = std::filesystem;
+using Words = std::vector<std::string>;
+
+const std::set<std::string> kAfterWhat = {
+    "is",    "was",   "are",  "were",  "it",     "they",   "one",     "a",       "an",      "the",
+    "that",  "has",   "had",  "have",  "lies",   "stands", "changed", "became",  "becomes", "comes",
+    "goes",  "does",  "did",  "can",   "cannot", "must",   "may",     "of",      "no",      "this",
+    "there", "in",    "work", "works", "make",   "makes",  "hold",    "holds",   "other",   "others",
+    "file",  "files", "edit", "edits", "ray",    "rays",   "picture", "pictures"};
+const std::set<std::string> kPronouns = {"whoever", "whatever", "whichever", "nobody"};
+const std::set<std::string> kPrepositions = {"of",   "by",  "to",    "from",   "at",     "on",
+                                             "with", "for", "about", "beyond", "behind", "beside"};
+const std::set<std::string> kOldWords = {"beside", "besides", "anew", "likewise", "mend", "mended", "tells", "told"};
+const std::set<std::string> kOpeners = {"what", "whether", "of", "how", "where", "that", "whoever", "which"};
+
+Words words_of(std::string_view text) {
+  Words words;
+  std::string word;
+  for (const char c : text) {
+    if (std::isalpha(static_cast<unsigned char>(c)) != 0) {
+      word += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    } else if (!word.empty()) {
+      words.push_back(std::move(word));
+      word.clear();
+    }
+  }
+  if (!word.empty()) words.push_back(std::move(word));
+  return words;
+}
+
+/// Returns the first hard phrase, or "".
+std::string hard_phrase(const Words& words) {
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string& word = words[i];
+    const std::string next = i + 1 < words.size() ? words[i + 1] : "";
+    if (kPronouns.contains(word) || kOldWords.contains(word)) return word;
+    if (word == "what" && kAfterWhat.contains(next)) return word + " " + next;
+    if (kPrepositions.contains(word) && (next == "which" || next == "whom" || next == "what")) return word + " " + next;
+    const bool is_pair =
+        (word == "no" && next == "one") || (word == "but" && next == "for") || (word == "for" && next == "ever");
+    if (is_pair) return word + " " + next;
+    const bool is_comparison = word == "as" && (next == "those" || next == "that") && i + 2 < words.size();
+    if (is_comparison && words[i + 2] == "of") return word + " " + next + " of";
+  }
+  return "";
+}
+
+enum class Kind { Code, Script, Python, Document };
+
+/// Reads the prose of a file line by line: comments, long string literals, documents outside of code blocks.
+class Prose {
+ public:
+  explicit Prose(Kind kind) : kind_(kind) {}
+
+  [[nodiscard]] std::string of_line(const std::string& line) {
+    if (kind_ == Kind::Document) return of_document(line);
+    if (kind_ == Kind::Python) return of_python(line);
+    if (kind_ == Kind::Script) return line;
+    return of_code(line, "//");
+  }
+
+ private:
+  std::string of_document(const std::string& line) {
+    if (line.starts_with("```")) {
+      is_in_block_ = !is_in_block_;
+      return "";
+    }
+    return is_in_block_ ? "" : line;
+  }
+  std::string of_python(const std::string& line) {
+    const bool was_in_block = is_in_block_;
+    for (std::size_t at = line.find("\"\"\""); at != std::string::npos; at = line.find("\"\"\"", at + 3)) {
+      is_in_block_ = !is_in_block_;
+    }
+    return was_in_block || is_in_block_ ? line : of_code(line, "#");
+  }
+  static std::string of_code(const std::string& line, std::string_view comment) {
+    constexpr std::size_t kLongLiteral = 20;
+    std::string text;
+    bool is_in_literal = false;
+    std::string literal;
+    for (std::size_t i = 0; i < line.size(); ++i) {
+      if (is_in_literal && line[i] == '\\') {
+        ++i;
+        literal += ' ';
+      } else if (line[i] == '"') {
+        if (is_in_literal && literal.size() >= kLongLiteral) text += literal + ". ";
+        literal.clear();
+        is_in_literal = !is_in_literal;
+      } else if (is_in_literal) {
+        literal += line[i];
+      } else if (line.compare(i, comment.size(), comment) == 0) {
+        return text + line.substr(i + comment.size());
+      }
+    }
+    return text;
+  }
+
+  Kind kind_;
+  bool is_in_block_ = false;
+};
+
+/// Returns the reason why a line is hard to read, or "".
+std::string fault_of(const std::string& line, Prose& prose) {
+  const std::string text = prose.of_line(line);
+  if (const std::string phrase = hard_phrase(words_of(text)); !phrase.empty()) return phrase;
+  const std::size_t begin = line.find_first_not_of(' ');
+  if (begin == std::string::npos) return "";
+  if (line.compare(begin, 2, "//") == 0) {
+    const Words words = words_of(std::string_view(line).substr(begin));
+    if (!words.empty() && kOpeners.contains(words[0])) return "comment opens with " + words[0];
+  }
+  for (const char* opening : {"\"Of --", "\"Of a ", "\"Of the "}) {
+    if (line.find(opening) != std::string::npos) return opening;
+  }
+  if (line.starts_with("TEST")) {
+    for (const char* name : {", That", ", What", ", Whether"}) {
+      if (line.find(name) != std::string::npos) return "test name opens with " + std::string(name + 2);
+    }
+  }
+  return "";
+}
+
+const fs::path kRoot = QUOIN_SOURCE_DIR;
+
+bool is_left_out(const fs::path& folder) {
+  static const std::set<std::string> kNames = {"node_modules", "archive", "corpus", "golden", "build", "__pycache__"};
+  const std::string name = folder.filename().string();
+  return kNames.contains(name) || name.starts_with('.');
+}
+
+/// Returns the kind of a file by its name; nothing for files without prose.
+std::optional<Kind> kind_of(const fs::path& path) {
+  static const std::set<std::string> kCode = {".cpp",  ".h",    ".inl",  ".c",  ".comp", ".glsl",
+                                              ".frag", ".vert", ".wgsl", ".js", ".mjs",  ".ts"};
+  const std::string ending = path.extension().string();
+  if (kCode.contains(ending)) return Kind::Code;
+  if (ending == ".md") return Kind::Document;
+  if (ending == ".py") return Kind::Python;
+  if (path.filename() == "dev" || ending == ".sh") return Kind::Script;
+  return std::nullopt;
+}
+
+struct Counted {
+  std::map<std::string, int> lines;            // by file
+  std::map<std::string, std::string> example;  // the first, by file
+};
+
+Counted count_all() {
+  Counted out;
+  const auto add = [&](const fs::path& path) {
+    const auto kind = kind_of(path);
+    if (!kind || path.filename() == "english_test.cpp") return;
+    const std::string name = fs::relative(path, kRoot).generic_string();
+    std::ifstream file(path);
+    Prose prose(*kind);
+    int number = 0;
+    for (std::string line; std::getline(file, line);) {
+      ++number;
+      const std::string fault = fault_of(line, prose);
+      if (fault.empty()) continue;
+      if (out.lines[name]++ == 0) out.example[name] = "line " + std::to_string(number) + " (" + fault + "): " + line;
+    }
+  };
+  for (const char* file : {"README.md", "CONTRIBUTING.md", "CHANGELOG.md", "dev"}) add(kRoot / file);
+  for (const char* folder : {"src", "include", "apps", "tests", "docs", "examples", "bench"}) {
+    for (fs::recursive_directory_iterator at(kRoot / folder), end; at != end; ++at) {
+      if (at->is_directory() && is_left_out(at->path())) at.disable_recursion_pending();
+      if (at->is_regular_file()) add(at->path());
+    }
+  }
+  return out;
+}
+
+const fs::path kLimits = kRoot / "tests/english_limits.txt";
+
+std::map<std::string, int> read_limits() {
+  std::map<std::string, int> limits;
+  std::ifstream file(kLimits);
+  std::string name;
+  int count = 0;
+  while (file >> count >> name) limits[name] = count;
+  return limits;
+}
+
+TEST(English, NoFileHasMoreHardPhrasesThanBefore) {
+  const Counted counted = count_all();
+  const bool lowers = std::getenv("QUOIN_LOWER_ENGLISH_LIMITS") != nullptr;
+  const std::map<std::string, int> limits = lowers && !fs::exists(kLimits) ? counted.lines : read_limits();
+  std::map<std::string, int> lowered;
+  int all = 0;
+  for (const auto& [name, count] : counted.lines) {
+    all += count;
+    const auto limit = limits.find(name);
+    const int most = limit == limits.end() ? 0 : limit->second;
+    EXPECT_LE(count, most) << name << ", the first: " << counted.example.at(name);
+    if (std::min(count, most) > 0) lowered[name] = std::min(count, most);
+  }
+  RecordProperty("hard_phrases", all);
+  if (!lowers) return;
+  std::ofstream file(kLimits);
+  for (const auto& [name, count] : lowered) file << count << ' ' << name << '\n';
+  std::printf("%d lines with hard phrases in %zu files\n", all, lowered.size());
+}
+
+TEST(English, FindsHardPhrases) {
+  const auto found = [](Kind kind, const std::string& line) {
+    Prose prose(kind);
+    return fault_of(line, prose);
+  };
+  EXPECT_EQ(found(Kind::Code, "  /// Whether the grid is empty."), "comment opens with whether");
+  EXPECT_EQ(found(Kind::Code, "  // Keeps what is there."), "what is");
+  EXPECT_EQ(found(Kind::Code, "  int what = is_there();"), "");
+  EXPECT_EQ(found(Kind::Code, "  add(\"the file of which nothing is known\");"), "of which");
+  EXPECT_EQ(found(Kind::Code, "  add(\"beside\");  // Adds a file."), "");
+  EXPECT_EQ(found(Kind::Document, "Files go beside the input."), "beside");
+  EXPECT_EQ(found(Kind::Python, "x = 1  # as those of the grid"), "as those of");
+  EXPECT_EQ(found(Kind::Code, "TEST(Ray, ThatMisses) {"), "test name opens with That");
+  EXPECT_EQ(found(Kind::Code, "/// Returns true if the grid is empty."), "");
+}
+
+}  // namespace
+}  // namespace quoin::english
