@@ -51,7 +51,7 @@ CLI::Validator file_name() {
 
 void add_quiet_option(CLI::App& command) {
   command.add_flag_callback(
-      "-q,--quiet", [] { be_quiet(); }, "Print errors only: no progress, no warnings");
+      "-q,--quiet", [] { be_quiet(); }, "Print only errors and the object of --json: no progress, no warnings");
 }
 
 void add_outside_files_option(CLI::App& command, LoadOptions& options) {

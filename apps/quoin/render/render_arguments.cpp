@@ -93,8 +93,10 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
   command.add_flag("--fixed-sky", arguments.has_fixed_sky, "Keep the sky of a clear day for every sun direction");
   add_text_option(command, "--sky-brightness", "X", "Factor of the light of the sky (default 1)");
   command
-      .add_option("--lamps", arguments.render.light.max_lamps,
-                  "Maximum number of lamps and glowing voxels that light a surface, 0 to 1024 (default 64)")
+      .add_option(
+          "--lamps", arguments.render.light.max_lamps,
+          "Maximum number of lamps and glowing voxels that light a surface, 0 to 1024 (default 64). With 0 they "
+          "only glow themselves")
       ->check(CLI::Range(0, 1024));
   add_text_option(command, "--lamp-brightness", "X", "Factor of the light that lamps cast (default 1)");
   add_text_option(command, "--emission-scale", "X", "Factor of the light that voxels emit (default 1)");
