@@ -4,35 +4,38 @@
 
 namespace quoin {
 
-/// A programmer's mistake: a `Requires:` of the documentation that did not hold; or something within Quoin that never
-/// fails to, and then is Quoin's own.
+/// A broken contract: a documented `Requires:` that did not hold, or a broken internal invariant, which is a bug in
+/// Quoin.
 struct AssertFailure {
-  const char* condition;  ///< as it stands in the source
-  const char* message;    ///< what should hold, or an empty string
+  const char* condition;  ///< the expression as written in the source
+  const char* message;    ///< the expected condition in words, or an empty string
   std::source_location location;
 };
 
-/// Called for every mistake that is found. When it returns, the process is aborted; it may throw or exit instead. A
-/// throw ends the process too where the function that found the mistake is noexcept.
+/// Handles a failed assertion. The process aborts when the handler returns.
+/// The handler may throw or exit instead. A throw also ends the process if the failing function is noexcept.
 using AssertHandler = void (*)(const AssertFailure& failure);
 
-/// Replaces the handler, for the whole process; null restores the default, which writes one line to standard error.
-/// Returns the handler that was there. Threads: any; the handler is called on the thread that made the mistake.
+/// Replaces the assert handler of the whole process and returns the previous handler.
+/// Null restores the default handler, which writes one line to standard error.
+/// Threads: any. The handler runs on the thread that failed the assertion.
 AssertHandler set_assert_handler(AssertHandler handler);
 
-/// Calls the handler, then aborts.
+/// Calls the current handler, then aborts the process.
 [[noreturn]] void handle_assert_failure(const AssertFailure& failure);
 
 }  // namespace quoin
 
-/// 1 where mistakes are looked for: in debug builds and wherever QUOIN_CHECKED is defined (CMake: -DQUOIN_CHECKED=ON).
+/// Is 1 if assertions are checked: in debug builds, and in any build that defines QUOIN_CHECKED (CMake:
+/// -DQUOIN_CHECKED=ON). Is 0 otherwise.
 #if defined(QUOIN_CHECKED) || !defined(NDEBUG)
 #define QUOIN_ASSERT_ENABLED 1
 #else
 #define QUOIN_ASSERT_ENABLED 0
 #endif
 
-/// Checks what should hold, where that is enabled; elsewhere the condition is compiled but never evaluated.
+/// Asserts that `condition` is true if QUOIN_ASSERT_ENABLED is 1. Otherwise the condition is compiled but never
+/// evaluated.
 /// Usage: QUOIN_ASSERT(i < size(), "the type must be registered").
 #if QUOIN_ASSERT_ENABLED
 #define QUOIN_ASSERT(condition, ...) \

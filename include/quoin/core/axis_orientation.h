@@ -12,18 +12,19 @@
 
 namespace quoin {
 
-/// One of the 48 orientations that take the axes onto each other: a signed permutation of them. 24 are rotations by
-/// quarter turns, the others such a rotation of the mirror image.
+/// An orientation that maps the coordinate axes onto each other: a signed axis permutation.
+/// There are 48 of them. 24 are rotations by quarter turns; the other 24 combine such a rotation with a mirror.
 ///
 /// Usage: const auto turned = AxisOrientation::quarter_turns(1, 1) * AxisOrientation::mirror(0);  // the mirror first
 class AxisOrientation {
  public:
   static constexpr int kCount = 48;
 
-  /// Leaves everything as it is.
+  /// Creates the identity.
   constexpr AxisOrientation() = default;
-  /// The rotation about an axis (0 x, 1 y, 2 z) by that many quarter turns, counter-clockwise seen from the axis'
-  /// positive end: one about z takes +x to +y. Negative ones turn back. Requires: 0 <= axis < 3.
+  /// Returns the rotation about an axis (0 x, 1 y, 2 z) by `turns` quarter turns.
+  /// Positive turns are counter-clockwise, seen from the positive end of the axis: a turn about z maps +x to +y.
+  /// Negative turns rotate the other way. Requires: 0 <= axis < 3.
   [[nodiscard]] static constexpr AxisOrientation quarter_turns(int axis, int turns) {
     QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
     AxisOrientation quarter;
@@ -36,14 +37,14 @@ class AxisOrientation {
     for (int i = (turns % 4 + 4) % 4; i > 0; --i) all = quarter * all;
     return all;
   }
-  /// Negates an axis (0 x, 1 y, 2 z). Requires: 0 <= axis < 3.
+  /// Returns the mirror that negates an axis (0 x, 1 y, 2 z). Requires: 0 <= axis < 3.
   [[nodiscard]] static constexpr AxisOrientation mirror(int axis) {
     QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
     AxisOrientation mirrored;
     mirrored.is_negated_[static_cast<std::size_t>(axis)] = true;
     return mirrored;
   }
-  /// The orientation of that `index()`; 0 is the one that leaves everything as it is. Requires: 0 <= index < kCount.
+  /// Returns the orientation with the given `index()`; 0 is the identity. Requires: 0 <= index < kCount.
   [[nodiscard]] static constexpr AxisOrientation at(int index) {
     QUOIN_ASSERT(index >= 0 && index < kCount, "0 <= index < kCount");
     constexpr std::array<std::array<std::uint8_t, 3>, 6> kOrders = {
@@ -53,28 +54,28 @@ class AxisOrientation {
     for (std::size_t i = 0; i < 3; ++i) found.is_negated_[i] = (index >> i & 1) != 0;
     return found;
   }
-  /// 0 to 47, for files and tables.
+  /// Returns the index of this orientation, 0 to 47, for files and tables.
   [[nodiscard]] constexpr int index() const {
     const int order = is_cyclic() ? source_[0] : 5 - source_[2];
     return 8 * order + int{is_negated_[0]} + 2 * int{is_negated_[1]} + 4 * int{is_negated_[2]};
   }
 
-  /// The axis (0 x, 1 y, 2 z) that becomes `axis`. Requires: 0 <= axis < 3.
+  /// Returns the source axis (0 x, 1 y, 2 z) that maps to `axis`. Requires: 0 <= axis < 3.
   [[nodiscard]] constexpr int source_axis(int axis) const {
     QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
     return source_[static_cast<std::size_t>(axis)];
   }
-  /// Whether `axis` points the other way than the one that becomes it. Requires: 0 <= axis < 3.
+  /// Returns true if `axis` is the negated source axis. Requires: 0 <= axis < 3.
   [[nodiscard]] constexpr bool is_negated(int axis) const {
     QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
     return is_negated_[static_cast<std::size_t>(axis)];
   }
-  /// Whether it mirrors: makes left hands of right ones.
+  /// Returns true if the orientation is a reflection (determinant -1), which swaps left and right hands.
   [[nodiscard]] constexpr bool is_mirrored() const {
     return (is_negated_[0] != is_negated_[1]) != (is_negated_[2] == is_cyclic());
   }
 
-  /// A vector from the origin, turned.
+  /// Applies the orientation to a vector from the origin, or to a direction.
   [[nodiscard]] IVec3 apply(IVec3 v) const { return applied(v); }
   [[nodiscard]] DVec3 apply(DVec3 v) const { return applied(v); }
   [[nodiscard]] Direction apply(Direction direction) const {
@@ -83,10 +84,10 @@ class AxisOrientation {
     while (source_[axis] != frame.axis) ++axis;
     return static_cast<Direction>(2 * axis + std::size_t{is_negated_[axis] == (frame.sign > 0)});
   }
-  /// A box of that size, turned.
+  /// Returns the size of a box after the orientation is applied to it.
   [[nodiscard]] IVec3 size_of(IVec3 size) const { return {size[source_[0]], size[source_[1]], size[source_[2]]}; }
 
-  /// The one that turns back what this turned.
+  /// Returns the inverse orientation.
   [[nodiscard]] constexpr AxisOrientation inverse() const {
     AxisOrientation back;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -95,7 +96,7 @@ class AxisOrientation {
     }
     return back;
   }
-  /// `second` after `first`, as of matrices.
+  /// Composes two orientations in matrix order: applies `first`, then `second`.
   [[nodiscard]] friend constexpr AxisOrientation operator*(const AxisOrientation& second,
                                                            const AxisOrientation& first) {
     AxisOrientation both;
@@ -105,7 +106,7 @@ class AxisOrientation {
     }
     return both;
   }
-  /// The same as a matrix for column vectors.
+  /// Returns the orientation as a matrix for column vectors.
   [[nodiscard]] glm::dmat3 matrix() const {
     glm::dmat3 columns(0.0);
     for (int i = 0; i < 3; ++i) columns[source_axis(i)][i] = is_negated(i) ? -1.0 : 1.0;
@@ -122,7 +123,7 @@ class AxisOrientation {
     return turned;
   }
 
-  std::array<std::uint8_t, 3> source_ = {0, 1, 2};  // [axis]: which one becomes it
+  std::array<std::uint8_t, 3> source_ = {0, 1, 2};  // [axis]: source axis
   std::array<bool, 3> is_negated_ = {};
 };
 

@@ -8,8 +8,9 @@
 
 namespace quoin {
 
-/// A growing array of plain values whose new elements are uninitialised: for output that is written by the hundred
-/// thousand and reused. Moved, never copied. `data` and iterators are good until it grows beyond its capacity.
+/// A growable array of trivially copyable values that leaves new elements uninitialised.
+/// Use it for large output that is rebuilt often. It can be moved but not copied.
+/// Pointers and iterators stay valid until the buffer grows beyond its capacity.
 /// Requires: indices are less than `size()`; this is not checked.
 template <class T>
 class Buffer {
@@ -17,7 +18,7 @@ class Buffer {
 
  public:
   Buffer() = default;
-  /// Leaves the other empty, without memory.
+  /// Moves the contents. The other buffer is left empty, without memory.
   Buffer(Buffer&& other) noexcept
       : values_(std::move(other.values_)),
         size_(std::exchange(other.size_, 0)),
@@ -42,9 +43,9 @@ class Buffer {
   [[nodiscard]] const T* end() const { return values_.get() + size_; }
   [[nodiscard]] std::size_t capacity() const { return capacity_; }
 
-  /// Keeps the memory.
+  /// Sets the size to 0 and keeps the memory.
   void clear() { size_ = 0; }
-  /// Elements beyond the old size are uninitialised.
+  /// Changes the size. Elements beyond the old size are uninitialised.
   void resize(std::size_t size) {
     reserve(size);
     size_ = size;
@@ -54,7 +55,7 @@ class Buffer {
     resize(size_ + 1);
     values_[size_ - 1] = copy;
   }
-  /// Room for that many elements; at least half more than before when it has to grow.
+  /// Reserves memory for at least `capacity` elements. A growing buffer grows by at least half its old capacity.
   void reserve(std::size_t capacity) {
     if (capacity <= capacity_) return;
     const std::size_t larger = capacity > capacity_ + capacity_ / 2 ? capacity : capacity_ + capacity_ / 2;

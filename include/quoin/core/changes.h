@@ -5,28 +5,31 @@
 
 namespace quoin {
 
-/// A number that nothing in this process had before; never 0. Journals and elements of slot maps are told apart by it.
-/// Threads: any.
+/// Returns a serial number that is unique in this process and never 0.
+/// Identifies journals and slot-map elements. Threads: any.
 [[nodiscard]] std::uint64_t next_serial();
 
-/// How far a consumer has read the journal of changes of a container (Grid, DensityGrid, VoxelRegistry, Scene).
+/// A consumer's read position in the change journal of a container (Grid, DensityGrid, VoxelRegistry, Scene).
 ///
 ///   quoin::ChangeCursor cursor;                              // has read nothing
 ///   const quoin::GridChanges changes = grid.changes_since(cursor);
 ///   if (changes.all) forget_everything();                    // the first time, and rarely again
 ///   for (const quoin::IVec3 chunk : quoin::chunks_to_mesh(grid, changes)) mesh(grid.neighbourhood(chunk));
 ///
-/// Each consumer has a cursor of its own; asking moves that cursor and no other, so consumers do not know of each
-/// other. A cursor read from a container can be asked of its snapshots, and the other way round. It may also be asked
-/// of any other container, and of one that took the place of the one it read: then all has changed. Asking costs time
-/// in proportion to what changed, whatever the size of the container. A journal keeps as many changes as the container
-/// has chunks (types, instances), twice, and some thousands; a cursor that is further behind is told that all has
-/// changed. Before the first cursor there is no journal, and edits do not pay for one. When a consumer fails halfway,
-/// it goes on with a copy of the cursor from before.
+/// Each consumer owns a cursor. Reading changes moves only that cursor, so consumers are independent of each other.
+///
+/// Snapshots:  a cursor can move between a container and its snapshots.
+/// Unknown:    a cursor may also be used with an unrelated container, or with a replacement for its container. The
+///             container then reports that everything changed (`Changes::all`).
+/// Capacity:   a journal keeps up to 8,192 changes plus twice the number of chunks (types, instances). A cursor that is
+///             further behind gets `Changes::all`. No journal is kept, and edits pay nothing, until the first cursor
+///             reads.
+/// Cost:       proportional to the number of changes, independent of the container's size.
+/// Failure:    a consumer that fails halfway can retry with a copy of the cursor from before the read.
 class ChangeCursor {
  public:
   bool operator==(const ChangeCursor&) const = default;
-  /// Whether both are of the same container, at whatever times; never so of one that was not used yet.
+  /// Returns true if both cursors read the same container, at any position. Returns false if a cursor is unused.
   [[nodiscard]] bool is_beside(const ChangeCursor& other) const {
     return container_ != 0 && container_ == other.container_;
   }
@@ -38,21 +41,21 @@ class ChangeCursor {
   std::uint64_t next_ = 0;
 };
 
-/// What changed between two states of a container.
+/// The changes between two states of a container.
 template <class Change>
 struct Changes {
-  bool all = false;           ///< anything may have changed, what is no longer there included; `items` is empty
-  std::vector<Change> items;  ///< each chunk (type, handle) once, in the order in which the container lists them
+  bool all = false;           ///< anything may have changed or been removed; `items` is empty
+  std::vector<Change> items;  ///< each chunk (type, handle) once, in the container's order
 
   [[nodiscard]] bool empty() const { return !all && items.empty(); }
 };
 
-// Part of the layout of Grid and DensityGrid, of no use to callers.
+// Part of the layout of Grid and DensityGrid; not for callers.
 
 class EditNotices;
 
-/// By it a container tells the one that holds it (a grid its scene) that it was edited. It stays where it is when the
-/// container's content is moved.
+/// Notifies the owner of a container about edits, for example the scene that owns a grid.
+/// The notice stays with its container object when the container's content is moved.
 class EditNotice {
  public:
   EditNotice() = default;
@@ -63,7 +66,7 @@ class EditNotice {
   }
   ~EditNotice() = default;
 
-  /// After every edit; costs something the first time since it was last taken.
+  /// Notifies the owner; call it after every edit. Only the first call since the owner last read the notice does work.
   void give() {
     if (!is_given_) [[unlikely]]
       give_first();

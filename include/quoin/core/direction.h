@@ -13,15 +13,15 @@
 
 namespace quoin {
 
-/// The six face directions; the value is also the bit in a visible-face mask.
+/// The six face directions. The value is also the bit index in a visible-face mask.
 enum class Direction : std::uint8_t { PosX = 0, NegX = 1, PosY = 2, NegY = 3, PosZ = 4, NegZ = 5 };
 
 inline constexpr std::array<Direction, 6> kDirections = {Direction::PosX, Direction::NegX, Direction::PosY,
                                                          Direction::NegY, Direction::PosZ, Direction::NegZ};
 
-/// How a face lies in space: its axis, its sign, and the two axes along its edges.
+/// The frame of a face: its axis, its sign, and the two axes along its edges.
 ///
-/// u x v points along the outward normal, so the corners (0,0) (1,0) (1,1) (0,1) in (u,v) run counter-clockwise as
+/// u x v points along the outward normal. The corners (0,0) (1,0) (1,1) (0,1) in (u,v) therefore run counter-clockwise,
 /// seen from outside.
 struct FaceFrame {
   std::uint8_t axis;  ///< 0 x, 1 y, 2 z
@@ -34,19 +34,19 @@ inline constexpr std::array<FaceFrame, 6> kFaceFrames = {FaceFrame{0, +1, 1, 2},
                                                          FaceFrame{1, +1, 2, 0}, FaceFrame{1, -1, 0, 2},
                                                          FaceFrame{2, +1, 0, 1}, FaceFrame{2, -1, 1, 0}};
 
-/// The frame of a direction's faces.
+/// Returns the face frame of a direction.
 [[nodiscard]] constexpr const FaceFrame& frame_of(Direction d) {
   return kFaceFrames[static_cast<std::size_t>(d)];
 }
 
-/// Unit vector of a direction.
+/// Returns the unit vector of a direction.
 [[nodiscard]] inline IVec3 normal_of(Direction d) {
   IVec3 n{0};
   n[frame_of(d).axis] = frame_of(d).sign;
   return n;
 }
 
-/// The direction along which a vector points most; of equal ones x before y before z. PosX for a vector of 0.
+/// Returns the direction closest to a vector. Ties prefer x over y over z. Returns PosX for the zero vector.
 [[nodiscard]] inline Direction nearest_direction(const DVec3& vector) {
   int axis = 0;
   for (int other = 1; other < 3; ++other) {
@@ -55,13 +55,13 @@ inline constexpr std::array<FaceFrame, 6> kFaceFrames = {FaceFrame{0, +1, 1, 2},
   return static_cast<Direction>(2 * axis + (vector[axis] < 0.0 ? 1 : 0));
 }
 
-/// "+X", "-X", "+Y", "-Y", "+Z" or "-Z".
+/// Returns "+X", "-X", "+Y", "-Y", "+Z" or "-Z".
 [[nodiscard]] constexpr std::string_view name_of(Direction direction) {
   constexpr std::array<std::string_view, 6> kNames = {"+X", "-X", "+Y", "-Y", "+Z", "-Z"};
   return kNames[static_cast<std::size_t>(direction)];
 }
 
-/// A set of directions, such as the visible faces of a voxel; takes a byte.
+/// A set of directions, such as the visible faces of a voxel, stored in one byte.
 ///
 ///   const DirectionSet faces = visible_faces(chunks, types, {10, 10, 10});
 ///   if (faces.contains(Direction::PosY)) grow_grass();
@@ -73,7 +73,7 @@ class DirectionSet {
     for (const Direction direction : directions) insert(direction);
   }
   [[nodiscard]] static constexpr DirectionSet all() { return from_bits(kAll); }
-  /// Bit d is for the direction of value d: +X 0, -X 1, +Y 2, -Y 3, +Z 4, -Z 5. The two highest bits mean nothing.
+  /// Creates a set from a bit mask: +X is bit 0, then -X, +Y, -Y, +Z, -Z. The two highest bits are ignored.
   [[nodiscard]] static constexpr DirectionSet from_bits(std::uint8_t bits) {
     DirectionSet set;
     set.bits_ = bits & kAll;
@@ -88,7 +88,7 @@ class DirectionSet {
   [[nodiscard]] constexpr bool empty() const { return bits_ == 0; }
   constexpr bool operator==(const DirectionSet&) const = default;
 
-  /// Goes over the directions of a set in the order of kDirections.
+  /// Iterates over the directions of a set in the order of kDirections.
   class Iterator {
    public:
     using iterator_category = std::forward_iterator_tag;
@@ -112,7 +112,7 @@ class DirectionSet {
     constexpr bool operator==(const Iterator&) const = default;
 
    private:
-    std::uint8_t bits_ = 0;  // of the directions that are still to come
+    std::uint8_t bits_ = 0;  // the remaining directions
   };
   [[nodiscard]] constexpr Iterator begin() const { return Iterator(bits_); }
   [[nodiscard]] constexpr Iterator end() const { return Iterator(); }

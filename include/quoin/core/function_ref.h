@@ -9,15 +9,15 @@ namespace quoin {
 template <class Signature>
 class FunctionRef;
 
-/// A callable that somebody else owns, plain functions too, for the length of a call that takes it as an argument.
-/// Allocates nothing. Lifetime: the callable must outlive it.
+/// A non-owning reference to a callable, also to a plain function. Use it for callback parameters.
+/// Never allocates. Lifetime: the callable must outlive the reference.
 template <class Result, class... Arguments>
 class FunctionRef<Result(Arguments...)> {
  public:
   template <class Callable>
     requires(!std::is_same_v<std::remove_cvref_t<Callable>, FunctionRef> &&
              std::is_invocable_r_v<Result, Callable&, Arguments...>)
-  FunctionRef(Callable&& callable) {  // NOLINT(bugprone-forwarding-reference-overload): not of a FunctionRef, see above
+  FunctionRef(Callable&& callable) {  // NOLINT(bugprone-forwarding-reference-overload): never a FunctionRef, see above
     using Called = std::remove_reference_t<Callable>;
     if constexpr (std::is_function_v<Called>) {
       callable_.function = reinterpret_cast<void (*)()>(&callable);

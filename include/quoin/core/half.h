@@ -5,16 +5,17 @@
 
 namespace quoin {
 
-/// The bits of an IEEE 754 half: 11 bits of precision, up to 65,504, down to 2^-24.
+/// The bits of an IEEE 754 half: 11 bits of precision, largest value 65,504, smallest positive value 2^-24.
 using Half = std::uint16_t;
 
-/// The largest finite half, and the smallest above 0.
+/// The largest finite half and the smallest positive half.
 inline constexpr float kMaxHalf = 65504.0F;
 inline constexpr float kMinHalf = 1.0F / 16777216.0F;
 
-/// Exact; infinities and NaN too.
+/// Converts a half to a float. Exact, also for infinities and NaN.
 [[nodiscard]] constexpr float float_from_half(Half half) {
-  // The exponent is moved into a float's place and mended by a product, which also makes subnormals normal.
+  // Moves the exponent into the float's exponent field, then corrects its bias with a multiplication. The
+  // multiplication also normalises subnormals.
   constexpr float kScale = std::bit_cast<float>(std::uint32_t{(127 + 112) << 23});
   const std::uint32_t magnitude = std::uint32_t{half & 0x7FFFU} << 13;
   std::uint32_t bits = std::bit_cast<std::uint32_t>(std::bit_cast<float>(magnitude) * kScale);
@@ -22,7 +23,8 @@ inline constexpr float kMinHalf = 1.0F / 16777216.0F;
   return std::bit_cast<float>(bits | std::uint32_t{half & 0x8000U} << 16);
 }
 
-/// To the nearest half, ties to even; beyond the largest, infinity; NaN stays NaN. As F16C does.
+/// Rounds a float to the nearest half, ties to even, as F16C does. Values that round above kMaxHalf become infinity.
+/// NaN stays NaN.
 [[nodiscard]] constexpr Half half_from_float(float value) {
   const std::uint32_t bits = std::bit_cast<std::uint32_t>(value);
   const auto sign = static_cast<std::uint32_t>(bits >> 16 & 0x8000U);
@@ -30,7 +32,7 @@ inline constexpr float kMinHalf = 1.0F / 16777216.0F;
   if (magnitude > 0x7F80'0000U) return static_cast<Half>(sign | 0x7E00U | (magnitude >> 13 & 0x1FFU));
   if (magnitude >= 0x4780'0000U) return static_cast<Half>(sign | 0x7C00U);  // 65,536 and more
   if (magnitude < 0x3880'0000U) {
-    // Subnormal: adding 0.5 leaves the half's bits at the bottom of the float's, rounded.
+    // Subnormal: adding 0.5 puts the rounded bits of the half into the lowest bits of the float.
     const float sum = std::bit_cast<float>(magnitude) + 0.5F;
     return static_cast<Half>(sign | (std::bit_cast<std::uint32_t>(sum) - std::bit_cast<std::uint32_t>(0.5F)));
   }

@@ -4,7 +4,7 @@
 
 namespace quoin {
 
-/// Spreads the bits of a word: every input bit changes about half of the output's.
+/// Mixes the bits of a word. Every input bit changes about half of the output bits.
 ///
 /// Source: C. Wellons, "Prospecting for hash functions" (2018), the function called lowbias32.
 [[nodiscard]] constexpr std::uint32_t mix_bits(std::uint32_t x) {

@@ -5,28 +5,29 @@
 
 namespace quoin {
 
-/// A picture as files hold it: 8-bit sRGB, rows from the top, pixels from the left, channels interleaved.
+/// An 8-bit sRGB image as stored in files. Rows run from the top, pixels from the left; channels are interleaved.
 struct Image {
   int width = 0;
   int height = 0;
   std::vector<std::uint8_t> rgb;  ///< 3 * width * height
 };
 
-/// A picture with alpha: 8-bit sRGB and linear coverage, not multiplied by it; as Image else.
+/// An 8-bit sRGB image with linear alpha, not premultiplied. The layout is the same as in Image.
 struct AlphaImage {
   int width = 0;
   int height = 0;
   std::vector<std::uint8_t> rgba;  ///< 4 * width * height
 };
 
-/// One float a pixel, rows from the top, pixels from the left; pictures have their depth so.
+/// An image with one float per pixel, such as a depth buffer. Rows run from the top, pixels from the left.
 struct FloatImage {
   int width = 0;
   int height = 0;
   std::vector<float> values;  ///< width * height
 };
 
-/// Linear light, three floats a pixel, rows from the top, pixels from the left, channels interleaved.
+/// An image of linear light with three floats per pixel. Rows run from the top, pixels from the left; channels are
+/// interleaved.
 struct RadianceImage {
   int width = 0;
   int height = 0;

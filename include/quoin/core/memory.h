@@ -5,15 +5,19 @@
 
 namespace quoin {
 
-/// Bytes that this process can still use before it is ended for it: by the machine's memory and swap, by its group's
-/// limit (cgroups) and by its own (RLIMIT_AS). Nothing where the system does not say.
+/// Returns the memory still available to this process, in bytes. Exceeding it can end the process.
+/// The result is the lowest of three limits: free system memory and swap, the cgroup limit, and RLIMIT_AS.
+/// Returns nullopt if the system reports none of them.
 [[nodiscard]] std::optional<std::uint64_t> available_memory();
 
-/// From now on each large block (of 32 KiB or more) that this process frees goes back to the system at once, so that
-/// what is resident follows what is used: a streamed world keeps its budget by it, and takes a fifth more without. It
-/// is a setting of the whole process, for programs that stream worlds: call it first in `main`. The price is time for
-/// new pages, 8 to 20 % of a flight's. False, and nothing is changed, where the C library is not glibc; no effect where
-/// another allocator took its place. See docs/performance.md, "Worlds larger than memory".
+/// Makes the C library return each freed block of 32 KiB or more to the system at once, for the whole process.
+///
+/// Resident memory then follows the memory in use. Programs that stream worlds need this to keep their memory budget;
+/// without it they use about 20 % more. Call it first in `main`.
+/// Cost:     time for new pages: 8 to 20 % of a flight through a streamed world.
+/// Returns:  false, without a change, if the C library is not glibc. Has no effect if another allocator replaces
+///           malloc.
+/// See docs/performance.md, "Worlds larger than memory".
 bool return_freed_memory();
 
 }  // namespace quoin

@@ -9,8 +9,8 @@
 
 namespace quoin {
 
-/// Counts the owners of an object that is shared until it is written: derive from it, own by Ref. A copy of the object
-/// has owners of its own.
+/// Base class that counts the owners of a copy-on-write object; owners hold it by Ref. A copy of the object starts
+/// without owners.
 class RefCounted {
  public:
   RefCounted() = default;
@@ -26,17 +26,18 @@ class RefCounted {
   mutable std::atomic<std::uint32_t> owners_{0};
 };
 
-/// One of the owners of a T, which derives from RefCounted; the last one destroys it. Null by default.
+/// A reference-counted pointer to a T, which derives from RefCounted. The last owner destroys the object.
+/// Null by default.
 ///
-/// Requires: `*` and `->` are of one that is not null; this is not checked.
-/// Copy on write: what `is_shared` is not to be changed; `make_own` puts a copy in its place.
-/// Threads: owners of one object may come and go on several threads at once, each Ref by itself on one.
+/// Requires: `*` and `->` are used only if the pointer is not null; this is not checked.
+/// Copy on write: do not change an object while `is_shared` is true. `make_own` replaces it with a copy first.
+/// Threads: several threads may add and release owners of one object at once. Use each Ref on one thread at a time.
 template <class T>
 class Ref {
  public:
   Ref() noexcept = default;
   Ref(std::nullptr_t) noexcept {}
-  /// Owns an object that has no owner yet, or shares it with its owners.
+  /// Becomes an owner of the object, alone or together with its existing owners.
   explicit Ref(T* object) noexcept : object_(object) { acquire(); }
   Ref(const Ref& other) noexcept : object_(other.object_) { acquire(); }
   Ref(Ref&& other) noexcept : object_(std::exchange(other.object_, nullptr)) {}
@@ -52,7 +53,7 @@ class Ref {
 
   void reset() noexcept {
     T* object = std::exchange(object_, nullptr);
-    // Whoever is last sees what the others did before they went.
+    // The acquire-release order lets the last owner see the writes of all other owners before it deletes the object.
     if (object != nullptr && object->owners_.fetch_sub(1, std::memory_order_acq_rel) == 1) delete object;
   }
   void swap(Ref& other) noexcept { std::swap(object_, other.object_); }
@@ -63,12 +64,13 @@ class Ref {
   bool operator==(const Ref& other) const = default;
   bool operator==(std::nullptr_t) const { return object_ == nullptr; }
 
-  /// Whether there are other owners. Requires: it is not null.
+  /// Returns true if the object has other owners. Requires: not null.
   [[nodiscard]] bool is_shared() const {
     QUOIN_ASSERT(object_ != nullptr, "there is an object");
     return object_->owners_.load(std::memory_order_acquire) != 1;
   }
-  /// Copies what it shares; then it is the only owner. Requires: it is not null.
+  /// Replaces a shared object with a copy, so that this is its only owner. Does nothing if the object is not shared.
+  /// Requires: not null.
   void make_own() {
     if (is_shared()) *this = Ref(new T(*object_));
   }

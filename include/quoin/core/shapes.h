@@ -4,19 +4,19 @@
 
 namespace quoin {
 
-/// A box in any place and rotation, in world units.
+/// A box with any position and rotation, in world units.
 struct OrientedBox {
   DVec3 centre{0.0};
-  DVec3 half_size{0.5};                ///< 0 or more: a box, a plate, a rod or a point
-  DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< world from box; of any length; a zero one counts as no rotation
+  DVec3 half_size{0.5};                ///< 0 or more per axis; zeros give a plate, a rod or a point
+  DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< world from box; need not be normalised; zero counts as no rotation
 };
 
-/// All that is within a distance of a line between two points, in world units: a rod with round ends, or a ball.
-// The radius comes first, so that what is in braces is a box or a capsule, and never either.
+/// A capsule in world units: all points within `radius` of a line segment.
+// The radius comes first, so that a braced initialiser fits either a box or a capsule but never both.
 struct Capsule {
-  double radius = 0.5;  ///< 0 or less: it meets nothing
+  double radius = 0.5;  ///< 0 or less: the capsule hits nothing
   DVec3 centre{0.0};
-  DVec3 half_axis{0.0, 0.5, 0.0};  ///< from the centre to the middle of one of the ends; 0: a ball
+  DVec3 half_axis{0.0, 0.5, 0.0};  ///< from the centre to one end of the segment; zero gives a ball
 };
 
 }  // namespace quoin

@@ -14,28 +14,31 @@
 
 namespace quoin {
 
-/// Names an element of a SlotMap<T>; stays invalid for ever once that element is removed. The default names nothing.
-/// In a copy of the map (SlotMap::copied) it names the copy of that element. In any other map it names nothing, also
-/// where both were filled alike; what is inserted into one of the two after the copy has no name in the other.
+/// A handle to an element of a SlotMap<T>. It becomes invalid for good when the element is removed.
+/// A default handle is invalid.
+///
+/// In a copy of the map (SlotMap::copied), the handle refers to the copied element. It is invalid in every other map,
+/// even if both maps were filled in the same way. An element inserted after the copy has no handle in the other map.
 template <class T>
 struct Handle {
-  std::uint32_t index = 0xFFFFFFFFu;  ///< the slot
-  std::uint64_t generation = 0;       ///< of the element: no other one of this process has the same; 0: none
+  std::uint32_t index = 0xFFFFFFFFu;  ///< slot index
+  std::uint64_t generation = 0;       ///< unique per element in this process; 0 means none
 
   bool operator==(const Handle& other) const = default;
-  /// By slot; gives a stable order for things drawn at equal depth.
+  /// Orders handles by slot, for a stable order of objects drawn at equal depth.
   bool operator<(const Handle& other) const {
     return index != other.index ? index < other.index : generation < other.generation;
   }
 };
 
-/// Values by generational handle: O(1) insert, remove and find; iteration in slot order. An element stays at its
-/// address until it is removed, whatever else is inserted, and when the map is moved.
+/// A container that finds its values by generational handle. Insert, remove and find are O(1); iteration is in slot
+/// order.
+/// An element keeps its address until it is removed, even if other elements are inserted or the map is moved.
 template <class T>
 class SlotMap {
  public:
   SlotMap() = default;
-  /// Leaves the other empty; its handles name the elements here.
+  /// Moves the elements and leaves the other map empty. Existing handles stay valid in this map.
   SlotMap(SlotMap&& other) noexcept
       : pages_(std::exchange(other.pages_, {})),
         free_(std::exchange(other.free_, {})),
@@ -51,8 +54,8 @@ class SlotMap {
   }
   ~SlotMap() = default;
 
-  /// Puts a value in a free slot. Returns its handle.
-  /// Errors: bad_alloc, and what moving a T throws; the map is then as it was.
+  /// Inserts a value into a free slot and returns its handle.
+  /// Errors: bad_alloc, or an exception from moving a T. The map is then unchanged.
   Handle<T> insert(T value) {
     const std::uint32_t index = next_index();
     if (index / kPage == pages_.size()) pages_.push_back(std::make_unique<Page>());
@@ -67,13 +70,13 @@ class SlotMap {
     ++size_;
     return {index, slot.generation};
   }
-  /// The slot that the next element is put into: Handle::index of what `insert` returns.
+  /// Returns the slot of the next inserted element (the Handle::index that `insert` returns next).
   [[nodiscard]] std::uint32_t next_index() const { return free_.empty() ? count_ : free_.back(); }
 
-  /// Ends the element and its handle. Returns false when the handle names nothing.
+  /// Removes an element and invalidates its handle. Returns false if the handle is invalid.
   bool remove(Handle<T> handle) {
     if (find(handle) == nullptr) return false;
-    free_.push_back(handle.index);  // first, since it may throw
+    free_.push_back(handle.index);  // first, because it may throw
     Slot& slot = slot_at(handle.index);
     slot.value.reset();
     slot.generation = 0;
@@ -81,7 +84,7 @@ class SlotMap {
     return true;
   }
 
-  /// Null when the handle names nothing (never inserted, or removed since). Lifetime: the map owns the element.
+  /// Returns the element, or null if the handle is invalid. Lifetime: the map owns the element.
   [[nodiscard]] const T* find(Handle<T> handle) const {
     if (handle.index >= count_) return nullptr;
     const Slot& slot = slot_at(handle.index);
@@ -89,7 +92,7 @@ class SlotMap {
   }
   [[nodiscard]] T* find(Handle<T> handle) { return const_cast<T*>(std::as_const(*this).find(handle)); }
 
-  /// Requires: the handle names an element.
+  /// Returns the element. Requires: the handle is valid.
   [[nodiscard]] const T& operator[](Handle<T> handle) const {
     const T* found = find(handle);
     QUOIN_ASSERT(found != nullptr, "the handle names an element");
@@ -100,14 +103,14 @@ class SlotMap {
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] bool empty() const { return size_ == 0; }
 
-  /// The handles of all elements, in slot order.
+  /// Returns the handles of all elements, in slot order.
   [[nodiscard]] std::vector<Handle<T>> handles() const {
     std::vector<Handle<T>> all;
     all.reserve(size_);
     for_each([&](Handle<T> handle, const T&) { all.push_back(handle); });
     return all;
   }
-  /// The handle of the element in a slot, if any.
+  /// Returns the handle of the element in a slot, or nullopt if the slot is empty.
   [[nodiscard]] std::optional<Handle<T>> handle_at(std::uint32_t index) const {
     if (index >= count_ || !slot_at(index).value.has_value()) return std::nullopt;
     return Handle<T>{index, slot_at(index).generation};
@@ -125,7 +128,7 @@ class SlotMap {
     }
   }
 
-  /// A map with the same handles, of `copy(value)`.
+  /// Returns a map with the same handles, in which each value is `copy(value)`.
   template <class Copy>
   [[nodiscard]] SlotMap copied(Copy&& copy) const {
     SlotMap made;
@@ -146,7 +149,7 @@ class SlotMap {
  private:
   struct Slot {
     std::optional<T> value;
-    std::uint64_t generation = 0;  // of the value; 0: none
+    std::uint64_t generation = 0;  // of the value; 0 means none
   };
   static constexpr std::size_t kPage = 32;
   using Page = std::array<Slot, kPage>;
@@ -156,16 +159,16 @@ class SlotMap {
 
   std::vector<std::unique_ptr<Page>> pages_;
   std::vector<std::uint32_t> free_;
-  std::uint32_t count_ = 0;  // slots that were ever used
+  std::uint32_t count_ = 0;  // number of slots ever used
   std::size_t size_ = 0;
 };
 
 }  // namespace quoin
 
-/// So that handles are keys of std::unordered_map.
+/// Hashes handles, so that they can be keys of std::unordered_map.
 template <class T>
 struct std::hash<quoin::Handle<T>> {
   [[nodiscard]] std::size_t operator()(const quoin::Handle<T>& handle) const noexcept {
-    return std::hash<std::uint64_t>()(handle.generation);  // no two elements have the same
+    return std::hash<std::uint64_t>()(handle.generation);  // unique per element
   }
 };

@@ -5,7 +5,7 @@
 
 namespace quoin {
 
-/// "1,234,567", for a person.
+/// Formats a number with thousands separators for people: "1,234,567".
 [[nodiscard]] std::string with_thousands(std::int64_t number);
 
 }  // namespace quoin

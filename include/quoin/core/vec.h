@@ -10,7 +10,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
 
-// glm is part of Quoin's interface: whoever includes it with other settings would hand over other bytes.
+// glm types are part of Quoin's interface. Other glm settings would change their memory layout.
 #if defined(GLM_FORCE_QUAT_DATA_WXYZ) || defined(GLM_FORCE_QUAT_CTOR_XYZW)
 #error "Quoin needs glm's quaternions as they are by default: stored as x, y, z, w and made of (w, x, y, z)"
 #endif
@@ -19,24 +19,24 @@ namespace quoin {
 
 /// Integer voxel or chunk coordinates.
 using IVec3 = glm::ivec3;
-/// Mesh vertices: float, relative to a grid or a chunk.
+/// Mesh vertex positions in float, relative to a grid or a chunk.
 using Vec3 = glm::vec3;
-/// World positions: double.
+/// World positions in double.
 using DVec3 = glm::dvec3;
-/// Rotations. Constructor order is glm's: (w, x, y, z).
+/// Rotations. The constructor takes (w, x, y, z), as in glm.
 using DQuat = glm::dquat;
 
 static_assert(sizeof(IVec3) == 12 && sizeof(Vec3) == 12 && sizeof(DVec3) == 24 && alignof(DVec3) == alignof(double) &&
                   sizeof(DQuat) == 32 && alignof(DQuat) == alignof(double),
               "Quoin needs glm's types packed, without GLM_FORCE_DEFAULT_ALIGNED_GENTYPES");
 
-/// A point, which is no voxel. Functions of a voxel or chunk refuse it, and `voxel_of` says in which voxel it lies. The
-/// members of IBox and PlacedVoxel cannot refuse it: see `box_around`.
+/// A floating-point position, as opposed to a voxel. Functions that take a voxel or a chunk reject it at compile time;
+/// convert it with `voxel_of`. The members of IBox and PlacedVoxel cannot reject it: see `box_around`.
 template <std::floating_point T>
 using Point = glm::vec<3, T, glm::defaultp>;
 
-/// The voxel in which a point of a grid lies; of a point between two the greater one, along each axis. What is beyond
-/// the int32 range counts as its end, NaN as 0.
+/// Returns the voxel that contains a point in grid space. A point on the face between two voxels lies in the voxel on
+/// the greater side, on each axis. Coordinates beyond the int32 range are clamped to it; NaN counts as 0.
 [[nodiscard]] inline IVec3 voxel_of(DVec3 point) {
   const auto whole = [](double x) {
     constexpr double kLeast = std::numeric_limits<int>::min();
@@ -46,14 +46,15 @@ using Point = glm::vec<3, T, glm::defaultp>;
   return {whole(point.x), whole(point.y), whole(point.z)};
 }
 
-/// Neither infinite nor NaN in any component.
+/// Returns true if no component is infinite or NaN.
 [[nodiscard]] inline bool is_finite(DVec3 v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
 /// A box of whole voxels (or chunks): `min` inclusive, `max` exclusive.
 ///
-/// Empty when any component of `max` is not greater than that of `min`; the default box is empty.
+/// The box is empty if any component of `max` is not greater than the same component of `min`. The default box is
+/// empty.
 struct IBox {
   IVec3 min{0};
   IVec3 max{0};
@@ -66,7 +67,7 @@ struct IBox {
   bool operator==(const IBox& other) const { return min == other.min && max == other.max; }
 };
 
-/// Orders coordinates by z, then y, then x, as chunks are listed: for std::map and std::sort.
+/// Orders coordinates by z, then y, then x, for std::map and std::sort. Chunks are listed in this order.
 struct ByZyx {
   [[nodiscard]] constexpr bool operator()(IVec3 a, IVec3 b) const {
     if (a.z != b.z) return a.z < b.z;
@@ -74,7 +75,7 @@ struct ByZyx {
   }
 };
 
-/// Spreads integer coordinates (of voxels, of chunks) over a hash table: for std::unordered_map.
+/// Hashes integer coordinates (of voxels or chunks), for std::unordered_map.
 struct CoordinateHash {
   [[nodiscard]] std::size_t operator()(IVec3 c) const {
     std::uint64_t h = 0;
@@ -85,14 +86,14 @@ struct CoordinateHash {
   }
 };
 
-/// The smallest box that contains both; an empty box adds nothing.
+/// Returns the smallest box that contains both boxes. An empty box adds nothing.
 [[nodiscard]] inline IBox unite(const IBox& a, const IBox& b) {
   if (a.empty()) return b;
   if (b.empty()) return a;
   return {glm::min(a.min, b.min), glm::max(a.max, b.max)};
 }
 
-/// The box that both cover; empty when they do not meet.
+/// Returns the overlap of both boxes; empty if they do not overlap.
 [[nodiscard]] inline IBox intersect(const IBox& a, const IBox& b) {
   return {glm::max(a.min, b.min), glm::min(a.max, b.max)};
 }
@@ -103,22 +104,24 @@ struct DBox {
   DVec3 max{-std::numeric_limits<double>::infinity()};
 
   [[nodiscard]] bool empty() const { return !(min.x <= max.x && min.y <= max.y && min.z <= max.z); }
-  /// Grows to hold a point.
+  /// Grows the box to contain a point.
   void extend(DVec3 p) {
     min = glm::min(min, p);
     max = glm::max(max, p);
   }
 };
 
-/// The voxels that a box of a grid's space meets, but in a face, edge or corner alone; a box without a volume has those
-/// in which its points lie. Empty of an empty one, and of one beyond the int32 range.
+/// Returns the voxels whose interior overlaps a box in grid space. Voxels that only touch a face, an edge or a
+/// corner of the box are left out. A box without volume gives the voxels that contain its points.
+/// Returns an empty box for an empty box, and for a box above the int32 range. Below the int32 range, the result is the
+/// lowest layer of voxels.
 [[nodiscard]] inline IBox box_around(const DBox& box) {
   if (box.empty()) return {};
   const IVec3 min = voxel_of(box.min);
   return {min, glm::max(voxel_of(glm::ceil(box.max)), voxel_of(DVec3(min) + 1.0))};
 }
 
-/// Corner 0 to 7 of a box: at its greater x, y and z where bit 0, 1 and 2 of `index` are set.
+/// Returns corner `index` (0 to 7) of a box. Bits 0, 1 and 2 of `index` select the greater x, y and z.
 [[nodiscard]] inline DVec3 box_corner(const DBox& box, int index) {
   return {((index & 1) != 0 ? box.max : box.min).x, ((index & 2) != 0 ? box.max : box.min).y,
           ((index & 4) != 0 ? box.max : box.min).z};
