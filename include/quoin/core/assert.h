@@ -12,12 +12,12 @@ struct AssertFailure {
   std::source_location location;
 };
 
-/// Handles a failed assertion. The process aborts when the handler returns.
-/// The handler may throw or exit instead. A throw also ends the process if the failing function is noexcept.
+/// Handles a failed assertion. The process aborts when the handler returns. The handler may throw or exit instead. A
+/// throw also ends the process if the failing function is noexcept.
 using AssertHandler = void (*)(const AssertFailure& failure);
 
-/// Replaces the assert handler of the whole process and returns the previous handler.
-/// Null restores the default handler, which writes one line to standard error.
+/// Replaces the assert handler of the whole process and returns the previous handler. Null restores the default
+/// handler, which writes one line to standard error.
 /// Threads: any. The handler runs on the thread that failed the assertion.
 AssertHandler set_assert_handler(AssertHandler handler);
 

@@ -12,8 +12,8 @@
 
 namespace quoin {
 
-/// An orientation that maps the coordinate axes onto each other: a signed axis permutation.
-/// There are 48 of them. 24 are rotations by quarter turns; the other 24 combine such a rotation with a mirror.
+/// An orientation that maps the coordinate axes onto each other: a signed axis permutation. There are 48 of them. 24
+/// are rotations by quarter turns; the other 24 combine such a rotation with a mirror.
 ///
 /// Usage: const auto turned = AxisOrientation::quarter_turns(1, 1) * AxisOrientation::mirror(0);  // the mirror first
 class AxisOrientation {
@@ -22,9 +22,9 @@ class AxisOrientation {
 
   /// Creates the identity.
   constexpr AxisOrientation() = default;
-  /// Returns the rotation about an axis (0 x, 1 y, 2 z) by `turns` quarter turns.
-  /// Positive turns are counter-clockwise, seen from the positive end of the axis: a turn about z maps +x to +y.
-  /// Negative turns rotate the other way. Requires: 0 <= axis < 3.
+  /// Returns the rotation about an axis (0 x, 1 y, 2 z) by `turns` quarter turns. Positive turns are counter-clockwise,
+  /// seen from the positive end of the axis: a turn about z maps +x to +y. Negative turns rotate the other way.
+  /// Requires: 0 <= axis < 3.
   [[nodiscard]] static constexpr AxisOrientation quarter_turns(int axis, int turns) {
     QUOIN_ASSERT(axis >= 0 && axis < 3, "0 <= axis < 3");
     AxisOrientation quarter;

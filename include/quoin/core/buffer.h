@@ -8,9 +8,9 @@
 
 namespace quoin {
 
-/// A growable array of trivially copyable values that leaves new elements uninitialised.
-/// Use it for large output that is rebuilt often. It can be moved but not copied.
-/// Pointers and iterators stay valid until the buffer grows beyond its capacity.
+/// A growable array of trivially copyable values that leaves new elements uninitialised. Use it for large output that
+/// is rebuilt often. It can be moved but not copied. Pointers and iterators stay valid until the buffer grows beyond
+/// its capacity.
 /// Requires: indices are less than `size()`; this is not checked.
 template <class T>
 class Buffer {

@@ -5,8 +5,8 @@
 
 namespace quoin {
 
-/// Returns a serial number that is unique in this process and never 0.
-/// Identifies journals and slot-map elements. Threads: any.
+/// Returns a serial number that is unique in this process and never 0. Identifies journals and slot-map elements.
+/// Threads: any.
 [[nodiscard]] std::uint64_t next_serial();
 
 /// A consumer's read position in the change journal of a container (Grid, DensityGrid, VoxelRegistry, Scene).
@@ -54,8 +54,8 @@ struct Changes {
 
 class EditNotices;
 
-/// Notifies the owner of a container about edits, for example the scene that owns a grid.
-/// The notice stays with its container object when the container's content is moved.
+/// Notifies the owner of a container about edits, for example the scene that owns a grid. The notice stays with its
+/// container object when the container's content is moved.
 class EditNotice {
  public:
   EditNotice() = default;

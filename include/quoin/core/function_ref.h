@@ -9,8 +9,8 @@ namespace quoin {
 template <class Signature>
 class FunctionRef;
 
-/// A non-owning reference to a callable, also to a plain function. Use it for callback parameters.
-/// Never allocates. Lifetime: the callable must outlive the reference.
+/// A non-owning reference to a callable, also to a plain function. Use it for callback parameters. Never allocates.
+/// Lifetime: the callable must outlive the reference.
 template <class Result, class... Arguments>
 class FunctionRef<Result(Arguments...)> {
  public:

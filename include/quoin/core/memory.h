@@ -5,9 +5,9 @@
 
 namespace quoin {
 
-/// Returns the memory still available to this process, in bytes. Exceeding it can end the process.
-/// The result is the lowest of three limits: free system memory and swap, the cgroup limit, and RLIMIT_AS.
-/// Returns nullopt if the system reports none of them.
+/// Returns the memory still available to this process, in bytes. Exceeding it can end the process. The result is the
+/// lowest of three limits: free system memory and swap, the cgroup limit, and RLIMIT_AS. Returns nullopt if the system
+/// reports none of them.
 [[nodiscard]] std::optional<std::uint64_t> available_memory();
 
 /// Makes the C library return each freed block of 32 KiB or more to the system at once, for the whole process.

@@ -33,14 +33,13 @@ struct Error {
   std::optional<std::uint64_t> byte_offset;  ///< Position in the file, counted from 0.
 };
 
-/// Formats an error, for example "castle.vox: byte 1204: chunk SIZE claims 4294967295 x 40 x 40 voxels".
-/// A missing path or byte offset is left out.
+/// Formats an error, for example "castle.vox: byte 1204: chunk SIZE claims 4294967295 x 40 x 40 voxels". A missing path
+/// or byte offset is left out.
 [[nodiscard]] std::string to_string(const Error& error);
 
-/// A value or an Error: a tl::expected that converts implicitly from Error.
-/// Callers propagate an error with `return loaded.error();`. Used only for failures caused by outside data or the
-/// system.
-/// Broken preconditions assert instead (QUOIN_ASSERT).
+/// A value or an Error: a tl::expected that converts implicitly from Error. Callers propagate an error with `return
+/// loaded.error();`. Used only for failures caused by outside data or the system. Broken preconditions assert instead
+/// (QUOIN_ASSERT).
 template <class T>
 class [[nodiscard]] Result : public tl::expected<T, Error> {
  public:

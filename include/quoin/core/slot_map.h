@@ -14,8 +14,8 @@
 
 namespace quoin {
 
-/// A handle to an element of a SlotMap<T>. It becomes invalid for good when the element is removed.
-/// A default handle is invalid.
+/// A handle to an element of a SlotMap<T>. It becomes invalid for good when the element is removed. A default handle is
+/// invalid.
 ///
 /// In a copy of the map (SlotMap::copied), the handle refers to the copied element. It is invalid in every other map,
 /// even if both maps were filled in the same way. An element inserted after the copy has no handle in the other map.
@@ -32,8 +32,7 @@ struct Handle {
 };
 
 /// A container that finds its values by generational handle. Insert, remove and find are O(1); iteration is in slot
-/// order.
-/// An element keeps its address until it is removed, even if other elements are inserted or the map is moved.
+/// order. An element keeps its address until it is removed, even if other elements are inserted or the map is moved.
 template <class T>
 class SlotMap {
  public:

@@ -112,9 +112,9 @@ struct DBox {
 };
 
 /// Returns the voxels whose interior overlaps a box in grid space. Voxels that only touch a face, an edge or a
-/// corner of the box are left out. A box without volume gives the voxels that contain its points.
-/// Returns an empty box for an empty box, and for a box above the int32 range. Below the int32 range, the result is the
-/// lowest layer of voxels.
+/// corner of the box are left out. A box without volume gives the voxels that contain its points. Returns an empty box
+/// for an empty box, and for a box above the int32 range. Below the int32 range, the result is the lowest layer of
+/// voxels.
 [[nodiscard]] inline IBox box_around(const DBox& box) {
   if (box.empty()) return {};
   const IVec3 min = voxel_of(box.min);

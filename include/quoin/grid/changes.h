@@ -20,20 +20,20 @@ namespace quoin {
 class Grid;
 class DensityGrid;
 
-/// Some of the 256 slabs of a chunk: each is 4x4 rows of 64 voxels along x, as chunks are stored.
+/// A set of the 256 slabs of a chunk. A slab is 4x4 rows of 64 voxels along x, the storage unit of a chunk.
 class ChunkSlabs {
  public:
-  /// None.
+  /// Creates an empty set.
   ChunkSlabs() = default;
   [[nodiscard]] static ChunkSlabs all() {
     ChunkSlabs slabs;
     slabs.words_.fill(~std::uint64_t{0});
     return slabs;
   }
-  /// Those that a box in the chunk's coordinates reaches. Requires: it lies within 0 to 64.
+  /// Returns the slabs that a box in chunk coordinates overlaps. Requires: the box lies within 0 to 64.
   [[nodiscard]] static ChunkSlabs of(const IBox& box);
 
-  /// Adds that of a row. Requires: 0 <= y, z < 64.
+  /// Adds the slab of row (y, z). Requires: 0 <= y, z < 64.
   void add(int y, int z) {
     QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");
     words_[static_cast<std::size_t>(z >> 4)] |= std::uint64_t{1} << bit_of(y, z);
@@ -41,17 +41,18 @@ class ChunkSlabs {
   void add(const ChunkSlabs& others) {
     for (std::size_t i = 0; i < words_.size(); ++i) words_[i] |= others.words_[i];
   }
-  /// Whether that of a row is among them. Requires: 0 <= y, z < 64.
+  /// Returns true if the set contains the slab of row (y, z). Requires: 0 <= y, z < 64.
   [[nodiscard]] bool has(int y, int z) const {
     QUOIN_ASSERT((y | z) >= 0 && (y | z) < kChunkEdge, "0 <= y, z < 64");
     return (words_[static_cast<std::size_t>(z >> 4)] >> bit_of(y, z) & 1U) != 0;
   }
-  /// Of the 16 slabs at a row's z, a bit each by y. Requires: 0 <= z < 64.
+  /// Returns the 16 slabs at z as a mask; bit y / 4 is the slab of row (y, z). Requires: 0 <= z < 64.
   [[nodiscard]] std::uint32_t along_y(int z) const {
     QUOIN_ASSERT(z >= 0 && z < kChunkEdge, "0 <= z < 64");
     return static_cast<std::uint32_t>(words_[static_cast<std::size_t>(z >> 4)] >> (16 * (z >> 2 & 3)) & 0xFFFFU);
   }
-  /// Of the 4x4 slabs from (y, z) on a bit each, [z][y]. Requires: y and z are 0, 16, 32 or 48.
+  /// Returns the 4x4 slabs from row (y, z) on as a mask; bit j + 4 * k is the slab of row (y + 4 * j, z + 4 * k).
+  /// Requires: y and z are 0, 16, 32 or 48.
   [[nodiscard]] std::uint32_t block(int y, int z) const {
     QUOIN_ASSERT((y | z) >= 0 && ((y | z) & ~48) == 0, "0, 16, 32 or 48");
     std::uint32_t slabs = 0;
@@ -67,36 +68,40 @@ class ChunkSlabs {
   std::array<std::uint64_t, 4> words_{};  // [z / 16]: bit y / 4 + 16 (z / 4 % 4)
 };
 
-/// Voxels of one chunk that changed.
+/// The changed voxels of a chunk.
 struct ChunkChange {
   IVec3 chunk{0};
-  IBox box;  ///< the smallest around them, in the chunk's coordinates
-  /// Bit Neighbourhood::index(dx, dy, dz): the chunk at that offset holds one of their 26 neighbours.
+  IBox box;  ///< smallest box around the changed voxels, in chunk coordinates
+  /// Bit Neighbourhood::index(dx, dy, dz) is set if the chunk at that offset contains one of the 26 neighbours of a
+  /// changed voxel.
   std::uint32_t neighbours = 0;
-  ChunkSlabs slabs;  ///< those that hold one of them
-  /// False: nothing was edited, the chunk only came into memory or went out of it (Grid::load_chunk).
+  ChunkSlabs slabs;  ///< the slabs that contain a changed voxel
+  /// False if the chunk was only loaded or unloaded (Grid::load_chunk, Grid::unload_chunk), without an edit.
   bool is_edit = true;
 
-  /// Whether the mesh of the chunk at an offset may have changed. Requires: -1 <= offset.x, offset.y, offset.z <= 1.
+  /// Returns true if the mesh of the chunk at an offset may have changed. Requires: -1 <= offset.x, offset.y, offset.z
+  /// <= 1.
   [[nodiscard]] bool affects(IVec3 offset) const {
     return (neighbours >> Neighbourhood::index(offset.x, offset.y, offset.z) & 1U) != 0;
   }
 };
 using GridChanges = Changes<ChunkChange>;
 
-/// The chunks whose blocky meshes have to be made again: those that hold one of the 26 neighbours of a changed voxel,
-/// and are there; and those that changed and are there no more. Sorted by z, then y, then x. All of the grid's when all
-/// has changed. Of a partial grid those are among them whose mesh has to go, since a chunk beside them was unloaded.
-/// `changes` are those up to the grid's present state.
+/// Returns the chunks whose blocky meshes must be rebuilt, sorted by z, then y, then x.
+///
+/// The result contains every changed chunk, even if it no longer exists. It also contains each existing chunk with
+/// one of the 26 neighbours of a changed voxel. In a partial grid, an unloaded chunk adds its neighbours too, because
+/// their meshes must be removed. If everything changed, the result is all chunks of the grid.
+/// Requires: `changes` lead up to the grid's present state.
 [[nodiscard]] std::vector<IVec3> chunks_to_mesh(const Grid& grid, const GridChanges& changes);
 
-/// A row of 64 voxels along x in one chunk, some of which changed; valid during the call that tells of it.
+/// A row of 64 voxels along x in one chunk, with at least one change. Valid only during the callback that receives it.
 struct RowChange {
-  IVec3 first{0};                          ///< the voxel of `before[0]`
-  std::uint64_t changed = 0;               ///< bit i: voxel `first` + (i, 0, 0)
+  IVec3 first{0};                          ///< the voxel of `before[0]` and `now[0]`
+  std::uint64_t changed = 0;               ///< bit i is set if voxel `first` + (i, 0, 0) changed
   std::span<const VoxelType> before, now;  ///< 64 types each
 
-  /// Calls `visit(IVec3 voxel, VoxelType before, VoxelType now)` for the voxels that changed, x ascending.
+  /// Calls `visit(IVec3 voxel, VoxelType before, VoxelType now)` for each changed voxel, x ascending.
   template <class Visit>
   void for_each(Visit&& visit) const {
     for (std::uint64_t left = changed; left != 0; left &= left - 1) {
@@ -106,44 +111,50 @@ struct RowChange {
   }
 };
 
-/// What edits did to single voxels: calls `visit` for every row of voxels that differs between two states of a grid,
-/// chunks by z, y, x, in each the rows by z, then y. `before` is a snapshot of the time when the cursor was read for
-/// the last time, `changes` what `now.changes_since` told since then; when all has changed, all of both is compared.
-/// For rules that follow edits, whoever makes them: falling sand, water, wires. What became another type and then was
-/// it again meanwhile (a stream, each of whose voxels was followed by the next) is no difference: what a rule moves it
-/// looks at again by itself (examples/falling_sand.cpp). Chunks that are not loaded in one of the two are left out.
+/// Calls `visit` for every row of voxels that differs between two states of a grid.
 ///
-/// Cost: O(slabs that changed); chunks that the two share cost nothing.
+/// Use it for rules that react to edits from any source: falling sand, water, wires. `before` is a snapshot from the
+/// last time the cursor was read. `changes` is the result of `now.changes_since` for that cursor. If everything
+/// changed, the two states are compared completely.
+///
+/// Order:    chunks by z, y, x; within a chunk, rows by z, then y.
+/// Limits:   a voxel that changed and then changed back is not reported, for example inside a stream in which each
+///           voxel is replaced by the next. A rule must therefore check the voxels that it moves itself
+///           (examples/falling_sand.cpp).
+/// Partial:  chunks that are not loaded in either state are skipped.
+/// Cost:     O(changed slabs). Chunks shared by both states cost nothing.
 void visit_changes(const Grid& before, const Grid& now, const GridChanges& changes,
                    FunctionRef<void(const RowChange&)> visit);
 
-/// Voxels of one chunk whose data changed, because it was set or because they became another type.
+/// The voxels of a chunk whose data changed, either directly or because their type changed.
 struct DataChange {
   IVec3 chunk{0};
-  IBox box;             ///< around them, in the chunk's coordinates
+  IBox box;             ///< a box around the changed voxels, in chunk coordinates
   bool is_edit = true;  ///< as in ChunkChange
 };
 using DataChanges = Changes<DataChange>;
 
-/// What edits did to the data of single voxels: calls `visit` for every voxel whose data differs between two states of
-/// a grid, chunks by z, y, x, in each the voxels by z, y, x. `before` is a snapshot of when the cursor was read
-/// for the last time, `changes` what `now.data_changes_since` told since then; when all has changed, all of both is
-/// compared.
+/// Calls `visit` for every voxel whose data differs between two states of a grid.
 ///
-/// Cost: O(voxels with data of the slabs, of 4x4 rows, in which some changed); what the two share costs nothing.
+/// `before` is a snapshot from the last time the cursor was read. `changes` is the result of `now.data_changes_since`
+/// for that cursor. If everything changed, the two states are compared completely.
+///
+/// Order:    chunks by z, y, x; within a chunk, voxels by z, y, x.
+/// Partial:  chunks that are not loaded in either state are skipped.
+/// Cost:     O(voxels with data in the slabs of 4x4 rows that contain a change). Shared storage costs nothing.
 void visit_data_changes(const Grid& before, const Grid& now, const DataChanges& changes,
                         FunctionRef<void(IVec3 voxel, const VoxelData& before, const VoxelData& now)> visit);
 
-/// Samples of one chunk that changed, in density or in material.
+/// The changed samples of a chunk, in density or material.
 struct DensityChange {
   IVec3 chunk{0};
-  IBox box;  ///< the smallest around them, in the chunk's coordinates
-  /// [Neighbourhood::index(dx, dy, dz)]: how many samples past its own the chunk at that offset has to read to come
-  /// upon one of them; 0 for the chunk itself.
+  IBox box;  ///< smallest box around the changed samples, in chunk coordinates
+  /// Distance in samples, by Neighbourhood::index(dx, dy, dz). The chunk at that offset reaches a changed sample if it
+  /// reads this many samples beyond its own. The distance is 0 for the chunk itself.
   std::array<std::uint8_t, 27> distance{};
   bool is_edit = true;  ///< as in ChunkChange
 
-  /// Whether the chunk at an offset, grown by `reach` samples on each side, holds one of them.
+  /// Returns true if the chunk at an offset, grown by `reach` samples on each side, contains a changed sample.
   /// Requires: -1 <= offset.x, offset.y, offset.z <= 1; 0 <= reach <= 64.
   [[nodiscard]] bool affects(IVec3 offset, int reach) const {
     QUOIN_ASSERT(reach >= 0 && reach <= 64, "0 <= reach <= 64");
@@ -152,10 +163,11 @@ struct DensityChange {
 };
 using DensityChanges = Changes<DensityChange>;
 
-/// The chunks whose smooth meshes have to be made again: those that hold a changed sample within their own 64^3 samples
-/// grown by `reach` on each side, whether they are there or not (all far air), since a surface can end in them. `reach`
-/// is what the mesher says (`reach_of`, quoin/mesh/smooth.h). Sorted by z, then y, then x; each once. When all has
-/// changed: the grid's chunks and all 26 beside each.
+/// Returns the chunks whose smooth meshes must be rebuilt, each once, sorted by z, then y, then x.
+///
+/// A chunk is in the result if its 64^3 samples, grown by `reach` on each side, contain a changed sample. Chunks that
+/// are all far air are included too, because a surface can end in them. If everything changed, the result is all
+/// chunks of the grid and their 26 neighbours. `reach_of` (quoin/mesh/smooth.h) returns the reach of a mesher.
 ///
 /// Requires: 0 <= reach <= 64.
 [[nodiscard]] std::vector<IVec3> chunks_to_mesh(const DensityGrid& grid, const DensityChanges& changes, int reach);

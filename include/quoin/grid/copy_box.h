@@ -12,27 +12,30 @@
 namespace quoin {
 
 struct CopyOptions {
-  bool copy_air = true;  ///< false: air in the box leaves what is there
-  /// [type]: the type that takes its place, which may be air. [0] means nothing: air stays air. Types beyond its end
-  /// stay as they are. Lifetime: it must outlive the call.
+  bool copy_air = true;  ///< false: air voxels of the box are not copied
+  /// Maps each type to its replacement, which may be air. Entry 0 is ignored: air stays air. Types beyond the end are
+  /// kept.
+  /// Lifetime: must outlive the call.
   std::span<const VoxelType> type_map{};
-  /// The state (VoxelData) with which a voxel of this type arrives, where it has one: what is turned with its box says
-  /// another direction there, which only the game knows. Empty: as it was.
+  /// Maps the state (VoxelData) of a copied voxel, for voxels that have a state. Only the game knows how a state
+  /// encodes a direction, so a rotated copy needs this function. If empty, states are copied unchanged.
   std::function<std::uint32_t(VoxelType type, std::uint32_t state)> map_state{};
 };
 
-/// Copies the voxels of a box into another grid, or another place of the same: turned and mirrored by `orientation`,
-/// so that the least corner of the turned box is at `to_min`; their data goes with them. Returns how many types differ.
+/// Copies the voxels of a box and their data into another grid, or to another position in the same grid. The box is
+/// rotated and mirrored by `orientation`; the minimum corner of the result is at `to_min`. Returns the number of voxels
+/// whose type changed in `to`.
 ///
-/// Space:   voxel coordinates of each grid. Voxel `v` of the box arrives at `to_min` + (the turned v - box.min, moved
-///          so that the turned box begins at 0). The turned box's size is `orientation.size_of(box.size())`.
-/// Overlap: `from` and `to` may be one grid, and the boxes may overlap: as if all were copied at once.
-/// Partial: what is not loaded of `from` is not copied, and leaves what is there; of `to` it is not changed.
-/// Ends:    what would come to lie outside the world (see Grid) is left out; an empty box copies nothing.
-/// Cost:    O(chunks of the box) where it is moved by whole chunks and not turned: these are shared with `from`, no
-///          voxel is copied until one is edited. So are chunks of one type, wherever they go. Otherwise O(rows of 64
-///          voxels of the box), turned or not, and 0.5 MiB of memory for the call. Of a box larger than what the grids
-///          hold only their chunks are looked at.
+/// Space:    voxel coordinates of each grid. Rotate `v - box.min`, then move the rotated box so that it begins at 0.
+///           Voxel `v` of the box arrives at the result plus `to_min`. The rotated box has size
+///           `orientation.size_of(box.size())`.
+/// Overlap:  `from` and `to` may be the same grid, and the boxes may overlap. The copy acts as if all voxels were read
+///           before the first is written.
+/// Partial:  unloaded chunks of `from` are not copied; unloaded chunks of `to` are not changed.
+/// Limits:   voxels that would land outside the world (see Grid) are left out. An empty box copies nothing.
+/// Cost:     O(chunks of the box) for a move by whole chunks without rotation. These chunks are shared with `from`
+///           until edited; so are uniform chunks in every case. Otherwise O(rows of 64 voxels in the box), rotated or
+///           not, and 0.5 MiB of memory for the call. Chunks that do not exist in either grid cost nothing.
 std::int64_t copy_box(const Grid& from, const IBox& box, Grid& to, IVec3 to_min, AxisOrientation orientation = {},
                       const CopyOptions& options = {});
 

@@ -17,103 +17,107 @@
 
 namespace quoin {
 
-/// One sample as an edit sees it.
+/// The density and material of a sample.
 struct DensitySample {
   float density = 0.0F;  ///< negative is solid
   VoxelType material = kAir;
 };
 
-/// What DensityGrid::flatten moves a surface towards.
+/// Options of DensityGrid::flatten.
 struct FlattenOptions {
-  DVec3 point{0.0};             ///< of the plane, in samples
-  DVec3 normal{0.0, 1.0, 0.0};  ///< into the air; any length but 0
-  double strength = 1.0;        ///< as in `smooth`: how far of the way
-  VoxelType material = 1;       ///< of samples that become solid
+  DVec3 point{0.0};             ///< a point on the plane, in samples
+  DVec3 normal{0.0, 1.0, 0.0};  ///< points into the air; any length except 0
+  double strength = 1.0;        ///< as in `smooth`: the share of the way to the plane
+  VoxelType material = 1;       ///< for samples that become solid
 };
 
-/// A sparse, unbounded field of densities in chunks of 64^3 samples: negative is solid, 0 and above is air. What was
-/// never set is air, `band` from the surface.
+/// A sparse, unbounded density field in chunks of 64^3 samples. Negative is solid; 0 and above is air. A sample that
+/// was never set is far air, at a distance of `band` from the surface.
 ///
-/// Space:     sample (i, j, k) lies at the point (i, j, k); between samples the field is trilinear. Any int32
-///            coordinates, except the outermost chunk on each side, which stays air.
-/// Precision: half floats within `band` of 0, clamped beyond, so that rock and sky far from the surface cost nothing.
-///            Values are distances in samples wherever occlusion is to mean what it says. The sign that is given is
-///            kept, however small the value; NaN counts as far air, infinities as +-band.
-/// Materials: that of an air sample has no effect on any mesh. Far air has none: it reads as kAir.
-/// Edits:     a chunk that is all far air is dropped. When an edit throws (bad_alloc, or what a callback threw), what
-///            it did until then, or until its `progress` cancelled it, stays done and booked. `changes_since` tells
-///            any number of consumers what edits changed.
-/// Partial:   as Grid; `smooth` leaves chunks as they are beside which one is not loaded.
-/// Sharing:   and threads as Grid.
-/// Moving:    a field that was moved from may only be assigned to or destroyed.
+/// Space:     sample (i, j, k) lies at the point (i, j, k). Between samples the field is trilinear. All int32
+///            coordinates are valid, except that the outermost chunk on each side stays air.
+/// Precision: half floats within `band` of 0, clamped beyond, so rock and sky far from the surface cost nothing.
+///            Ambient occlusion needs densities that are distances in samples. The sign of a density is kept, however
+///            small the value. NaN counts as far air, infinities as +-band.
+/// Materials: the material of an air sample does not affect any mesh. Far air has no material: it reads as kAir.
+/// Edits:     a chunk that is all far air is removed. If an edit throws (bad_alloc or an exception from a callback), or
+///            `progress` cancels it, the changes made so far stay and are recorded. `changes_since` reports changes to
+///            any number of consumers.
+/// Partial:   as in Grid. `smooth` does not change chunks next to an unloaded chunk.
+/// Sharing:   as in Grid.
+/// Threads:   as in Grid.
+/// Moving:    a moved-from field can only be assigned to or destroyed.
 class DensityGrid {
  public:
-  /// Requires: 0 < band <= 65,504. A band that is no half counts as the next lesser one.
+  /// Creates an empty field. Requires: 0 < band <= 65,504. A band that is not a half is rounded down to a half.
   explicit DensityGrid(float band = 8.0F);
   DensityGrid(DensityGrid&&) noexcept;
   DensityGrid& operator=(DensityGrid&&) noexcept;
   ~DensityGrid();
-  /// As Grid::snapshot.
+  /// Returns a copy-on-write copy, as Grid::snapshot.
   [[nodiscard]] DensityGrid snapshot() const;
 
-  /// The distance beyond which densities are clamped, in samples.
+  /// Returns the clamping limit of densities, in samples.
   [[nodiscard]] float band() const;
-  /// What is stored at a sample: `band` and kAir where nothing was set.
+  /// Returns the stored density or material of a sample: `band` and kAir if never set.
   [[nodiscard]] float density(IVec3 sample) const;
   [[nodiscard]] VoxelType material(IVec3 sample) const;
   template <std::floating_point T>
   float density(Point<T> point) const = delete;  // density_at(point)
   template <std::floating_point T>
   VoxelType material(Point<T> point) const = delete;
-  /// The trilinear field at any point, across chunk borders. Exact at samples; outside the int32 range, and at NaN, far
-  /// air.
+  /// Returns the trilinear field at any point, across chunk borders. The result is exact at samples. Returns far air
+  /// outside the int32 range and for NaN.
   [[nodiscard]] float density_at(DVec3 point) const;
-  /// The gradient of the trilinear field, a one-sided one on the faces between cells: that of the cell above.
-  /// 0 outside the int32 range, and at NaN.
+  /// Returns the gradient of the trilinear field. On a face between two cells, the cell on the greater side counts.
+  /// Returns 0 outside the int32 range and for NaN.
   [[nodiscard]] DVec3 gradient_at(DVec3 point) const;
 
-  /// Returns true when density or material was another before.
+  /// Sets a sample. Returns true if its density or material changed.
   bool set(IVec3 sample, DensitySample value);
   template <std::floating_point T>
   bool set(Point<T> point, DensitySample value) = delete;
-  /// Both of a sample: what `set` puts there.
+  /// Returns the stored density and material of a sample.
   [[nodiscard]] DensitySample get(IVec3 sample) const { return {density(sample), material(sample)}; }
   template <std::floating_point T>
   DensitySample get(Point<T> point) const = delete;
 
-  /// Unites the solid with a sphere, a box (`rounding` >= 0 rounds its edges, at most until its shortest side is
-  /// round): the least of both distances; or takes it away: the greater of the density and minus the distance. Samples
-  /// that become solid take `material`; others, those that become air too, keep theirs.
+  /// Adds a sphere or a box to the solid, or removes it. Adding takes the minimum of density and shape distance;
+  /// removing takes the maximum of density and negated shape distance. Samples that become solid take `material`. All
+  /// other samples keep theirs, including samples that become air. `rounding` >= 0 is the radius of a box's edges,
+  /// limited to half of its shortest side.
   ///
-  /// Blend:   `blend` >= 0 is the width k, in samples, over which the two surfaces flow together (0: a sharp crease):
-  ///          min(a, b) - max(k - |a - b|, 0)^2 / (4 k). Since densities end at the band, k is at most
+  /// Blend:   `blend` >= 0 is the width k, in samples, of the smooth transition between the two surfaces (0: a sharp
+  ///          crease): min(a, b) - max(k - |a - b|, 0)^2 / (4 k). Because densities end at the band, k is limited to
   ///          band - max(a, b).
-  /// Returns: how many samples changed.
-  /// Errors:  a negative, infinite or NaN size or place, or a box whose `max` is less than its `min`, changes nothing.
-  /// Cost:    adding: O(chunks of the shape's box), and O(samples) in those that its surface comes near or that exist;
-  ///          each chunk inside becomes a uniform one of about 200 bytes, and a sphere of radius 10^6 has 10^13 of
-  ///          them: where a size is a user's own choice, say how much is too much by `progress`. Removing: only chunks
-  ///          that exist.
+  /// Returns: the number of changed samples.
+  /// Errors:  a negative, infinite or NaN size or position, or a box with `max` less than `min`, changes nothing.
+  /// Cost:    adding: O(chunks of the shape's box), plus O(samples) in chunks near its surface and in existing chunks.
+  ///          Each chunk inside becomes a uniform chunk of about 200 bytes, and a sphere of radius 10^6 has 10^13 of
+  ///          them. If users choose the size, limit it with `progress`. Removing: only existing chunks.
   std::int64_t add_sphere(DVec3 centre, double radius, VoxelType material, double blend = 0.0,
                           const Progress& progress = {});
   std::int64_t remove_sphere(DVec3 centre, double radius, double blend = 0.0);
   std::int64_t add_box(DVec3 min, DVec3 max, VoxelType material, double rounding = 0.0, double blend = 0.0,
                        const Progress& progress = {});
   std::int64_t remove_box(DVec3 min, DVec3 max, double rounding = 0.0, double blend = 0.0);
-  /// Smooths the surface within a sphere: moves each density towards the mean of its 26 neighbours (as they were
-  /// before), strength * (1 - (distance / radius)^2)^2 of the way. Samples that become solid take the material of most
-  /// of their solid neighbours. A strength above 1 counts as 1; sizes, places and strengths that are not above 0,
-  /// infinite or NaN change nothing. Returns how many samples changed.
-  /// Cost: O(samples of the sphere's box in chunks that exist, or are beside one), and 4 bytes of memory for each
-  /// meanwhile.
+  /// Smooths the surface inside a sphere: moves each density towards the mean of its 26 neighbours, as they were
+  /// before. Each density moves by the factor strength * (1 - (distance / radius)^2)^2. A strength above 1 counts as 1.
+  /// A sample that becomes solid takes the most frequent material of its solid neighbours.
+  /// Returns: the number of changed samples.
+  /// Errors:  an infinite or NaN centre or radius, a NaN strength, or a radius or strength of 0 or less, changes
+  ///          nothing.
+  /// Cost:    O(samples of the sphere's box in existing chunks and their neighbours), and 4 bytes of temporary memory
+  ///          each.
   std::int64_t smooth(DVec3 centre, double radius, double strength);
-  /// Moves the surface within a sphere towards a plane. A strength, place or normal that is not as FlattenOptions says
-  /// changes nothing. Returns how many samples changed. Cost: as adding a sphere.
+  /// Moves the surface inside a sphere towards a plane. Returns the number of changed samples. An invalid strength,
+  /// centre, radius, point or normal changes nothing (see FlattenOptions and `smooth`).
+  /// Cost: same as adding a sphere.
   std::int64_t flatten(DVec3 centre, double radius, const FlattenOptions& options, const Progress& progress = {});
-  /// Asks `pick(IVec3 sample, DensitySample current)` for the new value of every sample of the box (half open: `max`
-  /// excluded), x fastest, then y, then z within a chunk, and chunks in that order too. Returns how many samples
-  /// changed.
-  /// Requires: `pick` leaves the grid alone. Cost: O(samples of the box), far air too.
+  /// Calls `pick(IVec3 sample, DensitySample current)` for every sample of the box and stores the returned value. The
+  /// box is half-open (`max` excluded). The order is x fastest, then y, then z within a chunk; chunks in the same
+  /// order. Returns the number of changed samples.
+  /// Requires: `pick` does not access the grid. Cost: O(samples of the box), including far air.
   template <class Pick>
   std::int64_t edit(const IBox& box, Pick&& pick, const Progress& progress = {}) {
     return edit_rows(
@@ -127,58 +131,60 @@ class DensityGrid {
         },
         progress);
   }
-  /// `edit`, a row at a time: `change(first, densities, materials)` gets the samples of the box along x in one chunk,
-  /// from `first` on, and changes them in place. Returns how many changed.
+  /// Edits a box row by row. `change(first, densities, materials)` receives the samples of the box along x in one
+  /// chunk, starting at `first`, and changes them in place. Returns the number of changed samples.
   std::int64_t edit_rows(
       const IBox& box,
       FunctionRef<void(IVec3 first, std::span<float> densities, std::span<VoxelType> materials)> change,
       const Progress& progress = {});
-  /// Puts a whole chunk in place; counts as an edit of whatever differs. Returns how many samples changed. Outermost
-  /// chunks are ignored. Requires: its densities are `stored_density` of this band.
+  /// Replaces a whole chunk, as an edit of each sample that differs. Returns the number of changed samples. Outermost
+  /// chunks are ignored. Requires: all densities are `stored_density` results for this band.
   std::int64_t put_chunk(IVec3 chunk, DensityChunk samples);
-  /// Makes everything far air, as an edit.
+  /// Sets all samples to far air, as an edit.
   void clear();
 
-  /// As those of Grid.
+  /// Makes the grid partial. All functions for partial grids work as in Grid.
   void make_partial();
   [[nodiscard]] bool is_partial() const;
-  /// Requires: as `put_chunk`.
+  /// Loads a chunk, as Grid::load_chunk. Requires: same as `put_chunk`.
   bool load_chunk(IVec3 chunk, DensityChunk samples);
-  /// Likewise, of a chunk that is known to be far air.
+  /// Loads a chunk that is known to be far air, as `load_chunk`.
   bool load_air_chunk(IVec3 chunk);
   bool unload_chunk(IVec3 chunk);
   [[nodiscard]] bool is_loaded(IVec3 chunk) const;
   [[nodiscard]] bool is_loaded_around(IVec3 chunk, int distance = 1) const;
-  /// As that of Grid, of a box of samples. A point between samples is known where all eight around it are loaded.
+  /// Returns true if all chunks that a box of samples overlaps are loaded, as Grid::is_loaded_within. A point between
+  /// samples is known if all eight samples around it are loaded.
   [[nodiscard]] bool is_loaded_within(const IBox& samples) const;
   [[nodiscard]] std::vector<IVec3> loaded_chunks() const;
 
-  /// Null where all is far air. Lifetime: as Grid::find_chunk.
+  /// Returns the chunk, or null if all its samples are far air. Lifetime: same as Grid::find_chunk.
   [[nodiscard]] const DensityChunk* find_chunk(IVec3 chunk) const;
-  /// Coordinates of all chunks that are not far air, sorted by z, then y, then x.
+  /// Returns the coordinates of all chunks that are not far air, sorted by z, then y, then x.
   [[nodiscard]] std::vector<IVec3> chunks() const;
   [[nodiscard]] std::size_t chunk_count() const;
-  /// The chunk and the 26 around it, for meshers. Lifetime: the grid must outlive it, and an edit ends it.
+  /// Returns the chunk and its 26 neighbours, for meshers. Lifetime: the grid must outlive it, and an edit invalidates
+  /// it.
   [[nodiscard]] DensityNeighbourhood neighbourhood(IVec3 chunk) const;
-  /// The smallest box around all solid samples; empty when there are none.
-  /// Cost: O(chunks * 4096) the first time, then that of the chunks that changed.
+  /// Returns the smallest box around all solid samples; empty if there are none.
+  /// Cost: O(chunks * 4096) the first time, then O(4096) per changed chunk.
   [[nodiscard]] IBox solid_bounds() const;
-  /// The smallest box of whole coordinates within which the trilinear field is negative anywhere: the solid lies
-  /// between its sides. Empty where there is none. Cost: as `solid_bounds`.
+  /// Returns the smallest box with integer corners around all points with a negative trilinear field. The box is empty
+  /// if there are none. Cost: same as `solid_bounds`.
   [[nodiscard]] IBox bounds() const;
-  /// How many samples are solid. Cost: as `solid_bounds`.
+  /// Returns the number of solid samples. Cost: O(chunks * 4096) per call.
   [[nodiscard]] std::int64_t solid_count() const;
 
-  /// What edits changed since the cursor's last time, exactly; moves the cursor to the present.
-  /// Cost: O(chunks that changed), whatever the size of the grid. See ChangeCursor.
+  /// Returns the exact changes since the cursor's last read, and moves the cursor to the present.
+  /// Cost: O(changed chunks), independent of the grid's size. See ChangeCursor.
   [[nodiscard]] DensityChanges changes_since(ChangeCursor& cursor) const;
-  /// As those of Grid.
+  /// Returns true if anything has changed since the cursor, as Grid::has_changed_since.
   [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const;
   [[nodiscard]] ChangeCursor cursor() const;
 
-  /// Bytes held.
+  /// Returns the memory in use, in bytes.
   [[nodiscard]] std::size_t bytes() const;
-  /// Gives back memory that edits left unused.
+  /// Frees memory that edits left unused.
   void compact();
 
  private:
@@ -188,7 +194,7 @@ class DensityGrid {
   [[nodiscard]] inline Impl& impl() const;
 
   std::unique_ptr<Impl> impl_;
-  mutable EditNotice notice_;  // a scene that follows it is no part of it
+  mutable EditNotice notice_;  // not part of a scene that follows the grid
 };
 
 }  // namespace quoin

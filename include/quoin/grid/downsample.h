@@ -13,32 +13,30 @@
 
 namespace quoin {
 
-/// The grid in cells of 2^3 voxels: voxel c of the result stands for the voxels from 2 c to 2 c + 1.
+/// Halves the resolution of a grid: voxel c of the result covers the 2^3 voxels from 2 c to 2 c + 1 (a cell).
 ///
-/// Solid:   a cell of which at least half is not air (4 voxels of 8). And what is thin: a cell with 2 or 3 voxels that
-///          lie in both halves along some axis, where the next cell along that axis on either side is not empty and
-///          none of the four cells beside it is solid by half. Of several such cells side by side the one with the
-///          least coordinates counts, so that a rod one or two voxels wide becomes a rod one cell wide. So a cell that
-///          is added stands for at least 2 voxels, and none is added beside what is solid: the result's volume is at
-///          most 4 times the grid's.
-/// Type:    opaque types before transparent ones; of these the one with the greatest weight, a voxel weighing 1 and 8
-///          more for every face that meets air (tuned on pictures of terrains); of equal ones the lower.
-/// Threads: the same result at any number.
-/// Cost:    1.3 to 3 milliseconds a chunk of the result, of caves and several types.
+/// Solid:   a cell becomes solid if at least 4 of its 8 voxels are not air. Thin structures are kept by a second rule.
+///          A thin cell has 2 or 3 voxels, with voxels in both halves along an axis. It becomes solid if a neighbour
+///          along that axis is not empty, and none of the four cells next to it across the axis has 4 or more voxels.
+///          Of two thin cells side by side, at an even and the next odd coordinate, only the lower becomes solid: a
+///          rod that is two voxels wide there becomes a rod one cell wide. Each solid cell covers at least 2 voxels, so
+///          the volume of the result is at most 4 times the volume of the grid.
+/// Type:    opaque types win over transparent types. Among these, the type with the greatest weight wins; ties go to
+///          the lower type. A voxel weighs 1, plus 8 per face that meets air (tuned on images of terrain).
+/// Threads: the result is the same at any thread count.
+/// Cost:    1.3 to 3 ms per chunk of the result, for caves with several types.
 /// Errors:  Cancelled.
 [[nodiscard]] Result<Grid> downsample(const Grid& grid, const VoxelRegistry& types, Threads threads = {},
                                       const Progress& progress = {});
 
-/// One chunk of `downsample(grid, types)`, by its place among that grid's chunks.
+/// Computes one chunk of `downsample(grid, types)`, by its chunk coordinates in the result.
 ///
-/// Reads the voxels that its cells stand for and two past them on each side, and no others: an edit elsewhere leaves it
-/// as it was.
+/// Reads only the voxels that its cells cover and two more on each side. An edit elsewhere does not change the result.
 [[nodiscard]] Chunk downsample_chunk(const Grid& grid, const VoxelRegistry& types, IVec3 chunk);
 
-/// The coarser levels of a grid, each half as fine as the one before, kept and brought up to date where the grid was
-/// edited.
+/// Coarser levels of a grid, each at half the resolution of the previous level, updated incrementally after edits.
 ///
-/// Threads: any number may read; an update needs it to itself.
+/// Threads: any number may read at once; an update needs exclusive access.
 class GridPyramid {
  public:
   GridPyramid();
@@ -46,17 +44,17 @@ class GridPyramid {
   GridPyramid& operator=(GridPyramid&&) noexcept;
   ~GridPyramid();
 
-  /// Halves `grid` up to `levels` times, fewer where nothing would be left. Only chunks that edits since the last
-  /// update can have changed are made again; all of another grid.
+  /// Updates the pyramid: halves `grid` up to `levels` times, or until nothing is left. Recomputes only chunks affected
+  /// by edits since the last update, or all chunks if the grid is a different grid.
   ///
-  /// Requires: the visibility of the types is that of the last update; this is not checked.
-  /// Lifetime: grid and types are only read within the call; their snapshots may take their place in the next.
-  /// Cost:     `downsample_chunk` for each chunk that an edit can have changed.
+  /// Requires: type visibilities are the same as in the last update; this is not checked.
+  /// Lifetime: grid and types are read only during the call. The next call may use snapshots of them instead.
+  /// Cost:     `downsample_chunk` for each chunk that an edit can affect.
   void update(const Grid& grid, const VoxelRegistry& types, int levels, Threads threads = {});
 
-  /// How many there are; none before the first update.
+  /// Returns the number of levels; 0 before the first update.
   [[nodiscard]] int levels() const;
-  /// The grid halved `level` times. Lifetime: the pyramid owns it, until an update leaves fewer levels.
+  /// Returns the grid halved `level` times. Lifetime: the pyramid owns it, until an update has fewer levels.
   ///
   /// Requires: 1 <= level <= levels().
   [[nodiscard]] const Grid& level(int level) const;
@@ -66,25 +64,26 @@ class GridPyramid {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The field at half as many samples along each axis: sample c stands where sample 2 c was, with its density in the
-/// samples that are left (half the number, in half the band), so that the surface stays where it was between the two.
+/// Halves the number of samples of a field along each axis. Sample c of the result lies at sample 2 c of the field. Its
+/// density is the field's density at that point, in units of the coarser samples (half the number, in half the band).
+/// The surface therefore stays at the same position between samples.
 ///
-/// Material: of a solid sample with air among its 26 neighbours in the result that of the solid samples of the field at
-///           2 c and around it (27) whose density is the greatest, the one that lies nearest to the air: grass stays
-///           green, however thin it is. Of equal ones the sample itself, else the least of (z, y, x). Of any other
-///           solid sample its own.
-/// Threads:  the same result at any number.
-/// Cost:     some 5 milliseconds a chunk of the result, of caves and several materials.
+/// Material: a solid sample next to air (26 neighbours) takes its material from the 27 field samples at and around 2 c.
+///           The solid sample with the greatest density wins, because it is nearest to the air: a thin layer of grass
+///           stays green. Ties prefer the sample at 2 c, then the least (z, y, x). Other solid samples keep the
+///           material at 2 c.
+/// Threads:  the result is the same at any thread count.
+/// Cost:     about 5 ms per chunk of the result, for caves with several materials.
 /// Errors:   Cancelled.
 [[nodiscard]] Result<DensityGrid> downsample(const DensityGrid& field, Threads threads = {},
                                              const Progress& progress = {});
 
-/// What a halved field has kept of the finer one, in samples.
+/// Sample counts that show how much of a field survives halving.
 struct DownsampledDensityCounts {
-  std::int64_t finer_solid = 0;  ///< of the field that was halved
-  std::int64_t solid = 0;        ///< of the result
-  std::int64_t surface = 0;      ///< of these, those with air beside them along some axis
-  std::int64_t thin = 0;         ///< of these, those with air on both sides along some axis
+  std::int64_t finer_solid = 0;  ///< solid samples of the finer field
+  std::int64_t solid = 0;        ///< solid samples of the result
+  std::int64_t surface = 0;      ///< solid samples with air next to them along some axis
+  std::int64_t thin = 0;         ///< solid samples with air on both sides along some axis
 
   DownsampledDensityCounts& operator+=(const DownsampledDensityCounts& other) {
     finer_solid += other.finer_solid;
@@ -103,9 +102,9 @@ struct DownsampledDensityCounts {
   bool operator==(const DownsampledDensityCounts&) const = default;
 };
 
-/// The coarser levels of a field, as GridPyramid has those of a grid.
+/// Coarser levels of a density field, as GridPyramid for a grid.
 ///
-/// Threads: any number may read; an update needs it to itself.
+/// Threads: any number may read at once; an update needs exclusive access.
 class DensityPyramid {
  public:
   DensityPyramid();
@@ -113,16 +112,17 @@ class DensityPyramid {
   DensityPyramid& operator=(DensityPyramid&&) noexcept;
   ~DensityPyramid();
 
-  /// As GridPyramid::update: an edit costs a halved chunk for each chunk that reads what it changed.
-  /// Lifetime: the field is only read within the call.
+  /// Updates the pyramid, as GridPyramid::update. An edit recomputes each coarser chunk that reads a changed sample.
+  /// Lifetime: the field is read only during the call.
   void update(const DensityGrid& field, int levels, Threads threads = {});
 
-  /// How many there are; none before the first update.
+  /// Returns the number of levels; 0 before the first update.
   [[nodiscard]] int levels() const;
-  /// The field halved `level` times. Lifetime: as GridPyramid::level.
+  /// Returns the field halved `level` times. Lifetime: same as GridPyramid::level.
   /// Requires: 1 <= level <= levels().
   [[nodiscard]] const DensityGrid& level(int level) const;
-  /// What halving to `level` has kept. Lifetime: as `level`. Requires: 1 <= level <= levels().
+  /// Returns the sample counts of `level` and of the next finer field. Lifetime: same as `level`.
+  /// Requires: 1 <= level <= levels().
   [[nodiscard]] const DownsampledDensityCounts& counts(int level) const;
 
  private:

@@ -18,78 +18,82 @@
 
 namespace quoin {
 
-/// A voxel and what it is to be.
+/// A voxel position and the type to set there.
 struct PlacedVoxel {
   IVec3 voxel{0};
   VoxelType type = kAir;
   bool operator==(const PlacedVoxel&) const = default;
 };
 
-/// A sparse, unbounded field of voxels in chunks of 64^3. What was never set is air.
+/// A sparse, unbounded voxel grid in chunks of 64^3. Voxels that were never set are air.
 ///
-/// Space:    voxel (i, j, k) fills the unit cube from (i, j, k) to (i + 1, j + 1, k + 1). Any int32 coordinates, except
-///           the outermost chunk on each side, which stays air.
-/// Edits:    setting a voxel to what it is changes nothing. A chunk that is all air is dropped. When an edit throws
-///           (bad_alloc, or what a callback threw), or is cancelled by its `progress`, what it did until then stays
-///           done and booked. `changes_since` tells any number of consumers what edits changed, `visit_changes` from
-///           which type to which.
-/// Data:     voxels that are not air may hold VoxelData. It follows its voxel: an edit that gives it another type takes
-///           it away, one that gives it the type it has leaves it; whole chunks, snapshots, `copy_box` and extracted
-///           pieces carry it along. Halved grids and fields have none.
-/// Partial:  of a world that is larger than memory a grid holds some chunks (`make_partial`). Those that are not loaded
-///           read as air, which is not what they are: edits leave them as they are, no mesh is made of a chunk unless
-///           all around it are loaded, and queries of a scene know of them (UnloadedChunks). What counts or reads
-///           voxels here tells of what is loaded: `is_loaded_within` says whether that is all.
-/// Sharing:  `snapshot` is a copy that costs a pointer. What the two share is copied when one of them is edited, some
-///           4 KiB of a chunk at a time.
-/// Threads:  any number may read at once, and take snapshots; an edit needs the grid to itself. A snapshot is a grid of
-///           its own: it may be read and destroyed on another thread while this one is edited.
-/// Moving:   a grid that was moved from may only be assigned to or destroyed.
+/// Space:    voxel (i, j, k) fills the unit cube from (i, j, k) to (i + 1, j + 1, k + 1). All int32 coordinates are
+///           valid, except that the outermost chunk on each side stays air.
+/// Edits:    an edit that sets a voxel to its present type changes nothing. A chunk that is all air is removed. If an
+///           edit throws (bad_alloc or an exception from a callback), or `progress` cancels it, the changes made so far
+///           stay and are recorded. `changes_since` reports changes to any number of consumers; `visit_changes` also
+///           reports old and new types.
+/// Data:     voxels other than air can hold VoxelData. An edit that changes a voxel's type removes its data; an
+///           edit that sets the same type keeps it. Whole chunks, snapshots, `copy_box` and extracted pieces include
+///           the data. Halved grids and density fields do not.
+/// Partial:  a partial grid (`make_partial`) holds some chunks of a world that is larger than memory. Unloaded chunks
+///           read as air, but their real content is unknown. Edits do not change them. A chunk is meshed only if all
+///           chunks around it are loaded. Scene queries report unloaded chunks (UnloadedChunks). Functions that count
+///           or read voxels see only loaded chunks; `is_loaded_within` returns true if a box is complete.
+/// Sharing:  a `snapshot` is a copy-on-write copy and costs a pointer. An edit of either copies the shared memory that
+///           it changes, about 4 KiB of a chunk at a time.
+/// Threads:  any number may read or take snapshots at once; an edit needs exclusive access. A snapshot is independent:
+///           it may be read and destroyed on another thread while this grid is edited.
+/// Moving:   a moved-from grid can only be assigned to or destroyed.
 class Grid {
  public:
   Grid();
-  /// Takes the other's voxels and its journal of changes along.
+  /// Moves the voxels and the change journal.
   Grid(Grid&&) noexcept;
   Grid& operator=(Grid&&) noexcept;
   ~Grid();
-  /// The voxels as they are now; later edits of either do not reach the other. A cursor that read this grid's changes
-  /// reads on in the snapshot, and the other way round, until the snapshot is edited itself.
-  /// Cost: a fraction of a microsecond. The first edit of each place afterwards copies what lies around it, some 4 KiB,
-  /// and of its chunk the rest of some 3 KiB, as long as a snapshot shares it.
+  /// Returns a copy-on-write copy of the present voxels. Later edits of either grid do not affect the other. A
+  /// cursor of this grid also works with the snapshot, and the reverse, until the snapshot itself is edited.
+  /// Cost: less than a microsecond. Afterwards, the first edit of each region copies about 4 KiB around it, and the
+  /// first edit of each chunk about 3 KiB more, as long as a snapshot shares them.
   [[nodiscard]] Grid snapshot() const;
 
-  /// The voxel's type; kAir where nothing was set.
-  // Coordinates go one by one where a call is often made: a vector is stored in memory for it, and waited for.
+  /// Returns the type of a voxel; kAir if never set.
+  // Hot functions take coordinates one by one. A vector argument is stored in memory for the call, which stalls the
+  // load.
   [[nodiscard]] VoxelType get(IVec3 voxel) const { return get(voxel.x, voxel.y, voxel.z); }
   [[nodiscard]] VoxelType get(int x, int y, int z) const;
   template <std::floating_point T>
   VoxelType get(Point<T> point) const = delete;  // get(voxel_of(point))
 
-  /// Sets one voxel. Returns true when it had another type before. Of many, `edit` or a GridWriter is faster.
+  /// Sets a voxel. Returns true if its type changed. For many voxels, `edit` or GridWriter is faster.
   bool set(IVec3 voxel, VoxelType type) { return set(voxel.x, voxel.y, voxel.z, type); }
   bool set(int x, int y, int z, VoxelType type);
   template <std::floating_point T>
   bool set(Point<T> point, VoxelType type) = delete;  // set(voxel_of(point), type)
-  /// Sets many voxels wherever they lie; of several for one place the last counts. Returns how many changed.
-  /// Cost: of those that lie in one chunk one after the other a third of `set`.
+  /// Sets many voxels at any positions. If a position occurs several times, the last entry counts. Returns the
+  /// number of changed voxels.
+  /// Cost: a third of `set` per voxel, if consecutive voxels lie in the same chunk.
   std::int64_t set(std::span<const PlacedVoxel> voxels);
-  /// Of the row of 64 voxels along x in which `row` lies, sets those whose bits are set in `mask`: voxel i to
-  /// `types[i]`; one edit. Returns how many changed.
+  /// Sets voxels in the row of 64 voxels along x that contains `row`, as one edit. Voxel i becomes `types[i]` if bit
+  /// i of `mask` is set. Returns the number of changed voxels.
   std::int64_t write_row(IVec3 row, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types);
   template <std::floating_point T>
   std::int64_t write_row(Point<T> row, std::uint64_t mask, std::span<const VoxelType, kChunkEdge> types) = delete;
-  /// Sets all voxels of a box (half open: `max` excluded; an empty one changes nothing). Returns how many changed.
-  /// Cost: O(chunks of the box + rows of 64 voxels at its rim); uniform chunks take no memory per voxel, but each some
-  /// hundred bytes: where a box is a user's own choice, say how much is too much by `progress`.
+  /// Sets all voxels of a box (half-open: `max` excluded; an empty box changes nothing). Returns the number of changed
+  /// voxels.
+  /// Cost: O(chunks of the box + rows of 64 voxels at its rim). A uniform chunk takes some hundred bytes and no memory
+  /// per voxel. If users choose the box, limit its size with `progress`.
   std::int64_t fill_box(const IBox& box, VoxelType type, const Progress& progress = {});
-  /// Sets the voxels whose centre (i + 0.5) is at most `radius` from `centre`. Returns how many changed.
-  /// A radius that is negative or not finite, or a centre that is not finite, changes nothing.
-  /// Cost: O(voxels of the box around the sphere); of air, of those in chunks that there are.
+  /// Sets the voxels whose centre (i + 0.5) lies within `radius` of `centre`. Returns the number of changed voxels. A
+  /// negative or non-finite radius, or a non-finite centre, changes nothing.
+  /// Cost: O(voxels of the box around the sphere); for air, only in existing chunks.
   std::int64_t fill_sphere(DVec3 centre, double radius, VoxelType type, const Progress& progress = {});
-  /// Asks `pick(IVec3 voxel, VoxelType current)` for the new type of every voxel of the box (half open: `max`
-  /// excluded), x fastest, then y, then z within a chunk, and chunks in that order too. Returns how many changed.
-  /// Requires: `pick` changes nothing in the grid. It may read it by `get`, not by a GridReader, and finds what was
-  /// picked for earlier rows, of 64 voxels along x, but not its own.
+  /// Calls `pick(IVec3 voxel, VoxelType current)` for every voxel of the box and sets the returned type. The box is
+  /// half-open (`max` excluded). The order is x fastest, then y, then z within a chunk; chunks in the same order.
+  /// Returns the number of changed voxels.
+  /// Requires: `pick` does not edit the grid. It may call `get`, but must not use a GridReader. It sees the new
+  /// types of earlier rows of 64 voxels along x, and the old types of its own row.
   template <class Pick>
   std::int64_t edit(const IBox& box, Pick&& pick, const Progress& progress = {}) {
     return edit_rows(
@@ -102,91 +106,97 @@ class Grid {
         },
         progress);
   }
-  /// `edit`, a row at a time: `change(IVec3 first, std::span<VoxelType> types)` gets the types of the voxels of the
-  /// box along x in one chunk, from `first` on, and changes them in place. Returns how many changed.
+  /// Edits a box row by row. `change(IVec3 first, std::span<VoxelType> types)` receives the types of the box along x in
+  /// one chunk, starting at `first`, and changes them in place. Returns the number of changed voxels.
   std::int64_t edit_rows(const IBox& box, FunctionRef<void(IVec3 first, std::span<VoxelType> types)> change,
                          const Progress& progress = {});
-  /// Puts a whole chunk in place, its data too; counts as an edit of whatever differs. Returns how many types changed.
-  /// The outermost chunks are ignored.
+  /// Replaces a whole chunk and its data, as an edit of each voxel that differs. Returns the number of voxels that
+  /// changed type. The outermost chunks are ignored.
   std::int64_t put_chunk(IVec3 chunk, Chunk voxels);
-  /// Makes everything air, as an edit; of a partial grid, what is loaded.
+  /// Sets all voxels to air, as an edit. In a partial grid, this applies to the loaded chunks.
   void clear();
 
-  /// Makes it a partial grid of which nothing is loaded; what it held is gone, as an edit.
+  /// Makes the grid partial, with no chunk loaded. Removes its previous content, as an edit.
   void make_partial();
   [[nodiscard]] bool is_partial() const;
-  /// Brings a chunk into memory, which may be air: `changes_since` tells of it, as no edit (ChunkChange::is_edit).
-  /// False, and nothing is done, where it is loaded, the grid is not partial, or the chunk is an outermost one.
+  /// Loads a chunk, which may be all air. `changes_since` reports it as a load, not an edit (ChunkChange::is_edit).
+  /// Returns false, without a change, if the chunk is loaded or outermost, or if the grid is not partial.
   bool load_chunk(IVec3 chunk, Chunk voxels);
-  /// Takes a chunk out of memory, likewise. False where it is not loaded, or the grid is not partial.
+  /// Unloads a chunk. `changes_since` reports it as in `load_chunk`. Returns false if the chunk is not loaded or the
+  /// grid is not partial.
   bool unload_chunk(IVec3 chunk);
-  /// Whether a chunk's voxels are in memory: always, unless the grid is partial.
+  /// Returns true if the chunk is in memory. Always true if the grid is not partial.
   [[nodiscard]] bool is_loaded(IVec3 chunk) const;
   template <std::floating_point T>
   bool is_loaded(Point<T> point) const = delete;  // is_loaded(chunk_of(voxel_of(point)))
-  /// Whether it and all that are at most so many chunks from it along each axis are.
+  /// Returns true if the chunk and all chunks within `distance` of it along each axis are loaded.
   [[nodiscard]] bool is_loaded_around(IVec3 chunk, int distance = 1) const;
-  /// Whether all chunks are that a box of voxels meets (half open: `max` excluded): whether what is read, counted or
-  /// copied there is all that there is. Cost: O(1) unless the grid is partial; else O(log chunks) for each chunk.
+  /// Returns true if all chunks that overlap a box of voxels (half-open: `max` excluded) are loaded. Reads, counts and
+  /// copies of the box are then complete. Cost: O(1) if the grid is not partial, else O(log chunks) per chunk.
   [[nodiscard]] bool is_loaded_within(const IBox& voxels) const;
-  /// Of a partial grid the chunks that are loaded, air too; else as `chunks`. Sorted likewise.
+  /// Returns the loaded chunks of a partial grid, including air chunks, or `chunks` if the grid is not partial. Sorted
+  /// by z, then y, then x.
   [[nodiscard]] std::vector<IVec3> loaded_chunks() const;
 
-  /// What the voxel holds besides its type; empty where nothing was put. Lifetime: until the grid's next edit.
+  /// Returns the data of a voxel; empty if never set. Lifetime: until the grid's next edit.
   [[nodiscard]] VoxelData data(IVec3 voxel) const;
   template <std::floating_point T>
   VoxelData data(Point<T> point) const = delete;  // data(voxel_of(point))
-  /// Puts that in the place of what there was; true when it was another. False, and nothing is put, where the voxel is
-  /// air. No type changes: `changes_since` tells nothing of it, `data_changes_since` does.
+  /// Replaces the data of a voxel. Returns true if it changed. Does nothing and returns false for air. The change is
+  /// reported by `data_changes_since` but not by `changes_since`, because no type changes.
   /// Requires: at most kMaxVoxelDataBytes bytes, which are copied.
   bool set_data(IVec3 voxel, const VoxelData& data);
   template <std::floating_point T>
   bool set_data(Point<T> point, const VoxelData& data) = delete;
-  /// Type and data, which may be this grid's own: `set(at, opened_door, world.data(at))`. True when either changed.
+  /// Sets type and data of a voxel. Returns true if either changed. The data may come from this grid:
+  /// `set(at, opened_door, world.data(at))`.
   bool set(IVec3 voxel, VoxelType type, const VoxelData& data);
   template <std::floating_point T>
   bool set(Point<T> point, VoxelType type, const VoxelData& data) = delete;
-  /// Voxels with data. Cost: O(1).
+  /// Returns the number of voxels with data. Cost: O(1).
   [[nodiscard]] std::int64_t data_count() const;
-  /// Calls `visit` for them: chunks as in `chunks`, then z, y, x; it must not edit the grid.
+  /// Calls `visit` for each voxel with data: chunks in the order of `chunks`, then z, y, x. Requires: `visit` does not
+  /// edit the grid.
   void for_each_data(FunctionRef<void(IVec3 voxel, VoxelType type, const VoxelData& data)> visit) const;
 
-  /// Null where all is air. Lifetime: the grid owns the chunk, and its next edit may end it; a copy of the chunk costs
-  /// no more than the pointer and is the caller's own.
+  /// Returns the chunk, or null if all its voxels are air. Lifetime: the grid owns the chunk, and the next edit may
+  /// invalidate the pointer. A copy of the chunk costs a pointer and stays valid.
   [[nodiscard]] const Chunk* find_chunk(IVec3 chunk) const { return find_chunk(chunk.x, chunk.y, chunk.z); }
   [[nodiscard]] const Chunk* find_chunk(int x, int y, int z) const;
   template <std::floating_point T>
   const Chunk* find_chunk(Point<T> point) const = delete;  // find_chunk(chunk_of(voxel_of(point)))
-  /// Coordinates of all chunks that hold a voxel, sorted by z, then y, then x.
+  /// Returns the coordinates of all chunks with a voxel that is not air, sorted by z, then y, then x.
   [[nodiscard]] std::vector<IVec3> chunks() const;
   [[nodiscard]] std::size_t chunk_count() const;
-  /// The chunk and the 26 around it, for meshers. Where not all of them are loaded, all 27 are null, as of air: ask
-  /// `is_loaded_around` first. Lifetime: the grid must outlive it, and an edit ends it.
+  /// Returns the chunk and its 26 neighbours, for meshers. If any of them is not loaded, all 27 are null and read as
+  /// air:
+  /// call `is_loaded_around` first. Lifetime: the grid must outlive it, and an edit invalidates it.
   [[nodiscard]] Neighbourhood neighbourhood(IVec3 chunk) const;
   template <std::floating_point T>
   Neighbourhood neighbourhood(Point<T> point) const = delete;
 
-  /// What edits changed since the cursor's last time, exactly; moves the cursor to the present.
-  /// Cost: O(chunks that changed), whatever the size of the grid. See ChangeCursor.
+  /// Returns the exact changes since the cursor's last read, and moves the cursor to the present.
+  /// Cost: O(changed chunks), independent of the grid's size. See ChangeCursor.
   [[nodiscard]] GridChanges changes_since(ChangeCursor& cursor) const;
-  /// Whether that would tell of anything. Cost: O(1).
+  /// Returns true if voxel types have changed since the cursor. Cost: O(1).
   [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const;
-  /// Where voxels' data changed since the cursor's last time; moves the cursor to the present, so that whoever asks
-  /// for both has a cursor for each. Cost: as `changes_since`.
+  /// Returns the changes of voxel data since the cursor's last read, and moves the cursor to the present. A consumer of
+  /// both types and data needs a cursor for each. Cost: same as `changes_since`.
   [[nodiscard]] DataChanges data_changes_since(ChangeCursor& cursor) const;
-  /// Whether that would tell of anything. Cost: O(1).
+  /// Returns true if voxel data has changed since the cursor. Cost: O(1).
   [[nodiscard]] bool has_data_changed_since(const ChangeCursor& cursor) const;
-  /// A cursor at the present: it will be told what changes from now on.
+  /// Returns a cursor at the present. It reports changes from now on.
   [[nodiscard]] ChangeCursor cursor() const;
 
-  /// The smallest box around all non-air voxels; empty when there are none. Cost: O(chunks) the first time, and after
-  /// edits at its sides; otherwise O(chunks that changed).
+  /// Returns the smallest box around all voxels that are not air; empty if there are none.
+  /// Cost: O(chunks) the first time and after edits at its sides, otherwise O(changed chunks).
   [[nodiscard]] IBox bounds() const;
-  /// Voxels that are not air. Cost: O(1).
+  /// Returns the number of voxels that are not air. Cost: O(1).
   [[nodiscard]] std::int64_t voxel_count() const;
-  /// Types that occur, ascending. Cost: O(chunks).
+  /// Returns the types in use except air, ascending. Cost: O(chunks).
   [[nodiscard]] std::vector<VoxelType> types() const;
-  /// Calls `visit(IVec3 voxel, VoxelType type)` for every non-air voxel: chunks as in `chunks`, then z, y, x.
+  /// Calls `visit(IVec3 voxel, VoxelType type)` for every voxel that is not air: chunks in the order of `chunks`, then
+  /// z, y, x.
   template <class Visit>
   void for_each(Visit&& visit) const {
     for_each_row([&visit](IVec3 first, std::span<const VoxelType> row) {
@@ -196,12 +206,12 @@ class Grid {
       }
     });
   }
-  /// Calls `visit(first voxel, types)` for the rows along x of the tight bounds of each chunk, in the same order; there
-  /// may be air among the types. Valid only during the call.
+  /// Calls `visit(first voxel, types)` for each row along x within the tight bounds of each chunk, in the same order.
+  /// The types can include air. The span is valid only during the call.
   void for_each_row(FunctionRef<void(IVec3 first, std::span<const VoxelType> types)> visit) const;
-  /// Bytes held, also those that snapshots share.
+  /// Returns the memory in use, in bytes, including memory shared with snapshots.
   [[nodiscard]] std::size_t bytes() const;
-  /// Gives back memory that edits left unused, but for what snapshots share.
+  /// Frees memory that edits left unused, except memory shared with snapshots.
   void compact();
 
  private:
@@ -211,13 +221,13 @@ class Grid {
   [[nodiscard]] inline Impl& impl() const;
 
   std::unique_ptr<Impl> impl_;
-  mutable EditNotice notice_;  // a scene that follows it is no part of it
+  mutable EditNotice notice_;  // not part of a scene that follows the grid
 };
 
-/// Reads many voxels that lie near each other: remembers the chunk of the last one, and unpacks a row that is
-/// read along x.
+/// Reads many voxels that lie near each other. Caches the chunk of the last voxel, and unpacks a row when reads run
+/// along x.
 ///
-/// Lifetime: the grid must outlive the reader, unedited.
+/// Lifetime: the grid must outlive the reader and must not be edited.
 class GridReader {
  public:
   explicit GridReader(const Grid& grid) : grid_(&grid) {}
@@ -231,45 +241,45 @@ class GridReader {
   }
 
  private:
-  // One key, computed once a row by whoever reads along x.
+  // Combines y and z into one key. A caller that reads along x computes it once per row.
   static std::uint64_t both(int y, int z) {
     return std::uint64_t{static_cast<std::uint32_t>(y)} << 32 | static_cast<std::uint32_t>(z);
   }
-  // Coordinates one by one: a vector would be stored in memory for the call, at every read.
+  // Takes coordinates one by one, because a vector would be stored in memory for the call at every read.
   VoxelType get_elsewhere(int x, int y, int z);
   VoxelType get_in_other_chunk(int x, int y, int z);
   VoxelType get_in_new_row(int x, int y, int z);
-  // Who read the last row along x and begins another at its start goes on like that.
+  // Predicts that the next row will be read along x too: the last row was, and the new row starts at its beginning.
   [[nodiscard]] bool goes_on(int x) const { return reads_of_row_ >= kReadsAlongX && (x & (kChunkEdge - 1)) == 0; }
 
-  static constexpr int kReadsAlongX = 4;  // so many in one row, and the next ones are expected there too
+  static constexpr int kReadsAlongX = 4;  // after this many reads in a row, unpack it
   const Grid* grid_;
   std::uint32_t row_x_ = 0;
-  std::uint32_t row_length_ = 0;  // of what is unpacked: nothing, or a row
+  std::uint32_t row_length_ = 0;  // of the unpacked row; 0 if there is none
   std::uint64_t row_yz_ = 0;
   std::array<VoxelType, kChunkEdge> row_{};
-  const Chunk* chunk_ = nullptr;          // that of the last voxel read elsewhere than in the row
-  const ChunkStorage* voxels_ = nullptr;  // its voxels; null where they are all of `uniform_`
+  const Chunk* chunk_ = nullptr;          // chunk of the last read outside the unpacked row
+  const ChunkStorage* voxels_ = nullptr;  // its voxels; null if all are `uniform_`
   VoxelType uniform_ = kAir;
-  std::uint32_t unknown_ = ~std::uint32_t{0};  // 0 from the first read on
+  std::uint32_t unknown_ = ~std::uint32_t{0};  // all ones until the first read, then 0
   int last_x_ = 0;
   int last_y_ = 0;
   int last_z_ = 0;
   int reads_of_row_ = 0;
 };
 
-/// Sets many voxels that lie near each other: collects those of a row of 64 along x and sets them in one edit when it
-/// comes to another row, when it is flushed, and at its end. Until then the grid is as it was.
+/// Sets many voxels that lie near each other. Collects the voxels of a row of 64 along x and writes them as one edit:
+/// when another row begins, on flush, and on destruction. The grid does not change before that.
 ///
 /// Lifetime: the grid must outlive the writer.
-/// Requires: nothing reads the grid before a flush and expects what was set.
-/// Cost:     where voxels come in rows, a tenth of `Grid::set`; where every voxel lies in another row, more than that.
+/// Requires: call `flush` before reading voxels that were set.
+/// Cost:     a tenth of `Grid::set` if voxels come in rows; more than `Grid::set` if every voxel lies in another row.
 class GridWriter {
  public:
   explicit GridWriter(Grid& grid) : grid_(&grid) {}
   GridWriter(const GridWriter&) = delete;
   GridWriter& operator=(const GridWriter&) = delete;
-  /// Flushes. A failed allocation ends the process here; flush before to have it thrown.
+  /// Flushes. A failed allocation here ends the process; call `flush` first to get the exception.
   ~GridWriter() { flush(); }
 
   void set(IVec3 voxel, VoxelType type) { set(voxel.x, voxel.y, voxel.z, type); }
@@ -280,7 +290,7 @@ class GridWriter {
     types_[static_cast<std::size_t>(local)] = type;
     is_set_[static_cast<std::size_t>(local)] = 1;
   }
-  /// Sets what was collected. Errors: bad_alloc; that row is then not set.
+  /// Writes the collected voxels. Errors: bad_alloc; the row is then not written.
   void flush();
 
  private:
@@ -291,7 +301,7 @@ class GridWriter {
   int row_y_ = 0;
   int row_z_ = 0;
   std::array<VoxelType, kChunkEdge> types_{};
-  std::array<std::uint8_t, kChunkEdge> is_set_{};  // bytes: one mask would have each write wait for the one before
+  std::array<std::uint8_t, kChunkEdge> is_set_{};  // bytes, because writes to one mask would depend on each other
 };
 
 }  // namespace quoin

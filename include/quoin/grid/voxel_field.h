@@ -11,39 +11,39 @@
 
 namespace quoin {
 
-/// The density of a voxel model, rounded: what a smooth mesh of it is made from. Every voxel but air is solid.
+/// Converts a voxel model to a rounded density field, the input of a smooth mesher. All voxels except air are solid.
 ///
-/// Space:     sample (i, j, k) stands for the centre of voxel (i, j, k): point p of the field is point p + 0.5 of the
-///            grid.
-/// Shape:     the distance to the nearest voxel centre of the other kind, less one half, smoothed by a 1 4 6 4 1 kernel
-///            along each axis; of its voxel's sign everywhere, at least 0.35 from 0 in solid voxels and 0.1 in air, so
-///            that the surface runs between the voxels that it ran between before, and nothing thin is lost. Within a
-///            band of 8 samples.
-/// Materials: the voxels' types.
-/// Order:     the same densities at any thread count.
-/// Cost:      about 5 ms a chunk that the surface comes near, on each thread; little for the others.
+/// Space:     sample (i, j, k) is the centre of voxel (i, j, k): point p of the field is point p + 0.5 of the grid.
+/// Shape:     the distance to the nearest voxel centre of the other kind (solid or air), minus one half, smoothed by a
+///            1 4 6 4 1 kernel along each axis. Densities keep the sign of their voxel, with a magnitude of at least
+///            0.35 in solid voxels and 0.1 in air. The surface therefore separates the same voxels as before, and thin
+///            parts remain. Band: 8 samples.
+/// Materials: the types of the voxels.
+/// Order:     the densities are the same at any thread count.
+/// Cost:      about 5 ms per chunk near the surface, on each thread; little for other chunks.
 /// Errors:    Cancelled.
 [[nodiscard]] Result<DensityGrid> field_from_grid(const Grid& grid, Threads threads = {},
                                                   const Progress& progress = {});
 
-/// The voxels of a field: one at each sample that is solid, of the sample's material.
+/// Converts a density field to voxels: each solid sample becomes a voxel with its material.
 ///
-/// Space:     voxel (i, j, k) has sample (i, j, k) at its centre: as field_from_grid, the other way round.
-/// Materials: `unnamed` in place of those that are air.
-/// Order:     the same voxels at any thread count.
+/// Space:     sample (i, j, k) is the centre of voxel (i, j, k), the inverse of field_from_grid.
+/// Materials: solid samples without a material (kAir) become `unnamed`.
+/// Order:     the voxels are the same at any thread count.
 /// Cost:      O(rows of 64 samples) of the field's chunks.
 [[nodiscard]] Grid grid_from_field(const DensityGrid& field, VoxelType unnamed, Threads threads = {});
 
-/// How far, in voxels, the density of a sample looks: an edit that is farther than this from a chunk leaves its
-/// densities as they were.
+/// Maximum distance, in voxels, between a voxel and a density that depends on it. An edit farther than this from a
+/// chunk does not change its densities.
 inline constexpr int kVoxelFieldReach = 10;
 
-/// One chunk of that field, of the centre's voxels and those around them: what `field_from_grid` puts there, all far
-/// air included. Several threads may make chunks at once.
+/// Computes one chunk of `field_from_grid` from the centre chunk and its neighbours, even if the result is all far air.
+/// Several threads may compute chunks at once.
 [[nodiscard]] DensityChunk density_of_voxels(const Neighbourhood& chunks);
-/// Makes the densities of a chunk, as they were before an edit, those of its voxels as they are now, to the same bits.
-/// `changed`: holds the voxels that came or went, in the chunk's coordinates; beyond the chunk where its neighbours
-/// changed. Cost: of the rows along x that these reach, about 1 ms for one voxel.
+/// Updates the densities of a chunk after an edit. The result is bit-identical to density_of_voxels. `densities` holds
+/// the state before the edit. `changed` contains the voxels that were added or removed, in chunk coordinates; it
+/// extends beyond the chunk if its neighbours changed.
+/// Cost: proportional to the affected rows along x; about 1 ms for one voxel.
 void update_density_of_voxels(const Neighbourhood& chunks, const IBox& changed, DensityChunk& densities);
 
 }  // namespace quoin

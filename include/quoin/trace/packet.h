@@ -11,8 +11,8 @@
 
 namespace quoin {
 
-/// Sixteen rays side by side, in grid space. Rays that start near each other and point the same way are traced together
-/// several times as fast as one by one; with the same results.
+/// A packet of 16 rays in grid space. Rays with similar origins and directions are traced several times as fast in a
+/// packet as one by one, with the same results.
 struct alignas(64) RayPacket {
   static constexpr int kSize = 16;
   template <class T>
@@ -20,10 +20,10 @@ struct alignas(64) RayPacket {
 
   Lanes<double> origin_x{}, origin_y{}, origin_z{};
   Lanes<double> direction_x{}, direction_y{}, direction_z{};
-  Lanes<double> max_t{};     ///< up to and including; infinity is none, a negative number or NaN hits nothing
-  std::uint32_t active = 0;  ///< bit i: ray i counts
+  Lanes<double> max_t{};     ///< inclusive; infinity is no limit; a negative value or NaN hits nothing
+  std::uint32_t active = 0;  ///< bit i is set if ray i is traced
 
-  /// Puts a ray into a lane, which becomes active; to drop a lane, clear its bit in `active`.
+  /// Sets the ray of a lane and activates the lane. To remove a ray, clear its bit in `active`.
   /// Requires: 0 <= lane < kSize.
   void set(int lane, const Ray& ray, double ray_max_t) {
     QUOIN_ASSERT(lane >= 0 && lane < kSize, "0 <= lane < kSize");
@@ -33,7 +33,7 @@ struct alignas(64) RayPacket {
     max_t[i] = ray_max_t;
     active |= 1U << lane;
   }
-  /// The ray of a lane, active or not. Requires: 0 <= lane < kSize.
+  /// Returns the ray of a lane, active or not. Requires: 0 <= lane < kSize.
   [[nodiscard]] Ray ray(int lane) const {
     QUOIN_ASSERT(lane >= 0 && lane < kSize, "0 <= lane < kSize");
     const auto i = static_cast<std::size_t>(lane);
@@ -41,7 +41,7 @@ struct alignas(64) RayPacket {
   }
 };
 
-/// What `first_hits` found; lanes whose bit in `hit` is not set hold nothing of meaning.
+/// The results of `first_hits`. Lanes whose bit in `hit` is not set have no meaningful content.
 struct alignas(64) PacketHits {
   std::uint32_t hit = 0;
   std::uint32_t starts_inside = 0;
@@ -49,7 +49,7 @@ struct alignas(64) PacketHits {
   RayPacket::Lanes<double> t{};
   RayPacket::Lanes<Direction> face{};
 
-  /// Puts what a ray alone hit into its lane, which counts as hit. Requires: 0 <= lane < RayPacket::kSize.
+  /// Stores the hit of a single ray in its lane and marks the lane as hit. Requires: 0 <= lane < RayPacket::kSize.
   void set(int lane, const RayHit& found) {
     QUOIN_ASSERT(lane >= 0 && lane < RayPacket::kSize, "0 <= lane < kSize");
     const auto i = static_cast<std::size_t>(lane);
@@ -59,7 +59,7 @@ struct alignas(64) PacketHits {
     t[i] = found.t;
     face[i] = found.face;
   }
-  /// What a lane hit. Requires: 0 <= lane < RayPacket::kSize, and its bit in `hit` is set.
+  /// Returns the hit of a lane. Requires: 0 <= lane < RayPacket::kSize, and its bit in `hit` is set.
   [[nodiscard]] RayHit operator[](int lane) const {
     QUOIN_ASSERT(lane >= 0 && lane < RayPacket::kSize, "0 <= lane < kSize");
     QUOIN_ASSERT((hit >> lane & 1U) != 0, "a lane that hit something");
@@ -68,10 +68,10 @@ struct alignas(64) PacketHits {
   }
 };
 
-/// As the function for single rays, for each active ray: equal in every bit, whatever the other rays.
+/// Traces each active ray as `first_hit` does. Each result is bit-identical to tracing that ray alone.
 void first_hits(const OccupancyTree& tree, const RayPacket& rays, PacketHits& hits);
 
-/// Bit i: ray i is active and blocked.
+/// Returns a mask of the active rays that are blocked.
 [[nodiscard]] std::uint32_t any_hits(const OccupancyTree& tree, const RayPacket& rays);
 
 }  // namespace quoin
