@@ -6,15 +6,15 @@
 namespace quoin {
 
 /// Returns the memory still available to this process, in bytes. Exceeding it can end the process. The result is the
-/// lowest of three limits: free system memory and swap, the cgroup limit, and RLIMIT_AS. Returns nullopt if the system
-/// reports none of them.
+/// lowest of three limits: available system memory plus swap, the cgroup limit, and RLIMIT_AS. Returns nullopt if the
+/// system reports none of them.
 [[nodiscard]] std::optional<std::uint64_t> available_memory();
 
 /// Makes the C library return each freed block of 32 KiB or more to the system at once, for the whole process.
 ///
 /// Resident memory then follows the memory in use. Programs that stream worlds need this to keep their memory budget;
 /// without it they use about 20 % more. Call it first in `main`.
-/// Cost:     time for new pages: 8 to 20 % of a flight through a streamed world.
+/// Cost:     time for new pages: 8 to 20 % of the time of a flight through a streamed world.
 /// Returns:  false, without a change, if the C library is not glibc. Has no effect if another allocator replaces
 ///           malloc.
 /// See docs/performance.md, "Worlds larger than memory".

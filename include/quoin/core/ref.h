@@ -29,8 +29,8 @@ class RefCounted {
 /// A reference-counted pointer to a T, which derives from RefCounted. The last owner destroys the object. Null by
 /// default.
 ///
-/// Requires: `*` and `->` are used only if the pointer is not null; this is not checked. Copy on write: do not change
-/// an object while `is_shared` is true. `make_own` replaces it with a copy first.
+/// Requires: `*` and `->` are used only if the pointer is not null; this is not checked.
+/// Sharing: do not change an object while `is_shared` is true. Call `make_own` first, which replaces it with a copy.
 /// Threads: several threads may add and release owners of one object at once. Use each Ref on one thread at a time.
 template <class T>
 class Ref {

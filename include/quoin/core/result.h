@@ -37,9 +37,9 @@ struct Error {
 /// or byte offset is left out.
 [[nodiscard]] std::string to_string(const Error& error);
 
-/// A value or an Error: a tl::expected that converts implicitly from Error. Callers propagate an error with `return
-/// loaded.error();`. Used only for failures caused by outside data or the system. Broken preconditions assert instead
-/// (QUOIN_ASSERT).
+/// A value or an Error: a tl::expected that converts implicitly from Error. Callers propagate an error with
+/// `return loaded.error();`. Used only for failures caused by outside data or the system. Broken preconditions assert
+/// instead (QUOIN_ASSERT).
 template <class T>
 class [[nodiscard]] Result : public tl::expected<T, Error> {
  public:

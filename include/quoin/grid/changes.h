@@ -51,7 +51,7 @@ class ChunkSlabs {
     QUOIN_ASSERT(z >= 0 && z < kChunkEdge, "0 <= z < 64");
     return static_cast<std::uint32_t>(words_[static_cast<std::size_t>(z >> 4)] >> (16 * (z >> 2 & 3)) & 0xFFFFU);
   }
-  /// Returns the 4x4 slabs from row (y, z) on as a mask; bit j + 4 * k is the slab of row (y + 4 * j, z + 4 * k).
+  /// Returns the 4x4 slabs starting at row (y, z) as a mask. Bit j + 4 * k is the slab of row (y + 4 * j, z + 4 * k).
   /// Requires: y and z are 0, 16, 32 or 48.
   [[nodiscard]] std::uint32_t block(int y, int z) const {
     QUOIN_ASSERT((y | z) >= 0 && ((y | z) & ~48) == 0, "0, 16, 32 or 48");
@@ -79,8 +79,8 @@ struct ChunkChange {
   /// False if the chunk was only loaded or unloaded (Grid::load_chunk, Grid::unload_chunk), without an edit.
   bool is_edit = true;
 
-  /// Returns true if the mesh of the chunk at an offset may have changed. Requires: -1 <= offset.x, offset.y, offset.z
-  /// <= 1.
+  /// Returns true if the mesh of the chunk at an offset may have changed.
+  /// Requires: -1 <= offset.x, offset.y, offset.z <= 1.
   [[nodiscard]] bool affects(IVec3 offset) const {
     return (neighbours >> Neighbourhood::index(offset.x, offset.y, offset.z) & 1U) != 0;
   }
@@ -121,7 +121,7 @@ struct RowChange {
 /// Limits:   a voxel that changed and then changed back is not reported, for example inside a stream in which each
 ///           voxel is replaced by the next. A rule must therefore check the voxels that it moves itself
 ///           (examples/falling_sand.cpp).
-/// Partial:  chunks that are not loaded in either state are skipped.
+/// Partial:  chunks that are unloaded in at least one of the two states are skipped.
 /// Cost:     O(changed slabs). Chunks shared by both states cost nothing.
 void visit_changes(const Grid& before, const Grid& now, const GridChanges& changes,
                    FunctionRef<void(const RowChange&)> visit);
@@ -140,7 +140,7 @@ using DataChanges = Changes<DataChange>;
 /// for that cursor. If everything changed, the two states are compared completely.
 ///
 /// Order:    chunks by z, y, x; within a chunk, voxels by z, y, x.
-/// Partial:  chunks that are not loaded in either state are skipped.
+/// Partial:  chunks that are unloaded in at least one of the two states are skipped.
 /// Cost:     O(voxels with data in the slabs of 4x4 rows that contain a change). Shared storage costs nothing.
 void visit_data_changes(const Grid& before, const Grid& now, const DataChanges& changes,
                         FunctionRef<void(IVec3 voxel, const VoxelData& before, const VoxelData& now)> visit);

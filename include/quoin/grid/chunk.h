@@ -153,9 +153,8 @@ class Chunk {
   [[nodiscard]] int count(VoxelType type) const;
   /// Returns the types in use, ascending, including air. Cost: same as `count`.
   [[nodiscard]] std::vector<VoxelType> types() const;
-  /// Returns the smallest box around the voxels that are not air, in chunk coordinates. The box is empty if all are
-  /// air.
-  /// Cost: O(64).
+  /// Returns the smallest box around the voxels that are not air, in chunk coordinates. Empty if all are air. Cost:
+  /// O(64).
   [[nodiscard]] IBox bounds() const;
   /// Returns the memory in use, in bytes, including this object.
   [[nodiscard]] std::size_t bytes() const;
@@ -202,8 +201,8 @@ struct Neighbourhood {
   /// Chunks at index [(dz + 1) * 9 + (dy + 1) * 3 + (dx + 1)]; the centre is 13.
   std::array<const Chunk*, 27> chunks{};
 
-  /// Returns the offset of the chunk at an index, -1 to 1 on each axis. The inverse of `index`. Requires: 0 <= index <
-  /// 27.
+  /// Returns the offset of the chunk at an index, -1 to 1 on each axis. The inverse of `index`.
+  /// Requires: 0 <= index < 27.
   [[nodiscard]] static IVec3 offset(int index) {
     QUOIN_ASSERT(index >= 0 && index < 27, "0 <= index < 27");
     return {index % 3 - 1, index / 3 % 3 - 1, index / 9 - 1};

@@ -26,9 +26,8 @@ struct CopyOptions {
 /// rotated and mirrored by `orientation`; the minimum corner of the result is at `to_min`. Returns the number of voxels
 /// whose type changed in `to`.
 ///
-/// Space:    voxel coordinates of each grid. Rotate `v - box.min`, then move the rotated box so that it begins at 0.
-///           Voxel `v` of the box arrives at the result plus `to_min`. The rotated box has size
-///           `orientation.size_of(box.size())`.
+/// Space:    voxel coordinates of each grid. Voxel `v` of the box arrives at `to_min` plus the rotated `v - box.min`,
+///           shifted so that the rotated box begins at 0. The rotated box has size `orientation.size_of(box.size())`.
 /// Overlap:  `from` and `to` may be the same grid, and the boxes may overlap. The copy acts as if all voxels were read
 ///           before the first is written.
 /// Partial:  unloaded chunks of `from` are not copied; unloaded chunks of `to` are not changed.

@@ -32,7 +32,7 @@ struct FlattenOptions {
 };
 
 /// A sparse, unbounded density field in chunks of 64^3 samples. Negative is solid; 0 and above is air. A sample that
-/// was never set is far air, at a distance of `band` from the surface.
+/// was never set is far air: its density is `band`.
 ///
 /// Space:     sample (i, j, k) lies at the point (i, j, k). Between samples the field is trilinear. All int32
 ///            coordinates are valid, except that the outermost chunk on each side stays air.
@@ -94,7 +94,7 @@ class DensityGrid {
   /// Errors:  a negative, infinite or NaN size or position, or a box with `max` less than `min`, changes nothing.
   /// Cost:    adding: O(chunks of the shape's box), plus O(samples) in chunks near its surface and in existing chunks.
   ///          Each chunk inside becomes a uniform chunk of about 200 bytes, and a sphere of radius 10^6 has 10^13 of
-  ///          them. If users choose the size, limit it with `progress`. Removing: only existing chunks.
+  ///          them. If users choose the size, cancel oversized edits with `progress`. Removing: only existing chunks.
   std::int64_t add_sphere(DVec3 centre, double radius, VoxelType material, double blend = 0.0,
                           const Progress& progress = {});
   std::int64_t remove_sphere(DVec3 centre, double radius, double blend = 0.0);
@@ -102,8 +102,8 @@ class DensityGrid {
                        const Progress& progress = {});
   std::int64_t remove_box(DVec3 min, DVec3 max, double rounding = 0.0, double blend = 0.0);
   /// Smooths the surface inside a sphere: moves each density towards the mean of its 26 neighbours, as they were
-  /// before. Each density moves by the factor strength * (1 - (distance / radius)^2)^2. A strength above 1 counts as 1.
-  /// A sample that becomes solid takes the most frequent material of its solid neighbours.
+  /// before. Each density moves strength * (1 - (distance / radius)^2)^2 of the way. A strength above 1 counts as 1. A
+  /// sample that becomes solid takes the most frequent material of its solid neighbours.
   /// Returns: the number of changed samples.
   /// Errors:  an infinite or NaN centre or radius, a NaN strength, or a radius or strength of 0 or less, changes
   ///          nothing.
@@ -194,7 +194,7 @@ class DensityGrid {
   [[nodiscard]] inline Impl& impl() const;
 
   std::unique_ptr<Impl> impl_;
-  mutable EditNotice notice_;  // not part of a scene that follows the grid
+  mutable EditNotice notice_;  // mutable: a scene that follows the grid is not part of its value
 };
 
 }  // namespace quoin

@@ -83,7 +83,7 @@ class Grid {
   /// Sets all voxels of a box (half-open: `max` excluded; an empty box changes nothing). Returns the number of changed
   /// voxels.
   /// Cost: O(chunks of the box + rows of 64 voxels at its rim). A uniform chunk takes some hundred bytes and no memory
-  /// per voxel. If users choose the box, limit its size with `progress`.
+  /// per voxel. If users choose the box, cancel oversized edits with `progress`.
   std::int64_t fill_box(const IBox& box, VoxelType type, const Progress& progress = {});
   /// Sets the voxels whose centre (i + 0.5) lies within `radius` of `centre`. Returns the number of changed voxels. A
   /// negative or non-finite radius, or a non-finite centre, changes nothing.
@@ -169,8 +169,7 @@ class Grid {
   [[nodiscard]] std::vector<IVec3> chunks() const;
   [[nodiscard]] std::size_t chunk_count() const;
   /// Returns the chunk and its 26 neighbours, for meshers. If any of them is not loaded, all 27 are null and read as
-  /// air:
-  /// call `is_loaded_around` first. Lifetime: the grid must outlive it, and an edit invalidates it.
+  /// air. Call `is_loaded_around` first. Lifetime: the grid must outlive it, and an edit invalidates it.
   [[nodiscard]] Neighbourhood neighbourhood(IVec3 chunk) const;
   template <std::floating_point T>
   Neighbourhood neighbourhood(Point<T> point) const = delete;
@@ -221,7 +220,7 @@ class Grid {
   [[nodiscard]] inline Impl& impl() const;
 
   std::unique_ptr<Impl> impl_;
-  mutable EditNotice notice_;  // not part of a scene that follows the grid
+  mutable EditNotice notice_;  // mutable: a scene that follows the grid is not part of its value
 };
 
 /// Reads many voxels that lie near each other. Caches the chunk of the last voxel, and unpacks a row when reads run

@@ -69,7 +69,7 @@ struct VoxelProperties {
   bool operator==(const VoxelProperties&) const = default;
 };
 
-/// A type that was added or replaced. Other properties than the flags below can differ too.
+/// A type that was added or replaced. Properties without a flag below can differ too.
 struct TypeChange {
   VoxelType type = kAir;
   bool visibility_changed = false;  ///< an unregistered type counts as opaque
@@ -81,7 +81,7 @@ using TypeChanges = Changes<TypeChange>;
 /// everything must be meshed and traced again.
 [[nodiscard]] bool has_other_visibility(const TypeChanges& changes);
 
-/// The voxel types of a scene. Meshing, tracing and lighting read from it whether a type blocks sight or light.
+/// The voxel types of a scene. Meshing, tracing and lighting look up type visibility here.
 ///
 /// Copies share their content until either is changed, as Grid snapshots do. Until then, a cursor of either also works
 /// with the other. Threads: same as Grid. Cost: `visibility` is one array lookup.
