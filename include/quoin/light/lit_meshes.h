@@ -9,23 +9,25 @@
 
 namespace quoin {
 
-/// Gives each vertex of a scene's meshes the propagated light that it has in pictures (LightModel::Propagated), so that
-/// files show it: MeshView::light, with the exposure and what its type emits, as 16 bits a channel, 1 at most. Vertices
-/// of blocks have that of their face's corners; smooth ones that before them.
+/// Bakes propagated light (LightModel::Propagated) into each vertex of a scene's meshes, so that mesh files show it.
+/// Fills MeshView::light with light, exposure and the type's emission, 16 bits per channel, at most 1. Vertices of
+/// blocks get the light at their face's corners; smooth vertices get the light in front of them.
 ///
 ///   auto meshes = mesh_scene_smoothly(scene);
 ///   Status lit = light_meshes(scene, natural_light(), *meshes);
 ///   write_mesh(*meshes, "cave.glb");
 ///
-/// Faces:  those of blocks are as they were merged. What is merged across light shows it wrong: `mesh_lit_scene`.
-/// Parts:  of a part that several instances place, light is that of the grid, which they share.
-/// Errors: InvalidArgument for a part that no instance of the scene places, and for blocks that are watertight or in an
-///         atlas.
+/// Faces:  blocky faces stay merged as they are. Faces merged across changing light show it wrong; use `mesh_lit_scene`
+///         to avoid that.
+/// Parts:  a part placed by several instances has the light of its grid, which they share.
+/// Errors: InvalidArgument for a part that no instance of the scene places, for watertight blocks and for blocks with
+///         an atlas.
 [[nodiscard]] Status light_meshes(const Scene& scene, const LightOptions& options, SceneMeshes& meshes,
                                   Threads threads = {});
 
-/// `mesh_scene`, with light at the vertices and faces merged only along edges of equal light (LightMerging::Constant).
-/// Errors: those of both.
+/// Meshes a scene as `mesh_scene` does, with light at the vertices. Faces merge only along edges of equal light
+/// (LightMerging::Constant).
+/// Errors: as `mesh_scene` and `light_meshes`.
 [[nodiscard]] Result<SceneMeshes> mesh_lit_scene(const Scene& scene, const LightOptions& light,
                                                  BlockySceneOptions options = {}, Threads threads = {},
                                                  const Progress& progress = {});

@@ -16,7 +16,7 @@
 
 namespace quoin {
 
-/// Light at a voxel, 0 (dark) to 15: of the sky, and of lamps in three colours.
+/// Light levels at a voxel, 0 (dark) to 15: sky light, and lamp light in three colours.
 struct LightLevels {
   std::uint8_t sky = 0;
   std::uint8_t red = 0;
@@ -26,47 +26,51 @@ struct LightLevels {
   bool operator==(const LightLevels&) const = default;
 };
 
-/// In 16 bits, as meshes carry it: sky in the lowest four, then red, green and blue. Requires: levels of at most 15.
+/// Packs light levels into 16 bits for meshes: sky in the lowest four bits, then red, green and blue.
+/// Requires: levels of at most 15.
 [[nodiscard]] constexpr std::uint16_t packed(LightLevels levels) {
   QUOIN_ASSERT(std::max({levels.sky, levels.red, levels.green, levels.blue}) <= 15, "levels from 0 to 15");
   return static_cast<std::uint16_t>(levels.sky | levels.red << 4 | levels.green << 8 | levels.blue << 12);
 }
-/// The levels of such a word.
+/// Returns the light levels in a packed word.
 [[nodiscard]] constexpr LightLevels unpacked_light(std::uint16_t word) {
   return {static_cast<std::uint8_t>(word & 15), static_cast<std::uint8_t>(word >> 4 & 15),
           static_cast<std::uint8_t>(word >> 8 & 15), static_cast<std::uint8_t>(word >> 12)};
 }
 
-/// What a type gives off by itself: 0 for most. `emission` of 1 and more is level 15 in the brightest channel of its
-/// colour, the others in proportion to their sRGB values; less is less in proportion. Its `sky` is 0.
+/// Returns the lamp light that a type emits; 0 for most types. An `emission` of 1 or more gives level 15 in the
+/// brightest channel of the type's colour, and the other channels in proportion to their sRGB values. A lower emission
+/// scales the levels. `sky` is 0.
 [[nodiscard]] LightLevels lamp_levels(const VoxelProperties& properties);
 
 struct PropagatedLightOptions {
-  /// What types give off, for games with levels of their own; empty: `lamp_levels`. `sky` counts as 0, and
-  /// what is above 15 as 15.
+  /// Returns the lamp light that a type emits, for games with their own levels. Empty: `lamp_levels`. `sky` is ignored,
+  /// and levels above 15 count as 15.
   std::function<LightLevels(VoxelType, const VoxelProperties&)> lamp{};
 };
 
-/// Light in game time: that of the sky and of coloured lamps, spread through whatever is not opaque, one level less a
-/// step, kept up to date while a grid is edited. What block games light their faces with.
+/// Real-time light as in block games: sky light and coloured lamp light that spread through all voxels that are not
+/// opaque, losing one level per step. Updates incrementally after edits.
 ///
 ///   PropagatedLight light;
 ///   light.update(grid, types);                                    // once, and after each edit
 ///   for (const ChunkChange& change : light.changes_since(cursor).items) mesh_again(change);
-///   light.split(quads, chunk, lit_quads, levels);                 // a level a quad, merging kept where it is equal
+///   light.split(quads, chunk, lit_quads, levels);                 // one level per quad; merged where levels agree
 ///
-/// Sky:     level 15 falls straight down without loss, until something opaque; it is 15 outside of the world. y is up.
-/// Lamps:   the level of a type is in its own voxel, and spreads from there, whatever its visibility.
-/// Colours: a transparent type lets a colour of lamps pass where that channel of its colour is at least half the
-///          greatest, the sky always.
-/// Exact:   equal to a search from every lamp and every column of sky (Dijkstra), whatever edits led there.
-/// Cost:    of an update O(rows of 64 voxels within reach of what changed, and of columns of sky that it opens or
-///          closes), times the level. The first: some tenths of a millisecond a chunk.
-/// Memory:  a bit a voxel, channel and bit of its levels, where these are not the same in a slab of 64x4x4 voxels; less
-///          where rows are alike.
-/// Threads: any number may read at once, and take snapshots; an update needs it to itself. A snapshot is light of its
-///          own: LiveLight updates on a worker while the game shows what was there before.
-/// Source:  levels as block games have them; spread by whole words instead of a queue.
+/// Sky:     level 15 falls straight down without loss until it meets an opaque voxel, and is 15 outside the world. y is
+///          up.
+/// Lamps:   a type's level applies in its own voxel and spreads from there, even if the voxel is opaque.
+/// Colours: a transparent type passes a channel of lamp light if that channel of its colour is at least half its
+///          greatest channel. It always passes sky light.
+/// Exact:   the result equals a search from every lamp and every sky column (Dijkstra), independent of the order of
+///          edits.
+/// Cost:    an update costs O(rows of 64 voxels within reach of the edits, and of sky columns that the edits open or
+///          close), times the levels. The first update takes some tenths of a millisecond per chunk.
+/// Memory:  one bit per voxel, channel and bit of the level where a slab of 64x4x4 voxels is not uniform; less where
+///          rows are equal.
+/// Threads: any number can read and take snapshots at once; an update needs exclusive access. A snapshot is
+///          independent: LiveLight updates on a worker while the game shows the earlier state.
+/// Source:  levels as in block games; spread by whole 64-bit words instead of a queue.
 class PropagatedLight {
  public:
   explicit PropagatedLight(PropagatedLightOptions options = {});
@@ -74,28 +78,28 @@ class PropagatedLight {
   PropagatedLight& operator=(PropagatedLight&&) noexcept;
   ~PropagatedLight();
 
-  /// Takes over what was edited since the last update, or all of another grid or where types pass or give off another
-  /// light. When it throws (bad_alloc), the next update begins anew.
+  /// Applies the edits since the last update. Recomputes everything for another grid, or when the transparency or
+  /// emission of types changed. If it throws (bad_alloc), the next update starts from scratch.
   void update(const Grid& grid, const VoxelRegistry& types, Threads threads = {});
 
-  /// The light as it is now; later updates of either do not reach the other. A cursor of this one's changes reads
-  /// on in the snapshot, and the other way round, until the snapshot is updated itself, which goes on from what it is.
-  /// Cost: some pointers; an update copies of what the two share no more than it changes, in slabs of 64x4x4 voxels.
+  /// Returns a copy of the current light; later updates do not affect the copy, nor the reverse. A change cursor of
+  /// either object is valid in the other until the snapshot itself is updated, which continues from its own state.
+  /// Cost: some pointers. An update copies only the shared slabs of 64x4x4 voxels that it changes.
   [[nodiscard]] PropagatedLight snapshot() const;
 
-  /// As of the last update. Of an opaque voxel: what it gives off.
+  /// Returns the levels at a voxel as of the last update. For an opaque voxel: its emission.
   [[nodiscard]] LightLevels at(IVec3 voxel) const;
-  /// The 64 voxels along x in whose row `voxel` lies, packed.
+  /// Reads the packed levels of the row of 64 voxels along x that contains `voxel`.
   void read_row(IVec3 voxel, std::span<std::uint16_t, kChunkEdge> out) const;
 
-  /// Where light changed, exactly, as Grid::changes_since tells of voxels.
+  /// Returns exactly the changes of light, as Grid::changes_since does for voxels.
   [[nodiscard]] GridChanges changes_since(ChangeCursor& cursor) const;
 
-  /// Splits quads of a chunk where the light in front of their faces changes. `light` gets a level a quad of `out`, in
-  /// the order of the quads they come from; both are replaced.
+  /// Splits quads of a chunk where the light in front of their faces changes. `light` gets one packed level per quad of
+  /// `out`, in the order of the source quads. Replaces `out` and `light`.
   void split(const QuadBuffer& quads, IVec3 chunk, QuadBuffer& out, std::vector<std::uint16_t>& light) const;
 
-  /// Bytes held, also those that snapshots share.
+  /// Returns the bytes held, including bytes shared with snapshots.
   [[nodiscard]] std::size_t bytes() const;
 
  private:

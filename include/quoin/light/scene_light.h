@@ -11,24 +11,24 @@
 
 namespace quoin {
 
-/// A grid's light, and what is in its way. Lifetime: until the next update of what it is of.
+/// The light of a grid and the voxels that block it. Lifetime: until the next update of the SceneLight it comes from.
 struct GridLight {
   const PropagatedLight* light = nullptr;
-  /// The grid's voxels; where it has a field, with a voxel of its material (or, without one, of a number that no type
-  /// has) at each solid sample where there is none.
+  /// The grid's voxels. If the grid has a field, each of its solid samples in an air voxel adds a voxel of the field's
+  /// material, or of an unregistered type if it has no material.
   const Grid* voxels = nullptr;
 };
 
-/// Propagated light of all grids of a scene, each by itself.
+/// Propagated light of all grids of a scene, each grid separately.
 ///
 ///   SceneLight light;
 ///   light.update(scene);                       // once, and after edits
 ///   const GridLight of = light.of(handle);
 ///   SurfaceLight surface(*of.light, *of.voxels, scene.types);
 ///
-/// Fields: their samples stand in the way as the voxel does whose least corner they are: half a voxel off.
-/// Cost:   of an update that of PropagatedLight for what changed, and a look at each grid; of fields all of a chunk in
-///         which anything changed.
+/// Fields: a solid sample blocks light like the voxel whose minimum corner it is, which is half a voxel off.
+/// Cost:   an update costs PropagatedLight::update for the changes plus a check per grid. Fields are updated by whole
+///         chunks.
 class SceneLight {
  public:
   explicit SceneLight(PropagatedLightOptions options = {});
@@ -37,18 +37,18 @@ class SceneLight {
   ~SceneLight();
 
   void update(const Scene& scene, Threads threads = {});
-  /// As PropagatedLight::snapshot, of each grid; GridLight::voxels stays that of the last updates' scene, which must
-  /// outlive it, but for grids with fields.
+  /// Returns a PropagatedLight::snapshot of each grid. GridLight::voxels still points into the scene of the last
+  /// update, which must outlive the snapshot, except for grids with fields.
   [[nodiscard]] SceneLight snapshot() const;
-  /// As of the last update. Of a grid that the scene did not have then: nothing but open sky.
+  /// Returns the light of a grid as of the last update. For a grid that the scene did not have then: open sky.
   [[nodiscard]] GridLight of(GridHandle grid) const;
-  /// Of all light, also what snapshots share.
+  /// Returns the bytes of all light, including bytes shared with snapshots.
   [[nodiscard]] std::size_t bytes() const;
 
  private:
   struct Entry;
   PropagatedLightOptions options_;
-  std::unique_ptr<Entry> unknown_;  // what grids that are not there have
+  std::unique_ptr<Entry> unknown_;  // returned for unknown grids
   std::map<GridHandle, std::unique_ptr<Entry>> grids_;
 };
 

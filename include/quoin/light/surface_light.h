@@ -17,39 +17,44 @@
 
 namespace quoin {
 
-/// Light at the four corners of a face, in the order of FaceOcclusion: twelfths of a level, which means of up to four
-/// levels are whole numbers of. Each in a word: the sky's in the lowest byte, then red, green and blue, 0 to 180.
+/// Light at the four corners of a face, in the order of FaceOcclusion, one word per corner: sky in the lowest byte,
+/// then red, green and blue. Units are twelfths of a level, 0 to 180, which represent means of up to four levels
+/// exactly.
 using FaceLight = std::array<std::uint32_t, 4>;
 
-/// The levels of a corner.
+/// Returns the levels of a corner.
 [[nodiscard]] constexpr MeanLevels levels_of_corner(std::uint32_t twelfths) {
   const auto level = [&](int shift) { return static_cast<float>(twelfths >> shift & 255U) / 12.0F; };
   return {level(0), level(8), level(16), level(24)};
 }
 
-/// Where faces may stay merged.
+/// Condition under which faces stay merged.
 enum class LightMerging : std::uint8_t {
-  Constant,  ///< along an edge along which light does not change: also right where corners become colours first, and
-             ///< these are interpolated
-  Linear,    ///< where light is a linear function of the place: right where levels are interpolated, over whichever two
-             ///< triangles, and become colours (light_colour) in the fragment shader
+  /// Light is constant along the merged edge. Also right if corners are converted to colours first and the colours are
+  /// interpolated.
+  Constant,
+  /// Light is a linear function of position. Right if levels are interpolated, over either pair of triangles, and
+  /// converted to colours (light_colour) in the fragment shader.
+  Linear,
 };
 
-/// The light that reaches surfaces: smooth over faces and meshes, and never through walls.
+/// Smooth light on faces and meshes that never leaks through walls.
 ///
-///   SurfaceLight surface(light, grid, types);                         // one a thread
+///   SurfaceLight surface(light, grid, types);                         // one per thread
 ///   surface.split(quads, chunk, LightMerging::Linear, lit, corners);  // blocks
 ///   surface.read({mesh.positions, mesh.normals, origin}, levels);     // vertices of smooth meshes
 ///
-/// Corners:  the mean of the voxels in front of the face that touch the corner. One that is opaque is left out, and so
-///           is one at the far side of two that are: light does not go there. So a corner of a closed room is dark
-///           whatever shines behind the wall, and what touches the same corner from the same side has the same light.
-/// Vertices: half a sample in front of the surface, of the eight voxels around by their nearness; those that are
-///           opaque, or not connected with the nearest that is not, through the others, are left out.
-///           It depends on the place alone, so that meshes of neighbours have the same bits where they meet.
-/// Lifetime: light, grid and types must outlive it, and stay as they are while it is used; `light` is up to date.
-/// Threads:  each needs one of its own: it remembers rows (1.3 MB).
-/// Source:   corners as block games draw them (Luanti leaves out what is opaque likewise).
+/// Corners:  the mean of the voxels in front of the face that touch the corner. Skips opaque voxels and the diagonal
+///           voxel if both sides are opaque, because light cannot get there. A corner of a closed room is therefore
+///           independent of light behind the wall, and faces that touch a corner from the same side have the same light
+///           there.
+/// Vertices: sampled half a sample in front of the surface, weighted by distance from the eight surrounding voxels.
+///           Skips voxels that are opaque or not connected to the nearest open voxel through the others. Depends only
+///           on the position, so that neighbouring meshes have the same bits where they meet.
+/// Requires: `light` is up to date.
+/// Lifetime: light, grid and types must outlive it and must not change while it is used.
+/// Threads:  use one object per thread; it caches rows (1.3 MB).
+/// Source:   corner light as in block games (Luanti also skips opaque voxels).
 class SurfaceLight {
  public:
   SurfaceLight(const PropagatedLight& light, const Grid& grid, const VoxelRegistry& types);
@@ -57,17 +62,17 @@ class SurfaceLight {
   SurfaceLight& operator=(SurfaceLight&&) noexcept;
   ~SurfaceLight();
 
-  /// The corners of a face of a voxel. All 0 where the voxel in front is opaque.
+  /// Returns the light at the corners of a voxel's face. All 0 if the voxel in front is opaque.
   [[nodiscard]] FaceLight face(IVec3 voxel, Direction direction);
 
-  /// Splits quads of a chunk, as a mesher gave them, where light at their corners would not be what it is at those of
-  /// single faces. `corners` gets those of each quad of `out`, in the order of the quads they come from; both are
-  /// replaced.
+  /// Splits a mesher's quads where interpolation over a merged quad would differ from the light of the single faces.
+  /// `corners` gets the corner light of each quad of `out`, in the order of the source quads. Replaces `out` and
+  /// `corners`.
   void split(const QuadBuffer& quads, IVec3 chunk, LightMerging merging, QuadBuffer& out,
              std::vector<FaceLight>& corners);
 
-  /// Light of vertices, or of any places at a surface: sample (i, j, k) is the middle of voxel (i, j, k).
-  /// Requires: as many normals as positions, unit ones, and room for as many in `out`.
+  /// Writes the light of vertices, or of any positions at a surface. Sample (i, j, k) is the centre of voxel (i, j, k).
+  /// Requires: as many unit normals as positions; `out` has at least as many elements.
   void read(const SmoothPlaces& places, std::span<MeanLevels> out);
 
  private:

@@ -10,45 +10,47 @@ namespace quoin {
 
 struct LiveLightOptions {
   PropagatedLightOptions light{};
-  Threads workers{};  ///< unlike elsewhere 0 means one less than the machine has, at least 1
+  Threads workers{};  ///< 0: one less than the hardware threads, at least 1 (different from other options)
 };
 
-/// Propagated light of a scene's grids, kept up to date on workers while the scene is edited: a frame never waits for
-/// it, and shows light that is a few frames late.
+/// Propagated light of a scene's grids, updated on worker threads while the scene is edited. Frames never wait for
+/// light; the light shown is a few frames late.
 ///
 ///   LiveLight light;
 ///   renderer.use_light(&light.shown());
 ///   each frame: edit(scene); light.update(scene); light.take(); renderer.update(); renderer.render(...);
 ///
-/// Exact:   what is shown is at any time the light of the scene as it was at one moment, voxels included
-///          (GridLight::voxels), equal to a search from every lamp and all of the sky. How late it is depends on the
-///          workers; once nothing is edited any more, what `take` has put there is the light of what is there.
-/// Follow:  PropagatedLight::changes_since, of `shown().of(grid).light`, tells where light changed between two states.
-/// Lifetime: the scene is only read within calls. Threads: all calls come from one thread, or one after the other;
-///           what is shown may be read by any number until the next `take`.
+/// Exact:    the light shown is always the exact light of the scene at one moment, including its voxels
+///           (GridLight::voxels). The delay depends on the workers. Once edits stop, `take` eventually shows the light
+///           of the current scene.
+/// Follow:   PropagatedLight::changes_since, on `shown().of(grid).light`, reports where light changed between two
+///           states.
+/// Lifetime: the scene is read only during calls.
+/// Threads:  calls must not overlap. Any number of threads can read the shown light until the next `take`.
 class LiveLight {
  public:
-  /// Errors: std::system_error where the worker cannot be started.
+  /// Errors: std::system_error if the worker thread cannot be started.
   explicit LiveLight(LiveLightOptions options = {});
-  /// Waits for the update that is under way.
+  /// Waits for the update in progress.
   ~LiveLight();
   LiveLight(const LiveLight&) = delete;
   LiveLight& operator=(const LiveLight&) = delete;
 
-  /// Has workers find the light of the scene as it is now, if voxels' types, fields, grids or types are others than
-  /// when it last did, unless they are still at an earlier state: call it once a frame. Data at voxels, names and
-  /// places are none of light's: in what is shown they may be those of an earlier moment.
-  /// Cost:   nothing where nothing changed; else that of Scene::snapshot.
-  /// Errors: bad_alloc, of a worker too; what could not be lit then is, anew, after the next call.
+  /// Starts computing the light of the current scene on workers if voxel types, fields, grids or type properties have
+  /// changed, unless an earlier update is still running. Call it once per frame. Voxel data, names and instance
+  /// positions do not affect light and can be out of date in the light shown.
+  /// Cost:   no work if nothing changed; otherwise Scene::snapshot.
+  /// Errors: bad_alloc, also from a worker; the next call then computes the missing light from scratch.
   void update(const Scene& scene);
-  /// Puts the newest light that is ready in place of what is shown. Returns whether there was any. Cost: O(1).
+  /// Shows the newest completed light. Returns true if there was new light. Cost: O(1).
   bool take();
-  /// As of the last `take`; open sky before. It stays in its place. Lifetime of what it gives: until the next `take`.
+  /// Returns the light as of the last `take`; open sky before the first. The reference stays valid.
+  /// Lifetime: a GridLight from it is valid until the next `take`.
   [[nodiscard]] const SceneLight& shown() const;
 
-  /// Whether, as of the last update, there is something that is not shown yet.
+  /// Returns true if, as of the last update, the scene has changes whose light is not shown yet.
   [[nodiscard]] bool is_late() const;
-  /// Waits until the scene's light is shown. Errors: bad_alloc.
+  /// Waits until the light of the scene is shown. Errors: bad_alloc.
   void finish(const Scene& scene);
 
  private:

@@ -21,132 +21,137 @@ namespace quoin {
 
 enum class SurfaceStyle : std::uint8_t { Blocky, Smooth };
 
-/// What of a SceneGrid a surface is of.
+/// Part of a SceneGrid that a surface comes from.
 enum class SurfaceContent : std::uint8_t {
-  Voxels,  ///< its `grid`, in the style of the meshes
+  Voxels,  ///< its `grid`, in LiveMeshOptions::style
   Field,   ///< its `field`; always smooth
 };
 
-/// The quads of one region of a chunk: [LiveMeshOptions::region_edge]^3 voxels from a multiple of that on.
+/// The quads of one region of a chunk: [LiveMeshOptions::region_edge]^3 voxels, aligned to region_edge.
 struct SurfaceRegion {
-  IVec3 region{0};  ///< it begins at voxel `region` * edge of the chunk
-  /// Of the surface's quads those that face Direction d are [opaque[d], opaque[d + 1]), of transparent types
-  /// [transparent[d], transparent[d + 1]): what the camera cannot see of a region need not be drawn.
+  IVec3 region{0};  ///< the region starts at voxel `region` * region_edge of the chunk
+  /// Ranges in the surface's quads: opaque quads that face Direction d are [opaque[d], opaque[d + 1]), transparent
+  /// quads are [transparent[d], transparent[d + 1]). A renderer can skip directions that face away from the camera.
   std::array<std::uint32_t, 7> opaque{};
   std::array<std::uint32_t, 7> transparent{};
-  std::uint64_t hash = 0;  ///< of its quads and their light
+  std::uint64_t hash = 0;  ///< of the region's quads and their light
 };
 
-/// The surface of one chunk as it is drawn; never changed once it was made.
+/// The renderable surface of one chunk. Immutable.
 struct ChunkSurface {
   SurfaceStyle style = SurfaceStyle::Blocky;
-  int level = 0;  ///< of a field: of detail, 0 to kMaxSmoothLevel; its cells are 2^level samples wide
-  /// Blocky: voxels, origin at the chunk's minimum corner; those of transparent types last, each by region, then
-  /// direction, layer, row, column. None reaches over the border of a region.
+  /// Level of detail of a field, 0 to kMaxSmoothLevel; its cells are 2^level samples wide.
+  int level = 0;
+  /// Blocky: voxels, origin at the chunk's minimum corner. Opaque quads come before transparent quads; each group is
+  ///         sorted by region, then direction, layer, row, column. No quad crosses a region border.
   QuadBuffer quads;
   std::size_t opaque_quads = 0;
-  std::vector<FaceLight> light;        ///< of each quad, where LiveMeshes uses light; else empty
-  std::vector<SurfaceRegion> regions;  ///< blocky: those with quads, sorted by z, then y, then x
-  /// Smooth: point p of the mesh is point p + 64 * chunk of the grid, of voxels p + 0.5 + 64 * chunk (samples are their
-  /// middles); a colour (linear) and a type a vertex. Each transparent type is a closed body of its own, and of voxels
-  /// thin things are kept (SmoothMeshOptions::keep_thin), as mesh_scene_smoothly has it; instances are not united.
+  std::vector<FaceLight> light;        ///< one per quad if LiveMeshes uses light; otherwise empty
+  std::vector<SurfaceRegion> regions;  ///< blocky: regions that have quads, sorted by z, then y, then x
+  /// Smooth: mesh point p is grid point p + 64 * chunk; for voxels p + 0.5 + 64 * chunk, because samples are voxel
+  ///         centres. Each vertex has a linear colour and a type. Each transparent type is a closed body of its own.
+  ///         Thin voxel features are kept (SmoothMeshOptions::keep_thin), as in mesh_scene_smoothly. Instances are not
+  ///         united.
   SmoothChunkMesh smooth;
-  std::size_t glass_indices = 0;  ///< of its indices: those of transparent bodies, which come last
+  std::size_t glass_indices = 0;  ///< number of indices of transparent bodies, which come last
   std::vector<LinearRgba16> albedo;
   std::vector<VoxelType> types;
-  /// What LiveMeshOptions::convert made of it; null without.
+  /// Result of LiveMeshOptions::convert; null without `convert`.
   std::shared_ptr<const void> converted;
 
   [[nodiscard]] bool is_empty() const { return quads.empty() && smooth.indices.empty(); }
   [[nodiscard]] std::int64_t triangles() const;
-  [[nodiscard]] std::size_t bytes() const;  ///< without `converted`
+  [[nodiscard]] std::size_t bytes() const;  ///< excludes `converted`
 };
 
-/// What replaces the surface of a chunk.
+/// A new surface of a chunk.
 struct SurfaceUpdate {
   GridHandle grid;
   IVec3 chunk{0};
-  std::shared_ptr<const ChunkSurface> surface;  ///< null: nothing of the chunk is seen any more
+  std::shared_ptr<const ChunkSurface> surface;  ///< null: the chunk no longer has a surface
   SurfaceContent content = SurfaceContent::Voxels;
-  /// Bit x + n (y + n z), n = 64 / region_edge: the quads of that region differ from those that were given before, or
-  /// there were none, or there are none now. What is not blocky has one region.
+  /// Bit mask of changed regions. Bit x + n (y + n z), with n = 64 / region_edge, is set if the quads of region
+  /// (x, y, z) differ from the previous surface, are new or were removed. Smooth surfaces have one region.
   std::uint64_t changed_regions = ~std::uint64_t{0};
 };
 
 struct LiveMeshOptions {
   SurfaceStyle style = SurfaceStyle::Blocky;  ///< of voxels
   bool merge = true;                          ///< blocky: neighbouring faces become one quad
-  /// Blocky: 16, 32 or 64. Smaller regions are more quads, and less that is new to a graphics card after an edit.
+  /// Blocky: 16, 32 or 64. Smaller regions give more quads, but less data to upload to the GPU after an edit.
   int region_edge = 64;
-  LightMerging light_merging = LightMerging::Linear;  ///< blocky, with `use_light`: where faces stay merged
-  SmoothOcclusionOptions occlusion{};                 ///< of smooth surfaces, those of fields too
-  SurfaceColours colours = SurfaceColours::Sharp;     ///< of smooth surfaces of voxels; those of fields are blended
-  /// Of fields: where all eyes are farther than this from a chunk, in samples of its nearest instance, it has level of
-  /// detail 1, at twice that 2, and so on to kMaxSmoothLevel. A level is left only a tenth beyond where it ends. 0 and
-  /// less count as 1, NaN as infinity: level 0 everywhere.
+  LightMerging light_merging = LightMerging::Linear;  ///< blocky, with `use_light`: condition for merged faces
+  SmoothOcclusionOptions occlusion{};                 ///< of smooth surfaces, including fields
+  SurfaceColours colours = SurfaceColours::Sharp;     ///< of smooth voxel surfaces; fields are always blended
+  /// Fields: distance limit of level of detail 0, in samples of the chunk's nearest instance. A chunk farther than this
+  ///         from all eyes has level 1, at twice the distance level 2, and so on to kMaxSmoothLevel. A chunk leaves a
+  ///         level only a tenth beyond the limit (hysteresis). 0 and negative values count as 1. NaN counts as
+  ///         infinity: level 0 everywhere.
   double detail_distance = std::numeric_limits<double>::infinity();
-  InstanceFilter instances = InstanceFilter::Visible;  ///< whose grids are meshed
-  Threads workers{};  ///< unlike elsewhere 0 means one less than the machine has, at least 1
-  /// Called by workers, several at once, for each surface that was made, before it can be taken: what it returns, say
-  /// vertices in a format of your own, is ChunkSurface::converted. May be empty.
+  InstanceFilter instances = InstanceFilter::Visible;  ///< instances whose grids are meshed
+  Threads workers{};  ///< 0: one less than the hardware threads, at least 1 (different from other options)
+  /// Converts a new surface before it can be taken, for example to vertices in a custom format. The result becomes
+  /// ChunkSurface::converted. Called by several workers at once. Optional.
   std::function<std::shared_ptr<const void>(const SurfaceUpdate&)> convert{};
-  /// Called from a worker that is done with a chunk: there may be something to take, less is `pending`, and there is
-  /// room for more chunks. May be empty. It may call `take`, `pending` and `stats`, and nothing else of the meshes.
+  /// Called by a worker after each completed chunk: there may be a surface to take, `pending` has decreased, and there
+  /// is room for more chunks. Optional. It may call `take`, `pending` and `stats`, but no other member of LiveMeshes.
   std::function<void()> on_ready{};
 };
 
-/// The meshes of a scene's chunks, of voxels and of fields, kept up to date by worker threads while it is edited.
+/// The meshes of a scene's chunks, voxels and fields, updated by worker threads while the scene is edited.
 ///
-/// Only `update` reads the scene: workers read snapshots, so edits never wait for them. A chunk is meshed again only
-/// when an edit could have changed its mesh; of several edits before its turn the last counts, and results of what was
-/// removed meanwhile are dropped.
-/// Seams:   surfaces of a field fit each other at any time: what an edit, or a change of levels of detail, changes in
-///          chunks beside each other is given by one `take`, once all of it is there.
-/// Callbacks: what `on_ready` or `convert` throws is thrown by the next `update` or `finish`, the first of several;
-///           the surface is there without `converted`. bad_alloc of `convert` counts as the worker's.
-/// Lifetime: the scene is only read within calls; surfaces belong to whoever took them.
-/// Threads:  `update` and `finish` come from one thread at a time, the others from any.
+/// Only `update` reads the scene: workers read snapshots, so edits never wait for them. A chunk is meshed again only if
+/// an edit could have changed its mesh. Edits that arrive before a chunk is meshed are combined. Results for chunks
+/// removed in the meantime are dropped.
+/// Seams:     surfaces of a field always fit each other. Changes of neighbouring chunks, by an edit or by a level of
+///            detail, are returned together by one `take` when all are complete.
+/// Callbacks: the first exception of `on_ready` or `convert` is rethrown by the next `update` or `finish`; the surface
+///            exists without `converted`. A bad_alloc of `convert` counts as the worker's own.
+/// Lifetime:  the scene is read only during calls; callers share ownership of the surfaces they take.
+/// Threads:   `update` and `finish` must not overlap; any thread can call the other members.
 class LiveMeshes {
  public:
-  /// Requires: `region_edge` is 16, 32 or 64. Errors: std::system_error where the workers cannot be started.
+  /// Requires: `region_edge` is 16, 32 or 64. Errors: std::system_error if the workers cannot be started.
   explicit LiveMeshes(const LiveMeshOptions& options = {});
-  /// Waits for the chunks that are being meshed; others are given up.
+  /// Waits for the chunks being meshed; cancels the rest.
   ~LiveMeshes();
   LiveMeshes(const LiveMeshes&) = delete;
   LiveMeshes& operator=(const LiveMeshes&) = delete;
 
-  /// Takes over whatever was changed: voxels, grids, types whose visibility changed (smooth: whose colour did),
-  /// instances that first show a grid or last showed it. Chunks nearest to an eye (world) come first. Call it after
-  /// edits and once a frame while `pending` is not 0: no more chunks are handed out than keep the workers busy.
+  /// Applies the scene's changes since the last update: voxels, grids, visibility of types (smooth: also colour), and
+  /// instances that show a grid for the first time or no longer show it. Chunks nearest to an eye (world coordinates)
+  /// come first. Call it after edits, and once per frame while `pending` is not 0, because it hands out only as many
+  /// chunks as keep the workers busy.
   ///
-  /// Cost:   O(what changed), whatever the size of the world; O(instances) when some of them came, went or changed, and
-  ///         while chunks wait for workers, besides O(chunks that wait).
-  /// Errors: bad_alloc; the next call begins anew with all chunks.
+  /// Cost:   O(changes), independent of the size of the world. O(instances) more if instances were added, removed or
+  ///         changed. O(instances + waiting chunks) more while chunks wait for workers.
+  /// Errors: bad_alloc; the next call starts from scratch with all chunks.
   void update(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
 
-  /// From the next update on blocky surfaces of voxels carry this light at their corners, and a chunk is also meshed
-  /// again when its light alone changed. Null: none. It is only read within `update` and `finish`; that of LiveLight
-  /// (`&light.shown()`) is a few frames late, and so are the meshes.
-  /// Lifetime: it must outlive its use here, until another is used.
+  /// Sets the light that blocky voxel surfaces carry at their corners from the next update on. Chunks are then also
+  /// meshed again when only their light changed. Null: no light. It is read only during `update` and `finish`. With
+  /// LiveLight (`&light.shown()`), light and meshes are a few frames late.
+  /// Lifetime: the light must stay valid until another call replaces it.
   void use_light(const SceneLight* light);
 
-  /// The surfaces that are new since the last call: of one chunk only the last, never one older than was given before.
-  /// Of chunks of which nothing was, or is, to be seen, none is given. Once those of voxels have `max_bytes`, as
-  /// ChunkSurface::bytes counts them, the rest waits for another call; those of fields, which fit each other, do not.
+  /// Returns the surfaces that are new since the last call. Each chunk appears once, with its newest surface. Skips
+  /// chunks that had no surface and still have none. Once voxel surfaces reach `max_bytes` (ChunkSurface::bytes), the
+  /// rest waits for another call. Fields ignore the limit because their surfaces must fit each other.
   /// Errors: bad_alloc, as `update`.
   [[nodiscard]] std::vector<SurfaceUpdate> take(std::size_t max_bytes = std::numeric_limits<std::size_t>::max());
 
-  /// Chunks whose newest surface was not taken yet.
+  /// Returns the number of chunks whose newest surface has not been taken yet.
   [[nodiscard]] std::size_t pending() const;
-  /// Calls `update` until nothing is left to mesh. For tests and screenshots.
-  /// Errors: bad_alloc, also when workers' memory runs out for every chunk that is left.
+  /// Calls `update` until all chunks are meshed. For tests and screenshots.
+  /// Errors: bad_alloc, also if workers run out of memory for every remaining chunk.
   void finish(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
 
   struct Stats {
-    std::int64_t chunks_meshed = 0;     ///< in all
+    std::int64_t chunks_meshed = 0;     ///< in total
     double last_mesh_seconds = 0.0;     ///< of one chunk, on its worker
-    double last_latency_seconds = 0.0;  ///< from the `update` that saw an edit to the surface's being there
-    std::int64_t out_of_memory = 0;     ///< times a worker's memory ran out; the chunk stays pending, to be tried again
+    double last_latency_seconds = 0.0;  ///< from the `update` after an edit to the finished surface
+    /// Number of times a worker ran out of memory. The chunk stays pending and is tried again.
+    std::int64_t out_of_memory = 0;
   };
   [[nodiscard]] Stats stats() const;
 

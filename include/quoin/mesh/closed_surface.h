@@ -7,21 +7,21 @@
 
 namespace quoin {
 
-/// How far apart vertices are moved where the surface would touch itself, in voxels.
+/// Distance that vertices move apart where the surface would touch itself, in voxels.
 inline constexpr float kApart = 0.01F;
 
-/// The surface of all voxels that are not air as printers want it: closed, without T-junctions, and manifold: whoever
-/// joins vertices of equal positions finds each edge in two triangles, once in each direction, and one fan of triangles
-/// around each vertex.
+/// Meshes all non-air voxels as one printable surface: closed, manifold and without T-junctions. After vertices of
+/// equal position are welded, each edge has two triangles, one in each direction, and each vertex has a single fan of
+/// triangles.
 ///
-/// Space:    voxels. Vertices as in build_blocky_mesh: one a corner of a face, with its direction and type; no
+/// Space:    voxels. Vertices are as in build_blocky_mesh: one per face corner, with direction and type, without
 ///           occlusion. Faces are not merged: two triangles each.
-/// Touching: where voxels meet by an edge alone, or by a corner, the surface is parted: each side of it has vertices of
-///           its own, moved by kApart into its voxel (where two hollows meet, into these), and the edge gets one in its
-///           middle for each side. The five to eight corners of such a face are joined to its middle.
+/// Touching: where voxels meet only at an edge or a corner, the surface is separated. Each sheet gets its own vertices,
+///           moved by kApart into its voxel (where two cavities meet, into the cavities), and the edge gets a midpoint
+///           vertex per sheet. A face with five to eight outline vertices is triangulated around its centre.
 /// Order:    as Grid::for_each, then by direction.
-/// Cost:     about 0.2 microseconds a voxel of the surface, on one thread.
-/// Errors:   LimitExceeded beyond 2^32 vertices, or where voxels lie beyond 65,536; Cancelled.
+/// Cost:     about 0.2 microseconds per surface voxel, on one thread.
+/// Errors:   LimitExceeded beyond 2^32 vertices or for voxel coordinates beyond 65,536; Cancelled.
 [[nodiscard]] Result<BlockyTriangles> closed_surface(const Grid& grid, const Progress& progress = {});
 
 }  // namespace quoin

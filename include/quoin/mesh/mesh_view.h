@@ -14,39 +14,42 @@
 
 namespace quoin {
 
-/// Triangles of one surface of any mesh, whichever mesher made them. Arrays of vertices have one entry a vertex. A view
-/// is one of two kinds:
+/// A non-owning view of one triangle surface, from any mesher. Vertex arrays have one entry per vertex. There are two
+/// kinds of view:
 ///
-/// Blocks: `directions` and `types`, whose properties say how it looks; `block_occlusion`, or `atlas`, or none.
-/// Smooth: `normals` and `albedo`; `occlusion`, or none; `types`, or none, whose properties except the colour say how
-///         it looks.
-/// Both: `light`, or none.
+/// Blocks: `directions` and `types` are set; the types' properties define the appearance. `block_occlusion`, `atlas` or
+///         neither.
+/// Smooth: `normals` and `albedo` are set. `occlusion` is optional. `types` is optional and defines the appearance
+///         except the colour.
 ///
-/// Lifetime: owns nothing; the arrays must outlive it, unchanged.
+/// Both kinds can have `light`.
+///
+/// Lifetime: owns no data; the arrays must outlive the view and stay unchanged.
 struct MeshView {
   std::span<const Vec3> positions;
-  std::span<const std::uint32_t> indices;  ///< three a triangle, counter-clockwise seen from outside
+  std::span<const std::uint32_t> indices;  ///< three per triangle, counter-clockwise seen from outside
 
   SurfaceClass surface = SurfaceClass::Opaque;
-  std::span<const Direction> directions;          ///< of the face
-  std::span<const VoxelType> types;               ///< of blocks; of smooth surfaces of a scene too
+  std::span<const Direction> directions;          ///< direction of the vertex's face
+  std::span<const VoxelType> types;               ///< of blocks; also of smooth surfaces in a scene
   std::span<const std::uint8_t> block_occlusion;  ///< 0 (open) to 3 (dark)
-  /// Of opaque blocks whose colours and occlusion are in a texture (SceneMeshes::atlas): texture coordinates from its
-  /// upper left corner.
+  /// Texture coordinates from the upper left corner, for opaque blocks whose colours and occlusion are in a texture
+  /// (SceneMeshes::atlas).
   std::span<const std::array<float, 2>> atlas;
 
-  /// What light arrives at a vertex, linear: its colour is to be multiplied with it and shown as it is. Of either kind.
+  /// Linear light that arrives at each vertex, for either kind. Multiply the vertex colour by it and show the product
+  /// without further shading.
   std::span<const LinearRgba16> light;
 
-  std::span<const Vec3> normals;         ///< unit
+  std::span<const Vec3> normals;         ///< unit length
   std::span<const LinearRgba16> albedo;  ///< without occlusion
   std::span<const float> occlusion;      ///< 0 (open) to 1 (dark)
 
-  /// Whether it is of the smooth kind.
+  /// Returns true if the view is of the smooth kind.
   [[nodiscard]] bool has_albedo() const { return !albedo.empty(); }
 };
 
-/// Lifetime: the mesh must outlive the view, unchanged.
+/// Returns a view of one surface class of a blocky mesh. Lifetime: the mesh must outlive the view, unchanged.
 [[nodiscard]] inline MeshView view_of(const BlockyTriangles& mesh, SurfaceClass surface) {
   MeshView view;
   view.positions = mesh.positions;
@@ -58,7 +61,7 @@ struct MeshView {
   return view;
 }
 
-/// Lifetime: the mesh must outlive the view, unchanged.
+/// Returns a view of a smooth mesh. Lifetime: the mesh must outlive the view, unchanged.
 [[nodiscard]] inline MeshView view_of(const SmoothMesh& mesh) {
   MeshView view;
   view.positions = mesh.positions;
@@ -69,9 +72,9 @@ struct MeshView {
   return view;
 }
 
-/// A surface from an array (or that of a label, by `surface_of_label`), which has no colours of its own.
+/// Returns a view of an array surface or a label's surface (`surface_of_label`), which have no colours of their own.
 /// Lifetime: surface and albedo must outlive the view, unchanged.
-/// Requires: as many of `albedo` as vertices.
+/// Requires: one albedo per vertex.
 [[nodiscard]] inline MeshView view_of(const ArraySurface& surface, std::span<const LinearRgba16> albedo) {
   QUOIN_ASSERT(albedo.size() == surface.positions.size(), "an albedo a vertex");
   MeshView view;

@@ -11,16 +11,16 @@
 
 namespace quoin {
 
-/// Occlusion of a face's four corners, each 0 (open) to 3 (dark), in the order (0,0) (1,0) (1,1) (0,1) of the
-/// direction's (u, v): counter-clockwise from outside.
+/// Occlusion at the four corners of a face, each 0 (open) to 3 (dark). Corners are in the order (0,0) (1,0) (1,1)
+/// (0,1) of the direction's (u, v): counter-clockwise from outside.
 using FaceOcclusion = std::array<std::uint8_t, 4>;
 
-/// The three voxels in front of a face that give the occlusion of one of its corners, as offsets from the face's voxel:
-/// those that touch the corner, in the layer in front.
+/// The three voxels that determine the occlusion of one corner of a face, as offsets from the face's voxel. They touch
+/// the corner and lie in the layer in front of the face.
 struct CornerNeighbours {
   IVec3 side1;   ///< along the direction's u
-  IVec3 side2;   ///< along its v
-  IVec3 corner;  ///< along both
+  IVec3 side2;   ///< along the direction's v
+  IVec3 corner;  ///< diagonal: along both
 };
 
 namespace detail {
@@ -45,7 +45,7 @@ constexpr std::array<CornerNeighbours, 4> corner_neighbours(Direction direction)
 
 }  // namespace detail
 
-/// [direction][corner]: which voxels give the occlusion of each corner of each face; corners as in FaceOcclusion.
+/// Voxels that determine the occlusion of each corner of each face: [direction][corner], corners as in FaceOcclusion.
 ///
 ///   for (const CornerNeighbours& at : kCornerNeighbours[static_cast<std::size_t>(face)])
 ///     vertex_occlusion(is_opaque(voxel + at.side1), is_opaque(voxel + at.side2), is_opaque(voxel + at.corner));
@@ -54,29 +54,29 @@ inline constexpr std::array<std::array<CornerNeighbours, 4>, 6> kCornerNeighbour
     detail::corner_neighbours(Direction::PosY), detail::corner_neighbours(Direction::NegY),
     detail::corner_neighbours(Direction::PosZ), detail::corner_neighbours(Direction::NegZ)};
 
-/// Occlusion of one vertex from the three voxels that touch it in the layer in front of the face.
+/// Returns the occlusion of one vertex from the three voxels that touch it in the layer in front of the face.
 ///
-/// 3 when both sides are occluders, whatever the corner holds; else how many of the three are.
+/// The result is 3 if both sides are occluders; otherwise the number of occluders among the three voxels.
 [[nodiscard]] constexpr std::uint8_t vertex_occlusion(bool side1, bool side2, bool corner) {
   if (side1 && side2) return 3;
   return static_cast<std::uint8_t>(static_cast<int>(side1) + static_cast<int>(side2) + static_cast<int>(corner));
 }
 
-/// Brightness that occlusion leaves: 1, 0.75, 0.5, 0.25.
+/// Returns the brightness for an occlusion of 0 to 3: 1, 0.75, 0.5, 0.25.
 [[nodiscard]] constexpr float occlusion_brightness(std::uint8_t occlusion) {
   return 1.0F - 0.25F * static_cast<float>(occlusion);
 }
 
-/// Occlusion of the four corners of a face of `voxel` (coordinates in the centre chunk). Occluders are opaque voxels:
-/// glass and water do not darken.
+/// Returns the occlusion of the four corners of a face of `voxel` (coordinates in the centre chunk). Only opaque voxels
+/// are occluders: glass and water do not darken.
 ///
 /// Cost: 12 voxel look-ups; meshers do 64 faces at once instead.
 [[nodiscard]] FaceOcclusion face_occlusion(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel,
                                            Direction direction);
 
-/// Whether to split a quad along corners 1-3, triangles (1,2,3) (0,1,3), instead of (0,1,2) (0,2,3).
+/// Returns true if a quad must be split along corners 1-3 into triangles (1,2,3) (0,1,3), instead of (0,1,2) (0,2,3).
 ///
-/// Keeps the brighter diagonal: flips when the occlusion of corners 0 and 2 adds up to more than those of 1 and 3.
+/// Keeps the brighter diagonal: flips if the occlusion of corners 0 and 2 exceeds the occlusion of corners 1 and 3.
 [[nodiscard]] constexpr bool flips_diagonal(const FaceOcclusion& corners) {
   return corners[0] + corners[2] > corners[1] + corners[3];
 }

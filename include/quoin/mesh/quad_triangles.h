@@ -15,32 +15,32 @@
 
 namespace quoin {
 
-// How quads become triangles: everything that makes triangles of them does it by these functions.
+// Conversion of quads to vertices and triangles. All meshers, writers and renderers use these functions.
 
 /// The order of a triangle's corners, seen from its front.
 enum class Winding : std::uint8_t { CounterClockwise, Clockwise };
 
-/// What the meshes of so many quads take: four vertices and six indices each.
+/// Returns the number of vertices of `quads` quads: four each.
 [[nodiscard]] constexpr std::size_t vertices_needed(std::size_t quads) {
   return 4 * quads;
 }
+/// Returns the number of indices of `quads` quads: six each.
 [[nodiscard]] constexpr std::size_t indices_needed(std::size_t quads) {
   return 6 * quads;
 }
 
-/// [flipped + 2 * clockwise]: see `triangle_corners`.
+/// Corners by [flipped + 2 * clockwise]: see `triangle_corners`.
 inline constexpr std::array<std::array<std::uint8_t, 6>, 4> kTriangleCorners = {
     {{0, 1, 2, 0, 2, 3}, {1, 2, 3, 0, 1, 3}, {0, 2, 1, 0, 3, 2}, {1, 3, 2, 0, 3, 1}}};
 
-/// Which corners (0..3, as in FaceOcclusion) the two triangles of a quad join, in the order of their indices; `flipped`
-/// as in Quad.
+/// Returns the corners (0..3, as in FaceOcclusion) of a quad's two triangles, in index order. `flipped` is as in Quad.
 [[nodiscard]] constexpr const std::array<std::uint8_t, 6>& triangle_corners(
     bool flipped, Winding winding = Winding::CounterClockwise) {
   return kTriangleCorners[std::size_t{flipped} + 2 * std::size_t{winding == Winding::Clockwise}];
 }
 
-/// The positions of all four corners, as Quad::corner gives them one by one, each in a word: x in its lowest byte, then
-/// y, then z; the rest 0. Without a branch or a look at memory but for the table of directions.
+/// Returns the positions of all four corners (see Quad::corner), each packed into a word: x in the lowest byte, then y,
+/// then z; the highest byte is 0. Branch-free; reads no memory except the direction table.
 [[nodiscard]] inline std::array<std::uint32_t, 4> packed_corners_of(const Quad& quad) {
   const FaceFrame& frame = frame_of(quad.direction());
   const auto bits = static_cast<std::uint32_t>(quad.bits);
@@ -50,11 +50,11 @@ inline constexpr std::array<std::array<std::uint8_t, 6>, 4> kTriangleCorners = {
   const std::uint32_t along_v = static_cast<std::uint32_t>(quad.size_v()) << (8 * frame.v);
   return {first, first + along_u, first + along_u + along_v, first + along_v};
 }
-/// The position in such a word.
+/// Returns the position in a packed corner word.
 [[nodiscard]] inline IVec3 unpacked_corner(std::uint32_t packed) {
   return {static_cast<int>(packed & 255U), static_cast<int>(packed >> 8 & 255U), static_cast<int>(packed >> 16)};
 }
-/// The positions of all four corners, as Quad::corner gives them one by one.
+/// Returns the positions of all four corners (see Quad::corner).
 [[nodiscard]] inline std::array<IVec3, 4> corners_of(const Quad& quad) {
   const std::array<std::uint32_t, 4> packed = packed_corners_of(quad);
   return {unpacked_corner(packed[0]), unpacked_corner(packed[1]), unpacked_corner(packed[2]),
@@ -73,8 +73,8 @@ struct QuadVertex {
   int v = 0;
 };
 
-/// Calls `write(index of the vertex, const QuadVertex&)` for the four corners of every quad, in the order that
-/// `write_indices` means: for vertices in a layout of your own, written in place. Inlined, as a loop by hand.
+/// Calls `write(vertex_index, const QuadVertex&)` for the four corners of every quad, in the vertex order that
+/// `write_indices` expects. Use it to write vertices in a custom layout in place; it inlines to a plain loop.
 template <class Write>
 void for_each_vertex(std::span<const Quad> quads, Write&& write) {
   std::size_t index = 0;
@@ -94,11 +94,11 @@ void for_each_vertex(std::span<const Quad> quads, Write&& write) {
   }
 }
 
-/// Writes the indices of the quads' triangles, six a quad, to the front of `out`: the first quad's vertices are
-/// `first_vertex` to `first_vertex + 3`, and so on. `Index` is std::uint16_t or std::uint32_t.
+/// Writes six indices per quad to the front of `out`. The first quad's vertices are `first_vertex` to `first_vertex +
+/// 3`, and so on. `Index` is std::uint16_t or std::uint32_t.
 ///
 /// Requires: `out` has `indices_needed(quads.size())` elements; `first_vertex + vertices_needed(quads.size())` is at
-///           most the greatest Index (which itself is left to those who restart strips by it).
+///           most the greatest Index. The greatest Index itself is never written: it stays free for primitive restart.
 template <class Index>
 void write_indices(std::span<const Quad> quads, std::size_t first_vertex, std::span<Index> out,
                    Winding winding = Winding::CounterClockwise) {
@@ -116,10 +116,11 @@ void write_indices(std::span<const Quad> quads, std::size_t first_vertex, std::s
   }
 }
 
-/// Writes the indices of a mesh that has some (BlockyTriangles, SmoothChunkMesh, SmoothMesh), each more by
+/// Writes the indices of an indexed mesh (BlockyTriangles, SmoothChunkMesh, SmoothMesh), each increased by
 /// `first_vertex`.
 ///
-/// Requires: `out` is as long as `indices`, which is three a triangle; every sum is less than the greatest Index.
+/// Requires: `out` is at least as long as `indices`, which has three per triangle; every sum is less than the greatest
+///           Index.
 template <class Index>
 void write_indices(std::span<const std::uint32_t> indices, std::size_t first_vertex, std::span<Index> out,
                    Winding winding = Winding::CounterClockwise) {

@@ -15,78 +15,82 @@
 
 namespace quoin {
 
-/// Linear light, 16 bits a channel: 65,535 is 1. Eight bits would be visibly off in the darks.
+/// Linear colour, 16 bits per channel: 65,535 is 1. Eight bits would show banding in dark colours.
 using LinearRgba16 = std::array<std::uint16_t, 4>;
 
-/// One welded surface. The vertex arrays have one entry a vertex.
+/// A welded surface. The vertex arrays have one entry per vertex.
 struct SmoothMesh {
-  std::vector<Vec3> positions;         ///< the field's coordinates, in samples
-  std::vector<Vec3> normals;           ///< unit, into the air
-  std::vector<float> occlusion;        ///< 0 (open) to 1 (dark); empty without occlusion
-  std::vector<LinearRgba16> albedo;    ///< mean of the materials of the cell's solid samples (of coarse cells: of those
-                                       ///< next to the surface), without occlusion
-  std::vector<VoxelType> types;        ///< the material of most of these samples; of several, the least
-  std::vector<std::uint32_t> indices;  ///< three a triangle, counter-clockwise seen from the air
+  std::vector<Vec3> positions;   ///< the field's coordinates, in samples
+  std::vector<Vec3> normals;     ///< unit length, towards the air
+  std::vector<float> occlusion;  ///< 0 (open) to 1 (dark); empty with SmoothOcclusion::None
+  /// Mean colour of the materials of the cell's solid samples, without occlusion. Coarse cells use only the solid
+  /// samples next to the surface.
+  std::vector<LinearRgba16> albedo;
+  std::vector<VoxelType> types;        ///< most frequent material of these samples; the lowest on ties
+  std::vector<std::uint32_t> indices;  ///< three per triangle, counter-clockwise seen from the air
 };
 
-/// How the materials of samples become the colours of a surface.
+/// Selects how the materials of samples become surface colours.
 enum class SurfaceColours : std::uint8_t {
-  Blended,  ///< each vertex has the mean of those around it
-  Sharp,  ///< each face has that of its solid sample, as a block's; vertices between colours stand there once for each
+  Blended,  ///< each vertex has the mean colour of the samples around it
+  /// Each face has the colour of its solid sample, like a block. Vertices between colours are duplicated, once per
+  /// colour.
+  Sharp,
 };
 
 struct SmoothMeshOptions {
   SmoothOcclusionOptions occlusion{};
   bool split_sheets = true;  ///< as in SmoothOptions
   SurfaceColours colours = SurfaceColours::Blended;
-  /// 1: the surface of the field. Less draws each vertex to the middle of its cell, and each normal to that of its
-  /// face, until at 0 the surface is that of blocks around the solid samples (which are 1/256 apart, or as much
-  /// connected, where they touch by edges or corners). 0 to 1; others count as the nearest of these, NaN as 1.
+  /// Blends between blocks and the smooth surface, 0 to 1. At 1 the mesh is the surface of the field. Lower values move
+  /// each vertex towards the centre of its cell and each normal towards the normal of its face. At 0 the mesh is the
+  /// block surface around the solid samples; blocks that touch only by an edge or corner are 1/256 apart, or joined by
+  /// as much. Values out of range are clamped; NaN means 1.
   float smoothness = 1.0F;
-  /// Whether what is one sample thick, solid or gap, keeps about that thickness, and what is slanted holds together
-  /// (`join_diagonals`): surfaces of fields shrink it to a third. For fields of voxels. At level 0.
+  /// Keeps solids and gaps one sample thick at about that thickness and keeps slanted ones connected
+  /// (`join_diagonals`). Without it they shrink to a third. Meant for fields made from voxels. Applies at level 0.
   bool keep_thin = false;
-  /// The level of detail of a chunk, 0 to kMaxSmoothLevel; empty: 0 everywhere. Asked once a chunk, from the calling
-  /// thread, also for neighbours that do not exist.
+  /// Returns the level of detail of a chunk, 0 to kMaxSmoothLevel. Empty: 0 everywhere. Called once per chunk on the
+  /// calling thread, also for neighbours that do not exist.
   std::function<int(IVec3 chunk)> level_of{};
 };
 
-/// Meshes a whole field, chunk by chunk, and welds the chunks' meshes.
+/// Meshes a whole field, chunk by chunk, and welds the chunk meshes.
 ///
-/// Closed:  every edge has an even number of triangles (two, with `split_sheets` and one level), whatever the levels;
-///          vertices that stand there several times, for colours or normals, counted as one.
-/// Space:   the field's coordinates; beyond 2^24 samples from the origin floats lose whole samples.
-/// Order:   chunks as in DensityGrid::chunks; the same bytes at any thread count.
-/// Types:   materials that are not registered, and air, count as opaque white.
-/// Errors:  Cancelled; LimitExceeded when it takes more than 2^32 - 2 vertices; InvalidArgument for a level out of
-///          range.
+/// Closed: every edge has an even number of triangles at any mix of levels; exactly two with `split_sheets` and a
+///         single level. Vertices duplicated for colours or normals count as one.
+/// Space:  the field's coordinates. Beyond 2^24 samples from the origin, floats cannot represent whole samples.
+/// Order:  chunks as in DensityGrid::chunks; the same bytes at any thread count.
+/// Types:  unregistered materials and air count as opaque white.
+/// Errors: Cancelled; LimitExceeded if the mesh needs more than 2^32 - 2 vertices; InvalidArgument for a level out of
+///         range.
 [[nodiscard]] Result<SmoothMesh> build_smooth_mesh(const DensityGrid& field, const VoxelRegistry& types,
                                                    const SmoothMeshOptions& options = {}, Threads threads = {},
                                                    const Progress& progress = {});
 
-/// Removes triangles where that moves the surface by at most `error_in_samples`, drops vertices that nothing uses any
-/// more, and orders what is left for the caches of graphics processors. Returns the error reached, at most the one
-/// allowed.
+/// Simplifies a mesh: removes triangles while the surface moves by at most `error_in_samples`, drops unused vertices
+/// and orders the rest for GPU vertex caches. Returns the error reached, which is at most the error allowed.
 ///
-/// Error:    the greatest distance, in samples, of a vertex of the mesh before from the surface after. It is measured;
-///           where meshoptimizer, which bounds a mean, goes beyond it, less is removed. A try that goes beyond it and
-///           removes no more than one triangle in 1,000 ends the search.
-/// Large:    a mesh of 48,000 triangles or more is searched on a sample first: at least 16 boxes of it, with about
-///           12,000 triangles. If the sample loses no more than 1 % of its triangles, nothing is removed.
-/// Kept:     vertices that stay keep normal, occlusion, albedo and type, and their position, but for those below.
-///           Vertices of one place that differ in these count as one: lines between colours stay where they are, to the
-///           error. A closed mesh stays closed.
-/// Manifold: every edge of what was closed has two triangles, by places too if the error is above 0. Where removing
-///           brings parts of the surface together, the vertices there are drawn a thousandth of a sample apart.
+/// Error:    the greatest distance, in samples, of an original vertex from the simplified surface. It is measured,
+///           because meshoptimizer bounds only a mean. If an attempt exceeds the limit, fewer triangles are removed.
+///           The search ends with an attempt that exceeds the limit and removes at most one triangle in 1,000.
+/// Large:    a mesh of 48,000 triangles or more is first simplified on a sample: at least 16 boxes with about 12,000
+///           triangles. If the sample loses at most 1 % of its triangles, the mesh stays as it is.
+/// Kept:     remaining vertices keep normal, occlusion, albedo and type, and their position except as under Manifold.
+///           Vertices of equal position that differ in these attributes count as one, so colour borders move by at most
+///           the error. A closed mesh stays closed.
+/// Manifold: every edge of a closed mesh keeps two triangles; if the error is above 0, also after welding by position.
+///           Where removal brings parts of the surface together, their vertices are moved a thousandth of a sample
+///           apart.
 /// Order:    the same bytes on every run.
-/// Requires: arrays of one length (but for empty occlusion), indices that name vertices, finite positions.
-/// Errors:   InvalidArgument when the error is not a number of at least 0; Unsupported in builds without meshoptimizer.
-///           The mesh is as before then.
-/// Cost:     some to some tens of microseconds a triangle, on one thread.
+/// Requires: vertex arrays of equal length (occlusion can be empty), valid indices, finite positions.
+/// Errors:   InvalidArgument if the error is negative or NaN; Unsupported in builds without meshoptimizer. The mesh is
+///           unchanged after an error.
+/// Cost:     from a few microseconds to tens of microseconds per triangle, on one thread.
 /// Source:   M. Garland, P. Heckbert, "Surface Simplification Using Quadric Error Metrics" (1997); meshoptimizer.
 [[nodiscard]] Result<float> simplify_smooth_mesh(SmoothMesh& mesh, float error_in_samples);
 
-/// Whether this build can simplify.
+/// Returns true if this build can simplify (has meshoptimizer).
 [[nodiscard]] bool can_simplify();
 
 }  // namespace quoin

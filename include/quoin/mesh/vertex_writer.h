@@ -16,19 +16,21 @@
 
 namespace quoin {
 
-/// What a vertex has.
+/// Vertex attribute.
 enum class VertexAttribute : std::uint8_t {
-  Position,    ///< the mesh's coordinates and the origin that is given when writing
-  Normal,      ///< unit, outwards
-  Face,        ///< the Direction's number, 0 to 5
-  Colour,      ///< of the type, or the albedo of a smooth mesh; without occlusion. White where a type is not registered
-  Occlusion,   ///< of blocks, 0 (open) to 3 (dark)
-  Brightness,  ///< that occlusion leaves: of blocks 1 - occlusion / 4, of smooth meshes 1 - occlusion; 1 without any
+  Position,  ///< position in the mesh's coordinates, plus the origin passed to `write`
+  Normal,    ///< unit length, outwards
+  Face,      ///< number of the Direction, 0 to 5
+  /// Colour of the type, or albedo of a smooth mesh, without occlusion. White for unregistered types.
+  Colour,
+  Occlusion,  ///< of blocks, 0 (open) to 3 (dark)
+  /// Brightness after occlusion: 1 - occlusion / 4 for blocks, 1 - occlusion for smooth meshes, 1 without occlusion.
+  Brightness,
   Type,
   Uv,  ///< voxels from the quad's corner 0, along its u and v: 0 to 64
 };
 
-/// How it lies in memory: the machine's byte order, no padding within.
+/// Memory format of an attribute: native byte order, no padding between components.
 enum class VertexFormat : std::uint8_t {
   Float32,
   Float32x2,
@@ -42,11 +44,11 @@ enum class VertexFormat : std::uint8_t {
   Uint32,
   Snorm8x4,      ///< -127 is -1, 127 is 1
   Unorm8,        ///< 255 is 1
-  Unorm8x4,      ///< of colours: linear light
-  Unorm8x4Srgb,  ///< of colours: encoded as sRGB, but for alpha
+  Unorm8x4,      ///< for colours: linear
+  Unorm8x4Srgb,  ///< for colours: sRGB-encoded, alpha linear
   Unorm16x4,     ///< 65,535 is 1
 };
-/// Bytes: 1 to 16.
+/// Returns the size of a format in bytes, 1 to 16.
 [[nodiscard]] std::size_t size_of(VertexFormat format);
 
 struct VertexElement {
@@ -55,9 +57,9 @@ struct VertexElement {
   std::uint32_t offset = 0;  ///< bytes from the vertex's start; need not be aligned
 };
 
-/// An interleaved vertex, as graphics APIs describe it.
+/// Layout of an interleaved vertex, as graphics APIs describe it.
 ///
-/// | attribute | formats | a fourth component |
+/// | attribute | formats | fourth component |
 /// |---|---|---|
 /// | Position | Float32x3, Float32x4; of quads also Sint16x4, Uint8x4 | 1 |
 /// | Normal | Float32x3, Float32x4, Snorm8x4 | 0 |
@@ -68,52 +70,53 @@ struct VertexElement {
 /// | Type | Uint16, Uint32 | |
 /// | Uv | Float32x2, Uint8x2 | |
 struct VertexLayout {
-  std::uint32_t stride = 0;  ///< bytes a vertex, 1 to kMaxStride
+  std::uint32_t stride = 0;  ///< bytes per vertex, 1 to kMaxStride
   std::vector<VertexElement> elements;
 
   static constexpr std::uint32_t kMaxStride = 2'048;
 };
 
-/// What vertices are made from.
+/// Source of vertices.
 enum class VertexSource : std::uint8_t {
   Quads,        ///< has all attributes
-  Blocks,       ///< a MeshView of blocks: all but Uv; positions as floats
-  SmoothChunk,  ///< a SmoothChunkMesh: Position as floats, Normal, Brightness
-  Smooth,       ///< a MeshView of a smooth mesh: these and Colour
+  Blocks,       ///< MeshView of blocks: all except Uv; positions as floats
+  SmoothChunk,  ///< SmoothChunkMesh: Position as floats, Normal, Brightness
+  Smooth,       ///< MeshView of a smooth mesh: as SmoothChunk, plus Colour
 };
 
-/// Whether vertices of this source can be written so: a stride in its range, elements that lie within it and do not
-/// overlap, attributes that the source has, in formats of the table.
+/// Returns true if vertices of this source can be written in the layout: the stride is in range, the elements lie
+/// within it without overlap, and the source has each attribute in its format (see VertexLayout).
 [[nodiscard]] bool can_write(const VertexLayout& layout, VertexSource source);
 
-/// Writes vertices as a caller's buffer has them, for one to be uploaded or mapped device memory: out is written from
-/// front to back, each byte once, and never read. Bytes of a vertex that no element names become 0.
+/// Writes vertices in a custom layout, for upload or into mapped device memory. Writes `out` front to back, each byte
+/// once, and never reads it. Bytes of a vertex outside all elements become 0.
 ///
 /// Usage:    std::byte* mapped = map(writer.bytes_needed(vertices_needed(quads.size())));
 ///           writer.write(quads, Vec3(DVec3(chunk * kChunkEdge) - eye), {mapped, ...});
 ///           write_indices<std::uint16_t>(quads, 0, mapped_indices);
-/// Order:    the vertices' order is that of `write_indices` (quad_triangles.h): four a quad, or those of the mesh.
-/// Threads:  any number may write with one writer.
-/// Faster:   a layout known to the compiler, by `for_each_vertex`.
+/// Order:    vertices are in the order of `write_indices` (quad_triangles.h): four per quad, or the mesh's order.
+/// Threads:  any number of threads can write with one writer.
+/// Faster:   for a layout known at compile time, use `for_each_vertex`.
 class VertexWriter {
  public:
-  /// Takes the colours of the types as they are now: after a type has changed, make another.
-  /// Requires: some source can be written in this layout.
+  /// Copies the types' colours. After a type has changed, make another writer.
+  /// Requires: at least one source can be written in this layout.
   VertexWriter(VertexLayout layout, const VoxelRegistry& types);
 
   [[nodiscard]] const VertexLayout& layout() const { return layout_; }
   [[nodiscard]] std::size_t bytes_needed(std::size_t vertices) const { return vertices * layout_.stride; }
 
-  /// Four vertices a quad. `origin`, in voxels, is added to positions (chunk coordinates).
-  /// Every layout that a writer takes can be written of quads.
-  /// Requires: room for the bytes needed; where positions are whole numbers, `origin` is, and their sums are within the
-  ///           format's range.
+  /// Writes four vertices per quad. `origin`, in voxels, is added to positions (chunk coordinates). Supports every
+  /// layout that the constructor accepts.
+  /// Requires: `out` has at least `bytes_needed` bytes. For integer position formats, `origin` is whole and the sums
+  ///           are in the format's range.
   void write(std::span<const Quad> quads, Vec3 origin, std::span<std::byte> out) const;
-  /// The mesh's vertices; `origin`, in samples, is added to positions.
-  /// Requires: can_write(layout, VertexSource::SmoothChunk); room for the bytes needed.
+  /// Writes the mesh's vertices. `origin`, in samples, is added to positions.
+  /// Requires: can_write(layout, VertexSource::SmoothChunk); `out` has at least `bytes_needed` bytes.
   void write(const SmoothChunkMesh& mesh, Vec3 origin, std::span<std::byte> out) const;
-  /// The view's vertices; `origin`, in its coordinates, is added to positions.
-  /// Requires: can_write(layout, source), where `has_albedo` tells Smooth from Blocks; room for the bytes needed.
+  /// Writes the view's vertices. `origin`, in the view's coordinates, is added to positions.
+  /// Requires: can_write(layout, source), where source is Smooth if `has_albedo`, else Blocks; `out` has at least
+  ///           `bytes_needed` bytes.
   void write(const MeshView& mesh, Vec3 origin, std::span<std::byte> out) const;
 
  private:
@@ -131,7 +134,7 @@ class VertexWriter {
   }
 
   VertexLayout layout_;
-  std::vector<std::vector<Colour>> colours_;  // [element][type]; one more for those that are not registered
+  std::vector<std::vector<Colour>> colours_;  // [element][type]; the last entry is for unregistered types
 };
 
 }  // namespace quoin

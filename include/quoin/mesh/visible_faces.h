@@ -12,36 +12,37 @@
 
 namespace quoin {
 
-/// Whether the face of a voxel of type `a` towards a voxel of type `b` shows: `a` is not air, and `b` is air, or
-/// transparent and of another type.
+/// Returns true if the face of a voxel of type `a` towards a voxel of type `b` is visible: `a` is not air, and `b` is
+/// air or a transparent type other than `a`.
 [[nodiscard]] inline bool face_is_visible(const VoxelRegistry& types, VoxelType a, VoxelType b) {
   if (a == kAir) return false;
   if (b == kAir) return true;
   return types.is_transparent(b) && a != b;
 }
 
-/// Visible faces of a chunk as bit masks; BlockyMesher::find_faces makes them.
+/// Visible faces of a chunk as bit masks, filled by BlockyMesher::find_faces.
 struct FaceRows {
-  /// [direction][z * 64 + y]: bit x is set when that voxel's face shows.
+  /// [direction][z * 64 + y]: bit x is set if that voxel's face is visible.
   std::array<std::vector<std::uint64_t>, 6> rows;
 
   [[nodiscard]] std::int64_t count() const;
 };
 
-/// The visible faces of one voxel (coordinates in the centre chunk); none of air. Cost: up to 7 voxel look-ups.
+/// Returns the visible faces of one voxel (coordinates in the centre chunk); empty for air. Cost: up to 7 voxel
+/// look-ups.
 [[nodiscard]] DirectionSet visible_faces(const Neighbourhood& chunks, const VoxelRegistry& types, IVec3 voxel);
 
-/// The visible faces of the voxels of `region`: one set a voxel, x fastest, then y, then z.
+/// Finds the visible faces of the voxels in `region`: one set per voxel, x fastest, then y, then z.
 ///
-/// The region is clipped to the chunk and `out` resized to its volume.
-/// Convenient, but makes a BlockyMesher for one use: in a loop keep one and call its `find_faces`.
+/// The region is clipped to the chunk and `out` is resized to the clipped volume. Creates a BlockyMesher per call; in a
+/// loop, keep a mesher and call its `find_faces`.
 void visible_faces(const Neighbourhood& chunks, const VoxelRegistry& types, const IBox& region,
                    std::vector<DirectionSet>& out);
 
-/// How many faces there are, and how many of them show.
+/// Number of faces in total and number of visible faces.
 struct FaceCounts {
   std::int64_t visible = 0;
-  std::int64_t total = 0;  ///< 6 x voxels that are not air
+  std::int64_t total = 0;  ///< 6 x non-air voxels
 
   bool operator==(const FaceCounts&) const = default;
   FaceCounts& operator+=(const FaceCounts& other) {
@@ -56,7 +57,7 @@ struct FaceCounts {
   }
 };
 
-/// "Faces: 1,234 visible of 5,676 total".
+/// Formats as "Faces: 1,234 visible of 5,676 total".
 [[nodiscard]] std::string to_string(const FaceCounts& faces);
 
 }  // namespace quoin
