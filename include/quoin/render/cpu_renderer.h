@@ -19,71 +19,76 @@ namespace quoin {
 struct RenderOptions {
   int width = 1280;
   int height = 720;
-  int samples = 1;     ///< a pixel, 1 to 4,096; spread by a fixed pattern that begins with the centre
-  bool depth = false;  ///< whether Picture::depth is filled
+  int samples = 1;     ///< per pixel, 1 to 4,096; in a fixed pattern that starts with the pixel's centre
+  bool depth = false;  ///< fill Picture::depth
   LightOptions light{};
   DetailOptions detail{};
 };
 
 struct Picture {
   Image colour;
-  /// Euclidean distance along the ray through each pixel's centre in world units, to the first voxel of any kind,
-  /// transparent ones too, or surface of a field; 0 inside of either; +infinity where nothing was hit. Empty unless
-  /// asked for.
+  /// Distance in world units from the camera to the first voxel (also transparent) or field surface, along the ray
+  /// through each pixel's centre. 0 inside a voxel or field; +infinity where the ray hits nothing. Empty unless
+  /// RenderOptions::depth is set.
   FloatImage depth;
   std::int64_t rays = 0;        ///< of every kind
-  std::int64_t pixels_hit = 0;  ///< whose centre shows a voxel or a field
+  std::int64_t pixels_hit = 0;  ///< pixels whose centre shows a voxel or a field
 };
 
-/// Takes pictures of a scene by ray marching on the processor.
+/// Renders images of a scene by ray marching on the CPU.
 ///
-/// Light:       see LightOptions; computed linearly, each sample clamped to 0..1, averaged, and rounded to sRGB bytes
-///              exactly. Behind the scene is a sky, which the exposure does not change, and the sun only with
-///              LightOptions::sky_follows_sun.
-/// Transparent: a run of voxels, or of a field's solid, of one type is one body, whatever chunks and grids it crosses.
-///              It tints what is behind it by its length (one voxel of alpha a and colour c lets
-///              (1 - a) (1 - a (1 - c)) through; none of voxels counts as less than one), shows its own lit colour for
-///              what it covers, tints the sun's light and does not occlude. From inside it tints and glows, no more.
-/// Solid:       from inside an opaque voxel everything is that voxel's own colour, unlit.
+/// Light:       see LightOptions. Computed in linear space; each sample is clamped to 0..1, the samples are averaged
+///              and rounded exactly to sRGB bytes. The background is a sky that the exposure does not change. The sky
+///              shows the sun only with LightOptions::sky_follows_sun.
+/// Transparent: consecutive voxels (or field solid) of one transparent type along a ray form one body, also across
+///              chunks and grids. A body tints the background by its length: one voxel of alpha a and colour c
+///              transmits (1 - a) (1 - a (1 - c)). A body of voxels counts as at least one voxel long. It shows its own
+///              lit colour in proportion to its coverage, tints sunlight and does not occlude. Seen from inside, it
+///              only tints and emits.
+/// Solid:       from inside an opaque voxel, the whole view has that voxel's own colour, unlit.
 ///
-/// Holds the traversal structures of the scene's grids; build it once and take as many pictures as you like.
-/// Lifetime: the scene must outlive it, in its place; after an edit of the scene `update` comes before anything else.
-/// Threads:  any number may take pictures at once.
+/// Holds the acceleration structures of the scene's grids: build it once and render any number of images.
+/// Lifetime: the scene must outlive the renderer and must not move. After an edit of the scene, call `update` before
+///           any other function.
+/// Threads:  any number can render at once.
 class CpuRenderer {
  public:
-  /// Copies nothing of the voxels but what traversal and shading need. Draws the instances that `filter` lets pass.
+  /// Builds the acceleration structures of the instances that `filter` accepts. Copies only the voxel data that
+  /// traversal and shading need.
   explicit CpuRenderer(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible, Threads threads = {});
-  explicit CpuRenderer(Scene&&, InstanceFilter = InstanceFilter::Visible, Threads = {}) = delete;  // it must outlive it
+  /// Deleted because the scene must outlive the renderer.
+  explicit CpuRenderer(Scene&&, InstanceFilter = InstanceFilter::Visible, Threads = {}) = delete;
   CpuRenderer(CpuRenderer&&) noexcept;
   CpuRenderer& operator=(CpuRenderer&&) noexcept;
   ~CpuRenderer();
 
-  /// Takes over whatever was changed in the scene: instances, grids, and types in all their properties. Pictures are
-  /// then those of a renderer that was built anew.
+  /// Applies all changes of the scene: instances, grids, and types with all their properties. Images are then the same
+  /// as from a new renderer.
   ///
-  /// Requires: no picture is being taken.
-  /// Cost:     that of SceneTracer::update, and the types' colours. Impostors of edited grids are built anew when they
-  ///           are needed.
+  /// Requires: no render call is in progress.
+  /// Cost:     SceneTracer::update, plus the types' colours. Impostors of edited grids are rebuilt when they are next
+  ///           needed.
   void update(Threads threads = {});
 
-  /// Has pictures with LightModel::Propagated show light that the caller keeps, in place of light of its own;
-  /// null: its own. Until `update` takes over what changed in the light, as in the scene, it stays as it is.
-  /// Requires: no picture is being taken. Lifetime: the light must outlive the renderer, or its use.
+  /// Sets the light for images with LightModel::Propagated, in place of the renderer's own light. Null: the renderer's
+  /// own light. Changes of the light, like changes of the scene, appear after the next `update`.
+  /// Requires: no render call is in progress.
+  /// Lifetime: the light must outlive the renderer, or stay valid until another call replaces it.
   void use_light(const SceneLight* light);
 
-  /// One picture. The same bytes for any number of threads and any instruction set.
+  /// Renders one image. The bytes are the same for any number of threads and any instruction set.
   ///
   /// Requires: the camera's axes are perpendicular.
-  /// Errors:   InvalidArgument when a size is not positive, there are more than 2^28 pixels, samples are out of range,
-  ///           the camera's position is not finite, its axes are not of unit length, its angle or height is
-  ///           impossible, or `check` refuses the light; Cancelled when `progress` returns false, which is asked after
-  ///           every sample of a tile.
+  /// Errors:   InvalidArgument if a size is not positive, there are more than 2^28 pixels, samples are out of range,
+  ///           the camera's position is not finite, its axes are not of unit length, its field of view or view height
+  ///           is out of range, the impostor edge is not 16 to 1,024, the impostor time is NaN, or `check` rejects the
+  ///           light. Cancelled if `progress` returns false; it is called after every sample of a tile.
   [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options = {}, Threads threads = {},
                                        const Progress& progress = {}) const;
 
-  /// What its rays go through, for queries (first_hit, pick) that shall see what pictures show. Out of date after an
-  /// edit until `update`; not to be asked during one. Lifetime: that of the renderer; moving it leaves the tracer where
-  /// it is.
+  /// Returns the ray tracer of the renderer, for queries (first_hit, pick) that match its images. It is out of date
+  /// between an edit and `update`, and must not be used during `update`.
+  /// Lifetime: as the renderer; moving the renderer does not move the tracer.
   [[nodiscard]] const SceneTracer& tracer() const;
 
  private:

@@ -13,56 +13,59 @@
 namespace quoin {
 
 struct ImpostorCacheOptions {
-  std::size_t max_bytes = std::size_t{1} << 30;  ///< of the impostors that are held
-  Threads workers{};                             ///< unlike elsewhere 0 means one less than the machine has, at least 1
+  std::size_t max_bytes = std::size_t{1} << 30;  ///< of all held impostors
+  Threads workers{};                             ///< 0: one less than the hardware threads, at least 1 (different from
+                                                 ///< other options)
 };
 
-/// Impostors of a scene's grids, built by worker threads when they are first asked for, and again after edits.
+/// Impostors of a scene's grids, built by worker threads on first request and rebuilt after edits.
 ///
 ///   const std::shared_ptr<const Impostor> impostor = cache.find(scene, instance.grid);  // null: trace it this time
 ///   ...
-///   cache.wait(scene, 0.0);  // once a frame, at its end
+///   cache.wait(scene, 0.0);  // once per frame, at its end
 ///
-/// Workers read snapshots of the grids, so edits never wait for them. After an edit only what it can have changed is
-/// looked at again (Impostor::rebuilt), and the old impostor is returned until the new one is ready; that of a grid
-/// which another replaced, or of another scene's, is not. When there is no room, the ones that were asked for longest
-/// ago are dropped. What is asked for within one round, up to the end of a `wait`, is never dropped for something else
-/// of that round, which then has none.
+/// Workers read snapshots of the grids, so edits never wait for them. After an edit, only the affected parts are
+/// processed (Impostor::rebuilt), and `find` returns the old impostor until the new impostor is ready. It never returns
+/// the impostor of a replaced grid or of another scene. When the cache is full, it drops the least recently used
+/// impostors. Impostors requested within one round, which ends with `wait`, never replace each other; requests that do
+/// not fit get no impostor.
 ///
-/// Lifetime: shares impostors with whoever was given one; the scene is only read within calls.
-/// Threads:  any number may call at once, as long as nobody edits the scene meanwhile.
+/// Lifetime: shares impostors with its callers; the scene is read only during calls.
+/// Threads:  any number can call at once, as long as no thread edits the scene at the same time.
 class ImpostorCache {
  public:
   explicit ImpostorCache(const ImpostorCacheOptions& options = {});
   ImpostorCache(ImpostorCache&&) noexcept;
   ImpostorCache& operator=(ImpostorCache&&) noexcept;
-  /// Waits for what is being built; the rest is given up.
+  /// Waits for the builds in progress; cancels the rest.
   ~ImpostorCache();
 
-  /// The newest impostor that is ready; null when there is none or the handle names nothing. Marks it as used, and has
-  /// it built when it is missing, older than the grid, or was asked for with other options.
+  /// Returns the newest completed impostor; null if there is none or the handle is invalid. Marks it as used. Requests
+  /// a build if the impostor is missing, older than the grid or built with other options.
   ///
-  /// Cost:   O(log grids), and a snapshot of the grid where it has to be built.
-  /// Errors: std::system_error where the workers cannot be started.
+  /// Cost:   O(log grids), plus a grid snapshot if a build is needed.
+  /// Errors: std::system_error if the workers cannot be started.
   [[nodiscard]] std::shared_ptr<const Impostor> find(const Scene& scene, GridHandle grid,
                                                      const ImpostorOptions& options = {});
 
-  /// Ends a round: returns once all that was asked for is ready or so many seconds have passed, and forgets grids that
-  /// are gone. Without a limit of time the calling thread builds as well. Returns how many still wait.
+  /// Ends a round. Waits until all requested impostors are ready or `seconds` have passed, and forgets removed grids.
+  /// Without a time limit, the calling thread also builds. Returns the number of grids that still wait.
   std::size_t wait(const Scene& scene, double seconds = std::numeric_limits<double>::infinity());
 
-  /// Has impostors built anew where types became transparent or opaque since they were; `find` does it as well.
+  /// Requests rebuilds of impostors with types that have become transparent or opaque since the build; `find` does this
+  /// too.
   /// Cost: O(types that changed).
   void update_types(const VoxelRegistry& types);
 
   struct Stats {
     std::size_t held = 0;     ///< impostors
-    std::size_t bytes = 0;    ///< of these
-    std::size_t waiting = 0;  ///< grids that were asked for and are yet to be built, or built anew
-    std::uint64_t built = 0;  ///< in all, of which `rebuilt` from the one before
+    std::size_t bytes = 0;    ///< bytes of the held impostors
+    std::size_t waiting = 0;  ///< requested grids that wait for a build or rebuild
+    std::uint64_t built = 0;  ///< builds in total, including `rebuilt` ones
     std::uint64_t rebuilt = 0;
-    std::uint64_t dropped = 0;        ///< for want of room
-    std::uint64_t out_of_memory = 0;  ///< times a build's memory ran out; the grid is built when it is asked for again
+    std::uint64_t dropped = 0;  ///< to stay within max_bytes
+    /// Number of builds that ran out of memory. The grid is built again on its next request.
+    std::uint64_t out_of_memory = 0;
   };
   [[nodiscard]] Stats stats() const;
 

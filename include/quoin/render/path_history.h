@@ -9,17 +9,20 @@
 
 namespace quoin {
 
-/// Lets the picture of a view go on across edits: what an edit did not change stays as free of noise as it was.
+/// Keeps a progressive path-traced view converged across edits: regions that an edit did not change stay as free of
+/// noise as they were.
 ///
-/// A view converges by pictures of ever more samples, perhaps after smaller ones. Paths are chosen by pixel and sample,
-/// not by scene: where an edit changed nothing, a picture of few samples is, noise and all, what it was before it. So
+/// A view converges through images of increasing sample count, perhaps after smaller images. Random numbers depend on
+/// pixel and sample, not on the scene. Where an edit changed nothing, an image of few samples is therefore identical,
+/// noise included, to the image of as many samples before the edit. The shown image is
 ///
 ///   shown = new(n) + share * (before(best) - before(n))
 ///
-/// takes the noise of n samples away again where it is known. The share is found around each pixel: 1 where nothing
-/// changed, 0 where nothing of before is left. With as many samples as the best picture before the edit had, what is
-/// shown is the new picture and nothing else. Until then it leans towards what was: light that few samples find, and
-/// that an edit took away, goes over the first of them and not at once (docs/decisions/119).
+/// This removes the known noise of n samples. The share is estimated around each pixel: 1 in unchanged regions, 0 where
+/// the old image no longer correlates. Once the new image has as many samples as the best image before the edit, the
+/// history shows the new image alone. Until then the result is biased towards the old image: light that only few
+/// samples find, and that an edit removed, fades over the first samples instead of disappearing at once
+/// (docs/decisions/119).
 ///
 ///   PathHistory history;
 ///   for (const int samples : {1, 4, 16, 64}) {
@@ -29,38 +32,40 @@ namespace quoin {
 ///   }
 ///   grid.set({1, 2, 3}, kAir);
 ///   tracer.update();
-///   history.note_edit();                          // and from the first sample on again
+///   history.note_edit();                          // then start again from the first sample
 ///
-/// Source: control variates with common random numbers, as A. Owen, "Monte Carlo theory, methods and examples" (2013),
-///         8.9 and 8.6, has them; the share is their coefficient for pictures of equal noise.
+/// Source: control variates with common random numbers, A. Owen, "Monte Carlo theory, methods and examples" (2013), 8.9
+///         and 8.6; the share is the control variate coefficient for images of equal noise.
 class PathHistory {
  public:
-  /// Another view, size, light or seed: nothing that was taken says anything of it.
+  /// Forgets all images. Call it when the view, size, light or seed changes, because earlier images no longer apply.
   void clear();
 
-  /// The scene was edited since the last picture: those that follow are of another one. Of earlier scenes the best
-  /// picture is kept, with those that led to it.
+  /// Records that the scene was edited since the last image. Keeps the best image of the earlier scenes and the coarser
+  /// images that led to it.
   void note_edit();
 
-  /// Whether pictures would be made better: one of an earlier scene has more pixels or samples than any since.
+  /// Returns true if the history can improve images: an image of an earlier scene has more pixels or samples than any
+  /// image since the edit.
   [[nodiscard]] bool has_earlier() const { return !earlier_.empty(); }
-  /// Whether that was led to by a picture of this size and so many samples. Only such ones are made better.
+  /// Returns true if the earlier images include one of this size and sample count. Only such images are improved.
   [[nodiscard]] bool knows(int width, int height, int samples) const {
     return find_earlier(width, height, samples) != nullptr;
   }
 
-  /// Remembers the light of a picture, and makes it what is to be shown: of the best earlier picture's size, with light
-  /// as above. Layers, rays and counts stay those of the picture; layers that are of another size are left out.
+  /// Stores the light of an image and replaces it with the light to show: at the best earlier image's size, combined as
+  /// above. Keeps the image's layers, rays and counts, but drops layers of another size.
   ///
-  /// Requires: picture.radiance, scene and alpha have a value for each pixel; all pictures since `clear` show the same
-  ///           view under the same options but for size and samples.
+  /// Requires: picture.radiance, scene and alpha have one value per pixel; all images since `clear` show the same view
+  ///           with the same options except size and samples.
   void refine(PathPicture& picture, int samples, Threads threads = {});
 
-  /// Of what it remembers: 4 a pixel of each picture since the edit, and of each that led to the best one before it.
+  /// Returns the bytes held: 4 per pixel of each image since the edit, and of each image that led to the best image
+  /// before the edit.
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  /// The light of a picture: see PackedLight.
+  /// The light of an image: see PackedLight.
   struct Taken {
     int width = 0;
     int height = 0;
@@ -75,8 +80,8 @@ class PathHistory {
   static void combine(const Taken& before, const Taken& best, const std::vector<float>& shares, Threads threads,
                       PathPicture& picture);
 
-  std::vector<Taken> earlier_;  // ever finer; of one scene
-  std::vector<Taken> now_;      // likewise
+  std::vector<Taken> earlier_;  // in order of increasing quality; of one scene
+  std::vector<Taken> now_;      // in order of increasing quality; of the current scene
 };
 
 }  // namespace quoin

@@ -18,74 +18,78 @@
 
 namespace quoin {
 
-/// How a picture by paths is taken; Look says of what light.
+/// Settings of a path-traced image; Look describes the light.
 struct PathOptions : Look {
   int width = 1280;
   int height = 720;
-  int samples = 64;          ///< a pixel, 1 to 65,536
-  int max_bounces = 8;       ///< 0 to 1,024: how often light is scattered at most on its way to the camera
-  int max_scatterings = 64;  ///< 0 to 1,024: how often light is scattered at most in fog and clouds besides
+  int samples = 64;          ///< per pixel, 1 to 65,536
+  int max_bounces = 8;       ///< 0 to 1,024: maximum number of bounces between surfaces on a path
+  int max_scatterings = 64;  ///< 0 to 1,024: maximum number of additional scattering events in fog and clouds on a path
   std::uint32_t seed = 0;
-  bool layers = false;   ///< whether PathPicture's layers are filled
-  bool denoise = false;  ///< whether noise is taken out within surfaces; edges stay, also those of shadows and colours
+  bool layers = false;   ///< fill PathPicture's layers
+  bool denoise = false;  ///< remove noise within surfaces; keeps edges of objects, shadows and colours
 
   bool operator==(const PathOptions&) const = default;
 };
 
-/// Linear light, and what compositing wants to know besides. Each image has a value a pixel, rows from the top.
+/// A path-traced image in linear light, with data for compositing. Each array has one value per pixel, rows from the
+/// top.
 struct PathPicture {
   int width = 0;
   int height = 0;
-  std::vector<Vec3> radiance;  ///< means of the samples, the background included
-  std::vector<Vec3> scene;     ///< the same without what is seen of the background: radiance over black
-  std::vector<float> alpha;    ///< the share of samples that show the scene, or its shadow; 0 to 1
-  // Layers, of what pixels show first that is no glass; empty unless asked for.
-  std::vector<Vec3> albedo;      ///< means; black where nothing is
-  std::vector<Vec3> normal;      ///< means, in the world; not of unit length
+  std::vector<Vec3> radiance;  ///< means of the samples, including the background
+  std::vector<Vec3> scene;     ///< as radiance, without the visible background: radiance over black
+  std::vector<float> alpha;    ///< share of samples that show the scene or its shadow; 0 to 1
+  // Layers: the first surface in each pixel that is not glass; empty unless PathOptions::layers is set.
+  std::vector<Vec3> albedo;      ///< means; black where there is no surface
+  std::vector<Vec3> normal;      ///< means, in world space; not of unit length
   FloatImage depth;              ///< of the first sample, as Picture::depth
-  std::vector<VoxelType> types;  ///< of the first sample; kAir: nothing
-  /// Likewise: 1 + InstanceHandle::index (see SlotMap::handle_at); 0: nothing.
+  std::vector<VoxelType> types;  ///< of the first sample; kAir: no surface
+  /// Instance in the first sample: 1 + InstanceHandle::index (see SlotMap::handle_at); 0: no instance.
   std::vector<std::uint32_t> instances;
   std::int64_t rays = 0;        ///< of every kind
-  std::int64_t pixels_hit = 0;  ///< of which some sample shows the scene
+  std::int64_t pixels_hit = 0;  ///< pixels with at least one sample that shows the scene
 };
 
-/// Light by paths: the sun as a disc, a sky, what voxels emit, any number of bounces, gloss, metal and refracting
-/// glass. What pictures converge to is right to the last bounce; until then they have noise.
+/// Renders images by path tracing: the sun as a disc, a sky, emissive voxels, any number of bounces, gloss, metal and
+/// refractive glass. Images converge to the correct result including the last bounce; until then they have noise.
 ///
-/// Light:    in the units of LightOptions: a sun of 1 shows a white surface that faces it as 1, and a voxel of emission
-///           1 shows its own colour and lights others as such a surface does.
-/// Surfaces: glTF's metallic-roughness model, lossless: white stays white. A roughness of 1 of what is no metal is
-///           matte, without gloss.
-/// Glass:    what the camera sees of it, also by its reflections, refracts by the types' `ior` and absorbs by length.
-///           Light that goes from surface to surface passes it straight, tinted: no caustics. What alpha covers of it
-///           is matte.
-/// Fog, clouds: light is scattered in Look::fog, and in transparent types that have VoxelProperties::scattering, any
-///           number of times.
-/// Lamps:    faces that glow and Scene::lamps are sampled by a light tree. Fields and glass that glow are found by
-///           chance.
+/// Light:       in the units of LightOptions: a sun of 1 shows a white surface that faces it as 1. A voxel of emission
+///              1 shows its own colour and lights others as such a surface does.
+/// Surfaces:    glTF's metallic-roughness model, energy-conserving: white stays white. A non-metal of roughness 1 is
+///              matte, without gloss.
+/// Glass:       glass that the camera sees, directly or by reflection, refracts by the types' `ior` and absorbs by path
+///              length. Light between surfaces passes glass straight and tinted: no caustics. The part that alpha
+///              covers is matte.
+/// Fog, clouds: light scatters any number of times in Look::fog and in transparent types with
+///              VoxelProperties::scattering.
+/// Lamps:       emissive faces and Scene::lamps are sampled with a light tree. Emissive fields and glass are hit only
+///              by chance.
 ///
 /// Lifetime: as CpuRenderer.
 class PathTracer {
  public:
-  /// Copies nothing of the voxels but what traversal and shading need. Draws the instances that `filter` lets pass.
+  /// Builds the acceleration structures of the instances that `filter` accepts. Copies only the voxel data that
+  /// traversal and shading need.
   explicit PathTracer(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible, Threads threads = {});
-  explicit PathTracer(Scene&&, InstanceFilter = InstanceFilter::Visible, Threads = {}) = delete;  // it must outlive it
+  /// Deleted because the scene must outlive the tracer.
+  explicit PathTracer(Scene&&, InstanceFilter = InstanceFilter::Visible, Threads = {}) = delete;
   PathTracer(PathTracer&&) noexcept;
   PathTracer& operator=(PathTracer&&) noexcept;
   ~PathTracer();
 
-  /// As CpuRenderer::update.
+  /// Applies all changes of the scene, as CpuRenderer::update.
   void update(Threads threads = {});
 
-  /// One picture. The same bits for any number of threads and any instruction set.
+  /// Renders one image. The bits are the same for any number of threads and any instruction set.
   ///
   /// Requires: the camera's axes are perpendicular.
-  /// Errors:   InvalidArgument, with the option's name, for what the options do not allow, numbers that are not finite,
-  ///           brightnesses of less than 0 or more than 1e9, SkyModel::Environment without an environment of at least
-  ///           a pixel, more than 2^28 pixels, and cameras that CpuRenderer refuses; Cancelled when `progress` returns
-  ///           false, which is asked after every few samples of a tile.
-  /// Memory:   28 bytes a pixel, 62 with layers, some 300 more while `denoise` runs; 2 MB a thread. It keeps the sky.
+  /// Errors:   InvalidArgument, with the option's name, if an option is out of range or not finite, a brightness is
+  ///           outside 0 to 1e9, SkyModel::Environment has an environment without pixels, there are more than 2^28
+  ///           pixels, or CpuRenderer rejects the camera. Cancelled if `progress` returns false; it is called after
+  ///           every few samples of a tile.
+  /// Memory:   28 bytes per pixel, 62 with layers, about 300 more during `denoise`; 2 MB per thread. The tracer keeps
+  ///           the sky between calls.
   [[nodiscard]] Result<PathPicture> render(const Camera& camera, const PathOptions& options = {}, Threads threads = {},
                                            const Progress& progress = {}) const;
 
@@ -94,18 +98,20 @@ class PathTracer {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Returns the exposure that brings an image to middle tones; 1 for a black image.
+/// Returns the exposure that maps an image to middle tones; 1 for a black image.
 ///
-/// Neutral: the scene's mean logarithm of light becomes 0.18, and the brightest 1 % stays within 4 times white.
-/// Others:  the developed image, background included, has the same mean byte as under the neutral curve.
+/// Neutral: the log-average luminance becomes 0.18, and the brightest 1 % stays within 4 times white. Pixels with an
+///          alpha above 0.5 count without the background, others with it; black pixels do not count.
+/// Others:  the developed image, including the background, has the same mean byte as under the neutral curve.
 [[nodiscard]] double find_exposure(const PathPicture& picture, ToneCurve tone = ToneCurve::Neutral);
 
-/// The picture as bytes, sRGB, the background included.
-/// Errors: InvalidArgument, with the option's name, for what DevelopOptions do not allow. Memory: with bloom the light
-/// twice more.
+/// Converts the image to sRGB bytes, including the background.
+/// Errors: InvalidArgument, with the option's name, if a DevelopOptions value is out of range.
+/// Memory: with bloom, two additional copies of the light.
 [[nodiscard]] Result<Image> develop(const PathPicture& picture, const DevelopOptions& options = {});
 
-/// The scene alone, and how much of each pixel it covers. Errors: as `develop`.
+/// Converts the scene without the background to sRGB bytes, with the coverage of each pixel as alpha.
+/// Errors: as `develop`.
 [[nodiscard]] Result<AlphaImage> develop_with_alpha(const PathPicture& picture, const DevelopOptions& options = {});
 
 }  // namespace quoin

@@ -19,85 +19,90 @@ namespace quoin {
 
 enum class Wireframe : std::uint8_t {
   Off,
-  Over,  ///< the edges of triangles over the surfaces: dark, but on what is nearly black
-  Only,  ///< the edges alone; hidden ones too
+  /// Triangle edges over the surfaces: dark, but light on surfaces that are nearly black.
+  Over,
+  Only,  ///< edges only, including hidden edges
 };
 
 struct MeshPictureOptions {
   int width = 1280;
   int height = 720;
-  int samples = 4;  ///< a pixel, of coverage: 1, 2, 4 or 8; the device's next lower number is taken
-  /// `occlusion_rays` means nothing here: any occlusion but Off is that of the meshes' vertices.
+  /// Coverage samples per pixel: 1, 2, 4 or 8; rounded down to a number that the device supports.
+  int samples = 4;
+  /// `occlusion_rays` has no effect here: every mode except Off uses the occlusion of the meshes' vertices.
   LightOptions light{};
-  /// Mid: meshes of halved grids, made when a picture first shows them, blocky
-  /// or smooth as those of the full grid that were put, else blocky; Far: the faces of an impostor.
+  /// Mid: meshes of halved grids, built when an image first shows them; blocky or smooth as the full grid's meshes, or
+  ///      blocky if it has none.
+  /// Far: the faces of an impostor.
   DetailOptions detail{};
-  /// Whether glass is what marched pictures show: all that is transparent from the nearest face on, found by rays
-  /// through the VulkanRenderer's voxels. Else each blocky face counts as a body one voxel thick without a surface,
-  /// drawn from back to front, and of smooth bodies only the nearest is drawn, as one voxel thick with its surface:
-  /// cheap, and without need of voxels.
+  /// Draws glass as in ray-marched images: rays through the VulkanRenderer's voxels find all transparent bodies behind
+  /// the nearest face. If false, glass is cheaper and needs no voxels: each blocky face counts as a body one voxel
+  /// thick without reflections, drawn back to front; of smooth bodies only the nearest is drawn, as one voxel thick
+  /// with reflections.
   bool glass_by_rays = true;
   Wireframe wireframe = Wireframe::Off;
 };
 
-/// Draws chunks' meshes by rasterisation, on the device of a VulkanRenderer: a quad of a blocky mesh takes 8 bytes
-/// there, and its corners are made when it is drawn.
+/// Draws chunk meshes by rasterisation on the device of a VulkanRenderer. A quad of a blocky mesh takes 8 bytes of
+/// device memory; the vertex shader computes its corners.
 ///
-/// Equal:  a blocky mesh is CpuRenderer's picture with `OcclusionMode::Vertex`, to 2 of 255, but at silhouettes and
-///         edges of shadows; glass with `glass_by_rays`. Walls of smooth bodies of glass are the same to 4, away from
-///         their edges. What is brighter than white counts as white behind glass. There is no inside: only faces that
-///         look towards the camera are drawn.
-/// Light:  shadows, and the light of lamps, are found by rays from what a pixel shows through the voxels that the
-///         VulkanRenderer has, in the detail of the picture: whatever casts shadows there casts them here, drawn or
-///         not. Those of smooth surfaces start one voxel before them. Glass tints the sun by each grid by itself.
-///         LightModel::Propagated is of the same voxels, without rays.
-/// Detail: of far instances the impostor is drawn, but where all chunks' meshes are there and have fewer quads than it
-///         has faces, and of the meshes what is transparent; of a smooth one that is its voxels' faces. Until its
-///         impostor is there an instance is drawn halved.
-/// Glass:  by rays each pixel is seen through from its nearest fragment on, through the bodies that the renderer's
-///         voxels make, so nothing is put in order. The surfaces behind a smooth body's first have the upright of the
-///         voxels there, blurred. Face by face, quads are put in order by the distances of their middles, so large
-///         merged ones that lie close may be drawn in the wrong one; of more than 1,048,576 in a picture only the
-///         chunks are. Fields are opaque, whatever their types; and so is glass where values are shown.
-/// Far:    what is drawn is made relative to the camera in double precision, as CpuRenderer does. What is nearer than
-///         1/1024 of a voxel is cut off.
-/// Lifetime: the renderer it was made for must outlive it.
-/// Threads:  that renderer's.
-/// Errors:   as there.
+/// Equal:    a blocky mesh equals CpuRenderer's image with `OcclusionMode::Vertex` to 2 of 255, except at silhouettes
+///           and shadow edges; also glass with `glass_by_rays`. Walls of smooth glass bodies are equal to 4, away from
+///           their edges. Light brighter than white counts as white behind glass. There is no inside view: only faces
+///           towards the camera are drawn.
+/// Light:    rays from each visible point through the VulkanRenderer's voxels, at the image's level of detail, find
+///           shadows and lamp light. Everything that casts shadows in that renderer also casts them here, drawn or not.
+///           Rays from smooth surfaces start one voxel in front of the surface. Glass tints sunlight separately per
+///           grid. LightModel::Propagated uses the light of the same voxels, without rays.
+/// Detail:   far instances are drawn as impostors, except where all chunk meshes are loaded and have fewer quads than
+///           the impostor has faces. Transparent parts come from the meshes (in smooth meshes, from the voxel faces).
+///           An instance is drawn halved until its impostor is ready. Fields are drawn from their meshes, whose levels
+///           LiveMeshes chooses.
+/// Glass:    with `glass_by_rays`, rays continue from the nearest fragment of each pixel through the bodies of the
+///           renderer's voxels, so no sorting is needed. Surfaces behind the first surface of a smooth body have the
+///           orientation of its voxels, blurred. Without rays, quads are sorted by the distance of their centres, so
+///           large merged quads close to each other can be drawn in the wrong order; above 1,048,576 quads per image,
+///           only chunks are sorted. Fields are always opaque. Glass is opaque if Shading is Occlusion or Normals.
+/// Far:      geometry is made relative to the camera in double precision, as in CpuRenderer. The near plane is at
+///           1/1024 of a voxel.
+/// Lifetime: the VulkanRenderer passed to `create` must outlive it.
+/// Threads:  as the VulkanRenderer: one at a time.
+/// Errors:   as the VulkanRenderer.
 class VulkanMeshRenderer {
  public:
-  /// Errors: Unsupported when the device's queue draws no triangles.
+  /// Creates a mesh renderer. Errors: Unsupported if the device's queue cannot draw triangles.
   [[nodiscard]] static Result<VulkanMeshRenderer> create(VulkanRenderer& renderer);
   VulkanMeshRenderer(VulkanMeshRenderer&&) noexcept;
   VulkanMeshRenderer& operator=(VulkanMeshRenderer&&) noexcept;
   ~VulkanMeshRenderer();
 
-  /// Takes over instances and types. Cost: O(instances + types).
+  /// Applies the scene's instances and types. Cost: O(instances + types).
   [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible);
-  /// Takes over surfaces; of one chunk the last. Cost: the upload of these.
-  /// Errors: also InvalidArgument when a surface's arrays contradict each other; then nothing is changed. After another
-  /// error some surfaces may have been taken over, and the others are what they were.
+  /// Uploads surfaces. If a chunk occurs several times, the last surface counts. Cost: the upload.
+  /// Errors: also InvalidArgument if a surface's arrays are inconsistent; then no surface changes. After any other
+  ///         error some surfaces may be new, and the rest are unchanged.
   [[nodiscard]] Status put(std::span<const SurfaceUpdate> surfaces);
-  /// Forgets all surfaces.
+  /// Removes all surfaces.
   void clear();
 
-  /// Draws all there is; `threads` are for what detail needs.
+  /// Draws all surfaces into an image; `threads` compute levels of detail.
   ///
-  /// Requires: with levels of detail, lamps or propagated light the scene was not edited since the last update of this
-  ///           and of the VulkanRenderer; this is not checked.
-  /// Errors:   also InvalidArgument for sizes and samples that cannot be, for cameras as CpuRenderer::render and those
-  ///           whose axes lie in one plane, for a picture of another renderer, and with shadows, lamps, propagated
-  ///           light, levels of detail or glass by rays, if there is any, when the VulkanRenderer was not last updated
-  ///           with the same scene and filter; Unsupported for wireframes where the device has no lines. After an
-  ///           error in drawing the picture has no samples.
+  /// Requires: with levels of detail, lamps or propagated light, the scene was not edited since the last update of this
+  ///           renderer and of the VulkanRenderer (not checked).
+  /// Errors:   also InvalidArgument for a size or sample count out of range, for an invalid camera (as in
+  ///           CpuRenderer::render, and also linearly dependent axes), for an image of another renderer, and, if
+  ///           shadows, lamps, propagated light, levels of detail or glass by rays are used, if the VulkanRenderer's
+  ///           last update had another scene or filter. Unsupported for wireframes on a device without line drawing.
+  ///           After a drawing error the image has no samples.
   [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const MeshPictureOptions& options = {},
                             Threads threads = {});
 
   struct Stats {
-    std::size_t chunks = 0;            ///< with a surface, those of halved grids too
-    std::int64_t triangles = 0;        ///< in memory, each once
-    std::int64_t drawn_triangles = 0;  ///< of the last picture, after leaving out chunks beside it; impostors' too
-    std::size_t bytes = 0;             ///< of surfaces, in device memory
+    std::size_t chunks = 0;      ///< chunks with a surface, including chunks of halved grids
+    std::int64_t triangles = 0;  ///< in memory, each counted once
+    /// Triangles of the last image, after culling chunks outside the view; includes impostors.
+    std::int64_t drawn_triangles = 0;
+    std::size_t bytes = 0;  ///< device memory of the surfaces
   };
   [[nodiscard]] Stats stats() const;
 

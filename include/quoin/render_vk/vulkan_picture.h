@@ -11,23 +11,25 @@
 
 namespace quoin {
 
-/// A VkImage of a program, as a picture is put into it (VulkanPicture::record_copy), and where.
+/// An application's VkImage, and the position in it to copy an image to (VulkanPicture::record_copy).
 ///
-/// The image is two-dimensional, of one sample, made with VK_IMAGE_USAGE_TRANSFER_DST_BIT on the renderer's device, and
-/// belongs to the queue family that the commands run on.
+/// Requires: a two-dimensional image with one sample per pixel, created with VK_IMAGE_USAGE_TRANSFER_DST_BIT on the
+///           renderer's device, and owned by the queue family that runs the commands.
 struct VulkanImageTarget {
   VulkanImageHandle image{};  ///< VkImage
-  /// VkFormat: VK_FORMAT_R8G8B8A8_UNORM or _SRGB, VK_FORMAT_B8G8R8A8_UNORM or _SRGB. Bytes are the picture's, which are
-  /// sRGB, in each of them.
+  /// VkFormat, one of VK_FORMAT_R8G8B8A8_UNORM or _SRGB, VK_FORMAT_B8G8R8A8_UNORM or _SRGB. The copied bytes are sRGB
+  /// in each of these formats.
   std::uint32_t format = 0;
   int width = 0;  ///< of the mip level, in pixels
   int height = 0;
-  int x = 0;  ///< the pixel that the picture's upper left one becomes; all of the picture lies in the image
+  /// Pixel of the target for the upper left pixel of the copy. The copy must lie within the target.
+  int x = 0;
   int y = 0;
   std::uint32_t mip_level = 0;
   std::uint32_t array_layer = 0;
-  std::uint32_t layout_before = 0;  ///< VkImageLayout that it is in. VK_IMAGE_LAYOUT_UNDEFINED (0): all else may go
-  std::uint32_t layout_after = 0;   ///< VkImageLayout that it is left in; not UNDEFINED or PREINITIALIZED
+  /// Current VkImageLayout. VK_IMAGE_LAYOUT_UNDEFINED (0): the other pixels may be discarded.
+  std::uint32_t layout_before = 0;
+  std::uint32_t layout_after = 0;  ///< VkImageLayout after the copy; not UNDEFINED or PREINITIALIZED
 };
 
 class VulkanRenderer;
@@ -35,14 +37,14 @@ namespace vulkan {
 struct Access;
 }
 
-/// A picture that stays in device memory: drawn by one renderer and its VulkanMeshRenderers, put into images of a
-/// program that draws by Vulkan, or read.
+/// An image in device memory. A renderer and its VulkanMeshRenderers draw into it. It can be copied to the images of a
+/// Vulkan application, or read.
 ///
-/// Lifetime: the renderer it was made for must outlive it.
-/// Threads:  that renderer's.
+/// Lifetime: the renderer it was created for must outlive it.
+/// Threads:  as the renderer: one at a time.
 class VulkanPicture {
  public:
-  /// Of no size yet: whoever draws it decides.
+  /// Creates an empty image. Drawing sets its size.
   explicit VulkanPicture(VulkanRenderer& renderer);
   VulkanPicture(VulkanPicture&&) noexcept;
   VulkanPicture& operator=(VulkanPicture&&) noexcept;
@@ -50,37 +52,36 @@ class VulkanPicture {
 
   [[nodiscard]] int width() const;
   [[nodiscard]] int height() const;
-  [[nodiscard]] int samples() const;        ///< a pixel, so far; 0: nothing is to be seen yet
+  [[nodiscard]] int samples() const;        ///< per pixel, so far; 0: the image is empty
   [[nodiscard]] std::int64_t rays() const;  ///< of every kind, for all samples so far
-  [[nodiscard]] std::size_t bytes() const;  ///< of device memory
+  [[nodiscard]] std::size_t bytes() const;  ///< device memory
 
-  /// Errors: InvalidArgument when nothing was drawn; those of VulkanRenderer.
+  /// Reads the image back. Errors: InvalidArgument if the image is empty; otherwise as VulkanRenderer.
   [[nodiscard]] Result<Image> read() const;
 
-  /// Becomes a picture that was drawn elsewhere. Errors: InvalidArgument for one without pixels; those of
-  /// VulkanRenderer.
+  /// Uploads an image. Errors: InvalidArgument for an image without pixels; otherwise as VulkanRenderer.
   [[nodiscard]] Status write(const Image& image);
 
-  /// Records into a program's own command buffer what puts the picture into a program's own image; so it can stand
-  /// between whatever else the program draws, and whoever submits it says what is waited for.
+  /// Records a copy to an application's image into the application's own command buffer. The copy can stand between
+  /// other commands; the application submits and synchronises the command buffer.
   ///
-  /// Bytes:    the picture's, with alpha 255; never scaled or converted. Pixels beside the picture keep theirs unless
+  /// Bytes:    copied unscaled and unconverted, with alpha 255. Pixels of the target outside the copy are kept unless
   ///           `target.layout_before` is UNDEFINED.
-  /// Order:    all that was done with the image before on that queue comes first, and all that follows comes after it:
-  ///           the commands begin and end with barriers, which also change the layout.
-  /// Changes:  for B8G8R8A8 the compute pipeline that is bound and the constants that are pushed; and the picture keeps
-  ///           a second copy of its bytes in device memory from then on.
-  /// Requires: `commands` is being recorded, outside of a render pass, for the renderer's device and queue family.
-  ///           Until it has run, the picture is neither drawn, written nor destroyed, nor its renderer.
-  /// Cost:     recording: O(1); running: a copy of 4 bytes a pixel, two for B8G8R8A8.
-  /// Errors:   InvalidArgument when nothing was drawn, a handle is null, the image has no size, the picture does not
-  ///           lie within it, or `layout_after` is none; Unsupported for other formats, naming the format;
-  ///           LimitExceeded when a memory is full. After an error nothing was recorded.
+  /// Order:    the commands begin and end with barriers, which also change the layout. They run after all earlier
+  ///           accesses to the target on that queue and before all later ones.
+  /// Changes:  for B8G8R8A8, the bound compute pipeline and the push constants. The image then also keeps a second copy
+  ///           of its bytes in device memory.
+  /// Requires: `commands` is recording, outside a render pass, for the renderer's device and queue family. Until it has
+  ///           run, do not draw, write or destroy the image or destroy its renderer.
+  /// Cost:     recording: O(1); running: a copy of 4 bytes per pixel, two copies for B8G8R8A8.
+  /// Errors:   InvalidArgument if the image is empty, a handle is null, the target has no size, the copy does not fit
+  ///           in it or `layout_after` is invalid. Unsupported for other formats, naming the format. LimitExceeded if
+  ///           memory is full. After an error no command is recorded.
   [[nodiscard]] Status record_copy(VkCommandBuffer_T* commands, const VulkanImageTarget& target) const;
 
-  /// The same at once, on the renderer's queue: comes back when the image has the picture.
-  /// Requires: what the program has submitted and still uses the image went to that queue.
-  /// Errors:   as above, and those of VulkanRenderer.
+  /// Copies to an application's image immediately, on the renderer's queue. Returns when the copy is complete.
+  /// Requires: all submitted work that still uses the target went to that queue.
+  /// Errors:   as record_copy and as VulkanRenderer.
   [[nodiscard]] Status copy_to(const VulkanImageTarget& target) const;
 
  private:
@@ -89,15 +90,15 @@ class VulkanPicture {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The samples of a picture by paths, which stay in device memory, so that more can be added to them: it converges
-/// while one looks at it.
+/// The accumulated samples of a path-traced image in device memory. Samples can be added over time, so that a view
+/// converges while the user watches.
 ///
-/// Memory:   80 bytes a pixel of the device's, 112 with layers, and 180 besides with PathOptions::denoise.
-/// Lifetime: the renderer it was made for must outlive it.
-/// Threads:  that renderer's.
+/// Memory:   80 bytes of device memory per pixel, 112 with layers, plus 180 with PathOptions::denoise.
+/// Lifetime: the renderer it was created for must outlive it.
+/// Threads:  as the renderer: one at a time.
 class VulkanPathPicture {
  public:
-  /// Of no size yet: VulkanRenderer::draw_paths decides.
+  /// Creates an empty image. VulkanRenderer::draw_paths sets its size.
   explicit VulkanPathPicture(VulkanRenderer& renderer);
   VulkanPathPicture(VulkanPathPicture&&) noexcept;
   VulkanPathPicture& operator=(VulkanPathPicture&&) noexcept;
@@ -105,13 +106,13 @@ class VulkanPathPicture {
 
   [[nodiscard]] int width() const;
   [[nodiscard]] int height() const;
-  [[nodiscard]] int samples() const;        ///< a pixel, so far; 0: nothing is to be seen yet
-  [[nodiscard]] std::size_t bytes() const;  ///< of device memory
+  [[nodiscard]] int samples() const;        ///< per pixel, so far; 0: the image is empty
+  [[nodiscard]] std::size_t bytes() const;  ///< device memory
 
-  /// What the samples so far come to, to be developed: PathTracer::render's picture with as many. With
-  /// PathOptions::denoise its noise is taken out here, on the processor.
+  /// Returns the image of the samples so far, ready for `develop`. It equals PathTracer::render with as many samples.
+  /// With PathOptions::denoise, this call removes the noise, on the CPU.
   ///
-  /// Errors: InvalidArgument when nothing was drawn; those of VulkanRenderer.
+  /// Errors: InvalidArgument if the image is empty; otherwise as VulkanRenderer.
   [[nodiscard]] Result<PathPicture> read(Threads threads = {}) const;
 
  private:

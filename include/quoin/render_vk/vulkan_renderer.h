@@ -16,52 +16,56 @@
 
 namespace quoin {
 
-/// Of a renderer's blocks of device memory, where nothing else is said.
+/// Default size of a renderer's device memory blocks.
 inline constexpr std::uint64_t kVulkanBlockBytes = std::uint64_t{64} << 20;
 
 struct VulkanOptions {
-  /// Of `vulkan_devices`, as `choose_vulkan_device` understands it.
+  /// Device to use, in the form that `choose_vulkan_device` accepts.
   std::string device{};
-  /// Voxels lie in blocks of device memory of this size, as many as it takes. Requires: at least 64 KiB.
+  /// Size of the device memory blocks for voxels; the renderer allocates as many as it needs. Requires: at least 64
+  /// KiB.
   std::uint64_t block_bytes = kVulkanBlockBytes;
-  /// Told what the validation layer says, which is then loaded: each message is a mistake in Quoin. May be called from
-  /// any thread that uses the renderer.
+  /// Receives the messages of the validation layer. Setting it loads the layer; each message is a bug in Quoin. Called
+  /// on any thread that uses the renderer.
   std::function<void(const std::string& message)> on_validation_message{};
 };
 
-/// What becomes of the samples that a picture has when more are drawn.
+/// Selects whether new samples are added to the existing samples of an image.
 enum class Accumulation : std::uint8_t {
-  Continue,  ///< new ones are added to them
-  Restart,   ///< they are forgotten
+  Continue,  ///< add to the existing samples
+  Restart,   ///< discard the existing samples
 };
 
-/// Takes the pictures that CpuRenderer takes, on a graphics device: one of its own, or a program's.
+/// Renders the same images as CpuRenderer on a Vulkan device: its own device or the application's.
 ///
-/// Equal:   every option means the same but OcclusionMode::Smooth, which is Unsupported, and so does every error; a
-///          channel of a pixel differs by 2 at most but at
-///          silhouettes, where single precision can take a ray past another voxel: less than a pixel in a thousand,
-///          unless whole rows of rays run within the faces of voxels. Counts of rays differ as little.
-/// Detail:  grids are halved and impostors built on the processor, when a picture first asks for them, from the scene
-///          of the last update: pictures with `DetailOptions::policy`, and the first with lamps or propagated
-///          light, require that it is still there, unedited.
-/// Device:  computes with 32-bit numbers, relative to the camera, and addresses memory by pointers; so what it needs is
-///          Vulkan 1.2 with bufferDeviceAddress, and worlds are as large as its memory, whatever its limits to buffers.
-/// Errors:  LimitExceeded when a memory is full; DeviceLost, after which a new renderer is needed; Unsupported for what
-///          the driver refuses otherwise.
-/// Lifetime: must outlive its pictures and mesh renderers; a borrowed device must outlive it, and the scene of the last
-///          update the pictures that `Detail` speaks of.
-/// Threads: one at a time.
+/// Equal:    options and errors are as in CpuRenderer, except that OcclusionMode::Smooth is Unsupported. Channels
+///           differ by at most 2, except at silhouettes, where single precision can take a ray past another voxel. This
+///           affects less than one pixel in a thousand, unless whole rows of rays run exactly along voxel faces. Ray
+///           counts differ as little.
+/// Detail:   grids are halved and impostors built on the CPU on first use, from the scene of the last update. Images
+///           with `DetailOptions::policy`, and the first image with lamps or propagated light, require that this scene
+///           still exists unedited.
+/// Device:   computes in 32 bits relative to the camera, and addresses memory by pointers. It therefore needs Vulkan
+///           1.2 with bufferDeviceAddress. Device memory limits the size of worlds; buffer size limits do not.
+/// Errors:   LimitExceeded if memory is full; DeviceLost, after which a new renderer is needed; Unsupported for other
+///           driver errors.
+/// Lifetime: must outlive its images and mesh renderers. A borrowed device must outlive the renderer. The scene of the
+///           last update must outlive the render calls that need it (see Detail).
+/// Threads:  one at a time.
 class VulkanRenderer {
  public:
-  /// Errors: Unsupported, saying what is missing: Vulkan in this build, its loader, a driver, a device of that number
-  ///         or name, a feature of the device, the validation layer.
+  /// Creates a renderer on its own device.
+  /// Errors: Unsupported, naming the missing part: Vulkan in this build, its loader, a driver, the selected device, a
+  ///         feature of the device, or the validation layer.
   [[nodiscard]] static Result<VulkanRenderer> create(const VulkanOptions& options = {});
 
-  /// On a program's own device, beside which any number of renderers may stand. The renderer submits to `device.queue`,
-  /// guarded by `device.with_queue`, and waits for what it submits, never for the whole device.
+  /// Creates a renderer on the application's own device. Any number of renderers can share a device. The renderer
+  /// submits to `device.queue`, guarded by `device.with_queue`, and waits for its own submissions only, never for the
+  /// whole device.
   ///
-  /// Requires: instance and device were made as `vulkan_requirements` says; `block_bytes` as in VulkanOptions.
-  /// Errors:   InvalidArgument when a handle is null or there is no such queue family; Unsupported as above.
+  /// Requires: instance and device meet `vulkan_requirements`; `block_bytes` is at least 64 KiB.
+  /// Errors:   InvalidArgument if a handle is null or the queue family does not exist; Unsupported as for the other
+  ///           overload.
   [[nodiscard]] static Result<VulkanRenderer> create(const BorrowedVulkanDevice& device,
                                                      std::uint64_t block_bytes = kVulkanBlockBytes);
   VulkanRenderer(VulkanRenderer&&) noexcept;
@@ -70,53 +74,52 @@ class VulkanRenderer {
 
   [[nodiscard]] const VulkanDeviceInfo& device() const;
 
-  /// Has the device draw `scene` from now on, as it is now; nothing of it is needed afterwards but for levels of detail
-  /// (see above). Draws the instances that `filter` lets pass.
+  /// Uploads the current state of `scene`, which may be another scene each time. Draws the instances that `filter`
+  /// accepts. The scene is not needed afterwards, except as described under Detail. The change journals of the scene
+  /// and its grids determine the uploads.
   ///
-  /// What changed the journals of the scene and its grids tell; it may be another scene each time.
-  /// Cost:   the first time O(chunks); then O(chunks of edited grids), and uploads of the chunks that were edited.
-  /// Errors: as above, and Unsupported for grids that span more than 2^29 voxels; then the device holds nothing.
-  /// Memory: of a field 700 bytes for each 4^3 cells at its surface, beside its tree.
+  /// Cost:   O(chunks) the first time; then O(chunks of edited grids), plus uploads of the edited chunks.
+  /// Errors: as the class, and Unsupported for grids that span more than 2^29 voxels; then the device holds no scene.
+  /// Memory: a field takes 700 bytes per 4^3 cells at its surface, in addition to its tree.
   [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible,
                               Threads threads = {});
-  /// As CpuRenderer::use_light; also of the renderer's VulkanMeshRenderers.
+  /// Sets the light, as CpuRenderer::use_light; also for the VulkanMeshRenderers of this renderer.
   void use_light(const SceneLight* light);
-  /// Bytes that the last `update` sent to the device.
+  /// Returns the number of bytes that the last `update` sent to the device.
   [[nodiscard]] std::uint64_t uploaded_bytes() const;
 
-  /// One picture, as CpuRenderer::render; `threads` are for what detail needs.
+  /// Renders one image, as CpuRenderer::render; `threads` compute levels of detail.
   [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options = {}, Threads threads = {},
                                        const Progress& progress = {});
 
-  /// Draws into a picture that stays on the device: adds `options.samples` samples a pixel to those that it has, or
-  /// begins it anew, with Accumulation::Restart, if the size is another, or if what it shows was not drawn by this.
-  /// Sample after sample it becomes the picture that `render` takes with as many; after an error, Cancelled too, it has
-  /// none.
+  /// Draws into an image on the device: adds `options.samples` samples per pixel. Starts from scratch with
+  /// Accumulation::Restart, if the size changes, or if another function drew or wrote the image. The accumulated image
+  /// equals the result of `render` with as many samples. After an error, including Cancelled, the image has no samples.
   ///
-  /// Requires: unless it begins anew, camera, light and scene are those of its other samples; of the scene this is not
-  ///           checked.
-  /// Errors:   those of `render`, LimitExceeded for more than 4,096 samples, and InvalidArgument for a picture of
-  ///           another renderer; `options.depth` means nothing.
+  /// Requires: unless it starts from scratch, camera, light and scene are the same as for the existing samples; the
+  ///           scene is not checked.
+  /// Errors:   as `render`. LimitExceeded for more than 4,096 samples in total. InvalidArgument for an image of another
+  ///           renderer. `options.depth` has no effect.
   [[nodiscard]] Status draw(VulkanPicture& picture, const Camera& camera, const RenderOptions& options,
                             Accumulation accumulation, Threads threads = {}, const Progress& progress = {});
 
-  /// One picture by paths, as PathTracer::render, of the scene of the last `update`, which must still be there,
-  /// unedited, since faces that glow are found in it.
+  /// Path-traces one image, as PathTracer::render. Reads emissive faces from the scene of the last `update`, which must
+  /// still exist unedited.
   ///
-  /// Equal:  the same paths: they have the same random numbers, and part only where single precision takes one past
-  ///         another voxel. So a picture has the processor's light and the processor's noise, but for such paths.
-  /// Errors: those of PathTracer::render; those above.
-  /// Memory: VulkanPathPicture's.
+  /// Equal:  uses the same random numbers as PathTracer, so the image has the same light and the same noise. Paths
+  ///         differ only where single precision takes a ray past another voxel.
+  /// Errors: as PathTracer::render and as the class.
+  /// Memory: as VulkanPathPicture.
   [[nodiscard]] Result<PathPicture> render_paths(const Camera& camera, const PathOptions& options = {},
                                                  Threads threads = {}, const Progress& progress = {});
 
-  /// Adds `options.samples` samples a pixel to those of a picture by paths, or begins it anew, with
-  /// Accumulation::Restart, if the size is another, or after an error, Cancelled too.
+  /// Adds `options.samples` samples per pixel to a path-traced image. Starts from scratch with Accumulation::Restart,
+  /// if the size changes, or after an error, including Cancelled.
   ///
-  /// Requires: unless it begins anew, camera and options, but for the count of samples, are those of its other samples;
-  ///           so is the scene, of which this is not checked.
-  /// Errors:   those of `render_paths`; LimitExceeded for more than 65,536 samples, and InvalidArgument for a picture
-  ///           of another renderer.
+  /// Requires: unless it starts from scratch, camera, scene and options (except the sample count) are the same as for
+  ///           the existing samples; the scene is not checked.
+  /// Errors:   as `render_paths`. LimitExceeded for more than 65,536 samples in total. InvalidArgument for an image of
+  ///           another renderer.
   [[nodiscard]] Status draw_paths(VulkanPathPicture& picture, const Camera& camera, const PathOptions& options,
                                   Accumulation accumulation, const Progress& progress = {});
 
