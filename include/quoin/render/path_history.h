@@ -22,7 +22,7 @@ namespace quoin {
 /// the old image no longer correlates. Once the new image has as many samples as the best image before the edit, the
 /// history shows the new image alone. Until then the result is biased towards the old image: light that only few
 /// samples find, and that an edit removed, fades over the first samples instead of disappearing at once
-/// (docs/decisions/119).
+/// (docs/decisions/archive/119).
 ///
 ///   PathHistory history;
 ///   for (const int samples : {1, 4, 16, 64}) {

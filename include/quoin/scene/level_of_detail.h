@@ -44,7 +44,7 @@ struct DetailPolicy {
   double mid_radii = 10.0;    ///< ByRadius: Mid up to and including
   double voxel_pixels = 1.0;  ///< ByPixels: Mid once a voxel projects to less than this
   /// Mid: a grid is halved as long as its cells project to at most this. Tuned on a ship and a terrain: at 0.5 pictures
-  /// with 64 samples differ by up to 6.0 / 255, at 1 by up to 9 (docs/decisions/026).
+  /// with 64 samples differ by up to 6.0 / 255, at 1 by up to 9 (docs/decisions/archive/026).
   double cell_pixels = 0.4;
   int far_pixels = 128;  ///< ByPixels: Far once the grid's diameter projects to at most this; the snapshots' size
   /// A detail, or a level, is left only once the measure is beyond its threshold by this share. 0: no memory of the

@@ -24,7 +24,7 @@ namespace quoin::vox {
 /// What else is set, unless to what MagicaVoxel sets it when nobody does, and what cannot be read, is named in
 /// FileLook::not_drawn. Colours are sRGB; numbers out of range count as the nearest within.
 /// Source: none of MagicaVoxel's; names and usual values as its files have them, units as its pictures look. See
-///         docs/decisions/098.
+///         docs/decisions/archive/098.
 [[nodiscard]] std::optional<FileLook> look_of(const Document& document);
 
 }  // namespace quoin::vox

@@ -181,7 +181,7 @@ using MeshOwnCells = std::function<void(SmoothChunkMesh& out)>;
 /// Order:    the fast kernel's vertices and quads, then the vertices it lacks, the quads, the triangles.
 /// Requires: options.border is Shared.
 /// Source:   T. Ju, F. Losasso, S. Schaefer, J. Warren, "Dual Contouring of Hermite Data" (2002): polygons of the
-///           minimal edges of an octree; here of chunks of any levels. docs/decisions/020-smooth-levels-of-detail.md.
+///           minimal edges of an octree; here of chunks of any levels. docs/decisions/020-smooth-chunk-borders.md.
 void mesh_with_transitions(const DensityNeighbourhood& chunks, const SmoothOptions& options,
                            const MeshOwnCells& mesh_own_cells, SmoothChunkMesh& out);
 

@@ -39,7 +39,7 @@ int joined_face(std::uint32_t solid);
 ///           vertices on that face, one for each of its air corners, on the edge that joins the two cells: each has two
 ///           triangles then instead of four. Quads that run along such an edge become polygons, which come last.
 /// Order:    a cell's first sheet keeps the cell's place, the others come last.
-/// Proof:    docs/decisions/021-two-sheets.md.
+/// Proof:    docs/decisions/archive/021-two-sheets.md.
 void split_sheets(const DensityNeighbourhood& chunks, const SmoothOptions& options, std::size_t quad_indices,
                   SmoothChunkMesh& out);
 

@@ -75,7 +75,7 @@ TEST(SmoothSheets, AreAsManyAsTheSolidPartsOrTheAirPartsOfSimpleCells) {
   EXPECT_EQ(sheets_of(0xF6).count, 1) << "their complement: one piece of solid around a bridge of air";
 }
 
-// The proof in docs/decisions/021-two-sheets.md leans on this.
+// The proof in docs/decisions/archive/021-two-sheets.md leans on this.
 TEST(SmoothSheets, AtMostOneFaceHasAllItsCrossingsInOneSheet) {
   int cells_with_one = 0;
   for (std::uint32_t solid = 0; solid < 256; ++solid) {

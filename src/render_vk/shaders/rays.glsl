@@ -2,7 +2,7 @@
 // (`kHasGlass`).
 //
 // Compilers copy a function to each place that calls it, and a walk is long: each is called in one place of a shader,
-// in a loop over all that needs it. See docs/decisions/088.
+// in a loop over all that needs it. See docs/decisions/archive/088.
 
 uint rays_taken;
 

@@ -20,7 +20,7 @@ constexpr std::array<char, 4> kMagic = {'Q', 'C', 'B', '1'};
 constexpr std::size_t kMagicAt = 8;
 constexpr std::size_t kSectionsAt = 12;
 constexpr std::size_t kContentBytesAt = 40;
-// docs/decisions/102-chunks-on-disk.md
+// docs/decisions/archive/102-chunks-on-disk.md
 constexpr int kCompressionLevel = 1;
 // Buffers that one large chunk made are given back.
 constexpr std::size_t kKeptBytes = std::size_t{4} << 20;

@@ -47,7 +47,7 @@ struct Kernel {
 };
 
 /// Of fields. Files of their own hold these: in one with the others, compilers turn what both use into calls, and rays
-/// among voxels take a tenth more instructions (docs/decisions/052).
+/// among voxels take a tenth more instructions (docs/decisions/archive/052).
 struct FieldKernel {
   /// One ray in a field; null where it is to be walked otherwise, as are those that are unfinished. Whether alone: `t`
   /// means nothing.
