@@ -14,7 +14,7 @@
 
 namespace quoin {
 
-/// Where a picture is taken from. `right`, `up` and `forward` are unit and perpendicular; right-handed, so
+/// A camera in world space. `right`, `up` and `forward` are perpendicular unit vectors, right-handed:
 /// right = forward x up.
 struct Camera {
   enum class Projection : std::uint8_t { Perspective, Orthographic };
@@ -24,88 +24,90 @@ struct Camera {
   DVec3 up{0.0, 1.0, 0.0};
   DVec3 forward{0.0, 0.0, -1.0};
   Projection projection = Projection::Perspective;
-  double vertical_fov_radians = 1.0;  ///< perspective: more than 0 and less than pi
-  double view_height = 1.0;           ///< orthographic: world units from the picture's lower to its upper edge
+  double vertical_fov_radians = 1.0;  ///< perspective: in (0, pi)
+  double view_height = 1.0;           ///< orthographic: world units from the image's bottom edge to its top edge
 
   bool operator==(const Camera&) const = default;
 };
 
-/// A perspective camera at `position` that looks at `target`, upright (+Y up; where it looks straight up or down, the
-/// picture's top is towards -Z when looking down and +Z when looking up).
+/// Returns a perspective camera at `position` that looks at `target`. The camera is upright: +Y is up. When it looks
+/// straight down, the top of the image points towards -Z; when it looks straight up, towards +Z.
 ///
-/// Errors: InvalidArgument when a number is not finite, `position` equals `target`, or the field of view is not more
-///         than 0 and less than pi.
+/// Errors: InvalidArgument if a number is not finite, `position` equals `target`, or the field of view is outside (0,
+///         pi).
 [[nodiscard]] Result<Camera> look_at(DVec3 position, DVec3 target, double vertical_fov_radians);
 
-/// Likewise, one that looks along `direction`, of any length.
+/// Returns a perspective camera at `position` that looks along `direction`, which may have any length.
 ///
-/// Errors: InvalidArgument when a number is not finite, the direction is 0, or the field of view is as above.
+/// Errors: InvalidArgument if a number is not finite, the direction is 0, or the field of view is outside (0, pi).
 [[nodiscard]] Result<Camera> look_along(DVec3 position, DVec3 direction, double vertical_fov_radians);
 
-/// The view matrix: x to the right, y up, and -z forward, as glTF's cameras and
-/// glm::perspective(camera.vertical_fov_radians, aspect, near, far) expect.
+/// Returns the view matrix: x points right, y up and -z forward, as in glTF cameras and
+/// glm::perspective(camera.vertical_fov_radians, aspect, near, far).
 [[nodiscard]] glm::dmat4 camera_from_world(const Camera& camera);
 
-/// A point of a picture of `width` by `height` pixels.
+/// A point in an image of `width` by `height` pixels.
 struct PicturePoint {
-  double x = 0.0;  ///< pixels from the picture's upper left corner; a pixel's centre is at + 0.5
+  double x = 0.0;  ///< pixels from the image's upper left corner; pixel centres are at + 0.5
   double y = 0.0;
   int width = 1;
   int height = 1;
 };
 
-/// The ray of a point of the picture, in world space: from the camera for a perspective one, from the picture's plane
-/// for an orthographic one. `direction` is unit, so distances along it are world units.
+/// Returns the ray through a point of the image, in world space. It starts at a perspective camera's position, or in
+/// the image plane of an orthographic camera. `direction` is a unit vector, so distances along the ray are world units.
 /// Requires: width and height are positive.
 [[nodiscard]] Ray ray_through(const Camera& camera, const PicturePoint& point);
 
-/// Where a point of the world is seen in such a picture: the inverse of `ray_through`, for labels and marks; perhaps
-/// beside the picture. Nothing for what lies behind a perspective camera, beside it, or is not finite.
+/// Returns the image position of a world point: the inverse of `ray_through`, for labels and marks. The
+/// result may lie outside the image. Returns nullopt if the point is not finite, or is behind or level with a
+/// perspective camera.
 /// Requires: width and height are positive.
 [[nodiscard]] std::optional<PicturePoint> picture_point(const Camera& camera, DVec3 point_in_world, int width,
                                                         int height);
 
-/// The views that frame a whole scene by themselves. Front looks along -Z: what faces +Z is seen.
+/// Standard views that frame a whole scene. Front looks along -Z and shows faces that point towards +Z.
 enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };
 
-/// The view of that name ("front", "iso" ...).
+/// Returns the view with this name ("front", "iso", ...), or nullopt if the name is unknown.
 [[nodiscard]] std::optional<View> view_of_name(std::string_view name);
 
-/// Where a camera of that view looks: unit.
+/// Returns the unit direction in which a camera of this view looks.
 [[nodiscard]] DVec3 direction_of(View view);
-/// The same of a camera that stands so many degrees to the right of the front (90: towards +X) and above the horizon.
-/// View::Iso is 45 and 35.26.
+/// Returns the unit direction of a camera placed `azimuth_degrees` to the right of the front (90: towards +X) and
+/// `elevation_degrees` above the horizon. View::Iso is 45 and 35.26 degrees.
 [[nodiscard]] DVec3 direction_of(double azimuth_degrees, double elevation_degrees);
 
-/// A perspective camera that has the whole of `bounds` in the picture, filling it but for a margin.
+/// Returns a perspective camera that shows all of `bounds` and leaves a small margin.
 ///
-/// Requires: `bounds` is finite; an empty one counts as the unit cube at the origin. `aspect` (width / height) is
-///           finite and positive.
+/// Requires: `bounds` is finite; empty bounds count as the unit cube at the origin. `aspect` (width / height) is finite
+///           and positive.
 [[nodiscard]] Camera frame_view(const DBox& bounds, View view, double aspect);
 
-/// As `frame_view`, but for the voxels themselves: closer, since boxes have corners where often nothing is.
-/// Of the instances that `filter` lets pass.
+/// Returns a camera that frames the voxels of the instances that pass `filter`. It is closer than `frame_view`, because
+/// the corners of a bounding box are often empty.
 ///
 /// Requires: `aspect` (width / height) is finite and positive.
-/// Cost: O(instances * chunks of their grids), and the voxels of the few chunks that touch the picture's margin.
+/// Cost:     O(instances * chunks of their grids), plus the voxels of the few chunks that touch the image's margin.
 [[nodiscard]] Camera frame_scene(const Scene& scene, View view, double aspect,
                                  InstanceFilter filter = InstanceFilter::Visible);
 
-/// Cameras that have several scenes in their pictures, frames of a film or one scene from all sides, framed alike: as
-/// `frame_scene` frames one, so closely that none leaves the picture and the camera keeps its distance.
+/// Frames several scenes with one shared distance: the frames of a film, or views of one scene from all sides. Each
+/// camera is as close as `frame_scene` allows while every scene stays inside the image.
 ///
 ///   SceneFraming framing(direction_of(View::Iso), aspect, 36);
 ///   framing.add(scene);
-///   for (int i = 0; i < 36; ++i) render(scene, framing.camera(i));   // once round it
+///   for (int i = 0; i < 36; ++i) render(scene, framing.camera(i));   // one full turn
 class SceneFraming {
  public:
-  /// `turns`: into how many equal turns to the right, about the vertical through the middle of the first scene, a full
-  /// one is divided.
-  /// Requires: `forward` is unit; `aspect` (width / height) is finite and positive, and `turns` is positive.
+  /// Creates a framing with `turns` cameras. They are spaced equally around the vertical axis through the middle of the
+  /// first scene; each next camera is further to the right.
+  /// Requires: `forward` is unit; `aspect` (width / height) is finite and positive; `turns` is positive.
   SceneFraming(DVec3 forward, double aspect, int turns = 1);
-  /// Cost: that of frame_scene, for each of the turns.
+  /// Adds a scene to frame. Cost: `frame_scene` times `turns`.
   void add(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible);
-  /// Of all that was added. Nothing counts as the unit cube at the origin. Requires: 0 <= turn < turns.
+  /// Returns the camera of one turn, which frames all added scenes, or the unit cube at the origin if they are empty.
+  /// Requires: 0 <= turn < turns.
   [[nodiscard]] Camera camera(int turn = 0) const;
 
  private:

@@ -13,67 +13,67 @@
 
 namespace quoin {
 
-/// How an instance is drawn.
+/// Level of detail of one instance.
 enum class Detail : std::uint8_t {
   Near,  ///< every voxel
-  Mid,   ///< coarser cells, where none of them is larger than a pixel
+  Mid,   ///< coarser cells, none larger than a pixel
   Far,   ///< an impostor
 };
 
-/// The sphere around a grid's content: about the centre of the tight box of its voxels and its field's solid, through
-/// that box's corners.
+/// The bounding sphere of a grid's content. Its centre is the centre of the tight box around the voxels and the field's
+/// solid; the sphere passes through the corners of that box.
 struct ContentSphere {
   DVec3 centre{0.0};    ///< grid coordinates
   double radius = 0.0;  ///< voxels; 0 for an empty grid
 };
 
-/// Cost: O(chunks).
+/// Returns the bounding sphere of a grid's voxels. Cost: O(chunks).
 [[nodiscard]] ContentSphere content_sphere(const Grid& grid);
 [[nodiscard]] ContentSphere content_sphere(const SceneGrid& grid);
-/// Of what has these tight bounds.
+/// Returns the bounding sphere of content with these tight bounds.
 [[nodiscard]] ContentSphere content_sphere(const IBox& bounds);
 
-/// Which detail is chosen.
+/// Thresholds for choosing the level of detail.
 struct DetailPolicy {
   enum class Rule : std::uint8_t {
-    ByRadius,  ///< by the distance from the content's centre, in radii of the content
-    ByPixels,  ///< by what a voxel and the whole grid span in the picture
+    ByRadius,  ///< by distance from the content's centre, in content radii
+    ByPixels,  ///< by the projected size of a voxel and of the whole grid
   };
   Rule rule = Rule::ByPixels;
-  double near_radii = 1.0;    ///< ByRadius: Near up to and including
-  double mid_radii = 10.0;    ///< ByRadius: Mid up to and including
-  double voxel_pixels = 1.0;  ///< ByPixels: Mid once a voxel projects to less than this
-  /// Mid: a grid is halved as long as its cells project to at most this. Tuned on a ship and a terrain: at 0.5 pictures
-  /// with 64 samples differ by up to 6.0 / 255, at 1 by up to 9 (docs/decisions/archive/026).
+  double near_radii = 1.0;    ///< ByRadius: Near up to and including this distance
+  double mid_radii = 10.0;    ///< ByRadius: Mid up to and including this distance
+  double voxel_pixels = 1.0;  ///< ByPixels: Mid if a voxel projects to less than this
+  /// Mid: the grid is halved while its cells project to at most this many pixels. Tuned on a ship and a terrain with 64
+  ///      samples: images differ by up to 6.0 / 255 at 0.5, and by up to 9 / 255 at 1 (docs/decisions/archive/026).
   double cell_pixels = 0.4;
-  int far_pixels = 128;  ///< ByPixels: Far once the grid's diameter projects to at most this; the snapshots' size
-  /// A detail, or a level, is left only once the measure is beyond its threshold by this share. 0: no memory of the
-  /// last choice.
+  int far_pixels = 128;  ///< ByPixels: Far if the grid's diameter projects to at most this; also the impostor size
+  /// The detail or level changes only when the measure passes its threshold by this fraction. 0 disables hysteresis.
   double hysteresis = 0.1;
-  InstanceFilter instances = InstanceFilter::Visible;  ///< of which it is chosen
+  InstanceFilter instances = InstanceFilter::Visible;  ///< the instances to select from
 };
 
-/// What `ByRadius` decides, from the distance between camera and content centre, in the units of `radius`. R = 0: Near
-/// at distance 0, else Far; NaN is Far.
+/// Returns the detail that `ByRadius` chooses for a distance between camera and content centre, in the same units as
+/// `radius`. A radius of 0 gives Near at distance 0 and Far otherwise. NaN gives Far.
 [[nodiscard]] Detail detail_by_radius(double distance, double radius, const DetailPolicy& policy = {});
 
-/// What `ByPixels` decides on.
+/// The projected sizes that `ByPixels` compares.
 struct ScreenSize {
-  double voxel_pixels = 0.0;     ///< that one voxel spans at the content's nearest point
-  double diameter_pixels = 0.0;  ///< that the whole content spans at its centre's distance
+  double voxel_pixels = 0.0;     ///< size of one voxel at the content's nearest point
+  double diameter_pixels = 0.0;  ///< size of the whole content at its centre's distance
 };
-/// What `ByPixels` decides. Numbers that are not finite count as nothing to see: Far.
+/// Returns the detail that `ByPixels` chooses. Sizes that are not finite give Far.
 [[nodiscard]] Detail detail_by_pixels(const ScreenSize& size, const DetailPolicy& policy = {});
 
-/// One instance that may be in the picture.
+/// An instance that may be visible in the image.
 struct SelectedInstance {
   InstanceHandle instance;
   Detail detail = Detail::Near;
-  /// The level at which the grid is to be traced: cells of (2^level)^3 voxels, 0 to kMaxGridLevel. Near: 0.
-  /// Mid: by DetailPolicy::cell_pixels; ByRadius at least 1. Far: what stands in for the voxels in shadows and the
-  /// like.
+  /// The traced level of the grid: cells of (2^level)^3 voxels, 0 to kMaxGridLevel.
+  /// Near: 0.
+  /// Mid: chosen by DetailPolicy::cell_pixels; at least 1 with ByRadius.
+  /// Far: the level that replaces the voxels where no impostor is used, such as in shadows.
   int level = 0;
-  double distance = 0.0;  ///< from the camera to the content's centre, world units
+  double distance = 0.0;  ///< from the camera to the content's centre, in world units
 };
 
 /// The coarsest level at which grids are traced.
@@ -81,29 +81,29 @@ inline constexpr int kMaxGridLevel = 4;
 
 class DetailSelector;
 
-/// How a picture draws instances in levels of detail.
+/// Level-of-detail settings of a rendered image.
 struct DetailOptions {
-  /// Which detail each instance is drawn in; without, all are Near. Whether hidden instances are drawn is for the
-  /// renderer to say, not the policy.
+  /// Chooses each instance's detail. Without a policy, all instances are Near. The renderer, not the policy, decides if
+  /// hidden instances are drawn.
   std::optional<DetailPolicy> policy{};
-  /// Of the view that the picture is of: remembers what was chosen in the one before, so that models do not tremble
-  /// between two details. Null: a picture knows nothing of any other, and there is no hysteresis. Pictures that share
-  /// one are taken one after another, of one scene; it must outlive the call.
+  /// The selector of this view. It remembers the previous image's choices, so that models do not flicker between two
+  /// details. Null disables hysteresis. Images that share a selector must be rendered one after another, from one
+  /// scene. The selector must outlive the call.
   DetailSelector* selector = nullptr;
-  /// For how long a picture waits for impostors that are missing or older than their grid. Threads of the renderer's
-  /// own build them, whatever is drawn meanwhile; grids whose are not ready are traced, or shown as they were. Only
-  /// without a limit is a picture the same whenever it is taken; 0 is for frames. Their occlusion by rays is that of
-  /// nine rays of 6 voxels within the grid.
+  /// Maximum time to wait, in seconds, for impostors that are missing or older than their grid. The renderer's own
+  /// threads build them in the background. A grid whose impostor is not ready is traced, or shown with its old
+  /// impostor. Only an infinite wait gives reproducible images; use 0 for interactive frames. Impostors store ambient
+  /// occlusion from nine rays of 6 voxels within the grid.
   double impostor_seconds = std::numeric_limits<double>::infinity();
-  int impostor_edge = 128;  ///< texels a side of an impostor's finest snapshots, 16 to 1,024: ImpostorOptions::edge
-  /// Whether instances have colours that tell their detail instead of their own: Near green, Mid yellow to orange the
-  /// more often halved, Far blue.
+  int impostor_edge = 128;  ///< texels per side of an impostor's finest images, 16 to 1,024: ImpostorOptions::edge
+  /// Shows each instance in the colour of its detail: Near green; Mid yellow to orange as levels get coarser; Far
+  /// blue.
   bool colours = false;
 };
 
-/// Chooses what is drawn, and how, in one view (a window, a split screen's half, a mirror): remembers the last choice
-/// of each instance there (hysteresis), and each grid's content.
-/// Lifetime: the scene is only read within calls.
+/// Selects the instances to draw and their detail in one view (a window, half of a split screen, a mirror). It
+/// remembers each instance's last choice (hysteresis) and each grid's content sphere.
+/// Lifetime: the scene is only read during calls.
 class DetailSelector {
  public:
   DetailSelector();
@@ -111,15 +111,14 @@ class DetailSelector {
   DetailSelector& operator=(DetailSelector&&) noexcept;
   ~DetailSelector();
 
-  /// Replaces `out` by the instances of `policy.instances` whose content sphere meets the camera's frustum, in the
-  /// order of their handles. Empty grids and instances whose numbers are not finite or whose size is not positive are
-  /// left out.
+  /// Replaces `out` with the instances of `policy.instances` whose content sphere intersects the camera's frustum, in
+  /// handle order. Skips empty grids, and instances with a non-finite transform or a size that is not positive.
   ///
-  /// Sizes in pixels are those at the picture's centre; towards the edges of a wide angle things are stretched.
+  /// Projected sizes are those at the image centre; wide angles stretch objects towards the edges.
   ///
-  /// Requires: width and height are positive. What is not checked: `camera` is valid for rendering; it is always the
-  ///           same scene or its snapshots, edited between calls as you like.
-  /// Cost: O(instances), under 50 ns each; a grid's content is looked at again only when it was edited.
+  /// Requires: width and height are positive. Not checked: `camera` is valid for rendering, and every call passes the
+  ///           same scene or its snapshots. The scene may be edited between calls.
+  /// Cost:     O(instances), under 50 ns each; a grid's content is measured again only after an edit.
   void select(const Scene& scene, const Camera& camera, int width, int height, const DetailPolicy& policy,
               std::vector<SelectedInstance>& out);
 

@@ -19,48 +19,48 @@
 
 namespace quoin {
 
-/// A light without a body, at a point of the world. Voxels that emit light are lamps by themselves.
+/// A point or spot light without geometry. Voxels that emit light act as lamps without an entry here.
 ///
-/// Falls off with the square of the distance, times 1 - (distance / range)^4, as KHR_lights_punctual of glTF
-/// recommends; where it would add less than 1/4096 before its range is over, it ends there in the same way. A lamp
-/// whose numbers are not finite (but the range), or whose intensity is not positive, lights nothing.
+/// Intensity falls off with the squared distance, times 1 - (distance / range)^4, as glTF's KHR_lights_punctual
+/// recommends. A lamp also ends, with the same smooth cut-off, at the distance where it would add less than 1/4096. A
+/// lamp gives no light if its intensity is not positive or a number other than `range` is not finite.
 struct Lamp {
   enum class Kind : std::uint8_t {
-    Point,  ///< shines into all directions alike
-    Spot,   ///< into a cone around `direction`
+    Point,  ///< shines equally in all directions
+    Spot,   ///< shines in a cone around `direction`
   };
   std::string name{};
   Kind kind = Kind::Point;
   DVec3 position{0.0};              ///< world units
-  DVec3 direction{0.0, -1.0, 0.0};  ///< of a spot's middle; any length but 0
+  DVec3 direction{0.0, -1.0, 0.0};  ///< axis of a spot's cone; any non-zero length
   Vec3 colour{1.0F};                ///< linear
-  double intensity = 1.0;           ///< the light of a white surface that faces it 1 world unit away
+  double intensity = 1.0;           ///< light received by a white surface that faces the lamp at 1 world unit
   double range = std::numeric_limits<double>::infinity();  ///< world units
-  double inner_angle_radians = 0.0;                        ///< from a spot's middle, up to which it is at its brightest
-  double outer_angle_radians = 0.785398163;                ///< and from which on it is dark; up to pi
+  double inner_angle_radians = 0.0;                        ///< full brightness within this angle of the spot's axis
+  double outer_angle_radians = 0.785398163;                ///< dark beyond this angle of the spot's axis; up to pi
 
   bool operator==(const Lamp&) const = default;
 };
 
-/// A grid as a scene holds it: blocks, a field of densities, or both in one space, in which sample (i, j, k) of the
-/// field lies at the point (i, j, k), the least corner of voxel (i, j, k).
+/// A grid in a scene: voxels, a density field, or both in one space. Field sample (i, j, k) lies at the point (i, j,
+/// k), the minimum corner of voxel (i, j, k).
 struct SceneGrid {
   std::string name{};
   Grid grid{};  ///< the voxels
-  /// The point of the grid, in voxels, that an instance's position places and about which it turns.
+  /// The centre of rotation, in voxels; instances place it at Instance::position.
   DVec3 pivot{0.0};
-  /// The box that the file declares for it (an artist's canvas), in voxels; empty when none was declared. Voxels may
-  /// lie outside after edits; `declared_box` says how large the grid counts as.
+  /// The box that the file declares for the grid (an artist's canvas), in voxels; empty if there is none. Edits may
+  /// place voxels outside it; `declared_box` includes them.
   IBox canvas{};
-  /// The densities; its materials are types of the scene's registry. Pictures by rays see through transparent ones.
-  /// Where transparent and opaque ones meet inside the solid, the samples of both hold the distance to that border.
-  /// A field whose samples are voxels' centres (`field_from_grid`, `distance_field`) needs a grid of its own, whose
-  /// pivot is 0.5 less along each axis than that of the voxels.
+  /// The density field. Its materials are types in the scene's registry. Ray renderers see through transparent
+  /// materials. Where transparent and opaque material meet inside the solid, samples on both sides store the distance
+  /// to their shared border. A field whose samples are voxel centres (`field_from_grid`, `distance_field`) needs its
+  /// own SceneGrid, with a pivot that is 0.5 lower on each axis than the voxels' pivot.
   DensityGrid field = DensityGrid();
 
-  /// The smallest box of whole coordinates around the voxels and the field's solid; empty where there are none.
+  /// Returns the smallest integer box around the voxels and the field's solid; empty if there are none.
   [[nodiscard]] IBox bounds() const { return unite(grid.bounds(), field.bounds()); }
-  /// The canvas and the tight bounds together.
+  /// Returns the union of the canvas and the tight bounds.
   [[nodiscard]] IBox declared_box() const { return unite(canvas, bounds()); }
 };
 
@@ -71,138 +71,138 @@ struct SceneLayer;
 using GroupHandle = Handle<SceneGroup>;
 using LayerHandle = Handle<SceneLayer>;
 
-/// One placement of a grid in the world. Moving it touches no voxel and no mesh. One without a place (`has_place`) is
-/// left out of pictures, queries and bounds.
+/// One placement of a grid in the world. Moving an instance changes no voxels and no meshes. An instance with an
+/// invalid transform (see `has_place`) is left out of images, queries and bounds.
 struct Instance {
   std::string name{};
   GridHandle grid{};
-  DVec3 position{0.0};  ///< of the grid's pivot, in world units
-  /// World from grid. Of any length: what reads it makes it unit, and takes a zero one as no rotation.
+  DVec3 position{0.0};  ///< world position of the grid's pivot
+  /// World from grid. Any length: readers normalise it, and treat zero as no rotation.
   DQuat rotation{1.0, 0.0, 0.0, 0.0};
-  double voxel_size = 1.0;  ///< world units a voxel; positive
-  bool mirrored = false;    ///< the grid's x is negated (about the pivot) before the rotation
-  bool visible = true;      ///< its own switch; `is_shown` says whether its groups and layers show it too
-  GroupHandle group = {};   ///< that it belongs to; one that names nothing: it stands at the top
-  LayerHandle layer = {};   ///< that it lies on; one that names nothing: on none
-  /// Bits of a game's own meaning (terrain, ships, what the player owns), by which queries select: QueryFilter.
+  double voxel_size = 1.0;  ///< world units per voxel; positive
+  bool mirrored = false;    ///< negates the grid's x (about the pivot) before the rotation
+  bool visible = true;      ///< the instance's own flag; `is_shown` also checks its groups and layers
+  GroupHandle group = {};   ///< parent group; an invalid handle: the top level
+  LayerHandle layer = {};   ///< layer; an invalid handle: no layer
+  /// Category bits defined by the game (terrain, ships, player property) that queries select by: see QueryFilter.
   std::uint32_t categories = 1;
 };
 
 using InstanceHandle = Handle<Instance>;
 
-/// A node of a scene's hierarchy: instances and groups that belong together. Places of instances and groups are those
-/// of the world, so a group's place says only where its own frame lies: the point and the turn that tools handle it by.
-/// `move_group` moves a group with all that is below it.
+/// A node of the scene hierarchy, which contains instances and groups. All transforms are in world space, so a group's
+/// transform only defines its frame for editing tools. `move_group` moves a group with everything below it.
 struct SceneGroup {
   std::string name{};
-  GroupHandle parent = {};             ///< that it belongs to; one that names nothing: it stands at the top
-  LayerHandle layer = {};              ///< that it lies on, with all below it
-  DVec3 position{0.0};                 ///< of its frame, in world units
-  DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< world from group; as Instance::rotation
-  bool mirrored = false;               ///< as Instance::mirrored
-  bool visible = true;                 ///< false hides all below it
+  GroupHandle parent = {};             ///< parent group; an invalid handle: the top level
+  LayerHandle layer = {};              ///< layer of the group and everything below it
+  DVec3 position{0.0};                 ///< of the group's frame, in world units
+  DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< world from group; see Instance::rotation
+  bool mirrored = false;               ///< see Instance::mirrored
+  bool visible = true;                 ///< false hides everything below the group
 };
 
-/// Groups and instances that are shown and hidden together, wherever they stand in the hierarchy.
+/// A layer: groups and instances that are shown or hidden together, independent of the hierarchy.
 struct SceneLayer {
   std::string name{};
   bool visible = true;
 };
 
-/// Which instances a function looks at.
+/// Selects the instances that a function processes.
 enum class InstanceFilter : std::uint8_t {
-  Visible,  ///< those that `is_shown`
-  All,      ///< hidden ones too
+  Visible,  ///< only instances that pass `is_shown`
+  All,      ///< all instances, including hidden ones
 };
 
-/// What changed in a scene; in the order of the handles, each once. Those that were removed are among them: they name
-/// nothing.
+/// The changes in a scene, in handle order without duplicates. The lists include removed objects, whose handles are no
+/// longer valid.
 struct SceneChanges {
-  bool all = false;               ///< anything may have changed; the lists are empty
-  std::vector<GridHandle> grids;  ///< added, removed, edited, or with another name, pivot or canvas
-  /// Added, removed, or changed; and those below groups and on layers that were.
+  bool all = false;               ///< true if anything may have changed; the lists are then empty
+  std::vector<GridHandle> grids;  ///< added, removed or edited grids, and grids with a changed name, pivot or canvas
+  /// Added, removed or changed instances, and instances below a changed group or on a changed layer.
   std::vector<InstanceHandle> instances;
-  std::vector<GroupHandle> groups;  ///< added, removed, or changed
-  std::vector<LayerHandle> layers;  ///< likewise
+  std::vector<GroupHandle> groups;  ///< added, removed or changed groups
+  std::vector<LayerHandle> layers;  ///< added, removed or changed layers
 
   [[nodiscard]] bool empty() const {
     return !all && grids.empty() && instances.empty() && groups.empty() && layers.empty();
   }
 };
 
-/// Many grids, placed any number of times each, that share one registry.
+/// A set of grids with a shared type registry. Each grid may be placed any number of times.
 ///
-/// Axes:      right-handed, +Y up, one world unit a voxel unless an instance says otherwise.
-/// Addresses: a grid stays where it is until it is removed, also when the scene is moved: a reference to it may be
-///            kept.
-/// Threads:   any number may read at once, and take snapshots; a change needs the scene to itself, `edit` too. But
-///            grids to which references were taken before may be edited at once, each on one thread. A snapshot is a
-///            scene of its own.
-/// Moving:    a scene that was moved from may only be assigned to or destroyed.
+/// Axes:      right-handed, +Y up; one world unit per voxel unless an instance sets another size.
+/// Addresses: a grid keeps its address until it is removed, even when the scene is moved, so references stay valid.
+/// Threads:   any number of threads may read and take snapshots at once. Changes, including `edit`, need exclusive
+///            access. Exception: grids whose references were taken earlier may be edited in parallel, each by one
+///            thread. A snapshot is an independent scene.
+/// Moving:    a moved-from scene may only be assigned to or destroyed.
 class Scene {
  public:
   VoxelRegistry types;
-  /// Lights without a body; voxels that emit light are lamps by themselves. LightOptions::max_lamps says whether they
-  /// shine. Renderers take over what changed here with their next `update`.
+  /// Lights without geometry. Voxels that emit light act as lamps without an entry here. LightOptions::max_lamps is
+  /// the limit. Renderers apply changes to this list at their next `update`.
   std::vector<Lamp> lamps;
 
   Scene();
   Scene(Scene&&) noexcept;
   Scene& operator=(Scene&&) noexcept;
   ~Scene();
-  /// The scene as it is now; later changes of either do not reach the other. Cursors that read this one's changes read
-  /// on in the snapshot, and the other way round, until the snapshot is changed itself.
-  /// Cost: a pointer a grid and a copy of each instance, well below a microsecond each, whatever the grids hold.
+  /// Returns a copy of the scene as it is now; later changes to either do not affect the other. Change cursors of this
+  /// scene also work on the snapshot, and the reverse, until the snapshot is changed itself.
+  /// Cost: one pointer per grid and a copy of each instance; well below 1 microsecond each, at any grid size.
   [[nodiscard]] Scene snapshot() const;
 
-  /// Takes a grid, which the scene owns from then on. It shows once an instance places it.
+  /// Adds a grid, which the scene then owns. The grid is visible only where an instance places it.
   GridHandle add_grid(SceneGrid grid);
-  /// Places a grid. One whose `grid` names nothing is kept, and left out of all that looks at the scene.
+  /// Adds an instance. An instance with an invalid `grid` handle is stored but ignored by renderers and queries.
   InstanceHandle add_instance(Instance instance);
-  /// Removes the grid and every instance of it. Returns false when the handle names nothing, as all that remove.
+  /// Removes the grid and all its instances. Returns false if the handle is invalid, as do all remove functions.
   /// Cost: O(instances).
   bool remove_grid(GridHandle handle);
   bool remove_instance(InstanceHandle handle);
 
-  /// Adds a group or a layer, empty until instances name it.
+  /// Adds a group or a layer. It is empty until instances refer to it.
   GroupHandle add_group(SceneGroup group);
   LayerHandle add_layer(SceneLayer layer);
-  /// Removes the group; what belonged to it belongs to its parent then. Cost: O(instances and groups).
+  /// Removes the group; its children move to its parent group. Cost: O(instances and groups).
   bool remove_group(GroupHandle handle);
-  /// Removes the layer; what lay on it lies on none then. Cost: O(instances and groups).
+  /// Removes the layer; its members then have no layer. Cost: O(instances and groups).
   bool remove_layer(LayerHandle handle);
 
   [[nodiscard]] const SlotMap<SceneGrid>& grids() const { return grids_; }
   [[nodiscard]] const SlotMap<Instance>& instances() const { return instances_; }
   [[nodiscard]] const SlotMap<SceneGroup>& groups() const { return groups_; }
   [[nodiscard]] const SlotMap<SceneLayer>& layers() const { return layers_; }
-  /// A grid, to be edited, now or later: the scene learns of every edit of its voxels and its field. Name, pivot and
-  /// canvas are to be changed before the next `changes_since`, since this call is what records the change.
-  /// Requires: the handle names a grid. Lifetime: until it is removed, also when the scene is moved.
+  /// Returns a grid for editing, now or later. The scene detects every later edit of its voxels and field. This call
+  /// itself records changes of name, pivot and canvas, so make those before the next `changes_since`.
+  /// Requires: the handle is valid. Lifetime: until the grid is removed, even when the scene is moved.
   [[nodiscard]] SceneGrid& edit(GridHandle handle);
-  /// An instance, to be changed before the next `changes_since`: this call is what records it.
-  /// Requires: the handle names an instance. Lifetime: as that of a grid.
+  /// Returns an instance for editing and records the change. Change it before the next `changes_since`.
+  /// Requires: the handle is valid. Lifetime: until the instance is removed, even when the scene is moved.
   [[nodiscard]] Instance& edit(InstanceHandle handle);
-  /// A group or a layer, likewise. Groups that go round in a circle by their parents count as standing at the top.
-  /// Requires: the handle names one. Lifetime: as that of a grid.
+  /// Returns a group or a layer for editing and records the change. Change it before the next `changes_since`. Groups
+  /// whose parents form a cycle count as top-level groups.
+  /// Requires: the handle is valid. Lifetime: until it is removed, even when the scene is moved.
   [[nodiscard]] SceneGroup& edit(GroupHandle handle);
   [[nodiscard]] SceneLayer& edit(LayerHandle handle);
 
-  /// What changed since the cursor's last time; moves the cursor to the present. Which of a grid's chunks changed its
-  /// own `changes_since` tells, which types those of `types`.
-  /// Cost: O(grids and instances that changed), whatever the size of the scene; where a group or a layer changed, O(all
-  /// instances). See ChangeCursor.
+  /// Returns the changes since the cursor's last call and advances the cursor. For changed chunks, call the grid's own
+  /// `changes_since`; for changed types, that of `types`.
+  /// Cost: O(changed grids and instances), at any scene size; O(all instances) after a change of a group or a layer.
+  ///       See ChangeCursor.
   [[nodiscard]] SceneChanges changes_since(ChangeCursor& cursor) const;
-  /// Whether that would tell of anything; of `types` they tell themselves. Cost: as `changes_since`.
+  /// Returns true if anything has changed since the cursor. Ask `types` for changes of types. Cost: as `changes_since`.
   [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const;
-  /// A cursor at the present: it will be told what changes from now on.
+  /// Returns a cursor that reports all changes from now on.
   [[nodiscard]] ChangeCursor cursor() const;
 
-  /// Non-air voxels of all grids, without their fields; a grid that is placed several times counts once.
+  /// Returns the number of non-air voxels in all grids, without fields. A grid that is placed several times counts
+  /// once.
   [[nodiscard]] std::int64_t voxel_count() const;
 
-  /// The box around the tight bounds (SceneGrid::bounds) of every grid that an instance of `filter` places, in world
-  /// units; empty when nothing is placed.
+  /// Returns the world-space box around the tight bounds (SceneGrid::bounds) of every grid placed by an instance that
+  /// passes `filter`; empty if there is none.
   [[nodiscard]] DBox bounds(InstanceFilter filter = InstanceFilter::Visible) const;
 
  private:
@@ -216,56 +216,56 @@ class Scene {
   std::unique_ptr<Book> book_;
 };
 
-/// Whether an instance, and all that it belongs to, is visible: itself, its layer, its groups, and their layers.
-/// Cost: O(groups above it).
+/// Returns true if an instance, its layer, its parent groups and their layers are all visible.
+/// Cost: O(parent groups).
 [[nodiscard]] bool is_shown(const Scene& scene, const Instance& instance);
-/// The same of a group.
+/// Returns true if a group, its layer, its parent groups and their layers are all visible.
 [[nodiscard]] bool is_shown(const Scene& scene, const SceneGroup& group);
 
-/// Whether an instance is among those of a filter.
+/// Returns true if the filter accepts an instance.
 [[nodiscard]] inline bool passes(InstanceFilter filter, const Scene& scene, const Instance& instance) {
   return filter == InstanceFilter::All || is_shown(scene, instance);
 }
 
-/// The group that a group belongs to; one that names nothing for those at the top, whose parent is not there, or that
-/// are part of a circle. Cost: O(groups above it).
+/// Returns a group's parent. The handle is invalid for top-level groups, for groups with a missing parent, and for
+/// groups that are part of a cycle. Cost: O(parent groups).
 [[nodiscard]] GroupHandle parent_of(const Scene& scene, GroupHandle group);
 
-/// All groups, each after the one that it belongs to, else in the order of their handles.
+/// Returns all groups, parents before children, otherwise in handle order.
 /// Cost: O(groups * depth).
 [[nodiscard]] std::vector<GroupHandle> groups_from_top(const Scene& scene);
 
-/// Gives a group another place, and moves what is below it with it.
+/// Moves a group to a new position and rotation, together with everything below it.
 ///
-/// Requires: the handle names a group; its rotation and the new one are finite and not zero.
-/// Cost: O(instances and groups).
+/// Requires: the handle is valid; the group's old and new rotation are finite and not zero.
+/// Cost:     O(instances and groups).
 void move_group(Scene& scene, GroupHandle group, DVec3 position, const DQuat& rotation);
 
-/// Whether an instance has a place: all its numbers are finite, and its voxels have a positive size.
+/// Returns true if an instance has a valid transform: all numbers are finite and the voxel size is positive.
 [[nodiscard]] bool has_place(const Instance& instance);
 
-/// Whether an instance is to be drawn: its grid exists, and `filter` lets it pass; whatever its numbers are.
+/// Returns true if an instance's grid exists and `filter` accepts the instance. Does not check the transform.
 [[nodiscard]] bool is_drawn(const Scene& scene, const Instance& instance, InstanceFilter filter);
 
-/// A point of the instance's grid (voxels) in the world.
+/// Transforms a point from the instance's grid (voxels) to the world.
 [[nodiscard]] DVec3 world_from_grid(const Instance& instance, const SceneGrid& grid, DVec3 point_in_grid);
-/// The same for all points, as a matrix; a mirrored instance's has a negative determinant, so its triangles turn their
-/// other side. For a shader subtract the camera's position from the last column in double first: far from the origin
-/// floats cannot tell neighbouring voxels apart.
+/// Returns the matrix that transforms points from the instance's grid (voxels) to the world. The determinant is
+/// negative for a mirrored instance, which flips triangle winding. For a shader, first subtract the camera's position
+/// from the last column in double: far from the origin, floats cannot separate neighbouring voxels.
 [[nodiscard]] glm::dmat4 world_from_grid(const Instance& instance, const SceneGrid& grid);
-/// A point of the world in the instance's grid (voxels): the inverse of `world_from_grid`, to the rounding of the
-/// point's own doubles. NaN in every component where the instance has no place (`has_place`).
+/// Transforms a point from the world to the instance's grid (voxels): the inverse of `world_from_grid`, to rounding.
+/// Returns NaN in every component if the instance has no valid transform (`has_place`).
 [[nodiscard]] DVec3 grid_from_world(const Instance& instance, const SceneGrid& grid, DVec3 point_in_world);
-/// A displacement in the instance's grid (voxels) as one in the world (world units): turned, mirrored and scaled, not
-/// moved; and its inverse, NaN where the instance has no place.
+/// Transforms a displacement between the instance's grid (voxels) and the world (world units). Rotation, mirroring and
+/// scale apply; translation does not. grid_from_world_direction returns NaN if the instance has no valid transform.
 [[nodiscard]] DVec3 world_from_grid_direction(const Instance& instance, DVec3 direction_in_grid);
 [[nodiscard]] DVec3 grid_from_world_direction(const Instance& instance, DVec3 direction_in_world);
-/// Where a point that is fixed to an instance goes when the instance goes from one placement to another: so what stands
-/// on a lift or a turning ship is carried, frame by frame. The point itself where either is no place.
+/// Returns the new world position of a point fixed to an instance that moves from `before` to `after`. Call it each
+/// frame to carry bodies on a lift or a turning ship. Returns the point unchanged if either transform is invalid.
 [[nodiscard]] DVec3 carried_point(const Instance& before, const Instance& after, DVec3 point_in_world);
-/// The voxel that fills the place of a point of the world, whether it is air or not; of a point between two voxels the
-/// greater one on each axis. Nothing where the instance has no place, the point is not finite, or the voxel's
-/// coordinates are no int32.
+/// Returns the voxel (air included) that contains a world point. A point on a border belongs to the voxel with the
+/// greater coordinate on that axis. Returns nullopt if the instance has no valid transform, the point is not finite, or
+/// the voxel's coordinates do not fit in int32.
 [[nodiscard]] std::optional<IVec3> voxel_from_world(const Instance& instance, const SceneGrid& grid,
                                                     DVec3 point_in_world);
 
