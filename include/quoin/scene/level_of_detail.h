@@ -46,7 +46,8 @@ struct DetailPolicy {
   /// Mid: the grid is halved while its cells project to at most this many pixels. Tuned on a ship and a terrain with 64
   ///      samples: images differ by up to 6.0 / 255 at 0.5, and by up to 9 / 255 at 1 (docs/decisions/archive/026).
   double cell_pixels = 0.4;
-  int far_pixels = 128;  ///< ByPixels: Far if the grid's diameter projects to at most this; also the impostor size
+  /// ByPixels: Far if the grid's diameter projects to at most this; also the impostor image size.
+  int far_pixels = 128;
   /// The detail or level changes only when the measure passes its threshold by this fraction. 0 disables hysteresis.
   double hysteresis = 0.1;
   InstanceFilter instances = InstanceFilter::Visible;  ///< the instances to select from

@@ -64,8 +64,8 @@ struct Fog {
 /// Lighting and lens settings of a path-traced image. See PathTracer.
 struct Look {
   DVec3 sun{-0.48, 0.72, 0.5};  ///< from the scene towards the sun; any non-zero length
-  double sun_angle_radians =
-      0.0093;                   ///< angular diameter of the disc, at most 3; 0: a point, which the camera does not see
+  /// Angular diameter of the disc, at most 3; 0: a point, which the camera does not see.
+  double sun_angle_radians = 0.0093;
   double sun_brightness = 1.0;  ///< 1: a white surface facing the sun shows 1, without air; 0: no sun
   Vec3 sun_colour{1.0F};        ///< linear
   bool sun_is_seen = true;      ///< shows the disc to the camera and in mirrors and glass

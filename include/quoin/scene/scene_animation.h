@@ -10,8 +10,8 @@
 
 namespace quoin {
 
-/// A scene that changes from frame to frame, as one whose instances come, go and move: for animations in files of
-/// meshes. Each frame is shown until the next one; nothing is interpolated.
+/// Merges the frames of a changing scene into one scene whose instances appear, disappear and move. Use it to write
+/// animations into mesh files. Each frame lasts until the next; nothing is interpolated.
 ///
 ///   quoin::SceneAnimation animation;
 ///   for (const quoin::Scene& frame : frames) {
@@ -19,33 +19,35 @@ namespace quoin {
 ///   }
 ///   auto meshes = quoin::mesh_scene(animation.scene());
 ///   if (!meshes) return meshes.error();
-///   animation.animate(*meshes, 12.0);               // frames a second
+///   animation.animate(*meshes, 12.0);               // frames per second
 ///   return quoin::write_mesh(*meshes, "walk.glb");
 class SceneAnimation {
  public:
-  /// Adds the next frame, of what `filter` counts as drawn. Instances are told apart by their place in the order of
-  /// their handles; of the grids, types, groups and layers those of the first frame are taken, for what is in the same
-  /// slots in every frame: the frames of a .vox file, or snapshots of one scene whose instances alone change.
-  /// Cost: O(instances), times the grids that each has shown; memory for what changes.
-  /// Errors: InvalidArgument where the number of instances is another than before, or grids are in other slots.
+  /// Adds the next frame: the instances that pass `filter`. Instances are matched between frames by their index in
+  /// handle order. Grids, types, groups and layers are taken from the first frame, so every frame must have the same
+  /// grids in the same slots. Frames of a .vox file do, and so do snapshots of one scene in which only instances
+  /// change.
+  /// Cost:   O(instances), times the grids that each instance has shown; memory grows with the number of changes.
+  /// Errors: InvalidArgument if the number of instances differs from earlier frames or grids are in other slots.
   [[nodiscard]] Status add(const Scene& frame, InstanceFilter filter = InstanceFilter::Visible);
 
-  /// All that any frame shows: an instance that shows several grids one after the other is as many.
+  /// Returns a scene with everything that any frame shows. An instance that shows several grids in turn becomes several
+  /// instances.
   [[nodiscard]] const Scene& scene() const { return scene_; }
   [[nodiscard]] std::size_t frame_count() const { return frames_; }
 
-  /// Gives the placements their tracks, and where they stand in the first frame. Requires: `meshes` are those of
-  /// `scene()`, each instance by itself; `frames_per_second` is positive.
+  /// Sets the animation tracks of the placements and places them as in the first frame.
+  /// Requires: `meshes` was made from `scene()` without uniting instances; `frames_per_second` is positive.
   void animate(SceneMeshes& meshes, double frames_per_second) const;
 
  private:
-  /// What an instance is at one time: a part of its own in a file, since a node shows one mesh.
+  /// The appearance of an instance in some frames. Each is a separate part in the file, because a node shows one mesh.
   struct Look {
     GridHandle grid;  ///< in scene_
     bool mirrored = false;
     bool operator==(const Look&) const = default;
   };
-  /// From a frame on; nothing: it is not shown.
+  /// A change at a frame; without a value the instance is hidden from there on.
   struct Change {
     std::size_t frame = 0;
     std::optional<Similarity> at;
@@ -54,7 +56,7 @@ class SceneAnimation {
     Look look;
     InstanceHandle instance;  ///< in scene_
     std::vector<Change> changes;
-    std::size_t frames_until_last = 0;  ///< how many there were when it was last shown
+    std::size_t frames_until_last = 0;  ///< the number of frames at the end of its last appearance
   };
 
   [[nodiscard]] bool has_the_same_grids(const Scene& frame) const;
@@ -64,7 +66,7 @@ class SceneAnimation {
 
   Scene scene_;
   std::size_t frames_ = 0;
-  std::vector<std::vector<Shown>> instances_;  ///< by their place in the order
+  std::vector<std::vector<Shown>> instances_;  ///< by index in handle order
 };
 
 }  // namespace quoin

@@ -8,16 +8,15 @@
 
 namespace quoin {
 
-/// Keeps count of the faces of a scene's voxels while it is edited, as a mesher would find them.
+/// Counts the faces of a scene's voxels, as a mesher would find them, and keeps the counts up to date during edits.
 ///
-/// Counted are the grids that drawn instances place, each once, however often it is placed: what `mesh_scene` meshes.
-/// Follows the journals of scene, types and grids: an edit of a few voxels costs the chunks around it, whatever the
-/// scene's size.
+/// It counts each grid that a drawn instance places, once per grid: the same grids that `mesh_scene` meshes. It reads
+/// the change journals of scene, types and grids, so a small edit costs only the chunks around it, at any scene size.
 ///
-/// Lifetime: the scene is only read within calls.
+/// Lifetime: the scene is only read during calls.
 ///
 ///   SceneFaces faces;
-///   faces.update(scene);                      // all of it; later what changed since
+///   faces.update(scene);                      // counts all; later calls count only changes
 ///   print(faces.counts().visible, "visible of", faces.counts().total);
 class SceneFaces {
  public:
@@ -26,13 +25,13 @@ class SceneFaces {
   SceneFaces& operator=(SceneFaces&&) noexcept;
   ~SceneFaces();
 
-  /// Counts what changed since the last update: the chunks of `chunks_to_mesh`, and what was placed, hidden or removed.
-  /// All of it the first time, when this is another scene, and where the visibility of types in use changed.
-  /// Cost: some tens of microseconds a chunk, on all threads where there are many.
-  /// Threads: reads the scene, which must not be edited meanwhile.
+  /// Counts the changes since the last update: the chunks of `chunks_to_mesh`, and grids that were placed, hidden or
+  /// removed. Counts the whole scene the first time, for another scene, and when the visibility of a used type changed.
+  /// Cost:    some tens of microseconds per chunk; uses several threads for many chunks.
+  /// Threads: reads the scene, which must not be edited during the call.
   const FaceCounts& update(const Scene& scene, Threads threads = {});
 
-  /// As of the last update.
+  /// Returns the counts of the last update.
   [[nodiscard]] const FaceCounts& counts() const;
 
  private:
@@ -40,7 +39,7 @@ class SceneFaces {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The faces of a scene as it is now. Cost: as the first update of SceneFaces.
+/// Counts the faces of a scene once. Cost: as the first SceneFaces::update.
 [[nodiscard]] FaceCounts count_faces(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible,
                                      Threads threads = {});
 

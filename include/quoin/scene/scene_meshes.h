@@ -25,174 +25,176 @@
 
 namespace quoin {
 
-/// A similarity transform: scale, rotation, translation, and perhaps a reflection.
+/// A similarity transform: uniform scale, rotation, translation, and an optional reflection.
 struct Similarity {
   DVec3 position{0.0};
-  DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< of any length but 0
+  DQuat rotation{1.0, 0.0, 0.0, 0.0};  ///< any non-zero length
   double scale = 1.0;                  ///< positive
   bool mirrored = false;               ///< x is negated before the rotation
   bool operator==(const Similarity&) const = default;
 };
 
-/// From a time on, whether a placement is shown, and where.
+/// An animation key: sets the visibility and transform of a placement from a time on.
 struct MeshKey {
   double seconds = 0.0;
   bool visible = true;
   Similarity world_from_part{};
 };
 
-/// A group of placements and other groups: SceneGroup, as files of meshes have it.
+/// A group of placements and other groups in a mesh file; corresponds to SceneGroup.
 struct MeshGroup {
   std::string name{};
-  std::optional<std::size_t> parent{};  ///< index into SceneMeshes::groups, of one before it
-  std::string layer{};                  ///< the name of its layer
-  Similarity world_from_group{};        ///< without a scale
+  std::optional<std::size_t> parent{};  ///< index into SceneMeshes::groups of an earlier group
+  std::string layer{};                  ///< layer name
+  Similarity world_from_group{};        ///< has no scale
 };
 
-/// One place of a part in the world.
+/// One placement of a part in the world.
 struct MeshPlacement {
   std::size_t part = 0;  ///< index into SceneMeshes::parts
-  std::string name{};    ///< empty: that of the part
-  /// Takes points of the part, relative to its pivot, to the world. A matrix must be affine; a negative determinant
+  std::string name{};    ///< empty: the part's name
+  /// Transforms points relative to the part's pivot to the world. A matrix must be affine; a negative determinant
   /// mirrors.
   std::variant<Similarity, glm::dmat4> world_from_part{Similarity{}};
-  std::optional<std::size_t> group{};        ///< index into SceneMeshes::groups; nothing at the top
-  std::string layer{};                       ///< the name of its layer
-  std::optional<InstanceHandle> instance{};  ///< of the scene that was meshed
-  /// What it does while time goes by (SceneAnimation), by ascending seconds from 0; none: it stands. Each mirrors as
-  /// `world_from_part` does.
+  std::optional<std::size_t> group{};        ///< index into SceneMeshes::groups; nullopt: top level
+  std::string layer{};                       ///< layer name
+  std::optional<InstanceHandle> instance{};  ///< the source instance in the meshed scene
+  /// Animation keys (SceneAnimation) with ascending times in seconds, from 0; empty: not animated. Each key is mirrored
+  /// exactly if `world_from_part` is.
   std::vector<MeshKey> keys{};
 
   [[nodiscard]] glm::dmat4 matrix() const;
 };
 
-/// How far it is through a part's bodies of a transparent type, straight in from their faces: the median, by area.
+/// The area-weighted median thickness of a transparent type in a part, measured from its faces along their normals.
 struct GlassThickness {
   VoxelType type = kAir;
   float voxels = 1.0F;
 };
 
-/// A body that is placed as one, any number of times.
+/// A mesh that may be placed any number of times.
 struct MeshPart {
   std::string name;
-  std::vector<MeshView> surfaces{};  ///< all of one kind; may be none
-  DVec3 pivot{0.0};                  ///< the point that placements take to their translation
-  /// Of the arrays of `surfaces`. Lifetime: they live as long as it does; where it is null they must outlive the part.
+  std::vector<MeshView> surfaces{};  ///< all of one kind; may be empty
+  DVec3 pivot{0.0};                  ///< the point that placements move to their translation
+  /// Owner of the arrays in `surfaces`, which live as long as it does. If null, the arrays must outlive the part.
   std::shared_ptr<const void> owner{};
-  /// By type, of blocks: files have one alpha a type, for bodies of that thickness. For types without, and for smooth
-  /// surfaces, they are taken from the volume where the surface is closed, and else as one voxel thick.
+  /// Thickness per type, for blocks: files store one alpha per type, for bodies of this thickness. For smooth surfaces
+  /// and for types without an entry, writers compute the thickness from the volume of a closed surface, or else assume
+  /// one voxel.
   std::vector<GlassThickness> thickness{};
 };
 
-/// A part that owns its mesh. Surfaces without a triangle are left out.
+/// Returns a part that owns its mesh. Drops surfaces without triangles.
 [[nodiscard]] MeshPart mesh_part(std::string name, BlockyMesh mesh, const DVec3& pivot = DVec3(0.0));
 [[nodiscard]] MeshPart mesh_part(std::string name, SmoothMesh mesh, const DVec3& pivot = DVec3(0.0));
-/// A surface from an array, or of one label (`surface_of_label`), all of one colour. Where `surface_from_array` was
-/// given spacing and origin, its places are those of the world.
+/// Returns a part of one colour from an array's surface or from one label's surface (`surface_of_label`). If
+/// `surface_from_array` got a spacing and origin, the positions are in world space.
 ///
 ///   meshes.parts.push_back(mesh_part("bone", std::move(*surface), {230, 220, 200}));
 ///   meshes.placements.push_back({.part = 0});
 [[nodiscard]] MeshPart mesh_part(std::string name, ArraySurface surface, Rgba8 colour, const DVec3& pivot = DVec3(0.0));
 
-/// What was counted while meshing; a part that is placed several times counts once.
+/// Meshing statistics; a part that is placed several times counts once.
 struct MeshStats {
   std::int64_t faces_visible = 0;  ///< of blocks
   std::int64_t faces_total = 0;    ///< of blocks
   std::int64_t quads = 0;          ///< of blocks
   std::int64_t triangles = 0;
   std::int64_t vertices = 0;
-  std::int64_t solid_samples = 0;    ///< of a volume
-  float simplify_error = 0.0F;       ///< the largest that was reached, in voxels or samples
-  std::int64_t simplified_away = 0;  ///< triangles that simplifying removed
+  std::int64_t solid_samples = 0;    ///< for a volume
+  float simplify_error = 0.0F;       ///< largest simplification error, in voxels or samples
+  std::int64_t simplified_away = 0;  ///< number of triangles removed by simplification
 };
 
-/// A camera of a file of meshes.
+/// A camera in a mesh file.
 struct MeshCamera {
   std::string name{};
   Camera camera{};
 };
 
-/// Meshes and where they stand: what files of meshes are written from, whoever made them.
+/// Meshes and their placements: the input of all mesh file writers.
 struct SceneMeshes {
   std::vector<MeshPart> parts;
   std::vector<MeshPlacement> placements;
-  std::vector<MeshGroup> groups{};    ///< parents first; of scenes those with a placement below
-  VoxelRegistry types;                ///< the materials of blocks and of smooth surfaces with MeshView::types
-  double seconds = 0.0;               ///< how long its placements' keys take; 0 without any
-  Image atlas{};                      ///< what MeshView::atlas points into, colours times occlusion; perhaps empty
-  std::vector<Lamp> lamps{};          ///< to be written too, where the format has lamps; mesh_scene leaves it empty
-  std::vector<MeshCamera> cameras{};  ///< to be written too, where the format has cameras
+  std::vector<MeshGroup> groups{};  ///< parents first; from a scene, only groups with a placement below them
+  VoxelRegistry types;              ///< the materials of blocks and of smooth surfaces with MeshView::types
+  double seconds = 0.0;             ///< duration of the animation; 0 without keys
+  Image atlas{};                    ///< the texture that MeshView::atlas indexes: colours times occlusion; may be empty
+  std::vector<Lamp> lamps{};        ///< written if the format has lamps; mesh_scene leaves it empty
+  std::vector<MeshCamera> cameras{};  ///< written if the format has cameras
   MeshStats stats;
 };
 
 struct BlockySceneOptions {
   BlockyMeshOptions mesh{};
-  InstanceFilter instances = InstanceFilter::Visible;  ///< that count as drawn
-  /// Whether the colours and occlusion of opaque blocks that emit nothing go into a texture, SceneMeshes::atlas. Faces
-  /// then merge across their occlusion, which leaves about a third fewer triangles. A linear filter shades each voxel's
-  /// face between its four corners as a saddle, where two triangles have an edge.
+  InstanceFilter instances = InstanceFilter::Visible;  ///< the instances to mesh
+  /// Stores colours and occlusion of opaque, non-emissive blocks in a texture, SceneMeshes::atlas. Faces then merge
+  /// across occlusion changes, which saves about a third of the triangles. With linear filtering, each voxel face is
+  /// shaded bilinearly between its four corners, without a visible diagonal edge.
   bool atlas = false;
-  /// As BlockyMeshOptions::cut, of each grid; instead of that of `mesh`.
+  /// BlockyMeshOptions::cut for each grid; replaces the one in `mesh`.
   std::function<void(GridHandle grid, IVec3 chunk, QuadBuffer& quads)> cut{};
-  /// If given, makes the surfaces of a grid instead of build_blocky_mesh; its name is not read, and its pivot is
-  /// added to that of the grid. Adds their numbers to `stats`: for grids that are too large for memory (mesh_world).
-  /// Not for an atlas.
+  /// If set, makes the surfaces of a grid instead of build_blocky_mesh, and adds to `stats`. For grids that do not fit
+  /// in memory (mesh_world). The name is ignored and the pivot is added to the grid's pivot. Not available with
+  /// `atlas`.
   std::function<Result<MeshPart>(GridHandle grid, MeshStats& stats)> part_of{};
 };
 
-/// Meshes every grid that a drawn instance places, once, as build_blocky_mesh does. Parts are in the order of the
-/// grids' handles, a placement per drawn instance in that of theirs, under the groups of the scene. After
-/// these come the surfaces of the grids' fields, as build_smooth_mesh makes them, with placements of their own.
+/// Meshes each grid that a drawn instance places, once per grid, with build_blocky_mesh. Parts are in the order of the
+/// grid handles. There is one placement per drawn instance, in handle order, under the groups of the scene. The
+/// surfaces of the grids' fields (build_smooth_mesh) follow, with their own placements.
 ///
-/// Far:    vertices are floats: of grids beyond 2^16 voxels mesh near_grids(scene).
+/// Far:    vertices are floats; for grids beyond 2^16 voxels, mesh near_grids(scene).
 /// Order:  the same bytes at any thread count.
-/// Errors: those of build_blocky_mesh; InvalidArgument when a drawn instance's transform is not finite or its voxel
-///         size not positive, and for an atlas of faces that are not merged, cut, watertight or without occlusion;
-///         LimitExceeded when an atlas of 16,384 texels a side does not hold them, or
-///         voxels of it lie beyond 2^24; Cancelled when `progress` says so.
+/// Errors: those of build_blocky_mesh; InvalidArgument if a drawn instance's transform is not finite or its voxel size
+///         is not positive; InvalidArgument for `atlas` with faces that are not merged, cut, watertight or without
+///         occlusion; LimitExceeded if the faces do not fit in an atlas of 16,384 x 16,384 texels, or atlas voxels lie
+///         beyond 2^24; Cancelled if `progress` returns false.
 [[nodiscard]] Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
 
-/// How voxels become smooth surfaces unless told otherwise: colours as sharp as the voxels', thin things kept.
+/// Returns the default options for smooth surfaces around voxels: colours as sharp as the voxels, thin features kept.
 [[nodiscard]] SmoothMeshOptions smooth_voxels();
 
 struct SmoothSceneOptions {
-  /// Of voxels; of fields occlusion, `split_sheets` and `level_of` alone. Where voxels have transparent types, or
-  /// instances are united, all is of level 0.
+  /// Options for voxels. Fields use only occlusion, `split_sheets` and `level_of`. With transparent types or united
+  /// instances, every chunk is meshed at level 0.
   SmoothMeshOptions mesh = smooth_voxels();
-  std::optional<float> simplify_error{};  ///< in voxels, as simplify_smooth_mesh has it; without, nothing is simplified
-  InstanceFilter instances = InstanceFilter::Visible;  ///< that count as drawn
-  /// Whether instances whose voxels lie on one lattice and touch are one body: without seams, grooves and slits
-  /// between them. Such instances have a part each then, even of one grid.
+  std::optional<float> simplify_error{};  ///< as in simplify_smooth_mesh, in voxels; nullopt: no simplification
+  InstanceFilter instances = InstanceFilter::Visible;  ///< the instances to mesh
+  /// Joins instances that touch and share one voxel lattice into one body, without seams, grooves or slits between
+  /// them. Each such instance becomes its own part, even if instances share a grid.
   bool unite = true;
 };
 
-/// Meshes what drawn instances place with smooth surfaces around the voxels, as field_from_grid and build_smooth_mesh
-/// make them; then the surfaces of the grids' fields.
+/// Meshes drawn instances with smooth surfaces around the voxels (field_from_grid, build_smooth_mesh), then the
+/// surfaces of the grids' fields.
 ///
-/// Parts:  a grid whose instances are alone is one part, in the order of the grids' handles; then follow the instances
-///         that were united, each with what of the surface is its own voxels', in the order of their groups and of
-///         their handles. Where several have a voxel, it is the last one's. Vertices between two parts are the same in
-///         both. Placements are in the order of their parts; what has no surface is left out.
-/// Bodies: all opaque voxels of a part are one surface, each transparent type is a closed one of its own, all of these
-///         in one view. In a cell that several share, their vertices are the same, but where a body touches itself by
-///         edges and with `simplify_error`: each body is simplified by itself. Transparent voxels occlude no others.
-/// Types:  MeshView::types of every vertex, in the scene's types.
-/// Cost:   what touches is found by boxes: O(n log n + pairs that overlap along one axis) of instances. Each
-///         transparent type is meshed for itself, in the chunks that have it and those around them.
-/// Errors: also those of build_smooth_mesh and simplify_smooth_mesh.
+/// Parts:  a grid whose instances touch no others is one part, in the order of the grid handles. United instances
+///         follow, ordered by group and handle. Each contains the surface of its own voxels; a voxel in several
+///         instances belongs to the last one. Vertices on the border of two parts are identical in both. Placements are
+///         in the order of their parts; parts without a surface are left out.
+/// Bodies: all opaque voxels of a part form one surface, and each transparent type forms a closed surface; all are in
+///         one view. Bodies that share a cell share its vertices, except where a body touches itself along edges, and
+///         except with `simplify_error`, which simplifies each body separately. Transparent voxels cast no occlusion on
+///         others.
+/// Types:  MeshView::types for every vertex, in the scene's types.
+/// Cost:   finds touching instances by their boxes: O(n log n + pairs that overlap along one axis). Each transparent
+///         type is meshed separately, in its own chunks and their neighbours.
+/// Errors: those of mesh_scene, build_smooth_mesh and simplify_smooth_mesh.
 [[nodiscard]] Result<SceneMeshes> mesh_scene_smoothly(const Scene& scene, const SmoothSceneOptions& options = {},
                                                       Threads threads = {}, const Progress& progress = {});
 
 struct VolumeMeshOptions {
-  float iso = 0.0F;  ///< solid where values are above
+  float iso = 0.0F;  ///< values above are solid
   SmoothMeshOptions mesh{};
   std::optional<float> simplify_error{};  ///< in samples
   Rgba8 colour{180, 176, 168, 255};
 };
 
-/// The surface of a volume, as field_from_volume and build_smooth_mesh find it: one part, named as the volume and
-/// placed where it says, in its units; none when there is no surface. Errors: theirs, and those of
+/// Meshes the surface of a volume with field_from_volume and build_smooth_mesh. The result has one part, with the
+/// volume's name, position and units, or none if there is no surface. Errors: those of both functions and of
 /// simplify_smooth_mesh.
 [[nodiscard]] Result<SceneMeshes> mesh_volume(const Volume& volume, const VolumeMeshOptions& options = {},
                                               Threads threads = {}, const Progress& progress = {});

@@ -17,103 +17,105 @@
 
 namespace quoin {
 
-/// Which voxels a query meets, and which solid of fields. Unregistered types, and solid without a material, count as
+/// The voxels and field materials that a query detects. Unregistered types, and solid without a material, count as
 /// opaque and colliding.
 enum class QueryTypes : std::uint8_t {
-  All,        ///< whatever is not air
-  Colliding,  ///< what stops a moving body (VoxelProperties::collides)
-  Opaque,     ///< what blocks sight
+  All,        ///< all voxels except air
+  Colliding,  ///< voxels that stop moving bodies (VoxelProperties::collides)
+  Opaque,     ///< voxels that block sight
 };
 
-/// What chunks that are not loaded are to a query (Grid::make_partial): nobody knows what is in them. Between samples
-/// of a field that is partial, what lies between a sample that is loaded and one that is not is not known either.
+/// The treatment of unloaded chunks (Grid::make_partial), whose content is unknown. In a partial field, the space
+/// between a loaded and an unloaded sample is also unknown.
 enum class UnloadedChunks : std::uint8_t {
   Passed,  ///< air
-  Met,     ///< solid, and what is met says so
+  Met,     ///< solid; hits report `is_unloaded`
 };
 
-/// What of a scene a query looks at; by default all of it.
-/// Lifetime: what `ignored` looks at must outlive the query.
+/// Restricts a query; by default it covers the whole scene.
+/// Lifetime: the array behind `ignored` must outlive the query.
 struct QueryFilter {
-  std::span<const InstanceHandle> ignored = {};    ///< passed through: a body that moves ignores itself
-  std::uint32_t categories = ~std::uint32_t{0};    ///< instances without any of these bits are passed through
-  std::optional<QueryTypes> types = std::nullopt;  ///< nothing: All for rays, Colliding for shapes
-  /// Nothing: Passed for rays, whose hits say what they passed; Met for shapes, so that nobody falls through ground
-  /// that has not come yet.
+  std::span<const InstanceHandle> ignored = {};    ///< instances to skip: a moving body ignores itself
+  std::uint32_t categories = ~std::uint32_t{0};    ///< skips instances that have none of these bits
+  std::optional<QueryTypes> types = std::nullopt;  ///< default: All for rays, Colliding for shapes
+  /// Default: Passed for rays, whose hits report `unloaded_t`; Met for shapes, so that bodies do not fall through
+  ///          ground that is still loading.
   std::optional<UnloadedChunks> unloaded = std::nullopt;
 };
 
-/// Where a ray meets a scene.
+/// A ray hit in a scene.
 struct SceneHit {
   InstanceHandle instance;
-  /// In the grid that is traced: the instance's own, unless the tracer has halved it. Of a field the cell, as in
+  /// Voxel in the traced grid: the instance's grid, unless the tracer uses a halved one. For a field, the cell as in
   /// DensityHit.
   IVec3 voxel{0};
-  VoxelType type = kAir;             ///< of a field the material
-  Direction face = Direction::PosX;  ///< of the voxel, in its grid; as in RayHit. Of a field that nearest to its normal
-  double t = 0.0;                    ///< in lengths of the ray's direction: world units for a unit one
-  DVec3 position{0.0};               ///< in the world
+  VoxelType type = kAir;  ///< for a field, the material
+  /// Face of the voxel, in its grid, as in RayHit; for a field, the direction nearest to its normal.
+  Direction face = Direction::PosX;
+  double t = 0.0;       ///< in multiples of the ray direction's length: world units for a unit direction
+  DVec3 position{0.0};  ///< in world space
   bool starts_inside = false;
   bool in_field = false;
-  DVec3 normal{0.0};  ///< in the world: unit, out of what was hit; 0 where a field has no gradient
-  /// What was met is a chunk that is not loaded (UnloadedChunks::Met): `voxel` is its first one, `type` air.
+  DVec3 normal{0.0};  ///< unit normal in world space, pointing out of the solid; 0 if a field has no gradient
+  /// True for a hit on an unloaded chunk (UnloadedChunks::Met): `voxel` is the chunk's first voxel, `type` is air.
   bool is_unloaded = false;
-  /// Where the ray came to what is not loaded, before `t`: it may be stopped from there on by what is not known.
-  /// Infinite where it did not.
+  /// Ray distance of the first entry into unloaded space, before `t`. Unknown content may stop the ray there.
+  /// Infinite if it does not enter any.
   double unloaded_t = std::numeric_limits<double>::infinity();
 };
 
-/// The nearest voxel or field's surface along a ray in the world, up to and including `max_t` (in lengths of its
-/// direction), transparent ones too; of equally near ones that of the instance that comes first, in it the voxel.
-/// Nothing when there is none, when the ray is not finite or its direction is zero, or when `max_t` is negative or NaN.
+/// Returns the nearest voxel or field surface along a world-space ray, transparent ones included, up to and including
+/// `max_t` (in multiples of the direction's length). At equal distance, the first instance wins, and within an instance
+/// the voxel. Returns nullopt if there is no hit, the ray is not finite, its direction is zero, or `max_t` is negative
+/// or NaN.
 ///
-/// Precision: moved into each grid in double before it is traced there, so as exact 10^9 from the origin as the ray
-///            itself.
-/// Filters:   what is passed through is nowhere; a ray that starts inside of it starts in air.
-/// Partial:   with UnloadedChunks::Met a hit is certain, or says that the ray comes to what is not loaded, and where;
-///            nothing is then met by a ray that stays in what is loaded. Costs a look-up for each chunk on the ray.
-/// Cost:      O(log instances + grids on the ray); in grids that hold types which the filter passes through, besides
-///            O(such voxels, and a field's cells, on the ray).
+/// Precision: the ray is transformed into each grid in double, so at 10^9 from the origin a hit is as exact as the ray.
+/// Filters:   excluded voxels and instances count as air; a ray that starts inside them starts in air.
+/// Partial:   with UnloadedChunks::Met, a hit is certain or reports the entry into unloaded space, and a miss
+///            means that the ray stays in loaded chunks. Costs a look-up per chunk on the ray.
+/// Cost:      O(log instances + grids on the ray). For grids with excluded types, also O(such voxels, and field cells,
+///            on the ray).
 [[nodiscard]] std::optional<SceneHit> first_hit(const SceneTracer& tracer, const Ray& ray_in_world,
                                                 double max_t = std::numeric_limits<double>::infinity(),
                                                 const QueryFilter& filter = {});
 
-/// Whether anything meets a ray in the world from 0 up to and including `max_t`, transparent ones too: as `first_hit`,
-/// without asking what is nearest, so it is done with the first that is found. For lines of sight.
+/// Returns true if a world-space ray hits anything from 0 up to and including `max_t`, transparent voxels included.
+/// Like `first_hit`, but stops at any hit. Use it for lines of sight.
 [[nodiscard]] bool any_hit(const SceneTracer& tracer, const Ray& ray_in_world,
                            double max_t = std::numeric_limits<double>::infinity(), const QueryFilter& filter = {});
 
-/// What is seen at a point of a picture. Requires: width and height are positive.
+/// Returns the hit at a point of an image. Requires: width and height are positive.
 [[nodiscard]] std::optional<SceneHit> pick(const SceneTracer& tracer, const Camera& camera, const PicturePoint& point,
                                            const QueryFilter& filter = {});
 
-/// The voxel that a pixel of a depth picture shows: the first one no nearer than `depth`, which is a float's rounding
-/// off at most. Nothing when there is none at that distance.
+/// Returns the voxel that a pixel of a depth image shows: the first voxel no nearer than `depth`, which may be off by
+/// the rounding of a float. Returns nullopt if there is none at that distance.
 [[nodiscard]] std::optional<SceneHit> voxel_at_depth(const SceneTracer& tracer, const Camera& camera,
                                                      const PicturePoint& point, float depth,
                                                      const QueryFilter& filter = {});
 
-/// A voxel that meets a shape, or a cell of a field whose solid does; of the types that the query's filter says, by
-/// default those that collide.
+/// An overlap of a shape with a voxel or with a field cell whose solid touches it. QueryFilter selects the types; by
+/// default, the ones that collide.
 struct SceneOverlap {
   InstanceHandle instance;
-  IVec3 voxel{0};         ///< of a field the cell, as in DensityHit
-  VoxelType type = kAir;  ///< of a field the material, of the nearest sample whose material counts
+  IVec3 voxel{0};         ///< for a field, the cell as in DensityHit
+  VoxelType type = kAir;  ///< for a field, the material of the nearest sample with a matching material
   bool in_field = false;
-  DVec3 normal{0.0};  ///< of a field its gradient at a point within the shape, in the world, unit; otherwise 0
-  /// A chunk that is not loaded (UnloadedChunks::Met): `voxel` is its first one, `type` air.
+  DVec3 normal{0.0};  ///< for a field, its unit gradient at a point inside the shape, in world space; otherwise 0
+  /// True for an unloaded chunk (UnloadedChunks::Met): `voxel` is its first voxel, `type` is air.
   bool is_unloaded = false;
 };
 
-/// For each instance that has such a voxel within a sphere, a box or a capsule, the first of these (by z, y, x), in
-/// the order of the instances; of one without, the first cell in which its field is negative anywhere within the shape,
-/// unless that is less than 1e-6 voxels deep; of one without that too, a chunk of its grid that is not loaded. To touch
-/// is not to overlap. Numbers that are not finite or negative meet
-/// nothing, nor does a radius of 0; a box of size 0 is a plate, a rod or a point.
+/// Returns one overlap per instance that overlaps a sphere, box or capsule, in instance order:
+/// the first overlapping voxel by z, y, x; else the first field cell that is negative anywhere inside the shape, unless
+/// the depth is less than 1e-6 voxels; else an unloaded chunk of the grid.
 ///
-/// Fields:  which cells collide, and what bounds do not tell, is as for `sweep_box`; the latter counts as overlapping.
-/// Cost:    O(log instances), and for each instance near it the voxels within the shape's bounds until one is found.
-/// Threads: any number may ask at once, while the tracer is not updated.
+/// Touching is not overlapping. Numbers that are negative or not finite, and a radius of 0, overlap nothing. A box of
+/// size 0 along some axes is a plate, a rod or a point.
+///
+/// Fields:  cells collide as in `sweep_box`. A cell that its bounds cannot decide counts as overlapping.
+/// Cost:    O(log instances), plus, per nearby instance, the voxels within the shape's bounds until one is found.
+/// Threads: any number of threads may query at once while the tracer is not updated.
 [[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, DVec3 centre, double radius,
                                                  const QueryFilter& filter = {});
 [[nodiscard]] std::vector<SceneOverlap> overlaps(const SceneTracer& tracer, const OrientedBox& box,

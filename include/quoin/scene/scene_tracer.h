@@ -13,49 +13,52 @@ namespace quoin {
 
 struct PlacedGrid;
 
-/// The traversal structures of a scene's instances.
+/// The acceleration structures for tracing rays through a scene.
 ///
-/// Lifetime: the scene must outlive it, in its place; after an edit of the scene `update` comes before anything else.
+/// Lifetime: the scene must outlive the tracer and keep its address. After an edit of the scene, call `update` before
+///           any other function.
 class SceneTracer {
  public:
-  /// Left out are instances that `filter` does not let pass; empty grids; and instances whose numbers are not finite or
-  /// whose size is not positive.
-  /// Cost: O(chunks of the grids that are placed), on several threads.
+  /// Builds the structures for the instances that pass `filter`. Skips empty grids, and instances with a non-finite
+  /// transform or a size that is not positive.
+  /// Cost: O(chunks of the placed grids), on several threads.
   explicit SceneTracer(const Scene& scene, InstanceFilter filter = InstanceFilter::Visible, Threads threads = {});
-  explicit SceneTracer(Scene&&, InstanceFilter = InstanceFilter::Visible, Threads = {}) = delete;  // it must outlive it
+  explicit SceneTracer(Scene&&, InstanceFilter = InstanceFilter::Visible, Threads = {}) = delete;  // would dangle
   SceneTracer(SceneTracer&&) noexcept;
   SceneTracer& operator=(SceneTracer&&) noexcept;
   ~SceneTracer();
 
-  /// Brings it up to date with its scene, whatever happened to that: instances that came, went, moved, turned, showed
-  /// or hid; grids that came, went, were edited or replaced; types that became transparent or opaque. Then it is as one
-  /// that was built anew. Returns whether grids that are traced, or their types' transparency, are other than before:
-  /// what was made of them is then out of date.
+  /// Applies all changes of the scene: instances that were added, removed, moved, shown or hidden; grids that were
+  /// added, removed, edited or replaced; types whose transparency changed. The result equals a newly built tracer.
+  /// Returns true if a traced grid or the transparency of its types changed; data derived from them is then out of
+  /// date.
   ///
-  /// Requires: nothing reads it meanwhile. What `with_detail` returned is invalidated.
-  /// Cost:     of what changed: OccupancyTree::update for the chunks of a grid that is placed; of its halved ones only
-  ///           what the edit can have changed, when they are next asked for. For an instance that moved: its transform,
-  ///           and its share of the tree of instances, which is built anew, O(n log n), when instances come or go or
-  ///           have moved far. A look at all instances when the bounds of a grid change.
-  ///           A change of a type's transparency: all trees that hold such voxels.
-  /// Threads:  grids are updated on several.
+  /// Requires: no other thread reads the tracer during the call. Invalidates the results of `with_detail`.
+  /// Cost:     for an edited grid: OccupancyTree::update of its changed chunks; its halved versions are updated at
+  ///           their next use, only where the edit matters. For a moved instance: its transform and its entry in the
+  ///           instance tree, which is rebuilt in O(n log n) when instances are added, removed or moved far. When a
+  ///           grid's bounds change: a pass over all instances. When a type's transparency changes: all trees with such
+  ///           voxels.
+  /// Threads:  grids are updated on several threads.
   bool update(Threads threads = {});
 
-  /// The same instances, those of `selected` in their detail: Mid and Far ones as grids halved that often, voxels and
-  /// field, or less often where that would change the volume of either by more than an eighth or leave more than an
-  /// eighth of the field's surface a sample thin; never where anything of the field is transparent. The others, which
-  /// are out of the picture but may cast shadows into it, stay as they are.
+  /// Returns a tracer of the same instances, with those in `selected` at their chosen detail. Mid and Far instances use
+  /// grids (voxels and field) halved to the selected level. A grid is halved less if its voxel or field volume would
+  /// change by more than an eighth, or more than an eighth of the field's surface would become one sample thin. Fields
+  /// with transparent parts are never halved. Other instances, which are outside the image but may cast shadows into
+  /// it, keep full detail.
   ///
-  /// Lifetime: this one, which keeps the halved grids so that only the first picture pays for them, must outlive the
-  ///           result, without an update. An update of the result makes it a tracer of whole grids.
-  /// Threads:  any number may call at once.
+  /// Lifetime: this tracer must outlive the result and must not be updated before that. It caches the halved grids, so
+  ///           only the first image pays for them. Calling `update` on the result turns it into a tracer of full-detail
+  ///           grids.
+  /// Threads:  any number of threads may call it at once.
   [[nodiscard]] SceneTracer with_detail(std::span<const SelectedInstance> selected, Threads threads = {}) const;
 
-  /// What it traces; queries ask its registry what collides.
+  /// Returns the traced scene, whose registry defines the types that collide.
   [[nodiscard]] const Scene& scene() const;
-  /// Whether any instance has transparent voxels, or anything transparent in its field.
+  /// Returns true if any instance has transparent voxels or transparent material in its field.
   [[nodiscard]] bool has_transparent() const;
-  /// Bytes of the trees of voxels and of fields' cells that it traces, those that instances share once.
+  /// Returns the bytes of all traced voxel and field trees; shared trees count once.
   [[nodiscard]] std::size_t bytes() const;
 
  private:

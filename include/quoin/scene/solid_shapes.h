@@ -13,32 +13,34 @@
 
 namespace quoin {
 
-// What of voxels is solid, as shapes for a physics engine. Solid are types that collide (VoxelProperties::collides),
-// and what is not registered. Boxes have an inside, so that fast bodies do not pass them; triangles have none, and such
-// bodies need the engine's continuous detection.
+// Collision shapes of solid voxels for physics engines. Types that collide (VoxelProperties::collides) and unregistered
+// types are solid. Boxes have an inside, so fast bodies do not tunnel through them. Triangles do not, so fast bodies
+// need the engine's continuous collision detection.
 
-/// Appends boxes that hold exactly the solid voxels of a chunk, each once: half boxes are what a compound of Jolt
-/// (StaticCompoundShapeSettings) or Bullet (btCompoundShape) takes.
+/// Appends boxes that cover each solid voxel of a chunk exactly once. Half of a box's size is the half extent that Jolt
+/// (StaticCompoundShapeSettings) and Bullet (btCompoundShape) take.
 ///
-/// Space: voxels, origin at the chunk's minimum corner. Order: by their lowest voxel, z, then y, then x.
-/// Cost:  O(rows of 64 voxels + boxes * rows of each). Terrain full of caves, 1,800 boxes a chunk: 0.15 ms.
+/// Space: voxels, origin at the chunk's minimum corner.
+/// Order: by each box's lowest voxel: z, then y, then x.
+/// Cost:  O(rows of 64 voxels + boxes * rows of each). 0.15 ms for cave terrain with 1,800 boxes per chunk.
 void append_solid_boxes(const Chunk& chunk, const VoxelRegistry& types, std::vector<IBox>& out);
 
-/// Appends the faces of a chunk's solid voxels towards what is not solid, in its neighbours too, as rectangles that
-/// hold each face once, of whatever types. They have type 0 and no occlusion, and corners as any Quad.
+/// Appends the faces between a chunk's solid voxels and non-solid voxels, also across chunk borders, as rectangles.
+/// Each face is covered once; rectangles merge different types. Quads have type 0, no occlusion, and the usual corners.
 ///
-/// Border: a missing chunk is not solid. Order: by direction and layer; the same for the same voxels.
+/// Border: a missing chunk is not solid.
+/// Order:  by direction and layer; the same for the same voxels.
 /// Cost:   0.35 ms for the same chunk, 6,800 quads.
 void append_solid_faces(const Grid& grid, IVec3 chunk, const VoxelRegistry& types, QuadBuffer& out);
 
-/// Triangles in the layout that physics engines take: `positions` are three floats each (Jolt's Float3, Bullet's vertex
-/// base with a stride of 12 bytes), `indices` three a triangle, counter-clockwise seen from outside.
+/// Triangles in the layout of physics engines. `positions` has three floats per vertex (Jolt's Float3, Bullet's vertex
+/// base with a stride of 12 bytes). `indices` has three per triangle, counter-clockwise seen from outside.
 struct SolidMesh {
   std::vector<Vec3> positions;
   std::vector<std::uint32_t> indices;
 };
 
-/// The triangles of solid faces: four positions and two triangles a quad, in the quads' space.
+/// Returns the triangles of solid faces: four positions and two triangles per quad, in the quads' space.
 [[nodiscard]] SolidMesh solid_mesh(const QuadBuffer& faces);
 
 struct SolidShapesOptions {
@@ -46,17 +48,17 @@ struct SolidShapesOptions {
   bool faces = false;
 };
 
-/// The solid shapes of a grid's chunks, kept up to date while it is edited.
+/// The solid shapes of a grid's chunks, kept up to date during edits.
 ///
 ///   SolidShapes shapes;
-///   for (const IVec3 chunk : shapes.update(grid, types)) {  // all the first time, then those that changed
-///     replace_body(chunk, shapes.boxes(chunk));             // none where nothing is solid any more
+///   for (const IVec3 chunk : shapes.update(grid, types)) {  // all chunks the first time, then changed ones
+///     replace_body(chunk, shapes.boxes(chunk));             // empty if the chunk has no solid voxels
 ///   }
 ///
-/// Pieces that lose their support are ConnectedPieces'; a piece that was extracted is a grid with shapes of its own.
-/// Cost:    of an update what `append_solid_boxes` and `append_solid_faces` cost, for the chunks that changed;
-///          O(chunks) where types came to collide or no longer do.
-/// Threads: any number may read at once; an update needs it to itself.
+/// To find pieces that lose their support, use ConnectedPieces. An extracted piece is a grid with its own shapes.
+/// Cost:    an update costs `append_solid_boxes` and `append_solid_faces` for the changed chunks; O(chunks) if a type's
+///          `collides` changed.
+/// Threads: any number of threads may read at once; an update needs exclusive access.
 class SolidShapes {
  public:
   explicit SolidShapes(const SolidShapesOptions& options = {});
@@ -64,16 +66,16 @@ class SolidShapes {
   SolidShapes& operator=(SolidShapes&&) noexcept;
   ~SolidShapes();
 
-  /// Takes over what was edited since the last update, or all of another grid. Returns the chunks whose shapes are
-  /// others than before, sorted by z, then y, then x, those included that have none any more.
-  /// When it throws (bad_alloc), the next update begins anew.
+  /// Applies the edits since the last update, or all chunks of another grid. Returns the chunks whose shapes changed,
+  /// including chunks that became empty, sorted by z, then y, then x. If it throws bad_alloc, the next update starts
+  /// from scratch.
   std::vector<IVec3> update(const Grid& grid, const VoxelRegistry& types, Threads threads = {});
 
-  /// As of the last update; empty for a chunk without. Lifetime: until the next update.
+  /// Returns a chunk's shapes as of the last update; empty if it has none. Lifetime: until the next update.
   [[nodiscard]] const std::vector<IBox>& boxes(IVec3 chunk) const;
   [[nodiscard]] const QuadBuffer& faces(IVec3 chunk) const;
 
-  /// Bytes held.
+  /// Returns the bytes held.
   [[nodiscard]] std::size_t bytes() const;
 
  private:

@@ -10,18 +10,17 @@
 namespace quoin {
 
 struct VolumeSceneOptions {
-  float iso = 0.0F;  ///< solid where values are above
+  float iso = 0.0F;  ///< values above are solid
   Rgba8 colour{180, 176, 168, 255};
 };
 
-/// A volume as a scene: one grid with the field that field_from_volume makes of it, placed where the volume says, in
-/// its units.
+/// Converts a volume to a scene: one grid with the field from field_from_volume, at the volume's position and in its
+/// units.
 ///
-/// Spacing: where it differs along the axes, values are interpolated at the least of the spacings first (trilinear), as
-///          grids have cubes for cells.
-/// Errors:  Unsupported for a volume whose axes are not perpendicular to each other; InvalidArgument where a spacing is
-///          0 or not finite; LimitExceeded where the interpolated volume would have more than 2^31 samples; those of
-///          field_from_volume.
+/// Spacing: if it differs between axes, values are first resampled to the smallest spacing (trilinear), because grid
+///          cells are cubes.
+/// Errors:  Unsupported for axes that are not perpendicular; InvalidArgument if a spacing is 0 or not finite;
+///          LimitExceeded if the resampled volume would have more than 2^31 samples; those of field_from_volume.
 [[nodiscard]] Result<Scene> scene_from_volume(const Volume& volume, const VolumeSceneOptions& options = {},
                                               Threads threads = {}, const Progress& progress = {});
 
