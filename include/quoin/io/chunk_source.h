@@ -23,35 +23,35 @@
 
 namespace quoin {
 
-/// What a source says of itself before anything is read of it.
+/// Properties of a source that are known before its chunks are read.
 struct ChunkSourceInfo {
   std::string format;                     ///< "minecraft", "luanti_map"
-  std::string version;                    ///< of what wrote it, for a person: "1.18.2"; empty: it is not said
-  std::string name;                       ///< of the world, where it has one
-  double spacing = 1.0;                   ///< world units along a voxel's edge
-  IBox chunks;                            ///< in chunk coordinates: all that there is lies within
-  std::optional<DVec3> spawn;             ///< where a player begins, in voxels of the source's grid
-  std::vector<Error> broken{};            ///< files that cannot be read at all, which are left out
+  std::string version;                    ///< of the program that wrote it, for display: "1.18.2"; empty: unknown
+  std::string name;                       ///< of the world; may be empty
+  double spacing = 1.0;                   ///< world units per voxel
+  IBox chunks;                            ///< bounds of all chunks, in chunk coordinates
+  std::optional<DVec3> spawn;             ///< the player's spawn point, in voxels of the source's grid
+  std::vector<Error> broken{};            ///< files that cannot be read at all and are skipped
   std::vector<std::string> warnings{};    ///< one line per assumption
-  std::string dimension{};                ///< of Minecraft's worlds, "minecraft:overworld"; empty: it has no name
-  std::vector<std::string> dimensions{};  ///< all of that world, the chosen one too
+  std::string dimension{};                ///< Minecraft: the open dimension, "minecraft:overworld"; else empty
+  std::vector<std::string> dimensions{};  ///< Minecraft: all dimensions, including the open one
 };
 
-/// A chunk of a source, in its types.
+/// A chunk in the source's voxel types.
 struct SourceChunk {
-  IVec3 place{0};  ///< as Grid::find_chunk
+  IVec3 place{0};  ///< chunk coordinates, as in Grid::find_chunk
   Chunk voxels{kAir};
 };
 
-/// What reading a part gave.
+/// The content of one part.
 struct SourcePart {
-  std::vector<SourceChunk> chunks;  ///< by y; those that are all air are left out
-  std::vector<Error> broken{};      ///< what could not be read and is left out, with file and byte offset
-  std::map<std::string, std::uint64_t> invisible{};  ///< voxels that are read as air and have a name, by that name
-  std::vector<Lamp> lamps{};                         ///< lights without a body, in voxels of the source's grid
+  std::vector<SourceChunk> chunks;                   ///< by y, without chunks that are all air
+  std::vector<Error> broken{};                       ///< unreadable items that were skipped, with file and byte offset
+  std::map<std::string, std::uint64_t> invisible{};  ///< number of voxels read as air, by block name
+  std::vector<Lamp> lamps{};                         ///< lights without geometry, in voxels of the source's grid
 };
 
-/// A world that is read chunk by chunk, without being held whole: a folder of region files, a database, a large model.
+/// A world that is read chunk by chunk and never held whole: a folder of region files, a database, a large model.
 ///
 ///   auto source = quoin::open_chunk_source("saves/New World");
 ///   for (std::size_t i = 0; i < (*source)->parts().size(); ++i) {
@@ -59,14 +59,14 @@ struct SourcePart {
 ///     for (auto& [place, voxels] : part->chunks) ...   // of types in (*source)->types()
 ///   }
 ///
-/// Space:   one grid, right-handed with y upwards; chunks are 64^3, as everywhere.
-/// Parts:   what the files hold together and is read at once, such as a column of chunks. They do not overlap.
-/// Types:   may be added while parts are read, in the order in which threads come upon them; none is ever changed.
-///          Whoever wants the same numbers each time, or has types of others beside them, renumbers: SourceTypes.
-/// Threads: every function from any thread, also at once.
-/// Memory:  bounded, whatever the world: besides 40 bytes a part, what is being read and 32 MiB of parts that were read
-///          last, from which `read` takes chunks.
-/// Files:   must not change meanwhile.
+/// Space:   one grid, right-handed with y upwards; chunks of 64^3 voxels, as everywhere.
+/// Parts:   a part is the unit that is read at once, such as a column of chunks. Parts do not overlap.
+/// Types:   reading parts may add types, in the order in which threads find them; existing types never change. For
+///          reproducible type ids, or to merge with other types, use SourceTypes.
+/// Threads: every function may be called from any thread, also at once.
+/// Memory:  bounded for any world: 40 bytes per part, the parts being read, and a 32 MiB cache of recently read parts
+///          for `read`.
+/// Files:   must not change while the source is open.
 class ChunkSource {
  public:
   ChunkSource(const ChunkSource&) = delete;
@@ -74,23 +74,23 @@ class ChunkSource {
   virtual ~ChunkSource();
 
   [[nodiscard]] const ChunkSourceInfo& info() const { return info_; }
-  /// All types that chunks returned so far have. Cost: a pointer, until more are added.
+  /// Returns all types of the chunks returned so far. Cost: copies a pointer, until types are added.
   [[nodiscard]] virtual VoxelRegistry types() const = 0;
 
-  /// The box of each part, in chunk coordinates: one chunk along x and z, and along y as far as there may be any. In an
-  /// order that reads every file once; the same each time the same files are opened.
+  /// Returns the box of each part, in chunk coordinates: one chunk along x and z, and the possible range along y. The
+  /// order reads every file once, and is the same each time the same files are opened.
   [[nodiscard]] std::span<const IBox> parts() const { return parts_; }
-  /// The index of the part that holds a chunk; nothing where there is none, and nothing to be read.
+  /// Returns the index of the part that contains a chunk, or nullopt if there is none.
   /// Cost: O(log parts).
   [[nodiscard]] std::optional<std::size_t> part_of(IVec3 chunk) const;
 
-  /// Reads a part. Damage is no error: what can be read is returned, with a line for each thing that was left out.
-  /// Errors: LimitExceeded (of types, of memory); CannotRead where the system fails.
+  /// Reads a part. Damage is not an error: the readable content is returned, with one `broken` entry per skipped item.
+  /// Errors: LimitExceeded (types, memory); CannotRead if the system fails.
   /// Requires: part < parts().size().
   [[nodiscard]] virtual Result<SourcePart> read_part(std::size_t part) const = 0;
-  /// Reads one chunk: nothing where it is air or outside of all parts. What was broken in its part is added to `broken`
-  /// (which may be null), but not again while the part is remembered. Chunks of one part that are wanted at once, or
-  /// soon after each other, read it once.
+  /// Reads one chunk. Returns nullopt if it is air or outside all parts. Appends the broken items of its part to
+  /// `broken` (may be null), but not again while the part is cached. Concurrent or successive reads of chunks in one
+  /// part read the part once.
   /// Errors: as read_part.
   [[nodiscard]] Result<std::optional<Chunk>> read(IVec3 chunk, std::vector<Error>* broken = nullptr) const;
 
@@ -102,54 +102,53 @@ class ChunkSource {
   struct Cache;
   ChunkSourceInfo info_;
   std::vector<IBox> parts_;
-  std::vector<std::uint32_t> by_place_;  // indices of parts, by z, x, y
+  std::vector<std::uint32_t> by_place_;  // part indices, by z, x, y
   std::unique_ptr<Cache> cache_;
 };
 
-/// Numbers in another registry for the types of a source, which may hold other types too. What equals a type that is
-/// there in everything gets its number. Chunks renumbered in the same order give the same numbers each time, whatever
-/// threads read them before. Threads: one at a time. Lifetime: of the source's.
+/// Maps the types of a source to ids in another registry, which may also hold other types. A source type that equals an
+/// existing type gets that type's id. Renumbering chunks in a fixed order gives the same ids on every run, at
+/// any order of earlier reads. Threads: one at a time. Lifetime: the source must outlive it.
 class SourceTypes {
  public:
   explicit SourceTypes(const ChunkSource& source) : source_(&source) {}
 
-  /// Gives the voxels of a chunk of the source the types of `into`, which gains those that it lacks. It must be the
-  /// same registry each time. Cost: O(types of the chunk) and a copy of its storage.
+  /// Replaces a source chunk's types with types of `into`, and adds missing ones. `into` must be the same registry in
+  /// every call. Cost: O(types of the chunk) and a copy of its storage.
   /// Errors: LimitExceeded: more than kMaxVoxelTypes.
   [[nodiscard]] Status renumber(Chunk& chunk, VoxelRegistry& into);
 
  private:
   const ChunkSource* source_;
   VoxelRegistry known_;                // of the source
-  std::vector<VoxelType> numbers_{0};  // by type of the source; kAir: none yet
+  std::vector<VoxelType> numbers_{0};  // indexed by source type; kAir: not assigned yet
 };
 
-/// Whether a path leads to what open_chunk_source reads and load_scene does not: a folder that holds a world.
+/// Returns true if the path is a world folder, which open_chunk_source can read.
 [[nodiscard]] bool is_world_folder(const std::filesystem::path& path);
-/// Whether files of a format, as detect_format says it, are what open_chunk_source reads.
+/// Returns true if open_chunk_source reads files of this format (from detect_format).
 [[nodiscard]] bool is_read_by_chunks(std::optional<FileFormat> format);
 
-/// Opens a world: a folder of Minecraft's (Java), its level.dat, or one of its region files; a folder of Luanti's, or
-/// its map.sqlite. `dimension`: as LoadOptions::dimension.
+/// Opens a Minecraft (Java) world folder, its level.dat or one of its region files; or a Luanti world folder or its
+/// map.sqlite. `dimension`: see LoadOptions::dimension.
 ///
-/// Errors: CannotRead; BadFormat, Unsupported where it is nothing that Quoin reads; InvalidArgument for a dimension
-/// that is not there.
+/// Errors: CannotRead; BadFormat or Unsupported if the format is not readable; InvalidArgument for a missing dimension.
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_chunk_source(const std::filesystem::path& path,
                                                                      std::string_view dimension = {});
 
-/// Returns a warning that names voxels with a name that are read as air (SourcePart::invisible); empty for none.
+/// Returns a warning that lists the named blocks read as air (SourcePart::invisible); empty if there are none.
 [[nodiscard]] std::string text_of_invisible(const std::map<std::string, std::uint64_t>& invisible);
 
-/// Puts what lies in a box of chunk coordinates into a scene: one grid, one instance. What was broken, and that there
-/// is more outside, are warnings.
+/// Loads the chunks in a box of chunk coordinates into a scene with one grid and one instance. Adds warnings for broken
+/// items and for content outside the box.
 ///
-/// Memory: all that lies in the box is held.
+/// Memory: holds all chunks of the box.
 /// Errors: as ChunkSource::read_part; Cancelled.
 [[nodiscard]] Result<LoadedScene> load_source(const ChunkSource& source, const IBox& chunks, Threads threads = {},
                                               const Progress& progress = {});
 
-/// The box of chunks around a source's spawn (or its middle, where it has none), `radius` chunks to each side, as high
-/// as the source is. Where no part lies in it, the box around the part that is nearest to the spawn.
+/// Returns the box of chunks within `radius` chunks of the source's spawn (or its middle, if it has none), over its
+/// full height. If no part lies in that box, returns the box around the part nearest to the spawn.
 [[nodiscard]] IBox chunks_around_spawn(const ChunkSource& source, int radius);
 
 }  // namespace quoin

@@ -11,32 +11,33 @@
 
 namespace quoin {
 
-/// The whole of a regular file. Errors: CannotRead, with the system's reason (a folder, no permission, not there);
+/// Reads a whole regular file. Errors: CannotRead, with the system's reason (a folder, no permission, not found);
 /// LimitExceeded beyond 8 GiB.
 [[nodiscard]] Result<std::vector<std::byte>> read_file(const std::filesystem::path& path);
 
-/// The first `max_bytes` bytes of a regular file, or all that it has. Errors: as read_file, whatever the file's size.
+/// Reads up to the first `max_bytes` bytes of a regular file of any size. Errors: CannotRead, as read_file.
 [[nodiscard]] Result<std::vector<std::byte>> read_file_beginning(const std::filesystem::path& path,
                                                                  std::size_t max_bytes);
 
-/// The file at the end of a chain of symbolic links; it need not be there. A path that is no link is itself.
+/// Returns the target of a chain of symbolic links, which need not exist. Returns other paths unchanged.
 [[nodiscard]] std::filesystem::path follow_links(std::filesystem::path path);
-/// Whether both names lead to one file, by links of any kind or none; it need not be there yet.
+/// Returns true if both paths refer to one file, through links of any kind. The file need not exist.
 [[nodiscard]] bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b);
 
-/// A file that appears whole or not at all: bytes go to a temporary file beside `path`, `commit` syncs and renames it.
-/// Destroyed without a commit, it leaves nothing behind and the old file as it was.
+/// Writes a file atomically: bytes go to a temporary file next to `path`; `commit` syncs and renames it. Without a
+/// commit, the destructor removes the temporary file and the old file stays unchanged.
 class AtomicFile {
  public:
-  /// Errors: CannotWrite, with the reason: no such folder, no permission, a folder of that name.
+  /// Creates the temporary file. Errors: CannotWrite, with the reason: missing folder, no permission, `path` is a
+  /// folder.
   [[nodiscard]] static Result<AtomicFile> create(const std::filesystem::path& path);
   AtomicFile(AtomicFile&& other) noexcept;
   AtomicFile& operator=(AtomicFile&& other) noexcept;
   ~AtomicFile();
 
-  /// Errors: CannotWrite (a full disk). Afterwards `commit` fails too.
+  /// Appends bytes. Errors: CannotWrite (disk full); `commit` then fails too.
   [[nodiscard]] Status write(std::span<const std::byte> bytes);
-  /// Puts the file in place. Errors: CannotWrite; the old file is then as it was.
+  /// Replaces `path` with the new file. Errors: CannotWrite; the old file stays unchanged.
   [[nodiscard]] Status commit();
 
  private:
@@ -49,36 +50,36 @@ class AtomicFile {
   bool failed_ = false;
 };
 
-/// What a file holds now, kept under another name while something else is put there. Links are followed.
+/// Keeps the current content of a file as a backup while a new file is written. Follows links.
 ///
-///   auto before = FileBackup::of(path);            // nothing to keep where there is no file
-///   if (write(path)) before->keep();               // as NAME~, in place of an older one
+///   auto before = FileBackup::of(path);            // does nothing if there is no file
+///   if (write(path)) before->keep();               // as NAME~, replacing an older backup
 ///
-/// Destroyed without `keep`, it leaves nothing behind and an older NAME~ as it was. Where NAME~ cannot be replaced (it
-/// is a folder, or somebody else's), or must not be, it is NAME.~1~ to NAME.~99~, the first that is not there.
+/// Without `keep`, the destructor removes the backup and an older NAME~ stays unchanged. If NAME~ cannot or must not be
+/// replaced (a folder, another user's file, Older::Kept), the backup is the first free name of NAME.~1~ to NAME.~99~.
 class FileBackup {
  public:
   enum class Older : std::uint8_t { Replaced, Kept };
 
-  /// Cost: none, where the file system has links; else a copy, with the file's permissions. Errors: CannotWrite,
-  /// CannotRead: nothing was changed.
+  /// Backs up a file. Cost: none on file systems with links; otherwise a copy with the file's permissions.
+  /// Errors: CannotWrite, CannotRead; nothing changes.
   [[nodiscard]] static Result<FileBackup> of(const std::filesystem::path& path, Older older = Older::Replaced);
-  /// What `of` would keep the file as; empty where there is nothing to keep, or no name for it.
+  /// Returns the path that `of` would back up the file as; empty if there is no file or no free name.
   [[nodiscard]] static std::filesystem::path name_for(const std::filesystem::path& path, Older older = Older::Replaced);
   FileBackup(FileBackup&& other) noexcept;
   FileBackup& operator=(FileBackup&& other) noexcept;
   ~FileBackup();
 
-  /// Errors: CannotWrite; what was to be kept is then left behind under the name that the error has.
+  /// Keeps the backup. Errors: CannotWrite, which names the temporary file that still holds the content.
   [[nodiscard]] Status keep();
 
  private:
   FileBackup() = default;
-  std::filesystem::path second_name_;  // empty: there is nothing to keep
+  std::filesystem::path second_name_;  // empty: nothing to keep
   std::filesystem::path backup_;
 };
 
-/// What tells a file from a later one of the same name: nothing where there is none.
+/// Size and modification time of a file, to detect changes; `of` returns nullopt if there is no file.
 struct FileStamp {
   std::filesystem::file_time_type time{};
   std::uintmax_t bytes = 0;
@@ -87,7 +88,7 @@ struct FileStamp {
   [[nodiscard]] static std::optional<FileStamp> of(const std::filesystem::path& path);
 };
 
-/// Writes all of `bytes` to `path` by way of an AtomicFile. Errors: CannotWrite.
+/// Writes `bytes` to `path` through an AtomicFile. Errors: CannotWrite.
 [[nodiscard]] Status write_file(std::span<const std::byte> bytes, const std::filesystem::path& path);
 
 }  // namespace quoin

@@ -43,87 +43,86 @@ enum class FileFormat : std::uint8_t {
   Off
 };
 
-/// What Quoin can do with a file format.
+/// Properties of a file format.
 struct FormatInfo {
   FileFormat format;
-  std::string_view name;         ///< as in `quoin info`: "vox"
+  std::string_view name;         ///< short name, as in `quoin info`: "vox"
   std::string_view extension;    ///< ".vox"
-  std::string_view description;  ///< for a person
+  std::string_view description;  ///< for display
   bool readable;
   bool writable;
-  bool is_mesh;             ///< written from meshes rather than from voxels
-  bool is_volume;           ///< values, which read_volume reads as such and load_scene as a field
-  std::string_view also{};  ///< further extensions of the same format, or of kin: ".kv6 .kvx"
+  bool is_mesh;             ///< written from meshes, not voxels
+  bool is_volume;           ///< scalar values: read_volume returns them, load_scene makes a field
+  std::string_view also{};  ///< further extensions of the same or a related format: ".kv6 .kvx"
 };
 
-/// All formats, those that can be read first. Lifetime: for ever.
+/// Returns all formats, readable ones first. Lifetime: static.
 [[nodiscard]] std::span<const FormatInfo> file_formats();
 
-/// The extensions of all formats that can be read (or written), for messages: ".glb, .gltf, .obj, .ply, .vox".
+/// Returns the extensions of all readable (or writable) formats, for messages: ".glb, .gltf, .obj, .ply, .vox".
 [[nodiscard]] std::string readable_extensions();
 [[nodiscard]] std::string writable_extensions();
 
-/// The name of a file without its folder and its extension, nor that of what is within gzip: NAME of NAME.vox and of
-/// NAME.nii.gz.
+/// Returns a file name without folder and extension; also removes the extension inside gzip. NAME.vox and NAME.nii.gz
+/// both give NAME.
 [[nodiscard]] std::string stem_of_file(const std::filesystem::path& path);
 
-/// What is known of a format. Lifetime: for ever.
+/// Returns the properties of a format. Lifetime: static.
 [[nodiscard]] const FormatInfo& format_info(FileFormat format);
 
-/// Returns the readable format that bytes are of, by what they begin with, within gzip too; nothing when it is none.
-/// Binary STL, .cub, .kvx, .vxl and SLAB6's .vox are known by their whole length: pass all bytes.
+/// Detects a readable format from the first bytes of a file, also inside gzip. Returns nullopt if no format matches.
+/// Binary STL, .cub, .kvx, .vxl and SLAB6's .vox are recognised by their total length: pass all bytes.
 [[nodiscard]] std::optional<FileFormat> detect_format(std::span<const std::byte> bytes);
-/// The same of a file, or of a folder that holds a world. The first 64 KiB are read; of a .stl, .cub, .kvx, .vxl or
-/// .vox that these do not tell, all of it. Errors: CannotRead.
+/// Detects the format of a file or of a world folder. Reads the first 64 KiB, or all of a .stl, .cub, .kvx, .vxl or
+/// .vox that these do not identify. Errors: CannotRead.
 [[nodiscard]] Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& path);
 
-/// Returns the format that a file of this name is written in, by its extension in any case.
+/// Returns the format in which a file of this name is written, from its extension in any case.
 ///
-/// Errors: Unsupported, naming the extensions there are.
+/// Errors: Unsupported, listing the writable extensions.
 [[nodiscard]] Result<FormatInfo> format_for_writing(const std::filesystem::path& path);
 
-// What reads and what writes has a twin for bytes and one for a path; but for save_scene, which goes by a path's
-// extension: the writers of its formats, write_scene_file and write_vox, have both. Warnings are part of what is
-// returned: of what was read, and of what was written where its format may not hold all. Options, Threads (where
-// several are used) and Progress (of what may take long) come last, in this order, and may be left out.
+// Readers and writers come in pairs, for paths and for bytes. save_scene has no byte version because it picks the
+// format by extension; write_scene_file and write_vox have both. Results include warnings: of skipped content when
+// reading, of unsupported content when writing. Options, Threads and Progress come last, in this order, and are
+// optional.
 
-/// Reads a file of any readable format, or a folder that holds a world. A volume becomes a field, as scene_from_volume
-/// makes it, at surface_value. Triangles become voxels or a field, as LoadOptions::mesh says, placed where the mesh is,
-/// in its unit. Of worlds that open_chunk_source reads it is what lies around their spawn.
+/// Reads a file of any readable format, or a world folder. A volume becomes a field at surface_value
+/// (scene_from_volume). Triangles become voxels or a field (LoadOptions::mesh), at the mesh's position and in its unit.
+/// For worlds of open_chunk_source, only the surroundings of the spawn point are loaded.
 ///
-/// The content decides, unless `LoadOptions::raw` does; the name only helps to say what is wrong with a file that is of
-/// no known format.
-/// Errors: CannotRead, BadFormat (with the byte offset where there is one), Unsupported; those of
-///         the format's own reader (InvalidArgument for a frame that is not there, Cancelled, LimitExceeded); `path` is
-///         set in all.
+/// The content determines the format, unless `LoadOptions::raw` is set. The extension is used only to explain why a
+/// file of unknown format cannot be read.
+/// Errors: CannotRead, BadFormat (with the byte offset where there is one), Unsupported; those of the format's reader
+///         (InvalidArgument for a missing frame, Cancelled, LimitExceeded). `path` is set in all.
 [[nodiscard]] Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
-/// The same of bytes. Errors: Unsupported also for scene files that name others, which only a path finds.
+/// Reads a scene from bytes. Errors: also Unsupported for scene files that name other files, which need a path.
 [[nodiscard]] Result<LoadedScene> load_scene(std::span<const std::byte> bytes, const LoadOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
 
-/// What load_scene reads beside the file itself: the files that a scene file names, which need not be there, the values
-/// of a NIfTI pair, a world's -wal, and the materials, buffers and pictures of a mesh. Nothing where the file cannot be
-/// read. Cost: of a mesh that of read_mesh. `allowed`: as LoadOptions::sidecar_files.
+/// Returns the files that load_scene reads in addition to `path`: files named by a scene file (which need not exist),
+/// the values of a NIfTI pair, a world's -wal file, and a mesh's materials, buffers and images. Empty if the file
+/// cannot be read. Cost: for a mesh, that of read_mesh. `allowed`: see LoadOptions::sidecar_files.
 [[nodiscard]] std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path,
                                                                    SidecarFiles allowed = SidecarFiles::WithinFolder);
 
-/// Writes a scene as a file of voxels, in the format of the name's extension: .quoin (write_world) or .json
-/// (write_scene_file), both without loss, .vox (write_vox), or one of other programs: .qb, .gox, .vxl, .binvox, .schem,
-/// .vdb, .nii. It appears whole or not at all. docs/formats/models.md says what each of these holds.
+/// Writes a scene's voxels to a file, atomically. The extension selects the format: .quoin (write_world) and .json
+/// (write_scene_file) are lossless; .vox (write_vox), .qb, .gox, .vxl, .binvox, .schem, .vdb and .nii are formats of
+/// other programs. docs/formats/models.md lists the content that each supports.
 ///
-/// Warnings: one line each of what the format does not hold.
+/// Warnings: one line per kind of content that the format does not support.
 /// Errors:   Unsupported for other extensions; those of the format's writer; `path` is set in all.
 [[nodiscard]] Result<SavedScene> save_scene(const Scene& scene, const std::filesystem::path& path, Threads threads = {},
                                             const Progress& progress = {});
-/// The same of a scene that was read, with what its file had beside it: in .quoin and .json its sun and camera (.quoin
-/// has all cameras), in .vox what `source` holds, its cameras and its sun.
+/// Writes a loaded scene with the additional data of its file. .quoin and .json store sun and camera (.quoin: all
+/// cameras); .vox stores the content of `source`, cameras and sun.
 [[nodiscard]] Result<SavedScene> save_scene(const LoadedScene& loaded, const std::filesystem::path& path,
                                             Threads threads = {}, const Progress& progress = {});
 
-/// What `save_scene` would warn of, for who wants to ask before: nothing when all is kept. Cost: little beside saving,
-/// but of formats of other programs that of making the file.
-/// Errors: those of `save_scene` that are known before anything is written.
+/// Returns the warnings that `save_scene` would give, for asking the user first; empty if the format keeps everything.
+/// Cost: small compared with saving, except that formats of other programs build the file in memory.
+/// Errors: those of `save_scene` that are detected before writing.
 [[nodiscard]] Result<std::vector<std::string>> losses_of_saving(const Scene& scene, const std::filesystem::path& path);
 [[nodiscard]] Result<std::vector<std::string>> losses_of_saving(const LoadedScene& loaded,
                                                                 const std::filesystem::path& path);
