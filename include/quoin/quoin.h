@@ -1,18 +1,19 @@
 #pragma once
 
-/// All of Quoin. Including one folder's headers instead builds faster.
+/// Includes all of Quoin. Including only the headers of one folder builds faster.
 ///
-/// What holds everywhere, unless a header says otherwise:
+/// These rules hold everywhere unless a header says otherwise:
 ///
-/// Space:    right-handed, +Y up. Voxel (i, j, k) fills the cube from (i, j, k) to (i + 1, j + 1, k + 1) of its grid;
-///           boxes of voxels end before their `max`. Angles are in radians, but where a name says degrees.
-/// Errors:   what comes from outside (files, options, devices) gives a Result, absence an optional or a null pointer. A
-///           `Requires:` that does not hold is a programmer's mistake: see QUOIN_ASSERT. Nothing throws but bad_alloc,
-///           and std::system_error where threads cannot be started.
-/// Threads:  any number may read one object at once; whatever changes it needs it to itself. Functions that take
-///           Threads return when all of theirs are done, with the same result at any number.
-/// Lifetime: arguments are read within the call and not kept; what is kept, and for how long it must live, is said.
-/// Moving:   what was moved from may only be assigned to or destroyed.
+/// Space:    right-handed, +Y up. Voxel (i, j, k) fills the cube from (i, j, k) to (i + 1, j + 1, k + 1) of its grid.
+///           Voxel boxes exclude their `max`. Angles are in radians unless a name says degrees.
+/// Errors:   failures caused by external input (files, options, devices) give a Result; absence gives an optional or a
+///           null pointer. A violated `Requires:` is a programming error: see QUOIN_ASSERT. Functions throw only
+///           bad_alloc, and std::system_error if threads cannot be started.
+/// Threads:  any number of threads may read an object at once; changing it needs exclusive access. Functions that take
+///           Threads return when all their threads are done, with the same result at any thread count.
+/// Lifetime: arguments are read during the call and not kept. Headers document each exception and its required
+///           lifetime.
+/// Moving:   a moved-from object may only be assigned to or destroyed.
 
 #include <quoin/core/assert.h>
 #include <quoin/core/axis_orientation.h>

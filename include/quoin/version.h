@@ -2,8 +2,8 @@
 
 #include <string_view>
 
-/// The version of these headers; CMake reads it from here. Versions follow semantic versioning: before 1.0 a minor
-/// version may change what there is, a patch does not.
+/// The version of these headers; CMake reads it from here. Semantic versioning: before 1.0, a minor version may change
+/// the API; a patch does not.
 #define QUOIN_VERSION_MAJOR 0
 #define QUOIN_VERSION_MINOR 1
 #define QUOIN_VERSION_PATCH 0
@@ -13,7 +13,7 @@
 
 namespace quoin {
 
-/// "MAJOR.MINOR.PATCH".
+/// Returns "MAJOR.MINOR.PATCH".
 [[nodiscard]] constexpr std::string_view version() {
   return QUOIN_QUOTE(QUOIN_VERSION_MAJOR) "." QUOIN_QUOTE(QUOIN_VERSION_MINOR) "." QUOIN_QUOTE(QUOIN_VERSION_PATCH);
 }

@@ -11,12 +11,12 @@ namespace quoin {
 /// The files that another file may name: buffers and images of glTF, materials and textures of OBJ, values of NRRD and
 /// NIfTI, models of scene files, skies.
 enum class SidecarFiles : std::uint8_t {
-  WithinFolder,  ///< in the folder of the file that names them, or below it; symbolic links count where they lead
-  Anywhere       ///< every file that the process can read: for input from a trusted source only
+  WithinFolder,  ///< in the naming file's folder or below it; symbolic links are resolved first
+  Anywhere       ///< every file that the process can read: only for input from a trusted source
 };
 
-/// Returns the path of the file that `from` names `name`, relative to the folder of `from`. Backslashes separate
-/// folders too. The file need not exist; if it does not, reading the path says so.
+/// Returns the path of the file that `from` refers to as `name`, relative to the folder of `from`. Backslashes also
+/// separate folders. The file need not exist; reading it then reports the error.
 ///
 /// Requires: `name` is decoded (no percent-encoding).
 /// Cost:     resolves both paths in the file system.

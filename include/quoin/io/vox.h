@@ -13,91 +13,90 @@
 
 namespace quoin {
 
-/// MagicaVoxel's format, versions 150 and 200.
+/// Reads MagicaVoxel's format, versions 150 and 200.
 ///
-/// Source:  the published format description of MagicaVoxel and its extension (github.com/ephtracy/voxel-model); and
+/// Source:  the published format description of MagicaVoxel and its extension (github.com/ephtracy/voxel-model);
 ///          Teardown's compressed models, TDCZ (github.com/vengi-voxel/vengi/pull/778).
 /// Axes:    (x, y, z) becomes (x, z, -y): Quoin's +Y is MagicaVoxel's +Z.
-/// Grids:   one a model, in the file's order, with the model's box, from the origin, as canvas. Models that are placed
-///          nowhere stay grids without an instance; a warning counts them.
-/// Types:   1 to 255 are the palette as the artist sees it (IMAP applied); the raw material keys are kept in
-///          VoxelProperties::attributes. The palette's alpha means nothing to MagicaVoxel and is not read.
-/// Groups:  a group of the scene graph is a SceneGroup, but for the topmost, which is the scene. Transforms that follow
-///          each other without a group between them are one place.
-/// Layers:  those of the file; of a file with a single one, without a name and shown, none.
-/// Frames:  without a scene graph each model is a frame; otherwise `frame` counts as the keys' `_f` does, from 0 to the
-///          last key or the end of the animation's range.
-/// Hidden:  nodes and layers that are hidden are kept; `is_shown` says what is to be drawn.
-/// Odd:     a MAIN chunk that claims up to 20 bytes more than there are is read with a warning, when all within is
-///          sound.
-/// Cameras: those that were set, by the file's numbers; panoramas are skipped with a warning.
-/// Look:    the render settings are LoadedScene::look, where the file has them.
-/// Skipped: with a warning, voxels outside their model's box or of colour 0. Frames but one, notes and chunks that are
-///          not known are in LoadedScene::source alone. `only_in_source` names these, and all else that a Scene cannot
-///          hold: cameras and render settings.
-/// Progress: told after every model.
+/// Grids:   one per model, in file order. The canvas is the model's box, from the origin. Models that are not placed
+///          become grids without an instance; a warning counts them.
+/// Types:   1 to 255 are the palette as the artist sees it (IMAP applied). The raw material keys are kept in
+///          VoxelProperties::attributes. MagicaVoxel ignores the palette's alpha, and so does Quoin.
+/// Groups:  each group of the scene graph becomes a SceneGroup, except the root, which is the scene. Consecutive
+///          transforms without a group between them are combined.
+/// Layers:  those of the file; none if the file has a single, unnamed, visible layer.
+/// Frames:  without a scene graph, each model is a frame. Otherwise `frame` matches the keys' `_f`, from 0 to the last
+///          key or the end of the animation range.
+/// Hidden:  hidden nodes and layers are kept; `is_shown` returns false for them.
+/// Lenient: a MAIN chunk that claims up to 20 bytes more than the file has is read with a warning, if its content is
+///          valid.
+/// Cameras: those that the user set, with the file's numbers; panoramas are skipped with a warning.
+/// Look:    the render settings are in LoadedScene::look, if the file has them.
+/// Skipped: with a warning, voxels outside their model's box or of colour 0. Other frames, notes and unknown chunks are
+///          only in LoadedScene::source. `only_in_source` lists these and everything else that a Scene cannot hold:
+///          cameras and render settings.
+/// Progress: called after each model.
 /// Errors:  BadFormat with the byte offset; Unsupported for SLAB6's format of the same name and git-LFS pointers;
-///          InvalidArgument for a frame that is not there; Cancelled; LimitExceeded when a scene graph or scattered
-///          voxels would take far more memory than the file has bytes. Memory stays within a multiple of the input's
-///          size.
+///          InvalidArgument for a missing frame; Cancelled; LimitExceeded if a scene graph or scattered voxels would
+///          take far more memory than the file has bytes. Memory stays within a multiple of the input's size.
 [[nodiscard]] Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions& options = {},
                                            const Progress& progress = {});
-/// The same of a file. Errors: also CannotRead; they name the file.
+/// Reads a .vox file. Errors: also CannotRead; errors name the file.
 [[nodiscard]] Result<LoadedScene> read_vox(const std::filesystem::path& path, const LoadOptions& options = {},
                                            const Progress& progress = {});
 
-/// The scene of another frame of a file, whose models and colours are shared with the one that was read, as it was
-/// read: its grids, groups and layers have the same handles. Cost: that of the scene graph, however many voxels there
-/// are. Errors: InvalidArgument for a frame that is not there.
+/// Returns the scene of another frame. It shares models and colours with the scene that was read, in their original
+/// state; grids, groups and layers have the same handles. Cost: that of the scene graph, at any number of voxels.
+/// Errors: InvalidArgument for a missing frame.
 [[nodiscard]] Result<Scene> scene_at_frame(const VoxSource& source, int frame);
 
-/// What a file holds that its scene does not, for people, a line each: "animation of 24 frames", "10 cameras". A .vox
-/// file written by write_vox keeps it; any other format loses it.
+/// Lists the content of a file that its scene does not hold, one line each, for display: "animation of 24 frames", "10
+/// cameras". Files from write_vox keep it; all other formats lose it.
 [[nodiscard]] std::vector<std::string> only_in_source(const VoxSource& source);
 
-/// A scene as the bytes of a .vox file.
+/// A scene encoded as a .vox file.
 struct VoxBytes {
   std::vector<std::byte> bytes;
-  std::vector<std::string> warnings;  ///< one line each: what the format does not hold
+  std::vector<std::string> warnings;  ///< one line per kind of content that the format does not support
 };
 
-/// The scene as a .vox file of version 150; the same scene gives the same bytes.
+/// Encodes a scene as a .vox file of version 150. The same scene gives the same bytes.
 ///
-/// Reading it again gives the same scene when every canvas is a box of at most 256 voxels a side from the origin, as
-/// `read_vox` makes them. Otherwise voxels still stand where they stood, but grids are moved to the origin, and those
-/// beyond 256 become several, under a group.
-/// Types:    keep their ids when all that occur are below 256; else those that occur are numbered from 1. What
-///           MagicaVoxel has no key for (the name of a type, whether it collides, numbers that its own keys round) is
-///           kept under keys that begin with "_quoin_", which other programs lose when they save.
-/// Lost:     names of grids that are placed nowhere. Positions between voxels are rounded, turns of groups that are not
-///           by quarter turns and lamps are left out, each with a warning.
-/// Errors:   Unsupported when an instance's transform is not one of the 48 axis-aligned ones, a voxel size is not 1 or
-///           a grid holds a field of densities;
-///           LimitExceeded for more than 255 types, positions beyond 32 bits, or more than 4 GiB.
-/// Progress: told after the voxels of every grid.
+/// Reading the result restores the same scene if every canvas is a box from the origin of at most 256 voxels per side,
+/// as `read_vox` makes them. Otherwise voxels keep their world positions, but grids move to the origin, and larger
+/// grids are split into several under a group.
+/// Types:    keep their ids if all used ids are below 256; otherwise the used types are numbered from 1. Properties
+///           without a MagicaVoxel key (a type's name, `collides`, numbers that MagicaVoxel rounds) are stored under
+///           keys that begin with "_quoin_", which other programs lose when they save.
+/// Lost:     names of grids that are not placed. With a warning each: positions between voxels are rounded; group
+///           rotations other than quarter turns, and lamps, are dropped.
+/// Errors:   Unsupported if an instance's transform is not one of the 48 axis-aligned ones, a voxel size is not 1, or a
+///           grid has a density field; LimitExceeded for more than 255 types, positions beyond 32 bits, or more than 4
+///           GiB.
+/// Progress: called after the voxels of each grid.
 [[nodiscard]] Result<VoxBytes> write_vox(const Scene& scene, const Progress& progress = {});
-/// The same as a file, which appears whole or not at all. Errors: also CannotWrite; they name the file.
+/// Writes a .vox file atomically. Errors: also CannotWrite; errors name the file.
 [[nodiscard]] Result<SavedScene> write_vox(const Scene& scene, const std::filesystem::path& path,
                                            const Progress& progress = {});
 
-/// A scene that was read from a .vox file, with what was changed since, as a .vox file that keeps all else of the first
-/// one: chunks that no change concerns are the same bytes in the same order, so a scene without a change is the same
-/// file. Cameras and the sun (of `look`, else `sun`) are written where they changed. Without `source`: else as above.
+/// Encodes an edited scene from a .vox file and keeps all other content of that file. Unchanged chunks keep their bytes
+/// and order, so an unchanged scene gives an identical file. Cameras and sun (from `look`, else `sun`) are written if
+/// they changed. Without `source`, works as the overload for a Scene.
 ///
-/// Voxels:   of a model that was changed the file's order stays, new ones follow.
-/// Frames:   moving an instance or a group that moves by itself sets a key at the frame that was read; other frames
-///           stay. A shape that shows several models keeps those of other frames.
-/// Canvas:   a model that has outgrown its box becomes larger about its pivot where more than one key shows it.
-/// Types:    those of the file stay where they are in its palette. New ones take entries of the same look, else some
-///           that no voxel uses.
-/// Lost:     also, with a warning each: colours of the palette that no voxel uses, when new ones need their entries;
-///           animation, attributes of nodes that Quoin does not know and nodes apart from the graph, where nodes of
-///           the scene graph have several parents and one of them has to change.
+/// Voxels:   a changed model keeps the file's voxel order; new voxels follow.
+/// Frames:   moving an animated instance or group sets a key at the loaded frame; other frames stay. A shape with
+///           several models keeps the models of other frames.
+/// Canvas:   a model that outgrew its box grows around its pivot if more than one key shows it.
+/// Types:    the file's types keep their palette entries. New types take entries with the same appearance, else unused
+///           ones.
+/// Lost:     in addition, with a warning each: unused palette colours, if new types need their entries; and, if the
+///           scene graph has nodes with several parents and one of these must change: animation, attributes of unknown
+///           nodes, and nodes outside the graph.
 [[nodiscard]] Result<VoxBytes> write_vox(const LoadedScene& loaded, const Progress& progress = {});
 [[nodiscard]] Result<SavedScene> write_vox(const LoadedScene& loaded, const std::filesystem::path& path,
                                            const Progress& progress = {});
 
-/// What write_vox would warn of. Errors: those of write_vox, but for files of more than 4 GiB.
+/// Returns the warnings that write_vox would give. Errors: those of write_vox, except for files of more than 4 GiB.
 [[nodiscard]] Result<std::vector<std::string>> losses_of_vox(const Scene& scene);
 [[nodiscard]] Result<std::vector<std::string>> losses_of_vox(const LoadedScene& loaded);
 

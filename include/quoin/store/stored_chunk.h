@@ -9,19 +9,19 @@
 
 namespace quoin {
 
-/// Which chunk of a world.
+/// The address of a chunk in a world.
 struct ChunkPlace {
-  std::uint32_t grid = 0;  ///< the grid's number in the world, which no other grid ever has
-  std::uint8_t level = 0;  ///< its voxels have edges of 2^level
-  IVec3 chunk{0};          ///< as Grid::find_chunk
+  std::uint32_t grid = 0;  ///< the grid's number in the world; never reused
+  std::uint8_t level = 0;  ///< level of detail: voxels have edges of 2^level
+  IVec3 chunk{0};          ///< chunk coordinates, as in Grid::find_chunk
 
   bool operator==(const ChunkPlace&) const = default;
 };
 
-/// What a world holds of a chunk. Air counts: a chunk that is kept as air was made and is empty, one that is not kept
-/// was never made.
+/// The stored content of a chunk. A chunk stored as air was generated and is empty; a chunk that is not stored was
+/// never generated.
 struct StoredChunk {
-  Chunk voxels{kAir};  ///< with the data at voxels
+  Chunk voxels{kAir};  ///< with per-voxel data
   std::optional<DensityChunk> densities = std::nullopt;
 
   bool operator==(const StoredChunk&) const = default;

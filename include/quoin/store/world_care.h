@@ -13,85 +13,86 @@
 #include <quoin/store/stored_chunk.h>
 #include <quoin/store/world_store.h>
 
-// What owners of worlds do with them as files: look, check, repair, back up, compact.
+// Maintenance of world files: summary, check, repair, backup, compaction.
 
 namespace quoin {
 
-/// What a world holds, without its voxels.
+/// A summary of a world, without its voxels.
 struct WorldSummary {
-  int version = 0;          ///< of the format
-  std::uint64_t bytes = 0;  ///< of the file, its log included
-  std::uint64_t saves = 0;  ///< commits since it was made
-  std::size_t types = 0;    ///< besides air
+  int version = 0;          ///< format version
+  std::uint64_t bytes = 0;  ///< file size, including its log
+  std::uint64_t saves = 0;  ///< commits since the world was created
+  std::size_t types = 0;    ///< without air
   std::size_t instances = 0;
   std::size_t values = 0;
-  std::size_t thumbnail_bytes = 0;  ///< 0: there is none
+  std::size_t thumbnail_bytes = 0;  ///< 0: no thumbnail
   struct GridSummary {
     WorldGrid grid;
-    std::uint64_t chunks = 0;                        ///< of level 0; those that are kept as air too
-    std::map<std::uint8_t, std::uint64_t> by_level;  ///< chunks of each level there is
-    IBox chunk_bounds;                               ///< around those of level 0, in chunks
+    std::uint64_t chunks = 0;                        ///< of level 0, including chunks stored as air
+    std::map<std::uint8_t, std::uint64_t> by_level;  ///< number of chunks per existing level
+    IBox chunk_bounds;                               ///< of level 0, in chunk coordinates
   };
   std::map<std::uint32_t, GridSummary> grids;
 };
 
-/// Errors: as WorldStore::open. Cost: O(chunks), of which only the keys are read; of version 1 all of the file.
+/// Summarises a world. Errors: as WorldStore::open. Cost: O(chunks), but reads only their keys; for version 1, reads
+/// the whole file.
 [[nodiscard]] Result<WorldSummary> summarize_world(const std::filesystem::path& path, const Progress& progress = {});
 
-/// Something of a world file that is not as it was written.
+/// A damaged item in a world file.
 struct WorldDamage {
-  std::optional<ChunkPlace> chunk;  ///< the chunk that is lost, where it is known
-  std::string what;                 ///< one line
+  std::optional<ChunkPlace> chunk;  ///< the lost chunk, if known
+  std::string what;                 ///< description, one line
 };
 
 struct WorldCheck {
-  std::uint64_t chunks = 0;  ///< that are sound
-  std::uint64_t parts = 0;   ///< types, grids, instances, values ... that are
+  std::uint64_t chunks = 0;  ///< number of valid chunks
+  std::uint64_t parts = 0;   ///< number of other valid items (types, grids, instances, values, ...)
   std::vector<WorldDamage> damage;
 };
 
-/// Reads all of a world: each row's checksum and content, and SQLite's own check of its tables. Others may write it
-/// meanwhile.
-/// Errors: CannotRead, Cancelled; BadFormat where it cannot even be opened.
+/// Reads a whole world and verifies each row's checksum and content, and SQLite's tables with its own check. Other
+/// processes may write the world during the call.
+/// Errors: CannotRead; Cancelled; BadFormat if the file cannot be opened as a world.
 [[nodiscard]] Result<WorldCheck> check_world(const std::filesystem::path& path, const Progress& progress = {});
 
 struct WorldRepair {
-  WorldCheck check;            ///< what was kept, and what is lost
-  std::filesystem::path kept;  ///< where the damaged world is, if the repaired one took its place
+  WorldCheck check;            ///< the kept and the lost content
+  std::filesystem::path kept;  ///< path of the damaged world, if the repaired world replaced it
 };
 
-/// Makes a new world of all that is sound in one, wherever in the file it lies and whether SQLite can still read it or
-/// not. `to`: a new file; or `from` itself, whose damaged content is then kept as NAME~ or under another name that the
-/// outcome has. Types that are lost become magenta ones.
-/// Errors: CannotRead; CannotWrite (another writer, a file `to`); Cancelled; BadFormat where nothing of a world is
-///         left; Unsupported for a world of a later version.
+/// Writes all valid content of a damaged world to a new world. It finds content anywhere in the file, even if SQLite
+/// can no longer read it. `to` is a new file, or `from` itself; the damaged file is then kept as NAME~ or under the
+/// name in WorldRepair::kept. Lost types become magenta.
+/// Errors: CannotRead; CannotWrite (another writer, or `to` exists); Cancelled; BadFormat if no world content is left;
+///         Unsupported for a world of a later version.
 [[nodiscard]] Result<WorldRepair> repair_world(const std::filesystem::path& from, const std::filesystem::path& to,
                                                const Progress& progress = {});
 
-/// Copies a world as one commit left it, also while others write it; the copy is compact, and appears whole or not at
-/// all. Returns its size. Errors: CannotRead, CannotWrite (there is a file `to`), BadFormat (damaged).
+/// Copies the state of a world after one commit, even while other processes write it. The copy is compact and is
+/// written atomically. Returns its size. Errors: CannotRead, CannotWrite (`to` exists), BadFormat (damaged).
 [[nodiscard]] Result<std::uint64_t> back_up_world(const std::filesystem::path& from, const std::filesystem::path& to);
 
-/// What a copy of a world has.
+/// The result of copying a world.
 struct WorldCopy {
-  std::uint64_t bytes = 0;        ///< of the file
+  std::uint64_t bytes = 0;        ///< file size
   std::uint64_t chunks = 0;       ///< of all levels
-  std::uint64_t voxels = 0;       ///< of level 0 that are not air
-  std::uint64_t samples = 0;      ///< of level 0 that are solid, of densities
-  std::vector<WorldDamage> lost;  ///< chunks that are damaged, and left out
+  std::uint64_t voxels = 0;       ///< non-air voxels of level 0
+  std::uint64_t samples = 0;      ///< solid density samples of level 0
+  std::vector<WorldDamage> lost;  ///< damaged chunks that were left out
 };
 
-/// Writes all that one commit left in a world as a new one of the present version, compact, in place of what is there;
-/// it appears whole or not at all. Each chunk is read and checked, and written as it is; what games keep, thumbnails
-/// and what this version does not know go along. Others may write `from` meanwhile.
-/// Memory: a chunk, whatever the world.
-/// Errors: CannotRead; CannotWrite, also where another program writes the world that is there; Cancelled; BadFormat
-///         where parts besides chunks are damaged, which repair_world is for.
+/// Copies the state of a world after one commit to a compact world of the current version, replacing `to` atomically.
+/// Chunks are verified and copied unchanged. Game values, thumbnails and content unknown to this version are copied
+/// too. Other processes may write `from` during the call.
+/// Memory: one chunk, for any world.
+/// Errors: CannotRead; CannotWrite, also if another process writes the world at `to`; Cancelled; BadFormat if items
+///         other than chunks are damaged (use repair_world).
 [[nodiscard]] Result<WorldCopy> copy_world(const std::filesystem::path& from, const std::filesystem::path& to,
                                            const Progress& progress = {});
 
-/// Gives back to the file system what edits left unused. A crash meanwhile loses nothing. Returns the file's size.
-/// Errors: CannotWrite (another writer or reader has it open, a full disk), BadFormat.
+/// Returns unused space of a world to the file system. A crash during the call loses nothing. Returns the file's size.
+/// Errors: CannotWrite (open in another writer or reader, disk full), BadFormat.
 [[nodiscard]] Result<std::uint64_t> compact_world(const std::filesystem::path& path);
 
 }  // namespace quoin

@@ -13,25 +13,25 @@
 
 namespace quoin {
 
-/// What putting a world into another file gave.
+/// The result of importing a world.
 struct ImportedWorld {
-  std::uint64_t bytes = 0;                         ///< of the file
-  std::uint64_t chunks = 0;                        ///< that were written, by an earlier run too
-  std::uint64_t voxels = 0;                        ///< of these
-  std::size_t resumed_parts = 0;                   ///< of the source, that an earlier run had put there
-  std::vector<std::string> broken;                 ///< what could not be read and is left out, a line each
-  std::vector<std::string> guessed;                ///< names of types whose looks are guesses
-  std::map<std::string, std::uint64_t> invisible;  ///< SourcePart::invisible of all parts
+  std::uint64_t bytes = 0;                         ///< file size
+  std::uint64_t chunks = 0;                        ///< number of written chunks, including earlier runs
+  std::uint64_t voxels = 0;                        ///< number of voxels in these chunks
+  std::size_t resumed_parts = 0;                   ///< parts of the source that an earlier run had imported
+  std::vector<std::string> broken;                 ///< unreadable items that were skipped, one line each
+  std::vector<std::string> guessed;                ///< names of types whose appearance is a guess
+  std::map<std::string, std::uint64_t> invisible;  ///< SourcePart::invisible, summed over all parts
 };
 
-/// Puts all of a source into a world on disk, part by part, without holding it.
+/// Imports a whole source into a world on disk, part by part, without holding it in memory.
 ///
-/// Until all is there it is a world named PATH.part, which knows how far it came: whoever ended (Progress, kill -9, a
-/// power cut) is gone on with by the same call, and what comes of it has the same chunks and types, bit for bit.
-/// Only then does it get the name PATH, in place of what had it.
-/// Memory:  what the source takes, and some 100 chunks, whatever the world.
-/// Errors:  those of WorldStore and ChunkSource::read_part; Cancelled; InvalidArgument where PATH.part is of another
-///          source, or of one that has other parts now. (Whether the same parts hold something else is not noticed.)
+/// Until the import is complete, the world is named PATH.part and stores the progress. An interrupted import
+/// (cancelled, killed, power loss) resumes when called again; the result has bit-identical chunks and types. The
+/// complete world is then renamed to PATH and replaces an existing file.
+/// Memory:  that of the source and about 100 chunks, for any world.
+/// Errors:  those of WorldStore and ChunkSource::read_part; Cancelled; InvalidArgument if PATH.part is from another
+///          source, or the source's parts have changed. (Changed content within the same parts is not detected.)
 [[nodiscard]] Result<ImportedWorld> import_world(const ChunkSource& source, const std::filesystem::path& path,
                                                  Threads threads = {}, const Progress& progress = {});
 

@@ -18,36 +18,37 @@
 namespace quoin {
 
 struct WorldMeshOptions {
-  BlockySceneOptions scene{};  ///< without `atlas`, `cut` and `part_of`
-  /// Where the meshes go that are not held in memory: into files without a name, which are gone with them. As large as
-  /// a .ply of them, and half as much again.
+  BlockySceneOptions scene{};  ///< must not set `atlas`, `cut` or `part_of`
+  /// Folder for unnamed temporary files that hold the meshes. Needs about 1.5 times the size of a .ply of them. The
+  /// files are deleted with the meshes.
   std::filesystem::path folder = ".";
-  std::size_t cache_bytes = std::size_t{64} << 20;  ///< of chunks that are kept for those beside them
+  std::size_t cache_bytes = std::size_t{64} << 20;  ///< cache for neighbouring chunks
 };
 
-/// Meshes of a world, and what was found while it was read.
+/// The meshes of a world, with counts and errors from reading it.
 struct WorldMeshes {
   SceneMeshes meshes;
-  std::int64_t voxels = 0;            ///< of all grids, each once
-  std::int64_t voxels_with_data = 0;  ///< likewise
-  std::vector<std::string> broken;    ///< a line for each chunk that is damaged, and left out
+  std::int64_t voxels = 0;            ///< of all grids; each grid counts once
+  std::int64_t voxels_with_data = 0;  ///< voxels with per-voxel data; each grid counts once
+  std::vector<std::string> broken;    ///< damaged chunks that were left out, one line each
 };
 
-/// Meshes what a world's instances place, as mesh_scene does, without holding its voxels or its meshes: chunk after
-/// chunk. `loaded`: of load_partial_world.
+/// Meshes the grids that a world's instances place, as mesh_scene does, chunk by chunk. Holds neither the voxels nor
+/// the meshes in memory. `loaded`: from load_partial_world.
 ///
-/// Order:  the same meshes as mesh_scene makes of the whole world, to the byte.
-/// Memory: `cache_bytes`, or the chunks around 32 of them if these are more; the triangles of 32 chunks; 80 bytes a
-///         chunk of a grid. What is read of the meshes later comes from files, and goes again by itself.
-/// Errors: those of mesh_scene and of reading; CannotWrite for `folder`; Unsupported where there are densities, which
-///         are meshed as a whole.
-/// Requires: `scene` without atlas and cut. Nobody writes the world meanwhile: chunks would not fit those beside them.
+/// Order:    the same meshes as mesh_scene of the whole world, byte for byte.
+/// Memory:   `cache_bytes`, or the neighbourhood of 32 chunks if that is more; the triangles of 32 chunks; 80 bytes per
+///           chunk of a grid. Later accesses to the meshes read memory-mapped files, which the system can evict.
+/// Errors:   those of mesh_scene and of reading; CannotWrite for `folder`; Unsupported for density fields, which can
+///           only be meshed as a whole.
+/// Requires: `scene` has no atlas and no cut. No process writes the world during the call, because neighbouring chunks
+///           would not match.
 [[nodiscard]] Result<WorldMeshes> mesh_world(const WorldStore& world, const LoadedWorld& loaded,
                                              const WorldMeshOptions& options, Threads threads = {},
                                              const Progress& progress = {});
 
-/// Counts the faces of the voxels that a world's instances place and show, each grid's once, as count_faces does of a
-/// scene, without holding the world. `loaded`: of load_partial_world. Damaged chunks count as air.
+/// Counts the voxel faces of a world's placed and visible grids, each once, as count_faces does for a scene, without
+/// holding the world. `loaded`: from load_partial_world. Damaged chunks count as air.
 ///
 /// Cost:   reads all chunks of these grids.
 /// Memory: as mesh_world, without its triangles.
@@ -56,8 +57,8 @@ struct WorldMeshes {
                                                    InstanceFilter filter = InstanceFilter::Visible,
                                                    Threads threads = {}, const Progress& progress = {});
 
-/// About how many bytes of memory a world takes that is loaded whole (load_world), from some of its chunks; nothing
-/// where these cannot be read.
+/// Estimates the bytes of memory that load_world needs for a world, from a sample of its chunks. Returns nullopt if
+/// they cannot be read.
 [[nodiscard]] std::optional<std::uint64_t> memory_of_world(const WorldStore& world);
 
 }  // namespace quoin

@@ -21,14 +21,15 @@ namespace quoin {
 
 struct LoadedWorld;
 
-/// As in LoadedScene.
+/// Sun and cameras, as in LoadedScene.
 struct WorldView {
   std::optional<DVec3> sun;
   std::optional<Camera> camera;
   std::vector<FileCamera> cameras;
 };
 
-/// Keeps a scene in a world: each `save` writes what changed since the one before, found by the journals.
+/// Saves a scene to a world incrementally: each `save` writes the changes since the previous one, found through the
+/// change journals.
 ///
 ///   auto world = quoin::WorldStore::open("home.quoin", quoin::WorldAccess::Write);
 ///   auto loaded = quoin::load_world(*world);
@@ -41,29 +42,31 @@ struct WorldView {
 ///   if (const auto begun = loaded->saver.save(*world, scene); !begun) complain(begun.error());
 ///   if (const auto saved = world->flush(); !saved) complain(saved.error());
 ///
-/// A chunk that edits emptied is kept as air (StoredChunk). Numbers of grids, instances, groups and layers stay theirs.
-/// Lifetime: it holds no reference between calls.
+/// A chunk that becomes empty through edits is stored as air (StoredChunk). Grids, instances, groups and layers keep
+/// their numbers in the world.
+/// Lifetime: holds no reference between calls.
 /// Threads:  as the scene.
 class WorldSaver {
  public:
-  /// Of a scene for a world that holds none yet: the first `save` writes all of it.
+  /// Creates a saver for a world that has no scene yet; the first `save` writes everything.
   WorldSaver();
   WorldSaver(WorldSaver&&) noexcept;
   WorldSaver& operator=(WorldSaver&&) noexcept;
   ~WorldSaver();
 
-  /// Saves what changed, all of it in one go; returns at once. Chunks are shared with the scene, not copied.
-  /// `more`: is saved with it, a game's own values for one, or a thumbnail.
-  /// Errors: InvalidArgument, and nothing is saved: voxels of types that are not registered, numbers that are not
-  ///         finite, an instance whose grid is not there; the first time, a world that holds a scene or other types.
-  ///         Of writing: see WorldStore::save.
-  /// Cost:   O(what changed); the first time O(chunks).
-  /// Requires: the same world and scene (or a snapshot of it) each time; the world is open for writing.
+  /// Saves all changes as one atomic commit, in the background. Chunks are shared with the scene, not copied. `more` is
+  /// saved in the same commit: game values or a thumbnail, for example.
+  /// Errors:   InvalidArgument, and nothing is saved, for unregistered voxel types, numbers that are not finite, or an
+  ///           instance whose grid does not exist; on the first save, also for a world that already holds a scene or
+  ///           other types. For write errors, see WorldStore::save.
+  /// Cost:     O(changes); O(chunks) the first time.
+  /// Requires: the same world and scene (or a snapshot of it) in every call; the world is open for writing.
   Result<SaveTicket> save(WorldStore& world, const Scene& scene, WorldChanges more = {},
                           std::function<void(const Status&)> on_saved = {});
-  /// From where it is looked at, and lit: saved with the next `save`. What load_world read until then.
+  /// Sets the sun and cameras to store with the next `save`. Until then, the values from load_world apply.
   void set_view(WorldView view);
-  /// The number that a grid has in the world (ChunkPlace::grid); nothing before it was saved. Cost: O(log grids).
+  /// Returns the number of a grid in the world (ChunkPlace::grid), or nullopt before its first save. Cost: O(log
+  /// grids).
   [[nodiscard]] std::optional<std::uint32_t> number_of(GridHandle grid) const;
 
  private:
@@ -74,31 +77,31 @@ class WorldSaver {
   std::unique_ptr<Impl> impl_;
 };
 
-/// A world's scene, and what saves what becomes of it.
+/// A loaded scene and the saver for its changes.
 struct LoadedWorld {
   LoadedScene loaded;
   WorldSaver saver;
 };
 
-/// Reads a world's scene: all chunks of level 0, into memory.
+/// Loads a world's scene with all chunks of level 0 into memory.
 ///
-/// Warnings: of what is damaged, which is left out, and stays in the file.
+/// Warnings: one per damaged item; it is left out of the scene but stays in the file.
 /// Errors:   CannotRead, BadFormat, Cancelled.
 [[nodiscard]] Result<LoadedWorld> load_world(const WorldStore& world, const LoadOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
 
-/// The same without chunks: its grids are partial, and nothing of them is loaded (Grid::make_partial). The saver keeps
-/// what is edited in what is loaded later; what is not loaded stays as it is stored.
+/// Loads a world's scene without chunks: its grids are partial, with all chunks unloaded (Grid::make_partial). The
+/// saver saves edits of chunks that are loaded later; unloaded chunks stay as stored.
 [[nodiscard]] Result<LoadedWorld> load_partial_world(const WorldStore& world, const LoadOptions& options = {});
 
-/// Writes a scene as a new world, in place of what is there; it appears whole or not at all. Returns its size.
-/// `more`: as WorldSaver::save.
+/// Writes a scene as a new world, replacing an existing file atomically. Returns its size. `more`: see
+/// WorldSaver::save.
 ///
-/// Errors: those of WorldSaver::save; CannotWrite, also where another program writes the world that is there.
+/// Errors: those of WorldSaver::save; CannotWrite, also if another process writes the existing world.
 [[nodiscard]] Result<SavedScene> write_world(const Scene& scene, const std::filesystem::path& path,
                                              Threads threads = {}, const Progress& progress = {},
                                              WorldChanges more = {});
-/// The same with the sun and the cameras of a scene that was read.
+/// Writes a loaded scene with its sun and cameras as a new world.
 [[nodiscard]] Result<SavedScene> write_world(const LoadedScene& loaded, const std::filesystem::path& path,
                                              Threads threads = {}, const Progress& progress = {},
                                              WorldChanges more = {});

@@ -24,19 +24,20 @@ namespace store {
 struct ChangeSet;
 }
 
-/// What a world knows of a grid, but for its chunks.
+/// The properties of a grid in a world, without its chunks.
 struct WorldGrid {
   std::string name{};
   DVec3 pivot{0.0};   ///< as SceneGrid
   IBox canvas{};      ///< as SceneGrid
-  float band = 8.0F;  ///< of its densities, as DensityGrid; it must not change once there are any
+  float band = 8.0F;  ///< band of its density field, as in DensityGrid; must not change once densities are stored
 
   bool operator==(const WorldGrid&) const = default;
 };
 
 enum class WorldAccess : std::uint8_t { Read, Write };
 
-/// What is saved together: all of it, or after a power cut none of it. Later changes of one thing replace earlier ones.
+/// A set of changes that is saved atomically: after a power cut, the file has all of them or none. A later change of
+/// the same item replaces an earlier one.
 class WorldChanges {
  public:
   WorldChanges();
@@ -44,21 +45,22 @@ class WorldChanges {
   WorldChanges& operator=(WorldChanges&&) noexcept;
   ~WorldChanges();
 
-  /// Cost: a pointer or two; chunks are shared with the grids that they are from, which may be edited meanwhile.
+  /// Stores a chunk. Cost: copies a few pointers; chunks share storage with their grids, which may be edited
+  /// afterwards.
   void put_chunk(const ChunkPlace& place, StoredChunk chunk);
-  /// As if it had never been made.
+  /// Removes a chunk, as if it had never been generated.
   void remove_chunk(const ChunkPlace& place);
-  /// The types of a registry, from one on. A type that chunks use may change, but not go.
+  /// Stores the types of a registry, from `first` on. Types in use can be changed but not removed.
   void put_types(const VoxelRegistry& types, VoxelType first = 1);
-  /// Requires: not air.
+  /// Stores one type. Requires: not air.
   void put_type(VoxelType type, const VoxelProperties& properties);
   void put_grid(std::uint32_t number, const WorldGrid& grid);
-  /// The grid and all its chunks.
+  /// Removes the grid and all its chunks.
   void remove_grid(std::uint32_t number);
-  /// What a game keeps beside the world: an inventory, the time of day. Any bytes under any name, up to 64 MiB.
+  /// Stores a game-defined value (inventory, time of day, ...) of up to 64 MiB under any name.
   void put_value(std::string name, std::vector<std::byte> bytes);
   void remove_value(std::string name);
-  /// What shows the world in lists: a PNG, up to 16 MiB. Whoever saves draws it, at any time; it stays until the next.
+  /// Stores a preview image for world lists, a PNG of up to 16 MiB. The caller renders it; it stays until replaced.
   void put_thumbnail(std::vector<std::byte> png);
   void remove_thumbnail();
 
@@ -71,20 +73,20 @@ class WorldChanges {
   std::unique_ptr<store::ChangeSet> content_;
 };
 
-/// A save that was begun: WorldStore::wait.
+/// Identifies a save: see WorldStore::wait.
 struct SaveTicket {
-  std::uint64_t number = 0;  ///< later saves have greater ones; 0: nothing was to be saved
+  std::uint64_t number = 0;  ///< later saves have greater numbers; 0: there was nothing to save
 };
 
 struct WorldStats {
-  std::uint64_t pending_chunks = 0;  ///< that are not on disk yet
-  std::uint64_t pending_bytes = 0;   ///< of memory that these take
+  std::uint64_t pending_chunks = 0;  ///< not on disk yet
+  std::uint64_t pending_bytes = 0;   ///< memory of the pending chunks
   std::uint64_t saved_chunks = 0;    ///< since the world was opened
-  std::uint64_t saved_bytes = 0;     ///< of these, on disk
+  std::uint64_t saved_bytes = 0;     ///< size on disk of the saved chunks
   std::uint64_t commits = 0;
 };
 
-/// A world on disk, in one file (docs/formats/world.md): chunks of any number of grids, and all that a scene has.
+/// A world on disk in one file (docs/formats/world.md): the chunks of any number of grids, and the scene.
 ///
 ///   auto world = quoin::WorldStore::open("home.quoin", quoin::WorldAccess::Write);
 ///   quoin::WorldChanges changes;
@@ -92,64 +94,69 @@ struct WorldStats {
 ///   if (const auto begun = world->save(std::move(changes)); !begun) complain(begun.error());  // on its own thread
 ///   if (const auto saved = world->flush(); !saved) complain(saved.error());
 ///
-/// Safety:  what `wait`, `flush` or a callback said was saved survives kill -9 and power cuts. Until then it is there
-///          after a crash as a whole or not at all, never in part.
-/// Writers: one at a time, of all processes of the machine; readers any number, which see each save as a whole.
-/// Threads: any function from any thread, also at once. `load_chunk` sees what was saved before, on disk or not yet.
-/// Files:   beside NAME there are NAME-wal, NAME-shm and NAME-lock while it is written, of which the first belongs to
-///          it: after a crash it holds what was saved last. On network file systems there is no -wal; readers then wait
-///          for writers.
-/// Requires: nothing but Quoin opens and closes the file in this process while it is open: that would end its locks.
-/// Lifetime: moving it is cheap; it waits for its saves when it ends.
+/// Safety:   once `wait`, `flush` or a callback reports a save as done, it survives kill -9 and power cuts. Before
+///           that, a crash leaves either the whole save or none of it.
+/// Writers:  one at a time among all processes on the machine. Any number of readers; each sees a save entirely or not
+///           at all.
+/// Threads:  any function may be called from any thread, also at once. `load_chunk` sees earlier saves, on disk or
+///           pending.
+/// Files:    while NAME is written, NAME-wal, NAME-shm and NAME-lock exist next to it. NAME-wal is part of the world:
+///           after a crash it holds the latest saves. On network file systems there is no -wal, and readers wait for
+///           writers.
+/// Requires: while the world is open, only Quoin opens and closes the file in this process; any other close would
+///           release its locks.
+/// Lifetime: moving it is cheap. The destructor waits for pending saves.
 class WorldStore {
  public:
-  /// Makes a new, empty world, open for writing. It appears whole or not at all.
-  /// Errors: CannotWrite, also where there is a file of that name; Unsupported in builds without SQLite.
+  /// Creates a new, empty world atomically and opens it for writing.
+  /// Errors: CannotWrite, also if the file exists; Unsupported in builds without SQLite.
   [[nodiscard]] static Result<WorldStore> create(const std::filesystem::path& path, Threads threads = {});
-  /// Errors: CannotRead, CannotWrite (another writer, a read-only file); BadFormat (no world, cut off, damaged beyond
-  ///         reading: see repair_world); Unsupported (of a later version; in builds without SQLite).
+  /// Opens a world.
+  /// Errors: CannotRead; CannotWrite (another writer, a read-only file); BadFormat (not a world, truncated, too damaged
+  ///         to read: see repair_world); Unsupported (a later version; builds without SQLite).
   [[nodiscard]] static Result<WorldStore> open(const std::filesystem::path& path, WorldAccess access,
                                                Threads threads = {});
-  /// Opens a world for writing; makes it where there is none. Errors: as those two.
+  /// Opens a world for writing, or creates it if the file does not exist. Errors: as `open` and `create`.
   [[nodiscard]] static Result<WorldStore> open_or_create(const std::filesystem::path& path, Threads threads = {});
   WorldStore(WorldStore&&) noexcept;
   WorldStore& operator=(WorldStore&&) noexcept;
   ~WorldStore();
 
-  /// The chunk; nothing where there is none, which is not the same as air.
-  /// Errors: BadFormat where it is damaged; CannotRead.
+  /// Loads a chunk. Returns nullopt if it is not stored, which differs from air.
+  /// Errors: BadFormat if it is damaged; CannotRead.
   [[nodiscard]] Result<std::optional<StoredChunk>> load_chunk(const ChunkPlace& place) const;
-  /// The places of all chunks of a grid and level that lie in a box of chunk coordinates (half open), sorted by z, then
-  /// y, then x. Cost: O(volume of the box) or O(chunks of the regions, of 32^3 chunks, that it meets), the lesser.
+  /// Returns the coordinates of all stored chunks of a grid and level in a box of chunk coordinates (half open), sorted
+  /// by z, then y, then x. Cost: the lesser of O(box volume) and O(chunks in the regions of 32^3 chunks that the box
+  /// touches).
   [[nodiscard]] Result<std::vector<IVec3>> chunks(std::uint32_t grid, std::uint8_t level, const IBox& box) const;
-  /// The same of a whole level.
+  /// Returns the coordinates of all stored chunks of a level, sorted as above.
   [[nodiscard]] Result<std::vector<IVec3>> chunks(std::uint32_t grid, std::uint8_t level) const;
-  /// The types of its voxels; those that are damaged are magenta ones of other names. Errors: CannotRead.
+  /// Returns the voxel types. Damaged types are replaced by magenta ones with other names. Errors: CannotRead.
   [[nodiscard]] Result<VoxelRegistry> types() const;
-  /// Its grids by their numbers; those that are damaged are nameless. Errors: as `types`.
+  /// Returns the grids by number. Damaged grids have no name. Errors: as `types`.
   [[nodiscard]] Result<std::map<std::uint32_t, WorldGrid>> grids() const;
-  /// A number for a new grid, which no grid had before, and which no other call returns.
+  /// Returns an unused grid number, which no earlier grid had and no other call returns.
   [[nodiscard]] std::uint32_t next_grid();
-  /// Nothing where none was put. Errors: BadFormat where it is damaged; CannotRead.
+  /// Returns a value, or nullopt if it is not stored. Errors: BadFormat if it is damaged; CannotRead.
   [[nodiscard]] Result<std::optional<std::vector<std::byte>>> value(std::string_view name) const;
-  /// The names of all values, sorted.
+  /// Returns the names of all values, sorted.
   [[nodiscard]] Result<std::vector<std::string>> value_names() const;
 
-  /// The PNG that shows the world; nothing where none was put. Errors: as `value`.
+  /// Returns the thumbnail PNG, or nullopt if there is none. Errors: as `value`.
   [[nodiscard]] Result<std::optional<std::vector<std::byte>>> thumbnail() const;
 
-  /// Saves, on the world's own thread; returns at once. `on_saved` is called there once it is on disk, or when it
-  /// failed; it must not call `wait` or `flush`. What failed is kept in memory, read by `load_chunk`, and tried again
-  /// with the next save or `flush`.
-  /// Errors: InvalidArgument, and nothing is saved: types with fewer state bits than before; chunks with types, or of
-  ///         grids, that were never put; voxels' data with more state bits than their type has, or more than 64 MiB in
-  ///         one chunk; a value of more; a thumbnail that is no PNG.
+  /// Starts a save on the world's own thread and returns at once. Calls `on_saved` on that thread after success or
+  /// failure; the callback must not call `wait` or `flush`. A failed save stays in memory, where `load_chunk` finds it,
+  /// and is retried with the next save or `flush`.
+  /// Errors:   InvalidArgument, and nothing is saved, for types with fewer state bits than before; chunks with types or
+  ///           grids that were never stored; per-voxel data with more state bits than its type or more than 64 MiB in
+  ///           one chunk; a value above 64 MiB; a thumbnail that is not a PNG.
   /// Requires: open for writing.
   Result<SaveTicket> save(WorldChanges changes, std::function<void(const Status&)> on_saved = {});
-  /// Waits until that save is on disk. Errors: CannotWrite (a full disk ...): it is not, but kept.
+  /// Waits until a save is on disk. Errors: CannotWrite (disk full, ...); the save is not on disk but stays in memory.
   /// Requires: a ticket of this world.
   [[nodiscard]] Status wait(SaveTicket ticket);
-  /// Waits for all that was saved before; of what failed it tries again. Errors: as `wait`.
+  /// Waits for all earlier saves and retries failed ones. Errors: as `wait`.
   [[nodiscard]] Status flush();
   [[nodiscard]] WorldStats stats() const;
 

@@ -13,9 +13,9 @@
 
 namespace quoin {
 
-/// Makes the chunks of a grid that its world does not hold yet: a landscape, another program's world.
+/// Generates the chunks that a world does not hold yet: a landscape, or another program's world.
 ///
-/// Threads: `make` is called from several at once.
+/// Threads: `make` is called from several threads at once.
 class ChunkGenerator {
  public:
   ChunkGenerator() = default;
@@ -23,28 +23,28 @@ class ChunkGenerator {
   ChunkGenerator& operator=(const ChunkGenerator&) = delete;
   virtual ~ChunkGenerator() = default;
 
-  /// The box of chunks (half open) outside of which all is air, which is never asked for; it must not change.
+  /// Returns the box of chunks (half open) that `make` can fill. Everything outside is air. The box must not
+  /// change.
   [[nodiscard]] virtual IBox chunks() const = 0;
-  /// One chunk, in types of the world's registry; densities within the band of the grid's field.
-  /// Errors: whatever kept it from being made. The chunk is then air, and asked for anew when the world is opened
-  ///         again; a StreamedWorld tells of it by `take_problems`. It throws nothing but bad_alloc.
+  /// Makes one chunk, with types of the world's registry, and densities within the band of the grid's field.
+  /// Errors: any. The chunk is then air until the world is opened again, and StreamedWorld::take_problems reports the
+  ///         error. Throws only bad_alloc.
   [[nodiscard]] virtual Result<StoredChunk> make(IVec3 chunk) const = 0;
 };
 
-/// A landscape without an end: the worlds of `generate_terrain` and `generate_smooth_terrain`, each of which is a piece
-/// of it.
+/// An endless landscape. The worlds of `generate_terrain` and `generate_smooth_terrain` are pieces of it.
 struct EndlessTerrain {
   std::uint64_t seed = 42;
-  int height = 4;          ///< chunks from 0 upwards: 1 to 16
-  bool is_smooth = false;  ///< a field of densities instead of voxels
+  int height = 4;          ///< in chunks, from 0 upwards: 1 to 16
+  bool is_smooth = false;  ///< makes a density field instead of voxels
 
   bool operator==(const EndlessTerrain&) const = default;
 };
 
-/// Its generator. Bits: as `generate_terrain`; each chunk is that of any piece of this height and seed that holds it,
-/// but for what lies within a chunk of the piece's sides. It reaches 2^24 voxels from the origin.
-/// Errors: InvalidArgument for heights out of their range; LimitExceeded where the registry is full: `types` gets the
-///         landscape's (`add_terrain_types`).
+/// Returns the generator of an endless landscape and adds the landscape's types (`add_terrain_types`) to `types`. Each
+/// chunk equals the chunk of any `generate_terrain` piece with the same height and seed, except within a chunk of the
+/// piece's sides. The landscape extends 2^24 voxels from the origin.
+/// Errors: InvalidArgument for a height out of range; LimitExceeded if the registry is full.
 [[nodiscard]] Result<std::shared_ptr<const ChunkGenerator>> make_terrain_generator(const EndlessTerrain& terrain,
                                                                                    VoxelRegistry& types);
 

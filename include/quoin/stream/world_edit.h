@@ -15,35 +15,35 @@
 
 namespace quoin {
 
-/// An edit as data, which can be kept, sent and repeated elsewhere. What it does to a voxel or sample depends on that
-/// alone, and on nothing beside it, so that it can be done chunk by chunk, each when it is loaded.
+/// An edit as data, to be stored, sent and replayed. Its effect on a voxel or sample depends only on that voxel or
+/// sample, so it can be applied chunk by chunk, as chunks are loaded.
 struct WorldEdit {
-  /// As Grid::set of several.
+  /// Like Grid::set for several voxels.
   struct SetVoxels {
     std::vector<PlacedVoxel> voxels;
     bool operator==(const SetVoxels&) const = default;
   };
-  /// As Grid::set_data.
+  /// Like Grid::set_data.
   struct SetData {
     IVec3 voxel{0};
     std::uint32_t state = 0;
     std::vector<std::byte> bytes{};
     bool operator==(const SetData&) const = default;
   };
-  /// As Grid::fill_box.
+  /// Like Grid::fill_box.
   struct FillBox {
     IBox box;
     VoxelType type = kAir;
     bool operator==(const FillBox&) const = default;
   };
-  /// As Grid::fill_sphere.
+  /// Like Grid::fill_sphere.
   struct FillSphere {
     DVec3 centre{0.0};
     double radius = 0.0;
     VoxelType type = kAir;
     bool operator==(const FillSphere&) const = default;
   };
-  /// As DensityGrid::add_sphere; with kAir remove_sphere.
+  /// Like DensityGrid::add_sphere, or remove_sphere with kAir.
   struct FieldSphere {
     DVec3 centre{0.0};
     double radius = 0.0;
@@ -51,7 +51,7 @@ struct WorldEdit {
     VoxelType material = kAir;
     bool operator==(const FieldSphere&) const = default;
   };
-  /// As DensityGrid::add_box; with kAir remove_box.
+  /// Like DensityGrid::add_box, or remove_box with kAir.
   struct FieldBox {
     DVec3 min{0.0};
     DVec3 max{0.0};
@@ -62,49 +62,51 @@ struct WorldEdit {
   };
   using Content = std::variant<SetVoxels, SetData, FillBox, FillSphere, FieldSphere, FieldBox>;
 
-  std::uint32_t grid = 0;  ///< the grid's number in the world (StreamedWorld::number_of), the same on all machines
+  std::uint32_t grid = 0;  ///< the grid's number in the world (StreamedWorld::number_of), equal on all machines
   Content content;
 
   bool operator==(const WorldEdit&) const = default;
 };
 
-/// Chunks of one edit at most.
+/// Maximum number of chunks that one edit may touch.
 inline constexpr std::size_t kMaxEditChunks = 1U << 16;
 
-/// The chunks that an edit may change, each once, sorted by z, then y, then x. `band`: of the grid's field.
-/// Errors: LimitExceeded where there are more than kMaxEditChunks; InvalidArgument for sizes, places and blends that
-///         are not finite or negative.
+/// Returns the chunks that an edit may change, without duplicates, sorted by z, then y, then x. `band`: of the grid's
+/// field.
+/// Errors: LimitExceeded for more than kMaxEditChunks; InvalidArgument for sizes, positions and blends that are not
+///         finite, or sizes and blends that are negative.
 [[nodiscard]] Result<std::vector<IVec3>> chunks_of_edit(const WorldEdit& edit, float band = 8.0F);
 
-/// Does it to what is loaded of a grid. Returns how many voxels or samples changed.
+/// Applies an edit to the loaded chunks of a grid. Returns the number of changed voxels or samples.
 std::int64_t apply_edit(const WorldEdit& edit, Grid& grid, DensityGrid& field);
 
-/// An edit with its place in the order of all.
+/// An edit with its position in the global order.
 struct LoggedEdit {
-  std::uint64_t number = 0;  ///< the greater the later
-  std::uint32_t author = 0;  ///< of edits with one number that of the least author comes first
+  std::uint64_t number = 0;  ///< greater is later
+  std::uint32_t author = 0;  ///< orders edits with equal numbers: lower authors first
   WorldEdit edit;
 
   bool operator==(const LoggedEdit&) const = default;
 };
 
-/// Edits in their order: what a server sends to its players, or a game keeps to replay.
+/// An ordered log of edits, to send from a server to players or to store for replay.
 ///
-/// Same bytes: whoever applies equal logs to equal worlds has equal worlds, on any machine.
-/// Merging:    logs of several authors are merged by number, then author. What was merged once may be merged again.
+/// Same bytes: equal logs applied to equal worlds give equal worlds, on any machine.
+/// Merging:    logs of several authors are merged by number, then author. Merging a log twice has no further effect.
 class EditLog {
  public:
-  /// Requires: it comes after the last one (number, author).
+  /// Appends an edit. Requires: its (number, author) is greater than the last edit's.
   void add(LoggedEdit edit);
   [[nodiscard]] const std::vector<LoggedEdit>& edits() const { return edits_; }
   [[nodiscard]] bool empty() const { return edits_.empty(); }
 
-  /// All edits of both, each (number, author) once. Errors: InvalidArgument where two of one number and author differ.
+  /// Returns all edits of both logs, each (number, author) once. Errors: InvalidArgument if two different edits have
+  /// the same number and author.
   [[nodiscard]] static Result<EditLog> merged(const EditLog& a, const EditLog& b);
 
-  /// The log as bytes (docs/formats/edit_log.md), with a checksum an edit.
+  /// Encodes the log (docs/formats/edit_log.md), with a checksum per edit.
   [[nodiscard]] std::vector<std::byte> encode() const;
-  /// Errors: BadFormat, with the offset, where a byte is wrong, missing or left over; nothing is taken then.
+  /// Decodes a log. Errors: BadFormat, with the offset, for a wrong, missing or extra byte; no edits are returned.
   [[nodiscard]] static Result<EditLog> decode(std::span<const std::byte> bytes);
 
  private:
