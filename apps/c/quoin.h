@@ -1,16 +1,15 @@
-/* Quoin for C99 and whatever speaks C: files of voxels, arrays, meshes, pictures and rays.
+/* Quoin's C99 interface, for C and languages that call C: voxel files, arrays, meshes, images and rays.
  *
- * Status:   every function that can fail returns QUOIN_OK or a code; quoin_last_error() then says why, in one line.
- *           No call ends the process, and no exception leaves it.
- * Handles:  scenes and meshes are numbers. One that was freed, or never given, is QUOIN_BAD_HANDLE. 0 is none.
- * Arrays:   the caller owns what he gives and what he has filled. What quoin_mesh_view shows belongs to the mesh, and
- *           lasts until that is freed.
- * Structs:  set `size` to sizeof the struct (QUOIN_INIT does). Later versions add to its end: a program that was made
- *           with an older header, whose struct is shorter, goes on as it was.
- * Axes:     right-handed, +Y up; a voxel (x, y, z) fills the cube from there to (x + 1, y + 1, z + 1).
- * Threads:  any thread may call. Any number read a scene at once; who changes it, or saves it, has it to himself
- *           meanwhile, and others wait.
- */
+ * Status:   every function that can fail returns QUOIN_OK or an error code; quoin_last_error() then returns the reason,
+ *           in one line. No call ends the process or throws an exception.
+ * Handles:  scenes and meshes are numbers. A freed or unknown handle gives QUOIN_BAD_HANDLE. 0 is no object.
+ * Arrays:   the caller owns its input and output arrays. Arrays from quoin_mesh_view belong to the mesh and are valid
+ *           until it is freed.
+ * Structs:  set `size` to sizeof the struct (QUOIN_INIT does). Later versions add fields at the end; programs compiled
+ *           with an older header, whose structs are shorter, keep working.
+ * Axes:     right-handed, +Y up; voxel (x, y, z) fills the cube from there to (x + 1, y + 1, z + 1).
+ * Threads:  any thread may call. Any number of threads read a scene at once; a change or a save has exclusive access,
+ *           and other calls wait. */
 #ifndef QUOIN_C_H
 #define QUOIN_C_H
 /* NOLINTBEGIN(readability-*,modernize-*,performance-*,cppcoreguidelines-*): this is C */
@@ -28,14 +27,14 @@ extern "C" {
 #define QUOIN_API
 #endif
 
-/* An empty struct of `type`: every number 0, which means its default, but for three: of quoin_type alpha (0: nothing is
- * to be seen of it) and roughness (0: a mirror), of quoin_instance visible (0: hidden). */
+/* An empty struct of `type`. Every number is 0, which means its default, with three exceptions: quoin_type alpha (0:
+ * invisible), quoin_type roughness (0: a mirror) and quoin_instance visible (0: hidden). */
 #define QUOIN_INIT(type) \
   { .size = sizeof(type) }
 
 typedef enum quoin_status {
   QUOIN_OK = 0,
-  QUOIN_INVALID_ARGUMENT = 1, /* null, NaN, a size that cannot be, an index out of range */
+  QUOIN_INVALID_ARGUMENT = 1, /* null, NaN, invalid size, index out of range */
   QUOIN_CANNOT_READ = 2,
   QUOIN_CANNOT_WRITE = 3,
   QUOIN_BAD_FORMAT = 4,
@@ -70,19 +69,19 @@ typedef struct quoin_array {
   const void* data;
   int32_t scalar; /* quoin_scalar */
   int64_t shape[3];
-  int64_t strides[3]; /* bytes, of any sign; all three 0: without gaps, z fastest and x slowest */
-  double spacing[3];  /* of neighbours; all three 0: 1 */
-  double origin[3];   /* where sample (0, 0, 0) lies */
+  int64_t strides[3]; /* in bytes, of any sign; all 0: contiguous, z fastest, x slowest */
+  double spacing[3];  /* between samples; all 0: 1 */
+  double origin[3];   /* position of sample (0, 0, 0) */
 } quoin_array;
 
 typedef struct quoin_grid_info {
   size_t size;
-  char name[128]; /* UTF-8, cut off where it is longer */
+  char name[128]; /* UTF-8, truncated if longer */
   int64_t voxels;
-  int32_t min[3]; /* of the tight box around its voxels, or its field's solid */
+  int32_t min[3]; /* of the tight box around its voxels or its field's solid */
   int32_t extent[3];
-  int32_t has_field; /* densities: the surface of a volume */
-  double pivot[3];   /* the point about which instances turn it, in its voxels */
+  int32_t has_field; /* has a density field: the surface of a volume */
+  double pivot[3];   /* centre of rotation for instances, in voxels */
 } quoin_grid_info;
 
 typedef struct quoin_type {
@@ -92,67 +91,68 @@ typedef struct quoin_type {
   float metalness; /* 0 to 1 */
   float roughness; /* 0 to 1; QUOIN_INIT's 0 is a mirror */
   char name[128];
-  int32_t transparent; /* given: 0 is what rgba's alpha says */
-  float ior;           /* index of refraction of what is transparent; given: 0 is 1.5 */
-  float scattering;    /* of clouds: how often light is scattered on a voxel's length; 0: glass */
-  float anisotropy;    /* of that: the mean cosine of the angle, -1 to 1 */
+  int32_t transparent; /* input: 0: from rgba's alpha */
+  float ior;           /* index of refraction, if transparent; input: 0 is 1.5 */
+  float scattering;    /* clouds: mean number of scatterings per voxel length; 0: glass */
+  float anisotropy;    /* clouds: mean cosine of the scattering angle, -1 to 1 */
 } quoin_type;
 
 /* One placement of a grid in the world. */
 typedef struct quoin_instance {
   size_t size;
-  char name[128];             /* UTF-8; cut off at its end where it is longer */
-  size_t grid;                /* its number; of an instance of no grid as many as there are */
-  double world_from_grid[12]; /* three rows of four: takes a point (x, y, z, 1) of the grid, in voxels, to the world */
-  int32_t visible;            /* its own switch */
-  int32_t shown;              /* told: whether its groups and its layer show it too */
-  size_t group;               /* that it belongs to, counted from 1; 0: none */
-  char layer[128];            /* told: the name of its layer */
+  char name[128]; /* UTF-8, truncated if longer */
+  size_t grid;    /* grid number; the number of grids if it has no valid grid */
+  /* Three rows of four: transforms a point (x, y, z, 1) from the grid, in voxels, to the world. */
+  double world_from_grid[12];
+  int32_t visible; /* the instance's own flag */
+  int32_t shown;   /* output: also considers its groups and layer */
+  size_t group;    /* parent group, counted from 1; 0: none */
+  char layer[128]; /* output: layer name */
 } quoin_instance;
 
-/* Instances, and groups, that belong together. Places are those of the world, whatever the groups. */
+/* A group of instances and other groups. All transforms are in world space, independent of groups. */
 typedef struct quoin_group {
   size_t size;
   char name[128];
-  size_t parent; /* counted from 1, less than its own number; 0: none */
+  size_t parent; /* counted from 1, less than the group's own number; 0: none */
   int32_t shown;
   char layer[128];
 } quoin_group;
 
-/* A camera of the file. right, up and forward are unit, and perpendicular. */
+/* A camera of a file. right, up and forward are perpendicular unit vectors. */
 typedef struct quoin_camera {
   size_t size;
-  int32_t number;   /* that the file has it under */
-  int32_t is_first; /* to be looked through at first */
+  int32_t number;   /* number in the file */
+  int32_t is_first; /* the initial camera */
   int32_t is_orthographic;
   double position[3];
   double right[3], up[3], forward[3];
-  double vertical_fov_degrees; /* of perspective */
-  double view_height;          /* of orthographic: world units from the picture's lower edge to its upper */
-  double focus_distance;       /* 0: not said */
+  double vertical_fov_degrees; /* perspective */
+  double view_height;          /* orthographic: world units from the image's bottom edge to its top edge */
+  double focus_distance;       /* 0: not stored */
 } quoin_camera;
 
-/* A light without a body; types that emit are lights by themselves. */
+/* A light without geometry. Types with emission are lights by themselves. */
 typedef struct quoin_lamp {
   size_t size;
   char name[128];
-  int32_t is_spot; /* else it shines into all directions alike */
+  int32_t is_spot; /* 0: shines equally in all directions */
   double position[3], direction[3];
   float colour[3];                                 /* linear */
-  double intensity;                                /* the light of a white surface that faces it 1 world unit away */
-  double range;                                    /* infinity: without an end */
-  double inner_angle_degrees, outer_angle_degrees; /* of a spot, from its middle */
+  double intensity;                                /* light received by a white surface facing it at 1 world unit */
+  double range;                                    /* infinity: unlimited */
+  double inner_angle_degrees, outer_angle_degrees; /* of a spot, from its axis */
 } quoin_lamp;
 
-/* What a file says, or a scene is, as a whole. */
+/* Properties of a scene or its file. */
 typedef struct quoin_scene_info {
   size_t size;
-  char format[32]; /* "vox"; empty of a scene that was not read */
-  double min[3];   /* the box around what is shown, in the world; all 0 where nothing is */
+  char format[32]; /* "vox"; empty if the scene was not loaded */
+  double min[3];   /* bounds of everything visible, in world space; all 0 if empty */
   double max[3];
   int32_t has_sun;
-  double sun[3];      /* from the scene towards it */
-  int64_t last_frame; /* of its animation */
+  double sun[3];      /* from the scene towards the sun */
+  int64_t last_frame; /* of the animation */
 } quoin_scene_info;
 
 typedef struct quoin_format {
@@ -161,39 +161,42 @@ typedef struct quoin_format {
   char extensions[64]; /* ".kv6 .kvx" */
   char description[128];
   int32_t readable, writable;
-  int32_t is_mesh; /* triangles */
+  int32_t is_mesh; /* contains triangles */
 } quoin_format;
 
-/* What a mesh has; null where it has none. One entry a vertex, but for indices and interfaces. */
+/* The arrays of a mesh; null if absent. Arrays have one entry per vertex, except indices and interfaces. */
 typedef struct quoin_mesh_data {
   size_t size;
   size_t vertex_count;
   size_t index_count;
   size_t interface_count;
-  const float* positions;    /* [vertex_count][3] */
-  const float* normals;      /* [vertex_count][3], unit */
-  const uint8_t* colours;    /* [vertex_count][4], sRGB, without occlusion; of grids */
-  const float* occlusion;    /* [vertex_count], 0 open to 1 dark; of grids */
-  const uint32_t* indices;   /* three a triangle, counter-clockwise from outside */
-  const int64_t* interfaces; /* [interface_count][4]: back label, front label, first index, count; of labels */
-  const uint16_t* types;     /* [vertex_count], of grids meshed as blocks: first blocks, four vertices and six indices a
-                                face (watertight: or more of both), then the surfaces of fields, whose type is 0 */
+  const float* positions;  /* [vertex_count][3] */
+  const float* normals;    /* [vertex_count][3], unit */
+  const uint8_t* colours;  /* [vertex_count][4], sRGB, without occlusion; for grids */
+  const float* occlusion;  /* [vertex_count], 0 open to 1 dark; for grids */
+  const uint32_t* indices; /* three per triangle, counter-clockwise seen from outside */
+  /* [interface_count][4]: back label, front label, first index, index count; for labels. */
+  const int64_t* interfaces;
+  /* [vertex_count], for grids meshed as blocks. Blocks come first, with four vertices and six indices per face
+   * (watertight: possibly more). The surfaces of fields follow, with type 0. */
+  const uint16_t* types;
 } quoin_mesh_data;
 
 typedef struct quoin_mesh_options {
   size_t size;
-  int32_t smooth;       /* 0: blocks; else smooth surfaces around them */
-  int32_t no_occlusion; /* of blocks */
+  int32_t smooth;       /* 0: blocks; else smooth surfaces */
+  int32_t no_occlusion; /* blocks only */
   int32_t threads;      /* 0: all */
   int32_t reserved;     /* not read: padding of earlier versions */
-  int32_t watertight; /* of blocks: no corner of a face lies inside another's edge, so no gaps are seen there. Faces get
-                           more triangles. Smooth surfaces always are */
+  /* Blocks only: no face corner lies inside another face's edge, which avoids visible gaps but makes more triangles.
+   *              Smooth surfaces are always watertight. */
+  int32_t watertight;
 } quoin_mesh_options;
 
-/* How a picture says heights. */
+/* The encoding of heights in an image. */
 typedef enum quoin_heights {
   QUOIN_HEIGHTS_NONE = 0,
-  QUOIN_HEIGHTS_GREY = 1,     /* a height is a level, of 8 or 16 bits, times metres_per_level */
+  QUOIN_HEIGHTS_GREY = 1,     /* height = level (8 or 16 bits) * metres_per_level */
   QUOIN_HEIGHTS_MAPBOX = 2,   /* terrain-RGB: (65,536 R + 256 G + B) / 10 - 10,000 metres */
   QUOIN_HEIGHTS_TERRARIUM = 3 /* 256 R + G + B / 256 - 32,768 metres */
 } quoin_heights;
@@ -201,45 +204,50 @@ typedef enum quoin_heights {
 typedef struct quoin_load_options {
   size_t size;
   int32_t threads;     /* 0: all */
-  int32_t show_hidden; /* what is hidden becomes visible */
-  int32_t frame;       /* of an animation */
-  int32_t radius;      /* of a world that is read by chunks: of 64 voxels, around its spawn; 0: 4 */
-  int32_t has_iso;     /* of a volume: what is above `iso` is solid; else a value is found */
+  int32_t show_hidden; /* shows hidden instances, groups and layers */
+  int32_t frame;       /* animation frame */
+  /* For worlds read by chunks: chunks of 64 voxels around the spawn; 0: 4. */
+  int32_t radius;
+  int32_t has_iso; /* volumes: values above `iso` are solid; 0: automatic threshold */
   float iso;
-  int32_t mesh_voxels;  /* of a file of triangles: voxels along its longest side; 0: 128 */
-  double voxel_size;    /* or of this size, in the file's unit */
-  int32_t raw_shape[3]; /* the file holds values alone, so many along each axis, the first one fastest; all 0: it is
-                            another file */
-  int32_t raw_scalar;   /* quoin_scalar, of these */
+  int32_t mesh_voxels; /* triangle files: voxels along the longest side; 0: 128 */
+  double voxel_size;   /* overrides mesh_voxels; in the file's unit */
+  /* For files of raw values: the number of values along each axis, the first axis fastest; all 0: another format. */
+  int32_t raw_shape[3];
+  int32_t raw_scalar; /* quoin_scalar of the raw values */
   int32_t raw_big_endian;
-  int32_t heights;             /* quoin_heights: the file is a picture (PNG) of the heights of a landscape */
-  double metres_per_level;     /* 0: 1 */
-  double metres_per_pixel;     /* between neighbouring heights; 0: 1, with a warning */
-  double metres_per_voxel;     /* 0: metres_per_pixel */
-  double exaggeration;         /* heights times this; 0: 1 */
-  int32_t ground_depth;        /* voxels of ground below the lowest height, up to 4,096; 0: 8 */
-  int32_t smooth_ground;       /* densities, whose surface is smooth, rather than voxels */
-  int32_t allow_outside_files; /* the file may name files outside its folder: for input from a trusted source only */
-  const char* dimension; /* of a Minecraft world: "overworld", "nether", "end" or "NAMESPACE:NAME"; null or "": the
-                                  overworld, or the first that the world has. Other files ignore it */
+  int32_t heights;         /* quoin_heights: the file is a height map image (PNG) */
+  double metres_per_level; /* 0: 1 */
+  double metres_per_pixel; /* between neighbouring samples; 0: 1, with a warning */
+  double metres_per_voxel; /* 0: metres_per_pixel */
+  double exaggeration;     /* factor on heights; 0: 1 */
+  int32_t ground_depth;    /* voxels of ground below the lowest height, up to 4,096; 0: 8 */
+  int32_t smooth_ground;   /* makes a density field with a smooth surface instead of voxels */
+  /* The file may name files outside its folder: only for input from a trusted source. */
+  int32_t allow_outside_files;
+  /* For Minecraft worlds: "overworld", "nether", "end" or "NAMESPACE:NAME". Null or "": the overworld, or the first
+   * dimension if there is none. Other files ignore it. */
+  const char* dimension;
 } quoin_load_options;
 
 typedef enum quoin_fill {
-  QUOIN_FILL_ALL = 0,    /* what the triangles enclose, and what they pass through: thin parts stay */
-  QUOIN_FILL_SOLID = 1,  /* voxels whose centre they enclose */
-  QUOIN_FILL_SURFACE = 2 /* voxels that they pass through; hollow */
+  QUOIN_FILL_ALL = 0,    /* enclosed voxels and voxels that triangles touch: keeps thin parts */
+  QUOIN_FILL_SOLID = 1,  /* voxels whose centre is enclosed */
+  QUOIN_FILL_SURFACE = 2 /* voxels that triangles touch; hollow */
 } quoin_fill;
 
-/* Triangles to become voxels. Any soup will do. */
+/* Triangles to voxelise. Any triangle soup is valid. */
 typedef struct quoin_triangles {
   size_t size;
   size_t vertex_count, triangle_count;
-  const float* positions;    /* [vertex_count][3] */
-  const uint32_t* indices;   /* [triangle_count][3], counter-clockwise from outside */
-  const float* colours;      /* [vertex_count][4], linear light and alpha, times the materials'; null: white. Where
-                                alpha is 0 there is no surface, below 1 the voxels are transparent */
-  const uint32_t* materials; /* [triangle_count], of `types`; null: 0 */
-  const quoin_type* types;   /* [type_count], from the first on, each with its size; null: one, light grey */
+  const float* positions;  /* [vertex_count][3] */
+  const uint32_t* indices; /* [triangle_count][3], counter-clockwise seen from outside */
+  /* [vertex_count][4], linear light and alpha, multiplied by the material's; null: white. Alpha 0 is no surface; alpha
+   * below 1 makes transparent voxels. */
+  const float* colours;
+  const uint32_t* materials; /* [triangle_count], indices into `types`; null: 0 */
+  /* [type_count]; the size is set in each element; null: a single light grey type. */
+  const quoin_type* types;
   size_t type_count;
 } quoin_triangles;
 
@@ -247,65 +255,67 @@ typedef struct quoin_voxelize_options {
   size_t size;
   double voxel_size; /* in the unit of positions; 0: 1 */
   int32_t fill;      /* quoin_fill */
-  int32_t max_types; /* that are added: near colours are merged, also of types that differ in colour alone; 0: as many
-                        as there can be */
+  /* Maximum number of added types. Similar colours are merged, also between types that differ only in colour; 0: no
+   * limit. */
+  int32_t max_types;
   int32_t threads;
 } quoin_voxelize_options;
 
 typedef struct quoin_render_options {
   size_t size;
   int32_t width, height; /* 0: 1280 x 720 */
-  int32_t samples;       /* a pixel; 0: 4, of paths 64 */
-  int32_t paths;         /* 0: light by rays; else paths of light */
+  int32_t samples;       /* per pixel; 0: 4, or 64 for path tracing */
+  int32_t paths;         /* 0: ray casting with direct light; else path tracing */
   int32_t threads;       /* 0: all */
-  int32_t has_camera;    /* 0: the whole scene, seen from in front, the right and above */
+  int32_t has_camera;    /* 0: shows the whole scene from the front, right and above */
   double camera[3], look_at[3];
   double fov_degrees; /* vertical; 0: 45 */
-  int32_t has_sun;    /* 0: beside the camera that is in front, the right and above */
-  double sun[3];      /* from the scene towards the sun; any length but 0. The sky follows it */
+  int32_t has_sun;    /* 0: (-0.48, 0.72, 0.5) */
+  /* From the scene towards the sun; any non-zero length. The sky follows the sun. */
+  double sun[3];
 } quoin_render_options;
 
-/* What rays met; arrays of the caller, of one entry a ray; null: not wanted. */
+/* Ray hits: caller-owned arrays with one entry per ray. Null arrays are not filled. */
 typedef struct quoin_hits {
   size_t size;
-  double* t;      /* in lengths of the direction; infinity: nothing was met */
+  double* t;      /* in multiples of the direction's length; infinity: no hit */
   int32_t* voxel; /* [count][3], in its grid */
   uint16_t* type;
-  double* normal; /* [count][3], in the world */
+  double* normal; /* [count][3], in world space */
 } quoin_hits;
 
-/* Told how far a long call has come, 0 to 1. Returns whether to go on: 0 ends the call with QUOIN_CANCELLED. Any thread
- * calls it, one at a time, and it is to call nothing of Quoin's. */
+/* Progress callback, called with the finished fraction of a long call, 0 to 1. Return 0 to cancel the call with
+ * QUOIN_CANCELLED. Any thread may call it, one at a time. It must not call Quoin functions. */
 typedef int32_t (*quoin_progress)(double fraction, void* user);
 
 QUOIN_API const char* quoin_version(void);
-/* Of this thread's last call that failed. Lasts until its next call. Never null. */
+/* Returns the error of this thread's last failed call. Valid until this thread's next call. Never null. */
 QUOIN_API const char* quoin_last_error(void);
-/* Of the calls that this thread makes from now on; null: nobody is told. `user` is handed through. */
+/* Sets the progress callback for later calls of this thread; null removes it. `user` is passed through. */
 QUOIN_API quoin_status quoin_set_progress(quoin_progress progress, void* user);
-/* Frees a scene or a mesh; 0 is none, and fine. */
+/* Frees a scene or a mesh; ignores 0. */
 QUOIN_API quoin_status quoin_free(uint64_t handle);
 
 /* Scenes. `path` is UTF-8. */
 QUOIN_API quoin_status quoin_scene_create(quoin_scene* out);
 QUOIN_API quoin_status quoin_scene_load(const char* path, quoin_scene* out);
 QUOIN_API quoin_status quoin_scene_load_bytes(const void* data, size_t bytes, quoin_scene* out);
-/* The same with options; null: none. */
+/* Load a scene with options; null: defaults. */
 QUOIN_API quoin_status quoin_scene_load_with(const char* path, const quoin_load_options* options, quoin_scene* out);
 QUOIN_API quoin_status quoin_scene_load_bytes_with(const void* data, size_t bytes, const quoin_load_options* options,
                                                    quoin_scene* out);
 QUOIN_API quoin_status quoin_scene_get_info(quoin_scene scene, quoin_scene_info* out);
-/* What files can be read and written. */
+/* Formats that can be read or written. */
 QUOIN_API quoin_status quoin_format_count(size_t* out);
 QUOIN_API quoin_status quoin_format_get(size_t index, quoin_format* out);
-/* By the name's ending: .quoin, .json, .vox and others hold voxels; .glb, .gltf, .obj, .ply, .stl and .3mf their
- * meshes, of blocks. quoin_format_get tells all. */
+/* Saves a scene in the format of the extension. .quoin, .json, .vox and others store voxels; .glb, .gltf, .obj, .ply,
+ * .stl and .3mf store blocky meshes. quoin_format_get lists all formats. */
 QUOIN_API quoin_status quoin_scene_save(quoin_scene scene, const char* path);
-/* One line each: first of what reading left out, and voxelizing merged, then of what the last save left out. */
+/* Warnings, one line each: first from loading and voxelising, then from the last save. */
 QUOIN_API quoin_status quoin_scene_warning_count(quoin_scene scene, size_t* out);
 QUOIN_API quoin_status quoin_scene_warning(quoin_scene scene, size_t index, char* text, size_t capacity);
 
-/* Types of voxels: 0 is air, others count up from 1. */
+/* Voxel types: 0 is air, others count up from 1. */
 QUOIN_API quoin_status quoin_type_count(quoin_scene scene, size_t* out);
 QUOIN_API quoin_status quoin_type_get(quoin_scene scene, size_t index, quoin_type* out);
 QUOIN_API quoin_status quoin_type_add(quoin_scene scene, const quoin_type* type, uint16_t* out);
@@ -313,92 +323,93 @@ QUOIN_API quoin_status quoin_type_add(quoin_scene scene, const quoin_type* type,
 /* Grids, by number. */
 QUOIN_API quoin_status quoin_grid_count(quoin_scene scene, size_t* out);
 QUOIN_API quoin_status quoin_grid_get_info(quoin_scene scene, size_t grid, quoin_grid_info* out);
-/* Writes the types of the voxels from `min` on, shape[0] x shape[1] x shape[2] of them, x slowest and z fastest, as
- * uint16_t[capacity]. */
+/* Writes the voxel types of a box into uint16_t out[capacity]. The box starts at `min` and has shape[0] x shape[1] x
+ * shape[2] voxels; x is slowest, z fastest. */
 QUOIN_API quoin_status quoin_grid_read(quoin_scene scene, size_t grid, const int32_t min[3], const int32_t shape[3],
                                        uint16_t* out, size_t capacity);
-/* Adds a grid of an array of types (QUOIN_UINT8 or QUOIN_UINT16), all of which the scene has, and shows it at
- * array->origin, which is rounded down to whole voxels. `name` may be null, and `out`, its number. */
+/* Adds a grid from an array of types (QUOIN_UINT8 or QUOIN_UINT16), which must exist in the scene. Places it at
+ * array->origin, rounded down to whole voxels. `name` may be null. `out` receives the grid's number and may be null. */
 QUOIN_API quoin_status quoin_grid_add(quoin_scene scene, const quoin_array* array, const char* name, size_t* out);
 
-/* Makes voxels of triangles, and shows them where these are, in units of a voxel: what fills the cube from
- * voxel_size * (x, y, z) on becomes the voxel at (x, y, z) of the world. Adds the types that it takes.
- * `options`, `name` and `out` may be null. */
+/* Voxelises triangles into a new grid and places it at their position, in units of a voxel: the cube with minimum
+ * corner voxel_size * (x, y, z) becomes the world's voxel (x, y, z). Adds the types that it needs. `options`, `name`
+ * and `out` may be null. */
 QUOIN_API quoin_status quoin_grid_voxelize(quoin_scene scene, const quoin_triangles* triangles,
                                            const quoin_voxelize_options* options, const char* name, size_t* out);
 
-/* Where grids stand, which group each place belongs to, and what else files hold; by number. */
+/* Instances, groups, cameras and lamps, by number. */
 QUOIN_API quoin_status quoin_instance_count(quoin_scene scene, size_t* out);
 QUOIN_API quoin_status quoin_instance_get(quoin_scene scene, size_t index, quoin_instance* out);
-/* Places a grid once more, or puts an instance elsewhere. world_from_grid turns, mirrors, moves and scales, alike along
- * all axes. Who adds is to say that it is visible. `out` may be null. */
+/* Adds or replaces a placement of a grid. world_from_grid may rotate, mirror, translate and scale uniformly. Set
+ * `visible` to show it. `out` may be null. */
 QUOIN_API quoin_status quoin_instance_add(quoin_scene scene, const quoin_instance* instance, size_t* out);
 QUOIN_API quoin_status quoin_instance_set(quoin_scene scene, size_t index, const quoin_instance* instance);
 QUOIN_API quoin_status quoin_group_count(quoin_scene scene, size_t* out);
-QUOIN_API quoin_status quoin_group_get(quoin_scene scene, size_t number, quoin_group* out); /* from 1 */
+QUOIN_API quoin_status quoin_group_get(quoin_scene scene, size_t number, quoin_group* out); /* counts from 1 */
 QUOIN_API quoin_status quoin_camera_count(quoin_scene scene, size_t* out);
 QUOIN_API quoin_status quoin_camera_get(quoin_scene scene, size_t index, quoin_camera* out);
 QUOIN_API quoin_status quoin_lamp_count(quoin_scene scene, size_t* out);
 QUOIN_API quoin_status quoin_lamp_get(quoin_scene scene, size_t index, quoin_lamp* out);
 
-/* Meshes; `options` may be null. Of arrays nothing is copied. */
+/* Meshes; `options` may be null. Array functions do not copy their input. */
 QUOIN_API quoin_status quoin_grid_mesh(quoin_scene scene, size_t grid, const quoin_mesh_options* options,
                                        quoin_mesh* out);
-/* Where the array has the value `iso`. solid_below: what is less than it is solid, as of signed distances. */
+/* Meshes the surface where the array equals `iso`. solid_below: values below iso are solid, as in signed distances. */
 QUOIN_API quoin_status quoin_surface_nets(const quoin_array* array, double iso, int32_t solid_below, int32_t threads,
                                           quoin_mesh* out);
-/* The surfaces between whole numbers; relaxation steps, 0 to 1,000, smooth their stairs. */
+/* Meshes the surfaces between integer labels. relaxation_steps, 0 to 1,000, smooth the voxel steps. */
 QUOIN_API quoin_status quoin_mesh_labels(const quoin_array* array, int64_t background, int32_t relaxation_steps,
                                          int32_t threads, quoin_mesh* out);
 QUOIN_API quoin_status quoin_mesh_view(quoin_mesh mesh, quoin_mesh_data* out);
 
-/* A picture, rows from the top, three bytes a pixel (sRGB), into rgb[capacity]. `options` may be null. */
+/* Renders an image into rgb[capacity]: rows from the top, three bytes per pixel (sRGB). `options` may be null. */
 QUOIN_API quoin_status quoin_scene_render(quoin_scene scene, const quoin_render_options* options, uint8_t* rgb,
                                           size_t capacity);
-/* The nearest voxel or surface along each ray: origins[count][3] and directions[count][3], in the world. The first call
- * builds a tree, which the scene keeps and brings up to date. */
+/* Finds the nearest voxel or surface along each ray, given by origins[count][3] and directions[count][3] in world
+ * space. The first call builds a tree, which the scene keeps and updates. */
 QUOIN_API quoin_status quoin_scene_rays(quoin_scene scene, size_t count, const double* origins,
                                         const double* directions, double max_t, const quoin_hits* out);
 
-/* Changes the voxels of a grid from array->origin on, in its own voxels, rounded down: all of the box of the array
- * become the types (QUOIN_UINT8 or QUOIN_UINT16) that it holds, 0 air. What quoin_grid_read read goes back so. Where
- * the scene has not all of its types nothing changes. */
+/* Replaces the voxels of a box of a grid with an array of types (QUOIN_UINT8 or QUOIN_UINT16; 0 is air). The box starts
+ * at array->origin in the grid's voxels, rounded down. Accepts the output of quoin_grid_read. If the scene lacks one of
+ * the types, nothing changes. */
 QUOIN_API quoin_status quoin_grid_write(quoin_scene scene, size_t grid, const quoin_array* array);
 
-/* What is put into a scene beside its grids. Which of it a format holds, and what saving left out, warnings say. */
+/* Layers, cameras, lamps and the sun of a scene. The warnings of a save list content that the format does not support.
+ */
 
-/* Instances and groups that are shown and hidden together, wherever they stand. Layers are known by their names; of
- * several with one name the first is meant. */
+/* A layer: instances and groups that are shown or hidden together, independent of the hierarchy. Layers are identified
+ *          by name; of several with one name, the first is used. */
 typedef struct quoin_layer {
   size_t size;
   char name[128];
   int32_t visible;
 } quoin_layer;
 
-/* The one sun of a scene, infinitely far away. */
+/* The sun of a scene, infinitely far away. */
 typedef struct quoin_sun {
   size_t size;
-  double direction[3];  /* from the scene towards it, of any length but 0 */
-  double brightness;    /* that of a white surface that faces it; 0: there is no sun */
+  double direction[3];  /* from the scene towards the sun; any non-zero length */
+  double brightness;    /* brightness of a white surface facing it; 0: no sun */
   float colour[3];      /* linear */
-  double angle_degrees; /* of its disc, across; 0: a point */
+  double angle_degrees; /* angular diameter; 0: a point */
 } quoin_sun;
 
 QUOIN_API quoin_status quoin_layer_count(quoin_scene scene, size_t* out);
 QUOIN_API quoin_status quoin_layer_get(quoin_scene scene, size_t index, quoin_layer* out);
-/* Adds a layer, or shows or hides that of this name, which is not to be empty. */
+/* Adds a layer, or shows or hides the existing layer of this name. The name must not be empty. */
 QUOIN_API quoin_status quoin_layer_set(quoin_scene scene, const quoin_layer* layer);
-/* Puts an instance on the layer of this name, which the scene has; null or empty: on none. */
+/* Moves an instance to an existing layer; null or empty: no layer. */
 QUOIN_API quoin_status quoin_instance_set_layer(quoin_scene scene, size_t index, const char* layer);
-/* Adds a group, into which quoin_instance_set and _add put instances. `shown` is its own switch here, and `layer` the
- * name of one that the scene has, or empty. `out`, its number, may be null. */
+/* Adds a group, to which quoin_instance_set and _add assign instances. Here `shown` is the group's own flag, and
+ * `layer` is an existing layer's name or empty. `out` receives the group's number and may be null. */
 QUOIN_API quoin_status quoin_group_add(quoin_scene scene, const quoin_group* group, size_t* out);
-/* Adds a camera under its number, which no other has. right is forward x up. */
+/* Adds a camera with an unused number. right is forward x up. */
 QUOIN_API quoin_status quoin_camera_add(quoin_scene scene, const quoin_camera* camera);
-/* Adds a lamp. A range of 0 is one without an end; an outer angle of 0 that of 45 degrees. */
+/* Adds a lamp. A range of 0 is unlimited; an outer angle of 0 is 45 degrees. */
 QUOIN_API quoin_status quoin_lamp_add(quoin_scene scene, const quoin_lamp* lamp);
-/* Of a scene without a sun the brightness is 0, and all else. What a file does not say is as usual: white, of
- * brightness 1 and half a degree. */
+/* Gets or sets the sun. Without a sun, all fields are 0. Properties that the file does not store have defaults: white,
+ * brightness 1, 0.5 degrees. */
 QUOIN_API quoin_status quoin_sun_get(quoin_scene scene, quoin_sun* out);
 QUOIN_API quoin_status quoin_sun_set(quoin_scene scene, const quoin_sun* sun);
 
