@@ -91,8 +91,8 @@ typedef struct quoin_type {
   float metalness; /* 0 to 1 */
   float roughness; /* 0 to 1; QUOIN_INIT's 0 is a mirror */
   char name[128];
-  int32_t transparent; /* input: 0: from rgba's alpha */
-  float ior;           /* index of refraction, if transparent; input: 0 is 1.5 */
+  int32_t transparent; /* input 0: derived from rgba's alpha */
+  float ior;           /* index of refraction of transparent types; input 0: 1.5 */
   float scattering;    /* clouds: mean number of scatterings per voxel length; 0: glass */
   float anisotropy;    /* clouds: mean cosine of the scattering angle, -1 to 1 */
 } quoin_type;
@@ -101,7 +101,7 @@ typedef struct quoin_type {
 typedef struct quoin_instance {
   size_t size;
   char name[128]; /* UTF-8, truncated if longer */
-  size_t grid;    /* grid number; the number of grids if it has no valid grid */
+  size_t grid;    /* grid number; equal to the grid count if it has no grid */
   /* Three rows of four: transforms a point (x, y, z, 1) from the grid, in voxels, to the world. */
   double world_from_grid[12];
   int32_t visible; /* the instance's own flag */
@@ -188,8 +188,8 @@ typedef struct quoin_mesh_options {
   int32_t no_occlusion; /* blocks only */
   int32_t threads;      /* 0: all */
   int32_t reserved;     /* not read: padding of earlier versions */
-  /* Blocks only: no face corner lies inside another face's edge, which avoids visible gaps but makes more triangles.
-   *              Smooth surfaces are always watertight. */
+  /* Blocks only: keeps face corners off the inside of other faces' edges. This avoids visible gaps but makes more
+   * triangles. Smooth surfaces are always watertight. */
   int32_t watertight;
 } quoin_mesh_options;
 
@@ -206,13 +206,13 @@ typedef struct quoin_load_options {
   int32_t threads;     /* 0: all */
   int32_t show_hidden; /* shows hidden instances, groups and layers */
   int32_t frame;       /* animation frame */
-  /* For worlds read by chunks: chunks of 64 voxels around the spawn; 0: 4. */
+  /* For worlds read by chunks: chunks (64 voxels) to load on each side of the spawn point; 0: 4. */
   int32_t radius;
   int32_t has_iso; /* volumes: values above `iso` are solid; 0: automatic threshold */
   float iso;
   int32_t mesh_voxels; /* triangle files: voxels along the longest side; 0: 128 */
   double voxel_size;   /* overrides mesh_voxels; in the file's unit */
-  /* For files of raw values: the number of values along each axis, the first axis fastest; all 0: another format. */
+  /* Reads the file as raw values: their number along each axis, the first axis fastest. All 0: any other format. */
   int32_t raw_shape[3];
   int32_t raw_scalar; /* quoin_scalar of the raw values */
   int32_t raw_big_endian;
@@ -246,7 +246,7 @@ typedef struct quoin_triangles {
    * below 1 makes transparent voxels. */
   const float* colours;
   const uint32_t* materials; /* [triangle_count], indices into `types`; null: 0 */
-  /* [type_count]; the size is set in each element; null: a single light grey type. */
+  /* [type_count]; `size` is set in each element. Null: a single light grey type. */
   const quoin_type* types;
   size_t type_count;
 } quoin_triangles;
@@ -265,7 +265,7 @@ typedef struct quoin_render_options {
   size_t size;
   int32_t width, height; /* 0: 1280 x 720 */
   int32_t samples;       /* per pixel; 0: 4, or 64 for path tracing */
-  int32_t paths;         /* 0: ray casting with direct light; else path tracing */
+  int32_t paths;         /* 0: ray-cast lighting; else path tracing */
   int32_t threads;       /* 0: all */
   int32_t has_camera;    /* 0: shows the whole scene from the front, right and above */
   double camera[3], look_at[3];
@@ -285,7 +285,8 @@ typedef struct quoin_hits {
 } quoin_hits;
 
 /* Progress callback, called with the finished fraction of a long call, 0 to 1. Return 0 to cancel the call with
- * QUOIN_CANCELLED. Any thread may call it, one at a time. It must not call Quoin functions. */
+ * QUOIN_CANCELLED. Quoin may call it from any thread, but never from
+ * two at once. The callback must not call Quoin functions. */
 typedef int32_t (*quoin_progress)(double fraction, void* user);
 
 QUOIN_API const char* quoin_version(void);
@@ -300,7 +301,7 @@ QUOIN_API quoin_status quoin_free(uint64_t handle);
 QUOIN_API quoin_status quoin_scene_create(quoin_scene* out);
 QUOIN_API quoin_status quoin_scene_load(const char* path, quoin_scene* out);
 QUOIN_API quoin_status quoin_scene_load_bytes(const void* data, size_t bytes, quoin_scene* out);
-/* Load a scene with options; null: defaults. */
+/* Loads a scene with options; null: defaults. */
 QUOIN_API quoin_status quoin_scene_load_with(const char* path, const quoin_load_options* options, quoin_scene* out);
 QUOIN_API quoin_status quoin_scene_load_bytes_with(const void* data, size_t bytes, const quoin_load_options* options,
                                                    quoin_scene* out);
@@ -315,7 +316,7 @@ QUOIN_API quoin_status quoin_scene_save(quoin_scene scene, const char* path);
 QUOIN_API quoin_status quoin_scene_warning_count(quoin_scene scene, size_t* out);
 QUOIN_API quoin_status quoin_scene_warning(quoin_scene scene, size_t index, char* text, size_t capacity);
 
-/* Voxel types: 0 is air, others count up from 1. */
+/* Voxel types: 0 is air, others are numbered from 1. */
 QUOIN_API quoin_status quoin_type_count(quoin_scene scene, size_t* out);
 QUOIN_API quoin_status quoin_type_get(quoin_scene scene, size_t index, quoin_type* out);
 QUOIN_API quoin_status quoin_type_add(quoin_scene scene, const quoin_type* type, uint16_t* out);
