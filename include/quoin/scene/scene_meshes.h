@@ -59,8 +59,8 @@ struct MeshPlacement {
   std::optional<std::size_t> group{};        ///< index into SceneMeshes::groups; nullopt: top level
   std::string layer{};                       ///< layer name
   std::optional<InstanceHandle> instance{};  ///< the source instance in the meshed scene
-  /// Animation keys (SceneAnimation) with ascending times in seconds, from 0; empty: not animated. Each key is mirrored
-  /// exactly if `world_from_part` is.
+  /// Animation keys (SceneAnimation) with ascending times in seconds, from 0; empty: not animated. All keys mirror, or
+  /// none do, as `world_from_part`.
   std::vector<MeshKey> keys{};
 
   [[nodiscard]] glm::dmat4 matrix() const;
@@ -77,7 +77,7 @@ struct MeshPart {
   std::string name;
   std::vector<MeshView> surfaces{};  ///< all of one kind; may be empty
   DVec3 pivot{0.0};                  ///< the point that placements move to their translation
-  /// Owner of the arrays in `surfaces`, which live as long as it does. If null, the arrays must outlive the part.
+  /// Keeps the arrays behind `surfaces` alive. If null, the arrays must outlive the part.
   std::shared_ptr<const void> owner{};
   /// Thickness per type, for blocks: files store one alpha per type, for bodies of this thickness. For smooth surfaces
   /// and for types without an entry, writers compute the thickness from the volume of a closed surface, or else assume
@@ -148,9 +148,9 @@ struct BlockySceneOptions {
 /// Far:    vertices are floats; for grids beyond 2^16 voxels, mesh near_grids(scene).
 /// Order:  the same bytes at any thread count.
 /// Errors: those of build_blocky_mesh; InvalidArgument if a drawn instance's transform is not finite or its voxel size
-///         is not positive; InvalidArgument for `atlas` with faces that are not merged, cut, watertight or without
-///         occlusion; LimitExceeded if the faces do not fit in an atlas of 16,384 x 16,384 texels, or atlas voxels lie
-///         beyond 2^24; Cancelled if `progress` returns false.
+///         is not positive; InvalidArgument for `atlas` with unmerged, cut or watertight faces, or without occlusion;
+///         LimitExceeded if the faces do not fit in an atlas of 16,384 x 16,384 texels, or atlas voxels lie beyond
+///         2^24; Cancelled if `progress` returns false.
 [[nodiscard]] Result<SceneMeshes> mesh_scene(const Scene& scene, const BlockySceneOptions& options = {},
                                              Threads threads = {}, const Progress& progress = {});
 

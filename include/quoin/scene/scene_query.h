@@ -38,8 +38,8 @@ struct QueryFilter {
   std::span<const InstanceHandle> ignored = {};    ///< instances to skip: a moving body ignores itself
   std::uint32_t categories = ~std::uint32_t{0};    ///< skips instances that have none of these bits
   std::optional<QueryTypes> types = std::nullopt;  ///< default: All for rays, Colliding for shapes
-  /// Default: Passed for rays, whose hits report `unloaded_t`; Met for shapes, so that bodies do not fall through
-  ///          ground that is still loading.
+  /// The default is Passed for rays, whose hits report `unloaded_t`, and Met for shapes, so that bodies do not fall
+  /// through ground that is still loading.
   std::optional<UnloadedChunks> unloaded = std::nullopt;
 };
 
@@ -106,9 +106,9 @@ struct SceneOverlap {
   bool is_unloaded = false;
 };
 
-/// Returns one overlap per instance that overlaps a sphere, box or capsule, in instance order:
-/// the first overlapping voxel by z, y, x; else the first field cell that is negative anywhere inside the shape, unless
-/// the depth is less than 1e-6 voxels; else an unloaded chunk of the grid.
+/// Returns the overlaps of a sphere, box or capsule with a scene: at most one per instance, in instance order. It is
+/// the first overlapping voxel by z, y, x; else the first field cell with a negative density inside the shape, at least
+/// 1e-6 voxels deep; else an unloaded chunk of the grid.
 ///
 /// Touching is not overlapping. Numbers that are negative or not finite, and a radius of 0, overlap nothing. A box of
 /// size 0 along some axes is a plate, a rod or a point.

@@ -16,9 +16,9 @@ namespace quoin {
 /// The first contact of a moving shape with a voxel or with a field's solid.
 struct SweepHit {
   double fraction = 0.0;  ///< fraction of the displacement, 0 to 1; 0 if the shape starts inside
-  /// Unit normal in world space, out of the obstacle towards the shape. For a field, it is the direction that separates
-  /// both at the contact: the field's gradient at a corner of the box; the gradient without its component along the
-  /// edge at an edge of the box; the face's own normal where a face touches a peak.
+  /// Unit normal in world space, out of the obstacle towards the shape. For a field, it depends on the touching part of
+  /// the box. A corner gives the field's gradient. An edge gives the gradient without its component along the edge. A
+  /// face that rests on a peak gives the face's own normal.
   DVec3 normal{0.0};
   InstanceHandle instance;
   IVec3 voxel{0};      ///< for a field, the cell as in DensityHit
@@ -41,8 +41,9 @@ struct SweepHit {
 ///          deep counts as touching. If 4,000 cell parts cannot decide (a large box almost flush with an uneven
 ///          surface), the box stops at the first undecided part, up to one part's size away.
 /// Partial: unloaded chunks stop the box, unless `filter` sets UnloadedChunks::Passed.
-/// Inside:  in a field's solid, the exit direction is the gradient at the deepest point of the box, and `depth` leads
-///          out of all of that field's solid around the box. Far from any surface, it leads one voxel further.
+/// Inside:  in a field's solid, `normal` is the gradient at the deepest point of the box, and `depth` leads out of all
+///          of that field's solid around the box. If the gradient does not lead out within about the box's size, the
+///          grid axis with the shortest way out replaces it. If no axis does, `depth` is one voxel.
 /// Cost:    per instance on the way: the voxels around the box, for each step of the box's size. In a field: the cells
 ///          with solid, in more parts the closer the box lies along the surface.
 /// Source:  the separating axes of two boxes (S. Gottschalk, M. Lin, D. Manocha, "OBBTree", 1996), each with the time
@@ -51,8 +52,8 @@ struct SweepHit {
 [[nodiscard]] std::optional<SweepHit> sweep_box(const SceneTracer& tracer, const OrientedBox& box, DVec3 displacement,
                                                 const QueryFilter& filter = {});
 
-/// Returns the first voxel or field point that a moving capsule or ball hits. It slides over edges and small steps that
-/// catch a box. `depth` is the distance that moves it out of the voxel in which it is deepest.
+/// Returns the first voxel or field point that a moving capsule or ball hits. A capsule slides over edges and small
+/// steps that stop a box. `depth` is the distance that moves it out of its deepest voxel.
 ///
 /// Exact:  to 1e-9 voxels among voxels of any rotation; in fields as a box. The normal points from the contact to the
 ///         capsule's axis.
@@ -81,8 +82,8 @@ struct FloorOptions {
   /// Maximum height of an obstacle that the body steps onto, in world units; 0: no stepping. The step needs a floor on
   /// top of the obstacle or within half of the box's width beyond its edge, and room for the box above.
   double step_height = 0.0;
-  /// Maximum drop, in world units, over which a body that stood on a floor stays on the ground. The
-  /// body then walks down slopes and steps without leaving the ground; 0: it falls.
+  /// Maximum drop, in world units, that a standing body follows down slopes and steps without leaving the ground. With
+  /// 0 it falls instead.
   double snap_distance = 0.0;
 };
 
@@ -133,11 +134,11 @@ struct SlideResult {
 /// Moves a box or a capsule and slides it along obstacles. At a face, the displacement into the face is dropped; in a
 /// crease of two faces, only the displacement along the crease remains; in a corner, none does.
 ///
-/// With a floor: on a floor, the body keeps the horizontal part of its displacement and follows the ground up and down.
-///               Its downward part is dropped, so the body stands still on a slope, and the resulting displacement is
-///               horizontal. Steeper surfaces are walls to a standing body, which does not climb them; a falling body
-///               slides down along them. An upward displacement leaves the floor. Add gravity to the displacement every
-///               frame.
+/// With `SlideOptions::floor`, a body on a floor keeps the horizontal part of its displacement and follows the ground
+/// up
+/// and down. Its downward part is dropped, so the body stands still on a slope, and the resulting displacement is
+/// horizontal. Steeper surfaces are walls to a standing body, which does not climb them; a falling body slides down
+/// along them. An upward displacement leaves the floor. Add gravity to the displacement every frame.
 ///
 /// Requires: `max_contacts` is at least 1.
 /// Cost:     a sweep per contact, `max_contacts` at most. With a floor, two more, and four per attempted step.

@@ -38,7 +38,7 @@ struct StreamOptions {
   std::function<std::size_t()> other_bytes{};
   /// Time limit of one `update` call in seconds; it loads or unloads at least one chunk.
   double update_seconds = 0.0001;
-  /// Interval of saves by `update`; 0: every call.
+  /// Minimum time between two saves in `update`; 0: saves in every call.
   std::chrono::milliseconds save_interval{1000};
   /// Saves generated chunks, so that each is generated once. If false, a chunk is generated at each load until it is
   /// edited.
