@@ -164,10 +164,12 @@ class SlotMap {
 
 }  // namespace quoin
 
-/// Hashes handles, so that they can be keys of std::unordered_map.
+// Hashes handles, so that they can be keys of std::unordered_map. Doxygen 1.9 finds no scope for it.
+/// @cond
 template <class T>
 struct std::hash<quoin::Handle<T>> {
   [[nodiscard]] std::size_t operator()(const quoin::Handle<T>& handle) const noexcept {
     return std::hash<std::uint64_t>()(handle.generation);  // unique per element
   }
 };
+/// @endcond
