@@ -107,8 +107,8 @@ class ChunkSource {
 };
 
 /// Maps the types of a source to ids in another registry, which may also hold other types. A source type that equals an
-/// existing type gets that type's id. Renumbering chunks in a fixed order gives the same ids on every run, at
-/// any order of earlier reads. Threads: one at a time. Lifetime: the source must outlive it.
+/// existing type gets that type's id. Renumbering chunks in a fixed order gives the same ids on every run,
+/// regardless of the reading order. Threads: one at a time. Lifetime: the source must outlive it.
 class SourceTypes {
  public:
   explicit SourceTypes(const ChunkSource& source) : source_(&source) {}

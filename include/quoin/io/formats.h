@@ -104,7 +104,7 @@ struct FormatInfo {
 
 /// Returns the files that load_scene reads in addition to `path`: files named by a scene file (which need not exist),
 /// the values of a NIfTI pair, a world's -wal file, and a mesh's materials, buffers and images. Empty if the file
-/// cannot be read. Cost: for a mesh, that of read_mesh. `allowed`: see LoadOptions::sidecar_files.
+/// cannot be read. Cost: for a mesh, as read_mesh. `allowed`: see LoadOptions::sidecar_files.
 [[nodiscard]] std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path& path,
                                                                    SidecarFiles allowed = SidecarFiles::WithinFolder);
 

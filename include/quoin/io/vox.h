@@ -24,13 +24,13 @@ namespace quoin {
 ///          VoxelProperties::attributes. MagicaVoxel ignores the palette's alpha, and so does Quoin.
 /// Groups:  each group of the scene graph becomes a SceneGroup, except the root, which is the scene. Consecutive
 ///          transforms without a group between them are combined.
-/// Layers:  those of the file; none if the file has a single, unnamed, visible layer.
+/// Layers:  the file's layers; none if the file has a single, unnamed, visible layer.
 /// Frames:  without a scene graph, each model is a frame. Otherwise `frame` matches the keys' `_f`, from 0 to the last
 ///          key or the end of the animation range.
 /// Hidden:  hidden nodes and layers are kept; `is_shown` returns false for them.
 /// Lenient: a MAIN chunk that claims up to 20 bytes more than the file has is read with a warning, if its content is
 ///          valid.
-/// Cameras: those that the user set, with the file's numbers; panoramas are skipped with a warning.
+/// Cameras: all that the user set, with the file's numbers; panoramas are skipped with a warning.
 /// Look:    the render settings are in LoadedScene::look, if the file has them.
 /// Skipped: with a warning, voxels outside their model's box or of colour 0. Other frames, notes and unknown chunks are
 ///          only in LoadedScene::source. `only_in_source` lists these and everything else that a Scene cannot hold:
@@ -46,7 +46,7 @@ namespace quoin {
                                            const Progress& progress = {});
 
 /// Returns the scene of another frame. It shares models and colours with the scene that was read, in their original
-/// state; grids, groups and layers have the same handles. Cost: that of the scene graph, at any number of voxels.
+/// state; grids, groups and layers have the same handles. Cost: O(scene graph), at any number of voxels.
 /// Errors: InvalidArgument for a missing frame.
 [[nodiscard]] Result<Scene> scene_at_frame(const VoxSource& source, int frame);
 

@@ -59,9 +59,8 @@ struct PicturePoint {
 /// Requires: width and height are positive.
 [[nodiscard]] Ray ray_through(const Camera& camera, const PicturePoint& point);
 
-/// Returns the image position of a world point: the inverse of `ray_through`, for labels and marks. The
-/// result may lie outside the image. Returns nullopt if the point is not finite, or is behind or level with a
-/// perspective camera.
+/// Returns the image position of a world point: the inverse of `ray_through`, for labels and marks. The result may lie
+/// outside the image. Returns nullopt if the point is not finite, or is behind or level with a perspective camera.
 /// Requires: width and height are positive.
 [[nodiscard]] std::optional<PicturePoint> picture_point(const Camera& camera, DVec3 point_in_world, int width,
                                                         int height);
@@ -100,8 +99,8 @@ enum class View : std::uint8_t { Front, Back, Left, Right, Top, Iso };
 ///   for (int i = 0; i < 36; ++i) render(scene, framing.camera(i));   // one full turn
 class SceneFraming {
  public:
-  /// Creates a framing with `turns` cameras. They are spaced equally around the vertical axis through the middle of the
-  /// first scene; each next camera is further to the right.
+  /// Creates a framing with `turns` cameras. Camera 0 looks along `forward`. They are spaced equally around the
+  /// vertical axis through the middle of the first scene, each further to the right than the previous one.
   /// Requires: `forward` is unit; `aspect` (width / height) is finite and positive; `turns` is positive.
   SceneFraming(DVec3 forward, double aspect, int turns = 1);
   /// Adds a scene to frame. Cost: `frame_scene` times `turns`.

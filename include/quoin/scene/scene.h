@@ -188,7 +188,7 @@ class Scene {
   [[nodiscard]] SceneLayer& edit(LayerHandle handle);
 
   /// Returns the changes since the cursor's last call and advances the cursor. For changed chunks, call the grid's own
-  /// `changes_since`; for changed types, that of `types`.
+  /// `changes_since`; for changed types, `types.changes_since`.
   /// Cost: O(changed grids and instances), at any scene size; O(all instances) after a change of a group or a layer.
   ///       See ChangeCursor.
   [[nodiscard]] SceneChanges changes_since(ChangeCursor& cursor) const;

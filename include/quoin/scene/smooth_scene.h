@@ -44,8 +44,8 @@ class SmoothScene {
   /// Errors: Cancelled if `progress`, called every few chunks, returns false; finished chunks are kept for the next
   ///         update and `scene` stays unchanged. LimitExceeded beyond `max_bytes`; `scene` is then empty, and later
   ///         calls fail at once until there are fewer chunks.
-  /// Cost:   about 6 ms per chunk near a surface that lies within kVoxelFieldReach voxels of an edit, or that contains
-  ///         or adjoins a type whose transparency changed.
+  /// Cost:   about 6 ms for each affected chunk near a surface. A chunk is affected if it is within kVoxelFieldReach
+  ///         voxels of an edit, or if it or a neighbour has a type whose transparency changed.
   Status update(const Scene& of, Threads threads = {}, const Progress& progress = {});
 
   /// Returns the converted scene. It keeps its address, and its change journals notify renderers of updates.
