@@ -18,7 +18,7 @@
 namespace quoin {
 
 struct WorldMeshOptions {
-  BlockySceneOptions scene{};  ///< must not set `atlas`, `cut` or `part_of`
+  BlockySceneOptions scene{};  ///< must not set `atlas` or `cut`; `part_of` is ignored
   /// Folder for unnamed temporary files that hold the meshes. Needs about 1.5 times the size of a .ply of them. The
   /// files are deleted with the meshes.
   std::filesystem::path folder = ".";
