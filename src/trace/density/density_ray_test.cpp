@@ -201,7 +201,7 @@ TEST_P(DensityRays, AreTheSameInPackets) {
 }
 
 // Packets of short rays walk in windows, others from cell to cell.
-TEST_P(DensityRays, ThatAreShortAreTheSameInPackets) {
+TEST_P(DensityRays, ShortRaysAreTheSameInPackets) {
   std::mt19937 random(11);
   int blocked = 0;
   int free = 0;
@@ -235,6 +235,40 @@ TEST_P(DensityRays, ThatAreShortAreTheSameInPackets) {
   }
   EXPECT_GT(blocked, 4'000);
   EXPECT_GT(free, 4'000);
+}
+
+// A ray that enters and leaves a cell at zeros of the field has no root in it.
+TEST_P(DensityRays, RaysThroughZerosAreTheSameInPackets) {
+  std::mt19937 random(12);
+  DensityGrid field;
+  field.edit({IVec3{58}, IVec3{70}}, [&](IVec3, DensitySample) {
+    return DensitySample{static_cast<float>(static_cast<int>(random() % 5)) - 2.0F, 1};
+  });
+  const DensityTree tree(field);
+  int hits = 0;
+  for (int i = 0; i < 6'000; ++i) {
+    RayPacket packet;
+    for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+      const auto corner = [&] { return DVec3(glm::round(random_in(random, 57.0, 71.0) * 2.0) / 2.0); };
+      const DVec3 from = corner();
+      const DVec3 way = (corner() - from) * random_in(random, 0.1, 3.0).x;
+      if (way != DVec3(0.0)) packet.set(lane, {from, way}, random() % 8 == 0 ? 1.0 : kInfinity);
+    }
+    DensityPacketHits found;
+    first_hits(tree, packet, found);
+    for (int lane = 0; lane < RayPacket::kSize; ++lane) {
+      if ((packet.active >> lane & 1U) == 0) continue;
+      const auto at = static_cast<std::size_t>(lane);
+      const auto alone = first_hit(tree, packet.ray(lane), packet.max_t[at]);
+      ASSERT_EQ((found.hit >> lane & 1U) != 0, alone.has_value()) << "packet " << i << " lane " << lane;
+      ASSERT_EQ(any_hit(tree, packet.ray(lane), packet.max_t[at]), alone.has_value());
+      if (!alone) continue;
+      ++hits;
+      ASSERT_EQ(found.lanes[at].t, alone->t);
+      ASSERT_EQ(found.lanes[at].cell, alone->cell);
+    }
+  }
+  EXPECT_GT(hits, 20'000);
 }
 
 TEST_P(DensityRays, MeetASphereWhereItIs) {
@@ -347,6 +381,9 @@ TEST(DensityRay, StopsAtItsEnd) {
     EXPECT_FALSE(any_hit(tree, {{15, 30, odd}, {0, -1, 0}}));
   }
   EXPECT_FALSE(first_hit(tree, {{15, 30, 15}, {0, 0, 0}}));
+  // Slower than rays heed along every axis, next to the solid.
+  EXPECT_FALSE(first_hit(tree, {{15, 21.5, 15}, {0, -1e-40, 0}}));
+  EXPECT_FALSE(any_hit(tree, {{15, 20.5, 15}, {0, 1e-40, 0}}));
   // Where nothing is.
   const DensityGrid nothing;
   const DensityTree empty(nothing);

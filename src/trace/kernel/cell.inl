@@ -124,7 +124,8 @@ struct CellCurve {
 template <class Number, class V>
 inline CellCurve<V> curve_of(const CellCubic<V>& f) {
   const auto third = static_cast<Number>(1.0 / 3.0);
-  return {f.c0 + f.c1 * third, f.c0 + (f.c1 + f.c1 + f.c2) * third, f.c0 + f.c1 + f.c2 + f.c3};
+  // The last is f(1) to the bit, so that a root lies between 0 and 1 where it is negative.
+  return {f.c0 + f.c1 * third, f.c0 + (f.c1 + f.c1 + f.c2) * third, ((f.c3 + f.c2) + f.c1) + f.c0};
 }
 
 /// The root of `f` between `low`, where it is not negative, and `high`, where it is, of which there is one.

@@ -336,6 +336,7 @@ class FieldLanes {
                      some<Doubles>(kept_.c3 + from)};
         wanted[k] = some<Longs>(kept_.has_root + from);
       }
+      static_assert(kGroups == 2);
       const Longs has_root[kGroups] = {wanted[0], wanted[1]};
       find_roots(fields, wanted, roots);
       for (int k = 0; k < kGroups; ++k) {

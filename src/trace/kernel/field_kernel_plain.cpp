@@ -95,6 +95,7 @@ class SurfaceWalk {
         least = t;
       }
     }
+    if (axis < 0) return false;  // too slow along every axis
     cell_[axis] += in_cells_.direction[axis] > 0.0 ? 1 : -1;
     return true;
   }

@@ -56,7 +56,7 @@ inline F just_below(F a) {
   return {_mm256_blendv_ps(_mm256_set1_ps(-1e-30F), less, is_positive)};
 }
 
-// The numbers of the lanes of a mask, without gaps. The numbers after them have no meaning.
+// The numbers of the lanes of a mask, without gaps; then 0.
 inline __m256i lane_numbers(std::uint32_t mask) {
   const std::uint64_t bytes = _pdep_u64(mask, 0x0101'0101'0101'0101U) * 0xFFU;
   const std::uint64_t numbers = _pext_u64(0x0706'0504'0302'0100U, bytes);

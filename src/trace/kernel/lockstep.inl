@@ -347,15 +347,6 @@ inline F cross_next(const Lanes& lanes, const Planes& steps, Nexts& nexts, Cross
   return t;
 }
 
-// The same, of the lanes of `who`.
-inline void cross_next(const Lanes& lanes, const Planes& steps, Mask who, Nexts& nexts, Crossing& crossing) {
-  first_of({nexts.x.t, nexts.y.t, nexts.z.t}, crossing);
-  crossing = {crossing.x & who, crossing.y & who, crossing.z & who};
-  cross_if(crossing.x, lanes.x, steps.x, nexts.x);
-  cross_if(crossing.y, lanes.y, steps.y, nexts.y);
-  cross_if(crossing.z, lanes.z, steps.z, nexts.z);
-}
-
 // The same for numbers that change by a constant with each plane.
 struct Strides {
   I x, y, z;
@@ -544,26 +535,6 @@ inline VoxelWalk enter_cells(const Lanes& lanes, const Planes& entries, const Vo
   walk.nexts.z =
       enter_cell(lanes.z, entries.z, t, before_t, ties(lanes.z, mask_of(0)), steps.one.z, steps.strides.z, walk.code);
   return walk;
-}
-
-// One step of the lanes of `who`; returns those that are still in their cell.
-inline Mask step_on(const Lanes& lanes, const VoxelSteps& steps, Mask who, VoxelWalk& walk) {
-  Crossing crossing;
-  cross_next(lanes, steps.one, who, walk.nexts, crossing);
-  walk.code = stepped(walk.code, crossing, steps.strides);
-  return who & ~test(walk.code, all(kLeft));
-}
-
-// Walks until each lane of `walking` stands in an occupied voxel, and stays there, or has left its cell.
-inline Mask stop_at_voxels(const Lanes& lanes, const VoxelSteps& steps, VoxelWalk& walk, Mask walking) {
-  Mask hit = mask_of(0);
-  for (;;) {
-    const I half = select(test(walk.code, all(32)), walk.high_half, walk.low_half);
-    const Mask met = test_bit(half, walk.code) & walking;
-    hit = hit | met;
-    walking = step_on(lanes, steps, walking & ~met, walk);
-    if (!any(walking)) return hit;
-  }
 }
 
 // Walks until each lane of `walking` has met a voxel, whose code it leaves, or has left its cell.
