@@ -1,5 +1,6 @@
-// Counts phrases that make comments, documents and messages hard to read (nominal "what", "of which", "beside", ...). tests/english_limits.txt holds the number of such lines per file. A file must not exceed
-// its limit; a file without a limit must have none. `./dev english --accept` lowers the limits.
+// Counts phrases that make comments, documents and messages hard to read (nominal "what", "of which", "beside", ...).
+// tests/english_limits.txt holds the number of such lines per file. A file must not exceed its limit; a file without a
+// limit must have none. `./dev english --accept` lowers the limits.
 
 #include <algorithm>
 #include <cctype>
@@ -110,7 +111,9 @@ class Prose {
         is_in_literal = !is_in_literal;
       } else if (is_in_literal) {
         literal += line[i];
-      } else if (line.compare(i, comment.size(), comment) == 0) {
+      } else if (line[i] == '\'' && i + 2 < line.size() && line[i + 2] == '\'') {
+        i += 2;  // a character, which may be a quotation mark
+      } else if (line.compare(i, comment.size(), comment) == 0 || line.compare(i, 2, "/*") == 0) {
         return text + line.substr(i + comment.size());
       }
     }

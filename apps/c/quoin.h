@@ -402,7 +402,7 @@ QUOIN_API quoin_status quoin_layer_get(quoin_scene scene, size_t index, quoin_la
 QUOIN_API quoin_status quoin_layer_set(quoin_scene scene, const quoin_layer* layer);
 /* Moves an instance to an existing layer; null or empty: no layer. */
 QUOIN_API quoin_status quoin_instance_set_layer(quoin_scene scene, size_t index, const char* layer);
-/* Adds a group, to which quoin_instance_set and _add assign instances. Here `shown` is the group's own flag, and
+/* Adds a group; quoin_instance_set and _add assign instances to it. Here `shown` is the group's own flag, and
  * `layer` is an existing layer's name or empty. `out` receives the group's number and may be null. */
 QUOIN_API quoin_status quoin_group_add(quoin_scene scene, const quoin_group* group, size_t* out);
 /* Adds a camera with an unused number. right is forward x up. */

@@ -79,7 +79,8 @@ void add_height_options(CLI::App& command, std::optional<HeightOptions>& heights
                                 : name == "mapbox" ? HeightEncoding::Mapbox
                                                    : HeightEncoding::Terrarium;
           },
-          "Read a .png as a height map: grey (8 or 16 bits), or the terrain-RGB encodings mapbox or terrarium")
+          "Read a .png as a height map: grey (8 or 16 bits), or the terrain-RGB encodings mapbox or terrarium. .hgt "
+          "files need no option; every option under this heading makes the input a height map")
       ->check(CLI::IsMember({"grey", "mapbox", "terrarium"}));
   number("--metres-per-level", "Height of one grey level in metres (default 1)",
          [](HeightOptions& options, double value) { options.metres_per_level = value; });
@@ -87,7 +88,7 @@ void add_height_options(CLI::App& command, std::optional<HeightOptions>& heights
          [](HeightOptions& options, double value) { options.metres_per_pixel = value; });
   number("--metres-per-voxel", "Edge of a voxel in metres (default: --metres-per-pixel)",
          [](HeightOptions& options, double value) { options.metres_per_voxel = value; });
-  number("--exaggeration", "Factor of heights (default 1)",
+  number("--exaggeration", "Vertical exaggeration (default 1)",
          [](HeightOptions& options, double value) { options.vertical_exaggeration = value; });
   command
       .add_option_function<int>(

@@ -158,8 +158,10 @@ void add_view_command(CLI::App& app, int& status) {
       ->capture_default_str();
   command->add_option("--device", arguments->device, "Vulkan device: its number or a part of its name");
   command
-      ->add_option("--memory", arguments->memory_mebibytes,
-                   "Memory for the loaded part of a world (.quoin) in MiB (default: a quarter of the machine's)")
+      ->add_option(
+          "--memory", arguments->memory_mebibytes,
+          "Memory for the loaded part of a world (.quoin) and its meshes and light in MiB, at least 64 (default: a "
+          "quarter of the machine's)")
       ->check(CLI::Range(std::size_t{64}, std::size_t{1} << 24));
   command
       ->add_option("--distance", arguments->distance,

@@ -188,7 +188,7 @@ void add_world_command(CLI::App& app, int& status) {
       ->add_option("-o,--output", repaired->output,
                    "File to write (default: WORLD itself; the damaged file is kept as WORLD~)")
       ->check(file_name());
-  added->footer("Example: quoin world repair home.quoin -o mended.quoin");
+  added->footer("Example: quoin world repair home.quoin -o repaired.quoin");
   const auto backed_up =
       add(*command, added, "backup", "Copy a world, also while a program writes it", run_backup, status);
   added->add_option("OUT", backed_up->output, "File to write; must not exist")->required()->check(file_name());

@@ -539,7 +539,7 @@ void add_mesh_file_options(CLI::App& command, ConvertOptions& options) {
   command.add_flag("--lights", options.lights, "Also write lamps (KHR_lights_punctual) and cameras (.glb, .gltf)");
   command.add_flag("--animate", options.animate,
                    "Write all frames of a .vox as an animation (.glb, .gltf); meshes smooth models separately");
-  command.add_option("--fps", options.frames_per_second, "Frames per second of --animate (default 10)")
+  command.add_option("--fps", options.frames_per_second, "Frames per second of --animate, 0.001 to 1000 (default 10)")
       ->check(CLI::Range(0.001, 1000.0));
   command.add_flag("--compress", options.compress,
                    "Compress glTF without loss, for viewers with EXT_meshopt_compression");
@@ -796,10 +796,11 @@ std::string footer() {
          ".\n"
          "Existing models and worlds are overwritten only with --force. Inputs are never overwritten.\n"
          "NAME.gltf comes with NAME.bin; NAME.obj with NAME.mtl, NAME_palette.png, and NAME_emissive.png and "
-         "NAME_atlas.png if needed. These replace files with the same names.\n"
-         ".json and .quoin keep everything. .vox keeps all that MagicaVoxel supports; from .vox to .vox nothing is "
-         "lost, and --frame writes one frame.\n"
-         "Triangles become voxels first, also on the way to a mesh.\n"
+         "NAME_atlas.png if needed. These replace files with the same names. Smooth meshes keep their colours in the "
+         "vertices and need none of them.\n"
+         ".json and .quoin keep all grids, types, rotations and scales. Only .vox keeps animation and notes; from .vox "
+         "to .vox nothing is lost, and --frame writes one frame.\n"
+         "Triangles become voxels first, at their own size in the world, also on the way to a mesh.\n"
          ".stl and .3mf are closed manifold meshes in millimetres, for 3D printing. Volumes in millimetres become "
          "metres in glTF and keep their unit in other formats.\n"
          "Example: quoin convert castle.vox castle.glb\n"

@@ -31,8 +31,9 @@ void add_mesh_input_options(CLI::App& command, MeshInputTexts& texts, MeshLoadOp
   command.add_option("--band", options.band, "Range of distances of --field in voxels, 1 to 64 (default 8)")
       ->check(CLI::Range(1.0, 64.0));
   command
-      .add_option("--max-colours", options.max_types,
-                  "Maximum number of colours; similar colours are merged (default: as many as OUT can hold)")
+      .add_option(
+          "--max-colours", options.max_types,
+          "Maximum number of colours, 1 to 65535; similar colours are merged (default: as many as OUT can hold)")
       ->check(CLI::Range(1, 65'535));
   command.add_option("--input-up", texts.up, "Up axis of the input: y or z (default y; z for .stl and .ply)")
       ->check(CLI::IsMember({"y", "z"}));

@@ -171,7 +171,7 @@ void add_path_options(CLI::App& command, PathArguments& arguments) {
   command
       .add_option("--sky", arguments.sky,
                   "Sky (default gradient). gradient: as with --light rays. physical: a clear sky for the height of the "
-                  "sun. uniform: white from all directions. Or an environment image, .hdr or .exr")
+                  "sun. uniform: white from all directions, also from below. Or an environment image, .hdr or .exr")
       ->type_name("NAME|FILE");
   add_text_option(command, "--sky-turn", "DEGREES", "Rotation of an environment image around the vertical (default 0)");
   add_text_option(command, "--sun-angle", "DEGREES",

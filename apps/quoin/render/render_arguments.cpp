@@ -54,7 +54,7 @@ void add_camera_options(CLI::App& command, RenderArguments& arguments) {
       ->check(CLI::IsMember({"front", "back", "left", "right", "top", "iso"}));
   add_text_option(command, "--azimuth", "DEGREES",
                   "Frame the whole scene from this angle, to the right of the front (default 45)");
-  add_text_option(command, "--elevation", "DEGREES", "Angle of --azimuth above the horizon (default 35.26)");
+  add_text_option(command, "--elevation", "DEGREES", "Camera angle above the horizon (default 35.26)");
   add_text_option(command, "--camera", "X,Y,Z|file:N",
                   "Position of the camera, with --look-at; or camera N of the file, as listed by quoin info");
   add_text_option(command, "--look-at", "X,Y,Z", "Point in the middle of the image");
@@ -62,12 +62,13 @@ void add_camera_options(CLI::App& command, RenderArguments& arguments) {
   set_heading(command, heading::kSeries);
   command
       .add_option("--turntable", arguments.turns,
-                  "Render this number of images around the scene: OUT-00.png, OUT-01.png, ...")
+                  "Render this number of images around the scene, 2 to 100000: OUT-00.png, OUT-01.png, ...")
       ->check(CLI::Range(2, 100'000));
   add_text_option(command, "--frames", "A:B", "Render each animation frame from A to B with one framing");
   command
       .add_option("--path", arguments.camera_path,
-                  "Render an image for each camera in this JSON file, an array of the \"camera\" objects of --json")
+                  "Render an image for each camera in this JSON file, an array of the \"camera\" objects of --json: "
+                  "OUT-00.png, OUT-01.png, ...")
       ->type_name("FILE")
       ->check(file_name());
   command.add_flag("--resume", arguments.resume, "Keep existing images of a series and render only the others");
@@ -85,12 +86,15 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
   command
       .add_option(
           "--preset", arguments.preset,
-          "Shading (default full): full, no-shadows, no-ao, unlit (colours only), ao (occlusion only, grey), or "
-          "density (a slice through fields and volumes)")
+          "Shading (default full): full, no-shadows, no-ao, unlit (colours only; with --ao times occlusion), ao "
+          "(occlusion only, grey), or density (a slice through fields and volumes)")
       ->check(CLI::IsMember({"full", "no-shadows", "no-ao", "unlit", "ao", "density"}));
-  add_text_option(command, "--sun", "X,Y,Z|off",
-                  "Direction to the sun (default -0.48,0.72,0.5), or off. The sky follows the sun to dusk and night");
-  command.add_flag("--fixed-sky", arguments.has_fixed_sky, "Keep the sky of a clear day for every sun direction");
+  add_text_option(
+      command, "--sun", "X,Y,Z|off",
+      "Direction to the sun (default -0.48,0.72,0.5), or off. The sky follows the sun to dusk and night; off "
+      "keeps the sky");
+  command.add_flag("--fixed-sky", arguments.has_fixed_sky,
+                   "Keep the sky and the light colour of a clear day for every sun direction");
   add_text_option(command, "--sky-brightness", "X", "Factor of the light of the sky (default 1)");
   command
       .add_option(
@@ -102,7 +106,7 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
   add_text_option(command, "--emission-scale", "X", "Factor of the light that voxels emit (default 1)");
   add_text_option(command, "--exposure", "X|auto",
                   "Factor of all light (default 1; 1.3 with --light path, 2 with --sky physical), or auto with --light "
-                  "path");
+                  "path, as the first image needs");
   add_text_option(command, "--shadow-distance", "VOXELS", "Maximum length of shadows (default: unlimited)");
   add_text_option(command, "--least-light", "X",
                   "Minimum light of --light propagated; with 0 closed rooms are black (default 0)");
@@ -115,9 +119,9 @@ void add_light_options(CLI::App& command, RenderArguments& arguments) {
       ->check(CLI::IsMember({"rays", "vertex", "smooth"}));
   command
       .add_option("--ao-rays", arguments.render.light.occlusion_rays,
-                  "Rays per point (default 9; 16 if --ao-distance is more than 12)")
+                  "Rays per point with --ao rays, 1 to 4096 (default 9; 16 if --ao-distance is more than 12)")
       ->check(CLI::Range(1, kMaxSamples));
-  add_text_option(command, "--ao-distance", "VOXELS", "Length of occlusion rays (default 6; on fields 18)");
+  add_text_option(command, "--ao-distance", "VOXELS", "Length of rays with --ao rays (default 6; on fields 18)");
   command
       .add_option("--ao-affects", arguments.occlusion_affects,
                   "Light that occlusion darkens: ambient or all (default ambient)")
@@ -134,8 +138,9 @@ void add_detail_options(CLI::App& command, RenderArguments& arguments) {
                   "Use coarser cells for far models: near (never), radius (by distance in model radii) or pixels (if a "
                   "voxel is smaller than a pixel) (default near)")
       ->check(CLI::IsMember({"near", "radius", "pixels"}));
-  command.add_flag("--lod-colours", arguments.render.detail.colours,
-                   "Colour models by level of detail, green (near) to blue (far); implies --detail pixels");
+  command.add_flag(
+      "--lod-colours", arguments.render.detail.colours,
+      "Colour models by level of detail, green (near) to blue (far). Without --detail it implies --detail pixels");
 }
 
 void add_backend_options(CLI::App& command, RenderArguments& arguments) {

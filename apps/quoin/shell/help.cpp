@@ -87,7 +87,9 @@ class HelpFormatter : public CLI::FormatterBase {
     if (!notes.empty()) out += "\n" + notes;
     if (examples.size() > 1) {
       out += "\nMore examples:\n";
-      for (std::size_t i = 1; i < examples.size() && (shows_all || i < 4); ++i) out += "  " + examples[i] + "\n";
+      const std::size_t end = shows_all ? examples.size() : std::min(examples.size(), std::size_t{4});
+      for (std::size_t i = 1; i < end; ++i) out += "  " + examples[i] + "\n";
+      if (end < examples.size()) out += "  ... and more with --help-all\n";
     }
     return out;
   }
@@ -103,7 +105,7 @@ class HelpFormatter : public CLI::FormatterBase {
       out += option->get_required() ? " " + its_name : " [" + its_name + "]";
     }
     for (const CLI::Option* option : options) {
-      if (option->get_required()) out += " --" + option->get_lnames().front() + " FILE";
+      if (option->get_required()) out += " " + name_of(*option);
     }
     if (!app.get_subcommands([](const CLI::App*) { return true; }).empty()) out += " COMMAND";
     return out;

@@ -23,7 +23,7 @@ inline constexpr const char* kMeshFile = "Mesh files";
 inline constexpr const char* kManyFiles = "Many files (--to)";
 inline constexpr const char* kWorlds = "Minecraft and Luanti worlds";
 inline constexpr const char* kVolumes = "Volumes";
-inline constexpr const char* kTriangles = "Triangles in (.obj, .glb, .gltf, .ply, .stl)";
+inline constexpr const char* kTriangles = "Triangle meshes as input (.obj, .glb, .gltf, .ply, .stl, .3mf, .off)";
 inline constexpr const char* kHeights = "Heights";
 }  // namespace heading
 
