@@ -10,13 +10,13 @@ namespace {
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr unsigned kLineWords = 8;
 
-// Where the first word of a slab stands.
+// Returns the place of a slab's first word.
 std::size_t place_of(std::size_t slab) {
   return 4 * (slab >> 2) + 16 * (slab & 3);
 }
 
-// Lines, of at most `most`, whose words are all as the one that follows them, empty or full: from the first place on,
-// or from the last one back.
+// Returns the number of lines, at most `most`, that can be omitted: all their words equal the next word, empty or full.
+// Counts from the first place forwards, or from the last place backwards.
 int lines_alike(const Node& words, bool is_from_last, int most) {
   const auto word_at = [&](unsigned i) {
     const unsigned place = is_from_last ? 63 - i : i;

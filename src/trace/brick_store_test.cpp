@@ -79,7 +79,7 @@ TEST(BrickStore, SlabsThatArePutOneAfterAnotherMakeTheBrickThatIsPutAtOnce) {
       words = {};
     }
   }
-  // The empty and the full brick, and a run or two of each length: what was given back is used again.
+  // The empty and the full brick, and one or two runs of each length: released runs are used again.
   EXPECT_LE(store.line_count(), 16U + 3U * (4 + 5 + 6 + 7 + 8));
 }
 

@@ -12,8 +12,8 @@
 
 namespace quoin::trace {
 
-/// 4x4 rows of cells between samples, of what `join` makes of their eight corners. `ends(y, z)`: of a row of samples,
-/// which cells along x have one of their two ends, or both; y and z up to 64.
+/// Computes 4x4 rows of cells between samples; `join` combines their eight corners. `ends(y, z)` returns, for a row of
+/// samples, the bits of the cells along x, each combined from the two ends of the cell; y and z are at most 64.
 template <class Ends, class Join>
 Slab join_corners(int y, int z, const Ends& ends, const Join& join, SlabRows& rows) {
   // Along x, then along y, then along z.
@@ -30,39 +30,39 @@ Slab join_corners(int y, int z, const Ends& ends, const Join& join, SlabRows& ro
   return slab_of(rows);
 }
 
-/// Rows of 64^3 cells between samples as bits: those with a solid corner. Cell (x, y, z) of a chunk lies between its
-/// sample (x, y, z) and the sample one further along each axis, which may be the next chunk's.
+/// Rows of 64^3 cells between samples, as bits: set for cells with a solid corner. Cell (x, y, z) of a chunk lies
+/// between its sample (x, y, z) and the next sample along each axis, which may belong to the next chunk.
 class CellRows {
  public:
   CellRows(const DensityGrid& field, IVec3 chunk);
 
-  /// Whether no cell has a solid corner.
+  /// Returns true if no cell has a solid corner.
   [[nodiscard]] bool none() const { return is_air_; }
 
-  /// As ChunkRows::read.
+  /// Reads 4x4 rows like ChunkRows::read.
   [[nodiscard]] Slab read(int y, int z, SlabRows& rows) const;
 
  private:
-  // The signs of a chunk's rows; those of one that is not there, or uniform, are all the same.
+  // The signs of a chunk's rows; the rows of a missing or uniform chunk are all equal.
   struct Signs {
     const std::uint64_t* rows = nullptr;  // [z][y]; null where all are `all`
     std::uint64_t all = 0;
   };
 
-  // Which cells along x have a solid sample at either end, of the samples' row (y, z), 0 to 64.
+  // Returns the cells along x with a solid sample at either end, for the samples' row (y, z), 0 to 64.
   [[nodiscard]] std::uint64_t either_end(int y, int z) const;
 
   std::array<Signs, 8> signs_;  // by the offset of the chunk, x + 2 y + 4 z
   bool is_air_ = true;
 };
 
-/// Which samples of a chunk of a field, and of the first of those beyond it along each axis, are solid and of materials
-/// that count: a bit each, by rows along x.
+/// The samples of a field's chunk that are solid and of a counted material, one bit each, in rows along x. Includes the
+/// first samples beyond the chunk along each axis.
 class SolidRows {
  public:
-  /// Of what is transparent.
+  /// Counts all transparent materials.
   SolidRows(const DensityGrid& field, const VoxelRegistry& types, IVec3 chunk);
-  /// Of one material.
+  /// Counts one material.
   SolidRows(const DensityGrid& field, VoxelType only, IVec3 chunk);
 
   [[nodiscard]] bool none() const { return rows_.empty(); }
@@ -79,15 +79,15 @@ class SolidRows {
   void read(const DensityGrid& field, IVec3 chunk, const RowsOf& rows_of);
   void read_chunk(const DensityChunk& samples, const ChunkRows& materials, IVec3 offset);
 
-  std::vector<std::uint64_t> rows_;  // none where none counts
+  std::vector<std::uint64_t> rows_;  // empty if no sample counts
   std::vector<std::uint8_t> last_;   // sample 64 of each row
 };
 
-/// Whether any solid sample of a chunk is of a transparent material. Cost: O(1) where it has no such material, else up
-/// to 10 microseconds.
+/// Returns true if a solid sample of a chunk has a transparent material. Cost: O(1) if the chunk has no such material,
+/// otherwise up to 10 microseconds.
 [[nodiscard]] bool has_glass(const DensityChunk& samples, const VoxelRegistry& types);
 
-/// Rows of the cells between samples, as CellRows: those with a solid corner of a transparent material.
+/// Rows of the cells between samples, like CellRows: set for cells with a solid corner of a transparent material.
 class GlassRows {
  public:
   GlassRows(const DensityGrid& field, const VoxelRegistry& types, IVec3 chunk) : samples_(field, types, chunk) {}
@@ -98,7 +98,7 @@ class GlassRows {
   SolidRows samples_;
 };
 
-/// Which blocks of a chunk's cells have all corners solid and of one transparent material.
+/// Finds the blocks of a chunk's cells whose corners are all solid and of one transparent material.
 [[nodiscard]] UniformBlocks uniform_glass(const DensityGrid& field, const VoxelRegistry& types, IVec3 chunk);
 
 }  // namespace quoin::trace

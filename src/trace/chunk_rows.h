@@ -17,11 +17,11 @@
 
 namespace quoin::trace {
 
-/// What 4x4 rows of a chunk, 64 voxels each, hold.
+/// The content of 4x4 rows of a chunk, 64 voxels each.
 enum class Slab : std::uint8_t { Empty, Full, Mixed };
 using SlabRows = std::array<std::uint64_t, 16>;  ///< [z][y]
 
-/// Of which kind rows are.
+/// Classifies rows as empty, full or mixed.
 [[nodiscard]] inline Slab slab_of(const SlabRows& rows) {
   std::uint64_t any = 0;
   std::uint64_t all = ~std::uint64_t{0};
@@ -36,24 +36,24 @@ using SlabRows = std::array<std::uint64_t, 16>;  ///< [z][y]
 class ChunkRows {
  public:
   ChunkRows(const Chunk& chunk, const VoxelRegistry& types, Occupancy which);
-  /// Of one type only.
+  /// Counts the voxels of one type only.
   ChunkRows(const Chunk& chunk, VoxelType only);
-  /// Of the types for which `counts`, which must outlive it; never asked for air.
+  /// Counts the types that `counts` accepts. `counts` must outlive this object and is never called for air.
   ChunkRows(const Chunk& chunk, const FunctionRef<bool(VoxelType)>& counts);
 
-  /// Whether no voxel counts.
+  /// Returns true if no voxel counts.
   [[nodiscard]] bool none() const { return in_.empty(); }
 
-  /// The box of those that count, where that of all voxels is the same.
+  /// Returns the box of the counted voxels if it is known without a scan: if air is the only type that does not count.
   [[nodiscard]] std::optional<IBox> known_bounds() const {
     const bool are_all = std::all_of(out_.begin(), out_.end(), [](VoxelType type) { return type == kAir; });
     return are_all ? std::optional(chunk_->bounds()) : std::nullopt;
   }
 
-  /// The 4x4 rows from (y, z) on, which are multiples of 4; they are set only where they are mixed.
+  /// Reads the 4x4 rows that start at (y, z), multiples of 4. Sets `rows` only if they are mixed.
   [[nodiscard]] Slab read(int y, int z, SlabRows& rows) const;
 
-  /// Calls `visit(y, z, row)` for the rows of a box's y and z, by slabs; not for those of slabs in which none counts.
+  /// Calls `visit(y, z, row)` for the rows in a box's y and z range, slab by slab. Skips empty slabs.
   template <class Visit>
   void for_each_row(const IBox& box, Visit&& visit) const;
 
@@ -62,14 +62,14 @@ class ChunkRows {
   [[nodiscard]] bool belongs(VoxelType type) const;
 
   const Chunk* chunk_;
-  const VoxelRegistry* types_ = nullptr;  // null: of one type only, or of those for which counts_
+  const VoxelRegistry* types_ = nullptr;  // null: one type only, or selected by counts_
   const FunctionRef<bool(VoxelType)>* counts_ = nullptr;
   Occupancy which_ = Occupancy::NonAir;
   VoxelType only_ = kAir;
   std::vector<VoxelType> in_;
   std::vector<VoxelType> out_;
-  std::vector<std::uint32_t> asked_;  // indices of the palette: whichever list is shorter
-  std::uint64_t inverted_ = 0;        // all ones where that is of those which do not count
+  std::vector<std::uint32_t> asked_;  // palette indices of the shorter list
+  std::uint64_t inverted_ = 0;        // all ones if asked_ lists the types that do not count
 };
 
 template <class Visit>
@@ -106,7 +106,7 @@ class RowsBox {
     y_ |= std::uint64_t{15} << y;
     z_ |= std::uint64_t{15} << z;
   }
-  /// A cell of 4^3 voxels, as nodes have it, at a multiple of 4.
+  /// Adds a cell of 4^3 voxels, in the bit order of nodes, at a multiple of 4.
   void add_cell(IVec3 at, std::uint64_t cell) {
     QUOIN_ASSERT(((at.x | at.y | at.z) & ~(kChunkEdge - 4)) == 0, "multiples of 4 within the chunk");
     std::uint64_t plane = (cell | cell >> 32);
@@ -119,9 +119,9 @@ class RowsBox {
       z_ |= std::uint64_t{(cell >> (16 * i) & 0xFFFFU) != 0} << (at.z + i);
     }
   }
-  /// Whether nothing within the 16^3 voxels from `at` on could change it.
+  /// Returns true if no voxel of the 16^3 voxels at `at` can enlarge the box.
   [[nodiscard]] bool covers_brick(IVec3 at) const { return covers(at, 0xFFFF); }
-  /// Likewise within 4^3.
+  /// Returns true if no voxel of the 4^3 voxels at `at` can enlarge the box.
   [[nodiscard]] bool covers_cell(IVec3 at) const { return covers(at, 0xF); }
   /// In chunk coordinates.
   [[nodiscard]] IBox box() const {
@@ -140,17 +140,17 @@ class RowsBox {
   std::uint64_t z_ = 0;
 };
 
-/// Finds which blocks of a chunk are full of one transparent type: in the rows of four bricks that hold any of the
-/// `wanted` slabs; of the other rows `blocks` is as it was.
-/// Cost: as that of a node of the tree for each such type of which there are voxels enough to fill a cell.
+/// Finds the blocks of a chunk that are full of one transparent type. Updates only the rows of four bricks that contain
+/// a `wanted` slab; other rows of `blocks` stay unchanged. Cost: for each transparent type with enough voxels to fill a
+/// cell, about the cost of building a tree node.
 void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, const ChunkSlabs& wanted,
                          UniformBlocks& blocks);
 
 /// Four bricks side by side along x, at (y, z) of a chunk, which are multiples of 16.
 struct BrickRow {
   std::array<Node, 4> bricks{};
-  /// Fills them in from what has rows, a ChunkRows or CellRows. False when all four are empty or all four are full, as
-  /// `is_full` says; `bricks` is then not set.
+  /// Reads the bricks from `rows`, a ChunkRows or CellRows. Returns false if all four are empty or all four are full;
+  /// then it sets `is_full` but not `bricks`.
   template <class Rows>
   bool read(const Rows& rows, int y, int z, RowsBox& box);
   bool is_full = false;
@@ -159,7 +159,7 @@ struct BrickRow {
 // 16 rows of 16 nibbles, [z][y][x / 4], become 16 words of 4^3 bits: nibble j of word i becomes nibble i of word j.
 void transpose_nibbles(SlabRows& rows);
 
-/// The 4x4 rows from (y, z) on, which are multiples of 4, as words of 4^3 voxels, [x].
+/// Reads the 4x4 rows that start at (y, z), multiples of 4, as words of 4^3 voxels, [x].
 template <class Rows>
 Slab read_cells(const Rows& rows, int y, int z, SlabRows& words, RowsBox& box) {
   const Slab kind = rows.read(y, z, words);

@@ -21,8 +21,8 @@ namespace {
 
 using trace::ChunkBricks, trace::ChunkNode, trace::Node, trace::RegionNode;
 
-// Two tables over the box of chunks around everything: what kernels of many rays read instead of regions and chunk
-// nodes, since an address is then a sum of products.
+// Two tables over the bounding box of all chunks. Kernels for packets read them instead of regions and chunk nodes,
+// because an address is then a sum of products.
 struct FlatTables {
   IVec3 origin{0};                       // the voxel at the least corner
   IVec3 chunks{0};                       // size
@@ -37,7 +37,7 @@ struct FlatTables {
   [[nodiscard]] trace::BrickCode* first_brick() { return bricks.data() + 1; }
 };
 
-// Where a unit stands in a table with these strides.
+// Returns the index of a unit in a table with these strides.
 std::size_t place_in(IVec3 strides, IVec3 unit) {
   return static_cast<std::size_t>(unit.x) + static_cast<std::size_t>(unit.y) * static_cast<std::size_t>(strides.y) +
          static_cast<std::size_t>(unit.z) * static_cast<std::size_t>(strides.z);
@@ -45,7 +45,7 @@ std::size_t place_in(IVec3 strides, IVec3 unit) {
 
 constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr int kRegionShift = 4;  // chunks, per axis
-// Of a row of four bricks more slabs than these are put together.
+// If more slabs than this of a row of four bricks change, fill_row assembles each brick once.
 constexpr int kFewSlabs = 2;
 // Flat tables up to this size are made however sparse the world is.
 constexpr std::int64_t kSmallTables = std::int64_t{1} << 20;
@@ -61,7 +61,7 @@ unsigned bit_of(IVec3 unit) {
   return static_cast<unsigned>((unit.x & 3) + 4 * (unit.y & 3) + 16 * (unit.z & 3));
 }
 
-// A chunk and those below it, some of whose cells end in it.
+// A chunk and its lower neighbours: some of the neighbours' cells end in the chunk.
 constexpr std::array<IVec3, 8> kBelow = {IVec3{0, 0, 0}, {-1, 0, 0},  {0, -1, 0},  {-1, -1, 0},
                                          {0, 0, -1},     {-1, 0, -1}, {0, -1, -1}, {-1, -1, -1}};
 
@@ -70,12 +70,12 @@ struct SlabsOfChunk {
   ChunkSlabs slabs;
 };
 
-// The slabs whose cells end in what an edit of a field changed.
+// Returns the slabs with cells that touch a sample changed by an edit of the field.
 std::vector<SlabsOfChunk> cells_reached(const DensityChanges& changes) {
   std::vector<SlabsOfChunk> reached;
   for (const DensityChange& each : changes.items) {
     for (const IVec3 offset : kBelow) {
-      // A cell begins a sample before each of its ends.
+      // A cell begins one sample before each of its ends.
       const IBox cells{each.box.min - 1 - offset * kChunkEdge, each.box.max - offset * kChunkEdge};
       const IBox own = intersect(cells, kWholeChunk);
       if (!own.empty()) reached.push_back({each.chunk + offset, ChunkSlabs::of(own)});
@@ -95,7 +95,7 @@ std::vector<SlabsOfChunk> cells_reached(const DensityChanges& changes) {
   return reached;
 }
 
-// Where cells between the samples of some chunks lie.
+// Returns the chunks of the cells between the samples of some chunks.
 std::vector<IVec3> cells_of(const std::vector<IVec3>& chunks) {
   std::vector<IVec3> cells;
   cells.reserve(chunks.size() * kBelow.size());
@@ -140,22 +140,22 @@ trace::TreeView make_view(const FlatTables& tables, const trace::FlatChunk* chun
 struct OccupancyTree::Impl {
   Occupancy which = Occupancy::NonAir;
   tsl::robin_map<IVec3, std::unique_ptr<RegionNode>, CoordinateHash> regions;
-  std::vector<ChunkNode> chunk_nodes = std::vector<ChunkNode>(1);  // 0: none
+  std::vector<ChunkNode> chunk_nodes = std::vector<ChunkNode>(1);  // index 0: an empty node
   trace::BrickStore bricks;
-  std::vector<trace::UniformBlocks> uniform;  // of transparent voxels: of each of `chunk_nodes`
+  std::vector<trace::UniformBlocks> uniform;  // only for transparent voxels, parallel to `chunk_nodes`
   std::vector<std::uint32_t> free_chunks;
   ChunkBoxes chunk_boxes;  // around the occupied voxels of each chunk, in grid coordinates
   IBox bounds;
-  FlatTables flat;  // no chunks: none
+  FlatTables flat;  // empty without chunks
   std::vector<trace::FlatChunk> flat_nodes;
-  const ChunkNode* known_nodes = nullptr;  // where they were when `flat_nodes` was made
+  const ChunkNode* known_nodes = nullptr;  // data() of chunk_nodes when `flat_nodes` was made
   IBox flat_chunks;
   // A chunk far from all others makes the tables too large. They are kept without it until it is gone again, with the
   // changes that they have not got.
   bool is_flat = false;
   std::vector<ChunkBricks> missed;
   trace::TreeView view{};
-  bool is_built = false;  // until then what is kept may double: finish_build trims it
+  bool is_built = false;  // before finish_build, vectors may double their capacity; finish_build trims them
 
   void release_bricks(ChunkNode& node) {
     for (trace::BrickCode& brick : node.bricks) {
@@ -203,7 +203,7 @@ struct OccupancyTree::Impl {
     return chunk_nodes[index];
   }
 
-  // Puts the words of one brick in place; returns whether they are others than before.
+  // Replaces the words of one brick. Returns true if they changed.
   bool set_brick(ChunkNode& node, std::size_t brick, const Node& words) {
     if (bricks.words(node.bricks[brick]).node() == words) return false;
     std::uint64_t cells = 0;
@@ -234,14 +234,14 @@ struct OccupancyTree::Impl {
     return true;
   }
 
-  // Which of a brick's cells are not empty, when one slab's are these.
+  // Returns the non-empty cells of a brick after replacing the words of one slab.
   static std::uint64_t with_slab(std::uint64_t cells, std::size_t slab, std::span<const std::uint64_t, 4> words) {
     cells &= ~(std::uint64_t{15} << (4 * slab));
     for (std::size_t i = 0; i < 4; ++i) cells |= std::uint64_t{words[i] != 0} << (4 * slab + i);
     return cells;
   }
 
-  // Puts the words of one slab in place in a brick, four of its 64; returns whether they are others than before.
+  // Replaces the words of one slab in a brick, four of its 64. Returns true if they changed.
   bool set_slab(ChunkNode& node, std::size_t brick, std::size_t slab, std::span<const std::uint64_t, 4> words) {
     trace::BrickCode& code = node.bricks[brick];
     if (bricks.words(code).has_four(4 * slab, words.data())) return false;
@@ -252,7 +252,7 @@ struct OccupancyTree::Impl {
     return true;
   }
 
-  // Puts all slabs. Returns which bricks changed; `box` is united with that of the occupied voxels.
+  // Replaces all slabs. Returns the bricks that changed, and adds the occupied voxels to `box`.
   template <class Rows>
   std::uint64_t fill(ChunkNode& node, const Rows& rows, trace::RowsBox& box) {
     std::uint64_t changed = 0;
@@ -269,7 +269,7 @@ struct OccupancyTree::Impl {
     return changed;
   }
 
-  // Likewise, but of the `wanted` slabs alone.
+  // Replaces only the `wanted` slabs. Returns the bricks that changed, and adds their occupied voxels to `box`.
   template <class Rows>
   std::uint64_t fill(ChunkNode& node, const Rows& rows, const ChunkSlabs& wanted, trace::RowsBox& box) {
     std::uint64_t changed = 0;
@@ -296,7 +296,7 @@ struct OccupancyTree::Impl {
     return changed;
   }
 
-  // Some slabs of a row of four bricks, each brick put once.
+  // Replaces some slabs of a row of four bricks, and stores each brick once.
   template <class Rows>
   std::uint64_t fill_row(ChunkNode& node, const Rows& rows, int row, std::uint32_t slabs, trace::RowsBox& box) {
     const std::size_t first = 4 * static_cast<std::size_t>(row);
@@ -352,7 +352,7 @@ struct OccupancyTree::Impl {
     return kAll;
   }
 
-  // Puts the slabs of a chunk that are `wanted`; the others are as they were. Returns which bricks changed.
+  // Replaces the `wanted` slabs of a chunk; other slabs stay unchanged. Returns the bricks that changed.
   template <class Rows>
   std::uint64_t put(const Rows& rows, IVec3 chunk, ChunkSlabs wanted = ChunkSlabs::all()) {
     if (rows.none()) return drop(chunk);
@@ -371,7 +371,7 @@ struct OccupancyTree::Impl {
     chunk_boxes.put(chunk, {box.min + chunk * kChunkEdge, box.max + chunk * kChunkEdge});
     return changed;
   }
-  // Whether none of some bricks reaches to a side of a box in their chunk.
+  // Returns true if none of the bricks touches a side of a box in their chunk.
   static bool is_inside(std::uint64_t bricks, const IBox& box) {
     const IBox inner{(box.min >> 4) + 1, (box.max - 1) >> 4};  // bricks
     for (; bricks != 0; bricks &= bricks - 1) {
@@ -380,11 +380,12 @@ struct OccupancyTree::Impl {
     }
     return true;
   }
-  // Of a chunk of which some slabs were put, in which `found` is.
+  // Returns the box of a chunk's occupied voxels after some slabs were replaced. `found` is their box within these
+  // slabs.
   template <class Rows>
   [[nodiscard]] IBox box_after(const Rows& rows, const ChunkNode& node, std::uint64_t changed, const IBox& before,
                                const IBox& found) const {
-    // Where nothing ended at a side of the box before, that side is where it was.
+    // If no changed brick touches a side of the old box, every side stays or moves outward.
     if (is_inside(changed, before)) return unite(before, found);
     if constexpr (std::is_same_v<Rows, trace::ChunkRows>) {
       if (const auto known = rows.known_bounds()) return *known;
@@ -405,8 +406,8 @@ struct OccupancyTree::Impl {
     }
     return changed;
   }
-  // Those of some slabs in which there is something, and all in rows of bricks in which there is more or less than
-  // before: of the others nothing can be told that is new.
+  // Returns the wanted slabs that contain voxels, and all wanted slabs in rows with changed bricks. The uniform
+  // blocks of other slabs cannot have changed.
   static ChunkSlabs with_any(const ChunkNode& node, std::uint64_t changed, const ChunkSlabs& wanted) {
     ChunkSlabs slabs;
     for (std::size_t row = 0; row < 16; ++row) {
@@ -438,7 +439,7 @@ struct OccupancyTree::Impl {
     if (index != 0) find_blocks(uniform[index]);
   }
 
-  // Puts 4 bits in place of those at `bit`.
+  // Replaces the 4 bits at `bit`.
   static void put_bits(std::vector<std::uint32_t>& words, std::size_t bit, std::uint64_t bits) {
     const std::size_t word = bit / 32;
     QUOIN_ASSERT(bits < 16 && word + 1 < words.size(), "bits of the table");
@@ -486,7 +487,7 @@ struct OccupancyTree::Impl {
     return found == regions.end() ? nullptr : found->second.get();
   }
 
-  // Whether tables for the box of chunks are not too large for what is in it.
+  // Returns true if tables for this box of chunks are not too large for its content.
   [[nodiscard]] bool can_be_flat(const IBox& chunks) const {
     const IVec3 size = chunks.size();
     const std::int64_t cells = (16 * std::int64_t{size.x} + 2) * (16 * std::int64_t{size.y} + 2);
@@ -502,7 +503,7 @@ struct OccupancyTree::Impl {
     return static_cast<double>(cells) * (16.0 * chunks_along_z + 2.0);
   }
 
-  // Tables of nothing.
+  // Makes empty tables for a box of chunks.
   void clear_tables(const IBox& chunks) {
     flat = {};
     const IVec3 size = flat.chunks = chunks.size();
@@ -523,7 +524,7 @@ struct OccupancyTree::Impl {
     for (const auto& [chunk, box] : chunk_boxes) flatten(chunk, kAll);
   }
 
-  // Puts the bits of one table's row into another's, where they are 0.
+  // ORs a row of bits from one table into another, where the bits are 0.
   static void copy_bits(const std::vector<std::uint32_t>& from, std::size_t from_bit, std::vector<std::uint32_t>& to,
                         std::size_t to_bit, std::size_t count) {
     QUOIN_ASSERT((from_bit + count - 1) / 32 + 1 < from.size() && (to_bit + count - 1) / 32 + 1 < to.size(),
@@ -569,7 +570,7 @@ struct OccupancyTree::Impl {
     });
   }
 
-  // A box of chunks that is to be in the tables, with room on the sides on which it is not yet.
+  // Grows a box of chunks that the tables must cover, on the sides that they do not cover yet.
   [[nodiscard]] IBox with_room(const IBox& chunks) const {
     IBox grown = chunks;
     const IVec3 room = glm::max(IVec3(1), chunks.size() / 8);
@@ -580,7 +581,7 @@ struct OccupancyTree::Impl {
     return can_be_flat(grown) ? grown : chunks;
   }
 
-  // After chunks have been put: the bounds, and the tables where they concern `changed`.
+  // Updates the bounds after chunks were replaced, and the tables for the `changed` chunks.
   void finish(std::span<const ChunkBricks> changed) {
     renew_tables(changed);
     QUOIN_ASSERT(flat_chunks.empty() || flat_nodes.size() == volume(flat_chunks.size()), "tables of their chunks");
@@ -611,7 +612,7 @@ struct OccupancyTree::Impl {
   void renew_tables(std::span<const ChunkBricks> changed) {
     bounds = chunk_boxes.bounds();
     const IBox chunks = bounds.empty() ? IBox{} : IBox{chunk_of(bounds.min), chunk_of(bounds.max - 1) + 1};
-    // As a tree built from scratch would have it.
+    // As in a tree built from scratch.
     is_flat = can_be_flat(chunks);
     if (!is_flat) return miss(changed);
     const bool is_little = !flat_chunks.empty() && volume(chunks.size()) < volume(flat_chunks.size()) / 4;

@@ -191,7 +191,7 @@ TEST(Ray, BlockerThatStraddlesTheEndIsHit) {
   EXPECT_FALSE(any_hit(tree, {{0.5, 0.5, 0.5}, {1, 0, 0}}, 9.4999));
 }
 
-// Rays that start far away are moved to the bounds first, of which a flat floor is a face.
+// Rays from far away are moved to the bounds first. A flat floor is one face of these bounds.
 TEST(Ray, IsHitWithinTheDistanceAtWhichItWasHit) {
   Grid grid;
   grid.fill_box({{-200, -5, -200}, {201, 1, 201}}, 1);

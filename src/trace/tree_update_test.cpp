@@ -1,4 +1,4 @@
-// Trees that follow edits, beside trees that are built anew.
+// Compares trees that follow edits with trees that are built from scratch.
 
 #include <algorithm>
 #include <random>
@@ -127,7 +127,7 @@ TEST(TreeUpdate, EqualsATreeBuiltAnew) {
   }
 }
 
-// One voxel after another, each outside of what there was, and then away again.
+// Adds voxels one by one, each outside the previous bounds, and then removes them again.
 TEST(TreeUpdate, WorldsThatGrowAndShrink) {
   const VoxelRegistry types = two_of_each();
   Random random(5);
@@ -152,7 +152,7 @@ TEST(TreeUpdate, WorldsThatGrowAndShrink) {
     expect_equal(tree, OccupancyTree::build(grid, types), random, false);
     if (HasFatalFailure()) FAIL() << at.x;
   }
-  // What is left of a great world is small again.
+  // The tree of a large world that shrinks becomes small again.
   grid.fill_box({{10, 0, 0}, {200, 90, 200}}, kAir);
   grid.fill_box({{0, 0, 10}, {10, 90, 200}}, kAir);
   tree.update(grid, types, grid.changes_since(cursor));

@@ -1,23 +1,23 @@
 #pragma once
 
-// How an occupancy tree lies in memory.
+// The memory layout of an occupancy tree.
 //
 //   region, 1,024^3 voxels      16^3 chunks                Node: bits; and the index of each ChunkNode
-//     chunk, 64^3                 16^3 cells of 4^3          Node: bits; and where each of its 64 bricks lies
+//     chunk, 64^3                 16^3 cells of 4^3          Node: bits; and the address of each of its 64 bricks
 //       brick, 16^3                 16^3 voxels                a run of lines
 //
-// One shape serves all levels: a node is 16^3 units as 64 words, each the bits of 4^3 units (x + 4 y + 16 z). Beside
-// the tree lie flat tables over the box of chunks around everything, so that a kernel finds an address by adding.
+// All levels use one node shape: 16^3 units in 64 words, each with the bits of 4^3 units (x + 4 y + 16 z). In addition
+// to the tree, flat tables cover the bounding box of all chunks, so that a kernel computes an address by addition.
 //
-// Of a brick the same 64 words are kept by layers of y (place x + 4 z + 16 y), as land lies, in lines of eight. Where
-// they begin or end with equal words, all empty or all full, up to half of the lines are left out:
+// A brick stores its 64 words in layers of y (place x + 4 z + 16 y), since terrain is layered, in lines of eight words.
+// If the brick begins or ends with equal words, all empty or all full, it omits up to half of the lines:
 //
 //   place        0  1  2  3  4  5  6  7     lines
-//   kept         .  .  .  A  B  C  D  E     shift -3: places before line A read its first word
-//   kept         A  B  C  D  E  F  .  .     shift  2: places after line F read its last word
+//   stored       .  .  .  A  B  C  D  E     shift -3: places before line A read its first word
+//   stored       A  B  C  D  E  F  .  .     shift  2: places after line F read its last word
 //
-// A place plus the shift, as a number with a sign that saturates, is where in the run its word lies: one instruction
-// for all lanes of a kernel.
+// The position of a word in the run is its place plus the shift, as a saturating signed addition: one instruction for
+// all lanes of a kernel.
 
 #include <array>
 #include <cstddef>
@@ -36,8 +36,8 @@ using Node = std::array<std::uint64_t, 64>;
 using BrickLine = std::array<std::uint64_t, 8>;
 inline constexpr int kBrickLines = 8;
 
-/// Where a brick of 16^3 voxels lies: 28 bits of a line's number, three of the shift as two's complement, and a 0. So
-/// it is a count of half words, of 32 bits, once its lowest four bits are cleared.
+/// The address of a brick of 16^3 voxels: 28 bits of a line number, three bits of the shift in two's complement, and a
+/// 0 bit. With its lowest four bits cleared, it is a count of 32-bit half words.
 using BrickCode = std::uint32_t;
 inline constexpr BrickCode kEmptyBrick = 0;
 inline constexpr BrickCode kFullBrick = 16 * kBrickLines;
@@ -60,8 +60,8 @@ struct BrickRun {
   [[nodiscard]] int count() const { return kBrickLines - (shift < 0 ? -shift : shift); }
 };
 
-/// For each shift, by its three bits, where the word of a cell (x + 4 y + 16 z) lies, from the middle of a brick that
-/// has all its lines.
+/// For each shift, by its three bits: the position of each cell's word (x + 4 y + 16 z), relative to the middle of a
+/// brick that stores all its lines.
 inline constexpr auto kBrickPlaces = [] {
   std::array<std::array<std::int8_t, 64>, 8> places{};
   for (int shift = -4; shift < 4; ++shift) {
@@ -79,11 +79,11 @@ inline constexpr auto kBrickPlaces = [] {
 /// The 64 words of a brick, by cells: x + 4 y + 16 z.
 class BrickWords {
  public:
-  /// `middle` is four lines after the first of all, those of the empty brick.
+  /// `middle` is four lines after the very first line, which belongs to the empty brick.
   BrickWords(const BrickLine* middle, BrickCode code)
       : words_(middle->data() + std::size_t{code >> 4} * 8), places_(kBrickPlaces[code >> 1 & 7U].data()) {}
   const std::uint64_t& operator[](std::size_t cell) const { return words_[places_[cell]]; }
-  /// Whether four of them, from a cell with x = 0 on, are these.
+  /// Returns true if the four words from `cell` on, whose x is 0, equal `four`.
   [[nodiscard]] bool has_four(std::size_t cell, const std::uint64_t* four) const {
     const std::uint64_t* const own = words_ + places_[cell];
     const std::size_t step = is_kept(cell) ? 1 : 0;
@@ -106,20 +106,20 @@ class BrickWords {
   }
 
  private:
-  // Four cells lie side by side, or none of them is kept.
+  // The words of four cells along x are either adjacent or all omitted.
   [[nodiscard]] bool is_kept(std::size_t cell) const { return places_[cell] != places_[cell + 1]; }
 
   const std::uint64_t* words_;
   const std::int8_t* places_;
 };
 
-/// Of 64^3 voxels: which 4^3 cells hold any, and where the bricks of 16^3 voxels lie.
+/// A chunk of 64^3 voxels: the occupied 4^3 cells, and the addresses of its 16^3 bricks.
 struct ChunkNode {
   Node cells{};                        ///< word b: the cells of brick b
   std::array<BrickCode, 64> bricks{};  ///< kEmptyBrick and kFullBrick are shared by all
 };
 
-/// Of a chunk of transparent voxels: which aligned blocks are full of one type.
+/// The aligned blocks of a transparent chunk that are full of one type.
 struct UniformBlocks {
   Node cells{};              ///< cells of 4^3, as in ChunkNode
   std::uint64_t bricks = 0;  ///< bricks of 16^3, x + 4 y + 16 z
@@ -132,22 +132,22 @@ struct ChunkBricks {
   std::uint64_t bricks = 0;  ///< x + 4 y + 16 z
 };
 
-/// Of 16^3 chunks.
+/// A region of 16^3 chunks.
 struct RegionNode {
   Node chunks{};                            ///< which chunks hold any voxel
-  std::array<std::uint32_t, 4096> nodes{};  ///< index of a ChunkNode, x + 16 y + 256 z; 0 is none
+  std::array<std::uint32_t, 4096> nodes{};  ///< index of a ChunkNode, x + 16 y + 256 z; 0: empty
 };
 
 /// A chunk as walks of single rays read it.
 struct FlatChunk {
-  std::uint64_t bricks = 0;  ///< those that are not empty, x + 4 y + 16 z
+  std::uint64_t bricks = 0;  ///< non-empty bricks, x + 4 y + 16 z
   const ChunkNode* node = nullptr;
 };
 
-/// What the kernels read of a tree with flat tables.
+/// The part of a tree with flat tables that the kernels read.
 struct TreeView {
-  /// Of a tree; null where the world is so sparse (islands far apart) that its tables would be larger than all the
-  /// rest.
+  /// Returns the view of a tree; null if the world is so sparse (distant islands) that its tables would be larger than
+  /// the rest of the tree.
   [[nodiscard]] static const TreeView* of(const OccupancyTree& tree) { return tree.view_; }
 
   // `origin`, `box` and the strides of chunks, as registers read them.
@@ -157,7 +157,7 @@ struct TreeView {
   alignas(16) std::int32_t low_voxel[4];
   alignas(16) std::int32_t high_voxel[4];
   alignas(16) std::int32_t chunk_strides[4];
-  // As everything else reads it.
+  // The same values for all other code.
   const std::uint32_t* cells;  ///< bits
   const BrickCode* bricks;
   const std::uint32_t* words;  ///< halves of the words of `lines`, the lower first
@@ -183,7 +183,7 @@ class TreeNodes {
   [[nodiscard]] const ChunkNode* find_chunk(IVec3 chunk) const;
   [[nodiscard]] const ChunkNode& chunk(std::uint32_t index) const { return chunks_[index]; }
   [[nodiscard]] BrickWords brick(BrickCode code) const { return {lines_, code}; }
-  /// Of one of the tree's chunks. Requires: a tree of transparent voxels.
+  /// Returns the uniform blocks of one of the tree's chunks. Requires: a tree of transparent voxels.
   [[nodiscard]] const UniformBlocks& uniform_blocks(const ChunkNode& chunk) const {
     QUOIN_ASSERT(uniform_ != nullptr && &chunk > chunks_, "a chunk of a tree of transparent voxels");
     return uniform_[&chunk - chunks_];

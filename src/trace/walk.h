@@ -11,9 +11,9 @@
 
 namespace quoin::trace {
 
-/// A walk through a tree from one plane crossing to the next, in double. Every crossing's distance is found from the
-/// origin, (plane - origin) / direction, by the same formula whatever the size of the step, so a walk in large steps
-/// crosses the same planes at the same distances, in the same order, as one voxel at a time.
+/// A walk through a tree from one plane crossing to the next, in double precision. The distance of every crossing is
+/// (plane - origin) / direction, computed by the same formula for any step size. A walk in large steps therefore
+/// crosses the same planes at the same distances, in the same order, as a walk over single voxels.
 class Walk {
  public:
   Walk(const OccupancyTree& tree, const Ray& ray) : nodes_(tree) {
@@ -54,7 +54,7 @@ class Walk {
         exit_axis = axis;
       }
     }
-    // Through an edge of the bounds: it has left before it enters if the axis on which it leaves goes first.
+    // The ray passes an edge of the bounds. It leaves before it enters if the axis of its exit comes first.
     if (!(enter_t <= exit_t) || (enter_t == exit_t && exit_axis < enter_axis)) return false;
     bounds_ = bounds;
     t_ = enter_t;
@@ -97,7 +97,7 @@ class Walk {
   [[nodiscard]] int axis() const { return axis_; }
 
  private:
-  // Where the ray stands on `axis` when it has entered its bounds, or starts within.
+  // Returns the ray's coordinate on `axis` at its entry into the bounds, or at its start within them.
   [[nodiscard]] int coordinate_at_start(int axis) const {
     if (axis_ < 0) return static_cast<int>(std::floor(origin_[axis]));
     const int last = bounds_.max[axis] - 1;
@@ -105,7 +105,7 @@ class Walk {
     return coordinate_after(axis, bounds_.min[axis], last);
   }
 
-  // Where the ray is on `axis` just after the current crossing, between `low` and `high`.
+  // Returns the ray's coordinate on `axis` just after the current crossing, between `low` and `high`.
   [[nodiscard]] int coordinate_after(int axis, int low, int high) const {
     const double d = direction_[axis];
     const double o = origin_[axis];
@@ -114,13 +114,13 @@ class Walk {
     if (!(position < high + 1.0)) return settled(axis, high, low, high);
     const int floor = static_cast<int>(std::floor(position));
     const double fraction = position - floor;
-    // Rounding can put a position on the wrong side of a plane only next to it.
+    // Rounding can put a position on the wrong side of a plane only near that plane.
     if (fraction > 1e-5 && fraction < 1.0 - 1e-5) return floor;
     return settled(axis, floor, low, high);
   }
 
-  // Corrects a coordinate by comparing crossings: planes whose t is less were crossed before, and at a tie those of
-  // axes before this one.
+  // Corrects a coordinate by comparing crossings: planes with a smaller t were crossed before. At a tie, planes of
+  // earlier axes were crossed before.
   [[nodiscard]] int settled(int axis, int guess, int low, int high) const {
     if (direction_[axis] == 0.0) return std::clamp(static_cast<int>(std::floor(origin_[axis])), low, high);
     const int forward = direction_[axis] > 0.0 ? 1 : -1;
@@ -181,7 +181,7 @@ class Walk {
   [[nodiscard]] double crossing(int axis, double plane) const {
     return direction_[axis] != 0.0 ? (plane - origin_[axis]) * inverse_[axis] : std::numeric_limits<double>::infinity();
   }
-  // Where the voxel ends along an axis.
+  // Computes t where the ray leaves its voxel along an axis.
   void find_next(int axis) {
     next_[axis] = crossing(axis, direction_[axis] > 0.0 ? static_cast<double>(voxel_[axis]) + 1.0 : voxel_[axis]);
   }
@@ -196,7 +196,7 @@ class Walk {
     return (word_ >> ((v.x & 3) + 4 * (v.y & 3) + 16 * (v.z & 3)) & 1U) != 0 ? 0 : 1;
   }
 
-  // Looks up the cell of a voxel; returns the size of the empty block around it where there is nothing in it.
+  // Looks up the cell of a voxel. Returns the edge length of the empty block around it, or 0 if the cell is occupied.
   int enter_cell(IVec3 v) {
     const IVec3 chunk = v >> 6;
     if (chunk != chunk_ || !knows_chunk_) {
@@ -218,7 +218,7 @@ class Walk {
     return 0;
   }
 
-  // The edge of the largest aligned block around an occupied voxel that is of its type.
+  // Returns the edge length of the largest aligned block of one type around an occupied voxel.
   [[nodiscard]] int uniform_size() const {
     const UniformBlocks& blocks = nodes_.uniform_blocks(*node_);
     const std::size_t brick = brick_of(voxel());
@@ -227,7 +227,7 @@ class Walk {
     return (blocks.bricks >> brick & 1U) != 0 ? 16 : 4;
   }
 
-  // Of a brick within its chunk, of a cell within its brick.
+  // Returns the index of a brick within its chunk. The next function returns that of a cell within its brick.
   static std::size_t brick_of(IVec3 v) {
     return static_cast<std::size_t>((v.x >> 4 & 3) + 4 * (v.y >> 4 & 3) + 16 * (v.z >> 4 & 3));
   }
@@ -235,7 +235,7 @@ class Walk {
     return static_cast<std::size_t>((v.x >> 2 & 3) + 4 * (v.y >> 2 & 3) + 16 * (v.z >> 2 & 3));
   }
 
-  // Looks up a chunk's node; returns the size of the empty block around it where there is none.
+  // Looks up a chunk's node. Returns the edge length of the empty block around it, or 0 if the chunk has a node.
   int enter_chunk(IVec3 chunk) {
     const IVec3 region = chunk >> 4;
     if (region != region_coordinates_ || !knows_region_) {
@@ -259,7 +259,7 @@ class Walk {
   IVec3 chunk_{0};
   bool knows_region_ = false;
   bool knows_chunk_ = false;
-  IVec3 cell_{std::numeric_limits<int>::min()};  // none, of any voxel
+  IVec3 cell_{std::numeric_limits<int>::min()};  // initially no cell
   std::uint64_t word_ = 0;                       // its voxels
   double origin_[3] = {};
   double direction_[3] = {};
@@ -268,10 +268,10 @@ class Walk {
   double t_ = 0.0;
   int axis_ = -1;
   int voxel_[3] = {};
-  double next_[3] = {};  // t at which it leaves the voxel along each axis
+  double next_[3] = {};  // t where the ray leaves the voxel along each axis
 };
 
-/// Whether there is anything to walk.
+/// Returns true if the ray is finite and has a direction, and max_t is not negative.
 inline bool is_usable(const Ray& ray, double max_t) {
   double length = 0.0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -297,8 +297,8 @@ struct WalkSpan : VoxelSpan {
   Direction exit_face = Direction::PosX;
 };
 
-/// Calls `visit` with a WalkSpan for each of what `leave` takes a walk out of, from one occupied voxel on, until it
-/// returns false.
+/// Calls `visit` with a WalkSpan for each block that `leave` crosses, starting at an occupied voxel, until it returns
+/// false.
 template <class Leave, class Visit>
 void visit_spans(const OccupancyTree& tree, const Ray& ray, double max_t, const Leave& leave, const Visit& visit) {
   if (!is_usable(ray, max_t)) return;
@@ -313,9 +313,10 @@ void visit_spans(const OccupancyTree& tree, const Ray& ray, double max_t, const 
   }
 }
 
-/// As `visit_hits`, of a tree of transparent voxels, for whole blocks of voxels of one type at a time: a span is that
-/// of a block, entered at its voxel. Together the spans are those of the voxels. `enter`: told of that voxel first.
-/// `largest`: returns, where there is a block, how long its edge may be.
+/// Like `visit_hits`, for a tree of transparent voxels, but visits whole blocks of voxels of one type: a span covers a
+/// block, and its voxel is the entry voxel. Together the spans cover the same intervals as the spans of single voxels.
+/// `enter` is called first, with the entry voxel. `largest` returns the maximum edge length of a block, where there is
+/// one.
 template <class Enter, class Largest, class Visit>
 void visit_blocks(const OccupancyTree& tree, const Ray& ray, double max_t, const Enter& enter, const Largest& largest,
                   const Visit& visit) {

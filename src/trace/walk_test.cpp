@@ -66,7 +66,7 @@ class WalkOfBlocks : public ::testing::Test {
     return spans;
   }
 
-  /// How many voxels there are a block, on the rays of a loop.
+  /// Returns the number of voxels per block along the rays of a loop.
   double compare(const OccupancyTree& tree, int rays) {
     std::size_t block_count = 0;
     std::size_t voxel_count = 0;
@@ -128,7 +128,7 @@ TEST_F(WalkOfBlocks, WholeChunksAreOneStep) {
   EXPECT_EQ(blocks(tree, {{-5, 30.5, 30.5}, {1, 0, 0}}, 1e9).size(), 2U);
   grid.fill_box({{70, 0, 0}, {71, 64, 64}}, ids[1]);
   const OccupancyTree edited = OccupancyTree::build(grid, types, Occupancy::Transparent);
-  // Bricks of 16 where there is one type, and cells of 4 beside the sheet.
+  // Bricks of 16 where there is one type, and cells of 4 next to the sheet.
   EXPECT_EQ(blocks(edited, {{-5, 30.5, 30.5}, {1, 0, 0}}, 1e9).size(), 1U + 1 + 4 + 2 + 3);
   EXPECT_EQ(blocks(edited, {{-5, 30.5, 30.5}, {1, 0, 0}}, 1e9, 5.0).size(), 16U + 1 + 4 + 2 + 12);
   EXPECT_EQ(blocks(edited, {{-5, 30.5, 30.5}, {1, 0, 0}}, 1e9, 0.0).size(), 128U);

@@ -36,7 +36,7 @@ struct BodiesInCell {
   bool has_air = false;
   bool has_opaque = false;
 
-  // Whether all of it is of one transparent material.
+  // Returns true if the whole cell has one transparent material.
   [[nodiscard]] bool is_full() const { return !has_air && !has_opaque && count == 1; }
 
   void set(std::size_t i, double density, VoxelType material, const VoxelRegistry& types) {
@@ -53,7 +53,7 @@ struct BodiesInCell {
     ++count;
   }
 
-  // The field of one body: what is solid of others is as far out as it is in.
+  // Returns the field of one body: solid samples of other bodies have their sign flipped.
   [[nodiscard]] Corners field_of(VoxelType of) const {
     Corners field = densities;
     for (std::size_t i = 0; i < 8; ++i) {
@@ -99,10 +99,10 @@ class CellReader {
   bool knows_ = false;
 };
 
-// Numbers from 0 to 1 at which something begins or ends, in order.
+// The sorted ends of spans, as parameters in [0, 1].
 class Crossings {
  public:
-  // Where a cubic changes its sign.
+  // Adds the sign changes of a cubic.
   void add(const trace::CellCubic<double>& f) {
     const double a = 3.0 * f.c3;
     const double b = 2.0 * f.c2;
@@ -130,7 +130,7 @@ class Crossings {
   [[nodiscard]] double operator[](std::size_t i) const { return places_[i]; }
 
  private:
-  // Of all, of the opaque, and of each pair of eight types up to three, and the two ends.
+  // The whole field, the opaque field and each pair of eight types have up to three roots each, plus the two ends.
   static constexpr std::size_t kMost = 3 + 3 + 3 * 28 + 2;
 
   void add_between(const trace::CellCubic<double>& f, double low, double high) {
@@ -147,7 +147,7 @@ trace::CellCubic<double> operator-(const trace::CellCubic<double>& a, const trac
   return {a.c0 - b.c0, a.c1 - b.c1, a.c2 - b.c2, a.c3 - b.c3};
 }
 
-// What a ray comes to in a cell, between 0, where it enters, and 1, where it leaves.
+// The spans of a ray in a cell, from 0 at its entry to 1 at its exit.
 class RayInCell {
  public:
   RayInCell(const BodiesInCell& cell, const DVec3& entry, const DVec3& way)
@@ -202,7 +202,7 @@ bool visit_cell(const BodiesInCell& cell, const Ray& ray, const trace::WalkSpan&
   const DVec3 entry = glm::clamp(ray.origin + ray.direction * span.t_enter - DVec3(span.voxel), 0.0, 1.0);
   const RayInCell in_cell(cell, entry, ray.direction * length);
   const Crossings crossings = in_cell.crossings();
-  // Where it is cut at its ends, distances are those of the cells beside it, to the bit.
+  // Ends at the cell's boundary use the distances of the neighbouring cells, bit for bit.
   const auto t_of = [&](double s) { return s <= 0.0 ? span.t_enter : s >= 1.0 ? t_exit : span.t_enter + s * length; };
   for (std::size_t i = 0; i + 1 < crossings.count();) {
     const double from = crossings[i];

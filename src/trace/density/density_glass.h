@@ -9,25 +9,25 @@
 
 namespace quoin {
 
-/// What of a field is transparent, ready to be traced.
+/// The transparent part of a density field, for tracing.
 ///
-/// Where: the trilinear field of the densities is negative in all that is solid. Opaque of it is where the same field
-///        is negative once samples of transparent materials count as far out as they are in; the rest is transparent:
-///        so there is no gap between the two, and along the lattice's edges they meet where the surfaces of meshes do
-///        (mesh/surface/bodies.h). Of several transparent materials a point has the one whose field, made likewise of
-///        its own samples, is the least there.
+/// Regions: the solid is the set of points with a negative trilinear density. Its opaque part is the region where the
+/// same field is negative after samples of transparent materials have had their sign flipped. The rest of the solid is
+/// transparent. There is no gap between the two parts, and along lattice edges they meet at the surfaces of meshes
+/// (mesh/surface/bodies.h). A point in reach of several transparent materials has the material with the lowest field
+/// there, each field computed from the samples of that material in the same way.
 /// Lifetime, threads: as DensityTree.
 class DensityGlass {
  public:
   DensityGlass(const DensityGrid& field, const VoxelRegistry& types);
 
-  /// Takes over what edits changed. Requires: `changes` are those since the last update, or since it was made; no type
-  /// that was there has another visibility since.
+  /// Applies the changes of edits. Requires: `changes` covers all changes since the last update or since construction;
+  /// the visibility of existing types has not changed.
   void update(const VoxelRegistry& types, const DensityChanges& changes);
 
   [[nodiscard]] const DensityGrid& field() const { return *field_; }
   [[nodiscard]] const VoxelRegistry& types() const { return types_; }
-  /// Those with a solid corner of a transparent material: only in them is anything transparent.
+  /// The cells with a solid corner of a transparent material. All transparent regions lie in these cells.
   [[nodiscard]] const OccupancyTree& cells() const { return cells_; }
 
  private:
@@ -45,17 +45,17 @@ struct GlassSpan {
   bool starts_inside = false;  ///< at the ray's origin
 };
 
-/// Calls `visit` for each part of a ray up to `max_t` that lies in what is transparent, cell by cell or block by block,
-/// in the ray's order, until it returns false. One follows on another where their distances are the same. `largest`:
-/// how long the edge of a block of a type may be that is passed at once.
+/// Calls `visit` for each transparent part of a ray up to `max_t`, cell by cell or block by block, in the ray's order,
+/// until it returns false. Two parts are adjacent if the end distance of one equals the start distance of the other.
+/// `largest` returns the maximum edge length of a block of one type that is crossed in one step.
 ///
-/// Precision: as first_hit of a DensityTree. Cost: some 100 ns a cell at a surface, 20 ns a block within.
+/// Precision: as first_hit of a DensityTree. Cost: about 100 ns per cell at a surface, 20 ns per block inside.
 /// Same bits: with any instruction set.
 void visit_glass(const DensityGlass& glass, const Ray& ray, double max_t, FunctionRef<double(VoxelType)> largest,
                  FunctionRef<bool(const GlassSpan&)> visit);
 
-/// The normal of a transparent body at a point of its surface, out of it, of unit length: towards air (`other` is
-/// kAir), as surfaces of fields are lit, or towards another transparent material in the cell. 0 where there is none.
+/// Returns the outward unit normal of a transparent body at a point of its surface: towards air (`other` is kAir), as
+/// used to light field surfaces, or towards another transparent material in the cell. Returns 0 if there is none.
 [[nodiscard]] DVec3 glass_normal(const DensityGlass& glass, IVec3 cell, const DVec3& point, VoxelType type,
                                  VoxelType other);
 

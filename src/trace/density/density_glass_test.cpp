@@ -32,7 +32,7 @@ struct Types {
   }
 };
 
-// What a point is of: the slow, obvious way, in double.
+// Finds the material at a point: the slow, obvious way, in double.
 class Oracle {
  public:
   Oracle(const DensityGrid& field, const VoxelRegistry& types) : field_(&field), types_(&types) {}
@@ -125,7 +125,7 @@ DensityGrid noise(const Types& types, IVec3 corner, int edge, unsigned seed, int
   return field;
 }
 
-// A ray and its spans beside the oracle at many points; returns how many of these were transparent.
+// Compares a ray's spans with the oracle at many points. Returns the number of transparent points.
 int check(const DensityGlass& glass, const Oracle& oracle, const Ray& ray, double max_t) {
   const std::vector<GlassSpan> spans = spans_along(glass, ray, max_t, 64.0);
   double last = 0.0;
@@ -141,7 +141,7 @@ int check(const DensityGlass& glass, const Oracle& oracle, const Ray& ray, doubl
   for (double t = 0.5 * kStep; t < max_t; t += kStep) {
     const auto found = [&](double at) { return oracle.at(ray.origin + ray.direction * at); };
     const VoxelType type = found(t);
-    // Where it changes nearby, either may be right.
+    // Near a change, either answer may be right.
     if (found(t - 2e-3) != type || found(t + 2e-3) != type) continue;
     const VoxelType expected = type == kOpaque ? kAir : type;
     EXPECT_EQ(type_at(spans, t), expected) << t;
@@ -236,7 +236,7 @@ TEST(DensityGlass, ABallInWaterIsEnteredAndLeftWhereItIs) {
   EXPECT_LT(normal(bodies[1], bodies[1].t_exit, types.water).y, -0.99) << "out of the ball";
 }
 
-// Digging, painting and filling, beside trees that are built anew.
+// Compares digging, painting and filling with trees that are built from scratch.
 TEST(DensityGlass, FollowsEdits) {
   const Types types;
   DensityGrid field = lake(types);

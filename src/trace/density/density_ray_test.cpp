@@ -13,7 +13,7 @@
 namespace quoin {
 namespace {
 
-// The trilinear field in double, sample by sample: what rays must agree with.
+// The trilinear field in double, sample by sample: the reference for rays.
 class Dense {
  public:
   explicit Dense(const DensityGrid& field) : field_(field) {}
@@ -70,7 +70,7 @@ void check(const DensityTree& tree, const Ray& ray, double max_t, double far, Ta
   const Dense dense(tree.field());
   const auto hit = first_hit(tree, ray, max_t);
   ASSERT_EQ(any_hit(tree, ray, max_t), hit.has_value());
-  // A cell passed for less than 1e-3 may be left out: what is solid there has not this density.
+  // A ray may skip a cell that it passes for less than 1e-3. Densities on that stretch stay above this limit.
   constexpr double kLeftOut = -0.02;
   if (!hit) {
     ++tally.misses;
@@ -283,7 +283,7 @@ TEST_P(DensityRays, MeetASphereWhereItIs) {
       const auto hit = first_hit(tree, {centre + out * distance, -out * 3.0});
       ASSERT_TRUE(hit);
       EXPECT_NEAR(hit->t * 3.0, distance - 20.0, 0.02);
-      // Of cells: as far from round as their corners are from each other.
+      // Cells approximate the sphere, so the normal deviates slightly.
       EXPECT_GT(glm::dot(hit->normal, out), 0.998);
       EXPECT_EQ(hit->material, 7);
       // Past it, and away from it.
@@ -384,7 +384,7 @@ TEST(DensityRay, StopsAtItsEnd) {
   // Slower than rays heed along every axis, next to the solid.
   EXPECT_FALSE(first_hit(tree, {{15, 21.5, 15}, {0, -1e-40, 0}}));
   EXPECT_FALSE(any_hit(tree, {{15, 20.5, 15}, {0, 1e-40, 0}}));
-  // Where nothing is.
+  // Empty space.
   const DensityGrid nothing;
   const DensityTree empty(nothing);
   EXPECT_FALSE(first_hit(empty, ray));

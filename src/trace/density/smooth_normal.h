@@ -6,9 +6,9 @@
 
 namespace quoin {
 
-/// The normal with which a field is lit where a ray hit it: of unit length and without the steps that
-/// DensityHit::normal has from cell to cell. Of the differences of the field a sample to each side; that of the hit
-/// where these point elsewhere, as they do at solids thinner than two samples.
+/// Returns the unit normal for lighting a field at a ray's hit. Unlike DensityHit::normal, it has no steps between
+/// cells. It is computed from differences of the field one sample to each side. Where these point away from the hit's
+/// normal, as at solids thinner than two samples, it returns the hit's normal.
 [[nodiscard]] inline DVec3 smooth_normal(const DensityGrid& field, const DVec3& point, const DensityHit& hit) {
   DVec3 gradient;
   for (int axis = 0; axis < 3; ++axis) {

@@ -1,13 +1,13 @@
-// What a ray comes to in one cell between the samples of a field, in double: the same operations, in the same order,
-// for every kernel.
+// Intersects a ray with one cell between the samples of a field, in double precision. Every kernel uses the same
+// operations in the same order.
 //
 //   corners d000 .. d111, by x + 2 y + 4 z        along the ray, p = entry + s * way, 0 <= s <= 1:
 //
 //        d011-------d111                          f(s) = c0 + c1 s + c2 s^2 + c3 s^3
 //       / |        / |                                 = the Bezier curve of b0, b1, b2, b3,
 //     d010--+----d110|       y  z
-//      |  d001----|--d101    | /                  which lies between the least and the greatest of the four: where none
-//     d000-------d100        |/__ x               is negative, no point of the ray is.
+//      |  d001----|--d101    | /                  which lies between the least and the greatest of the four: if none
+//     d000-------d100        |/__ x               is negative, no point of the ray is negative.
 
 #pragma once
 
@@ -27,8 +27,8 @@ template <class V>
 struct CellRayOf {
   V origin[3];
   V direction[3];
-  V inverse[3];  // huge where it stands still, so that it never leaves
-  V entry[3];    // of a cell's two planes the one that it passes first: 0 or 1
+  V inverse[3];  // huge for an axis without motion, so that the ray never leaves along it
+  V entry[3];    // the plane of the cell that the ray passes first: 0 or 1
   V exit[3];
   V max_t;
 };
@@ -37,7 +37,7 @@ using CellRay = CellRayOf<double>;
 inline CellRay cell_ray(const Ray& ray, double max_t) {
   CellRay out;
   for (int axis = 0; axis < 3; ++axis) {
-    // As the walks: what is so slow stands still.
+    // As in the walks: such a slow axis counts as having no motion.
     const double d = std::abs(ray.direction[axis]) < 0x1p-100 ? 0.0 : ray.direction[axis];
     out.origin[axis] = ray.origin[axis];
     out.direction[axis] = d;
@@ -75,7 +75,7 @@ inline CellSpan<V> span_in(const CellRayOf<V>& ray, const V (&cell)[3]) {
     last[axis] = (cell[axis] + ray.exit[axis] - ray.origin[axis]) * ray.inverse[axis];
   }
   const V t_in = greatest(greatest(first[0], first[1]), greatest(first[2], V{}));
-  // Rounding may have it leave before it came.
+  // Rounding may put the exit before the entry.
   return {t_in, greatest(least(least(last[0], last[1]), last[2]), t_in)};
 }
 
@@ -128,11 +128,11 @@ inline CellCurve<V> curve_of(const CellCubic<V>& f) {
   return {f.c0 + f.c1 * third, f.c0 + (f.c1 + f.c1 + f.c2) * third, ((f.c3 + f.c2) + f.c1) + f.c0};
 }
 
-/// The root of `f` between `low`, where it is not negative, and `high`, where it is, of which there is one.
+/// Returns the only root of `f` between `low`, where `f` is not negative, and `high`, where it is negative.
 inline double root_between(const CellCubic<double>& f, double low, double high) {
   const double f_low = f(low);
   const double f_high = f(high);
-  // Newton's steps from the chord's root, kept within what is left of the bracket.
+  // Newton's method, starting at the chord's root, within the current bracket.
   double s = low + (high - low) * (f_low / (f_low - f_high));
   for (int i = 0; i < 60; ++i) {
     const double value = f(s);
@@ -151,8 +151,8 @@ inline double root_between(const CellCubic<double>& f, double low, double high) 
   return s;
 }
 
-/// Where the cubic first becomes negative for 0 <= s <= 1; a negative number where it never does. Asked whether alone,
-/// any number that is not negative says that it does.
+/// Returns the first s in [0, 1] where the cubic becomes negative; a negative number if it never does. Without
+/// `kAsksWhere`, returns any non-negative number if it does.
 template <bool kAsksWhere>
 inline double first_negative(const CellCubic<double>& f) {
   if (f.c0 < 0.0) return 0.0;
@@ -194,8 +194,8 @@ inline CellCubic<V> cubic_along(const CellRayOf<V>& ray, const V (&cell)[3], V t
   return cubic_of(corners, entry, way);
 }
 
-/// Where the ray first comes to a negative density in a cell, in t; a negative number where it does not, or only beyond
-/// its end.
+/// Returns the first t where the ray meets a negative density in a cell; a negative number if it does not, or only
+/// beyond its end.
 template <bool kAsksWhere>
 inline double meet_cell(const CellRay& ray, const double (&cell)[3], const CellSpan<double>& span,
                         const float (&corners)[8]) {

@@ -1,10 +1,10 @@
-// One ray in a field of densities: the walk of trace/kernel/single.inl through cells that touch the solid. These are
-// gathered, then eight at once are asked whether the field in them may become negative along the ray; of those, in
-// order, where it does.
+// Traces one ray in a density field: the walk of trace/kernel/single.inl through cells with a solid corner. Eight of
+// these cells are gathered and tested at once for a negative value along the ray. The candidates are then solved in
+// order.
 //
-//   walk    ..X. .... .XX. X...    words of 4^3 cells, with those that touch the solid and that the ray passes
-//   group   | X | X | X | X |      in lanes, see below
-//   asked   | . | . | 1 | 1 |      the third: from where on; else the fourth; else the walk goes on
+//   walk     ..X. .... .XX. X...    words of 4^3 cells: the cells that the ray passes and that have a solid corner
+//   group    | X | X | X | X |      in lanes, see below
+//   result   | . | . | 1 | 1 |      solve the third, then the fourth; without a root, the walk continues
 
 #pragma once
 
@@ -33,7 +33,7 @@ inline NearRay<float> near_ray(const PathRay& path, const Ray& ray, I4 base) {
   for (int axis = 0; axis < 3; ++axis) {
     const bool is_back = path.backward[axis] != 0;
     const bool is_still = path.inverse[axis] == kStillInverse;
-    // The walk has them in the middle of a voxel where they stand still.
+    // The walk puts the origin of an axis without motion in the middle of a voxel.
     out.origin[axis] = is_still  ? static_cast<float>(ray.origin[axis] - base[axis])
                        : is_back ? -path.origin[axis]
                                  : path.origin[axis];
@@ -78,7 +78,7 @@ class CellGroup {
   }
 
  private:
-  // `count` cells from `first` on, of eight at most.
+  // Tests `count` cells starting at `first`, at most eight.
   template <bool kAsksWhere>
   [[gnu::always_inline]] bool ask_some(int first, int count, FieldHit& hit) {
     I8 code;
@@ -107,8 +107,8 @@ class CellGroup {
   std::int32_t base_[3];
   int count_ = 0;
   int word_count_ = 0;
-  alignas(32) std::int32_t words_[3][kGroup];        // where words begin, by axis
-  alignas(32) std::int32_t codes_[64 + 2 * kGroup];  // cells: which word, six bits of which of its cells
+  alignas(32) std::int32_t words_[3][kGroup];        // first cells of the words, by axis
+  alignas(32) std::int32_t codes_[64 + 2 * kGroup];  // cells: the number of the word, and six bits for the cell in it
 };
 
 template <bool kAsksWhere>
@@ -138,10 +138,10 @@ inline bool first_in_field(const FieldView& field, const Ray& ray, double max_t,
   return is_hit;
 }
 
-// Packets of rays in a field of densities: the walk of trace/kernel/lockstep.inl, or of trace/kernel/window.inl for
-// short rays, through the cells with a solid corner. Lanes append such cells to a list and walk on. As soon as the list
-// fills registers its cells are tested: in single precision whether the field can become negative along the ray, then
-// the few candidates in double. Lanes stop after a hit.
+// Traces packets of rays in a density field: the walk of trace/kernel/lockstep.inl, or of trace/kernel/window.inl for
+// short rays, through the cells with a solid corner. Lanes append such cells to a list and continue. When the list
+// fills the registers, its cells are tested: in single precision for a possible negative value along the ray, then the
+// few candidates in double. Lanes stop after a hit.
 //
 //   lane          | 0 | 1 | 2 | ... | 15 |
 //   step 1        | A | . | B | ... |  C |    a cell with a solid corner, or none
@@ -151,10 +151,10 @@ inline bool first_in_field(const FieldView& field, const Ray& ray, double max_t,
 //   candidates    | x |   | x |   |   | ...    found in single precision
 //   hits          | x |   |   |   |   | ...    found in double; hits[lane] gets the cell and its corners
 //
-// The places of hits are roots, which are found at the end for all lanes at once. If they are wanted, the rest of the
-// list is tested at the end of each word of 4^3 cells, so that lanes do not walk far beyond a hit.
+// The positions of hits are roots, which are computed at the end for all lanes at once. If they are requested, the
+// rest of the list is tested at the end of each word of 4^3 cells, so that lanes do not walk far beyond a hit.
 
-/// The lanes of a packet from `first` on.
+/// The lanes of a packet, starting at lane `first`.
 template <bool kAsksWhere>
 class FieldLanes {
  public:
@@ -325,7 +325,7 @@ class FieldLanes {
   }
 
   void find_where() {
-    constexpr int kGroups = 2;  // as many as registers hold
+    constexpr int kGroups = 2;  // as many as fit in registers
     for (int first = 0; first < kWidth; first += kGroups * int{kDoubles}) {
       CellCubic<Doubles> fields[kGroups];
       Longs wanted[kGroups];
@@ -367,7 +367,7 @@ class FieldLanes {
     return ray;
   }
 
-  // As cell_ray of each lane.
+  // Sets up the ray of each lane like cell_ray.
   void find_exact() {
     knows_exact_ = true;
     for (int axis = 0; axis < 3; ++axis) {
@@ -417,7 +417,7 @@ class FieldLanes {
   alignas(64) double exact_inverse_[3][kWidth];
 };
 
-// The lanes that come into the solid; `unfinished` are to be traced otherwise.
+// Returns the lanes that enter the solid. Other code must trace the `unfinished` lanes.
 template <bool kAsksWhere>
 inline std::uint32_t packet_in_field(const FieldView& field, const RayPacket& rays, FieldHit* hits,
                                      std::uint32_t& unfinished) {

@@ -3,7 +3,7 @@
 //
 //   x, y, z      | 0 | 1 | ... | 7 |    the cells; eight, or with AVX-512 also sixteen
 //   corners      | 0 | 1 | ... | 7 |    eight times: gathered from rows of halves, two of a row at once
-//   the cubic    | 0 | 1 | ... | 7 |    along the ray, or along a ray for each, in a stretch that is a little too long
+//   the cubic    | 0 | 1 | ... | 7 |    along one ray, or one ray per lane, in a slightly extended interval
 
 #pragma once
 
@@ -139,8 +139,8 @@ inline Floats<kLanes> floats_from_halves(Int32s<kLanes> high) {
   return reinterpret_cast<Values>(magnitude | (high & std::numeric_limits<std::int32_t>::min()));
 }
 
-// The densities of samples x and x + 1 of rows of a chunk, as halves, the first in the lower bits; `x` below 63. Other
-// lanes than those of the mask keep `others`.
+// Returns the densities of samples x and x + 1 in rows of a chunk, as halves, the first in the lower bits; `x` is below
+// 63. Lanes outside the mask keep `others`.
 template <class Places>
 inline Places pairs_of(const DensityStorage& chunk, Places x, Places y, Places z, Places mask, Places others) {
   const Places slab = gather_some<4>(chunk.slabs.data(), (z >> 2) * 16 + (y >> 2), mask, Places{});
@@ -150,7 +150,7 @@ inline Places pairs_of(const DensityStorage& chunk, Places x, Places y, Places z
   return gather_some<sizeof(Half)>(chunk.values.data(), row * kChunkEdge + x, mask & ~is_uniform, known);
 }
 
-/// The chunk of a field that was asked for last.
+/// Caches the chunk of the last look-up in a field.
 class LastChunk {
  public:
   /// Null where it is not there or uniform.
@@ -182,7 +182,7 @@ template <int kLanes>
     is_within &= cell[axis] < 63;
   }
   std::uint32_t left = bits_of(is_within);
-  std::uint32_t apart = bits_of(wanted) & ~left;  // those with corners in several chunks, or in none with a storage
+  std::uint32_t apart = bits_of(wanted) & ~left;  // cells with corners in several chunks, or in a chunk without storage
   Places pairs[4] = {};
   const auto read_chunk_of = [&](int lane) {
     Places here = is_within;
@@ -206,7 +206,7 @@ template <int kLanes>
     corners[2 * row + 1] = floats_from_halves<kLanes>(pairs[row]);
   }
   if (apart == 0) return;
-  alignas(64) float numbers[8][kLanes];  // of their own, so that the others stay in registers
+  alignas(64) float numbers[8][kLanes];  // a copy in memory, so that `corners` stays in registers
   std::memcpy(numbers, corners, sizeof numbers);
   for (; apart != 0; apart &= apart - 1) {
     const int lane = std::countr_zero(apart);
@@ -222,8 +222,8 @@ template <class Number>
 struct NearRay {
   Number origin[3];
   Number direction[3];
-  Number inverse[3];  // huge where it stands still
-  Number entry[3];    // of a cell's two planes the one that it passes first, and the other, each beyond the cell
+  Number inverse[3];  // huge for an axis without motion
+  Number entry[3];    // the plane of a cell that the ray passes first, and the other one, each moved outwards
   Number exit[3];
   Number size;  // the direction's greatest component
 };
@@ -255,11 +255,12 @@ inline Int32s<kLanes> may_be_negative(const NearRay<Number>& ray, const Floats<k
   for (int i = 1; i < 8; ++i) low = least(low, corners[i]), high = greatest(high, corners[i]);
   const CellCubic<Values> field = cubic_of(corners, entry, way);
   const Values doubt = (high - low) * (t_in * ray.size * kDoubtFurther + kDoubtHere);
-  // Numbers that are none are in doubt, too.
+  // The negated comparison includes NaN among the candidates.
   return ~(least(curve_of<float>(field).low(), field.c0) > doubt);
 }
 
-/// Whether, and where, the field becomes negative along the ray in the cell that `hit` names, with its corners.
+/// Returns true if the field becomes negative along the ray in the cell that `hit` names, with its corners. Sets
+/// `hit.t`.
 template <bool kAsksWhere>
 inline bool meets(const CellRay& ray, FieldHit& hit) {
   const double cell[3] = {static_cast<double>(hit.x), static_cast<double>(hit.y), static_cast<double>(hit.z)};
@@ -305,7 +306,7 @@ struct Meetings {
   Doubles length;
 };
 
-/// As meet_cell, except for the root. Asked whether alone, `has_root` is false.
+/// Like meet_cell, without the root. Without `kAsksWhere`, `has_root` is false.
 template <bool kAsksWhere>
 inline Meetings meet_cells(const CellRayOf<Doubles>& ray, const Doubles (&cell)[3], const Doubles (&corners)[8]) {
   const CellSpan<Doubles> span = span_in(ray, cell);
@@ -327,8 +328,8 @@ inline Meetings meet_cells(const CellRayOf<Doubles>& ray, const Doubles (&cell)[
   return out;
 }
 
-/// As root_between of 0 and 1, of several at once in the lanes of `wanted`: each waits for its own divisions only.
-/// Others are any number.
+/// Finds roots in (0, 1) like root_between, for several registers at once, in the lanes of `wanted`. Their divisions
+/// overlap. Results in other lanes are unspecified.
 template <int kCount>
 inline void find_roots(const CellCubic<Doubles> (&f)[kCount], Longs (&wanted)[kCount], Doubles (&s)[kCount]) {
   Doubles low[kCount];

@@ -1,13 +1,13 @@
-// One ray in a field of densities, from cell to cell by the planes that it crosses: for processors without the kernels'
-// instructions, and for rays that those leave to others. Slow through what is empty only where that is thin: wider gaps
-// are left to the tree.
+// Traces one ray in a density field, from cell to cell by the planes that it crosses. Used on processors without the
+// kernels' instructions, and for rays that the kernels do not support. It steps only through short empty stretches,
+// since it is slow there. The tree crosses longer ones.
 //
 //      tree                     planes               planes, cells without solid            tree
-//   o--------->|  s  |  s  |  s  |     |     |     |   from here the next one that is not  ------->|  s  |
+//   o--------->|  s  |  s  |  s  |     |     |     |   find the next cell with solid        ------->|  s  |
 //      empty    look, meet_cell, step      up to kMaxEmptySteps                       empty
 //
-// An `s` is a cell with a solid corner. In each of them the field's cubic along the ray is asked (meet_cell), from
-// where the ray comes into the cell to where it leaves it (span_).
+// An `s` is a cell with a solid corner. In each of them, meet_cell solves the field's cubic along the ray, from the
+// ray's entry into the cell to its exit (span_).
 
 #include <optional>
 
@@ -18,9 +18,9 @@
 namespace quoin::trace {
 namespace {
 
-// How many empty cells are stepped through one by one before the tree is asked for the next one that is not.
+// The maximum number of single steps through empty cells before the tree finds the next cell with solid.
 constexpr int kMaxEmptySteps = 3;
-// A ray is asked about anew from the middle of a cell that it passes for at least this, in t.
+// The minimum interval of t in a cell for a new tree search, which starts in the middle of the interval.
 constexpr double kLeastSpan = 1e-6;
 
 // Asks a tree of cells that lie near each other.
@@ -50,8 +50,8 @@ class NearbyCells {
   std::optional<BrickWords> words_;
 };
 
-// A ray's way from cell to cell at a field's surface: for processors without the kernels' instructions, and for rays
-// that those leave to others.
+// A ray's walk from cell to cell at a field's surface, for processors without the kernels' instructions and for
+// rays that the kernels do not support.
 template <bool kAsksWhere>
 class SurfaceWalk {
  public:

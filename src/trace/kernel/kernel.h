@@ -17,7 +17,7 @@ namespace quoin::trace {
 
 /// A field as kernels read it.
 struct FieldView {
-  const TreeView* cells;  ///< those with a solid corner
+  const TreeView* cells;  ///< cells with a solid corner
   const DensityGrid* grid;
   /// The densities of a chunk; null where it is not there or uniform.
   const DensityStorage* (*find)(const DensityGrid& grid, int x, int y, int z);
@@ -25,45 +25,45 @@ struct FieldView {
   void (*read)(const DensityGrid& grid, int x, int y, int z, float* corners);
 };
 
-/// Where a field becomes negative along a ray: the cell, the densities of its corners by x + 2 y + 4 z, and t.
+/// The point where a field becomes negative along a ray: the cell, its corner densities by x + 2 y + 4 z, and t.
 struct FieldHit {
   double t;
   int x, y, z;
   float corners[8];
 };
 
-// Every kernel gives the same results, those of a walk from one lattice plane to the next where the plane P of an axis
-// is crossed at t = (P - origin) * (1 / direction), in single precision and rounded after each operation, in the order
-// of t and at ties of axes; origin is relative to a multiple of 64 voxels next to the ray's start.
+// All kernels return the same results as a walk over lattice planes. The walk crosses plane P of an axis at t = (P -
+// origin) * (1 / direction), in single precision, rounded after each operation. Crossings are ordered by t, and by axis
+// at ties. The origin is relative to a multiple of 64 voxels near the ray's start.
 struct Kernel {
   /// One ray; `face` is not set where it starts inside.
   bool (*first_hit)(const TreeView& tree, const Ray& ray, double max_t, RayHit& hit, bool& unfinished);
-  /// Whether one ray is blocked.
+  /// Returns true if the ray is blocked.
   bool (*any_hit)(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished);
-  /// Fills in what `PacketHits` says; lanes of `unfinished` are to be traced otherwise.
+  /// Fills in `PacketHits`. The caller must trace the lanes of `unfinished` with other code.
   void (*first_hits)(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished);
   /// Returns the lanes that are blocked.
   std::uint32_t (*any_hits)(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished);
 };
 
-/// Of fields. Files of their own hold these: in one with the others, compilers turn what both use into calls, and rays
-/// among voxels take a tenth more instructions (docs/decisions/archive/052).
+/// Kernels for density fields, in separate files: in one file with the voxel kernels, compilers turn shared functions
+/// into calls, and rays among voxels take 10 % more instructions (docs/decisions/archive/052).
 struct FieldKernel {
-  /// One ray in a field; null where it is to be walked otherwise, as are those that are unfinished. Whether alone: `t`
-  /// means nothing.
+  /// Traces one ray in a field. The caller walks `unfinished` rays with other code, and all rays if the pointer is
+  /// null. `any_in_field` does not set `t`.
   bool (*first_in_field)(const FieldView& field, const Ray& ray, double max_t, FieldHit& hit, bool& unfinished);
   bool (*any_in_field)(const FieldView& field, const Ray& ray, double max_t, FieldHit& hit, bool& unfinished);
-  /// The same of packets, lane by lane; null where rays are to be traced one by one.
+  /// Traces packets, lane by lane; null if the caller must trace the rays one by one.
   std::uint32_t (*first_hits_in_field)(const FieldView& field, const RayPacket& rays, FieldHit* hits,
                                        std::uint32_t& unfinished);
   std::uint32_t (*any_hits_in_field)(const FieldView& field, const RayPacket& rays, std::uint32_t& unfinished);
 };
 
-/// The same by any processor, for any ray and whatever the size of the world: `field.cells` may be null.
+/// Traces any ray on any processor, in a world of any size; `field.cells` may be null.
 bool walk_in_field(const OccupancyTree& cells, const FieldView& field, const Ray& ray, double max_t, bool asks_where,
                    FieldHit& hit);
 
-// Those of wider instructions are there only where they are compiled; tables have what there is.
+// Kernels for wider instructions are defined only where they are compiled. The tables list the available ones.
 extern const Kernel kPlainKernel;
 extern const Kernel kAvx2Kernel;
 extern const Kernel kAvx512Kernel;
@@ -73,7 +73,7 @@ extern const FieldKernel kAvx512FieldKernel;
 extern const KernelTable<Kernel> kKernels;
 extern const KernelTable<FieldKernel> kFieldKernels;
 
-/// That of the widest instructions that this machine has.
+/// Returns the kernel with the widest instructions that this machine supports.
 [[nodiscard]] inline const Kernel& kernel() {
   return kKernels.widest();
 }

@@ -129,7 +129,7 @@ inline F4 single_coordinates_after(const SingleRay& ray, float t, F4 low, F4 hig
   return at + (is_short ? ray.sign : all4(0.0F)) - (is_far ? ray.sign : all4(0.0F));
 }
 
-// Where a ray stands: a unit on each axis, by its lower plane, and when it came there.
+// The position of a ray: a unit on each axis, by its lower plane, and the time of the ray's entry.
 struct Stand {
   F4 lower;
   float t;
@@ -143,7 +143,7 @@ inline void enter(const SingleRay& ray, F4 low, F4 high, Stand& stand) {
   stand.lower = axes == stand.axis ? (ray.forward ? low : high) : others;
 }
 
-// Where a ray starts within its box, or enters it.
+// Returns the unit in which a ray starts within its box, or through which it enters the box.
 inline Stand first_stand(const SingleRay& ray) {
   Stand stand{floor4(ray.origin), ray.enter_t, ray.enter_axis};
   if (stand.axis >= 0) enter(ray, ray.low, ray.high - 1.0F, stand);

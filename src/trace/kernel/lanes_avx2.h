@@ -1,4 +1,4 @@
-// Sixteen lanes in pairs of AVX2 registers: what one half waits for, the other works through.
+// Sixteen lanes in pairs of AVX2 registers: one half computes while the other waits for results.
 //
 //   F, I, Mask   low  | 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 |     half::F, half::I, half::Mask
 //                high | 8 | 9 |10 |11 |12 |13 |14 |15 |
@@ -26,7 +26,7 @@ inline F narrow(const double* from) {
   return {_mm256_set_m128(_mm256_cvtpd_ps(_mm256_loadu_pd(from + 4)), _mm256_cvtpd_ps(_mm256_loadu_pd(from)))};
 }
 
-// Positions, from a corner, as multiples of 64 and what is left of them, and the whole number below what is left.
+// Splits positions relative to a corner into multiples of 64 and a remainder, and rounds the remainder down to `whole`.
 inline void split(const double* from, double corner, I& base, F& rest, F& whole) {
   __m128i b[2];
   __m128 r[2];

@@ -1,4 +1,4 @@
-// What tracing adds to the sixteen lanes of core/lanes_avx512.h.
+// Additions for tracing to the sixteen lanes of core/lanes_avx512.h.
 
 #pragma once
 
@@ -22,7 +22,7 @@ inline F narrow(const double* from) {
   return {join(_mm512_cvtpd_ps(_mm512_loadu_pd(from)), _mm512_cvtpd_ps(_mm512_loadu_pd(from + 8)))};
 }
 
-// Positions, from a corner, as multiples of 64 and what is left of them, and the whole number below what is left.
+// Splits positions relative to a corner into multiples of 64 and a remainder, and rounds the remainder down to `whole`.
 inline void split(const double* from, double corner, I& base, F& rest, F& whole) {
   constexpr int kDown = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
   const __m512d low = _mm512_sub_pd(_mm512_loadu_pd(from), _mm512_set1_pd(corner));

@@ -1,15 +1,15 @@
-// The walk of `kWidth` rays in lockstep, each in a lane: clipping to where they can meet anything, then two loops that
-// take turns. The first goes from cell to cell (4^3 voxels) until every lane has found an occupied one or has left; the
-// second goes from voxel to voxel through the cells found, each held in registers. Lanes that are done keep walking,
-// over harmless addresses, so that no step waits for the last look-up; what counts is recorded under masks. A lane's
-// answer depends on its own ray only.
+// Walks `kWidth` rays in lockstep, one per lane. Each ray is clipped to the box in which hits are possible. Two loops
+// then alternate. The first walks over cells (4^3 voxels) until every lane has found an occupied cell or has left. The
+// second walks over the voxels of these cells, each held in registers. Finished lanes keep walking over harmless
+// addresses, so that no step waits for the last look-up; masks select the results to record. A lane's result depends on
+// its own ray only.
 //
 //   lanes       |  0  |  1  |  2  | ...        Axis: origin, inverse, base (a multiple of 64), the box, by x, y, z
-//   cells       |  .  |  X  |  .  | ...        first loop: a bit of the flat table each, until all are X or gone
+//   cells       |  .  |  X  |  .  | ...        first loop: one bit of the flat table each, until all are X or gone
 //   voxels      |     | .X  |     | ...        second loop: two halves of the cell's word in registers
 //
-// Which plane a ray crossed last follows from where it stands: the one that it crossed latest of those through which it
-// came into its unit. So walks need not keep it.
+// The position of a lane determines the plane that it crossed last: the latest of the three planes through which it
+// entered its unit. Walks therefore do not store it.
 
 #pragma once
 
@@ -47,7 +47,7 @@ struct Axis {
   Mask moved;  // the ray does not start at `origin`, but came there
   F low;       // the box in which the lane moves
   F high;
-  F far_t;  // where it leaves that box along this axis
+  F far_t;  // t where the ray leaves that box along this axis
 };
 
 struct Lanes {
@@ -103,14 +103,14 @@ inline F first_of(const Planes& t, Crossing& which) {
   return min(t.x, y_or_z);
 }
 
-// Where rays start.
+// The start positions of the rays.
 struct Starts {
   alignas(64) double position[3][kWidth];
   alignas(64) double max_t[kWidth];
   alignas(64) std::int32_t entered[kWidth];
 };
 
-// Cuts an axis' box to what the lanes can come to until `reach`; returns when they would leave the whole box.
+// Cuts an axis' box to the range that the lanes reach until `reach`. Returns the times when they leave the whole box.
 inline F limit_reach(Axis& axis, F reach) {
   const F bounds_exit = crossing_t(axis, select(axis.forward, axis.high, axis.low));
   const F end = axis.origin + reach * axis.direction;
@@ -148,10 +148,10 @@ inline F to_bound(int bound, I base) {
   return to_float(all(bound) - base);
 }
 
-// The coordinate, in cells, just after the crossing at `t`: a guess by position, corrected by
-// comparing crossings, since rounding can put a position on the wrong side of a plane. `ties_before`: lanes whose
-// crossing was of a later axis, so that planes of this one at the same t were crossed before; `ties_after`: of an
-// earlier axis.
+// Returns the coordinate, in cells, just after the crossing at `t`. The position gives a first guess. Comparing
+// crossings corrects it, since rounding can put a position on the wrong side of a plane. `ties_before`: lanes that
+// crossed a plane of a later axis, so planes of this axis at the same t were crossed before. `ties_after`: lanes that
+// crossed a plane of an earlier axis.
 inline F coordinate_after(const Axis& axis, F t, F low, F high, Mask ties_before, Mask ties_after) {
   constexpr float kEdge = 4.0F;
   const F position = axis.origin + t * axis.direction;
@@ -171,7 +171,7 @@ inline F coordinate_after(const Axis& axis, F t, F low, F high, Mask ties_before
   return add_if(is_far, at, all(0.0F) - one);
 }
 
-// A view of one coordinate of the packet's lanes from `first` on.
+// A view of one coordinate of the packet's lanes, starting at lane `first`.
 struct Rays {
   const double* origins[3];
   const double* directions[3];
@@ -192,8 +192,8 @@ inline Vector some(const void* from) {
   return out;
 }
 
-// Moves the lanes of `far_lanes` from `first` on to where they enter the bounds, as move_to_bounds does; those that
-// miss them get a `max_t` below 0.
+// Moves the lanes of `far_lanes`, starting at lane `first`, to their entry into the bounds, as move_to_bounds does.
+// Lanes that miss the bounds get a negative `max_t`.
 inline void move_some_to_bounds(const TreeView& tree, const Rays& rays, std::uint32_t far_lanes, std::size_t first,
                                 Starts& starts) {
   const Longs is_far = (lane_bits() & static_cast<std::int64_t>(far_lanes >> first)) != 0;
@@ -206,9 +206,9 @@ inline void move_some_to_bounds(const TreeView& tree, const Rays& rays, std::uin
     const Doubles p = some<Doubles>(starts.position[axis] + first);
     const Doubles d = some<Doubles>(rays.directions[axis] + first);
     const Longs is_low = p < low;
-    const Longs is_out = is_low | ~(p < high);  // of what is no number too, which misses
+    const Longs is_out = is_low | ~(p < high);  // also true for NaN, which misses
     missing |= is_out & ~(is_low ? d > 0.0 : d < 0.0);
-    missing |= ~(is_low | (p >= low));  // what is no number
+    missing |= ~(is_low | (p >= low));  // NaN
     const Doubles plane = is_low ? Doubles{} + low : Doubles{} + high;
     const Doubles t = (plane - p) * (1.0 / d);
     const Longs is_later = is_out & (t >= enter_t);
@@ -239,7 +239,7 @@ inline void move_some_to_bounds(const TreeView& tree, const Rays& rays, std::uin
   std::memcpy(starts.entered + first, &entered, sizeof entered);
 }
 
-// Which lanes a kernel can serve, and where they start; the others are `unfinished`.
+// Selects the lanes that a kernel can trace, and finds their start positions; the others become `unfinished`.
 inline void find_starts(const TreeView& tree, const Rays& rays, std::uint32_t wanted, Starts& starts, Lanes& lanes) {
   for (int axis = 0; axis < 3; ++axis) {
     for (int i = 0; i < kWidth; ++i) starts.position[axis][i] = rays.origins[axis][i] - tree.origin[axis];
@@ -308,7 +308,7 @@ inline Lanes set_up(const TreeView& tree, const RayPacket& packet, int first, st
   entered.y = (near_y == enter_t) & starts_outside & ~entered.z;
   entered.x = starts_outside & ~entered.z & ~entered.y;
   t = max(enter_t, all(0.0F));
-  // Through an edge of its box: it has left before it enters if the axis on which it leaves goes first.
+  // The ray passes an edge of its box. It leaves before it enters if the axis of its exit comes first.
   const Mask left = (lanes.x.far_t < t) | (lanes.y.far_t < t) | (lanes.z.far_t < t) |
                     ((lanes.x.far_t == t) & (entered.y | entered.z)) | ((lanes.y.far_t == t) & entered.z);
   lanes.live = lanes.live & ~left;
@@ -317,11 +317,11 @@ inline Lanes set_up(const TreeView& tree, const RayPacket& packet, int first, st
   return lanes;
 }
 
-// Where an axis of a walk stands: when it crosses the next plane, and the plane after that.
+// The state of a walk along one axis: the time of the next plane crossing, and the plane after that with its time.
 struct Next {
   F t;
   F after;
-  F after_t;  // nothing waits for it
+  F after_t;  // computed ahead: no step waits for it
 };
 
 struct Nexts {
@@ -347,7 +347,7 @@ inline F cross_next(const Lanes& lanes, const Planes& steps, Nexts& nexts, Cross
   return t;
 }
 
-// The same for numbers that change by a constant with each plane.
+// The change of an index with each plane crossing, per axis and lane.
 struct Strides {
   I x, y, z;
 };
@@ -367,7 +367,7 @@ struct CellWalk {
   I index;       // into the table's bits
 };
 
-// The cell at which an axis stands just after entering.
+// Returns the cell coordinate of a lane on one axis just after it enters its box.
 inline F first_cell(const Axis& axis, F t, Mask entered, Mask ties_before, Mask ties_after) {
   const F low = floor(axis.low * all(0.25F));
   const F high = floor((axis.high - all(1.0F)) * all(0.25F));
@@ -394,8 +394,8 @@ inline Mask is_occupied(const TreeView& tree, I index) {
   return test_bit(gather(tree.cells, word), index);
 }
 
-// Walks until each lane of `walking` stands in an occupied cell, where `at` then holds it, or has left its box.
-// Returns the lanes that found one.
+// Walks until each lane of `walking` is in an occupied cell or has left its box. Stores the occupied cells in `at`.
+// Returns the lanes that found a cell.
 inline Mask find_cells(const TreeView& tree, const Lanes& lanes, CellWalk& at, Mask walking) {
   const Strides strides = strides_of(lanes, tree.cell_strides.x, tree.cell_strides.y, tree.cell_strides.z);
   const Planes four = steps_of(lanes, 4.0F);
@@ -419,14 +419,15 @@ inline Mask find_cells(const TreeView& tree, const Lanes& lanes, CellWalk& at, M
   return found_any;
 }
 
-// When a lane came through this plane; before its start where it never did.
+// Returns the time when a lane crossed this plane; a negative number if it never did.
 inline F entry_t(const Axis& axis, F plane) {
   const F t = crossing_t(axis, plane);
   const Mask never = axis.still | ((t == all(0.0F)) & axis.forward & ~axis.moved);
   return select(never, all(-1.0F), t);
 }
 
-// When lanes came into the units with these planes of entry, which may be before their start, and through which.
+// Returns the time when each lane entered the unit with these entry planes, and the axis that it entered through. The
+// time may be before the lane's start.
 inline F last_entry(const Lanes& lanes, const Planes& entries, Crossing& entered) {
   const F tx = entry_t(lanes.x, entries.x);
   const F ty = entry_t(lanes.y, entries.y);
@@ -438,16 +439,16 @@ inline F last_entry(const Lanes& lanes, const Planes& entries, Crossing& entered
   return last;
 }
 
-// A walk from voxel to voxel of the cells in which lanes stand.
+// A walk over the voxels of the lanes' current cells.
 struct VoxelWalk {
   I low_half;
   I high_half;
-  I code;  // x + 4 y + 16 z, and 256 times x + 8 y + 64 z, whose bits 2, 5 and 8 tell that it has left
+  I code;  // x + 4 y + 16 z, plus 256 times x + 8 y + 64 z; bits 2, 5 and 8 of the latter: has left
   Nexts nexts;
 };
 
-// From the plane of entry of a cell to the voxel at `t`: those planes within the cell that are crossed until then, up
-// to and including `t` for the lanes of `ties`.
+// Advances from the entry plane of a cell to the voxel at `t`, across the planes within the cell that are crossed
+// before `t`; in the lanes of `ties`, also the planes crossed at `t`.
 inline Next enter_cell(const Axis& axis, F entry, F t, F before_t, Mask ties, F one, I stride, I& code) {
   const F until = select(ties, t, before_t);
   const F second = entry + one;
@@ -478,13 +479,13 @@ struct Cells {
   I x, y, z;
 };
 
-// Where a brick's run has what stands at a place of it, from TreeView::lines: the place with a sign, from -128 in the
-// highest byte, plus the shift, which saturates there.
+// Returns the position in the brick's run (TreeView::lines) of the word at a place in the brick. The highest byte of
+// `place` holds the place as a signed number from -128 on. The addition of the shift saturates in that byte.
 inline I place_in_run(I brick, I place) {
   return add_saturated_bytes(place + all(std::numeric_limits<std::int32_t>::min()), shift_left<28>(brick));
 }
-// Which half of a word of TreeView::words has the voxel at a place of a brick, whose highest bits are those of the half
-// word, of 128.
+// Returns the index in TreeView::words of the half word that holds a voxel. The highest bits of `place` are the
+// number of the half word within its brick, of 128.
 inline I half_of(I brick, I place) {
   return (brick & all(~15)) + shift_right_signed<25>(place_in_run(brick, place));
 }
@@ -498,7 +499,7 @@ inline void read_words(const TreeView& tree, const Cells& cells, Mask which, Vox
   gather_words(tree.words, half, walk.low_half, walk.high_half);
 }
 
-// Where a lane stands within a cell before it crosses any of its planes.
+// Returns the code of a lane's position in its cell before it crosses any plane of the cell.
 inline I code_at_entry(const Axis& axis, int stride) {
   const I still = (to_int(floor(axis.origin)) & all(3)) * all(stride);
   return select(axis.still, still, select(axis.forward, all(0), all(3 * stride)));
@@ -519,7 +520,7 @@ inline VoxelWalk enter_cells(const Lanes& lanes, const Planes& entries, const Vo
   Crossing entered;
   const F last = last_entry(lanes, entries, entered);
   const F t = max(last, all(0.0F));
-  // At a tie planes of earlier axes are crossed first; those upon which a ray starts, before all others.
+  // At a tie, planes of earlier axes are crossed first. The planes of a ray's start come before all others.
   const Mask is_start = t == all(0.0F);
   const Mask is_inside = last < all(0.0F);
   const auto ties = [&](const Axis& axis, Mask earlier) {
@@ -537,7 +538,7 @@ inline VoxelWalk enter_cells(const Lanes& lanes, const Planes& entries, const Vo
   return walk;
 }
 
-// Walks until each lane of `walking` has met a voxel, whose code it leaves, or has left its cell.
+// Walks until each lane of `walking` has hit a voxel or has left its cell. Stores the code of each hit in `code`.
 template <Ask kAsk>
 inline Mask find_voxels(const Lanes& lanes, const VoxelSteps& steps, VoxelWalk& walk, Mask walking, I& code) {
   Mask hit = mask_of(0);
@@ -555,7 +556,7 @@ inline Mask find_voxels(const Lanes& lanes, const VoxelSteps& steps, VoxelWalk& 
   }
 }
 
-// Where lanes met a voxel.
+// The voxels and faces that lanes hit.
 struct Met {
   Mask hit;
   Mask inside;
@@ -574,8 +575,8 @@ inline void find_faces(const Lanes& lanes, Mask hit, Met& met) {
   met.axis = select(hit, crossed(entered, all(0), all(1), all(2)), met.axis);
 }
 
-// Walks the lanes from cell to cell; `meet(cells, voxels, found)` goes through the voxels of those in which the lanes
-// of `found` stand, and returns the lanes that are done. Returns all that are.
+// Walks the lanes from cell to cell. `meet(cells, voxels, found)` walks over the voxels of the current cells of the
+// lanes of `found`, and returns the finished lanes. Returns all finished lanes.
 template <class Meet>
 [[gnu::always_inline]] inline Mask walk_apart(const TreeView& tree, const Lanes& lanes, const VoxelSteps& steps, F t,
                                               const Crossing& entered, Meet&& meet) {
@@ -603,7 +604,7 @@ inline Cells voxels_at(const Cells& cells, I code) {
           shift_left<2>(cells.z) + (shift_right<4>(code) & all(3))};
 }
 
-// Asked whether alone, it does not say where.
+// Traces each lane on its own. With Ask::Whether, the hit positions stay unset.
 template <Ask kAsk>
 inline Met trace_apart(const TreeView& tree, Lanes& lanes, F t, const Crossing& entered, Met met) {
   const VoxelSteps steps = voxel_steps(lanes);

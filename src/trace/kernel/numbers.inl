@@ -1,5 +1,5 @@
-// What the kernels of single rays and of packets share: constants, four numbers side by side, where rays start, and
-// what a walk comes to.
+// Shared code of the kernels for single rays and for packets: constants, vectors of four numbers, start positions of
+// rays, and the results of a walk.
 //
 //   F4, I4, D4                  | x | y | z | - |
 //   a ray's position            64 k + rest, k and rest by axis; only the rest, below 64, is ever a float
@@ -7,7 +7,7 @@
 //   a voxel as walks count it   bit | 16 |15 14| 13 |12 11| 10 | 9 8 | 7 6 | 5 4 | 3 2 | 1 0 |
 //                                   | left z   | left y   | left x   |     |  z  |  y  |  x  |
 //
-// The lower six bits are the place in the cell's word; a step that leaves the cell carries into a bit called left.
+// The lower six bits are the position in the cell's word. A step out of the cell carries into a `left` bit.
 
 #pragma once
 
@@ -27,12 +27,12 @@
 namespace quoin::trace {
 namespace {
 
-// Further than any crossing; adding a step to it changes nothing.
+// Beyond any crossing; adding a step does not change it.
 constexpr float kNever = 1e37F;
 constexpr float kEndless = std::numeric_limits<float>::infinity();
-// How far a lane goes, along its greatest component, before single precision would no longer do.
+// The range of a lane along its greatest component. Single precision is not exact enough beyond it.
 constexpr float kReach = 2048.0F;
-// How far beyond the bounds a ray may start without being moved to them first.
+// The maximum distance of a ray's start from the bounds. Rays from farther away are moved to the bounds first.
 constexpr float kNearby = 64.0F;
 // More than rounding can move the end of a ray, in voxels.
 constexpr float kSlack = 0.02F;
@@ -40,8 +40,8 @@ constexpr float kSlack = 0.02F;
 // its distance to a plane by 2^-18, and products by 2^-22 of 22 voxels.
 constexpr float kDoubt = 4e-5F;
 
-// A voxel of a cell as kernels count it: x + 4 y + 16 z, and 256 times x + 8 y + 64 z, whose bits 2, 5 and 8 tell that
-// a step has left the cell.
+// A voxel of a cell in kernels: x + 4 y + 16 z, plus 256 times x + 8 y + 64 z. Bits 2, 5 and 8 of the latter are set
+// when a step has left the cell.
 constexpr int kCodeX = 1 + 256;
 constexpr int kCodeY = 4 + 256 * 8;
 constexpr int kCodeZ = 16 + 256 * 64;
@@ -82,7 +82,7 @@ inline F4 max4(F4 a, F4 b) {
 inline F4 all4(float x) {
   return F4{x, x, x, x};
 }
-// Of the first three.
+// Minimum and maximum of the first three lanes.
 inline float least3(F4 a) {
   return std::min(std::min(a[0], a[1]), a[2]);
 }
@@ -90,7 +90,7 @@ inline float greatest3(F4 a) {
   return std::max(std::max(a[0], a[1]), a[2]);
 }
 
-// What is asked of a single ray.
+// The query of a single ray: the hit position, or only a yes or no.
 enum class Ask : std::uint8_t { Where, Whether };
 
 enum class SetUp : std::uint8_t { Ready, Misses, Unusual };
@@ -99,7 +99,7 @@ enum class SetUp : std::uint8_t { Ready, Misses, Unusual };
 struct RayNumbers {
   D4 position;  // from the tables' origin
   F4 direction;
-  F4 size;  // of its components
+  F4 size;  // absolute values of the components
   float greatest;
 };
 
@@ -120,15 +120,15 @@ inline RayNumbers read_ray(const TreeView& tree, const Ray& ray) {
 struct SingleHit {
   bool is_hit = false;
   bool is_unfinished = false;
-  int axis = -1;  // of the face; -1 when it starts inside
+  int axis = -1;  // axis of the face; -1 if the ray starts inside
   IVec3 voxel{0};
 };
 
-// Where a ray starts, in voxels from the tables' origin.
+// The start of a ray, in voxels from the tables' origin.
 struct Move {
   double position[3];
   double max_t;
-  int entered = -1;  // the axis of the bounds' plane to which it was moved
+  int entered = -1;  // axis of the bounds' plane that the ray was moved to; -1: not moved
 };
 
 // Moves one ray that starts far away to where it enters the bounds; false when it misses them.
@@ -180,8 +180,8 @@ inline double distance_of(const TreeView& tree, const Ray& ray, const SingleHit&
   return (plane - ray.origin[found.axis]) * (1.0 / d);
 }
 
-// What a single ray's walk comes to, in double precision. `Tracer::trace<kAsk>` walks; asked whether alone, it need not
-// say where.
+// Traces a single ray and computes the hit in double precision. `Tracer::trace<kAsk>` walks the ray; with Ask::Whether
+// it may omit the position.
 template <class Tracer>
 inline bool first_single(const TreeView& tree, const Ray& ray, double max_t, RayHit& hit, bool& unfinished) {
   const SingleHit found = Tracer::template trace<Ask::Where>(tree, ray, max_t);
@@ -194,7 +194,7 @@ inline bool first_single(const TreeView& tree, const Ray& ray, double max_t, Ray
   return hit.t <= max_t;
 }
 
-// Whether it is blocked.
+// Returns true if the ray is blocked.
 template <class Tracer>
 inline bool any_single(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished) {
   if (max_t == std::numeric_limits<double>::infinity()) {

@@ -12,13 +12,13 @@ namespace {
 
 #ifndef QUOIN_KERNEL_AVX512
 
-// Rays of one packet that go the same way, together, in AVX2: the units that any of them may pass are found once for
-// all, in an order in which each of them passes those that it does; which rays pass an occupied voxel is then asked of
-// all lanes. The same results as the walk in lockstep.
+// Traces rays of one packet with similar directions together, in AVX2. The units that any of the rays may pass are
+// computed once for all, in an order that is valid for each ray. Each occupied voxel is then tested in all lanes. The
+// results equal those of the walk in lockstep.
 //
-//     start ______                       origin, inverse: least and greatest of all lanes, mirrored
+//     start ______                       origin, inverse: minimum and maximum of all lanes, mirrored
 //     |  ___/   | \___                    -> chunks, bricks, cells, voxels that any lane may pass (BeamPaths)
-//     | /       |     \                   -> of each occupied voxel: which lanes pass it; those are done
+//     | /       |     \                   -> for each occupied voxel: the lanes that pass it, which are then finished
 //     |/________|______|  end
 
 // Several rays that go the same way.
@@ -28,8 +28,8 @@ struct Beam {
   float end;  // no ray goes further
 };
 
-// As Paths, but with the earliest and the latest time at which any of the rays crosses a plane. Rounding keeps the
-// order of products and differences, so these times bound those of every ray.
+// Like Paths, but with the earliest and the latest time when any of the rays crosses a plane. Rounding is monotonic for
+// products and differences, so these times bound those of every ray.
 class BeamPaths {
  public:
   explicit BeamPaths(const Beam& beam) : end_(_mm256_set1_ps(beam.end)) {
@@ -67,10 +67,10 @@ class BeamPaths {
   __m256 end_;
 };
 
-// A ray passes at most ten of the 64 units of a block; a beam that passes more than this meets voxels that most of its
-// rays do not.
+// A ray passes at most ten of the 64 units of a block. A beam that passes more units than this tests voxels that
+// most of its rays miss.
 constexpr int kWideBeam = 24;
-// How wide a beam may be at its end, in voxels: measured. Wider ones walk in lockstep.
+// The maximum width of a beam at its end, in voxels (measured). Wider beams walk in lockstep.
 constexpr float kBeamWidth = 4.0F;
 
 struct BeamAxis {
@@ -86,7 +86,7 @@ struct BeamLanes {
   I4 backward;
   int octant = 0;
   bool nudges = false;
-  Mask left;  // have met nothing yet
+  Mask left;  // lanes without a hit yet
 };
 
 // Fails where some go forward and some backward, or do not start next to the same multiple of 64.
@@ -135,7 +135,7 @@ inline Beam beam_of(const BeamLanes& lanes, F exit_t) {
   return beam;
 }
 
-// Whether no ray is far from the first one, where it starts and where it ends.
+// Returns true if all rays start and end near the first one.
 inline bool is_narrow(const Lanes& lanes) {
   const int first = std::countr_zero(bits(lanes.live) | 1U << (kWidth - 1));
   const auto apart = [first](F a) {
@@ -231,7 +231,7 @@ inline F4 chunk_block(const BeamLanes& lanes, F t) {
   return floor4(F4{first(lanes.x), first(lanes.y), first(lanes.z), 0.0F} * (1.0F / kChunkSize)) * kChunkSize;
 }
 
-// Returns the lanes that are to be traced otherwise: it was not asked to serve them, or did not get on.
+// Returns the lanes that other code must trace: beams that it does not support, or that stopped early.
 inline Mask trace_beam(const TreeView& tree, const Lanes& lanes, F t, const Crossing& entered, Met& met) {
   if (!is_narrow(lanes)) return lanes.live;
   BeamLanes beam;
@@ -258,13 +258,13 @@ inline Mask trace_beam(const TreeView& tree, const Lanes& lanes, F t, const Cros
 
 #endif
 
-// What is known of the lanes that were asked about.
+// The results for the requested lanes.
 struct LaneHits {
   std::uint32_t hit = 0;
   std::uint32_t starts_inside = 0;
   std::uint32_t unfinished = 0;                  // went further than a kernel goes: to be traced in double precision
   RayPacket::Lanes<std::int32_t> x{}, y{}, z{};  // voxels, from the tables' origin
-  RayPacket::Lanes<std::int32_t> axis{};         // of the face
+  RayPacket::Lanes<std::int32_t> axis{};         // axis of the face
 };
 
 template <Ask kAsk>
@@ -304,8 +304,8 @@ inline Vector lanes_at(const RayPacket::Lanes<T>& from, std::size_t first) {
   return some<Vector>(from.data() + first);
 }
 
-// The distances of the faces met by the lanes from `first` on, in double precision, and which way rays go through them,
-// 1 where forward; returns the lanes within reach.
+// Computes the distances of the faces hit by the lanes, starting at lane `first`, in double precision, and the
+// direction in which rays cross them, 1 for forward. Returns the lanes within reach.
 inline std::uint32_t measure_some(const TreeView& tree, const RayPacket& rays, const LaneHits& lanes, std::size_t first,
                                   RayPacket::Lanes<double>& t, RayPacket::Lanes<std::int32_t>& forward) {
   const Longs axis = __builtin_convertvector(lanes_at<Ints>(lanes.axis, first), Longs);
@@ -374,7 +374,7 @@ inline void trace_first(const TreeView& tree, const RayPacket& rays, PacketHits&
   trace_first_lanes(tree, rays, hits, unfinished);
 }
 
-// Which rays are blocked: short ones in a window, others as they are.
+// Returns the blocked rays. Short rays walk in a window, other rays in the usual way.
 inline std::uint32_t trace_any_lanes(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished) {
   LaneHits others;
   std::uint32_t blocked = 0;

@@ -1,14 +1,14 @@
-// One ray, by sets of units, for processors with BMI2: it is mirrored so that it goes forward along every axis, then
-// goes from chunk to chunk. The same arithmetic and answers as the walk in trace/kernel/kernel_plain.cpp: a plane and
-// an origin that both change their sign are as far apart as before, to the bit.
+// Traces one ray with sets of units, on processors with BMI2. The ray is mirrored to go forward along every axis, then
+// walks from chunk to chunk. It uses the arithmetic of the walk in trace/kernel/kernel_plain.cpp and returns the same
+// bits: negating both a plane and an origin leaves their distance unchanged.
 //
-//   chunk        bricks passed  &  bricks that hold something   ->  lowest bit: the next brick
-//     brick        cells passed   &  cells that hold something    ->  lowest bit: the next cell
-//       cell         voxels passed  &  voxels                       ->  lowest bit: what is met
+//   chunk        bricks passed  &  occupied bricks             ->  lowest bit: the next brick
+//     brick        cells passed   &  occupied cells              ->  lowest bit: the next cell
+//       cell         voxels passed  &  occupied voxels             ->  lowest bit: the hit
 //
 // A ray that starts within the bounds begins at the bottom: in its own cell, then its brick, then its chunk.
 //
-// Which units of a block it passes is found for all 64 at once, as bits:
+// The units of a block that the ray passes are computed for all 64 at once, as bits:
 //
 //   a block: 4^3 units          bit  x + 4 y + 16 z of a word
 //     of a chunk   bricks        z = 0              z = 1
@@ -18,9 +18,9 @@
 //                                |  0  1  2  3 |    | 16 17 18 19 |
 //                                  x
 //
-// Rays are mirrored so that they go forward along every axis; then the order of the bits is that in which they are
-// passed. Three intervals of a line that overlap two by two have a point in common (Helly), so the units passed are
-// those whose x and y, x and z, y and z overlap. Crossings at the same t are ordered by axis.
+// Rays are mirrored to go forward along every axis, so the ray passes units in the order of their bits. Three intervals
+// on a line that overlap pairwise have a common point (Helly). The ray therefore passes the units whose intervals
+// overlap for x and y, x and z, y and z. Crossings at the same t are ordered by axis.
 
 #pragma once
 
@@ -56,12 +56,12 @@ inline F4 corner_of(int unit) {
   return corner;
 }
 
-// What turns the index of a unit into that of the unit that it is mirrored to.
+// Returns the mask that, XORed with a unit's index, gives the index of its mirror image.
 inline int flip_of(int octant) {
   return (octant & 1) * 3 + (octant & 2) * 6 + (octant & 4) * 12;
 }
 
-// How the bits of blocks are mirrored: bytes change places, then each half of a byte is looked up.
+// Tables that mirror the bits of blocks: a byte shuffle, then a table look-up for each half of a byte.
 struct alignas(16) MirrorTables {
   std::uint8_t bytes[8][16];
   std::uint8_t low[8][16];
@@ -107,11 +107,11 @@ class Mirror {
   __m128i high_;
 };
 
-// The edge of a chunk, and what an axis that stands still has for 1 / direction.
+// The edge length of a chunk, and the value of 1 / direction for an axis without motion.
 constexpr float kChunkSize = 64.0F;
 constexpr float kStillInverse = 1e37F;
 
-// Just below zero: puts planes on which a ray starts, and which it therefore never crosses, before all others.
+// A tiny shift in t. It orders the planes of a ray's start, which the ray never crosses, before all others.
 constexpr float kNudge = 1e-30F;
 
 inline F4 mirrored_planes(F4 planes, I4 backward) {
@@ -124,8 +124,8 @@ inline F4 mirrored_planes(F4 planes, I4 backward) {
 // In sixteen lanes: one for each plane, then one for each pair of units along two axes.
 struct alignas(64) PathTables {
   std::int32_t axis[16];        // five planes of x, of y, of z
-  float number[16];             // of the plane
-  float unit[64][16];           // the same, plus four times where a unit lies
+  float number[16];             // the plane's number
+  float unit[64][16];           // the plane's number plus four times the unit's coordinate
   std::int32_t pattern[8][16];  // pairs: lower and upper planes of x, y (first), y, z (second)
 };
 
@@ -157,7 +157,7 @@ class Paths {
 
   Paths(F4 origin, F4 inverse, float end)
       : origin_(block(origin)), inverse_(block(inverse)), end_(_mm512_set1_ps(end)) {}
-  // Planes behind which the ray starts, and which it never crosses, along axes that it goes forward.
+  // Shifts the planes of the ray's start along its forward axes. The ray never crosses these planes.
   void nudge(I4 forward) {
     nudges_ = true;
     nudge_ = block(forward ? all4(kNudge) : all4(0.0F));
@@ -174,7 +174,7 @@ class Paths {
     const __m512 lower = _mm512_sub_ps(_mm512_load_ps(kPath.unit[brick]), _mm512_load_ps(kPath.number));
     return _mm512_fmadd_ps(lower, _mm512_set1_ps(4.0F), chunk);
   }
-  // Products and sums of whole numbers: nothing is rounded.
+  // Products and sums of integers are exact.
   [[nodiscard]] std::uint64_t bricks(Block chunk) const {
     return through(_mm512_fmadd_ps(_mm512_load_ps(kPath.number), _mm512_set1_ps(16.0F), chunk));
   }
@@ -189,7 +189,7 @@ class Paths {
   static __m512 pairs(int pattern, __m512 t) {
     return _mm512_permutexvar_ps(_mm512_load_si512(kPath.pattern[pattern]), t);
   }
-  // Pairs of units of two axes, of which `a` goes first, that overlap.
+  // Returns the overlapping pairs of units of two axes; axis `a` comes first at ties.
   static std::uint32_t overlaps(__m512 a_lower, __m512 a_upper, __m512 b_lower, __m512 b_upper) {
     const __mmask16 is_before_end = _mm512_cmp_ps_mask(a_lower, b_upper, _CMP_LE_OQ);
     return _mm512_mask_cmp_ps_mask(is_before_end, b_lower, a_upper, _CMP_LT_OQ);
@@ -220,7 +220,7 @@ class Paths {
 #else
 
 struct alignas(32) PlaneTables {
-  float unit[4][4][8];  // lower planes of units of 1, 4, 16 and 64 voxels, twice, by where the block lies along an axis
+  float unit[4][4][8];  // lower planes of units of 1, 4, 16 and 64 voxels, repeated, by the block's coordinate
 };
 
 constexpr PlaneTables make_plane_tables() {
@@ -235,7 +235,7 @@ constexpr PlaneTables make_plane_tables() {
 
 constexpr PlaneTables kPlanes = make_plane_tables();
 
-// When the lower and the upper planes of the four units along an axis are crossed, twice.
+// The times of crossing the lower and the upper planes of the four units along an axis, repeated.
 struct Times {
   __m256 lower, upper;
 };
@@ -247,7 +247,7 @@ inline Times rows(const Times& t, bool is_second) {
   return {_mm256_permutevar_ps(t.lower, which), _mm256_permutevar_ps(t.upper, which)};
 }
 
-// Of two axes, of which `a` goes first; kOrder says what counts at a tie.
+// Returns the overlapping units of two axes. Axis `a` comes first at ties, and kOrder is the comparison for the other.
 template <int kOrder>
 inline __m256 overlaps(const Times& a, const Times& b) {
   return _mm256_and_ps(_mm256_cmp_ps(a.lower, b.upper, _CMP_LE_OQ), _mm256_cmp_ps(b.lower, a.upper, kOrder));
@@ -280,7 +280,7 @@ class Paths {
 
   Paths(F4 origin, F4 inverse, float end)
       : origin_(block(origin)), inverse_(block(inverse)), end_(_mm256_set1_ps(end)) {}
-  // Planes behind which the ray starts, and which it never crosses, along axes that it goes forward.
+  // Shifts the planes of the ray's start along its forward axes. The ray never crosses these planes.
   void nudge(I4 forward) {
     nudges_ = true;
     nudge_ = block(forward ? all4(kNudge) : all4(0.0F));
@@ -346,7 +346,7 @@ struct PathRay {
   bool is_inside;  // it starts within the bounds
   bool is_cut;
   bool is_moved;
-  bool is_on_plane;  // starts, within the bounds or upon them, on a plane that lies behind it and was never crossed
+  bool is_on_plane;  // starts on a plane behind it that it never crossed, within the bounds or on their boundary
 };
 
 // The box of a ray's way by its mirrored planes.
@@ -376,8 +376,8 @@ inline PathBox box_of(const TreeView& tree, PathRay& ray, F4 origin, F4 directio
           mirrored_planes(ray.backward ? low : high, ray.backward)};
 }
 
-// The chunk into which a ray comes at `t` through a plane of `axis`: a guess by position, corrected by comparing
-// crossings, since rounding can put a position on the wrong side of a plane next to it.
+// Returns the chunk that a ray enters at `t` through a plane of `axis`. The position gives a first guess. Comparing
+// crossings corrects it, since rounding can put a position on the wrong side of a nearby plane.
 inline F4 chunk_entered(const PathRay& ray, const PathBox& box, F4 speed, float t, int axis) {
   const F4 first = floor4(box.low * (1.0F / kChunkSize)) * kChunkSize;
   const F4 last = floor4((box.high - 1.0F) * (1.0F / kChunkSize)) * kChunkSize;
@@ -403,7 +403,7 @@ inline bool starts_on_plane(const PathRay& ray) {
   return mask3(ray.forward & (__builtin_convertvector(ray.own, F4) == ray.origin)) != 0;
 }
 
-// Where a ray enters its box and leaves it.
+// Computes the times when a ray enters and leaves its box.
 inline SetUp clip_path(PathRay& ray, const PathBox& box, F4 speed, int moved) {
   const F4 origin = ray.origin;
   const I4 axes = {0, 1, 2, 3};
@@ -427,7 +427,7 @@ inline SetUp clip_path(PathRay& ray, const PathBox& box, F4 speed, int moved) {
   const float t = greatest3(near_t);
   const int axis = 31 - std::countl_zero(static_cast<std::uint32_t>(mask3(near_t == all4(t))));
   const F4 now = all4(t);
-  // Through an edge of its box: it has left before it enters if the axis on which it leaves goes first.
+  // The ray passes an edge of its box. It leaves before it enters if the axis of its exit comes first.
   if (mask3((ray.far_t < now) | ((ray.far_t == now) & (axes < axis))) != 0) return SetUp::Misses;
   ray.is_on_plane = t == 0.0F && !ray.is_moved && starts_on_plane(ray);
   ray.chunk = chunk_entered(ray, box, speed, t, axis);
@@ -461,7 +461,7 @@ inline SetUp set_up_path(const TreeView& tree, const Ray& ray, double max_t, Pat
   out.own = __builtin_convertvector(whole, I4);
   out.backward = (d < 0.0F) & ~still;
   out.forward = (d > 0.0F) & ~still;
-  // A still axis never comes to a plane.
+  // A ray never crosses a plane of an axis without motion.
   out.origin = still ? whole + 0.5F : mirrored_planes(origin, out.backward);
   const F4 inverse = 1.0F / (still ? all4(1.0F) : size);
   out.inverse = still ? all4(kStillInverse) : inverse;
@@ -512,7 +512,7 @@ class PathWalk {
     int brick = 0;
     auto block = chunk_;
     if (ray_.is_inside) {
-      // From the voxel in which it starts: mostly what it meets is near.
+      // Start in the ray's own voxel: most hits are near the start.
       const Own own = own_units();
       brick = own.brick;
       block = Paths::brick_of(chunk_, brick);
@@ -549,7 +549,7 @@ class PathWalk {
     const F4 lower = F4{plane_[0], plane_[1], plane_[2], 0.0F} - kChunkSize;
     return lower + corner_of(brick) * 16.0F + corner_of(cell) * 4.0F;
   }
-  /// Whether that is further than single precision serves, and left to others.
+  /// Returns true if the cell is beyond the range of single precision. The caller then traces the ray in double.
   [[nodiscard]] bool is_too_far(F4 in_cell) const {
     return ray_.is_cut && greatest3((in_cell - ray_.origin) * ray_.inverse) > ray_.exit_t;
   }
@@ -598,7 +598,7 @@ class PathWalk {
     index_ += stride_[kAxis];
     chunk_ = Paths::next_chunk<kAxis>(chunk_);
     if (now < ray_.exit_t) return true;
-    // At a tie the axis on which it leaves may come later.
+    // At a tie, the exit axis may come later.
     const int exit_axis = std::countr_zero(static_cast<std::uint32_t>(mask3(ray_.far_t == all4(ray_.exit_t))));
     return now == ray_.exit_t && kAxis < exit_axis;
   }
@@ -610,7 +610,7 @@ class PathWalk {
     if (kAsk == Ask::Whether) return {true, false, -1, IVec3{0}};
     const F4 voxel = in_cell + corner_of(std::countr_zero(voxels));
     const F4 nudge = ray_.is_on_plane ? (ray_.forward ? all4(kNudge) : all4(0.0F)) : all4(0.0F);
-    // It came in through the last of its lower planes, at a tie that of the later axis.
+    // The ray entered through the last of the lower planes; at a tie, the plane of the later axis.
     const F4 t = (voxel - ray_.origin) * ray_.inverse - nudge;
     const float last = greatest3(t);
     const int axis = last < 0.0F ? -1 : t[2] == last ? 2 : t[1] == last ? 1 : 0;
