@@ -16,7 +16,7 @@
 
 namespace quoin::oracle {
 
-/// A visible unit face: what it shows.
+/// The visible content of a unit face.
 struct UnitFace {
   VoxelType type = kAir;
   FaceOcclusion corners{};

@@ -26,7 +26,7 @@ constexpr ScalarType scalar_type_of() {
   return static_cast<ScalarType>(kOrder + (std::is_signed_v<T> ? 1 : 0));
 }
 
-/// A packed array whose last axis runs fastest.
+/// A packed array; its last axis is contiguous.
 template <class T>
 class TestArray {
  public:
@@ -64,8 +64,8 @@ class TestArray {
   std::vector<T> values_;
 };
 
-/// The same samples laid out otherwise: axes from the fastest to the slowest, those of `reversed`'s bits backwards,
-/// samples `spread` places apart, the whole some bytes off.
+/// The same samples in another layout: axes from the fastest to the slowest, the axes in the bits of `reversed`
+/// backwards, samples `spread` elements apart, and all data at a byte offset.
 template <class T>
 class Relaid {
  public:
@@ -99,7 +99,7 @@ class Relaid {
   std::vector<std::byte> bytes_;
 };
 
-/// From -1 to 1, each sample of its own.
+/// Random values from -1 to 1.
 inline TestArray<float> noise(Size size, unsigned seed) {
   std::mt19937 random(seed);
   return {size, [&](DVec3) { return static_cast<float>(random()) * 0x1p-31F - 1.0F; }};
@@ -157,7 +157,7 @@ inline std::vector<DVec3> naive_vertices(const TestArray<float>& samples, double
   return all;
 }
 
-/// How many edges are crossed; with an open border, of those with four cells around them.
+/// Returns the number of crossed edges; with an open border, only of edges with four cells around them.
 inline std::size_t naive_edges(const TestArray<float>& samples, double iso, bool is_open = false) {
   std::size_t count = 0;
   const Size size = samples.size();

@@ -1,4 +1,5 @@
-// What the surfaces of arrays take beside their input and output, as the C library counts it at every step of progress.
+// Memory that the surfaces of arrays take in addition to their input and output, measured by the C library at every
+// progress step.
 
 #include <quoin/mesh/array_surface.h>
 #include <quoin/mesh/label_surfaces.h>
@@ -40,7 +41,7 @@ bool can_count() {
   return some != nullptr && bytes_in_use() >= before + (1 << 20);
 }
 
-// The most that is taken at any step, beyond what there was.
+// Returns the maximum of additional memory over all progress steps.
 template <class Make>
 std::size_t most_bytes(Make make) {
   const std::size_t before = bytes_in_use();

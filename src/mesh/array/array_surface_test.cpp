@@ -64,7 +64,7 @@ void expect_alike(const ArraySurface& a, const ArraySurface& b) {
   EXPECT_GT(volume, 0.0);
 }
 
-// What a ball's signed distances make.
+// A ball, sampled as signed distances.
 struct Ball {
   Size size{};
   DVec3 centre{0.0};

@@ -1,6 +1,6 @@
 #pragma once
 
-// The arithmetic of one cell whose densities may be of any size. What is said of vertices.inl holds here too.
+// The arithmetic of one cell with densities of any size. The notes in vertices.inl apply here too.
 
 #include <cmath>
 #include <cstddef>
@@ -60,7 +60,7 @@ inline Vec3 mean_crossing(const Corners& d) {
           (sum[2] + (high[0][1] + high[1][0])) * inverse};
 }
 
-// Brought to a size whose square is a number, then to 1.
+// Scales the vector so that its square is a finite number, then normalizes it.
 inline Vec3 unit_of_any(Vec3 g) {
   float most = std::fabs(g.x);
   most = most < std::fabs(g.y) ? std::fabs(g.y) : most;

@@ -1,6 +1,6 @@
 #pragma once
 
-// Which cells of an array have a vertex, and which vertex: what fields and labels have in common.
+// The cells of an array that have a vertex, and their vertex indices. Shared by fields and labels.
 
 #include <algorithm>
 #include <bit>
@@ -21,7 +21,7 @@
 
 namespace quoin::array {
 
-// Slices of cells are worked on in slabs; whatever the number of threads, so that the order stays.
+// The number of slices of cells per slab. It does not depend on the number of threads, so the order stays the same.
 inline constexpr std::size_t kSlabSlices = 16;
 
 inline std::size_t slab_count(const Lattice& lattice) {
@@ -45,7 +45,7 @@ class EdgeWindow {
     no_edges_.assign(words_, 0);
   }
 
-  // Slices must follow each other from the first that is asked for.
+  // Slices must be requested in order; the first may be any slice.
   CellSlice at(std::size_t slice) {
     QUOIN_ASSERT(slice <= slices_, "a slice of cells");
     if (is_new_ && slice != 0) load(slice - 1, planes_[0]);

@@ -48,7 +48,7 @@ void read_corners(const CornerRows& rows, const std::int32_t* cells, std::size_t
   }
 }
 
-// Where doubles are too small or too large for floats, those of a cell are divided by the largest of them.
+// If doubles are too small or too large for floats, the values of a cell are divided by the largest of them.
 constexpr double kSmall = 1e-25;
 constexpr double kLarge = 1e25;
 
@@ -69,7 +69,7 @@ void convert_doubles(const double* values, const Densities<double>& densities, s
 
 void convert_floats(const float* values, const Densities<float>& densities, CornerBatch& out) {
   const float iso = densities.iso();
-  // All places, so that compilers do several at once. 0 is to have no sign.
+  // Converts the whole batch, so that compilers vectorize the loop. 0 must not have a sign.
   for (std::size_t corner = 0; corner < 8; ++corner) {
     const float* const from = values + corner * kBatch;
     float* const to = out.densities[corner];

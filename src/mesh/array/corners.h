@@ -16,15 +16,15 @@ namespace quoin::array {
 struct CornerRows {
   const std::byte* rows[4];
   bool is_beyond[4];
-  const std::byte* next;  // after in y, in the slice after both; null where there is none
+  const std::byte* next;  // after in y, in the slice after both; null if there is none
   std::ptrdiff_t stride;
   std::int64_t size;  // samples of a row
 };
 
-// Of a row of cells.
+// Returns the rows of samples around a row of cells.
 [[nodiscard]] CornerRows corner_rows(const Lattice& lattice, std::int64_t row, std::int64_t slice);
 
-// The values at cells' corners as they are, [x + 2 y + 4 z][cell], and which corners lie beyond the array.
+// The raw values at cells' corners, [x + 2 y + 4 z][cell], and the corners beyond the array.
 struct RawCorners {
   alignas(64) std::byte values[8 * kBatch * 8];
   std::uint8_t is_beyond[kBatch];
@@ -32,7 +32,7 @@ struct RawCorners {
 };
 
 struct CornerReader {
-  // Reads the corners of cells of a row to place `at` and those after it.
+  // Reads the corners of cells of a row into `out`, starting at index `at`.
   void (*read)(const CornerRows& rows, const std::int32_t* cells, std::size_t count, std::size_t at, RawCorners& out);
   // Makes densities of the first `count`.
   void (*convert)(const RawCorners& raw, const SolidRule& rule, std::size_t count, CornerBatch& out);
@@ -40,7 +40,8 @@ struct CornerReader {
 
 [[nodiscard]] CornerReader corner_reader(ScalarType type);
 
-// Writes what kernels compare values with; true when all values are solid instead.
+// Writes the limit that kernels compare values with. Returns true if all values are solid; the limit has no effect
+// then.
 [[nodiscard]] bool write_limit(ScalarType type, const SolidRule& rule, std::byte (&limit)[8]);
 
 }  // namespace quoin::array

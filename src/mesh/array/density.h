@@ -1,6 +1,6 @@
 #pragma once
 
-// From a value of any type to whether it is solid, and to how far it is from the surface.
+// Converts values of any type to signs (solid or air) and to distances from the surface.
 
 #include <algorithm>
 #include <cmath>
@@ -12,10 +12,10 @@ namespace quoin::array {
 
 struct SolidRule {
   double iso = 0.0;
-  bool is_below = false;  // solid is what is less
+  bool is_below = false;  // values below iso are solid
 };
 
-// What a value is compared with: v > value, or v < value.
+// The limit of a comparison: v > value, or v < value.
 template <class T>
 struct SolidLimit {
   T value{};
@@ -52,7 +52,7 @@ SolidLimit<T> limit_of(const SolidRule& rule) {
   }
 }
 
-// How far values are from the surface, negative where solid; NaN stays.
+// Computes the distance of values from the surface, negative for solid values; NaN stays NaN.
 template <class T>
 class Densities {
  public:
@@ -70,7 +70,8 @@ class Densities {
     }
   }
 
-  // Whether single precision will do: a difference of floats that is rounded twice is rounded right.
+  // Returns true if single precision gives the same bits: a difference of floats, rounded first to double, is rounded
+  // correctly.
   [[nodiscard]] bool is_single() const { return is_float_; }
   [[nodiscard]] float iso() const { return float_iso_; }
   [[nodiscard]] bool is_below() const { return is_below_; }
@@ -92,7 +93,7 @@ class Densities {
     }
     return is_below_ ? -above : above;
   }
-  // What is solid stays so, and 0 has no sign.
+  // Solid values stay negative, and 0 has no sign.
   [[nodiscard]] static float rounded(double difference) {
     constexpr float kLeast = std::numeric_limits<float>::min();
     const float density = static_cast<float>(difference);
@@ -106,7 +107,7 @@ class Densities {
   float float_iso_;
   bool is_below_;
   bool is_float_;
-  T whole_{};  // of numbers of 64 bits: the surface's value in two parts
+  T whole_{};  // for 64-bit integers: the surface's value in two parts
   double part_ = 0.0;
   bool is_inside_ = false;
 };

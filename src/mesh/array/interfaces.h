@@ -6,18 +6,19 @@
 
 namespace quoin::array {
 
-// The kinds of faces between labels: for each pair that meets, a slot with a number, of triangles or of a place.
+// The interfaces between labels: a slot for each pair of labels that meet, with a number, which is first a count of
+// triangles and then a write position.
 //
-// Labels are keys here: their bits, whose order as unsigned numbers is that of the labels.
+// Labels are stored as keys: their bits, changed so that the order as unsigned numbers is the order of the labels.
 class InterfaceTable {
  public:
   struct Slot {
     std::uint64_t back = 0;
-    std::uint64_t front = 0;  // as `back`: empty
+    std::uint64_t front = 0;  // equal to `back`: empty
     std::uint64_t number = 0;
   };
 
-  // That of a pair, new ones with 0. Valid until the next call.
+  // Returns the slot of a pair; new slots have number 0. The reference is valid until the next call.
   [[gnu::always_inline]] Slot& slot(std::uint64_t back, std::uint64_t front) {
     for (std::size_t i = place(back, front);; i = (i + 1) & mask_) {
       Slot& slot = slots_[i];
@@ -38,7 +39,7 @@ class InterfaceTable {
   Slot& insert(std::uint64_t back, std::uint64_t front);
 
   std::vector<Slot> storage_;
-  Slot* slots_ = nullptr;  // those of storage_
+  Slot* slots_ = nullptr;  // data of storage_
   std::size_t mask_ = 0;
   std::size_t count_ = 0;
 };

@@ -13,7 +13,7 @@
 #include "mesh/array/interfaces.h"
 #include "mesh/array/placement.h"
 
-// What is compiled for each instruction set. Every kernel gives the same bits.
+// Functions that are compiled for each instruction set. Every kernel gives the same bits.
 
 namespace quoin::array {
 
@@ -23,7 +23,7 @@ inline constexpr std::size_t kScalarTypes = 10;
 // kDensityAtSurface if the other end's density is -1.
 inline constexpr float kLeastFraction = kDensityAtSurface / (kDensityAtSurface + 1.0F);
 
-// How many cells are worked on at a time.
+// The number of cells per batch.
 inline constexpr std::size_t kBatch = 128;
 
 // Densities of cells' corners: [x + 2 y + 4 z][cell]; solid below 0, never -0. They may be infinite; NaN
@@ -32,7 +32,8 @@ struct CornerBatch {
   alignas(64) float densities[8][kBatch];
 };
 
-// The same cells, and their vertices: where they lie in them, to 1/65,536, and the unit gradient in space.
+// The same cells and their vertices: the position in the cell, in multiples of 1/65,536, and the unit gradient in
+// space.
 struct VertexBatch {
   alignas(64) std::int32_t cells[3][kBatch];  // by walked axis
   alignas(64) float fractions[3][kBatch];
@@ -48,11 +49,11 @@ struct EdgePlanes {
 
 // A slice of cells: the crossed edges around it.
 struct CellSlice {
-  std::size_t rows;  // of samples; of cells one more
+  std::size_t rows;  // of samples; cells have one more
   std::size_t words;
   const std::uint64_t* no_edges;        // a row without any
   EdgePlanes low;                       // of the slice of samples before
-  EdgePlanes high;                      // of that after
+  EdgePlanes high;                      // of the slice of samples after
   const std::uint64_t* between_slices;  // [row][word], bit x: of sample x
 };
 
@@ -62,12 +63,12 @@ struct RankedRows {
   const std::uint32_t* first;
 };
 
-// What all quads of a mesh have in common.
+// Common data of all quads of a mesh.
 struct QuadRules {
   const Vec3* positions;
   bool is_mirrored;
-  // A bit for each vertex of a cell with several sheets, and what such a cell's vertex is on an edge, by 4 * axis +
-  // du + 2 dv of the edge's start in the cell; null: there are none.
+  // `split` has one bit per vertex, set for cells with several sheets; null if there are none. `vertex_on_edge` returns
+  // the vertex of such a cell on an edge, given 4 * axis + du + 2 dv of the edge's start in the cell.
   const std::uint64_t* split = nullptr;
   const void* split_cells = nullptr;
   std::uint32_t (*vertex_on_edge)(const void* split_cells, std::uint32_t vertex, unsigned edge) = nullptr;
@@ -79,16 +80,16 @@ struct LabelRows {
   std::ptrdiff_t stride[3];
   std::int64_t size[3];
   std::uint64_t background;  // its key
-  std::uint64_t sign;        // what makes a key of a label's bits
+  std::uint64_t sign;        // XORed with a label's bits to get its key
 };
 
 // A step of relaxation of a slice of cells.
 struct RelaxStep {
-  std::size_t rows;  // of samples
+  std::size_t rows;  // number of rows of samples
   std::size_t words;
   bool is_first_slice;
   bool is_last_slice;
-  const std::uint8_t* links;  // of all vertices, as their fractions
+  const std::uint8_t* links;  // of all vertices, in the order of their fractions
   const Vec3* from;
   Vec3* to;
 };
@@ -99,12 +100,12 @@ inline constexpr float kFarthest = 0x1p100F;
 inline constexpr float kLeastGradient = std::numeric_limits<float>::min();
 
 struct Kernel {
-  /// Which of `count` neighbouring values are solid, by type and side (above, below), against a limit of that type.
-  /// Writes whole words; bits from `count` on are 0.
+  /// Finds the solid ones of `count` adjacent values, by type and side (above, below), compared with a limit of that
+  /// type. Writes whole words; bits from `count` on are 0.
   void (*solid_row[kScalarTypes][2])(const std::byte* row, std::size_t count, const std::byte* limit,
                                      std::uint64_t* out);
-  /// Which of `count` neighbouring values of 1, 2, 4 or 8 bytes differ from those of another row; or, without one, from
-  /// a value. Writes whole words.
+  /// Finds the values, of `count` adjacent values of 1, 2, 4 or 8 bytes, that differ from another row, or from `value`
+  /// if `other` is null. Writes whole words.
   void (*differing[4])(const std::byte* row, const std::byte* other, std::uint64_t value, std::size_t count,
                        std::uint64_t* out);
   /// The edges between rows of samples and others, and between neighbours in rows: bit c between c - 1 and c.
@@ -122,25 +123,25 @@ struct Kernel {
   /// they end. `solid` are the signs of these samples, null beyond the array; `ranked` begins at this slice.
   std::uint32_t* (*quads)(const CellSlice& slice, const std::uint64_t* solid, const RankedRows& ranked,
                           const QuadRules& rules, std::uint32_t* out);
-  /// The same of labels, by their sizes in bytes: counts quads into the interfaces' slots, ...
+  /// The same for labels, by their sizes in bytes: counts quads in the interfaces' slots, ...
   void (*count_interfaces[4])(const CellSlice& slice, const LabelRows& labels, std::int64_t z, InterfaceTable& table);
   /// ... and writes them to where the interfaces' slots say.
   void (*label_quads[4])(const CellSlice& slice, const LabelRows& labels, std::int64_t z, const RankedRows& ranked,
                          const QuadRules& rules, InterfaceTable& table, std::uint32_t* out);
-  /// The vertices of a slice of cells: at the mean of the crossings' middles, as fractions of their cells. `links` gets
-  /// which of the six neighbouring cells share a crossed edge with them: bits -x, x, -y, y, -z, z.
+  /// Computes the vertices of a slice of cells: the mean of the midpoints of crossed edges, as fractions of their
+  /// cells. `links` gets one bit per neighbour that the vertex is linked with: -x, x, -y, y, -z, z.
   void (*label_vertices)(const CellSlice& slice, const RankedRows& ranked, Vec3* fractions, std::uint8_t* links);
-  /// Moves the vertices of a slice of cells towards the mean of those that they are linked with, within their cells.
+  /// Moves the vertices of a slice of cells towards the mean of their linked neighbours, within their cells.
   void (*relax)(const RelaxStep& step, const RankedRows& ranked);
 };
 
-// Those of wider instructions are there only where they are compiled; tables have what there is.
+// Kernels for wider instructions are defined only where they are compiled. The tables list the available ones.
 extern const Kernel kPlainKernel;
 extern const Kernel kAvx2Kernel;
 extern const Kernel kAvx512Kernel;
 extern const KernelTable<Kernel> kKernels;
 
-/// That of the widest instructions that this machine has.
+/// Returns the kernel with the widest instructions that this machine supports.
 [[nodiscard]] inline const Kernel& kernel() {
   return kKernels.widest();
 }

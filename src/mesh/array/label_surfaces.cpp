@@ -22,7 +22,7 @@ bool is_signed(ScalarType type) {
          type == ScalarType::Int64;
 }
 
-/// Labels as bits, as keys whose order is theirs, and as numbers.
+/// Converts labels between bits, keys in label order, and numbers.
 class LabelCode {
  public:
   explicit LabelCode(ScalarType type)
@@ -196,7 +196,7 @@ class Builder {
     });
   }
 
-  // Where the vertices of a slice of cells begin; slices before the first are empty.
+  // Returns the first vertex of a slice of cells; slices before the first are empty.
   [[nodiscard]] std::uint32_t first_of(std::size_t slice) const {
     return index_.first[std::min(slice, lattice_.slices() + 1) * (lattice_.rows() + 1)];
   }
@@ -288,7 +288,7 @@ Result<LabelSurfaces> surfaces_from_labels(const ArrayView& labels, const LabelS
 }
 
 std::vector<std::int64_t> labels_of(const LabelSurfaces& surfaces) {
-  // Whatever has no background beside it is behind some other label, or before one.
+  // Labels that do not touch the background are the front or the back of an interface with another label.
   std::vector<std::int64_t> labels;
   for (const LabelInterface& interface : surfaces.interfaces) {
     labels.push_back(interface.back);

@@ -103,7 +103,7 @@ Face face_of(const LabelSurfaces& surfaces, std::size_t first_index) {
   IVec3 start = most;
   IVec3 end = most;
   ++end[axis];
-  // Which way it faces.
+  // The orientation of the quad.
   const auto at = [&](std::size_t i) { return DVec3(surfaces.positions[surfaces.indices[first_index + i]]); };
   const DVec3 normal = glm::cross(at(1) - at(0), at(2) - at(0)) + glm::cross(at(4) - at(3), at(5) - at(3));
   if (normal[axis] < 0.0) std::swap(start, end);
@@ -147,7 +147,7 @@ TEST_P(LabelNoise, HasAClosedSurfaceForEachLabel) {
       volume += enclosed_volume(surface.positions, surface.indices);
       for (const Vec3& normal : surface.normals) ASSERT_NEAR(glm::length(normal), 1.0F, 1e-5F);
     }
-    // What the labels take together is what the background leaves.
+    // All labels together fill the space that the background leaves.
     EXPECT_NEAR(volume, -enclosed_volume(surfaces.positions, indices_of_label(surfaces, 0)), 1e-3);
   }
 }
@@ -215,7 +215,7 @@ TEST(LabelSurfaces, AreSmootherWhenRelaxed) {
   const DVec3 centre(29.7, 30.2, 30.6);
   const TestArray<std::uint8_t> labels(
       {60, 60, 60}, [&](DVec3 p) { return static_cast<std::uint8_t>(glm::length(p - centre) < kRadius); });
-  // How far the triangles' normals are from the ball's, in the mean.
+  // Returns the mean angle between the triangles' normals and the ball's normals.
   const auto roughness = [&](int steps) {
     const ArraySurface surface = surface_of_label(surfaces_of(labels.view(), {0, steps}), 1);
     double sum = 0.0;

@@ -18,7 +18,7 @@ std::uint64_t magnitude(std::int64_t v) {
   return v < 0 ? std::uint64_t{0} - static_cast<std::uint64_t>(v) : static_cast<std::uint64_t>(v);
 }
 
-// Whether all samples lie within the address space.
+// Returns true if all samples are within the address space.
 bool is_addressable(const ArrayView& array) {
   std::uint64_t below = 0;
   std::uint64_t above = size_of(array.type);
@@ -56,14 +56,14 @@ Status check(const ArrayView& array) {
   return {};
 }
 
-// The axes from the smallest stride to the largest. Those of one sample, or one that is repeated, come last.
+// Returns the axes from the smallest stride to the largest. Axes with one sample or with stride 0 come last.
 std::array<int, 3> walking_order(const ArrayView& array) {
   const auto size = [&](int axis) { return array.size[static_cast<std::size_t>(axis)]; };
   const auto reach = [&](int axis) {
     const std::uint64_t stride = magnitude(array.strides[static_cast<std::size_t>(axis)]);
     return stride == 0 || size(axis) == 1 ? std::numeric_limits<std::uint64_t>::max() : stride;
   };
-  // Of equal ones the last axis first, as in a packed array.
+  // At equal strides the last axis comes first, as in a packed array.
   std::array<int, 3> order = {2, 1, 0};
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return reach(a) < reach(b); });
   if (size(order[0]) < kShortRow) {

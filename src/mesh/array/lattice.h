@@ -11,19 +11,20 @@
 
 namespace quoin::array {
 
-// An array as it is walked: axis 0 along rows, 1 from row to row within a slice, 2 from slice to slice.
+// An array with its axes in the order of access: axis 0 along rows, 1 from row to row within a slice, 2 from slice to
+// slice.
 //
 // Cell c of an axis spans samples c - 1 and c: cells 0 and n, at its ends, have a sample on one side only. A bit row of
-// samples or cells is `words` words, that of sample or cell c at bit c; bits beyond the last are 0.
+// samples or cells has `words` words, with sample or cell c at bit c. Bits beyond the last are 0.
 struct Lattice {
   const std::byte* data = nullptr;  // sample (0, 0, 0) as it is walked
   ScalarType type = ScalarType::Float32;
   std::array<std::int64_t, 3> size{};
   std::array<std::ptrdiff_t, 3> stride{};  // bytes; of axis 0 never negative
-  std::array<int, 3> view_axis{};          // which of the view's axes each is
-  DVec3 origin{0.0};                       // of sample (0, 0, 0), by the walked axes
+  std::array<int, 3> view_axis{};          // the view's axis of each axis
+  DVec3 origin{0.0};                       // position of sample (0, 0, 0), by the axes here
   DVec3 spacing{1.0};
-  bool is_mirrored = false;  // the walked axes, as they lie in space, are left-handed
+  bool is_mirrored = false;  // the axes here are left-handed in space
   std::size_t words = 0;
 
   [[nodiscard]] std::size_t item_bytes() const { return size_of(type); }
@@ -41,7 +42,7 @@ struct Lattice {
   [[nodiscard]] std::size_t cell_slice_words() const { return (rows() + 1) * words; }
 };
 
-// The way to walk an array, or what is wrong with it.
+// Returns the access order of an array, or an error.
 [[nodiscard]] Result<Lattice> lattice_of(const ArrayView& array);
 
 // Copies a row to neighbouring places.

@@ -13,7 +13,7 @@ struct Placement {
   double origin[3];  // by walked axis
   double spacing[3];
   int view_axis[3];
-  float gradient_scale[3];  // what makes of a gradient over samples one in space, but for its length
+  float gradient_scale[3];  // from a gradient per sample to a gradient in space, except for its length
 };
 
 [[nodiscard]] inline Placement placement_of(const Lattice& lattice) {
@@ -29,7 +29,7 @@ struct Placement {
   return placement;
 }
 
-// A coordinate of a vertex within a cell. Rounded once: what is between is double.
+// Returns a coordinate of a vertex in space. Rounds once; intermediate values are double.
 [[gnu::always_inline]] inline float in_space(const Placement& placement, int axis, std::int32_t cell, float fraction) {
   const double sample = (static_cast<double>(cell) - 1.0) + static_cast<double>(fraction);
   return static_cast<float>(placement.origin[axis] + placement.spacing[axis] * sample);

@@ -97,7 +97,7 @@ template <class Emitter>
   }
 }
 
-// Quads of a field, one after the other; where some cells have several vertices, or none has.
+// Writes the quads of a field in order. kHasSplitCells: some cells have several vertices.
 template <bool kHasSplitCells>
 struct FieldQuads {
   const CellSlice& slice;
@@ -105,7 +105,7 @@ struct FieldQuads {
   const QuadRules& rules;
   std::uint32_t* out;
   const std::uint64_t* starts = nullptr;  // solid samples of the row where the edges start
-  std::size_t shift = 0;                  // from an edge's bit to that of its start
+  std::size_t shift = 0;                  // from an edge's bit to the bit of its start
   int edge_axis = 0;
 
   [[nodiscard]] bool has_low() const { return solid != nullptr; }
@@ -123,7 +123,7 @@ struct FieldQuads {
   // The vertex of a cell that may have several, on the edge that is at work.
   [[nodiscard]] std::uint32_t resolved(std::uint32_t vertex, unsigned corner) const {
     if ((rules.split[vertex / kWordBits] >> (vertex % kWordBits) & 1U) == 0) return vertex;
-    // Where the edge lies in the cell: at the high end of the axes in which the cell lies before it.
+    // The edge's position in the cell: at the high end of each axis along which the cell is before the edge.
     constexpr unsigned kEnds[4] = {3, 2, 0, 1};
     return rules.vertex_on_edge(rules.split_cells, vertex, 4 * static_cast<unsigned>(edge_axis) + kEnds[corner]);
   }
@@ -156,7 +156,7 @@ class LabelPairs {
   LabelPairs(const CellSlice& slice, const LabelRows& labels, std::int64_t z)
       : labels_(labels), rows_(static_cast<std::int64_t>(slice.rows)), z_(z) {}
 
-  // Of the edges that start in the slice of samples before the slice z of cells.
+  // Selects a row of edges that start in the slice of samples before slice z of cells.
   void begin_row(int axis, std::size_t row) {
     const auto y = static_cast<std::int64_t>(row);
     axis_ = axis;
@@ -193,7 +193,7 @@ class LabelPairs {
   const std::byte* end_ = nullptr;
 };
 
-// Whether the face between two labels faces the first: the background, else the lesser.
+// Returns true if `label` is the front of its interface with `other`: the background is, otherwise the lesser label.
 inline bool is_front(std::uint64_t label, std::uint64_t other, std::uint64_t background) {
   return label == background || (other != background && label < other);
 }
@@ -221,7 +221,7 @@ void count_interfaces(const CellSlice& slice, const LabelRows& labels, std::int6
   }
 }
 
-// Quads of labels, each to the next place of its interface.
+// Writes the quads of labels, each at the next position of its interface.
 template <class T>
 struct LabelQuads {
   const QuadRules& rules;

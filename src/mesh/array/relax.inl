@@ -16,7 +16,7 @@
 namespace quoin::array {
 namespace {
 
-// Of the cells with certain crossings: the sum of their places, in halves of a cell, and the faces over which the
+// The sum of the crossing positions of a cell, in half cells, by its set of crossings; and the faces across which the
 // vertex is linked with its neighbours.
 struct CrossingSum {
   std::uint8_t halves[3];
@@ -32,7 +32,7 @@ constexpr auto kCrossingSums = [] {
     for (unsigned edge = 0; edge < 12; ++edge) {
       if ((crossings >> edge & 1U) == 0) continue;
       const unsigned axis = edge / 4;
-      // Of the other two axes, in their order: at their low or high end.
+      // The ends of the other two axes, in their order: 0 is low, 1 is high.
       const unsigned ends[2] = {edge & 1U, edge >> 1 & 1U};
       const unsigned others[2] = {axis == 0 ? 1U : 0U, axis == 2 ? 1U : 2U};
       ++sum.count;
@@ -91,9 +91,9 @@ void label_vertices(const CellSlice& slice, const RankedRows& ranked, Vec3* frac
   }
 }
 
-// Vertices keep that far from their cell's faces, so that no two come to one place.
+// The minimum distance of vertices from their cell's faces, so that no two vertices coincide.
 constexpr float kMargin = 1.0F / 32.0F;
-// How far a vertex goes towards the middle of its neighbours: the whole way would swing to and fro.
+// The share of the way towards the neighbours' mean per step. A full step would oscillate.
 constexpr float kStep = 0.625F;
 
 inline float relaxed(float from, float mean) {
@@ -102,13 +102,13 @@ inline float relaxed(float from, float mean) {
   return low < 1.0F - kMargin ? low : 1.0F - kMargin;
 }
 
-// A vertex among its neighbours, by the bits of its links.
+// Relaxes a vertex; the bits of `links` select its neighbours.
 inline void relax_vertex(const Vec3* from, std::uint32_t vertex, const std::uint32_t (&neighbours)[6], unsigned links,
                          Vec3& out) {
   float sum[3] = {0.0F, 0.0F, 0.0F};
   float count = 0.0F;
   for (int i = 0; i < 6; ++i) {
-    // Without branches: what is not linked counts nothing.
+    // Without branches: unlinked neighbours have weight 0.
     const bool is_linked = (links >> i & 1U) != 0;
     const float* const other = &from[is_linked ? neighbours[i] : vertex].x;
     const float one = is_linked ? 1.0F : 0.0F;
@@ -128,7 +128,7 @@ void relax(const RelaxStep& step, const RankedRows& ranked) {
   for (std::ptrdiff_t row = 0; row < slice_rows; ++row) {
     const std::uint32_t* const first = ranked.first + row;
     if (first[0] == first[1]) continue;
-    // Beyond the array nothing is linked: there any row will do.
+    // There are no links beyond the array, so any row is valid there.
     const std::ptrdiff_t steps[4] = {row == 0 ? 0 : -1, row == slice_rows - 1 ? 0 : 1,
                                      step.is_first_slice ? 0 : -slice_rows, step.is_last_slice ? 0 : slice_rows};
     const std::uint64_t* const active = ranked.active + row * row_words;

@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::size_t kWordBits = 64;
 
-// Bit i is that of flag i; flags are all ones or 0.
+// Bit i represents flag i; flags are all ones or 0.
 inline std::uint64_t bits_of_flags(const std::uint8_t* flags) {
 #ifdef QUOIN_KERNEL_AVX2
   const auto half = [flags](int first) {
@@ -33,7 +33,7 @@ inline std::uint64_t bits_of_flags(const std::uint8_t* flags) {
   std::uint64_t bits = 0;
   for (int i = 0; i < 8; ++i) {
     std::uint64_t eight = 0;
-    // The first flag is to be the lowest bit, whatever the order of the machine's bytes.
+    // The first flag becomes the lowest bit, independent of byte order.
     for (int k = 0; k < 8; ++k) eight |= std::uint64_t{flags[8 * i + k]} << (8 * k);
     bits |= ((eight & 0x0101'0101'0101'0101U) * 0x0102'0408'1020'4080U >> 56) << (8 * i);
   }
@@ -84,7 +84,7 @@ void differing(const std::byte* row, const std::byte* other, std::uint64_t value
   collect_bits(count, out, [&](std::size_t i) { return value_at<T>(row, i) != same; });
 }
 
-// No sample is at the last bit of a row, so that nothing is carried from row to row, and rows need not be told apart.
+// The last bit of a row is never a sample. No bit carries from row to row, so rows need no separation.
 
 void differences(const std::uint64_t* a, const std::uint64_t* b, std::size_t words, std::uint64_t* out) {
   for (std::size_t w = 0; w < words; ++w) out[w] = a[w] ^ b[w];
@@ -118,9 +118,9 @@ std::uint64_t count_bits(const std::uint64_t* words, std::size_t count) {
 
 // The edges around a row of cells.
 struct RowEdges {
-  const std::uint64_t* along[4];    // of the rows of samples before and after, in the slice before, then in that after
+  const std::uint64_t* along[4];    // rows of samples before and after: in the slice before, then in the slice after
   const std::uint64_t* between[2];  // in the slice before and after
-  const std::uint64_t* across[2];   // of the row before and after
+  const std::uint64_t* across[2];   // in the row before and after
 };
 
 inline RowEdges edges_of_row(const CellSlice& slice, std::size_t row) {
@@ -139,7 +139,7 @@ inline std::uint64_t edges_at_samples(const RowEdges& e, std::size_t w) {
   return e.between[0][w] | e.between[1][w] | e.across[0][w] | e.across[1][w];
 }
 
-// A word of cells: those at crossed edges along rows, and those before and after crossed edges at samples.
+// Returns a word of cells: those at crossed edges along rows, and the cells before and after crossed edges at samples.
 inline std::uint64_t active_word(const RowEdges& e, std::size_t w, std::uint64_t last_at_samples) {
   const std::uint64_t at_samples = edges_at_samples(e, w);
   return e.along[0][w] | e.along[1][w] | e.along[2][w] | e.along[3][w] | at_samples | at_samples << 1 |

@@ -14,7 +14,7 @@
 namespace quoin::array {
 namespace {
 
-// Whether a cell exists, and does not touch an open border.
+// Returns true if a cell exists and does not touch an open border.
 bool may_have_sheets(const Lattice& lattice, bool is_open, IVec3 cell) {
   const int margin = is_open ? 2 : 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -24,8 +24,8 @@ bool may_have_sheets(const Lattice& lattice, bool is_open, IVec3 cell) {
   return true;
 }
 
-// The face whose crossings are paired the other way, as the cell on its other side pairs them: both have all four in
-// one sheet.
+// Returns the face with flipped pairs of crossings, or kNoFace. The cell on its other side flips them too: both cells
+// have all four crossings in one sheet.
 int flipped_face_of(const Lattice& lattice, const Signs& signs, IVec3 cell, std::uint32_t solid) {
   const int face = smooth::joined_face(solid);
   if (face == smooth::kNoFace) return face;

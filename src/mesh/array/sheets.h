@@ -19,25 +19,26 @@
 
 namespace quoin::array {
 
-// The cells that several sheets of the surface pass through: each sheet gets a vertex, the first the cell's own, the
-// others come after all cells'. What a sheet is says smooth/split.h. Cells at an open border keep one.
+// The cells that several sheets of the surface cross. Each sheet gets a vertex. The first sheet has the cell's own
+// vertex; the vertices of other sheets follow the vertices of all cells. smooth/split.h defines sheets. Cells at an
+// open border keep one vertex.
 class SplitCells {
  public:
   Status find(const Lattice& lattice, const Signs& signs, const CellIndex& index, Threads threads,
               ProgressSteps& steps);
 
-  // How many vertices there are besides the cells'.
+  // The number of vertices in addition to the cells' own.
   [[nodiscard]] std::uint64_t extra_vertices() const { return extra_; }
   // Writes the vertices of the sheets.
   void place(const Lattice& lattice, const SolidRule& rule, Threads threads, ArraySurface& out) const;
-  // Tells quads of them.
+  // Adds these cells to the rules for quads.
   void add_to(QuadRules& rules) const;
 
  private:
   struct Cell {
     IVec3 place;
     std::uint32_t vertex;
-    std::uint32_t first_extra;  // of the second sheet; until all are known, how many there are
+    std::uint32_t first_extra;  // vertex of the second sheet; while counting: the number of additional vertices
     std::uint8_t solid;         // corners
     std::uint8_t flipped_face;
   };

@@ -30,10 +30,10 @@ class Signs {
   [[nodiscard]] const std::uint64_t* slice(std::size_t z) const {
     return z < lattice_.slices() ? bits_.data() + z * lattice_.slice_words() : nullptr;
   }
-  // Which of a cell's corners are solid, by x + 2 y + 4 z.
+  // Returns the solid corners of a cell, by x + 2 y + 4 z.
   [[nodiscard]] std::uint32_t solid_corners(IVec3 cell) const;
 
-  // As EdgeWindow's source.
+  // The functions of a source for EdgeWindow.
   void within(std::size_t z, std::uint64_t* along_rows, std::uint64_t* between_rows) const;
   void between(std::size_t slice_of_cells, std::uint64_t* out) const;
 
@@ -44,7 +44,7 @@ class Signs {
   const Lattice& lattice_;
   SolidRule rule_;
   bool is_open_;
-  std::vector<std::uint64_t> along_mask_;  // of an open border
+  std::vector<std::uint64_t> along_mask_;  // for an open border
   std::vector<std::uint64_t> sample_mask_;
   Buffer<std::uint64_t> bits_;  // [slice][row][word]
 };

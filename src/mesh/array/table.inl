@@ -1,4 +1,4 @@
-// The table of what the other pieces define for one instruction set.
+// The function table of one instruction set, filled with the functions of the other files.
 
 #pragma once
 
@@ -14,7 +14,7 @@
 namespace quoin::array {
 namespace {
 
-// What each kernel has of its own.
+// Functions that each kernel defines.
 void vertices(const CornerBatch& corners, std::size_t count, const Placement& placement, VertexBatch& batch,
               Vec3* positions, Vec3* normals);
 

@@ -1,8 +1,8 @@
-// The vertices of cells with eight densities each, a register of lanes at a time. The arithmetic of the plain kernel,
-// step for step; smooth/cell.h has what both share.
+// The vertices of cells with eight densities each, one register of lanes at a time. The arithmetic equals the plain
+// kernel, step for step; smooth/cell.h has the shared part.
 //
-// Each crossing has a division of its own. The chunk kernels divide once for four, which densities of halves allow;
-// here they may be of any size, and a product of four would overflow or vanish.
+// Each crossing has its own division. The chunk kernels divide once for four crossings, which is safe for half
+// densities. Here densities may have any size, and a product of four would overflow or underflow.
 
 #pragma once
 
@@ -31,7 +31,7 @@ inline void make_finite(F* d) {
   for (int i = 0; i < 8; ++i) d[i] = select(d[i] == d[i], d[i], most);
 }
 
-// The fraction at which an edge is crossed, else 0; `one` is 1 where it is.
+// Returns the fraction where an edge is crossed, otherwise 0. `one` is 1 for crossed edges.
 inline F crossing_of(F a, F b, F& one) {
   const Mask is_crossed = signs_differ(a, b);
   one = only(is_crossed, all(1.0F));
@@ -63,7 +63,7 @@ inline Lanes3 mean_crossing(const F* d) {
           (sum[2] + (high[0][1] + high[1][0])) * inverse};
 }
 
-// Brought to a size whose square is a number, then to 1.
+// Scales the vector so that its square is a finite number, then normalizes it.
 inline Lanes3 unit_of_any(Lanes3 g) {
   const F least = all(kLeastGradient);
   F most = abs(g.x);

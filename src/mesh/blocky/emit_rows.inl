@@ -1,7 +1,7 @@
-// From runs to quads, a row at a time, for AVX-512: compressing moves pick the runs that end in a row, and put their
-// parts side by side; then sixteen quads at a time are put together.
+// Converts runs to quads, one row at a time, for AVX-512. Compressing moves select the runs that end in a row and pack
+// their parts. Then sixteen quads at a time are assembled.
 //
-//   Parts       | first | first | ...     a byte each: the run's first cell
+//   Parts       | first | first | ...     one byte each: the run's first cell
 //               | last  | last  | ...     its last cell
 //               | rows  | rows  | ...     its rows before this one
 //               | corners ...           the eight bits of their occlusion
@@ -36,8 +36,8 @@ QUOIN_STAGE std::size_t list_rows(int groups, const Batch& b, std::uint16_t* row
   return static_cast<std::size_t>(_mm512_reduce_add_epi64(quads));
 }
 
-// What does not change from row to row when occlusion is found: for each bit of a cell's occlusion (two a corner),
-// which neighbours it comes from.
+// Constants of the occlusion computation for all rows: for each bit of a cell's occlusion (two per corner), the
+// neighbours that determine it.
 template <bool kUAlongBits>
 struct CornerLanes {
   // Corners (bit, row) in a quad's order: (0,0) (1,0) (1,1) (0,1), or with the axes exchanged.
@@ -56,8 +56,8 @@ QUOIN_INLINE __m512i rows_beside(const std::uint64_t* row) {
                                       _mm_loadl_epi64(reinterpret_cast<const __m128i*>(row + 1)));
 }
 
-// The cell before or after, as each lane needs it: a rotation by 1 or by 63 brings it, and with it an end of the row,
-// which is replaced first.
+// Returns the cell before or after, as each lane needs it. A rotation by 1 or by 63 moves it into place. The end of the
+// row that the rotation also moves is replaced first.
 template <bool kUAlongBits>
 QUOIN_INLINE __m512i cells_beside(__m512i row, __m512i ends) {
   constexpr __mmask8 kAfter = CornerLanes<kUAlongBits>::kAfter;
@@ -92,7 +92,7 @@ QUOIN_INLINE void append(std::uint8_t* to, __m512i bytes, std::int64_t count) {
   if (__builtin_expect(count > 16, 0)) _mm512_storeu_si512(to, bytes);
 }
 
-// The same number `count` times.
+// Appends the same number `count` times.
 QUOIN_INLINE void append(std::uint16_t* to, __m512i numbers, std::int64_t count) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm512_castsi512_si256(numbers));
   if (__builtin_expect(count > 16, 0)) {
@@ -116,7 +116,7 @@ QUOIN_STAGE void take_apart(const Pass& pass, int first_plane, std::size_t rows,
   const int front = word_index(first_plane + pass.side, 0);
   const std::uint64_t* opaque = pass.view->opaque.words + front;
   const std::uint64_t* row_ends = pass.view->ends.words + front;
-  __m512i heights = _mm512_setzero_si512();  // of the run that ends in a column: its rows so far
+  __m512i heights = _mm512_setzero_si512();  // rows so far of the run that ends in a column
   std::uint8_t* out = parts.bytes[0];
   std::uint16_t* places = parts.places;
   for (std::size_t i = 0; i < rows; ++i) {
@@ -164,7 +164,7 @@ QUOIN_INLINE __m512i or3(__m512i a, __m512i b, __m512i c) {
   return _mm512_ternarylogic_epi32(a, b, c, 0xFE);
 }
 
-// Puts quads together from their parts.
+// Assembles quads from their parts.
 template <int kDirection, bool kOcclusion, int kPlanes>
 QUOIN_STAGE void put_together(int first_plane, std::uint64_t one_type, std::size_t quads, const Scratch& s,
                               std::uint64_t* out) {
@@ -213,7 +213,7 @@ void add_types(const Scratch& s, std::uint64_t* quads, std::size_t count) {
   }
 }
 
-// The quads of a batch, behind those that are there.
+// Appends the quads of a batch to the buffer.
 template <int kDirection, bool kOcclusion>
 void emit_batch(const Pass& pass, int first_plane, int groups, const TypeSource& types, Scratch& s, QuadBuffer& quads) {
   constexpr bool kUAlongBits = Layout<kDirection>::kUAlongBits;

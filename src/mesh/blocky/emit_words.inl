@@ -13,7 +13,7 @@
 namespace quoin::blocky {
 namespace {
 
-// Puts the rows of the listed groups that have runs side by side; returns how many runs those are.
+// Packs the rows with runs of the listed groups. Returns the number of runs.
 template <int kDirection>
 QUOIN_STAGE std::size_t list_rows(const Pass& pass, int first_plane, int groups, const TypeSource& types, Scratch& s) {
   using L = Layout<kDirection>;
@@ -62,7 +62,7 @@ QUOIN_INLINE std::uint64_t bits_in_front(const Pass& pass, const std::uint64_t* 
   return (front[-1] >> shift & 7) + (front[0] >> shift & 7) * 8 + (front[1] >> shift & 7) * 64;
 }
 
-// Removes the lowest bits of both words; when none are left, takes up the next row, without a branch.
+// Removes the lowest bits of both words. If none are left, continues with the next row, without a branch.
 QUOIN_INLINE void next_run(std::uint64_t& starts, std::uint64_t& ends, const Row*& row) {
   const Row* next = row + 1;
   starts &= starts - 1;
@@ -147,7 +147,7 @@ std::uint64_t* emit(const Pass& pass, int log_bits, std::size_t runs, Scratch& s
   }
 }
 
-// The quads of a batch, behind those that are there.
+// Appends the quads of a batch to the buffer.
 template <int kDirection, bool kOcclusion>
 void emit_batch(const Pass& pass, int first_plane, int groups, const TypeSource& types, Scratch& s, QuadBuffer& quads) {
   const std::size_t runs = list_rows<kDirection>(pass, first_plane, groups, types, s);

@@ -5,7 +5,7 @@
 //
 // Rows of 64 voxels are words. A corner's occlusion is two bit planes, computed for 64 faces at once; merging along a
 // row and from row to row is a handful of word operations (an addition carries "every cell agrees" to a run's end).
-// What is left a quad is one flat loop without unpredictable branches.
+// The rest of the work is one flat loop over the quads, without unpredictable branches.
 
 #pragma once
 
@@ -39,7 +39,7 @@ void run_pass(const Job& job, const Pass& pass, const TypeSource& types, Scratch
   }
 }
 
-// How the axes of a direction map to planes, rows and bits.
+// Returns the mapping of a direction's axes to planes, rows and bits.
 Pass pass_for(Direction direction, const Job& job, const Scratch& s, bool row_ends) {
   const FaceFrame& frame = frame_of(direction);
   constexpr int kRowAxis[3] = {1, 2, 1};
@@ -88,7 +88,7 @@ void run_direction(const Job& job, bool row_ends, const TypeSource& types, Scrat
   }
 }
 
-// The type of all of a chunk's voxels besides air, when there is just one.
+// Returns true if all voxels of a chunk except air have one type, and sets `type`.
 bool has_one_type(const Chunk& chunk, VoxelType& type) {
   const ChunkStorage* voxels = ChunkStorage::of(chunk);
   if (voxels == nullptr) {
@@ -104,7 +104,7 @@ bool has_one_type(const Chunk& chunk, VoxelType& type) {
   return found == 1;
 }
 
-// Where the quads' types come from.
+// Returns the source of the quads' types.
 TypeSource find_types(const Chunk& centre, Scratch& s) {
   VoxelType type = kAir;
   if (has_one_type(centre, type)) return {std::uint64_t{type} << Quad::kTypeShift, kOneType, 0};
@@ -156,7 +156,7 @@ IBox above_solid_floor(const Job& job, bool row_ends, const Scratch& s) {
   return rest;
 }
 
-// Nothing is the same across the chunk's border.
+// Clears the `same` bits across the chunk's border.
 void end_at_border(const SlabRange& range, Scratch& s) {
   for (int z = range.z.begin; z < range.z.end; ++z) {
     s.z.same_row.words[word_index(z, -1)] = s.z.same_row.words[word_index(z, 63)] = 0;

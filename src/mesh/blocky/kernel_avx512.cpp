@@ -1,5 +1,5 @@
-// The mesher's kernel for x86-64 processors with AVX-512 F, BW, DQ, VL, VBMI, VBMI2, VPOPCNTDQ and GFNI; called only
-// where all were found.
+// The mesher's kernel for x86-64 processors with AVX-512 F, BW, DQ, VL, VBMI, VBMI2, VPOPCNTDQ and GFNI. Called only if
+// the processor has all of them.
 
 #ifdef QUOIN_X86_KERNELS
 

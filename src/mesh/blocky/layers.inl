@@ -54,7 +54,7 @@ QUOIN_INLINE std::uint64_t plane_of_row(const std::uint64_t* row, int k) {
   }
 }
 
-// The voxels of a row that equal those of another: 8 or 16 bits a voxel.
+// Returns the voxels of a row that equal the voxels of another row: 8 or 16 bits per voxel.
 template <int kBits>
 QUOIN_INLINE std::uint64_t equal_cells(const std::uint64_t* a, const std::uint64_t* b) {
 #ifdef QUOIN_KERNEL_AVX512
@@ -111,7 +111,7 @@ using UnalignedFour __attribute__((vector_size(32), aligned(8))) = std::uint64_t
 // Four pointers, as numbers.
 using FourAddresses __attribute__((vector_size(4 * sizeof(std::uintptr_t)))) = std::uintptr_t;
 
-// Where each row's packed voxels lie; those of uniform slabs are written out once.
+// Finds the address of each row's packed voxels. Rows of uniform slabs are written to a buffer once.
 void find_rows(const ChunkStorage& voxels, const SlabRange& range, Scratch& s) {
   for (int z = range.z.begin; z < range.z.end; z += 4) {
     for (int y = range.y.begin; y < range.y.end; y += 4) {
@@ -139,7 +139,7 @@ template <int kBits>
 QUOIN_INLINE Four plane_of_rows(const std::uint64_t* rows, int k) {
 #ifdef QUOIN_KERNEL_AVX512
   if constexpr (kBits == 2) {
-    // In each byte, bit k of its four voxels; two bytes side by side are eight of them.
+    // In each byte, bit k of its four voxels; two adjacent bytes hold eight of them.
     const __m512i pairs = _mm512_set1_epi64(k == 0 ? 0x0104'1040'0000'0000 : 0x0208'2080'0000'0000);
     const __m512i fours = _mm512_gf2p8affine_epi64_epi8(_mm512_loadu_si512(rows), pairs, 0);
     const __m512i eights = _mm512_maddubs_epi16(fours, _mm512_set1_epi16(0x1001));
@@ -158,7 +158,7 @@ QUOIN_INLINE Four plane_of_rows(const std::uint64_t* rows, int k) {
               plane_of_row<kBits>(rows + 2 * kBits, k), plane_of_row<kBits>(rows + 3 * kBits, k)};
 }
 
-// How many of the planes of narrow palette indices may differ from 0.
+// Returns the number of bit planes of narrow palette indices that may differ from 0.
 int index_planes(const ChunkStorage& voxels) {
   if (voxels.bits > 4) return 0;
   return voxels.bits == 4 && voxels.palette.size() <= 8 ? 3 : voxels.bits;
@@ -181,7 +181,7 @@ void split_planes(const ChunkStorage& voxels, const SlabRange& range, Scratch& s
   }
 }
 
-// The palette indices that are in use and not opaque: air, and then those that are transparent.
+// The used palette indices that are not opaque: air, then the transparent ones.
 struct OpenIndices {
   std::uint8_t indices[16];
   int air_count;
@@ -200,7 +200,7 @@ OpenIndices open_indices(const ChunkStorage& voxels, const Scratch& s) {
   return open;
 }
 
-// Which cells hold none of some indices.
+// Returns the cells that hold none of some indices.
 template <int kPlanes>
 QUOIN_INLINE Words hold_none(const Words (&planes)[kPlanes], const std::uint8_t* first, const std::uint8_t* last) {
   Words none = ~Words{};
@@ -260,7 +260,7 @@ void read_planes(const Job& job, const ChunkStorage& voxels, const SlabRange& ra
   }
 }
 
-// Which cells of a row hold an index.
+// Returns the cells of a row that hold an index.
 template <int kBits>
 QUOIN_INLINE std::uint64_t cells_of(const std::uint64_t* row, std::uint32_t index) {
   std::uint64_t pattern[kBits];
@@ -268,7 +268,7 @@ QUOIN_INLINE std::uint64_t cells_of(const std::uint64_t* row, std::uint32_t inde
   return equal_cells<kBits>(row, pattern);
 }
 
-// Which hold a transparent type.
+// Returns the cells of a row that hold a transparent type.
 template <int kBits>
 QUOIN_INLINE std::uint64_t transparent_cells(const Job& job, const ChunkStorage& voxels, const Scratch& s,
                                              const std::uint64_t* row) {
@@ -286,7 +286,7 @@ QUOIN_INLINE std::uint64_t transparent_cells(const Job& job, const ChunkStorage&
   return mask;
 }
 
-// As above for 8 and 16 bits: whole rows are compared, a palette index is classified a row at a time.
+// As above for 8 and 16 bits: compares whole rows, and classifies a palette index for a row at a time.
 template <int kBits>
 void classify_wide(const Job& job, const ChunkStorage& voxels, const SlabRange& range, Scratch& s) {
   std::uint32_t air = 0;
@@ -364,7 +364,7 @@ void fill_layers(const Job& job, const SlabRange& range, Scratch& s) {
   }
 }
 
-// Which of a chunk's voxels are opaque.
+// The opaque voxels of a chunk, as bits.
 class OpaqueVoxels {
  public:
   OpaqueVoxels(const Chunk* chunk, const VoxelRegistry& types) : types_(&types) {
@@ -454,7 +454,7 @@ class OpaqueVoxels {
     return ~mask;
   }
 
-  const ChunkStorage* voxels_ = nullptr;  // null: all or none are opaque
+  const ChunkStorage* voxels_ = nullptr;  // null: all or no voxels are opaque
   const VoxelRegistry* types_;
   bool all_ = false;
   int other_count_ = 0;
@@ -462,7 +462,8 @@ class OpaqueVoxels {
   std::uint8_t is_opaque_[256];
 };
 
-// Rows of the 8 neighbours with the centre's x. Returns whether a voxel of those with another z may be opaque.
+// Gathers the rows of the 8 neighbours with the centre's x. Returns true if a neighbour with another z may have opaque
+// voxels.
 bool gather_rows(const Job& job, Scratch& s) {
   const auto first = [](int d) { return d > 0 ? 64 : d; };
   const auto last = [](int d) { return d < 0 ? -1 : d > 0 ? 64 : 63; };
@@ -482,7 +483,7 @@ bool gather_rows(const Job& job, Scratch& s) {
   return other_z;
 }
 
-// Whether a voxel of the 18 neighbours with another x may be opaque: their palettes need not be read for that.
+// Returns true if one of the 18 neighbours with another x may have opaque voxels. Does not read their palettes.
 bool has_row_ends(const Job& job) {
   const auto may_be_opaque = [&](const Chunk* chunk) {
     return chunk != nullptr && (ChunkStorage::of(*chunk) != nullptr || job.types->is_opaque(*chunk->uniform()));
@@ -495,7 +496,7 @@ bool has_row_ends(const Job& job) {
   return false;
 }
 
-// What stands before and after the rows of one neighbour with the centre's x, or of the centre.
+// Gathers the voxels before and after the rows of the centre, or of a neighbour with the centre's x.
 void gather_row_ends(const Job& job, int dy, int dz, Scratch& s) {
   const OpaqueVoxels before(job.chunks->at(-1, dy, dz), *job.types);
   const OpaqueVoxels after(job.chunks->at(1, dy, dz), *job.types);
@@ -522,10 +523,10 @@ void gather_row_ends(const Job& job, int dy, int dz, Scratch& s) {
   }
 }
 
-// Rows of opacity around the chunk, from its 26 neighbours, into the z view. Returns whether any voxel before or after
-// a row of any view may be opaque; only then is `ends` written.
+// Gathers rows of opacity around the chunk, from its 26 neighbours, into the z view. Returns true if any voxel before
+// or after a row of any view may be opaque; only then is `ends` written.
 bool gather_border(const Job& job, Scratch& s) {
-  // The x view's rows lie along z, so what stands before and after those are voxels of the neighbours in z.
+  // The x view's rows are along z, so the voxels before and after them belong to the neighbours in z.
   const bool other_z = gather_rows(job, s);
   if (!other_z && !has_row_ends(job)) return false;
   for (int dz = -1; dz <= 1; ++dz) {
@@ -534,8 +535,8 @@ bool gather_border(const Job& job, Scratch& s) {
   return true;
 }
 
-// Visible faces where some types are transparent: the z view's faces and `sides`, from the z view's other layers. A
-// face is hidden by an opaque voxel, and by a transparent one of its own type.
+// Computes the visible faces if some types are transparent: the z view's faces and `sides`, from the z view's other
+// layers. A face is hidden by an opaque voxel, or by a transparent voxel of its own type.
 void find_faces_of_all_types(const Job& job, bool row_ends, Scratch& s) {
   for (int z = job.region.min.z; z < job.region.max.z; ++z) {
     for (int y = rounded_down(job.region.min.y); y < job.region.max.y; y += kLanes) {

@@ -74,7 +74,7 @@ std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more) {
 
 namespace {
 
-// The voxels of a row of the centre chunk that are transparent and of the same type as those of a neighbour's row.
+// Returns the voxels of a row of the centre chunk that are transparent and have the same type as in a neighbour's row.
 std::uint64_t same_transparent(const Job& job, const Chunk& other, int y, int z, int other_y, int other_z) {
   const Chunk& centre = *job.chunks->centre();
   std::uint64_t mask = 0;
@@ -103,7 +103,7 @@ Layer& faces_towards(Direction direction, Scratch& s) {
   return d < 4 ? s.sides[d] : s.z.faces[d - 4];
 }
 
-// The neighbour beyond the border that the region's faces towards a direction reach; null when they reach none.
+// Returns the neighbour across the border for the region's faces in a direction; null if no such face is at the border.
 const Chunk* chunk_beyond(const Job& job, Direction direction) {
   const FaceFrame& frame = frame_of(direction);
   const bool reaches = frame.sign > 0 ? job.region.max[frame.axis] == kChunkEdge : job.region.min[frame.axis] == 0;
@@ -120,7 +120,7 @@ void hide_faces_at_border(const Job& job, Scratch& s) {
     if (other == nullptr || !holds_transparent(*other, *job.types)) continue;
     const FaceFrame& frame = frame_of(direction);
     const int border = frame.sign > 0 ? kChunkEdge - 1 : 0;
-    IBox box = job.region;  // of rows: whatever their x
+    IBox box = job.region;  // a box of rows; x is ignored
     if (frame.axis != 0) {
       box.min[frame.axis] = border;
       box.max[frame.axis] = border + 1;
@@ -147,7 +147,7 @@ void hide_faces_at_border(const Job& job, Scratch& s) {
 
 namespace {
 
-// A chunk of one type whose six neighbours hide all of it: no voxel need be looked at.
+// Returns true for a chunk of one type that its six neighbours hide completely. No voxel is read then.
 bool is_buried(const Neighbourhood& chunks, const VoxelRegistry& types) {
   const auto type = chunks.centre()->uniform();
   if (!type.has_value()) return false;
@@ -178,7 +178,7 @@ Kernel pick_kernel() {
   return {blocky::mesh_plain, blocky::find_faces_plain, blocky::count_faces_plain};
 }
 
-// What to look at for the visible faces of a region.
+// Returns the job for the visible faces of a region.
 blocky::Job job_of_faces(const Neighbourhood& chunks, const VoxelRegistry& types, const IBox& region) {
   return {.chunks = &chunks,
           .types = &types,

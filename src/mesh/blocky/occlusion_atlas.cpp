@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kCorners = 4;
 
-/// A face of a mesh, as its first four vertices have it.
+/// A face of a mesh, derived from its first four vertices.
 struct Face {
   Direction direction = Direction::PosX;
   IVec3 chunk{0};
@@ -44,7 +44,7 @@ Face face_of(const BlockyTriangles& mesh, std::size_t first_vertex) {
   return face;
 }
 
-/// Where the levels of a voxel's face begin.
+/// Returns the index of the first occlusion level of a voxel's face.
 std::size_t place_of(const Face& face, int u, int v) {
   const FaceFrame& frame = frame_of(face.direction);
   const auto edge = static_cast<std::size_t>(kChunkEdge);
@@ -54,7 +54,7 @@ std::size_t place_of(const Face& face, int u, int v) {
   return (((static_cast<std::size_t>(face.direction) * edge + layer) * edge + row) * edge + column) * kCorners;
 }
 
-/// Whether rows (or, with a stride of one texel, columns) are all the same.
+/// Returns true if all rows (or, with a stride of one texel, columns) are equal.
 bool is_constant(const std::vector<std::uint8_t>& levels, std::size_t first, int columns, int rows, bool along_rows) {
   const auto at = [&](int column, int row) {
     return levels[first + static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
@@ -74,7 +74,7 @@ void OcclusionAtlas::paint(const BlockyTriangles& split, std::size_t first_verte
   const Face face = face_of(split, first_vertex);
   for (int v = 0; v < face.size_v; ++v) {
     for (int u = 0; u < face.size_u; ++u) {
-      // Faces merge only along what their occlusion does not change along, so each voxel's is that of the whole.
+      // Faces merge only along directions of constant occlusion, so each voxel has the occlusion of the whole face.
       std::copy_n(split.occlusion.begin() + static_cast<std::ptrdiff_t>(first_vertex), kCorners,
                   faces_.begin() + static_cast<std::ptrdiff_t>(place_of(face, u, v)));
     }
@@ -84,7 +84,7 @@ void OcclusionAtlas::paint(const BlockyTriangles& split, std::size_t first_verte
 std::size_t OcclusionAtlas::patch_of(const BlockyTriangles& merged, std::size_t first_vertex, Rgba8 colour) {
   const Face face = face_of(merged, first_vertex);
   Patch patch{face.size_u + 1, face.size_v + 1, 0, 0, colour, levels_.size()};
-  // Which corner of a voxel's face lies at its lower or upper end along u and v.
+  // The corner of a voxel's face at its lower or upper end along u and v.
   constexpr std::array<std::array<std::size_t, 2>, 2> kCornerAt = {{{0, 3}, {1, 2}}};
   for (int v = 0; v <= face.size_v; ++v) {
     for (int u = 0; u <= face.size_u; ++u) {

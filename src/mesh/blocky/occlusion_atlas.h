@@ -13,27 +13,27 @@
 
 namespace quoin {
 
-/// Colours and occlusion of faces in a texture, so that faces may be merged across their occlusion.
+/// Colours and occlusion of faces in a texture, so that faces can be merged across changes of occlusion.
 ///
-///   a merged face of 4 x 1 voxels        its patch: a texel a corner of a voxel, at whose centres the
-///   +---+---+---+---+                    vertices lie, so that a linear filter never reads beyond it
+///   a merged face of 4 x 1 voxels        its patch: one texel per voxel corner. The vertices are at texel
+///   +---+---+---+---+                    centres, so a linear filter never reads beyond the patch
 ///   |   |   |   |   |                    o-------o-------o-------o-------o
 ///   +---+---+---+---+                    |       |       |       |       |
 ///                                        o-------o-------o-------o-------o
 ///
-/// Where occlusion does not change along an axis the patch is one texel wide; equal patches are one. A filter turns the
-/// four levels of a voxel's face into a saddle, where two triangles have an edge; at the corners they are the same.
+/// If occlusion is constant along an axis, the patch is one texel wide. Equal patches are stored once. A filter turns
+/// the four levels of a voxel's face into a saddle, where two triangles have an edge; at the corners both are equal.
 class OcclusionAtlas {
  public:
   /// Longest side of a texture that devices take.
   static constexpr int kMaxEdge = 16'384;
 
-  /// Whether no face was added.
+  /// Returns true if no face was added.
   [[nodiscard]] bool is_empty() const { return patches_.empty(); }
 
-  /// Adds the faces of a surface, whose voxels lie within 2^24 of the origin. `split` and `merged` are the same faces
-  /// of the same grid, as build_blocky_mesh makes them with and without occlusion. Returns where the vertices of
-  /// `merged` lie, for `coordinates`.
+  /// Adds the faces of a surface with voxels within 2^24 of the origin. `split` and `merged` are the same faces of the
+  /// same grid, as build_blocky_mesh makes them with and without occlusion. Returns the first index of the vertices of
+  /// `merged`, for `coordinates`.
   std::size_t add(const BlockyTriangles& split, const BlockyTriangles& merged, const VoxelRegistry& types);
 
   /// Places all that was added; sides are powers of two. The same additions give the same texture.

@@ -46,7 +46,7 @@ VoxelRegistry three_types() {
   return types;
 }
 
-/// What a linear filter shows at a place of the texture.
+/// Returns the result of a linear filter at a position in the texture.
 std::array<double, 3> filtered(const Image& image, double u, double v) {
   const double x = u * image.width - 0.5;
   const double y = v * image.height - 0.5;
@@ -111,7 +111,7 @@ Grid random_grid(unsigned seed, int types) {
   return grid;
 }
 
-// At every corner of every voxel the texture shows its colour times its occlusion, whatever was merged.
+// At every corner of every voxel, the texture has the colour times the occlusion, for any merging.
 TEST(OcclusionAtlas, EveryCornerHasItsColourAndOcclusion) {
   const VoxelRegistry types = three_types();
   for (unsigned seed = 1; seed <= 6; ++seed) {

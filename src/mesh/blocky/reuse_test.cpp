@@ -130,7 +130,7 @@ QuadOptions random_options(std::mt19937& random) {
 
 class MesherReuse : public testing::TestWithParam<InstructionSet> {};
 
-// Of the plain kernel the oracle alone is asked, of the others that they give its bytes too.
+// Compares the plain kernel with the oracle, and the other kernels also with the bytes of the plain kernel.
 TEST_P(MesherReuse, RandomSequencesOfChunksRegionsAndOptionsAgreeWithTheOracle) {
   QUOIN_SKIP_WITHOUT(GetParam());
   const std::vector<LitWorld> worlds = worlds_of_all_widths();

@@ -58,7 +58,7 @@ QUOIN_INLINE CornerOcclusion corner_occlusion(Words side1, Words side2, Words co
   return {occlusion_low(side1, side2, corner), occlusion_high(side1, side2, corner)};
 }
 
-// Where `a` has the occlusion of `b`, and `c` that of `d`.
+// Returns the faces where `a` has the same occlusion as `b`, and `c` the same as `d`.
 QUOIN_INLINE Words agree(const CornerOcclusion& a, const CornerOcclusion& b, const CornerOcclusion& c,
                          const CornerOcclusion& d) {
   return ~or_difference(or_difference(or_difference(a.low ^ b.low, a.high, b.high), c.low, d.low), c.high, d.high);
@@ -75,7 +75,7 @@ QUOIN_STAGE void keep_apart(int groups, Batch& b) {
   }
 }
 
-// Faces of a group whose occlusion is constant along the bits, and along the rows.
+// Finds the faces of a group with constant occlusion along the bits, and along the rows.
 template <bool kRowEnds>
 QUOIN_INLINE void constant_occlusion(const Pass& pass, int front, Words& along_bits, Words& along_rows) {
   const auto row_at = [&](int offset, Words& before, Words& middle, Words& after) {
@@ -124,14 +124,15 @@ QUOIN_STAGE void find_runs(const Pass& pass, int first_plane, int groups, Batch&
   }
 }
 
-// Which runs go on in the next row: those with the same extent, type and occlusion constant along the rows.
+// Finds the runs that continue in the next row: the row has a run of the same extent and type, and the occlusion is
+// constant along the rows.
 template <bool kTypes>
 QUOIN_STAGE void find_growth(const Pass& pass, int first_plane, int groups, Batch& b) {
   for (int i = 0; i < groups; ++i) {
     const int at = b.groups[i];
     const Words starts = load(b.starts + at);
     const Words ends = load(b.ends + at);
-    // The next row may be of a group that is not listed: only its faces, none, are sure to be there.
+    // The next row may belong to a group that is not listed. Only its empty face words are valid then.
     Words agreed = load(b.mergeable + at) & load(b.mergeable + at + 1) & load(b.faces + at + 1);
     if constexpr (kTypes) agreed &= load(pass.view->same_row.words + word_index(first_plane, 0) + at);
     agreed = and_same(and_same(agreed, starts, load(b.starts + at + 1)), ends, load(b.ends + at + 1));
@@ -149,7 +150,7 @@ void merge(const Pass& pass, int first_plane, int groups, Batch& b) {
   find_growth<kTypes>(pass, first_plane, groups, b);
 }
 
-// Where a quad of one direction holds what.
+// The bit layout of a quad for one direction.
 template <int kDirection>
 struct Layout {
   static constexpr FaceFrame kFrame = kFaceFrames[kDirection];
@@ -161,13 +162,13 @@ struct Layout {
   static constexpr int kHeightShift = kUAlongBits ? Quad::kSizeVShift : Quad::kSizeUShift;
 };
 
-// How quads learn their types: all have one, or each looks into its voxel's packed row.
+// Quads get their types in one of two ways: all have one type, or each reads its voxel's packed row.
 inline constexpr int kOneType = -1;
 
 struct TypeSource {
   std::uint64_t one;  // in a quad's place; 0 when there are several
-  int log_bits;       // of the packed rows, or kOneType
-  int planes;         // of palette indices; 0 where there are none
+  int log_bits;       // log2 of the bits per voxel of the packed rows, or kOneType
+  int planes;         // number of palette index planes; 0 if there are none
 };
 
 }  // namespace

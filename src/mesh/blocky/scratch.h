@@ -10,9 +10,9 @@
 
 namespace quoin::blocky {
 
-// A layer is a bit per voxel of a chunk and of the rows around it: planes and rows run from -1 to 64, a word holds the
-// 64 voxels of a row. Row 0 of every plane is aligned to eight words, and rows -8 to 71 may be read: beyond -1 and 64
-// they are those of the planes beside.
+// A layer has one bit per voxel of a chunk and of the rows around it: planes and rows run from -1 to 64, and a word
+// holds the 64 voxels of a row. Row 0 of every plane is aligned to eight words. Rows -8 to 71 may be read; those beyond
+// -1 and 64 belong to the adjacent planes.
 inline constexpr int kRowStride = 72;
 inline constexpr int kFirstRow = 8;
 inline constexpr int kLayerWords = 66 * kRowStride + kFirstRow;
@@ -25,7 +25,7 @@ struct alignas(64) Layer {
   std::uint64_t words[kLayerWords];
 };
 
-// The chunk seen along one axis: faces point along `plane`, runs lie along `bit`, runs of equal extent merge along
+// The chunk seen along one axis: faces point along `plane`, runs are along `bit`, and runs of equal extent merge along
 // `row`.
 struct View {
   Layer opaque;    // all 66 x 66 rows
@@ -50,11 +50,11 @@ struct alignas(64) Row {
 
 struct alignas(64) Batch {
   std::uint64_t faces[kBatchWords + 8];
-  std::uint64_t mergeable[kBatchWords + 8];  // faces whose occlusion is constant along the rows
+  std::uint64_t mergeable[kBatchWords + 8];  // faces with constant occlusion along the rows
   std::uint64_t starts[kBatchWords + 8];     // first cell of each run
   std::uint64_t ends[kBatchWords + 8];       // last cell of each run
   std::uint64_t closes[kBatchWords + 8];     // at a run's last cell: the run does not go on in the next row
-  // Of the run that ends in a column: its rows so far, as a quad's bits; 0 between batches.
+  // By the column in which a run ends: its rows so far, as a quad's bits; 0 between batches.
   std::uint64_t rows_before[64];
   std::uint16_t groups[kBatchWords / 4 + 8];
   Row rows[kBatchPlanes * 64 + 8];
@@ -65,7 +65,7 @@ struct alignas(64) Batch {
 inline constexpr std::size_t kBatchQuads = std::size_t{kBatchPlanes} * 64 * 64 + 64;
 
 struct alignas(64) Parts {
-  // Of the row in which a quad ends, its first and last cell; its rows before; its eight bits of occlusion.
+  // The first and last cell of the row in which a quad ends, the rows before it, and its eight bits of occlusion.
   static constexpr std::size_t kFirst = 0;
   static constexpr std::size_t kLast = 1;
   static constexpr std::size_t kRowsBefore = 2;
@@ -76,15 +76,15 @@ struct alignas(64) Parts {
   std::uint16_t places[kBatchQuads];  // 64 * plane of the batch + row
 };
 
-// 9 front neighbours' bits -> a quad's bits for occlusion and diagonal, for faces whose u lies along the bits, and
-// along the rows. Index: bits 0-2 the previous row (before, at, after), 3-5 this row, 6-8 the next row.
+// Tables from 9 front neighbours' bits to a quad's bits for occlusion and diagonal, for faces whose u is along the
+// bits, and along the rows. Index: bits 0-2 the previous row (before, at, after), 3-5 this row, 6-8 the next row.
 struct OcclusionTables {
   std::uint64_t u_along_bits[512];
   std::uint64_t u_along_rows[512];
   std::uint64_t places[3][kBatchWords];  // by axis: a quad's bits for the plane and row of a word of a batch
   std::uint32_t numbers[kBatchWords];    // by word of a batch: 64 * plane + row, twice
   std::uint32_t
-      flips[8];  // by a quad's eight bits of occlusion: whether it is flipped; bit (occlusion + 6) % 32 of a word
+      flips[8];  // by a quad's eight bits of occlusion: set if the quad is flipped; bit (occlusion + 6) % 32 of a word
 };
 
 struct Scratch {
@@ -107,7 +107,7 @@ struct Scratch {
   std::size_t quads;                   // written so far
 };
 
-// What a kernel works on.
+// The input of a kernel.
 struct Job {
   const Neighbourhood* chunks;
   const VoxelRegistry* types;
@@ -118,8 +118,8 @@ struct Job {
   bool one_type;         // all its voxels but air are of one opaque type: the layers of same types are not made
 };
 
-// The same kernel for each instruction set; all give the same bytes. `find_faces` leaves the visible faces in `sides`
-// and in the z view's `faces`, for the rows of the region; `count_faces` counts those of the region instead.
+// One kernel per instruction set; all give the same bytes. `find_faces` leaves the visible faces in `sides` and in the
+// z view's `faces`, for the rows of the region. `count_faces` counts the visible faces of the region instead.
 void mesh_plain(const Job& job, Scratch& scratch, QuadBuffer& out);
 void find_faces_plain(const Job& job, Scratch& scratch);
 std::int64_t count_faces_plain(const Job& job, Scratch& scratch);
@@ -135,7 +135,7 @@ std::int64_t count_faces_avx512(const Job& job, Scratch& scratch);
 // Makes room for `more` quads behind the first `used`; returns where they go.
 std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more);
 
-// Whether a voxel of the chunk is transparent.
+// Returns true if a voxel of the chunk is transparent.
 bool holds_transparent(const Chunk& chunk, const VoxelRegistry& types);
 
 // Takes away the faces of transparent voxels that voxels of their own type hide from beyond the chunk's border, from

@@ -20,7 +20,7 @@ bool is_on_border(int coordinate) {
   return coordinate == 0 || coordinate == kChunkEdge;
 }
 
-// Whether an edge along `axis` through `p` lies in a border plane of the chunk.
+// Returns true if an edge along `axis` through `p` is in a border plane of the chunk.
 bool edge_is_on_border(IVec3 p, int axis) {
   for (int other = 0; other < 3; ++other) {
     if (other != axis && is_on_border(p[other])) return true;

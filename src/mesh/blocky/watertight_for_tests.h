@@ -28,7 +28,7 @@ struct Edge {
   int direction;  ///< +1 from low to high, -1 back
 };
 
-/// Whether one of the points (sorted) lies on the segment between two lattice points, its ends left out.
+/// Returns true if one of the points (sorted) is on the segment between two lattice points, without its ends.
 inline bool has_point_inside(const std::vector<std::uint64_t>& points, IVec3 from, IVec3 to) {
   const IVec3 delta = to - from;
   const int steps = std::gcd(std::gcd(delta.x, delta.y), delta.z);
@@ -40,9 +40,9 @@ inline bool has_point_inside(const std::vector<std::uint64_t>& points, IVec3 fro
 
 }  // namespace detail
 
-/// What is wrong with the mesh of the opaque voxels (those that emit included) as a closed surface; empty when it is
-/// watertight: vertices welded by position, every directed edge is met by as many opposite ones, no vertex lies inside
-/// an edge, no triangle is degenerate or inside out.
+/// Checks that the opaque and emissive voxels form a closed surface. Returns the first fault, or an empty string if the
+/// mesh is watertight: after welding vertices by position, every directed edge has equally many opposite edges, no
+/// vertex is inside an edge, and no triangle is degenerate or inside out.
 inline std::string watertight_fault(const BlockyMesh& mesh) {
   std::vector<detail::Edge> edges;
   std::vector<std::uint64_t> points;

@@ -17,7 +17,7 @@
 #include "mesh/blocky/scratch.h"
 
 #define QUOIN_INLINE inline __attribute__((always_inline))
-#define QUOIN_STAGE inline __attribute__((noinline))  // stands apart in a profile
+#define QUOIN_STAGE inline __attribute__((noinline))  // separate function in a profile
 
 namespace quoin::blocky {
 namespace {
@@ -234,7 +234,7 @@ QUOIN_INLINE void store_lanes(std::uint64_t* p, unsigned lanes, Words v) {
 
 inline constexpr unsigned kAllLanes = (1U << kLanes) - 1;
 
-// Three of the six steps of a transposition, for words that lie kFar / 4 apart.
+// Three of the six steps of a transposition, for words at a distance of kFar / 4.
 template <int kFar>
 QUOIN_INLINE void exchange_eight(Words (&v)[8]) {
   for (int j = 0; j < 4; ++j) exchange<kFar>(v[j], v[j + 4]);
@@ -301,8 +301,7 @@ void turn_border(const Layer& from, Layer& to) {
   transpose_bits<kLane>(from.words + word_index(0, kFirst), to.words + word_index(0, kFirst));
 }
 
-// Calls `copy` with an index of every word in the rows -1 to 64 of plane 0, and whether it stands for one word or for
-// kLanes.
+// Calls `copy` with an index of every word in the rows -1 to 64 of plane 0, and a tag for one word or for kLanes words.
 template <class Copy>
 QUOIN_INLINE void for_rows_and_border(const Copy& copy) {
   copy(word_index(0, -1), std::uint64_t{});
@@ -321,7 +320,7 @@ QUOIN_INLINE void write_as(std::uint64_t* p, const T& v) {
   __builtin_memcpy(p, &v, sizeof(v));
 }
 
-// The rows outside the chunk in the y and x views, from those of the z view.
+// Copies the rows outside the chunk in the y and x views from the z view.
 void copy_border(bool row_ends, Scratch& s) {
   for (int row = -1; row <= 64; ++row) {
     for (const int side : {-1, 64}) {
@@ -343,7 +342,7 @@ void copy_border(bool row_ends, Scratch& s) {
   });
 }
 
-// What stands before and after the rows of the y and x views.
+// Copies the voxels before and after the rows of the y and x views.
 void copy_row_ends(Scratch& s) {
   swap_planes_and_rows(s.z.ends, s.y.ends, {0, 64}, {0, 64});
   for (int row = -1; row <= 64; ++row) {
@@ -352,7 +351,7 @@ void copy_row_ends(Scratch& s) {
       s.y.ends.words[word_index(row, side)] = s.z.ends.words[word_index(side, row)];
     }
   }
-  // Rows of the x view lie along z, its planes are bits of the z view.
+  // Rows of the x view are along z, its planes are bits of the z view.
   for_rows_and_border([&](int at, auto like) {
     using T = decltype(like);
     const auto before = [&](const Layer& layer) { return read_as<T>(layer.words + at - kRowStride); };

@@ -50,7 +50,7 @@ float occlusion_of_place(const DensityNeighbourhood& chunks, const CellPlace& pl
 
 PlaceKernel::PlaceKernel() : kernel_(pick_kernel()) {}
 
-// Finds where the places lie; those out of reach are open.
+// Finds the cells of the samples. Samples out of reach are open.
 void PlaceKernel::sort_by_slice(const ChunkPlaces& wanted, const Sampling& sampling, std::span<float> out) {
   const DVec3 origin = DVec3(wanted.places.origin) - DVec3(wanted.chunk) * static_cast<double>(kChunkEdge);
   entries_.clear();

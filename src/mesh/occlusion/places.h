@@ -1,6 +1,6 @@
 #pragma once
 
-// Occlusion at places that nobody meshed: where each lies, and the places of one chunk, slice by slice.
+// Occlusion at arbitrary positions: their cells, and the samples of one chunk in the order of slices.
 
 #include <array>
 #include <cmath>
@@ -35,7 +35,7 @@ inline bool is_in_int32(DVec3 position) {
   return is_in(position.x) && is_in(position.y) && is_in(position.z);
 }
 
-/// None where the position is NaN or outside the int32 range. The position is in samples of level 0.
+/// Returns the cell of a position in samples of level 0; empty if the position is NaN or outside the int32 range.
 inline std::optional<CellPlace> place_at(DVec3 position, int level) {
   if (!is_in_int32(position)) return std::nullopt;
   const DVec3 at = position * double{depth_unit(level)};
@@ -50,7 +50,7 @@ inline std::optional<CellPlace> place_at(DVec3 position, int level) {
 
 [[nodiscard]] Vec3 unit_or_up(Vec3 normal);
 
-/// What occlusion reads a normal as.
+/// Returns the unit normal for occlusion: other lengths are normalized, invalid normals become +y.
 inline Vec3 sound_normal(Vec3 normal) {
   constexpr float kTolerance = 1e-3F;
   const float square = (normal.x * normal.x + normal.y * normal.y) + normal.z * normal.z;
@@ -60,7 +60,7 @@ inline Vec3 sound_normal(Vec3 normal) {
 /// The occlusion of far air.
 [[nodiscard]] float open_occlusion(const SmoothOcclusionOptions& options);
 
-/// The settings as they count, at the level at which they do.
+/// The effective settings and level, within their limits.
 struct Sampling {
   SmoothOcclusionOptions occlusion;
   int level = 0;
@@ -68,7 +68,8 @@ struct Sampling {
   Sampling(const SmoothOcclusionOptions& wanted, int wanted_level);
 };
 
-/// Of one place, sample by sample. `place.cell` is relative to the centre chunk's first.
+/// Returns the occlusion of one sample position, without kernels. `place.cell` is relative to the centre chunk's first
+/// cell.
 [[nodiscard]] float occlusion_of_place(const DensityNeighbourhood& chunks, const CellPlace& place, Vec3 normal,
                                        const Sampling& sampling);
 
@@ -76,10 +77,10 @@ struct Sampling {
 struct ChunkPlaces {
   const SmoothPlaces& places;
   IVec3 chunk{0};                          ///< its coordinates, where `places` has the field's
-  std::span<const std::uint32_t> numbers;  ///< of those that lie in the chunk or a cell around it; others are far air
+  std::span<const std::uint32_t> numbers;  ///< samples in the chunk or a cell around it; other samples are far air
 };
 
-/// The mesher's kernels for occlusion, with whatever the places of a chunk read.
+/// Computes occlusion with the mesher's kernels, including the rows that the samples of a chunk read.
 class PlaceKernel {
  public:
   PlaceKernel();
@@ -102,9 +103,9 @@ class PlaceKernel {
 
   Kernel kernel_;
   Work work_;
-  std::vector<Entry> entries_;                                  // those in reach, as they came
+  std::vector<Entry> entries_;                                  // samples within reach, in input order
   std::vector<Entry> sorted_;                                   // by slice
-  std::array<std::uint32_t, kChunkEdge + 3> first_of_slice_{};  // [z + 1], from cell -1 on
+  std::array<std::uint32_t, kChunkEdge + 3> first_of_slice_{};  // [z + 1], starting at cell -1
   std::array<float, kPlacesAtOnce + 64> occlusion_{};
 };
 

@@ -22,7 +22,7 @@ using smooth::CellPlace;
 using smooth::PlaceKernel;
 using smooth::Sampling;
 
-// Fewer places in a chunk than these are done one by one: the kernels' rows are read for nothing.
+// Chunks with fewer samples than this are computed sample by sample: gathering the kernels' rows would cost more.
 constexpr std::size_t kFewPlaces = 24;
 
 void check_places(const SmoothPlaces& places, std::span<float> out) {
@@ -92,7 +92,7 @@ class PlacesByChunk {
   std::vector<IVec3> chunks_;
   std::uint32_t last_ = 0;
   std::vector<std::uint32_t> first_{
-      0};  // of each chunk, in `numbers_`; while places are counted, how many the one before has
+      0};  // first of each chunk, in `numbers_`; while counting, the count of the chunk before
   std::vector<std::uint32_t> numbers_;
 };
 

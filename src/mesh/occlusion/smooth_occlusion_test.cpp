@@ -206,7 +206,7 @@ TEST(SmoothOcclusionDeathTest, PlacesThatDoNotFitAreAMistake) {
   std::vector<float> out(2);
   QUOIN_EXPECT_MISTAKE((void)smooth_occlusion(field, {three, two}, {}, out), "as many normals as positions");
   QUOIN_EXPECT_MISTAKE((void)smooth_occlusion(field, {three, three}, {}, out), "room for every place");
-  // As many as cannot be, of which none is read.
+  // An impossible number of samples, which must not be read.
   const std::span<const Vec3> many(three.data(), std::size_t{1} << 32);
   const std::span<float> room(out.data(), many.size());
   QUOIN_EXPECT_MISTAKE((void)smooth_occlusion(field, {many, many}, {}, room), "less than 2.32 places");

@@ -65,7 +65,7 @@ void join_at_edge(unsigned solid, unsigned axis, unsigned side, Sheets& sheets) 
   }
 }
 
-/// Where a cell's middle lies, from the corner.
+/// Returns the direction from a corner to the middle of a cell around it.
 Vec3 towards(unsigned cell) {
   return {is_set(cell, 0) ? 1.0F : -1.0F, is_set(cell, 1) ? 1.0F : -1.0F, is_set(cell, 2) ? 1.0F : -1.0F};
 }
@@ -222,7 +222,7 @@ class SurfaceMaker {
       const CornerOffsets& offsets = print::corner_offsets()[around.corner(corner)];
       // From whole numbers first, so that all voxels around a corner find the same bits.
       put(Vec3(voxel + corner) + offsets[corner_face(cell, static_cast<unsigned>(face.axis))]);
-      // The side on which the edge to the next corner lies.
+      // The side of the face with the edge to the next corner.
       IVec3 side(0);
       for (int axis = 0; axis < 3; ++axis) {
         if (axis != face.axis && corner[axis] == next[axis]) side[axis] = 2 * corner[axis] - 1;
@@ -247,7 +247,7 @@ class SurfaceMaker {
 }  // namespace
 
 Result<BlockyTriangles> closed_surface(const Grid& grid, const Progress& progress) {
-  // Where floats are fine enough for what is moved apart.
+  // The range in which floats are precise enough for the small offsets.
   constexpr int kFarthest = 1 << 16;
   const IBox bounds = grid.bounds();
   for (int axis = 0; axis < 3; ++axis) {

@@ -36,7 +36,7 @@ struct Soundness {
   double volume = 0.0;
 };
 
-/// What somebody finds who joins vertices of one place.
+/// Checks a mesh after welding vertices by position.
 Soundness soundness_of(const BlockyTriangles& mesh) {
   Soundness found;
   std::map<Place, std::uint32_t> numbers;

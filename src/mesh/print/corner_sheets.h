@@ -9,16 +9,16 @@ namespace quoin::print {
 /// Faces that can meet in a corner: between its eight voxels.
 inline constexpr unsigned kCornerFaces = 12;
 
-/// The face between a corner's voxel `cell` (bits x, y, z) and that beside it along an axis.
+/// Returns the face between a corner's voxel `cell` (bits x, y, z) and its neighbour along an axis.
 inline constexpr unsigned corner_face(unsigned cell, unsigned axis) {
   const unsigned low = cell & ((1U << axis) - 1U);
   return axis * 4 + (low | (cell >> (axis + 1) << axis));
 }
 
-/// Where the vertex of each of a corner's faces lies, from the corner, in voxels.
+/// The offsets of the vertices of a corner's faces from the corner, in voxels.
 using CornerOffsets = std::array<Vec3, kCornerFaces>;
 
-/// By which of the eight voxels are solid.
+/// Returns the offsets by the set of solid voxels, of eight.
 [[nodiscard]] const std::array<CornerOffsets, 256>& corner_offsets();
 
 }  // namespace quoin::print

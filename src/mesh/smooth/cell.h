@@ -1,7 +1,7 @@
 #pragma once
 
-// The arithmetic of one cell and of the occlusion of its vertex, in the order that every kernel keeps, so that all give
-// the same bits. No contraction.
+// The arithmetic of one cell and of its vertex' occlusion. Every kernel keeps this order of operations, without
+// contraction, so all give the same bits.
 
 #include <algorithm>
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace quoin::smooth {
 
-/// A vertex as the arithmetic of its cell gives it.
+/// The vertex of a cell, as computed by its arithmetic.
 struct CellVertex {
   Vec3 fraction;  ///< 0 to 1 within the cell, not rounded: normals are computed with it
   Vec3 snapped;   ///< rounded to 1/65,536, so that it can be added to whole numbers exactly: positions, occlusion
@@ -36,8 +36,8 @@ inline constexpr std::array<float, 16> kReciprocals = {
     0.0F,        1.0F,        1.0F / 2.0F,  1.0F / 3.0F,  1.0F / 4.0F,  1.0F / 5.0F, 1.0F / 6.0F, 1.0F / 7.0F,
     1.0F / 8.0F, 1.0F / 9.0F, 1.0F / 10.0F, 1.0F / 11.0F, 1.0F / 12.0F, 0.0F,        0.0F,        0.0F};
 
-/// The sum of the fractions at which four parallel edges (a[i], b[i]) are crossed, by a single division; those that are
-/// not crossed count 0.
+/// Returns the sum of the fractions where four parallel edges (a[i], b[i]) are crossed, with a single division.
+/// Edges that are not crossed count 0.
 inline float sum_of_crossings(const float* a, const float* b) {
   float n[4];
   float d[4];
@@ -92,10 +92,10 @@ inline float snap(float f) {
   return (f + 128.0F) - 128.0F;
 }
 
-/// What is added to numbers of -8 to 8, and taken away again, to round them to 1/524,288.
+/// Added and then subtracted to round numbers from -8 to 8 to multiples of 1/524,288.
 inline constexpr float kSnapOffset = 24.0F;
 
-/// The vertex of a cell that the surface crosses: the mean of the crossings of its edges.
+/// Returns the vertex of a cell that the surface crosses: the mean of its edge crossings.
 inline CellVertex cell_vertex(const Corners& d) {
   const float x_low[4] = {d[0], d[2], d[4], d[6]};
   const float x_high[4] = {d[1], d[3], d[5], d[7]};
@@ -119,9 +119,9 @@ inline CellVertex cell_vertex(const Corners& d) {
   return vertex;
 }
 
-/// How far above the surface the lowest samples of a plane lie.
+/// The height of the lowest samples above a planar surface.
 inline constexpr float kLift = 0.1F;
-/// The published form counts depths below this as none.
+/// The published form treats depths below this as 0.
 inline constexpr float kLeastDepth = 0.001F;
 
 /// Returns the factor from samples of level 0 to cells of the level, for densities and spreads.
@@ -129,15 +129,15 @@ inline constexpr float kLeastDepth = 0.001F;
   return 1.0F / static_cast<float>(1 << level);
 }
 
-/// Where a vertex is sampled about, relative to its cell's lowest corner: rounded, so that sums with whole numbers and
-/// spreads are exact, and whoever knows a vertex' position and normal finds the same, by whatever cell.
+/// Returns the centre of a vertex' samples, relative to its cell's lowest corner. It is rounded, so that sums with
+/// integers and spreads are exact, and the vertex' position and normal alone determine it, independent of the cell.
 [[gnu::always_inline]] inline Vec3 occlusion_centre(Vec3 snapped, Vec3 n, float spread) {
   const float lift = spread * ((std::abs(n.x) + std::abs(n.y)) + std::abs(n.z)) + kLift;
   const auto at = [lift](float place, float along) { return place + ((along * lift + kSnapOffset) - kSnapOffset); };
   return {at(snapped.x, n.x), at(snapped.y, n.y), at(snapped.z, n.z)};
 }
 
-/// The lattice points around the three samples of one axis, and where between them they lie.
+/// The lattice points below the three samples of one axis, and the fractions of the samples between lattice points.
 struct SampleAxis {
   std::array<int, 3> base;
   std::array<float, 3> fraction;
@@ -147,7 +147,7 @@ struct SampleAxis {
   SampleAxis axis{};
   const float whole = std::floor(spread);
   for (int i = 0; i < 3; ++i) {
-    // With whole spreads all three have one fraction, whatever the rounding of the sum.
+    // With an integer spread, all three samples have the same fraction, independent of the rounding of the sum.
     const float at = whole == spread ? centre : centre + static_cast<float>(i - 1) * spread;
     const float below = std::floor(at);
     axis.base[static_cast<std::size_t>(i)] =
@@ -157,7 +157,7 @@ struct SampleAxis {
   return axis;
 }
 
-/// The share of 27 samples that are solid, of which so many are in air.
+/// Returns the solid share of 27 samples, given the number in air.
 [[gnu::always_inline]] inline float solid_share(int in_air) {
   return 1.0F - static_cast<float>(in_air) * (1.0F / 27.0F);
 }
@@ -179,7 +179,7 @@ struct SampleAxis {
   return std::min(sum * (1.0F / 27.0F), 1.0F);
 }
 
-/// What the weighted forms make of the sum of the depths and the deepest (both at most 0).
+/// Returns the occlusion of the weighted forms from the sum of the depths and the deepest (both at most 0).
 [[gnu::always_inline]] inline float weighted_occlusion(float sum, float least, const SmoothOcclusionOptions& options) {
   float ratio = 0.0F;
   if (options.method == SmoothOcclusion::Weighted) {
@@ -190,7 +190,7 @@ struct SampleAxis {
   const float base = ratio + options.offset;
   const bool squared = options.power == 2.0F;
   const float darkness = squared ? base * base : std::pow(base, options.power);
-  // As published, what is open has the offset's darkness.
+  // In the published form, open surfaces have the darkness of the offset.
   if (options.method == SmoothOcclusion::WeightedPublished) return std::clamp(darkness, 0.0F, 1.0F);
   const float open = squared ? options.offset * options.offset : std::pow(options.offset, options.power);
   return 1.0F - std::clamp((1.0F - darkness) / (1.0F - open), 0.0F, 1.0F);
@@ -204,7 +204,7 @@ struct SampleAxis {
     const auto open = std::count_if(samples.begin(), samples.end(), [](float v) { return v >= 0.0F; });
     return solid_share(static_cast<int>(open));
   }
-  // Nine triples along x: those of even and odd number are added up apart, as two halves of a register.
+  // Nine triples along x: even and odd ones are summed separately, as two halves of a register.
   std::array<std::array<float, 3>, 2> sums{};
   float least = 0.0F;
   for (std::size_t i = 0; i < 27; ++i) {

@@ -1,4 +1,4 @@
-// What a chunk's mesh reads, brought together from the chunk and its neighbours.
+// Gathers the samples that a chunk's mesh reads from the chunk and its neighbours.
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::uint64_t kAllSolid = ~std::uint64_t{0};
 
-// A lattice coordinate as that of a chunk (-1, 0, 1) and of a sample in it.
+// A lattice coordinate, split into a chunk (-1, 0, 1) and a sample in it.
 struct ChunkCoordinate {
   int chunk;
   int sample;
@@ -39,7 +39,7 @@ struct Rows {
   int count = kChunkEdge;
 };
 
-// The signs of rows of one chunk column at once, as they lie in storage.
+// Copies the signs of several rows of one chunk column, in storage order.
 void copy_signs(const DensityChunk* chunk, Half outside, int z, Rows rows, std::uint64_t* to) {
   const DensityStorage* const storage = chunk == nullptr ? nullptr : DensityStorage::of(*chunk);
   if (storage != nullptr) {
@@ -83,7 +83,7 @@ RowPart row_part(const DensityChunk* chunk, Half outside, ChunkCoordinate y, Chu
   return {samples, samples == nullptr ? chunk->get(0, y.sample, z.sample) : Half{0}};
 }
 
-// `kCount` points of a row of one chunk at level 0, from `first` on.
+// Reads `kCount` points of a row of one chunk at level 0, starting at `first`.
 template <int kCount>
 [[gnu::always_inline]] inline void copy_part(const DensityChunk* chunk, Half outside, ChunkCoordinate y,
                                              ChunkCoordinate z, int first, Half* to) {
@@ -106,7 +106,7 @@ void copy_thinned(const RowPart& part, int level, Half* to) {
   for (int i = 0; i < n; ++i) to[i] = part.samples == nullptr ? part.value : part.samples[i << level];
 }
 
-// A row of points of the chunk, and sixteen before and after: window 0 from column -16 on, window 1 from 16 on.
+// A row of points of the chunk, with sixteen before and after: window 0 starts at column -16, window 1 at 16.
 struct Windows {
   std::uint64_t first = 0;
   std::uint64_t second = 0;
@@ -136,7 +136,7 @@ void copy_column(const DensityNeighbourhood& chunks, int dx, ChunkCoordinate z, 
   }
 }
 
-// Nothing to mesh where the chunk and all that its cells touch are of one sign throughout.
+// Returns true if the chunk and all samples that its cells touch have the same sign. The mesh is empty then.
 bool is_of_one_sign(const DensityNeighbourhood& chunks) {
   bool is_solid = false;
   bool is_air = false;
@@ -266,7 +266,7 @@ namespace quoin {
 int reach_of(const SmoothOcclusionOptions& occlusion, int coarsest_level) {
   const int level = std::clamp(coarsest_level, 0, kMaxSmoothLevel);
   const SmoothOcclusionOptions limited = smooth::within_limits(occlusion, level);
-  // Without occlusion, splitting sheets looks at the cells beside its own.
+  // Without occlusion, splitting sheets still reads the cells next to a cell.
   return (std::max(smooth::apron_of(limited), 1) + 1) << level;
 }
 

@@ -1,4 +1,4 @@
-// What smooth meshing adds to core/lanes_avx2.h.
+// Additions for smooth meshing to core/lanes_avx2.h.
 
 #pragma once
 
@@ -67,7 +67,7 @@ inline void scatter(std::uint32_t* base, I place, I value, std::size_t count) {
   store(values, value);
   for (std::size_t i = 0; i < std::min<std::size_t>(count, 8); ++i) base[places[i]] = values[i];
 }
-// Halves as floats: none is infinite or NaN, so that moving the bits and mending the exponent is all.
+// Converts halves to floats. None is infinite or NaN, so moving the bits and correcting the exponent is enough.
 inline F load_halves(const Half* from) {
   const I halves = {_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from)))};
   return as_float(shift_left<13>(halves) & all(static_cast<int>(0x8FFFE000U))) * all(0x1p112F);
@@ -108,11 +108,11 @@ constexpr int kVerticesAtOnce = 1;
 inline F load_rows(const float* const* from, std::ptrdiff_t offset) {
   return {_mm256_loadu_ps(from[0] + offset)};
 }
-// One value a vertex in all of its lanes.
+// Repeats one value per vertex in all lanes of the vertex.
 inline F spread_out(const float* from) {
   return {_mm256_set1_ps(from[0])};
 }
-// Of eight lanes of `a` the three at 0, step, 2 step, and then those of `b`, moved by `by` lanes.
+// Selects the lanes of `a` at 0, step, 2 step, and then the same lanes of `b`, all offset by `by`, of eight lanes each.
 class Thirds {
  public:
   Thirds(int step, int by) {

@@ -1,4 +1,4 @@
-// What smooth meshing adds to core/lanes_avx512.h (VBMI2 too).
+// Additions for smooth meshing to core/lanes_avx512.h (also requires VBMI2).
 
 #pragma once
 
@@ -47,7 +47,7 @@ inline I gather_pairs(const Half* base, I place) {
 inline F gather(const float* base, I place) {
   return {_mm512_i32gather_ps(place.v, base, 4)};
 }
-// Of a table in one register.
+// Looks up values of a table in one register.
 inline F look_up(const std::array<float, 16>& table, I index) {
   return {_mm512_permutexvar_ps(index.v, _mm512_loadu_ps(table.data()))};
 }
@@ -165,11 +165,12 @@ inline F load_rows(const float* const* from, std::ptrdiff_t offset) {
   return {_mm512_insertf32x8(_mm512_castps256_ps512(_mm256_loadu_ps(from[0] + offset)),
                              _mm256_loadu_ps(from[1] + offset), 1)};
 }
-// One value a vertex in all of its lanes.
+// Repeats one value per vertex in all lanes of the vertex.
 inline F spread_out(const float* from) {
   return {_mm512_insertf32x8(_mm512_castps256_ps512(_mm256_set1_ps(from[0])), _mm256_set1_ps(from[1]), 1)};
 }
-// Of each vertex' eight lanes of `a` the three at 0, step, 2 step, and then those of `b`, moved by `by` lanes.
+// In each vertex' eight lanes: selects the lanes of `a` at 0, step, 2 step, and then the same lanes of `b`, all offset
+// by `by`.
 class Thirds {
  public:
   Thirds(int step, int by) {

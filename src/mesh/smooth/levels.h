@@ -1,7 +1,7 @@
 #pragma once
 
-// The cells of a chunk and its neighbours, each chunk at its own level of detail. All coordinates are samples of level
-// 0, from the centre chunk's sample (0, 0, 0), unless said otherwise.
+// The cells of a chunk and its neighbours, where each chunk has its own level of detail. Coordinates are in samples of
+// level 0, relative to the centre chunk's sample (0, 0, 0), unless stated otherwise.
 
 #include <algorithm>
 #include <array>
@@ -53,7 +53,7 @@ class ChunkLevels {
     const int level = of_chunk(chunk);
     return {chunk, sample & IVec3{-(1 << level)}, level};
   }
-  /// The cell that a vertex of a mesh lies in.
+  /// Returns the cell of a mesh vertex.
   [[nodiscard]] LevelCell cell_of(SmoothCell name) const {
     // In place: a copy of three integers waits for their stores.
     LevelCell cell{name.chunk_offset(), name.cell(), 0};
@@ -70,7 +70,7 @@ class ChunkLevels {
     for (const int other : {(axis + 1) % 3, (axis + 2) % 3}) step[other] = (sample[other] & (kChunkEdge - 1)) == 0;
     return range(chunk_of(sample) - step, chunk_of(sample), [](IVec3) { return true; });
   }
-  /// The levels of the chunks that a cell touches along a face or an edge, its own included.
+  /// Returns the range of levels of the chunks that a cell touches along a face or an edge, including its own.
   [[nodiscard]] LevelRange around_cell(const LevelCell& cell) const {
     IVec3 min = cell.chunk;
     IVec3 max = cell.chunk;
@@ -117,7 +117,7 @@ inline Corners corners_of(const DensityNeighbourhood& chunks, const LevelCell& c
   return corners;
 }
 
-/// Which of a cell's corners are solid, as solid_corners.
+/// Returns the solid corners of a cell as bits, like solid_corners.
 inline std::uint32_t solid_corners_of(const DensityNeighbourhood& chunks, const LevelCell& cell) {
   const IVec3 first = cell.first;
   const bool inside = cell.level == 0 && cell.chunk == IVec3{0} && std::max({first.x, first.y, first.z}) < 63;
@@ -138,7 +138,7 @@ inline std::uint32_t solid_corners_of(const DensityNeighbourhood& chunks, const 
   return solid;
 }
 
-/// Whether all samples within a cell and on its boundary are solid, or all air.
+/// Returns true if all samples within a cell and on its boundary have the same sign.
 inline bool is_of_one_sign(const DensityNeighbourhood& chunks, const LevelCell& cell) {
   const int x = cell.first.x & (kChunkEdge - 1);
   const bool ends_within = x + cell.size() < kChunkEdge;
@@ -156,7 +156,7 @@ inline bool is_of_one_sign(const DensityNeighbourhood& chunks, const LevelCell& 
       };
       any |= row(chunk.x) & samples;
       all &= row(chunk.x);
-      // The last sample of the cell may be the next chunk's first; the bit beyond the word then stands for it.
+      // The last sample of the cell may be the first of the next chunk; the bit beyond the word represents it.
       if (ends_within) continue;
       const bool last = (row(chunk.x + 1) & 1U) != 0;
       any |= last ? std::uint64_t{1} << 63 : 0;
@@ -166,22 +166,22 @@ inline bool is_of_one_sign(const DensityNeighbourhood& chunks, const LevelCell& 
   return any == 0 || all == samples;
 }
 
-/// Replaces its argument by the vertices of the centre chunk's own cells, 0 to n - 1 on each axis at its level, sorted
-/// by name, and the quads around the edges that lie between four of them.
+/// Replaces `out` by the vertices of the centre chunk's own cells, 0 to n - 1 on each axis at its level, sorted by
+/// name, and the quads around the edges between four of these cells.
 using MeshOwnCells = std::function<void(SmoothChunkMesh& out)>;
 
-/// Replaces `out` by the surface of the centre chunk, where the chunk or a neighbour is of another level of detail.
+/// Replaces `out` by the surface of the centre chunk, if the chunk or a neighbour has another level of detail.
 ///
-/// Edges:    the shortest lattice edges at each place: on a face or a line between chunks, those of the finest chunk
-///           that touches it. Each that is crossed gives a polygon of the vertices of the three or four cells around
-///           it.
+/// Edges:    the shortest lattice edges at each position: on a face or a line between chunks, the edges of the finest
+///           chunk that touches it. Each crossed edge gives a polygon that connects the vertices of the three or four
+///           cells around it.
 /// Vertices: a cell that touches no finer chunk along a face or an edge has the vertex of the fast kernels, bit for
-///           bit. Any other has one if a shortest edge on its boundary is crossed: at the mean of their crossings,
+///           bit. Any other cell has a vertex if a shortest edge on its boundary is crossed: at the mean of the crossings,
 ///           weighted by length.
-/// Order:    the fast kernel's vertices and quads, then the vertices it lacks, the quads, the triangles.
+/// Order:    the fast kernel's vertices and quads, then the missing vertices, the quads, the triangles.
 /// Requires: options.border is Shared.
 /// Source:   T. Ju, F. Losasso, S. Schaefer, J. Warren, "Dual Contouring of Hermite Data" (2002): polygons of the
-///           minimal edges of an octree; here of chunks of any levels. docs/decisions/020-smooth-chunk-borders.md.
+///           minimal edges of an octree; here for chunks of any levels. docs/decisions/020-smooth-chunk-borders.md.
 void mesh_with_transitions(const DensityNeighbourhood& chunks, const SmoothOptions& options,
                            const MeshOwnCells& mesh_own_cells, SmoothChunkMesh& out);
 

@@ -1,5 +1,5 @@
 // smooth/* of the workload specification: 64^3 fields, from the grid's own storage (half floats, signs kept) to
-// complete indexed meshes. What the mesher gathers from storage is in the time.
+// complete indexed meshes. The time includes gathering from storage.
 
 #include <quoin/mesh/smooth.h>
 
@@ -103,7 +103,7 @@ void places(benchmark::State& state) {
   if (found != expected) std::exit(1);
   state.counters["places"] = static_cast<double>(found.size());
 }
-// Of a chunk; of a field, all at once; of a field, one by one.
+// The samples of one chunk; of a field in one call; of a field in one call each.
 BENCHMARK(places)->Name("smooth/places")->ArgName("how")->DenseRange(0, 2)->Unit(benchmark::kMicrosecond);
 
 // A whole generated world, welded, with occlusion and materials.

@@ -62,7 +62,7 @@ void decode_around(Work& work, int z) {
   work.next_slice = last + 1;
 }
 
-// Where each vertex of a slice is sampled: the lowest point that it reads, and the fractions that its samples share.
+// The sample grid of each vertex of a slice: the lowest point that it reads, and the fractions that its samples share.
 struct Centres {
   alignas(64) std::int32_t offset[kWidth];
   alignas(64) std::int32_t z[kWidth];

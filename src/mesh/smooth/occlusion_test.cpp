@@ -20,7 +20,7 @@ namespace {
 constexpr SmoothOcclusion kForms[] = {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted,
                                       SmoothOcclusion::WeightedPublished, SmoothOcclusion::SoftShare};
 
-/// What a surface has that is open: 0, but by the published curve.
+/// Returns the occlusion of an open surface: 0, except for the published curve.
 float when_open(SmoothOcclusion form) {
   return form == SmoothOcclusion::WeightedPublished ? 0.4F * 0.4F : 0.0F;
 }
@@ -276,7 +276,7 @@ TEST(SmoothOcclusion, TurnsAndMirrorsWithTheField) {
         if (found == expected.end()) continue;
         ++shared;
         const double difference = std::abs(occlusion - found->second);
-        // A count jumps where a sample is 0 but for rounding.
+        // A count jumps if a sample is 0 except for rounding.
         if (form == SmoothOcclusion::SolidShare && std::abs(difference - 1.0 / 27) < 1e-6) {
           ++jumps;
         } else {
@@ -341,7 +341,7 @@ TEST(SmoothOcclusion, AnEditBeyondTheReachChangesNothing) {
     mesher.mesh(grid.neighbourhood(IVec3(0)), options, after);
     ASSERT_EQ(before.occlusion.size(), after.occlusion.size());
     EXPECT_EQ(std::memcmp(before.occlusion.data(), after.occlusion.data(), 4 * before.occlusion.size()), 0);
-    // One sample nearer it matters: the reach is not wider than it must be by more than what the corner case takes.
+    // A change one sample nearer has an effect: the reach is not wider than the corner case requires.
     grid.edit({{-64, -64, -reach}, {128, 128, 0}}, [](IVec3, DensitySample) { return DensitySample{-8.0F, 1}; });
     mesher.mesh(grid.neighbourhood(IVec3(0)), options, after);
     const bool is_same = before.occlusion.size() == after.occlusion.size() &&

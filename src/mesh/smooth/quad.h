@@ -1,6 +1,6 @@
 #pragma once
 
-// The rules by which quads are ordered and split, for all that emits quads outside of the fast kernels.
+// The order and the diagonal of quads, for all code except the fast kernels.
 
 #include <algorithm>
 #include <array>
@@ -19,7 +19,7 @@ inline IVec3 unit_axis(int axis) {
   return unit;
 }
 
-/// Where a corner of a cell lies from its first, in cells; corners are numbered by x + 2 y + 4 z.
+/// Returns the offset of a cell's corner from its first corner, in cells; corners are numbered by x + 2 y + 4 z.
 inline IVec3 corner_place(int corner) {
   return {corner & 1, corner >> 1 & 1, corner >> 2};
 }
@@ -34,11 +34,10 @@ inline SmoothCell cell_name(IVec3 cell, IVec3 offset) {
   return {bits};
 }
 
-/// A corner of a quad. Corners are compared at places in 1/64 of their cells, so that lengths are told apart by whole
-/// numbers.
+/// A corner of a quad. Corners are compared in units of 1/64 cell, so that length comparisons are exact.
 struct QuadCorner {
   std::uint32_t vertex;
-  int level;    ///< of its cell
+  int level;    ///< level of its cell
   IVec3 place;  ///< in 1/64 of a sample
 };
 

@@ -11,9 +11,9 @@
 
 namespace quoin::smooth {
 
-// What is meshed lies on a lattice: every 2^level-th sample of the chunk and its neighbours. Lattice points of the
-// chunk are 0 to n - 1 on each axis (n = 64 >> level), cell c spans lattice points c and c + 1. Within a slice of cells
-// or points, (x, y) has the place (y + 1) * 128 + x + 1: x and y begin at -1.
+// The mesher works on a lattice: every 2^level-th sample of the chunk and its neighbours. Lattice points of the chunk
+// are 0 to n - 1 on each axis (n = 64 >> level), and cell c spans lattice points c and c + 1. Within a slice of cells
+// or points, (x, y) has the index (y + 1) * 128 + x + 1: x and y begin at -1.
 
 inline constexpr int kPlaceShift = 7;
 inline constexpr int kPlaceStride = 1 << kPlaceShift;
@@ -35,12 +35,12 @@ inline constexpr int kDecodedStride = 96;
 inline constexpr int kDecodedSlice = kApronRows * kDecodedStride;
 inline constexpr int kRepeatedSlices = 5;
 
-// Occlusion reads points -16 to 79 on each axis. Words hold 64 columns, from -16 or from 16 on.
+// Occlusion reads points -16 to 79 on each axis. Words hold 64 columns, starting at -16 or at 16.
 inline constexpr int kReachRows = 96;
 inline constexpr int kSecondWindow = 32;  // the first column of the second window, counted from -16
 inline constexpr int kSampledStride = kReachRows;
 inline constexpr int kSampledSlice = kReachRows * kSampledStride;
-inline constexpr int kMostSlices = 32;  // that occlusion reads at once
+inline constexpr int kMostSlices = 32;  // maximum number that occlusion reads at once
 
 // The lowest bits of a word.
 constexpr std::uint64_t low_bits(int count) {
@@ -55,7 +55,7 @@ struct CellRange {
   int first = -1;
   int last = 64;
 
-  // Where edges start that lie along an axis: [first_edge, last) on it, [first + 1, last) on the others.
+  // Edges along an axis start in [first_edge, last) on that axis and in [first + 1, last) on the other axes.
   [[nodiscard]] int first_edge() const { return first < 0 ? 0 : first; }
 };
 
@@ -68,7 +68,7 @@ struct RowSet {
   static RowSet of(bool has_first, std::uint64_t rows) {
     return {std::uint64_t{has_first} << 15 | rows << 16, rows >> 48};
   }
-  // The rows of points of a row of cells, which is given from -1 on: 0 is row -1.
+  // The rows of points at the corners of a row of cells, where 0 means row -1.
   static RowSet of_cells(int row) {
     RowSet rows;
     const int bit = row + 15;
@@ -100,30 +100,31 @@ struct RowSet {
   }
 };
 
-// A bit for each cell of a row in a window: a sample in it has to be interpolated; or else it is solid for sure. Those
-// with neither are in air.
+// Two bits for each cell of a row in a window. `listed`: a sample in the cell must be interpolated. `whole`: the sample
+// is certainly solid. Cells with neither bit are in air.
 struct CellWords {
   std::uint64_t listed = 0;
   std::uint64_t whole = 0;
 };
 
-// What the kernels read and write. Points are addressed by `point`.
+// The input, output and temporary data of the kernels. `point` gives the addresses of points.
 struct Work {
   int level = 0;
   int n = 64;
   CellRange cells;
   SmoothOcclusionOptions occlusion;
 
-  // Signs of the points of each row: bit x, and those of points -1 and n in words of their own (bit 0).
+  // Signs of the points of each row: bit x; the signs of points -1 and n are in separate words (bit 0).
   std::uint64_t solid[66][kSignRows];
   std::uint64_t before[66][kSignRows];
   std::uint64_t after[66][kSignRows];
-  // Of each row of cells, [z + 1][y + 1]: cells 0 to n - 1, and cell -1 in bit 0 of a word of its own.
+  // Active cells of each row of cells, [z + 1][y + 1]: cells 0 to n - 1, and cell -1 in bit 0 of a separate word.
   std::uint64_t active[65][kSignRows];
   std::uint64_t active_before[65][kSignRows];
-  // Which rows of cells have an active one, by slice [z + 1].
+  // Rows of cells with an active cell, by slice [z + 1].
   std::array<RowSet, 66> active_rows;
-  // Which rows of points the cells' corners are, and which occlusion reads besides, by slice [z + kWidestApron].
+  // Rows of points at the corners of active cells, and rows of points that occlusion reads, by slice [z +
+  // kWidestApron].
   std::array<RowSet, kApronRows> corner_rows;
   std::array<RowSet, kApronRows> occlusion_rows;
 
@@ -131,16 +132,16 @@ struct Work {
   // The points of the two slices that are at work: [z & 1], rows -1 to 64.
   std::vector<Half> points = std::vector<Half>(std::size_t{2} * kPointSlice + 64);
 
-  // Places of the active cells of a slice, and of crossed edges, those that start at a solid point with bit 15 set.
+  // Indices of the active cells of a slice, or of crossed edges; edges that start at a solid point have bit 15 set.
   alignas(64) std::uint16_t places[kSlicePlaces + 64];
-  // What a place of the two last slices holds: the vertex, counted from the slice's first, in 13 bits, and its
-  // fractions in 64ths, 6 bits each.
+  // The vertices of the last two slices, by index in the slice: the vertex number, counted from the slice's first, in
+  // 13 bits, and its fractions in 64ths, 6 bits each.
   alignas(64) std::uint32_t vertices[2][kSlicePlaces + 64];
-  // Of the slice's vertices, for occlusion: where in their cells they lie, in whole 1/65,536.
+  // The positions of the slice's vertices within their cells, for occlusion, as multiples of 1/65,536.
   alignas(64) float fractions[3][kSlicePlaces / 2 + 64];
   alignas(64) float normals[3][kSlicePlaces / 2 + 64];
 
-  // True where many cells are active: occlusion interpolates all samples then, else those of listed cells.
+  // True if many cells are active. Occlusion then interpolates all samples, otherwise only those of listed cells.
   bool is_dense = false;
   int ring_mask = 0;   // slices that occlusion reads are held as [z & ring_mask]
   int next_slice = 0;  // the first slice that is not there yet
@@ -152,10 +153,10 @@ struct Work {
   std::vector<CellWords> cell_words;
   std::array<RowSet, kMostSlices> listed_rows;
   std::vector<Half> sampled;
-  // All of them: points as floats, [z & ring_mask][y + kWidestApron][x + kPointX]. The first kRepeatedSlices follow the
-  // last again, so that all that one vertex reads lies at fixed distances.
+  // Used if is_dense: points as floats, [z & ring_mask][y + kWidestApron][x + kPointX]. The first kRepeatedSlices are
+  // repeated after the last slice, so that all samples of a vertex are at fixed distances.
   std::vector<float> decoded;
-  int apron = 0;  // how many points below and above a cell's own occlusion reads
+  int apron = 0;  // number of points below and above a cell's own that occlusion reads
 
   // The row of points (y, z): x = 0 is at its begin.
   [[nodiscard]] Half* row(int y, int z) {
@@ -216,21 +217,21 @@ struct RowPart {
   }
   return word;
 }
-// Copies the row of points (y, z), sixteen (or, at coarse levels, n) before and after the chunk's own included, to
-// where x = 0 is.
+// Copies the row of points (y, z) to `row`, which points to x = 0. Includes sixteen points (at coarse levels n) before
+// and after the chunk's own.
 void gather_row(const Work& work, int y, int z, Half* row);
-// Finds Work::signs of slice z of points; at coarse levels those of the rows that occlusion reads.
+// Computes Work::signs of slice z of points; at coarse levels only for the rows that occlusion reads.
 void find_signs(Work& work, int z);
-// Adds to what occlusion reads the rows of points within the apron of those of slice z of cells.
+// Marks the rows of points that occlusion reads for slice z of cells: those within the apron of `rows`.
 void add_occlusion_rows(Work& work, RowSet rows, int z);
-// Makes room for the slices that occlusion reads, from that of the first cells on. `is_dense` is set.
+// Allocates the slices that occlusion reads, starting at the slice of the first cells. Requires: `is_dense` is set.
 void begin_occlusion(Work& work);
 
 void mesh_plain(Work& work, SmoothChunkMesh& out);
 void mesh_avx2(Work& work, SmoothChunkMesh& out);
 void mesh_avx512(Work& work, SmoothChunkMesh& out);
 
-// How many places one call takes.
+// The maximum number of samples per call.
 inline constexpr std::size_t kPlacesAtOnce = 4096;
 // The occlusion of `count` places in slice z of cells, which `places`, `fractions` and `normals` of the work hold.
 // Writes up to 64 numbers more.

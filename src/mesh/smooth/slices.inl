@@ -20,7 +20,7 @@
 namespace quoin::smooth {
 namespace {
 
-// If a larger share of the cells is active, interpolating all samples takes less time than listing those that need it
+// The share of active cells above which interpolating all samples is faster than listing the required samples
 // (docs/decisions/123).
 #ifdef QUOIN_KERNEL_AVX512
 constexpr double kManyActive = 0.38;
@@ -37,8 +37,8 @@ enum class Axis : std::uint8_t { X, Y, Z };
 
 struct Slice {
   int z = 0;
-  std::uint32_t first_vertex = 0;          // of this slice
-  std::uint32_t first_vertex_of_last = 0;  // of the one before
+  std::uint32_t first_vertex = 0;          // of the current slice
+  std::uint32_t first_vertex_of_last = 0;  // of the slice before
 };
 
 SmoothCell cell_code(int x, int y, int z, int n) {
@@ -54,11 +54,11 @@ constexpr int kPlaceMask = 0x3FFF;
 constexpr int kStartsSolid = 0x8000;
 constexpr std::uint32_t kVertexMask = (1U << kVertexBits) - 1;
 
-// The four cells around an edge that starts at a place, counter-clockwise as seen from the end of its axis; (u, v) are
-// the next two axes. Corners 0 to 3: before in both, in v, in none, in u.
+// The four cells around an edge, counter-clockwise as seen from the end of its axis; (u, v) are the next two axes.
+// Corners 0 to 3: before in both, in v, in none, in u.
 template <Axis kAxis>
 struct Around {
-  // How many places a cell lies back in its slice, and whether that is the slice before.
+  // The distance of a cell back to an earlier index in its slice, and whether it is in the slice before.
   static constexpr int kX = 1;
   static constexpr int kY = kPlaceStride;
   static constexpr std::array<int, 4> back = kAxis == Axis::X   ? std::array{kY, 0, 0, kY}
@@ -128,7 +128,7 @@ void find_active(Work& work) {
       active[i] = (any | any >> 1 | any_after << top) & ~(all & (all >> 1 | all_after << top)) & in_range;
       active_before[i] = (any | any_before) & ~(all & all_before) & with_before;
     }
-    // Row y stands at [y + 1]; -1 is alone.
+    // Bit y + 1 represents row y; row -1 is separate.
     std::uint64_t rows = 0;
     for (int y = 0; y < cells.last; ++y) {
       rows |= std::uint64_t{(active[y + 1] | active_before[y + 1]) != 0} << y;
@@ -138,7 +138,7 @@ void find_active(Work& work) {
   }
 }
 
-// Rows of points that are corners of an active cell, and those within the apron of one.
+// Marks the rows of points at corners of active cells, and the rows within their apron.
 bool find_needed(Work& work) {
   work.corner_rows.fill({});
   work.occlusion_rows.fill({});
@@ -185,7 +185,7 @@ std::size_t list_cells(Work& work, int z) {
   return static_cast<std::size_t>(end - work.places);
 }
 
-// Which edges along an axis are crossed that start in the row of points (y, z).
+// Returns the crossed edges along an axis that start in the row of points (y, z).
 template <Axis kAxis>
 std::uint64_t crossed_edges(const Work& work, int y, int z, std::uint64_t columns) {
   const std::uint64_t start = work.solid[z + 1][y + 1];
@@ -208,7 +208,7 @@ std::size_t list_edges(Work& work, int z) {
   if (z < first(Axis::Z)) return 0;
   const std::uint64_t columns =
       (~std::uint64_t{0} >> (kChunkEdge - cells.last)) & (~std::uint64_t{0} << first(Axis::X));
-  // A crossed edge belongs to an active cell of its own row, or of the one before; the row's own is always in range.
+  // A crossed edge has an active cell in its own row or in the row before; the cell of its own row is always in range.
   const RowSet& rows = work.active_rows[static_cast<std::size_t>(z + 1)];
   std::uint16_t* end = work.places;
   const auto list_row = [&](int y) {

@@ -21,8 +21,8 @@ namespace quoin::oracle {
 /// The sample at a lattice point of the level that is meshed.
 using LatticeDensity = std::function<float(IVec3 point)>;
 
-/// What is meshed: vertices of the cells in `cells`, quads around the edges that start in `edges` and have all their
-/// cells in `cells`.
+/// The part of a field to mesh: vertices of the cells in `cells`, and quads around the edges that start in `edges` and
+/// have all their cells in `cells`.
 struct SmoothPart {
   IBox cells;
   IBox edges;
@@ -30,7 +30,7 @@ struct SmoothPart {
   SmoothOcclusionOptions occlusion;
 };
 
-/// What SmoothMesher::mesh covers for this border and level. Requires: all levels are the same.
+/// Returns the part that SmoothMesher::mesh covers for this border and level. Requires: all levels are equal.
 inline SmoothPart part_of_chunk(const SmoothOptions& options) {
   const int n = kChunkEdge >> options.levels[13];
   SmoothPart part{{IVec3{-1}, IVec3{n}}, {IVec3{0}, IVec3{n}}, options.levels[13], options.occlusion};
@@ -116,7 +116,7 @@ inline LatticeDensity lattice_density(const DensityNeighbourhood& chunks, int le
   return [chunks, level](IVec3 point) { return float_from_half(chunks.get(point * (1 << level))); };
 }
 
-/// As SmoothMesher::mesh with one level everywhere and without splitting sheets.
+/// Like SmoothMesher::mesh with one level everywhere and without splitting sheets.
 inline void smooth_mesh(const DensityNeighbourhood& chunks, const SmoothOptions& options, SmoothChunkMesh& out) {
   SmoothOracle(lattice_density(chunks, options.levels[13]), part_of_chunk(options)).mesh(out);
 }

@@ -20,7 +20,7 @@ int corner_at(IVec3 place) {
   return place.x + 2 * place.y + 4 * place.z;
 }
 
-// Where an edge of a cell starts, in cells.
+// Returns the start of an edge of a cell, in cells.
 IVec3 edge_start(std::size_t edge) {
   const int axis = static_cast<int>(edge / 4);
   IVec3 start{0};
@@ -106,7 +106,7 @@ Sheets find_sheets(std::uint32_t solid, int flipped_face) {
     sheets.of_edge[edge] = crossed ? static_cast<std::uint8_t>(edge) : Sheets::kUncrossed;
   }
   for (int face = 0; face < 6; ++face) join_on_face(solid, face, face == flipped_face, sheets.of_edge);
-  // Sheets bear the numbers of their first edges; now those of 0, 1, ...
+  // Sheets have the numbers of their first edges; now they are renumbered 0, 1, ...
   for (std::size_t edge = 0; edge < kEdges; ++edge) {
     if (sheets.of_edge[edge] != edge) continue;
     std::replace(sheets.of_edge.begin() + static_cast<std::ptrdiff_t>(edge), sheets.of_edge.end(),
@@ -134,7 +134,7 @@ int find_joined_face(std::uint32_t solid) {
 struct SheetTables {
   std::array<std::array<Sheets, kNoFace + 1>, 256> sheets;  // by solid corners, then flipped face
   std::array<std::uint8_t, 256> joined_face;
-  std::array<bool, 256> is_plain;  // by solid corners: one sheet at most, whatever the cells beside it
+  std::array<bool, 256> is_plain;  // by solid corners: at most one sheet, independent of the neighbouring cells
   SheetTables() {
     for (std::uint32_t solid = 0; solid < 256; ++solid) {
       joined_face[solid] = static_cast<std::uint8_t>(find_joined_face(solid));
@@ -209,14 +209,14 @@ class Splitter {
   // The two vertices between a cell and the next along an axis, one for each air corner of their common face.
   struct Bridge {
     int axis;
-    std::uint32_t first;  // of the lesser corner; the other's follows
+    std::uint32_t first;  // vertex of the lesser corner; the other follows
   };
 
   void split_vertex(std::uint32_t vertex, const LevelCell& cell, std::uint32_t solid) {
     const int joined = tables().joined_face[solid];
     if (!same_levels_ && levels_.touches_another(cell)) return;
     const bool joins = joined != kNoFace && joins_as_well(cell, joined);
-    // Where solids are to hold together there is a bridge instead, which the lower of both cells makes.
+    // With `join_diagonals`, a bridge replaces the flip. The lower of the two cells makes it.
     const bool flipped = joins && !options_.join_diagonals;
     if (joins && !flipped && joined % 2 == 1) add_bridge(vertex, cell, joined);
     const Sheets& sheets = tables().sheets[solid][static_cast<std::size_t>(flipped ? joined : kNoFace)];
@@ -260,7 +260,7 @@ class Splitter {
     return corners;
   }
 
-  // Where the surface crosses the edge between two corners.
+  // Returns the point where the surface crosses the edge between two corners.
   static Vec3 crossing(const Corners& corners, int a, int b) {
     const float from = corners[static_cast<std::size_t>(a)];
     const float to = corners[static_cast<std::size_t>(b)];
@@ -268,7 +268,7 @@ class Splitter {
     return first + (Vec3(corner_place(b)) - first) * (from / (from - to));
   }
 
-  // The vertex of a bridge on the side of a quad's edge from one cell to the next; nothing where there is no bridge.
+  // Returns the vertex of a bridge on the side of a quad's edge from one cell to the next; empty if there is no bridge.
   [[nodiscard]] std::optional<std::uint32_t> bridge_between(std::uint32_t vertex, const LevelCell& cell,
                                                             std::uint32_t next, const LevelCell& next_cell, IVec3 start,
                                                             int axis) const {
@@ -286,7 +286,7 @@ class Splitter {
     return found->second.first + (corner < other ? 0U : 1U);
   }
 
-  // Whether the cell on the other side of a face also has all four crossings of that face in one sheet.
+  // Returns true if the cell on the other side of a face also has all four crossings of that face in one sheet.
   [[nodiscard]] bool joins_as_well(const LevelCell& cell, int face) const {
     const IVec3 step = unit_axis(face / 2) * (face % 2 == 1 ? cell.size() : -cell.size());
     LevelCell other = cell;
@@ -345,7 +345,7 @@ class Splitter {
     return false;
   }
 
-  // The vertex of the sheet that an edge crosses, of those that `vertex` was split into.
+  // Returns the vertex of the sheet that an edge crosses, among the vertices that `vertex` was split into.
   [[nodiscard]] std::uint32_t sheet_vertex(std::uint32_t vertex, const LevelCell& cell, IVec3 start, int axis) const {
     const auto found = split_.find(vertex);
     if (found == split_.end()) return vertex;
@@ -364,8 +364,8 @@ class Splitter {
   SmoothChunkMesh& out_;
   std::unordered_map<std::uint32_t, Split> split_;     // by vertex
   std::unordered_map<std::uint32_t, Bridge> bridges_;  // by vertex of the lower cell
-  std::vector<bool> is_split_;                         // by vertex, of those before: split or with a bridge
-  std::vector<std::uint32_t> polygons_;                // triangles in place of quads with more corners
+  std::vector<bool> is_split_;                         // by original vertex: split or with a bridge
+  std::vector<std::uint32_t> polygons_;                // triangles that replace quads with more corners
 };
 
 }  // namespace

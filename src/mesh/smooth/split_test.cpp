@@ -1,4 +1,4 @@
-// Where several sheets of the surface cross a cell, each has a vertex of its own, and the mesh is manifold.
+// Each sheet of the surface that crosses a cell has its own vertex, and the mesh is manifold.
 
 #include "mesh/smooth/split.h"
 
@@ -193,7 +193,7 @@ TEST(SmoothSheets, VerticesLieInTheirCells) {
   }
 }
 
-// How many of the samples of a layer below the chunk change its mesh when they change their sign.
+// Returns the number of samples in a layer below the chunk that change its mesh when their sign flips.
 int edits_that_matter(DensityGrid& grid, int z) {
   SmoothMesher mesher;
   SmoothChunkMesh before;
@@ -216,7 +216,7 @@ int edits_that_matter(DensityGrid& grid, int z) {
   return changed;
 }
 
-// A sheet's vertex depends on the cells beside its own, one further than the kernel reads.
+// A sheet's vertex depends on the neighbouring cells, one further than the kernel reads.
 TEST(SmoothSheets, AnEditReachesTwoSamplesWithoutOcclusion) {
   const SmoothOcclusionOptions none{SmoothOcclusion::None, 2.0F, 0.4F, 2.0F};
   ASSERT_EQ(reach_of(none), 2);

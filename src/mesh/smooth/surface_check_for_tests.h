@@ -1,6 +1,6 @@
 #pragma once
 
-// Fields to mesh, and what there is to say of a mesh as a surface.
+// Test fields, and checks of a mesh as a surface.
 
 #include <algorithm>
 #include <array>

@@ -14,10 +14,10 @@
 namespace quoin::smooth {
 namespace {
 
-// What the crossings of a cell's boundary add up to. In double and in the cell's own order, so that every chunk that
-// computes the vertex gets the same bits.
+// The sum of the crossings on a cell's boundary. Computed in double and in the cell's own order, so that every
+// chunk that computes the vertex gets the same bits.
 struct Crossings {
-  DVec3 sum{0.0};  // of fractions of the cell, weighted
+  DVec3 sum{0.0};  // weighted sum of fractions of the cell
   double weight = 0.0;
   DVec3 slopes{0.0};  // towards the air
 };
@@ -124,7 +124,7 @@ class Transitions {
     }
   }
 
-  // The edges that start in the chunk and lie in one or two of its planes x = 0, y = 0, z = 0.
+  // Adds the polygons around edges that start in the chunk and are in one or two of its planes x = 0, y = 0, z = 0.
   void add_polygons_on_lower_faces(int axis) {
     const int u_axis = (axis + 1) % 3;
     const int v_axis = (axis + 2) % 3;
@@ -200,7 +200,7 @@ class Transitions {
   ChunkLevels levels_;
   SmoothChunkMesh& out_;
   std::size_t kernel_vertices_ = 0;
-  std::vector<bool> mended_;                                   // by the kernel's vertex; empty: none
+  std::vector<bool> mended_;                                   // by the kernel's vertex: recomputed; empty: none
   std::unordered_map<std::uint32_t, std::uint32_t> appended_;  // by name
   std::vector<std::uint32_t> triangles_;
 };

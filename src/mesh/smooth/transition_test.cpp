@@ -94,7 +94,7 @@ TEST_P(MixedLevels, ALargeSphereStaysASphere) {
   EXPECT_GT(worst_cosine, 0.98);
 }
 
-// What a chunk's mesh says of a cell's vertex.
+// The bits of a cell's vertex in a chunk's mesh.
 struct VertexBits {
   std::array<std::uint32_t, 7> bits{};
   bool operator==(const VertexBits&) const = default;
@@ -262,7 +262,7 @@ TEST(SmoothLevels, MeshesThatKnowNothingOfTheirNeighboursLevelsDoNotMeet) {
   EXPECT_GT(open_edges(fine), 2 * open_edges(coarse));
 }
 
-// How far a sample lies from the samples of chunk (0, 0, 0), as the farthest axis has it.
+// Returns the distance of a sample from the samples of chunk (0, 0, 0), along the farthest axis.
 int distance_from_chunk(IVec3 sample) {
   const IVec3 outside = glm::max(glm::max(-sample, sample - (kChunkEdge - 1)), IVec3{0});
   return std::max({outside.x, outside.y, outside.z});

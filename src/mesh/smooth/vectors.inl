@@ -1,12 +1,12 @@
-// Vertices and quads, a register of lanes at a time. The arithmetic is that of cell.h, step for step.
+// Vertices and quads, one register of lanes at a time. The arithmetic equals cell.h, step for step.
 //
 //   lanes       | cell 0 | cell 1 | cell 2 | ...       by the list of their places
 //   d[8]        the densities of their corners, x first, then y, then z; a pair of halves along x is one gather
-//   vertices    | index: 13 bits | x, y, z in 64ths: 6 bits each |      what a place remembers
+//   vertices    | index: 13 bits | x, y, z in 64ths: 6 bits each |      stored per cell of a slice
 
 #pragma once
 
-// First: what these lanes append with is used by the slices.
+// Included first: the slices use the append functions of these lanes.
 #include "mesh/trilinear_normals.inl"
 
 #include "mesh/smooth/slices.inl"
@@ -115,7 +115,7 @@ inline I lane_numbers() {
   return as_int(load(reinterpret_cast<const float*>(kNumbers)));
 }
 
-// What the two last slices remember of their vertices.
+// Stores the vertices of the current slice for the quads of this and the next slice.
 inline void remember(Work& work, const Slice& slice, std::size_t first, std::size_t count, I place, Lanes3 at) {
   const I index = lane_numbers() + all(static_cast<int>(first));
   const I fractions = shift_left<kVertexBits>(in_64ths(at.x)) | shift_left<kVertexBits + 6>(in_64ths(at.y)) |

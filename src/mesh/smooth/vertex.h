@@ -14,7 +14,7 @@
 
 namespace quoin::smooth {
 
-/// Reads single densities that lie near each other, in rows along x of which there are two by y and two by z.
+/// Reads single, nearby densities. Caches four rows along x, by the parity of y and z.
 class NearbyDensities {
  public:
   explicit NearbyDensities(const DensityNeighbourhood& chunks) : chunks_(chunks) {}
@@ -30,7 +30,7 @@ class NearbyDensities {
   struct Row {
     IVec3 place{std::numeric_limits<int>::min()};
     const Half* values = nullptr;
-    Half only = 0;  // where there are none
+    Half only = 0;  // the value of a row without storage
   };
 
   [[nodiscard]] Row find(IVec3 place) const {
@@ -86,7 +86,7 @@ inline CellVertex vertex_at(Vec3 fraction, Vec3 gradient) {
 inline std::array<std::uint32_t, 4> corners_of_quad(const std::uint32_t* indices, const SmoothChunkMesh& mesh) {
   std::array<std::uint32_t, 4> cycle = {indices[0], indices[1], indices[2], indices[5]};
   const auto cell = [&](std::uint32_t vertex) {
-    // Whatever the level: within a quad of one level, the chunk before counts less than any cell of this one.
+    // At any level: within a quad of one level, cells of the chunk before have lower sums than cells of this chunk.
     const SmoothCell name = mesh.cells[vertex];
     const IVec3 place = name.cell() + name.chunk_offset() * kChunkEdge;
     return place.x + place.y + place.z;

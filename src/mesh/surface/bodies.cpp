@@ -24,7 +24,7 @@ bool holds_others(const DensityChunk& chunk, const VoxelRegistry& types, std::ui
   return holds(chunk, types, body, true);
 }
 
-// Of opaque ones the others are the transparent types; of a transparent one all but its own type.
+// For the opaque body, lists the transparent types, which are the others. For a transparent body, lists its own type.
 OtherBodies::OtherBodies(const DensityChunk& chunk, const VoxelRegistry& types, std::uint32_t body)
     : chunk_(chunk), listed_(chunk.materials().types()), listed_are_others_(body == 0) {
   std::erase_if(listed_, [&](VoxelType material) {

@@ -10,7 +10,7 @@
 
 namespace quoin::smooth {
 
-/// Which body a material is part of: all opaque ones are one, 0, each transparent one is its own.
+/// Returns the body of a material: 0 for all opaque materials, a separate body for each transparent material.
 [[nodiscard]] inline std::uint32_t body_of(const VoxelRegistry& types, VoxelType material) {
   return types.is_transparent(material) ? std::uint32_t{material} + 1U : 0U;
 }
@@ -18,14 +18,14 @@ namespace quoin::smooth {
 /// The bodies of some materials, sorted, each once.
 [[nodiscard]] std::vector<std::uint32_t> bodies_of(const VoxelRegistry& types, const std::vector<VoxelType>& materials);
 
-/// The bodies of a field, sorted. What is solid without a material is opaque. Cost: O(chunks), unless nothing is
-/// transparent.
+/// Returns the bodies of a field, sorted. Solid samples without a material are opaque. Cost: O(chunks), except if there
+/// is no transparent material.
 [[nodiscard]] std::vector<std::uint32_t> bodies_of(const VoxelRegistry& types, const DensityGrid& field);
 
-/// Whether any material of a chunk is of another body.
+/// Returns true if any material of a chunk belongs to another body.
 [[nodiscard]] bool holds_others(const DensityChunk& chunk, const VoxelRegistry& types, std::uint32_t body);
 
-/// Which samples of a chunk are solid and of another body, row by row.
+/// The samples of a chunk that are solid and of another body, row by row.
 class OtherBodies {
  public:
   /// Lifetime: `chunk` must outlive this.
@@ -33,7 +33,7 @@ class OtherBodies {
 
   /// Requires: 0 <= y, z < 64.
   [[nodiscard]] std::uint64_t row(int y, int z) const;
-  /// Whether there is none, whatever is solid.
+  /// Returns true if the chunk certainly has no such samples. Always false for a transparent body.
   [[nodiscard]] bool empty() const { return listed_are_others_ && listed_.empty(); }
 
  private:
@@ -42,11 +42,11 @@ class OtherBodies {
   bool listed_are_others_;
 };
 
-/// A chunk in which what is solid of other bodies is as far out as it was in.
+/// Returns a copy of a chunk in which solid samples of other bodies have their sign flipped.
 [[nodiscard]] DensityChunk without_others(const DensityChunk& whole, const VoxelRegistry& types, std::uint32_t body);
 
-/// The densities of one body of several: those of all, `without_others`. Shares the chunks of `whole` in which there
-/// are no others; chunks that are not near the body are left out where it is transparent.
+/// Returns the densities of one of several bodies: `without_others` of all chunks. Shares the chunks of `whole` without
+/// other bodies. For a transparent body, omits chunks that are not near it.
 [[nodiscard]] DensityGrid field_of_body(const DensityGrid& whole, const VoxelRegistry& types, std::uint32_t body,
                                         Threads threads);
 

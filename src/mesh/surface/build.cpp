@@ -25,7 +25,7 @@ std::size_t place_in(const std::vector<IVec3>& chunks, IVec3 chunk) {
   return static_cast<std::size_t>((found != chunks.end() && *found == chunk ? found : chunks.end()) - chunks.begin());
 }
 
-// `chunks` and all that lie at offsets from `first` to `last` on each axis, sorted.
+// Returns `chunks` and all chunks at offsets from `first` to `last` on each axis, sorted.
 std::vector<IVec3> with_neighbours(const std::vector<IVec3>& chunks, int first, int last) {
   std::vector<IVec3> all;
   for (const IVec3 chunk : chunks) {
@@ -39,7 +39,7 @@ std::vector<IVec3> with_neighbours(const std::vector<IVec3>& chunks, int first, 
   return all;
 }
 
-// The levels of detail of all chunks that are meshed and of their neighbours, each asked for once.
+// The levels of detail of all meshed chunks and of their neighbours. Each level is requested once.
 class LevelMap {
  public:
   Status ask(const std::vector<IVec3>& meshed, const std::function<int(IVec3)>& level_of) {
@@ -77,26 +77,26 @@ class LevelMap {
   std::vector<std::uint8_t> levels_;
 };
 
-// A vertex that chunks after its own may share.
+// A vertex that later chunks may share.
 struct BorderVertex {
   std::uint32_t name;   // SmoothCell bits
   std::uint32_t place;  // among the chunk's own vertices
 };
 
-// What one chunk gives to the whole: the vertices of its own cells and all its triangles.
+// The contribution of one chunk to the whole mesh: the vertices of its own cells and all its triangles.
 struct Part {
   std::vector<Vec3> positions;
   std::vector<Vec3> normals;
   std::vector<float> occlusion;
   std::vector<CellMaterial> materials;
-  std::vector<TriangleFace> faces;     // by triangle, in the chunk's coordinates; only where they are asked for
+  std::vector<TriangleFace> faces;     // by triangle, in the chunk's coordinates; only if requested
   std::vector<BorderVertex> border;    // sorted by name
   std::vector<SmoothCell> foreign;     // vertices of chunks before this one
   std::vector<std::uint32_t> indices;  // into the own vertices, or kForeign plus a place in `foreign`
   static constexpr std::uint32_t kForeign = 0x8000'0000U;
 };
 
-// What a thread needs to mesh a chunk.
+// The data that a thread needs to mesh a chunk.
 struct Workspace {
   SmoothMesher mesher;
   SmoothChunkMesh mesh;
@@ -182,7 +182,7 @@ class Builder {
       shape.whole = &whole;
     }
     shape_vertices(neighbourhood, options, shape, workspace.mesh);
-    // Sharp colours are those of the faces.
+    // Sharp colours come from the faces.
     const bool is_blended = options_.colours == SurfaceColours::Blended;
     parts_[i] = make_part(neighbourhood, options.levels[13], is_blended ? &materials : nullptr, workspace);
     if (request_.with_faces) find_faces(neighbourhood, options, materials, workspace.mesh, parts_[i].faces);

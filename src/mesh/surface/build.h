@@ -11,31 +11,31 @@
 
 namespace quoin::smooth {
 
-/// A welded surface whose vertices stand there once each, and what its triangles are the faces of.
+/// A welded surface without duplicate vertices, and the voxel faces of its triangles.
 struct Surface {
   SmoothMesh mesh;
-  std::vector<TriangleFace> faces;  ///< by triangle; empty where nobody asked for them
+  std::vector<TriangleFace> faces;  ///< by triangle; empty if not requested
 };
 
 struct SurfaceRequest {
-  /// Where the field is one body of several: all of them together, with the materials that tell them apart.
+  /// If the field is one of several bodies: the field of all bodies, with the materials that distinguish them.
   const DensityGrid* whole = nullptr;
   bool with_faces = false;
 };
 
-/// `build_smooth_mesh`, before vertices are split by colours and normals. With sharp colours, albedo and types are
-/// those of the faces only.
+/// Like `build_smooth_mesh`, before vertices are split by colours and normals. With sharp colours, only the faces have
+/// albedo and types.
 [[nodiscard]] Result<Surface> build_surface(const DensityGrid& field, const VoxelRegistry& types,
                                             const SmoothMeshOptions& options, const SurfaceRequest& request,
                                             Threads threads, const Progress& progress);
 
-/// Splits the vertices as the options have it; returns the group of each vertex where the triangles' are given.
+/// Splits the vertices according to the options. Returns the group of each vertex if the triangles' groups are given.
 /// Requires: with sharp colours, or a smoothness below 1, the surface has its faces.
 std::vector<std::uint32_t> finish_surface(Surface& surface, const VoxelRegistry& types,
                                           const SmoothMeshOptions& options, std::span<const std::uint32_t> groups = {});
 
-/// Appends vertex `i` of a mesh, which may be the same one, with all that it has there. Returns its index.
-/// Requires: both have occlusion, or `to` has no vertex yet, or neither has it.
+/// Appends vertex `i` of `from`, which may be `to` itself, with all its attributes. Returns its index. Requires: both
+/// have occlusion, or neither, or `to` has no vertex yet.
 std::uint32_t append_vertex(SmoothMesh& to, const SmoothMesh& from, std::size_t i);
 
 /// The smoothness that options mean.

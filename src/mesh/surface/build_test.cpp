@@ -1,4 +1,4 @@
-// A whole field as one mesh: what is in it, and how it is made.
+// The mesh of a whole field: its contents, and the ways to build it.
 
 #include <quoin/mesh/smooth_mesh.h>
 
@@ -135,7 +135,7 @@ TEST(SmoothMesh, MaterialsAreThoseOfTheSolidSamplesAndNeverAir) {
         EXPECT_EQ(mesh->types[v], 2);
       } else if (albedo[1] != 0 && albedo[1] != 65'535) {
         ++mixed;
-        // Of as many of both, the least wins.
+        // At equal counts, the lowest type wins.
         EXPECT_EQ(mesh->types[v], albedo[1] <= 32'768 ? 1 : 2);
       }
     }
@@ -143,7 +143,7 @@ TEST(SmoothMesh, MaterialsAreThoseOfTheSolidSamplesAndNeverAir) {
   }
 }
 
-// Two samples of white sand on red rock: whatever the level, what one sees from above is sand.
+// Two samples of white sand on red rock: at every level, the view from above shows sand.
 TEST(SmoothMesh, AThinCoverShowsAtEveryLevel) {
   DensityGrid grid;
   grid.edit({IVec3{0}, {128, 70, 128}}, [](IVec3 p, DensitySample) {

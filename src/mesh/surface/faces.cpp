@@ -10,7 +10,7 @@
 namespace quoin::smooth {
 namespace {
 
-/// What a FaceLook holds, in one number; not 0.
+/// A FaceLook, packed in one non-zero number.
 class LookCode {
  public:
   LookCode() = default;
@@ -34,9 +34,9 @@ class Copies {
  public:
   explicit Copies(std::size_t vertices) : first_(vertices) {}
 
-  /// Whether the first copy of the vertex has the look; a vertex without copies has it from now on.
+  /// Returns true if the first copy of the vertex has the look. A vertex without copies gets the look first.
   bool is_first(std::uint32_t vertex, LookCode look) {
-    // Without a branch: which triangle is the first of its vertex nobody can guess.
+    // Without a branch: the first triangle of a vertex is unpredictable.
     const LookCode first = first_[vertex].is_set() ? first_[vertex] : look;
     first_[vertex] = first;
     return first == look;
@@ -55,8 +55,8 @@ class Copies {
     return number;
   }
 
-  /// In the order of the vertices, those of one in the order in which they were added. `places` becomes where those of
-  /// each vertex begin.
+  /// Lists the copies in the order of the vertices, and of their addition for each vertex. `places` gets the index of
+  /// each vertex' first copy.
   [[nodiscard]] std::vector<VertexCopy> list(std::vector<std::uint32_t>& places) const {
     std::vector<VertexCopy> copies;
     copies.reserve(first_.size() + others_.size());
@@ -77,7 +77,7 @@ class Copies {
   // A copy of a vertex after its first, in the list of these.
   struct Other {
     LookCode look;
-    std::uint32_t next = 0;  // 0: none, else the place of another, plus one
+    std::uint32_t next = 0;  // 0: none, otherwise the index of the next, plus one
   };
 
   std::vector<LookCode> first_;        // by vertex
@@ -85,7 +85,7 @@ class Copies {
   std::vector<Other> others_;
 };
 
-// Whether a sample next to the chunk or in it is solid.
+// Returns true if a sample in or next to the chunk is solid.
 bool is_solid_at(const DensityNeighbourhood& chunks, IVec3 sample) {
   const IVec3 chunk = chunk_of(sample);
   const IVec3 local = local_of(sample);
@@ -98,8 +98,8 @@ bool is_solid_at(const DensityNeighbourhood& chunks, IVec3 sample) {
   return (row >> local.x & 1U) != 0;
 }
 
-// The face around a crossed edge of the lattice of samples, from the cells that a triangle's vertices lie in or
-// between, which are three or four of those around the edge.
+// Returns the face around a crossed lattice edge. The cells that the triangle's vertices are in or between are three or
+// four of the cells around the edge.
 TriangleFace face_around_edge(const DensityNeighbourhood& chunks, const SmoothChunkMesh& mesh,
                               const std::uint32_t* triangle, bool has_bridges) {
   const auto place_of = [&](std::size_t i) {
@@ -128,7 +128,7 @@ TriangleFace face_around_edge(const DensityNeighbourhood& chunks, const SmoothCh
   return face;
 }
 
-// Where cells are of several sizes: by what lies around the triangle's vertices.
+// For cells of several sizes: derives the face from the surroundings of the triangle's vertices.
 TriangleFace face_of_triangle(const SmoothChunkMesh& mesh, const std::uint32_t* triangle,
                               const std::vector<CellMaterial>& materials) {
   const auto type = [&](std::size_t i) { return materials[triangle[i]].type; };
@@ -195,7 +195,7 @@ std::vector<VertexCopy> split_by_faces(std::span<std::uint32_t> indices, std::si
   Copies copies(vertices);
   struct Exception {
     std::size_t index;
-    std::uint32_t number;  // among the copies of its vertex
+    std::uint32_t number;  // index among the copies of its vertex
   };
   std::vector<Exception> exceptions;
   for (std::size_t i = 0; i < faces.size(); ++i) {

@@ -13,7 +13,7 @@
 
 namespace quoin::smooth {
 
-/// What a triangle is the face of.
+/// The voxel face that a triangle represents.
 struct TriangleFace {
   IVec3 sample{0};  ///< the solid one, in the field's coordinates; of coarse cells, near there
   VoxelType type = kAir;
@@ -24,15 +24,15 @@ struct TriangleFace {
 [[nodiscard]] std::vector<CellMaterial> materials_of(const DensityNeighbourhood& chunks, const SmoothOptions& options,
                                                      const SurfaceMaterials& materials, const SmoothChunkMesh& mesh);
 
-/// How many of the indices are quads, six each, where all is of one level: the triangles after them have a vertex in a
-/// bridge each.
+/// Returns the number of indices that are quads, six each, if all cells have one level. Each of the triangles after
+/// them has a vertex in a bridge.
 [[nodiscard]] std::size_t quad_indices_of(const SmoothChunkMesh& mesh);
 
 /// The faces of the triangles of a chunk's mesh, in the chunk's coordinates.
 void find_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options, const SurfaceMaterials& materials,
                 const SmoothChunkMesh& mesh, std::vector<TriangleFace>& faces);
 
-/// What tells the copies of a vertex apart, as far as that is asked for.
+/// The attributes that distinguish the copies of a vertex, as far as requested.
 struct FaceLook {
   VoxelType type = kAir;
   Direction direction = Direction::PosX;
@@ -41,22 +41,22 @@ struct FaceLook {
   bool operator==(const FaceLook&) const = default;
 };
 
-/// What of their faces tells triangles apart that share a vertex.
+/// Selects the face attributes that split a vertex shared by several triangles.
 struct FaceDifferences {
   bool types = false;
   bool directions = false;
   std::span<const std::uint32_t> groups;  ///< by triangle; empty: all are one
 };
 
-/// A copy of a vertex, for the triangles whose faces look alike.
+/// A copy of a vertex, for the triangles with equal attributes.
 struct VertexCopy {
   std::uint32_t vertex = 0;
   FaceLook look;
 };
 
-/// Gives each of `vertices` vertices as many copies as its triangles' faces have looks: returns them, those of a vertex
-/// next to each other in the order in which triangles need them, and makes `indices` name them. Vertices that no
-/// triangle has get none. `faces`: by triangle.
+/// Gives each of `vertices` vertices one copy per distinct look of its triangles' faces, and updates `indices`. Returns
+/// the copies; copies of one vertex are adjacent, in the order in which triangles need them. Vertices without triangles
+/// get no copy. `faces`: by triangle.
 std::vector<VertexCopy> split_by_faces(std::span<std::uint32_t> indices, std::size_t vertices,
                                        std::span<const TriangleFace> faces, const FaceDifferences& differences);
 

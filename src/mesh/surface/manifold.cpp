@@ -11,14 +11,14 @@ namespace quoin {
 
 namespace {
 
-/// A triangle as one of its vertices sees it: it leads from one neighbour round to the next.
+/// A triangle as seen from one of its vertices: it leads from one neighbour to the next.
 struct Arc {
   std::uint32_t from = 0;
   std::uint32_t to = 0;
   std::uint32_t triangle = 0;
 };
 
-/// Which triangles each vertex has.
+/// The triangles of each vertex.
 class Corners {
  public:
   explicit Corners(const Triangulation& mesh) : first_(mesh.positions.size() + 1), triangles_(mesh.indices.size()) {
@@ -40,7 +40,7 @@ class Corners {
   std::vector<std::uint32_t> triangles_;
 };
 
-/// Replaces `arcs` by those around a vertex, by where they start.
+/// Replaces `arcs` by the arcs around a vertex, sorted by their start.
 void arcs_around(const Triangulation& mesh, const Corners& corners, std::uint32_t vertex, std::vector<Arc>& arcs) {
   arcs.clear();
   for (const std::uint32_t triangle : corners.of(vertex)) {
@@ -81,7 +81,7 @@ void remove_back_to_back(Triangulation& mesh) {
   mesh.corners.resize(kept);
 }
 
-/// The first of the arcs that start at a neighbour; the number of arcs when none does.
+/// Returns the first arc that starts at a neighbour, or the number of arcs if there is none.
 std::size_t first_from(const std::vector<Arc>& arcs, std::uint32_t neighbour) {
   const auto found = std::lower_bound(arcs.begin(), arcs.end(), neighbour,
                                       [](const Arc& arc, std::uint32_t value) { return arc.from < value; });
@@ -89,7 +89,7 @@ std::size_t first_from(const std::vector<Arc>& arcs, std::uint32_t neighbour) {
   return static_cast<std::size_t>(found - arcs.begin());
 }
 
-/// Whether following the arcs from the first leads back to it past all others.
+/// Returns true if the arcs form one ring: following them from the first leads back to it through all others.
 bool are_one_ring(const std::vector<Arc>& arcs) {
   std::size_t at = 0;
   for (std::size_t passed = 1; passed <= arcs.size(); ++passed) {
@@ -100,8 +100,8 @@ bool are_one_ring(const std::vector<Arc>& arcs) {
   return arcs.empty();
 }
 
-/// Takes arcs apart into rings that pass no neighbour twice; returns the number of each arc's ring, from 0. Arcs that
-/// belong to none are in ring 0.
+/// Splits arcs into rings that pass no neighbour twice. Returns the ring number of each arc, starting at 0. Arcs
+/// outside of any ring are in ring 0.
 std::vector<std::uint32_t> rings_of(const std::vector<Arc>& arcs) {
   std::vector<std::uint32_t> ring(arcs.size(), 0);
   std::vector<bool> is_used(arcs.size());
@@ -131,7 +131,7 @@ std::vector<std::uint32_t> rings_of(const std::vector<Arc>& arcs) {
   return ring;
 }
 
-/// One vertex a ring, each drawn towards the middle of its neighbours.
+/// Makes one vertex per ring, each moved towards the middle of its neighbours.
 void split(Triangulation& mesh, std::uint32_t vertex, const std::vector<Arc>& arcs, float apart) {
   const std::vector<std::uint32_t> ring = rings_of(arcs);
   const std::size_t rings = *std::max_element(ring.begin(), ring.end()) + std::size_t{1};

@@ -11,15 +11,15 @@ namespace quoin {
 struct Triangulation {
   std::vector<Vec3> positions;
   std::vector<std::uint32_t> indices;  ///< three a triangle
-  std::vector<std::uint32_t> corners;  ///< one an index: whatever the corner is to keep
+  std::vector<std::uint32_t> corners;  ///< one per index: a value that stays with the corner
 };
 
-/// Makes every edge of a closed mesh have one triangle on each side: pairs of triangles that lie back to back are
-/// removed, and a vertex whose triangles form several rings becomes one vertex a ring. These are drawn `apart` (a
-/// length) from their place, each towards its own ring, so that whoever takes vertices of one place for one finds
-/// nothing else.
+/// Gives every edge of a closed mesh one triangle on each side. Removes pairs of triangles that are back to back. A
+/// vertex with several rings of triangles becomes one vertex per ring. These vertices move by `apart` (a length), each
+/// towards its own ring, so that welding vertices by position does not join them again.
 ///
-/// What is no ring (the mesh is open there) stays together. Cost: O(triangles), more where many meet in one vertex.
+/// Triangles that form no ring (the mesh is open there) stay together. Cost: O(triangles), more if many triangles share
+/// a vertex.
 void make_manifold(Triangulation& mesh, float apart);
 
 }  // namespace quoin

@@ -27,7 +27,7 @@ VoxelType material_at(const DensityNeighbourhood& chunks, IVec3 sample) {
   return chunk == nullptr ? kAir : chunk->materials().get(local_of(sample));
 }
 
-// The materials of the solid corners of a cell that lies within a chunk, row by row.
+// Reads the materials of the solid corners of a cell within a chunk, row by row.
 std::size_t materials_of_corners(const DensityChunk& chunk, IVec3 first, VoxelType* out) {
   const ChunkStorage* mixed = ChunkStorage::of(chunk.materials());
   std::size_t found = 0;
@@ -62,8 +62,8 @@ std::size_t solid_materials(const DensityNeighbourhood& chunks, IVec3 first, int
   return found;
 }
 
-// The materials of the solid samples nearest to the surface along the crossed edges of a cell that is `size` wide: what
-// lies on the ground, where the corners lie well below it.
+// Reads the materials of the solid samples nearest to the surface along the crossed edges of a cell of width `size`:
+// the top layer of the ground, even if the corners are far below it.
 std::size_t materials_under_crossings(const DensityNeighbourhood& chunks, IVec3 first, int size, VoxelType* out) {
   std::size_t found = 0;
   for (int edge = 0; edge < 12; ++edge) {

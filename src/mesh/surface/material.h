@@ -17,17 +17,17 @@ struct CellMaterial {
 /// A colour in linear light.
 [[nodiscard]] LinearRgba16 linear_colour_of(Rgba8 colour);
 
-/// What the surface of a cell is made of: the materials of its solid samples.
+/// The surface material of cells: the materials of their solid samples.
 class SurfaceMaterials {
  public:
   explicit SurfaceMaterials(const VoxelRegistry& types);
 
-  /// Of a cell of the centre chunk or of one before it, in cells of `level`. Level 0: by its solid corners. Coarser: by
-  /// the solid samples next to the surface along its crossed edges, since corners may lie well below it; when no edge
-  /// of its own is crossed, by the solid samples of the coarsest lattice within the cell that has any. All air gives
-  /// air, white.
+  /// Returns the material of a cell of the centre chunk or of a chunk before it, in cells of `level`. Level 0: from its
+  /// solid corners. Coarser levels: from the solid samples next to the surface along its crossed edges, since corners
+  /// may be far below the surface; if none of its edges is crossed, from the solid samples of the coarsest lattice
+  /// within the cell that has any. A cell of air gives air, white.
   [[nodiscard]] CellMaterial of_cell(const DensityNeighbourhood& chunks, IVec3 cell, int level) const;
-  /// White of what is not registered.
+  /// Returns the colour of a type; white if it is not registered.
   [[nodiscard]] LinearRgba16 albedo(VoxelType type) const;
 
  private:

@@ -16,20 +16,20 @@
 namespace quoin::smooth {
 namespace {
 
-/// The share of the way from the middle of its cell that a vertex of something thin keeps: a rail of one voxel becomes
+/// The share of the way from the middle of its cell that a vertex of a thin feature keeps: a rail of one voxel becomes
 /// 0.8 voxels wide instead of 0.37.
 constexpr float kThinShare = 1.0F / 3.0F;
-/// What vertices of cells with several sheets keep of it at least.
+/// The minimum share for vertices of cells with several sheets.
 constexpr float kLeastShare = 1.0F / 256.0F;
 
-/// Bits of samples along x, of a row from -2 to 65: in each word all bits but the first and the last have both
-/// neighbours there.
+/// Bits of samples along x, of a row from -2 to 65. In each word, all bits except the first and the last have both
+/// neighbours.
 struct WideRow {
   std::uint64_t low = 0;   ///< bit i: sample i - 2
   std::uint64_t high = 0;  ///< bit i: sample i + 2
 };
 
-/// A row of a chunk's neighbourhood, of what `row_of(i, y, z)` has of the i-th chunk.
+/// Assembles a row of a chunk's neighbourhood from the rows `row_of(i, y, z)` of its chunks.
 template <class RowOf>
 WideRow wide_row(int y, int z, const RowOf& row_of) {
   const auto part = [&](int dx) -> std::uint64_t {
@@ -52,7 +52,7 @@ std::size_t cell_row(int y, int z) {
   return static_cast<std::size_t>((z + 1) * kCellRows + y + 1);
 }
 
-/// [z][y]: adds to each row of samples those that cells beginning there have as well.
+/// Adds to each row of samples the other rows at the corners of its cells, [z][y].
 void unite_for_cells(std::vector<WideRow>& rows) {
   for (std::size_t row = 0; row + kCellRows + 1 < rows.size(); ++row) {
     for (const std::size_t other : {row + 1, row + kCellRows, row + kCellRows + 1}) {
@@ -62,7 +62,7 @@ void unite_for_cells(std::vector<WideRow>& rows) {
   }
 }
 
-/// Which cells of a chunk have a corner that is solid and transparent: no other has several bodies.
+/// The cells of a chunk with a solid, transparent corner. Only these can have several bodies.
 class TransparentCells {
  public:
   TransparentCells(const DensityNeighbourhood& whole, const VoxelRegistry& types) {
@@ -92,11 +92,11 @@ class TransparentCells {
   std::vector<WideRow> any_;  // [z][y], by unite_for_cells
 };
 
-/// The words of a row and of those beside it, of one half.
+/// One half of the words of a row and of its neighbours.
 struct RowsAround {
   std::uint64_t here;
   std::array<std::uint64_t, 2> y;                  ///< before, after
-  std::array<std::uint64_t, 2> z;                  ///< likewise
+  std::array<std::uint64_t, 2> z;                  ///< before, after
   std::array<std::array<std::uint64_t, 2>, 2> yz;  ///< [y][z]
 };
 
@@ -144,7 +144,7 @@ class ThinCells {
     unite_for_cells(any_);
   }
 
-  /// Whether `has` holds along any axis.
+  /// Returns true if `has` is true for any axis.
   [[nodiscard]] bool has_any(IVec3 cell) const { return (pair_of(any_[cell_row(cell.y, cell.z)], cell.x) & 3U) != 0; }
 
   [[nodiscard]] bool has(IVec3 cell, int axis) const {
@@ -157,7 +157,7 @@ class ThinCells {
   }
 
  private:
-  static constexpr int kRead = kChunkEdge + 4;  // rows from -2 on
+  static constexpr int kRead = kChunkEdge + 4;  // rows, starting at -2
 
   static std::size_t at(int y, int z) { return static_cast<std::size_t>((z + 2) * kRead + y + 2); }
 
@@ -189,7 +189,7 @@ class ThinCells {
   std::vector<WideRow> any_;                  // [z][y]: along any axis, by unite_for_cells
 };
 
-/// Whether a cell has one sheet, whichever way they are told apart.
+/// Returns true if a cell has one sheet, for both ways to pair crossings.
 bool has_one_sheet(std::uint32_t solid) {
   return sheets_of(solid).count == 1 && sheets_of(solid ^ 255U).count == 1;
 }
@@ -200,7 +200,7 @@ struct SharedVertex {
   std::optional<Vec3> normal;
 };
 
-/// Nothing where a cell has one body, or none.
+/// Returns the shared vertex of a cell's bodies; empty if the cell has fewer than two bodies.
 std::optional<SharedVertex> vertex_of_bodies(const Shape& shape, const LevelCell& cell) {
   constexpr std::uint32_t kNone = ~0U;
   std::array<std::uint32_t, 8> body{};
@@ -238,8 +238,8 @@ std::optional<SharedVertex> vertex_of_bodies(const Shape& shape, const LevelCell
   return shared;
 }
 
-/// Splits quads with vertices that bodies share along the diagonals that are shorter now: each body chose its own
-/// before these were moved.
+/// Splits quads with shared vertices along the diagonal that is shorter now. Each body chose its own diagonal before
+/// these vertices were moved.
 void split_quads_again(const ChunkLevels& levels, const std::vector<bool>& is_shared, SmoothChunkMesh& mesh) {
   const std::size_t quads_end = quad_indices_of(mesh);
   for (std::size_t i = 0; i < quads_end; i += 6) {
@@ -282,7 +282,7 @@ void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& opt
       fraction = shared->fraction;
       if (shared->normal) mesh.normals[i] = *shared->normal;
     }
-    // Sheets of one cell would come to lie in one place, and have edges of four triangles there.
+    // The sheets of a cell would otherwise coincide, with edges of four triangles.
     const bool may_meet_others = shape.smoothness < kLeastShare &&
                                  (mesh.cells[i].bridge_axis() >= 0 || !has_one_sheet(solid_corners_of(chunks, cell)));
     const float share = may_meet_others ? kLeastShare : shape.smoothness;

@@ -46,7 +46,7 @@ bool has_finite_positions(const SmoothMesh& mesh) {
 }
 #endif
 
-/// How far apart vertices of one place are drawn that have to be several.
+/// The distance between vertices at one position that must stay separate.
 constexpr float kApart = 1.0F / 1024.0F;
 /// The share of the error that the library is allowed: it bounds a mean of squares, and single vertices of smooth
 /// surfaces are up to twice as far off.
@@ -55,17 +55,18 @@ constexpr float kMeanShare = 0.8F;
 /// triangles jump up and down as the error grows.
 constexpr float kLevelShare = 0.84F;
 constexpr int kLevels = 16;
-/// If no more than one of so many places is too far off, the mesh stays as it was around those; else the next level is
-/// tried.
+/// If at most one in this number of positions deviates too far, the mesh stays unchanged around these positions.
+/// Otherwise the next level is tried.
 constexpr std::size_t kFewPlaces = 20;
-/// Tries at one level, all but the first with triangles that stay. A sample has fewer places that may be too far off.
+/// The number of rounds at one level; all except the first have triangles that stay. A sample has fewer positions that
+/// may deviate too far.
 constexpr int kRounds = 8;
 constexpr int kRoundsOfSample = 4;
 /// Rounds in which most triangles stay, where no level has few places that are too far off: meshes that are round
 /// everywhere. Behind the first ones each has the next level.
 constexpr int kMostStayRounds = 12;
 constexpr int kRoundsOfFirstLevel = 4;
-/// Such a search in place of a level's number.
+/// A value in place of a level's number, for such a search.
 constexpr int kMostStay = kLevels;
 /// A try that removes no more than one of so many triangles, and is too far off, is the last one.
 constexpr std::size_t kHardlyAny = 1'000;
@@ -79,7 +80,8 @@ constexpr int kSampleBoxes = 16;
 /// If the sample loses no more than one of so many triangles, the mesh cannot be simplified.
 constexpr std::size_t kLeastLoss = 100;
 
-/// The vertices of each place, which colours and normals may have made several: by vertex, the first of its place.
+/// Returns, for each vertex, the first vertex at its position. Colours and normals may have split a position into
+/// several vertices.
 std::vector<std::uint32_t> places_of(const SmoothMesh& mesh) {
   std::vector<std::uint32_t> place(mesh.positions.size());
   meshopt_generateVertexRemap(place.data(), nullptr, place.size(), mesh.positions.data(), place.size(), sizeof(Vec3));
@@ -92,8 +94,8 @@ std::vector<std::uint32_t> places_of(const SmoothMesh& mesh) {
   return place;
 }
 
-/// Removes triangles, but neither those that stay nor their borders, nor the border of a sample. Returns indices of the
-/// mesh's vertices.
+/// Removes triangles. Keeps the triangles that stay and their borders, and the border of a sample. Returns indices of
+/// the mesh's vertices.
 std::vector<std::uint32_t> remove_triangles(const SmoothMesh& mesh, float error_in_samples, float scale, bool is_sample,
                                             const std::vector<bool>& stays) {
   std::vector<std::uint32_t> kept;
@@ -107,7 +109,7 @@ std::vector<std::uint32_t> remove_triangles(const SmoothMesh& mesh, float error_
   return left;
 }
 
-/// Triangles of the places, whose corners are vertices of the mesh.
+/// Returns triangles of welded positions; their corners are vertices of the mesh.
 Triangulation triangulation_of(const SmoothMesh& mesh, std::vector<std::uint32_t> left,
                                const std::vector<std::uint32_t>& place) {
   Triangulation result{mesh.positions, std::move(left), {}};
@@ -116,7 +118,7 @@ Triangulation triangulation_of(const SmoothMesh& mesh, std::vector<std::uint32_t
   for (std::size_t i = 0; i < result.indices.size(); i += 3) {
     std::array<std::uint32_t, 3> at{};
     for (std::size_t k = 0; k < 3; ++k) at[k] = place[result.indices[i + k]];
-    // Of what was cut for colours, triangles may be left whose corners lie in two places.
+    // If the mesh was cut by colour, triangles with only two distinct positions may be left.
     if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) continue;
     for (std::size_t k = 0; k < 3; ++k, ++kept) {
       result.corners[kept] = result.corners[i + k];
@@ -128,7 +130,7 @@ Triangulation triangulation_of(const SmoothMesh& mesh, std::vector<std::uint32_t
   return result;
 }
 
-/// How far the vertices of the mesh lie from simpler triangles.
+/// The distances of the mesh's vertices from simpler triangles.
 struct Deviation {
   float most = 0.0F;
   std::size_t places = 0;
@@ -210,10 +212,10 @@ void merge_corners(const SmoothMesh& mesh, Triangulation& simple) {
   }
 }
 
-/// Puts simpler triangles in place of the mesh's: a vertex for each corner and place that is in use.
+/// Replaces the mesh's triangles by simpler ones, with a vertex for each used pair of corner and position.
 void take_over(SmoothMesh& mesh, const Triangulation& simple, std::vector<std::uint32_t>& tags) {
   const auto before = static_cast<std::uint32_t>(mesh.positions.size());
-  // What was drawn apart is appended; the first such copy of a corner by its place.
+  // Vertices that were moved apart are appended: one copy per pair of position and corner.
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> copies;
   std::vector<std::uint32_t> indices;
   indices.reserve(simple.indices.size());
@@ -262,7 +264,7 @@ class Search {
     Attempt attempt;
     int level = 0;
   };
-  /// The try with the fewest triangles, of all levels. Nothing if no try is within the error.
+  /// Returns the attempt with the fewest triangles, of all levels; empty if no attempt is within the error.
   std::optional<Found> best_of_levels() {
     std::optional<Found> best;
     for (int level = 0; level < kLevels; ++level) {
@@ -283,7 +285,7 @@ class Search {
     }
     return best;
   }
-  /// The try of the first level from `level` on that is within the error.
+  /// Returns the attempt of the first level, starting at `level`, that is within the error.
   std::optional<Attempt> first_from(int level) {
     for (; level <= kMostStay; ++level) {
       std::optional<Attempt> attempt = run(level);
@@ -293,7 +295,7 @@ class Search {
   }
 
  private:
-  /// Tries one level, in rounds in which more and more triangles stay. Nothing if the level is given up.
+  /// Tries one level, in rounds in which more and more triangles stay. Returns nothing if the level fails.
   std::optional<Attempt> run(int level) {
     const bool most_stay = level == kMostStay;
     std::vector<bool> stays(mesh_.indices.size() / 3);
@@ -331,7 +333,8 @@ class Search {
   bool is_fruitless_ = false;
 };
 
-/// The positions and triangles of about kSampleTriangles triangles of a mesh: of boxes that lie anywhere in it.
+/// Returns the positions and triangles of about kSampleTriangles triangles of a mesh, in boxes selected by a hash of
+/// their position.
 SmoothMesh sample_of(const SmoothMesh& mesh) {
   const auto box_of = [&](std::size_t i) {
     const IVec3 at = voxel_of(DVec3(mesh.positions[mesh.indices[i]]) / kSampleBox);
@@ -369,7 +372,7 @@ float scale_of(const SmoothMesh& mesh) {
   return meshopt_simplifyScale(&mesh.positions[0].x, mesh.positions.size(), sizeof(Vec3));
 }
 
-/// The try that simplifies a mesh; nothing if it cannot be simplified.
+/// Returns the attempt that simplifies a mesh; empty if it cannot be simplified.
 std::optional<Attempt> find_simpler(const SmoothMesh& mesh, float scale, float error_in_samples) {
   Search search(mesh, scale, error_in_samples, false);
   if (mesh.indices.size() / 3 < kLeastSampled) {

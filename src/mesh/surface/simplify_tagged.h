@@ -8,7 +8,7 @@
 
 namespace quoin {
 
-/// `simplify_smooth_mesh`, with a number for each vertex that goes with it; or none.
+/// Like `simplify_smooth_mesh`, with an optional number per vertex that stays with it.
 [[nodiscard]] Result<float> simplify_tagged(SmoothMesh& mesh, float error_in_samples, std::vector<std::uint32_t>& tags);
 
 }  // namespace quoin

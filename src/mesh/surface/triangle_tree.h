@@ -17,15 +17,15 @@ class TriangleTree {
   /// `indices`: three a triangle.
   TriangleTree(std::span<const Vec3> positions, std::span<const std::uint32_t> indices);
 
-  /// The distance of a point from the nearest triangle, or `most` if none is nearer.
+  /// Returns the distance of a point from the nearest triangle, or `most` if no triangle is nearer.
   [[nodiscard]] float distance(Vec3 point, float most) const;
 
  private:
   struct Node {
     Vec3 min;
     Vec3 max;
-    std::uint32_t first;  // of a leaf its first triangle in `order_`, else the first of its two children
-    std::uint32_t count;  // of a leaf its triangles, else 0
+    std::uint32_t first;  // leaf: its first triangle in `order_`; otherwise the first of its two children
+    std::uint32_t count;  // leaf: its number of triangles; otherwise 0
   };
   struct Item {
     Vec3 min;

@@ -181,7 +181,7 @@ TEST(SmoothVoxels, GapsOfOneVoxelStayOpen) {
   EXPECT_LT(width(plain), 0.3F);
 }
 
-/// How many pieces a closed mesh has.
+/// Returns the number of connected pieces of a closed mesh.
 std::size_t pieces_of(const SmoothMesh& mesh) {
   std::vector<std::uint32_t> parent(mesh.positions.size());
   for (std::uint32_t i = 0; i < parent.size(); ++i) parent[i] = i;
@@ -364,7 +364,7 @@ TEST(SmoothBodies, GlassIsAClosedBodyThatMeetsItsFrameExactly) {
   for (const Triangle& triangle : triangles(bodies[1], true)) common += frame.count(triangle) != 0 ? 1 : 0;
   // Round both panes: 2 deep, 14 high, 6 and 7 wide.
   EXPECT_EQ(common, 2 * 2 * (2 * (14 + 6) + 2 * (14 + 7)));
-  // What is left of the glass is its outside, flush with the wall's.
+  // The rest of the glass is its outside, flush with the wall's outside.
   EXPECT_EQ(static_cast<std::int64_t>(bodies[1].indices.size() / 3) - common, 2 * 2 * 14 * 13);
   SmoothMeshOptions united = options;
   const double all = signed_volume(mesh_of(grid, united));

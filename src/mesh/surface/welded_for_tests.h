@@ -8,7 +8,7 @@
 
 namespace quoin {
 
-/// The mesh with one vertex where several stand at one place, and without normals.
+/// Welds vertices by position and removes normals.
 inline SmoothMesh welded(const SmoothMesh& mesh) {
   SmoothMesh whole;
   std::map<std::array<float, 3>, std::uint32_t> known;

@@ -16,14 +16,14 @@ namespace {
 constexpr std::size_t kBlockBytes = 16'384;
 static_assert(kBlockBytes >= 4 * VertexLayout::kMaxStride);
 
-// Where one element of a block's vertices lies.
+// The address and stride of one element in a block's vertices.
 struct Column {
   std::byte* at;
   std::size_t stride;
 };
 
-// What one element of the vertices is made from: a value a vertex, a quad, or a corner of a quad. `put<Value>(convert)`
-// writes what `convert` makes of each.
+// The sources of one element of the vertices: a value per vertex, per quad, or per corner of a quad.
+// `put<Value>(convert)` writes each value after conversion.
 template <class ValueOf>
 struct PerVertex {
   Column column;

@@ -47,7 +47,7 @@ struct Written {
   std::vector<std::uint32_t> indices;
 };
 
-// Of those quads whose types are of one class, chunk by chunk.
+// Writes the quads whose types have one surface class, chunk by chunk.
 Written written(const Grid& grid, const VoxelRegistry& types, const VertexWriter& writer, SurfaceClass surface) {
   Written all;
   BlockyMesher mesher;
@@ -179,7 +179,7 @@ TEST(VertexWriter, WritesColoursInEveryFormat) {
                               {VertexAttribute::Colour, Unorm8x4Srgb, 28}}},
                             types);
   std::vector<std::byte> found(writer.bytes_needed(8));
-  // The second is of a type that nobody registered.
+  // The type of the second quad is not registered.
   const QuadBuffer quads = {{std::uint64_t{1} << Quad::kTypeShift}, {std::uint64_t{9} << Quad::kTypeShift}};
   writer.write(quads, Vec3(0.0F), found);
   const auto linear = read<std::array<float, 4>>(found, 0);
