@@ -1,4 +1,4 @@
-// Unit gradients of trilinear cells, a register of lanes at a time. The arithmetic is that of smooth/cell.h, step for
+// Unit gradients of trilinear cells, one register of lanes at a time. The arithmetic equals smooth/cell.h, step for
 // step.
 
 #pragma once

@@ -1,6 +1,6 @@
 #pragma once
 
-// The words of a tree's bricks: runs of four to eight lines (tree_view.h), one after the other.
+// The words of a tree's bricks: consecutive runs of four to eight lines (tree_view.h).
 
 #include <array>
 #include <cstddef>

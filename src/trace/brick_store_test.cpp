@@ -41,7 +41,7 @@ TEST(BrickStore, BricksReadAsTheyWerePutAndLeaveOutWhatIsAlikeAtAnEnd) {
         const BrickRun run = BrickRun::of(brick);
         EXPECT_EQ(run.code(), brick);
         EXPECT_EQ(store.line_count() - lines, static_cast<std::size_t>(run.count()));
-        // A line stays that stands for those left out.
+        // One line that represents the omitted lines stays.
         const int below = std::min((from - 1) / 8, 4);
         const int above = std::min((63 - to) / 8, 3);
         EXPECT_EQ(run.count(), 8 - std::max(below, above)) << from << " to " << to;

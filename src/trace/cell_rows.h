@@ -52,7 +52,7 @@ class CellRows {
   // Returns the cells along x with a solid sample at either end, for the samples' row (y, z), 0 to 64.
   [[nodiscard]] std::uint64_t either_end(int y, int z) const;
 
-  std::array<Signs, 8> signs_;  // by the offset of the chunk, x + 2 y + 4 z
+  std::array<Signs, 8> signs_;  // index: the chunk's offset, x + 2 y + 4 z
   bool is_air_ = true;
 };
 

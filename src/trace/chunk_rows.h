@@ -146,7 +146,7 @@ class RowsBox {
 void find_uniform_blocks(const Chunk& chunk, const VoxelRegistry& types, const ChunkSlabs& wanted,
                          UniformBlocks& blocks);
 
-/// Four bricks side by side along x, at (y, z) of a chunk, which are multiples of 16.
+/// Four adjacent bricks along x, at (y, z) of a chunk, multiples of 16.
 struct BrickRow {
   std::array<Node, 4> bricks{};
   /// Reads the bricks from `rows`, a ChunkRows or CellRows. Returns false if all four are empty or all four are full;
@@ -190,8 +190,8 @@ bool BrickRow::read(const Rows& rows, int y, int z, RowsBox& box) {
   return empty != 16 && full != 16;
 }
 
-/// Adds the blocks that are full in rows of one type, of the rows of four bricks that hold any of the `wanted` ones.
-/// Returns which bricks are.
+/// Adds the blocks that are full in `rows`, the rows of one type. Tests only the rows of four bricks that contain a
+/// `wanted` brick. Returns the full bricks.
 template <class Rows>
 std::uint64_t add_uniform(const Rows& rows, std::uint64_t wanted, UniformBlocks& blocks) {
   constexpr std::uint64_t kAll = ~std::uint64_t{0};

@@ -150,8 +150,8 @@ struct OccupancyTree::Impl {
   std::vector<trace::FlatChunk> flat_nodes;
   const ChunkNode* known_nodes = nullptr;  // data() of chunk_nodes when `flat_nodes` was made
   IBox flat_chunks;
-  // A chunk far from all others makes the tables too large. They are kept without it until it is gone again, with the
-  // changes that they have not got.
+  // A chunk far from all others would make the tables too large. The tables then stay as they are until that chunk is
+  // gone, together with the changes that they missed.
   bool is_flat = false;
   std::vector<ChunkBricks> missed;
   trace::TreeView view{};
@@ -540,7 +540,7 @@ struct OccupancyTree::Impl {
     }
   }
 
-  // Tables of another box of chunks that holds all there is in these, by copying rows.
+  // Builds tables for another box of chunks, which contains all chunks of the current tables, by copying rows.
   void move_flat(const IBox& chunks) {
     const FlatTables old = std::move(flat);
     const std::vector<trace::FlatChunk> old_nodes = std::move(flat_nodes);
@@ -596,7 +596,7 @@ struct OccupancyTree::Impl {
     flat_chunks = {};
     missed = {};
   }
-  // Keeps changes for tables that are not in use, as long as these are few.
+  // Keeps changes for unused tables, up to a limit.
   void miss(std::span<const ChunkBricks> changed) {
     constexpr std::size_t kMostMissed = 1024;
     if (flat_chunks.empty()) return;

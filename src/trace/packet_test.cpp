@@ -130,7 +130,7 @@ class Packets : public testing::TestWithParam<std::tuple<unsigned, InstructionSe
   OccupancyTree tree_;
 };
 
-// Plain rays and those of a set, in a packet and alone; returns how many hit.
+// Compares plain rays with rays of an instruction set, in a packet and alone. Returns the number of hits.
 int hits_if_all_agree(const OccupancyTree& tree, const RayPacket& rays, InstructionSet with) {
   const InstructionSet sets[] = {InstructionSet::Plain, with};
   int hits = 0;
@@ -340,7 +340,7 @@ INSTANTIATE_TEST_SUITE_P(Seeds, Packets,
                            return std::to_string(std::get<0>(each.param)) + name_in_tests(std::get<1>(each.param));
                          });
 
-// Rays of every kind through a tree that followed edits are those through a new one.
+// Rays of every kind give the same results in a tree that followed edits and in a new tree.
 TEST(PacketsOf, ThroughATreeThatFollowedEditsAreThoseThroughANewOne) {
   const VoxelRegistry types = oracle::mixed_types();
   Grid grid;

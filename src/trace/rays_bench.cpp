@@ -1,6 +1,6 @@
 // rays/*: the 256x128x256 terrain, primary, shadow and occlusion rays, one at a time and in packets; rays/random600.
-// rays/*/subnormal_lanes: the same with subnormal numbers in lanes without data, and how many times as long that takes
-// as with zeros (ratio_to_zeroed, at most 1.1).
+// rays/*/subnormal_lanes: the same with subnormal numbers in unused lanes. ratio_to_zeroed is its time divided by the
+// time with zeros there, at most 1.1.
 
 #include <bit>
 #include <chrono>
@@ -104,8 +104,8 @@ void trace_packets(benchmark::State& state, const Case& c, InstructionSet set) {
 constexpr double kSubnormalFloat = 1e-40;
 constexpr double kSubnormalDouble = 1e-310;
 
-// Rays that stand still along x, by a component that is 0 or subnormal as a float. It follows the origin in memory: a
-// kernel that reads four numbers there has it in its unused lane too.
+// Rays without motion along x, by a component that is 0 or subnormal as a float. In memory it follows the origin, so a
+// kernel that reads four numbers there also has it in its unused lane.
 std::vector<RayQuery> still_rays(std::vector<RayQuery> rays, double x) {
   for (RayQuery& query : rays) query.ray.direction.x = x;
   return rays;

@@ -37,7 +37,7 @@ struct Random {
   }
 };
 
-// Everything that is asked of a tree, of one that followed edits and of one that was built.
+// Compares all queries of a tree that followed edits and of a tree that was built from scratch.
 void expect_equal(const OccupancyTree& followed, const OccupancyTree& built, Random& random, bool has_blocks) {
   ASSERT_EQ(followed.bounds(), built.bounds());
   ASSERT_EQ(trace::TreeView::of(followed) == nullptr, trace::TreeView::of(built) == nullptr);

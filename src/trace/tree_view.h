@@ -47,7 +47,7 @@ inline constexpr std::size_t kMaxBrickLines = std::size_t{1} << 27;
 /// The lines of a brick that are kept.
 struct BrickRun {
   std::uint32_t first = 0;
-  int shift = 0;  ///< in lines, -4 to 3: less than 0 where the first ones are left out
+  int shift = 0;  ///< in lines, -4 to 3: negative if the first lines are omitted
 
   static BrickRun of(BrickCode code) {
     const int shift = static_cast<std::int32_t>(code << 28) >> 29;
@@ -134,7 +134,7 @@ struct ChunkBricks {
 
 /// A region of 16^3 chunks.
 struct RegionNode {
-  Node chunks{};                            ///< which chunks hold any voxel
+  Node chunks{};                            ///< chunks with any voxel
   std::array<std::uint32_t, 4096> nodes{};  ///< index of a ChunkNode, x + 16 y + 256 z; 0: empty
 };
 

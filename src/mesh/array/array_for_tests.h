@@ -122,7 +122,7 @@ inline double enclosed_volume(const Buffer<Vec3>& positions, const Buffer<std::u
   return volume;
 }
 
-/// A sample's density; beyond the array as far in the air as the nearest is from the surface.
+/// Returns a sample's density. Beyond the array it is air, at the nearest sample's distance from the surface.
 inline double density_at(const TestArray<float>& samples, double iso, IVec3 p) {
   if (samples.has(p)) return iso - double{samples.at(p)};
   const Size size = samples.size();

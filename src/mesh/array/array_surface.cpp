@@ -15,7 +15,7 @@ namespace {
 
 using namespace array;
 
-// Makes vertices, a batch of cells at a time.
+// Computes vertices in batches of cells.
 class VertexMaker {
  public:
   VertexMaker(const Lattice& lattice, const SolidRule& rule, ArraySurface& out)

@@ -27,7 +27,7 @@ using namespace array_tests;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// Without a vertex for each sheet: what most of these tests count.
+// One vertex per cell: most of these tests count vertices.
 constexpr ArraySurfaceOptions kPlain = {.split_sheets = false};
 
 ArraySurface surface_of(const ArrayView& view, const ArraySurfaceOptions& options = kPlain, unsigned threads = 1) {
@@ -46,7 +46,7 @@ void expect_same(const ArraySurface& a, const ArraySurface& b) {
   EXPECT_TRUE(same_bytes(a.indices, b.indices));
 }
 
-// As good as the same: vertices are at the same places, in any order.
+// Compares surfaces up to rounding: vertices at the same positions, in any order.
 void expect_alike(const ArraySurface& a, const ArraySurface& b) {
   ASSERT_EQ(a.positions.size(), b.positions.size());
   ASSERT_EQ(a.indices.size(), b.indices.size());
@@ -270,7 +270,7 @@ std::size_t triangles_without_area(const ArraySurface& surface) {
   return flat;
 }
 
-// Waves and noise of few values, so that many are that of the surface.
+// Waves and noise with few distinct values, so that many values equal iso.
 TYPED_TEST(ArrayTypes, HaveNoTrianglesWithoutAreaWhereValuesEqualIso) {
   const TestArray<float> random = noise({20, 21, 66}, 9);
   for (const double levels : {2.0, 6.0}) {
@@ -409,7 +409,7 @@ TEST(ArraySurface, OfOneSampleIsClosed) {
   EXPECT_GT(enclosed_volume(surface.positions, surface.indices), 0.0);
 }
 
-// Halves, and of a band of 8: places are as near as those can tell.
+// Halves, and a band of 8: positions agree within the precision of both.
 TEST(ArraySurface, IsThatOfTheFieldOfTheSameVolume) {
   Volume volume;
   volume.size = {70, 60, 50};
@@ -433,7 +433,7 @@ TEST(ArraySurface, IsThatOfTheFieldOfTheSameVolume) {
     ASSERT_GT(mesh.positions.size(), 1'000U);
     ASSERT_EQ(surface.positions.size(), mesh.positions.size());
     ASSERT_EQ(surface.indices.size(), mesh.indices.size());
-    // By cell; a vertex on a cell's face may be counted to either.
+    // By cell; a vertex on a cell's face may belong to either cell.
     std::map<std::array<int, 3>, std::vector<Vec3>> theirs;
     const auto cell_of = [](Vec3 p, IVec3 step) {
       const IVec3 cell = IVec3(glm::floor(p)) + step;

@@ -14,7 +14,7 @@ namespace quoin::array {
 
 using smooth::Corners;
 
-// NaN is air, as far from the surface as any of the others.
+// NaN counts as air, at the greatest distance from the surface of all corners.
 inline void make_finite(Corners& d) {
   float most = 0.0F;
   for (float& density : d) {

@@ -28,7 +28,7 @@ inline std::size_t slab_count(const Lattice& lattice) {
   return lattice.slices() / kSlabSlices + 1;
 }
 
-// The planes of crossed edges around one slice of cells after the other. A source knows a slice's edges:
+// The planes of crossed edges around consecutive slices of cells. A source provides a slice's edges:
 //
 //   void within(std::size_t z, std::uint64_t* along_rows, std::uint64_t* between_rows);
 //   void between(std::size_t slice, std::uint64_t* out);      from sample slice - 1 to `slice`; either may not exist
@@ -132,7 +132,7 @@ void for_each_cell(const Lattice& lattice, const CellIndex& index, std::size_t f
   }
 }
 
-// Makes of the counts of rows the numbers before them.
+// Replaces the counts of rows by prefix sums.
 [[nodiscard]] inline Status sum_up(const Lattice& lattice, CellIndex& index) {
   for (std::vector<std::uint64_t>* counts : {&index.quads_before, &index.vertices_before}) {
     std::uint64_t sum = 0;

@@ -11,8 +11,8 @@
 
 namespace quoin::array {
 
-// The rows of samples at the corners of a row of cells, (y, z) before both, after in y, in z, in both. Beyond the array
-// there is the row next to it once more, as air that is as far from the surface.
+// The rows of samples at the corners of a row of cells, (y, z) before both, after in y, in z, in both. Beyond the
+// array, the adjacent row is repeated as air at the same distance from the surface.
 struct CornerRows {
   const std::byte* rows[4];
   bool is_beyond[4];
@@ -34,7 +34,7 @@ struct RawCorners {
 struct CornerReader {
   // Reads the corners of cells of a row into `out`, starting at index `at`.
   void (*read)(const CornerRows& rows, const std::int32_t* cells, std::size_t count, std::size_t at, RawCorners& out);
-  // Makes densities of the first `count`.
+  // Converts the first `count` corners to densities.
   void (*convert)(const RawCorners& raw, const SolidRule& rule, std::size_t count, CornerBatch& out);
 };
 

@@ -79,7 +79,7 @@ class Densities {
   [[nodiscard]] float operator()(T value) const { return rounded(difference(value)); }
   // Before rounding.
   [[nodiscard]] double difference(T value) const {
-    double above = 0.0;  // by how much the surface's value is more
+    double above = 0.0;  // the surface's value minus `value`
     if constexpr (kIsLong) {
       using Unsigned = std::make_unsigned_t<T>;
       const auto distance = [](T more, T less) {

@@ -26,7 +26,7 @@ class InterfaceTable {
       if (slot.back == slot.front) return insert(back, front);
     }
   }
-  // All that there are, in no order.
+  // Returns all used slots, in unspecified order.
   [[nodiscard]] std::vector<Slot> used() const;
 
   InterfaceTable();

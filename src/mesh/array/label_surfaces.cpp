@@ -116,7 +116,7 @@ class LabelEdges {
   std::vector<std::byte> packed_[2];
 };
 
-/// Makes the surfaces, step by step.
+/// Builds the surfaces, step by step.
 class Builder {
  public:
   Builder(const Lattice& lattice, const LabelSurfaceOptions& options, Threads threads, const Progress& progress)
@@ -201,7 +201,7 @@ class Builder {
     return index_.first[std::min(slice, lattice_.slices() + 1) * (lattice_.rows() + 1)];
   }
 
-  // All vertices go at once, from one buffer to the other; the triangles' memory is not taken yet.
+  // Moves all vertices in one pass from one buffer to the other. The triangles are not allocated yet.
   Status relax() {
     if (options_.relaxation_steps == 0) return {};
     Buffer<Vec3> relaxed;

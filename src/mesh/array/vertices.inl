@@ -17,7 +17,7 @@ namespace {
 
 using namespace smooth;
 
-// NaN is air, as far from the surface as any of the others.
+// NaN counts as air, at the greatest distance from the surface of all corners.
 inline void make_finite(F* d) {
   const F far = all(kFarthest);
   const F near = all(-kFarthest);

@@ -13,8 +13,8 @@ class ChunkTriangles {
  public:
   ChunkTriangles(const VoxelRegistry& types, bool watertight);
 
-  /// Appends those of one chunk, and counts its faces and quads.
-  /// Errors: LimitExceeded when a surface class needs more than about 2^32 vertices.
+  /// Appends the triangles of one chunk, and counts its faces and quads. Errors: LimitExceeded if a surface class needs
+  /// more than about 2^32 vertices.
   [[nodiscard]] Status append(const QuadBuffer& quads, IVec3 chunk, BlockyMesh& mesh);
 
  private:

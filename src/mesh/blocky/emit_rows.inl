@@ -202,7 +202,7 @@ QUOIN_STAGE void put_together(int first_plane, std::uint64_t one_type, std::size
   }
 }
 
-// Adds the types of quads in chunks of 8 or 16 bits a voxel.
+// Adds the types of quads in chunks with 8 or 16 bits per voxel.
 template <int kLogBits>
 void add_types(const Scratch& s, std::uint64_t* quads, std::size_t count) {
   constexpr std::uint64_t kMask = (std::uint64_t{1} << (1 << kLogBits)) - 1;

@@ -1,6 +1,6 @@
-// From runs to quads, one run after the other.
+// Converts runs to quads, one run at a time.
 //
-//   Row      | ends | starts | closes | place | front |      a row that has runs, its five words side by side
+//   Row      | ends | starts | closes | place | front |      a row that has runs, with its five words
 //   quad     | type | occlusion, flip | size v | size u | place, direction |      64 bits; see quoin/mesh/quad.h
 
 #pragma once

@@ -3,9 +3,9 @@
 //   voxels -> layers (z view) -> y and x views -> for each direction, eight planes at a time:
 //   faces -> runs -> growth -> quads
 //
-// Rows of 64 voxels are words. A corner's occlusion is two bit planes, computed for 64 faces at once; merging along a
-// row and from row to row is a handful of word operations (an addition carries "every cell agrees" to a run's end).
-// The rest of the work is one flat loop over the quads, without unpredictable branches.
+// Rows of 64 voxels are words. A corner's occlusion is two bit planes, computed for 64 faces at once. Merging along a
+// row and from row to row takes a few word operations (an addition carries "every cell agrees" to a run's end). The
+// rest of the work is one flat loop over the quads, without unpredictable branches.
 
 #pragma once
 

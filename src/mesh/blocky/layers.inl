@@ -41,7 +41,7 @@ QUOIN_INLINE std::uint64_t nibble_bits(std::uint64_t w) {
 #endif
 }
 
-// Bit k of each voxel of a row of 1, 2 or 4 bits a voxel.
+// Returns bit k of each voxel of a row with 1, 2 or 4 bits per voxel.
 template <int kBits>
 QUOIN_INLINE std::uint64_t plane_of_row(const std::uint64_t* row, int k) {
   if constexpr (kBits == 1) {
@@ -92,7 +92,7 @@ QUOIN_INLINE std::uint64_t equal_cells(const std::uint64_t* a, const std::uint64
 #endif
 }
 
-// The slabs that hold the region and the voxels around it.
+// The slabs of the region and of the voxels around it.
 struct SlabRange {
   Range y;  // rows, multiples of kLanes
   Range z;
@@ -164,7 +164,7 @@ int index_planes(const ChunkStorage& voxels) {
   return voxels.bits == 4 && voxels.palette.size() <= 8 ? 3 : voxels.bits;
 }
 
-// The lowest planes of rows of 1, 2 or 4 bits a voxel.
+// Extracts the lowest planes of rows with 1, 2 or 4 bits per voxel.
 template <int kBits, int kPlanes>
 void split_planes(const ChunkStorage& voxels, const SlabRange& range, Scratch& s) {
   for (int z = range.z.begin; z < range.z.end; z += 4) {

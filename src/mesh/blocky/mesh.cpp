@@ -30,7 +30,7 @@ namespace {
 std::vector<QuadBuffer> quads_of(const Grid& grid, const std::vector<IVec3>& chunks, const VoxelRegistry& types,
                                  const BlockyMeshOptions& options, Threads threads, ProgressSteps& reporter) {
   std::vector<QuadBuffer> parts(chunks.size());
-  // As many tasks as keep every thread busy; each keeps one mesher for the chunks it takes.
+  // Enough tasks to keep every thread busy; each task uses one mesher for its chunks.
   const std::size_t tasks = std::min<std::size_t>(chunks.size(), std::size_t{8} * thread_count(threads));
   parallel_for(tasks, threads, [&](std::size_t task) {
     BlockyMesher mesher;

@@ -22,7 +22,7 @@ OcclusionTables make_occlusion_tables() {
   OcclusionTables tables{};
   for (unsigned around = 0; around < 512; ++around) {
     const auto bit = [&](unsigned i) { return (around >> i & 1U) != 0; };
-    // By (bit, row): the sides are the neighbours along each, the corner the one across.
+    // By (bit, row): the sides are the neighbours along each axis, the corner is the diagonal neighbour.
     const std::uint8_t l00 = vertex_occlusion(bit(3), bit(1), bit(0));
     const std::uint8_t l10 = vertex_occlusion(bit(5), bit(1), bit(2));
     const std::uint8_t l01 = vertex_occlusion(bit(3), bit(7), bit(6));

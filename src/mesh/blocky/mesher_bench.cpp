@@ -149,7 +149,7 @@ void visible_faces(benchmark::State& state) {
 }
 BENCHMARK(visible_faces)->Name("visible_faces/w1/cold64")->Unit(benchmark::kMicrosecond);
 
-// As `quoin info` counts them; a time is of one chunk.
+// Counts faces as `quoin info` does; a time is per chunk.
 void count_faces(benchmark::State& state) {
   const Grid grid = terrain_of_chunks();
   const VoxelRegistry types = workloads::three_types();

@@ -32,11 +32,11 @@ class OcclusionAtlas {
   [[nodiscard]] bool is_empty() const { return patches_.empty(); }
 
   /// Adds the faces of a surface with voxels within 2^24 of the origin. `split` and `merged` are the same faces of the
-  /// same grid, as build_blocky_mesh makes them with and without occlusion. Returns the first index of the vertices of
-  /// `merged`, for `coordinates`.
+  /// same grid, as build_blocky_mesh makes them with and without occlusion. Returns the index of this addition, for
+  /// `coordinates`.
   std::size_t add(const BlockyTriangles& split, const BlockyTriangles& merged, const VoxelRegistry& types);
 
-  /// Places all that was added; sides are powers of two. The same additions give the same texture.
+  /// Packs all added patches into a texture whose sides are powers of two. The same additions give the same texture.
   /// Errors: LimitExceeded beyond kMaxEdge.
   [[nodiscard]] Result<Image> draw();
 

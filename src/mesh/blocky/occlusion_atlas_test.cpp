@@ -55,7 +55,7 @@ std::array<double, 3> filtered(const Image& image, double u, double v) {
     const double column = std::floor(x) + (i & 1);
     const double row = std::floor(y) + (i >> 1);
     const double share = (1.0 - std::abs(x - column)) * (1.0 - std::abs(y - row));
-    if (share < 1e-4) continue;  // of rounding
+    if (share < 1e-4) continue;  // only rounding
     EXPECT_TRUE(column >= 0 && row >= 0 && column < image.width && row < image.height);
     const auto at =
         3 * (static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(column));
@@ -64,7 +64,7 @@ std::array<double, 3> filtered(const Image& image, double u, double v) {
   return sum;
 }
 
-using Corner = std::tuple<int, int, int, int>;  // where, and which way the face looks
+using Corner = std::tuple<int, int, int, int>;  // position, and direction of the face
 
 /// Calls `visit(voxel's corner, its level, its type)` for every corner of every voxel's face.
 template <class Visit>

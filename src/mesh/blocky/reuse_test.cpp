@@ -9,7 +9,7 @@
 #include "core/made_with_for_tests.h"
 #include "mesh/mesh_oracle.h"
 
-// One mesher serves many chunks: nothing of an earlier call may show in a later one.
+// One mesher meshes many chunks; earlier calls must not affect later results.
 
 namespace quoin {
 namespace {

@@ -60,8 +60,8 @@ struct alignas(64) Batch {
   Row rows[kBatchPlanes * 64 + 8];
 };
 
-// Quads in the making, where a whole row is done at once: rows with runs, and then each quad's parts, side by side.
-// With room for a vector behind the last.
+// Temporary quads for kernels that process a whole row at once: rows with runs, then the parts of each quad in separate
+// arrays. Includes room for one vector after the last.
 inline constexpr std::size_t kBatchQuads = std::size_t{kBatchPlanes} * 64 * 64 + 64;
 
 struct alignas(64) Parts {
@@ -132,7 +132,7 @@ void find_faces_avx512(const Job& job, Scratch& scratch);
 std::int64_t count_faces_avx512(const Job& job, Scratch& scratch);
 #endif
 
-// Makes room for `more` quads behind the first `used`; returns where they go.
+// Reserves `more` quads after the first `used`. Returns a pointer to them.
 std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more);
 
 // Returns true if a voxel of the chunk is transparent.

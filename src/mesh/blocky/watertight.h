@@ -14,14 +14,14 @@ struct OutlinePoint {
   std::uint8_t occlusion;
 };
 
-/// Finds, for the quads of one chunk, the vertices that must lie on their outlines so that no vertex lies inside
-/// another quad's edge.
+/// Finds, for the quads of one chunk, the vertices that must be on their outlines so that no vertex is inside another
+/// quad's edge.
 ///
-/// Inside the chunk those are the corners of its other quads. An edge in one of the chunk's border planes is shared
-/// with a chunk that may be meshed apart, so it is divided at every voxel: a rule that both sides can follow.
+/// Inside the chunk, these are the corners of its other quads. An edge in a border plane of the chunk is shared with a
+/// chunk that may be meshed separately, so it is divided at every voxel: both sides follow this rule.
 class OutlineFinder {
  public:
-  /// Takes note of the corners of all quads of a chunk.
+  /// Records the corners of all quads of a chunk.
   void prepare(const QuadBuffer& quads);
 
   /// The outline of one of them, counter-clockwise from outside, starting at corner 0; corners are never left out.
@@ -33,9 +33,9 @@ class OutlineFinder {
   std::vector<std::uint64_t> corners_;  // a bit for each of 65^3 lattice points
 };
 
-/// Appends triangles that cover a quad's outline, using all of its points and none of zero area.
+/// Appends triangles that cover a quad's outline. Uses all points of the outline and no triangle of zero area.
 ///
-/// Order of `outline`: as OutlineFinder gives it. An outline of four points is split along the quad's diagonal.
+/// Order of `outline`: as OutlineFinder returns it. An outline of four points is split along the quad's diagonal.
 void triangulate_outline(const std::vector<OutlinePoint>& outline, bool flipped, std::uint32_t base,
                          std::vector<std::uint32_t>& indices);
 

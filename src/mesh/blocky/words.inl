@@ -1,4 +1,4 @@
-// Words side by side, four, or eight with AVX-512; and the layers in the layouts of the other views.
+// Words in groups of four, or eight with AVX-512; and the layers in the layouts of the other views.
 //
 //   a word      the 64 voxels of a row                    | x 0 ... 63 |
 //   Words       rows y, y + 1, ... of one plane           | y | y + 1 | y + 2 | y + 3 |
@@ -245,7 +245,7 @@ QUOIN_INLINE void exchange_eight(Words (&v)[8]) {
   for (int j = 0; j < 8; j += 2) exchange<kFar / 4>(v[j], v[j + 1]);
 }
 
-// Bits x of 64 rows z become bits z of 64 planes x, for as many rows y side by side as there are lanes.
+// Transposes bits x of 64 rows z to bits z of 64 planes x, for as many adjacent rows y as there are lanes.
 template <unsigned kStored>
 void transpose_bits(const std::uint64_t* from, std::uint64_t* to) {
   const auto put = [&](int plane, Words v) {

@@ -113,7 +113,7 @@ TEST(SmoothOcclusionOfPlaces, IsTheSameInAnyOrderAndCompany) {
   std::normal_distribution<float> normal;
   std::vector<Vec3> positions;
   std::vector<Vec3> normals;
-  // So many in one slice that they take several calls of a kernel.
+  // Enough in one slice for several kernel calls.
   for (int i = 0; i < 30'000; ++i) {
     const float z = i % 2 == 0 ? at(random) : -3.0F + 0.5F * std::sin(static_cast<float>(i));
     positions.emplace_back(at(random), at(random), z);

@@ -113,7 +113,7 @@ CornerOffsets offsets_of(unsigned solid) {
   for (unsigned face = 0; face < kCornerFaces; ++face) {
     const Sides& of = sides[sheets.of(face)];
     if (of.solid == 0) continue;
-    // Apart into what each sheet has for itself.
+    // Moves the sheets apart, each towards the voxels that belong to it alone.
     const Vec3 away = mean_of(shares_solid ? of.open : of.solid);
     offsets[face] = glm::length(away) > 0.0F ? glm::normalize(away) * kApart : Vec3(0.0F);
   }

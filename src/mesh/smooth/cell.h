@@ -162,8 +162,8 @@ struct SampleAxis {
   return 1.0F - static_cast<float>(in_air) * (1.0F / 27.0F);
 }
 
-/// Returns the depth, in cells: a sample as deep as this counts as solid in any case. A smaller depth would give spikes
-/// next to corners with densities just below 0.
+/// Returns a depth in cells. Samples at least this deep always count as solid. A smaller depth would give spikes next
+/// to corners with densities just below 0.
 [[gnu::always_inline]] inline float whole_depth(float spread) {
   return spread * 0.125F;
 }

@@ -46,7 +46,7 @@ TEST(SmoothClosure, ASphereIsOneClosedSurfaceWhereverBordersLie) {
 TEST(SmoothClosure, ABoxWithFacesOnTheLatticeIsClosed) {
   for (const IVec3 first : {IVec3{3, 4, 5}, IVec3{60, 60, 60}, IVec3{-5, 63, 0}, IVec3{0, 0, 0}, IVec3{64, -64, 64}}) {
     const IVec3 last = first + IVec3{5, 7, 3};
-    // The density is 0 on the box's faces: those samples are air, as 0 is.
+    // The density is 0 on the box's faces. These samples are air, since 0 is air.
     const DensityGrid grid = grid_of({first - 3, last + 4}, [&](DVec3 p) {
       const DVec3 away = glm::max(DVec3(first) - p, p - DVec3(last));
       return std::max({away.x, away.y, away.z});

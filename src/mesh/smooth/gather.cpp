@@ -33,7 +33,7 @@ std::uint64_t solid_row(const DensityChunk* chunk, Half outside, ChunkCoordinate
   return chunk->solid_row(y.sample, z.sample);
 }
 
-// Some rows of a slice of a chunk.
+// A range of rows in a slice of a chunk.
 struct Rows {
   int first = 0;
   int count = kChunkEdge;

@@ -29,7 +29,7 @@ float density_of(Half half) {
   return std::bit_cast<float>(bits) * 0x1p112F;
 }
 
-// By x + 2 y + 4 z, of rows that lie `stride` apart.
+// Reads corners by x + 2 y + 4 z, from rows at a distance of `stride`.
 Corners corners_at(const Half* low, const Half* high, std::ptrdiff_t stride) {
   return {density_of(low[0]),  density_of(low[1]),  density_of(low[stride]),  density_of(low[stride + 1]),
           density_of(high[0]), density_of(high[1]), density_of(high[stride]), density_of(high[stride + 1])};

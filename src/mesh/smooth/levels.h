@@ -175,8 +175,8 @@ using MeshOwnCells = std::function<void(SmoothChunkMesh& out)>;
 /// Edges:    the shortest lattice edges at each position: on a face or a line between chunks, the edges of the finest
 ///           chunk that touches it. Each crossed edge gives a polygon that connects the vertices of the three or four
 ///           cells around it.
-/// Vertices: a cell that touches no finer chunk along a face or an edge has the vertex of the fast kernels, bit for
-///           bit. Any other cell has a vertex if a shortest edge on its boundary is crossed: at the mean of the crossings,
+/// Vertices: a cell that touches no finer chunk along a face or an edge has the exact vertex of the fast kernels.
+///           Any other cell has a vertex if a shortest edge on its boundary is crossed: at the mean of the crossings,
 ///           weighted by length.
 /// Order:    the fast kernel's vertices and quads, then the missing vertices, the quads, the triangles.
 /// Requires: options.border is Shared.

@@ -1,13 +1,13 @@
-// Occlusion by lists, for every kernel: a sample whose cell has eight corners of one sign needs no interpolation, since
-// with fractions below 1 the sign stays to the last bit. So each vertex looks its 27 cells up in words, and only those
-// samples are listed whose value is needed.
+// Occlusion by lists, for every kernel. A sample whose cell has eight corners of one sign needs no interpolation, since
+// with fractions below 1 the sign is exact. Each vertex therefore looks up its 27 cells in words, and lists only the
+// samples that need interpolation.
 //
-//   27 cells       | 0 | 0 | ? | 1 | ...      0: corners in air, adds nothing. 1: solid corners, counts as one where
-//                                             samples are counted. ?: listed
-//   codes          vertex << 5 | sample       of the listed samples of 32 vertices, one after the other
+//   27 cells       | 0 | 0 | ? | 1 | ...      0: corners in air, adds nothing. 1: solid corners, adds one if samples
+//                                             are counted. ?: listed
+//   codes          vertex << 5 | sample       of the listed samples of 32 vertices, in order
 //   values, bits   a number and a bit each    the part that a sample adds; set if it is solid
 //
-// Kernels give find_batch, find_values, list_samples and add_up.
+// The kernels define find_batch, find_values, list_samples and add_up.
 
 #pragma once
 
@@ -41,12 +41,12 @@ struct Batch {
   alignas(64) std::uint8_t solid[kBatch * kSamples / 8 + 16];  // a bit per code
   std::uint32_t listed[kBatch];                                // a bit per sample; AVX-512 alone
   std::int32_t first_code[kBatch + 1];
-  std::int32_t whole[kBatch];  // how many samples are solid without being listed
+  std::int32_t whole[kBatch];  // number of samples that are solid without being listed
 };
 
 constexpr int kSliceBias = 16;
 
-// Returns the window that holds the samples from a column (counted from -16) on.
+// Returns the window with the samples that start at a column (counted from -16).
 constexpr int window_of(int column) {
   return column < kSecondWindow + kPointX ? 0 : 1;
 }
@@ -135,15 +135,16 @@ Sum sum_of(const Batch& batch, std::size_t v) {
 }
 #endif
 
-// Makes one number of the samples' values.
+// Combines the sum of the samples' values into the occlusion.
 float occlusion_of_sum(const Sum& sum, const SmoothOcclusionOptions& options) {
   if (options.method == SmoothOcclusion::SoftShare) return soft_share(sum.sum);
   return weighted_occlusion(sum.sum, sum.least, options);
 }
 
-// Each kernel gives these: the cells and fractions of up to 32 vertices from `first` on; the values and solid
-// bits of `count` codes, as far as the form of occlusion needs them (returns whether any is solid); and, from these,
-// the occlusion of `count` vertices with a solid sample each, whose numbers are in `which`.
+// Each kernel defines these functions. find_batch finds the cells and fractions of up to 32 vertices, starting at
+// `first`. find_values computes the values and solid bits of all codes, as far as the form of occlusion needs them, and
+// returns true if any is solid. The next function computes the occlusion of `count` vertices with at least one solid
+// sample, whose numbers are in `which`.
 template <int kSpread>
 void find_batch(const Work& work, const Slice& slice, std::size_t first, std::size_t count, Batch& batch);
 template <int kSpread, bool kCounted>

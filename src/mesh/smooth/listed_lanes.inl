@@ -2,7 +2,7 @@
 
 #pragma once
 
-// First: what these lanes append with is used by the lists.
+// Included first: the lists use the append functions of these lanes.
 #include "mesh/smooth/vectors.inl"
 
 #include "mesh/smooth/listed.inl"
@@ -215,8 +215,8 @@ void find_first_words(const Work& work, std::size_t count, const Batch& batch, F
 
 #ifdef QUOIN_KERNEL_AVX512
 
-// Finds the words of a vertex' 27 cells. A register holds {listed, whole} of four rows, of three slices one
-// upon the other: of sample s word 8 j or 8 j + 4 of 16 bits, and in it a bit.
+// Finds the words of a vertex' 27 cells. A register holds {listed, whole} of four rows, with the bits of three slices
+// in the same words: sample s has a bit in 16-bit word 8 j or 8 j + 4.
 template <int kSpread>
 struct WordTable {
   static constexpr int kBitOfSlice[3] = {0, kSpread == 1 ? 3 : 1, 6};
@@ -356,7 +356,7 @@ std::size_t list_samples(const Work& work, std::size_t count, Batch& batch) {
       const auto first = static_cast<unsigned>(v << kCodeShift);
       auto left = static_cast<std::uint64_t>(_mm_cvtsi128_si64(bits));
       const int listed = std::popcount(left);
-      // By fours: the processor cannot foresee the end of a short loop. Later codes overwrite those that are too many.
+      // In steps of four: the end of a short loop is unpredictable. Later codes overwrite the excess ones.
       std::uint16_t* to = end;
       do {
         for (int i = 0; i < 4; ++i, left &= left - 1) {

@@ -1,6 +1,6 @@
-// Occlusion where many cells are active, with whole-number spreads, as many vertices at a time as a register holds
-// eight lanes. All 27 samples share one fraction then: six rows of points along x in each of six slices, interpolated
-// along z, y and x in turn.
+// Occlusion for slices with many active cells and integer spreads, as many vertices at a time as a register has
+// groups of eight lanes. All 27 samples of a vertex then share one fraction: six rows of points along x in each of six
+// slices, interpolated along z, y and x in turn.
 //
 //   slices z, z + 1 -> one; rows y, y + 1 -> one: nine rows of eight points     | . . . . . . . . |
 //   of two rows the points 0, s, 2 s each, s the spread                          | a a a b b b - - |
@@ -55,7 +55,7 @@ void decode_slice(Work& work, int z) {
   }
 }
 
-// Makes sure that all is there that the vertices of slice z of cells are occluded by.
+// Decodes all samples that the occlusion of vertices in slice z of cells reads.
 void decode_around(Work& work, int z) {
   const int last = z + work.apron + 1;
   for (int next = std::max(work.next_slice, z - work.apron); next <= last; ++next) decode_slice(work, next);
@@ -105,7 +105,7 @@ inline F part_of(F density) {
   return kPart == Part::All ? density : min(density, all(0.0F));
 }
 
-// The nine rows along x that are left after interpolating along z and y, and one of zeros.
+// The nine rows along x after interpolation along z and y, and one row of zeros.
 struct NineRows {
   F v[10];
 };

@@ -25,7 +25,7 @@ float when_open(SmoothOcclusion form) {
   return form == SmoothOcclusion::WeightedPublished ? 0.4F * 0.4F : 0.0F;
 }
 
-/// A field as far as a vertex of the middle chunk may read; the rest is not computed.
+/// A field within reach of the middle chunk's vertices; the rest is not computed.
 World world_of(const std::function<double(IVec3)>& field) {
   const int reach = reach_of(SmoothOcclusionOptions{});
   return World([&](IVec3 p) {
@@ -193,7 +193,7 @@ TEST(SmoothOcclusion, IsTheSameOfAFieldThatGrowsWithItsCellsAndSpread) {
   }
 }
 
-// Hills and caves, as far as meshes of level 2 may read.
+// Hills and caves within reach of level-2 meshes.
 World rugged() {
   return World([](IVec3 p) {
     const DVec3 at(p);

@@ -1,4 +1,4 @@
-// Every kernel gives the bytes of the slow, obvious mesher.
+// Every kernel returns the bytes of the slow, obvious mesher.
 
 #include <array>
 #include <cstring>

@@ -1,7 +1,7 @@
-// The cells around a slice, for every kernel: says which of them occlusion has to interpolate.
+// Finds the cells around a slice that occlusion must interpolate, for every kernel.
 //
-//   points        signs[z & 1][window][row]            a bit per point: it is solid
-//   cells         cell_words[z & mask][window][slot]   two bits per cell: a sample in it is to be listed; it is solid
+//   points        signs[z & 1][window][row]            one bit per point: solid
+//   cells         cell_words[z & mask][window][slot]   two bits per cell: a sample in it must be listed; it is solid
 //   points again  sampled[z & mask][row][column]       halves, of the rows that a listed cell touches
 //
 //   columns  -16        16                  48        79      Two windows of 64 columns, so that one word holds
@@ -15,7 +15,7 @@
 namespace quoin::smooth {
 namespace {
 
-// Registers that take the rows of three samples at once need those of spread 2 side by side.
+// Registers that read the rows of three samples at once need adjacent rows at spread 2.
 #ifdef QUOIN_KERNEL_AVX2
 template <int kSpread>
 constexpr int kRowStep = kSpread == 2 ? 2 : 1;
@@ -40,7 +40,7 @@ RowSet find_cell_words(Work& work, int z, int window) {
   const std::uint64_t columns = known_columns(work, window);
   std::uint64_t rows[2] = {};
 #ifdef QUOIN_KERNEL_AVX512
-  // A register holds the listed and whole words of four rows: the even ones, and the odd ones.
+  // One register holds the listed and whole words of four rows: even rows, then odd rows.
   const bool is_apart = work.row_step == 2;
   for (int row = 0; row < kReachRows; row += 8) {
     const __m512i a = _mm512_loadu_si512(low + row), b = _mm512_loadu_si512(low + row + 1);
@@ -85,7 +85,7 @@ void find_cell_words(Work& work, int z) {
   rows.unite(find_cell_words<kCounted>(work, z, 1));
 }
 
-// Copies the rows of points of slice z that listed cells touch, as far as vertices read them.
+// Copies the rows of points of slice z that listed cells touch, within the range that vertices read.
 void copy_sampled(Work& work, int z) {
   const auto touched = [&](int slice) { return work.listed_rows[static_cast<std::size_t>(slice & work.ring_mask)]; };
   RowSet rows = touched(z);
@@ -95,7 +95,7 @@ void copy_sampled(Work& work, int z) {
   rows.for_each([&](int y) { gather_row(work, y, z, work.sampled_row(y, z)); });
 }
 
-// Makes sure that all is there that the vertices of slice z of cells are occluded by.
+// Finds all cells that the occlusion of vertices in slice z of cells reads.
 template <int kSpread>
 void find_cells_around(Work& work, int z) {
   const bool is_counted = work.occlusion.method == SmoothOcclusion::SolidShare;

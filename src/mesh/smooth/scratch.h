@@ -233,10 +233,9 @@ void mesh_avx512(Work& work, SmoothChunkMesh& out);
 
 // The maximum number of samples per call.
 inline constexpr std::size_t kPlacesAtOnce = 4096;
-// The occlusion of `count` places in slice z of cells, which `places`, `fractions` and `normals` of the work hold.
-// Writes up to 64 numbers more.
-// Requires: `chunks`, `apron` and `occlusion_rows` are set, `begin_occlusion` was called, slices come in their order;
-// 0 < count <= kPlacesAtOnce, and 64 more places than that can be read.
+// Computes the occlusion of `count` samples in slice z of cells, given by `places`, `fractions` and `normals` of the
+// work. Writes up to 64 more numbers. Requires: `chunks`, `apron` and `occlusion_rows` are set, `begin_occlusion` was
+// called, and slices come in order; 0 < count <= kPlacesAtOnce, and 64 additional places are readable.
 void occlude_plain(Work& work, int z, std::size_t count, float* occlusion);
 void occlude_avx2(Work& work, int z, std::size_t count, float* occlusion);
 void occlude_avx512(Work& work, int z, std::size_t count, float* occlusion);

@@ -80,14 +80,14 @@ constexpr std::array<int, 3> along_diagonal(int v_sign) {
   return along;
 }
 
-// Each kernel gives these, and finds the places of bits: vertices, occlusion and quads.
+// Each kernel defines these functions for vertices, occlusion and quads, and append_places.
 void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChunkMesh& out);
 void add_occlusion(Work& work, const Slice& slice, std::size_t count, float* occlusion);
 template <Axis kAxis>
 void make_quads(const Work& work, const Slice& slice, std::size_t count, std::uint32_t* out);
 
 #ifndef QUOIN_KERNEL_AVX512
-// One by one.
+// Appends places one by one.
 std::uint16_t* append_places(std::uint64_t bits, int first_place, std::uint16_t* end) {
   for (; bits != 0; bits &= bits - 1) *end++ = static_cast<std::uint16_t>(first_place + std::countr_zero(bits));
   return end;
@@ -155,7 +155,7 @@ bool find_needed(Work& work) {
   return is_any;
 }
 
-// True where so many cells are active that most samples would be listed.
+// Returns true if so many cells are active that most samples would be listed.
 bool has_many_active(const Work& work) {
   std::int64_t active = 0;
   for (int z = 0; z < work.cells.last; ++z) {

@@ -37,7 +37,7 @@ std::size_t edge_between(int a, int b) {
   return static_cast<std::size_t>(4 * axis + first[(axis + 1) % 3] + 2 * first[(axis + 2) % 3]);
 }
 
-// The corners of a face, one after the other around it.
+// Returns the corners of a face, in order around it.
 std::array<int, 4> face_corners(int face) {
   const int axis = face / 2;
   const IVec3 base = unit_axis(axis) * (face % 2);
@@ -65,7 +65,7 @@ bool is_solid_corner(std::uint32_t solid, int corner) {
   return (solid >> corner & 1U) != 0;
 }
 
-// Four crossings: opposite corners are alike, neighbours are not.
+// Returns true if a face has four crossings: opposite corners are equal, adjacent corners differ.
 bool has_four_crossings(std::uint32_t solid, const std::array<int, 4>& corners) {
   return is_solid_corner(solid, corners[0]) == is_solid_corner(solid, corners[2]) &&
          is_solid_corner(solid, corners[1]) == is_solid_corner(solid, corners[3]) &&

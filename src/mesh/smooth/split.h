@@ -36,7 +36,7 @@ int joined_face(std::uint32_t solid);
 ///
 /// Quads:    the first `quad_indices` of the indices, six per quad.
 /// Bridges:  with `join_diagonals`, two cells that both have all crossings of their common face in one sheet get two
-///           vertices on that face, one for each of its air corners, on the edge that joins the two cells. Each of these
+///           vertices on that face, one for each of its air corners, on the edge that joins the two cells. Each of the
 ///           edges then has two triangles instead of four. Quads along such an edge become polygons, which come last.
 /// Order:    a cell's first sheet keeps the cell's vertex index; the other sheets are appended.
 /// Proof:    docs/decisions/archive/021-two-sheets.md.

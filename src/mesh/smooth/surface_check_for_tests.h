@@ -74,7 +74,7 @@ inline std::uint64_t hash_of(unsigned seed, IVec3 p) {
   return h ^ h >> 32;
 }
 
-/// Every sample at random, of its own.
+/// An independent random value for every sample.
 inline Field scatter(unsigned seed, double solid_share = 0.5) {
   return [=](DVec3 p) {
     const std::uint64_t random = hash_of(seed, IVec3(p));
@@ -85,7 +85,7 @@ inline Field scatter(unsigned seed, double solid_share = 0.5) {
 
 /// A mesh as a surface: how its triangles meet.
 struct SurfaceCount {
-  std::int64_t vertices = 0;  ///< those that a triangle uses
+  std::int64_t vertices = 0;  ///< vertices that a triangle uses
   std::int64_t unused_vertices = 0;
   std::int64_t edges = 0;
   std::int64_t triangles = 0;
@@ -195,7 +195,7 @@ inline SurfaceCount count_surface(const SmoothMesh& mesh, bool with_fans = false
   return count_surface(mesh.indices, mesh.positions.size(), with_fans);
 }
 
-/// No open edge, and nothing that is there for nothing.
+/// Expects no open edge, and no unused vertex or degenerate triangle.
 inline void expect_closed(const SurfaceCount& count) {
   EXPECT_GT(count.triangles, 0);
   EXPECT_EQ(count.odd_edges, 0) << count;

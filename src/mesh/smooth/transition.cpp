@@ -41,7 +41,7 @@ class Transitions {
   [[nodiscard]] float density(IVec3 sample) const { return float_from_half(chunks_.get(sample)); }
   [[nodiscard]] bool is_solid(IVec3 sample) const { return DensityChunk::is_solid(chunks_.get(sample)); }
 
-  // Gives the own cells that touch a finer chunk their vertex.
+  // Computes the vertices of the chunk's own cells that touch a finer chunk.
   void mend_own_cells() {
     const int level = levels_.of_chunk(IVec3{0});
     if (level == 0) return;

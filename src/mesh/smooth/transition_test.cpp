@@ -102,7 +102,7 @@ struct VertexBits {
 
 VertexBits bits_of(const SmoothChunkMesh& mesh, std::size_t i) {
   VertexBits vertex;
-  // The same place relative to the cell's own chunk: exact, as both are multiples of 2^-16 of at most 64.
+  // The position relative to the cell's own chunk: exact, as both are multiples of 2^-16 of at most 64.
   const Vec3 position = mesh.positions[i] - Vec3(mesh.cells[i].chunk_offset() * kChunkEdge);
   std::memcpy(vertex.bits.data(), &position, 12);
   std::memcpy(vertex.bits.data() + 3, &mesh.normals[i], 12);
@@ -110,7 +110,7 @@ VertexBits bits_of(const SmoothChunkMesh& mesh, std::size_t i) {
   return vertex;
 }
 
-// Meshes the chunks of a box one by one; a cell's vertex must be the same in each that has it.
+// Meshes the chunks of a box one by one. All chunks that have a cell's vertex must agree on it.
 void expect_that_chunks_agree(const DensityGrid& grid, const std::function<int(IVec3)>& level_of, bool split) {
   std::map<std::tuple<int, int, int, std::uint32_t>, VertexBits> known;
   SmoothMesher mesher;

@@ -46,7 +46,7 @@ class NearbyDensities {
   std::array<Row, 4> rows_;
 };
 
-/// Writes all that a mesh knows of a vertex to an index that is there already.
+/// Writes all attributes of a vertex to an existing index.
 inline void write_vertex(const DensityNeighbourhood& chunks, const SmoothOcclusionOptions& occlusion,
                          const LevelCell& cell, const CellVertex& vertex, std::uint32_t index, SmoothChunkMesh& out) {
   out.positions[index] = Vec3(cell.first) + vertex.snapped * static_cast<float>(cell.size());

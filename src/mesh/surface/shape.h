@@ -20,15 +20,15 @@ struct Shape {
 
 /// Moves the vertices of a chunk's mesh. Vertices of cells before the chunk get the same bits as in the chunk before.
 ///
-/// Smoothness: the remaining share of the way from the middle of the cell to the vertex. For a cell with several sheets it
-///             is at least 1/256, so that the sheets do not meet.
+/// Smoothness: the remaining share of the way from the middle of the cell to the vertex. For a cell with several sheets
+///             it is at least 1/256, so that the sheets do not meet.
 /// Thin:       a sample is thin along an axis if both neighbours there have the other sign, and it does not continue
-///             diagonally on either side. A wall at 45 degrees, which is smooth and thick enough, is therefore not thin.
+///             diagonally on either side. A wall at 45 degrees, smooth and thick enough, is therefore not thin.
 ///             Vertices of level-0 cells with a corner that is thin along an axis keep a third of that way along it.
-/// Bodies:     in a level-0 cell with samples of several bodies and one sheet, the vertex is the mean of the crossings of
-///             all edges between different bodies or air, in the middle if both ends are solid. It is kept as if thin. The
-///             normal is the normal of the whole field, if that is crossed. Quads with such a vertex are split again, so
-///             that two bodies choose the same diagonal.
+/// Bodies:     in a level-0 cell with samples of several bodies and one sheet, the vertex is the mean of the crossings
+///             of all edges between different bodies or air, in the middle if both ends are solid. It is kept as if
+///             thin. The normal is the normal of the whole field, if that is crossed. Quads with such a vertex are
+///             split again, so that two bodies choose the same diagonal.
 /// Cost:       up to 0.5 ms per chunk for thin features.
 void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& options, const Shape& shape,
                     SmoothChunkMesh& mesh);

@@ -48,11 +48,11 @@ bool has_finite_positions(const SmoothMesh& mesh) {
 
 /// The distance between vertices at one position that must stay separate.
 constexpr float kApart = 1.0F / 1024.0F;
-/// The share of the error that the library is allowed: it bounds a mean of squares, and single vertices of smooth
-/// surfaces are up to twice as far off.
+/// The share of the error that the library may use. The library bounds a mean of squares, and single vertices of smooth
+/// surfaces deviate up to twice as far.
 constexpr float kMeanShare = 0.8F;
-/// Errors that the library is allowed in turn, each this share of the one before. A larger step makes the number of
-/// triangles jump up and down as the error grows.
+/// The ratio between consecutive error levels for the library. A larger step makes the number of triangles jump up and
+/// down as the error grows.
 constexpr float kLevelShare = 0.84F;
 constexpr int kLevels = 16;
 /// If at most one in this number of positions deviates too far, the mesh stays unchanged around these positions.
@@ -68,16 +68,16 @@ constexpr int kMostStayRounds = 12;
 constexpr int kRoundsOfFirstLevel = 4;
 /// A value in place of a level's number, for such a search.
 constexpr int kMostStay = kLevels;
-/// A try that removes no more than one of so many triangles, and is too far off, is the last one.
+/// If an attempt removes at most one in this number of triangles and deviates too far, it is the last one.
 constexpr std::size_t kHardlyAny = 1'000;
-/// The level of a mesh with more triangles than this is found on a sample of about so many.
+/// The level of a mesh with more triangles than this is determined on a sample of about this size.
 constexpr std::size_t kSampleTriangles = 12'000;
 constexpr std::size_t kLeastSampled = 4 * kSampleTriangles;
 /// The edge of the boxes that the sample consists of, in samples of the field.
 constexpr double kSampleBox = 12.0;
 /// The least number of these boxes: one box says little about the others.
 constexpr int kSampleBoxes = 16;
-/// If the sample loses no more than one of so many triangles, the mesh cannot be simplified.
+/// If the sample loses at most one in this number of triangles, the mesh cannot be simplified.
 constexpr std::size_t kLeastLoss = 100;
 
 /// Returns, for each vertex, the first vertex at its position. Colours and normals may have split a position into
@@ -192,9 +192,9 @@ std::vector<bool> vertices_on_border(const SmoothMesh& mesh) {
   return is_on_border;
 }
 
-/// Merges the corners of each vertex of the simpler triangles into one. So a closed mesh stays closed by vertex, not by
-/// position alone. Corners differ where a zero-length edge had triangles, which are gone, and where surfaces touch.
-/// Corners on a border of the mesh keep apart: lines between colours are borders.
+/// Merges the corners of each vertex of the simpler triangles into one, so that a closed mesh stays closed by vertex
+/// and not only by position. Corners differ where a zero-length edge had triangles, which are gone, and where surfaces
+/// touch. Corners on a border of the mesh stay separate: lines between colours are borders.
 void merge_corners(const SmoothMesh& mesh, Triangulation& simple) {
   std::vector<std::uint32_t> first(simple.positions.size(), ~0U);
   const auto joined = [&](std::size_t i) -> std::uint32_t {

@@ -80,7 +80,7 @@ std::size_t open_edges(const SmoothMesh& mesh) {
   return open;
 }
 
-/// As simplifying does it, for meshes whose vertices are all in places of their own.
+/// Applies the manifold repair of the simplifier, for meshes whose vertices all have distinct positions.
 void make_one_manifold(SmoothMesh& mesh) {
   Triangulation triangles{mesh.positions, mesh.indices, mesh.indices};
   make_manifold(triangles, 0.0F);
@@ -217,11 +217,11 @@ TEST_F(Simplify, TouchingSurfacesStayClosed) {
   }
 }
 
-/// By looking at every triangle.
+/// Tests every triangle.
 float distance_from(const SmoothMesh& mesh, Vec3 p) {
   float nearest = std::numeric_limits<float>::infinity();
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
-    // As a tree of one triangle, which looks at that alone.
+    // A tree of one triangle tests only that triangle.
     const TriangleTree one(mesh.positions, std::span(mesh.indices).subspan(i, 3));
     nearest = std::min(nearest, one.distance(p, 1e6F));
   }
@@ -328,7 +328,7 @@ TEST_F(Simplify, LeavesALargeMeshThatHardlyShrinks) {
   EXPECT_LT(mesh.indices.size(), whole.indices.size() * 9 / 10);
 }
 
-// A third of the mesh is noise, the rest flat plates. It shrinks alike at every place.
+// A third of the mesh is noise, the rest flat plates. Its position does not affect how much it shrinks.
 TEST_F(Simplify, AMeshThatIsRoughInOnePlaceShrinksWhereverItLies) {
   std::mt19937 random(3);
   std::vector<float> values(std::size_t{23} * 23 * 23);

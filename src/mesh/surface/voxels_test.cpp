@@ -108,7 +108,7 @@ TEST(SmoothVoxels, EachVisibleFaceOfAVoxelIsAQuadOfItsColour) {
         }
       }
     }
-    // A bridge gives two faces a triangle more each.
+    // A bridge gives two faces one additional triangle each.
     for (const auto& [type, count] : faces) {
       EXPECT_GE(quads[type], count);
       EXPECT_LE(quads[type], count + count / 4);
@@ -372,7 +372,7 @@ TEST(SmoothBodies, GlassIsAClosedBodyThatMeetsItsFrameExactly) {
   EXPECT_NEAR(signed_volume(bodies[1]), 2.0 * 14.0 * 13.0, 0.15 * 2.0 * 14.0 * 13.0);
 }
 
-// Every sample of one body's densities, one by one, in rock with water and two kinds of glass.
+// Checks every sample of one body's densities, in rock with water and two kinds of glass.
 TEST(SmoothBodies, OthersAreAsFarOutAsTheyWereIn) {
   const VoxelRegistry types = six_types();
   std::mt19937 random(11);
@@ -384,7 +384,7 @@ TEST(SmoothBodies, OthersAreAsFarOutAsTheyWereIn) {
       const IVec3 size(1 + static_cast<int>(random() % 8), 1 + static_cast<int>(random() % 8), 1);
       grid.fill_box({at, at + size}, static_cast<VoxelType>(random() % 7));
     }
-    if (round == 0) grid.fill_box({{-64, -64, -64}, {128, 128, 128}}, 5);  // nothing but the other body
+    if (round == 0) grid.fill_box({{-64, -64, -64}, {128, 128, 128}}, 5);  // only the other body
     const DensityGrid field = *field_from_grid(grid);
     const DensityChunk& whole = *field.find_chunk({0, 0, 0});
     const DensityChunk before = whole;

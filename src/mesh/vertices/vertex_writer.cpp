@@ -221,7 +221,7 @@ std::size_t face_of(Direction direction) {
   return static_cast<std::size_t>(direction);
 }
 
-// Calls `make(first, count, block)` for blocks of at most `per_block` of something that has `vertices` vertices each.
+// Calls `make(first, count, block)` for blocks of at most `per_block` items with `vertices` vertices each.
 template <class Make>
 void by_blocks(std::size_t count, std::size_t vertices, std::size_t stride, std::byte* out, Make&& make) {
   alignas(64) std::array<std::byte, kBlockBytes> block{};

@@ -26,7 +26,7 @@ Value read(const std::vector<std::byte>& bytes, std::size_t at) {
   return value;
 }
 
-// All that a vertex of blocks can have; some of it twice, oddly placed.
+// All elements that a vertex of blocks can have; some of them twice, at unusual offsets.
 VertexLayout full_layout() {
   return {60,
           {{VertexAttribute::Position, Float32x3, 0},

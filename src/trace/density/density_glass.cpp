@@ -31,7 +31,7 @@ struct BodiesInCell {
 
   Corners densities{};
   std::array<VoxelType, 8> body{};         // kAir, kOpaque, or a transparent type
-  std::array<VoxelType, 8> transparent{};  // of these each once, ascending
+  std::array<VoxelType, 8> transparent{};  // the distinct transparent types, ascending
   std::size_t count = 0;
   bool has_air = false;
   bool has_opaque = false;
@@ -109,7 +109,7 @@ class Crossings {
     const double discriminant = b * b - 4.0 * a * f.c1;
     double low = 0.0;
     if (discriminant > 0.0) {
-      // Without the difference of two numbers that are nearly alike.
+      // Avoids the difference of two nearly equal numbers.
       const double q = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));
       double extremes[2] = {q / a, f.c1 / q};
       if (!(extremes[0] <= extremes[1])) std::swap(extremes[0], extremes[1]);
@@ -192,7 +192,7 @@ class RayInCell {
   const BodiesInCell* cell_;
   trace::CellCubic<double> solid_;
   std::optional<trace::CellCubic<double>> opaque_;
-  std::array<trace::CellCubic<double>, 8> own_{};  // of the cell's transparent materials, where there are several
+  std::array<trace::CellCubic<double>, 8> own_{};  // of the cell's transparent materials, if there are several
 };
 
 // The spans of one cell that is not all of one material, in which the ray is from `t_enter` to `t_exit`.

@@ -43,7 +43,7 @@ class Oracle {
     return types_->is_transparent(material) ? material : kOpaque;
   }
 
-  // The trilinear field of one body; of all that is solid for kAir.
+  // Returns the trilinear field of one body; for kAir, the field of the whole solid.
   [[nodiscard]] double field_of(VoxelType body, const DVec3& p) const {
     const DVec3 whole = glm::floor(p);
     const DVec3 f = p - whole;
@@ -88,7 +88,7 @@ std::vector<GlassSpan> spans_along(const DensityGlass& glass, const Ray& ray, do
   return spans;
 }
 
-// Those that follow on each other, of one type, as one.
+// Joins consecutive spans of one type.
 std::vector<GlassSpan> joined(const std::vector<GlassSpan>& spans) {
   std::vector<GlassSpan> bodies;
   for (const GlassSpan& span : spans) {

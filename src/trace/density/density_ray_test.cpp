@@ -31,7 +31,8 @@ class Dense {
     return sum;
   }
 
-  // The least density on the ray from `from` to `to`, by many samples: more than a cubic has extremes in a cell.
+  // Returns the lowest density on the ray from `from` to `to`, from many samples: more than a cubic has extremes in a
+  // cell.
   [[nodiscard]] double least(const Ray& ray, double from, double to) const {
     const double step = 0.02 / glm::length(ray.direction);
     double least = kInfinity;
@@ -50,7 +51,7 @@ struct Tally {
   int left_out = 0;
 };
 
-// The least index of a solid corner among the nearest to a point of a cell.
+// Returns the material of the nearest solid corner to a point of a cell; the one with the lowest index at ties.
 VoxelType material_at(const DensityGrid& field, IVec3 cell, const DVec3& p) {
   double least = kInfinity;
   VoxelType found = kAir;
@@ -347,7 +348,7 @@ TEST_P(DensityRays, AreThoseOfTheWalkInDoubleHoweverFarTheyGo) {
   EXPECT_LE(others, 2);
 }
 
-// As two turns of 90 degrees leave it: less than walks heed, on a whole coordinate.
+// As after two turns of 90 degrees: below the walks' threshold for motion, on an integer coordinate.
 TEST_P(DensityRays, ThatHardlyMoveAlongAnAxisStandStillThere) {
   DensityGrid field;
   field.add_box({300, 20, 20}, {310, 100, 100}, 1);

@@ -22,7 +22,7 @@
 namespace quoin::trace {
 namespace {
 
-/// A ray as cells see it, or several side by side; by axis.
+/// A ray in the form that cell tests use, or several rays in lanes; by axis.
 template <class V>
 struct CellRayOf {
   V origin[3];
@@ -58,7 +58,7 @@ inline V greatest(V a, V b) {
   return a < b ? b : a;
 }
 
-/// The ray's stretch in a cell.
+/// The ray's interval in a cell.
 template <class V>
 struct CellSpan {
   V t_in;
@@ -79,7 +79,7 @@ inline CellSpan<V> span_in(const CellRayOf<V>& ray, const V (&cell)[3]) {
   return {t_in, greatest(least(least(last[0], last[1]), last[2]), t_in)};
 }
 
-/// The cubic of a cell along a ray, in powers of s; of one cell, or of several side by side.
+/// The cubic of a cell along a ray, in powers of s; for one cell, or for several in lanes.
 template <class V>
 struct CellCubic {
   V c0, c1, c2, c3;
@@ -168,7 +168,7 @@ inline double first_negative(const CellCubic<double>& f) {
   const double discriminant = b * b - 4.0 * a * f.c1;
   double low = 0.0;
   if (discriminant > 0.0) {
-    // Without the difference of two numbers that are nearly alike.
+    // Avoids the difference of two nearly equal numbers.
     const double q = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));
     double extremes[2] = {q / a, f.c1 / q};
     if (!(extremes[0] <= extremes[1])) std::swap(extremes[0], extremes[1]);

@@ -228,7 +228,7 @@ class FieldLanes {
     count_ += std::popcount(bits(which));
   }
 
-  // Tests groups of cells while at least that many are left. Returns all lanes with a hit so far.
+  // Tests groups of cells while at least `least_count` cells are left. Returns all lanes with a hit so far.
   Mask ask(int least_count) {
     int first = 0;
     for (; count_ - first >= least_count; first += kCellsAtOnce) {

@@ -129,8 +129,8 @@ inline Doubles gather_doubles(const double* table, Ints at) {
 }
 #endif
 
-// Halves in bits 16 to 31 that are neither infinite nor NaN. As float_from_half: the product moves the exponent, and
-// makes subnormals normal.
+// Converts halves in bits 16 to 31 that are neither infinite nor NaN. Like float_from_half: the multiplication moves
+// the exponent and normalizes subnormal numbers.
 template <int kLanes>
 inline Floats<kLanes> floats_from_halves(Int32s<kLanes> high) {
   using Signed = Int32s<kLanes>;
@@ -217,7 +217,7 @@ template <int kLanes>
   std::memcpy(corners, numbers, sizeof numbers);
 }
 
-/// A ray in single precision, or several side by side, from a place near its start; by axis.
+/// A ray in single precision, or several rays in lanes, relative to a position near its start; by axis.
 template <class Number>
 struct NearRay {
   Number origin[3];

@@ -20,7 +20,7 @@ inline bool any_short_single(const TreeView& tree, const Ray& ray, double max_t,
   }
   const Blocked blocked = any_at_once(tree, ray, max_t, length);
   unfinished = false;
-  // No branch on whether it met anything, which no processor foresees.
+  // No branch on the hit itself, which is unpredictable.
   if (blocked.is_doubtful) [[unlikely]]
     return any_single<PathTracer>(tree, ray, max_t, unfinished);
   return blocked.is_sure;

@@ -1,7 +1,7 @@
-// The kernel for any processor: rays one by one, walked in plain code, from cell to cell and through occupied cells
-// from voxel to voxel. trace/kernel/lockstep.inl, which walks in the same way, explains the arithmetic.
+// The kernel for any processor. Walks rays one by one in portable code, over cells and, in occupied cells, over voxels.
+// trace/kernel/lockstep.inl, with the same walk, explains the arithmetic.
 //
-//   Steps   the next plane of each axis, and when it is crossed       | plane0 t0 | plane1 t1 | plane2 t2 |
+//   Steps   the next plane of each axis, and the time of its crossing     | plane0 t0 | plane1 t1 | plane2 t2 |
 //   index   of cells: a bit of the flat table; of voxels: as in trace/kernel/numbers.inl
 
 #include "trace/kernel/numbers.inl"
@@ -9,7 +9,7 @@
 namespace quoin::trace {
 namespace {
 
-// A ray's numbers by axis; masks are all ones or zeros. The fourth of each means nothing.
+// A ray's numbers by axis; masks are all ones or zeros. The fourth component is unused.
 struct SingleRay {
   F4 origin;
   F4 direction;
@@ -108,7 +108,8 @@ inline SetUp set_up_single(const TreeView& tree, const Ray& ray, double max_t, S
   return clip_single(tree, out, limit, greatest, moved);
 }
 
-// As `coordinate_after` of the lockstep kernel, for all axes but `axis`, the one just crossed, where it means nothing.
+// Like `coordinate_after` of the lockstep kernel, for all axes except `axis`, the axis of the last crossing, whose
+// result is unspecified.
 inline F4 single_coordinates_after(const SingleRay& ray, float t, F4 low, F4 high, int axis) {
   const F4 position = ray.origin + t * ray.direction;
   const F4 at = max4(min4(floor4(position), high), low);
@@ -133,7 +134,7 @@ inline F4 single_coordinates_after(const SingleRay& ray, float t, F4 low, F4 hig
 struct Stand {
   F4 lower;
   float t;
-  int axis;  // of the last crossing; -1 before the first
+  int axis;  // axis of the last crossing; -1 before the first
 };
 
 // From the box just entered, by its lower and upper voxels, to the voxel.
@@ -156,7 +157,7 @@ inline F4 exit_planes(const SingleRay& ray, F4 lower, float size) {
   return ray.still ? all4(kNever) : moving;
 }
 
-// The next planes of a walk and when it crosses them, each in a variable of its own so that it can live in a register.
+// The next planes of a walk and their crossing times, each in a separate variable so that it can be in a register.
 struct Steps {
   float plane0, plane1, plane2;
   float t0, t1, t2;

@@ -15,7 +15,7 @@
 namespace quoin::trace {
 namespace {
 
-// Eight lanes: what tracing adds to core/lanes_avx2.h.
+// Eight lanes: additions for tracing to core/lanes_avx2.h.
 namespace half {
 
 using namespace lanes_avx2;
@@ -82,7 +82,7 @@ class BrickWindow {
                       has_row ? _mm_maskload_epi32(reinterpret_cast<const int*>(from), is_in) : _mm_setzero_si128());
     }
   }
-  // By x + 4 y + 16 z; further bits do not count.
+  // Returns the codes of bricks by x + 4 y + 16 z; further bits are ignored.
   [[nodiscard]] I brick(I place) const { return gather(bricks_, place & all(63)); }
 
  private:

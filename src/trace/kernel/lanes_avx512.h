@@ -36,7 +36,7 @@ inline void split(const double* from, double corner, I& base, F& rest, F& whole)
   whole.v = _mm512_cvtepi32_ps(_mm512_and_si512(floor, _mm512_set1_epi32(63)));
 }
 
-// The next number below one that is not negative: all that lie below it and are no closer to it than 1e-30.
+// Returns a number below a non-negative number: at least as large as all numbers that are smaller by 1e-30 or more.
 inline F just_below(F a) {
   const __mmask16 is_positive = _mm512_cmp_ps_mask(a.v, _mm512_setzero_ps(), _CMP_GT_OQ);
   const __m512i less = _mm512_mask_sub_epi32(_mm512_castps_si512(_mm512_set1_ps(-1e-30F)), is_positive,
@@ -107,7 +107,7 @@ class BrickWindow {
       layers_[z] = _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
     }
   }
-  // By x + 4 y + 16 z.
+  // Returns the codes of bricks by x + 4 y + 16 z.
   [[nodiscard]] I brick(I place) const {
     const __m512i low = _mm512_permutex2var_epi32(layers_[0], place.v, layers_[1]);
     const __m512i high = _mm512_permutex2var_epi32(layers_[2], place.v, layers_[3]);

@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::uint32_t kAllLanes = (std::uint32_t{1} << kWidth) - 1U;
 
-// Lanes in double precision, as many as a register holds.
+// Lanes in double precision, as many as fit in a register.
 using Doubles = double __attribute__((vector_size(kDoubles * 8)));
 using Longs = std::int64_t __attribute__((vector_size(kDoubles * 8)));
 using Ints = std::int32_t __attribute__((vector_size(kDoubles * 4)));

@@ -47,8 +47,8 @@ constexpr int kCodeY = 4 + 256 * 8;
 constexpr int kCodeZ = 16 + 256 * 64;
 constexpr int kLeft = 256 * (4 + 4 * 8 + 4 * 64);
 
-// Four numbers side by side: x, y, z and an unused one. Divisors have 1 there, positions 0: processors take a slow path
-// for subnormal numbers, in lanes without data too.
+// Four numbers in a register: x, y, z and an unused one. The unused lane of divisors is 1, of positions 0: processors
+// take a slow path for subnormal numbers, even in unused lanes.
 using F4 = float __attribute__((vector_size(16)));
 using I4 = std::int32_t __attribute__((vector_size(16)));
 using D4 = double __attribute__((vector_size(32)));
@@ -95,7 +95,7 @@ enum class Ask : std::uint8_t { Where, Whether };
 
 enum class SetUp : std::uint8_t { Ready, Misses, Unusual };
 
-// A ray as registers hold it.
+// A ray in registers.
 struct RayNumbers {
   D4 position;  // from the tables' origin
   F4 direction;

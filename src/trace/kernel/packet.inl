@@ -153,7 +153,7 @@ inline F beam_t(const BeamAxis& axis, float plane, bool nudges) {
   return nudges ? t - axis.nudge : t;
 }
 
-// Asks the lanes that are left which of them pass the voxel with these lower planes, and records it.
+// Tests which of the remaining lanes pass the voxel with these lower planes, and records the hits.
 inline void meet(BeamLanes& lanes, F4 voxel, Met& met) {
   const F lx = beam_t(lanes.x, voxel[0], lanes.nudges);
   const F ly = beam_t(lanes.y, voxel[1], lanes.nudges);

@@ -1,15 +1,16 @@
-// Says whether one short ray is blocked, in sixteen lanes of AVX-512: all its crossings at once instead of one after
-// the other, so that nothing waits and the answer decides no branch. The same answers as of trace/kernel/single.inl:
-// a crossing so near to an edge, or to the ray's end, that rounding may decide is doubtful, and the walk is asked.
+// Tests if one short ray is blocked, in sixteen lanes of AVX-512. All crossings are computed at once, so there are no
+// dependent steps and the result decides no branch. The results equal those of trace/kernel/single.inl. Crossings near
+// an edge or near the ray's end, where rounding may decide, are doubtful; then the walk decides.
 //
 //   lane       | 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 | 8 | 9 |10 |11 |12 |13 |14 |15 |
 //   crossing   | planes of x   | planes of y       | planes of z ...      |start|
 //   t          by the formula of every walk                                 0
-//   place      origin + t * direction in 65,536ths of a voxel; along the axis crossed the middle of the voxel beyond
+//   place      origin + t * direction in 65,536ths of a voxel; along the crossed axis, the middle of the voxel beyond
 //
-// The ray is mirrored so that it goes forward along every axis, and its places count from the corner of its brick.
-// Along an axis 0 to 15 lie in it and 16 to 31 in the next; where that is mirrored -16 to -1 (in five bits 16 to 31)
-// lie in it and 0 to 15 in the next. Three tables spread them into brick (of eight), half word and bit.
+// The ray is mirrored to go forward along every axis, and its places are relative to the corner of its brick. On an
+// axis that is not mirrored, places 0 to 15 are in the brick and 16 to 31 in the next one. On a mirrored axis, -16 to
+// -1 (in five bits 16 to 31) are in the brick and 0 to 15 in the next one. Three tables spread the places into brick
+// (of eight), half word and bit.
 
 #pragma once
 
@@ -23,8 +24,8 @@
 namespace quoin::trace {
 namespace {
 
-// Voxels along |x| + |y| + |z| that a ray may reach: with one crossing more on each axis they are at most fourteen, and
-// the last lane is left for where it starts.
+// The maximum of |x| + |y| + |z| for a short ray, in voxels. With one more crossing on each axis there are at most
+// fourteen crossings, and the last lane is left for the start.
 constexpr float kShortRayReach = 11.0F;
 constexpr int kStartLane = 15;
 constexpr float kPlaceUnit = 65536.0F;
@@ -39,9 +40,9 @@ constexpr float kShortRayRatio = 2048.0F;
 constexpr float kLeastMoving = 0x1p-100F;
 
 struct ShortRayTables {
-  // The spread bits of places, as in trace/kernel/packet.inl, of five bits per axis.
+  // The spread bits of places, as in trace/kernel/window.inl, of five bits per axis.
   alignas(64) std::int32_t spread[3][32];
-  // By how many planes of x and of y are crossed: the axis of each lane, and four times the number of its plane.
+  // The axis of each lane, and four times the number of its plane, by the number of crossed planes of x and of y.
   alignas(16) std::uint8_t lanes[16][16][16];
   // For each set of mirrored axes: the spread bits that turn over. Along x these are not the brick's, as bricks come in
   // pairs along x, the lower one first. And the highest bit of the half word, as place_in_run takes it.
@@ -93,27 +94,28 @@ inline __m128i load4(const void* from) {
   return _mm_loadu_si128(static_cast<const __m128i*>(from));
 }
 
-// A mirrored ray, from the corner of the brick in which it starts. Lane 3 stands for the start: it has a plane at 0,
-// and the inverse 1.
+// A mirrored ray, relative to the corner of the brick in which it starts. Lane 3 represents the start: its plane is 0
+// and its inverse 1.
 struct ShortRay {
   __m128 origin;
-  __m128 size;       // of the direction
+  __m128 size;       // absolute values of the direction
   __m128 cell;       // the voxel in which it starts, its nearer corner
   __m128i brick;     // not mirrored
   __m128i backward;  // -1 along axes that are mirrored
   __m128 limit;      // max_t
-  int octant = 0;    // which axes are mirrored
-  __m128i crossed;   // how many planes it may cross at most
+  int octant = 0;    // bits of the mirrored axes
+  __m128i crossed;   // maximum number of planes that it may cross
 };
 
-// Returns false where another way is to be taken. `length`: |x| + |y| + |z| of the direction. Requires: it is short.
+// Returns false if the ray needs another method. `length`: |x| + |y| + |z| of the direction. Requires: it is short.
 inline bool set_up(const TreeView& tree, const Ray& ray, double max_t, double length, ShortRay& out) {
   static_assert(sizeof(Ray) == 6 * sizeof(double));
   const __m128 d = _mm256_cvtpd_ps(_mm256_loadu_pd(&ray.origin.z));  // with the direction behind it
   const __m128 direction = _mm_blend_ps(_mm_permute_ps(d, 0x39), _mm_setzero_ps(), 8);
   const __m128 sign_bit = _mm_set1_ps(-0.0F);
   const __m128 size = _mm_andnot_ps(sign_bit, direction);
-  // As every walk has it, axes of less stand still: sums and quotients of subnormal numbers are slow.
+  // As in every walk, axes with a smaller component count as having no motion: arithmetic with subnormal numbers is
+  // slow.
   const unsigned is_moving = _mm_cmp_ps_mask(size, _mm_set1_ps(kLeastMoving), _CMP_GE_OQ);
   out.size = _mm_maskz_mov_ps(static_cast<__mmask8>(is_moving), size);
   // Rounding may move the crossings of an axis along which a ray creeps past many of another.
@@ -134,7 +136,7 @@ inline bool set_up(const TreeView& tree, const Ray& ray, double max_t, double le
   const __m128 whole = _mm_cvtepi32_ps(_mm_and_si128(own, _mm_set1_epi32(63)));
   const __m128 rest =
       _mm_min_ps(_mm256_cvtpd_ps(_mm256_sub_pd(position, base)), _mm_add_ps(whole, _mm_set1_ps(1.0F - 0x1p-17F)));
-  // From the brick's corner, which rounds nothing.
+  // Relative to the brick's corner; this subtraction is exact.
   const __m128 in_brick = _mm_sub_ps(rest, _mm_cvtepi32_ps(_mm_and_si128(own, _mm_set1_epi32(48))));
   out.backward = _mm_srai_epi32(_mm_castps_si128(direction), 31);
   out.octant = _mm_movemask_ps(direction);
@@ -144,7 +146,7 @@ inline bool set_up(const TreeView& tree, const Ray& ray, double max_t, double le
   return true;
 }
 
-// The eight bricks that start with that of the ray, by x, y and z; those outside the table are empty.
+// Returns the eight bricks from the ray's brick on, by x, y and z; bricks outside the table are empty.
 inline __m256i bricks_of(const TreeView& tree, const ShortRay& ray) {
   const __m128i sizes = load4(&tree.brick_sizes);
   const __m128i strides = _mm_setr_epi32(1, tree.brick_strides.y, tree.brick_strides.z, 0);
@@ -212,7 +214,7 @@ inline Blocked any_at_once(const TreeView& tree, const Ray& ray, double max_t, d
   const I code = {
       _mm512_xor_si512(_mm512_ternarylogic_epi32(x, y, z, 0xFE), _mm512_set1_epi32(kShortRay.flips[own.octant]))};
   const I brick = from_16(I{_mm512_castsi256_si512(bricks_of(tree, own))}, shift_right<12>(code));
-  // As half_of; the code's highest bit is turned over already.
+  // Like half_of; the code's highest bit is already flipped.
   const I in_run = add_saturated_bytes(shift_left<20>(code), shift_left<28>(brick));
   const I at = (brick & all(~15)) + shift_right_signed<25>(in_run);
   const I word = {_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), maybe, at.v, tree.words, 4)};

@@ -78,7 +78,7 @@ inline SpreadStep spread_step(const Axis& axis) {
 // Rays where they start, in a window.
 struct ShortRays {
   Lanes lanes;
-  Planes planes;  // that they cross next
+  Planes planes;  // the next planes to cross
   I code;         // the place
   F max_t;
   F doubt;        // bound of the error of the times when they cross planes
@@ -143,9 +143,9 @@ inline std::uint32_t set_up_short(const TreeView& tree, const Rays& rays, Mask w
   return bits(here);
 }
 
-// Walks rays to their ends through the voxels of a window. Calls `meet(met, unsure)` at each step: the lanes of `met`
-// stand in occupied voxels, whose places are in `rays.code`; lanes of `unsure` may end before. It returns lanes that
-// stop.
+// Walks rays to their ends through the voxels of a window. Calls `meet(met, unsure)` at each step. The lanes of `met`
+// are in occupied voxels, with places in `rays.code`; lanes of `unsure` may have ended before. `meet` returns the
+// lanes that stop.
 template <class Meet>
 [[gnu::always_inline]] inline void walk_window(const TreeView& tree, const IVec3& origin, ShortRays& rays,
                                                Meet&& meet) {
@@ -214,7 +214,7 @@ template <class Walk>
     const IVec3 origin{place_window(start.x), place_window(start.y), place_window(start.z)};
     ShortRays rays;
     const std::uint32_t here = set_up_short(tree, lanes_from(packet, first), mask_of(wanted), origin, rays);
-    // Rays that have little in common gain nothing by windows.
+    // Packets with few rays in a common window do not benefit from it.
     if (2 * std::popcount(here) < std::popcount(wanted)) return wanted;
     walk(origin, rays);
     wanted &= ~here;
