@@ -46,7 +46,7 @@ class BrickStore {
   /// Replaces `brick` by a brick with these words, by cell x + 4 y + 16 z. Requires: the words are neither all empty
   /// nor all full.
   [[nodiscard]] BrickCode put(BrickCode brick, const Node& words);
-  /// Takes one back, if it is neither the empty nor the full one.
+  /// Releases a brick, unless it is the empty or the full one.
   void release(BrickCode brick);
   /// Replaces the words of one of the sixteen slabs of `brick`, cells 4 `slab` and on. The result may be full or empty.
   /// Cost: about ten instructions if the stored lines stay the same.

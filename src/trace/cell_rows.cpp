@@ -7,7 +7,7 @@
 namespace quoin::trace {
 namespace {
 
-// Cells all of whose corners count.
+// Cells whose corners all count.
 class FullRows {
  public:
   explicit FullRows(const SolidRows& samples) : samples_(&samples) {}
@@ -21,8 +21,8 @@ class FullRows {
   const SolidRows* samples_;
 };
 
-// Calls `visit(at, row)` for the first `size` rows along y and z of a chunk: which of its samples are solid and of the
-// materials that count; until it returns false.
+// Calls `visit(at, row)` for the first `size` rows along y and z of a chunk, with the samples that are solid and of a
+// counted material, until it returns false.
 template <class Visit>
 void visit_solid_rows(const DensityChunk& samples, const ChunkRows& materials, IVec3 size, const Visit& visit) {
   SlabRows words;
@@ -91,7 +91,7 @@ void SolidRows::read(const DensityGrid& field, IVec3 chunk, const RowsOf& rows_o
   }
 }
 
-// `offset`: of the chunk, 0 or 1 along each axis; of one beyond, only the first samples are wanted.
+// `offset`: the chunk's offset, 0 or 1 along each axis. In the direction of an offset, only the first samples are read.
 void SolidRows::read_chunk(const DensityChunk& samples, const ChunkRows& materials, IVec3 offset) {
   if (rows_.empty()) {
     rows_.resize(kRows * kRows);
@@ -127,7 +127,7 @@ Slab GlassRows::read(int y, int z, SlabRows& rows) const {
 }
 
 UniformBlocks uniform_glass(const DensityGrid& field, const VoxelRegistry& types, IVec3 chunk) {
-  constexpr int kCell = 64;  // the least of a cell's corners that are the chunk's own
+  constexpr int kCell = 64;  // the first of a cell's corners that belong to the chunk itself
   UniformBlocks blocks;
   const DensityChunk* const samples = field.find_chunk(chunk);
   if (samples == nullptr) return blocks;

@@ -66,7 +66,7 @@ class SolidRows {
   SolidRows(const DensityGrid& field, VoxelType only, IVec3 chunk);
 
   [[nodiscard]] bool none() const { return rows_.empty(); }
-  /// Sample i of a row as bit i, 0 <= y, z <= 64; and sample i + 1.
+  /// Returns sample i of a row as bit i, 0 <= y, z <= 64. `next` returns sample i + 1.
   [[nodiscard]] std::uint64_t at(int y, int z) const { return rows_[index(y, z)]; }
   [[nodiscard]] std::uint64_t next(int y, int z) const {
     return rows_[index(y, z)] >> 1 | std::uint64_t{last_[index(y, z)]} << 63;

@@ -79,7 +79,7 @@ Slab ChunkRows::read(int y, int z, SlabRows& rows) const {
       rows[i] = mask ^ inverted_;
     }
   }
-  // Edits leave slabs behind that are of one type but not stored so.
+  // After edits, a slab may have one type without being stored as uniform.
   return slab_of(rows);
 }
 

@@ -32,7 +32,7 @@ using SlabRows = std::array<std::uint64_t, 16>;  ///< [z][y]
   return any == 0 ? Slab::Empty : all == ~std::uint64_t{0} ? Slab::Full : Slab::Mixed;
 }
 
-/// Rows of a chunk as bits, by asking the palette which types count.
+/// Rows of a chunk as bits. The palette decides which types count.
 class ChunkRows {
  public:
   ChunkRows(const Chunk& chunk, const VoxelRegistry& types, Occupancy which);
@@ -90,7 +90,7 @@ void ChunkRows::for_each_row(const IBox& box, Visit&& visit) const {
   }
 }
 
-/// The box of the voxels that count, row by row.
+/// The box of the counted voxels, computed row by row.
 class RowsBox {
  public:
   void add(int y, int z, std::uint64_t row) {
@@ -100,7 +100,7 @@ class RowsBox {
     y_ |= any << y;
     z_ |= any << z;
   }
-  /// 4x4 full rows.
+  /// Adds 4x4 full rows.
   void add_slab(int y, int z) {
     x_ = ~std::uint64_t{0};
     y_ |= std::uint64_t{15} << y;
@@ -123,7 +123,7 @@ class RowsBox {
   [[nodiscard]] bool covers_brick(IVec3 at) const { return covers(at, 0xFFFF); }
   /// Returns true if no voxel of the 4^3 voxels at `at` can enlarge the box.
   [[nodiscard]] bool covers_cell(IVec3 at) const { return covers(at, 0xF); }
-  /// In chunk coordinates.
+  /// Returns the box in chunk coordinates.
   [[nodiscard]] IBox box() const {
     if (x_ == 0) return {};
     return {{std::countr_zero(x_), std::countr_zero(y_), std::countr_zero(z_)},
@@ -156,7 +156,8 @@ struct BrickRow {
   bool is_full = false;
 };
 
-// 16 rows of 16 nibbles, [z][y][x / 4], become 16 words of 4^3 bits: nibble j of word i becomes nibble i of word j.
+// Transposes 16 rows of 16 nibbles, [z][y][x / 4], to 16 words of 4^3 bits: nibble j of word i becomes nibble i of word
+// j.
 void transpose_nibbles(SlabRows& rows);
 
 /// Reads the 4x4 rows that start at (y, z), multiples of 4, as words of 4^3 voxels, [x].

@@ -24,12 +24,12 @@ using trace::ChunkBricks, trace::ChunkNode, trace::Node, trace::RegionNode;
 // Two tables over the bounding box of all chunks. Kernels for packets read them instead of regions and chunk nodes,
 // because an address is then a sum of products.
 struct FlatTables {
-  IVec3 origin{0};                       // the voxel at the least corner
+  IVec3 origin{0};                       // the voxel at the lowest corner
   IVec3 chunks{0};                       // size
-  std::vector<std::uint32_t> cells;      // a bit a cell of 4^3 voxels; one empty cell around everything
+  std::vector<std::uint32_t> cells;      // one bit per cell of 4^3 voxels, with a border of empty cells
   std::vector<trace::BrickCode> bricks;  // x first, then y, then z; an empty one before and after, for pairs along x
 
-  // Cells from one to the next along x, y, z; cell (0, 0, 0) is bit x + y + z of these.
+  // The steps between cells along x, y, z; cell (0, 0, 0) is bit x + y + z of them.
   [[nodiscard]] IVec3 cell_strides() const { return {1, 16 * chunks.x + 2, (16 * chunks.x + 2) * (16 * chunks.y + 2)}; }
   [[nodiscard]] IVec3 chunk_strides() const { return {1, chunks.x, chunks.x * chunks.y}; }
   [[nodiscard]] IVec3 brick_strides() const { return {1, 4 * chunks.x, 16 * chunks.x * chunks.y}; }
@@ -47,10 +47,10 @@ constexpr std::uint64_t kAll = ~std::uint64_t{0};
 constexpr int kRegionShift = 4;  // chunks, per axis
 // If more slabs than this of a row of four bricks change, fill_row assembles each brick once.
 constexpr int kFewSlabs = 2;
-// Flat tables up to this size are made however sparse the world is.
+// Flat tables up to this size are made for any world, even a sparse one.
 constexpr std::int64_t kSmallTables = std::int64_t{1} << 20;
 
-// Index of a unit in a node's table of 16^3, and its word and bit in a node.
+// The index of a unit in a node's table of 16^3, and its word and bit in a node.
 std::size_t table_index(IVec3 unit) {
   return static_cast<std::size_t>(unit.x + 16 * unit.y + 256 * unit.z);
 }
@@ -212,7 +212,7 @@ struct OccupancyTree::Impl {
     return true;
   }
 
-  // `cells` says which of the words are not 0.
+  // `cells`: the words that are not 0.
   void replace_brick(ChunkNode& node, std::size_t brick, const Node& words, std::uint64_t cells) {
     const bool is_full =
         cells == kAll && std::all_of(words.begin(), words.end(), [](auto word) { return word == kAll; });
@@ -329,7 +329,7 @@ struct OccupancyTree::Impl {
     return changed;
   }
 
-  // The box of a node's occupied voxels, in chunk coordinates.
+  // Returns the box of a node's occupied voxels, in chunk coordinates.
   [[nodiscard]] IBox box_of(const ChunkNode& node) const {
     trace::RowsBox box;
     for (int i = 0; i < 64; ++i) {
@@ -397,7 +397,7 @@ struct OccupancyTree::Impl {
     if (voxels == nullptr) return drop(chunk);
     const bool was_there = chunk_boxes.find(chunk) != nullptr;
     const std::uint64_t changed = put(trace::ChunkRows(*voxels, types, which), chunk, wanted);
-    // Another type may have come where there was one before: then no brick is another.
+    // A voxel may have changed its type without a change of occupancy. Then no brick has changed.
     if (which == Occupancy::Transparent) {
       set_uniform_blocks(chunk, [&](trace::UniformBlocks& blocks) {
         const ChunkSlabs part = was_there ? with_any(node_of(chunk), changed, wanted) : ChunkSlabs::all();
@@ -495,7 +495,7 @@ struct OccupancyTree::Impl {
         bricks.count() * sizeof(Node) + (chunk_nodes.size() - free_chunks.size()) * sizeof(ChunkNode);
     const auto limit = static_cast<double>(std::max(kSmallTables, static_cast<std::int64_t>(used_bytes)));
     const double brick_bytes = 4.0 * 64.0 * size.x * static_cast<double>(size.y) * size.z;
-    // Kernels count bits of cells, and halves of words of bricks, in 32 bits.
+    // Kernels count cell bits and half words of bricks in 32 bits.
     return !chunks.empty() && bricks.line_count() <= trace::kMaxBrickLines &&
            bits_of(cells, size.z) / 8 + brick_bytes <= limit && bits_of(cells, size.z) <= 2e9;
   }

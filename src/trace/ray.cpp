@@ -14,7 +14,7 @@ using trace::face_of, trace::facing, trace::is_usable, trace::Walk;
 
 namespace {
 
-// `first_hit` one step at a time, for rays of any length in worlds of any size.
+// `first_hit` in single steps, for rays of any length in worlds of any size.
 std::optional<RayHit> walk_to_first_hit(const OccupancyTree& tree, const Ray& ray, double max_t) {
   if (!is_usable(ray, max_t)) return std::nullopt;
   Walk walk(tree, ray);

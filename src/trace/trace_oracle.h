@@ -1,6 +1,6 @@
 #pragma once
 
-// The dense one-voxel-at-a-time tracer that the hierarchical one is compared with, in double precision.
+// The dense tracer in double precision, one voxel at a time: the reference for the hierarchical tracer.
 
 #include <array>
 #include <cmath>
@@ -12,7 +12,7 @@
 
 namespace quoin::oracle {
 
-/// Walks voxel by voxel inside `box`, asking the grid for each.
+/// Walks voxel by voxel inside `box`, and reads each from the grid.
 inline std::optional<RayHit> dense_first_hit(const Grid& grid, const IBox& box, const Ray& ray, double max_t) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   std::array<long long, 3> at{};

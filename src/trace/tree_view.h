@@ -32,7 +32,7 @@ namespace quoin::trace {
 /// Bits of 16^3 units: word [z / 4][y / 4][x / 4], bit x % 4 + 4 (y % 4) + 16 (z % 4).
 using Node = std::array<std::uint64_t, 64>;
 
-/// Eight words of a brick, as they are stored.
+/// Eight words of a brick, in storage order.
 using BrickLine = std::array<std::uint64_t, 8>;
 inline constexpr int kBrickLines = 8;
 
@@ -41,10 +41,10 @@ inline constexpr int kBrickLines = 8;
 using BrickCode = std::uint32_t;
 inline constexpr BrickCode kEmptyBrick = 0;
 inline constexpr BrickCode kFullBrick = 16 * kBrickLines;
-/// Lines of all bricks that kernels can count.
+/// The maximum number of lines that kernels can address.
 inline constexpr std::size_t kMaxBrickLines = std::size_t{1} << 27;
 
-/// The lines of a brick that are kept.
+/// The stored lines of a brick.
 struct BrickRun {
   std::uint32_t first = 0;
   int shift = 0;  ///< in lines, -4 to 3: negative if the first lines are omitted
@@ -76,7 +76,7 @@ inline constexpr auto kBrickPlaces = [] {
   return places;
 }();
 
-/// The 64 words of a brick, by cells: x + 4 y + 16 z.
+/// The 64 words of a brick, by cell: x + 4 y + 16 z.
 class BrickWords {
  public:
   /// `middle` is four lines after the very first line, which belongs to the empty brick.
@@ -138,7 +138,7 @@ struct RegionNode {
   std::array<std::uint32_t, 4096> nodes{};  ///< index of a ChunkNode, x + 16 y + 256 z; 0: empty
 };
 
-/// A chunk as walks of single rays read it.
+/// A chunk in the form that walks of single rays read.
 struct FlatChunk {
   std::uint64_t bricks = 0;  ///< non-empty bricks, x + 4 y + 16 z
   const ChunkNode* node = nullptr;
@@ -150,7 +150,7 @@ struct TreeView {
   /// the rest of the tree.
   [[nodiscard]] static const TreeView* of(const OccupancyTree& tree) { return tree.view_; }
 
-  // `origin`, `box` and the strides of chunks, as registers read them.
+  // `origin`, `box` and the strides of chunks, in the layout of registers.
   alignas(32) double corner[4];
   alignas(16) float low[4];
   alignas(16) float high[4];
@@ -163,7 +163,7 @@ struct TreeView {
   const std::uint32_t* words;  ///< halves of the words of `lines`, the lower first
   const BrickLine* lines;      ///< as BrickWords takes them
   const FlatChunk* chunks;     ///< x first, then y, then z
-  DVec3 origin;                ///< of the tables, in the grid
+  DVec3 origin;                ///< origin of the tables, in the grid
   std::uint32_t last_cell_word;
   int first_cell;  ///< bit of the table's cell (0, 0, 0)
   IVec3 cell_strides;
@@ -173,7 +173,7 @@ struct TreeView {
   bool is_small;  ///< no ray from nearby reaches further within the box than kernels go
 };
 
-/// The nodes of a tree, until it changes.
+/// The nodes of a tree, valid until it changes.
 class TreeNodes {
  public:
   explicit TreeNodes(const OccupancyTree& tree);

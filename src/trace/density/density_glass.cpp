@@ -25,9 +25,9 @@ IVec3 corner(std::size_t i) {
   return {static_cast<int>(i & 1U), static_cast<int>(i >> 1 & 1U), static_cast<int>(i >> 2)};
 }
 
-// A cell of a field, and which bodies its corners belong to.
+// A cell of a field, with the bodies of its corners.
 struct BodiesInCell {
-  static constexpr VoxelType kOpaque = 0xFFFF;  // no type's number: kMaxVoxelTypes is less
+  static constexpr VoxelType kOpaque = 0xFFFF;  // not a valid type: kMaxVoxelTypes is less
 
   Corners densities{};
   std::array<VoxelType, 8> body{};         // kAir, kOpaque, or a transparent type
@@ -63,7 +63,7 @@ struct BodiesInCell {
   }
 };
 
-// Reads cells that lie near each other.
+// Reads cells near each other.
 class CellReader {
  public:
   explicit CellReader(const DensityGlass& glass) : glass_(&glass) {}
@@ -170,7 +170,7 @@ class RayInCell {
     return all;
   }
 
-  // The transparent material there; kAir where there is none.
+  // Returns the transparent material at `s`, or kAir if there is none.
   [[nodiscard]] VoxelType at(double s) const {
     if (!(solid_(s) < 0.0) || (opaque_ && (*opaque_)(s) < 0.0)) return kAir;
     std::size_t nearest = 0;
@@ -195,7 +195,7 @@ class RayInCell {
   std::array<trace::CellCubic<double>, 8> own_{};  // of the cell's transparent materials, if there are several
 };
 
-// The spans of one cell that is not all of one material, in which the ray is from `t_enter` to `t_exit`.
+// Visits the spans of one cell with several materials, where the ray is inside from `t_enter` to `t_exit`.
 bool visit_cell(const BodiesInCell& cell, const Ray& ray, const trace::WalkSpan& span, double t_exit,
                 FunctionRef<bool(const GlassSpan&)> visit) {
   const double length = t_exit - span.t_enter;
@@ -239,7 +239,7 @@ void visit_glass(const DensityGlass& glass, const Ray& ray, double max_t, Functi
   const auto largest_here = [&] { return cell.is_full() ? largest(cell.transparent[0]) : 1.0; };
   trace::visit_blocks(glass.cells(), ray, max_t, enter, largest_here, [&](const trace::WalkSpan& span) {
     const double t_exit = std::min(span.t_exit, max_t);
-    if (!(t_exit > span.t_enter)) return true;  // an edge that it only touches
+    if (!(t_exit > span.t_enter)) return true;  // the ray only touches an edge
     if (!cell.is_full()) return visit_cell(cell, ray, span, t_exit, visit);
     return visit({span.voxel, cell.transparent[0], span.t_enter, t_exit, span.starts_inside});
   });

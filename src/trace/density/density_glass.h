@@ -36,7 +36,7 @@ class DensityGlass {
   OccupancyTree cells_;
 };
 
-/// A part of a ray that lies in one transparent material.
+/// A part of a ray inside one transparent material.
 struct GlassSpan {
   IVec3 cell{0};  ///< in which it begins
   VoxelType type = kAir;

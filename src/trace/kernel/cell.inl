@@ -65,7 +65,7 @@ struct CellSpan {
   V t_out;
 };
 
-/// `cell`: the least corner, by axis.
+/// `cell`: the lowest corner, by axis.
 template <class V>
 inline CellSpan<V> span_in(const CellRayOf<V>& ray, const V (&cell)[3]) {
   V first[3];
@@ -87,8 +87,8 @@ struct CellCubic {
   [[nodiscard]] V slope(V s) const { return (3.0 * c3 * s + 2.0 * c2) * s + c1; }
 };
 
-/// `entry` is a point in the cell, 0 to 1 on each axis, and `way` leads from it to where the ray leaves the cell. The
-/// eight corners become four functions of s along z, these two along y, and these one.
+/// `entry` is a point in the cell, 0 to 1 on each axis, and `way` leads from it to the exit. The eight corners become
+/// four functions of s along z, then two along y, then one.
 template <class V>
 inline CellCubic<V> cubic_of(const V (&corners)[8], const V (&entry)[3], const V (&way)[3]) {
   V z0[4];
@@ -114,7 +114,7 @@ inline CellCubic<V> cubic_of(const V (&corners)[8], const V (&entry)[3], const V
   return {y0[0] + x0 * entry[0], y1[0] + x1 * entry[0] + x0 * way[0], y2[0] + x2 * entry[0] + x1 * way[0], x2 * way[0]};
 }
 
-/// The last three of the four numbers of the Bezier curve; the first is c0.
+/// The last three of the four control points of the Bezier curve; the first is c0.
 template <class V>
 struct CellCurve {
   V b1, b2, b3;
@@ -143,7 +143,7 @@ inline double root_between(const CellCubic<double>& f, double low, double high) 
     }
     if (!(high - low > 1e-15)) break;
     double next = s - value / f.slope(s);
-    // Also where the slope is 0.
+    // Also if the slope is 0.
     if (!(next > low && next < high)) next = 0.5 * (low + high);
     if (std::abs(next - s) <= 1e-13) return next;
     s = next;
@@ -160,9 +160,9 @@ inline double first_negative(const CellCubic<double>& f) {
   if (curve.low() >= 0.0) return -1.0;
   const auto [b1, b2, b3] = curve;
   if (!kAsksWhere && b3 < 0.0) return 1.0;
-  // One change of sign among the four: one root.
+  // One sign change among the four control points: one root.
   if (b3 < 0.0 && !(b1 < 0.0 && b2 >= 0.0)) return root_between(f, 0.0, 1.0);
-  // Between its extremes the curve only falls or only rises.
+  // Between its extremes, the curve is monotonic.
   const double a = 3.0 * f.c3;
   const double b = 2.0 * f.c2;
   const double discriminant = b * b - 4.0 * a * f.c1;
@@ -181,7 +181,7 @@ inline double first_negative(const CellCubic<double>& f) {
   return b3 < 0.0 ? root_between(f, low, 1.0) : -1.0;
 }
 
-/// The field of a cell along a ray, from where it comes in at `t_in` on for `length`.
+/// Returns the field of a cell along a ray, from its entry at `t_in` over `length`.
 template <class V>
 inline CellCubic<V> cubic_along(const CellRayOf<V>& ray, const V (&cell)[3], V t_in, V length, const V (&corners)[8]) {
   V entry[3];

@@ -22,11 +22,11 @@
 namespace quoin::trace {
 namespace {
 
-// One ray.
+// Single rays.
 
 constexpr int kGroup = 8;
 
-// `base`: from where the walk counts, in the field.
+// `base`: the origin of the walk's coordinates, in the field.
 inline NearRay<float> near_ray(const PathRay& path, const Ray& ray, I4 base) {
   NearRay<float> out;
   out.size = 0.0F;
@@ -46,10 +46,10 @@ inline NearRay<float> near_ray(const PathRay& path, const Ray& ray, I4 base) {
   return out;
 }
 
-// The next cells of a ray that touch the solid.
+// The next cells of a ray with a solid corner.
 class CellGroup {
  public:
-  /// `base`: from where the walk counts, in the field.
+  /// `base`: the origin of the walk's coordinates, in the field.
   CellGroup(const FieldView& field, const Ray& ray, double max_t, const PathRay& path, I4 base)
       : field_(field), ray_(ray), max_t_(max_t), near_(near_ray(path, ray, base)) {
     for (int axis = 0; axis < 3; ++axis) backward_[axis] = path.backward[axis], base_[axis] = base[axis];
@@ -58,7 +58,7 @@ class CellGroup {
   [[nodiscard]] bool is_empty() const { return count_ == 0; }
   [[nodiscard]] bool is_full() const { return count_ >= kGroup; }
 
-  /// Cells of a word; `at` is the one of the word that the ray could pass first.
+  /// Adds cells of a word; `at` is the first of the word's cells that the ray could pass.
   /// Requires: the group is not full.
   void add(I4 at, std::uint64_t cells) {
     for (int axis = 0; axis < 3; ++axis) words_[axis][word_count_] = at[axis];
@@ -66,7 +66,7 @@ class CellGroup {
     ++word_count_;
   }
 
-  /// Asks all cells, and forgets them.
+  /// Tests all cells, and removes them from the group.
   template <bool kAsksWhere>
   bool ask(FieldHit& hit) {
     const int count = count_;
@@ -271,7 +271,7 @@ class FieldLanes {
   // Tests the candidates in double.
   void meet(const Candidates<kCellsAtOnce>& cells, Int32s<kCellsAtOnce> lane) {
     using CellInts = Int32s<kCellsAtOnce>;
-    // Without gaps.
+    // Packed, without gaps.
     const CellInts order = lane_numbers(Vectors<kCellsAtOnce>{}, cells.lanes);
     alignas(64) std::int32_t from[kWidth] = {};
     const auto front = [&](const auto& numbers, auto* to) {
@@ -398,8 +398,8 @@ class FieldLanes {
   I lane_numbers_;
   NearRays rays_near_;
   alignas(64) float size_[kWidth];
-  alignas(64) std::int32_t base_[3][kWidth];  // from where each lane counts, in the field
-  // The list; as packing writes whole registers there is room for one more.
+  alignas(64) std::int32_t base_[3][kWidth];  // origin of each lane's coordinates, in the field
+  // The list. Packing writes whole registers, so it has room for one more.
   int count_ = 0;
   alignas(64) std::int32_t lane_[3 * kWidth];
   alignas(64) std::int32_t at_[3][3 * kWidth];
@@ -410,7 +410,7 @@ class FieldLanes {
     std::int64_t has_root[kWidth];
   };
   alignas(64) Kept kept_;
-  // In double.
+  // In double precision.
   Rays exact_from_;
   bool knows_exact_ = false;
   alignas(64) double exact_direction_[3][kWidth];

@@ -21,7 +21,7 @@
 namespace quoin::trace {
 namespace {
 
-// Vectors of that many lanes, as types that do not depend on the number (GCC 12 leaves the attribute out there).
+// Vectors with this number of lanes, as types that do not depend on the number (GCC 12 omits the attribute there).
 template <int kLanes>
 struct Vectors;
 template <>
@@ -40,10 +40,10 @@ template <int kLanes>
 using Int32s = typename Vectors<kLanes>::Int32s;
 using I8 = Int32s<8>;
 
-// Added to a ray's interval at each plane of a cell, in cells: more than rounding moves it along the ray, up to kReach.
+// Extends a ray's interval at each plane of a cell, in cells: more than the rounding error along the ray, up to kReach.
 constexpr float kStretch = 1e-3F;
-// Bounds of the rounding of a field's values, as a share of the difference between corners: at the ray's start, and for
-// each cell that the ray has passed since.
+// Bounds of the rounding error of a field's values, as a share of the difference between corners: at the ray's start,
+// and for each cell that the ray has passed since.
 constexpr float kDoubtHere = 1e-4F;
 constexpr float kDoubtFurther = 2e-6F;
 
@@ -51,7 +51,7 @@ inline std::uint32_t bits_of(I8 mask) {
   return static_cast<std::uint32_t>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));
 }
 
-// Entries of a table, `kBytes` apart, in the lanes where the mask is set, else `others`.
+// Gathers entries of a table, `kBytes` apart, in the lanes of the mask; other lanes get `others`.
 template <int kBytes>
 inline I8 gather_some(const void* table, I8 at, I8 mask, I8 others) {
   return reinterpret_cast<I8>(_mm256_mask_i32gather_epi32(reinterpret_cast<__m256i>(others),
@@ -59,17 +59,17 @@ inline I8 gather_some(const void* table, I8 at, I8 mask, I8 others) {
                                                           reinterpret_cast<__m256i>(mask), kBytes));
 }
 
-// A mask of the first `count` lanes.
+// Returns a mask of the first `count` lanes.
 inline I8 first_lanes(Vectors<8>, int count) {
   return I8{0, 1, 2, 3, 4, 5, 6, 7} < count;
 }
 
-// One lane's number in all lanes.
+// Broadcasts one lane's number to all lanes.
 inline I8 of_lane(I8 numbers, int lane) {
   return reinterpret_cast<I8>(_mm256_permutevar8x32_epi32(reinterpret_cast<__m256i>(numbers), _mm256_set1_epi32(lane)));
 }
 
-// Entries of a table of eight, and of sixteen.
+// Looks up entries in a table of eight, and of sixteen.
 inline I8 from_8(const std::int32_t* table, I8 at) {
   const __m256i entries = _mm256_load_si256(reinterpret_cast<const __m256i*>(table));
   return reinterpret_cast<I8>(_mm256_permutevar8x32_epi32(entries, reinterpret_cast<__m256i>(at)));
@@ -97,7 +97,7 @@ inline Int32s<16> of_lane(Int32s<16> numbers, int lane) {
   return reinterpret_cast<Int32s<16>>(
       _mm512_permutexvar_epi32(_mm512_set1_epi32(lane), reinterpret_cast<__m512i>(numbers)));
 }
-// The numbers of the lanes of a mask, without gaps; then 0.
+// Returns the numbers of the lanes of a mask, without gaps, then 0.
 inline Int32s<16> lane_numbers(Vectors<16>, std::uint32_t mask) {
   const __m512i all = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   return reinterpret_cast<Int32s<16>>(_mm512_maskz_compress_epi32(static_cast<__mmask16>(mask), all));
@@ -145,7 +145,7 @@ template <class Places>
 inline Places pairs_of(const DensityStorage& chunk, Places x, Places y, Places z, Places mask, Places others) {
   const Places slab = gather_some<4>(chunk.slabs.data(), (z >> 2) * 16 + (y >> 2), mask, Places{});
   const Places is_uniform = slab < 0;
-  const Places row = (slab << 4) + (z & 3) * 4 + (y & 3);  // a uniform slab has its sign bit set, which goes
+  const Places row = (slab << 4) + (z & 3) * 4 + (y & 3);  // the shift drops a uniform slab's sign bit
   const Places known = is_uniform ? slab << 16 | (slab & 0xFFFF) : others;
   return gather_some<sizeof(Half)>(chunk.values.data(), row * kChunkEdge + x, mask & ~is_uniform, known);
 }
@@ -153,7 +153,7 @@ inline Places pairs_of(const DensityStorage& chunk, Places x, Places y, Places z
 /// Caches the chunk of the last look-up in a field.
 class LastChunk {
  public:
-  /// Null where it is not there or uniform.
+  /// Returns null if the chunk is missing or uniform.
   const DensityStorage* find(const FieldView& field, int x, int y, int z) {
     if (x != at_[0] || y != at_[1] || z != at_[2]) {
       at_[0] = x, at_[1] = y, at_[2] = z;
@@ -199,7 +199,7 @@ template <int kLanes>
     }
   };
   read_chunk_of(0);
-  // Mostly there is one.
+  // There is usually one chunk.
   while (left != 0) read_chunk_of(std::countr_zero(left));
   for (int row = 0; row < 4; ++row) {
     corners[2 * row] = floats_from_halves<kLanes>(pairs[row] << 16);
@@ -228,8 +228,8 @@ struct NearRay {
   Number size;  // the direction's greatest component
 };
 
-/// The cells with these corners in which the field may become negative along the ray. `place`: the cells, from where
-/// the ray counts.
+/// Returns the cells in which the field may become negative along the ray, given their corners. `place`: the cells,
+/// relative to the ray's origin of coordinates.
 template <int kLanes, class Number>
 inline Int32s<kLanes> may_be_negative(const NearRay<Number>& ray, const Floats<kLanes> (&corners)[8],
                                       const Int32s<kLanes> (&place)[3]) {
@@ -294,12 +294,13 @@ template <int kLanes, class Number, class Base>
   if (cells.lanes != 0) std::memcpy(cells.corners, corners, sizeof corners);
 }
 
-// Several cells at once in double: the same operations, in the same order, as for one (trace/kernel/cell.inl).
+// Tests several cells at once in double, with the same operations in the same order as for one cell
+// (trace/kernel/cell.inl).
 
 /// Results of the test in double, before roots are found.
 struct Meetings {
   Longs met;       // the field becomes negative
-  Longs has_root;  // the cubic has one root, which is not known yet; elsewhere the root is `s`
+  Longs has_root;  // the cubic has one root, not yet known; in other lanes the root is `s`
   CellCubic<Doubles> field;
   Doubles s;
   Doubles t_in;  // the ray's interval in the cell
@@ -319,7 +320,7 @@ inline Meetings meet_cells(const CellRayOf<Doubles>& ray, const Doubles (&cell)[
   Longs is_simple = is_open & (curve.b3 < 0.0);
   if (kAsksWhere) is_simple &= ~((curve.b1 < 0.0) & (curve.b2 >= 0.0));
   Meetings out = {starts_negative | is_simple, kAsksWhere ? is_simple : Longs{}, f, {}, span.t_in, length};
-  // Few.
+  // Only a few lanes.
   for (std::uint32_t left = bits_of(is_open & ~is_simple); left != 0; left &= left - 1) {
     const int i = std::countr_zero(left);
     out.s[i] = first_negative<kAsksWhere>(CellCubic<double>{f.c0[i], f.c1[i], f.c2[i], f.c3[i]});

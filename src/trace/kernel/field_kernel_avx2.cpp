@@ -1,4 +1,4 @@
-// Rays in fields for x86-64 processors with AVX2, BMI and BMI2; called only where all were found.
+// Rays in fields for x86-64 processors with AVX2, BMI and BMI2. Called only if the processor has all of them.
 
 #include "trace/kernel/kernel.h"
 

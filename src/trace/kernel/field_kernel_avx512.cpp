@@ -1,4 +1,4 @@
-// Rays in fields for x86-64 processors with AVX-512 F, BW, DQ and VL; called only where all were found.
+// Rays in fields for x86-64 processors with AVX-512 F, BW, DQ and VL. Called only if the processor has all of them.
 
 #include "trace/kernel/kernel.h"
 

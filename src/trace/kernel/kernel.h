@@ -15,13 +15,13 @@ struct DensityStorage;
 
 namespace quoin::trace {
 
-/// A field as kernels read it.
+/// The part of a field that kernels read.
 struct FieldView {
   const TreeView* cells;  ///< cells with a solid corner
   const DensityGrid* grid;
-  /// The densities of a chunk; null where it is not there or uniform.
+  /// Returns the densities of a chunk; null if the chunk is missing or uniform.
   const DensityStorage* (*find)(const DensityGrid& grid, int x, int y, int z);
-  /// The densities of any cell's corners, by x + 2 y + 4 z.
+  /// Reads the densities of any cell's corners, by x + 2 y + 4 z.
   void (*read)(const DensityGrid& grid, int x, int y, int z, float* corners);
 };
 
@@ -36,7 +36,7 @@ struct FieldHit {
 // origin) * (1 / direction), in single precision, rounded after each operation. Crossings are ordered by t, and by axis
 // at ties. The origin is relative to a multiple of 64 voxels near the ray's start.
 struct Kernel {
-  /// One ray; `face` is not set where it starts inside.
+  /// Traces one ray; does not set `face` if the ray starts inside.
   bool (*first_hit)(const TreeView& tree, const Ray& ray, double max_t, RayHit& hit, bool& unfinished);
   /// Returns true if the ray is blocked.
   bool (*any_hit)(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished);

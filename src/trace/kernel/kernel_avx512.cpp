@@ -1,4 +1,4 @@
-// The kernel for x86-64 processors with AVX-512 F, BW, DQ and VL; called only where all were found.
+// The kernel for x86-64 processors with AVX-512 F, BW, DQ and VL. Called only if the processor has all of them.
 
 #include "trace/kernel/kernel.h"
 
@@ -13,7 +13,7 @@ namespace quoin::trace {
 namespace {
 
 inline bool any_short_single(const TreeView& tree, const Ray& ray, double max_t, bool& unfinished) {
-  // Before all else, as most rays go further.
+  // Tested first, since most rays are longer.
   const double length = std::abs(ray.direction.x) + std::abs(ray.direction.y) + std::abs(ray.direction.z);
   if (!(max_t * length <= kShortRayReach && max_t >= 0.0)) {
     return any_single<PathTracer>(tree, ray, max_t, unfinished);

@@ -25,10 +25,10 @@ struct SingleRay {
   float enter_t;
   int enter_axis;
   bool is_cut;
-  bool is_moved;  // it does not start at `origin`, but came there
+  bool is_moved;  // it was moved to `origin` from its start
 };
 
-// Cuts a ray's box to the voxels that it can come to.
+// Limits a ray's box to the voxels that it can reach.
 inline void limit_reach(SingleRay& ray, float max_t, float furthest) {
   const F4 end = ray.origin + std::min(max_t, furthest) * ray.direction;
   ray.low = max4(ray.low, floor4(min4(ray.origin, end) - kSlack));
@@ -36,7 +36,7 @@ inline void limit_reach(SingleRay& ray, float max_t, float furthest) {
   ray.is_cut = furthest < max_t;
 }
 
-// The box of the ray's way, and where it enters and leaves it.
+// Computes the ray's box, and the times of its entry and exit.
 inline SetUp clip_single(const TreeView& tree, SingleRay& ray, float max_t, float greatest, int moved) {
   const F4 f = ray.origin;
   const IVec3& lo = tree.box.min;
@@ -46,7 +46,7 @@ inline SetUp clip_single(const TreeView& tree, SingleRay& ray, float max_t, floa
   ray.low = low_bound;
   ray.high = high_bound;
   ray.is_cut = false;
-  // Endless rays leave a small world before they reach further than they may.
+  // Infinite rays leave a small world before they exceed their range.
   if (!(tree.is_small && max_t > kReach / 0x1p-20F)) limit_reach(ray, max_t, kReach / greatest);
   const F4 far = ray.forward ? ray.high : ray.low;
   const I4 is_low = f < ray.low;
@@ -113,7 +113,7 @@ inline SetUp set_up_single(const TreeView& tree, const Ray& ray, double max_t, S
 inline F4 single_coordinates_after(const SingleRay& ray, float t, F4 low, F4 high, int axis) {
   const F4 position = ray.origin + t * ray.direction;
   const F4 at = max4(min4(floor4(position), high), low);
-  // Rounding can put a position on the wrong side of a plane only next to it.
+  // Rounding can put a position on the wrong side of a plane only near that plane.
   const F4 past = position - at;
   if ((mask3((past < 0.01F) | (past > 0.99F)) & ~(1 << (axis & 3))) == 0) return at;
   const F4 ahead = ray.forward ? at + 1.0F : at;
@@ -137,7 +137,7 @@ struct Stand {
   int axis;  // axis of the last crossing; -1 before the first
 };
 
-// From the box just entered, by its lower and upper voxels, to the voxel.
+// Finds the voxel in a box that the ray has just entered, given by its lower and upper voxels.
 inline void enter(const SingleRay& ray, F4 low, F4 high, Stand& stand) {
   const F4 others = single_coordinates_after(ray, stand.t, low, high, stand.axis);
   const I4 axes = {0, 1, 2, 3};
@@ -151,7 +151,7 @@ inline Stand first_stand(const SingleRay& ray) {
   return stand;
 }
 
-// The planes through which a ray leaves units of this size.
+// Returns the planes through which a ray leaves units of this size.
 inline F4 exit_planes(const SingleRay& ray, F4 lower, float size) {
   const F4 moving = ray.forward ? lower + size : lower;
   return ray.still ? all4(kNever) : moving;
@@ -174,7 +174,7 @@ inline Steps make_steps(const SingleRay& ray, F4 planes, float size, int index, 
           signed_strides[0], signed_strides[1], signed_strides[2], index};
 }
 
-// Goes through the next plane; returns its axis.
+// Crosses the next plane; returns its axis.
 inline int advance(const SingleRay& ray, Steps& s, float& now) {
   if (s.t0 <= s.t1 && s.t0 <= s.t2) {
     now = s.t0;
@@ -197,7 +197,7 @@ inline int advance(const SingleRay& ray, Steps& s, float& now) {
   return 2;
 }
 
-// The voxel of a cell into which a ray has just come, counted from the cell's lower corner.
+// Returns the voxel of a cell that a ray has just entered, relative to the cell's lower corner.
 inline I4 voxel_entered(const SingleRay& ray, F4 cell, const Stand& stand) {
   const F4 position = ray.origin + stand.t * ray.direction - cell;
   const I4 trunc = __builtin_convertvector(position, I4);
@@ -206,7 +206,7 @@ inline I4 voxel_entered(const SingleRay& ray, F4 cell, const Stand& stand) {
   const F4 past = position - __builtin_convertvector(at, F4);
   const I4 axes = {0, 1, 2, 3};
   const I4 entered = axes == stand.axis;
-  // Rounding can put a position on the wrong side of a plane only next to it.
+  // Rounding can put a position on the wrong side of a plane only near that plane.
   if (mask3(((past < 0.01F) | (past > 0.99F)) & ~entered) != 0) {
     Stand exact = stand;
     enter(ray, cell, cell + 3.0F, exact);
@@ -215,7 +215,7 @@ inline I4 voxel_entered(const SingleRay& ray, F4 cell, const Stand& stand) {
   return entered ? (~ray.forward & 3) : at;
 }
 
-// Walks through the 64 voxels of a cell; returns the index of the voxel met, or -1.
+// Walks through the 64 voxels of a cell. Returns the index of the voxel hit, or -1.
 inline int walk_cell(const SingleRay& ray, std::uint64_t word, F4 cell, I4 within, int& axis) {
   const F4 lower = cell + __builtin_convertvector(within, F4);
   const int index = within[0] * kCodeX + within[1] * kCodeY + within[2] * kCodeZ;

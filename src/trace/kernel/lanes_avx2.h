@@ -45,7 +45,7 @@ inline void split(const double* from, double corner, I& base, F& rest, F& whole)
   whole.v = _mm256_set_m128(w[1], w[0]);
 }
 
-// Bytes with signs.
+// Adds signed bytes with saturation.
 inline I add_saturated_bytes(I a, I b) {
   return {_mm256_adds_epi8(a.v, b.v)};
 }
@@ -63,7 +63,7 @@ inline __m256i lane_numbers(std::uint32_t mask) {
   return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<std::int64_t>(numbers)));
 }
 
-// The codes of 4^3 bricks; those outside the table are empty.
+// The codes of 4^3 bricks; bricks outside the table are empty.
 class BrickWindow {
  public:
   BrickWindow(const TreeView& tree, const IVec3& origin) {
@@ -210,7 +210,7 @@ inline I add_saturated_bytes(I a, I b) {
 inline I gather(const std::uint32_t* base, I at) {
   return {half::gather(base, at.low), half::gather(base, at.high)};
 }
-// Words of 64 bits, as their halves.
+// Gathers words of 64 bits, as two halves.
 inline void gather_words(const std::uint32_t* base, I at, I& low, I& high) {
   low = gather(base, at);
   high = gather(base, at + all(1));
@@ -248,7 +248,7 @@ inline Packing packing_of(Mask which) {
   const std::uint32_t low = half::bits(which.low);
   return {half::lane_numbers(low), half::lane_numbers(half::bits(which.high)), std::popcount(low)};
 }
-// Writes the selected lanes without gaps. The numbers after them, up to sixteen in all, have no meaning.
+// Writes the selected lanes without gaps. The numbers after them, up to sixteen in all, are unspecified.
 inline void store_packed(std::int32_t* to, const Packing& packing, I a) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(a.low.v, packing.low));
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + packing.low_count),

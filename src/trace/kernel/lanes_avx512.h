@@ -44,12 +44,12 @@ inline F just_below(F a) {
   return {_mm512_castsi512_ps(less)};
 }
 
-// Bytes with signs.
+// Adds signed bytes with saturation.
 inline I add_saturated_bytes(I a, I b) {
   return {_mm512_adds_epi8(a.v, b.v)};
 }
 
-// Words of 64 bits, as their halves: two gathers of eight take half the time of two of sixteen.
+// Gathers words of 64 bits, as two halves: two gathers of eight take half the time of two of sixteen.
 inline void gather_words(const std::uint32_t* base, I at, I& low, I& high) {
   const auto each = static_cast<__mmask8>(each_lane());
   const auto eight = [&](__m256i half) {
@@ -75,7 +75,7 @@ inline void store_packed(std::int32_t* to, Packing packing, I a) {
 inline float least_of(F a) {
   return _mm512_reduce_min_ps(a.v);
 }
-// Entry `at % 16`, or `at % 32`, of a table.
+// Looks up entry `at % 16`, or `at % 32`, of a table.
 inline I from_16(I table, I at) {
   return {_mm512_permutexvar_epi32(at.v, table.v)};
 }
@@ -85,7 +85,7 @@ inline I from_32(const std::int32_t* table, I at) {
 inline F from_16(F table, I at) {
   return {_mm512_permutexvar_ps(at.v, table.v)};
 }
-// The codes of 4^3 bricks; those outside the table are empty.
+// The codes of 4^3 bricks; bricks outside the table are empty.
 class BrickWindow {
  public:
   BrickWindow(const TreeView& tree, const IVec3& origin) {

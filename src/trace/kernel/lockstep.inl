@@ -30,7 +30,7 @@ using Doubles = double __attribute__((vector_size(kDoubles * 8)));
 using Longs = std::int64_t __attribute__((vector_size(kDoubles * 8)));
 using Ints = std::int32_t __attribute__((vector_size(kDoubles * 4)));
 
-// 1, 2, 4 ...
+// Bits 1, 2, 4 ... by lane.
 inline Longs lane_bits() {
   Longs lane;
   for (std::size_t i = 0; i < kDoubles; ++i) lane[i] = std::int64_t{1} << i;
@@ -44,7 +44,7 @@ struct Axis {
   I base;  // voxels from the tables' origin, a multiple of 64
   Mask forward;
   Mask still;  // the direction has no such component
-  Mask moved;  // the ray does not start at `origin`, but came there
+  Mask moved;  // the ray was moved to `origin` from its start
   F low;       // the box in which the lane moves
   F high;
   F far_t;  // t where the ray leaves that box along this axis
@@ -81,20 +81,20 @@ inline Planes steps_of(const Lanes& lanes, float size) {
           select(lanes.z.forward, all(size), all(-size))};
 }
 
-// Moves on the planes that were crossed.
+// Advances the planes that were crossed.
 inline void step_over(const Crossing& crossing, const Planes& steps, Planes& planes) {
   planes.x = add_if(crossing.x, planes.x, steps.x);
   planes.y = add_if(crossing.y, planes.y, steps.y);
   planes.z = add_if(crossing.z, planes.z, steps.z);
 }
 
-// Each lane's number of the axis that it crossed.
+// Selects, in each lane, the number of the crossed axis.
 template <class Number>
 inline Number crossed(const Crossing& crossing, Number x, Number y, Number z) {
   return select(crossing.x, x, select(crossing.y, y, z));
 }
 
-// The least of three, and which it is: the first axis at a tie.
+// Returns the minimum of three and its axis: the first axis at a tie.
 inline F first_of(const Planes& t, Crossing& which) {
   const F y_or_z = min(t.y, t.z);
   which.x = t.x <= y_or_z;
@@ -119,7 +119,7 @@ inline F limit_reach(Axis& axis, F reach) {
   return select(axis.still, all(kNever), bounds_exit);
 }
 
-// Returns where a lane enters through a plane of this axis; -1 when it starts between its planes.
+// Returns the time of a lane's entry through a plane of this axis; -1 if it starts between its planes.
 inline F clip(Axis& axis, Mask entered, Mask& live) {
   const F far = select(axis.forward, axis.high, axis.low);
   const Mask is_low = axis.origin < axis.low;
@@ -131,11 +131,11 @@ inline F clip(Axis& axis, Mask entered, Mask& live) {
   return select(before, crossing_t(axis, select(axis.forward, axis.low, axis.high)), all(-1.0F));
 }
 
-// `whole` is the voxel in which a lane starts.
+// `whole` is the lane's start voxel.
 inline Axis make_axis(const double* position, double corner, F direction, F& whole) {
   Axis axis;
   split(position, corner, axis.base, axis.origin, whole);
-  // Stays within the voxel it starts in, however it rounds.
+  // Keeps the origin within its start voxel, for any rounding.
   axis.origin = min(axis.origin, whole + all(1.0F - 0x1p-17F));
   axis.still = abs(direction) < all(0x1p-100F);
   axis.direction = select(axis.still, all(0.0F), direction);
@@ -163,7 +163,7 @@ inline F coordinate_after(const Axis& axis, F t, F low, F high, Mask ties_before
   const F ahead_t = crossing_t(axis, ahead);
   const F behind_t = crossing_t(axis, behind);
   const Mask is_short = ((ahead_t < t) | ((ahead_t == t) & ties_before)) & ~axis.still;
-  // It was never out of the unit in which it started.
+  // The ray was never outside its start unit.
   const Mask was_inside = axis.forward & ((behind < axis.origin) | ((behind == axis.origin) & ~axis.moved));
   const Mask is_far = ((t < behind_t) | ((behind_t == t) & ties_after)) & ~axis.still & ~was_inside & ~is_short;
   const F one = select(axis.forward, all(1.0F), all(-1.0F));
@@ -184,7 +184,7 @@ inline Rays lanes_from(const RayPacket& rays, int first) {
           rays.max_t.data() + first};
 }
 
-// Lanes from a place in memory on.
+// Loads lanes from memory.
 template <class Vector>
 inline Vector some(const void* from) {
   Vector out;
@@ -217,7 +217,7 @@ inline void move_some_to_bounds(const TreeView& tree, const Rays& rays, std::uin
   }
   const Longs enters = is_far & (enter_axis >= 0);
   const Doubles max_t = some<Doubles>(starts.max_t + first);
-  // Not to the bit: the distance of the face decides in the end, and rounds otherwise.
+  // Not exact: the distance of the face decides at the end, and rounds differently.
   missing |= enters & ~(enter_t <= max_t * 1.000001);
   for (int axis = 0; axis < 3; ++axis) {
     const auto low = static_cast<double>(tree.box.min[axis]);
@@ -226,7 +226,7 @@ inline void move_some_to_bounds(const TreeView& tree, const Rays& rays, std::uin
     const Doubles d = some<Doubles>(rays.directions[axis] + first);
     const Doubles plane = d > 0.0 ? Doubles{} + low : Doubles{} + high;
     const Doubles at = enter_axis == axis ? plane : p + enter_t * d;
-    // The others are inside by now, or never will be.
+    // On the other axes, the ray is inside by now or never will be.
     missing |= enters & ~((at >= low - 1e-3) & (at <= high + 1e-3));
     const Doubles moved = enters ? at : p;
     std::memcpy(starts.position[axis] + first, &moved, sizeof moved);
@@ -274,7 +274,7 @@ inline void find_starts(const TreeView& tree, const Rays& rays, std::uint32_t wa
   lanes.live = lanes.live & (all(0.0F) <= narrow(starts.max_t));
 }
 
-// Clips the lanes to where they can meet anything, and finds where they enter.
+// Clips the lanes to the box in which hits are possible, and finds their entries.
 inline Lanes set_up(const TreeView& tree, const RayPacket& packet, int first, std::uint32_t wanted, F& t,
                     Crossing& entered) {
   Starts starts;
@@ -284,7 +284,7 @@ inline Lanes set_up(const TreeView& tree, const RayPacket& packet, int first, st
   if (!any(lanes.live)) return lanes;
   const F max_t = narrow(starts.max_t);
   const F furthest = all(kReach) / lanes.reach_scale;
-  // Endless rays leave a small world before they reach further than they may.
+  // Infinite rays leave a small world before they exceed their range.
   const bool is_limited = !tree.is_small || any(lanes.live & (max_t < all(kEndless)));
   const I moved = load(starts.entered);
   F bounds_exit = all(kNever);
@@ -361,7 +361,7 @@ inline I stepped(I index, const Crossing& crossing, const Strides& strides) {
   return add_if(crossing.z, add_if(crossing.y, add_if(crossing.x, index, strides.x), strides.y), strides.z);
 }
 
-// A walk from cell to cell.
+// A walk over cells.
 struct CellWalk {
   Planes after;  // as in Next
   I index;       // into the table's bits
@@ -469,7 +469,7 @@ inline Next enter_cell(const Axis& axis, F entry, F t, F before_t, Mask ties, F 
   return next;
 }
 
-// The coordinate of the cell with this plane of entry.
+// Returns the coordinate of the cell with this entry plane.
 inline I cell_of(const Axis& axis, F entry) {
   const F moving = add_if(~axis.forward, entry, all(-4.0F));
   return shift_right_signed<2>(to_int(select(axis.still, floor(axis.origin), moving)) + axis.base);
@@ -564,7 +564,7 @@ struct Met {
   I axis;
 };
 
-// The faces through which lanes came into the voxels that they met.
+// Finds the faces through which lanes entered the voxels that they hit.
 inline void find_faces(const Lanes& lanes, Mask hit, Met& met) {
   const auto entry = [](const Axis& axis, I voxel) {
     return add_if(~axis.forward, to_float(voxel - axis.base), all(1.0F));

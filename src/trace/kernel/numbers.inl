@@ -34,10 +34,10 @@ constexpr float kEndless = std::numeric_limits<float>::infinity();
 constexpr float kReach = 2048.0F;
 // The maximum distance of a ray's start from the bounds. Rays from farther away are moved to the bounds first.
 constexpr float kNearby = 64.0F;
-// More than rounding can move the end of a ray, in voxels.
+// An upper bound of the rounding error of a ray's end, in voxels.
 constexpr float kSlack = 0.02F;
-// More than rounding can move a short ray's crossing, in voxels along its axis: an origin below 64 by 2^-17 at most,
-// its distance to a plane by 2^-18, and products by 2^-22 of 22 voxels.
+// An upper bound of the rounding error of a short ray's crossing, in voxels along its axis: an origin below 64 by 2^-17
+// at most, its distance to a plane by 2^-18, and products by 2^-22 of 22 voxels.
 constexpr float kDoubt = 4e-5F;
 
 // A voxel of a cell in kernels: x + 4 y + 16 z, plus 256 times x + 8 y + 64 z. Bits 2, 5 and 8 of the latter are set
@@ -54,7 +54,7 @@ using I4 = std::int32_t __attribute__((vector_size(16)));
 using D4 = double __attribute__((vector_size(32)));
 
 #ifdef QUOIN_KERNEL_AVX2
-// The sign bits of the first three.
+// Returns the sign bits of the first three lanes.
 inline int mask3(I4 a) {
   return _mm_movemask_ps(_mm_castsi128_ps(reinterpret_cast<__m128i>(a))) & 7;
 }
@@ -131,7 +131,7 @@ struct Move {
   int entered = -1;  // axis of the bounds' plane that the ray was moved to; -1: not moved
 };
 
-// Moves one ray that starts far away to where it enters the bounds; false when it misses them.
+// Moves one distant ray to its entry into the bounds. Returns false if it misses them.
 inline bool move_to_bounds(const TreeView& tree, const double direction[3], Move& ray) {
   double enter_t = -1.0;
   int enter_axis = -1;
@@ -149,12 +149,12 @@ inline bool move_to_bounds(const TreeView& tree, const double direction[3], Move
     }
   }
   if (enter_axis < 0) return true;
-  // Not to the bit: the distance of the face decides in the end, and rounds otherwise.
+  // Not exact: the distance of the face decides at the end, and rounds differently.
   if (!(enter_t <= ray.max_t * 1.000001)) return false;
   for (int axis = 0; axis < 3; ++axis) {
     const double plane = direction[axis] > 0.0 ? tree.box.min[axis] : tree.box.max[axis];
     const double p = axis == enter_axis ? plane : ray.position[axis] + enter_t * direction[axis];
-    // The others are inside by now, or never will be.
+    // On the other axes, the ray is inside by now or never will be.
     if (!(p >= tree.box.min[axis] - 1e-3 && p <= tree.box.max[axis] + 1e-3)) return false;
     ray.position[axis] = p;
   }
@@ -163,7 +163,7 @@ inline bool move_to_bounds(const TreeView& tree, const double direction[3], Move
   return true;
 }
 
-// Moves the start of a ray that is far away to where it enters the bounds; false when it misses them.
+// Moves the start of a distant ray to its entry into the bounds. Returns false if it misses them.
 inline bool bring_near(const TreeView& tree, const Ray& ray, double max_t, D4& position, float& limit, int& moved) {
   const double direction[3] = {ray.direction.x, ray.direction.y, ray.direction.z};
   Move move{{position[0], position[1], position[2]}, max_t, -1};

@@ -21,7 +21,7 @@ namespace {
 //     | /       |     \                   -> for each occupied voxel: the lanes that pass it, which are then finished
 //     |/________|______|  end
 
-// Several rays that go the same way.
+// Several rays with similar directions.
 struct Beam {
   F4 least_origin, greatest_origin;
   F4 least_inverse, greatest_inverse;
@@ -38,7 +38,7 @@ class BeamPaths {
                      _mm256_set1_ps(beam.least_inverse[axis]), _mm256_set1_ps(beam.greatest_inverse[axis])};
     }
   }
-  // The units of 4^kLevel voxels of the block with these lower planes.
+  // Returns the units of 4^kLevel voxels in the block with these lower planes.
   template <int kLevel>
   [[nodiscard]] std::uint64_t units(F4 block) const {
     const Times x = times<kLevel>(block[0], axes_[0]);
@@ -89,7 +89,7 @@ struct BeamLanes {
   Mask left;  // lanes without a hit yet
 };
 
-// Fails where some go forward and some backward, or do not start next to the same multiple of 64.
+// Returns false if some rays go forward and some backward, or if their starts are near different multiples of 64.
 inline bool mirror_axis(const Axis& axis, Mask live, Mask starts_there, int index, BeamLanes& out, BeamAxis& to) {
   const std::uint32_t is_forward = bits(axis.forward & live);
   const std::uint32_t is_backward = bits(live & ~axis.forward & ~axis.still);
@@ -194,7 +194,7 @@ inline void trace_brick(const BrickWords& words, std::uint64_t cells, BeamLanes&
   }
 }
 
-// Traces the lanes through the 4^3 chunks with these lower planes; false when the beam is too wide to be worth it.
+// Traces the lanes through the 4^3 chunks with these lower planes. Returns false if the beam is too wide to pay off.
 inline bool trace_chunks(const TreeView& tree, BeamLanes& lanes, const BeamPaths& paths, F4 block, Met& met) {
   const Mirror mirrored(lanes.octant);
   for (std::uint64_t chunks = paths.units<3>(block); chunks != 0; chunks &= chunks - 1) {
@@ -262,7 +262,7 @@ inline Mask trace_beam(const TreeView& tree, const Lanes& lanes, F t, const Cros
 struct LaneHits {
   std::uint32_t hit = 0;
   std::uint32_t starts_inside = 0;
-  std::uint32_t unfinished = 0;                  // went further than a kernel goes: to be traced in double precision
+  std::uint32_t unfinished = 0;                  // exceeded the kernel's range: must be traced in double precision
   RayPacket::Lanes<std::int32_t> x{}, y{}, z{};  // voxels, from the tables' origin
   RayPacket::Lanes<std::int32_t> axis{};         // axis of the face
 };
@@ -270,7 +270,7 @@ struct LaneHits {
 template <Ask kAsk>
 inline Met trace(const TreeView& tree, Lanes& lanes, F t, const Crossing& entered) {
   Met met{mask_of(0), mask_of(0), all(0), all(0), all(0), all(0)};
-#ifndef QUOIN_KERNEL_AVX512  // lockstep in AVX-512 serves packets of every kind as well as beams would, or better
+#ifndef QUOIN_KERNEL_AVX512  // in AVX-512, lockstep is at least as fast as beams for every kind of packet
   lanes.live = trace_beam(tree, lanes, t, entered, met);
   if (!any(lanes.live)) return met;
 #endif

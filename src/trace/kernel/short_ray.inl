@@ -29,10 +29,10 @@ namespace {
 constexpr float kShortRayReach = 11.0F;
 constexpr int kStartLane = 15;
 constexpr float kPlaceUnit = 65536.0F;
-// Nearer to an edge than this, in units of places, rounding might decide; places are moved up by as much, so that one
-// test of bits finds both sides. Rounding moves them by less than one unit.
+// Places nearer to an edge than this are uncertain because of rounding. Places are shifted up by this amount, so that
+// one bit test finds both sides. Rounding moves them by less than one unit.
 constexpr int kNearEdge = 8;
-// Longer or shorter directions are for other ways, which scale them.
+// Longer or shorter directions use other methods, which scale them.
 constexpr float kLeastDirection = 0x1p-20F;
 constexpr float kGreatestDirection = 0x1p20F;
 // The direction may be this much longer than any of its components.
@@ -44,10 +44,10 @@ struct ShortRayTables {
   alignas(64) std::int32_t spread[3][32];
   // The axis of each lane, and four times the number of its plane, by the number of crossed planes of x and of y.
   alignas(16) std::uint8_t lanes[16][16][16];
-  // For each set of mirrored axes: the spread bits that turn over. Along x these are not the brick's, as bricks come in
-  // pairs along x, the lower one first. And the highest bit of the half word, as place_in_run takes it.
+  // For each set of mirrored axes: the spread bits to flip. Along x, the brick bits are not flipped, because bricks
+  // come in pairs along x, the lower one first. Also flips the highest bit of the half word, as place_in_run requires.
   std::int32_t flips[8];
-  // For x mirrored or not, and each set of axes whose next brick lies outside the table: the bricks that lie inside.
+  // For x mirrored or not, and each set of axes whose next brick is outside the table: the bricks inside.
   std::uint8_t inside[2][8];
 };
 
@@ -99,7 +99,7 @@ inline __m128i load4(const void* from) {
 struct ShortRay {
   __m128 origin;
   __m128 size;       // absolute values of the direction
-  __m128 cell;       // the voxel in which it starts, its nearer corner
+  __m128 cell;       // the nearer corner of its start voxel
   __m128i brick;     // not mirrored
   __m128i backward;  // -1 along axes that are mirrored
   __m128 limit;      // max_t
@@ -110,7 +110,7 @@ struct ShortRay {
 // Returns false if the ray needs another method. `length`: |x| + |y| + |z| of the direction. Requires: it is short.
 inline bool set_up(const TreeView& tree, const Ray& ray, double max_t, double length, ShortRay& out) {
   static_assert(sizeof(Ray) == 6 * sizeof(double));
-  const __m128 d = _mm256_cvtpd_ps(_mm256_loadu_pd(&ray.origin.z));  // with the direction behind it
+  const __m128 d = _mm256_cvtpd_ps(_mm256_loadu_pd(&ray.origin.z));  // followed by the direction
   const __m128 direction = _mm_blend_ps(_mm_permute_ps(d, 0x39), _mm_setzero_ps(), 8);
   const __m128 sign_bit = _mm_set1_ps(-0.0F);
   const __m128 size = _mm_andnot_ps(sign_bit, direction);
@@ -118,7 +118,7 @@ inline bool set_up(const TreeView& tree, const Ray& ray, double max_t, double le
   // slow.
   const unsigned is_moving = _mm_cmp_ps_mask(size, _mm_set1_ps(kLeastMoving), _CMP_GE_OQ);
   out.size = _mm_maskz_mov_ps(static_cast<__mmask8>(is_moving), size);
-  // Rounding may move the crossings of an axis along which a ray creeps past many of another.
+  // Rounding may move the crossings of a slow axis past many crossings of another axis.
   const __m128 least = _mm_set1_ps(static_cast<float>(length) * (1.0F / kShortRayRatio));
   const unsigned is_creeping = _mm_cmp_ps_mask(size, least, _CMP_LT_OQ) & is_moving;
   out.limit = _mm_set1_ps(static_cast<float>(max_t));
@@ -153,7 +153,7 @@ inline __m256i bricks_of(const TreeView& tree, const ShortRay& ray) {
   const __m128i next = _mm_add_epi32(ray.brick, _mm_or_si128(ray.backward, _mm_set1_epi32(1)));
   const unsigned outside = _mm_cmpge_epu32_mask(next, sizes) & 7U;
   const __mmask8 inside = kShortRay.inside[ray.octant & 1][outside];
-  // Bricks outside are read from the own brick's row instead.
+  // Bricks outside are read from the row of the ray's own brick instead.
   const __m128i there = _mm_mask_mov_epi32(next, static_cast<__mmask8>(outside), ray.brick);
   const __m256i both = _mm256_mullo_epi32(_mm256_inserti128_si256(_mm256_castsi128_si256(ray.brick), there, 1),
                                           _mm256_broadcastsi128_si256(strides));
@@ -185,12 +185,12 @@ inline Blocked any_at_once(const TreeView& tree, const Ray& ray, double max_t, d
   const __m512 plane = _mm512_add_ps(of_axis(first), _mm512_cvtepi32_ps(_mm512_srli_epi32(lane, 2)));
   const __m512 inverse = of_axis(inverses);
   const __m512 t = _mm512_mul_ps(_mm512_sub_ps(plane, of_axis(own.origin)), inverse);
-  // More than rounding can move a crossing.
+  // An upper bound of the rounding error of a crossing.
   const __m512 doubt = _mm512_mul_ps(inverse, _mm512_set1_ps(kDoubt));
   const __m512 limit = _mm512_broadcastss_ps(own.limit);
   const __mmask16 maybe = _mm512_cmp_ps_mask(t, _mm512_add_ps(limit, doubt), _CMP_LT_OQ);
   const __mmask16 sure = _mm512_cmp_ps_mask(t, _mm512_sub_ps(limit, doubt), _CMP_LT_OQ) | 1U << kStartLane;
-  // Places, moved up by kNearEdge except on the axis that is crossed and at the start, where they are exact.
+  // Places, shifted up by kNearEdge except on the crossed axis and at the start, where they are exact.
   const __m128 unit = _mm_set1_ps(kPlaceUnit), half = _mm_set1_ps(0.5F * kPlaceUnit);
   const __m512 from =
       _mm512_broadcast_f32x4(_mm_add_ps(_mm_mul_ps(own.origin, unit), _mm_set1_ps(static_cast<float>(kNearEdge))));
@@ -198,7 +198,7 @@ inline Blocked any_at_once(const TreeView& tree, const Ray& ray, double max_t, d
   const __m512 middle = _mm512_broadcast_f32x4(_mm_add_ps(_mm_mul_ps(own.cell, unit), half));
   const __m512 beyond = _mm512_add_ps(_mm512_mul_ps(plane, _mm512_set1_ps(kPlaceUnit)), _mm512_broadcastss_ps(half));
   const __m512i axis = _mm512_and_si512(lane, _mm512_set1_epi32(3));
-  __mmask16 apart = 0xFFFF;  // lanes whose place is near no edge
+  __mmask16 apart = 0xFFFF;  // lanes with a place that is near no edge
   const auto spread = [&]<int kAxis>() {
     constexpr int kAll = kAxis * 0x55;
     const __m512 start = _mm512_mask_permute_ps(_mm512_permute_ps(from, kAll), 1U << kStartLane, middle, kAll);
@@ -221,7 +221,7 @@ inline Blocked any_at_once(const TreeView& tree, const Ray& ray, double max_t, d
   const unsigned met = maybe & bits(test_bit(word, code));
   const unsigned clean = met & sure & apart;
   const unsigned doubtful = (met & ~sure) | (maybe & ~apart);
-  // All bits where none is clean.
+  // All bits are set if no lane is clean.
   const auto none = static_cast<unsigned>(static_cast<int>(clean - 1) >> 31);
   return {clean != 0, (doubtful & none) != 0};
 }

@@ -33,7 +33,7 @@ namespace {
 
 struct alignas(64) UnitTables {
   float corner[64][4];
-  std::uint64_t from[64];  // units that are nowhere before this one
+  std::uint64_t from[64];  // units that are not before this one on any axis
 };
 
 constexpr UnitTables make_unit_tables() {
@@ -121,7 +121,7 @@ inline F4 mirrored_planes(F4 planes, I4 backward) {
 
 #ifdef QUOIN_KERNEL_AVX512
 
-// In sixteen lanes: one for each plane, then one for each pair of units along two axes.
+// Tables for sixteen lanes: one lane per plane, then one per pair of units along two axes.
 struct alignas(64) PathTables {
   std::int32_t axis[16];        // five planes of x, of y, of z
   float number[16];             // the plane's number
@@ -270,7 +270,7 @@ inline std::uint64_t units_passed(const Times& x, const Times& y, const Times& z
   return xy & (layers<kOrder>(x, y, rows(z, false)) | layers<kOrder>(x, y, rows(z, true)) << 32);
 }
 
-// In eight lanes: two rows of four pairs each.
+// For eight lanes: two rows of four pairs each.
 class Paths {
  public:
   // The lower planes of a block, the same in all lanes.
@@ -337,11 +337,11 @@ struct PathRay {
   F4 origin;
   F4 inverse;
   F4 far_t;
-  F4 chunk;     // the lower planes of the chunk in which it starts
+  F4 chunk;     // the lower planes of its start chunk
   I4 backward;  // axes that were mirrored; masks, like the next
   I4 forward;
   I4 base;
-  I4 own;  // the voxel in which it starts, from `base`, not mirrored
+  I4 own;  // its start voxel, relative to `base`, not mirrored
   float exit_t;
   bool is_inside;  // it starts within the bounds
   bool is_cut;
@@ -349,7 +349,7 @@ struct PathRay {
   bool is_on_plane;  // starts on a plane behind it that it never crossed, within the bounds or on their boundary
 };
 
-// The box of a ray's way by its mirrored planes.
+// The box of a ray, by its mirrored planes.
 struct PathBox {
   F4 low;
   F4 high;
@@ -363,7 +363,7 @@ inline PathBox box_of(const TreeView& tree, PathRay& ray, F4 origin, F4 directio
   F4 low = __builtin_convertvector(low_voxel - ray.base, F4);
   F4 high = __builtin_convertvector(high_voxel - ray.base, F4);
   ray.is_cut = false;
-  // Endless rays leave a small world before they reach further than they may.
+  // Infinite rays leave a small world before they exceed their range.
   if (!(tree.is_small && max_t > kReach / 0x1p-20F)) {
     const float furthest = kReach / greatest;
     const F4 bound = mirrored_planes(ray.backward ? low : high, ray.backward);
@@ -390,7 +390,7 @@ inline F4 chunk_entered(const PathRay& ray, const PathBox& box, F4 speed, float 
     const F4 ahead_t = (at + kChunkSize - ray.origin) * ray.inverse;
     const F4 behind_t = (at - ray.origin) * ray.inverse;
     const I4 is_short = (ahead_t < now) | ((ahead_t == now) & (axes < axis));
-    // It was never out of the chunk in which it started.
+    // The ray was never outside its start chunk.
     const I4 was_inside = (at == ray.origin) & ray.forward & (ray.is_moved ? I4{} : ~I4{});
     const I4 is_far = ((now < behind_t) | ((behind_t == now) & (axes > axis))) & ~was_inside & ~is_short;
     at = at + (is_short ? all4(kChunkSize) : all4(0.0F)) - (is_far ? all4(kChunkSize) : all4(0.0F));
@@ -422,7 +422,7 @@ inline SetUp clip_path(PathRay& ray, const PathBox& box, F4 speed, int moved) {
     ray.chunk = ray.backward ? all4(-kChunkSize) : all4(0.0F);
     return SetUp::Ready;
   }
-  // Enters through the last plane; at a tie the later axis.
+  // The ray enters through the last plane; at a tie, through the plane of the later axis.
   const F4 near_t = before ? (box.low - origin) * ray.inverse : all4(-1.0F);
   const float t = greatest3(near_t);
   const int axis = 31 - std::countl_zero(static_cast<std::uint32_t>(mask3(near_t == all4(t))));
@@ -502,8 +502,8 @@ class PathWalk {
     return found;
   }
 
-  /// Calls `meet(brick, cell, voxels)` for the occupied voxels that the ray passes, of one cell after the other, until
-  /// it returns true.
+  /// Calls `meet(brick, cell, voxels)` for the occupied voxels that the ray passes, one cell at a time, until it
+  /// returns true.
   template <class Meet>
   [[gnu::always_inline]] void walk(Meet&& meet) {
     std::uint64_t allowed = ~std::uint64_t{0};
@@ -544,7 +544,7 @@ class PathWalk {
     }
   }
 
-  /// The mirrored planes below a cell of a brick of the chunk in which the walk is.
+  /// Returns the mirrored planes below a cell of a brick of the current chunk.
   [[nodiscard]] F4 corner_of_cell(int brick, int cell) const {
     const F4 lower = F4{plane_[0], plane_[1], plane_[2], 0.0F} - kChunkSize;
     return lower + corner_of(brick) * 16.0F + corner_of(cell) * 4.0F;
@@ -553,14 +553,14 @@ class PathWalk {
   [[nodiscard]] bool is_too_far(F4 in_cell) const {
     return ray_.is_cut && greatest3((in_cell - ray_.origin) * ray_.inverse) > ray_.exit_t;
   }
-  /// The voxel, from the tables' origin, with these mirrored planes below it.
+  /// Returns the voxel, relative to the tables' origin, with these mirrored planes below it.
   [[nodiscard]] I4 native_voxel(F4 voxel) const {
     const F4 native = mirrored_planes(ray_.backward ? voxel + 1.0F : voxel, ray_.backward);
     return __builtin_convertvector(native, I4) + ray_.base;
   }
 
  private:
-  // The units in which a ray starts, mirrored.
+  // The start units of a ray, mirrored.
   struct Own {
     int brick, cell, voxel;
   };
@@ -585,7 +585,7 @@ class PathWalk {
     return paths_.voxels(block, cell) & mirrored_(&words[static_cast<std::size_t>(cell ^ flip_)]);
   }
 
-  // Into the next chunk; false when the ray has left its box.
+  // Moves to the next chunk. Returns false if the ray has left its box.
   [[gnu::always_inline]] bool advance() {
     if (t_[0] <= t_[1] && t_[0] <= t_[2]) return cross<0>();
     return t_[1] <= t_[2] ? cross<1>() : cross<2>();
@@ -625,7 +625,7 @@ class PathWalk {
   const PathRay& ray_;
   int flip_;  // from a mirrored unit to the unit
   int index_;
-  float plane_[3];  // through which it leaves the chunk
+  float plane_[3];  // exit planes of the chunk
   float t_[3];
   int stride_[3];
 };

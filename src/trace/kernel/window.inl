@@ -2,7 +2,7 @@
 // the brick indices of the window, and the rays walk from voxel to voxel without a test of 4^3 cells first.
 //
 //   a place in the window     bit | 17 16 | 15 14 | 13 12 | 11 10 | 9 8 | 7 6 | 5 4 | 3 2 | 1 0 |
-//                                 |   z       y       x   |   z     y     x   |  z     y     x  |
+//                                 |   z       y       x   |   y     z     x   |  z     y     x  |
 //                                 | brick                 | cell of the brick | voxel of the cell |
 //
 // The upper six bits are the brick, the next seven the half word in it, and the lowest five the bit.
@@ -46,8 +46,8 @@ inline bool is_full(const RayPacket& rays) {
   return (rays.active & kAll) == kAll;
 }
 
-// A place in a window: bits of x, y, z within a cell, then of z above x and y above z, as bricks are stored, then of x,
-// y, z which brick.
+// A place in a window, from the lowest bits: x, y, z of the voxel in its cell; x, z, y of the cell in its brick, in
+// storage order; x, y, z of the brick.
 constexpr int kAxisBits[3] = {3 | 3 << 6 | 3 << 12, 3 << 2 | 3 << 10 | 3 << 14, 3 << 4 | 3 << 8 | 3 << 16};
 constexpr int kWindow = 64;
 // In voxels, along any axis. Most longer rays leave the window.
@@ -75,7 +75,7 @@ inline SpreadStep spread_step(const Axis& axis) {
   return {select(axis.forward, all(~kAxisBits[kAxis]), all(0)), select(axis.forward, all(kOne), all(-kOne))};
 }
 
-// Rays where they start, in a window.
+// The start state of rays in a window.
 struct ShortRays {
   Lanes lanes;
   Planes planes;  // the next planes to cross
@@ -102,7 +102,7 @@ inline Mask start_in_window(ShortRays& rays, Axis& axis, F& plane, const double*
   const F reach = abs(axis.direction) * rays.max_t;
   const I margin = to_int(reach) + all(2);
   const I from = at - margin;
-  // Starts too far away for whole numbers come out as any, but not as these; NaN and infinity are no numbers.
+  // Distant starts give arbitrary integers, but not integers in this range. NaN and infinity fail the comparison.
   const Mask is_near = equals(at & all(~(kWindow - 1)), 0) & (whole <= all(kChunkSize));
   return is_near & (reach <= all(kShortReach)) & (all(-1) < from) & (from + margin + margin < all(kWindow));
 }
@@ -126,7 +126,7 @@ inline std::uint32_t set_up_short(const TreeView& tree, const Rays& rays, Mask w
   lanes.reach_scale = greatest;
   out.max_t = narrow(rays.max_t);
   out.code = all(0);
-  // A limit just below zero may have become one.
+  // A limit just below zero may have been rounded to zero.
   const Mask is_negative = test(as_int(out.max_t), all(std::numeric_limits<std::int32_t>::min()));
   const Mask usual = ~is_negative & (all(0.0F) <= out.max_t) & (all(0x1p-20F) <= greatest) & (greatest <= all(0x1p20F));
   const Mask fits = start_in_window<0>(out, lanes.x, out.planes.x, rays.origins[0], tree.origin.x, dx, origin.x) &
@@ -196,7 +196,7 @@ inline I gathered(I place) {
          (shift_right<8 + kInCell>(place) & all(48));
 }
 
-// Walks short rays, one window after the other, by `walk(origin, rays)`; a window begins at `origin`. Returns the other
+// Walks short rays, one window at a time, with `walk(origin, rays)`; a window begins at `origin`. Returns the remaining
 // rays.
 template <class Walk>
 [[gnu::always_inline]] inline std::uint32_t trace_short(const TreeView& tree, const RayPacket& packet, int first,
