@@ -1,6 +1,6 @@
 #pragma once
 
-// The slow, obvious mesher that the fast ones are compared with: one voxel, one face, one neighbour at a time.
+// The slow, obvious mesher, one voxel, one face, one neighbour at a time: the reference for the fast ones.
 
 #include <map>
 #include <random>
@@ -31,7 +31,7 @@ inline bool shows(const VoxelRegistry& types, VoxelType a, VoxelType b) {
   return a != kAir && (b == kAir || (types[b].visibility == Visibility::Transparent && a != b));
 }
 
-/// Occlusion by asking for each of the three voxels of each corner.
+/// Computes occlusion by reading each of the three voxels of each corner.
 inline FaceOcclusion corners_of_face(const Grid& grid, const VoxelRegistry& types, IVec3 voxel, Direction d) {
   const FaceFrame& frame = frame_of(d);
   FaceOcclusion corners{};
@@ -63,8 +63,7 @@ inline FaceSet visible_faces(const Grid& grid, const VoxelRegistry& types, bool 
   return faces;
 }
 
-/// Takes a quad apart into unit faces; fails where its corners do not interpolate to one tuple, or a face is there
-/// twice.
+/// Splits a quad into unit faces. Fails if its corners do not interpolate to one tuple, or if a face exists twice.
 inline void add_quad(const Quad& quad, IVec3 origin, FaceSet& faces) {
   const FaceOcclusion corners = quad.occlusion();
   const FaceFrame& frame = frame_of(quad.direction());
@@ -99,7 +98,7 @@ inline VoxelRegistry mixed_types() {
   return types;
 }
 
-/// A random world in `box`: blocks of random size, so that merging has something to do, and single voxels.
+/// Returns a random world in `box`: blocks of random size, which can be merged, and single voxels.
 inline Grid random_world(unsigned seed, const IBox& box, int type_count, double density) {
   std::mt19937 random(seed);
   Grid grid;

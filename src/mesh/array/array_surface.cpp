@@ -25,7 +25,7 @@ class VertexMaker {
         placement_(placement_of(lattice)),
         out_(out) {}
 
-  // The vertices of a slice of cells.
+  // Adds the vertices of a slice of cells.
   void add(const RankedRows& ranked, std::size_t slice) {
     for (std::size_t row = 0; row <= lattice_.rows(); ++row) {
       if (ranked.first[row] == ranked.first[row + 1]) continue;

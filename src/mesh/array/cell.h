@@ -25,13 +25,13 @@ inline void make_finite(Corners& d) {
   for (float& density : d) density = std::isnan(density) ? most : density;
 }
 
-// The crossing of an edge between densities of different signs, as a fraction of the edge.
+// Returns the crossing of an edge between densities of different signs, as a fraction of the edge.
 inline float crossing_of(float a, float b) {
   const float t = a / (a - b);
   return a == 0.0F ? kLeastFraction : b == 0.0F ? 1.0F - kLeastFraction : t;
 }
 
-// The mean of a cell's crossings.
+// Returns the mean of a cell's crossings.
 inline Vec3 mean_crossing(const Corners& d) {
   float sum[3];
   float high[3][2];  // crossed edges along an axis: at the high end of the next axis, and of the one after

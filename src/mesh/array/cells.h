@@ -79,7 +79,7 @@ class EdgeWindow {
   std::vector<std::uint64_t> no_edges_;
 };
 
-// A source that many windows share.
+// A source shared by many windows.
 template <class Source>
 struct Borrowed {
   Source* source;
@@ -91,7 +91,7 @@ struct Borrowed {
 
 struct CellIndex {
   Buffer<std::uint64_t> active;                // [slice][row][word] of cells
-  Buffer<std::uint32_t> first;                 // [slice][row]: the vertices before; one more at the end
+  Buffer<std::uint32_t> first;                 // [slice][row]: the number of vertices before; one more at the end
   std::vector<std::uint64_t> quads_before;     // by slab; one more at the end
   std::vector<std::uint64_t> vertices_before;  // by slab; one more at the end
 

@@ -17,7 +17,7 @@ void copy_values(const CornerRows& rows, std::ptrdiff_t low, std::ptrdiff_t high
   }
 }
 
-// A bit for each corner beyond the array.
+// Returns one bit for each corner beyond the array.
 std::uint8_t corners_beyond(const CornerRows& rows, bool is_low_beyond, bool is_high_beyond) {
   unsigned bits = (is_low_beyond ? 0x55U : 0U) | (is_high_beyond ? 0xAAU : 0U);
   for (unsigned row = 0; row < 4; ++row) bits |= rows.is_beyond[row] ? 3U << (2 * row) : 0U;
@@ -35,7 +35,7 @@ void read_corners(const CornerRows& rows, const std::int32_t* cells, std::size_t
     out.is_beyond[at + i] = inner;
     if (cell > 0 && cell < rows.size) {
       copy_values<T>(rows, (cell - 1) * rows.stride, cell * rows.stride, to + i * sizeof(T));
-      // The next slice crosses the surface nearby.
+      // Prefetches: the surface probably crosses the next slice nearby.
 #if defined(__GNUC__)
       if (rows.next != nullptr) __builtin_prefetch(rows.next + cell * rows.stride);
 #endif

@@ -22,7 +22,7 @@ struct SolidLimit {
   bool takes_all = false;  // every value is solid
 };
 
-// The largest T that is not more than `x`, infinities included.
+// Returns the largest T that is not above `x`, including infinities.
 template <class T>
 T not_above(double x) {
   if constexpr (std::is_same_v<T, double>) {
@@ -43,7 +43,7 @@ SolidLimit<T> limit_of(const SolidRule& rule) {
     return {rule.is_below ? -not_above<T>(-rule.iso) : not_above<T>(rule.iso), false};
   } else {
     const double lowest = static_cast<double>(std::numeric_limits<T>::lowest());
-    // Beyond the largest: a power of two, so that it is exact.
+    // One more than the maximum: a power of two, so it is exact.
     const double beyond = std::ldexp(1.0, std::numeric_limits<T>::digits);
     const double whole = rule.is_below ? std::ceil(rule.iso) : std::floor(rule.iso);
     if (whole >= beyond) return {std::numeric_limits<T>::max(), rule.is_below};
@@ -77,7 +77,7 @@ class Densities {
   [[nodiscard]] bool is_below() const { return is_below_; }
 
   [[nodiscard]] float operator()(T value) const { return rounded(difference(value)); }
-  // Before rounding.
+  // Returns the distance before rounding.
   [[nodiscard]] double difference(T value) const {
     double above = 0.0;  // the surface's value minus `value`
     if constexpr (kIsLong) {

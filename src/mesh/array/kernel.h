@@ -40,8 +40,8 @@ struct VertexBatch {
   alignas(64) float normals[3][kBatch];
 };
 
-// The crossed edges that get quads, of a slice of samples: along rows, bit c between samples c - 1 and c; and from row
-// to row, row r between rows r - 1 and r.
+// The crossed edges of a slice of samples that get quads. Along rows: bit c is between samples c - 1 and c. Between
+// rows: row r is between rows r - 1 and r.
 struct EdgePlanes {
   const std::uint64_t* along_rows;    // [row][word]
   const std::uint64_t* between_rows;  // [row, one more][word]
@@ -57,7 +57,7 @@ struct CellSlice {
   const std::uint64_t* between_slices;  // [row][word], bit x: of sample x
 };
 
-// Cells that have a vertex, and the first vertex of each of their rows; slice after slice.
+// The cells that have a vertex, and the first vertex of each of their rows; slices are consecutive.
 struct RankedRows {
   const std::uint64_t* active;
   const std::uint32_t* first;
@@ -74,7 +74,7 @@ struct QuadRules {
   std::uint32_t (*vertex_on_edge)(const void* split_cells, std::uint32_t vertex, unsigned edge) = nullptr;
 };
 
-// A label array as kernels read it.
+// A label array in the form that kernels read.
 struct LabelRows {
   const std::byte* data;
   std::ptrdiff_t stride[3];
@@ -83,7 +83,7 @@ struct LabelRows {
   std::uint64_t sign;        // XORed with a label's bits to get its key
 };
 
-// A step of relaxation of a slice of cells.
+// One relaxation step of a slice of cells.
 struct RelaxStep {
   std::size_t rows;  // number of rows of samples
   std::size_t words;
@@ -94,9 +94,9 @@ struct RelaxStep {
   Vec3* to;
 };
 
-// Densities beyond these would overflow when they are subtracted.
+// Differences of densities beyond this would overflow.
 inline constexpr float kFarthest = 0x1p100F;
-// Gradients of less have no direction.
+// Shorter gradients have no direction.
 inline constexpr float kLeastGradient = std::numeric_limits<float>::min();
 
 struct Kernel {
@@ -108,24 +108,25 @@ struct Kernel {
   /// if `other` is null. Writes whole words.
   void (*differing[4])(const std::byte* row, const std::byte* other, std::uint64_t value, std::size_t count,
                        std::uint64_t* out);
-  /// The edges between rows of samples and others, and between neighbours in rows: bit c between c - 1 and c.
+  /// Finds the edges between two rows of samples, and between neighbours in a row: bit c is between c - 1 and c.
   void (*differences)(const std::uint64_t* a, const std::uint64_t* b, std::size_t words, std::uint64_t* out);
   void (*differences_along)(const std::uint64_t* a, std::size_t words, std::uint64_t* out);
-  /// Finds the cells of a slice that touch an edge; `count` gets how many there are in each row.
+  /// Finds the cells of a slice that touch an edge. `count` gets the number in each row.
   void (*find_active)(const CellSlice& slice, std::uint64_t* active, std::uint32_t* count);
   std::uint64_t (*count_bits)(const std::uint64_t* words, std::size_t count);
-  /// The vertices of cells, which are in place i of `out`.
+  /// Computes the vertices of the first `count` cells of a batch, and writes their positions and normals.
   void (*vertices)(const CornerBatch& corners, std::size_t count, const Placement& placement, VertexBatch& batch,
                    Vec3* positions, Vec3* normals);
-  /// The places of vertices from their cells and fractions.
+  /// Computes the positions of vertices from their cells and fractions.
   void (*place)(const VertexBatch& batch, std::size_t count, const Placement& placement, Vec3* positions);
-  /// Writes the triangles around the edges that start in the slice of samples before a slice of cells; returns where
-  /// they end. `solid` are the signs of these samples, null beyond the array; `ranked` begins at this slice.
+  /// Writes the triangles around the edges that start in the slice of samples before a slice of cells. Returns the
+  /// end of the written triangles. `solid` contains the signs of these samples, null beyond the array; `ranked` begins
+  /// at this slice.
   std::uint32_t* (*quads)(const CellSlice& slice, const std::uint64_t* solid, const RankedRows& ranked,
                           const QuadRules& rules, std::uint32_t* out);
   /// The same for labels, by their sizes in bytes: counts quads in the interfaces' slots, ...
   void (*count_interfaces[4])(const CellSlice& slice, const LabelRows& labels, std::int64_t z, InterfaceTable& table);
-  /// ... and writes them to where the interfaces' slots say.
+  /// ... and writes them to the positions in the interfaces' slots.
   void (*label_quads[4])(const CellSlice& slice, const LabelRows& labels, std::int64_t z, const RankedRows& ranked,
                          const QuadRules& rules, InterfaceTable& table, std::uint32_t* out);
   /// Computes the vertices of a slice of cells: the mean of the midpoints of crossed edges, as fractions of their

@@ -1,4 +1,4 @@
-// The kernel for x86-64 processors with AVX2, BMI and BMI2; called only where all were found.
+// The kernel for x86-64 processors with AVX2, BMI and BMI2. Called only if the processor has all of them.
 
 #include "mesh/array/kernel.h"
 

@@ -35,11 +35,11 @@ class LabelCode {
   [[nodiscard]] std::uint64_t key_of(std::int64_t label) const { return bits_of(label) ^ sign_; }
   [[nodiscard]] std::int64_t label_of(std::uint64_t key) const {
     const std::uint64_t bits = key ^ sign_;
-    // The sign goes to all the bits above it.
+    // Extends the sign to all bits above it.
     return static_cast<std::int64_t>((bits ^ sign_) - sign_);
   }
   [[nodiscard]] bool holds(std::int64_t label) const { return label_of(key_of(label)) == label; }
-  // Among the functions of a kernel.
+  // The index of the label size among the functions of a kernel.
   [[nodiscard]] std::size_t size_index() const { return static_cast<std::size_t>(std::countr_zero(bits_ / 8)); }
 
  private:
@@ -47,7 +47,8 @@ class LabelCode {
   std::uint64_t sign_;
 };
 
-/// The edges between samples of different labels, as EdgeWindow's source; has two slices packed where rows are not.
+/// The edges between samples of different labels, as a source for EdgeWindow. Packs two slices if rows are not
+/// contiguous.
 class LabelEdges {
  public:
   LabelEdges(const Lattice& lattice, const LabelCode& code, std::int64_t background)
@@ -101,7 +102,7 @@ class LabelEdges {
     const std::size_t words = lattice_->words;
     out[words - 1] = 0;
     differing_(row, row + item_, background_, count_ - 1, out);
-    // To the place of the later sample.
+    // Moves each bit to the index of the later sample.
     for (std::size_t w = words; w-- > 1;) out[w] = out[w] << 1 | out[w - 1] >> 63;
     out[0] <<= 1;
     if (!is_background(row)) out[0] |= 1;
@@ -157,7 +158,7 @@ class Builder {
  private:
   [[nodiscard]] LabelEdges edges() const { return {lattice_, code_, options_.background}; }
 
-  // Numbers of quads become their places: by interface, and within it by slab.
+  // Converts counts of quads to write positions: by interface, and within it by slab.
   void list_interfaces() {
     struct Part {
       InterfaceTable::Slot slot;
@@ -220,7 +221,7 @@ class Builder {
     return done;
   }
 
-  // From their cells to space.
+  // Converts vertices from cell fractions to space.
   Status place() {
     const Placement placement = placement_of(lattice_);
     return for_each_slab(lattice_, threads_, steps_, [&](std::size_t, std::size_t first, std::size_t end) {

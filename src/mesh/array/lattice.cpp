@@ -11,7 +11,7 @@ namespace quoin::array {
 namespace {
 
 constexpr std::int64_t kMaxSize = (std::int64_t{1} << 31) - 2;
-// Rows shorter than this waste most of their words: another axis is walked along if it is longer.
+// Shorter rows waste most of their words. A longer axis is then used for the rows.
 constexpr std::int64_t kShortRow = 40;
 
 std::uint64_t magnitude(std::int64_t v) {
@@ -102,7 +102,7 @@ Result<Lattice> lattice_of(const ArrayView& array) {
     if (lattice.spacing[own] < 0.0) lattice.is_mirrored = !lattice.is_mirrored;
   }
   if (lattice.stride[0] < 0) {
-    // From the row's other end.
+    // From the other end of the row.
     const std::int64_t steps = lattice.size[0] - 1;
     lattice.data += steps * lattice.stride[0];
     lattice.stride[0] = -lattice.stride[0];

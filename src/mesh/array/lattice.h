@@ -17,7 +17,7 @@ namespace quoin::array {
 // Cell c of an axis spans samples c - 1 and c: cells 0 and n, at its ends, have a sample on one side only. A bit row of
 // samples or cells has `words` words, with sample or cell c at bit c. Bits beyond the last are 0.
 struct Lattice {
-  const std::byte* data = nullptr;  // sample (0, 0, 0) as it is walked
+  const std::byte* data = nullptr;  // sample (0, 0, 0) in the access order
   ScalarType type = ScalarType::Float32;
   std::array<std::int64_t, 3> size{};
   std::array<std::ptrdiff_t, 3> stride{};  // bytes; of axis 0 never negative
@@ -37,7 +37,7 @@ struct Lattice {
   }
   [[nodiscard]] std::size_t rows() const { return static_cast<std::size_t>(size[1]); }
   [[nodiscard]] std::size_t slices() const { return static_cast<std::size_t>(size[2]); }
-  // Words of a slice of samples, and of one of cells.
+  // The number of words in a slice of samples, and in a slice of cells.
   [[nodiscard]] std::size_t slice_words() const { return rows() * words; }
   [[nodiscard]] std::size_t cell_slice_words() const { return (rows() + 1) * words; }
 };
@@ -45,7 +45,7 @@ struct Lattice {
 // Returns the access order of an array, or an error.
 [[nodiscard]] Result<Lattice> lattice_of(const ArrayView& array);
 
-// Copies a row to neighbouring places.
+// Copies a row to contiguous memory.
 void pack_row(const Lattice& lattice, std::int64_t y, std::int64_t z, std::byte* to);
 
 }  // namespace quoin::array

@@ -1,4 +1,4 @@
-// Vertices from their cells to space.
+// Converts vertices from cell fractions to space.
 
 #pragma once
 
@@ -9,7 +9,7 @@
 namespace quoin::array {
 namespace {
 
-// Arrays of coordinates as one of vectors, with the axes in the view's order.
+// Interleaves arrays of coordinates to vectors, with the axes in the view's order.
 inline void interleave(const float (&parts)[3][kBatch], const int (&view_axis)[3], std::size_t count, Vec3* out) {
   const float* in_order[3];
   for (int axis = 0; axis < 3; ++axis) in_order[view_axis[axis]] = parts[axis];

@@ -8,7 +8,7 @@
 
 namespace quoin::array {
 
-// From the walked axes to the view's, in space.
+// Maps the axes of the access order to the view's axes, in space.
 struct Placement {
   double origin[3];  // by walked axis
   double spacing[3];

@@ -43,7 +43,7 @@ inline float squared_distance(const Vec3& a, const Vec3& b) {
   out[5] = d;
 }
 
-// Rows of cells, and the vertices before the word that is at work.
+// Rows of cells, and the numbers of vertices before the current word.
 template <int kRows>
 struct RowCursor {
   const std::uint64_t* active[kRows];
@@ -65,8 +65,8 @@ template <int kRows, class Visit>
   }
 }
 
-// Calls emit(is_along, place, q0, q1, q2, q3) ... of a slice of cells, row by row. `begin_row(axis, row)` comes before
-// each row that has edges.
+// Calls emit(is_along, place, q0, q1, q2, q3) for the crossed edges of a slice of cells, row by row. Calls
+// `begin_row(axis, row)` before each row with edges.
 template <class Emitter>
 [[gnu::always_inline]] inline void for_each_quad(const CellSlice& slice, const RankedRows& ranked, Emitter& emit) {
   const std::size_t words = slice.words;
@@ -120,7 +120,7 @@ struct FieldQuads {
     const std::size_t at = place - shift;
     return (starts[at / kWordBits] >> (at % kWordBits) & 1U) != 0;
   }
-  // The vertex of a cell that may have several, on the edge that is at work.
+  // Returns the vertex of a cell, which may have several, on the current edge.
   [[nodiscard]] std::uint32_t resolved(std::uint32_t vertex, unsigned corner) const {
     if ((rules.split[vertex / kWordBits] >> (vertex % kWordBits) & 1U) == 0) return vertex;
     // The edge's position in the cell: at the high end of each axis along which the cell is before the edge.

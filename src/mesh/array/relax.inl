@@ -1,7 +1,7 @@
-// The vertices of labels: where they start, and how they are relaxed.
+// The start positions of label vertices, and their relaxation.
 //
 //   crossings of a cell   | along rows | from row to row | from slice to slice |    12 bits
-//                         | dy + 2 dz  | dx + 2 dz       | dx + 2 dy           |    which of the four edges
+//                         | dy + 2 dz  | dx + 2 dz       | dx + 2 dy           |    number of the edge, of four
 
 #pragma once
 
@@ -42,8 +42,9 @@ constexpr auto kCrossingSums = [] {
         ++on_face[2 * others[i] + ends[i]];
       }
     }
-    // A face with three crossings has three labels: a line where surfaces meet leaves the cell there. Vertices of such
-    // lines go by their neighbours on the line alone, so that it is smooth too. Four may be two labels, crosswise.
+    // A face with three crossings has three labels: a line where surfaces meet leaves the cell there. Vertices on such
+    // lines are linked only with their neighbours on the line, so that the line is smooth too. Four crossings may also
+    // be two labels on opposite corners.
     unsigned least = 1;
     for (const unsigned count : on_face) least = count == 3 ? 3 : least;
     for (unsigned face = 0; face < 6; ++face) {

@@ -48,7 +48,7 @@ template <class T>
   return value;
 }
 
-// A word for each 64 of `count` places where `is_set` says so.
+// Writes one word per 64 of `count` indices, with the bits where `is_set` returns true.
 template <class IsSet>
 [[gnu::always_inline]] inline void collect_bits(std::size_t count, std::uint64_t* out, IsSet is_set) {
   alignas(64) std::uint8_t flags[kWordBits];
@@ -156,7 +156,7 @@ void find_active(const CellSlice& slice, std::uint64_t* active, std::uint32_t* c
   };
   find(0, words);
   find(slice.rows, words);
-  // All rows between are one long one.
+  // All inner rows are processed as one long row.
   if (slice.rows > 1) find(1, (slice.rows - 1) * words);
   for (std::size_t row = 0; row <= slice.rows; ++row) {
     std::uint32_t sum = 0;

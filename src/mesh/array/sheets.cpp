@@ -35,7 +35,7 @@ int flipped_face_of(const Lattice& lattice, const Signs& signs, IVec3 cell, std:
   return smooth::joined_face(signs.solid_corners(other)) == (face ^ 1) ? face : smooth::kNoFace;
 }
 
-// The mean of the crossings of one sheet, and the gradient there.
+// Returns the mean of the crossings of one sheet, and the gradient there.
 smooth::CellVertex vertex_of_sheet(const smooth::Corners& d, const smooth::Sheets& sheets, int sheet,
                                    const float* scale) {
   Vec3 sum(0.0F);

@@ -11,7 +11,7 @@
 namespace quoin::array {
 namespace {
 
-// The bits from `first` to before `end`.
+// Returns words with the bits from `first` to before `end`.
 std::vector<std::uint64_t> bit_range(std::size_t words, std::int64_t first, std::int64_t end) {
   std::vector<std::uint64_t> bits(words, 0);
   for (std::int64_t i = first; i < end; ++i) bits[static_cast<std::size_t>(i / 64)] |= std::uint64_t{1} << (i % 64);
@@ -111,7 +111,7 @@ void Signs::between(std::size_t slice_of_cells, std::uint64_t* out) const {
   }
 }
 
-// Leaves the edges of an open border that get quads.
+// Keeps the edges that get quads with an open border.
 void Signs::keep_inner(std::uint64_t* rows, std::size_t count, const std::vector<std::uint64_t>& mask) const {
   for (std::size_t row = 0; row < count; ++row, rows += lattice_.words) {
     const bool is_kept = is_inner(row, count);

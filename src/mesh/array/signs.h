@@ -16,7 +16,7 @@
 
 namespace quoin::array {
 
-// The signs of an array's samples, and which edges get quads.
+// The signs of an array's samples, and the edges that get quads.
 class Signs {
  public:
   Signs(const Lattice& lattice, const ArraySurfaceOptions& options);
@@ -26,7 +26,7 @@ class Signs {
 
   Status find(Threads threads, ProgressSteps& steps);
 
-  // Null beyond the array.
+  // Returns a slice of signs; null beyond the array.
   [[nodiscard]] const std::uint64_t* slice(std::size_t z) const {
     return z < lattice_.slices() ? bits_.data() + z * lattice_.slice_words() : nullptr;
   }

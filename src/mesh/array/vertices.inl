@@ -39,7 +39,7 @@ inline F crossing_of(F a, F b, F& one) {
   return only(is_crossed, select(b == all(0.0F), all(1.0F - kLeastFraction), t));
 }
 
-// The mean of a cell's crossings.
+// Returns the mean of a cell's crossings.
 inline Lanes3 mean_crossing(const F* d) {
   F sum[3];
   F high[3][2];  // crossed edges along an axis: at the high end of the next axis, and of the one after

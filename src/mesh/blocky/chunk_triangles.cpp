@@ -13,7 +13,7 @@ Error too_large() {
   return {ErrorCode::LimitExceeded, "the mesh needs more than 2^32 vertices", {}, {}};
 }
 
-// Room for as many quads more.
+// Reserves room for `quads` more quads.
 void grow(std::size_t quads, BlockyTriangles& out) {
   const std::size_t vertices = out.positions.size() + vertices_needed(quads);
   out.positions.resize(vertices);
@@ -23,7 +23,7 @@ void grow(std::size_t quads, BlockyTriangles& out) {
   out.indices.resize(out.indices.size() + indices_needed(quads));
 }
 
-// Writes the `number`-th quad of all of them.
+// Writes the quad with index `number`.
 void put_quad(const Quad& quad, IVec3 origin, std::size_t number, BlockyTriangles& out) {
   const std::size_t first = 4 * number;
   for_each_vertex({&quad, 1}, [&](std::size_t i, const QuadVertex& vertex) {

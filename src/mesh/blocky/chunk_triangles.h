@@ -8,7 +8,7 @@
 
 namespace quoin {
 
-/// Turns the quads of chunks into triangles, chunk after chunk.
+/// Converts the quads of consecutive chunks to triangles.
 class ChunkTriangles {
  public:
   ChunkTriangles(const VoxelRegistry& types, bool watertight);

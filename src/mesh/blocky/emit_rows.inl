@@ -19,7 +19,7 @@
 namespace quoin::blocky {
 namespace {
 
-// Lists the rows of the listed groups that have runs; returns how many quads end in them.
+// Lists the rows with runs in the listed groups. Returns the number of quads that end in them.
 QUOIN_STAGE std::size_t list_rows(int groups, const Batch& b, std::uint16_t* rows, std::size_t& row_count) {
   const __m128i eight = _mm_set_epi16(7, 6, 5, 4, 3, 2, 1, 0);
   __m512i quads = _mm512_setzero_si512();
@@ -49,7 +49,7 @@ QUOIN_INLINE __m512i broadcast(const std::uint64_t* p) {
   return _mm512_set1_epi64(static_cast<long long>(*p));
 }
 
-// The row before or the row after, as each lane needs it.
+// Returns the row before or the row after, as each lane needs it.
 template <bool kUAlongBits>
 QUOIN_INLINE __m512i rows_beside(const std::uint64_t* row) {
   return _mm512_mask_broadcastq_epi64(broadcast(row - 1), CornerLanes<kUAlongBits>::kNextRow,
@@ -66,7 +66,7 @@ QUOIN_INLINE __m512i cells_beside(__m512i row, __m512i ends) {
   return _mm512_rolv_epi64(_mm512_ternarylogic_epi64(brought, ends, row, 0xCA), rotation);
 }
 
-// The eight bits of occlusion of all 64 cells of a row, as a quad has them.
+// Computes the eight bits of occlusion of all 64 cells of a row, in the layout of a quad.
 template <bool kUAlongBits, bool kRowEnds>
 QUOIN_INLINE __m512i occlusion_of_row(const std::uint64_t* front, const std::uint64_t* ends) {
   const __m512i none = _mm512_setzero_si512();
@@ -76,7 +76,7 @@ QUOIN_INLINE __m512i occlusion_of_row(const std::uint64_t* front, const std::uin
   constexpr __mmask8 kHighBits = 0b1010'1010;
   __m512i planes = _mm512_mask_ternarylogic_epi64(side1, kHighBits, side2, corner, 0xE8);
   planes = _mm512_mask_ternarylogic_epi64(planes, static_cast<__mmask8>(~kHighBits), side2, corner, 0xD6);
-  // Byte i of each plane, the last plane first; then their bits, a cell a byte.
+  // Selects byte i of each plane, the last plane first, and then transposes the bits: one byte per cell.
   alignas(64) static constexpr auto kTurned = [] {
     std::array<std::uint8_t, 64> bytes{};
     for (std::size_t i = 0; i < 64; ++i) bytes[i] = static_cast<std::uint8_t>((7 - i % 8) * 8 + i / 8);
@@ -140,7 +140,7 @@ QUOIN_STAGE void take_apart(const Pass& pass, int first_plane, std::size_t rows,
   }
 }
 
-// The types of sixteen quads, shifted as in the upper half of a quad: from the bit planes of the palette index.
+// Returns the types of sixteen quads, shifted as in the upper half of a quad, from the bit planes of the palette index.
 template <int kPlanes>
 QUOIN_INLINE __m512i types_of(const Scratch& s, __m512i positions) {
   // A layer in halves of words: 2 * word_index(z, y) + x / 32.

@@ -29,7 +29,7 @@ QUOIN_STAGE std::size_t list_rows(const Pass& pass, int first_plane, int groups,
     const Words columns[4] = {load(b.ends + at), load(b.starts + at), load(b.closes + at), load(places + at) + base};
     Words rows[4];
     transpose_words(columns, rows);
-    // All four are written; a row without runs is written over by the next.
+    // All four rows are written; the next row overwrites a row without runs.
     for (int k = 0; k < 4; ++k) {
       const std::uint64_t ends = b.ends[at + k];
       store(&out->ends, rows[k]);
@@ -42,7 +42,7 @@ QUOIN_STAGE std::size_t list_rows(const Pass& pass, int first_plane, int groups,
   return static_cast<std::size_t>(runs);
 }
 
-// The bits of the 9 voxels in front of the first or last cell of a row, as the occlusion tables index them.
+// Returns the bits of the 9 voxels in front of the first or last cell of a row, in the order of the occlusion tables.
 __attribute__((noinline)) std::uint64_t bits_in_front_at_end(const Pass& pass, const std::uint64_t* front,
                                                              bool is_first) {
   const std::int64_t word = front - pass.view->opaque.words;
@@ -67,7 +67,7 @@ QUOIN_INLINE void next_run(std::uint64_t& starts, std::uint64_t& ends, const Row
   const Row* next = row + 1;
   starts &= starts - 1;
 #ifdef QUOIN_KERNEL_AVX2
-  // Compilers make this a branch, which mispredicts in every other row.
+  // Compilers turn this into a branch, which is mispredicted in every other row.
   asm("blsr %[ends], %[ends]\n\t"
       "cmovz %[next_starts], %[starts]\n\t"
       "cmovz %[next_ends], %[ends]\n\t"
@@ -84,7 +84,7 @@ QUOIN_INLINE void next_run(std::uint64_t& starts, std::uint64_t& ends, const Row
 #endif
 }
 
-// The type of a cell of a row, in a quad's place. `place` holds the row's plane and number.
+// Returns the type of a cell of a row, shifted to its position in a quad. `place` holds the row's plane and number.
 template <int kDirection, int kLogBits>
 QUOIN_INLINE std::uint64_t type_of(const Scratch& s, std::uint64_t place, std::uint64_t cell) {
   using L = Layout<kDirection>;
@@ -101,12 +101,12 @@ QUOIN_INLINE std::uint64_t type_of(const Scratch& s, std::uint64_t place, std::u
   }
 }
 
-// Turns the runs of a batch into quads. A run that ends here becomes one; one that grows only counts a row. One flat
-// loop over all runs.
+// Converts the runs of a batch to quads, in one flat loop. A run that ends here becomes a quad; a run that grows only
+// counts a row.
 template <int kDirection, bool kOcclusion, int kLogBits>
 QUOIN_STAGE std::uint64_t* emit(const Pass& pass, std::size_t runs, Scratch& s, std::uint64_t* out) {
   using L = Layout<kDirection>;
-  // A row more starts lower and is higher.
+  // Each additional row lowers the start and increases the height.
   constexpr std::uint64_t kPerRow = (std::uint64_t{1} << L::kHeightShift) - (std::uint64_t{1} << (6 * L::kRowAxis));
   const Row* row = s.batch.rows;
   std::uint64_t starts = row->starts;

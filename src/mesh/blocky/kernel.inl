@@ -69,7 +69,8 @@ void fill_row_masks(const IBox& region, Scratch& s) {
   }
 }
 
-// With transparent types a face depends on both voxels' types: all six face layers are made in the z view's layout.
+// With transparent types, a face depends on both voxels' types. All six face layers are then computed in the z view's
+// layout.
 void fill_faces(const Job& job, const SlabRange& range, bool row_ends, Scratch& s) {
   find_faces_of_all_types(job, row_ends, s);
   for (int i = 0; i < 2; ++i) {
@@ -125,8 +126,8 @@ void run_directions(const Job& job, bool row_ends, const TypeSource& types, Scra
   run_direction<5>(job, row_ends, types, s, out);
 }
 
-// The region without its solid floor: layers in which every voxel, of the region and around it, is opaque, like the
-// layers below and above, show no face. A common case, the ground under a terrain's surface.
+// Returns the region without its solid floor: layers without a visible face, because every voxel in them and around
+// them, and in the layers below and above, is opaque. This is common in the ground under terrain.
 IBox above_solid_floor(const Job& job, bool row_ends, const Scratch& s) {
   IBox rest = job.region;
   const std::uint64_t before = rest.min.x == 0 ? std::uint64_t{1} << 63 : 0;  // as in a view's ends
@@ -188,7 +189,7 @@ std::int64_t count_all_faces(const Job& job, Scratch& s) {
   return count;
 }
 
-// The layers of the other views.
+// Fills the layers of the other views.
 void turn_views(const Job& job, bool row_ends, Scratch& s) {
   const SlabRange range = slabs_around(job.region);
   swap_planes_and_rows(s.z.opaque, s.y.opaque, range.z, range.y);

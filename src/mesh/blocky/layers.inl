@@ -1,10 +1,10 @@
-// From packed voxels to layers of bits: the chunk's own, and opacity around it from its 26 neighbours.
+// Converts packed voxels to bit layers: the chunk's own, and the opacity around it from its 26 neighbours.
 //
-//   packed row, 2 bits a voxel       | 3 0 1 1 2 ... |           palette indices
-//   planes, a word each          bit 0 | 1 0 1 1 0 ... |
-//                                bit 1 | 1 0 0 0 1 ... |
-//   opaque                         | 1 0 1 1 0 ... |           from the planes, index by index
-//   same_bit, same_row, same_z     | 0 0 1 0 . ... |           the next voxel along x, y, z is of the same type
+//   packed row, 2 bits per voxel     | 3 0 1 1 2 ... |           palette indices
+//   planes, one word each       bit 0 | 1 0 1 1 0 ... |
+//                               bit 1 | 1 0 0 0 1 ... |
+//   opaque                            | 1 0 1 1 0 ... |        from the planes, one index at a time
+//   same_bit, same_row, same_z        | 0 0 1 0 . ... |        the next voxel along x, y, z has the same type
 
 #pragma once
 
@@ -21,7 +21,7 @@ namespace {
 #ifdef QUOIN_KERNEL_AVX512
 inline constexpr bool kTypesFromRows = false;
 #else
-// Types are fetched from packed rows, however narrow these are.
+// Types are read from packed rows of any width.
 inline constexpr bool kTypesFromRows = true;
 #endif
 
@@ -134,7 +134,7 @@ void find_rows(const ChunkStorage& voxels, const SlabRange& range, Scratch& s) {
   }
 }
 
-// Bit k of the voxels of four rows.
+// Returns bit k of the voxels of four rows.
 template <int kBits>
 QUOIN_INLINE Four plane_of_rows(const std::uint64_t* rows, int k) {
 #ifdef QUOIN_KERNEL_AVX512
@@ -214,7 +214,7 @@ QUOIN_INLINE Words hold_none(const Words (&planes)[kPlanes], const std::uint8_t*
   return none;
 }
 
-// Opacity, and where neighbours are of one type if there are several.
+// Computes opacity, and equality of adjacent types if there are several types.
 template <int kPlanes, bool kTypes, bool kTransparent>
 void combine_planes(const SlabRange& range, const OpenIndices& open, Scratch& s) {
   const std::uint8_t* first_transparent = open.indices + open.air_count;
@@ -383,7 +383,7 @@ class OpaqueVoxels {
 
   [[nodiscard]] bool none() const { return voxels_ == nullptr && !all_; }
 
-  // Bit x: the voxel at x.
+  // Returns a row; bit x is the voxel at x.
   [[nodiscard]] std::uint64_t row(int y, int z) const {
     if (voxels_ == nullptr) return std::uint64_t{0} - static_cast<std::uint64_t>(all_);
     const std::uint32_t slab = voxels_->slabs[ChunkStorage::slab_index(y, z)];
@@ -402,7 +402,7 @@ class OpaqueVoxels {
     }
   }
 
-  // Bit i: the voxel at the row's first or last place in row i of a slab.
+  // Returns bits; bit i is the first or last voxel of row i of a slab.
   template <bool kLast>
   [[nodiscard]] std::uint64_t ends_of_slab(std::size_t slab) const {
     constexpr std::uint64_t kAllRows = 0xFFFF;

@@ -26,7 +26,7 @@ std::int64_t BlockyMesh::vertex_count() const {
 
 namespace {
 
-// The quads of all chunks; fewer where `reporter` was cancelled.
+// Returns the quads of all chunks; fewer if `reporter` was cancelled.
 std::vector<QuadBuffer> quads_of(const Grid& grid, const std::vector<IVec3>& chunks, const VoxelRegistry& types,
                                  const BlockyMeshOptions& options, Threads threads, ProgressSteps& reporter) {
   std::vector<QuadBuffer> parts(chunks.size());

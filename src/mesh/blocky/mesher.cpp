@@ -97,7 +97,7 @@ std::uint64_t same_transparent(const Job& job, const Chunk& other, int y, int z,
   return mask;
 }
 
-// The layer of faces towards a direction, where some types are transparent.
+// Returns the layer of faces in a direction, if some types are transparent.
 Layer& faces_towards(Direction direction, Scratch& s) {
   const auto d = static_cast<std::size_t>(direction);
   return d < 4 ? s.sides[d] : s.z.faces[d - 4];

@@ -123,7 +123,7 @@ std::size_t OcclusionAtlas::add(const BlockyTriangles& split, const BlockyTriang
   std::vector<std::size_t>& faces = additions_.emplace_back();
   faces.reserve(merged.positions.size() / kCorners);
   std::size_t next = 0;
-  // Both have their faces chunk by chunk, in one order of chunks.
+  // Both meshes have their faces chunk by chunk, in the same order of chunks.
   for (std::size_t at = 0; at < merged.positions.size();) {
     const IVec3 chunk = face_of(merged, at).chunk;
     for (; next < split.positions.size() && face_of(split, next).chunk == chunk; next += kCorners) paint(split, next);
@@ -137,7 +137,7 @@ std::size_t OcclusionAtlas::add(const BlockyTriangles& split, const BlockyTriang
   return additions_.size() - 1;
 }
 
-// Shelves of patches that become ever lower. Fails where they do not fit into a square.
+// Packs patches on shelves of decreasing height. Returns false if they do not fit into the square.
 bool OcclusionAtlas::place(const std::vector<std::size_t>& order, int edge, int& height) {
   int x = 0;
   int y = 0;

@@ -25,7 +25,7 @@ namespace quoin {
 /// the four levels of a voxel's face into a saddle, where two triangles have an edge; at the corners both are equal.
 class OcclusionAtlas {
  public:
-  /// Longest side of a texture that devices take.
+  /// The maximum texture size that devices support.
   static constexpr int kMaxEdge = 16'384;
 
   /// Returns true if no face was added.
@@ -40,11 +40,12 @@ class OcclusionAtlas {
   /// Errors: LimitExceeded beyond kMaxEdge.
   [[nodiscard]] Result<Image> draw();
 
-  /// Texture coordinates of the vertices of an addition, 0 to 1 from the upper left corner. Requires: drawn.
+  /// Returns the texture coordinates of the vertices of an addition, 0 to 1 from the upper left corner. Requires:
+  /// draw() was called.
   [[nodiscard]] std::vector<std::array<float, 2>> coordinates(std::size_t addition) const;
 
  private:
-  /// A texel a corner, rows from v = 0.
+  /// One texel per corner, rows from v = 0.
   struct Patch {
     int columns = 1;
     int rows = 1;

@@ -4,7 +4,7 @@
 //   merged       . X X . . . X .      the next cell has the same type and occlusion
 //   starts       . X . . X . X .      first cells of runs
 //   ends         . . . X X . . X      last cells of runs
-//   closes       . . . . X . . X      ends of runs that do not go on in the next row, by the carry of one addition
+//   closes       . . . . X . . X      ends of runs that do not continue in the next row, by the carry of one addition
 
 #pragma once
 
@@ -22,12 +22,12 @@ struct Pass {
   const std::uint64_t* row_masks;  // by row: the cells of the region
   Range planes;
   Range rows;
-  int side;       // +1 or -1: where the faces look
+  int side;       // +1 or -1: side that the faces point to
   bool row_ends;  // some voxel before or after a row may be opaque
-  bool one_type;  // all faces are of one type: the layers of same types are not there
+  bool one_type;  // all faces have one type: the layers of equal types are not filled
 };
 
-// Visible faces of a batch of planes, and the list of groups of kLanes rows that have any.
+// Finds the visible faces of a batch of planes, and lists the groups of kLanes rows that have any.
 template <bool kTransparent>
 QUOIN_STAGE int find_faces(const Pass& pass, int first_plane, int plane_count, Batch& b) {
   int groups = 0;
@@ -64,7 +64,7 @@ QUOIN_INLINE Words agree(const CornerOcclusion& a, const CornerOcclusion& b, con
   return ~or_difference(or_difference(or_difference(a.low ^ b.low, a.high, b.high), c.low, d.low), c.high, d.high);
 }
 
-// Faces that are not to be merged: each is a run.
+// Makes each face a run: no merging.
 QUOIN_STAGE void keep_apart(int groups, Batch& b) {
   for (int i = 0; i < groups; ++i) {
     const int at = b.groups[i];

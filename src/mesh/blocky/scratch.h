@@ -29,14 +29,14 @@ struct alignas(64) Layer {
 // `row`.
 struct View {
   Layer opaque;    // all 66 x 66 rows
-  Layer same_bit;  // same type as the next voxel of the row
+  Layer same_bit;  // same type as the next voxel in the row
   Layer same_row;  // same type as the voxel of the next row
   Layer ends;      // bit 63: the voxel before the row's first is opaque; bit 0: the one after its last (as rotated in)
   Layer faces[2];  // visible faces towards the next and the previous plane; only used with transparent types
 };
 
-// Everything that the passes over one direction need of a batch of planes. Rows are numbered as in a layer: a plane is
-// kRowStride further than the one before.
+// All data that the passes over one direction need for a batch of planes. Rows are numbered as in a layer: a plane
+// starts kRowStride after the one before.
 inline constexpr int kBatchPlanes = 8;
 inline constexpr int kBatchWords = kBatchPlanes * kRowStride;
 
@@ -53,7 +53,7 @@ struct alignas(64) Batch {
   std::uint64_t mergeable[kBatchWords + 8];  // faces with constant occlusion along the rows
   std::uint64_t starts[kBatchWords + 8];     // first cell of each run
   std::uint64_t ends[kBatchWords + 8];       // last cell of each run
-  std::uint64_t closes[kBatchWords + 8];     // at a run's last cell: the run does not go on in the next row
+  std::uint64_t closes[kBatchWords + 8];     // at a run's last cell: the run does not continue in the next row
   // By the column in which a run ends: its rows so far, as a quad's bits; 0 between batches.
   std::uint64_t rows_before[64];
   std::uint16_t groups[kBatchWords / 4 + 8];
@@ -94,12 +94,12 @@ struct Scratch {
   Layer solid;      // planes z, rows y: not air
   Layer same_z;     // planes z, rows y: same type as the voxel at z + 1
   Layer planes[4];  // planes z, rows y: the bits of the palette index
-  Layer sides[4];   // planes z, rows y: visible faces towards +x, -x, +y, -y; not used by meshing opaque types
+  Layer sides[4];   // planes z, rows y: visible faces towards +x, -x, +y, -y; unused if all types are opaque
   Batch batch;
   Parts parts;
   OcclusionTables occlusion;
-  std::uint64_t palette[256];          // types in a quad's place, by palette index
-  std::uint32_t narrow_palette[16];    // the first, as in the upper half of a quad
+  std::uint64_t palette[256];          // types in quad position, by palette index
+  std::uint32_t narrow_palette[16];    // the first entries, as in the upper half of a quad
   std::uint64_t row_masks[3][64 + 8];  // by axis of the rows: the cells of the region
   std::uint64_t patterns[256][16];     // a row of each uniform slab
   const std::uint64_t* rows[4096];     // [z * 64 + y]: packed voxels
@@ -114,8 +114,8 @@ struct Job {
   IBox region;  // not empty, inside the chunk, no larger than the voxels' bounds
   bool merge;
   bool occlusion;
-  bool has_transparent;  // some voxel of the centre chunk is
-  bool one_type;         // all its voxels but air are of one opaque type: the layers of same types are not made
+  bool has_transparent;  // some voxel of the centre chunk is transparent
+  bool one_type;         // all its voxels except air have one opaque type: the layers of equal types are not filled
 };
 
 // One kernel per instruction set; all give the same bytes. `find_faces` leaves the visible faces in `sides` and in the
@@ -138,8 +138,8 @@ std::uint64_t* grow_quads(QuadBuffer& out, std::size_t used, std::size_t more);
 // Returns true if a voxel of the chunk is transparent.
 bool holds_transparent(const Chunk& chunk, const VoxelRegistry& types);
 
-// Takes away the faces of transparent voxels that voxels of their own type hide from beyond the chunk's border, from
-// `sides` and the z view's faces.
+// Removes, from `sides` and the z view's faces, the faces of transparent voxels that a voxel of the same type beyond
+// the chunk's border hides.
 void hide_faces_at_border(const Job& job, Scratch& scratch);
 
 }  // namespace quoin::blocky

@@ -28,7 +28,7 @@ bool edge_is_on_border(IVec3 p, int axis) {
   return false;
 }
 
-// The four corners of an outline, by their place in it.
+// Returns the indices of the four corners in an outline.
 std::array<std::size_t, 4> corner_places(const std::vector<OutlinePoint>& outline) {
   std::array<std::size_t, 4> places{};
   std::size_t found = 1;
@@ -69,14 +69,14 @@ void OutlineFinder::outline(const Quad& quad, std::vector<OutlinePoint>& out) co
     const bool all = edge_is_on_border(from, axis);
     out.push_back({from, quad.occlusion(corner)});
     for (IVec3 p = from + step; p != to; p += step) {
-      // Quads merge only where occlusion is constant, so along an edge longer than a voxel it does not change.
+      // Quads merge only where occlusion is constant, so occlusion is constant along an edge longer than a voxel.
       if (all || is_vertex(p)) out.push_back({p, quad.occlusion(corner)});
     }
   }
 }
 
-// A and C are the ends of the diagonal. Fans from C cover side A-B, from the last point before B side B-C; then the
-// same for the other half.
+// A and C are the ends of the diagonal. Fans from C cover side A-B, fans from the last point before B cover side B-C.
+// The other half works in the same way.
 void triangulate_outline(const std::vector<OutlinePoint>& outline, bool flipped, std::uint32_t base,
                          std::vector<std::uint32_t>& indices) {
   const std::array<std::size_t, 4> corners = corner_places(outline);
@@ -85,7 +85,7 @@ void triangulate_outline(const std::vector<OutlinePoint>& outline, bool flipped,
     for (const std::size_t i : {a, b, c}) indices.push_back(base + static_cast<std::uint32_t>(i % count));
   };
   const auto half = [&](std::size_t a, std::size_t b, std::size_t c) {
-    // Places rise from a to b to c, modulo the count.
+    // Indices increase from a to b to c, modulo the count.
     const std::size_t to_b = (b + count - a) % count;
     const std::size_t to_c = (c + count - a) % count;
     for (std::size_t i = 0; i + 1 < to_b; ++i) emit(a + i, a + i + 1, c);

@@ -24,13 +24,14 @@ class OutlineFinder {
   /// Records the corners of all quads of a chunk.
   void prepare(const QuadBuffer& quads);
 
-  /// The outline of one of them, counter-clockwise from outside, starting at corner 0; corners are never left out.
+  /// Computes the outline of one of these quads, counter-clockwise from outside, starting at corner 0. Includes all
+  /// corners.
   void outline(const Quad& quad, std::vector<OutlinePoint>& out) const;
 
  private:
   [[nodiscard]] bool is_vertex(IVec3 p) const;
 
-  std::vector<std::uint64_t> corners_;  // a bit for each of 65^3 lattice points
+  std::vector<std::uint64_t> corners_;  // one bit for each of 65^3 lattice points
 };
 
 /// Appends triangles that cover a quad's outline. Uses all points of the outline and no triangle of zero area.

@@ -51,7 +51,7 @@ QUOIN_INLINE __m512i bits_of(Words v) {
   return reinterpret_cast<__m512i>(v);
 }
 
-// Any function of three bits: `kTable` has the answer for (a, b, c) at bit 4a + 2b + c.
+// Computes any function of three bits: `kTable` has the result for (a, b, c) at bit 4a + 2b + c.
 template <int kTable>
 QUOIN_INLINE Words ternary(Words a, Words b, Words c) {
   return reinterpret_cast<Words>(_mm512_ternarylogic_epi64(bits_of(a), bits_of(b), bits_of(c), kTable));
@@ -101,7 +101,7 @@ QUOIN_INLINE Words and_not(Words a, Words but_not, Words b) {
 QUOIN_INLINE Words and_same(Words so_far, Words a, Words b) {
   return so_far & ~(a ^ b);
 }
-// The two bits of a corner's occlusion: how many of the three are set, but 3 where both sides are.
+// The two bits of a corner's occlusion: the number of set bits of the three, but 3 if both sides are set.
 QUOIN_INLINE Words occlusion_low(Words side1, Words side2, Words corner) {
   return (side1 ^ side2 ^ corner) | (side1 & side2);
 }
@@ -111,7 +111,7 @@ QUOIN_INLINE Words occlusion_high(Words side1, Words side2, Words corner) {
 
 #endif
 
-// Position of the lowest bit. Requires: there is one.
+// Returns the position of the lowest set bit. Requires: w is not 0.
 QUOIN_INLINE std::uint64_t lowest_bit(std::uint64_t w) {
 #ifdef QUOIN_KERNEL_AVX2
   return _tzcnt_u64(w);
@@ -134,7 +134,7 @@ QUOIN_INLINE Words second_pairs(Words a, Words b) {
 }
 #endif
 
-// Word j of vector i becomes word i of vector j.
+// Transposes: word j of vector i becomes word i of vector j.
 QUOIN_INLINE void transpose_words(const Words (&in)[kLanes], Words (&out)[kLanes]) {
 #ifdef QUOIN_KERNEL_AVX512
   Words even[4];  // words 0, 2, 4, 6 of two vectors
@@ -167,7 +167,7 @@ QUOIN_INLINE void transpose_words(const Words (&in)[kLanes], Words (&out)[kLanes
 #endif
 }
 
-// Rows [z][y] to rows [y][z]; words are moved whole.
+// Copies rows [z][y] to rows [y][z]; whole words are moved.
 void swap_planes_and_rows(const Layer& from, Layer& to, Range z_range, Range y_range) {
   for (int z = z_range.begin; z < z_range.end; z += kLanes) {
     for (int y = y_range.begin; y < y_range.end; y += kLanes) {
@@ -182,7 +182,7 @@ void swap_planes_and_rows(const Layer& from, Layer& to, Range z_range, Range y_r
 
 #ifdef QUOIN_KERNEL_AVX512
 
-// Bytes of both words change places in one instruction each, bits in four.
+// Bytes of both words are exchanged in one instruction each, bits in four.
 template <int kShift>
 QUOIN_INLINE void exchange(Words& low, Words& high) {
   const __m512i a = bits_of(low);
@@ -207,7 +207,7 @@ QUOIN_INLINE void exchange(Words& low, Words& high) {
   }
 }
 
-// Stores only the chosen lanes.
+// Stores only the selected lanes.
 QUOIN_INLINE void store_lanes(std::uint64_t* p, unsigned lanes, Words v) {
   _mm512_mask_storeu_epi64(p, static_cast<__mmask8>(lanes), bits_of(v));
 }
@@ -287,7 +287,7 @@ void turn_bits(const Layer& from, Layer& to, Range y_range) {
   }
 }
 
-// One row outside the chunk: -1 or 64.
+// Copies one row outside the chunk: -1 or 64.
 template <int kRow>
 void turn_border(const Layer& from, Layer& to) {
   std::uint64_t opaque = 0;

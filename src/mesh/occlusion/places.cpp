@@ -22,7 +22,7 @@ auto pick_kernel() {
 }  // namespace
 
 Vec3 unit_or_up(Vec3 normal) {
-  // In double, no length of floats is too small or too large.
+  // In double, no vector of floats overflows or underflows.
   const DVec3 n(normal);
   const double length = std::sqrt((n.x * n.x + n.y * n.y) + n.z * n.z);
   if (!(length > 0.0) || !std::isfinite(length)) return {0.0F, 1.0F, 0.0F};
@@ -75,7 +75,7 @@ void PlaceKernel::sort_by_slice(const ChunkPlaces& wanted, const Sampling& sampl
 
 void PlaceKernel::occlude_some(const SmoothPlaces& places, int z, std::size_t first, std::size_t count,
                                std::span<float> out) {
-  // Kernels read whole registers: the last place again and again.
+  // Kernels read whole registers, so the last place is repeated.
   constexpr std::size_t kOverrun = 16;
   for (std::size_t i = 0; i < count + kOverrun; ++i) {
     const Entry& entry = sorted_[first + std::min(i, count - 1)];

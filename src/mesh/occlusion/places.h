@@ -16,19 +16,20 @@
 
 namespace quoin::smooth {
 
-/// A place as a vertex: in whole 1/65,536 of a cell of the level.
+/// A position in the form of a vertex: a cell, and a multiple of 1/65,536 within it.
 struct CellPlace {
-  IVec3 cell;    ///< of the whole field, at the level
+  IVec3 cell;    ///< in the whole field, at the level
   Vec3 snapped;  ///< 0 to 1 within it
 };
 
-/// The whole number below. Requires: within the range of int64. Without a call to the library, as the standard's is.
+/// Returns the largest integer that is not above `at`. Requires: it is in the range of int64. Avoids the library
+/// call of std::floor.
 inline std::int64_t whole_below(double at) {
   const auto whole = static_cast<std::int64_t>(at);
   return whole - (static_cast<double>(whole) > at ? 1 : 0);
 }
 
-/// False for NaN too.
+/// Returns true if all components are in the int32 range; false for NaN.
 inline bool is_in_int32(DVec3 position) {
   constexpr double kLimit = 2'147'483'648.0;
   const auto is_in = [](double at) { return at >= -kLimit && at < kLimit; };
@@ -57,7 +58,7 @@ inline Vec3 sound_normal(Vec3 normal) {
   return std::abs(square - 1.0F) <= kTolerance ? normal : unit_or_up(normal);
 }
 
-/// The occlusion of far air.
+/// Returns the occlusion of a position in far air.
 [[nodiscard]] float open_occlusion(const SmoothOcclusionOptions& options);
 
 /// The effective settings and level, within their limits.
@@ -73,10 +74,10 @@ struct Sampling {
 [[nodiscard]] float occlusion_of_place(const DensityNeighbourhood& chunks, const CellPlace& place, Vec3 normal,
                                        const Sampling& sampling);
 
-/// Places of one chunk.
+/// The sample positions of one chunk.
 struct ChunkPlaces {
   const SmoothPlaces& places;
-  IVec3 chunk{0};                          ///< its coordinates, where `places` has the field's
+  IVec3 chunk{0};                          ///< its coordinates, if `places` is relative to the field
   std::span<const std::uint32_t> numbers;  ///< samples in the chunk or a cell around it; other samples are far air
 };
 

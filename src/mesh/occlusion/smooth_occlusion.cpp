@@ -31,18 +31,18 @@ void check_places(const SmoothPlaces& places, std::span<float> out) {
   QUOIN_ASSERT(places.positions.size() < std::numeric_limits<std::uint32_t>::max(), "less than 2^32 places");
 }
 
-// Requires: within the int32 range.
+// Requires: the position is in the int32 range.
 IVec3 chunk_at(DVec3 position) {
   const auto chunk = [](double at) { return static_cast<int>(smooth::whole_below(at) >> kChunkShift); };
   return {chunk(position.x), chunk(position.y), chunk(position.z)};
 }
 
-// A place's chunk, and its cell from the chunk's first on.
+// Converts a cell to be relative to the first cell of its chunk.
 CellPlace in_chunk(const CellPlace& place, IVec3 chunk, int level) {
   return {place.cell - chunk * (kChunkEdge >> level), place.snapped};
 }
 
-// The places of a field, chunk by chunk.
+// The positions of a field, grouped by chunk.
 class PlacesByChunk {
  public:
   PlacesByChunk(const SmoothPlaces& places, const Sampling& sampling, std::span<float> out) {
@@ -74,7 +74,7 @@ class PlacesByChunk {
   }
 
  private:
-  // Counts one more place of the chunk.
+  // Counts one more position in the chunk. Returns the chunk's index.
   std::uint32_t index_of(IVec3 chunk) {
     if (chunks_.empty() || chunk != chunks_[last_]) {
       const auto [found, is_new] = indices_.try_emplace(chunk, static_cast<std::uint32_t>(chunks_.size()));

@@ -1,9 +1,9 @@
-// Faces of single voxels, whose corners know the eight voxels around them:
+// Faces of single voxels, with corners that depend on the eight voxels around them:
 //
-//        6 ---- 7      a corner's voxels, by bits x, y, z; between two that differ in one bit lies one of its twelve
-//       /|     /|      faces. Faces that share an edge from the corner are joined: a corner of one sheet has one
-//      2 ---- 3 |      vertex, one of several has one for each. On an edge with four faces those of one solid voxel
-//      | 4 ---| 5      are joined.
+//        6 ---- 7      a corner's voxels, by bits x, y, z. Between two voxels that differ in one bit is one of its
+//       /|     /|      twelve faces. Faces that share an edge at the corner are joined to sheets. A corner has one
+//      2 ---- 3 |      vertex per sheet. On an edge with four faces, the two faces of the same solid voxel are
+//      | 4 ---| 5      joined.
 //      0 ---- 1
 
 #include <quoin/mesh/closed_surface.h>
@@ -30,7 +30,7 @@ bool is_set(unsigned bits, unsigned cell) {
   return (bits >> cell & 1U) != 0;
 }
 
-/// Sheets of the faces around a corner, as sets that are joined.
+/// Sheets of the faces around a corner, as disjoint sets.
 class Sheets {
  public:
   Sheets() { std::iota(parent_.begin(), parent_.end(), 0U); }
@@ -44,12 +44,12 @@ class Sheets {
   std::array<unsigned, kCornerFaces> parent_{};
 };
 
-/// Joins the faces at one of the six edges from a corner: that towards the greater or lesser side of an axis.
+/// Joins the faces at one of the six edges from a corner: the edge towards the greater or lesser side of an axis.
 void join_at_edge(unsigned solid, unsigned axis, unsigned side, Sheets& sheets) {
   const unsigned u = 1U << ((axis + 1) % 3);
   const unsigned v = 1U << ((axis + 2) % 3);
   const unsigned first = side << axis;
-  // The four voxels around the edge, in turn; face i lies between voxels i and i + 1.
+  // The four voxels around the edge, in order; face i is between voxels i and i + 1.
   const std::array<unsigned, 4> cells = {first, first | u, first | u | v, first | v};
   const auto face = [&](unsigned i) { return corner_face(cells[i % 4], i % 2 == 0 ? (axis + 1) % 3 : (axis + 2) % 3); };
   std::array<unsigned, 4> shown{};
@@ -70,7 +70,7 @@ Vec3 towards(unsigned cell) {
   return {is_set(cell, 0) ? 1.0F : -1.0F, is_set(cell, 1) ? 1.0F : -1.0F, is_set(cell, 2) ? 1.0F : -1.0F};
 }
 
-/// The solid voxels, and the others, that a sheet lies between.
+/// The solid voxels and the open voxels adjacent to a sheet.
 struct Sides {
   unsigned solid = 0;
   unsigned open = 0;
@@ -138,7 +138,7 @@ namespace {
 using print::corner_face;
 using print::CornerOffsets;
 
-/// The voxels around one: bit (dx + 1) + 3 (dy + 1) + 9 (dz + 1) where they are not air.
+/// The voxels around a voxel: bit (dx + 1) + 3 (dy + 1) + 9 (dz + 1) is set for voxels that are not air.
 class Around {
  public:
   Around(GridReader& reader, IVec3 voxel) {
@@ -150,7 +150,7 @@ class Around {
   [[nodiscard]] bool is_solid(IVec3 from) const {
     return (bits_ >> static_cast<unsigned>((from.x + 1) + 3 * (from.y + 1) + 9 * (from.z + 1)) & 1U) != 0;
   }
-  /// The eight around a corner of the voxel, which is 0 or 1 along each axis.
+  /// Returns the eight voxels around a corner of the voxel; the corner is 0 or 1 along each axis.
   [[nodiscard]] unsigned corner(IVec3 corner) const {
     unsigned solid = 0;
     for (int cell = 0; cell < 8; ++cell) {
@@ -177,7 +177,7 @@ constexpr std::array<Face, 6> kFaces = {{{Direction::NegX, 0, 0},
                                          {Direction::NegZ, 2, 0},
                                          {Direction::PosZ, 2, 1}}};
 
-/// Corner i of a face, counter-clockwise from outside: 0 or 1 along each axis.
+/// Returns corner i of a face, counter-clockwise from outside: 0 or 1 along each axis.
 IVec3 corner_of(const Face& face, int i) {
   const int u = (face.axis + 1) % 3;
   const int v = (face.axis + 2) % 3;
@@ -217,10 +217,10 @@ class SurfaceMaker {
     for (int i = 0; i < 4; ++i) {
       const IVec3 corner = corner_of(face, i);
       const IVec3 next = corner_of(face, (i + 1) % 4);
-      // This voxel lies at the lesser side of its greater corners.
+      // This voxel is on the lesser side of its greater corners.
       const unsigned cell = static_cast<unsigned>((1 - corner.x) | (1 - corner.y) << 1 | (1 - corner.z) << 2);
       const CornerOffsets& offsets = print::corner_offsets()[around.corner(corner)];
-      // From whole numbers first, so that all voxels around a corner find the same bits.
+      // Adds integers first, so that all voxels around a corner compute the same bits.
       put(Vec3(voxel + corner) + offsets[corner_face(cell, static_cast<unsigned>(face.axis))]);
       // The side of the face with the edge to the next corner.
       IVec3 side(0);

@@ -6,7 +6,7 @@
 
 namespace quoin::print {
 
-/// Faces that can meet in a corner: between its eight voxels.
+/// The number of faces that can meet in a corner: between its eight voxels.
 inline constexpr unsigned kCornerFaces = 12;
 
 /// Returns the face between a corner's voxel `cell` (bits x, y, z) and its neighbour along an axis.

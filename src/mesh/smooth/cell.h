@@ -16,15 +16,15 @@ namespace quoin::smooth {
 
 /// The vertex of a cell, as computed by its arithmetic.
 struct CellVertex {
-  Vec3 fraction;  ///< 0 to 1 within the cell, not rounded: normals are computed with it
-  Vec3 snapped;   ///< rounded to 1/65,536, so that it can be added to whole numbers exactly: positions, occlusion
+  Vec3 fraction;  ///< 0 to 1 within the cell, not rounded; used for normals
+  Vec3 snapped;   ///< rounded to 1/65,536, so that sums with integers are exact; used for positions and occlusion
   Vec3 normal;    ///< unit, into the air
 };
 
-/// Density of the corners, by x + 2 y + 4 z.
+/// Densities of the corners, by x + 2 y + 4 z.
 using Corners = std::array<float, 8>;
 
-/// A corner is solid below 0. -0 and 0 are air.
+/// Returns the solid corners as bits. A corner is solid below 0; -0 and 0 are air.
 inline std::uint32_t solid_corners(const Corners& d) {
   std::uint32_t solid = 0;
   for (std::size_t i = 0; i < 8; ++i) solid |= static_cast<std::uint32_t>(d[i] < 0.0F) << i;
@@ -53,7 +53,7 @@ inline float sum_of_crossings(const float* a, const float* b) {
   return (p * s + r * q) / (q * s);
 }
 
-/// 1 / sqrt(x) to about 1e-7, with products only. Requires: x is normal.
+/// Returns 1 / sqrt(x), accurate to about 1e-7, with multiplications only. Requires: x is normal.
 inline float reciprocal_root(float x) {
   const float half = 0.5F * x;
   float y = std::bit_cast<float>(0x5F37'59DFU - (std::bit_cast<std::uint32_t>(x) >> 1));
@@ -62,10 +62,10 @@ inline float reciprocal_root(float x) {
   return y * (1.5F - (half * y) * y);
 }
 
-/// Squared gradients below this have no direction.
+/// Gradients with a smaller square have no direction.
 inline constexpr float kLeastSquaredGradient = 1e-30F;
 
-/// A gradient made unit; (0, 1, 0) where it has no direction.
+/// Normalizes a gradient. Returns (0, 1, 0) if it has no direction.
 inline Vec3 unit_normal(Vec3 g) {
   const float q = (g.x * g.x + g.y * g.y) + g.z * g.z;
   if (!(q >= kLeastSquaredGradient)) return {0.0F, 1.0F, 0.0F};
@@ -80,14 +80,14 @@ inline float bilinear(float v00, float v10, float v01, float v11, float u, float
   return a + v * (b - a);
 }
 
-/// The gradient of the trilinear field at a point of the cell.
+/// Returns the gradient of the trilinear field at a point of the cell.
 inline Vec3 trilinear_gradient(const Corners& d, Vec3 f) {
   return {bilinear(d[1] - d[0], d[3] - d[2], d[5] - d[4], d[7] - d[6], f.y, f.z),
           bilinear(d[2] - d[0], d[3] - d[1], d[6] - d[4], d[7] - d[5], f.x, f.z),
           bilinear(d[4] - d[0], d[5] - d[1], d[6] - d[2], d[7] - d[3], f.x, f.y)};
 }
 
-/// Rounds 0 to 1 to a multiple of 1/65,536.
+/// Rounds a number from 0 to 1 to a multiple of 1/65,536.
 inline float snap(float f) {
   return (f + 128.0F) - 128.0F;
 }
@@ -104,7 +104,7 @@ inline CellVertex cell_vertex(const Corners& d) {
   const float z_low[4] = {d[0], d[1], d[2], d[3]};
   const float z_high[4] = {d[4], d[5], d[6], d[7]};
   const std::uint32_t m = solid_corners(d);
-  // Crossed edges by axis, a bit at the place of their first corner.
+  // Crossed edges by axis, as bits at the number of their first corner.
   const std::uint32_t cx = (m ^ m >> 1) & 0x55U;
   const std::uint32_t cy = (m ^ m >> 2) & 0x33U;
   const std::uint32_t cz = (m ^ m >> 4) & 0x0FU;
@@ -168,13 +168,13 @@ struct SampleAxis {
   return spread * 0.125F;
 }
 
-/// Returns by how much a sample is solid, 0 to 1. `solid`: interpolated as its density is, but with 0 for the corners
-/// in air.
+/// Returns the solid share of a sample, 0 to 1. `solid` is interpolated like its density, but with 0 for the corners in
+/// air.
 [[gnu::always_inline]] inline float solidity(float density, float solid, float whole_depth) {
   return std::min(std::min(density, 0.0F) / std::min(solid, -whole_depth), 1.0F);
 }
 
-/// The soft share from the sum of 27 samples' solidity.
+/// Returns the soft share from the sum of 27 samples' solidity.
 [[gnu::always_inline]] inline float soft_share(float sum) {
   return std::min(sum * (1.0F / 27.0F), 1.0F);
 }
@@ -196,7 +196,8 @@ struct SampleAxis {
   return 1.0F - std::clamp((1.0F - darkness) / (1.0F - open), 0.0F, 1.0F);
 }
 
-/// Occlusion from the samples' densities, which come by z, then y, then x; of the soft share from their solidity.
+/// Returns the occlusion from the samples' densities (for the soft share: from their solidity), ordered by z, then y,
+/// then x.
 [[gnu::always_inline]] inline float occlusion_of(const std::array<float, 27>& samples,
                                                  const SmoothOcclusionOptions& options) {
   const bool is_soft = options.method == SmoothOcclusion::SoftShare;
@@ -216,8 +217,8 @@ struct SampleAxis {
   return is_soft ? soft_share(sum) : weighted_occlusion(sum, least, options);
 }
 
-/// The occlusion of a vertex at a place in its cell; `density(x, y, z)` is the lattice point at that offset from the
-/// cell's lowest corner, in samples of the level.
+/// Returns the occlusion of a vertex at a position in its cell. `density(x, y, z)` returns the lattice point at that
+/// offset from the cell's lowest corner, in samples of the level.
 template <class Density>
 [[gnu::always_inline]] inline float occlusion_at_vertex(Vec3 snapped, Vec3 normal,
                                                         const SmoothOcclusionOptions& options, Density density) {

@@ -50,7 +50,7 @@ void copy_signs(const DensityChunk* chunk, Half outside, int z, Rows rows, std::
   std::fill_n(to, rows.count, DensityChunk::is_solid(value) ? kAllSolid : 0);
 }
 
-// Rows 0 to 63 of slice z at level 0.
+// Gathers rows 0 to 63 of slice z at level 0.
 void gather_inner_signs(const DensityNeighbourhood& chunks, int z, Work& work) {
   const ChunkCoordinate cz = chunk_coordinate(z, 0);
   copy_signs(chunks.at(0, 0, cz.chunk), chunks.outside, cz.sample, {}, work.solid[z + 1] + 1);
@@ -100,7 +100,7 @@ template <int kCount>
   }
 }
 
-// All points of a row of one chunk at a coarser level.
+// Copies all points of a row of one chunk at a coarser level.
 void copy_thinned(const RowPart& part, int level, Half* to) {
   const int n = kChunkEdge >> level;
   for (int i = 0; i < n; ++i) to[i] = part.samples == nullptr ? part.value : part.samples[i << level];
@@ -126,7 +126,7 @@ Windows windows_of(std::uint64_t before, std::uint64_t own, std::uint64_t after,
   return windows;
 }
 
-// 96 rows of signs of one chunk column at level 0: 16 of the chunk before along y, 64, 16 of the chunk after.
+// Copies 96 rows of signs of one chunk column at level 0: 16 of the chunk before along y, 64, 16 of the chunk after.
 void copy_column(const DensityNeighbourhood& chunks, int dx, ChunkCoordinate z, std::uint64_t* to) {
   constexpr std::array<Rows, 3> kRows = {{{kChunkEdge - kPointX, kPointX}, {}, {0, kPointX}}};
   for (int dy = -1; dy <= 1; ++dy) {
@@ -245,7 +245,7 @@ void find_signs(Work& work, int z) {
 }
 
 void begin_occlusion(Work& work) {
-  // The slices from `apron` below a cell to as many above its upper points.
+  // The slices from `apron` below a cell to `apron` above its upper points.
   const std::size_t slices = work.apron <= 6 ? 16 : kMostSlices;
   work.ring_mask = static_cast<int>(slices) - 1;
   work.next_slice = work.cells.first - work.apron;
@@ -253,7 +253,7 @@ void begin_occlusion(Work& work) {
     if (values.size() < size) values.resize(size);
   };
   if (work.is_dense) return make_room(work.decoded, (slices + kRepeatedSlices) * kDecodedSlice + 64);
-  // The first slice is not there yet.
+  // The first slice is not gathered yet.
   --work.next_slice;
   make_room(work.cell_words, slices * 2 * Work::kSlots + 4);
   make_room(work.sampled, slices * kSampledSlice + 64);

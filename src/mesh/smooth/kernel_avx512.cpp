@@ -1,4 +1,5 @@
-// The Surface Nets kernel for x86-64 processors with AVX-512 F, BW, DQ, VL and VBMI2; called only where all were found.
+// The Surface Nets kernel for x86-64 processors with AVX-512 F, BW, DQ, VL and VBMI2. Called only if the processor has
+// all of them.
 
 #ifdef QUOIN_X86_KERNELS
 

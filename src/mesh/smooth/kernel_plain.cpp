@@ -15,7 +15,7 @@
 namespace quoin::smooth {
 namespace {
 
-// A place's column and row, from -1.
+// The column and the row of a place, starting at -1.
 int column_of(int place) {
   return (place & (kPlaceStride - 1)) - 1;
 }
@@ -23,7 +23,7 @@ int row_of(int place) {
   return (place >> kPlaceShift) - 1;
 }
 
-// A stored density, which is never infinite or NaN: moving its bits and mending the exponent is all.
+// Converts a stored density. It is never infinite or NaN, so moving the bits and correcting the exponent is enough.
 float density_of(Half half) {
   const auto bits = static_cast<std::uint32_t>(std::int32_t{static_cast<std::int16_t>(half)}) << 13 & 0x8FFF'E000U;
   return std::bit_cast<float>(bits) * 0x1p112F;
@@ -35,7 +35,7 @@ Corners corners_at(const Half* low, const Half* high, std::ptrdiff_t stride) {
           density_of(high[0]), density_of(high[1]), density_of(high[stride]), density_of(high[stride + 1])};
 }
 
-// A vertex as a place remembers it.
+// Packs a vertex in the form stored per place.
 std::uint32_t remembered(std::uint32_t index, Vec3 snapped) {
   const auto part = [](float f) { return static_cast<std::uint32_t>(std::min(static_cast<int>(f * 64.0F), 63)); };
   return index | part(snapped.x) << kVertexBits | part(snapped.y) << (kVertexBits + 6) |
@@ -85,7 +85,7 @@ void find_batch(const Work& work, const Slice& slice, std::size_t first, std::si
   }
 }
 
-// Along z, y and x in turn; corners by x + 2 y + 4 z.
+// Interpolates along z, y and x in turn; corners by x + 2 y + 4 z.
 float interpolated(const Corners& d, Vec3 fraction) {
   const auto between = [](float a, float b, float f) { return a + f * (b - a); };
   std::array<float, 4> along_z{};
@@ -141,7 +141,7 @@ void add_occlusion(Work& work, const Slice& slice, std::size_t count, float* occ
   if (count != 0) occlude_by_lists(work, slice, count, occlusion);
 }
 
-// The squared length of a diagonal, in 64ths of a cell.
+// Returns the squared length of a diagonal, in units of 1/64 cell.
 int squared_length(std::uint32_t from, std::uint32_t to, const std::array<int, 3>& cells) {
   int sum = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {

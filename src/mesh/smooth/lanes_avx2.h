@@ -23,7 +23,7 @@ using namespace lanes_avx2;
 inline Mask equal(I a, I b) {
   return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(a.v, b.v))};
 }
-// Lanes whose signs differ.
+// Returns the lanes with different signs.
 inline Mask signs_differ(F a, F b) {
   return {_mm256_castsi256_ps(_mm256_srai_epi32(_mm256_castps_si256(_mm256_xor_ps(a.v, b.v)), 31))};
 }
@@ -40,7 +40,7 @@ inline I load_words(const std::uint16_t* from) {
 inline void store(void* to, I a) {
   _mm256_storeu_si256(static_cast<__m256i*>(to), a.v);
 }
-// The pair of halves at each place, as one number.
+// Gathers the pair of halves at each place, as one number.
 inline I gather_pairs(const Half* base, I place) {
   return {_mm256_i32gather_epi32(reinterpret_cast<const int*>(base), place.v, 2)};
 }
@@ -59,7 +59,7 @@ inline I gather(const std::int32_t* base, I at) {
 inline I look_up(const std::int32_t (&table)[32], I index) {
   return gather(table, index);
 }
-// The first `count` lanes to their places.
+// Stores the first `count` lanes at their places.
 inline void scatter(std::uint32_t* base, I place, I value, std::size_t count) {
   alignas(32) std::uint32_t places[8];
   alignas(32) std::uint32_t values[8];
@@ -78,13 +78,13 @@ inline void store_vectors(Vec3* to, F x, F y, F z) {
   const __m256 zz[2] = {_mm256_unpacklo_ps(z.v, z.v), _mm256_unpackhi_ps(z.v, z.v)};
   const __m256 lanes[4] = {_mm256_shuffle_ps(xy[0], zz[0], 0x44), _mm256_shuffle_ps(xy[0], zz[0], 0xEE),
                            _mm256_shuffle_ps(xy[1], zz[1], 0x44), _mm256_shuffle_ps(xy[1], zz[1], 0xEE)};
-  // Each store's fourth number is overwritten by the next.
+  // The next store overwrites the fourth number of each store.
   auto* const out = reinterpret_cast<float*>(to);
   for (int i = 0; i < 4; ++i) _mm_storeu_ps(out + 3 * i, _mm256_castps256_ps128(lanes[i]));
   for (int i = 0; i < 4; ++i) _mm_storeu_ps(out + 12 + 3 * i, _mm256_extractf128_ps(lanes[i], 1));
 }
 
-// Two triangles a lane: (a, b, c) and (a, c, d).
+// Stores two triangles per lane: (a, b, c) and (a, c, d).
 inline void store_triangles(std::uint32_t* to, I a, I b, I c, I d) {
   const __m256i ab[2] = {_mm256_unpacklo_epi32(a.v, b.v), _mm256_unpackhi_epi32(a.v, b.v)};
   const __m256i ca[2] = {_mm256_unpacklo_epi32(c.v, a.v), _mm256_unpackhi_epi32(c.v, a.v)};
@@ -102,7 +102,7 @@ inline void store_triangles(std::uint32_t* to, I a, I b, I c, I d) {
   }
 }
 
-// Occlusion takes one vertex at once.
+// Occlusion processes one vertex at a time.
 constexpr int kVerticesAtOnce = 1;
 
 inline F load_rows(const float* const* from, std::ptrdiff_t offset) {
@@ -127,7 +127,7 @@ class Thirds {
  private:
   __m256i lanes_;
 };
-// A bit for each lane that is at least 0.
+// Returns one bit per lane, set if it is at least 0.
 inline std::uint32_t open_bits(F a) {
   return static_cast<std::uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(a.v, _mm256_setzero_ps(), _CMP_GE_OQ)));
 }

@@ -23,7 +23,7 @@ using namespace lanes_avx512;
 inline Mask equal(I a, I b) {
   return {_mm512_cmpeq_epi32_mask(a.v, b.v)};
 }
-// Lanes whose signs differ.
+// Returns the lanes with different signs.
 inline Mask signs_differ(F a, F b) {
   return {_mm512_movepi32_mask(_mm512_castps_si512(_mm512_xor_ps(a.v, b.v)))};
 }
@@ -40,7 +40,7 @@ inline I load_words(const std::uint16_t* from) {
 inline void store(void* to, I a) {
   _mm512_storeu_si512(to, a.v);
 }
-// The pair of halves at each place, as one number.
+// Gathers the pair of halves at each place, as one number.
 inline I gather_pairs(const Half* base, I place) {
   return {_mm512_i32gather_epi32(place.v, base, 2)};
 }
@@ -51,7 +51,7 @@ inline F gather(const float* base, I place) {
 inline F look_up(const std::array<float, 16>& table, I index) {
   return {_mm512_permutexvar_ps(index.v, _mm512_loadu_ps(table.data()))};
 }
-// Entries of a table in two registers.
+// Looks up entries of a table in two registers.
 inline F look_up(const float (&table)[32], I index) {
   return {_mm512_permutex2var_ps(_mm512_load_ps(table), index.v, _mm512_load_ps(table + 16))};
 }
@@ -61,12 +61,12 @@ inline I look_up(const std::int32_t (&table)[32], I index) {
 inline I gather(const std::int32_t* base, I at) {
   return {_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), each_lane(), at.v, base, 4)};
 }
-// The first `count` lanes to their places.
+// Stores the first `count` lanes at their places.
 inline void scatter(std::uint32_t* base, I place, I value, std::size_t count) {
   const auto mask = static_cast<__mmask16>(count >= 16 ? 0xFFFF : (1U << count) - 1);
   _mm512_mask_i32scatter_epi32(base, mask, place.v, value.v, 4);
 }
-// Halves as floats.
+// Converts halves to floats.
 inline F load_halves(const Half* from) {
   return {_mm512_cvtph_ps(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)))};
 }
@@ -77,7 +77,7 @@ struct Interleave {
   std::uint16_t is_second[6];
 };
 
-// x y z of sixteen lanes, one lane after the other: of the first two registers, or of the third.
+// Interleaves x y z of sixteen lanes: the first two registers, or the third.
 constexpr Interleave interleave_3() {
   Interleave t{};
   for (int i = 0; i < 48; ++i) {
@@ -89,7 +89,7 @@ constexpr Interleave interleave_3() {
   return t;
 }
 
-// a b c a c d of sixteen lanes: of a and b, or of c and d.
+// Interleaves a b c a c d of sixteen lanes: from a and b, or from c and d.
 constexpr Interleave interleave_triangles() {
   constexpr int kFirst[6] = {0, 16, 0, 0, 0, 0};
   constexpr int kSecond[6] = {0, 0, 0, 0, 0, 16};
@@ -117,7 +117,7 @@ inline void store_vectors(Vec3* to, F x, F y, F z) {
   }
 }
 
-// Two triangles a lane: (a, b, c) and (a, c, d).
+// Stores two triangles per lane: (a, b, c) and (a, c, d).
 inline void store_triangles(std::uint32_t* to, I a, I b, I c, I d) {
   for (int i = 0; i < 6; ++i) {
     const __m512i ab = _mm512_permutex2var_epi32(a.v, _mm512_load_si512(kInterleaveTriangles.first[i]), b.v);
@@ -126,7 +126,7 @@ inline void store_triangles(std::uint32_t* to, I a, I b, I c, I d) {
   }
 }
 
-// Appends the places of a word's bits, x from `first_place` on.
+// Appends the places of a word's bits, where x starts at `first_place`.
 inline std::uint16_t* append_compressed(std::uint64_t bits, __m512i low, __m512i high, std::uint16_t* end) {
   const auto low_bits = static_cast<std::uint32_t>(bits);
   const auto high_bits = static_cast<std::uint32_t>(bits >> 32);
@@ -158,7 +158,7 @@ inline std::uint16_t* append_edges(std::uint64_t bits, std::uint64_t solid, int 
                            end);
 }
 
-// Occlusion takes two vertices at once, a half register each.
+// Occlusion processes two vertices at a time, in half a register each.
 constexpr int kVerticesAtOnce = 2;
 
 inline F load_rows(const float* const* from, std::ptrdiff_t offset) {
@@ -186,7 +186,7 @@ class Thirds {
  private:
   __m512i lanes_;
 };
-// A bit for each lane that is at least 0.
+// Returns one bit per lane, set if it is at least 0.
 inline std::uint32_t open_bits(F a) {
   return _mm512_cmp_ps_mask(a.v, _mm512_setzero_ps(), _CMP_GE_OQ);
 }

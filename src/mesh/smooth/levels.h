@@ -47,7 +47,7 @@ class ChunkLevels {
     return std::all_of(levels_.begin(), levels_.end(), [&](std::uint8_t level) { return level == levels_[0]; });
   }
 
-  /// The cell that starts at a sample or contains the unit cube from it.
+  /// Returns the cell that starts at a sample or contains the unit cube that starts there.
   [[nodiscard]] LevelCell cell_at(IVec3 sample) const {
     const IVec3 chunk = chunk_of(sample);
     const int level = of_chunk(chunk);
@@ -55,7 +55,7 @@ class ChunkLevels {
   }
   /// Returns the cell of a mesh vertex.
   [[nodiscard]] LevelCell cell_of(SmoothCell name) const {
-    // In place: a copy of three integers waits for their stores.
+    // Constructed in place: a copy of three integers would wait for their stores.
     LevelCell cell{name.chunk_offset(), name.cell(), 0};
     cell.level = of_chunk(cell.chunk);
     for (int axis = 0; axis < 3; ++axis) {
@@ -64,7 +64,7 @@ class ChunkLevels {
     return cell;
   }
 
-  /// The levels of the chunks that meet in the line along `axis` through a sample: one, two or four of them.
+  /// Returns the levels of the chunks that meet in the line along `axis` through a sample: one, two or four chunks.
   [[nodiscard]] LevelRange around_line(IVec3 sample, int axis) const {
     IVec3 step{0};
     for (const int other : {(axis + 1) % 3, (axis + 2) % 3}) step[other] = (sample[other] & (kChunkEdge - 1)) == 0;
@@ -108,7 +108,7 @@ class ChunkLevels {
   std::array<std::uint8_t, 27> levels_;
 };
 
-/// Density of a cell's corners.
+/// Returns the densities of a cell's corners.
 inline Corners corners_of(const DensityNeighbourhood& chunks, const LevelCell& cell) {
   Corners corners;
   const auto find_chunk = [&](IVec3 chunk) { return chunks.at(chunk.x, chunk.y, chunk.z); };

@@ -21,10 +21,10 @@ namespace {
 constexpr int kBatch = 32;
 constexpr int kSamples = 27;
 constexpr int kCodeShift = 5;
-// Codes that kernels read beyond the last, a register's worth.
+// Codes that kernels read beyond the last one: a register's worth.
 constexpr std::size_t kCodeSlack = 32;
 
-// The place in Work::sampled of a column and row from -16 on, and of a slice's number above.
+// The index in Work::sampled of a column and a row, starting at -16; the slice number is above.
 constexpr int kSliceShift = 16;
 
 // Up to 32 vertices and the samples around them. Sample i + 3 j + 9 k is number i along x, j along y, k along z.
@@ -33,8 +33,8 @@ struct Batch {
   alignas(64) std::int32_t column[kBatch];       // of it, from -16
   alignas(64) std::int32_t row[kBatch];          // from -16
   alignas(64) std::int32_t slice[kBatch];        // z + 16
-  alignas(64) std::int32_t steps[3][3][kBatch];  // [axis][i]: cells from sample 0 to sample i; whole spreads: unset
-  alignas(64) float fraction[3][3][kBatch];      // [axis][i]: within the cell; whole spreads: i = 0 is of all
+  alignas(64) std::int32_t steps[3][3][kBatch];  // [axis][i]: cells from sample 0 to i; integer spreads: unset
+  alignas(64) float fraction[3][3][kBatch];      // [axis][i]: within the cell; integer spreads: only i = 0
   alignas(64) float packed[kBatch][4];           // fractions of sample 0, and the bits of `lowest`; AVX2 alone
   alignas(64) std::uint16_t codes[kBatch * kSamples + kCodeSlack];
   alignas(64) float values[kBatch * kSamples + kCodeSlack];
@@ -51,7 +51,7 @@ constexpr int window_of(int column) {
   return column < kSecondWindow + kPointX ? 0 : 1;
 }
 
-// The bits of samples 0, 1, 2 along x, moved together. Spread 0: any, by `steps`.
+// Packs the bits of samples 0, 1, 2 along x. Spread 0 means any spread, by `steps`.
 template <int kSpread>
 std::uint32_t three_bits(std::uint64_t word, int second, int third) {
   const int a = kSpread != 0 ? kSpread : second;
@@ -86,14 +86,14 @@ SampleBits bits_of_samples(const Work& work, const Batch& batch, std::size_t v) 
   return bits;
 }
 
-// Returns how many samples the batch lists.
+// Returns the number of samples that the batch lists.
 std::size_t end_list(const std::uint16_t* end, std::size_t count, Batch& batch) {
   const std::ptrdiff_t listed = end - batch.codes;
   batch.first_code[count] = static_cast<std::int32_t>(listed);
   return static_cast<std::size_t>(listed);
 }
 
-// Lists the samples that have to be interpolated, and returns how many there are.
+// Lists the samples to interpolate. Returns their number.
 template <int kSpread, bool kCounted>
 std::size_t list_one_by_one(const Work& work, std::size_t count, Batch& batch) {
   std::uint16_t* end = batch.codes;
@@ -108,7 +108,7 @@ std::size_t list_one_by_one(const Work& work, std::size_t count, Batch& batch) {
   return end_list(end, count, batch);
 }
 
-// The bits of the vertex' listed samples that are solid.
+// Returns the solid samples among the listed samples of a vertex.
 std::uint32_t solid_bits(const Batch& batch, std::size_t v) {
   const auto first = static_cast<unsigned>(batch.first_code[v]);
   std::uint64_t bits = 0;
@@ -116,7 +116,7 @@ std::uint32_t solid_bits(const Batch& batch, std::size_t v) {
   return static_cast<std::uint32_t>(bits >> (first & 7U) & low_bits(batch.first_code[v + 1] - batch.first_code[v]));
 }
 
-// The sum of all samples' values and the least, in the order of occlusion_of.
+// The sum and the minimum of all samples' values, in the order of occlusion_of.
 struct Sum {
   float sum = 0.0F;
   float least = 0.0F;

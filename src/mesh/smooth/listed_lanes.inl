@@ -1,4 +1,4 @@
-// The parts of listed.inl that kernels with registers have of their own.
+// The functions of listed.inl that vector kernels define.
 
 #pragma once
 
@@ -65,7 +65,8 @@ void find_batch(const Work& work, const Slice& slice, std::size_t first, std::si
 #endif
 }
 
-// The place of sample s from sample 0, for whole spreads, as in Batch::lowest; and 32 times its number along each axis.
+// The offset of sample s from sample 0 for integer spreads, as in Batch::lowest, and 32 times its number along each
+// axis.
 template <int kSpread>
 struct SampleTable {
   alignas(64) std::int32_t offset[32]{};
@@ -81,7 +82,7 @@ struct SampleTable {
 template <int kSpread>
 inline constexpr SampleTable<kSpread> kSampleTable{};
 
-// The cells of sixteen (or eight) listed samples, and the samples' places in them.
+// The cells of sixteen (or eight) listed samples, and the samples' positions in them.
 struct Listed {
   I place;
   F fraction[3];
@@ -99,7 +100,7 @@ Listed listed_at(const Batch& batch, const std::uint16_t* codes) {
     const I lowest = look_up(batch.lowest, vertex);
     for (int axis = 0; axis < 3; ++axis) listed.fraction[axis] = look_up(batch.fraction[axis][0], vertex);
 #else
-    // One load a sample takes less time than four gathers.
+    // One load per sample is faster than four gathers.
     std::int32_t at[kWidth];
     for (int i = 0; i < kWidth; ++i) at[i] = 4 * (codes[i] >> kCodeShift);
     F bits_of_lowest;
@@ -140,7 +141,7 @@ inline SampledCorners corners_of(const Work& work, I place) {
   return corners;
 }
 
-// Along z, y and x in turn.
+// Interpolates along z, y and x in turn.
 inline F interpolated(const SampledCorners& c, const F (&fraction)[3]) {
   F along_z[4];
   for (int i = 0; i < 4; ++i) along_z[i] = c.d[i] + fraction[2] * (c.d[i + 4] - c.d[i]);
@@ -179,7 +180,7 @@ bool find_values(const Work& work, std::size_t count, Batch& batch) {
   return any != 0;
 }
 
-// occlusion_of_sum for the forms whose power is 2.
+// occlusion_of_sum for the forms with power 2.
 inline F occlusion_of_sum(F sum, F least, const SmoothOcclusionOptions& options) {
   if (options.method == SmoothOcclusion::SoftShare) return min(sum * all(1.0F / 27.0F), all(1.0F));
   const F minus_zero = all(-0.0F);
@@ -189,7 +190,7 @@ inline F occlusion_of_sum(F sum, F least, const SmoothOcclusionOptions& options)
   return all(1.0F) - min(max(part, all(0.0F)), all(1.0F));
 }
 
-// The place in Work::cell_words of a vertex' first row in each slice, and how far its words are moved down.
+// The index in Work::cell_words of a vertex' first row in each slice, and the shift of its words.
 struct FirstWords {
   alignas(64) std::int32_t word[3][kBatch];
   alignas(64) std::int32_t shift[kBatch];
@@ -313,8 +314,8 @@ inline Sum sum_of(const Batch& batch, std::size_t v) {
 
 #else
 
-// The sample that each bit of a vertex stands for: those of a row `kSpread` bits apart, then the next row, then
-// the next slice.
+// The sample of each bit of a vertex: samples of a row are `kSpread` bits apart, then follow the next row, then the
+// next slice.
 template <int kSpread>
 constexpr int kBitsOfRow = 2 * kSpread + 1;
 template <int kSpread>

@@ -28,7 +28,7 @@ struct SmoothMesher::Scratch {
   const MeshKernel kernel = pick_kernel();
   smooth::Work work;
 
-  // Replaces `out` by the surface of some cells of the centre chunk.
+  // Replaces `out` by the surface of a range of cells of the centre chunk.
   void mesh(const DensityNeighbourhood& chunks, const SmoothOptions& options, smooth::CellRange cells,
             SmoothChunkMesh& out) {
     out.clear();

@@ -23,7 +23,7 @@ void decode_part(const RowPart& part, int first, int count, float* to) {
   decode_row(same, to, count);
 }
 
-// The row of points (y, z), with sixteen before and after; x = 0 is at `to`.
+// Decodes the row of points (y, z), with sixteen points before and after; `to` points to x = 0.
 void decode_points(const Work& work, int y, int z, float* to) {
   if (work.level == 0) {
     const std::array<RowPart, 3> parts = row_parts(work, y, z);
@@ -97,7 +97,7 @@ inline Centres find_centres(const Work& work, const Slice& slice, std::size_t fi
   return centres;
 }
 
-// The part of the points' densities that is interpolated.
+// The part of the points' densities to interpolate.
 enum class Part { All, Solid };
 
 template <Part kPart>
@@ -135,7 +135,7 @@ inline NineRows rows_around(const Work& work, const Centres& centres, std::size_
   return rows;
 }
 
-// Two rows' samples in the lowest six lanes of each vertex.
+// The samples of two rows, in the lowest six lanes of each vertex.
 struct Samples {
   F v[5];
 };
@@ -159,7 +159,7 @@ inline void store_counted(const Samples& samples, float* out) {
   }
 }
 
-// The sum of a vertex' six lanes, in the order of occlusion_of.
+// Returns the sum of a vertex' six lanes, in the order of occlusion_of.
 inline float sum_of_lanes(const float* s) {
   return ((s[0] + s[3]) + (s[1] + s[4])) + (s[2] + s[5]);
 }

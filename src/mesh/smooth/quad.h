@@ -24,7 +24,7 @@ inline IVec3 corner_place(int corner) {
   return {corner & 1, corner >> 1 & 1, corner >> 2};
 }
 
-/// The name of a cell of a chunk at `offset` (0 or -1 on each axis) from the mesh's.
+/// Returns the name of a cell of a chunk at `offset` (0 or -1 on each axis) from the mesh's chunk.
 inline SmoothCell cell_name(IVec3 cell, IVec3 offset) {
   std::uint32_t bits = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -41,7 +41,7 @@ struct QuadCorner {
   IVec3 place;  ///< in 1/64 of a sample
 };
 
-/// A vertex in the cell that starts at the sample `first` and is 2^level wide.
+/// Returns a vertex in the cell that starts at the sample `first` and has width 2^level.
 inline QuadCorner quad_corner(std::uint32_t vertex, Vec3 position, IVec3 first, int level) {
   const auto size = static_cast<float>(1 << level);
   QuadCorner corner{vertex, level, first * 64};
@@ -56,7 +56,7 @@ inline bool quad_is_split_at_first(const std::array<QuadCorner, 4>& q) {
   const auto is_finest = [&](std::size_t i) {
     return q[i].level <= q[0].level && q[i].level <= q[1].level && q[i].level <= q[2].level && q[i].level <= q[3].level;
   };
-  // A triangle without a cell of the finest level might be there a second time, around the next part of a long edge.
+  // A triangle without a cell of the finest level might exist twice: again around the next part of a long edge.
   const bool first_allowed = is_finest(0) || is_finest(2);
   const bool second_allowed = is_finest(1) || is_finest(3);
   if (first_allowed != second_allowed) return first_allowed;
@@ -64,14 +64,15 @@ inline bool quad_is_split_at_first(const std::array<QuadCorner, 4>& q) {
   return squared_length(q[0].place - q[2].place) <= squared_length(q[1].place - q[3].place);
 }
 
-/// Two triangles on the shorter of the diagonals that have an end at the finest level; of equal ones, from corner 0.
+/// Returns two triangles along the shorter diagonal with an end at the finest level; of equal ones, the diagonal from
+/// corner 0.
 inline std::array<std::uint32_t, 6> triangles_of(const std::array<QuadCorner, 4>& q) {
   const auto v = [&](std::size_t i) { return q[i].vertex; };
   if (quad_is_split_at_first(q)) return {v(0), v(1), v(2), v(0), v(2), v(3)};
   return {v(1), v(2), v(3), v(1), v(3), v(0)};
 }
 
-/// The cells around an edge along `axis` that starts at `p`, counter-clockwise seen from +axis.
+/// Returns the cells around an edge along `axis` that starts at `p`, counter-clockwise as seen from +axis.
 inline std::array<IVec3, 4> cells_around(IVec3 p, int axis) {
   const IVec3 u = unit_axis((axis + 1) % 3);
   const IVec3 v = unit_axis((axis + 2) % 3);

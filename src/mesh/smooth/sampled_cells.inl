@@ -24,7 +24,7 @@ template <int kSpread>
 constexpr int kRowStep = 1;
 #endif
 
-// The cells of a window whose points are all known: the last column's lie partly beyond.
+// Returns the cells of a window whose points are all known: points of the last column are partly beyond the window.
 std::uint64_t known_columns(const Work& work, int window) {
   const int cells = kPointX + work.n + std::min(work.n, kPointX) - 1 - kSecondWindow * window;
   return low_bits(std::clamp(cells, 0, kChunkEdge - 1));

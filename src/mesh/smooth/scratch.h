@@ -59,12 +59,12 @@ struct CellRange {
   [[nodiscard]] int first_edge() const { return first < 0 ? 0 : first; }
 };
 
-// A bit for each row of a slice of points, row y at bit y + 16.
+// One bit per row of a slice of points, row y at bit y + 16.
 struct RowSet {
   std::uint64_t low = 0;
   std::uint64_t high = 0;
 
-  // Row -1, and rows 0 to 63 by their bits.
+  // Makes a set of row -1, and of rows 0 to 63 by their bits.
   static RowSet of(bool has_first, std::uint64_t rows) {
     return {std::uint64_t{has_first} << 15 | rows << 16, rows >> 48};
   }
@@ -85,7 +85,7 @@ struct RowSet {
     low |= other.low;
     high |= other.high;
   }
-  // Towards larger rows.
+  // Shifts the set towards larger rows.
   [[nodiscard]] RowSet raised() const { return {low << 1, high << 1 | low >> 63}; }
   [[nodiscard]] RowSet lowered() const { return {low >> 1 | high << 63, high >> 1}; }
   void intersect(const RowSet& other) {
@@ -129,7 +129,7 @@ struct Work {
   std::array<RowSet, kApronRows> occlusion_rows;
 
   const DensityNeighbourhood* chunks = nullptr;
-  // The points of the two slices that are at work: [z & 1], rows -1 to 64.
+  // The points of the two current slices: [z & 1], rows -1 to 64.
   std::vector<Half> points = std::vector<Half>(std::size_t{2} * kPointSlice + 64);
 
   // Indices of the active cells of a slice, or of crossed edges; edges that start at a solid point have bit 15 set.
@@ -143,11 +143,11 @@ struct Work {
 
   // True if many cells are active. Occlusion then interpolates all samples, otherwise only those of listed cells.
   bool is_dense = false;
-  int ring_mask = 0;   // slices that occlusion reads are held as [z & ring_mask]
-  int next_slice = 0;  // the first slice that is not there yet
-  // By lists. Signs of points: [z & 1][window][y + 16]. Words of cells: [z & ring_mask][window][slot], rows y, y + 2,
-  // ... one after the other where `row_step` is 2, so that one register takes all rows of a vertex. Rows of
-  // cells that are listed: [z & ring_mask]. Points: [z & ring_mask][y + 16][x + 16].
+  int ring_mask = 0;   // occlusion stores slices as [z & ring_mask]
+  int next_slice = 0;  // the first slice that is not gathered yet
+  // Data for lists. Signs of points: [z & 1][window][y + 16]. Words of cells: [z & ring_mask][window][slot]; if
+  // `row_step` is 2, rows y, y + 2, ... are consecutive, so that one register takes all rows of a vertex. Rows of
+  // listed cells: [z & ring_mask]. Points: [z & ring_mask][y + 16][x + 16].
   std::uint64_t signs[2][2][kReachRows + 8]{};
   int row_step = 1;
   std::vector<CellWords> cell_words;
@@ -158,7 +158,7 @@ struct Work {
   std::vector<float> decoded;
   int apron = 0;  // number of points below and above a cell's own that occlusion reads
 
-  // The row of points (y, z): x = 0 is at its begin.
+  // Returns the row of points (y, z); the pointer is at x = 0.
   [[nodiscard]] Half* row(int y, int z) {
     return points.data() + static_cast<std::ptrdiff_t>(z & 1) * kPointSlice + (y + 1) * kPlaceStride + kPointX;
   }
@@ -173,7 +173,7 @@ struct Work {
   }
   static constexpr int kOddRows = kReachRows / 2 + 4;  // their first slot; registers read four slots
   static constexpr int kSlots = 2 * kOddRows;
-  // The slot of a row, which is counted from -16.
+  // Returns the slot of a row, counted from -16.
   [[nodiscard]] int slot_of(int row) const { return row_step == 1 ? row : (row & 1) * kOddRows + row / 2; }
   [[nodiscard]] const CellWords* cell_words_of(int z, int window) const {
     return cell_words.data() + (std::ptrdiff_t{z & ring_mask} * 2 + window) * kSlots;
@@ -185,27 +185,27 @@ struct Work {
 
 inline constexpr int kVertexBits = 13;
 
-// Lattice points beyond its cell's that a vertex may read, for occlusion.
+// Returns the number of lattice points beyond its cell that a vertex may read for occlusion.
 [[nodiscard]] int apron_of(const SmoothOcclusionOptions& occlusion);
 
-// The options with every number brought into its range.
+// Returns the options with every number clamped to its range.
 [[nodiscard]] SmoothOcclusionOptions within_limits(SmoothOcclusionOptions occlusion, int level);
 
-// True if the way for many active cells serves this occlusion.
+// Returns true if the method for many active cells supports this occlusion.
 [[nodiscard]] inline bool is_whole_spread(const SmoothOcclusionOptions& occlusion) {
   return occlusion.spread == 1.0F || occlusion.spread == 2.0F;
 }
 
-// Fills in the signs; false when all are the same.
+// Gathers the signs. Returns false if all are equal.
 [[nodiscard]] bool prepare(const DensityNeighbourhood& chunks, Work& work);
-// A row of one chunk's samples, or the one value that all of them have.
+// A row of one chunk's samples, or the one value of all its samples.
 struct RowPart {
   const Half* samples;  // null: all are `value`
   Half value;
 };
-// The row of points (y, z) in the chunk before, the chunk and the chunk after.
+// Returns the row of points (y, z) in the chunk before, the chunk and the chunk after.
 [[nodiscard]] std::array<RowPart, 3> row_parts(const Work& work, int y, int z);
-// Every 2^level-th bit of a word, moved together.
+// Packs every 2^level-th bit of a word.
 [[nodiscard]] constexpr std::uint64_t thinned(std::uint64_t word, int level) {
   for (; level > 0; --level) {
     word &= 0x5555'5555'5555'5555U;

@@ -1,10 +1,10 @@
-// The walk over the slices of a chunk, for every kernel.
+// The loop over the slices of a chunk, for every kernel.
 //
-//   signs          solid[z + 1][y + 1]     a word a row of points, and points -1 and n in words of their own
-//   active cells   active[z + 1][y + 1]    a word a row of cells: the 2x2x2 points differ
-//   slice z        places of active cells  -> vertices, remembered by place for two slices
+//   signs          solid[z + 1][y + 1]     one word per row of points; points -1 and n are in separate words
+//   active cells   active[z + 1][y + 1]    one word per row of cells: the 2x2x2 points differ
+//   slice z        places of active cells  -> vertices, stored by place for two slices
 //                  places of crossed edges -> quads of the vertices of this slice and the last
-//   occlusion      by lists (listed.inl) or, where many cells are active, of decoded[z & ring_mask] (occlusion.inl)
+//   occlusion      by lists (listed.inl) or, with many active cells, from decoded[z & ring_mask] (occlusion.inl)
 
 #pragma once
 
@@ -30,7 +30,7 @@ constexpr double kManyActive = 0.27;
 constexpr double kManyActive = 2.0;  // never
 #endif
 
-// Room that the stores of the vector kernels may overrun.
+// Room for stores of the vector kernels beyond the end.
 constexpr std::size_t kSlack = 32;
 
 enum class Axis : std::uint8_t { X, Y, Z };
@@ -71,7 +71,8 @@ struct Around {
   static constexpr int v = (static_cast<int>(kAxis) + 2) % 3;
 };
 
-// From corner 0 to corner 2, and from corner 3 to corner 1, in whole cells: (1, 1) and (1, -1) along (u, v).
+// The vectors from corner 0 to corner 2, and from corner 3 to corner 1, in whole cells: (1, 1) and (1, -1) along (u,
+// v).
 template <Axis kAxis>
 constexpr std::array<int, 3> along_diagonal(int v_sign) {
   std::array<int, 3> along{};
@@ -102,7 +103,7 @@ std::uint16_t* append_edges(std::uint64_t bits, std::uint64_t solid, int first_p
 }
 #endif
 
-// A row of cells is active where its 2x2 rows of points are neither all solid nor all air.
+// A row of cells is active if its 2x2 rows of points are neither all solid nor all air.
 void find_active(Work& work) {
   const CellRange& cells = work.cells;
   const std::uint64_t in_range = ~std::uint64_t{0} >> (kChunkEdge - std::min(cells.last, work.n));

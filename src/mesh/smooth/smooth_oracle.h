@@ -1,6 +1,6 @@
 #pragma once
 
-// The slow, obvious Surface Nets that the fast ones are compared with: one cell, one edge at a time.
+// The slow, obvious Surface Nets, one cell and one edge at a time: the reference for the fast ones.
 
 #include <array>
 #include <cstdint>
@@ -18,7 +18,7 @@
 
 namespace quoin::oracle {
 
-/// The sample at a lattice point of the level that is meshed.
+/// Returns the sample at a lattice point of the meshed level.
 using LatticeDensity = std::function<float(IVec3 point)>;
 
 /// The part of a field to mesh: vertices of the cells in `cells`, and quads around the edges that start in `edges` and
@@ -82,7 +82,7 @@ class SmoothOracle {
     const IVec3 offset{cell.x < 0, cell.y < 0, cell.z < 0};
     out.cells.push_back(smooth::cell_name(cell & IVec3{n - 1}, offset));
     if (part_.occlusion.method == SmoothOcclusion::None) return;
-    // In cells of the level, as the spread is by now.
+    // In cells of the level, like the scaled spread.
     const auto from_cell = [&](int x, int y, int z) { return density_(cell + IVec3{x, y, z}) / size; };
     const SmoothOcclusionOptions occlusion = smooth::within_limits(part_.occlusion, part_.level);
     out.occlusion.push_back(smooth::occlusion_at_vertex(vertex.snapped, vertex.normal, occlusion, from_cell));

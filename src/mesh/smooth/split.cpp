@@ -29,7 +29,7 @@ IVec3 edge_start(std::size_t edge) {
   return start;
 }
 
-// The edge between two neighbouring corners.
+// Returns the edge between two adjacent corners.
 std::size_t edge_between(int a, int b) {
   const IVec3 first = corner_place(a & b);
   const IVec3 step = corner_place(a ^ b);
@@ -46,7 +46,7 @@ std::array<int, 4> face_corners(int face) {
   return {corner_at(base), corner_at(base + u), corner_at(base + u + v), corner_at(base + v)};
 }
 
-// The edges on both sides of each corner of a face: where a corner is cut off, they belong together.
+// The edges on both sides of each corner of a face. A sheet that cuts off the corner contains both.
 struct FaceEdges {
   std::array<std::size_t, 4> before{};
   std::array<std::size_t, 4> after{};
@@ -151,7 +151,7 @@ const SheetTables& tables() {
   return built;
 }
 
-// The mean of the crossings of one sheet.
+// Returns the mean of the crossings of one sheet.
 Vec3 mean_of_crossings(const Corners& corners, const Sheets& sheets, int sheet) {
   Vec3 sum{0.0F};
   float count = 0.0F;
@@ -203,10 +203,10 @@ class Splitter {
  private:
   struct Split {
     Sheets sheets;
-    std::uint32_t second;  // the vertices of sheets 1, 2, ... follow each other from here
+    std::uint32_t second;  // the vertices of sheets 1, 2, ... are consecutive from here
   };
 
-  // The two vertices between a cell and the next along an axis, one for each air corner of their common face.
+  // The two vertices between a cell and the next one along an axis, one for each air corner of their common face.
   struct Bridge {
     int axis;
     std::uint32_t first;  // vertex of the lesser corner; the other follows
@@ -281,7 +281,7 @@ class Splitter {
     const std::uint32_t air = parted_corners(lower);
     int corner = corner_at((start - lower.first) / lower.size());
     if (!is_solid_corner(air, corner)) corner += corner_at(unit_axis(axis));
-    // The other air corner of the face is across from it.
+    // The other air corner of the face is diagonally opposite.
     const int other = corner ^ 7 ^ corner_at(unit_axis(found->second.axis));
     return found->second.first + (corner < other ? 0U : 1U);
   }
@@ -301,18 +301,18 @@ class Splitter {
     return tables().joined_face[parted_corners(other)] == (face ^ 1);
   }
 
-  // The corners of a cell that are kept apart on faces where they alternate.
+  // Returns the corners of a cell that stay separate on faces with alternating corners.
   [[nodiscard]] std::uint32_t parted_corners(const LevelCell& cell) const {
     return solid_corners_of(chunks_, cell) ^ (options_.join_diagonals ? 255U : 0U);
   }
 
-  // False where a quad remains; else its triangles are among the polygons.
+  // Returns false if the quad remains; otherwise adds its triangles to the polygons.
   bool rewire_quad(std::size_t first_index) {
     std::uint32_t* quad = out_.indices.data() + first_index;
     std::array<std::uint32_t, 4> cycle = corners_of_quad(quad, out_);
     std::array<LevelCell, 4> cells{};
     for (std::size_t i = 0; i < 4; ++i) cells[i] = levels_.cell_of(out_.cells[cycle[i]]);
-    // The cells around an edge share its start, the first corner of the last of them, and their extent along it.
+    // The cells around an edge share its start (the first corner of the last cell) and their extent along it.
     const IVec3 start = cells[2].first;
     const IVec3 across = start - cells[0].first;
     const int axis = across.x == 0 ? 0 : across.y == 0 ? 1 : 2;

@@ -12,7 +12,7 @@ namespace quoin::smooth {
 /// No face; faces are 2 * axis + (1 for the upper side).
 inline constexpr int kNoFace = 6;
 
-/// The sheets of the surface in a cell: which of them each of the twelve edges is crossed by.
+/// The sheets of the surface in a cell: for each of the twelve edges, the sheet that crosses it.
 struct Sheets {
   /// By 4 * axis + du + 2 dv of the edge's start, u and v the next two axes; kUncrossed for edges that are not crossed.
   std::array<std::uint8_t, 12> of_edge{};
@@ -27,7 +27,8 @@ struct Sheets {
 /// the two that cut off an air corner.
 Sheets sheets_of(std::uint32_t solid, int flipped_face = kNoFace);
 
-/// The face with four crossings that are all of one sheet, or kNoFace. No cell has two. Requires: solid < 256.
+/// Returns the face with four crossings that are all in one sheet, or kNoFace. No cell has two such faces. Requires:
+/// solid < 256.
 int joined_face(std::uint32_t solid);
 
 /// Gives each cell of `out` that several sheets cross one vertex per sheet. The vertices of other cells stay unchanged.

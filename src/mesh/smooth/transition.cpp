@@ -69,7 +69,7 @@ class Transitions {
     }
   }
 
-  // The kernel chose the diagonals by the vertices that it knew.
+  // The kernel chose the diagonals with its own vertices.
   void mend_diagonals() {
     if (mended_.empty()) return;
     for (std::size_t i = 0; i < out_.indices.size(); i += 6) {
@@ -83,7 +83,7 @@ class Transitions {
     }
   }
 
-  // The vertex of a cell that touches a finer chunk, if its boundary is crossed.
+  // Returns the vertex of a cell that touches a finer chunk, if its boundary is crossed.
   [[nodiscard]] std::optional<CellVertex> transition_vertex(const LevelCell& cell) const {
     if (is_of_one_sign(chunks_, cell)) return std::nullopt;
     Crossings crossings;
@@ -168,7 +168,7 @@ class Transitions {
     return quad_corner(vertex, out_.positions[vertex], cell.first, cell.level);
   }
 
-  // The vertex of a cell that has one, made if need be.
+  // Returns the vertex of a cell that has one; creates it if needed.
   std::uint32_t vertex_of(const LevelCell& cell) {
     const SmoothCell name = cell.name();
     if (const auto found = kernel_vertex(name)) return *found;

@@ -14,8 +14,8 @@
 namespace quoin::smooth {
 namespace {
 
-// Crossings by configuration of a cell: how many there are on its edges at the high end of each axis, and in all, a
-// byte each. Bits of a configuration: x low at (y, z) 00, 10, 01, 11, then x high.
+// The number of crossings by configuration of a cell, one byte each: on its edges at the high end of each axis, and in
+// total. Bits of a configuration: x low at (y, z) 00, 10, 01, 11, then x high.
 constexpr auto kCrossings = [] {
   std::array<std::uint32_t, 256> counts{};
   for (unsigned c = 0; c < 256; ++c) {
@@ -94,7 +94,7 @@ inline Lanes3 mean_of_crossings(const CornerLanes& corners) {
           (sum_of_crossings(corners.d, {0, 1, 2, 3}, 4) + to_float(shift_right<16>(counts) & byte)) * inverse};
 }
 
-// SmoothCell::bits of cells of slice z: x and y are one more than the cell's.
+// Returns SmoothCell::bits of cells of slice z; x and y are one more than the cell's.
 inline I cell_codes(I x, I y, int z, int n) {
   const std::uint32_t z_bits = cell_code(0, 0, z, n).bits;
   const I mask = all(n - 1);
@@ -154,7 +154,7 @@ void make_vertices(Work& work, const Slice& slice, std::size_t count, SmoothChun
   }
 }
 
-// The squared lengths of diagonals, in 64ths of a cell.
+// Returns the squared lengths of diagonals, in units of 1/64 cell.
 template <int kShift>
 inline I squared_part(I from, I to, int cells) {
   const I d = (shift_right<kShift>(to) & all(63)) - (shift_right<kShift>(from) & all(63)) + all(64 * cells);

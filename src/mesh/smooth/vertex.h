@@ -1,6 +1,6 @@
 #pragma once
 
-// Putting single vertices into a chunk's mesh, in scalar: for the cells that the fast kernels leave out.
+// Scalar code that adds single vertices to a chunk's mesh, for the cells that the fast kernels omit.
 
 #include <array>
 #include <limits>
@@ -60,7 +60,7 @@ inline void write_vertex(const DensityNeighbourhood& chunks, const SmoothOcclusi
       occlusion_at_vertex(vertex.snapped, vertex.normal, within_limits(occlusion, cell.level), density);
 }
 
-/// The index of a new vertex.
+/// Appends a vertex. Returns its index.
 inline std::uint32_t append_vertex(const DensityNeighbourhood& chunks, const SmoothOcclusionOptions& occlusion,
                                    const LevelCell& cell, const CellVertex& vertex, SmoothCell name,
                                    SmoothChunkMesh& out) {
@@ -73,7 +73,7 @@ inline std::uint32_t append_vertex(const DensityNeighbourhood& chunks, const Smo
   return static_cast<std::uint32_t>(index);
 }
 
-/// A vertex at a place in its cell, with the gradient there.
+/// Returns a vertex at a position in its cell, with the gradient there.
 inline CellVertex vertex_at(Vec3 fraction, Vec3 gradient) {
   CellVertex vertex;
   vertex.fraction = fraction;
@@ -82,7 +82,7 @@ inline CellVertex vertex_at(Vec3 fraction, Vec3 gradient) {
   return vertex;
 }
 
-/// The corners of a quad of six indices, in its winding, beginning with the corner of the first cell.
+/// Returns the corners of a quad of six indices, in its winding, starting with the corner of the first cell.
 inline std::array<std::uint32_t, 4> corners_of_quad(const std::uint32_t* indices, const SmoothChunkMesh& mesh) {
   std::array<std::uint32_t, 4> cycle = {indices[0], indices[1], indices[2], indices[5]};
   const auto cell = [&](std::uint32_t vertex) {

@@ -15,7 +15,7 @@ namespace quoin::smooth {
   return types.is_transparent(material) ? std::uint32_t{material} + 1U : 0U;
 }
 
-/// The bodies of some materials, sorted, each once.
+/// Returns the distinct bodies of some materials, sorted.
 [[nodiscard]] std::vector<std::uint32_t> bodies_of(const VoxelRegistry& types, const std::vector<VoxelType>& materials);
 
 /// Returns the bodies of a field, sorted. Solid samples without a material are opaque. Cost: O(chunks), except if there
@@ -31,7 +31,7 @@ class OtherBodies {
   /// Lifetime: `chunk` must outlive this.
   OtherBodies(const DensityChunk& chunk, const VoxelRegistry& types, std::uint32_t body);
 
-  /// Requires: 0 <= y, z < 64.
+  /// Returns the samples of a row as bits. Requires: 0 <= y, z < 64.
   [[nodiscard]] std::uint64_t row(int y, int z) const;
   /// Returns true if the chunk certainly has no such samples. Always false for a transparent body.
   [[nodiscard]] bool empty() const { return listed_are_others_ && listed_.empty(); }
@@ -50,7 +50,7 @@ class OtherBodies {
 [[nodiscard]] DensityGrid field_of_body(const DensityGrid& whole, const VoxelRegistry& types, std::uint32_t body,
                                         Threads threads);
 
-/// A chunk of such a field.
+/// Returns a chunk of such a field.
 [[nodiscard]] DensityChunk chunk_of_body(const DensityChunk& whole, const VoxelRegistry& types, std::uint32_t body);
 
 }  // namespace quoin::smooth

@@ -19,7 +19,7 @@ namespace quoin {
 namespace smooth {
 namespace {
 
-// The place of a chunk in a sorted list; the list's size when it is not there.
+// Returns the index of a chunk in a sorted list, or the list's size if it is not in the list.
 std::size_t place_in(const std::vector<IVec3>& chunks, IVec3 chunk) {
   const auto found = std::lower_bound(chunks.begin(), chunks.end(), chunk, by_zyx);
   return static_cast<std::size_t>((found != chunks.end() && *found == chunk ? found : chunks.end()) - chunks.begin());
@@ -80,7 +80,7 @@ class LevelMap {
 // A vertex that later chunks may share.
 struct BorderVertex {
   std::uint32_t name;   // SmoothCell bits
-  std::uint32_t place;  // among the chunk's own vertices
+  std::uint32_t place;  // index among the chunk's own vertices
 };
 
 // The contribution of one chunk to the whole mesh: the vertices of its own cells and all its triangles.
@@ -92,7 +92,7 @@ struct Part {
   std::vector<TriangleFace> faces;     // by triangle, in the chunk's coordinates; only if requested
   std::vector<BorderVertex> border;    // sorted by name
   std::vector<SmoothCell> foreign;     // vertices of chunks before this one
-  std::vector<std::uint32_t> indices;  // into the own vertices, or kForeign plus a place in `foreign`
+  std::vector<std::uint32_t> indices;  // into the own vertices, or kForeign plus an index into `foreign`
   static constexpr std::uint32_t kForeign = 0x8000'0000U;
 };
 
@@ -253,7 +253,8 @@ class Builder {
     }
   }
 
-  // The vertex of the whole that `chunk` calls so. Every cell of a meshed chunk that has a vertex is in its border.
+  // Returns the vertex of the whole mesh for a vertex name of `chunk`. The border of a meshed chunk contains every cell
+  // with a vertex.
   [[nodiscard]] std::uint32_t vertex_of(IVec3 chunk, SmoothCell name) const {
     const std::size_t owner = place_in(chunks_, chunk + name.chunk_offset());
     QUOIN_ASSERT(owner < chunks_.size());
@@ -291,7 +292,7 @@ Result<Surface> build_surface(const DensityGrid& field, const VoxelRegistry& typ
 
 namespace {
 
-/// Between a face's normal and the surface's; the face's where they cancel out.
+/// Interpolates between a face's normal and the surface's. Returns the face's normal if they cancel out.
 Vec3 normal_between(Direction direction, Vec3 normal, float smoothness) {
   const Vec3 flat(normal_of(direction));
   const Vec3 sum = flat * (1.0F - smoothness) + normal * smoothness;

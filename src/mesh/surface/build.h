@@ -38,7 +38,7 @@ std::vector<std::uint32_t> finish_surface(Surface& surface, const VoxelRegistry&
 /// have occlusion, or neither, or `to` has no vertex yet.
 std::uint32_t append_vertex(SmoothMesh& to, const SmoothMesh& from, std::size_t i);
 
-/// The smoothness that options mean.
+/// Returns the effective smoothness of the options.
 [[nodiscard]] float smoothness_of(const SmoothMeshOptions& options);
 
 }  // namespace quoin::smooth

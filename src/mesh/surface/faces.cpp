@@ -42,7 +42,7 @@ class Copies {
     return first == look;
   }
 
-  /// The number, among the copies of the vertex, of that with the look, which is not the first.
+  /// Returns the index, among the copies of the vertex, of the copy with the look, which is not the first copy.
   std::uint32_t find_or_add_other(std::uint32_t vertex, LookCode look) {
     if (second_.empty()) second_.resize(first_.size());
     std::uint32_t number = 1;
@@ -74,7 +74,7 @@ class Copies {
   }
 
  private:
-  // A copy of a vertex after its first, in the list of these.
+  // A copy of a vertex after its first one, in a linked list.
   struct Other {
     LookCode look;
     std::uint32_t next = 0;  // 0: none, otherwise the index of the next, plus one
@@ -115,7 +115,7 @@ TriangleFace face_around_edge(const DensityNeighbourhood& chunks, const SmoothCh
       if (axis >= 0) last = glm::max(last, places[i] + unit_axis(axis));
     }
   }
-  // These cells share their extent along the edge; the last of them begins where the edge does.
+  // These cells have the same extent along the edge; the last of them begins where the edge begins.
   const int axis = first.x == last.x ? 0 : first.y == last.y ? 1 : 2;
   TriangleFace face;
   face.sample = last;

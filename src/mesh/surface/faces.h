@@ -15,12 +15,13 @@ namespace quoin::smooth {
 
 /// The voxel face that a triangle represents.
 struct TriangleFace {
-  IVec3 sample{0};  ///< the solid one, in the field's coordinates; of coarse cells, near there
+  IVec3 sample{0};  ///< the solid sample, in the field's coordinates; for coarse cells, a nearby one
   VoxelType type = kAir;
   Direction direction = Direction::PosX;  ///< from it into the air
 };
 
-/// The blended materials of a chunk's vertices; one of a cell before the chunk looks as it does in that chunk's mesh.
+/// Returns the blended materials of a chunk's vertices. A vertex of a cell before the chunk has the same material as
+/// in that chunk's mesh.
 [[nodiscard]] std::vector<CellMaterial> materials_of(const DensityNeighbourhood& chunks, const SmoothOptions& options,
                                                      const SurfaceMaterials& materials, const SmoothChunkMesh& mesh);
 
@@ -28,7 +29,7 @@ struct TriangleFace {
 /// them has a vertex in a bridge.
 [[nodiscard]] std::size_t quad_indices_of(const SmoothChunkMesh& mesh);
 
-/// The faces of the triangles of a chunk's mesh, in the chunk's coordinates.
+/// Finds the faces of the triangles of a chunk's mesh, in the chunk's coordinates.
 void find_faces(const DensityNeighbourhood& chunks, const SmoothOptions& options, const SurfaceMaterials& materials,
                 const SmoothChunkMesh& mesh, std::vector<TriangleFace>& faces);
 

@@ -113,7 +113,7 @@ std::vector<std::uint32_t> rings_of(const std::vector<Arc>& arcs) {
     is_used[start] = true;
     while (!path.empty()) {
       const std::uint32_t at = arcs[path.back()].to;
-      // A neighbour that the path has passed closes a ring, which leaves the path.
+      // A neighbour that is already on the path closes a ring, which is removed from the path.
       const auto begin = std::find_if(path.begin(), path.end(), [&](std::size_t i) { return arcs[i].from == at; });
       if (begin != path.end()) {
         std::for_each(begin, path.end(), [&](std::size_t i) { ring[i] = rings; });

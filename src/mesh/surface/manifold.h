@@ -7,7 +7,7 @@
 
 namespace quoin {
 
-/// The triangles of a mesh, and the place of each vertex.
+/// The triangles of a mesh, and the position of each vertex.
 struct Triangulation {
   std::vector<Vec3> positions;
   std::vector<std::uint32_t> indices;  ///< three a triangle

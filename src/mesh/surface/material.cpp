@@ -48,7 +48,7 @@ std::size_t materials_of_corners(const DensityChunk& chunk, IVec3 first, VoxelTy
   return found;
 }
 
-// The materials of the solid samples of the closed box from `first`, `count` a side and `step` apart.
+// Reads the materials of the solid samples in the closed box that starts at `first`, `count` per side and `step` apart.
 std::size_t solid_materials(const DensityNeighbourhood& chunks, IVec3 first, int count, int step, VoxelType* out) {
   std::size_t found = 0;
   for (int z = 0; z < count; ++z) {

@@ -14,7 +14,7 @@ struct CellMaterial {
   VoxelType type = kAir;
 };
 
-/// A colour in linear light.
+/// Converts a colour to linear light.
 [[nodiscard]] LinearRgba16 linear_colour_of(Rgba8 colour);
 
 /// The surface material of cells: the materials of their solid samples.

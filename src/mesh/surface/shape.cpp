@@ -40,12 +40,12 @@ WideRow wide_row(int y, int z, const RowOf& row_of) {
   return {part(-1) >> 62 | middle << 2, middle >> 2 | part(1) << 62};
 }
 
-/// In the lowest two bits: samples x and x + 1.
+/// Returns samples x and x + 1 in the lowest two bits.
 std::uint64_t pair_of(const WideRow& row, int x) {
   return x < kChunkEdge / 2 ? row.low >> (x + 2) : row.high >> (x - 2);
 }
 
-/// Rows of cells, -1 to 63 on y and z, and one more of samples.
+/// The number of rows of cells, -1 to 63 on y and z, plus one more row of samples.
 constexpr int kCellRows = kChunkEdge + 2;
 
 std::size_t cell_row(int y, int z) {
@@ -100,8 +100,8 @@ struct RowsAround {
   std::array<std::array<std::uint64_t, 2>, 2> yz;  ///< [y][z]
 };
 
-/// By axis: the set samples that are thin along it. A side at a slant: the sample there is set, and the one that leads
-/// to it is not.
+/// By axis: the solid samples that are thin along it. A side continues diagonally if the diagonal sample is set and the
+/// sample between is not.
 using ThinRows = std::array<std::uint64_t, 3>;
 
 ThinRows thin_of(const RowsAround& rows) {
@@ -124,7 +124,7 @@ ThinRows thin_of(const RowsAround& rows) {
   return thin;
 }
 
-/// Along which axes the cells of a chunk, -1 to 63 on each axis, have a thin corner.
+/// The axes along which the cells of a chunk, -1 to 63 on each axis, have a thin corner.
 class ThinCells {
  public:
   explicit ThinCells(const DensityNeighbourhood& chunks)
@@ -172,7 +172,7 @@ class ThinCells {
   [[nodiscard]] ThinRows find(int y, int z, std::uint64_t WideRow::*half) const {
     const auto row = [&](int dy, int dz) { return solid_[at(y + dy, z + dz)].*half; };
     RowsAround solid{row(0, 0), {row(-1, 0), row(1, 0)}, {row(0, -1), row(0, 1)}, {}};
-    // Within the ground and above it, as most rows are.
+    // Most rows are entirely inside the ground or above it.
     const std::uint64_t all = solid.here & solid.y[0] & solid.y[1] & solid.z[0] & solid.z[1];
     const std::uint64_t some = solid.here | solid.y[0] | solid.y[1] | solid.z[0] | solid.z[1];
     if (~all == 0 || some == 0) return {};
@@ -290,7 +290,7 @@ void shape_vertices(const DensityNeighbourhood& chunks, const SmoothOptions& opt
       const bool is_thin = thin && cell.level == 0 && (shared || (has_thin && thin->has(cell.first, axis)));
       const float kept = is_thin ? share * kThinShare : share;
       if (kept == 1.0F && !shared) continue;
-      // In a bridge: from the middle of the face between two cells.
+      // For a bridge, relative to the middle of the face between two cells.
       const float middle = axis == mesh.cells[i].bridge_axis() ? 1.0F : 0.5F;
       const float moved = snap(middle + (fraction[axis] - middle) * kept);
       mesh.positions[i][axis] = first[axis] + moved * size;

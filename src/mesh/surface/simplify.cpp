@@ -62,8 +62,8 @@ constexpr std::size_t kFewPlaces = 20;
 /// may deviate too far.
 constexpr int kRounds = 8;
 constexpr int kRoundsOfSample = 4;
-/// Rounds in which most triangles stay, where no level has few places that are too far off: meshes that are round
-/// everywhere. Behind the first ones each has the next level.
+/// The number of rounds in which most triangles stay. Used if no level has few positions that deviate too far, as for
+/// meshes that are curved everywhere. After the first rounds, each round uses the next level.
 constexpr int kMostStayRounds = 12;
 constexpr int kRoundsOfFirstLevel = 4;
 /// A value in place of a level's number, for such a search.
@@ -73,9 +73,9 @@ constexpr std::size_t kHardlyAny = 1'000;
 /// The level of a mesh with more triangles than this is determined on a sample of about this size.
 constexpr std::size_t kSampleTriangles = 12'000;
 constexpr std::size_t kLeastSampled = 4 * kSampleTriangles;
-/// The edge of the boxes that the sample consists of, in samples of the field.
+/// The edge length of the sample's boxes, in samples of the field.
 constexpr double kSampleBox = 12.0;
-/// The least number of these boxes: one box says little about the others.
+/// The minimum number of these boxes: one box says little about the others.
 constexpr int kSampleBoxes = 16;
 /// If the sample loses at most one in this number of triangles, the mesh cannot be simplified.
 constexpr std::size_t kLeastLoss = 100;
@@ -160,7 +160,7 @@ Deviation deviation_of(const SmoothMesh& mesh, const std::vector<std::uint32_t>&
   return found;
 }
 
-/// Adds the triangles that touch one of these places, and their neighbours.
+/// Adds the triangles that touch one of these positions, and their neighbours.
 void keep_around(const SmoothMesh& mesh, const std::vector<std::uint32_t>& place, std::vector<bool> is_near,
                  std::vector<bool>& stays) {
   for (int ring = 0; ring < 2; ++ring) {
@@ -178,8 +178,8 @@ void keep_around(const SmoothMesh& mesh, const std::vector<std::uint32_t>& place
 
 /// Returns the vertices on a border: an edge there has a triangle on one side only, by vertex.
 ///
-/// A closed fan leads to each neighbour as often as from it, so that the sum over both is 0. It is not 0 for one open
-/// fan; for several open fans of one vertex it is by chance, once in 2^32.
+/// In a closed fan, each neighbour is a start as often as an end, so the sum over both is 0. It is not 0 for one open
+/// fan. For several open fans of one vertex it can be 0 by chance, once in 2^32.
 std::vector<bool> vertices_on_border(const SmoothMesh& mesh) {
   std::vector<std::uint32_t> balance(mesh.positions.size());
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
@@ -237,7 +237,7 @@ void take_over(SmoothMesh& mesh, const Triangulation& simple, std::vector<std::u
   mesh.indices = std::move(indices);
 }
 
-/// A try to remove triangles.
+/// An attempt to remove triangles.
 struct Attempt {
   Triangulation simple;
   Deviation deviation;
@@ -316,7 +316,7 @@ class Search {
     std::vector<std::uint32_t> left = remove_triangles(mesh_, allowed, scale_, is_sample_, stays);
     attempt.removes_hardly_any = left.size() + mesh_.indices.size() / kHardlyAny >= mesh_.indices.size();
     attempt.simple = triangulation_of(mesh_, std::move(left), place_);
-    // A neck three edges round, say, is drawn together to one edge.
+    // A neck of three edges, for example, may collapse to one edge.
     make_manifold(attempt.simple, std::min(kApart, 0.25F * error_));
     attempt.deviation = deviation_of(mesh_, place_, attempt.simple, error_);
     return attempt;

@@ -9,12 +9,12 @@
 
 namespace quoin {
 
-/// Triangles in a tree of boxes, for the distances of points from them.
+/// A bounding volume hierarchy of triangles, for distances of points.
 ///
-/// Lifetime: the arrays must outlive it. Threads: any number may ask.
+/// Lifetime: the arrays must outlive it. Threads: concurrent queries are safe.
 class TriangleTree {
  public:
-  /// `indices`: three a triangle.
+  /// `indices`: three per triangle.
   TriangleTree(std::span<const Vec3> positions, std::span<const std::uint32_t> indices);
 
   /// Returns the distance of a point from the nearest triangle, or `most` if no triangle is nearer.

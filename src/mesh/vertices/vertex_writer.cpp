@@ -1,5 +1,5 @@
-// Vertices are made a block at a time, an element after the other, in memory that stays in the cache; then the block is
-// copied to where the caller wants it.
+// Vertices are made one block at a time, one element after another, in memory that stays in the cache. The block is
+// then copied to the caller's memory.
 
 #include <quoin/mesh/vertex_writer.h>
 
@@ -113,7 +113,7 @@ const std::array<Vec3, 6>& face_normals() {
   return normals;
 }
 
-// Each takes one of the three above.
+// Each of these takes one of the three sources above.
 template <class Source>
 void put_positions(VertexFormat format, const Source& positions) {
   if (format == VertexFormat::Float32x3) return positions.template put<Float3>([](Vec3 v) { return float3(v); });
@@ -148,7 +148,7 @@ void put_block_occlusion(VertexFormat format, const Source& occlusion) {
   }
 }
 
-// Numbers, in as many bytes as the format has.
+// Writes numbers, in as many bytes as the format has.
 template <class Source>
 void put_numbers(VertexFormat format, const Source& numbers) {
   switch (format) {
@@ -161,7 +161,7 @@ void put_numbers(VertexFormat format, const Source& numbers) {
   }
 }
 
-// Colours that were encoded before, or are now.
+// Returns the first bytes of an encoded colour.
 template <std::size_t kSize>
 std::array<std::byte, kSize> first_bytes(const std::array<std::byte, 16>& bytes) {
   std::array<std::byte, kSize> first;
