@@ -254,7 +254,7 @@ TEST_P(Packets, OfShortRaysFromAboutOnePlaceAgree) {
   EXPECT_GT(hits, 300);
 }
 
-// Voxels fill whole chunks, so that rays come to the ends of the tables.
+// Voxels fill whole chunks, so that rays reach the ends of the tables.
 TEST_P(Packets, OfShortRaysAtTheEndsOfAWorldAgree) {
   Grid grid;
   const IVec3 corner = IVec3{whole(-2, 1), whole(-2, 1), whole(-2, 1)} * kChunkEdge;
@@ -311,7 +311,7 @@ TEST_P(Packets, OfRaysFromAfarTowardsEdgesAndCornersOfAWorldAgree) {
   EXPECT_GT(hits, 1'000);
 }
 
-// Further than the 4^3 chunks that a beam looks at together, and further than single precision goes.
+// Beyond the 4^3 chunks that a beam reads at once, and beyond the range of single precision.
 TEST_P(Packets, OfRaysThatGoTheSameWayThroughALongWorldAgree) {
   Grid grid;
   for (int i = 0; i < 400; ++i) {

@@ -1,10 +1,10 @@
 // Converts packed voxels to bit layers: the chunk's own, and the opacity around it from its 26 neighbours.
 //
-//   packed row, 2 bits per voxel     | 3 0 1 1 2 ... |           palette indices
-//   planes, one word each       bit 0 | 1 0 1 1 0 ... |
-//                               bit 1 | 1 0 0 0 1 ... |
-//   opaque                            | 1 0 1 1 0 ... |        from the planes, one index at a time
-//   same_bit, same_row, same_z        | 0 0 1 0 . ... |        the next voxel along x, y, z has the same type
+//   packed row, 2 bits per voxel           | 3 0 1 1 2 ... |     palette indices
+//   planes, one word each            bit 0 | 1 0 1 1 0 ... |
+//                                    bit 1 | 1 0 0 0 1 ... |
+//   opaque                                 | 1 0 1 1 0 ... |     from the planes, one index at a time
+//   same_bit, same_row, same_z             | 0 0 1 0 . ... |     the next voxel along x, y, z has the same type
 
 #pragma once
 

@@ -89,7 +89,7 @@ Grid ten_chunks() {
 }
 
 TEST(BlockyMesh, StopsWhenProgressSaysSo) {
-  // The first ten calls come while faces are found, the others while they become triangles.
+  // The first ten calls occur while faces are found, the others during the conversion to triangles.
   for (const int last : {1, 3, 10, 11, 15, 20}) {
     int calls = 0;
     const auto go_on = [&](double) { return ++calls < last; };

@@ -70,7 +70,7 @@ void mesh_world(benchmark::State& state, bool occlusion, InstructionSet instruct
   state.counters["faces"] = static_cast<double>(faces);
 }
 
-// Empty and full chunks lie among their like.
+// Empty and full chunks are surrounded by chunks of the same kind.
 Neighbourhood surrounded(const Chunk& chunk, Blocky which) {
   Neighbourhood n = isolated(chunk);
   if (which == Blocky::Full) n.chunks.fill(&chunk);

@@ -72,7 +72,7 @@ void run(benchmark::State& state, const Case& what) {
   }
 }
 
-// The occlusion of another's vertices, as the mesher finds it while it meshes.
+// The occlusion of a mesh's vertices, as the mesher computes it while meshing.
 void places(benchmark::State& state) {
   const DensityChunk chunk = workloads::density_chunk(workloads::smooth_field(Smooth::S1, 0, 0));
   DensityGrid field;

@@ -110,7 +110,7 @@ TEST(SmoothSheets, TheOtherPairingOfAJoinedFaceParts) {
     EXPECT_FALSE(std::all_of(edges.begin(), edges.end(), [&](std::size_t edge) {
       return sheets.of_edge[edge] == sheets.of_edge[edges[0]];
     })) << solid;
-    // No other face comes to have all in one.
+    // No other face gets all crossings in one sheet.
     for (int other = 0; other < 6; ++other) {
       if (!is_ambiguous(solid, other)) continue;
       const auto around = edges_around(other);

@@ -113,7 +113,7 @@ DVec3 random_between(std::mt19937& random, double low, double high) {
   return {any(random), any(random), any(random)};
 }
 
-// Every sample another number and material: all kinds of cells.
+// Every sample has its own value and material: all kinds of cells.
 DensityGrid noise(const Types& types, IVec3 corner, int edge, unsigned seed, int materials) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> density(-4.0F, 2.5F);

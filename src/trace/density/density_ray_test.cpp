@@ -66,7 +66,7 @@ VoxelType material_at(const DensityGrid& field, IVec3 cell, const DVec3& p) {
   return found;
 }
 
-// Before a hit the field is not negative, at it it is 0; where there is none it never is negative.
+// Before a hit the field is not negative, and at the hit it is 0. Without a hit it is never negative.
 void check(const DensityTree& tree, const Ray& ray, double max_t, double far, Tally& tally) {
   const Dense dense(tree.field());
   const auto hit = first_hit(tree, ray, max_t);
@@ -97,7 +97,7 @@ void check(const DensityTree& tree, const Ray& ray, double max_t, double far, Ta
     EXPECT_GE(least, kLeftOut) << hit->t;
     tally.left_out += least < -1e-9;
     EXPECT_NEAR(dense.at(p), 0.0, 1e-6) << hit->t;
-    // It goes down from here.
+    // The density decreases from here.
     EXPECT_LE(glm::dot(hit->normal, ray.direction), 1e-6 * glm::length(ray.direction));
   }
   if (hit->normal != DVec3(0.0)) {
@@ -111,7 +111,7 @@ DVec3 random_in(std::mt19937& random, double low, double high) {
   return {any(random), any(random), any(random)};
 }
 
-// Every sample another number: cells with up to three crossings of a ray, and sheets of all kinds.
+// Every sample has its own value: cells with up to three crossings of a ray, and sheets of all kinds.
 DensityGrid noise(IVec3 corner, int edge, unsigned seed, double share_of_air) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> density(-4.0F, 4.0F);
@@ -201,7 +201,7 @@ TEST_P(DensityRays, AreTheSameInPackets) {
   EXPECT_GT(hits, 1200);
 }
 
-// Packets of short rays walk in windows, others from cell to cell.
+// Packets of short rays walk in windows, other packets from cell to cell.
 TEST_P(DensityRays, ShortRaysAreTheSameInPackets) {
   std::mt19937 random(11);
   int blocked = 0;
@@ -340,7 +340,7 @@ TEST_P(DensityRays, AreThoseOfTheWalkInDoubleHoweverFarTheyGo) {
       EXPECT_EQ(blocked >> lane & 1U, found.hit >> lane & 1U);
       hits += is_hit;
       const DensityHit& hit = found.lanes[static_cast<std::size_t>(lane)];
-      // Cells that rays pass for less than 1e-3 are another matter.
+      // Cells that rays pass for less than 1e-3 may differ.
       others += is_hit != expected.has_value() || (is_hit && (hit.t != expected->t || hit.cell != expected->cell));
     }
   }
