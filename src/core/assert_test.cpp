@@ -10,7 +10,7 @@
 namespace quoin {
 namespace {
 
-// What a handler of a program of its own would do instead of aborting.
+// A custom handler that throws instead of aborting.
 struct Caught : std::runtime_error {
   explicit Caught(const AssertFailure& failure)
       : std::runtime_error(std::string(failure.condition) + "|" + failure.message), line(failure.location.line()) {}

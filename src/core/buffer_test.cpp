@@ -11,7 +11,7 @@ TEST(Buffer, ABufferThatWasMovedFromIsEmptyAndGrowsAgain) {
   Buffer<int> from;
   for (int i = 0; i < 100; ++i) from.push_back(i);
   Buffer<int> to = std::move(from);
-  EXPECT_EQ(from.size(), 0U);  // NOLINT(bugprone-use-after-move): what is promised
+  EXPECT_EQ(from.size(), 0U);  // NOLINT(bugprone-use-after-move): the documented guarantee
   EXPECT_EQ(from.capacity(), 0U);
   for (int i = 0; i < 10; ++i) from.push_back(-i);
   EXPECT_EQ(from[9], -9);

@@ -14,41 +14,42 @@
 
 namespace quoin {
 
-/// The changes of a container in the order in which they happened: what stands behind every `changes_since`.
+/// The changes of a container in chronological order. Every `changes_since` reads such a journal.
 ///
 ///   serial    1 2 3 4 5 6 7 8 9
-///   record        c d a b c a        3 to 8: kept; 1 and 2 were let go (first_ = 3, end_ = 9)
-///                       ^ seen_ = 6  no cursor has read what came later: another change of `a` or `c` joins 8 or 7
+///   record        c d a b c a        3 to 8: kept; 1 and 2 were dropped (first_ = 3, end_ = 9)
+///                       ^ seen_ = 6  no cursor has read 7 and 8: another change of `a` or `c` merges into 8 or 7
 ///
-/// A key (a chunk, a type, an instance) has the serial of its last record beside it, kept by the container, so that its
-/// next change joins that record as long as nobody has read it. So what a cursor is told is exact, and of a container
-/// that is edited a million times between two frames there are as many records as keys, and one more each time that a
-/// key went and came again.
+/// The container stores the serial of the last record with each key (a chunk, a type, an instance). The next change of
+/// the key merges into that record as long as no cursor has read it. Cursors therefore read exact changes. After a
+/// million edits between two frames, a container has one record per key, plus one each time a key was removed and added
+/// again.
 ///
-/// A copy (a snapshot's) shares the records up to then and goes by the same name; when it is changed itself, it becomes
-/// a container of its own.
-/// Record: copyable, `merge(const Record&)`. Threads: any number may read and copy at once, and copies may be read
-/// while this is written.
+/// A copy (as in a snapshot) shares the existing records and keeps the container's identity. The first change of the
+/// copy makes it a separate container.
+///
+/// Record: copyable, `merge(const Record&)`.
+/// Threads: several threads may read and copy at once. Copies may be read while this object is written.
 template <class Record>
 class ChangeJournal {
  public:
   ChangeJournal() : container_(next_serial()) {}
   ChangeJournal(const ChangeJournal& other)
       : container_(other.container_), is_copy_(true), first_(other.first_), end_(other.end_), blocks_(other.blocks_) {
-    // The records stay as they are from now on, and later ones are kept for consumers that read only copies.
+    // Existing records become immutable. Later ones are kept for consumers that read only copies.
     other.observe();
     seen_.store(other.seen_.load(std::memory_order_relaxed), std::memory_order_relaxed);
   }
   ChangeJournal& operator=(const ChangeJournal&) = delete;
 
-  /// Before anything else of a change: a copy becomes a container of its own.
+  /// Call before any other step of a change: a copy becomes a separate container.
   void begin_change() {
     if (is_copy_) [[unlikely]]
       become_own();
   }
 
-  /// Books a change of a key with `serial`, 0 at first. `keys` are those of the container. Never throws: where there is
-  /// no memory, all has changed.
+  /// Records a change of a key whose last record is `serial` (0: none). `keys` is the number of keys in the container.
+  /// Never throws: if out of memory, every cursor reads that everything has changed.
   void note(std::uint64_t& serial, const Record& record, std::size_t keys) {
     QUOIN_ASSERT(serial < end_, "a serial of this journal");
     const std::uint64_t seen = seen_.load(std::memory_order_relaxed);
@@ -59,8 +60,8 @@ class ChangeJournal {
     }
   }
 
-  /// Moves the cursor to the present; calls `visit(record)` for what came after it, oldest first. False, without a
-  /// visit, when that is not known.
+  /// Moves the cursor to the present and calls `visit(record)` for each later record, oldest first. Returns false
+  /// without a visit if the changes since the cursor are unknown.
   template <class Visit>
   bool visit_since(ChangeCursor& cursor, Visit&& visit) const {
     const bool is_known = cursor.container_ == container_ && cursor.next_ >= first_ && cursor.next_ <= end_;
@@ -73,14 +74,14 @@ class ChangeJournal {
     return is_known;
   }
 
-  /// What every `changes_since` returns: the changes since the cursor, each key once, in the order of `less(a, b)`,
-  /// which compares records by their keys. Records tell of a change by `change()`.
+  /// Implements `changes_since`: returns the changes since the cursor, each key once, sorted by `less(a, b)`, which
+  /// compares records by their keys. `Record::change()` returns the change.
   template <class Change, class Less>
   [[nodiscard]] Changes<Change> changes_since(ChangeCursor& cursor, Less&& less) const {
     return changes_since<Change>(
         cursor, less, [](const Record& record, std::vector<Change>& items) { items.push_back(record.change()); });
   }
-  /// The same of one aspect: `tell(record, items)` appends what a record says of that, if anything.
+  /// Returns the changes of one aspect: `tell(record, items)` appends the changes of this aspect in a record, if any.
   template <class Change, class Less, class Tell>
   [[nodiscard]] Changes<Change> changes_since(ChangeCursor& cursor, Less&& less, Tell&& tell) const {
     std::vector<Record> records;
@@ -95,17 +96,17 @@ class ChangeJournal {
     return changes;
   }
 
-  /// What `visit_since` does to a cursor.
+  /// Returns a cursor at the present, as `visit_since` leaves it.
   [[nodiscard]] ChangeCursor present() const {
     ChangeCursor cursor;
     visit_since(cursor, [](const Record&) {});
     return cursor;
   }
-  /// Whether `visit_since` would tell of anything.
+  /// Returns true if `visit_since` would visit a record or return false.
   [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor) const {
     return cursor.container_ != container_ || cursor.next_ != end_;
   }
-  /// The same of one aspect, of which nothing is told in records after the one with `serial`.
+  /// Returns true if one aspect may have changed. `serial` is the last record with a change of this aspect.
   [[nodiscard]] bool has_changed_since(const ChangeCursor& cursor, std::uint64_t serial) const {
     return cursor.container_ != container_ || cursor.next_ < first_ || cursor.next_ <= serial;
   }
@@ -115,10 +116,10 @@ class ChangeJournal {
  private:
   static constexpr std::uint64_t kNobody = ~std::uint64_t{0};
   static constexpr std::size_t kBlock = 256;
-  static constexpr std::size_t kLeast = 8192;  // records that are kept, however small the container
+  static constexpr std::size_t kLeast = 8192;  // minimum number of records kept, even for a small container
   using Block = std::array<Record, kBlock>;
 
-  // What is there was read, or may have been.
+  // Marks all records as possibly read.
   void observe() const { seen_.store(end_ - 1, std::memory_order_relaxed); }
 
   [[nodiscard]] Record& at(std::uint64_t serial) const {
@@ -127,7 +128,7 @@ class ChangeJournal {
     return (*blocks_[static_cast<std::size_t>(serial / kBlock - first_ / kBlock)])[serial % kBlock];
   }
 
-  // Whoever asks next is told that all has changed.
+  // Every cursor reads that everything has changed.
   void forget() {
     blocks_.clear();
     first_ = ++end_;
@@ -147,7 +148,7 @@ class ChangeJournal {
     at(serial) = record;
   }
 
-  // The oldest block goes; and what is left of it counts as read, so that nothing joins it.
+  // Drops the oldest block. Records up to its end count as read, so that no change merges into them.
   void let_go() {
     QUOIN_ASSERT(end_ - first_ > kBlock && blocks_.size() > 1, "more than what goes");
     first_ = (first_ / kBlock + 1) * kBlock;
@@ -168,7 +169,7 @@ class ChangeJournal {
   std::uint64_t first_ = 1;
   std::uint64_t end_ = 1;
   mutable std::atomic<std::uint64_t> seen_{
-      kNobody};                                 // the last serial that a cursor may have read; kNobody: none asked
+      kNobody};  // the last serial that a cursor may have read; kNobody: no cursor exists
   std::vector<std::shared_ptr<Block>> blocks_;  // [serial / kBlock - first_ / kBlock]
 };
 

@@ -9,7 +9,7 @@
 
 namespace quoin {
 
-/// The notices of what one container holds: which of it was edited since they were last taken.
+/// The edit notices of one container: lists which of its items were edited since the last `take`.
 ///
 /// Threads: notices may be given on several threads at once, for different things.
 class EditNotices {
@@ -33,7 +33,7 @@ class EditNotices {
     notice.index_ = index;
     notice.is_given_ = false;
   }
-  /// Appends the numbers of those that were given. Each is given again only once it has been followed anew.
+  /// Appends the numbers of the edited items. Each is reported again only after it is followed again.
   void take(std::vector<std::uint32_t>& taken) {
     const std::lock_guard lock(mutex_);
     taken.insert(taken.end(), given_.begin(), given_.end());
@@ -46,7 +46,7 @@ class EditNotices {
   void give(std::uint32_t index) {
     const std::lock_guard lock(mutex_);
     QUOIN_ASSERT(index < is_given_.size(), "room was made when it was followed");
-    // A number stands there once, also when what had it has gone and something else has it now.
+    // A number is listed once, even if its item was removed and another item has the number now.
     if (is_given_[index]) return;
     is_given_[index] = true;
     given_.push_back(index);

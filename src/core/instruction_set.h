@@ -6,8 +6,8 @@
 
 namespace quoin {
 
-/// Which processor instructions kernels use, from the fewest to the most; each set has all of those before it. Every
-/// one gives the same bytes.
+/// The instruction sets of kernels, from the smallest to the largest. Each set includes all earlier ones. All give the
+/// same bytes.
 enum class InstructionSet : std::uint8_t {
   Plain,        ///< none beyond the build's baseline
   Avx2,         ///< AVX2, BMI, BMI2
@@ -22,8 +22,8 @@ inline constinit std::atomic<std::uint8_t> instruction_set_in_use{0};
 // Looks at the machine.
 [[nodiscard]] InstructionSet find_instruction_set();
 
-/// What kernels are to use: the most that this machine has, or less by an override. Kernels ask once a call, or once
-/// an object. Cost: a load.
+/// Returns the instruction set for kernels: the largest that this machine supports, or a smaller one set by an
+/// override. Kernels read it once per call or once per object. Cost: one load.
 [[nodiscard]] inline InstructionSet instruction_set() {
   const std::uint8_t known = instruction_set_in_use.load(std::memory_order_relaxed);
   return known != 0 ? static_cast<InstructionSet>(known - 1) : find_instruction_set();
@@ -33,16 +33,16 @@ inline constinit std::atomic<std::uint8_t> instruction_set_in_use{0};
   return set <= instruction_set();
 }
 
-/// What is compiled once for each instruction set: one of each, several times where it has no better one.
+/// A table with one kernel per instruction set. An entry repeats where a set has no better kernel.
 template <class Kernel>
 struct KernelTable {
   const Kernel* of[kInstructionSets];
 
-  /// That of the widest instructions that this machine has.
+  /// Returns the kernel for the widest instructions of this machine.
   [[nodiscard]] const Kernel& widest() const { return *of[static_cast<std::size_t>(instruction_set())]; }
 };
 
-/// What a processor has that has the set, for messages.
+/// Returns a name of the processors that have the set, for messages.
 [[nodiscard]] const char* name_of(InstructionSet set);
 
 /// For tests and benchmarks: until it goes out of scope, calls and new objects use `set` and nothing more, on every

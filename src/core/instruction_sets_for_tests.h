@@ -7,13 +7,13 @@
 
 #include "core/instruction_set.h"
 
-/// Skips the test, visibly, where the machine lacks what it is about.
+/// Skips the test, with a message, if the machine lacks the instruction set.
 #define QUOIN_SKIP_WITHOUT(set) \
   if (!::quoin::has_instruction_set(set)) GTEST_SKIP() << "this machine lacks " << ::quoin::name_of(set)
 
 namespace quoin {
 
-/// For tests that compare each with an oracle: what this machine has.
+/// Returns the instruction sets of this machine, for tests that compare each with an oracle.
 inline std::vector<InstructionSet> sets_of_this_machine() {
   std::vector<InstructionSet> sets;
   for (std::size_t i = 0; i < kInstructionSets; ++i) {

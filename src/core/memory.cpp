@@ -39,7 +39,8 @@ std::optional<std::uint64_t> of_machine() {
   return (*free + number_in("/proc/meminfo", "SwapFree:").value_or(0)) * 1024;
 }
 
-// What a group may use, less what it uses and cannot give back: files that are kept in memory it can.
+// Returns the limit of a control group minus its usage. Cached files do not count as usage, since the kernel can free
+// them.
 std::optional<std::uint64_t> of_group(const std::string& folder) {
   const auto limit = number_of(folder + "/memory.max");
   const auto used = number_of(folder + "/memory.current");
@@ -50,7 +51,7 @@ std::optional<std::uint64_t> of_group(const std::string& folder) {
   return *limit > kept ? *limit - kept : 0;
 }
 
-// Of the groups that it is in, one within the other.
+// Returns the minimum over the nested control groups of this process.
 std::optional<std::uint64_t> of_groups() {
   std::ifstream file("/proc/self/cgroup");
   std::optional<std::uint64_t> least;

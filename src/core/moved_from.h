@@ -6,7 +6,7 @@
 
 namespace quoin {
 
-/// What an object consists of. Requires: it was not moved from.
+/// Returns the implementation of an object. Requires: the object was not moved from.
 template <class Content>
 [[nodiscard]] Content& content_of(const std::unique_ptr<Content>& content) {
   QUOIN_ASSERT(content != nullptr, "an object that was not moved from");

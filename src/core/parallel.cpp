@@ -67,8 +67,8 @@ void parallel_for(std::size_t count, Threads threads, FunctionRef<void(std::size
 
 namespace {
 
-// A thread's own, by their workers. oneTBB 2021.8 never gives back some 7 KB of each that ever was: a program that made
-// one a call would grow for ever.
+// Arenas of one thread, by their number of workers. oneTBB 2021.8 never frees some 7 KB per arena, so a program that
+// created an arena per call would grow without limit.
 oneapi::tbb::task_arena& arena_of(unsigned workers) {
   thread_local std::map<unsigned, oneapi::tbb::task_arena> arenas;
   return arenas.try_emplace(workers, static_cast<int>(workers)).first->second;

@@ -8,7 +8,8 @@
 
 namespace quoin {
 
-/// Tells a listener how many of `total` steps are done; remembers when it asked to stop. Any number of threads.
+/// Reports to a progress callback how many of `total` steps are done, and remembers if it cancelled. Threads: any
+/// number.
 class ProgressSteps {
  public:
   ProgressSteps(const Progress& progress, std::size_t total) : progress_(&progress), total_(total) {}

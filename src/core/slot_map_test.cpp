@@ -26,7 +26,7 @@ TEST(SlotMap, AMapThatWasMovedFromIsEmptyAndCanBeUsed) {
   SlotMap<int> map;
   const auto handle = map.insert(1);
   SlotMap<int> moved = std::move(map);
-  EXPECT_TRUE(map.empty());  // NOLINT(bugprone-use-after-move): what is promised
+  EXPECT_TRUE(map.empty());  // NOLINT(bugprone-use-after-move): the documented guarantee
   EXPECT_EQ(map.find(handle), nullptr);
   EXPECT_TRUE(map.handles().empty());
   const auto again = map.insert(2);
@@ -95,7 +95,7 @@ TEST(SlotMap, AHandleNamesTheCopyOfItsElementAndNothingThatCameLater) {
   EXPECT_EQ(copy[in_copy], 4);
 }
 
-// Moving one throws now and then, as copying what cannot be moved may.
+// Its copy constructor, which also serves as the move, can throw.
 struct Fragile {
   explicit Fragile(int given) : value(given) {}
   Fragile(const Fragile& other) : value(other.value) {

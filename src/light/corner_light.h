@@ -12,7 +12,7 @@ namespace quoin {
 /// The occlusion of the four corners that a blocky mesh carries for a face. Cost: 8 voxel look-ups.
 [[nodiscard]] FaceOcclusion corner_occlusion(GridReader& grid, const VoxelRegistry& types, IVec3 voxel, Direction face);
 
-/// The same of whatever says which voxels are opaque. Cost: 8 questions.
+/// Returns the occlusion of a face's corners from a predicate for opaque voxels. Cost: 8 calls.
 template <class IsOpaque>
 [[nodiscard]] FaceOcclusion corner_occlusion(IsOpaque&& is_opaque, IVec3 voxel, Direction face) {
   const FaceFrame& frame = frame_of(face);

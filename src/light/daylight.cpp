@@ -61,7 +61,7 @@ Colours look_at_elevation(float degrees) {
   const float r = 1.0F - s;
   Colours look{};
   for (std::size_t i = 0; i < look.size(); ++i) {
-    // Where nothing changes the bits stay.
+    // Constant values keep their bits.
     look.at(i) = from.look.at(i) + (to.look.at(i) - from.look.at(i)) * (s * s * (3.0F - 2.0F * s)) +
                  width * s * r * (slope(hour, i) * r - slope(hour + 1, i) * s);
   }

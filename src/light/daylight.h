@@ -37,7 +37,7 @@ struct SkyColours {
   return of.horizon + (of.ground - of.horizon) * (s * s * (3.0F - 2.0F * s));
 }
 
-/// What the sun and the sky give: the one model that every renderer has.
+/// The light of sun and sky: the single model used by all renderers.
 struct Daylight {
   SkyColours sky;               ///< before LightOptions::sky_brightness
   Vec3 ambient{1.0F};           ///< times the ambient term

@@ -20,10 +20,10 @@ Vec3 emitted_by(const VoxelProperties& properties) {
   return linear_colour(properties.colour) * std::min(properties.emission, most);
 }
 
-// What is gathered of a cell.
+// Sums over the emitting faces of a cell.
 struct Sum {
-  DVec3 first{0.0};     // power times place
-  double second = 0.0;  // and times its square
+  DVec3 first{0.0};     // power times position
+  double second = 0.0;  // power times squared position
   double weight = 0.0;
   IVec3 origin{0};
   EmissiveCell cell;
@@ -64,21 +64,21 @@ std::vector<EmissiveCell> cells_of(const std::map<int, Sum>& sums) {
   return cells;
 }
 
-// By how much a surface is smaller than what the three axes see of it together.
+// Returns the ratio of a surface's area to the sum of its projections on the three axes.
 float share_of_area(const DVec3& gradient) {
   const DVec3 size = glm::abs(gradient);
   const double sum = size.x + size.y + size.z;
   return sum > 0.0 ? static_cast<float>(glm::length(gradient) / sum) : 1.0F;
 }
 
-// Where the surface of a solid sample's body crosses an edge of the lattice, from the sample, and how much of its area
-// counts there.
+// The intersection of a body's surface with a lattice edge, relative to the solid sample, and the share of the surface
+// area that it represents.
 struct Crossing {
   DVec3 place{0.0};
   float share = 1.0F;
 };
 
-// The gradient of a body's own field at a sample: what is solid of others is as far out as it is in.
+// Returns the gradient of a body's own field at a sample. Solid of other bodies counts as air at the same distance.
 DVec3 gradient_of_body(const DensityGrid& field, const VoxelRegistry& types, IVec3 sample, VoxelType type) {
   const auto own = [&](IVec3 at) {
     const double density = field.density(at);
@@ -96,7 +96,7 @@ DVec3 gradient_of_body(const DensityGrid& field, const VoxelRegistry& types, IVe
   return gradient;
 }
 
-// `out`: along the edge. Nothing where it does not, or what is opaque lies there.
+// Finds the surface along the edge `out`. Returns nothing if the surface does not cross it or opaque solid is there.
 std::optional<Crossing> crossing(const DensityGrid& field, const VoxelRegistry& types, IVec3 sample, VoxelType type,
                                  IVec3 out) {
   const double own = field.density(sample);
@@ -110,7 +110,7 @@ std::optional<Crossing> crossing(const DensityGrid& field, const VoxelRegistry& 
   return Crossing{own / (own + next) * DVec3(out), share_of_area(gradient_of_body(field, types, sample, type))};
 }
 
-// Of one chunk.
+// Finds the emissive cells of one chunk of voxels.
 std::vector<EmissiveCell> look_at(const Grid& grid, const VoxelRegistry& types, IVec3 at) {
   const Chunk* chunk = grid.find_chunk(at);
   if (chunk == nullptr || !has_emissive_types(*chunk, types)) return {};
@@ -138,7 +138,8 @@ std::vector<EmissiveCell> look_at(const Grid& grid, const VoxelRegistry& types, 
   return cells_of(sums);
 }
 
-// What the surface crosses of the lattice's edges that begin or end at samples of the chunk that emit.
+// Finds the emissive cells of one field chunk, from the lattice edges that the surface crosses and that begin or end at
+// emitting samples of the chunk.
 std::vector<EmissiveCell> look_at(const DensityGrid& field, const VoxelRegistry& types, IVec3 at) {
   const DensityChunk* chunk = field.find_chunk(at);
   if (chunk == nullptr || !has_emissive_types(chunk->materials(), types)) return {};

@@ -19,19 +19,19 @@ struct EmissiveCell {
   IBox box;                     ///< tight around what emits
 };
 
-/// Of one grid, or one field, kept up to date while it is edited. A face shines where no opaque voxel, and none of its
-/// own type, is before it. A field's surface shines along each axis by the edges of the lattice that it crosses along
-/// that, from a sample that emits: so many samples wide it looks from there. Where it is inclined each counts so much
-/// less that all together are its area.
+/// The emissive cells of one grid or field, kept up to date with its edits. A voxel face emits if the voxel before it
+/// is neither opaque nor of the same type. A field's surface emits along each axis at the lattice edges that it crosses
+/// in that direction, starting at an emitting sample. Each crossing counts as one sample of projected area. Inclined
+/// surfaces are weighted so that the sum is their true area.
 class EmissiveCells {
  public:
   static constexpr int kEdge = 4;  ///< voxels
 
-  /// Cost: of the chunks in which anything changed; a chunk without types that emit costs O(its types).
+  /// Cost: proportional to the changed chunks. A chunk without emitting types costs O(its types).
   void update(const Grid& grid, const VoxelRegistry& types);
   void update(const DensityGrid& field, const VoxelRegistry& types);
 
-  /// Calls `visit(const EmissiveCell&)` for every cell: chunks by z, y, x, then cells likewise.
+  /// Calls `visit(const EmissiveCell&)` for every cell. Chunks, and the cells in each chunk, are sorted by z, y, x.
   template <class Visit>
   void for_each(Visit&& visit) const {
     chunks_.for_each([&](IVec3, const EmissiveCell& cell) { visit(cell); });

@@ -13,14 +13,15 @@
 
 namespace quoin {
 
-/// Whether any type that a chunk may hold emits light. Cost: O(its types).
+/// Returns true if any type of a chunk's palette emits light. Cost: O(its types).
 [[nodiscard]] bool has_emissive_types(const Chunk& chunk, const VoxelRegistry& types);
 
-/// What is known of a grid's, or a field's, chunks that emit light, kept up to date while it is edited.
+/// Data about the light-emitting chunks of a grid or field, kept up to date with its edits.
 template <class Item>
 class EmissiveChunks {
  public:
-  /// `chunks_of(changes)`: those to look at again. `look_at(chunk)`: what is known of one, in a vector.
+  /// `chunks_of(changes)` returns the chunks to examine again. `look_at(chunk)` returns the items of one chunk in a
+  /// vector.
   template <class Content, class Find, class Look>
   void follow(const Content& content, const VoxelRegistry& types, Find&& chunks_of, Look&& look_at) {
     if (!types.changes_since(followed_types_).empty()) followed_ = {};

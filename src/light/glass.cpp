@@ -17,7 +17,7 @@ namespace {
 constexpr double kClosed = -11.0;
 
 constexpr double kDiagonal = 1.7320508075688774;  // of a cube of 1
-constexpr double kLeastClosing = 1e-9;            // of what is clear
+constexpr double kLeastClosing = 1e-9;            // for clear materials
 
 bool continues(const GlassBody& body, VoxelType type, double t_enter) {
   return type == body.type && reaches(body, t_enter);

@@ -10,69 +10,69 @@
 
 namespace quoin {
 
-/// A run of transparent voxels, or of what is transparent of a field, of one type along a ray: one piece of glass,
-/// whatever grids and chunks it lies in.
+/// A run of transparent voxels, or of transparent field solid, of one type along a ray. It counts as one piece of glass
+/// even if it spans grids and chunks.
 struct GlassBody {
-  std::int32_t placed = 0;  ///< the grid in which the ray enters it
-  IVec3 voxel{0};           ///< where it enters; the cell of a field
+  std::int32_t placed = 0;  ///< the grid in which the ray enters the body
+  IVec3 voxel{0};           ///< the voxel of entry, or the cell of a field
   Direction face = Direction::PosX;
   VoxelType type = kAir;
   bool starts_inside = false;
   double t_enter = 0.0;
   double t_exit = 0.0;
   double voxels = 0.0;                    ///< length inside, in voxels of the grids
-  std::int32_t exit_placed = 0;           ///< the grid in which the ray leaves it
-  Direction exit_face = Direction::PosX;  ///< and the face through which
-  bool in_field = false;                  ///< it enters through a field's surface: `face` means nothing
-  bool exit_in_field = false;             ///< likewise where it leaves
-  VoxelType before = kAir;  ///< of a field: another transparent material of it that ends where this one begins
+  std::int32_t exit_placed = 0;           ///< the grid in which the ray leaves the body
+  Direction exit_face = Direction::PosX;  ///< the face through which it leaves
+  bool in_field = false;                  ///< the ray enters through a field's surface; `face` is unused
+  bool exit_in_field = false;             ///< the ray leaves through a field's surface; `exit_face` is unused
+  VoxelType before = kAir;                ///< fields only: the transparent material that ends where this one begins
 };
 
-/// The bodies that a ray passes before `max_t`, nearest first. `out` is cleared first. Deep inside a body that lets
-/// nothing through any more the list ends.
+/// Finds the bodies that a ray passes before `max_t`, nearest first. Clears `out` first. The list ends deep inside a
+/// body that absorbs all light.
 void find_glass(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view, double max_t,
                 std::vector<GlassBody>& out);
 
-/// How a body looks to whoever looks through it.
+/// The appearance of a body to a ray that passes through it.
 struct GlassLook {
-  Vec3 passed{1.0F};  ///< what of each channel comes through
-  float own = 0.0F;   ///< the share of the body's own colour; `passed` and `own` together are at most 1
+  Vec3 passed{1.0F};  ///< transmittance per channel
+  float own = 0.0F;   ///< share of the body's own colour; at most 1 together with `passed`
 };
 
-/// A length of a material lets through what Beer and Lambert say, and shows its own colour in place of what it does not
-/// let see past. A body of voxels that a ray enters counts as one voxel long at least, so that its edges are crisp; one
-/// of a field has no edges, and is as thin at its shores as it is.
+/// Applies the Beer-Lambert law to the length inside, and adds the material's own colour for the part that is hidden. A
+/// voxel body that the ray enters counts as at least one voxel long, so that its edges are crisp. A field body has no
+/// edges and keeps its true thickness near its boundary.
 [[nodiscard]] GlassLook look_of(const Surface& surface, const GlassBody& body);
 
-/// Whether the ray is in the body still, or just out of it, at `t`: so another body that begins there, or a surface,
-/// touches it.
+/// Returns true if the ray is inside the body at `t` or has just left it. Another body or a surface that begins at `t`
+/// then touches this body.
 [[nodiscard]] inline bool reaches(const GlassBody& body, double t) {
   constexpr double kTouching = 1e-6;  // the rounding of placed grids
   return t <= body.t_exit + kTouching * std::max(1.0, body.t_exit);
 }
 
-/// Whether something opaque at `t` leaves no air behind the body: a hundredth of a voxel is none, so that it does not
-/// matter how grids that stand on each other are rounded.
+/// Returns true if an opaque surface at `t` touches the body's far side. A gap below a hundredth of a voxel counts as
+/// touching, so that the rounding of stacked grids does not matter.
 [[nodiscard]] bool lies_on_opaque(const SceneView& view, const Ray& ray_in_view, const GlassBody& body, double t);
 
-/// What a surface between two media does to a ray.
+/// The effect of the surface between two media on a ray.
 struct Mirror {
-  float share = 0.0F;  ///< of what is seen: it comes from the mirrored direction
-  float up = 0.0F;     ///< the y of that direction, a unit vector
+  float share = 0.0F;  ///< share of the seen light that comes from the mirrored direction
+  float up = 0.0F;     ///< y component of that direction, a unit vector
 };
 
-/// The normal of a body's surface where a ray enters it, and where it leaves it into air: out of it, in the grid in
-/// which that is (`placed`, `exit_placed`), of unit length, or 0. Cost: of fields a microsecond.
+/// Return the outward normal of a body's surface at the point where a ray enters it, or leaves it into air. In the
+/// space of the grid `placed` or `exit_placed`, of unit length, or 0. Cost for fields: about a microsecond.
 [[nodiscard]] DVec3 normal_entered(const SceneView& view, const Ray& ray_in_view, const GlassBody& body);
 [[nodiscard]] DVec3 normal_left(const SceneView& view, const Ray& ray_in_view, const GlassBody& body);
 
-/// Of a surface in a placed grid with that normal, between media of these indices of refraction: Fresnel's equations
-/// without polarisation. Since rays go straight on, their angle is taken for that in the thinner medium, on whichever
-/// side they come from: through both faces of a pane the same share is mirrored, as with refraction, and never all.
+/// Computes the reflection at a surface of a placed grid between media of these indices of refraction, by Fresnel's
+/// equations without polarisation. Rays are not refracted, so their angle counts as the angle in the thinner medium on
+/// both sides. Both faces of a pane then mirror the same share, as with refraction, and never all light.
 [[nodiscard]] Mirror mirror_at(const SceneView& view, const Ray& ray_in_view, std::int32_t placed,
                                const DVec3& normal_in_grid, float ior, float other_ior);
 
-/// What of each channel passes through everything transparent on a ray.
+/// Returns the transmittance per channel of all transparent bodies on a ray.
 [[nodiscard]] Vec3 transmittance_along(const SceneView& view, const Surfaces& surfaces, const Ray& ray_in_view,
                                        double max_t);
 

@@ -16,7 +16,7 @@
 namespace quoin {
 namespace {
 
-// What a white surface gets at a lamp's reach, at most: less than a step of a picture's bytes.
+// Maximum light on a white surface at a lamp's reach: less than one step of an 8-bit image.
 constexpr double kLeastLight = 1.0 / 4096.0;
 constexpr std::size_t kMaxKept = 2;  // tables
 constexpr int kBricksAChunk = kChunkEdge / LampTable::kBrick;
@@ -93,7 +93,7 @@ Sphere sphere_of(const LampPlace& place, IVec3 corner, int edge) {
           0.5 * edge * std::numbers::sqrt3 * place.voxel_size};
 }
 
-// The most that a lamp may add to what lies in a sphere; 0: it does not reach there.
+// Returns the maximum light that a lamp can add to any point of a sphere; 0 if the sphere is out of reach.
 double most_light(const PlacedLamp& lamp, double power, const Sphere& sphere) {
   const double nearest = std::max(glm::length(lamp.position - sphere.centre) - sphere.radius, 0.0);
   if (nearest >= lamp.reach) return 0.0;
@@ -117,7 +117,7 @@ class ListMaker {
   ListMaker(const std::vector<PlacedLamp>& lamps, const std::vector<double>& power, int max_lamps)
       : lamps_(&lamps), power_(&power), max_lamps_(static_cast<std::size_t>(max_lamps)) {}
 
-  // Of some chunks of a placed grid.
+  // Adds some chunks of a placed grid.
   void add(const LampPlace& place, std::int32_t index, std::span<const IVec3> chunks) {
     const trace::TreeNodes opaque(*place.opaque);
     for (const IVec3 chunk : chunks) {

@@ -24,12 +24,12 @@
 
 namespace quoin {
 
-/// What lights others: a Lamp, or what emits of the voxels, or the field, of a cell.
+/// A light source for other surfaces: a Lamp, or the emission of the voxels or the field in one cell.
 struct PlacedLamp {
-  DVec3 position{0.0};          ///< in the world
-  glm::dmat3 axes{1.0};         ///< its own axes in the world, unit columns
-  std::array<Vec3, 6> power{};  ///< the light of a white surface that faces it, times the distance's square, of what
-                                ///< shines into each direction of its axes; `power[0]` where it is a point
+  DVec3 position{0.0};   ///< in the world
+  glm::dmat3 axes{1.0};  ///< its own axes in the world, unit columns
+  std::array<Vec3, 6> power{};  ///< per direction of its axes: light on a white surface that faces the lamp, times the
+                                ///< squared distance; `power[0]` for a point
   double spread_squared = 0.0;  ///< world units: added to the distance's square
   DVec3 low{0.0};               ///< its box, from `position` along its axes, in world units: shadow rays end there
   DVec3 high{0.0};
@@ -43,9 +43,9 @@ struct PlacedLamp {
 /// Those of Scene::lamps that shine. `brightness`: times theirs.
 [[nodiscard]] std::vector<PlacedLamp> placed_lamps(const Scene& scene, double brightness);
 
-/// How a lamp lights a point.
+/// The light of a lamp at a point.
 struct LampRay {
-  Vec3 light{0.0F};        ///< of a white surface, if nothing is in between; 0: none
+  Vec3 light{0.0F};        ///< on a white surface, if unoccluded; 0: none
   DVec3 direction{0.0};    ///< towards the lamp, unit, in the world
   double distance = -1.0;  ///< world units up to where the lamp begins; not positive: the point lies in it
 };
@@ -78,11 +78,11 @@ struct LampTable {
     const auto bits = [](int coordinate) { return static_cast<std::uint32_t>(coordinate); };
     return hash_of(hash_of(bits(brick.x), bits(brick.y)), hash_of(bits(brick.z), bits(placed)));
   }
-  /// Of a brick of a placed grid: voxel coordinates of the full grid / 16, rounded down.
+  /// Returns the lamps of a brick of a placed grid. `brick`: voxel coordinates of the full grid / 16, rounded down.
   [[nodiscard]] std::span<const std::uint32_t> at(IVec3 brick, std::int32_t placed) const;
 };
 
-/// A grid in its place.
+/// A grid and its placement.
 struct LampPlace {
   GridHandle grid;
   const Grid* voxels = nullptr;

@@ -17,12 +17,12 @@ constexpr float kAmbient = 0.15F;
 constexpr float kAmbientWithoutOcclusion = 0.10F;
 constexpr float kLeastOfAll = 0.25F;  ///< what full occlusion leaves when it darkens everything
 
-/// Whether surfaces show light that needs levels of voxels.
+/// Returns true if surfaces show propagated light, which needs light levels of voxels.
 [[nodiscard]] inline bool is_propagated(const LightOptions& options) {
   return options.model == LightModel::Propagated && options.shading == Shading::Lit;
 }
 
-/// Whether values are shown instead of colours.
+/// Returns true if the shading shows values instead of colours.
 [[nodiscard]] inline bool shows_values(Shading shading) {
   return shading == Shading::Occlusion || shading == Shading::Normals;
 }
@@ -39,7 +39,7 @@ constexpr float kLeastOfAll = 0.25F;  ///< what full occlusion leaves when it da
   return static_cast<float>(std::min<double>(options.exposure, std::numeric_limits<float>::max()));
 }
 
-/// Linear: the colour that tells a detail.
+/// Returns the linear colour that stands for a level of detail.
 [[nodiscard]] inline Vec3 colour_of_detail(Detail detail, int halvings) {
   if (detail == Detail::Near) return {0.10F, 0.55F, 0.12F};
   if (detail == Detail::Far) return {0.08F, 0.20F, 0.75F};

@@ -291,7 +291,7 @@ struct Lighting::LampPlaces {
   }
 };
 
-// Points of one brick have the same list; each point adds its lamps in the list's order, whatever its group.
+// All points of a brick have the same lamp list. Each point adds its lamps in list order in any group.
 std::int64_t Lighting::add_lamplight(const Group& group, std::span<Vec3> lamplight) const {
   const PlacedGrid& placed = placed_in(view_->tracer())[static_cast<std::size_t>(group.placed)];
   std::array<std::span<const std::uint32_t>, RayPacket::kSize> lists;

@@ -18,11 +18,11 @@
 
 namespace quoin {
 
-/// What a point sends towards whoever sees it.
+/// The kind of light that a point sends to the viewer.
 enum class PointKind : std::uint8_t {
-  Surface,  ///< its lit colour and what it emits
-  Unlit,    ///< its own colour: seen from inside
-  Glow,     ///< only what it emits
+  Surface,  ///< lit colour and emission
+  Unlit,    ///< own colour, unlit: seen from inside
+  Glow,     ///< emission only
 };
 
 /// A point of a voxel's face, or of a field's surface, that is to be lit.
@@ -31,24 +31,24 @@ struct SurfacePoint {
   IVec3 voxel{0};
   std::int32_t placed = 0;  ///< index into SceneTracer::placed
   VoxelType type = kAir;
-  Direction face = Direction::PosX;  ///< of a field the one to which the normal is nearest
+  Direction face = Direction::PosX;  ///< fields: the direction nearest to the normal
   bool in_field = false;
   bool is_blended = false;  ///< of a field: not of one material, but of those around, as Surfaces::blend_of_field
   Vec3 normal{0.0F};        ///< of a field, in its grid, of unit length or 0
   float lift = 0.0F;        ///< of a field: how far above the surface the position lies, along the normal
   PointKind kind = PointKind::Surface;
-  std::uint32_t pixel = 0;  ///< seeds what is random: a number of pixel and sample
-  float openness = -1.0F;   ///< 0 to 1 where it is known, whatever the options' way to find it; less than 0: it is not
+  std::uint32_t pixel = 0;  ///< seed for random numbers: combines pixel and sample
+  float openness = -1.0F;   ///< 0 to 1 if already known, independent of the occlusion options; less than 0: unknown
 };
 
 /// The reference model of light: a sun with shadows, an ambient term with occlusion, and what voxels emit.
 ///
 ///   colour * (0.15 * openness + diffuse + lamplight) + emitted, times the exposure,
 ///
-/// with diffuse = max(n.l, 0), or 0 in shadow, tinted by what is transparent on the way, as is what lamps add; without
-/// occlusion the ambient term is 0.1. The ambient term and the sun's light are of the colours of daylight_of. Secondary
-/// rays start 0.01 voxels in front of the face. Distances are in voxels of the grid that was hit, of the full one also
-/// where a halved one is traced. Other shadings: see Shading.
+/// with diffuse = max(n.l, 0), or 0 in shadow. Transparent bodies tint sunlight and lamplight. Without occlusion the
+/// ambient term is 0.1. The colours of the ambient term and of sunlight come from daylight_of. Secondary rays start
+/// 0.01 voxels in front of the face. Distances are in voxels of the grid that was hit; for a halved grid, in voxels of
+/// the full grid. Other shadings: see Shading.
 ///
 /// LightModel::Propagated has colour * light_colour * (1 - 0.75 * occlusion) + emitted instead.
 class Lighting {
@@ -66,11 +66,11 @@ class Lighting {
   std::int64_t light(std::span<const SurfacePoint> points, std::span<Vec3> colours, int sample = 0) const;
 
   [[nodiscard]] const Surfaces& surfaces() const { return *surfaces_; }
-  /// What is behind everything. `up`: the y of a unit direction.
+  /// Returns the colour of the background. `up`: the y of a unit direction.
   [[nodiscard]] Vec3 sky(float up) const;
 
  private:
-  /// Of one placed grid, in its own frame.
+  /// Light directions for one placed grid, in its own space.
   struct Frame {
     DVec3 to_sun{0.0};
     double voxels_per_cell = 1.0;
@@ -82,7 +82,7 @@ class Lighting {
   std::int64_t light_group(const Group& group, std::span<Vec3> colours) const;
   void find_propagated(const Group& group, std::span<Vec3> light) const;
   std::int64_t find_sunlight(const Group& group, std::span<Vec3> sunlight) const;
-  // Removes from each active lane's light what does not get past what lies on its ray; returns how many were traced.
+  // Multiplies the light of each active lane by the transmittance of its ray. Returns how many rays were traced.
   std::int64_t shadow(const Group& group, RayPacket& rays, std::span<Vec3> light) const;
   void tint(const Group& group, const RayPacket& rays, std::span<Vec3> light) const;
   std::int64_t add_lamplight(const Group& group, std::span<Vec3> lamplight) const;
@@ -96,7 +96,7 @@ class Lighting {
   [[nodiscard]] Surface surface_at(const SurfacePoint& point) const;
   [[nodiscard]] Vec3 shade(const SurfacePoint& point, Vec3 direct, float openness) const;
   [[nodiscard]] Vec3 shade_lit(const SurfacePoint& point, Vec3 direct, float openness) const;
-  // Of the sun, without shadows.
+  // Returns the sun's diffuse term without shadows.
   [[nodiscard]] float diffuse(const Frame& frame, const SurfacePoint& point) const;
   [[nodiscard]] Vec3 normal_colour(const SurfacePoint& point) const;
   [[nodiscard]] bool needs_openness() const;

@@ -10,20 +10,21 @@
 
 namespace quoin {
 
-/// Where the occlusion rays of each face point, as unit vectors in the grid's frame.
+/// The directions of the occlusion rays of each face, as unit vectors in the grid's space.
 ///
 /// 6: the normal, the four directions tilted 45 degrees towards the tangents, and (1,1,1)/sqrt(3) with the normal's
-///    sign along the normal: lopsided, as the reference has it. 9: the normal, the four tilted ones and all four
-///    diagonals; each further sample of a pixel turns them about the normal and leans the first one, or flat faces
-///    would keep bands at any number of samples. Any other number: cosine-weighted, one ray in each of as
-///    many rings of equal weight, a golden angle apart; the whole is turned and shifted within the rings by a hash of
+///    sign along the normal. The set is asymmetric, like the reference renderer's.
+/// 9: the normal, the four tilted ones and all four diagonals. Each further sample of a pixel rotates them about the
+///    normal and tilts the first one. Without this, flat faces would keep bands at any number of samples.
+/// Any other number: cosine-weighted, one ray in each of as many rings of equal weight, a golden angle apart. A hash of
+///    the pixel rotates the whole set and shifts it within the rings.
 ///    the pixel.
 class OcclusionDirections {
  public:
   explicit OcclusionDirections(int rays);
 
   [[nodiscard]] int count() const { return count_; }
-  /// Whether all pixels have the same.
+  /// Returns true if all pixels use the same directions.
   [[nodiscard]] bool is_fixed() const { return is_fixed_; }
   /// Requires: `is_fixed`. `face`: a Direction.
   [[nodiscard]] DVec3 fixed(std::size_t face, int ray) const {
@@ -37,23 +38,22 @@ class OcclusionDirections {
     double cosine = 1.0;
     double sine = 0.0;
   };
-  /// What a pixel's sample does to the nine.
+  /// The rotation of the nine directions for one sample of a pixel.
   struct Turn {
-    /// By how much they turn about the normal, from u towards v: less than a quarter, over which samples are spread
-    /// evenly.
+    /// Rotation about the normal, from u towards v: less than a quarter turn. Samples spread evenly over this range.
     Angle about_normal;
-    /// Where the first one, which turning leaves in its place, then points, along u, v and the normal: within half the
-    /// way to the four next to it, over which samples are spread evenly.
+    /// The new direction of the first ray, which rotation leaves unchanged, along u, v and the normal. It lies within
+    /// half the angle to the next four rays. Samples spread evenly over this range.
     DVec3 upright{0.0, 0.0, 1.0};
   };
-  /// Nothing for the first sample, nor where there are not nine.
+  /// Returns the identity for the first sample, and if there are not nine directions.
   [[nodiscard]] static Turn turn_of(int sample, int rays);
 
   using Fixed = std::array<std::array<DVec3, 9>, 6>;
   /// All fixed directions, by face, so turned. Requires: `is_fixed`.
   [[nodiscard]] Fixed turned(const Turn& turn) const;
 
-  /// What `spread` is made of: the rings' angles, and those by which pixels turn them; empty where it is not.
+  /// Data of `spread`: the angles of the rings and the rotations of pixels; empty if `spread` is not used.
   [[nodiscard]] const std::vector<Angle>& ring_angles() const { return ring_angles_; }
   [[nodiscard]] const std::vector<Angle>& turns() const { return turns_; }
 

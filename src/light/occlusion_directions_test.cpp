@@ -47,7 +47,7 @@ TEST(OcclusionDirections, SixAreTheLopsidedReference) {
       EXPECT_TRUE(holds(all, n - tangent));
     }
   }
-  // Of the sixth only the component along the normal changes its sign.
+  // Only the sixth direction's component along the normal changes its sign.
   EXPECT_TRUE(holds(fixed_set(6, Direction::PosX), {1, 1, 1}));
   EXPECT_TRUE(holds(fixed_set(6, Direction::NegX), {-1, 1, 1}));
   EXPECT_TRUE(holds(fixed_set(6, Direction::PosY), {1, 1, 1}));

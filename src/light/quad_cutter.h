@@ -12,8 +12,9 @@ namespace quoin {
 /// Cuts the faces of quads into rectangles of those that belong together: as far along u as it goes, and then along v.
 class QuadCutter {
  public:
-  /// `start(u, v)` gives what a rectangle from that face on may take in: `goes_along_u`, `goes_along_v`, and whether
-  /// `joins(u, v)`. `emit(u, v, along_u, along_v)` is called for each rectangle, by rows of their first faces.
+  /// `start(u, v)` returns an object that decides how a rectangle from that face may grow: `goes_along_u`,
+  /// `goes_along_v` and `joins(u, v)`. `emit(u, v, along_u, along_v)` is called for each rectangle, by rows of first
+  /// faces.
   template <class Start, class Emit>
   void cut(int width, int height, const Start& start, const Emit& emit) {
     QUOIN_ASSERT(width > 0 && height > 0, "a quad with faces");

@@ -14,7 +14,7 @@ std::optional<float> glass_ior(const VoxelProperties& properties) {
 }
 
 void set_absorption(float alpha, Surface& surface) {
-  // One voxel covers `alpha` of what lies behind it and tints the rest, the more the more it covers.
+  // One voxel covers `alpha` of the background and tints the rest. The tint increases with `alpha`.
   surface.log_clarity = std::log(1.0F - alpha);
   for (int channel = 0; channel < 3; ++channel) {
     surface.log_transmittance[channel] = std::log((1.0F - alpha) * (1.0F - alpha * (1.0F - surface.colour[channel])));
@@ -31,7 +31,7 @@ Surface surface_of(const VoxelProperties& properties, Clouds clouds) {
   Surface surface;
   const Rgba8 c = properties.colour;
   surface.colour = linear_colour(c);
-  // What overflows is as bright as can be; negative and NaN emit nothing.
+  // Clamps infinite emission; negative values and NaN emit no light.
   const float emission =
       properties.emission > 0.0F ? std::min(properties.emission, std::numeric_limits<float>::max() / 4.0F) : 0.0F;
   surface.emitted = surface.colour * emission;

@@ -27,7 +27,7 @@ std::vector<SurfaceUpdate> GridSurfaces::update(const SceneGrid& grid, const Vox
   source_->follow(grid, LiveClock::now());
   LiveTypes looks;
   looks.registry = std::shared_ptr<const VoxelRegistry>(std::shared_ptr<void>(), &types);
-  // Of a field what hangs together is done at once, and then perhaps what waited for it.
+  // Connected chunks of a field are meshed as one group; chunks that waited for the group may follow.
   for (source_->prepare(grid, types); !source_->waiting().empty(); source_->prepare(grid, types)) {
     const bool needs_materials = options_.style == SurfaceStyle::Smooth && looks.materials == nullptr;
     if (needs_materials) looks.materials = std::make_shared<const SurfaceMaterials>(types);

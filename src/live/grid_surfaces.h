@@ -21,10 +21,10 @@ class GridSurfaces {
   GridSurfaces& operator=(const GridSurfaces&) = delete;
 
   [[nodiscard]] SurfaceStyle style() const { return options_.style; }
-  /// Makes the next `update` begin anew: types may look otherwise.
+  /// Makes the next `update` start from scratch, because the look of types may have changed.
   void forget() { source_->forget(); }
-  /// What is other than at the last call, as LiveMeshes::take. Requires: it is always the same grid or its snapshots.
-  /// Errors: bad_alloc; then it is not to be asked again.
+  /// Returns the changes since the last call, as LiveMeshes::take does. Requires: always the same grid or its
+  /// snapshots. Errors: bad_alloc; do not call it again after that.
   [[nodiscard]] std::vector<SurfaceUpdate> update(const SceneGrid& grid, const VoxelRegistry& types, Threads threads);
 
  private:

@@ -1,6 +1,6 @@
-// journal: what it costs to find what one edit changed, in worlds of 100 and of 100,000 chunks, and what snapshots
-// cost. journal/find/*: only finding, microseconds; journal/follow/*: all that a consumer does after an edit of one
-// voxel.
+// journal: the cost of finding the changes of one edit, in worlds of 100 and of 100,000 chunks, and the cost of
+// snapshots. journal/find/*: finding alone, in microseconds; journal/follow/*: all work of a consumer after an edit of
+// one voxel.
 
 #include <chrono>
 #include <cstdio>
@@ -74,7 +74,7 @@ struct World {
 // The time of `follow` after each edit.
 template <class Follow>
 void after_edits(benchmark::State& state, World& world, Follow&& follow) {
-  // What is made once, the first time something changes, is none of these.
+  // Excludes the work that happens only at the first change.
   for (int i = 0; i < 4; ++i) {
     world.edit();
     follow();

@@ -12,7 +12,7 @@
 namespace quoin {
 namespace {
 
-// So many chunks of one update are compared voxel by voxel; an edit of more reaches most of what is beside them anyway.
+// Maximum number of chunks per update that are compared voxel by voxel. Larger edits reach most neighbours anyway.
 constexpr std::size_t kMaxCompared = 32;
 
 std::uint64_t next_stamp() {
@@ -27,7 +27,7 @@ ChunkDifference everything() {
   return all;
 }
 
-// Which samples of the rows of a box differ; null is far air.
+// Returns the samples that differ in the rows of a box; null is far air.
 ChangeReach density_difference(const DensityChunk* before, const DensityChunk* after, const IBox& within) {
   static const DensityChunk far_air(DensityNeighbourhood{}.outside);
   const DensityChunk& a = before == nullptr ? far_air : *before;
@@ -130,13 +130,13 @@ void LiveDensity::make_locked() {
 bool LiveDensity::reads_as(std::uint64_t stamp, int reach, IVec3 offset) const {
   if (stamp == stamp_) return true;
   if (!has_base_ || base_stamp_ != stamp) return false;
-  // Vertices take the materials of their cells' corners, which end one sample past the chunk; what is solid of one body
-  // is air to others.
+  // Vertices take the materials of their cells' corners, which end one sample past the chunk. Solid of one body is air
+  // to other bodies.
   return !changed_densities_.is_within(reach, offset.x, offset.y, offset.z) &&
          !changed_types_.is_within(may_change_bodies_ ? reach : 1, offset.x, offset.y, offset.z);
 }
 
-// Where the chunks of the edits differ from what they were, as far as that is looked into.
+// Returns the differences between the edited chunks and their former states, as far as they are compared.
 std::vector<DensityCache::Change> DensityCache::changes_of(const Grid& grid, const GridChanges& edits) const {
   std::vector<Change> changes;
   if (edits.all) {
@@ -179,7 +179,7 @@ void DensityCache::reach_from(const Change& change, std::vector<IVec3>& reached)
     } else if (i == 13 && change.difference.types.samples != 0) {
       invalidate(at, false, {});
     }
-    // Of types, those beside the chunk matter; which body a sample is of may matter further away: LiveDensity knows.
+    // Types matter only next to the chunk. The body of a sample can matter further away; LiveDensity checks that.
     if (is_within(change.difference.solid, kVoxelFieldReach + reach_) || is_within(change.difference.types, reach_)) {
       reached.push_back(at);
     }

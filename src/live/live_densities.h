@@ -21,14 +21,14 @@ namespace quoin {
 /// The types of a chunk's samples that are transparent, in their order; none of null.
 [[nodiscard]] std::vector<VoxelType> transparent_of(const DensityChunk* chunk, const VoxelRegistry& types);
 
-/// What single bodies have of one chunk of densities (smooth::without_others), made by the worker that needs one first,
-/// and kept.
+/// The densities of single bodies in one chunk (smooth::without_others). The first worker that needs a body computes
+/// its densities; they are then kept.
 ///
 /// Threads: any.
 class BodyChunks {
  public:
-  /// Null where all is far air. `whole` is always the same chunk, or a copy of it; it must outlive the result, which is
-  /// it where there are no other bodies.
+  /// Null if all is far air. `whole` must always be the same chunk or a copy of it. It must outlive the result, because
+  /// the result refers to it if there are no other bodies.
   [[nodiscard]] std::shared_ptr<const DensityChunk> of(const DensityChunk* whole, const VoxelRegistry& types,
                                                        std::uint32_t body);
 
@@ -38,12 +38,12 @@ class BodyChunks {
   std::map<std::uint32_t, std::shared_ptr<const DensityChunk>> made_;
 };
 
-/// A grid as it was at one moment, for whoever needs it on other threads.
+/// A grid at one moment, for use on other threads.
 using GridSnapshot = std::shared_ptr<const Grid>;
 
-/// The densities of one chunk of voxels in one state, made by the first who needs them.
+/// The densities of one chunk of voxels in one state, computed by the first thread that needs them.
 ///
-/// Threads: any; the voxels are let go once the densities are made.
+/// Threads: any. The voxels are released once the densities exist.
 class LiveDensity {
  public:
   /// `base` are the densities of an earlier state, or null. `changed` holds the voxels that came or went since, in the
@@ -51,20 +51,20 @@ class LiveDensity {
   LiveDensity(GridSnapshot voxels, IVec3 chunk, std::shared_ptr<const LiveDensity> base, const IBox& changed,
               std::shared_ptr<const VoxelRegistry> types);
 
-  /// Tells this state of this chunk from every other; 0 stands for far air, of which there is no object.
+  /// Returns the unique stamp of this state of this chunk. 0 stands for far air, which has no object.
   [[nodiscard]] std::uint64_t stamp() const { return stamp_; }
   [[nodiscard]] bool is_made() const { return is_made_.load(std::memory_order_acquire); }
-  /// Makes them unless another thread is about it. When that throws, nothing has happened.
+  /// Computes them unless another thread does so already. If it throws, nothing has changed.
   void try_to_make();
-  /// Returns once they are made, by this thread or another.
+  /// Returns once they exist, computed by this thread or another.
   void make();
 
   /// Null where all is far air. Requires: is_made().
   [[nodiscard]] const DensityChunk* densities() const { return densities_.get(); }
   /// Those of single bodies. Requires: is_made(), before they are asked for.
   [[nodiscard]] BodyChunks& bodies() { return bodies_; }
-  /// Whether these are, for the chunk at an offset from this one that looks `reach` samples beyond its own, those of
-  /// `stamp`; false when that is not known. Requires: is_made().
+  /// Returns true if a neighbour at `offset` that reads `reach` samples past its own reads the same densities here as
+  /// in the state `stamp`. Returns false if that is unknown. Requires: is_made().
   [[nodiscard]] bool reads_as(std::uint64_t stamp, int reach, IVec3 offset) const;
 
  private:
@@ -100,13 +100,13 @@ class DensityCache {
   explicit DensityCache(int reach) : reach_(reach) {}
 
   void clear() { *this = DensityCache(reach_); }
-  /// Takes over what was edited since the last time, as `edits` say: the chunks that changed, came or went (`changed`),
-  /// and those in which the surface may have changed (`reached`), both sorted. When all has changed, what was there
-  /// before is to be cleared first.
+  /// Takes over the edits since the last call. Appends the chunks that changed, came or went to `changed`, and the
+  /// chunks whose surface may have changed to `reached`, both sorted. If everything has changed, call `clear` first.
   void follow(GridSnapshot grid, const GridChanges& edits, std::vector<IVec3>& changed, std::vector<IVec3>& reached);
-  /// Of the grid as `follow` saw it last. `types`: whose visibility all densities of one registry's state have.
+  /// Returns densities for the grid as of the last `follow`. `types`: must have the same visibility in all calls for
+  /// one registry state.
   [[nodiscard]] LiveDensities around(IVec3 chunk, const std::shared_ptr<const VoxelRegistry>& types);
-  /// Keeps what workers made, as far as it holds still. Returns a bit for each that is new.
+  /// Keeps the densities that workers computed, unless their chunks have changed since. Returns a bit for each new one.
   std::uint32_t keep(IVec3 chunk, const LiveDensities& made);
 
  private:

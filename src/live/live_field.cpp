@@ -105,7 +105,7 @@ void LiveField::follow(const SceneGrid& content, LiveClock::time_point now) {
   followed_ = end;
 }
 
-// What was made so far, or is being made, is of another field.
+// Discards all surfaces and jobs, because they belong to another field.
 void LiveField::begin_anew(const DensityGrid& field, LiveClock::time_point now) {
   abandon_groups();
   bodies_.clear();
@@ -126,8 +126,8 @@ void LiveField::begin_anew(const DensityGrid& field, LiveClock::time_point now) 
 void LiveField::follow_changes(const DensityGrid& field, const DensityChanges& changes, LiveClock::time_point now) {
   for (const DensityChange& change : changes.items) {
     bodies_.erase(change.chunk);
-    // What a loaded chunk completes was not there before, and what an unloaded one was beside goes: neither has to fit
-    // what is seen.
+    // A loaded chunk completes surfaces that did not exist before, and unloading removes the neighbours' surfaces.
+    // Neither has to match the visible surfaces.
     if (!change.is_edit) {
       for (int i = 0; i < 27; ++i) see_whether_there(field, change.chunk + Neighbourhood::offset(i), false, now);
       continue;
@@ -166,7 +166,7 @@ void LiveField::mark(IVec3 chunk, bool is_bound, LiveClock::time_point now) {
   is_prepared_ = false;
 }
 
-// Those beside it depend on it as much as it does on them.
+// Neighbours depend on each other's levels.
 void LiveField::set_level(IVec3 chunk, FieldChunk& state, int level, LiveClock::time_point now) {
   if (state.level == level) return;
   state.level = static_cast<std::uint8_t>(level);
@@ -281,7 +281,7 @@ void LiveField::prepare(const SceneGrid& content, const VoxelRegistry& types) {
     bool is_empty = true;
     for (const IVec3 each : members) {
       FieldChunk& state = chunks_.at(each);
-      if (state.group != nullptr) continue;  // what it waits for is in its present group
+      if (state.group != nullptr) continue;  // its present group contains the chunks it waits for
       state.is_empty = state.is_gone || !may_have_surface(content.field, types, each);
       is_empty &= state.is_empty;
       if (begins && !state.is_empty) {

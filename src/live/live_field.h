@@ -13,9 +13,10 @@ namespace quoin {
 
 /// The field of one grid.
 ///
-/// Surfaces of chunks beside each other have vertices in common, so those that one change reaches are a group: meshed
-/// from one snapshot, with one choice of levels, and given at once when the last is done. A change that reaches a chunk
-/// whose group is on its way waits until that has been given; what is loaded, and was never seen, waits for nobody.
+/// Surfaces of neighbouring chunks share vertices. The chunks that one change reaches therefore form a group: they are
+/// meshed from one snapshot with one choice of levels, and delivered together when the last is done. A change to a
+/// chunk whose group is in progress waits until that group has been delivered. Loaded chunks that were never shown do
+/// not wait.
 class LiveField final : public LiveSource {
  public:
   LiveField(GridHandle handle, const LiveMeshOptions& options, LiveTotals& totals);
@@ -26,7 +27,7 @@ class LiveField final : public LiveSource {
   void mark_types(const SceneGrid& content, const ChangedTypes& changed, LiveClock::time_point now) override;
 
   [[nodiscard]] bool wants_levels() const override { return wants_levels_; }
-  /// Chunks that nobody has seen have their levels at once; of others some are changed at a time, the nearest first.
+  /// Chunks that were never shown get their levels at once. Other chunks change a few at a time, nearest first.
   void choose_levels(const ChunkDistances& distances, LiveClock::time_point now) override;
   void prepare(const SceneGrid& content, const VoxelRegistry& types) override;
   [[nodiscard]] const ChunkSet& waiting() const override { return waiting_; }
@@ -50,23 +51,23 @@ class LiveField final : public LiveSource {
   struct FieldChunk {
     std::shared_ptr<Group> group;  // that it is meshed in; null: in none
     std::uint64_t serial = 0;      // of the newest job
-    LiveClock::time_point seen;    // when the last change was
-    bool is_stale = false;         // it changed since it was meshed, or put into a group
-    bool is_bound = false;         // what changed it also changed some beside it
-    bool is_working = false;       // the newest job is with the workers
+    LiveClock::time_point seen;    // time of the last change
+    bool is_stale = false;         // it changed after it was meshed or put into a group
+    bool is_bound = false;         // the same change also reached neighbours
+    bool is_working = false;       // a worker has the newest job
     bool is_done = false;          // in its group
     bool is_empty = false;         // there is nothing to mesh
     bool is_gone = false;          // of the field nothing is there any more
-    bool is_ready = false;         // `surface` is to be taken
+    bool is_ready = false;         // `surface` is ready to be taken
     bool is_listed = false;        // in LiveTotals::ready
-    bool is_shown = false;         // what was taken last is not null
-    bool was_given = false;        // a surface, or that there is none
+    bool is_shown = false;         // the last surface taken is not null
+    bool was_given = false;        // a surface, or the report that there is none
     std::uint8_t level = 0;
     std::array<std::uint8_t, 27> levels{};        // in its group
     std::shared_ptr<const ChunkSurface> result;   // in its group
     std::shared_ptr<const ChunkSurface> surface;  // of the last group
 
-    // Whether nothing depends on its level yet.
+    // Returns true if no other chunk depends on its level yet.
     [[nodiscard]] bool is_new() const { return !was_given && group == nullptr; }
     [[nodiscard]] bool is_unfinished() const { return is_stale || group != nullptr; }
     [[nodiscard]] bool is_pending() const { return is_unfinished() || is_ready; }

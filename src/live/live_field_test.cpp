@@ -21,7 +21,7 @@ namespace {
 
 using Point = std::tuple<double, double, double>;
 
-// How many edges of what is shown have an odd number of triangles: 0 where it is closed.
+// Counts the edges with an odd number of triangles; 0 if the surfaces are closed.
 std::size_t open_edges(const ShownSurfaces& shown, GridHandle handle) {
   std::map<std::pair<Point, Point>, int> edges;
   for (const SurfaceUpdate& each : shown.all()) {
@@ -45,7 +45,7 @@ std::size_t open_edges(const ShownSurfaces& shown, GridHandle handle) {
   return odd;
 }
 
-// Whether all chunks have the levels that the nearest of the eyes, in samples, asks for.
+// Checks that all chunks have the level for the distance, in samples, of the nearest eye.
 void expect_levels(const ShownSurfaces& shown, const std::vector<DVec3>& eyes, double detail_distance) {
   const auto level_at = [&](double distance) {
     return std::clamp(static_cast<int>(std::ceil(std::log2(std::max(distance, 1e-3) / detail_distance))), 0, 3);
@@ -107,7 +107,7 @@ DensityGrid hills(int chunks, unsigned seed = 3) {
   return field;
 }
 
-// Some edit that chunks beside each other may see.
+// Makes a random edit, often near chunk borders.
 void dig(DensityGrid& field, std::mt19937& random, int chunks) {
   const auto below = [&](double end) { return std::uniform_real_distribution<double>(0.0, end)(random); };
   const auto border = [&] { return 64.0 * static_cast<double>(random() % static_cast<unsigned>(chunks)) - 3.0; };
@@ -272,7 +272,7 @@ TEST(LiveField, ColoursOfTypesAreFollowed) {
   ASSERT_NO_FATAL_FAILURE(expect_field(shown, one.scene, one.handle, options_of(1)));
 }
 
-// A lake with a ball of glass in it, over chunk borders; `bed`: what lies around it.
+// A lake that contains a glass ball and crosses chunk borders; `bed` is the material around it.
 DensityGrid lake(VoxelType water, VoxelType glass, VoxelType bed) {
   DensityGrid field;
   field.add_box({2.0, 2.0, 2.0}, {126.0, 70.0, 126.0}, bed);

@@ -17,7 +17,7 @@ bool has_solid_first_layer(const Chunk* chunk, std::size_t axis) {
   return ChunkStorage::of(*chunk)->layer_counts[axis][0] != 0;
 }
 
-// Of a partial grid: its densities are made of its own and the 26 chunks around each.
+// Partial grids: the densities of a chunk depend on the chunk and its 26 neighbours.
 constexpr int kSmoothDistance = 2;
 
 // Quads belong to the chunk in which their lattice edge starts: it, or the next one along the edge, has a solid sample.
@@ -71,7 +71,7 @@ void LiveGrid::follow_light(const GridLight& light, LiveClock::time_point now) {
   followed_light_ = end;
 }
 
-// What was made so far, or is being made, is of another grid.
+// Discards all surfaces and jobs, because they belong to another grid.
 void LiveGrid::begin_anew() {
   densities_.clear();
   for (auto& [chunk, state] : chunks_) {
@@ -183,7 +183,7 @@ void LiveGrid::mark(IVec3 chunk, LiveChunk& state, LiveClock::time_point now) {
   const Change change(totals_, state);
   // Jobs of a chunk that was here before may still be running.
   if (state.oldest == 0) state.oldest = totals_.serial + 1;
-  // That it was gone need not be told any more.
+  // Its removal no longer has to be reported.
   if (state.is_gone) state.is_ready = false;
   state.is_gone = false;
   state.is_waiting = true;
@@ -271,8 +271,8 @@ void LiveGrid::withdrawn(const LiveJob& job) {
   state.is_working = false;
 }
 
-// Where new densities read as those that a surface is of, the surface counts as one of the new: later ones will be
-// compared with these.
+// Updates the stamps of the surface if the new densities read the same as its old ones. Later
+// densities are then compared with the new ones.
 void LiveGrid::keep_densities(const LiveJob& job) {
   const std::uint32_t kept = densities_.keep(job.chunk, job.densities);
   const int reach = reach_of(options_.occlusion);
@@ -305,7 +305,7 @@ void LiveGrid::collect(LiveJob& job) {
   const bool is_newest = job.serial == state.serial;
   if (is_newest) state.is_working = false;
   if (job.serial < state.oldest || job.serial <= state.collected) return;
-  // What another job gave meanwhile may differ from what this one was compared with.
+  // Another job's surface, collected in the meantime, may differ from the surface that this job was compared with.
   const bool is_void = job.outcome == LiveJob::Outcome::OutOfMemory ||
                        (job.outcome == LiveJob::Outcome::AsBefore && job.last_collected != state.collected);
   if (is_void) {
@@ -323,7 +323,7 @@ void LiveGrid::collect(LiveJob& job) {
   if (state.surface != nullptr || state.is_shown) make_ready(job.chunk, state);
 }
 
-// Which regions differ from those that were taken last.
+// Returns the regions that differ from the ones taken last.
 std::uint64_t LiveGrid::note_regions(LiveChunk& state) const {
   constexpr std::uint64_t kAll = ~std::uint64_t{0};
   const int across = kChunkEdge / options_.region_edge;

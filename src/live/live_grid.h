@@ -15,22 +15,22 @@
 
 namespace quoin {
 
-/// What is known of the surface of one chunk.
+/// The state of one chunk's surface.
 struct LiveChunk {
   std::uint64_t serial = 0;     ///< of the newest job
-  std::uint64_t oldest = 0;     ///< results of jobs before this one are of something else
-  std::uint64_t collected = 0;  ///< the newest job that is done
-  LiveClock::time_point seen;   ///< when the last edit was
+  std::uint64_t oldest = 0;     ///< results of earlier jobs are obsolete
+  std::uint64_t collected = 0;  ///< the newest collected job
+  LiveClock::time_point seen;   ///< time of the last edit
   bool is_waiting = false;      ///< for a job
   bool is_working = false;      ///< the newest job is not collected
-  bool is_ready = false;        ///< `surface` is to be taken
+  bool is_ready = false;        ///< `surface` is ready to be taken
   bool is_listed = false;       ///< in LiveTotals::ready
-  bool is_shown = false;        ///< what was taken last is not null
-  bool is_gone = false;         ///< not to be seen any more
+  bool is_shown = false;        ///< the last surface taken is not null
+  bool is_gone = false;         ///< it must no longer be visible
   std::shared_ptr<const ChunkSurface> surface;
-  std::vector<std::uint64_t> region_hashes;    ///< of what was taken last, where there are several; 0 without quads
-  std::unique_ptr<DensityStamps> last_stamps;  ///< smooth: of what was collected last
-  std::uint64_t type_generation = 0;           ///< likewise
+  std::vector<std::uint64_t> region_hashes;    ///< of the surface taken last, if it has several regions; 0: no quads
+  std::unique_ptr<DensityStamps> last_stamps;  ///< smooth: densities of the surface collected last
+  std::uint64_t type_generation = 0;           ///< types of the surface collected last
 
   [[nodiscard]] bool is_unfinished() const { return is_waiting || is_working; }
   [[nodiscard]] bool is_pending() const { return is_unfinished() || is_ready; }

@@ -18,7 +18,7 @@ struct LitScene {
   SceneLight light;
 };
 
-// How far the changes of a grid were read that light depends on.
+// Read positions in the changes of a grid, for voxels and fields.
 struct GridCursors {
   ChangeCursor voxels;
   ChangeCursor field;
@@ -57,7 +57,7 @@ struct LiveLight::Impl {
   bool is_behind = true;  // something changed that no snapshot has
   LitScene shown;
 
-  // The worker's, and what it was made with.
+  // Used only by the worker thread.
   Threads threads;
   LitScene working;
 
@@ -65,7 +65,7 @@ struct LiveLight::Impl {
   std::condition_variable wake;
   std::condition_variable progressed;
   bool is_stopping = false;
-  bool is_busy = false;                // with what was asked for
+  bool is_busy = false;                // computing the requested light
   std::shared_ptr<const Scene> asked;  // to be lit
   std::unique_ptr<LitScene> ready;     // to be taken
   std::unique_ptr<LitScene> given_up;  // was shown; the worker destroys it, which takes a while
@@ -90,8 +90,8 @@ void LiveLight::Impl::run() {
       failed = std::current_exception();
     }
     lock.lock();
-    std::swap(ready, done);  // what nobody took
-    // Whoever takes what is ready finds room for what was shown before.
+    std::swap(ready, done);  // `done` receives the light that was not taken
+    // Frees the former light here, so that the thread that takes the new one does not have to.
     std::unique_ptr<LitScene> old = std::exchange(given_up, nullptr);
     failure = failed;
     is_busy = false;
@@ -110,7 +110,8 @@ void LiveLight::Impl::throw_failure() {
   std::rethrow_exception(std::exchange(failure, nullptr));
 }
 
-// Whether light depends on any of what changed since the last time. A scene tells of names and of data at voxels, too.
+// Returns true if light depends on any change since the last call. Scenes also report names and voxel data, which light
+// ignores.
 bool LiveLight::Impl::read_changes(const Scene& scene) {
   const SceneChanges changes = scene.changes_since(followed_scene);
   bool is_any = changes.all || scene.types.has_changed_since(followed_types);

@@ -1,4 +1,4 @@
-// Light that workers keep up to date: whatever is shown is that of the voxels it is given with, found from nothing.
+// Light kept up to date by workers: it always equals light computed from scratch for the voxels it comes with.
 
 #include <quoin/live/live_light.h>
 
@@ -108,7 +108,7 @@ TEST(LiveLight, ThreadsAndTimeDoNotMatter) {
   EXPECT_TRUE(results[0] == results[1]);
 }
 
-// Others read what is shown while the next is being found and the scene is edited.
+// Readers use the shown light while workers compute the next light and the scene is edited.
 TEST(LiveLight, IsReadWhileWorkersGoOn) {
   LitScene world(2);
   LiveLight light({{}, {2}});
@@ -132,7 +132,7 @@ TEST(LiveLight, IsReadWhileWorkersGoOn) {
   }
 }
 
-// A consumer that copies what it is told of has all of the light.
+// A consumer that copies only the reported changes has all of the light.
 TEST(LiveLight, TellsWhereLightChanged) {
   LitScene world(4);
   LiveLight light;

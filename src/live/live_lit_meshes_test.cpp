@@ -137,7 +137,7 @@ TEST(LiveLitMeshes, OfAChunkThatOnlyItsLightReachesAreMadeAgain) {
   ASSERT_EQ(updates.size(), 2U);
   for (const SurfaceUpdate& update : updates) {
     ASSERT_LT(update.chunk.x, 2);
-    // Of the chunk beside it those regions alone that the light reaches: it ends 8 voxels within.
+    // In the neighbouring chunk only the regions within the range of the light change: it ends 8 voxels inside.
     constexpr std::uint64_t kFirstAlongX = 0x1111'1111'1111'1111U;
     if (update.chunk.x == 1) {
       EXPECT_EQ(update.changed_regions & ~kFirstAlongX, 0U);
@@ -204,7 +204,7 @@ TEST(LiveLitMeshes, WithoutLightAnyMoreAreThoseOfBefore) {
   }
 }
 
-// Light and meshes on workers, each at its own pace: at the end both are of what is there.
+// Light and meshes update on workers at their own pace. Finally both match the scene.
 TEST(LiveLitMeshes, FollowLiveLight) {
   DarkeningScene world(8);
   LiveLight light;

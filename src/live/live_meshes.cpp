@@ -30,7 +30,7 @@ LiveMeshes::LiveMeshes(const LiveMeshOptions& options) {
                "regions are 16, 32 or 64 voxels wide");
   impl_ = std::make_unique<Impl>(options);
 }
-// Workers may call what is there until they have ended.
+// Workers may call the callback until they have stopped.
 LiveMeshes::~LiveMeshes() {
   impl_->scheduler.stop();
 }

@@ -105,7 +105,7 @@ TEST_P(LiveMeshesOf, NothingIsMadeWhereNothingChanged) {
   LiveMeshes meshes(options());
   EXPECT_FALSE(all_of(meshes, one.scene).empty());
   const std::int64_t before = meshes.stats().chunks_meshed;
-  one.grid().set({60, 60, 60}, 1);  // what it is
+  one.grid().set({60, 60, 60}, 1);  // same type as before
   one.scene.edit(one.placed).position = {5, 5, 5};
   Instance second = one.instance;
   second.position = {500, 0, 0};
@@ -287,7 +287,7 @@ TEST(LiveCallbacks, SurfacesAreConvertedByWorkersAndTakenByThem) {
   std::mutex mutex;
   std::map<std::pair<GridHandle, std::array<int, 3>>, std::size_t> taken;
   const auto take = [&] {
-    const std::lock_guard lock(mutex);  // what is taken first is kept first
+    const std::lock_guard lock(mutex);  // keeps the order of `take` calls
     for (const SurfaceUpdate& update : meshes->take()) {
       const std::pair key{update.grid, std::array{update.chunk.x, update.chunk.y, update.chunk.z}};
       if (update.surface == nullptr) {
@@ -386,7 +386,7 @@ TEST(LiveBudget, TheRestWaitsForTheNextCall) {
     ASSERT_EQ(one_more.size(), 1U);
     shown.apply(one_more);
     if (left != 5) continue;
-    // What waits is replaced, and given once.
+    // A waiting surface is replaced and delivered once.
     one.grid().fill_box({{0, 10, 0}, {640, 12, 10}}, 1);
     meshes.finish(one.scene, {});
     shown.apply(meshes.take());

@@ -1,4 +1,4 @@
-// Which chunks are meshed again after an edit.
+// Tests which chunks are meshed again after an edit.
 
 #include <quoin/live/live_meshes.h>
 
@@ -28,7 +28,7 @@ class FollowedGrid {
     options.workers = {2};
     return options;
   }
-  // How many chunks were meshed since the last call, and which were given.
+  // Returns the number of chunks meshed since the last call, and sets `given` to the chunks delivered.
   std::int64_t meshed(Places& given) {
     const std::int64_t before = meshes.stats().chunks_meshed;
     meshes.finish(one.scene, {});
@@ -62,7 +62,7 @@ TEST(LiveReach, BlockyEditsReachTheChunksOfTheNeighbouringVoxels) {
   }
 }
 
-// Those of which a density field says that a sample changed within reach.
+// Returns the chunks within reach of a changed sample, according to a density field.
 Places chunks_near_changes(const DensityGrid& before, const DensityGrid& after, int reach) {
   DensityGrid edited = before.snapshot();
   ChangeCursor cursor;
@@ -168,7 +168,7 @@ TEST(LiveReach, OnlyChunksThatShowAChangedTypeAreMeshedAgain) {
     EXPECT_EQ(followed.meshed(given), 1);
     EXPECT_EQ(given, (Places{{5, 0, 0}}));
     expect_surfaces(followed.shown, followed.one.scene, FollowedGrid::options_of(style));
-    // Of a type that nothing has.
+    // No voxel has this type.
     EXPECT_TRUE(types.add(properties).has_value());
     EXPECT_EQ(followed.meshed(given), 0);
   }

@@ -16,10 +16,11 @@
 
 namespace quoin {
 
-/// How far the nearest eye is from chunks of a grid: from the nearest of its instances.
+/// Distances from the nearest eye to chunks of a grid, over all its instances.
 class ChunkDistances {
  public:
-  /// `chunks` hold all that will be asked for, or nearly so; empty: no matter which. `eyes` are read while it lives.
+  /// `chunks` should contain all chunks that will be asked for; pass an empty box if unknown. Lifetime: `eyes` must
+  /// outlive it.
   ChunkDistances(const IBox& chunks, std::span<const DVec3> eyes) : chunks_(chunks), eyes_(eyes) {}
 
   /// Requires: the instance has a place.
@@ -78,7 +79,7 @@ class LiveChange {
   const State& state_;
 };
 
-/// What surfaces are made with.
+/// The type data that surfaces are made with.
 struct LiveTypes {
   std::shared_ptr<const VoxelRegistry> registry;
   std::shared_ptr<const SurfaceMaterials> materials;
@@ -91,7 +92,7 @@ struct ChangedTypes {
   std::vector<bool> colour;
 };
 
-/// What jobs of one update are made of; snapshots are taken when the first needs them.
+/// The inputs of one update's jobs. A snapshot is taken when the first job needs it.
 class LiveInputs {
  public:
   LiveInputs(const SceneGrid& content, const LiveTypes& with, const GridLight& light = {})
@@ -125,8 +126,7 @@ class LiveInputs {
 
 using ChunkSet = std::unordered_set<IVec3, CoordinateHash>;
 
-/// Follows the voxels or the field of one grid of a scene: which of its chunks are to be meshed, and what became of
-/// them.
+/// Follows the voxels or the field of one grid of a scene: tracks which chunks need meshing and their results.
 class LiveSource {
  public:
   LiveSource() = default;
@@ -134,22 +134,22 @@ class LiveSource {
   LiveSource& operator=(const LiveSource&) = delete;
   virtual ~LiveSource() = default;
 
-  /// Takes over what was edited, at a cost in proportion to that.
+  /// Takes over the edits. Cost: proportional to the edits.
   virtual void follow(const SceneGrid& content, LiveClock::time_point now) = 0;
-  /// The same of its light, whose pointers are null where none is used.
+  /// Takes over the changes of its light. The pointers of `light` are null if no light is used.
   virtual void follow_light(const GridLight& light, LiveClock::time_point now) {
     (void)light;
     (void)now;
   }
   /// Nothing of it is drawn any more.
   virtual void leave() = 0;
-  /// Makes the next `follow` begin anew.
+  /// Makes the next `follow` start from scratch.
   virtual void forget() = 0;
-  /// Chunks that show one of the types are to be meshed again.
+  /// Marks the chunks that show one of the types for meshing.
   virtual void mark_types(const SceneGrid& content, const ChangedTypes& changed, LiveClock::time_point now) = 0;
-  /// Whether it is to choose levels of detail though no eye moved.
+  /// Returns true if it needs to choose levels of detail even though no eye moved.
   [[nodiscard]] virtual bool wants_levels() const { return false; }
-  /// Takes over how far chunks are, after `follow`.
+  /// Takes over the distances of chunks; call after `follow`.
   virtual void choose_levels(const ChunkDistances& distances, LiveClock::time_point now) {
     (void)distances;
     (void)now;
@@ -161,17 +161,17 @@ class LiveSource {
   /// Holds all chunks that wait or are being meshed.
   [[nodiscard]] virtual const IBox& box() const = 0;
   [[nodiscard]] virtual bool has_chunks() const = 0;
-  /// Requires: the chunk waits; the inputs are of what `follow` saw last.
+  /// Creates the job of a waiting chunk. Requires: the chunk waits; `inputs` match the last `follow`.
   [[nodiscard]] virtual std::unique_ptr<LiveJob> make_job(LiveInputs& inputs, IVec3 chunk) = 0;
-  /// The job is with the workers.
+  /// Called when a worker has received the job.
   virtual void hand_over(IVec3 chunk, std::uint64_t serial) = 0;
-  /// Whether the job's result is still wanted.
+  /// Returns true if the job's result is still needed.
   [[nodiscard]] virtual bool is_current(const LiveJob& job) const = 0;
-  /// The job was taken back; what is not meshed anew anyway waits again.
+  /// Called when the job was withdrawn. The chunk waits again unless it is already waiting.
   virtual void withdrawn(const LiveJob& job) = 0;
-  /// The job is done.
+  /// Called when the job is done.
   virtual void collect(LiveJob& job) = 0;
-  /// Appends the surface if there is one to be taken.
+  /// Appends the surface if one is ready.
   virtual void take(IVec3 chunk, std::vector<SurfaceUpdate>& out) = 0;
 };
 

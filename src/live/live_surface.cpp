@@ -59,7 +59,7 @@ std::uint64_t hash_of(const SurfaceRegion& region, const ChunkSurface& surface) 
   return hash;
 }
 
-// Where the quads of each direction begin, from `first` on, and where all end; they are in the order of directions.
+// Returns the start of each direction's quads, beginning at `first`, and the end of all. Quads are sorted by direction.
 std::array<std::uint32_t, 7> directions_of(const QuadBuffer& quads, std::size_t first, std::size_t end) {
   std::array<std::uint32_t, 7> range{};
   auto at = quads.begin() + static_cast<std::ptrdiff_t>(first);
@@ -85,7 +85,8 @@ void sort_into_one(const LitQuads& lit, const VoxelRegistry& types, ChunkSurface
   surface.light.resize(lit.light.size());
   std::size_t opaque = quads.size();
   if (types.has_transparent()) {
-    // Transparent ones from the end on, and then turned round. Without a branch: nobody can guess them.
+    // Places transparent quads from the end backwards, then reverses them. Branchless, because the branch is
+    // unpredictable.
     opaque = 0;
     std::size_t end = quads.size();
     for (std::size_t i = 0; i < quads.size(); ++i) {
@@ -250,7 +251,7 @@ bool reads_as_before(const LiveJob& job, int reach) {
   return true;
 }
 
-// What no other worker is about comes first; what others are about is there, or nearly so, by then.
+// Computes first the densities that no other worker computes. The remaining ones are then finished or nearly so.
 DensityNeighbourhood make_densities(const LiveDensities& densities) {
   DensityNeighbourhood chunks;
   for (const auto& density : densities) {
@@ -318,7 +319,7 @@ BodiesAround bodies_around(const DensityNeighbourhood& chunks, const VoxelRegist
   }
   BodiesAround bodies{smooth::bodies_of(types, own), false};
   std::vector<std::uint32_t> all_bodies = smooth::bodies_of(types, all);
-  // What is solid of a field without a material is opaque.
+  // Field solid without a material is opaque.
   if (content == SurfaceContent::Field) {
     for (std::vector<std::uint32_t>* each : {&bodies.own, &all_bodies}) {
       if (each->empty() || each->front() != 0) each->insert(each->begin(), 0);
@@ -328,7 +329,7 @@ BodiesAround bodies_around(const DensityNeighbourhood& chunks, const VoxelRegist
   return bodies;
 }
 
-// `chunk_of(i, body)`: what the body has of the i-th chunk around.
+// `chunk_of(i, body)` returns the body's densities in the i-th chunk of the neighbourhood.
 template <class ChunkOf>
 void make_bodies(const LiveMeshOptions& options, const DensityNeighbourhood& whole, LiveJob& job,
                  LiveWorkspace& workspace, const ChunkOf& chunk_of) {

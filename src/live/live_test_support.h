@@ -51,7 +51,7 @@ inline VoxelRegistry live_types() {
   return types;
 }
 
-/// What a client keeps of the updates.
+/// The surfaces that a client holds after it applies the updates.
 class ShownSurfaces {
  public:
   void apply(const std::vector<SurfaceUpdate>& updates) {
@@ -274,7 +274,7 @@ class SceneEditor {
     return all[static_cast<std::size_t>(below(static_cast<int>(all.size())))];
   }
 
-  // More often than not beside a border between chunks.
+  // Returns a coordinate that is often near a chunk border.
   int place() { return below(3) != 0 ? 64 * (below(3) - 1) + below(5) - 2 : below(140) - 70; }
 
   Grid small_grid() {

@@ -13,7 +13,7 @@ double seconds(LiveClock::duration duration) {
   return std::chrono::duration<double>(duration).count();
 }
 
-// What only workers need; copies of chunks are let go as soon as they are done with.
+// Releases the inputs of a job. Copies of chunks are freed as early as possible.
 void drop_inputs(LiveJob& job) {
   job.voxels = {};
   job.field.reset();
@@ -121,7 +121,7 @@ std::unique_ptr<LiveJob> MeshJobQueue::take_nearest() {
   return job;
 }
 
-// Keeps what it throws for whoever asks next.
+// Stores an exception of the call for `take_failure`.
 template <class Call>
 void MeshJobQueue::guard(Call&& call) {
   try {
@@ -154,7 +154,7 @@ void MeshJobQueue::run() {
       }
     });
     drop_inputs(*job);
-    // Nobody is told of failures: whoever tried again at once would fail again.
+    // Failures are not reported to the callback: an immediate retry would fail again.
     const bool is_told = job->outcome != LiveJob::Outcome::OutOfMemory;
     finish(std::move(job), start);
     if (is_told && on_ready_) guard(on_ready_);

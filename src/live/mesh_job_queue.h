@@ -28,10 +28,10 @@ using LiveClock = std::chrono::steady_clock;
 /// A field as it was at one moment.
 using FieldSnapshot = std::shared_ptr<const DensityGrid>;
 
-/// What bodies have of the chunks of a field; none are where there is nothing transparent.
+/// The densities of single bodies, per chunk of a field; empty if nothing is transparent.
 using FieldBodies = std::unordered_map<IVec3, std::shared_ptr<BodyChunks>, CoordinateHash>;
 
-/// A grid's light as it was at one moment, and the voxels that it is of.
+/// A grid's light at one moment, and the voxels that it was computed from.
 struct LitVoxels {
   PropagatedLight light;
   Grid voxels;
@@ -61,21 +61,21 @@ struct LiveJob {
   LightSnapshot light;  ///< blocky; null where none is used
   std::shared_ptr<const VoxelRegistry> types;
   LiveDensities densities;                            ///< smooth
-  std::shared_ptr<const SurfaceMaterials> materials;  ///< smooth, and of fields
-  /// Smooth: the stamps of the densities of which the last surface is; meshing what they say again is spared.
+  std::shared_ptr<const SurfaceMaterials> materials;  ///< smooth surfaces and fields
+  /// Smooth: density stamps of the last surface. If the stamps match, meshing is skipped.
   std::optional<DensityStamps> last_stamps;
-  std::uint64_t last_collected = 0;           ///< the job whose surface that was
-  std::uint64_t type_generation = 0;          ///< of `types` and `materials`
-  FieldSnapshot field;                        ///< of fields, which take `materials` too
-  std::shared_ptr<const FieldBodies> bodies;  ///< of that
-  std::array<std::uint8_t, 27> levels{};      ///< of fields: of detail, as a neighbourhood has them
+  std::uint64_t last_collected = 0;           ///< the job that made the last surface
+  std::uint64_t type_generation = 0;          ///< generation of `types` and `materials`
+  FieldSnapshot field;                        ///< fields only; uses `materials` too
+  std::shared_ptr<const FieldBodies> bodies;  ///< bodies of `field`
+  std::array<std::uint8_t, 27> levels{};      ///< fields: levels of detail, in neighbourhood order
 
   enum class Outcome : std::uint8_t { Meshed, AsBefore, OutOfMemory };
   Outcome outcome = Outcome::Meshed;
   std::shared_ptr<ChunkSurface> surface;  ///< null where there is nothing to see
 };
 
-/// What a worker keeps from chunk to chunk.
+/// Scratch memory that a worker keeps between chunks.
 struct LiveWorkspace {
   std::optional<BlockyMesher> blocky;
   std::optional<SmoothMesher> smooth;
@@ -103,17 +103,17 @@ class MeshJobQueue {
   MeshJobQueue(const MeshJobQueue&) = delete;
   MeshJobQueue& operator=(const MeshJobQueue&) = delete;
 
-  /// Waits for jobs that were started; gives up the rest, and whatever comes later.
+  /// Waits for started jobs. Discards waiting jobs and all later ones.
   void stop();
   void push(std::unique_ptr<LiveJob> job);
-  /// What a callback threw first since the last call; null: nothing.
+  /// Returns the first exception of a callback since the last call, or null.
   [[nodiscard]] std::exception_ptr take_failure();
-  /// Takes back what no worker has started of the jobs for which `is_unwanted`.
+  /// Withdraws and returns the waiting jobs that match `is_unwanted`.
   [[nodiscard]] std::vector<std::unique_ptr<LiveJob>> withdraw(const std::function<bool(const LiveJob&)>& is_unwanted);
-  /// Gives the jobs that wait new distances; returns these, the least first.
+  /// Sets new distances of the waiting jobs. Returns the distances in ascending order.
   [[nodiscard]] std::vector<double> measure(const std::function<double(const LiveJob&)>& distance);
-  /// Calls `renew` for the jobs that wait, to give blocky ones newer snapshots in which their chunks are the same: an
-  /// old one keeps all that was let go of since. Workers end the old ones.
+  /// Calls `renew` for the waiting jobs, so that blocky ones can get newer snapshots in which their chunks are
+  /// unchanged. An old snapshot keeps all memory that was released since. Workers free the old snapshots.
   void renew(const std::function<void(LiveJob&)>& renew);
   /// The jobs that were done since the last call, in the order in which they were.
   [[nodiscard]] std::vector<std::unique_ptr<LiveJob>> collect();

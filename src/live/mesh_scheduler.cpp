@@ -60,7 +60,7 @@ void MeshScheduler::update(const Scene& scene, DVec3 eye, std::span<const DVec3>
   }
 }
 
-// Memory ran out in the middle: whatever was lost is found by beginning anew.
+// Memory ran out during an update. Starting from scratch recovers all lost changes.
 void MeshScheduler::forget() {
   for (auto& [key, source] : sources_) source->forget();
   followed_scene_ = {};
@@ -106,7 +106,7 @@ void MeshScheduler::follow_light(LiveClock::time_point now) {
   }
 }
 
-// Of fields, where eyes moved, or places did, or there are more to be chosen.
+// Chooses levels of fields if eyes or instances moved, or if some levels are still to be chosen.
 void MeshScheduler::choose_levels(const Scene& scene, LiveClock::time_point now) {
   if (options_.detail_distance == std::numeric_limits<double>::infinity()) return;
   std::map<GridHandle, ChunkDistances> distances;
@@ -146,7 +146,7 @@ std::vector<GridHandle> MeshScheduler::follow_scene(const Scene& scene) {
   return drawn_;
 }
 
-// What those that are new, or of another registry, are: all types look otherwise, those that it does not have included.
+// Follows the type registry. If the registry is new, all types count as changed, including types it does not contain.
 ChangedTypes MeshScheduler::follow_types(const VoxelRegistry& types) {
   ChangeCursor now = followed_types_;
   const TypeChanges changes = types.changes_since(now);
@@ -258,7 +258,7 @@ void MeshScheduler::renew_jobs(const Scene& scene, LiveClock::time_point now) {
   });
 }
 
-// Gives jobs to the workers; those that wait and are farther than what comes now have to wait longer.
+// Gives jobs to the workers. Waiting jobs that are farther away than the new ones wait longer.
 void MeshScheduler::hand_over(const Scene& scene) {
   if (!has_waiting()) return;
   constexpr double kNone = std::numeric_limits<double>::infinity();
@@ -322,10 +322,10 @@ void MeshScheduler::finish(const Scene& scene, DVec3 eye, std::span<const DVec3>
     const std::size_t left = !is_done && has_waiting() ? max_ahead_ / 2 : 0;
     // A worker that is done may take.
     lock.unlock();
-    queue_.wait(left);  // once all is done: for what was removed while it was meshed
+    queue_.wait(left);  // once all is done: waits for jobs of removed grids
     if (is_done) return throw_failure();
     const LiveMeshes::Stats after = stats();
-    // Nothing but failures: it will not do to try for ever.
+    // If all jobs failed, throws instead of retrying without end.
     if (after.out_of_memory != before.out_of_memory && after.chunks_meshed == before.chunks_meshed) {
       throw std::bad_alloc();
     }

@@ -12,7 +12,7 @@
 namespace quoin {
 namespace {
 
-// Workers that stop at a gate, and what they did.
+// Workers that stop at a gate, and a log of their work.
 class GatedWork {
  public:
   explicit GatedWork(const LiveMeshOptions& options) : options_(options) {}
@@ -156,7 +156,7 @@ TEST(MeshScheduler, WhatOneEditOfAFieldReachesIsGivenAtOnce) {
   for (int done = 1; done <= 4; ++done) {
     EXPECT_TRUE(scheduler.take().empty()) << done;
     gated.wait_for_started(8U + static_cast<std::size_t>(done));
-    // What comes meanwhile waits for these.
+    // Changes made in the meantime wait for these jobs.
     if (done == 2) field.remove_sphere(DVec3(64.0, 118.0, 20.0), 6.0);
     scheduler.update(one.scene, {});
     gated.let_through(1);
@@ -267,7 +267,7 @@ TEST(MeshScheduler, NothingOlderIsGivenAfterSomethingNewer) {
   EXPECT_EQ(faces[0] + faces[1], 6 * edits);
 }
 
-// Of chunks that look as before nothing is given, but those who wait for `pending` to be 0 learn of them.
+// Unchanged chunks deliver no surface, but callers that wait for `pending` to be 0 still finish.
 TEST(MeshScheduler, WhoActsOnlyWhenCalledComesToTheEnd) {
   OneGrid one;
   constexpr int kEdited = 40;

@@ -11,11 +11,12 @@
 
 namespace quoin {
 
-/// The boxes of what chunks hold, and the box around all of them, which follows every change at a cost of O(log
-/// chunks): of each of its six sides it is known how many chunks' boxes end at which coordinate.
+/// One box per chunk and the box around all of them, updated at a cost of O(log chunks) per change. For each of the six
+/// sides, a map counts the chunk boxes that end at each coordinate.
 class ChunkBoxes {
  public:
-  /// An empty box takes the chunk away. When it throws, the chunk is to be put again; all others are as they were.
+  /// Sets the box of a chunk; an empty box removes the chunk. If it throws, put the chunk again; all others are
+  /// unchanged.
   void put(IVec3 chunk, const IBox& box) {
     try {
       const auto found = boxes_.find(chunk);
@@ -56,7 +57,7 @@ class ChunkBoxes {
     return around;
   }
 
-  /// Of a chunk; null where there is none, until the next `put`.
+  /// Returns the box of a chunk, or null if it has none. Valid until the next `put`.
   [[nodiscard]] const IBox* find(IVec3 chunk) const {
     const auto found = boxes_.find(chunk);
     return found == boxes_.end() ? nullptr : &found->second;

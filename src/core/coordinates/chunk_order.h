@@ -15,7 +15,7 @@ inline void sort_and_unite(std::vector<IVec3>& chunks) {
   chunks.erase(std::unique(chunks.begin(), chunks.end()), chunks.end());
 }
 
-/// Records of changes likewise, by their chunks.
+/// Sorts change records by their chunks, in the order of `by_zyx`.
 inline constexpr auto by_chunk = [](const auto& a, const auto& b) { return by_zyx(a.chunk, b.chunk); };
 
 }  // namespace quoin

@@ -23,8 +23,8 @@ namespace quoin {
 ///                          |   |
 ///                       0: [e] [e e]
 ///
-/// A copy shares all nodes. A change copies those between the root and its entry that are shared, 64 places each: time
-/// in proportion to the levels, whatever the number of chunks.
+/// A copy shares all nodes. A change copies the shared nodes between the root and its entry, 64 slots each. Its time is
+/// proportional to the levels and independent of the number of chunks.
 /// Threads: as Ref; a trie may be changed while copies of it are read and destroyed on other threads.
 template <class Entry>
 class ChunkTrie {
@@ -51,7 +51,7 @@ class ChunkTrie {
     return find(chunk.x, chunk.y, chunk.z) == nullptr ? nullptr : &find_or_create(chunk, on_copy);
   }
 
-  /// Likewise, made where it was missing. Requires: the chunk's voxels have int32 coordinates.
+  /// Returns the entry of a chunk and creates it if missing. Requires: the chunk's voxels have int32 coordinates.
   template <class OnCopy>
   Entry& find_or_create(IVec3 chunk, OnCopy&& on_copy) {
     const Place at = place_of(chunk.x, chunk.y, chunk.z);
@@ -106,7 +106,7 @@ class ChunkTrie {
   void for_each(Visit&& visit) const {
     if (root_ != nullptr) walk(*root_, nullptr, visit);
   }
-  /// Of one leaf.
+  /// Visits the entries of one leaf.
   template <class Visit>
   static void for_each_of(Leaf& leaf, Visit&& visit) {
     for (std::uint64_t left = leaf.present; left != 0; left &= left - 1) {
@@ -115,7 +115,7 @@ class ChunkTrie {
     }
   }
 
-  /// Of all nodes, entries included, also of those that copies share.
+  /// Returns the size of all nodes with their entries, including nodes shared with copies.
   [[nodiscard]] std::size_t bytes() const { return root_ == nullptr ? 0 : bytes_of(*root_); }
 
  private:

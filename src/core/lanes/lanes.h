@@ -1,6 +1,6 @@
 #pragma once
 
-// The lanes of the instruction set for which a file is compiled.
+// Includes the lanes of the instruction set that the including file is compiled for.
 #if defined(QUOIN_KERNEL_AVX512)
 #include "core/lanes/lanes_avx512.h"
 namespace quoin {

@@ -126,7 +126,7 @@ inline I select(Mask m, I a, I b) {
 inline I add_if(Mask m, I a, I b) {
   return {_mm256_add_epi32(a.v, _mm256_and_si256(_mm256_castps_si256(m.v), b.v))};
 }
-// Whether any of `b`'s bits is set in `a`.
+// Tests if any of the bits of `b` is set in `a`.
 inline Mask test(I a, I b) {
   const __m256i none = _mm256_cmpeq_epi32(_mm256_and_si256(a.v, b.v), _mm256_setzero_si256());
   return {_mm256_castsi256_ps(_mm256_xor_si256(none, _mm256_set1_epi32(-1)))};

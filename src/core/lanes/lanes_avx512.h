@@ -125,7 +125,7 @@ inline I select(Mask m, I a, I b) {
 inline I add_if(Mask m, I a, I b) {
   return {_mm512_mask_add_epi32(a.v, m.m, a.v, b.v)};
 }
-// Whether any of `b`'s bits is set in `a`.
+// Tests if any of the bits of `b` is set in `a`.
 inline Mask test(I a, I b) {
   return {_mm512_test_epi32_mask(a.v, b.v)};
 }

@@ -1,5 +1,5 @@
-// Four lanes in plain C++, which compilers turn into what the build's baseline has.
-// What a comparison with NaN gives, and which of two `min` and `max` take then, is as in x86-64.
+// Four lanes in plain C++; compilers map them to the instructions of the build's baseline. NaN behaves as in x86-64, in
+// comparisons and in the operand that `min` and `max` choose.
 
 #pragma once
 
@@ -82,7 +82,7 @@ inline F floor(F a) {
 inline F sqrt(F a) {
   return each<F>([&](int i) { return std::sqrt(a.v[i]); });
 }
-// Of whole numbers all wraps around.
+// Integer arithmetic wraps around.
 template <class Of>
 inline I each_word(Of of) {
   return each<I>([&](int i) { return static_cast<std::int32_t>(of(i)); });
@@ -150,7 +150,7 @@ inline F select(Mask m, F a, F b) {
 inline I select(Mask m, I a, I b) {
   return each<I>([&](int i) { return (m.m >> i & 1U) != 0 ? a.v[i] : b.v[i]; });
 }
-// Whether any of `b`'s bits is set in `a`.
+// Tests if any of the bits of `b` is set in `a`.
 inline Mask test(I a, I b) {
   return mask_where([&](int i) { return (a.v[i] & b.v[i]) != 0; });
 }

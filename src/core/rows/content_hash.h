@@ -14,7 +14,7 @@ inline std::uint64_t mixed_with(std::uint64_t hash, std::uint64_t value) {
 
 inline constexpr std::uint64_t kHashSeed = 0x2D35'8DCC'AA6C'78A5U;
 
-/// Of 64 types or halves.
+/// Hashes a row of 64 types or half floats.
 inline std::uint64_t hash_of_row(const std::array<std::uint16_t, 64>& row) {
   std::uint64_t hash = kHashSeed;
   for (std::size_t x = 0; x < row.size(); x += 4) {

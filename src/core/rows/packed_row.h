@@ -126,7 +126,7 @@ std::uint64_t equal_mask_by_bytes(const std::uint64_t* row, std::uint64_t patter
 }
 #endif
 
-/// Which voxels of the row hold `index`: bit x for voxel x.
+/// Returns the voxels of the row that hold `index`: bit x for voxel x.
 inline std::uint64_t equal_mask(const std::uint64_t* row, int bits, std::uint32_t index) {
   const std::uint64_t pattern = repeat(bits, index);
   std::uint64_t mask = 0;
@@ -212,8 +212,8 @@ inline void write_masked(std::uint64_t* row, int bits, std::uint64_t mask, std::
   }
 }
 
-/// Whether all voxels of `rows` rows that follow each other hold `index`; looks from the last row back, which where
-/// rows are filled in order is the one that does not.
+/// Returns true if all voxels of `rows` consecutive rows hold `index`. Starts at the last row, because in rows that are
+/// filled in order the last one is the one that differs.
 inline bool all_equal(const std::uint64_t* row, int bits, int rows, std::uint32_t index) {
   const std::uint64_t pattern = repeat(bits, index);
   for (int i = rows * bits; i-- > 0;) {
@@ -266,7 +266,7 @@ void unpack(const std::uint64_t* row, int bits, const Value* palette, std::size_
   }
 }
 
-/// Which of 64 values are `wanted`.
+/// Returns a mask of the values that equal `wanted`.
 template <class Value>
 std::uint64_t where_equal(const Value* values, Value wanted) {
   std::uint8_t equal[64];

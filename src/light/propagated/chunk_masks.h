@@ -12,7 +12,7 @@
 
 namespace quoin::propagated {
 
-/// What a type does to light.
+/// The light properties of a voxel type.
 struct TypeLight {
   std::uint16_t lamp = 0;    ///< packed levels that it gives off
   std::uint8_t passes = 15;  ///< bit c: channel c
@@ -20,7 +20,7 @@ struct TypeLight {
   bool operator==(const TypeLight&) const = default;
 };
 
-/// Where light passes through a box of a chunk, and where it comes from there. Reused: it only grows.
+/// Masks of a box of a chunk: the voxels that light passes and the lamps. Reused between calls: buffers only grow.
 class ChunkMasks {
  public:
   struct LampRow {
@@ -29,8 +29,8 @@ class ChunkMasks {
     std::uint64_t where;
   };
 
-  /// `voxels`: null where all is air. `lamp_slabs`: all that have lamps, and maybe others. What is not registered is
-  /// opaque. Cost: O(rows of the box).
+  /// `voxels`: null if all is air. `lamp_slabs`: all slabs with lamps, maybe more. Unregistered types are opaque. Cost:
+  /// O(rows of the box).
   void read(const Chunk* voxels, const std::vector<TypeLight>& types, const IBox& box, const SlabSet& lamp_slabs);
 
   /// Rows of the box, [y + 64 z]; null where they are all `uniform`.
@@ -39,10 +39,10 @@ class ChunkMasks {
     return found.is_uniform ? nullptr : found.words.data();
   }
   [[nodiscard]] std::uint64_t uniform(std::size_t channel) const { return rows_[rows_of_[channel]].uniform; }
-  /// Whether two channels pass alike.
+  /// Returns true if two channels have the same mask.
   [[nodiscard]] bool are_alike(std::size_t a, std::size_t b) const { return rows_of_[a] == rows_of_[b]; }
   [[nodiscard]] std::span<const LampRow> lamps() const { return lamps_; }
-  /// Slabs that were looked through and have none.
+  /// Slabs that were examined and contain no lamp.
   [[nodiscard]] const SlabSet& without_lamps() const { return without_lamps_; }
 
  private:

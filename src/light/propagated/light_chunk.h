@@ -24,7 +24,7 @@ inline constexpr std::size_t kSlabs = 256;   // of a chunk
   return static_cast<std::size_t>((z & 3) << 2 | (y & 3));
 }
 
-/// What replaces slabs of a channel of a chunk: all by one level, or those at some indices.
+/// Replaces slabs of one channel of a chunk: all by one level, or those at some indices.
 struct ChannelChange {
   struct Slab {
     std::size_t index;
@@ -82,10 +82,10 @@ using SlabSet = std::array<std::uint16_t, kChunkEdge / 4>;
   return all;
 }
 
-/// Of all channels. Dark at first.
+/// The light of all channels of a chunk. Dark by default.
 struct LightChunk {
   std::array<ChannelLight, kChannels> channels;
-  SlabSet lamp_slabs = all_slabs();  ///< all that have lamps, and maybe others
+  SlabSet lamp_slabs = all_slabs();  ///< all slabs with lamps, maybe more
 
   /// Packed. Requires: 0 <= x, y, z < 64.
   [[nodiscard]] std::uint16_t at(IVec3 voxel) const {

@@ -12,9 +12,9 @@
 
 namespace quoin::propagated {
 
-/// The chunks whose light is kept: those within one of a chunk with voxels, and what lies between these in a column.
-/// Everything above is open to the sky, and so are columns without such a chunk; what lies below is dark. Light from
-/// beyond, or that went out there, comes to no surface: a chunk is wider than light reaches.
+/// The chunks whose light is stored: chunks at most one away from a chunk with voxels, and the gaps between them in
+/// each column. Space above them, and columns without them, are open sky; space below is dark. Light that leaves the
+/// domain reaches no surface, since a chunk is wider than the range of light.
 class LightDomain {
  public:
   struct Range {
@@ -32,7 +32,7 @@ class LightDomain {
     const auto column = columns_.find({chunk.x, 0, chunk.z});
     return column != columns_.end() && column->second.count(chunk.y) > 0;
   }
-  /// A chunk has voxels now, or has none any more. Appends the columns of which others are held.
+  /// Records that a chunk has voxels now, or has none any more. Appends the columns whose stored range changed.
   void set(IVec3 chunk, bool has_voxels, std::vector<Change>& changed) {
     std::set<int>& column = columns_[{chunk.x, 0, chunk.z}];
     const bool is_news = has_voxels ? column.insert(chunk.y).second : column.erase(chunk.y) > 0;

@@ -25,7 +25,7 @@ struct QuadLight {
   }
 };
 
-// What one light goes over.
+// A rectangle of constant light.
 struct LightPiece {
   const QuadLight& light;
   std::uint16_t word;

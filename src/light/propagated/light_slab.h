@@ -69,7 +69,7 @@ class LightSlab {
   }
   [[nodiscard]] RowPlanes row(std::size_t row) const;
   void read(SlabPlanes& out) const;
-  /// Beside the object itself.
+  /// Returns the heap memory, without the object itself.
   [[nodiscard]] std::size_t bytes() const { return is_uniform() ? 0 : block().bytes(); }
 
  private:

@@ -12,7 +12,7 @@
 namespace quoin::propagated {
 namespace {
 
-// Of several kinds: one level, sky and rock, gradients along an axis, anything.
+// Slabs of several kinds: one level, sky and rock, gradients along an axis, random levels.
 SlabPlanes random_planes(std::mt19937_64& random) {
   SlabPlanes planes;
   const unsigned kind = random() % 5;
@@ -102,7 +102,7 @@ TEST(LightSlabKernel, PacksAndReadsAlikeWithEveryInstructionSet) {
       ASSERT_EQ(made.fresh, wanted.fresh);
       ASSERT_EQ(made.first, wanted.first);
       ASSERT_TRUE(std::equal(units.begin(), units.begin() + count, wanted_units.begin()));
-      // In room of exactly that size: a sanitizer tells of reads beyond it.
+      // Uses a buffer of the exact size, so that a sanitizer reports reads past it.
       const std::vector<std::uint32_t> exact(units.begin(), units.begin() + count);
       SlabPlanes read;
       kernel().unpack_slab(made, exact.data(), read.words.data());

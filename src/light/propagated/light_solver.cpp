@@ -17,7 +17,7 @@ std::uint64_t bits_between(int begin, int end) {
   return begin >= end ? 0 : kAll >> (64 - (end - begin)) << begin;
 }
 
-// Where the level is as in `level`.
+// Returns the voxels with the given level.
 std::uint64_t equal_to(const RowPlanes& planes, unsigned level) {
   std::uint64_t equal = kAll;
   for (std::size_t i = 0; i < kPlanes; ++i) equal &= (level >> i & 1U) != 0 ? planes[i] : ~planes[i];
@@ -72,7 +72,7 @@ void add_slab(int y, int z, const std::uint64_t* changed, VoxelRecord& record) {
 
 }  // namespace
 
-// What a region or its rim has of a chunk.
+// The intersection of a region, or its rim, with a chunk.
 struct LightSolver::Part {
   IVec3 chunk;
   IBox box;  // of the chunk
@@ -196,7 +196,7 @@ void LightSolver::read_rim() {
   });
 }
 
-// What is known of a part of the rim.
+// Reads the known light of a part of the rim.
 void LightSolver::read_light(const Part& part) {
   const ChunkAround& around = *part.around;
   if (!around.is_held) {
@@ -280,7 +280,7 @@ void LightSolver::read_pass(std::size_t channel) {
     if (rows == nullptr) same.fill(part.around->masks->uniform(channel));
     const auto count = static_cast<std::size_t>(part.box.max.y - part.box.min.y);
     const auto y = static_cast<std::size_t>(part.chunk.y * kChunkEdge + part.box.min.y - origin_.y);
-    // A column before the first is but for what is masked.
+    // The column before the first is written only where it is masked.
     const std::ptrdiff_t column = part.shift >> 6;
     for (int z = part.box.min.z; z < part.box.max.z; ++z) {
       const std::uint64_t* from = rows == nullptr ? same.data() : rows + part.box.min.y + kChunkEdge * z;
@@ -291,7 +291,7 @@ void LightSolver::read_pass(std::size_t channel) {
   });
 }
 
-// Which blocks light can come to.
+// Finds the blocks that light can reach.
 void LightSolver::find_passable() {
   for (std::size_t z = 0; z < passable_.size(); ++z) {
     passable_[z] = kernel().find_blocks(pass_.data() + z * layer_, columns_ * blocks_);
@@ -304,7 +304,7 @@ bool LightSolver::has_sources(std::size_t channel) const {
                      [](const std::vector<Source>& sources) { return !sources.empty(); });
 }
 
-// What has no higher level has this one. Where light does not pass there is but one source.
+// Gives this level to voxels without a higher one. A voxel that blocks light has only one source.
 void LightSolver::light_up(const Source& source, unsigned level) {
   const std::uint64_t block = std::uint64_t{1} << source.block;
   const bool is_touched = (touched_[source.z] & block) != 0;
@@ -325,7 +325,7 @@ void LightSolver::light_up(const Source& source, unsigned level) {
   }
 }
 
-// Of each layer, those within `margin` along y of what is wanted.
+// For each layer: blocks within `margin` of the wanted box along y.
 std::uint64_t LightSolver::blocks_near(int margin) const {
   const int low = std::max(box_.wanted.min.y - margin - origin_.y, 1);
   const int high = std::min(box_.wanted.max.y + margin - origin_.y, size_.y + 1);
@@ -335,7 +335,7 @@ std::uint64_t LightSolver::blocks_near(int margin) const {
   return blocks;
 }
 
-// Blocks beside those that changed, no farther from what is wanted than light of the level comes to it.
+// Activates the blocks next to those that changed, if light of this level can still reach the wanted box from there.
 void LightSolver::activate(unsigned level) {
   const int margin = static_cast<int>(level) - 1;
   const std::uint64_t near = blocks_near(margin);
@@ -403,7 +403,7 @@ void LightSolver::clear_fronts() {
   }
 }
 
-// Blocks of what is wanted that share a slab with one that is touched are dark, but for what is touched of them.
+// Darkens the wanted blocks that share a slab with a touched block, except the touched ones.
 void LightSolver::complete_planes() {
   const std::uint64_t all = kAll >> (64 - columns_ * blocks_);
   const int begin = box_.wanted.min.z - origin_.z;
@@ -422,7 +422,7 @@ void LightSolver::complete_planes() {
   }
 }
 
-// Whether something is lit in the blocks of which a slab has rows.
+// Returns true if any voxel is lit in the blocks that contain rows of a slab.
 bool LightSolver::is_touched(const Part& part, int y, int z) const {
   const IVec3 p = part.chunk * kChunkEdge + IVec3(0, y, z) - origin_;
   const int first = std::max(p.y, 0) / 8;
@@ -512,7 +512,7 @@ void LightSolver::solve(const LightRegion::Box& box, unsigned channels, std::vec
   has_sky_ = false;
   read_rim();
   read_inside();
-  std::size_t passes = kChannels;  // the channel of which `pass_` is
+  std::size_t passes = kChannels;  // the channel stored in `pass_`
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     if ((channels >> channel & 1U) == 0) continue;
     outcome_ = Outcome::Dark;

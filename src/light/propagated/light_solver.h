@@ -18,13 +18,13 @@ inline constexpr std::size_t kSky = 0;
 /// Steps that light goes from where it comes from, until it is dark.
 inline constexpr int kReach = 14;
 
-/// A chunk in a region or beside it.
+/// A chunk in a region or next to it.
 struct ChunkAround {
-  bool is_held = false;               ///< else its light stays as it is: dark, ...
+  bool is_held = false;               ///< false: its light is constant, either dark ...
   bool is_open = false;               ///< ... or all sky
-  const ChunkMasks* masks = nullptr;  ///< of those that are held, of where the region lies in it
+  const ChunkMasks* masks = nullptr;  ///< if held: masks of the chunk's part of the region
   const LightChunk* light = nullptr;  ///< null: dark
-  IBox unknown;                       ///< of the chunk: where its light is not to be relied on
+  IBox unknown;                       ///< box of the chunk whose light is not valid
 };
 
 /// Voxels whose light is to be found.
@@ -37,7 +37,7 @@ struct LightRegion {
   };
   std::array<Box, kChannels> channels;  ///< empty: that channel stays as it is
   Box all;                              ///< around these
-  IBox chunks;                          ///< those in `all.voxels` and beside them
+  IBox chunks;                          ///< the chunks of `all.voxels` and their neighbours
   std::vector<ChunkAround> around;      ///< [x, y, z] of these, x fastest
 
   [[nodiscard]] std::size_t index(IVec3 chunk) const {
@@ -50,28 +50,28 @@ struct LightRegion {
   [[nodiscard]] ChunkAround& at(IVec3 chunk) { return around[index(chunk)]; }
 };
 
-/// Light in a region, given that around it. Reused from region to region: it only grows.
+/// Computes the light in a region from the light around it. Reused for many regions: buffers only grow.
 ///
 /// Levels are spread as sets of 64 voxels, from 15 down:
 ///
 ///   front[L] = source[L] | (front[L + 1] moved by one along each axis, where light passes and it is dark)
 ///
-/// Sources are what lamps give off and the light at the region's rim, one voxel around it. In one pass over the levels
-/// every voxel has its own, since none is lit by a lower one. Sky of level 15 falls first. At each level only those
-/// blocks of rows are looked at beside which something is of the level before.
+/// Sources are the lamps and the light at the region's rim, one voxel around it. One pass over the levels gives every
+/// voxel its final level, since no voxel is lit by a lower one. Sky light of level 15 falls first. Each level processes
+/// only the blocks of rows next to blocks that contain the previous level.
 ///
 ///   words [z][column][y]: bit x of the region is bit x % 64 of column x / 64; x, y and z count from the rim
 class LightSolver {
  public:
-  /// Whether a region is not too large.
+  /// Returns true if the region fits into the masks.
   [[nodiscard]] static bool fits(IVec3 size);
 
-  /// What becomes of the light that is wanted: equal to that of all voxels, where of those at the region's rim whose
-  /// light is unknown none is within 14 of it, and the others have theirs. `changes`: one for each chunk that has of
-  /// what is wanted, x fastest. Requires: fits(all.voxels.size()).
+  /// Computes the new light of the wanted voxels. The result equals a solution for all voxels if the rim voxels with
+  /// unknown light are more than 14 away, and the others have their correct light. `changes`: one entry per chunk with
+  /// wanted voxels, x fastest. Requires: fits(all.voxels.size()).
   void solve(const LightRegion& region, std::vector<ChunkLightChange>& changes);
 
-  /// Masks for whoever has none that last; they are reused.
+  /// Returns temporary masks for chunks without cached ones. They are reused.
   [[nodiscard]] ChunkMasks& own_masks(std::size_t i) {
     while (own_masks_.size() <= i) own_masks_.push_back(std::make_unique<ChunkMasks>());
     return *own_masks_[i];
@@ -126,9 +126,9 @@ class LightSolver {
   std::vector<std::unique_ptr<ChunkMasks>> own_masks_;
   bool has_sky_ = false;  // there is sky that does not come by sources
   std::vector<std::uint64_t> pass_;
-  std::vector<std::uint64_t> rest_;   // of it what is dark, in blocks that are touched
-  std::vector<std::uint64_t> front_;  // what has the present level; all 0 between regions
-  std::vector<std::uint64_t> next_;   // likewise: the level above, and then that below
+  std::vector<std::uint64_t> rest_;   // dark voxels of pass_, in touched blocks
+  std::vector<std::uint64_t> front_;  // voxels of the current level; all 0 between regions
+  std::vector<std::uint64_t> next_;   // voxels of the level above, then of the level below; all 0 between regions
   std::array<std::vector<std::uint64_t>, kPlanes> plane_words_;
   std::array<std::uint64_t*, kPlanes> planes_{};  // bits of levels, within these
   std::vector<std::uint64_t> wanted_bits_;        // [column]

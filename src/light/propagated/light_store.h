@@ -17,20 +17,20 @@
 
 namespace quoin::propagated {
 
-/// What became of the light of one chunk.
+/// The new light of one chunk.
 struct ChunkLightChange {
   IVec3 chunk{0};
   std::array<ChannelChange, kChannels> channels;
-  VoxelRecord record;       ///< where something changed
-  SlabSet without_lamps{};  ///< slabs in which there was found to be none
+  VoxelRecord record;       ///< the changed voxels
+  SlabSet without_lamps{};  ///< slabs that were found to contain no lamp
 
   [[nodiscard]] bool empty() const {
     return std::all_of(channels.begin(), channels.end(), [](const ChannelChange& channel) { return channel.empty(); });
   }
 };
 
-/// The light of chunks, with the bookkeeping of changes. What is not there is dark.
-/// A copy costs some pointers, and shares light until it is changed; its journal is a copy's (ChangeJournal).
+/// The light of chunks and the journal of its changes. Missing chunks are dark. A copy costs a few pointers and shares
+/// light until it is changed. Its journal is a copy (see ChangeJournal).
 class LightStore {
  public:
   [[nodiscard]] const LightChunk* find(IVec3 chunk) const {

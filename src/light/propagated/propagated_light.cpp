@@ -1,7 +1,7 @@
-// An edit changes light no farther around it than its level less one, and around the columns that the sky falls down:
-// that box is solved from nothing, given the light around it, which stays as it is. Boxes that touch are one. Where
-// that would be too large, chunks are: a layer of them after the other from above, each with as much around it as light
-// comes from, so that none is solved twice.
+// An edit changes light at most (level - 1) voxels around it and around the sky columns that it opens or blocks. This
+// box is solved from scratch, with the light around it as boundary. Boxes that touch are merged. If the merged box is
+// too large, whole chunks are solved in layers from the top down. Each region includes the surroundings within
+// the range of light, so that no chunk is solved twice.
 #include <quoin/light/propagated_light.h>
 
 #include <algorithm>
@@ -157,7 +157,8 @@ void PropagatedLight::Impl::begin_anew(const Grid& grid) {
   change_domain(grid, grid.chunks());
 }
 
-// Chunks that came or went, or may have: light of what the domain has now is found from nothing, and that around.
+// Handles chunks that came or went, or may have: computes the light of the new parts of the domain and around them from
+// scratch.
 void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IVec3>& chunks) {
   std::vector<LightDomain::Change> changed;
   for (const IVec3 chunk : chunks) {
@@ -201,7 +202,7 @@ void PropagatedLight::Impl::add_chunks(const IBox& voxels) {
   }
 }
 
-// Of the light that voxels had, themselves and beside them, and of the lamps that they are now.
+// Returns the highest light levels in and next to the voxels, including the lamps that they are now.
 std::array<unsigned, kChannels> PropagatedLight::Impl::highest_levels(const Grid& grid, const IBox& voxels) const {
   constexpr int kMany = 512;
   std::array<unsigned, kChannels> highest{};
@@ -229,7 +230,7 @@ std::array<unsigned, kChannels> PropagatedLight::Impl::highest_levels(const Grid
   return highest;
 }
 
-// Down to where columns of the sky change, of which voxels are part.
+// Returns the lower end of the sky columns that change because of these voxels.
 int PropagatedLight::Impl::end_of_sky(const Grid& grid, const IBox& voxels) const {
   int low = voxels.max.y;
   LightReader words = reader();
@@ -251,7 +252,7 @@ int PropagatedLight::Impl::end_of_sky(const Grid& grid, const IBox& voxels) cons
   return low;
 }
 
-// Where light may differ for edits of these voxels. The domain is still that of before.
+// Returns the boxes in which light may change after edits of these voxels. Uses the domain before the edit.
 PropagatedLight::Impl::Dirty PropagatedLight::Impl::reach_of(const Grid& grid, const IBox& voxels) const {
   std::array<unsigned, kChannels> highest = highest_levels(grid, voxels);
   IBox from = voxels;
@@ -278,7 +279,7 @@ void PropagatedLight::Impl::take_over(const Grid& grid, const GridChanges& chang
 
 namespace {
 
-// Boxes that touch, or share a slab of a chunk, of which the results would be put one over the other.
+// Boxes that touch or share a chunk slab, so that their results would overwrite each other.
 struct Cluster {
   std::array<IBox, kChannels> boxes;
   IBox all;
@@ -300,7 +301,7 @@ struct Cluster {
 
 }  // namespace
 
-// Where boxes that touch are too large together, or too many, chunks are solved.
+// Merges dirty boxes. If the result is too large or there are too many, queues chunks instead.
 void PropagatedLight::Impl::sort_dirty() {
   constexpr std::size_t kMany = 1024;
   std::vector<Cluster> clusters;
@@ -368,7 +369,7 @@ void PropagatedLight::Impl::solve(std::vector<LightRegion>& regions, Threads thr
   }
 }
 
-// Each in one go, by what it has of chunks.
+// Solves each box at once.
 void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
   std::vector<LightRegion> regions;
   for (const Dirty& each : dirty) {
@@ -398,8 +399,8 @@ void PropagatedLight::Impl::solve_dirty(const Grid& grid, Threads threads) {
   dirty.clear();
 }
 
-// The highest chunks of the queue, since sky falls: what lies above them is known. Whole ones side by side are solved
-// together, since less lies around them.
+// Returns the highest chunks of the queue. Sky light falls, so the light above them is known. Whole chunks next to each
+// other are solved together, because they share surroundings.
 std::vector<LightRegion> PropagatedLight::Impl::next_layer() const {
   constexpr int kRun = 4;
   int highest = queue.begin()->first.y;
@@ -427,7 +428,7 @@ std::vector<LightRegion> PropagatedLight::Impl::next_layer() const {
   return regions;
 }
 
-// Of the chunks of a layer and of what they look at.
+// Reads the masks of the chunks of a layer and of the chunks around them.
 void PropagatedLight::Impl::read_masks(const Grid& grid, const std::vector<LightRegion>& regions, Threads threads) {
   std::vector<std::pair<IVec3, ChunkMasks*>> missing;
   for (const LightRegion& region : regions) {
@@ -455,7 +456,7 @@ void PropagatedLight::Impl::read_masks(const Grid& grid, const std::vector<Light
 
 void PropagatedLight::Impl::solve_queue(const Grid& grid, Threads threads) {
   constexpr std::size_t kBatch = 64;        // regions at a time
-  constexpr std::size_t kMaskLimit = 1024;  // chunks of which masks are kept: 32 MB
+  constexpr std::size_t kMaskLimit = 1024;  // chunks with cached masks: 32 MB
   while (!queue.empty()) {
     const std::vector<LightRegion> layer = next_layer();
     for (std::size_t first = 0; first < layer.size(); first += kBatch) {

@@ -36,8 +36,8 @@ VoxelRegistry light_types() {
   return types;
 }
 
-/// A search from every lamp and all of the sky, level by level, a voxel at a time. Its box is that of all voxels and as
-/// far around as light can go, so that what comes from beyond reaches no voxel of the middle but by the sky.
+/// Searches from every lamp and all of the sky, level by level, one voxel at a time. Its box contains all voxels plus
+/// the range of light, so that light from outside reaches a voxel in the middle only as sky light.
 class Search {
  public:
   Search(const Grid& grid, const VoxelRegistry& types, const IBox& box)
@@ -228,7 +228,7 @@ TEST(PropagatedLight, ShadowsFallAsFarAsThereIsSky) {
   grid.set({0, -500, 0}, kGlass);
   PropagatedLight light;
   light.update(grid, types);
-  for (const int y : {-100, -600, 3}) {  // a shadow longer than what is solved at once, and shorter ones
+  for (const int y : {-100, -600, 3}) {  // one shadow longer than the solver's regions, and shorter ones
     const IBox roof{{-2, y, -2}, {3, y + 1, 3}};
     grid.fill_box(roof, kStone);
     light.update(grid, types);
@@ -380,7 +380,7 @@ TEST(PropagatedLight, TellsWhereItChanged) {
             const IVec3 local = local_of(voxel);
             return change.chunk == chunk_of(voxel) && change.box.contains(local) && change.slabs.has(local.y, local.z);
           });
-          // What lies above all chunks is not kept.
+          // Light above all chunks is not stored.
           ASSERT_TRUE(is_told || changes.all) << x << " " << y << " " << z;
         }
       }

@@ -1,7 +1,7 @@
 #pragma once
 
-// Light at surfaces, of whatever says what light voxels have and which are opaque: `Voxels` has
-//   std::uint16_t word(IVec3), packed light, and bool passes(IVec3), whether light gets there.
+// Light at surfaces, for any source of voxel light. `Voxels` has
+//  std::uint16_t word(IVec3), packed light, and bool passes(IVec3), true if light passes the voxel.
 
 #include <algorithm>
 #include <array>
@@ -25,8 +25,8 @@ struct FrontLight {
   bool passes = false;
 };
 
-/// The light of a corner, in twelfths, from the voxels in front that touch it: that of the face itself, those beside it
-/// along either edge, and the one across.
+/// Returns the light of a corner, in twelfths, from the voxels in front that touch it: the voxel before the face, its
+/// two neighbours along the edges, and the diagonal one.
 [[nodiscard]] constexpr std::uint32_t corner_light(const FrontLight& own, const FrontLight& side1,
                                                    const FrontLight& side2, const FrontLight& across) {
   if (!own.passes) return 0;
@@ -98,16 +98,16 @@ struct FacePlace {
   }
 };
 
-/// The light of a place on a face. Cells are solid where not all of their voxels are: what lies before such a face is
-/// looked for as far as the cell is wide.
+/// Returns the light of a position on a face. A halved cell can be solid while some of its voxels are air. The search
+/// for light in front of such a face therefore goes as far as the width of the cell.
 template <class Voxels>
 [[nodiscard]] MeanLevels light_on_face(Voxels& voxels, FacePlace place, Direction face, int level) {
   for (int step = 1; step < 1 << level && !voxels.passes(place.front); ++step) place.front += normal_of(face);
   return light_between(face_light(voxels, place.front, face), place.u, place.v);
 }
 
-/// The eight voxels around a point, whose coordinates are whole in the middle of voxels. Bit x + 2 y + 4 z is the voxel
-/// that is one further along these axes.
+/// The eight voxels around a point; the point's coordinates are integers at voxel centres. Bit x + 2 y + 4 z is the
+/// voxel offset by (x, y, z).
 struct VoxelsAround {
   IVec3 low{0};
   std::array<float, 8> nearness{};

@@ -96,7 +96,7 @@ bool LightBricks::is_at_surface(const OfGrid& of, IVec3 brick) {
   return is_near;
 }
 
-// Those whose light, or what stands in it, may be other than before.
+// Returns the bricks whose light or voxels may have changed.
 std::vector<IVec3> LightBricks::bricks_to_find(OfGrid& of, const GridLight& light) {
   std::vector<IVec3> bricks;
   const auto add = [&](const IBox& box) { for_bricks(box, [&](IVec3 brick) { bricks.push_back(brick); }); };

@@ -18,12 +18,12 @@ namespace quoin {
 
 class LightRows;
 
-/// Light around the surfaces of a scene's grids as shaders read it: a table of bricks of 8^3 voxels, those with a voxel
-/// of any kind and those beside them, which follows edits.
+/// The light around the surfaces of a scene's grids, as a shader-readable table of 8^3 bricks. It contains bricks with
+/// voxels and their neighbours, and follows edits.
 class LightBricks {
  public:
   static constexpr int kEdge = 8;
-  /// 512 words of light, two a number, the lower x in the lower half; then a bit a voxel: whether light gets there.
+  /// 512 words of light, two per number, the lower x in the lower half; then one bit per voxel, set if light passes.
   static constexpr std::size_t kNumbers = 256 + 16;
   static constexpr std::uint32_t kIsUniform = 0x8000'0000U;
   static constexpr std::uint32_t kAllOpaque = 0xFFFF'FFFFU;
@@ -37,22 +37,22 @@ class LightBricks {
                                       ///< passes; or kAllOpaque, as bricks that are not there
     std::uint32_t pad[2]{};
   };
-  /// What is other than when it was last asked.
+  /// The changes since the last call.
   struct Changed {
     bool all = true;
     std::vector<std::uint32_t> slots{};
-    std::vector<std::uint32_t> numbers{};  ///< where those of a brick begin
+    std::vector<std::uint32_t> numbers{};  ///< index of each brick's first number
   };
 
-  /// Takes over what changed; `light` is up to date.
-  /// Cost: of bricks in which light changed, or beside which voxels came or went, some microseconds each; where types
-  ///       or grids came, changed or went, of all of them.
+  /// Takes over the changes of the scene. Requires: `light` is up to date.
+  /// Cost: some microseconds per brick with changed light, or next to added or removed voxels; all bricks if types or
+  /// grids were added, changed or removed.
   void update(const Scene& scene, const SceneLight& light, Threads threads);
 
   [[nodiscard]] std::span<const Brick> bricks() const { return bricks_; }  ///< a power of two
   [[nodiscard]] std::span<const std::uint32_t> numbers() const { return numbers_; }
   [[nodiscard]] static std::uint32_t slot_of(IVec3 brick, std::int32_t grid);
-  /// What a brick's `grid` is. Requires: the scene of the last update has it.
+  /// Returns the index stored in a brick's `grid`. Requires: the scene of the last update contains the grid.
   [[nodiscard]] std::int32_t index_of(GridHandle grid) const;
   [[nodiscard]] Changed take_changes() { return std::exchange(changed_, {false, {}, {}}); }
 

@@ -24,7 +24,7 @@ Status refused(const MeshPart& part, const char* why) {
   return make_error(ErrorCode::InvalidArgument, "part \"" + part.name + "\": " + why);
 }
 
-// Of a mesh's vertices.
+// Computes the light of a mesh's vertices.
 class VertexLights {
  public:
   VertexLights(const GridLight& of, const VoxelRegistry& types, const LightOptions& options)
@@ -75,7 +75,7 @@ class VertexLights {
   float exposure_;
 };
 
-// What is kept with a part from then on.
+// Data that a part keeps alive.
 struct LitPart {
   std::shared_ptr<const void> owner;
   std::vector<std::vector<LinearRgba16>> lights;  // of each surface

@@ -28,7 +28,7 @@ class LitMeshes : public ::testing::Test {
     light_.update(scene_.grids()[handle_].grid, scene_.types);
   }
   [[nodiscard]] const Grid& grid() const { return scene_.grids()[handle_].grid; }
-  // Of a vertex, by what the picture's colours are made of.
+  // Returns the expected light of a vertex, by the same functions that colour images.
   [[nodiscard]] Vec3 wanted(const MeanLevels& levels, Vec3 normal, float emission) const {
     const Vec3 light = light_colour(levels, normal, light_look(options_)) + emission;
     return glm::min(light * static_cast<float>(options_.exposure), Vec3(1.0F)) * 65'535.0F;
@@ -44,7 +44,7 @@ class LitMeshes : public ::testing::Test {
   LightOptions options_;
 };
 
-// At every corner of every face, also within what is merged.
+// Compares every corner of every face, including those inside merged quads.
 TEST_F(LitMeshes, MergedFacesShowTheLightOfSingleOnes) {
   put(LightWorld(3));
   options_.exposure = 0.8;

@@ -12,8 +12,8 @@
 
 namespace quoin {
 
-/// Light of voxels, and which it passes, a row of 64 along x at a time; each row has its place among those that are
-/// remembered. Lifetime: what it reads must outlive it, and stay as it is.
+/// Reads the light of voxels and their light-passing masks in rows of 64 along x. Each row has one slot in the cache.
+/// Lifetime: `light`, `grid` and `types` must outlive it unchanged.
 class LightRows {
  public:
   LightRows(const PropagatedLight& light, const Grid& grid, const VoxelRegistry& types)

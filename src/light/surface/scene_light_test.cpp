@@ -67,7 +67,7 @@ TEST(SceneLight, FollowsVoxelsAndFieldsAsIfMadeAnew) {
   }
 }
 
-// Bricks say of every voxel near one that is held what the light itself says.
+// Bricks contain the same light as the grid, for every voxel near a surface.
 TEST(LightBricks, HoldTheLightAroundSurfaces) {
   GridHandle handle;
   Scene scene = scene_of(LightWorld(12), handle);

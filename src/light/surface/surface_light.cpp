@@ -13,7 +13,7 @@ namespace quoin {
 
 struct SurfaceLight::Rows {
   LightRows voxels;
-  // Of one quad: what lies in front of it and around, and corners.
+  // Scratch memory for one quad: the light in front of and around it, and its corners.
   std::vector<FrontLight> fronts;
   std::vector<std::uint32_t> corners;
   QuadCutter cutter;
@@ -31,14 +31,14 @@ FaceLight SurfaceLight::face(IVec3 voxel, Direction direction) {
 
 namespace {
 
-// Twelfths with room between them, so that sums and differences of all four are one operation each. Differences borrow
-// from what lies above them, the same wherever they are the same.
+// Spreads the four twelfths with gaps between them, so that sums and differences of all four take one operation. A
+// difference borrows from the bits above it; equal values borrow equally.
 constexpr std::uint64_t spread(std::uint32_t twelfths) {
   const std::uint64_t all = twelfths;
   return (all & 0xFFU) | (all & 0xFF00U) << 8 | (all & 0xFF'0000U) << 16 | (all & 0xFF00'0000U) << 24;
 }
 
-// How light changes over a face, where it is linear.
+// The gradient of light over a face, if it is linear.
 struct Slope {
   std::uint64_t along_u = 0;
   std::uint64_t along_v = 0;
@@ -69,7 +69,7 @@ class QuadCorners {
   const std::vector<std::uint32_t>& corners_;
 };
 
-// What one slope goes over.
+// A rectangle with a constant gradient.
 struct SlopePiece {
   const QuadCorners& corners;
   Slope slope;
@@ -87,8 +87,9 @@ struct SlopePiece {
   }
 };
 
-// Corner (u, v) of a quad of so many faces, from what lies in front of it and one voxel around. Its own voxel is one in
-// front of the quad: two of a corner's that are both are beside each other, so that either says the same.
+// Returns the light of corner (u, v) of a quad from the voxels in front of it and one voxel around. Its own voxel is in
+// front of the quad. If two voxels at a corner are in front of the quad, they are neighbours, and each gives the same
+// result.
 std::uint32_t corner_of_quad(const std::vector<FrontLight>& fronts, int width, int height, int u, int v) {
   const int own_u = std::min(u, width - 1) + 1;
   const int own_v = std::min(v, height - 1) + 1;

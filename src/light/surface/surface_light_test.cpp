@@ -92,7 +92,7 @@ TEST(SurfaceLight, CornersAreMeansOfWhatCanBeWalkedTo) {
   }
 }
 
-// What a quad of so many faces shows at one of its lattice points, as a linear function of its corners.
+// Returns the light that a quad of several faces shows at a lattice point: a linear function of its corners.
 std::array<double, 4> shown_by_quad(const FaceLight& corners, int width, int height, int u, int v) {
   std::array<double, 4> shown{};
   for (std::size_t c = 0; c < 4; ++c) {

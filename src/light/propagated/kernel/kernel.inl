@@ -44,7 +44,7 @@ inline bool any(Words words) {
 #endif
 }
 
-// A block's planes: what has this very level joins them, or is all that there is.
+// Adds the voxels of this level to a block's bit planes. Overwrites the planes of a block that is not touched yet.
 inline void add_to_planes(const LevelPass& step, std::size_t at, bool is_touched) {
   for (std::size_t plane = 0; plane < kPlanes; ++plane) {
     const bool has_bit = (step.level >> plane & 1U) != 0;
@@ -61,8 +61,8 @@ inline void clear_block(std::uint64_t* to) {
   for (std::size_t i = 0; i < kBlockRows; i += kWidth) store(Words{}, to + i);
 }
 
-// Puts what light reaches in a block into `next`. Returns whether that is anything. Words beside the region are read:
-// they are dark, or are of the rim of a row elsewhere, from which light passes nowhere.
+// Writes the voxels that light reaches in a block to `next`. Returns true if there are any. Reads words next to the
+// region: these are dark, or belong to the rim of another row, through which no light passes.
 template <bool kIsWide>
 inline bool reach_in_block(const LevelPass& step, std::size_t at, bool is_touched) {
   const std::uint64_t* dark = (is_touched ? step.rest : step.pass) + at;
@@ -80,7 +80,7 @@ inline bool reach_in_block(const LevelPass& step, std::size_t at, bool is_touche
   return any(all);
 }
 
-// Takes over what was reached in a block. Returns whether something is left in the dark.
+// Removes the reached voxels of a block from the dark ones. Returns true if any dark voxels remain.
 inline bool light_block(const LevelPass& step, std::size_t at, bool is_touched, bool is_wanted) {
   const std::uint64_t* dark = (is_touched ? step.rest : step.pass) + at;
   Words all{};
@@ -145,7 +145,7 @@ inline Words lanes_up(Words words) {
   return lanes_from<kWidth - 1>(Words{}, words, std::make_index_sequence<kWidth>());
 }
 
-// What is lit falls to lower lanes while it can pass, and so does what comes from above.
+// Spreads light to lower lanes where it can pass, including the light that enters from above.
 inline Words fall(Words lit, Words pass, std::uint64_t from_above) {
   const Words none{};
   lit |= pass & lanes_down<1>(lit, none);

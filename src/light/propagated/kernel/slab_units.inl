@@ -69,7 +69,7 @@ inline Units select(unsigned which, Units a, Units b) {
 constexpr std::size_t kRows = 4;
 using Units = __m256i;
 
-// Where units go when some of eight are put together, and where they come from when they are put back.
+// Permutations that compact a subset of eight units, and their inverses.
 struct Orders {
   std::array<std::array<std::uint8_t, 8>, 256> together{};
   std::array<std::array<std::uint8_t, 8>, 256> apart{};
@@ -91,7 +91,7 @@ constexpr Orders kOrders = make_orders();
 inline Units order(const std::array<std::uint8_t, 8>& of) {
   return _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(of.data())));
 }
-// Lanes of which the bit is set.
+// Returns a mask of the lanes whose bit is set.
 inline Units lanes(unsigned which) {
   const Units own = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
   return _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(static_cast<int>(which)), own), own);
@@ -181,7 +181,7 @@ inline Units select(unsigned which, Units a, Units b) {
 
 constexpr unsigned kAllUnits = (1U << (2 * kRows)) - 1;
 
-// What is not known yet takes what is so many rows before.
+// Fills unknown rows with the row kBy above them.
 template <int kBy>
 inline void fall(Units& rows, unsigned& known) {
   rows = select(known, rows, moved<kBy>(rows, none()));
