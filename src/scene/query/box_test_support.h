@@ -12,7 +12,7 @@
 
 namespace quoin {
 
-// Whether a single ray meets a box, by slabs.
+// Returns true if a single ray hits a box (slab test).
 inline bool meets(const Ray& ray, double max_t, const DBox& box) {
   if (box.empty()) return false;
   double low = 0.0;

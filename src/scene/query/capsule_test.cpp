@@ -43,7 +43,7 @@ double least_of(double low, double high, const Function& function) {
   return 0.5 * (low + high);
 }
 
-// Of a capsule's line and a voxel, in the grid.
+// Returns the distance between a capsule's line and a voxel, in the grid's space.
 double line_distance(DVec3 centre, DVec3 half_axis, IVec3 voxel) {
   const auto distance = [&](double t) {
     const DVec3 point = centre + t * half_axis;
@@ -66,7 +66,7 @@ InGrid in_grid(const Instance& instance, const Capsule& capsule, DVec3 displacem
           capsule.radius / instance.voxel_size};
 }
 
-// Whether its way leads near enough to a voxel for a search.
+// Returns true if the capsule's path comes near enough to the voxel to need a search.
 bool is_near(const InGrid& capsule, IVec3 voxel) {
   const DVec3 reach = glm::abs(capsule.half_axis) + capsule.radius;
   const DVec3 end = capsule.centre + capsule.displacement;
@@ -136,7 +136,7 @@ TEST(Capsule, SweepsMeetVoxelsWhenTheirDistanceIsTheRadius) {
       const auto hit = sweep_capsule(tracer, capsule, displacement);
       EXPECT_EQ(!overlaps(tracer, capsule).empty(), wanted == 0.0);
       if (hit && !wanted) {
-        // Grazing: nothing but rounding tells.
+        // A grazing contact: rounding decides.
         EXPECT_TRUE(overlaps(tracer, moved({capsule.radius * (1 + 1e-7), capsule.centre, capsule.half_axis},
                                            hit->fraction * displacement))
                         .size() == 1);
@@ -206,7 +206,7 @@ TEST(Capsule, FiltersAreThoseOfBoxes) {
   EXPECT_FALSE(sweep_capsule(tracer, ball, {0, -10, 0}, without));
 }
 
-// Fields of distances: what is met, and where, is known.
+// Distance fields: the contact is known by analysis.
 TEST(Capsule, MeetsFieldsWhereTheyAre) {
   Random random(4);
   for (int i = 0; i < 60; ++i) {

@@ -29,18 +29,18 @@ struct FieldPiece {
   DVec3 middle{0.5};
   DVec3 half{0.5};  ///< size; positive
   CellCorners corners{};
-  // Of `measure`:
+  // Set by `measure`:
   DVec3 slope{0.0};
   DVec3 rise{0.0};  ///< slope * half
   double square_of_slope = 0.0;
   double level = 0.0;
   double doubt = 0.0;
-  DVec3 twist{0.0};  ///< how much of the doubt each axis has a share in
-  // Of what is searched for:
-  double enter = 0.0;     ///< no solid of it is met before
-  double slack = 0.0;     ///< after which time it is met surely, but for the doubt
-  int axis = -1;          ///< of the shape's directions, the one that parts it until then; -1 none does
-  bool is_exact = false;  ///< of all directions, not of the first few alone
+  DVec3 twist{0.0};  ///< each axis's contribution to the doubt
+  // Set by the search:
+  double enter = 0.0;     ///< no contact with its solid before this time
+  double slack = 0.0;     ///< contact is certain after this additional time, except for the doubt
+  int axis = -1;          ///< the shape's direction that separates it until then; -1: none
+  bool is_exact = false;  ///< all directions were tested, not only the first few
 
   [[nodiscard]] bool has_solid() const {
     double least = corners[0];
@@ -51,7 +51,7 @@ struct FieldPiece {
   [[nodiscard]] double density(const DVec3& point) const {
     return trilinear(corners, (point - middle) / (2.0 * half) + 0.5);
   }
-  /// In densities a voxel.
+  /// In densities per voxel.
   [[nodiscard]] DVec3 gradient(const DVec3& point) const {
     return trilinear_gradient(corners, (point - middle) / (2.0 * half) + 0.5) / (2.0 * half);
   }
@@ -95,8 +95,9 @@ struct FieldPiece {
     half = 0.5 * (high - low);
   }
 
-  /// How far its solid reaches from the middle along a direction and against it; at least, since only the plane and
-  /// the piece's own sides are known. `along_half` is direction * half, `along_slope` direction * slope.
+  /// Bounds on the distance from the middle to its solid, along a direction and against it. They are conservative,
+  /// since they use only the plane and the sides of the piece. `along_half` is direction * half, `along_slope`
+  /// direction * slope.
   struct Extent {
     double ahead = 0.0;
     double behind = 0.0;
@@ -122,8 +123,8 @@ struct FieldPiece {
 
  private:
   static double sum(const DVec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
-  // A direction less any multiple of the slope says as much of what lies below the plane, which ends the solid along
-  // the slope; the best multiple leaves one of the axes out.
+  // Subtracting a multiple of the slope from a direction gives the same bound for the solid below the plane, which ends
+  // the solid along the slope. The best multiple makes one component 0.
   [[nodiscard]] double below_plane(const DVec3& along_half, double multiple) const {
     return sum(along_half - multiple * rise) - std::abs(multiple) * level;
   }

@@ -1,4 +1,4 @@
-// Overlaps and sweeps against fields: beside points of the solid that are looked at one by one, and answers known by
+// Overlaps and sweeps against fields, compared with a search over sample points of the solid and with results known by
 // analysis.
 
 #include <algorithm>
@@ -189,7 +189,7 @@ TEST(FieldQuery, PlanesInAnyOrientationAreMetWhereTheyAre) {
       ASSERT_EQ(hit.has_value(), expected <= 1.0) << i;
       if (!hit) continue;
       EXPECT_NEAR(hit->fraction, expected, 1e-9) << i;
-      // Of a box that lies flush all that parts them is the same.
+      // For a flush box all directions that separate the two are equal.
       EXPECT_LT(glm::length(hit->normal - up), 1e-6) << i;
     }
   }
@@ -341,7 +341,7 @@ TEST(FieldQuery, OnlyMaterialsThatCollideStop) {
   EXPECT_NEAR(9.0 - 20.0 * hit->fraction - 0.4, 1.0, 1.0 + 1e-6);
   EXPECT_TRUE(overlaps(tracer, moved(box, {0, -6.5, 0})).empty());
   EXPECT_EQ(overlaps(tracer, moved(box, {0, -9.5, 0})).size(), 1U);
-  // Solid without a material, or with one that nobody registered, is solid.
+  // Solid without a material, or with an unregistered one, is still solid.
   for (const VoxelType type : {kAir, VoxelType{99}}) {
     DensityGrid bare;
     bare.edit({IVec3{-4}, IVec3{5}}, [&](IVec3 p, DensitySample) {
@@ -404,7 +404,7 @@ TEST(FieldQuery, WhatIsNoNumberMeetsNothing) {
   EXPECT_FALSE(sweep_box(SceneTracer(empty), {}, {5, 0, 0}).has_value());
 }
 
-// Whatever densities mean: only their signs and the trilinear field between them count.
+// Only the signs of densities and the trilinear field between them matter.
 TEST(FieldQuery, DensitiesNeedNotBeDistances) {
   for (const float scale : {1e-4F, 1.0F, 1000.0F}) {
     DensityGrid field(60'000.0F);

@@ -35,7 +35,7 @@ inline OrientedBox moved(OrientedBox box, DVec3 by) {
   return box;
 }
 
-/// One instance of a grid, as `instance` says but for the grid.
+/// Creates a scene with one instance of a grid; replaces the grid of `instance`.
 inline Scene scene_of(SceneGrid grid, Instance instance) {
   Scene scene;
   for (const bool collides : {true, false, true}) {
@@ -88,7 +88,7 @@ inline DensityGrid rolling_ground(Random& random, int half_width, double steepne
   return field;
 }
 
-/// Where a field's ground is, seen from above.
+/// Returns the height of a field's ground at (x, z).
 inline double height_of(const DensityGrid& field, double x, double z) {
   double low = -12.0;
   double high = 12.0;

@@ -1,7 +1,7 @@
 #pragma once
 
-// Where a shape first meets the solid of a field: the pieces that it may meet soonest are looked at first, and halved
-// where their bounds do not tell.
+// Finds the first contact of a shape with the solid of a field. Processes pieces in the order of their earliest
+// possible contact, and halves a piece if its bounds do not decide.
 
 #include <algorithm>
 #include <optional>
@@ -16,15 +16,16 @@
 
 namespace quoin {
 
-/// The cells of a field that hold solid of the types that count.
+/// The cells of a field that contain solid of the types that a query meets.
 class FieldCells {
  public:
   FieldCells(const DensityTree& tree, const TypesMet& types) : tree_(tree), types_(types) {}
   [[nodiscard]] IBox bounds() const { return tree_.cells().bounds(); }
   [[nodiscard]] const DensityGrid& field() const { return tree_.field(); }
-  /// Whether a solid corner of the cell counts; the corners' densities.
+  /// Reads the densities of the cell's corners. Returns true if the query meets one of its solid corners.
   bool read(IVec3 cell, CellCorners& corners);
-  /// Of the nearest solid corner that counts; of several, the least of (z, y, x). `point` is relative to the cell.
+  /// Returns the material of the nearest solid corner that the query meets; among equally near ones, the least in (z,
+  /// y, x). `point` is relative to the cell.
   [[nodiscard]] VoxelType material(IVec3 cell, const DVec3& point);
 
  private:
@@ -44,7 +45,7 @@ class FieldSearch {
  public:
   explicit FieldSearch(const Shape& shape) : shape_(shape) {}
 
-  /// Of a cell the part that the shape passes between two fractions.
+  /// Adds the part of a cell that the shape passes between two fractions.
   void add(IVec3 cell, const CellCorners& corners, double from, double to) {
     FieldPiece piece;
     piece.cell = cell;
@@ -52,7 +53,7 @@ class FieldSearch {
     if (cut(piece, from, to, 1.0) != Cut::Nothing) keep(piece);
   }
 
-  /// The first contact of what was added, up to the fraction `until`.
+  /// Returns the first contact with the added cells, up to the fraction `until`.
   [[nodiscard]] std::optional<FieldContact> first(double until) {
     std::optional<FieldContact> known;  // no later than this
     for (int looked_at = 0; !pieces_.empty(); ++looked_at) {
@@ -69,10 +70,10 @@ class FieldSearch {
         if (point) return FieldContact{enter, is_inside, piece, *point};
       }
       const bool is_tiny = std::max({piece.half.x, piece.half.y, piece.half.z}) <= kSmallest;
-      // What is neither in it nor parted from it by then is as near as touching: met, if it is on the way.
+      // A tiny piece that is neither inside nor separated by then counts as touched if it is on the path.
       if (is_tiny && is_inside) continue;
       if (is_tiny || looked_at >= kMostPieces) {
-        piece.axis = -1;  // as good as any other
+        piece.axis = -1;  // arbitrary
         return FieldContact{enter, false, piece, piece.middle};
       }
       learn(piece, until, known);
@@ -84,16 +85,16 @@ class FieldSearch {
  private:
   // Pieces no larger than this are not halved.
   static constexpr double kSmallest = 1e-6;
-  // How far a piece's plane may be off, in voxels, for the box to be in its solid once it is deeper than touching.
+  // Maximum error of a piece's plane, in voxels, such that a box deeper than kFieldTouch is surely in its solid.
   static constexpr double kFlat = 2.0 * kFieldTouch;
-  // What many pieces cannot tell is met.
+  // After this many pieces the search assumes a contact.
   static constexpr int kMostPieces = 4'000;
 
   static bool later(const FieldPiece& a, const FieldPiece& b) { return a.enter > b.enter; }
 
   enum class Cut { Nothing, Little, Much };
 
-  // Leaves what the shape passes of a piece, unless that is nearly all of it.
+  // Cuts a piece to the part that the shape passes, unless that is nearly all of it.
   Cut cut(FieldPiece& piece, double from, double to, double share) const {
     DBox passed = shape_.bounds(piece.cell, from, to);
     passed.min = glm::max(passed.min, piece.middle - piece.half);
@@ -112,7 +113,7 @@ class FieldSearch {
     return Cut::Much;
   }
 
-  // The box of what lies below its plane.
+  // Cuts a piece to the bounding box of the part below its plane.
   static Cut cut_above_plane(FieldPiece& piece) {
     DVec3 low(-1.0);
     DVec3 high(1.0);
@@ -155,7 +156,7 @@ class FieldSearch {
     const Cut below = cut_above_plane(piece);
     if (below == Cut::Nothing) return;
     if (much == Cut::Much || below == Cut::Much) return keep(piece);
-    // Where the doubt comes from, if that is what is left to be settled; then all directions; then the longest side.
+    // If the doubt is large, splits along the axis that causes it. Then tests all directions, then splits the longest side.
     const int longest = greatest(piece.half);
     if (piece.doubt > 0.01 * std::sqrt(piece.square_of_slope) * piece.half[longest]) {
       const int axis = greatest(piece.twist);
@@ -182,7 +183,7 @@ class FieldSearch {
   std::vector<FieldPiece> pieces_;  // a heap, the soonest first
 };
 
-/// The first cell (z, then y, then x) whose solid of types that count a shape at rest meets, deeper than kFieldTouch.
+/// a heap, earliest contact first
 template <class Shape>
 std::optional<FieldContact> first_overlap_in_field(FieldCells& cells, const Shape& shape) {
   const IBox box = voxels_within(shape.bounds(IVec3{0}, 0.0, 0.0), cells.bounds());

@@ -4,7 +4,7 @@ namespace quoin {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Of the directions that may part a box from a piece.
+// Indices of the directions that can separate a box from a piece.
 constexpr int kFirstEdge = 3;
 constexpr int kSlope = 6;
 constexpr int kFirstOfGrid = 7;
@@ -68,7 +68,7 @@ struct BoxInField::Course {
     if (left <= touch || gap + rate * until >= -touch) return false;
     if (rate == 0.0) return true;
     leave = std::min(leave, left / -rate);
-    // Of directions that part them equally long, the first.
+    // Among directions that separate them for the same time, the first is chosen.
     const double begin = gap / -rate;
     if (gap > -touch && begin > enter + (which < axis ? -at_once : at_once)) {
       enter = std::max(begin, enter);
@@ -108,7 +108,7 @@ bool BoxInField::follow(FieldPiece& piece, bool is_exact) const {
   piece.axis = course.axis;
   piece.slack = course.slack;
   piece.is_exact = is_exact;
-  // What is inside from the start comes before what is met at once.
+  // Overlaps at the start come before contacts at time 0.
   piece.enter = course.axis < 0 ? -1.0 : std::max(course.enter, 0.0);
   return true;
 }
@@ -141,7 +141,8 @@ DVec3 BoxInField::direction(const FieldPiece& piece, int which) const {
   return across(edge, box_.axes[pair % 3]);
 }
 
-// What parts the two until they meet, towards the box; of what is inside from the start the plane's.
+// Returns the direction that separates the two until contact, towards the box; for an overlap at the start, the plane's
+// normal.
 DVec3 BoxInField::parting(const FieldPiece& piece) const {
   const DVec3 along = direction(piece, piece.axis < 0 ? kSlope : piece.axis);
   return piece.axis >= 0 && glm::dot(along, box_.displacement) > 0.0 ? -along : along;
@@ -196,8 +197,8 @@ std::array<DVec3, 8> BoxInField::gradients_about(const FieldContact& contact, co
   return gradients;
 }
 
-// Where two cells meet in a ridge, what parts an edge of the box from it lies between the gradients of both; where the
-// field goes on beyond a side of the piece, there is no ridge, and its gradient does.
+// If two cells meet in a ridge, the normal between a box edge and the ridge lies between the gradients of both cells.
+// If the field continues past a side of the piece there is no ridge, and the gradient is the normal.
 DVec3 BoxInField::across_crease(const FieldContact& contact, const DensityGrid& field) const {
   const FieldPiece& piece = contact.piece;
   const DVec3 normal = unit_or_zero(parting(piece));
@@ -251,7 +252,7 @@ std::optional<DVec3> BoxInField::by_support(const FieldPiece& piece, const DVec3
                                                : std::clamp(at[i], -half_size_[i], half_size_[i]);
   }
   if (piece.axis >= kFirstCrease && piece.axis < kFirstSide) {
-    // Where the edge of the box crosses the side of the piece.
+    // The intersection of the box's edge with the side of the piece.
     const int side = (piece.axis - kFirstCrease) / 3;
     const int edge = (piece.axis - kFirstCrease) % 3;
     at[edge] = 0.0;
@@ -264,7 +265,7 @@ std::optional<DVec3> BoxInField::by_support(const FieldPiece& piece, const DVec3
 
 std::optional<DVec3> BoxInField::point_in_solid(const FieldPiece& piece, double until) const {
   const DVec3 centre = box_.centre - DVec3(piece.cell) + until * box_.displacement;
-  // Of what tells where the box comes upon the surface, only there.
+  // If a direction gives the point of contact on the surface, only that point is tested.
   if (piece.axis >= 0) {
     const auto point = by_support(piece, centre);
     if (point || !piece.is_exact) return point;
@@ -346,7 +347,8 @@ DBox CapsuleInField::bounds(IVec3 cell, double from, double to) const {
   return {within.min - DVec3(cell), within.max - DVec3(cell)};
 }
 
-// What is round touches in one direction: from where it is met to its line, which between cells is that of their ridge.
+// Returns the normal of a round contact: from the point of contact to the capsule's line. Between cells it is the
+// normal of their ridge.
 DVec3 CapsuleInField::normal(const FieldContact& contact, const DensityGrid& field) const {
   const DVec3 centre = capsule_.centre - DVec3(contact.piece.cell) + contact.fraction * capsule_.displacement;
   DVec3 normal = parting(contact.piece, centre);
@@ -365,7 +367,7 @@ void BoxInField::shrink(DBox& part, IVec3 cell, double from, double to) const {
     const double b = middle + to * glm::dot(axis, box_.displacement);
     const double low = std::min(a, b) - half_size_[i] - kFieldTouch;
     const double high = std::max(a, b) + half_size_[i] + kFieldTouch;
-    // Along each axis what the slab leaves wherever on the other two.
+    // For each axis, the range that the slab leaves for any position on the other two axes.
     const DVec3 at_min = axis * part.min;
     const DVec3 at_max = axis * part.max;
     const DVec3 least = glm::min(at_min, at_max);

@@ -1,7 +1,7 @@
 #pragma once
 
-// What a search in a field asks of a shape: when it can first meet the solid of a piece at all, a point in which it
-// does, and which part of the piece it passes.
+// The operations that a search in a field needs from a shape: the earliest possible contact with a piece's solid, a
+// point of contact, and the part of the piece that the shape passes.
 
 #include <algorithm>
 #include <array>
@@ -20,10 +20,10 @@
 
 namespace quoin {
 
-/// How deep a shape may be in a field's solid and count as touching it, in voxels.
+/// Maximum penetration depth that counts as touching, in voxels.
 inline constexpr double kFieldTouch = 1e-6;
 
-/// Where a shape meets a field.
+/// A contact of a shape with a field.
 struct FieldContact {
   double fraction = std::numeric_limits<double>::infinity();
   bool starts_inside = false;
@@ -31,15 +31,15 @@ struct FieldContact {
   DVec3 point{0.0};  ///< relative to the piece's cell
 };
 
-/// A box on its way, or at rest.
+/// A box in motion or at rest.
 ///
-/// The directions that can part it from the solid of a piece: its own three; the plane's, less what of it runs along
-/// each of the box's edges; the plane's; the grid's three. These ten mostly do: a face of the box comes to lie on the
-/// surface, or an edge, or a corner. With the products of the box's edges and those of the solid, where the plane or
-/// two sides of the piece meet, nothing else can: what is left is the plane's doubt.
+/// Separating directions, in the order of tests: the box's three axes; the plane's normal, projected along each of the
+/// box's edges; the plane's normal; the grid's three axes. These ten usually suffice, because a face, an edge or a
+/// corner of the box touches the surface. The cross products of box edges with edges of the solid (where the plane or
+/// two sides of the piece meet) complete the set. The remaining error is the plane's doubt.
 class BoxInField {
  public:
-  /// `until`: the fraction of the way at which it ends.
+  /// `until`: the last fraction of the movement.
   BoxInField(const MovingBox& box, double until)
       : box_(box),
         until_(until),
@@ -48,19 +48,20 @@ class BoxInField {
         reach_(glm::max(reach_of_axes(box.half_axes), DVec3(2.0 * kFieldTouch))),
         is_upright_(is_along_grid(box.axes)) {}
 
-  /// Whether the piece's solid can be met; then `enter`, `slack` and `axis` are set.
+  /// Returns true if the box may touch the piece's solid; then sets `enter`, `slack` and `axis`.
   [[nodiscard]] bool may_meet(FieldPiece& piece) const;
-  /// The same by all directions.
+  /// As `may_meet`, but tests all directions.
   [[nodiscard]] bool may_meet_exactly(FieldPiece& piece) const;
-  /// Whether it is surely met by the time `until`.
+  /// Returns a point of the solid that the box has surely reached by the time `until`, if any.
   [[nodiscard]] std::optional<DVec3> point_in_solid(const FieldPiece& piece, double until) const;
-  /// When to ask that for a piece that it does meet: once it is in it deeper than the plane's doubt.
+  /// Returns the time for a call of `point_in_solid` for a piece on the path: the box is then deeper than the plane's
+  /// doubt.
   [[nodiscard]] double time_beyond_doubt(const FieldPiece& piece) const;
-  /// What it passes between two fractions, relative to a cell.
+  /// Returns the bounds of the box between two fractions, relative to a cell.
   [[nodiscard]] DBox bounds(IVec3 cell, double from, double to) const;
-  /// Leaves of a box relative to a cell about what it passes between two fractions.
+  /// Shrinks a box relative to a cell to the approximate region that the shape passes between two fractions.
   void shrink(DBox& part, IVec3 cell, double from, double to) const;
-  /// From the solid towards the box, of unit length, in the grid; 0 where nothing is known.
+  /// Returns the unit normal from the solid towards the box, in the grid's space; 0 if unknown.
   [[nodiscard]] DVec3 normal(const FieldContact& contact, const DensityGrid& field) const;
 
  private:
@@ -88,11 +89,11 @@ class BoxInField {
   bool is_upright_;  // its axes are the grid's
 };
 
-/// A capsule on its way, or at rest. What parts it from a piece's solid is the direction between the points of both
-/// that are nearest to each other, found by turns; any direction's word is good, until they meet along it.
+/// A capsule in motion or at rest. The separating direction joins the nearest points of the capsule and the piece's
+/// solid, found by iteration. Any direction gives a valid bound until the two touch along it.
 class CapsuleInField {
  public:
-  /// `until`: the fraction of the way at which it ends.
+  /// `until`: the last fraction of the movement.
   CapsuleInField(const MovingCapsule& capsule, double until) : capsule_(capsule), until_(until) {}
 
   [[nodiscard]] bool may_meet(FieldPiece& piece) const;
@@ -110,7 +111,7 @@ class CapsuleInField {
   double until_;
 };
 
-/// The shape in a field of one that moves.
+/// Maps a moving shape to its field shape.
 template <class Moving>
 struct InField;
 template <>

@@ -101,7 +101,7 @@ DVec3 nearest_within(const MovingCapsule& capsule, const DVec3& point) {
   return length > capsule.radius ? on_line + away * (capsule.radius / length) : point;
 }
 
-// Where in a shape at rest the field is least, of the corners of what it covers of each cell; exact for a box along the
+// The point of least density in a shape at rest, among the corners of its intersection with each cell. Exact for a box along the
 // grid's axes.
 struct Deepest {
   DVec3 point{0.0};
@@ -135,7 +135,7 @@ Deepest deepest_in(const DensityTree& tree, const TypesMet& types, const Moving&
   return deepest;
 }
 
-// How far a shape has to go along a direction until it is out, at most `most`; infinity where it is not out by then.
+// Returns the distance along a direction after which the shape is free; infinity if more than `most`.
 template <class Moving>
 double depth_along(const DensityTree& tree, const TypesMet& types, const Moving& shape, DVec3 direction, double guess,
                    double most) {
@@ -145,13 +145,13 @@ double depth_along(const DensityTree& tree, const TypesMet& types, const Moving&
     back.displacement = -direction * std::min(length, most);
     FieldSweep<Moving> sweep(tree, types, back, 1.0);
     follow_way(back, 1.0, sweep);
-    // Free where it starts: the last that it leaves is the first that it meets on the way back.
+    // Free at the start of the way back: the first contact on the way back is the last solid that the shape leaves.
     if (!sweep.best().starts_inside) return std::min(length, most) * (1.0 - std::min(sweep.best().fraction, 1.0));
     if (length >= most) return kInfinity;
   }
 }
 
-// Of the field about a point rather than of its cell alone, and 0 where it has none.
+// Returns the unit gradient of the field around a point, from samples beyond its cell; 0 if the field is constant there.
 DVec3 direction_out(const DensityGrid& field, DVec3 point) {
   DVec3 gradient(0.0);
   for (int axis = 0; axis < 3; ++axis) {

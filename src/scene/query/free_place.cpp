@@ -1,11 +1,11 @@
-// The nearest place at which a box meets nothing.
+// The nearest position of a box without overlaps.
 //
 //   voxels along the box's axes:                turned grids, and fields:
-//   there the box touches something on each     cubes of displacements, the nearest first; all of one is blocked
-//   axis along which it was moved               where the box, less the cube, meets something
+//   there the box touches something on each     cubes of displacements, the nearest first; a cube is blocked as a
+//   axis along which it was moved               whole if the box, shrunk by the cube, overlaps something
 //     +--+--+                                     +-------+
-//     |##|##|  <- box: its place is one of        |  +-+  |  box     +-+ what all places of the cube
-//     +--+--+     few for each axis, tried        |  +-+  |          +-+ have in common
+//     |##|##|  <- box: candidates are a few       |  +-+  |  box     +-+ the part of the box that is the same
+//     +--+--+     positions for each axis,        |  +-+  |          +-+ for all displacements of the cube
 //                 from the nearest on             +-------+
 
 #include <algorithm>
@@ -37,7 +37,8 @@ glm::dmat3 axes_of(const Capsule& /*capsule*/) {
   return glm::dmat3(1.0);
 }
 
-// Some of what a shape has in common with itself moved by anything up to `half` along its axes, if there is any.
+// Returns a part of the shape that stays inside it under any displacement of up to `half` along its axes, if there is
+// one.
 std::optional<OrientedBox> common_of(OrientedBox box, double half) {
   box.half_size -= half;
   return is_box(box) ? std::optional(box) : std::nullopt;
@@ -71,7 +72,8 @@ class FreePlace {
   }
   [[nodiscard]] bool is_free(DVec3 displacement) const { return overlaps(tracer_, at(displacement), filter_).empty(); }
 
-  // Whether all that may be in the way are voxels whose axes are the box's. Collects where it touches their faces.
+  // Returns true if all possible obstacles are voxels whose axes are parallel to the box's. Collects the positions
+  // where the box touches their faces.
   [[nodiscard]] bool has_own_axes() {
     const DVec3 reach = reach_of_axes(half_axes_of(shape_)) + max_distance_;
     bool are_own = true;
@@ -93,7 +95,7 @@ class FreePlace {
     const ToGrid to_grid(placed);
     const DVec3 centre = to_grid.point(shape_.centre);
     const IBox bounds = placed.voxels->bounds();
-    // What rounding may leave of an overlap.
+    // Tolerance for overlaps caused by rounding.
     const double room = 0x1p-50 * (glm::length(shape_.centre) + glm::length(placed.position) + max_distance_);
     for (int axis = 0; axis < 3; ++axis) {
       const DVec3 direction = to_grid.axes * axes_[axis] * placed.voxel_size;
@@ -168,7 +170,7 @@ class FreePlace {
     return common && !overlaps(tracer_, *common, filter_).empty();
   }
 
-  // From a free place back towards where it was, sliding along what it meets.
+  // Moves from a free position back towards the start, sliding along obstacles.
   [[nodiscard]] DVec3 nearer(DVec3 free) const {
     SlideOptions options;
     options.pushes_out = false;

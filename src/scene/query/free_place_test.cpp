@@ -1,4 +1,4 @@
-// Where a box that starts inside is moved to.
+// Tests where overlapping boxes move.
 
 #include <quoin/scene/sweep.h>
 
@@ -30,7 +30,7 @@ Grid heap(Random& random, int count) {
   return grid;
 }
 
-// The least length of displacements, among many, at which the box meets nothing.
+// Returns the least length among many random displacements that free the box.
 double least_of_samples(const SceneTracer& tracer, const OrientedBox& box, double below, Random& random) {
   double least = below;
   for (int i = 0; i < 3000; ++i) {
@@ -84,7 +84,7 @@ TEST(FreePlace, AmongTurnedBlocksAndFieldsItIsNearTheNearest) {
     const auto away = displacement_to_free_place(tracer, box, kReach);
     const double least = least_of_samples(tracer, box, kReach, random);
     if (!away) {
-      // What little room there may be is smaller than a 32nd.
+      // Any free space is narrower than 1/32.
       EXPECT_GT(least, 0.5 * kReach) << round;
       continue;
     }

@@ -34,7 +34,7 @@ inline MovingBox moving_in_grid(const PlacedGrid& placed, const OrientedBox& box
           box.half_size / placed.voxel_size, to_grid.axes * half_axes, to_grid.axes * displacement};
 }
 
-/// Of any finite vector: the square of a large one would be infinite.
+/// Returns the length of any finite vector without overflow in the squares.
 inline double length_of(DVec3 v) {
   const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
   if (largest == 0.0) return 0.0;
@@ -61,12 +61,12 @@ void visit_sides(const MovingBox& box, const Visit& visit) {
   }
 }
 
-/// How far a shape reaches from its centre along each axis.
+/// Returns the half-extents of a shape along each axis.
 inline DVec3 reach_of(const MovingBox& box) {
   return reach_of_axes(box.half_axes);
 }
 
-/// The fractions of the way at which a shape's bounds are within `tight`.
+/// Returns the range of fractions in which a shape's bounds overlap `tight`.
 template <class Moving>
 std::pair<double, double> times_within(const Moving& shape, DVec3 reach, const IBox& tight) {
   double first = 0.0;
@@ -109,10 +109,10 @@ void follow_way(const Moving& shape, double most, Contents& contents) {
   if (tight.empty()) return;
   const auto [first, last] = times_within(shape, reach, tight);
   if (first > last) return;
-  // Whole steps from the start, so that what is met does not depend on the grid's bounds.
+  // Whole steps from the start, so that the result does not depend on the grid's bounds.
   const double steps = std::max(1.0, std::ceil(length / step));
   double i = std::floor(first * steps);
-  // So far away steps are lost in rounding; what there is within the bounds is looked at in one.
+  // At this distance steps are lost in rounding; the whole range is checked at once.
   if (i + 1.0 == i) return check(first, std::min(last, most));
   for (; i / steps <= std::min(last, most); ++i) {
     check(i / steps, std::min((i + 1.0) / steps, 1.0));

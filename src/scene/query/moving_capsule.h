@@ -1,10 +1,10 @@
 #pragma once
 
-// A capsule on its way through the space of a grid, and how far it is from a voxel.
+// A moving capsule in the space of a grid, and its distance from a voxel.
 //
-// Source: the distance of a line and a box is the least of a convex function that is quadratic between the places where
-// the line crosses the planes of the box's faces. The distance of two convex bodies that move is convex in time, so
-// that Newton's steps from the start never go past the time at which it is first the radius.
+// Source: the distance between a line and a box is the minimum of a convex function that is quadratic between the
+// points where the line crosses the planes of the box's faces. The distance between two moving convex bodies is
+// convex in time. Newton's steps from the start therefore never pass the first time when the distance equals the radius.
 
 #include <algorithm>
 #include <array>
@@ -53,13 +53,13 @@ inline MovingCapsule moving_in_grid(const PlacedGrid& placed, const Capsule& cap
           to_grid.axes * displacement};
 }
 
-/// How far a line is from a voxel.
+/// The distance of a line from a voxel.
 struct LineGap {
   double distance = 0.0;
-  DVec3 away{0.0};  ///< from the voxel to the line, unit; 0 where they meet
+  DVec3 away{0.0};  ///< unit vector from the voxel to the line; 0 if they touch
 };
 
-/// Of the line from `middle` - `half_axis` to `middle` + `half_axis`; a voxel about the origin, half a voxel each way.
+/// For the line from `middle` - `half_axis` to `middle` + `half_axis`; the voxel is centred at the origin.
 inline LineGap gap_of_line(const DVec3& middle, const DVec3& half_axis) {
   const auto apart_at = [&](double t) {
     const DVec3 point = middle + t * half_axis;

@@ -1,4 +1,4 @@
-// What queries pass through: as if it were not there.
+// Queries ignore filtered voxels and instances.
 
 #include <algorithm>
 #include <array>
@@ -49,7 +49,7 @@ bool is_met(const VoxelRegistry& types, VoxelType type, QueryTypes which) {
   return which == QueryTypes::All || (which == QueryTypes::Opaque ? types.is_opaque(type) : types[type].collides);
 }
 
-// What is left of a scene once all is air that a filter passes through.
+// Returns the scene with all filtered voxels replaced by air.
 Scene seen_by(const Scene& scene, const QueryFilter& filter, QueryTypes which) {
   Scene left = scene.snapshot();
   for (const GridHandle handle : left.grids().handles()) {
@@ -283,7 +283,7 @@ TEST(SlideContact, FloorsThatMoveCarryWhatStandsOnThem) {
   }
   EXPECT_LT(glm::length(grid_from_world(scene.instances()[handle], grid, box.centre) - on_raft), 0.01);
   EXPECT_GT(box.centre.x, 5.0);
-  // What is no place carries nothing.
+  // An invalid placement moves nothing.
   Instance nowhere;
   nowhere.voxel_size = 0.0;
   EXPECT_EQ(carried_point(nowhere, instance, {1.0, 2.0, 3.0}), DVec3(1.0, 2.0, 3.0));

@@ -1,6 +1,6 @@
 #pragma once
 
-// What queries of a scene share: the way into a grid's space, and boxes against voxels.
+// Shared parts of scene queries: transforms into a grid's space, and boxes against voxels.
 
 #include <algorithm>
 #include <array>
@@ -21,7 +21,7 @@
 
 namespace quoin {
 
-// What queries may see of a tracer.
+// The parts of a tracer that queries may access.
 class SceneQuery {
  public:
   static const InstanceTree& instances(const SceneTracer& tracer) { return content_of(tracer.impl_).instances; }
@@ -57,7 +57,7 @@ inline IBox voxels_within(const DBox& bounds, const IBox& tight) {
   return box;
 }
 
-/// Whether a box is one: finite, and no less than a point.
+/// Returns true if the box is valid: finite, with half sizes of at least 0.
 inline bool is_box(const OrientedBox& box) {
   const DVec3 half = box.half_size;
   const DQuat& q = box.rotation;
@@ -72,18 +72,18 @@ inline glm::dmat3 half_axes_of(const OrientedBox& box) {
   return half_axes;
 }
 
-/// Which types a query meets; those that are not registered count as colliding and opaque.
+/// The set of types that a query meets. Unregistered types count as colliding and opaque.
 class TypesMet {
  public:
   TypesMet(const VoxelRegistry& types, QueryTypes which) : types_(&types), which_(which) {
-    // Where all do, there is nothing to ask.
+    // If all types match, skips the lookup.
     if (which == QueryTypes::Colliding && !types.has_passable()) which_ = QueryTypes::All;
     if (which == QueryTypes::Opaque && !types.has_transparent()) which_ = QueryTypes::All;
   }
   [[nodiscard]] bool are_all() const { return which_ == QueryTypes::All; }
   [[nodiscard]] bool are_opaque() const { return which_ == QueryTypes::Opaque; }
   [[nodiscard]] bool holds(VoxelType type) const { return type != kAir && holds_solid(type); }
-  /// Of a field's solid, which without a material is solid all the same.
+  /// For a field's solid. Solid without a material also counts.
   [[nodiscard]] bool holds_solid(VoxelType material) const {
     if (which_ == QueryTypes::All || material == kAir || material >= types_->size()) return true;
     return which_ == QueryTypes::Opaque ? types_->is_opaque(material) : (*types_)[material].collides;
@@ -94,7 +94,7 @@ class TypesMet {
   QueryTypes which_;
 };
 
-/// What a filter lets a query see.
+/// The part of a scene that a filter includes.
 class Seen {
  public:
   Seen(const SceneTracer& tracer, const QueryFilter& filter, QueryTypes by_default)
@@ -112,7 +112,7 @@ class Seen {
     const Instance* const instance = tracer_.scene().instances().find(placed.instance);
     return instance == nullptr || (instance->categories & filter_.categories) != 0;
   }
-  /// Calls `visit(placed)` for those near a box in the world, in their order.
+  /// Calls `visit(placed)` for each included instance near a box in the world, in order.
   template <class Visit>
   void visit_near(const DBox& box, const Visit& visit) const {
     std::vector<std::size_t> near;
@@ -168,12 +168,12 @@ inline SeparatingAxes separating_axes(const glm::dmat3& half_axes) {
   return axes;
 }
 
-/// How far a box reaches from its centre along each of the world's axes.
+/// Returns the half-extents of a box along each of the world's axes.
 inline DVec3 reach_of_axes(const glm::dmat3& half_axes) {
   return glm::abs(half_axes[0]) + glm::abs(half_axes[1]) + glm::abs(half_axes[2]);
 }
 
-/// How far apart the centres of a box and a voxel are along an axis when the two touch.
+/// Returns the distance of the centres of a box and a voxel along an axis when the two touch.
 inline double reach_along(DVec3 axis, const glm::dmat3& half_axes) {
   double reach = 0.5 * (std::abs(axis.x) + std::abs(axis.y) + std::abs(axis.z));
   for (int i = 0; i < 3; ++i) reach += std::abs(glm::dot(half_axes[i], axis));

@@ -22,7 +22,7 @@ namespace quoin {
 
 namespace {
 
-// What a ray meets in one grid; `normal` in the grid.
+// A ray hit in one grid; `normal` in the grid's space.
 struct GridHit {
   RayHit hit;
   bool in_field = false;
@@ -55,7 +55,7 @@ double leaves_at(const IBox& box, const Ray& ray) {
   return last;
 }
 
-// Where a ray comes into the solid of a field that counts, past what does not: the way of a point.
+// Returns the first hit of a ray with field solid of matching types, past other solid. Sweeps a point.
 std::optional<DensityHit> first_beyond(const DensityTree& field, const TypesMet& types, const Ray& ray, double max_t) {
   MovingBox point;
   point.centre = ray.origin;
@@ -115,7 +115,7 @@ Ray ray_in_grid(const PlacedGrid& placed, const Ray& ray) {
   return {to_grid.point(ray.origin), to_grid.axes * ray.direction};
 }
 
-// What overlap queries ask of a shape in a grid's space.
+// A capsule in a grid's space, for overlap queries.
 class CapsuleInGrid {
  public:
   explicit CapsuleInGrid(const MovingCapsule& capsule) : capsule_(capsule) {}
@@ -159,7 +159,7 @@ class BoxInGrid {
   SeparatingAxes separators_;
 };
 
-// `source`: what a Reader reads, within `tight`.
+// Reads voxels from `source` within `tight`.
 template <class Reader, class Shape, class Source>
 std::optional<SceneOverlap> first_of_shape(const PlacedGrid& placed, const TypesMet& types, const Shape& shape,
                                            const Source& source, const IBox& tight) {
@@ -275,7 +275,7 @@ std::optional<SceneHit> first_unloaded_of(const Seen& seen, const Ray& ray, doub
   return first;
 }
 
-// Has a hit, or none up to `max_t`, say what is not loaded before it, or be that.
+// Updates a hit with an unloaded chunk before it, or replaces a miss within `max_t` by the unloaded chunk.
 void note_unloaded(const Seen& seen, const Ray& ray, double max_t, std::optional<SceneHit>& found) {
   if (!found && !seen.meets_unloaded) return;
   const auto unloaded = first_unloaded_of(seen, ray, max_t);

@@ -78,7 +78,7 @@ std::vector<PlainVoxel> all_voxels(const Scene& scene, DVec3 away) {
   return all;
 }
 
-// Where a ray enters the voxel, infinity if it does not.
+// Returns the ray distance to the entry into the voxel; infinity if it misses.
 double entry(const PlainVoxel& voxel, DVec3 origin, DVec3 direction) {
   double low = 0.0;
   double high = std::numeric_limits<double>::infinity();
@@ -209,8 +209,8 @@ TEST(SceneQuery, SpheresOverlapWhatIsNearerThanTheirRadius) {
   EXPECT_GT(found, 100U);
 }
 
-// Whether a box holds a point of the voxel: by clipping is too clever for an oracle; a dense lattice of points finds
-// all but the shallowest overlaps.
+// Returns true if a box contains a point of the voxel. Clipping would be too complex for an oracle. A dense lattice of
+// points finds all overlaps except the shallowest.
 bool holds_a_point(const OrientedBox& box, const PlainVoxel& voxel) {
   constexpr int kPoints = 12;
   if (glm::length(voxel.low - box.centre) > glm::length(box.half_size) + 3.0) return false;
@@ -242,7 +242,7 @@ TEST(SceneQuery, BoxesOverlapWhatTheyHoldAPointOf) {
     const auto answer = instances_of(overlaps(tracer, box));
     for (const InstanceHandle handle : expected)
       EXPECT_NE(std::find(answer.begin(), answer.end(), handle), answer.end());
-    // What is answered beyond that must be shallow: a slightly smaller box does not overlap it.
+    // Other results must be shallow: a slightly smaller box does not overlap them.
     const OrientedBox smaller{box.centre, box.half_size - 0.25, box.rotation};
     const auto deep = instances_of(overlaps(tracer, smaller));
     for (const InstanceHandle handle : deep)

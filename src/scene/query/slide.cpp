@@ -13,7 +13,7 @@
 namespace quoin {
 namespace {
 
-// What is left of a displacement after the contacts so far.
+// Removes from a displacement the components that point into the contacts so far.
 DVec3 along_contacts(DVec3 displacement, const std::vector<DVec3>& normals) {
   const auto goes_into = [&](DVec3 d) {
     return std::any_of(normals.begin(), normals.end(),
@@ -58,7 +58,7 @@ double thinnest_of(const Capsule& capsule) {
   return capsule.radius;
 }
 
-// A shape among what it may meet.
+// A shape and the scene in which it moves.
 template <class Shape>
 struct Body {
   const SceneTracer& tracer;
@@ -68,8 +68,9 @@ struct Body {
   [[nodiscard]] std::optional<SweepHit> sweep(DVec3 displacement) const {
     return sweep_shape(tracer, shape, displacement, options.filter);
   }
-  // Moves it to a contact, but for the skin; returns which fraction of the displacement that was. Where it is stuck in
-  // a hollow of a field because what went before ended within the skin, it gets that back, or it would stay there.
+  // Moves the shape to a contact, minus the skin. Returns the fraction of the displacement used. A previous move may
+  // have ended within the skin, in a hollow of a field. The shape then moves back by the missing part, or it would be
+  // stuck.
   double move_to(const SweepHit& hit, DVec3 displacement) {
     const double speed = -glm::dot(displacement, hit.normal);
     const double back = speed > 0.0 ? options.skin / speed : 0.0;
@@ -82,7 +83,7 @@ struct Body {
     }
     return fraction;
   }
-  // Out of what it starts inside of; false where it stays there.
+  // Moves the shape out of an initial overlap. Returns false if it stays there.
   bool move_out(const SweepHit& hit) {
     if (!options.pushes_out || hit.is_unloaded) return false;
     const double furthest = options.max_push_out.value_or(longest_of(shape) + hit.depth + options.skin);
@@ -105,7 +106,7 @@ struct Body {
     if (overlaps(tracer, further, options.filter).empty()) shape = further;
     return true;
   }
-  // Moves it as far as it goes; returns what it met.
+  // Moves the shape as far as possible. Returns the contact, if any.
   std::optional<SweepHit> advance(DVec3 displacement) {
     const auto hit = sweep(displacement);
     if (!hit) {
@@ -117,7 +118,7 @@ struct Body {
   }
 };
 
-// What was met, which a floor is no obstacle among.
+// Records a contact. Floors do not count as obstacles.
 void note(SlideResult& result, SlideContact::Kind kind, const SweepHit& hit) {
   if (hit.is_unloaded) {
     kind = SlideContact::Kind::Unloaded;
@@ -158,8 +159,8 @@ SlideResult slide(Body<Shape> body, DVec3 displacement) {
   return result;
 }
 
-// A body that walks. On a floor it has a level displacement, which walls turn aside and the floor lifts and lowers; off
-// it, it slides as any body.
+// A walking body. On a floor its displacement is horizontal: walls deflect it, and the floor raises and lowers it. In
+// the air it slides as any other body.
 template <class Shape>
 class Walk {
  public:
@@ -189,9 +190,9 @@ class Walk {
 
  private:
   [[nodiscard]] bool is_floor(DVec3 normal) const { return glm::dot(normal, up_) >= steepest_; }
-  // Nobody stands on what is not loaded.
+  // Unloaded chunks are no floor.
   [[nodiscard]] bool is_floor(const SweepHit& hit) const { return !hit.is_unloaded && is_floor(hit.normal); }
-  // Where it starts inside of something; false where it stays there.
+  // Handles an initial overlap. Returns false if the body stays there.
   bool move_out(const SweepHit& hit) {
     note(result_, SlideContact::Kind::Inside, hit);
     if (body_.move_out(hit)) return true;
@@ -199,7 +200,7 @@ class Walk {
     return false;
   }
   [[nodiscard]] DVec3 level(DVec3 v) const { return v - glm::dot(v, up_) * up_; }
-  // A level displacement as the floor lifts it.
+  // Returns a horizontal displacement that follows the slope of the floor.
   [[nodiscard]] DVec3 along_floor(DVec3 v) const {
     return v - up_ * (glm::dot(v, result_.floor_normal) / glm::dot(result_.floor_normal, up_));
   }
@@ -214,7 +215,7 @@ class Walk {
     return result_;
   }
 
-  // Moves it out of what it is in, and looks for what it stands on. False where it is not to move.
+  // Moves the body out of overlaps and finds the floor below it. Returns false if the body must not move.
   bool find_ground(DVec3 displacement) {
     const double skin = body_.options.skin;
     const DVec3 down = -up_ * (skin + skin / std::max(steepest_, 0.1));
@@ -232,7 +233,7 @@ class Walk {
   }
 
   void land(const SweepHit& floor) {
-    // Walls that were met in the air, as it meets them on foot.
+    // Contacts with walls in the air count as they do on foot.
     if (!is_on_floor_) make_walls_upright();
     is_on_floor_ = true;
     result_.floor = floor;
@@ -255,7 +256,7 @@ class Walk {
     walls_ = std::move(upright);
   }
 
-  // Goes to a contact and turns what is left of the way; false where it is over.
+  // Moves to a contact and redirects the remaining path. Returns false at the end of the path.
   bool meet(const SweepHit& hit, DVec3 way) {
     if (hit.depth > 0.0) return move_out(hit);
     left_ *= 1.0 - body_.move_to(hit, way);
@@ -273,7 +274,7 @@ class Walk {
     return true;
   }
 
-  // While it stands, walls are upright, and a ceiling over a rising floor is one too.
+  // On a floor, walls count as vertical, and so does a ceiling above a rising floor.
   void turn_aside(DVec3 normal) {
     DVec3 wall = normal;
     if (!make_upright(wall)) {
@@ -288,7 +289,7 @@ class Walk {
     displacement_ = along_contacts(displacement_, walls_);
   }
 
-  // While it falls or rises: what pushes it into a slope from the side does not lift it.
+  // In the air, a push into a slope from the side does not lift the body.
   void turn(DVec3 normal) {
     const auto turned = [&](DVec3 v) {
       const DVec3 slid = along_contacts(v, walls_);
@@ -302,7 +303,7 @@ class Walk {
     displacement_ = turned(displacement_);
   }
 
-  // Tries to go up, on and down again onto a floor. What is left of the way is then done.
+  // Tries to step up, forward and down onto a floor. On success the remaining path counts as done.
   bool steps(DVec3 ahead, DVec3 normal) {
     const double length = glm::length(ahead);
     if (!(length > 0.0) || glm::dot(ahead, normal) >= 0.0) return false;
@@ -312,13 +313,13 @@ class Walk {
     if (!(rise > body_.options.skin)) return false;
     Body<Shape> landed = raised;
     landed.advance(ahead);
-    // Not where the wall goes on above.
+    // Fails if the wall continues above.
     if (glm::dot(landed.shape.centre - raised.shape.centre, ahead) < 0.25 * length * length) return false;
     const DVec3 down = -up_ * (rise + 2.0 * body_.options.skin);
     auto ground = landed.advance(down);
     if (!ground || ground->depth > 0.0) return false;
     if (!is_floor(*ground)) {
-      // On the edge of the step: the floor may begin a little further on.
+      // On the edge of the step: the floor may begin slightly further on.
       Body<Shape> further = raised;
       further.advance(ahead * std::max(1.0, thinnest_of(body_.shape) / length));
       ground = further.advance(down);
@@ -334,7 +335,7 @@ class Walk {
     return true;
   }
 
-  // Down to the floor, if there is one near.
+  // Moves down to a nearby floor, if any.
   void settle() {
     const double skin = body_.options.skin;
     const double probe = skin + skin / std::max(steepest_, 0.1);
@@ -345,21 +346,21 @@ class Walk {
       land(*hit);
       return;
     }
-    // On the edge of a step, or between a floor and what is steeper.
+    // At the edge of a step, or between a floor and a steeper slope.
     is_on_floor_ = meets_floor_ && hit && hit->fraction * glm::length(down) <= probe;
   }
 
   Body<Shape> body_;
   const FloorOptions& floor_;
   DVec3 up_;
-  double steepest_;  // of the normals of floors, along `up_`
+  double steepest_;  // minimum of dot(normal, up_) for floors
   SlideResult result_;
-  DVec3 displacement_{0.0};  // all of it, without what went into contacts
-  DVec3 left_{0.0};          // of the way; level on a floor
+  DVec3 displacement_{0.0};  // total, minus the parts that went into contacts
+  DVec3 left_{0.0};          // the remaining path; horizontal on a floor
   std::vector<DVec3> walls_;
   bool is_on_floor_ = false;
-  bool meets_floor_ = false;   // on the way
-  bool is_supported_ = false;  // by a floor or a slope, from the start
+  bool meets_floor_ = false;   // during the move
+  bool is_supported_ = false;  // by a floor or a slope at the start
 };
 
 template <class Shape>

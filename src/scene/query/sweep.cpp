@@ -25,7 +25,7 @@ struct Contact {
   int axis = -1;  // of the normal, where it is one of the grid's; else 3 and more, and -1 where nothing is met
 };
 
-// A moving box, with what parts it from voxels.
+// A moving box and the axes that can separate it from voxels.
 class BoxAmongVoxels {
  public:
   explicit BoxAmongVoxels(const MovingBox& box) : centre_(box.centre), axes_(separating_axes(box.half_axes)) {
@@ -92,7 +92,7 @@ Contact BoxAmongVoxels::meet(IVec3 voxel, double most) const {
   return contact;
 }
 
-// A moving capsule, likewise.
+// The same for a moving capsule.
 class CapsuleAmongVoxels {
  public:
   explicit CapsuleAmongVoxels(const MovingCapsule& capsule) : capsule_(capsule) {}
@@ -141,7 +141,7 @@ Contact CapsuleAmongVoxels::meet(IVec3 voxel, double most) const {
 template <class Shape, class Reader>
 class BlockSweep {
  public:
-  // `source`: what is read.
+  // `source`: the grid to read.
   template <class Source>
   BlockSweep(const Source& source, const IBox& bounds, const TypesMet& types, const Shape& shape)
       : reader_(source), types_(types), shape_(shape), bounds_(bounds) {}
@@ -174,7 +174,7 @@ class BlockSweep {
     best_is_exposed_ = is_exposed;
   }
 
-  // Whether the face that was met has no voxel that counts before it; of edges that cross it is not known.
+  // Returns true if no matching voxel covers the face that was hit. Always true for edge contacts, which have no face.
   [[nodiscard]] bool faces_air(IVec3 voxel, const Contact& contact) {
     if (contact.axis >= 3) return true;
     IVec3 before = voxel;
@@ -233,7 +233,7 @@ std::optional<SweepHit> first_of(const PlacedGrid& placed, const TypesMet& types
   return hit_of(placed, sweep);
 }
 
-// The first contact with what an instance places, likewise.
+// Returns the first contact with the voxels of an instance.
 template <class Moving>
 std::optional<SweepHit> first_of_voxels(const PlacedGrid& placed, const TypesMet& types, const Moving& shape,
                                         double most) {

@@ -1,7 +1,7 @@
-// scene/sweep/*: a player's box of 0.8x1.8x0.8 on the benchmarks' terrain of 256x128x256, as blocks and without steps
-// as a field, a skin above the ground: moved by 0.2 along the ground (level) or into it (down), upright, turned about
-// its height, and turned anyhow; and a step of walking with gravity; likewise a capsule within that box. Time is of one
-// query.
+// scene/sweep/*: sweeps of a player's box of 0.8x1.8x0.8 on the benchmark terrain of 256x128x256, as blocks and as a
+// smooth field, one skin above the ground. The box moves by 0.2 along the ground (level) or into it (down); it is
+// upright, turned about its height, or arbitrarily rotated. Also measured: a step of walking with gravity, and a
+// capsule of the same size. Times are per query.
 
 #include <cmath>
 #include <cstdio>
@@ -100,7 +100,7 @@ void sweeps(benchmark::State& state, const World& (*world_of)(), Turn turn, doub
   state.counters["hits"] = hits;
 }
 
-// What goes into a box of that size.
+// Returns the largest capsule inside the box.
 Capsule capsule_in(const OrientedBox& box) {
   return {box.half_size.x, box.centre, box.rotation * DVec3(0.0, box.half_size.y - box.half_size.x, 0.0)};
 }

@@ -163,7 +163,7 @@ TEST(Sweep, SlidesAlongWallsAndStopsInCorners) {
     const Scene scene = scene_of_voxels(room.snapshot(), rotation);
     const SceneTracer tracer(scene);
     const OrientedBox box{rotation * DVec3(10.3, 10.1, 10.2), DVec3(0.6), rotation};
-    // Over the floor: what goes down is dropped, the rest kept, across the borders of its voxels.
+    // Slides over the floor: removes the downward part and keeps the rest, across voxel borders.
     const SlideResult slid = move_and_slide(tracer, box, rotation * DVec3(5.0, -20.0, 3.0));
     const DVec3 ended = glm::conjugate(rotation) * slid.centre;
     EXPECT_TRUE(slid.is_blocked);

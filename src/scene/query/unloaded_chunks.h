@@ -1,8 +1,8 @@
 #pragma once
 
-// What of partial grids is not loaded, as rays and shapes meet it: cubes of the size of a chunk, in a space whose units
-// are chunks. Between the samples of a field a point is known where all eight around it are: what is asked of a field
-// is asked of the point, and of those a sample farther along each axis.
+// The unloaded chunks of partial grids, as rays and shapes hit them: cubes of chunk size, in a space whose unit is a
+// chunk. Between field samples a point is known if all eight samples around it are. Queries of a field therefore test
+// the point itself and the positions one sample farther along each axis.
 
 #include <algorithm>
 #include <array>
@@ -54,7 +54,8 @@ void for_each_corner(const SceneGrid& grid, const Ask& ask) {
   }
 }
 
-/// Whether all chunks are loaded that a box, in chunks, may ask of. False where that would be a long list.
+/// Returns true if all chunks that a box may touch are loaded; the box is in chunk units. Returns false if there are
+/// too many to check.
 inline bool is_surely_loaded(const SceneGrid& grid, const DBox& bounds) {
   constexpr double kFew = 256.0;
   const DBox all{bounds.min - 1e-6, bounds.max + 1e-6 + (grid.field.is_partial() ? 1.0 / kChunkEdge : 0.0)};

@@ -1,4 +1,4 @@
-// What queries of a scene say where it is not loaded.
+// Scene queries in unloaded areas.
 
 #include <random>
 #include <vector>
@@ -13,8 +13,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// A partial grid of a floor (y below 0) whose chunks are loaded in a box of chunks, but for those that a test leaves
-// out.
+// A partial grid with a floor (y below 0). The chunks in a box are loaded, except those that a test omits.
 struct PartialScene {
   Scene scene;
   GridHandle grid;
@@ -63,7 +62,7 @@ TEST(UnloadedRays, SayWhereTheyCameToWhatIsNotLoaded) {
   EXPECT_EQ(hit->unloaded_t, kInfinity);
   EXPECT_FALSE(hit->is_unloaded);
 
-  // From above what is loaded: the same voxel, but something may be before it.
+  // From above the loaded chunks: the same voxel, with a possible earlier hit in unloaded chunks.
   const Ray from_above{{32.0, 200.0, 32.0}, {0.0, -2.0, 0.0}};
   const auto uncertain = first_hit(tracer, from_above);
   ASSERT_TRUE(uncertain);
@@ -297,7 +296,7 @@ TEST(UnloadedOverlaps, AreFoundOnceAnInstance) {
   ASSERT_EQ(found.size(), 1U);
   EXPECT_TRUE(found[0].is_unloaded);
   EXPECT_EQ(found[0].voxel, IVec3(64, 0, 0));
-  // Where it meets a voxel too, that is told.
+  // A hit with a loaded voxel takes precedence.
   const auto ground = overlaps(tracer, OrientedBox{{64.0, 0.0, 10.0}, DVec3(0.4)});
   ASSERT_EQ(ground.size(), 1U);
   EXPECT_FALSE(ground[0].is_unloaded);

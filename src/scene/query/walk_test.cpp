@@ -33,7 +33,7 @@ SlideOptions on_foot(double max_slope = 45.0, double step_height = 0.0, double s
   return options;
 }
 
-// As a game does: what is left of the velocity, and gravity, over sixtieths of a second.
+// Moves like a game's player: applies the remaining velocity and gravity at 60 steps per second.
 struct Player {
   const SceneTracer& tracer;
   SlideOptions options;
@@ -226,7 +226,7 @@ TEST(Walk, DoesNotStepOntoSlopesThatAreTooSteep) {
   EXPECT_LT(player.box.centre.y, height);
 }
 
-// Where a wall of blocks stands in a slope, whatever the box is pushed with, it comes neither into nor through either.
+// A box pushed in any direction enters neither blocks nor the slope that they stand in.
 TEST(Walk, StaysOutOfCornersOfBlocksAndSlopes) {
   Random random(6);
   for (const double degrees : {20.0, 50.0}) {
