@@ -15,11 +15,11 @@
 
 namespace quoin {
 
-/// The bounds of a grid as they were last asked for. What changed since within them, without touching their sides,
-/// leaves them as they were; where something else changed, the boxes of all chunks are kept from then on.
+/// The bounds of a grid, cached between calls. Changes inside the bounds that do not touch their sides keep the cached
+/// bounds. After any other change, the cache keeps the boxes of all chunks.
 ///
-/// `Entries` are the grid's chunks and `Record` what its journal holds; `BoxOfEntry::of(entry)` is the box of what
-/// counts in one of them, in the chunk's coordinates.
+/// `Entries` are the grid's chunks and `Record` is the record type of its journal. `BoxOfEntry::of(entry)` returns the
+/// box of the counted voxels in one chunk, in the chunk's coordinates.
 /// Threads: any number may ask at once.
 template <class Record, class Entries, class BoxOfEntry>
 class BoundsCache {
@@ -32,8 +32,8 @@ class BoundsCache {
     box_ = other.box_;
   }
 
-  /// Before a copy is made: where bounds are asked of copies they go on from here, instead of each from the last time
-  /// that this was asked.
+  /// Call before a copy is made. If bounds were ever requested, updates them first, so that each copy starts from
+  /// current bounds and not from those of the last request.
   void prepare(const ChangeJournal<Record>& journal, const Entries& entries) {
     if (is_wanted_->load(std::memory_order_relaxed)) update(journal, entries);
   }

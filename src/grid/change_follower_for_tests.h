@@ -20,7 +20,7 @@ class ChangeFollower {
   std::vector<IVec3> take(const DensityGrid& grid, int reach) {
     return chunks_to_mesh(grid, grid.changes_since(cursor_), reach);
   }
-  /// Whether anything changed; tells `take` nothing.
+  /// Returns true if anything changed. Does not call `take`.
   template <class AnyGrid>
   [[nodiscard]] bool is_behind(const AnyGrid& grid) const {
     return grid.has_changed_since(cursor_);

@@ -11,8 +11,8 @@
 
 namespace quoin {
 
-/// A box of voxels of one chunk in eight bytes, so that it grows by one comparison of all: the least x, y, z, and 255
-/// less the greatest.
+/// A box of voxels of one chunk in eight bytes: the least x, y, z, and 255 minus the greatest. A bytewise minimum
+/// unites two boxes.
 class PackedBox {
  public:
   static PackedBox of(int x, int y, int z) {
@@ -32,7 +32,7 @@ class PackedBox {
     return box;
   }
 
-  /// Of nothing.
+  /// The empty box.
   PackedBox() = default;
   [[nodiscard]] bool empty() const { return bytes_ == ~std::uint64_t{0}; }
 
@@ -53,19 +53,19 @@ class PackedBox {
   std::uint64_t bytes_ = ~std::uint64_t{0};
 };
 
-/// Which neighbours of a chunk hold one of the 26 neighbours of a changed voxel: a bit for each of the 27 offsets, as
-/// in Neighbourhood; and where those voxels are.
+/// The chunks that a change of voxels affects, as a bit for each of the 27 offsets in Neighbourhood, and the box of the
+/// changed voxels. A bit is set if that chunk contains a changed voxel or one of its 26 neighbours.
 struct VoxelRecord {
   static constexpr std::uint32_t kCentreOnly = std::uint32_t{1} << 13;
 
   IVec3 chunk{0};
   std::uint32_t neighbours = 0;
   PackedBox box;
-  PackedBox data;  ///< around those whose data changed, those that became another type too
+  PackedBox data;  ///< box of changed data, including voxels that also changed type
   ChunkSlabs slabs;
   bool is_edit = true;  ///< false: only loaded or unloaded
 
-  /// Counts voxels of a row that changed.
+  /// Adds changed voxels of a row.
   void add(int y, int z, std::uint64_t changed) {
     const unsigned x_sides = 0b010U | static_cast<unsigned>(changed & 1) | static_cast<unsigned>(changed >> 63) << 2;
     const unsigned y_sides = sides(y);
@@ -78,14 +78,14 @@ struct VoxelRecord {
     box.unite(PackedBox::of_row(y, z, changed));
     slabs.add(y, z);
   }
-  /// Counts one voxel that is on no side of the chunk.
+  /// Adds one voxel that is on no side of the chunk.
   void add_inner(int x, int y, int z) {
     QUOIN_ASSERT(sides(x) == 0b010U && sides(y) == 0b010U && sides(z) == 0b010U, "on no side of the chunk");
     neighbours |= kCentreOnly;
     box.unite(PackedBox::of(x, y, z));
     slabs.add(y, z);
   }
-  /// Counts all voxels of a box that is not empty.
+  /// Adds all voxels of a non-empty box.
   void add_box(const IBox& all) {
     QUOIN_ASSERT(!all.empty(), "voxels that changed");
     neighbours = kEverywhere;
@@ -93,7 +93,7 @@ struct VoxelRecord {
     box.unite(PackedBox::of(all.max.x - 1, all.max.y - 1, all.max.z - 1));
     slabs.add(ChunkSlabs::of(all));
   }
-  /// For an edit that was broken off: anything may have changed.
+  /// For an interrupted edit: anything may have changed.
   void add_all() {
     neighbours = kEverywhere;
     box = PackedBox::of_chunk();
@@ -118,10 +118,10 @@ struct VoxelRecord {
   }
 };
 
-/// What an edit did to one chunk of voxels.
+/// The changes that an edit makes to one chunk of voxels.
 struct VoxelEdit {
   std::int64_t voxels = 0;
-  int data_before = 0;  ///< voxels with data; the edit takes some away where it changes types
+  int data_before = 0;  ///< voxels with data before the edit; a changed type removes data
   VoxelRecord record{};
 
   void add(int y, int z, std::uint64_t changed) {
@@ -135,13 +135,13 @@ struct VoxelEdit {
   }
 };
 
-/// How near the changed samples of a chunk come to each of its neighbours, so that it can be asked later, and exactly,
-/// whether a neighbour that reads `reach` samples beyond its own reads one of them.
+/// The distance from a chunk's changed samples to each of its neighbours. It answers exactly if a neighbour that reads
+/// `reach` samples past its own reads a changed one.
 class ChangeReach {
  public:
   ChangeReach() { least_.fill(kNever); }
 
-  /// Counts samples of a row that changed.
+  /// Adds changed samples of a row.
   void add(int y, int z, std::uint64_t changed) {
     if (changed == 0) return;
     samples += std::popcount(changed);
@@ -156,7 +156,7 @@ class ChangeReach {
     box_.unite(PackedBox::of_row(y, z, changed));
   }
 
-  /// For an edit that was broken off: anything may have changed.
+  /// For an interrupted edit: anything may have changed.
   void add_all() {
     samples = kChunkVoxels;
     for (std::size_t i = 0; i < least_.size(); ++i) least_[i] = i == 13 ? 0 : 1;
@@ -181,7 +181,8 @@ class ChangeReach {
  private:
   static constexpr std::uint8_t kNever = 255;
 
-  // From the previous chunk, this one and the next: how many samples beyond its own a chunk must read.
+  // For the previous chunk, this one and the next: number of samples past its own that a chunk must read to be
+  // affected.
   static std::array<std::uint8_t, 3> steps(int local) {
     return {static_cast<std::uint8_t>(local + 1), 0, static_cast<std::uint8_t>(kChunkEdge - local)};
   }
@@ -190,7 +191,7 @@ class ChangeReach {
   PackedBox box_;
 };
 
-/// In a grid's journal.
+/// The record type of a grid's journal.
 struct DensityRecord {
   IVec3 chunk{0};
   ChangeReach reach;

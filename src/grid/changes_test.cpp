@@ -25,7 +25,7 @@ Key key_of(IVec3 at) {
   return {at.z, at.y, at.x};
 }
 
-// What one consumer should be told.
+// The changes that one consumer should read.
 struct Expected {
   std::map<Key, IBox> boxes;  // by chunk, in grid coordinates
   std::set<Key> reached;      // chunks that hold one of the 26 neighbours of a changed voxel

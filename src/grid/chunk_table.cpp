@@ -114,7 +114,7 @@ void ChunkWindow::close() {
   size_x_ = size_y_ = size_z_ = 0;
 }
 
-// Of its own epochs none is known in which its nodes were not shared.
+// Starts at an epoch without nodes that are known to be unshared.
 ChunkTable::ChunkTable(const ChunkTable& other)
     : trie_(other.trie_), outside_(other.size()), is_planned_(false), epoch_(2) {
   other.epoch_.fetch_add(1, std::memory_order_relaxed);
@@ -190,8 +190,8 @@ bool ChunkTable::fits(const ChunkWindow::Box& box) const {
   return box.log_cells() < 31 && std::size_t{1} << box.log_cells() <= max_cells();
 }
 
-// A new chunk. Where the window cannot grow to hold it, it stays outside, until so many do that it is worth looking
-// where all of them lie.
+// Adds a new chunk. If the window cannot grow to contain it, the chunk stays outside until so many are outside that a
+// new plan is worth its cost.
 void ChunkTable::place(const IVec3& chunk, ChunkEntry& entry) {
   const std::uint32_t cell = window_.cell(chunk.x, chunk.y, chunk.z);
   if (cell != ChunkWindow::kOutside) return window_.put(cell, &entry, epoch());
@@ -260,7 +260,7 @@ ChunkWindow::Box ChunkTable::box_of_most(std::size_t left_out) const {
   return box;
 }
 
-// Where there is no memory for another window the one there is stays: chunks outside are found in the tree.
+// If memory for a new window is short, the current window stays. Chunks outside are found in the tree.
 void ChunkTable::plan() {
   try {
     try_to_plan();
@@ -284,7 +284,7 @@ void ChunkTable::try_to_plan() {
 void ChunkTable::move_to(const ChunkWindow::Box& box) {
   window_.move_to(box);
   outside_ = 0;
-  // Where nothing was ever shared nothing need be looked at again.
+  // If no node was ever shared, no entry needs another check.
   const std::uint32_t known = epoch() == 1 ? 1 : 0;
   trie_.for_each([&](IVec3 at, const ChunkEntry& entry) {
     const std::uint32_t cell = window_.cell(at.x, at.y, at.z);

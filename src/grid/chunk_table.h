@@ -14,28 +14,28 @@
 
 namespace quoin {
 
-/// A chunk, and what a grid keeps beside it.
+/// A chunk and the grid's bookkeeping for it.
 struct ChunkEntry {
   Chunk chunk;
-  std::uint64_t serial = 0;  ///< of its last record in the grid's journal
-  int counted = 0;           ///< its voxels that are not air, as the grid counts them
+  std::uint64_t serial = 0;  ///< serial of its last record in the grid's journal
+  int counted = 0;           ///< its voxels that are not air, as counted by the grid
 };
 
-/// A box of chunks in which one is found by its place: a pointer for every chunk of the box, there or not.
+/// A box of chunks with one pointer per cell, null for missing chunks. A lookup takes constant time.
 ///
-///   box from 5 to 12:  8 9 10 11 12 5 6 7    a chunk's place is its coordinate modulo the box's size, so that a box
-///   from 6 to 13:      8 9 10 11 12 13 6 7   that slides along leaves what it goes on holding where it stands
+///   box from 5 to 12:  8 9 10 11 12 5 6 7    a chunk's cell is its coordinate modulo the box's size, so that chunks
+///   from 6 to 13:      8 9 10 11 12 13 6 7   keep their cells while the box slides
 class ChunkWindow {
  public:
   static constexpr std::uint32_t kOutside = ~std::uint32_t{0};
   static constexpr int kMaxSlide = 4;
-  /// Powers of two along each axis, so that a place is found by shifts.
+  /// Sizes are powers of two along each axis, so that cells are computed by shifts.
   struct Box {
     IVec3 first{0};
     std::array<int, 3> log{};
     [[nodiscard]] int log_cells() const { return log[0] + log[1] + log[2]; }
     [[nodiscard]] IVec3 size() const { return {1 << log[0], 1 << log[1], 1 << log[2]}; }
-    /// Doubled on the sides of a chunk until it is inside.
+    /// Doubles the size towards a chunk until it is inside.
     [[nodiscard]] Box grown_to(IVec3 chunk) const;
   };
 
@@ -43,7 +43,7 @@ class ChunkWindow {
   ChunkWindow(const ChunkWindow&) = delete;
   ChunkWindow& operator=(const ChunkWindow&) = delete;
 
-  /// Where a chunk stands, or kOutside.
+  /// Returns the cell of a chunk, or kOutside.
   [[nodiscard]] std::uint32_t cell(int x, int y, int z) const {
     const std::uint32_t dx = static_cast<std::uint32_t>(x) - first_x_;
     const std::uint32_t dy = static_cast<std::uint32_t>(y) - first_y_;
@@ -53,11 +53,11 @@ class ChunkWindow {
     return (static_cast<std::uint32_t>(x) & mask_x_) + ((static_cast<std::uint32_t>(y) & mask_y_) << shift_y_) +
            ((static_cast<std::uint32_t>(z) & mask_z_) << shift_z_);
   }
-  /// Null where there is no chunk.
+  /// Null if there is no chunk.
   [[nodiscard]] ChunkEntry* entry(std::uint32_t cell) const { return entries_[cell]; }
-  /// The epoch in which the entry was last known to be shared with no snapshot.
+  /// Returns the last epoch in which the entry was known to be unshared.
   [[nodiscard]] std::uint32_t epoch(std::uint32_t cell) const { return epochs_[cell]; }
-  /// The voxels of a chunk; those of a chunk of air where there is none; null where the chunk is uniform.
+  /// Returns the voxels of a chunk: those of an air chunk if it is missing, null if it is uniform.
   [[nodiscard]] const ChunkStorage* voxels(std::uint32_t cell) const { return voxels_[cell]; }
 
   [[nodiscard]] std::size_t cells() const { return entries_.size(); }
@@ -66,16 +66,16 @@ class ChunkWindow {
     return cells() * (sizeof(ChunkEntry*) + sizeof(ChunkStorage*) + sizeof(std::uint32_t));
   }
 
-  /// A chunk that came or went, or whose storage may have moved.
+  /// Updates the cell of a chunk that came or went, or whose storage may have moved.
   void put(std::uint32_t cell, ChunkEntry* entry, std::uint32_t epoch);
-  /// Of a chunk that is there; until it is put again its voxels are found through its entry.
+  /// Clears the voxel pointer of an existing chunk. Until the next `put`, its voxels are found through its entry.
   void forget_voxels(std::uint32_t cell) { voxels_[cell] = nullptr; }
-  /// Another box, in which no chunk stands yet. When it throws, all is as it was.
+  /// Replaces the box by an empty one of another size or position. If it throws, nothing has changed.
   void move_to(const Box& box);
-  /// Moves the box so that a chunk is inside. False, and nothing has changed, where a chunk stands in what it would
-  /// leave, or that is more than kMaxSlide layers along an axis.
+  /// Moves the box so that a chunk is inside. Returns false without a change if a chunk is in the part that the box
+  /// would leave, or the distance is more than kMaxSlide layers along an axis.
   bool slide_to(IVec3 chunk);
-  /// A box of nothing.
+  /// Makes the box empty.
   void close();
 
  private:
@@ -89,7 +89,7 @@ class ChunkWindow {
   std::uint32_t size_x_ = 0;
   std::uint32_t size_y_ = 0;
   std::uint32_t size_z_ = 0;
-  std::uint32_t mask_x_ = 0;  // sizes less 1
+  std::uint32_t mask_x_ = 0;  // sizes minus 1
   std::uint32_t mask_y_ = 0;
   std::uint32_t mask_z_ = 0;
   int shift_y_ = 0;
@@ -100,15 +100,16 @@ class ChunkWindow {
   Box box_;
 };
 
-/// The chunks of a grid by their coordinates: in a tree, and those that lie close together in a window besides.
+/// The chunks of a grid by their coordinates: all in a tree, and those close together also in a window.
 ///
-/// The window grows with the chunks and goes where they go: it slides where they come on one side and go on the other,
-/// as around somebody who walks; else it is made anew, without the outermost eighth along each axis where these
-/// lie too far out, and never has more than 8 places a chunk (or 64), 32 where chunks were dropped. What lies outside
-/// it is found in the tree.
-/// A copy shares the tree's nodes and has no window until it is changed. Entries are changed by way of `find_to_edit`
-/// or `find_or_create`, which copy what is shared; they lie elsewhere then, so that no pointer to an entry outlives the
-/// next of these calls. Threads: any number may read and copy at once; a change needs it to itself.
+/// The window grows and moves with the chunks. It slides if chunks appear on one side and disappear on the other, as
+/// around a moving player. Otherwise it is rebuilt; outliers in the outermost eighth along each axis are then left out.
+/// It has at most 8 cells per chunk (or 64), 32 after chunks were removed. Chunks outside of it are found in the tree.
+///
+/// A copy shares the tree's nodes and has no window until it is changed. Change entries only through `find_to_edit` or
+/// `find_or_create`, which copy shared nodes. The copies have other addresses, so a pointer to an entry is valid only
+/// until the next of these calls.
+/// Threads: any number may read and copy at once; a change needs exclusive access.
 class ChunkTable {
  public:
   /// An entry that is about to be changed; `entry` is null where there is none.
@@ -138,7 +139,7 @@ class ChunkTable {
     return find_shared_to_edit(chunk, cell);
   }
   [[nodiscard]] Slot find_or_create(const IVec3& chunk);
-  /// Of one voxel, by its own coordinates.
+  /// Returns the type of a voxel.
   [[nodiscard]] VoxelType voxel(int x, int y, int z) const;
 
   /// To be called before a change during which the chunk may be read: it is then read through its entry.

@@ -93,7 +93,7 @@ TEST(ChunkTable, TheWindowFollowsACrowdThatMoves) {
   }
 }
 
-// As around a viewer: what comes ahead and what goes behind are never many, and the window never stands anew.
+// Simulates a moving viewer: chunks come ahead and go behind in small numbers, and the window is never rebuilt.
 TEST(ChunkTable, TheWindowSlidesAlongAndKnowsTheSameChunks) {
   for (const IVec3 way : {IVec3{1, 0, 0}, IVec3{-1, 0, 0}, IVec3{0, 1, 0}, IVec3{0, 0, -1}, IVec3{1, -1, 1}}) {
     ChunkTable table;

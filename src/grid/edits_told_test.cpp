@@ -1,4 +1,4 @@
-// What edits changed: bricks of 16^3, and voxel by voxel.
+// The change records of edits: bricks of 16^3, and voxel by voxel.
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,8 @@ namespace quoin {
 namespace {
 
 using Place = std::tuple<int, int, int>;
-using Told = std::vector<std::tuple<int, int, int, VoxelType, VoxelType>>;  // places, what was there, what is
+// Position, old type, new type.
+using Told = std::vector<std::tuple<int, int, int, VoxelType, VoxelType>>;
 
 Told told(const Grid& before, const Grid& now, const GridChanges& changes) {
   Told all;
@@ -192,7 +193,7 @@ TEST(Grid, EditsCanBeCancelled) {
   EXPECT_EQ(last, 1.0);
 }
 
-// What takes a voxel takes no point: it would be cut off towards 0.
+// Functions that take a voxel do not accept a point, whose coordinates would be truncated towards 0.
 template <class G, class P>
 concept TakesAPoint = requires(const G& grid, P point) { grid.get(point); };
 static_assert(TakesAPoint<Grid, IVec3>);

@@ -36,8 +36,8 @@ struct Grid::Impl {
   BoundsCache<VoxelRecord, ChunkTable, VoxelBox> bounds;
   std::int64_t voxel_count = 0;    // that are not air
   std::int64_t data_count = 0;     // that have data
-  std::uint64_t types_serial = 0;  // of the last record that tells of types
-  std::uint64_t data_serial = 0;   // of the last that tells of data
+  std::uint64_t types_serial = 0;  // last record with a change of types
+  std::uint64_t data_serial = 0;   // last record with a change of data
 
   void note(std::uint64_t& serial, const VoxelRecord& record) {
     journal.note(serial, record, entries.size());
@@ -45,7 +45,7 @@ struct Grid::Impl {
     if (record.has_data()) data_serial = std::max(data_serial, serial);
   }
 
-  // Books an edit of one chunk, tells whoever follows the grid, and drops the chunk where nothing is left in it.
+  // Records an edit of one chunk, notifies followers of the grid, and drops the chunk if it is empty.
   void finish_edit(const IVec3& chunk, const ChunkTable::Slot& slot, VoxelEdit& edit, EditNotice& notice) {
     QUOIN_ASSERT(slot.entry != nullptr && entries.find(chunk) == slot.entry, "the slot is the chunk's");
     // Before anything that may throw: the storage that was known may be gone.
@@ -67,7 +67,7 @@ struct Grid::Impl {
     if (voxels == 0) entries.erase(chunk);
   }
 
-  // Puts voxels in place that were, or now are, not loaded: whatever the chunk held or holds is told of, as no edit.
+  // Replaces the voxels of a chunk that was loaded or unloaded. The change is reported as a load, not as an edit.
   void replace(const IVec3& chunk, Chunk voxels, EditNotice& notice) {
     if (non_air_count(voxels) == 0 && quoin::data_count(voxels) == 0 && entries.find(chunk) == nullptr) {
       VoxelRecord record;  // air where nothing was: no chunk comes and goes for it
@@ -154,7 +154,7 @@ std::int64_t Grid::Impl::edit_box(const LongBox& wanted, bool create, EditNotice
   return changed;
 }
 
-// What a grid that was moved from has no more. Single voxels, rows and chunks go without the question.
+// Asserts that the grid was not moved from. Accesses to single voxels, rows and chunks skip this check.
 inline Grid::Impl& Grid::impl() const {
   QUOIN_ASSERT(impl_ != nullptr, "a grid that was not moved from");
   return *impl_;

@@ -132,8 +132,8 @@ void set_alone(benchmark::State& state) {
 }
 BENCHMARK(set_alone)->Name("grid/set_alone")->Unit(benchmark::kMillisecond);
 
-// Rounds of a million voxels set to random ones of `types` types, and back: what the grid takes then, beside what a new
-// one takes.
+// Sets a million voxels to random ones of `types` types and back, several times. Compares the grid's memory
+// with that of a new grid.
 void edits_undone(benchmark::State& state, std::uint32_t types) {
   constexpr int kEdits = 1'000'000;
   Grid grid = world().snapshot();

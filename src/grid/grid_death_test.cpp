@@ -1,4 +1,4 @@
-// What functions of grids require.
+// Tests the requirements of grid functions.
 
 #include <array>
 #include <utility>
@@ -135,7 +135,7 @@ TEST(RegistryDeathTest, AnotherAirIsAMistake) {
   QUOIN_EXPECT_MISTAKE(types.replace(type, air), "type 0 is the only air");
 }
 
-// NOLINTBEGIN(bugprone-use-after-move): that is what is asked.
+// NOLINTBEGIN(bugprone-use-after-move): tested here
 TEST(RegistryDeathTest, OneThatWasMovedFromIsNotToBeUsed) {
   VoxelRegistry types;
   const VoxelRegistry moved = std::move(types);

@@ -10,7 +10,7 @@
 namespace quoin {
 namespace {
 
-// Voxels are set to random types, then back. What is left must take about what a grid takes that never had the edits.
+// Sets voxels to random types, then back. The memory left must be close to that of a grid without the edits.
 class EditsUndone : public testing::TestWithParam<unsigned> {};
 
 TEST_P(EditsUndone, LeaveTheMemoryOfANewGrid) {

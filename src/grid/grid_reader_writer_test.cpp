@@ -19,7 +19,7 @@ TEST(GridReader, ReadsAsTheGridDoes) {
   GridReader reader(grid);
   for (int x = -70; x < 70; ++x) EXPECT_EQ(reader.get({x, 0, 0}), grid.get({x, 0, 0}));
   std::mt19937 random(8);
-  for (int i = 0; i < 20'000; ++i) {  // runs along x between jumps, of which some stay in the row
+  for (int i = 0; i < 20'000; ++i) {  // runs along x between jumps; some jumps stay in the row
     const auto place = [&] { return static_cast<int>(random() % 90) - 45; };
     const IVec3 first{place(), place() / 9, place() / 9};
     for (int x = 0; x < static_cast<int>(random() % 12); ++x) {

@@ -216,7 +216,7 @@ TEST(Grid, PuttingANewChunkDirtiesOnlyWhatItsVoxelsReach) {
   EXPECT_EQ(follower.take(grid), std::vector<IVec3>({{0, 0, 0}, {1, 0, 0}}));
 }
 
-/// The chunks that hold one of the 26 neighbours of a voxel of the box that is not what it was.
+/// Returns the chunks that contain a changed voxel of the box or one of its 26 neighbours.
 std::vector<IVec3> reached_chunks(const Grid& before, const Grid& after, const IBox& box) {
   std::set<std::tuple<int, int, int>> found;  // z, y, x: the order of chunks_to_mesh
   for (int z = box.min.z; z < box.max.z; ++z) {

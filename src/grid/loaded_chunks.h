@@ -12,10 +12,10 @@
 
 namespace quoin {
 
-/// Which chunks of a partial grid are in memory; of a grid that is not partial all are. Copies share it.
+/// The loaded chunks of a partial grid. In a grid that is not partial, all chunks count as loaded. Shared with copies.
 class LoadedChunks {
  public:
-  /// None is, from now on.
+  /// Makes the grid partial with no chunk loaded.
   void begin() {
     is_partial_ = true;
     chunks_.clear();
@@ -24,7 +24,7 @@ class LoadedChunks {
   [[nodiscard]] bool has(IVec3 chunk) const {
     return !is_partial_ || !is_inside_world(chunk) || chunks_.find(chunk.x, chunk.y, chunk.z) != nullptr;
   }
-  /// Whether edits may change a chunk.
+  /// Returns true if edits may change the chunk.
   [[nodiscard]] bool may_edit(IVec3 chunk) const { return is_inside_world(chunk) && has(chunk); }
   [[nodiscard]] bool has_around(IVec3 chunk, int distance) const {
     if (!is_partial_) return true;
@@ -37,11 +37,11 @@ class LoadedChunks {
     }
     return true;
   }
-  /// Of all chunks that a box of voxels meets.
+  /// Returns true if all chunks that a box of voxels overlaps are loaded.
   [[nodiscard]] bool has_within(const IBox& voxels) const {
     if (!is_partial_ || voxels.empty()) return true;
     const IBox chunks = chunks_of(box_from(voxels));
-    // More than there are cannot all be there; and what lies outside of the world is.
+    // A box with more chunks than are loaded contains an unloaded one. Chunks outside of the world count as loaded.
     const LongBox inside = box_from(intersect(chunks, {IVec3(kMinChunk + 1), IVec3(kMaxChunk)}));
     if (is_empty(inside)) return true;
     const auto edge = [&](std::size_t axis) { return static_cast<double>(inside.max[axis] - inside.min[axis]); };
@@ -63,7 +63,7 @@ class LoadedChunks {
     std::sort(all.begin(), all.end(), by_zyx);
     return all;
   }
-  /// Of a partial grid those in a box of chunks, sorted by z, then y, then x.
+  /// Returns the loaded chunks of a partial grid in a box of chunks, sorted by z, y, x.
   [[nodiscard]] std::vector<IVec3> within(const IBox& chunks) const {
     std::vector<IVec3> found;
     chunks_.for_each_in(chunks, [&](IVec3 at, const Mark&) { found.push_back(at); });

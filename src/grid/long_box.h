@@ -21,7 +21,7 @@ inline bool is_inside_world(IVec3 chunk) {
   return fits(chunk.x) && fits(chunk.y) && fits(chunk.z);
 }
 
-/// Whether a chunk beside another has coordinates: those at the ends of the int32 range have none beyond.
+/// Returns true if the neighbouring chunk has valid coordinates. At the ends of the int32 range it has none.
 inline bool has_neighbour(IVec3 chunk, IVec3 offset) {
   for (int axis = 0; axis < 3; ++axis) {
     const std::int64_t at = std::int64_t{chunk[axis]} + offset[axis];
@@ -95,7 +95,7 @@ inline IBox part_of(const LongBox& box, IVec3 chunk) {
   return part;
 }
 
-/// Without what lies in the outermost chunks.
+/// Clips a box to the world without the outermost chunks.
 inline LongBox clipped(LongBox box) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     box.min[axis] = std::max<std::int64_t>(box.min[axis], std::int64_t{kMinChunk + 1} * kChunkEdge);

@@ -77,7 +77,7 @@ class MedianCut {
 
  private:
   static bool is_opaque(const Looks::Look& look) { return look.colour.a == 255; }
-  // Glass and what is opaque are never one.
+  // Transparent and opaque looks are never merged.
   static bool belong_together(const Looks::Look& a, const Looks::Look& b) {
     return a.material == b.material && is_opaque(a) == is_opaque(b);
   }

@@ -38,7 +38,7 @@ class Looks {
                                                       std::size_t most = kMaxVoxelTypes) const;
 
  private:
-  /// The colours of looks, some of which are the same afterwards. Errors: LimitExceeded.
+  /// Returns a reduced colour for each look; some become equal. Errors: LimitExceeded.
   [[nodiscard]] Result<std::vector<Rgba8>> reduced(std::size_t most) const;
   std::vector<Look> looks_;
   std::unordered_map<std::uint64_t, std::uint32_t> numbers_;  // by colour and material

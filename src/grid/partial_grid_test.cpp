@@ -43,7 +43,7 @@ TEST(PartialGrid, WhatIsNotLoadedIsNotEdited) {
   EXPECT_EQ(grid.edit({{0, 0, 0}, {2, 2, 2}}, [](IVec3, VoxelType) { return VoxelType{1}; }), 0);
   EXPECT_EQ(grid.put_chunk({0, 0, 0}, Chunk(1)), 0);
   EXPECT_FALSE(grid.has_changed_since(cursor));
-  // A box that reaches over a loaded and other chunks changes what is loaded.
+  // An edit of a box that is only partly loaded changes the loaded part.
   EXPECT_TRUE(grid.load_chunk({0, 0, 0}, Chunk(kAir)));
   EXPECT_EQ(grid.fill_box({{-5, 0, 0}, {5, 1, 1}}, 1), 5);
 }
@@ -212,7 +212,7 @@ TEST(PartialGrid, FieldsAlike) {
   const DensityChanges loaded = field.changes_since(cursor);
   ASSERT_EQ(loaded.items.size(), 2U);
   EXPECT_FALSE(loaded.items[0].is_edit);
-  EXPECT_GT(field.add_sphere({70.0, 32.0, 32.0}, 10.0, 2), 0);  // what is loaded of it
+  EXPECT_GT(field.add_sphere({70.0, 32.0, 32.0}, 10.0, 2), 0);  // changes the loaded part
   EXPECT_EQ(field.material({70, 32, -5}), kAir);
   const DensityChanges edited = field.changes_since(cursor);
   ASSERT_EQ(edited.items.size(), 2U);

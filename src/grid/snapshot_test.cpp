@@ -21,7 +21,7 @@ namespace {
 
 using Voxels = std::map<std::tuple<int, int, int>, VoxelType>;
 
-// A grid and what it should hold.
+// A grid and its expected voxels.
 struct Twin {
   Grid grid;
   Voxels voxels;
@@ -50,7 +50,7 @@ void expect_equal(const Twin& twin) {
   ASSERT_EQ(twin.grid.bounds(), bounds);
 }
 
-// Snapshots of snapshots, each edited, in whatever order they end.
+// Snapshots of snapshots, each edited, destroyed in random order.
 TEST(Snapshot, WhatIsEditedInOneStaysAsItWasInAllOthers) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE(seed);

@@ -41,7 +41,8 @@ Histogram histogram_of(const Volume& volume) {
   return counts;
 }
 
-/// The variance between the values in bins up to each and those in the bins after it, but for a constant factor.
+/// Returns, up to a constant factor, the variance between the values in the bins up to each bin and the values after
+/// it.
 std::array<double, kBins> variance_between(const Histogram& counts) {
   double all = 0.0;
   double moment = 0.0;

@@ -41,7 +41,7 @@ class Samples {
     return volume_.values.data() + static_cast<std::size_t>(z) * plane_ + static_cast<std::size_t>(y) * row_;
   }
   [[nodiscard]] float at(IVec3 p) const { return row(p.y, p.z)[p.x]; }
-  /// How steeply the values change where the surface runs between a sample and the next on `axis`.
+  /// Returns the gradient length at the surface between a sample and the next on `axis`.
   [[nodiscard]] double steepness(IVec3 p, int axis) const {
     IVec3 next = p;
     ++next[axis];
@@ -70,7 +70,7 @@ class Samples {
   std::size_t plane_;
 };
 
-// Which of the edges that start at the samples of a row the surface crosses: bit `axis` of each.
+// Finds the edges that the surface crosses, among those that start at the samples of a row: bit `axis` of each entry.
 void find_crossings(const Samples& samples, float iso, int y, int z, std::vector<std::uint8_t>& crossed) {
   const IVec3 size = samples.size();
   const auto width = static_cast<std::size_t>(size.x);
@@ -195,7 +195,7 @@ Result<DensityGrid> field_from_volume(const Volume& volume, const VolumeFieldOpt
   const std::size_t row = static_cast<std::size_t>(across.x);
   const std::size_t plane = row * static_cast<std::size_t>(across.y);
   const std::size_t count = plane * static_cast<std::size_t>(across.z);
-  // In batches, so that progress can be told and chunks are stored in one order.
+  // Works in batches, to report progress and to store chunks in a fixed order.
   constexpr std::size_t kBatch = 32;
   DensityGrid field(kBand);
   std::vector<std::optional<DensityChunk>> made(std::min(kBatch, count));

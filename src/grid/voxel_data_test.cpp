@@ -50,7 +50,7 @@ HeldVoxels voxels_of(const Grid& grid) {
   return found;
 }
 
-// A grid beside the slow, obvious version of it.
+// A grid and a slow, simple model of it.
 struct DataTwin {
   Grid grid;
   HeldVoxels voxels;

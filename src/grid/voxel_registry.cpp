@@ -20,7 +20,7 @@ std::uint64_t hash_of(const VoxelProperties& p) {
          static_cast<std::uint64_t>(p.visibility);
 }
 
-// As ==, but that what is no number equals itself: else each look for it would add a type.
+// As ==, but NaN equals itself. Otherwise each lookup would add a type.
 bool is_same(const VoxelProperties& a, const VoxelProperties& b) {
   if (a == b) return true;
   VoxelProperties left = a;

@@ -26,8 +26,8 @@ namespace quoin {
 
 /// A light source for other surfaces: a Lamp, or the emission of the voxels or the field in one cell.
 struct PlacedLamp {
-  DVec3 position{0.0};   ///< in the world
-  glm::dmat3 axes{1.0};  ///< its own axes in the world, unit columns
+  DVec3 position{0.0};          ///< in the world
+  glm::dmat3 axes{1.0};         ///< its own axes in the world, unit columns
   std::array<Vec3, 6> power{};  ///< per direction of its axes: light on a white surface that faces the lamp, times the
                                 ///< squared distance; `power[0]` for a point
   double spread_squared = 0.0;  ///< world units: added to the distance's square

@@ -189,8 +189,8 @@ std::uint64_t Chunk::row_mask(int y, int z, VoxelType type) const {
   return packed_row::equal_mask(m.row(slab, ChunkStorage::row_in_slab(y, z)), m.bits, index);
 }
 
-// The palette index of a type, adding it where it is new; may widen the voxels. Beside its callers, so that
-// setting a voxel costs no call of it.
+// Returns the palette index of a type and adds new types, which may widen the voxels. Inline next to its callers,
+// so that setting a voxel does not pay for a call.
 inline std::uint32_t Chunk::index_for(VoxelType type) {
   ChunkStorage& m = *storage_;
   if (m.direct()) return type;
@@ -300,7 +300,7 @@ std::uint64_t Chunk::write_row(int y, int z, std::uint64_t mask, std::span<const
     left &= ~same;
     if (others == 0) continue;
     index = replace(y, z, others, type);
-    // At once: what comes next may throw.
+    // Counts at once, because the next steps may throw.
     count_change(y, z, type == kAir ? others : 0, others & air);
     changed |= others;
   }

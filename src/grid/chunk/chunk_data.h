@@ -23,12 +23,12 @@ namespace quoin {
 class SlabData : public RefCounted {
  public:
   [[nodiscard]] bool empty() const { return states_.empty() && bytes_.empty(); }
-  /// Of a row: which voxels have a state, bytes, or either.
+  /// Returns the voxels of a row that have a state, bytes, or either.
   [[nodiscard]] std::uint64_t voxels(int row) const;
   [[nodiscard]] VoxelData get(int row, int x) const;
   /// Requires: it is not empty. When it throws, nothing has changed.
   void put(int row, int x, const VoxelData& data);
-  /// Of the voxels of a row that are in `mask`.
+  /// Removes the data of the row's voxels in `mask`.
   void clear(int row, std::uint64_t mask);
   [[nodiscard]] std::size_t allocated() const;
 
@@ -72,7 +72,7 @@ class ChunkData : public RefCounted {
   [[nodiscard]] bool operator==(const ChunkData& other) const;
   [[nodiscard]] std::size_t allocated() const;
 
-  /// Of a chunk; null where no voxel has any.
+  /// Returns the data of a chunk; null if no voxel has any.
   [[nodiscard]] static const ChunkData* of(const Chunk& chunk) { return chunk.data_.get(); }
 
  private:

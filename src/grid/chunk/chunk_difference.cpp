@@ -11,7 +11,7 @@
 namespace quoin {
 namespace {
 
-// Whether the indices of two chunks mean the same types, those that only one of them has apart.
+// Returns true if equal indices of two chunks mean the same type. Entries that only one of them has do not matter.
 bool share_palette(const ChunkStorage* a, const ChunkStorage* b) {
   if (a == nullptr || b == nullptr || a->bits != b->bits) return false;
   const std::size_t both = std::min(a->palette.size(), b->palette.size());
@@ -25,7 +25,7 @@ bool are_equal(const std::uint64_t* a, const std::uint64_t* b) {
   return other == 0;
 }
 
-// Whether two rows of so many bits a voxel are equal.
+// Returns true if two rows with `bits` bits per voxel are equal.
 bool are_rows_equal(const std::uint64_t* a, const std::uint64_t* b, int bits) {
   switch (bits) {
     case 1:
@@ -41,7 +41,7 @@ bool are_rows_equal(const std::uint64_t* a, const std::uint64_t* b, int bits) {
   }
 }
 
-// Whether a row is stored alike in both. Requires: they share a palette.
+// Returns true if a row is stored identically in both. Requires: they share a palette.
 bool is_stored_alike(const ChunkStorage& a, const ChunkStorage& b, int y, int z) {
   QUOIN_ASSERT(a.bits == b.bits, "they share a palette");
   const std::uint32_t in_a = a.slabs[ChunkStorage::slab_index(y, z)];

@@ -1,4 +1,4 @@
-// How a chunk keeps its voxels: palette, slots of slabs, and giving back what edits left unused.
+// The storage of a chunk's voxels: palette, slots of slabs, and release of memory that edits left unused.
 
 #include <algorithm>
 #include <bitset>
@@ -14,12 +14,12 @@
 namespace quoin {
 namespace {
 
-// What it costs to store a slab's voxels anew or to look through them, in changes of single voxels.
+// The cost of repacking a slab's voxels or scanning them, in changes of single voxels.
 constexpr std::uint32_t kCreditOfSlot = 4;
 constexpr std::uint32_t kMaxCredit = 1U << 30;
 constexpr std::size_t kAllTypes = std::size_t{1} << 16;
 
-// Calls `visit(type, voxels)` for the types of all voxels at 16 bits, several times for one.
+// Calls `visit(type, voxels)` for the types of all voxels at 16 bits; several calls may have the same type.
 template <class Visit>
 void for_each_type(const ChunkStorage& m, Visit&& visit) {
   std::array<VoxelType, kChunkEdge> row{};
@@ -49,7 +49,7 @@ std::vector<std::uint32_t> count_types(const ChunkStorage& m) {
   return voxels;
 }
 
-// Requires: the voxels have a palette, and `bits` are enough for what is used of it.
+// Requires: the voxels have a palette, and `bits` suffice for its used entries.
 Numbering numbering_of_palette(const ChunkStorage& m, int bits) {
   Numbering to;
   if (bits == 16) {
@@ -172,8 +172,8 @@ void Chunk::release_slot(std::size_t slab, std::uint32_t index) {
   ++m.free_count;
 }
 
-// Notices what a write of `index` to a row made uniform or left unused. Voxels are stored anew for fewer bits only
-// where as many changed before, so that edits that come and go cost a bounded time each.
+// Detects rows and palette entries that a write of `index` made uniform or unused. Repacks voxels to fewer bits only
+// after enough changes, so that alternating edits have a bounded cost each.
 void Chunk::after_writing(int y, int z, std::uint32_t index, std::uint32_t changed) {
   constexpr std::uint32_t kFewFree = 8;
   ChunkStorage& m = *storage_;
@@ -198,7 +198,7 @@ std::size_t Chunk::used_types() const {
   return seen.count();
 }
 
-// Gives back what edits left behind, where that is much.
+// Releases memory that edits left unused, if it is large.
 void Chunk::tidy() {
   constexpr std::uint32_t kSoon = 64;
   ChunkStorage& m = *storage_;
@@ -217,7 +217,7 @@ void Chunk::tidy() {
   }
 }
 
-// Whether all slabs are of the same one type.
+// Returns true if all slabs are uniform with the same type.
 bool Chunk::is_one_entry() const {
   const std::uint32_t first = storage_->slabs[0];
   return (first & ChunkStorage::kUniformSlab) != 0 &&
@@ -225,7 +225,7 @@ bool Chunk::is_one_entry() const {
                      [first](std::uint32_t entry) { return entry == first; });
 }
 
-// Stores the voxels anew, `bits` wide, without free slots and unused palette entries.
+// Repacks the voxels with `bits` bits each, without free slots and unused palette entries.
 void Chunk::repack(int bits) {
   ChunkStorage& m = *storage_;
   Numbering to = m.direct() ? numbering_of_types(m, bits) : numbering_of_palette(m, bits);
@@ -278,7 +278,7 @@ std::size_t Chunk::bytes() const {
 void Chunk::compact() {
   if (storage_ == nullptr) return;
   if (is_one_entry()) return fill(get(0, 0, 0));
-  // What others share they would keep all the same.
+  // Copies would keep the shared memory anyway.
   if (storage_.is_shared() || storage_->words.has_shared_pages()) return;
   repack(bits_for(used_types()));
   storage_->palette.shrink_to_fit();

@@ -34,7 +34,8 @@ inline constexpr int kSlabRows = 16;
 struct ChunkStorage : RefCounted {
   static constexpr std::uint32_t kUniformSlab = 0x8000'0000U;
   static constexpr std::uint32_t kNoSlot = 0xFFFF'FFFFU;
-  /// Of types at 16 bits: so few that a chunk can keep their counts, so many that 256 types or fewer show.
+  /// Number of remainders that types are counted by at 16 bits: small enough for a table per chunk, large enough to
+  /// detect 256 types or fewer.
   static constexpr std::uint32_t kRemainders = 1'024;
   int bits = 1;                            ///< a voxel: 1, 2, 4, 8 or 16
   std::vector<VoxelType> palette;          ///< type of each index; unused at 16 bits, where the index is the type
@@ -45,15 +46,15 @@ struct ChunkStorage : RefCounted {
   int non_air = 0;
   std::uint32_t used = 0;              ///< entries of `counts` that are not 0
   std::uint32_t recent = 0;            ///< palette index that was written last
-  std::uint32_t credit = 0;            ///< voxels that changed, less what storing them anew has cost since
-  std::uint32_t count_at = 0;          ///< at 16 bits: the credit from which on types may be counted
-  std::uint32_t first_free = kNoSlot;  ///< a slot that no slab has; its first word holds the next one
+  std::uint32_t credit = 0;            ///< voxels changed, minus the cost of repacking
+  std::uint32_t count_at = 0;          ///< at 16 bits: credit required before types are counted
+  std::uint32_t first_free = kNoSlot;  ///< a slot that no slab uses; its first word holds the next one
   std::uint32_t free_count = 0;
   std::uint32_t slot_count = 0;  ///< free ones included
 
-  /// Of a chunk; null when it is uniform.
+  /// Returns the storage of a chunk; null if it is uniform.
   [[nodiscard]] static const ChunkStorage* of(const Chunk& chunk) { return chunk.storage_.get(); }
-  /// A chunk of these voxels. Requires: of two types at least; counts, layers and slabs agree with `words`.
+  /// Creates a chunk from storage. Requires: at least two types; counts, layers and slabs agree with `words`.
   [[nodiscard]] static Chunk chunk_of(Ref<ChunkStorage> storage) {
     QUOIN_ASSERT(storage != nullptr && storage->used >= 2, "voxels of several types");
     Chunk chunk;
@@ -121,7 +122,7 @@ struct ChunkStorage : RefCounted {
   return mixed != nullptr ? mixed->non_air : chunk.non_air_count();
 }
 
-// What is about to be written: of this chunk alone.
+// Returns storage that only this chunk uses, for writing.
 inline ChunkStorage& Chunk::own() {
   if (storage_.is_shared()) [[unlikely]]
     copy_storage();

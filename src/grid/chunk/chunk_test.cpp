@@ -16,8 +16,8 @@ std::size_t dense_index(int x, int y, int z) {
   return static_cast<std::size_t>((z * kChunkEdge + y) * kChunkEdge + x);
 }
 
-// What the asserts within Chunk are too cheap to see: slots are one slab's or free, and all counts are those of the
-// voxels.
+// Checks the invariants that are too expensive for asserts: each slot belongs to one slab or is free, and all counts
+// match the voxels.
 void expect_books_agree(const Chunk& chunk) {
   const ChunkStorage* const m = ChunkStorage::of(chunk);
   if (m == nullptr) return;
@@ -108,7 +108,7 @@ TEST(Chunk, FilledVoxelByVoxelBecomesUniform) {
   EXPECT_EQ(chunk.uniform(), 9);
 }
 
-// Each width is reached by having that many types; the chunk must hold what a plain array holds.
+// Uses enough types to reach each bit width, and compares the chunk with a plain array.
 class ChunkOfTypes : public testing::TestWithParam<int> {};
 
 TEST_P(ChunkOfTypes, HoldsWhatAPlainArrayHolds) {

@@ -15,19 +15,19 @@
 
 namespace quoin {
 
-/// Words in pages that copies share until one of them writes to a page: what a copy costs, and a write to one, does not
-/// grow with the words there are.
+/// Words in pages that copies share until one of them writes to a page. The costs of a copy and of a first write do not
+/// depend on the number of words.
 ///
-/// Threads: as copies of a Ref. What has owners of its own may be copied by several threads at once, and is written by
-/// one that has seen that it is the only owner (Ref::is_shared).
+/// Threads: as for copies of a Ref. An object with several owners may be copied by several threads at once. Only a
+/// thread that has seen that it is the sole owner may write it (Ref::is_shared).
 class PagedWords {
  public:
   static constexpr std::size_t kPageWords = 512;
-  static constexpr std::size_t kMaxWords = 65'536;  // of a chunk at 16 bits a voxel
+  static constexpr std::size_t kMaxWords = 65'536;  // for a chunk at 16 bits per voxel
   static constexpr std::size_t kMaxPages = kMaxWords / kPageWords;
 
   PagedWords() = default;
-  /// Zeros, or these; no more room than they take.
+  /// Creates zeros or a copy of `words`, without spare capacity.
   explicit PagedWords(std::size_t zeros);
   explicit PagedWords(std::span<const std::uint64_t> words);
   PagedWords(const PagedWords& other) : pages_(other.pages_), size_(other.size_) { other.share(); }
@@ -47,49 +47,49 @@ class PagedWords {
   ~PagedWords() = default;
 
   [[nodiscard]] std::size_t size() const { return size_; }
-  /// That word and those after it in its page.
+  /// Returns a pointer to the word and those after it in its page.
   [[nodiscard]] const std::uint64_t* at(std::size_t word) const {
     QUOIN_ASSERT(word < size_, "a word that there is");
     return pages_[word / kPageWords]->words() + word % kPageWords;
   }
-  /// Whether its page is known to be this one's alone.
+  /// Returns true if its page is known to be unshared.
   [[nodiscard]] bool owns(std::size_t word) const {
     const std::size_t page = word / kPageWords;
     return (own_[page / 64].load(std::memory_order_relaxed) >> (page % 64) & 1U) != 0;
   }
-  /// The same, to be written. Requires: `owns(word)`.
+  /// Returns writable words. Requires: `owns(word)`.
   [[nodiscard]] std::uint64_t* own_at(std::size_t word) {
     QUOIN_ASSERT(word < size_ && owns(word), "a word whose page was made one's own");
     return pages_[word / kPageWords]->words() + word % kPageWords;
   }
-  /// Copies its page where others have it, too. Requires: this is not shared.
+  /// Copies the page of the word if it is shared. Requires: this object is not shared.
   void make_own(std::size_t word) {
     if (!owns(word)) make_page_own(word / kPageWords);
   }
-  /// Adds words of any value at the end; the pages that they are in are then this one's own. Requires: this is not
-  /// shared; at most kMaxWords.
+  /// Appends words with unspecified values; their pages become unshared. Requires: this object is not shared; at most
+  /// kMaxWords.
   void grow(std::size_t size);
-  /// Gives back the room that growing left.
+  /// Releases the spare capacity.
   void shrink_to_fit();
-  /// For each page: its words.
+  /// Calls the function with the words of each page.
   template <class Visit>
   void for_each_page(Visit&& visit) const {
     for (std::size_t first = 0; first < size_; first += kPageWords) {
       visit(std::span(pages_[first / kPageWords]->words(), std::min(kPageWords, size_ - first)));
     }
   }
-  /// Whether others have some of the pages, too.
+  /// Returns true if some pages are shared with copies.
   [[nodiscard]] bool has_shared_pages() const {
     return std::ranges::any_of(pages_, [](const Ref<Page>& page) { return page.is_shared(); });
   }
-  /// Bytes allocated, those that are shared too.
+  /// Returns the allocated bytes, including shared ones.
   [[nodiscard]] std::size_t allocated() const;
 
  private:
-  // The words lie behind it.
+  // The words follow it in memory.
   class alignas(16) Page : public RefCounted {
    public:
-    // Words of any value.
+    // Words with unspecified values.
     static Ref<Page> make(std::size_t capacity);
     static void operator delete(void* page) { ::operator delete(page); }
     [[nodiscard]] std::size_t capacity() const { return capacity_; }
@@ -101,7 +101,7 @@ class PagedWords {
     std::uint32_t capacity_;
   };
 
-  // A copy was made.
+  // Clears the bits after a copy.
   void share() const {
     for (auto& bits : own_) bits.store(0, std::memory_order_relaxed);
   }
@@ -110,9 +110,9 @@ class PagedWords {
   }
   void add_page(std::size_t capacity);
   void make_page_own(std::size_t page);
-  // The page anew, with room for so many words.
+  // Replaces a page by a copy with the given capacity.
   void replace_page(std::size_t page, std::size_t capacity);
-  // That a page is own. Nobody else writes the bits, since this is not shared.
+  // Marks a page as unshared. No other thread writes the bits, since this object is not shared.
   void mark_own(std::size_t page) {
     std::atomic<std::uint64_t>& bits = own_[page / 64];
     bits.store(bits.load(std::memory_order_relaxed) | std::uint64_t{1} << (page % 64), std::memory_order_relaxed);
@@ -121,7 +121,7 @@ class PagedWords {
 
   std::vector<Ref<Page>> pages_;
   std::size_t size_ = 0;
-  // Pages that no other has, as far as is known: whoever copies this, which is shared then, takes the bits away.
+  // Pages known to be unshared. A copy of this object, which is shared then, clears the bits.
   mutable std::array<std::atomic<std::uint64_t>, kMaxPages / 64> own_{};
 };
 

@@ -20,7 +20,7 @@ namespace quoin {
 inline std::uint64_t run_starts(std::uint64_t row) {
   return row & ~(row << 1);
 }
-/// How many ones; quick where there is at most one, as in most rows of runs, since counting may be a call.
+/// Counts set bits. Fast for at most one bit, the usual case for rows of runs, since popcount may be a function call.
 inline std::uint32_t count_ones(std::uint64_t word) {
   if ((word & (word - 1)) == 0) return static_cast<std::uint32_t>(word != 0);
   return static_cast<std::uint32_t>(std::popcount(word));
@@ -28,7 +28,7 @@ inline std::uint32_t count_ones(std::uint64_t word) {
 inline std::uint32_t count_runs(std::uint64_t row) {
   return count_ones(run_starts(row));
 }
-/// Which run of the row holds a voxel. Requires: one does.
+/// Returns the index of the run that contains a voxel. Requires: such a run exists.
 inline std::uint32_t run_of(std::uint64_t row, int x) {
   QUOIN_ASSERT((row >> x & 1U) != 0, "a voxel of a run");
   const std::uint64_t up_to_x = (std::uint64_t{2} << x) - 1;
@@ -39,14 +39,14 @@ inline std::uint64_t without_lowest_run(std::uint64_t row) {
   return row & (row + (row & (~row + 1)));
 }
 
-/// Calls `touch(x in a, x in b)` so often that all runs of two rows side by side that touch are told of.
+/// Calls `touch(x in a, x in b)` for all pairs of touching runs in two neighbouring rows, at least once per pair.
 template <class Touch>
 void for_each_contact(std::uint64_t a, std::uint64_t b, Connectivity connectivity, Touch&& touch) {
   for (std::uint64_t both = a & b; both != 0; both = without_lowest_run(both)) {
     touch(std::countr_zero(both), std::countr_zero(both));
   }
   if (connectivity == Connectivity::Faces6) return;
-  // What touches only across: just beyond the ends of the runs of `a`.
+  // Diagonal contacts: just past the ends of the runs of `a`.
   for (std::uint64_t above = (a << 1) & ~a & b; above != 0; above &= above - 1) {
     touch(std::countr_zero(above) - 1, std::countr_zero(above));
   }
@@ -55,11 +55,11 @@ void for_each_contact(std::uint64_t a, std::uint64_t b, Connectivity connectivit
   }
 }
 
-/// Sets of numbers that are united one by one. The least of a set stands for it.
+/// A union-find structure. The least number of a set represents it.
 template <class Index>
 class UnionFind {
  public:
-  /// Every number a set of its own.
+  /// Each number starts as a separate set.
   void reset(std::size_t count) {
     parents_.resize(count);
     for (std::size_t i = 0; i < count; ++i) parents_[i] = static_cast<Index>(i);
@@ -86,12 +86,12 @@ class UnionFind {
   std::vector<Index> parents_;
 };
 
-/// What of a piece is connected within one chunk; in the chunk's coordinates.
+/// A connected component within one chunk; in the chunk's coordinates.
 struct ChunkPart {
   std::array<std::uint8_t, 3> min{};
   std::array<std::uint8_t, 3> last{};  ///< included
   std::uint32_t voxels = 0;
-  std::uint32_t first = 0;  ///< (z * 64 + y) * 64 + x of the voxel that comes first
+  std::uint32_t first = 0;  ///< (z * 64 + y) * 64 + x of the first voxel
 
   [[nodiscard]] IBox box() const { return {IVec3(min[0], min[1], min[2]), IVec3(last[0], last[1], last[2]) + 1}; }
   [[nodiscard]] IVec3 first_voxel() const {
@@ -99,13 +99,13 @@ struct ChunkPart {
   }
 };
 
-/// The parts of one chunk, and which voxels they have. Shares the chunk.
+/// The parts of one chunk and their voxels. Shares the chunk.
 ///
-/// Of a chunk of one part nothing more is kept: its voxels are those that belong. Else a number a run says which part
-/// it is of; the runs are found again from the chunk.
+/// A chunk with one part stores no more than the rule that selects its voxels. Otherwise each run has the number of its
+/// part; the runs themselves are found in the chunk again.
 class ChunkParts {
  public:
-  /// Scratch memory for finding parts; one a thread.
+  /// Scratch memory for finding parts; one per thread.
   struct Scratch {
     std::array<std::uint64_t, std::size_t{kChunkEdge} * kChunkEdge> rows;
     std::array<std::uint32_t, std::size_t{kChunkEdge} * kChunkEdge> first_runs;
@@ -118,20 +118,20 @@ class ChunkParts {
 
   [[nodiscard]] std::span<const ChunkPart> parts() const { return parts_; }
   [[nodiscard]] const Chunk& chunk() const { return chunk_; }
-  /// The same voxels with other data. Requires: the types are the same.
+  /// Replaces the chunk by one with the same types and other data.
   void take_data(const Chunk& chunk) { chunk_ = chunk; }
-  /// The voxels of a row that belong to parts.
+  /// Returns the voxels of a row that belong to parts.
   [[nodiscard]] std::uint64_t row(int y, int z) const;
-  /// The part of a voxel of a row. Requires: `row` is that row, and has the voxel.
+  /// Returns the part of a voxel of a row. Requires: `row` is that row and contains the voxel.
   [[nodiscard]] std::uint32_t part_at(std::uint64_t row, int x, int y, int z) const {
     return parts_.size() == 1 ? 0 : part_of_run(first_run(y, z) + run_of(row, x));
   }
-  /// Those voxels of a row that are of one part. Requires: as `part_at`.
+  /// Returns the voxels of a row that belong to one part. Requires: as `part_at`.
   [[nodiscard]] std::uint64_t row_of_part(std::uint64_t row, int y, int z, std::uint32_t part) const;
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  // How to find which voxels of a row belong.
+  // The rule that selects the voxels of a row.
   enum class Rule : std::uint8_t { AllButAir, OnlyListed, AllButListed, Search };
 
   void choose_rule(const ConnectedOptions& options);
@@ -149,12 +149,12 @@ class ChunkParts {
 
   Chunk chunk_;
   Rule rule_ = Rule::AllButAir;
-  std::vector<VoxelType> types_;  // that the rule speaks of, ascending
+  std::vector<VoxelType> types_;  // types listed by the rule, ascending
   std::vector<ChunkPart> parts_;
   std::vector<std::uint32_t> layer_starts_;  // [z]: the first run of the layer
-  std::vector<std::uint16_t> row_starts_;    // [z * 64 + y]: of the row, from there
-  std::vector<std::uint8_t> few_parts_;      // [run], where there are at most 256 parts
-  std::vector<std::uint32_t> many_parts_;    // [run] elsewhere
+  std::vector<std::uint16_t> row_starts_;    // [z * 64 + y]: first run of the row, relative to its layer
+  std::vector<std::uint8_t> few_parts_;      // [run], if there are at most 256 parts
+  std::vector<std::uint32_t> many_parts_;    // [run], otherwise
 };
 
 }  // namespace quoin

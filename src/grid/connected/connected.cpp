@@ -1,5 +1,5 @@
-// Runs of voxels are joined into parts of chunks (chunk_parts.h), parts that touch across the chunks' sides are linked,
-// and linked parts are pieces. An edit finds the parts of its chunks anew, and their links; pieces are made of all
+// Runs of voxels are joined into parts of chunks (chunk_parts.h). Parts that touch across chunk borders are linked, and
+// linked parts form pieces. An edit recomputes the parts and links of its chunks. Pieces are rebuilt from all
 // links, which are few.
 
 #include <quoin/grid/connected.h>
@@ -86,7 +86,7 @@ class Linker {
   }
 
  private:
-  // The coordinates from which a step of -1, 0 or 1 leads into a chunk at an offset.
+  // Returns the range of coordinates that a step of -1, 0 or 1 moves into the chunk at an offset.
   static std::pair<int, int> rows_that_reach(int offset, int step) {
     const int first = std::max(offset * kChunkEdge - step, 0);
     return {first, std::min((offset + 1) * kChunkEdge - step, kChunkEdge)};
@@ -114,7 +114,7 @@ class Linker {
   std::vector<Link> links_;
 };
 
-// Whether a part has a voxel at that side, edge or corner of its chunk which lies towards a neighbour.
+// Returns true if a part has a voxel at the side, edge or corner of its chunk towards a neighbour.
 bool touches(const ChunkParts& parts, std::uint32_t part, IVec3 towards) {
   const IBox box = parts.parts()[part].box();
   IBox side{IVec3(0), IVec3(kChunkEdge)};
@@ -193,7 +193,7 @@ struct ConnectedPieces::Impl {
       i = end;
     }
   }
-  // Whether the nodes are all that the chunk holds besides air.
+  // Returns true if the nodes contain all non-air voxels of the chunk.
   static bool are_all(const Entry& entry, std::span<const std::size_t> of_piece) {
     std::int64_t voxels = 0;
     for (const std::size_t node : of_piece) voxels += entry.parts.parts()[node - entry.first_node].voxels;
@@ -205,7 +205,7 @@ struct ConnectedPieces::Impl {
   [[nodiscard]] std::vector<std::size_t> listed(const IBox& box, bool touching) const;
 };
 
-// Makes the parts of these chunks anew.
+// Recomputes the parts of these chunks.
 void ConnectedPieces::Impl::find_parts(const Grid& grid, const std::vector<IVec3>& chunks, Threads threads) {
   std::vector<ChunkParts> made(chunks.size());
   const std::size_t tasks = std::min<std::size_t>(chunks.size(), std::size_t{8} * thread_count(threads));
@@ -264,7 +264,7 @@ void ConnectedPieces::Impl::find_links(const std::vector<IVec3>& chunks, Threads
   }
 }
 
-// Finds again which parts of these chunks and of those around them touch what is not loaded.
+// Recomputes which parts of these chunks and their neighbours touch unloaded chunks.
 void ConnectedPieces::Impl::find_open_parts(const Grid& grid, const std::vector<IVec3>& chunks) {
   if (!grid.is_partial()) return;
   std::vector<IVec3> around;
@@ -449,7 +449,7 @@ void ConnectedPieces::update(const Grid& grid, Threads threads) {
   ChangeCursor now = content_of(impl_).followed;
   ChangeCursor of_data = now;
   const GridChanges changes = grid.changes_since(now);
-  // What became another type as well is found anew below.
+  // Voxels that also changed their type are handled below.
   for (const DataChange& change : grid.data_changes_since(of_data).items) {
     content_of(impl_).take_data(change.chunk, grid.find_chunk(change.chunk));
   }
@@ -514,7 +514,7 @@ Grid ConnectedPieces::extract(std::size_t piece) const {
       grid.write_row(entry.at * kChunkEdge + row, voxels, types);
     });
     entry.parts.chunk().for_each_data([&](IVec3 local, const VoxelData& data) {
-      // Where the piece has nothing is air, which takes none.
+      // Outside of the piece there is air, which accepts no data.
       grid.set_data(entry.at * kChunkEdge + local, data);
     });
   });

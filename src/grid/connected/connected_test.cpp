@@ -174,7 +174,7 @@ TEST(ConnectedPieces, OfAnotherGridAreFoundAnew) {
   EXPECT_FALSE(pieces.piece_at({0, 0, 0}).has_value());
 }
 
-// Types by the hundred, of which some belong.
+// Uses hundreds of types; only some belong.
 TEST(ConnectedPieces, OfManyTypesAreThoseOfAFloodFill) {
   Random random(3);
   Grid grid;
@@ -325,7 +325,7 @@ TEST(ConnectedPiecesDeathTest, APieceThatIsNotThereIsAMistake) {
   QUOIN_EXPECT_MISTAKE(pieces.for_each_row(1, [](IVec3, std::uint64_t) {}), "piece < size");
 }
 
-// Whether a voxel of a piece lies beside one that is not loaded, one voxel at a time.
+// Returns true if a voxel of a piece is next to an unloaded one; checks voxel by voxel.
 bool touches_unloaded(const Grid& grid, const ConnectedPieces& pieces, std::size_t piece, Connectivity connectivity) {
   bool found = false;
   pieces.for_each_row(piece, [&](IVec3 row, std::uint64_t voxels) {

@@ -78,7 +78,7 @@ class BoxCopy {
   [[nodiscard]] std::size_t source_axis(std::size_t axis) const {
     return static_cast<std::size_t>(orientation_.source_axis(static_cast<int>(axis)));
   }
-  // Where a part of the turned box comes from, and where a part of the box goes.
+  // Returns the source box of a part of the turned box.
   [[nodiscard]] LongBox source_of(const LongBox& part) const {
     LongBox source;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -209,7 +209,7 @@ class BoxCopy {
     }
   }
 
-  // Of what is not loaded as a whole, each chunk that is.
+  // Copies each loaded chunk of a source that is only partly loaded.
   void copy_loaded(const LongBox& source, const IBox& chunks) {
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {
@@ -223,7 +223,7 @@ class BoxCopy {
     }
   }
 
-  // Where a chunk arrives as it is, data and all.
+  // Returns true if a chunk is copied unchanged, including its data.
   bool is_shared_whole(IVec3 at, const IBox& chunks, const IBox& place) {
     if (place.size() != IVec3(kChunkEdge) || orientation_ != AxisOrientation() || chunks.size() != IVec3(1))
       return false;
@@ -253,7 +253,7 @@ class BoxCopy {
     }
   }
 
-  // Puts what comes from the chunks that a part of the box meets into the block, turned.
+  // Copies the chunks that a part of the box overlaps into the block, turned.
   void gather(const LongBox& source, const IBox& chunks) {
     for (int z = chunks.min.z; z < chunks.max.z; ++z) {
       for (int y = chunks.min.y; y < chunks.max.y; ++y) {

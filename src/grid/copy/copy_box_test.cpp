@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kWorldEdge = std::numeric_limits<int>::max() / kChunkEdge * kChunkEdge;
 
-// Where a voxel of the box arrives, by the definition.
+// Returns the target of a voxel of the box, by definition.
 IVec3 arrival(IVec3 voxel, const IBox& box, IVec3 to_min, AxisOrientation orientation) {
   const IVec3 turned = orientation.apply(voxel - box.min);
   const IVec3 far = orientation.apply(box.size() - 1);

@@ -27,7 +27,7 @@ class TurnedBlock {
   /// box, before it is turned.
   void put(const Chunk* chunk, const IBox& part, IVec3 offset);
 
-  /// Calls `change(type)` for what was put, and puts what it returns.
+  /// Replaces the type of each put voxel by `change(type)`.
   template <class Change>
   void change_types(Change&& change) {
     for (int z = part_.min.z; z < part_.max.z; ++z) {
@@ -37,7 +37,7 @@ class TurnedBlock {
       }
     }
   }
-  /// What is neither put nor cleared is not to be read.
+  /// Returns the types of the chunk. Positions that were neither put nor cleared are undefined.
   [[nodiscard]] std::span<const VoxelType, kChunkVoxels> types() const {
     return std::span<const VoxelType, kChunkVoxels>(types_.get(), kChunkVoxels);
   }

@@ -14,18 +14,18 @@
 
 namespace quoin {
 
-/// Densities of the eight corners of a cell between samples: corner i lies `size` samples further along x, y and z
-/// where bit 0, 1 and 2 of i are set.
+/// Reads the densities of the eight corners of a cell between samples. Corner i lies `size` samples further along x, y
+/// and z if bit 0, 1 and 2 of i are set.
 ///
-/// `find_chunk(IVec3 chunk)` returns the chunk at a place, null where all is `outside()`; it is asked once for each
-/// chunk that the corners lie in. Requires: 0 < size < 64, corners within int32.
+/// `find_chunk(IVec3 chunk)` returns a chunk, or null if all its samples are `outside()`; called once for each chunk
+/// with corners. Requires: 0 < size < 64, corners within int32.
 template <class Number, class FindChunk, class Outside>
 inline void read_cell_corners(IVec3 first, int size, const FindChunk& find_chunk, const Outside& outside,
                               Number* corners) {
   QUOIN_ASSERT(size > 0 && size < kChunkEdge, "0 < size < 64");
   const IVec3 chunk = chunk_of(first);
   const IVec3 local = local_of(first);
-  const int last = kChunkEdge - 1 - size;  // from beyond which the next chunk is reached
+  const int last = kChunkEdge - 1 - size;  // beyond it the next chunk begins
   const unsigned beyond = unsigned{local.x > last} | unsigned{local.y > last} << 1 | unsigned{local.z > last} << 2;
   if (beyond == 0) {
     const DensityChunk* const one = find_chunk(chunk);

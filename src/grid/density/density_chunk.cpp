@@ -28,7 +28,7 @@ std::uint64_t solid_bits(const Half* row) {
   return mask;
 }
 
-// Whether it is none of what no `stored_density` is, whatever the band: -0, an infinity, NaN.
+// Returns false for values that no band stores: -0, infinities, NaN.
 [[maybe_unused]] bool is_stored(Half density) {
   return density != 0x8000U && (density & 0x7C00U) != 0x7C00U;
 }
@@ -185,7 +185,7 @@ void DensityChunk::unite_slabs() {
 void DensityChunk::compact() {
   unite_slabs();
   materials_.compact();
-  // What others share they would keep all the same.
+  // Copies would keep the shared memory anyway.
   if (storage_ == nullptr || storage_.is_shared()) return;
   std::vector<Half> values;
   DensityStorage& m = *storage_;

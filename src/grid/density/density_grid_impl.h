@@ -33,13 +33,13 @@ struct DensityGrid::Impl {
   BoundsCache<DensityRecord, ChunkTrie<DensityStore::Entry>, SolidBox> solid;
 };
 
-// What a field that was moved from has no more. Single samples and chunks go without the question.
+// Asserts that the field was not moved from. Accesses to single samples and chunks skip this check.
 inline DensityGrid::Impl& DensityGrid::impl() const {
   QUOIN_ASSERT(impl_ != nullptr, "a field that was not moved from");
   return *impl_;
 }
 
-/// Gives notice, where it ends, of what was edited while it was there, also when that threw.
+/// Notifies followers, on destruction, of edits made during its lifetime, even after an exception.
 class NoticeOfEdits {
  public:
   NoticeOfEdits(const DensityStore& store, EditNotice& notice)

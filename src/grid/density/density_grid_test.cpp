@@ -39,7 +39,7 @@ TEST(DensityGrid, WhatWasNeverSetIsFarAir) {
   EXPECT_EQ(DensityGrid(3.0001F).band(), 3.0F);
 }
 
-/// A random set, edit or whole chunk, done to both fields; answers what changed.
+/// Applies a random set, edit or whole chunk to both fields. Returns the changed samples.
 std::vector<IVec3> change_both(std::mt19937& random, int round, DensityGrid& grid, PlainField& plain) {
   const IVec3 at = IVec3(random() % 128, random() % 128, random() % 128) - 64;
   const DensitySample value{static_cast<float>(random() % 21) - 10.0F, static_cast<VoxelType>(random() % 3)};

@@ -9,7 +9,7 @@
 
 namespace quoin {
 
-/// Densities and materials of a box, each in its own place: what a density grid must agree with.
+/// The densities and materials of a box in plain arrays, as an oracle for density grids.
 class PlainField {
  public:
   PlainField(const IBox& box, float band)

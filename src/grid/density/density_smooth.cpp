@@ -103,7 +103,7 @@ Smoothed smoothed(const DensityStore& store, const Brush& brush, const ChunkPart
   return result;
 }
 
-// The parts of chunks within a box that can change: far air changes beside a chunk only.
+// Returns the parts of a box that can change: far air changes only next to a chunk.
 std::vector<ChunkPart> parts_near_chunks(const DensityStore& store, const LongBox& box) {
   std::vector<IVec3> chunks;
   const IBox wanted = chunks_of(box);
@@ -134,7 +134,7 @@ std::int64_t DensityGrid::smooth(DVec3 centre, double radius, double strength) {
   std::vector<Smoothed> news;
   Window window;
   for (const ChunkPart& part : parts_near_chunks(store, box)) {
-    if (!is_loaded_around(part.chunk)) continue;  // what it would flow together with is not known
+    if (!is_loaded_around(part.chunk)) continue;  // the result would depend on unknown samples
     const DensityNeighbourhood around = neighbourhood(part.chunk);
     if (is_one_value(around)) continue;
     window.read(around, part.box);

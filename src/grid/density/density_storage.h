@@ -15,9 +15,9 @@ namespace quoin {
 
 /// The densities of a chunk of several. Shared by copies of the chunk until one of them is written.
 struct DensityStorage : RefCounted {
-  /// Of a chunk; null when it is uniform.
+  /// Returns the storage of a chunk; null if it is uniform.
   [[nodiscard]] static const DensityStorage* of(const DensityChunk& chunk) { return chunk.storage_.get(); }
-  /// A chunk of these densities. Requires: of two at least; each a `stored_density`, `solid` agrees with them.
+  /// Creates a chunk of these densities. Requires: at least two values; each is a `stored_density`, and `solid` agrees.
   [[nodiscard]] static DensityChunk chunk_of(Ref<DensityStorage> storage, Chunk materials) {
     DensityChunk chunk(Half{0});
     chunk.storage_ = std::move(storage);

@@ -36,7 +36,7 @@ bool are_one_value(const DensityChunk& a, const DensityChunk& b, int y, int z) {
   return material.has_value() && material == b.materials().uniform();
 }
 
-// Whether every density is one that edits within this band store.
+// Returns true if edits within this band could have stored every density.
 [[maybe_unused]] bool is_stored_within(const DensityChunk& samples, Half far) {
   const auto is_stored = [far](Half density) { return stored_within(float_from_half(density), far) == density; };
   for (int z = 0; z < kChunkEdge; ++z) {
@@ -174,7 +174,7 @@ void DensityStore::make_partial() {
   loaded_.begin();
 }
 
-// Nobody looks at each sample here, as `put` does: chunks are loaded on threads that must not wait.
+// Skips the per-sample checks of `put`: chunks are loaded on threads that must not wait.
 bool DensityStore::load(IVec3 chunk, DensityChunk samples) {
   if (!loaded_.add(chunk)) return false;
   samples.unite_slabs();

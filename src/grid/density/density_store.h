@@ -25,11 +25,11 @@ struct SampleRow {
   std::array<VoxelType, kChunkEdge> materials{};  ///< air where the density is far air
 };
 
-/// What an edit does to a chunk.
+/// The effect of an edit on a whole chunk.
 enum class ChunkEdit : std::uint8_t {
   Nothing,
-  Rows,   ///< it must look at the samples
-  Solid,  ///< all samples become solid, as far from the surface as can be
+  Rows,   ///< the edit must process the samples
+  Solid,  ///< all samples become solid, as far from the surface as possible
 };
 
 /// Some samples of a chunk; `box` is in the chunk's coordinates.
@@ -61,7 +61,7 @@ class DensityStore {
     const IVec3 local = local_of(sample);
     return entry->samples.get(local.x, local.y, local.z);
   }
-  /// Air where the density is far air, whatever is stored there.
+  /// Returns air if the density is far air, even if another material is stored.
   [[nodiscard]] VoxelType material(IVec3 sample) const;
 
   /// Edits the samples of a box, clipped to the world, chunk by chunk in the order of z, y, x. Returns how many

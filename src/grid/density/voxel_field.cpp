@@ -19,16 +19,17 @@
 namespace quoin {
 namespace {
 
-// Squared distances are bytes: what is farther than the reach counts as one more.
+// Squared distances are stored in bytes; anything beyond the reach is clamped to reach + 1.
 constexpr int kReach = 8;
 constexpr int kFarSquared = (kReach + 1) * (kReach + 1);
 // Half the width of the smoothing kernel.
 constexpr int kBlur = 2;
-constexpr int kSmoothed = kChunkEdge + 2 * kBlur;  // samples whose distance is wanted, along an edge
+constexpr int kSmoothed = kChunkEdge + 2 * kBlur;  // samples per edge with a wanted distance
 constexpr int kMargin = kReach + kBlur;
 constexpr int kRegion = kChunkEdge + 2 * kMargin;  // voxels that are looked at, along an edge
 constexpr int kPitch = 80;                         // kSmoothed, rounded up to whole vectors
-// Solid voxels keep more of their own distance of 0.5 than air does: what is one voxel thick would shrink to a wire.
+// Solid voxels keep more of their distance of 0.5 than air does; otherwise features one voxel thick would shrink to a
+// wire.
 constexpr float kLeastSolid = 0.35F;
 constexpr float kLeastAir = 0.1F;
 constexpr float kBand = 8.0F;
@@ -75,7 +76,7 @@ void for_each_row(const Window& window, int more_y, int more_z, Visit visit) {
   }
 }
 
-// Which voxels of a row of the neighbourhood's chunks are not air. Requires: -64 <= y, z < 128.
+// Returns the non-air voxels of a row of the neighbourhood's chunks. Requires: -64 <= y, z < 128.
 std::uint64_t solid_row(const Neighbourhood& chunks, int dx, int y, int z) {
   QUOIN_ASSERT(y >= -kChunkEdge && y < 2 * kChunkEdge && z >= -kChunkEdge && z < 2 * kChunkEdge, "-64 <= y, z < 128");
   const Chunk* chunk = chunks.at(dx, y >> kChunkShift, z >> kChunkShift);
@@ -193,7 +194,7 @@ void blur_along_x(Scratch& scratch, const Window& window) {
   });
 }
 
-// Smooths a row of 64 with those beside it, `stride` values apart.
+// Smooths a row of 64 with its neighbouring rows, `stride` values apart.
 void blur_rows(const float* first, std::size_t stride, float* out) {
   for (std::size_t x = 0; x < kChunkEdge; ++x) {
     const float* d = first + x;

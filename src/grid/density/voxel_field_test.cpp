@@ -72,7 +72,7 @@ TEST(VoxelField, AgreesWithTheSlowWay) {
       IVec3 p;
       do {
         p = IVec3(random() % 110, random() % 110, random() % 110) - 30;
-        // Every other one beside the surface, where the least densities decide.
+        // Every other sample is next to the surface, where the minimum densities apply.
       } while (round % 2 == 1 && (grid.get(p) == kAir) == (grid.get(p + IVec3{0, 1, 0}) == kAir));
       const double expected = plain.density(p);
       EXPECT_NEAR(field.density(p), expected, std::abs(expected) / 1024.0 + 1e-4);

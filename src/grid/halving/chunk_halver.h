@@ -36,14 +36,14 @@ class ChunkHalver {
     VoxelType type = kAir;
     std::uint64_t cells = 0;
   };
-  /// How many faces of the voxels of four rows meet air, as binary numbers.
+  /// The number of exposed faces per voxel of four rows, as bit planes.
   using Exposed = std::array<std::array<std::uint64_t, 3>, 4>;
 
   /// `half` of the row of cells at (y, z).
   void fill_half(int half, int y, int z, std::uint64_t solid);
   void find_layers(const Chunk& chunk, std::uint32_t slab, int half, int y, int z);
   void fill_mixed(int half, int y, int z, std::uint64_t mixed);
-  /// Of the layers that occur in a cell.
+  /// Returns the heaviest of the layers in a cell.
   [[nodiscard]] std::size_t heaviest(const Exposed& exposed, int x) const;
   void add(VoxelType type, int half, std::uint64_t cells);
 

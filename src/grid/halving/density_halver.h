@@ -10,7 +10,7 @@
 
 namespace quoin {
 
-/// A chunk of a halved field, and what it has kept.
+/// A chunk of a halved field and the counts kept for updates.
 struct HalvedDensityChunk {
   DensityChunk samples{Half{0}};
   DownsampledDensityCounts counts;
@@ -30,7 +30,7 @@ class DensityHalver {
  private:
   static constexpr int kRows = kChunkEdge + 2;
 
-  /// Which samples of a coarse row are solid, bit by bit, and the one before and after.
+  /// The solid samples of a coarse row as bits, plus the sample before and the one after.
   struct Signs {
     std::uint64_t bits = 0;
     bool before = false;

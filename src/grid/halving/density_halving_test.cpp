@@ -216,7 +216,7 @@ TEST(DensityHalving, AnEditMakesAnewOnlyTheChunksThatReadIt) {
   pyramid.update(field, 1);
   const auto made_anew = [&](IVec3 sample) {
     ChangeCursor cursor = pyramid.level(1).cursor();
-    // Of every material once, so that there is always something new.
+    // Uses each material once, so that each edit makes a change.
     const auto material = static_cast<VoxelType>(field.material(sample) + 1);
     field.set(sample, {field.density(sample) < 0.0F ? -7.5F : -0.5F, material});
     std::vector<const DensityStorage*> before;

@@ -69,7 +69,7 @@ struct DensityLevel {
   std::map<IVec3, DownsampledDensityCounts, ByZyx> chunks;  // that hold any solid
   DownsampledDensityCounts counts;                          // of all
 
-  // Of another field its band may be another.
+  // Resets the level if the band of the finer field differs.
   void begin(const DensityGrid& finer) {
     const float band = DensityGrid(0.5F * finer.band()).band();
     if (content.band() == band) return;
@@ -86,7 +86,7 @@ struct DensityLevel {
   }
 };
 
-// What is kept of a level, and how far it has followed the finer one.
+// The stored data of a level and its read position in the changes of the finer level.
 template <class Halving, class Kept>
 struct Level : Kept {
   using Content = typename Halving::Content;
@@ -140,7 +140,7 @@ struct Levels {
       kept[i]->update(*finer, halving, threads);
       finer = &kept[i]->content;
       if (finer->chunk_count() != 0) continue;
-      // It stays, though it counts as none, so that the next edit does not make it anew.
+      // An empty level stays, although it does not count, so that the next edit does not rebuild it.
       kept.resize(i + 1);
       return;
     }

@@ -45,7 +45,7 @@ WordCells cells_of(const CellVoxels& voxels) {
   return cells;
 }
 
-// The rows of a chunk as masks of what is not air; looks air up in the palette once.
+// The rows of a chunk as masks of non-air voxels. Looks up air in the palette once.
 class SolidRows {
  public:
   explicit SolidRows(const Chunk& chunk) : voxels_(ChunkStorage::of(chunk)) {
@@ -100,7 +100,7 @@ class SolidRows {
   }
 
  private:
-  // All words first, in a loop of which compilers make vectors.
+  // Processes all words first, in a loop that compilers vectorise.
   void where_not_air_of_two_bits(const std::uint64_t* words, std::array<std::uint64_t, 16>& out) const {
     const std::uint64_t air = packed_row::repeat(2, air_);
     std::array<std::uint64_t, 32> halves;

@@ -8,7 +8,7 @@
 
 namespace quoin {
 
-/// The 32 even bits, side by side.
+/// Gathers the 32 even bits.
 constexpr std::uint64_t even_bits(std::uint64_t bits) {
   bits &= 0x5555'5555'5555'5555U;
   bits = (bits | bits >> 1) & 0x3333'3333'3333'3333U;
@@ -18,10 +18,10 @@ constexpr std::uint64_t even_bits(std::uint64_t bits) {
   return (bits | bits >> 16) & 0x0000'0000'FFFF'FFFFU;
 }
 
-/// Which voxels around one chunk of a halved grid are not air, and which of its cells are solid for that.
+/// The non-air voxels around one chunk of a halved grid, and the cells that are solid for that reason.
 ///
-/// Space: fine, voxels from the chunk's least corner, -2 to 129 on each axis; cells, -1 to 64. Of what lies outside
-///        only what shares a face with the inside is known.
+/// Space: fine, voxels from the chunk's least corner, -2 to 129 on each axis; cells, -1 to 64. Outside of the
+///        chunk, only voxels and cells that share a face with the inside are known.
 class HalvingMasks {
  public:
   /// `chunk` is of the halved grid.
@@ -31,11 +31,11 @@ class HalvingMasks {
   [[nodiscard]] const Chunk* octant(IVec3 octant) const { return chunks_[slot(octant)]; }
   /// The solid cells of a row, 0 <= y, z < 64.
   [[nodiscard]] std::uint64_t solid_cells(int y, int z) const;
-  /// The voxels of half a row that are not air, 0 <= y, z < 128; `half` 0 or 1.
+  /// Returns the non-air voxels of half a row, 0 <= y, z < 128; `half` is 0 or 1.
   [[nodiscard]] std::uint64_t voxels(int half, int y, int z) const {
     return fine(y, z)[static_cast<std::size_t>(half + 1)];
   }
-  /// How many faces of each voxel of half a row meet air, as binary numbers: [0] the ones, [1] the twos, [2] the fours.
+  /// Returns the number of exposed faces of each voxel of half a row, as bit planes: [0] ones, [1] twos, [2] fours.
   [[nodiscard]] std::array<std::uint64_t, 3> exposed_faces(int half, int y, int z) const;
 
  private:
@@ -43,7 +43,7 @@ class HalvingMasks {
   static constexpr int kRows = kFineEdge + 4;
   static constexpr int kCellRows = kChunkEdge + 2;
 
-  /// 64 cells along x, bit by bit, and the one before and after.
+  /// 64 cells along x as bits, plus the cell before and the one after.
   struct CellBits {
     std::uint64_t bits = 0;
     bool before = false;

@@ -156,7 +156,8 @@ class FieldSearch {
     const Cut below = cut_above_plane(piece);
     if (below == Cut::Nothing) return;
     if (much == Cut::Much || below == Cut::Much) return keep(piece);
-    // If the doubt is large, splits along the axis that causes it. Then tests all directions, then splits the longest side.
+    // If the doubt is large, splits along the axis that causes it. Then tests all directions, then splits the longest
+    // side.
     const int longest = greatest(piece.half);
     if (piece.doubt > 0.01 * std::sqrt(piece.square_of_slope) * piece.half[longest]) {
       const int axis = greatest(piece.twist);
@@ -180,10 +181,11 @@ class FieldSearch {
   }
 
   const Shape& shape_;
-  std::vector<FieldPiece> pieces_;  // a heap, the soonest first
+  std::vector<FieldPiece> pieces_;  // a heap, earliest contact first
 };
 
-/// a heap, earliest contact first
+/// Returns the first cell (by z, y, x) whose solid a resting shape overlaps deeper than kFieldTouch. Only solid
+/// with a matching type counts.
 template <class Shape>
 std::optional<FieldContact> first_overlap_in_field(FieldCells& cells, const Shape& shape) {
   const IBox box = voxels_within(shape.bounds(IVec3{0}, 0.0, 0.0), cells.bounds());

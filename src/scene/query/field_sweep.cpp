@@ -101,8 +101,8 @@ DVec3 nearest_within(const MovingCapsule& capsule, const DVec3& point) {
   return length > capsule.radius ? on_line + away * (capsule.radius / length) : point;
 }
 
-// The point of least density in a shape at rest, among the corners of its intersection with each cell. Exact for a box along the
-// grid's axes.
+// The point of least density in a shape at rest, among the corners of its intersection with each cell. Exact for a box
+// along the grid's axes.
 struct Deepest {
   DVec3 point{0.0};
   double density = 0.0;
@@ -151,7 +151,8 @@ double depth_along(const DensityTree& tree, const TypesMet& types, const Moving&
   }
 }
 
-// Returns the unit gradient of the field around a point, from samples beyond its cell; 0 if the field is constant there.
+// Returns the unit gradient of the field around a point, from samples beyond its cell; 0 if the field is constant
+// there.
 DVec3 direction_out(const DensityGrid& field, DVec3 point) {
   DVec3 gradient(0.0);
   for (int axis = 0; axis < 3; ++axis) {

@@ -72,8 +72,8 @@ class FreePlace {
   }
   [[nodiscard]] bool is_free(DVec3 displacement) const { return overlaps(tracer_, at(displacement), filter_).empty(); }
 
-  // Returns true if all possible obstacles are voxels whose axes are parallel to the box's. Collects the positions
-  // where the box touches their faces.
+  // Returns true if all possible obstacles are voxels whose axes are parallel to the box's. Collects the positions in
+  // contact with their faces.
   [[nodiscard]] bool has_own_axes() {
     const DVec3 reach = reach_of_axes(half_axes_of(shape_)) + max_distance_;
     bool are_own = true;

@@ -4,7 +4,8 @@
 //
 // Source: the distance between a line and a box is the minimum of a convex function that is quadratic between the
 // points where the line crosses the planes of the box's faces. The distance between two moving convex bodies is
-// convex in time. Newton's steps from the start therefore never pass the first time when the distance equals the radius.
+// convex in time. Newton's steps from the start therefore never pass the first time when the distance equals the
+// radius.
 
 #include <algorithm>
 #include <array>
