@@ -50,10 +50,10 @@ DBox box_to_frame(const DBox& bounds) {
   return bounds.min == bounds.max ? DBox{bounds.min - 0.5, bounds.max + 0.5} : bounds;
 }
 
-/// Where a camera must stand, along one axis of the picture and along its view, to see all corners.
+/// The camera position, along one image axis and the view direction, such that all corners are visible.
 struct Stand {
-  double across;   ///< along the picture's axis, midway between the two edges' limits
-  double forward;  ///< the furthest that it may go
+  double across;   ///< along the image axis, midway between the limits of the two edges
+  double forward;  ///< the maximum along the view direction
 };
 
 /// Each point at depth f may lie up to `slope * (f - stand)` to either side.
@@ -99,7 +99,8 @@ glm::dmat4 camera_from_world(const Camera& camera) {
 
 namespace {
 
-/// Of a picture so many pixels high: how large a pixel is in the plane 1 in front of the camera, or in the world.
+/// Returns the size of a pixel of an image with the given height: in the plane 1 in front of a perspective camera, or
+/// in world units.
 double pixel_size(const Camera& camera, int height) {
   const bool is_perspective = camera.projection == Camera::Projection::Perspective;
   const double picture_height = is_perspective ? 2.0 * std::tan(camera.vertical_fov_radians / 2.0) : camera.view_height;
@@ -155,7 +156,7 @@ Camera frame(DVec3 middle, const Reach& reach, View view, double aspect) {
 }
 
 std::array<DVec3, 4> framing_directions(DVec3 forward, double aspect) {
-  // A middle and a reach that say nothing: what is asked for is what counts.
+  // The middle and the reach are dummies; only the requested directions matter.
   std::array<DVec3, 4> asked{};
   std::size_t count = 0;
   static_cast<void>(frame(

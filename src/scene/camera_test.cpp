@@ -28,7 +28,7 @@ void expect_orthonormal(const Camera& camera) {
   expect_near(camera.right, glm::cross(camera.forward, camera.up));
 }
 
-/// Where a point lies in the picture: -1 to 1 from the left to the right edge and from the lower to the upper.
+/// The position of a point in the image: -1 to 1 from the left to the right edge and from the bottom to the top edge.
 struct InPicture {
   double x, y, depth;
 };
@@ -42,7 +42,7 @@ InPicture project(const Camera& camera, double aspect, DVec3 point) {
   return {glm::dot(offset, camera.right) / (half * aspect), glm::dot(offset, camera.up) / half, depth};
 }
 
-/// How far the box's corners reach to each side of the picture, and the least depth.
+/// The extent of the box's corners on each side of the image, and the least depth.
 struct Extent {
   double left = 0, right = 0, low = 0, high = 0, depth = kInfinity;
 };
@@ -238,7 +238,7 @@ Scene scattered_scene(std::mt19937_64& random) {
   return scene;
 }
 
-/// How far the scene's voxels reach to each side of the picture.
+/// Returns the extent of the scene's voxels on each side of the image.
 Extent extent_of(const Camera& camera, double aspect, const Scene& scene, InstanceFilter filter) {
   Extent all;
   for (const InstanceHandle handle : scene.instances().handles()) {

@@ -38,13 +38,13 @@ struct Candidate {
   const Chunk* voxels;
   const DensityChunk* samples;  ///< where there are no voxels
   IVec3 first;                  ///< the chunk's first voxel or sample in its grid
-  IBox box;                     ///< of what counts, in the chunk
+  IBox box;                     ///< box of the counted voxels or samples, in chunk coordinates
   Functional functional;
 
   [[nodiscard]] std::uint64_t row(int y, int z) const {
     return samples == nullptr ? ~voxels->row_mask(y, z, kAir) : samples->solid_row(y, z);
   }
-  /// What is solid around a sample begins after the one before it on each axis.
+  /// For fields, the solid around a sample begins after the previous sample on each axis.
   [[nodiscard]] int margin() const { return samples == nullptr ? 0 : 1; }
   [[nodiscard]] double over(IVec3 min, IVec3 max) const { return functional.over(min - margin(), max); }
 };
@@ -69,7 +69,7 @@ void add_candidates(const Instance& instance, const SceneGrid& grid, DVec3 direc
   }
 }
 
-/// The greatest over what a chunk holds, if that is more than `least`; else `least`.
+/// Returns the maximum over a chunk's contents, or `least` if that is greater.
 double scan(const Candidate& candidate, double least) {
   const IBox& box = candidate.box;
   for (int z = box.min.z; z < box.max.z; ++z) {

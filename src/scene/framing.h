@@ -7,16 +7,16 @@
 
 namespace quoin {
 
-/// How far something reaches along a direction (of any length) from the point called its middle: the greatest dot
-/// product with any of its points.
+/// Computes the maximum dot product of a direction (of any length) with the vectors from the middle point to the
+/// points of an object.
 using Reach = std::function<double(DVec3 direction)>;
 
-/// A camera that has all of it in the picture, filling it but for a margin.
+/// Returns a camera whose image shows the whole object, filling it except for a margin.
 ///
-/// Requires: it has an inside; everything is finite.
+/// Requires: the object has an inside; everything is finite.
 [[nodiscard]] Camera frame(DVec3 middle, const Reach& reach, View view, double aspect);
 
-/// The same where it looks along `forward`, a unit vector.
+/// The same for a camera that looks along `forward`, a unit vector.
 [[nodiscard]] Camera frame(DVec3 middle, const Reach& reach, DVec3 forward, double aspect);
 
 /// The four directions whose reaches `frame` asks for, in its order.

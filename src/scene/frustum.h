@@ -10,7 +10,8 @@
 
 namespace quoin {
 
-/// What a camera's picture shows of the world, as five half-spaces: its four edges, and what is not behind it.
+/// The part of the world in a camera's image, as five half-spaces: four image edges, and the space in front of the
+/// camera.
 ///
 /// Space: the world's axes and units, with the camera's position as origin.
 class Frustum {
@@ -19,10 +20,10 @@ class Frustum {
   /// length: the planes are those of `ray_through`.
   Frustum(const Camera& camera, int width, int height);
 
-  /// False only when no ray of the picture meets the sphere; some spheres near the picture's corners count as met.
-  /// What is not a number counts as met.
+  /// Returns false only if no ray of the image hits the sphere. Some spheres near the corners of the image count as
+  /// hit. NaN counts as hit.
   [[nodiscard]] bool meets(DVec3 centre, double radius) const {
-    // Room for rounding, of far centres too.
+    // Tolerance for rounding, also for far centres.
     constexpr double kRoom = 1e-9;
     const double reach = radius + kRoom * (radius + std::abs(centre.x) + std::abs(centre.y) + std::abs(centre.z));
     TwoBits is_out{};

@@ -22,7 +22,7 @@ bool is_visible_layer(const Scene& scene, LayerHandle handle) {
   return layer == nullptr || layer->visible;
 }
 
-/// Whether the groups above by themselves show it; nothing where they go round in a circle.
+/// Returns true if all groups above show it; nothing if the groups form a cycle.
 std::optional<bool> is_shown_without_circles(const Scene& scene, GroupHandle from) {
   bool shown = true;
   std::size_t left = scene.groups().size();
@@ -57,7 +57,8 @@ GroupHandle parent_of(const Scene& scene, GroupHandle group) {
   const SceneGroup* found = scene.groups().find(group);
   if (found == nullptr || scene.groups().find(found->parent) == nullptr) return {};
   GroupHandle above = found->parent;
-  // A group above may be part of a circle of which this one is not: that is walked round until all were counted.
+  // The parent chain may end in a cycle that does not contain this group. The loop then stops after as many steps as
+  // there are groups.
   for (std::size_t left = scene.groups().size(); left > 0; --left) {
     if (above == group) return {};
     const SceneGroup* next = scene.groups().find(above);
@@ -69,7 +70,7 @@ GroupHandle parent_of(const Scene& scene, GroupHandle group) {
 
 namespace {
 
-/// How many groups are above each, by slots, as parent_of has it. Each group is walked over twice at most.
+/// The number of groups above each group, by slot, as defined by parent_of. Visits each group at most twice.
 class GroupDepths {
  public:
   explicit GroupDepths(const Scene& scene) : scene_(scene) {

@@ -1,4 +1,4 @@
-// Groups and layers: who is shown, who is told of changes, and what moving and removing groups does to what is below.
+// Groups and layers: visibility, reported changes, and the effect of moving and removing groups on their contents.
 
 #include <quoin/scene/scene.h>
 
@@ -144,7 +144,7 @@ bool slowly_shown(const Scene& scene, const Instance& instance) {
   return shown;
 }
 
-// Who redraws only what changed must be told of every instance that appears or disappears.
+// A renderer that redraws only changes must read every instance that appears or disappears.
 TEST(Hierarchy, WhatAppearsOrDisappearsIsToldOf) {
   std::mt19937 random(kHierarchySeed);
   Scene scene;

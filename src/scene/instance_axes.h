@@ -8,13 +8,13 @@
 
 namespace quoin {
 
-/// As `unit_rotation`, whatever its length.
+/// Normalises a quaternion of any length.
 [[nodiscard]] DQuat made_unit(const DQuat& q);
 
-/// The rotation that a quaternion of any length stands for: itself when it is of unit length but for rounding, none for
-/// a zero one. What is not finite stays so.
+/// Returns the rotation of a quaternion of any length: the quaternion itself if it is of unit length up to rounding,
+/// the identity if it is zero. Non-finite quaternions stay non-finite.
 [[nodiscard]] inline DQuat unit_rotation(const DQuat& q) {
-  // What is no longer than this says the same, but for the last bits.
+  // Within this error, normalising would change only the last bits.
   constexpr double kRounding = 1e-12;
   if (std::abs(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w - 1.0) < kRounding) return q;
   return made_unit(q);

@@ -25,7 +25,7 @@ int halvings_for(double voxel_pixels, const DetailPolicy& policy) {
          static_cast<int>(voxel_pixels <= 0.125 * cell) + static_cast<int>(voxel_pixels <= 0.0625 * cell);
 }
 
-// What the camera's picture makes of lengths.
+// Converts lengths to pixels in the camera's image.
 class PixelScale {
  public:
   PixelScale(const Camera& camera, int height)
@@ -46,7 +46,7 @@ class PixelScale {
   double scale_;  // pixels: perspective of a unit at distance 1, else of a unit
 };
 
-// What is chosen of an instance, and remembered until the next time.
+// The level of detail chosen for an instance, kept for the next call.
 struct Choice {
   std::uint64_t generation = 0;  // of the instance; 0: nothing chosen yet
   std::uint8_t level = 0;
@@ -54,13 +54,13 @@ struct Choice {
 };
 
 bool is_far(const ScreenSize& size, const DetailPolicy& policy) {
-  // Less than infinite is finite: sizes are never negative, and what is not a number is not less.
+  // Sizes are never negative, so a comparison with infinity tests that they are finite. It is false for NaN.
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   return !(size.voxel_pixels < kInfinity && size.diameter_pixels < kInfinity && size.voxel_pixels > -kInfinity) ||
          size.diameter_pixels <= policy.far_pixels;
 }
 
-// What an instance measures in a view.
+// The measurements of an instance in a view.
 struct Measure {
   ScreenSize size;
   double distance = 0.0;

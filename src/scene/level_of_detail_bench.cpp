@@ -1,4 +1,5 @@
-// scene/select10000: what is in the picture of a scene of 10,000 instances of mixed sizes, and in what detail.
+// scene/select10000: selects the visible instances of a scene of 10,000 instances of mixed sizes, and their levels of
+// detail.
 
 #include <array>
 #include <cstdio>

@@ -50,7 +50,7 @@ Camera random_camera(std::mt19937& random) {
   return camera;
 }
 
-// Whether a ray from `origin` on meets the sphere.
+// Returns true if a ray from `origin` hits the sphere.
 bool meets_sphere(const Ray& ray, DVec3 centre, double radius) {
   const DVec3 to = centre - ray.origin;
   const double along = std::max(0.0, glm::dot(to, ray.direction));

@@ -22,7 +22,7 @@ struct Random {
   explicit Random(unsigned seed) : engine(seed) {}
   double share() { return std::uniform_real_distribution<double>(-1.0, 1.0)(engine); }
   DVec3 vector() { return {share(), share(), share()}; }
-  // Of any length, also of quarter turns.
+  // A rotation of any length, including quarter turns.
   DQuat rotation() {
     if (engine() % 4 == 0) {
       DVec3 axis(0.0);
@@ -54,7 +54,7 @@ TEST(GridFromWorld, IsTheInverseOfWorldFromGrid) {
     grid.pivot = random.vector() * 100.0;
     const DVec3 point = random.vector() * std::pow(10.0, 4.0 + 3.0 * random.share());
     const DVec3 world = world_from_grid(instance, grid, point);
-    // What the world's doubles cannot tell apart, and as much of the offset in the grid.
+    // The rounding of the world's doubles, and of the offset in the grid.
     const double rounding = 8.0 * std::numeric_limits<double>::epsilon();
     const double room = rounding * ((largest(world) + largest(instance.position)) / instance.voxel_size +
                                     largest(point) + largest(grid.pivot));
@@ -160,7 +160,7 @@ TEST(VoxelFromWorld, AgreesWithWhatARayHits) {
           EXPECT_GT(within[axis], -1e-5);
           EXPECT_LT(within[axis], 1.0 + 1e-5);
         }
-        // Beside an edge the voxel is a matter of rounding.
+        // Next to an edge, rounding decides the voxel.
         const DVec3 from_sides = glm::min(within, 1.0 - within);
         if (std::min({from_sides.x, from_sides.y, from_sides.z}) < 1e-5) continue;
         EXPECT_EQ(voxel_from_world(instance, scene.grids()[instance.grid], point), hit->voxel);

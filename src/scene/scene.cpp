@@ -79,7 +79,7 @@ void sort_and_unite(std::vector<Handle<T>>& handles) {
 
 }  // namespace
 
-// What a scene knows of its changes. Edits of grids come as notices and are booked when somebody asks.
+// A scene's journal of its changes. Grid edits arrive as notices and are recorded at the next query.
 struct Scene::Book {
   Book() = default;
   Book(const Book& other) : journal(other.journal), serials(other.serials) {}
@@ -102,7 +102,7 @@ struct Scene::Book {
     std::vector<std::uint64_t>& of = serials_of(kind);
     if (index >= of.size()) of.resize(index + std::size_t{1});
   }
-  // Puts it in and books that. Whatever may throw comes first.
+  // Inserts an object and records the change. Steps that may throw come first.
   template <class T>
   Handle<T> insert(SlotMap<T>& into, T value, std::size_t keys) {
     make_room(kind_of<T>(), into.next_index());

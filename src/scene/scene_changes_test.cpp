@@ -1,4 +1,4 @@
-// Who is told of what changed in a scene, where grids lie, and what snapshots keep.
+// Reported scene changes, positions of grids, and contents of snapshots.
 
 #include <quoin/scene/scene.h>
 
@@ -165,7 +165,7 @@ TEST(SceneChanges, AnEditThatThrowsIsTold) {
   EXPECT_TRUE(scene.changes_since(cursor).empty()) << "an edit that changes nothing";
 }
 
-// What a callback sees of its own edit is told, and so is the rest of it.
+// A consumer that reads in the middle of an edit's callback reads the rest of the edit later.
 TEST(SceneChanges, AnEditThatIsLookedAtHalfwayIsToldToItsEnd) {
   Scene scene;
   const GridHandle handle = scene.add_grid({});

@@ -1,4 +1,4 @@
-// What functions of scenes and cameras require.
+// Tests the requirements of scene and camera functions.
 
 #include <cmath>
 #include <limits>
@@ -84,7 +84,7 @@ TEST(SceneDeathTest, AHandleOfWhatCameAfterASnapshotIsAMistakeInTheOther) {
   expect_to_name_nothing(ours.scene, other);
 }
 
-// It is as if nobody placed it.
+// The instance counts as not placed.
 TEST(SceneDeathTest, AnInstanceOfAnotherScenesGridIsLeftOut) {
   Built ours;
   Built other;
@@ -121,7 +121,7 @@ TEST(SceneDeathTest, WhatWasMovedFromIsNotToBeUsed) {
   QUOIN_EXPECT_MISTAKE((void)first_hit(tree, Ray{}), "a tree that was not moved from");
 }
 
-// NOLINTBEGIN(bugprone-use-after-move): that is what is tried
+// NOLINTBEGIN(bugprone-use-after-move): tested here
 TEST(SceneDeathTest, WhateverWasMovedFromIsNotToBeUsed) {
   const char* const wanted = "an object that was not moved from";
   const auto leave = [](auto& object) { [[maybe_unused]] const auto taken = std::move(object); };
@@ -159,7 +159,7 @@ TEST(SceneDeathTest, WhateverWasMovedFromIsNotToBeUsed) {
   QUOIN_EXPECT_MISTAKE(mesher.mesh({}, {}, {}, quads), wanted);
 }
 
-// What looks at a scene looks at it where it was.
+// Objects that refer to a scene need it at its original address.
 TEST(SceneDeathTest, ASceneThatWasMovedAwayFromWhatLooksAtItIsAMistake) {
   Scene scene;
   SceneTracer tracer(scene);

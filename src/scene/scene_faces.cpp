@@ -19,7 +19,7 @@ struct GridFaces {
   std::unordered_map<IVec3, std::int64_t, CoordinateHash> visible_of;  // chunks with a visible face
   std::int64_t visible = 0;
   std::size_t placements = 0;  // drawn instances
-  FaceCounts counted;          // what of it is in the scene's counts
+  FaceCounts counted;          // the part included in the scene's counts
 
   void put(IVec3 chunk, std::int64_t count) {
     const auto known = visible_of.find(chunk);
@@ -32,7 +32,7 @@ struct GridFaces {
   }
 };
 
-/// A chunk whose faces are to be counted anew.
+/// A chunk whose faces need a new count.
 struct ChunkCount {
   const Grid* grid = nullptr;
   GridFaces* faces = nullptr;
@@ -74,7 +74,7 @@ struct SceneFaces::Impl {
   void count_in(const Scene& scene, GridHandle handle);
 };
 
-// The grids of which something may count otherwise than before.
+// Returns the grids whose counts may have changed.
 std::vector<GridHandle> SceneFaces::Impl::touched_by(const Scene& scene, const SceneChanges& changes) {
   std::vector<GridHandle> touched = changes.grids;
   std::vector<InstanceHandle> instances = changes.instances;
@@ -143,7 +143,7 @@ void SceneFaces::Impl::count(std::vector<ChunkCount>& chunks, const VoxelRegistr
   }
 }
 
-// Puts what a grid has now in the place of what was counted of it before.
+// Replaces a grid's previous counts by the current ones.
 void SceneFaces::Impl::count_in(const Scene& scene, GridHandle handle) {
   const auto found = grids.find(handle);
   if (found == grids.end()) return;

@@ -35,7 +35,7 @@ GridHandle add_random_grid(Scene& scene, std::mt19937& random) {
   return scene.add_grid(std::move(grid));
 }
 
-/// Any change that a scene can be told of.
+/// Makes a random change of a scene.
 void change(Scene& scene, std::mt19937& random) {
   const auto grids = scene.grids().handles();
   const auto instances = scene.instances().handles();

@@ -15,11 +15,11 @@
 namespace quoin {
 namespace {
 
-// Of unit axes, and of spacings by their least.
+// Tolerances: for unit axes, and for spacings relative to the smallest.
 constexpr double kSkew = 1e-4;
 constexpr double kUneven = 1e-3;
 
-// Where samples lie: along unit axes, at these distances, from a corner.
+// The positions of samples: along unit axes, at these distances, from a corner.
 struct Lattice {
   glm::dmat3 axes{1.0};
   DVec3 spacing{1.0};
@@ -46,7 +46,7 @@ Result<Lattice> lattice_of(const Volume& volume) {
   return lattice;
 }
 
-// Where a sample of the finer lattice lies between two of the volume's along an axis.
+// The position of a finer lattice's sample between two samples of the volume along an axis.
 struct Between {
   std::size_t low = 0;
   std::size_t high = 0;
@@ -124,7 +124,7 @@ Result<DensityGrid> field_of(const Volume& volume, const Lattice& lattice, doubl
                        static_cast<std::size_t>(std::max(volume.size.z, 0));
   const DVec3 spacing = lattice.spacing;
   const bool is_even = std::max(std::max(spacing.x, spacing.y), spacing.z) <= step * (1.0 + kUneven);
-  // What field_from_volume refuses it says itself.
+  // Invalid volumes go to field_from_volume, which reports the error.
   const bool is_sound = samples > 0 && volume.values.size() == samples;
   if (is_even || !is_sound) return field_from_volume(volume, options, threads, progress);
   const auto even = with_even_spacing(volume, lattice, step, threads);

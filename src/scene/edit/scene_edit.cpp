@@ -21,7 +21,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMinVoxel = double{std::numeric_limits<int>::min()} + kChunkEdge;
 constexpr double kMaxVoxel = double{std::numeric_limits<int>::max()} - kChunkEdge;
 
-// Where along a row centres lie in a box.
+// The range of a row in which voxel centres lie in a box.
 struct Span {
   double first = -kInfinity;
   double last = kInfinity;
@@ -59,7 +59,8 @@ class BoxInGrid {
     }
     return true;
   }
-  // Whether one of the box's own axes parts it from the centres of voxels; those of the grid are `bounds`' business.
+  // Returns true if one of the box's own axes separates it from the voxel centres. The grid's axes are tested by
+  // `bounds`.
   [[nodiscard]] bool is_apart_from(const IBox& voxels) const {
     const DVec3 half = (DVec3(voxels.max) - DVec3(voxels.min) - 1.0) * 0.5;
     const DVec3 middle = DVec3(voxels.min) + 0.5 + half;
@@ -118,7 +119,7 @@ class BoxFiller {
       fill_part(voxels);
       return changed_;
     }
-    // Where nothing is there is nothing to take away.
+    // Erasing affects only existing chunks.
     for (const IVec3 chunk : grid_.chunks()) {
       fill_part(intersect(voxels, {chunk * kChunkEdge, chunk * kChunkEdge + kChunkEdge}));
     }

@@ -47,8 +47,8 @@ Placed random_placement(Random& random, double distance) {
   return placed;
 }
 
-// Every voxel near a place in the grid by the shape's own definition in the world: how far outside of it a point lies.
-// Where that is less than the rounding, either is right.
+// Compares every voxel near a position with the shape's definition in the world: the distance of a point outside of it.
+// If the distance is less than the rounding, either result is right.
 template <class Outside>
 void expect_filled(const Placed& placed, const Grid& before, VoxelType type, DVec3 middle, int reach, double rounding,
                    std::int64_t changed, Outside&& outside) {
@@ -127,7 +127,7 @@ TEST(SceneEdit, LargeBoxesFillWholeChunksWithin) {
   const std::int64_t changed = fill_box(placed.scene, placed.handle, box, 2);
   EXPECT_EQ(changed, std::int64_t{300} * 280 * 320);
   EXPECT_EQ(placed.grid().grid.voxel_count(), changed);
-  // A box as large as the world takes away what there is, and no longer than that takes.
+  // A box as large as the world erases all voxels, in time proportional to the existing ones.
   box.half_size = DVec3(1e12);
   EXPECT_EQ(fill_box(placed.scene, placed.handle, box, kAir), changed);
   EXPECT_EQ(placed.grid().grid.chunk_count(), 0U);

@@ -18,8 +18,8 @@ namespace glass_thickness_detail {
 
 constexpr int kDeepest = 1024;
 
-/// [voxels deep]: the area of the triangles behind which it is so deep. Areas are whole numbers: in any order they have
-/// the same sum.
+/// [depth in voxels]: the area of the triangles with this depth behind them. Areas are integers, so that sums do not
+/// depend on the order.
 using AreaByDepth = std::vector<double>;
 
 template <class Reader>
@@ -46,9 +46,9 @@ inline float median(const AreaByDepth& areas) {
 
 }  // namespace glass_thickness_detail
 
-/// How thick the bodies of each transparent type are, by type: looked up straight in from the middle of each triangle
-/// of a grid's surfaces, 1,024 voxels deep at most. `reader`: has `get(voxel)`, as a GridReader.
-/// Cost: a voxel for each that lies behind a triangle's middle.
+/// Returns the thickness of the bodies of each transparent type, by type. Measures straight inwards from the middle of
+/// each triangle of a grid's surfaces, at most 1,024 voxels deep. `reader` has `get(voxel)`, like GridReader.
+/// Cost: one lookup per voxel behind the middle of a triangle.
 template <class Reader>
 std::vector<GlassThickness> glass_thickness(Reader& reader, std::span<const MeshView> surfaces) {
   using namespace glass_thickness_detail;

@@ -9,9 +9,9 @@ namespace quoin {
 
 namespace {
 
-/// How far a voxel's corner may be from the lattice's, in voxels.
+/// The maximum distance of a voxel corner from the lattice, in voxels.
 constexpr double kTolerance = 1e-3;
-/// Coordinates beyond this are left alone: sums of them would not fit.
+/// Larger coordinates are ignored, because their sums would overflow.
 constexpr double kFarthest = 1 << 29;
 
 DBox world_box(const SceneGrid& grid, const Instance& instance) {
@@ -21,7 +21,7 @@ DBox world_box(const SceneGrid& grid, const Instance& instance) {
   return box;
 }
 
-/// Which numbers are connected.
+/// A union-find structure over numbers.
 class Sets {
  public:
   explicit Sets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), std::size_t{0}); }
@@ -55,7 +55,8 @@ class Grouping {
     for (std::size_t i = 0; i < instances_.size(); ++i) {
       const std::size_t first = sets_.find(i);
       if (first != i) {
-        // Of the first member; what is off by more than between neighbours, over many of them, is alone.
+        // Relative to the first member. An instance that is off only by errors summed over many neighbours stays
+        // separate.
         const auto place = place_in_lattice(scene_, instance_of(instances_[first]), instance_of(instances_[i]));
         if (place) {
           groups[group_of[first]].push_back({instances_[i], *place});
@@ -74,7 +75,7 @@ class Grouping {
     return scene_.grids()[instance_of(handle).grid];
   }
 
-  /// Along the axis on which the boxes are spread the farthest.
+  /// Sweeps along the axis of the largest spread.
   void unite_those_that_touch() {
     DBox all;
     for (const DBox& box : boxes_) {

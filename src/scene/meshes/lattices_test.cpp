@@ -33,7 +33,7 @@ Instance placed(const Scene& scene, const Instance& lattice, GridHandle grid, co
   instance.grid = grid;
   instance.voxel_size = lattice.voxel_size;
   instance.mirrored = place.orientation.is_mirrored() != lattice.mirrored;
-  // What is left of the orientation after the mirror of x.
+  // The remaining orientation after the mirror of x.
   const AxisOrientation mirror = instance.mirrored ? AxisOrientation::mirror(0) : AxisOrientation{};
   const AxisOrientation own = lattice.mirrored ? AxisOrientation::mirror(0) : AxisOrientation{};
   const glm::dmat3 turn = (own * place.orientation * mirror).matrix();

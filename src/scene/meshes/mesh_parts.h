@@ -1,6 +1,6 @@
 #pragma once
 
-// What blocky and smooth meshes of scenes are put together from.
+// Shared parts of blocky and smooth scene meshes.
 
 #include <array>
 #include <map>
@@ -23,7 +23,7 @@ namespace quoin {
 class MeshHierarchy {
  public:
   MeshHierarchy(const Scene& scene, SceneMeshes& meshes) : scene_(scene), meshes_(meshes) {}
-  /// Where an instance stands, of a part.
+  /// Returns the placement of an instance for a part.
   [[nodiscard]] MeshPlacement place(InstanceHandle handle, std::size_t part);
 
  private:
@@ -35,13 +35,13 @@ class MeshHierarchy {
   std::map<GroupHandle, std::size_t> groups_;
 };
 
-/// Surfaces of one grid: what is opaque, then all that is transparent.
+/// Surfaces of one grid: opaque, then all transparent.
 using SmoothBodies = std::array<SmoothMesh, 2>;
 
-/// Adds the vertices and triangles of a mesh to another, which becomes that mesh where it has no triangles.
+/// Appends the vertices and triangles of a mesh to another. If the other has no triangles, `more` replaces it.
 void append(SmoothMesh& all, SmoothMesh more);
 
-/// A part of what there is of a grid's surfaces.
+/// Creates a part from the non-empty surfaces of a grid.
 [[nodiscard]] MeshPart part_of_bodies(std::string name, SmoothBodies bodies, const DVec3& pivot);
 
 struct SurfaceOptions {
@@ -54,13 +54,12 @@ struct SurfaceOptions {
                                             const SurfaceOptions& wanted, MeshStats& stats, Threads threads,
                                             const Progress& progress);
 
-/// Simplifies a mesh, whose vertices' `tags` (or none) go with them, where an error is given; counts what is left.
+/// Simplifies a mesh if an error is given, and keeps the vertices' `tags` (may be empty) in step. Counts the result.
 [[nodiscard]] Status simplify_and_count(SmoothMesh& mesh, std::optional<float> error, std::vector<std::uint32_t>& tags,
                                         MeshStats& stats);
 
-/// Adds a part for the field of each grid that has one with a surface, and its placements: those of the grid's
-/// instances, in their order. Each transparent material is a closed body of its own; bodies meet where pictures see
-/// them meet.
+/// Adds a part for each grid's field with a surface, and its placements: those of the grid's instances, in their order.
+/// Each transparent material is a separate closed body; bodies meet as in images.
 [[nodiscard]] Status add_fields(const Scene& scene, const std::vector<GridHandle>& grids, InstanceFilter filter,
                                 const SurfaceOptions& wanted, MeshHierarchy& hierarchy, SceneMeshes& meshes,
                                 Threads threads, const Progress& progress);

@@ -17,7 +17,7 @@ Similarity place_of(const Instance& instance) {
   return {instance.position, unit_rotation(instance.rotation), instance.voxel_size, instance.mirrored};
 }
 
-// What is in the same slot of another map; nothing where the handle names nothing in its own.
+// Returns the object in the same slot of another map, or a null handle if the handle is invalid in its own map.
 template <class T>
 Handle<T> in_slot_of(Handle<T> handle, const SlotMap<T>& own, const SlotMap<T>& other) {
   if (own.find(handle) == nullptr) return {};

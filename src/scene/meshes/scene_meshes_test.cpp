@@ -89,7 +89,7 @@ TEST(SceneMeshes, TransparentMaterialsOfFieldsAreClosedBodies) {
     EXPECT_EQ(part->surfaces[0].surface, SurfaceClass::Opaque);
     EXPECT_EQ(part->surfaces[1].surface, SurfaceClass::Transparent);
     for (const MeshView& view : part->surfaces) EXPECT_TRUE(is_closed(view));
-    // What is added leaves stone what it is.
+    // The added bodies do not change the stone.
     EXPECT_NEAR(volume_of(part->surfaces[0]), 80.0 * 30 * 80, 0.02 * 80 * 30 * 80);
     EXPECT_NEAR(volume_of(part->surfaces[1]), ball + dome, 0.04 * (ball + dome));
     const auto has_only = [](const MeshView& view, std::vector<VoxelType> types) {

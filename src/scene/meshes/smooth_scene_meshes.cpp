@@ -87,8 +87,8 @@ class UnitedGrid {
     return dense_;
   }
 
-  /// Notes a member for the chunks of the whole in which it may have voxels; by its own chunks, since its box may be
-  /// far larger than what is in it.
+  /// Adds a member to all united chunks in which it may have voxels. Goes by the member's own chunks, since its box may
+  /// be far larger than its contents.
   void note_chunks(std::size_t member) {
     std::vector<IVec3> reached;
     for (const IVec3 chunk : grids_[member]->chunks()) {
@@ -107,7 +107,7 @@ class UnitedGrid {
 
   std::vector<LatticeMember> members_;
   std::vector<const Grid*> grids_;  // by member
-  std::vector<LatticePlace> back_;  // likewise
+  std::vector<LatticePlace> back_;  // by member
   Grid voxels_;
   std::unordered_map<IVec3, std::vector<std::uint32_t>, CoordinateHash> by_chunk_;  // members in their order
   std::optional<IVec3> dense_chunk_;
@@ -130,7 +130,7 @@ std::vector<std::uint32_t> owners_of(UnitedGrid& united, const std::vector<Trian
   return owners;
 }
 
-/// Meshes what is united or stands for itself.
+/// Meshes a united grid or a single one.
 class Mesher {
  public:
   Mesher(const Scene& scene, const SmoothSceneOptions& options, Threads threads, MeshStats& stats)
@@ -165,7 +165,7 @@ class Mesher {
   Result<Body> mesh_body(const DensityGrid& field, const DensityGrid* whole, UnitedGrid* united,
                          const Progress& progress) const {
     SmoothMeshOptions wanted = options_.mesh;
-    // Bodies meet at level 0 only, and of several grids' chunks nobody could ask.
+    // Bodies meet only at level 0, and chunks of several grids have no common levels.
     if (whole != nullptr || united != nullptr) wanted.level_of = nullptr;
     auto surface = smooth::build_surface(field, scene_.types, wanted, {whole, true}, threads_, progress);
     if (!surface) return surface.error();
@@ -191,7 +191,7 @@ MeshPart part_of_voxels(const SceneGrid& grid, SmoothBodies bodies) {
   return part_of_bodies(grid.name, std::move(bodies), grid.pivot - 0.5);
 }
 
-/// What of a body is each member's, in its own grid's samples.
+/// Divides a body among its members, each in the samples of its own grid.
 std::vector<SmoothMesh> divide(const Body& body, const UnitedGrid& united) {
   std::vector<SmoothMesh> parts(united.members().size());
   std::vector<std::uint32_t> places(body.owners.size());
@@ -216,7 +216,7 @@ std::vector<SmoothMesh> divide(const Body& body, const UnitedGrid& united) {
   return parts;
 }
 
-/// What is meshed together: a grid by itself, for all of these instances, or a group of them.
+/// A unit of meshing: one grid for all of these instances, or a group of instances.
 struct Unit {
   std::vector<LatticeMember> members;
   bool is_united = false;

@@ -15,15 +15,15 @@ namespace quoin {
 namespace {
 
 constexpr int kThickness = 4;            // of slabs, at most
-constexpr int kMargin = kThickness + 1;  // rows that are looked at beyond the chunk
+constexpr int kMargin = kThickness + 1;  // rows read past the chunk
 constexpr int kRows = kChunkEdge + 2 * kMargin;
 constexpr float kHalf = 0.5F;
-/// Of the air beside solid voxels that touch by an edge: less than these have, so that they are joined; a wall of such
-/// ones, at 45 degrees, becomes 0.79 voxels thick.
+/// Density of air next to solid voxels that touch only by an edge. Below this value they are joined. A wall of such
+/// voxels, at 45 degrees, becomes 0.79 voxels thick.
 constexpr float kBesideEdge = 0.4F;
 
-/// Voxels of a row along x, in two words that overlap by half: bit i of the first is voxel i - 16, of the second voxel
-/// i + 16. So voxels of the chunk can be asked of what is up to 16 from them without looking at another word.
+/// The voxels of a row along x, in two words that overlap by half: bit i is voxel i - 16 in the first word and voxel i
+/// + 16 in the second. The neighbours up to 16 away of a chunk's voxel are then in the same word.
 using RowWords = std::array<std::uint64_t, 2>;
 constexpr int kShift = 16;
 
@@ -31,7 +31,7 @@ constexpr std::uint64_t moved(std::uint64_t word, int by) {
   return by >= 0 ? word >> by : word << -by;
 }
 
-/// Finds the samples whose densities are to be others.
+/// Finds the samples whose densities need a correction.
 class Marks {
  public:
   explicit Marks(const Neighbourhood& voxels)
@@ -51,9 +51,9 @@ class Marks {
     }
   }
 
-  /// Half a voxel from the surface.
+  /// Samples half a voxel from the surface.
   [[nodiscard]] std::uint64_t at_faces(int y, int z) const { return row(at_faces_[at(y, z)]); }
-  /// Around an edge by which solid voxels touch.
+  /// Samples around an edge shared by two solid voxels.
   [[nodiscard]] std::uint64_t at_edges(int y, int z) const { return row(at_edges_[at(y, z)]); }
 
  private:
@@ -81,7 +81,7 @@ class Marks {
     return {part(-1) >> (kChunkEdge - kShift) | middle << kShift, middle >> kShift | part(1) << (kChunkEdge - kShift)};
   }
 
-  // Which voxels of a place have one of the kind so far from them.
+  // Returns the voxels of a row that have a voxel of the kind at `offset`.
   [[nodiscard]] std::uint64_t of_kind(bool is_solid, const Place& place, IVec3 offset) const {
     const std::uint64_t solid = solid_[at(place.y + offset.y, place.z + offset.z)][place.half];
     return moved(is_solid ? solid : ~solid, offset.x);
@@ -104,7 +104,7 @@ class Marks {
     }
   }
 
-  // Which of the faces towards `out` are in the midst of 3x3, and belong to something thin.
+  // Marks faces towards `out` in the middle of 3x3 faces of a thin slab.
   void mark_slab(std::uint64_t faces, bool is_solid, int axis, IVec3 out, const Place& place) {
     std::uint64_t ends = 0;
     for (int k = 1; k <= kThickness; ++k) ends |= of_kind(!is_solid, place, out * -k);
@@ -119,7 +119,7 @@ class Marks {
     mark(at_faces_, faces, place, out);
   }
 
-  // At a slant: beside it, one further along the axis, is one of the kind, and the one that leads there is none.
+  // Excludes slants: the voxel to the side is not of the kind, but the next one along the axis from it is.
   void mark_thin(std::uint64_t found, bool is_solid, int axis, const Place& place) {
     IVec3 step{0};
     step[axis] = 1;
@@ -134,7 +134,7 @@ class Marks {
     for (const int k : {-1, 0, 1}) mark(at_faces_, found, place, step * k);
   }
 
-  // Of the four voxels around an edge along the axis, two that touch by it alone are solid.
+  // Marks edges along the axis where the only two solid voxels of four touch diagonally.
   void mark_edges(int axis, const Place& place) {
     IVec3 first{0};
     IVec3 second{0};
@@ -154,7 +154,7 @@ class Marks {
   Rows at_edges_;
 };
 
-/// Which solid voxels of a chunk have one of another body before one of their faces.
+/// The solid voxels of a chunk that share a face with a voxel of another body.
 class BodyBorders {
  public:
   BodyBorders(const Neighbourhood& voxels, const VoxelRegistry& types) {
@@ -216,7 +216,7 @@ class BodyBorders {
     }
   }
 
-  std::vector<std::uint32_t> bodies_;  // empty where there is one at most
+  std::vector<std::uint32_t> bodies_;  // empty if there is at most one
 };
 
 }  // namespace
@@ -244,7 +244,7 @@ DensityChunk marched_density(const Neighbourhood& voxels, const VoxelRegistry& t
           row[x] = in;
         } else {
           if ((at_faces & bit) != 0) row[x] = out;
-          // Of positive halves the lesser has the lesser bits.
+          // For positive half floats the order of bits is the order of values.
           if ((at_edges & bit) != 0) row[x] = std::min(row[x], beside_edge);
         }
       }

@@ -6,13 +6,14 @@
 
 namespace quoin {
 
-/// One chunk of voxels as the field that rays are to meet: `density_of_voxels`, but that samples beside some faces
-/// between voxels are half a voxel from the surface, so that it runs along these faces. Smooth meshes have the like by
-/// moving vertices (mesh/surface/shape.h), and what blocks have they absorb light by.
+/// Computes the field that rays trace for one chunk of voxels. It is `density_of_voxels`, except that samples next to
+/// some faces between voxels are half a voxel from the surface, so that the surface runs along these faces. Smooth
+/// meshes achieve the same by moving vertices (mesh/surface/shape.h). Light is absorbed by the length in the original
+/// blocks.
 ///
-/// Thin:   faces of what is one voxel thick along an axis, solid or a gap, unless it goes on at a slant.
-/// Slabs:  faces in the midst of 3x3 such ones, of what is four voxels thick or less. The blur that rounds steps, which
-///         looks two voxels far, would take up to a quarter of their thickness.
+/// Thin:   faces of features one voxel thick along an axis, solid or gap, unless the feature continues at a slant.
+/// Slabs:  faces in the middle of 3x3 such faces, of features at most four voxels thick. The blur that rounds steps
+///         has a radius of two voxels and would take up to a quarter of their thickness.
 /// Edges:  two solid voxels that touch by an edge alone are joined there, as in meshes.
 /// Bodies: faces between solid voxels of different bodies (mesh/surface/bodies.h): water and its bed.
 ///

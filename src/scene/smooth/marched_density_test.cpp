@@ -43,7 +43,7 @@ class Oracle {
   }
   [[nodiscard]] bool is_solid(IVec3 voxel) const { return grid_.get(voxel) != kAir; }
 
-  // Whether the face between a voxel and the next is to lie where it does.
+  // Returns true if the face between a voxel and the next must keep its position.
   [[nodiscard]] bool keeps_face(IVec3 from, IVec3 step, int axis) const {
     const bool kind = is_solid(from);
     if (is_solid(from + step) == kind) return false;

@@ -15,14 +15,14 @@
 namespace quoin {
 namespace {
 
-/// What is made of one grid.
+/// The fields made from one grid.
 struct GridFields {
   ChangeCursor voxels_read;
   ChangeCursor field_read;
   DensityGrid made = DensityGrid();  // of the voxels
   std::vector<IVec3> to_make;        // chunks of it that are out of date
   bool is_made_new = true;           // to the scene
-  bool is_field_new = true;          // likewise
+  bool is_field_new = true;          // to the scene
   DVec3 pivot{0.0};
   GridHandle of_voxels;  // in the scene, if they were there
   GridHandle of_field;
@@ -86,7 +86,7 @@ std::size_t SmoothScene::bytes() const {
   return content_of(impl_).bytes;
 }
 
-// Notes what is out of date; nothing is made yet.
+// Records the outdated chunks. Makes nothing yet.
 void SmoothScene::Impl::follow(const Scene& of) {
   const SceneChanges changes = of.changes_since(scene_read);
   if (changes.all || !changes.instances.empty() || !changes.groups.empty() || !changes.layers.empty()) {
@@ -151,7 +151,7 @@ Status SmoothScene::Impl::make(const Scene& of, Threads threads, const Progress&
     bytes += fields.made.bytes();
   }
   const auto all = static_cast<double>(left);
-  // So that whoever cancels waits for two chunks of each thread at most.
+  // A cancelled call ends after at most two chunks per thread.
   const std::size_t batch = std::size_t{2} * thread_count(threads);
   for (auto& [handle, fields] : grids) {
     while (!fields.to_make.empty()) {
@@ -232,7 +232,7 @@ void SmoothScene::Impl::place_all(const Scene& of) {
   is_placed_anew = false;
 }
 
-// Only what the grids hold has changed. A grid that had nothing, or has nothing any more, is another scene.
+// Updates only the contents of grids. If a grid's first content appears or its last disappears, the scene is rebuilt.
 void SmoothScene::Impl::renew_fields(const Scene& of) {
   const bool is_other = std::ranges::any_of(grids, [&](const auto& entry) {
     const GridFields& fields = entry.second;

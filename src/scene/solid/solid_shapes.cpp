@@ -3,7 +3,7 @@
 //   z = 0   . # # .      z = 1   . # # .      the run 1..2 of the first row, both rows of z = 0 and
 //           . # # #              . # # .      of z = 1: one box of 2 x 2 x 2; the voxel at (3, 1, 0) is left
 //
-// Faces are rectangles of a layer, which is 64 words of 64 bits whatever the direction: those along x are transposed.
+// Faces are rectangles of a layer, which is 64 words of 64 bits in each direction: layers across x are transposed.
 #include <quoin/scene/solid_shapes.h>
 
 #include <algorithm>
@@ -122,7 +122,7 @@ void cut_faces(Layer& faces, Direction direction, bool is_u_in_word, int layer, 
   }
 }
 
-/// A chunk's solid voxels and those beside it, by layers across one axis.
+/// A chunk's solid voxels and their neighbours, in layers across one axis.
 class SolidLayers {
  public:
   SolidLayers(const SolidRows& rows, int axis) : rows_(rows), axis_(axis) {
@@ -229,7 +229,7 @@ std::vector<IVec3> SolidShapes::Impl::chunks_to_make(const Grid& grid, const Vox
   if (types.has_changed_since(followed_types)) {
     followed_types = types.cursor();
     std::vector<bool> now = solid_types(types);
-    // What is not registered is solid.
+    // Unregistered types are solid.
     const auto is_other = [&](std::size_t i) { return (i >= now.size() || now[i]) != (i >= solid.size() || solid[i]); };
     for (std::size_t i = 1; i < std::max(now.size(), solid.size()) && !changes.all; ++i) changes.all = is_other(i);
     solid = std::move(now);

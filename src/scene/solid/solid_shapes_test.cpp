@@ -159,7 +159,7 @@ TEST(SolidShapes, AFullChunkIsABoxAndSixFaces) {
   EXPECT_EQ(shapes.update(grid, types), std::vector<IVec3>{IVec3(0)});
   EXPECT_EQ(shapes.boxes({0, 0, 0}), (std::vector<IBox>{{{0, 0, 0}, {64, 64, 64}}}));
   EXPECT_EQ(shapes.faces({0, 0, 0}).size(), 6U);
-  // Closed by what lies beside it.
+  // Surrounded by solid voxels.
   grid.fill_box({{-64, -64, -64}, {128, 128, 128}}, 1);
   EXPECT_EQ(shapes.update(grid, types).size(), 27U);
   EXPECT_TRUE(shapes.faces({0, 0, 0}).empty());

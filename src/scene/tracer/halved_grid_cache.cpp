@@ -15,8 +15,7 @@ const DensityGrid& no_field() {
   return none;
 }
 
-// Whether the voxels of a grid halved that often fill as much as those of the full one, but for an
-// eighth.
+// Returns true if a halved grid fills the same volume as the full one, within an eighth.
 bool has_volume_of(const Grid& coarse, int halvings, const Grid& full) {
   const auto cells = std::ldexp(static_cast<double>(coarse.voxel_count()), 3 * halvings);
   const auto voxels = static_cast<double>(full.voxel_count());
@@ -68,7 +67,7 @@ void HalvedGridCache::Entry::make(const SceneGrid& grid, const VoxelRegistry& ty
   }
 }
 
-// Brings what there is up to date with an edit.
+// Updates the existing levels after an edit.
 void HalvedGridCache::Entry::renew(const SceneGrid& grid, const VoxelRegistry& types, Threads threads) {
   is_coarsest = has_glass(grid.field, types);
   if (is_coarsest) return levels.clear();

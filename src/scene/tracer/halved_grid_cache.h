@@ -20,25 +20,26 @@ struct PlacedGrid;
 
 /// A halved grid, ready to be traced.
 struct CoarseLevel {
-  const Grid* voxels = nullptr;        ///< of none where the grid has none
+  const Grid* voxels = nullptr;        ///< empty if the grid has no voxels
   const DensityGrid* field = nullptr;  ///< null where the grid has none
   IBox tight;                          ///< around both
   int level = 0;
   TreeCache trees;
 
-  /// Has a placed grid traced through this instead of its own voxels and field. Requires: it is placed as the scene
-  /// says.
+  /// Makes a placed grid trace this level instead of its own voxels and field. Requires: its placement matches the
+  /// scene.
   void put_in(PlacedGrid& placed) const;
 };
 
-/// Halved grids with their trees, made when first asked for and kept; where grids were edited since, the chunks that an
-/// edit can have changed are made anew.
+/// Halved grids with their trees, made at the first request and kept. After an edit of a grid, only the chunks that it
+/// can affect are remade.
 ///
-/// A grid is halved only as long as the volume of its voxels stays the same but for an eighth: what is thin, as a
-/// bridge's deck, becomes twice as thick, and shows. Likewise its field, of whose surface besides at most an eighth may
-/// be one sample thin: what is, loses its shape next, and then holes come. Where a grid has both, both are halved as
-/// often. Not at all where anything of the field is transparent: a halved sample may take a neighbour's material, and
-/// then the shore of a lake is in pieces. Threads: any number may call.
+/// A grid is halved only while the volume of its voxels changes by at most an eighth: thin features, such as a bridge's
+/// deck, would become visibly thicker. A field is halved only while at most an eighth of its surface is one sample
+/// thin: thin features would lose their shape and then get holes. If a grid has both, both are halved equally often. A
+/// field with transparent material is never halved: a halved sample may take a neighbour's material, which would break
+/// up the shore of a lake.
+/// Threads: any number may call.
 class HalvedGridCache {
   struct Entry {
     ChangeCursor followed;
@@ -55,11 +56,12 @@ class HalvedGridCache {
   };
 
  public:
-  /// What was made, to be looked at while nobody else makes more. Levels stay where they are until their grid changes.
+  /// Access to the levels, which blocks other threads from making more. Levels keep their addresses until their grid
+  /// changes.
   class Lock {
    public:
-    /// The grid halved that often, or less often where it would swell or shrink too much; null where that is not at
-    /// all.
+    /// Returns the grid halved that often, or less often if its volume would change too much. Returns null if it cannot
+    /// be halved at all.
     [[nodiscard]] const CoarseLevel* find(GridHandle grid, int halvings) const;
 
    private:
@@ -69,10 +71,10 @@ class HalvedGridCache {
     std::unique_lock<std::mutex> lock_;
   };
 
-  /// Makes what the selected instances need.
+  /// Makes the levels that the selected instances need.
   [[nodiscard]] Lock make(const Scene& scene, std::span<const SelectedInstance> selected, Threads threads);
 
-  /// What was made of a grid goes when `is_stale(handle)`.
+  /// Removes a grid's levels if `is_stale(handle)` returns true.
   template <class IsStale>
   void forget(IsStale&& is_stale) {
     const std::lock_guard lock(mutex_);

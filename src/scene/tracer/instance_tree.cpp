@@ -13,7 +13,7 @@ constexpr std::size_t kNoLeaf = std::numeric_limits<std::size_t>::max();
 // By how much a tree may become slower to search before it is built from scratch.
 constexpr double kMaxWorse = 1.5;
 
-// Narrows [low, high] to the t at which `origin + t * direction` is at most `limit`.
+// Narrows [low, high] to the interval of t in which `origin + t * direction` is at most `limit`.
 void clip(double origin, double direction, double limit, double& low, double& high) {
   if (direction > 0.0) {
     high = std::min(high, (limit - origin) / direction);
@@ -45,7 +45,7 @@ bool may_meet(const Ray& ray, double max_t, const DBox& box) {
   return high >= 0.0 && low <= high * (1.0 + kRoom) + kRoom;
 }
 
-// What is sorted: a box by its centre.
+// A sort item: a box and its centre.
 struct InstanceTree::Item {
   DVec3 twice_centre{0.0};
   std::size_t box = 0;
@@ -65,7 +65,7 @@ void InstanceTree::build() {
   for (std::size_t i = 0; i < boxes_.size(); ++i) {
     if (boxes_[i].empty()) continue;
     const DVec3 twice_centre = boxes_[i].min + boxes_[i].max;
-    // What is endless to both sides has no centre, but has to be sorted.
+    // A box that is infinite on both sides has no centre, but needs a sort key.
     items.push_back({is_finite(twice_centre) ? twice_centre : DVec3(0.0), i});
   }
   if (items.empty()) return;
@@ -78,7 +78,7 @@ void InstanceTree::build() {
   built_cost_ = search_cost();
 }
 
-// How many nodes a ray through the whole may be expected to look into (surface area heuristic).
+// Returns the expected number of nodes that a ray through the whole tree visits (surface area heuristic).
 double InstanceTree::search_cost() const {
   const double whole = area_of(nodes_.front().box);
   return whole > 0.0 ? areas_ / whole : 0.0;

@@ -42,14 +42,14 @@ class InstanceTree {
   [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
   [[nodiscard]] const std::vector<std::size_t>& order() const { return order_; }
 
-  /// Puts other boxes in place. Only the nodes above them are fitted anew; the tree is built from scratch once these
-  /// have grown so much that it would be slow to search, or when a box became empty or was.
+  /// Replaces boxes. Refits only the nodes above them. Rebuilds the tree if the nodes have grown so much that searches
+  /// would be slow, or if a box became empty or non-empty.
   ///
   /// Cost: O(changes * log n) at most, and a bit for each node; O(n log n) when built from scratch.
   void change(std::span<const Change> changes);
 
-  /// Calls `visit(index)` for every box that the ray may meet from 0 to `max_t`, nearer ones mostly first, until it
-  /// returns false. It may lower `max_t` on the way.
+  /// Calls `visit(index)` for every box that the ray may hit from 0 to `max_t`, roughly from near to far, until it
+  /// returns false. `visit` may lower `max_t`.
   template <class Visit>
   void visit(const Ray& ray, double& max_t, Visit&& visit) const {
     if (nodes_.empty()) return;

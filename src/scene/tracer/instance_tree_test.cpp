@@ -62,7 +62,7 @@ TEST(InstanceTree, FindsThemAfterChangesToo) {
   }
 }
 
-// However boxes wander about, searching stays as good as in a new tree, but for a factor.
+// After random movements of boxes, the search cost stays within a factor of a new tree's.
 TEST(InstanceTree, StaysGoodToSearchHoweverBoxesWander) {
   RandomBoxes world(5);
   std::vector<DBox> boxes = world.boxes(1000);

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the benchmarks of scenes work on.
+// A scene for the benchmarks.
 
 #include <cstdint>
 #include <random>

@@ -1,4 +1,4 @@
-// Instances and queries with numbers that no one should write, but someone will.
+// Instances and queries with extreme and invalid numbers.
 
 #include <cmath>
 #include <numbers>

@@ -41,7 +41,7 @@ struct Range {
   double high = 0.0;
 };
 
-// Of the active lanes; what is not a number does not count.
+// Returns the range of the active lanes. Ignores NaN.
 Range range_of(const RayPacket::Lanes<double>& lanes, const std::array<TwoBits, RayPacket::kSize / 2>& inactive) {
   constexpr double kFar = std::numeric_limits<double>::infinity();
   Two low = {kFar, kFar};
@@ -79,7 +79,7 @@ PacketBounds::PacketBounds(const RayPacket& rays) {
     const auto add = [&](double origin, double direction, std::size_t plane) {
       const bool is_upper = direction > 0.0;
       Limit& limit = limits_[is_upper ? --next_upper : lower_count_++];
-      // What is not a number limits nothing.
+      // NaN gives no limit.
       limit.origin = is_usual_ ? rounded_down(origin) : std::numeric_limits<float>::quiet_NaN();
       limit.inverse = direction == 0.0 ? -kInfinity : static_cast<float>(double{scale_} / direction);
       limit.plane = plane;
@@ -142,7 +142,7 @@ class PacketTree::Builder {
   Builder(const InstanceTree& tree, DVec3 origin, const std::vector<bool>& left_out, std::vector<Node>& nodes)
       : tree_(tree), origin_(origin), left_out_(left_out), nodes_(nodes) {}
 
-  // Returns the box around what is in the node; an empty one, and no node, when that is nothing.
+  // Returns the box of the node's contents. If there are none, returns an empty box and adds no node.
   DBox make(std::size_t from) {
     const std::size_t at = nodes_.size();
     nodes_.emplace_back().boxes.fill(Four{} - kInfinity);

@@ -45,16 +45,16 @@ class PacketBounds {
  public:
   explicit PacketBounds(const RayPacket& rays);
 
-  /// What distances along the rays are multiplied with. 0: no ray has a direction.
+  /// Returns the factor for distances along the rays. 0: no ray has a direction.
   [[nodiscard]] float scale() const { return scale_; }
-  /// Whether directions are of lengths that single precision can tell apart; otherwise the rays may meet anything.
+  /// Returns true if single precision can represent the lengths of the directions; otherwise the rays may hit anything.
   [[nodiscard]] bool is_usual() const { return is_usual_; }
-  /// How far the rays go, all together, in their own distances.
+  /// Sets the maximum distance of all rays, in ray units.
   void set_reach(double max_t) { max_t_ = std::min(static_cast<float>(max_t * double{scale_}), kFarthest); }
-  /// Whether what begins at `near` (scaled) is within reach.
+  /// Returns true if a box that begins at `near` (scaled) is within reach.
   [[nodiscard]] bool reaches(float near) const { return near <= max_t_ * kDistanceRoom + kLeastDistance; }
 
-  /// Bit i is clear only when no ray meets box i; `near` says from where they may (scaled).
+  /// Clears bit i only if no ray hits box i. `near` receives the lower bounds of the hit distances (scaled).
   [[nodiscard]] unsigned meet(const FourBoxes& boxes, Four& near) const {
     Four low{};
     Four high = Four{} + max_t_;
@@ -120,11 +120,11 @@ class PacketLanes {
 class PacketTree {
  public:
   PacketTree() = default;
-  /// Leaves out the boxes for which `left_out` (one for each box, or empty) is set. Cost: O(n).
+  /// Omits each box whose entry in `left_out` (one per box, or empty) is set. Cost: O(n).
   PacketTree(const InstanceTree& tree, DVec3 origin, const std::vector<bool>& left_out = {});
 
-  /// Calls `visit(index, boxes, box)` for every box that the rays may meet, nearer ones first, until it returns false:
-  /// the box is that one of the four. It may lower how far the rays reach.
+  /// Calls `visit(index, boxes, box)` for every box that the rays may hit, from near to far, until it returns false.
+  /// `box` is the index within the four `boxes`. `visit` may lower the reach of the rays.
   template <class Visit>
   void visit(const PacketBounds& rays, Visit&& visit) const {
     if (nodes_.empty() || !(rays.scale() > 0.0F)) return;
@@ -149,10 +149,10 @@ class PacketTree {
   struct Node {
     FourBoxes boxes;
     std::array<std::uint32_t, 4> children{};  // nodes, or indices of boxes
-    std::uint32_t is_box = 0;                 // bit by bit: a child is a box, not a node
-    std::uint32_t present = 0;                // likewise: there is a child
+    std::uint32_t is_box = 0;                 // bits: the child is a box, not a node
+    std::uint32_t present = 0;                // bits: the child exists
   };
-  // What is yet to be looked into: a node, or one of its boxes.
+  // A pending node, or one of its boxes.
   static constexpr std::uint32_t kWhole = 4;
   struct Entry {
     std::uint32_t node;

@@ -22,24 +22,24 @@ class DensityGlass;
 struct PlacedGrid {
   InstanceHandle instance;
   const SceneGrid* grid = nullptr;  ///< as the scene holds it
-  const Grid* voxels = nullptr;     ///< what is traced: its voxels, or what is left of them once halved
+  const Grid* voxels = nullptr;     ///< the traced grid: its voxels, or the halved grid
   DVec3 pivot{0.0};                 ///< in the coordinates of `voxels`
   const OccupancyTree* opaque = nullptr;
   const OccupancyTree* transparent = nullptr;  ///< null when the grid has no transparent voxel
   const DensityTree* field = nullptr;          ///< in the space of `voxels`; null when the field has no solid
-  const DensityTree* opaque_field = nullptr;   ///< what of the field is opaque: `field` itself where all is; or null
-  const DensityGlass* glass = nullptr;         ///< what of the field is transparent; null when nothing is
+  const DensityTree* opaque_field = nullptr;   ///< the opaque part of the field: `field` if all is opaque; may be null
+  const DensityGlass* glass = nullptr;         ///< the transparent part of the field, or null
   glm::dmat3 world_axes{1.0};  ///< columns: the grid's axes in the world, unit; a mirrored instance's x is negated
   DVec3 position{0.0};         ///< of the grid's pivot, in the world
   double voxel_size = 1.0;     ///< world units a voxel of `voxels`
   Detail detail = Detail::Near;
   int level = 0;  ///< of `voxels`: cells of (2^level)^3 voxels of the grid
 
-  /// How many voxels of the full grid a voxel of `voxels` spans.
+  /// Returns the number of voxels of the full grid along an edge of one voxel of `voxels`.
   [[nodiscard]] double voxels_per_cell() const { return std::ldexp(1.0, level); }
 };
 
-/// What a tracer traces, in the order of the instances' handles. Lifetime: the tracer owns them, until an update.
+/// Returns the placed grids of a tracer, by instance handle. Lifetime: the tracer owns them, until its next update.
 [[nodiscard]] const std::vector<PlacedGrid>& placed_in(const SceneTracer& tracer);
 
 }  // namespace quoin

@@ -1,4 +1,4 @@
-// Fields of densities in scenes: what changes, where rays meet them, and beside blocks.
+// Density fields in scenes: changes, ray hits, and fields next to blocks.
 
 #include <cmath>
 #include <random>

@@ -30,7 +30,7 @@ struct TracedGrid {
 [[nodiscard]] DBox bounds_in_world(const PlacedGrid& placed, const IBox& tight);
 
 struct SceneTracer::Impl {
-  // What a placed grid was read from, to be compared with what its instance is now.
+  // The state that a placed grid was read from, for comparison with the current instance.
   struct Source {
     InstanceHandle instance;
     TracedGrid* grid = nullptr;

@@ -72,8 +72,7 @@ bool SceneTracer::Impl::update(Threads threads) {
   return std::exchange(has_other_trees, false);
 }
 
-// Forgets what was made of types that were not seen through and now are, or the other way around. False when there was
-// nothing of the kind.
+// Discards the data of types that became transparent or ceased to be. Returns false if there are none.
 bool SceneTracer::Impl::update_types(const TypeChanges& changes) {
   if (!has_other_visibility(changes)) return false;
   std::vector<VoxelType> changed;
@@ -139,7 +138,7 @@ bool SceneTracer::Impl::look_at(GridHandle handle) {
   const bool is_new = std::exchange(known->grid, &grid) == nullptr;
   const IBox tight = grid.bounds();
   const bool was_partial = std::exchange(known->is_partial, grid.grid.is_partial() || grid.field.is_partial());
-  // What is not a number differs from itself, and is another each time.
+  // NaN differs from itself, so such a pivot counts as changed each time.
   if (!is_new && tight == known->tight && known->pivot == grid.pivot && was_partial == known->is_partial) return true;
   known->shape = ++shapes;
   known->pivot = grid.pivot;
@@ -169,7 +168,7 @@ void SceneTracer::Impl::place(std::size_t i, InstanceHandle handle, const Instan
                 instance.mirrored};
 }
 
-// Places an instance anew if it was moved; false when it is to be traced and was not, or the other way round.
+// Updates the placement of an instance. Returns false if the instance must be added to the traced ones or removed.
 bool SceneTracer::Impl::move_instance(InstanceHandle handle, std::vector<InstanceTree::Change>& moved) {
   const auto found = std::lower_bound(sources.begin(), sources.end(), handle,
                                       [](const Source& each, InstanceHandle key) { return each.instance < key; });
@@ -179,7 +178,7 @@ bool SceneTracer::Impl::move_instance(InstanceHandle handle, std::vector<Instanc
   const bool is_placed = grid != nullptr && has_place(*instance);
   if (is_placed != was_placed) return false;
   if (!is_placed || found->is_of(*instance, *grid)) return true;
-  // Of another grid: that grid's trees may not be there.
+  // With another grid, the trees of that grid may be missing.
   if (found->grid != grid) return false;
   const auto i = static_cast<std::size_t>(found - sources.begin());
   place(i, handle, *instance, *grid);
@@ -196,7 +195,7 @@ bool SceneTracer::Impl::move_instances(const SceneChanges& changes) {
   return true;
 }
 
-// Likewise all; false, with some of it done, when other instances are to be traced than were.
+// Does this for all instances. Returns false, with part of it done, if the set of traced instances changed.
 bool SceneTracer::Impl::move_all_instances() {
   for (const auto& each : grids) {
     if (each != nullptr) each->is_placed = false;
@@ -211,7 +210,7 @@ bool SceneTracer::Impl::move_all_instances() {
     const bool is_next = next < sources.size() && sources[next].instance == handle;
     const bool has_moved = !is_next || !sources[next].is_of(instance, *grid);
     if (has_moved && !has_place(instance)) return;
-    // Of another grid: that grid's trees may not be there.
+    // With another grid, the trees of that grid may be missing.
     is_same = is_next && (!has_moved || sources[next].grid == grid);
     if (!is_same) return;
     grid->is_placed = true;
@@ -260,7 +259,8 @@ void SceneTracer::Impl::find_unloaded(const SceneChanges& changes, bool finds_al
   for (const InstanceHandle handle : changes.instances) place_unloaded(handle, scene->instances().find(handle));
 }
 
-// Puts an instance of a partial grid where it belongs in `unloaded`; takes away what is none any more.
+// Inserts or updates an instance of a partial grid in `unloaded`. Removes an instance that is gone or not partial any
+// more.
 void SceneTracer::Impl::place_unloaded(InstanceHandle handle, const Instance* instance) {
   const auto at = std::lower_bound(unloaded.begin(), unloaded.end(), handle,
                                    [](const PlacedGrid& each, InstanceHandle key) { return each.instance < key; });

@@ -1,5 +1,5 @@
-// scene/update10000: a tracer of 10,000 instances taken to what was changed in the scene: a tenth of the instances
-// moved, one voxel edited, nothing at all, an instance added; beside making it anew. One thread.
+// scene/update10000: updates a tracer of 10,000 instances after a change: a tenth of the instances moved, one voxel
+// edited, no change, an instance added. Also measures a rebuild. One thread.
 
 #include <cmath>
 #include <cstdio>

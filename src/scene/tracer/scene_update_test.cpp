@@ -181,7 +181,7 @@ void expect_same_placed(const SceneTracer& updated, const SceneTracer& fresh, bo
   }
 }
 
-// What rays meet of both, in every way in which they can be asked.
+// Compares the hits of two tracers for all kinds of ray queries.
 void expect_same_hits(const SceneTracer& updated, const SceneTracer& fresh, ChangingScene& world, Counts& counts) {
   const DVec3 origin = world.vector() * 300.0;
   const SceneView a(updated, origin);
@@ -296,7 +296,7 @@ TEST(SceneUpdate, KeepsTheTreesOfGridsAndSaysWhetherTheyChanged) {
   EXPECT_TRUE(first->is_occupied({70, 20, 0}));
 }
 
-// An instance takes a grid that nobody showed while the bounds of another grid change.
+// An instance gets a grid without earlier instances while the bounds of another grid change.
 TEST(SceneUpdate, AGridThatIsShownForTheFirstTimeHasItsTrees) {
   TwoCubes world;
   const GridHandle hidden = world.add_cube();

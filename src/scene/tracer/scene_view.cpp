@@ -18,7 +18,8 @@ namespace {
 
 constexpr std::size_t kLanes = RayPacket::kSize;
 
-// Room for something that is written before it is read: to clear packets first takes longer than to fill them.
+// Uninitialised memory for an object that is written before it is read: clearing packets takes longer than filling
+// them.
 template <class T>
 class RoomFor {
  public:
@@ -30,7 +31,7 @@ class RoomFor {
   alignas(T) std::byte bytes_[sizeof(T)];
 };
 
-// The lanes of a packet, once they are asked for.
+// The lanes of a packet, unpacked on demand.
 class LanesWhenNeeded {
  public:
   LanesWhenNeeded(const RayPacket& rays, const PacketBounds& bounds) : rays_(rays), bounds_(bounds) {}
@@ -84,7 +85,7 @@ std::uint32_t blocked_by(const PlacedGrid& placed, const RayPacket& rays_in_grid
   return blocked | quoin::any_hits(*placed.opaque_field, rest);
 }
 
-// How far the rays that count go at most.
+// Returns the maximum distance of the active rays.
 double farthest(const RayPacket& rays) {
   double max_t = 0.0;
   for (std::uint32_t left = rays.active; left != 0; left &= left - 1) {
@@ -101,11 +102,11 @@ struct SceneView::Impl {
   std::vector<Affine> view_from_grid;
   DVec3 origin{0.0};
   PacketTree instances;                 // in view space
-  PacketTree seen;                      // of these, those that `first_hits` meets, where not all
-  std::vector<bool> left_to_impostors;  // none: sees all
+  PacketTree seen;                      // the instances that `first_hits` sees, if not all
+  std::vector<bool> left_to_impostors;  // empty: sees all
   bool is_alone = false;                // there is one instance
-  PacketTree with_glass;           // of `instances`, those that hold something transparent, where these are several
-  std::vector<std::size_t> glass;  // which they are
+  PacketTree with_glass;                // the `instances` with transparent contents, if there are several
+  std::vector<std::size_t> glass;       // their indices
 
   void find_glass_instances() {
     const std::vector<PlacedGrid>& placed = placed_in(*tracer);
@@ -117,7 +118,7 @@ struct SceneView::Impl {
     if (glass.size() > 1) with_glass = PacketTree(tracer->impl_->instances, origin, left_out);
   }
 
-  // Which of the rays in view meet something transparent in that instance.
+  // Returns the rays in view space that hit a transparent voxel or field of the instance.
   [[nodiscard]] std::uint32_t meet_glass(std::size_t index, std::uint32_t near, const RayPacket& in_view,
                                          RayPacket& room) const {
     const PlacedGrid& placed = placed_in(*tracer)[index];
@@ -151,7 +152,7 @@ struct SceneView::Impl {
     }
   }
 
-  // What rays meet first in the only instance that there is.
+  // Finds the first hits in the only instance of the scene.
   void meet_alone(const RayPacket& rays_in_view, SceneHits& hits) const {
     const PlacedGrid& placed = placed_in(*tracer).front();
     RoomFor<RayPacket> room_for_rays;
@@ -166,8 +167,8 @@ struct SceneView::Impl {
     (void)add_field(placed, 0, rays, hits);
   }
 
-  // What the lanes `near` of rays in view meet in an instance nearer than what `hits` knows, whose max_t shrink to
-  // that. Returns which lanes met it.
+  // Finds hits of the lanes `near` in an instance that are nearer than those in `hits`. Lowers the max_t of these rays.
+  // Returns the lanes with a new hit.
   std::uint32_t meet(std::size_t index, std::uint32_t near, RayPacket& left, SceneHits& hits) const {
     const PlacedGrid& placed = placed_in(*tracer)[index];
     RoomFor<RayPacket> room_for_rays;
@@ -192,8 +193,8 @@ struct SceneView::Impl {
     return met | taken;
   }
 
-  // What is opaque of a placed grid's field and lies nearer than what `hits` knows; the rays are in its grid and go no
-  // further. Returns which lanes met it.
+  // Adds hits with the opaque field of a placed grid that are nearer than those in `hits`. The rays are in the grid's
+  // space and limited to the known hits. Returns the lanes with a new hit.
   static std::uint32_t add_field(const PlacedGrid& placed, std::size_t index, const RayPacket& rays_in_grid,
                                  SceneHits& hits) {
     DensityPacketHits found;
@@ -226,7 +227,7 @@ struct SceneView::Impl {
 SceneView::SceneView(const SceneTracer& tracer, DVec3 origin) : impl_(std::make_unique<Impl>()) {
   impl_->tracer = &tracer;
   for (const PlacedGrid& placed : placed_in(tracer)) {
-    // The difference of two far positions is taken first: it is small, and mostly exact.
+    // Subtracts the two far positions first: the difference is small and usually exact.
     const DVec3 position = placed.position - origin;
     const glm::dmat3 grid_axes = glm::transpose(placed.world_axes) / placed.voxel_size;
     impl_->grid_from_view.push_back({grid_axes, placed.pivot - grid_axes * position});

@@ -22,13 +22,12 @@ struct Affine {
   [[nodiscard]] DVec3 point(const DVec3& p) const { return axes * p + offset; }
 };
 
-/// What a packet of rays met in a scene, voxels or fields; lanes whose bit in `grids.hit` is not set hold nothing of
-/// meaning.
+/// The hits of a ray packet in a scene, with voxels or fields. Lanes without a bit in `grids.hit` are undefined.
 struct SceneHits {
   PacketHits grids;                         ///< voxels and faces in the grid, distances of the packet's rays
   RayPacket::Lanes<std::int32_t> placed{};  ///< index into SceneTracer::placed
-  /// Lanes that met a field. For these the voxel is the cell, the face that to which the normal is nearest; and here is
-  /// the unit normal, in the grid, and the material.
+  /// Lanes that hit a field. For these, the voxel is the cell and the face is the direction nearest to the normal. The
+  /// members below contain the unit normal, in the grid's space, and the material.
   std::uint32_t in_field = 0;
   RayPacket::Lanes<float> normal_x{}, normal_y{}, normal_z{};
   RayPacket::Lanes<VoxelType> material{};
@@ -56,19 +55,20 @@ class SceneView {
   /// They still stop other rays. Cost: O(instances * log instances).
   void leave_to_impostors(std::span<const std::int32_t> placed);
 
-  /// The nearest opaque voxel, or what is opaque of a field, of all instances for each ray, in view space; of equally
-  /// near ones the instance that comes first, in it the voxel.
+  /// Finds the nearest opaque voxel or field surface of all instances for each ray, in view space. Of equally near
+  /// hits, the one of the first instance counts, and a voxel before a field.
   void first_hits(const RayPacket& rays_in_view, SceneHits& hits) const;
 
-  /// Which rays meet an opaque voxel, or what is opaque of a field, of any instance. They are in the space of grid
-  /// `home`, which is asked first.
+  /// Returns the rays that hit an opaque voxel or field of any instance. They are in the space of grid `home`, which is
+  /// tested first.
   [[nodiscard]] std::uint32_t any_hits(std::int32_t home, const RayPacket& rays_in_grid) const;
 
-  /// Which rays meet a transparent voxel of any instance, or a cell of a field that may hold something transparent.
+  /// Returns the rays that hit a transparent voxel of any instance, or a field cell that may contain transparent
+  /// material.
   [[nodiscard]] std::uint32_t any_transparent(const RayPacket& rays_in_view) const;
 
-  /// Calls `visit` for each instance with transparent voxels, or a field of which something is transparent, that one
-  /// ray may meet before `max_t`: an index into SceneTracer::placed, and the ray in its grid.
+  /// Calls `visit` for each instance with transparent voxels or transparent field parts that one ray may hit before
+  /// `max_t`. Passes an index into SceneTracer::placed and the ray in the grid's space.
   void visit_transparent(const Ray& ray_in_view, double max_t,
                          FunctionRef<void(std::int32_t placed, const Ray& ray_in_grid)> visit) const;
 

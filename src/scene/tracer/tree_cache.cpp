@@ -86,7 +86,7 @@ bool TreeCache::update(const DensityGrid& field, const VoxelRegistry& types) {
   return true;
 }
 
-// Where there was no glass, there is none but in what changed.
+// If there was no transparent material, only the changed chunks can contain some.
 void TreeCache::update_split(const DensityGrid& field, const VoxelRegistry& types, const DensityChanges& changes) {
   if (changes.all) split_.reset();
   if (split_ != nullptr) {
@@ -97,7 +97,7 @@ void TreeCache::update_split(const DensityGrid& field, const VoxelRegistry& type
   if (split_ != nullptr && split_->glass().cells().bounds().empty()) split_.reset();
 }
 
-// Where there was no tree, there was no transparent voxel but in what changed.
+// If there was no tree, only the changed chunks can contain transparent voxels.
 void TreeCache::update_transparent(const Grid& grid, const VoxelRegistry& types, const GridChanges& changes) {
   if (!transparent_) {
     const auto holds_some = [&](IVec3 chunk) { return has_transparent_types(grid.find_chunk(chunk), types); };

@@ -13,19 +13,19 @@
 
 namespace quoin {
 
-/// A field with transparent materials, in two parts for rays: what of it blocks light, as a field of its own that
-/// shares the chunks in which nothing is transparent, and the rest.
+/// A field with transparent materials, in two parts for rays: the opaque part, a field that shares the chunks without
+/// transparent material, and the transparent part.
 ///
-/// Lifetime: `whole` must outlive it, in its place; it stays in its own.
+/// Lifetime: `whole` must outlive it at the same address. This object cannot be moved.
 class SplitField {
  public:
-  /// Cost: 0.3 ms a chunk that has transparent materials, besides the trees.
+  /// Cost: 0.3 ms per chunk with transparent materials, plus the trees.
   SplitField(const DensityGrid& whole, const VoxelRegistry& types);
   SplitField(const SplitField&) = delete;
   SplitField& operator=(const SplitField&) = delete;
 
-  /// Takes over what edits changed. Requires: as DensityGlass::update. Cost: as that of making it, for the chunks that
-  /// changed and, of the trees, those below.
+  /// Takes over the edits. Requires: as DensityGlass::update. Cost: like construction, for the changed chunks and, in
+  /// the trees, those below.
   void update(const VoxelRegistry& types, const DensityChanges& changes);
 
   [[nodiscard]] const DensityTree& opaque() const { return *opaque_; }
@@ -39,21 +39,21 @@ class SplitField {
   DensityGlass glass_;
 };
 
-/// Whether anything solid of a field is transparent. Cost: O(chunks).
+/// Returns true if any solid of a field is transparent. Cost: O(chunks).
 [[nodiscard]] bool has_glass(const DensityGrid& field, const VoxelRegistry& types);
-/// Likewise in the chunks that changed.
+/// As above, but tests only the changed chunks.
 [[nodiscard]] bool has_glass(const DensityGrid& field, const VoxelRegistry& types, const DensityChanges& changes);
 
-/// What rays that make light need of one grid, and how far it has followed the grid's changes.
+/// The tracing data of one grid for rendering, and its read position in the grid's changes.
 class TreeCache {
  public:
-  /// Makes the trees, or takes over what was edited since the last time; everything when it is another grid. Returns
-  /// whether there was anything to do.
+  /// Makes the trees, or updates them with the edits since the last call; rebuilds them for another grid. Returns true
+  /// if there was anything to do.
   ///
   /// Requires: the types' visibility is that of the last time; otherwise `forget` first.
   /// Cost:     that of OccupancyTree::update for the chunks that changed.
   bool update(const Grid& grid, const VoxelRegistry& types);
-  /// The same of a field. Lifetime: as DensityTree. Cost: where it has transparent materials also that of SplitField.
+  /// The same for a field. Lifetime: as DensityTree. Cost: with transparent materials, also the cost of SplitField.
   bool update(const DensityGrid& field, const VoxelRegistry& types);
   void forget() { *this = {}; }
   [[nodiscard]] const ChangeCursor& followed() const { return followed_; }
@@ -64,11 +64,11 @@ class TreeCache {
   [[nodiscard]] const OccupancyTree* transparent() const { return transparent_ ? &*transparent_ : nullptr; }
   /// All that is solid of the field; null when there is none.
   [[nodiscard]] const DensityTree* field() const { return field_ ? if_any(*field_) : nullptr; }
-  /// What of it is opaque, the same where all is; null when there is none.
+  /// Returns the opaque part of the field, or the whole field if all is opaque; null if there is none.
   [[nodiscard]] const DensityTree* opaque_field() const { return split_ ? if_any(split_->opaque()) : field(); }
-  /// What of it is transparent; null when there is none.
+  /// Returns the transparent part of the field; null if there is none.
   [[nodiscard]] const DensityGlass* glass() const { return split_ ? &split_->glass() : nullptr; }
-  /// Whether there are transparent voxels, or anything transparent in the field.
+  /// Returns true if there are transparent voxels or field parts.
   [[nodiscard]] bool has_transparent() const { return transparent_.has_value() || split_ != nullptr; }
 
  private:
