@@ -18,14 +18,14 @@ class EditNotices {
   EditNotices(const EditNotices&) = delete;
   EditNotices& operator=(const EditNotices&) = delete;
 
-  /// Has room for that number, so that neither following nor giving a notice of it allocates.
+  /// Reserves memory for the number, so that neither following it nor giving its notice allocates.
   void make_room(std::uint32_t index) {
     const std::lock_guard lock(mutex_);
     if (index < is_given_.size()) return;
     given_.reserve(std::size_t{2} * index + 1);
     is_given_.resize(std::size_t{2} * index + 1);
   }
-  /// From now on the notice is given to this, under a number. Requires: this outlives it.
+  /// Makes the notice report to this object under a number. Requires: this object outlives the notice.
   void follow(EditNotice& notice, std::uint32_t index) {
     make_room(index);
     const std::lock_guard lock(mutex_);

@@ -11,7 +11,7 @@
 namespace quoin {
 namespace {
 
-// By the definition of the format.
+// Converts by the definition of the format.
 double value_of(Half half) {
   const int exponent = half >> 10 & 31;
   const double fraction = half & 1023;

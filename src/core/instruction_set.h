@@ -45,8 +45,8 @@ struct KernelTable {
 /// Returns a name of the processors that have the set, for messages.
 [[nodiscard]] const char* name_of(InstructionSet set);
 
-/// For tests and benchmarks: until it goes out of scope, calls and new objects use `set` and nothing more, on every
-/// thread. Within its scope the machine counts as one that has no more. Scopes nest, on one thread at a time.
+/// For tests and benchmarks: while it exists, calls and new objects use at most `set`, on every thread. Within its
+/// scope the machine appears to support no larger set. Scopes nest, on one thread at a time.
 ///
 /// Requires: has_instruction_set(set).
 class InstructionSetOverride {

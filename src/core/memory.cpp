@@ -25,7 +25,7 @@ std::optional<std::uint64_t> number_in(const std::string& path, const std::strin
   return std::nullopt;
 }
 
-// The number that a file is; nothing for "max".
+// Reads the number in a file; nothing for "max".
 std::optional<std::uint64_t> number_of(const std::string& path) {
   std::ifstream file(path);
   std::uint64_t number = 0;

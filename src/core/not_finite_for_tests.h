@@ -4,7 +4,7 @@
 
 namespace quoin {
 
-// Numbers that tests try where finite ones are asked for.
+// Non-finite numbers for tests of functions that require finite ones.
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 

@@ -78,7 +78,7 @@ oneapi::tbb::task_arena& arena_of(unsigned workers) {
 
 void parallel_for(std::size_t count, Threads threads, FunctionRef<void(std::size_t i)> body) {
   if (count == 0) return;
-  // Asked for more workers than there are processors, oneTBB starts no more but complains on standard error.
+  // With more workers than processors, oneTBB starts no more threads but prints a warning to standard error.
   static const auto processors = static_cast<unsigned>(std::max(1, oneapi::tbb::info::default_concurrency()));
   const unsigned workers = count == 1 ? 1 : std::min(thread_count(threads), processors);
   if (workers == 1) {

@@ -6,11 +6,11 @@
 
 namespace quoin {
 
-/// The light that an sRGB byte stands for, 0 to 1.
+/// Returns the linear light of an sRGB byte, 0 to 1.
 ///
 /// Source: IEC 61966-2-1. Computed in long double, rounded to float once.
 [[nodiscard]] float linear_from_srgb(std::uint8_t encoded);
-/// The same of a value between bytes: `encoded` is 0 to 1 for bytes 0 to 255.
+/// As above, for values between bytes: `encoded` is 0 to 1 for bytes 0 to 255.
 [[nodiscard]] float linear_from_srgb(float encoded);
 
 /// Turns linear light into sRGB bytes, rounded to the nearest: exactly, for every float. Less than 0 and NaN give 0,

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kFewCells = 64;
 constexpr std::size_t kCellsPerChunk = 8;
-// A window of so many times what its chunks may have is made smaller; so it does not come and go with one chunk.
+// A window that exceeds its allowed size by this factor is shrunk. The factor prevents resizing for a single chunk.
 constexpr std::size_t kSlack = 4;
 
 const ChunkStorage& all_air() {
@@ -226,7 +226,7 @@ bool ChunkTable::slide_to(const IVec3& chunk) {
   return true;
 }
 
-// Chunks that stood outside, and now may stand in the window.
+// Puts chunks from outside into the window if they now fit.
 void ChunkTable::take_in(const IBox& chunks) {
   trie_.for_each_in(chunks, [&](IVec3 at, const ChunkEntry& entry) {
     const std::uint32_t cell = window_.cell(at.x, at.y, at.z);
@@ -236,13 +236,14 @@ void ChunkTable::take_in(const IBox& chunks) {
   });
 }
 
-// Looks where the chunks are now and then, so that all of it costs no more than a few visits a change.
+// Plans the window again after a quarter of the chunks changed outside of it, so that the total cost is a few visits
+// per change.
 void ChunkTable::outside_changed() {
   ++outside_since_plan_;
   if (4 * outside_since_plan_ >= size()) plan();
 }
 
-// Around all chunks but so many at either end of each axis.
+// Returns a box of all chunks except `left_out` at either end of each axis.
 ChunkWindow::Box ChunkTable::box_of_most(std::size_t left_out) const {
   std::vector<int> along(size());
   ChunkWindow::Box box;

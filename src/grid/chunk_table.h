@@ -112,7 +112,7 @@ class ChunkWindow {
 /// Threads: any number may read and copy at once; a change needs exclusive access.
 class ChunkTable {
  public:
-  /// An entry that is about to be changed; `entry` is null where there is none.
+  /// An entry to be changed; `entry` is null if there is none.
   struct Slot {
     ChunkEntry* entry = nullptr;
     std::uint32_t cell = ChunkWindow::kOutside;
@@ -142,11 +142,11 @@ class ChunkTable {
   /// Returns the type of a voxel.
   [[nodiscard]] VoxelType voxel(int x, int y, int z) const;
 
-  /// To be called before a change during which the chunk may be read: it is then read through its entry.
+  /// Call before a change during which the chunk may be read. It is then read through its entry.
   void voxels_will_change(const Slot& slot) {
     if (slot.cell != ChunkWindow::kOutside) window_.forget_voxels(slot.cell);
   }
-  /// To be called after every change of a chunk's voxels.
+  /// Call after every change of a chunk's voxels.
   void voxels_changed(const Slot& slot) {
     QUOIN_ASSERT(slot.entry != nullptr, "a chunk that is there");
     if (slot.cell != ChunkWindow::kOutside && window_.voxels(slot.cell) != ChunkStorage::of(slot.entry->chunk)) {
@@ -162,10 +162,10 @@ class ChunkTable {
   [[nodiscard]] std::size_t bytes() const { return trie_.bytes() + window_.bytes(); }
   /// Places of the window.
   [[nodiscard]] std::size_t window_cells() const { return window_.cells(); }
-  /// Chunks that do not stand in the window.
+  /// Number of chunks outside of the window.
   [[nodiscard]] std::size_t outside() const { return outside_; }
 
-  /// Calls `visit(chunk, entry)` for each, in an order that depends on nothing but the coordinates.
+  /// Calls `visit(chunk, entry)` for each entry. The order depends only on the coordinates.
   template <class Visit>
   void for_each(Visit&& visit) const {
     trie_.for_each(visit);

@@ -48,7 +48,7 @@ struct Grid::Impl {
   // Records an edit of one chunk, notifies followers of the grid, and drops the chunk if it is empty.
   void finish_edit(const IVec3& chunk, const ChunkTable::Slot& slot, VoxelEdit& edit, EditNotice& notice) {
     QUOIN_ASSERT(slot.entry != nullptr && entries.find(chunk) == slot.entry, "the slot is the chunk's");
-    // Before anything that may throw: the storage that was known may be gone.
+    // Runs before any step that may throw: the known storage may be freed.
     entries.voxels_changed(slot);
     if (const int data = quoin::data_count(slot.entry->chunk); data != edit.data_before) {
       if (!edit.record.has_data()) edit.record.data = edit.record.box;
@@ -70,7 +70,7 @@ struct Grid::Impl {
   // Replaces the voxels of a chunk that was loaded or unloaded. The change is reported as a load, not as an edit.
   void replace(const IVec3& chunk, Chunk voxels, EditNotice& notice) {
     if (non_air_count(voxels) == 0 && quoin::data_count(voxels) == 0 && entries.find(chunk) == nullptr) {
-      VoxelRecord record;  // air where nothing was: no chunk comes and goes for it
+      VoxelRecord record;  // air replaces nothing: no chunk is created or removed
       record.chunk = chunk;
       record.add_all();
       record.is_edit = false;
@@ -228,7 +228,7 @@ bool Grid::set_data(IVec3 voxel, const VoxelData& data) {
   const IVec3 at = chunk_of(voxel);
   const IVec3 local = local_of(voxel);
   const Chunk* const present = find_chunk(at);
-  // Asked first, so that nothing is copied where nothing changes.
+  // Checked first, so that nothing is copied without a change.
   if (present == nullptr || present->get(local) == kAir || present->data(local) == data) return false;
   const ChunkTable::Slot slot = impl().entries.find_to_edit(at);
   VoxelEdit edit{.data_before = quoin::data_count(slot.entry->chunk)};

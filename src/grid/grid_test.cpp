@@ -280,7 +280,7 @@ TEST(Grid, AnEditThatThrowsIsBooked) {
   EXPECT_EQ(follower.take(grid), std::vector<IVec3>({{0, 0, 0}, {1, 0, 0}}));
 }
 
-// The storage of a chunk comes and goes while it is edited.
+// The storage of a chunk is created and freed during an edit.
 TEST(Grid, AnEditMayReadWhatItChanges) {
   Grid grid;
   const IBox box{{0, 0, 0}, {64, 64, 64}};

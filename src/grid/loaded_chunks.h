@@ -72,13 +72,13 @@ class LoadedChunks {
   }
   [[nodiscard]] std::size_t bytes() const { return chunks_.bytes(); }
 
-  /// False where it is loaded, outside of the world, or the grid is not partial.
+  /// Returns false if the chunk is already loaded or outside of the world, or the grid is not partial.
   bool add(IVec3 chunk) {
     if (!is_partial_ || has(chunk)) return false;
     chunks_.find_or_create(chunk, [](auto&) {});
     return true;
   }
-  /// False where it is not loaded, or the grid is not partial.
+  /// Returns false if the chunk is not loaded or the grid is not partial.
   bool remove(IVec3 chunk) {
     return is_partial_ && chunks_.erase(chunk, [](auto&) {});
   }

@@ -36,7 +36,7 @@ struct LongBox {
   std::array<std::int64_t, 3> max{};
 };
 
-/// From `first` to `last`, both included.
+/// Returns the box from `first` to `last`, both included.
 inline LongBox box_from(IVec3 first, IVec3 last) {
   LongBox box;
   for (int axis = 0; axis < 3; ++axis) {

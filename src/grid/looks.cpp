@@ -55,7 +55,7 @@ class MedianCut {
 
   [[nodiscard]] std::size_t groups() const { return groups_.size(); }
 
-  /// Cuts groups in two until there are so many, or none has two colours.
+  /// Splits groups until there are `most`, or no group has two colours.
   void cut(std::size_t most) {
     while (groups_.size() < most && groups_.top().spread > 0) {
       const Group group = groups_.top();
@@ -66,7 +66,7 @@ class MedianCut {
     }
   }
 
-  /// Gives each look the mean colour of its group, which has none then.
+  /// Gives each look the mean colour of its group. Removes the groups.
   void take_means(std::vector<Rgba8>& colours) {
     for (; !groups_.empty(); groups_.pop()) {
       const Group& group = groups_.top();

@@ -28,10 +28,11 @@ class Looks {
   /// Returns the colour of a material, of the same alpha, that is nearest to `colour`; `colour` if there is none.
   [[nodiscard]] Rgba8 nearest(Rgba8 colour, std::uint32_t material) const;
 
-  /// Adds a type for each look and returns them by number: `materials` of the look's, its colour, transparent where
-  /// alpha is below 255. Where there are more than `most`, or than there is room for, near ones of one material become
-  /// one, their mean by voxels, and `warnings` gets a line.
-  /// Errors: LimitExceeded where materials alone are too many. Requires: every look's material is one of `materials`.
+  /// Adds a type for each look and returns the types by number. A type has the properties of the look's entry in
+  /// `materials` and the look's colour; it is transparent if alpha is below 255. If there are more than `most` looks,
+  /// or more than the registry has space for, similar looks of one material are merged into their mean, weighted by
+  /// voxels, and a line is added to `warnings`.
+  /// Errors: LimitExceeded if the materials alone are too many. Requires: every look's material is one of `materials`.
   /// Source: P. Heckbert, "Color Image Quantization for Frame Buffer Display" (1982): median cut.
   [[nodiscard]] Result<std::vector<VoxelType>> add_to(VoxelRegistry& types, std::span<const VoxelProperties> materials,
                                                       std::vector<std::string>& warnings,

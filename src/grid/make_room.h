@@ -4,7 +4,7 @@
 
 namespace quoin {
 
-/// So that the next element is put without a failure.
+/// Reserves memory, so that adding the next element cannot fail.
 template <class T>
 void make_room(std::vector<T>& all) {
   if (all.size() == all.capacity()) all.reserve(2 * all.size() + 1);

@@ -80,13 +80,13 @@ float volume_threshold(const Volume& volume) {
   const double* const begin = variance.data();
   const double* const end = begin + variance.size();
   const double* const first = std::max_element(begin, end);
-  // Bins that hold nothing leave the variance as it is: the threshold goes amid them.
+  // Empty bins do not change the variance: the threshold is in the middle of them.
   const double* last = first;
   while (last + 1 != end && *(last + 1) == *first) ++last;
   const double bins = (static_cast<double>(first - begin) + static_cast<double>(last - begin)) / 2;
   const double min = volume.min;
   const auto threshold = static_cast<float>(min + (bins + 1.0) * ((static_cast<double>(volume.max) - min) / kBins));
-  // Amid two values that follow each other there is no float, and nothing is above the greater.
+  // There is no float between two consecutive values, and no value is above the greater one.
   return std::min(threshold, std::nextafter(volume.max, volume.min));
 }
 

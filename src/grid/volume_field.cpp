@@ -56,7 +56,7 @@ class Samples {
   }
 
  private:
-  // From the previous sample to the next, or as far as there are any.
+  // Difference between the previous and the next sample, or fewer at the border.
   [[nodiscard]] double change(IVec3 p, int axis) const {
     IVec3 low = p;
     IVec3 high = p;
@@ -121,7 +121,7 @@ std::vector<double> steepness_at_surface(const Samples& samples, float iso, std:
 
 // The change of the value over one sample, straight through the surface.
 double slope_of(const Samples& samples, const Volume& volume, float iso, Threads threads) {
-  // A median needs no more than some millions of samples.
+  // A few million samples suffice for a median.
   constexpr std::size_t kEnough = std::size_t{1} << 22;
   const auto stride = static_cast<std::uint32_t>(std::min(volume.values.size() / kEnough + 1, kEnough));
   std::vector<double> all = steepness_at_surface(samples, iso, stride, threads);

@@ -281,7 +281,7 @@ TEST(VoxelDataChanges, AreToldApartFromThoseOfTypes) {
   EXPECT_EQ(grid.bounds(), (IBox{{0, 0, 0}, {128, 8, 8}}));
 }
 
-// As many consumers as there are, each with its own pace.
+// Several consumers read at different rates.
 TEST(VoxelDataChanges, TellOfEveryVoxelThatDiffers) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE(seed);
@@ -368,7 +368,7 @@ TEST(VoxelDataCopies, ArriveTurnedWithTheirVoxels) {
       if (held.type == kAir && !options.copy_air) return;
       if (!options.type_map.empty() && held.type < map.size()) held.type = map[held.type];
       if (held.type == kAir) {
-        // A type that is mapped to air takes nothing away where air is not copied.
+        // Without copy_air, a type that is mapped to air removes nothing.
         if (options.copy_air) to.voxels.erase(key_of(place + v));
         return;
       }

@@ -91,7 +91,7 @@ Result<VoxelType> VoxelRegistry::add(VoxelProperties properties) {
   Content& c = *content_;
   const auto type = static_cast<VoxelType>(size());
   const Visibility visibility = properties.visibility;
-  // Room first, so that nothing is half done when there is none.
+  // Reserves memory first, so that a failure leaves nothing half done.
   make_room(c.serials);
   make_room(c.visibility);
   make_room(c.properties);

@@ -8,7 +8,7 @@
 namespace quoin {
 namespace {
 
-// By barycentric coordinates in the triangle of the mesh that holds the point.
+// Interpolates by barycentric coordinates in the mesh triangle that contains the point.
 double occlusion_by_triangles(const FaceOcclusion& corners, double u, double v) {
   constexpr double kU[] = {0, 1, 1, 0};
   constexpr double kV[] = {0, 0, 1, 1};

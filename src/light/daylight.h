@@ -7,7 +7,7 @@
 
 namespace quoin {
 
-/// In linear light. `kGroundBegins`, `kGroundIsFull`: the y of unit directions.
+/// Sky colours in linear light. `kGroundBegins`, `kGroundIsFull`: the y of unit directions.
 namespace sky {
 constexpr Vec3 kZenith{0.145F, 0.335F, 0.700F};
 constexpr Vec3 kHorizon{0.640F, 0.780F, 0.900F};
@@ -23,8 +23,8 @@ struct SkyColours {
   Vec3 ground = sky::kGround;
 };
 
-/// The backdrop in linear light: paler towards the horizon, with ground that fades in below it. A picture's exposure
-/// does not change it, so that a scene can be made brighter without the sky burning out.
+/// Returns the backdrop in linear light: paler towards the horizon, with ground that fades in below it. An image's
+/// exposure does not change it, so that a scene can be made brighter without overexposing the sky.
 ///
 /// `up`: the y of a unit direction.
 [[nodiscard]] inline Vec3 sky_colour(float up, const SkyColours& of = {}) {
@@ -42,16 +42,15 @@ struct Daylight {
   SkyColours sky;               ///< before LightOptions::sky_brightness
   Vec3 ambient{1.0F};           ///< times the ambient term
   Vec3 sun{1.0F};               ///< times the sun's light
-  double sun_brightness = 1.0;  ///< the options', 0 where no light comes from the sun
+  double sun_brightness = 1.0;  ///< as in the options; 0 if the sun gives no light
 };
 
-/// A day's unless LightOptions::sky_follows_sun says otherwise.
+/// Returns the colours of sun and sky. Always day unless LightOptions::sky_follows_sun is set.
 ///
-/// Sun:     what air lets through of it by the Rayleigh scattering on its way, whose length is that of F. Kasten,
-///          A. T. Young, "Revised optical air mass tables and approximation formula" (1989); it goes down within two
-///          degrees.
-/// Sky:     of a table of elevations, a smooth curve through which goes nowhere beyond two neighbours. From 30 degrees
-///          upwards it is the day's; from 18 below the horizon downwards it is night, with a little light of its own.
+/// Sun:     transmittance of the air by Rayleigh scattering. The length of the path is from F. Kasten, A. T. Young,
+///          "Revised optical air mass tables and approximation formula" (1989). The sun fades out within two degrees.
+/// Sky:     a monotone curve through a table of elevations. Above 30 degrees it has the day's colours; from 18 degrees
+///          below the horizon downwards it is night, with a little light of its own.
 [[nodiscard]] Daylight daylight_of(const LightOptions& options);
 
 }  // namespace quoin

@@ -16,7 +16,7 @@ struct EmissiveCell {
   DVec3 centre{0.0};            ///< of the faces that shine, weighted by their power
   double spread_squared = 0.0;  ///< the mean square of their distances from there
   std::array<Vec3, 6> power{};  ///< colour * emission, linear, times the number of faces, by direction
-  IBox box;                     ///< tight around what emits
+  IBox box;                     ///< bounds of the emitting surfaces
 };
 
 /// The emissive cells of one grid or field, kept up to date with its edits. A voxel face emits if the voxel before it

@@ -13,7 +13,7 @@
 namespace quoin {
 namespace {
 
-// ln of the share of light below which a body counts as closed: a sixteenth of the least step of an 8-bit picture.
+// ln of the share of light below which a body counts as opaque: a sixteenth of the least step of an 8-bit image.
 constexpr double kClosed = -11.0;
 
 constexpr double kDiagonal = 1.7320508075688774;  // of a cube of 1
@@ -109,7 +109,7 @@ class BodiesOfGrid {
     return clarity_ > kClosed;
   }
 
-  // False where nothing is seen any more.
+  // Returns false if nothing behind the body is visible.
   bool add(const GlassBody& next) {
     if (!(next.voxels > 0.0)) return true;  // an edge that it only touches
     if (out_.size() > first_ && continues(out_.back(), next.type, next.t_enter)) {
@@ -132,7 +132,7 @@ class BodiesOfGrid {
   double clarity_ = 0.0;
 };
 
-// Puts bodies in the ray's order and makes those one that touch, of neighbouring grids.
+// Sorts bodies along the ray and joins those of neighbouring grids that touch.
 void join_touching(std::vector<GlassBody>& bodies) {
   std::sort(bodies.begin(), bodies.end(), [](const GlassBody& a, const GlassBody& b) {
     return a.t_enter != b.t_enter ? a.t_enter < b.t_enter : a.placed < b.placed;

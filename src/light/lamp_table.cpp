@@ -47,7 +47,7 @@ PlacedLamp placed_cell(const EmissiveCell& cell, const LampPlace& place, double 
   PlacedLamp lamp;
   lamp.position = place.position + place.axes * ((cell.centre - place.pivot) * size);
   lamp.axes = place.axes;
-  // A face of radiance L lights what faces it by L / pi, as the sun's 1 is an irradiance of pi.
+  // A face of radiance L lights a facing surface by L / pi, since the sun's 1 is an irradiance of pi.
   const double scale = brightness * size * size / std::numbers::pi;
   for (std::size_t face = 0; face < 6; ++face) lamp.power[face] = capped(DVec3(cell.power[face]) * scale);
   lamp.spread_squared = cell.spread_squared * size * size;
@@ -189,7 +189,7 @@ void put_bricks(std::vector<ListMaker>& made, LampTable& table) {
   }
 }
 
-// Those that hold voxels, or cells of the field: these begin a sample before it.
+// Returns the chunks with voxels or field cells. Cells begin one sample before their chunk.
 std::vector<IVec3> chunks_of(const LampPlace& place) {
   std::vector<IVec3> chunks = place.voxels->chunks();
   if (place.cells == nullptr) return chunks;

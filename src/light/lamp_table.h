@@ -40,7 +40,7 @@ struct PlacedLamp {
   double cos_outer = -3.0;
 };
 
-/// Those of Scene::lamps that shine. `brightness`: times theirs.
+/// Returns the shining lamps of Scene::lamps. `brightness` multiplies their own brightness.
 [[nodiscard]] std::vector<PlacedLamp> placed_lamps(const Scene& scene, double brightness);
 
 /// The light of a lamp at a point.
@@ -53,15 +53,15 @@ struct LampRay {
 /// Requires: `normal` is unit. `to_lamp`: from the point to the lamp's position. Both in the world.
 [[nodiscard]] LampRay lamp_ray(const PlacedLamp& lamp, DVec3 to_lamp, DVec3 normal);
 
-/// The lamps of a scene, and which of them light which part of it.
+/// The lamps of a scene and the regions that they light.
 ///
-/// Each brick of 16^3 voxels of each placed grid has a list of the lamps that reach it; where these are more than
-/// `max_lamps`, those that can add most to it, the first of equal ones. So what lights a surface depends on where it
-/// is, and on nothing of the picture.
+/// Each brick of 16^3 voxels of each placed grid has a list of the lamps that reach it. If there are more than
+/// `max_lamps`, the list contains those that can add the most light; ties go to the first. The lamps of a surface
+/// therefore depend only on its position, not on the image.
 struct LampTable {
   static constexpr int kBrick = 16;
 
-  /// A list; `count` 0: none. Open addressing by `slot_of`.
+  /// A list; `count` 0: empty. Open addressing by `slot_of`.
   struct Brick {
     IVec3 brick{0};
     std::int32_t placed = 0;
@@ -100,17 +100,17 @@ struct LampPlace {
 [[nodiscard]] LampPlace lamp_place(const Scene& scene, const PlacedGrid& placed, const OccupancyTree& opaque,
                                    const OccupancyTree* transparent, const DensityTree* field);
 
-/// Makes the table of a scene when it is first asked for after an `update`, and keeps the last two that options asked
-/// for: pictures of a moving view may take fewer lamps than others. Threads: any number may call `table`.
+/// Makes the table of a scene at the first request after an `update`, and keeps the last two for different options:
+/// images of a moving view may use fewer lamps. Threads: any number may call `table`.
 class LampCache {
  public:
-  /// The scene was edited, or its instances are others.
+  /// Call after the scene was edited or its instances changed.
   void update();
 
-  /// Null where nothing shines, or the options want no lamps. `places` is asked for the placed grids, in the order of
-  /// SceneTracer::placed, when the table has to be made.
-  /// Cost: when it is made, the emissive cells of the chunks that changed; for each chunk all lamps, for each brick
-  /// those near its chunk. The scene is read then only.
+  /// Returns null if no lamp shines or the options disable lamps. Calls `places` for the placed grids, in the order of
+  /// SceneTracer::placed, only if it has to make the table.
+  /// Cost of making it: the emissive cells of the changed chunks; for each chunk all lamps, for each brick the lamps
+  /// near its chunk. Reads the scene only then.
   [[nodiscard]] std::shared_ptr<const LampTable> table(const Scene& scene, const LightOptions& light, Threads threads,
                                                        FunctionRef<std::vector<LampPlace>()> places);
 
@@ -126,7 +126,7 @@ class LampCache {
     double brightness = 0.0;
     std::shared_ptr<const LampTable> table;
   };
-  std::vector<Kept> kept_;  // none is out of date; the one that was used last is the last
+  std::vector<Kept> kept_;  // up to date, most recently used last
 };
 
 }  // namespace quoin

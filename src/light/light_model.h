@@ -15,7 +15,7 @@ namespace quoin {
 constexpr double kRayLift = 0.01;  ///< voxels in front of the face, where secondary rays start
 constexpr float kAmbient = 0.15F;
 constexpr float kAmbientWithoutOcclusion = 0.10F;
-constexpr float kLeastOfAll = 0.25F;  ///< what full occlusion leaves when it darkens everything
+constexpr float kLeastOfAll = 0.25F;  ///< remaining light at full occlusion if it darkens all light
 
 /// Returns true if surfaces show propagated light, which needs light levels of voxels.
 [[nodiscard]] inline bool is_propagated(const LightOptions& options) {

@@ -54,12 +54,12 @@ struct SurfacePoint {
 class Lighting {
  public:
   /// `view`, `surfaces` and `lamps` must outlive it. Requires: `check` accepts the options.
-  /// `lamps`: of the same placed grids; null: none shines. `detail_colours`: surfaces are of the colour of their grid's
-  /// detail and emit nothing. `levels`: of each placed grid, where the options' model is propagated light.
+  /// `lamps`: for the same placed grids; null: no lamps. `detail_colours`: surfaces have the colour of their grid's
+  /// detail and emit nothing. `levels`: for each placed grid, if the options' model is propagated light.
   Lighting(const SceneView& view, const VoxelRegistry& types, const Surfaces& surfaces, const LightOptions& options,
            const LampTable* lamps = nullptr, bool detail_colours = false, std::vector<GridLight> levels = {});
 
-  /// Linear light of each point, not clamped; returns how many rays that took.
+  /// Computes the linear light of each point, not clamped. Returns the number of rays traced.
   ///
   /// Requires: as many places in `colours` as points. The result for a point does not depend on the others; neighbours
   /// should lie side by side, since sixteen are traced together. `sample`: of each pixel, which they are of.

@@ -18,7 +18,6 @@ namespace quoin {
 ///    normal and tilts the first one. Without this, flat faces would keep bands at any number of samples.
 /// Any other number: cosine-weighted, one ray in each of as many rings of equal weight, a golden angle apart. A hash of
 ///    the pixel rotates the whole set and shifts it within the rings.
-///    the pixel.
 class OcclusionDirections {
  public:
   explicit OcclusionDirections(int rays);
@@ -65,10 +64,10 @@ class OcclusionDirections {
   std::vector<Angle> turns_;
 };
 
-/// A direction that stands to (0, 1, 0) as the result stands to a unit `normal`: turned about the axis upright to both.
+/// Rotates a direction by the rotation from (0, 1, 0) to a unit `normal`, about the axis perpendicular to both.
 [[nodiscard]] DVec3 turned_from_up(const DVec3& direction, const DVec3& normal);
 
-/// A well-mixed number of two, by integers only.
+/// Returns a well-mixed hash of two numbers, by integer operations only.
 [[nodiscard]] constexpr std::uint32_t hash_of(std::uint32_t a, std::uint32_t b) {
   return mix_bits(a * 0x9E37'79B9U + b * 0x85EB'CA6BU + 0x27D4'EB2FU);
 }

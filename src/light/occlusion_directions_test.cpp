@@ -128,7 +128,7 @@ TEST(OcclusionDirections, NineHaveAllFourDiagonals) {
     EXPECT_TRUE(holds(all, n));
     EXPECT_EQ(tilted, 4);
     EXPECT_EQ(diagonal, 4);
-    // Symmetric: nothing is left but along the normal.
+    // Symmetric: only the component along the normal remains.
     EXPECT_NEAR(glm::length(sum - n * glm::dot(sum, n)), 0.0, 1e-12);
   }
 }

@@ -103,7 +103,7 @@ class MaterialShares {
   IVec3 at_{0};  // of the chunk
   const DensityChunk* chunk_ = nullptr;
   std::optional<VoxelType> only_;  // the material of all its samples
-  std::uint64_t solid_ = 0;        // of the row that was last asked for
+  std::uint64_t solid_ = 0;        // of the row read last
   std::array<Share, 27> shares_;
   std::size_t count_ = 0;
 };

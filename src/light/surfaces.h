@@ -67,7 +67,7 @@ class Surfaces {
 
  private:
   Clouds clouds_;
-  std::vector<Surface> surfaces_;  // that of unregistered types comes last
+  std::vector<Surface> surfaces_;  // the last entry is for unregistered types
   ChangeCursor followed_;
 };
 

@@ -43,7 +43,7 @@ std::vector<SurfaceUpdate> GridSurfaces::update(const SceneGrid& grid, const Vox
       try {
         make_live_surface(options_, *jobs[i], workspace);
       } catch (...) {
-        workspace = {};  // what memory ran out in may be half made
+        workspace = {};  // an allocation failure may have left it incomplete
         throw;
       }
     });

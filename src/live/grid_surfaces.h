@@ -12,8 +12,8 @@
 
 namespace quoin {
 
-/// The surfaces of the chunks of one grid's voxels, or of its field, made when they are asked for rather than by
-/// workers: as LiveMeshes makes them, and after an edit those that it could have changed.
+/// The surfaces of the chunks of one grid's voxels or field, made on request instead of by workers. Equal to those of
+/// LiveMeshes; after an edit, only the affected ones are made.
 class GridSurfaces {
  public:
   GridSurfaces(GridHandle handle, SurfaceContent content, SurfaceStyle style);

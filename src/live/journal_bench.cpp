@@ -60,7 +60,7 @@ struct World {
     edge = 64 * ((grid().bounds().max.x + 63) / 64);
   }
   Grid& grid() { return scene.edit(handle).grid; }
-  // In the middle of the world, and of a chunk: it comes and goes.
+  // Toggles a voxel in the middle of the world and of a chunk.
   void edit() {
     const IVec3 at{edge / 128 * 64 + 30, 33, edge / 128 * 64 + 30};
     fail_unless(scene.edit(handle).grid.set(at, (++edits & 1) != 0 ? VoxelType{1} : kAir), "the edit changed nothing");

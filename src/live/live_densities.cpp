@@ -216,7 +216,7 @@ LiveDensities DensityCache::around(IVec3 chunk, const std::shared_ptr<const Voxe
 }
 
 std::shared_ptr<LiveDensity> DensityCache::density(IVec3 chunk, const std::shared_ptr<const VoxelRegistry>& types) {
-  // As in a DensityGrid, the outermost chunks stay air.
+  // The outermost chunks stay air, as in a DensityGrid.
   if (!is_inside_world(chunk) || !has_voxels_near(chunk)) return nullptr;
   Slot& slot = slots_[chunk];
   if (slot.kept != nullptr && !slot.is_solid_stale && !slot.is_type_stale) return slot.kept;

@@ -18,7 +18,7 @@
 
 namespace quoin {
 
-/// The types of a chunk's samples that are transparent, in their order; none of null.
+/// Returns the transparent types of a chunk's samples, in ascending order; empty for null.
 [[nodiscard]] std::vector<VoxelType> transparent_of(const DensityChunk* chunk, const VoxelRegistry& types);
 
 /// The densities of single bodies in one chunk (smooth::without_others). The first worker that needs a body computes
@@ -59,9 +59,9 @@ class LiveDensity {
   /// Returns once they exist, computed by this thread or another.
   void make();
 
-  /// Null where all is far air. Requires: is_made().
+  /// Returns the densities; null if all is far air. Requires: is_made().
   [[nodiscard]] const DensityChunk* densities() const { return densities_.get(); }
-  /// Those of single bodies. Requires: is_made(), before they are asked for.
+  /// Returns the densities of single bodies. Requires: is_made().
   [[nodiscard]] BodyChunks& bodies() { return bodies_; }
   /// Returns true if a neighbour at `offset` that reads `reach` samples past its own reads the same densities here as
   /// in the state `stamp`. Returns false if that is unknown. Requires: is_made().
@@ -96,7 +96,7 @@ using DensityStamps = std::array<std::uint64_t, 27>;
 /// Threads: one.
 class DensityCache {
  public:
-  /// `reach` is what meshing reads beyond a chunk's own samples.
+  /// `reach`: number of samples that meshing reads past a chunk's own.
   explicit DensityCache(int reach) : reach_(reach) {}
 
   void clear() { *this = DensityCache(reach_); }

@@ -9,15 +9,15 @@
 namespace quoin {
 namespace {
 
-// Levels are changed for so many chunks at a time, so that edits near them need not wait long.
+// Maximum number of chunks whose levels change at a time, so that edits near them need not wait long.
 constexpr std::size_t kMaxLevelChanges = 32;
 
-// The chunks whose samples the cells of a chunk have as corners: it, and those that follow.
+// Returns the chunks that contain corners of a chunk's cells: the chunk and those after it.
 IVec3 corner_chunk(IVec3 chunk, int i) {
   return chunk + IVec3{i & 1, i >> 1 & 1, i >> 2};
 }
 
-// Those whose cells have samples of a chunk as corners: it, and those before it.
+// Returns the chunks with cells that have samples of a chunk as corners: the chunk and those before it.
 IVec3 cell_chunk(IVec3 chunk, int i) {
   return chunk - IVec3{i & 1, i >> 1 & 1, i >> 2};
 }

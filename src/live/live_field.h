@@ -57,7 +57,7 @@ class LiveField final : public LiveSource {
     bool is_working = false;       // a worker has the newest job
     bool is_done = false;          // in its group
     bool is_empty = false;         // there is nothing to mesh
-    bool is_gone = false;          // of the field nothing is there any more
+    bool is_gone = false;          // it no longer exists in the field
     bool is_ready = false;         // `surface` is ready to be taken
     bool is_listed = false;        // in LiveTotals::ready
     bool is_shown = false;         // the last surface taken is not null

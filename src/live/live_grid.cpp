@@ -111,7 +111,7 @@ void LiveGrid::follow_blocky(const Grid& grid, const GridChanges& changes, LiveC
   }
 }
 
-// Those that may have been waiting for a chunk to be loaded, or must not be shown without it.
+// Adds chunks that may have waited for a chunk to load, or must be hidden without it.
 void LiveGrid::add_chunks_around(IVec3 chunk, int distance, std::vector<IVec3>& to) {
   for (int z = -distance; z <= distance; ++z) {
     for (int y = -distance; y <= distance; ++y) {

@@ -53,7 +53,7 @@ class LiveGrid final : public LiveSource {
   [[nodiscard]] const IBox& box() const override { return box_; }
   [[nodiscard]] bool has_chunks() const override { return !chunks_.empty(); }
   [[nodiscard]] std::unique_ptr<LiveJob> make_job(LiveInputs& inputs, IVec3 chunk) override;
-  /// With the grid as `follow` saw it; null for smooth surfaces.
+  /// Makes a job for the grid as of the last `follow`. `grid` is null for smooth surfaces.
   [[nodiscard]] std::unique_ptr<LiveJob> make_job(const GridSnapshot& grid, IVec3 chunk, const LiveTypes& types,
                                                   const LightSnapshot& light = nullptr);
   void hand_over(IVec3 chunk, std::uint64_t serial) override;

@@ -51,7 +51,7 @@ LitQuads sorted(const QuadBuffer& quads, const std::vector<FaceLight>& light) {
   return all;
 }
 
-// As they would be made from nothing.
+// Compares with surfaces made from scratch.
 void expect_right(const DarkeningScene& world, const SceneLight& light, const Surfaces& surfaces,
                   LightMerging merging) {
   const GridLight lit = light.of(world.handle);

@@ -1,5 +1,5 @@
-// live: from an edit to the new meshes of all chunks that it reaches, and from nothing to all meshes; terrain of
-// 256x128x256 voxels, as many workers as `LiveMeshOptions` makes them by itself.
+// live: time from an edit to the new meshes of all affected chunks, and from scratch to all meshes. Terrain of
+// 256x128x256 voxels, the default number of workers of `LiveMeshOptions`.
 
 #include <quoin/live/live_meshes.h>
 
@@ -62,7 +62,7 @@ void load(benchmark::State& state, SurfaceStyle style) {
   state.counters["chunks"] = static_cast<double>(surfaces);
 }
 
-// A voxel comes and goes; `x` and `z` say how many chunks that reaches.
+// Toggles a voxel; `x` and `z` choose how many chunks it affects.
 void edit(benchmark::State& state, SurfaceStyle style, int x, int z) {
   Land land;
   Grid& grid = land.scene.edit(land.grid).grid;

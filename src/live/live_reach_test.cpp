@@ -125,7 +125,7 @@ TEST(LiveReach, SmoothEditsReachTheChunksThatReadAnotherDensity) {
     for (const IVec3 chunk : grid.chunks()) asked.insert(key(chunk - IVec3{0, 0, 1}));
     const Places reached = chunks_that_read_changes(before, after, asked);
     const std::int64_t meshed = followed.meshed(given);
-    // Not all that were asked can own a quad.
+    // Not all affected chunks can own a quad.
     EXPECT_LE(meshed, static_cast<std::int64_t>(reached.size()));
     EXPECT_GT(meshed, 0);
     for (const auto& each : given) EXPECT_TRUE(reached.contains(each));

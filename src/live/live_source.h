@@ -27,9 +27,9 @@ class ChunkDistances {
   void add(const Instance& instance, const SceneGrid& grid);
   /// Call it once all instances are added.
   void sort();
-  /// In the world. 0 where numbers are not finite, or nothing was added.
+  /// Returns the distance in the world. 0 if numbers are not finite or no instance was added.
   [[nodiscard]] double to(IVec3 chunk) const;
-  /// In voxels, or samples, of the instance that is nearest in these. As `to`.
+  /// As `to`, in voxels or samples; the minimum over the instances, each in its own voxels.
   [[nodiscard]] double in_voxels(IVec3 chunk) const;
 
  private:
@@ -106,7 +106,7 @@ class LiveInputs {
     if (field_ == nullptr) field_ = std::make_shared<const DensityGrid>(content_->field.snapshot());
     return field_;
   }
-  /// Null where no light is used.
+  /// Returns the light; null if no light is used.
   [[nodiscard]] const LightSnapshot& light() {
     if (lit_ == nullptr && light_.light != nullptr) {
       lit_ = std::make_shared<const LitVoxels>(LitVoxels{light_.light->snapshot(), light_.voxels->snapshot()});
@@ -141,7 +141,7 @@ class LiveSource {
     (void)light;
     (void)now;
   }
-  /// Nothing of it is drawn any more.
+  /// Called when the grid left the scene: all of its surfaces are removed.
   virtual void leave() = 0;
   /// Makes the next `follow` start from scratch.
   virtual void forget() = 0;
@@ -156,9 +156,9 @@ class LiveSource {
   }
   /// Sees which chunks may be given to workers. Requires: `content` is as `follow` saw it last.
   virtual void prepare(const SceneGrid& content, const VoxelRegistry& types) = 0;
-  /// Those chunks.
+  /// Returns the waiting chunks.
   [[nodiscard]] virtual const ChunkSet& waiting() const = 0;
-  /// Holds all chunks that wait or are being meshed.
+  /// Returns a box that contains all chunks that wait or are being meshed.
   [[nodiscard]] virtual const IBox& box() const = 0;
   [[nodiscard]] virtual bool has_chunks() const = 0;
   /// Creates the job of a waiting chunk. Requires: the chunk waits; `inputs` match the last `follow`.

@@ -78,7 +78,7 @@ struct LitQuads {
   std::span<const FaceLight> light;
 };
 
-// Those of opaque types first.
+// Sorts the quads, opaque types first.
 void sort_into_one(const LitQuads& lit, const VoxelRegistry& types, ChunkSurface& surface) {
   const QuadBuffer& quads = lit.quads;
   surface.quads.resize(quads.size());
@@ -244,7 +244,7 @@ bool reads_as_before(const LiveJob& job, int reach) {
   for (int i = 0; i < 27; ++i) {
     const auto& density = job.densities[static_cast<std::size_t>(i)];
     const std::uint64_t last = (*job.last_stamps)[static_cast<std::size_t>(i)];
-    // From that chunk, this one lies the other way.
+    // The offset as seen from that chunk.
     const IVec3 offset = -Neighbourhood::offset(i);
     if (density == nullptr ? last != 0 : !density->reads_as(last, reach, offset)) return false;
   }
@@ -364,7 +364,7 @@ void make_smooth(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& wo
   });
 }
 
-// Fields have no `last_stamps`: what reads as before is not meshed.
+// Fields have no `last_stamps`: chunks with unchanged densities are not meshed.
 void make_field(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& workspace) {
   const DensityNeighbourhood chunks = job.field->neighbourhood(job.chunk);
   make_bodies(options, chunks, job, workspace, [&](std::size_t i, std::uint32_t body) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// Scenes that are edited at random, and what their surfaces should be.
+// Scenes with random edits, and their expected surfaces.
 
 #include <algorithm>
 #include <array>

@@ -54,11 +54,11 @@ struct LiveJob {
   LiveKey source;
   IVec3 chunk{0};
   std::uint64_t serial = 0;
-  double distance = 0.0;       ///< from the eye; the least comes first
+  double distance = 0.0;       ///< from the eye; the nearest comes first
   LiveClock::time_point seen;  ///< when the edit was
 
   GridSnapshot voxels;  ///< blocky
-  LightSnapshot light;  ///< blocky; null where none is used
+  LightSnapshot light;  ///< blocky; null if no light is used
   std::shared_ptr<const VoxelRegistry> types;
   LiveDensities densities;                            ///< smooth
   std::shared_ptr<const SurfaceMaterials> materials;  ///< smooth surfaces and fields
@@ -72,7 +72,7 @@ struct LiveJob {
 
   enum class Outcome : std::uint8_t { Meshed, AsBefore, OutOfMemory };
   Outcome outcome = Outcome::Meshed;
-  std::shared_ptr<ChunkSurface> surface;  ///< null where there is nothing to see
+  std::shared_ptr<ChunkSurface> surface;  ///< null if there is no surface
 };
 
 /// Scratch memory that a worker keeps between chunks.
@@ -117,7 +117,7 @@ class MeshJobQueue {
   void renew(const std::function<void(LiveJob&)>& renew);
   /// The jobs that were done since the last call, in the order in which they were.
   [[nodiscard]] std::vector<std::unique_ptr<LiveJob>> collect();
-  /// Returns once at most `waiting` jobs wait for workers; with 0, once none is left at all.
+  /// Returns once at most `waiting` jobs wait for workers; with 0, once all jobs are done.
   void wait(std::size_t waiting);
   [[nodiscard]] LiveMeshes::Stats stats() const;
 

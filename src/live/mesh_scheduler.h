@@ -35,7 +35,7 @@ class MeshScheduler {
   }
   void finish(const Scene& scene, DVec3 eye, std::span<const DVec3> other_eyes = {});
   [[nodiscard]] LiveMeshes::Stats stats() const;
-  /// Ends the workers; nothing may be called after it.
+  /// Stops the workers. Do not call other functions after it.
   void stop() { queue_.stop(); }
 
  private:
@@ -65,7 +65,7 @@ class MeshScheduler {
   const LiveMeshOptions options_;
   const unsigned workers_;
   const std::size_t max_ahead_;  // jobs that wait for workers
-  mutable std::mutex mutex_;     // guards what follows, but the queue, which guards itself
+  mutable std::mutex mutex_;     // guards the following members, except the queue, which has its own mutex
   LiveTotals totals_;
   LiveTypes types_;
   const SceneLight* light_ = nullptr;  // of the caller

@@ -291,7 +291,7 @@ TEST(MeshScheduler, WhoActsOnlyWhenCalledComesToTheEnd) {
     make_live_surface(options, job, workspace);
     as_before += job.outcome == LiveJob::Outcome::AsBefore ? 1 : 0;
   });
-  const DVec3 eye{0.0, -1'000'000.0, 0.0};  // the lower row, which is edited, comes first
+  const DVec3 eye{0.0, -1'000'000.0, 0.0};  // the lower row, which is edited, has priority
   const auto come_to_the_end = [&] {
     for (int seen = -1;;) {
       scheduler.update(one.scene, eye);

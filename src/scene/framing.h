@@ -7,8 +7,8 @@
 
 namespace quoin {
 
-/// Computes the maximum dot product of a direction (of any length) with the vectors from the middle point to the
-/// points of an object.
+/// A function that returns the maximum dot product of a direction (of any length) with the vectors from the middle
+/// point to the points of an object.
 using Reach = std::function<double(DVec3 direction)>;
 
 /// Returns a camera whose image shows the whole object, filling it except for a margin.

@@ -34,8 +34,8 @@ class ChunkBoxes {
     }
   }
 
-  /// The box around all. Cost: O(chunks) the first time, O(chunks log chunks) the second: until then nothing is
-  /// counted, for those who never change.
+  /// Returns the box around all. Cost: O(chunks) the first time, O(chunks log chunks) the second. Counting starts with
+  /// the second call, so that containers that never change do not pay for it.
   [[nodiscard]] IBox bounds() {
     IBox around;
     if (!was_asked_) {

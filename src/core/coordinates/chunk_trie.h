@@ -15,10 +15,10 @@ namespace quoin {
 
 /// The chunks of a grid by their coordinates, in a tree that its copies share.
 ///
-///                root                     A node of level n stands for a cube of 4^(n+1) chunks an edge and has
-///           2: [ . . x . x . ]            64 places. A node of level 0 holds the entries themselves. Levels at which
-///                  |     |                there is but one child are left out, so chunks far apart cost a node each.
-///           0: [ e . e ] |                A node's `prefix` are the coordinates of its cube in cubes of its size.
+///                root                     A node of level n covers a cube with an edge of 4^(n+1) chunks and has
+///           2: [ . . x . x . ]            64 slots. A node of level 0 holds the entries themselves. Levels with a
+///                  |     |                single child are omitted, so a distant chunk costs a single node.
+///           0: [ e . e ] |                `prefix` contains the coordinates of a node's cube in units of its size.
 ///                     1: [ x . x ]
 ///                          |   |
 ///                       0: [e] [e e]
@@ -44,8 +44,8 @@ class ChunkTrie {
     return nullptr;
   }
 
-  /// The entry, which no copy shares then; null where there is none. Calls `on_copy(leaf)` when the entries around it
-  /// had to be copied and now lie elsewhere.
+  /// Returns the entry, unshared, or null if there is none. Calls `on_copy(leaf)` if the entries around it were copied
+  /// and have new addresses.
   template <class OnCopy>
   Entry* find_to_edit(IVec3 chunk, OnCopy&& on_copy) {
     return find(chunk.x, chunk.y, chunk.z) == nullptr ? nullptr : &find_or_create(chunk, on_copy);
@@ -80,7 +80,7 @@ class ChunkTrie {
     }
   }
 
-  /// False where there is none.
+  /// Returns false if there is no entry.
   template <class OnCopy>
   bool erase(IVec3 chunk, OnCopy&& on_copy) {
     if (find_to_edit(chunk, on_copy) == nullptr) return false;
@@ -96,8 +96,7 @@ class ChunkTrie {
 
   [[nodiscard]] std::size_t size() const { return size_; }
 
-  /// Calls `visit(chunk, entry)` for each within the box of chunks, in an order that depends on nothing but the
-  /// coordinates.
+  /// Calls `visit(chunk, entry)` for each entry in the box of chunks. The order depends only on the coordinates.
   template <class Visit>
   void for_each_in(const IBox& chunks, Visit&& visit) const {
     if (root_ != nullptr) walk(*root_, &chunks, visit);
@@ -186,7 +185,7 @@ class ChunkTrie {
     return Ref<Node>(new Inner(static_cast<const Inner&>(node)));
   }
 
-  // Puts a node in place of another that does not cover a chunk: the smallest that covers both, with the other below.
+  // Replaces a node that does not cover a chunk by the smallest node that covers both, with the old one as child.
   static void insert_above(Ref<Node>& here, const Place& at) {
     int level = here->level;
     Place other = here->prefix;
@@ -206,7 +205,7 @@ class ChunkTrie {
     here = Ref<Node>(inner.release());
   }
 
-  // Requires: the entry is there, and nothing on the way to it is shared.
+  // Requires: the entry exists, and no node on the path to it is shared.
   static void erase_below(Ref<Node>& here, const Place& at) {
     QUOIN_ASSERT(!here.is_shared(), "the way to an entry is copied before it changes");
     Node& node = *here;

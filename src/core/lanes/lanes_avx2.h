@@ -175,7 +175,7 @@ inline F sqrt(F a) {
 }
 // Four numbers from `base + at[lane]` on.
 inline void load_four(const float* base, const std::int32_t (&at)[kWidth], F& a, F& b, F& c, F& d) {
-  // 128 bits of a register hold what belongs to four lanes side by side.
+  // Each 128-bit part of a register holds the values of four neighbouring lanes.
   const auto rows = [&](int i) {
     return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(base + at[i])), _mm_loadu_ps(base + at[i + 4]), 1);
   };

@@ -1,7 +1,7 @@
 // Sixteen lanes in AVX-512 registers.
 //
 //   F, I   | 0 | 1 | 2 | ... |15 |    32 bits each
-//   Mask   a bit each, in a register of its own
+//   Mask   one bit per lane, in a mask register
 
 #pragma once
 
@@ -179,7 +179,7 @@ inline F sqrt(F a) {
 }
 // Four numbers from `base + at[lane]` on.
 inline void load_four(const float* base, const std::int32_t (&at)[kWidth], F& a, F& b, F& c, F& d) {
-  // 128 bits of a register hold what belongs to four lanes side by side.
+  // Each 128-bit part of a register holds the values of four neighbouring lanes.
   const auto rows = [&](int i) {
     __m512 four = _mm512_castps128_ps512(_mm_loadu_ps(base + at[i]));
     four = _mm512_insertf32x4(four, _mm_loadu_ps(base + at[i + 4]), 1);

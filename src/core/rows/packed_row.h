@@ -100,7 +100,7 @@ inline std::uint64_t top_bits(__m128i bytes) {
   return static_cast<std::uint32_t>(_mm_movemask_epi8(bytes));
 }
 
-/// As equal_mask, of voxels of 4, 8 or 16 bits.
+/// As equal_mask, for voxels of 4, 8 or 16 bits.
 template <int kBits>
 std::uint64_t equal_mask_by_bytes(const std::uint64_t* row, std::uint64_t pattern) {
   const __m128i wanted = _mm_set1_epi64x(static_cast<long long>(pattern));

@@ -270,7 +270,7 @@ bool Chunk::set(int x, int y, int z, VoxelType type) {
   return true;
 }
 
-// Also where the slab has no voxels of its own yet, and for types that the chunk does not have.
+// Sets a voxel of any slab, including slabs without a slot, to any type, including types that are not in the palette.
 bool Chunk::set_anywhere(int x, int y, int z, VoxelType type) {
   const VoxelType old = storage_ == nullptr ? uniform_ : storage_->type(x, y, z);
   if (old == type) return false;

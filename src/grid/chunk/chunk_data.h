@@ -26,7 +26,7 @@ class SlabData : public RefCounted {
   /// Returns the voxels of a row that have a state, bytes, or either.
   [[nodiscard]] std::uint64_t voxels(int row) const;
   [[nodiscard]] VoxelData get(int row, int x) const;
-  /// Requires: it is not empty. When it throws, nothing has changed.
+  /// Sets the data of a voxel. Requires: the data is not empty. If it throws, nothing has changed.
   void put(int row, int x, const VoxelData& data);
   /// Removes the data of the row's voxels in `mask`.
   void clear(int row, std::uint64_t mask);
@@ -56,7 +56,7 @@ class ChunkData : public RefCounted {
  public:
   /// Voxels that have some.
   [[nodiscard]] int count() const { return count_; }
-  /// Null where no voxel of the slab has any.
+  /// Returns the data of a slab; null if no voxel of it has any.
   [[nodiscard]] const SlabData* slab(std::size_t index) const { return slabs_[index].get(); }
   [[nodiscard]] std::uint64_t voxels(int y, int z) const {
     const SlabData* const slab = slabs_[ChunkStorage::slab_index(y, z)].get();

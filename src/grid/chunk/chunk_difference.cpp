@@ -90,7 +90,7 @@ std::uint64_t other_types(const std::array<VoxelType, kChunkEdge>& a, const std:
 
 void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edit) {
   if (before.uniform().has_value() || after.uniform().has_value()) {
-    // As of a chunk that was not there: words of bits instead of types.
+    // One state is uniform: compares masks of the other's rows, as for a missing chunk, instead of types.
     const Chunk& one = before.uniform().has_value() ? before : after;
     const Chunk& other = before.uniform().has_value() ? after : before;
     if (one.shares_storage_with(other)) return;

@@ -138,7 +138,7 @@ std::uint32_t Chunk::find_or_add(VoxelType type) {
   return static_cast<std::uint32_t>(m.palette.size() - 1);
 }
 
-// A slot of its own for a slab, filled with the slab's type where it had none; in a page of this chunk alone.
+// Returns an unshared slot of a slab for writing. A uniform slab gets a slot filled with its type.
 std::uint32_t Chunk::slot_for_writing(std::size_t slab) {
   ChunkStorage& m = *storage_;
   const std::uint32_t entry = m.slabs[slab];

@@ -14,7 +14,7 @@
 
 namespace quoin {
 
-/// Rows of a slab, and bits that a palette of so many types takes for each voxel.
+/// The rows of a slab, and the bits per voxel for a palette of this many types.
 inline constexpr int kSlabRows = 16;
 [[nodiscard]] inline int bits_for(std::size_t types) {
   if (types <= 2) return 1;
@@ -88,7 +88,7 @@ struct ChunkStorage : RefCounted {
     layer_counts[1][static_cast<std::size_t>(y)] += static_cast<std::uint16_t>(delta);
     layer_counts[2][static_cast<std::size_t>(z)] += static_cast<std::uint16_t>(delta);
   }
-  // By shifts: less latency than a multiplication. A slab lies in one page.
+  // Uses shifts, which have less latency than a multiplication. A slab lies in one page.
   [[nodiscard]] std::size_t word_of(std::uint32_t slot, int row_in_slab) const {
     const int log = std::countr_zero(static_cast<unsigned>(bits) | 16U);
     return (std::size_t{slot} << (log + 4)) + (static_cast<std::size_t>(row_in_slab) << log);

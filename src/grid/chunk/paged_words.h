@@ -71,7 +71,7 @@ class PagedWords {
   void grow(std::size_t size);
   /// Releases the spare capacity.
   void shrink_to_fit();
-  /// Calls the function with the words of each page.
+  /// Calls `visit(words)` for each page.
   template <class Visit>
   void for_each_page(Visit&& visit) const {
     for (std::size_t first = 0; first < size_; first += kPageWords) {

@@ -6,7 +6,7 @@ namespace quoin {
 namespace {
 
 constexpr std::size_t kRows = std::size_t{kChunkEdge} * kChunkEdge;
-// So many types are looked for one by one, in words.
+// Up to this many types are searched for one by one, in words.
 constexpr std::size_t kFewTypes = 4;
 
 constexpr std::uint32_t kNoPart = 0xFFFF'FFFFU;

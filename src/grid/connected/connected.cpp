@@ -244,7 +244,7 @@ void ConnectedPieces::Impl::find_links(const std::vector<IVec3>& chunks, Threads
   for (const IVec3 chunk : chunks) {
     for (std::size_t next = 0; next < nexts; ++next) {
       add(chunk, next);
-      // From one that changed too it is found anyway.
+      // Links from a chunk that also changed are found anyway.
       const IVec3 before = chunk - next_chunk(next);
       if (!std::binary_search(chunks.begin(), chunks.end(), before, by_zyx)) add(before, next);
     }
@@ -335,7 +335,7 @@ void ConnectedPieces::Impl::number_pieces(UnionFind<std::size_t>& sets) {
       add_node(piece_of_node[node], *entry, part);
     }
   }
-  // By first voxels: a piece may begin in a later chunk, but at a lesser z.
+  // Sorts by first voxels: a piece may begin in a later chunk, but at a lower z.
   std::vector<std::size_t> order(pieces.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   std::sort(order.begin(), order.end(),

@@ -72,7 +72,7 @@ void find_in_noise(benchmark::State& state) {
 }
 BENCHMARK(find_in_noise)->Name("connected/find/noise")->Unit(benchmark::kMillisecond);
 
-// A blow: a sphere taken out and put back, each time asked what came loose.
+// Removes a sphere and restores it, and searches for loose pieces each time.
 void follow(benchmark::State& state) {
   Grid world = terrain().snapshot();
   ConnectedPieces pieces;

@@ -104,7 +104,7 @@ class BoxCopy {
     return target;
   }
 
-  // All chunks of the turned box, or, where there are fewer, those that something comes to or is taken from.
+  // Returns all chunks of the turned box or, if there are fewer, those that receive or lose voxels.
   [[nodiscard]] std::vector<IVec3> chunks_to_write() const {
     const IBox all = chunks_of(target_);
     std::vector<IVec3> chunks;

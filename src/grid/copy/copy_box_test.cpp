@@ -122,7 +122,7 @@ TEST(CopyBox, WholeChunksAreSharedWhereTheyAreMovedByChunks) {
     ASSERT_NE(copy, nullptr);
     EXPECT_TRUE(copy->shares_storage_with(*from.find_chunk(chunk)));
   }
-  // Also where a map of types changes none of the chunk's, and where air is left out but nothing is there.
+  // Also if a type map changes none of the chunk's types, and if air is not copied and the target is empty.
   Grid third;
   const std::vector<VoxelType> type_map = {0, 1, 2};
   CopyOptions options;

@@ -19,12 +19,12 @@ class TurnedBlock {
   // Every voxel that is read is written before.
   TurnedBlock() : types_(new VoxelType[kChunkVoxels]) {}
 
-  /// For a box that fills a part of the chunk once it is turned.
+  /// Starts a box that, once turned, fills `part` of the chunk.
   void begin(AxisOrientation orientation, const IBox& part);
   /// Makes all of the chunk air.
   void clear();
-  /// Puts the voxels of a part of a chunk (null: air) into their place; `offset`: of the part's least corner in the
-  /// box, before it is turned.
+  /// Puts the voxels of a part of a chunk (null: air) at their turned positions. `offset`: the part's least corner in
+  /// the box, before it is turned.
   void put(const Chunk* chunk, const IBox& part, IVec3 offset);
 
   /// Replaces the type of each put voxel by `change(type)`.

@@ -92,7 +92,7 @@ void DensityChunk::make_mixed() {
   storage_->solid.fill(is_solid(uniform_) ? ~std::uint64_t{0} : 0);
 }
 
-// A slot of its own for a slab, filled with the slab's density where it had none.
+// Returns a slot of a slab for writing. A uniform slab gets a slot filled with its density.
 std::uint32_t DensityChunk::slot_for_writing(std::size_t slab) {
   DensityStorage& m = *storage_;
   const std::uint32_t entry = m.slabs[slab];

@@ -7,14 +7,14 @@
 namespace quoin {
 namespace {
 
-// From the middle of a chunk's samples, and of a row's, to the farthest one.
+// Distances from the middle of a chunk's samples, and of a row's, to the farthest sample.
 constexpr double kMiddle = 0.5 * (kChunkEdge - 1);
 constexpr double kChunkRadius = 54.6;
 constexpr double kRowRadius = kMiddle;
 
-/// The least of two distances; where they differ by less than `blend`, a parabola that meets both without a crease.
+/// Returns the minimum of two distances. If they differ by less than `blend`, a parabola joins both smoothly.
 ///
-/// Densities end at the band: one that reads `band` may be anything beyond, so the blend narrows to nothing towards it.
+/// Densities end at the band: a value of `band` may be anything larger, so the blend narrows to 0 towards it.
 /// Source: I. Quilez, "smooth minimum": min(a, b) - h^2 / (4 k), h = max(k - |a - b|, 0).
 double united(double a, double b, double blend, double band) {
   const double width = std::min(blend, band - std::max(a, b));
@@ -27,7 +27,7 @@ bool is_length(double value) {
   return value >= 0.0 && std::isfinite(value);
 }
 
-// Gives part of a row new densities: `combine(density, distance to the shape)`. Samples that become solid take
+// Sets the densities of part of a row to `combine(density, distance to the shape)`. Samples that become solid get
 // `material`.
 template <class Shape, class Combine>
 void combine_row(const Shape& shape, IVec3 start, int first, int end, VoxelType material, SampleRow& row,

@@ -34,7 +34,7 @@ class PlainField {
     }
   }
 
-  /// Gives every sample a new value, rounded and clamped as the grid must; returns which changed.
+  /// Sets every sample to `pick`'s value, rounded and clamped like a density grid does. Returns the changed samples.
   template <class Pick>
   std::vector<IVec3> edit(Pick&& pick) {
     std::vector<IVec3> changed;

@@ -29,7 +29,7 @@ class Sphere {
   double radius_;
 };
 
-/// A box whose edges are rounded; at most so much that it becomes round altogether along its shortest side.
+/// A box with rounded edges. The radius is at most half its shortest side.
 class RoundedBox {
  public:
   RoundedBox(DVec3 min, DVec3 max, double rounding)

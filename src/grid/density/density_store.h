@@ -32,7 +32,7 @@ enum class ChunkEdit : std::uint8_t {
   Solid,  ///< all samples become solid, as far from the surface as possible
 };
 
-/// Some samples of a chunk; `box` is in the chunk's coordinates.
+/// A part of a chunk; `box` is in the chunk's coordinates.
 struct ChunkPart {
   IVec3 chunk{0};
   IBox box;
@@ -67,10 +67,10 @@ class DensityStore {
   /// Edits the samples of a box, clipped to the world, chunk by chunk in the order of z, y, x. Returns how many
   /// changed.
   ///
-  /// `chunk_edit(chunk)` says what to do with a chunk; it is asked for chunks that do not exist where `creates`. Solid
-  /// counts only for chunks that do not exist, which become `material`; others are edited by rows.
-  /// `change(sample, first, end, row)` changes part of a row, and returns false when it did not; `sample` is the row's
-  /// first (local x = 0). `progress` is asked after each chunk.
+  /// `chunk_edit(chunk)` returns the effect on a chunk; with `creates` it is also called for missing chunks. Solid
+  /// applies only to missing chunks, which become `material`; existing ones are edited by rows. `change(sample, first,
+  /// end, row)` changes part of a row and returns false if nothing changed; `sample` is the row's first sample (local x
+  /// = 0). `progress` is called after each chunk.
   template <class ChooseChunk, class ChangeRow>
   std::int64_t edit(const LongBox& box, bool creates, VoxelType material, ChooseChunk&& chunk_edit, ChangeRow&& change,
                     const Progress& progress);

@@ -8,7 +8,7 @@
 
 namespace quoin {
 
-/// The largest half that is no more than `band`; at least the smallest half above 0.
+/// Returns the largest half float that is at most `band`; at least the smallest positive one.
 inline Half largest_within(float band) {
   Half half = half_from_float(band);
   if (float_from_half(half) > band) --half;

@@ -68,7 +68,7 @@ struct Window {
   [[nodiscard]] bool empty() const { return first_y >= last_y || first_z >= last_z; }
 };
 
-/// Visits (y, z) of a window that is so much larger at its ends.
+/// Visits (y, z) of a window enlarged by `more_y` and `more_z` at its ends.
 template <class Visit>
 void for_each_row(const Window& window, int more_y, int more_z, Visit visit) {
   for (int z = window.first_z; z < window.last_z + more_z; ++z) {
@@ -83,7 +83,7 @@ std::uint64_t solid_row(const Neighbourhood& chunks, int dx, int y, int z) {
   return chunk == nullptr ? 0 : ~chunk->row_mask(y & (kChunkEdge - 1), z & (kChunkEdge - 1), kAir);
 }
 
-// Returns whether all voxels of the region are solid, none is, or neither.
+// Returns true if all voxels of the region are solid, false if all are air, and nothing if both occur.
 std::optional<bool> read_region(const Neighbourhood& chunks, const Window& window, Scratch& scratch) {
   bool is_all_solid = true;
   bool is_all_air = true;
@@ -100,7 +100,7 @@ std::optional<bool> read_region(const Neighbourhood& chunks, const Window& windo
   return is_all_air ? std::optional(false) : std::nullopt;
 }
 
-// By the bits of a byte: a byte each, 0 or 1.
+// For each byte, its bits as eight bytes of 0 or 1.
 constexpr std::array<std::uint64_t, 256> make_spread_bits() {
   std::array<std::uint64_t, 256> table{};
   for (std::size_t bits = 0; bits < 256; ++bits) {
@@ -135,7 +135,7 @@ void measure_row(const RegionRow& row, bool solid, ByteRow& out) {
   }
 }
 
-// One more axis: the least of the neighbours' squared distances, each with the square of its own offset.
+// Extends the distances along another axis: the minimum of the neighbours' squared distances plus squared offsets.
 void spread(const ByteRow* middle, int stride, ByteRow& out) {
   out = *middle;
   for (int offset = 1; offset <= kReach; ++offset) {
@@ -215,7 +215,7 @@ void blur_along_y(Scratch& scratch, const Window& window) {
 Half stored_distance(float distance, float band) {
   const auto bits = std::bit_cast<std::uint32_t>(std::clamp(distance, -band, band));
   const std::uint32_t magnitude = bits & 0x7FFF'FFFFU;
-  // As half_from_float rounds.
+  // Rounds like half_from_float.
   const std::uint32_t rounded = (magnitude + 0xC800'0FFFU + (magnitude >> 13 & 1U)) >> 13;
   return static_cast<Half>((bits >> 16 & 0x8000U) | rounded);
 }
@@ -344,7 +344,7 @@ Grid grid_from_field(const DensityGrid& field, VoxelType unnamed, Threads thread
 Result<DensityGrid> field_from_grid(const Grid& grid, Threads threads, const Progress& progress) {
   DensityGrid field(kBand);
   const std::vector<IVec3> places = chunks_near(grid);
-  // In batches, so that little waits to be put in place.
+  // Works in batches, so that few finished chunks wait to be stored.
   constexpr std::size_t kBatch = 64;
   std::vector<std::optional<DensityChunk>> made(std::min(kBatch, places.size()));
   for (std::size_t first = 0; first < places.size(); first += kBatch) {

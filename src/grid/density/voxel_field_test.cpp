@@ -107,7 +107,7 @@ TEST(VoxelField, AFlatWallIsTheDistanceFromItsFace) {
   grid.fill_box({{-100, -100, -40}, {101, 10, 41}}, 3);
   const DensityGrid field = *field_from_grid(grid);
   for (int y = 0; y < 30; ++y) {
-    // The smoothing sees no more than 8.5, so it bends the last values a little.
+    // The smoothing reads distances of at most 8.5, so it bends the last values a little.
     const double distance = y - 9.5;
     EXPECT_NEAR(field.density({0, y, 0}), std::clamp(distance, -8.0, 8.0), std::abs(distance) < 6.6 ? 0.01 : 0.07) << y;
   }

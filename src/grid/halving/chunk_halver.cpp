@@ -79,7 +79,7 @@ void ChunkHalver::fill_half(int half, int y, int z, std::uint64_t solid) {
   if ((several & solid) != 0) fill_mixed(half, y, z, several & solid);
 }
 
-// The types in the four rows of half a row of cells, whose slab has voxels of its own.
+// Finds the types in the four rows of half a row of cells, for a slab with a slot.
 void ChunkHalver::find_layers(const Chunk& chunk, std::uint32_t slab, int half, int y, int z) {
   const ChunkStorage& mixed = *ChunkStorage::of(chunk);
   std::array<const std::uint64_t*, 4> rows{};

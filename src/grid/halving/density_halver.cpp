@@ -110,7 +110,7 @@ void DensityHalver::copy_materials(Chunk& made) const {
   }
 }
 
-// Those of a row that are solid, with air among their neighbours.
+// Returns the solid samples of a row that have air neighbours.
 std::uint64_t DensityHalver::beside_air(int y, int z) const {
   std::uint64_t inside = ~std::uint64_t{0};
   for (int dz = -1; dz <= 1; ++dz) {

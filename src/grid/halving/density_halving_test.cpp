@@ -124,7 +124,7 @@ TEST(DensityHalving, WhatLiesOutsideGivesTheMaterial) {
   EXPECT_EQ(once.material({6, 0, 6}), 2);
   EXPECT_EQ(once.material({6, -2, 6}), 1);
   EXPECT_EQ(twice.material({3, 0, 3}), 2);
-  // And where the grass has no sample of its own any more.
+  // The grass no longer has any samples here.
   DensityGrid lower;
   lower.add_box({-100, -40, -100}, {100, -0.2, 100}, 1);
   lower.edit({{-110, -1, -110}, {110, 0, 110}}, [](IVec3, DensitySample sample) {

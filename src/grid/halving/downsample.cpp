@@ -93,7 +93,7 @@ struct Level : Kept {
   using Kept::content;
   ChangeCursor followed;
 
-  // Returns false where `progress` cancelled it: then nothing has changed.
+  // Returns false, without a change, if `progress` cancelled the update.
   bool update(const Content& finer, const Halving& halving, Threads threads, const Progress& progress = {}) {
     ChangeCursor now = followed;
     const auto changes = finer.changes_since(now);

@@ -252,7 +252,7 @@ TEST(Downsample, AnEditMakesAnewOnlyTheChunksThatReadIt) {
     }
     return anew;
   };
-  grid.set({0, 0, 0}, 4);  // chunks of one type share nothing that could tell
+  grid.set({0, 0, 0}, 4);  // chunks of one type have no storage to compare
   grid.fill_box({{-1, -1, -1}, {0, 0, 0}}, 4);
   for (const int x : {-40, 40}) {
     for (const int y : {-40, 40}) {

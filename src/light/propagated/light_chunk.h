@@ -73,7 +73,7 @@ class ChannelLight {
   Ref<Slabs> slabs_;
 };
 
-/// Some slabs of a chunk: [z / 4], bit y / 4.
+/// A set of slabs of a chunk: [z / 4], bit y / 4.
 using SlabSet = std::array<std::uint16_t, kChunkEdge / 4>;
 
 [[nodiscard]] inline SlabSet all_slabs() {

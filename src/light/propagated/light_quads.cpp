@@ -35,8 +35,7 @@ struct LightPiece {
   [[nodiscard]] bool joins(int u, int v) const { return light.at(u, v) == word; }
 };
 
-// Light in a chunk and one voxel around it. Rows are unpacked when one of their voxels is asked for: there are several
-// faces a row.
+// The light in a chunk and one voxel around it. Rows are unpacked on demand: there are several faces per row.
 class ChunkWords {
  public:
   void begin(const LightReader& reader, IVec3 chunk) {

@@ -16,7 +16,7 @@ namespace quoin::propagated {
 /// Levels of a row of 64 voxels: bit x of [i] is bit i of the level at x.
 using RowPlanes = std::array<std::uint64_t, kPlanes>;
 
-/// Those of a slab, 64x4x4 voxels: [plane][y % 4 + 4 (z % 4)].
+/// The bit planes of a slab, 64x4x4 voxels: [plane][y % 4 + 4 (z % 4)].
 struct SlabPlanes {
   alignas(64) std::array<std::uint64_t, kPlanes * kSlabWords> words;
 
@@ -31,12 +31,13 @@ struct SlabPlanes {
   [[nodiscard]] unsigned lit_rows(std::uint64_t mask) const { return kernel().find_rows(words.data(), kPlanes, mask); }
 };
 
-/// The levels of one channel in a slab. Shared by its copies; it is never changed, but replaced. Threads: as Ref.
+/// The levels of one channel in a slab. Shared by its copies and immutable. Threads: as Ref.
 ///
-/// A slab of one level is but a number. Else it keeps what SlabUnits keep: of open sky and rock half a plane.
+/// A slab of a single level is stored as a number. Other slabs are stored as SlabUnits; a slab of open sky and rock
+/// takes half a plane.
 class LightSlab {
  public:
-  /// All of one level.
+  /// A slab of one level.
   explicit LightSlab(unsigned level = 0) noexcept : bits_(std::uintptr_t{level} << 1 | 1U) {
     QUOIN_ASSERT(level < 1U << kPlanes, "a level");
   }

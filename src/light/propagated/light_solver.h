@@ -15,7 +15,7 @@
 namespace quoin::propagated {
 
 inline constexpr std::size_t kSky = 0;
-/// Steps that light goes from where it comes from, until it is dark.
+/// Maximum number of steps from a light source until light is dark.
 inline constexpr int kReach = 14;
 
 /// A chunk in a region or next to it.
@@ -63,7 +63,7 @@ struct LightRegion {
 ///   words [z][column][y]: bit x of the region is bit x % 64 of column x / 64; x, y and z count from the rim
 class LightSolver {
  public:
-  /// Returns true if the region fits into the masks.
+  /// Returns true if a region of this size fits into the 64-bit block masks.
   [[nodiscard]] static bool fits(IVec3 size);
 
   /// Computes the new light of the wanted voxels. The result equals a solution for all voxels if the rim voxels with

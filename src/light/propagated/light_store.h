@@ -57,7 +57,7 @@ class LightStore {
       entry->light.lamp_slabs[static_cast<std::size_t>(z / 4)] |= static_cast<std::uint16_t>(slabs.along_y(z));
     }
   }
-  /// A chunk is dark from now on, and all of it may be another to readers: it comes, or goes.
+  /// Makes a chunk dark and reports all of it as changed: the chunk comes or goes.
   void begin(IVec3 chunk) {
     journal_.begin_change();
     note_all(chunk);

@@ -202,7 +202,7 @@ void PropagatedLight::Impl::add_chunks(const IBox& voxels) {
   }
 }
 
-// Returns the highest light levels in and next to the voxels, including the lamps that they are now.
+// Returns upper bounds of the light levels in and next to the voxels, including the lamps that they are now.
 std::array<unsigned, kChannels> PropagatedLight::Impl::highest_levels(const Grid& grid, const IBox& voxels) const {
   constexpr int kMany = 512;
   std::array<unsigned, kChannels> highest{};

@@ -192,7 +192,7 @@ void edit_little(Grid& grid, std::mt19937& random) {
 }
 
 TEST(PropagatedLight, AMillionRandomEditsEqualASearch) {
-  // By day a few thousand, and where each takes ten times as long.
+  // A million only at night, and only in fast builds: debug and sanitizer builds take ten times as long.
 #if defined(NDEBUG) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   const bool is_night = std::getenv("QUOIN_NIGHTLY") != nullptr;
 #else
@@ -207,7 +207,7 @@ TEST(PropagatedLight, AMillionRandomEditsEqualASearch) {
   PropagatedLight light;
   int checked = 0;
   for (int done = 0; done < edits;) {
-    // At times so many that boxes run into each other.
+    // Sometimes enough edits that boxes overlap.
     const int count = random() % 100 == 0 ? 200 : 1 + static_cast<int>(random() % 30);
     for (int i = 0; i < count; ++i) edit_little(grid, random);
     done += count;
@@ -484,7 +484,7 @@ TEST(PropagatedLight, SnapshotsKeepTheirLightAndGoOnByThemselves) {
     expect_searched(light, grid, types);
     expect_searched(other, branch, types);
     ASSERT_FALSE(HasFatalFailure()) << round;
-    // The one that is updated goes on with its journal; a snapshot that is, has one of its own.
+    // The updated object continues with its journal; an updated snapshot has a separate one.
     ChangeCursor of_kept = cursor;
     EXPECT_TRUE(kept.changes_since(of_kept).empty());
     EXPECT_FALSE(light.changes_since(cursor).all);

@@ -127,7 +127,7 @@ struct VoxelsAround {
   }
 };
 
-/// Those of the eight that can be reached from the one, side by side, within `passing`.
+/// Returns the voxels of the eight that are reachable from `one` through faces within `passing`.
 [[nodiscard]] constexpr std::uint32_t connected_of_eight(std::uint32_t one, std::uint32_t passing) {
   for (;;) {
     const std::uint32_t moved = (one & 0x55U) << 1 | (one & 0xAAU) >> 1 | (one & 0x33U) << 2 | (one & 0xCCU) >> 2 |
@@ -163,8 +163,8 @@ template <class Voxels>
   return true;
 }
 
-/// Light of a surface at a point with a unit normal, `step` samples of level 0 a sample of its own. Dark where no air
-/// is near.
+/// Returns the light of a surface at a point with a unit normal; `step` is the size of its samples in level 0 samples.
+/// Dark if no air is near.
 template <class Voxels>
 [[nodiscard]] MeanLevels light_before(Voxels& voxels, DVec3 point, Vec3 normal, int step) {
   MeanLevels levels;

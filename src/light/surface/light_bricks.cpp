@@ -103,7 +103,7 @@ std::vector<IVec3> LightBricks::bricks_to_find(OfGrid& of, const GridLight& ligh
   const GridChanges voxels = light.voxels->changes_since(of.followed_voxels);
   const GridChanges levels = light.light->changes_since(of.followed_light);
   if (voxels.all || levels.all) {
-    // Known ones may be gone.
+    // Known bricks may have disappeared.
     for (const auto& [chunk, held] : of.occupied) add({chunk * kBricksOfChunk - 1, (chunk + 1) * kBricksOfChunk + 1});
     of.occupied.clear();
     for (const IVec3 chunk : light.voxels->chunks()) {

@@ -89,11 +89,11 @@ class LightBricks {
   Changed changed_;
 };
 
-/// Keeps light and bricks of a scene, brought up to date when they are first asked for after an `update`.
-/// Threads: any number may ask for light; bricks are one's own.
+/// Keeps the light and bricks of a scene, updated at the first request after an `update`.
+/// Threads: any number may request light; bricks are for one thread.
 class LightCache {
  public:
-  /// The scene was edited, or is another.
+  /// Call after the scene was edited or replaced.
   void update();
   /// Light that somebody else keeps, from now on; null: its own. It changes only together with the scene.
   void use(const SceneLight* light);

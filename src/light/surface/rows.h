@@ -26,7 +26,7 @@ class LightRows {
     std::array<std::uint16_t, kChunkEdge> words{};
   };
 
-  /// The row in which a voxel lies. Lifetime: until another is asked for.
+  /// Returns the row of a voxel. Lifetime: until the next call.
   [[nodiscard]] const Row& row_of(IVec3 voxel) {
     const IVec3 at{voxel.x >> kChunkShift, voxel.y, voxel.z};
     Row& row = rows_[place_of(at)];

@@ -245,7 +245,7 @@ TEST(SurfaceLight, VerticesAreTheSameFromAnyChunk) {
   EXPECT_GT(shared, 100U);
 }
 
-// A house of thin walls with lamps and sky all around, and one more lamp behind a wall of its own.
+// A house of thin walls surrounded by lamps and sky, and another lamp behind a separate wall.
 TEST(SurfaceLight, AClosedRoomIsBlackWhateverShinesOutside) {
   for (unsigned seed = 0; seed < 4; ++seed) {
     SCOPED_TRACE(seed);

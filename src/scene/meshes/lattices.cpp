@@ -55,8 +55,8 @@ class Grouping {
     for (std::size_t i = 0; i < instances_.size(); ++i) {
       const std::size_t first = sets_.find(i);
       if (first != i) {
-        // Relative to the first member. An instance that is off only by errors summed over many neighbours stays
-        // separate.
+        // Relative to the first member. Small errors can add up over many neighbours. An instance with a larger total
+        // error becomes a group by itself.
         const auto place = place_in_lattice(scene_, instance_of(instances_[first]), instance_of(instances_[i]));
         if (place) {
           groups[group_of[first]].push_back({instances_[i], *place});

@@ -165,7 +165,7 @@ class Mesher {
   Result<Body> mesh_body(const DensityGrid& field, const DensityGrid* whole, UnitedGrid* united,
                          const Progress& progress) const {
     SmoothMeshOptions wanted = options_.mesh;
-    // Bodies meet only at level 0, and chunks of several grids have no common levels.
+    // Bodies meet only at level 0, and level_of knows only the chunks of a single grid.
     if (whole != nullptr || united != nullptr) wanted.level_of = nullptr;
     auto surface = smooth::build_surface(field, scene_.types, wanted, {whole, true}, threads_, progress);
     if (!surface) return surface.error();

@@ -119,7 +119,8 @@ class Marks {
     mark(at_faces_, faces, place, out);
   }
 
-  // Excludes slants: the voxel to the side is not of the kind, but the next one along the axis from it is.
+  // Marks both faces of features one voxel thick, except at a slant: there the voxel to the side is of the other kind,
+  // but one of its neighbours along the axis is of this kind.
   void mark_thin(std::uint64_t found, bool is_solid, int axis, const Place& place) {
     IVec3 step{0};
     step[axis] = 1;

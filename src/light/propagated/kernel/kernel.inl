@@ -80,7 +80,8 @@ inline bool reach_in_block(const LevelPass& step, std::size_t at, bool is_touche
   return any(all);
 }
 
-// Removes the reached voxels of a block from the dark ones. Returns true if any dark voxels remain.
+// Removes the reached voxels of a block from the dark ones, and adds them to the bit planes if the block is wanted.
+// Returns true if any dark voxels remain.
 inline bool light_block(const LevelPass& step, std::size_t at, bool is_touched, bool is_wanted) {
   const std::uint64_t* dark = (is_touched ? step.rest : step.pass) + at;
   Words all{};
@@ -94,7 +95,7 @@ inline bool light_block(const LevelPass& step, std::size_t at, bool is_touched, 
   return any(all);
 }
 
-// In two loops, so that the first has no branch to guess.
+// Uses two loops, so that the first has no unpredictable branch.
 template <bool kIsWide>
 void spread_layers(const LevelPass& of) {
   const LevelPass step = of;  // so that no store is to one of its members
@@ -140,7 +141,7 @@ inline Words lanes_down(Words words, Words above) {
   return lanes_from<kBy>(words, above, std::make_index_sequence<kWidth>());
 }
 
-// Lanes move up by one, 0 comes in.
+// Lanes move up by one; 0 enters.
 inline Words lanes_up(Words words) {
   return lanes_from<kWidth - 1>(Words{}, words, std::make_index_sequence<kWidth>());
 }
@@ -196,7 +197,7 @@ bool take_sky_of_layer(const LevelPass& step, std::size_t z) {
     Words dark[kBlockRows / kWidth];
     Words all_lit{};
     Words all_dark{};
-    // The top row of a column is of the rim: nothing falls from one column to another.
+    // The top row of a column belongs to the rim: no light falls from one column to another.
     for (std::size_t part = kBlockRows / kWidth; part-- > 0;) {
       const Words pass = load(step.pass + at + part * kWidth);
       lit[part] = fall(load(step.front + at + part * kWidth), pass, from_above);

@@ -5,8 +5,8 @@
 //     1  00000000 000ff000     00
 //     2  00000001 00fff000     11  00fff000 00000001
 //
-// (the half of the lower x is the right one). The wide kernels take as many rows at a time as a register holds; when
-// they read, units fall into rows that have none of their own: by one row, then by two, then by four.
+// (the right half has the lower x). The wide kernels process as many rows at a time as a register holds. When they
+// read, rows without units take those of the row above: by one row, then by two, then by four.
 
 #include <array>
 #include <bit>
@@ -40,7 +40,7 @@ inline void store_rows(Units rows, std::uint64_t* to) {
 inline Units exclusive_or(Units a, Units b) {
   return _mm512_xor_si512(a, b);
 }
-// Each row from so many rows before; the first ones from the last ones of `before`.
+// Moves each row by kBy rows; the first rows come from the end of `before`.
 template <int kBy>
 inline Units moved(Units rows, Units before) {
   return _mm512_alignr_epi64(rows, before, 8 - kBy);
@@ -181,7 +181,7 @@ inline Units select(unsigned which, Units a, Units b) {
 
 constexpr unsigned kAllUnits = (1U << (2 * kRows)) - 1;
 
-// Fills unknown rows with the row kBy above them.
+// Fills unknown rows from the row kBy before them.
 template <int kBy>
 inline void fall(Units& rows, unsigned& known) {
   rows = select(known, rows, moved<kBy>(rows, none()));
@@ -210,7 +210,7 @@ SlabUnits pack_slab(const std::uint64_t* planes, SlabUnitsRoom& units) {
   return made;
 }
 
-// From the last plane on, which is the same in both codes; the others need the one above.
+// Starts at the last plane, which is the same in both codes; the others need the next plane.
 void unpack_slab(const SlabUnits& of, const std::uint32_t* units, std::uint64_t* planes) {
   for (std::size_t plane = kPlanes; plane-- > 0;) {
     const std::uint32_t* next = units + of.first[plane];
