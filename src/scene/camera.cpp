@@ -19,7 +19,7 @@ namespace quoin {
 namespace {
 
 constexpr double kFramingFov = 30.0 * std::numbers::pi / 180.0;  // little enough to keep towers upright
-constexpr double kMargin = 0.04;                                 // of the picture's width (height), on each side
+constexpr double kMargin = 0.04;                                 // share of the image's width (height), on each side
 
 struct NamedView {
   std::string_view name;

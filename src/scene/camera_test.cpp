@@ -305,7 +305,7 @@ TEST(Camera, NothingAndAPointAreFramedAsAUnitCube) {
   }
 }
 
-// Every picture of a turn, and every scene, lies within the picture; at one distance from the axis.
+// Every frame of a turn, and every scene, fits into the image; the camera keeps one distance from the axis.
 TEST(Framing, SeveralScenesAndTurnsAreFramedAlike) {
   std::mt19937 random(18);
   const auto number = [&](int count) { return static_cast<int>(random() % static_cast<unsigned>(count)); };

@@ -34,7 +34,7 @@ struct Functional {
 };
 
 struct Candidate {
-  double bound;  ///< nothing of the chunk reaches further
+  double bound;  ///< upper bound of the chunk's reach
   const Chunk* voxels;
   const DensityChunk* samples;  ///< where there are no voxels
   IVec3 first;                  ///< the chunk's first voxel or sample in its grid

@@ -19,7 +19,7 @@ using Reach = std::function<double(DVec3 direction)>;
 /// The same for a camera that looks along `forward`, a unit vector.
 [[nodiscard]] Camera frame(DVec3 middle, const Reach& reach, DVec3 forward, double aspect);
 
-/// The four directions whose reaches `frame` asks for, in its order.
+/// Returns the four directions that `frame` passes to `reach`, in order.
 [[nodiscard]] std::array<DVec3, 4> framing_directions(DVec3 forward, double aspect);
 
 }  // namespace quoin

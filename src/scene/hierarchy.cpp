@@ -97,7 +97,7 @@ class GroupDepths {
     }
     std::size_t depth = 0;
     if (group != nullptr && depths_[handle.index] == kOnTheWay) {
-      // Those of a circle are all at the top.
+      // Groups in a cycle count as roots.
       for (bool is_first = false; !is_first; way.pop_back()) {
         is_first = way.back() == handle.index;
         depths_[way.back()] = 0;

@@ -4,9 +4,9 @@
 
 namespace quoin {
 
-/// Adds to the changed instances those below changed groups and on changed layers, some of them twice.
+/// Adds the instances below changed groups and on changed layers to the changed instances, possibly twice.
 /// Requires: `groups` and `layers` of the changes are sorted.
-/// Cost: nothing without such; else O(instances + groups * depth).
+/// Cost: nothing without changed groups and layers; else O(instances + groups * depth).
 void add_instances_below(const Scene& scene, SceneChanges& changes);
 
 /// Shows every instance, group and layer.

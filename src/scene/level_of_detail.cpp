@@ -16,7 +16,7 @@
 namespace quoin {
 namespace {
 
-// As many as keep a cell within `policy.cell_pixels`.
+// Returns the number of halvings that keep a cell within `policy.cell_pixels`.
 int halvings_for(double voxel_pixels, const DetailPolicy& policy) {
   static_assert(kMaxGridLevel == 4);
   // Halves and doubles are exact: 16 sizes within the limit are one within its sixteenth.
@@ -35,7 +35,8 @@ class PixelScale {
 
   [[nodiscard]] ScreenSize of(double distance, double radius, double voxel_size) const {
     if (!is_perspective_) return {voxel_size * scale_, 2.0 * radius * scale_};
-    // From inside the content a voxel may be arbitrarily near; never infinite, which counts as nothing to see.
+    // Inside the content a voxel may be arbitrarily near. The size stays finite, because infinite sizes count as
+    // invisible.
     constexpr double kNearest = 1e-3;  // voxels
     const double nearest = std::max(distance - radius, kNearest * voxel_size);
     return {voxel_size / nearest * scale_, 2.0 * radius / std::max(distance, kNearest * voxel_size) * scale_};
@@ -48,7 +49,7 @@ class PixelScale {
 
 // The level of detail chosen for an instance, kept for the next call.
 struct Choice {
-  std::uint64_t generation = 0;  // of the instance; 0: nothing chosen yet
+  std::uint64_t generation = 0;  // of the instance; 0: no choice yet
   std::uint8_t level = 0;
   Detail detail = Detail::Near;
 };
@@ -66,7 +67,7 @@ struct Measure {
   double distance = 0.0;
   double radius = 0.0;
 
-  // As if it were seen through a lens.
+  // Returns the measurements as seen through a lens.
   [[nodiscard]] Measure zoomed(double by) const {
     return {{size.voxel_pixels * by, size.diameter_pixels * by}, distance / by, radius};
   }
@@ -136,7 +137,7 @@ struct DetailSelector::Impl {
   std::vector<Content> contents;  // by the grids' slots
   std::vector<Choice> choices;    // by the instances' slots
 
-  // An instance whose content meets the picture's frustum.
+  // An instance whose content intersects the camera's frustum.
   struct Seen {
     InstanceHandle instance;
     DVec3 centre{0.0};  // of the content, from the camera

@@ -1,4 +1,4 @@
-// From the world into an instance's grid and back.
+// Transforms from the world into an instance's grid and back.
 
 #include <algorithm>
 #include <cmath>

@@ -108,7 +108,7 @@ struct Scene::Book {
     make_room(kind_of<T>(), into.next_index());
     const Handle<T> handle = into.insert(std::move(value));
     journal.begin_change();
-    serials_of(kind_of<T>())[handle.index] = 0;  // records of another one in this slot stay as they are
+    serials_of(kind_of<T>())[handle.index] = 0;  // earlier records of this slot are not extended
     note(handle, keys + 1);
     return handle;
   }

@@ -62,7 +62,7 @@ struct SceneFaces::Impl {
   ChangeCursor scene_read;
   ChangeCursor types_read;
   std::map<GridHandle, GridFaces> grids;       // also those that no drawn instance places any more
-  std::map<InstanceHandle, GridHandle> drawn;  // what each drawn instance places
+  std::map<InstanceHandle, GridHandle> drawn;  // the grid of each drawn instance
   FaceCounts counts;
   std::optional<BlockyMesher> mesher;  // for the few chunks around an edit
 
@@ -128,7 +128,7 @@ void SceneFaces::Impl::follow(const Scene& scene, GridHandle handle, std::vector
 }
 
 void SceneFaces::Impl::count(std::vector<ChunkCount>& chunks, const VoxelRegistry& types, Threads threads) {
-  // Making a mesher, which each task has of its own, takes as long as some chunks.
+  // Each task makes its own mesher, which takes as long as a few chunks.
   constexpr std::size_t kChunksPerTask = 32;
   const std::size_t tasks =
       std::min<std::size_t>(chunks.size() / kChunksPerTask, std::size_t{4} * thread_count(threads));

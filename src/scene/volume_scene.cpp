@@ -70,7 +70,7 @@ std::vector<Between> stations(int size, double spacing, double step) {
 }
 
 float mix(float a, float b, float share) {
-  // Not by differences alone: at a sample next to an infinite one it has its own value.
+  // A sample next to an infinite one keeps its own value: the difference alone would give NaN.
   return share == 0.0F ? a : a + share * (b - a);
 }
 

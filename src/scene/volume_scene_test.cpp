@@ -92,7 +92,7 @@ TEST(VolumeScene, WhatHasNoPlaceIsRefused) {
   Volume lacking = ball({4, 4, 4}, placed(glm::dmat3(1.0), {1, 1, 2}, {4, 4, 4}));
   lacking.values.pop_back();
   EXPECT_FALSE(scene_from_volume(lacking, {64.0F}));
-  // Nothing above the value: a scene of nothing.
+  // No value is above the threshold: the scene is empty.
   const auto empty = scene_from_volume(ball({4, 4, 4}, glm::dmat4(1.0)), {1e6F});
   ASSERT_TRUE(empty);
   EXPECT_TRUE(empty->bounds().empty());

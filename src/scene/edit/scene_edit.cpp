@@ -91,7 +91,7 @@ class BoxInGrid {
     if (!(span.first <= length + 1.0 && span.last >= -1.0)) return {first, first - 1};
     int low = first + static_cast<int>(std::clamp(std::floor(span.first) - 1.0, 0.0, length));
     int high = first + static_cast<int>(std::clamp(std::ceil(span.last) + 1.0, 0.0, length));
-    // The quotients are rounded: the voxels at the ends are asked one by one.
+    // The quotients are rounded, so the voxels at the ends are tested individually.
     while (low <= high && !holds_centre({low, y, z})) ++low;
     while (high >= low && !holds_centre({high, y, z})) --high;
     return {low, high};

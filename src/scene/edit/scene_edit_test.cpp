@@ -102,7 +102,7 @@ TEST(SceneEdit, BoxesFillTheVoxelsWhoseCentresTheyHold) {
     const DVec3 in_grid = random.vector() * 60.0;
     OrientedBox box;
     box.centre = world_from_grid(placed.instance(), placed.grid(), in_grid);
-    // Also plates and beams.
+    // Includes plates and beams.
     box.half_size = (1.0 + glm::abs(random.vector()) * DVec3(30.0, 10.0, 3.0)) * size;
     box.rotation = random.rotation();
     if (seed % 5 == 0) box.rotation = placed.instance().rotation;
@@ -158,7 +158,7 @@ TEST(SceneEdit, ClearingALargePartOfTheWorldCostsWhatIsThere) {
   instance.grid = scene.add_grid(std::move(made));
   const InstanceHandle handle = scene.add_instance(instance);
   const DQuat askew = glm::angleAxis(0.3, glm::normalize(DVec3(1, 2, 3)));
-  // Were chunks asked that are not there, this would take years.
+  // A visit of missing chunks would take years.
   EXPECT_EQ(fill_box(scene, handle, {{0, 0, 0}, DVec3(0.2 * kFar), askew}, kAir), 0);
   EXPECT_EQ(fill_box(scene, handle, {{0, kFar, 0}, DVec3(0.2 * kFar), askew}, kAir), 1);
   EXPECT_EQ(fill_box(scene, handle, {{0, 0, 0}, DVec3(3.0 * kFar), askew}, kAir), 5);

@@ -30,7 +30,7 @@ class Sets {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;
   }
-  /// The least number of a set stands for it.
+  /// Unites two sets. The least number of a set represents it.
   void unite(std::size_t a, std::size_t b) {
     a = find(a);
     b = find(b);

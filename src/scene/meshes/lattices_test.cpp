@@ -105,8 +105,8 @@ TEST(Lattices, GroupsAreWhatTouches) {
 using Corner = std::array<std::int64_t, 3>;
 using Triangle = std::array<Corner, 3>;
 
-/// The triangles of all placements in the world, to 1/512, which floats are sure of, turned so that the
-/// least corner comes first.
+/// Returns the triangles of all placements in the world, rounded to 1/512, which floats represent safely. Each triangle
+/// starts with its least corner.
 std::map<Triangle, int> triangles_of(const SceneMeshes& meshes) {
   std::map<Triangle, int> all;
   for (const MeshPlacement& placement : meshes.placements) {
@@ -147,7 +147,7 @@ TEST(UnitedInstances, LookAsIfTheyWereOneGrid) {
     pieces.types = whole.types;
     Instance lattice;
     lattice.voxel_size = 0.5;
-    // In pieces of any turn; the first as it is.
+    // Pieces with arbitrary orientations; the first is unchanged.
     for (int i = 0; i < 4; ++i) {
       const IBox box{{-20 + 10 * i, -9, 50}, {-10 + 10 * i, 12, 75}};
       LatticePlace place;

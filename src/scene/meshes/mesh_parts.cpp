@@ -39,7 +39,7 @@ std::string MeshHierarchy::layer_name(LayerHandle handle) const {
 }
 
 std::optional<std::size_t> MeshHierarchy::group_of(GroupHandle handle) {
-  // From the lowest one that is not there yet upwards; then they are added from the top.
+  // Collects the missing groups from the lowest upwards, then adds them from the top.
   std::vector<GroupHandle> way;
   for (GroupHandle each = handle; scene_.groups().find(each) != nullptr && !groups_.contains(each);
        each = parent_of(scene_, each)) {

@@ -49,7 +49,7 @@ struct SurfaceOptions {
   std::optional<float> simplify_error;
 };
 
-/// Meshes, simplifies where that is asked for, and counts.
+/// Meshes a field, simplifies the mesh if requested, and counts the result.
 [[nodiscard]] Result<SmoothMesh> surface_of(const DensityGrid& field, const VoxelRegistry& types,
                                             const SurfaceOptions& wanted, MeshStats& stats, Threads threads,
                                             const Progress& progress);

@@ -78,7 +78,7 @@ void SceneAnimation::show(Shown& shown, std::size_t frame, const Similarity& pla
   shown.frames_until_last = frame + 1;
 }
 
-// While it is not shown it stays where it was, or will be first.
+// While hidden, it keeps its last placement, or its first one.
 std::vector<MeshKey> SceneAnimation::keys_of(const Shown& shown, double frames_per_second) const {
   std::vector<MeshKey> keys;
   const auto add = [&](std::size_t frame, bool visible, const Similarity& place) {

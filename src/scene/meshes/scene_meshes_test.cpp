@@ -35,7 +35,7 @@ void place(Scene& scene, GridHandle grid, bool visible = true) {
   scene.add_instance(instance);
 }
 
-// Each edge is as often gone along one way as the other.
+// Returns true if each edge occurs equally often in both directions.
 bool is_closed(const MeshView& view) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
   for (std::size_t i = 0; i < view.indices.size(); i += 3) {

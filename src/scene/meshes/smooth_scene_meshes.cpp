@@ -44,10 +44,11 @@ class UnitedGrid {
 
   [[nodiscard]] const std::vector<LatticeMember>& members() const { return members_; }
   [[nodiscard]] const Grid& voxels() const { return voxels_; }
-  /// From the lattice to a member's own grid.
+  /// Returns the placement from the lattice to a member's own grid.
   [[nodiscard]] const LatticePlace& way_back(std::size_t member) const { return back_[member]; }
 
-  /// Whose voxel it is: the last member's that has one there. Where none has one, the first whose chunk it is, or 0.
+  /// Returns the owner of a voxel: the last member with a voxel there. Without one, the first member whose chunk it is,
+  /// or 0.
   [[nodiscard]] std::uint32_t owner_of(IVec3 voxel) {
     const auto found = by_chunk_.find(chunk_of(voxel));
     if (found == by_chunk_.end()) return 0;
@@ -67,7 +68,7 @@ class UnitedGrid {
     return static_cast<std::size_t>((local.z * kChunkEdge + local.y) * kChunkEdge + local.x);
   }
 
-  /// Whose each voxel of a chunk is that many members share; of the last such chunk that was asked for it is kept.
+  /// Returns the owners of all voxels of a chunk that several members share. Keeps the result for the last such chunk.
   const Owners& owners_in(IVec3 chunk, const std::vector<std::uint32_t>& members) {
     if (dense_chunk_ == chunk) return dense_;
     dense_chunk_ = chunk;
@@ -257,7 +258,7 @@ void add_part(MeshPart part, std::span<const LatticeMember> members, MeshHierarc
   if (part.surfaces.empty()) return;
   for (const LatticeMember& member : members) {
     MeshPlacement placement = hierarchy.place(member.instance, meshes.parts.size());
-    // As a matrix: of two rotations that are the same, files then have the one with a positive w.
+    // Uses the matrix, so that files contain the quaternion with a positive w.
     placement.world_from_part = placement.matrix();
     meshes.placements.push_back(std::move(placement));
   }

@@ -305,7 +305,7 @@ TEST(Capsule, IsPushedOutToANearFreePlace) {
   EXPECT_NEAR(away->y, 0.95, 2.0 / 32.0);
   EXPECT_LT(std::hypot(away->x, away->z), 0.4);
   EXPECT_FALSE(displacement_to_free_place(tracer, player, 0.5));
-  // Random heaps: free, and none of many other places is much nearer.
+  // Random heaps: the result is free, and no other of many positions is much nearer.
   for (int i = 0; i < 25; ++i) {
     SceneGrid heap;
     for (int n = 0; n < 150; ++n) heap.grid.set(IVec3(random.vector() * 4.0), kStone);

@@ -51,7 +51,7 @@ struct FieldPiece {
   [[nodiscard]] double density(const DVec3& point) const {
     return trilinear(corners, (point - middle) / (2.0 * half) + 0.5);
   }
-  /// In densities per voxel.
+  /// Returns the gradient in density units per voxel.
   [[nodiscard]] DVec3 gradient(const DVec3& point) const {
     return trilinear_gradient(corners, (point - middle) / (2.0 * half) + 0.5) / (2.0 * half);
   }

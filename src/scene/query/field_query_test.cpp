@@ -35,7 +35,7 @@ std::vector<DVec3> points_of_solid(const Scene& scene, InstanceHandle handle, do
   return points;
 }
 
-// A box on its way, and when it comes to hold points.
+// A moving box and the times when it contains points.
 struct Way {
   OrientedBox box;
   DVec3 speed;
@@ -136,7 +136,7 @@ TEST(FieldQuery, OverlapsAreThoseOfThePointsOfTheSolid) {
         EXPECT_EQ(found[0].type, 1);
         ++both;
       }
-      // Nothing beyond half a lattice's spacing away is missed by it.
+      // If even a box that is larger by half the spacing of the points contains no solid point, the query finds nothing.
       OrientedBox larger = box;
       larger.half_size += 0.13 * size;
       const bool is_near = Way(larger, DVec3(0.0)).holds_any(solid, 0.0);
@@ -397,7 +397,7 @@ TEST(FieldQuery, WhatIsNoNumberMeetsNothing) {
     }
     EXPECT_TRUE(overlaps(tracer, DVec3(0.0), bad).empty());
   }
-  // Everything far away, and nothing at all.
+  // Far boxes, and an empty scene.
   EXPECT_FALSE(sweep_box(tracer, {DVec3(1e9)}, {1e8, 0, 0}).has_value());
   const Scene empty = scene_of(DensityGrid(), {});
   EXPECT_TRUE(overlaps(SceneTracer(empty), OrientedBox{}).empty());

@@ -66,7 +66,7 @@ inline Scene random_blobs(Random& random) {
   return scene_of(std::move(field), {});
 }
 
-/// Samples that know nothing of each other.
+/// A field of independent random samples.
 inline Scene random_noise(Random& random) {
   DensityGrid field(4.0F);
   field.edit({IVec3{-5}, IVec3{6}}, [&](IVec3, DensitySample) {

@@ -27,7 +27,7 @@ DVec3 unit_or_zero(const DVec3& v) {
   return length > 0.0 ? v / length : DVec3(0.0);
 }
 
-// By turns the nearest point of a shape, and a step from there down the field.
+// Alternates between the nearest point of a shape and a step from there down the field.
 template <class Nearest>
 std::optional<DVec3> by_turns(const FieldPiece& piece, Nearest&& nearest) {
   DVec3 point = piece.middle;
@@ -45,7 +45,7 @@ std::optional<DVec3> by_turns(const FieldPiece& piece, Nearest&& nearest) {
 
 }  // namespace
 
-// The times during which nothing is known to part a box from the solid of a piece.
+// The interval of time in which no tested direction separates a box from a piece's solid.
 struct BoxInField::Course {
   double until;
   double at_once;  // times that differ by less are the same
@@ -82,7 +82,7 @@ struct BoxInField::Course {
 bool BoxInField::follow(FieldPiece& piece, bool is_exact) const {
   Course course{until_, at_once_};
   const DVec3 apart = box_.centre - DVec3(piece.cell) - piece.middle;
-  // `length`: what touching is measured in.
+  // `length`: the unit of the touch tolerance along this direction.
   const auto passes = [&](int which, const DVec3& along, double length) {
     const DVec3 along_half = along * piece.half;
     const auto extent =
@@ -91,7 +91,7 @@ bool BoxInField::follow(FieldPiece& piece, bool is_exact) const {
     return course.passes(which, extent, glm::dot(along, apart), reaches.x + reaches.y + reaches.z,
                          glm::dot(along, box_.displacement), length);
   };
-  // The plane's parts most that are not met, so it comes first.
+  // The plane separates most pieces that are not hit, so it is tested first.
   const bool has_slope = piece.square_of_slope > 0.0;
   if (has_slope && !passes(kSlope, piece.slope, std::sqrt(piece.square_of_slope))) return false;
   for (int i = 0; i < 3; ++i) {
@@ -163,8 +163,8 @@ DVec3 BoxInField::normal(const FieldContact& contact, const DensityGrid& field) 
   return unit_or_zero(piece.axis >= 0 ? parting(piece) : -box_.displacement);
 }
 
-// A face that comes to lie on a peak parts the two, and there the gradient is the face's normal, or there are gradients
-// to all sides of it. Otherwise the box meets it with an edge or a corner of the face at the same time.
+// The normal of a face that touches a peak. There, the gradient is the face's normal, or gradients point to all
+// sides of it. Otherwise an edge or a corner of the face touches the piece at the same time.
 DVec3 BoxInField::of_face(const FieldContact& contact, const DensityGrid& field) const {
   const DVec3 normal = unit_or_zero(parting(contact.piece));
   const auto aside = [&](const DVec3& gradient) { return gradient - glm::dot(gradient, normal) * normal; };
@@ -228,8 +228,8 @@ DVec3 BoxInField::nearest(const DVec3& centre, const DVec3& point) const {
   return centre + box_.axes * at;
 }
 
-// The point of the box that is deepest below what parts the two; where a whole edge or face is, the point of it that is
-// nearest to where the plane is highest.
+// Returns the point of the box that is deepest along the separating direction. If that is an edge or a face, returns
+// its point nearest to the highest point of the plane.
 std::optional<DVec3> BoxInField::by_support(const FieldPiece& piece, const DVec3& centre) const {
   const DVec3 up = parting(piece);
   const double square = piece.square_of_slope;
@@ -283,12 +283,14 @@ DBox BoxInField::bounds(IVec3 cell, double from, double to) const {
   return {within.min - DVec3(cell), within.max - DVec3(cell)};
 }
 
-// From the solid of a piece to the line of a capsule at `centre`, unit; 0 where they meet. Relative to the cell.
+// Returns the unit vector from the solid of a piece to the line of a capsule at `centre`; 0 if they touch. Relative to
+// the cell.
 DVec3 CapsuleInField::parting(const FieldPiece& piece, const DVec3& centre) const {
   DVec3 on_line = capsule_.nearest_of_line(centre, piece.middle);
   DVec3 nearest = on_line;
   for (int turn = 0; turn < 6; ++turn) {
-    // By turns within the piece and below its plane: near to the nearest point of its solid.
+    // Alternates between clamping to the piece and projecting below its plane: approximates the nearest point of its
+    // solid.
     nearest = clamped(piece, on_line);
     for (int again = 0; again < 4 && piece.square_of_slope > 0.0; ++again) {
       const double above = glm::dot(piece.slope, nearest - piece.middle) + piece.level;

@@ -37,8 +37,9 @@ struct WayOut {
   double depth = 0.0;
 };
 
-/// For a shape that starts inside: along the gradient where it is deepest, or along the grid's axis along which it is
-/// out soonest where there is none. Where neither leads out within twice its size, it leads a voxel along the first.
+/// Returns the way out for a shape that starts inside: along the gradient at the deepest point or, without a gradient,
+/// along the grid axis with the shortest way. If neither leads out within twice the shape's size, the way is a voxel
+/// long along the first.
 ///
 /// Cost: some sweeps about as long as the shape.
 template <class Moving>

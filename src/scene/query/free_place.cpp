@@ -149,7 +149,7 @@ class FreePlace {
       const std::array<std::size_t, 3> which = next.top().which;
       next.pop();
       if (is_free(displacement(which))) return in_world(displacement(which));
-      // Each once: the last axis that was gone along, and those after it.
+      // Pushes each candidate only once: advances the last axis used and those after it.
       push(which, 2);
       if (which[2] == 0) push(which, 1);
       if (which[2] == 0 && which[1] == 0) push(which, 0);

@@ -41,9 +41,9 @@ inline double length_of(DVec3 v) {
   return std::min(largest * glm::length(v / largest), std::numeric_limits<double>::max());
 }
 
-/// Calls `visit(box)` for a box, until that returns false. One without thickness across its way may lie between two
-/// voxels, within what both are together and in neither: it is visited on each side of where it is, and meets only what
-/// it meets on all of them.
+/// Calls `visit(box)` for a box until it returns false. A box without thickness across its path may lie between two
+/// voxels, touching both but inside neither. It is then visited on each side of its position, and collides only if it
+/// does on all sides.
 template <class Visit>
 void visit_sides(const MovingBox& box, const Visit& visit) {
   std::array<int, 3> thin{};
@@ -93,9 +93,9 @@ DBox bounds_between(const Moving& shape, DVec3 reach, double from, double to) {
   return {glm::min(a, b) - reach, glm::max(a, b) + reach};
 }
 
-/// Follows a shape's way in steps of its own size, up to the fraction `most`: `contents.check(near, from, to)` looks
-/// at the voxels or cells that are near between two fractions, within `contents.bounds()`; the way ends where
-/// `contents.fraction()`, of the best contact so far, has been passed.
+/// Follows a shape's path in steps of its own size, up to the fraction `most`. `contents.check(near, from, to)` tests
+/// the voxels or cells near the path between two fractions, within `contents.bounds()`. The path ends after
+/// `contents.fraction()`, the fraction of the best contact so far.
 template <class Moving, class Contents>
 void follow_way(const Moving& shape, double most, Contents& contents) {
   const DVec3 reach = reach_of(shape);

@@ -250,7 +250,7 @@ TEST(SlideContact, SaysWhatWasMet) {
   EXPECT_TRUE(overlaps(tracer, {out.centre, sunk.half_size}).empty());
 }
 
-// A box that stands on a lift, and on a raft that turns and drifts, stays where it is on it.
+// A box on a lift, and on a raft that turns and drifts, keeps its position relative to it.
 TEST(SlideContact, FloorsThatMoveCarryWhatStandsOnThem) {
   Scene scene;
   ASSERT_TRUE(scene.types.add({}).has_value());

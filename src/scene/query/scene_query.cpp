@@ -44,7 +44,7 @@ std::optional<RayHit> first_of_tree(const OccupancyTree& tree, const PlacedGrid&
   return hit;
 }
 
-// As far as a ray can meet a box, from its start.
+// Returns the maximum distance for a ray to be inside a box.
 double leaves_at(const IBox& box, const Ray& ray) {
   double last = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {

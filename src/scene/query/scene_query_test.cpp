@@ -268,7 +268,7 @@ TEST(SceneQuery, TouchingIsNotOverlapping) {
   EXPECT_EQ(overlaps(tracer, {2.0, 0.5, 0.5}, 1.001).size(), 1U);
   EXPECT_TRUE(overlaps(tracer, {DVec3(2.0, 0.5, 0.5), DVec3(1.0), {1, 0, 0, 0}}).empty());
   EXPECT_EQ(overlaps(tracer, {DVec3(2.0, 0.5, 0.5), DVec3(1.001), {1, 0, 0, 0}}).size(), 1U);
-  // A zero rotation is none; the ghost above does not collide.
+  // A zero rotation counts as the identity; the ghost above does not collide.
   EXPECT_EQ(overlaps(tracer, {DVec3(2.0, 0.5, 0.5), DVec3(1.001), {0, 0, 0, 0}}).size(), 1U);
   EXPECT_TRUE(overlaps(tracer, {0.5, 5.5, 0.5}, 2.0).empty());
 }

@@ -22,7 +22,7 @@ struct Contact {
   double fraction = kInfinity;
   DVec3 normal{0.0};  // in the grid
   double depth = 0.0;
-  int axis = -1;  // of the normal, where it is one of the grid's; else 3 and more, and -1 where nothing is met
+  int axis = -1;  // grid axis of the normal; 3 and more: other axes; -1: no contact
 };
 
 // A moving box and the axes that can separate it from voxels.
@@ -113,7 +113,7 @@ Contact CapsuleAmongVoxels::contact_at(double fraction, const LineGap& gap) cons
 }
 
 Contact CapsuleAmongVoxels::meet(IVec3 voxel, double most) const {
-  constexpr int kMostSteps = 64;  // as many as halve a distance until nothing is left of it: when it just grazes
+  constexpr int kMostSteps = 64;  // enough to halve a distance to nothing, as for grazing contacts
   constexpr double kMet = 1e-12;
   const DVec3 apart = capsule_.centre - (DVec3(voxel) + 0.5);
   const double radius = capsule_.radius - kTouch;
@@ -122,7 +122,7 @@ Contact CapsuleAmongVoxels::meet(IVec3 voxel, double most) const {
     LineGap gap = gap_of_line(apart + fraction * capsule_.displacement, capsule_.half_axis);
     const double left = gap.distance - radius;
     if (step == 0 && left < 0.0) {
-      // Less is what rounding leaves of a line that goes through the voxel.
+      // A smaller gap is a rounding error of a line through the voxel.
       if (gap.distance < kTouch) gap = way_out_of_line(apart, capsule_.half_axis);
       Contact contact = contact_at(0.0, gap);
       contact.depth = capsule_.radius - gap.distance;
@@ -137,7 +137,7 @@ Contact CapsuleAmongVoxels::meet(IVec3 voxel, double most) const {
   return {};
 }
 
-// The voxels of one grid, and the best contact with them so far; for `follow_way`.
+// The voxels of one grid, and the best contact with them so far; an argument of `follow_way`.
 template <class Shape, class Reader>
 class BlockSweep {
  public:
@@ -240,7 +240,7 @@ std::optional<SweepHit> first_of_voxels(const PlacedGrid& placed, const TypesMet
   return first_of<GridReader>(placed, types, shape, most, *placed.voxels, placed.voxels->bounds());
 }
 
-// With a chunk that is not loaded, of a shape in chunks.
+// Returns the first contact with an unloaded chunk, for a shape in chunk units.
 template <class Moving>
 std::optional<SweepHit> first_of_unloaded(const PlacedGrid& chunks, const Moving& shape, double most) {
   if (is_surely_loaded(*chunks.grid, bounds_between(shape, reach_of(shape), 0.0, most))) return std::nullopt;

@@ -3,12 +3,12 @@
 namespace quoin {
 namespace {
 
-// From one chunk to the next along a ray, in double. Every crossing's distance is found from the origin.
+// Walks along a ray from chunk to chunk, in double precision. Each crossing distance is computed from the origin.
 class ChunkWalk {
  public:
   explicit ChunkWalk(const Ray& ray) : ray_(ray) {}
 
-  // To where the ray enters the world; false where it misses that, or enters beyond `max_t`.
+  // Moves to the entry of the ray into the world. Returns false if it misses the world, or enters it beyond `max_t`.
   bool enter(double max_t) {
     const IBox world = chunks_of_world();
     double exit_t = max_t;

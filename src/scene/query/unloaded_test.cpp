@@ -255,7 +255,7 @@ TEST(UnloadedSweeps, WhoStartsInWhatIsNotLoadedStaysThere) {
 TEST(UnloadedSweeps, WhoIsPushedOutOfVoxelsIsNotPushedIntoWhatIsNotLoaded) {
   PartialScene world;
   world.load_around(1);
-  // In the ground, a voxel from its border, which is where nothing is loaded.
+  // In the ground, one voxel from the border of the unloaded area.
   world.scene.edit(world.grid).grid.fill_box({{0, 0, 0}, {64, 64, 64}}, 1);
   world.scene.edit(world.grid).grid.fill_box({{50, 0, 0}, {56, 64, 64}}, kAir);
   const SceneTracer tracer(world.scene);

@@ -86,7 +86,7 @@ TEST(Walk, ClimbsWhatIsAFloorAndNothingSteeper) {
     const DVec3 start = player.box.centre;
     player.steps(180, {3.0, 0.0, 0.0});
     if (max_slope > 40.0) {
-      // As fast as on level ground.
+      // The same speed as on level ground.
       EXPECT_NEAR(player.box.centre.x, start.x + 9.0, 0.05);
       EXPECT_NEAR(player.box.centre.y - start.y,
                   (player.box.centre.x - start.x) * std::tan(40.0 / 180.0 * std::numbers::pi), 0.05);
@@ -287,7 +287,7 @@ TEST(Walk, WandersWithoutComingIntoAnything) {
   }
 }
 
-// With options for floors, blocks are walked on as well; without, nothing is other than before there were any.
+// Floor options also apply to blocks; without them, blocks behave as ordinary obstacles.
 TEST(Walk, WalksOnBlocks) {
   SceneGrid yard;
   yard.grid.fill_box({{-10, -1, -10}, {10, 0, 10}}, kWood);

@@ -199,7 +199,7 @@ Error SmoothScene::Impl::refuse(const Scene& of) {
                "", std::nullopt};
 }
 
-// Everything in its place, in a scene of its own.
+// Rebuilds the scene with all grids in place.
 void SmoothScene::Impl::place_all(const Scene& of) {
   Scene placed;
   for (auto& [handle, fields] : grids) {

@@ -35,7 +35,7 @@ bool is_solid(const VoxelRegistry& types, VoxelType type) {
   return type != kAir && (type >= types.size() || types[type].collides);
 }
 
-// Null: nothing of it is solid. False where nothing is; the rows are then not set.
+// Null: not solid. Returns false, without setting the rows, if no voxel is solid.
 bool read_solid_rows(const Chunk* chunk, const VoxelRegistry& types, SolidRows& rows) {
   if (chunk == nullptr) return false;
   const auto counts = [&](VoxelType type) { return is_solid(types, type); };
@@ -171,7 +171,7 @@ void append_solid_faces(const Grid& grid, IVec3 chunk, const VoxelRegistry& type
   for (const Direction direction : kDirections) {
     const FaceFrame& frame = frame_of(direction);
     const bool is_up = frame.sign > 0;
-    if (is_up) layers.emplace(rows, frame.axis);  // of the opposite direction too, which comes next
+    if (is_up) layers.emplace(rows, frame.axis);  // also used by the opposite direction, which follows
     // The bits of a word lie along the lower of the other two axes.
     const bool is_u_in_word = frame.u < frame.v;
     for (std::size_t i = 0; i < kEdge; ++i) {

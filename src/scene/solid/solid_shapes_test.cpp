@@ -14,7 +14,7 @@
 namespace quoin {
 namespace {
 
-// Stone, water that nothing is stopped by, glass.
+// Stone, water (passable), glass.
 VoxelRegistry three_types() {
   VoxelRegistry types;
   VoxelProperties properties;

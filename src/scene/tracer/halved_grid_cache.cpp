@@ -22,7 +22,7 @@ bool has_volume_of(const Grid& coarse, int halvings, const Grid& full) {
   return std::abs(cells - voxels) <= 0.125 * voxels;
 }
 
-// The same of a field; and whether little of its surface is so thin that the next halving would tear it.
+// The same for a field; also false if so much of its surface is thin that the next halving would make holes.
 bool has_shape_of(const DensityPyramid& fields, int halvings) {
   const DownsampledDensityCounts& now = fields.counts(halvings);
   const auto cells = std::ldexp(static_cast<double>(now.solid), 3 * halvings);
@@ -87,7 +87,8 @@ bool HalvedGridCache::Entry::is_alike(const SceneGrid& grid, int halvings) const
   return has_voxels || has_field;
 }
 
-// Puts a level of the pyramids among those that are like the grid; false, and none from there on, when it is not.
+// Adds a level of the pyramids if it is similar to the grid. Otherwise removes it and all coarser levels, and returns
+// false.
 bool HalvedGridCache::Entry::take_level(const SceneGrid& grid, const VoxelRegistry& types, int halvings) {
   const auto index = static_cast<std::size_t>(halvings - 1);
   if (!is_alike(grid, halvings)) {

@@ -48,7 +48,7 @@ class HalvedGridCache {
     DensityPyramid fields;
     Grid no_voxels;
     std::vector<std::unique_ptr<CoarseLevel>> levels;  // once halved first
-    bool is_coarsest = false;                          // there are no more levels that are like the grid
+    bool is_coarsest = false;                          // no coarser level is similar to the grid
     void make(const SceneGrid& grid, const VoxelRegistry& types, int halvings, Threads threads);
     void renew(const SceneGrid& grid, const VoxelRegistry& types, Threads threads);
     [[nodiscard]] bool is_alike(const SceneGrid& grid, int halvings) const;

@@ -10,7 +10,7 @@ namespace quoin {
 namespace {
 
 constexpr std::size_t kNoLeaf = std::numeric_limits<std::size_t>::max();
-// By how much a tree may become slower to search before it is built from scratch.
+// Maximum ratio of search costs before the tree is rebuilt.
 constexpr double kMaxWorse = 1.5;
 
 // Narrows [low, high] to the interval of t in which `origin + t * direction` is at most `limit`.
@@ -118,11 +118,11 @@ void InstanceTree::change(std::span<const Change> changes) {
     fit(nodes_[i]);
     areas_ += area_of(nodes_[i].box);
   }
-  // Also when it is not a number.
+  // Written so that NaN also rebuilds.
   if (!nodes_.empty() && !(search_cost() <= kMaxWorse * built_cost_)) build();
 }
 
-// Makes the nodes below one that holds `items`, whose boxes stand in `order_` from `begin` on.
+// Makes the nodes below the one for `items`, whose boxes begin at `begin` in `order_`.
 void InstanceTree::split(std::size_t node, std::span<Item> items, std::size_t begin) {
   if (items.size() <= kLeafSize) {
     nodes_[node].first = begin;

@@ -12,7 +12,7 @@
 
 namespace quoin {
 
-/// False only when the ray does not meet the box from 0 to `max_t`.
+/// Returns false only if the ray misses the box from 0 to `max_t`.
 [[nodiscard]] bool may_meet(const Ray& ray, double max_t, const DBox& box);
 
 /// A bounding-volume tree over boxes.
@@ -45,7 +45,7 @@ class InstanceTree {
   /// Replaces boxes. Refits only the nodes above them. Rebuilds the tree if the nodes have grown so much that searches
   /// would be slow, or if a box became empty or non-empty.
   ///
-  /// Cost: O(changes * log n) at most, and a bit for each node; O(n log n) when built from scratch.
+  /// Cost: at most O(changes * log n), plus one bit per node; O(n log n) for a rebuild.
   void change(std::span<const Change> changes);
 
   /// Calls `visit(index)` for every box that the ray may hit from 0 to `max_t`, roughly from near to far, until it
@@ -110,7 +110,7 @@ class InstanceTree {
   std::vector<std::size_t> order_;
   std::vector<Node> nodes_;
   std::vector<std::size_t> leaf_of_;  // by box: its leaf's index; kNoLeaf for an empty one
-  double built_cost_ = 0.0;           // what `search_cost` was once built
+  double built_cost_ = 0.0;           // `search_cost` after the last rebuild
   double areas_ = 0.0;                // of all nodes' boxes
 };
 

@@ -15,10 +15,10 @@ using TwoBits = std::int64_t __attribute__((vector_size(16)));
 using FourDoubles = double __attribute__((vector_size(32)));
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-// More than the rounding to single precision takes away.
+// Exceeds the error of rounding to single precision.
 constexpr float kRounding = 0x1p-22F;
 constexpr float kLeastRounding = 1e-20F;
-// Directions beyond these are not scaled but taken as going anywhere.
+// Directions of other lengths are not scaled; such rays may hit anything.
 constexpr double kShortest = 1e-30;
 constexpr double kLongest = 1e30;
 

@@ -114,9 +114,9 @@ class PacketLanes {
   bool is_usual_;
 };
 
-/// An InstanceTree as packets of rays near one point look through it: four boxes at a time, in single precision.
+/// An InstanceTree for packets of rays near one point: tests four boxes at a time, in single precision.
 ///
-/// Boxes are rounded outwards, so that nothing is missed. Space: the tree's, with `origin` in the middle.
+/// Boxes are rounded outwards, so that no hit is missed. Space: the tree's, with `origin` in the middle.
 class PacketTree {
  public:
   PacketTree() = default;
@@ -160,7 +160,7 @@ class PacketTree {
     float near;
   };
 
-  // The nearest comes last, on top.
+  // The nearest child is pushed last, on top.
   std::size_t push_children(const PacketBounds& rays, std::uint32_t index, Entry* stack, std::size_t height) const {
     const Node& node = nodes_[index];
     Four near;

@@ -11,7 +11,7 @@
 namespace quoin {
 namespace {
 
-// By the index of each box that was visited: the lanes that may meet it.
+// Returns, by the index of each visited box, the lanes that may hit it.
 std::map<std::size_t, std::uint32_t> visited(const PacketTree& tree, const RayPacket& rays) {
   std::map<std::size_t, std::uint32_t> found;
   const PacketBounds bounds(rays);

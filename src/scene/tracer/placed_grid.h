@@ -17,8 +17,8 @@ namespace quoin {
 
 class DensityGlass;
 
-/// A grid in the place that an instance gives it, ready to be traced. Instances of one grid share its trees.
-/// Lifetime: owns nothing; the tracer and its scene must outlive it, and an update ends it.
+/// A grid with the placement of an instance, ready to be traced. Instances of one grid share its trees. Lifetime: owns
+/// nothing; the tracer and its scene must outlive it, and an update invalidates it.
 struct PlacedGrid {
   InstanceHandle instance;
   const SceneGrid* grid = nullptr;  ///< as the scene holds it

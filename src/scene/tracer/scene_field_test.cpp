@@ -44,7 +44,7 @@ TEST(SceneFields, ChangesAreTold) {
   ChangeCursor cursor = s.scene.cursor();
   DensityGrid& field = s.scene.edit(s.grid).field;
   EXPECT_EQ(s.scene.changes_since(cursor).grids.size(), 1U);
-  // By the field alone, as often as it is edited, and not where an edit changes nothing.
+  // Edits of the field are reported each time; edits without a change are not.
   for (int i = 0; i < 3; ++i) {
     EXPECT_FALSE(s.scene.has_changed_since(cursor));
     field.add_sphere({16.0 + i, 30.0, 16.0}, 3.0, 2);
@@ -53,7 +53,7 @@ TEST(SceneFields, ChangesAreTold) {
     field.set({16, 16, 16}, {field.density({16, 16, 16}), field.material({16, 16, 16})});
     EXPECT_TRUE(s.scene.changes_since(cursor).empty());
   }
-  // Another field in its place.
+  // Replaces the field.
   field = DensityGrid();
   EXPECT_EQ(s.scene.changes_since(cursor).grids, std::vector<GridHandle>{s.grid});
   EXPECT_TRUE(s.scene.bounds().empty());

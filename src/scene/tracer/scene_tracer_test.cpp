@@ -157,7 +157,7 @@ TEST(SceneTracer, EquallyNearHitsBelongToTheFirstInstance) {
   SceneGrid grid;
   grid.grid.set({0, 0, 0}, 1);
   const GridHandle handle = scene.add_grid(std::move(grid));
-  // So many in one place that the tree's leaves hold some of them each.
+  // Many instances at one position, so that each leaf of the tree contains some.
   for (const double x : {5.0, -5.0}) scene.add_instance({"", handle, {x, 0, 0}});
   for (int i = 0; i < 30; ++i) scene.add_instance({"", handle});
   const SceneTracer tracer(scene);

@@ -98,7 +98,7 @@ bool SceneTracer::Impl::update_types(const TypeChanges& changes) {
   return has_forgotten;
 }
 
-// False when a grid has other bounds or another pivot than before, came or went.
+// Returns false if a grid came or went, or its bounds or pivot changed.
 bool SceneTracer::Impl::look_at_grids(const SceneChanges& changes) {
   const auto is_gone = [&](GridHandle handle) { return scene->grids().find(handle) == nullptr; };
   if (changes.all) {
@@ -125,7 +125,7 @@ bool SceneTracer::Impl::look_at_grids(const SceneChanges& changes) {
   return is_same;
 }
 
-// False when it is placed otherwise than before.
+// Returns false if the placement of the grid's contents changed.
 bool SceneTracer::Impl::look_at(GridHandle handle) {
   const SceneGrid& grid = scene->grids()[handle];
   if (handle.index >= grids.size()) grids.resize(handle.index + std::size_t{1});

@@ -35,7 +35,8 @@ void expect_up_to_date(const SceneTracer& tracer, const Scene& scene) {
   }
 }
 
-// A tenth of the instances, another one in each round, by up to `step`; where they leave the square they come back.
+// Moves a tenth of the instances, a different one in each round, by up to `step`. Instances that leave the square
+// return.
 void tenth_moved(benchmark::State& state, double step) {
   Scene scene = mixed_scene(kInstances);
   SceneTracer tracer(scene, InstanceFilter::Visible, {1});

@@ -95,7 +95,7 @@ class ChangingScene {
     if (below(2) == 0) grid.clear();
     if (!grid.bounds().empty()) grid.fill_box(grid.bounds(), kAir);
   }
-  // Another in its place.
+  // Replaces a grid.
   void replace_grid() {
     SceneGrid* grid = any_grid();
     if (grid == nullptr) return;

@@ -261,7 +261,7 @@ void SceneView::first_hits(const RayPacket& rays_in_view, SceneHits& hits) const
     impl_->meet_alone(rays_in_view, hits);
     return;
   }
-  RayPacket left = rays_in_view;  // its max_t shrink to the nearest hits so far
+  RayPacket left = rays_in_view;  // `max_t` shrinks to the nearest hits so far
   PacketBounds bounds(left);
   LanesWhenNeeded lanes(left, bounds);
   const PacketTree& seen = impl_->sees_all() ? impl_->instances : impl_->seen;

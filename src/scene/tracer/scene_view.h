@@ -51,8 +51,8 @@ class SceneView {
 
   [[nodiscard]] const SceneTracer& tracer() const;
 
-  /// From now on `first_hits` passes through these (indices into SceneTracer::placed), which are drawn in another way.
-  /// They still stop other rays. Cost: O(instances * log instances).
+  /// Makes `first_hits` skip these instances (indices into SceneTracer::placed), because impostors draw them. They
+  /// still block other rays. Cost: O(instances * log instances).
   void leave_to_impostors(std::span<const std::int32_t> placed);
 
   /// Finds the nearest opaque voxel or field surface of all instances for each ray, in view space. Of equally near

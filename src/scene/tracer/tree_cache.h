@@ -62,7 +62,7 @@ class TreeCache {
   [[nodiscard]] const OccupancyTree& opaque() const { return opaque_; }
   /// Null when the grid has no transparent voxel.
   [[nodiscard]] const OccupancyTree* transparent() const { return transparent_ ? &*transparent_ : nullptr; }
-  /// All that is solid of the field; null when there is none.
+  /// Returns all solid of the field; null if there is none.
   [[nodiscard]] const DensityTree* field() const { return field_ ? if_any(*field_) : nullptr; }
   /// Returns the opaque part of the field, or the whole field if all is opaque; null if there is none.
   [[nodiscard]] const DensityTree* opaque_field() const { return split_ ? if_any(split_->opaque()) : field(); }
