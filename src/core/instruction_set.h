@@ -16,10 +16,10 @@ enum class InstructionSet : std::uint8_t {
 };
 inline constexpr std::size_t kInstructionSets = 4;
 
-// One more than the set in use; 0 until someone asks.
+// One more than the set in use; 0 until the first request.
 inline constinit std::atomic<std::uint8_t> instruction_set_in_use{0};
 
-// Looks at the machine.
+// Detects the instruction sets of the machine.
 [[nodiscard]] InstructionSet find_instruction_set();
 
 /// Returns the instruction set for kernels: the largest that this machine supports, or a smaller one set by an

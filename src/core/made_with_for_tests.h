@@ -6,7 +6,7 @@
 
 namespace quoin {
 
-/// An object whose kernels are those of `set`.
+/// Creates an object with the kernels of `set`.
 template <class T>
 [[nodiscard]] T made_with(InstructionSet set) {
   const InstructionSetOverride over(set);

@@ -24,7 +24,7 @@ using CellCorners = std::array<double, 8>;
   return between(low, high, f.z);
 }
 
-/// Its gradient, in densities a sample.
+/// Returns the gradient, in densities per sample.
 [[nodiscard]] inline DVec3 trilinear_gradient(const CellCorners& d, const DVec3& f) {
   return {bilinear(d[1] - d[0], d[3] - d[2], d[5] - d[4], d[7] - d[6], f.y, f.z),
           bilinear(d[2] - d[0], d[3] - d[1], d[6] - d[4], d[7] - d[5], f.x, f.z),

@@ -65,7 +65,7 @@ void expect_told(Consumer& consumer, const Grid& grid) {
   consumer.expected = {};
 }
 
-// The least and the greatest voxels of a chunk, and some between.
+// The least and greatest voxels of a chunk, and some in between.
 int random_place(std::mt19937& random) {
   return static_cast<int>(random() % 3) * 64 - 64 + std::array{0, 1, 17, 40, 62, 63}[random() % 6];
 }

@@ -37,7 +37,7 @@ ChunkWindow::Box ChunkWindow::Box::grown_to(IVec3 chunk) const {
   return grown;
 }
 
-// Air outlives every window, as it is there before the first.
+// The static air chunk is created before the first window, so it outlives all windows.
 ChunkWindow::ChunkWindow() : air_(&all_air()) {}
 
 void ChunkWindow::put(std::uint32_t cell, ChunkEntry* entry, std::uint32_t epoch) {
@@ -269,7 +269,8 @@ void ChunkTable::plan() {
   }
 }
 
-// Moves the window to where all chunks are, or most; where they lie too far from each other it stays if most are in it.
+// Moves the window to all chunks or, failing that, to most of them. If they are too far apart, the window stays,
+// provided that it contains most of them.
 void ChunkTable::try_to_plan() {
   outside_since_plan_ = 0;
   if (empty()) return window_.close();

@@ -40,7 +40,7 @@ Told told(const Grid& before, const Grid& now, const GridChanges& changes) {
   return all;
 }
 
-// All voxels that differ, one by one, each once.
+// Returns all voxels that differ, each once.
 Told compared(const Grid& before, const Grid& now) {
   Told all;
   before.for_each([&](IVec3 p, VoxelType type) {
@@ -98,7 +98,7 @@ TEST(VisitChanges, TellsOfEveryVoxelAndWhatItWas) {
     GridChanges unknown;
     unknown.all = true;
     ASSERT_EQ(told(before, grid, unknown), expected) << step;
-    // Slabs: those of the changed voxels, and where an edit was undone others too.
+    // Covers the slabs of the changed voxels, and possibly others if an edit was undone.
     std::map<Place, ChunkSlabs> slabs;
     for (const ChunkChange& change : changes.items) {
       slabs[{change.chunk.x, change.chunk.y, change.chunk.z}] = change.slabs;

@@ -74,7 +74,7 @@ void get_dependent(benchmark::State& state) {
 }
 BENCHMARK(get_dependent)->Name("grid/get_dependent")->Unit(benchmark::kMillisecond);
 
-// The same walk through a plain array of bytes, which takes 8,388,608 of them.
+// The same walk through a plain array of 8,388,608 bytes.
 void get_dependent_dense(benchmark::State& state) {
   constexpr int kGets = 1'000'000;
   std::vector<std::uint8_t> dense;

@@ -55,7 +55,7 @@ inline LongBox box_from(const IBox& box) {
   return result;
 }
 
-/// The whole points between two corners, and some beyond.
+/// Returns the integer points between two corners, and some outside.
 inline LongBox box_around(DVec3 min, DVec3 max) {
   constexpr double kLimit = 2'147'483'648.0;
   LongBox box;

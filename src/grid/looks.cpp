@@ -25,7 +25,7 @@ Channels channels_of(Rgba8 colour) {
   return {colour.r, colour.g, colour.b, colour.a};
 }
 
-/// Looks that become one: a stretch of a list.
+/// Looks that are merged: a range of a list.
 struct Group {
   std::size_t first = 0;
   std::size_t end = 0;
@@ -37,7 +37,7 @@ struct Group {
   }
 };
 
-/// Looks in groups that become one colour each: the median cut.
+/// Groups of looks; each group becomes one colour (median cut).
 class MedianCut {
  public:
   explicit MedianCut(std::span<const Looks::Look> looks) : looks_(looks), order_(looks.size()) {

@@ -60,7 +60,7 @@ TEST(VolumeField, DensitiesOfABallAreDistancesInSamples) {
 }
 
 TEST(VolumeField, SolidIsExactlyWhatIsGreater) {
-  // Differences down to the least that a float can hold.
+  // Differences down to the smallest positive float.
   const auto value = [](IVec3 p) {
     const double least = std::numeric_limits<float>::denorm_min();
     return p.x % 3 == 0 ? least : (p.x % 3 == 1 ? 0.0 : -least) + (p.y == 5 ? 1e30 : 0.0);

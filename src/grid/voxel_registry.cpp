@@ -12,7 +12,7 @@
 namespace quoin {
 namespace {
 
-// Only properties that are cheap to mix: equal properties hash alike, `find_or_add` compares the rest.
+// Hashes only properties that are cheap to mix. Equal properties have equal hashes; `find_or_add` compares the rest.
 std::uint64_t hash_of(const VoxelProperties& p) {
   const std::uint64_t colour = (std::uint64_t{p.colour.r} << 24) | (std::uint64_t{p.colour.g} << 16) |
                                (std::uint64_t{p.colour.b} << 8) | p.colour.a;

@@ -41,7 +41,8 @@ float secant(std::size_t hour, std::size_t channel) {
   return (b.look.at(channel) - a.look.at(channel)) / (b.elevation - a.elevation);
 }
 
-// At an hour: the harmonic mean of those on both sides, so that the curve stays between its neighbours.
+// The slope at a table entry: the harmonic mean of the slopes on both sides, so that the curve stays between its
+// neighbours.
 // Source: F. N. Fritsch, R. E. Carlson, "Monotone piecewise cubic interpolation" (1980).
 float slope(std::size_t hour, std::size_t channel) {
   if (hour == 0 || hour + 1 == kHours.size()) return 0.0F;

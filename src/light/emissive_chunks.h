@@ -47,7 +47,7 @@ class EmissiveChunks {
  private:
   ChangeCursor followed_;
   ChangeCursor followed_types_;
-  std::map<IVec3, std::vector<Item>, ByZyx> chunks_;  // those that hold some
+  std::map<IVec3, std::vector<Item>, ByZyx> chunks_;  // non-empty ones
 };
 
 }  // namespace quoin

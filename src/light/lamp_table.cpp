@@ -200,7 +200,7 @@ std::vector<IVec3> chunks_of(const LampPlace& place) {
   return chunks;
 }
 
-// On several threads, some chunks at a time; in the order of places and chunks.
+// Works on several threads, some chunks at a time; the result is in the order of places and chunks.
 void make_lists(std::span<const LampPlace> places, int max_lamps, Threads threads, LampTable& table) {
   constexpr std::size_t kChunksATask = 16;
   struct Task {

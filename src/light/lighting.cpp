@@ -64,13 +64,13 @@ std::vector<std::uint32_t> Lighting::coherent_order(std::span<const SurfacePoint
 
 // Up to sixteen points of one placed grid, with the origins of their rays.
 struct Lighting::Group {
-  const OcclusionDirections::Fixed* directions = nullptr;  // where all pixels have the same
+  const OcclusionDirections::Fixed* directions = nullptr;  // if all pixels use the same
   RayPacket origins;
   std::size_t size = 0;
   std::array<const SurfacePoint*, RayPacket::kSize> points{};
   std::int32_t placed = 0;
-  std::uint32_t surfaces = 0;  // lanes that are to be lit
-  std::uint32_t unknown = 0;   // of these, those whose openness is to be found
+  std::uint32_t surfaces = 0;  // lanes to be lit
+  std::uint32_t unknown = 0;   // lanes of `surfaces` with unknown openness
   bool is_one_face = true;
 
   // `lift`: in the voxels that are traced.
@@ -470,7 +470,7 @@ Vec3 Lighting::normal_colour(const SurfacePoint& point) const {
   return colour;
 }
 
-// `openness`: 1 where it is not known.
+// `openness`: 1 if unknown.
 Vec3 Lighting::shade(const SurfacePoint& point, Vec3 direct, float openness) const {
   const bool is_surface = point.kind == PointKind::Surface;
   switch (options_.shading) {

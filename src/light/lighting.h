@@ -33,7 +33,7 @@ struct SurfacePoint {
   VoxelType type = kAir;
   Direction face = Direction::PosX;  ///< fields: the direction nearest to the normal
   bool in_field = false;
-  bool is_blended = false;  ///< of a field: not of one material, but of those around, as Surfaces::blend_of_field
+  bool is_blended = false;  ///< fields: a blend of the materials around, as Surfaces::blend_of_field
   Vec3 normal{0.0F};        ///< of a field, in its grid, of unit length or 0
   float lift = 0.0F;        ///< of a field: how far above the surface the position lies, along the normal
   PointKind kind = PointKind::Surface;

@@ -49,7 +49,7 @@ class OcclusionDirections {
   [[nodiscard]] static Turn turn_of(int sample, int rays);
 
   using Fixed = std::array<std::array<DVec3, 9>, 6>;
-  /// All fixed directions, by face, so turned. Requires: `is_fixed`.
+  /// Returns all fixed directions, by face, with this rotation. Requires: `is_fixed`.
   [[nodiscard]] Fixed turned(const Turn& turn) const;
 
   /// Data of `spread`: the angles of the rings and the rotations of pixels; empty if `spread` is not used.

@@ -9,7 +9,7 @@
 
 namespace quoin {
 
-/// Cuts the faces of quads into rectangles of those that belong together: as far along u as it goes, and then along v.
+/// Cuts the faces of quads into rectangles of matching faces: as far along u as possible, then along v.
 class QuadCutter {
  public:
   /// `start(u, v)` returns an object that decides how a rectangle from that face may grow: `goes_along_u`,

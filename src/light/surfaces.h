@@ -41,11 +41,11 @@ enum class Clouds : std::uint8_t {
   Scatter,  ///< no refraction, tint or absorption; `log_clarity` is the unscattered light
 };
 
-/// Surfaces by type; an id that is not registered gives a magenta that shows.
+/// Surfaces by type. Unregistered ids give a conspicuous magenta.
 class Surfaces {
  public:
   explicit Surfaces(const VoxelRegistry& types, Clouds clouds = Clouds::AsGlass) : clouds_(clouds) { update(types); }
-  /// Takes over the types that changed; false: none did. Cost: O(these).
+  /// Takes over the changed types. Returns false if there are none. Cost: O(changed types).
   bool update(const VoxelRegistry& types);
   /// Returns true if any type scatters light inside; always false with Clouds::AsGlass.
   [[nodiscard]] bool has_clouds() const {
@@ -56,12 +56,12 @@ class Surfaces {
   }
   /// Returns the surface of a field's material. kAir has no material and is white, as in smooth meshes.
   [[nodiscard]] const Surface& of_field(VoxelType material) const;
-  /// The colour, emission, roughness and metalness at a point of a field's surface: those of the solid samples of the
-  /// 27 around it, each by its share. A flat smooth mesh has the same colours: at the middle of a cell the samples of
-  /// its corners have equal shares, and between the middles of cells the shares change linearly.
+  /// Returns the colour, emission, roughness and metalness at a point of a field's surface: the weighted mean of the
+  /// solid samples among the 27 around it. A flat smooth mesh has the same colours: at the middle of a cell the
+  /// samples of its corners have equal weights, and between cell centres the weights change linearly.
   ///
-  /// `inside`: where in the cell, 0 to 1 on each axis. `nearest`: the material where no sample around is solid.
-  /// Cost: 9 rows of samples, and 27 materials where these differ.
+  /// `inside`: the position in the cell, 0 to 1 on each axis. `nearest`: the material if no sample around is solid.
+  /// Cost: 9 rows of samples, and 27 materials if these differ.
   [[nodiscard]] Surface blend_of_field(const DensityGrid& field, IVec3 cell, const DVec3& inside,
                                        VoxelType nearest) const;
 

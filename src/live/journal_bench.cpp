@@ -206,7 +206,7 @@ void snapshot_scene(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(world.scene.snapshot().grids().size());
 }
 
-// The first edit of a chunk after a snapshot, which copies the chunk and the way to it.
+// The first edit of a chunk after a snapshot, which copies the chunk and the path to it.
 void snapshot_and_edit(benchmark::State& state) {
   World world(static_cast<int>(state.range(0)));
   for (auto _ : state) {

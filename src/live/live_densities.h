@@ -34,7 +34,7 @@ class BodyChunks {
 
  private:
   std::mutex mutex_;
-  std::vector<VoxelType> transparent_;  // those that were when `made_` was
+  std::vector<VoxelType> transparent_;  // the transparent types at the time of `made_`
   std::map<std::uint32_t, std::shared_ptr<const DensityChunk>> made_;
 };
 

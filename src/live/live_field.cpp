@@ -57,7 +57,7 @@ bool has_changes_of_sign(const DensityGrid& field, IVec3 chunk) {
   return false;
 }
 
-// Bodies that touch have surfaces where no sign changes.
+// Touching bodies have surfaces without a change of sign.
 bool may_have_surface(const DensityGrid& field, const VoxelRegistry& types, IVec3 chunk) {
   if (has_changes_of_sign(field, chunk)) return true;
   if (!types.has_transparent()) return false;
@@ -340,7 +340,7 @@ void LiveField::finish_chunk(FieldChunk& state, std::shared_ptr<const ChunkSurfa
   --state.group->unfinished;
 }
 
-// All of a group is there.
+// The whole group is done.
 void LiveField::give(const Members& members) {
   for (const IVec3 chunk : members) {
     FieldChunk& state = chunks_.at(chunk);

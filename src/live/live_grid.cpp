@@ -82,7 +82,7 @@ void LiveGrid::begin_anew() {
     state.last_stamps.reset();
     state.surface.reset();
     state.is_ready = false;
-    // It stays pending until it is seen whether the new grid has it.
+    // It stays pending until the new grid is known to contain it or not.
     state.is_waiting = true;
   }
 }

@@ -1,4 +1,4 @@
-// Blocky surfaces that carry light follow it, also where no voxel near them changed.
+// Lit blocky surfaces follow changes of light, even without changed voxels nearby.
 
 #include <quoin/live/live_meshes.h>
 

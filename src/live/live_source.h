@@ -86,7 +86,7 @@ struct LiveTypes {
   std::uint64_t generation = 0;
 };
 
-/// Types that look otherwise than before, by type; empty where none does.
+/// Types with a changed look, by type; empty if there are none.
 struct ChangedTypes {
   std::vector<bool> visibility;
   std::vector<bool> colour;
@@ -154,7 +154,7 @@ class LiveSource {
     (void)distances;
     (void)now;
   }
-  /// Sees which chunks may be given to workers. Requires: `content` is as `follow` saw it last.
+  /// Finds the chunks that are ready for workers. Requires: `content` is as in the last `follow`.
   virtual void prepare(const SceneGrid& content, const VoxelRegistry& types) = 0;
   /// Returns the waiting chunks.
   [[nodiscard]] virtual const ChunkSet& waiting() const = 0;

@@ -72,7 +72,7 @@ std::array<std::uint32_t, 7> directions_of(const QuadBuffer& quads, std::size_t 
   return range;
 }
 
-// Quads, and the light of each where there is any.
+// Quads, with their light if any.
 struct LitQuads {
   const QuadBuffer& quads;
   std::span<const FaceLight> light;
@@ -198,7 +198,7 @@ void make_blocky(const LiveMeshOptions& options, LiveJob& job, LiveWorkspace& wo
   job.surface = std::move(surface);
 }
 
-// Its triangles and vertices follow those that are there.
+// Appends its triangles and vertices.
 void append(const SmoothChunkMesh& from, SmoothChunkMesh& to) {
   const auto first = static_cast<std::uint32_t>(to.positions.size());
   const std::size_t begin = to.indices.size();
@@ -299,7 +299,7 @@ void finish(std::shared_ptr<ChunkSurface> surface, LiveJob& job) {
   job.surface = std::move(surface);
 }
 
-// The bodies that a chunk may own faces of, sorted, and whether a cell of its may have several.
+// The bodies whose faces a chunk may own, sorted; `are_several`: a cell may contain several bodies.
 struct BodiesAround {
   std::vector<std::uint32_t> own;
   bool are_several = false;

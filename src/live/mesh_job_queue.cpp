@@ -50,7 +50,7 @@ void MeshJobQueue::push(std::unique_ptr<LiveJob> job) {
   {
     const std::lock_guard lock(mutex_);
     const std::size_t wanted = done_.size() + queue_.size() + running_ + 1;
-    // Workers must not run out of memory where they say that they did.
+    // Reserves memory here, so that workers cannot fail when they report a failure.
     if (done_.capacity() < wanted) done_.reserve(2 * wanted);
     queue_.push_back(std::move(job));
   }

@@ -89,7 +89,7 @@ struct LiveWorkspace {
   SmoothChunkMesh mesh;
 };
 
-/// Workers, the jobs that wait for them, nearest first, and those that are done.
+/// Workers, the waiting jobs (nearest first), and the finished ones.
 ///
 /// Threads: all calls come from one thread at a time.
 class MeshJobQueue {

@@ -36,7 +36,7 @@ struct Functional {
 struct Candidate {
   double bound;  ///< upper bound of the chunk's reach
   const Chunk* voxels;
-  const DensityChunk* samples;  ///< where there are no voxels
+  const DensityChunk* samples;  ///< if there are no voxels
   IVec3 first;                  ///< the chunk's first voxel or sample in its grid
   IBox box;                     ///< box of the counted voxels or samples, in chunk coordinates
   Functional functional;

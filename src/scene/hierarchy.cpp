@@ -127,7 +127,7 @@ std::vector<GroupHandle> groups_from_top(const Scene& scene) {
 
 namespace {
 
-/// Says of groups whether they are below, or are, one of those that were changed.
+/// Tests if groups are equal to, or below, a changed group.
 class ChangedGroups {
  public:
   ChangedGroups(const Scene& scene, const SceneChanges& changes) : changed_(changes.groups) {

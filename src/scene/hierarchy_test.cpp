@@ -176,7 +176,7 @@ TEST(Hierarchy, WhatAppearsOrDisappearsIsToldOf) {
         if (scene.layers().find(layer) != nullptr) scene.edit(layer).visible = random() % 3 != 0;
         break;
       case 2:
-        // Only below one that came before: no circles.
+        // Only below an earlier one: avoids cycles.
         if (scene.groups().find(group) != nullptr) {
           const GroupHandle parent = any(groups);
           if (parent.index < group.index || parent == GroupHandle{}) scene.edit(group).parent = parent;

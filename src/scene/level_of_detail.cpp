@@ -182,7 +182,7 @@ void DetailSelector::Impl::look_at_grid(GridHandle handle, const SceneGrid& grid
   content.from_pivot = content.sphere.centre - grid.pivot;
 }
 
-// Instances are written before it is known whether they are seen: no processor guesses that (a tenth of the time).
+// Writes each instance before its visibility is known, because the branch is unpredictable (saves a tenth of the time).
 std::span<const DetailSelector::Impl::Seen> DetailSelector::Impl::look_at_instances(const Scene& scene, DVec3 camera,
                                                                                     const Frustum& frustum,
                                                                                     InstanceFilter filter) {

@@ -48,7 +48,7 @@ class TouchingChunks {
     for (const IVec3 chunk : chunks) blocks_[shifted_right(chunk, 1)].push_back(chunk);
   }
 
-  /// Takes out the set of a block that is left. Requires: there is one.
+  /// Removes and returns the connected set of a remaining block. Requires: the block exists.
   std::vector<IVec3> take(IVec3 block) {
     std::vector<IVec3> chunks;
     std::vector<IVec3> waiting = {block};

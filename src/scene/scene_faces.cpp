@@ -61,7 +61,7 @@ struct SceneFaces::Impl {
   InstanceFilter filter = InstanceFilter::Visible;
   ChangeCursor scene_read;
   ChangeCursor types_read;
-  std::map<GridHandle, GridFaces> grids;       // also those that no drawn instance places any more
+  std::map<GridHandle, GridFaces> grids;       // includes grids that no drawn instance places any more
   std::map<InstanceHandle, GridHandle> drawn;  // the grid of each drawn instance
   FaceCounts counts;
   std::optional<BlockyMesher> mesher;  // for the few chunks around an edit

@@ -13,7 +13,7 @@
 namespace quoin {
 namespace {
 
-/// One voxel, one face at a time.
+/// Counts one voxel and one face at a time.
 FaceCounts slow_counts(const Scene& scene, InstanceFilter filter) {
   FaceCounts counts;
   for (const GridHandle handle : scene.grids().handles()) {

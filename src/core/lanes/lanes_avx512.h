@@ -133,8 +133,8 @@ inline Mask test(I a, I b) {
 inline Mask test_bit(I a, I at) {
   return test(I{_mm512_rorv_epi32(a.v, at.v)}, I{_mm512_set1_epi32(1)});
 }
-// All lanes, as compilers cannot see: under a mask that they know to be full they gather into any register, whose
-// content, mostly that of the last gather, the processor then waits for.
+// A mask of all lanes that compilers cannot recognise as full. With a known full mask they gather into an arbitrary
+// register, and the processor waits for its content, often that of the last gather.
 inline __mmask16 each_lane() {
   __mmask16 each = 0xFFFF;
   __asm__("" : "+Yk"(each));

@@ -234,7 +234,7 @@ void unpack_as(const std::uint64_t* row, Out* out, ValueOf&& value_of) {
   }
 }
 
-/// One of two values for each of the 64 bits of a word; in such steps that compilers make vectors of them.
+/// Selects between two values by the 64 bits of a word, in steps that compilers vectorise.
 template <class Value>
 void unpack_bits(std::uint64_t word, Value zero, Value one, Value* out) {
   const auto flip = static_cast<Value>(zero ^ one);

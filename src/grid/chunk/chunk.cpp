@@ -49,8 +49,8 @@ bool is_one_type(std::span<const VoxelType> types) {
   return std::memcmp(types.data(), types.data() + 1, types.size_bytes() - sizeof(VoxelType)) == 0;
 }
 
-// Calls `visit(type, voxels)` for the types of a row in the order in which they come; where there are many, for some of
-// them more than once.
+// Calls `visit(type, voxels)` for the types of a row, in order of appearance. If there are many types, some are visited
+// more than once.
 template <class Visit>
 void for_each_run(std::span<const VoxelType, kChunkEdge> row, Visit&& visit) {
   constexpr int kFewTypes = 6;
@@ -75,7 +75,7 @@ void for_each_row_of_slab(std::size_t slab, Visit&& visit) {
   for (int row = 0; row < kSlabRows; ++row) visit(row, first_y + (row & 3), first_z + (row >> 2));
 }
 
-// The type of all voxels of a row, where there is one and it is quick to see.
+// Returns the type of all voxels of a row, if there is one and it is cheap to detect.
 std::optional<VoxelType> one_type_of_row(const Chunk& chunk, int y, int z) {
   const ChunkStorage* m = ChunkStorage::of(chunk);
   if (m == nullptr) return chunk.uniform();
@@ -198,7 +198,8 @@ inline std::uint32_t Chunk::index_for(VoxelType type) {
   return m.direct() ? type : m.recent;
 }
 
-// Writes a type where voxels of a row are of others; books it among the palette's counts, but not which became air.
+// Replaces the types of voxels that have other types. Updates the palette's counts, but not the air counts
+// (see count_change).
 std::uint32_t Chunk::replace(int y, int z, std::uint64_t changed, VoxelType type) {
   QUOIN_ASSERT(changed != 0, "voxels that are of other types");
   types_will_change(y, z, changed);

@@ -102,7 +102,7 @@ void difference_of_types(const Chunk& before, const Chunk& after, VoxelEdit& edi
         if (changed != 0) edit.record.add(y, z, changed);
       }
     }
-    // Counted already, where that is kept.
+    // Uses the stored count if there is one.
     edit.voxels += is_of_air ? other.non_air_count() : static_cast<int>(kChunkVoxels) - other.count(*one.uniform());
     return;
   }

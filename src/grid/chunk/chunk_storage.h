@@ -23,7 +23,7 @@ inline constexpr int kSlabRows = 16;
   return types <= 256 ? 8 : 16;
 }
 
-/// The slabs in the order in which their voxels are stored: those of one height lie together, since edits do.
+/// The slabs in storage order: those of one height are adjacent, because edits often are.
 [[nodiscard]] inline std::size_t slab_in_order(std::size_t i) {
   return i % 16 * 16 + i / 16;
 }
@@ -97,7 +97,7 @@ struct ChunkStorage : RefCounted {
     QUOIN_ASSERT(slot < slot_count, "a slab with voxels of its own");
     return words.at(word_of(slot, row_in_slab));
   }
-  /// The same, to be written. Requires: its page is this chunk's alone (Chunk::slot_for_writing).
+  /// As above, for writing. Requires: the page belongs to this chunk alone (Chunk::slot_for_writing).
   [[nodiscard]] std::uint64_t* own_row(std::uint32_t slot, int row_in_slab) {
     QUOIN_ASSERT(slot < slot_count, "a slab with voxels of its own");
     return words.own_at(word_of(slot, row_in_slab));

@@ -54,7 +54,8 @@ void PagedWords::grow(std::size_t size) {
     const std::size_t page = size_ / kPageWords;
     const std::size_t wanted = std::min(size - page * kPageWords, kPageWords);
     if (page == pages_.size()) {
-      // The first page grows as vectors do; where there is one already, the next will be filled, too.
+      // The first page grows like a vector. If there are several pages, the last one gets full capacity, since it will
+      // be filled.
       add_page(page == 0 ? wanted : kPageWords);
     } else if (wanted > pages_[page]->capacity()) {
       replace_page(page, std::min(std::max(wanted, 2 * pages_[page]->capacity()), kPageWords));

@@ -105,7 +105,7 @@ void ChunkParts::find_parts(Scratch& scratch, Connectivity connectivity) {
   keep_runs(scratch);
 }
 
-// Numbers the parts in the order of their first voxels: the least run of a set is the first.
+// Numbers the parts by their first voxels: the least run of a set is the first.
 void ChunkParts::keep_runs(Scratch& scratch) {
   const std::size_t run_count = scratch.runs.size();
   scratch.part_of_root.assign(run_count, kNoPart);

@@ -38,7 +38,7 @@ IVec3 next_chunk(std::size_t i) {
   return {kNextChunks[i][0], kNextChunks[i][1], kNextChunks[i][2]};
 }
 
-// Two parts that touch: one of a chunk, one of a chunk that follows it.
+// Two parts that touch: one of a chunk, the other of a later chunk.
 struct Link {
   std::uint32_t part = 0;
   std::uint32_t other = 0;

@@ -286,7 +286,7 @@ TEST(ConnectedPieces, VoxelsAcrossCornersOfChunksHoldTogetherOnlyWithCorners) {
   for (int i = 0; i < 27; ++i) {
     const IVec3 step{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
     if (step == IVec3(0)) continue;
-    // On either side of the corner of eight chunks.
+    // Places voxels on either side of the corner of eight chunks.
     const IVec3 first = glm::max(-step, IVec3(0)) - 1;
     Grid grid;
     grid.set(first, 1);
@@ -382,7 +382,7 @@ TEST(ConnectedPieces, EdgesAndCornersOfChunksCountWhereVoxelsConnectByThem) {
     }
     grid.set(63, 63, 20, 1);  // at the edge towards one that is not loaded
     grid.set(0, 0, 0, 1);     // at the corner towards another
-    // Its box reaches both sides of that edge, it does not.
+    // Its bounding box reaches both sides of the edge, but the piece does not.
     for (int x = 40; x < 64; ++x) grid.set(x, 40, 40, 1);
     for (int y = 40; y < 64; ++y) grid.set(40, y, 40, 1);
     ConnectedPieces pieces({.connectivity = connectivity, .belongs = {}});

@@ -48,7 +48,7 @@ double volume(const IBox& box) {
   return size.x * size.y * size.z;
 }
 
-// One copy, from a grid that does not change meanwhile.
+// A single copy, from a grid that does not change in the meantime.
 class BoxCopy {
  public:
   BoxCopy(const Grid& from, const IBox& box, Grid& to, IVec3 to_min, AxisOrientation orientation,

@@ -21,7 +21,7 @@ IVec3 arrival(IVec3 voxel, const IBox& box, IVec3 to_min, AxisOrientation orient
   return to_min + turned - glm::min(far, IVec3(0));
 }
 
-// One voxel at a time, all read before any is set.
+// Copies voxel by voxel; reads all of them before it writes.
 std::int64_t plain_copy(const Grid& from, const IBox& box, Grid& to, IVec3 to_min, AxisOrientation orientation,
                         const CopyOptions& options) {
   std::vector<std::pair<IVec3, VoxelType>> voxels;

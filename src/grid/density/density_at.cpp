@@ -12,7 +12,7 @@ struct Cell {
   IVec3 low{0};
   DVec3 fraction{0.0};
 
-  /// Returns whether all corners have int32 coordinates; NaN has none.
+  /// Returns true if all corners have int32 coordinates; false for NaN.
   bool locate(DVec3 point) {
     constexpr double kLow = -2'147'483'648.0;
     constexpr double kHigh = 2'147'483'647.0;

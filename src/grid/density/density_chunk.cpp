@@ -168,7 +168,7 @@ void DensityChunk::unite_slabs() {
     const std::uint32_t slab = storage_->slabs[i];
     if ((slab & ChunkStorage::kUniformSlab) != 0) continue;
     const Half* values = storage_->row(slab, 0);
-    // All are equal when each equals the next.
+    // All values are equal if each equals the next.
     if (std::memcmp(values, values + 1, sizeof(Half) * (kSlabValues - 1)) != 0) continue;
     const Half value = *values;
     storage_.make_own();

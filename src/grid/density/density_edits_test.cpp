@@ -20,7 +20,7 @@ namespace {
 
 constexpr float kBand = 8.0F;
 
-// Both surfaces flow together where they are nearly as near.
+// The two surfaces blend at points that are nearly equally far from both.
 double flowing_least(double a, double b, double blend) {
   const double k = std::min(blend, kBand - std::max(a, b));
   if (k <= 0.0) return std::min(a, b);

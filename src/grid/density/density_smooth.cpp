@@ -69,7 +69,7 @@ class Window {
   Buffer<double> row_sums_;
 };
 
-// The material of most solid samples among the 26 neighbours; of several, the least.
+// The most frequent material of the solid samples among the 26 neighbours; the least of equally frequent ones.
 VoxelType prevailing_material(const DensityStore& store, IVec3 sample) {
   std::map<VoxelType, int> counts;
   for (int i = 0; i < 27; ++i) {

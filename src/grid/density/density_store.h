@@ -92,16 +92,16 @@ class DensityStore {
 
  private:
   void read_row(const DensityChunk& samples, int y, int z, SampleRow& out) const;
-  // All 64 densities of a row that is stored as such are equal.
+  // Returns true if all 64 densities of a stored row are equal.
   static bool is_even(const Half* row) {
     return row != nullptr && std::memcmp(row, row + 1, sizeof(Half) * (kChunkEdge - 1)) == 0;
   }
-  // Returns which samples changed.
+  // Returns the changed samples.
   std::uint64_t write_row(DensityChunk& samples, int y, int z, int first, int end, const SampleRow& row) const;
   [[nodiscard]] ChangeReach differences(const DensityChunk* before, const DensityChunk* after) const;
   Entry& find_or_create(IVec3 chunk);
-  // Books an edit of one chunk, and drops it where it is all far air. `has_even_row`: an edited row came to hold one
-  // density, so that slabs may have to be united.
+  // Records an edit of one chunk, and removes the chunk if it is all far air. `has_even_row`: an edited row became
+  // uniform, so slabs may need to be united.
   void finish_edit(IVec3 chunk, Entry& entry, const ChangeReach& changes, bool has_even_row, bool is_edit = true);
   void replace(IVec3 chunk, DensityChunk samples);
   template <class ChangeRow>

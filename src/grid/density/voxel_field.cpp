@@ -259,7 +259,7 @@ bool is_one_kind_throughout(const Neighbourhood& chunks) {
                                           [&](const Chunk* chunk) { return kind(chunk) == first; });
 }
 
-// The chunks that hold a voxel, and those around them: the band reaches into these.
+// The chunks that contain voxels, and their neighbours: the band extends into these.
 std::vector<IVec3> chunks_near(const Grid& grid) {
   std::vector<IVec3> all;
   for (const IVec3 at : grid.chunks()) {

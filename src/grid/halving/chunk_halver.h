@@ -23,13 +23,13 @@ class ChunkHalver {
   [[nodiscard]] Chunk make();
 
  private:
-  /// One type's voxels in the four rows [z][y] that make half a row of cells, and the cells in which it occurs.
+  /// The voxels of one type in the four rows [z][y] of half a row of cells, and the cells that contain it.
   struct Layer {
     VoxelType type = kAir;
     bool is_opaque = false;
     std::array<std::uint64_t, 4> voxels{};
     std::uint64_t cells = 0;
-    std::uint64_t won = 0;  ///< of the cells that hold several types, those that become this one
+    std::uint64_t won = 0;  ///< the cells with several types that become this one
   };
   /// Cells of one type in a row of 64.
   struct Run {

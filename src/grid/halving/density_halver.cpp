@@ -85,7 +85,7 @@ void DensityHalver::halve_densities(DensityChunk& made) const {
   }
 }
 
-// Solid samples take those of the samples that they are.
+// Copies the materials of the coinciding fine samples to the solid samples.
 void DensityHalver::copy_materials(Chunk& made) const {
   std::array<VoxelType, kChunkEdge> fine{};
   std::array<VoxelType, kChunkEdge> coarse{};

@@ -18,11 +18,11 @@ struct HalvedDensityChunk {
 
 /// Makes one chunk of a halved field.
 ///
-/// Space: fine, samples from the chunk's least corner, -2 to 129 on each axis; coarse, -1 to 64. Reads no others: an
-///        edit elsewhere leaves the chunk as it was.
+/// Space: fine, samples from the chunk's least corner, -2 to 129 on each axis; coarse, -1 to 64. Reads no other
+/// samples: an edit elsewhere does not change the chunk.
 class DensityHalver {
  public:
-  /// `chunk` is of the halved field.
+  /// `chunk`: coordinates in the halved field.
   DensityHalver(const DensityGrid& field, IVec3 chunk);
 
   [[nodiscard]] HalvedDensityChunk make() const;

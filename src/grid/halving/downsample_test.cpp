@@ -28,7 +28,7 @@ IVec3 unit(int axis) {
   return step;
 }
 
-// The rules of the header, a voxel at a time.
+// Applies the rules of the header voxel by voxel.
 class Oracle {
  public:
   Oracle(const Grid& grid, const VoxelRegistry& types) : grid_(&grid), types_(&types) {}

@@ -27,7 +27,7 @@ class HalvingMasks {
   /// `chunk` is of the halved grid.
   HalvingMasks(const Grid& grid, IVec3 chunk);
 
-  /// The chunk of the full grid at `octant`, 0 or 1 on each axis; null where all is air.
+  /// Returns the chunk of the full grid at `octant`, 0 or 1 on each axis; null if all is air.
   [[nodiscard]] const Chunk* octant(IVec3 octant) const { return chunks_[slot(octant)]; }
   /// The solid cells of a row, 0 <= y, z < 64.
   [[nodiscard]] std::uint64_t solid_cells(int y, int z) const;

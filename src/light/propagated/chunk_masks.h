@@ -33,7 +33,7 @@ class ChunkMasks {
   /// O(rows of the box).
   void read(const Chunk* voxels, const std::vector<TypeLight>& types, const IBox& box, const SlabSet& lamp_slabs);
 
-  /// Rows of the box, [y + 64 z]; null where they are all `uniform`.
+  /// Returns the rows of the box, [y + 64 z]; null if all are `uniform`.
   [[nodiscard]] const std::uint64_t* rows(std::size_t channel) const {
     const Rows& found = rows_[rows_of_[channel]];
     return found.is_uniform ? nullptr : found.words.data();

@@ -87,7 +87,7 @@ class LightDomain {
   }
 
   std::unordered_map<IVec3, std::set<int>, CoordinateHash> columns_;  // [x, 0, z]: y of chunks with voxels
-  std::unordered_map<IVec3, Range, CoordinateHash> ranges_;           // [x, 0, z]: those that are not empty
+  std::unordered_map<IVec3, Range, CoordinateHash> ranges_;           // [x, 0, z]: non-empty ranges
 };
 
 }  // namespace quoin::propagated

@@ -27,7 +27,7 @@ struct SlabPlanes {
     for (std::size_t i = 0; i < kPlanes; ++i) planes[i] = plane(i)[row];
     return planes;
   }
-  /// Bit i: whether row i has light where `mask` has bits.
+  /// Bit i is set if row i has light in the voxels of `mask`.
   [[nodiscard]] unsigned lit_rows(std::uint64_t mask) const { return kernel().find_rows(words.data(), kPlanes, mask); }
 };
 

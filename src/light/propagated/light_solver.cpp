@@ -30,7 +30,7 @@ unsigned level_at(const RowPlanes& planes, int x) {
   return level;
 }
 
-// Bit i: whether a box has row i of the slab from (y, z) on, y % 4 + 4 (z % 4).
+// Bit i is set if the box contains row i of the slab that begins at (y, z); i = y % 4 + 4 (z % 4).
 unsigned rows_of(const IBox& box, int y, int z) {
   if (y >= box.min.y && y + 4 <= box.max.y && z >= box.min.z && z + 4 <= box.max.z) return (1U << kSlabWords) - 1;
   const auto span = [](int begin, int end) {
@@ -44,7 +44,7 @@ unsigned rows_of(const IBox& box, int y, int z) {
   return rows;
 }
 
-// Rows of a slab that changed, in a record: those within a chunk all at once.
+// Adds the changed rows of a slab to a record. Rows inside the chunk are added together.
 void add_slab(int y, int z, const std::uint64_t* changed, VoxelRecord& record) {
   std::uint64_t any = 0;
   std::array<std::uint64_t, 4> by_y{};
@@ -78,10 +78,10 @@ struct LightSolver::Part {
   IBox box;  // of the chunk
   const ChunkAround* around;
   int shift;           // bit of the chunk's first voxel in a row of the region
-  std::uint64_t bits;  // voxels of a row: those of the box, or some of them
+  std::uint64_t bits;  // voxels of a row: all of the box, or some of them
 
   [[nodiscard]] bool is_whole() const { return box == kWholeChunk; }
-  // Calls `visit(y, z)` with the least of their rows.
+  // Calls `visit(y, z)` with the first row of each slab.
   template <class Visit>
   void for_each_slab(Visit&& visit) const {
     for (int z = box.min.z & ~3; z < box.max.z; z += 4) {
@@ -236,7 +236,7 @@ void LightSolver::read_channel(const Part& part, std::size_t channel, const Chan
   });
 }
 
-// All is lit by the sky.
+// The sky lights all of it.
 void LightSolver::open(const Part& part) {
   if ((channels_ >> kSky & 1U) == 0) return;
   has_sky_ = true;
@@ -452,7 +452,7 @@ void LightSolver::read_slab(const Part& part, int y, int z, SlabPlanes& now) con
   kernel().read_slab(read, now.words.data());
 }
 
-// Returns whether all of a chunk is open sky, and was of one level.
+// Returns true if all of a chunk is open sky and its light was uniform.
 bool LightSolver::write_open(const Part& part, const ChannelLight& before, ChunkLightChange& change) const {
   const ChunkMasks& masks = *part.around->masks;
   const bool is_open = outcome_ == Outcome::Open && part.is_whole() && before.is_uniform() &&

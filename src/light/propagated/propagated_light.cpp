@@ -63,7 +63,7 @@ std::vector<TypeLight> type_lights(const VoxelRegistry& types, const PropagatedL
   return lights;
 }
 
-// Bit c: whether any type gives off channel c.
+// Bit c is set if any type emits light in channel c.
 unsigned lamp_channels(const std::vector<TypeLight>& lights) {
   unsigned channels = 0;
   for (const TypeLight& light : lights) {
@@ -102,7 +102,7 @@ LightLevels lamp_levels(const VoxelProperties& properties) {
 
 struct PropagatedLight::Impl {
   Impl() = default;
-  /// Shares all that there is to share. Requires: no update is under way.
+  /// Shares all shareable data. Requires: no update is in progress.
   Impl(const Impl& other)
       : options(other.options),
         followed_grid(other.followed_grid),
@@ -185,7 +185,7 @@ void PropagatedLight::Impl::change_domain(const Grid& grid, const std::vector<IV
   }
 }
 
-// A box of voxels is to be solved by chunks, of those that the domain holds.
+// Queues a box of voxels by chunks, limited to chunks of the domain.
 void PropagatedLight::Impl::add_chunks(const IBox& voxels) {
   const IVec3 first = chunk_of(voxels.min);
   const IVec3 last = chunk_of(voxels.max - 1);
@@ -490,7 +490,7 @@ void PropagatedLight::update(const Grid& grid, const VoxelRegistry& types, Threa
     if (me.lights().empty() || types.has_changed_since(me.followed_types)) {
       me.followed_types = types.cursor();
       std::vector<TypeLight> lights = type_lights(types, me.options);
-      // A type that was not registered was opaque: those that are new are others than before.
+      // Unregistered types count as opaque, so new types change light.
       changes.all |= lights != me.lights();
       me.lamp_channels = lamp_channels(lights);
       me.shared_lights = std::make_shared<const std::vector<TypeLight>>(std::move(lights));

@@ -95,7 +95,7 @@ std::vector<IVec3> places_in_caves(const World& world, const PropagatedLight& li
   return places;
 }
 
-// Made and taken back by turns, at one place after the other; each is one iteration.
+// Alternates between placing and removing, at one position after the other; each counts as an iteration.
 void edits_in_caves(benchmark::State& state, bool in_walls, VoxelType type) {
   World world = made_world(true);
   PropagatedLight light;
@@ -161,7 +161,7 @@ void split(benchmark::State& state) {
 }
 BENCHMARK(split)->Name("light/propagated/split")->Unit(benchmark::kMillisecond);
 
-// Placed and removed by turns; each is one iteration.
+// Alternates between placing and removing; each counts as an iteration.
 void edit(benchmark::State& state, IVec3 at, VoxelType type) {
   World world = made_world(true);
   PropagatedLight light;

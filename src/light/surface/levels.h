@@ -13,13 +13,13 @@
 
 namespace quoin {
 
-/// A level a byte: sky, red, green, blue.
+/// Spreads a packed word to one byte per level: sky, red, green, blue.
 [[nodiscard]] constexpr std::uint32_t level_bytes(std::uint16_t word) {
   const std::uint32_t w = word;
   return (w & 0xFU) | (w & 0xF0U) << 4 | (w & 0xF00U) << 8 | (w & 0xF000U) << 12;
 }
 
-/// A voxel in front of a face: its level bytes, and whether light gets there.
+/// A voxel in front of a face: its levels in bytes, and a flag that light passes it.
 struct FrontLight {
   std::uint32_t levels = 0;
   bool passes = false;
@@ -138,7 +138,7 @@ struct VoxelsAround {
   }
 }
 
-/// Light at a point in front of a surface; false where all eight voxels around are opaque.
+/// Computes the light at a point in front of a surface. Returns false if all eight voxels around are opaque.
 template <class Voxels>
 [[nodiscard]] bool light_around(Voxels& voxels, DVec3 point, MeanLevels& out) {
   const VoxelsAround around(point);

@@ -33,8 +33,8 @@ class LightBricks {
     IVec3 brick{0};  ///< voxel coordinates / 8, rounded down
     std::int32_t grid = 0;
     std::uint32_t is_held = 0;        ///< 0: the slot is free
-    std::uint32_t what = kAllOpaque;  ///< where its numbers begin; kIsUniform | light, where all of it is alike and
-                                      ///< passes; or kAllOpaque, as bricks that are not there
+    std::uint32_t what = kAllOpaque;  ///< index of its first number; kIsUniform | light, if uniform and light passes;
+                                      ///< or kAllOpaque, as for missing bricks
     std::uint32_t pad[2]{};
   };
   /// The changes since the last call.
@@ -64,7 +64,7 @@ class LightBricks {
     ChangeCursor followed_light;
     std::unordered_map<IVec3, Occupied, CoordinateHash> occupied;  // by chunk
   };
-  // A brick's content as found; no numbers where it is uniform or opaque.
+  // The computed content of a brick; no numbers if it is uniform or opaque.
   struct Found {
     IVec3 brick{0};
     std::uint32_t what = kAllOpaque;

@@ -110,7 +110,7 @@ Status light_part(const VertexLights& lights, Threads threads, MeshPart& part) {
   return {};
 }
 
-// The grid of each part; none where no instance of the scene places it.
+// The grid of each part; none if no instance of the scene places it.
 std::vector<std::optional<GridHandle>> grids_of_parts(const Scene& scene, const SceneMeshes& meshes) {
   std::vector<std::optional<GridHandle>> grids(meshes.parts.size());
   for (const MeshPlacement& placement : meshes.placements) {

@@ -42,7 +42,7 @@ class LightRows {
   }
 
  private:
-  static constexpr std::size_t kRows = 8'192;  // those of two chunks side by side
+  static constexpr std::size_t kRows = 8'192;  // the rows of two neighbouring chunks
 
   [[nodiscard]] static std::size_t place_of(IVec3 at) {
     return static_cast<std::size_t>((at.y & 63) | (at.z & 63) << 6 | (at.x & 1) << 12);

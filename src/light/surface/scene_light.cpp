@@ -25,7 +25,7 @@ struct SceneLight::Entry {
 
   PropagatedLight light;
   const Grid* voxels = nullptr;  // the scene's, or `both`
-  Grid both;                     // voxels and field as one, where there is a field
+  Grid both;                     // union of voxels and field, if there is a field
   ChangeCursor followed_voxels;
   ChangeCursor followed_field;
 

@@ -28,7 +28,7 @@ std::array<int, 4> levels_at(const LightWorld& world, IVec3 voxel) {
   return {levels.sky, levels.red, levels.green, levels.blue};
 }
 
-// A corner's light in words: of the voxels around that corner in front, those that can be walked to from the face.
+// Computes a corner's light by definition: from the voxels around the corner in front that are reachable from the face.
 std::array<double, 4> walked_corner(const LightWorld& world, IVec3 voxel, Direction face, IVec3 corner) {
   const FaceFrame& frame = frame_of(face);
   const IVec3 front = voxel + normal_of(face);
@@ -153,7 +153,8 @@ TEST(SurfaceLight, SplitQuadsShowWhatSingleFacesDo) {
   }
 }
 
-// The light of a place in words: shares of the eight voxels around, of those that can be walked to from the nearest.
+// Computes the light of a position by definition: shares of the eight voxels around it that are reachable from the
+// nearest one.
 std::array<double, 4> walked_light(const LightWorld& world, DVec3 place) {
   const IVec3 low(glm::floor(place));
   const auto nearness = [&](IVec3 voxel) {

@@ -98,7 +98,7 @@ class BoxInGrid {
   }
 
  private:
-  // One past the last voxel too, for the ends of boxes.
+  // Includes one past the last voxel, for the ends of boxes.
   static int whole(double coordinate) { return static_cast<int>(std::clamp(coordinate, kMinVoxel, kMaxVoxel + 1.0)); }
 
   DVec3 centre_;

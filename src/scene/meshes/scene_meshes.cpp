@@ -106,7 +106,7 @@ Status check_atlas(const Scene& scene, const std::vector<GridHandle>& grids, con
     return make_error(ErrorCode::InvalidArgument,
                       "an atlas is of faces that are merged, not cut or watertight, and have occlusion");
   }
-  constexpr int kFarthest = 1 << 24;  // beyond it floats do not tell voxels apart
+  constexpr int kFarthest = 1 << 24;  // floats cannot represent larger integers exactly
   for (const GridHandle handle : grids) {
     const IBox bounds = scene.grids()[handle].grid.bounds();
     const bool is_near = bounds.empty() || (glm::all(glm::greaterThanEqual(bounds.min, IVec3(-kFarthest))) &&

@@ -115,7 +115,7 @@ class UnitedGrid {
   Owners dense_;
 };
 
-/// The surface of one body, and whose each vertex is, where there are several owners.
+/// The surface of one body, and the owner of each vertex if there are several.
 struct Body {
   SmoothMesh mesh;
   std::vector<std::uint32_t> owners;
@@ -137,7 +137,7 @@ class Mesher {
   Mesher(const Scene& scene, const SmoothSceneOptions& options, Threads threads, MeshStats& stats)
       : scene_(scene), options_(options), threads_(threads), stats_(stats) {}
 
-  /// The opaque body, then all that are transparent as one. `united`: null where all has one owner.
+  /// Returns the opaque body, then all transparent ones combined. `united`: null for a single owner.
   Result<std::array<Body, 2>> mesh(const Grid& voxels, UnitedGrid* united, const Progress& progress) const {
     constexpr double kFieldShare = 0.2;
     const auto field = field_from_grid(voxels, threads_, part_of(progress, 0.0, kFieldShare));

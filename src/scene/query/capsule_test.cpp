@@ -1,4 +1,4 @@
-// Capsules and balls in queries, against distances that are found by halving alone.
+// Capsules and balls in queries, compared with distances computed by bisection.
 
 #include <algorithm>
 #include <cmath>
@@ -31,7 +31,7 @@ Capsule random_capsule(Random& random, double size) {
   return capsule;
 }
 
-// The least of a convex function on [low, high], by thirds.
+// Finds the minimum of a convex function on [low, high] by ternary search.
 template <class Function>
 double least_of(double low, double high, const Function& function) {
   for (int i = 0; i < 60; ++i) {
@@ -78,7 +78,7 @@ bool is_near(const InGrid& capsule, IVec3 voxel) {
   return true;
 }
 
-// When a capsule first meets any voxel; 0 where it starts within one.
+// Returns the time when a capsule first touches any voxel; 0 if it starts inside.
 std::optional<double> first_meeting(const Grid& grid, const InGrid& capsule) {
   std::optional<double> first;
   grid.for_each_row([&](IVec3 row, std::span<const VoxelType> types) {

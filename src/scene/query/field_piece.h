@@ -23,7 +23,7 @@
 
 namespace quoin {
 
-/// Lengths are those of the grid's voxels, places relative to the cell's least sample.
+/// Lengths are in voxels of the grid, positions relative to the cell's least sample.
 struct FieldPiece {
   IVec3 cell{0};
   DVec3 middle{0.5};
@@ -108,7 +108,7 @@ struct FieldPiece {
     const double cut = std::min(whole, below_plane(along_half, along_slope / square_of_slope));
     return along_slope > 0.0 ? Extent{cut, whole} : Extent{whole, cut};
   }
-  /// The same, exactly.
+  /// The exact bounds.
   [[nodiscard]] Extent exact_extent(const DVec3& along_half) const {
     const double whole = sum(along_half);
     Extent extent{whole, whole};

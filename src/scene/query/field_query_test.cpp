@@ -136,7 +136,8 @@ TEST(FieldQuery, OverlapsAreThoseOfThePointsOfTheSolid) {
         EXPECT_EQ(found[0].type, 1);
         ++both;
       }
-      // If even a box that is larger by half the spacing of the points contains no solid point, the query finds nothing.
+      // If even a box that is larger by half the spacing of the points contains no solid point, the query finds
+      // nothing.
       OrientedBox larger = box;
       larger.half_size += 0.13 * size;
       const bool is_near = Way(larger, DVec3(0.0)).holds_any(solid, 0.0);
@@ -426,7 +427,7 @@ TEST(FieldQuery, DensitiesNeedNotBeDistances) {
   }
 }
 
-// The same answers wherever and however an instance lies.
+// Results do not depend on an instance's placement.
 TEST(FieldQuery, ResultsMoveWithTheInstance) {
   Random random(64);
   Scene plain = random_blobs(random);
@@ -475,7 +476,7 @@ TEST(FieldQuery, BlocksAndFieldsOfOneGridAreMetTogether) {
   EXPECT_FALSE(wall->in_field);
   EXPECT_EQ(wall->type, kWood);
   EXPECT_NEAR(wall->fraction, 6.5 / 9.0, 1e-9);
-  // One answer an instance: its voxel, where it has one in the box.
+  // One result per instance: its voxel, if it has one in the box.
   const auto both = overlaps(tracer, {{1.7, 0.6, 0.0}, DVec3(0.5), {1, 0, 0, 0}});
   ASSERT_EQ(both.size(), 1U);
   EXPECT_FALSE(both[0].in_field);

@@ -54,8 +54,9 @@ struct BoxInField::Course {
   double slack = 0.0;
   int axis = -1;
 
-  // A direction of any length: how far the solid reaches along it from the piece's middle, how far away the box's
-  // centre is from there and how far it reaches itself, and how fast it moves. Returns whether they may meet at all.
+  // Tests a direction of any length. `solid`: the extent of the solid along it from the piece's middle; `apart`: the
+  // distance of the box's centre from there; `reach`: the extent of the box; `rate`: its speed. Returns false if they
+  // never touch.
   bool passes(int which, FieldPiece::Extent solid, double apart, double reach, double rate, double length) {
     if (rate > 0.0) {
       rate = -rate;

@@ -84,7 +84,7 @@ class BoxInField {
   const MovingBox& box_;
   double until_;
   double at_once_;
-  DVec3 half_size_;  // thick enough to be more than touched, also where it has no thickness
+  DVec3 half_size_;  // at least twice the touch tolerance, even for a box without thickness
   DVec3 reach_;
   bool is_upright_;  // its axes are the grid's
 };

@@ -120,7 +120,7 @@ class FreePlace {
     if (std::abs(along) <= max_distance_) places_[static_cast<std::size_t>(axis)].push_back(along);
   }
 
-  // One of the places of each axis, 0 included.
+  // A combination of one position per axis, 0 included.
   [[nodiscard]] std::optional<DVec3> among_planes() {
     for (std::vector<double>& along : places_) {
       along.push_back(0.0);

@@ -17,7 +17,7 @@
 
 namespace quoin {
 
-/// Lengths are those of the grid's voxels.
+/// A moving box in a grid's space. Lengths are in voxels.
 struct MovingBox {
   DVec3 centre{0.0};
   glm::dmat3 axes{1.0};  ///< columns: the box's own, unit

@@ -22,7 +22,7 @@
 
 namespace quoin {
 
-/// Lengths are those of the grid's voxels.
+/// A moving capsule in a grid's space. Lengths are in voxels.
 struct MovingCapsule {
   DVec3 centre{0.0};
   DVec3 half_axis{0.0};

@@ -70,7 +70,7 @@ struct Filtered {
     const std::vector<InstanceHandle> handles = scene.instances().handles();
     ignored = {handles[seed % handles.size()], handles[(seed + 7) % handles.size()]};
   }
-  // One of each kind, by number.
+  // One voxel of each kind, by number.
   [[nodiscard]] QueryFilter filter(int i) const {
     QueryFilter made;
     if (i % 2 == 1) made.ignored = ignored;
@@ -312,7 +312,7 @@ TEST(QueryFilter, BoxesWithoutSizeAreStopped) {
       EXPECT_FALSE(overlaps(tracer, {{at.x, -1.5, at.z}, half}).empty());
       EXPECT_FALSE(overlaps(tracer, {{at.x, -1.0, at.z}, half}).empty());
       EXPECT_TRUE(overlaps(tracer, {{at.x, half.y, at.z}, half}).empty());
-      // On the ground's face, and along its side.
+      // Tests the ground's upper face and its side.
       EXPECT_FALSE(sweep_box(tracer, {{at.x, half.y, at.z}, half}, {12.0, 0.0, 3.0}));
       EXPECT_FALSE(sweep_box(tracer, {{20.0 + half.x, 5.0, at.z}, half}, {0.0, -30.0, 0.0}));
     }

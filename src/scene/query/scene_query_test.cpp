@@ -168,7 +168,7 @@ TEST(SceneQuery, PickAndDepthNameTheSameVoxel) {
       voxel_at_depth(tracer, *camera, {160, 120, 320, 240}, std::numeric_limits<float>::infinity()).has_value());
 }
 
-// The least distance of a sphere's centre from a voxel, by projecting onto its edges.
+// Returns the minimum distance of a sphere's centre from a voxel, by projection onto its edges.
 double distance_to(const PlainVoxel& voxel, DVec3 point) {
   DVec3 nearest = voxel.low;
   for (const DVec3& edge : voxel.edges) {

@@ -99,7 +99,7 @@ struct Body {
     const auto away = displacement_to_free_place(tracer, shape, furthest, options.filter);
     if (!away) return false;
     shape.centre += *away;
-    // And on by the skin where there is room.
+    // Adds the skin if there is space for it.
     const double length = glm::length(*away);
     Shape further = shape;
     if (length > 0.0) further.centre += *away * (options.skin / length);

@@ -65,7 +65,7 @@ class ChunkWalk {
   void find_next(int axis) {
     const double d = ray_.direction[axis];
     const double plane = static_cast<double>(chunk_[axis]) + (d > 0.0 ? 1.0 : 0.0);
-    // Rounding may put a start beyond the plane that it has not crossed.
+    // Rounding may move a start past the plane that it has not crossed.
     next_[axis] = d == 0.0 ? std::numeric_limits<double>::infinity() : std::max((plane - ray_.origin[axis]) / d, t_);
   }
 

@@ -24,10 +24,10 @@
 
 namespace quoin {
 
-/// The chunks of a placed grid as voxels: solid where they are not loaded, air where they are.
+/// Reads the chunks of a placed grid as voxels: unloaded chunks are solid, loaded ones are air.
 class UnloadedReader {
  public:
-  /// `asks_voxels`: also of the voxels, and not of the field alone.
+  /// `asks_voxels`: tests the voxels in addition to the field.
   UnloadedReader(const SceneGrid& grid, bool asks_voxels) : grid_(&grid), asks_voxels_(asks_voxels) {}
   [[nodiscard]] VoxelType get(IVec3 chunk) const {
     const bool is_loaded = (!asks_voxels_ || grid_->grid.is_loaded(chunk)) && grid_->field.is_loaded(chunk);
@@ -39,13 +39,13 @@ class UnloadedReader {
   bool asks_voxels_;
 };
 
-/// All chunks that can be not loaded.
+/// Returns all chunks that can be unloaded.
 inline IBox chunks_of_world() {
   return {IVec3(kMinChunk + 1), IVec3(kMaxChunk)};
 }
 
-/// Calls `ask(offset in chunks, reader)` for a point, and where the grid has a partial field for those of the seven
-/// samples around it.
+/// Calls `ask(offset in chunks, reader)` for a point. If the grid has a partial field, also calls it for the seven
+/// samples around the point.
 template <class Ask>
 void for_each_corner(const SceneGrid& grid, const Ask& ask) {
   const int count = grid.field.is_partial() ? 8 : 1;

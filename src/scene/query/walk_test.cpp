@@ -184,7 +184,7 @@ TEST(Walk, StepsOntoWhatIsNoHigher) {
   EXPECT_NEAR(walk(0.6).feet(), 0.0, 2e-3);
   EXPECT_NEAR(walk(1.1).box.centre.x, 16.0, 0.1);
   EXPECT_NEAR(walk(1.1).feet(), 1.0, 2e-3);
-  // Down again, without falling where that is no further than it looks for the floor.
+  // Walks down again; does not fall while the floor is within the search distance.
   Player down = walk(1.1);
   down.options = on_foot(45.0, 1.1, 1.1);
   for (int i = 0; i < 240; ++i) {

@@ -46,7 +46,7 @@ Made small_scene() {
   return made;
 }
 
-/// All that rays would meet: the chunks of each instance's field, in order.
+/// Returns the field chunks that rays can hit, for each instance in order.
 std::vector<std::uint64_t> content_of(const Scene& scene) {
   std::vector<std::uint64_t> content;
   for (const InstanceHandle handle : scene.instances().handles()) {
@@ -80,7 +80,7 @@ TEST(SmoothScene, HoldsFieldsInThePlacesOfVoxels) {
   EXPECT_EQ(scene.grids().handles().size(), 3U) << "the boat has two";
   EXPECT_EQ(scene.instances().handles().size(), 4U);
   EXPECT_GT(smooth.bytes(), 100'000U);
-  // A face of the hill lies where it did.
+  // A face of the hill keeps its position.
   const Instance& hill = scene.instances()[scene.instances().handles().front()];
   const SceneGrid& grid = scene.grids()[hill.grid];
   EXPECT_NEAR(grid.field.density_at(grid_from_world(hill, grid, {-30.0 + 50.0, 20.0, 0.0})), 0.0, 1e-6);

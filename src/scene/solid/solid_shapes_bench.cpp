@@ -18,7 +18,7 @@ const Grid& terrain() {
   return made;
 }
 
-// Before anything is timed: the boxes hold every voxel, as many as there are.
+// Checks before timing: the boxes contain as many voxels as the world.
 void check(const SolidShapes& shapes, const Grid& world) {
   std::int64_t voxels = 0;
   for (const IVec3 chunk : world.chunks()) {

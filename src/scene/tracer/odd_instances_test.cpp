@@ -19,7 +19,7 @@
 namespace quoin {
 namespace {
 
-// One slab, away from its pivot, so that its rotation shows.
+// A slab away from its pivot, so that its rotation has a visible effect.
 struct SlabScene {
   Scene scene;
   GridHandle grid;

@@ -136,7 +136,7 @@ std::uint32_t PacketLanes::meet(const FourBoxes& boxes, std::size_t box) const {
   return met;
 }
 
-// Makes the nodes of a tree from those of an InstanceTree, two levels in one.
+// Converts the nodes of an InstanceTree, two levels into one.
 class PacketTree::Builder {
  public:
   Builder(const InstanceTree& tree, DVec3 origin, const std::vector<bool>& left_out, std::vector<Node>& nodes)

@@ -32,15 +32,15 @@ using FourBits = std::int32_t __attribute__((vector_size(16)));
 #endif
 }
 
-/// The planes of four boxes: where they end along x, y and z, and with its sign turned where they begin.
+/// The planes of four boxes: the upper ends along x, y and z, and the negated lower ends.
 using FourBoxes = std::array<Four, 6>;
 
-/// Distances are scaled in single precision, so that the longest component of any direction is 1. More than the
-/// rounding of the few steps from a plane to its distance:
+/// Distances are scaled in single precision, so that the longest component of any direction is 1. These constants
+/// exceed the rounding errors of the few steps from a plane to its distance:
 inline constexpr float kDistanceRoom = 1.0F + 2e-6F;
 inline constexpr float kLeastDistance = 1e-37F;
 
-/// All active rays of a packet as one: those between its outermost ones.
+/// Bounds of all active rays of a packet.
 class PacketBounds {
  public:
   explicit PacketBounds(const RayPacket& rays);
@@ -82,7 +82,7 @@ class PacketBounds {
   float scale_ = 0.0F;
   bool is_usual_ = false;
   float max_t_ = 0.0F;
-  std::size_t lower_count_ = 0;  // those from t on come first
+  std::size_t lower_count_ = 0;  // the lower limits come first in `limits_`
   std::array<Limit, 6> limits_;
 };
 

@@ -50,21 +50,21 @@ struct SceneTracer::Impl {
   InstanceFilter filter = InstanceFilter::Visible;
   ChangeCursor followed_types;
   ChangeCursor followed_scene;
-  std::vector<std::unique_ptr<TracedGrid>> grids;  // by the scene's slots; null where none was seen
+  std::vector<std::unique_ptr<TracedGrid>> grids;  // by the scene's slots; null for unused ones
   std::vector<PlacedGrid> placed;
   std::vector<Source> sources;  // of `placed`
   InstanceTree instances;       // of `placed`, in the world
-  // Instances of partial grids, empty ones too, by their handles; in the space of a grid whose voxels are chunks. They
-  // have no trees.
+  // Instances of partial grids, including empty ones, by their handles; in the space of a grid whose voxels are chunks.
+  // They have no trees.
   std::vector<PlacedGrid> unloaded;
   bool has_transparent = false;
-  HalvedGridCache coarse;  // those of `with_detail`
+  HalvedGridCache coarse;  // the levels of `with_detail`
 
   bool update(Threads threads);
 
-  std::uint64_t shapes = 0;      // that were given out
-  bool has_other_trees = false;  // than those that `placed` names
-  bool is_unfinished = false;    // an update was broken off
+  std::uint64_t shapes = 0;      // number of shapes so far
+  bool has_other_trees = false;  // `placed` refers to outdated grids or trees
+  bool is_unfinished = false;    // an update was interrupted
 
   bool update_types(const TypeChanges& changes);
   [[nodiscard]] bool look_at_grids(const SceneChanges& changes);

@@ -147,7 +147,7 @@ bool SceneTracer::Impl::look_at(GridHandle handle) {
   return false;
 }
 
-// The grid of an instance that is to be traced where it has a place; null for any other.
+// Returns the grid of an instance that can be traced, or null.
 TracedGrid* SceneTracer::Impl::grid_to_place(const Instance& instance) const {
   if (!passes(filter, *scene, instance) || instance.grid.index >= grids.size()) return nullptr;
   TracedGrid* grid = grids[instance.grid.index].get();

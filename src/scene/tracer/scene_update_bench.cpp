@@ -82,7 +82,7 @@ void one_voxel(benchmark::State& state) {
 }
 BENCHMARK(one_voxel)->Name("scene/update10000/one_voxel")->Unit(benchmark::kMicrosecond);
 
-// One world of 16x4x16 chunks, with default threads: a voxel far from all others is set and removed. Both are timed.
+// A world of 16x4x16 chunks, with default threads: sets and removes a distant voxel. Both are timed.
 void edit_far(benchmark::State& state) {
   Scene scene;
   VoxelProperties properties;

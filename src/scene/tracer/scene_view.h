@@ -35,7 +35,7 @@ struct SceneHits {
   [[nodiscard]] Vec3 normal(std::size_t lane) const { return {normal_x[lane], normal_y[lane], normal_z[lane]}; }
 };
 
-/// Traces rays through a scene, relative to a point near which they are.
+/// Traces rays through a scene, relative to a point near the rays.
 ///
 /// Spaces: view, the world's axes and units with `origin` in the middle, so that rays are as exact 10^9 away from the
 ///         world's origin as near it; and grid, PlacedGrid::voxels of a placed grid. A ray's t is the same number in

@@ -135,7 +135,7 @@ inline Words lanes_from(Words words, Words above, std::index_sequence<kLanes...>
   return __builtin_shufflevector(words, above, (kLanes + kBy)...);
 }
 
-// Lanes move down by kBy, those of `above` come in.
+// Lanes move down by kBy; lanes of `above` enter.
 template <std::size_t kBy>
 inline Words lanes_down(Words words, Words above) {
   return lanes_from<kBy>(words, above, std::make_index_sequence<kWidth>());
@@ -184,7 +184,7 @@ inline bool has_bits(const std::uint64_t* words, std::size_t count) {
   return any(all);
 }
 
-// Returns whether something that is wanted stays in the shade of a layer that has sky.
+// Returns true if some wanted voxels stay dark in a layer with sky light.
 bool take_sky_of_layer(const LevelPass& step, std::size_t z) {
   Words shade{};
   std::uint64_t from_above = 0;
@@ -241,7 +241,7 @@ std::uint64_t find_blocks(const std::uint64_t* words, std::size_t count) {
   return blocks;
 }
 
-// Bit i: whether lane i is not 0.
+// Bit i is set if lane i is not 0.
 inline unsigned lanes_with_bits(Words words) {
 #if defined(QUOIN_KERNEL_AVX512)
   const auto all = reinterpret_cast<__m512i>(words);

@@ -56,7 +56,7 @@ inline void store_some(Units units, unsigned which, std::uint32_t* to) {
 inline Units load_some(const std::uint32_t* from, unsigned which) {
   return _mm512_maskz_expandloadu_epi32(static_cast<__mmask16>(which), from);
 }
-// Its last row, in all of them.
+// Copies its last row to all rows.
 inline Units last_row(Units rows) {
   return _mm512_permutex_epi64(_mm512_shuffle_i64x2(rows, rows, 0xFF), 0xFF);
 }
@@ -230,7 +230,7 @@ void unpack_slab(const SlabUnits& of, const std::uint32_t* units, std::uint64_t*
   }
 }
 
-// The last unit of a half that is there up to a row.
+// Returns the last stored unit of a half up to a row.
 inline std::uint64_t unit_of(std::uint32_t fresh, const std::uint32_t* units, std::size_t row, unsigned half) {
   constexpr std::uint32_t kLowHalves = 0x5555'5555;
   const std::uint32_t so_far = fresh & kLowHalves << half & ((std::uint32_t{2} << (2 * row + half)) - 1);
