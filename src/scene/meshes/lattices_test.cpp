@@ -105,7 +105,7 @@ TEST(Lattices, GroupsAreWhatTouches) {
 using Corner = std::array<std::int64_t, 3>;
 using Triangle = std::array<Corner, 3>;
 
-/// Returns the triangles of all placements in the world, rounded to 1/512, which floats represent safely. Each triangle
+/// Returns the triangles of all placements in the world, rounded to 1/512: floats represent that safely. Each triangle
 /// starts with its least corner.
 std::map<Triangle, int> triangles_of(const SceneMeshes& meshes) {
   std::map<Triangle, int> all;
