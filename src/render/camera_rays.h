@@ -11,7 +11,8 @@ struct PixelPoint {
   double y = 0.5;
 };
 
-/// Where sample `index` lies in every pixel. The first is the centre; all are a low-discrepancy sequence.
+/// Returns the position of sample `index` within every pixel. The first is the centre; all form a low-discrepancy
+/// sequence.
 ///
 /// Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018): R2.
 [[nodiscard]] PixelPoint sample_point(int index);
@@ -27,8 +28,8 @@ class CameraRays {
   /// The rays of the 4x4 pixels from (`column`, `row`); lane x + 4 y. Directions are unit, so distances are world
   /// units. Pixels outside the picture are not active.
   void block(int column, int row, PixelPoint point, RayPacket& rays) const;
-  /// How far up the sky is that a ray of the block shows where it hits nothing: its direction's y. Orthographic rays,
-  /// which are all parallel, show the sky that a perspective camera of 50 degrees would see there.
+  /// Returns the sky height of a ray that hits nothing: the y of its direction. Orthographic rays are all parallel, so
+  /// they use the directions of a perspective camera of 50 degrees.
   [[nodiscard]] float sky_up(const RayPacket& rays, std::size_t lane) const;
 
   // For renderers that make rays elsewhere: pixel (x, y) lies at corner + x right + y down, a perspective camera's at

@@ -73,7 +73,7 @@ struct Cave {
   return options;
 }
 
-/// With halved grids, none of them far.
+/// Selects halved grids; none of them is Far.
 inline void use_halved(RenderOptions& options) {
   options.detail.policy = DetailPolicy{};
   options.detail.policy->voxel_pixels = 100.0;

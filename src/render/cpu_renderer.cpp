@@ -62,7 +62,7 @@ struct CpuRenderer::Impl {
 
 namespace {
 
-// What a picture is taken of.
+// The content of an image.
 struct Subject {
   std::optional<SceneTracer> detailed;
   std::optional<SceneView> view;

@@ -246,7 +246,7 @@ TEST(CameraRays, AreThoseThatPickThePixel) {
   }
 }
 
-// A renderer that is updated, beside one that is made anew for each picture.
+// An updated renderer, and a second one that is rebuilt for each image.
 class UpdatedRenderer {
  public:
   explicit UpdatedRenderer(const Scene& scene) : scene_(scene), renderer_(scene) {}
@@ -276,7 +276,7 @@ class UpdatedRenderer {
   Picture last_;
 };
 
-// Whatever is changed, between pictures of every kind.
+// Applies changes of all kinds between images of every kind.
 TEST(CpuRenderer, UpdatedItTakesThePicturesOfANewOne) {
   Scene scene = lively_scene();
   UpdatedRenderer renderer(scene);

@@ -76,7 +76,7 @@ Plane plane_of(const DBox& box, const DensitySliceOptions& options) {
   return plane;
 }
 
-// The density of a pixel, what it is a share of, and how much of a sample the pixel spans.
+// The density of a pixel, its share of the range, and the part of a sample that the pixel spans.
 struct Value {
   float density;
   float band;
@@ -111,7 +111,7 @@ Rgb colour_of(const Value& value) {
   return value.density < 0.0F ? mixed(kSolidNear, kSolidFar, share) : mixed(kAirNear, kAirFar, share);
 }
 
-// What a line between two pixels dims the first one to.
+// Returns the brightness factor of the first pixel for a contour line between two pixels.
 float line_between(const Value& a, const Value& b) {
   if ((a.density < 0.0F) != (b.density < 0.0F)) return 0.15F;
   const bool crosses = a.step < kWidestStep && std::floor(a.density) != std::floor(b.density);

@@ -7,14 +7,14 @@
 
 namespace quoin {
 
-/// Where a ray meets a face, in the grid: `position`, which is there but for rounding, put onto the face.
+/// Returns a ray's hit on a face, in the grid: `position`, which is exact except for rounding, moved onto the face.
 [[nodiscard]] inline DVec3 on_face(DVec3 position, IVec3 voxel, Direction face) {
   // Secondary rays start at least this far inside the face that was hit, in voxels, so that they start in front of it
-  // whatever the rounding.
+  // despite rounding.
   constexpr double kRim = 1e-6;
   const FaceFrame& frame = frame_of(face);
   const double front = frame.sign > 0 ? 1.0 : 0.0;
-  // By choice, and not by an index that is known late: what was written so would be waited for.
+  // Selects instead of indexing with a late-known axis: an indexed write would stall the following read.
   const auto along = [&](int axis, double at, int cell) {
     const auto low = static_cast<double>(cell);
     return axis == frame.axis ? low + front : std::clamp(at, low + kRim, low + (1.0 - kRim));

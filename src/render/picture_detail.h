@@ -14,23 +14,24 @@
 
 namespace quoin {
 
-/// How the instances of one picture are drawn.
+/// The level of detail of each instance in one image.
 struct PictureDetail {
   std::vector<SelectedInstance> selected;  ///< traced so often halved; see keep_whole
   FarImpostors far;
 };
 
-/// Has those that are drawn from impostors stay whole where they are traced: shadows onto what an impostor shows are
-/// those of its voxels. Both in the order of the instances.
+/// Keeps instances drawn from impostors at full detail for tracing: shadows on an impostor use its voxels. Both spans
+/// are in the order of the instances.
 void keep_whole(std::span<const FarInstance> far, std::span<SelectedInstance> selected);
 
 /// Chooses that, and keeps impostors from picture to picture. Threads: any number may choose.
 class DetailChooser {
  public:
-  /// `threads`: those that build impostors; as ImpostorCacheOptions::workers.
+  /// `threads`: for building impostors, as in ImpostorCacheOptions::workers.
   explicit DetailChooser(Threads threads = {}) : impostors_({FarImpostors::kMaxBytes, threads}) {}
 
-  /// Nothing without DetailOptions::policy. Requires: nobody edits the scene meanwhile; it is always the same one.
+  /// Returns an empty result without DetailOptions::policy. Requires: the scene is not edited during the call and is
+  /// the same in every call.
   [[nodiscard]] PictureDetail choose(const Scene& scene, InstanceFilter filter, const Camera& camera,
                                      const RenderOptions& options);
 

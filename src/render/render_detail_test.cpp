@@ -142,7 +142,7 @@ Closeness closeness(const Picture& a, const Picture& b) {
   return {sum / (3.0 * either), static_cast<double>(both) / either};
 }
 
-// A camera from which a voxel at the content's nearest point spans that many pixels.
+// Returns a camera where a voxel at the content's nearest point spans that many pixels.
 Camera camera_for(const Model& model, double voxel_pixels, DVec3 direction) {
   const double scale = 0.5 * kEdge / std::tan(kFov / 2.0);
   return towards(glm::normalize(direction) * (model.radius() + scale / voxel_pixels), {0, 0, 0}, kFov);
@@ -154,7 +154,7 @@ DetailPolicy without_impostors() {
   return policy;
 }
 
-// Halvings of what is traced of a model's one instance.
+// Returns the number of halvings of the model's one traced instance.
 int halvings_traced(const Model& model, const Camera& camera, const DetailPolicy& policy) {
   std::vector<SelectedInstance> selected;
   DetailSelector().select(model.scene, camera, kEdge, kEdge, policy, selected);
@@ -172,7 +172,7 @@ Closeness closeness_at(const Model& model, const Camera& camera, const DetailPol
   return closeness(near, renderer.render(camera, options).value());
 }
 
-// Just beyond the thresholds at which a grid becomes Mid and at which it is halved.
+// Compares just beyond the thresholds for Mid and for halving.
 void expect_close(const Model& model, int halvings) {
   const DetailPolicy policy = without_impostors();
   for (const DVec3 direction : {DVec3(1, 0.6, 1.4), DVec3(-1.2, 0.3, 0.4)}) {
@@ -439,7 +439,7 @@ TEST(RenderDetail, ColoursTellTheDetail) {
   EXPECT_TRUE(far[2] > far[0] && far[2] > far[1]) << "blue";
 }
 
-// Distances from a model at which what is chosen of it changes, the nearest first.
+// Returns the distances from a model where its chosen detail changes, nearest first.
 std::vector<double> thresholds_of(const Model& model, const DetailPolicy& policy) {
   std::vector<double> found;
   std::vector<SelectedInstance> selected;

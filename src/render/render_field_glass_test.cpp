@@ -1,4 +1,4 @@
-// What is transparent of fields does to a picture what transparent voxels do.
+// Transparent fields look the same as transparent voxels.
 
 #include <cmath>
 #include <utility>
@@ -30,7 +30,7 @@ struct GlassScene {
 Vec3 power(Vec3 base, float exponent) {
   return {std::pow(base.x, exponent), std::pow(base.y, exponent), std::pow(base.z, exponent)};
 }
-// What a length of the glass lets through.
+// Returns the transmittance of a length of glass.
 Vec3 through(float length) {
   return power((1.0F - kAlpha) * (Vec3(1.0F) - kAlpha * (Vec3(1.0F) - linear(kGlass))), length);
 }
@@ -265,7 +265,7 @@ TEST(RenderFieldGlass, TheSameBytesWhateverComputesThem) {
     const InstructionSetOverride over(set);
     EXPECT_EQ(taken(s.scene, camera, options).colour.rgb, one.colour.rgb) << name_of(set);
   }
-  // What it would be without glass is another picture.
+  // The image without glass differs.
   for (const VoxelType type : {s.glass, s.green}) {
     VoxelProperties opaque = s.scene.types[type];
     opaque.visibility = Visibility::Opaque;
@@ -332,7 +332,7 @@ TEST(RenderFieldGlass, SeenFromInsideTintsOnly) {
   EXPECT_EQ(depth_at(picture, 1, 1), 0.0F);
 }
 
-// What is opaque of it comes from an impostor, glass from rays; and none of it is halved.
+// Its opaque part comes from an impostor, its glass from rays; neither is halved.
 TEST(RenderFieldGlass, FromAfarItIsSeenThrough) {
   PondScene s;
   RenderOptions options = sized(96, 72);

@@ -47,7 +47,7 @@ TEST(RenderField, ABallHasTheLightOfItsNormals) {
       const double px = (x - 30) * 60.0 / 61.0;
       const double pz = (y - 30) * 60.0 / 61.0;
       const double square = kRadius * kRadius - px * px - pz * pz;
-      // Next to the outline the surface of cells is not that of the ball.
+      // Near the outline the cell surface differs from the ball.
       if (square < 60.0) continue;
       const DVec3 normal = DVec3{px, std::sqrt(square), pz} / kRadius;
       const double cosine = std::max(glm::dot(normal, kSun), 0.0);
@@ -75,7 +75,7 @@ TEST(RenderField, ItAndBlocksShadeEachOther) {
   RenderOptions options = lit_by_the_sun(81);
   options.light.sun = {0, 1, 0};
   const Picture picture = taken(scene, from_above(0, 100, 0, 81), options);
-  // Beneath the ball's outline lies no pixel that is seen; beside it the floor is lit.
+  // No pixel below the ball's outline is visible; next to it the floor is lit.
   EXPECT_EQ(pixel_at(picture, 40 + 10, 40), encoded(linear({188, 188, 188, 255}) * 1.1F));
   // With the sun aslant the ball's shadow lies where its centre is cast onto the floor.
   options.light.sun = {1, 1, 0};

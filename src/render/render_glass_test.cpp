@@ -27,7 +27,7 @@ struct GlassScene {
   VoxelType green = add_type(scene, {60, 220, 90, 100}, Visibility::Transparent);
 };
 
-// What one voxel's length of the glass lets through.
+// Returns the transmittance of one voxel's length of glass.
 Vec3 through_one() {
   return (1.0F - kAlpha) * (Vec3(1.0F) - kAlpha * (Vec3(1.0F) - linear(kGlass)));
 }
@@ -187,7 +187,7 @@ TEST(RenderGlass, SurfacesMirrorWhatFresnelSays) {
   };
   EXPECT_NEAR(at(1.0, 1.0F, 1.5F).share, 0.04F, 1e-6F);
   EXPECT_NEAR(at(1.0, 1.0F, 1.5F).up, axes[1].y, 1e-6);
-  // Brewster's angle, at which one polarisation is not mirrored: ((n^2 - 1) / (n^2 + 1))^2 / 2 is left.
+  // At Brewster's angle one polarisation is not reflected: ((n^2 - 1) / (n^2 + 1))^2 / 2 is left.
   const double brewster = 1.0 / std::sqrt(1.0 + 1.5 * 1.5);
   EXPECT_NEAR(at(brewster, 1.0F, 1.5F).share, 0.5 * (1.25 / 3.25) * (1.25 / 3.25), 1e-6);
   EXPECT_NEAR(at(0.0, 1.0F, 1.5F).share, 1.0F, 1e-6F);
@@ -198,7 +198,7 @@ TEST(RenderGlass, SurfacesMirrorWhatFresnelSays) {
   }
 }
 
-// What a picture with surfaces shows of one without: through a pane on stone, and through one over it.
+// Compares images with and without reflecting surfaces: a pane on stone, and a pane above it.
 TEST(RenderGlass, SurfacesShowTheSkyAndDimWhatLiesBehind) {
   for (const int gap : {0, 3}) {
     GlassScene s;
@@ -219,7 +219,7 @@ TEST(RenderGlass, SurfacesShowTheSkyAndDimWhatLiesBehind) {
     const Vec3 zenith = sky_colour(1.0F);
     const Vec3 passed = power(through_one(), 2.0F);
     Vec3 behind = linear(kWhite) * light;
-    // What the lower surface mirrors goes through the pane a second time.
+    // Light that the lower surface reflects passes the pane a second time.
     if (gap != 0) behind = 0.96F * behind + 0.04F * passed * zenith;
     const float own = 1.0F - (1.0F - kAlpha) * (1.0F - kAlpha);
     expect_near(pixel_at(picture, 1, 2),
@@ -255,7 +255,7 @@ TEST(RenderGlass, SurfacesBelongToLightAndToBodies) {
   EXPECT_GT(count_different(taken(glass, camera, plain), taken(glass, camera, with_surfaces), 2), 500);
   EXPECT_GT(differ(glass, scene_with(1.5F, 1.33F, false)), 100);
   EXPECT_EQ(differ(scene_with(1.5F, 1.33F, false), scene_with(1.5F, 1.33F, true)), 0) << "in two grids";
-  // What is as thin as air, and what is no index, mirrors nothing.
+  // Glass with the index of air, or with an invalid index, reflects no light.
   const Scene airy = scene_with(1.0F, std::numeric_limits<float>::quiet_NaN(), false);
   EXPECT_EQ(taken(airy, camera, with_surfaces).colour.rgb, taken(airy, camera, plain).colour.rgb);
   for (const Shading shading : {Shading::Unlit, Shading::Occlusion, Shading::Normals}) {

@@ -104,7 +104,7 @@ TEST(RenderLamps, ThingsCastShadowsUnlessToldNotTo) {
   EXPECT_GT(pixel_at(taken(scene, camera, options), 27, 20)[0], 30);
 }
 
-// One voxel, as a lamp of six faces: near to what the faces themselves give.
+// One voxel as a lamp of six faces: close to the light of the faces themselves.
 TEST(RenderLamps, AVoxelThatEmitsLightsAsItsFacesDo) {
   Scene scene = floor_by_night();
   const VoxelType torch = add_type(scene, kWhite, Visibility::Opaque, 6.0F);
@@ -137,7 +137,7 @@ TEST(RenderLamps, AVoxelThatEmitsLightsAsItsFacesDo) {
   }
 }
 
-// A ball of one radiance, by what is known of it: its light falls off with the square of the distance from its middle.
+// Analytic check of a ball of constant radiance: its light falls off with the squared distance from its centre.
 TEST(RenderLamps, AFieldThatEmitsLightsAsItsSurfaceDoes) {
   Scene scene = floor_by_night();
   const VoxelType glow = add_type(scene, kWhite, Visibility::Opaque, 1.5F);
@@ -241,7 +241,7 @@ TEST(RenderLamps, GlassTintsTheirLight) {
   EXPECT_LT(tinted[1], tinted[0] / 2) << "red";
 }
 
-// Whatever else is in the picture.
+// Holds with any other content in the image.
 TEST(RenderLamps, WhichLampsLightAPlaceDependsOnThePlaceAlone) {
   Scene scene = floor_by_night();
   for (int i = 0; i < 200; ++i) {

@@ -184,7 +184,7 @@ TEST(RenderLight, EmissionShinesInTheDarkAndWithTheExposure) {
             encoded((linear(amber) * 0.5F + linear(amber) * 0.15F) * 0.25F));
 }
 
-// Beside a wall, where the occlusion of corners falls from 2 to 0 across one voxel.
+// Next to a wall, where the corner occlusion falls from 2 to 0 across one voxel.
 TEST(RenderLight, VertexOcclusionIsWhatTheMeshCarries) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);

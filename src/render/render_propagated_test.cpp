@@ -54,7 +54,7 @@ TEST(RenderPropagated, ShowsTheLightBetweenTheCornersOfFaces) {
       const Ray ray = ray_through(Cave::inside(), point);
       const auto hit = first_hit(renderer.tracer(), ray);
       ASSERT_TRUE(hit);
-      // What is seen through glass is tinted; what emits adds that.
+      // Glass tints the surface behind it; emission adds to that.
       const VoxelProperties& type = cave.scene.types[hit->type];
       if (hit->position.x > 8.0 || type.emission > 0.0F || cave.scene.types.is_transparent(hit->type)) continue;
       const FaceFrame& frame = frame_of(hit->face);
@@ -145,7 +145,7 @@ TEST(RenderPropagated, HalvedGridsKeepTheirLight) {
   options.detail.policy->cell_pixels = 3.0;
   options.detail.policy->far_pixels = 0;
   const Picture halved = taken(cave.scene, camera, options);
-  // The top is in full sky, whatever its voxels' size.
+  // The top is in full sky light at any voxel size.
   EXPECT_EQ(pixel_at(halved, 40, 36), pixel_at(whole, 40, 36));
   EXPECT_GT(brightest(halved), 150);
 }

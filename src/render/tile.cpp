@@ -31,7 +31,7 @@ bool Tile::render(const std::function<bool(std::size_t)>& goes_on) {
   for (int sample = 0; sample < samples; ++sample) {
     take_sample(sample);
     for (std::size_t i = 0; i < kPixels; ++i) {
-      // The minimum is taken second: what is not a number becomes 0.
+      // The minimum comes second, so that NaN becomes 0.
       sum_[i] += glm::min(glm::max(Vec3(0.0F), sample_[i]), Vec3(1.0F));
     }
     if (!goes_on(1)) return false;

@@ -17,7 +17,7 @@
 
 namespace quoin {
 
-/// What all tiles of a picture share.
+/// The data shared by all tiles of an image.
 struct TileContext {
   const SceneView* view = nullptr;
   const CameraRays* camera = nullptr;
@@ -26,7 +26,7 @@ struct TileContext {
   const ImpostorPass* impostors = nullptr;  ///< null when there are none
 };
 
-/// One square of a picture: its rays, what they hit, and the light of that.
+/// One square of an image: its rays, their hits, and the light at the hits.
 class Tile {
  public:
   static constexpr int kEdge = 32;  ///< pixels; a multiple of CameraRays::kBlock
@@ -35,9 +35,9 @@ class Tile {
   /// `column` and `row` are of its upper left pixel.
   Tile(const TileContext& context, int column, int row);
 
-  /// All samples of all pixels. The same numbers whatever the tile's size and place.
+  /// Renders all samples of all pixels. The numbers do not depend on the tile's size and position.
   ///
-  /// Asks `goes_on(1)` after each sample; once that returns false, so does this, and the tile is not to be used.
+  /// Calls `goes_on(1)` after each sample. If that returns false, this returns false and the tile must not be used.
   [[nodiscard]] bool render(const std::function<bool(std::size_t)>& goes_on);
   /// Puts the pixels that lie in the picture in place.
   void write_to(Picture& picture) const;
@@ -54,19 +54,20 @@ class Tile {
   void add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight);
   // What glass does to a ray.
   struct Sight {
-    Vec3 passed{1.0F};    // of what lies behind
-    Vec3 mirrored{0.0F};  // by surfaces
+    Vec3 passed{1.0F};    // transmittance for the light behind
+    Vec3 mirrored{0.0F};  // light reflected by surfaces
   };
-  // Adds what is seen of the glass before `max_t`, but for what its surfaces mirror.
+  // Adds the glass visible before `max_t`, without the reflections of its surfaces.
   Sight add_glass(const Ray& ray, double max_t, std::size_t pixel);
-  // Where a ray enters a body, from air (null) or from one that touches it; `normal`: of that surface, in its grid.
+  // Processes a ray's entry into a body from air (null) or from a touching body. `normal`: of that surface, in its
+  // grid.
   void enter_body(const Ray& ray, const GlassBody* from, const GlassBody& to, const DVec3& normal, Sight& sight) const;
   // Where it leaves a body into air.
   void leave_body(const Ray& ray, const GlassBody& from, Sight& sight) const;
-  // What the surface mirrors on the way from a body, or from air, which is null.
+  // Adds the surface reflection on the way out of a body, or out of air (null).
   void meet_surface(const Mirror& mirror, const GlassBody* from, Sight& sight) const;
   void fill_in(const Ray& ray, const GlassBody& body, const DVec3& normal, SurfacePoint& point) const;
-  // A point that is to be filled in: what it sends counts so much in that pixel.
+  // Adds a point for the caller to fill in; its light counts with `weight` in that pixel.
   SurfacePoint& add_point(std::size_t pixel, Vec3 weight);
   void light_points();
 
@@ -80,7 +81,7 @@ class Tile {
   std::array<Vec3, kPixels> sum_{};     // of the samples so far
   std::array<Vec3, kPixels> sample_{};  // the present one
   std::array<float, kPixels> depth_{};
-  // Of the present sample: what is to be lit, and where and how much of it counts.
+  // A point to be lit for the present sample, with its pixel and weight.
   struct Target {
     std::uint32_t pixel = 0;
     Vec3 weight{1.0F};

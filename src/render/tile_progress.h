@@ -11,8 +11,8 @@
 
 namespace quoin {
 
-/// Counts what is done of a picture's tiles and tells the listener, one call at a time: after each sample of a tile, or
-/// after some of them, since a tile of many samples can take minutes.
+/// Counts the finished samples of an image's tiles and calls the progress callback, one call at a time: after each
+/// sample of a tile, or after several, since a tile of many samples can take minutes.
 class TileProgress {
  public:
   /// `samples`: of all tiles together.

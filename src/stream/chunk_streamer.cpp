@@ -15,7 +15,7 @@
 namespace quoin::stream {
 namespace {
 
-// Bytes that wait to be written, from which on nothing is made until there are fewer.
+// Workers stop making chunks while more bytes than this wait to be written.
 constexpr std::uint64_t kMaxPendingBytes = std::uint64_t{128} << 20;
 constexpr std::size_t kMaxProblems = 1000;
 // After so many bytes of chunks that went memory is given back to the system.
@@ -30,7 +30,7 @@ std::size_t bytes_of(const StoredChunk& chunk) {
   return chunk.voxels.bytes() + (chunk.densities ? chunk.densities->bytes() : 0);
 }
 
-// What was let go of lies between what is kept: allocators give such pages back only when they are asked to.
+// Returns freed pages to the system: allocators keep the pages between live blocks until asked.
 void trim_heaps() {
 #if defined(__GLIBC__)
   ::malloc_trim(0);
@@ -87,7 +87,7 @@ void ChunkStreamer::post(Note note, bool hurries) {
     ++posted_;
   }
   ++signal_;
-  if (hurries) signal_.notify_one();  // whoever plans tells the others
+  if (hurries) signal_.notify_one();  // the planning worker wakes the others
 }
 
 void ChunkStreamer::set_room(std::int64_t bytes, std::int64_t each) {
@@ -156,7 +156,7 @@ void ChunkStreamer::read_inbox() {
   reading_.wishes.reset();
 }
 
-// Under the plan's lock: what the caller is to know of it.
+// Publishes the state for the caller. Requires: the plan's lock is held.
 void ChunkStreamer::tell() {
   // Not under the lock that the caller takes.
   const std::size_t missing = plan_.missing();
@@ -177,7 +177,7 @@ void ChunkStreamer::tell() {
   came_.notify_all();
 }
 
-// Few chunks come in any case, so that nobody stands in nothing.
+// Always admits a few chunks, so that the viewer never stands in empty space.
 bool ChunkStreamer::has_room() const {
   constexpr std::size_t kFew = 64;
   return room_ > 0 || plan_.max_chunks() <= kFew;
@@ -196,7 +196,7 @@ void ChunkStreamer::run() {
   }
 }
 
-// Reads what was posted, and sees to one chunk, or waits for either. False: it ends.
+// Processes the inbox and one chunk, or waits for either. Returns false when the streamer ends.
 bool ChunkStreamer::work_once() {
   std::unique_lock lock(plan_mutex_);
   const auto has_post = [&] {
@@ -249,7 +249,7 @@ bool has_place(std::vector<Arrival>& arrivals) {
 
 }  // namespace
 
-// What has come is not lost: where there is no memory for its place in the list, that is waited for.
+// Retries until there is memory for the list entry, so that no arrival is lost.
 void ChunkStreamer::hand_over(Arrival arrival) {
   for (;;) {
     {
@@ -309,7 +309,7 @@ void ChunkStreamer::read_or_make(Arrival& arrival) {
   if (generator != nullptr && generator->chunks().contains(place.chunk)) make(*generator, arrival);
 }
 
-// Not for ever: a full disk is no reason to stand still.
+// Waits for a limited time: a full disk must not stop the streamer.
 void ChunkStreamer::wait_for_disk() {
   for (int i = 0; i < 400 && !is_ending_ && store_.stats().pending_bytes > kMaxPendingBytes; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));

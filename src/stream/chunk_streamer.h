@@ -31,18 +31,18 @@ struct Arrival {
   Outcome outcome = Outcome::Came;
 };
 
-/// Workers that plan, read, make and save:
+/// Workers that plan, read, generate and save chunks:
 ///
-///   caller  -- post -->  inbox  -->  plan -> read or make -> save what was made  -->  outbox  -- take -->  caller
+///   caller  -- post -->  inbox  -->  plan -> read or make -> save new chunks  -->  outbox  -- take -->  caller
 ///
-/// The caller waits for neither plan nor disk: both boxes are exchanged as a whole.
+/// The caller waits for neither the plan nor the disk: both boxes are swapped as a whole.
 class ChunkStreamer {
  public:
   struct Options {
     bool keeps_made = true;
     unsigned workers = 1;
   };
-  /// What became of a chunk on the caller's thread.
+  /// A result for a chunk that the caller's thread reports to the workers.
   struct Event {
     enum class What : std::uint8_t {
       Here,    ///< it was put in place
@@ -55,7 +55,7 @@ class ChunkStreamer {
   struct Note {
     std::optional<Wishes> wishes{};     ///< where they are others than before
     std::vector<Event> events;          ///< in their order
-    std::vector<StoredChunk> let_go{};  ///< to be destroyed where nobody waits for it
+    std::vector<StoredChunk> let_go{};  ///< destroyed on a worker thread, off the caller's thread
     void add(const ChunkPlace& place, Event::What what) { events.push_back({place, what}); }
     [[nodiscard]] bool empty() const { return !wishes && events.empty() && let_go.empty(); }
   };
@@ -80,17 +80,17 @@ class ChunkStreamer {
   /// Waits for the chunks that workers are at.
   ~ChunkStreamer();
 
-  /// Null: what is not in the world is air.
+  /// Sets the generator of a grid. Null: chunks that the world does not store are air.
   void set_generator(std::uint32_t grid, std::shared_ptr<const ChunkGenerator> generator);
   [[nodiscard]] std::shared_ptr<const ChunkGenerator> generator_of(std::uint32_t grid) const;
-  /// Where nothing hurries, who waits for work is not woken: that takes the caller longer than all else here.
+  /// Queues a note. Without `hurries` sleeping workers are not woken: a wake-up costs the caller more than the rest.
   void post(Note note, bool hurries = true);
-  /// How many bytes of chunks may be read or made besides those that workers are at, and what one may take; what edits
-  /// wait for comes in any case.
+  /// Sets the bytes of chunks that may be read or made in addition to those in progress, and the expected bytes per
+  /// chunk. Chunks that edits wait for are always loaded.
   void set_room(std::int64_t bytes, std::int64_t each);
-  /// What came since the last call; the numbers are those of the present.
+  /// Takes all results since the last call, with the current counters.
   void take(Outbox& out);
-  /// Returns once something came, or nothing is left to do for what was posted, or there is no room for it.
+  /// Returns when there are results, when all posted work is done, or when there is no room for more.
   void wait();
 
  private:
@@ -115,7 +115,7 @@ class ChunkStreamer {
   Note inbox_;
   std::uint64_t posted_ = 0;
 
-  mutable std::mutex plan_mutex_;  ///< of what follows
+  mutable std::mutex plan_mutex_;  ///< guards the members below
   StreamPlan plan_;
   std::map<std::uint32_t, std::shared_ptr<const ChunkGenerator>> generators_;
   Note reading_;  ///< of it the first events have been read
@@ -132,7 +132,7 @@ class ChunkStreamer {
   Outbox outbox_;
   std::condition_variable came_;
   std::size_t working_ = 0;
-  bool is_short_ = false;  ///< of memory, since the caller was told last
+  bool is_short_ = false;  ///< short of memory, since the last report to the caller
   std::uint64_t told_posts_ = 0;
   bool has_more_ = false;
 

@@ -9,7 +9,7 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/stream/world_edit.h>
 
-// Edits come from elsewhere: what a world could not save is not done.
+// Checks edits from outside: edits that a world could not save are rejected.
 
 namespace quoin::stream {
 

@@ -1,7 +1,7 @@
-// stream/flight: 100 voxels a second over a landscape that is generated, meshed, edited, saved and let go of meanwhile,
-// at 60 frames a second. What it takes of the caller's thread, and what is in memory. QUOIN_FLIGHT_SECONDS: how long;
-// QUOIN_FLIGHT_RADIUS: of the viewer; QUOIN_FLIGHT_BUDGET: MiB; QUOIN_FLIGHT_PLOT: a file for a line a second;
-// QUOIN_FLIGHT_KEEPS: the allocator keeps what is freed.
+// stream/flight: flies at 100 voxels per second over a landscape that is generated, meshed, edited, saved and unloaded
+// on the way, at 60 frames per second. Measures the caller's thread time and the memory in use. QUOIN_FLIGHT_SECONDS:
+// duration. QUOIN_FLIGHT_RADIUS: the viewer's radius. QUOIN_FLIGHT_BUDGET: MiB. QUOIN_FLIGHT_PLOT: output file with one
+// line per second. QUOIN_FLIGHT_KEEPS: the allocator keeps freed memory.
 
 #include <time.h>
 #include <unistd.h>
@@ -35,7 +35,7 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Of this thread: what others are given meanwhile does not count.
+// CPU time of this thread only.
 double processor_seconds() {
   timespec time{};
   ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
@@ -85,7 +85,7 @@ double number_of(const char* name, double otherwise) {
   return text == nullptr ? otherwise : std::atof(text);
 }
 
-/// What was seen on the way; a line a second goes into a file, to be plotted.
+/// Records the measurements of a flight; writes one line per second to a file for plotting.
 class FlightLog {
  public:
   FlightLog() {
@@ -128,9 +128,9 @@ class FlightLog {
   }
 
   std::vector<double> updates;
-  std::vector<double> own;  // of these, what the processor did for them
+  std::vector<double> own;  // the part of `own` spent on the CPU
   std::vector<double> follows;
-  std::vector<double> control;    // of work that is always the same: what the machine does to any work
+  std::vector<double> control;    // of a fixed workload: shows disturbance by the machine
   std::vector<double> residents;  // megabytes
   double least_radius = std::numeric_limits<double>::infinity();
   double most_counted = 0.0;
@@ -146,7 +146,7 @@ struct Flight {
 
   Status begin() {
     viewer.radius = number_of("QUOIN_FLIGHT_RADIUS", 448.0);
-    // What every such program takes, whatever its world's size: its code, its workers and what these work with.
+    // The fixed cost of such a program at any world size: its code, its workers and their buffers.
     const Viewer near{.position = viewer.position, .radius = 100.0};
     if (auto done = world.load_all({&near, 1}); !done) return done;
     meshes.finish(world.scene(), viewer.position);
@@ -222,7 +222,7 @@ Status fly_through(Flight& flight, benchmark::State& state) {
 }
 
 void fly(benchmark::State& state, bool is_smooth) {
-  // As programs that stream do; QUOIN_FLIGHT_KEEPS: as those that do not.
+  // Streaming programs return freed memory; QUOIN_FLIGHT_KEEPS measures programs that do not.
   if (std::getenv("QUOIN_FLIGHT_KEEPS") == nullptr) return_freed_memory();
   for (auto _ : state) {
     const WorldFolder folder;

@@ -9,7 +9,7 @@
 namespace quoin::stream {
 namespace {
 
-// World units: what is farther is of no grid.
+// World units: placements farther away are ignored.
 constexpr double kMaxRadius = 1e12;
 // Beyond the nearest, in one look.
 constexpr std::size_t kSlice = 256;
@@ -72,7 +72,7 @@ void Placements::remove(InstanceHandle instance) {
   if (at + 1 != placed_.size()) swap(at, placed_.size() - 1);
   placed_.pop_back();
   index_.erase(instance);
-  // Another one has come among the nearest, whichever was last.
+  // The set of nearest placements has changed, even if another placement moved last.
   if (at < kNearest && placed_.size() > kNearest) looked_at_ = false;
 }
 
@@ -83,7 +83,7 @@ std::vector<InstanceHandle> Placements::instances() const {
   return all;
 }
 
-// Brings near what is nearer than the farthest of the nearest.
+// Moves placements that are nearer than the farthest of the nearest set into that set.
 void Placements::look(const Scene& scene, const SceneGrid& grid, std::span<const Viewer> viewers) {
   const auto measure = [&](std::size_t at) {
     const Instance* const instance = scene.instances().find(placed_[at].instance);

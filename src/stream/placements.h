@@ -13,12 +13,12 @@
 
 namespace quoin::stream {
 
-/// Where one grid of a scene is placed, the nearest ones first: what these need the others need too.
+/// The placements of one grid in a scene, the nearest first: chunks that these need serve the others too.
 ///
-///   [ the nearest kNearest, looked at each time | the others, some of which are looked at each time ]
+///   [ the nearest kNearest, checked each time | the others, checked a few at a time ]
 ///
-/// So what a look costs does not grow with the instances, and of thousands that all come nearer at once the right ones
-/// are found a little later. Where there are no more than kNearest it is exact.
+/// So the cost of an update does not grow with the instances. If thousands come nearer at once, the right ones are
+/// found a few updates later. Exact for up to kNearest placements.
 class Placements {
  public:
   static constexpr std::size_t kNearest = 64;

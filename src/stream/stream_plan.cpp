@@ -15,9 +15,9 @@
 namespace quoin::stream {
 namespace {
 
-// Of the budget, when it does not suffice: the rest is for what lies at the border and would come and go.
+// Share of the budget to fill when it is too small; the rest avoids reloading chunks at the border.
 constexpr double kShareOfWanted = 0.95;
-// What is not looked at comes as if it were so much farther away, from a distance on at which one has to turn to it.
+// Chunks outside the view are ranked as if they were this much farther away, if they are not close by.
 constexpr double kBehind = 1.75;
 constexpr double kCloseBy = 2.0 * kChunkEdge;
 
@@ -33,7 +33,7 @@ bool is_looked_at(const Eye& eye, IVec3 chunk) {
   return length <= kCloseBy || glm::dot(to, eye.direction) >= 0.5 * length || eye.direction == DVec3(0.0);
 }
 
-// What a plan holds at most, however large the budget and the radius are: a ball of 40 chunks' radius.
+// Maximum number of chunks in a plan at any budget and radius: a ball with a radius of 40 chunks.
 constexpr std::size_t kMaxPlanned = std::size_t{1} << 18;
 
 // A ball of more chunks than may be loaded would be cut to this anyway.
@@ -170,7 +170,7 @@ void StreamPlan::find_queue() {
   next_ = asked_ = 0;
 }
 
-// What is here and not wanted stays while it is near and there is room.
+// Collects the loaded chunks to unload. Unwanted chunks stay while they are near and there is room.
 void StreamPlan::find_leaving() {
   leaving_.clear();
   std::map<std::uint32_t, std::unordered_map<IVec3, bool, CoordinateHash>> is_wanted;

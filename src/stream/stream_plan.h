@@ -22,15 +22,15 @@ struct Eye {
   bool operator==(const Eye&) const = default;
 };
 
-/// Whether a chunk that is loaded may stay for a viewer: it lies within the radius, or little beyond.
+/// Returns true if a loaded chunk may stay for a viewer: it lies within the radius or slightly beyond.
 [[nodiscard]] bool stays_for(const Eye& eye, IVec3 chunk);
 
 using Eyes = std::map<std::uint32_t, std::vector<Eye>>;  ///< of each grid, by its number in the world
 
-/// Whether nothing else is wanted for these than for those: they moved and turned little.
+/// Returns true if both sets of viewers want the same chunks: they moved and turned little.
 [[nodiscard]] bool see_alike(const Eyes& a, const Eyes& b);
 
-/// What is wanted, as the caller's thread says it.
+/// The chunks that the caller's thread requests.
 struct Wishes {
   Eyes eyes;
   std::size_t max_chunks = 0;     ///< that the budget suffices for
@@ -38,7 +38,7 @@ struct Wishes {
   std::uint64_t number = 0;       ///< the caller's own; greater for later ones
 };
 
-/// Which chunks are to be loaded, nearest first, and which are to go.
+/// Selects the chunks to load, nearest first, and the chunks to unload.
 ///
 ///   unknown -> begun -> here -> unknown
 ///
@@ -50,20 +50,21 @@ class StreamPlan {
   void set_state(const ChunkPlace& place, State state);
   void forget(const ChunkPlace& place);
 
-  /// Takes over what is wanted, and finds anew what is to be loaded.
+  /// Replaces the requests and computes the chunks to load from scratch.
   void plan(Wishes wishes);
-  /// The next chunk to load, which then counts as begun. False where there is none. Without `has_room` only what edits
-  /// wait for is loaded.
+  /// Gets the next chunk to load and marks it as begun. Returns false if there is none. Without `has_room` this
+  /// considers only chunks that edits wait for.
   bool next(ChunkPlace& place, bool has_room);
   [[nodiscard]] bool has_next(bool has_room) const {
     return asked_ < wishes_.asked.size() || (has_room && next_ < queue_.size());
   }
   [[nodiscard]] std::size_t max_chunks() const { return wishes_.max_chunks; }
-  /// Those that are to go, farthest first, since the last call.
+  /// Takes the chunks to unload since the last call, farthest first.
   [[nodiscard]] std::vector<ChunkPlace> take_leaving();
 
   [[nodiscard]] std::size_t wanted() const { return wanted_.size(); }
-  /// Of these, that are not here; and how far the nearest of them is, world units. Cost: O(wanted) after a change.
+  /// The number of wanted chunks that are not loaded, and the distance of the nearest, world units. Cost: O(wanted)
+  /// after a change.
   [[nodiscard]] std::size_t missing();
   [[nodiscard]] double complete_radius();
 

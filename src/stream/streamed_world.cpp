@@ -41,7 +41,7 @@ using What = ChunkStreamer::Event::What;
 constexpr std::size_t kMaxArrivals = 128;
 // Chunks that edits wait for, in one plan.
 constexpr std::size_t kMaxAsked = 1024;
-// Of a chunk that is loaded, besides its voxels and densities: marks, sizes and states, bytes.
+// Bytes per loaded chunk in addition to its voxels and densities: marks, sizes and states.
 constexpr std::size_t kChunkBytes = 256;
 // After so many chunks that came or went it is time to save: what saves reads of the journals is so never much at once.
 constexpr std::size_t kMaxMoved = 48;
@@ -66,7 +66,7 @@ std::vector<std::byte> bytes_of_text(const std::string& text) {
   return {bytes.begin(), bytes.end()};
 }
 
-/// What became of saves, told by the store's thread.
+/// Results of saves, reported by the store's thread.
 class DiskOutcome {
  public:
   void put(const Status& outcome) {
@@ -91,8 +91,8 @@ struct StreamedWorld::Impl {
     std::uint32_t number = 0;
     Placements placements;
     ChangeCursor voxels, data, densities;
-    std::unordered_map<IVec3, std::size_t, CoordinateHash> sizes;  // of what is loaded, bytes
-    std::unordered_set<IVec3, CoordinateHash> kept;  // edited, where the world may not be written: they stay
+    std::unordered_map<IVec3, std::size_t, CoordinateHash> sizes;  // of the loaded chunks, bytes
+    std::unordered_set<IVec3, CoordinateHash> kept;                // edited in a read-only world: they stay loaded
     WaitingEdits waiting;
     std::unordered_set<IVec3, CoordinateHash> broken;
   };
@@ -259,7 +259,7 @@ std::size_t StreamedWorld::Impl::chunks_of_budget() const {
   const bool has_all = box.missing == 0 && box.begun == 0 && arrivals.empty();
   const double missing = static_cast<double>(box.missing) / static_cast<double>(std::max<std::size_t>(box.wanted, 1));
   const std::size_t fit = budget.chunks(planned_chunks, is_cut(), missing);
-  // What may not be taken away, edited and not to be saved, is counted too: then less is wanted, until that fits.
+  // Edited chunks that cannot be saved count too: the plan shrinks until they fit.
   const bool is_stuck = !has_all && !has_chunks_to_move() && budget.room(0) <= 0 && seconds_since(planned) > kReplan;
   return is_stuck ? std::min(fit, planned_chunks * 9 / 10) : fit;
 }
@@ -300,11 +300,11 @@ bool StreamedWorld::Impl::is_near_anyone(const ChunkPlace& place) const {
   return std::ranges::any_of(found->second, [&](const Eye& eye) { return stays_for(eye, place.chunk); });
 }
 
-// What edits did since the last time; what workers brought is no edit.
+// Records the edits since the last call; chunks that workers brought are not edits.
 void StreamedWorld::Impl::note_edits() {
   for (auto& [number, grid] : grids) {
     const SceneGrid* const content = scene().grids().find(grid.handle);
-    if (content == nullptr) {  // removed, with what was loaded of it
+    if (content == nullptr) {  // removed, with its loaded chunks
       for (const auto& [chunk, size] : grid.sizes) budget.remove_chunk(size);
       grid.sizes.clear();
       grid.waiting.clear();
@@ -324,7 +324,7 @@ void StreamedWorld::Impl::note_edits() {
         size->second = now;
         if (!store.is_writable()) of.kept.insert(change.chunk);
       }
-      if (changes.all) {  // so much that it was not noted: whatever is loaded may have been edited
+      if (changes.all) {  // too many changes to list: any loaded chunk may have been edited
         is_edited = true;
         if (store.is_writable()) return;
         for (const auto& [chunk, size] : of.sizes) of.kept.insert(chunk);
@@ -348,13 +348,13 @@ Status StreamedWorld::Impl::save_now() {
   return {};
 }
 
-// What edits that waited make of a chunk; nothing where nothing waited, or changed.
+// Applies waiting edits to an arriving chunk. Returns nullopt if no edit waited or none changed it.
 std::optional<StoredChunk> StreamedWorld::Impl::edited_on_arrival(Streamed& grid, const Arrival& arrival,
                                                                   const SceneGrid& content) {
   const auto waiting = grid.waiting.find(arrival.place.chunk);
   if (waiting == grid.waiting.end()) return std::nullopt;
   if (asked_left != 0) --asked_left;
-  // Partial grids of this chunk alone: whatever the edit does elsewhere it does not do here.
+  // Uses grids that hold this chunk only: the edit's effects elsewhere are dropped.
   const IVec3 at = arrival.place.chunk;
   Grid voxels;
   voxels.make_partial();
@@ -412,7 +412,7 @@ void StreamedWorld::Impl::put(Arrival arrival, ChunkStreamer::Note& note) {
   ++moved_since_save;
   note.add(place, What::Here);
   if (!edited) return;
-  // As an edit of what was loaded: it is saved like any other, before the chunk goes again.
+  // Counts as an edit of a loaded chunk: it is saved before the chunk is unloaded.
   content->grid.put_chunk(place.chunk, std::move(edited->voxels));
   content->field.put_chunk(place.chunk, edited->densities
                                             ? std::move(*edited->densities)
@@ -450,7 +450,7 @@ void StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, C
   while (!arrivals.empty() || (may_leave && !leaving.empty())) {
     if (has_moved && seconds_since(start) >= seconds) break;
     has_moved = true;
-    // What goes makes room for what comes.
+    // Unloads chunks first to make room for arrivals.
     const bool is_over = budget.is_over();
     if (may_leave && !leaving.empty() && (is_over || arrivals.empty() || leaving.size() >= arrivals.size())) {
       take_away(leaving.front(), note);
@@ -490,7 +490,7 @@ Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
     asked_others = start;
   }
   Status outcome;
-  // Before anything is taken out of memory it is on its way to the disk; and before workers save what has new types.
+  // Chunks are queued for the disk before they leave memory, and before workers save chunks with new types.
   const bool is_due = start - saved >= options.save_interval;
   const bool is_wanted =
       (is_edited && !leaving.empty()) || moved_since_save > kMaxMoved || scene().types.has_changed_since(saved_types);
@@ -524,7 +524,7 @@ std::size_t StreamedWorld::Impl::waiting_chunks() const {
   return sum;
 }
 
-// Nothing will come of what waits now.
+// Returns true if all waiting edits wait for broken chunks, which never arrive.
 bool StreamedWorld::Impl::waits_for_broken_alone() const {
   return std::ranges::all_of(grids, [](const auto& each) {
     const Streamed& grid = each.second;
@@ -558,7 +558,7 @@ StreamedWorld::~StreamedWorld() {
   if (impl_ == nullptr || !impl_->store.is_writable()) return;
   try {
     (void)flush();
-  } catch (const std::bad_alloc&) {  // what was saved before is kept
+  } catch (const std::bad_alloc&) {  // earlier saves remain valid
   }
 }
 
@@ -665,7 +665,7 @@ std::optional<std::uint32_t> StreamedWorld::number_of(GridHandle grid) const {
 void StreamedWorld::use_generator(GridHandle grid, std::shared_ptr<const ChunkGenerator> generator) {
   const auto number = impl_->world.saver.number_of(grid);
   QUOIN_ASSERT(number && impl_->streamed(*number) != nullptr, "a grid that is streamed");
-  // The types of what it makes.
+  // Saves the generator's types first.
   if (const auto saved = impl_->save_now(); !saved) impl_->problems.push_back(to_string(saved.error()));
   impl_->streamer.set_generator(*number, std::move(generator));
 }

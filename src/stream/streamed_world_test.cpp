@@ -193,7 +193,7 @@ TEST_F(StreamedWorldTest, TheBudgetHoldsAndTheNearestStay) {
     }
     const StreamStats stats = world.stats();
     most = std::max(most, stats.loaded_bytes);
-    // Meshes and the like of what is loaded.
+    // Simulates meshes and other data derived from loaded chunks.
     others = 3000 * stats.loaded_chunks;
     EXPECT_LE(stats.loaded_bytes + stats.other_bytes, options.budget_bytes + options.budget_bytes / 4) << step;
   }
@@ -213,7 +213,7 @@ TEST_F(StreamedWorldTest, EditsReachWhatIsNotLoaded) {
   ASSERT_TRUE(world.flush().has_value());
   EXPECT_EQ(world.stats().waiting_edits, 0U);
   ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
-  EXPECT_LT(world.stats().loaded_chunks, loaded + 10);  // of what it came by, what is near stays
+  EXPECT_LT(world.stats().loaded_chunks, loaded + 10);  // of the chunks on the way only near ones stay
   const auto kept = world.store().load_chunk({0, 0, chunk_of(IVec3{2000, -6, 0})});
   ASSERT_TRUE(kept.has_value() && kept->has_value());
   EXPECT_EQ((*kept)->voxels.get(local_of(IVec3{2000, -6, 0})), 2);
@@ -293,7 +293,7 @@ TEST_F(StreamedWorldTest, FieldsAreStreamedLikeVoxels) {
     meshes.finish(world->scene(), viewer.position);
     take();
     EXPECT_FALSE(drawn.empty());
-    for (const Key& chunk : drawn) EXPECT_GT(std::get<0>(chunk), 25);  // what is gone is not drawn
+    for (const Key& chunk : drawn) EXPECT_GT(std::get<0>(chunk), 25);  // unloaded chunks are not drawn
     viewer.position.x = 100.0;
     ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
     EXPECT_LT(world->scene().grids()[*grid].field.density({100, 110, 100}), 0.0F);
@@ -428,7 +428,7 @@ TEST_F(StreamedWorldTest, WhatCannotBeMadeIsNamedAndIsAir) {
   EXPECT_NE(problems[0].find("a broken region"), std::string::npos);
 }
 
-// Random flights, edits and threads: whatever the order in which things happen, the world's file has the same chunks.
+// Random flights, edits and threads: the world file has the same chunks in any order of events.
 TEST_F(StreamedWorldTest, RandomSchedulesGiveTheSameBytes) {
   const int rounds = std::getenv("QUOIN_SCHEDULES") == nullptr ? 8 : std::atoi(std::getenv("QUOIN_SCHEDULES"));
   std::map<Key, StoredChunk> expected;
@@ -467,7 +467,7 @@ TEST_F(StreamedWorldTest, RandomSchedulesGiveTheSameBytes) {
         for (int x = -7; x <= 7; ++x) {
           auto chunk = store->load_chunk({0, 0, {x, y, z}});
           ASSERT_TRUE(chunk.has_value());
-          // What nobody came near was not made.
+          // Chunks that no viewer came near are not generated.
           found[{x, y, z}] = *chunk ? std::move(**chunk) : StoredChunk{PatternGround::of({x, y, z})};
         }
       }
@@ -478,7 +478,7 @@ TEST_F(StreamedWorldTest, RandomSchedulesGiveTheSameBytes) {
   }
 }
 
-// What a server sends: the same log applied to two worlds whose viewers are elsewhere.
+// Simulates a server: the same log is applied to two worlds with viewers at different positions.
 TEST_F(StreamedWorldTest, ReplayedLogsGiveTheSameWorlds) {
   EditLog log;
   std::mt19937 chance(3);

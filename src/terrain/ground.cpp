@@ -24,7 +24,7 @@ class Profile {
   std::array<std::uint64_t, kChunkEdge> reach_{};
 };
 
-/// What one slice of constant z is made of.
+/// The profiles of one slice of constant z.
 struct Slice {
   Profile solid;
   Profile below_cover;
@@ -36,7 +36,8 @@ struct Slice {
   std::uint64_t sandy = 0;
 };
 
-/// Up to which y a cave may take a column's ground away: caves open in steep slopes only, and never into water.
+/// Returns the highest y where a cave may remove a column's ground. Caves open only in steep slopes and never into
+/// water.
 int cave_ceiling(const Column& column, int water_level) {
   if (column.lowest < water_level) return column.lowest - 2;
   return column.is_steep ? column.height : column.height - 4;
@@ -130,8 +131,8 @@ void fill(Chunk& chunk, const IBox& box, VoxelType type) {
   if (!box.empty()) chunk.fill_box(box, type, [](int, int, std::uint64_t) {});
 }
 
-/// The layers of four slices, a slab deep, that have to be looked at one by one; those below are stone, those above
-/// water or air. Both ends are multiples of 4 but for the box's own.
+/// The layers of four slices, a slab deep, that need a test per layer. Layers below are stone, layers above are water
+/// or air. Both ends are multiples of 4 except at the box's own ends.
 struct Layers {
   int from;
   int to;

@@ -23,7 +23,7 @@ constexpr double kSea = 0.24;
 constexpr double kSnow = 0.74;
 constexpr double kKnee = 0.70;
 
-// Bends what is above the knee so that 1.3 becomes 1, without an edge.
+// Compresses levels above the knee smoothly, so that 1.3 maps to 1.
 double compress(double level) {
   if (level <= kKnee) return std::max(0.0, level);
   const double u = std::min(1.0, (level - kKnee) * (1.0 / (1.3 - kKnee)));

@@ -8,7 +8,7 @@
 
 namespace quoin::terrain {
 
-/// What covers a column of ground.
+/// The cover of a ground column.
 enum class Surface : std::uint8_t { Grass, Meadow, Earth, Stone, Sand, Gravel, Snow };
 inline constexpr int kSurfaces = 7;
 /// Bare rock shows a band of darker stone once in so many layers.
@@ -44,7 +44,7 @@ class Landform {
   [[nodiscard]] Column column(int x, int z) const;
   /// The columns of a square, x fastest, for little more than one `height` each.
   [[nodiscard]] std::vector<Column> columns(int first_x, int first_z, int edge) const;
-  /// How wooded the land is here: below 0 bare, 1 a dense forest.
+  /// Returns the forest density: below 0 is bare, 1 is a dense forest.
   [[nodiscard]] double forest(int x, int z) const;
 
   /// y of the water's topmost voxel; -1 in a dry world.

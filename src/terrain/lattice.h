@@ -47,13 +47,13 @@ class Lattice {
   std::vector<float> values_;
 };
 
-/// How a field changes at a sample.
+/// The gradient of a field at a sample.
 struct Slope {
   float length = 0.0F;
   float up = 0.0F;
 };
 
-/// Values at the samples of a chunk and those beside it.
+/// Values at the samples of a chunk and at their neighbours.
 class Field {
  public:
   Field() : values_(std::size_t{kFieldEdge} * kFieldEdge * kFieldEdge) {}
@@ -61,7 +61,7 @@ class Field {
   void fill(float value) { std::fill(values_.begin(), values_.end(), value); }
   void upsample(const Lattice& lattice);
 
-  /// Of samples -1 and on; `y` and `z` count from there, too.
+  /// Returns the row of samples from x = -1; `y` and `z` also start at sample -1.
   [[nodiscard]] float* row(int y, int z) { return values_.data() + (z * kFieldEdge + y) * kFieldEdge; }
   /// Requires: 0 <= x, y, z < 64.
   [[nodiscard]] float at(int x, int y, int z) const { return values_[index(x, y, z)]; }

@@ -75,7 +75,7 @@ void add_plants(int spacing, const IBox& world, IVec3 first, IVec3 last, InCell&
   }
 }
 
-/// Writes single voxels, of which it leaves out those that are not the chunk's.
+/// Writes single voxels; skips voxels outside the chunk.
 class Painter {
  public:
   Painter(IVec3 chunk, Chunk& out) : origin_(chunk * kChunkEdge), chunk_(out) {}

@@ -10,7 +10,7 @@
 
 namespace quoin::terrain {
 
-/// The heights of one column of chunks, and whatever else its chunks share. Makes one of them after the other.
+/// The heights of one column of chunks, and other data that its chunks share. Makes the chunks one after the other.
 class SmoothColumn {
  public:
   /// `world`: the samples that the world has.

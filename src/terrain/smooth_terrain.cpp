@@ -77,7 +77,7 @@ Result<DensityGrid> generate_smooth_terrain(const SmoothTerrainOptions& options,
   const auto across = static_cast<std::size_t>(options.size.x);
   const auto up = static_cast<std::size_t>(options.size.y);
   const std::size_t count = across * static_cast<std::size_t>(options.size.z);
-  // In batches, so that progress can be told and chunks are stored in one order.
+  // Batches allow progress reports and store chunks in a fixed order.
   constexpr std::size_t kBatch = 32;
   DensityGrid field(kBand);
   std::vector<std::optional<DensityChunk>> made(std::min(kBatch, count) * up);

@@ -136,7 +136,7 @@ TEST(SmoothTerrain, WithoutOverhangsTheGroundIsThatOfTheBlockyWorld) {
   }
 }
 
-// Columns in which solid lies above air that is not below it all: what a height map cannot hold.
+// Counts columns with solid ground above air, which a height map cannot represent.
 int overhung_columns(const DensityGrid& field, IVec3 size) {
   int count = 0;
   for (int z = 2; z < size.z - 2; ++z) {

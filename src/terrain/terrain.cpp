@@ -139,7 +139,7 @@ Result<Grid> generate_terrain(const TerrainOptions& options, const TerrainTypes&
   const auto across = static_cast<std::size_t>(chunks.size().x);
   const auto up = static_cast<std::size_t>(chunks.size().y);
   const std::size_t count = across * static_cast<std::size_t>(chunks.size().z);
-  // In batches, so that progress can be told and chunks are stored in one order.
+  // Batches allow progress reports and store chunks in a fixed order.
   constexpr std::size_t kBatch = 64;
   Grid grid;
   std::vector<Chunk> made;

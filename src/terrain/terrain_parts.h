@@ -11,25 +11,26 @@
 
 #include "terrain/landform.h"
 
-// What generate_terrain_chunk puts together: caves, the ground with what covers it, and what stands on that.
+// The steps of generate_terrain_chunk: caves, ground with its cover, and plants.
 
 namespace quoin::terrain {
 
-/// Which voxels of a chunk tunnels pass through, as rows along x.
+/// The voxels of a chunk that tunnels pass through, as rows along x.
 struct CaveMasks {
   std::array<std::uint64_t, kChunkEdge * kChunkEdge> rows{};  ///< [z][y]
 
   [[nodiscard]] std::uint64_t row(int y, int z) const { return rows[static_cast<std::size_t>(z * kChunkEdge + y)]; }
 };
 
-/// Tunnels run where two noises are both near zero. The noises are taken at every fourth voxel and interpolated.
+/// Finds the tunnel voxels: tunnels run where two noises are both near zero. The noises are sampled at every fourth
+/// voxel and interpolated.
 ///
-/// `height`: up to which layer of the chunk to look.
+/// `height`: number of the chunk's layers to search.
 void find_caves(std::uint32_t seed, IVec3 chunk, int height, CaveMasks& out);
 
-/// One chunk of stone, soil, cover and water, with caves where asked for.
+/// Makes one chunk of stone, soil, cover and water, with optional caves.
 ///
-/// `columns`: the chunk's 64x64, x fastest. `part`: what of the chunk lies in the world, in the chunk's coordinates.
+/// `columns`: the chunk's 64x64, x fastest. `part`: the part of the chunk within the world, in chunk coordinates.
 [[nodiscard]] Chunk make_ground(const Landform& land, const std::vector<Column>& columns, const TerrainTypes& types,
                                 IVec3 chunk, const IBox& part, bool has_caves);
 
@@ -46,8 +47,8 @@ struct Plant {
 /// No plant reaches further than this from its foot, sideways.
 inline constexpr int kPlantReach = 4;
 
-/// What stands so that it can reach into the square of columns: sorted by z, then x, of the places where it could
-/// stand. Only plants that lie within `world` are there.
+/// Returns the plants that can reach into the square of columns, sorted by z, then x, of their sites. Only plants that
+/// lie within `world` are included.
 [[nodiscard]] std::vector<Plant> plants_near(const Landform& land, const TerrainOptions& options, const IBox& world,
                                              int first_x, int first_z, int edge);
 

@@ -83,7 +83,7 @@ TEST(Terrain, StaysInItsBoxWhateverItsSize) {
   }
 }
 
-// Every column is filled from the floor up, whatever plants and rocks do; caves and plants off.
+// Every column is filled from the floor up, with any plants and rocks; here caves and plants are off.
 TEST(Terrain, GroundHasNoHolesWithoutCaves) {
   TerrainOptions options = options_of(42, {4, 2, 4});
   options.caves = options.plants = options.rocks = false;

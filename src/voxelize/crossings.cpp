@@ -29,7 +29,7 @@ int first_centre(double place) {
   return static_cast<int>(std::ceil(place - 0.5));
 }
 
-/// Where an edge passes a row of lines.
+/// The interval in which an edge crosses a row of lines.
 struct Passing {
   double u = 0.0;
   double w = 0.0;
@@ -70,11 +70,11 @@ void for_each_touch_at_top(const std::array<Seen, 3>& corners, double high, int 
 }
 
 /// Calls `visit(u, v, w, enters)` for the lines within [first, first + 64) that meet a triangle, and `touch(u, v, w)`
-/// for those that meet nothing but its border, which belongs to another one.
+/// for lines that meet only border points that belong to another triangle.
 ///
-/// A row of lines passes two edges of it, or none; the lines from the left one up to before the right one meet it. That
-/// gives every line through a shared edge or corner to one triangle, and each edge counts once up and once down in a
-/// closed mesh, so that as many crossings enter as leave on every line.
+/// A row of lines crosses two edges of the triangle, or none. The lines from the left edge up to but excluding the
+/// right edge meet it. So each line through a shared edge or corner belongs to one triangle. In a closed mesh each edge
+/// counts once up and once down, so every line has as many entering as leaving crossings.
 template <class Visit, class Touch>
 void for_each_crossing(const std::array<Seen, 3>& corners, bool is_mirrored, int first_u, int first_v,
                        const Visit& visit, const Touch& touch) {
@@ -114,7 +114,7 @@ std::array<Seen, 3> seen_along(int axis, const Corners& corners) {
   return seen;
 }
 
-/// Which triangles the lines of each column may meet.
+/// The triangles that the lines of each column may meet.
 struct ColumnTriangles {
   std::vector<std::uint64_t> begin;
   std::vector<std::uint32_t> triangles;
@@ -268,7 +268,7 @@ Column find_column(const Frame& frame, int axis, SolidVoxels rule, std::span<con
     };
     const double area = seen_area(seen);
     const auto touch = [&](int u, int v, double w) {
-      // One that is seen edge-on has its border in common with others that are not.
+      // A triangle seen edge-on shares its border with triangles that are not.
       if (area != 0.0) touched.push_back({line_of(u, v), (area < 0.0) != is_mirrored, triangle, snapped(w)});
     };
     for_each_crossing(seen, is_mirrored, first_u, first_v, visit, touch);

@@ -67,7 +67,7 @@ class Crossings {
 
   /// All columns along `axis`.
   [[nodiscard]] std::span<const Column> columns(int axis) const { return columns_[static_cast<std::size_t>(axis)]; }
-  /// Of these the one through a chunk of the frame.
+  /// Returns the index of the column along `axis` through a chunk of the frame.
   [[nodiscard]] std::size_t column_index(int axis, IVec3 chunk) const {
     const auto [u, v] = kPlane[static_cast<std::size_t>(axis)];
     return static_cast<std::size_t>(chunk[u]) +

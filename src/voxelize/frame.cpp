@@ -104,7 +104,7 @@ Result<VoxelLattice> lattice_of_size(const TriangleMesh& mesh, int voxels) {
   if (box.empty()) return nothing_there();
   const double side = longest_side(box);
   VoxelLattice lattice;
-  // What is one point gets one voxel.
+  // A mesh that is a single point gets one voxel.
   lattice.voxel_size = side > 0.0 ? side / (voxels - 2.0 * kClear) : 1.0;
   // In the middle of as many voxels along each axis as hold it.
   const DVec3 size = (box.max - box.min) / lattice.voxel_size;
@@ -182,7 +182,7 @@ IBox chunk_box(const Frame& frame, const Corners& corners, double margin) {
   return {glm::max(first, IVec3(0)), glm::min(chunk_of(voxel_of(high)) + 1, frame.chunks())};
 }
 
-/// Whether a plane may come within `margin` of a chunk.
+/// Returns true if a plane may come within `margin` of a chunk.
 bool meets(const DVec3& normal, const DVec3& on_plane, IVec3 chunk, double margin) {
   const double half = 0.5 * kChunkEdge + margin + 1e-6;
   const DVec3 centre = (DVec3(chunk) + 0.5) * static_cast<double>(kChunkEdge);

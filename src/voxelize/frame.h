@@ -54,7 +54,7 @@ class Frame {
   IVec3 first_chunk_{0};
 };
 
-/// Which triangles come near a chunk: those whose plane and box, grown by `margin`, meet it.
+/// Lists the triangles near a chunk: their plane and their box, grown by `margin`, meet it.
 class ChunkTriangles {
  public:
   ChunkTriangles(const Frame& frame, double margin);

@@ -10,18 +10,18 @@ namespace {
 
 // Of six rays: more than half of them.
 constexpr int kHalf = 3;
-// So that the sum of six fits the numbers, and beyond what a real mesh has.
+// Keeps the sum of six votes within int16; real meshes stay below it.
 constexpr int kMostTurns = 4'000;
 
-/// What the two rays of a line say of a centre: `before` is the sum of the steps before it, `all` of all of the line.
-/// A ray back sees the steps before; a ray on sees what is behind, from the other side. In a closed mesh both are the
-/// winding number.
+/// Returns the votes of a line's two rays at a centre. `before` is the sum of the steps before the centre, `all` the
+/// sum of the whole line. The backward ray counts the steps before the centre; the forward ray counts the steps behind
+/// it, from the other side. In a closed mesh both equal the winding number.
 int votes_of(SolidVoxels rule, int before, int all, int crossed, int crossings) {
   if (rule == SolidVoxels::Parity) return (crossed & 1) + ((crossings - crossed) & 1);
   return std::clamp(2 * before - all, -kMostTurns, kMostTurns);
 }
 
-/// How the votes of a line change within a chunk.
+/// Iterates over the changes of a line's votes within a chunk.
 class LineVotes {
  public:
   LineVotes(std::span<const Crossing> line, SolidVoxels rule, int first)
@@ -29,11 +29,11 @@ class LineVotes {
     for (const Crossing& crossing : line) all_ += crossing.step();
     while (next_ < line.size() && line[next_].behind() <= first) before_ += line[next_++].step();
   }
-  /// Where the line enters the chunk.
+  /// Returns the votes at the line's current position; at first where it enters the chunk.
   [[nodiscard]] int votes() const {
     return votes_of(rule_, before_, all_, static_cast<int>(next_), static_cast<int>(line_.size()));
   }
-  /// Whether they change before the chunk's end; `at` is set to the voxel from which on.
+  /// Returns true if the votes change before the chunk's end; sets `at` to the first voxel with the new votes.
   [[nodiscard]] bool advance(int& at) {
     if (next_ >= line_.size() || line_[next_].behind() >= end_) return false;
     at = line_[next_].behind() - (end_ - kChunkEdge);
@@ -62,7 +62,7 @@ void entering_votes(const Column& column, SolidVoxels rule, int first, Plane& vo
   }
 }
 
-/// Widens the ranges of the chunks that a line passes by what it says in them: between two crossings it is the same.
+/// Extends the vote ranges of the chunks along a line: votes are constant between two crossings.
 void add_line(std::span<const Crossing> line, SolidVoxels rule, std::span<VoteRange> chunks) {
   const int end = static_cast<int>(chunks.size()) * kChunkEdge;
   int all = 0;
@@ -99,7 +99,7 @@ void find_ranges(const Column& column, SolidVoxels rule, std::span<VoteRange> ch
   if (has_empty) add_line({}, rule, chunks);
 }
 
-/// Adds the votes of lines along x: those that change do so within a row.
+/// Adds the votes of lines along x, which change within a row.
 void add_along_x(const Column& column, SolidVoxels rule, int first, const Plane& entering, std::int16_t* sums) {
   for (std::size_t i = 0; i < kLines; ++i, sums += kChunkEdge) {
     std::int16_t votes = entering[i];
@@ -141,7 +141,7 @@ class RowsOfVotes {
       }
     }
   }
-  /// Of the row at `step` along the lines; rows come one after the other.
+  /// Adds the row at `step` along the lines. Rows must come in order.
   void add(std::size_t step, std::int16_t* sums) {
     const std::int16_t* change = changes_.data() + step * kChunkEdge;
     for (std::size_t x = 0; x < kChunkEdge; ++x) {

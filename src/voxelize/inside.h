@@ -4,7 +4,7 @@
 
 namespace quoin::voxelizing {
 
-/// What of a chunk is within a mesh.
+/// The part of a chunk within a mesh.
 enum class Filled : std::uint8_t { None, All, Some };
 
 /// Room that a thread uses again.
@@ -18,12 +18,12 @@ struct VoteRange {
   std::int16_t most = 0;
 };
 
-/// Which voxels are within a mesh.
+/// Finds the voxels within a mesh.
 ///
-/// Votes: by Winding each of the six rays from a centre along the axes says how often more it leaves the mesh than it
-///        enters it; their sum is six times the winding number. By Parity each says whether it meets an odd number.
-/// What the lines of all axes say at least and at most decides most chunks, of open meshes too: `find` looks at the
-/// voxels of the others only.
+/// Votes: with Winding, each of the six axis rays from a centre counts how often more it leaves the mesh than it enters
+/// it; the sum is six times the winding number. With Parity, each ray votes if it has an odd number of crossings.
+/// The minimum and maximum votes of the lines of all axes decide most chunks, also in open meshes: `find` tests single
+/// voxels only in the other chunks.
 class Inside {
  public:
   /// Requires: `rule` is not None; `crossings` outlives it.

@@ -75,7 +75,7 @@ void cut_by_plane(const Solid& solid, float y, float z, float reach, int& first,
   const float rest =
       (y - solid.edges[0].from.y) * n.y + (z - solid.edges[0].from.z) * n.z - solid.edges[0].from.x * n.x;
   if (std::abs(n.x) < 1e-3F) {
-    // Along the plane: all or nothing, with room for what the slope adds.
+    // Parallel to the plane: takes all or none of the row, with a margin for the slope.
     if (std::abs(rest) > reach + 0.1F + std::abs(n.x) * 2.0F * kChunkEdge) end = first;
     return;
   }

@@ -71,7 +71,7 @@ void mark_overlapping(const Corners& corners, IVec3 chunk, ChunkBits& bits) {
   const Corners local = {corners[0] - origin, corners[1] - origin, corners[2] - origin};
   const DVec3 low = glm::min(glm::min(local[0], local[1]), local[2]);
   const DVec3 high = glm::max(glm::max(local[0], local[1]), local[2]);
-  // The cube from i to i + 1 is closed: it meets what lies from i on and up to i + 1.
+  // The cube [i, i + 1] is closed: it also meets triangles that touch its sides.
   const IVec3 first = glm::max(voxel_of(glm::ceil(low) - 1.0), IVec3(0));
   const IVec3 end = glm::min(voxel_of(high) + 1, IVec3(kChunkEdge));
   if (IBox{first, end}.empty()) return;

@@ -110,7 +110,7 @@ inline double winding_number(const TriangleMesh& mesh, DVec3 p) {
   return sum / (4.0 * std::numbers::pi);
 }
 
-/// Whether a triangle meets a closed box: no axis of thirteen separates them.
+/// Returns true if a triangle meets a closed box: none of thirteen axes separates them.
 /// Source: T. Akenine-Moller, "Fast 3D Triangle-Box Overlap Testing" (2001).
 inline bool meets_box(const std::array<DVec3, 3>& triangle, DVec3 centre, double half) {
   std::array<DVec3, 3> v = triangle;
@@ -133,7 +133,7 @@ inline bool meets_box(const std::array<DVec3, 3>& triangle, DVec3 centre, double
   return true;
 }
 
-/// Whether a triangle meets the piece of line from `from` to `to`, by signed volumes.
+/// Returns true if a triangle meets the segment from `from` to `to`, by signed volumes.
 inline bool meets_segment(const std::array<DVec3, 3>& t, DVec3 from, DVec3 to) {
   const auto volume = [](DVec3 a, DVec3 b, DVec3 c, DVec3 d) { return glm::dot(glm::cross(b - a, c - a), d - a); };
   if ((volume(t[0], t[1], t[2], from) > 0.0) == (volume(t[0], t[1], t[2], to) > 0.0)) return false;
@@ -172,7 +172,7 @@ inline Voxels voxels_of(const Grid& grid) {
   return all;
 }
 
-/// The voxels of a box, grown by two to each side, for which `is` holds.
+/// Returns the voxels that satisfy `is` in a box grown by two on each side.
 template <class Is>
 Voxels voxels_where(const DBox& bounds, const Is& is) {
   const IVec3 low = voxel_of(bounds.min) - 2;

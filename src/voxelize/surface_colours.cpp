@@ -17,7 +17,7 @@ namespace {
 // Emission within a texture has steps of a 16th of the material's.
 constexpr std::uint32_t kEmissionSteps = 16;
 
-// What a mesh without materials has: a light grey that shows its shape, sRGB 200.
+// The colour of a mesh without materials: a light grey that shows its shape, sRGB 200.
 constexpr float kGrey = 0.577580F;
 
 std::uint16_t unit_of(float value) {
@@ -50,7 +50,7 @@ int wrapped(int at, int size, TextureWrap wrap) {
   return within < size ? within : period - 1 - within;
 }
 
-/// A place in a picture; of what is not a number, or far beyond it, its corner.
+/// Returns a valid texture coordinate: 0 for NaN and for values far outside the texture.
 double sound_place(double at) {
   constexpr double kFarthest = 1e6;
   return std::abs(at) <= kFarthest ? at : 0.0;
@@ -196,7 +196,7 @@ glm::vec4 SurfaceColours::sample(std::size_t texture, std::size_t level, DVec3 p
                   glm::mix(at(left, top + 1.0), at(left + 1.0, top + 1.0), share_u), share_v);
 }
 
-/// The level a pixel of which is about as large as a voxel.
+/// Returns the mip level whose pixels are about as large as a voxel.
 std::size_t SurfaceColours::level_of(std::uint32_t triangle, const glm::vec2* places, std::size_t texture) const {
   const Corners corners = frame_->corners(triangle);
   const double area = glm::length(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));

@@ -13,18 +13,18 @@
 
 namespace quoin::voxelizing {
 
-/// What colours a mesh has at its points.
+/// The colours of a mesh at its surface points.
 class SurfaceColours {
  public:
   /// Lifetime: the frame must outlive it.
   explicit SurfaceColours(const Frame& frame);
 
-  /// Whether all of the surface looks the same, and nothing is cut out.
+  /// Returns true if the whole surface has one colour and no cut-outs.
   [[nodiscard]] bool is_plain() const { return is_plain_; }
   [[nodiscard]] bool may_have_holes(std::uint32_t triangle) const {
     return material_of(triangle).alpha_mode != AlphaMode::Opaque;
   }
-  /// Whether there is a surface at a point of a triangle, given by shares of its corners.
+  /// Returns true if there is a surface at a point of a triangle, given in barycentric coordinates.
   [[nodiscard]] bool has_surface(std::uint32_t triangle, DVec3 shares) const;
   [[nodiscard]] Rgba8 colour(std::uint32_t triangle, DVec3 shares) const;
   [[nodiscard]] std::uint32_t material_index(std::uint32_t triangle) const {
@@ -35,7 +35,7 @@ class SurfaceColours {
   [[nodiscard]] std::uint32_t look_index(std::uint32_t triangle, DVec3 shares) const;
   /// The look of the one material that all triangles have, with its mean emission; nothing if there are several.
   [[nodiscard]] std::optional<std::uint32_t> deep_look() const;
-  /// The mean colour, by area, of what lies at the triangles' middles; with its alpha where one material alone blends.
+  /// The area-weighted mean colour at the triangles' centres, with alpha if the only material blends.
   [[nodiscard]] Rgba8 mean() const { return mean_; }
   /// The properties of types except their colour: of the materials, then of those with parts of their emission.
   [[nodiscard]] const std::vector<VoxelProperties>& looks() const { return properties_; }

@@ -127,11 +127,11 @@ TEST(SurfaceColours, cut_out_what_alpha_masks) {
   }));
   mesh.textures[0].is_smooth = false;
   const Made made = surface_of(mesh);
-  // Where the cut meets the edge of two triangles, a voxel beside it touches one of them.
+  // At the cut on the edge of two triangles an adjacent voxel touches one of them.
   EXPECT_NEAR(static_cast<double>(made.grid.voxel_count()), 12 * kSide, 1);
   EXPECT_EQ(made.grid.get(3, 0, 9), kAir);
   EXPECT_EQ(made.at(4, 3).colour, (Rgba8{9, 200, 9, 255}));
-  // What is enclosed stays.
+  // Enclosed voxels stay.
   TriangleMesh box = shapes::box(DVec3(0.0), DVec3(6.0));
   box.materials.emplace_back();
   box.materials[0].alpha_mode = AlphaMode::Mask;

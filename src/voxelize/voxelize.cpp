@@ -27,9 +27,9 @@ namespace quoin {
 namespace voxelizing {
 namespace {
 
-// How far from the surface voxels have its colours: those of which one side is seen lie within 1.
+// Voxels within this distance of the surface take its colours: voxels with one visible side lie within 1.
 constexpr float kColourReach = 1.25F;
-// Of samples: a corner of the cell that the surface passes lies within the cell's diagonal.
+// Reach for samples: a corner of a cell that the surface crosses lies within the cell's diagonal.
 constexpr float kFieldColourReach = 1.75F;
 // A cube that the surface meets has its centre within half its diagonal.
 constexpr float kCubeReach = 0.8661F;
@@ -41,7 +41,7 @@ struct Coloured {
   Rgba8 colour;
 };
 
-/// What was found of a chunk, before there are types.
+/// The results for a chunk, before types exist.
 struct Found {
   Filled filled = Filled::None;
   std::unique_ptr<ChunkBits> bits;  // of Some
@@ -51,20 +51,20 @@ struct Found {
 
 constexpr std::size_t kRows = kLines;
 constexpr float kMostBand = 64.0F;
-// Of the work, what is told as progress.
+// Shares of the work in the reported progress.
 constexpr double kLinesShare = 0.2;
 constexpr double kFoundShare = 0.9;
 
-/// All of what a run needs, made once.
+/// The shared data of a run, made once.
 struct Parts {
   Frame frame;
-  std::unique_ptr<const Crossings> crossings;  // null where nobody asks them
-  std::optional<Inside> inside;                // of a rule for what is solid
+  std::unique_ptr<const Crossings> crossings;  // null if not needed
+  std::optional<Inside> inside;                // if a rule for solid voxels is set
   std::optional<ChunkTriangles> triangles;
   std::optional<SurfaceColours> colours;
 };
 
-/// What a thread uses again.
+/// Buffers that a thread reuses.
 struct Scratch {
   InsideScratch inside;
   Nearest nearest;
@@ -78,7 +78,7 @@ Filled filled(const ChunkBits& bits) {
   return is(~std::uint64_t{0}) ? Filled::All : Filled::Some;
 }
 
-/// What of a chunk is solid; `solid` is set where that is some of it only.
+/// Finds the solid voxels of a chunk; sets `solid` only if it returns Some.
 Filled find_solid(const Parts& parts, IVec3 chunk, Scratch& scratch, ChunkBits& solid) {
   return parts.inside ? parts.inside->find(chunk, scratch.inside, solid) : Filled::None;
 }
@@ -114,7 +114,7 @@ void mark_surface(const Parts& parts, std::size_t index, SurfaceVoxels which, Ch
   }
 }
 
-/// Colours what lies near the surface; takes from `all` what is cut out of it.
+/// Colours the voxels near the surface; removes cut-out voxels from `all`.
 void colour_voxels(const Parts& parts, std::size_t index, const Nearest& nearest, const ChunkBits& solid,
                    ChunkBits& all, std::vector<Coloured>& coloured) {
   const IVec3 chunk = parts.frame.chunk_at(index);
@@ -149,7 +149,7 @@ Found find_voxels(const Parts& parts, std::size_t index, const VoxelizeOptions& 
   return found;
 }
 
-/// Distances with the signs of what is solid.
+/// Makes signed distances from the nearest triangles and the solid voxels.
 DensityChunk signed_densities(const Nearest& nearest, const ChunkBits& solid, float band) {
   const Half far = stored_density(band, band);
   DensityChunk densities(far);
@@ -158,7 +158,7 @@ DensityChunk signed_densities(const Nearest& nearest, const ChunkBits& solid, fl
     const float* squared = nearest.squared.data() + row * kChunkEdge;
     for (unsigned x = 0; x < kChunkEdge; ++x) {
       const float distance = std::sqrt(squared[x]);
-      // What lies on the surface counts as its inner side, as voxels do.
+      // Points on the surface count as inside, as they do for voxels.
       const bool is_solid = (solid[row] >> x & 1U) != 0;
       halves[x] = stored_density(is_solid ? -std::max(distance, 1e-6F) : distance, band);
     }
@@ -192,7 +192,7 @@ Found find_densities(const Parts& parts, std::size_t index, const DistanceFieldO
   return found;
 }
 
-/// What was found of all chunks; null of those that have nothing.
+/// The results for all chunks; null for empty chunks.
 using AllFound = std::vector<std::unique_ptr<Found>>;
 
 /// Finds all chunks. Errors: Cancelled.
@@ -220,7 +220,7 @@ std::size_t count_of(const Found& found) {
   return count;
 }
 
-/// The types of what was found: of what lies deep, and of looks by number.
+/// The voxel types of the results: of deep voxels, and of looks by number.
 struct Types {
   VoxelType deep = kAir;
   std::vector<VoxelType> by_look;
@@ -230,7 +230,7 @@ struct Types {
 Result<Types> find_types(const SurfaceColours& colours, AllFound& found, VoxelRegistry& registry, std::size_t most,
                          std::vector<std::string>& warnings) {
   std::vector<VoxelProperties> materials = colours.looks();
-  // Of what is deep: of the one material that all triangles have, or of none.
+  // Deep voxels take the one material that all triangles share, or none.
   const std::uint32_t deep_material = colours.deep_look().value_or(static_cast<std::uint32_t>(materials.size()));
   materials.emplace_back();
   Looks looks;
@@ -276,8 +276,8 @@ Chunk types_of(const Found& found, const Types& types) {
   return chunk;
 }
 
-/// Makes what is found of chunks the voxels of grids, some chunks at a time: `make(i)` on any thread, `put(i, made)` in
-/// order. What was found is gone afterwards.
+/// Turns the results of chunks into voxels of grids, a batch of chunks at a time: `make(i)` runs on any thread, `put(i,
+/// made)` in order. Frees the results.
 template <class Make, class Put>
 void put_all(AllFound& found, Threads threads, const Make& make, const Put& put) {
   constexpr std::size_t kAtOnce = 256;

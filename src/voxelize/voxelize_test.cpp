@@ -65,7 +65,7 @@ TEST(VoxelizeSolid, has_as_many_voxels_as_shapes_that_can_be_counted) {
 }
 
 TEST(VoxelizeSolid, has_no_leak_where_edges_run_through_centres) {
-  // Corners, edges and faces on centres and sides of voxels. What lies on the surface itself may be either.
+  // Corners, edges and faces on centres and sides of voxels. Voxels on the surface itself may be either.
   constexpr double kOn = 1e-6;
   for (const TriangleMesh& mesh :
        {shapes::box(DVec3(0.5), DVec3(8.5)), shapes::box(DVec3(20), DVec3(28)),
@@ -140,7 +140,7 @@ TEST(VoxelizeSolid, bridges_holes) {
               0.01 * static_cast<double>(whole.size()));
 }
 
-/// What six rays along the axes from a centre say together, each triangle by itself.
+/// The combined votes of six axis rays from a centre, with each triangle tested separately.
 int votes_of(const TriangleMesh& mesh, SolidVoxels rule, DVec3 centre) {
   int votes = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -198,7 +198,7 @@ TEST(VoxelizeSurface, thick_is_every_cube_that_the_mesh_meets) {
     const Voxels expected = shapes::surface_by_boxes(mesh);
     EXPECT_TRUE(voxelized(mesh, SurfaceVoxels::Separating26, SolidVoxels::None) == expected) << expected.size();
   }
-  // What lies between voxels takes both.
+  // Surfaces between two voxels take both.
   const TriangleMesh box = shapes::box(DVec3(0.0), DVec3(4.0));
   EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating26, SolidVoxels::None).size(), 6U * 6U * 6U - 2U * 2U * 2U);
   EXPECT_TRUE(voxelized(box, SurfaceVoxels::Separating26, SolidVoxels::None) == shapes::surface_by_boxes(box));
@@ -290,7 +290,7 @@ TEST(VoxelizeSurface, of_a_slanted_plane_is_one_layer) {
   EXPECT_TRUE(solid_of(mesh).empty());
 }
 
-/// Whether a walk from outside through voxels that are no surface comes to a solid centre that is no surface.
+/// Returns true if a walk from outside through non-surface voxels reaches a solid non-surface centre.
 bool reaches_inside(const Voxels& surface, const Voxels& solid, const DBox& bounds, bool through_corners) {
   const IVec3 low = voxel_of(bounds.min) - 2;
   const IVec3 high = voxel_of(bounds.max) + 2;

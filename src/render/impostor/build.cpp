@@ -97,12 +97,12 @@ void count_open_rays(const OccupancyTree& opaque, const DensityTree* field, std:
   }
 }
 
-// What is known of the faces of an impostor that was, where nothing near them has changed.
+// The reusable faces of the previous impostor: faces without changes nearby.
 class KnownFaces {
  public:
   KnownFaces() = default;
   KnownFaces(const ImpostorFaces& before, std::span<const IBox> changed) : faces_(before.faces) {
-    // A voxel changes the light of whatever an occlusion ray may reach from.
+    // A voxel changes the light of all faces within reach of an occlusion ray.
     constexpr int kReach = static_cast<int>(kOcclusionReach) + 2;
     for (const IBox& box : changed) near_.push_back({box.min - kReach, box.max + kReach});
   }
@@ -128,9 +128,9 @@ struct Subject {
   const Grid* grid;
   const VoxelRegistry* types;
   const OccupancyTree* opaque;
-  const DensityTree* field;  // what is opaque of its field; null: none
+  const DensityTree* field;  // the opaque part of the grid's field; null: none
   ContentSphere content;
-  IBox box;  // of what is drawn
+  IBox box;  // of the drawn content
   int edge = 0;
   int first_width = 0;                 // see ImpostorFaces
   std::optional<ImpostorShell> shell;  // none where there are very many faces
@@ -220,7 +220,7 @@ std::shared_ptr<const ImpostorFaces> faces_of(const Subject& subject, const std:
   return faces;
 }
 
-// Around what changed, if that is so little that the rest is worth keeping.
+// Returns boxes around the changes if they are small enough for the remaining faces to be reused.
 std::optional<std::vector<IBox>> small_boxes(const GridChanges& changes, const IBox& content) {
   constexpr std::size_t kMaxBoxes = 16;
   constexpr double kMaxShare = 1.0 / 16.0;  // of the content's volume

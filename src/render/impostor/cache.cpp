@@ -22,7 +22,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// What an impostor is made of.
+// The grid content that an impostor was built from.
 struct Origin {
   ChangeCursor grid;
   ChangeCursor field;
@@ -30,7 +30,7 @@ struct Origin {
   int edge = 0;
 };
 
-// What a worker needs to build one.
+// The input of a worker that builds an impostor.
 struct Job {
   SceneGrid grid;  // snapshots of voxels and field
   Origin origin;
@@ -43,9 +43,9 @@ struct Entry {
   Origin origin;
   std::optional<Job> waiting;
   std::optional<Origin> building;
-  bool is_replaced = false;  // the grid that is being built: nobody will see it
+  bool is_replaced = false;  // the grid being built has been replaced: its impostor is never shown
   std::uint64_t last_use = 0;
-  std::size_t refused_bytes = 0;  // of the last one, for which there was no room
+  std::size_t refused_bytes = 0;  // size of the last impostor, refused for lack of room
 
   // Of the newest that there is, is being built or waits.
   [[nodiscard]] const Origin* newest() const {
@@ -90,7 +90,7 @@ struct ImpostorCache::Impl {
   std::shared_ptr<const VoxelRegistry> types;
   std::uint64_t types_changed = 0;  // how often, in whether they are transparent
   std::uint64_t round = 0;          // up to a wait
-  // What was replaced while somebody held it: freed by a worker, since that takes a while.
+  // Impostors that were replaced while a caller held them: a worker frees them, since that takes time.
   std::vector<std::shared_ptr<const Impostor>> replaced;
   bool has_unused = false;  // among these, perhaps
   bool is_stopped = false;
@@ -112,7 +112,7 @@ void ImpostorCache::Impl::look_at(const VoxelRegistry& now) {
   if (is_other || types == nullptr) types = std::make_shared<const VoxelRegistry>(now);
 }
 
-// Puts the grid's present state into the queue, in place of an older one that waits there.
+// Queues the grid's present state; replaces an older state in the queue.
 void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const SceneGrid& grid, int edge) {
   start_workers();
   Job job;
@@ -127,8 +127,8 @@ void ImpostorCache::Impl::ask(Entry& entry, GridHandle handle, const SceneGrid& 
   if (is_new) wake.notify_one();
 }
 
-// What changed since the impostor that the job will find. That of another grid, which this one replaced or which
-// another scene has by the same handle, is not to be seen again.
+// Returns the changes since the impostor that the job will find. An impostor of another grid (replaced, or with the
+// same handle in another scene) is never used again.
 GridChanges ImpostorCache::Impl::changes_of(Entry& entry, const Job& job) {
   GridChanges changes{true, {}};
   const Origin* base = entry.building ? &*entry.building : entry.impostor != nullptr ? &entry.origin : nullptr;
@@ -141,7 +141,7 @@ GridChanges ImpostorCache::Impl::changes_of(Entry& entry, const Job& job) {
     release(entry);
     entry.is_replaced = entry.building.has_value();
   }
-  // What has, or had, a field is built anew.
+  // Grids that have or had a field are rebuilt from scratch.
   const bool has_field = job.grid.field.chunk_count() != 0 || !of_samples.empty();
   if (base->types == types_changed && base->edge == job.origin.edge && !has_field) changes = std::move(since);
   return changes;
@@ -255,13 +255,13 @@ void ImpostorCache::Impl::release(Entry& entry) {
   has_unused = true;
 }
 
-// What is being built, waits or was refused stays, without an impostor.
+// Entries that are being built, queued or refused stay, without an impostor.
 void ImpostorCache::Impl::drop(Entries::iterator entry) {
   release(entry->second);
   if (!entry->second.building && !entry->second.waiting && entry->second.refused_bytes == 0) entries.erase(entry);
 }
 
-// Makes room for so many bytes by dropping what was not used since `used_before`; whether that was possible.
+// Makes room for `bytes` by dropping impostors last used before `used_before`. Returns false if that is impossible.
 bool ImpostorCache::Impl::make_room(std::size_t bytes, std::uint64_t used_before) {
   while (stats.bytes + bytes > options.max_bytes) {
     auto oldest = entries.end();
@@ -277,7 +277,7 @@ bool ImpostorCache::Impl::make_room(std::size_t bytes, std::uint64_t used_before
   return true;
 }
 
-// Going by its own size, where it was refused, or the mean of those that were built.
+// Estimates by the entry's own refused size, or by the mean size of built impostors.
 bool ImpostorCache::Impl::has_room(const Entry& entry) {
   const std::size_t mean = stats.built == 0 ? 1 : built_bytes / stats.built;
   const std::size_t likely = std::max(entry.refused_bytes, mean);

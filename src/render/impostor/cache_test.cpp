@@ -100,7 +100,7 @@ TEST(ImpostorCache, ThoseOfAnotherScenesGridsAreNotSeenMeanwhile) {
   EXPECT_EQ(cache.wait(first.scene), 0U);
   ASSERT_NE(cache.find(first.scene, first.grids[0]), nullptr);
   EXPECT_EQ(cache.find(second.scene, second.grids[0]), nullptr);
-  // That of the first scene, which is asked for and not waited for, may be under way.
+  // The first scene's impostor is requested without waiting, so it may be under way.
   static_cast<void>(cache.find(first.scene, first.grids[0]));
   EXPECT_EQ(cache.find(second.scene, second.grids[0]), nullptr);
   EXPECT_EQ(cache.wait(second.scene), 0U);
@@ -238,7 +238,7 @@ TEST(ImpostorCache, CanEndInTheMiddle) {
   }
 }
 
-// What a frame of a game does: no more than look things up, whatever is built.
+// A game's frame only looks impostors up while any number is being built.
 TEST(ImpostorCache, EditsEveryFrameNeverWaitForABuild) {
   CacheWorld world(1);
   world.scene.edit(world.grids[0]).grid.fill_box({{0, 0, 0}, {160, 160, 160}}, 1);

@@ -30,8 +30,8 @@ class SurfaceCells {
   SurfaceCells(const std::vector<SeenFace>& faces, const ContentSphere& content, int edge, int log2_width);
 
   /// Returns cells of 2 voxels that show through the gaps between surfels: the faces that no view saw, and for each
-  /// surfel the nearest lattice cells below it whose corners are all solid. None of these reaches the field's surface,
-  /// so outlines stay. Cost: about 2 us per surfel.
+  /// surfel the nearest lattice cells below it whose corners are all solid. No cell reaches the field's surface, so
+  /// outlines stay. Cost: about 2 us per surfel.
   [[nodiscard]] static SurfaceCells behind(const std::vector<SeenFace>& faces, const DensityGrid& field,
                                            const ContentSphere& content, int edge);
 

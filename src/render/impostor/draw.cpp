@@ -40,7 +40,7 @@ class FarTile {
     lighting_->light(points_, lit);
     const SrgbEncoder& encode = SrgbEncoder::shared();
     for (std::size_t i = 0; i < lit.size(); ++i) {
-      // The minimum is taken second: what is not a number becomes 0.
+      // The minimum comes second, so that NaN becomes 0.
       const Vec3 colour = glm::min(glm::max(Vec3(0.0F), lit[i]), Vec3(1.0F));
       for (int channel = 0; channel < 3; ++channel) {
         picture_->colour.rgb[3 * pixels_[i] + static_cast<std::size_t>(channel)] = encode(colour[channel]);

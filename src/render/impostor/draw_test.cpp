@@ -1,4 +1,4 @@
-// Pictures of impostors beside those that are traced.
+// Compares impostor images with traced images.
 
 #include <algorithm>
 #include <array>
@@ -64,8 +64,8 @@ TEST(DrawImpostors, HasNoHolesInCrevices) {
   }
 }
 
-// Voxels are then far smaller than pixels, and what one ray a pixel meets is a matter of chance; measured: 0.9014 at
-// least (blobs at 16 pixels).
+// Voxels are then far smaller than pixels, so the single ray of a pixel hits them at random. Measured minimum: 0.9014
+// (blobs at 16 pixels).
 TEST(DrawImpostors, KeepsItsOutlineWhereItIsSmall) {
   for (const Model model : kModels) {
     World world(model);
@@ -225,7 +225,7 @@ TEST(DrawImpostors, HostilePlacesNeitherHangNorCrash) {
   EXPECT_EQ(pixels_at({std::numeric_limits<double>::quiet_NaN(), 0, -200}), 0);
   EXPECT_EQ(pixels_at({0, infinity, -200}), 0);
   EXPECT_EQ(pixels_at({0, 0, -1e7}), 0) << "under a pixel";
-  // Around the camera, or endlessly large or small: whatever they show.
+  // Around the camera, or extremely large or small: any image is accepted.
   static_cast<void>(pixels_at({60, 0, -1e-9}));
   static_cast<void>(pixels_at({0, 0, -1e-300}));
   static_cast<void>(pixels_at({1e300, 0, -1e-300}));

@@ -6,8 +6,7 @@
 namespace quoin {
 namespace {
 
-// Grids that are waited for at once where there is no limit of time; no more, so that what they take beyond the limit
-// of memory is little.
+// Number of grids to wait for at once without a time limit; small, so that memory beyond the limit stays small.
 constexpr std::size_t kAtOnce = 16;
 
 // The grids of the far ones, each once, in the order of the instances.

@@ -17,12 +17,12 @@ struct FarImpostors {
   static constexpr std::size_t kMaxBytes = std::size_t{1} << 30;  ///< of all grids; those beyond have none
 
   std::vector<FarInstance> instances;
-  std::map<GridHandle, std::shared_ptr<const Impostor>> kept;  ///< what they point to
+  std::map<GridHandle, std::shared_ptr<const Impostor>> kept;  ///< owns the impostors above
 };
 
-/// Has impostors built for what is Far among `selected`, and takes those that are ready when `seconds` have passed.
+/// Requests impostors for the Far instances in `selected`, and takes the ready ones after `seconds`.
 ///
-/// Without a limit of time it depends on the scene alone which instances have one: grids are taken in the order of the
+/// Without a time limit the scene alone decides which instances have an impostor: grids are taken in the order of the
 /// instances.
 [[nodiscard]] FarImpostors take_impostors(ImpostorCache& cache, const Scene& scene,
                                           std::span<const SelectedInstance> selected, double seconds,

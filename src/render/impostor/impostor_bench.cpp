@@ -72,8 +72,8 @@ void rebuild_terrain(benchmark::State& state) {
 }
 BENCHMARK(rebuild_terrain)->Name("impostor/terrain/edit")->Unit(benchmark::kMillisecond)->Iterations(10);
 
-// A flight with an edit a frame among 200 models, the largest of 256^3 voxels: what a frame's own thread pays for
-// impostors, while a worker builds them. Counters: milliseconds, of all frames.
+// A flight with one edit per frame among 200 models, the largest of 256^3 voxels: measures the frame thread's cost for
+// impostors while a worker builds them. Counters: milliseconds, over all frames.
 Scene models_of_a_flight() {
   Scene scene;
   const auto types = add_terrain_types(scene.types);

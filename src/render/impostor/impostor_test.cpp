@@ -1,4 +1,4 @@
-// The snapshots of an impostor: where they are taken from and what they hold.
+// The snapshots of an impostor: their viewpoints and contents.
 
 #include <quoin/render/impostor.h>
 

@@ -48,7 +48,7 @@ class LevelMaker {
   void end_group();
 
   ImpostorFaces::Level level_;
-  std::size_t side_ = 0;  // that of the next rectangle, at least
+  std::size_t side_ = 0;  // minimum side of the next rectangle
   Rectangle last_;
   Vec3 low_{0.0F};  // of the group that is being filled
   Vec3 high_{0.0F};

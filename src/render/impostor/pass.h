@@ -26,7 +26,7 @@ struct FarFaces {
   }
 };
 
-/// The far instances of one picture: which may show in which part of it, and what rays meet of them.
+/// The far instances of one image: the tiles where each may show, and the hits of rays on them.
 class ImpostorPass {
  public:
   static constexpr int kTile = raster::kTile;  ///< pixels; blocks of rays lie in one tile
@@ -35,16 +35,16 @@ class ImpostorPass {
   ImpostorPass(const SceneTracer& tracer, std::span<const FarInstance> far, const Camera& camera, int width,
                int height);
 
-  /// Whether anything may show in the tile from (`column`, `row`), multiples of kTile.
+  /// Returns true if an instance may show in the tile from (`column`, `row`), multiples of kTile.
   [[nodiscard]] bool may_show(int column, int row) const { return !bin_of(column, row).empty(); }
 
   /// Draws the impostors that show in that tile, for the rays of one sample of each pixel. Cost: about 10 ns per
   /// rectangle.
   void draw(int column, int row, int sample, raster::Canvas& canvas) const;
 
-  /// Puts what is nearer than `hits` into them: for the 4x4 pixels from (`column`, `row`), whose rays from the camera
-  /// these are. Faces and voxels are those that light the hit.
-  /// Requires: `canvas` is that of the tile.
+  /// Replaces `hits` by nearer hits on far instances, for the 4x4 pixels from (`column`, `row`), whose rays from the
+  /// camera are `rays_in_view`. Hits report the faces and voxels used for lighting.
+  /// Requires: `canvas` belongs to the tile.
   void find(int column, int row, const RayPacket& rays_in_view, const raster::Canvas& canvas, SceneHits& hits,
             FarFaces& faces) const;
 

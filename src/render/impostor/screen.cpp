@@ -74,7 +74,7 @@ raster::NearViews near_views(DVec3 towards) {
 
 }  // namespace
 
-// What of a content's sphere decides whether and where it is drawn.
+// The properties of a content sphere that decide if and where it is drawn.
 struct ImpostorScreen::Sphere {
   DVec3 seen{0.0};  // the centre: right, down, forward
   double radius = 0.0;

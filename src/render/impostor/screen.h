@@ -45,7 +45,7 @@ struct DrawnImpostor {
     raster::Share share;
   };
   static constexpr std::size_t kMaxParts = 3;
-  /// Those that are drawn, in this order. Crevices that no view looked into are drawn with level 0.
+  /// Returns the parts to draw, in order. Crevices that no view looked into are drawn with level 0.
   [[nodiscard]] std::span<const Part> parts(std::array<Part, kMaxParts>& room) const;
 };
 
@@ -54,7 +54,7 @@ class ImpostorScreen {
  public:
   ImpostorScreen(const Camera& camera, int width, int height);
 
-  /// Nothing for what draw_impostors leaves out, or what cannot show. `impostor` must outlive the result.
+  /// Returns nullopt for instances that draw_impostors skips or that cannot show. `impostor` must outlive the result.
   [[nodiscard]] std::optional<DrawnImpostor> drawn(const PlacedGrid& placed, std::int32_t index,
                                                    const Impostor& impostor) const;
 

@@ -111,8 +111,8 @@ class SeenAgain {
   const std::vector<std::uint32_t>* now_of_old_;
   std::vector<SeenFace>* now_;
   std::vector<std::uint32_t> found_;     // views by face; all 0 between calls
-  std::vector<std::uint32_t> shown_;     // those that are not
-  std::vector<std::uint32_t> affected_;  // may come more than once
+  std::vector<std::uint32_t> shown_;     // visible faces
+  std::vector<std::uint32_t> affected_;  // may contain duplicates
   raster::Canvas canvas_;
 };
 
@@ -127,7 +127,7 @@ std::vector<SeenFace> seen_of(const ImpostorFaces& faces) {
   return seen;
 }
 
-// The face beside another at the edge towards `sign` along `axis`: in the same plane, or around the edge.
+// Returns the adjacent face across the edge towards `sign` along `axis`: in the same plane, or around the edge.
 VoxelFace face_beside(const VoxelFace& face, int axis, int sign, const OccupancyTree& opaque) {
   IVec3 beside = face.voxel;
   beside[axis] += sign;

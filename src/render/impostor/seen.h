@@ -21,10 +21,10 @@ struct SeenFace {
   std::uint32_t views = 0;
 };
 
-/// All faces of a shell and of a field, with what the 26 snapshots of `edge` texels a side see of them: by side,
-/// neighbours mostly together. `field` is to outlive the result.
+/// Returns all faces of a shell and of a field with their visibility in the 26 snapshots of `edge` texels per side:
+/// sorted by side, neighbours mostly together. `field` must outlive the result.
 ///
-/// Source: all faces drawn from each view. Cost: about 10 ns a face and view.
+/// Source: all faces drawn from each view. Cost: about 10 ns per face and view.
 [[nodiscard]] std::vector<SeenFace> faces_seen_of(const ImpostorShell& shell, const FieldSurfels& field,
                                                   const IBox& box, const ContentSphere& content, int edge);
 
@@ -35,8 +35,8 @@ struct SeenFace {
 [[nodiscard]] std::vector<SeenFace> faces_seen_after(const ImpostorFaces& before, const ImpostorShell& shell,
                                                      const ContentSphere& content, std::span<const IBox> changed);
 
-/// Returns the faces that a ray for each texel meets, and those that share an edge with one of these (slivers that no
-/// texel's ray meets); in any number of faces. Cost: about 0.15 microseconds per covered texel.
+/// Returns the faces that one ray per texel meets, and faces that share an edge with one of them (slivers between the
+/// rays). Works for any number of faces. Cost: about 0.15 microseconds per covered texel.
 [[nodiscard]] std::vector<SeenFace> faces_seen_by_rays(const OccupancyTree& opaque, const ContentSphere& content,
                                                        int edge);
 

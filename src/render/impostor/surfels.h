@@ -18,14 +18,14 @@ struct FieldSurfels {
   std::vector<VoxelType> types;
 };
 
-/// All surfels of a field, sorted by `comes_before`; nothing where they would be more than `max_count`, or more than a
-/// quarter of them on what is at most three samples thick.
+/// Returns all surfels of a field, sorted by `comes_before`. Returns nullopt if there would be more than `max_count`,
+/// or if more than a quarter of them lie on parts at most three samples thick.
 ///
-/// Which:  where the surface crosses an edge of the lattice, along the axis of which the normal has 0.8 of its largest
-///         component or more than 0.55: so wherever the largest axis changes those of both sides overlap, and there is
-///         no gap.
-/// Normal: as that of a traced surface.
-/// Cost:   about a microsecond a surfel.
+/// Which:  lattice edges that the surface crosses, if the normal's component along the edge is at least 0.8 of its
+///         largest component or more than 0.55. So the surfels of both sides overlap where the largest axis changes,
+///         and there is no gap.
+/// Normal: the normal of the traced surface.
+/// Cost:   about a microsecond per surfel.
 [[nodiscard]] std::optional<FieldSurfels> surfels_of(const DensityGrid& field, std::size_t max_count);
 
 }  // namespace quoin

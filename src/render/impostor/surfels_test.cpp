@@ -1,4 +1,4 @@
-// Impostors of fields, beside the traced picture.
+// Compares impostors of fields with traced images.
 
 #include <cmath>
 #include <cstdio>
@@ -112,7 +112,7 @@ TEST(Surfels, RenderersDrawFarFieldsFromThem) {
   const Likeness found = likeness(traced, far);
   EXPECT_GE(found.overlap, 0.975);
   EXPECT_LE(found.difference, 6.0);
-  // Before a field that is near: what is drawn of the one says nothing of the other.
+  // In front of a near field: the drawing of each must not depend on the other.
   SceneGrid ground;
   ground.field.add_box({-300, -90, -300}, {300, -60, 300}, 3);
   world.scene.add_instance({"", world.scene.add_grid(std::move(ground))});

@@ -1,6 +1,6 @@
 #pragma once
 
-// Models, their impostors, and how like their pictures are to those that are traced.
+// Models, their impostors, and the similarity of their images to traced images.
 
 #include <algorithm>
 #include <array>
@@ -163,7 +163,7 @@ struct ImpostorWorld {
   }
 };
 
-// From a distance at which the sphere spans `pixels` of a square picture a little larger.
+// Places the camera where the sphere spans `pixels` of a slightly larger square image.
 inline Camera orbiting(const ImpostorWorld& world, double azimuth, double elevation, double roll, double pixels,
                        int size) {
   const double distance = 12.0 * world.radius;

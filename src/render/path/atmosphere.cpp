@@ -72,7 +72,7 @@ float along(float radius, float cosine, float t) {
   return std::sqrt(radius * radius + t * t + 2.0F * radius * cosine * t);
 }
 
-// What comes through from the top of the atmosphere to any height, from any angle at which no ground is in between.
+// Transmittance from the top of the atmosphere to any height, at any angle that is clear of the ground.
 class Transmittance {
  public:
   explicit Transmittance(const AirOptions& air) : table_(std::size_t{kAngles} * kHeights) {
@@ -269,7 +269,7 @@ class Dome {
            (entries_[index(i, j + 1)] * (1.0F - fx) + entries_[index(i + 1, j + 1)] * fx) * fy;
   }
 
-  // What a level ground gets of it.
+  // Returns the irradiance on level ground.
   [[nodiscard]] Vec3 on_level_ground() const {
     Vec3 level(0.0F);
     for (int j = 0; j < kHeight / 2; ++j) {

@@ -9,7 +9,7 @@ namespace quoin::path {
 /// A clear sky, and the sun through it, seen from the ground.
 struct AtmosphericSky {
   RadianceImage radiance;  ///< of all directions as EnvironmentLight has them; without the sun
-  Vec3 sunlight{0.0F};     ///< what comes through of the sun's light
+  Vec3 sunlight{0.0F};     ///< the transmitted sunlight
 };
 
 /// `to_sun`: unit, in the world. `irradiance`: of the sun before the air. Below the horizon the picture shows ground.

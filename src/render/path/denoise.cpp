@@ -13,8 +13,8 @@ namespace quoin::path {
 namespace {
 
 constexpr int kLevels = 5;             // with steps of 1 to 16 pixels
-constexpr float kLeastAlbedo = 1e-4F;  // by which light is divided
-constexpr float kAllowed = 2.0F;       // standard deviations by which light may differ
+constexpr float kLeastAlbedo = 1e-4F;  // lower bound of the divisor of light
+constexpr float kAllowed = 2.0F;       // largest difference of light, in standard deviations
 constexpr float kCurve = 32.0F;        // how fast other normals count less
 constexpr std::array kKernel = {1.0F / 16, 1.0F / 4, 3.0F / 8, 1.0F / 4, 1.0F / 16};
 
@@ -35,7 +35,7 @@ float likeness(const SurfacePart& a, const SurfacePart& b) {
   const float length2 = glm::dot(a.normal, a.normal) * glm::dot(b.normal, b.normal);
   if (!(length2 > 0.0F)) return 1.0F;
   const float cosine = glm::dot(a.normal, b.normal) / std::sqrt(length2);
-  // Beside it, not before or behind: along the normal no further than a third of the way between them.
+  // Next to it, not in front or behind: along the normal no farther than a third of the distance between them.
   const Vec3 way = b.place / b.samples - a.place / a.samples;
   const float along = glm::dot(way, a.normal) / std::sqrt(glm::dot(a.normal, a.normal));
   if (along * along > glm::dot(way, way) / 9.0F) return 0.0F;
@@ -82,7 +82,7 @@ class Denoiser {
     });
   }
 
-  // Calls `visit(part, light, weight)` for what is the same surface around a part, itself included.
+  // Calls `visit(part, light, weight)` for the parts of the same surface around a part, itself included.
   template <class Visit>
   void around(int x, int y, std::size_t slot, int radius, int step, Visit&& visit) const {
     const SurfacePart& own = parts_.at(index(x, y))[slot];
@@ -102,8 +102,8 @@ class Denoiser {
     }
   }
 
-  // The noise of one pixel's samples alone is too uncertain: that of those around it is taken with it. By how much
-  // pixels differ from each other is no noise: it may be the edge of a shadow.
+  // One pixel's noise estimate is too uncertain, so it is averaged with its neighbours. Differences between pixels are
+  // not noise: they may be the edge of a shadow.
   void begin() {
     for_each_part([&](int x, int y, std::size_t slot) {
       const SurfacePart& own = parts_.at(index(x, y))[slot];
@@ -126,8 +126,8 @@ class Denoiser {
   [[nodiscard]] Light smoothed(int x, int y, std::size_t slot, int step) const {
     const Light& own = now_[index(x, y)][slot];
     const float own_light = luminance(own.mean);
-    // By the light that comes back, not by that which falls on it: a channel of which a surface takes nearly all says
-    // little about that.
+    // Uses reflected light, not incident light: a channel that the surface mostly absorbs says little about incident
+    // light.
     Vec3 sum(0.0F);
     Vec3 whole(0.0F);
     float variances = 0.0F;

@@ -11,15 +11,15 @@
 
 namespace quoin::path {
 
-/// What a pixel shows of one surface: a face's plane in a grid, a field, the ground.
+/// The part of a pixel that shows one surface: a face's plane in a grid, a field, the ground.
 struct SurfacePart {
   std::uint32_t surface = 0;  ///< which; 0: none
   float samples = 0.0F;
   float square = 0.0F;  ///< sum of the squares of the light's luminance
   Vec3 light{0.0F};     ///< sums
   Vec3 albedo{0.0F};
-  Vec3 normal{0.0F};  ///< of what is curved; else 0
-  Vec3 place{0.0F};   ///< likewise, in view space
+  Vec3 normal{0.0F};  ///< of curved surfaces; otherwise 0
+  Vec3 place{0.0F};   ///< of curved surfaces, in view space; otherwise 0
 };
 
 /// The surfaces of a picture's pixels, each pixel's first few.
@@ -28,7 +28,8 @@ struct SurfacePart {
 class SurfaceParts {
  public:
   static constexpr std::size_t kOfPixel = 3;
-  static constexpr std::uint32_t kSky = 4;  ///< the surface of what lies behind fog and clouds where nothing does
+  static constexpr std::uint32_t kSky = 4;  ///< the surface of the background behind fog and clouds that hits no other
+                                            ///< surface
   using OfPixel = std::array<SurfacePart, kOfPixel>;
 
   SurfaceParts(int width, int height)
@@ -45,12 +46,12 @@ class SurfaceParts {
   std::vector<OfPixel> pixels_;
 };
 
-/// Replaces the light of a picture's surfaces by means over the same surface nearby, where they do not differ by more
-/// than their noise. What is none of the parts stays as it is, and so does every edge between surfaces, down to the
-/// share that each has of a pixel. `samples`: of each pixel.
+/// Replaces the light of an image's surfaces by means over the same surface nearby, within the limits of their noise.
+/// Light outside the parts is unchanged. Every edge between surfaces stays, down to each surface's share of a pixel.
+/// `samples`: per pixel.
 ///
 /// Source: the a-trous wavelets of H. Dammertz et al. (2010), guided by variance as in C. Schied et al. (2017); over
-///         the exact parts of pixels instead of whole ones.
+/// the exact parts of pixels instead of whole pixels.
 void denoise(const SurfaceParts& parts, int samples, Threads threads, PathPicture& picture);
 
 }  // namespace quoin::path

@@ -85,7 +85,7 @@ Vec3 agx(Vec3 colour) {
 }
 
 Vec3 toned(Vec3 light, float exposure, ToneCurve tone) {
-  // What is infinite or no number becomes what can be shown.
+  // Replaces infinite values and NaN by values that can be shown.
   constexpr float kMost = 1e6F;
   const Vec3 exposed = glm::min(glm::max(Vec3(0.0F), light * exposure), Vec3(kMost));
   switch (tone) {
@@ -121,7 +121,8 @@ Status check(const DevelopOptions& options) {
   return {};
 }
 
-// Means of `2 radius + 1` pixels along lines of `count` values that lie `step` apart; what lies outside is as the edge.
+// Computes means of `2 radius + 1` pixels along lines of `count` values with a stride of `step`. Values outside equal
+// the edge's.
 void blur_line(std::vector<Vec3>& values, std::size_t first, std::size_t step, int count, int radius,
                std::vector<Vec3>& line) {
   const auto at = [&](int i) -> Vec3& {
@@ -152,11 +153,11 @@ void blur(std::vector<Vec3>& values, int width, int height, double radius_x, dou
   }
 }
 
-// What light is before the tone curve: exposed, with what spreads from what is bright. `most`: of what spreads, so that
-// one pixel of a lamp does not fill the picture.
+// Returns the light before the tone curve: exposed, with bloom from bright pixels. `most` limits the bloom, so that one
+// pixel of a lamp does not fill the image.
 std::vector<Vec3> bloomed(const std::vector<Vec3>& light, int width, int height, float exposure, const Bloom& bloom) {
   constexpr float kMost = 64.0F;
-  constexpr float kWide = 4.0F;  // the widest spread beside the narrowest
+  constexpr float kWide = 4.0F;  // ratio of the widest to the narrowest blur
   constexpr std::array kSpreads = {0.25, 1.0};
   constexpr int kSpreadCount = static_cast<int>(kSpreads.size());
   const auto threshold = static_cast<float>(bloom.threshold);

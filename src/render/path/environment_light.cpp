@@ -9,7 +9,7 @@
 namespace quoin::path {
 namespace {
 
-constexpr float kLeastShare = 1e-3F;  // of the mean: what a picture's interpolation makes of black pixels is found too
+constexpr float kLeastShare = 1e-3F;  // of the mean: also samples black pixels, which interpolation can brighten
 
 // Sums of weights, to 1.
 void accumulate(std::span<const float> weights, std::span<float> sums) {

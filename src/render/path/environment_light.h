@@ -46,8 +46,8 @@ class EnvironmentLight {
   [[nodiscard]] float density_at(int x, int y, float sine) const;
 
   RadianceImage image_;
-  std::vector<float> rows_;     // sums of what is left of them, to 1; [height + 1]
-  std::vector<float> columns_;  // likewise in each row; [height][width + 1]
+  std::vector<float> rows_;     // cumulative shares of the rows, up to 1; [height + 1]
+  std::vector<float> columns_;  // cumulative shares within each row; [height][width + 1]
 };
 
 }  // namespace quoin::path

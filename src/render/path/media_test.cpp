@@ -103,7 +103,7 @@ TEST(PathMedia, WhiteFogAndCloudsCannotBeSeen) {
   EXPECT_NEAR(mean_red(fog), 1.0, 0.005);
 }
 
-// Black fog lets e^-length through, of what is seen and of what a surface gets.
+// Black fog transmits e^-length, for visible surfaces and for their lighting.
 TEST(PathMedia, WhatPassesFallsWithTheLength) {
   VoxelProperties lamp;
   lamp.colour = {255, 255, 255, 255};
@@ -127,7 +127,7 @@ TEST(PathMedia, WhatPassesFallsWithTheLength) {
   EXPECT_NEAR(mean_red(path_picture(floor, from_above(0.0, 30.0, 0.0, 4.0), options)), std::exp(-1.0), 0.004);
 }
 
-// Black clouds likewise; glass with edges counts as a voxel at least, clouds do not.
+// Black clouds also transmit e^-length. Glass with edges counts as at least one voxel; clouds do not.
 TEST(PathMedia, ABlackCloudOnlyTakesAway) {
   for (const int depth : {1, 6}) {
     const Scene scene = box_of(cloud_of({0, 0, 0, 255}, 0.25F), {{-20, -20, -depth}, {20, 20, 0}});

@@ -1,4 +1,4 @@
-// The parts of pictures by paths, each against what is known of it.
+// Tests the parts of the path tracer against analytic results.
 
 #include <array>
 #include <cmath>
@@ -82,7 +82,7 @@ TEST(PathScatter, ItsDensityIsThatOfItsSamples) {
   for (const Material& material : kMaterials) {
     const Vec3 out = glm::normalize(Vec3(0.6F, -0.2F, 0.5F));
     const Scatter scatter(material, out);
-    // The integral of the density over the hemisphere is what samples find; so is that of the value.
+    // Samples must match the integral of the density over the hemisphere, and the integral of the value.
     constexpr std::uint32_t kSamples = 1U << 16;
     double density = 0.0;
     Vec3 value(0.0F);
@@ -108,7 +108,7 @@ TEST(PathScatter, ItsDensityIsThatOfItsSamples) {
   }
 }
 
-// A white surface reflects all light, whatever its gloss.
+// A white surface reflects all light at any gloss.
 TEST(PathScatter, WhiteStaysWhite) {
   for (const float metal : {0.0F, 0.5F, 1.0F}) {
     for (const float rough : {0.0F, 0.1F, 0.25F, 0.5F, 0.75F, 0.99F, 1.0F}) {
@@ -131,7 +131,7 @@ TEST(PathScatter, ReciprocalGlossHasTheSameValueBothWays) {
   const Material metal{{0.9F, 0.6F, 0.3F}, 0.4F, 1.0F};
   const Vec3 a = glm::normalize(Vec3(0.4F, 0.1F, 0.8F));
   const Vec3 b = glm::normalize(Vec3(-0.5F, 0.3F, 0.6F));
-  // But for what is put back, which is of the direction of the one who looks.
+  // Except for the compensated energy, which depends on the view direction.
   const Vec3 one = Scatter(metal, a).value(b) / b.z;
   const Vec3 other = Scatter(metal, b).value(a) / a.z;
   EXPECT_NEAR(one.x / other.x, 1.0F, 0.05F);

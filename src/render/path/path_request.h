@@ -11,18 +11,18 @@
 
 namespace quoin::path {
 
-/// Of a pixel.
+/// Samples per pixel.
 inline constexpr int kMaxPathSamples = 65'536;
 
-/// What PathTracer::render refuses. Requires: the camera's axes are perpendicular.
+/// Returns an error for arguments that PathTracer::render rejects. Requires: the camera's axes are perpendicular.
 [[nodiscard]] Status check(const Camera& camera, const PathOptions& options);
 
 /// With room for all that the options ask for.
 [[nodiscard]] PathPicture empty_picture(const PathOptions& options);
 
-/// What a pixel's samples add up to.
+/// The sums over a pixel's samples.
 struct PixelSums {
-  Vec3 background{0.0F};  ///< what is seen of it
+  Vec3 background{0.0F};  ///< the visible part of the background
   Vec3 scene{0.0F};
   Vec3 caught{0.0F};  ///< background behind ground that only catches shadows
   Vec3 lit{0.0F};     ///< that ground

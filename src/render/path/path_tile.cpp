@@ -58,8 +58,8 @@ ShadeLight light_of(const SkyLight& sky, const PathLamps& lamps) {
   return light;
 }
 
-// By its direction: what lifts a point off a face, in the grid. Known before the program starts, so that pictures may
-// be taken for what is initialized then.
+// Offsets that move a point off a face, by direction, in the grid. Constant-initialised, so that static initialisers
+// may render images.
 constexpr std::array<DVec3, 6> lifts_off_faces() {
   std::array<DVec3, 6> lifts{};
   for (std::size_t face = 0; face < lifts.size(); ++face) {
@@ -133,9 +133,9 @@ bool PathTile::render(const std::function<bool(std::size_t)>& goes_on) {
   return true;
 }
 
-// A pixel's numbers go where its earlier ones were not. What is learned by these would lead to lamps by numbers that
-// are chance no more, and what they give would come out too dark; so from now on lamps are chosen by others. These are
-// spread as well as before, since a sequence's samples from one power of two to the next are.
+// Later points of a low-discrepancy sequence fill the gaps between earlier ones. Lamp choices learned from the earlier
+// points would then correlate with the later numbers and darken the image, so lamps are chosen by other numbers after
+// each step. These are spread equally well, since every power-of-two block of the sequence is.
 void PathTile::learn(int first) {
   static_assert(std::has_single_bit(static_cast<unsigned>(kSamplesAtOnce)));
   memory_.learn();
@@ -424,7 +424,7 @@ void PathTile::hit_matter(std::uint32_t index, const RayPacket& rays, const Scen
   vertex.in_view = context_->view->view_from_grid(vertex.placed).point(vertex.in_grid);
   vertex.material = {surface.colour, surface.roughness, surface.metalness};
   if (!path.is_noted) {
-    // What shines or glows differs by its type; what is matte differs by its colour alone.
+    // Emissive and glossy surfaces differ by type; matte surfaces differ by colour only.
     const bool is_matte = surface.roughness >= 1.0F && surface.metalness <= 0.0F && is_black(surface.emitted);
     note_part(path, vertex, surface_id(voxel, face, in_field, vertex.placed, is_matte ? kAir : type), in_field);
   }
@@ -671,7 +671,7 @@ void PathTile::trace_requests() {
     trace_request_packet(std::span(order_).subspan(first, end - first));
     first = end;
   }
-  // In the order in which they were asked, whatever that of the rays was.
+  // In the order of the requests, independent of the order of the rays.
   for (const Request& request : requests_) paths_[request.path].radiance += request.light;
 }
 

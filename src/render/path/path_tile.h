@@ -25,11 +25,11 @@
 
 namespace quoin::path {
 
-/// Of each placed grid, by the direction of a face: its normal in the world, unit.
+/// The unit world normals of each placed grid, by face direction.
 using FaceNormals = std::vector<std::array<Vec3, 6>>;
 [[nodiscard]] FaceNormals face_normals(std::span<const PlacedGrid> placed);
 
-/// What all tiles of a picture share.
+/// The data shared by all tiles of an image.
 struct TileContext {
   const SceneView* view = nullptr;
   std::span<const PlacedGrid> placed;         ///< of the view's tracer
@@ -44,12 +44,12 @@ struct TileContext {
   bool has_media = false;         ///< fog or clouds
 };
 
-/// One square of a picture.
+/// One square of an image.
 ///
-///   begin -> [ order -> meet -> shade by sixteens -> ask what shadows light ] until no path is left -> add
+///   begin -> [ order -> meet -> shade by sixteens -> trace shadow rays ] until no path is left -> add
 ///
-/// All paths of some samples go one step at a time, those that point the same way side by side, so that packets of rays
-/// are full and stay near each other. What a path finds depends on its pixel and sample alone.
+/// All paths of some samples advance one step at a time. Paths of similar direction are adjacent, so that ray packets
+/// are full and coherent. A path's result depends only on its pixel and sample.
 class PathTile {
  public:
   static constexpr int kEdge = 32;  ///< pixels
@@ -75,7 +75,7 @@ class PathTile {
     Path() {}              // NOLINT: a defaulted one is cleared whole before its members are made, which takes longer
     DVec3 origin{0.0};     // of its next ray, in view space
     Vec3 direction{0.0F};  // unit
-    float density = 0.0F;  // with which that was found; infinite where nothing else could find it
+    float density = 0.0F;  // density of the last sampled direction; infinite if no other strategy can sample it
     Vec3 throughput{1.0F};
     Vec3 radiance{0.0F};
     Vec3 normal{0.0F};  // where it was last scattered
@@ -101,7 +101,7 @@ class PathTile {
     std::int32_t placed = 0;
     DVec3 in_grid{0.0};  // a hundredth of a voxel above the surface, so that rays start before it
     DVec3 in_view{0.0};  // there
-    Vec3 normal{0.0F};   // in the world, on the side from which the path comes
+    Vec3 normal{0.0F};   // in the world, towards the path's origin
     Material material;
     std::int32_t place = 0;
     bool is_ground = false;
@@ -124,7 +124,7 @@ class PathTile {
     std::uint32_t bin = 0;
     std::int32_t lamp = -1;  // that sends it
     std::int32_t place = 0;
-    float brightness = 0.0F;  // of what the lamp sends there
+    float brightness = 0.0F;  // of the lamp's light at the point
   };
   struct Interval {
     double begin = 0.0;
@@ -142,7 +142,7 @@ class PathTile {
   void meet_packet(std::span<const std::uint32_t> paths);
   // A path that leaves the scene towards `direction`.
   void leave(Path& path, Vec3 direction);
-  // What a ray meets of glass before `t`, where it may meet some. Returns whether the path's ray ended there.
+  // Traces a ray through glass before `t`, if the scene has glass. Returns true if the path's ray ends there.
   bool meet_glass(std::uint32_t index, double t);
   bool pass_glass(std::uint32_t index);
   // Those bodies before the first of glass that scatter light.
@@ -157,7 +157,7 @@ class PathTile {
   bool enter_glass(std::uint32_t index);
   bool leave_glass(std::uint32_t index);
   void turn_at(Path& path, const DVec3& point, Vec3 direction, Vec3 normal, double lift, VoxelType inside);
-  // A ray of a packet, of what neither glass nor fog ends.
+  // Processes one ray of a packet that neither glass nor fog stops.
   void meet_lane(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane, double until);
   void hit_matter(std::uint32_t index, const RayPacket& rays, const SceneHits& hits, int lane);
   void hit_glass(std::uint32_t index, const GlassBody& body, const DVec3& normal_in_grid);
@@ -165,7 +165,7 @@ class PathTile {
   [[nodiscard]] double ground_at(const DVec3& origin, Vec3 direction) const;  // infinite: nowhere
   void add_emitted(Path& path, Vec3 emitted, std::int32_t lamp, float distance) const;
   void note_layers(Path& path, const Vertex& vertex, double t, VoxelType type);
-  // Likewise of what a path would meet without fog and clouds: whether it meets these is chance.
+  // Records the surface that a path would meet without fog and clouds, which it meets at random.
   void note_behind(Path& path, const SceneHits& hits, int lane, double t);
   // Which of the pixel's surfaces that is. `surface`: not 0.
   [[nodiscard]] SurfacePart& part_of(const Path& path);
@@ -174,7 +174,7 @@ class PathTile {
   void shade_all();
   [[nodiscard]] bool may_scatter(const Vertex& vertex) const;
   void put_into_block(const Vertex& vertex, std::size_t lane);
-  // Once the kernel knows of `block_` what it does.
+  // Scatters a path, from the kernel's results in `block_`.
   void shade(const Vertex& vertex, std::size_t lane);
   // Sends a path on that is scattered, into a direction of the world.
   void go_on(const Vertex& vertex, std::size_t lane, Vec3 normal, const Scattered& next);
@@ -193,7 +193,7 @@ class PathTile {
   int column_;
   int row_;
   double ground_ = 0.0;   // height in view space
-  double fog_top_ = 0.0;  // likewise
+  double fog_top_ = 0.0;  // the top of the fog
   std::int64_t rays_ = 0;
   const Kernel* kernel_;
   ShadeLight light_;

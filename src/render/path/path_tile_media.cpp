@@ -19,11 +19,11 @@ namespace {
 
 constexpr int kMostGlass = 64;  // surfaces of glass that a path meets between two others
 
-// Of a surface between two media, without polarisation; 1 where nothing gets through. `eta`: the index of the medium
-// from which light comes over that of the other; `cosine` of its angle, positive.
+// Refraction at a surface between two media, without polarisation; reflectance 1 on total reflection. `eta`: the
+// refractive index on the incident side over the index on the other side. `cosine`: of the incident angle, positive.
 struct Refraction {
   float mirrored = 1.0F;
-  float cosine = 0.0F;  // of what gets through
+  float cosine = 0.0F;  // of the transmitted direction
 };
 
 Refraction refraction(float cosine, float eta) {
@@ -116,7 +116,7 @@ bool PathTile::enter_glass(std::uint32_t index) {
   Vec3 normal(placed.world_axes * in_grid_normal);
   const float cosine = std::clamp(-glm::dot(normal, path.direction), 1e-4F, 1.0F);
   if (path.is_first) {
-    // What is mirrored, and what is seen through it, are one: which of them a path meets is chance.
+    // Reflection and transmission belong to one surface: a path chooses one of them at random.
     Vertex whole;
     whole.material.colour = Vec3(1.0F);
     note_part(path, whole, surface_id(body.voxel, body.face, body.in_field, body.placed, body.type), false);
@@ -140,7 +140,7 @@ bool PathTile::enter_glass(std::uint32_t index) {
   return true;
 }
 
-// A path within glass: to where the body ends, or to what stands in it.
+// Follows a path within glass to the end of the body, or to an object inside it.
 bool PathTile::leave_glass(std::uint32_t index) {
   Path& path = paths_[index];
   const Ray ray{path.origin, DVec3(path.direction)};
@@ -182,7 +182,7 @@ bool PathTile::leave_glass(std::uint32_t index) {
   return true;
 }
 
-// Sends a path on from a surface of glass, on that side to which `normal` points.
+// Continues a path from a glass surface, on the side of `normal`.
 void PathTile::turn_at(Path& path, const DVec3& point, Vec3 direction, Vec3 normal, double lift, VoxelType inside) {
   path.origin = point + DVec3(normal) * lift;
   path.direction = glm::normalize(direction);
@@ -244,7 +244,7 @@ void PathTile::hit_air(std::uint32_t index, double t, Vec3 colour, float anisotr
     sums.scene_share += 1.0F;
     if (path.is_first_sample) sums.depth = static_cast<float>(t);
   }
-  // It has no normal, and what lies behind is not what the pixel shows.
+  // Fog has no normal, and the pixel does not show the surface behind.
   if (!path.is_noted) sums.albedo += colour;
   path.is_noted = true;
   vertices_.push_back(vertex);

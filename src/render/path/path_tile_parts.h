@@ -18,16 +18,16 @@
 #include "render/path/kernel/kernel.h"
 #include "render/path/numbers/path_math.h"
 
-// What the two halves of PathTile share: path_tile.cpp has surfaces and light, path_tile_media.cpp glass, fog and
+// Shared by the two halves of PathTile: path_tile.cpp has surfaces and light, path_tile_media.cpp has glass, fog and
 // clouds.
 namespace quoin::path {
 
 inline constexpr double kInfinite = std::numeric_limits<double>::infinity();
-inline constexpr float kNoOther = std::numeric_limits<float>::infinity();  // a density beside which there is no other
-inline constexpr std::uint32_t kDimensions = 8;                            // of a vertex
+inline constexpr float kNoOther = std::numeric_limits<float>::infinity();  // a density without an alternative strategy
+inline constexpr std::uint32_t kDimensions = 8;                            // per vertex
 inline constexpr std::uint32_t kFog = 0x4000'0000;                         // added to a vertex's: numbers of their own
 inline constexpr std::uint32_t kFade = 0x5000'0000;
-inline constexpr std::uint32_t kGroundSurface = 2;  // beside what surface_id gives
+inline constexpr std::uint32_t kGroundSurface = 2;  // distinct from all results of surface_id
 
 // Of kBins.
 inline std::uint32_t bin_of(Vec3 direction) {
@@ -72,7 +72,7 @@ inline std::uint32_t surface_id(IVec3 voxel, Direction face, bool in_field, std:
   return mix_bits(id ^ static_cast<std::uint32_t>(type)) | 1U;
 }
 
-// How long a way is on which light is scattered `density` times by unit length, on average.
+// Returns a free path length in a medium that scatters `density` times per unit length on average.
 inline double free_way(float u, double density) {
   return -static_cast<double>(log_of_two(1.0F - u)) * std::numbers::ln2 / density;
 }

@@ -34,7 +34,7 @@ struct PathTracer::Impl {
     const std::lock_guard lock(mutex_);
     made_ = nullptr;
   }
-  // That of the last picture where it is the same.
+  // Returns the sky light; reuses the last image's if the sky is the same.
   [[nodiscard]] std::shared_ptr<const path::SkyLight> sky(const Look& look) {
     const std::lock_guard lock(mutex_);
     if (sky_ == nullptr || !path::is_same_sky(sky_of_, look)) {

@@ -179,7 +179,7 @@ TEST(PathTracer, TheSunLightsWhatFacesIt) {
   }
 }
 
-// The edge of a shadow is as wide as the sun's disc times the distance of what throws it.
+// A penumbra is as wide as the sun's disc times the distance of the occluder.
 TEST(PathTracer, APenumbraGrowsWithTheDistance) {
   Scene scene;
   const VoxelType type = add_type(scene, kWhite);
@@ -216,7 +216,7 @@ Grid voxel_sphere(int radius, VoxelType type) {
   return grid;
 }
 
-// White furnace: what reflects all light cannot be seen, of whatever gloss.
+// White furnace: a surface that reflects all light is invisible at any gloss.
 TEST(PathTracer, AWhiteBallInAWhiteSkyCannotBeSeen) {
   for (const auto& [rough, metal] : {std::pair{1.0F, 0.0F}, {0.4F, 0.0F}, {0.4F, 1.0F}, {0.0F, 1.0F}}) {
     Scene scene;
@@ -299,7 +299,7 @@ TEST(PathTracer, ALampOfABillionIsANumberAndNoPixelIsBrighterThanIt) {
   EXPECT_TRUE(develop(picture).has_value());
 }
 
-// Paths that find lamps by chance and those that aim at them agree: here a lamp without gloss beside mirrors.
+// Light from lamp hits and from lamp samples agrees: here a lamp without gloss next to mirrors.
 TEST(PathTracer, AimedAndFoundLightAgreeOnGloss) {
   for (const float rough : {0.15F, 0.35F, 0.6F}) {
     VoxelProperties walls = of_colour(kGrey);
@@ -443,7 +443,7 @@ TEST(PathTracer, AnEnvironmentOfOnePixelIsAUniformSky) {
   EXPECT_NEAR(light, 0.5F * linear_from_srgb(std::uint8_t{188}), 0.01F);
 }
 
-// Walls and covered lamps at random on a floor of 256 voxels, black but for the floor.
+// Random walls and covered lamps on a floor of 256 voxels; all black except the floor.
 Scene dim_yard() {
   Scene scene;
   const VoxelType floor = add_type(scene, kGrey);
@@ -471,7 +471,7 @@ Scene dim_yard() {
   return scene;
 }
 
-// A pixel is as large as a place: what is remembered there was found out by the pixel's own samples.
+// Each pixel covers one place, so the place learns from the pixel's own samples.
 TEST(PathTracer, WhatPlacesRememberOfLampsDarkensNothing) {
   const Scene scene = dim_yard();
   const PathTracer tracer(scene);

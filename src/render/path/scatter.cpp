@@ -12,8 +12,8 @@
 namespace quoin::path {
 namespace {
 
-constexpr float kDielectric = 0.04F;   // what it reflects of light that comes straight down: glTF's 1.5
-constexpr float kMirrorAlpha = 1e-4F;  // gloss that is sharper is a mirror
+constexpr float kDielectric = 0.04F;   // reflectance of a dielectric at normal incidence: glTF's index 1.5
+constexpr float kMirrorAlpha = 1e-4F;  // smaller values are mirrors
 
 float schlick(float cosine) {
   const float x = std::clamp(1.0F - cosine, 0.0F, 1.0F);
@@ -37,7 +37,7 @@ float microfacets(Vec3 out, Vec3 in, Vec3 half, float alpha) {
   return ggx * shadowing / (4.0F * out.z);
 }
 
-// With which visible_normal leads to `in`, by solid angle of `in`.
+// Returns the probability density of `in` in visible_normal, per solid angle.
 float microfacet_density(Vec3 out, Vec3 half, float alpha) {
   const float alpha2 = alpha * alpha;
   const float d = 1.0F + (alpha2 - 1.0F) * half.z * half.z;
@@ -140,7 +140,7 @@ Scatter::Scatter(const Material& material, Vec3 out) : out_(out), colour_(materi
   const Vec3 by_dielectric = rough < 1.0F ? reflected_of(Vec3(kDielectric), dielectric_gain) : Vec3(0.0F);
   metal_gain_ = metal_gain * metal;
   dielectric_gain_ = dielectric_gain * (1.0F - metal);
-  // glTF mixes a metal with a dielectric, whose gloss alone is above what is matte.
+  // glTF mixes a metal with a dielectric; only the dielectric has a matte layer below its gloss.
   matte_ *= 1.0F - std::min(by_dielectric.x, 1.0F);
   const float shine = largest(reflected_of(colour_, metal_gain) * metal + by_dielectric * (1.0F - metal));
   const float below = largest(matte_);

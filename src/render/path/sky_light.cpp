@@ -11,7 +11,7 @@
 namespace quoin::path {
 namespace {
 
-// About the vertical: what is in front of -z goes towards +x.
+// Rotates about the vertical: -z turns towards +x.
 Vec3 turned(Vec3 v, SineCosine by) {
   return {v.x * by.cosine - v.z * by.sine, v.y, v.x * by.sine + v.z * by.cosine};
 }

@@ -12,7 +12,7 @@
 
 namespace quoin::path {
 
-/// Whether skies are the same; the rest of a look does not matter to them.
+/// Returns true if the skies of both looks are the same; their other settings are ignored.
 [[nodiscard]] bool is_same_sky(Look a, const Look& b);
 
 /// The sun and the sky of a picture. Cost: of a physical sky 70 ms.
@@ -21,21 +21,22 @@ class SkyLight {
   /// Requires: `check` accepts the options.
   explicit SkyLight(const Look& options);
 
-  /// What a ray meets that leaves the scene: without the sun, and the sun alone. `direction`: unit, in the world.
+  /// Returns the light of a ray that leaves the scene: the sky without the sun, and the sun alone. `direction`: unit,
+  /// in the world.
   [[nodiscard]] Vec3 sky(Vec3 direction) const;
   [[nodiscard]] Vec3 sun(Vec3 direction) const;
 
-  /// Whether there is a sun to sample.
+  /// Returns true if there is a sun to sample.
   [[nodiscard]] bool has_sun() const { return largest(sunlight_) > 0.0F; }
   [[nodiscard]] SkySample sample_sun(Pair u) const;
-  /// That of such a direction.
+  /// Returns the sun sample for a given direction.
   [[nodiscard]] SkySample sun_sample(Vec3 direction) const;
-  /// What a surface gets of it that faces it.
+  /// Returns the irradiance of a surface that faces the sun.
   [[nodiscard]] Vec3 sun_irradiance() const { return sunlight_; }
-  /// With which `sample_sun` finds a direction.
+  /// Returns the probability density of a direction in `sample_sun`.
   [[nodiscard]] float sun_density(Vec3 direction) const;
 
-  /// Whether the sky is so uneven that it is sampled by itself.
+  /// Returns true if the sky is uneven enough to be importance sampled.
   [[nodiscard]] bool has_uneven_sky() const { return is_uneven_; }
   /// Requires: has_uneven_sky().
   [[nodiscard]] SkySample sample_sky(Pair u) const;
@@ -55,8 +56,8 @@ class SkyLight {
  private:
   SkyModel model_;
   Vec3 to_sun_{0.0F, 1.0F, 0.0F};
-  Vec3 sunlight_{0.0F};        // irradiance of what faces the sun
-  float one_less_cos_ = 0.0F;  // of half the angle of its disc; 0: it has none
+  Vec3 sunlight_{0.0F};        // irradiance of a surface that faces the sun
+  float one_less_cos_ = 0.0F;  // of the disc's half angle; 0: no disc
   float brightness_ = 1.0F;
   Vec3 uniform_{1.0F};
   SkyColours gradient_;

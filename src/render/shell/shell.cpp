@@ -11,7 +11,7 @@ namespace {
 constexpr int kCellsAChunk = 16;
 constexpr int kCellsABrick = 4;
 
-// How many cells along each axis touch the box or lie beside one that does.
+// Returns the number of cells along each axis that touch the box or adjoin such a cell.
 IVec3 cells_around(const IBox& box) {
   return ((box.max - 1) >> 2) - (box.min >> 2) + 3;
 }

@@ -25,17 +25,17 @@ struct VoxelFace {
 /// side.
 [[nodiscard]] std::uint64_t exposed_bits(std::uint64_t own, std::uint64_t next, Direction direction);
 
-/// The faces between the voxels of a tree and what is not of them, as bits over the box around these voxels.
+/// The faces between a tree's voxels and other cells, as bits over the box around these voxels.
 ///
-/// Memory: a bit a voxel of the box and of what lies within four voxels of it.
+/// Memory: one bit per voxel of the box and of its margin of four voxels.
 class ImpostorShell {
  public:
-  /// None where the box and what it keeps around it have more than `max_voxels`, or there are more than `max_faces`.
+  /// Returns nullopt if the box with its margin has more than `max_voxels`, or if there are more than `max_faces`.
   static std::optional<ImpostorShell> build(const OccupancyTree& tree, std::int64_t max_voxels, std::int64_t max_faces);
 
   /// In the order of `comes_before`.
   [[nodiscard]] std::vector<VoxelFace> faces() const;
-  /// Requires: `voxel` is at most one beside the box.
+  /// Requires: `voxel` is at most one voxel outside the box.
   [[nodiscard]] bool is_occupied(IVec3 voxel) const {
     const IVec3 local = voxel - origin_;
     QUOIN_ASSERT((IBox{IVec3{0}, size_ * 4}.contains(local)), "at most one beside the box");

@@ -5,8 +5,8 @@
 
 #include "core/instruction_set.h"
 
-// What is compiled for each instruction set: which triangle is nearest, for a row of voxels. Every kernel gives the
-// same bits.
+// The kernel compiled for each instruction set: the nearest triangle for a row of voxels. Every kernel gives the same
+// bits.
 
 namespace quoin::voxelizing {
 
@@ -32,13 +32,13 @@ struct Kernel {
   void (*update_row)(const TriangleInRow& triangle, int first, int end, float* squared, std::int32_t* nearest);
 };
 
-// Those of wider instructions are there only where they are compiled; tables have what there is.
+// Kernels of wider instruction sets exist only where they are compiled; the tables list the compiled ones.
 extern const Kernel kPlainKernel;
 extern const Kernel kAvx2Kernel;
 extern const Kernel kAvx512Kernel;
 extern const KernelTable<Kernel> kKernels;
 
-/// That of the widest instructions that this machine has.
+/// Returns the kernel with the widest instructions that this machine has.
 [[nodiscard]] inline const Kernel& kernel() {
   return kKernels.widest();
 }

@@ -9,7 +9,7 @@ namespace {
 using lanes::F;
 using lanes::I;
 
-// More than any square of a distance, times what lies outside a triangle.
+// Larger than any squared distance; marks voxels outside the triangle's prism.
 constexpr float kFar = 1e30F;
 
 constexpr float kSteps[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
@@ -34,7 +34,7 @@ void update_row(const TriangleInRow& triangle, int first, int end, float* square
   for (int i = first & -lanes::kWidth; i < end; i += lanes::kWidth) {
     const F x = lanes::all(static_cast<float>(i)) + steps;
     const F to_edges = lanes::min(lanes::min(edge_squared(a, x), edge_squared(b, x)), edge_squared(c, x));
-    // What is not beside the triangle's face is as far as its edges say: the face is made far away there.
+    // Voxels that do not project onto the face use the edge distances: the face is pushed far away there.
     const F out = lanes::max(lanes::max(outside(a, x), outside(b, x)), lanes::max(outside(c, x), lanes::all(0.0F)));
     const F plane = lanes::all(triangle.plane) + x * lanes::all(triangle.plane_x);
     const F to_face = plane * plane + (lanes::all(triangle.flat) + out) * lanes::all(kFar);

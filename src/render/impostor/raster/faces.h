@@ -36,18 +36,17 @@ struct ImpostorFaces {
   struct Cell {
     Vec3 corner{0.0F};                                 ///< the least one, voxels from the content's centre
     std::uint64_t bits = 0;                            ///< bit x + 4 y + 16 z
-    std::array<std::uint32_t, kImpostorViews> face{};  ///< index into `faces`: one that the view saw here
+    std::array<std::uint32_t, kImpostorViews> face{};  ///< index into `faces` of a face that the view saw in this cell
     bool operator==(const Cell&) const = default;
   };
 
-  /// The rectangles that are drawn at one size: arrays over rectangles, by direction, those that lie along the axes
-  /// before those that are inclined (surfels). Each direction's number is rounded up to whole groups with rectangles
-  /// that no view saw.
+  /// The rectangles drawn at one size: arrays over rectangles, by direction, axis-aligned rectangles before inclined
+  /// ones (surfels). Each direction's count is rounded up to whole groups with rectangles that no view saw.
   ///
-  /// Level 0 holds the faces and surfels themselves. Each coarser level holds the sides of boxes, one around all that
-  /// shows in a Cell. A ray that meets a box is followed through the bits of its cell. Boxes and bits contain every
-  /// face of a voxel, and lie closed below surfels, so a ray that meets the grid's surface meets a bit: no level has
-  /// holes.
+  /// Level 0 holds the faces and surfels themselves. Each coarser level holds the sides of boxes, one around the
+  /// visible content of a Cell. A ray that meets a box is followed through the bits of its cell. Boxes and bits contain
+  /// every face of a voxel and form a closed layer below surfels, so a ray that meets the grid's surface meets a bit:
+  /// no level has holes.
   struct Level {
     std::array<std::vector<float>, 3> centre;       ///< of the rectangle, voxels from the content's centre
     std::vector<std::uint32_t> views;               ///< bit i: view i saw it; coarser levels: all
@@ -62,35 +61,35 @@ struct ImpostorFaces {
     float size = 0.0F;  ///< no coordinate is larger
 
     [[nodiscard]] std::size_t count() const { return views.size(); }
-    /// The distance, in voxels, beyond a rectangle's sides at which rays still meet it: rectangles that share an edge
-    /// meet at points that differ by rounding.
+    /// Returns the tolerance, in voxels, beyond a rectangle's sides where rays still meet it: rectangles that share an
+    /// edge meet at points that differ by rounding.
     [[nodiscard]] float room() const { return 1e-5F + 2e-6F * size; }
   };
 
-  /// What is the same at all levels.
+  /// The properties of a face that are the same at all levels.
   struct Face {
     IVec3 voxel{0};
     VoxelType type = kAir;
     std::uint8_t occlusion = 0;  ///< of the four corners, two bits each
     Direction direction : 3 = Direction::PosX;
     std::uint8_t open_rays : 4 = kRays;  ///< of so many occlusion rays from the face's middle
-    bool in_field : 1 = false;           ///< a surfel: `direction` is that to which its normal is near
+    bool in_field : 1 = false;           ///< a surfel: `direction` is the axis direction nearest to its normal
     static constexpr int kRays = 9;
   };
 
   /// Rays of light start so high above a surfel, since it is flat and the surface is curved.
   static constexpr float kSurfelLift = 0.5F;
 
-  /// A piece of a field's surface, where that crosses an edge of the lattice of samples: of a plane through that point
-  /// what lies within half a sample to each side of the edge, or up to where the surface ends there, at a sharp edge or
-  /// the foot of a wall. `Face::voxel` is the edge's lower end, `direction` along it. So the surfels of one direction
-  /// lie side by side as the lattice's edges do.
+  /// A piece of a field's surface at its crossing with an edge of the sample lattice. It is part of the plane through
+  /// the crossing: half a sample to each side of the edge, or less if the surface ends sooner, at a sharp edge or the
+  /// foot of a wall. `Face::voxel` is the edge's lower end, `direction` runs along the edge. So the surfels of one
+  /// direction lie side by side like the lattice edges.
   struct Surfel {
-    Vec3 normal{0.0F};             ///< with which it is lit
-    float offset = 0.0F;           ///< of its middle from the edge's lower end, along the direction's axis
+    Vec3 normal{0.0F};             ///< normal for lighting
+    float offset = 0.0F;           ///< of its centre from the edge's lower end, along the direction's axis
     std::array<float, 2> shift{};  ///< the same along kFaceFrames' u and v
     std::array<float, 2> half{};   ///< from the middle to the sides along these, at most 1: whole 1/1,024
-    /// How much the plane rises along the direction's axis by a sample along these.
+    /// Rise of the plane along the direction's axis per sample along the other two axes.
     std::array<float, 2> slope{};
 
     /// Returns its middle. `lower_end`: of the lattice's edge that it lies on.
@@ -110,15 +109,15 @@ struct ImpostorFaces {
     }
   };
   static constexpr float kSurfelRoom =
-      0.05F;  ///< by which rays meet a surfel beyond its edges, since they are not flush
+      0.05F;  ///< tolerance beyond a surfel's edges for rays, since surfels are not flush
 
   int edge = 0;           ///< texels a side of the snapshots
   int first_width = 0;    ///< log2 of the width in voxels of level 0's cells; 0: level 0 holds the faces themselves
   bool is_whole = false;  ///< `faces` are all that the opaque voxels have, in the order of ImpostorShell::faces
   DVec3 centre{0.0};      ///< of the content, in the grid
   std::array<Level, kLevels> levels;
-  /// Faces in crevices that no snapshot shows but a camera may see: drawn after level 0, where nothing of that level
-  /// hides them. Empty for grids with so many faces that level 0 holds cells.
+  /// Faces in crevices that no snapshot shows but a camera may see: drawn after level 0, if no face of that level hides
+  /// them. Empty for grids with so many faces that level 0 holds cells.
   ///
   /// If level 0 holds surfels: cells of such faces and of the solid behind the surfels; see SurfaceCells::behind.
   Level unseen;

@@ -16,7 +16,7 @@ inline constexpr int kTile = 32;  ///< pixels a side
 inline constexpr int kBlock = 4;
 inline constexpr std::size_t kPixels = std::size_t{kTile} * kTile;
 
-/// Where pixel (x, y) lies among the numbers of a tile: 4x4 pixels together, lane x + 4 y.
+/// Returns the index of pixel (x, y) in a tile's arrays: 4x4 pixels together, lane x + 4 y.
 [[nodiscard]] constexpr std::size_t index_of(int x, int y) {
   const int block = y / kBlock * (kTile / kBlock) + x / kBlock;
   return static_cast<std::size_t>(block * kBlock * kBlock + y % kBlock * kBlock + x % kBlock);
@@ -68,10 +68,10 @@ struct NearViews {
   }
 };
 
-/// What is drawn from where.
+/// The input of a draw: faces and viewpoint.
 struct Job {
   const ImpostorFaces::Level* level = nullptr;
-  std::uint32_t views = 0;  ///< faces that none of these saw are left out
+  std::uint32_t views = 0;  ///< only faces that one of these views saw are drawn
   std::int32_t id = 0;
   Share share;  ///< of the pixels
   NearViews near;
@@ -133,7 +133,7 @@ struct Met {
   return level.cells.empty() ? at : level.cells[at].face[met.view];
 }
 
-/// What is nearest so far, in the order of index_of.
+/// The nearest hit of each pixel so far, in the order of index_of.
 struct Canvas {
   alignas(64) std::array<float, kPixels> depth{};        ///< infinite: nothing
   alignas(64) std::array<std::int32_t, kPixels> id{};    ///< of the job
@@ -146,15 +146,15 @@ struct Canvas {
   void set_pattern(int column, int row, std::uint32_t sample);
 };
 
-/// Puts each face where a pixel's ray meets it, if it is nearer than what is there, or as near and of a lower id, or
-/// the lower face of that id.
+/// Writes each face to the pixels whose rays meet it, if it is nearer than the stored hit. Ties go to the lower id,
+/// then to the lower face.
 using Draw = void (*)(const Job& job, Canvas& canvas);
 
 extern const Draw kDrawPlain;
 extern const Draw kDrawAvx2;
 extern const Draw kDrawAvx512;
 
-/// That of the widest instructions that this machine has. Every one writes the same bits.
+/// Returns the kernel with the widest instructions that this machine has. Every kernel writes the same bits.
 [[nodiscard]] Draw draw();
 
 }  // namespace quoin::raster

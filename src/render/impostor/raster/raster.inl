@@ -1,7 +1,7 @@
 // The kernel of raster.h for lanes of any width, each of which holds a face.
 //
-//   Groups      boxes around 16 rectangles   | box 0 | box 1 | ...      which pixels of the tile may each show in?
-//     Level       rectangles of one side       | 0 | 1 | ...              which pixels may each show in?
+//   Groups      boxes around 16 rectangles   | box 0 | box 1 | ...      find the tile's pixels where each may show
+//     Level       rectangles of one side       | 0 | 1 | ...              find the pixels where each may show
 //       pixels      one of each lane's rectangle, until the largest has none left
 
 #pragma once
@@ -145,7 +145,7 @@ inline void put(const Job& job, std::size_t side, float x, float y, float depth,
   canvas.face[pixel] = met;
 }
 
-// Puts what rays meet in place.
+// Writes the faces that rays met to the canvas.
 inline void put_met(const Job& job, const Side& side, F x, F y, F depth, Mask met, std::size_t first, Canvas& canvas) {
   std::uint32_t left = bits(met);
   if (left == 0) return;
@@ -235,7 +235,7 @@ void draw_group(const Job& job, const Side& side, std::size_t begin, Canvas& can
   }
 }
 
-// Whether what is there is nearer than `depth` in all blocks that an area touches.
+// Returns true if the stored hits are nearer than `depth` in all blocks that an area touches.
 inline bool is_hidden(int left, int top, int right, int bottom, float depth, const Canvas& canvas) {
   for (int y = top / kBlock; y <= bottom / kBlock; ++y) {
     for (int x = left / kBlock; x <= right / kBlock; ++x) {
@@ -286,7 +286,7 @@ void find_furthest(const Job& job, Canvas& canvas) {
   }
 }
 
-// Whether any ray goes against the normal. What is linear is least or greatest in a corner.
+// Returns true if any ray goes against the normal. A linear function has its extremes in a corner.
 bool is_seen(const Job& job, const Side& side) {
   const auto at = [&](int x, int y) {
     const float direction = job.direction.at[side.axis] + job.direction.x[side.axis] * static_cast<float>(x) +

@@ -77,7 +77,7 @@ struct Met {
   int face = -1;
 };
 
-// What a pixel's ray meets first, and how clearly.
+// Returns the first face that a pixel's ray meets, and the margin of that choice.
 Met met_by(const Shape& shape, const raster::Aim& aim, std::uint32_t views, double x, double y) {
   DVec3 origin = -(aim.right * aim.centre.x + aim.down * aim.centre.y + aim.forward * aim.centre.z);
   DVec3 direction = aim.forward;

@@ -9,8 +9,8 @@
 
 namespace quoin::path {
 
-/// Light in 32 bits: three parts of 9 bits under one exponent of 5. The greatest part is off by at most 1/512 of it,
-/// what is above `kMaxPackedLight` or below 0 becomes that.
+/// Light in 32 bits: three parts of 9 bits with a shared 5-bit exponent. The relative error of the largest part is at
+/// most 1/512. Values are clamped to [0, `kMaxPackedLight`].
 ///
 ///   bit 31     27 26      18 17       9 8        0
 ///       | exponent | blue    | green   | red     |

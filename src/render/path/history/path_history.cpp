@@ -27,7 +27,7 @@ std::size_t pixel_count(int width, int height) {
   return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
 }
 
-/// Where a pixel of a picture lies among the pixels of a smaller one along an axis.
+/// The position of a pixel among the pixels of a smaller image along one axis.
 struct Between {
   int low = 0;
   int high = 0;
@@ -77,7 +77,7 @@ std::vector<float> sums_around(const std::vector<float>& values, int width, int 
   return sums_along(Along::Columns, sums_along(Along::Rows, values, width, height, threads), width, height, threads);
 }
 
-/// The mean of a picture over what a pixel of a smaller one shows of it.
+/// Returns an image's mean over the area of a pixel of a smaller image.
 Vec3 mean_over(const std::vector<std::uint32_t>& light, int width, int height, int x, int y, int of_width,
                int of_height) {
   const auto first = [](int at, int size, int of_size) {
@@ -111,7 +111,7 @@ void PathHistory::clear() {
 }
 
 void PathHistory::note_edit() {
-  // What is kept of earlier scenes is finer than all since: see `refine`.
+  // Images of earlier scenes are finer than all later ones: see `refine`.
   if (earlier_.empty()) earlier_ = std::move(now_);
   now_.clear();
 }
@@ -134,7 +134,7 @@ void PathHistory::refine(PathPicture& picture, int samples, Threads threads) {
   Taken taken{picture.width, picture.height, samples, std::vector<std::uint32_t>(picture.radiance.size())};
   std::transform(picture.radiance.begin(), picture.radiance.end(), taken.light.begin(), pack_light);
   if (!earlier_.empty() && !is_finer(earlier_.back(), taken)) earlier_.clear();
-  // Whoever begins again from few samples, without an edit, goes on from those.
+  // A restart from few samples without an edit continues from these images.
   while (!now_.empty() && !is_finer(taken, now_.back())) now_.pop_back();
   now_.push_back(std::move(taken));
   const Taken* before = find_earlier(picture.width, picture.height, samples);
@@ -143,8 +143,8 @@ void PathHistory::refine(PathPicture& picture, int samples, Threads threads) {
   combine(*before, best, shares(now_.back(), *before, best, threads), threads, picture);
 }
 
-// For two pictures of equal noise around the same light, of which a share is common, the mean square of their
-// difference is 2 * (1 - share) times that of the noise.
+// For two images of equal noise around the same light that have a share of samples in common, the mean square of their
+// difference is 2 * (1 - share) times the noise variance.
 std::vector<float> PathHistory::shares(const Taken& now, const Taken& before, const Taken& best, Threads threads) {
   std::vector<float> change(now.light.size());
   std::vector<float> noise(now.light.size());
@@ -173,7 +173,7 @@ void PathHistory::combine(const Taken& before, const Taken& best, const std::vec
                           PathPicture& picture) {
   const int of_width = picture.width;
   const int of_height = picture.height;
-  // One that is as large is changed in its place: each pixel is read before it is written, and by no other.
+  // An image of the same size is changed in place: each pixel is read before it is written, and by no other pixel.
   PathPicture smaller;
   const bool is_as_large = of_width == best.width && of_height == best.height;
   if (!is_as_large) {

@@ -31,7 +31,7 @@ using render_test::towards;
 using render_test::under_even_sky;
 
 constexpr int kEdge = 48;             // of pictures, in pixels
-constexpr IVec3 kTower{-16, 0, -16};  // what is built on the meadow
+constexpr IVec3 kTower{-16, 0, -16};  // the tower built on the meadow
 constexpr std::array kSamples{1, 4, 16, 64};
 
 float greatest_difference(const PathPicture& a, const PathPicture& b, int from_x = 0) {
@@ -200,7 +200,7 @@ TEST_F(PathHistoryTest, ShowsWhatTheNewSceneShowsInTheMean) {
   for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(all[axis] / right[axis], 1.0, 0.008);
 }
 
-// What shines through a window is found by few samples: where they find none, nothing tells that the window is gone.
+// Few samples find a light behind a window: samples that miss it do not show that the window is gone.
 TEST(PathHistory, ARoomThatIsWalledUpBecomesDarkWithinAFewSamples) {
   constexpr IBox kWindow{{32, 12, 12}, {33, 18, 18}};
   Scene scene;

@@ -5,9 +5,9 @@
 
 #include "core/instruction_set.h"
 
-// What is compiled for each instruction set of pictures by paths: random numbers, the choice of a lamp, and how matte
-// surfaces scatter light, for sixteen points side by side. Every kernel gives the same bits, those of path_random.h,
-// path_math.h, Scatter and SkyLight.
+// The path tracing code compiled for each instruction set: random numbers, the choice of a lamp, and the scattering of
+// light by matte surfaces, for sixteen points at once. Every kernel gives the same bits as path_random.h, path_math.h,
+// Scatter and SkyLight.
 
 namespace quoin::path {
 
@@ -16,13 +16,13 @@ constexpr std::size_t kBlockPoints = 16;
 template <class T>
 using BlockLanes = T[kBlockPoints];
 
-/// How much light a node of a tree over lamps may send, for what LightTree asks of it.
+/// The measures of a light tree node that bound the light it may send; used by LightTree.
 struct LampMeasures {
   float middle[3] = {0.0F, 0.0F, 0.0F};
   float power = 0.0F;
   float half[3] = {0.0F, 0.0F, 0.0F};  ///< of its box's size
   float squared = 1e-12F;              ///< of that half's length, at least a little
-  /// What shines to one side has an axis; `beyond` is how far the box reaches along it. Else 0 and infinity.
+  /// One-sided lamps have an axis; `beyond` is the extent of the box along it. Otherwise 0 and infinity.
   float axis[3] = {0.0F, 0.0F, 0.0F};
   float beyond = 0.0F;
 };
@@ -46,16 +46,16 @@ struct alignas(64) LampBlock {
   BlockLanes<float> probability = {};
 };
 
-/// Where paths are scattered.
+/// Points where paths are scattered.
 struct alignas(64) ShadeBlock {
   // Asked.
   BlockLanes<std::uint32_t> pixel = {};  ///< Random's
   BlockLanes<std::uint32_t> sample = {};
   BlockLanes<std::uint32_t> dimension = {};  ///< of the vertex
   BlockLanes<float> direction[3] = {};       ///< unit, of the path that comes
-  BlockLanes<float> colour[3] = {};          ///< of what is matte
+  BlockLanes<float> colour[3] = {};          ///< of matte surfaces
   BlockLanes<float> throughput[3] = {};
-  std::uint32_t in_air = 0;  ///< those that have no normal
+  std::uint32_t in_air = 0;  ///< points without a normal
 
   /// Asked, and turned a little where it looks away from the path.
   BlockLanes<float> normal[3] = {};
@@ -69,15 +69,15 @@ struct alignas(64) ShadeBlock {
   BlockLanes<float> next_density = {};  ///< of it, by solid angle; 0: the path ends
   BlockLanes<std::int32_t> next_bin = {};
 
-  LampBlock lamps;  ///< of which `u` and `normal` are filled in
+  LampBlock lamps;  ///< `u` and `normal` are set
 };
 
-/// What is the same for all points of a picture.
+/// The lighting data shared by all points of an image.
 struct ShadeLight {
   const LampBranch* lamps = nullptr;  ///< null: there are none
-  /// Tables of what counts of each node; the first entry of each is 1.
+  /// Tables of the learned share of each node; the first entry of each is 1.
   const float* shares = nullptr;
-  std::uint32_t lamp_numbers = 0;  ///< for those that lamps are chosen by, bits of `pixel` that are turned over
+  std::uint32_t lamp_numbers = 0;  ///< bits of `pixel` flipped in the random numbers that choose lamps
   bool has_sun = false;
   float to_sun[3] = {0.0F, 1.0F, 0.0F};
   float sun_frame[3][3] = {};  ///< whose third axis that is
@@ -110,13 +110,13 @@ struct Kernel {
                 BlockLanes<float>& x, BlockLanes<float>& y);
 };
 
-// Those of wider instructions are there only where they are compiled; tables have what there is.
+// Kernels of wider instruction sets exist only where they are compiled; the tables list the compiled ones.
 extern const Kernel kPlainKernel;
 extern const Kernel kAvx2Kernel;
 extern const Kernel kAvx512Kernel;
 extern const KernelTable<Kernel> kKernels;
 
-/// That of the widest instructions that this machine has.
+/// Returns the kernel with the widest instructions that this machine has.
 [[nodiscard]] inline const Kernel& kernel() {
   return kKernels.widest();
 }

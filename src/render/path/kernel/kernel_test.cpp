@@ -1,4 +1,4 @@
-// What kernels of paths compute beside what they are lanes of: every bit, with every instruction set.
+// Compares path tracing kernels with their scalar versions: every bit, with every instruction set.
 
 #include "render/path/kernel/kernel.h"
 
@@ -56,7 +56,7 @@ std::vector<LampBounds> some_lamps(Numbers& numbers, std::size_t count) {
   return lamps;
 }
 
-// Axes, their borders and what lies in between: where a choice between components is a tie.
+// Axes, their borders and directions between them: cases where component comparisons tie.
 std::vector<Vec3> awkward_directions() {
   std::vector<Vec3> all;
   for (int x = -1; x <= 1; ++x) {

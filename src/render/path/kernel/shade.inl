@@ -106,7 +106,7 @@ void choose_lamps(const LampBranch* branches, const float* shares, LampBlock& bl
   }
 }
 
-// ---- what is matte -----------------------------------------------------------------------------------------------
+// ---- matte surfaces ----------------------------------------------------------------------------------------------
 
 // Turns a smooth normal that looks away from who sees the surface.
 inline Vector facing(const Vector& normal, const Vector& direction) {

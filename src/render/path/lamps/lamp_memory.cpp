@@ -8,7 +8,7 @@ namespace quoin::path {
 namespace {
 
 constexpr int kPlaceShift = 3;
-// Before anything is known all lamps are seen: as if so many samples of mean light had told.
+// The prior assumes that all lamps are visible: it weighs like this many samples of mean light.
 constexpr float kBelief = 0.5F;
 constexpr float kLeastShare = 0.05F;
 

@@ -11,20 +11,20 @@
 
 namespace quoin::path {
 
-/// How much of what lamps would send to a place gets there, as far as paths found out that passed it: a tree over lamps
-/// knows of no walls. By it the tree is corrected, node by node of its upper levels, so that fewer rays end at walls.
+/// The share of lamp light that reaches a place, as learned by the paths that passed it: a light tree ignores walls.
+/// The shares correct the upper levels of the tree, so that fewer shadow rays end at walls.
 ///
 ///   place      one side of 8^3 voxels
-///     table    [node of LightTree::kTopLevels]: its share, 1 where nothing is known
+///     table    [node of LightTree::kTopLevels]: its share, 1 if unknown
 ///
-/// What is noted counts from the next `learn` on; until then shares stay as they are, so that a path may ask for the
-/// chance of a lamp that it meets. What is chosen remains right whatever the shares, which are never 0.
+/// Notes take effect at the next `learn`; until then shares are constant, so that a path may query the probability of a
+/// lamp that it hits. Estimates are unbiased for all shares, which are never 0.
 class LampMemory {
  public:
   LampMemory();
 
-  /// The number of a place; 0 for those of which nothing is remembered, since there are too many. `of`: tells what the
-  /// voxels belong to.
+  /// Returns the number of a place; 0 for places beyond the limit, which are not remembered. `of`: identifies the
+  /// voxels' owner.
   [[nodiscard]] std::int32_t place_of(std::int32_t of, IVec3 voxel, Direction side);
   /// [place][node]: `LightTree::kTopNodes` a place.
   [[nodiscard]] const float* tables() const { return tables_.data(); }
@@ -32,10 +32,10 @@ class LampMemory {
     return tables_.data() + static_cast<std::size_t>(place) * LightTree::kTopNodes;
   }
 
-  /// That a sample of a lamp would have brought so much light, divided by its chance, and whether a wall was between.
+  /// Records a lamp sample: its light divided by its probability, and whether a wall blocked it.
   void note(const LightTree& tree, std::int32_t place, std::int32_t lamp, float light, bool is_blocked);
-  /// Requires: lamps that are chosen from here on are chosen by numbers that those of before tell nothing of, also not
-  /// as later ones of one low-discrepancy sequence: these go where earlier ones were not.
+  /// Applies the notes. Requires: later lamp choices use random numbers independent of all earlier ones. Later points
+  /// in a low-discrepancy sequence are not independent: they fill the gaps between the earlier points.
   void learn();
 
  private:

@@ -212,8 +212,8 @@ LampMeasures LightTree::measures_of(const LampBounds& bounds) {
   return measures;
 }
 
-// The form factor of the node's middle, times its power: exact for what is small, and never 0 where a part of the box
-// lies before the point and the point before a part of it. One square root.
+// Returns the form factor of the node's centre, times its power: exact for small nodes, and never 0 if a part of the
+// box lies in front of the point and the point in front of a part of it. Cost: one square root.
 float LightTree::importance(const LampMeasures& of, Vec3 point, Vec3 normal) {
   const auto vec = [](const float(&v)[3]) { return Vec3(v[0], v[1], v[2]); };
   const Vec3 way = vec(of.middle) - point;

@@ -10,12 +10,13 @@
 
 namespace quoin::path {
 
-/// What a tree of lamps knows of one.
+/// The data of one lamp in a light tree.
 struct LampBounds {
   Vec3 low{0.0F};
   Vec3 high{0.0F};
-  Vec3 axis{0.0F, 0.0F, 1.0F};  ///< about which it shines, unit
-  float cos_spread = 1.0F;      ///< of the angle between the axis and its normals; -1: all directions
+  Vec3 axis{0.0F, 0.0F, 1.0F};  ///< emission axis, unit
+  float cos_spread = 1.0F;      ///< cosine of the largest angle between the axis and the lamp's normals; -1: all
+                                ///< directions
   float cos_edge = 0.0F;        ///< of the angle between a normal and where light ends; -1: nowhere
   float power = 0.0F;           ///< positive
 };
@@ -45,7 +46,7 @@ class LightTree {
 
   /// `shares`: what counts of each of the upper nodes. Requires: 0 <= u < 1; `normal` is unit. Cost: O(log(lamps)).
   [[nodiscard]] Choice choose(Vec3 point, Vec3 normal, float u, const float* shares = whole_shares()) const;
-  /// With which `choose` finds that lamp.
+  /// Returns the probability that `choose` selects the lamp.
   [[nodiscard]] float probability(std::uint32_t lamp, Vec3 point, Vec3 normal,
                                   const float* shares = whole_shares()) const;
 

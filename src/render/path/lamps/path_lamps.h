@@ -56,12 +56,12 @@ class PathLamps {
   [[nodiscard]] DVec3 origin() const { return origin_; }  ///< in the world
   /// A point of a lamp that was chosen, as it is seen from `point`, in the world.
   [[nodiscard]] LampSample sample(LightTree::Choice chosen, DVec3 point, Pair u) const;
-  /// With which `sample` finds the point of that lamp, once it is chosen, that lies in `direction` at `distance`.
+  /// Returns the density of `sample` for the point of a chosen lamp in `direction` at `distance`.
   [[nodiscard]] float density(std::int32_t lamp, DVec3 point, Vec3 direction, float distance) const;
 
   /// Notes that a unit face of a placed grid's voxel is part of a lamp.
   void add_face(std::int32_t placed, IVec3 voxel, Direction face, std::int32_t lamp);
-  /// Of which lamp it is part; -1: of none.
+  /// Returns the index of the lamp that contains the face; -1 if none does.
   [[nodiscard]] std::int32_t lamp_of(std::int32_t placed, IVec3 voxel, Direction face) const;
 
   struct Face {

@@ -9,8 +9,8 @@
 
 #include <quoin/core/vec.h>
 
-// What pictures by paths compute with, the same bits on every machine: sums, products, quotients and square roots are
-// rounded alike everywhere, the C library's sine, exponential and power are not.
+// Path tracing arithmetic with the same bits on every machine: sums, products, quotients and square roots round alike
+// everywhere; the C library's sine, exponential and power do not.
 namespace quoin::path {
 
 constexpr float kPi = std::numbers::pi_v<float>;
@@ -20,7 +20,7 @@ struct SineCosine {
   float cosine = 1.0F;
 };
 
-/// Of an angle in turns. Error: 1e-7. Requires: 0 <= turns <= 1.
+/// Returns the sine and cosine of an angle in turns. Error: 1e-7. Requires: 0 <= turns <= 1.
 ///
 /// Source: Taylor's series about the nearest eighth of a turn.
 [[nodiscard]] inline SineCosine of_turns(float turns) {
@@ -81,12 +81,12 @@ struct SineCosine {
   return part * kRootOfTwo * std::bit_cast<float>(exponent);
 }
 
-/// e^x, likewise.
+/// Returns e^x; the same bits on every machine.
 [[nodiscard]] inline float exponential(float x) {
   return power_of_two(x * std::numbers::log2e_v<float>);
 }
 
-/// The logarithm to base 2 of what is at least the least normal float; of less, that of it. Error: 2e-7 or relative.
+/// Returns the base-2 logarithm; smaller values count as the smallest normal float. Error: 2e-7, absolute or relative.
 [[nodiscard]] inline float log_of_two(float x) {
   if (!(x >= std::numeric_limits<float>::min())) return -126.0F;
   const auto bits = std::bit_cast<std::uint32_t>(x);
@@ -108,7 +108,7 @@ struct SineCosine {
   return x * x;
 }
 
-/// How bright a colour is: its luminance in linear sRGB (ITU-R BT.709).
+/// Returns the luminance of a linear sRGB colour (ITU-R BT.709).
 [[nodiscard]] inline float luminance(Vec3 colour) {
   return 0.2126F * colour.x + 0.7152F * colour.y + 0.0722F * colour.z;
 }
@@ -166,7 +166,8 @@ struct Pair {
   return {disc.x, disc.y, std::sqrt(std::max(0.0F, 1.0F - disc.x * disc.x - disc.y * disc.y))};
 }
 
-/// The share of a strategy of density `own` beside one of `other`: the balance heuristic of E. Veach (1995).
+/// Returns the weight of a strategy with density `own` against another of density `other`: the balance heuristic of E.
+/// Veach (1995).
 [[nodiscard]] inline float balance(float own, float other) {
   return own / (own + other);
 }

@@ -17,8 +17,9 @@ namespace quoin::path {
   return x >> 16 | x << 16;
 }
 
-/// Pascal's triangle modulo 2 times the bits of an index: bit i of the result is the sum of all bits j of which i is
-/// a part. Reversed it is the second coordinate of Sobol's sequence, as the reversed index is the first.
+/// Multiplies the bits of an index by Pascal's triangle modulo 2: bit i of the result is the sum of all bits j whose
+/// binary digits include those of i. Reversed, it is the second coordinate of Sobol's sequence; the reversed index is
+/// the first.
 [[nodiscard]] constexpr std::uint32_t pascal(std::uint32_t x) {
   x ^= x >> 1 & 0x5555'5555U;
   x ^= x >> 2 & 0x3333'3333U;
