@@ -14,14 +14,14 @@
 
 namespace quoin::store {
 
-/// What a damaged world has besides its chunks, as far as it is sound, and what stands for what is lost.
+/// The sound parts of a damaged world except its chunks, and placeholders for lost parts.
 class FoundParts {
  public:
   FoundParts();
 
   /// Takes all parts that SQLite can read. False where it cannot read all of them.
   bool read(Connection& connection, std::vector<WorldDamage>& damage);
-  /// Takes a record that was found in the file's pages, if it is a sound part and newer than what is there.
+  /// Takes a record found in the file's pages, if it is a sound part and newer than the stored version.
   void add(const PageRecord& record);
 
   /// The version of the format, where a record is the sound part that says it.
@@ -33,7 +33,7 @@ class FoundParts {
   /// Sees to it that there is such a grid, and types up to a number.
   void add_grid(std::uint32_t grid);
   void add_types_up_to(VoxelType last);
-  /// Puts what was not put yet into changes.
+  /// Moves the parts added since the last call into `changes`.
   void move_to(WorldChanges& changes);
 
   /// Sound ones.

@@ -37,12 +37,12 @@ std::uint64_t file_bytes(const std::filesystem::path& path) {
   return error ? 0 : bytes;
 }
 
-/// Tells of bytes that were read, as a share of a file's.
+/// Reports the bytes read as a fraction of a file's size.
 class ReadProgress {
  public:
   ReadProgress(const Progress& progress, const std::filesystem::path& path)
       : progress_(progress), bytes_(static_cast<double>(std::max<std::uint64_t>(file_bytes(path), 1))) {}
-  /// Whether to go on.
+  /// Returns false to cancel.
   bool add(std::size_t bytes) {
     read_ += bytes;
     if (!progress_ || (++calls_ & 255U) != 0) return true;
@@ -206,7 +206,7 @@ Result<std::uint64_t> back_up(const std::filesystem::path& from, const std::file
   const Status done = [&]() -> Status {
     auto reader = with_path(open_reader(from), from);
     if (!reader) return reader.error();
-    // It writes another file than the one that it may only read.
+    // Writing is allowed here because VACUUM INTO writes to another file.
     if (auto set = reader->connection().run("PRAGMA query_only=OFF"); !set) return set;
     auto copy = reader->connection().prepare("VACUUM INTO ?");
     if (!copy) return copy.error();

@@ -128,7 +128,7 @@ int wanted_damage() {
   return wanted != nullptr ? std::atoi(wanted) : 60;
 }
 
-// What is lost is named by the check, and all else is in the repaired world.
+// The check names all lost items; the repaired world has everything else.
 TEST(WorldCare, AnyDamageIsSeenAndWhatIsSoundIsKept) {
   const WorldFolder folder;
   const auto whole = folder / "whole.quoin";

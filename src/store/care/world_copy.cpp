@@ -27,7 +27,7 @@ namespace {
 constexpr const char* kPutPart = "INSERT INTO parts(kind, id, revision, sum, body) VALUES(?, ?, ?, ?, ?)";
 constexpr const char* kPutRegion = "INSERT INTO regions(id, grid, level, x, y, z) VALUES(?, ?, ?, ?, ?, ?)";
 constexpr const char* kPutChunk = "INSERT INTO chunks(key, body) VALUES(?, ?)";
-// Rows of one transaction: what is written waits in memory until its end.
+// Rows per transaction: written rows stay in memory until it ends.
 constexpr std::uint64_t kGroup = 1024;
 
 std::uint64_t solid_samples(const DensityChunk& densities) {
@@ -174,7 +174,7 @@ Result<WorldCopy> copy(const std::filesystem::path& from, const std::filesystem:
   if (!reader) return reader.error();
   auto database = Connection::open(fresh.string(), Connection::Mode::Create);
   if (!database) return database.error();
-  // Nothing of it counts before it is whole, and has its name.
+  // The copy is invalid until it is complete and has its final name.
   const Status set = database->run("PRAGMA page_size=8192; PRAGMA journal_mode=MEMORY; PRAGMA synchronous=OFF");
   if (!set) return set.error();
   if (auto done = create_schema(*database); !done) return done.error();

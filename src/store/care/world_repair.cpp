@@ -30,7 +30,7 @@ namespace {
 // Chunks that are saved at once, so that memory stays bounded.
 constexpr std::size_t kSlice = 256;
 
-/// Chunks on their way into the new world, with what of types and grids they need and nothing else has.
+/// Chunks on their way into the new world, with the types and grids that only they refer to.
 class Output {
  public:
   explicit Output(WorldStore& world, FoundParts& parts) : world_(world), parts_(parts) {}
@@ -122,7 +122,7 @@ class Repair {
     Status fault;
     auto gaps = rows.each([&](std::int64_t key, std::span<const std::byte> body) {
       if (is_cancelled()) return RowVerdict::Stop;
-      // What a body says of itself counts: the row's key may be wrong, or its region lost.
+      // The body's own address counts: the row's key may be wrong, or its region lost.
       const auto region = regions.find(key >> kRegionBits);
       const bool is_key_right = region != regions.end();
       if (const auto header = read_header(body)) {
@@ -163,7 +163,7 @@ class Repair {
   /// no longer used, is better than none.
   Status salvage_chunks(Output& output) {
     Status fault;
-    const auto read = revisions_;  // what SQLite could read is newer than what lies on unused pages
+    const auto read = revisions_;  // rows that SQLite could read are newer than bodies on unused pages
     Status scanned = scan_bodies(from_, [&](std::int64_t key, std::span<const std::byte> body) {
       const bool is_in_gap =
           std::ranges::any_of(gaps_, [&](const KeyGap& gap) { return gap.first <= key && key <= gap.last; });

@@ -60,7 +60,7 @@ Result<std::vector<KeyGap>> ChunkRows::each(FunctionRef<RowVerdict(std::int64_t,
         rows->reset();
         return gaps;
       }
-      // A key that is a lie says nothing of where the rows behind it are.
+      // A corrupt key gives no position for the rows after it.
       if (verdict == RowVerdict::Damaged) {
         unsound.insert(key);
         continue;
@@ -79,7 +79,8 @@ Result<std::vector<KeyGap>> ChunkRows::each(FunctionRef<RowVerdict(std::int64_t,
       return gaps;
     }
     if (row.error().code != ErrorCode::BadFormat) return row.error();
-    // Behind the damage, at first near it. What is readable between two damaged pages may be taken for damaged too.
+    // Continues behind the damage, at first near it. Readable rows between two damaged pages may also be reported as
+    // damaged.
     if (!gap) gap = KeyGap{next, kLastKey, row.error().message};
     const std::uint64_t room = static_cast<std::uint64_t>(kLastKey) - static_cast<std::uint64_t>(next);
     if (step == 0 || step > room) {

@@ -21,18 +21,18 @@ struct KeyGap {
   std::string why;
 };
 
-/// What a visitor found a row to be.
+/// A visitor's verdict on a row.
 enum class RowVerdict : std::uint8_t { Sound, Damaged, Stop };
 
-/// Reads every row of the table of chunks by its key, whatever else is damaged.
+/// Reads every row of the chunk table by its key, despite damage elsewhere.
 class ChunkRows {
  public:
   explicit ChunkRows(Connection& connection) : connection_(connection) {}
 
-  /// The places of regions; those that cannot be read are left out, with a line in `damage`.
+  /// Returns the regions' positions. Skips unreadable ones, with a line each in `damage`.
   [[nodiscard]] std::map<std::int64_t, RegionPlace> regions(std::vector<std::string>& damage);
-  /// Calls `visit(key, body)` for each row that can be read, until it says to stop; returns the keys of those that
-  /// cannot. Errors: CannotRead.
+  /// Calls `visit(key, body)` for each readable row until it returns Stop. Returns the key ranges of unreadable rows.
+  /// Errors: CannotRead.
   [[nodiscard]] Result<std::vector<KeyGap>> each(
       FunctionRef<RowVerdict(std::int64_t key, std::span<const std::byte> body)> visit);
 

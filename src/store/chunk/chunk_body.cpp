@@ -185,7 +185,7 @@ Result<std::span<const std::byte>> ChunkDecoder::content_of(const ChunkBodyHeade
                                                             std::span<const std::byte> body) {
   const auto stored = body.subspan(kChunkBodyHeader);
   if ((header.sections & chunk_sections::kCompressed) == 0) return stored;
-  // Looked at before memory is taken; a frame that says nothing of it is none that was written.
+  // Checked before memory is allocated; the encoder always stores the size in the frame.
   if (ZSTD_getFrameContentSize(stored.data(), stored.size()) != header.content_bytes) {
     return fault("no zstd frame of " + std::to_string(header.content_bytes) + " bytes", kChunkBodyHeader);
   }

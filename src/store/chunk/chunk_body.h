@@ -20,19 +20,19 @@
 
 // The body of a chunk's row in a world. Numbers little-endian.
 //
-//   uint64 checksum      XXH3-64 of all that follows
+//   uint64 checksum      XXH3-64 of all bytes after it
 //   uint8 magic[4]       "QCB1"
-//   uint8 sections       1: types of voxels, 2: data at voxels, 4: densities; 128: the content is a zstd frame
-//   uint8 level          of the place
+//   uint8 sections       1: voxel types, 2: voxel data, 4: densities; 128: the content is a zstd frame
+//   uint8 level          of the address
 //   uint16 0
-//   uint32 grid          of the place
-//   int32 x, y, z        of the place
-//   uint64 revision      greater in what was saved later
+//   uint32 grid          of the address
+//   int32 x, y, z        of the address
+//   uint64 revision      later saves have greater revisions
 //   uint32 bytes         of the content
-//   content              the sections that there are, one after the other: voxel_runs.h, placed_data.h,
-//                        density_section.h
+//   content              the present sections in order: voxel_runs.h, placed_data.h, density_section.h
 //
-// Without the first section all voxels are air. A body says where it belongs, so that a world whose index is lost can
+// Without the first section all voxels are air. A body contains its own address, so that a world with a lost index can
+// be rebuilt from its bodies.
 // be put together again from its bodies.
 
 namespace quoin::store {
@@ -55,9 +55,9 @@ struct ChunkBodyHeader {
   std::uint32_t content_bytes = 0;
 };
 
-/// What a body says of itself. The checksum is right; of the content nothing else was looked at.
+/// The header of a body. Only the checksum and the header are verified, not the content.
 /// Errors: BadFormat, with the offset in the body; Unsupported for a body of a later version.
-/// Cost: some 10 bytes a nanosecond.
+/// Cost: about 10 bytes per nanosecond.
 [[nodiscard]] Result<ChunkBodyHeader> read_header(std::span<const std::byte> body);
 
 /// Puts the right checksum into a body's first bytes. Requires: kChunkBodyHeader bytes.
@@ -71,10 +71,10 @@ class ChunkEncoder {
   ChunkEncoder& operator=(ChunkEncoder&&) noexcept;
   ~ChunkEncoder();
 
-  /// Puts a chunk's body into `out`, in place of what was there. The same voxels, data and densities give the same
-  /// bytes, however the chunk stores them (by one version of zstd). `densities` may be null; data at their materials
-  /// is left out, which a field has none of.
-  /// Errors: LimitExceeded: data of more than kMaxChunkDataBytes; `out` is empty then.
+  /// Replaces `out` by a chunk's body. Equal voxels, data and densities give equal bytes, independent of the chunk's
+  /// storage (with one version of zstd). `densities` may be null. Data attached to density materials is omitted, since
+  /// fields have none.
+  /// Errors: LimitExceeded: data of more than kMaxChunkDataBytes; `out` is then empty.
   [[nodiscard]] Status encode(const ChunkPlace& place, std::uint64_t revision, const Chunk& voxels,
                               const DensityChunk* densities, std::vector<std::byte>& out);
 
@@ -88,7 +88,7 @@ class ChunkEncoder {
   std::vector<std::byte> content_;
 };
 
-/// What a chunk may hold. Lifetime: of the types', which are not owned.
+/// The limits that chunks are checked against. Lifetime: refers to the types without owning them.
 struct ChunkLimits {
   const VoxelRegistry* types = nullptr;  ///< not null
   float band = 8.0F;                     ///< of its densities
@@ -105,9 +105,9 @@ class ChunkDecoder {
   ChunkDecoder& operator=(ChunkDecoder&&) noexcept;
   ~ChunkDecoder();
 
-  /// The chunk of a body, which must say that it is of that place.
-  /// Errors: BadFormat, with the offset in the body (of the content, where that is compressed: the message has the
-  /// offset in what it expands to); Unsupported for a body of a later version.
+  /// Returns the chunk of a body, whose address must be the expected one.
+  /// Errors: BadFormat, with the offset in the body (for a compressed content the message has the offset in the
+  /// decompressed bytes); Unsupported for a body of a later version.
   [[nodiscard]] Result<StoredChunk> decode(const ChunkPlace& expected, std::span<const std::byte> body,
                                            const ChunkLimits& limits);
 

@@ -17,7 +17,7 @@
 
 namespace quoin::store {
 
-/// Types 1 to `count`, of which those divisible by 3 have 8 bits of state, those by 5 have 32.
+/// Returns types 1 to `count`: multiples of 3 have 8 bits of state, multiples of 5 have 32.
 inline VoxelRegistry types_for_tests(int count) {
   VoxelRegistry types;
   for (int i = 1; i <= count; ++i) {
@@ -29,7 +29,7 @@ inline VoxelRegistry types_for_tests(int count) {
   return types;
 }
 
-/// Boxes of types below `types`, one in another; with noise, single voxels besides.
+/// Returns nested boxes of types below `types`; with noise, also single voxels.
 inline Chunk chunk_of_boxes(std::mt19937& random, int types, int boxes, int noise) {
   const auto below = [&](int end) { return static_cast<int>(random() % static_cast<unsigned>(end)); };
   Chunk chunk(static_cast<VoxelType>(below(types)));
@@ -90,7 +90,7 @@ struct CorpusChunk {
   StoredChunk chunk;
 };
 
-/// What the files of tests/corpus/chunk_body hold, at place {} and with `types_for_tests(300)`.
+/// Returns the contents of the files in tests/corpus/chunk_body, at address {} and with `types_for_tests(300)`.
 inline std::vector<CorpusChunk> corpus_chunks() {
   std::mt19937 random(42);
   const VoxelRegistry types = types_for_tests(300);

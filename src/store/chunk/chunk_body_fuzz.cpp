@@ -67,8 +67,8 @@ void read_body(std::vector<std::byte>& body) {
 
 }  // namespace
 
-// The bytes are a body, whose checksum is put right; and behind their first, which says which sections there are, a
-// content as it is, so that what no chance gets through a zstd frame is tried too.
+// Decodes the input as a body, with the checksum corrected. Also decodes it as uncompressed content, with the first
+// byte as the section mask: random bytes rarely get through a zstd frame.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::span bytes(reinterpret_cast<const std::byte*>(data), size);
   std::vector<std::byte> body(bytes.begin(), bytes.end());

@@ -49,7 +49,7 @@ std::vector<VoxelType> dense_of(const Chunk& chunk) {
   return dense;
 }
 
-/// That the storage is what `from_dense` makes of the same voxels, but for the order of its palette.
+/// Expects the storage that `from_dense` makes of the same voxels, except for the palette's order.
 void expect_sound(const Chunk& chunk) {
   const std::vector<VoxelType> dense = dense_of(chunk);
   const Chunk wanted = Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense));
@@ -393,7 +393,7 @@ TEST(ChunkBody, LiesAreNamed) {
   EXPECT_EQ(decoded(later, types).error().code, ErrorCode::Unsupported);
 }
 
-// Bodies that were written once go on being read as what they were.
+// Bodies from earlier versions still decode to the same chunks.
 TEST(ChunkBody, ReadsEveryFileOfTheCorpus) {
   const VoxelRegistry types = types_for_tests(300);
   for (const CorpusChunk& each : corpus_chunks()) {

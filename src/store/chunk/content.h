@@ -48,7 +48,7 @@ class ContentReader {
   T take() {
     return number_at<T>(take_bytes(sizeof(T)).data());
   }
-  /// What `put_short_number` wrote, and nothing longer. Errors: BadFormat.
+  /// Reads a number written by `put_short_number`; rejects longer encodings. Errors: BadFormat.
   Result<std::uint32_t> take_short() {
     std::uint64_t number = 0;
     for (int shift = 0; shift < 35; shift += 7) {

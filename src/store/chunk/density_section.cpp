@@ -33,7 +33,7 @@ Half half_of_rank(std::int32_t rank) {
   return static_cast<Half>(rank < 0 ? kSign | static_cast<std::uint32_t>(-rank) : static_cast<std::uint32_t>(rank));
 }
 
-// The rank of the nearest half, of which `largest` is the farthest; subnormal numbers count as 0.
+// Returns the rank of the nearest half, clamped to `largest` in absolute value; subnormal numbers count as 0.
 std::int32_t rank_of_float(float value, std::int32_t largest) {
   const auto bits = std::bit_cast<std::uint32_t>(value);
   const auto half = static_cast<std::int32_t>(((bits & 0x7FFF'FFFFU) + 0x1000U) >> 13) - (112 << 10);
@@ -41,7 +41,7 @@ std::int32_t rank_of_float(float value, std::int32_t largest) {
   return (bits >> 31) != 0 ? -magnitude : magnitude;
 }
 
-/// What rows are expected to be, row after row, by the rows before.
+/// Predicts each row from the rows before it.
 class Expectation {
  public:
   explicit Expectation(Half largest) : largest_(largest) {}
@@ -62,7 +62,7 @@ class Expectation {
       ranks.fill(0);
     }
   }
-  /// What it is.
+  /// Sets the row's actual values.
   void put(int y, int z, const Half* row) {
     FloatRow& values = layers_[z & 1][static_cast<std::size_t>(y)];
     for (std::size_t x = 0; x < kRow; ++x) values[x] = float_from_half(row[x]);
@@ -176,7 +176,7 @@ void DensityWriter::put_rows(const DensityChunk& chunk, std::vector<std::byte>& 
 
 namespace {
 
-/// What is stored for a band.
+/// The stored halves of a band.
 class StoredHalves {
  public:
   // Requires: band > 0.
@@ -289,7 +289,7 @@ Result<DensityChunk> DensityReader::read(ContentReader& reader, VoxelRunReader& 
   if (!slots) return slots.error();
   if (auto status = read_rows(reader, stored, half, *slots, *m); !status) return status.error();
   DensityChunk chunk = DensityStorage::chunk_of(std::move(m), std::move(*of_materials));
-  chunk.unite_slabs();  // that turned out to be of one density, whatever was said of them
+  chunk.unite_slabs();  // slabs may have one density even if the file stores them as mixed
   return chunk;
 }
 

@@ -16,25 +16,25 @@
 // The densities of a chunk's samples, and their materials. 256 slabs of 64 x 4 x 4 samples, by z / 4, then y / 4.
 //
 //   materials            as the types of voxels: voxel_runs.h
-//   uint8 form           0: all of one density, 1: several
+//   uint8 form           0: one density for all samples, 1: several
 //   form 0:
 //     uint16 density     as a half
 //   form 1:
-//     uint16 largest     no density is farther from 0; as a half
-//     uint8 mixed[32]    a bit for each slab, from the lowest up: whether it holds several densities
-//     uint16 density[]   of all samples of a slab, as a half; for each that is not mixed
-//     uint8 low[]        of each row of the mixed slabs, by z, then y: the lower bytes of 64 numbers
-//     uint8 high[]       likewise the upper bytes
+//     uint16 largest     the largest absolute density; as a half
+//     uint8 mixed[32]    one bit per slab, from the lowest up: 1 if it holds several densities
+//     uint16 density[]   of all samples of a slab, as a half; for each slab that is not mixed
+//     uint8 low[]        for each row of the mixed slabs, by z, then y: the lower bytes of 64 numbers
+//     uint8 high[]       the upper bytes, in the same order
 //
-// A number is what a sample is beyond what its neighbours let expect, less the same of the sample before it in the row
-// (0 for the first), modulo 2^16, as (2 n) for n >= 0 and (-2 n - 1) for n < 0. "Is" counts halves: a half's 15 lower
-// bits, negative where its sign is set. Expected is, with the neighbours at y - 1, at z - 1, and at both (single
-// precision, each sum rounded),
+// The residual of a sample is its rank minus the predicted rank. A number is the residual minus the residual of the
+// previous sample in the row (0 for the first), modulo 2^16, stored as (2 n) for n >= 0 and (-2 n - 1) for n < 0. The
+// rank of a half is its 15 lower bits, negative if its sign is set. The prediction uses the neighbours at y - 1, at z -
+// 1, and at both (single precision, each sum rounded),
 //
 //     (at y - 1) + (at z - 1) - (at both)
 //
-// or the one neighbour that the chunk has, or 0 in its first row. Rounded to a half: the 15 bits are those of a float
-// from the 13th bit up, after adding 2^12 to these bits, less 112 of the exponent, at least 0, at most `largest`.
+// or the only neighbour within the chunk, or 0 in its first row. It is rounded to a half: the 15 bits are the float's
+// bits from the 13th up, after adding 2^12 to them, with 112 subtracted from the exponent, clamped to [0, `largest`].
 
 namespace quoin::store {
 

@@ -9,20 +9,20 @@
 
 #include "store/chunk/content.h"
 
-// What a chunk's voxels hold besides their types.
+// The data of a chunk's voxels in addition to their types.
 //
 //   uint32 n            voxels with data, 1 to 262,144
 //   uint32 bytes[3]     of the next three lines
-//   gaps[n]             voxels between this one and the one before that has data, or that come before it
+//   gaps[n]             number of voxels between this voxel with data and the previous one, or before the first
 //   states[n]
-//   lengths[n]          of their bytes, at most 65,536 each and 64 MiB all together
-//   uint8 bytes[]       of one voxel after the other
+//   lengths[n]          of their bytes, at most 65,536 each and 64 MiB in total
+//   uint8 bytes[]       of all voxels, in order
 //
-// Voxels x fastest, then y, then z. Gaps, states and lengths seven bits a byte, as lengths of runs.
+// Voxels x fastest, then y, then z. Gaps, states and lengths use seven bits per byte, as do run lengths.
 
 namespace quoin::store {
 
-/// That the voxels of a chunk can hold all together, to be kept in a world.
+/// The largest total data of a chunk's voxels that a world can store.
 inline constexpr std::size_t kMaxChunkDataBytes = std::size_t{64} << 20;
 /// The most that this can take of a chunk's content.
 inline constexpr std::size_t kMaxDataSection = 16 + kChunkVoxels * (3 + 5 + 3) + kMaxChunkDataBytes;

@@ -1,8 +1,8 @@
-// From runs to the packed rows of a chunk, four layers at a time:
+// Converts runs to the packed rows of a chunk, four layers at a time:
 //
 //   runs      3 of grass | 70 of earth | ...
-//   changes   each voxel's index XOR that of the voxel before: 0 but where a run starts
-//   row sums  what a row changes in all, so that it is known how the next row begins, and how many voxels are not air
+//   changes   each voxel's index XOR the previous voxel's index: 0 except at the start of a run
+//   row sums  the total change within a row: gives the first index of the next row, and the count of non-air voxels
 //   rows      of one index, or a prefix XOR over the row's changes
 //   slabs     of one index, or a slot
 
@@ -131,7 +131,7 @@ class VoxelRunReader::Builder {
 
   /// Takes the runs that start in the next four layers.
   [[nodiscard]] Fault take_runs(Streams& streams) {
-    // What the loop needs lies in registers: what it writes could be any of the members, as far as compilers know.
+    // Local copies stay in registers: for the compiler the loop's writes could alias any member.
     Streams s = streams;
     std::uint64_t* const changes = changes_.data();
     std::uint32_t* const counts = counts_.data();
@@ -242,7 +242,7 @@ class VoxelRunReader::Builder {
 
  private:
   static constexpr std::uint32_t kMixed = 0x8000'0000U;
-  /// What a row's runs change in all: sums of three numbers, kept in one.
+  /// The total change of a row's runs: three sums packed into one number.
   struct RowSum {
     explicit RowSum(std::int64_t sum) : change(static_cast<std::int32_t>(sum)) {
       const std::int64_t above = (sum - change) >> 32;
@@ -292,9 +292,9 @@ class VoxelRunReader::Builder {
   std::vector<std::uint64_t>& words_;
   Ref<ChunkStorage> m_ = make_ref<ChunkStorage>();
   std::array<std::int64_t, kRows> sums_{};  // RowSum
-  std::array<int, kChunkEdge> ended_{};  // by x: runs of solid voxels that end before it, less those that start there
-  std::uint32_t air_ = 0xFFFF'FFFFU;     // its index, where there is any
-  std::uint32_t last_ = 0;               // index of the last voxel of the rows so far
+  std::array<int, kChunkEdge> ended_{};     // by x: runs of solid voxels that end before x, minus runs that start there
+  std::uint32_t air_ = 0xFFFF'FFFFU;        // the palette index of air, if present
+  std::uint32_t last_ = 0;                  // index of the last voxel of the rows so far
   bool is_last_solid_ = false;
   std::uint32_t layers_begin_ = 0;  // their first voxel
   std::uint32_t voxel_ = 0;         // that the next run starts with

@@ -10,23 +10,23 @@
 
 #include "store/chunk/content.h"
 
-// The types of a chunk's voxels, as runs of equal ones across rows, or packed where that is smaller.
+// The types of a chunk's voxels, as runs of equal types across rows, or packed if that is smaller.
 //
-//   uint8 form           0: all of one type, 1: runs, 2: packed
-//   uint16 n - 1         types; 1 where the form is 0, else 2 to 65,536
-//   uint16 types[n]      in the order in which they first occur, each once
+//   uint8 form           0: one type, 1: runs, 2: packed
+//   uint16 n - 1         number of types; 1 in form 0, otherwise 2 to 65,536
+//   uint16 types[n]      distinct, in the order of their first occurrence
 //   runs: voxels x fastest, then z, then y
 //     uint32 runs        n to 262,144
 //     uint32 bytes       of the next line
-//     uint8 lengths[]    each run's voxels - 1, seven bits a byte, lowest first, the top bit set but in its last byte
-//     uint8 indices[]    each run's type; none where n is 2, as runs alternate then; to 256 types a byte a run,
-//                        else the low bytes of all runs, then the high ones
+//     uint8 lengths[]    each run's voxels - 1, seven bits per byte, lowest first, the top bit set except in the last
+//     uint8 indices[]    each run's type; omitted if n is 2, as runs then alternate; one byte per run for up to 256
+//                        types, otherwise the low bytes of all runs, then the high bytes
 //   packed:
 //     uint8 [32,768 * bits]  indices of `bits` bits, x fastest, then z, then y, from the lowest bit up; `bits` is the
 //                            first of 1, 2, 4, 8 and 16 with 2^bits >= n
 //
-// Layers of equal height come one after the other: ground is alike along them. A run's type differs from that of the
-// run before. So the same voxels are the same bytes, whatever edits led to them.
+// Layers of equal height follow each other, since ground is uniform along them. Adjacent runs have different types. So
+// equal voxels give equal bytes, independent of the edits that led to them.
 
 namespace quoin::store {
 

@@ -13,7 +13,7 @@ namespace quoin::store {
 
 namespace {
 
-// How long a read or a commit waits for another process: long enough for any of our own, short enough to be told.
+// Time that a read or a commit waits for another process: long enough for any Quoin process, short enough to report.
 constexpr int kBusyMilliseconds = 10'000;
 // A row is a chunk, a part or a value; nothing we write is larger.
 constexpr int kMaxRowBytes = 256 << 20;
@@ -181,7 +181,7 @@ Result<Connection> Connection::open(std::span<const std::byte> bytes) {
   auto* const copy = static_cast<unsigned char*>(sqlite3_malloc64(std::max<std::size_t>(bytes.size(), 1)));
   if (copy == nullptr) throw std::bad_alloc();
   std::memcpy(copy, bytes.data(), bytes.size());
-  // Nothing in memory has a log beside it: the header, which says that there is one, is turned.
+  // A database in memory has no log file: clears the WAL flag in the header.
   constexpr std::size_t kFormatAt = 18;
   if (bytes.size() > kFormatAt + 1 && copy[kFormatAt] == 2) copy[kFormatAt] = copy[kFormatAt + 1] = 1;
   const auto size = static_cast<sqlite3_int64>(bytes.size());

@@ -37,7 +37,7 @@ class Statement {
   [[nodiscard]] std::span<const std::byte> bytes(int column) const;
   [[nodiscard]] std::string_view text(int column) const;
   [[nodiscard]] bool is_integer(int column) const;
-  /// Of bytes or of text.
+  /// Returns true for a blob, false for text.
   [[nodiscard]] bool is_bytes(int column) const;
 
  private:
@@ -61,12 +61,12 @@ class StatementScope {
   Statement& statement_;
 };
 
-/// An open SQLite database, used by one thread at a time. Errors name no path: whoever knows it adds it.
+/// An open SQLite database, used by one thread at a time. Errors omit the path; the caller adds it.
 class Connection {
  public:
   enum class Mode : std::uint8_t {
     Read,
-    /// Of a file in a folder that nobody can write to: without locks and shared memory.
+    /// for a file in a read-only folder: without locks and shared memory
     ReadImmutable,
     Write,
     Create,
@@ -77,13 +77,13 @@ class Connection {
   [[nodiscard]] static Result<Connection> open(std::span<const std::byte> bytes);
 
   [[nodiscard]] Result<Statement> prepare(std::string_view sql);
-  /// Runs statements that give no rows, or whose rows nobody wants.
+  /// Runs statements without rows, or ignores their rows.
   [[nodiscard]] Status run(const char* sql);
   /// The first column of the first row, as a number or as text. Errors: also where there is no row.
   [[nodiscard]] Result<std::int64_t> number(const char* sql);
   [[nodiscard]] Result<std::string> text(const char* sql);
 
-  /// Writes what the write-ahead log holds into the database, as far as no reader needs it there.
+  /// Writes the write-ahead log's content into the database, except frames that readers still need.
   [[nodiscard]] Status checkpoint();
   /// Pages in the write-ahead log as the last commit left it.
   [[nodiscard]] int log_pages() const { return *log_pages_; }
@@ -103,7 +103,7 @@ class Connection {
   std::unique_ptr<int> log_pages_ = std::make_unique<int>(0);
 };
 
-/// What SQLite says of its last fault, as an error of ours.
+/// Converts SQLite's last error.
 [[nodiscard]] Error error_of(sqlite3* database, int code);
 
 }  // namespace quoin::store

@@ -17,12 +17,12 @@
 
 #include "store/database/connection.h"
 
-// The tables of a world, as docs/formats/world.md tells them to others:
+// The tables of a world; docs/formats/world.md documents them.
 //
-//   parts    kind, id -> body     what a scene has besides chunks, a text of JSON each; a game's values
-//   regions  id <- grid, level, place of 32^3 chunks
-//   chunks   key = region * 32768 + Morton code within it -> body (store/chunk/chunk_body.h); its keys alone are an
-//            index, since reading them in the table would read the bodies
+//   parts    kind, id -> body     the scene except its chunks, one JSON text per part; a game's values
+//   regions  id <- grid, level, position of 32^3 chunks
+//   chunks   key = region * 32768 + Morton code within it -> body (store/chunk/chunk_body.h); its keys have their own
+//            index, since reading keys from the table would read the bodies
 
 namespace quoin::store {
 
@@ -35,8 +35,8 @@ inline constexpr int kRegionBits = 3 * kRegionShift;
 
 /// Makes the tables of an empty database.
 [[nodiscard]] Status create_schema(Connection& database);
-/// Whether they are there, in a version that this program reads: from 1 on; `migrate` (world/migration.h) takes earlier
-/// ones to the present one before they are written.
+/// Checks that the tables exist, in a version that this program reads (from 1 on). `migrate` (world/migration.h)
+/// upgrades earlier versions before they are written.
 /// Errors: BadFormat (another program's database), Unsupported (a later version).
 [[nodiscard]] Status check_schema(Connection& database);
 
@@ -90,13 +90,14 @@ inline constexpr const char* kGroup = "group";
 inline constexpr const char* kLayer = "layer";
 inline constexpr const char* kLamp = "lamp";
 inline constexpr const char* kCamera = "camera";
-/// Id 0: what is looked through at first; the others are the "camera"s.
+/// Id 0: the initial camera; the others are the "camera" parts.
 inline constexpr const char* kView = "view";
 inline constexpr const char* kSun = "sun";
 /// Id 0: a PNG.
 inline constexpr const char* kThumbnail = "thumbnail";
 inline constexpr const char* kValue = "value";
-/// Of the world itself: id "revision", the number of its last commit as decimal digits; id "next_grid" likewise.
+/// Properties of the world: id "revision", the number of its last commit as decimal digits; id "next_grid", in the same
+/// form.
 inline constexpr const char* kWorld = "world";
 }  // namespace part
 

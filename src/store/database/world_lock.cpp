@@ -69,7 +69,7 @@ WorldLock& WorldLock::operator=(WorldLock&& other) noexcept {
 
 WorldLock::~WorldLock() {
   if (descriptor_ < 0) return;
-  ::unlink(file_.c_str());  // while it is locked: whoever waits finds that the name is another file's
+  ::unlink(file_.c_str());  // unlinked while locked: a waiting process detects that the name refers to another file
   ::close(descriptor_);
 }
 

@@ -6,12 +6,12 @@
 
 namespace quoin::store {
 
-/// That this process alone writes a world: a lock on NAME-lock, which ends with the process, however that ends.
+/// Ensures that only this process writes a world: a lock on NAME-lock that the system releases when the process ends.
 class WorldLock {
  public:
   /// Errors: CannotWrite: another writer has it, or there are no locks on this file system.
   [[nodiscard]] static Result<WorldLock> take(const std::filesystem::path& world);
-  /// Of nothing.
+  /// Holds no lock.
   WorldLock() = default;
   WorldLock(WorldLock&& other) noexcept;
   WorldLock& operator=(WorldLock&& other) noexcept;
@@ -22,10 +22,10 @@ class WorldLock {
   int descriptor_ = -1;
 };
 
-/// Whether the file system of a world's folder knows locks. True where that cannot be told.
+/// Returns true if the file system of a world's folder supports locks, or if that is unknown.
 [[nodiscard]] bool has_locks(const std::filesystem::path& world);
 
-/// Whether a world's folder is on another machine, so that programs cannot share memory about it.
+/// Returns true if a world's folder is on another machine, where programs cannot share memory.
 [[nodiscard]] bool is_on_network(const std::filesystem::path& world);
 
 }  // namespace quoin::store

@@ -59,7 +59,7 @@ inline Bytes zstd_of(std::span<const std::byte> content) {
   return out;
 }
 
-/// What a block is to hold.
+/// The content of one node in a block.
 struct Node {
   std::uint16_t number = 0;
   std::uint8_t param2 = 0;

@@ -36,11 +36,11 @@ constexpr int kBlocksOfChunk = kChunkEdge / kBlockEdge;  // along an edge
 constexpr int kLowestBlock = -2048;
 constexpr int kHighestBlock = 2048;  // the first that there cannot be
 constexpr int kChunksOfPart = 8;
-/// Of a row. What Luanti writes has some kilobytes; a zlib stream of more could expand to gigabytes.
+/// Size limit of a row. Luanti's rows have a few kilobytes; a larger zlib stream could expand to gigabytes.
 constexpr std::size_t kMaxRow = std::size_t{16} << 20;
 constexpr const char* kStatesAttribute = "luanti.states";
 
-/// How the table says places: by a number, or by three since version 5.12.
+/// The table's form of block positions: one number, or three columns since version 5.12.
 enum class Places : std::uint8_t { Number, Three };
 
 std::int64_t number_of(IVec3 block) {
@@ -106,7 +106,7 @@ class Readers {
     return {};
   }
 
-  /// Runs `use(Reader&)` with one that no other thread uses.
+  /// Runs `use(Reader&)` with a reader that no other thread uses.
   template <class Use>
   auto with_reader(Use use) -> decltype(use(std::declval<Reader&>())) {
     auto reader = take();
@@ -124,7 +124,7 @@ class Readers {
  private:
   Result<Connection> open_file() const {
     auto connection = Connection::open(path_.string(), Connection::Mode::Read);
-    // In a folder that nobody can write to there is no place for what readers of a log share.
+    // A read-only folder cannot hold the files that readers of a log share.
     if (!connection || connection->prepare("SELECT data FROM blocks LIMIT 1")) return connection;
     auto alone = Connection::open(path_.string(), Connection::Mode::ReadImmutable);
     if (alone && alone->prepare("SELECT data FROM blocks LIMIT 1")) return alone;
@@ -176,7 +176,7 @@ class Readers {
 /// The types of the nodes that were met so far. Threads: any function from any thread, also at once.
 class NodeTypes {
  public:
-  /// kAir for what is no node. Errors: LimitExceeded.
+  /// Returns kAir for names without a node. Errors: LimitExceeded.
   Result<VoxelType> find(const std::string& name) {
     {
       const std::shared_lock lock(mutex_);
@@ -273,7 +273,7 @@ class LuantiSource final : public ChunkSource {
   }
 
  private:
-  /// `inside`: which of the chunk's blocks. What is broken is told.
+  /// Adds one block of a chunk; `inside` is its position there. Appends errors to `broken`.
   Status put_block(Reader& reader, IVec3 chunk, IVec3 inside, ChunkBuilder& builder, std::vector<Error>& broken) const {
     const IVec3 ours = chunk * kBlocksOfChunk + inside;
     const IVec3 place{ours.x, ours.y, -1 - ours.z};
@@ -316,7 +316,7 @@ class LuantiSource final : public ChunkSource {
   mutable NodeTypes types_;
 };
 
-/// What the table has, as our chunks.
+/// The extent of the table's blocks, in Quoin chunks.
 struct Extent {
   std::unordered_set<std::uint64_t> chunks;
   std::int64_t stray = 0;  // rows whose place there cannot be
@@ -396,7 +396,7 @@ Result<std::unique_ptr<ChunkSource>> open(std::unique_ptr<Readers> readers, std:
   return std::unique_ptr<ChunkSource>(new LuantiSource(std::move(info), std::move(parts), std::move(readers)));
 }
 
-/// What world.mt says under a name; empty where it says nothing.
+/// Returns the value of a key in world.mt; empty if missing.
 std::string value_of(const std::string& text, std::string_view key) {
   constexpr std::string_view kBlank = " \t\r";
   const auto trimmed = [&](std::string_view part) {

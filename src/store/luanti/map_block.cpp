@@ -30,7 +30,7 @@ constexpr int kOldest = 25;
 constexpr int kFirstWithLight = 27;
 constexpr int kFirstOfZstd = 29;
 constexpr int kNewest = 29;
-/// Of what a row expands to. What is read stands before what nodes hold.
+/// Limit of a decompressed row. The fields used here precede the nodes' metadata.
 constexpr std::size_t kMaxContent = std::size_t{4} << 20;
 constexpr std::size_t kMaxMetadata = std::size_t{16} << 20;
 constexpr std::uint32_t kUnnamed = 0xFFFFFFFF;
@@ -40,7 +40,7 @@ std::uint16_t read_u16(ByteReader& reader) {
   return bytes.empty() ? std::uint16_t{0} : load<std::uint16_t>(bytes.data(), std::endian::big);
 }
 
-/// How many bytes param0 has.
+/// Reads the size of param0 in bytes.
 Result<std::size_t> read_widths(ByteReader& reader) {
   const std::size_t at = reader.position();
   const std::size_t content = reader.u8();
@@ -69,7 +69,7 @@ void put_nodes(std::span<const std::byte> content, std::size_t width, MapBlock& 
   }
 }
 
-/// Names, by number; those that are there twice count as the last.
+/// Reads the names by number; the last one wins among duplicates.
 Status read_names(ByteReader& reader, std::vector<std::uint32_t>& name_of, std::vector<std::string>& names) {
   const std::size_t at = reader.position();
   const int version = reader.u8();
@@ -125,7 +125,7 @@ Status read_zlib(std::span<const std::byte> row, int version, std::vector<std::u
   ByteStream node_stream(row, nodes_at, Compression::Zlib);
   const auto count = node_stream.read(nodes);
   if (!count) return count.error();
-  // What is left is the stream's end alone.
+  // Only the stream's end must be left.
   const auto more = node_stream.skip(1);
   if (!more) return more.error();
   if (*count != nodes.size() || *more != 0) return bad_at(nodes_at, "not the bytes of 4096 nodes");

@@ -22,7 +22,7 @@ struct MapBlock {
   std::vector<std::string> names;                  ///< of the nodes that are in it
   std::array<std::uint16_t, kBlockNodes> nodes{};  ///< places in `names`
   std::array<std::uint8_t, kBlockNodes>
-      param2{};  ///< turns, levels of what flows, colours: what it means its node says
+      param2{};  ///< rotation, liquid level or colour, as defined by the node's definition
 };
 
 /// Reads blocks as the database has them. Not read are what nodes hold (metadata), objects, timers, and light (param1).
@@ -32,12 +32,12 @@ class MapBlockReader {
  public:
   MapBlockReader();
 
-  /// Puts what a row's bytes hold into `block`, whose memory is used again.
+  /// Decodes a row's bytes into `block` and reuses its memory.
   ///
   /// Versions: 25 to 29.
-  /// Errors:   BadFormat with the offset in the row, or in what a row of version 29 expands to, as the message says;
-  ///           Unsupported for other versions. The block then means nothing.
-  /// Memory:   4 MiB of what it expands to.
+  /// Errors:   BadFormat with the offset in the row, or in the decompressed row of version 29, as the message says;
+  ///           Unsupported for other versions. The block is then invalid.
+  /// Memory:   4 MiB of decompressed bytes.
   [[nodiscard]] Status read(std::span<const std::byte> row, MapBlock& block);
 
  private:

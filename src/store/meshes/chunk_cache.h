@@ -14,24 +14,24 @@
 
 namespace quoin::store {
 
-/// The chunks of a grid of a world, level 0, of which the last ones used are in memory.
+/// The chunks of a world's grid, level 0; the most recently used ones are in memory.
 class ChunkCache {
  public:
   /// `bytes`: of voxels that are kept. `world` must outlive it. Errors of reading keys: `status`.
   ChunkCache(const WorldStore& world, std::uint32_t grid, std::size_t bytes);
-  /// What went wrong with reading the world as such.
+  /// The errors of reading the world itself.
   [[nodiscard]] const Status& status() const { return status_; }
 
   /// All that there are, by z, then y, then x.
   [[nodiscard]] std::span<const IVec3> places() const { return places_; }
-  /// Reads those that are not there yet, on several threads; places that hold none are left out.
+  /// Reads the missing chunks on several threads; skips addresses without a chunk.
   void load(std::span<const IVec3> places, Threads threads);
   /// Null where there is none, or it is not loaded. Lifetime: until the next `trim`.
   [[nodiscard]] const Chunk* find(IVec3 place) const;
   /// Lets those go that were not loaded last and do not fit any more.
   void trim();
 
-  /// Of all that was read, each chunk once: voxels that are not air, those with data.
+  /// Totals over all chunks read, each counted once: non-air voxels, voxels with data.
   [[nodiscard]] std::int64_t voxels() const { return voxels_; }
   [[nodiscard]] std::int64_t data() const { return data_; }
   [[nodiscard]] bool has_densities() const { return has_densities_; }

@@ -29,7 +29,7 @@ namespace {
 
 // Chunks that are meshed at once.
 constexpr std::size_t kBatch = 32;
-// What is read of files is not counted as theirs by those who read it: it goes after so long.
+// Interval for releasing mapped file pages: memory statistics do not attribute these pages to the mesher.
 constexpr auto kGiveBack = std::chrono::milliseconds(10);
 
 /// The triangles of a grid, in files.
@@ -103,7 +103,7 @@ class SpooledMesh {
   std::jthread giver_;  // last: it ends first
 };
 
-/// Reads voxels of a grid, whichever chunks they are in.
+/// Reads voxels of a grid across chunks.
 class CachedReader {
  public:
   /// `origin`: the chunk whose corner voxels are counted from.

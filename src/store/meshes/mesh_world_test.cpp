@@ -141,7 +141,7 @@ TEST(WorldMeshes, AreReadAgainAfterTheyWereGivenBack) {
     return std::string(std::istreambuf_iterator<char>(in), {});
   };
   EXPECT_TRUE(bytes(folder / "a.glb") == bytes(folder / "b.glb"));
-  // Nothing of what was put into files is left.
+  // No temporary file is left.
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 3);
 }
 

@@ -33,7 +33,7 @@ class Spool {
     return {static_cast<const T*>(mapped_), static_cast<std::size_t>(written_) / sizeof(T)};
   }
   [[nodiscard]] std::uint64_t bytes() const { return written_ + buffer_.size(); }
-  /// Takes what was read out of the process's memory; it is read again from the file when it is needed.
+  /// Releases the pages read from this process's memory; later accesses read them from the file again.
   void give_back() const;
 
  private:

@@ -28,7 +28,7 @@ class RandomFile {
   ~RandomFile();
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
-  /// Fills `out` from an offset on; what the file does not have, or the disk does not give, is 0.
+  /// Fills `out` from an offset on. Bytes beyond the file's end or unreadable bytes become 0.
   void read(std::uint64_t offset, std::span<std::byte> out) const;
 
  private:
@@ -37,13 +37,13 @@ class RandomFile {
   std::uint64_t size_ = 0;
 };
 
-/// How a file is cut into pages.
+/// The page size of a file.
 struct PageLayout {
   std::size_t page_size = 8'192;
   std::size_t usable = 8'192;  ///< of these, what SQLite fills
 };
 
-/// Which state of the pages is meant: that of the file alone, or with the log's frames up to one.
+/// The state of the pages: the file alone, or with the log's frames up to a given one.
 struct PageView {
   std::size_t frames = 0;  ///< of the log that count
 };

@@ -17,7 +17,7 @@ namespace {
 
 // Longer records count as bytes that look like one by chance.
 constexpr std::uint64_t kMaxPayload = std::uint64_t{128} << 20;
-// Overflow pages that are read, against the file's size: each is read once or twice for what it holds.
+// Limit of overflow page reads relative to the file's size: a sound page is read once or twice.
 constexpr std::uint64_t kMaxReadsOfByte = 64;
 // Of a file that is searched for how it is cut into pages.
 constexpr std::uint64_t kSampledBytes = std::uint64_t{1} << 30;
@@ -54,7 +54,7 @@ std::optional<std::uint64_t> bytes_of_type(std::uint64_t type) {
   return type < 12 ? std::nullopt : std::optional((type - 12) / 2);
 }
 
-/// How much of a payload lies in the page of its cell.
+/// Returns the bytes of a payload within the page of its cell.
 std::size_t local_bytes(std::uint64_t payload, std::size_t usable) {
   if (payload <= usable - 35) return static_cast<std::size_t>(payload);
   const std::size_t least = (usable - 12) * 32 / 255 - 23;
@@ -120,7 +120,7 @@ class Scan {
  private:
   static constexpr std::size_t kKeptBytes = std::size_t{4} << 20;
 
-  // Appends overflow pages to what was gathered. False where they end too early.
+  // Appends overflow pages to the gathered payload. Returns false if they end too early.
   bool gather(std::uint32_t next, PageView view, std::uint64_t payload_bytes) {
     overflow_.resize(file_.layout().page_size);
     const std::uint64_t limit = kMaxReadsOfByte * file_.bytes();
@@ -217,7 +217,7 @@ void Scan::find_layout() {
         return !is_found;
       });
     });
-    // What a wrong layout led to says nothing.
+    // Discards the counters of a wrong layout.
     read_bytes_ = 0;
     is_too_slow_ = false;
     if (is_found) return;

@@ -11,17 +11,17 @@
 #include <quoin/core/function_ref.h>
 #include <quoin/core/result.h>
 
-// What is left in the file of a database, and in its write-ahead log, read page by page without SQLite: also where the
-// first page, the inner pages of trees or pages' own headers are damaged, and what lies on pages that are no longer
-// used. Source: https://sqlite.org/fileformat2.html.
+// Finds the remains in a database file and its write-ahead log, page by page without SQLite: also if the first page,
+// inner tree pages or page headers are damaged, and on unused pages. Source: https://sqlite.org/fileformat2.html.
 //
-// Neither trees nor the places of cells are followed: each byte of each page may be where a cell begins. What follows
-// is a record if its lengths agree, and a chunk's body if its checksum is right.
+// Ignores trees and cell pointers: each byte of each page may be the start of a cell. Bytes are a record if the lengths
+// agree, and a chunk's body if the checksum is right.
 //
-// Errors:  CannotRead where the file cannot be opened. Pages that the disk does not give count as damaged.
-//          LimitExceeded for a file whose pages were made to lead back to themselves again and again.
-// Memory:  a page or two, the largest record, and 16 bytes for each page in the log.
-// Cost:    about 10 ns a byte for records, 0.5 ns for bodies, besides reading the file twice; where no body that spans pages
+//Errors:  CannotRead if the file cannot be opened. Unreadable pages count as damaged.
+//         LimitExceeded for a file with crafted page cycles.
+//Memory:  a page or two, the largest record, and 16 bytes for each page in the log.
+//Cost:    about 10 ns per byte for records, 0.5 ns for bodies, plus reading the file twice. If no body that spans pages
+//         reveals the page size, up to 1 GiB is scanned for each possible size.
 //          says how large these are, 1 GiB of it at most for each size that there may be.
 
 namespace quoin::store {
@@ -34,8 +34,8 @@ struct PageRecord {
   std::vector<ColumnValue> columns;
 };
 
-/// Calls `visit` for all that may be a row of a table of two columns or more, as often as it is found: also older
-/// states of rows, and bytes that look like rows by chance. Whoever reads them has checksums of his own.
+/// Calls `visit` for each possible row of a table with at least two columns, possibly several times. This includes
+/// older states of rows, and bytes that look like rows by chance: the caller must verify its own checksums.
 [[nodiscard]] Status scan_records(const std::filesystem::path& database, FunctionRef<void(const PageRecord&)> visit);
 
 /// A body whose own row cannot be read has this key.

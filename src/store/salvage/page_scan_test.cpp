@@ -200,7 +200,7 @@ TEST(PageScan, FindsAllWithoutTheFirstPage) {
     std::filesystem::remove(path);
     write(path, file);
     expect_all_found(path, rows);
-    // And with one that lies.
+    // Also with a random header.
     for (int i = 0; i < page_size; ++i) file[static_cast<std::size_t>(i)] = static_cast<std::byte>(random());
     std::memcpy(file.data(), "SQLite format 3\0\x02\0", 18);
     write(path, file);

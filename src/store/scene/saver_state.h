@@ -49,7 +49,7 @@ struct SavedGrid {
   bool is_partly_read = false;  ///< there may be others that the scene lacks
 };
 
-/// How much of a scene a world has.
+/// The part of a scene that a world has stored.
 struct SaverState {
   ChangeCursor scene;
   ChangeCursor types;

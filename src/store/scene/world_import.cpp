@@ -35,7 +35,7 @@ constexpr std::size_t kMaxLines = 1'000;
 /// Saves that may wait to be written.
 constexpr std::size_t kMaxSaves = 2;
 
-/// What tells a source from another one, and from the same one after files came or went.
+/// Returns an identity that differs between sources, and changes when files of a source are added or removed.
 std::string identity_of(const ChunkSource& source) {
   std::uint64_t hash = 1469598103934665603U;
   for (const IBox& part : source.parts()) {
@@ -46,7 +46,7 @@ std::string identity_of(const ChunkSource& source) {
   return source.info().format + ", " + std::to_string(source.parts().size()) + " parts, " + std::to_string(hash);
 }
 
-/// How far an import came. It is saved with the chunks that it counts.
+/// The progress of an import. Saved together with the chunks that it counts.
 struct Done {
   std::size_t parts = 0;
   std::uint64_t chunks = 0;
@@ -176,7 +176,7 @@ class Import {
     return {};
   }
 
-  // A scene without voxels, to which chunks are added.
+  // Starts from scratch, with a scene without voxels; chunks are added later.
   Status begin_anew() {
     Scene scene;
     SceneGrid grid;

@@ -21,7 +21,7 @@ using namespace store;
 
 namespace {
 
-// Lines of damage: of a whole world that is broken nobody reads more.
+// Maximum number of damage lines, for readable reports on broken worlds.
 constexpr std::size_t kMaxLines = 20;
 
 /// Puts a world's parts and chunks into a scene.
@@ -93,7 +93,7 @@ class Load {
         });
     if (is_cancelled) return make_error(ErrorCode::Cancelled, "cancelled", world_.path().string());
     if (!read) {
-      // Where the tables themselves are damaged, what was read until there is kept.
+      // If the tables themselves are damaged, the parts read so far are kept.
       if (read.error().code != ErrorCode::BadFormat) return read;
       saved.is_partly_read = true;
       add_line("grid " + std::to_string(number) + ": not all could be read: " + read.error().message);
@@ -108,7 +108,7 @@ class Load {
     state_.grids.emplace(handle, std::move(saved));
   }
 
-  // Reads the parts of a kind; what is damaged is told, and left out.
+  // Reads the parts of a kind; reports and skips damaged parts.
   template <class T, class Put>
   Status each(const char* kind, Put put) {
     return WorldParts::each(world_, kind, [&](const Part& part, bool is_sound) {
@@ -192,7 +192,7 @@ class Load {
       saved.voxels = saved.data = grid.grid.cursor();
       saved.densities = grid.field.cursor();
     }
-    // The numbers of what is damaged stay taken.
+    // The numbers of damaged parts stay reserved.
     const auto after = [&](const char* kind) { return last_.contains(kind) ? last_[kind] + 1 : 0; };
     state_.instances.next = after(part::kInstance);
     state_.groups.next = after(part::kGroup);

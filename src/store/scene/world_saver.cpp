@@ -22,7 +22,7 @@ namespace {
 constexpr auto kBefore = [](IVec3 a, IVec3 b) { return std::tie(a.z, a.y, a.x) < std::tie(b.z, b.y, b.x); };
 using ChunkSet = std::set<IVec3, decltype(kBefore)>;
 
-/// One save: what changed in a scene, put into changes.
+/// One save: collects the changes of a scene.
 class Save {
  public:
   Save(WorldStore& world, const Scene& scene, SaverState& state, WorldChanges& changes)
@@ -35,7 +35,7 @@ class Save {
     if (auto done = put_types(); !done) return done;
     SceneChanges changed = scene_.changes_since(state_.scene);
     if (changed.all) name_everything(changed);
-    // What is named comes before what names it.
+    // Parts are saved before the parts that refer to them.
     put_named(changed.layers, scene_.layers(), state_.layers, part::kLayer);
     put_groups(changed.groups);
     for (const GridHandle handle : changed.grids) {
@@ -50,7 +50,7 @@ class Save {
     state_.owes_all = false;
     return {};
   }
-  /// Of what was not taken nothing was saved.
+  /// Restores the unsaved state after the store refused the changes.
   void give_back() {
     state_.owes_all = true;
     state_.is_view_new |= had_view_;
@@ -215,7 +215,7 @@ class Save {
     if (is_all) {
       for (const IVec3 chunk : grid.grid.chunks()) changed.insert(chunk);
       for (const IVec3 chunk : grid.field.chunks()) changed.insert(chunk);
-      if (!is_new && !saved.is_partly_read) {  // what was emptied meanwhile, but for what was never read
+      if (!is_new && !saved.is_partly_read) {  // finds chunks emptied since, except chunks that were never read
         const auto held = world_.chunks(saved.number, 0);
         if (!held) return held.error();
         ChunkSet emptied(held->begin(), held->end(), kBefore);

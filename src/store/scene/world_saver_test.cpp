@@ -25,7 +25,7 @@ std::string text_of(const Scene& scene) {
   return all.substr(0, 3000) + std::to_string(std::hash<std::string>()(all));
 }
 
-/// Of everything something.
+/// Returns a scene with every kind of content.
 Scene rich_scene() {
   Scene scene;
   scene.types = coloured_types(9);

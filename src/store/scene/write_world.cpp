@@ -40,7 +40,7 @@ Status clear_log(const std::filesystem::path& path) {
   return {};
 }
 
-/// A world that is made beside the name that it is to have; without `put_in_place` nothing is left of it.
+/// A world written under a temporary name in the same folder; deleted unless `put_in_place` is called.
 class FreshWorld {
  public:
   explicit FreshWorld(std::filesystem::path path) : path_(std::move(path)), fresh_(fresh_name(path_)) {}
@@ -102,7 +102,7 @@ Status store::put_world_in_place(const std::filesystem::path& from, const std::f
   return move_in_place(from, to, Existing::Replaced);
 }
 
-// Errors name the file that was wanted, not the one beside it.
+// Errors name the requested file, not the temporary one.
 Result<SavedScene> write_world(const Scene& scene, const std::filesystem::path& path, Threads threads,
                                const Progress& progress, WorldChanges more) {
   auto saved = write(scene, {}, path, threads, progress, std::move(more));

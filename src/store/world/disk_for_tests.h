@@ -16,15 +16,15 @@
 
 #include <sqlite3.h>
 
-// A disk in memory, as a file system of SQLite's, that knows what of its content a power cut would leave: what was
-// synced, and of the rest whatever a disk may have written by then, in any order, sectors torn.
+// An in-memory disk, as an SQLite file system, that knows the possible contents after a power cut: all synced data, and
+// any subset of later writes, in any order, with torn sectors.
 //
-//   file      content now | content when it was last synced | what was done to it since
-//   folder    names now   | names when it was last synced
+//   file      content now | content at the last sync | operations since
+//   folder    names now   | names at the last sync
 //
-// As SQLite's own, it syncs the folder when a new file is synced for the first time, and when a file is deleted with
-// that wish. Shared memory is of the running machine and does not survive. Overwriting a sector leaves the others as
-// they are (POWERSAFE_OVERWRITE).
+// Like SQLite's own file system, it syncs the folder at the first sync of a new file, and at a deletion with the sync
+// flag. Shared memory belongs to the running machine and does not survive. Overwriting a sector leaves other sectors
+// unchanged (POWERSAFE_OVERWRITE).
 
 namespace quoin {
 
@@ -33,7 +33,7 @@ class TestDisk {
   static constexpr std::size_t kSector = 512;
   using Bytes = std::vector<std::uint8_t>;
 
-  /// What a power cut at some moment leaves, but for chance.
+  /// The state that a power cut leaves, before random choices.
   struct Image {
     struct Step {
       std::size_t offset = 0;
@@ -80,10 +80,10 @@ class TestDisk {
   [[nodiscard]] const char* name() const { return name_.c_str(); }
   /// Called before everything that changes the disk, with the disk as it is then.
   std::function<void()> before_change;
-  /// Asked whether a call fails, with what: SQLITE_OK, SQLITE_FULL, SQLITE_IOERR_WRITE ... `what`: "write", "sync",
+  /// Returns the result code of a call: SQLITE_OK, SQLITE_FULL, SQLITE_IOERR_WRITE ... `what`: "write", "sync",
   /// "truncate", "delete", "open", "read".
   std::function<int(const char* what)> fault;
-  /// Whether a file's sync does what it says.
+  /// Returns true if a sync of the file really writes its data.
   std::function<bool(const std::string& file)> is_sync_honest;
 
   [[nodiscard]] Image image() {
@@ -97,7 +97,7 @@ class TestDisk {
     return image;
   }
 
-  /// Becomes what a disk may hold after a power cut.
+  /// Sets the content to a possible state after a power cut.
   void become(const Image& image, std::minstd_rand& random) {
     const std::scoped_lock lock(mutex_);
     names_.clear();

@@ -1,4 +1,4 @@
-// A process that saves is killed: what it was told is on disk is there, and every save is there as a whole or not at all.
+// Kills a saving process: all acknowledged saves are on disk, and each save is complete or absent.
 
 #include <sys/wait.h>
 #include <unistd.h>
@@ -16,7 +16,7 @@
 namespace quoin {
 namespace {
 
-// In the process that is to be killed: saves on and on from a number, and writes the numbers of those that are on disk.
+// Runs in the process to be killed: saves repeatedly from a number on, and writes the numbers of the saves on disk.
 [[noreturn]] void save_until_killed(const std::string& file, int first, int out) {
   auto world = WorldStore::open(file, WorldAccess::Write, {1});
   if (!world) ::_exit(3);

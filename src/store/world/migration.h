@@ -9,11 +9,11 @@
 
 namespace quoin::store {
 
-/// What takes a world from one version of the format to the next.
+/// Upgrades a world from one format version to the next.
 struct MigrationStep {
   int from = 0;               ///< to the next one
-  bool changes_rows = false;  ///< rather than to add something: what was there is then kept as another file
-  Status (*run)(Connection& database) = nullptr;  ///< within a transaction that is none of its own
+  bool changes_rows = false;  ///< changes existing rows instead of only adding to them: a backup file is then kept
+  Status (*run)(Connection& database) = nullptr;  ///< runs within the caller's transaction
 };
 
 /// One for each version before the present one, from version 1 on.
@@ -22,11 +22,11 @@ struct MigrationStep {
 /// Has a world say a version, in its header and in the part that says it.
 [[nodiscard]] Status put_version(Connection& database, int version);
 
-/// Takes a world to the version after the last of the steps, all of them in one transaction: after a crash, and where
-/// one of them fails, it is as it was. Where rows change, a copy of the world is kept beside it first, as NAME~ or,
-/// where there is such a file, under the next such name that is free. Nothing is done to a world of that version.
+/// Upgrades a world to the version after the last of the steps, in one transaction: after a crash or a failed step it
+/// is unchanged. If rows change, a copy of the world is kept in the same folder first, as NAME~ or, if that file
+/// exists, under the next free name of this form. Does nothing to a world of that version.
 ///
-/// Requires: `database` is open for writing, by whoever holds the lock of `path`; a commit lasts once it returns.
+/// Requires: `database` is open for writing and the caller holds the lock of `path`; commits are durable on return.
 /// Errors: CannotWrite (a full disk ...), BadFormat.
 [[nodiscard]] Status migrate(Connection& database, const std::filesystem::path& path,
                              std::span<const MigrationStep> steps = migration_steps());

@@ -110,7 +110,7 @@ TEST(Migration, KeysAreListedWithoutTheirBodies) {
   }
 }
 
-// Steps of a program to come: the present version to one that renames types, and one after that.
+// Steps of a future program: the present version to one that renames types, and one after that.
 Status rename_values(Connection& database) {
   return database.run("UPDATE parts SET kind='thing' WHERE kind='value'; CREATE TABLE added(x)");
 }

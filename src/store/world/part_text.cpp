@@ -20,7 +20,7 @@ using scene_json::OrderedJson;
 using scene_json::PartWriter;
 using scene_json::Place;
 
-// Parts are flat; what is deeper would fill the stack of whoever reads it.
+// Parts are flat; deeper nesting could overflow the stack of a recursive reader.
 constexpr int kMaxDepth = 32;
 
 bool is_too_deep(std::string_view text) {

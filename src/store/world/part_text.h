@@ -32,7 +32,7 @@ namespace quoin::store {
 template <class T>
 [[nodiscard]] Result<T> part_from(std::span<const std::byte> text, const std::string& name);
 
-/// Whether a part of a kind that scenes have can be read again; of other kinds anything can.
+/// Checks that a scene part can be read again; parts of other kinds may have any content.
 /// Errors: InvalidArgument.
 [[nodiscard]] Status check_part(const PartKey& key, std::span<const std::byte> body);
 

@@ -1,4 +1,4 @@
-// Power cuts, failing calls: what was acknowledged is there, and every save is there as a whole or not at all.
+// Power cuts and failing calls: acknowledged saves are present, and each save is complete or absent.
 
 #include <atomic>
 #include <cstdlib>
@@ -35,7 +35,7 @@ class Cuts {
       if (random_() % 3 == 0) {
         ASSERT_TRUE(world->wait(*ticket));
       }
-      if (i % 20 == 0) {  // closed and opened, by which the log ends and begins
+      if (i % 20 == 0) {  // close and reopen, to end and restart the log
         world = make_error(ErrorCode::Cancelled, "closed");
         world = WorldParts::open(kFile, WorldAccess::Write, {1}, disk_.name());
         ASSERT_TRUE(world) << to_string(world.error());

@@ -12,21 +12,21 @@
 #include "store/world/world_changes.h"
 #include "store/world/world_for_tests.h"
 
-// Saves that follow each other, of which it is known what a world holds after any number of them.
+// A sequence of saves with a known world content after each of them.
 
 namespace quoin {
 
 inline constexpr int kPlaces = 24;
 inline constexpr int kTypes = 200;
 
-/// What a world holds after so many saves: the type of each place's chunk; 0: none. Save i is save i whatever was
-/// before, so that any number of them can be replayed.
+/// The content of a world after a number of saves: the type of each chunk; 0: none. Save i does not depend on earlier
+/// state, so that saves can be replayed.
 struct Expected {
   std::array<VoxelType, kPlaces> types{};
   int saves = 0;
 };
 
-/// Save number `i` (from 1): a counter, and some chunks, of which one may go.
+/// Performs save number `i` (from 1): a counter and some chunks, sometimes a removal.
 template <class Put, class Remove>
 void each_of_save(int i, Put put, Remove remove) {
   std::minstd_rand random(static_cast<unsigned>(i) * 7919U);
@@ -55,7 +55,7 @@ inline ChunkPlace place_of(int place) {
   return {0, 0, {place % 5 - 2, place / 5, 31 + place % 3}};
 }
 
-// Several rows' worth of content, told apart by its type.
+// Returns a content of several rows, identified by its type.
 inline Chunk content_of(VoxelType type) {
   Chunk chunk(type);
   for (int i = 0; i < 40; ++i) chunk.set(i, (i * type) % 64, (i * 5) % 64, kAir);
@@ -85,7 +85,7 @@ inline Result<WorldStore> create_for_saves(const std::string& file, const char* 
   return world;
 }
 
-/// How many saves a world has; -1 where it is not as after any number of them, with the reason.
+/// The number of saves in a world; -1 with a reason if the world matches no number of saves.
 struct Found {
   int saves = -1;
   std::string why;

@@ -17,7 +17,7 @@ void ChangeSet::remove_grid(std::uint32_t number) {
 
 void ChangeSet::add(ChangeSet&& later) {
   chunks.reserve(chunks.size() + later.chunks.size());
-  // From here on nothing asks for memory: what is there moves, node by node.
+  // No allocation from here on: existing nodes move one by one.
   for (const std::uint32_t grid : later.removed_grids) {
     std::erase_if(chunks, [&](const auto& each) { return each.first.grid == grid; });
   }

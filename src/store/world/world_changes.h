@@ -42,7 +42,7 @@ namespace quoin {
 
 using store::PartBody;
 
-/// What the store's own parts put into changes besides chunks and values.
+/// Changes by the store's own modules, in addition to chunks and values.
 struct WorldParts {
   /// Nothing for `body`: the part goes.
   static void put(WorldChanges& changes, store::PartKey key, std::optional<PartBody> body);
@@ -54,12 +54,12 @@ struct WorldParts {
   /// written. Errors: CannotRead.
   [[nodiscard]] static Status each(const WorldStore& world, const char* kind,
                                    FunctionRef<void(const store::Part& part, bool is_sound)> visit);
-  /// Calls `visit`, on the caller's thread, for the chunks of a grid and level that are on disk in the order of their
-  /// keys, until it returns false; those that are damaged are errors. Decodes on several threads, in bounded memory.
+  /// Calls `visit`, on the caller's thread, for the chunks of a grid and level on disk in key order, until it returns
+  /// false. Damaged chunks are passed as errors. Decodes on several threads, in bounded memory.
   [[nodiscard]] static Status each_chunk(const WorldStore& world, std::uint32_t grid, std::uint8_t level,
                                          Threads threads,
                                          FunctionRef<bool(const ChunkPlace& place, Result<StoredChunk> chunk)> visit);
-  /// What of types and grids was found damaged when it was opened, a line each.
+  /// Returns a line for each damaged type or grid found on opening.
   [[nodiscard]] static std::vector<std::string> damage(const WorldStore& world);
 
   /// `vfs`: a file system of SQLite's, for tests; null: the usual one, with a lock.

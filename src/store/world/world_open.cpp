@@ -39,7 +39,7 @@ Status roll_back(const std::filesystem::path& path) {
   return connection->close();
 }
 
-/// As a file that nobody changes.
+/// Opens the file as immutable: no other program changes it.
 Result<WorldReader> open_alone(const std::filesystem::path& path) {
   auto alone = Connection::open(path.string(), Connection::Mode::ReadImmutable);
   if (!alone) return alone.error();
@@ -47,7 +47,8 @@ Result<WorldReader> open_alone(const std::filesystem::path& path) {
   return WorldReader(std::move(*alone));
 }
 
-/// On a file system without locks nobody may write, so it stays as it is; unless it came there while it was written.
+/// Opens a world on a file system without locks. Writing is impossible there, so the file is stable, unless it was
+/// copied there during a write.
 Result<WorldReader> open_unlocked(const std::filesystem::path& path) {
   std::error_code unknown;
   for (const char* const log : {"-wal", "-journal"}) {
@@ -64,9 +65,9 @@ Result<WorldReader> open_unlocked(const std::filesystem::path& path) {
 }  // namespace
 
 Status begin_writing(Connection& connection, bool is_network) {
-  // Acknowledged is what is synced: NORMAL would lose commits when the power goes. Without a log the folder, from which
-  // the journal vanishes, is to be synced too; so also where the log begins: a journal that came back after a power cut
-  // would have the database forget that there is one.
+  // Acknowledged commits must be synced: NORMAL could lose commits on a power failure. In rollback mode the folder must
+  // also be synced after the journal is deleted. The same holds at the switch to the log: a journal that reappears
+  // after a power cut would hide the log from the database.
   if (auto done = connection.run("PRAGMA synchronous=EXTRA"); !done) return done;
   if (is_network) {  // of another machine it may still have one
     const auto mode = connection.text("PRAGMA journal_mode=DELETE");
@@ -90,7 +91,7 @@ Result<WorldReader> open_reader(const std::filesystem::path& path, const char* v
   auto connection = Connection::open(path.string(), Connection::Mode::Read, vfs);
   const Status sound = connection ? check_schema(*connection) : Status(connection.error());
   if (sound) return WorldReader(std::move(*connection));
-  // A transaction that a crash cut off in rollback mode is undone by whoever may write.
+  // A writer rolls back a transaction that a crash left in rollback mode.
   if (sound.error().code == ErrorCode::CannotWrite && vfs == nullptr) {
     if (auto undone = roll_back(path); !undone) return undone.error();
     auto again = Connection::open(path.string(), Connection::Mode::Read);
@@ -98,7 +99,7 @@ Result<WorldReader> open_reader(const std::filesystem::path& path, const char* v
     if (auto done = check_schema(*again); !done) return done.error();
     return WorldReader(std::move(*again));
   }
-  // A folder that nobody can write to has no place for the memory that readers share; then there are no writers either.
+  // A read-only folder cannot hold the readers' shared memory file; it also has no writers.
   const std::filesystem::path folder = path.parent_path();
   std::error_code error;
   const bool has_log = std::filesystem::exists(path.string() + "-wal", error);

@@ -11,19 +11,20 @@ namespace quoin::store {
 [[nodiscard]] Result<WorldReader> open_reader(const std::filesystem::path& path, const char* vfs = nullptr);
 /// Has commits of a connection that writes last once they return: from here on by a write-ahead log, but on networks.
 [[nodiscard]] Status begin_writing(Connection& connection, bool is_network);
-/// Empties the log and does without it, so that nothing lies beside the file and any medium will do for it. False where
-/// it is in use: it stays then, and whoever writes next goes on with it.
+/// Empties and disables the log, so that the world is a single file that works on any medium. Returns false if the log
+/// is in use: it then stays for the next writer.
 bool end_writing(Connection& connection);
-/// What lies beside a database.
+/// Removes a database's log files.
 void remove_database_log(const std::filesystem::path& path);
-/// A database, and what lies beside it.
+/// Removes a database with its log files.
 void remove_database(const std::filesystem::path& path);
 
-/// A name beside a world for one that is being made, which nobody else uses.
+/// Returns an unused temporary name in the world's folder.
 [[nodiscard]] std::filesystem::path fresh_name(const std::filesystem::path& world);
 
 enum class Existing : std::uint8_t { Refused, Replaced };
-/// Gives a closed database another name, at which it is whole after any power cut, or is not. Errors: CannotWrite.
+/// Renames a closed database; after a power cut the new name has the complete file or does not exist. Errors:
+/// CannotWrite.
 [[nodiscard]] Status move_in_place(const std::filesystem::path& from, const std::filesystem::path& to,
                                    Existing existing = Existing::Refused);
 

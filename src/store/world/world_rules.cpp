@@ -14,7 +14,7 @@ namespace {
 constexpr std::int64_t kMaxGrid = 0xFFFF'FFFE;
 constexpr std::size_t kMaxValueBytes = std::size_t{64} << 20;
 
-// Types up to a number, those that are lost in between.
+// Adds types up to a number, with placeholders for lost types in between.
 Status fill_types(VoxelRegistry& types, std::int64_t number, std::vector<std::string>& damage) {
   while (static_cast<std::int64_t>(types.size()) < number) {
     const auto missing = static_cast<std::int64_t>(types.size());
@@ -63,7 +63,7 @@ VoxelProperties lost_type(std::int64_t number) {
   VoxelProperties properties;
   properties.name = "lost type " + std::to_string(number);
   properties.colour = {255, 0, 255, 255};
-  properties.state_bits = kMaxStateBits;  // whatever its voxels hold is read
+  properties.state_bits = kMaxStateBits;  // accepts any state of its voxels
   return properties;
 }
 

@@ -14,22 +14,22 @@
 
 namespace quoin::store {
 
-/// What chunks are checked against: the types and grids of a world.
+/// The types and grids of a world, for checking chunks.
 struct WorldRules {
   VoxelRegistry types;
   std::map<std::uint32_t, WorldGrid> grids;
-  std::vector<std::string> damage;  ///< a line each: of what was replaced by something that shows
+  std::vector<std::string> damage;  ///< a line for each item replaced by a visible placeholder
 
   /// Rules after changes. Errors: InvalidArgument, as WorldStore::save.
   [[nodiscard]] Result<WorldRules> after(const ChangeSet& changes) const;
-  /// Whether changes have types or grids.
+  /// Returns true if changes include types or grids.
   [[nodiscard]] static bool concern(const ChangeSet& changes);
 };
 
 /// Those of a world on disk. Types that are damaged become magenta ones, so that their voxels show; grids that are
 /// become nameless.
 [[nodiscard]] Result<WorldRules> read_rules(WorldReader& reader);
-/// What stands for a type that is lost: magenta, so that it shows.
+/// Returns the placeholder of a lost type: magenta, so that it is visible.
 [[nodiscard]] VoxelProperties lost_type(std::int64_t number);
 /// "chunk (1, 2, 3) of grid 0".
 [[nodiscard]] std::string about(const ChunkPlace& place);

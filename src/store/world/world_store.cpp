@@ -32,7 +32,7 @@ namespace {
 
 using namespace store;
 
-/// Which file a name leads to.
+/// Identifies the file that a name refers to.
 struct FileIdentity {
   dev_t device = 0;
   ino_t number = 0;
@@ -45,7 +45,7 @@ struct FileIdentity {
   }
 };
 
-/// What one thread reads with.
+/// The objects that one thread reads with.
 struct ReadKit {
   WorldReader reader;
   ChunkDecoder decoder;
@@ -53,7 +53,7 @@ struct ReadKit {
 
 Result<std::uint64_t> last_revision(WorldReader& reader) {
   const auto body = reader.part({part::kWorld, std::string("revision")});
-  // One that is damaged is higher than any that was: salvage may then take later rows for older ones, no more.
+  // A damaged revision counts as higher than any real one: at worst salvage mistakes later rows for older ones.
   if (!body)
     return body.error().code == ErrorCode::BadFormat ? std::uint64_t{1} << 48 : Result<std::uint64_t>(body.error());
   return *body ? number_in(**body) : 0;
@@ -74,8 +74,8 @@ struct WorldStore::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
   ~Impl() {
-    // Readers first: the last connection of all clears the log away, and it is to be the one that may. Not under the
-    // lock, which what is called back when the last saves are done may want.
+    // Closes readers first: the last connection to close removes the log, and only the writer is allowed to. The lock
+    // is not held here, since callbacks at the end of the last saves may need it.
     std::vector<std::unique_ptr<ReadKit>> readers;
     {
       const std::scoped_lock guard(mutex);
@@ -90,7 +90,7 @@ struct WorldStore::Impl {
   std::optional<FileIdentity> identity;  // of the file that was opened
   const char* vfs = nullptr;
   WorldLock lock;
-  mutable std::mutex mutex;  // of what follows
+  mutable std::mutex mutex;  // guards the members below
   mutable std::vector<std::unique_ptr<ReadKit>> idle;
   mutable std::shared_ptr<const WorldRules> rules;
   std::uint32_t next_grid = 0;
@@ -129,7 +129,7 @@ struct WorldStore::Impl {
     const std::scoped_lock guard(mutex);
     idle.push_back(std::move(kit));
   }
-  /// What `read(kit)` returns, its errors with the path.
+  /// Returns the result of `read(kit)`; adds the path to errors.
   template <class Read>
   auto with_kit(Read read) const -> std::invoke_result_t<Read, ReadKit&> {
     auto kit = take();
@@ -295,7 +295,7 @@ Result<std::optional<StoredChunk>> WorldStore::load_chunk(const ChunkPlace& plac
 }
 
 Result<std::vector<IVec3>> WorldStore::chunks(std::uint32_t grid, std::uint8_t level, const IBox& box) const {
-  // Before the disk is read: what is written meanwhile is found there.
+  // Taken before the disk is read, so that chunks written in between are found on disk.
   WorldWriter::PendingChunks pending;
   if (impl_->writer != nullptr) pending = impl_->writer->pending_chunks(grid, level, box);
   std::vector<IVec3> on_disk;

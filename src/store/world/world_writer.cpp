@@ -12,8 +12,8 @@ namespace quoin::store {
 
 namespace {
 
-// Chunks of one commit, unless a single save has more: the commit's syncs cost as much as some tens of chunks, and
-// what comes later waits for the whole of it.
+// Maximum number of chunks per commit, unless a single save has more. A commit's syncs cost as much as tens of chunks,
+// and later saves wait for the whole commit.
 constexpr std::size_t kGroupChunks = 256;
 // Of a save with more chunks so many are encoded at once, so that memory stays bounded.
 constexpr std::size_t kSliceChunks = 256;
@@ -215,7 +215,7 @@ void WorldWriter::finish(std::list<Save> group, const Status& outcome) {
   } else {
     try {
       told = save.on_saved;
-    } catch (const std::bad_alloc&) {  // they are told when it was tried again
+    } catch (const std::bad_alloc&) {  // callers are notified after the retry
     }
   }
   {
@@ -228,7 +228,7 @@ void WorldWriter::finish(std::list<Save> group, const Status& outcome) {
       stats_.saved_bytes += bytes_of_commit_;
     } else {
       failure_ = outcome;
-      // Of what is behind it nothing is tried either, until somebody asks.
+      // Later saves are not tried either, until a caller retries.
       failed_through_ = last_ticket_;
       queue_.splice(queue_.begin(), group);
     }
@@ -237,7 +237,7 @@ void WorldWriter::finish(std::list<Save> group, const Status& outcome) {
   for (const OnSaved& on_saved : told) on_saved(outcome);
 }
 
-// What was begun of a commit is undone.
+// Rolls back an unfinished commit.
 void WorldWriter::roll_back() {
   regions_.clear();
   try {
@@ -259,7 +259,7 @@ Result<Statement*> WorldWriter::ready(const char* sql) {
 Status WorldWriter::write(const ChangeSet& changes) {
   chunks_of_commit_ = 0;
   bytes_of_commit_ = 0;
-  if (changes.empty() && !needs_version_) return {};  // what was saved before is on disk
+  if (changes.empty() && !needs_version_) return {};  // all earlier changes are on disk
   ++revision_;
   if (connection_.is_in_transaction()) roll_back();
   Status outcome = connection_.run("BEGIN IMMEDIATE");

@@ -20,20 +20,20 @@
 
 namespace quoin::store {
 
-/// Saves changes on a thread of its own, many in one commit while commits take longer than they come:
+/// Saves changes on its own thread; merges many saves into one commit while commits are slower than saves:
 ///
 ///   save -> queue -> group (merged) -> encoded, by key -> one transaction -> commit, synced -> acknowledged
 ///
-/// What is not on disk yet is found here (`pending_*`). Threads: any function from any thread.
+/// The `pending_*` functions find changes that are not on disk yet. Threads: any function from any thread.
 class WorldWriter {
  public:
   using OnSaved = std::function<void(const Status&)>;
 
-  /// `revision`: of the last commit. The connection is the only one that writes.
+  /// `revision`: of the last commit. `connection` is the only writing connection.
   WorldWriter(Connection connection, std::uint64_t revision, Threads threads);
   WorldWriter(const WorldWriter&) = delete;
   WorldWriter& operator=(const WorldWriter&) = delete;
-  /// Saves what is queued, if it can, and closes the connection.
+  /// Saves the queue if possible, and closes the connection.
   ~WorldWriter();
 
   SaveTicket save(ChangeSet changes, OnSaved on_saved);
@@ -45,14 +45,14 @@ class WorldWriter {
   [[nodiscard]] std::optional<std::optional<StoredChunk>> pending_chunk(const ChunkPlace& place) const;
   /// As `pending_chunk`.
   [[nodiscard]] std::optional<std::optional<PartBody>> pending_part(const PartKey& key) const;
-  /// What is about to change of a grid's and level's chunks in a box: whether each will be there. All others go where
-  /// the grid is to be removed.
+  /// The pending changes to the chunks of a grid and level in a box: each chunk with true if it will exist, false if it
+  /// is removed. With `is_removed` the grid's other chunks are removed.
   struct PendingChunks {
     bool is_removed = false;
     std::vector<std::pair<IVec3, bool>> chunks;
   };
   [[nodiscard]] PendingChunks pending_chunks(std::uint32_t grid, std::uint8_t level, const IBox& box) const;
-  /// The parts of a kind that are about to change; nothing for those that go.
+  /// Returns the pending changes to the parts of a kind; nullopt for removed parts.
   [[nodiscard]] std::vector<std::pair<PartKey, std::optional<PartBody>>> pending_parts(std::string_view kind) const;
 
  private:
