@@ -1,6 +1,6 @@
 #pragma once
 
-// Fields with what is transparent: what tests of marched and of rasterised pictures compare.
+// Fields with transparent parts, for tests that compare marched with rasterised images.
 
 #include <algorithm>
 #include <cmath>
@@ -30,7 +30,7 @@ inline FieldTypes add_field_types(Scene& scene) {
   return types;
 }
 
-// Hills with a lake, a ball of glass half in it, another beside a house, which has a window; in one field.
+// Hills with a lake, a ball of glass half in it, another next to a house with a window; in one field.
 inline SceneGrid lakeside(const FieldTypes& types, VoxelType water) {
   SceneGrid grid;
   grid.field.edit({{-90, -60, -90}, {90, 40, 90}}, [&](IVec3 p, DensitySample) {

@@ -1,4 +1,4 @@
-// What is known of devices without asking Vulkan.
+// Device requirements that are known without Vulkan calls.
 
 #include <algorithm>
 #include <array>

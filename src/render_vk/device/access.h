@@ -5,7 +5,7 @@
 
 namespace quoin::vulkan {
 
-/// What the public classes of this layer keep from everybody else.
+/// Gives this layer's sources access to the private parts of its public classes.
 struct Access {
   using Renderer = VulkanRenderer::Impl;
   using Picture = VulkanPicture::Impl;

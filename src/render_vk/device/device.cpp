@@ -92,7 +92,7 @@ Status Device::adopt(const BorrowedVulkanDevice& lent) {
   return start();
 }
 
-// Whatever the device comes from.
+// Initialises the device, owned or borrowed.
 Status Device::start() {
   if (const char* missing = api_.load_device(handle_)) return refuse(description().name + " lacks " + missing);
   api_.vkGetPhysicalDeviceMemoryProperties(physical_.handle, &memory_);
@@ -117,7 +117,8 @@ VkResult Device::make_commands() {
 
 Device::~Device() {
   if (handle_ == VK_NULL_HANDLE) return;
-  // Whoever else uses a device that is lent must not be in the way, and what was submitted here has been waited for.
+  // Waits only on an owned device: the owner of a borrowed one must not be blocked, and all commands submitted here
+  // have completed.
   if (instance_) api_.vkDeviceWaitIdle(handle_);
   if (fence_ != VK_NULL_HANDLE) api_.vkDestroyFence(handle_, fence_, nullptr);
   if (pool_ != VK_NULL_HANDLE) api_.vkDestroyCommandPool(handle_, pool_, nullptr);

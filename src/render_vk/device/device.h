@@ -24,11 +24,11 @@ class Device {
   [[nodiscard]] const Api& api() const { return api_; }
   [[nodiscard]] VkDevice handle() const { return handle_; }
   [[nodiscard]] const VulkanDeviceInfo& description() const { return physical_.description; }
-  /// What it can do, and how it is known to Vulkan.
+  /// The capabilities and the Vulkan handle of the device.
   [[nodiscard]] const PhysicalDevice& physical() const { return physical_; }
   [[nodiscard]] const VkPhysicalDeviceMemoryProperties& memory() const { return memory_; }
 
-  /// What a failed call comes to. `doing`: as in "drawing".
+  /// Converts a failed call to an error. `doing`: as in "drawing".
   [[nodiscard]] Error error_of(VkResult result, const std::string& doing) const;
   /// Nothing on success.
   [[nodiscard]] Status check(VkResult result, const std::string& doing) const {
@@ -36,11 +36,11 @@ class Device {
     return error_of(result, doing);
   }
 
-  /// Has the commands that `record` records run, and waits for them. What they write is then seen by the processor
-  /// and by later commands.
+  /// Runs the commands that `record` records, and waits for them. Their writes are then visible to the CPU and to later
+  /// commands.
   [[nodiscard]] Status run(const std::string& doing, const std::function<void(VkCommandBuffer)>& record);
 
-  /// Between commands of which the later read or overwrite what the earlier wrote.
+  /// Adds a barrier between commands where the later read or overwrite the results of the earlier.
   void separate(VkCommandBuffer commands) const;
 
  private:
@@ -65,7 +65,7 @@ class Device {
 
 /// A shader, to be destroyed once pipelines were made of it.
 [[nodiscard]] VkResult make_shader(const Device& device, std::span<const std::uint32_t> code, VkShaderModule& shader);
-/// What a shader that computes is made with: its constants of these numbers.
+/// A specialization constant of a compute shader.
 struct ShaderConstant {
   std::uint32_t number = 0;
   bool value = false;
@@ -74,7 +74,7 @@ struct ShaderConstant {
 [[nodiscard]] VkResult make_compute_pipeline(const Device& device, VkPipelineLayout layout,
                                              std::span<const std::uint32_t> code,
                                              std::span<const ShaderConstant> constants, VkPipeline& pipeline);
-/// How shaders are given what they read: `bytes` that are pushed, in which the rest is found by address.
+/// Makes a layout with `bytes` of push constants; shaders find all other data by address.
 [[nodiscard]] VkResult make_push_layout(const Device& device, VkShaderStageFlags stages, std::uint32_t bytes,
                                         VkPipelineLayout& layout);
 

@@ -5,10 +5,10 @@
 
 namespace quoin::vulkan {
 
-/// Erases from a map what pictures have not asked for longest, until no more than `max_bytes` are held; what the last
-/// picture asked for (`last_use` is `picture`) stays.
+/// Erases the least recently used entries of a map until at most `max_bytes` are held. Entries that the last image used
+/// (`last_use` is `picture`) stay.
 ///
-/// `bytes_of(entry)` and `release(entry)` take what an iterator points to; the second gives back what it holds.
+/// `bytes_of(entry)` and `release(entry)` take a reference to an entry; `release` frees its resources.
 template <class Map, class BytesOf, class Release>
 void drop_oldest(Map& entries, std::uint64_t picture, std::uint64_t max_bytes, BytesOf&& bytes_of, Release&& release) {
   std::uint64_t held = 0;

@@ -25,10 +25,10 @@ struct PhysicalDevice {
 
 /// A device as it is, with the first queue family that will do best.
 [[nodiscard]] PhysicalDevice describe(const Api& api, VkPhysicalDevice handle);
-/// What queues of a family can do; none where there is no such family.
+/// Returns the capabilities of a queue family; 0 if there is no such family.
 [[nodiscard]] VkQueueFlags queue_flags(const Api& api, VkPhysicalDevice device, std::uint32_t family);
 
-/// Vulkan as this library sees it when nobody lends it a device.
+/// The Vulkan instance that this library creates when the caller lends no device.
 class VulkanInstance {
  public:
   /// With `listener` the validation layer is loaded. Errors: Unsupported.

@@ -35,7 +35,7 @@ VkResult allocate(const Device& device, VkBuffer buffer, Buffer::Where where, Vk
   for (const VkMemoryPropertyFlags wanted : wishes(where)) {
     const auto type = memory_type(device.memory(), needs.memoryTypeBits, wanted);
     if (!type) continue;
-    // A heap that is too small is not even asked: drivers differ in what they make of that.
+    // Rejects heaps that are too small here: drivers handle such allocations differently.
     const std::uint32_t heap = device.memory().memoryTypes[*type].heapIndex;
     if (needs.size > device.memory().memoryHeaps[heap].size) continue;
     const VkMemoryAllocateInfo info{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, &flags, needs.size, *type};
@@ -112,7 +112,7 @@ Result<Place> DeviceMemory::allocate(VkDeviceSize wanted, const std::string& doi
     if (blocks_[i] == nullptr) continue;
     if (const Place place = take(i, size); place.size != 0) return place;
   }
-  // Room for the address to be a multiple, whatever the buffer's is.
+  // Leaves room to align the address, for any alignment of the buffer.
   const VkDeviceSize bytes = std::max(size, block_bytes_ / kAlignment * kAlignment);
   auto buffer = Buffer::create(*device_, bytes + kAlignment, Buffer::Where::Device, doing);
   if (!buffer) return buffer.error();

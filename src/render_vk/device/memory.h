@@ -58,7 +58,8 @@ class DeviceMemory final : public ShaderMemory {
  public:
   DeviceMemory(Device& device, VkDeviceSize block_bytes) : device_(&device), block_bytes_(block_bytes) {}
 
-  /// What is larger than a block gets a block of its own. Errors: LimitExceeded when the device's memory is full.
+  /// Allocates memory; requests larger than a block get their own block. Errors: LimitExceeded when the device's memory
+  /// is full.
   [[nodiscard]] Result<Place> allocate(VkDeviceSize size, const std::string& doing) override;
   void release(Place& place) override;
 
@@ -92,7 +93,7 @@ class DeviceMemory final : public ShaderMemory {
   std::uint64_t written_ = 0;
 };
 
-/// Parts of device memory that are given back together, and what was not sent of them is forgotten.
+/// Parts of device memory that are released together; their unsent data is discarded.
 class Places {
  public:
   /// `doing`: as in "drawing".

@@ -235,7 +235,7 @@ class OwnImage {
     return target;
   }
 
-  /// The bytes of a level in VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, red first whatever the format.
+  /// Returns the bytes of a level in VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, red first in any format.
   [[nodiscard]] std::vector<std::uint8_t> read(const VulkanImageTarget& level) {
     const std::vector<std::uint8_t> bytes = [&] {
       device_->run([&](VkCommandBuffer commands) {

@@ -1,4 +1,4 @@
-// What is refused, and in which words.
+// Rejected inputs and their error messages.
 
 #include "render_vk/device/vulkan_for_tests.h"
 
@@ -83,7 +83,7 @@ TEST_F(VulkanErrors, AreThoseOfTheProcessor) {
   expect_same(wrong, sized(4, 4));
 }
 
-// There is no scene to make levels of detail of, before the first update and after one that failed.
+// Before the first update and after a failed one there is no scene for levels of detail.
 TEST_F(VulkanErrors, DetailOfNothingIsTheSky) {
   const Camera camera = towards({20, 20, 40}, {0, 0, 0});
   RenderOptions options = sized(16, 12);

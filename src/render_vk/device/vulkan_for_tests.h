@@ -1,6 +1,6 @@
 #pragma once
 
-// What the tests of the Vulkan renderer share: pictures of one scene by both renderers, and their differences.
+// Shared by the Vulkan renderer's tests: images of one scene by both renderers, and their differences.
 
 #include <algorithm>
 #include <cmath>
@@ -19,9 +19,9 @@
 
 namespace quoin::vulkan_test {
 
-/// Tests are skipped where there is no device, and fail on every message of the validation layer. Those of a suite that
-/// run in one process draw by one renderer, whose pipelines take longer to compile than most pictures to draw: what one
-/// test leaves in it, the next one's `update` replaces.
+/// Tests are skipped without a device and fail on every validation layer message. The tests of a suite in one process
+/// share a renderer, since its pipelines compile longer than most images render. The next test's `update` replaces the
+/// state left by a test.
 class VulkanTest : public ::testing::Test {
  protected:
   static void TearDownTestSuite() { shared_.reset(); }
@@ -78,7 +78,7 @@ class VulkanTest : public ::testing::Test {
   static inline std::unique_ptr<Shared> shared_;
 };
 
-/// A pixel is at a silhouette where the distances around it jump, or where nothing is beside something.
+/// Returns true if the distances around a pixel jump, or if a neighbour shows the background.
 inline bool is_at_silhouette(const FloatImage& depth, int x, int y) {
   float least = INFINITY;
   float greatest = 0.0F;
@@ -95,11 +95,11 @@ inline bool is_at_silhouette(const FloatImage& depth, int x, int y) {
   return greatest - least > 0.004F * least;
 }
 
-/// What two pictures differ in.
+/// The differences of two images.
 struct Differences {
   int pixels = 0;     ///< by more than 2 in a channel
-  int elsewhere = 0;  ///< of these, those that are not at a silhouette
-  int depths = 0;     ///< by more than 1e-4 of the distance
+  int elsewhere = 0;  ///< subset that is not at a silhouette
+  int depths = 0;     ///< differences of more than 1e-4 of the distance
   int total = 0;
 };
 

@@ -11,7 +11,7 @@
 namespace quoin::vulkan {
 namespace {
 
-// What the device knows of the place of a grid that is traced halved.
+// Sets a halved grid in a placed grid's entry for the device.
 void put_in(const CoarseLevel& coarse, const SceneGrid& grid, const DeviceGrid& voxels, std::int32_t index,
             DevicePlaced& each) {
   each.placed.grid = &grid;
@@ -65,7 +65,7 @@ Result<Placement> DeviceDetail::place(const DeviceScene& device, const Scene& sc
     Status done = impostors_.draw(scene, *sent, screen, options.width, options.height, placement);
     return done ? memory_->flush() : done;
   };
-  // What was half put in place is not kept, whether the device's memory ran out or ours.
+  // Removes a partly built entry, whether the device or the host ran out of memory.
   try {
     if (Status done = put(); !done) {
       clear();

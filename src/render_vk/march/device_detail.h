@@ -24,9 +24,8 @@ class DeviceDetail {
 
   explicit DeviceDetail(DeviceMemory& memory) : memory_(&memory), impostors_(memory) {}
 
-  /// After an update of the device's scene: releases what was made of grids that are gone or were replaced, and
-  /// everything when types became transparent or opaque. Of edited grids the chunks that changed are made and sent
-  /// anew, when they are next asked for.
+  /// After an update of the device's scene: releases data of removed or replaced grids, and all data if types became
+  /// transparent or opaque. The changed chunks of edited grids are rebuilt and sent at the next request.
   void look_at(const Scene& scene);
   void clear();
 
@@ -41,7 +40,7 @@ class DeviceDetail {
                                         const Camera& camera, const RenderOptions& options, Threads threads,
                                         std::uint64_t max_bytes = kMaxBytes);
 
-  /// Of device memory that halved grids take, and impostors.
+  /// The device memory of halved grids, and of impostors, in bytes.
   [[nodiscard]] std::uint64_t halved_bytes() const;
   [[nodiscard]] std::uint64_t impostor_bytes() const { return impostors_.bytes(); }
 

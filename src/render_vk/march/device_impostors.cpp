@@ -65,7 +65,7 @@ std::vector<ShaderVoxelFace> packed(const ImpostorFaces& impostor, std::size_t f
   faces.reserve(count);
   const std::size_t voxel_faces = impostor.faces.size() - impostor.surfels.size();
   for (std::size_t i = first; i < first + count; ++i) {
-    // Of a surfel first what a face of a voxel has, then its shape.
+    // A surfel has the data of a voxel face first, then its shape.
     const std::size_t number = i < voxel_faces ? i : voxel_faces + (i - voxel_faces) / 3;
     const std::size_t part = i < voxel_faces ? 0 : (i - voxel_faces) % 3;
     if (part > 0) {
@@ -90,8 +90,8 @@ std::size_t entries_of(const ImpostorFaces& impostor) {
   return impostor.faces.size() + 2 * impostor.surfels.size();
 }
 
-// Bits of the directions whose faces any ray of the area may go against. What is linear is least or greatest in a
-// corner.
+// Returns bits of the directions whose faces may point against any ray of the area. A linear function has its extremes
+// in a corner.
 std::uint32_t seen_sides(const raster::Job& job, const PixelArea& area) {
   const auto width = static_cast<float>(area.right - area.left);
   const auto height = static_cast<float>(area.bottom - area.top);
@@ -219,11 +219,11 @@ Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, Ent
   const bool is_known = entry.last_use == picture_;
   entry.last_use = picture_;
   if (is_known || entry.whole.impostor == impostor) return {};
-  // What was begun is ended first, or an edit a frame would keep it from ever being whole; but who waits wants the
-  // last.
+  // Finishes a started transfer first: otherwise one edit per frame would keep it from ever completing. A caller that
+  // waits gets the latest impostor.
   const bool waits = faces_left == std::numeric_limits<std::size_t>::max();
   if (entry.next.impostor == nullptr || (waits && entry.next.impostor != impostor)) {
-    // Nobody will see the old one again.
+    // The old impostor is not drawn again.
     if (waits) {
       memory_->release(entry.whole.place);
       entry.whole = {};
@@ -242,7 +242,7 @@ Status DeviceImpostors::put(const std::shared_ptr<const Impostor>& impostor, Ent
 Result<std::vector<FarInstance>> DeviceImpostors::send(const Scene& scene, const FarImpostors& far, bool waits) {
   ++picture_;
   std::size_t faces_left = waits ? std::numeric_limits<std::size_t>::max() : kFacesAPicture;
-  // Those that are not there at all come first, or one that is edited all the time would keep them waiting.
+  // Missing impostors come first: a constantly edited impostor would delay them forever.
   for (const bool is_first : {true, false}) {
     for (const auto& [grid, impostor] : far.kept) {
       const auto [found, is_new] = entries_.try_emplace(grid);
@@ -292,7 +292,7 @@ Status DeviceImpostors::draw(const Scene& scene, std::span<const FarInstance> se
   return {};
 }
 
-// What it is drawn from.
+// Returns the shader data for drawing an impostor.
 ShaderFar DeviceImpostors::shader_far(const Sent& sent, const DrawnImpostor& drawn) {
   ShaderFar far;
   std::array<DrawnImpostor::Part, DrawnImpostor::kMaxParts> room;

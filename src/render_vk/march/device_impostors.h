@@ -19,10 +19,10 @@ namespace quoin::vulkan {
 
 struct Placement;
 
-/// Impostors in device memory, sent when a picture first shows them and kept from picture to picture.
+/// Impostors in device memory, sent when an image first shows them and kept for later images.
 ///
-/// Where pictures do not wait, one sends no more than `kFacesAPicture`, a fraction of a millisecond: until a new
-/// impostor is there as a whole, the one before it is drawn, and what has none is traced.
+/// Without waiting, each image sends at most `kFacesAPicture` faces, a fraction of a millisecond. Until a new impostor
+/// is complete, the previous one is drawn; instances without any are traced.
 class DeviceImpostors {
  public:
   static constexpr std::size_t kFacesAPicture = std::size_t{1} << 16;
@@ -40,14 +40,14 @@ class DeviceImpostors {
   ///           cleared.
   [[nodiscard]] Status draw(const Scene& scene, std::span<const FarInstance> sent, const ImpostorScreen& screen,
                             int width, int height, Placement& placement) const;
-  /// Drops what was not asked for by the last picture, the oldest first, until no more than that is held.
+  /// Drops the least recently used impostors not used by the last image, until at most `max_bytes` are held.
   void drop_unused(std::uint64_t max_bytes);
 
-  /// What was made of grids goes that are gone, or that others replaced.
+  /// Drops the impostors of removed or replaced grids.
   void follow(const Scene& scene);
   void clear();
 
-  /// Of device memory.
+  /// Returns the device memory in use.
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:
@@ -58,10 +58,10 @@ class DeviceImpostors {
   struct Sent {
     std::shared_ptr<const Impostor> impostor;  // null: none
     Place place;
-    std::array<ShaderFarLevel, ImpostorFaces::kLevels + 1> levels{};  // the last: those that no view saw
+    std::array<ShaderFarLevel, ImpostorFaces::kLevels + 1> levels{};  // last: faces that no view saw
     std::uint64_t faces = 0;                                          // address
-    std::size_t part = 0;                                             // what is sent next; kParts: it is whole
-    std::size_t at = 0;                                               // and from where on in it
+    std::size_t part = 0;                                             // part to send next; kParts: complete
+    std::size_t at = 0;                                               // position in that part
   };
   struct Entry {
     Sent whole;
@@ -81,7 +81,7 @@ class DeviceImpostors {
   std::uint64_t picture_ = 0;
 };
 
-/// Which impostors show in which tile of a picture.
+/// The impostors that show in each tile of an image.
 struct FarTiles {
   struct Range {
     std::uint32_t first = 0;  ///< in `parts`

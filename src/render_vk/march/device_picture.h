@@ -12,7 +12,7 @@
 
 namespace quoin {
 
-/// What VulkanPicture is to those who draw it: a word a pixel, row by row, sRGB bytes with red the lowest.
+/// The device state of a VulkanPicture: one word per pixel, row by row, sRGB bytes with red lowest.
 struct VulkanPicture::Impl {
   Impl(vulkan::Device& of_device, const vulkan::Pipelines& with_pipelines)
       : device(&of_device), pipelines(&with_pipelines) {}
@@ -21,7 +21,7 @@ struct VulkanPicture::Impl {
   [[nodiscard]] Status resize(int new_width, int new_height);
   /// The same for `sums`, and nothing was drawn so far; what will be is of this camera. Errors: LimitExceeded.
   [[nodiscard]] Status begin_sums(const Camera& of_camera, const LightOptions& in_light);
-  /// As VulkanPicture::record_copy, of what `prepare_copy` has found right.
+  /// Records VulkanPicture::record_copy, after `prepare_copy` accepted the target.
   void record_copy(VkCommandBuffer commands, const VulkanImageTarget& target) const;
   /// Errors: those of VulkanPicture::record_copy.
   [[nodiscard]] Status prepare_copy(const VulkanImageTarget& target);
@@ -34,7 +34,7 @@ struct VulkanPicture::Impl {
   std::int64_t rays = 0;
   vulkan::Buffer colours;
   vulkan::Buffer swapped;  ///< the colours with blue the lowest; only where images wanted them
-  /// What its samples were drawn with.
+  /// the camera of its samples
   Camera camera;
   LightOptions light;
   vulkan::Buffer sums;  ///< of the samples' light, four floats a pixel; only where samples are added one by one

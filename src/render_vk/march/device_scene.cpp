@@ -74,7 +74,7 @@ void DeviceScene::clear() {
   followed_types_ = followed_visibility_ = followed_scene_ = {};
 }
 
-// Lists the instances and keeps, of the known grids, those that are among them.
+// Lists the instances and keeps only the known grids that they use.
 void DeviceScene::place(const Scene& scene, InstanceFilter filter) {
   placement_.placed.clear();
   for (auto& [handle, grid] : grids_) grid.is_used = false;
@@ -100,7 +100,7 @@ void DeviceScene::place(const Scene& scene, InstanceFilter filter) {
   placement_.instances = InstanceTree(std::move(boxes));
 }
 
-// The placed grids that may be other than before; `places` where instances are to be placed anew.
+// Returns the placed grids that may have changed; sets `places` if instances must be placed again.
 std::vector<GridHandle> DeviceScene::changed_grids(const Scene& scene, InstanceFilter filter, bool& places) {
   const SceneChanges changes = scene.changes_since(followed_scene_);
   places = changes.all || filter != filter_ || !changes.instances.empty();
@@ -109,7 +109,7 @@ std::vector<GridHandle> DeviceScene::changed_grids(const Scene& scene, InstanceF
   for (const GridHandle handle : changes.grids) {
     const auto known = grids_.find(handle);
     const SceneGrid* grid = scene.grids().find(handle);
-    // One that was empty may now be placed, and whose pivot moved is placed elsewhere.
+    // An empty grid may now be placed; a grid with a moved pivot changes its position.
     places |= known == grids_.end() || grid == nullptr || !(content_bounds(*grid) == known->second.bounds) ||
               grid->pivot != known->second.pivot;
     if (known != grids_.end() && grid != nullptr) changed.push_back(handle);
@@ -154,7 +154,7 @@ Status DeviceScene::update_grids(const Scene& scene, const std::vector<GridHandl
 }
 
 Status DeviceScene::try_update(const Scene& scene, InstanceFilter filter, Threads threads) {
-  // Grids are packed by what their types are.
+  // Packing depends on the visibility of types.
   if (has_other_visibility(scene.types.changes_since(followed_visibility_))) {
     for (auto& [handle, grid] : grids_) grid.voxels.release(*memory_);
     grids_.clear();

@@ -29,10 +29,10 @@ struct DevicePlaced {
   DVec3 high{0.0};
   bool is_far = false;                      ///< drawn from its impostor: the camera's rays pass it by
   const ImpostorFaces* impostor = nullptr;  ///< of that, until the next picture
-  std::size_t impostor_level = 0;           ///< the finest one that is drawn
+  std::size_t impostor_level = 0;           ///< the finest level drawn
 };
 
-/// Where an instance is among those from `begin` on, or the one after it. They are in the order of their handles.
+/// Returns an instance's position among those from `begin` on, sorted by handle, or the next position if it is missing.
 template <class Iterator>
 [[nodiscard]] Iterator find_placed(Iterator begin, Iterator end, InstanceHandle instance) {
   return std::lower_bound(begin, end, instance, [](const DevicePlaced& each, InstanceHandle handle) {
@@ -40,7 +40,7 @@ template <class Iterator>
   });
 }
 
-/// What rays meet: instances, and the table of the grids that they place.
+/// The content of rays' space: instances, and the table of their grids.
 struct Placement {
   std::vector<DevicePlaced> placed;  ///< in the order of their handles
   InstanceTree instances;            ///< their boxes in the world
@@ -54,9 +54,10 @@ struct Placement {
 [[nodiscard]] Status put_table(ShaderMemory& memory, Place& place, std::span<const std::byte> bytes);
 [[nodiscard]] bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b);
 
-/// Adds what a type looks like, as shaders have it: three vectors, the last of whose numbers is `last`.
+/// Appends a type's surface in shader form: three vectors; the last number is `last`.
 void add_surface(const Surface& surface, float last, std::vector<Vec4>& table);
-/// What types look like, as shaders/data.glsl has it: three vectors each, and those of types beyond the last.
+/// Returns the surfaces of all types in the form of shaders/data.glsl: three vectors each; the last entry is for types
+/// out of range.
 [[nodiscard]] std::vector<Vec4> surface_table(const VoxelRegistry& types);
 
 /// A table of lamps, its bricks and lists in device memory.
@@ -75,14 +76,14 @@ struct DeviceLevels {
   Place bricks;
   Place numbers;
 
-  /// Sends what changed since the last time. After an error it holds nothing, and sends all the next time.
+  /// Sends the changes since the last call. After an error it is empty and sends everything at the next call.
   [[nodiscard]] Status put(ShaderMemory& memory, LightBricks& now);
 
  private:
   [[nodiscard]] Status put_changes(ShaderMemory& memory, const LightBricks& now, const LightBricks::Changed& changed);
 };
 
-/// What light of a picture is looked up in.
+/// The lookup data for the light of an image.
 struct DeviceLight {
   DeviceLamps lamps;
   DeviceLevels levels;
@@ -97,7 +98,7 @@ class DeviceScene {
   [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter, Threads threads);
 
   [[nodiscard]] const Placement& placement() const { return placement_; }
-  /// Of the scene of the last update, which has not been edited since.
+  /// Returns the lamps of the last update's scene. Requires: the scene has not been edited since.
   [[nodiscard]] std::vector<LampPlace> lamp_places(const Scene& scene) const;
   [[nodiscard]] const std::vector<ShaderGrid>& grid_table() const { return grid_table_; }
   [[nodiscard]] std::uint64_t surfaces_address() const { return surfaces_place_.address; }

@@ -22,15 +22,15 @@
 namespace quoin::vulkan {
 namespace {
 
-// How far, in voxels, the points from which things are counted may lie from a grid's bounds: what lies within keeps its
-// precision, and what lies further has none to lose.
+// Maximum distance, in voxels, of a local origin from a grid's bounds: points within keep their precision; farther
+// points have none to lose.
 constexpr double kNearby = 1024.0;
 
 Vec4 to_vec4(DVec3 v, double w = 0.0) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
 }
 
-// What is left when `to_vec4` rounds.
+// Returns the rounding error of `to_vec4`.
 Vec4 low_vec4(DVec3 v) {
   return to_vec4(v - DVec3(Vec3(v)));
 }
@@ -57,7 +57,7 @@ double depth_of(const DevicePlaced& grid, const glm::dmat3& view_axes, DVec3 cam
   return std::ldexp(std::floor(fraction * 4096.0), exponent - 12);
 }
 
-// A box in single precision, with room for its rounding and that of rays.
+// Appends a box in single precision, enlarged for its rounding and that of rays.
 void add_box(const DBox& box, std::uint32_t low_w, std::int32_t high_w, std::vector<Vec4>& out) {
   const DVec3 room = glm::max(glm::abs(box.min), glm::abs(box.max)) * 1e-5 + 1e-6;
   Vec4 low = to_vec4(box.min - room);
@@ -88,7 +88,7 @@ struct Rays {
   bool is_perspective;
   DVec3 right, down, corner, forward;
 
-  // What a pixel to the right or down is at a depth.
+  // Returns the size of a pixel at a depth.
   [[nodiscard]] double spread(double depth) const { return is_perspective ? depth : 1.0; }
 };
 

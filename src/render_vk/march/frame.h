@@ -11,7 +11,7 @@
 
 namespace quoin::vulkan {
 
-/// What shaders need to know of one picture, but for where things lie in memory.
+/// The shader data of one image, without memory addresses.
 struct FrameData {
   ShaderFrame frame;
   std::vector<ShaderPlaced> placed;

@@ -71,7 +71,7 @@ void begin_copy(const vulkan::Api& api, VkCommandBuffer commands, VkImageMemoryB
                            nullptr, 1, &image);
 }
 
-// Before whatever follows.
+// Makes the copy visible to all later commands.
 void end_copy(const vulkan::Api& api, VkCommandBuffer commands, VkImageMemoryBarrier image) {
   image.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
   image.dstAccessMask = VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT;

@@ -287,12 +287,12 @@ Status PicturePass::draw(PictureImpl& picture, const Camera& camera, const Rende
                          const Progress& progress) {
   target_ = &picture;
   RenderOptions all = options;
-  all.samples += picture.samples;  // what the sums are divided by
+  all.samples += picture.samples;  // the divisor of the sums
   Status done = begin(camera, all);
   if (done) done = add_samples(picture, options, progress);
   ShaderCounters counters;
   if (done) done = read_counters(counters);
-  // Sums to which not every tile was added are of no use.
+  // Incomplete sums, with tiles missing, are discarded.
   picture.samples = done ? all.samples : 0;
   picture.rays = done ? picture.rays + counters.rays() : 0;
   return done;

@@ -20,7 +20,7 @@ namespace quoin::vulkan {
 /// One picture, tile by tile: a tile is drawn in device memory and then read, or stays there.
 class PicturePass {
  public:
-  /// `placement` is of `scene`, and so is `light`. `content`: what that scene is of; null: nothing.
+  /// Requires: `placement` and `light` belong to `scene`. `content`: the source of that scene; null: empty.
   PicturePass(Device& device, DeviceMemory& memory, const Pipelines& pipelines, const DeviceScene& scene,
               const Placement& placement, DeviceLight light, const Scene* content)
       : device_(&device),
@@ -34,10 +34,10 @@ class PicturePass {
   PicturePass(const PicturePass&) = delete;
   PicturePass& operator=(const PicturePass&) = delete;
 
-  /// As VulkanRenderer::render, of what is right.
+  /// Renders as VulkanRenderer::render, for validated arguments.
   [[nodiscard]] Result<Picture> render(const Camera& camera, const RenderOptions& options, const Progress& progress);
 
-  /// As VulkanRenderer::draw, of what is right.
+  /// Draws as VulkanRenderer::draw, for validated arguments.
   [[nodiscard]] Status draw(PictureImpl& picture, const Camera& camera, const RenderOptions& options,
                             const Progress& progress);
 
@@ -75,7 +75,7 @@ class PicturePass {
   const Placement* placement_;
   DeviceLight light_;
   const Scene* content_;
-  const PictureImpl* target_ = nullptr;  // null: what is drawn is read
+  const PictureImpl* target_ = nullptr;  // null: the image is read back
   Places places_;
   ShaderFrame frame_;
   std::uint64_t frame_address_ = 0;

@@ -48,7 +48,7 @@ class Pipelines {
   ~Pipelines();
   /// Makes what `with_fields` names, once.
   [[nodiscard]] Status add_fields();
-  /// Makes what `with_field_glass` names besides, once.
+  /// Makes the additional pipelines of `with_field_glass`, once.
   [[nodiscard]] Status add_field_glass();
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;

@@ -23,7 +23,7 @@ namespace vulkan {
 struct PathScene;
 }
 
-/// What a renderer, its pictures and its mesh renderers share.
+/// The state shared by a renderer, its images and its mesh renderers.
 struct VulkanRenderer::Impl {
   static constexpr std::uint64_t kLeastBlock = std::uint64_t{64} << 10;
 
@@ -59,12 +59,12 @@ struct VulkanRenderer::Impl {
   vulkan::DeviceMemory memory;
   vulkan::DeviceScene scene;
   vulkan::DeviceDetail detail;
-  /// What levels of detail are made of, as of the last update: null where there was none.
+  /// The source of levels of detail, as of the last update; null before the first.
   const Scene* voxels = nullptr;
   ChangeCursor at_update;  ///< of it: where one scene was another may be by now
   InstanceFilter instances = InstanceFilter::Visible;
   std::unique_ptr<DetailChooser> chooser;  // for that scene
-  /// What lamps light, sent to the device when it is another than before.
+  /// Returns the lamp table; sends it to the device if it changed.
   [[nodiscard]] Result<vulkan::DeviceLamps> lamp_table(const LightOptions& light, Threads threads) {
     if (light.max_lamps == 0 || is_propagated(light) || voxels == nullptr) return vulkan::DeviceLamps{};
     auto table = lamps.table(*voxels, light, threads, [this] { return scene.lamp_places(*voxels); });
@@ -72,7 +72,7 @@ struct VulkanRenderer::Impl {
     return sent_lamps;
   }
 
-  /// Levels of light, likewise.
+  /// Returns the light levels; sends them to the device if they changed.
   [[nodiscard]] Result<vulkan::DeviceLevels> level_table(const LightOptions& light, Threads threads) {
     if (!is_propagated(light) || voxels == nullptr) return vulkan::DeviceLevels{};
     if (Status done = sent_levels.put(memory, levels.bricks(*voxels, threads)); !done) return done.error();
@@ -98,10 +98,10 @@ struct VulkanRenderer::Impl {
 
 namespace vulkan {
 
-/// What a picture is taken of: the instances as the scene has them, or in their detail.
+/// The content of an image: the scene's instances, or their levels of detail.
 class Subject {
  public:
-  /// As VulkanRenderer::render, of what is right.
+  /// Selects the content as VulkanRenderer::render does, for validated arguments.
   [[nodiscard]] static Result<Subject> of(RendererImpl& impl, const Camera& camera, const RenderOptions& options,
                                           Threads threads);
 

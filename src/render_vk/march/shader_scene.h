@@ -16,8 +16,8 @@
 
 namespace quoin::vulkan {
 
-/// A scene for shaders that are not this library's to run, as those of browsers: the tables of shaders/data.glsl as
-/// bytes, in light by rays, every instance as it is.
+/// A scene for shaders outside this library, such as a browser's: the tables of shaders/data.glsl as bytes, with traced
+/// light and all instances at full detail.
 class ShaderScene {
  public:
   /// `light`: of whose lamps there is a table. Lifetime: the scene must outlive it, and is not edited meanwhile.

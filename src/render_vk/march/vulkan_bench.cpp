@@ -1,5 +1,5 @@
-// render/terrain/1280x720/vulkan: the picture of cpu_renderer_bench.cpp on the best device that there is, and what an
-// edit of one voxel costs. Skipped where there is no device.
+// render/terrain/1280x720/vulkan: the image of cpu_renderer_bench.cpp on the best device found, and the cost of editing
+// one voxel. Skipped without a device.
 
 #include <benchmark/benchmark.h>
 

@@ -1,4 +1,4 @@
-// Pictures of fields of densities by a device, beside those of the processor.
+// Compares a device's images of density fields with the CPU renderer's.
 
 #include <array>
 #include <cmath>
@@ -162,7 +162,7 @@ TEST_F(VulkanField, EditsAreTakenOver) {
     compare(scene, camera, options, "field_edited");
     EXPECT_LT(renderer_->uploaded_bytes(), all);
   }
-  // What lies lower, or only has blocks, or only a field.
+  // Lower fields, regions with only blocks, and regions with only a field.
   field.add_sphere({-200.0, -150.0, 0.0}, 20.0, types.stone);
   compare(scene, camera, options, "field_moved_origin");
   scene.edit(handle).grid.clear();

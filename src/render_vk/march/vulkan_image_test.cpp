@@ -141,7 +141,7 @@ TEST_F(VulkanImages, KeepWhatLiesBesideThePicture) {
   }
 }
 
-// What was recorded before must not be changed by what is recorded after it.
+// Later recordings must not change earlier ones.
 TEST_F(VulkanImages, OneCommandBufferFillsMany) {
   std::mt19937 random(5);
   draw_noise(70, 50, random);

@@ -169,7 +169,7 @@ TEST_F(VulkanImpostors, OfFieldsFarFromTheOriginAndTheCamera) {
 
 TEST_F(VulkanImpostors, InTheSamePlaceTheFirstInstanceShows) {
   const GridHandle grid = add_blobs(scene_, 31);
-  // Without glass: that would begin where the other's opaque voxels do, but for rounding.
+  // Without glass, whose start would coincide with the other grid's opaque voxels up to rounding.
   Grid& voxels = scene_.edit(grid).grid;
   voxels.edit(voxels.bounds(), [](IVec3, VoxelType type) { return type == 3 ? VoxelType{1} : type; });
   SceneGrid other;

@@ -78,7 +78,7 @@ TEST_F(VulkanPropagated, EveryLevelHasTheColourThatTheProcessorGivesIt) {
     if (i == 3) grid.fill_box({{0, 0, 12}, {1, 8, 13}}, kAir);
   }
   grid.fill_box({{1, 1, -4}, {20, 8, 20}}, kAir);
-  grid.fill_box({{1, 4, -4}, {20, 5, 20}}, white);  // a roof over what is open now
+  grid.fill_box({{1, 4, -4}, {20, 5, 20}}, white);  // a roof over the open area
   grid.fill_box({{1, 1, -4}, {20, 4, -3}}, white);
   grid.fill_box({{1, 1, 19}, {20, 4, 20}}, white);
   grid.fill_box({{19, 1, -4}, {20, 4, 20}}, white);

@@ -62,7 +62,7 @@ InstanceHandle add_instance(Scene& scene, GridHandle grid, DVec3 position, DQuat
   return scene.add_instance(instance);
 }
 
-/// Huts turned, mirrored, large and small, some of which touch or stand in others.
+/// Rotated, mirrored, large and small huts; some touch or overlap others.
 Scene village(DVec3 centre, bool has_glass) {
   Scene scene;
   const Types types = add_types(scene);

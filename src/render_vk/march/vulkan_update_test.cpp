@@ -1,4 +1,4 @@
-// What the device holds after edits, and how worlds of all sizes get there.
+// The device's state after edits, and its updates for worlds of all sizes.
 
 #include <functional>
 #include <random>
@@ -16,7 +16,7 @@ using vulkan_test::expect_equal;
 
 class VulkanUpdate : public vulkan_test::VulkanTest {
  protected:
-  /// After an update the picture is that of the processor, and to the byte that of a renderer that knew nothing before.
+  /// Expects the updated image to match the CPU renderer's, and to equal a fresh renderer's image byte for byte.
   void expect_current(const Scene& scene, const Camera& camera, const std::string& name) {
     const RenderOptions options = sized(64, 48);
     const Picture updated = taken_as_is(camera, options);

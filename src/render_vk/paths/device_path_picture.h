@@ -9,11 +9,11 @@
 
 namespace quoin {
 
-/// What VulkanPathPicture is to those who draw it.
+/// The device state of a VulkanPathPicture.
 struct VulkanPathPicture::Impl {
   explicit Impl(vulkan::Device& of_device) : device(&of_device) {}
 
-  /// Room for a picture, of which nothing was drawn so far. Errors: LimitExceeded, after which it has none.
+  /// Allocates an empty image. Errors: LimitExceeded; the image then has no memory.
   [[nodiscard]] Status begin(const Camera& of_camera, const PathOptions& with_options);
 
   vulkan::Device* device;

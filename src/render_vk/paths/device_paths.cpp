@@ -83,7 +83,7 @@ Status DevicePaths::try_put(DeviceMemory& memory, const Placement& placement, co
   if (done) done = put_sky(memory, options);
   if (done && gloss_.size == 0) done = put_values(memory, gloss_, path::gloss_table());
   if (done) done = put_faces(memory);
-  // What is kept is sent, whatever becomes of the rest of the picture.
+  // Sends the kept data even if the rest of the image fails.
   if (done) done = memory.flush();
   if (!done) return done;
   frame.gloss = gloss_.address;

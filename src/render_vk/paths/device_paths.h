@@ -16,15 +16,15 @@
 
 namespace quoin::vulkan {
 
-/// What paths look up, in device memory: types as light by paths sees them, the sky, what gloss reflects, of which
-/// lamps faces are part. It is sent again where it is another than before.
+/// The lookup data of path tracing in device memory: types' materials, the sky, gloss reflectance, and the lamp of each
+/// face. Sent again when it changes.
 class DevicePaths {
  public:
-  /// Of this scene from now on, as it is now; null: there is none. What lights others is found anew.
+  /// Follows this scene from now on, in its present state; null: none. Rebuilds the lamps.
   void look_at(const Scene* scene);
 
-  /// Puts in place what a picture of what is placed needs, and says so in its frame; all but lamps as they lie from it.
-  /// Errors: LimitExceeded; after one it holds nothing. Requires: the scene was not edited since `look_at`.
+  /// Sends the data that an image of `placement` needs and refers to it in the frame, except the lamps' relative
+  /// positions. Errors: LimitExceeded; it is then empty. Requires: the scene was not edited since `look_at`.
   [[nodiscard]] Status put(DeviceMemory& memory, const Placement& placement, const PathOptions& options,
                            ShaderPathFrame& frame);
 

@@ -17,7 +17,7 @@ namespace vulkan {
 namespace {
 
 const char* const kDoing = "drawing by paths";
-constexpr int kSamplesAtOnce = 16;  // of a tile; between them its progress is told
+constexpr int kSamplesAtOnce = 16;  // samples of a tile between progress reports
 constexpr int kDispatchesAtOnce = 8;
 constexpr int kFewSamples = 4;  // so few are over before larger buffers are made
 
@@ -199,7 +199,7 @@ Status PathPass::draw(int samples, const Progress& progress) {
     });
   }
   if (done) done = add_samples(samples, progress);
-  // Sums to which not every tile was added are of no use.
+  // Incomplete sums, with tiles missing, are discarded.
   if (!done) {
     picture_->samples = 0;
     return done;

@@ -14,7 +14,7 @@
 
 namespace quoin::vulkan {
 
-/// What pictures by paths of one renderer share.
+/// The data shared by the path-traced images of one renderer.
 struct PathScene {
   explicit PathScene(std::unique_ptr<PathPipelines> made) : pipelines(std::move(made)) {}
 
@@ -23,10 +23,9 @@ struct PathScene {
   std::uint64_t update_count = 0;  ///< of the renderer, when the tables last looked
 };
 
-/// Adds samples to a picture by paths, tile by tile.
+/// Adds samples to a path-traced image, tile by tile.
 ///
-///   tile: begin -> [ some steps of every pixel's path, in whose place comes that of its next sample ] until all have
-///   ended
+///   tile: begin -> [ some steps of every pixel's path; the next sample's path starts when one ends ] until all end
 class PathPass {
  public:
   PathPass(RendererImpl& renderer, PathPictureImpl& picture);

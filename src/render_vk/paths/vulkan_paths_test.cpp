@@ -1,4 +1,4 @@
-// Pictures by paths on a device beside those of the processor: the same random numbers, so the same paths.
+// Compares path-traced images of a device with the CPU's: the same random numbers give the same paths.
 
 #include <cstdlib>
 

@@ -16,8 +16,8 @@ inline VoxelType add_glass(Scene& scene, Rgba8 colour, float ior) {
   return scene.types.add(properties).value();
 }
 
-/// A stone floor with a pool from 2 to 8 voxels deep, a clear cube, a pane before a red block, two glasses that touch,
-/// one of which stands in water, and a lamp. `alpha`: of the clear glass.
+/// A stone floor with a pool from 2 to 8 voxels deep, a clear cube, a pane in front of a red block, two touching
+/// glasses (one stands in water), and a lamp. `alpha`: of the clear glass.
 inline Scene glass_yard(DVec3 at = DVec3(0.0), std::uint8_t alpha = 20) {
   Scene scene;
   const VoxelType stone = render_test::add_type(scene, {190, 180, 165});

@@ -14,23 +14,23 @@
 
 namespace quoin::vulkan {
 
-/// The meshes of halved grids, of their voxels and of their fields, made when a picture first asks for them and kept;
-/// where grids were edited since, those of the chunks that an edit can have changed are made anew.
+/// The meshes of halved grids, of their voxels and of their fields. Made at the first request of an image and kept.
+/// After edits only the chunks that can have changed are rebuilt.
 class LevelMeshes {
  public:
-  /// What is put there goes with it.
+  /// Its meshes live in `store` and are destroyed with it.
   explicit LevelMeshes(MeshStore& store) : store_(&store) {}
 
-  /// What was made of grids that are gone goes, and what changed types may show otherwise is made anew.
+  /// Drops the meshes of removed grids, and marks meshes for rebuilding that changed types may affect.
   void look_at(const Scene& scene);
   void clear();
 
   /// Begins a picture.
   void begin() { ++picture_; }
-  /// Has the meshes of a grid halved `key.level` times in the store: as `placed` has it. Once a picture.
-  /// Errors: of MeshStore::put, and bad_alloc; then nothing of this level is there.
+  /// Puts the meshes of a grid halved `key.level` times into the store, placed as `placed`. Called once per image.
+  /// Errors: of MeshStore::put, and bad_alloc; the level is then empty.
   [[nodiscard]] Status put(MeshKey key, const PlacedGrid& placed, const VoxelRegistry& types, Threads threads);
-  /// Drops what was not asked for by the last picture, the oldest first, until no more than that is held.
+  /// Drops the least recently used meshes not used by the last image, until at most `max_bytes` are held.
   void drop_unused(std::uint64_t max_bytes);
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the tests of drawing meshes share: surfaces of scenes, and pictures of them.
+// Shared by the mesh drawing tests: surfaces of scenes, and their images.
 
 #include <memory>
 #include <string>
@@ -170,7 +170,7 @@ class VulkanMeshTest : public VulkanTest {
   static inline std::unique_ptr<VulkanMeshRenderer> shared_;
 };
 
-/// Of the bytes of two pictures of one size, those that differ by more than `tolerance`.
+/// Returns the number of bytes that differ by more than `tolerance` between two images of the same size.
 inline int bytes_that_differ(const Image& a, const Image& b, int tolerance) {
   EXPECT_EQ(a.rgb.size(), b.rgb.size());
   int different = 0;

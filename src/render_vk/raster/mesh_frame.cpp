@@ -29,7 +29,7 @@ Vec4 to_vec4(DVec3 v, double w = 0.0) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
 }
 
-// The picture, and what of the world is seen in it.
+// The image and the visible part of the world.
 struct View {
   CameraRays rays;
   Frustum frustum;
@@ -81,7 +81,7 @@ struct Space {
   }
 };
 
-// The directions of which what lies in a box may show a face.
+// Returns the directions of faces that may be visible in a box.
 std::uint8_t visible_faces(DBox box, DVec3 eye, bool is_perspective) {
   const DVec3 low = is_perspective ? box.min : DVec3(0.0);
   const DVec3 high = is_perspective ? box.max : DVec3(0.0);
@@ -257,7 +257,7 @@ void set_frame(const View& view, const LightOptions& light, MeshFrameData& data)
   data.frame.sun = to_vec4(to_sun(light) * daylight_of(light).sun_brightness);
 }
 
-// Axes in one plane see nothing of space; products of near to perpendicular unit vectors are near to 1.
+// Returns true if the camera's axes lie in one plane. Products of nearly perpendicular unit vectors are near 1.
 bool is_flat(const Camera& camera) {
   return !(std::abs(glm::dot(glm::cross(camera.right, camera.up), camera.forward)) > 1e-6);
 }
@@ -321,7 +321,7 @@ Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInst
   std::stable_sort(data.draws.begin(), data.draws.end(), is_nearer);
   std::stable_sort(data.far.begin(), data.far.end(), is_nearer);
   set_frame(view, options.light, data);
-  // Where values are shown instead of colours, what is transparent is drawn like anything else.
+  // When values are shown instead of colours, transparent surfaces are drawn like opaque ones.
   if (!shows_values(options.light.shading)) order_glass(spaces, view, data);
   return data;
 }

@@ -43,10 +43,10 @@ struct MeshInstance {
   DVec3 pivot{0.0};  ///< in the coordinates of the mesh's grid, which may be a halved one
   double voxel_size = 1.0;
   bool mirrored = false;
-  std::int32_t placed = -1;  ///< among what the frame's rays meet; -1: it is not there
+  std::int32_t placed = -1;  ///< index among the frame's placed grids; -1: not placed
   IVec3 origin{0};           ///< of its tree's coordinates
-  bool is_far = false;       ///< of its own meshes only what is transparent is drawn
-  MeshImpostor impostor;     ///< of a far one, if it shows
+  bool is_far = false;       ///< only the transparent parts of its own meshes are drawn
+  MeshImpostor impostor;     ///< of a far instance, if it shows
 };
 
 /// A chunk of an instance that is in the picture.
@@ -55,9 +55,9 @@ struct MeshDraw {
   std::uint32_t instance = 0;  ///< index into MeshFrameData::instances
   Vec3 offset{0.0F};           ///< of the chunk, from where its instance is counted
   double distance = 0.0;       ///< of its middle, in world units; orthographic: along the view
-  std::uint8_t faces = 0;      ///< the directions, as bits, of which the camera can see any
+  std::uint8_t faces = 0;      ///< the directions, as bits, of faces that the camera can see
   bool mirrored = false;
-  bool is_far = false;  ///< only what is transparent
+  bool is_far = false;  ///< only transparent parts are drawn
 };
 
 /// Runs of a chunk's quads, or of an impostor's faces, each from one number to before the next.
@@ -74,46 +74,47 @@ struct FarDraw {
   double distance = 0.0;
 };
 
-/// Those of a blocky chunk that face the camera, as far as can be told by directions; the transparent ones all, if
-/// at all.
+/// Returns the quads of a blocky chunk that face the camera, as far as directions decide; all transparent quads or
+/// none.
 [[nodiscard]] QuadRuns visible_quads(const MeshDraw& draw, bool with_glass);
 
-/// What drawing one picture takes, but for where things lie in memory.
+/// The data for drawing one image, without memory addresses.
 struct MeshFrameData {
-  FrameData picture;  ///< what rays meet, and light
+  FrameData picture;  ///< the rays' content, and light
   ShaderMeshFrame frame;
   ShaderMeshPush push;  ///< what all draws have in common
   ShaderMeshPush sky;
   std::vector<ShaderMeshInstance> instances;
   std::vector<MeshDraw> draws;  ///< the nearest first
-  std::vector<FarDraw> far;     ///< likewise
-  /// Transparent quads, the furthest first, by their middles; empty when there are more than `kMaxOrdered`, or rays
-  /// find what is transparent: then chunks are drawn in their order, and the quads of each as they come.
+  std::vector<FarDraw> far;     ///< of the far instances, in the same form
+  /// Transparent quads, farthest first, by their centres. Empty if there are more than `kMaxOrdered`, or if rays find
+  /// transparent surfaces: chunks are then drawn in their order, each with its quads in stored order.
   std::vector<ShaderGlassQuad> order;
   std::vector<ShaderGlassDraw> glass;  ///< what `order` names
   std::vector<ShaderLamp> lamps;
   std::size_t glass_quads = 0;
   bool has_smooth_glass = false;
-  bool has_fields = false;     ///< among what rays meet
-  bool glass_by_rays = false;  ///< only the nearest glass of a pixel is drawn, with all that is seen through it
+  bool has_fields = false;     ///< among the placed content
+  bool glass_by_rays = false;  ///< only the nearest glass of a pixel is drawn, including everything visible through it
 
   [[nodiscard]] bool has(std::uint32_t flag) const { return (picture.frame.flags & flag) != 0; }
-  /// Of the surfaces that are drawn.
+  /// Returns the number of triangles drawn.
   [[nodiscard]] std::int64_t triangles() const;
 };
 
 constexpr std::size_t kMaxOrdered = std::size_t{1} << 20;
 
-/// All that is in the world is made relative to the camera here, in double precision; then each instance is counted
-/// from a corner of a chunk near the camera, so that a corner that chunks share is the same number in each of them.
+/// Makes all positions relative to the camera, in double precision. Each instance then uses a chunk corner near the
+/// camera as its origin, so that a corner shared by chunks has the same coordinates in each of them.
 ///
-/// Depth: reversed, 1 at the near plane. It lies at the nearest chunk in the picture, but not nearer than 1/1024 of the
-///        smallest voxel; perspective has no far plane, orthographic pictures' lies behind the last chunk.
-/// `subpixels`: in how many places per pixel and axis a device tells corners apart.
-/// `glass_by_rays`: as the result has it; where values are shown glass is drawn like anything else.
-/// `picture` is left to the caller. Requires: `check` accepts the camera and the options.
-/// Errors:   InvalidArgument for a camera whose axes lie in one plane.
-/// Cost:     O(chunks of the instances), and sorting those in the picture and the transparent quads.
+/// Depth: reversed, 1 at the near plane. The near plane lies at the nearest chunk in the image, but not nearer than
+///        1/1024 of the smallest voxel. Perspective has no far plane; the orthographic far plane lies behind the last
+///        chunk.
+/// `subpixels`: the device's subpixel positions per pixel and axis.
+/// `glass_by_rays`: as in the result; if values are shown, glass is drawn like opaque surfaces.
+/// The caller fills in `picture`. Requires: `check` accepts the camera and the options.
+/// Errors: InvalidArgument for a camera whose axes lie in one plane.
+/// Cost: O(chunks of the instances), and sorting the visible chunks and the transparent quads.
 [[nodiscard]] Result<MeshFrameData> make_mesh_frame(MeshStore& store, std::span<const MeshInstance> instances,
                                                     const Camera& camera, const RenderOptions& options, int subpixels,
                                                     bool glass_by_rays);

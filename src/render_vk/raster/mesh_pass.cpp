@@ -25,7 +25,7 @@ VkDeviceSize bytes_of(const std::vector<T>& values) {
 
 }  // namespace
 
-/// A walk over what is drawn, in one way.
+/// One traversal of the draws, in one mode.
 struct MeshPass::Step {
   enum class Over : std::uint8_t {
     Sky,
@@ -40,7 +40,7 @@ struct MeshPass::Step {
   VkPipeline blocky = VK_NULL_HANDLE;  // or the sky's
   std::array<VkPipeline, 2> smooth{};  // mirrored: 1
   VkPipeline far = VK_NULL_HANDLE;     // impostors
-  bool is_backwards = false;           // so that of equally near surfaces the one stays that is drawn first otherwise
+  bool is_backwards = false;           // keeps the result for equally near surfaces: the first in normal order wins
   Styles styles = Styles::All;
 
   [[nodiscard]] bool is_glass() const { return over == Over::GlassInOrder || over == Over::GlassByChunk; }
@@ -119,7 +119,7 @@ Status MeshPass::grow(VkDeviceSize bytes) {
   return {};
 }
 
-// Puts what the shaders read of a picture where it will be copied from.
+// Writes the shader data of an image to the staging memory.
 Status MeshPass::put_frame(MeshFrameData& data) {
   // Instances follow the frame of meshes.
   struct Part {
@@ -145,7 +145,7 @@ Status MeshPass::put_frame(MeshFrameData& data) {
     frame_bytes_ += i == 0 ? parts[i].bytes : aligned(parts[i].bytes);
   }
   if (Status done = grow(frame_bytes_ + kAlignment); !done) return done;
-  // Room was left for the address to be a multiple, whatever the buffer's is.
+  // The allocation left room for this alignment.
   frame_address_ = aligned(frame_.address());
   for (std::size_t i = 0; i < parts.size(); ++i) {
     if (parts[i].address != nullptr) *parts[i].address = frame_address_ + offsets[i];
@@ -173,7 +173,7 @@ Status MeshPass::prepare(MeshFrameData& data, VkExtent2D size, std::uint32_t sam
 std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wireframe wireframe, MeshLight light) const {
   if (wireframe == Wireframe::Only) return {{Step::Over::Sky}, {Step::Over::All, kDrawEdgesOnly}};
   const bool shows_values = data.has(kShowOcclusion | kShowNormals);
-  // What is solid first, so that less of the sky is to be drawn.
+  // Solid surfaces come first, so that less of the sky is drawn.
   const auto solid = shows_values ? Step::Over::All : Step::Over::Opaque;
   std::vector<Step> steps{{solid}, {Step::Over::Sky}};
   if (light != MeshLight::Plain) {
@@ -209,7 +209,7 @@ std::vector<MeshPass::Step> MeshPass::steps_for(const MeshFrameData& data, Wiref
 Status MeshPass::find_pipelines(std::vector<Step>& steps, std::uint32_t samples, MeshLight light,
                                 const MeshFrameData& data) {
   for (Step& step : steps) {
-    // Edges are as bright as what they lie on, but for shadows.
+    // Edges are as bright as their surface, but without shadows.
     const bool is_lit = step.over != Step::Over::Sky && (step.mode == kDrawSurfaces || is_channel_of_glass(step.mode));
     MeshLight lit = is_lit ? light : MeshLight::Plain;
     if (is_nearest_glass(step.mode)) lit = data.glass_by_rays ? MeshLight::TracedThroughGlass : light;
@@ -251,7 +251,7 @@ Status MeshPass::draw(MeshFrameData& data, VkExtent2D size, std::uint32_t sample
 void MeshPass::copy_frame(VkCommandBuffer commands) const {
   const VkBufferCopy all{0, frame_address_ - frame_.address(), frame_bytes_};
   device_->api().vkCmdCopyBuffer(commands, staging_.handle(), frame_.handle(), 1, &all);
-  // Also before what was uploaded by commands before these.
+  // Also orders uploads by earlier commands before these.
   auto barrier = info_of<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
   barrier.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
   barrier.dstAccessMask = VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_INDEX_READ_BIT;

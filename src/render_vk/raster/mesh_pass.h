@@ -20,7 +20,7 @@ class MeshPass {
 
   /// The greatest number that the device offers of those up to `wanted`.
   [[nodiscard]] std::uint32_t samples_for(int wanted) const;
-  /// Of a picture, across and down.
+  /// The largest width and height of an image.
   [[nodiscard]] std::uint32_t largest_edge() const { return largest_edge_; }
   [[nodiscard]] int subpixels() const { return subpixels_; }
 
@@ -42,7 +42,7 @@ class MeshPass {
   void record(VkCommandBuffer commands, const MeshFrameData& data, const std::vector<Step>& steps,
               const Buffer& colours) const;
   void record_step(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const;
-  // Those of the step's draws, with what pushes have in common.
+  // Draws the step's chunks; `values` has the shared push constants.
   void draw_chunks(VkCommandBuffer commands, const MeshFrameData& data, const Step& step, ShaderMeshPush values) const;
   void draw_far(VkCommandBuffer commands, const MeshFrameData& data, const Step& step) const;
   void draw_mesh(VkCommandBuffer commands, const MeshDraw& draw, const Step& step) const;

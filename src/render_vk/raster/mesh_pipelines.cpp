@@ -103,8 +103,8 @@ constexpr std::array<std::span<const std::uint32_t>, 10> kCode = {
     kSkyVertex,      kSkyFragment, kBlockyVertex,        kBlockyFragment,      kSmoothVertex,
     kSmoothFragment, kFarVertex,   kBlockyGlassFragment, kSmoothGlassFragment, kFarFragment};
 
-// Of vertices and of fragments, in `kCode`. Those that see through glass take seconds to compile on a processor, and
-// are apart from all others.
+// Returns the vertex and fragment shaders, as indices of `kCode`. Shaders for vision through glass take seconds to
+// compile on a CPU driver, so they are separate from all others.
 std::array<std::size_t, 2> shaders_of(const MeshWay& way) {
   const bool sees_through = way.glass_by_rays && way.mode != kDrawGlassDepth;
   if (sees_through && way.what == MeshWay::What::Blocky) return {2, 7};
@@ -138,7 +138,7 @@ VkAttachmentDescription attachment(VkFormat format, std::uint32_t samples, VkAtt
   return made;
 }
 
-// After what was done with the images before, and before they are copied.
+// Orders the pass after earlier uses of the images, and before their copies.
 std::array<VkSubpassDependency, 2> around_pass() {
   constexpr VkPipelineStageFlags kDepthStages =
       VK_PIPELINE_STAGE_EARLY_FRAGMENT_TESTS_BIT | VK_PIPELINE_STAGE_LATE_FRAGMENT_TESTS_BIT;
@@ -196,8 +196,9 @@ void blend(VkBlendFactor added, VkBlendFactor kept, VkPipelineColorBlendAttachme
   state.colorBlendOp = state.alphaBlendOp = VK_BLEND_OP_ADD;
 }
 
-// Glass lets through another share of each channel, but blending knows one alpha: so it is drawn once a channel; or,
-// where each pixel has one fragment of it, what is there is multiplied by what passes, and then the rest is added.
+// Glass has a different transmittance for each channel, but blending has one alpha, so glass is drawn once per channel.
+// If each pixel has a single glass fragment, the stored colour is multiplied by the transmittance, and the glass's
+// light is added in a second pass.
 VkPipelineColorBlendAttachmentState blend_of(const MeshWay& way) {
   VkPipelineColorBlendAttachmentState state{};
   state.colorWriteMask =
@@ -212,7 +213,7 @@ VkPipelineColorBlendAttachmentState blend_of(const MeshWay& way) {
   return state;
 }
 
-// The two shaders with what of a way they are made for.
+// The two shader stages with their specialization constants.
 struct Stages {
   std::array<VkBool32, 7> values;
   std::array<VkSpecializationMapEntry, 7> entries;

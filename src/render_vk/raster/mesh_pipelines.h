@@ -13,11 +13,11 @@ namespace quoin::vulkan {
 constexpr VkFormat kMeshColour = VK_FORMAT_R8G8B8A8_SRGB;  // so that blending and resolving are linear
 constexpr VkFormat kMeshDepth = VK_FORMAT_D32_SFLOAT;
 
-/// What light a fragment gets.
+/// The light of a fragment.
 enum class MeshLight : std::uint8_t {
   Plain,              ///< all that its face is turned to
-  Traced,             ///< what rays say: shadows, lamps
-  TracedThroughGlass  ///< there is some in the scene
+  Traced,             ///< by rays: shadows, lamps
+  TracedThroughGlass  ///< the scene has glass
 };
 
 /// One of the few ways in which meshes are drawn.
@@ -36,7 +36,7 @@ struct MeshWay {
   auto operator<=>(const MeshWay&) const = default;
 };
 
-/// Pipelines and render passes by what they are for, each made when it is first needed.
+/// Pipelines and render passes by purpose, each made at first use.
 class MeshPipelines {
  public:
   [[nodiscard]] static Result<std::unique_ptr<MeshPipelines>> create(Device& device);
@@ -45,8 +45,8 @@ class MeshPipelines {
   MeshPipelines& operator=(const MeshPipelines&) = delete;
 
   [[nodiscard]] VkPipelineLayout layout() const { return layout_; }
-  /// Attachments: with one sample colour and depth; else these, then the colour that samples are resolved into. What is
-  /// to be read is left ready to be copied from.
+  /// Attachments: with one sample colour and depth; otherwise these and the resolved colour. Attachments to be read end
+  /// in a layout for copying.
   [[nodiscard]] Result<VkRenderPass> render_pass(std::uint32_t samples);
   [[nodiscard]] Result<VkPipeline> pipeline(const MeshWay& way);
 

@@ -44,13 +44,13 @@ struct ShaderMeshFrame {
   Vec4 sun{0.0F};
 };
 
-// ShaderMeshPush::numbers: what is drawn,
+// Draw modes in ShaderMeshPush::numbers,
 constexpr std::uint32_t kDrawSurfaces = 0;
 constexpr std::uint32_t kDrawEdgesOver = 1;
 constexpr std::uint32_t kDrawEdgesOnly = 2;
 constexpr std::uint32_t kDrawGlass = 3;  ///< and the channel
 constexpr std::uint32_t kDrawDepth = 6;  ///< where surfaces are, before they are lit
-// of the glass that is nearest where it is, what of each channel passes and what is added,
+// for the nearest glass: its depth, the transmittance of each channel, and the added light,
 constexpr std::uint32_t kDrawGlassDepth = 7;
 constexpr std::uint32_t kDrawGlassPassed = 8;
 constexpr std::uint32_t kDrawGlassAdded = 9;

@@ -12,7 +12,7 @@
 namespace quoin::vulkan {
 namespace {
 
-// What is replaced stays until its replacement has arrived; no more of that than this at a time.
+// Replaced meshes stay until their replacement has arrived; this limits their memory at a time.
 constexpr std::size_t kBatchBytes = std::size_t{32} << 20;
 
 void append_vertex(const ChunkSurface& surface, std::size_t i, std::vector<std::uint32_t>& words) {
@@ -27,7 +27,7 @@ void append_vertex(const ChunkSurface& surface, std::size_t i, std::vector<std::
   words.push_back(surface.types[i]);
 }
 
-// What a device would read beside the surface's memory.
+// Rejects indices and sizes that would make a device read outside the surface's memory.
 Status check(const ChunkSurface& surface) {
   const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
   if (surface.style == SurfaceStyle::Blocky) {

@@ -19,7 +19,7 @@ struct StoredMesh {
   /// Blocky: where each direction's opaque quads begin and the last one's end; then come the transparent ones.
   std::array<std::uint32_t, 7> opaque{};
   bool is_by_direction = true;  ///< false: only the first and the last of these mean something
-  /// Smooth: of how many, of which the last so many are of transparent bodies, and where they begin in `place`.
+  /// Smooth: the number of indices, the number of transparent ones at their end, and their offset in `place`.
   std::uint32_t indices = 0;
   std::uint32_t glass_indices = 0;
   VkDeviceSize first_index = 0;
@@ -55,7 +55,7 @@ class MeshStore {
     IVec3 low{0};  ///< of the chunks' places, once `bounds_known`
     IVec3 high{0};
     std::int64_t opaque_quads = 0;  ///< of all, once `bounds_known`
-    std::uint64_t bytes = 0;        ///< likewise
+    std::uint64_t bytes = 0;        ///< of all, once `bounds_known`
     bool bounds_known = false;
   };
 
@@ -69,7 +69,7 @@ class MeshStore {
   void drop(MeshKey key);
   void clear();
 
-  /// Null when nothing of the grid is there. Its bounds are known then.
+  /// Returns null if no mesh of the grid is stored. Computes its bounds if needed.
   [[nodiscard]] const StoredGrid* find(MeshKey key);
 
   [[nodiscard]] std::size_t chunks() const { return chunks_; }

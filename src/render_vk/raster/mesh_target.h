@@ -4,7 +4,7 @@
 
 namespace quoin::vulkan {
 
-/// What is drawn to: an image of one layer with memory of its own.
+/// A render target: an image of one layer with its own memory.
 class Attachment {
  public:
   struct Kind {

@@ -1,4 +1,4 @@
-// Levels of detail and impostors of what is rasterised.
+// Levels of detail and impostors in rasterised images.
 
 #include <algorithm>
 #include <array>
@@ -25,7 +25,7 @@ using vulkan_test::with_mesh_light;
 
 class VulkanMeshDetail : public vulkan_test::VulkanMeshTest {
  protected:
-  // Glass is told apart by tests of its own.
+  // Glass has its own tests.
   void make_opaque() {
     for (std::size_t type = 1; type < scene_.types.size(); ++type) {
       VoxelProperties properties = scene_.types[static_cast<VoxelType>(type)];
@@ -90,7 +90,7 @@ TEST_F(VulkanMeshDetail, ImpostorsAreThoseOfTheProcessor) {
   whole.detail.policy.reset();
   EXPECT_GT(with, 0);
   EXPECT_LT(with, triangles_of(camera, with_mesh_light(whole)));
-  // What is merged is simpler than its impostor.
+  // The merged mesh is simpler than its impostor.
   compare_all(camera, options, "mesh_far_merged", true);
   EXPECT_LT(triangles_of(camera, with_mesh_light(options)), with);
 }
@@ -190,7 +190,7 @@ TEST_F(VulkanMeshDetail, EditsShowInEveryDetail) {
   }
 }
 
-// Without waiting, what has no impostor yet is drawn halved, and nothing is left out.
+// Without waiting, grids without an impostor are drawn halved, and all grids are drawn.
 TEST_F(VulkanMeshDetail, WhatHasNoImpostorYetIsDrawnHalved) {
   add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 3, 260.0);
   make_opaque();
@@ -225,8 +225,8 @@ TEST_F(VulkanMeshDetail, SmoothMeshesStaySmooth) {
   EXPECT_LE(different * 50, static_cast<int>(halved.rgb.size()));
 }
 
-// Fields are drawn from meshes of their halved samples, beside the halved blocks of the same grid; far ones from their
-// own meshes.
+// Fields are drawn from meshes of their halved samples, together with the halved blocks of the same grid; far fields
+// from their full meshes.
 TEST_F(VulkanMeshDetail, FieldsAreHalvedToo) {
   const VoxelType stone = add_type(scene_, {200, 190, 170});
   const VoxelType brick = add_type(scene_, {190, 90, 70});
@@ -275,7 +275,7 @@ TEST_F(VulkanMeshDetail, FieldsAreHalvedToo) {
   }
 }
 
-// A view's memory keeps what is about a threshold from trembling.
+// A view's hysteresis prevents flicker near a threshold.
 TEST_F(VulkanMeshDetail, AViewRemembersItsChoice) {
   add_crowd(scene_, {add_blobs(scene_, 31)}, 1, 260.0);
   make_opaque();
@@ -291,7 +291,7 @@ TEST_F(VulkanMeshDetail, AViewRemembersItsChoice) {
   for (int i = 0; i < 6; ++i) {
     std::vector<SelectedInstance> selected;
     DetailSelector without;
-    // The distance at which it changes without memory, found by bisection.
+    // The switching distance without hysteresis, found by bisection.
     double near = 10.0;
     double far = 10'000.0;
     for (int step = 0; step < 50; ++step) {

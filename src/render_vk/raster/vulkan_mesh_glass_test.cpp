@@ -1,4 +1,4 @@
-// What is transparent, drawn face by face from back to front.
+// Transparent surfaces, drawn face by face from back to front.
 
 #include <algorithm>
 #include <cmath>
@@ -124,7 +124,7 @@ TEST_F(VulkanMeshGlass, WhatIsNotSeenThroughGlassIsThatOfTheProcessor) {
   by_faces.glass_by_rays = false;
   const Image image = drawn(camera, by_faces);
   const Picture cpu = render_test::taken(scene, camera, options);
-  // Of another colour, water tells where it is.
+  // Gives water another colour to identify it.
   for (std::size_t type = 1; type < scene.types.size(); ++type) {
     VoxelProperties properties = scene.types[static_cast<VoxelType>(type)];
     if (properties.visibility != Visibility::Transparent) continue;

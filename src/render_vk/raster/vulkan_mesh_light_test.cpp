@@ -59,7 +59,7 @@ Scene huts(DVec3 at) {
 
 TEST_F(VulkanMeshLight, GoldenViewsAreThoseOfTheProcessor) {
   Scene scene = golden::terrain_scene();
-  // What is transparent has tests of its own.
+  // Transparent surfaces have their own tests.
   for (std::size_t type = 1; type < scene.types.size(); ++type) {
     VoxelProperties properties = scene.types[static_cast<VoxelType>(type)];
     properties.visibility = Visibility::Opaque;

@@ -50,7 +50,7 @@ TEST_F(VulkanMeshPropagated, AnEditOpensARoom) {
   EXPECT_GT(brightest(), 0);
 }
 
-// What the field's surface shows is marched alike but for the mesh's own shape.
+// The mesh matches the marched field except for the mesh's own shape.
 TEST_F(VulkanMeshPropagated, SmoothSurfacesAreLitAsTheFieldsThatTheyAreOf) {
   Scene scene;
   const VoxelType stone = render_test::add_type(scene, {180, 170, 160, 255});

@@ -110,7 +110,7 @@ struct VulkanMeshRenderer::Impl {
   InstanceFilter shown = InstanceFilter::Visible;
   std::vector<vulkan::MeshInstance> instances;  // in the order of their handles; voxels, then the field
   vulkan::Place surfaces;
-  std::vector<Vec4> surface_table;  // what lies there
+  std::vector<Vec4> surface_table;  // the content of `surfaces`
   std::int64_t drawn_triangles = 0;
 };
 
@@ -224,7 +224,7 @@ Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(con
     if (placed.instance != instance.handle) continue;
     instance.placed = static_cast<std::int32_t>(next - placement.placed.begin());
     instance.origin = next->origin;
-    // Surfels are not rasterised: what has a field is drawn from its meshes, whose levels live meshes choose.
+    // Surfels are not rasterised: grids with a field are drawn from their meshes, whose levels the live meshes choose.
     instance.is_far = next->is_far && (next->impostor == nullptr || next->impostor->surfels.empty());
     if (placed.level == 0) continue;
     instance.mesh.level = placed.level;
@@ -241,8 +241,8 @@ Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(con
         [](const vulkan::MeshInstance& instance, InstanceHandle handle) { return instance.handle < handle; });
     if (found == shown_as.end() || found->handle != placed.placed.instance) continue;
     if (!placed.impostor->surfels.empty()) continue;
-    // Merged quads of what is simple are fewer than the faces that snapshots saw of it. Where not all chunks have a
-    // mesh, some may still be on their way.
+    // A simple grid can have fewer merged quads than visible faces; its mesh is then drawn. If some chunks have no
+    // mesh, it may still be on its way.
     const vulkan::MeshStore::StoredGrid* mesh = store.find(found->mesh);
     found->is_far = mesh == nullptr || mesh->chunks.size() < scene->grids()[found->mesh.grid].grid.chunk_count() ||
                     mesh->opaque_quads > std::int64_t{far.level.count} + far.coarser.count + far.unseen.count;
@@ -251,7 +251,7 @@ Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(con
   return shown_as;
 }
 
-// What rays meet, and light.
+// Writes the rays' content and the light.
 Status VulkanMeshRenderer::Impl::put_picture(const vulkan::Placement& placement, const Camera& camera,
                                              const RenderOptions& request, Threads threads,
                                              vulkan::MeshFrameData& data) {

@@ -1,4 +1,4 @@
-// Glass by rays: what a fragment of it shows is what the marched picture shows.
+// Glass by rays: its fragments match the marched image.
 
 #include <optional>
 
@@ -163,7 +163,7 @@ TEST_F(VulkanMeshSeeThrough, ItNeedsTheVoxelsOfTheSceneWhereThereIsGlass) {
   meshes_->clear();
 }
 
-// Edges of what stands behind glass are dimmed by it; glass has its own.
+// Glass dims the edges of objects behind it; it has its own edges.
 TEST_F(VulkanMeshSeeThrough, EdgesAreSeenThroughGlass) {
   Scene scene;
   const VoxelType wall = add_type(scene, {230, 230, 230});

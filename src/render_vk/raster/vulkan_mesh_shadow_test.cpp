@@ -22,7 +22,7 @@ using vulkan_test::without_shadows;
 
 class VulkanMeshShadow : public vulkan_test::VulkanMeshTest {};
 
-// A floor with a tower on it, and beside these a turned beam that is another instance.
+// A floor with a tower, and next to them a rotated beam as a separate instance.
 Scene yard(DVec3 at = DVec3(0.0)) {
   Scene scene;
   const VoxelType stone = add_type(scene, {200, 180, 150});
@@ -83,7 +83,7 @@ TEST_F(VulkanMeshShadow, TheyAreAsLongAsTheyMayBe) {
   compare(scene, towards({40, 45, 60}, {0, 4, 5}), options, "yard_short");
 }
 
-// What a merged floor shows next to a wall lies on its edge, and must not start rays inside the wall.
+// Points of a merged floor next to a wall lie on its edge and must not start rays inside the wall.
 TEST_F(VulkanMeshShadow, NothingIsDarkWhereAWallBegins) {
   Scene scene;
   const VoxelType stone = add_type(scene, {200, 200, 200});

@@ -31,8 +31,8 @@ int pixels_that_are_not(const Image& image, std::uint8_t byte) {
   return count;
 }
 
-// A white room in white stone, over eight chunks, its walls flat but for bumps: merged faces of all sizes, whose
-// corners lie on others' edges.
+// A white room in white stone across eight chunks, with small bumps on flat walls: merged faces of all sizes, with
+// corners on the edges of others.
 Scene white_room(std::mt19937& random) {
   Scene scene;
   const VoxelType white = add_type(scene, {255, 255, 255});
@@ -70,7 +70,7 @@ TEST_F(VulkanMeshShape, MergedFacesHaveNoHolesBetweenThem) {
   EXPECT_EQ(holes, 0) << "seed " << seed;
 }
 
-// The normal that a sphere's picture shows at a pixel; nothing at its rim and beside it.
+// Returns the normal that a sphere's image shows at a pixel; nullopt at and outside its rim.
 std::optional<DVec3> normal_at(const Camera& camera, int x, int y, DVec3 centre, double radius) {
   const Ray ray = ray_through(camera, {x + 0.5, y + 0.5, 160, 160});
   const DVec3 to_centre = centre - ray.origin;
@@ -266,7 +266,7 @@ TEST_F(VulkanMeshShape, SamplesAreResolvedInLinearLight) {
     EXPECT_GE(picture.samples(), samples >= 4 ? 4 : 1) << "every device has 4";
     if (picture.samples() == 1) continue;
     const Image image = picture.read().value();
-    // What is behind, straight down, is nearly even.
+    // The background straight down is nearly uniform.
     const Vec3 sky = byte_at(image, 10, 50);
     const SrgbEncoder& encode = SrgbEncoder::shared();
     const float half = 0.5F + 0.5F * linear_from_srgb(static_cast<std::uint8_t>(sky.x));

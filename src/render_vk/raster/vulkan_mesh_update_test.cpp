@@ -1,4 +1,4 @@
-// Surfaces come and go; what is wrong is refused.
+// Adding and removing surfaces; invalid surfaces are rejected.
 
 #include <algorithm>
 #include <cmath>

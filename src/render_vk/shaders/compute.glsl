@@ -1,4 +1,4 @@
-// What the shaders share that compute a tile of a picture, an invocation a pixel.
+// Shared by the shaders that compute a tile of an image with one invocation per pixel.
 #include "data.glsl"
 
 layout(push_constant) uniform Push {
@@ -6,9 +6,9 @@ layout(push_constant) uniform Push {
   ivec2 corner;     // of the tile, in pixels
   ivec2 size;       // of the tile
   vec2 point;       // of the sample, within pixels
-  vec2 point_low;   // what is left of that
-  vec2 turn;        // of the sample: cosine and sine of what turns nine fixed directions of occlusion
-  vec3 upright;     // and where the first of these points, along u, v and the normal
+  vec2 point_low;   // its rounding error
+  vec2 turn;        // of the sample: cosine and sine of the rotation of nine fixed occlusion directions
+  vec3 upright;     // the first of these directions, along u, v and the normal
   uint seed;        // of the sample
   uint first;       // 1: of the pixel's samples
   uint round;       // of the sample

@@ -1,4 +1,4 @@
-// What the shaders read and write; src/render_vk/trees/shader_data.h says the same to the processor's compiler.
+// The shaders' inputs and outputs. src/render_vk/trees/shader_data.h has the same layout for the CPU.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 
@@ -6,7 +6,7 @@
 layout(constant_id = 4) const bool kHasFields = false;
 // Whether anything of them is transparent.
 layout(constant_id = 6) const bool kHasFieldGlass = false;
-// What a grid's trees hold: its voxels, then its field.
+// The trees of a grid: its voxels, then its field.
 const int kContents = kHasFields ? 2 : 1;
 const int kGlassContents = kHasFieldGlass ? 2 : 1;
 
@@ -48,8 +48,8 @@ struct Tree {
 struct GridTrees {
   Tree opaque;
   Tree transparent;
-  Tree field;  // of the cells that touch what is opaque of it
-  Tree glass;  // of those that touch what is transparent of it
+  Tree field;  // cells that touch the field's opaque part
+  Tree glass;  // cells that touch its transparent part
 };
 
 // An instance. View space has the world's axes and units; its origin is the camera, or a point before it where
@@ -68,7 +68,7 @@ struct Placed {
   vec4 to_sun;  // w: its brightness
   vec4 diffuse[2];  // by face
   vec4 detail_colour;
-  // What is left of numbers above when they are rounded.
+  // The rounding errors of the numbers above.
   vec4 grid_axes_low[3];
   vec4 start_low;
   vec4 start_x_low;
@@ -76,7 +76,7 @@ struct Placed {
   ivec4 origin;  // of the tree's coordinates, in the grid; w: how often that is halved
 };
 
-// What a pixel shows: a voxel, or a cell of a field.
+// The surface point that a pixel shows: a voxel, or a cell of a field.
 struct Point {
   ivec4 voxel;  // w: the instance; -1: none
   vec4 inside;  // where in the voxel; w: t
@@ -85,9 +85,9 @@ struct Point {
 // Of a field the kind has kIsField, and instead of a face there is a normal, as `packed_normal` has it.
 // Of an impostor the kind is kSurface | kIsFar, with the corner occlusion and open rays of its face from bit 8 on.
 
-// A run of transparent voxels, or of what is transparent of a field, of one type. w of `voxel`: the instance;
-// `lengths`: t of enter and exit, voxels, and t of enter from the start of the instance's ray; `what`: type, face, how,
-// and where it leaves: 8 times the instance, and the face. Of a field the face is a normal, as `packed_normal` has it.
+// A run of transparent voxels, or of a field's transparent part, of one type. w of `voxel`: the instance. `lengths`:
+// entry t and exit t, voxels, and entry t from the start of the instance's ray. `what`: type, face, flags of its ends,
+// and the exit: 8 times the instance, plus the face. For a field the face is a normal, in the form of `packed_normal`.
 struct Body {
   ivec4 voxel;
   vec4 lengths;
@@ -101,10 +101,11 @@ const uint kEndsInField = 4;
 const uint kHowItBegins = 3;
 const uint kExitNormal = 4;  // bits
 
-// A pixel on the way: what is still seen past the glass so far, where to go on, and the sample's colour so far.
+// A pixel's state: the transmittance of the glass so far, the position to continue from, and the sample's colour so
+// far.
 struct State {
-  vec4 weight;  // w: t from which on bodies are still to be lit
-  vec4 colour;  // w: 0 once the sample is done, else 1 and the bodies to be lit in this round
+  vec4 weight;  // w: bodies from this t on are still to be lit
+  vec4 colour;  // w: 0 when the sample is done, otherwise 1 plus the number of bodies to light in this round
 };
 
 // Rays of light start so high above a surfel, as in render/impostor/raster/faces.h.

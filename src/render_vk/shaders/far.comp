@@ -124,7 +124,7 @@ void draw_surfel(Far far, vec3 q, vec2 slope, vec2 reach, uint side, uint number
   }
 }
 
-// Which part of the tile's list the workgroup belongs to: the last one that begins up to there.
+// Returns the part of the tile's list that the workgroup belongs to: the last part that begins at or before it.
 uvec2 part_of(uint group) {
   FarParts parts = FarParts(frame().far_parts);
   uint low = push.far_first;

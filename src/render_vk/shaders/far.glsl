@@ -31,8 +31,8 @@ struct Far {
   vec4 across;  // where points lie in the picture: ((across . q + across.w) / (ahead . q + ahead.w) + at.x, ...)
   vec4 down;
   vec4 ahead;
-  vec4 at;        // z: how far rays still meet a rectangle beyond its sides; w: the share of pixels, of 2^24, at which
-                  // the coarser level is drawn
+  vec4 at;        // z: tolerance of rays beyond a rectangle's sides; w: share of pixels, of 2^24, that use the coarser
+                  // level
   vec4 centre;    // of the content, in the tree's coordinates
   ivec4 area;     // pixels: left, top, right, bottom, the last two exclusive
   ivec4 origin;   // of the tree's coordinates, in the grid; w: the instance
@@ -87,7 +87,7 @@ uint view_of(uvec4 near, uint chosen) {
 // the cell's box at `along` through a side across axis `side`.
 // Returns the bit that it meets, with `along` there, or -1.
 int follow(FarCell cell, float bit_width, int side, vec3 point, vec3 direction, inout float along) {
-  const float kPast = 1e-3;  // bits: beyond the side that was entered, whatever the rounding
+  const float kPast = 1e-3;  // bits: beyond the entered side, despite rounding
   float scale = 1.0 / bit_width;
   precise vec3 from = (point - cell.corner.xyz) * scale;
   precise vec3 steps = direction * scale;

@@ -1,5 +1,5 @@
-// The look of a field's surface: Surfaces::blend_of_field on the processor's side. Those that include this have
-// `Surface`, `surface_of`, `white_surface` and `mix_look`.
+// The surface of a field; matches Surfaces::blend_of_field on the CPU. The including file defines `Surface`,
+// `surface_of`, `white_surface` and `mix_look`.
 
 // The samples around the word of a cell; false where the word has none, since all are solid.
 bool samples_around(Tree field, ivec3 cell, out Numbers block) {

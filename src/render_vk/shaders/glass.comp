@@ -10,7 +10,7 @@
 #include "glass.glsl"
 #include "count.glsl"
 
-// Distances count from where view space has its origin, but for `first_t`.
+// Distances are measured from the origin of view space, except `first_t`.
 void find_glass(uint slot, inout State state, out float first_t, out bool has_hit) {
   vec2 point = picture_point();
   ViewRay ray = camera_ray(point);

@@ -26,7 +26,7 @@ struct BodyList {
   uint first;
   uint room;  // 0: none is kept
   uint count;
-  float dropped_t;  // where the first begins for which there was no room
+  float dropped_t;  // start of the first body that did not fit
 };
 
 #ifdef HOLDS_BODIES
@@ -72,7 +72,7 @@ bool insert_body(inout BodyList list, Body body, out Body dropped) {
   return is_full;
 }
 
-// What one more body does to the light of those that found no room.
+// Adds a body; if the list is full, keeps the transmittance of the bodies that did not fit.
 void keep_body(inout BodyList list, Body body, float from_t, inout vec3 passed) {
   if (body.lengths.x < from_t) return;
   Body dropped;
@@ -107,9 +107,9 @@ void add_to_run(inout BodyRun run, Body next, float from_t, inout BodyList list,
   run.has_body = true;
 }
 
-// What is transparent of a field: trace/density/density_glass.h on the processor's side. Its tree holds the
-// cells with a transparent corner; a word of 4^3 cells is of one material throughout, or has the samples around it and
-// what bodies these of its corners belong to.
+// The transparent part of a field; matches trace/density/density_glass.h on the CPU. Its tree holds the cells with a
+// transparent corner. A word of 4^3 cells has either one material throughout, or the samples around it and these
+// corners' bodies.
 
 const uint kOpaqueBody = 0xFFFF;  // no type's number
 const int kBodiesEdge = 5;
@@ -163,13 +163,13 @@ bool is_transparent(uint body) {
   return body != 0 && body != kOpaqueBody;
 }
 
-// The field of one body: what is solid of others is as far out as it is in.
+// Computes the field of one body: solid corners of other bodies are as far outside as they are inside their own.
 void corners_of_body(GlassCell cell, uint body, out vec4 low, out vec4 high) {
   low = mix(abs(cell.low), cell.low, equal(cell.body_low, uvec4(body)));
   high = mix(abs(cell.high), cell.high, equal(cell.body_high, uvec4(body)));
 }
 
-// A ray in a cell, and the cubics that say what it comes to.
+// A ray in a cell, and the cubics of its crossings.
 struct RayInGlass {
   vec3 entry;
   vec3 way;
@@ -207,7 +207,7 @@ RayInGlass ray_in_glass(GlassCell cell, vec3 entry, vec3 way) {
   return ray;
 }
 
-// The first place beyond `after` at which a cubic changes its sign; 1 where there is none before.
+// Returns the first sign change of a cubic beyond `after`; 1 if there is none before.
 float change_after(vec4 f, float after) {
   float a = 3.0 * f.w;
   float b = 2.0 * f.z;
@@ -233,8 +233,8 @@ float change_after(vec4 f, float after) {
   return 1.0;
 }
 
-// Where a ray next comes from one body, or air, into another. One loop over the cubics that say so: what is solid, what
-// is opaque, and which of two transparent types is nearer.
+// Returns the ray's next transition from one body, or air, to another. One loop over the cubics for the three
+// decisions: solid, opaque, and the nearer of two transparent types.
 float next_change(GlassCell cell, RayInGlass ray, float after) {
   const int kSolid = -2;
   float next = 1.0;
@@ -302,7 +302,7 @@ vec3 normal_from_28(uint word) {
   return unit_vector(packSnorm2x16(at));
 }
 
-// The normals with which a body of a cell begins and ends, from `begin` to `end` of a ray's way in it.
+// Sets the normals at both ends of a cell's body, from `begin` to `end` of the ray's path in it.
 void put_normals(GlassCell cell, RayInGlass ray, float begin, float end, BodyRun run, inout Body body) {
   bool touches = run.has_body && reaches(run.body, body.lengths.x);
   bool is_entered = !touches || run.body.what.x != body.what.x;
@@ -319,8 +319,8 @@ void put_normals(GlassCell cell, RayInGlass ray, float begin, float end, BodyRun
   }
 }
 
-// The bodies of a voxel, of a cell of a field, or of a word of it that is all of one type, from `enter_t` to `exit_t`.
-// `next`: a body with what is the same for all of it; `cell`: if it is mixed.
+// Adds the bodies of a voxel, of a field's cell, or of a word of a single type, from `enter_t` to `exit_t`. `next`: a
+// body with the shared properties set; `cell`: used if `is_mixed`.
 void add_bodies(GlassCell cell, bool is_mixed, Body next, float enter_t, float exit_t, float ray_t, float voxels_a_t,
                 float from_t, inout BodyRun run, inout BodyList list, inout vec3 passed) {
   float size = exit_t - enter_t;
@@ -402,7 +402,7 @@ void find_bodies(int i, GridTrees trees, GridRay ray, float voxels_a_t, float ma
   }
 }
 
-// The next body of a list, as one with those that it touches; false at the list's end.
+// Returns the next body of a list, joined with the bodies that touch it; false at the list's end.
 bool next_body(BodyList list, inout uint i, out Body body) {
   if (i >= list.count) return false;
   body = listed_body(list, i++);
@@ -419,7 +419,7 @@ bool next_body(BodyList list, inout uint i, out Body body) {
   return true;
 }
 
-// What a surface between media of two indices of refraction mirrors of a ray, and the y of the mirrored direction.
+// Returns the reflectance at a surface between media of two refractive indices, and the y of the reflected direction.
 // `direction`, `normal`: in the world, unit.
 vec2 mirror_at(vec3 direction, vec3 normal, float ior, float other_ior) {
   float along = dot(direction, normal);

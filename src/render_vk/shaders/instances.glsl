@@ -100,19 +100,20 @@ ViewRay view_from_grid(Placed placed, GridRay ray) {
   return ViewRay(placed.ref_view.xyz + turned(placed.view_axes, from_ref), turned(placed.view_axes, ray.direction));
 }
 
-// What an instance's grid holds goes by number (kContents): its voxels, then its field.
+// A grid's contents are numbered (kContents): its voxels, then its field.
 bool is_field_content(int content) {
   return kHasFields && content == 1;
 }
 
-// The tree of what is opaque of a content.
+// Returns the tree of a content's opaque part.
 Tree opaque_tree(Placed placed, int content) {
   Tree tree = Grids(frame().grids).at[placed.ref_base.w].opaque;
   if (is_field_content(content)) tree = Grids(frame().grids).at[placed.ref_base.w].field;
   return tree;
 }
 
-// Whether a ray in an instance's space meets what is opaque of a content up to `max_t`, and how far along.
+// Returns true if a ray in an instance's space meets an opaque part of a content up to `max_t`; sets `t` to the
+// distance.
 bool find_opaque(Placed placed, int content, GridRay ray, float max_t, out float t) {
   Tree tree = opaque_tree(placed, content);
   FieldHit hit;

@@ -3,7 +3,7 @@
 
 struct Lamp {
   vec4 position;  // in view; w: its reach
-  vec4 axes[3];   // its own in view, unit; w: what is added to the distance's square, cosines of a spot's angles
+  vec4 axes[3];   // its own in view, unit; w: the term added to the squared distance, cosines of a spot's angles
   vec4 power[6];
   vec4 low;       // of its box, from its position along its axes; w: 1 where it is a point, 2 where it is a spot
   vec4 high;

@@ -45,7 +45,8 @@ bool levels_of_voxel(ivec3 voxel, int grid, out vec4 levels) {
   return passes;
 }
 
-// The mean of the voxels that touch a corner in front of a face, of its own, those beside it and the one across.
+// Returns the mean over the voxels at a corner in front of a face: the face's own, its two neighbours and the diagonal
+// one.
 vec4 corner_levels(vec4 levels[9], uint passing, int u, int v) {
   if ((passing & 16) == 0) return vec4(0.0);
   int side = 3 + u;
@@ -88,8 +89,8 @@ vec4 levels_on_face(ivec3 cell, uint face, vec3 inside, int level, int grid) {
   return mix(low, high, along[v]);
 }
 
-// Of the eight voxels around a point (whole coordinates in their middles, counted from `base`), those that can be
-// reached from the nearest that passes light.
+// Averages the eight voxels around a point (integer coordinates at voxel centres, relative to `base`), restricted to
+// voxels reachable from the nearest one that passes light.
 bool levels_around(ivec3 base, vec3 point, int grid, out vec4 mean) {
   mean = vec4(0.0);
   vec3 low = floor(point);
@@ -149,7 +150,7 @@ vec3 light_colour(vec4 levels, vec3 normal) {
 
 // Where light by levels is looked up.
 struct LevelPlace {
-  ivec3 voxel;  // of an instance's tree; or the sample of a surface from which `inside` counts
+  ivec3 voxel;  // of an instance's tree; or the surface sample that is the origin of `inside`
   vec3 inside;
   vec3 normal;  // in the grid
   int face;     // of the voxel; -1: on a surface

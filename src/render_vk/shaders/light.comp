@@ -1,5 +1,5 @@
 #version 460
-// The light of what each pixel of a tile shows: light/lighting.h on the processor's side.
+// Lights the points that the pixels of a tile show; matches light/lighting.h on the CPU.
 #include "compute.glsl"
 #include "walk.glsl"
 #include "instances.glsl"
@@ -57,7 +57,7 @@ vec3 occlusion_direction(uint face, int ray, uint hash) {
   return direction;
 }
 
-// What a face of an impostor says of itself.
+// Returns the openness stored in an impostor's face.
 float openness_of_far(Point point) {
   uint light = point.what.z >> 8;
   if (!has(kOcclusionVertex) || is_of_field(point)) return float(light >> 8) / 9.0;
@@ -128,8 +128,8 @@ LightRays rays_of(Point point, Placed placed, GridRay from) {
   return rays;
 }
 
-// Turns a ray to where its number says. `brought`: what a lamp adds if nothing is in between; false where that need not
-// be asked.
+// Sets a ray to the direction of its number. `brought`: the light that a lamp adds if unblocked. Returns false if the
+// ray is not needed.
 bool aim(int number, LightRays rays, Placed placed, inout GridRay ray, out float max_t, out vec3 brought) {
   brought = vec3(0.0);
   float occlusion_distance = frame().occlusion_distance * (rays.is_field ? frame().light.w : 1.0);
@@ -163,8 +163,8 @@ LevelPlace level_place(Point point) {
                     is_of_field(point) ? -1 : int(point.what.y));
 }
 
-// What reaches a surface point: the sun's light and that of lamps, and its openness. One loop over all rays, for the
-// reason that rays.glsl gives.
+// Computes the light of the sun and lamps at a surface point, and its openness. One loop over all rays; rays.glsl gives
+// the reason.
 void trace_light(Point point, Placed placed, uint slot, out vec3 light, out float openness) {
   GridRay ray = ray_from(point, placed);
   LightRays rays = rays_of(point, placed, ray);
@@ -234,7 +234,7 @@ vec3 light_of(Point point, uint slot) {
                           : surface.emitted * frame().exposure;
 }
 
-// What a body shows where it begins.
+// Returns the surface point where a body begins.
 Point point_of(Body body) {
   Point point;
   point.voxel = body.voxel;
@@ -256,8 +256,8 @@ vec3 normal_met(int instance, uint face, float t) {
   return face_normal(placed_at(instance), face);
 }
 
-// Lights what this round has of a pixel, and returns whether that was all. One loop over all that shows there, for the
-// reason that rays.glsl gives.
+// Lights this round's points of a pixel; returns true if that completes it. One loop over all points; rays.glsl gives
+// the reason.
 bool light_pixel(uint slot, inout State state) {
   vec2 at = picture_point();
   Point opaque = Points(frame().points).at[slot];
@@ -291,7 +291,7 @@ void main() {
     if (push.round == 0 || state.colour.w > 0.0) {
       bool is_last = light_pixel(slot, state);
       if (is_last) {
-        // The minimum is taken second: what is not a number becomes 0.
+        // The minimum comes second, so that NaN becomes 0.
         vec3 sample_colour = min(max(vec3(0.0), state.colour.xyz), vec3(1.0));
         sample_colour = mix(sample_colour, vec3(0.0), isnan(state.colour.xyz));
         Sums sums = Sums(frame().sums);

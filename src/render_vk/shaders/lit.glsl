@@ -54,7 +54,8 @@ float left_by_occlusion(float openness) {
   return share.z + (1.0 - share.z) * openness;
 }
 
-// The light of a point, before exposure. `sunlight`: what the sun and lamps add; or all of it, by levels.
+// Returns the light of a point, before exposure. `sunlight`: the light of the sun and lamps; with light levels all
+// light.
 vec3 light_at(vec3 sunlight, float openness) {
   vec4 share = frame().light;
   vec4 ambient = frame().ambient;
@@ -64,7 +65,7 @@ vec3 light_at(vec3 sunlight, float openness) {
   return share.x * openness * ambient.xyz + sunlight;
 }
 
-// What a surface shows where colours are seen, rather than values.
+// Returns the displayed colour of a surface when colours are shown instead of values.
 vec3 colour_in_light(vec3 colour, vec3 emitted, vec3 sunlight, float openness) {
   if (has(kLit)) return (emitted + colour * light_at(sunlight, openness)) * frame().exposure;
   return has(kUnlitOcclusion) && has_occlusion() ? colour * left_by_occlusion(openness) : colour;

@@ -1,5 +1,6 @@
-// Numbers as sums of two single-precision ones, some 48 bits in all, three at a time: what the processor does in double
-// before it rounds. So rays that run along the edges of voxels are the processor's to the bit, and take the same side.
+// Numbers as sums of two single-precision floats, about 48 bits in total, three at a time: for values that the CPU
+// computes in double precision before rounding. So rays along voxel edges equal the CPU's bit for bit and take the same
+// side.
 //
 // Source: T. J. Dekker, "A floating-point technique for extending the available precision" (1971).
 

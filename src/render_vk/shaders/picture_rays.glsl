@@ -14,7 +14,7 @@ ViewRay camera_ray(vec2 point) {
   return ViewRay(start, d * (1.0 / sqrt(dot(d, d))));
 }
 
-// The ray's length by which its forward component grows by 1.
+// Returns the ray length per unit of depth.
 float length_a_depth(vec2 point) {
   if (!has(kPerspective)) return 1.0;
   vec3 d = picture_vector(point) + frame().forward.xyz;

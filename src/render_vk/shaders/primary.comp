@@ -132,15 +132,15 @@ bool find_far(Pair direction, float scale, inout Point point, out float depth, o
   return true;
 }
 
-// Every instance has a start of its own; that of the nearest hit so far lies at this depth, and the hit `t` behind it.
-// Differences of depths are exact.
+// Every instance has its own ray start. The start of the nearest hit's instance lies at this depth, and the hit `t`
+// behind it. Differences of depths are exact.
 struct Nearest {
   float depth;
   float t;
 };
 
-// Takes over what the pixel's ray meets of what a grid holds if that is nearer than all before. `scale`: the length of
-// a depth.
+// Replaces the nearest hit by the pixel ray's hit on a grid's content if that is nearer. `scale`: the ray length per
+// unit of depth.
 void meet_content(int content, int i, Placed placed, Pair direction, float scale, inout Nearest nearest,
                   inout Point point) {
   bool is_field = is_field_content(content);
@@ -159,7 +159,7 @@ void meet_content(int content, int i, Placed placed, Pair direction, float scale
   FieldHit hit;
   if (!find_content(is_field, room, walked_t, hit)) return;
   float found_t = moved_t + walked_t;
-  // Of equally near ones the instance that comes first; equal but for the rounding of each grid's own space.
+  // Among equally near hits the first instance wins; equal means within the rounding of each grid's own space.
   bool is_equal = point.voxel.w >= 0 && abs(found_t - limit) <= rounding;
   if (is_equal ? i + content > point.voxel.w : found_t > limit) return;
   nearest = Nearest(placed.start.w, found_t);

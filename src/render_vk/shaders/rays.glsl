@@ -1,13 +1,13 @@
-// What light reaches a point: rays among all instances. Those that include this say whether there is glass
-// (`kHasGlass`).
+// The light that reaches a point: rays among all instances. The including file defines `kHasGlass`: true if there is
+// glass.
 //
-// Compilers copy a function to each place that calls it, and a walk is long: each is called in one place of a shader,
-// in a loop over all that needs it. See docs/decisions/archive/088.
+// Compilers inline a function at each call, and a walk is long. So each function is called at a single place of a
+// shader, in a loop over all its uses. See docs/decisions/archive/088.
 
 uint rays_taken;
 
-// Whether a ray in the space of grid `home`, which is asked first, meets an opaque voxel, or what is opaque of a field,
-// of any instance.
+// Returns true if a ray in the space of grid `home` meets an opaque voxel or an opaque part of a field in any instance.
+// Tests `home` first.
 bool is_blocked(int home, Placed own, GridRay ray, float max_t) {
   ViewRay in_view = view_from_grid(own, ray);
   start_visit(in_view);
@@ -45,7 +45,7 @@ void find_bodies(int home, GridRay ray, ViewRay in_view, float length, float max
   }
 }
 
-// What of each channel of the sun's light passes what is transparent on the way.
+// Returns the transmittance of each channel for sunlight along the ray.
 vec3 sunlight_passed(uint slot, int home, Placed own, GridRay ray, float max_t) {
 #ifdef KEEPS_BODIES
   BodyList list = BodyList(frame().sun_bodies, slot * kBodies, kBodies, 0, kInfinity);
@@ -67,7 +67,7 @@ uvec2 lamps_around(ivec4 voxel, Placed placed) {
   return lamps_at(((voxel.xyz + placed.origin.xyz) << placed.origin.w) >> 4, voxel.w);
 }
 
-// What a lamp in the lists adds at a point in view, if nothing is in between; points the ray at it, up to `max_t`.
+// Returns the light that a listed lamp adds at a point in view if unblocked; sets the ray towards it, up to `max_t`.
 vec3 light_of_lamp(uint number, vec3 in_view, vec3 normal, Placed placed, inout GridRay ray, out float max_t) {
   Lamp lamp = Lamps(frame().lamps).at[Numbers(frame().lamp_lists).at[number]];
   vec3 direction = vec3(0.0);
@@ -79,7 +79,7 @@ vec3 light_of_lamp(uint number, vec3 in_view, vec3 normal, Placed placed, inout 
   return light;
 }
 
-// What of each channel of light passes on a ray's way. `slot`: whose lists of bodies it may use.
+// Returns the transmittance of each channel along a ray. `slot`: selects the lists of bodies to use.
 vec3 passed_on_way(uint slot, int home, Placed own, GridRay ray, float max_t) {
   ++rays_taken;
   if (is_blocked(home, own, ray, max_t)) return vec3(0.0);

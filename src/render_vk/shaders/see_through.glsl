@@ -1,6 +1,5 @@
-// What one sees through bodies of glass, as light/glass.h says on the processor's side. Those that include this define
-// these: which way one looks, in the world, and the upright of the surface that is met at `t`, in the face of an
-// instance's voxel; unit, in the world.
+// The view through bodies of glass; matches light/glass.h on the CPU. The including file defines two functions: the
+// view direction in the world, and the surface normal at `t`, in the face of an instance's voxel; unit, in the world.
 vec3 seen_direction();
 vec3 normal_met(int instance, uint face, float t);
 
@@ -24,14 +23,14 @@ vec3 normal_of_side(Body body, bool is_entered) {
   return normal_met(instance, is_entered ? body.what.y : body.what.w & 7, is_entered ? body.lengths.x : body.lengths.y);
 }
 
-// A surface that mirrors the sky. `normal`: unit, in the world; `tint`: of what is mirrored.
+// Adds a surface that reflects the sky. `normal`: unit, in the world; `tint`: of the reflection.
 void meet_surface(vec3 normal, float before, float behind, vec3 tint, inout State state) {
   vec2 mirror = mirror_at(seen_direction(), normal, before, behind);
   state.colour.xyz += state.weight.xyz * tint * mirror.x * sky_colour(mirror.y);
   state.weight.xyz *= 1.0 - mirror.x;
 }
-// Where a ray leaves one body for the next, or for air, and where it enters that: what is mirrored in a body's end
-// passes it once more.
+// Handles the surfaces where a ray leaves one body for the next, or for air: a reflection at a body's end passes the
+// body once more.
 void meet_surfaces(Body from, bool has_from, Body to, bool has_to, inout State state) {
   bool touches = has_from && has_to && reaches(from, to.lengths.x);
   for (int side = 0; side < 2; ++side) {
@@ -62,7 +61,7 @@ bool lies_on_opaque(Body body, float opaque_t) {
 struct Passage {
   BodyList list;
   uint next;
-  Body body;      // the last one that it came to
+  Body body;      // the latest body
   bool has_body;
   bool is_entered;  // the first was entered before
   bool is_last;     // there was room for all; else it stops before the last one, which may go on among the others
@@ -78,9 +77,9 @@ Passage passage_through(BodyList list, bool is_entered) {
   return way;
 }
 
-// Goes on into the next body, with what its surfaces show; false when there is none left. Then the ray has come out,
-// unless what is opaque, `opaque_t` away, follows at once; or where not all had room, state.weight.w says from where to
-// go on.
+// Continues into the next body, with the reflections of its surfaces. Returns false if there is no body left: the ray
+// is then in air, unless an opaque surface at `opaque_t` follows directly. If not all bodies fit, state.weight.w is the
+// distance to continue from.
 bool enter_next(inout Passage way, float opaque_t, inout State state) {
   Body body;
   bool has_next = next_body(way.list, way.next, body);
@@ -97,11 +96,11 @@ bool enter_next(inout Passage way, float opaque_t, inout State state) {
   return true;
 }
 
-// Goes through the body, and returns with what weight its own light is seen.
+// Passes through the body; returns the weight of its own light.
 vec3 pass_body(Passage way, inout State state) {
   Body body = way.body;
   Surface surface = surface_of(body.what.x);
-  // Where values are shown, glass is as good as stone, but for what one looks from.
+  // When values are shown, glass counts as opaque, except the body around the camera.
   if (has(kShowOcclusion) || has(kShowNormals)) {
     if ((body.what.z & kStartsInside) != 0) return vec3(0.0);
     vec3 weight = state.weight.xyz;

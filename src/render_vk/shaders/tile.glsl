@@ -1,5 +1,5 @@
-// An invocation and its pixel. Those that include this have declared what is pushed: the frame's address, and the
-// size of the tile.
+// An invocation and its pixel. The including file declares the push constants: the frame's address, and the size of the
+// tile.
 
 layout(local_size_x = 8, local_size_y = 8) in;
 

@@ -50,8 +50,8 @@ bvec3 either(bvec3 a, bvec3 b) {
   return bvec3(a.x || b.x, a.y || b.y, a.z || b.z);
 }
 
-// The coordinates, from ray_base, just after the crossing of `axis` at `t`, within `low` to `high`; that of `axis`
-// itself means nothing.
+// Returns the coordinates, relative to ray_base, just after the crossing of `axis` at `t`, clamped to `low` and `high`;
+// the coordinate of `axis` itself is undefined.
 ivec3 coordinates_after(float t, int axis, ivec3 low, ivec3 high) {
   precise vec3 position = ray_origin + t * ray_direction;
   vec3 at = clamp(floor(position), vec3(low), vec3(high));
@@ -80,7 +80,7 @@ ivec3 coordinates_after(float t, int axis, ivec3 low, ivec3 high) {
   return clamp(ivec3(at), low, high);
 }
 
-// What the walk keeps of its ray, from the 64 voxels about the ray's origin.
+// Sets the walk's ray, relative to the 64-voxel block at the ray's origin.
 void set_ray(ivec3 base, vec3 origin, vec3 direction) {
   ivec3 whole = ivec3(clamp(floor(origin), vec3(-1e9), vec3(1e9)));
   ivec3 shift = whole & ~63;
@@ -93,9 +93,9 @@ void set_ray(ivec3 base, vec3 origin, vec3 direction) {
   ray_sign = mix(vec3(-1.0), vec3(1.0), ray_forward);
 }
 
-// Puts a ray at its start, or where it enters the tree's bounds; false when it misses them.
+// Starts a ray at its origin, or where it enters the tree's bounds; returns false if it misses them.
 //
-// `moved`: the axis of the bounds' plane to which it was moved before; -1 for a ray that starts where it is.
+// `moved`: the axis of the bounds' plane that the ray was moved to before; -1 for a ray that starts at its origin.
 bool start_walk(Tree tree, ivec3 base, vec3 origin, vec3 direction, float max_t, int moved) {
   if (any(greaterThanEqual(tree.low.xyz, tree.high.xyz))) return false;
   set_ray(base, origin, direction);
@@ -121,7 +121,7 @@ bool start_walk(Tree tree, ivec3 base, vec3 origin, vec3 direction, float max_t,
   walk_t = max(max(near_t.x, near_t.y), near_t.z);
   walk_axis = walk_t < 0.0 ? -1 : near_t.z == walk_t ? 2 : near_t.y == walk_t ? 1 : 0;
   walk_t = max(walk_t, 0.0);
-  // Through an edge: it has left before it enters if the axis on which it leaves goes first.
+  // Through an edge: the ray exits before it enters if the exit axis comes first.
   bvec3 first = both(equal(far_t, vec3(walk_t)), lessThan(ivec3(0, 1, 2), ivec3(walk_axis)));
   if (any(either(lessThan(far_t, vec3(walk_t)), first)) || walk_t > max_t) return false;
   ivec3 at = ivec3(floor(ray_origin));
@@ -168,7 +168,7 @@ bool find_voxel(float max_t) {
       if (!leave_block(2 * walk_level, max_t)) return false;
       continue;
     }
-    // Words of voxels and what is full have no children.
+    // Words of voxels and full nodes have no children.
     if ((walk_node.z & 1) != 0) return true;
     uint child = child_of(walk_node, index);
     uvec2 children = walk_node.zw;
@@ -207,7 +207,8 @@ uint type_found() {
   return type_in(record_found(), walk_voxel & 63);
 }
 
-// The face through which the ray entered the voxel; where it starts inside, the one that looks most against it.
+// Returns the face where the ray entered the voxel; for a ray that starts inside, the face most opposed to its
+// direction.
 uint face_found() {
   int axis = walk_axis;
   if (axis < 0) {
@@ -347,7 +348,7 @@ vec4 cubic_of(vec4 low, vec4 high, vec3 entry, vec3 way) {
   return vec4(y0.x + x0 * entry.x, y1.x + x1 * entry.x + x0 * way.x, y2.x + x2 * entry.x + x1 * way.x, x2 * way.x);
 }
 
-// What was found of a field.
+// A hit on a field.
 struct FieldHit {
   float t;
   vec3 inside;  // where in the cell
@@ -385,7 +386,8 @@ bool meet_cell(float max_t, out FieldHit hit) {
   return true;
 }
 
-// As find_voxel; in the tree of a field to the first point at which it is negative. `t`: how far along.
+// Like find_voxel; in the tree of a field, finds the first point with a negative density. `t`: the distance along the
+// ray.
 bool find_content(bool is_field, float max_t, out float t, out FieldHit hit) {
   while (find_voxel(max_t)) {
     t = walk_t;
@@ -416,8 +418,8 @@ vec3 gradient_of(vec4 low, vec4 high, vec3 inside) {
   return vec3(y.y - y.x, mix(along_y.x, along_y.y, inside.x), mix(z_y.x, z_y.y, inside.x));
 }
 
-// The normal with which a field is lit in a cell, whose least corner is `first` of a block:
-// trace/density/smooth_normal.h on the processor's side. Unit, or 0.
+// Returns the lighting normal of a field in a cell, whose lowest corner is `first` of a block; matches
+// trace/density/smooth_normal.h on the CPU. Unit, or 0.
 vec3 normal_in(Numbers block, ivec3 first, vec3 inside) {
   vec3 at = vec3(first) + inside;
   vec4 low;

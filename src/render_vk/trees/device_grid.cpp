@@ -95,7 +95,7 @@ Status DeviceGrid::update(ShaderMemory& memory, const Content& content) {
   return done ? update_tops(memory, content) : done;
 }
 
-// What lies above the chunks.
+// Updates the nodes above the chunks.
 Status DeviceGrid::update_tops(ShaderMemory& memory, const Content& content) {
   const OccupancyTree* const cells = content.field == nullptr ? nullptr : &content.field->cells();
   const OccupancyTree* const glass = content.glass == nullptr ? nullptr : &content.glass->cells();

@@ -18,7 +18,7 @@ struct ByPlace {
   bool operator()(IVec3 a, IVec3 b) const { return a.z != b.z ? a.z < b.z : a.y != b.y ? a.y < b.y : a.x < b.x; }
 };
 
-/// What lies above the chunks of a tree in device memory.
+/// The nodes above the chunks of a tree in device memory.
 class DeviceTree {
  public:
   /// Writes the nodes that changed.
@@ -27,7 +27,7 @@ class DeviceTree {
 
   [[nodiscard]] bool empty() const { return top_.root.mask == 0; }
   [[nodiscard]] std::uint64_t bytes() const { return place_.size; }
-  /// As shaders know it; `bounds` of what it holds, `origin` of its coordinates, in voxels.
+  /// Returns the shader form; `bounds` of the content, `origin` of its coordinates, in voxels.
   [[nodiscard]] ShaderTree shader_tree(const IBox& bounds, IVec3 origin) const;
 
  private:
@@ -38,7 +38,7 @@ class DeviceTree {
 /// One grid's voxels and field in device memory.
 class DeviceGrid {
  public:
-  /// What rays know of a grid: its trees as it is, what of its field is opaque, and transparent. Null: there is none.
+  /// The content of a grid for rays: its voxels' trees, and the opaque and transparent parts of its field. Null: none.
   struct Content {
     const Grid* voxels = nullptr;
     const OccupancyTree* opaque = nullptr;
@@ -47,21 +47,21 @@ class DeviceGrid {
     const DensityGlass* glass = nullptr;
   };
 
-  /// Takes over what was edited since the last time, and everything of another grid; shaders may read it once the
-  /// memory is flushed. After an error it is to be released.
+  /// Applies the edits since the last call, or loads another grid completely. Shaders may read it after the memory is
+  /// flushed. After an error it must be released.
   ///
-  /// Requires: the types' visibility is that of the last time.
+  /// Requires: the types' visibility is unchanged since the last call.
   [[nodiscard]] Status update(ShaderMemory& memory, const Content& content);
   void release(ShaderMemory& memory);
 
   [[nodiscard]] IVec3 origin() const { return origin_ * kChunkEdge; }  ///< of the trees' coordinates, in the grid
   [[nodiscard]] bool has_transparent() const { return !transparent_.empty() || has_field_glass(); }
-  /// What of a field is opaque or transparent.
+  /// Returns true if the grid has an opaque or transparent field part.
   [[nodiscard]] bool has_field() const { return !field_.empty() || has_field_glass(); }
   [[nodiscard]] bool has_field_glass() const { return !glass_.empty(); }
-  /// What shaders know it by.
+  /// Returns the shader form.
   [[nodiscard]] const ShaderGrid& shader_grid() const { return shader_grid_; }
-  /// Of device memory.
+  /// Returns the device memory in use.
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:

@@ -15,12 +15,12 @@ namespace quoin::vulkan {
 using Vec4 = glm::vec4;
 using IVec4 = glm::ivec4;
 
-/// How a record of a field's chunk keeps densities: for each word of 4^3 cells at the surface the samples from the one
-/// before its first corner to the one past its last, along each axis.
+/// Edge of a density block: a field chunk's record has, for each word of 4^3 cells at the surface, the samples from one
+/// before its first corner to one past its last, along each axis.
 constexpr int kFieldBlockEdge = 7;
 constexpr std::size_t kFieldBlockWords = 172;  ///< two halves a word
-/// A record of what is transparent of it keeps likewise, after these, what bodies the corners of the cells belong to; a
-/// word of cells that are all of one type has that type's number in place of a block's.
+/// Edge of a body block: a record of a field's transparent part also has, after the densities, the bodies of the cells'
+/// corners. A word of cells of one type has the type's number instead of a block's.
 constexpr int kGlassBlockEdge = 5;
 constexpr std::size_t kGlassBlockWords = 63;      ///< two numbers a word
 constexpr std::uint32_t kOpaqueBody = 0xFFFF;     ///< no type's number

@@ -10,7 +10,7 @@
 
 namespace quoin::vulkan {
 
-/// A part of what shaders read. They know it by its address, a multiple of 32.
+/// An allocation that shaders read. They find it by its address, a multiple of 32.
 struct Place {
   std::size_t block = 0;
   std::uint64_t offset = 0;
@@ -18,7 +18,7 @@ struct Place {
   std::uint64_t address = 0;
 };
 
-/// Where trees and tables of a scene are put for shaders.
+/// The memory for a scene's trees and tables in shaders.
 class ShaderMemory {
  public:
   static constexpr std::uint64_t kAlignment = 32;
@@ -37,15 +37,15 @@ class ShaderMemory {
   [[nodiscard]] virtual Status write(const Place& place, std::span<const std::byte> bytes,
                                      std::uint64_t offset = 0) = 0;
   [[nodiscard]] virtual Status flush() = 0;
-  /// Forgets what was written since the last `flush`.
+  /// Discards the writes since the last `flush`.
   virtual void discard() = 0;
 };
 
-/// The same as bytes, for devices that are reached from elsewhere: addresses count from the first. It is filled once:
-/// what is released is not given anew.
+/// The same memory as bytes, for devices outside this library: addresses start at the first byte. It is filled once:
+/// released parts are not reused.
 class ShaderBytes final : public ShaderMemory {
  public:
-  /// What programs of 32 bits can hold, also while it grows.
+  /// The largest size that 32-bit programs can hold, including its growth.
   static constexpr std::uint64_t kMost = std::uint64_t{1} << 30;
 
   [[nodiscard]] Result<Place> allocate(std::uint64_t size, const std::string& doing) override;

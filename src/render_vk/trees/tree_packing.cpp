@@ -192,8 +192,8 @@ class RecordWriter {
     record.words.resize(record.words.size() + 2);
     put(record.words.size() - 2, value);
   }
-  // A chunk's node with a number for each word of its cells, of which bricks that are full and `is_plain(first)` have
-  // none. `number_of(brick, cell, first)` may add to the record.
+  // Packs a chunk's node with a number for each word of its cells, except full bricks with `is_plain(first)`.
+  // `number_of(brick, cell, first)` may append to the record.
   template <class IsPlain, class NumberOf>
   Node add_cells(const trace::TreeNodes& nodes, const trace::ChunkNode& node, const IsPlain& is_plain,
                  const NumberOf& number_of) {
@@ -236,7 +236,7 @@ class RecordWriter {
       const std::uint32_t number = number_of(static_cast<std::size_t>(i), first + IVec3{i & 3, i >> 2 & 3, i >> 4} * 4);
       record.words[place++] = number;
     }
-    // What comes next begins at a multiple of 8 bytes.
+    // Aligns the next entry to 8 bytes.
     if (record.words.size() % 2 != 0) record.words.push_back(0);
   }
   // Returns where it lies.

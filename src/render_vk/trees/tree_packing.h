@@ -42,10 +42,10 @@ struct ChunkRecord {
 /// from the header; 0 where all of these are solid. Only such bricks, and chunks, count as full.
 /// Requires: `cells` holds some of the chunk.
 [[nodiscard]] ChunkRecord pack_field_chunk(const OccupancyTree& cells, const DensityGrid& field, IVec3 chunk);
-/// What is transparent of a field's chunk: a tree of the cells that touch it. The number of a word says where its
-/// samples lie, densities and bodies, or of which type all of it is. No brick or chunk counts as full.
+/// Packs the transparent part of a field's chunk: a tree of the cells that touch it. A word's number gives its samples'
+/// position (densities and bodies), or its single type. No brick or chunk counts as full.
 [[nodiscard]] ChunkRecord pack_glass_chunk(const DensityGlass& glass, IVec3 chunk);
-/// How far beyond a chunk's own samples such a record reads.
+/// The number of samples that such a record reads beyond the chunk.
 constexpr int kFieldRecordReach = 2;
 
 /// The nodes above chunks.

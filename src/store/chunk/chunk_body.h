@@ -33,7 +33,6 @@
 //
 // Without the first section all voxels are air. A body contains its own address, so that a world with a lost index can
 // be rebuilt from its bodies.
-// be put together again from its bodies.
 
 namespace quoin::store {
 

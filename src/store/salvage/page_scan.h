@@ -17,12 +17,11 @@
 // Ignores trees and cell pointers: each byte of each page may be the start of a cell. Bytes are a record if the lengths
 // agree, and a chunk's body if the checksum is right.
 //
-//Errors:  CannotRead if the file cannot be opened. Unreadable pages count as damaged.
-//         LimitExceeded for a file with crafted page cycles.
-//Memory:  a page or two, the largest record, and 16 bytes for each page in the log.
-//Cost:    about 10 ns per byte for records, 0.5 ns for bodies, plus reading the file twice. If no body that spans pages
-//         reveals the page size, up to 1 GiB is scanned for each possible size.
-//          says how large these are, 1 GiB of it at most for each size that there may be.
+// Errors:  CannotRead if the file cannot be opened. Unreadable pages count as damaged.
+//          LimitExceeded for a file with crafted page cycles.
+// Memory:  a page or two, the largest record, and 16 bytes for each page in the log.
+// Cost:    about 10 ns per byte for records, 0.5 ns for bodies, plus reading the file twice. If no body that spans
+//          pages reveals the page size, up to 1 GiB is scanned for each possible size.
 
 namespace quoin::store {
 

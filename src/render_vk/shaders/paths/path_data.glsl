@@ -1,10 +1,10 @@
-// What pictures by paths read and write; src/render_vk/paths/path_data.h says the same to the processor's compiler.
+// The inputs and outputs of path tracing. src/render_vk/paths/path_data.h has the same layout for the CPU.
 
 // Of a picture by paths: PathOptions and tables. Addresses of tables that there are not are 0.
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PathFrame {
   vec4 to_sun;    // w: one less the cosine of half its disc's angle; 0: it has none
-  vec4 sunlight;  // irradiance of what faces it; w: 1 where the camera sees its disc
-  vec4 sky;       // of SkyModel::Uniform; w: times the light of other skies
+  vec4 sunlight;  // irradiance of a surface that faces it; w: 1 if the camera sees its disc
+  vec4 sky;       // of SkyModel::Uniform; w: factor for the light of other skies
   vec4 background;    // w: 1 where there is one
   vec4 ground;        // its colour; w: its height in view
   vec4 fog;           // its colour; w: its top in view
@@ -77,9 +77,9 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Ke
 // A path between two steps.
 struct PathState {
   ivec4 voxel;      // where its next ray begins, of an instance's tree; w: the instance, -1: `inside` is in view
-  vec4 inside;      // from the voxel's lower corner; w: the density with which its direction was found
-  vec4 direction;   // in the world, unit; w: the number by which glass that is still ahead is met; -1: a new one
-  vec4 throughput;  // w: from where on bodies of glass are still to be looked for
+  vec4 inside;      // from the voxel's lower corner; w: density of the sampled direction
+  vec4 direction;   // in the world, unit; w: random number for glass ahead on this ray; -1: a new one
+  vec4 throughput;  // w: glass bodies from this t on are still to be found
   vec4 radiance;
   vec4 normal;      // in the world, where it was last scattered
   uvec4 counts;     // sample, dimension, bounces | scatterings << 16, flags
@@ -95,9 +95,9 @@ const uint kIsCaught = 4;  // the ground only catches shadows where it went
 const uint kIsNoted = 8;   // in the layers
 const uint kIsAlive = 16;
 
-// What a pixel's samples add up to.
+// The sums over a pixel's samples.
 const uint kSumBackground = 0;  // w: share of the scene
-const uint kSumScene = 1;       // w: share of what is caught
+const uint kSumScene = 1;       // w: share of shadow-catching ground
 const uint kSumCaught = 2;      // w: depth
 const uint kSumLit = 3;         // w: type
 const uint kSumOpen = 4;        // w: instance

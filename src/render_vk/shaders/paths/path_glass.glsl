@@ -1,7 +1,7 @@
 // Glass and clouds on a path's way: render/path/path_tile_media.cpp on the processor's side. Included by paths.comp
 // once it knows of paths, vertices and rays.
 
-// Of a surface between two media: what is mirrored, and the cosine of what gets through.
+// Returns the reflectance of a surface between two media, and the cosine of the transmitted direction.
 vec2 refraction(float cosine, float eta) {
   float sine2 = eta * eta * max(0.0, 1.0 - cosine * cosine);
   if (sine2 >= 1.0) return vec2(1.0, 0.0);
@@ -32,7 +32,7 @@ vec3 normal_entered(Body body) {
   return in_field ? normal_of(body.what.y) : face_normal(body.what.y);
 }
 
-// What a path comes to by glass and air: each is done in one place, since compilers copy functions.
+// A path's next event in glass or air. Each outcome is handled in one place, since compilers inline functions.
 struct Glass {
   uint outcome;
   Body body;
@@ -146,7 +146,7 @@ void enter_glass(Body body, inout Glass glass) {
   }
 }
 
-// A path within glass: to where the body ends, or to what stands in it. `opaque_t`: where that is.
+// Follows a path within glass to the end of the body, or to an object inside it, at `opaque_t`.
 void leave_glass(Body body, bool has_next, Body next, float opaque_t, inout Glass glass) {
   Surface surface = surface_of(body.what.x);
   path.throughput.xyz *= tint_of(surface, body.lengths.z);
@@ -177,7 +177,7 @@ void leave_glass(Body body, bool has_next, Body next, float opaque_t, inout Glas
   glass.within = is_mirrored ? body.what.x : touches ? next.what.x : 0;
 }
 
-// What is seen in glass, of the first body that is no cloud, and the one after it.
+// Handles the first glass body on a ray (clouds are skipped), and the body after it.
 void look_into(bool has_body, Body body, bool has_next, Body next, float opaque_t, inout Glass glass) {
   bool is_within = has_body && is_begun(body) && (path.more.x == 0 || body.what.x == path.more.x);
   if (is_within) {  // or the camera is in it

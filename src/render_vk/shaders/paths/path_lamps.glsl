@@ -136,8 +136,8 @@ float importance_of(LampNode node, vec3 point, vec3 normal) {
   return node.low.w * min(before, far) * shone / (distance2 * distance2);
 }
 
-// Goes down the tree: by chance to a lamp, or, with `lamp` >= 0, to that one. Returns with which probability chance
-// goes there; 0: nowhere.
+// Descends the tree: to a random lamp, or with `lamp` >= 0 to that lamp. Returns the probability of the random choice;
+// 0: no lamp.
 float go_down(inout int lamp, vec3 point, vec3 normal, float u) {
   LampNodes nodes = LampNodes(path_frame().lamp_nodes);
   uvec2 way = uvec2(0);
@@ -179,7 +179,7 @@ LampSample sample_lamp(vec3 point, vec3 normal, float choice, vec2 u) {
   return found;
 }
 
-// With which `sample_lamp` finds the point of a lamp that lies in `direction` at `distance`.
+// Returns the probability density, in `sample_lamp`, of the point of a lamp in `direction` at `distance`.
 float density_of_lamp(int lamp, vec3 point, vec3 normal, vec3 direction, float distance) {
   PathLamp of = PathLampTable(path_frame().lamps).at[lamp];
   float here = lamp_density(of, lamp_from(of, point), direction, distance);
@@ -187,7 +187,7 @@ float density_of_lamp(int lamp, vec3 point, vec3 normal, vec3 direction, float d
   return here * go_down(lamp, point, normal, 0.0);
 }
 
-// Of which lamp a voxel's face is part; -1: of none.
+// Returns the index of the lamp that contains a voxel's face; -1 if none does.
 int lamp_of_face(int placed, ivec3 voxel, uint face) {
   if (path_frame().lamp_count == 0) return -1;
   Keys keys = Keys(path_frame().face_keys);

@@ -1,5 +1,5 @@
-// What pictures by paths compute with, and the numbers of a path: render/path/numbers has them on the processor's side,
-// series for series, so that paths go the same ways.
+// Path tracing arithmetic and random numbers; matches render/path/numbers on the CPU, series for series, so that paths
+// are the same.
 
 const float kPi = 3.14159265;
 const float kAlmostOne = 0.99999994;
@@ -123,7 +123,7 @@ vec3 cosine_weighted(vec2 u) {
   return vec3(disc, sqrt(max(0.0, 1.0 - dot(disc, disc))));
 }
 
-// The share of a strategy beside another.
+// Returns the weight of a strategy against another: the balance heuristic.
 float balance(float own, float other) {
   return own / (own + other);
 }

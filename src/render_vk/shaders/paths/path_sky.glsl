@@ -96,7 +96,7 @@ Found find_sum(Floats sums, uint first, uint count, float u) {
   return Found(low, width > 0.0 ? min((u - begin) / width, kAlmostOne) : 0.5);
 }
 
-// What a ray meets that leaves the scene, without the sun. `direction`: unit, in the world.
+// Returns the radiance of a ray that leaves the scene, without the sun. `direction`: unit, in the world.
 vec3 sky_radiance(vec3 direction) {
   PathFrame f = path_frame();
   if (f.sky_model == kSkyUniform) return f.sky.xyz * f.sky.w;

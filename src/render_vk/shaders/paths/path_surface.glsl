@@ -100,7 +100,7 @@ vec3 visible_normal(vec3 outward, float alpha, vec2 u) {
   return normalize(vec3(alpha * halfway.xy, max(halfway.z, 1e-9)));
 }
 
-// What gloss reflects in all: times F0, and besides.
+// Returns the total gloss reflectance: the factor of F0, and the constant term.
 vec2 gloss_table(float cosine, float roughness) {
   float x = clamp(cosine, 0.0, 1.0) * float(kGlossEdge - 1);
   float y = clamp(roughness, 0.0, 1.0) * float(kGlossEdge - 1);
@@ -163,7 +163,7 @@ vec3 gloss_at(Scatter scatter, float cosine) {
          fresnel(vec3(kDielectric), cosine) * scatter.dielectric_gain;
 }
 
-// The scattering function times the cosine of `inward`; w: with which density `sample_scatter` finds it.
+// Returns the scattering function times the cosine of `inward`; w: its density in `sample_scatter`.
 vec4 evaluate(Scatter scatter, vec3 inward) {
   if (scatter.is_medium) {
     float share = phase(scatter.anisotropy, inward.z);

@@ -1,6 +1,6 @@
 #version 460
-// Pictures by paths: render/path/path_tile.h on the processor's side. An invocation a pixel: it takes some steps of its
-// path, each to the next thing that the path meets; where a path ends, that of the next sample begins.
+// Path tracing; matches render/path/path_tile.h on the CPU. One invocation per pixel: it takes some steps of its path,
+// each to the path's next hit. When a path ends, the next sample's path begins.
 #include "data.glsl"
 #include "paths/path_data.glsl"
 #include "walk.glsl"
@@ -25,7 +25,7 @@ const uint kSureBounces = 3;
 const float kMostLikely = 0.95;
 const uint kMostGlass = 64;
 
-// Dimensions of a vertex, and numbers beside these: render/path/path_tile_parts.h.
+// Dimensions of a vertex, and additional numbers: render/path/path_tile_parts.h.
 const uint kDimensions = 8;
 const uint kOfSun = 0;
 const uint kOfLampChoice = 1;
@@ -38,7 +38,7 @@ const uint kOfGlass = 7;
 const uint kOfFog = 0x40000000u;
 const uint kOfFade = 0x50000000u;
 
-// What a step comes to.
+// The outcome of a step.
 const uint kGoesOn = 0;  // nothing was met yet
 const uint kTurns = 1;   // the path has a next ray
 const uint kScatters = 2;
@@ -68,7 +68,7 @@ struct Request {
   vec3 light;
 };
 
-// What a ray meets that is opaque.
+// A ray's hit on an opaque surface.
 struct Hit {
   ivec4 voxel;  // w: the instance; -1: none
   vec3 inside;
@@ -88,7 +88,7 @@ int request_count;
 uint rays_taken;
 float behind;  // how far behind the start of the path's ray the camera is, of its first
 
-// ---- what a path's state says ----
+// ---- accessors of a path's state ----
 
 uint dimension() {
   return path.counts.y;
@@ -140,7 +140,7 @@ GridRay ray_in(int instance, ivec4 voxel, vec3 inside, ViewRay in_view) {
   return grid_from_view(placed_at(instance), in_view);
 }
 
-// Takes over what a ray meets of what a grid holds if that is nearer.
+// Replaces the hit by a ray's hit on a grid's content if that is nearer.
 bool meet_content(int content, int i, Placed placed, GridRay ray, float max_t, inout Hit hit) {
   float limit = min(hit.t, max_t);
   float t;
@@ -428,7 +428,7 @@ uint hit_air(vec3 origin, float t, vec3 colour, float anisotropy) {
   return kScatters;
 }
 
-// Of what a path would meet without fog and clouds.
+// Records the surface that a path would meet without fog and clouds.
 void note_behind(Hit hit, float until) {
   if (!is(kIsFirst)) return;
   if (hit.voxel.w >= 0 && hit.t <= until) {
@@ -547,7 +547,7 @@ bool shade() {
   return true;
 }
 
-// What the path's own ray comes to, of which glass has said so much already.
+// Returns the outcome of the path's own ray, after the outcome of its glass.
 uint meet(Hit hit, Glass glass, ViewRay ray, float until) {
   if (kHasGlass && glass.outcome == kTurnsAtGlass) return turn_at(glass, ray);
   if (kHasGlass && glass.outcome == kOnGlass) return hit_glass(glass.body, ray);
@@ -635,7 +635,7 @@ void step_path() {
     }
     uint met = meet(hit, glass, ray, until);
     goes_on_after = met == kTurns && !is_black(path.throughput.xyz);
-    // What the loop still asks for belongs to the vertex.
+    // The loop's remaining requests belong to the vertex.
     if (met == kScatters) goes_on_after = shade();
   }
   if (!goes_on_after) end_path();

@@ -1,4 +1,4 @@
-// The face of a voxel on which a fragment lies. Impostors choose it themselves: they define IS_IMPOSTOR.
+// The voxel face of a fragment. Impostors choose it themselves: they define IS_IMPOSTOR.
 
 #ifdef IS_IMPOSTOR
 vec4 place;
@@ -14,7 +14,8 @@ layout(location = 3) flat in uvec2 what;
 layout(location = 4) centroid in vec4 colour;
 #endif
 
-// On the face, a little inside its edges, and from there a little before it: what is interpolated can lie beside both.
+// Returns a point on the face, slightly inside its edges, lifted off it: interpolated positions can lie outside the
+// edges or off the plane.
 vec3 before_face(uint face, float lift) {
   const float kInside = 1e-4;
   vec3 at = place.xyz;
@@ -24,8 +25,8 @@ vec3 before_face(uint face, float lift) {
   return at;
 }
 
-// Whether the fragment lies on what the face was widened by. There another face has one too, and of glass each place
-// must be passed once.
+// Returns true if the fragment lies on the margin that the face was widened by. Another face covers the same point
+// there, and glass must be counted once per point.
 bool is_beyond(uint face) {
   vec2 at = vec2(place[kFaceU[face]], place[kFaceV[face]]);
   return any(lessThan(at, edges.xy)) || any(greaterThanEqual(at, edges.zw));

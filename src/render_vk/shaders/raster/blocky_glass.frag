@@ -1,5 +1,5 @@
 #version 460
-// What the nearest face of glass shows, with all that is seen through it.
+// The colour of the nearest glass face, including everything visible through it.
 #include "mesh.glsl"
 
 layout(constant_id = 5) const uint kGlassStep = 0;

@@ -1,5 +1,5 @@
-// What a point of a face shows: of a blocky mesh, or of an impostor. Those that include this say whether it is of glass
-// (`kIsGlass`).
+// The colour of a point on a face of a blocky mesh or an impostor. The including file defines `kIsGlass`: true for
+// glass.
 #include "faces.glsl"
 #include "lit.glsl"
 
@@ -9,7 +9,7 @@ float diffuse_of(uint face, uint instance) {
   return diffuse[face & 3];
 }
 
-// A colour, or a value that is to be seen as it is; w: what is hidden of what lies behind, of the channel drawn.
+// Returns a colour, or a value that is displayed directly; w: opacity, of the channel drawn.
 vec4 colour_of_face(uint face, uint type, uint instance, vec3 sunlight, float openness) {
   if (has(kShowOcclusion)) return vec4(vec3(openness), 1.0);
   if (has(kShowNormals)) {
@@ -25,7 +25,7 @@ vec4 colour_of_face(uint face, uint type, uint instance, vec3 sunlight, float op
     }
     surface.emitted = vec3(0.0);
   }
-  // Brighter than anything, but its products with what is interpolated stay numbers.
+  // Brighter than any display value, but products with interpolated values stay finite.
   vec3 lit = colour_in_light(surface.colour, min(surface.emitted, vec3(1e15)), sunlight, openness);
   lit = min(lit, vec3(1e15));
   if (!kIsGlass) return vec4(lit, 1.0);

@@ -55,7 +55,7 @@ bool find_face() {
   base = ivec4(voxel.xyz + home.xyz, voxel.w & 0xFFFF);
   edges = vec4(0.0, 0.0, 1.0, 1.0);
   what = uvec2(face, push.instance);
-  // Light is that of the face, which may lie elsewhere in the cell.
+  // Uses the light of the hit face, which may lie elsewhere in the cell.
   vec4 centre = f.instances[push.instance].far_centre;
   vec3 on = on_face(point + centre.xyz - vec3(base.xyz), face);
   uint corners = uint(voxel.w) >> 16 & 0xFF;

@@ -42,7 +42,7 @@ void main() {
     return;
   }
   met = point + widened - push.offset;
-  // Light is that of the whole face of the voxel, however large the rectangle.
+  // Uses the light of the whole voxel face, for rectangles of any size.
   int u = kFaceU[face];
   int v = kFaceV[face];
   vec3 low = vec3(0.0);

@@ -1,6 +1,6 @@
 // A point that a fragment shows in the light of rays.
 
-// What of a surface is lit: as `traced_light` has it, before which a point lies, and its own colours.
+// The point to be lit: the arguments of `traced_light`, its position in front of the surface, and its own colours.
 struct LitPoint {
   ivec4 voxel;
   ivec3 base;

@@ -1,10 +1,10 @@
-// What the shaders of meshes read; src/render_vk/raster/mesh_shader_data.h says the same to the compiler of the
-// processor's side. Vectors are read as a whole: see docs/decisions/040.
+// The inputs of mesh shaders. src/render_vk/raster/mesh_shader_data.h has the same layout for the CPU. Vectors are read
+// as a whole: see docs/decisions/040.
 #include "data.glsl"
 #include "srgb.glsl"
 
-// What is drawn: surfaces, the edges of their triangles, one channel of what is transparent; or, of that, where it is
-// nearest, what passes it and what is added.
+// Draw modes: surfaces, triangle edges, one channel of transparent surfaces; or, for the nearest glass, its depth, its
+// transmittance and its added light.
 const uint kSurfaces = 0;
 const uint kEdgesOver = 1;
 const uint kEdgesOnly = 2;
@@ -21,8 +21,8 @@ struct MeshInstance {
   vec4 diffuse[2];  // the sun's light on its faces
   ivec4 home;       // that point in its tree's coordinates (an impostor's: the grid's origin), and which instance of
                     // the frame it is: -1 where none
-  float room;          // voxels per clip w by which faces are widened
-  float first_sample;  // where in voxel 0 sample 0 of a smooth mesh lies: 0.5, the voxel's middle; of fields 0
+  float room;          // margin of faces in voxels per clip w
+  float first_sample;  // position of sample 0 of a smooth mesh in voxel 0: 0.5, the voxel's centre; 0 for fields
   vec2 far_steps;   // of an impostor: the width of the bits of its level's cells, and of the coarser level's
   uvec4 far_cells;  // addresses of both levels' cells
   uvec4 far_near;   // as Far has it
@@ -42,13 +42,13 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Me
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer MeshFrame {
   uvec2 frame;  // of the picture, as other pictures have it
   uvec2 draws;
-  uvec2 order;  // which quad of which draw is next, of what is transparent
+  uvec2 order;  // draw and quad indices of the transparent quads, in drawing order
   uvec2 pad;
   vec4 sun;  // towards it, in the world, as long as it is bright
   MeshInstance instances[];
 };
 
-// What is the same for many vertices is here rather than in memory, all that Vulkan has room for everywhere.
+// Data shared by many vertices are push constants instead of memory, up to the size that every Vulkan device supports.
 layout(push_constant) uniform Push {
   vec4 clip[4];  // of the instance; the sky's: right, down, corner and forward, as CameraRays has them
   vec4 eye;      // of the instance
@@ -58,8 +58,8 @@ layout(push_constant) uniform Push {
   uvec2 data;       // of the chunk, or of the impostor's level
   uvec2 far_faces;  // of an impostor
   float room;       // of the instance; the sky's: turns the way from the picture's middle into the tangent of an angle
-  uint numbers;     // bits 0-3 what is drawn; of an impostor 4-27 the share of pixels at which the coarser level is
-                    // drawn, 28 whether that is this one, 29 whether it has cells
+  uint numbers;     // bits 0-3: draw mode; for an impostor 4-27: share of pixels that use the coarser level, 28: 1 if
+                    // this is that level, 29: 1 if it has cells
 } push;
 
 MeshFrame mesh_frame() {
@@ -79,7 +79,7 @@ vec4 clip_from(vec4 clip[4], vec3 point) {
   return clip[0] * point.x + clip[1] * point.y + clip[2] * point.z + clip[3];
 }
 
-// What a fragment is to show of a colour, or of a value that is to be seen as it is.
+// Returns the displayed form of a colour, or of a value that is displayed directly.
 vec3 shown(vec3 colour) {
   if (has(kShowOcclusion) || has(kShowNormals)) colour = linear_from_srgb(clamp(colour, 0.0, 1.0));
   if (drawn() == kEdgesOnly) return vec3(0.02);

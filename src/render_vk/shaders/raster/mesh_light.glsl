@@ -1,5 +1,5 @@
-// What light reaches a fragment of a mesh, by rays through what the picture's frame places. Those that include this say
-// whether there are any (`kTraces`), and whether there is glass (`kHasGlass`).
+// The light of a mesh fragment, by rays through the content placed in the image's frame. The including file defines
+// `kTraces` (true if there are rays) and `kHasGlass` (true if there is glass).
 #include "walk.glsl"
 #include "instances.glsl"
 #include "glass.glsl"
@@ -7,11 +7,11 @@
 #include "rays.glsl"
 #include "levels.glsl"
 
-// The light of the sun and of lamps, or all light by levels. `voxel`: of an instance's tree, w: which instance, -1: it
-// is in nobody's way. `from`: where rays start, as in a GridRay; `normal`: in the world, unit; `diffuse`: of the sun;
-// `at`: the same place for levels.
+// Returns the light of the sun and of lamps, or all light with light levels. `voxel`: of an instance's tree, w: the
+// instance, -1: it blocks no rays. `from`: the start of rays, as in a GridRay. `normal`: in the world, unit. `diffuse`:
+// the sun's factor. `at`: the same position for light levels.
 //
-// One loop over them all, for the reason that rays.glsl gives.
+// One loop over all rays; rays.glsl gives the reason.
 vec3 traced_light(ivec4 voxel, ivec3 base, vec3 from, vec3 normal, float diffuse, LevelPlace at) {
   if (!kTraces || voxel.w < 0) return sunlight_of(diffuse);
   Placed placed = placed_at(voxel.w);

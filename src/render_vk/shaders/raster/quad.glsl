@@ -1,5 +1,5 @@
-// What blocky.vert and far.vert share: corners of faces, and what fragments are told of these. Where light is not
-// traced, that is their colour, which is linear in how open they are.
+// Shared by blocky.vert and far.vert: corners of faces, and their outputs for fragments. Without traced light the
+// output is the colour, which is linear in the openness.
 #include "mesh.glsl"
 
 layout(constant_id = 1) const bool kIsGlass = false;
@@ -57,7 +57,7 @@ float openness_of(uint corners, uint corner) {
   return 1.0 - float(corners >> 2 * corner & 3) / 3.0;
 }
 
-// Tells fragments what there is. `local`: the corner, `low` and `high`: of the whole face, from `from`.
+// Writes the outputs for fragments. `local`: the corner. `low` and `high`: of the whole face, relative to `from`.
 void put_face(uint face, uint type, uint instance, vec3 local, vec3 low, vec3 high, ivec3 from, float openness) {
   int u = kFaceU[face];
   int v = kFaceV[face];

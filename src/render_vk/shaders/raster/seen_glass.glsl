@@ -1,6 +1,6 @@
-// What a fragment of glass shows: all that is transparent from there to what is opaque behind, as marched pictures show
-// it. Those that include this draw the nearest such fragment of each pixel, once what is opaque is drawn, and say which
-// step of that it is (`kGlassStep`).
+// The colour of a glass fragment: all transparent bodies from there to the opaque surface behind, as in marched images.
+// The including shader draws the nearest such fragment of each pixel after the opaque surfaces, and defines the step
+// (`kGlassStep`).
 #include "see_through.glsl"
 
 // The ray from the fragment on. It starts within the body that the fragment is of.
@@ -40,7 +40,7 @@ LitPoint point_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
     surface.colour = placed.detail_colour.xyz;
     surface.emitted = vec3(0.0);
   }
-  // From inside it shows only what it emits.
+  // From inside, only its emission is visible.
   if ((body.what.z & kStartsInside) != 0) surface.colour = vec3(0.0);
   GridRay ray = seen_ray_in(body.voxel.w, placed);
   vec3 inside = vec3(ray.base - body.voxel.xyz) + ray.origin + body.lengths.w * ray.direction;
@@ -63,14 +63,14 @@ LitPoint point_of_body(Body body, Placed placed, vec3 normal, float diffuse) {
                   at);
 }
 
-// Those that include this say how bodies are lit.
+// Returns the point for lighting a body; defined by the including file.
 LitPoint point_of_body(Body body);
 
-// Those that include this define what begins in the fragment: the first body of a list.
+// Adds the body that begins at the fragment as the list's first; defined by the including file.
 void enter_first(inout BodyList list);
 
-// What is seen from a point of instance `home` on, in its tree's coordinates from `base`: what of each channel passes,
-// or what is added to what is drawn behind.
+// Returns the view from a point of instance `home`, in its tree's coordinates relative to `base`: the transmittance of
+// each channel, or the light added to the image behind.
 vec4 seen_from(int home, ivec3 base, vec3 from) {
   // The voxels that rays meet have no such instance any more.
   if (home < 0) discard;

@@ -1,10 +1,10 @@
 #version 460
-// What a point of a smooth mesh shows.
+// The colour of a point of a smooth mesh.
 #include "mesh.glsl"
 
 layout(constant_id = 2) const bool kTraces = false;
 layout(constant_id = 3) const bool kHasGlass = false;
-layout(constant_id = 5) const uint kGlassStep = 0;  // what is drawn, if it is the nearest glass
+layout(constant_id = 5) const uint kGlassStep = 0;  // draw mode, for the nearest glass
 #include "faces.glsl"
 #include "lit.glsl"
 #include "mesh_light.glsl"
@@ -14,7 +14,8 @@ layout(constant_id = 5) const uint kGlassStep = 0;  // what is drawn, if it is t
 
 layout(location = 0) out vec4 pixel;
 
-// The nearest glass, as a body of one voxel before what is opaque: what passes, or what is added.
+// Treats the nearest glass as a body of one voxel in front of the opaque surface: returns its transmittance, or its
+// added light.
 vec4 seen_alone(vec3 colour) {
   Surface surface = surface_of(uint(base.w));
   vec2 mirror = vec2(0.0);

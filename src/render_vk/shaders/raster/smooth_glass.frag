@@ -1,5 +1,5 @@
 #version 460
-// What the nearest point of a smooth body of glass shows, with all that is seen through it.
+// The colour of the nearest point of a smooth glass body, including everything visible through it.
 #include "mesh.glsl"
 
 layout(constant_id = 5) const uint kGlassStep = 0;
@@ -59,9 +59,9 @@ LitPoint point_of_body(Body body) {
   return point_of_body(body, placed_at(body.voxel.w), met, max(dot(met, sun.xyz), 0.0));
 }
 
-// The surface lies up to about a voxel before the voxels of its body, or within them; that of a field up to some
-// samples before it where it has less detail. Where there are none, there is no more than what counts as one voxel, and
-// of a field nothing but the surface.
+// The mesh surface lies up to about one voxel in front of its body's voxels, or within them. For a field with less
+// detail it lies up to some samples in front. If the ray finds no body there, the glass counts as one voxel, and for a
+// field only as a surface.
 void enter_first(inout BodyList list) {
   bool is_of_field = kHasFieldGlass && mesh_frame().instances[push.instance].first_sample == 0.0;
   float near = (is_of_field ? 8.0 : 2.0) * placed_at(seen_home).ref_inside.w;

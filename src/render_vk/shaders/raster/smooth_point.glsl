@@ -1,4 +1,4 @@
-// What fragments of smooth meshes are told, and how they are lit.
+// The inputs of smooth mesh fragments, and their lighting.
 
 layout(location = 0) centroid in vec3 normal;
 layout(location = 1) centroid in vec4 albedo;
