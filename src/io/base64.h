@@ -14,7 +14,7 @@ namespace quoin {
 /// (RFC 4648, section 4).
 [[nodiscard]] std::string to_base64(std::span<const std::byte> bytes);
 
-/// Errors: BadFormat for what `to_base64` does not write, with the offset in `text`.
+/// Errors: BadFormat for text that `to_base64` cannot produce, with the offset in `text`.
 [[nodiscard]] Result<std::vector<std::byte>> from_base64(std::string_view text);
 
 }  // namespace quoin

@@ -15,8 +15,8 @@
 
 namespace quoin {
 
-/// Gathers small values into blocks of a mebibyte on their way to a file or to memory. After an error it swallows what
-/// follows; `finish` tells.
+/// Collects small values in blocks of 1 MiB on their way to a file or to memory. After an error it ignores further
+/// writes; `finish` returns the error.
 class BlockWriter {
  public:
   using Sink = std::function<Status(std::span<const std::byte>)>;
@@ -37,7 +37,7 @@ class BlockWriter {
   }
 
   void put(std::span<const std::byte> bytes);
-  /// Room for text of at most `most` bytes; `advance` says where what was written into it ends.
+  /// Reserves space for up to `most` bytes of text; `advance` sets the end of the written part.
   [[nodiscard]] char* room(std::size_t most) {
     QUOIN_ASSERT(most <= kBlockBytes, "text that fits a block");
     if (used_ + most > kBlockBytes) flush();
@@ -52,7 +52,7 @@ class BlockWriter {
   /// Fills up to a multiple of four bytes since the start.
   void align(char filler);
 
-  /// Whether what follows is swallowed; long loops ask, to end early.
+  /// Returns true if further writes are ignored; lets long loops end early.
   [[nodiscard]] bool failed() const { return !status_.has_value(); }
   [[nodiscard]] std::uint64_t bytes() const { return written_ + used_; }
   /// Errors: the sink's first; Cancelled.

@@ -10,17 +10,17 @@
 
 namespace quoin {
 
-/// Whether a gzip stream (RFC 1952) begins here.
+/// Returns true if the bytes begin with a gzip header (RFC 1952).
 [[nodiscard]] bool begins_gzip(std::span<const std::byte> bytes);
 
 /// Gzip (RFC 1952) and Zlib (RFC 1950) are two wrappings of the same compressed data, Deflate (RFC 1951).
 enum class Compression : std::uint8_t { None, Gzip, Zlib, Deflate };
 
-/// The bytes of a file from some place to its end, in order, decompressed where they are a compressed stream.
+/// The bytes of a file from an offset to its end, in order, decompressed if they are a compressed stream.
 ///
-/// Members of gzip that follow each other are one stream, as the standard says; what follows the last, or the end of a
-/// zlib stream, is left alone.
-/// Memory is that of zlib's window, whatever the stream holds. Offsets in errors are those of the file.
+/// Consecutive gzip members are one stream, as in the standard. Bytes after the last member, or after the end of a zlib
+/// stream, are ignored.
+/// Memory: zlib's window, for any stream. Offsets in errors are file offsets.
 class ByteStream {
  public:
   /// Requires: `file` outlives the stream, begin <= file.size().
@@ -40,10 +40,10 @@ class ByteStream {
   [[nodiscard]] std::uint64_t max_bytes() const;
   /// The bytes left in the file itself.
   [[nodiscard]] std::size_t remaining() const { return file_.size() - position_; }
-  /// Where in the file the next byte comes from.
+  /// Returns the file offset of the next byte.
   [[nodiscard]] std::size_t position() const { return position_; }
   [[nodiscard]] bool is_compressed() const { return inflater_ != nullptr; }
-  /// Whether the last read failed because compressed data have no end, rather than because they are damaged.
+  /// Returns true if the last read failed because compressed data are truncated, not because they are damaged.
   [[nodiscard]] bool is_cut_off() const { return is_cut_off_; }
 
  private:

@@ -17,7 +17,7 @@ class ByteWriter {
   /// Has room for so many bytes more, so that they are not moved as it grows.
   void reserve(std::size_t more) { bytes_.reserve(bytes_.size() + more); }
   void raw(std::span<const std::byte> bytes) {
-    // Not `insert`, of which GCC 12 warns wrongly where it is inlined.
+    // Avoids `insert`: GCC 12 gives a false warning when it is inlined.
     const std::size_t at = bytes_.size();
     bytes_.resize(at + bytes.size());
     std::copy(bytes.begin(), bytes.end(), bytes_.begin() + static_cast<std::ptrdiff_t>(at));

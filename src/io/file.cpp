@@ -59,7 +59,7 @@ Status check_folder(const std::filesystem::path& path) {
   return cannot_write(std::move(why), path);
 }
 
-/// A name beside `path` that no other writer of this or another process uses.
+/// Returns a name in the folder of `path` that no other writer in any process uses.
 std::filesystem::path temporary_name(const std::filesystem::path& path, unsigned attempt) {
   static std::atomic<unsigned> counter{0};
   const std::string name =
@@ -240,7 +240,7 @@ Status copy_whole(const std::filesystem::path& from, const std::filesystem::path
   std::filesystem::copy_file(from, to, failed);
   if (failed) return cannot_write(failed.message(), to);
   const int descriptor = ::open(to.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return {};  // readable by nobody, as the file is
+  if (descriptor < 0) return {};  // unreadable, as is the original
   ::fsync(descriptor);
   ::close(descriptor);
   return {};
@@ -277,7 +277,7 @@ Result<FileBackup> FileBackup::of(const std::filesystem::path& path, Older older
     backup.second_name_ = second_name;
     return backup;
   }
-  // No copy is made over what is there; a part of one is removed with `backup`.
+  // An existing file is not overwritten; `backup` removes a partial copy.
   const bool was_there = is_there(second_name);
   if (!was_there) backup.second_name_ = second_name;
   if (Status copied = copy_whole(file, second_name); !copied) return copied.error();

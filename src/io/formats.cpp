@@ -100,7 +100,7 @@ std::string lower_case_extension(const std::filesystem::path& path) {
   return extension;
 }
 
-/// What is written has one extension, what is read others, too.
+/// Lists the extensions of a format with an ability: one for writing, possibly several for reading.
 std::string extensions_with(bool FormatInfo::*ability) {
   std::vector<std::string_view> sorted;
   for (const FormatInfo& info : kFormats) {
@@ -200,7 +200,7 @@ Result<LoadedScene> read_heights_as_scene(std::span<const std::byte> bytes, cons
   return loaded;
 }
 
-/// Voxlap's formats have no name for what they share.
+/// Voxlap's formats have no common name.
 Result<LoadedScene> read_voxlap(std::span<const std::byte> bytes) {
   if (models::is_kv6(bytes)) return models::read_kv6(bytes);
   if (models::is_kvx(bytes)) return models::read_kvx(bytes);
@@ -208,7 +208,7 @@ Result<LoadedScene> read_voxlap(std::span<const std::byte> bytes) {
   return models::read_vxl(bytes);
 }
 
-/// What reads a format of models; null where it is none.
+/// A reader of a model format; null for other formats.
 using ReadModel = Result<LoadedScene> (*)(std::span<const std::byte>);
 ReadModel model_reader(const std::optional<FileFormat>& format) {
   if (format == FileFormat::Qubicle) return models::read_qubicle;
@@ -220,7 +220,7 @@ ReadModel model_reader(const std::optional<FileFormat>& format) {
   return nullptr;
 }
 
-/// Of formats of models that begin with something of their own.
+/// Detects model formats with a magic number.
 std::optional<FileFormat> detect_model(std::span<const std::byte> beginning) {
   if (models::is_goxel(beginning)) return FileFormat::Goxel;
   if (models::is_kv6(beginning)) return FileFormat::Voxlap;
@@ -240,7 +240,7 @@ Result<LoadedScene> scene_of_triangles(Result<LoadedMesh> loaded, const std::str
   return triangles::scene_from_mesh(std::move(*loaded), options.mesh, name, threads, progress);
 }
 
-/// Of those whose whole length has to fit what they say.
+/// Detects model formats without a header, by their total length.
 std::optional<FileFormat> detect_headerless(std::span<const std::byte> whole) {
   if (triangles::is_stl(whole)) return FileFormat::Stl;
   if (models::is_cub(whole)) return FileFormat::CubeWorld;
@@ -248,7 +248,7 @@ std::optional<FileFormat> detect_headerless(std::span<const std::byte> whole) {
   return std::nullopt;
 }
 
-/// What lies around the spawn of a world that is read by chunks.
+/// Reads the surroundings of the spawn in a world that is read by chunks.
 Result<LoadedScene> read_around_spawn(const Result<std::unique_ptr<ChunkSource>>& source, const LoadOptions& options,
                                       Threads threads, const Progress& progress) {
   if (!source) return source.error();
@@ -274,19 +274,19 @@ Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<cons
   }
   if (is_volume(format)) return read_volume_as_scene(bytes, options, threads, progress);
   Error error = unrecognised(bytes, path);
-  // The reader knows more of what else goes by this name.
+  // The .vox reader has better errors for other formats with this extension.
   const bool named_vox = !bytes.empty() && !error.byte_offset && lower_case_extension(path) == ".vox";
   if (named_vox) return read_vox(bytes, options, progress);
   return error;
 }
 
-/// A scene to be saved, and what was read with it, if it was read.
+/// A scene to be saved, and the loaded file data if it was read from a file.
 struct Saved {
   const Scene& scene;
   const LoadedScene* loaded = nullptr;
 };
 
-/// What only another .vox file would keep.
+/// Lists the data that only another .vox file can store.
 std::vector<std::string> lost_with_source(const Saved& saved) {
   if (saved.loaded == nullptr || saved.loaded->source == nullptr) return {};
   std::vector<std::string> lines = only_in_source(*saved.loaded->source);
@@ -294,12 +294,12 @@ std::vector<std::string> lost_with_source(const Saved& saved) {
   return lines;
 }
 
-/// What stands beside a scene and a format other than .vox leaves out, `lost_with_source` aside.
+/// Lists the cameras and sun that a format other than .vox leaves out, except items of `lost_with_source`.
 std::vector<std::string> lost_beside(const Saved& saved, FileFormat format) {
   std::vector<std::string> lines;
   if (saved.loaded == nullptr) return lines;
   const LoadedScene& loaded = *saved.loaded;
-  // What the file had itself lost_with_source tells.
+  // `lost_with_source` already lists the file's own items.
   const auto is_told = [said = lost_with_source(saved)](std::string_view what) {
     return std::ranges::any_of(said, [&](const std::string& line) { return line.find(what) != std::string::npos; });
   };
@@ -328,7 +328,7 @@ Result<FileFormat> format_for_saving(const std::filesystem::path& path) {
   return format->format;
 }
 
-/// What writes a format of models, whose losses are known when it is written; null where it is none.
+/// A writer of a model format, whose losses are known after writing; null for other formats.
 using WriteModel = Result<models::ModelBytes> (*)(const Scene&, const Progress&);
 WriteModel model_writer(FileFormat format) {
   if (format == FileFormat::Schematic) return minecraft::write_schematic;
@@ -523,7 +523,7 @@ std::vector<std::filesystem::path> files_read_beside(const std::filesystem::path
 
 Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOptions& options, Threads threads,
                                const Progress& progress) {
-  // A volume's reader is given the path, which may lead to what lies beside it.
+  // Volume readers take the path, since they may read sidecar files.
   if (options.raw) return with_path(read_volume_as_scene(path, options, threads, progress), path);
   const auto format = detect_format(path);
   if (!format) return format.error();

@@ -43,8 +43,8 @@ GlassMaterial glass_material(const Surface& surface, float thickness) {
   for (int channel = 0; channel < 3; ++channel) {
     const float untinted = glass.alpha * glass.transmission * surface.colour[channel];
     if (!(untinted > 0.0F)) continue;
-    // What is left over for it, of one alpha for all channels, may be of any hue: some clients attenuate by it what is
-    // not covered, too.
+    // The remaining attenuation, after one alpha for all channels, may have any hue, and some clients apply it to the
+    // uncovered part too.
     const float least = std::max(passed[channel], kLeastAttenuation);
     glass.attenuation[channel] =
         std::clamp((passed[channel] - (1.0F - glass.alpha)) / untinted, least, std::max(least, 1.0F));

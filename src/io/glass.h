@@ -12,24 +12,24 @@
 
 namespace quoin {
 
-/// How files say a body of glass or water, whose materials have one alpha and not a way through voxels.
+/// Represents a body of glass or water in mesh files, whose materials have one alpha and no path length through voxels.
 ///
-/// Behind a body of thickness L Quoin's pictures have `passed` of each channel of what lies there and `own` of the
-/// body's colour c (GlassLook). Clients that know alpha only have `1 - alpha` and `alpha`. Those that know transmission
-/// have, by coverage and base colour, `1 - alpha + alpha * transmission * c * attenuation` and
-/// `alpha * (1 - transmission)`. So that
+/// Behind a body of thickness L, Quoin's images show the fraction `passed` of each channel of the background and `own`,
+/// the share of the body's colour c (GlassLook). Clients with alpha only show `1 - alpha` and `alpha`. Clients with
+/// transmission show, by coverage and base colour, `1 - alpha + alpha * transmission * c * attenuation` and `alpha * (1
+/// - transmission)`. Therefore:
 ///
-///   alpha         makes the least error of both, summed in squares over the channels, where nothing else is known;
+///   alpha         minimises the sum of the squared errors of both over the channels, for clients with alpha only;
 ///   transmission  gives the body's own share exactly;
-///   attenuation   gives, with these, what passes, where it can: it is at most 1, and no less than `passed` and a
-///                 hundredth. Blender's Cycles attenuates what is not covered too: of a pale pane the difference that
-///                 is left over is small, and would make it violet there.
+///   attenuation   gives, with these, the exact `passed` if possible: it is at most 1, and at least `passed` and
+///                 1/100. Blender's Cycles also attenuates the uncovered part: for a pale pane the remaining difference
+///                 is small, and would make the pane violet there.
 struct GlassMaterial {
   float thickness = 1.0F;  ///< voxels
   float alpha = 1.0F;
   float transmission = 0.0F;
   Vec3 attenuation{1.0F};  ///< of each channel by the whole thickness; above 0
-  Vec3 tint{1.0F};         ///< of each channel, what passes of what is not covered
+  Vec3 tint{1.0F};         ///< transmittance of each channel in the uncovered part
 };
 
 /// Requires: `thickness` is above 0.
@@ -38,12 +38,12 @@ struct GlassMaterial {
 /// The alpha of a smooth surface's vertex, 0 to 65,535, for bodies of that thickness. Requires: as above.
 [[nodiscard]] std::uint16_t glass_alpha(const LinearRgba16& albedo, float thickness);
 
-/// The thickness of closed bodies by their surface alone: what they hold, by the largest of the areas that they show
-/// along the axes. 1 where it is not closed or holds nothing. Cost: O(triangles).
+/// Estimates the thickness of closed bodies from their surface: the volume divided by the largest of its projected
+/// areas along the axes. Returns 1 for open or empty surfaces. Cost: O(triangles).
 [[nodiscard]] float thickness_of(const MeshView& view);
 
-/// How thick the bodies of transparent types are in a scene's meshes: of each type the median over all placements, by
-/// the area of its surface in them.
+/// The thickness of transparent bodies in a scene's meshes: for each type the median over all placements, weighted by
+/// surface area.
 class GlassBodies {
  public:
   struct Typical {

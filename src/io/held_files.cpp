@@ -15,10 +15,10 @@ namespace {
 
 using FileNumber = std::pair<unsigned long, unsigned long>;
 
-// Locks are the process's, and so is what is known of them.
+// Locks belong to the process, so this registry is global.
 struct Held {
   int databases = 0;
-  int descriptor = -1;  // that was opened beside them, and stays open as long as they do
+  int descriptor = -1;  // opened for reading while databases hold the file, and kept open as long as they do
 };
 struct HeldFiles {
   std::mutex mutex;
@@ -85,7 +85,7 @@ void close_after_reading(int descriptor) {
   if (::fstat(descriptor, &info) == 0) {
     const auto found = held.files.find(number_of(info));
     if (found != held.files.end()) {
-      // One that was opened before the database was stays open too, for ever if there is another: that is rare.
+      // A descriptor opened before the database also stays open. It leaks if the file already has one, which is rare.
       if (found->second.descriptor < 0) found->second.descriptor = descriptor;
       return;
     }

@@ -2,15 +2,15 @@
 
 #include <filesystem>
 
-// A process has its locks on a file (fcntl's, which SQLite takes) only as long as it closes no descriptor of that file,
-// whoever opened it. So files of open databases are known here, and what else reads them keeps its descriptor open.
+// A process loses its fcntl locks on a file (used by SQLite) when it closes any descriptor of that file. So this
+// registry knows the files of open databases, and other readers keep their descriptors open.
 
 namespace quoin {
 
-/// That a database of this process has a file open, from its making to its end. Threads: any.
+/// Marks a file as opened by a database of this process, for its lifetime. Threads: any.
 class HeldFile {
  public:
-  /// Of nothing.
+  /// Marks no file.
   HeldFile() = default;
   explicit HeldFile(const std::filesystem::path& file);
   HeldFile(HeldFile&& other) noexcept;
@@ -23,8 +23,8 @@ class HeldFile {
   bool holds_ = false;
 };
 
-/// Opens a file to be read; of one that is held the descriptor may have been opened before, and its offset is anywhere.
-/// Returns -1, with errno, where it cannot be opened.
+/// Opens a file for reading. For a held file the descriptor may be an earlier one with an arbitrary offset. Returns -1
+/// and sets errno if the file cannot be opened.
 [[nodiscard]] int open_for_reading(const std::filesystem::path& file);
 /// Closes what `open_for_reading` returned, once the file is not held any more.
 void close_after_reading(int descriptor);

@@ -40,7 +40,7 @@ std::uint32_t copy_vertex(const MeshView& source, std::size_t from, SmoothMesh& 
   return static_cast<std::uint32_t>(target.positions.size() - 1);
 }
 
-/// What the file can say: finite and not negative.
+/// Clamps to the range of the file format: finite and not negative.
 float clamped_emission(float emission) {
   return emission > 0.0F ? std::min(emission, std::numeric_limits<float>::max()) : 0.0F;
 }
@@ -119,7 +119,7 @@ void MaterialPalette::find_bands(const Usage& used) {
   }
 }
 
-// What has a material of its own: a transparent type, or a band of strengths of opaque ones.
+// Returns the material's group: a transparent type, or a band of emission strengths of opaque types.
 std::size_t MaterialPalette::group_of(SurfaceClass surface, VoxelType type) const {
   if (is_transparent(surface)) return type;
   return emits(surface) ? band_of_type_[type] : 0;

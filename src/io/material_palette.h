@@ -24,8 +24,8 @@ inline constexpr std::uint32_t kPaletteWidth = 256;
 struct SurfaceMaterial {
   std::string name;  ///< unique in the file
   SurfaceClass surface = SurfaceClass::Opaque;
-  float emission = 0.0F;  ///< what a full texel of the emissive palette stands for; 0 when nothing is emitted
-  VoxelType type = kAir;  ///< a transparent material's only one
+  float emission = 0.0F;  ///< emission of a full texel in the emissive palette; 0 without emission
+  VoxelType type = kAir;  ///< the only type of a transparent material
   GlassMaterial glass{};  ///< of it
   float unit = 1.0F;      ///< of it: the size of its voxels in the world, the mean of its placements
   // For smooth surfaces, which have no textures:
@@ -41,14 +41,14 @@ struct SurfaceMaterial {
   }
 };
 
-/// The voxel types of a scene's meshes as mesh formats say it: textures with one texel a type, and the few materials
-/// that use them.
+/// The voxel types of a scene's meshes in the form of mesh formats: textures with one texel per type, and the few
+/// materials that use them.
 ///
-/// Transparent types have a material each, with what glass of the type's typical thickness does to light.
+/// Each transparent type has its own material, with the light transmission of glass in the type's typical thickness.
 ///
 /// Emission: strengths are sorted into bands, each from its strongest down to half of it; a band is a material. Within
 /// a band the emissive texel is the type's colour, scaled in linear light by strength / strongest. A file with one
-/// strength, or with strengths more than twice apart, has its colours unscaled.
+/// strength, or with strengths more than a factor of two apart, has unscaled colours.
 class MaterialPalette {
  public:
   /// Only types that blocks of the meshes use get materials; all registered types get texels.
@@ -81,8 +81,8 @@ class MaterialPalette {
   /// Returns the thickness of the bodies of a smooth transparent material, in voxels or samples.
   [[nodiscard]] float smooth_thickness(std::size_t material) const;
 
-  /// sRGB colour and linear alpha: of transparent types that blocks of the meshes use that of their glass, 255 of
-  /// opaque types.
+  /// Returns sRGB colours with linear alpha: the glass colour for transparent types used by blocks of the meshes, alpha
+  /// 255 for opaque types.
   [[nodiscard]] PngImage base_colour() const;
   /// The same without alpha.
   [[nodiscard]] PngImage opaque_colour() const;
@@ -126,9 +126,9 @@ class MaterialPalette {
   std::map<std::pair<SurfaceClass, std::size_t>, std::size_t> by_class_and_group_;
 };
 
-/// The surfaces of a part, one a material. Those that need one material only are borrowed, not copied.
+/// The surfaces of a part, one per material. A surface with a single material is borrowed, not copied.
 ///
-/// Requires: the part's arrays outlive this.
+/// Requires: the part's arrays outlive this object.
 class MaterialSurfaces {
  public:
   struct Surface {

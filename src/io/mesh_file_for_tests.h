@@ -27,7 +27,7 @@ inline SmoothMesh test_mesh() {
   return mesh;
 }
 
-/// A mesh as the world sees it, whatever file it was in.
+/// A mesh in world space, independent of its file format.
 struct WorldMesh {
   std::vector<DVec3> positions;
   std::vector<DVec3> normals;
@@ -42,7 +42,7 @@ struct WorldMesh {
     return sum;
   }
 
-  /// How many corners have a normal that does not point to their triangle's outside.
+  /// Returns the number of corners whose normal points to the inside of their triangle.
   [[nodiscard]] std::size_t inward_normals() const {
     std::size_t count = 0;
     for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {

@@ -74,7 +74,7 @@ class SmoothMeshFiles : public ::testing::Test {
     parts_[0].placements.emplace_back(name, matrix);
   }
 
-  /// Every file holds what the matrices and the mesh say, by plain arithmetic.
+  /// Every file must match the product of the matrices and the mesh, by plain arithmetic.
   void expect_all_formats_agree(bool sheared = false) {
     for (const Format& format : kFormats) {
       const WorldMesh world = write(format);

@@ -60,7 +60,7 @@ const char* fault_of_smooth(const MeshView& view, std::size_t types) {
   return std::ranges::any_of(view.occlusion, is_no_share) ? "an occlusion beyond 0 to 1" : nullptr;
 }
 
-/// What is wrong with a mesh; null when nothing is.
+/// Returns a description of a mesh's first fault; null if it is valid.
 const char* fault_of(const MeshView& view, std::size_t types) {
   if (const char* fault = view.has_albedo() ? fault_of_smooth(view, types) : fault_of_blocks(view, types)) return fault;
   if (!is_none_or_one_a_vertex(view.light, view)) return "arrays of different lengths";
@@ -82,7 +82,8 @@ const char* fault_of(const glm::dmat4& matrix) {
   return is_sound ? nullptr : "a transform that is singular";
 }
 
-/// Whether floats reach every point of a box once it is moved. Affine images of a box lie between those of its corners.
+/// Returns true if floats can represent all points of a transformed box. Affine images of a box lie within the hull of
+/// its transformed corners.
 bool stays_within_floats(const DBox& box, const glm::dmat4& moved_from_box) {
   constexpr double kMost = std::numeric_limits<float>::max();
   for (int i = 0; i < 8; ++i) {
@@ -94,7 +95,7 @@ bool stays_within_floats(const DBox& box, const glm::dmat4& moved_from_box) {
   return true;
 }
 
-/// What is wrong with where a part of these bounds stands.
+/// Returns a description of a fault in a part's position; null if it is valid.
 const char* fault_of_place(const DBox& bounds, const DVec3& pivot, const glm::dmat4& world_from_part) {
   if (const char* fault = fault_of(world_from_part)) return fault;
   const DBox from_pivot{bounds.min - pivot, bounds.max - pivot};
@@ -103,7 +104,7 @@ const char* fault_of_place(const DBox& bounds, const DVec3& pivot, const glm::dm
   return is_within ? nullptr : "a vertex farther away than a float can say";
 }
 
-/// What is wrong with what a placement does.
+/// Returns a description of a fault in a placement's keys; null if they are valid.
 const char* fault_of_keys(const DBox& bounds, const DVec3& pivot, const MeshPlacement& placement) {
   const bool mirrors = glm::determinant(glm::dmat3(placement.matrix())) < 0.0;
   // Files have floats.
@@ -124,7 +125,7 @@ const char* fault_of_keys(const DBox& bounds, const DVec3& pivot, const MeshPlac
   return nullptr;
 }
 
-/// What contradicts the texture that some opaque blocks of a scene are in, and then all of them are.
+/// Returns a contradiction to the atlas: if some opaque blocks of a scene use it, all must. Null if there is none.
 const char* fault_of_atlas(const MeshView& view, const Image& atlas) {
   const auto is_outside = [](const std::array<float, 2>& uv) {
     return !(uv[0] >= 0.0F && uv[0] <= 1.0F && uv[1] >= 0.0F && uv[1] <= 1.0F);

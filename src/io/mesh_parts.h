@@ -33,13 +33,13 @@ using PlanMeshFiles = Result<std::vector<MeshFile>>(const SceneMeshes& meshes, c
 [[nodiscard]] PlanMeshFiles plan_glb;
 [[nodiscard]] PlanMeshFiles plan_gltf;
 [[nodiscard]] PlanMeshFiles plan_ply;
-/// Which has no place for occlusion but colours.
+/// OBJ stores occlusion only in colours.
 [[nodiscard]] Result<std::vector<MeshFile>> plan_obj(const SceneMeshes& meshes, const std::filesystem::path& path);
-/// Of files for printing.
+/// Formats for 3D printing.
 [[nodiscard]] Result<std::vector<MeshFile>> plan_stl(const SceneMeshes& meshes, const std::filesystem::path& path);
 [[nodiscard]] Result<std::vector<MeshFile>> plan_three_mf(const SceneMeshes& meshes, const std::filesystem::path& path);
 
-/// What goes beside `path`.
+/// Returns the files that are written next to `path`.
 [[nodiscard]] std::vector<std::filesystem::path> gltf_companions(const SceneMeshes& meshes,
                                                                  const std::filesystem::path& path);
 [[nodiscard]] std::vector<std::filesystem::path> obj_companions(const SceneMeshes& meshes,
@@ -48,7 +48,7 @@ using PlanMeshFiles = Result<std::vector<MeshFile>>(const SceneMeshes& meshes, c
 /// Errors: InvalidArgument, naming the first part whose mesh or placement is unsound (see mesh_file.h).
 [[nodiscard]] Status check_meshes(const SceneMeshes& meshes);
 
-/// Whether any surface has light at its vertices; of sound meshes then all have.
+/// Returns true if any surface has light at its vertices; in valid meshes all surfaces then have it.
 [[nodiscard]] bool has_light(const SceneMeshes& meshes);
 
 /// The box of all vertices; empty without one.
@@ -77,13 +77,13 @@ class VertexTransform {
   [[nodiscard]] DVec3 position(Vec3 in_part) const { return linear_ * (DVec3(in_part) - pivot_) + translation_; }
   /// Unit.
   [[nodiscard]] DVec3 normal(Vec3 in_part) const;
-  /// Of a block's six faces, by Direction.
+  /// Returns the normals of a block's six faces, by Direction.
   [[nodiscard]] std::array<Vec3, 6> face_normals() const;
-  /// Whether boxes along the axes stay such, each axis its own.
+  /// Returns true if axis-aligned boxes stay axis-aligned, with each axis mapped to itself.
   [[nodiscard]] bool keeps_axes() const {
     return linear_ == glm::dmat3(linear_[0].x, 0, 0, 0, linear_[1].y, 0, 0, 0, linear_[2].z);
   }
-  /// Whether triangles are to be turned round.
+  /// Returns true if triangles must be reversed.
   [[nodiscard]] bool mirrors() const { return mirrors_; }
   /// The length of the shortest axis once it is moved.
   [[nodiscard]] double least_step() const;
@@ -92,7 +92,7 @@ class VertexTransform {
 
  private:
   glm::dmat3 linear_;
-  glm::dmat3 normal_matrix_;  ///< the cofactors: as the inverse transpose, but for size and, when mirrored, sign
+  glm::dmat3 normal_matrix_;  ///< cofactor matrix: the inverse transpose except for scale and, if mirrored, sign
   DVec3 translation_;
   DVec3 pivot_;
   bool mirrors_;
@@ -111,19 +111,19 @@ class VertexTransform {
   return {at[0], at[turned ? 2 : 1], at[turned ? 1 : 2]};
 }
 
-/// What occlusion leaves of ambient light at a vertex: 1 open to 0 dark; 1 without any.
+/// Returns the ambient light left by occlusion at a vertex: 1 open to 0 dark; 1 without occlusion.
 [[nodiscard]] float openness_at(const MeshView& view, std::size_t vertex);
 
 /// The same mesh without occlusion, and so without an atlas.
 [[nodiscard]] MeshView without_occlusion(const MeshView& view);
 
-/// Whether what lies behind surfaces of a class shows.
+/// Returns true if surfaces of a class show the background.
 [[nodiscard]] inline bool is_transparent(SurfaceClass surface) {
   return surface == SurfaceClass::Transparent || surface == SurfaceClass::EmissiveTransparent;
 }
 
-/// The colour of a vertex of a smooth mesh, darkened by its occlusion and in its light, if it has any: linear light,
-/// opaque but for transparent surfaces; sRGB.
+/// Returns the colour of a smooth mesh's vertex, darkened by its occlusion and multiplied by its light, if present:
+/// linear light, alpha below 1 only for transparent surfaces; from sRGB.
 [[nodiscard]] LinearRgba16 linear_colour(const MeshView& view, std::size_t vertex);
 [[nodiscard]] std::array<std::uint8_t, 3> srgb_colour(const MeshView& view, std::size_t vertex);
 

@@ -11,13 +11,13 @@ namespace quoin {
 /// The integer that all of `text` spells, in base ten; nothing when it is not one or does not fit.
 [[nodiscard]] std::optional<std::int64_t> parse_integer(std::string_view text);
 
-/// The finite number that all of `text` spells, whatever the locale; nothing when it is not one.
+/// Parses all of `text` as a finite number, independent of the locale; nullopt if that fails.
 [[nodiscard]] std::optional<float> parse_float(std::string_view text);
 
 /// So many of them with blanks between, and nothing else. Returns whether it is that; otherwise `out` means nothing.
 [[nodiscard]] bool parse_floats(std::string_view text, std::span<float> out);
 
-/// The shortest text from which `parse_float` gives the same number.
+/// Returns the shortest text that `parse_float` maps to the same number.
 [[nodiscard]] std::string to_text(float value);
 
 [[nodiscard]] bool is_utf8(std::string_view text);

@@ -16,7 +16,7 @@
 
 namespace quoin {
 
-/// A GLB taken apart by the specification alone, for tests; what is wrong with it shows as an empty document.
+/// A GLB parsed from the specification alone, for tests; an invalid file gives an empty document.
 struct ParsedGlb {
   nlohmann::json document;
   std::vector<std::byte> binary;

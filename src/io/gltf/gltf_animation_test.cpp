@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// What a node of a file is at a time, by the specification: each value from its time on.
+/// A node's state at a time, by the specification: each value applies from its time on.
 struct Moment {
   DVec3 translation{0.0};
   DQuat rotation{1.0, 0.0, 0.0, 0.0};

@@ -96,7 +96,7 @@ void write_smooth_colours(float thickness, const MeshView& view, BlockWriter& ou
   }
 }
 
-/// Of blocks: their light, darkened by their occlusion.
+/// Writes the light of blocky meshes, darkened by their occlusion.
 void write_light(const MeshView& view, BlockWriter& out) {
   for (std::size_t i = 0; i < view.positions.size(); ++i) {
     LinearRgba16 light = view.light[i];

@@ -66,7 +66,7 @@ double number_at(const std::byte* at, int component, bool normalized) {
   }
 }
 
-/// An accessor as the specification reads it, whatever its components are.
+/// Reads an accessor of any component type, by the specification.
 std::vector<std::array<double, 4>> elements(const ParsedGlb& glb, std::size_t accessor) {
   const Json& entry = glb.document["accessors"][accessor];
   const Json& view = glb.document["bufferViews"][entry["bufferView"].get<std::size_t>()];
@@ -194,7 +194,7 @@ class GltfStored : public Gltf {
     }
   }
 
-  /// What either option, and both, show instead of floats; at most `error` away.
+  /// Expects files with either option, and with both, to differ from floats by at most `error`.
   static void expect_alike(const SceneMeshes& meshes, double error) {
     const Corners plain = corners_of(glb_of(meshes, {}));
     ASSERT_FALSE(plain.positions.empty());

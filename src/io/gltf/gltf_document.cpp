@@ -19,7 +19,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// glTF 2.0's numbers for what it borrows from OpenGL.
+// OpenGL constants used by glTF 2.0.
 constexpr int kArrayBuffer = 34962;
 constexpr int kElementArrayBuffer = 34963;
 constexpr int kNearest = 9728;
@@ -164,8 +164,8 @@ void add_emission(const GltfLayout& layout, const SurfaceMaterial& material, Jso
   entry["extensions"][kEmissiveStrength] = {{"emissiveStrength", std::max(material.emission, 1.0F)}};
 }
 
-/// Beside the alpha of the texel, as GlassMaterial has it. Thickness counts in the mesh's units, distance in the
-/// world's.
+/// Adds the glass extensions to the texel's alpha, from GlassMaterial. Thickness is in mesh units, distance in world
+/// units.
 void add_glass(const SurfaceMaterial& material, const VoxelProperties& properties, Json& entry) {
   const GlassMaterial& glass = material.glass;
   entry["alphaMode"] = "BLEND";
@@ -177,7 +177,7 @@ void add_glass(const SurfaceMaterial& material, const VoxelProperties& propertie
   if (const auto ior = glass_ior(properties)) extensions[kIor] = {{"ior", *ior}};
 }
 
-/// A material whose colours are shown as they are; what others know of light is left out.
+/// Returns a material that shows its colours directly, without lighting properties.
 Json unlit_json(const std::string& name, bool transparent, std::optional<std::size_t> texture) {
   Json entry = {{"name", name}, {"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}}};
   if (texture) entry["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", *texture}};

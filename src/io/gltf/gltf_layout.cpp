@@ -28,8 +28,8 @@ GltfView reserve_view(std::uint64_t bytes, std::uint64_t& end) {
   return view;
 }
 
-/// Whether indices into that many vertices take 32 bits instead of 16. 65,535 restarts a strip, so the largest 16-bit
-/// index is 65,534; one less for clients that count it among the vertices.
+/// Returns true if indices of that many vertices need 32 bits instead of 16. 65,535 restarts a strip, so the largest
+/// 16-bit index is 65,534; one less for clients that count it among the vertices.
 bool needs_wide_indices(std::uint64_t vertices) {
   constexpr std::uint64_t kShortIndexVertices = 65'535;
   return vertices >= kShortIndexVertices;
@@ -339,12 +339,12 @@ class MeshLayout {
   const SceneMeshes& meshes_;
   const MeshFileOptions& options_;
   GltfLayout& layout_;
-  std::map<Key, std::size_t> mesh_of_;  ///< by part and what is baked
-  std::optional<std::size_t> part_;     ///< of the last mesh
+  std::map<Key, std::size_t> mesh_of_;  ///< by part and baked transform
+  std::optional<std::size_t> part_;     ///< part of the last mesh
   std::size_t variants_ = 0;            ///< meshes of that part
 };
 
-/// A rotation and a position as those of what is below a group's frame. Groups do not mirror.
+/// Converts a world rotation and position to a group's frame. Groups do not mirror.
 GltfTransform below(const Similarity& group, GltfTransform world) {
   Instance frame;
   frame.rotation = group.rotation;
@@ -386,7 +386,7 @@ void hide_at_first(const SceneMeshes& meshes, std::vector<GltfNode>& nodes) {
   }
 }
 
-/// Collects the values of one property; those that follow an equal one are left out but for the last.
+/// Collects the values of one property; skips repeated values except the last.
 class ChannelBuilder {
  public:
   ChannelBuilder(std::size_t node, GltfChannel::Path path) : channel_{.node = node, .path = path} {}
@@ -417,7 +417,7 @@ std::array<float, 4> floats_of(const DQuat& q) {
   return {static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z), static_cast<float>(q.w)};
 }
 
-/// What the nodes of placements do, up to the end of the last frame, so that a loop shows it as long as the others.
+/// Adds the animation of placement nodes, up to the end of the last frame, so that a loop has equal frames.
 void add_channels(const SceneMeshes& meshes, GltfLayout& layout) {
   for (std::size_t i = 0; i < meshes.placements.size(); ++i) {
     const MeshPlacement& placement = meshes.placements[i];

@@ -17,18 +17,18 @@
 
 namespace quoin {
 
-/// A stretch of a glTF buffer; `offset` and `bytes` are multiples of four but for images and short indices.
+/// A range of a glTF buffer; `offset` and `bytes` are multiples of four except for images and short indices.
 struct GltfView {
   std::uint64_t offset = 0;
   std::uint64_t bytes = 0;
 };
 
-/// What an array of a primitive holds.
+/// The content of a primitive's array.
 enum class GltfArrayKind : std::uint8_t {
   Position,
   Normal,
   AtlasCoordinate,
-  PaletteCoordinate,  ///< the first of all coordinates, but for those of an atlas
+  PaletteCoordinate,  ///< the first coordinate set, except for the atlas coordinates
   Colour,
   Occlusion,
   Index,
@@ -50,10 +50,10 @@ struct GltfArray {
   GltfComponent component = GltfComponent::Float;
   int components = 3;
   bool normalized = false;
-  std::uint32_t stride = 0;         ///< bytes from one element to the next, a multiple of four but for indices
+  std::uint32_t stride = 0;         ///< bytes from one element to the next, a multiple of four except for indices
   GltfView view{};                  ///< of a compressed file: in the buffer that clients decode into
   GltfView packed_view{};           ///< of a compressed file: in the file's buffer
-  std::vector<std::byte> packed{};  ///< what lies there, in the codec of EXT_meshopt_compression
+  std::vector<std::byte> packed{};  ///< the encoded content (EXT_meshopt_compression)
 
   [[nodiscard]] std::uint64_t count() const { return view.bytes / stride; }
 };
@@ -67,22 +67,22 @@ struct GltfPrimitive {
   std::vector<GltfArray> arrays{};
 };
 
-/// How positions of a mesh are stored: `(position - origin) / step`, as floats or as the integers next to that.
+/// The storage of a mesh's positions: `(position - origin) / step`, as floats or rounded to integers.
 struct GltfQuantization {
   GltfComponent component = GltfComponent::Float;
   DVec3 origin{0.0};
   double step = 1.0;
 };
 
-/// A part's mesh as the file has it: with what nodes cannot say baked in.
+/// A part's mesh in the file, with the transforms that nodes cannot represent baked in.
 struct GltfMesh {
   std::string name;
-  VertexTransform transform;  ///< from the part to what is stored
+  VertexTransform transform;  ///< from the part to the stored positions
   GltfQuantization stored{};
   std::vector<GltfPrimitive> primitives{};
 };
 
-/// Translation, rotation and scale of a node, after what is baked into its mesh: a reflection or a shear.
+/// A node's translation, rotation and scale, applied after the part baked into its mesh: a reflection or a shear.
 struct GltfTransform {
   DVec3 translation{0.0};
   DQuat rotation{1.0, 0.0, 0.0, 0.0};
@@ -100,7 +100,7 @@ struct GltfNode {
   bool is_at_top = true;
 };
 
-/// What a node does while time goes by: one of its three properties, each value from its time on.
+/// The animation of a node property; each value applies from its time on.
 struct GltfChannel {
   enum class Path : std::uint8_t { Translation, Rotation, Scale };
 
@@ -112,7 +112,7 @@ struct GltfChannel {
   GltfView values_view{};
 };
 
-/// Which of a file's images is which.
+/// The purpose of a file's image.
 enum class GltfImageKind : std::uint8_t { Palette, MetallicRoughness, Emissive, Atlas };
 
 struct GltfImage {
@@ -122,7 +122,7 @@ struct GltfImage {
   GltfView view;
 };
 
-/// Where everything lies in the buffer of a glTF file; borrows the meshes' arrays.
+/// The layout of a glTF file's buffer; borrows the meshes' arrays.
 struct GltfLayout {
   MaterialPalette palette;
   std::vector<GltfNode> nodes;  ///< the placements in their order, then the groups
@@ -138,7 +138,7 @@ struct GltfLayout {
   bool is_unlit = false;  ///< colours of vertices have all light in them
 
   [[nodiscard]] bool is_compressed() const { return decoded_bytes > 0; }
-  /// The number of the texture; nothing when the file has none of that kind.
+  /// Returns the index of the texture; nullopt if the file has none of that kind.
   [[nodiscard]] std::optional<std::size_t> texture(GltfImageKind kind) const;
 };
 
@@ -150,16 +150,16 @@ struct GltfLayout {
 void write_gltf_array(const MaterialPalette& palette, const GltfMesh& mesh, const GltfPrimitive& primitive,
                       const GltfArray& array, BlockWriter& out);
 
-/// How the positions of surfaces, as `transform` has them, are stored as integers: those of blocks exactly, which is as
-/// floats where a lattice of whole voxels does not hold them all; others within half of a 32,767th of what the mesh
-/// spans, or a 65,534th where its pivot lies outside.
+/// Returns the integer quantization of surface positions after `transform`. Positions of blocks are exact; floats are
+/// used if no lattice of whole voxels holds them all. The error of other positions is at most half of 1/32,767 of the
+/// mesh's extent, or of 1/65,534 if its pivot lies outside.
 [[nodiscard]] GltfQuantization quantize_positions(const VertexTransform& transform,
                                                   std::span<const MaterialSurfaces::Surface> surfaces);
 
 /// Compresses an array, whose bytes are as they are stored. Requires: can_compress_gltf().
 [[nodiscard]] std::vector<std::byte> compress_gltf_array(const GltfArray& array, std::span<const std::byte> bytes);
 
-/// Whether the build has meshoptimizer.
+/// Returns true if the build has meshoptimizer.
 [[nodiscard]] bool can_compress_gltf();
 
 /// The JSON of a glTF file: compact, in a fixed order, names made valid UTF-8. `buffer_uri` names the file that holds

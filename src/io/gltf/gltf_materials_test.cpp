@@ -138,8 +138,8 @@ TEST_F(GltfMaterials, GlassSaysWhatABodyOfItsThicknessDoesToLight) {
   EXPECT_EQ(material_of(glb, 1.5F)["extensions"]["KHR_materials_volume"]["thicknessFactor"], 6.0F);
 }
 
-// What of the light behind passes and what of its own colour a body shows, for clients that know transmission and for
-// those that do not, beside what Quoin's pictures have.
+// Compares the transmitted background and the body's own colour, for clients with and without transmission, with
+// Quoin's images.
 TEST_F(GltfMaterials, ClientsWithAndWithoutTransmissionComeCloseToPictures) {
   add_glass_and_water(scene_);
   const auto meshes = mesh_scene(scene_);

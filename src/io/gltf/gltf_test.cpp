@@ -29,7 +29,7 @@ DVec3 world_from_node(const Json& node, const Vec3& point) {
   return vector_from(node, "translation", DVec3(0.0)) + rotation * scaled;
 }
 
-/// Corners of all triangles in the world, with their colour: what a picture of the file shows, as a set.
+/// The world corners of all triangles with their colour, as a set: the visible content of a file.
 using Corner = std::array<long, 6>;
 std::multiset<Corner> world_corners(const ParsedGlb& glb, const Json& node) {
   std::multiset<Corner> corners;

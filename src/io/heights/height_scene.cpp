@@ -22,13 +22,13 @@ constexpr float kSandMetres = 2.0F;  // the highest that has sand
 constexpr float kSnowMetres = 3'000.0F;
 constexpr float kTopsoil = 4.0F;  // voxels above stone
 
-/// What the ground is made of in a column, from above.
+/// The materials of a ground column, from the top down.
 struct Ground {
   VoxelType surface = kAir;
   VoxelType below = kAir;
 };
 
-/// The heights above the corner of each column, in voxels, and what they are made of.
+/// The height above each column's corner, in voxels, and its materials.
 struct Surface {
   int width = 0;
   int depth = 0;                 // along z
@@ -43,7 +43,7 @@ struct Surface {
   [[nodiscard]] bool has(int x, int z) const {
     return x >= 0 && z >= 0 && x < width && z < depth && !std::isnan(at(x, z));
   }
-  /// The rise of a voxel along an axis; one-sided beside a void or the border. Requires: has(x, z).
+  /// Returns the slope per voxel along an axis; one-sided next to a void or the border. Requires: has(x, z).
   [[nodiscard]] float rise(int x, int z, int step_x, int step_z) const {
     const bool has_before = has(x - step_x, z - step_z);
     const bool has_after = has(x + step_x, z + step_z);
@@ -61,7 +61,7 @@ struct Surface {
   }
 };
 
-/// What a column of chunks holds.
+/// The range of heights in a column of chunks.
 struct Range {
   float lowest = std::numeric_limits<float>::infinity();
   float highest = -std::numeric_limits<float>::infinity();
@@ -96,7 +96,7 @@ Result<Surface> surface_of(const HeightMap& map, const HeightOptions& options) {
       const int py = static_cast<int>(at_y);
       const double fx = at_x - px;
       const double fy = at_y - py;
-      // What is at a pixel is its height alone, even beside a void.
+      // At a pixel the result is its height alone, even next to a void.
       const auto mix = [](double a, double b, double share) { return share < 1e-6 ? a : a + share * (b - a); };
       const double metres =
           mix(mix(pixel(px, py), pixel(px + 1, py), fx), mix(pixel(px, py + 1), pixel(px + 1, py + 1), fx), fy);
@@ -201,7 +201,7 @@ class ColumnMaker {
 
  private:
   [[nodiscard]] static std::size_t place(int x, int z) { return static_cast<std::size_t>(z * kChunkEdge + x); }
-  /// Whether a chunk lies below the ground by so much, and above its bottom.
+  /// Returns true if a chunk lies at least `below` under the ground and above its bottom.
   [[nodiscard]] bool is_within(int first_y, float below) const {
     return range_.is_whole && static_cast<float>(first_y + kChunkEdge) + below <= range_.lowest &&
            first_y >= surface_.base + static_cast<int>(kBand) && is_far_from_border();

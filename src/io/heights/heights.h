@@ -8,10 +8,10 @@
 
 namespace quoin::heights {
 
-/// Of HeightOptions::depth.
+/// Upper limit of HeightOptions::depth.
 inline constexpr int kMaxDepth = 4096;
 
-/// Whether a file of so many bytes may be .hgt.
+/// Returns true if a file of this size may be .hgt.
 [[nodiscard]] bool is_hgt_size(std::uint64_t bytes);
 [[nodiscard]] bool is_png(std::span<const std::byte> beginning);
 /// Errors: InvalidArgument.

@@ -46,7 +46,7 @@ Bytes png_of(const std::vector<std::vector<unsigned>>& rows, int bits, int kind)
   put_big(header, rows.size(), 4);
   for (const int value : {bits, kind, 0, 0, 0}) put_big(header, static_cast<unsigned>(value), 1);
   put_chunk(png, "IHDR", header);
-  // What a gamma would do to heights is nothing.
+  // A gamma chunk must not change heights.
   Bytes gamma;
   put_big(gamma, 100'000, 4);
   put_chunk(png, "gAMA", gamma);

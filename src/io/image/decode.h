@@ -8,10 +8,10 @@
 
 namespace quoin {
 
-/// A PNG, JPEG or WebP by what it holds, as 8-bit sRGB with alpha.
+/// Decodes a PNG, JPEG or WebP, detected by content, to 8-bit sRGB with alpha.
 ///
-/// Errors: BadFormat; Unsupported for another kind, and for those that the build cannot read; LimitExceeded beyond 2^28
-///         pixels.
+/// Errors: BadFormat; Unsupported for other formats and for formats missing from the build; LimitExceeded beyond 2^28
+/// pixels.
 [[nodiscard]] Result<AlphaImage> decode_picture(std::span<const std::byte> bytes);
 
 /// Errors: as decode_picture.

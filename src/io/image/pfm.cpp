@@ -23,7 +23,7 @@ class HeaderReader {
   explicit HeaderReader(std::span<const std::byte> bytes)
       : text_(reinterpret_cast<const char*>(bytes.data()), bytes.size()) {}
 
-  /// Where the last word began, and where the next will be sought.
+  /// The offset of the last word, and the position where the search for the next starts.
   [[nodiscard]] std::size_t word_at() const { return word_at_; }
   [[nodiscard]] std::size_t position() const { return position_; }
 

@@ -104,7 +104,7 @@ Result<PngImage> decode_png(std::span<const std::byte> file) {
 
 namespace {
 
-/// What libpng reads from.
+/// The input of libpng.
 struct Input {
   std::span<const std::byte> left;
 };
@@ -144,7 +144,7 @@ bool read_header(png_structp png, png_infop info, Input& input, PngSamples& samp
   return true;
 }
 
-/// Likewise of the pixels.
+/// Reads the pixels.
 bool read_rows(png_structp png, int passes, PngSamples& samples) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
   const std::size_t row = samples.bytes.size() / samples.height;

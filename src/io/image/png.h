@@ -22,7 +22,7 @@ struct PngImage {
   return {static_cast<std::uint32_t>(picture.width), static_cast<std::uint32_t>(picture.height), 3, picture.rgb};
 }
 
-/// What to spend on a small file.
+/// The compression effort for a small file.
 enum class PngEffort : std::uint8_t {
   Smallest,  ///< for palettes
   Quick,     ///< for pictures: a third of the time, some 10 to 20 % more bytes
@@ -34,12 +34,12 @@ enum class PngEffort : std::uint8_t {
 /// Errors: LimitExceeded when libpng refuses (sizes beyond a million, memory).
 [[nodiscard]] Result<std::vector<std::byte>> encode_png(const PngImage& image, PngEffort effort = PngEffort::Smallest);
 
-/// Decodes to RGBA whatever the file holds.
+/// Decodes any PNG to RGBA.
 ///
 /// Errors: BadFormat; LimitExceeded beyond 2^28 pixels. Memory stays within a multiple of the input's size.
 [[nodiscard]] Result<PngImage> decode_png(std::span<const std::byte> file);
 
-/// The numbers of a picture as its file has them, whatever they mean: no gamma, no scaling.
+/// The raw samples of an image file, without gamma or scaling.
 struct PngSamples {
   std::uint32_t width = 0;
   std::uint32_t height = 0;

@@ -83,7 +83,7 @@ constexpr Biome kBiomes[] = {
     {"the_void", {0x8EB971, 0x71A74D, kWater}},
 };
 
-// Names that biomes had before 1.18, by those that they have now.
+// Biome names before 1.18, mapped to their present names.
 struct Renamed {
   std::string_view before;
   std::string_view now;

@@ -7,7 +7,7 @@
 
 namespace quoin::minecraft {
 
-/// The colours (sRGB, 0xRRGGBB) that a biome gives to what grows and flows in it.
+/// A biome's colours (sRGB, 0xRRGGBB) for plants and water.
 struct BiomeTints {
   std::uint32_t grass = 0x91BD59;
   std::uint32_t foliage = 0x77AB2F;
@@ -16,9 +16,9 @@ struct BiomeTints {
   bool operator==(const BiomeTints&) const = default;
 };
 
-/// Of a biome by its name ("minecraft:plains", or of mods); those of plains for one that is not known.
+/// Returns the tints of a biome by its name ("minecraft:plains", or a mod's); those of plains if it is unknown.
 [[nodiscard]] BiomeTints tints_of_biome(std::string_view name);
-/// The name of a biome by its number, as worlds had it before 1.18; "plains" for one that is not known.
+/// Returns the name of a biome by its number before 1.18; "plains" if it is unknown.
 [[nodiscard]] std::string_view name_of_biome(std::int64_t number);
 
 /// The index of tints in a list, which they are added to where they are new; beyond 255 of them the first's.

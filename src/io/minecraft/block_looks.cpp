@@ -7,21 +7,21 @@
 #include <string>
 #include <utility>
 
-// One table, like beside like, and what is guessed of names that it lacks: in pieces it would be no shorter, and harder
-// to find something in.
+// One table, sorted by kind, and rules for names that it lacks. Splitting it would not shorten it, and would make it
+// harder to search.
 
 namespace quoin::minecraft {
 
 namespace {
 
-/// How a block takes part in pictures.
+/// The visual kind of a block.
 enum class Kind : std::uint8_t {
   Air,
   Invisible,  // air to the eye, and a block to the game
   Solid,
   Plant,   // thin leaves and stalks, which one walks through: mostly air
   Thin,    // rails, plates and the like: mostly air
-  Glass,   // clear, but for its colour
+  Glass,   // clear, apart from its colour
   Liquid,  // water
   Clear,   // ice, slime
   Glow,    // solid, and shines
@@ -41,7 +41,7 @@ struct Entry {
 
 using K = Kind;
 
-// Mean colours of what the game shows, rounded by eye; sorted when first used.
+// Mean colours of the game's textures, rounded by eye; sorted at first use.
 constexpr Entry kBlocks[] = {
     {"air", 0, K::Air},
     {"cave_air", 0, K::Air},
@@ -495,7 +495,7 @@ constexpr Dye kDyes[] = {
     {"black", 0x141519, 0x080A0F, 0x251610},
 };
 
-// What is only another shape of a block; longer ones first. `is_thin`: it fills little of its voxel.
+// Suffixes of block shapes; longer ones first. `is_thin`: the shape fills little of its voxel.
 struct Shape {
   std::string_view suffix;
   bool is_thin;
@@ -623,7 +623,7 @@ std::optional<BlockLook> look_of_wood(std::string_view name) {
   return std::nullopt;
 }
 
-/// Of what a dye colours: "red_wool".
+/// Returns the look of a dyed block: "red_wool".
 std::optional<BlockLook> look_of_dyed(std::string_view name) {
   for (const Dye& dye : kDyes) {
     std::string_view rest = name;
@@ -688,7 +688,7 @@ std::optional<BlockLook> look_in_table(std::string_view name) {
   return std::nullopt;
 }
 
-// What a word in a name says, the surest first.
+// The looks implied by words in a name, the most reliable first.
 constexpr Entry kWords[] = {
     {"water", 0xFFFFFF, K::Liquid},
     {"lava", 0xE0661A, K::Glow},
@@ -794,7 +794,7 @@ constexpr Entry kWords[] = {
     {"air", 0, K::Air},
 };
 
-/// Whether a word stands in a name, from its beginning or an underscore on.
+/// Returns true if a name contains a word at its start or after an underscore.
 bool has_word(std::string_view name, std::string_view word) {
   for (std::size_t at = name.find(word); at != std::string_view::npos; at = name.find(word, at + 1)) {
     const bool begins = at == 0 || name[at - 1] == '_' || name[at - 1] == '/';

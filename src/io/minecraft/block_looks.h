@@ -7,24 +7,24 @@
 
 #include "io/minecraft/biomes.h"
 
-// What Minecraft's blocks look like as voxels, by their names: a table of our own making, and rules by the words of a
-// name for what is not in it.
+// The looks of Minecraft's blocks as voxels, by name: Quoin's own table, and rules by the words of a name for other
+// blocks.
 
 namespace quoin::minecraft {
 
-/// What of a place colours a block there: its colour is then multiplied by that of the biome.
+/// The biome colour that a block's colour is multiplied by.
 enum class Tint : std::uint8_t { None, Grass, Foliage, Water };
 
-/// What a biome colours so, 0xRRGGBB; white for Tint::None.
+/// Returns a biome's colour of a tint, 0xRRGGBB; white for Tint::None.
 [[nodiscard]] std::uint32_t colour_of(Tint tint, const BiomeTints& biome);
 /// A colour multiplied by that; its alpha stays.
 [[nodiscard]] Rgba8 tinted_colour(Rgba8 colour, std::uint32_t tint);
 
-/// How sure a look is.
+/// The source of a block's look.
 enum class Knowledge : std::uint8_t {
-  Table,    ///< the block is in the table, or is a shape of one that is
-  Words,    ///< a word of its name says what it is made of
-  Nothing,  ///< its name says nothing: a grey that differs from name to name
+  Table,    ///< the block is in the table, or is a shape of such a block
+  Words,    ///< a word of its name gives its material
+  Nothing,  ///< the name gives no material: a grey that depends on the name
 };
 
 struct BlockLook {

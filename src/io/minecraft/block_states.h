@@ -10,8 +10,8 @@
 
 #include <quoin/grid/voxel_registry.h>
 
-// What Minecraft says of a block besides its name ("facing=east,half=top") as a word of bits, VoxelData::state, so that
-// blocks that differ in it alone are one type. docs/formats/minecraft.md tells the bits to others.
+// The properties of a Minecraft block apart from its name ("facing=east,half=top") as a bit field, VoxelData::state.
+// Blocks that differ only in these are one type. docs/formats/minecraft.md documents the bits.
 
 namespace quoin::minecraft {
 
@@ -21,12 +21,13 @@ using Property = std::pair<std::string, std::string>;
 inline constexpr const char* kStatesAttribute = "minecraft.states";
 /// The attribute of a type whose look was guessed: "words" or "nothing".
 inline constexpr const char* kGuessAttribute = "minecraft.look";
-/// The attribute of a type that a biome coloured: what does so.
+/// The attribute with the tint of a biome-coloured type.
 inline constexpr const char* kTintAttribute = "minecraft.tint";
 
 /// A block as a type and a state.
 struct BlockState {
-  std::string name;         ///< "minecraft:furnace[lit=true]": with what has no bits, since it changes the look
+  std::string name;         ///< "minecraft:furnace[lit=true]": with the properties that change the look, which have no
+                            ///< bits
   std::string layout;       ///< as kStatesAttribute
   std::uint32_t state = 0;  ///< 0 where all properties have their commonest value
   std::uint8_t bits = 0;
@@ -34,8 +35,8 @@ struct BlockState {
   bool is_snowy = false;
 };
 
-/// Splits a block's properties into what is part of its type's name and what is a state. Of leaves what only decides
-/// when they decay ("distance", "persistent") is left out.
+/// Splits a block's properties into a part of its type's name and a state. Drops the properties of leaves that only
+/// control decay ("distance", "persistent").
 [[nodiscard]] BlockState block_state(std::string_view name, std::vector<Property> properties);
 
 /// The block of a type and a state: its name, and all properties that `block_state` was given but those it left out

@@ -18,7 +18,7 @@
 
 namespace quoin::minecraft {
 
-/// A block as voxels have it. What a biome colours has a type for each colour: BlockTypes::tinted.
+/// A block in voxel form. Biome-coloured blocks have one type per colour: BlockTypes::tinted.
 struct Block {
   VoxelType type = kAir;  ///< kAir too where it is tinted
   std::uint32_t state = 0;

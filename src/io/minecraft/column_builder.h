@@ -20,7 +20,7 @@ class ColumnBuilder {
   [[nodiscard]] Status put(const Section& section, IVec3 corner);
   /// Puts a section of one block. Requires: as `put`; block.is_plain().
   void put_block(const Block& block, IVec3 corner);
-  /// The chunks, by y, then z, then x; those that are all air are left out. The builder keeps invisible blocks alone.
+  /// Returns the chunks, by y, then z, then x, without chunks of air. The builder keeps only the invisible blocks.
   [[nodiscard]] std::vector<SourceChunk> take();
   /// Moves the counts of invisible blocks so far, and a lamp for each that gives light, to `part`.
   void take_invisible(SourcePart& part);

@@ -8,7 +8,7 @@ namespace quoin::minecraft {
 
 namespace {
 
-/// What a block's four bits of data say (https://minecraft.wiki/w/Java_Edition_data_values/Pre-flattening).
+/// The meaning of a block's four data bits (https://minecraft.wiki/w/Java_Edition_data_values/Pre-flattening).
 enum class How : std::uint8_t {
   Plain,        // nothing
   Kinds,        // which of a list of blocks
@@ -354,7 +354,7 @@ void add_torch(int data, std::string& name, Properties& properties) {
   properties.push_back(facing(kStairsFaces, data - 1));
 }
 
-/// What data say of turns and heights.
+/// Adds the rotation and height stored in the data bits.
 void add_turn(How how, int data, std::string& name, Properties& properties) {
   switch (how) {
     case How::Logs:
@@ -430,7 +430,7 @@ void add_turn(How how, int data, std::string& name, Properties& properties) {
   }
 }
 
-/// What data say as a number.
+/// Adds the number stored in the data bits.
 void add_number(How how, int data, Properties& properties) {
   const auto put = [&](const char* key, int number) { properties.emplace_back(key, std::to_string(number)); };
   switch (how) {

@@ -10,7 +10,7 @@
 
 namespace quoin::minecraft {
 
-/// What level.dat says of a world.
+/// The world properties in level.dat.
 struct LevelFile {
   std::string name;
   std::string version;  ///< "1.18.2"; empty before 1.9
@@ -18,7 +18,7 @@ struct LevelFile {
   std::string spawn_dimension = "minecraft:overworld";
 };
 
-/// Errors: BadFormat, with the offset (in what it expands to, where it is compressed); LimitExceeded.
+/// Errors: BadFormat, with the offset (in the decompressed bytes if it is compressed); LimitExceeded.
 [[nodiscard]] Result<LevelFile> parse_level_file(std::span<const std::byte> bytes);
 
 }  // namespace quoin::minecraft

@@ -10,7 +10,7 @@
 #include "io/minecraft/minecraft_source.h"
 #include "io/minecraft/schematic.h"
 
-/// Any bytes must give a world or errors, as a region file, as level.dat and as a schematic; whatever is read is of
+/// Any bytes must give a world or errors, as a region file, as level.dat and as a schematic. All voxels read must have
 /// registered types.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::span bytes(reinterpret_cast<const std::byte*>(data), size);

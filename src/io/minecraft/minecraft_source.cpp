@@ -31,7 +31,7 @@ constexpr int kColumnsOfRegion = kRegionEdge / kChunksOfColumn;  // along an edg
 // Sections' heights are signed bytes.
 constexpr int kLowestChunk = -32;
 constexpr int kHighestChunk = 32;
-/// Regions beyond have blocks that are no int32 with room for what looks past borders.
+/// Regions beyond this would have block coordinates outside int32, or too close to its limits for border reads.
 constexpr int kMaxRegion = 1 << 21;
 
 struct Region {
@@ -58,7 +58,7 @@ std::vector<Region> regions_in(const fs::path& folder, std::vector<Error>& broke
   }
   const auto place = [](const Region& r) { return std::tuple(r.name.z, r.name.x, r.name.kind, r.path.string()); };
   std::ranges::sort(regions, {}, place);
-  // What the game turned into Anvil it leaves beside it.
+  // The game leaves the old region file next to its Anvil conversion.
   for (std::size_t i = 1; i < regions.size();) {
     const bool is_same = regions[i].name.x == regions[i - 1].name.x && regions[i].name.z == regions[i - 1].name.z;
     if (!is_same) {
@@ -162,7 +162,7 @@ class MinecraftSource final : public ChunkSource {
   }
 
  private:
-  /// Puts one of the game's chunks into the builder. What is broken is told.
+  /// Adds one of the game's chunks to the builder. Reports broken data.
   Status read_chunk(const RegionFile& file, RegionName name, IVec3 chunk, SectionReader& reader, ColumnBuilder& builder,
                     std::vector<Error>& broken) const {
     const IVec3 place{name.x * kRegionEdge + chunk.x, 0, name.z * kRegionEdge + chunk.z};

@@ -14,10 +14,10 @@ namespace quoin::minecraft {
 /// path of its level.dat.
 [[nodiscard]] bool is_minecraft_folder(const std::filesystem::path& path);
 
-/// Opens a world of Minecraft's (Java): its folder or level.dat, the folder of a dimension, a folder of region files,
-/// or a region file. `dimension`: "overworld", "nether", "end" or NAMESPACE:NAME; empty: the overworld, or the first.
-/// Errors: CannotRead; BadFormat where there is no region that can be read; Unsupported for regions of entities or
-/// points of interest; InvalidArgument for a dimension that is not there, naming those that are.
+/// Opens a Minecraft (Java) world: its folder or level.dat, the folder of a dimension, a folder of region files, or a
+/// region file. `dimension`: "overworld", "nether", "end" or NAMESPACE:NAME; empty: the overworld, or the first.
+/// Errors: CannotRead; BadFormat if no region can be read; Unsupported for regions of entities or points of interest;
+/// InvalidArgument for a missing dimension, with a list of the present ones.
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_minecraft(const std::filesystem::path& path,
                                                                   std::string_view dimension = {});
 

@@ -121,7 +121,7 @@ TEST(MinecraftSource, ABrokenChunkIsNamedWithItsPlace) {
 }
 
 TEST(MinecraftSource, Lz4IsReadOrSaysWhatIsMissing) {
-  // One block of LZ4 that is stored as it is, and the empty one that ends the stream.
+  // One uncompressed LZ4 block, and the empty block that ends the stream.
   const std::vector<std::byte> chunk = chunk_of_stairs(0);
   std::vector<std::byte> stream;
   const auto block = [&](const std::vector<std::byte>& content, int method) {

@@ -15,7 +15,7 @@ T big(const std::byte* bytes) {
   return load<T>(bytes, std::endian::big);
 }
 
-/// Bytes of a number, or of an array's element; 0 for what has no fixed size.
+/// Returns the bytes of a number, or of an array's element; 0 for types of variable size.
 std::size_t bytes_of(Tag tag) {
   switch (tag) {
     case Tag::Byte:
@@ -85,7 +85,7 @@ class Parser {
     return static_cast<std::uint32_t>(document_.nodes_.size() - 1);
   }
 
-  // A tag, a name, a payload; `is_end`, which may be null, tells of a compound's end.
+  // Reads a tag, a name and a payload; sets `is_end`, unless null, at the end of a compound.
   Status named_value(int depth, bool* is_end) {
     const auto kind = tag();
     if (!kind) return kind.error();

@@ -11,8 +11,8 @@
 
 #include <quoin/core/result.h>
 
-// Named Binary Tag, the tree in which Minecraft (Java) keeps what it saves: https://minecraft.wiki/w/NBT_format.
-// Numbers have the most significant byte first.
+// Named Binary Tag, the tree format of Minecraft (Java) saves: https://minecraft.wiki/w/NBT_format. Numbers are
+// big-endian.
 
 namespace quoin::nbt {
 
@@ -32,7 +32,7 @@ enum class Tag : std::uint8_t {
   LongArray,
 };
 
-/// What a document may be; beyond it is refused.
+/// The limits of a document; larger ones are rejected.
 struct Limits {
   int depth = 512;  ///< of lists and compounds, as the game has it
   std::size_t nodes = std::size_t{1} << 22;
@@ -48,7 +48,7 @@ class Document {
   /// Errors: BadFormat, LimitExceeded, with the offset in `bytes`.
   [[nodiscard]] static Result<Document> parse(std::span<const std::byte> bytes, const Limits& limits = {});
 
-  /// The compound (or whatever it is) that all lies in.
+  /// Returns the root value, usually a compound.
   [[nodiscard]] Value root() const;
   /// Bytes of the document: others may follow it.
   [[nodiscard]] std::size_t size() const { return size_; }
@@ -69,15 +69,15 @@ class Document {
   std::vector<Node> nodes_;
 };
 
-/// A value of a document, or none: what is asked of none, or of a value of another kind, is none again.
-/// Lifetime: of the document and its bytes.
+/// A value of a document, or none. Queries on none, or on a value of another kind, return none.
+/// Lifetime: the document and its bytes must outlive it.
 class Value {
  public:
   Value() = default;
 
   [[nodiscard]] Tag tag() const { return document_ != nullptr ? node().tag : Tag::End; }
   [[nodiscard]] explicit operator bool() const { return document_ != nullptr; }
-  /// Where it begins in the document's bytes.
+  /// Returns its offset in the document's bytes.
   [[nodiscard]] std::size_t offset() const { return document_ != nullptr ? node().begin : 0; }
   [[nodiscard]] std::string_view name() const;
 
@@ -90,22 +90,22 @@ class Value {
     for (std::uint32_t at = index_ + 1; at < node().next; at = document_->nodes_[at].next) visit(Value(document_, at));
   }
 
-  /// Of a byte, short, int or long.
+  /// The value of a byte, short, int or long.
   [[nodiscard]] std::optional<std::int64_t> integer() const;
-  /// Of any number.
+  /// The value of a number of any type.
   [[nodiscard]] std::optional<double> number() const;
-  /// Of a string: UTF-8, but for zeros and what lies beyond 16 bits.
+  /// The value of a string: UTF-8, except for NUL and characters beyond 16 bits.
   [[nodiscard]] std::optional<std::string_view> text() const;
   /// Elements of an array or a list.
   [[nodiscard]] std::size_t count() const;
-  /// Of a byte array (or a list of bytes): its bytes.
+  /// The bytes of a byte array (or of a list of bytes).
   [[nodiscard]] std::span<const std::byte> bytes() const;
-  /// Of an array, or a list of whole numbers: one of them. Requires: i < count(); is_integers().
+  /// Element `i` of an array, or of a list of integers. Requires: i < count(); is_integers().
   [[nodiscard]] std::int64_t integer(std::size_t i) const;
   [[nodiscard]] bool is_integers() const;
-  /// Of a list of numbers of any kind (or an array): one of them.
+  /// Element `i` of a list of numbers of any type, or of an array.
   [[nodiscard]] std::optional<double> number(std::size_t i) const;
-  /// Of a long array: its words, as they lie there. Requires: nothing; empty where it is none.
+  /// The raw words of a long array; empty for other values.
   [[nodiscard]] std::span<const std::byte> long_bytes() const;
 
  private:
@@ -123,7 +123,7 @@ class Value {
   return make_error(ErrorCode::BadFormat, std::move(what), {}, at.offset());
 }
 
-/// Of a compound its value of the first of these names that is there.
+/// Returns a compound's value of the first of these names that is present.
 [[nodiscard]] inline Value first_of(Value compound, std::string_view name, std::string_view other) {
   const Value found = compound[name];
   return found ? found : compound[other];

@@ -10,7 +10,7 @@
 
 namespace quoin::nbt {
 
-/// Writes a document, value after value. Names are of what stands in compounds; `begin` and `end` come in pairs.
+/// Writes a document, value after value. Values in compounds have names; `begin` and `end` come in pairs.
 class DocumentWriter {
  public:
   void begin(std::string_view name) { head(Tag::Compound, name); }

@@ -39,7 +39,7 @@ std::string text_of(IVec3 size) {
   return std::to_string(size.x) + " x " + std::to_string(size.y) + " x " + std::to_string(size.z);
 }
 
-/// What colours the grass of columns: of all of their height, or of each slab of 16 layers.
+/// The biomes that tint the grass of columns: one per column, or one per slab of 16 layers.
 struct ColumnBiomes {
   std::vector<BiomeTints> tints;
   std::vector<std::uint8_t> of_columns;  ///< by slab, z, x; empty: all have the first, or plains'
@@ -321,7 +321,7 @@ VarintReader SchematicReader::varints(nbt::Value array) const {
   return {array.bytes(), found != arrays_.end() ? &found->second : nullptr};
 }
 
-// Indices of a palette of names: of columns, or of all blocks, of which each column's lowest of 16 is taken.
+// Biome indices into a palette of names: one per column, or one per block, where the lowest of 16 is used.
 void SchematicReader::take_biomes(Region& region, nbt::Value palette, nbt::Value data, int layers) {
   ColumnBiomes& biomes = region.biomes;
   std::vector<std::uint8_t> of_palette;
@@ -467,7 +467,7 @@ Status SchematicReader::read_structure() {
   const auto size = vector_of_list(root_["size"]);
   if (!size) return fault("a structure without a size", root_);
   if (auto sound = check_size(*size, root_["size"]); !sound) return sound;
-  // Of which nothing but what is in it says how large it is.
+  // Only the content determines the size of such files.
   constexpr std::int64_t kMaxArea = std::int64_t{1} << 22;
   if (std::int64_t{size->x} * size->z > kMaxArea) {
     return make_error(ErrorCode::LimitExceeded, "a structure of " + text_of(*size) + " blocks");

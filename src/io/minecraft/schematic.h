@@ -17,25 +17,25 @@
 
 namespace quoin::minecraft {
 
-/// Whether a file of NBT begins here, within gzip or as it is: what of it is a schematic its reader says.
-/// `beginning`: some hundred bytes suffice.
+/// Returns true if an NBT file begins here, gzipped or plain; the reader decides if it is a schematic. `beginning`:
+/// about a hundred bytes suffice.
 [[nodiscard]] bool begins_nbt(std::span<const std::byte> beginning);
 
-/// Reads any of them, by what stands in it. A grid for each region, in blocks from its least corner, at the offset that
-/// a .schem says; those of a litematic are placed as they stand to each other; regions of equal names are told apart by
-/// their number.
+/// Reads any schematic format, detected by content. Makes one grid per region, in blocks from its minimum corner, at
+/// the offset in a .schem. The regions of a litematic keep their relative positions; regions of equal names get a
+/// number.
 ///
-/// Types and states: as worlds have them, docs/formats/minecraft.md.
-/// Warnings: what is left out: entities, what blocks hold, biomes.
-/// Errors: BadFormat, with the offset in what the file expands to; LimitExceeded (2^30 blocks, 65,535 kinds, 1 GiB);
-///         Unsupported for other files of NBT; Cancelled.
+/// Types and states: as in worlds, docs/formats/minecraft.md.
+/// Warnings: dropped data: entities, block contents, biomes.
+/// Errors: BadFormat, with the offset in the decompressed file; LimitExceeded (2^30 blocks, 65,535 kinds, 1 GiB);
+///         Unsupported for other NBT files; Cancelled.
 [[nodiscard]] Result<LoadedScene> read_schematic(std::span<const std::byte> bytes, const Progress& progress = {});
 
-/// Writes a scene as a .schem, version 2: its instances become one. Types that are named as blocks are these, with
-/// their states; others become blocks of the nearest colour: concrete, wool, clay and some more, glass where they are
-/// transparent, lights where they shine.
+/// Writes a scene as a .schem, version 2: its instances are merged. Types named like blocks become these blocks, with
+/// their states. Others become blocks of the nearest colour: concrete, wool, clay and some more, glass for transparent
+/// types, lights for emissive types.
 ///
-/// Errors, warnings: as those of placed/placed_grids.h; LimitExceeded beyond 65,535 blocks a side or 2^30 in all.
+/// Errors, warnings: as in placed/placed_grids.h; LimitExceeded beyond 65,535 blocks per side or 2^30 in total.
 [[nodiscard]] Result<models::ModelBytes> write_schematic(const Scene& scene, const Progress& progress = {});
 
 }  // namespace quoin::minecraft

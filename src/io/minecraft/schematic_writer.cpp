@@ -57,7 +57,7 @@ std::vector<std::string> light_blocks() {
   return {"glowstone", "sea_lantern", "shroomlight", "ochre_froglight", "verdant_froglight", "pearlescent_froglight"};
 }
 
-/// Blocks, of which one is found by a colour.
+/// The blocks available for colour matching.
 class Blocks {
  public:
   explicit Blocks(const std::vector<std::string>& names) {
@@ -89,8 +89,8 @@ bool is_block(const VoxelProperties& type) {
          });
 }
 
-/// With what block_state leaves out where the game takes something else for it: that these do not burn, and that
-/// leaves, whose distance from wood nobody knows any more, do not decay.
+/// Adds properties that block_state drops and whose default in the game differs: campfires and torches that do not
+/// burn, and leaves that do not decay (their distance from wood is lost).
 BlockText as_in_game(BlockText block) {
   const auto has = [&](std::string_view key) {
     return std::ranges::any_of(block.properties, [&](const Property& property) { return property.first == key; });

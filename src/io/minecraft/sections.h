@@ -22,16 +22,16 @@ struct Section {
   int y = 0;  ///< its lowest blocks are at 16 y
   std::vector<Block> palette;
   std::array<std::uint16_t, kSectionBlocks> indices{};  ///< in the palette, by y, then z, then x
-  /// Of cells of 4^3, by y, then z, then x; or of columns, by z, then x.
+  /// for cells of 4^3, by y, then z, then x; or for columns, by z, then x
   std::vector<std::uint8_t> biome_indices;
-  std::vector<BiomeTints> biomes;  ///< those that the section has, at least one
+  std::vector<BiomeTints> biomes;  ///< the section's biomes, at least one
 };
 
-/// Reads the sections of a chunk's NBT, of any version from McRegion on, one after the other. What is broken is told,
-/// and the other sections are read.
+/// Reads the sections of a chunk's NBT one after the other, of any version from McRegion on. Reports broken sections
+/// and continues with the others.
 ///
-/// `take`:   gets each section that is not all air; it may keep nothing of it.
-/// `broken`: gets what cannot be read, with its offset in the NBT.
+/// `take`:   receives each section that is not all air; must not keep references to it.
+/// `broken`: receives errors, with their offset in the NBT.
 /// Errors: LimitExceeded.
 class SectionReader {
  public:
@@ -56,10 +56,10 @@ class SectionReader {
   std::vector<std::uint32_t> legacy_used_;
 };
 
-/// The i-th half of a byte, low ones first; 0 behind the end: what is left out of old worlds is 0.
+/// Returns the i-th half byte, low halves first; 0 past the end: old worlds omit trailing zeros.
 [[nodiscard]] int nibble(std::span<const std::byte> bytes, std::size_t i);
-/// Unpacks indices of `bits` each from longs, from the lowest bit up. Where they span longs is told by how many there
-/// are. False where the longs are of neither form. Requires: 1 <= bits <= 16.
+/// Unpacks indices of `bits` each from longs, from the lowest bit up. The number of longs shows if indices span two of
+/// them. Returns false if it fits neither form. Requires: 1 <= bits <= 16.
 [[nodiscard]] bool unpack_indices(nbt::Value longs, int bits, std::span<std::uint16_t> out);
 /// The same of indices that span longs, from the one of number `first` on. Requires: they are all there.
 void unpack_spanning(nbt::Value longs, int bits, std::size_t first, std::span<std::uint16_t> out);

@@ -104,7 +104,7 @@ Status GoxelReader::read_chunk(std::string_view type, ByteReader chunk) {
 Status GoxelReader::read_block(ByteReader& chunk) {
   const std::size_t at = chunk.position();
   const auto png = chunk.take(chunk.remaining());
-  // A picture says its sizes at its beginning; one that is no block is not decoded.
+  // An image starts with its size; images that are not a block are not decoded.
   constexpr std::size_t kSizesAt = 16;
   ByteReader sizes(png);
   static_cast<void>(sizes.take(kSizesAt));

@@ -19,7 +19,7 @@ struct Alike {
   std::string_view block;
 };
 
-// Sorted. What is not here has words in its name that say it.
+// Sorted. Other nodes are recognised by words in their names.
 constexpr std::array kAlike = std::to_array<Alike>({
     {"acacia_leaves", "acacia_leaves"},
     {"acacia_tree", "acacia_log"},

@@ -7,7 +7,7 @@
 
 namespace quoin::models {
 
-/// The attribute of a node's type whose look is a guess, as that of a block of Minecraft's.
+/// The attribute of node types with a guessed look, as for Minecraft blocks.
 inline constexpr const char* kNodeGuessAttribute = "luanti.look";
 
 /// The type of a node of Luanti's by its name ("default:stone"): by a table for the names of its own game, else by the

@@ -12,7 +12,7 @@
 
 namespace quoin::models {
 
-/// What a file says of a model besides its voxels.
+/// The properties of a model in a file, except its voxels.
 struct Model {
   std::string name{};
   DVec3 pivot{0.0};         ///< voxels: SceneGrid::pivot
@@ -28,7 +28,8 @@ class ModelBuilder {
  public:
   /// Voxels that follow are of this model. Requires: sizes are finite and positive.
   void begin(Model model);
-  /// What voxels are of besides their colour and their transparency. Returns its number; 0 is a material of nothing.
+  /// Adds the voxel properties other than colour and transparency. Returns the material's number; 0 is the default
+  /// material.
   [[nodiscard]] std::uint32_t add_material(VoxelProperties material);
   /// Voxels that follow are of this material. Requires: it was added.
   void use_material(std::uint32_t material);

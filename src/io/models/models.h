@@ -8,10 +8,11 @@
 #include <quoin/grid/voxel_registry.h>
 #include <quoin/io/loaded_scene.h>
 
-// Formats of voxel models, and of maps that are one. docs/formats/models.md says what of each is read.
+// Formats of voxel models, and of maps that consist of one model. docs/formats/models.md lists the supported content of
+// each.
 //
-// Recognition is by content: `is_...` take what a file begins with (64 KiB suffice), or the whole of those that have no
-// header, where only all of it tells.
+// Recognition is by content: `is_...` take the beginning of a file (64 KiB suffice), or the whole file for formats
+// without a header.
 // Errors of readers: BadFormat with the byte offset; LimitExceeded; Unsupported.
 
 namespace quoin::models {

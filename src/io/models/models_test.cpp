@@ -63,7 +63,8 @@ std::vector<std::byte> zlib_stored(std::span<const std::byte> content) {
   return writer.big(b << 16 | a, 4).bytes;
 }
 
-// Each of these is a red voxel, and a blue one beside it at the greater x; Voxlap's and Goxel's with z downwards or up.
+// Each of these has a red voxel, and a blue one next to it at the greater x; in Voxlap's files z points down, in
+// Goxel's up.
 std::vector<std::byte> binvox() {
   Writer writer;
   writer.text("#binvox 1\ndim 2 2 2\ntranslate 1 2 3\nscale 4\ndata\n");
@@ -236,7 +237,7 @@ TEST(Models, PlacesAreKept) {
   for (const auto& bytes : {kv6(), kvx(), slab6()}) {
     EXPECT_EQ(only_grid(*load_scene(bytes)).bounds().min, IVec3(0));
   }
-  // -y of what points north is +z here, one cell on.
+  // -y of a north-facing direction is +z here, offset by one cell.
   EXPECT_EQ(only_grid(*load_scene(goxel())).bounds().min, IVec3(0, 0, -1));
 }
 

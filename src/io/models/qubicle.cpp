@@ -1,5 +1,5 @@
-// Qubicle's formats. Matrices are placed by whole voxels; of compounds what they show is read, not what they were made
-// of.
+// Qubicle's formats. Matrices have integer positions. For compounds the visible result is read, not the source
+// matrices.
 //
 //   .qb    matrices of colours, as they are or as runs a slice
 //   .qbt   a tree of matrices, each a zlib stream
@@ -266,7 +266,7 @@ Status QbtReader::read_matrix(ByteReader& reader) {
   return put_voxels(matrix, packed, packed_at);
 }
 
-// x changes slowest, then z, then y. The last byte says which faces are seen: none of what is empty.
+// x changes slowest, then z, then y. The last byte is the mask of visible faces: 0 for empty voxels.
 Status QbtReader::put_voxels(const Matrix& matrix, std::span<const std::byte> packed, std::size_t at) {
   ByteStream stream(packed, 0, Compression::Zlib);
   std::vector<std::byte> column(static_cast<std::size_t>(matrix.size.y) * 4);
@@ -333,7 +333,7 @@ class QbclReader {
   ModelBuilder builder_;
 };
 
-/// `is_used`: not of what a compound was made of.
+/// `is_used`: false for the source matrices of a compound.
 Status QbclReader::read_node(int depth, bool is_used, bool is_shown) {
   enum class Kind : std::uint32_t { Matrix, Model, Compound };
   constexpr int kDeepest = 64;

@@ -130,7 +130,7 @@ bool is_cub(std::span<const std::byte> whole) {
   return !reader.failed() && volume == reader.remaining();
 }
 
-// x changes fastest, then what lies in the ground's plane, then the height: turned, so that up is +y.
+// x changes fastest, then the second ground axis, then the height: rotated so that up is +y.
 Result<LoadedScene> read_cub(std::span<const std::byte> bytes) {
   if (!is_cub(bytes)) return bad_at(0, "its size does not fit its three sizes");
   ByteReader reader(bytes);

@@ -105,7 +105,7 @@ Result<LoadedScene> read_kv6(std::span<const std::byte> bytes) {
 
 namespace {
 
-/// Where the parts of a KVX file lie.
+/// The offsets of a KVX file's parts.
 struct KvxLayout {
   Sizes sizes;
   DVec3 pivot{0.0};
@@ -211,13 +211,13 @@ namespace {
 constexpr std::array<Sizes, 2> kAceOfSpades = {{{512, 512, 64}, {512, 512, 240}}};
 constexpr Sizes kVoxlapMap{1024, 1024, 256};
 
-/// Where the columns of a map begin, and how many there are.
+/// The offset and number of a map's columns.
 struct VxlLayout {
   Sizes sizes = kAceOfSpades[0];
   std::size_t columns = 0;
 };
 
-/// The layout that a header says; none has that of the lower map.
+/// Returns the layout in a header; the lower map has none.
 VxlLayout layout_in_header(std::span<const std::byte> whole) {
   ByteReader reader(whole);
   if (reader.u32() != kVoxlapMagic) return {};

@@ -36,8 +36,8 @@ std::string one_word(const std::string& name) {
 
 constexpr std::size_t kMaxDigits = 40;
 
-/// Writes what the corners of voxels are mostly, whole and half numbers, as std::to_chars does; null for other ones.
-/// From 100,000 on that may choose an exponent.
+/// Writes whole and half numbers, the usual corners of voxels, as std::to_chars does; returns null for others. From
+/// 100,000 on std::to_chars may choose an exponent.
 char* write_halves(double value, char* out) {
   constexpr double kMost = 99'999.0;
   if (!(value >= -kMost && value <= kMost)) return nullptr;
@@ -68,8 +68,8 @@ class ObjLines {
   [[nodiscard]] static std::string text_of(double value);
   /// "KEYWORD x y z", without a line's end; `digits` 0: to a millionth, as far from the origin.
   void triple(std::string_view keyword, const DVec3& v, int digits = 0);
-  /// "o NAME" and a line's end: the name as one word, told apart from those before by a number; "object" for an empty
-  /// one.
+  /// Writes "o NAME" and a line end: the name as one word, with a number if it is not unique; "object" for an empty
+  /// name.
   void object(const std::string& name);
 
  private:
@@ -117,8 +117,8 @@ std::string mtl_name(const SurfaceMaterial& material) {
   return name;
 }
 
-/// How much covers what lies behind, what it does to colours there, and how it bends light. `d` is what most clients
-/// read; none agree on alpha in a texture.
+/// Returns the coverage, tint and refraction of glass as MTL lines. Most clients read `d`; they disagree about texture
+/// alpha.
 std::string mtl_glass(const SurfaceMaterial& material, const VoxelProperties& properties) {
   constexpr float kThousand = 1000.0F;
   const auto rounded = [](float value) { return shortest(std::round(value * kThousand) / kThousand); };
@@ -320,7 +320,7 @@ std::uint64_t expected_bytes(const SceneMeshes& meshes) {
   return bytes;
 }
 
-/// A picture beside the OBJ.
+/// Adds an image file next to the OBJ.
 Status add_image(const std::filesystem::path& path, const PngImage& image, std::vector<MeshFile>& files) {
   auto png = encode_png(image);
   if (!png) return png.error();

@@ -44,7 +44,7 @@ std::string text_of(const Instance& instance, const SceneGrid& grid) {
   return text.append(printable(instance.name.empty() ? grid.name : instance.name)).append("\"");
 }
 
-/// Counts what a format does not hold.
+/// Counts the content that a format cannot store.
 class Losses {
  public:
   Losses(const Scene& scene, const FormatHolds& holds) : scene_(scene), holds_(holds) {}
@@ -57,7 +57,7 @@ class Losses {
   std::int64_t nameless = 0;
   std::int64_t turned_states = 0;
 
-  /// One that is in the file. Requires: of a scene's types, as `Losses` was made for.
+  /// Counts a grid of the file. Requires: its types belong to the scene that `Losses` was made for.
   void count(const PlacedGrid& grid, bool is_turned) {
     ++placed_;
     const std::int64_t states = grid.voxels.data_count();

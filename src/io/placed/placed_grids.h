@@ -10,17 +10,18 @@
 #include <quoin/core/result.h>
 #include <quoin/scene/scene.h>
 
-// Scenes as formats have them that know whole voxels in one lattice: what stands where, and what of it they leave out.
+// Converts scenes for formats with whole voxels in one lattice: the placed grids, and the content that such formats
+// drop.
 
 namespace quoin::models {
 
-/// A file that was made of a scene, and what it does not hold: one line each.
+/// A file made from a scene, and the content that it lacks: one line each.
 struct ModelBytes {
   std::vector<std::byte> bytes;
   std::vector<std::string> warnings;
 };
 
-/// What a format says of models besides their voxels' colours.
+/// The properties of models that a format can store, except their voxels' colours.
 struct FormatHolds {
   std::string_view extension;   ///< for messages: ".qb"
   bool names = false;           ///< of models
@@ -38,7 +39,7 @@ struct PlacedGrid {
   std::string name;  ///< of the instance, or of the grid where it has none
   bool visible = true;
   Grid voxels{};  ///< turned and moved: in voxels of the file; shares chunks with the scene's where it can
-  IBox box{};     ///< likewise, of its declared box; never empty
+  IBox box{};     ///< in the same space, of its declared box; never empty
 };
 
 /// A scene in one lattice: voxel v of it lies at voxel_size * v in the world.
@@ -48,14 +49,16 @@ struct PlacedGrids {
   std::vector<std::string> warnings;
 };
 
-/// Turns and moves each placement of a scene. Instances between voxels move to the nearest, with a warning; what the
-/// format does not hold is counted in others. States of voxels (VoxelData) are not turned, which is warned of, too.
+/// Rotates and moves each placement of a scene. Instances between voxels move to the nearest voxel, with a warning.
+/// Content that the format lacks is counted in other warnings. States of voxels (VoxelData) are not rotated, which also
+/// causes a warning.
 ///
-/// Errors: Unsupported for fields of densities, turns that are none by quarters, and voxels of different sizes;
-///         LimitExceeded for what lies farther out than 2^26 voxels.
+/// Errors: Unsupported for density fields, rotations that are not multiples of 90 degrees, and voxels of different
+/// sizes; LimitExceeded for positions beyond 2^26 voxels.
 [[nodiscard]] Result<PlacedGrids> place_grids(const Scene& scene, const FormatHolds& holds);
 
-/// The same as one grid; where several have a voxel, it is that of the last. Memory: of all, and one of them turned.
+/// The same, merged into one grid; the last grid wins where several have a voxel. Memory: all grids, and one rotated
+/// copy.
 struct MergedGrid {
   std::string name;
   Grid voxels{};

@@ -171,7 +171,7 @@ class ModelWriter {
     const VertexTransform transform = in_world.relative_to(origins_.back());
     text_ += "<object id=\"" + std::to_string(id) + "\" type=\"model\" pid=\"1\" pindex=\"0\" name=\"" +
              escaped(name_of(meshes_, placement)) + "\">\n<mesh>\n<vertices>\n";
-    // Vertices of one place are one, which is what makes neighbours of triangles.
+    // Vertices of equal position are merged, so that adjacent triangles share them.
     std::unordered_map<Vec3, std::uint32_t, PositionHash> numbers;
     for (const MeshView& view : part.surfaces) {
       for (const std::uint32_t index : view.indices) {

@@ -11,9 +11,9 @@
 
 namespace quoin {
 
-/// Puts texts into a zip file, one after the other, compressed. The same bytes on every run.
+/// Writes texts to a zip file, one after the other, compressed. The bytes are the same on every run.
 ///
-/// Source: PKWARE, ".ZIP File Format Specification" 6.3.3. Memory: what is compressed.
+/// Source: PKWARE, ".ZIP File Format Specification" 6.3.3. Memory: the compressed bytes.
 class ZipFile {
  public:
   ZipFile();
@@ -21,7 +21,7 @@ class ZipFile {
   ZipFile(const ZipFile&) = delete;
   ZipFile& operator=(const ZipFile&) = delete;
 
-  /// What is put from now on is of this file. Requires: the name is ASCII.
+  /// Starts a file; later writes belong to it. Requires: the name is ASCII.
   void begin(std::string name);
   void put(std::string_view text);
   /// All of it. Errors: LimitExceeded where a file, or all of them, take 4 GiB or more.

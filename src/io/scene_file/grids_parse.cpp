@@ -63,7 +63,7 @@ std::string about(IVec3 chunk, std::string_view what) {
   return text.append(what);
 }
 
-// Puts the chunks of a piece into their grid; returns what is wrong, or "".
+// Adds a piece's chunks to their grid; returns a fault, or "".
 std::string put(std::vector<PlacedChunk> chunks, Grid& grid) {
   for (PlacedChunk& chunk : chunks) {
     if (chunk.voxels.non_air_count() == 0) return about(chunk.place, "holds nothing");
@@ -100,7 +100,7 @@ std::string put(const DataPiece& piece, Grid& grid, const VoxelRegistry& types) 
   return fault;
 }
 
-/// What became of a piece.
+/// The result of decoding a piece.
 struct Decoded {
   Result<std::vector<PlacedChunk>> voxels;
   Result<std::vector<PlacedDensities>> densities;
@@ -137,7 +137,7 @@ std::optional<std::vector<Decoded>> decode(const std::vector<Piece>& pieces, con
   return decoded;
 }
 
-// Puts a piece into its grid, or says what is wrong with it.
+// Adds a piece to its grid, or reports its fault.
 template <class Chunks, class... Content>
 void put_or_blame(Result<Chunks>& chunks, const Place& place, Faults& faults, Content&&... content) {
   if (!chunks) {

@@ -11,7 +11,7 @@
 #include <quoin/core/result.h>
 #include <quoin/core/vec.h>
 
-// What a scene file holds, asked for key by key; what is wrong is told with its place.
+// Reads a scene file key by key; reports faults with their position.
 
 namespace quoin::scene_json {
 
@@ -25,7 +25,7 @@ struct Place {
   std::optional<std::size_t> index;
 };
 
-/// The first fault found, with its place; reading goes on after it, and nothing of it is used.
+/// The first fault found, with its position. Reading continues after it, but its result is discarded.
 class Faults {
  public:
   void add(const Place& place, const std::string& what, ErrorCode code = ErrorCode::BadFormat);
@@ -71,7 +71,7 @@ class Object {
   Faults& faults_;
 };
 
-/// A vector made unit, unless it is but for rounding.
+/// Normalises a vector unless it is unit up to rounding; reports a fault if it is all 0.
 [[nodiscard]] std::vector<double> unit(std::vector<double> v, const Place& place, Faults& faults);
 
 /// The list of that key, with at most so many entries; null where it is none.

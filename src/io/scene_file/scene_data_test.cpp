@@ -193,7 +193,7 @@ std::vector<std::byte> bytes_of(const std::vector<Record>& records) {
   return bytes;
 }
 
-// What is wrong with such data at a grid of stairs at (1, 0, 0) and stone at (2, 0, 0).
+// Returns the fault of such data in a grid with stairs at (1, 0, 0) and stone at (2, 0, 0).
 std::string fault_of_bytes(const std::vector<std::byte>& data, const std::string& further = "") {
   Grid grid;
   grid.set({1, 0, 0}, kTurned);

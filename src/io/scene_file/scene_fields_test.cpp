@@ -70,7 +70,7 @@ TEST(SceneFields, ComeBackToTheLastBit) {
   }
 }
 
-// Voxels come before densities, and what is so regular that it is stored instead of compressed is written twice.
+// Voxels come before densities; data so regular that they are stored uncompressed are written twice.
 TEST(SceneFields, WritingThemTellsOfOneWholeThatNeverFalls) {
   DensityGrid field;
   field.add_sphere({0.0, 0.0, 0.0}, 150.0, 1);
@@ -125,7 +125,7 @@ std::string fault_of_grid(const std::string& grid) {
   return read ? "none" : to_string(read.error());
 }
 
-/// What is wrong with a piece of these numbers, 16 bits each.
+/// Returns the fault of a piece with these numbers, 16 bits each.
 std::string fault_of_densities(const std::vector<std::uint16_t>& words, std::size_t cut = 0) {
   std::vector<std::byte> bytes;
   for (const std::uint16_t word : words) {

@@ -56,7 +56,7 @@ struct Body {
   std::vector<Lamp> lamps;
 };
 
-/// Moves the types and grids of a file's scene into `into`; returns what the grids are there.
+/// Moves the types and grids of a file's scene into `into`; returns their new handles.
 Result<std::map<GridHandle, GridHandle>> take_over_grids(Scene& from, Scene& into) {
   std::vector<VoxelType> new_type_of = {kAir};
   for (std::size_t type = 1; type < from.types.size(); ++type) {
@@ -107,7 +107,7 @@ Result<Body> take_over(Scene& from, Scene& into) {
   return body;
 }
 
-/// Where a placement puts a direction, and a point, of a body.
+/// Returns a body's direction, or point, under a placement.
 DVec3 placed_direction(DVec3 direction, const SceneFile::Placement& outer) {
   return outer.rotation * (direction * DVec3(outer.mirrored ? -1.0 : 1.0, 1.0, 1.0));
 }
@@ -199,7 +199,7 @@ Result<Bodies> read_sources(const std::vector<SceneFile::Source>& sources, const
   return bodies;
 }
 
-/// A scene of what the file itself holds; its instances are to follow.
+/// Makes a scene of the file's own content; instances are added later.
 LoadedScene begin_scene(SceneFile& file, std::vector<GridHandle>& grids) {
   LoadedScene loaded;
   loaded.format = "scene";
@@ -212,7 +212,7 @@ LoadedScene begin_scene(SceneFile& file, std::vector<GridHandle>& grids) {
   return loaded;
 }
 
-/// Places what a file says, once its grids are in the scene.
+/// Places a file's content, after its grids are in the scene.
 class Placer {
  public:
   Placer(const SceneFile& file, const std::vector<GridHandle>& grids, const Bodies& bodies, Scene& scene)

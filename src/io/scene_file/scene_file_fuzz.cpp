@@ -29,7 +29,7 @@ void read_as_text(std::span<const std::byte> bytes) {
   require(again.has_value() && quoin::parse_scene_file(*again).has_value());
 }
 
-/// What is in the pieces of voxels, behind base64 and a checksum that no chance gets right.
+/// Decodes bytes as the content of voxel pieces, without base64 and the checksum that random input never passes.
 void read_as_voxels(std::span<const std::byte> bytes) {
   constexpr std::size_t kTypes = 300;
   const auto chunks = quoin::decode_voxels(quoin::to_base64(quoin::gzipped(bytes, 0)), kTypes);
@@ -39,7 +39,7 @@ void read_as_voxels(std::span<const std::byte> bytes) {
   }
 }
 
-/// What is in the pieces of data likewise, put at a grid of which every second voxel is air.
+/// Decodes bytes as the content of data pieces, for a grid with air at every second voxel.
 void read_as_data(std::span<const std::byte> bytes) {
   const auto piece = quoin::decode_data(quoin::to_base64(quoin::gzipped(bytes, 0)));
   if (!piece) return;

@@ -34,7 +34,7 @@ SceneFile::Source source_of(const Json& json, const Place& place, Faults& faults
   return source;
 }
 
-// Faults of what names entries of other lists.
+// Reports unknown references to entries of other lists.
 class NameCheck {
  public:
   NameCheck(const SceneFile& scene, Faults& faults) : scene_(scene), faults_(faults) {}
@@ -123,13 +123,13 @@ void read_file_object(const Json& json, std::size_t file_bytes, Threads threads,
   if (!faults.error()) NameCheck(scene, faults).check();
 }
 
-/// What a text has outside of its strings.
+/// The structure of a text outside its strings.
 struct Outside {
   int deepest = 0;        ///< brackets within each other
   std::size_t bytes = 0;  ///< and strings, each as one
 };
 
-// So that what it would take is known before anything is built.
+// Determines the memory needs before anything is built.
 Outside outside_strings(std::string_view text) {
   int depth = 0;
   int deepest = 0;

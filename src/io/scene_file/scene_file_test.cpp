@@ -302,8 +302,8 @@ TEST_F(SceneFiles, PlaceEachFileAsOftenAsWanted) {
   EXPECT_EQ(scene.instances()[handles[0]].grid, scene.instances()[handles[2]].grid);
   const Instance& second = scene.instances()[handles[1]];
   EXPECT_EQ(second.name, "second");
-  // Where a point comes to lie, by the definition: scale, mirror, then the rotation, then the position; on top of what
-  // the file itself says of it.
+  // The expected position of a point, by the definition: scale, mirror, rotation, then position; applied after the
+  // file's own placement.
   const auto alone = load_scene(folder_ / "blue.vox");
   ASSERT_TRUE(alone);
   const Instance& inner = alone->scene.instances()[alone->scene.instances().handles()[0]];

@@ -137,7 +137,7 @@ Status check_data(const SceneFile& scene) {
   return {};
 }
 
-// What there is of voxels, of densities and of data in the grids of a file.
+// The encoded voxels, densities and data of a file's grids.
 class Contents {
  public:
   explicit Contents(const SceneFile& scene) {
@@ -192,7 +192,7 @@ Result<std::string> text_of(const SceneFile& scene, const Contents& contents, Vo
   return SceneText().write(scene, *pieces);
 }
 
-// Whatever the reader refuses is not written. Voxels, which it takes as they are written, are left out here.
+// Rejects scenes that the reader would reject. Voxels are omitted here, since the reader accepts all written voxels.
 Status check_readable(const SceneFile& scene) {
   const SceneText::Texts none(scene.grids.size());
   const auto text = SceneText().write(scene, {none, none, none});
@@ -273,7 +273,7 @@ Result<std::vector<std::byte>> write_scene_file(const SceneFile& scene, Threads 
   const Contents contents(scene);
   auto text = text_of(scene, contents, VoxelCompression::Small, threads, progress);
   if (text && contents.bytes() > max_voxel_bytes(text->size())) {
-    // By now it is all but done: whoever listens may still cancel it.
+    // Almost done here; the caller may still cancel.
     text = text_of(scene, contents, VoxelCompression::Stored, threads, part_of(progress, 1.0, 1.0));
   }
   if (!text) return text.error();

@@ -187,7 +187,7 @@ void expect_equal_hierarchy(const Scene& a, const Scene& b) {
   }
 }
 
-// To the last bit, whatever the handles.
+// Expects equality to the last bit, independent of handles.
 void expect_equal(const Scene& a, const Scene& b) {
   ASSERT_EQ(a.types.size(), b.types.size());
   for (std::size_t i = 0; i < a.types.size(); ++i) {
@@ -353,7 +353,7 @@ std::string fault_of_scene(const std::string& text) {
   return read ? "none" : to_string(read.error());
 }
 
-/// What is wrong with a file whose only piece of voxels holds these numbers, after 16 bits each.
+/// Returns the fault of a file whose only voxel piece has these numbers, after 16 bits each.
 std::string fault_of_piece(std::vector<std::uint16_t> words, std::size_t cut = 0) {
   std::vector<std::byte> bytes;
   for (const std::uint16_t word : words) {

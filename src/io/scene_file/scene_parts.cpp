@@ -79,7 +79,7 @@ std::optional<std::uint32_t> bits_in(const Object& object, std::string_view key)
   return std::nullopt;
 }
 
-/// Whether axes are unit, perpendicular and right-handed, to the rounding of sums of them.
+/// Returns true if the axes are unit, perpendicular and right-handed, up to rounding.
 bool is_frame(const Camera& camera) {
   constexpr double kRounding = 1e-6;
   const auto is_near = [](DVec3 a, DVec3 b) { return glm::distance(a, b) <= kRounding; };

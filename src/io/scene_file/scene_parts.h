@@ -7,8 +7,8 @@
 
 #include "io/scene_file/json_reader.h"
 
-// What a scene is made of, but for its voxels, each part as the JSON of scene files (docs/scene-files.md). Worlds on
-// disk hold the same texts, a part each.
+// The parts of a scene, except its voxels, as the JSON of scene files (docs/scene-files.md). Worlds on disk store the
+// same text per part.
 
 namespace quoin::scene_json {
 
@@ -18,7 +18,7 @@ using OrderedJson = nlohmann::ordered_json;
 /// The same bits: -0 is another number than 0.
 [[nodiscard]] bool is_same(double a, double b);
 
-/// Writes parts, and knows whether what it wrote needs version 2 of the format.
+/// Writes parts, and records if they need version 2 of the format.
 class PartWriter {
  public:
   [[nodiscard]] OrderedJson json_of(const VoxelProperties& type);
@@ -38,7 +38,7 @@ class PartWriter {
   bool needs_second_ = false;
 };
 
-// Reads parts; whatever is wrong is added to the faults.
+// Reads parts; appends errors to `faults`.
 [[nodiscard]] VoxelProperties properties_of(const Json& json, const Place& place, Faults& faults);
 [[nodiscard]] SceneFile::Placement placement_of(const Json& json, const Place& place, Faults& faults);
 [[nodiscard]] SceneFile::Group group_of(const Json& json, const Place& place, Faults& faults);
@@ -47,7 +47,7 @@ class PartWriter {
 [[nodiscard]] Camera camera_of(const Json& json, const Place& place, Faults& faults);
 /// Name, pivot and canvas.
 void read_grid_header(const Object& object, SceneGrid& grid);
-/// Density beyond which a field is clamped, where the key is there.
+/// Reads the density band that a field is clamped to, if the key is present.
 void read_band(const Object& object, SceneGrid& grid);
 
 }  // namespace quoin::scene_json

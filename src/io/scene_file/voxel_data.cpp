@@ -29,14 +29,14 @@ constexpr std::size_t kMaxTypesOfChunk = 65'536;
 constexpr int kMaxPlace = (1 << (31 - kChunkShift)) - 2;
 constexpr int kMinPlace = -kMaxPlace - 1;
 
-// More than all that a piece can hold: chunks of 65,536 types, none of whose slabs is of one.
+// Upper bound of a piece: chunks of 65,536 types without uniform slabs.
 constexpr std::size_t kMaxPieceBytes = std::size_t{32} << 20;
 static_assert(kChunksPerPiece * (16 + 2 * kMaxTypesOfChunk + kSlabs * (4 + 2 * kSlabVoxels)) <= kMaxPieceBytes);
 
 // Data is cut into pieces anywhere between two voxels.
 constexpr std::size_t kDataPieceBytes = std::size_t{8} << 20;
 static_assert(kDataPieceBytes + kMaxVoxelDataBytes < kMaxPieceBytes);
-// Of a voxel's data besides its bytes, and of a chunk's.
+// Data sizes in addition to a voxel's bytes, and per chunk.
 constexpr std::size_t kPlacedDataBytes = 12;
 constexpr std::size_t kDataHeaderBytes = 16;
 
@@ -46,7 +46,7 @@ static_assert(kFieldChunksPerPiece * (16 + 2 * kMaxTypesOfChunk + 2 * kSlabs * (
 // Real scenes take up to thirty times their text.
 constexpr std::size_t kFreeBytes = std::size_t{64} << 20;
 constexpr std::size_t kBytesPerFileByte = 64;
-// Of the tree above a chunk that lies alone, about; with the chunk itself 1,040, by which old files were bounded.
+// Approximate size of the tree above a single chunk; with the chunk itself 1,040, the bound of old files.
 constexpr std::size_t kBytesAboveChunk = 1'040 - sizeof(Chunk);
 
 constexpr int bits_of(std::size_t types) {
@@ -57,11 +57,11 @@ constexpr int bits_of(std::size_t types) {
 
 using DenseChunk = std::vector<VoxelType>;  // x fastest, then y, then z
 
-// Where the rows of a slab begin in a dense chunk: four of y beside each other, four of z.
+// Returns the start of a slab's rows in a dense chunk: four adjacent rows of y, four of z.
 std::size_t first_of_slab(int slab) {
   return (static_cast<std::size_t>(slab / 16) * 4 * kChunkEdge + static_cast<std::size_t>(slab % 16) * 4) * kChunkEdge;
 }
-constexpr std::size_t kSlabRun = std::size_t{4} * kChunkEdge;  // voxels of a slab that lie beside each other
+constexpr std::size_t kSlabRun = std::size_t{4} * kChunkEdge;  // adjacent voxels of a slab
 
 /// Calls `visit(voxels of one z)` for the four runs of a slab.
 template <class Voxels, class Visit>

@@ -14,7 +14,7 @@
 #include <quoin/grid/density_grid.h>
 #include <quoin/grid/grid.h>
 
-// The voxels of a grid as a scene file holds them: pieces of some chunks each, which are gzip streams in base64.
+// The voxels of a grid in a scene file: pieces of some chunks each, which are gzip streams in base64.
 //
 //   chunk    int32 x, y, z          its coordinates: voxels / 64
 //            uint32 n               types of its palette, 1 to 65,536
@@ -26,18 +26,18 @@
 //
 // Little-endian; chunk after chunk to the end of the piece.
 //
-// The densities of a field likewise, with their materials:
+// The densities of a field, with their materials:
 //
 //   chunk    a chunk as above, of the materials
 //            uint32 density         of all samples, as a half; or 0xFFFFFFFF, and then 256 slabs as above:
 //              uint32 density       of all of the slab, as a half; or 0xFFFFFFFF, and then
-//              uint8 low[1024], high[1024]  the two bytes of each half's difference, modulo 65,536, from the one before
-//                                           it along x; of the first in a row from 0
+//              uint8 low[1024], high[1024]  the two bytes of each half's difference, modulo 65,536, from the previous
+//                                           half along x; the first in a row is relative to 0
 //
-// What voxels hold besides their types, chunk after chunk, of which one may come in several pieces:
+// The data of voxels in addition to their types, chunk after chunk; a chunk may be spread over several pieces:
 //
 //   chunk    int32 x, y, z
-//            uint32 n               voxels with data that follow, 1 to 262,144; of each
+//            uint32 n               number of voxels with data after this, 1 to 262,144; each has
 //              uint32 place         x + 64 y + 4,096 z in the chunk, ascending
 //              uint32 state
 //              uint32 length        of its bytes, at most 65,536
@@ -47,8 +47,8 @@ namespace quoin {
 
 inline constexpr std::size_t kMaxSceneFileBytes = std::size_t{2} << 30;
 
-/// What chunks may take in memory, all together, of a file of so many bytes; and what a chunk counts as, the tree above
-/// it included. What is written keeps to it: where compressed voxels would take more, they are stored as they are.
+/// The memory limit for all chunks of a file of this size, and the memory that a chunk counts as, including the tree
+/// above it. Written files stay within it: if compressed voxels would exceed it, they are stored uncompressed.
 [[nodiscard]] std::size_t max_voxel_bytes(std::size_t file_bytes);
 [[nodiscard]] std::size_t voxel_bytes(const Chunk& chunk);
 [[nodiscard]] std::size_t voxel_bytes(const DensityChunk& chunk);
@@ -66,7 +66,7 @@ enum class VoxelCompression : std::uint8_t { Stored, Small };
                                                                           VoxelCompression compression, Threads threads,
                                                                           const Progress& progress);
 
-/// The same of what voxels hold besides their types; no pieces where they hold nothing.
+/// Encodes the voxels' data in the same way; returns no pieces if there are none.
 [[nodiscard]] Result<std::vector<std::vector<std::string>>> encode_data(std::span<const Grid* const> grids,
                                                                         VoxelCompression compression, Threads threads,
                                                                         const Progress& progress);
@@ -81,11 +81,11 @@ struct PlacedDensities {
   DensityChunk samples{Half{0}};
 };
 
-/// The chunks of a piece.
+/// Decodes the chunks of a piece.
 ///
-/// Errors: BadFormat, whose message says at which character of the text, or at which byte of what is in it; also for
-///         types that are not below `type_count`. LimitExceeded for a piece that would expand to more than 32 MiB, as
-///         none that was written does.
+/// Errors: BadFormat, with the character position in the text or the byte offset in its content; also for types of at
+/// least `type_count`. LimitExceeded for a piece that would expand to more than 32 MiB, which the writer never
+/// produces.
 [[nodiscard]] Result<std::vector<PlacedChunk>> decode_voxels(std::string_view piece, std::size_t type_count);
 /// The same of a field with that band; also for densities that are not within it.
 [[nodiscard]] Result<std::vector<PlacedDensities>> decode_field(std::string_view piece, std::size_t type_count,
@@ -96,7 +96,7 @@ struct DataPiece {
   std::vector<std::byte> bytes;
   std::size_t memory = 0;  ///< that it will take in a grid, at least
 };
-/// What is wrong with a voxel's state, or "": more bits than its type says.
+/// Returns the fault of a voxel's state, or "": more bits than its type allows.
 [[nodiscard]] std::string fault_of_state(IVec3 voxel, const VoxelData& data, const VoxelProperties& type);
 /// Errors: as `decode_voxels`.
 [[nodiscard]] Result<DataPiece> decode_data(std::string_view piece);

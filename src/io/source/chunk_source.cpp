@@ -16,17 +16,17 @@ namespace quoin {
 namespace {
 
 constexpr std::size_t kCacheBytes = std::size_t{32} << 20;
-/// What a part takes besides its chunks.
+/// Cost of a part in addition to its chunks.
 constexpr std::size_t kPartBytes = 256;
 
-/// Of a box that is one chunk along x and z: by columns, from below in each.
+/// Returns the sort key of a box that is one chunk wide along x and z: by column, then bottom to top.
 std::tuple<int, int, int> order_of(IVec3 place) {
   return {place.z, place.x, place.y};
 }
 
 }  // namespace
 
-/// The parts that were read last. A part that several threads want is read by the first, for which the others wait.
+/// The most recently read parts. If several threads need a part, the first reads it and the others wait.
 struct ChunkSource::Cache {
   struct Entry {
     std::size_t part = 0;
@@ -36,7 +36,7 @@ struct ChunkSource::Cache {
   };
   std::mutex mutex;
   std::condition_variable was_read;
-  std::list<Entry> entries;  // what was wanted last first
+  std::list<Entry> entries;  // most recently used first
   std::unordered_map<std::size_t, std::list<Entry>::iterator> by_part;
   std::size_t bytes = 0;
 
@@ -48,7 +48,7 @@ struct ChunkSource::Cache {
   void keep_within_limit() {
     for (auto last = entries.end(); bytes > kCacheBytes && last != entries.begin();) {
       --last;
-      if (last == entries.begin() || !last->is_read) continue;  // what was read just now stays
+      if (last == entries.begin() || !last->is_read) continue;  // a part read just now stays
       const auto gone = last++;
       forget(gone);
     }

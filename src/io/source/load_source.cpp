@@ -11,7 +11,7 @@ namespace quoin {
 
 namespace {
 
-// Lines of damage: of a whole world that is broken nobody reads more.
+// Maximum number of damage lines, for readable reports on broken worlds.
 constexpr std::size_t kMaxLines = 20;
 
 bool meet(const IBox& a, const IBox& b) {
@@ -47,7 +47,7 @@ void add_lines(const std::vector<Error>& broken, std::vector<std::string>& warni
   if (broken.size() > kMaxLines) warnings.push_back("and " + std::to_string(broken.size() - kMaxLines) + " more");
 }
 
-/// Reads the parts that meet a box, several at once, into what has a place for each.
+/// Reads the parts that meet a box, several at once, into one slot per part.
 struct Reading {
   const ChunkSource& source;
   std::vector<std::size_t> wanted{};

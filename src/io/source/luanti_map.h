@@ -12,9 +12,9 @@
 
 namespace quoin {
 
-/// Whether bytes begin as a map of Luanti's does: with SQLite's header, and its table of blocks.
+/// Returns true if bytes begin like a Luanti map: with SQLite's header, and the table of blocks.
 [[nodiscard]] bool is_luanti_map(std::span<const std::byte> beginning);
-/// Whether a folder is a world of Luanti's: it holds world.mt.
+/// Returns true if a folder is a Luanti world: it contains world.mt.
 [[nodiscard]] bool is_luanti_folder(const std::filesystem::path& path);
 
 /// A world of Luanti's: its folder, or the database in it (map.sqlite).

@@ -12,7 +12,7 @@ namespace quoin {
 
 namespace {
 
-/// An order of types by what they are, so that it does not depend on who found them first.
+/// Orders types by their properties, independent of the order of discovery.
 bool comes_before(const VoxelProperties& a, const VoxelProperties& b) {
   const auto key = [](const VoxelProperties& p) {
     const std::array colour{p.colour.r, p.colour.g, p.colour.b, p.colour.a};

@@ -52,7 +52,7 @@ namespace {
 
 constexpr int kDeepest = 128;
 
-/// Whether brackets stand deeper in one another than tinygltf, which goes down by calls, may be given.
+/// Returns true if brackets are nested too deeply for tinygltf, which parses recursively.
 bool is_too_deep(std::string_view json) {
   int depth = 0;
   bool in_text = false;
@@ -72,7 +72,7 @@ bool is_too_deep(std::string_view json) {
   return false;
 }
 
-/// What tinygltf asks of files; and pictures as bytes, by number.
+/// The data for tinygltf's callbacks, and the images as bytes, by number.
 struct Asked {
   Beside* beside = nullptr;
   std::vector<std::vector<std::byte>> pictures{};
@@ -128,7 +128,7 @@ const T* entry(const std::vector<T>& list, int index) {
 /// Numbers of an accessor by element and component; those of whole types as they are, or as shares of 1.
 class Accessor {
  public:
-  /// Errors: BadFormat for what lies beyond its buffer.
+  /// Opens an accessor. Errors: BadFormat if it extends past the end of its buffer.
   static Result<Accessor> open(const tinygltf::Model& model, int index, int components) {
     const tinygltf::Accessor* const of = entry(model.accessors, index);
     if (of == nullptr) return make_error(ErrorCode::BadFormat, "an accessor that is not there");
@@ -530,7 +530,7 @@ class GltfReader {
       waiting.pop_back();
       const tinygltf::Node* const node = entry(model_.nodes, at.node);
       if (node == nullptr) return make_error(ErrorCode::BadFormat, "node " + std::to_string(at.node) + " is not there");
-      // A node has one parent: what comes a second time goes in a circle, or says the same twice.
+      // A node has one parent: a second visit is a cycle or a duplicate.
       if (seen_[static_cast<std::size_t>(at.node)]) {
         return make_error(ErrorCode::BadFormat, "node " + std::to_string(at.node) + " has several parents");
       }
@@ -714,7 +714,7 @@ class GltfReader {
   bool has_skins_ = false;
 };
 
-/// The JSON of a file: that of a GLB is its first chunk.
+/// Returns the JSON of a file; in a GLB it is the first chunk.
 std::string_view json_of(std::span<const std::byte> bytes) {
   const std::string_view text = text_of(bytes);
   if (!is_glb(bytes)) return text;

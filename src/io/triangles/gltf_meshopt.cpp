@@ -95,7 +95,7 @@ std::vector<std::byte> with_json(std::span<const std::byte> file, std::string_vi
 /// Bytes that one of code can stand for: of 64 that are alike one is left, and indices of one byte become four.
 constexpr std::size_t kMostPacked = 256;
 
-/// What a view's extension says.
+/// The content of a view's extension.
 struct CodedView {
   std::span<const unsigned char> coded;
   std::size_t count = 0;

@@ -17,7 +17,7 @@ class Model;
 
 namespace quoin::triangles {
 
-/// Whether this build decodes them.
+/// Returns true if this build can decode them.
 [[nodiscard]] bool has_meshopt();
 
 /// Returns the file as tinygltf reads it; empty if it does so already. Buffers that stand for decoded views alone,
@@ -26,9 +26,9 @@ namespace quoin::triangles {
 /// to tinygltf.
 [[nodiscard]] std::vector<std::byte> readable_by_tinygltf(std::span<const std::byte> file, std::string_view json);
 
-/// Decodes all coded views into buffers of their own, which the views are of afterwards.
+/// Decodes all coded views into new buffers; the views then refer to these.
 ///
-/// Memory: at most 256 times the file's buffers: what is more is refused before it is made.
+/// Memory: at most 256 times the file's buffers; larger results are rejected before allocation.
 /// Errors: BadFormat with the view's number; Unsupported without meshoptimizer.
 [[nodiscard]] Status decode_views(tinygltf::Model& model);
 

@@ -78,7 +78,7 @@ namespace {
 class Bytes : public std::streambuf {
  public:
   explicit Bytes(std::span<const std::byte> bytes) {
-    // Streams are read here only, and take no pointers to what is constant.
+    // The stream is only read, but its API takes no const pointers.
     char* const first = const_cast<char*>(reinterpret_cast<const char*>(bytes.data()));  // NOLINT
     setg(first, first, first + bytes.size());
   }
@@ -274,7 +274,7 @@ class ObjReader {
       const std::size_t end = std::min(text.find('\n', at), text.size());
       std::string line = text.substr(at, end - at);
       at = end + 1;
-      // What is missing is said by who looked for it, with the reason.
+      // The code that looked for the file already reported it as missing, with the reason.
       if (line.empty() || line.find("Failed to load material file") != std::string::npos) continue;
       if (++count <= kMost) loaded_.warnings.push_back(std::move(line));
     }
@@ -314,7 +314,7 @@ class ObjReader {
       if (!from.emissive_texname.empty() && material.emission > 0.0F) take_emission(from, material);
       loaded_.mesh.materials.push_back(std::move(material));
     }
-    // What names no material, or one that is not there.
+    // The material of faces with a missing or unknown material name.
     no_material_ = loaded_.mesh.materials.size();
     MeshMaterial plain;
     const float grey = loaded_.mesh.colours.empty() ? channel_of(200.0 / 255.0) : 1.0F;
@@ -391,7 +391,7 @@ class ObjReader {
     loaded_.warnings.emplace_back(
         "its materials make all of the model invisible (Tr 1 or d 0); they are read as opaque");
   }
-  /// Of OBJ (0, 0) is the picture's bottom left corner.
+  /// The OBJ origin (0, 0) is the image's bottom left corner.
   [[nodiscard]] glm::vec2 place_of(int index) const {
     const auto at = 2 * static_cast<std::size_t>(std::max(index, 0));
     const auto& t = attributes_.texcoords;

@@ -153,7 +153,7 @@ class Values {
   [[nodiscard]] std::size_t position() const { return encoding_ == Encoding::Text ? words_.position() : at_; }
   /// Bytes that are left.
   [[nodiscard]] std::size_t remaining() const { return bytes_.size() - std::min(position(), bytes_.size()); }
-  /// What values of a type take at least.
+  /// Returns the minimum size of values of a type.
   [[nodiscard]] std::size_t least_bytes(Scalar type) const {
     return encoding_ == Encoding::Text ? 1 : kBytes[static_cast<std::size_t>(type)];
   }
@@ -204,7 +204,7 @@ class Values {
   bool failed_ = false;
 };
 
-/// What a property of a vertex is: 0 to 2 x to z, 3 to 6 red to alpha.
+/// Returns the meaning of a vertex property: 0 to 2 are x to z, 3 to 6 are red to alpha.
 std::optional<std::size_t> meaning_of(std::string_view name) {
   constexpr std::array<std::string_view, 7> kNames = {"x", "y", "z", "red", "green", "blue", "alpha"};
   if (name.starts_with("diffuse_")) name.remove_prefix(8);
@@ -214,7 +214,7 @@ std::optional<std::size_t> meaning_of(std::string_view name) {
   return std::nullopt;
 }
 
-/// A channel of 0 to 1, of whole numbers the share of what their type holds at most.
+/// Returns a channel as 0 to 1; integers are divided by their type's maximum.
 float share_of(double value, Scalar type) {
   if (type == Scalar::UInt8) value /= 255.0;
   if (type == Scalar::UInt16) value /= 65'535.0;
@@ -285,7 +285,7 @@ class PlyReader {
     }
     for (auto i = static_cast<std::size_t>(count); i > 0 && !values_.failed(); --i) {
       const double value = values_.next(property.type);
-      // What is no index is one of nothing.
+      // Invalid indices become kNowhere.
       list_.push_back(value >= -1.0 && value < 4294967295.0 ? static_cast<std::int64_t>(value) : kNowhere);
     }
     return {};

@@ -70,8 +70,8 @@ class Ring {
     next_[last_[i]] = next_[i];
     last_[next_[i]] = last_[i];
   }
-  /// A corner to the left with no other corner within its triangle. One that turns to the left itself need not be
-  /// looked at: another that does not lies there too.
+  /// Returns true if a corner turns to the left and its triangle contains no other corner. Left-turning corners need no
+  /// test: if one lies inside, so does a corner that does not turn left.
   [[nodiscard]] bool is_ear(std::uint32_t i) const {
     if (!(turn(i) > 0.0)) return false;
     const Point& a = points_[last_[i]];

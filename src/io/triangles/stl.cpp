@@ -28,7 +28,7 @@ glm::vec4 colour_of(unsigned r, unsigned g, unsigned b) {
   return {channel(r), channel(g), channel(b), 1.0F};
 }
 
-/// What the two bytes after a triangle say; nothing where they say none.
+/// Returns the colour in the two bytes after a triangle; nullopt if there is none.
 std::optional<glm::vec4> colour_of(std::uint16_t bits, const std::optional<glm::vec4>& of_all) {
   const bool is_set = (bits & 0x8000U) != 0;
   // Magics: a colour for all stands in the header, and the highest bit says that it holds.

@@ -49,11 +49,11 @@ constexpr std::int64_t kNone = -1;
 
 struct Triangle {
   std::array<std::uint32_t, 3> corners{};
-  std::int64_t group = kNone;  // of colours; kNone: that of its object
+  std::int64_t group = kNone;  // colour group; kNone: the object's group
   std::array<std::int64_t, 3> colours{kNone, kNone, kNone};
 };
 
-/// Another object within an object, or one that is to be built.
+/// An object within an object, or one of the build items.
 struct Placed {
   std::string path;  // of its part; empty: the same
   std::int64_t object = kNone;

@@ -16,16 +16,16 @@
 #include <quoin/io/mesh_file.h>
 #include <quoin/io/sidecar_file.h>
 
-// Files of triangles. docs/formats/meshes.md says what of each is read.
+// Files of triangles. docs/formats/meshes.md lists the supported content of each.
 //
-// Recognition is by content: `is_...` take what a file begins with (64 KiB suffice), or the whole of binary STL, which
-// only its length tells.
+// Recognition is by content: `is_...` take the beginning of a file (64 KiB suffice), or the whole file for binary STL,
+// identified by its length only.
 
 namespace quoin::triangles {
 
 inline constexpr std::size_t kMostTriangles = std::size_t{1} << 27;
 
-/// Files beside another, which that one names. Of bytes without a path there are none.
+/// Sidecar files that a file refers to. Bytes without a path have none.
 class Beside {
  public:
   Beside() = default;
@@ -38,7 +38,7 @@ class Beside {
   [[nodiscard]] Result<std::vector<std::byte>> read_or_same_name(const std::string& name);
   /// The first refusal of `read`.
   [[nodiscard]] const std::optional<Error>& refused() const { return refused_; }
-  /// What was read.
+  /// The files read so far.
   [[nodiscard]] std::vector<std::filesystem::path>& files() { return files_; }
 
  private:
@@ -50,7 +50,7 @@ class Beside {
   std::optional<Error> refused_;
 };
 
-/// Appends what belongs together, and counts what is left out.
+/// Appends connected data to a mesh, and counts dropped items.
 class MeshBuilder {
  public:
   explicit MeshBuilder(LoadedMesh& loaded) : loaded_(loaded) {}
@@ -61,7 +61,7 @@ class MeshBuilder {
   /// places in `corners`. Errors: LimitExceeded.
   [[nodiscard]] Status add_polygon(std::span<const std::size_t> corners,
                                    FunctionRef<void(const std::array<std::uint32_t, 3>&)> added);
-  /// Warns of what was left out. Call at the end.
+  /// Adds warnings for dropped items. Call at the end.
   void finish();
 
  private:
@@ -105,7 +105,7 @@ class MeshBuilder {
 [[nodiscard]] bool has_three_mf();
 [[nodiscard]] Result<LoadedMesh> read_three_mf(std::span<const std::byte> bytes, Beside& beside);
 
-/// Of those by which a beginning is known.
+/// Detects formats that a beginning identifies.
 [[nodiscard]] std::optional<FileFormat> detect(std::span<const std::byte> beginning);
 /// Returns the format of a file whose content alone does not show it: a binary STL that was cut off or has bytes behind
 /// its triangles, and a zip file whose names lie behind its beginning.

@@ -32,7 +32,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                           quoin::triangles::read_three_mf}) {
     check(read, bytes);
   }
-  // By libraries: what is not of their format they have nothing to do with.
+  // Readers based on libraries: they get only input of their format.
   if (quoin::triangles::is_obj(bytes)) check(quoin::triangles::read_obj, bytes);
   if (quoin::triangles::is_gltf(bytes) || quoin::triangles::is_glb(bytes)) check(quoin::triangles::read_gltf, bytes);
   return 0;

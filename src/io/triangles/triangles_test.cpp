@@ -26,7 +26,7 @@ std::span<const std::byte> bytes_of(const std::string& text) {
   return std::as_bytes(std::span(text.data(), text.size()));
 }
 
-/// What is read; a failure where it is none.
+/// Returns the mesh read; fails the test on an error.
 LoadedMesh mesh_of(const std::string& text, std::optional<UpAxis> up = UpAxis::Y) {
   auto loaded = read_mesh(bytes_of(text), up);
   if (!loaded) {

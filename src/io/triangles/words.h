@@ -35,7 +35,7 @@ class Words {
     const auto word = next();
     return word ? number_in(*word) : std::nullopt;
   }
-  /// Where the next word is looked for.
+  /// Returns the position where the next word is searched.
   [[nodiscard]] std::size_t position() const { return at_; }
 
  private:

@@ -82,7 +82,7 @@ std::vector<Dimension> all_dimensions(const fs::path& world) {
   return found;
 }
 
-/// level.dat of a world, or of the one that a dimension belongs to.
+/// Returns the level.dat of a world, or of the world that a dimension belongs to.
 std::optional<fs::path> level_file_of(const fs::path& path) {
   std::error_code error;
   const fs::path whole = fs::absolute(path, error).lexically_normal();

@@ -53,7 +53,7 @@ std::optional<int> whole_number(std::string_view text) {
   return is_whole ? std::optional(number) : std::nullopt;
 }
 
-/// What stands behind the last dot; the text becomes what stands before it.
+/// Returns the part after the last dot and shortens the text to the part before it.
 std::optional<std::string_view> take_last(std::string_view& text) {
   const std::size_t dot = text.rfind('.');
   if (dot == std::string_view::npos) return std::nullopt;

@@ -17,7 +17,7 @@
 // (.linear), see linear_region.h.
 //
 //   1,024 x (uint24 first sector, uint8 sectors), by z, then x; 1,024 x uint32 times; sectors of 4,096 bytes
-//   a chunk: uint32 bytes that follow; uint8 compression (| 128: in c.X.Z.mcc beside it); the compressed NBT
+//   a chunk: uint32 bytes after it; uint8 compression (| 128: in the sidecar file c.X.Z.mcc); the compressed NBT
 
 namespace quoin::minecraft {
 
@@ -36,7 +36,7 @@ enum class ChunkCompression : std::uint8_t { Gzip = 1, Zlib = 2, None = 3, Lz4 =
 
 enum class RegionKind : std::uint8_t { Anvil, Linear, McRegion };
 
-/// Where a region's name says that it lies: (x, z) of "r.X.Z.mca", whatever stands before it.
+/// The region coordinates in a file name: (x, z) of "r.X.Z.mca", after any prefix.
 struct RegionName {
   int x = 0;
   int z = 0;
@@ -54,7 +54,7 @@ class RegionFile {
  public:
   /// Errors: CannotRead; BadFormat where it is shorter than its table.
   [[nodiscard]] static Result<std::unique_ptr<RegionFile>> open(const std::filesystem::path& path, RegionName name);
-  /// The same of a file's bytes, which are copied; chunks in files beside it are not found.
+  /// Opens a file's bytes, which are copied, in the same way; chunks in sidecar files are not found.
   [[nodiscard]] static Result<std::unique_ptr<RegionFile>> of(std::span<const std::byte> bytes);
   RegionFile(const RegionFile&) = delete;
   RegionFile& operator=(const RegionFile&) = delete;
@@ -65,7 +65,7 @@ class RegionFile {
   /// The NBT of a chunk, decompressed. Requires: has(x, z).
   /// Errors: BadFormat, Unsupported, LimitExceeded, CannotRead; with the file, and the offset in it.
   [[nodiscard]] Result<std::vector<std::byte>> read(int x, int z) const;
-  /// The offset of a chunk in the file; in a Linear file that of all compressed data.
+  /// Returns the offset of a chunk in the file; in a Linear file the offset of all compressed data.
   [[nodiscard]] std::uint64_t offset(int x, int z) const {
     return linear_ ? LinearRegion::kDataOffset : std::uint64_t{entry(x, z) >> 8} * 4096;
   }

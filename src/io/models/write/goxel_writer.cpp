@@ -27,7 +27,7 @@ constexpr std::uint32_t kVersion = 2;
 constexpr int kBlockEdge = 16;
 constexpr std::size_t kBlockBytes = std::size_t{4} * kBlockEdge * kBlockEdge * kBlockEdge;
 
-/// What a layer's material says; colours are its voxels'.
+/// The material of a layer; colours belong to voxels.
 struct Material {
   float metalness = 0.0F;
   float roughness = 1.0F;

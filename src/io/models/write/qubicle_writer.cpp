@@ -47,7 +47,8 @@ class RunWriter {
   }
 
  private:
-  // A run of three or fewer is no longer as words. No colour is taken for a code: what is not empty has an alpha.
+  // Runs of up to three are no longer as plain words. Colours cannot be mistaken for codes, since solid voxels have an
+  // alpha.
   void end_run() {
     constexpr std::uint32_t kWords = 3;
     if (count_ > kWords) {

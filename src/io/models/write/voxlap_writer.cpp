@@ -1,5 +1,5 @@
-// Columns of spans, each of air and of solid voxels whose colours are those of its top and of its bottom; what lies
-// between has none, and is earth to who reads it. So colours are written of what can be seen and of what is not earth.
+// Columns of spans, each with air and with solid voxels coloured at its top and its bottom. The voxels between have no
+// colour, and readers take them as earth. So colours are written for visible voxels and for voxels that are not earth.
 // The file's z points down: +x, -z, +y are this library's axes.
 
 #include <algorithm>
@@ -57,7 +57,7 @@ class MapWriter {
   const std::vector<Rgba8>& colours_;
   IVec3 size_;
   IVec3 min_;                    // of the map, in the grid
-  std::array<Slice, 3> slices_;  // of the column's z, with those beside it
+  std::array<Slice, 3> slices_;  // of the column's z and of its two neighbours
   std::vector<VoxelType> column_;
   std::vector<bool> has_colour_;
   std::int64_t grounded_ = 0;

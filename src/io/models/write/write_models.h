@@ -6,12 +6,12 @@
 
 #include "io/placed/placed_grids.h"
 
-// Scenes as files of other programs: docs/formats/models.md says what each of them holds. What it does not is warned
-// of, or is an error where the file would show something else.
+// Writes scenes as files of other programs; docs/formats/models.md lists the supported content of each. Unsupported
+// content causes a warning, or an error if the file would look different.
 //
-// Read again by Quoin each gives the voxels that were written, and but for .binvox their colours, at the same places.
-// Errors of all: Unsupported for fields of densities, turns that are none by quarters, and voxels of different sizes;
-//                LimitExceeded for what is larger than the format's limits; Cancelled.
+// Quoin reads back the same voxels at the same positions, with their colours except for .binvox.
+// Errors of all: Unsupported for density fields, rotations that are not multiples of 90 degrees, and voxels of
+// different sizes; LimitExceeded beyond the format's limits; Cancelled.
 
 namespace quoin::models {
 

@@ -146,7 +146,7 @@ TEST(WriteModels, GoxelKeepsMaterialsAndWhatIsHidden) {
   ASSERT_TRUE(file) << to_string(file.error());
   const auto read = read_goxel(file->bytes);
   ASSERT_TRUE(read) << to_string(read.error());
-  // A layer for what is opaque, for glass and for metal, twice.
+  // Layers for opaque, glass and metal voxels, for each of two instances.
   EXPECT_EQ(read->scene.instances().size(), 6U);
   std::size_t hidden = 0;
   read->scene.instances().for_each(
@@ -228,7 +228,7 @@ TEST(WriteModels, MapsKeepEveryColourAndGetGround) {
   EXPECT_EQ(ground, 512U * 512U - static_cast<std::size_t>(std::ranges::count_if(
                                       expected, [](const auto& e) { return std::get<1>(e.first) == 0; })));
   EXPECT_EQ(found.size(), expected.size() + ground);
-  // What was read is written as it was read: nothing moves, and nothing is lost.
+  // A file read and written again is unchanged, without losses.
   const auto again = write_vxl(read->scene);
   ASSERT_TRUE(again);
   EXPECT_TRUE(again->bytes == file->bytes);
@@ -243,7 +243,7 @@ TEST(WriteModels, SpansOfMapsOfAnyForm) {
   SceneGrid grid;
   grid.grid.fill_box({{0, 0, 0}, {512, 20, 512}}, earth);
   grid.grid.fill_box({{100, 30, 100}, {140, 60, 140}}, earth);
-  grid.grid.set(120, 45, 120, red);  // in the middle of what nobody sees
+  grid.grid.set(120, 45, 120, red);  // hidden inside the solid
   grid.grid.fill_box({{50, 63, 50}, {60, 64, 60}}, red);
   grid.grid.set(120, 8, 120, red);
   const GridHandle handle = scene.add_grid(std::move(grid));
@@ -308,7 +308,7 @@ TEST(WriteModels, SchematicsHaveBlocksOfTheNearestColour) {
   EXPECT_TRUE(again->bytes == file->bytes);
 }
 
-/// What the reader of blocks leaves out because it looks the same is in what the game reads.
+/// Properties that the block reader drops, since they do not change the look, are in the written file.
 TEST(WriteModels, SchematicsSayWhatTheGameWouldTakeOtherwise) {
   Scene scene;
   SceneGrid grid;
@@ -361,7 +361,7 @@ TEST(PlacedGrids, HalvesOfVoxelsAllGoTheSameWay) {
   EXPECT_EQ(merged->voxels.voxel_count(), 4);
   ASSERT_FALSE(merged->warnings.empty());
   EXPECT_EQ(merged->warnings.front(), "instances between voxels moved to the nearest: 4");
-  // A hidden field is left out with all that is hidden; names of two lines are told in one.
+  // A hidden field is dropped with all hidden instances; names of two lines appear as one line.
   scene.edit(handle).field.add_sphere({0.0, 0.0, 0.0}, 2.0, type);
   const auto refused = merge_grids(scene, holds);
   ASSERT_FALSE(refused);
@@ -452,7 +452,7 @@ TEST(WriteModels, RefuseWhatTheyWouldShowOtherwise) {
 }
 
 #ifdef QUOIN_SOURCE_DIR
-/// Real files, written again in their own format, are what they were.
+/// Real files, read and written in their own format, are unchanged.
 TEST(WriteModels, RealFilesAreReadAgainAsTheyWere) {
   const fs::path data = fs::path(QUOIN_SOURCE_DIR) / "../shared/data";
   if (!fs::exists(data)) GTEST_SKIP() << "no real files here: " << data;
