@@ -21,7 +21,7 @@ template <class T>
   return result;
 }
 
-/// What `read(bytes)` makes of a file. Errors: also CannotRead; they name the file.
+/// Returns the result of `read(bytes)` on a file. Errors: also CannotRead; they name the file.
 template <class Read>
 [[nodiscard]] auto read_whole(const std::filesystem::path& path, Read read)
     -> std::invoke_result_t<Read, std::span<const std::byte>> {
@@ -30,8 +30,7 @@ template <class Read>
   return with_path(read(std::span<const std::byte>(*bytes)), path);
 }
 
-/// Writes what was made for it to a file, which appears whole or not at all; returns its size. Errors: also
-/// CannotWrite; they name the file.
+/// Writes bytes to a file atomically; returns its size. Errors: also CannotWrite; they name the file.
 [[nodiscard]] inline Result<std::uint64_t> write_whole(const std::filesystem::path& path,
                                                        Result<std::vector<std::byte>> bytes) {
   if (!bytes) return with_path(Result<std::uint64_t>(bytes.error()), path);
@@ -42,7 +41,7 @@ template <class Read>
 /// The files that a scene file names; nothing where it cannot be read.
 [[nodiscard]] std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::path& path);
 
-/// Where the values of a NIfTI pair lie, of which `path` is the header; nothing where it is none.
+/// Returns the data file of a NIfTI pair with the header `path`; empty if it is no pair.
 [[nodiscard]] std::vector<std::filesystem::path> files_of_pair(const std::filesystem::path& path);
 
 /// Makes a rename last: without it a power cut may bring the old folder entry back. Not all file systems can.

@@ -15,18 +15,18 @@
 
 namespace quoin {
 
-/// By which a database of SQLite's says that it is a world: "Quon".
+/// The SQLite application id of a world: "Quon".
 inline constexpr std::uint32_t kWorldApplicationId = 0x51756F6E;
 /// Bytes of a file that `is_world_format` has to see.
 inline constexpr std::size_t kWorldHeaderBytes = 100;
 
-/// Whether bytes begin as a world does: with SQLite's header, and our mark.
+/// Returns true if bytes begin like a world: with SQLite's header, and Quoin's application id.
 [[nodiscard]] bool is_world_format(std::span<const std::byte> beginning);
 [[nodiscard]] Result<LoadedScene> read_world_format(const std::filesystem::path& path, const LoadOptions& options,
                                                     Threads threads, const Progress& progress);
 [[nodiscard]] Result<LoadedScene> read_world_format(std::span<const std::byte> bytes, const LoadOptions& options,
                                                     Threads threads, const Progress& progress);
-/// `loaded`: the scene with what was read beside it, if it was read; else null.
+/// `loaded`: the scene with the data read in addition to it, if it was read; otherwise null.
 [[nodiscard]] Result<SavedScene> write_world_format(const Scene& scene, const LoadedScene* loaded,
                                                     const std::filesystem::path& path, Threads threads,
                                                     const Progress& progress);

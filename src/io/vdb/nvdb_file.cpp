@@ -1,13 +1,12 @@
-// A file: segments, each of u64 "NanoVDB0", u32 version, u16 grids, u16 codec; of each grid 176 bytes and its name;
-// then of each grid its bytes, as they are or as u64 size and a zlib stream or frames of Blosc. A grid's bytes:
+// A file has segments: u64 "NanoVDB0", u32 version, u16 grids, u16 codec; then 176 bytes and the name for each grid;
+// then the bytes of each grid, uncompressed, or as u64 size and a zlib stream or Blosc frames. A grid's bytes:
 //
-//   at     0  u64 "NanoVDB0"; 384: 9 doubles, the rows of a matrix; 528: where it puts 0; 632: u32 class; 636: u32 type
-//        672  the tree: 4 u64, of which the last says where its root is
-//   root       u32 tiles at 24, background behind it; tiles of 32 bytes: u64 place, i64 child, u32 active, value
-//   nodes      bits of active places at 32, bits of children, places of 8 bytes (a value or an i64 child) on
-//              multiples of 32
-//   leaves     bits of active voxels at 16, values
-// Children are said by how far they lie from their parent.
+//   at     0  u64 "NanoVDB0"; 384: 9 doubles, the rows of a matrix; 528: its translation; 632: u32 class; 636: u32 type
+//        672  the tree: 4 u64; the last is the offset of its root
+//   root       u32 tiles at 24, then the background; tiles of 32 bytes: u64 position, i64 child, u32 active, value
+//   nodes      active mask at 32, child mask, entries of 8 bytes (a value or an i64 child) aligned to 32 bytes
+//   leaves     mask of active voxels at 16, values
+// Child offsets are relative to their parent.
 
 #include "io/vdb/vdb_tree.h"
 
@@ -37,7 +36,7 @@ constexpr std::uint64_t kMaxGrid = std::uint64_t{1} << 31;
 
 enum class Type : std::uint32_t { Float = 1, Double = 2, Mask = 8, Bool = 11 };
 
-/// What of a node's bytes is where.
+/// The layout of a node's bytes.
 struct NodeShape {
   std::size_t places;  // 32^3 or 16^3
   std::size_t table;   // where they begin
@@ -113,7 +112,7 @@ class GridReader {
     if (type_ == Type::Double) return static_cast<float>(load_at<double>(at));
     return bytes_[at] != std::byte{0} ? 1.0F : 0.0F;
   }
-  /// Where a child lies; behind the grid where it cannot be.
+  /// Returns the position of a child; past the end of the grid if the offset is invalid.
   [[nodiscard]] std::size_t place_of(std::size_t parent, std::int64_t distance) const {
     const auto place = static_cast<std::int64_t>(parent) + distance % (std::int64_t{1} << 40);
     return place < 0 ? bytes_.size() + 1 : static_cast<std::size_t>(place);
@@ -194,7 +193,7 @@ class GridReader {
   std::size_t most_upper_;
 };
 
-/// What a segment says of a grid.
+/// A grid's entry in a segment.
 struct Entry {
   std::uint64_t bytes = 0;
   std::uint64_t stored = 0;
@@ -311,7 +310,7 @@ Result<File> read_nvdb_file(std::span<const std::byte> bytes) {
       if (!grid) return grid.error();
       auto read = read_grid(*grid, entry, file);
       if (!read) {
-        // Offsets are of what the grid expands to.
+        // Offsets refer to the decompressed grid.
         const std::uint64_t inside = read.error().byte_offset.value_or(0);
         const std::string within = codec == 0 ? "" : " (byte " + std::to_string(inside) + " of what it expands to)";
         return make_error(read.error().code, read.error().message + within, {}, codec == 0 ? at + inside : at);

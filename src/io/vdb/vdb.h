@@ -23,7 +23,7 @@ namespace quoin::vdb {
 /// A scene as .vdb, version 224, zip: for each instance its densities as a level set, and its voxels as a bool grid.
 /// An instance whose grid is there already shares its tree. The same scene gives the same bytes.
 [[nodiscard]] Result<std::vector<std::byte>> write_vdb(const Scene& scene);
-/// What of a scene is not in it, one line each.
+/// Returns the parts of a scene that a VDB file cannot store, one line each.
 [[nodiscard]] std::vector<std::string> losses_of_vdb(const Scene& scene);
 
 }  // namespace quoin::vdb

@@ -1,15 +1,15 @@
 // A file, all numbers little-endian (strings: u32 size, bytes):
 //
-//   i64 "VDB ", u32 version, u32 major, u32 minor, u8 offsets are there, 36 bytes of an id, metadata, u32 grids
-//   of a grid, its descriptor: string name, string type, string name of the grid whose tree it shares; i64 where it
-//   begins, where its buffers do, and where it ends
-//   there: u32 compression, metadata, string kind of map, its doubles
+//   i64 "VDB ", u32 version, u32 major, u32 minor, u8 has offsets, 36 bytes of an id, metadata, u32 grids
+//   each grid has a descriptor: string name, string type, string name of the grid whose tree it shares; i64 offsets of
+//   its start, of its buffers, and of its end
+//   at its start: u32 compression, metadata, string kind of map, its doubles
 //          i32 1, background, u32 tiles, u32 nodes; tiles: 3 i32, value, u8 active; nodes: 3 i32, then as below
-//          a node: bits that say which of its places have children, bits of active ones, values of all places; children
-//          of leaves: bits of active voxels
-//   buffers: of each leaf: bits of active voxels, values
-//   values: u8 code, up to two values of what is not active, bits that choose between them; those of active ones alone,
-//   or all, as they are, or i64 size and a zlib stream or a frame of Blosc (or minus a size, and as they are)
+//          a node: child mask, active mask, values of all entries; children
+//          leaves: mask of active voxels
+//   buffers: for each leaf: mask of active voxels, values
+//   values: u8 code, up to two inactive values, bits that choose between them; then the active values only, or all
+//   values, uncompressed, or as i64 size and a zlib stream or Blosc frame (a negative size: uncompressed)
 
 #include "io/vdb/vdb_tree.h"
 
@@ -40,10 +40,10 @@ constexpr std::uint32_t kZip = 1;
 constexpr std::uint32_t kActiveAlone = 2;
 constexpr std::uint32_t kBlosc = 4;
 constexpr std::string_view kHalfSuffix = "_HalfFloat";
-/// Coordinates beyond have no room for what looks past them.
+/// Larger coordinates would leave no room for reads past the border.
 constexpr std::int32_t kMaxCoordinate = 1 << 30;
 
-/// How a tree has its values.
+/// The value type of a tree.
 enum class Scalar : std::uint8_t { Float, Double, Bool, Mask };
 
 struct Descriptor {
@@ -67,7 +67,7 @@ double read_f64(ByteReader& reader) {
   return std::bit_cast<double>(read_u64(reader));
 }
 
-/// What of metadata is asked for; the rest is passed over.
+/// The metadata used here; other entries are skipped.
 struct Metadata {
   std::string kind;  // "class"
   bool is_half = false;
@@ -171,7 +171,7 @@ class TreeReader {
   Status read_data(std::size_t count, std::span<float> out);
   Status read_buffer(Leaf& leaf);
   void add_tile(IVec3 origin, int edge, float value, bool is_active) {
-    // Of a mask what is active is there, of a bool grid what is true besides.
+    // A mask holds its active voxels; a bool grid holds its true voxels.
     if (scalar_ == Scalar::Mask) value = is_active ? 1.0F : 0.0F;
     if (!is_active && value == grid_.background) return;
     grid_.tiles.push_back({origin, edge, value, is_active});

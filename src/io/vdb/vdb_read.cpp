@@ -26,7 +26,7 @@ constexpr std::size_t kMaxFilledChunks = std::size_t{1} << 20;
 constexpr double kMaxFog = 0x1p27;
 constexpr VoxelType kMaterial = 1;
 
-/// Where an index space lies in the world, if its voxels are cubes.
+/// Returns the placement of an index space in the world, if its voxels are cubes.
 std::optional<Instance> place_of(const glm::dmat4& world_from_index) {
   constexpr double kTolerance = 1e-4;
   Instance placed;
@@ -53,7 +53,7 @@ struct Piece {
   bool is_tile = false;
 };
 
-/// All of a tree by chunks; tiles for which `is_wanted` alone.
+/// Returns a tree's content by chunk, with the tiles that satisfy `is_wanted`.
 Result<std::vector<Piece>> pieces_of(const Grid& grid, FunctionRef<bool(const Tile&)> is_wanted) {
   std::vector<Piece> pieces;
   for (std::size_t i = 0; i < grid.leaves.size(); ++i) {
@@ -82,7 +82,7 @@ Result<std::vector<Piece>> pieces_of(const Grid& grid, FunctionRef<bool(const Ti
   return pieces;
 }
 
-/// Calls `make(pieces of a chunk)` on several threads, then `put(chunk, what was made)` in order.
+/// Calls `make(pieces of a chunk)` on several threads, then `put(chunk, result)` in order.
 template <class Made>
 Status for_chunks(const std::vector<Piece>& pieces, Threads threads, const Progress& progress,
                   FunctionRef<Made(std::span<const Piece>)> make, FunctionRef<void(IVec3, Made)> put) {
@@ -271,7 +271,7 @@ class SceneMaker {
   const Progress& progress_;
   LoadedScene loaded_;
   std::vector<std::optional<GridHandle>> handles_;  // by place in the file
-  std::vector<IVec3> origins_;                      // of fog, likewise: its box's least corner
+  std::vector<IVec3> origins_;                      // of fog grids, in the same order: the minimum corner of the box
 };
 
 // The smallest box around all that is in a grid.

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The corpus was written by OpenVDB and NanoVDB 10; what it holds was counted by them.
+// The corpus was written by OpenVDB and NanoVDB 10, which also gave the expected counts.
 const fs::path kCorpus = fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "vdb";
 constexpr std::int64_t kInSphere = 4139;  // samples, of radius 10 around (2, 4, 6)
 

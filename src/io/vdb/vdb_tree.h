@@ -28,7 +28,7 @@ inline constexpr std::size_t kLeafVoxels = 512;
   return static_cast<std::size_t>(x << 6 | y << 3 | z);
 }
 
-/// What the values mean.
+/// The meaning of a grid's values.
 enum class Meaning : std::uint8_t {
   LevelSet,  ///< signed distances in world units, negative inside
   Fog,       ///< densities: the more the denser
@@ -56,7 +56,7 @@ struct Grid {
   float background = 0.0F;
   std::vector<Leaf> leaves;
   std::vector<float> values;  ///< 512 a leaf, in order; of masks none, and `active` says which are there
-  std::vector<Tile> tiles;    ///< those that are active, or differ from the background
+  std::vector<Tile> tiles;    ///< tiles that are active, or differ from the background
   glm::dmat4 world_from_index{1.0};
   std::size_t same_as = SIZE_MAX;  ///< the place of the grid whose tree it shares; it has none itself
 };
@@ -68,11 +68,12 @@ struct File {
 
 /// " BDV" and zeros.
 [[nodiscard]] bool is_vdb(std::span<const std::byte> beginning);
-/// Reads a file, versions 222 (OpenVDB 1.1) to 225: grids of float, double and bool, and masks; plain, zip and Blosc.
+/// Reads a file, versions 222 (OpenVDB 1.1) to 225: grids of float, double and bool, and masks; uncompressed, zip and
+/// Blosc.
 ///
 /// Source: openvdb/io and openvdb/tree of OpenVDB 10.
 /// Errors: BadFormat with the offset; LimitExceeded; Unsupported.
-/// Memory: 2 KiB a leaf, each of which takes 128 bytes of the file at least; 24 bytes a tile that is no background.
+/// Memory: 2 KiB per leaf, which takes at least 128 bytes in the file; 24 bytes per non-background tile.
 [[nodiscard]] Result<File> read_vdb_file(std::span<const std::byte> bytes);
 
 /// "NanoVDB0".

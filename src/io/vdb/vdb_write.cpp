@@ -92,7 +92,7 @@ void set_bit(std::span<std::uint64_t> bits, int i) {
   bits[static_cast<std::size_t>(i) >> 6] |= std::uint64_t{1} << (i & 63);
 }
 
-/// What lies in the 8^3 places of a chunk: makes nodes of it.
+/// Adds the nodes of an 8^3 block of a chunk.
 void add_block(Tree& tree, IVec3 origin, bool is_inside, const LeafMask* leaf) {
   const IVec3 upper = origin >> 12;  // rounded down
   static_assert(kUpperEdge == 1 << 12);
@@ -258,14 +258,14 @@ class TreeWriter {
     for (const auto& [i, mask] : lower.leaves) set_bit(children, i);
     out_.words(children);
     if (field_ == nullptr) {
-      // What is inside is active, and true.
+      // Inside voxels are active and true.
       out_.words(lower.inside);
       out_.number(std::uint8_t{0});
       std::size_t count = 0;
       for (const std::uint64_t word : lower.inside) count += static_cast<std::size_t>(std::popcount(word));
       out_.zipped(std::vector<std::byte>(count, std::byte{1}));
     } else {
-      // Nothing is active; bits choose the background, and what they do not is minus that.
+      // No voxel is active; set bits select the background, clear bits its negative.
       out_.words(std::array<std::uint64_t, 64>{});
       out_.number(std::uint8_t{3});
       std::array<std::uint64_t, 64> outside{};
@@ -401,7 +401,7 @@ class SceneWriter {
   Writer out_;
   std::vector<Wanted> wanted_;
   std::map<std::string, int> names_;
-  std::map<std::tuple<const SceneGrid*, double>, std::string> trees_;  // by what they hold
+  std::map<std::tuple<const SceneGrid*, double>, std::string> trees_;  // by content
 };
 
 }  // namespace

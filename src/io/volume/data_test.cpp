@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <quoin/io/volume.h>
 
-/// Real scans, which lie beside the source tree on machines that have them.
+/// Real scans, present next to the source tree on some machines.
 namespace quoin {
 namespace {
 
@@ -49,7 +49,7 @@ TEST_F(VolumeData, EveryFileHasTheSizeAndTypeThatOthersFound) {
     const std::vector<int> dims = dims_in(info);
     ASSERT_GE(dims.size(), 3U) << file;
     EXPECT_EQ(volume.size, IVec3(dims[0], dims[1], dims[2])) << file;
-    // NIfTI's numbers for types; the index does not give that of the one file of version 2.
+    // NIfTI's type numbers; the index lacks the type of the single version 2 file.
     const bool is_uint8 = info.find("dtype=2 ") != std::string::npos;
     EXPECT_EQ(volume.type, is_uint8 ? ScalarType::UInt8 : ScalarType::Int16) << file;
     EXPECT_EQ(volume.warnings.size(), dims.size() > 3 && dims[3] > 1 ? 1U : 0U) << file;

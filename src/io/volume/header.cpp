@@ -60,7 +60,7 @@ Status set_size(const std::array<std::int64_t, 3>& extents, const VolumeOptions&
 
 namespace {
 
-// What is decoded at once stays in the cache.
+// Values decoded at a time; they fit the CPU cache.
 constexpr std::size_t kValuesAtOnce = std::size_t{1} << 14;
 
 float to_float(double value) {
@@ -129,7 +129,7 @@ void decode(ScalarType type, const std::byte* bytes, std::endian order, Scale sc
   }
 }
 
-/// The range of what is finite, and counts of what is not.
+/// The range of the finite values, and counts of the others.
 struct Survey {
   float min = std::numeric_limits<float>::infinity();
   float max = -std::numeric_limits<float>::infinity();

@@ -19,12 +19,12 @@ namespace quoin {
 /// Encodings of the values of a volume, apart from a compression of the whole file.
 enum class DataEncoding : std::uint8_t { Raw, Gzip, Bzip2, Ascii, Hex };
 
-/// What the header of a volume says: all of the volume but its values, and where and how those are stored.
+/// The header of a volume: its properties except the values, and the position and format of the stored values.
 struct VolumeHeader {
   Progress progress;  ///< of reading the values
   Volume volume;
   std::endian order = std::endian::little;
-  double slope = 1.0;  ///< a value is slope times what is stored, plus intercept
+  double slope = 1.0;  ///< value = slope * stored value + intercept
   double intercept = 0.0;
 
   std::uint64_t data_at = 0;                       ///< where the values, or their encoded form, begin
@@ -43,12 +43,12 @@ enum class VolumeSpace : std::uint8_t { RightFrontHead, LeftFrontHead, LeftBackH
 /// The turn that `read_volume` documents, as a linear map.
 [[nodiscard]] glm::dmat4 quoin_from_space(VolumeSpace space);
 
-/// Sets `size` when it is one that Quoin can hold.
+/// Sets `size` if Quoin supports it.
 /// Errors: LimitExceeded. Requires: every extent is positive.
 [[nodiscard]] Status set_size(const std::array<std::int64_t, 3>& extents, const VolumeOptions& options,
                               std::optional<std::uint64_t> byte_offset, Volume& volume);
 
-/// Whether a file may mean this by a distance: positive, and neither so small nor so large that products overflow.
+/// Returns true for a valid distance: positive, and neither so small nor so large that products overflow.
 [[nodiscard]] inline bool is_distance(double distance) {
   constexpr double kSmallest = 1e-30;
   constexpr double kLargest = 1e30;
@@ -58,10 +58,10 @@ enum class VolumeSpace : std::uint8_t { RightFrontHead, LeftFrontHead, LeftBackH
 /// "64 x 33 x 32".
 [[nodiscard]] std::string text_of_size(IVec3 size);
 
-/// Reads the values that a header announces into its volume, with their range and counts; warns of what is not finite.
+/// Reads the values announced by a header into its volume, with their range and counts; warns of non-finite values.
 ///
-/// Requires: `stream` stands at the first value; `offset` is what errors about its length give.
-/// Errors:   BadFormat when there are fewer values than `size` says.
+/// Requires: `stream` is at the first value. `offset` is reported in errors about its length.
+/// Errors:   BadFormat if there are fewer values than `size` requires.
 [[nodiscard]] Status read_values(ByteStream& stream, VolumeHeader& header, std::uint64_t offset);
 
 /// Bytes that the values of a header take, with all components.
@@ -71,10 +71,10 @@ enum class VolumeSpace : std::uint8_t { RightFrontHead, LeftFrontHead, LeftBackH
 
 namespace quoin::nifti {
 
-/// How many bytes `read_header` wants at most.
+/// The maximum number of bytes that `read_header` needs.
 inline constexpr std::size_t kMaxHeaderBytes = 540;
 
-/// Whether a NIfTI-1 or -2 header of either byte order begins here, alone or of a pair.
+/// Returns true if a NIfTI-1 or -2 header of either byte order begins here, for a single file or a pair.
 [[nodiscard]] bool is_header(std::span<const std::byte> bytes);
 
 /// Reads a header; sources as in read_volume. Requires: is_header(bytes). Offsets in errors count from `bytes`.
@@ -84,19 +84,20 @@ inline constexpr std::size_t kMaxHeaderBytes = 540;
 
 namespace quoin::nrrd {
 
-/// How many bytes a header may have; one of a few dozen lines has some thousand.
+/// The maximum size of a header; a few dozen lines have some thousand bytes.
 inline constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 16;
 
-/// Whether a NRRD header begins here.
+/// Returns true if a NRRD header begins here.
 [[nodiscard]] bool is_header(std::span<const std::byte> bytes);
 
 /// Reads a header; sources as in read_volume. `bytes` may be the file's first kMaxHeaderBytes.
 /// Requires: is_header(bytes). Offsets in errors count from `bytes`.
 [[nodiscard]] Result<VolumeHeader> read_header(std::span<const std::byte> bytes, const VolumeOptions& options);
 
-/// Decodes values that are no raw bytes and no gzip stream (ascii, hex, bzip2), from `begin` on, to raw bytes of the
-/// header's order; of bzip2 as many as the header needs, with the bytes to skip before them.
-/// Memory: that of the decoded bytes. Requires: begin <= bytes.size().
+/// Decodes values of other encodings than raw and gzip (ascii, hex, bzip2), from `begin` on, to raw bytes in the
+/// header's byte order. For bzip2 it decodes as many bytes as the header needs, including the bytes to skip before
+/// them.
+/// Memory: the decoded bytes. Requires: begin <= bytes.size().
 /// Errors: BadFormat, with the offset; Unsupported for bzip2 in builds without it.
 [[nodiscard]] Result<std::vector<std::byte>> decode_values(std::span<const std::byte> bytes, std::size_t begin,
                                                            const VolumeHeader& header);

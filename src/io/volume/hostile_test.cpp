@@ -152,7 +152,7 @@ TEST(VolumeHostile, OffsetsWithinCompressedFilesSayWhatTheyCount) {
 }
 
 TEST(VolumeHostile, BombsOfGzipAreErrors) {
-  // 64 MiB of zeros in 64 KiB, of which the header speaks, or not.
+  // 64 MiB of zeros in 64 KiB, with and without a matching header.
   NiftiFile file{.dim = {3, 512, 512, 256}};
   const Bytes bomb = gzipped(file.bytes(Bytes(std::size_t{1} << 26)));
   ASSERT_LT(bomb.size(), std::size_t{70'000});

@@ -19,7 +19,7 @@ namespace quoin::nifti {
 
 namespace {
 
-/// Where a field lies in the headers of both versions.
+/// The offsets of a field in the headers of both versions.
 struct Place {
   std::uint16_t in_1;
   std::uint16_t in_2;
@@ -205,7 +205,7 @@ bool has_size(std::span<const std::byte> bytes, std::int32_t size, std::endian o
   return bytes.size() >= 4 && load<std::int32_t>(bytes.data(), order) == size;
 }
 
-/// Whether a magic number has this letter, 'n' for one file or 'i' for a pair: "n+1", "ni1".
+/// Returns true if a magic number has the letter for one file ('n': "n+1") or for a pair ('i': "ni1").
 bool has_magic(std::span<const std::byte> bytes, bool is_second, bool is_pair) {
   if (is_second)
     return has_text(bytes, kSecondMagicAt, is_pair ? std::string_view("ni2\0", 4) : std::string_view("n+2\0", 4));
@@ -334,7 +334,7 @@ Status read_data_place(const Fields& fields, bool is_pair, VolumeHeader& header)
   if (header.data_at == fields.header_bytes()) return {};
   if (header.data_at != 0) return bad("vox_offset is " + std::to_string(header.data_at) + ", within the header", at);
   header.data_at = least;
-  // Two statements: in one, GCC 12 warns of what it makes of the sum.
+  // Two statements: in a single one, GCC 12 gives a false warning about the concatenation.
   std::string& warning = header.volume.warnings.emplace_back("vox_offset is 0; the values are taken from byte ");
   warning += std::to_string(least);
   return {};

@@ -32,7 +32,7 @@ constexpr std::int16_t kIntentLabel = 1002;
 constexpr std::int16_t kScanner = 1;
 constexpr std::size_t kLongestName = 15;
 
-/// What the file holds besides its samples.
+/// The content of the file except its samples.
 struct Header {
   IBox box{};  ///< of the samples, in the grid
   glm::dmat4 world_from_grid{1.0};

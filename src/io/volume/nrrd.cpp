@@ -24,7 +24,7 @@ namespace quoin::nrrd {
 
 namespace {
 
-/// What follows the colon of a field, and where in the file.
+/// The text after a field's colon, and its offset in the file.
 struct Field {
   std::string_view text;
   std::size_t at = 0;
@@ -61,7 +61,7 @@ Error bad(std::string message, std::size_t at) {
 /// `text`, or as much of it as a message can hold, on one line between quotation marks.
 std::string quoted(std::string_view text) {
   constexpr std::size_t kMost = 40;
-  // Appended piece by piece: GCC 12 warns of what it makes of operator+ here.
+  // Appended piece by piece: GCC 12 gives a false warning about operator+ here.
   std::string shown = "\"";
   shown.append(printable(text.substr(0, kMost)));
   if (text.size() > kMost) shown.append("...");

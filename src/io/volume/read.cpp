@@ -13,7 +13,7 @@ namespace quoin {
 
 namespace {
 
-/// What a file begins with, decompressed, and whether it had to be.
+/// The decompressed beginning of a file, and whether it was compressed.
 struct Beginning {
   std::vector<std::byte> bytes;
   Compression compression = Compression::None;

@@ -13,16 +13,16 @@
 #include "io/byte_order.h"
 #include "io/byte_stream.h"
 
-/// What the tests and the fuzz target of volumes share.
+/// Shared by the tests and the fuzz target of volumes.
 namespace quoin::volume_test {
 
 using Bytes = std::vector<std::byte>;
 
-/// What most files of tests hold: 3 x 2 x 2 samples.
+/// The content of most test files: 3 x 2 x 2 samples.
 inline const std::vector<double> kTwelve = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
 inline const std::vector<float> kTwelveFloats(kTwelve.begin(), kTwelve.end());
 
-/// Where a sample is in the world.
+/// Returns the world position of a sample.
 inline DVec3 position_of(const Volume& volume, DVec3 voxel) {
   return DVec3(volume.world_from_voxel * glm::dvec4(voxel, 1.0));
 }
@@ -91,7 +91,7 @@ inline Bytes gzipped(std::span<const std::byte> bytes) {
   return quoin::gzipped(bytes, 9);
 }
 
-/// What a NIfTI header says; the offsets of its fields are written here once more, by the specification.
+/// A NIfTI header; its field offsets are repeated here, by the specification.
 struct NiftiFile {
   bool is_second = false;
   std::endian order = std::endian::little;
@@ -168,7 +168,7 @@ struct NiftiFile {
 /// The datatype numbers of NIfTI, by ScalarType.
 inline constexpr std::array<int, 10> kNiftiTypes = {2, 256, 512, 4, 768, 8, 1280, 1024, 16, 64};
 
-/// Reads bytes that may be anything: what is wrong with what came of it, or nothing.
+/// Reads arbitrary bytes; returns a fault of the result, or "".
 inline std::string wrong_with(std::span<const std::byte> bytes) {
   constexpr std::int64_t kMost = 1 << 20;
   const Result<Volume> volume = read_volume(bytes, {.max_values = kMost});

@@ -12,7 +12,7 @@ namespace quoin::vox {
 
 namespace {
 
-/// A camera's keys, as MagicaVoxel has them where nobody set any.
+/// A camera's keys, with MagicaVoxel's defaults.
 struct Keys {
   DVec3 focus{0.0};
   DVec3 angle{0.0};  ///< pitch, yaw, roll, in degrees
@@ -53,7 +53,7 @@ bool is_orthographic(const Keys& keys) {
   return keys.mode == "orth" || keys.mode == "iso";
 }
 
-/// Nobody looked through it: older versions write a radius of 1, newer ones 0.
+/// Returns true for an unused camera: older versions write a radius of 1, newer ones 0.
 bool was_never_set(const Keys& keys) {
   const bool is_near = keys.radius == 0.0 || keys.radius == 1.0;
   return is_near && keys.focus == DVec3(0.0) && keys.angle == DVec3(0.0);
@@ -68,7 +68,7 @@ std::string fault_of(const Keys& keys) {
   return {};
 }
 
-/// How far from `focus` everything lies in front of a plane across `forward`.
+/// Returns the distance from `focus` of a plane across `forward` that has all of `bounds` in front of it.
 double distance_before(const DBox& bounds, DVec3 focus, DVec3 forward) {
   if (bounds.empty()) return 0.0;
   double nearest = 0.0;

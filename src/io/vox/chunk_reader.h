@@ -20,7 +20,7 @@ class ChunkReader : public ByteReader {
       : ByteReader(file, begin, end), id_(id), offset_(offset) {}
 
   [[nodiscard]] std::string_view id() const { return id_; }
-  /// Where the chunk's header starts.
+  /// Returns the offset of the chunk's header.
   [[nodiscard]] std::size_t offset() const { return offset_; }
 
   [[nodiscard]] std::string_view string() { return text(u32()); }

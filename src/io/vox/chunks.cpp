@@ -13,9 +13,9 @@ namespace {
 
 constexpr std::size_t kFileHeaderBytes = 8;
 constexpr std::string_view kMagic = "VOX ";
-// Some writers count the headers before them among MAIN's children, 20 bytes at most. Such a file ends with a whole
-// chunk all the same. One that was cut off does not, or has lost a chunk of at most 8 bytes of content: that of no
-// chunk that says anything.
+// Some writers include the headers before MAIN's children in its child size, at most 20 bytes. Such a file still ends
+// with a complete chunk. A truncated file does not, unless it lost a chunk of at most 8 bytes of content, which no
+// meaningful chunk has.
 constexpr std::size_t kMostOverstated = kFileHeaderBytes + kChunkHeaderBytes;
 constexpr std::string_view kLfsPointer = "version https://git-lfs";
 
@@ -54,7 +54,7 @@ Status check_signature(std::span<const std::byte> bytes) {
   return bad_at(0, "a MagicaVoxel file starts with \"VOX \", this one with \"" + printable(text_of(bytes, 4)) + "\"");
 }
 
-/// Reads a header and checks that what it claims lies before `end`; its children may reach up to `spare` bytes further.
+/// Reads a header and checks that its sizes end before `end`; its children may extend up to `spare` bytes further.
 Result<ChunkHeader> read_header(std::span<const std::byte> bytes, std::size_t begin, std::size_t end,
                                 std::size_t spare = 0) {
   ByteReader reader(bytes, begin, end);
@@ -152,7 +152,7 @@ Status parse_index_map(ChunkReader& chunk, Document& out) {
   return {};
 }
 
-/// A damaged one is no reason to refuse the voxels: it is kept as it is, like chunks that nobody knows.
+/// A damaged camera does not invalidate the voxels: its chunk is kept unchanged, like unknown chunks.
 void parse_camera(ChunkReader& chunk, Document& out) {
   CameraChunk camera;
   camera.id = chunk.i32();
@@ -173,12 +173,13 @@ void parse_setting(ChunkReader& chunk, Document& out) {
   }
 }
 
-/// Whether the last SIZE still waits for its XYZI.
+/// The last SIZE chunk, while its XYZI is pending.
 struct ModelState {
   bool has_size = false;
 };
 
-/// What a chunk is, by its name and what came before it. Requires: `out` holds what came before, not the chunk itself.
+/// Classifies a chunk by its id and the chunks before it. Requires: `out` holds the chunks before it, not the chunk
+/// itself.
 ChunkPlace place_of(const ChunkHeader& header, const ModelState& state, const Document& out) {
   ChunkPlace place;
   place.begin = header.offset;
@@ -381,7 +382,7 @@ Status parse_keys(ChunkReader& chunk, Result<Key> (*parse)(ChunkReader&, std::si
   return {};
 }
 
-/// What all nodes begin with: an id and attributes.
+/// Parses the common start of all nodes: an id and attributes.
 Node parse_node(ChunkReader& chunk, NodeKind kind) {
   Node node;
   node.kind = kind;

@@ -90,7 +90,7 @@ struct SettingChunk {
   Dict attributes;
 };
 
-/// What a chunk within MAIN says, in the order of the file.
+/// The type of a chunk within MAIN.
 enum class ChunkKind : std::uint8_t { Other, ModelCount, Size, Voxels, PackedVoxels, Palette, Material, Node, Layer };
 
 struct ChunkPlace {
@@ -114,7 +114,7 @@ struct Document {
   std::vector<Node> nodes;
   std::vector<std::int32_t> children;        ///< node ids
   std::vector<TransformKey> transform_keys;  ///< of one node: by ascending frame
-  std::vector<ModelKey> model_keys;          ///< likewise
+  std::vector<ModelKey> model_keys;          ///< of one node: by ascending frame
   std::vector<Layer> layers;
   std::vector<CameraChunk> cameras;
   std::vector<SettingChunk> settings;
@@ -127,7 +127,7 @@ struct Document {
   std::size_t chunks_end = 0;    ///< and where the last one ends
 };
 
-/// Of a chunk's header: what it is called, the bytes of its content, and of its children.
+/// The size of a chunk's header: its id, the size of its content, and of its children.
 inline constexpr std::size_t kChunkHeaderBytes = 12;
 
 /// The frame of a transform's or a shape's key; one without `_f` takes its place in the list. Nothing when it is none.
@@ -136,7 +136,7 @@ inline constexpr std::size_t kChunkHeaderBytes = 12;
 [[nodiscard]] std::optional<Orientation> parse_orientation(std::string_view text);
 [[nodiscard]] std::optional<IVec3> parse_translation(std::string_view text);
 
-/// Whether one of several frames is shown.
+/// Returns true if the file has several frames.
 [[nodiscard]] bool is_animated(const Document& document);
 /// The last frame that there is.
 [[nodiscard]] std::int64_t last_frame(const Document& document);
@@ -147,8 +147,9 @@ inline constexpr std::size_t kChunkHeaderBytes = 12;
 /// Errors: Unsupported for formats that share the name; BadFormat with the byte offset.
 [[nodiscard]] Result<Document> parse_document(std::span<const std::byte> bytes);
 
-/// The voxels of a TDCZ as those of an XYZI: x, y, z, colour index of each that has a colour. What is compressed is a
-/// byte a voxel of the whole box, x fastest, then y, then z. Writers may leave the stream without an end.
+/// Decodes the voxels of a TDCZ to the form of an XYZI: x, y, z, colour index of each voxel with a colour. The
+/// compressed data has one byte per voxel of the whole box, x fastest, then y, then z. Some writers leave the stream
+/// unterminated.
 ///
 /// Memory: 64 MiB at most, since no edge is longer than 256.
 /// Errors: BadFormat with the byte offset, for damaged data and for more or fewer voxels than the box has.

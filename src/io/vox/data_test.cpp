@@ -8,7 +8,7 @@
 
 #include "io/vox/vox_for_tests.h"
 
-/// Real files: 152 of them lie beside the source tree, with what others counted in them, on machines that have them.
+/// Real files: 152 of them, next to the source tree on some machines, with counts by other programs.
 namespace quoin {
 namespace {
 
@@ -81,7 +81,7 @@ TEST_F(VoxData, AnUntouchedFileComesBackByteForByte) {
   }
 }
 
-// What an artist's first stroke does: of one model the voxels, nothing else.
+// Simulates an artist's first stroke: it changes the voxels of one model only.
 TEST_F(VoxData, APaintedVoxelChangesTheVoxelsOfItsModelAlone) {
   for (const DataFile& file : files_) {
     if (file.voxels <= 0) continue;

@@ -234,7 +234,7 @@ TEST(VoxHostile, AMillionNestedGroupsAreWalked) {
   EXPECT_EQ(loaded->scene.instances().size(), 1U);
 }
 
-/// 64 groups, each of which holds the next one twice: 2^64 ways down.
+/// 64 groups, each containing the next one twice: 2^64 paths.
 FileBuilder doubling_graph() {
   FileBuilder builder = file_of_one_voxel();
   builder.transform(0, 1, {{}});

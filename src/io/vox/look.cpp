@@ -17,11 +17,11 @@ namespace {
 
 constexpr double kRadians = std::numbers::pi / 180.0;
 constexpr double kUsualAir = 0.4;                            // _ray_d, _mie_d and _o3_d of the Earth
-constexpr std::array kUsualRayleigh = {45.0, 104.0, 255.0};  // _ray_k, likewise
+constexpr std::array kUsualRayleigh = {45.0, 104.0, 255.0};  // default of _ray_k
 constexpr std::array kUsualOzone = {105.0, 255.0, 110.0};
 constexpr double kBloomRadius = 0.05;  // of a _scale of 1
 
-// What a key that Quoin does not draw is set to when nobody sets it.
+// The default of a key that Quoin does not support.
 struct Usual {
   std::string_view group, key, value;
 };
@@ -43,7 +43,7 @@ class Settings {
     }
   }
 
-  // The numbers of a key. What is no such text stays unread.
+  // Returns the numbers of a key. Invalid text stays unread.
   template <std::size_t kCount>
   [[nodiscard]] std::optional<std::array<double, kCount>> numbers(std::string_view group, std::string_view key) {
     const auto found = values_.find({group, key});
@@ -70,7 +70,7 @@ class Settings {
       out[i] = linear_from_srgb(static_cast<float>(channel / 255.0));
     }
   }
-  // As multiples of what is usual.
+  // Stores the values as multiples of the defaults.
   void put_ratio(std::string_view group, std::string_view key, const std::array<double, 3>& usual, Vec3& out) {
     const auto value = numbers<3>(group, key);
     if (!value) return;
@@ -88,7 +88,7 @@ class Settings {
     found->second.is_read = true;
     return std::string(found->second.text);
   }
-  // What a group says does not count.
+  // Marks a group's keys as read, to ignore them.
   void pass(std::string_view group) {
     for (auto& [name, value] : values_) {
       if (name.first == group && name.second != "_enable") value.is_read = true;

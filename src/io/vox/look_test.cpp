@@ -31,7 +31,7 @@ FileLook look_with(const std::vector<Entries>& settings) {
   return loaded.look.value_or(FileLook{});
 }
 
-// What MagicaVoxel writes when nobody set anything.
+// The settings that MagicaVoxel writes by default.
 std::vector<Entries> usual() {
   return {
       {{"_type", "_bounce"}, {"_energy", "3"}, {"_diffuse", "2"}, {"_specular", "5"}, {"_scatter", "5"}},

@@ -16,7 +16,7 @@ namespace quoin::vox {
 
 namespace {
 
-// MATT's properties by bit: a float each, but for the last, which has no value.
+// MATT's properties by bit: a float each, except the last, which has no value.
 struct OldProperty {
   const char* key;
   bool has_value;
@@ -204,7 +204,7 @@ void decode_cloud(const Attributes& attributes, VoxelProperties& out) {
   out.anisotropy = std::clamp(number(attributes, "_g").value_or(0.0F), -1.0F, 1.0F);
 }
 
-/// What the published keys say.
+/// Decodes the published keys.
 void decode_published(const Attributes& attributes, VoxelProperties& out) {
   const auto type_entry = attributes.find("_type");
   const std::string type = type_entry == attributes.end() ? "_diffuse" : type_entry->second;
@@ -234,7 +234,7 @@ void decode_published(const Attributes& attributes, VoxelProperties& out) {
   out.ior = std::clamp(refraction.value_or(kDefaultRefraction), 1.0F, kMaxRefraction);
 }
 
-/// What Quoin's own keys say, in the order of encode_own.
+/// Decodes Quoin's own keys, in the order of encode_own.
 void decode_own(const Attributes& attributes, VoxelProperties& out) {
   const auto text = [&](const char* key) -> const std::string* {
     const auto found = attributes.find(std::string(kOwnPrefix) + key);
@@ -300,7 +300,7 @@ void encode_published(const VoxelProperties& properties, Attributes& out) {
   if (transparent) out["_trans"] = to_text(static_cast<float>(255 - properties.colour.a) / 255.0F);
 }
 
-/// Adds Quoin's own keys for what `decoded`, the reading of the published ones, lacks.
+/// Adds Quoin's own keys for properties that `decoded`, the result of the published keys, lacks.
 void encode_own(const VoxelProperties& wanted, const VoxelProperties& decoded, Attributes& out) {
   const auto set = [&](const char* key, const std::string& value) { out[std::string(kOwnPrefix) + key] = value; };
   if (wanted.name != decoded.name) set("name", printable(wanted.name));

@@ -32,8 +32,8 @@ IVec3 chunks_of(IVec3 size) {
   return (size + (kChunkEdge - 1)) >> kChunkShift;
 }
 
-/// Where a grid's voxel lies: its place in its chunk in bits 0-17, the chunk's number above, as the sum of one share an
-/// axis of the model's. Beyond the model shares are so large that no sum with one is a place.
+/// The address of a voxel in a grid, as the sum of one share per model axis: its index in its chunk in bits 0-17, the
+/// chunk's number above. Shares outside the model are so large that no sum with one is a valid address.
 struct Places {
   static constexpr std::uint32_t kOutside = 1U << 28;
   std::array<std::uint32_t, 256> of_x{};
@@ -42,7 +42,7 @@ struct Places {
 };
 static_assert(kMaxModelEdge <= 256 && (64U << kTypeShift) < Places::kOutside);
 
-/// `strides`: what one chunk further along the grid's axes adds to the chunk's number.
+/// `strides`: increments of the chunk number per chunk along the grid's axes.
 Places places_in(IVec3 model_size, IVec3 strides) {
   const auto share = [](int voxel, int stride, int shift) {
     const int chunk = (voxel >> kChunkShift) * stride;

@@ -28,7 +28,7 @@ struct Orientation {
 
 [[nodiscard]] Orientation inverse(const Orientation& orientation);
 
-/// First turned, then moved. Requires of what is computed with them: offsets stay below 2^62, as those of files do.
+/// A rotation followed by a translation. Requires for computations: offsets stay below 2^62, as all file offsets do.
 struct Motion {
   Orientation orientation;
   Offset translation{0, 0, 0};

@@ -40,7 +40,7 @@ std::vector<int> all_rotation_bytes() {
 
 using Placed = std::set<std::array<int, 4>>;
 
-/// Where each voxel's centre goes, in MagicaVoxel's axes and then, voxel (x, y, z) to (x, z, -1 - y), in Quoin's.
+/// Transforms each voxel's centre in MagicaVoxel's axes and then to Quoin's: voxel (x, y, z) to (x, z, -1 - y).
 Placed place_by_hand(const std::vector<FileVoxel>& voxels, IVec3 size, const Matrix& m, IVec3 t) {
   Placed placed;
   for (const FileVoxel& v : voxels) {

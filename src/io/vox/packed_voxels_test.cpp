@@ -18,7 +18,7 @@ namespace {
 using vox_test::FileBuilder;
 using vox_test::FileVoxel;
 
-/// How a writer ends its stream.
+/// The end of a writer's stream.
 enum class End { Proper, None };
 
 std::vector<std::byte> deflated(std::span<const std::byte> bytes, End end) {

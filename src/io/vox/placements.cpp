@@ -109,7 +109,7 @@ struct Step {
   std::size_t node = 0;
   std::size_t next_child = 0;
   Hanging hanging;
-  std::size_t group = kNone;  ///< what it is in Placements::groups when it is one of them
+  std::size_t group = kNone;  ///< its index in Placements::groups, if it is a listed group
 };
 
 class GraphWalk {
@@ -187,7 +187,7 @@ Status GraphWalk::check_shapes() {
   return {};
 }
 
-/// How what is below a step begins to hang.
+/// Returns the initial Hanging of a step's children.
 Hanging GraphWalk::below(const Step& parent) const {
   if (parent.node != kNone && document_.nodes[parent.node].kind == NodeKind::Transform) return parent.hanging;
   Hanging hanging;
@@ -235,7 +235,7 @@ bool GraphWalk::is_scene_itself(const Hanging& hanging) const {
 void GraphWalk::add_transform(Step& step) {
   const Node& node = document_.nodes[step.node];
   Hanging& hanging = step.hanging;
-  // What a chain has above its last transform counts as its own.
+  // The effects of a chain's earlier transforms count as its own.
   if (hanging.transform_count > 0) {
     hanging.before = inverse(hanging.parent_motion) * hanging.world;
     hanging.hidden = hanging.hidden || is_layer_hidden(hanging.layer);

@@ -65,7 +65,7 @@ void put_place(const vox::Motion& motion, Placed& out) {
   out.mirrored = turn.mirrored;
 }
 
-/// Layers by their ids: of several with one id one that is hidden, since it hides.
+/// Layers by their ids; a hidden layer wins among layers of equal id, since it hides.
 using LayersById = std::map<std::int32_t, LayerHandle>;
 
 LayersById add_layers(VoxSource& source, Scene& scene) {

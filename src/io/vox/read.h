@@ -15,8 +15,8 @@ namespace quoin::vox {
 
 inline constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
-/// Where a shape or a group hangs in the scene graph: below the nearest group above it, by a chain of transforms, which
-/// is mostly one.
+/// The position of a shape or a group in the scene graph: below the nearest group above it, by a chain of transforms,
+/// usually a single one.
 struct Hanging {
   std::size_t node = kNone;    ///< the shape or the group itself, in Document::nodes; kNone where there is no graph
   std::size_t parent = kNone;  ///< in Placements::groups; kNone: the scene itself
@@ -25,9 +25,9 @@ struct Hanging {
   Motion parent_motion;     ///< of the group above, in the world
   Motion before;            ///< of all transforms of the chain but the last, together
   Motion world;             ///< of all transforms down to here
-  bool hidden = false;      ///< by itself or its chain, whatever is above
+  bool hidden = false;      ///< by itself or its chain, regardless of the groups above
   std::int32_t layer = -1;  ///< of the last transform
-  std::string_view name;    ///< likewise
+  std::string_view name;    ///< of the last transform
 };
 
 /// A model as the scene graph shows it: the sum of all transforms on one way down to a shape. MagicaVoxel's axes.
@@ -36,7 +36,7 @@ struct Placement : Hanging {
   std::string_view shape_name;  ///< of the shape itself; Quoin's writer puts a grid's name there
 };
 
-/// The placements at one frame, in the order of the graph, and what there is to warn of.
+/// The placements at one frame, in the order of the graph, with warnings.
 struct Placements {
   std::vector<Placement> all;
   /// Groups but the topmost, which is the scene itself unless it is hidden, on a layer or named; parents come first.
@@ -50,7 +50,7 @@ struct Placements {
   std::vector<std::string> warnings;
 };
 
-/// What a transform does at a frame, as `place_models` has it.
+/// Returns a transform's motion at a frame, as in `place_models`.
 [[nodiscard]] Motion motion_at(const Document& document, const Node& node, int frame);
 /// The place of the key, in the file's order sorted by frames, that a shape shows at a frame.
 [[nodiscard]] std::size_t key_of_shape(const Document& document, const Node& shape, int frame);
@@ -59,14 +59,14 @@ struct Placements {
 
 /// Walks the scene graph of the document.
 ///
-/// Without nodes every model is a frame of an animation, and the one chosen stands on the ground, centred.
-/// Between two keys of a transform the position is interpolated, rounded towards zero, and the turn is the earlier's.
-/// Cost:   memory and time within a small multiple of the file's size, whatever the graph.
-/// Errors: BadFormat for cycles and for nodes or models that are not there; LimitExceeded when nodes with several
-///         parents multiply beyond `file_bytes`; InvalidArgument for a frame that is not there.
+/// Without nodes every model is a frame of an animation, and the chosen model stands on the ground, centred. Between
+/// two keys of a transform the position is interpolated, rounded towards zero, and the rotation is the earlier key's.
+/// Cost:   memory and time within a small multiple of the file's size, for any graph.
+/// Errors: BadFormat for cycles and for missing nodes or models; LimitExceeded when nodes with several parents multiply
+///         beyond `file_bytes`; InvalidArgument for a missing frame.
 [[nodiscard]] Result<Placements> place_models(const Document& document, int frame, std::size_t file_bytes);
 
-/// What was left out of models, over all of them.
+/// Counts of dropped voxels, over all models.
 struct ModelLosses {
   std::int64_t outside = 0;     ///< voxels beyond their model's size
   std::int64_t colourless = 0;  ///< voxels of colour index 0, which is air
@@ -78,9 +78,9 @@ class ModelBuilder {
   explicit ModelBuilder(const std::array<std::uint8_t, kColours>& type_of) : type_of_(type_of) {}
 
   /// Voxel (x, y, z) of the model becomes voxel (x, z, size.y - 1 - y) of the grid; canvas and pivot as in SceneGrid.
-  /// Where a position is named twice the last one counts. Voxels outside the model or without a colour are left out.
+  /// The last voxel of a position counts. Voxels outside the model or without a colour are dropped.
   ///
-  /// Cost: O(voxels), whatever the model's size.
+  /// Cost: O(voxels), independent of the model's size.
   [[nodiscard]] SceneGrid build(const Model& model);
 
   [[nodiscard]] const ModelLosses& losses() const { return losses_; }

@@ -11,7 +11,7 @@ namespace quoin {
 
 namespace {
 
-/// How chunks that a scene has no place for are called, for people; nothing for those that say what it has.
+/// Returns a display name for chunks without a place in a scene; "" for chunks that a scene represents.
 std::string kept_as(std::string_view id) {
   if (id == "rCAM") return "cameras";
   if (id == "rOBJ") return "render settings";

@@ -12,14 +12,14 @@
 
 namespace quoin {
 
-/// A .vox file as it was read, beside the scene that it became. Neither changes: a scene that did is compared with it.
+/// A .vox file as read, together with the scene made from it. Neither changes: an edited scene is compared with it.
 ///
-///   file                          scene, by the slots of its handles
-///   document.models[i]            grid i
-///   document.layers[i]            layer layer_of[i]; kNone: not in the scene
-///   placements.all[i]             instance i
-///   placements.groups[i]          group i
-///   colour index i                type type_of[i]
+///  file                          scene, by the slots of its handles
+///  document.models[i]            grid i
+///  document.layers[i]            layer layer_of[i]; kNone: not in the scene
+///  placements.all[i]             instance i
+///  placements.groups[i]          group i
+///  colour index i                type type_of[i]
 struct VoxSource {
   std::vector<std::byte> bytes;
   vox::Document document;  // views of `bytes`
@@ -30,8 +30,8 @@ struct VoxSource {
   Scene scene;
 };
 
-/// The handle of what has a slot of the scene as it was read, there and in what became of it; of nothing where there
-/// was none.
+/// Returns the handle of a slot in the scene as read, which is also valid in its edited copies; a null handle if the
+/// slot is empty.
 template <class T>
 [[nodiscard]] Handle<T> handle_read(const SlotMap<T>& read, std::size_t slot) {
   return read.handle_at(static_cast<std::uint32_t>(slot)).value_or(Handle<T>{});

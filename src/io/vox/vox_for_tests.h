@@ -17,7 +17,7 @@
 #include "io/vox/write/chunk_writer.h"
 #include "io/vox/write/write.h"
 
-/// What the tests and the fuzz target of .vox share.
+/// Shared by the tests and the fuzz target of .vox.
 namespace quoin::vox_test {
 
 using Entries = std::vector<std::pair<std::string, std::string>>;
@@ -188,8 +188,8 @@ inline std::string difference_after_round_trip(const Scene& scene) {
   return difference(scene, again->scene);
 }
 
-/// Reads bytes that may be anything. What can be read must survive writing and reading again, unless it lies beyond
-/// what a file can say; errors must be one line. Returns what is wrong, or nothing.
+/// Reads arbitrary bytes. Readable files must survive writing and reading again, unless they exceed the limits of the
+/// format; errors must be one line. Returns a fault, or "".
 inline std::string wrong_with(std::span<const std::byte> bytes, const LoadOptions& options = {}) {
   const Result<LoadedScene> loaded = read_vox(bytes, options);
   if (!loaded) {
@@ -205,7 +205,7 @@ inline std::string wrong_with(std::span<const std::byte> bytes, const LoadOption
   return difference(loaded->scene, again->scene);
 }
 
-/// Of all grids of a scene.
+/// Returns the bytes of all grids in a scene.
 inline std::size_t grid_bytes(const Scene& scene) {
   std::size_t bytes = 0;
   for (const GridHandle grid : scene.grids().handles()) bytes += scene.grids()[grid].grid.bytes();

@@ -153,13 +153,13 @@ void GraphRevision::find_top() {
   } else if (source_.placements.top_group == kNone) {
     const auto root = root_below_no_group();
     begin_graph(root ? std::vector{*root}
-                     : std::vector<std::int32_t>{});  // settle_root takes it away if nobody needs it
+                     : std::vector<std::int32_t>{});  // settle_root removes it later if the graph does not use it
   } else {
     top_ = {source_.placements.top_group, kNone, source_.placements.top_motion};
   }
 }
 
-/// Takes it and the chain above it from the graph; what is below stays, or goes by itself.
+/// Removes it and the chain above it from the graph; nodes below stay, or are removed separately.
 void GraphRevision::remove(const Hanging& hanging) {
   if (!source_.placements.is_tree) out_.must_be_new = true;
   const Document& document = source_.document;
@@ -183,7 +183,7 @@ void GraphRevision::remove_what_is_gone() {
   }
 }
 
-/// Where the pivot that the file gives the grid's first piece goes.
+/// Returns the motion of the pivot that the file gives to the grid's first piece.
 Result<Motion> GraphRevision::place(const Instance& instance, const GridPlan& plan) {
   if (instance.voxel_size != 1.0) {
     return make_error(
@@ -209,7 +209,8 @@ Result<Motion> GraphRevision::place(const Instance& instance, const GridPlan& pl
   return Motion{*orientation, *translation};
 }
 
-/// A group's place is for handling it alone: what the file cannot say of it is left out, and nothing else moves.
+/// A group's placement only serves its handling: the part that the file cannot store is dropped, and no other node
+/// moves.
 Motion GraphRevision::place(const SceneGroup& group, const Motion& parent) {
   bool is_exact = true;
   const auto translation = rounded(group.position, is_exact);
@@ -270,7 +271,7 @@ bool GraphRevision::is_hidden(std::int32_t layer) const {
   return false;
 }
 
-/// Transforms of a chain above its last one lie on layers of which the scene does not know: when such a layer is shown
+/// A chain's transforms above its last one may lie on layers that the scene does not track: when such a layer is shown
 /// or hidden, they leave it.
 void GraphRevision::keep_shown_by_chain(const Wanted& wanted, const Known& known) {
   const Hanging& hanging = known.hanging;
@@ -457,7 +458,7 @@ void GraphRevision::apply_child_changes() {
   }
 }
 
-/// Whether its reader would take the group, if it were the topmost one, for the scene itself.
+/// Returns true if the reader would treat the group, as the topmost one, as the scene itself.
 bool GraphRevision::would_be_the_scene(const SceneGroup& group) const {
   return group.visible && printable(group.name).empty() && scene_.layers().find(group.layer) == nullptr;
 }
@@ -489,7 +490,7 @@ void GraphRevision::free_root_id() {
   change(static_cast<std::size_t>(taken - nodes.begin())).id = id;
 }
 
-/// Where the source had no group as the scene itself, the new root stays only if something hangs there that did not.
+/// If the source had no group as the scene itself, the new root stays only if new nodes hang below it.
 void GraphRevision::settle_root() {
   if (!keeps_graph_ || source_.placements.top_group != kNone) return;
   if (!needs_new_top()) {
@@ -539,8 +540,8 @@ bool needs_graph(const Scene& scene, const VoxSource& source, const ModelPlan& m
   const SceneGrid& grid = scene.grids()[instance.grid];
   const bool says_nothing =
       instance.name.empty() && grid.name.empty() && instance.visible && scene.layers().find(instance.layer) == nullptr;
-  // Where the reader would place it: on the ground, centred.
-  // Likewise what it shows at other frames.
+  // Compares with the position that the reader would choose: on the ground, centred. Checks the models of other frames
+  // too.
   for (const GridPlan& other : models.grids) {
     const bool was_there = source.scene.grids().find(other.grid) != nullptr;
     if (was_there && (other.source_model == kNone || (other.is_resized && other.grid != instance.grid))) return true;

@@ -15,19 +15,19 @@
 
 namespace quoin::vox {
 
-/// What the scene graph and the layers of a file become.
+/// The revised scene graph and layers of a file.
 struct RevisedGraph {
   std::map<std::size_t, NodeContent> changed;  ///< by their places in the source's nodes
-  std::vector<bool> is_removed;                ///< likewise
+  std::vector<bool> is_removed;                ///< by their positions in the source's nodes
   std::vector<NodeContent> added;
   std::vector<std::int32_t> layer_ids;  ///< by slots of the scene's layers
   bool adds_only_layer = false;         ///< the file has none, and its shapes lie on layer 0
   std::int64_t rounded = 0;             ///< instances between voxels, which were moved
   std::int64_t beyond_limit = 0;        ///< instances farther out than MagicaVoxel shows
   std::int64_t turns_left_out = 0;      ///< groups whose turn or mirror the file cannot say
-  std::int64_t frames_left_out = 0;     ///< of a file without a graph: nothing of what they were is there any more
-  bool has_empty_model = false;         ///< shapes show one that has no voxel, whose number is the plan's count
-  /// A node with several parents has to change, so the graph has to be written anew.
+  std::int64_t frames_left_out = 0;     ///< frames of a file without a graph that are no longer kept
+  bool has_empty_model = false;         ///< shapes show a model without voxels, whose number is the plan's count
+  /// A node with several parents has to change, so the whole graph must be rewritten.
   bool must_be_new = false;
 };
 
@@ -40,7 +40,8 @@ struct RevisedGraph {
 /// The same of a file without a scene graph that needs none: its layers.
 [[nodiscard]] RevisedGraph revise_layers(const Scene& scene, const VoxSource& source);
 
-/// Whether a file without a scene graph needs one to show the scene: without, its reader shows one model at its place.
+/// Returns true if a file without a scene graph needs one to show the scene: without a graph, its reader shows one
+/// model at its default position.
 [[nodiscard]] bool needs_graph(const Scene& scene, const VoxSource& source, const ModelPlan& models);
 
 }  // namespace quoin::vox

@@ -1,14 +1,14 @@
 #pragma once
 
-// The scene graph that is written. One class, since each of its steps goes over what the last left in the same members:
+// The scene graph to be written. A single class, since each step continues on the members left by the last:
 //
-//   number_layers, find_top    ids of layers; the group that is the scene itself, perhaps a new one
-//   remove_what_is_gone        of the source
-//   revise_groups              from the top: place, name, layer, parent
-//   revise_instances           likewise, and the models that they show: graph_shapes.cpp
-//   name_shapes, apply_child_changes, settle_root
+//  number_layers, find_top    ids of layers; the group that is the scene itself, perhaps a new one
+//  remove_what_is_gone        removed nodes of the source
+//  revise_groups              from the top: position, name, layer, parent
+//  revise_instances           the same, and the models that they show: graph_shapes.cpp
+//  name_shapes, apply_child_changes, settle_root
 //
-// All of it goes into one RevisedGraph: nodes of the source that are other than they were, and new ones.
+// The result is a RevisedGraph: the changed nodes of the source, and new nodes.
 
 #include <cstddef>
 #include <cstdint>
@@ -33,10 +33,10 @@ namespace quoin::vox {
 inline constexpr std::int32_t kRootTransform = 0;
 inline constexpr std::int32_t kNoLayer = -1;
 
-/// Whether each can be written, and negated.
+/// Returns true if each component can be written, and negated.
 [[nodiscard]] bool has_32_bits(const Offset& offset);
 
-/// Where a piece of a grid stands beside its first one.
+/// Returns the motion of a grid's piece relative to the first piece.
 [[nodiscard]] Motion from_first_piece(const GridPlan& plan, std::size_t piece);
 
 /// Looks for ids that no node has.
@@ -45,7 +45,7 @@ class FreshIds {
   explicit FreshIds(const Document* document) {
     if (document == nullptr) return;
     for (const Node& node : document->nodes) used_.insert(node.id);
-    // What is referred to and not there must not come to be.
+    // Ids that are referenced but missing must not be assigned to new nodes.
     used_.insert(document->children.begin(), document->children.end());
     constexpr std::int32_t kFarEnd = std::numeric_limits<std::int32_t>::max() / 2;
     if (!used_.empty() && *used_.rbegin() >= 0 && *used_.rbegin() < kFarEnd) next_ = *used_.rbegin() + 1;
@@ -60,7 +60,7 @@ class FreshIds {
   std::int32_t next_ = kRootTransform;
 };
 
-/// Where children are hung: a group of the source or a new one.
+/// The parent of new children: a group of the source or a new one.
 struct Parent {
   std::size_t source_node = kNone;  ///< else it is new
   std::size_t added = kNone;        ///< in RevisedGraph::added
@@ -80,7 +80,7 @@ struct ChildChanges {
   std::vector<std::int32_t> added;
 };
 
-/// What an instance and a group have in common: what its transform says.
+/// The common properties of an instance and a group, stored in its transform.
 struct Wanted {
   std::string name;
   bool visible = true;
@@ -89,7 +89,7 @@ struct Wanted {
   Motion world;
 };
 
-/// What it was when it was read.
+/// The same properties as read from the source.
 struct Known {
   const Hanging& hanging;
   const std::string& name;
@@ -116,7 +116,7 @@ class GraphRevision {
   }
 
  private:
-  /// What a file without a scene graph shows at one frame.
+  /// The content of one frame in a file without a scene graph.
   struct Frame {
     const GridPlan* plan = nullptr;  ///< null: its grid is gone
     Motion first;                    ///< where the pivot of its first piece goes
@@ -183,7 +183,7 @@ class GraphRevision {
   std::map<Parent, ChildChanges> children_;
   std::map<std::size_t, std::size_t> inserted_;  // transforms that were put above nodes, in RevisedGraph::added
   std::map<GridHandle, std::vector<std::size_t>> added_shapes_;   // of grids, in RevisedGraph::added
-  std::map<GridHandle, std::vector<std::size_t>> source_shapes_;  // likewise, in the source's nodes
+  std::map<GridHandle, std::vector<std::size_t>> source_shapes_;  // by grid: its shapes among the source's nodes
 };
 
 }  // namespace quoin::vox

@@ -1,5 +1,5 @@
-// The models that instances show: shapes of one model, groups of shapes for what is written as several pieces, and keys
-// of shapes for what was frames.
+// The models that instances show: shapes of one model, groups of shapes for grids of several pieces, and shape keys for
+// former frames.
 
 #include <algorithm>
 #include <cmath>
@@ -55,7 +55,7 @@ std::vector<GraphRevision::Frame> GraphRevision::frames_about(const Motion& box)
   return frames;
 }
 
-/// Where the pivot of a model's box in the source lies beside that of its first piece.
+/// Returns the offset between the pivots of a source model's box and of its first piece.
 Motion GraphRevision::from_source_box(const GridPlan& plan, std::size_t model) const {
   GridPlan boxes = plan;
   const IBox before = canvas_of(source_.document.models[model].size);
@@ -78,8 +78,8 @@ void GraphRevision::show_frames(const std::vector<Frame>& frames, NodeContent& t
   }
 }
 
-/// Hangs a piece of a grid below a group that is at `group` in the added nodes; `frame`: the only one that shows it,
-/// of all those in `frame_count`; kNone: all do.
+/// Adds a piece of a grid below a group, at `group` in the added nodes. `frame`: the only frame of `frame_count` that
+/// shows it; kNone: all frames show it.
 void GraphRevision::hang_piece(std::size_t group, const std::string& name, const GridPlan& plan, std::size_t piece,
                                const Motion& motion, std::size_t frame, std::size_t frame_count) {
   NodeContent transform;
@@ -175,8 +175,8 @@ std::int32_t GraphRevision::add_shape(const NodeContent& before, const std::vect
   return id;
 }
 
-/// A shape that shows one model at the frame becomes a group of shapes that show its pieces then, and nothing at other
-/// frames; what it shows at those is a shape beside them.
+/// Turns a shape that shows one model at the frame into a group of shapes that show its pieces at that frame only. An
+/// additional shape shows the models of the other frames.
 void GraphRevision::show_pieces(std::size_t shape_node, const GridPlan& plan) {
   NodeContent& shape = change(shape_node);
   const NodeContent before = shape;

@@ -13,7 +13,7 @@ namespace quoin::vox {
 
 namespace {
 
-/// Which models of the source only ever show where one key of a transform puts them, so that their pivot may move.
+/// Finds the source models that are only shown at one key of a transform, so that their pivot may move.
 std::vector<bool> models_of_one_key(const VoxSource& source) {
   const Document& document = source.document;
   std::vector<bool> free(document.models.size(), document.models.size() == 1 || !document.nodes.empty());
@@ -157,7 +157,7 @@ class ColourBox {
            static_cast<std::size_t>(at.x);
   }
   [[nodiscard]] bool contains(IVec3 at) const { return at.x < size_.x && at.y < size_.y && at.z < size_.z; }
-  /// What is there; it is air from then on.
+  /// Returns a voxel's colour and sets the voxel to air.
   std::byte take(std::size_t place) {
     QUOIN_ASSERT(place < colours_.size(), "a place of the box");
     return std::exchange(colours_[place], std::byte{0});

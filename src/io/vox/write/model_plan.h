@@ -12,13 +12,13 @@
 
 namespace quoin::vox {
 
-/// What becomes of a grid in the file.
+/// The models of a grid in the file.
 struct GridPlan {
   GridHandle grid;
   std::vector<Piece> pieces;         ///< never empty; of a model of the source one
   std::size_t source_model = kNone;  ///< the source's model that it stays; kNone for new models
   bool is_resized = false;           ///< of a model of the source: its box changed
-  bool is_changed = false;           ///< likewise its voxels, or where they lie in the box
+  bool is_changed = false;           ///< of a model of the source: its voxels changed, or their positions in the box
   std::uint32_t first_model = 0;     ///< number of its first piece's model: the source's come first, then new ones
 };
 
@@ -31,8 +31,8 @@ struct ModelPlan {
   [[nodiscard]] const GridPlan* find(GridHandle grid) const;
 };
 
-/// Which models the grids become. `keeps_graph`: the transforms of the source stay, so the pivot of a model that
-/// several keys show has to stay where it is.
+/// Plans the models of all grids. `keeps_graph`: the transforms of the source stay, so a model shown by several keys
+/// must keep its pivot.
 [[nodiscard]] ModelPlan plan_models(const Scene& scene, const VoxSource& source, bool keeps_graph);
 
 /// The content of a changed model's XYZI (or TDCZ) chunk: voxels that are still there in the file's order, then new

@@ -50,25 +50,26 @@ struct NodeContent {
   std::vector<std::byte> tail;                            ///< what follows in the chunk
 };
 
-/// Requires: `content` is that of a chunk of this kind, which `parse_document` has read without an error.
+/// Requires: `content` belongs to a chunk of this kind, which `parse_document` has read without an error.
 [[nodiscard]] NodeContent read_node(NodeKind kind, std::span<const std::byte> content);
 
-/// What a node of the source says.
+/// Returns the content of a source node.
 [[nodiscard]] NodeContent node_of(const VoxSource& source, std::size_t node);
 
 /// Writes the content without a chunk's header: what read_node read, the same bytes.
 void write_node(const NodeContent& node, ChunkWriter& out);
 [[nodiscard]] std::string_view chunk_id(NodeKind kind);
 
-/// Whether it says what no scene holds, animation aside: attributes that are not Quoin's, and what follows them.
+/// Returns true if the node has content that a scene cannot hold, animation aside: attributes other than Quoin's, and
+/// trailing bytes.
 [[nodiscard]] bool says_more(const NodeContent& node);
 
-/// What a key of a transform says of its place: `_r` and `_t`, each left out where it says nothing and was not there.
-/// Requires of a motion: 32 bits.
+/// Sets the motion of a transform key: `_r` and `_t`, each omitted if it is the identity and was absent.
+/// Requires: the motion fits 32 bits.
 void set_motion(Entries& key, const Motion& motion);
 [[nodiscard]] Motion motion_of(const Entries& key);
 
-/// Which of a node's keys, in the file's order, is in force at a frame, and whether it stands right there.
+/// The key of a node that applies at a frame, by its index in the file's order; `is_exact` if the key is at that frame.
 struct KeyInForce {
   std::size_t place = 0;
   std::int64_t frame = 0;  ///< as the keys count: folded where the node loops
@@ -79,7 +80,7 @@ struct KeyInForce {
 [[nodiscard]] KeyInForce frame_in_force(const NodeContent& transform, int frame);
 [[nodiscard]] KeyInForce model_in_force(const NodeContent& shape, int frame);
 
-/// Gives a transform a place at a frame: its only key, the one that stands there, or a new one.
+/// Sets a transform's motion at a frame: in its only key, in the key at that frame, or in a new key.
 void set_motion_at(NodeContent& transform, int frame, const Motion& motion);
 
 }  // namespace quoin::vox

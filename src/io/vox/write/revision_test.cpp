@@ -76,7 +76,7 @@ std::string changed_chunks(const std::vector<std::byte>& before, const std::vect
   return changed;
 }
 
-/// What a viewer would see and call by name: every instance's way down, and each of its voxels in the world.
+/// Lists the visible and named content: every instance's path in the graph, and each of its voxels in the world.
 std::multiset<std::string> said_by(const Scene& scene) {
   std::multiset<std::string> said;
   const auto layer_text = [&](LayerHandle handle) {
@@ -128,7 +128,7 @@ void drop_grid_names(Scene& scene) {
 
 const std::vector<std::byte> kSecret = {std::byte{1}, std::byte{2}, std::byte{3}, std::byte{0xFF}, std::byte{7}};
 
-/// A house as MagicaVoxel writes one: layers, groups, animation, a camera, notes, and what nobody knows.
+/// A house in MagicaVoxel's form: layers, groups, animation, a camera, notes, and unknown chunks.
 std::vector<std::byte> house() {
   FileBuilder file;
   file.chunk("PACK", std::array{std::byte{4}, std::byte{0}, std::byte{0}, std::byte{0}});
@@ -344,7 +344,7 @@ TEST(VoxRevision, FilesWithoutASceneGraphKeepTheirFrames) {
   EXPECT_EQ(save(loaded), bytes);
   loaded.scene.edit(loaded.scene.grids().handles()[0]).grid.set({2, 2, 2}, 9);
   EXPECT_EQ(changed_chunks(bytes, save(loaded)), " ~XYZI") << "no graph is needed for that";
-  // A graph is, once something stands beside it.
+  // A graph is needed once another instance is added.
   Instance other;
   other.name = "new";
   other.grid = loaded.scene.grids().handles()[2];
@@ -358,14 +358,14 @@ TEST(VoxRevision, FilesWithoutASceneGraphKeepTheirFrames) {
   const std::string at_1 = shown(load(saved, 1));
   EXPECT_EQ(at_1, shown(std::move(loaded)));
   for (const int frame : {0, 2}) {
-    // What the frame's model was, and the new instance.
+    // The frame's former model, and the new instance.
     LoadedScene before = load(bytes, frame);
     before.scene.edit(before.scene.grids().handles()[0]).grid.set({2, 2, 2}, 9);
     EXPECT_EQ(shown(load(saved, frame)), shown(std::move(before)) + at_1.substr(at_1.find("/new"))) << frame;
   }
 }
 
-/// Each voxel that is shown, where it is and of what type.
+/// Returns the position and type of each visible voxel.
 std::set<std::string> voxels_of(const Scene& scene) {
   std::set<std::string> voxels;
   for (const InstanceHandle handle : scene.instances().handles()) {
@@ -484,7 +484,7 @@ TEST(VoxRevision, CategoriesOfInstancesAreSaidToBeLost) {
   EXPECT_EQ(losses_of_vox(loaded).value(), warnings);
 }
 
-/// A walk of three frames, whose topmost node is what the arguments say, with what nobody knows on every node.
+/// A walk of three frames with the topmost node given by the arguments, and unknown attributes on every node.
 std::vector<std::byte> lone_walk(bool has_hidden_group) {
   FileBuilder file;
   file.model(2, 2, 2, {{0, 0, 0, 5}});
@@ -546,7 +546,7 @@ TEST(VoxRevision, AboveALoneRootThereIsRoomForMore) {
       EXPECT_NE(text.find("apart"), std::string::npos) << edit;
       EXPECT_EQ(text.find("group") != std::string::npos, has_hidden_group) << edit;
       if (std::string_view(edit) == "remove") continue;
-      // The other frames too are what they were.
+      // The other frames are unchanged too.
       const Scene first = load(file, 0).scene;
       const Scene first_again = load(written, 0).scene;
       const auto place_of = [](const Scene& at) { return at.instances()[at.instances().handles().front()].position; };
@@ -759,7 +759,7 @@ TEST(VoxRevision, AnyHistoryIsReadBackAsItWasWritten) {
         ASSERT_EQ(written.error().code, ErrorCode::LimitExceeded) << "seed " << seed << to_string(written.error());
         break;
       }
-      // The last frame may have gone with what had it.
+      // The last frame may be gone with its node.
       auto again = read_vox(written->bytes, {.frame = frame});
       if (!again && again.error().code == ErrorCode::InvalidArgument) break;
       ASSERT_TRUE(again) << "seed " << seed << ": " << to_string(again.error());

@@ -6,7 +6,7 @@
 #include <quoin/io/loaded_scene.h>
 #include <quoin/scene/scene.h>
 
-/// Scenes whose voxels have another size than 1, the only one that .vox holds.
+/// Scenes with voxels of another size than 1, the only size in .vox.
 namespace quoin::vox {
 
 /// Returns the size of voxels that all instances have in common; nothing if it is 1 or they differ.

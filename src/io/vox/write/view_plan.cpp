@@ -23,7 +23,7 @@ bool is_same(const FileCamera& a, const FileCamera& b) {
   return a.camera == b.camera && a.focus_distance == b.focus_distance;
 }
 
-// What of a look the sun is: of one that may be changed, or not.
+// Returns the sun of a look, const or mutable.
 template <class AnyLook>
 auto sun_of(AnyLook& look) {
   return std::tie(look.sun, look.sun_angle_radians, look.sun_brightness, look.sun_colour, look.sun_is_seen);
@@ -106,7 +106,7 @@ void set_camera_keys(const FileCamera& file_camera, Entries& keys) {
   const double roll =
       std::atan2(glm::dot(camera.right, glm::cross(level, camera.forward)), glm::dot(camera.right, level));
   DVec3 angle = DVec3(pitch, yaw, roll) * kDegrees;
-  // That is how cameras look that nobody set.
+  // An unused camera looks like this.
   const bool looks_unset = focus == DVec3(0.0) && angle == DVec3(0.0) && (radius == 0.0 || radius == 1.0);
   if (looks_unset) angle.z = 360.0;
   keys.set("_mode", is_flat ? "orth" : "pers");

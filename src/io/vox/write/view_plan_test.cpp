@@ -129,7 +129,7 @@ TEST(VoxViewWriting, TheSunComesBack) {
   EXPECT_TRUE(write_vox(loaded).value().warnings.empty());
   const Look& found = again.look.value().look;
   EXPECT_LT(glm::length(found.sun - look.look.sun), 1e-6);
-  // What is brighter than white is brightness.
+  // Values brighter than white become brightness.
   for (int i = 0; i < 3; ++i) {
     EXPECT_NEAR(static_cast<double>(found.sun_colour[i]) * found.sun_brightness,
                 static_cast<double>(look.look.sun_colour[i]) * 3.0, 0.03);
@@ -143,7 +143,7 @@ TEST(VoxViewWriting, TheSunComesBack) {
   EXPECT_EQ(losses_of_vox(loaded).value().size(), 1U);
 }
 
-// A file with two cameras that were set, one that was not, and a sun; other keys are kept.
+// A file with two cameras that were set, one unused camera, and a sun; other keys are kept.
 std::vector<std::byte> file_with_views() {
   FileBuilder file;
   file.model(1, 1, 1, {{0, 0, 0, 1}});
@@ -177,7 +177,7 @@ TEST(VoxViewWriting, OnlyWhatChangedIsWrittenAnew) {
   LoadedScene loaded = read_vox(file_with_views()).value();
   ASSERT_EQ(loaded.cameras.size(), 2U);
   loaded.cameras[1].camera.position.x += 5.0;                 // number 2
-  loaded.cameras.push_back({1, turned(0.2, 0.4, 0.0), 7.0});  // that of the one that was not set
+  loaded.cameras.push_back({1, turned(0.2, 0.4, 0.0), 7.0});  // the unused camera
   loaded.cameras.push_back({6, turned(0.2, 0.5, 0.0), 7.0});
   loaded.look->look.sun_brightness = 2.0;
   const std::vector<std::byte> bytes = write_vox(loaded).value().bytes;

@@ -27,7 +27,7 @@ namespace quoin {
 
 namespace {
 
-// What files of voxels do not hold is not lost in silence.
+// Rejects fields, so that they are not lost silently.
 Status check_has_no_field(const SceneGrid& grid) {
   if (grid.field.chunk_count() == 0) return {};
   return make_error(ErrorCode::Unsupported,
@@ -40,7 +40,7 @@ constexpr std::uint32_t kGone = std::numeric_limits<std::uint32_t>::max();
 constexpr std::size_t kContentOfMain = 12;
 constexpr std::size_t kChildrenOfMain = 16;
 
-/// A file without anything, of which a scene that came from nowhere is a revision.
+/// An empty file: the source of scenes that were not read from a file.
 const VoxSource& no_source() {
   static const VoxSource source = [] {
     VoxSource empty;
@@ -50,7 +50,7 @@ const VoxSource& no_source() {
   return source;
 }
 
-/// What is written after which chunk of the source; kNone: before the first.
+/// The source chunks after which new chunks are written; kNone: before the first.
 struct Anchors {
   std::size_t models = vox::kNone;
   std::size_t nodes = vox::kNone;
@@ -98,19 +98,19 @@ struct Chunk {
   std::vector<std::byte> content;
 };
 
-/// Writes a file again with what a scene changed; of a scene without a file all is new.
+/// Rewrites a file with a scene's changes; for a scene without a file everything is new.
 class Writer {
  public:
   Writer(const Scene& scene, const VoxSource& source, const Progress& progress = {})
       : scene_(scene), source_(source), progress_(progress) {}
-  /// What a scene was read with is written too.
+  /// Also writes the data read with a scene.
   Writer(const LoadedScene& loaded, const VoxSource& source, const Progress& progress = {})
       : Writer(loaded.scene, source, progress) {
     view_ = vox::plan_view(loaded, source, is_new());
   }
 
   Result<VoxBytes> run();
-  /// Only what `run` would warn of. Errors: those of `run`, but for the size.
+  /// Returns only the warnings of `run`. Errors: as `run`, except for the size.
   Result<std::vector<std::string>> losses();
 
  private:
@@ -163,11 +163,11 @@ class Writer {
   vox::RevisedGraph graph_;
   vox::ViewPlan view_;
   std::vector<std::int32_t> written_cameras_;  // numbers of `view_` that chunks of the source had
-  bool has_written_sun_ = false;               // likewise
-  std::vector<std::string> lost_;              ///< with the file's scene graph, where it is written anew
-  std::vector<const vox::GridPlan*> plan_of_;  // by the source's models; null where the model is no grid any more
-  std::vector<std::uint32_t> number_of_;  // of models, by their numbers in the plan; kGone for those that are left out
-  std::vector<bool> shown_;               // likewise: whether any shape shows them, at any frame
+  bool has_written_sun_ = false;               // a chunk of the source had the sun
+  std::vector<std::string> lost_;              ///< data lost with the file's scene graph if it is rewritten
+  std::vector<const vox::GridPlan*> plan_of_;  // by the source's models; null for removed models
+  std::vector<std::uint32_t> number_of_;       // of models, by their numbers in the plan; kGone for omitted models
+  std::vector<bool> shown_;                    // by the same numbers: true if a shape shows the model at any frame
   std::uint32_t model_count_ = 0;
   std::array<std::size_t, vox::kColours> material_chunk_{};  // by colour index, the last one; kNone without
   std::size_t palette_chunk_ = vox::kNone;
@@ -313,7 +313,7 @@ std::int64_t Writer::models_left_as_they_were() const {
   });
 }
 
-/// What only nodes of the file say, and no scene.
+/// Lists the content of the file's nodes that scenes cannot hold.
 std::vector<std::string> Writer::lost_with_graph() const {
   constexpr const char* kWhy = " left out: nodes of the file's scene graph have several parents, and one changed";
   std::vector<std::string> lost;
@@ -485,7 +485,7 @@ std::optional<Chunk> Writer::revised_palette(const vox::ChunkPlace& place) const
   return Chunk{"RGBA", std::move(content)};
 }
 
-/// Of a camera, or the sun.
+/// Returns the revised chunk of a camera or of the sun; nullopt if it is unchanged.
 std::optional<Chunk> Writer::revised_view(const vox::ChunkPlace& place) {
   const std::span<const std::byte> bytes = content_of(place);
   const auto number = vox::camera_number(id_of(place), bytes);
@@ -647,7 +647,7 @@ void Writer::write_new_materials() {
   }
 }
 
-/// Where the source had no such chunk.
+/// Writes the cameras and sun that the source lacks.
 void Writer::write_new_view() {
   const auto write = [&](std::string_view id, const vox::Entries& keys, const auto& write_number) {
     const std::size_t chunk = out_.begin_chunk(id);
@@ -668,7 +668,7 @@ void Writer::write_new_view() {
   }
 }
 
-/// What is new follows the last chunk of its kind.
+/// Writes new chunks after the last chunk of their kind.
 void Writer::write_after(std::size_t chunk) {
   if (anchors_.models == chunk) write_new_models();
   if (anchors_.nodes == chunk) write_new_nodes();

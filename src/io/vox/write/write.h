@@ -16,19 +16,19 @@ namespace quoin {
 struct VoxSource;
 }
 
-/// What a scene becomes in a .vox file before it is bytes.
+/// The parts of a .vox file made from a scene, before encoding.
 namespace quoin::vox {
 
-/// Which colour index stands for which type.
+/// The mapping between colour indices and types.
 struct TypeTable {
   std::vector<std::uint8_t> index_of_type;         ///< by type; 0 for types that do not occur
   std::array<VoxelProperties, kColours> by_index;  ///< entry 0 is unused
 };
 
-/// Types keep their ids as colour indices when all types that occur are below 256; else those that occur are numbered
-/// in ascending order. Colour indices without a type get the default palette's colour.
+/// Makes the mapping. Types keep their ids as colour indices if all used types are below 256; otherwise the used types
+/// are numbered in ascending order. Colour indices without a type get the default palette's colour.
 ///
-/// Errors: LimitExceeded when more than 255 types occur.
+/// Errors: LimitExceeded if more than 255 types are used.
 [[nodiscard]] Result<TypeTable> make_type_table(const Scene& scene);
 
 struct RevisedTypes {

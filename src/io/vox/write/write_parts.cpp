@@ -18,7 +18,7 @@ namespace {
 
 using Cell = std::array<std::int64_t, 3>;
 
-/// Which piece of a box a voxel lies in, counted z, y, x so that pieces sort that way.
+/// Returns the piece of a box that contains a voxel, ordered z, y, x so that pieces sort that way.
 Cell cell_of(IVec3 voxel, IVec3 box_min) {
   Cell cell{};
   for (int axis = 0; axis < 3; ++axis) {
@@ -103,7 +103,7 @@ class PaletteRoom {
 
   [[nodiscard]] const std::vector<VoxelType>& strangers() const { return strangers_; }
 
-  /// An entry that looks like it already, or one that no voxel has; nothing when there is none.
+  /// Returns an entry of the same look, or one that no voxel uses; nullopt if there is none.
   std::optional<std::size_t> place(const VoxelProperties& wanted) {
     for (std::size_t index = 1; index < kColours; ++index) {
       if (!looks_the_same(table_.by_index[index], wanted)) continue;
@@ -188,7 +188,7 @@ bool is_inside(IVec3 voxel, const Piece& piece) {
          voxel.y < end.y && voxel.z < end.z;
 }
 
-/// The pieces of a box by their places, and the last one that was asked for.
+/// The pieces of a box by position, with a cache of the last lookup.
 class PieceMap {
  public:
   explicit PieceMap(const IBox& box) : box_(box) {}
@@ -224,7 +224,7 @@ class PieceMap {
   Piece* last_ = nullptr;
 };
 
-/// Where the next voxel of each piece goes.
+/// The write positions of each piece's next voxel.
 class Cursors {
  public:
   Cursors(std::span<const Piece> pieces, std::span<const std::size_t> starts)

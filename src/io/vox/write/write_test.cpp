@@ -236,7 +236,7 @@ TEST(VoxWrite, TypesBelow256KeepTheirIndicesNamesAndProperties) {
   }
 }
 
-// MagicaVoxel has no key for it: it is kept under one of Quoin's own, whatever else there is to say of the type.
+// MagicaVoxel has no such key: it is stored under Quoin's own key, independent of the type's other properties.
 TEST(VoxWrite, WhetherATypeCollidesIsKeptWithoutAWarning) {
   Scene scene = scene_with_types(4);
   for (VoxelType type = 1; type <= 4; ++type) {
