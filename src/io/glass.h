@@ -16,8 +16,8 @@ namespace quoin {
 ///
 /// Behind a body of thickness L, Quoin's images show the fraction `passed` of each channel of the background and `own`,
 /// the share of the body's colour c (GlassLook). Clients with alpha only show `1 - alpha` and `alpha`. Clients with
-/// transmission show, by coverage and base colour, `1 - alpha + alpha * transmission * c * attenuation` and `alpha * (1
-/// - transmission)`. Therefore:
+/// transmission show, by coverage and base colour, `1 - alpha + alpha * transmission * c * attenuation` and
+/// `alpha * (1 - transmission)`. Therefore:
 ///
 ///   alpha         minimises the sum of the squared errors of both over the channels, for clients with alpha only;
 ///   transmission  gives the body's own share exactly;

@@ -47,7 +47,7 @@ void CameraRays::block(int column, int row, PixelPoint point, RayPacket& rays) c
     if (pixel_x < width_ && pixel_y < height_) rays.active |= 1U << i;
   }
   rays.max_t.fill(std::numeric_limits<double>::infinity());
-  // Where each ray crosses the picture, relative to the middle of the picture.
+  // The crossing of each ray with the image plane, relative to the image's centre.
   const auto across = [&](int axis, RayPacket::Lanes<double>& out) {
     for (std::size_t i = 0; i < kLanes; ++i) out[i] = corner_[axis] + right_[axis] * x[i] + down_[axis] * y[i];
   };

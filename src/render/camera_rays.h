@@ -17,7 +17,7 @@ struct PixelPoint {
 /// Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018): R2.
 [[nodiscard]] PixelPoint sample_point(int index);
 
-/// The rays of a picture, relative to the camera's position (view space).
+/// The rays of an image, relative to the camera's position (view space).
 class CameraRays {
  public:
   /// Pixels across and pixels down. Cost of a block: 16 square roots.
@@ -25,8 +25,8 @@ class CameraRays {
 
   CameraRays(const Camera& camera, int width, int height);
 
-  /// The rays of the 4x4 pixels from (`column`, `row`); lane x + 4 y. Directions are unit, so distances are world
-  /// units. Pixels outside the picture are not active.
+  /// Makes the rays of the 4x4 pixels from (`column`, `row`); lane x + 4 y. Directions are unit, so distances are in
+  /// world units. Pixels outside the image are inactive.
   void block(int column, int row, PixelPoint point, RayPacket& rays) const;
   /// Returns the sky height of a ray that hits nothing: the y of its direction. Orthographic rays are all parallel, so
   /// they use the directions of a perspective camera of 50 degrees.
@@ -39,7 +39,7 @@ class CameraRays {
   [[nodiscard]] DVec3 right() const { return right_; }
   [[nodiscard]] DVec3 down() const { return down_; }
   [[nodiscard]] DVec3 corner() const { return corner_; }
-  /// Orthographic: turns the way from the picture's middle into the tangent of an angle.
+  /// Orthographic: converts the distance from the image's centre to the tangent of an angle.
   [[nodiscard]] double sky_scale() const { return sky_scale_; }
 
  private:
@@ -47,8 +47,8 @@ class CameraRays {
   int height_;
   bool is_perspective_;
   DVec3 forward_;
-  double sky_scale_ = 0.0;  // orthographic: turns the way from the picture's middle into the tangent of an angle
-  // Per pixel to the right and down, and the picture's upper left corner, at a distance of 1.
+  double sky_scale_ = 0.0;  // orthographic: converts the distance from the image's centre to the tangent of an angle
+  // Per pixel to the right and down, and the image's upper left corner, at a distance of 1.
   DVec3 right_;
   DVec3 down_;
   DVec3 corner_;

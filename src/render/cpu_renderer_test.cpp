@@ -166,7 +166,7 @@ TEST(CpuRenderer, OneVoxelIsSeenUprightAndNotMirrored) {
   RenderOptions options = sized(80, 80);
   options.light.shading = Shading::Unlit;
   const Picture picture = taken(scene, towards({0, 0, 10}, {0, 0, 0}, 2.0 * std::atan(0.4)), options);
-  // At distance 9 the picture reaches 3.6 up from the middle: 11.1 pixels a voxel.
+  // At distance 9 the image extends 3.6 up from the centre: 11.1 pixels per voxel.
   EXPECT_EQ(pixel_at(picture, 40 + 27, 40 - 16), encoded(linear(red)));
   EXPECT_FLOAT_EQ(depth_at(picture, 40 + 27, 40 - 16),
                   9.0F * static_cast<float>(glm::length(DVec3(27.5 / 100, 15.5 / 100, 1.0))));

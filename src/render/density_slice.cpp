@@ -10,7 +10,7 @@ namespace quoin {
 namespace {
 
 constexpr std::int64_t kMaxPixels = std::int64_t{1} << 28;
-// The share of the picture's smaller side that is left on each side.
+// The margin on each side, as a share of the image's smaller side.
 constexpr double kMargin = 0.02;
 // Lines at whole samples where a pixel spans less of a sample.
 constexpr double kWidestStep = 0.25;

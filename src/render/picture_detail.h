@@ -24,7 +24,7 @@ struct PictureDetail {
 /// are in the order of the instances.
 void keep_whole(std::span<const FarInstance> far, std::span<SelectedInstance> selected);
 
-/// Chooses that, and keeps impostors from picture to picture. Threads: any number may choose.
+/// Chooses the level of detail, and keeps impostors for later images. Threads: any number may choose.
 class DetailChooser {
  public:
   /// `threads`: for building impostors, as in ImpostorCacheOptions::workers.

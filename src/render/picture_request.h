@@ -7,10 +7,10 @@ namespace quoin {
 /// InvalidArgument for sizes and cameras that no renderer takes.
 [[nodiscard]] Status check_picture(const Camera& camera, int width, int height);
 
-/// The errors of CpuRenderer::render, which are those of every renderer.
+/// Returns the argument errors of CpuRenderer::render, which all renderers share.
 [[nodiscard]] Status check(const Camera& camera, const RenderOptions& options);
 
-/// A picture of the size asked for, with depths if they are.
+/// Returns an image of the requested size, with depths if requested.
 [[nodiscard]] Picture empty_picture(const RenderOptions& options);
 
 }  // namespace quoin

@@ -1,4 +1,4 @@
-// Pictures of coarser cells look like those of the voxels.
+// Images of coarser cells look like images of the voxels.
 
 #include <algorithm>
 #include <array>
@@ -26,7 +26,7 @@ using namespace render_test;
 constexpr double kFov = std::numbers::pi / 6;
 constexpr int kEdge = 320;
 
-// A scene of one instance, turned a little so that nothing lies along the picture's rows.
+// A scene of one slightly rotated instance, so that no edges align with the image's rows.
 struct Model {
   Scene scene;
   InstanceHandle instance;

@@ -111,7 +111,7 @@ TEST(RenderFieldGlass, TheFloorOfALakeIsWhereItsSamplesSay) {
   options.light.sun = {0, 1, 0};
   options.light.occlusion_mode = OcclusionMode::Off;
   const Picture picture = taken(s.scene, from_above(0, 20, 0, 4), options);
-  // The sun comes through the water, and is seen through it; of the surface itself nothing is in the way.
+  // The sun's light passes the water, and the view does too; the surface itself blocks no light.
   const Vec3 behind = linear(kRed) * (0.1F + through(6.74F));
   expect_near(pixel_at(picture, 1, 1), encoded(behind * through(6.75F) + own(6.75F) * 1.1F), 1);
 }
@@ -186,7 +186,7 @@ TEST(RenderFieldGlass, OverlappingBlocksAreSeenThroughIt) {
   EXPECT_GT(std::abs(pixel_at(picture, 0, 0)[2] - pixel_at(picture, 4, 4)[2]), 20) << "beside them it is deeper";
 }
 
-// A ball of clear glass before the sky: what its two surfaces mirror, by the field's own normals.
+// A ball of clear glass in front of the sky: the reflections of its two surfaces, by the field's own normals.
 TEST(RenderFieldGlass, SurfacesMirrorByTheGradient) {
   Scene scene;
   VoxelProperties clear;
@@ -208,7 +208,7 @@ TEST(RenderFieldGlass, SurfacesMirrorByTheGradient) {
     const double in_plane = (1.5 * cosine - inside) / (1.5 * cosine + inside);
     return 0.5 * (across * across + in_plane * in_plane);
   };
-  // Straight through: as the camera's own rays say of their direction.
+  // Straight through: the sky of the camera's own ray directions.
   const Picture empty = taken(Scene(), camera, options);
   int compared = 0;
   for (int y = 4; y < 57; y += 4) {

@@ -156,7 +156,7 @@ TEST(RenderField, SmoothOcclusionIsThatOfItsMeshAtEveryPoint) {
       const DVec3 up = glm::normalize(same.gradient_at(point));
       const float open = 1.0F - smooth_occlusion(same, point, Vec3(up), options.light.smooth_occlusion);
       darker += open < 0.9F ? 1 : 0;
-      // The picture's normals are those of light, smoother than the exact ones.
+      // The image uses the lighting normals, which are smoother than the exact ones.
       EXPECT_NEAR(pixel_at(picture, x, y)[0], 255.0 * open, 30.0) << x << ' ' << y;
     }
   }
@@ -201,7 +201,7 @@ DensityGrid patchwork(Scene& scene) {
   return field;
 }
 
-// Seen from above, the floor has the colours that the mesh's vertices have, and between them those in between.
+// Seen from above, the floor has the colours of the mesh's vertices, interpolated between them.
 TEST(RenderField, MaterialsBlendAsThoseOfItsMesh) {
   Scene scene;
   DensityGrid field = patchwork(scene);
@@ -240,7 +240,7 @@ TEST(RenderField, MaterialsBlendAsThoseOfItsMesh) {
   EXPECT_GT(blended, 10'000);
 }
 
-// Emission, and what paths meet, blend by the same shares.
+// Emission and path-traced materials blend by the same shares.
 TEST(RenderField, WhatGlowsBlendsToo) {
   Scene scene;
   const VoxelType dark = add_type(scene, {0, 0, 0, 255});

@@ -1,4 +1,4 @@
-// What transparent voxels do to a picture.
+// The effect of transparent voxels on images.
 
 #include <cmath>
 #include <limits>
@@ -171,7 +171,7 @@ TEST(RenderGlass, ThatGlowsShinesInTheDarkFromOutsideAndInside) {
   }
 }
 
-// Of a glass of index 1.5, what Fresnel's equations say.
+// Checks Fresnel's equations for glass of index 1.5.
 TEST(RenderGlass, SurfacesMirrorWhatFresnelSays) {
   GlassScene s;
   Grid grid;

@@ -45,7 +45,7 @@ void expect_grey(const Picture& picture, int x, int y, double light) {
   for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(found[c], expected[c], 1) << x << ", " << y;
 }
 
-// The middle of a pixel of a picture from above that is `height` high.
+// Returns the world position of a pixel's centre in an image from above that is `height` high.
 DVec3 floor_at(int x, int y, int size, double height) {
   return {((x + 0.5) / size - 0.5) * height, 0.0, ((y + 0.5) / size - 0.5) * height};
 }

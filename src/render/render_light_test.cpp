@@ -1,4 +1,4 @@
-// Pictures whose light is known by analysis.
+// Images with analytically known light.
 
 #include <algorithm>
 #include <cmath>
@@ -141,7 +141,7 @@ TEST(RenderLight, OcclusionEndsAtItsDistance) {
   EXPECT_EQ(pixel_at(taken(scene, from_above(0, 5, 0, 1), options), 0, 0), encoded(linear(kGrey) * 0.15F));
 }
 
-// Every ray of this picture meets one point, of whose sky a wall hides a part.
+// Every ray of this image hits one point, where a wall hides a part of the sky.
 TEST(RenderLight, SamplesOfAPixelHaveOcclusionRaysOfTheirOwn) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);
@@ -198,7 +198,7 @@ TEST(RenderLight, VertexOcclusionIsWhatTheMeshCarries) {
   const float sun = cosines(options.light.sun).y;
   for (const auto affects : {OcclusionAffects::Ambient, OcclusionAffects::All}) {
     options.light.occlusion_affects = affects;
-    // One column of voxels across the picture: x from 3 to 4.
+    // One column of voxels across the image: x from 3 to 4.
     Camera camera = from_above(3.5, 3, 0.5, 1.0 / 40);
     const Picture picture = taken(scene, camera, options);
     for (int column = 0; column < 40; ++column) {
@@ -260,7 +260,7 @@ TEST(RenderLight, OcclusionAloneIsGreyAndDarkensOwnColours) {
   const Camera camera = from_above(5, 30, 5, 10);
   RenderOptions options = sized(200, 200);
   options.light.occlusion_mode = OcclusionMode::Vertex;
-  options.light.exposure = 3.0;  // light has no say
+  options.light.exposure = 3.0;  // exposure has no effect
   options.light.shading = Shading::Occlusion;
   const Picture grey = taken(scene, camera, options);
   options.light.shading = Shading::UnlitWithOcclusion;

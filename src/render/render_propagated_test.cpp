@@ -1,4 +1,4 @@
-// Pictures in propagated light: what each pixel shows is found again by first_hit and SurfaceLight.
+// Images in propagated light: first_hit and SurfaceLight give the expected value of each pixel.
 
 #include <algorithm>
 #include <cstdlib>

@@ -1,4 +1,4 @@
-// Pictures of one world, placed in different ways, are one picture.
+// Images of one world, placed in different ways, are equal.
 
 #include <algorithm>
 #include <array>

@@ -37,7 +37,7 @@ inline InstanceHandle place(Scene& scene, Grid grid, DVec3 position = DVec3(0.0)
   return scene.add_instance({"", scene.add_grid(std::move(placed)), position});
 }
 
-/// Straight down from `height` above (x, z), `view_height` wide and high; the picture's right is +X, its top -Z.
+/// Looks straight down from `height` above (x, z), `view_height` wide and high; the image's right is +X, its top -Z.
 inline Camera from_above(double x, double height, double z, double view_height) {
   Camera camera;
   camera.position = {x, height, z};
@@ -93,8 +93,8 @@ inline Pixel encoded(Vec3 light) {
   return {encode(light.x), encode(light.y), encode(light.z)};
 }
 
-/// A plate whose face towards `face` has a blocker where only the reference's sixth occlusion ray from the face's
-/// middle meets it, and a camera that sees that middle in one pixel.
+/// Makes a plate with a blocker that only the reference's sixth occlusion ray from the face's centre meets, and a
+/// camera that sees this centre in one pixel.
 inline Camera sixth_ray_blocked(Scene& scene, Direction face) {
   const VoxelType type = add_type(scene, {188, 188, 188, 255});
   const FaceFrame& frame = frame_of(face);

@@ -39,7 +39,7 @@ class Tile {
   ///
   /// Calls `goes_on(1)` after each sample. If that returns false, this returns false and the tile must not be used.
   [[nodiscard]] bool render(const std::function<bool(std::size_t)>& goes_on);
-  /// Puts the pixels that lie in the picture in place.
+  /// Writes the pixels within the image.
   void write_to(Picture& picture) const;
 
   [[nodiscard]] std::int64_t rays() const { return rays_; }
@@ -52,7 +52,7 @@ class Tile {
   void take_block(int x, int y, const RayPacket& rays, int sample);
   [[nodiscard]] std::uint32_t lanes_through_glass(const RayPacket& rays, const SceneHits& hits) const;
   void add_opaque(int lane, const RayPacket& rays, const SceneHits& hits, std::size_t pixel, Vec3 weight);
-  // What glass does to a ray.
+  // The effect of glass on a ray.
   struct Sight {
     Vec3 passed{1.0F};    // transmittance for the light behind
     Vec3 mirrored{0.0F};  // light reflected by surfaces

@@ -19,7 +19,7 @@ class TileProgress {
   TileProgress(const Progress& listener, std::size_t samples) : listener_(&listener), samples_(samples) {}
 
   [[nodiscard]] bool is_cancelled() const { return is_cancelled_; }
-  /// Returns whether to go on.
+  /// Returns false to cancel.
   bool add_samples(std::size_t samples) {
     const std::lock_guard lock(mutex_);
     done_ += samples;
@@ -46,8 +46,8 @@ class TileProgress {
   std::atomic<bool> is_cancelled_{false};
 };
 
-/// Draws a picture by squares of Tile::kEdge pixels: `Tile(context, column, row)`, of the upper left pixel, draws its
-/// samples and writes itself into the picture. Errors: Cancelled.
+/// Draws an image by squares of Tile::kEdge pixels: `Tile(context, column, row)`, given the upper left pixel, draws its
+/// samples and writes itself into the image. Errors: Cancelled.
 template <class Tile, class Context, class Options, class Drawn>
 [[nodiscard]] Status draw_tiles(const Context& context, const Options& options, Threads threads,
                                 const Progress& progress, Drawn& picture) {

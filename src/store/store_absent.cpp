@@ -7,7 +7,8 @@
 #include "io/source/luanti_map.h"
 #include "io/world_format.h"
 
-// Builds without SQLite, zstd or xxHash: worlds on disk say so. Arguments are taken as where there are any.
+// Builds without SQLite, zstd or xxHash: all world functions return an error. Parameters are the same as in complete
+// builds.
 // NOLINTBEGIN(performance-unnecessary-value-param)
 
 namespace quoin {

@@ -123,13 +123,13 @@ void ChunkStreamer::wait() {
     posted = posted_;
   }
   signal_.notify_one();
-  // It is the caller who makes room.
+  // Only the caller can make room.
   if (room_ <= 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   std::unique_lock lock(outbox_mutex_);
   came_.wait(lock, [&] { return !outbox_.arrivals.empty() || (working_ == 0 && !has_more_ && told_posts_ >= posted); });
 }
 
-// Under the plan's lock. Where memory runs out on the way it goes on from there the next time.
+// Requires: the plan's lock is held. If memory runs out, the next call continues there.
 void ChunkStreamer::read_inbox() {
   if (read_events_ == reading_.events.size() && !reading_.wishes) {
     Note done;
@@ -236,7 +236,7 @@ bool ChunkStreamer::work_once() {
 
 namespace {
 
-// Makes room for one more. False where there is no memory for that.
+// Makes room for one more. Returns false if memory runs out.
 bool has_place(std::vector<Arrival>& arrivals) {
   constexpr std::size_t kLeast = 16;
   try {
@@ -328,7 +328,7 @@ void ChunkStreamer::make(const ChunkGenerator& generator, Arrival& arrival) {
   if (!options_.keeps_made) return;
   WorldChanges changes;
   changes.put_chunk(arrival.place, arrival.chunk);
-  // What could not be written is kept by the store, and tried again.
+  // The store keeps failed changes and retries them.
   if (const auto saved = store_.save(std::move(changes)); !saved) add_problem(arrival.place, saved.error());
 }
 

@@ -15,7 +15,7 @@ namespace quoin::stream {
 
 /// Errors: InvalidArgument for types that the world does not have.
 [[nodiscard]] Status check_types(const WorldEdit& edit, const VoxelRegistry& types);
-/// As `apply_edit`; data that a voxel's type has no room for is left out, on every machine alike.
+/// Applies an edit as `apply_edit`, but drops data that a voxel's type cannot hold, equally on every machine.
 std::int64_t apply_fitting(const WorldEdit& edit, Grid& grid, DensityGrid& field, const VoxelRegistry& types);
 
 /// Edits that wait for chunks, in their order.

@@ -140,7 +140,7 @@ class FlightLog {
   double slowest_ = 0.0;
 };
 
-/// A world, its meshes, and who flies through it.
+/// A world, its meshes, and the viewer that flies through it.
 struct Flight {
   Flight(StreamedWorld streamed, bool smooth) : world(std::move(streamed)), is_smooth(smooth) {}
 

@@ -120,7 +120,7 @@ void Placements::look(const Scene& scene, const SceneGrid& grid, std::span<const
 
 std::vector<Eye> Placements::eyes(const Scene& scene, const SceneGrid& grid, std::span<const Viewer> viewers) {
   if (placed_.size() > kNearest) look(scene, grid, viewers);
-  // In an order that depends on nothing but the instances.
+  // The order depends only on the instances.
   std::vector<InstanceHandle> near;
   for (std::size_t i = 0; i < std::min(kNearest, placed_.size()); ++i) near.push_back(placed_[i].instance);
   std::sort(near.begin(), near.end());

@@ -45,7 +45,7 @@ class Placements {
 
   std::vector<Placed> placed_;
   std::map<InstanceHandle, std::size_t> index_;
-  std::vector<InstanceHandle> moved_;  // since the last look, of those beyond the nearest
+  std::vector<InstanceHandle> moved_;  // instances outside the nearest set that moved since the last update
   std::size_t next_ = kNearest;
   bool looked_at_ = false;
 };

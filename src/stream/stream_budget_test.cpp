@@ -14,7 +14,7 @@ using stream::StreamBudget;
 constexpr std::size_t kBudget = std::size_t{64} << 20;
 constexpr std::size_t kChunk = 50'000;
 
-// A program whose meshes take as much as the chunks do, and come some time after them.
+// A program whose meshes need as much memory as the chunks, and appear some time after them.
 class Program {
  public:
   void load(std::size_t chunks) {
@@ -50,7 +50,7 @@ TEST(StreamBudget, RoomIsKeptForWhatIsMadeOfChunksLater) {
   }
   EXPECT_LT(program.most, static_cast<double>(kBudget));
   EXPECT_GT(program.most, 0.8 * static_cast<double>(kBudget)) << "what was kept for nothing is used in the end";
-  // Who flies has no less after an hour.
+  // The loaded chunks do not decrease during an hour of flight.
   const std::size_t before = program.budget.loaded_chunks();
   std::size_t planned = before;
   for (int i = 0; i < 6000; ++i) {

@@ -96,7 +96,7 @@ void StreamPlan::forget(const ChunkPlace& place) {
 }
 
 void StreamPlan::plan(Wishes wishes) {
-  queue_.clear();  // so that nothing old is left where memory runs out on the way
+  queue_.clear();  // leaves no stale entries if memory runs out
   leaving_.clear();
   next_ = asked_ = here_ = 0;
   is_counted_ = false;

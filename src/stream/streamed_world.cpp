@@ -43,14 +43,14 @@ constexpr std::size_t kMaxArrivals = 128;
 constexpr std::size_t kMaxAsked = 1024;
 // Bytes per loaded chunk in addition to its voxels and densities: marks, sizes and states.
 constexpr std::size_t kChunkBytes = 256;
-// After so many chunks that came or went it is time to save: what saves reads of the journals is so never much at once.
+// Number of moved chunks that triggers a save; it bounds the journal entries that a save reads.
 constexpr std::size_t kMaxMoved = 48;
 constexpr auto kAskOthers = std::chrono::milliseconds(100);
 // Between plans that the budget alone is the reason of, seconds.
 constexpr double kReplan = 0.2;
-// When nothing came or went for so long, all that is made of chunks is there, seconds.
+// After this time without moved chunks all derived data is complete, seconds.
 constexpr double kQuiet = 3.0;
-// The landscape that a grid goes on with.
+// The generator of a grid's landscape.
 constexpr std::string_view kTerrainValue = "quoin.terrain.";
 
 double seconds_since(Clock::time_point start) {
@@ -131,7 +131,7 @@ struct StreamedWorld::Impl {
   [[nodiscard]] Eyes eyes_of(std::span<const Viewer> viewers);
   void wish(ChunkStreamer::Note& note);
   [[nodiscard]] bool is_cut() const;
-  // Nothing that was wanted is on its way any more.
+  // Returns true if no requested chunk is on its way.
   [[nodiscard]] bool is_quiet() const {
     return box.missing == 0 && box.begun == 0 && arrivals.empty() && box.plans == posted_plans;
   }
@@ -268,7 +268,7 @@ void StreamedWorld::Impl::wish(ChunkStreamer::Note& note) {
   const std::size_t fit = chunks_of_budget();
   const bool is_over = budget.is_over();
   const double change = static_cast<double>(fit) / static_cast<double>(std::max<std::size_t>(planned_chunks, 1));
-  // Where all fits, how much more would fit changes nothing.
+  // If all requested chunks fit, additional room changes nothing.
   const bool is_limited = is_cut() || fit <= box.wanted || is_over;
   const bool is_other_budget = is_limited && (change < 0.99 || change > 1.05) && seconds_since(planned) > kReplan;
   if (asked_left == 0 && waiting_chunks() != 0 && !waits_for_broken_alone()) must_plan = true;
@@ -442,8 +442,8 @@ void StreamedWorld::Impl::take_away(const ChunkPlace& place, ChunkStreamer::Note
   ++totals.chunks_unloaded;
 }
 
-// Chunks that came or are to go, as far as the time suffices; one at least. While edits could not be handed to the
-// store nothing goes.
+// Moves arrived and leaving chunks within the time limit, at least one. Unloads no chunk while edits could not be
+// handed to the store.
 void StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, ChunkStreamer::Note& note) {
   has_moved = false;
   const bool may_leave = !is_edited;
@@ -466,7 +466,7 @@ void StreamedWorld::Impl::move_chunks(double seconds, Clock::time_point start, C
   }
 }
 
-// What workers have brought and planned since the last time.
+// Takes the chunks and plans from the workers since the last call.
 void StreamedWorld::Impl::take_in() {
   streamer.take(box);
   for (Arrival& arrival : box.arrivals) {
@@ -478,7 +478,7 @@ void StreamedWorld::Impl::take_in() {
   std::ranges::move(box.problems, std::back_inserter(problems));
 }
 
-// All but what changes the scene.
+// Plans, without changing the scene.
 Status StreamedWorld::Impl::plan(std::span<const Viewer> viewers) {
   const Clock::time_point start = Clock::now();
   note_edits();
@@ -745,10 +745,10 @@ Status StreamedWorld::apply(const WorldEdit& edit) {
 Status StreamedWorld::flush() {
   constexpr double kAsLongAsItTakes = std::numeric_limits<double>::infinity();
   impl_->note_edits();
-  // Types first: what workers and edits bring may need them.
+  // Saves types first: chunks from workers and edits may need them.
   if (auto saved = impl_->save_now(); !saved) return saved;
   while (!impl_->waits_for_broken_alone()) {
-    // Around those of the last update: what else comes is edited, saved, and goes again.
+    // Loads around the viewers of the last update: other chunks are edited, saved and unloaded again.
     impl_->take_in();
     impl_->note_edits();
     if (impl_->is_edited) {

@@ -25,7 +25,7 @@ namespace {
 
 using Key = std::tuple<int, int, int>;
 
-/// Ground below y = 0 with a pattern of its own in each chunk; counts who asks.
+/// Ground below y = 0 with a different pattern in each chunk; counts the requests.
 class PatternGround final : public ChunkGenerator {
  public:
   explicit PatternGround(int delay_microseconds = 0) : delay_(delay_microseconds) {}
@@ -298,7 +298,7 @@ TEST_F(StreamedWorldTest, FieldsAreStreamedLikeVoxels) {
     ASSERT_TRUE(world->load_all({&viewer, 1}).has_value());
     EXPECT_LT(world->scene().grids()[*grid].field.density({100, 110, 100}), 0.0F);
   }
-  // The landscape goes on when the world is opened again.
+  // The landscape continues when the world is opened again.
   auto world = StreamedWorld::open(path(), WorldAccess::Write);
   ASSERT_TRUE(world.has_value()) << to_string(world.error());
   viewer.position.z = 1500.0;

@@ -11,7 +11,7 @@ namespace quoin::stream {
 
 /// A landscape as a world keeps it: JSON.
 [[nodiscard]] std::string text_of(const EndlessTerrain& terrain);
-/// Nothing where it is none that this version makes.
+/// Parses a terrain; nullopt for one that this version cannot generate.
 [[nodiscard]] std::optional<EndlessTerrain> terrain_from(std::span<const std::byte> bytes);
 
 }  // namespace quoin::stream

@@ -15,7 +15,7 @@ namespace quoin::terrain {
 inline constexpr int kLatticeStep = 4;
 /// From -4 to 68 in samples of a chunk.
 inline constexpr int kLatticeEdge = kChunkEdge / kLatticeStep + 3;
-/// From -1 to 64 in samples of a chunk: what gradients need.
+/// From sample -1 to sample 64 of a chunk, as needed for gradients.
 inline constexpr int kFieldEdge = kChunkEdge + 2;
 
 /// Values at every fourth sample of a chunk and around it.
@@ -23,7 +23,7 @@ class Lattice {
  public:
   Lattice() : values_(std::size_t{kLatticeEdge} * kLatticeEdge * kLatticeEdge) {}
 
-  /// `value(sample, column)` gives the value at a sample of the world; `column` is its [z][x] in the lattice.
+  /// `value(sample, column)` returns the value at a world sample; `column` is its [z][x] in the lattice.
   template <class Value>
   void fill(IVec3 corner, Value&& value) {
     std::size_t i = 0;

@@ -87,7 +87,7 @@ class Painter {
     chunk_.set(local, type);
   }
 
-  /// The voxels whose middle lies in an ellipsoid, frayed by `shape`.
+  /// Fills the voxels whose centre lies in an ellipsoid with a rough border, varied by `shape`.
   void put_ball(IVec3 middle, double across, double up, VoxelType type, std::uint32_t shape, bool only_in_air) {
     const double per_across = 1.0 / (across * across);
     const double per_up = 1.0 / (up * up);

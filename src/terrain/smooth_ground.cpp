@@ -41,7 +41,7 @@ constexpr float kSteepNormal = 0.62F;
 constexpr float kSoilDepth = 3.5F;
 constexpr float kTurfDepth = 2.2F;
 
-// What covers flat ground, by height.
+// The cover of flat ground, by height.
 struct Cover {
   VoxelType turf = kAir;
   VoxelType soil = kAir;

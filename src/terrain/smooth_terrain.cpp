@@ -20,7 +20,7 @@ constexpr int kMaxPlace = 1 << 19;
 constexpr int kUnitsPerChunk = kChunkEdge / kTerrainUnit;
 constexpr float kBand = 8.0F;
 
-// Whether those of a smooth world are all there, as add_terrain_types makes them.
+// Returns true if all types of a smooth world are set, as by add_terrain_types.
 bool are_filled(const TerrainTypes& t) {
   const VoxelType all[] = {t.grass, t.earth, t.stone, t.sand, t.snow};
   return std::find(std::begin(all), std::end(all), kAir) == std::end(all);

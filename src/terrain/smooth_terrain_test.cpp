@@ -58,7 +58,7 @@ bool is_solid(const DensityGrid& field, IVec3 p) {
   return field.density(p) < 0.0F;
 }
 
-// A world is a promise: who kept a seed wants the same hills back. A change here is a change of every world.
+// Worlds must be reproducible from a saved seed. A change here changes every world.
 TEST(SmoothTerrain, GivesTheSameWorldsEverywhere) {
   EXPECT_EQ(hash_of(make(smooth_options_of(42, {2, 2, 2}))), 16'385'689'152'749'590'625U);
   EXPECT_EQ(hash_of(make(smooth_options_of(7, {1, 4, 1}, -3, 5))), 12'034'568'528'284'950'785U);

@@ -42,7 +42,7 @@ std::uint64_t hash_of_voxels(const Grid& grid) {
   return hash;
 }
 
-// A world is a promise: who kept a seed wants the same hills back. A change here is a change of every world.
+// Worlds must be reproducible from a saved seed. A change here changes every world.
 TEST(Terrain, GivesTheSameWorldsEverywhere) {
   EXPECT_EQ(hash_of_voxels(make(options_of(42, {4, 2, 4}))), 3'554'384'073'062'585'728U);
   EXPECT_EQ(hash_of_voxels(make(options_of(7, {3, 1, 5}))), 14'850'430'397'421'753'799U);

@@ -24,7 +24,7 @@ struct Seen {
   double u, v, w;
 };
 
-/// The first whole number whose centre (0.5 further) lies at or behind a place.
+/// Returns the first integer whose centre (0.5 further) lies at or behind a position.
 int first_centre(double place) {
   return static_cast<int>(std::ceil(place - 0.5));
 }
@@ -162,7 +162,7 @@ struct Met {
 /// For triangles that lie between voxels and are touched: true if their inner side is the one behind them.
 using Sides = std::map<std::uint32_t, bool>;
 
-/// Puts crossings that rounding moved off the border between two voxels onto it.
+/// Moves crossings that rounding moved off the border between two voxels back onto it.
 double snapped(double w) {
   constexpr double kRounding = 1e-9;
   const double border = std::round(w);

@@ -1,10 +1,10 @@
 #pragma once
 
-// What lines through the centres of voxels meet of a mesh, along each axis.
+// The crossings of a mesh with lines through the voxel centres, along each axis.
 //
-//   axis 0 (x): lines of (y, z)     a column is 64 x 64 lines: all that cross the chunks one behind the other
-//   axis 1 (y): lines of (x, z)     its lines' crossings lie one line after the other, each sorted along the line
-//   axis 2 (z): lines of (x, y)
+//  axis 0 (x): lines of (y, z)     a column is 64 x 64 lines: all that cross the chunks one behind the other
+//  axis 1 (y): lines of (x, z)     its lines' crossings are stored line by line, each sorted along the line
+//  axis 2 (z): lines of (x, y)
 
 #include <array>
 #include <cstddef>
@@ -21,8 +21,8 @@
 
 namespace quoin::voxelizing {
 
-/// One crossing: the first voxel whose centre lies at or behind it, whether it lies in the voxel before that one, and
-/// which side is met. Where it lies between two voxels it belongs to the one on the inner side of the surface.
+/// One crossing: the first voxel whose centre lies at or behind it, whether it lies in the previous voxel, and the hit
+/// side. A crossing between two voxels belongs to the voxel on the inner side of the surface.
 class Crossing {
  public:
   Crossing() = default;

@@ -85,7 +85,7 @@ void add_line(std::span<const Crossing> line, SolidVoxels rule, std::span<VoteRa
   }
 }
 
-/// The ranges of a column's chunks; where nothing is met they stay 0 to 0.
+/// Returns the ranges of a column's chunks; they stay 0 to 0 without crossings.
 void find_ranges(const Column& column, SolidVoxels rule, std::span<VoteRange> chunks) {
   if (column.begin.empty()) return;
   constexpr VoteRange kNone = {std::numeric_limits<std::int16_t>::max(), std::numeric_limits<std::int16_t>::min()};

@@ -29,7 +29,7 @@ class Inside {
   /// Requires: `rule` is not None; `crossings` outlives it.
   Inside(const Crossings& crossings, SolidVoxels rule, Threads threads);
 
-  /// Finds the voxels of a chunk whose centre is solid; `bits` is set where that is some of them only.
+  /// Finds the voxels of a chunk whose centre is solid; sets `bits` only if it returns Some.
   [[nodiscard]] Filled find(IVec3 chunk, InsideScratch& scratch, ChunkBits& bits) const;
 
  private:

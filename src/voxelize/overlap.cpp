@@ -10,8 +10,8 @@ namespace quoin::voxelizing {
 
 namespace {
 
-/// The half plane on the inner side of an edge in a projection, grown by a unit square: a square whose least corner is
-/// (a, b) meets it where a * slope_a + b * slope_b + offset >= 0.
+/// The half plane on the inner side of an edge in a projection, grown by a unit square: a square with the lowest corner
+/// (a, b) meets it if a * slope_a + b * slope_b + offset >= 0.
 struct HalfPlane {
   double slope_a = 0.0;
   double slope_b = 0.0;
@@ -66,7 +66,7 @@ struct Triangle {
 }  // namespace
 
 void mark_overlapping(const Corners& corners, IVec3 chunk, ChunkBits& bits) {
-  // In the chunk's coordinates, which loses nothing that matters: corners lie at most 2^14 chunks away.
+  // In chunk coordinates, without a relevant loss of precision: corners lie at most 2^14 chunks away.
   const DVec3 origin = DVec3(chunk) * static_cast<double>(kChunkEdge);
   const Corners local = {corners[0] - origin, corners[1] - origin, corners[2] - origin};
   const DVec3 low = glm::min(glm::min(local[0], local[1]), local[2]);

@@ -41,7 +41,7 @@ const std::array<float, 256>& linear_of_bytes() {
   return all;
 }
 
-/// A pixel's index within a picture.
+/// Returns a pixel's index within an image.
 int wrapped(int at, int size, TextureWrap wrap) {
   if (wrap == TextureWrap::Clamp) return std::clamp(at, 0, size - 1);
   const int period = wrap == TextureWrap::Mirror ? 2 * size : size;

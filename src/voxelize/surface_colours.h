@@ -33,7 +33,7 @@ class SurfaceColours {
   }
   /// The index into `looks` of a point: of its material, with the emission that its texture has there.
   [[nodiscard]] std::uint32_t look_index(std::uint32_t triangle, DVec3 shares) const;
-  /// The look of the one material that all triangles have, with its mean emission; nothing if there are several.
+  /// Returns the look of the single material of all triangles, with its mean emission; nullopt if there are several.
   [[nodiscard]] std::optional<std::uint32_t> deep_look() const;
   /// The area-weighted mean colour at the triangles' centres, with alpha if the only material blends.
   [[nodiscard]] Rgba8 mean() const { return mean_; }
@@ -41,7 +41,7 @@ class SurfaceColours {
   [[nodiscard]] const std::vector<VoxelProperties>& looks() const { return properties_; }
 
  private:
-  /// A texture's picture and its halves down to one pixel.
+  /// An image of a texture's mip chain, down to one pixel.
   struct Level {
     int width = 0;
     int height = 0;
@@ -54,13 +54,13 @@ class SurfaceColours {
   [[nodiscard]] const MeshMaterial& material_of(std::uint32_t triangle) const {
     return materials_[material_index(triangle)];
   }
-  /// The material that all triangles are of; nothing where there are several.
+  /// Returns the single material of all triangles; nullopt if there are several.
   [[nodiscard]] std::optional<std::uint32_t> only_material() const;
   /// The look of a material with this share of its emission.
   [[nodiscard]] std::uint32_t look_of(std::uint32_t material, float share) const;
   /// The share of its material's emission, 0 to 1.
   [[nodiscard]] float emission_share(std::uint32_t triangle, DVec3 shares) const;
-  /// The texture's colour at a point of a triangle, whose corners have these places in it.
+  /// Returns the texture's colour at a point of a triangle; `places` are its corners' texture coordinates.
   [[nodiscard]] glm::vec4 colour_in(std::size_t texture, std::uint32_t triangle, const glm::vec2* places,
                                     DVec3 shares) const;
   /// Linear light and alpha.

@@ -317,8 +317,8 @@ bool has_voxel_near(GridReader& voxels, IVec3 at) {
   return false;
 }
 
-/// Warns of corners without a voxel next to them: a thin surface leaves out tips and pieces that no line through
-/// centres meets. Corners whose material cuts parts out do not count.
+/// Warns of corners without a voxel next to them: a thin surface omits tips and pieces between the lines through voxel
+/// centres. Corners of materials with cut-outs are ignored.
 void warn_of_thin_parts(const TriangleMesh& mesh, const VoxelLattice& lattice, const SurfaceColours& colours,
                         const Grid& grid, std::vector<std::string>& warnings) {
   GridReader voxels(grid);

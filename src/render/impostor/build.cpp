@@ -28,7 +28,7 @@ int edge_for(const ContentSphere& content, const ImpostorOptions& options) {
   return voxels <= options.edge ? options.edge : 2 * options.edge;
 }
 
-// The log2 of the width of cells whose bits are as wide as a snapshot's texels.
+// Returns the log2 of the width of cells whose bits are as wide as a snapshot's texels.
 int first_width_for(const ContentSphere& content, int edge) {
   int log2_width = 2;
   while (log2_width < 10 && std::ldexp(edge, log2_width - 2) < 2.0 * content.radius) ++log2_width;
@@ -80,7 +80,7 @@ void count_open_rays(const OccupancyTree& opaque, const DensityTree* field, std:
     for (int ray = 0; ray < kRays; ++ray) {
       for (std::size_t i = 0; i < size; ++i) {
         const ImpostorFaces::Face& face = faces[wanted[begin + i]];
-        // Those of a field's surface are those of an upper face, turned with it.
+        // Faces of a field's surface use the values of an upper face, rotated with it.
         const auto side = static_cast<std::size_t>(face.in_field ? Direction::PosY : face.direction);
         DVec3 direction = directions.fixed(side, ray);
         if (face.in_field) {

@@ -80,7 +80,7 @@ struct ImpostorCache::Impl {
   const ImpostorCacheOptions options;
   mutable std::mutex mutex;
   std::condition_variable wake;   // of workers: there is something to build, or the end
-  std::condition_variable ready;  // of who waits: something was built
+  std::condition_variable ready;  // signalled to waiting callers when an impostor is built
   Entries entries;
   std::deque<GridHandle> queue;  // of the entries that wait
   std::size_t building = 0;
@@ -163,7 +163,7 @@ void ImpostorCache::Impl::work() {
       if (next != entries.end()) build(next, lock);
       free_unused(lock);
     } catch (const std::bad_alloc&) {
-      // For the lists above: the impostor is gone, and is asked for again.
+      // If memory for the lists above runs out: the impostor is dropped and requested again.
       if (!lock.owns_lock()) lock.lock();
       ++stats.out_of_memory;
     }
@@ -200,10 +200,10 @@ void ImpostorCache::Impl::build(Entries::iterator entry, std::unique_lock<std::m
     made = std::make_shared<const Impostor>(is_again ? before->rebuilt(job->grid.grid, *job->types, job->changes)
                                                      : Impostor::build(job->grid, *job->types, {job->origin.edge}));
   } catch (const std::bad_alloc&) {
-    // Nothing was made.
+    // The build failed.
   }
   const Origin origin = job->origin;
-  job.reset();  // what only the snapshot holds goes without the lock
+  job.reset();  // frees the snapshot's data without the lock
   lock.lock();
   QUOIN_ASSERT(building != 0 && entry->second.building, "what is built was begun");
   --building;
@@ -298,7 +298,7 @@ void ImpostorCache::Impl::forget_missing(const Scene& scene) {
   ++round;
 }
 
-// What somebody still holds is looked at again when the next one is replaced.
+// Impostors still held by callers are checked again at the next replacement.
 void ImpostorCache::Impl::free_unused(std::unique_lock<std::mutex>& lock) {
   has_unused = false;
   const auto kept = std::partition(replaced.begin(), replaced.end(),
@@ -342,7 +342,7 @@ std::size_t ImpostorCache::wait(const Scene& scene, double seconds) {
       next != me.entries.end() ? me.build(next, lock) : me.ready.wait(lock);
     }
   } else if (seconds > 0.0) {
-    constexpr double kLongest = 1e6;  // what clocks can count
+    constexpr double kLongest = 1e6;  // limit of the clock type
     me.ready.wait_for(lock, std::chrono::duration<double>(std::min(seconds, kLongest)), is_ready);
   }
   me.forget_missing(scene);

@@ -173,7 +173,7 @@ std::uint64_t bit_of_eighth(IVec3 in_cell, DVec3 half, int log2_width) {
   return std::uint64_t{1} << (at.x + 4 * at.y + 16 * at.z);
 }
 
-// The 4^3 bits of a cell as 2^3 bits of the cell of twice the width, in whose octant it lies.
+// Reduces the 4^3 bits of a cell to 2^3 bits, in their octant of the cell of twice the width.
 std::uint64_t halved_bits(std::uint64_t bits, unsigned octant) {
   bits |= bits >> 1, bits |= bits >> 4, bits |= bits >> 16;
   const std::uint64_t low = (bits & 1U) | (bits >> 1 & 2U) | (bits >> 4 & 16U) | (bits >> 5 & 32U);
@@ -183,7 +183,7 @@ std::uint64_t halved_bits(std::uint64_t bits, unsigned octant) {
   return (low | high << 16) << shift;
 }
 
-// The cells of a field's lattice whose eight corners are all solid.
+// The cells of a field's lattice with eight solid corners.
 class SolidCells {
  public:
   explicit SolidCells(const DensityGrid& field) : field_(&field) {}
@@ -224,8 +224,8 @@ class SurfaceCells::Collector {
     cell.bits |= bits_of_voxel(in_cell(seen.face.voxel), into_->log2_width_);
   }
 
-  // As the eighths of voxels whose middles lie just below it: two of each column, so that no ray slips through between
-  // two columns.
+  // Adds a surfel as the eighths of voxels whose centres lie just below it: two per column, so that no ray passes
+  // between two columns.
   void add_surfel(const SeenFace& seen, std::uint32_t index) {
     const FaceFrame& frame = frame_of(seen.face.direction);
     const ImpostorFaces::Surfel& surfel = *seen.surfel;
@@ -254,7 +254,7 @@ class SurfaceCells::Collector {
     }
   }
 
-  // As the first solid cells of the lattice below it, and those below them, in the four columns around its edge.
+  // Adds the first solid lattice cells below a surfel, and the cells below those, in the four columns around its edge.
   void add_behind(const SeenFace& seen, std::uint32_t index, SolidCells& solid) {
     constexpr int kDeepest = 4;
     const FaceFrame& frame = frame_of(seen.face.direction);
@@ -304,7 +304,7 @@ class SurfaceCells::Collector {
     if (at == last_at_) return into_->cells_[last_];
     last_at_ = at;
     const std::uint64_t code = morton_code(at);
-    // Those of the row before come again.
+    // The cells of the previous row occur again.
     Recent& recent = recent_[MortonHash()(code) % recent_.size()];
     if (recent.is_known && recent.code == code) return into_->cells_[last_ = recent.cell];
     const auto [found, is_new] = index_.try_emplace(code, static_cast<std::uint32_t>(into_->cells_.size()));

@@ -25,8 +25,8 @@ namespace quoin {
 ///   +-+-+-+-+-+-+-+-+
 class SurfaceCells {
  public:
-  /// Groups `faces` into cells of 2^`log2_width` voxels, 1 to 10. Cost: some 50 ns per face, 1 us per surfel.
-  /// `edge`: texels a side of the snapshots that saw them.
+  /// Groups `faces` into cells of 2^`log2_width` voxels, 1 to 10. Cost: about 50 ns per face, 1 us per surfel. `edge`:
+  /// texels per side of the snapshots that saw them.
   SurfaceCells(const std::vector<SeenFace>& faces, const ContentSphere& content, int edge, int log2_width);
 
   /// Returns cells of 2 voxels that show through the gaps between surfels: the faces that no view saw, and for each
@@ -41,8 +41,8 @@ class SurfaceCells {
   /// least.
   void fill_from(const OccupancyTree& tree);
 
-  /// The sides of the boxes that a ray may reach from outside. `is_solid(voxel)` answers for voxels of the content's
-  /// box and those next to it. Order: direction, then cells along a Morton curve.
+  /// Returns the box sides that a ray may reach from outside. `is_solid(voxel)` must accept voxels of the content's box
+  /// and their neighbours. Order: direction, then cells along a Morton curve.
   [[nodiscard]] ImpostorFaces::Level level(const std::function<bool(IVec3)>& is_solid) const;
 
  private:

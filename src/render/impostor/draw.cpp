@@ -20,7 +20,7 @@ namespace {
 constexpr int kTile = ImpostorPass::kTile;
 constexpr int kBlock = CameraRays::kBlock;
 
-// Draws one square of the picture.
+// Draws one square of the image.
 class FarTile {
  public:
   FarTile(const ImpostorPass& pass, const SceneView& view, const CameraRays& rays, const Lighting& lighting,

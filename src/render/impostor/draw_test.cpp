@@ -77,8 +77,8 @@ TEST(DrawImpostors, KeepsItsOutlineWhereItIsSmall) {
   }
 }
 
-// By how much a step of one degree changes the picture of an impostor more than the traced one. Measured: 0.06 of 255
-// at most (the ship).
+// The change of an impostor's image for a step of one degree, minus that of the traced image. Measured maximum: 0.06 of
+// 255 (the ship).
 TEST(DrawImpostors, DoesNotJumpWhileOrbiting) {
   for (const Model model : {Model::Castle, Model::Ship}) {
     const World world(model);

@@ -12,9 +12,9 @@
 
 namespace quoin {
 
-/// The far ones among the instances of one picture that have impostors.
+/// The far instances of one image that have impostors.
 struct FarImpostors {
-  static constexpr std::size_t kMaxBytes = std::size_t{1} << 30;  ///< of all grids; those beyond have none
+  static constexpr std::size_t kMaxBytes = std::size_t{1} << 30;  ///< of all grids; grids beyond the limit have none
 
   std::vector<FarInstance> instances;
   std::map<GridHandle, std::shared_ptr<const Impostor>> kept;  ///< owns the impostors above

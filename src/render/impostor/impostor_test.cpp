@@ -285,7 +285,7 @@ TEST(Impostor, RebuiltKnowsWhatItCannotKeep) {
   expect_right();
   grid.fill_box({{0, 0, 0}, {40, 40, 40}}, kAir);
   expect_right();
-  grid.set({90, 3, 3}, kAir);  // nothing is left
+  grid.set({90, 3, 3}, kAir);  // the last voxel
   expect_right();
   EXPECT_TRUE(impostor.empty());
   grid.fill_box({{0, 0, 0}, {4, 4, 4}}, 2);

@@ -85,7 +85,7 @@ void LevelMaker::end_group() {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<int>(axis);
     groups.centre[axis].push_back(0.5F * (low_[a] + high_[a]));
-    // With room for rounding.
+    // Includes a rounding margin.
     groups.half[axis].push_back(0.5F * (high_[a] - low_[a]) + 1e-6F * level_.size);
   }
 }

@@ -68,7 +68,7 @@ class ImpostorPass {
   std::vector<std::vector<std::uint32_t>> bins_;  // of tiles: indices of these, nearest first
 };
 
-/// The indices of those far instances that a tracer holds, in SceneTracer::placed.
+/// Returns the indices in SceneTracer::placed of the far instances in a tracer.
 [[nodiscard]] std::vector<std::int32_t> placed_of(const SceneTracer& tracer, std::span<const FarInstance> far);
 
 }  // namespace quoin

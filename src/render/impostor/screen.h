@@ -16,7 +16,7 @@
 
 namespace quoin {
 
-/// Pixels of a picture, `right` and `bottom` exclusive.
+/// A pixel rectangle of an image, `right` and `bottom` exclusive.
 struct PixelArea {
   int left = 0;
   int top = 0;
@@ -24,7 +24,7 @@ struct PixelArea {
   int bottom = 0;
 };
 
-/// A far instance as one picture shows it.
+/// A far instance as drawn in one image.
 struct DrawnImpostor {
   std::int32_t placed = 0;  ///< index into SceneTracer::placed
   const ImpostorFaces* faces = nullptr;
@@ -49,7 +49,7 @@ struct DrawnImpostor {
   [[nodiscard]] std::span<const Part> parts(std::array<Part, kMaxParts>& room) const;
 };
 
-/// A picture that impostors are drawn into.
+/// An image that impostors are drawn into.
 class ImpostorScreen {
  public:
   ImpostorScreen(const Camera& camera, int width, int height);
@@ -60,7 +60,7 @@ class ImpostorScreen {
 
  private:
   struct Sphere;
-  // Where in the picture it may lie, if it is to be drawn.
+  // Returns its area in the image, if it is to be drawn.
   [[nodiscard]] std::optional<PixelArea> area_of(const Sphere& sphere) const;
 
   Camera camera_;

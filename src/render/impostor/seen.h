@@ -28,10 +28,10 @@ struct SeenFace {
 [[nodiscard]] std::vector<SeenFace> faces_seen_of(const ImpostorShell& shell, const FieldSurfels& field,
                                                   const IBox& box, const ContentSphere& content, int edge);
 
-/// The same after an edit. `before`: of an impostor with the same content and edge whose faces are whole. `changed`:
-/// boxes around the voxels that are other than then.
+/// Updates the faces after an edit. `before`: an impostor with the same content and edge, and complete faces.
+/// `changed`: boxes around the changed voxels.
 ///
-/// Cost: about 10 ns a face, and for each box and view the faces that may show in its texels.
+/// Cost: about 10 ns per face, plus the faces that may show in the texels of each box and view.
 [[nodiscard]] std::vector<SeenFace> faces_seen_after(const ImpostorFaces& before, const ImpostorShell& shell,
                                                      const ContentSphere& content, std::span<const IBox> changed);
 
@@ -40,8 +40,8 @@ struct SeenFace {
 [[nodiscard]] std::vector<SeenFace> faces_seen_by_rays(const OccupancyTree& opaque, const ContentSphere& content,
                                                        int edge);
 
-/// Returns the level of the faces that any view saw. Level::face counts in `faces`, which are sorted by direction,
-/// those of voxels first.
+/// Returns the level of the faces that any view saw. Level::face indexes `faces`, which are sorted by direction, voxel
+/// faces first.
 [[nodiscard]] ImpostorFaces::Level seen_faces(const std::vector<SeenFace>& faces, const ContentSphere& content);
 
 /// Returns the level of the faces that no view saw, as if every view had seen them.

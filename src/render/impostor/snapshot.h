@@ -32,7 +32,7 @@ struct SnapshotCamera {
 /// Upright along the grid's +Y; along its +X where the view is within 8 degrees of the Y axis.
 [[nodiscard]] SnapshotCamera snapshot_camera(const ContentSphere& content, int view, int edge);
 
-/// One view of a grid's opaque voxels: what each texel sees, rows from the top. A texel whose type is air saw nothing;
+/// One view of a grid's opaque voxels: the hit of each texel, rows from the top. A texel with type air hit no voxel;
 /// its depth is infinite.
 struct Snapshot {
   SnapshotCamera camera;

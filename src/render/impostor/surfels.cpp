@@ -20,7 +20,7 @@ constexpr double kOfLargest = 0.8;
 constexpr double kEnough = 0.55;
 constexpr int kThin = 3;  // samples
 
-// Gathers what crosses the edges of the lattice that begin in each chunk.
+// Collects the surface's crossings with the lattice edges that begin in each chunk.
 class SurfelMaker {
  public:
   SurfelMaker(const DensityGrid& field, std::size_t max_count) : field_(&field), max_count_(max_count) {}
@@ -109,7 +109,7 @@ class SurfelMaker {
     made_.types.push_back(field_->material(solid));
   }
 
-  // How a surfel goes on along another axis: how far it reaches to both sides, and how much it rises.
+  // The extent of a surfel along another axis: its reach to both sides, and its rise.
   struct Side {
     double low = 0.5;
     double high = 0.5;
@@ -134,7 +134,8 @@ class SurfelMaker {
     }
     return side;
   }
-  // Where the surface crosses an edge, from its lower end; nothing where it does not, or the other way.
+  // Returns the height of the surface's crossing with an edge above its lower end; nullopt without one, or for the
+  // opposite side.
   [[nodiscard]] std::optional<double> height(IVec3 sample, int axis, bool is_solid_below) const {
     IVec3 next = sample;
     ++next[axis];
@@ -152,8 +153,7 @@ class SurfelMaker {
     }
     return std::nullopt;
   }
-  // How far a surface goes on from an edge where it does not cross the next one: up to where it bends away, or to the
-  // foot of a wall.
+  // Returns the extent of the surface from an edge if it does not cross the next edge: up to its bend, or to a wall.
   [[nodiscard]] double reach_to(IVec3 sample, IVec3 step, int axis, bool is_solid_below) const {
     IVec3 solid = sample;
     IVec3 air = sample;

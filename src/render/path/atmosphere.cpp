@@ -27,7 +27,7 @@ constexpr Vec3 kOzone{0.650e-3F, 1.881e-3F, 0.085e-3F};
 constexpr float kGroundAlbedo = 0.3F;
 constexpr Vec3 kNight{0.0006F, 0.0009F, 0.0016F};  // of stars and air: never black
 
-constexpr int kWidth = 512;  // of the picture
+constexpr int kWidth = 512;  // of the image
 constexpr int kHeight = 256;
 
 struct Medium {
@@ -53,8 +53,8 @@ Vec3 through(Vec3 depth) {
   return {exponential(-depth.x), exponential(-depth.y), exponential(-depth.z)};
 }
 
-// From a point at `radius` along a ray whose cosine with the vertical is `cosine`, to a sphere around the Earth's
-// middle; negative: never.
+// Returns the distance from a point at `radius` along a ray whose cosine with the vertical is `cosine`, to a sphere
+// around the Earth's centre; negative: no intersection.
 float distance_to(float radius, float cosine, float sphere, bool is_entered) {
   const float b = radius * cosine;
   const float c = radius * radius - sphere * sphere;

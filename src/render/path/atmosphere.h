@@ -12,7 +12,8 @@ struct AtmosphericSky {
   Vec3 sunlight{0.0F};     ///< the transmitted sunlight
 };
 
-/// `to_sun`: unit, in the world. `irradiance`: of the sun before the air. Below the horizon the picture shows ground.
+/// `to_sun`: unit, in the world. `irradiance`: of the sun outside the atmosphere. Below the horizon the image shows
+/// ground.
 ///
 /// Source: S. Hillaire, "A scalable and production ready sky and atmosphere rendering technique" (2020): single
 ///         scattering along the ray, and all further scattering from a table, with its constants for the Earth.

@@ -116,7 +116,7 @@ class Denoiser {
         squares += weight * std::max(part.square - sum * sum / part.samples, 0.0F) * scale * scale;
       });
       const Vec3 mean = own.light / own.samples / albedo_of(own);
-      // Of single samples nothing is known: as much as they are.
+      // Single samples give no variance: assumes their own square.
       const float variance = freedom > 0.0F ? squares / freedom : square(luminance(mean));
       return Light{mean, variance / own.samples};
     });

@@ -22,7 +22,7 @@ struct SurfacePart {
   Vec3 place{0.0F};   ///< of curved surfaces, in view space; otherwise 0
 };
 
-/// The surfaces of a picture's pixels, each pixel's first few.
+/// The surfaces of an image's pixels, each pixel's first few.
 ///
 ///   pixel 0: part part part | pixel 1: part part part | ...
 class SurfaceParts {

@@ -226,7 +226,7 @@ class Developer {
   const SrgbEncoder& encode_ = SrgbEncoder::shared();
 };
 
-// The exposure of the neutral curve. None: nothing shines.
+// Returns the exposure of the neutral curve; nullopt for a black image.
 std::optional<double> neutral_exposure(const PathPicture& picture) {
   constexpr double kMiddle = 0.18;
   constexpr double kBrightest = 4.0;

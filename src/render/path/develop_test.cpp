@@ -91,7 +91,7 @@ TEST(PathDevelop, AutomaticExposureGivesEveryCurveTheSameMean) {
   EXPECT_EQ(find_exposure(picture_of(2, 2, Vec3(0.0F)), ToneCurve::Aces), 1.0);
 }
 
-// A bright pixel in the middle of a dark picture gives light to its surroundings, and keeps the rest.
+// A bright pixel in the centre of a dark image lights its surroundings, and keeps the rest.
 TEST(PathDevelop, BloomSpreadsWhatIsBright) {
   PathPicture picture = picture_of(65, 65, Vec3(0.1F));
   const std::size_t middle = 32 * 65 + 32;
@@ -106,7 +106,7 @@ TEST(PathDevelop, BloomSpreadsWhatIsBright) {
   EXPECT_GT(at(33, 32), dark + 30);
   EXPECT_GT(at(33, 32), at(36, 32));
   EXPECT_EQ(at(33, 32), at(32, 31));  // round
-  EXPECT_EQ(at(0, 0), dark);          // below the threshold nothing changes
+  EXPECT_EQ(at(0, 0), dark);          // no change below the threshold
   options.bloom.aspect = 1.0;
   const auto wide = develop(picture, options);
   ASSERT_TRUE(wide.has_value());

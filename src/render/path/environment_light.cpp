@@ -113,7 +113,7 @@ SkySample EnvironmentLight::sample(Pair u) const {
   const SineCosine latitude = of_turns(0.5F * down);
   const SineCosine longitude = of_turns(around);
   SkySample sample;
-  // Half a turn back: the middle of the picture is -z.
+  // Half a turn back: the image's centre is -z.
   sample.direction = {-latitude.sine * longitude.sine, latitude.cosine, latitude.sine * longitude.cosine};
   sample.density = density_at(static_cast<int>(column.index), static_cast<int>(row.index), latitude.sine);
   sample.radiance = at(sample.direction);

@@ -17,8 +17,8 @@ struct SkySample {
   float density = 0.0F;  ///< by solid angle; infinite of a sun without a disc
 };
 
-/// A picture of all directions that shines: +y is up, the picture's middle is -z, its left edge is +z, and to the right
-/// of the middle is +x.
+/// An emissive image of all directions: +y is up, the image's centre is -z, its left edge is +z, and +x is right of the
+/// centre.
 class EnvironmentLight {
  public:
   /// `image`: longitude and latitude. Values that are not finite or negative count as 0.

@@ -1,4 +1,4 @@
-// Light in fog and clouds, where analysis knows it; and what takes the noise out of pictures.
+// Compares light in fog and clouds with analytic results; tests the denoiser.
 
 #include <algorithm>
 #include <cmath>
@@ -139,7 +139,7 @@ TEST(PathMedia, ABlackCloudOnlyTakesAway) {
   }
 }
 
-// Glass before and behind a cloud, and a lamp within: nothing is lost on the way in a white sky.
+// Glass in front of and behind a cloud, and a lamp within: no light is lost under a white sky.
 TEST(PathMedia, CloudsStandBesideGlass) {
   Scene scene;
   const VoxelType cloud = scene.types.add(cloud_of({255, 255, 255, 255}, 0.3F)).value_or(kAir);
@@ -235,7 +235,7 @@ TEST(PathDenoise, HalvesTheErrorAtLeast) {
   EXPECT_LT(after, 0.6 * before) << before << " " << after;
 }
 
-// Without noise nothing changes: edges of surfaces, colours and hard shadows.
+// An image without noise is unchanged: edges of surfaces, colours and hard shadows.
 TEST(PathDenoise, KeepsEdges) {
   Scene scene;
   Grid grid;

@@ -180,7 +180,7 @@ TEST(PathLightTree, FindsLampsAsOftenAsItSays) {
   }
 }
 
-// No lamp whose light may reach a point is out of its reach.
+// Every lamp whose light may reach a point can be chosen.
 TEST(PathLightTree, MissesNoLampThatShinesThere) {
   std::mt19937 random(9);
   std::uniform_real_distribution<float> unit(-1.0F, 1.0F);

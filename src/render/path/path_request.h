@@ -17,7 +17,7 @@ inline constexpr int kMaxPathSamples = 65'536;
 /// Returns an error for arguments that PathTracer::render rejects. Requires: the camera's axes are perpendicular.
 [[nodiscard]] Status check(const Camera& camera, const PathOptions& options);
 
-/// With room for all that the options ask for.
+/// Returns an image with buffers for all requested outputs.
 [[nodiscard]] PathPicture empty_picture(const PathOptions& options);
 
 /// The sums over a pixel's samples.
@@ -26,7 +26,7 @@ struct PixelSums {
   Vec3 scene{0.0F};
   Vec3 caught{0.0F};  ///< background behind ground that only catches shadows
   Vec3 lit{0.0F};     ///< that ground
-  Vec3 open{0.0F};    ///< and what light it would have if nothing was on it
+  Vec3 open{0.0F};    ///< the light it would have on an empty ground
   float scene_share = 0.0F;
   float caught_share = 0.0F;
   Vec3 albedo{0.0F};
@@ -35,7 +35,7 @@ struct PixelSums {
   VoxelType type = kAir;
   std::uint32_t instance = 0;
 
-  /// Puts their means in place.
+  /// Writes the means to the image.
   void write_to(PathPicture& picture, std::size_t pixel, int samples) const;
 };
 

@@ -24,7 +24,7 @@ constexpr int kBlock = CameraRays::kBlock;
 constexpr std::size_t kBlockPixels = std::size_t{kBlock} * kBlock;
 static_assert(kBlockPixels == kBlockPoints);
 constexpr int kSureBounces = 3;       // before chance may end a path
-constexpr float kMostLikely = 0.95F;  // to go on
+constexpr float kMostLikely = 0.95F;  // maximum probability to continue
 
 // Calls `put(index)` in the order of keys, equal ones in theirs.
 template <class Key, class Put>
@@ -709,7 +709,7 @@ void PathTile::trace_request_packet(std::span<const std::uint32_t> requests) {
   }
 }
 
-// ---- the picture -------------------------------------------------------------------------------------------------
+// ---- the image ---------------------------------------------------------------------------------------------------
 
 std::int64_t PathTile::pixels_hit() const {
   return std::count_if(sums_.begin(), sums_.end(), [](const PixelSums& sums) { return sums.scene_share > 0.0F; });

@@ -40,7 +40,7 @@ struct TileContext {
   const CameraRays* rays = nullptr;
   const Camera* camera = nullptr;
   const PathOptions* options = nullptr;
-  SurfaceParts* parts = nullptr;  ///< of the picture, to be filled; null: not wanted
+  SurfaceParts* parts = nullptr;  ///< of the image, to be filled; null: not requested
   bool has_media = false;         ///< fog or clouds
 };
 
@@ -60,7 +60,7 @@ class PathTile {
   /// All samples of all pixels. Asks `goes_on(samples)` after some of them; once that returns false, so does this, and
   /// the tile is not to be used.
   [[nodiscard]] bool render(const std::function<bool(std::size_t samples)>& goes_on);
-  /// Puts the pixels that lie in the picture in place.
+  /// Writes the pixels within the image.
   void write_to(PathPicture& picture) const;
 
   [[nodiscard]] std::int64_t rays() const { return rays_; }
@@ -88,8 +88,8 @@ class PathTile {
     VoxelType inside = kAir;        // the glass in which it is
     std::int32_t place = 0;         // where it was last scattered
     bool is_seen = true;            // by the camera, itself or by glass and mirrors
-    bool is_first = true;           // nothing was met yet
-    bool is_caught = false;         // the ground only catches shadows where it went
+    bool is_first = true;           // no surface has been hit yet
+    bool is_caught = false;         // it passed ground that only catches shadows
     bool is_first_sample = false;
     bool is_noted = false;  // in the layers
     std::uint8_t bin = 0;   // of its direction
@@ -113,7 +113,7 @@ class PathTile {
       return !is_medium && material.roughness >= 1.0F && material.metalness <= 0.0F;
     }
   };
-  // Light that reaches a vertex if nothing is in between.
+  // The light that reaches a vertex if unblocked.
   struct Request {
     DVec3 origin{0.0};     // in the grid `home`
     Vec3 direction{0.0F};  // in the world
@@ -131,7 +131,7 @@ class PathTile {
     double end = 0.0;
   };
 
-  // What samples before `first`, a power of two, found out of lamps.
+  // Applies the lamp results of samples before `first`, a power of two.
   void learn(int first);
   void begin(int first, int count);
   // A point of the lens, of radius 1.
@@ -145,7 +145,7 @@ class PathTile {
   // Traces a ray through glass before `t`, if the scene has glass. Returns true if the path's ray ends there.
   bool meet_glass(std::uint32_t index, double t);
   bool pass_glass(std::uint32_t index);
-  // Those bodies before the first of glass that scatter light.
+  // Traces the scattering bodies before the first glass.
   bool pass_clouds(std::uint32_t index);
   // Where a path ends in a body that scatters, if `u` is below the share of paths that do.
   void scatter_in(std::uint32_t index, const GlassBody& body, float u);
@@ -179,7 +179,7 @@ class PathTile {
   // Sends a path on that is scattered, into a direction of the world.
   void go_on(const Vertex& vertex, std::size_t lane, Vec3 normal, const Scattered& next);
   [[nodiscard]] Scatter scatter_at(const Vertex& vertex, const Path& path, const Frame& frame) const;
-  // Counts the scattering that comes now, and by chance ends the path. Returns whether it goes on.
+  // Counts the current scattering, and ends the path at random. Returns true if it continues.
   [[nodiscard]] bool survives(Path& path, bool in_medium) const;
   void ask_sun(const Vertex& vertex, std::size_t lane, const Frame& frame, const Scatter& scatter);
   void ask_sky(const Vertex& vertex, const Path& path, const Frame& frame, const Scatter& scatter);

@@ -46,7 +46,7 @@ bool PathTile::meet_glass(std::uint32_t index, double t) {
   return !glass_.empty() && enter_glass(index);
 }
 
-// Light from surface to surface goes straight on; by chance it meets what covers the glass.
+// Light between surfaces passes straight through glass; the opaque share of the glass blocks it at random.
 bool PathTile::pass_glass(std::uint32_t index) {
   Path& path = paths_[index];
   float u = path.random.one(path.dimension + dimension::kGlass);

@@ -47,7 +47,7 @@ inline Vec3 tint_of(const Surface& surface, double voxels) {
   if (!(length > 0.0F)) return Vec3(1.0F);
   Vec3 tint;
   for (int i = 0; i < 3; ++i) {
-    // Glass that covers all lets nothing through: the difference of infinities is not a number.
+    // Glass with full coverage transmits no light: the difference of infinities would be NaN.
     const float log = surface.log_clarity > -kNoOther ? surface.log_transmittance[i] - surface.log_clarity : 0.0F;
     tint[i] = exponential(log * length);
   }

@@ -1,4 +1,4 @@
-// Pictures by paths of scenes whose light is known by analysis.
+// Path-traced images of scenes with analytically known light.
 
 #include <algorithm>
 #include <cmath>
@@ -478,7 +478,7 @@ TEST(PathTracer, WhatPlacesRememberOfLampsDarkensNothing) {
   PathOptions options = under_even_sky(32, 32, 4);
   options.sky_brightness = 0.0;
   options.max_bounces = 1;
-  double forgetful = 0.0;  // nothing is known to the first four samples
+  double forgetful = 0.0;  // the first four samples have learned no shares
   double remembering = 0.0;
   for (options.seed = 0; options.seed < 100; ++options.seed) {
     for (const int samples : {4, 8}) {

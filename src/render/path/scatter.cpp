@@ -54,7 +54,7 @@ Vec3 visible_normal(Vec3 out, float alpha, Pair u) {
   return glm::normalize(Vec3(alpha * half.x, alpha * half.y, std::max(half.z, 1e-9F)));
 }
 
-// What gloss of white and of black at the normal reflects in all: the share is white * F0 + black * (1 - F0).
+// The total reflectance of gloss for F0 = 1 and F0 = 0: the share is white * F0 + black * (1 - F0).
 class GlossTable {
  public:
   static const GlossTable& shared() {

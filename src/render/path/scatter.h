@@ -45,7 +45,7 @@ class Scatter {
   [[nodiscard]] Vec3 value(Vec3 in) const;
   /// Returns the probability density of `in` in `sample`.
   [[nodiscard]] float density(Vec3 in) const;
-  /// A weight of 0: nothing comes from there.
+  /// A weight of 0: no light arrives from there.
   [[nodiscard]] Scattered sample(Pair u, float choice) const;
 
  private:

@@ -15,7 +15,7 @@ namespace quoin::path {
 /// Returns true if the skies of both looks are the same; their other settings are ignored.
 [[nodiscard]] bool is_same_sky(Look a, const Look& b);
 
-/// The sun and the sky of a picture. Cost: of a physical sky 70 ms.
+/// The sun and the sky of an image. Cost: 70 ms for a physical sky.
 class SkyLight {
  public:
   /// Requires: `check` accepts the options.

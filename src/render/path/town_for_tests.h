@@ -46,7 +46,7 @@ inline Scene town() {
   return scene;
 }
 
-/// A picture without a sun, under a sky that is 1 everywhere.
+/// Options for an image without a sun, under a sky of radiance 1.
 inline PathOptions under_even_sky(int width, int height, int samples) {
   PathOptions options;
   options.width = width;
@@ -57,7 +57,7 @@ inline PathOptions under_even_sky(int width, int height, int samples) {
   return options;
 }
 
-/// Expects that there is such a picture.
+/// Renders an image; fails the test on an error.
 inline PathPicture path_picture(const Scene& scene, const Camera& camera, const PathOptions& options,
                                 Threads threads = {}) {
   auto picture = PathTracer(scene).render(camera, options, threads);

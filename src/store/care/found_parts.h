@@ -24,11 +24,11 @@ class FoundParts {
   /// Takes a record found in the file's pages, if it is a sound part and newer than the stored version.
   void add(const PageRecord& record);
 
-  /// The version of the format, where a record is the sound part that says it.
+  /// Returns the format version, if a record is the sound part that holds it.
   [[nodiscard]] static std::optional<int> version_of(const PageRecord& record);
 
   [[nodiscard]] float band(std::uint32_t grid) const;
-  /// As many types as there can be: what chunks are checked against before it is known which are lost.
+  /// The maximum number of types: chunks are checked against these until the lost types are known.
   [[nodiscard]] const VoxelRegistry& any_types() const { return any_types_; }
   /// Sees to it that there is such a grid, and types up to a number.
   void add_grid(std::uint32_t grid);
@@ -38,7 +38,7 @@ class FoundParts {
 
   /// Sound ones.
   [[nodiscard]] std::size_t count() const { return count_; }
-  /// A line for each thing that is lost.
+  /// Returns a line for each lost item.
   [[nodiscard]] std::vector<std::string> lost() const { return lost_; }
 
  private:

@@ -170,7 +170,7 @@ class Check {
     return reading_.status();
   }
 
-  // What rows alone do not show: indices, free pages.
+  // Checks structures that rows do not cover: indices, free pages.
   Status check_tables() {
     auto select = reader_.connection().prepare("PRAGMA integrity_check(20)");
     if (!select) return select.error().code == ErrorCode::BadFormat ? Status() : Status(select.error());

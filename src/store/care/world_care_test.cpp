@@ -270,7 +270,7 @@ TEST(WorldCopy, HasAllThatTheWorldHas) {
   EXPECT_EQ(**copy->value("inventory"), std::vector<std::byte>(3000, std::byte{7}));
   EXPECT_EQ(**copy->thumbnail(), png_of('a'));
   EXPECT_EQ((*copy->load_chunk({0, 3, {1, 2, 3}}))->voxels.uniform(), 2);
-  // And goes on: numbers of grids and regions are those of the world.
+  // The world remains usable: grid and region numbers match it.
   auto on = WorldStore::open(folder / "c.quoin", WorldAccess::Write);
   WorldChanges more;
   more.put_chunk({0, 0, {500, 0, 0}}, {Chunk(1)});

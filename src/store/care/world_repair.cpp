@@ -67,7 +67,7 @@ class Repair {
   Result<WorldCheck> run() {
     auto reader = open_reader(from_);
     if (!reader && reader.error().code == ErrorCode::Unsupported) {
-      // Of a later Quoin; or the number itself is damaged, and the world says another one elsewhere.
+      // A later Quoin wrote it; or the number itself is damaged, and the world has a different one elsewhere.
       bool is_known = false;
       const Status scanned = scan_records(from_, [&](const PageRecord& record) {
         const auto version = FoundParts::version_of(record);
@@ -144,7 +144,7 @@ class Repair {
     return {};
   }
 
-  /// Puts a body with a right checksum, unless there is a newer one.
+  /// Adds a body with a correct checksum, unless there is a newer one.
   Status take(const ChunkBodyHeader& header, std::span<const std::byte> body, Output& output) {
     auto& newest = revisions_[header.place];
     if (newest > header.revision) return {};
@@ -159,8 +159,8 @@ class Repair {
     return output.put(header.place, std::move(*chunk));
   }
 
-  /// Rows that SQLite cannot read, or whose bytes are damaged there: an older state of a chunk, left on a page that is
-  /// no longer used, is better than none.
+  /// Covers rows that SQLite cannot read, or whose bytes are damaged: an older state of a chunk, left on an unused
+  /// page, is better than none.
   Status salvage_chunks(Output& output) {
     Status fault;
     const auto read = revisions_;  // rows that SQLite could read are newer than bodies on unused pages
@@ -192,7 +192,7 @@ class Repair {
   std::unordered_map<ChunkPlace, std::uint64_t, ChunkPlaceHash> revisions_;
 };
 
-/// Puts the new world in the place of the damaged one, whose content and log stay under another name.
+/// Replaces the damaged world by the new one; the damaged content and its log stay under another name.
 Result<std::filesystem::path> replace(const std::filesystem::path& fresh, const std::filesystem::path& path) {
   auto backup = FileBackup::of(path, FileBackup::Older::Kept);
   if (!backup) return backup.error();

@@ -59,7 +59,7 @@ struct ChunkBodyHeader {
 /// Cost: about 10 bytes per nanosecond.
 [[nodiscard]] Result<ChunkBodyHeader> read_header(std::span<const std::byte> body);
 
-/// Puts the right checksum into a body's first bytes. Requires: kChunkBodyHeader bytes.
+/// Writes the correct checksum to a body's first bytes. Requires: kChunkBodyHeader bytes.
 void put_checksum(std::span<std::byte> body);
 
 /// Makes bodies, one after the other; keeps its buffers. One thread at a time.

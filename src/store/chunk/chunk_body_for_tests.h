@@ -44,7 +44,7 @@ inline Chunk chunk_of_boxes(std::mt19937& random, int types, int boxes, int nois
   return chunk;
 }
 
-/// States and bytes at some voxels whose types take them.
+/// Adds states and bytes to some voxels whose types allow them.
 inline void put_some_data(std::mt19937& random, const VoxelRegistry& types, int tries, Chunk& chunk) {
   for (int i = 0; i < tries; ++i) {
     const IVec3 local{static_cast<int>(random() % 64), static_cast<int>(random() % 64),

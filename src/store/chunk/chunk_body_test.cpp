@@ -311,7 +311,7 @@ TEST(ChunkBody, RefusesEveryFlippedBit) {
   }
 }
 
-/// Bodies whose content is as it is, so that lies in it are not lost in a zstd frame.
+/// Returns a body with uncompressed content, so that corruptions of it are not masked by the zstd frame.
 std::vector<std::byte> stored_raw(const std::vector<std::byte>& content, std::uint8_t sections) {
   auto body = encoded(Chunk());
   body[12] = static_cast<std::byte>(sections);
@@ -408,7 +408,7 @@ TEST(ChunkBody, ReadsEveryFileOfTheCorpus) {
   }
 }
 
-// A frame that says it expands to more than any chunk holds is refused before memory is taken for it.
+// A frame whose size exceeds any chunk is rejected before memory is allocated.
 TEST(ChunkBody, BombsAreRefused) {
   auto body = encoded(Chunk(VoxelType{1}));
   body[12] = static_cast<std::byte>(chunk_sections::kVoxels | chunk_sections::kCompressed);

@@ -35,7 +35,7 @@ inline void put_short_number(std::vector<std::byte>& out, std::uint32_t number) 
   out.push_back(static_cast<std::byte>(number));
 }
 
-/// The bytes of a chunk's content, read from the first to the last. Offsets are those of the content.
+/// Reads a chunk's content sequentially. Offsets are relative to the content.
 class ContentReader {
  public:
   explicit ContentReader(std::span<const std::byte> bytes) : bytes_(bytes) {}

@@ -216,7 +216,7 @@ void read_row(const std::byte* low, const std::byte* high, const std::array<std:
   }
 }
 
-/// Reads the slabs of one density into the storage, and says which the others are.
+/// Reads the slabs of one density into the storage, and finds the others.
 Result<std::size_t> read_slabs(ContentReader& reader, const StoredHalves& stored, DensityStorage& m) {
   if (!reader.has(kSlabs / 8)) return reader.cut_off();
   const auto mixed = reader.take_bytes(kSlabs / 8);

@@ -27,11 +27,11 @@ inline constexpr std::size_t kMaxChunkDataBytes = std::size_t{64} << 20;
 /// The most that this can take of a chunk's content.
 inline constexpr std::size_t kMaxDataSection = 16 + kChunkVoxels * (3 + 5 + 3) + kMaxChunkDataBytes;
 
-/// Appends it. Errors: LimitExceeded, and nothing is appended. Requires: some voxel has data.
+/// Appends the data of a chunk's voxels. Errors: LimitExceeded; `out` is then unchanged. Requires: some voxel has data.
 [[nodiscard]] Status write_placed_data(const Chunk& chunk, std::vector<std::byte>& out);
 
-/// Puts it into a chunk. Errors: BadFormat, with the offset in the content; also for voxels of air and for states of
-/// more bits than their type has.
+/// Reads the data into a chunk. Errors: BadFormat, with the offset in the content; also for voxels of air and for
+/// states of more bits than their type allows.
 [[nodiscard]] Status read_placed_data(ContentReader& reader, const VoxelRegistry& types, Chunk& chunk);
 
 }  // namespace quoin::store

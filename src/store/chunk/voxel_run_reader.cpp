@@ -250,8 +250,8 @@ class VoxelRunReader::Builder {
       is_mixed = above - solid != 0;
     }
     std::int32_t change;  // of the stored index
-    std::int16_t solid;   // voxels that are not air, less those if the row were as the last voxel before it
-    bool is_mixed;        // a run starts within the row, not just with it
+    std::int16_t solid;   // non-air voxels, minus their number if the whole row were like the last voxel before it
+    bool is_mixed;        // a run starts within the row, not only at its start
   };
   static std::uint32_t row_of_slab(std::uint32_t z, std::uint32_t i) { return (i & 3U) * kChunkEdge + z + (i >> 2); }
 

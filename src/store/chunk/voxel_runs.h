@@ -36,7 +36,7 @@ inline constexpr std::size_t kMaxVoxelSection = 3 + 2 * (std::size_t{1} << 16) +
 /// Writes the types of one chunk after the other. One thread at a time. Memory: 1.1 MiB once there was a noisy chunk.
 class VoxelRunWriter {
  public:
-  /// Appends those of a chunk; its data is left out. Cost: O(rows + runs).
+  /// Appends the runs of a chunk, without its data. Cost: O(rows + runs).
   void write(const Chunk& chunk, std::vector<std::byte>& out);
 
  private:
@@ -70,7 +70,7 @@ class VoxelRunReader {
   std::vector<VoxelType> palette_;
   std::vector<std::uint64_t> seen_;  // by type / 64: in the palette; 0 between calls
   std::vector<std::uint32_t> counts_;
-  std::vector<std::uint64_t> changes_;  // of four layers: what each voxel's index is, XOR the one before
+  std::vector<std::uint64_t> changes_;  // of four layers: each voxel's index XOR the previous index
   std::vector<std::uint64_t> words_;
 };
 

@@ -15,7 +15,7 @@ namespace {
 
 // Time that a read or a commit waits for another process: long enough for any Quoin process, short enough to report.
 constexpr int kBusyMilliseconds = 10'000;
-// A row is a chunk, a part or a value; nothing we write is larger.
+// A row is a chunk, a part or a value; Quoin writes no larger ones.
 constexpr int kMaxRowBytes = 256 << 20;
 
 // A system's reason where there is one, else SQLite's own words.
@@ -34,7 +34,7 @@ bool is_of_reading(int code) {
   return code == SQLITE_IOERR_READ || code == SQLITE_IOERR_SHORT_READ || code == SQLITE_IOERR_FSTAT;
 }
 
-// Settings of every connection: a database may be anybody's, so that nothing in it runs, and lies are found.
+// The settings of every connection: a database may be untrusted, so code in it is disabled and corruption is detected.
 Status harden(sqlite3* database) {
   const auto set = [&](int option, int value) {
     return sqlite3_db_config(database, option, value, nullptr) == SQLITE_OK;
@@ -194,7 +194,7 @@ Result<Connection> Connection::open(std::span<const std::byte> bytes) {
 
 Status Connection::set_up(Mode mode) {
   if (auto done = harden(database_.get()); !done) return done;
-  // Damage is noticed where it is read; nothing is mapped, since a fault of the disk would end the process.
+  // Damage is detected on reads. No memory mapping, since a disk fault would end the process.
   if (auto done = run("PRAGMA cell_size_check=ON; PRAGMA mmap_size=0; PRAGMA temp_store=MEMORY"); !done) return done;
   if (mode == Mode::Read || mode == Mode::ReadImmutable) {
     // One connection alone moves the log into the database: see docs/decisions/103.

@@ -26,7 +26,7 @@ class Statement {
   /// Lifetime: the bytes until the statement is reset.
   void bind(int parameter, std::span<const std::byte> bytes);
 
-  /// Goes on to the next row: true where there is one. Errors: those of the database; the statement is then reset.
+  /// Moves to the next row; returns false after the last. Errors: those of the database; the statement is then reset.
   [[nodiscard]] Result<bool> step();
   /// Runs a statement that gives no rows, and resets it.
   [[nodiscard]] Status run();
@@ -88,7 +88,7 @@ class Connection {
   /// Pages in the write-ahead log as the last commit left it.
   [[nodiscard]] int log_pages() const { return *log_pages_; }
   [[nodiscard]] bool is_in_transaction() const;
-  /// Ends it. Errors: what SQLite gave for a close that failed.
+  /// Closes the connection. Errors: those of SQLite for a failed close.
   [[nodiscard]] Status close();
   [[nodiscard]] sqlite3* raw() { return database_.get(); }
 

@@ -103,7 +103,7 @@ inline constexpr const char* kWorld = "world";
 
 /// A text as the body of a part.
 [[nodiscard]] std::vector<std::byte> body_of(std::string_view text);
-/// The number whose decimal digits a body is; 0 where it is none.
+/// Parses a body of decimal digits; returns 0 if it is none.
 [[nodiscard]] std::uint64_t number_in(std::span<const std::byte> digits);
 /// Binds the id of a part.
 void bind(Statement& statement, int parameter, const PartId& id);

@@ -19,7 +19,7 @@
 
 #include "store/database/connection.h"
 
-// Maps of Luanti's, written without what reads them.
+// Luanti maps, written independently of the reader.
 
 namespace quoin::luanti_test {
 
@@ -71,8 +71,8 @@ struct Block {
   Node& at(int x, int y, int z) { return nodes[static_cast<std::size_t>((z * 16 + y) * 16 + x)]; }
 };
 
-/// A row of any version from 25 to 29. `width`: bytes of a node's number; with 1, numbers from 2048 to 4095 go on in
-/// param2.
+/// Returns a row of any version from 25 to 29. `width`: bytes of a node's number; with 1, numbers from 2048 to 4095
+/// extend into param2.
 inline Bytes row_of(const Block& block, int version, int width = 2) {
   Writer names;
   names.big(0, 1).big(block.names.size(), 2);

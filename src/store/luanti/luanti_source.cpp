@@ -64,14 +64,14 @@ std::string to_string(IVec3 place) {
   return "(" + std::to_string(place.x) + ", " + std::to_string(place.y) + ", " + std::to_string(place.z) + ")";
 }
 
-/// A fault of the database, without what only Quoin's own worlds can do about it.
+/// Returns a database error without advice that only applies to Quoin's worlds.
 Error fault_of_database(Error error, const fs::path& path) {
   if (error.code == ErrorCode::BadFormat) error.message = "the database is damaged";
   error.path = path.string();
   return error;
 }
 
-/// A connection and what reads a row with it.
+/// A connection, and the objects that read a row with it.
 struct Reader {
   Connection connection;
   Statement row;
@@ -92,7 +92,7 @@ class Readers {
     return Connection::open(bytes_);
   }
 
-  /// Finds out how places are said.
+  /// Detects the form of block positions.
   Status choose(Connection& connection) {
     if (const auto by_number = connection.prepare("SELECT pos, data FROM blocks LIMIT 1")) {
       places_ = Places::Number;
@@ -319,7 +319,7 @@ class LuantiSource final : public ChunkSource {
 /// The extent of the table's blocks, in Quoin chunks.
 struct Extent {
   std::unordered_set<std::uint64_t> chunks;
-  std::int64_t stray = 0;  // rows whose place there cannot be
+  std::int64_t stray = 0;  // rows with impossible positions
 
   void add(std::optional<IVec3> block) {
     if (!block) {

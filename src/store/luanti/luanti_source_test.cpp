@@ -245,7 +245,7 @@ TEST(LuantiMap, ARealWorldHasTheNodesThatItHas) {
       chunk.voxels.for_each_data([&](IVec3, const VoxelData&) { ++with_state; });
     }
   }
-  // Counted by a program that shares nothing with this one.
+  // Counted by an independent program.
   EXPECT_EQ(voxels, 1'003'917);
   EXPECT_EQ(with_state, 2'665);
   EXPECT_EQ((*source)->types().size() - 1, 46U);

@@ -59,7 +59,7 @@ void put_nodes(std::span<const std::byte> content, std::size_t width, MapBlock& 
       block.nodes[i] = load<std::uint16_t>(content.data() + 2 * i, std::endian::big);
       continue;
     }
-    // The upper half of such numbers goes on in param2.
+    // The upper half of such numbers extends into param2.
     auto number = std::to_integer<std::uint16_t>(content[i]);
     if (number > 0x7F) {
       number = static_cast<std::uint16_t>(number << 4 | block.param2[i] >> 4);
@@ -163,7 +163,7 @@ void MapBlockReader::Free::operator()(ZSTD_DCtx_s* context) const {
 
 MapBlockReader::MapBlockReader() : context_(ZSTD_createDCtx()) {
   if (context_ == nullptr) throw std::bad_alloc();
-  constexpr int kMaxWindow = 23;  // of 2^23 bytes; what Luanti writes has less
+  constexpr int kMaxWindow = 23;  // of 2^23 bytes; Luanti uses less
   static_cast<void>(ZSTD_DCtx_setParameter(context_.get(), ZSTD_d_windowLogMax, kMaxWindow));
 }
 

@@ -25,7 +25,7 @@ struct MapBlock {
       param2{};  ///< rotation, liquid level or colour, as defined by the node's definition
 };
 
-/// Reads blocks as the database has them. Not read are what nodes hold (metadata), objects, timers, and light (param1).
+/// Reads blocks in the database's form. Ignores node metadata, objects, timers, and light (param1).
 ///
 /// Source: Luanti's doc/world_format.md.
 class MapBlockReader {

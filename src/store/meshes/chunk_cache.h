@@ -28,14 +28,14 @@ class ChunkCache {
   void load(std::span<const IVec3> places, Threads threads);
   /// Null where there is none, or it is not loaded. Lifetime: until the next `trim`.
   [[nodiscard]] const Chunk* find(IVec3 place) const;
-  /// Lets those go that were not loaded last and do not fit any more.
+  /// Drops chunks that are not part of the last load and exceed the limit.
   void trim();
 
   /// Totals over all chunks read, each counted once: non-air voxels, voxels with data.
   [[nodiscard]] std::int64_t voxels() const { return voxels_; }
   [[nodiscard]] std::int64_t data() const { return data_; }
   [[nodiscard]] bool has_densities() const { return has_densities_; }
-  /// A line for each chunk that is damaged, which counts as air.
+  /// A line for each damaged chunk; these count as air.
   [[nodiscard]] const std::vector<std::string>& damage() const { return damage_; }
 
  private:

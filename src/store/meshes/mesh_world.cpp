@@ -106,7 +106,7 @@ class SpooledMesh {
 /// Reads voxels of a grid across chunks.
 class CachedReader {
  public:
-  /// `origin`: the chunk whose corner voxels are counted from.
+  /// `origin`: the chunk whose corner is the origin of voxel coordinates.
   CachedReader(ChunkCache& cache, IVec3 origin, Threads threads)
       : cache_(cache), origin_(origin * kChunkEdge), threads_(threads) {}
   VoxelType get(IVec3 from_origin) {
@@ -129,7 +129,7 @@ class CachedReader {
   IVec3 place_{0};
 };
 
-/// The chunks of a batch and those around them, read by way of the cache.
+/// Reads the chunks of a batch and their neighbours through the cache.
 Result<Grid> window_around(std::span<const IVec3> batch, ChunkCache& cache, Threads threads) {
   std::vector<IVec3> around;
   for (const IVec3 chunk : batch) {
@@ -146,7 +146,7 @@ Result<Grid> window_around(std::span<const IVec3> batch, ChunkCache& cache, Thre
   return window;
 }
 
-/// The faces of one grid of a world. Errors: those of reading; Cancelled.
+/// Counts the faces of one grid of a world. Errors: read errors; Cancelled.
 Result<FaceCounts> count_grid_faces(ChunkCache& cache, const VoxelRegistry& types, Threads threads,
                                     const Progress& progress) {
   FaceCounts counts;
@@ -186,7 +186,7 @@ class WorldMesher {
     auto meshes = mesh_scene(scene, wanted, threads_, {});
     if (!meshes) return meshes.error();
     made_.meshes = std::move(*meshes);
-    // What nothing places is counted all the same.
+    // Grids without placements are counted too.
     for (const GridHandle grid : scene.grids().handles()) {
       if (meshed_.contains(grid)) continue;
       ChunkCache cache(world_, number_of(grid), options_.cache_bytes);

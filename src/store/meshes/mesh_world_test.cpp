@@ -14,7 +14,7 @@
 namespace quoin {
 namespace {
 
-// A landscape with water, whose parts stand turned, hidden and twice, and a grid that nothing places.
+// A landscape with water, with rotated, hidden and repeated parts, and a grid without placements.
 Scene landscape() {
   Scene scene;
   const auto materials = add_terrain_types(scene.types);

@@ -10,7 +10,7 @@
 
 namespace quoin::store {
 
-/// Values that are written once, in order, and then read: in a file without a name, which is gone with it.
+/// Values written once, in order, and then read: in an unnamed temporary file, which is deleted with the object.
 class Spool {
  public:
   Spool() = default;

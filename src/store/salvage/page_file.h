@@ -16,7 +16,7 @@ namespace quoin::store {
 /// A file that is read at places. Owns its descriptor.
 class RandomFile {
  public:
-  /// Nothing where there is no such file. Errors: CannotRead.
+  /// Returns nullopt if there is no such file. Errors: CannotRead.
   [[nodiscard]] static Result<std::optional<RandomFile>> open(const std::filesystem::path& path);
   RandomFile(RandomFile&& other) noexcept
       : descriptor_(std::exchange(other.descriptor_, -1)), size_(std::exchange(other.size_, 0)) {}
@@ -40,7 +40,7 @@ class RandomFile {
 /// The page size of a file.
 struct PageLayout {
   std::size_t page_size = 8'192;
-  std::size_t usable = 8'192;  ///< of these, what SQLite fills
+  std::size_t usable = 8'192;  ///< the part that SQLite uses
 };
 
 /// The state of the pages: the file alone, or with the log's frames up to a given one.
@@ -48,7 +48,7 @@ struct PageView {
   std::size_t frames = 0;  ///< of the log that count
 };
 
-/// The pages of a database and of its log. Those of the log are numbered by frame: several may be of one page.
+/// The pages of a database and of its log. Log pages are numbered by frame: several frames may hold one page.
 class PageFile {
  public:
   /// Errors: CannotRead.
@@ -59,10 +59,10 @@ class PageFile {
   void set_layout(const PageLayout& layout);
   [[nodiscard]] const PageLayout& layout() const { return layout_; }
 
-  /// Those in the file, a last part of one included, and those in the log behind them.
+  /// Returns the number of pages in the file, including a partial last one, and in the log after them.
   [[nodiscard]] std::size_t page_count() const { return file_pages_ + frames_.size(); }
   [[nodiscard]] std::uint64_t bytes() const { return file_.size() + (log_ ? log_->size() : 0); }
-  /// Requires: index < page_count(), room for a page.
+  /// Requires: index < page_count(); `page` holds a page.
   void read(std::size_t index, std::span<std::byte> page) const;
   /// The states in which a page may have been written that lead from it to others, the likeliest first.
   [[nodiscard]] std::vector<PageView> views(std::size_t index) const;

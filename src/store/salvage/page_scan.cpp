@@ -47,7 +47,7 @@ std::optional<std::uint64_t> varint_before(std::span<const std::byte> from, std:
   return found.bytes == bytes ? std::optional(found.value) : std::nullopt;
 }
 
-/// Bytes that a value takes in a record; nothing for the two types that SQLite keeps for itself.
+/// Returns the size of a value in a record; nullopt for the two types reserved by SQLite.
 std::optional<std::uint64_t> bytes_of_type(std::uint64_t type) {
   constexpr std::array<std::uint8_t, 10> kFixed = {0, 1, 2, 3, 4, 6, 8, 8, 0, 0};
   if (type < kFixed.size()) return kFixed[type];
@@ -143,7 +143,7 @@ class Scan {
   bool is_too_slow_ = false;
 };
 
-/// A chunk's row whose body begins at some place of a page: a payload of NULL and the body.
+/// A chunk's row whose body begins within a page: a payload of NULL and the body.
 struct FoundBody {
   Payload payload;
   std::size_t header_bytes = 0;  ///< of the record
@@ -302,7 +302,7 @@ Status scan_records(const std::filesystem::path& database, FunctionRef<void(cons
       scan->each_state(page, index, payload, [&](std::span<const std::byte> whole) {
         read_columns(whole, types, record);
         visit(record);
-        return false;  // a checksum of the caller's says which state is the right one
+        return false;  // the caller's checksum selects the correct state
       });
     }
     return !scan->is_too_slow();

@@ -40,7 +40,7 @@ struct PageRecord {
 /// A body whose own row cannot be read has this key.
 inline constexpr std::int64_t kLostKey = -1;
 
-/// Calls `visit` for the bodies of chunks whose checksum is right, as often as they are found: also older states of
+/// Calls `visit` for the chunk bodies with a correct checksum, possibly several times, including older states of
 /// chunks. `body`: valid during the call.
 [[nodiscard]] Status scan_bodies(const std::filesystem::path& database,
                                  FunctionRef<void(std::int64_t key, std::span<const std::byte> body)> visit);

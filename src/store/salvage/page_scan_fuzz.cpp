@@ -32,7 +32,7 @@ void write(const std::filesystem::path& path, const char* bytes, std::size_t siz
 
 }  // namespace
 
-// The bytes are a database, and behind as many of its blocks of 256 as the first byte says, its log.
+// The input is a database, followed by its log; the first byte is the number of the database's 256-byte blocks.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   static const std::filesystem::path path = file_name();

@@ -140,7 +140,7 @@ struct Span {
   std::size_t end = 0;
 };
 
-/// The bytes of each row in a whole file, as the page headers, which the scan does not look at, say where they are.
+/// Returns the bytes of each row in an intact file, found by its page headers, which the scan ignores.
 std::map<std::int64_t, std::vector<Span>> places_of_rows(const Bytes& file, std::size_t page_size) {
   std::map<std::int64_t, std::vector<Span>> places;
   for (std::size_t page = 0; page < file.size(); page += page_size) {
@@ -372,7 +372,7 @@ TEST(PageScan, EndsWhereRecordsDoNot) {
   EXPECT_TRUE(found_in(path).empty());
 }
 
-// As page_scan_fuzz reads them: a database of blocks of 256 bytes, as many as the first byte says, and its log.
+// In the form of page_scan_fuzz: a database whose number of 256-byte blocks is the first byte, and its log.
 TEST(PageScan, FilesOfTheCorpusHoldTheirBodies) {
   const WorldFolder folder;
   for (const char* const name : {"pages_of_512", "pages_of_1024"}) {

@@ -16,7 +16,7 @@ std::string megabytes(std::uint64_t bytes) {
   return std::to_string((bytes + 500'000) / 1'000'000) + " MB";
 }
 
-// Says so, rather than being ended by the system half-way.
+// Returns an error if memory is too small, instead of letting the system end the process.
 Status check_memory(const WorldStore& world) {
   constexpr std::uint64_t kSmall = std::uint64_t{64} << 20;
   const auto needed = memory_of_world(world);

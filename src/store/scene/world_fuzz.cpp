@@ -7,7 +7,7 @@
 
 #include "io/world_format.h"
 
-// Whole small databases: any bytes must give an error or a scene whose content can be walked.
+// Complete small databases: any bytes must give an error or a scene whose content can be traversed.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto loaded = quoin::read_world_format(std::as_bytes(std::span(data, size)), {}, quoin::Threads{1}, {});
   if (!loaded) return 0;

@@ -24,7 +24,7 @@ namespace {
 // Maximum number of damage lines, for readable reports on broken worlds.
 constexpr std::size_t kMaxLines = 20;
 
-/// Puts a world's parts and chunks into a scene.
+/// Loads a world's parts and chunks into a scene.
 class Load {
  public:
   enum class Chunks : std::uint8_t { All, None };

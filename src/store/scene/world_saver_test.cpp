@@ -112,7 +112,7 @@ TEST(WorldSaver, SunAndCamerasAreKept) {
   EXPECT_EQ(again->cameras[1].camera.projection, Camera::Projection::Orthographic);
 }
 
-/// A world that is saved again and again, and what should be in it.
+/// A world that is saved repeatedly, and its expected content.
 class KeptWorld {
  public:
   explicit KeptWorld(const std::filesystem::path& path) : world_(WorldStore::create(path).value()) {}

@@ -20,8 +20,8 @@ using namespace store;
 
 namespace {
 
-/// Empties the log of a world that is about to be replaced: the new one must not find it. Others that read it keep what
-/// they have open.
+/// Empties the log of a world that is about to be replaced, so that the new world does not find it. Other readers keep
+/// their open files.
 Status clear_log(const std::filesystem::path& path) {
   const auto beginning = read_file_beginning(path, kWorldHeaderBytes);
   if (!beginning) return beginning.error();

@@ -102,7 +102,7 @@ class TestDisk {
     const std::scoped_lock lock(mutex_);
     names_.clear();
     synced_names_.clear();
-    // A folder's entries are written on their own: each name may have come or gone by then.
+    // Folder entries are written separately: each name may or may not be updated yet.
     const unsigned folder = random() % 3;
     const auto chosen = [&] { return folder == 0 ? false : folder == 1 ? true : random() % 2 == 0; };
     std::map<std::string, const Image::Content*> kept;

@@ -49,7 +49,7 @@ Status put_version(Connection& database, int version) {
   if (!revision) return revision.error();
   const auto row = revision->step();
   if (!row) return row.error();
-  if (!*row) return {};  // nothing was ever saved in it: the first save says it
+  if (!*row) return {};  // the world has no saves: the first save writes the version
   const std::vector<std::byte> body = body_of(digits);
   const Part part{{part::kWorld, std::string("version")}, static_cast<std::uint64_t>(revision->integer(0)), body};
   revision->reset();

@@ -19,7 +19,7 @@ struct MigrationStep {
 /// One for each version before the present one, from version 1 on.
 [[nodiscard]] std::span<const MigrationStep> migration_steps();
 
-/// Has a world say a version, in its header and in the part that says it.
+/// Sets a world's version, in its header and in its version part.
 [[nodiscard]] Status put_version(Connection& database, int version);
 
 /// Upgrades a world to the version after the last of the steps, in one transaction: after a crash or a failed step it

@@ -88,7 +88,7 @@ TEST(Migration, IsTakenToThePresentVersionWhenItIsWritten) {
     EXPECT_EQ(world->chunks(0, 0)->size(), std::size_t{kChunks});
   }
   EXPECT_EQ(version_of(path), kSchemaVersion);
-  EXPECT_EQ(sound_chunks(path), std::size_t{kChunks});  // the part that says the version has a right sum too
+  EXPECT_EQ(sound_chunks(path), std::size_t{kChunks});  // the version part has a correct checksum too
   Connection database = write(path);
   EXPECT_EQ(*database.number("SELECT count(*) FROM sqlite_schema WHERE name='chunk_keys'"), 1);
   EXPECT_EQ(*database.text("SELECT body FROM parts WHERE kind='world' AND id='version'"),
@@ -130,7 +130,7 @@ TEST(Migration, ACopyIsKeptWhereRowsChange) {
                                  MigrationStep{kSchemaVersion + 1, false, add_nothing}};
   for (const bool is_again : {false, true}) {
     Connection database = write(path);
-    ASSERT_TRUE(migrate(database, path, kSteps)) << is_again;  // the second time there is nothing to do
+    ASSERT_TRUE(migrate(database, path, kSteps)) << is_again;  // the second call does nothing
     EXPECT_EQ(*database.number("PRAGMA user_version"), kSchemaVersion + 2);
     EXPECT_EQ(*database.number("SELECT count(*) FROM sqlite_schema WHERE name='added'"), 1);
     ASSERT_TRUE(database.close());

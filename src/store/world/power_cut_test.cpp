@@ -94,7 +94,7 @@ TEST(WorldPowerCut, NothingAcknowledgedIsLost) {
   std::printf("%d power cuts, nothing lost\n", cuts);
 }
 
-// The test can fail: a disk that says it has synced the log, and has not.
+// Verifies that the test can fail: on a disk that reports the log as synced without syncing it.
 TEST(WorldPowerCut, ADiskThatLiesAboutSyncsLosesSaves) {
   int bad = 0;
   for (unsigned seed = 1; seed < 4; ++seed) {
@@ -162,7 +162,7 @@ bool survives_fault(int number, int code, bool is_lasting) {
       after.become(disk.image(), random);
       const Found found = look_at(kFile, after.name());
       EXPECT_GE(found.saves, acknowledged) << found.why << " call " << number;
-      // What failed is read, and saved once there is room again.
+      // Failed saves are still readable, and are saved when there is room again.
       Expected expected;
       for (int k = 1; k <= i; ++k) apply(expected, k);
       for (int place = 0; place < kPlaces; ++place) {

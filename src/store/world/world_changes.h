@@ -44,7 +44,7 @@ using store::PartBody;
 
 /// Changes by the store's own modules, in addition to chunks and values.
 struct WorldParts {
-  /// Nothing for `body`: the part goes.
+  /// nullopt for `body` removes the part.
   static void put(WorldChanges& changes, store::PartKey key, std::optional<PartBody> body);
   static void put(WorldChanges& changes, const char* kind, std::int64_t id, std::string_view text);
   static void remove(WorldChanges& changes, const char* kind, std::int64_t id);
@@ -66,7 +66,7 @@ struct WorldParts {
   [[nodiscard]] static Result<WorldStore> create(const std::filesystem::path& path, Threads threads, const char* vfs);
   [[nodiscard]] static Result<WorldStore> open(const std::filesystem::path& path, WorldAccess access, Threads threads,
                                                const char* vfs);
-  /// A world that no crash may meet: nothing is synced before it is closed.
+  /// Creates a world without crash safety: it is synced only when it is closed.
   [[nodiscard]] static Result<WorldStore> create_unsynced(const std::filesystem::path& path, Threads threads);
   /// A world in memory, to be read.
   [[nodiscard]] static Result<WorldStore> open(std::span<const std::byte> bytes);

@@ -9,11 +9,11 @@
 #include <quoin/grid/grid.h>
 #include <quoin/store/world_store.h>
 
-// What tests of worlds share.
+// Shared by the tests of worlds.
 
 namespace quoin {
 
-/// A folder of its own, gone at the end.
+/// A temporary folder, deleted at the end.
 class WorldFolder {
  public:
   WorldFolder() {

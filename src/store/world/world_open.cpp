@@ -80,7 +80,7 @@ Status begin_writing(Connection& connection, bool is_network) {
 }
 
 bool end_writing(Connection& connection) {
-  // Only who has the log open takes it away: where nothing was written, nothing has opened it.
+  // Only a connection that has the log open removes it; a connection without writes has not opened it.
   if (!connection.run("PRAGMA busy_timeout=0; PRAGMA synchronous=EXTRA; BEGIN IMMEDIATE; COMMIT")) return false;
   const auto mode = connection.text("PRAGMA journal_mode=DELETE");
   return mode && *mode == "delete";

@@ -24,8 +24,8 @@ std::vector<std::byte> copy_of(std::span<const std::byte> bytes) {
   return {bytes.begin(), bytes.end()};
 }
 
-// So few chunks that each is looked up. A range of keys costs reading those within it, from their index; in a world of
-// version 1 also the chunks.
+// Returns true for few enough chunks to look each up. A range query reads the chunks' keys from their index; in a
+// version 1 world it also reads the chunks.
 bool is_small(const IBox& box) {
   const IVec3 size = box.size();
   return size.x * size.y * size.z <= 512;
@@ -85,7 +85,7 @@ Result<std::optional<std::vector<std::byte>>> WorldReader::chunk_body(const Chun
   const std::int64_t before = was_known ? known->second : -1;
   auto body = body_in_region(wanted, place.chunk);
   if (!body || *body || !was_known) return body;
-  // The grid may have gone and come again, with another region.
+  // The grid may have been removed and added again, with another region.
   known_regions_.erase(wanted);
   const auto now = region_id(wanted);
   if (!now) return now.error();

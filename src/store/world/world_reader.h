@@ -19,7 +19,7 @@ class WorldReader {
  public:
   explicit WorldReader(Connection connection) : connection_(std::move(connection)) {}
 
-  /// The chunk's row; nothing where there is none.
+  /// Returns the chunk's row; nullopt if there is none.
   [[nodiscard]] Result<std::optional<std::vector<std::byte>>> chunk_body(const ChunkPlace& place);
   /// Adds the places of a grid's and level's chunks in a box of chunks to `out`, in no order.
   [[nodiscard]] Status find_chunks(std::uint32_t grid, std::uint8_t level, const IBox& box, std::vector<IVec3>& out);
@@ -62,7 +62,7 @@ class WorldReader {
       known_regions_;  // an id is never another region's, though a region may get another
 };
 
-/// A part of a row whose columns are id, revision, sum, body; nothing where they are of other types.
+/// Returns a part from a row with columns id, revision, sum, body; nullopt for other column types.
 [[nodiscard]] std::optional<Part> part_of(Statement& row, std::string_view kind, std::uint64_t& sum);
 
 }  // namespace quoin::store

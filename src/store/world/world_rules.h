@@ -26,14 +26,14 @@ struct WorldRules {
   [[nodiscard]] static bool concern(const ChangeSet& changes);
 };
 
-/// Those of a world on disk. Types that are damaged become magenta ones, so that their voxels show; grids that are
-/// become nameless.
+/// Reads the rules of a world on disk. Damaged types become magenta, so that their voxels are visible; damaged grids
+/// lose their names.
 [[nodiscard]] Result<WorldRules> read_rules(WorldReader& reader);
 /// Returns the placeholder of a lost type: magenta, so that it is visible.
 [[nodiscard]] VoxelProperties lost_type(std::int64_t number);
 /// "chunk (1, 2, 3) of grid 0".
 [[nodiscard]] std::string about(const ChunkPlace& place);
-/// As WorldStore::save says.
+/// Checks changes as documented for WorldStore::save.
 [[nodiscard]] Status check_changes(const ChangeSet& changes, const WorldRules& rules);
 
 }  // namespace quoin::store

@@ -191,7 +191,7 @@ Result<WorldStore> WorldParts::create(const std::filesystem::path& named, Thread
     const std::filesystem::path fresh = fresh_name(path);
     auto done = make_database(fresh, nullptr);
     if (done) {
-      remove_database_log(path);  // what another file of that name left
+      remove_database_log(path);  // removes the log of an earlier file of that name
       done = move_in_place(fresh, path);
     }
     if (!done) {

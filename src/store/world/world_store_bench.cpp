@@ -1,5 +1,5 @@
-// store/save, store/load: chunks of generated terrain into a world on disk and out of it, codec, checksums and syncs
-// included, on one thread of work. store/caller: what saving takes of the thread that asks for it.
+// store/save, store/load: chunks of generated terrain to and from a world on disk, including codec, checksums and
+// syncs, on one worker thread. store/caller: the cost of saving on the calling thread.
 
 #include <algorithm>
 #include <cstdio>

@@ -71,7 +71,7 @@ TEST(WorldStore, ChunksValuesTypesAndGridsSurviveAReopening) {
     EXPECT_FALSE(world->value("nothing")->has_value());
     EXPECT_EQ(world->next_grid(), 1U);
   }
-  // The second one was opened for writing, and wrote nothing.
+  // The second store was opened for writing without a write.
   EXPECT_FALSE(std::filesystem::exists(path.string() + "-wal"));
   EXPECT_FALSE(std::filesystem::exists(path.string() + "-shm"));
 }
@@ -236,7 +236,7 @@ TEST(WorldStore, CallbacksComeOnceItIsOnDisk) {
     was_there = saved && reader->load_chunk({0, 0, {1, 1, 1}})->has_value();
   }));
   ASSERT_TRUE(world.flush());
-  // The callback follows the commit, which is what flush waits for.
+  // The callback follows the commit; flush waits for the commit only.
   for (int i = 0; i < 1000 && !was_there; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   EXPECT_TRUE(was_there);
 }

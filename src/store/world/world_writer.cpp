@@ -270,7 +270,7 @@ Status WorldWriter::write(const ChangeSet& changes) {
     return outcome;
   }
   needs_version_ = false;
-  // What fails here is tried again with a later commit; the commit is safe in the log.
+  // Failures are ignored: a later commit retries, and this one is safe in the log.
   if (connection_.log_pages() > kMaxLogPages) static_cast<void>(connection_.checkpoint());
   return outcome;
 }
@@ -286,7 +286,7 @@ Status WorldWriter::write_all(const ChangeSet& changes) {
   const auto put = [&](const char* name, std::uint64_t number) {
     return write_part({part::kWorld, std::string(name)}, body_of(std::to_string(number)));
   };
-  if (needs_version_) {  // again, where no turned bit of the header can say another
+  if (needs_version_) {  // written again in a part, so that a flipped bit in the header cannot change it
     if (auto done = put("version", kSchemaVersion); !done) return done;
   }
   return put("revision", revision_);

@@ -41,7 +41,7 @@ class WorldWriter {
   [[nodiscard]] Status flush();
   [[nodiscard]] WorldStats stats() const;
 
-  /// The chunk that is to be saved, none where it is to be removed; nothing at all where it is not about to change.
+  /// Returns the chunk to be saved, or an inner nullopt if it is to be removed; nullopt if it has no pending change.
   [[nodiscard]] std::optional<std::optional<StoredChunk>> pending_chunk(const ChunkPlace& place) const;
   /// As `pending_chunk`.
   [[nodiscard]] std::optional<std::optional<PartBody>> pending_part(const PartKey& key) const;
@@ -75,7 +75,7 @@ class WorldWriter {
   };
 
   void run();
-  /// Waits for work; nothing when the writer ends.
+  /// Waits for work; returns an empty list when the writer ends.
   [[nodiscard]] std::list<Save> next_group(std::unique_lock<std::mutex>& lock);
   void note_pending(const ChangeSet& changes, std::uint64_t ticket);
   void finish(std::list<Save> group, const Status& outcome);

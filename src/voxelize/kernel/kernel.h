@@ -27,8 +27,9 @@ struct TriangleInRow {
 };
 
 struct Kernel {
-  /// For points first to before end: where the triangle is nearer than `squared` says, that becomes the square of its
-  /// distance and `nearest` its number. Both have 64 places; points around the range may be looked at too.
+  /// Updates points from first to before end: if the triangle is nearer than `squared`, stores the square of its
+  /// distance there and its number in `nearest`. Both arrays have 64 elements; points outside the range may be read
+  /// too.
   void (*update_row)(const TriangleInRow& triangle, int first, int end, float* squared, std::int32_t* nearest);
 };
 

@@ -25,7 +25,8 @@ struct ImpostorFaces {
   static constexpr std::size_t kGroup = 16;  ///< faces that are projected at once
   static constexpr std::size_t kSides = 12;  ///< the six directions of voxels' faces, then those of surfels
 
-  /// Rectangles that lie close together in space. Positions are those of Level. Fillers at the end let kernels read on.
+  /// Rectangles close together in space. Positions match those of Level. Fillers at the end allow kernels to read past
+  /// it.
   struct Groups {
     std::array<std::vector<float>, 3> centre;
     std::array<std::vector<float>, 3> half;  ///< from the centre to the sides of the box around them
@@ -111,7 +112,7 @@ struct ImpostorFaces {
   static constexpr float kSurfelRoom =
       0.05F;  ///< tolerance beyond a surfel's edges for rays, since surfels are not flush
 
-  int edge = 0;           ///< texels a side of the snapshots
+  int edge = 0;           ///< texels per side of the snapshots
   int first_width = 0;    ///< log2 of the width in voxels of level 0's cells; 0: level 0 holds the faces themselves
   bool is_whole = false;  ///< `faces` are all that the opaque voxels have, in the order of ImpostorShell::faces
   DVec3 centre{0.0};      ///< of the content, in the grid

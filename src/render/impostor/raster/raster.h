@@ -8,8 +8,8 @@
 
 #include "render/impostor/raster/faces.h"
 
-/// Draws the faces of an impostor into a square of a picture: in single precision relative to the content's centre, in
-/// voxels, a register of faces at once.
+/// Draws the faces of an impostor into a square of an image: in single precision relative to the content's centre, in
+/// voxels, with one vector register of faces at a time.
 namespace quoin::raster {
 
 inline constexpr int kTile = 32;  ///< pixels a side
@@ -31,7 +31,7 @@ struct LinearVector {
   Vector y{};
 };
 
-/// The pixels that show one of two levels: those whose number of Pattern is from `first` to before `end`.
+/// The pixels that show one of two levels: those with a Pattern number from `first` to before `end`.
 struct Share {
   std::int32_t first = 0;
   std::int32_t end = 1 << 24;
@@ -60,7 +60,7 @@ struct NearViews {
   std::array<std::uint8_t, 3> view{};
   std::array<std::uint16_t, 2> share{1 << 14, 0};  ///< of the first two
 
-  /// The view whose face lights a bit of a cell, by lot.
+  /// Returns the view whose face lights a bit of a cell, chosen pseudo-randomly.
   [[nodiscard]] std::uint32_t chosen(std::uint32_t number) const {
     const std::uint32_t at = mix_bits(number) >> 18;
     if (at < share[0]) return view[0];
@@ -75,7 +75,7 @@ struct Job {
   std::int32_t id = 0;
   Share share;  ///< of the pixels
   NearViews near;
-  // The ray of a pixel: a point of it in the plane through the content's centre, and how it goes on.
+  // A pixel's ray: its point in the plane through the content's centre, and its direction.
   LinearVector point;
   LinearVector direction;
   // Depths along the camera's forward axis, in world units: `depth_at` in that plane, and how it grows a length of
@@ -83,8 +83,8 @@ struct Job {
   Vector forward{};
   float depth_at = 0.0F;
   float depth_step = 1.0F;
-  // Where a point q lies in the tile: ((across . q + across_at), (down . q + down_at)) / (ahead . q + ahead_at), plus
-  // (column_at, row_at). In pixels, whose samples lie at whole numbers.
+  // The position of a point q in the tile: ((across . q + across_at), (down . q + down_at)) / (ahead . q + ahead_at),
+  // plus (column_at, row_at). In pixels, with samples at integers.
   Vector across{};
   Vector down{};
   Vector ahead{};
@@ -112,7 +112,7 @@ struct Aim {
   double voxel_size = 1.0;  ///< world units
 };
 
-/// Sets all that depends on the camera. Pixel (0, 0) of the tile lies at (`x`, `y`) pixels from the picture's middle.
+/// Sets all camera-dependent data. Pixel (0, 0) of the tile lies at (`x`, `y`) pixels from the image's centre.
 void set_aim(const Aim& aim, double x, double y, Job& job);
 
 /// A hit: the number of a rectangle of a level and, for a cell, the view whose face lights it.
@@ -135,14 +135,14 @@ struct Met {
 
 /// The nearest hit of each pixel so far, in the order of index_of.
 struct Canvas {
-  alignas(64) std::array<float, kPixels> depth{};        ///< infinite: nothing
+  alignas(64) std::array<float, kPixels> depth{};        ///< infinite: no hit
   alignas(64) std::array<std::int32_t, kPixels> id{};    ///< of the job
   alignas(64) std::array<std::int32_t, kPixels> face{};  ///< see Met
   std::array<float, kPixels / 16> furthest{};            ///< depth of each 4x4 pixels
   std::array<std::int32_t, kPixels> pattern{};           ///< see Pattern; 0 where all parts are drawn whole
 
   void clear();
-  /// For a tile from (`column`, `row`) of a picture. Cost: a microsecond.
+  /// Sets the pattern of the tile from (`column`, `row`) of an image. Cost: 1 microsecond.
   void set_pattern(int column, int row, std::uint32_t sample);
 };
 

@@ -189,7 +189,7 @@ inline void meet_inclined(const Job& job, const Side& side, const F (&q)[3], con
   put_met(job, side, x, y, depth, met, first, canvas);
 }
 
-// Puts the rectangle of each lane at each of its pixels.
+// Draws the rectangle of each lane to each of its pixels.
 inline void put_all(const Job& job, const Side& side, const F (&q)[3], const F (&slope)[2], const F (&reach)[2],
                     const Areas& areas, Mask shown, std::size_t first, Canvas& canvas) {
   const F none = all(-1.0F);

@@ -1,4 +1,4 @@
-// The kernel of impostors for any processor.
+// The kernel of impostors for any CPU.
 
 #include "render/impostor/raster/raster.inl"
 

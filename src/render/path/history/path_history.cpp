@@ -42,7 +42,7 @@ Between between(int at, int size, int of_size) {
   return {bounded(low), bounded(low + 1), static_cast<float>(place - low)};
 }
 
-/// Values of a smaller picture at the pixels of one row of a larger one.
+/// The values of a smaller image at the pixels of one row of a larger one.
 template <typename At>
 auto value_at(const Between& x, const Between& y, int width, const At& at) {
   if (x.low == x.high && y.low == y.high) return at(index_of(x.low, y.low, width));

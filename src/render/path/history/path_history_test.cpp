@@ -1,4 +1,4 @@
-// Pictures by paths that go on across edits.
+// Path-traced images that continue across edits.
 
 #include <algorithm>
 #include <array>
@@ -54,7 +54,7 @@ double mean_square(const PathPicture& a, const PathPicture& b) {
   return sum / (3.0 * static_cast<double>(a.radiance.size()));
 }
 
-/// A meadow with a wall and lamps seen from above, whose noise is plain to see.
+/// A meadow with a wall and lamps seen from above, with visible noise.
 class PathHistoryTest : public testing::Test {
  protected:
   PathHistoryTest() : scene_(meadow(grid_)), tracer_(scene_), options_(under_even_sky(kEdge, kEdge, 1)) {

@@ -1,4 +1,4 @@
-// The kernel for any processor.
+// The kernel for any CPU.
 
 #include "render/path/kernel/shade.inl"
 

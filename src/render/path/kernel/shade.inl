@@ -108,7 +108,7 @@ void choose_lamps(const LampBranch* branches, const float* shares, LampBlock& bl
 
 // ---- matte surfaces ----------------------------------------------------------------------------------------------
 
-// Turns a smooth normal that looks away from who sees the surface.
+// Turns a smooth normal that points away from the viewer.
 inline Vector facing(const Vector& normal, const Vector& direction) {
   const F towards = negative(dot(normal, direction));
   const F least = all(1e-3F);

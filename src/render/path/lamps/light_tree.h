@@ -44,7 +44,7 @@ class LightTree {
   /// Shares of 1 of all of these.
   [[nodiscard]] static const float* whole_shares();
 
-  /// `shares`: what counts of each of the upper nodes. Requires: 0 <= u < 1; `normal` is unit. Cost: O(log(lamps)).
+  /// `shares`: the learned shares of the upper nodes. Requires: 0 <= u < 1; `normal` is unit. Cost: O(log(lamps)).
   [[nodiscard]] Choice choose(Vec3 point, Vec3 normal, float u, const float* shares = whole_shares()) const;
   /// Returns the probability that `choose` selects the lamp.
   [[nodiscard]] float probability(std::uint32_t lamp, Vec3 point, Vec3 normal,
@@ -85,7 +85,7 @@ class LightTree {
 
   std::vector<Node> nodes_;
   std::vector<LampBranch> branches_;  // the inner nodes, in their order; of a lone lamp one whose second has no power
-  std::vector<std::uint64_t> ways_;   // [lamp]: a bit a level, 1: the second child
+  std::vector<std::uint64_t> ways_;   // [lamp]: one bit per level, 1: the second child
 };
 
 }  // namespace quoin::path

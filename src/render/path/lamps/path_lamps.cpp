@@ -151,7 +151,7 @@ LampBounds bounds_of(const PathLamp& lamp, DVec3 origin) {
   if (lamp.is_point) {
     bounds.cos_spread = lamp.cos_inner > -2.0F ? std::max(lamp.cos_outer, -1.0F) : -1.0F;
     bounds.cos_edge = bounds.cos_spread > -1.0F ? 1.0F : -1.0F;
-    // Within its cone a spot is as bright as it is; its edge is a hair beyond, so that rounding darkens nothing.
+    // A spot has full brightness within its cone; the edge lies slightly beyond, so that rounding darkens no point.
     if (bounds.cos_edge > 0.0F) bounds.cos_edge = 0.999F;
     bounds.power = light;
   } else {

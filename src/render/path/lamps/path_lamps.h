@@ -46,12 +46,12 @@ struct LampSample {
 /// All lamps of a scene, for points anywhere.
 class PathLamps {
  public:
-  /// `bodies`: the faces; `points`: those without a body. `origin`: near which all is.
+  /// `origin`: a point near all lamps.
   PathLamps(std::vector<PathLamp> lamps, DVec3 origin);
 
   [[nodiscard]] bool empty() const { return lamps_.empty(); }
   [[nodiscard]] std::size_t size() const { return lamps_.size(); }
-  /// Lamps are chosen out of `tree`, whose points are from `origin`.
+  /// The tree that lamps are chosen from; its points are relative to `origin`.
   [[nodiscard]] const LightTree& tree() const { return tree_; }
   [[nodiscard]] DVec3 origin() const { return origin_; }  ///< in the world
   /// A point of a lamp that was chosen, as it is seen from `point`, in the world.
@@ -91,8 +91,8 @@ class PathLamps {
 /// Keeps the faces of a scene's grids that emit light while it is edited.
 class PathLampCache {
  public:
-  /// The lamps of the instances that are placed. `surfaces`: of the scene's types. `brightness`: times what lamps give.
-  /// Cost: the quads of chunks that changed, and O(faces that emit).
+  /// Returns the lamps of the placed instances. `surfaces`: of the scene's types. `brightness`: factor of the lamps'
+  /// light. Cost: the quads of changed chunks, and O(faces that emit).
   [[nodiscard]] std::shared_ptr<const PathLamps> lamps(const Scene& scene, std::span<const PlacedGrid> placed,
                                                        const Surfaces& surfaces, double brightness);
 

@@ -28,7 +28,7 @@ namespace quoin::path {
   return x ^ (x >> 16 & 0x0000'FFFFU);
 }
 
-/// Owen's scrambling of a number whose bits are in reverse order: each bit depends on those below it alone.
+/// Owen scrambling of a number with bits in reverse order: each bit depends only on the bits below it.
 ///
 /// Source: B. Burley, "Practical hash-based Owen scrambling" (2020), after S. Laine and T. Karras; constants of
 /// N. Vegdahl, "Owen scrambling based dithered blue-noise sampling" (2021).
