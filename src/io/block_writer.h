@@ -21,7 +21,7 @@ class BlockWriter {
  public:
   using Sink = std::function<Status(std::span<const std::byte>)>;
 
-  /// `expected_bytes` is what progress is measured against; 0 when unknown.
+  /// `expected_bytes`: the total that progress is relative to; 0 when unknown.
   BlockWriter(Sink sink, const Progress& progress, std::uint64_t expected_bytes)
       : sink_(std::move(sink)), progress_(progress), expected_bytes_(expected_bytes) {
     block_.resize(kBlockBytes);

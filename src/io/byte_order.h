@@ -35,7 +35,7 @@ struct Word<8> {
 
 }  // namespace byte_order
 
-/// The number whose bytes begin at `bytes`, in either order. Requires: sizeof(T) bytes are there; T is a number.
+/// Reads a number at `bytes`, in either order. Requires: sizeof(T) bytes; T is a number.
 template <class T>
 [[nodiscard]] T load(const std::byte* bytes, std::endian order) {
   using Word = byte_order::Word<sizeof(T)>;
@@ -44,7 +44,7 @@ template <class T>
   return std::bit_cast<T>(order == std::endian::native ? word : Word::swapped(word));
 }
 
-/// Puts a number where `bytes` begin, in either order. Requires: room for sizeof(T) bytes; T is a number.
+/// Writes a number at `bytes`, in either order. Requires: space for sizeof(T) bytes; T is a number.
 template <class T>
 void put_number(std::byte* bytes, T value, std::endian order) {
   using Word = byte_order::Word<sizeof(T)>;

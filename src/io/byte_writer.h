@@ -14,7 +14,7 @@ namespace quoin {
 /// Bytes of a file as they are made; numbers are little-endian.
 class ByteWriter {
  public:
-  /// Has room for so many bytes more, so that they are not moved as it grows.
+  /// Reserves memory for `more` bytes, so that growth does not move the data.
   void reserve(std::size_t more) { bytes_.reserve(bytes_.size() + more); }
   void raw(std::span<const std::byte> bytes) {
     // Avoids `insert`: GCC 12 gives a false warning when it is inlined.
@@ -30,9 +30,9 @@ class ByteWriter {
   void f32(float value) { u32(std::bit_cast<std::uint32_t>(value)); }
   void f64(double value) { put(std::bit_cast<std::uint64_t>(value), 8); }
 
-  /// Makes room for bytes that are written through `bytes` later.
+  /// Leaves space for bytes that are written through `bytes` later.
   void leave(std::size_t count) { bytes_.resize(bytes_.size() + count); }
-  /// Writes the lowest four bytes of a number over those at `offset`.
+  /// Overwrites four bytes at `offset` with the lowest four bytes of a number.
   void patch(std::size_t offset, std::size_t value) {
     for (std::size_t i = 0; i < 4; ++i) bytes_[offset + i] = static_cast<std::byte>(value >> (8 * i) & 0xFFU);
   }

@@ -26,7 +26,7 @@ class HeldFile {
 /// Opens a file for reading. For a held file the descriptor may be an earlier one with an arbitrary offset. Returns -1
 /// and sets errno if the file cannot be opened.
 [[nodiscard]] int open_for_reading(const std::filesystem::path& file);
-/// Closes what `open_for_reading` returned, once the file is not held any more.
+/// Closes a descriptor from `open_for_reading`, once the file is no longer held.
 void close_after_reading(int descriptor);
 
 }  // namespace quoin

@@ -88,7 +88,7 @@ class MaterialPalette {
   [[nodiscard]] PngImage opaque_colour() const;
   /// Roughness in green, metalness in blue, both linear.
   [[nodiscard]] PngImage metallic_roughness() const;
-  /// sRGB; black where nothing is emitted.
+  /// Returns sRGB colours; black without emission.
   [[nodiscard]] PngImage emissive() const;
 
  private:

@@ -22,7 +22,7 @@ namespace quoin {
 /// One of the files that a mesh is written as; they are all written before the first is put in place, in their order.
 struct MeshFile {
   std::filesystem::path path;
-  std::uint64_t expected_bytes = 0;  ///< what progress is measured against; 0: too small to tell of
+  std::uint64_t expected_bytes = 0;  ///< the total that progress is relative to; 0: too small to report
   std::function<void(BlockWriter&)> write;
 };
 
@@ -45,7 +45,7 @@ using PlanMeshFiles = Result<std::vector<MeshFile>>(const SceneMeshes& meshes, c
 [[nodiscard]] std::vector<std::filesystem::path> obj_companions(const SceneMeshes& meshes,
                                                                 const std::filesystem::path& path);
 
-/// Errors: InvalidArgument, naming the first part whose mesh or placement is unsound (see mesh_file.h).
+/// Checks all parts and placements. Errors: InvalidArgument, with the first invalid part (see mesh_file.h).
 [[nodiscard]] Status check_meshes(const SceneMeshes& meshes);
 
 /// Returns true if any surface has light at its vertices; in valid meshes all surfaces then have it.
@@ -105,7 +105,7 @@ class VertexTransform {
 /// these go beyond `most` along an axis.
 [[nodiscard]] DVec3 float_origin(const DBox& bounds, double most);
 
-/// The corners of the triangle whose indices begin at `i`, in the order in which they are written.
+/// Returns the corners of the triangle whose indices begin at `i`, in the order of writing.
 [[nodiscard]] inline std::array<std::uint32_t, 3> corners_of(const MeshView& view, std::size_t i, bool turned) {
   const std::uint32_t* at = view.indices.data() + i;
   return {at[0], at[turned ? 2 : 1], at[turned ? 1 : 2]};

@@ -8,13 +8,13 @@
 
 namespace quoin {
 
-/// The integer that all of `text` spells, in base ten; nothing when it is not one or does not fit.
+/// Parses all of `text` as a decimal integer; nullopt if it is none or does not fit.
 [[nodiscard]] std::optional<std::int64_t> parse_integer(std::string_view text);
 
 /// Parses all of `text` as a finite number, independent of the locale; nullopt if that fails.
 [[nodiscard]] std::optional<float> parse_float(std::string_view text);
 
-/// So many of them with blanks between, and nothing else. Returns whether it is that; otherwise `out` means nothing.
+/// Parses exactly `out.size()` numbers separated by blanks. Returns false on failure; `out` is then unspecified.
 [[nodiscard]] bool parse_floats(std::string_view text, std::span<float> out);
 
 /// Returns the shortest text that `parse_float` maps to the same number.

@@ -10,7 +10,7 @@
 #include <quoin/core/result.h>
 #include <quoin/io/file.h>
 
-// What reads or writes bytes becomes what reads or writes a file; and which files a file is read with.
+// Adapts readers and writers of bytes to files; lists the sidecar files of a file.
 
 namespace quoin {
 
@@ -38,7 +38,7 @@ template <class Read>
   return bytes->size();
 }
 
-/// The files that a scene file names; nothing where it cannot be read.
+/// Returns the files that a scene file refers to; empty if it cannot be read.
 [[nodiscard]] std::vector<std::filesystem::path> files_named_in_scene(const std::filesystem::path& path);
 
 /// Returns the data file of a NIfTI pair with the header `path`; empty if it is no pair.

@@ -10,8 +10,8 @@
 #include <quoin/core/result.h>
 #include <quoin/io/loaded_scene.h>
 
-// Worlds on disk as one of the formats. The store, a layer above this one, defines these; in builds without SQLite they
-// say so.
+// Worlds on disk as a file format. The store, a layer above this one, defines these functions; builds without SQLite
+// return an error.
 
 namespace quoin {
 

@@ -92,7 +92,7 @@ struct GltfTransform {
 
 struct GltfNode {
   std::string name;
-  std::optional<std::size_t> mesh;  ///< none where there is nothing to draw
+  std::optional<std::size_t> mesh;  ///< nullopt for nodes without geometry
   GltfTransform transform;          ///< from the node above, or the world
   std::string layer{};
   std::vector<std::size_t> children{};
@@ -146,7 +146,7 @@ struct GltfLayout {
 /// compression where the build has no meshoptimizer.
 [[nodiscard]] Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, const MeshFileOptions& options = {});
 
-/// Writes the elements of one array as they are stored, without what fills it up to a multiple of four.
+/// Writes the stored elements of one array, without padding to a multiple of four.
 void write_gltf_array(const MaterialPalette& palette, const GltfMesh& mesh, const GltfPrimitive& primitive,
                       const GltfArray& array, BlockWriter& out);
 
@@ -156,7 +156,7 @@ void write_gltf_array(const MaterialPalette& palette, const GltfMesh& mesh, cons
 [[nodiscard]] GltfQuantization quantize_positions(const VertexTransform& transform,
                                                   std::span<const MaterialSurfaces::Surface> surfaces);
 
-/// Compresses an array, whose bytes are as they are stored. Requires: can_compress_gltf().
+/// Compresses the stored bytes of an array. Requires: can_compress_gltf().
 [[nodiscard]] std::vector<std::byte> compress_gltf_array(const GltfArray& array, std::span<const std::byte> bytes);
 
 /// Returns true if the build has meshoptimizer.

@@ -28,10 +28,11 @@ enum class PngEffort : std::uint8_t {
   Quick,     ///< for pictures: a third of the time, some 10 to 20 % more bytes
 };
 
-/// A PNG file without colour-space chunks, so that readers take the numbers as they are; the same bytes on every run.
+/// Encodes a PNG file without colour-space chunks, so that readers use the numbers unchanged; the same bytes on every
+/// run.
 ///
-/// Requires: both sizes positive and as many bytes in `pixels` as they say.
-/// Errors: LimitExceeded when libpng refuses (sizes beyond a million, memory).
+/// Requires: positive sizes, and `pixels` of matching size.
+/// Errors: LimitExceeded if libpng fails (sizes beyond a million, memory).
 [[nodiscard]] Result<std::vector<std::byte>> encode_png(const PngImage& image, PngEffort effort = PngEffort::Smallest);
 
 /// Decodes any PNG to RGBA.

@@ -39,8 +39,8 @@ struct BlockLook {
   Knowledge knowledge = Knowledge::Table;
 };
 
-/// The look of a block. `name`: "minecraft:oak_stairs", or without its namespace; of mods too. `is_lit`, `is_snowy`:
-/// its states of those names are "true". Cost: some look-ups in sorted tables.
+/// Returns the look of a block. `name`: "minecraft:oak_stairs", or without its namespace; also of mods. `is_lit`,
+/// `is_snowy`: the states of these names are "true". Cost: some look-ups in sorted tables.
 [[nodiscard]] BlockLook look_of_block(std::string_view name, bool is_lit, bool is_snowy);
 
 }  // namespace quoin::minecraft

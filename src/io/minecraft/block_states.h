@@ -17,9 +17,9 @@ namespace quoin::minecraft {
 
 using Property = std::pair<std::string, std::string>;
 
-/// The attribute of a type that lists what its states' bits are, from the lowest up: "facing:3,half:2".
+/// The attribute of a type that lists the fields of its state bits, from the lowest up: "facing:3,half:2".
 inline constexpr const char* kStatesAttribute = "minecraft.states";
-/// The attribute of a type whose look was guessed: "words" or "nothing".
+/// The attribute of a type with a guessed look: "words" or "nothing".
 inline constexpr const char* kGuessAttribute = "minecraft.look";
 /// The attribute with the tint of a biome-coloured type.
 inline constexpr const char* kTintAttribute = "minecraft.tint";
@@ -39,8 +39,8 @@ struct BlockState {
 /// control decay ("distance", "persistent").
 [[nodiscard]] BlockState block_state(std::string_view name, std::vector<Property> properties);
 
-/// The block of a type and a state: its name, and all properties that `block_state` was given but those it left out
-/// and lit=false and snowy=false, sorted by name. Of types of other formats the type's name, and none.
+/// Returns the block of a type and a state: its name, and the properties given to `block_state` except the dropped ones
+/// and lit=false and snowy=false, sorted by name. Types of other formats give their name without properties.
 struct BlockText {
   std::string name;
   std::vector<Property> properties;
@@ -48,7 +48,7 @@ struct BlockText {
 [[nodiscard]] BlockText block_text(const VoxelProperties& type, std::uint32_t state);
 /// "minecraft:oak_stairs[facing=east,half=top]".
 [[nodiscard]] std::string to_string(const BlockText& block);
-/// The inverse. Nothing where brackets or equals signs are missing.
+/// Parses such a text; nullopt if brackets or equals signs are missing.
 [[nodiscard]] std::optional<BlockText> parse_block(std::string_view text);
 
 }  // namespace quoin::minecraft

@@ -23,11 +23,11 @@ struct Block {
   VoxelType type = kAir;  ///< kAir too where it is tinted
   std::uint32_t state = 0;
   Tint tint = Tint::None;
-  std::uint32_t number = 0;     ///< of the block among those with a tint
-  std::uint16_t invisible = 0;  ///< not 0: it is read as air, and BlockTypes::invisible_name has its name
+  std::uint32_t number = 0;     ///< of the block among the tinted blocks
+  std::uint16_t invisible = 0;  ///< not 0: the block is read as air, and BlockTypes::invisible_name has its name
   std::uint8_t light = 0;       ///< light level of an invisible block, 0 to 15
 
-  /// Returns true if nothing is to be said of the block: air of any kind.
+  /// Returns true for visible air of any kind.
   [[nodiscard]] bool is_air() const { return type == kAir && tint == Tint::None && invisible == 0; }
   /// Returns true if the type is all there is to the block, in every biome.
   [[nodiscard]] bool is_plain() const { return state == 0 && tint == Tint::None && invisible == 0; }

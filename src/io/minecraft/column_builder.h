@@ -11,14 +11,14 @@
 
 namespace quoin::minecraft {
 
-/// Puts sections together to chunks of 64^3: of a column of them, or of a box of blocks.
+/// Assembles sections into chunks of 64^3: a column of chunks, or a box of blocks.
 class ColumnBuilder {
  public:
   explicit ColumnBuilder(BlockTypes& types) : types_(types) {}
 
-  /// Puts a section where its least corner is, which is a multiple of 16. Errors: LimitExceeded, of types.
+  /// Adds a section at its minimum corner, a multiple of 16. Errors: LimitExceeded, of types.
   [[nodiscard]] Status put(const Section& section, IVec3 corner);
-  /// Puts a section of one block. Requires: as `put`; block.is_plain().
+  /// Adds a section of one block. Requires: as `put`; block.is_plain().
   void put_block(const Block& block, IVec3 corner);
   /// Returns the chunks, by y, then z, then x, without chunks of air. The builder keeps only the invisible blocks.
   [[nodiscard]] std::vector<SourceChunk> take();
@@ -38,7 +38,7 @@ class ColumnBuilder {
 
   BlockTypes& types_;
   std::vector<Cell> cells_;
-  std::vector<Cell> spare_;               // whose memory is used again
+  std::vector<Cell> spare_;               // reused memory
   std::vector<VoxelType> types_of_;       // [biome][index in the palette]
   std::vector<std::uint64_t> invisible_;  // by Block::invisible
   std::vector<Lamp> lamps_;

@@ -25,13 +25,13 @@ class PagedBytes {
   [[nodiscard]] std::uint64_t held_bytes() const { return held_bytes_; }
   /// Appends bytes. Requires: all calls before the last one append whole pages.
   void append(std::span<const std::byte> bytes);
-  /// The value that a whole page has; nothing where bytes differ. Requires: page * kPageBytes < size().
+  /// Returns the common value of a page's bytes; nullopt if they differ. Requires: page * kPageBytes < size().
   [[nodiscard]] std::optional<std::byte> uniform_page(std::size_t page) const {
     return pages_[page].bits == 0 ? std::optional(pages_[page].value) : std::nullopt;
   }
-  /// Writes the bytes of a page; those beyond the array's end are not specified. Requires: as uniform_page.
+  /// Writes the bytes of a page; bytes past the array's end are unspecified. Requires: as uniform_page.
   void read_page(std::size_t page, PageContent& out) const;
-  /// The value that all bytes of a range have; nothing where they differ. Cost: O(pages).
+  /// Returns the common value of a range's bytes; nullopt if they differ. Cost: O(pages).
   /// Requires: begin < end <= size().
   [[nodiscard]] std::optional<std::byte> uniform(std::uint64_t begin, std::uint64_t end) const;
 
@@ -55,8 +55,8 @@ struct LargeNbt {
   std::map<std::size_t, PagedBytes> arrays;
 };
 
-/// Reads a gzip stream of NBT, and puts apart the blocks and biomes of a Sponge schematic (BlockData, BiomeData, Data
-/// of Blocks or Biomes) where they have 1 MiB or more. Memory: `max_bytes`, and 16 bytes per page.
+/// Reads a gzip stream of NBT, and separates the blocks and biomes of a Sponge schematic (BlockData, BiomeData, Data of
+/// Blocks or Biomes) if they have 1 MiB or more. Memory: `max_bytes`, and 16 bytes per page.
 /// Errors: BadFormat; LimitExceeded.
 [[nodiscard]] Result<LargeNbt> read_large_nbt(std::span<const std::byte> gzip, std::size_t max_bytes);
 

@@ -8,9 +8,9 @@
 
 namespace quoin::minecraft {
 
-/// A block as worlds before 1.13 had it, by the names of later ones: the name, and what its data says of kind, turn and
-/// height. Data that says something else is the property "data". A number that no block of the game had is
-/// "legacy:NUMBER". Requires: 0 <= id < 4096, 0 <= data < 16.
+/// Converts a block of a world before 1.13 to later names: its name, and the kind, rotation and height in its data.
+/// Other data becomes the property "data". Unknown block numbers become "legacy:NUMBER". Requires: 0 <= id < 4096, 0 <=
+/// data < 16.
 [[nodiscard]] std::pair<std::string, std::vector<Property>> legacy_block(int id, int data);
 
 }  // namespace quoin::minecraft

@@ -59,8 +59,8 @@ class Document {
   struct Node {
     Tag tag = Tag::End;
     Tag element = Tag::End;   // of a list
-    std::uint32_t name = 0;   // of its text, whose length stands before it; 0: it has none
-    std::uint32_t begin = 0;  // of the payload, behind any count
+    std::uint32_t name = 0;   // offset of its text, which has its length in front; 0: no name
+    std::uint32_t begin = 0;  // offset of the payload, after any count
     std::uint32_t count = 0;  // elements, or bytes of a string
     std::uint32_t next = 0;   // node after all that is in it
   };
@@ -83,7 +83,7 @@ class Value {
 
   /// The value of that name in a compound.
   [[nodiscard]] Value operator[](std::string_view name) const;
-  /// Calls `visit(Value)` for the values in a compound, or in a list whose elements are no numbers, in order.
+  /// Calls `visit(Value)` for the values in a compound, or in a list of non-numbers, in order.
   template <class Visit>
   void for_each(Visit visit) const {
     if (tag() != Tag::Compound && tag() != Tag::List) return;

@@ -33,7 +33,7 @@ class DocumentWriter {
     put(static_cast<std::int64_t>(values.size()), 4);
     for (const std::int32_t value : values) put(value, 4);
   }
-  /// A list of nothing.
+  /// Writes an empty list.
   void empty_list(std::string_view name) {
     head(Tag::List, name);
     put(0, 1);

@@ -25,7 +25,7 @@ namespace quoin::models {
 [[nodiscard]] bool is_cub(std::span<const std::byte> whole);
 [[nodiscard]] Result<LoadedScene> read_cub(std::span<const std::byte> bytes);
 
-/// Ken Silverman's: KV6 and KVX models, SLAB6's .vox, and .vxl maps: those of Ace of Spades (without a header, 64 or
+/// Ken Silverman's formats: KV6 and KVX models, SLAB6's .vox, and .vxl maps of Ace of Spades (without a header, 64 or
 /// 240 high) and of Voxlap.
 [[nodiscard]] bool is_kv6(std::span<const std::byte> beginning);
 [[nodiscard]] Result<LoadedScene> read_kv6(std::span<const std::byte> bytes);

@@ -25,8 +25,8 @@ struct ModelBytes {
 struct FormatHolds {
   std::string_view extension;   ///< for messages: ".qb"
   bool names = false;           ///< of models
-  bool hidden = false;          ///< that a model is hidden; else those are left out
-  bool several = false;         ///< models; else they become one
+  bool hidden = false;          ///< hidden models; otherwise they are dropped
+  bool several = false;         ///< several models; otherwise they are merged
   bool colours = true;          ///< of voxels
   bool transparency = false;    ///< of colours
   bool materials = false;       ///< roughness, metalness and light of voxels
@@ -62,7 +62,7 @@ struct PlacedGrids {
 struct MergedGrid {
   std::string name;
   Grid voxels{};
-  IBox box{};  ///< empty where the scene shows nothing
+  IBox box{};  ///< empty if the scene has no visible voxel
   double voxel_size = 1.0;
   std::vector<std::string> warnings;
 };
@@ -74,7 +74,8 @@ struct MergedGrid {
 /// Types of the voxels from `first` on along x.
 void read_voxels(const Grid& grid, IVec3 first, std::span<VoxelType> out);
 
-/// The colour of a type, whose alpha is 255 unless it is transparent, and then at least 1. Of air 0, 0, 0, 0.
+/// Returns the colours of all types. Alpha is 255 for opaque types, and at least 1 for transparent types. Air is 0, 0,
+/// 0, 0.
 [[nodiscard]] std::vector<Rgba8> colours_of(const VoxelRegistry& types);
 
 }  // namespace quoin::models

@@ -13,7 +13,7 @@ namespace quoin::scene_json {
 /// The list "types" of a scene file, if there is one: type 1, 2 and so on.
 [[nodiscard]] VoxelRegistry read_types(const Object& file);
 
-/// The list "grids" of a scene file of `file_bytes`, if there is one, whose voxels are of those types.
+/// Reads the list "grids" of a scene file of `file_bytes`, if present; its voxels use `types`.
 [[nodiscard]] std::vector<SceneGrid> read_grids(const Object& file, const VoxelRegistry& types, std::size_t file_bytes,
                                                 Threads threads);
 

@@ -38,7 +38,7 @@ class Faults {
 /// A piece of the file in a message.
 [[nodiscard]] std::string excerpt(std::string_view text);
 
-/// An object of the file, whose keys are asked for one by one. What `read` does not find it leaves as it was.
+/// An object of the file, read key by key. Missing keys leave the output of `read` unchanged.
 class Object {
  public:
   Object(const Json& json, const Place& place, std::initializer_list<std::string_view> keys, Faults& faults);

@@ -55,8 +55,8 @@ inline constexpr std::size_t kMaxSceneFileBytes = std::size_t{2} << 30;
 
 enum class VoxelCompression : std::uint8_t { Stored, Small };
 
-/// The pieces of each grid, in the order of their chunks. The same voxels give the same text, at any thread count.
-/// Errors: Cancelled when `progress` says so.
+/// Returns the pieces of each grid, in the order of their chunks. Equal voxels give equal text, at any thread count.
+/// Errors: Cancelled by `progress`.
 [[nodiscard]] Result<std::vector<std::vector<std::string>>> encode_voxels(std::span<const Grid* const> grids,
                                                                           VoxelCompression compression, Threads threads,
                                                                           const Progress& progress);
@@ -91,7 +91,7 @@ struct PlacedDensities {
 [[nodiscard]] Result<std::vector<PlacedDensities>> decode_field(std::string_view piece, std::size_t type_count,
                                                                 float band);
 
-/// A piece of data whose form is sound; whether voxels are there that may hold it is to be asked when it is put.
+/// A well-formed piece of data; its voxels are checked when it is added to a grid.
 struct DataPiece {
   std::vector<std::byte> bytes;
   std::size_t memory = 0;  ///< that it will take in a grid, at least

@@ -7,8 +7,8 @@
 
 namespace quoin {
 
-/// Returns the format of a world that a path leads to by its name: a folder of Minecraft's or Luanti's, or a level.dat.
-/// Nothing for other files and folders.
+/// Returns the format of a world that a path's name refers to: a Minecraft or Luanti folder, or a level.dat. Returns
+/// nullopt for other files and folders.
 [[nodiscard]] std::optional<FileFormat> detect_world(const std::filesystem::path& path);
 
 }  // namespace quoin

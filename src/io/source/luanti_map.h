@@ -7,8 +7,8 @@
 
 #include <quoin/io/chunk_source.h>
 
-// Luanti's worlds, which are SQLite's databases. The store, a layer above this one, opens them; in builds without
-// SQLite it says so.
+// Luanti worlds, which are SQLite databases. The store, a layer above this one, opens them; builds without SQLite
+// return an error.
 
 namespace quoin {
 
@@ -17,8 +17,8 @@ namespace quoin {
 /// Returns true if a folder is a Luanti world: it contains world.mt.
 [[nodiscard]] bool is_luanti_folder(const std::filesystem::path& path);
 
-/// A world of Luanti's: its folder, or the database in it (map.sqlite).
-/// Errors: CannotRead; BadFormat; Unsupported where world.mt says that it is kept elsewhere.
+/// Opens a Luanti world: its folder, or the database in it (map.sqlite).
+/// Errors: CannotRead; BadFormat; Unsupported if world.mt names another storage.
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_luanti(const std::filesystem::path& path);
 /// The database's bytes, which are copied.
 [[nodiscard]] Result<std::unique_ptr<ChunkSource>> open_luanti(std::span<const std::byte> database);

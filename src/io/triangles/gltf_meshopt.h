@@ -11,19 +11,18 @@ namespace tinygltf {
 class Model;
 }
 
-// EXT_meshopt_compression: views whose bytes are coded, and lie in another buffer than the view says.
+// EXT_meshopt_compression: views with coded bytes, which lie in another buffer than the view's own.
 //
-// Source: Khronos, "EXT_meshopt_compression"; the codecs are meshoptimizer's.
+// Source: Khronos, "EXT_meshopt_compression"; meshoptimizer implements the codecs.
 
 namespace quoin::triangles {
 
 /// Returns true if this build can decode them.
 [[nodiscard]] bool has_meshopt();
 
-/// Returns the file as tinygltf reads it; empty if it does so already. Buffers that stand for decoded views alone,
-/// which tinygltf would look for, become one byte. Indices that Draco codes, whose accessor tinygltf refuses since it
-/// has no view, move into the primitive's extension. `json`: the file's, within it. JSON that cannot be parsed is left
-/// to tinygltf.
+/// Returns the file in a form that tinygltf reads; empty if it already is. Buffers that only stand for decoded views,
+/// searched by tinygltf, become one byte. Draco-coded indices, whose accessor tinygltf rejects since it has no
+/// view, move into the primitive's extension. `json`: the file's JSON, within `file`. Invalid JSON is left to tinygltf.
 [[nodiscard]] std::vector<std::byte> readable_by_tinygltf(std::span<const std::byte> file, std::string_view json);
 
 /// Decodes all coded views into new buffers; the views then refer to these.

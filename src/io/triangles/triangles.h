@@ -54,7 +54,7 @@ class Beside {
 class MeshBuilder {
  public:
   explicit MeshBuilder(LoadedMesh& loaded) : loaded_(loaded) {}
-  /// A triangle of positions that are there; false, and nothing is added, where one is not, or not finite.
+  /// Adds a triangle. Returns false and adds no triangle if a position is missing or not finite.
   /// Errors: LimitExceeded.
   [[nodiscard]] Result<bool> add(std::size_t a, std::size_t b, std::size_t c);
   /// The triangles of a polygon, as cut_polygon cuts it. `added` gets the corners of each triangle that is added, as
@@ -76,7 +76,7 @@ class MeshBuilder {
 /// Returns true for the greys of occlusion that Quoin writes after the corners of blocks: quarters, exact or as bytes.
 [[nodiscard]] bool is_occlusion_grey(double linear);
 
-/// Adds a picture as a texture; nothing, with a warning, where it cannot be decoded.
+/// Adds an image as a texture; returns nullopt, with a warning, if it cannot be decoded.
 [[nodiscard]] std::optional<std::size_t> add_texture(std::span<const std::byte> picture, const std::string& name,
                                                      LoadedMesh& loaded);
 
@@ -107,8 +107,8 @@ class MeshBuilder {
 
 /// Detects formats that a beginning identifies.
 [[nodiscard]] std::optional<FileFormat> detect(std::span<const std::byte> beginning);
-/// Returns the format of a file whose content alone does not show it: a binary STL that was cut off or has bytes behind
-/// its triangles, and a zip file whose names lie behind its beginning.
+/// Returns the format of a file that its beginning does not identify: a truncated binary STL or one with trailing
+/// bytes, and a zip file whose names are not at its beginning.
 [[nodiscard]] std::optional<FileFormat> detect_by_name(const std::filesystem::path& path,
                                                        std::span<const std::byte> bytes);
 

@@ -55,10 +55,10 @@ struct Grid {
   Meaning meaning = Meaning::Fog;
   float background = 0.0F;
   std::vector<Leaf> leaves;
-  std::vector<float> values;  ///< 512 a leaf, in order; of masks none, and `active` says which are there
+  std::vector<float> values;  ///< 512 per leaf, in order; empty for masks, where `active` has the voxels
   std::vector<Tile> tiles;    ///< tiles that are active, or differ from the background
   glm::dmat4 world_from_index{1.0};
-  std::size_t same_as = SIZE_MAX;  ///< the place of the grid whose tree it shares; it has none itself
+  std::size_t same_as = SIZE_MAX;  ///< index of the grid whose tree it shares; its own tree is then empty
 };
 
 struct File {

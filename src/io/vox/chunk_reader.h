@@ -26,7 +26,7 @@ class ChunkReader : public ByteReader {
   [[nodiscard]] std::string_view string() { return text(u32()); }
   [[nodiscard]] Dict dict();
 
-  /// BadFormat at the chunk: "chunk nTRN <what>".
+  /// Returns BadFormat at the chunk: "chunk nTRN <what>".
   [[nodiscard]] Error error(const std::string& what) const {
     return bad_at(offset_, "chunk " + printable(id_) + " " + what);
   }

@@ -24,7 +24,7 @@
 namespace quoin::vox {
 
 inline constexpr std::size_t kColours = 256;
-/// Voxels along a model's axis: XYZI holds coordinates in a byte each.
+/// Maximum voxels along a model's axis: XYZI has one byte per coordinate.
 inline constexpr int kMaxModelEdge = 256;
 
 /// Keys and values of a DICT, as they lie in the file.
@@ -119,7 +119,7 @@ struct Document {
   std::vector<CameraChunk> cameras;
   std::vector<SettingChunk> settings;
   std::int32_t last_frame = 0;       ///< of the keys and META's range
-  std::int64_t stray_materials = 0;  ///< MATL and MATT chunks whose id is no colour index
+  std::int64_t stray_materials = 0;  ///< MATL and MATT chunks whose id is not a colour index
   std::vector<std::string> warnings;
   std::vector<ChunkPlace> chunks;
   std::size_t main_content = 0;  ///< bytes; of a MAIN that has content of its own
@@ -130,9 +130,10 @@ struct Document {
 /// The size of a chunk's header: its id, the size of its content, and of its children.
 inline constexpr std::size_t kChunkHeaderBytes = 12;
 
-/// The frame of a transform's or a shape's key; one without `_f` takes its place in the list. Nothing when it is none.
+/// Returns the frame of a transform's or a shape's key; without `_f` it is the key's index in the list. Returns nullopt
+/// if it is invalid.
 [[nodiscard]] std::optional<std::int32_t> frame_of_key(std::string_view text, std::size_t place);
-/// `_r` and `_t` of a transform's key; nothing when they are none.
+/// Parses `_r` and `_t` of a transform's key; nullopt if they are invalid.
 [[nodiscard]] std::optional<Orientation> parse_orientation(std::string_view text);
 [[nodiscard]] std::optional<IVec3> parse_translation(std::string_view text);
 
@@ -141,10 +142,10 @@ inline constexpr std::size_t kChunkHeaderBytes = 12;
 /// The last frame that there is.
 [[nodiscard]] std::int64_t last_frame(const Document& document);
 
-/// Reads all chunks and checks each against the bytes that are there; what nodes refer to is not checked.
+/// Reads all chunks and checks each against the available bytes; references of nodes are not checked.
 ///
 /// Memory: views, plus a small multiple of the file's size.
-/// Errors: Unsupported for formats that share the name; BadFormat with the byte offset.
+/// Errors: Unsupported for other formats with this extension; BadFormat with the byte offset.
 [[nodiscard]] Result<Document> parse_document(std::span<const std::byte> bytes);
 
 /// Decodes the voxels of a TDCZ to the form of an XYZI: x, y, z, colour index of each voxel with a colour. The

@@ -21,7 +21,7 @@ namespace quoin::vox {
 [[nodiscard]] std::array<std::uint8_t, kColours> types_by_colour_index(const Document& document,
                                                                        std::vector<std::string>& warnings);
 
-/// Registers types 1 to 255: colours of RGBA (its alpha means nothing), materials of MATL or MATT.
+/// Registers types 1 to 255: colours of RGBA (its alpha is ignored), materials of MATL or MATT.
 ///
 /// Requires: `types` holds air only.
 [[nodiscard]] Status register_palette(const Document& document, const std::array<std::uint8_t, kColours>& type_of,

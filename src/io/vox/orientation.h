@@ -11,8 +11,8 @@ namespace quoin::vox {
 /// A translation that sums of many 32-bit ones cannot overflow.
 using Offset = std::array<std::int64_t, 3>;
 
-/// One of the 48 turns and reflections that take the axes to the axes, as a matrix whose row `i` holds `sign[i]` in
-/// column `axis[i]` and zeros elsewhere.
+/// One of the 48 rotations and reflections that map axes to axes, as a matrix whose row `i` has `sign[i]` in column
+/// `axis[i]` and zeros elsewhere.
 struct Orientation {
   std::array<std::uint8_t, 3> axis{0, 1, 2};
   std::array<std::int8_t, 3> sign{1, 1, 1};
@@ -40,8 +40,8 @@ struct Motion {
 [[nodiscard]] Motion operator*(const Motion& a, const Motion& b);
 [[nodiscard]] Motion inverse(const Motion& motion);
 
-/// From and to the `_r` byte: bits 0-1 and 2-3 the columns of the first and second row's entry, bits 4-6 the rows'
-/// signs. Nothing when the two rows name the same column, or none.
+/// Converts from and to the `_r` byte: bits 0-1 and 2-3 the columns of the first and second row's entry, bits 4-6 the
+/// rows' signs. Returns nullopt if the two rows have the same or an invalid column.
 [[nodiscard]] std::optional<Orientation> orientation_from_byte(std::uint8_t byte);
 [[nodiscard]] std::uint8_t byte_from_orientation(const Orientation& orientation);
 
@@ -53,7 +53,7 @@ struct InstanceTurn {
 
 /// From MagicaVoxel's axes (z up) to Quoin's (y up): the same motion seen from axes (x, z, -y).
 [[nodiscard]] InstanceTurn turn_from_orientation(const Orientation& in_vox);
-/// The inverse; nothing when the rotation is not by quarter turns.
+/// The inverse conversion; nullopt if the rotation is not a multiple of quarter turns.
 [[nodiscard]] std::optional<Orientation> orientation_from_turn(const InstanceTurn& turn);
 
 /// (x, y, z) of MagicaVoxel as Quoin's (x, z, -y), and back.

@@ -33,7 +33,7 @@ struct Hanging {
 /// A model as the scene graph shows it: the sum of all transforms on one way down to a shape. MagicaVoxel's axes.
 struct Placement : Hanging {
   std::uint32_t model = 0;
-  std::string_view shape_name;  ///< of the shape itself; Quoin's writer puts a grid's name there
+  std::string_view shape_name;  ///< of the shape itself; Quoin's writer stores a grid's name there
 };
 
 /// The placements at one frame, in the order of the graph, with warnings.

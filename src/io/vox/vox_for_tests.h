@@ -126,7 +126,7 @@ inline VoxelList voxels_of(const Grid& grid) {
   return list;
 }
 
-/// The first difference between two grids, or nothing.
+/// Returns the first difference between two grids, or "".
 inline std::string grid_difference(const SceneGrid& a, const SceneGrid& b) {
   if (a.name != b.name) return "name \"" + a.name + "\" and \"" + b.name + "\"";
   if (!(a.canvas == b.canvas)) return "canvas";
@@ -153,8 +153,8 @@ inline std::string type_difference(const Scene& a, const Scene& b) {
   return {};
 }
 
-/// The first difference between two scenes, or nothing: types, grids and instances, in order, and which instance is of
-/// which grid.
+/// Returns the first difference between two scenes, or "": types, grids and instances, in order, and the grid of each
+/// instance.
 inline std::string difference(const Scene& a, const Scene& b) {
   const auto grids_a = a.grids().handles();
   const auto grids_b = b.grids().handles();
@@ -179,7 +179,7 @@ inline std::string difference(const Scene& a, const Scene& b) {
   return {};
 }
 
-/// Writes the scene and reads it again: what differs, or why it could not be done; nothing when all is the same.
+/// Writes the scene and reads it again. Returns a difference or an error; "" if the scenes are equal.
 inline std::string difference_after_round_trip(const Scene& scene) {
   const Result<VoxBytes> written = write_vox(scene);
   if (!written) return "cannot write: " + to_string(written.error());

@@ -44,9 +44,9 @@ struct RegionName {
 };
 [[nodiscard]] std::optional<RegionName> parse_region_name(const std::filesystem::path& path);
 
-/// Returns true if a file that begins with these bytes is a region: a Linear file, or a table whose entries mostly name
-/// sectors that can exist, with chunks in most of the sectors that lie within the bytes. A few damaged entries do not
-/// matter. Returns false for a region without chunks.
+/// Returns true if a file that begins with these bytes is a region: a Linear file, or a table whose entries mostly
+/// refer to possible sectors, with chunks in most of the sectors within the bytes. A few damaged entries are accepted.
+/// Returns false for a region without chunks.
 [[nodiscard]] bool is_region_file(std::span<const std::byte> beginning);
 
 /// A region that is open for reading. Threads: any number at once.

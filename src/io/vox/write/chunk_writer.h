@@ -28,15 +28,15 @@ class ChunkWriter : public ByteWriter {
     }
   }
 
-  /// Starts a chunk; what follows until `end_chunk` is its content.
+  /// Starts a chunk; writes until `end_chunk` are its content.
   [[nodiscard]] std::size_t begin_chunk(std::string_view id) {
     text(id);
     u32(0);
     u32(0);
     return size();
   }
-  /// `begin` is what begin_chunk gave. Content beyond 4 GiB wraps: ask `size` before trusting the bytes.
-  /// `children`: bytes of other chunks that follow.
+  /// `begin`: the result of begin_chunk. Content beyond 4 GiB wraps: check `size` before using the bytes. `children`:
+  /// bytes of child chunks after it.
   void end_chunk(std::size_t begin, std::size_t children = 0) {
     patch(begin - 8, size() - begin);
     patch(begin - 4, children);

@@ -24,14 +24,15 @@ struct RevisedGraph {
   bool adds_only_layer = false;         ///< the file has none, and its shapes lie on layer 0
   std::int64_t rounded = 0;             ///< instances between voxels, which were moved
   std::int64_t beyond_limit = 0;        ///< instances farther out than MagicaVoxel shows
-  std::int64_t turns_left_out = 0;      ///< groups whose turn or mirror the file cannot say
+  std::int64_t turns_left_out = 0;      ///< groups whose rotation or reflection the file cannot store
   std::int64_t frames_left_out = 0;     ///< frames of a file without a graph that are no longer kept
   bool has_empty_model = false;         ///< shapes show a model without voxels, whose number is the plan's count
   /// A node with several parents has to change, so the whole graph must be rewritten.
   bool must_be_new = false;
 };
 
-/// Compares the scene with the source, and changes of its graph what differs. Without `keeps_graph` all nodes are new.
+/// Compares the scene with the source, and updates the differences in its graph. Without `keeps_graph` all nodes are
+/// new.
 ///
 /// Errors: as write_vox.
 [[nodiscard]] Result<RevisedGraph> revise_graph(const Scene& scene, const VoxSource& source, const ModelPlan& models,

@@ -118,8 +118,8 @@ class GraphRevision {
  private:
   /// The content of one frame in a file without a scene graph.
   struct Frame {
-    const GridPlan* plan = nullptr;  ///< null: its grid is gone
-    Motion first;                    ///< where the pivot of its first piece goes
+    const GridPlan* plan = nullptr;  ///< null: its grid was removed
+    Motion first;                    ///< the pivot of its first piece
   };
 
   void number_layers();

@@ -35,11 +35,11 @@ struct ModelPlan {
 /// must keep its pivot.
 [[nodiscard]] ModelPlan plan_models(const Scene& scene, const VoxSource& source, bool keeps_graph);
 
-/// The content of a changed model's XYZI (or TDCZ) chunk: voxels that are still there in the file's order, then new
-/// ones. Voxels that cannot be seen, outside the model or of colour 0, stay as long as its box does.
+/// Returns the content of a changed model's XYZI (or TDCZ) chunk: remaining voxels in the file's order, then new
+/// voxels. Invisible voxels, outside the model or of colour 0, stay if the box is unchanged.
 ///
-/// Memory: up to a byte a voxel of the box and, of a TDCZ, four a voxel.
-/// Errors: those of unpack_voxels.
+/// Memory: up to one byte per voxel of the box and, for a TDCZ, four bytes per voxel.
+/// Errors: as unpack_voxels.
 [[nodiscard]] Result<std::vector<std::byte>> revised_voxels(const Grid& grid, const GridPlan& plan,
                                                             const VoxSource& source,
                                                             const std::vector<std::uint8_t>& index_of_type);

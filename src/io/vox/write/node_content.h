@@ -28,7 +28,7 @@ class Entries {
   /// The last value of that key, or a new one after all others.
   void set(std::string_view key, std::string value);
   void erase(std::string_view key);
-  /// Sets it, or erases it where the value says nothing.
+  /// Sets the key, or erases it if the value is empty.
   void set_or_erase(std::string_view key, const std::string& value);
 
   [[nodiscard]] const ChunkWriter::Entries& all() const { return all_; }
@@ -37,7 +37,7 @@ class Entries {
   ChunkWriter::Entries all_;
 };
 
-/// A chunk of the scene graph with all that it says, to be changed and written again.
+/// The complete content of a scene graph chunk, to be changed and written again.
 struct NodeContent {
   NodeKind kind = NodeKind::Group;
   std::int32_t id = 0;
@@ -47,7 +47,7 @@ struct NodeContent {
   std::vector<std::int32_t> children;                     ///< of a transform one; of a group
   std::vector<Entries> frames;                            ///< of a transform, in the file's order
   std::vector<std::pair<std::uint32_t, Entries>> models;  ///< of a shape, in the file's order
-  std::vector<std::byte> tail;                            ///< what follows in the chunk
+  std::vector<std::byte> tail;                            ///< trailing bytes of the chunk
 };
 
 /// Requires: `content` belongs to a chunk of this kind, which `parse_document` has read without an error.
@@ -56,7 +56,7 @@ struct NodeContent {
 /// Returns the content of a source node.
 [[nodiscard]] NodeContent node_of(const VoxSource& source, std::size_t node);
 
-/// Writes the content without a chunk's header: what read_node read, the same bytes.
+/// Writes the content without a chunk header: the same bytes that read_node read.
 void write_node(const NodeContent& node, ChunkWriter& out);
 [[nodiscard]] std::string_view chunk_id(NodeKind kind);
 

@@ -9,7 +9,7 @@
 /// Scenes with voxels of another size than 1, the only size in .vox.
 namespace quoin::vox {
 
-/// Returns the size of voxels that all instances have in common; nothing if it is 1 or they differ.
+/// Returns the common voxel size of all instances; nullopt if it is 1 or they differ.
 [[nodiscard]] std::optional<double> common_voxel_size(const Scene& scene);
 
 /// Returns the scene with voxels of size 1 and all positions divided by their size.

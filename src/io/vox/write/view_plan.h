@@ -22,7 +22,7 @@ struct ViewPlan {
   std::vector<std::int32_t> order;             ///< their numbers, as the scene has them
   std::vector<std::int32_t> removed;           ///< numbers that the source has
   std::optional<Look> sun;
-  bool has_more_settings = false;  ///< those of the sun alone are written, and there are others
+  bool has_more_settings = false;  ///< the look has settings other than the sun, which are not written
 };
 
 /// Compares a loaded scene with its source. The initial camera gets a free number, if it is none of the others.

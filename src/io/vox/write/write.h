@@ -36,11 +36,11 @@ struct RevisedTypes {
   std::int64_t replaced = 0;  ///< colours of the palette that no voxel had, and that new ones took the place of
 };
 
-/// The same for a scene that was read from a file: the types that were its palette stay where they were. Others that
-/// occur take entries of the same look, else some whose type does not occur, those first that say least: a plain
-/// colour that is there twice, or of the default palette.
+/// Makes the table for a scene that was read from a file: the types of its palette keep their indices. Other used types
+/// take entries of the same look, otherwise entries of unused types, the least specific first: a duplicate plain
+/// colour, or a colour of the default palette.
 ///
-/// Errors: LimitExceeded when more than 255 types occur.
+/// Errors: LimitExceeded if more than 255 types are used.
 [[nodiscard]] Result<RevisedTypes> revise_type_table(const Scene& scene, const VoxSource& source);
 
 /// A model to write, cut from a grid.
@@ -54,9 +54,9 @@ struct Piece {
 /// voxels are left out unless they are all there is.
 [[nodiscard]] std::vector<Piece> cut_into_pieces(const SceneGrid& grid);
 
-/// Writes the voxels of all pieces of a grid as XYZI has them, each piece's from its place in `starts` on.
+/// Writes the voxels of all pieces of a grid in XYZI form, each piece from its offset in `starts` on.
 ///
-/// Requires: `pieces` were cut from this grid; there is room for four bytes a voxel.
+/// Requires: `pieces` were cut from this grid; the output has four bytes per voxel.
 void write_voxels(const Grid& grid, const std::vector<std::uint8_t>& index_of_type, std::span<const Piece> pieces,
                   std::span<const std::size_t> starts, std::span<std::byte> out);
 
@@ -67,7 +67,7 @@ void write_voxels(const Grid& grid, const std::vector<std::uint8_t>& index_of_ty
 
 namespace quoin {
 
-/// Calls `visit(voxel, type)` for every non-air voxel of a chunk whose least corner is `origin`, by z, then y, then x.
+/// Calls `visit(voxel, type)` for every non-air voxel of a chunk with minimum corner `origin`, by z, then y, then x.
 ///
 /// Cost: O(rows within the tight bounds + voxels), so that scattered voxels are cheap.
 template <class Visit>
