@@ -102,9 +102,9 @@ struct Api {
 #undef QUOIN_VULKAN_MEMBER
   // NOLINTEND(readability-identifier-naming)
 
-  /// Those of the loader. Errors: Unsupported when there is none.
+  /// Loads the functions of the Vulkan loader. Errors: Unsupported if there is none.
   [[nodiscard]] static Result<Api> load();
-  /// The way to those of an instance that others made, by `entry` if that is not null. Errors: as `load`.
+  /// Finds the functions for an instance made by the caller, through `entry` unless null. Errors: as `load`.
   [[nodiscard]] static Result<Api> find(PFN_vkGetInstanceProcAddr entry);
   /// Return the first function that is not there; null: none.
   [[nodiscard]] const char* load_instance(VkInstance instance);

@@ -63,7 +63,7 @@ std::vector<VkQueueFamilyProperties> queue_families(const Api& api, VkPhysicalDe
   return families;
 }
 
-// The first family whose queues can do all that `wanted` says.
+// Returns the first queue family with all capabilities in `wanted`.
 std::optional<std::uint32_t> queue_family(const Api& api, VkPhysicalDevice device, VkQueueFlags wanted) {
   const std::vector<VkQueueFamilyProperties> families = queue_families(api, device);
   const auto found = std::find_if(families.begin(), families.end(), [=](const VkQueueFamilyProperties& family) {

@@ -39,7 +39,7 @@ class VulkanInstance {
 
   [[nodiscard]] const Api& api() const { return api_; }
   [[nodiscard]] const std::vector<PhysicalDevice>& devices() const { return devices_; }
-  /// As VulkanOptions::device says. Errors: Unsupported.
+  /// Chooses a device as documented for VulkanOptions::device. Errors: Unsupported.
   [[nodiscard]] Result<PhysicalDevice> choose(const std::string& wanted) const;
 
  private:

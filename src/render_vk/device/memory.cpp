@@ -95,7 +95,7 @@ void Buffer::swap(Buffer& other) noexcept {
   std::swap(mapped_, other.mapped_);
 }
 
-// The first gap that is large enough; nothing when there is none.
+// Takes the first gap that is large enough; returns an empty place if there is none.
 Place DeviceMemory::take(std::size_t block, VkDeviceSize size) {
   Block& from = *blocks_[block];
   const auto gap = std::find_if(from.free.begin(), from.free.end(), [&](const auto& g) { return g.second >= size; });

@@ -22,8 +22,8 @@ class Buffer {
  public:
   enum class Where : std::uint8_t {
     Device,  ///< where the device reads fastest
-    Upload,  ///< written by the processor through `mapped`
-    Read,    ///< read by the processor through `mapped`
+    Upload,  ///< written by the CPU through `mapped`
+    Read,    ///< read by the CPU through `mapped`
   };
 
   Buffer() = default;
@@ -103,7 +103,7 @@ class Places {
   Places& operator=(const Places&) = delete;
 
   [[nodiscard]] Status reserve(std::size_t bytes, std::uint64_t& address);
-  /// Puts bytes in place, before what `DeviceMemory::flush` is followed by; of none the address stays as it is.
+  /// Queues bytes for the next `DeviceMemory::flush`. Leaves `address` unchanged for empty input.
   [[nodiscard]] Status upload(std::span<const std::byte> bytes, std::uint64_t& address);
   template <class T>
   [[nodiscard]] Status upload(const std::vector<T>& values, std::uint64_t& address) {

@@ -21,7 +21,7 @@ namespace quoin::vulkan_test {
 using vulkan::Api;
 using vulkan::info_of;
 
-/// An instance with the validation layer where it is installed, the first device that lacks nothing, a queue.
+/// An instance with the validation layer if installed, the first suitable device, and a queue.
 class OwnDevice {
  public:
   /// Null, with the reason why, where there is none.
@@ -104,7 +104,7 @@ class OwnDevice {
     return memory;
   }
 
-  // NOLINTBEGIN(readability-identifier-naming): what tests hand out
+  // NOLINTBEGIN(readability-identifier-naming): public members for tests
   Api api;
   VkInstance instance = VK_NULL_HANDLE;
   VkPhysicalDevice physical = VK_NULL_HANDLE;
@@ -192,7 +192,7 @@ class OwnDevice {
   std::vector<std::string> messages_;
 };
 
-/// An image of two mip levels and two layers, and a way to its bytes.
+/// An image of two mip levels and two layers, with read access to its bytes.
 class OwnImage {
  public:
   OwnImage(OwnDevice& device, VkFormat format, int width, int height)

@@ -39,7 +39,7 @@ Status enable_vulkan_features(VkDeviceCreateInfo& info, VulkanFeatureStorage& st
   using Addresses = VkPhysicalDeviceBufferDeviceAddressFeatures;
   static_assert(sizeof(Addresses) <= sizeof storage.bytes && alignof(Addresses) <= 8);
   QUOIN_ASSERT(info.sType == VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, "a VkDeviceCreateInfo that says what it is");
-  // Vulkan declares chains constant, but only reads them where it says so.
+  // Vulkan declares extension chains const, although some structures in them are outputs.
   for (auto* one = static_cast<VkBaseOutStructure*>(const_cast<void*>(info.pNext)); one != nullptr; one = one->pNext) {
     if (one->sType == VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES) {
       reinterpret_cast<VkPhysicalDeviceVulkan12Features*>(one)->bufferDeviceAddress = VK_TRUE;

@@ -109,7 +109,7 @@ Status DeviceDetail::put_halved(const DeviceScene& device, const Scene& scene,
   return {};
 }
 
-// Brings a level up to date and into the table, once a picture.
+// Updates a level and adds it to the table, once per image.
 Status DeviceDetail::put_level(const CoarseLevel& coarse, GridHandle grid, std::vector<ShaderGrid>& table,
                                const Level*& level) {
   Level& known = levels_[{grid, coarse.level}];

@@ -16,8 +16,7 @@
 
 namespace quoin::vulkan {
 
-/// Halved grids and impostors in device memory, made when a picture first asks for them and kept from picture to
-/// picture.
+/// Halved grids and impostors in device memory, made at the first request of an image and kept for later images.
 class DeviceDetail {
  public:
   static constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 30;
@@ -29,13 +28,12 @@ class DeviceDetail {
   void look_at(const Scene& scene);
   void clear();
 
-  /// Returns the scene's instances in their detail: traced in grids halved as often as `detail` says, or less often
-  /// where that would change a grid's volume too much (see SceneTracer::with_detail), or drawn from impostors. Beyond
-  /// `max_bytes` of device memory, of each of both, those are released that pictures have not asked for longest; what
-  /// this one asks for stays.
+  /// Returns the scene's instances in their detail: traced in grids halved as often as `detail` requests, or less often
+  /// if that would change a grid's volume too much (see SceneTracer::with_detail), or drawn from impostors. Beyond
+  /// `max_bytes` of device memory for each kind, the least recently used ones are released; those of this image stay.
   ///
-  /// Requires: `device` was updated with `scene`, which is as it was then; no commands run.
-  /// Errors:   those of DeviceImpostors::draw; then it holds nothing.
+  /// Requires: `device` was updated with `scene`, which has not changed since; no commands run.
+  /// Errors:   as DeviceImpostors::draw; it is then empty.
   [[nodiscard]] Result<Placement> place(const DeviceScene& device, const Scene& scene, const PictureDetail& detail,
                                         const Camera& camera, const RenderOptions& options, Threads threads,
                                         std::uint64_t max_bytes = kMaxBytes);
@@ -53,7 +51,7 @@ class DeviceDetail {
   struct Level {
     DeviceGrid voxels;
     std::uint64_t last_use = 0;
-    std::int32_t index = 0;  // in the table of the picture that used it last
+    std::int32_t index = 0;  // in the table of the last image that used it
   };
   Status put_halved(const DeviceScene& device, const Scene& scene, std::span<const SelectedInstance> selected,
                     Threads threads, Placement& placement);

@@ -29,15 +29,14 @@ class DeviceImpostors {
 
   explicit DeviceImpostors(DeviceMemory& memory) : memory_(&memory) {}
 
-  /// Begins a picture: sends impostors, and returns the far instances whose impostor is there; the others are to be
-  /// traced. `waits`: all are sent. Errors: LimitExceeded when a memory is full. It then is to be cleared.
+  /// Begins an image: sends impostors, and returns the far instances whose impostor is complete; the others must be
+  /// traced. `waits`: sends all. Errors: LimitExceeded when a memory is full. It must then be cleared.
   [[nodiscard]] Result<std::vector<FarInstance>> send(const Scene& scene, const FarImpostors& far, bool waits);
 
-  /// Has those of a picture, which is `width` by `height` pixels, drawn from their impostors: rays of the camera pass
-  /// them by, and Placement::far says what shows of them. Memory as DeviceDetail::place.
+  /// Prepares an image of `width` by `height` pixels to draw instances from their impostors: camera rays skip them,
+  /// and Placement::far has their visible faces. Memory as DeviceDetail::place.
   ///
-  /// Requires: `send` returned them. Errors: LimitExceeded when their faces are more than 2^32. It then is to be
-  ///           cleared.
+  /// Requires: `send` returned them. Errors: LimitExceeded if they have more than 2^32 faces. It must then be cleared.
   [[nodiscard]] Status draw(const Scene& scene, std::span<const FarInstance> sent, const ImpostorScreen& screen,
                             int width, int height, Placement& placement) const;
   /// Drops the least recently used impostors not used by the last image, until at most `max_bytes` are held.

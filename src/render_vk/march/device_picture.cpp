@@ -104,7 +104,7 @@ Status VulkanPicture::write(const Image& image) {
   });
   impl_->samples = done ? 1 : 0;
   impl_->rays = 0;
-  impl_->sums = {};  // of another picture
+  impl_->sums = {};  // belong to another image
   return done;
 }
 

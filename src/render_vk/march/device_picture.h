@@ -17,13 +17,13 @@ struct VulkanPicture::Impl {
   Impl(vulkan::Device& of_device, const vulkan::Pipelines& with_pipelines)
       : device(&of_device), pipelines(&with_pipelines) {}
 
-  /// Room for that many pixels, whose contents mean nothing then if the size is another. Errors: LimitExceeded.
+  /// Allocates that many pixels; their contents are undefined if the size changes. Errors: LimitExceeded.
   [[nodiscard]] Status resize(int new_width, int new_height);
-  /// The same for `sums`, and nothing was drawn so far; what will be is of this camera. Errors: LimitExceeded.
+  /// Allocates `sums` and starts without samples, for this camera. Errors: LimitExceeded.
   [[nodiscard]] Status begin_sums(const Camera& of_camera, const LightOptions& in_light);
   /// Records VulkanPicture::record_copy, after `prepare_copy` accepted the target.
   void record_copy(VkCommandBuffer commands, const VulkanImageTarget& target) const;
-  /// Errors: those of VulkanPicture::record_copy.
+  /// Validates the target. Errors: those of VulkanPicture::record_copy.
   [[nodiscard]] Status prepare_copy(const VulkanImageTarget& target);
 
   vulkan::Device* device;

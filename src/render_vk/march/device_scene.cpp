@@ -121,7 +121,7 @@ std::vector<GridHandle> DeviceScene::changed_grids(const Scene& scene, InstanceF
   return changed;
 }
 
-// What depends on the grids as they are by now.
+// Updates the data that depends on the grids' present state.
 void DeviceScene::finish_placed(const Scene& scene) {
   for (DevicePlaced& each : placement_.placed) {
     const KnownGrid& known = grids_.find(scene.instances()[each.placed.instance].grid)->second;
@@ -192,7 +192,7 @@ Status DeviceLamps::put(ShaderMemory& memory, std::shared_ptr<const LampTable> n
   return done;
 }
 
-// Numbers have room for some more bricks.
+// Bricks have spare numbers for growth.
 Status DeviceLevels::put_changes(ShaderMemory& memory, const LightBricks& now, const LightBricks::Changed& changed) {
   const auto all_bricks = std::as_bytes(now.bricks());
   const auto all_numbers = std::as_bytes(now.numbers());

@@ -20,15 +20,15 @@
 
 namespace quoin::vulkan {
 
-/// An instance and what frames need to know of it.
+/// An instance and its data for frames.
 struct DevicePlaced {
-  PlacedGrid placed;      ///< of its pointers only `voxels` of a halved grid means anything, until the next picture
+  PlacedGrid placed;      ///< only `voxels` of a halved grid is a valid pointer, until the next image
   std::int32_t grid = 0;  ///< index into the device's grids
   IVec3 origin{0};        ///< of the tree's coordinates, in the grid
   DVec3 low{0.0};         ///< tight bounds of all voxels and the field, in the tree's coordinates
   DVec3 high{0.0};
   bool is_far = false;                      ///< drawn from its impostor: the camera's rays pass it by
-  const ImpostorFaces* impostor = nullptr;  ///< of that, until the next picture
+  const ImpostorFaces* impostor = nullptr;  ///< of that, until the next image
   std::size_t impostor_level = 0;           ///< the finest level drawn
 };
 
@@ -48,9 +48,9 @@ struct Placement {
   bool has_transparent = false;
   bool has_fields = false;
   bool has_field_glass = false;  ///< something of these is transparent
-  std::vector<ShaderFar> far;    ///< what shows of impostors, in the order of the instances
+  std::vector<ShaderFar> far;    ///< visible faces of impostors, in the order of the instances
 };
-/// Puts a table in place, or in a larger one.
+/// Writes a table to its place, or to a larger one.
 [[nodiscard]] Status put_table(ShaderMemory& memory, Place& place, std::span<const std::byte> bytes);
 [[nodiscard]] bool is_same(const std::vector<ShaderGrid>& a, const std::vector<ShaderGrid>& b);
 
@@ -62,11 +62,11 @@ void add_surface(const Surface& surface, float last, std::vector<Vec4>& table);
 
 /// A table of lamps, its bricks and lists in device memory.
 struct DeviceLamps {
-  std::shared_ptr<const LampTable> table;  ///< null: nothing shines
+  std::shared_ptr<const LampTable> table;  ///< null: no lamps
   Place bricks;
   Place lists;
 
-  /// After an error it holds nothing.
+  /// After an error it is empty.
   [[nodiscard]] Status put(ShaderMemory& memory, std::shared_ptr<const LampTable> now);
 };
 
@@ -94,7 +94,7 @@ class DeviceScene {
  public:
   explicit DeviceScene(ShaderMemory& memory) : memory_(&memory) {}
 
-  /// As VulkanRenderer::update. After an error it holds nothing.
+  /// Updates as VulkanRenderer::update. After an error it is empty.
   [[nodiscard]] Status update(const Scene& scene, InstanceFilter filter, Threads threads);
 
   [[nodiscard]] const Placement& placement() const { return placement_; }

@@ -150,7 +150,7 @@ void set_sun(const PlacedGrid& placed, DVec3 sun, double brightness, ShaderPlace
   }
 }
 
-// Where rays start, and view space has its origin: as far ahead as there is nothing.
+// Sets the start of rays, the origin of view space: as far ahead as space is empty.
 void add_placed(const Placement& scene, const Camera& camera, const RenderOptions& options, const Rays& rays,
                 FrameData& data) {
   const DVec3 sun = to_sun(options.light);

@@ -1,4 +1,4 @@
-// A picture into an image of a program that draws by Vulkan itself.
+// Copies an image into a Vulkan image of the calling program.
 
 #include <string>
 
@@ -58,7 +58,7 @@ Status check(const VulkanImageTarget& target, int width, int height) {
   return {};
 }
 
-// After all that was done with the image, and after the picture was drawn.
+// Waits for all earlier uses of the image, and for the end of drawing.
 void begin_copy(const vulkan::Api& api, VkCommandBuffer commands, VkImageMemoryBarrier image) {
   auto picture = info_of<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
   picture.srcAccessMask = VK_ACCESS_MEMORY_WRITE_BIT;

@@ -8,7 +8,7 @@
 namespace quoin::vulkan {
 namespace {
 
-// What commands do should be over before anything thinks that the device hangs: of one tile, and of one batch.
+// Limits of the work per tile and per batch, so that no driver's watchdog resets the device.
 constexpr std::int64_t kMaxRays = std::int64_t{1} << 22;
 constexpr std::int64_t kMaxRaysAtOnce = std::int64_t{1} << 24;
 const char* const kDoing = "drawing";
@@ -124,7 +124,7 @@ ShaderPush PicturePass::push_for_sample(const Tile& tile, int sample) const {
   return push;
 }
 
-// What each pixel's ray meets.
+// Finds the hit of each pixel's ray.
 void PicturePass::find_hits(VkCommandBuffer commands, const ShaderPush& push) const {
   if (push.far_groups > 0) {
     const VkDeviceSize half = (frame_.far_numbers - frame_.far_depths);
@@ -150,7 +150,7 @@ Status PicturePass::take_sample(const Tile& tile, int sample) {
   return done && has_glass ? finish_glass(push) : done;
 }
 
-// Bodies of glass are lit as many at a time as there is room for, until no pixel has more.
+// Lights as many glass bodies at a time as fit, until no pixel has more.
 Status PicturePass::finish_glass(ShaderPush push) {
   for (;;) {
     Status done = device_->run(kDoing, [&](VkCommandBuffer commands) {
@@ -243,7 +243,7 @@ Result<Picture> PicturePass::render(const Camera& camera, const RenderOptions& o
   return picture;
 }
 
-// One sample of some tiles; without glass, which the processor counts rounds for, all in one batch.
+// Takes one sample of some tiles, in one batch if there is no glass (the CPU must count the rounds of glass).
 Status PicturePass::take_sample(std::span<const Tile> tiles, int sample) {
   if (placement_->has_transparent) {
     for (const Tile& tile : tiles) {

@@ -17,7 +17,7 @@
 
 namespace quoin::vulkan {
 
-/// One picture, tile by tile: a tile is drawn in device memory and then read, or stays there.
+/// Draws one image tile by tile: each tile is drawn in device memory and then read back, or stays there.
 class PicturePass {
  public:
   /// Requires: `placement` and `light` belong to `scene`. `content`: the source of that scene; null: empty.
@@ -84,7 +84,7 @@ class PicturePass {
   std::vector<FarTiles::Range> far_;  // of the tiles
   Place far_place_;                   // depths and numbers of a tile's impostors, half each
   Buffer output_;                     // colours, depths, counters
-  Buffer results_;                    // the same, for the processor
+  Buffer results_;                    // the same, for the CPU
 };
 
 }  // namespace quoin::vulkan

@@ -25,7 +25,7 @@ enum class Pass : std::uint8_t {
   FieldGlass,  ///< these where something of fields is transparent
   LightWithFieldGlass,
   Resolve,  ///< the samples' mean as bytes
-  Swap,     ///< red and blue change places, of a whole picture
+  Swap,     ///< swaps red and blue of a whole image
 };
 constexpr std::size_t kPassCount = 13;
 
@@ -46,7 +46,7 @@ class Pipelines {
  public:
   [[nodiscard]] static Result<std::unique_ptr<Pipelines>> create(Device& device);
   ~Pipelines();
-  /// Makes what `with_fields` names, once.
+  /// Makes the pipelines of `with_fields`, once.
   [[nodiscard]] Status add_fields();
   /// Makes the additional pipelines of `with_field_glass`, once.
   [[nodiscard]] Status add_field_glass();
@@ -57,7 +57,7 @@ class Pipelines {
   void dispatch(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const;
   /// The same over impostors: ShaderPush::far_groups workgroups.
   void dispatch_far(VkCommandBuffer commands, Pass pass, const ShaderPush& push) const;
-  /// Records a copy of a picture's words with red and blue swapped, after which it may be read.
+  /// Records a copy of an image's words with red and blue swapped, after which it may be read.
   void swap_red_and_blue(VkCommandBuffer commands, const SwapPush& push) const;
 
  private:

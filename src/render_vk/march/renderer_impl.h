@@ -92,7 +92,7 @@ struct VulkanRenderer::Impl {
   LightCache levels;
   vulkan::DeviceLevels sent_levels;
   std::uint64_t update_count = 0;            ///< of updates
-  std::shared_ptr<vulkan::PathScene> paths;  ///< null: nothing was drawn by paths
+  std::shared_ptr<vulkan::PathScene> paths;  ///< null: no path-traced image was drawn
   std::uint64_t uploaded = 0;
 };
 

@@ -20,7 +20,7 @@ namespace quoin::vulkan {
 /// light and all instances at full detail.
 class ShaderScene {
  public:
-  /// `light`: of whose lamps there is a table. Lifetime: the scene must outlive it, and is not edited meanwhile.
+  /// `light`: determines the lamp table. Lifetime: the scene must outlive it and must not be edited.
   /// Errors: those of VulkanRenderer::update; LimitExceeded beyond 1 GiB.
   [[nodiscard]] static Result<std::unique_ptr<ShaderScene>> of(const Scene& scene, InstanceFilter filter,
                                                                const LightOptions& light, Threads threads);
@@ -29,9 +29,9 @@ class ShaderScene {
   [[nodiscard]] std::span<const std::byte> bytes() const { return memory_.bytes(); }
   [[nodiscard]] const Placement& placement() const { return scene_.placement(); }
 
-  /// A picture's ShaderFrame, and behind it the tables that are its own: placed, tree, leaves, directions, turns,
-  /// lamps and thresholds. Their addresses count from the frame's first byte, those of other tables as in `bytes`.
-  /// Requires: the light is by rays, with the lamps of the time when this was made.
+  /// Returns an image's ShaderFrame, followed by its own tables: placed, tree, leaves, directions, turns, lamps and
+  /// thresholds. Their addresses are relative to the frame's first byte; those of other tables are as in `bytes`.
+  /// Requires: traced light, with the lamps at the time of construction.
   /// Errors: those of CpuRenderer::render. Cost: O(instances + lamps).
   [[nodiscard]] Result<std::vector<std::byte>> frame(const Camera& camera, const RenderOptions& options) const;
 

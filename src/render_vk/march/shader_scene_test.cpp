@@ -38,7 +38,7 @@ class Words {
   std::vector<std::uint32_t> words_;
 };
 
-// Walks down a tree as walk.wgsl does, to the type of a voxel; nothing where the tree does not hold it.
+// Descends a tree as walk.wgsl does, to the type of a voxel; nullopt if the tree does not contain it.
 std::optional<VoxelType> type_in(const Words& words, const vulkan::ShaderTree& tree, IVec3 voxel) {
   for (int axis = 0; axis < 3; ++axis) {
     if (voxel[axis] < tree.low[axis] || voxel[axis] >= tree.high[axis]) return std::nullopt;
@@ -156,7 +156,7 @@ TEST(ShaderScene, AFrameHasItsTablesBehindIt) {
   }
   const auto second = words.read<vulkan::ShaderPlaced>(frame.placed + sizeof(vulkan::ShaderPlaced));
   EXPECT_FLOAT_EQ(second.ref_inside.w, 0.5F) << "the size of its voxels";
-  // What types look like lies with the scene.
+  // The surfaces of types are stored with the scene.
   const Words scene((*shaders)->bytes());
   const auto colour = scene.read<vulkan::Vec4>(frame.surfaces + std::uint64_t{made.brick} * 3 * sizeof(vulkan::Vec4));
   EXPECT_EQ(Vec3(colour), Surfaces(made.scene.types)[made.brick].colour);

@@ -1,6 +1,6 @@
 #pragma once
 
-// Scenes of many instances in every detail, drawn by the device and by the processor.
+// Scenes of many instances in every detail, drawn by the device and by the CPU.
 
 #include <cstdint>
 #include <random>

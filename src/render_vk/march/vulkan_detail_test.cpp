@@ -1,6 +1,6 @@
 #ifdef QUOIN_HAVE_VULKAN
 
-// Grids that are halved where they are far, drawn by the device and by the processor.
+// Far grids that are halved, drawn by the device and by the CPU.
 
 #include <set>
 
@@ -19,7 +19,7 @@ using vulkan_test::in_detail;
 
 class VulkanDetail : public vulkan_test::VulkanDetailTest {
  protected:
-  // Of the grids that the processor traces.
+  // Returns the halvings of the grids that the CPU traces.
   [[nodiscard]] std::set<int> halvings_of(const Camera& camera, const RenderOptions& options) const {
     std::vector<SelectedInstance> selected;
     DetailSelector().select(scene_, camera, options.width, options.height, *options.detail.policy, selected);

@@ -197,7 +197,7 @@ TEST_F(VulkanField, ALakeAndBallsOfGlass) {
     options.light.shading = shading;
     compare(scene, camera, options, "field_lake_shading_" + std::to_string(static_cast<int>(shading)));
   }
-  // Where all of it is opaque, another picture.
+  // If all of it is opaque, the image differs.
   options = sized(160, 120);
   for (const VoxelType type : {types.glass, static_cast<VoxelType>(types.glass + 1)}) {
     VoxelProperties opaque = scene.types[type];

@@ -60,7 +60,7 @@ class VulkanImages : public ::testing::Test {
     });
   }
 
-  /// The picture's bytes as an image has them.
+  /// Returns the image's bytes in the target's format.
   [[nodiscard]] std::vector<std::uint8_t> bytes() const {
     const Image image = picture_->read().value();
     std::vector<std::uint8_t> all;

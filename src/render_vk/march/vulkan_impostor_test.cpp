@@ -1,6 +1,6 @@
 #ifdef QUOIN_HAVE_VULKAN
 
-// Impostors, drawn by the device and by the processor.
+// Impostors, drawn by the device and by the CPU.
 
 #include <chrono>
 #include <cmath>

@@ -1,4 +1,4 @@
-// Pictures in propagated light: those of CpuRenderer.
+// Images in propagated light match those of CpuRenderer.
 
 #include <algorithm>
 #include <array>

@@ -71,7 +71,7 @@ Status VulkanRenderer::update(const Scene& scene, InstanceFilter filter, Threads
     impl_->look_at(done ? &scene : nullptr, filter);
     return done;
   } catch (...) {
-    impl_->look_at(nullptr, filter);  // the scene before may be gone by the next picture
+    impl_->look_at(nullptr, filter);  // the previous scene may be destroyed before the next image
     throw;
   }
 }

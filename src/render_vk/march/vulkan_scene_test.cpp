@@ -1,4 +1,4 @@
-// Scenes of many kinds, drawn by the device and by the processor.
+// Scenes of many kinds, drawn by the device and by the CPU.
 
 #include <cmath>
 #include <numbers>
@@ -259,7 +259,7 @@ TEST_F(VulkanScene, MorePanesThanThereIsRoomFor) {
   grid.fill_box({{0, 0, 0}, {1, 21, 21}}, types.roof);
   for (int x = 4; x < 78; x += 2) grid.fill_box({{x, 1, 2}, {x + 1, 15, 19}}, x % 4 == 0 ? clear : other);
   place(scene, std::move(grid));
-  // A second grid whose panes touch those of the first.
+  // A second grid whose panes touch the first grid's panes.
   Grid beside;
   for (int x = 4; x < 40; x += 2) beside.fill_box({{x + 1, 1, 2}, {x + 2, 8, 19}}, x % 4 == 0 ? clear : other);
   place(scene, std::move(beside));

@@ -19,7 +19,7 @@ struct VulkanPathPicture::Impl {
   vulkan::Device* device;
   int samples = 0;
   std::int64_t rays = 0;
-  // What its samples were drawn with.
+  // The camera of its samples.
   Camera camera;
   PathOptions options;
   vulkan::Buffer sums;   ///< vectors of four floats a pixel: path_data.glsl

@@ -12,7 +12,7 @@
 namespace quoin::vulkan {
 namespace {
 
-// What types look like by paths: four vectors each, and those of types beyond the last.
+// Returns the path tracing materials of types: four vectors each; the last entry is for types out of range.
 std::vector<Vec4> path_surface_table(const Surfaces& surfaces, std::size_t types) {
   std::vector<Vec4> table;
   table.reserve(4 * (types + 1));

@@ -56,13 +56,13 @@ class DevicePaths {
   path::PathLampCache cache_;
   std::shared_ptr<const path::PathLamps> lamps_;  // null: out of date
   double brightness_ = 0.0;
-  std::shared_ptr<const path::PathLamps> of_faces_;  // those whose faces and ways were sent
+  std::shared_ptr<const path::PathLamps> of_faces_;  // the lamps whose faces and tree paths were sent
   Place lamp_ways_;
   Place face_keys_;
   Place face_lamps_;
 };
 
-/// A picture's lamps as shaders have them, from where view space has its origin in the world.
+/// An image's lamps in shader form, relative to the world position of view space's origin.
 struct LampTables {
   std::vector<ShaderPathLamp> lamps;
   std::vector<ShaderLampNode> nodes;

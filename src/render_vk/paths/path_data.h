@@ -8,7 +8,7 @@
 
 namespace quoin::vulkan {
 
-// What src/render_vk/shaders/paths/path_data.glsl declares, field by field.
+// Mirrors src/render_vk/shaders/paths/path_data.glsl, field by field.
 
 struct ShaderPathFrame {
   Vec4 to_sun{0.0F};

@@ -137,7 +137,7 @@ Status PathPass::put_frame(int samples) {
   return done;
 }
 
-// Some samples of a tile. `done`: of the picture, before.
+// Takes some samples of a tile. `done_before`: progress of the image before it.
 Status PathPass::take(const Tile& tile, int first, int count, const Progress& progress, double done_before) {
   PathPush push;
   push.frame = frame_address_;

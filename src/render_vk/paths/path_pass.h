@@ -32,7 +32,7 @@ class PathPass {
   PathPass(const PathPass&) = delete;
   PathPass& operator=(const PathPass&) = delete;
 
-  /// `samples` more. After an error the picture has none.
+  /// Adds `samples` samples. After an error the image has none.
   [[nodiscard]] Status draw(int samples, const Progress& progress);
 
  private:
@@ -51,7 +51,7 @@ class PathPass {
   std::uint64_t frame_address_ = 0;
   std::int32_t tile_edge_ = 0;
   Buffer counters_;  // on the device
-  Buffer results_;   // the same, for the processor
+  Buffer results_;   // the same, for the CPU
 };
 
 }  // namespace quoin::vulkan

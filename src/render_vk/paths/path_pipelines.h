@@ -9,8 +9,8 @@
 
 namespace quoin::vulkan {
 
-/// The shader of paths, as scenes need it: with glass, with fields, with transparent fields. Each is made when a
-/// picture first needs it.
+/// The path tracing shader in the variants that scenes need: with glass, with fields, with transparent fields. Each is
+/// made at first use.
 class PathPipelines {
  public:
   [[nodiscard]] static Result<std::unique_ptr<PathPipelines>> create(Device& device);

@@ -35,9 +35,9 @@ PathOptions small(int samples = 4) {
   return options;
 }
 
-// What two pictures of the same paths differ in.
+// The differences of two images with the same paths.
 struct PathDifferences {
-  int pixels = 0;      ///< whose light differs by more than a hundredth
+  int pixels = 0;      ///< pixels whose light differs by more than 1/100
   int depths = 0;      ///< by more than 1e-4 of the distance
   double light = 1.0;  ///< of the whole, by the other's
   int total = 0;
@@ -81,7 +81,7 @@ class VulkanPaths : public VulkanTest {
     return picture ? std::move(*picture) : PathPicture{};
   }
 
-  // `share`: of pixels in whose paths single precision may matter.
+  // `share`: of pixels where single precision may change paths.
   void expect_same_light(const Scene& scene, const Camera& camera, const PathOptions& options, const std::string& name,
                          double share = 0.002) {
     const PathPicture device = drawn(scene, camera, options);
@@ -169,7 +169,7 @@ TEST_F(VulkanPaths, TakeOutTheProcessorsNoise) {
   expect_same_light(town(), of_town(), options, "denoised");
 }
 
-// From the fifth sample on the processor's paths remember which lamps reach a place.
+// From the fifth sample on, paths on the CPU use the learned shares of lamps.
 TEST_F(VulkanPaths, ConvergeToWhatTheProcessorShows) {
   const PathOptions options = small(48);
   const Scene scene = town();
@@ -216,7 +216,7 @@ TEST_F(VulkanPaths, MeetFields) {
   expect_same_light(scene, of_town(), small(), "fields");
 }
 
-// More bodies of glass along a ray than a pixel has room for.
+// More glass bodies along a ray than a pixel's list holds.
 TEST_F(VulkanPaths, PassAnyNumberOfPanes) {
   Scene scene;
   const VoxelType ground = add_type(scene, {200, 200, 200, 255});
@@ -241,7 +241,7 @@ TEST_F(VulkanPaths, PassAnyNumberOfPanes) {
   expect_same_light(scene, towards({0.0, 0.0, 100.0}, {0.0, 0.0, 0.0}), options, "panes");
 }
 
-// A camera far away, whose view space begins before the scene; far from the world's origin too.
+// A distant camera, whose view space begins in front of the scene; also far from the world's origin.
 TEST_F(VulkanPaths, AreAsExactFromFarAway) {
   Scene scene = town();
   const DVec3 far(3.0e6, -2.0e5, 1.0e6);

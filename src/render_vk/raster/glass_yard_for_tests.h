@@ -1,6 +1,6 @@
 #pragma once
 
-// A scene in which glass is all that counts: what tests of marched and of rasterised pictures compare.
+// A scene dominated by glass, for tests that compare marched with rasterised images.
 
 #include <utility>
 

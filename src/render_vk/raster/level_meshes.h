@@ -25,7 +25,7 @@ class LevelMeshes {
   void look_at(const Scene& scene);
   void clear();
 
-  /// Begins a picture.
+  /// Begins an image.
   void begin() { ++picture_; }
   /// Puts the meshes of a grid halved `key.level` times into the store, placed as `placed`. Called once per image.
   /// Errors: of MeshStore::put, and bad_alloc; the level is then empty.

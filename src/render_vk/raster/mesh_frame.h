@@ -49,7 +49,7 @@ struct MeshInstance {
   MeshImpostor impostor;     ///< of a far instance, if it shows
 };
 
-/// A chunk of an instance that is in the picture.
+/// A chunk of an instance in the image.
 struct MeshDraw {
   const StoredMesh* mesh = nullptr;
   std::uint32_t instance = 0;  ///< index into MeshFrameData::instances
@@ -63,10 +63,10 @@ struct MeshDraw {
 /// Runs of a chunk's quads, or of an impostor's faces, each from one number to before the next.
 using QuadRuns = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
 
-/// Faces of an impostor that are in the picture.
+/// Faces of an impostor in the image.
 struct FarDraw {
   ShaderFarLevel level;
-  QuadRuns runs;  ///< of its faces, those whose direction the camera may see
+  QuadRuns runs;  ///< faces in directions that the camera may see
   std::uint64_t faces = 0;
   std::uint32_t instance = 0;
   Vec3 offset{0.0F};          ///< of the content's centre
@@ -82,7 +82,7 @@ struct FarDraw {
 struct MeshFrameData {
   FrameData picture;  ///< the rays' content, and light
   ShaderMeshFrame frame;
-  ShaderMeshPush push;  ///< what all draws have in common
+  ShaderMeshPush push;  ///< the constants shared by all draws
   ShaderMeshPush sky;
   std::vector<ShaderMeshInstance> instances;
   std::vector<MeshDraw> draws;  ///< the nearest first
@@ -90,7 +90,7 @@ struct MeshFrameData {
   /// Transparent quads, farthest first, by their centres. Empty if there are more than `kMaxOrdered`, or if rays find
   /// transparent surfaces: chunks are then drawn in their order, each with its quads in stored order.
   std::vector<ShaderGlassQuad> order;
-  std::vector<ShaderGlassDraw> glass;  ///< what `order` names
+  std::vector<ShaderGlassDraw> glass;  ///< the draws that `order` refers to
   std::vector<ShaderLamp> lamps;
   std::size_t glass_quads = 0;
   bool has_smooth_glass = false;

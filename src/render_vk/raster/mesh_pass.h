@@ -9,7 +9,7 @@
 
 namespace quoin::vulkan {
 
-/// Draws what MeshFrameData lists, and keeps the memory that this takes from picture to picture.
+/// Draws the content of MeshFrameData, and keeps its memory for later images.
 class MeshPass {
  public:
   /// Errors: Unsupported when the device cannot draw meshes at all.
@@ -18,13 +18,13 @@ class MeshPass {
   MeshPass(const MeshPass&) = delete;
   MeshPass& operator=(const MeshPass&) = delete;
 
-  /// The greatest number that the device offers of those up to `wanted`.
+  /// Returns the largest sample count of the device up to `wanted`.
   [[nodiscard]] std::uint32_t samples_for(int wanted) const;
   /// The largest width and height of an image.
   [[nodiscard]] std::uint32_t largest_edge() const { return largest_edge_; }
   [[nodiscard]] int subpixels() const { return subpixels_; }
 
-  /// Writes the pixels of `data` into `colours`. `data.picture` says where types, trees and tables of lamps are.
+  /// Writes the pixels of `data` into `colours`. `data.picture` has the addresses of types, trees and lamp tables.
   [[nodiscard]] Status draw(MeshFrameData& data, VkExtent2D size, std::uint32_t samples, Wireframe wireframe,
                             MeshLight light, const Buffer& colours);
 

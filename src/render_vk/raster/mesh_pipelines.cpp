@@ -10,7 +10,7 @@
 namespace quoin::vulkan {
 namespace {
 
-// How triangles are drawn whose corners shaders read from memory. Viewport and scissor are set when that is recorded.
+// A pipeline whose shaders read the triangles' corners from memory. Viewport and scissor are dynamic.
 struct GraphicsPipelineInfo {
   VkRenderPass pass = VK_NULL_HANDLE;
   VkPipelineLayout layout = VK_NULL_HANDLE;
@@ -19,7 +19,7 @@ struct GraphicsPipelineInfo {
   VkPipelineColorBlendAttachmentState blend{};
   VkSampleCountFlagBits samples = VK_SAMPLE_COUNT_1_BIT;
 
-  // Filled triangles, both sides, no depth, nothing blended.
+  // Filled triangles, both sides, no depth test, no blending.
   GraphicsPipelineInfo();
 };
 
@@ -182,7 +182,7 @@ VkPipelineDepthStencilStateCreateInfo depth_of(const MeshWay& way) {
   const bool is_depth = way.mode == kDrawDepth || way.mode == kDrawGlassDepth;
   const bool writes = (way.mode == kDrawSurfaces && !is_sky && !has_depth) || is_depth;
   state.depthWriteEnable = writes ? VK_TRUE : VK_FALSE;
-  // Of equally near surfaces the first one drawn stays; edges lie on theirs; the sky is where nothing is.
+  // The first of equally near surfaces wins; edges lie on their surfaces; the sky fills empty pixels.
   state.depthCompareOp = VK_COMPARE_OP_GREATER;
   if (has_depth) state.depthCompareOp = VK_COMPARE_OP_EQUAL;
   if (is_sky || way.mode == kDrawEdgesOver) state.depthCompareOp = VK_COMPARE_OP_GREATER_OR_EQUAL;
@@ -292,7 +292,7 @@ VkResult MeshPipelines::make_pass(std::uint32_t samples, VkRenderPass& pass) con
   const bool is_resolved = samples > 1;
   constexpr VkImageLayout kColourLayout = VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL;
   constexpr VkImageLayout kDepthLayout = VK_IMAGE_LAYOUT_DEPTH_STENCIL_ATTACHMENT_OPTIMAL;
-  // The sky covers what nothing else does.
+  // The sky covers all empty pixels.
   const std::array attachments = {
       attachment(kMeshColour, samples, VK_ATTACHMENT_LOAD_OP_DONT_CARE, !is_resolved, kColourLayout),
       attachment(kMeshDepth, samples, VK_ATTACHMENT_LOAD_OP_CLEAR, false, kDepthLayout),

@@ -27,7 +27,7 @@ struct MeshWay {
   /// As ShaderMeshPush: surfaces, edges over them, edges alone, a channel of glass, or a step of the nearest glass.
   std::uint32_t mode = 0;
   bool mirrored = false;  ///< smooth: the instance turns triangles round; blocky faces are culled by their shader
-  bool ordered = false;   ///< blocky: quads of many chunks, in the order that memory says
+  bool ordered = false;   ///< blocky: quads of many chunks, in the order stored in memory
   MeshLight light = MeshLight::Plain;
   bool glass_by_rays = false;  ///< of the nearest glass: with all that is seen through it
   bool fields = false;         ///< rays may meet some

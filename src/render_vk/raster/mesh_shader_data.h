@@ -7,7 +7,7 @@
 
 namespace quoin::vulkan {
 
-// What src/render_vk/shaders/raster/mesh.glsl declares, field by field.
+// Mirrors src/render_vk/shaders/raster/mesh.glsl, field by field.
 
 struct ShaderMeshInstance {
   std::array<Vec4, 4> clip{};

@@ -23,7 +23,7 @@ struct StoredMesh {
   std::uint32_t indices = 0;
   std::uint32_t glass_indices = 0;
   VkDeviceSize first_index = 0;
-  std::vector<Quad> glass;  ///< the transparent quads, which may be put in order for each picture
+  std::vector<Quad> glass;  ///< the transparent quads, which may be sorted for each image
 
   [[nodiscard]] std::int64_t triangles() const {
     return std::int64_t{2} * opaque.back() + 2 * static_cast<std::int64_t>(glass.size()) + indices / 3;
@@ -31,7 +31,7 @@ struct StoredMesh {
   [[nodiscard]] bool has_glass() const { return !glass.empty() || glass_indices > 0; }
 };
 
-/// Whose chunks: those of a grid's voxels, or of these halved that often, or of its field.
+/// Identifies meshes: those of a grid's voxels, of its voxels halved that often, or of its field.
 struct MeshKey {
   GridHandle grid;
   int level = 0;
@@ -81,7 +81,7 @@ class MeshStore {
   struct Change {
     MeshKey key;
     IVec3 chunk{0};
-    StoredMesh mesh;  // of no size: nothing is there any more
+    StoredMesh mesh;  // of size 0: removed
   };
 
   Status put_all(std::span<const SurfaceUpdate> surfaces, int level, std::vector<Change>& changes);

@@ -36,7 +36,7 @@ class Attachment {
   VkImageView view_ = VK_NULL_HANDLE;
 };
 
-/// The images of a picture of meshes while it is drawn.
+/// The images that an image of meshes is drawn with.
 class MeshTarget {
  public:
   MeshTarget() = default;

@@ -95,7 +95,7 @@ TEST_F(VulkanMeshDetail, ImpostorsAreThoseOfTheProcessor) {
   EXPECT_LT(triangles_of(camera, with_mesh_light(options)), with);
 }
 
-// A hole is a pixel of sky whose neighbours and itself the traced model covers whole.
+// A hole is a sky pixel that the traced model covers completely, together with its neighbours.
 TEST_F(VulkanMeshDetail, SmallImpostorsHaveNoHoles) {
   using render_test::Model;
   for (const Model model : {Model::Ball, Model::Castle, Model::Terrain, Model::Comb}) {

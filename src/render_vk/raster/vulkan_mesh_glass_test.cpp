@@ -42,7 +42,7 @@ Types add_types(Scene& scene) {
           add_type(scene, {255, 220, 120, 100}, Visibility::Transparent, 0.5F)};
 }
 
-// Towards -Z, whose every ray goes straight through a pane.
+// Looks towards -Z; every ray passes straight through a pane.
 Camera straight(DVec3 position, double view_height) {
   Camera camera;
   camera.position = position;
@@ -113,7 +113,7 @@ TEST_F(VulkanMeshGlass, WhatIsSolidHidesGlassBehindIt) {
   compare_both(scene, straight({10.03, 10.02, 50}, 26), without_shadows(sized(80, 80)), "hidden_pane");
 }
 
-// Face by face, waters of any depth are not the processor's, which counts their voxels; all else is.
+// Drawn face by face, water of any depth differs from the CPU's, which counts its voxels; all other pixels match.
 TEST_F(VulkanMeshGlass, WhatIsNotSeenThroughGlassIsThatOfTheProcessor) {
   Scene scene = golden::terrain_scene();
   const golden::GoldenView& view = golden::kViews[0];

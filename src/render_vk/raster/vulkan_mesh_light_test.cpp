@@ -1,4 +1,4 @@
-// Blocky meshes look as the processor's pictures do.
+// Blocky meshes match the CPU's images.
 
 #include <cmath>
 #include <numbers>

@@ -1,4 +1,4 @@
-// Meshes in propagated light look as the processor's pictures do.
+// Meshes in propagated light match the CPU's images.
 
 #include <algorithm>
 #include <cstdlib>

@@ -69,7 +69,7 @@ vulkan::MeshImpostor impostor_of(const vulkan::ShaderFar& far, const vulkan::Dev
   impostor.near = far.near;
   impostor.faces = far.faces;
   impostor.centre = faces.centre;
-  // The corners of the largest box in the content's sphere, with room for rounding.
+  // The corners of the largest box in the content's sphere, with a rounding margin.
   impostor.radius = 1.7321 * faces.levels[0].size + 1.0;
   return impostor;
 }
@@ -211,7 +211,7 @@ bool VulkanMeshRenderer::Impl::has_glass_by_rays(const MeshPictureOptions& optio
   return options.glass_by_rays && shows_glass && store.has_glass() && scene != nullptr;
 }
 
-// The instances as a picture shows them; the meshes of halved grids are in the store then.
+// Returns the instances as drawn in an image; puts the meshes of halved grids into the store.
 Result<std::vector<vulkan::MeshInstance>> VulkanMeshRenderer::Impl::detailed(const vulkan::Placement& placement,
                                                                              Threads threads) {
   std::vector<vulkan::MeshInstance> shown_as = instances;
@@ -287,7 +287,7 @@ Result<vulkan::MeshFrameData> VulkanMeshRenderer::Impl::make_frame(const Camera&
     subject.emplace(std::move(*made));
   }
   const vulkan::Placement& placement = subject ? subject->placement() : nothing;
-  // Nothing was updated yet, or that failed: then there are no types either.
+  // Before the first update, or after a failed one, there are no types.
   if (surface_table.empty()) instances.clear();
   const auto shown_as = detailed(placement, threads);
   if (!shown_as) return shown_as.error();

@@ -194,7 +194,7 @@ std::vector<Camera> onto_walls() {
           towards({12, 70, 36}, {10, 9, 26.5}, kNarrow), towards({110, 16, 36}, {46, 15, 35}, kNarrow)};
 }
 
-// Pixels that differ by more than 4 of 255 from the marched picture's, of all views onto walls.
+// Counts pixels that differ by more than 4 of 255 from the marched image, over all views of walls.
 int different_walls(const std::vector<Image>& images, const std::vector<Image>& marched) {
   int different = 0;
   for (std::size_t view = 0; view < images.size(); ++view) {
@@ -240,7 +240,7 @@ TEST_F(VulkanMeshSeeThrough, WallsAreTheSameMarchedAndFromBlocksAndSmooth) {
   }
 }
 
-// Pixels at shores and silhouettes differ: a mesh's normals are those of its vertices.
+// Pixels at shores and silhouettes differ: a mesh interpolates the normals of its vertices.
 TEST_F(VulkanMeshSeeThrough, LakesAndBallsOfFieldsAreThoseOfTheProcessor) {
   Scene scene;
   const vulkan_test::FieldTypes types = vulkan_test::add_field_types(scene);

@@ -113,7 +113,7 @@ TEST_F(VulkanMeshShadow, GlassTintsTheSun) {
   place(scene, std::move(grid));
   RenderOptions options = with_mesh_light(sized(120, 120));
   options.light.sun = {-1, 1, 0};
-  // Only the floor behind the panes is in the picture.
+  // Only the floor behind the panes is in the image.
   const Camera camera = from_above(41, 9, 30, 36);
   compare(scene, camera, options, "tinted");
   const Image image = drawn(camera, mesh_options(options));

@@ -213,7 +213,7 @@ TEST_F(VulkanMeshShape, WireframesShowEdgesWhereTheyAre) {
 }
 
 TEST_F(VulkanMeshShape, EdgesWinOverTheirSurfaces) {
-  // A floor of unmerged faces and nothing else, so that no edge is hidden.
+  // Only a floor of unmerged faces, so that no edge is hidden.
   Scene scene;
   const VoxelType white = add_type(scene, {255, 255, 255});
   Grid grid;

@@ -1,30 +1,31 @@
 // The camera's rays, one an invocation; in view, and in the grids of instances.
 #include "picture_rays.glsl"
 
-// Where the invocation's ray crosses the picture, in pixels.
+// Returns the image position of the invocation's ray, in pixels.
 vec2 picture_point() {
   return vec2(push.corner + tile_pixel()) + push.point;
 }
 
-// How far behind where view space has its origin the point lies on its ray; what shows nothing lies nowhere.
+// Returns the distance of a point on its ray from the origin of view space; undefined for pixels without a hit.
 float t_of(Point point, vec2 at) {
   if (point.voxel.w < 0) return kInfinity;
   float ahead = placed_at(point.voxel.w).start.w - frame().view_depth;
   return ahead * length_a_depth(at) + uintBitsToFloat(point.what.w);
 }
 
-// A coordinate of the picture, in all three.
+// Returns an image coordinate, in all three components.
 Pair pixel_pair(int axis) {
   Pair sum = exact_sum(vec3(float(push.corner[axis] + tile_pixel()[axis])), vec3(push.point[axis]));
   return renewed(sum.high, sum.low + push.point_low[axis]);
 }
 
-// origin + x right + y down at the invocation's point of the picture.
+// Returns origin + x right + y down at the invocation's image position.
 Pair across(Pair origin, Pair right, Pair down) {
   return sum_of(sum_of(origin, product_of(right, pixel_pair(0))), product_of(down, pixel_pair(1)));
 }
 
-// A camera's ray in an instance's grid, as exact as in double. It starts near the grid, so that distance costs nothing.
+// A camera ray in an instance's grid, in about double precision. It starts near the grid, so that distance costs no
+// precision.
 struct ExactRay {
   Pair start;  // from start_base
   Pair direction;
@@ -56,8 +57,8 @@ bool is_before(Pair a, Pair b, int axis) {
   return a.high[axis] != b.high[axis] ? a.high[axis] < b.high[axis] : a.low[axis] < b.low[axis];
 }
 
-// Moves a ray that starts more than 64 voxels from a tree's bounds to where it enters them, as the processor does
-// before it rounds. `axis`: of the plane through which it enters; -1 where it is left as it is. False when it misses.
+// Moves a ray that starts more than 64 voxels from a tree's bounds to its entry point, as the CPU does before rounding.
+// `axis`: of the plane where it enters; -1 if it is unchanged. Returns false if the ray misses.
 bool move_to_bounds(Tree tree, Placed placed, inout ExactRay ray, out float moved_t, out int axis) {
   vec3 low = vec3(tree.low.xyz - placed.start_base.xyz);
   vec3 high = vec3(tree.high.xyz - placed.start_base.xyz);

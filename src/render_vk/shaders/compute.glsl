@@ -23,7 +23,7 @@ layout(push_constant) uniform Push {
 
 #include "tile.glsl"
 
-// Its place where the picture comes together.
+// Returns the pixel's index in the assembled image.
 uint place_of_pixel() {
   return push.base + gl_GlobalInvocationID.y * push.pitch + gl_GlobalInvocationID.x;
 }

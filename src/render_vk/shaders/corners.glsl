@@ -1,4 +1,4 @@
-// Occlusion as blocky meshes carry it, found in a tree: light/corner_light.h on the processor's side.
+// The corner occlusion of blocky meshes, found in a tree; matches light/corner_light.h on the CPU.
 
 // 3 when both sides are occluders, else how many of the three are.
 float vertex_occlusion(bool side_u, bool side_v, bool corner) {

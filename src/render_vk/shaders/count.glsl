@@ -1,4 +1,4 @@
-// Counts of a whole picture, added up in a workgroup first.
+// Counts for a whole image, summed within a workgroup first.
 shared uint shared_rays;
 shared uint shared_hits;
 shared uint shared_pending;

@@ -38,12 +38,12 @@ vec3 unit_vector(uint word) {
 
 const uint kBodies = 16;  // of glass that are kept for a pixel at a time
 
-// A sparse tree whose nodes each have 4^3 places; a node of level l spans 4^(l + 1) voxels. Level 0 is a word of
+// A sparse tree whose nodes have 4^3 children each; a node of level l spans 4^(l + 1) voxels. Level 0 is a word of
 // voxels, level 1 a brick of 16^3, level 2 a chunk.
 struct Tree {
   uvec4 root;
   ivec4 low;   // tight bounds, from the tree's origin; w: the root's level, at least 2
-  ivec4 high;  // w: nothing
+  ivec4 high;  // w: unused
 };
 struct GridTrees {
   Tree opaque;
@@ -116,7 +116,7 @@ const uint kUnlit = 1;
 const uint kGlow = 2;
 const uint kIsFar = 4;
 const uint kIsField = 8;
-const uint kIsBlended = 16;  // of a field: not of one material, but of those around, see blend_of_field
+const uint kIsBlended = 16;  // of a field: blended from the materials around, see blend_of_field
 
 uint kind_of(Point point) {
   return point.what.z & 3;
@@ -175,9 +175,9 @@ layout(buffer_reference, std430, buffer_reference_align = 16) buffer Counters {
   uint pending;
 };
 
-// Of a picture. Vectors are read as a whole: see docs/decisions/040.
+// The data of an image. Vectors are read as a whole: see docs/decisions/040.
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Frame {
-  vec4 right;  // a pixel to the right and down, and the picture's upper left corner, at a distance of 1
+  vec4 right;  // per pixel to the right and down, and the image's upper left corner, at a distance of 1
   vec4 down;
   vec4 corner;
   vec4 forward;
@@ -191,7 +191,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   vec4 sky_zenith;
   vec4 sky_horizon;
   vec4 sky_ground;
-  vec4 light;  // ambient, ambient without occlusion, what occlusion leaves of all, reach of its rays at fields
+  vec4 light;  // ambient, ambient without occlusion, light left by full occlusion, reach of its rays at fields
   vec4 ambient;  // colours: of the ambient light, of the sun's
   vec4 sun;
   vec4 level_sky;  // what light of level 15 is like, of the sky, of lamps; and what shines everywhere
@@ -236,10 +236,10 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
   float ground_begins;
   float ground_is_full;
   float view_depth;  // where view space has its origin
-  float sky_scale;   // turns the way from an orthographic picture's middle into the tangent of an angle
+  float sky_scale;   // converts the distance from an orthographic image's centre to the tangent of an angle
   float lift;
-  uint far_count;  // 0: nothing is drawn from impostors
+  uint far_count;  // 0: no impostors are drawn
   uint lamp_mask;  // of slots of bricks
   uint light_mask;  // of slots of bricks of levels
-  uvec2 paths;  // of a picture by paths: paths/path_data.glsl
+  uvec2 paths;  // for path tracing: paths/path_data.glsl
 };

@@ -52,7 +52,7 @@ void put(ivec2 pixel, float depth, uint number) {
   }
 }
 
-// The pixels that show the part: those whose pattern is from x to before y.
+// The pixels that show the part: those with a pattern number from x to before y.
 ivec2 share;
 
 bool is_shared(Far far, vec2 pixel) {

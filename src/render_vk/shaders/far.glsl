@@ -1,4 +1,4 @@
-// Impostors: the rectangles of far instances, as render/impostor/raster/raster.inl draws them on the processor.
+// Impostors: the rectangles of far instances; matches render/impostor/raster/raster.inl on the CPU.
 
 // A rectangle of a level.
 struct FarFace {
@@ -74,7 +74,7 @@ int pattern_at(ivec2 pixel, uint sample_number) {
   return int((uint(pixel.x) * 12664745u + uint(pixel.y) * 9560333u + sample_number * 10368889u) & 0xFFFFFFu);
 }
 
-// The view whose face lights a bit of a cell, by lot: 0 to 2 of those in `near`.
+// Returns the view whose face lights a bit of a cell, chosen pseudo-randomly: 0 to 2 of those in `near`.
 uint chosen_view(uvec4 near, uint number) {
   uint at = mixed(number) >> 18;
   return at < near.y ? 0 : at < near.y + near.z ? 1 : 2;

@@ -1,5 +1,5 @@
 #version 460
-// The bodies of glass before what each pixel shows.
+// Finds the glass bodies in front of each pixel's hit.
 #include "compute.glsl"
 #include "walk.glsl"
 #include "instances.glsl"

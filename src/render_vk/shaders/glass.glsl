@@ -1,5 +1,5 @@
-// Bodies of glass along a ray: light/glass.h on the processor's side. They are kept in a list, nearest first. With
-// KEEPS_BODIES there is one of kBodies for each pixel of the tile; with HOLDS_BODIES the invocation has one.
+// Glass bodies along a ray; matches light/glass.h on the CPU. They are kept in a list, nearest first. With KEEPS_BODIES
+// there is one of kBodies for each pixel of the tile; with HOLDS_BODIES the invocation has one.
 
 // ln of the share of light below which a body counts as closed.
 const float kClosed = -11.0;
@@ -48,7 +48,7 @@ void list_body(BodyList list, uint i, Body body) {
 }
 #endif
 
-// Puts a body in its place; when the list is full the furthest gives way, and is returned.
+// Inserts a body in order; if the list is full, removes and returns the farthest.
 bool insert_body(inout BodyList list, Body body, out Body dropped) {
   dropped = body;
   if (list.room == 0) return true;

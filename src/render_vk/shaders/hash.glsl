@@ -1,4 +1,4 @@
-// core/hash.h on the processor's side.
+// Matches core/hash.h on the CPU.
 
 // A well-mixed number of one.
 uint mixed(uint x) {

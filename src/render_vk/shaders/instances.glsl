@@ -25,7 +25,7 @@ vec3 visit_direction;
 vec3 visit_inverse;
 bvec3 visit_still;
 
-// Begins to list the instances whose boxes a ray in view may meet.
+// Starts listing the instances whose boxes a ray in view may meet.
 void start_visit(ViewRay ray) {
   visit_stack[0] = 0;
   visit_height = frame().placed_count > 0 ? 1 : 0;
@@ -45,7 +45,7 @@ bool may_meet(vec3 low, vec3 high, float max_t) {
   vec3 far = mix(max(a, b), vec3(kNever), visit_still);
   float enter_t = max(max(near.x, near.y), max(near.z, 0.0));
   float exit_t = min(min(far.x, far.y), min(far.z, max_t));
-  // The boxes have room for rounding; their distances need it too.
+  // The boxes include a rounding margin; their distances need one too.
   return enter_t <= exit_t * 1.00001 + 1e-5;
 }
 

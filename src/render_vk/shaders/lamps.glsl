@@ -1,4 +1,4 @@
-// What lights others: light/lamp_table.h on the processor's side.
+// Lamps; matches light/lamp_table.h on the CPU.
 #include "hash.glsl"
 
 struct Lamp {
@@ -35,8 +35,8 @@ uvec2 lamps_at(ivec3 brick, int placed) {
   }
 }
 
-// The light of a white surface, if nothing is in between; where there is some, also the direction towards the lamp and
-// how far away that begins.
+// Returns the light on a white surface if unblocked. If it is not 0, also sets the direction towards the lamp and the
+// distance of its surface.
 vec3 lamp_light(Lamp lamp, vec3 to_lamp, vec3 normal, out vec3 direction, out float reach) {
   float squared = dot(to_lamp, to_lamp);
   float far = sqrt(squared);

@@ -1,4 +1,4 @@
-// Propagated light at surfaces: quoin/light/light_colour.h and light/surface/levels.h on the processor's side.
+// Propagated light at surfaces; matches quoin/light/light_colour.h and light/surface/levels.h on the CPU.
 
 struct LightBrick {
   ivec4 key;   // voxel coordinates / 8; w: the grid
@@ -124,7 +124,7 @@ bool levels_around(ivec3 base, vec3 point, int grid, out vec4 mean) {
   return true;
 }
 
-// Before a field's surface, whose samples lie 2^level apart.
+// Returns the light levels in front of a field's surface with samples 2^level apart.
 vec4 levels_before(ivec3 cell, vec3 inside, vec3 normal, int level, int grid) {
   float edge = float(1 << level);
   vec4 mean;

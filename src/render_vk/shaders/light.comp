@@ -89,10 +89,10 @@ GridRay ray_from(Point point, Placed placed) {
   return ray;
 }
 
-// The rays of a surface point, by numbers: -1 is that to the sun, then come those of occlusion, then those to lamps.
+// The rays of a surface point, by number: -1 is the sun's ray, then the occlusion rays, then the lamps' rays.
 struct LightRays {
   vec3 normal;  // in the grid
-  uint face;    // directions about a field's surface are those of an upper face, turned with it
+  uint face;    // directions at a field's surface are an upper face's, rotated with it
   bool is_field;
   float cosine;  // of the sun
   int first;
@@ -147,7 +147,7 @@ bool aim(int number, LightRays rays, Placed placed, inout GridRay ray, out float
   return true;
 }
 
-// How open a surface point is, of whose rays of occlusion so many met nothing.
+// Returns the openness of a surface point with `open` unblocked occlusion rays.
 float openness_of(Point point, Placed placed, int open) {
   if ((point.what.z & kIsFar) != 0) return openness_of_far(point);
   if (has(kOcclusionVertex) && !is_of_field(point)) {

@@ -1,5 +1,4 @@
-// What types look like, and the reference model of light: light/surfaces.h and light/lighting.h on the processor's
-// side.
+// The surfaces of types, and the reference lighting model; matches light/surfaces.h and light/lighting.h on the CPU.
 
 struct Surface {
   vec3 colour;
@@ -38,7 +37,7 @@ float own_share(Surface surface, float voxels, bool has_own_length) {
   return length > 0.0 ? 1.0 - exp(surface.log_clarity * length) : 0.0;
 }
 
-// The sun's light where nothing is in between. `diffuse`: its share of a point, with the sun's brightness.
+// Returns the unblocked sunlight. `diffuse`: the point's share, times the sun's brightness.
 vec3 sunlight_of(float diffuse) {
   vec4 colour = frame().sun;
   return diffuse * colour.xyz;
@@ -48,7 +47,7 @@ bool has_occlusion() {
   return has(kOcclusionRays) || has(kOcclusionVertex);
 }
 
-// What occlusion leaves of all light of a point, 0 to 1 open.
+// Returns the share of all light that occlusion leaves at a point, 0 to 1 open.
 float left_by_occlusion(float openness) {
   vec4 share = frame().light;
   return share.z + (1.0 - share.z) * openness;

@@ -9,7 +9,7 @@ struct Pair {
   vec3 low;
 };
 
-// Of a sum whose first part is the larger.
+// Normalises a sum whose first part is the larger.
 Pair renewed(vec3 high, vec3 low) {
   precise vec3 sum = high + low;
   precise vec3 rest = low - (sum - high);

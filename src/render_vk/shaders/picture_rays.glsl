@@ -1,4 +1,4 @@
-// The camera's rays in view, by where they cross the picture, in pixels.
+// The camera's rays in view space, by image position in pixels.
 
 vec3 picture_vector(vec2 point) {
   Frame f = frame();

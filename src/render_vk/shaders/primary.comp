@@ -41,7 +41,7 @@ vec3 place_on_surfel(ExactRay ray, Pair from_voxel, uint side, vec3 shape, vec2 
   return near + rest * d;
 }
 
-// The impostor of a rectangle, by its number among those of all.
+// Returns the impostor of a rectangle, by its number among all impostors' rectangles.
 Far far_with(uint number) {
   Fars fars = Fars(frame().fars);
   uint low = 0;
@@ -57,7 +57,7 @@ Far far_with(uint number) {
   return fars.at[low];
 }
 
-// The level of a rectangle, by its number among those of the impostor's parts, which becomes that in its level.
+// Returns the level of a rectangle, by its number among the impostor's parts; `index` becomes the number in its level.
 FarLevel level_with(Far far, inout uint index) {
   if (index < far.level.faces.z) return far.level;
   index -= far.level.faces.z;
@@ -66,7 +66,7 @@ FarLevel level_with(Far far, inout uint index) {
   return far.unseen;
 }
 
-// How far along a ray the plane of a rectangle is. `voxel`: from whose corner the ray's start is counted.
+// Returns the distance along a ray to a rectangle's plane. `voxel`: its corner is the origin of the ray's start.
 Pair distance_to_rectangle(ExactRay ray, Pair from_voxel, Far far, FarFace rectangle, ivec3 voxel) {
   int axis = int(rectangle.what.z >> 1);
   float centre = far.centre[axis] - float(voxel[axis]);
@@ -75,8 +75,8 @@ Pair distance_to_rectangle(ExactRay ray, Pair from_voxel, Far far, FarFace recta
   return quotient_of(from_plane, component(ray.direction, axis));
 }
 
-// Puts the impostor that shows at the pixel into `point`. Returns the start of the instance's ray, and how far behind
-// it the rectangle lies.
+// Sets `point` to the impostor visible at the pixel. Returns the start of the instance's ray, and the rectangle's
+// distance from it.
 bool find_far(Pair direction, float scale, inout Point point, out float depth, out float nearest) {
   uint number = FarPixels(frame().far_numbers).at[slot_of_pixel()];
   if (number == kNoFace) return false;
@@ -126,7 +126,7 @@ bool find_far(Pair direction, float scale, inout Point point, out float depth, o
     point.what = uvec4(what & 0xFFFF, normal, kind | light << 8, floatBitsToUint(nearest));
     return true;
   }
-  // Light puts it onto the face, which may lie elsewhere in the rectangle's cell.
+  // Lighting moves it onto the face, which may lie elsewhere in the rectangle's cell.
   point.inside.xyz = at;
   point.what = uvec4(what & 0xFFFF, side, kSurface | kIsFar | light << 8, floatBitsToUint(nearest));
   return true;

@@ -51,7 +51,8 @@ void meet_surfaces(Body from, bool has_from, Body to, bool has_to, inout State s
   }
 }
 
-// Whether something opaque leaves no air behind a body. `opaque_t`: how far that is; kInfinity where there is nothing.
+// Returns true if an opaque surface directly follows a body, without air. `opaque_t`: its distance; kInfinity without
+// one.
 bool lies_on_opaque(Body body, float opaque_t) {
   float voxel_size = placed_at(int(body.what.w >> 3)).ref_inside.w;
   return opaque_t <= body.lengths.y + frame().lift * voxel_size;
@@ -64,7 +65,7 @@ struct Passage {
   Body body;      // the latest body
   bool has_body;
   bool is_entered;  // the first was entered before
-  bool is_last;     // there was room for all; else it stops before the last one, which may go on among the others
+  bool is_last;     // all bodies fitted; otherwise it stops before the last body, which may continue in the next round
 };
 
 Passage passage_through(BodyList list, bool is_entered) {

@@ -1,4 +1,4 @@
-// The backdrop: light/daylight.h on the processor's side.
+// The backdrop; matches light/daylight.h on the CPU.
 
 struct Sky {
   vec3 zenith;
@@ -18,7 +18,7 @@ vec3 sky_colour(Sky sky, float up) {
   float s = clamp((sky.ground_begins - y) / (sky.ground_begins - sky.ground_is_full), 0.0, 1.0);
   return sky.horizon + (sky.ground - sky.horizon) * (s * s * (3.0 - 2.0 * s));
 }
-// Of the picture.
+// Returns the sky's image colour at a height.
 vec3 sky_colour(float up) {
   Frame f = frame();
   return sky_colour(Sky(f.sky_zenith.xyz, f.sky_horizon.xyz, f.sky_ground.xyz, f.ground_begins, f.ground_is_full), up);

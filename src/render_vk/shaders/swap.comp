@@ -1,5 +1,5 @@
 #version 460
-// A picture's words with red and blue in each other's places, for images that want blue first.
+// Swaps red and blue in an image's words, for images with blue first.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 

@@ -1,10 +1,10 @@
-// One ray's way through one tree, in a single loop: an iteration either goes down to the place of the node in which the
-// ray stands, or over the largest aligned block around it that is known to be empty, and up to the lowest ancestor
-// that holds both ends of that step.
+// Walks one ray through one tree, in a single loop. An iteration either descends to the child at the ray's position, or
+// steps over the largest aligned block around it that is known to be empty, and ascends to the lowest ancestor that
+// contains both ends of that step.
 //
-// The plane P of an axis is crossed at t = (P - origin) * (1 / direction), in single precision, and crossings are
-// ordered by t, at ties by axis: the definition of docs/decisions/011, so that the processor's kernels meet the same
-// voxels. `origin` is relative to a multiple of 64 voxels next to the ray's start.
+// A ray crosses the plane P of an axis at t = (P - origin) * (1 / direction), in single precision. Crossings are
+// ordered by t, ties by axis, as defined in docs/decisions/011, so that the CPU kernels meet the same voxels. `origin`
+// is relative to a multiple of 64 voxels near the ray's start.
 
 // Where a voxel lies in the node of a level that holds it.
 uint index_in(ivec3 voxel, int level) {
@@ -60,7 +60,7 @@ ivec3 coordinates_after(float t, int axis, ivec3 low, ivec3 high) {
   vec3 near = 0.01 + abs(position) * 1e-6;
   bvec3 is_close = either(lessThan(past, near), greaterThan(past, 1.0 - near));
   bvec3 is_other = notEqual(ivec3(0, 1, 2), ivec3(axis));
-  // The last clamp is for numbers beyond 2^24, which rounding moves by more than one.
+  // The last clamp handles numbers beyond 2^24, where rounding can move them by more than one.
   if (!any(both(is_close, is_other))) return clamp(ivec3(at), low, high);
   vec3 ahead = mix(at, at + 1.0, ray_forward);
   vec3 behind = mix(at + 1.0, at, ray_forward);
@@ -160,7 +160,7 @@ bool leave_block(int shift, float max_t) {
   return true;
 }
 
-// Goes on, from where the walk stands, to the first occupied voxel; false when there is none up to max_t.
+// Continues from the walk's position to the first occupied voxel; returns false if there is none up to max_t.
 bool find_voxel(float max_t) {
   for (;;) {
     uint index = index_in(walk_voxel, walk_level);
@@ -232,8 +232,8 @@ bool holds(Tree tree, ivec3 voxel) {
   }
 }
 
-// Fields of densities. Their trees hold the cells that touch the solid; in a cell the field along a ray is a cubic,
-// whose first root is found as trace/kernel/cell.inl does on the processor's side, here in single precision.
+// Density fields. Their trees hold the cells that touch the solid. In a cell the field along a ray is a cubic, whose
+// first root is found as in trace/kernel/cell.inl on the CPU, here in single precision.
 
 const int kBlockEdge = 7;
 
@@ -250,7 +250,7 @@ float sample_of(Numbers block, ivec3 at) {
   return (i & 1) == 0 ? two.x : two.y;
 }
 
-// Those around a cell of a brick, whose chunk has that record. False where all of them are solid.
+// Gets the densities around a cell of a brick in a chunk with that record. Returns false if all of them are solid.
 bool block_in(uvec4 brick, uvec2 record, ivec3 cell, out Numbers block) {
   uint child = child_of(brick, index_in(cell, 1));
   uint words = bitCount(brick.x) + bitCount(brick.y);
@@ -259,7 +259,7 @@ bool block_in(uvec4 brick, uvec2 record, ivec3 cell, out Numbers block) {
   return from != 0;
 }
 
-// Those of the cell that was found. False where all of them are solid, as those around it are.
+// Gets the densities of the cell found. Returns false if all of them are solid, like their neighbours.
 bool block_found(out Numbers block) {
   return walk_level == 0 && block_in(walk_stack[1], record_found(), walk_voxel, block);
 }
@@ -474,7 +474,7 @@ uint material_found(Tree field, vec3 inside) {
   }
   ivec3 at = walk_voxel + nearest;
   if (((at ^ walk_voxel) & ~63) == ivec3(0)) return type_in(record_found(), at & 63);
-  // Of the next chunk, whose own cell there touches the sample.
+  // The next chunk owns the sample: its cell there touches it.
   return type_at(field, at);
 }
 

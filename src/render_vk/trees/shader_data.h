@@ -10,7 +10,7 @@
 
 namespace quoin::vulkan {
 
-// What src/render_vk/shaders/data.glsl declares, field by field.
+// Mirrors src/render_vk/shaders/data.glsl, field by field.
 
 using Vec4 = glm::vec4;
 using IVec4 = glm::ivec4;
@@ -24,12 +24,12 @@ constexpr std::size_t kFieldBlockWords = 172;  ///< two halves a word
 constexpr int kGlassBlockEdge = 5;
 constexpr std::size_t kGlassBlockWords = 63;      ///< two numbers a word
 constexpr std::uint32_t kOpaqueBody = 0xFFFF;     ///< no type's number
-constexpr std::uint32_t kIsUniform = 0x80000000;  ///< what follows is a type
+constexpr std::uint32_t kIsUniform = 0x80000000;  ///< the other bits are a type
 
 /// A node of a sparse tree with 4^3 places a node; see data.glsl.
 struct Node {
   std::uint64_t mask = 0;      ///< bit x + 4 y + 16 z: that place holds something
-  std::uint64_t children = 0;  ///< the address of the first of those; odd: all is full and there are none
+  std::uint64_t children = 0;  ///< the address of the first child; odd: the node is full and has none
   bool operator==(const Node&) const = default;
 };
 
@@ -66,7 +66,7 @@ struct ShaderPlaced {
   IVec4 origin{0};
 };
 
-// What src/render_vk/shaders/lamps.glsl declares; bricks are LampTable::Brick.
+// Mirrors src/render_vk/shaders/lamps.glsl; bricks are LampTable::Brick.
 struct ShaderLamp {
   Vec4 position{0.0F};
   std::array<Vec4, 3> axes{};
@@ -261,7 +261,7 @@ struct ShaderPush {
   std::uint32_t pad = 0;
 };
 
-// What src/render_vk/shaders/swap.comp declares.
+// Mirrors src/render_vk/shaders/swap.comp.
 struct SwapPush {
   std::uint64_t from = 0;
   std::uint64_t to = 0;

@@ -14,7 +14,7 @@ namespace quoin::vulkan {
 struct Place {
   std::size_t block = 0;
   std::uint64_t offset = 0;
-  std::uint64_t size = 0;  ///< 0: nothing
+  std::uint64_t size = 0;  ///< 0: none
   std::uint64_t address = 0;
 };
 
@@ -33,7 +33,7 @@ class ShaderMemory {
   /// Leaves `place` empty. Requires: no shader that reads it runs.
   virtual void release(Place& place) = 0;
 
-  /// Puts bytes in place, before what `flush` is followed by.
+  /// Queues bytes for the next `flush`.
   [[nodiscard]] virtual Status write(const Place& place, std::span<const std::byte> bytes,
                                      std::uint64_t offset = 0) = 0;
   [[nodiscard]] virtual Status flush() = 0;

@@ -68,7 +68,7 @@ class FieldSamples {
   std::vector<Half> halves_;
 };
 
-// What bodies the samples of a chunk belong to, and those next to it: 0 for air, kOpaqueBody, or a transparent type.
+// The bodies of a chunk's samples and of their neighbours: 0 for air, kOpaqueBody, or a transparent type.
 class FieldBodies {
  public:
   FieldBodies(const DensityGlass& glass, IVec3 chunk)

@@ -1,6 +1,6 @@
 // The inputs and outputs of path tracing. src/render_vk/paths/path_data.h has the same layout for the CPU.
 
-// Of a picture by paths: PathOptions and tables. Addresses of tables that there are not are 0.
+// The data of a path-traced image: PathOptions and tables. Addresses of absent tables are 0.
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PathFrame {
   vec4 to_sun;    // w: one less the cosine of half its disc's angle; 0: it has none
   vec4 sunlight;  // irradiance of a surface that faces it; w: 1 if the camera sees its disc
@@ -22,8 +22,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Pa
   uvec2 face_keys;    // ivec4
   uvec2 face_lamps;   // int
   uvec2 states;       // PathState, of a tile
-  uvec2 sums;         // of the picture: kSums or kSumsWithLayers vectors a pixel
-  uvec2 parts;        // kParts of a pixel; 0: not wanted
+  uvec2 sums;         // of the image: kSums or kSumsWithLayers vectors per pixel
+  uvec2 parts;        // kParts per pixel; 0: not requested
   int sky_model;
   int sky_width;
   int sky_height;
@@ -83,15 +83,15 @@ struct PathState {
   vec4 radiance;
   vec4 normal;      // in the world, where it was last scattered
   uvec4 counts;     // sample, dimension, bounces | scatterings << 16, flags
-  uvec4 more;       // the type of glass within, the part of the pixel's surfaces; zw: nothing
+  uvec4 more;       // the type of glass within, the part of the pixel's surfaces; zw: unused
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer PathStates {
   PathState at[];
 };
 
 const uint kIsSeen = 1;    // by the camera, itself or by glass and mirrors
-const uint kIsFirst = 2;   // nothing was met yet
-const uint kIsCaught = 4;  // the ground only catches shadows where it went
+const uint kIsFirst = 2;   // no surface has been hit yet
+const uint kIsCaught = 4;  // it passed ground that only catches shadows
 const uint kIsNoted = 8;   // in the layers
 const uint kIsAlive = 16;
 
@@ -129,8 +129,8 @@ layout(push_constant) uniform Push {
   ivec2 size;    // of the tile
   uint first;    // sample
   uint count;    // of samples
-  uint begins;   // 1: paths begin, and are not gone on with
-  uint width;    // of the picture
+  uint begins;   // 1: new paths begin; 0: paths continue
+  uint width;    // of the image
 } push;
 
 #include "tile.glsl"

@@ -1,5 +1,5 @@
-// Glass and clouds on a path's way: render/path/path_tile_media.cpp on the processor's side. Included by paths.comp
-// once it knows of paths, vertices and rays.
+// Glass and clouds along a path; matches render/path/path_tile_media.cpp on the CPU. Included by paths.comp after the
+// declarations of paths, vertices and rays.
 
 // Returns the reflectance of a surface between two media, and the cosine of the transmitted direction.
 vec2 refraction(float cosine, float eta) {
@@ -36,7 +36,7 @@ vec3 normal_entered(Body body) {
 struct Glass {
   uint outcome;
   Body body;
-  // kTurnsAtGlass: where, and on which side of the surface the path goes on.
+  // kTurnsAtGlass: the position, and the side of the surface where the path continues.
   int instance;
   float t;
   vec3 direction;
@@ -92,8 +92,8 @@ void scatter_in(Body body, float u, inout Glass glass) {
   glass.outcome = kInAir;
 }
 
-// A path that goes straight through a body: light from surface to surface, and all through clouds. By chance it meets
-// what covers the glass.
+// Passes straight through a body: light between surfaces, and all paths in clouds. The opaque share of the glass stops
+// it at random.
 void pass_through(Body body, inout float u, inout Glass glass) {
   Surface surface = surface_of(body.what.x);
   bool is_cloud = surface.scattering > 0.0;

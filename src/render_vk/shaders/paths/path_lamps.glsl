@@ -1,4 +1,4 @@
-// Lamps of a picture by paths: render/path/lamps/path_lamps.h and light_tree.h on the processor's side.
+// Lamps in path tracing; matches render/path/lamps/path_lamps.h and light_tree.h on the CPU.
 
 struct LampSample {
   vec3 direction;

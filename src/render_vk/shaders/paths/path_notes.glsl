@@ -1,5 +1,5 @@
-// What paths tell the denoiser of surfaces, and layers of a picture: render/path/denoise.h on the processor's side.
-// Included by paths.comp once it knows of paths and vertices.
+// The denoiser's surface data, and an image's layers; matches render/path/denoise.h on the CPU. Included by paths.comp
+// after the declarations of paths and vertices.
 
 bool wants_parts() {
   return path_frame().parts != uvec2(0);

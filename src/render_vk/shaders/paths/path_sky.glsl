@@ -1,4 +1,4 @@
-// The sun and the sky of a picture by paths: render/path/sky_light.h on the processor's side.
+// The sun and the sky in path tracing; matches render/path/sky_light.h on the CPU.
 
 // Light from infinitely far away.
 struct SkySample {
@@ -50,7 +50,7 @@ vec2 environment_place(vec3 direction) {
   return vec2(turns * float(path_frame().sky_width), down * float(path_frame().sky_height));
 }
 
-// `direction`: in the environment's picture.
+// `direction`: in the environment image.
 vec3 environment_at(vec3 direction) {
   int width = path_frame().sky_width;
   int height = path_frame().sky_height;

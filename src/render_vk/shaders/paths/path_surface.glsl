@@ -1,5 +1,4 @@
-// What types look like by paths, and how they scatter light: light/surfaces.h and render/path/scatter.h on the
-// processor's side.
+// Path tracing materials and their scattering; matches light/surfaces.h and render/path/scatter.h on the CPU.
 #define HAS_CLOUDS
 
 struct Surface {
@@ -41,7 +40,7 @@ vec3 passed_by(Surface surface, float voxels, bool has_own_length) {
 
 vec3 tint_of(Surface surface, float voxels) {
   if (!(voxels > 0.0)) return vec3(1.0);
-  // Glass that covers all lets nothing through: the difference of infinities is not a number.
+  // Glass with full coverage transmits no light: the difference of infinities would be NaN.
   bool has_clarity = surface.log_clarity > -kNever;
   return has_clarity ? exponential((surface.log_transmittance - surface.log_clarity) * voxels) : vec3(1.0);
 }
@@ -179,7 +178,7 @@ vec4 evaluate(Scatter scatter, vec3 inward) {
   return both;
 }
 
-// A direction into which light is scattered; `weight` 0: nothing comes from there.
+// A scattered direction; `weight` 0: no light arrives from there.
 struct Scattered {
   vec3 direction;
   vec3 weight;

@@ -39,7 +39,7 @@ const uint kOfFog = 0x40000000u;
 const uint kOfFade = 0x50000000u;
 
 // The outcome of a step.
-const uint kGoesOn = 0;  // nothing was met yet
+const uint kGoesOn = 0;  // no surface has been hit yet
 const uint kTurns = 1;   // the path has a next ray
 const uint kScatters = 2;
 const uint kEnds = 3;
@@ -248,7 +248,7 @@ void set_random() {
   random = Random(mixed(place ^ path_frame().seed * 0x9E3779B9u), path.counts.x);
 }
 
-// A camera's path's first ray, from its point of the picture: it begins where view space has its origin.
+// Returns the image position of a path's first camera ray, which begins at the origin of view space.
 vec2 point_of_path() {
   return vec2(push.corner + tile_pixel()) + random_pair(random, 0);
 }
@@ -309,7 +309,7 @@ void leave(vec3 origin, vec3 direction) {
   note_depth(kInfinity);
 }
 
-// ---- what paths meet ----
+// ---- hits of paths ----
 
 void add_emitted(vec3 emitted, int lamp, vec3 origin, float distance) {
   if (is_black(emitted)) return;
@@ -331,7 +331,7 @@ Surface surface_met(Hit hit) {
   return blend_of_field(field, hit.voxel.xyz, hit.inside, hit.type);
 }
 
-// Puts the vertex on a surface of an instance, a little before it.
+// Places the vertex slightly in front of an instance's surface.
 void put_on_surface(ivec4 voxel, vec3 inside, vec3 normal_in_grid) {
   Placed placed = placed_at(voxel.w);
   vertex.voxel = voxel;
@@ -443,7 +443,7 @@ void note_behind(Hit hit, float until) {
 
 // ---- light ----
 
-// Asks for light that reaches the vertex if nothing is in between.
+// Requests a shadow ray for light that reaches the vertex if unblocked.
 void ask(vec3 direction, float max_t, vec3 light) {
   if (is_black(light)) return;
   if (ground_at(vertex.in_view, direction, 0.0) < max_t) return;
@@ -467,7 +467,7 @@ bool goes_on(bool in_medium) {
   return true;
 }
 
-// Lights the vertex, and sends the path on. Returns whether it goes on.
+// Lights the vertex, and scatters the path. Returns true if it continues.
 bool shade() {
   bool in_medium = vertex.is_medium;
   int left = in_medium ? path_frame().max_scatterings - int(scatterings()) : path_frame().max_bounces - int(bounces());
@@ -476,7 +476,7 @@ bool shade() {
   vec3 normal = vertex.normal;
   if (!in_medium) {
     float facing = -dot(normal, direction);
-    // A smooth normal may look away from who sees the surface.
+    // A smooth normal may point away from the viewer.
     if (facing < 1e-3) normal = normalize(normal - direction * (1e-3 - facing));
   }
   Axes axes = axes_about(in_medium ? direction : normal);
@@ -559,7 +559,8 @@ uint meet(Hit hit, Glass glass, ViewRay ray, float until) {
   return kEnds;
 }
 
-// One step: the path's own ray, then those to light. One loop over all of them, for the reason that rays.glsl gives.
+// Takes one step: traces the path's own ray, then its shadow rays. One loop over all of them; rays.glsl gives the
+// reason.
 void step_path() {
   request_count = 0;
   bool goes_on_after = false;

@@ -2,7 +2,7 @@
 // A corner of a quad of a blocky mesh: eight bytes of mesh/quad.h are read, the rest is made here.
 #include "quad.glsl"
 
-// The quads are those of many chunks, in the order that memory says, rather than one chunk's.
+// true: quads of many chunks, in the order stored in memory; false: one chunk's quads.
 layout(constant_id = 0) const bool kIsOrdered = false;
 
 void main() {

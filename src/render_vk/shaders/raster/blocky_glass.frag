@@ -31,7 +31,7 @@ LitPoint point_of_body(Body body) {
   return point_of_body(body, placed, face_normal(placed, face), diffuse);
 }
 
-// The body of the fragment begins in its face; those of other instances in which the ray starts began before.
+// Adds the fragment's body, which begins in its face; bodies of other instances around the ray's start began earlier.
 void enter_first(inout BodyList list) {
   for (uint i = 0; i < list.count; ++i) {
     Body body = listed_body(list, i);
@@ -45,6 +45,6 @@ void enter_first(inout BodyList list) {
 void main() {
   const float kWithin = 1e-4;
   if (is_beyond(what.x)) discard;
-  // Vertices make no colours where light is traced: theirs is 0, and read so that nothing they write is left unread.
+  // With traced light vertices output the colour 0; it is read so that no output is unused.
   pixel = colour + seen_from(mesh_frame().instances[what.y].home.w, base.xyz, before_face(what.x, -kWithin));
 }

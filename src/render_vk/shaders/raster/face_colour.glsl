@@ -3,7 +3,7 @@
 #include "faces.glsl"
 #include "lit.glsl"
 
-// The sun's light on a face of an instance, if nothing is in between.
+// Returns the unblocked sunlight on a face of an instance.
 float diffuse_of(uint face, uint instance) {
   vec4 diffuse = mesh_frame().instances[instance].diffuse[face >> 2];
   return diffuse[face & 3];

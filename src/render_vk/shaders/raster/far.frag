@@ -30,7 +30,7 @@ bool is_of_other_level() {
   return (pattern_at(ivec2(gl_FragCoord.xy), 0) < coarser) != is_coarser;
 }
 
-// Follows the ray through the cell, and puts the face that lights the bit which it meets in place of the corner's.
+// Follows the ray through the cell; replaces the corner's face by the face that lights the first bit hit.
 bool find_face() {
   MeshFrame f = mesh_frame();
   bool is_coarser = (push.numbers >> 28 & 1) != 0;

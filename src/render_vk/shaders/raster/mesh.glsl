@@ -40,7 +40,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Me
   MeshDraw at[];
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer MeshFrame {
-  uvec2 frame;  // of the picture, as other pictures have it
+  uvec2 frame;  // of the image, shared with marched images
   uvec2 draws;
   uvec2 order;  // draw and quad indices of the transparent quads, in drawing order
   uvec2 pad;
@@ -57,7 +57,8 @@ layout(push_constant) uniform Push {
   uvec2 frame;
   uvec2 data;       // of the chunk, or of the impostor's level
   uvec2 far_faces;  // of an impostor
-  float room;       // of the instance; the sky's: turns the way from the picture's middle into the tangent of an angle
+  float room;       // of the instance; the sky's: converts the distance from the image's centre to the tangent of an
+                    // angle
   uint numbers;     // bits 0-3: draw mode; for an impostor 4-27: share of pixels that use the coarser level, 28: 1 if
                     // this is that level, 29: 1 if it has cells
 } push;

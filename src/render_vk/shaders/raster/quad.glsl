@@ -30,8 +30,8 @@ struct Seen {
   float room;
 };
 
-// Puts a face's corner, at `point`, in the picture, and says by how much the face was widened there; false where one
-// cannot see the face.
+// Projects a face's corner at `point`, and returns the margin that the face was widened by there. Returns false if the
+// face is not visible.
 bool put_corner(Seen seen, uint face, vec3 point, bool is_east, bool is_north, out vec3 widened) {
   widened = vec3(0.0);
   int axis = axis_of(face);

@@ -1,5 +1,5 @@
 #version 460
-// One triangle over the whole picture, behind everything.
+// One triangle over the whole image, behind everything.
 #include "mesh.glsl"
 
 layout(location = 0) flat out vec4 zenith;  // w: where the ground begins

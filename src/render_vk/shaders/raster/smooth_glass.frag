@@ -17,8 +17,8 @@ const bool kHasGlass = true;
 
 layout(location = 0) out vec4 pixel;
 
-// Outwards at a point of a grid's surface, in its tree's coordinates from `base`: of all voxels, blurred by quadratic
-// splines; unit, or 0 where nothing is on one side rather than on the other.
+// Returns the outward normal at a point of a grid's surface, in its tree's coordinates from `base`: from all voxels,
+// blurred by quadratic splines. Unit, or 0 if both sides are equal.
 vec3 blurred_normal(GridTrees trees, ivec3 base, vec3 point) {
   vec3 whole = floor(point);
   vec3 off = point - whole - 0.5;

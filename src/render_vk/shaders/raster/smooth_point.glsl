@@ -6,8 +6,8 @@ layout(location = 2) centroid in vec3 emitted;
 layout(location = 3) centroid in vec3 place;
 layout(location = 4) flat in ivec4 base;
 
-// The surface lies up to most of a voxel below the corners of the voxels that it is of; what would be shadows of these
-// on it begins past them. Voxels.
+// Voxels. The surface lies up to almost one voxel below the corners of its voxels; rays start above them, so that these
+// voxels cast no shadow on it.
 const float kLift = 1.0;
 
 // Of the fragment; in its grid, and in the world.
