@@ -9,8 +9,8 @@
 //
 // The ray is mirrored to go forward along every axis, and its places are relative to the corner of its brick. On an
 // axis that is not mirrored, places 0 to 15 are in the brick and 16 to 31 in the next one. On a mirrored axis, -16 to
-// -1 (in five bits 16 to 31) are in the brick and 0 to 15 in the next one. Three tables spread the places into brick
-// (of eight), half word and bit.
+// -1 (in five bits 16 to 31) are in the brick and 0 to 15 in the next one. Three tables spread the places into the
+// brick (one of eight), half word and bit.
 
 #pragma once
 
