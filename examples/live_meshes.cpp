@@ -1,5 +1,5 @@
-// Meshes that follow a world while it is edited: workers mesh snapshots, so the game's own thread never waits. A crater
-// field is blown into a plain, a blast a frame: OUT.png, or craters.png, shows the world at the end.
+// Meshes that follow the edits of a world. Workers mesh snapshots, so the game's own thread never waits. The example
+// blasts one crater per frame into a plain. OUT.png (default craters.png) shows the world at the end.
 
 #include <cstdio>
 #include <map>
@@ -30,12 +30,12 @@ quoin::Result<quoin::GridHandle> add_plain(quoin::Scene& scene) {
   return handle;
 }
 
-// What a renderer would hold: here only how many triangles there are.
+// The meshes that a renderer would hold; this example only counts their triangles.
 class Shown {
  public:
   void apply(const std::vector<quoin::SurfaceUpdate>& updates) {
     for (const quoin::SurfaceUpdate& update : updates) {
-      surfaces_[{update.chunk.x, update.chunk.y, update.chunk.z}] = update.surface;  // null: nothing is seen there
+      surfaces_[{update.chunk.x, update.chunk.y, update.chunk.z}] = update.surface;  // null if the chunk has no surface
     }
   }
   [[nodiscard]] std::int64_t triangles() const {
@@ -66,7 +66,7 @@ int main(int argc, char** argv) {
   quoin::Scene scene;
   const auto plain = add_plain(scene);
   if (!plain) return 1;
-  const quoin::DVec3 eye{128.0, 60.0, 128.0};  // chunks near to it come first
+  const quoin::DVec3 eye{128.0, 60.0, 128.0};  // near chunks are meshed first
 
   quoin::LiveMeshes meshes{quoin::LiveMeshOptions{}};
   Shown shown;
@@ -75,8 +75,8 @@ int main(int argc, char** argv) {
     random = random * 1'664'525U + 1'013'904'223U;
     const quoin::DVec3 blast{static_cast<double>(random >> 24), 18.0, static_cast<double>(random >> 16 & 255)};
     scene.edit(*plain).grid.fill_sphere(blast, 5.0 + frame % 9, quoin::kAir);
-    meshes.update(scene, eye);   // takes over what was edited; the cost is that of the change
-    shown.apply(meshes.take());  // what workers have finished, to be uploaded
+    meshes.update(scene, eye);   // follows the edits; the cost depends on the changes only
+    shown.apply(meshes.take());  // uploads the meshes that the workers have finished
   }
   meshes.finish(scene, eye);
   shown.apply(meshes.take());
