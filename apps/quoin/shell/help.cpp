@@ -25,8 +25,9 @@ std::string group_of(const CLI::Option& option) {
   return option.get_group() == "Options" ? heading::kGeneral : option.get_group();
 }
 
-/// Words in lines of at most kWidth columns. The first line starts at `column`, the others after `indent` spaces.
-std::string wrapped(const std::string& text, std::size_t column, std::size_t indent) {
+/// Wraps words to kWidth columns. The first line starts in column `indent`; the others get that many spaces.
+std::string wrapped(const std::string& text, std::size_t indent) {
+  std::size_t column = indent;
   std::istringstream words(text);
   std::string out;
   std::string word;
@@ -50,7 +51,7 @@ std::string entry(const std::string& name, const std::string& description) {
   std::string line = "  " + name;
   if (description.empty()) return line + "\n";
   line += line.size() + 2 > kIndent ? "\n" + std::string(kIndent, ' ') : std::string(kIndent - line.size(), ' ');
-  return line + wrapped(description, kIndent, kIndent) + "\n";
+  return line + wrapped(description, kIndent) + "\n";
 }
 
 /// "-o,--output FILE" from an option; without the choices and ranges that CLI11 appends to the type.
@@ -77,7 +78,7 @@ class HelpFormatter : public CLI::FormatterBase {
       if (line.starts_with(kExample)) {
         examples.push_back(line.substr(kExample.size()));
       } else {
-        notes += wrapped(line, 0, 0) + "\n";
+        notes += wrapped(line, 0) + "\n";
       }
     }
     std::string out = app->get_description() + "\n\nUsage: " + (name.empty() ? app->get_name() : name);
@@ -137,7 +138,7 @@ class HelpFormatter : public CLI::FormatterBase {
       out += "\n" + group + ":\n";
       for (const CLI::Option* option : options) out += entry(name_of(*option), option->get_description());
     }
-    if (!hidden.empty()) out += "\n" + wrapped("More options with --help-all: " + hidden + ".", 0, 0) + "\n";
+    if (!hidden.empty()) out += "\n" + wrapped("More options with --help-all: " + hidden + ".", 0) + "\n";
     return out;
   }
 

@@ -175,18 +175,8 @@ class FieldLanes {
   /// Walks the lanes of `walking` through the 4^3 cells of a word. Returns all lanes with a hit so far.
   Mask walk(const Lanes& lanes, const VoxelSteps& steps, const Cells& word, VoxelWalk& voxels, Mask walking) {
     const I origin[3] = {all(origin_[0]), all(origin_[1]), all(origin_[2])};
-    while (any(walking)) {
-      const I half = select(test(voxels.code, all(32)), voxels.high_half, voxels.low_half);
-      const Mask touching = test_bit(half, voxels.code) & walking;
-      if (any(touching)) {
-        add(touching, voxels_at(word, voxels.code), origin);
-        if (count_ >= kCellsAtOnce) walking = walking & ~ask(kCellsAtOnce);
-      }
-      Crossing crossing;
-      cross_next(lanes, steps.one, voxels.nexts, crossing);
-      voxels.code = stepped(voxels.code, crossing, steps.strides);
-      walking = walking & ~test(voxels.code, all(kLeft));
-    }
+    walk_voxels(lanes, steps, voxels, walking,
+                [&](Mask met) { return visit(met, voxels_at(word, voxels.code), origin); });
     return kAsksWhere ? ask(1) : mask_of(met_);
   }
 
@@ -194,9 +184,7 @@ class FieldLanes {
   void walk_short(const TreeView& tree, const IVec3& window, ShortRays& rays) {
     const I origin[3] = {all(origin_[0] + window.x), all(origin_[1] + window.y), all(origin_[2] + window.z)};
     walk_window(tree, window, rays, [&](Mask met, Mask) {
-      if (!any(met)) return mask_of(0);
-      add(met, {gathered<0>(rays.code), gathered<1>(rays.code), gathered<2>(rays.code)}, origin);
-      return count_ >= kCellsAtOnce ? ask(kCellsAtOnce) : mask_of(0);
+      return visit(met, {gathered<0>(rays.code), gathered<1>(rays.code), gathered<2>(rays.code)}, origin);
     });
   }
 
@@ -217,6 +205,13 @@ class FieldLanes {
     const Mask is_back = ~(axis.forward | axis.still);
     store(rays_near_.entry[index], select(is_back, all(1.0F + kStretch), all(-kStretch)));
     store(rays_near_.exit[index], select(is_back, all(-kStretch), all(1.0F + kStretch)));
+  }
+
+  // Appends the cells of these lanes, and tests the list if it fills the registers. Returns the lanes with a hit.
+  [[gnu::always_inline]] Mask visit(Mask which, const Cells& cells, const I (&origin)[3]) {
+    if (!any(which)) return mask_of(0);
+    add(which, cells, origin);
+    return count_ >= kCellsAtOnce ? ask(kCellsAtOnce) : mask_of(0);
   }
 
   void add(Mask which, const Cells& cells, const I (&origin)[3]) {
@@ -454,21 +449,15 @@ inline std::uint32_t packet_in_field(const FieldView& field, const RayPacket& ra
   return hit;
 }
 
-template <bool kAsksWhere>
-inline std::uint32_t any_packet_in_field(const FieldView& field, const RayPacket& rays, FieldHit* hits,
-                                         std::uint32_t& unfinished) {
-  fetch_next(rays);
-  if (!is_full(rays)) return packet_in_field<kAsksWhere>(field, fill_inactive(rays), hits, unfinished);
-  return packet_in_field<kAsksWhere>(field, rays, hits, unfinished);
-}
-
 inline std::uint32_t first_hits_in_field(const FieldView& field, const RayPacket& rays, FieldHit* hits,
                                          std::uint32_t& unfinished) {
-  return any_packet_in_field<true>(field, rays, hits, unfinished);
+  return trace_filled(rays,
+                      [&](const RayPacket& filled) { return packet_in_field<true>(field, filled, hits, unfinished); });
 }
 
 inline std::uint32_t any_hits_in_field(const FieldView& field, const RayPacket& rays, std::uint32_t& unfinished) {
-  return any_packet_in_field<false>(field, rays, nullptr, unfinished);
+  return trace_filled(
+      rays, [&](const RayPacket& filled) { return packet_in_field<false>(field, filled, nullptr, unfinished); });
 }
 
 }  // namespace

@@ -538,22 +538,32 @@ inline VoxelWalk enter_cells(const Lanes& lanes, const Planes& entries, const Vo
   return walk;
 }
 
-// Walks until each lane of `walking` has hit a voxel or has left its cell. Stores the code of each hit in `code`.
-template <Ask kAsk>
-inline Mask find_voxels(const Lanes& lanes, const VoxelSteps& steps, VoxelWalk& walk, Mask walking, I& code) {
-  Mask hit = mask_of(0);
+// Walks each lane of `walking` through the voxels of its cell. Calls `meet(met)` at each step with the lanes in occupied
+// voxels; it returns the lanes that stop.
+template <class Meet>
+[[gnu::always_inline]] inline void walk_voxels(const Lanes& lanes, const VoxelSteps& steps, VoxelWalk& walk,
+                                               Mask walking, Meet&& meet) {
   for (;;) {
     const I half = select(test(walk.code, all(32)), walk.high_half, walk.low_half);
-    const Mask met = test_bit(half, walk.code) & walking;
-    hit = hit | met;
-    if (kAsk == Ask::Where) code = select(met, walk.code, code);
-    walking = walking & ~met;
+    walking = walking & ~meet(test_bit(half, walk.code) & walking);
     Crossing crossing;
     cross_next(lanes, steps.one, walk.nexts, crossing);
     walk.code = stepped(walk.code, crossing, steps.strides);
     walking = walking & ~test(walk.code, all(kLeft));
-    if (!any(walking)) return hit;
+    if (!any(walking)) return;
   }
+}
+
+// Walks until each lane of `walking` has hit a voxel or has left its cell. Stores the code of each hit in `code`.
+template <Ask kAsk>
+inline Mask find_voxels(const Lanes& lanes, const VoxelSteps& steps, VoxelWalk& walk, Mask walking, I& code) {
+  Mask hit = mask_of(0);
+  walk_voxels(lanes, steps, walk, walking, [&](Mask met) {
+    hit = hit | met;
+    if (kAsk == Ask::Where) code = select(met, walk.code, code);
+    return met;
+  });
+  return hit;
 }
 
 // The voxels and faces that lanes hit.

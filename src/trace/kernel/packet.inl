@@ -369,9 +369,7 @@ inline void trace_first_lanes(const TreeView& tree, const RayPacket& rays, Packe
 }
 
 inline void trace_first(const TreeView& tree, const RayPacket& rays, PacketHits& hits, std::uint32_t& unfinished) {
-  fetch_next(rays);
-  if (!is_full(rays)) return trace_first_lanes(tree, fill_inactive(rays), hits, unfinished);
-  trace_first_lanes(tree, rays, hits, unfinished);
+  trace_filled(rays, [&](const RayPacket& filled) { trace_first_lanes(tree, filled, hits, unfinished); });
 }
 
 // Returns the blocked rays. Short rays walk in a window, other rays in the usual way.
@@ -416,9 +414,7 @@ inline std::uint32_t trace_any_lanes(const TreeView& tree, const RayPacket& rays
 }
 
 inline std::uint32_t trace_any(const TreeView& tree, const RayPacket& rays, std::uint32_t& unfinished) {
-  fetch_next(rays);
-  if (!is_full(rays)) return trace_any_lanes(tree, fill_inactive(rays), unfinished);
-  return trace_any_lanes(tree, rays, unfinished);
+  return trace_filled(rays, [&](const RayPacket& filled) { return trace_any_lanes(tree, filled, unfinished); });
 }
 
 }  // namespace

@@ -46,6 +46,13 @@ inline bool is_full(const RayPacket& rays) {
   return (rays.active & kAll) == kAll;
 }
 
+// Calls `trace` with the packet, its inactive lanes filled, and prefetches the next packet.
+template <class Trace>
+[[gnu::always_inline]] inline auto trace_filled(const RayPacket& rays, Trace&& trace) {
+  fetch_next(rays);
+  return is_full(rays) ? trace(rays) : trace(fill_inactive(rays));
+}
+
 // A place in a window, from the lowest bits: x, y, z of the voxel in its cell; x, z, y of the cell in its brick, in
 // storage order; x, y, z of the brick.
 constexpr int kAxisBits[3] = {3 | 3 << 6 | 3 << 12, 3 << 2 | 3 << 10 | 3 << 14, 3 << 4 | 3 << 8 | 3 << 16};

@@ -19,7 +19,7 @@ layout(constant_id = 0) const bool kHasGlass = true;
 #include "faces.glsl"
 #include "field_blend.glsl"
 
-// Of a dispatch. Where there is glass, paths part that take several: see docs/decisions/archive/105.
+// Steps per dispatch: one with glass, where paths with several steps would diverge (docs/decisions/archive/105).
 const uint kSteps = kHasGlass ? 1 : 4;
 const uint kSureBounces = 3;
 const float kMostLikely = 0.95;
