@@ -21,7 +21,7 @@ constexpr int kUnitsPerChunk = kChunkEdge / kTerrainUnit;
 constexpr float kBand = 8.0F;
 
 // Returns true if all types of a smooth world are set, as by add_terrain_types.
-bool are_filled(const TerrainTypes& t) {
+[[maybe_unused]] bool are_filled(const TerrainTypes& t) {
   const VoxelType all[] = {t.grass, t.earth, t.stone, t.sand, t.snow};
   return std::find(std::begin(all), std::end(all), kAir) == std::end(all);
 }

@@ -30,8 +30,8 @@ Status check(const TerrainOptions& options) {
   return {};
 }
 
-// Whether they are all there, as add_terrain_types makes them.
-bool are_filled(const TerrainTypes& t) {
+// Returns true if all types are set, as by add_terrain_types.
+[[maybe_unused]] bool are_filled(const TerrainTypes& t) {
   const VoxelType all[] = {t.grass,  t.earth, t.stone,  t.sand,         t.snow,    t.water, t.meadow,
                            t.gravel, t.trunk, t.leaves, t.young_leaves, t.needles, t.rock,  t.dark_stone};
   return std::find(std::begin(all), std::end(all), kAir) == std::end(all);

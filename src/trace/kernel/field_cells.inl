@@ -184,23 +184,24 @@ template <int kLanes>
   std::uint32_t left = bits_of(is_within);
   std::uint32_t apart = bits_of(wanted) & ~left;  // cells with corners in several chunks, or in a chunk without storage
   Places pairs[4] = {};
+  // Returns the lanes in the chunk of `lane`.
   const auto read_chunk_of = [&](int lane) {
     Places here = is_within;
     for (const Places& at_axis : chunk) here &= at_axis == of_lane(at_axis, lane);
     const std::uint32_t those = bits_of(here);
-    left &= ~those;
     const DensityStorage* const storage = last.find(field, chunk[0][lane], chunk[1][lane], chunk[2][lane]);
     if (storage == nullptr) {
       apart |= those;
-      return;
+      return those;
     }
     for (int row = 0; row < 4; ++row) {
       pairs[row] = pairs_of(*storage, cell[0], cell[1] + (row & 1), cell[2] + (row >> 1), here, pairs[row]);
     }
+    return those;
   };
-  read_chunk_of(0);
+  left &= ~read_chunk_of(0);
   // There is usually one chunk.
-  while (left != 0) read_chunk_of(std::countr_zero(left));
+  while (left != 0) left &= ~read_chunk_of(std::countr_zero(left));
   for (int row = 0; row < 4; ++row) {
     corners[2 * row] = floats_from_halves<kLanes>(pairs[row] << 16);
     corners[2 * row + 1] = floats_from_halves<kLanes>(pairs[row]);

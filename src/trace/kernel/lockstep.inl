@@ -538,8 +538,8 @@ inline VoxelWalk enter_cells(const Lanes& lanes, const Planes& entries, const Vo
   return walk;
 }
 
-// Walks each lane of `walking` through the voxels of its cell. Calls `meet(met)` at each step with the lanes in occupied
-// voxels; it returns the lanes that stop.
+// Walks each lane of `walking` through the voxels of its cell. Calls `meet(met)` at each step with the lanes in
+// occupied voxels; it returns the lanes that stop.
 template <class Meet>
 [[gnu::always_inline]] inline void walk_voxels(const Lanes& lanes, const VoxelSteps& steps, VoxelWalk& walk,
                                                Mask walking, Meet&& meet) {
