@@ -374,7 +374,7 @@ TEST(Layers, RoomsOfALayerDoNotLeanOnEachOtherInACircle) {
 }
 
 // A header that only tests include says so by its name, and one that says so is included by nothing else.
-TEST(Layers, WhatIsForTestsSaysSo) {
+TEST(Layers, TestHeadersSaySoByName) {
   std::set<std::string> used;
   for (const char* top : {"src", "apps"}) {
     for (const Source& source : sources_of(top)) {

@@ -290,7 +290,7 @@ TEST(SmallImpostors, LookLikeTheTracedImage) {
   }
 }
 
-TEST(SmallImpostors, OfRealFilesLookLikeTheTracedImage) {
+TEST(SmallImpostors, RealFilesLookLikeTheTracedImage) {
   if (!std::filesystem::exists(folder_of_files())) GTEST_SKIP() << "without the real files";
   for (const char* name : kFiles) {
     auto loaded = load_scene(folder_of_files() / name);

@@ -294,7 +294,7 @@ TEST_F(ToolRender, OcclusionShapesACaveOfAField) {
   EXPECT_GT(rock("--ao-distance 6")[0], plain[0] + 10.0);
 }
 
-TEST_F(ToolRender, WhatNoOptionSaysTheFileSays) {
+TEST_F(ToolRender, FileSettingsApplyWithoutOptions) {
   vox_test::FileBuilder file;
   file.model(4, 4, 4, {{0, 0, 0, 1}, {3, 0, 0, 2}, {0, 3, 3, 3}});
   file.with("rOBJ", [&](auto& out) { out.dict({{"_type", "_env"}, {"_mode", "0"}}); });

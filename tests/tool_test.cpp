@@ -448,7 +448,7 @@ TEST_F(Tool, MoreThreadsThanProcessorsAreNoNews) {
   EXPECT_EQ(result.err, "");
 }
 
-TEST_F(Tool, WhatIsReadIsNeverReplaced) {
+TEST_F(Tool, NeverReplacesInputs) {
   std::filesystem::create_symlink("tiny.vox", folder_.file("link.vox"));
   std::ofstream(folder_.file("other.vox"), std::ios::binary) << tiny_vox();
   for (const std::string arguments : {"tiny.vox tiny.vox", "tiny.vox ./tiny.vox --force", "tiny.vox link.vox --force",
@@ -460,7 +460,7 @@ TEST_F(Tool, WhatIsReadIsNeverReplaced) {
   }
 }
 
-TEST_F(Tool, WhatHoldsAModelIsReplacedOnlyByForce) {
+TEST_F(Tool, ReplacesModelsOnlyWithForce) {
   const std::string large = checkerboard_vox(6);
   std::ofstream(folder_.file("other.vox"), std::ios::binary) << large;
   std::ofstream(folder_.file("misnamed.glb"), std::ios::binary) << large;

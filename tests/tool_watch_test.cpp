@@ -73,7 +73,7 @@ TEST_F(ToolWatch, APictureFollowsTheModelsThatASceneNames) {
 }
 
 // A model that is broken when it is first read is mended, and one that a scene names beside other inputs changes.
-TEST_F(ToolWatch, WhatAScenesModelsBecomeIsSeenWhateverTheyWere) {
+TEST_F(ToolWatch, SeesChangedModelsOfAScene) {
   std::ofstream(folder_.file("fleet.json")) << R"({"quoin_scene": 1, "files": [{"id": "a", "path": "ship.vox"}],)"
                                             << R"( "instances": [{"file": "a"}]})";
   const ToolRun result = script(
@@ -106,7 +106,7 @@ TEST_F(ToolWatch, AFolderIsFollowedFileByFile) {
       << result.out;
 }
 
-TEST_F(ToolWatch, WhatCannotGoOnByItselfIsWrongUsage) {
+TEST_F(ToolWatch, RefusesWatchingStreamsAndJson) {
   for (const std::string arguments : {"convert tiny.vox out.glb --watch --json", "convert - out.glb --watch",
                                       "convert tiny.vox - --to glb --watch", "convert tiny.vox out.json --watch",
                                       "render tiny.vox -o out.png --watch --json", "render - -o out.png --watch"}) {

@@ -144,7 +144,7 @@ TEST_F(ToolWorld, MeshesAreThoseOfTheSameSceneHeldWhole) {
   EXPECT_EQ(run("convert hills.quoin smooth.glb --mesher smooth -q").status, 0);
 }
 
-TEST_F(ToolWorld, WhatDoesNotFitIntoMemoryIsToldBeforeItIsTried) {
+TEST_F(ToolWorld, ReportsInsufficientMemoryBeforeLoading) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "sanitizers take more addresses than the limit";
 #endif
@@ -196,7 +196,7 @@ TEST_F(ToolWorld, IsMadeOfHeightsWhereTheyAreSaidToBeHeights) {
   EXPECT_EQ(Json::parse(smooth.out)["voxels"], 0);
 }
 
-TEST_F(ToolWorld, WhatIsNoWorldIsRefusedInOneLine) {
+TEST_F(ToolWorld, RefusesInvalidWorldsInOneLine) {
   std::ofstream(folder_.file("text.quoin")) << "hello";
   std::ofstream(folder_.file("empty.quoin")) << "";
   for (const char* name : {"text.quoin", "empty.quoin", "none.quoin", "."}) {

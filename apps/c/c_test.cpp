@@ -284,7 +284,7 @@ TEST(C, PicturesAndRaysSeeTheScene) {
   EXPECT_EQ(quoin_free(scene), QUOIN_OK);
 }
 
-TEST(C, WhatCannotBeIsAnError) {
+TEST(C, ReportsErrorsForInvalidArguments) {
   std::vector<std::uint16_t> voxels;
   const quoin_scene scene = made_scene(voxels);
   std::size_t count = 0;

@@ -309,7 +309,7 @@ TEST(CpuBackend, MovingPicturesAreWholeWhereThereIsTime) {
   }
 }
 
-TEST(CpuBackend, WhereThereIsNoTimeMovingPicturesAreDraftsInLessLight) {
+TEST(CpuBackend, DraftsMovingImagesInReducedLightWhenTimeIsShort) {
   const LoadedScene loaded = small_scene();
   Watched watched(loaded.scene);
   ViewRequest request = request_for(loaded.scene, View::Iso);

@@ -239,7 +239,7 @@ TEST_F(DeviceBackendTest, PathsConvergeAndFollowEdits) {
 }
 
 // How fine the first picture may be follows from what others like it took.
-TEST_F(DeviceBackendTest, WhatPathsTakeSaysNothingOfRays) {
+TEST_F(DeviceBackendTest, PathTimesDoNotSizeRayImages) {
   const Document document = small_document();
   DeviceBackendOptions options;
   options.cpu.threads = {2};
@@ -384,7 +384,7 @@ TEST_F(DeviceBackendTest, WithoutADeviceThereAreRays) {
   EXPECT_FALSE(settle(backend).empty());
 }
 
-TEST_F(DeviceBackendTest, WhatIsDrawnApartIsTheSameInTheEndAndFollowsEdits) {
+TEST_F(DeviceBackendTest, DrawsTheSameOnAThreadAndFollowsEdits) {
   Document document = small_document();
   const auto at_once = backend_of(document, true);
   // Its thread has a device of its own.

@@ -74,7 +74,7 @@ TEST(Brush, ActionsTouchWhatTheyName) {
   EXPECT_EQ(grid.voxel_count(), 0);
 }
 
-TEST(Brush, WhereCoordinatesEndItDoesNothing) {
+TEST(Brush, DoesNothingAtTheCoordinateLimits) {
   Grid grid;
   const int most = std::numeric_limits<int>::max();
   EXPECT_EQ(apply({BrushAction::Place, BrushShape::Box, 9, 3}, {most, 0, 0}, grid), 0);
@@ -415,7 +415,7 @@ TEST(Document, ASavedStrokeKeepsEverythingElseAndTheFileBefore) {
   EXPECT_TRUE((*document)->losses(path).value().empty()) << "it was written by this one";
 }
 
-TEST(Document, WhatSavingWouldLoseIsToldOnce) {
+TEST(Document, ReportsLossesOfSavingOnce) {
   const ScratchFolder folder("losing");
   const auto path = write_layered(folder);
   const auto document = Document::open(path);
@@ -442,7 +442,7 @@ TEST(Document, WhatSavingWouldLoseIsToldOnce) {
   EXPECT_NE(of_others->front().find("another program"), std::string::npos);
 }
 
-TEST(Document, WhatWasLostOnceIsKeptWhateverIsSavedLater) {
+TEST(Document, KeepsBackupOfOriginalAfterLossySave) {
   const ScratchFolder folder("lost_once");
   const auto path = folder.file("scene.json");
   const auto document = Document::open(write_layered(folder));
@@ -475,7 +475,7 @@ TEST(Document, WhatWasLostOnceIsKeptWhateverIsSavedLater) {
   EXPECT_EQ(content("scene.json.~1~"), of_another);
 }
 
-TEST(Document, WhatIsShownAndHiddenCanBeUndoneAndSaved) {
+TEST(Document, UndoesAndSavesVisibility) {
   const ScratchFolder folder("switches");
   const auto path = write_layered(folder);
   const auto document = Document::open(path);
@@ -500,7 +500,7 @@ TEST(Document, WhatIsShownAndHiddenCanBeUndoneAndSaved) {
   EXPECT_FALSE((*document)->show(GroupHandle{9, 9}, true)) << "there is none";
 }
 
-TEST(Document, WhatCannotBeDoneIsAnError) {
+TEST(Document, ReportsErrors) {
   const ScratchFolder folder("errors");
   Document document = small_document();
   std::vector<std::string> warnings;

@@ -67,7 +67,7 @@ TEST(Settings, ForgetsShadingsForDebugging) {
   }
 }
 
-TEST(Settings, WhatEarlierVersionsWroteIsRead) {
+TEST(Settings, ReadsSettingsOfEarlierVersions) {
   const LightOptions light = parse_settings(R"({"light": {"lit": false, "shadows": true, "occlusion": false}})").light;
   EXPECT_EQ(light.shading, Shading::Unlit);
   EXPECT_EQ(light.occlusion_mode, OcclusionMode::Off);

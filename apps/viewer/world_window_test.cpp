@@ -136,7 +136,7 @@ TEST_F(WorldWindowTest, EditsAreSavedWithoutBeingAsked) {
   EXPECT_EQ(again->scene.voxel_count(), small_scene().scene.voxel_count() + 18);
 }
 
-TEST_F(WorldWindowTest, WhatWasDoneElsewhereIsUndoneOnlyThere) {
+TEST_F(WorldWindowTest, UndoesDistantEditsOnlyThere) {
   make_endless();
   const auto document = open(near_by());
   const Camera here = camera_at({0.0, 100.0, 0.0});
@@ -263,7 +263,7 @@ TEST_F(WorldWindowTest, AFlightShowsWhatTheWholeWorldShows) {
   EXPECT_GT(world.stats().chunks_unloaded, 0U);
 }
 
-TEST_F(WorldWindowTest, WhatIsDrawnMeanwhileEndsAsThePictureOfAllThatIsLoaded) {
+TEST_F(WorldWindowTest, DrawingDuringLoadingEndsWithTheFullImage) {
   make_endless();
   const auto document = open(near_by());
   WorldWindow& world = *document->world();

@@ -34,7 +34,7 @@ TEST(FunctionRef, CallsTheCallableItselfAndNoCopy) {
   EXPECT_EQ(calls, 3);
 }
 
-TEST(FunctionRef, WhatIsReturnedToNobodyIsDropped) {
+TEST(FunctionRef, DropsAnUnusedReturnValue) {
   int sum = 0;
   const auto adding = [&](int i) { return sum += i; };
   const FunctionRef<void(int)> add = adding;

@@ -71,7 +71,7 @@ TEST(Half, FloatsBecomeTheNearestHalfAndTiesTheEvenOne) {
   }
 }
 
-TEST(Half, WhatIsTooLargeBecomesInfinite) {
+TEST(Half, OverflowBecomesInfinite) {
   EXPECT_EQ(half_from_float(65'519.0F), 0x7BFF);
   EXPECT_EQ(half_from_float(65'520.0F), 0x7C00);
   EXPECT_EQ(half_from_float(-1e30F), 0xFC00);

@@ -25,7 +25,7 @@ TEST(ParallelFor, DoesEachOnceAlsoWithinAnotherAndFromSeveralThreads) {
   }
 }
 
-TEST(ParallelFor, WhatIsThrownArrives) {
+TEST(ParallelFor, RethrowsExceptions) {
   EXPECT_THROW(parallel_for(100, {2},
                             [](std::size_t i) {
                               if (i == 37) throw std::runtime_error("here");

@@ -181,7 +181,7 @@ TEST(Changes, ACursorOfAnotherKindOfContainerIsToldAll) {
   }
 }
 
-TEST(Changes, WhatChangesNothingLeavesASnapshotASnapshot) {
+TEST(Changes, NoOpEditsLeaveASnapshotASnapshot) {
   Grid grid;
   grid.set({1, 2, 3}, 4);
   ChangeCursor cursor = grid.cursor();
@@ -217,7 +217,7 @@ TEST(Changes, WhoLagsTooFarIsToldAll) {
   EXPECT_LT(grid.bytes(), 2'000'000U);
 }
 
-TEST(Changes, OfTypesAreToldWithWhatLooksOtherwise) {
+TEST(Changes, ReportsTypeChangesWithVisibilityAndColour) {
   VoxelRegistry types;
   ChangeCursor cursor = types.cursor();
   VoxelProperties properties;

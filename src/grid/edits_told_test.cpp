@@ -213,7 +213,7 @@ TEST(Grid, HasNoNeighboursBeyondTheEndOfNumbers) {
   }
 }
 
-TEST(VoxelRegistry, WhatIsNoNumberIsFoundAgain) {
+TEST(VoxelRegistry, FindsPropertiesWithNanAgain) {
   VoxelRegistry types;
   VoxelProperties odd;
   odd.emission = std::nanf("");

@@ -77,7 +77,7 @@ TEST(DensityDeathTest, AChunkOfAnotherBandIsAMistake) {
   QUOIN_EXPECT_MISTAKE(grid.put_chunk(IVec3(0), chunk), "densities are stored_density of the band");
 }
 
-TEST(NeighbourhoodDeathTest, WhatLiesBeyondTheNextChunksIsAMistake) {
+TEST(NeighbourhoodDeathTest, OffsetsBeyondTheNextChunksAreMistakes) {
   const Neighbourhood voxels;
   QUOIN_EXPECT_MISTAKE((void)Neighbourhood::index(0, 2, 0), "-1 <= dx, dy, dz <= 1");
   QUOIN_EXPECT_MISTAKE((void)Neighbourhood::offset(27), "0 <= index < 27");

@@ -103,7 +103,7 @@ TEST(GridWriter, SetsWhatSetsOneByOneSet) {
   plain.for_each([&](IVec3 voxel, VoxelType type) { ASSERT_EQ(grid.get(voxel), type); });
 }
 
-TEST(GridWriter, WhatIsNotFlushedIsNotThereYet) {
+TEST(GridWriter, WritesNothingBeforeFlush) {
   Grid grid;
   GridWriter writer(grid);
   writer.set({1, 2, 3}, 4);

@@ -29,7 +29,7 @@ TEST(PartialGrid, AWholeGridHasAllChunksInMemory) {
   EXPECT_EQ(grid.voxel_count(), 0);
 }
 
-TEST(PartialGrid, WhatIsNotLoadedIsNotEdited) {
+TEST(PartialGrid, RefusesEditsInUnloadedChunks) {
   Grid grid = partial();
   ChangeCursor cursor = grid.cursor();
   const std::array<VoxelType, kChunkEdge> row{1, 2, 3};
@@ -88,7 +88,7 @@ TEST(PartialGrid, LoadingIsToldOfAndIsNoEdit) {
   EXPECT_TRUE(grid.loaded_chunks().empty());
 }
 
-TEST(PartialGrid, WhatIsLoadedAndThenEditedIsAnEdit) {
+TEST(PartialGrid, EditsAfterLoadingAreEdits) {
   Grid grid = partial();
   ChangeCursor cursor = grid.cursor();
   grid.load_chunk({0, 0, 0}, Chunk(1));
@@ -173,7 +173,7 @@ TEST(PartialGrid, ABoxIsLoadedWhereAllItsChunksAre) {
   EXPECT_TRUE(Grid().is_loaded_within({IVec3(least), IVec3(most)}));
 }
 
-TEST(PartialGrid, WhatIsNotLoadedIsNotCopied) {
+TEST(PartialGrid, CopiesOnlyLoadedVoxels) {
   Grid grid = partial();
   grid.load_chunk({0, 0, 0}, Chunk(kAir));
   grid.set(63, 5, 5, 2);

@@ -51,7 +51,7 @@ void expect_equal(const Twin& twin) {
 }
 
 // Snapshots of snapshots, each edited, destroyed in random order.
-TEST(Snapshot, WhatIsEditedInOneStaysAsItWasInAllOthers) {
+TEST(Snapshot, EditsLeaveAllOtherSnapshotsAsTheyWere) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
@@ -121,7 +121,7 @@ TEST(Snapshot, AChunkThatNobodySharesAnyMoreIsEditedInPlace) {
   EXPECT_EQ(ChunkStorage::of(*grid.find_chunk({0, 0, 0})), before);
 }
 
-TEST(Snapshot, OfDensitiesStaysAsItWas) {
+TEST(Snapshot, DensitySnapshotsStayAsTheyWere) {
   std::mt19937 random(4);
   DensityGrid grid;
   std::vector<std::pair<DensityGrid, std::uint64_t>> copies;

@@ -105,7 +105,7 @@ TEST(VolumeField, AVolumeThatIsNeverCrossedIsEmptyOrSolid) {
   EXPECT_EQ(field_from_volume(ramp, iso_of(-100.0F)).value().density({0, 0, 0}), -8.0F);
 }
 
-TEST(VolumeField, WhatIsNoVolumeIsRefused) {
+TEST(VolumeField, RefusesInvalidVolumes) {
   const Volume good = sampled({4, 3, 2}, [](IVec3 p) { return p.x; });
   EXPECT_EQ(field_from_volume(good, iso_of(kNan)).error().code, ErrorCode::InvalidArgument);
   constexpr int kMost = std::numeric_limits<int>::max();
@@ -139,7 +139,7 @@ TEST(VolumeField, IsTheSameAtAnyNumberOfThreadsAndCanBeCancelled) {
   EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
 }
 
-TEST(VolumeField, WhatIsFarFromTheSurfaceTakesNoMemory) {
+TEST(VolumeField, StoresNothingFarFromTheSurface) {
   const Volume volume = sampled({192, 192, 64}, ball);
   const DensityGrid field = field_from_volume(volume, iso_of(100.0F)).value();
   EXPECT_EQ(field.chunks(), std::vector<IVec3>({{0, 0, 0}, {1, 0, 0}}));

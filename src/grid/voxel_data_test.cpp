@@ -203,7 +203,7 @@ TEST(VoxelData, GoesWithAnotherTypeAndStaysWithTheSame) {
   EXPECT_EQ(grid.data_count(), 0);
 }
 
-TEST(VoxelData, OfItsOwnVoxelCanBePutAgain) {
+TEST(VoxelData, AcceptsAViewOfTheSameVoxelsData) {
   Grid grid;
   const IVec3 at{-1, -1, -1};
   const std::vector<std::byte> inventory = bytes_of("three apples");
@@ -214,7 +214,7 @@ TEST(VoxelData, OfItsOwnVoxelCanBePutAgain) {
   EXPECT_EQ(grid.data(at), (VoxelData{8, std::span(inventory).first(5)}));
 }
 
-TEST(VoxelData, OfAChunkOfOneTypeIsKeptThere) {
+TEST(VoxelData, UniformChunkKeepsData) {
   Chunk chunk(kStone);
   chunk.set_data({1, 2, 3}, {.state = 5});
   chunk.set_data({63, 63, 63}, {.state = 6});
@@ -328,7 +328,7 @@ TEST(VoxelDataChanges, TellOfEveryVoxelThatDiffers) {
   }
 }
 
-TEST(VoxelDataChanges, OfAGridThatIsClearedAreTold) {
+TEST(VoxelDataChanges, ReportsDataOfAClearedGrid) {
   Grid grid;
   grid.set({1, 1, 1}, kChest, {.state = 1});
   grid.set({100, 1, 1}, kStone);
@@ -380,7 +380,7 @@ TEST(VoxelDataCopies, ArriveTurnedWithTheirVoxels) {
   }
 }
 
-TEST(VoxelDataCopies, OfWholeChunksShareIt) {
+TEST(VoxelDataCopies, CopiesOfWholeChunksShareData) {
   Grid from;
   from.fill_box({{0, 0, 0}, {128, 64, 64}}, kStone);
   from.set({70, 2, 2}, kChest, {.state = 4});
@@ -416,7 +416,7 @@ TEST(VoxelDataPieces, GoWithWhatFallsOff) {
   EXPECT_EQ(world.data_count(), 1);
 }
 
-TEST(VoxelDataDeathTest, OfMoreBytesThanAVoxelHoldsIsAMistake) {
+TEST(VoxelDataDeathTest, TooManyBytesAreAMistake) {
   Grid grid;
   grid.set({0, 0, 0}, kChest);
   const std::vector<std::byte> most(kMaxVoxelDataBytes);

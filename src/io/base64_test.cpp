@@ -33,7 +33,7 @@ TEST(Base64, AnyBytesComeBack) {
   }
 }
 
-TEST(Base64, WhatIsDamagedIsRefusedWithItsPlace) {
+TEST(Base64, RefusesDamageWithItsPosition) {
   const auto fault = [](std::string_view text) {
     const auto bytes = from_base64(text);
     return bytes ? std::string("none") : to_string(bytes.error());

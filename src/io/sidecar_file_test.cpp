@@ -94,7 +94,7 @@ TEST_F(SidecarFile, IsFoundAnywhereOnRequest) {
   }
 }
 
-TEST_F(SidecarFile, OfGltfIsRefusedOutsideTheFolder) {
+TEST_F(SidecarFile, RefusesGltfReferencesOutsideTheFolder) {
   if (!format_info(FileFormat::Gltf).readable) GTEST_SKIP() << "the build reads no glTF";
   const std::string corners("\0\0\0\0\0\0\0\0\0\0\0\0\0\0\x80?\0\0\0\0\0\0\0\0\0\0\0\0\0\0\x80?\0\0\0\0", 36);
   write("corners.bin", corners);
@@ -119,7 +119,7 @@ TEST_F(SidecarFile, OfGltfIsRefusedOutsideTheFolder) {
   EXPECT_TRUE(read_gltf());
 }
 
-TEST_F(SidecarFile, OfObjIsLeftOutOutsideTheFolder) {
+TEST_F(SidecarFile, LeavesOutObjReferencesOutsideTheFolder) {
   if (!format_info(FileFormat::Obj).readable) GTEST_SKIP() << "the build reads no OBJ";
   write("outer.mtl", "newmtl a\nKd 1 0 0\n");
   fs::create_symlink("../outer.mtl", folder_ / "in" / "linked.mtl");
@@ -136,7 +136,7 @@ TEST_F(SidecarFile, OfObjIsLeftOutOutsideTheFolder) {
   }
 }
 
-TEST_F(SidecarFile, OfASceneIsRefusedOutsideTheFolder) {
+TEST_F(SidecarFile, RefusesSceneReferencesOutsideTheFolder) {
   Scene scene;
   const auto type = scene.types.find_or_add({});
   ASSERT_TRUE(type);

@@ -91,7 +91,7 @@ TEST(Daylight, ASunBelowTheHorizonLightsNothing) {
   EXPECT_EQ(at(0.5).sun_brightness, 1.0);
 }
 
-TEST(Daylight, WhereTheSunStandsRoundTheHorizonIsOfNoMatter) {
+TEST(Daylight, IsIndependentOfTheSunsAzimuth) {
   for (const double elevation : {-6.0, 2.0, 20.0}) {
     const auto one = parts(daylight_of(with_sun(elevation, 0.1)));
     const auto other = parts(daylight_of(with_sun(elevation, 4.0)));

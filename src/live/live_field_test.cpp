@@ -166,7 +166,7 @@ TEST(LiveField, VoxelsBesideItAreSurfacesOfTheirOwn) {
   EXPECT_TRUE(shown.all().empty()) << "nothing draws the grid any more";
 }
 
-TEST(LiveField, WhatIsShownIsClosedAtAnyTimeWhileItIsEdited) {
+TEST(LiveField, SurfacesStayClosedWhileEdited) {
   for (unsigned seed = 1; seed <= (kIsSlow ? 1U : 3U); ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);

@@ -60,7 +60,7 @@ struct LitScene : PlacedLightWorld {
   }
 };
 
-TEST(LiveLight, WhatIsShownIsRightAtAnyTime) {
+TEST(LiveLight, ShownLightIsAlwaysCorrect) {
   LitScene world(5);
   LiveLight light;
   EXPECT_EQ(light.shown().of(world.handle).light->at({0, 0, 0}), (LightLevels{15, 0, 0, 0})) << "open sky at first";

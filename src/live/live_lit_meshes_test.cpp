@@ -116,7 +116,7 @@ struct Room {
   GridHandle handle;
 };
 
-TEST(LiveLitMeshes, OfAChunkThatOnlyItsLightReachesAreMadeAgain) {
+TEST(LiveLitMeshes, RemeshesAChunkThatOnlyItsLightReaches) {
   Room room;
   SceneLight light;
   LiveMeshOptions options;

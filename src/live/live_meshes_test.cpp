@@ -114,7 +114,7 @@ TEST_P(LiveMeshesOf, NothingIsMadeWhereNothingChanged) {
   EXPECT_EQ(meshes.stats().chunks_meshed, before);
 }
 
-TEST_P(LiveMeshesOf, WhatIsNotDrawnGoesAndComesBack) {
+TEST_P(LiveMeshesOf, HiddenSurfacesGoAndComeBack) {
   OneGrid one;
   one.grid().fill_box({{3, 3, 3}, {10, 10, 10}}, 1);
   LiveMeshes meshes(options());
@@ -326,7 +326,7 @@ TEST(LiveCallbacks, SurfacesAreConvertedByWorkersAndTakenByThem) {
   EXPECT_EQ(taken.size(), with_quads);
 }
 
-TEST(LiveCallbacks, WhatTheyThrowArrives) {
+TEST(LiveCallbacks, ExceptionsArrive) {
   OneGrid one;
   one.grid().fill_box({{0, 0, 0}, {200, 10, 10}}, 1);
   for (const bool from_convert : {false, true}) {

@@ -134,7 +134,7 @@ TEST(MeshScheduler, SnapshotsAreLetGoOnceNoWorkerNeedsThem) {
   EXPECT_EQ(storage(91), before) << "nobody shares it any more";
 }
 
-TEST(MeshScheduler, WhatOneEditOfAFieldReachesIsGivenAtOnce) {
+TEST(MeshScheduler, DeliversAllChunksOfOneFieldEditTogether) {
   OneGrid one;
   DensityGrid& field = one.scene.edit(one.handle).field;
   field.add_box(DVec3(10.0), DVec3(118.0), 1);  // in eight chunks
@@ -174,7 +174,7 @@ TEST(MeshScheduler, WhatOneEditOfAFieldReachesIsGivenAtOnce) {
   EXPECT_EQ(gated.started().size(), 14U);
 }
 
-TEST(MeshScheduler, OfSeveralEditsBeforeItsTurnTheLastCounts) {
+TEST(MeshScheduler, MeshesTheLastOfSeveralEdits) {
   OneGrid one;
   fill_row(one.grid(), 2);
   GatedWork gated(blocky(1));
@@ -214,7 +214,7 @@ TEST(MeshScheduler, AnEditDuringMeshingGivesBothInOrder) {
   EXPECT_EQ(scheduler.pending(), 0U);
 }
 
-TEST(MeshScheduler, WhatIsRemovedOrReplacedDuringMeshingIsDropped) {
+TEST(MeshScheduler, DropsChunksRemovedOrReplacedDuringMeshing) {
   for (const bool replaced : {false, true}) {
     SCOPED_TRACE(replaced);
     OneGrid one;

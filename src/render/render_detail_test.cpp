@@ -395,7 +395,7 @@ TEST(RenderDetail, TheSameBytesAtAnyNumberOfThreadsAndAgain) {
   EXPECT_EQ(CpuRenderer(model.scene).render(camera, options).value().colour.rgb, one.colour.rgb);
 }
 
-TEST(RenderDetail, WhatIsOutOfThePictureStillCastsItsShadow) {
+TEST(RenderDetail, OffscreenInstancesStillCastShadows) {
   Scene scene;
   const VoxelType type = add_type(scene, {200, 200, 200, 255});
   Grid floor;

@@ -241,7 +241,7 @@ TEST(RenderField, MaterialsBlendAsThoseOfItsMesh) {
 }
 
 // Emission and path-traced materials blend by the same shares.
-TEST(RenderField, WhatGlowsBlendsToo) {
+TEST(RenderField, BlendsEmissionToo) {
   Scene scene;
   const VoxelType dark = add_type(scene, {0, 0, 0, 255});
   const VoxelType glow = add_type(scene, {255, 255, 255, 255}, Visibility::Opaque, 0.5F);

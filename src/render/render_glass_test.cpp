@@ -153,7 +153,7 @@ TEST(RenderGlass, SeenFromInsideTintsOnly) {
   EXPECT_EQ(depth_at(picture, 1, 1), 0.0F);
 }
 
-TEST(RenderGlass, ThatGlowsShinesInTheDarkFromOutsideAndInside) {
+TEST(RenderGlass, EmissiveGlassShinesInTheDarkFromOutsideAndInside) {
   for (const double height : {20.0, 1.0}) {
     std::array<Pixel, 2> seen{};
     for (const float emission : {0.0F, 2.0F}) {

@@ -332,7 +332,7 @@ void expect_same(const EmissiveCells& kept, const EmissiveCells& fresh) {
   }
 }
 
-TEST(EmissiveCells, OfFieldsFollowEditsAsIfMadeAnew) {
+TEST(EmissiveCells, FieldEditsMatchARebuild) {
   Scene scene;
   const VoxelType stone = add_type(scene, kWhite);
   const VoxelType torch = add_type(scene, {255, 120, 30, 255}, Visibility::Opaque, 3.0F);
@@ -357,7 +357,7 @@ TEST(EmissiveCells, OfFieldsFollowEditsAsIfMadeAnew) {
 }
 
 // A glowing ball in a lake of the same field shines as in air; in stone it does not.
-TEST(EmissiveCells, OfFieldsShineIntoGlassAroundThem) {
+TEST(EmissiveCells, EmissiveFieldsShineIntoGlassAroundThem) {
   Scene scene;
   const VoxelType stone = add_type(scene, kWhite);
   const VoxelType torch = add_type(scene, {255, 120, 30, 255}, Visibility::Opaque, 3.0F);

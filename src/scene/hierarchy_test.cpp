@@ -145,7 +145,7 @@ bool slowly_shown(const Scene& scene, const Instance& instance) {
 }
 
 // A renderer that redraws only changes must read every instance that appears or disappears.
-TEST(Hierarchy, WhatAppearsOrDisappearsIsToldOf) {
+TEST(Hierarchy, ReportsInstancesThatAppearOrDisappear) {
   std::mt19937 random(kHierarchySeed);
   Scene scene;
   const GridHandle grid = add_voxel(scene);

@@ -231,7 +231,7 @@ TEST(LevelOfDetail, ACameraThatTremblesAtAThresholdChangesNothing) {
   }
 }
 
-TEST(LevelOfDetail, WhatIsFarBeyondAThresholdIsAlwaysChosenAnew) {
+TEST(LevelOfDetail, IgnoresHistoryFarBeyondAThreshold) {
   const Scene scene = cubes(1, 400);
   DetailSelector selector;
   std::vector<SelectedInstance> selected;

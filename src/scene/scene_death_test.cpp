@@ -108,7 +108,7 @@ TEST(SceneDeathTest, MovingAGroupWithoutARotationIsAMistake) {
   QUOIN_EXPECT_MISTAKE(move_group(scene, unturned, DVec3(0.0), none), "finite and not zero");
 }
 
-TEST(SceneDeathTest, WhatWasMovedFromIsNotToBeUsed) {
+TEST(SceneDeathTest, UsingMovedFromObjectsIsAMistake) {
   Scene scene;
   const Scene moved = std::move(scene);
   QUOIN_EXPECT_MISTAKE(scene.add_grid({}), "a scene that was not moved from");  // NOLINT(bugprone-use-after-move)

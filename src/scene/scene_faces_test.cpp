@@ -112,7 +112,7 @@ TEST(SceneFaces, AreThoseThatAMesherFinds) {
   }
 }
 
-TEST(SceneFaces, OfAnotherSceneAreCountedAnew) {
+TEST(SceneFaces, CountsAnotherSceneFromScratch) {
   std::mt19937 random(6);
   SceneFaces faces;
   EXPECT_EQ(faces.update(Scene()), FaceCounts());

@@ -73,7 +73,7 @@ TEST(VolumeScene, StandsWhereTheVolumeSays) {
   }
 }
 
-TEST(VolumeScene, WhatHasNoPlaceIsRefused) {
+TEST(VolumeScene, RefusesInvalidTransforms) {
   const auto code_of = [](const glm::dmat4& world_from_voxel) {
     Volume volume = ball({4, 4, 4}, glm::dmat4(1.0));
     volume.world_from_voxel = world_from_voxel;

@@ -20,7 +20,7 @@ EditLog some_log(std::uint32_t author) {
   return log;
 }
 
-TEST(EditLog, WhatWasWrittenIsRead) {
+TEST(EditLog, RoundTripsALog) {
   const EditLog log = some_log(1);
   const auto read = EditLog::decode(log.encode());
   ASSERT_TRUE(read.has_value()) << to_string(read.error());

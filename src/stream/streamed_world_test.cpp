@@ -156,7 +156,7 @@ TEST_F(StreamedWorldTest, EditsSurviveEvictionAndTheGeneratorIsAskedOnce) {
   EXPECT_EQ(generator->most_asked(), 1);
 }
 
-TEST_F(StreamedWorldTest, WhatWasEditedIsSavedThoughTheWorldJustEnds) {
+TEST_F(StreamedWorldTest, SavesEditsOnDestruction) {
   auto generator = std::make_shared<PatternGround>();
   {
     StreamedWorld world = ground(path(), generator);
@@ -411,7 +411,7 @@ class BrokenGround final : public ChunkGenerator {
   }
 };
 
-TEST_F(StreamedWorldTest, WhatCannotBeMadeIsNamedAndIsAir) {
+TEST_F(StreamedWorldTest, NamesChunksThatCannotBeGeneratedAndShowsAir) {
   auto world = StreamedWorld::open_or_create(path());
   ASSERT_TRUE(world.has_value());
   add_types(*world);

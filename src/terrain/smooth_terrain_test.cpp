@@ -253,7 +253,7 @@ TEST(SmoothTerrain, SolidSamplesAreOfTheLandscapesTypesWithGrassOnTop) {
   EXPECT_GT(green, tops / 4);
 }
 
-TEST(SmoothTerrain, WhatCannotBeIsRefusedAndCancellingStops) {
+TEST(SmoothTerrain, RefusesInvalidOptionsAndStopsWhenCancelled) {
   const SmoothWorld world;
   for (const IVec3 size : {IVec3(0, 1, 1), IVec3(1, 17, 1), IVec3(513, 1, 1), IVec3(1, 1, -1)}) {
     EXPECT_EQ(generate_smooth_terrain(smooth_options_of(1, size), world.types).error().code,

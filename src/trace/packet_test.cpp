@@ -218,7 +218,7 @@ TEST_P(Packets, AreTheSameWhateverInactiveLanesHold) {
   EXPECT_GT(hits, 100);
 }
 
-TEST_P(Packets, OfRaysThatNearlyStandStillAlongAnAxisAgree) {
+TEST_P(Packets, RaysWithTinyDirectionComponentsAgree) {
   int hits = 0;
   for (int i = 0; i < 1'000; ++i) {
     RayPacket rays;
@@ -233,7 +233,7 @@ TEST_P(Packets, OfRaysThatNearlyStandStillAlongAnAxisAgree) {
   EXPECT_GT(hits, 100);
 }
 
-TEST_P(Packets, OfRaysThatGoTheSameWayAgree) {
+TEST_P(Packets, RaysInTheSameDirectionAgree) {
   int hits = 0;
   for (int i = 0; i < 4'000; ++i) {
     hits += hits_if_all_agree(tree_, beam(), set());
@@ -242,7 +242,7 @@ TEST_P(Packets, OfRaysThatGoTheSameWayAgree) {
   EXPECT_GT(hits, 1'000);
 }
 
-TEST_P(Packets, OfShortRaysFromAboutOnePlaceAgree) {
+TEST_P(Packets, ShortRaysFromNearbyOriginsAgree) {
   int hits = 0;
   for (int i = 0; i < 5'000; ++i) {
     RayPacket rays = bunch();
@@ -255,7 +255,7 @@ TEST_P(Packets, OfShortRaysFromAboutOnePlaceAgree) {
 }
 
 // Voxels fill whole chunks, so that rays reach the ends of the tables.
-TEST_P(Packets, OfShortRaysAtTheEndsOfAWorldAgree) {
+TEST_P(Packets, ShortRaysAtTheEndsOfAWorldAgree) {
   Grid grid;
   const IVec3 corner = IVec3{whole(-2, 1), whole(-2, 1), whole(-2, 1)} * kChunkEdge;
   const IVec3 size = IVec3{whole(1, 2), whole(1, 2), whole(1, 2)} * kChunkEdge;
@@ -279,7 +279,7 @@ TEST_P(Packets, OfShortRaysAtTheEndsOfAWorldAgree) {
 }
 
 // Rays that are brought to the bounds, and enter them where planes meet, or all but miss them.
-TEST_P(Packets, OfRaysFromAfarTowardsEdgesAndCornersOfAWorldAgree) {
+TEST_P(Packets, DistantRaysTowardsEdgesAndCornersOfAWorldAgree) {
   Grid grid;
   const IVec3 corner{whole(-40, 40), whole(-40, 40), whole(-40, 40)};
   grid.fill_box({corner, corner + IVec3{whole(1, 40), whole(1, 40), whole(1, 40)}}, VoxelType{1});
@@ -312,7 +312,7 @@ TEST_P(Packets, OfRaysFromAfarTowardsEdgesAndCornersOfAWorldAgree) {
 }
 
 // Beyond the 4^3 chunks that a beam reads at once, and beyond the range of single precision.
-TEST_P(Packets, OfRaysThatGoTheSameWayThroughALongWorldAgree) {
+TEST_P(Packets, RaysInTheSameDirectionThroughALongWorldAgree) {
   Grid grid;
   for (int i = 0; i < 400; ++i) {
     const IVec3 corner{whole(-1'500, 2'500), whole(-40, 90), whole(-70, 75)};
@@ -411,7 +411,7 @@ TEST(PacketsOf, AcrossALongWorldAndBetweenIslandsAgreeWithTheDenseTracer) {
   }
 }
 
-TEST(PacketsOf, OfNoRaysHitNothing) {
+TEST(PacketsOf, InvalidRaysHitNothing) {
   Grid grid;
   grid.fill_box({{-5, -5, -5}, {6, 6, 6}}, 1);
   const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());

@@ -156,7 +156,7 @@ TEST(Ray, ABillionVoxelsFromTheOriginHitsAsAtTheOrigin) {
   EXPECT_GT(hits, 500);
 }
 
-TEST(Ray, ThatCannotBeOneHitsNothing) {
+TEST(Ray, RejectsNonFiniteRay) {
   Grid grid;
   grid.fill_box({{-5, -5, -5}, {6, 6, 6}}, 1);
   const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());
@@ -171,7 +171,7 @@ TEST(Ray, ThatCannotBeOneHitsNothing) {
   EXPECT_TRUE(first_hit(tree, {{-1e6, 0.5, 0.5}, {1, 0, 0}}).has_value());
 }
 
-TEST(Ray, ThatStartsInsideHitsAtOnce) {
+TEST(Ray, HitsAtOnceFromInside) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {10, 10, 10}}, 1);
   const OccupancyTree tree = OccupancyTree::build(grid, oracle::mixed_types());

@@ -40,7 +40,7 @@ TEST(CameraControl, TakesOverEveryView) {
   }
 }
 
-TEST(CameraControl, OfARolledCameraTheWayItLooksStays) {
+TEST(CameraControl, KeepsViewDirectionOfRolledCamera) {
   CameraControl control;
   Camera camera = look_at({10, 20, 30}, {1, 2, 3}, 0.7).value();
   const DVec3 right = camera.right;

@@ -84,7 +84,7 @@ void expect_holds(const Chunk& chunk, const std::vector<VoxelType>& dense) {
   }
 }
 
-TEST(Chunk, OfOneTypeHoldsNoVoxelData) {
+TEST(Chunk, UniformChunkHoldsNoVoxelData) {
   EXPECT_EQ(Chunk(7).bytes(), sizeof(Chunk));
   EXPECT_EQ(Chunk(7).non_air_count(), 64 * 64 * 64);
   EXPECT_EQ(Chunk().bounds(), IBox{});

@@ -162,7 +162,7 @@ TEST(ConnectedPieces, FollowEdits) {
   }
 }
 
-TEST(ConnectedPieces, OfAnotherGridAreFoundAnew) {
+TEST(ConnectedPieces, StartsOverForAnotherGrid) {
   Random random(5);
   ConnectedPieces pieces;
   pieces.update(random_grid(random));
@@ -175,7 +175,7 @@ TEST(ConnectedPieces, OfAnotherGridAreFoundAnew) {
 }
 
 // Uses hundreds of types; only some belong.
-TEST(ConnectedPieces, OfManyTypesAreThoseOfAFloodFill) {
+TEST(ConnectedPieces, MatchAFloodFillWithManyTypes) {
   Random random(3);
   Grid grid;
   grid.edit({IVec3(-40), IVec3(40)}, [&](IVec3, VoxelType) { return static_cast<VoxelType>(random.below(1'000)); });
@@ -261,7 +261,7 @@ TEST(ConnectedPieces, TouchABoxWhereTheyHaveAVoxelInIt) {
   }
 }
 
-TEST(ConnectedPieces, WhatIsCutFromTheGroundIsApartFromIt) {
+TEST(ConnectedPieces, FindsPiecesCutFromTheGround) {
   constexpr int kMin = std::numeric_limits<int>::min();
   constexpr int kMax = std::numeric_limits<int>::max();
   const IBox ground{{kMin, 0, kMin}, {kMax, 1, kMax}};
@@ -342,7 +342,7 @@ bool touches_unloaded(const Grid& grid, const ConnectedPieces& pieces, std::size
   return found;
 }
 
-TEST(ConnectedPieces, WhatTouchesChunksThatAreNotLoadedIsHeld) {
+TEST(ConnectedPieces, HoldsPiecesThatTouchUnloadedChunks) {
   Grid grid;
   grid.make_partial();
   grid.load_chunk({0, 0, 0}, Chunk(kAir));

@@ -170,7 +170,7 @@ TEST(CopyBox, TheJournalTellsExactlyWhatChanged) {
   EXPECT_EQ(grid.get(23, 24, 25), 1'000);
 }
 
-TEST(CopyBox, OfAlmostEmptyWorldsLooksOnlyAtWhatIsThere) {
+TEST(CopyBox, VisitsOnlyExistingChunksOfAlmostEmptyWorlds) {
   Grid from;
   from.set({1'000'000, -2'000'000, 5}, 3);
   from.set({-7, 8, 9}, 4);

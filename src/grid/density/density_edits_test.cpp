@@ -206,7 +206,7 @@ TEST(DensityEdits, RemovedRockKeepsItsMaterialWhileItIsNearTheSurface) {
   EXPECT_EQ(grid.material({0, 0, 0}), 3);
 }
 
-TEST(DensityEdits, WhatIsRemovedAltogetherLeavesNothing) {
+TEST(DensityEdits, RemovingAllSolidLeavesNoChunks) {
   DensityGrid grid;
   ChangeFollower follower(grid);
   grid.add_box({-70, 3, 3}, {80, 90, 40}, 3, 4.0);

@@ -29,7 +29,7 @@ DensityChunk chunk_of_plane(double height, VoxelType material) {
   return chunk;
 }
 
-TEST(DensityGrid, WhatWasNeverSetIsFarAir) {
+TEST(DensityGrid, UnsetSamplesAreFarAir) {
   const DensityGrid grid(3.0F);
   EXPECT_EQ(grid.density({5, -900, kHighest}), 3.0F);
   EXPECT_EQ(grid.material({5, 6, 7}), kAir);
@@ -184,7 +184,7 @@ TEST(DensityGrid, TheEndsOfTheWorldStayAir) {
   EXPECT_EQ(grid.neighbourhood(chunk_of({kLowest, 0, 0})).get({64, 0, 0}), stored_density(-1.0F, 8.0F));
 }
 
-TEST(DensityGrid, WhatAnEditDidBeforeItThrewStaysBooked) {
+TEST(DensityGrid, RecordsEditsMadeBeforeAnException) {
   DensityGrid grid;
   ChangeFollower follower(grid);
   const auto pick = [](IVec3 p, DensitySample) -> DensitySample {

@@ -109,7 +109,7 @@ TEST(DensityHalving, TheSurfaceStaysWhereItWas) {
   }
 }
 
-TEST(DensityHalving, WhatLiesOutsideGivesTheMaterial) {
+TEST(DensityHalving, TakesTheMaterialFromTheOutside) {
   DensityGrid field;
   field.add_box({-100, -40, -100}, {100, 0.8, 100}, 1);
   // Grass of one sample.

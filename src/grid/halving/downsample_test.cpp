@@ -179,7 +179,7 @@ TEST(Downsample, SpecksGoAndStepsOfASurfaceDoNotGrow) {
   EXPECT_EQ(downsample(grid, types)->voxel_count(), ground);
 }
 
-TEST(Downsample, WhatLiesOpenGivesTheColourAndOpaqueBeatsTransparent) {
+TEST(Downsample, ExposedVoxelsGiveTheColourAndOpaqueBeatsTransparent) {
   const VoxelRegistry types = some_types();
   Grid lawn;
   lawn.fill_box({{0, 0, 0}, {8, 7, 8}}, 4);

@@ -238,7 +238,7 @@ TEST_F(GltfAnimation, WithoutASceneGraphModelsAreTheFrames) {
   }
 }
 
-TEST_F(GltfAnimation, WhatNeverMovesIsNoAnimation) {
+TEST_F(GltfAnimation, WritesNoAnimationForStaticModels) {
   vox_test::FileBuilder builder;
   builder.model(2, 2, 2, {{0, 0, 0, 1}});
   const ParsedGlb glb = written(animation_of(builder.file()), 10.0);

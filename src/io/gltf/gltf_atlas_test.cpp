@@ -103,7 +103,7 @@ TEST_F(GltfAtlas, FewerTrianglesOfTheSameFaces) {
   EXPECT_EQ(with_atlas.vertices, 4 * with_atlas.quads);
 }
 
-TEST_F(GltfAtlas, OfNothingOpaqueThereIsNone) {
+TEST_F(GltfAtlas, HasNoAtlasWithoutOpaqueVoxels) {
   Scene scene;
   VoxelProperties glass;
   glass.visibility = Visibility::Transparent;
@@ -121,7 +121,7 @@ TEST_F(GltfAtlas, VoxelsThatFloatsDoNotTellApartAreRefused) {
   EXPECT_EQ(mesh_scene(scene_, {.atlas = true}).error().code, ErrorCode::LimitExceeded);
 }
 
-TEST_F(GltfAtlas, WhatContradictsItIsRefused) {
+TEST_F(GltfAtlas, RefusesContradictoryOptions) {
   for (const BlockyMeshOptions& mesh : {BlockyMeshOptions{.merge = false}, BlockyMeshOptions{.bake_occlusion = false},
                                         BlockyMeshOptions{.watertight = true}}) {
     EXPECT_EQ(mesh_scene(scene_, {.mesh = mesh, .atlas = true}).error().code, ErrorCode::InvalidArgument);

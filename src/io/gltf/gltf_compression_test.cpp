@@ -258,7 +258,7 @@ TEST_F(GltfStored, FarFromThePivotBlocksKeepTheirPlaces) {
   expect_alike(meshes(), 1e-9);
 }
 
-TEST_F(GltfStored, WhatIntegersDoNotReachStaysAsFloats) {
+TEST_F(GltfStored, StoresFloatsBeyondTheIntegerRange) {
   SceneGrid grid;
   grid.grid.set({0, 0, 0}, VoxelType{1});
   grid.grid.set({70'000, 0, 0}, VoxelType{2});

@@ -96,7 +96,7 @@ Scene scene_of(const HeightMap& map, const HeightOptions& options) {
   return scene ? std::move(*scene) : Scene();
 }
 
-TEST(Heights, OfEachEncodingAreWhatItsFormulaSays) {
+TEST(Heights, DecodesEachEncodingByItsFormula) {
   HeightOptions grey = options_of(HeightEncoding::Grey);
   grey.metres_per_level = 0.5;
   EXPECT_EQ(metres_of(png_of({{0, 1}, {300, 65'535}}, 16, 0), grey), (std::vector<float>{0, 0.5F, 150, 32'767.5F}));
@@ -128,7 +128,7 @@ TEST(Heights, APictureIsNoneUnlessItIsSaid) {
   EXPECT_EQ(loaded->warnings.size(), 1U) << "of the distance of its pixels";
 }
 
-TEST(Heights, OfHgtAreMetresWithVoids) {
+TEST(Heights, ReadsHgtMetresWithVoids) {
   Bytes file;
   for (int i = 0; i < 1201 * 1201; ++i) put_big(file, static_cast<std::uint16_t>(i == 1202 ? -32'768 : i % 7 - 3), 2);
   const auto map = read_height_map(file, {});
@@ -234,7 +234,7 @@ TEST(Heights, AnyNumberOfThreadsGivesTheSame) {
   }
 }
 
-TEST(Heights, WhatIsOutOfRangeIsRefused) {
+TEST(Heights, RefusesOptionsOutOfRange) {
   const HeightMap map = map_of(10, 10, 5.0F);
   for (const double length : {0.0, -1.0, 1e9, std::numeric_limits<double>::quiet_NaN()}) {
     HeightOptions options;
@@ -258,7 +258,7 @@ TEST(Heights, WhatIsOutOfRangeIsRefused) {
   EXPECT_EQ(content_of(*scene_from_heights(steep, {})).grid.voxel_count(), 0);
 }
 
-TEST(Heights, OfDamagedPicturesAreErrors) {
+TEST(Heights, RefusesDamagedImages) {
   const Bytes sound = png_of({{0, 1, 2}, {300, 65'535, 9}}, 16, 0);
   const HeightOptions options = options_of(HeightEncoding::Grey);
   for (std::size_t size = 0; size + 12 < sound.size(); ++size) {
@@ -284,7 +284,7 @@ TEST(Heights, OfDamagedPicturesAreErrors) {
   EXPECT_GT(read, 4);
 }
 
-TEST(Heights, OfARealTileAreThoseOfItsMountain) {
+TEST(Heights, ReadsARealTileOfMountFuji) {
   const fs::path path = fs::path(QUOIN_SOURCE_DIR) / "../shared/data/dem/mapbox+martini/test__fixtures__fuji.png";
   if (!fs::exists(path)) GTEST_SKIP() << path << " is not there";
   LoadOptions options;

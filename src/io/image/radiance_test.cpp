@@ -109,7 +109,7 @@ TEST(Exr, ReadsWhatItWrote) {
   }
 }
 
-TEST(Exr, WhatIsTooBrightForAHalfIsItsBrightest) {
+TEST(Exr, ClampsValuesTooBrightForHalf) {
   if (!has_exr()) GTEST_SKIP() << "built without OpenEXR";
   const auto image = read_radiance(*write_exr(1, 1, three_channels({1e9F}, ExrChannel::Type::Float16)));
   ASSERT_TRUE(image.has_value());

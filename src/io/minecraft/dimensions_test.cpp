@@ -70,7 +70,7 @@ TEST(Dimensions, AreFoundInBothLayouts) {
   EXPECT_EQ(load_scene(world.path(), {.dimension = "worlds/2b2t/2b2t_2"})->dimension, names.back());
 }
 
-TEST(Dimensions, OfTwoLayoutsTheNewerIsRead) {
+TEST(Dimensions, ReadsTheNewerOfTwoLayouts) {
   WrittenWorld world("twice");
   world.level().region("region").region("dimensions/minecraft/overworld/region");
   const minecraft::WorldFolder found = minecraft::find_dimensions(world.path());
@@ -92,7 +92,7 @@ TEST(Dimensions, FoldersOfOneAreRead) {
   EXPECT_EQ(name("region"), "minecraft:overworld");
 }
 
-TEST(Dimensions, OfAServersNetherFolderAreRead) {
+TEST(Dimensions, ReadsAServersNetherFolder) {
   WrittenWorld world("world_nether");
   world.level().region("DIM-1/region");
   EXPECT_EQ(load_scene(world.path())->dimension, "minecraft:the_nether");

@@ -39,7 +39,7 @@ TEST(Nbt, FindsValuesByName) {
   EXPECT_FALSE(document->root()["d"]["e"]);
 }
 
-TEST(Nbt, WhatIsCutOffAnywhereIsAnError) {
+TEST(Nbt, RefusesTruncationAnywhere) {
   const std::vector<std::byte> whole = chunk_of_stairs(0);
   ASSERT_TRUE(nbt::Document::parse(whole));
   for (std::size_t size = 0; size < whole.size(); size += size < 200 ? 1 : 97) {
@@ -64,7 +64,7 @@ TEST(BlockStates, ComeBackAsTheyWere) {
   EXPECT_EQ(to_string(minecraft::block_text(type, block.state)), "minecraft:oak_stairs[facing=east,half=top]");
 }
 
-TEST(BlockStates, WhatHasNoBitsIsInTheName) {
+TEST(BlockStates, PutsPropertiesWithoutBitsIntoTheName) {
   const auto block = minecraft::block_state("mod:thing", {{"kind", "strange"}, {"lit", "true"}});
   EXPECT_EQ(block.name, "mod:thing[kind=strange,lit=true]");
   EXPECT_EQ(block.bits, 0);

@@ -206,7 +206,7 @@ TEST(Schematic, BiomesColourTheGrassOfColumns) {
   }
 }
 
-TEST(Schematic, WhatIsWrongIsSaidInALine) {
+TEST(Schematic, ReportsErrorsInOneLine) {
   EXPECT_EQ(read_schematic(structure({2, 1, 2})).error().code, ErrorCode::BadFormat);
   EXPECT_EQ(read_schematic(litematic({12, 1, 6})).error().code, ErrorCode::BadFormat);
   EXPECT_EQ(read_schematic(litematic({0, 1, 3})).error().code, ErrorCode::BadFormat);
@@ -223,7 +223,7 @@ TEST(Schematic, WhatIsWrongIsSaidInALine) {
   EXPECT_EQ(read_schematic(wide.list("blocks", 10, 0).end().bytes).error().code, ErrorCode::LimitExceeded);
 }
 
-TEST(Schematic, WhatIsCutOffOrTurnedAnywhereNeverCrashes) {
+TEST(Schematic, SurvivesTruncationAndFlippedBits) {
   for (const auto& whole : {sponge(1), sponge(3), mcedit(), structure({1, 1, 2}), litematic({11, 1, 3})}) {
     for (std::size_t size = 0; size < whole.size(); ++size) {
       EXPECT_FALSE(read_schematic(std::span(whole).first(size))) << size;
@@ -395,7 +395,7 @@ TEST(PagedBytes, HoldWhatWasAppended) {
   EXPECT_EQ(pages.uniform(PagedBytes::kPageBytes + 6, bytes.size()), std::byte{7});
 }
 
-TEST(Schematic, OfTheBedrockEditionIsNamed) {
+TEST(Schematic, NamesTheBedrockEdition) {
   // The least significant byte first: {"format_version": 1}.
   std::vector<std::byte> bytes = {std::byte{10}, std::byte{0}, std::byte{0}, std::byte{3}, std::byte{14}, std::byte{0}};
   for (const char c : std::string("format_version")) bytes.push_back(static_cast<std::byte>(c));
@@ -405,7 +405,7 @@ TEST(Schematic, OfTheBedrockEditionIsNamed) {
   EXPECT_NE(loaded.error().message.find("Bedrock edition (.mcstructure)"), std::string::npos);
 }
 
-TEST(Schematic, OfNoKindIsNamedByWhatItHasInPrint) {
+TEST(Schematic, UnknownKindIsDescribedInPrintableCharacters) {
   NbtWriter nbt;
   nbt.compound("").integer("a\n\x01", 1).end();
   const auto loaded = load_scene(nbt.bytes);

@@ -241,7 +241,7 @@ TEST(Models, PlacesAreKept) {
   EXPECT_EQ(only_grid(*load_scene(goxel())).bounds().min, IVec3(0, 0, -1));
 }
 
-TEST(Models, WhatIsCutOffOrTurnedAnywhereNeverCrashes) {
+TEST(Models, SurvivesTruncationAndFlippedBits) {
   for (const Kind& kind : all_kinds()) {
     SCOPED_TRACE(kind.name);
     const std::size_t step = kind.bytes.size() > 2000 ? 13 : 1;

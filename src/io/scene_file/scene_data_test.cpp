@@ -76,7 +76,7 @@ TEST(SceneData, ComesBackAtEveryVoxel) {
   EXPECT_EQ(text_of(loaded->scene, Threads{1}), text) << "by any number of threads";
 }
 
-TEST(SceneData, OfManyMegabytesComesInSeveralPieces) {
+TEST(SceneData, SplitsManyMegabytesIntoPieces) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {64, 64, 64}}, kTurned);
   std::mt19937 random(6);
@@ -91,7 +91,7 @@ TEST(SceneData, OfManyMegabytesComesInSeveralPieces) {
 }
 
 // What compresses too well is stored as it is, so that the reader takes it.
-TEST(SceneData, ThatIsRegularIsTaken) {
+TEST(SceneData, StoresHighlyRegularDataUncompressed) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {64, 64, 1}}, kPlain);
   const std::vector<std::byte> zeros(kMaxVoxelDataBytes);
@@ -119,7 +119,7 @@ TEST(SceneData, IsKeptWhereTypesOfNamedFilesAreRenumbered) {
   EXPECT_EQ(only_grid(loaded->scene).data({1, 2, 3}).state, 2U);
 }
 
-TEST(SceneData, WhereThereIsNoneTheFileIsAsBefore) {
+TEST(SceneData, LeavesFilesWithoutDataUnchanged) {
   Scene scene;
   ASSERT_TRUE(scene.types.add({.name = "stone", .colour = {}}));
   SceneGrid grid;
@@ -137,7 +137,7 @@ TEST(SceneData, WhereThereIsNoneTheFileIsAsBefore) {
   EXPECT_EQ(text_of(scene), before);
 }
 
-TEST(SceneData, OfMoreBitsThanTheTypeSaysIsNotWritten) {
+TEST(SceneData, RefusesStatesWithMoreBitsThanTheType) {
   Grid grid;
   grid.set({1, 2, 3}, kTurned, {.state = 4});
   const auto written = write_scene_file(scene_file_of(scene_of(std::move(grid))).value());
@@ -146,7 +146,7 @@ TEST(SceneData, OfMoreBitsThanTheTypeSaysIsNotWritten) {
   EXPECT_EQ(written.error().message, "grids[0]: state 4 of voxel (1, 2, 3) has more than the 2 bits of its type");
 }
 
-TEST(SceneData, ThatVoxCannotHoldIsNamed) {
+TEST(SceneData, NamesDataThatVoxCannotHold) {
   Grid grid;
   grid.set({1, 2, 3}, kTurned, {.state = 3});
   const Scene scene = scene_of(std::move(grid));
@@ -210,7 +210,7 @@ std::string fault_of(const std::vector<Record>& records) {
   return fault_of_bytes(bytes_of(records));
 }
 
-TEST(SceneData, ThatIsWrongIsRefusedWithItsPlace) {
+TEST(SceneData, RefusesInvalidDataWithItsPosition) {
   const std::string piece = "grids[0].data[0]: ";
   const std::string at = piece + "byte 16 of the voxel data: ";
   EXPECT_EQ(fault_of({{.voxels = {{.place = 1}}}}), "");

@@ -49,7 +49,7 @@ TEST(SceneFile, ReadsEveryKey) {
   EXPECT_EQ(scene->camera->position, DVec3(9));
 }
 
-TEST(SceneFile, WhatIsWrittenReadsAsItWas) {
+TEST(SceneFile, RoundTripsRandomScenes) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> number(-1e6, 1e6);
   for (int seed = 0; seed < 50; ++seed) {
@@ -157,7 +157,7 @@ TEST(SceneFile, EveryFileOfTheCorpusIsReadOrRefused) {
   EXPECT_GE(refused, 4);
 }
 
-TEST(SceneFile, WhatTheReaderWouldRefuseIsNotWritten) {
+TEST(SceneFile, WritesNothingThatTheReaderRefuses) {
   const auto code_of = [](const std::function<void(SceneFile&)>& change) {
     SceneFile scene;
     scene.sources = {{"a", "a.vox"}};

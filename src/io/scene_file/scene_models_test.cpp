@@ -270,7 +270,7 @@ TEST(SceneModels, ChunksOfEveryWidthComeBack) {
 }
 
 // What compresses too well is refused by the reader, so the writer stores it.
-TEST(SceneModels, WhatIsRegularIsStoredWhereItWouldTakeTooMuchMemory) {
+TEST(SceneModels, StoresUncompressedWhereReadingWouldTakeTooMuchMemory) {
   Scene scene;
   ASSERT_TRUE(scene.types.add({}));
   SceneGrid grid;
@@ -316,7 +316,7 @@ TEST(SceneModels, StandBesideFilesOfModels) {
   EXPECT_EQ(alone.error().message, "a scene file that names others, which only a path finds");
 }
 
-TEST(SceneModels, WhatNoFileCanHoldIsRefused) {
+TEST(SceneModels, RefusesScenesThatNoFileCanHold) {
   const auto fault = [](auto change) {
     Scene scene;
     EXPECT_TRUE(scene.types.add({}));

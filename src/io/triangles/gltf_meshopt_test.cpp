@@ -55,7 +55,7 @@ std::vector<Triangle> triangles_of(const TriangleMesh& mesh) {
   return all;
 }
 
-TEST(GltfMeshopt, WhatIsCompressedIsReadAsIfItWereNot) {
+TEST(GltfMeshopt, ReadsCompressedMeshesLikeUncompressedMeshes) {
   if (!reads_and_writes()) GTEST_SKIP() << "this build has no tinygltf or no meshoptimizer";
   for (const bool quantize : {false, true}) {
     const auto plain = read_mesh(castle(quantize, false));

@@ -139,7 +139,7 @@ Scene some_scene() {
   return scene;
 }
 
-TEST(Vdb, WhatIsWrittenIsReadAgain) {
+TEST(Vdb, RoundTripsAScene) {
   const Scene scene = some_scene();
   const auto bytes = write_vdb(scene);
   ASSERT_TRUE(bytes);
@@ -171,7 +171,7 @@ TEST(Vdb, WhatIsWrittenIsReadAgain) {
   EXPECT_EQ(*write_vdb(scene), *bytes);
 }
 
-TEST(Vdb, WhatIsLostIsSaid) {
+TEST(Vdb, ReportsLosses) {
   const Scene scene = some_scene();
   const fs::path path = fs::temp_directory_path() / ("quoin-vdb-" + std::to_string(::getpid()) + ".vdb");
   const auto losses = losses_of_saving(scene, path);

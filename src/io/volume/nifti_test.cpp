@@ -182,7 +182,7 @@ TEST(Nifti, FormsThatPlaceNothingAreLeftOutWithAWarning) {
   EXPECT_EQ(placed(second).spacing, DVec3(1));
 }
 
-TEST(Nifti, OfMoreThanThreeDimensionsTheFirstVolumeIsTaken) {
+TEST(Nifti, ReadsTheFirstVolumeOfMoreThanThreeDimensions) {
   NiftiFile file;
   file.dim = {4, 3, 2, 2, 5, 1, 1, 1};
   std::vector<double> values = kTwelve;
@@ -196,7 +196,7 @@ TEST(Nifti, OfMoreThanThreeDimensionsTheFirstVolumeIsTaken) {
   EXPECT_EQ(placed(file).size, IVec3(12, 1, 1)) << "the rest means nothing";
 }
 
-TEST(Nifti, WhatIsNotFiniteIsKeptAndCounted) {
+TEST(Nifti, KeepsAndCountsNonFiniteValues) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   NiftiFile file;
   file.datatype = 64;

@@ -202,7 +202,7 @@ TEST(Nrrd, ReadsValuesOfTheFileNextToADetachedHeader) {
   std::filesystem::remove_all(folder);
 }
 
-TEST(Nrrd, WhatIsAmissIsSaidInOneLine) {
+TEST(Nrrd, ReportsErrorsInOneLine) {
   const auto header = [](const std::string& text) { return error_of(file_of("NRRD0004\n" + text, {})); };
   EXPECT_EQ(header(""), "byte 9: no empty line ends the header");
   EXPECT_EQ(header("\n"), "byte 10: the header has no field \"dimension\"");

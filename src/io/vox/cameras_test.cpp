@@ -92,7 +92,7 @@ TEST(VoxCameras, ThoseThatNobodySetAreNone) {
   EXPECT_TRUE(loaded.warnings.empty());
 }
 
-TEST(VoxCameras, WhatCannotBeDrawnIsSkippedAndSaid) {
+TEST(VoxCameras, SkipsAndNamesUnsupportedCameras) {
   const LoadedScene loaded = file_with({{{"_mode", "pano"}, {"_radius", "5"}},
                                         {{"_angle", "1 2"}},
                                         {{"_focus", "1 2 nan"}},

@@ -164,7 +164,7 @@ TEST(VoxHostile, ChunksBeyondTheFileAreErrors) {
   EXPECT_EQ(text_of(bytes), "byte 8: the first chunk must be MAIN, not \"NAIN\"");
 }
 
-TEST(VoxHostile, WhatFollowsMainIsSkippedWithAWarning) {
+TEST(VoxHostile, SkipsBytesAfterMainWithAWarning) {
   std::vector<std::byte> bytes = file_of_one_voxel().file();
   bytes.resize(bytes.size() + 9);
   const auto loaded = read_vox(bytes);

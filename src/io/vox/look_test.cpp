@@ -65,7 +65,7 @@ std::vector<Entries> usual() {
        {"_cell", "1"}}};
 }
 
-TEST(VoxLook, OfWhatNobodySet) {
+TEST(VoxLook, ReadsTheDefaultSettings) {
   const FileLook file = look_with(usual());
   const Look& look = file.look;
   EXPECT_TRUE(file.not_drawn.empty()) << file.not_drawn.front();
@@ -90,7 +90,7 @@ TEST(VoxLook, OfWhatNobodySet) {
   EXPECT_FALSE(file.is_transparent);
 }
 
-TEST(VoxLook, OfAFileWithoutSettingsThereIsNone) {
+TEST(VoxLook, HasNoneForAFileWithoutSettings) {
   EXPECT_FALSE(file_with_settings({}).look.has_value());
 }
 
@@ -136,7 +136,7 @@ TEST(VoxLook, FogLensFilmBloomAndBackground) {
   EXPECT_TRUE(file.not_drawn.empty());
 }
 
-TEST(VoxLook, WhatIsNotDrawnOrCannotBeReadIsNamed) {
+TEST(VoxLook, NamesUnsupportedAndUnreadableSettings) {
   const FileLook file = look_with({{{"_type", "_lens"}, {"_proj", "2"}, {"_fov", "60"}, {"_aperture", "much"}},
                                    {{"_type", "_setting"}, {"_grid", "1"}, {"_scale", "2 2 2"}},
                                    {{"_type", "_inf"}, {"_i", "nan"}, {"_angle", "1 2 3"}},

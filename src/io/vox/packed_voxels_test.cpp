@@ -93,7 +93,7 @@ TEST(PackedVoxels, AreTheSameModelsAsPlainOnes) {
   }
 }
 
-TEST(PackedVoxels, WhatIsDamagedIsRefusedWithItsPlace) {
+TEST(PackedVoxels, RefusesDamageWithItsPosition) {
   const std::vector<std::byte> box(27, std::byte{1});
   const auto fault = [&](IVec3 size, std::vector<std::byte> stream) {
     FileBuilder file;

@@ -113,7 +113,7 @@ TEST(LightBricks, HoldTheLightAroundSurfaces) {
   }
 }
 
-TEST(SceneLight, OfAGridThatItDoesNotKnowIsOpenSky) {
+TEST(SceneLight, UnknownGridIsOpenSky) {
   GridHandle handle;
   const Scene scene = scene_of(LightWorld(1), handle);
   SceneLight light;

@@ -72,7 +72,7 @@ TEST(ArrayMemory, IsAtMostAByteASampleBesideInputAndOutput) {
   }
 }
 
-TEST(ArrayMemory, OfLabelsIsAtMostAByteASampleBesideInputAndOutput) {
+TEST(ArrayMemory, LabelsTakeAtMostAByteASamplePlusInputAndOutput) {
   if (!can_count()) GTEST_SKIP() << "the C library does not tell how much memory is in use";
   const Size size = {128, 64, 256};
   const auto samples = static_cast<std::size_t>(size[0] * size[1] * size[2]);

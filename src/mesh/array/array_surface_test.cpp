@@ -100,7 +100,7 @@ void expect_ball(const ArraySurface& surface, const Ball& ball, double tolerance
   EXPECT_NEAR(enclosed_volume(surface.positions, surface.indices), volume, 0.01 * volume);
 }
 
-TEST(ArraySurface, OfABallIsWhereTheBallIs) {
+TEST(ArraySurface, MatchesTheSampledBall) {
   const Ball ball{{64, 70, 81}, {31.3, 34.1, 40.7}, 27.4};
   const TestArray<float> samples = ball.samples();
   expect_ball(surface_of(ball.view(samples), kBelow), ball, 0.02, 0.9995);
@@ -389,7 +389,7 @@ TEST(ArraySurface, TakesWhatIsNoNumberAsAir) {
   expect_same(surface_of(negative.view(), kBelow), above);
 }
 
-TEST(ArraySurface, OfAFullArrayIsABoxHalfASampleLarger) {
+TEST(ArraySurface, FullArrayIsABoxHalfASampleLarger) {
   const TestArray<std::uint8_t> samples({30, 20, 50}, [](DVec3) { return std::uint8_t{1}; });
   const ArraySurface surface = surface_of(samples.view(), {0.5, SolidSide::Above, ArrayBorder::Closed, false});
   oracle::expect_manifold(count_of(surface));
@@ -399,7 +399,7 @@ TEST(ArraySurface, OfAFullArrayIsABoxHalfASampleLarger) {
   EXPECT_EQ(open.positions.size(), 0U);
 }
 
-TEST(ArraySurface, OfOneSampleIsClosed) {
+TEST(ArraySurface, OneSampleIsClosed) {
   const float one = 1.0F;
   ArrayView view{&one, ScalarType::Float32, {1, 1, 1}, {4, 4, 4}};
   const ArraySurface surface = surface_of(view);

@@ -169,7 +169,7 @@ INSTANTIATE_TEST_SUITE_P(Sizes, LabelNoise,
                                   std::to_string(param.param[2]);
                          });
 
-TEST(LabelSurfaces, OfNeighboursShareTheirInterface) {
+TEST(LabelSurfaces, NeighboursShareTheirInterface) {
   const auto labels = cells_in_a_ball(48, 31, 12);
   const LabelSurfaces surfaces = surfaces_of(labels.view());
   // Triangles from their least vertex on.
@@ -293,7 +293,7 @@ TYPED_TEST(LabelTypes, KeepTheirExtremes) {
   EXPECT_EQ(surfaces.interfaces[2].front, static_cast<std::int64_t>(kinds[0]));
 }
 
-TEST(LabelSurfaces, OfOneKindAreABoxOrNothing) {
+TEST(LabelSurfaces, OneKindIsABoxOrNothing) {
   const TestArray<std::uint16_t> labels({6, 7, 64}, [](DVec3) { return std::uint16_t{9}; });
   const LabelSurfaces box = surfaces_of(labels.view(), {0, 0});
   EXPECT_EQ(labels_of(box), std::vector<std::int64_t>{9});

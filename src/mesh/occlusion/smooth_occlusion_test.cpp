@@ -180,7 +180,7 @@ TEST(SmoothOcclusionOfPlaces, NumbersOutOfRangeCountAsForTheMesher) {
   EXPECT_EQ(at({}, -1), at({}, 0));
 }
 
-TEST(SmoothOcclusionOfPlaces, OfNoPlacesIsNothing) {
+TEST(SmoothOcclusionOfPlaces, IsEmptyWithoutPositions) {
   EXPECT_TRUE(occlusion_of(hilly_field(), {}, {}).empty());
 }
 

@@ -389,7 +389,7 @@ TEST_F(Simplify, ColoursStayWhereTheyAreAndTheMeshIsManifoldByPlaces) {
   }
 }
 
-TEST_F(Simplify, WhatStaysKeepsAllThatItHad) {
+TEST_F(Simplify, KeepsTheAttributesOfRemainingVertices) {
   const SmoothMesh whole = surface_of(sphere, 41);
   SmoothMesh mesh = whole;
   ASSERT_TRUE(simplify_smooth_mesh(mesh, 0.1F));
@@ -483,7 +483,7 @@ TEST(Manifold, SurfacesThatTouchInManyEdgesBecomeClosedOnes) {
   }
 }
 
-TEST(SimplifyErrors, WhatCannotBeLeavesTheMesh) {
+TEST(SimplifyErrors, RefusedSimplificationLeavesTheMesh) {
   SmoothMesh mesh = surface_of(sphere, 41);
   const std::size_t before = mesh.indices.size();
   for (const float error : {-1.0F, std::numeric_limits<float>::quiet_NaN()}) {

@@ -100,7 +100,7 @@ TEST(VertexWriter, WritesTheTrianglesOfTheWholeMesh) {
   }
 }
 
-TEST(VertexWriter, OfAViewWritesTheSameAsOfItsQuads) {
+TEST(VertexWriter, WritesAViewLikeItsQuads) {
   const VoxelRegistry types = oracle::mixed_types();
   VertexLayout layout = full_layout();
   std::erase_if(layout.elements, [](const VertexElement& element) {
@@ -281,7 +281,7 @@ TEST(VertexWriterDeathTest, ALayoutThatCannotBeWrittenIsAMistake) {
                        "a layout that can be written");
 }
 
-TEST(VertexWriterDeathTest, WhatDoesNotFitIsAMistake) {
+TEST(VertexWriterDeathTest, MismatchedBuffersAndLayoutsAreMistakes) {
   const VertexWriter writer({16, {{VertexAttribute::Position, Sint16x4, 0}, {VertexAttribute::Uv, Uint8x2, 8}}}, {});
   const QuadBuffer quads(2);
   std::vector<std::byte> out(8 * 16 - 1);

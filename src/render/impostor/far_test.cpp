@@ -17,7 +17,7 @@ namespace {
 
 using namespace render_test;
 
-TEST(RenderFar, WhatIsNotReadyInTimeIsTraced) {
+TEST(RenderFar, TracesImpostorsThatAreNotReadyInTime) {
   const ImpostorWorld world(Model::Castle);
   RenderOptions options = sized(148, 148);
   const Camera camera = orbiting(world, 0.7, 0.6, 0.0, 100.0, 148);

@@ -154,7 +154,7 @@ TEST(Impostor, BlackVoxelsAreNoHoles) {
   }
 }
 
-TEST(Impostor, OfNothingIsEmpty) {
+TEST(Impostor, IsEmptyForAnEmptyGrid) {
   EXPECT_TRUE(Impostor().empty());
   const VoxelRegistry types = two_types();
   const Grid grid;

@@ -142,7 +142,7 @@ TEST(Surfels, AnEditMakesThemAnew) {
   EXPECT_FALSE(cache.find(world.scene, grid)->empty());
 }
 
-TEST(Surfels, WhatIsTooLargeOrThinIsTraced) {
+TEST(Surfels, TracesModelsThatAreTooLargeOrThin) {
   EXPECT_FALSE(surfels_of(field_of(Model::SmoothBall), 100).has_value());
   const ImpostorWorld rods(Model::SmoothRods);
   EXPECT_TRUE(rods.impostor.is_left_to_rays());

@@ -104,7 +104,7 @@ TEST(PathMedia, WhiteFogAndCloudsCannotBeSeen) {
 }
 
 // Black fog transmits e^-length, for visible surfaces and for their lighting.
-TEST(PathMedia, WhatPassesFallsWithTheLength) {
+TEST(PathMedia, TransmissionFallsExponentiallyWithLength) {
   VoxelProperties lamp;
   lamp.colour = {255, 255, 255, 255};
   lamp.emission = 1.0F;

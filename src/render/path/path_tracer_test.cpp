@@ -411,7 +411,7 @@ TEST(PathTracer, GroundCatchesShadowsAndIsNotSeenItself) {
   EXPECT_EQ(picture.alpha[at(32, 32)], 1.0F);
 }
 
-TEST(PathTracer, WhatIsInFocusStaysSharp) {
+TEST(PathTracer, FocusedObjectsStaySharp) {
   Scene scene;
   const VoxelType black = add_type(scene, {0, 0, 0, 255});
   const VoxelType white = add_type(scene, kWhite, Visibility::Opaque, 1.0F);
@@ -472,7 +472,7 @@ Scene dim_yard() {
 }
 
 // Each pixel covers one place, so the place learns from the pixel's own samples.
-TEST(PathTracer, WhatPlacesRememberOfLampsDarkensNothing) {
+TEST(PathTracer, LearnedLampSharesDarkenNothing) {
   const Scene scene = dim_yard();
   const PathTracer tracer(scene);
   PathOptions options = under_even_sky(32, 32, 4);

@@ -52,7 +52,7 @@ TEST_F(VulkanMemory, PlacesNeverOverlapAndBlocksAreGivenBack) {
   EXPECT_EQ(memory.block_count(), 1U);
 }
 
-TEST_F(VulkanMemory, WhatIsWrittenArrives) {
+TEST_F(VulkanMemory, WritesArrive) {
   DeviceMemory memory(*device_, 1 << 20);
   // More than is staged at a time.
   std::vector<std::uint32_t> values(5'000'000);

@@ -165,7 +165,7 @@ TEST_F(VulkanBorrowed, DevicesThatLackSomethingAreRefused) {
   expect_error(lent, ErrorCode::Unsupported, "the instance lacks vkGetPhysicalDeviceFeatures2");
 }
 
-TEST_F(VulkanBorrowed, WhatIsRequiredIsChecked) {
+TEST_F(VulkanBorrowed, ChecksPreconditions) {
   const Scene scene = golden::terrain_scene();
   VulkanRenderer one = renderer();
   ASSERT_TRUE(one.update(scene));

@@ -192,7 +192,7 @@ TEST_F(VulkanDetail, GridsThatAreGoneLeaveNothing) {
   EXPECT_EQ(halved_bytes(), 0U);
 }
 
-TEST_F(VulkanDetail, WhatPicturesNoLongerUseGivesWay) {
+TEST_F(VulkanDetail, EvictsImpostorsThatNoPictureUses) {
   const std::vector<GridHandle> grids = {add_blobs(scene_, 31), add_blobs(scene_, 32)};
   add_crowd(scene_, grids, 2, 260.0);
   ASSERT_TRUE(renderer_->update(scene_));

@@ -84,7 +84,7 @@ TEST_F(VulkanField, FromWithinAndFromAbove) {
 }
 
 // Glowing balls over hills, a house and a lantern; near, halved and from an impostor.
-TEST_F(VulkanField, WhatGlowsLightsItsSurroundings) {
+TEST_F(VulkanField, EmissiveSamplesLightTheirSurroundings) {
   Scene scene;
   const FieldTypes types = add_field_types(scene);
   SceneGrid grid = village(types);

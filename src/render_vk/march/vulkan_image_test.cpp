@@ -201,7 +201,7 @@ TEST_F(VulkanImages, HaveMeshesToo) {
   EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
 }
 
-TEST_F(VulkanImages, ThatCannotBeAreRefused) {
+TEST_F(VulkanImages, RefusesInvalidTargets) {
   OwnImage image(*own_, VK_FORMAT_R8G8B8A8_UNORM, 40, 30);
   const VulkanImageTarget right = image.target();
   expect_error(right, ErrorCode::InvalidArgument, "nothing was drawn");

@@ -152,7 +152,7 @@ TEST_F(VulkanImpostors, FarFromTheOriginAndTheCamera) {
 }
 
 // Their fields too, turned and mirrored.
-TEST_F(VulkanImpostors, OfFieldsFarFromTheOriginAndTheCamera) {
+TEST_F(VulkanImpostors, FieldsFarFromTheOriginAndTheCamera) {
   ImpostorWorld world(Model::Village);
   scene_ = std::move(world.scene);
   const GridHandle village = scene_.instances()[world.instance].grid;
@@ -225,7 +225,7 @@ TEST_F(VulkanImpostors, HiddenInstancesShowWhereTheyAreWanted) {
 }
 
 // Voxels smaller than texels, which grow to the size of these.
-TEST_F(VulkanImpostors, OfALargeGrid) {
+TEST_F(VulkanImpostors, LargeGrid) {
   add_model(Model::Terrain);
   const ImpostorWorld world(Model::Terrain);
   for (const int view : {0, 1, 2}) {
@@ -271,7 +271,7 @@ TEST_F(VulkanImpostors, RandomScenesAndPolicies) {
   }
 }
 
-TEST_F(VulkanImpostors, WhatIsNotReadyInTimeIsTraced) {
+TEST_F(VulkanImpostors, TracesImpostorsThatAreNotReadyInTime) {
   add_model(Model::Castle);
   const ImpostorWorld world(Model::Castle);
   const Camera camera = orbiting(world, 0.7, 0.6, 0.0, 100.0, 148);

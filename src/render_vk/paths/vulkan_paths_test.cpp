@@ -253,7 +253,7 @@ TEST_F(VulkanPaths, AreAsExactFromFarAway) {
   expect_same_light(scene, camera, options, "far", 0.01);
 }
 
-TEST_F(VulkanPaths, OfNothingAreTheSky) {
+TEST_F(VulkanPaths, EmptySceneShowsTheSky) {
   expect_same_light(Scene(), of_town(), small(), "nothing", 0.0);
 }
 

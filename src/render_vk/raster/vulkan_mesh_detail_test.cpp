@@ -191,7 +191,7 @@ TEST_F(VulkanMeshDetail, EditsShowInEveryDetail) {
 }
 
 // Without waiting, grids without an impostor are drawn halved, and all grids are drawn.
-TEST_F(VulkanMeshDetail, WhatHasNoImpostorYetIsDrawnHalved) {
+TEST_F(VulkanMeshDetail, DrawsGridsWithoutAnImpostorHalved) {
   add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 3, 260.0);
   make_opaque();
   put(scene_, blocky_surfaces(scene_, false));

@@ -103,7 +103,7 @@ TEST_F(VulkanMeshGlass, OrderIsThatOfTheCameraAndNotOfChunksOrInstances) {
   compare_both(scene, towards({12, 11, 400}, {10, 10, 5}, 0.06), options, "panes_perspective");
 }
 
-TEST_F(VulkanMeshGlass, WhatIsSolidHidesGlassBehindIt) {
+TEST_F(VulkanMeshGlass, SolidVoxelsHideGlassBehindThem) {
   Scene scene;
   const Types types = add_types(scene);
   Grid grid;
@@ -114,7 +114,7 @@ TEST_F(VulkanMeshGlass, WhatIsSolidHidesGlassBehindIt) {
 }
 
 // Drawn face by face, water of any depth differs from the CPU's, which counts its voxels; all other pixels match.
-TEST_F(VulkanMeshGlass, WhatIsNotSeenThroughGlassIsThatOfTheProcessor) {
+TEST_F(VulkanMeshGlass, MatchesTheCpuExceptThroughGlass) {
   Scene scene = golden::terrain_scene();
   const golden::GoldenView& view = golden::kViews[0];
   const Camera camera = golden::camera_for(view);

@@ -73,7 +73,7 @@ TEST_F(VulkanMeshUpdate, SurfacesAreReplacedAndRemoved) {
   EXPECT_EQ(meshes_->stats().bytes, 0U);
 }
 
-TEST_F(VulkanMeshUpdate, OfOneChunkInOneCallTheLastCounts) {
+TEST_F(VulkanMeshUpdate, LastUpdateOfAChunkInACallCounts) {
   const Scene scene = boxes();
   const std::vector<SurfaceUpdate> right = blocky_surfaces(scene);
   SurfaceUpdate wrong = right[0];

@@ -220,7 +220,7 @@ TEST(SceneEdit, TheJournalsTellOfIt) {
   EXPECT_TRUE(placed.scene.changes_since(cursor).empty());
 }
 
-TEST(SceneEdit, WhatIsNotFiniteOrNegativeChangesNothing) {
+TEST(SceneEdit, NonFiniteOrNegativeInputChangesNothing) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
   Random random(2);

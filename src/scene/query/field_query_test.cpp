@@ -373,7 +373,7 @@ TEST(FieldQuery, TouchingIsNotMeeting) {
   EXPECT_EQ(hit->normal, DVec3(0, 1, 0));
 }
 
-TEST(FieldQuery, WhatIsNoNumberMeetsNothing) {
+TEST(FieldQuery, NonFiniteInputMeetsNothing) {
   const Scene scene = scene_of(
       [] {
         DensityGrid ball;

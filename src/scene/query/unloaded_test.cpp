@@ -95,7 +95,7 @@ TEST(UnloadedRays, AMissIsCertainOnlyWhereAllIsLoaded) {
   EXPECT_FALSE(first_hit(tracer, level, kInfinity, {.ignored = {&world.instance, 1}, .unloaded = UnloadedChunks::Met}));
 }
 
-TEST(UnloadedRays, OfWholeGridsNothingIsNotLoaded) {
+TEST(UnloadedRays, WholeGridsHaveNoUnloadedChunks) {
   Scene scene;
   SceneGrid content;
   content.grid.set(0, 0, 0, 1);

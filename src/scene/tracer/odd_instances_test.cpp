@@ -89,7 +89,7 @@ TEST(OddInstances, AZeroRotationIsNone) {
   EXPECT_EQ(chosen[0].distance, chosen[1].distance);
 }
 
-TEST(OddInstances, WhatIsNotFiniteOrHasNoSizeIsLeftOutOfEverything) {
+TEST(OddInstances, IgnoresNonFiniteAndSizelessInstances) {
   SlabScene world;
   std::vector<Instance> odd;
   for (const double bad : {kNan, kInfinity, -kInfinity}) {

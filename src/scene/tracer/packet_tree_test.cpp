@@ -100,7 +100,7 @@ TEST(PacketTree, VisitsNearerBoxesFirstAndNoneBeyondReach) {
   EXPECT_EQ(order, (std::vector<std::size_t>{0, 1, 2, 3, 4, 5, 6, 7}));
 }
 
-TEST(PacketTree, WhatIsNoNumberOrHasNoDirectionHangsNothingAndHidesNoOtherRay) {
+TEST(PacketTree, IgnoresNonFiniteAndDirectionlessRays) {
   const DBox unit{DVec3(-1.0), DVec3(1.0)};
   const PacketTree tree(InstanceTree({unit, DBox{}, unit, unit, unit, unit, unit}), DVec3(0.0));
   RayPacket rays;

@@ -87,7 +87,7 @@ TEST(LuantiMap, AFolderHasItsName) {
   EXPECT_EQ((*source)->info().spawn, DVec3(0.0, 0.0, -0.5));
 }
 
-TEST(LuantiMap, ThatIsKeptElsewhereIsSaid) {
+TEST(LuantiMap, ReportsUnsupportedBackends) {
   const WorldFolder folder;
   const std::string text = "backend = leveldb\n";
   ASSERT_TRUE(write_file(std::as_bytes(std::span(text)), folder / "world.mt"));
@@ -121,7 +121,7 @@ TEST(LuantiMap, IsKnownByItsTable) {
   EXPECT_NE(refused.error().message.find("no table of blocks"), std::string::npos);
 }
 
-TEST(LuantiMap, WhatIsBrokenIsNamedAndLeftOut) {
+TEST(LuantiMap, NamesAndSkipsBrokenBlocks) {
   const WorldFolder folder;
   Bytes cut = row_of(some_block(), 28);
   cut.resize(cut.size() / 2);

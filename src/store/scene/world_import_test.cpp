@@ -82,7 +82,7 @@ TEST_F(WorldImport, KeepsTheLampsOfLightBlocks) {
   EXPECT_EQ(scene.lamps.front().range, 15.0);
 }
 
-TEST_F(WorldImport, WhatWasStoppedAnywhereEndsAsIfItHadNotBeen) {
+TEST_F(WorldImport, ResumedImportsMatchUninterruptedImports) {
   const auto source = open();
   ASSERT_TRUE(import_world(*source, folder / "whole.quoin", {1}));
   int stopped = 0;

@@ -231,7 +231,7 @@ TEST(WorldSaver, GoesOnWithWhatWasLoaded) {
   EXPECT_TRUE(WorldStore::open(path, WorldAccess::Read)->value("time")->has_value());
 }
 
-TEST(WorldSaver, WhatWasRefusedIsSavedTheNextTime) {
+TEST(WorldSaver, SavesRefusedChangesTheNextTime) {
   const WorldFolder folder;
   KeptWorld kept(folder / "w.quoin");
   Scene scene = rich_scene();
@@ -300,7 +300,7 @@ TEST(WorldSaver, CancelledLeavesNothing) {
   EXPECT_EQ(loaded.error().code, ErrorCode::Cancelled);
 }
 
-TEST(WorldSaver, WhatIsDamagedIsNotOverwritten) {
+TEST(WorldSaver, KeepsDamagedChunks) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   ASSERT_TRUE(save_scene(rich_scene(), path));

@@ -146,7 +146,7 @@ TEST(Migration, ACopyIsKeptWhereRowsChange) {
   EXPECT_EQ(WorldStore::open(path, WorldAccess::Write).error().code, ErrorCode::Unsupported);
 }
 
-TEST(Migration, WhereAStepFailsAllIsAsItWas) {
+TEST(Migration, FailedStepsLeaveTheWorldUnchanged) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   make_world(path);

@@ -76,7 +76,7 @@ TEST(WorldStore, ChunksValuesTypesAndGridsSurviveAReopening) {
   EXPECT_FALSE(std::filesystem::exists(path.string() + "-shm"));
 }
 
-TEST(WorldStore, WhatIsSavedIsReadBeforeItIsOnDisk) {
+TEST(WorldStore, ReadsSavedChunksBeforeTheyAreOnDisk) {
   const WorldFolder folder;
   WorldStore world = made(folder / "w.quoin");
   for (std::uint32_t i = 0; i < 300; ++i) {

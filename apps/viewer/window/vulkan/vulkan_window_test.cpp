@@ -183,7 +183,7 @@ TEST_F(VulkanWindowTest, PicturesOfTheProcessorAreShownToo) {
   EXPECT_TRUE(window->present(160, 90, &picture, {0, 0, 160, 90}, {}));
 }
 
-TEST_F(VulkanWindowTest, WhatCannotBeIsTold) {
+TEST_F(VulkanWindowTest, ReportsUnsupportedDevices) {
   const auto expect_refusal = [](const WindowDeviceOptions& wrong, const std::string& why) {
     const auto made = WindowDevice::create(wrong);
     ASSERT_FALSE(made);

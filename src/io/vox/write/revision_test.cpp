@@ -163,7 +163,7 @@ std::vector<std::byte> house() {
   return file.file(200);
 }
 
-TEST(VoxRevision, WhatNobodyEditedIsTheSameFile) {
+TEST(VoxRevision, WritesTheSameFileWithoutEdits) {
   const auto bytes = house();
   for (const int frame : {0, 3, 5, 12}) EXPECT_EQ(save(load(bytes, frame)), bytes) << frame;
 }
@@ -569,7 +569,7 @@ TEST(VoxRevision, BytesAfterTheVoxelsStay) {
   EXPECT_NE(std::ranges::search(written, kSecret).begin(), written.end());
 }
 
-TEST(VoxRevision, WhatIsHiddenAndWasShownIsSavedAsShown) {
+TEST(VoxRevision, SavesHiddenModelsAsShownWhenTheyWereShown) {
   const auto bytes = house();
   const auto shown = read_vox(bytes, {.show_hidden = true});
   ASSERT_TRUE(shown);
@@ -579,7 +579,7 @@ TEST(VoxRevision, WhatIsHiddenAndWasShownIsSavedAsShown) {
   }
 }
 
-TEST(VoxRevision, WhatASceneCannotHoldIsNamed) {
+TEST(VoxRevision, NamesContentThatASceneCannotHold) {
   const auto lines = only_in_source(*load(house()).source);
   const std::vector<std::string> expected = {
       "animation: frames 0 to 24", "cameras: 10", "chunks QQQQ: 1", "chunks xxxx: 1", "notes: 1", "render settings: 1"};

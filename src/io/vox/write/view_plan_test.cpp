@@ -168,7 +168,7 @@ std::size_t count_of(const std::vector<std::byte>& bytes, std::string_view text)
   return count;
 }
 
-TEST(VoxViewWriting, WhatDidNotChangeIsTheSameFile) {
+TEST(VoxViewWriting, WritesTheSameFileWithoutChanges) {
   const std::vector<std::byte> file = file_with_views();
   EXPECT_EQ(write_vox(read_vox(file).value()).value().bytes, file);
 }

@@ -237,7 +237,7 @@ TEST(VoxWrite, TypesBelow256KeepTheirIndicesNamesAndProperties) {
 }
 
 // MagicaVoxel has no such key: it is stored under Quoin's own key, independent of the type's other properties.
-TEST(VoxWrite, WhetherATypeCollidesIsKeptWithoutAWarning) {
+TEST(VoxWrite, KeepsCollisionOfTypesWithoutAWarning) {
   Scene scene = scene_with_types(4);
   for (VoxelType type = 1; type <= 4; ++type) {
     VoxelProperties properties = scene.types[type];
@@ -280,7 +280,7 @@ TEST(VoxWrite, MoreThan255TypesAreRefused) {
   EXPECT_EQ(written.error().message, "the scene uses 256 voxel types; a .vox file holds 255");
 }
 
-TEST(VoxWrite, WhatVoxCannotSayIsRefused) {
+TEST(VoxWrite, RefusesScenesThatVoxCannotHold) {
   Scene scene = scene_with_types(1);
   SceneGrid grid;
   grid.grid.set({0, 0, 0}, 1);

@@ -139,7 +139,7 @@ TEST_F(PathHistoryTest, WithoutAnEditPicturesStayAsTheyAre) {
   EXPECT_GE(history_.bytes(), 4U * kSamples.size() * kEdge * kEdge);
 }
 
-TEST_F(PathHistoryTest, WhatAnEditDidNotChangeStaysAsItWas) {
+TEST_F(PathHistoryTest, KeepsPixelsUnaffectedByAnEdit) {
   converge();
   const PathPicture before = take(kEdge, kSamples.back());
   edit(2);
@@ -256,7 +256,7 @@ TEST_F(PathHistoryTest, SmallPicturesAreShownInTheLargeOnesPlace) {
   EXPECT_GT(greatest_difference(shown, before), 0.1F) << "and the tower is there";
 }
 
-TEST_F(PathHistoryTest, WhatIsNotKnownStaysAsItIs) {
+TEST_F(PathHistoryTest, KeepsPixelsWithoutHistory) {
   converge();
   edit(2);
   const PathPicture taken = take(kEdge, 2);
