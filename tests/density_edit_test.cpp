@@ -23,7 +23,7 @@ void append_bytes(const Buffer<T>& values, std::string& out) {
   out.push_back('|');
 }
 
-/// The bytes of the mesh of every chunk that could hold a surface.
+/// The mesh bytes of every chunk that could hold a surface.
 class Meshes {
  public:
   explicit Meshes(const SmoothOptions& options) : options_(options) {}
@@ -78,7 +78,7 @@ void edit_somewhere(DensityGrid& grid, std::mt19937& random) {
   }
 }
 
-// Every chunk whose mesh an edit changed is told of, with whatever occlusion it was meshed.
+// Edits report every chunk whose mesh they changed, with any meshed occlusion.
 TEST(DensityEdits, NoMeshChangesUntold) {
   constexpr unsigned kSeed = 41;
   SCOPED_TRACE(kSeed);

@@ -14,7 +14,7 @@
 namespace quoin {
 namespace {
 
-// The demo's fleet is what no .vox holds: ships that turn every way, of half a unit a voxel.
+// The demo fleet has properties that no .vox file can hold: ships turned by any angle, with voxels of half a unit.
 TEST(Fleet, ItsPictureFromTheWrittenFileIsTheOriginals) {
   const auto fleet = demo::make_fleet();
   ASSERT_TRUE(fleet);

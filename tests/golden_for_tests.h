@@ -11,18 +11,18 @@
 #include <quoin/core/image.h>
 #include <quoin/io/picture_files.h>
 
-/// Comparing pictures with golden ones.
+/// Compares images with golden images.
 namespace quoin {
 
 struct PictureDifference {
-  std::int64_t pixels = 0;  ///< that differ in any channel
-  int greatest = 0;         ///< of any channel
-  /// Black where the two agree; elsewhere how much each channel differs, from a quarter of full brightness upwards, so
-  /// that a difference of 1 is seen.
+  std::int64_t pixels = 0;  /// pixels that differ in any channel
+  int greatest = 0;         /// the greatest difference of any channel
+  /// Black where the images agree; elsewhere the difference of each channel, from a quarter of full brightness upwards
+  /// to make a difference of 1 visible.
   Image image;
 };
 
-/// Requires: both are of one size.
+/// Requires: both images have the same size.
 inline PictureDifference difference_of(const Image& a, const Image& b) {
   PictureDifference difference{0, 0, {a.width, a.height, std::vector<std::uint8_t>(a.rgb.size())}};
   for (std::size_t pixel = 0; pixel < a.rgb.size(); pixel += 3) {
@@ -38,7 +38,7 @@ inline PictureDifference difference_of(const Image& a, const Image& b) {
   return difference;
 }
 
-/// Where golden pictures lie, and where the pictures of a failure go.
+/// The folders of golden images and of the images of failed comparisons.
 struct GoldenFolders {
   std::filesystem::path golden;
   std::filesystem::path failures;
@@ -48,8 +48,8 @@ inline GoldenFolders golden_folders() {
   return {QUOIN_SOURCE_DIR "/tests/golden", QUOIN_BINARY_DIR "/golden"};
 }
 
-/// Whether a picture is the golden one of its name, in every pixel. If not, NAME.actual.png and (where the sizes agree)
-/// NAME.difference.png are written among the failures; if so, such files of an earlier failure go.
+/// Returns success if an image equals the golden image of its name in every pixel. Otherwise writes NAME.actual.png and
+/// (where the sizes agree) NAME.difference.png into the failures folder. Removes such files of earlier failures.
 inline ::testing::AssertionResult is_golden(const Image& actual, const std::string& name,
                                             const GoldenFolders& folders) {
   const auto path = folders.golden / (name + ".png");

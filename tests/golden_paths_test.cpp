@@ -1,4 +1,4 @@
-// Pictures by paths, compared with golden ones to the last bit; accepted as those of golden_test.cpp.
+// Compares path-traced images with golden images to the last bit. Accepts them in the same way as golden_test.cpp.
 
 #include <array>
 #include <cstdlib>
@@ -20,7 +20,7 @@ using namespace golden;
 
 struct PathView {
   const char* name;
-  bool is_town;  // else the terrain
+  bool is_town;  // otherwise the terrain
   DVec3 sun;
   double exposure;
 };
@@ -64,7 +64,7 @@ TEST_P(GoldenPaths, PictureIsTheGoldenOneWithAnyInstructionsAndThreads) {
   EXPECT_EQ(difference_of(taken(view, options_of(view), {1}), usual).pixels, 0);
 }
 
-// Each fails where what it is about is off.
+// Each golden image fails when its feature is switched off.
 TEST_P(GoldenPaths, ATwinWithoutBouncesLampsOrSunIsAnother) {
   const PathView& view = GetParam();
   const auto golden = read_png(golden_folders().golden / (std::string(view.name) + ".png"));

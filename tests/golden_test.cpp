@@ -1,5 +1,5 @@
-// Pictures of a terrain, compared with golden ones to the last bit. QUOIN_ACCEPT_GOLDEN=1 (`./dev golden --accept`)
-// makes what is rendered the golden pictures instead.
+// Compares images of a terrain with golden images to the last bit. QUOIN_ACCEPT_GOLDEN=1 (`./dev golden --accept`)
+// replaces the golden images with the rendered images.
 
 #include <array>
 #include <cmath>
@@ -27,7 +27,7 @@ const GoldenView& view_called(const std::string& name) {
   return *std::find_if(kViews.begin(), kViews.end(), [&](const GoldenView& view) { return view.name == name; });
 }
 
-/// The same terrain without what lies beyond x = 64.
+/// The same terrain, cut off at x = 64.
 Scene scene_without_neighbours() {
   VoxelRegistry types;
   Grid grid = terrain(types);
@@ -39,7 +39,7 @@ Picture render(const Scene& scene, const GoldenView& view, const RenderOptions& 
   return CpuRenderer(scene).render(camera_for(view), options, threads).value();
 }
 
-/// How many pixels of the golden picture the twin gets wrong.
+/// Returns the number of pixels in which the twin differs from the golden image.
 std::int64_t wrong_pixels(const Picture& twin, const GoldenView& view) {
   const auto golden = read_png(golden_folders().golden / (std::string(view.name) + ".png"));
   if (!golden || golden->rgb.size() != twin.colour.rgb.size()) {
@@ -97,7 +97,7 @@ TEST(GoldenTwin, BoundaryViewFailsWithoutTheNeighbour) {
   const Picture whole = render(terrain_scene(), view, options);
   const Picture halved = render(scene_without_neighbours(), view, options);
   EXPECT_GT(wrong_pixels(halved, view), kPixels / 3) << "of " << kPixels;
-  // On what is still there, too: light is blocked across the border.
+  // The remaining half changes too: the missing half no longer blocks light across the border.
   int same_place = 0;
   int other_light = 0;
   for (std::size_t i = 0; i < whole.depth.values.size(); ++i) {

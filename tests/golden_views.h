@@ -8,14 +8,14 @@
 #include <quoin/render/cpu_renderer.h>
 #include <quoin/terrain/terrain.h>
 
-/// What the golden pictures show, and from where.
+/// The scenes and views of the golden images.
 namespace quoin::golden {
 
 inline constexpr int kWidth = 320;
 inline constexpr int kHeight = 180;
 inline constexpr std::int64_t kPixels = kWidth * kHeight;
 
-/// Axes as everywhere, +Y up; the terrain fills 128 x 64 x 128 voxels from the origin, two chunks along x and z.
+/// Uses Quoin's axes, +Y up; the terrain fills 128 x 64 x 128 voxels from the origin, two chunks along x and z.
 struct GoldenView {
   const char* name;
   DVec3 position;
@@ -29,7 +29,7 @@ inline void PrintTo(const GoldenView& view, std::ostream* out) {
 }
 
 inline const DVec3 kUsualSun = LightOptions{}.sun;
-/// From behind the ridge, so that its shadow falls over the slope and the water before it.
+/// From behind the ridge, whose shadow falls over the slope and the water in front.
 inline const DVec3 kLowSun{-1.0, 0.9, -0.5};
 
 inline const std::array<GoldenView, 7> kViews = {{

@@ -1,4 +1,4 @@
-// The mesh of a halved grid is the grid's coarse mesh.
+// The mesh of a halved grid equals the grid's coarse mesh.
 
 #include <gtest/gtest.h>
 

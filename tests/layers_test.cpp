@@ -1,5 +1,5 @@
-// A folder includes only folders above it, and never a sibling on its own level; what of a layer is private stays there
-// but for what is listed here; rooms do not lean on each other in a circle.
+// A folder includes only folders above it, and never a sibling on its own level. The private headers of a layer stay
+// private except for the headers listed here. The rooms of a layer do not include each other in a circle.
 
 #include <algorithm>
 #include <filesystem>
@@ -25,8 +25,8 @@ const std::map<std::string, int> kLevels = {{"core", 0},      {"grid", 1},     {
                                             {"render_vk", 6}, {"formats", 7},  {"stream", 7}};
 constexpr int kAppsLevel = 8;
 
-// Private headers that layers above use too, and which. A new line is a decision: the alternative is a public header,
-// or a function where the data is. What core has is for all.
+// Lists the private headers that higher layers use, and the users. A new line is a decision: the alternative is a
+// public header, or a function next to the data. All layers may use the headers of core.
 const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"grid/chunk/chunk_difference.h", {"live"}},
     {"grid/chunk/chunk_storage.h", {"io", "live", "mesh", "render_vk", "store", "trace"}},
@@ -95,11 +95,12 @@ const std::map<std::string, std::set<std::string>> kLentHeaders = {
     {"store/chunk/content.h", {"stream"}},
 };
 
-// A folder with more files is several rooms in one.
+// A folder with more files should be split.
 constexpr int kMaxFiles = 32;
 const std::map<std::string, int> kLargerFolders = {};
 
-// Why a file of `folder` may not include `path`, if so. Paths are as written: <quoin/grid/grid.h> or "grid/x.h".
+// Returns the reason if a file of `folder` must not include `path`. Paths are as written: <quoin/grid/grid.h> or
+// "grid/x.h".
 std::optional<std::string> breach(const std::string& folder, int level, const std::string& path) {
   const std::string inner = path.rfind("quoin/", 0) == 0 ? path.substr(6) : path;
   const auto slash = inner.find('/');
@@ -117,7 +118,7 @@ bool is_test(const fs::path& file) {
   return std::regex_search(file.stem().string(), std::regex("_(test|bench|fuzz|oracle)$"));
 }
 
-// Tests, and what they share: they may look into any layer.
+// Tests and their shared headers may include headers of any layer.
 bool is_for_tests(const fs::path& file) {
   return is_test(file) || std::regex_search(file.stem().string(), std::regex("_(fixture|for_tests|support)$"));
 }
@@ -129,7 +130,7 @@ struct Include {
 
 struct Source {
   fs::path file;
-  fs::path place;  // from the top: grid/chunk/chunk.cpp
+  fs::path place;  // relative to the top: grid/chunk/chunk.cpp
   std::vector<Include> includes;
   [[nodiscard]] std::string layer() const { return place.begin()->string(); }
 };
@@ -145,7 +146,7 @@ std::vector<Include> includes_of(const fs::path& file) {
   return found;
 }
 
-// All sources below a folder of the repository, tests too.
+// Returns all sources below a folder of the repository, including tests.
 std::vector<Source> sources_of(const std::string& top) {
   std::vector<Source> found;
   const fs::path root = fs::path(QUOIN_SOURCE_DIR) / top;
@@ -157,7 +158,7 @@ std::vector<Source> sources_of(const std::string& top) {
   return found;
 }
 
-// Why a file of a layer may not include another's private header, if so.
+// Returns the reason if a file of a layer must not include another layer's private header.
 std::optional<std::string> trespass(const std::string& layer, const Include& include) {
   if (!include.quoted) return std::nullopt;
   const std::string owner = fs::path(include.path).begin()->string();
@@ -167,7 +168,8 @@ std::optional<std::string> trespass(const std::string& layer, const Include& inc
   return include.path + " is private to " + owner + ", and not lent to " + layer;
 }
 
-// The room of a file or an include within its layer: "chunk" of grid/chunk/chunk.h, "" of what the layer's rooms share.
+// Returns the room of a file or an include within its layer: "chunk" for grid/chunk/chunk.h, "" for files that the
+// layer's rooms share.
 std::string room_of(const fs::path& place) {
   const std::string room = place.parent_path().lexically_relative(*place.begin()).generic_string();
   return room == "." ? "" : room;
@@ -175,7 +177,7 @@ std::string room_of(const fs::path& place) {
 
 using Graph = std::map<std::string, std::set<std::string>>;
 
-// A way round from a node to itself, if there is one.
+// Returns a path from a node back to itself, if there is one.
 std::vector<std::string> circle_in(const Graph& graph) {
   std::set<std::string> done;
   std::vector<std::string> path;
@@ -257,7 +259,7 @@ TEST(Layers, PrivateHeadersAreUsedInTheirLayerOrLent) {
   }
 }
 
-// Of what the checks here rest on.
+// The other tests rely on this.
 TEST(Layers, IncludesAreFound) {
   std::set<std::string> found;
   for (const Include& include : includes_of(__FILE__)) {
@@ -278,7 +280,7 @@ TEST(Layers, TheHeaderOfEverythingIncludesEveryPublicHeader) {
   }
 }
 
-// Sources of tests are found by their names and compiled together: none of them may get lost on the way.
+// Test sources are found by their names and compiled together; none may get lost.
 TEST(Layers, EverySourceOfTestsIsPartOfThisProgram) {
   std::set<fs::path> run;
   const testing::UnitTest& all = *testing::UnitTest::GetInstance();
@@ -308,10 +310,10 @@ TEST(Layers, PublicHeadersIncludeNoPrivateOnes) {
   }
 }
 
-// What one source alone needs belongs in it, unless it is long enough to be read by itself.
+// A header that serves a single source belongs in that source, unless it is long enough to be read by itself.
 TEST(Layers, SmallHeadersWithoutASourceAreShared) {
   constexpr int kSmall = 60;
-  const std::set<std::string> choices = {"lanes.h"};  // one of several, by the flags of whoever includes it
+  const std::set<std::string> choices = {"lanes.h"};  // one of several, chosen by the flags of the including source
   std::map<std::string, std::set<fs::path>> users;
   std::vector<fs::path> small;
   for (const char* top : {"src", "apps"}) {
@@ -333,7 +335,7 @@ TEST(Layers, SmallHeadersWithoutASourceAreShared) {
   }
 }
 
-// So that the folder of whatever a file leans on can be read in the file. What is generated has no folder.
+// The path shows the folder of each header in use. Generated headers have no folder.
 TEST(Layers, PrivateHeadersAreNamedByTheirFullPath) {
   const fs::path root = QUOIN_SOURCE_DIR;
   for (const Source& source : sources_of("src")) {
@@ -353,7 +355,7 @@ TEST(Layers, ACircleOfRoomsIsFound) {
   EXPECT_EQ(room_of("grid/grid.cpp"), "");
 }
 
-// Any room may use what its layer's rooms share, and that may use the rooms.
+// Any room may use the shared files of its layer, and shared files may use the rooms.
 TEST(Layers, RoomsOfALayerDoNotLeanOnEachOtherInACircle) {
   std::map<std::string, Graph> layers;
   for (const Source& source : sources_of("src")) {
@@ -373,7 +375,7 @@ TEST(Layers, RoomsOfALayerDoNotLeanOnEachOtherInACircle) {
   }
 }
 
-// A header that only tests include says so by its name, and one that says so is included by nothing else.
+// The name of a header says whether only tests include it; other sources include no such header.
 TEST(Layers, TestHeadersSaySoByName) {
   std::set<std::string> used;
   for (const char* top : {"src", "apps"}) {

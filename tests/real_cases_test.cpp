@@ -1,4 +1,4 @@
-// Small inputs that people ran into, as tests/corpus/cases has them: one test per kind of fault.
+// Small inputs of real bug reports, stored in tests/corpus/cases: one test per kind of fault.
 
 #include <algorithm>
 #include <filesystem>
@@ -267,7 +267,7 @@ TEST(GoxelCases, ReadsShapeLayers) {
   EXPECT_TRUE(loaded.warnings.empty());
 }
 
-// 65,535 names are promised in a file of 15 bytes: none of them is looked up.
+// A file of 15 bytes promises 65,535 names: the reader looks up none of them.
 TEST(LuantiCases, RefusesNamesThatAreCutOff) {
   const auto loaded = load_scene(case_file("mts-names-cut-off.mts"));
   ASSERT_FALSE(loaded);
@@ -275,7 +275,7 @@ TEST(LuantiCases, RefusesNamesThatAreCutOff) {
   EXPECT_EQ(loaded.error().byte_offset, 15U);
 }
 
-// Its width is 0, but it has 38,400 x 65,280 rows.
+// Its width is 0, with 38,400 x 65,280 rows.
 TEST(LuantiCases, RefusesASchematicWithoutNodes) {
   const auto loaded = load_scene(case_file("mts-no-width.mts"));
   ASSERT_FALSE(loaded);

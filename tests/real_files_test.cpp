@@ -1,4 +1,5 @@
-// Every real file beside the source tree is read, or refused in one clear line; and has what others counted in it.
+// Reads every real file next to the source tree, or refuses it in one clear line. Compares the counts with those of
+// other programs.
 
 #include <algorithm>
 #include <array>
@@ -24,7 +25,7 @@ namespace fs = std::filesystem;
 
 const fs::path kData = fs::path(QUOIN_SOURCE_DIR) / ".." / "shared" / "data";
 
-/// The numbers that groups of a pattern found.
+/// Returns the numbers that a pattern's groups match.
 std::vector<std::int64_t> numbers_in(const std::string& text, const char* pattern) {
   std::smatch found;
   std::vector<std::int64_t> numbers;
@@ -33,7 +34,7 @@ std::vector<std::int64_t> numbers_in(const std::string& text, const char* patter
   return numbers;
 }
 
-/// What a scene shows of a world of blocks, counted as their files count.
+/// The blocks of a scene, counted in the units of Minecraft files.
 struct Blocks {
   std::set<std::pair<int, int>> columns;  ///< of 16 x 16 blocks
   std::set<std::array<int, 3>> sections;  ///< of 16^3
@@ -55,7 +56,7 @@ std::optional<IVec3> first_canvas(const Scene& scene) {
   return scene.grids()[handles.front()].canvas.size();
 }
 
-/// What the collection's index says of a file, and what was read; returns whether it says anything that counts.
+/// Compares a scene with the file's entry in the collection's index. Returns true if the entry has anything to compare.
 bool compare(const std::string& file, const std::string& info, const LoadedScene& loaded) {
   SCOPED_TRACE(file);
   const Scene& scene = loaded.scene;
@@ -71,7 +72,7 @@ bool compare(const std::string& file, const std::string& info, const LoadedScene
     ASSERT_TRUE(size);
     std::array<std::int64_t, 3> found = {size->x, size->y, size->z};
     std::array<std::int64_t, 3> sorted = {wanted[0], wanted[1], wanted[2]};
-    // Which of them is up is the format's.
+    // The up axis depends on the format.
     std::ranges::sort(found);
     std::ranges::sort(sorted);
     EXPECT_EQ(found, sorted);
@@ -88,7 +89,7 @@ bool compare(const std::string& file, const std::string& info, const LoadedScene
   if (info.starts_with("magic=b'MTSM'")) expect_size(numbers_in(info, R"(size=\((\d+), (\d+), (\d+)\))"));
   if (file.ends_with(".mca")) {
     const Blocks blocks = blocks_of(scene);
-    // Chunks and sections of nothing but air are in the file, too: these are what is finished of the world.
+    // The index also counts chunks and sections that hold only air. Only finished worlds have none.
     EXPECT_LE(static_cast<std::int64_t>(blocks.columns.size()), numbers_in(info, R"(chunks=(\d+))").at(0));
     EXPECT_LE(static_cast<std::int64_t>(blocks.sections.size()), numbers_in(info, R"(sections=(\d+))").at(0));
     for (const char* const finished : {"1.12.2__r.0.-1.mca", "example__r.1.0.mca"}) {
@@ -117,7 +118,7 @@ TEST(RealFiles, AreReadAsOthersReadThemOrRefusedInALine) {
     const auto loaded = load_scene(kData / file, options);
     if (loaded) {
       ++read;
-      // Of .vox files it says more, which src/io/vox/data_test.cpp compares.
+      // For .vox files the entry says more; src/io/vox/data_test.cpp compares it.
       const nlohmann::json& info = entry.at("info");
       if (info.is_string() && compare(file, info, *loaded)) ++compared;
       continue;
@@ -128,7 +129,7 @@ TEST(RealFiles, AreReadAsOthersReadThemOrRefusedInALine) {
     EXPECT_NE(line.find(fs::path(file).filename().string()), std::string::npos) << line;
     EXPECT_LT(line.size(), 600U) << line;
   }
-  // What is refused is no file of voxels: pointers to files that are elsewhere, other trees of NBT, damaged ones.
+  // Refused files hold no voxels: pointers to files stored elsewhere, other NBT trees, and damaged files.
   EXPECT_EQ(counts["bad"], (std::array{0, 0, 23}));
   EXPECT_EQ(counts["kv6"], (std::array{49, 49, 0}));
   EXPECT_EQ(counts["binvox"], (std::array{1, 1, 0}));

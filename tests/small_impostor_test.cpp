@@ -1,5 +1,5 @@
-// Impostors at the sizes at which people see them, 64 to 8 pixels, next to the traced image: holes, outlines, colours
-// and steps as the distance changes. QUOIN_NIGHTLY=1 looks from all directions and at all sizes.
+// Compares impostors at common sizes, 64 to 8 pixels, with the traced image: holes, outlines, colours and steps as the
+// distance changes. QUOIN_NIGHTLY=1 tests all directions and all sizes.
 
 #include <algorithm>
 #include <array>
@@ -29,12 +29,12 @@ namespace {
 
 using namespace render_test;
 
-// One model about the origin of the world, and the same in white, which shows how much of each pixel it covers.
+// A model at the world origin, and the same model in white, which shows how much of each pixel it covers.
 struct SmallModel {
   std::string name;
   Scene scene;
   Scene white;
-  std::unique_ptr<CpuRenderer> renderer;  // of both, which keep their impostors
+  std::unique_ptr<CpuRenderer> renderer;  // renders both models and keeps their impostors
   std::unique_ptr<CpuRenderer> white_renderer;
   double radius = 0.0;
 
@@ -54,7 +54,7 @@ struct SmallModel {
   }
 };
 
-// Thin wires: poles, beams and diagonals one voxel wide.
+// Wires one voxel thick: poles, beams and diagonals.
 Grid wires() {
   Grid grid;
   for (int i = 0; i < 96; i += 16) {
@@ -127,7 +127,7 @@ std::filesystem::path folder_of_files() {
   return std::filesystem::path(QUOIN_SOURCE_DIR) / ".." / "shared" / "data" / "vox" / "mikelovesrobots+mmmm";
 }
 
-// Directions all around, the first one as far from every view as there is: 27.57 degrees.
+// Returns directions all around, the first one as far from every view as possible: 27.57 degrees.
 DVec3 direction_of(int index, int count) {
   if (index == 0) return glm::normalize(DVec3(1.0, 0.5224, 0.0));
   const double height = 1.0 - 2.0 * (index - 0.5) / (count - 1);
@@ -136,7 +136,7 @@ DVec3 direction_of(int index, int count) {
   return {across * std::cos(turn), height, across * std::sin(turn)};
 }
 
-// Looks at the model, rolled; its sphere spans `pixels`.
+// Returns a rolled camera that looks at the model; the bounding sphere spans `pixels`.
 Camera camera_at(const SmallModel& model, DVec3 direction, double pixels, int size, double roll) {
   const double fov = 0.3;
   const double distance = size / (2.0 * std::tan(fov / 2.0)) * 2.0 * model.radius / pixels;
@@ -160,7 +160,7 @@ RenderOptions all_far(RenderOptions options) {
   return options;
 }
 
-// An image, and the share of each pixel that the model covers.
+// An image, and the model's coverage of each pixel.
 struct Seen {
   std::vector<float> coverage;
   Image image;
@@ -181,7 +181,7 @@ Seen seen_in(const SmallModel& model, const Camera& camera, const RenderOptions&
   return seen;
 }
 
-// Pixels of full coverage in a neighbourhood of 3x3.
+// Returns the pixels whose 3x3 neighbourhoods are fully covered.
 std::vector<std::size_t> interior_of(const Seen& truth, int size) {
   std::vector<std::size_t> inside;
   for (int y = 1; y + 1 < size; ++y) {
@@ -196,15 +196,15 @@ std::vector<std::size_t> interior_of(const Seen& truth, int size) {
   return inside;
 }
 
-// Over all directions.
+// Sums over all directions.
 struct Findings {
   std::int64_t holes = 0;
   std::int64_t interior = 0;
-  std::int64_t both = 0;  // pixels of both outlines, where the model covers half of the pixel
-  std::int64_t any = 0;   // and of one of them
+  std::int64_t both = 0;  // pixels inside both outlines, where the model covers half of the pixel
+  std::int64_t any = 0;   // pixels inside at least one outline
   double worst_overlap = 1.0;
   double worst_colour = 0.0;
-  std::array<double, 3> colours{};  // sums over the traced outlines, of one minus the other
+  std::array<double, 3> colours{};  // sums over the traced outlines of the colour differences
   std::int64_t outline = 0;
 
   [[nodiscard]] double hole_share() const {
@@ -222,7 +222,7 @@ struct Findings {
     Findings own;
     for (std::size_t i = 0; i < truth.coverage.size(); ++i) {
       const bool in_truth = truth.coverage[i] >= 0.5F;
-      // Two of 64 samples decide nothing.
+      // Differences of two of 64 samples are ignored.
       const bool is_alike = std::abs(truth.coverage[i] - seen.coverage[i]) < 0.035F;
       const bool in_seen = is_alike ? in_truth : seen.coverage[i] >= 0.5F;
       own.both += in_truth && in_seen, own.any += in_truth || in_seen;
@@ -241,14 +241,14 @@ struct Findings {
 
 struct Views {
   int directions = 24;
-  int samples = 64;  // of each pixel
+  int samples = 64;  // per pixel
   bool is_nightly = std::getenv("QUOIN_NIGHTLY") != nullptr;
 };
 
 Findings look_at(const SmallModel& model, int pixels, const Views& views) {
   Findings found;
   const int size = pixels + 8;
-  // Small images take little time, and few pixels say little.
+  // Small images render fast and contain few pixels, so more of them are rendered.
   const int step = views.is_nightly || pixels <= 8 ? 1 : 7;
   for (int i = 0; i < views.directions; i += step) {
     const Camera camera = camera_at(model, direction_of(i, views.directions), pixels, size, 0.31 * i);
@@ -305,8 +305,8 @@ double mean_difference(const Image& a, const Image& b) {
   return sum / static_cast<double>(a.rgb.size());
 }
 
-// The largest changes of both images in steps of half a percent. A single step of a small image turns over a handful of
-// samples, of either image by chance; people see the largest of many steps.
+// Finds the largest changes of both images in steps of half a percent. A single step of a small image turns over a
+// handful of samples, of either image by chance; people see the largest of many steps.
 struct Changes {
   double drawn = 0.0;
   double traced = 0.0;
@@ -322,7 +322,7 @@ Changes changes_of(const SmallModel& model, int direction, double from_pixels, d
     Image traced = taken_by(*model.renderer, camera, sized(kSize, kSize));
     Image drawn = taken_by(*model.renderer, camera, all_far(sized(kSize, kSize)));
     if (!last.rgb.empty()) {
-      // Over as many pixels as the model's sphere spans.
+      // Relative to the number of pixels that the model's sphere spans.
       const double scale = kSize * kSize / (pixels * pixels);
       most.drawn = std::max(most.drawn, scale * mean_difference(drawn, last));
       most.traced = std::max(most.traced, scale * mean_difference(traced, last_traced));
@@ -332,7 +332,7 @@ Changes changes_of(const SmallModel& model, int direction, double from_pixels, d
   return most;
 }
 
-// Over every threshold between two levels, in windows of 45 steps.
+// Covers every threshold between two levels, in windows of 45 steps.
 TEST(SmallImpostors, ChangeAtMostTwiceAsMuchAsTheTracedImageAsTheDistanceDoes) {
   const bool is_nightly = std::getenv("QUOIN_NIGHTLY") != nullptr;
   for (const Source& source : made_models()) {
@@ -343,7 +343,7 @@ TEST(SmallImpostors, ChangeAtMostTwiceAsMuchAsTheTracedImageAsTheDistanceDoes) {
       const int first = is_nightly ? 0 : 7 * window % 24;
       for (int direction = first; direction < (is_nightly ? 24 : first + 1); direction += 5) {
         const Changes most = changes_of(model, direction, pixels, pixels / 1.25);
-        // Less than one of 255 is not seen.
+        // Changes below 1 of 255 are invisible.
         worst = std::max(worst, most.drawn / std::max(most.traced, 1.0));
       }
     }

@@ -1,4 +1,4 @@
-// Volumes and fields in formats of voxels, and surfaces of volumes.
+// Volumes and fields in voxel formats, and surfaces of volumes.
 
 #include <array>
 #include <cmath>
@@ -24,7 +24,7 @@ using Json = nlohmann::json;
 
 constexpr int kSide = 24;
 
-/// Whole numbers that fall by 5 a sample from 100 in the middle: many equal 60.
+/// Integers that fall by 5 per sample from 100 in the middle: many equal 60.
 int value_at(int x, int y, int z) {
   const double away = std::sqrt((x - 11) * (x - 11) + (y - 12) * (y - 12) + (z - 11) * (z - 11));
   return static_cast<int>(std::lround(100.0 - 5.0 * away));
@@ -105,7 +105,7 @@ TEST_F(ToolField, CountsTriangles) {
 }
 
 TEST_F(ToolField, RefusesSimplifyingBlocksBeforeItReadsThem) {
-  // A file that cannot be read: the fault of the options comes first.
+  // The file cannot be read, but option errors come first.
   std::ofstream(folder_.file("broken.vox"), std::ios::binary) << "VOX \x96";
   const ToolRun result = run("convert broken.vox a.glb --simplify 0.1");
   EXPECT_EQ(result.status, 2);
@@ -114,7 +114,7 @@ TEST_F(ToolField, RefusesSimplifyingBlocksBeforeItReadsThem) {
 
 TEST_F(ToolField, SaysThatNothingCanBeSimplified) {
   if (!can_simplify()) GTEST_SKIP() << "this build cannot simplify";
-  // No two triangles of it lie in one plane.
+  // No two of its triangles are coplanar.
   {
     std::ofstream out(folder_.file("round.nrrd"), std::ios::binary);
     out << "NRRD0005\ntype: float\ndimension: 3\nsizes: 24 24 24\nencoding: raw\nendian: little\n\n";
@@ -133,7 +133,7 @@ TEST_F(ToolField, SaysThatNothingCanBeSimplified) {
 using Point = std::array<float, 3>;
 using PointEdge = std::pair<Point, Point>;
 
-/// The faults of a surface whose vertices are joined by their positions.
+/// The faults of a surface after joining vertices by position.
 struct SurfaceFaults {
   std::size_t flat = 0;
   std::size_t crowded_edges = 0;

@@ -17,7 +17,7 @@
 
 #include "io/gltf/glb_for_tests.h"
 
-/// What the tests of the tool share.
+/// Helpers for the tests of the command-line tool.
 namespace quoin {
 
 struct ToolRun {
@@ -31,7 +31,7 @@ inline std::string text_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// A file in MagicaVoxel's oldest form: one model, whose voxels are four bytes each.
+/// Returns a file in MagicaVoxel's oldest form: one model with four bytes per voxel.
 inline std::string vox_file(std::array<std::uint32_t, 3> size, const std::string& voxels) {
   const auto word = [](std::uint32_t value) {
     std::string bytes(4, '\0');
@@ -49,7 +49,7 @@ inline std::string vox_file(std::array<std::uint32_t, 3> size, const std::string
   return "VOX " + word(150) + "MAIN" + word(0) + word(static_cast<std::uint32_t>(chunks.size())) + chunks;
 }
 
-/// Four voxels in two colours.
+/// Returns a file of four voxels in two colours.
 inline std::string tiny_vox() {
   return vox_file({3, 4, 2}, std::string("\0\0\0\1"
                                          "\1\0\0\1"
@@ -58,7 +58,7 @@ inline std::string tiny_vox() {
                                          16));
 }
 
-/// The model of `tiny_vox` at two places, of which as many as asked are hidden.
+/// Returns a file with two instances of the model of `tiny_vox`; the first `hidden` instances are hidden.
 inline std::string vox_with_hidden(int hidden) {
   const std::string file = tiny_vox();
   Scene scene = read_vox(std::as_bytes(std::span(file))).value().scene;
@@ -72,7 +72,7 @@ inline std::string vox_with_hidden(int hidden) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-/// Voxels that share no face, half of a cube: large in every format. 4,000 of them unless told.
+/// Returns a file whose voxels fill half of a cube and share no face: large in every format. 4,000 voxels by default.
 inline std::string checkerboard_vox(int edge = 20) {
   std::string voxels;
   for (int i = 0; i < edge * edge * edge; ++i) {
@@ -86,7 +86,7 @@ inline std::string checkerboard_vox(int edge = 20) {
   return vox_file({size, size, size}, voxels);
 }
 
-/// A test in a folder of its own, where tiny.vox lies.
+/// Runs a test in a folder of its own, which holds tiny.vox.
 class ToolTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -97,7 +97,7 @@ class ToolTest : public ::testing::Test {
   /// Runs the tool in the test's folder.
   ToolRun run(const std::string& arguments) { return shell("'" QUOIN_TOOL "' " + arguments); }
 
-  /// Runs a command line there.
+  /// Runs a command line in the test's folder.
   ToolRun shell(const std::string& line) {
     std::ofstream(folder_.file("run.sh")) << line << "\n";
     const std::string command = "cd '" + folder_.file("").string() + "' && sh run.sh > stdout.txt 2> stderr.txt";

@@ -138,7 +138,7 @@ TEST_F(ToolGenerate, WrongUsageIsStatus2AndLeavesNoFile) {
   EXPECT_TRUE(run("generate terrain out.vox --seed 5 --unknown").err.starts_with("quoin: no option \"--unknown\""));
 }
 
-// Before the work: this world would take minutes and gigabytes.
+// The error comes before the work: this world would take minutes and gigabytes.
 TEST_F(ToolGenerate, AFileThatCannotBeWrittenIsStatus1AtOnce) {
   const ToolRun result = shell("ulimit -t 10; '" QUOIN_TOOL "' generate terrain nowhere/out.vox --chunks 1024x2x32");
   EXPECT_EQ(result.status, 1);

@@ -1,4 +1,4 @@
-// Triangles in, files for printers out.
+// Reads triangle meshes and writes files for 3D printers.
 
 #include <fstream>
 #include <string>
@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// A box of 2 x 1 x 1, open at its top, as text.
+/// Returns a text STL of a box of 2 x 1 x 1, open at its top.
 std::string open_box() {
   const char* const corners[] = {"0 0 0", "2 0 0", "2 1 0", "0 1 0", "0 0 1", "2 0 1", "2 1 1", "0 1 1"};
   const int faces[10][3] = {{0, 2, 1}, {0, 3, 2}, {0, 1, 5}, {0, 5, 4}, {1, 2, 6},
@@ -81,12 +81,12 @@ TEST_F(ToolMesh, ForPrintersIsClosed) {
     ASSERT_EQ(result.status, 0) << result.err;
     EXPECT_EQ(Json::parse(result.out)["warnings"].size(), 0U) << result.out;
   }
-  // Read again, it has the volume that it had: 32 voxels of 2 mm.
+  // Reading it again gives the same volume: 32 voxels of 2 mm.
   const Json again = Json::parse(run("info a.stl --json").out);
   EXPECT_EQ(again["format"], "stl");
   const Json& bounds = again["bounds"];
   EXPECT_NEAR(bounds["max"][0].get<double>() - bounds["min"][0].get<double>(), 8.0, 0.1);
-  // What is there is a product, made anew; what is no mesh is not touched.
+  // An existing mesh is an output, replaced without --force.
   EXPECT_EQ(run("convert tiny.vox a.stl").status, 0);
 }
 

@@ -19,7 +19,7 @@ constexpr int kStoneLayers = 500;
 constexpr int kMixedLayers = 8;
 constexpr int kMixedTypes = 150;
 
-/// A layer of a schematic, as the bytes of its blocks.
+/// Returns the block bytes of a schematic layer.
 template <class Index>
 std::vector<std::byte> layer_of(Index index) {
   std::vector<std::byte> bytes;
@@ -33,8 +33,8 @@ std::vector<std::byte> layer_of(Index index) {
   return bytes;
 }
 
-/// Writes a .schem file of 10^9 blocks: stone with ores, a few layers of 150 types, air. Equal layers are compressed
-/// once, each layer as a gzip member of its own.
+/// Writes a .schem file of 10^9 blocks: stone with ores, a few layers of 150 types, air. Compresses equal layers once,
+/// each layer as a gzip member of its own.
 void write_large_schematic(const std::filesystem::path& path) {
   const std::vector<std::byte> stone = layer_of([](int x, int z) { return (x + kEdge * z) % 997 == 0 ? 2U : 1U; });
   const std::vector<std::byte> air = layer_of([](int, int) { return 0U; });
@@ -71,7 +71,7 @@ void write_large_schematic(const std::filesystem::path& path) {
 
 class ToolMinecraft : public ToolTest {};
 
-// Blocks as an array of bytes and their indices would take 3 GB.
+// A byte array of the blocks with their indices would take 3 GB.
 TEST_F(ToolMinecraft, CountsAThousandMillionBlocksInLittleMemory) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "sanitizers take more addresses than the limit";

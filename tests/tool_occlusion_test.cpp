@@ -1,4 +1,4 @@
-// Occlusion rays of `quoin render` that reach far.
+// Long-range occlusion rays of `quoin render`.
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,7 @@ namespace {
 
 class ToolOcclusion : public ToolTest {
  protected:
-  /// A floor 160 voxels wide; a wall 60 high stands on the quarter of it at the top of an image from above.
+  /// Writes a floor 160 voxels wide with a wall 60 high on the quarter at the top of an image seen from above.
   void write_wall() {
     Scene scene;
     VoxelProperties grey;
@@ -28,7 +28,7 @@ class ToolOcclusion : public ToolTest {
     scene.add_instance({"", scene.add_grid(std::move(placed)), DVec3(0.0)});
     ASSERT_TRUE(save_scene(scene, folder_.file("wall.json")));
   }
-  /// The largest change of the mean brightness from one row of the floor to the next.
+  /// Returns the largest change of the mean brightness from one floor row to the next.
   double largest_step(const std::string& flags) {
     const ToolRun result = run("render wall.json -o out.png --view top --size 160x160 --preset ao " + flags);
     EXPECT_EQ(result.status, 0) << result.err;

@@ -25,14 +25,14 @@ using Json = nlohmann::json;
 
 class ToolRender : public ToolTest {
  protected:
-  /// Draws and answers the JSON object.
+  /// Renders and returns the JSON report.
   Json drawn(const std::string& arguments) {
     const ToolRun result = run("render " + arguments + " --json");
     EXPECT_EQ(result.status, 0) << arguments << ": " << result.err;
     return result.status == 0 ? Json::parse(result.out) : Json();
   }
   std::string bytes(const std::string& name) { return text_of(folder_.file(name)); }
-  /// One voxel: in Quoin's axes from (0, 0, -1) to (1, 1, 0).
+  /// Writes a file of one voxel: in Quoin's axes from (0, 0, -1) to (1, 1, 0).
   void write_one_voxel() {
     std::ofstream(folder_.file("one.vox"), std::ios::binary) << vox_file({1, 1, 1}, std::string("\0\0\0\1", 4));
   }
@@ -103,7 +103,7 @@ TEST_F(ToolRender, DepthIsTheDistanceAlongEachRay) {
       const double right = ((column + 0.5) / 31 * 2 - 1) * half * 31 / 21;
       const double up = (1 - (row + 0.5) / 21 * 2) * half;
       const float value = depth->values[static_cast<std::size_t>(row * 31 + column)];
-      // The front face lies 2 before the camera.
+      // The front face lies 2 in front of the camera.
       if (std::abs(2 * right) < 0.5 && std::abs(2 * up) < 0.5) {
         EXPECT_NEAR(value, 2 * std::sqrt(1 + right * right + up * up), 1e-5);
         ++hit;
@@ -257,17 +257,17 @@ TEST_F(ToolRender, PathTracedImagesHaveABrightBackground) {
   for (const int corner : corners("--sky physical")) EXPECT_GE(corner, 150);
   for (const int corner : corners("--sky uniform")) EXPECT_GE(corner, 250);
   for (const int corner : corners("--sky uniform --ground")) EXPECT_GE(corner, 250);
-  // By night the exposure rises, also if --sun-time says where the sun is.
+  // Exposure rises at night, also if --sun-time places the sun.
   const std::string midnight = "--sun-time 12-21,0,48";
   EXPECT_GT(corners(midnight)[0], corners(midnight + " --exposure 1.3")[0] + 10);
 }
 
-// A cave is wider than blocks' rooms. A distance that is asked for is the fields' too.
+// A cave is wider than rooms of blocks. A distance set by an option applies to fields too.
 TEST_F(ToolRender, OcclusionShapesACaveOfAField) {
   ASSERT_EQ(run("generate smooth-terrain s.json --chunks 3x2x3").status, 0);
   const std::string base =
       "s.json -o out.png --size 64x48 --camera 98,35,161 --look-at 100.8,41.2,142.2 --fov 80 --exposure 3 ";
-  const auto rock = [&](const std::string& flags) {  // its mean and its standard deviation
+  const auto rock = [&](const std::string& flags) {  // the mean and the standard deviation of the rock
     drawn(base + flags);
     const auto image = read_png(folder_.file("out.png"));
     double sum = 0.0;
@@ -345,7 +345,7 @@ TEST_F(ToolRender, FilmsInOneFileAreMadeOfPictures) {
   EXPECT_EQ(Json::parse(made.out)["files"], Json({"film.mp4"}));
   EXPECT_EQ(bytes("film.mp4").substr(4, 4), "ftyp");
   EXPECT_FALSE(std::filesystem::exists(folder_.file("film.mp4.pictures")));
-  // One that was cut off goes on with what is there.
+  // An interrupted film continues from its existing frames.
   std::filesystem::create_directory(folder_.file("film.mp4.pictures"));
   drawn("many.vox -o film.mp4.pictures/picture.png --size 31x21 --turntable 3");
   std::filesystem::remove(folder_.file("film.mp4.pictures/picture-02.png"));
@@ -442,7 +442,7 @@ TEST_F(ToolRender, AFilmAlongAPathOfCamerasGoesOnWhereItEnded) {
   EXPECT_EQ(bytes("film-00.png"), "as it was");
   EXPECT_EQ(bytes("film-02.png"), last);
   EXPECT_EQ(drawn("many.vox -o film.png --size 64x48 --path path.json --resume")["files"], Json::array());
-  // What is there does not change the exposure of the rest.
+  // Existing frames do not change the exposure of the remaining frames.
   const std::string turns = "many.vox -o turn.png --size 32x24 --turntable 3 --light path --samples 1 --exposure auto";
   drawn(turns);
   const std::string third = bytes("turn-02.png");
@@ -662,7 +662,7 @@ TEST_F(ToolRender, FailuresAreOneLineStatus1AndNoFile) {
 
 TEST_F(ToolRender, ASignalEndsItWithoutAFile) {
   for (const auto& [signal, status] : {std::pair{"INT", 130}, {"TERM", 143}}) {
-    // Under a shell that is not interactive a job in the background ignores SIGINT; env makes it heed it again.
+    // A non-interactive shell makes background jobs ignore SIGINT; env restores the default.
     const ToolRun result = shell("env --default-signal=INT '" QUOIN_TOOL
                                  "' render tiny.vox -o out.png --samples 4096 --depth out.pfm & sleep 0.4; kill -" +
                                  std::string(signal) + " $!; wait $!");
@@ -682,7 +682,7 @@ TEST_F(ToolRender, AFullDiskLeavesNoFile) {
   EXPECT_FALSE(exists("d.pfm"));
 }
 
-/// Apart, since drivers keep what sanitizers call leaks.
+/// A separate suite, since drivers keep memory that sanitizers report as leaks.
 class VulkanTool : public ToolRender {};
 
 TEST_F(VulkanTool, ADeviceDrawsTheSamePicture) {
@@ -741,7 +741,7 @@ TEST_F(ToolRender, ItsHelpHasAnExample) {
   EXPECT_NE(help.out.find("Example: quoin render"), std::string::npos) << help.out;
 }
 
-// A film's pictures are framed alike: what does not move stays where it is.
+// All frames of a film share one framing: static objects keep their position.
 TEST_F(ToolRender, FilmsAreFramedAlike) {
   vox_test::FileBuilder file;
   file.model(1, 1, 1, {{0, 0, 0, 1}});
@@ -755,7 +755,7 @@ TEST_F(ToolRender, FilmsAreFramedAlike) {
   EXPECT_EQ(object["files"], Json({"film-08.png", "film-09.png", "film-10.png"}));
   const Json one = Json::parse(run("render film.vox -o one.png --frame 8 --size 64x48 --json").out);
   EXPECT_NE(one["camera"], object["camera"]) << "alone it is closer";
-  // The widest frame alone needs the camera of the film.
+  // The widest frame alone needs the film's camera.
   const Json widest = Json::parse(run("render film.vox -o ten.png --frame 10 --size 64x48 --json").out);
   for (const char* axis : {"position", "forward"}) {
     for (std::size_t i = 0; i < 3; ++i) {
@@ -777,7 +777,7 @@ TEST_F(ToolRender, ATurntableGoesRoundAtOneDistance) {
   EXPECT_EQ(run("render tiny.vox -o b.png --turntable 4 --frames 0:0").status, 2);
   EXPECT_EQ(run("render tiny.vox -o b.png --azimuth 20 --view left").status, 2);
   EXPECT_EQ(run("render tiny.vox -o b.png --elevation 91").status, 2);
-  // The views are directions like any other.
+  // Named views equal the same directions given as angles.
   ASSERT_EQ(run("render tiny.vox -o right.png --view right --size 64x48").status, 0);
   ASSERT_EQ(run("render tiny.vox -o ninety.png --azimuth 90 --elevation 0 --size 64x48").status, 0);
   EXPECT_EQ(bytes("right.png"), bytes("ninety.png"));

@@ -1,4 +1,4 @@
-// `quoin convert` to smooth meshes, of voxels and of volumes.
+// Smooth meshes of voxels and volumes from `quoin convert`.
 
 #include <algorithm>
 #include <array>
@@ -25,7 +25,7 @@ using Json = nlohmann::json;
 
 class ToolSmooth : public ToolTest {
  protected:
-  /// Converts and answers the JSON object.
+  /// Converts and returns the JSON report.
   Json converted(const std::string& arguments) {
     const ToolRun result = run("convert " + arguments + " --json");
     EXPECT_EQ(result.status, 0) << arguments << ": " << result.err;
@@ -46,7 +46,7 @@ class ToolSmooth : public ToolTest {
     return name.ends_with(".obj") ? world_of_obj(bytes) : world_of(parse_glb(bytes));
   }
 
-  /// A floor and a wall: corner.vox.
+  /// Writes a floor and a wall to corner.vox.
   void write_corner() {
     std::string voxels;
     for (int x = 0; x < 16; ++x) {
@@ -64,7 +64,7 @@ class ToolSmooth : public ToolTest {
   }
 };
 
-/// The values of a ball, x fastest: positive inside.
+/// Returns the values of a ball, x fastest: positive inside.
 std::vector<double> ball(IVec3 size, DVec3 centre, double radius) {
   std::vector<double> values;
   for (int i = 0; i < size.x * size.y * size.z; ++i) {
@@ -74,7 +74,8 @@ std::vector<double> ball(IVec3 size, DVec3 centre, double radius) {
   return values;
 }
 
-/// Edges without exactly one triangle on each side; vertices of one place, which colours tell apart, count as one.
+/// Counts edges without exactly one triangle on each side; vertices that share a position and differ in colour count as
+/// one.
 std::size_t open_edges(const WorldMesh& mesh) {
   std::map<std::array<double, 3>, std::size_t> places;
   const auto place = [&](std::size_t i) {
@@ -137,7 +138,7 @@ TEST_F(ToolSmooth, VoxelsKeepTheirPlacesAndColours) {
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     const DVec3& p = mesh.positions[i];
     box.extend(p);
-    if (std::abs(p.x - left - 5.0) <= 0.5) continue;  // where the colours meet
+    if (std::abs(p.x - left - 5.0) <= 0.5) continue;  // between the colours
     const std::array first = {0xCC / 255.0, 0x66 / 255.0, 0x33 / 255.0};
     const std::array second = {0x33 / 255.0, 0x22 / 255.0, 0x11 / 255.0};
     EXPECT_EQ(mesh.colours[i], p.x < left + 5.0 ? first : second);
@@ -415,7 +416,7 @@ TEST_F(ToolSmooth, VolumesBecomeMeshesVoxelsAndPictures) {
   EXPECT_EQ(picture.status, 0) << picture.err;
   EXPECT_GT(Json::parse(picture.out)["pixels_hit"], 10);
   EXPECT_TRUE(exists("out.png"));
-  // What is above this is nothing, which is said.
+  // No value reaches this threshold; the tool warns of an empty image.
   EXPECT_NE(run("render a.nrrd -o out.png --size 32x32 --iso 1000").err.find("a picture of the sky"),
             std::string::npos);
   EXPECT_EQ(run("render a.nrrd -o out.png --iso much").status, 2);

@@ -157,7 +157,7 @@ TEST_F(Tool, AnAtlasTakesFewerTriangles) {
   }
 }
 
-// A box with a hole in its lid: what is light in it is written at vertices, and faces are cut where it changes.
+// A box with a hole in its lid: vertices carry the light inside, and faces are split where it changes.
 TEST_F(Tool, LightIsWrittenAtVertices) {
   std::string voxels;
   for (int i = 0; i < 20 * 20 * 6; ++i) {
@@ -210,7 +210,7 @@ TEST_F(Tool, FramesBecomeAnAnimation) {
   }
 }
 
-// Nothing is seen of such a file, and it should say why.
+// Nothing of such a file is visible; `info` should show the reason.
 TEST_F(Tool, InfoTellsOfHiddenLayersWithoutAName) {
   vox_test::FileBuilder file;
   file.model(2, 2, 2, {{0, 0, 0, 1}});
@@ -222,7 +222,7 @@ TEST_F(Tool, InfoTellsOfHiddenLayersWithoutAName) {
   EXPECT_NE(text.out.find("Layers: 2: \"people\", 1 without a name hidden\n"), std::string::npos) << text.out;
 }
 
-// What an artist's file holds beside voxels goes along from .vox to .vox, and is told where it cannot.
+// .vox to .vox keeps everything in an artist's file, including content other than voxels; other formats warn of losses.
 TEST_F(Tool, FromVoxToVoxEverythingIsKept) {
   vox_test::FileBuilder file;
   file.model(4, 4, 4, {{0, 0, 0, 1}}).model(2, 2, 2, {{0, 0, 0, 3}});
@@ -260,7 +260,7 @@ TEST_F(Tool, FromVoxToVoxEverythingIsKept) {
   EXPECT_EQ(Json::parse(run("info crew.json --json").out)["groups"], info["groups"]);
 }
 
-/// The corners of the vertices of a .obj.
+/// Returns the bounds of an .obj file's vertices.
 std::pair<DVec3, DVec3> extent_of_obj(const std::string& text) {
   std::istringstream lines(text);
   DVec3 min(1e9);
@@ -307,7 +307,7 @@ TEST_F(Tool, QuietLeavesErrorsAndJson) {
   EXPECT_NE(run("info tiny.vox -q").out, "") << "which is what it is for";
 }
 
-// What is completed is what the help says: the shells are asked where they are.
+// Completions follow the help; the test runs the available shells.
 TEST_F(Tool, ShellsCompleteCommandsOptionsAndChoices) {
   const std::string script = run("completions bash").out;
   std::ofstream(folder_.file("quoin.bash")) << script;
@@ -381,7 +381,7 @@ TEST_F(Tool, ConvertNamesEveryFileThatItWrites) {
       {"b.json", {"b.json"}},
       {"c.gltf", {"c.gltf", "c.bin"}},
       {"d.obj", {"d.obj", "d.mtl", "d_palette.png"}}};
-  run("--version");  // makes the files for its output
+  run("--version");  // creates the files for its output
   for (const auto& [out, files] : files_of) {
     const std::size_t before = folder_.count();
     const ToolRun json = run("convert tiny.vox " + out + " --json");
@@ -474,7 +474,7 @@ TEST_F(Tool, ReplacesModelsOnlyWithForce) {
     EXPECT_EQ(text_of(folder_.file("other.vox")), large);
     EXPECT_EQ(text_of(folder_.file("misnamed.glb")), large);
   }
-  // Beside OUT, too.
+  // This also holds for files that are written next to OUT.
   std::ofstream(folder_.file("scene.bin"), std::ios::binary) << large;
   EXPECT_EQ(run("convert tiny.vox scene.gltf").status, 1);
   EXPECT_EQ(text_of(folder_.file("scene.bin")), large);
@@ -482,7 +482,7 @@ TEST_F(Tool, ReplacesModelsOnlyWithForce) {
   EXPECT_EQ(run("convert tiny.vox other.vox --force").status, 0);
   EXPECT_NE(text_of(folder_.file("other.vox")), large);
   EXPECT_EQ(run("generate terrain other.vox --chunks 1x1x1 --force").status, 0);
-  // Products are replaced as they always were.
+  // Outputs that hold no model are replaced without --force.
   EXPECT_EQ(run("convert tiny.vox mesh.glb").status, 0);
   EXPECT_EQ(run("convert tiny.vox mesh.glb").status, 0);
 }
@@ -522,19 +522,19 @@ TEST_F(Tool, ManyFilesAreNotMixedUp) {
   EXPECT_EQ(both.status, 2);
   EXPECT_EQ(both.err, "quoin: tiny.vox and a/tiny.vox would both become out/tiny.glb\n");
   EXPECT_FALSE(exists("out"));
-  // Whatever their folder is called.
+  // The names of the input folders make no difference.
   std::filesystem::create_symlink("a", folder_.file("b"));
   std::ofstream(folder_.file("a/tiny.json")) << "{}";
   const ToolRun apart = run("convert a/tiny.vox b/tiny.json --to glb");
   EXPECT_EQ(apart.status, 2);
   EXPECT_EQ(apart.err, "quoin: a/tiny.vox and b/tiny.json would both become b/tiny.glb\n");
   std::filesystem::remove(folder_.file("a/tiny.json"));
-  // What an earlier run wrote below a folder is not taken for a model of it.
+  // Output of an earlier run below a folder is not an input of the next run.
   for (int i = 0; i < 2; ++i) {
     EXPECT_EQ(run("convert a --to vox --recursive --out-dir a/out --force").status, 0);
     EXPECT_FALSE(exists("a/out/out"));
   }
-  // Named twice it is still one.
+  // A file named twice counts once.
   EXPECT_EQ(run("convert tiny.vox ./tiny.vox --to glb --out-dir out").status, 0);
   EXPECT_EQ(run("convert a --to glb").err, "quoin: a: a folder; --recursive converts what is in it\n");
   std::filesystem::create_directories(folder_.file("empty"));
@@ -603,7 +603,7 @@ TEST_F(Tool, ConvertReadsAndWritesStandardStreams) {
   EXPECT_EQ(through.status, 0);
   EXPECT_EQ(through.err, "");
   EXPECT_EQ(text_of(folder_.file("streamed.ply")), text_of(folder_.file("tiny.ply")));
-  // Models without a name have that of their file; standard input has none.
+  // Models without a name get the file's name; standard input has none.
   ASSERT_EQ(run("convert tiny.vox tiny.glb").status, 0);
   EXPECT_EQ(shell("'" QUOIN_TOOL "' convert - - --to glb < tiny.vox > streamed.glb").status, 0);
   const auto node_in = [&](const char* name) {
@@ -650,7 +650,7 @@ TEST_F(Tool, FailuresAreOneLineStatus1AndNoFile) {
 }
 
 TEST_F(Tool, AFullDiskIsOneLineStatus1AndNoFile) {
-  // A file system of 16 KiB, mounted where only these commands see it; the filler leaves one page of it.
+  // A file system of 16 KiB, mounted only for these commands; the filler leaves one page free.
   const std::string in_small_disk =
       "unshare -rm sh -c \"mkdir -p disk && mount -t tmpfs -o size=16k none disk && "
       "head -c 12288 /dev/zero > disk/filler && ";
@@ -685,7 +685,7 @@ TEST_F(Tool, ALimitOnTheSizeOfFilesIsOneLineStatus1AndNoFile) {
 TEST_F(Tool, SignalsLeaveNoTemporaryFile) {
   std::ofstream(folder_.file("large.vox"), std::ios::binary) << checkerboard_vox(40);
   for (const std::string signal : {"HUP", "INT", "TERM"}) {
-    // Each run ends before, during or after the signal; a few runs meet the middle of the writing.
+    // Each run ends before, during or after the signal; a few runs are interrupted while writing.
     for (int i = 0; i < 3; ++i) {
       const std::string out = signal + std::to_string(i) + ".obj";
       const ToolRun result = shell("'" QUOIN_TOOL "' convert large.vox " + out +

@@ -1,4 +1,4 @@
-// What `quoin view` says without a window; the window itself is tested in apps/viewer and tests/viewer.
+// Messages of `quoin view` without a window. The tests in apps/viewer and tests/viewer cover the window.
 
 #include <gtest/gtest.h>
 
@@ -9,11 +9,11 @@ namespace {
 
 class ToolView : public ToolTest {
  protected:
-  /// Whether the viewer was built.
+  /// Returns true if the viewer was built.
   [[nodiscard]] bool is_built() { return without_display("view tiny.vox").err.find("no viewer") == std::string::npos; }
   ToolRun without_display(const std::string& arguments) {
     std::string command = kNoDisplay;
-    command += arguments;  // of a sum GCC 12 warns without reason
+    command += arguments;  // GCC 12 warns of a sum without reason
     return shell(command);
   }
   static constexpr const char* kNoDisplay = "unset DISPLAY WAYLAND_DISPLAY SDL_VIDEODRIVER; '" QUOIN_TOOL "' ";

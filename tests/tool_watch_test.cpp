@@ -1,12 +1,12 @@
-// --watch of convert and render: what is read changes, and what is written follows, until a signal ends it.
+// --watch of convert and render: outputs follow changes of the inputs until a signal ends the program.
 
 #include "tests/tool_for_tests.h"
 
 namespace quoin {
 namespace {
 
-/// Shell functions: `start ARGUMENTS` runs the tool, `until CONDITION` waits for at most 20 s, `finish SIGNAL` ends it
-/// and gives its status.
+/// Shell functions: `start ARGUMENTS` runs the tool, `until_true CONDITION` waits for at most 20 s, `finish SIGNAL`
+/// ends the tool and prints its status.
 constexpr const char* kFunctions =
     "start() { env --default-signal=INT '" QUOIN_TOOL
     "' \"$@\" 2>log & pid=$!; }\n"
@@ -56,7 +56,7 @@ TEST_F(ToolWatch, ABrokenStateIsToldOfAndTheNextOneTaken) {
   EXPECT_NE(result.out.find("status 143"), std::string::npos) << result.out;
 }
 
-// A picture of a scene file depends on the files that it names.
+// The image of a scene file depends on the files that the scene names.
 TEST_F(ToolWatch, APictureFollowsTheModelsThatASceneNames) {
   std::ofstream(folder_.file("fleet.json")) << R"({"quoin_scene": 1, "files": [{"id": "a", "path": "tiny.vox"}],)"
                                             << R"( "instances": [{"file": "a", "position": [0, 0, 0]}]})";
@@ -72,7 +72,8 @@ TEST_F(ToolWatch, APictureFollowsTheModelsThatASceneNames) {
   EXPECT_EQ(bytes("out.png"), bytes("second.png"));
 }
 
-// A model that is broken when it is first read is mended, and one that a scene names beside other inputs changes.
+// First a model is broken when it is first read and later fixed; then a model of a scene changes, with other inputs
+// given.
 TEST_F(ToolWatch, SeesChangedModelsOfAScene) {
   std::ofstream(folder_.file("fleet.json")) << R"({"quoin_scene": 1, "files": [{"id": "a", "path": "ship.vox"}],)"
                                             << R"( "instances": [{"file": "a"}]})";
@@ -91,7 +92,7 @@ TEST_F(ToolWatch, SeesChangedModelsOfAScene) {
   EXPECT_EQ(result.out.find("never"), std::string::npos) << result.out;
 }
 
-// Of a folder only what has changed is converted again, and what is new; what is written there starts nothing.
+// Only changed and new files of a folder are converted again; outputs in the folder trigger nothing.
 TEST_F(ToolWatch, AFolderIsFollowedFileByFile) {
   const ToolRun result = script(
       "mkdir models; cp tiny.vox models/a.vox; cp other.vox models/b.vox\n"

@@ -20,7 +20,7 @@ class ToolWorld : public ToolTest {
     if (made.err.find("no worlds on disk") != std::string::npos) GTEST_SKIP() << made.err;
     ASSERT_EQ(made.status, 0) << made.err;
   }
-  /// Turns 100 bytes in the middle of a file.
+  /// Flips 100 bytes in the middle of a file.
   void damage(const char* name) {
     std::string bytes = text_of(folder_.file(name));
     for (std::size_t i = bytes.size() / 2; i < bytes.size() / 2 + 100; ++i) bytes[i] = static_cast<char>(~bytes[i]);
@@ -94,7 +94,7 @@ TEST_F(ToolWorld, ShowsItselfByAThumbnail) {
   EXPECT_GT(Json::parse(run("world info hills.quoin --json").out)["thumbnail_bytes"], 1000);
   ASSERT_EQ(run("world thumbnail hills.quoin hills.png -q").status, 0);
   EXPECT_EQ(text_of(folder_.file("hills.png")).substr(1, 3), "PNG");
-  // That is what `thumbnail` draws.
+  // It equals the image of `quoin thumbnail`.
   ASSERT_EQ(run("thumbnail hills.quoin drawn.png -q").status, 0);
   EXPECT_TRUE(text_of(folder_.file("hills.png")) == text_of(folder_.file("drawn.png")));
   ASSERT_TRUE(WorldStore::create(folder_.file("bare.quoin")));
@@ -149,7 +149,7 @@ TEST_F(ToolWorld, ReportsInsufficientMemoryBeforeLoading) {
   GTEST_SKIP() << "sanitizers take more addresses than the limit";
 #endif
   {
-    // Chunks of 256 types take 400 MB, of which few bytes are on disk.
+    // Chunks of 256 types take 400 MB in memory and few bytes on disk.
     auto world = WorldStore::create(folder_.file("large.quoin"));
     WorldChanges changes;
     VoxelRegistry types;
@@ -189,7 +189,7 @@ TEST_F(ToolWorld, IsMadeOfHeightsWhereTheyAreSaidToBeHeights) {
   const ToolRun made =
       run("convert " + picture + " fuji.quoin --heights grey --metres-per-level 0.1 --metres-per-pixel 2 -q --json");
   ASSERT_EQ(made.status, 0) << made.err;
-  // Levels of 0, 100, 255, 7, 8 and 9 tenths of a metre, in voxels of two metres, on eight of ground.
+  // Levels of 0, 100, 255, 7, 8 and 9 tenths of a metre, in voxels of two metres, above eight voxels of ground.
   EXPECT_EQ(Json::parse(made.out)["voxels"], 6 * 8 + 5 + 13);
   const ToolRun smooth = run("info " + picture + " --heights grey --metres-per-pixel 2 --smooth-ground --json");
   ASSERT_EQ(smooth.status, 0) << smooth.err;

@@ -16,7 +16,7 @@ TEST(Version, IsItsThreeNumbers) {
                            std::to_string(QUOIN_VERSION_PATCH));
 }
 
-// The build takes it from the header, for the tool, for what files say of their maker and for packages.
+// The build takes the version from the header, for the tool, the generator field of written files, and packages.
 TEST_F(VersionOfTool, IsThatOfTheHeader) {
   EXPECT_EQ(run("--version").out, "quoin " + std::string(version()) + "\n");
 }

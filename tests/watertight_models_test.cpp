@@ -15,7 +15,7 @@
 namespace quoin {
 namespace {
 
-// Every model of the real files, which lie beside the source tree on machines that have them.
+// Tests every model of the real files, which lie next to the source tree on some machines.
 TEST(WatertightModels, EveryRealModelIsWatertight) {
   const std::filesystem::path folder = std::filesystem::path(QUOIN_SOURCE_DIR) / ".." / "shared" / "data" / "vox";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "the collection of real files is not here: " << folder;
@@ -25,7 +25,7 @@ TEST(WatertightModels, EveryRealModelIsWatertight) {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
     if (entry.path().extension() != ".vox") continue;
     const auto loaded = load_scene(entry.path());
-    if (!loaded) continue;  // those that are meant to be bad; VoxData counts the others
+    if (!loaded) continue;  // intentionally bad files; VoxData counts the others
     for (const GridHandle handle : loaded->scene.grids().handles()) {
       const auto mesh = build_blocky_mesh(loaded->scene.grids()[handle].grid, loaded->scene.types, options);
       ASSERT_TRUE(mesh.has_value());
@@ -36,7 +36,7 @@ TEST(WatertightModels, EveryRealModelIsWatertight) {
   EXPECT_GT(models, 150);
 }
 
-/// Whoever takes vertices of one place for one finds each edge between two triangles.
+/// After welding vertices by position, each edge lies between two triangles.
 void expect_manifold_by_places(const MeshView& view) {
   std::map<std::array<float, 3>, std::uint32_t> places;
   std::vector<std::uint32_t> indices;
@@ -60,7 +60,7 @@ TEST(WatertightModels, EveryRealModelHasASmoothSurfaceThatIsAManifold) {
     if (!loaded) continue;
     SCOPED_TRACE(entry.path());
     for (const float error : {0.0F, 0.25F}) {
-      // Every third, since that takes long.
+      // Tests every third model, since simplification is slow.
       if (error > 0.0F && (!can_simplify() || ++simplified % 3 != 0)) continue;
       SmoothSceneOptions options;
       options.unite = false;
@@ -69,7 +69,7 @@ TEST(WatertightModels, EveryRealModelHasASmoothSurfaceThatIsAManifold) {
       ASSERT_TRUE(meshes);
       EXPECT_LE(meshes->stats.simplify_error, error);
       for (const MeshPart& part : meshes->parts) {
-        // Panes of two kinds share places.
+        // Panes of two kinds share positions.
         if (part.surfaces[0].surface == SurfaceClass::Opaque) expect_manifold_by_places(part.surfaces[0]);
         ++models;
       }

@@ -1,4 +1,4 @@
-// What tests/kernels/check is there to find: a function of the whole program, compiled for wide instructions.
+// A function of the whole program, compiled for wide instructions: tests/kernels/check must find it.
 
 inline void add_one(float* values) {
   for (int i = 0; i < 64; ++i) values[i] += 1.0F;

@@ -1,4 +1,4 @@
-// A program outside Quoin's tree: fills a box and meshes it, with blocks and smoothly.
+// A program outside Quoin's tree: fills a box and meshes it as blocks and as a smooth surface.
 
 #include <cstdio>
 
@@ -20,7 +20,7 @@ int main() {
 
   const auto mesh = quoin::build_blocky_mesh(scene.grids()[handle].grid, scene.types, {});
   if (!mesh || mesh->quads != 6) return 1;
-  // Also what only some builds have must be found when linking.
+  // Linking must also find the features that only some builds have.
   auto smooth = quoin::build_smooth_mesh(*quoin::field_from_grid(scene.grids()[handle].grid), scene.types, {});
   if (!smooth || smooth->indices.empty()) return 1;
   if (quoin::simplify_smooth_mesh(*smooth, 0.1F).has_value() != quoin::can_simplify()) return 1;
