@@ -88,7 +88,7 @@ TEST(SurfaceColours, are_means_in_linear_light_where_a_voxel_covers_many_pixels)
   EXPECT_EQ(made.at(3, 5).colour, (Rgba8{188, 188, 188, 255}));
 }
 
-TEST(SurfaceColours, of_coarse_textures_go_over_or_stay_as_they_are) {
+TEST(SurfaceColours, coarse_textures_blend_or_stay_sharp) {
   TriangleMesh mesh = square();
   const auto of = [](int x, int) { return x == 0 ? Rgba8{0, 0, 0, 255} : Rgba8{255, 255, 255, 255}; };
   mesh.textures.push_back(texture(2, of));
@@ -185,7 +185,7 @@ TEST(SurfaceColours, within_a_solid_are_their_mean) {
   EXPECT_EQ(types[made->grid.get({10, 10, 0})].colour, (Rgba8{0, 0, 255, 255}));
 }
 
-TEST(SurfaceColours, of_one_material_are_of_it_deep_inside_too) {
+TEST(SurfaceColours, one_material_fills_the_inside_too) {
   TriangleMesh mesh = shapes::box({0.25, 0.25, 0.25}, {9.75, 9.75, 9.75});
   MeshMaterial glass;
   glass.name = "glass";

@@ -164,7 +164,7 @@ int votes_of(const TriangleMesh& mesh, SolidVoxels rule, DVec3 centre) {
 }
 
 // Triangles by chance, open on all sides, over several chunks: most of these are decided without looking at voxels.
-TEST(VoxelizeSolid, of_any_triangles_is_what_six_rays_say) {
+TEST(VoxelizeSolid, open_triangles_match_votes_of_six_rays) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> place(0.0, 150.0);
   for (const int count : {1, 4, 13, 34}) {
@@ -254,7 +254,7 @@ TEST(VoxelizeSurface, on_centres_takes_all_that_it_passes_on_every_side) {
   EXPECT_EQ(voxelized(long_box, SurfaceVoxels::Separating6, SolidVoxels::Winding).size(), 4U * 4U * 11U);
 }
 
-TEST(VoxelizeSurface, what_rounding_puts_next_to_a_side_lies_on_it) {
+TEST(VoxelizeSurface, rounding_next_to_a_side_counts_as_on_it) {
   for (const double size : {0.1, 0.02, 1.0 / 3.0, 0.7}) {
     const TriangleMesh box = shapes::box(DVec3(3.0 * size, -7.0 * size, 11.0 * size), DVec3(17.0 * size));
     VoxelRegistry types;
@@ -266,7 +266,7 @@ TEST(VoxelizeSurface, what_rounding_puts_next_to_a_side_lies_on_it) {
   }
 }
 
-TEST(VoxelizeSurface, of_a_slanted_plane_is_one_layer) {
+TEST(VoxelizeSurface, slanted_plane_is_one_layer) {
   // y = 0.3 x + 0.45 z + 10.1, over 40 x 40 columns.
   TriangleMesh mesh;
   const auto at = [](double x, double z) { return DVec3(x, 0.3 * x + 0.45 * z + 10.1, z); };

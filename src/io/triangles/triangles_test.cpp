@@ -155,7 +155,7 @@ std::string tetrahedron_gltf(const std::string& nodes, const std::string& materi
                   materials + R"("nodes":)" + nodes);
 }
 
-TEST(Triangles, of_all_formats_are_the_same) {
+TEST(Triangles, all_formats_give_the_same_triangles) {
   std::vector<std::string> files = {ply_bytes(false), ply_bytes(true), stl_bytes(), stl_text()};
   std::string text = ply_header("ascii");
   for (const auto& c : kCorners) {
@@ -196,7 +196,7 @@ TEST(Triangles, have_the_colours_of_vertices) {
   EXPECT_EQ(obj.mesh.colours[1], glm::vec4(0, 1, 0, 1));
 }
 
-TEST(Triangles, of_ply_are_strips_too) {
+TEST(Triangles, ply_strips_are_read) {
   const std::string text =
       "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
       "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
@@ -206,7 +206,7 @@ TEST(Triangles, of_ply_are_strips_too) {
   EXPECT_EQ(loaded.mesh.triangles[1], (std::array<std::uint32_t, 3>{1, 3, 2}));
 }
 
-TEST(Triangles, of_polygons_are_cut_and_of_bad_corners_left_out) {
+TEST(Triangles, polygons_are_cut_and_bad_corners_left_out) {
   if (!reads(FileFormat::Obj)) return;
   const LoadedMesh loaded = mesh_of("v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv nan 0 0\nf 1 2 3 4\nf 1 2 900\nl 1 2\n");
   EXPECT_EQ(loaded.mesh.triangles.size(), 2U);
@@ -285,7 +285,7 @@ TEST(GltfTriangles, refuses_what_contradicts_itself) {
   EXPECT_EQ(error_of(cut).code, ErrorCode::BadFormat);
 }
 
-TEST(Triangles, of_files_that_lie_are_refused_with_a_place) {
+TEST(Triangles, inconsistent_files_are_refused_with_a_position) {
   std::string stl = stl_bytes();
   put(stl, 0);
   std::string claims = stl_bytes().substr(0, 80);
@@ -389,7 +389,7 @@ TEST(Triangles, become_scenes_at_their_own_size) {
   EXPECT_FALSE(load_scene(bytes_of("solid nothing\nendsolid nothing\n")));
 }
 
-TEST(Triangles, of_the_corpus_are_read_as_scenes) {
+TEST(Triangles, corpus_files_are_read_as_scenes) {
   std::size_t read = 0;
   for (const auto& entry : fs::directory_iterator(fs::path(QUOIN_SOURCE_DIR) / "tests" / "corpus" / "triangles")) {
     const auto loaded = load_scene(entry.path());
@@ -403,7 +403,7 @@ TEST(Triangles, of_the_corpus_are_read_as_scenes) {
   EXPECT_GE(read, 6U);
 }
 
-TEST(Triangles, of_real_files_have_their_counts) {
+TEST(Triangles, real_files_have_their_counts) {
   const fs::path folder = fs::path(QUOIN_SOURCE_DIR).parent_path() / "shared" / "data" / "mesh";
   if (!fs::exists(folder)) GTEST_SKIP() << "the files are not here";
   const fs::path models = folder / "alecjacobson+common-3d-test-models";

@@ -88,7 +88,7 @@ void expect_sound(const Grid& grid, double volume_error = 0.0) {
   EXPECT_NEAR(found.volume, static_cast<double>(grid.voxel_count()), 1e-3 + volume_error);
 }
 
-TEST(ClosedSurface, of_a_voxel_is_a_cube) {
+TEST(ClosedSurface, one_voxel_is_a_cube) {
   Grid grid;
   grid.set({5, -3, 7}, 2);
   const BlockyTriangles mesh = surface_of(grid);
