@@ -11,7 +11,7 @@
 namespace quoin {
 namespace {
 
-// Converts by the definition of the format.
+// Converts a half by the definition of the format.
 double value_of(Half half) {
   const int exponent = half >> 10 & 31;
   const double fraction = half & 1023;
@@ -19,7 +19,7 @@ double value_of(Half half) {
   return (half & 0x8000) != 0 ? -magnitude : magnitude;
 }
 
-// The nearest of all halves, one after the other; of two, the even one.
+// Returns the nearest half by a search over all halves; the even one at ties.
 Half nearest_half(float value) {
   const double magnitude = std::abs(double{value});
   Half low = 0;

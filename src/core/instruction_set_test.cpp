@@ -29,7 +29,7 @@ TEST(InstructionSets, AnOverrideEndsWithItsScopeAndIsSeenByEveryThread) {
   EXPECT_EQ(instruction_set(), before);
 }
 
-// A test that compares sets, as run on a machine that has only the plain one.
+// Runs a test that compares instruction sets as on a machine that has only the plain one.
 void compare_with_avx2(bool& is_compared) {
   QUOIN_SKIP_WITHOUT(InstructionSet::Avx2);
   is_compared = true;

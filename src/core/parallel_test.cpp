@@ -47,7 +47,7 @@ long resident_kilobytes() {
   return 4 * resident;
 }
 
-// A game calls this several times a frame, for hours.
+// A game calls parallel_for several times per frame, for hours.
 TEST(ParallelFor, ManyCallsKeepNoMemory) {
   std::atomic<int> done{0};
   const auto call = [&](int times) {

@@ -95,7 +95,7 @@ TEST(SlotMap, AHandleNamesTheCopyOfItsElementAndNothingThatCameLater) {
   EXPECT_EQ(copy[in_copy], 4);
 }
 
-// Its copy constructor, which also serves as the move, can throw.
+// Its copy constructor, which also serves as the move constructor, can throw.
 struct Fragile {
   explicit Fragile(int given) : value(given) {}
   Fragile(const Fragile& other) : value(other.value) {

@@ -9,7 +9,7 @@
 namespace quoin {
 namespace {
 
-// The standard's formula, rounded to the nearest byte.
+// Applies the standard's formula, rounded to the nearest byte.
 int by_formula(float linear) {
   const long double x = linear;
   const long double encoded = x <= 0.0031308L ? 12.92L * x : 1.055L * std::pow(x, 1.0L / 2.4L) - 0.055L;
@@ -27,7 +27,7 @@ TEST(Srgb, RoundsToTheNearestByteForRandomFloats) {
   const SrgbEncoder& encode = SrgbEncoder::shared();
   std::mt19937 random(5);
   for (int i = 0; i < 300'000; ++i) {
-    // Evenly over the floats from 2^-16 to 1.
+    // Covers the floats from 2^-16 to 1 evenly.
     const float x =
         std::ldexp(1.0F + static_cast<float>(random() >> 9) * 0x1p-23F, -1 - static_cast<int>(random() % 16));
     ASSERT_EQ(encode(x), by_formula(x)) << x;

@@ -21,7 +21,7 @@ TEST(Coordinates, AreKeysInTheOrderOfChunks) {
 
 TEST(Boxes, AroundABoxAreTheVoxelsThatItMeets) {
   EXPECT_EQ(box_around({{0.5, -0.5, 2.0}, {1.5, 0.0, 3.0}}), (IBox{{0, -1, 2}, {2, 0, 3}}));
-  // Points and flat boxes lie in voxels, too.
+  // Points and flat boxes also lie in voxels.
   EXPECT_EQ(box_around({DVec3(-1.0), DVec3(-1.0)}), (IBox{IVec3(-1), IVec3(0)}));
   EXPECT_EQ(box_around({{0.0, 0.25, 0.0}, {2.0, 0.25, 1.0}}), (IBox{{0, 0, 0}, {2, 1, 1}}));
   EXPECT_TRUE(box_around({}).empty());

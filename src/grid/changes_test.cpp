@@ -25,7 +25,7 @@ Key key_of(IVec3 at) {
   return {at.z, at.y, at.x};
 }
 
-// The changes that one consumer should read.
+// The expected changes for one consumer.
 struct Expected {
   std::map<Key, IBox> boxes;  // by chunk, in grid coordinates
   std::set<Key> reached;      // chunks that hold one of the 26 neighbours of a changed voxel
@@ -65,12 +65,12 @@ void expect_told(Consumer& consumer, const Grid& grid) {
   consumer.expected = {};
 }
 
-// The least and greatest voxels of a chunk, and some in between.
+// Returns the lowest or highest voxel of a chunk, or one in between.
 int random_place(std::mt19937& random) {
   return static_cast<int>(random() % 3) * 64 - 64 + std::array{0, 1, 17, 40, 62, 63}[random() % 6];
 }
 
-// An edit of some kind, and all voxels that it changed.
+// Makes a random edit and returns all changed voxels.
 std::vector<IVec3> random_edit(std::mt19937& random, Grid& grid) {
   const IVec3 at{random_place(random), random_place(random), random_place(random)};
   const IVec3 size{static_cast<int>(random() % 5), static_cast<int>(random() % 4), static_cast<int>(random() % 5)};
@@ -127,7 +127,7 @@ TEST(Changes, EveryConsumerIsToldExactlyWhatChangedSinceItsOwnLastTime) {
         for (Consumer& each : consumers) each.expected.add(voxel);
       }
       for (std::size_t i = 0; i < consumers.size(); ++i) {
-        // Each in its own rhythm, and some by way of a snapshot.
+        // Each consumer reads at its own rate, some through a snapshot.
         if (random() % (1U << (2 * i)) != 0) continue;
         if (random() % 3 == 0) {
           ASSERT_NO_FATAL_FAILURE(expect_told(consumers[i], grid.snapshot()));

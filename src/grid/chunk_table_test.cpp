@@ -24,7 +24,7 @@ ChunkEntry& add(ChunkTable& table, IVec3 at, VoxelType type) {
   return *slot.entry;
 }
 
-// A crowd that moves away bit by bit, and a few far from it and from each other.
+// Positions of a crowd that moves away step by step, and a few strays far from it and from each other.
 IVec3 random_place(std::mt19937& random, int round, bool strays) {
   const auto below = [&](int limit) { return static_cast<int>(random() % static_cast<unsigned>(limit)); };
   if (strays && random() % 8 == 0) return {below(40'000) - 20'000, below(40'000) - 20'000, below(40'000) - 20'000};
@@ -93,7 +93,8 @@ TEST(ChunkTable, TheWindowFollowsACrowdThatMoves) {
   }
 }
 
-// Simulates a moving viewer: chunks come ahead and go behind in small numbers, and the window is never rebuilt.
+// Simulates a moving viewer: small numbers of chunks appear ahead and disappear behind, and the window is never
+// rebuilt.
 TEST(ChunkTable, TheWindowSlidesAlongAndKnowsTheSameChunks) {
   for (const IVec3 way : {IVec3{1, 0, 0}, IVec3{-1, 0, 0}, IVec3{0, 1, 0}, IVec3{0, 0, -1}, IVec3{1, -1, 1}}) {
     ChunkTable table;

@@ -115,7 +115,7 @@ void set_sequential(benchmark::State& state) {
 }
 BENCHMARK(set_sequential)->Name("grid/set_sequential")->Unit(benchmark::kMillisecond);
 
-// The same, with one edit per voxel.
+// The same with one edit per voxel.
 void set_alone(benchmark::State& state) {
   constexpr int kEdge = 128;
   for (auto _ : state) {

@@ -29,7 +29,8 @@ TEST(GridReader, ReadsAsTheGridDoes) {
   }
 }
 
-// Uniform chunks of air and of something, mixed ones of few types and of many; rows one after the other, to and fro.
+// Covers uniform chunks of air and of solid, and mixed chunks of few and of many types; reads rows forwards and
+// backwards.
 TEST(GridReader, ReadsAsTheGridDoesWhateverTheOrder) {
   std::mt19937 random(4);
   const auto below = [&random](int limit) { return static_cast<int>(random() % static_cast<unsigned>(limit)); };

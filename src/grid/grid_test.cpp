@@ -28,7 +28,7 @@ TEST(Grid, VoxelMinusOneLiesInChunkMinusOne) {
   EXPECT_EQ(grid.bounds(), (IBox{{-1, -65, 63}, {0, -64, 64}}));
 }
 
-// A point is no voxel: it would be cut towards 0.
+// A point is not a voxel: its coordinates would be truncated towards 0.
 template <class Place>
 constexpr bool takes_any_of(Place) {
   return requires(Grid& grid, Place at) { grid.get(at); } || requires(Grid& grid, Place at) { grid.set(at, 1); } ||
@@ -280,14 +280,14 @@ TEST(Grid, AnEditThatThrowsIsBooked) {
   EXPECT_EQ(follower.take(grid), std::vector<IVec3>({{0, 0, 0}, {1, 0, 0}}));
 }
 
-// The storage of a chunk is created and freed during an edit.
+// An edit creates and frees the storage of a chunk.
 TEST(Grid, AnEditMayReadWhatItChanges) {
   Grid grid;
   const IBox box{{0, 0, 0}, {64, 64, 64}};
   const auto below = [&grid](IVec3 v) { return grid.get(v - IVec3{0, 1, 0}); };
   for (const VoxelType seed : {VoxelType{7}, VoxelType{9}, kAir}) {
     grid.fill_box({{0, -1, 0}, {64, 0, 64}}, seed);
-    // Mixed at first, of one type at the end, and the other way round.
+    // Starts mixed and ends uniform, and the reverse.
     if (seed != kAir) grid.set({5, 6, 7}, 3);
     grid.edit(box, [&](IVec3 v, VoxelType) { return below(v); });
     EXPECT_EQ(grid.get({63, 63, 63}), seed);

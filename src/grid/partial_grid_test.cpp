@@ -169,7 +169,7 @@ TEST(PartialGrid, ABoxIsLoadedWhereAllItsChunksAre) {
   const int least = std::numeric_limits<int>::min();
   const int most = std::numeric_limits<int>::max();
   EXPECT_FALSE(grid.is_loaded_within({IVec3(least), IVec3(most)}));
-  EXPECT_TRUE(grid.is_loaded_within({IVec3(least), IVec3(least + 64)}));  // the outermost is air
+  EXPECT_TRUE(grid.is_loaded_within({IVec3(least), IVec3(least + 64)}));  // the outermost chunk is air
   EXPECT_TRUE(Grid().is_loaded_within({IVec3(least), IVec3(most)}));
 }
 
@@ -178,7 +178,7 @@ TEST(PartialGrid, CopiesOnlyLoadedVoxels) {
   grid.load_chunk({0, 0, 0}, Chunk(kAir));
   grid.set(63, 5, 5, 2);
   for (int x = 0; x < 64; ++x) grid.set(x, 0, 0, 3);
-  const IBox box{{60, 0, 0}, {68, 10, 10}};  // half of it is loaded
+  const IBox box{{60, 0, 0}, {68, 10, 10}};  // half of the box is loaded
   for (const bool is_turned : {false, true}) {
     Grid to;
     to.fill_box({{0, 0, 0}, {20, 20, 20}}, 1);
@@ -217,7 +217,7 @@ TEST(PartialGrid, FieldsAlike) {
   const DensityChanges edited = field.changes_since(cursor);
   ASSERT_EQ(edited.items.size(), 2U);
   EXPECT_TRUE(edited.items[0].is_edit);
-  EXPECT_EQ(field.smooth({70.0, 32.0, 32.0}, 10.0, 1.0), 0);  // not all around is loaded
+  EXPECT_EQ(field.smooth({70.0, 32.0, 32.0}, 10.0, 1.0), 0);  // not all samples around the sphere are loaded
   EXPECT_TRUE(field.unload_chunk({0, 0, 0}));
   EXPECT_FALSE(field.is_loaded({0, 0, 0}));
   EXPECT_FALSE(field.is_loaded_around({1, 0, 0}));

@@ -50,14 +50,14 @@ void expect_equal(const Twin& twin) {
   ASSERT_EQ(twin.grid.bounds(), bounds);
 }
 
-// Snapshots of snapshots, each edited, destroyed in random order.
+// Edits and destroys snapshots of snapshots in random order.
 TEST(Snapshot, EditsLeaveAllOtherSnapshotsAsTheyWere) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
     const auto below = [&](std::size_t limit) { return static_cast<std::size_t>(random() % limit); };
     const auto place = [&] {
-      // Near each other, and now and then far apart.
+      // Edits near each other, and sometimes far apart.
       const int spread = random() % 8 == 0 ? 100'000 : 300;
       return static_cast<int>(random() % static_cast<unsigned>(2 * spread)) - spread;
     };
@@ -106,7 +106,7 @@ TEST(Snapshot, SharesChunksUntilTheyAreEdited) {
   for (int i = 0; i < 64; ++i) grid.set({64 * i + 3, 5, 7}, 1);
   const Grid copy = grid.snapshot();
   grid.set({64 * 20 + 4, 5, 7}, 2);
-  grid.set({64 * 21 + 3, 5, 7}, 1);  // as it was
+  grid.set({64 * 21 + 3, 5, 7}, 1);  // restores the voxel
   for (int i = 0; i < 64; ++i) {
     EXPECT_EQ(grid.find_chunk({i, 0, 0})->shares_storage_with(*copy.find_chunk({i, 0, 0})), i != 20) << i;
   }
@@ -142,7 +142,7 @@ TEST(Snapshot, DensitySnapshotsStayAsTheyWere) {
   }
 }
 
-// Readers on other threads keep, read and let go of snapshots while the grid is edited.
+// Threads keep, read and release snapshots while the grid is edited.
 TEST(Snapshot, IsReadOnOtherThreadsWhileTheGridIsEdited) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {256, 64, 256}}, 1);
@@ -165,7 +165,7 @@ TEST(Snapshot, IsReadOnOtherThreadsWhileTheGridIsEdited) {
   }
 }
 
-// Workers read snapshots, edit copies of their own and let go of both at any time, while the grid is edited.
+// Workers read snapshots, edit their own copies and release both at any time while the grid is edited.
 TEST(Snapshot, PagesOfVoxelsComeAndGoOnManyThreads) {
   std::mt19937 random(3);
   const auto below = [](std::mt19937& from, unsigned end) { return static_cast<int>(from() % end); };

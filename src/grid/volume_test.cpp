@@ -25,7 +25,7 @@ Volume volume_of(IVec3 size, const std::vector<float>& values) {
   return volume;
 }
 
-/// Otsu's threshold by trying every value.
+/// Finds Otsu's threshold by trying every value.
 double variance_within(const std::vector<float>& values, double threshold) {
   double sum[2] = {}, squares[2] = {}, count[2] = {};
   for (const double value : values) {

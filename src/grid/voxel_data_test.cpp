@@ -1,4 +1,4 @@
-// Data at voxels follows its voxels through every edit, copy and snapshot.
+// Voxel data follows its voxels through every edit, copy and snapshot.
 
 #include <algorithm>
 #include <map>
@@ -404,7 +404,7 @@ TEST(VoxelDataPieces, GoWithWhatFallsOff) {
   world.set_data({2, 0, 2}, {.state = 2});
   ConnectedPieces pieces;
   pieces.update(world);
-  world.set_data({66, 11, 11}, {.state = 3});  // no other type: pieces stay, their data does not
+  world.set_data({66, 11, 11}, {.state = 3});  // same type: pieces stay, their data changes
   pieces.update(world);
   const std::vector<std::size_t> fallen = pieces.apart_from({{0, 0, 0}, {100, 1, 100}});
   ASSERT_EQ(fallen.size(), 1U);

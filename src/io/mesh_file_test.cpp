@@ -27,14 +27,14 @@ struct Format {
   const char* extension;
   FileFormat format;
   std::function<WorldMesh(const std::vector<std::byte>&)> read;
-  bool linear;  ///< its colours are linear light rather than sRGB
+  bool linear;  /// colours are linear light rather than sRGB
 };
 
 const std::array kFormats = {
     Format{".glb", FileFormat::Glb, [](const auto& bytes) { return world_of(parse_glb(bytes)); }, true},
     Format{".ply", FileFormat::Ply, world_of_ply, false}, Format{".obj", FileFormat::Obj, world_of_obj, false}};
 
-/// A part whose arrays a test may spoil.
+/// A part whose arrays a test may corrupt.
 struct TestPart {
   std::string name;
   SmoothMesh mesh;
@@ -53,7 +53,7 @@ SceneMeshes meshes_of(const std::vector<TestPart>& parts) {
 
 class SmoothMeshFiles : public ::testing::Test {
  protected:
-  /// Writes with `format` and reads again.
+  /// Writes with `format` and reads the result.
   WorldMesh write(const Format& format, const MeshFileOptions& options = {}) {
     const auto path = folder_.file(std::string("out") + format.extension);
     const SceneMeshes meshes = meshes_of(parts_);
@@ -74,7 +74,7 @@ class SmoothMeshFiles : public ::testing::Test {
     parts_[0].placements.emplace_back(name, matrix);
   }
 
-  /// Every file must match the product of the matrices and the mesh, by plain arithmetic.
+  /// Every file must match the product of the matrices and the mesh, computed by plain arithmetic.
   void expect_all_formats_agree(bool sheared = false) {
     for (const Format& format : kFormats) {
       const WorldMesh world = write(format);
@@ -338,7 +338,7 @@ TEST_F(SmoothMeshFiles, APlacementOfNothingIsANodeWithoutAMesh) {
   EXPECT_FALSE(glb.document["nodes"][0].contains("mesh"));
 }
 
-/// Blocks and a smooth mesh in one description.
+/// Writes blocks and a smooth mesh in one file.
 TEST(MeshFiles, HoldBlocksAndSmoothMeshesSideBySide) {
   Scene scene;
   place(scene, add_asymmetric_grid(scene, "L"), {});
@@ -456,7 +456,7 @@ TEST(MeshFiles, OcclusionIsAnAttributeOfItsOwnWhereThatIsWanted) {
   ASSERT_FALSE(obj);
   EXPECT_EQ(obj.error().code, ErrorCode::Unsupported);
 
-  // Without occlusion there is none to write; PLY has one kind of vertex for all.
+  // Without occlusion glTF has no such attribute; in PLY, which has one vertex layout for all parts, it is 1.
   options.write_occlusion = false;
   const ParsedGlb plain = parse_glb(*write_mesh(*meshes, FileFormat::Glb, options));
   EXPECT_FALSE(plain.document["meshes"][1]["primitives"][0]["attributes"].contains("_AO"));

@@ -7,7 +7,7 @@
 namespace quoin {
 namespace {
 
-// Voxel by voxel: how far each of the 27 chunks around must look to see one that changed.
+// Compares voxel by voxel: how far each of the 27 chunks around must look to see a changed voxel.
 ChunkDifference slow_difference(const Chunk& a, const Chunk& b) {
   ChunkDifference found;
   for (int z = 0; z < kChunkEdge; ++z) {

@@ -33,7 +33,7 @@ TEST(PagedWords, HoldWhatTheyWereMadeOf) {
     EXPECT_EQ(words.size(), size);
     EXPECT_EQ(all_of(words), wanted);
     EXPECT_EQ(all_of(PagedWords(size)), std::vector<std::uint64_t>(size));
-    // No more room than words, heads and pointers.
+    // Allocates no more room than words, heads and pointers need.
     EXPECT_LE(words.allocated(), size * 8 + (size / PagedWords::kPageWords + 1) * 40);
   }
 }
@@ -53,7 +53,7 @@ TEST(PagedWords, AWriteToACopyCopiesOnePage) {
         << word;
   }
   EXPECT_TRUE(first.has_shared_pages());
-  // The first has that page to itself now, and finds out when it asks.
+  // Now the first owns that page alone, and detects this on access.
   const std::uint64_t* const place = first.at(2'500);
   first.make_own(2'500);
   EXPECT_TRUE(first.owns(2'500));
@@ -87,7 +87,7 @@ TEST(PagedWordsDeathTest, ASharedPageIsNotWritten) {
   QUOIN_EXPECT_MISTAKE((void)words.own_at(3), "made one's own");
 }
 
-// Chunks and copies of them, written in turn, against arrays.
+// Compares chunks and copies of them, written in turn, with plain arrays.
 TEST(Chunk, CopiesShareWhatNoneOfThemWrote) {
   for (const int types : {2, 4, 16, 200, 300}) {
     std::mt19937 random(static_cast<unsigned>(types));
@@ -108,7 +108,7 @@ TEST(Chunk, CopiesShareWhatNoneOfThemWrote) {
       const auto y = static_cast<int>(random() % 64);
       const auto z = static_cast<int>(random() % 64);
       if (random() % 4 == 0) {
-        // Whole slabs, so that slots become free and are taken again.
+        // Fills whole slabs to free slots and use them again.
         version.chunk.fill_box({{0, y & ~3, z & ~3}, {64, (y & ~3) + 4, (z & ~3) + 4}}, type,
                                [](int, int, std::uint64_t) {});
         for (int row = 0; row < 16; ++row) {

@@ -1,4 +1,4 @@
-// connected/*: the pieces of a 512x128x512 terrain of 128 chunks, with caves, found at first and after an edit.
+// connected/*: finds the pieces of a 512x128x512 terrain of 128 chunks, with caves, from scratch and after an edit.
 
 #include <quoin/grid/connected.h>
 
@@ -19,7 +19,7 @@ const Grid& terrain() {
   return made;
 }
 
-// Checks before timing: as many pieces as a flood fill finds.
+// Checks before timing: the number of pieces matches a flood fill.
 void check(std::size_t pieces, std::size_t expected) {
   if (pieces == expected) return;
   std::fprintf(stderr, "connected benchmark: %zu pieces, expected %zu\n", pieces, expected);
@@ -49,7 +49,7 @@ BENCHMARK_CAPTURE(find, corners, Connectivity::Corners26, 2)
     ->Name("connected/find/corners")
     ->Unit(benchmark::kMillisecond);
 
-// A chunk of noise, a third of it solid: some ten thousand pieces.
+// Measures a chunk of noise, a third of it solid: about ten thousand pieces.
 void find_in_noise(benchmark::State& state) {
   Grid world;
   std::uint64_t s = 42;
@@ -92,7 +92,7 @@ void follow(benchmark::State& state) {
 }
 BENCHMARK(follow)->Name("connected/follow")->Unit(benchmark::kMicrosecond);
 
-// The plain way: a flood fill by voxels, of the same terrain.
+// The simple method: a flood fill by voxels of the same terrain.
 void flood(benchmark::State& state) {
   const Grid& world = terrain();
   std::size_t pieces = 0;

@@ -13,7 +13,7 @@
 namespace quoin {
 namespace {
 
-// Pieces by flood fill, one voxel at a time.
+// Finds pieces by flood fill, one voxel at a time.
 class FloodFill {
  public:
   FloodFill(const Grid& grid, const ConnectedOptions& options) : box_(grid.bounds()), corners_(options.connectivity) {
@@ -22,7 +22,7 @@ class FloodFill {
     grid.for_each([&](IVec3 voxel, VoxelType type) {
       if (!options.belongs || options.belongs(type)) labels_[index(voxel)] = kUnseen;
     });
-    // In the order z, y, x: so pieces come in the order of their first voxels.
+    // Visits voxels in the order z, y, x, so that pieces are ordered by their first voxels.
     for (int z = box_.min.z; z < box_.max.z; ++z) {
       for (int y = box_.min.y; y < box_.max.y; ++y) {
         for (int x = box_.min.x; x < box_.max.x; ++x) {
@@ -89,7 +89,7 @@ struct Random {
   }
 };
 
-// Boxes, dust of many types, and a chunk of one type.
+// Returns a grid of boxes, dust of many types, and a uniform chunk.
 Grid random_grid(Random& random) {
   Grid grid;
   const int types = 2 + random.below(12);
@@ -195,7 +195,7 @@ TEST(ConnectedPieces, ExtractedMakeUpTheGrid) {
     ConnectedPieces pieces(options);
     pieces.update(grid);
     std::int64_t wrong = 0;
-    // The largest, and some of the others.
+    // Checks the largest piece and some of the others.
     for (std::size_t i = 0; i < pieces.size(); i += 1 + pieces.size() / 40) {
       const Grid piece = pieces.extract(i);
       ASSERT_EQ(piece.voxel_count(), pieces.pieces()[i].voxels);
@@ -346,7 +346,7 @@ TEST(ConnectedPieces, HoldsPiecesThatTouchUnloadedChunks) {
   Grid grid;
   grid.make_partial();
   grid.load_chunk({0, 0, 0}, Chunk(kAir));
-  grid.set(63, 10, 10, 1);  // may go on in the next chunk
+  grid.set(63, 10, 10, 1);  // may continue in the next chunk
   grid.set(30, 30, 30, 1);
   ConnectedPieces pieces;
   pieces.update(grid);
@@ -363,7 +363,7 @@ TEST(ConnectedPieces, HoldsPiecesThatTouchUnloadedChunks) {
   grid.unload_chunk({1, 0, 0});
   pieces.update(grid);
   EXPECT_TRUE(pieces.pieces()[0].touches_unloaded);
-  // The twin: of a whole grid with the same voxels all that is apart falls.
+  // For comparison: in a whole grid with the same voxels all separate pieces fall.
   Grid whole;
   whole.set(63, 10, 10, 1);
   whole.set(30, 30, 30, 1);
@@ -380,8 +380,8 @@ TEST(ConnectedPieces, EdgesAndCornersOfChunksCountWhereVoxelsConnectByThem) {
       const IVec3 chunk(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
       if (chunk != IVec3(1, 1, 0) && chunk != IVec3(-1, -1, -1)) grid.load_chunk(chunk, Chunk(kAir));
     }
-    grid.set(63, 63, 20, 1);  // at the edge towards one that is not loaded
-    grid.set(0, 0, 0, 1);     // at the corner towards another
+    grid.set(63, 63, 20, 1);  // at the border of an unloaded chunk
+    grid.set(0, 0, 0, 1);     // at the corner of another one
     // Its bounding box reaches both sides of the edge, but the piece does not.
     for (int x = 40; x < 64; ++x) grid.set(x, 40, 40, 1);
     for (int y = 40; y < 64; ++y) grid.set(40, y, 40, 1);

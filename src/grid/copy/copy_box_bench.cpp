@@ -1,4 +1,4 @@
-// copy/*: the 256x128x256 terrain copied, turned and mirrored into another grid; a time is of all 32 chunks.
+// copy/*: copies, turns and mirrors the 256x128x256 terrain into another grid; a time covers all 32 chunks.
 
 #include <quoin/grid/copy_box.h>
 

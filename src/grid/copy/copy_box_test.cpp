@@ -49,7 +49,7 @@ struct Random {
   explicit Random(unsigned seed) : engine(seed) {}
   int below(int limit) { return static_cast<int>(engine() % static_cast<unsigned>(limit)); }
   IVec3 place(int reach) { return {below(2 * reach) - reach, below(2 * reach) - reach, below(2 * reach) - reach}; }
-  // Boxes, single voxels, and chunks of one type.
+  // Returns a grid of boxes, single voxels and uniform chunks.
   Grid grid() {
     Grid made;
     const int types = 1 + below(300);
@@ -98,7 +98,7 @@ TEST(CopyBox, WithinOneGridCopiesAsIfAtOnce) {
     Grid grid = random.grid();
     Grid expected = grid.snapshot();
     const IBox box = random.box();
-    // Boxes that overlap, now and then by whole chunks.
+    // The boxes overlap, sometimes by whole chunks.
     IVec3 to_min = box.min + random.place(40);
     if (seed % 4 == 0) to_min = box.min + random.place(2) * kChunkEdge;
     const AxisOrientation orientation = seed % 2 == 0 ? AxisOrientation() : random.orientation();
@@ -122,7 +122,7 @@ TEST(CopyBox, WholeChunksAreSharedWhereTheyAreMovedByChunks) {
     ASSERT_NE(copy, nullptr);
     EXPECT_TRUE(copy->shares_storage_with(*from.find_chunk(chunk)));
   }
-  // Also if a type map changes none of the chunk's types, and if air is not copied and the target is empty.
+  // Also tests a type map that changes none of the chunk's types, and an empty target without copied air.
   Grid third;
   const std::vector<VoxelType> type_map = {0, 1, 2};
   CopyOptions options;
@@ -195,7 +195,7 @@ TEST(CopyBox, LeavesOutWhatWouldLieOutsideTheWorld) {
   EXPECT_EQ(to.get(kWorldEdge - 1, 9, 9), 1);
   constexpr int kLast = std::numeric_limits<int>::max();
   EXPECT_EQ(copy_box(from, {IVec3(0), IVec3(10)}, to, {0, kLast - 3, 0}, AxisOrientation::quarter_turns(0, 1)), 0);
-  // A box as large as coordinates are.
+  // A box that spans all coordinates.
   const IBox all{IVec3(std::numeric_limits<int>::min()), IVec3(kLast)};
   Grid whole;
   EXPECT_EQ(copy_box(from, all, whole, all.min), 1'000);

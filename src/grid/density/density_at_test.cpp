@@ -80,7 +80,7 @@ TEST(DensityAt, AgreesWithTheSumOverTheCornersInARandomField) {
       before[axis] = std::floor(p[axis]);
       DVec3 after = before;
       after[axis] += 1.0;
-      // Along an axis the field is linear within a cell.
+      // The field is linear along an axis within a cell.
       const double at_end = value(after - DVec3(axis == 0, axis == 1, axis == 2) * 1e-9);
       EXPECT_NEAR(grid.gradient_at(p)[axis], at_end - value(before), 1e-5);
     }

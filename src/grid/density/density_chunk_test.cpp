@@ -58,7 +58,7 @@ TEST(StoredDensity, IsWithinOnePartIn2048) {
   }
 }
 
-// Every sample, and the row that is its sign.
+// Stores every sample, and the row of its sign.
 class PlainChunk {
  public:
   explicit PlainChunk(Half density) : values_(kChunkVoxels, density) {}

@@ -70,7 +70,7 @@ DensitySample smoothed(PlainField& old, IVec3 p, double weight) {
   return with_material(before, before.density + weight * (sum / 26.0 - before.density), most);
 }
 
-/// A random edit, done to both fields.
+/// A random edit, applied to both fields.
 class RandomEdit {
  public:
   explicit RandomEdit(std::mt19937& random) : random_(random) {
@@ -134,7 +134,7 @@ class RandomEdit {
     }
   }
   double number(double low, double high) { return low + (high - low) * (random_() / 4294967296.0); }
-  // Often a whole or a half number, where exact ties happen.
+  // Often returns a whole or half number, which causes exact ties.
   double place() { return random_() % 3 == 0 ? std::round(number(-40.0, 60.0)) / 2.0 : number(-20.0, 30.0); }
 
   std::mt19937& random_;
@@ -149,7 +149,7 @@ class RandomEdit {
   VoxelType material_ = kAir;
 };
 
-// Densities to one unit of a half's last place, signs and materials exactly.
+// Expects densities to match within one unit of a half's last place, and signs and materials exactly.
 void expect_equal(const DensityGrid& grid, PlainField& plain) {
   int differing = 0;
   plain.for_each([&](IVec3 p, const DensitySample& expected) {

@@ -8,7 +8,7 @@
 namespace quoin {
 namespace {
 
-// Slow and obvious: looks at every voxel within 8, then smooths with 125 weights.
+// The slow reference: looks at every voxel within 8, then smooths with 125 weights.
 class PlainVoxelField {
  public:
   explicit PlainVoxelField(const Grid& grid) : grid_(grid) {}
@@ -107,7 +107,7 @@ TEST(VoxelField, AFlatWallIsTheDistanceFromItsFace) {
   grid.fill_box({{-100, -100, -40}, {101, 10, 41}}, 3);
   const DensityGrid field = *field_from_grid(grid);
   for (int y = 0; y < 30; ++y) {
-    // The smoothing reads distances of at most 8.5, so it bends the last values a little.
+    // Smoothing reads distances of at most 8.5, which bends the last values slightly.
     const double distance = y - 9.5;
     EXPECT_NEAR(field.density({0, y, 0}), std::clamp(distance, -8.0, 8.0), std::abs(distance) < 6.6 ? 0.01 : 0.07) << y;
   }
@@ -138,7 +138,7 @@ TEST(VoxelField, AnUpdateGivesTheBitsOfAFreshChunk) {
   for (int i = 0; i < 40; ++i) grid.fill_sphere({below(120) - 30, 15 + below(20), below(120) - 30}, below(9), 1);
   DensityChunk kept = density_of_voxels(grid.neighbourhood({0, 0, 0}));
   for (int i = 0; i < 60; ++i) {
-    // In the chunk, at its borders, beyond them, and too far for it.
+    // Covers positions in the chunk, at its borders, beyond them, and out of its reach.
     const IVec3 at{below(100) - 18, below(100) - 18, below(100) - 18};
     const IBox box{at, at + IVec3{1 + below(4), 1 + below(4), 1 + below(9)}};
     grid.fill_box(box, static_cast<VoxelType>(i % 3));

@@ -1,4 +1,4 @@
-// Halved fields, a sample at a time, and pyramids of them.
+// Compares halved fields and pyramids with a sample-by-sample reference.
 
 #include <cmath>
 #include <cstdint>
@@ -14,7 +14,7 @@
 namespace quoin {
 namespace {
 
-// Balls, boxes and holes of several materials across the borders of chunks and of coarse chunks.
+// Returns balls, boxes and holes of several materials across the borders of chunks and of coarse chunks.
 DensityGrid random_field(std::mt19937& random, float band = 8.0F) {
   DensityGrid field(band);
   std::uniform_real_distribution<double> near(-24.0, 24.0);
@@ -45,7 +45,7 @@ bool has_air_around(const DensityGrid& field, IVec3 sample, int step) {
   return false;
 }
 
-// The rules of the header.
+// Applies the rules of the header.
 DensitySample expected_at(const DensityGrid& field, IVec3 sample) {
   const IVec3 fine = 2 * sample;
   const float band = DensityGrid(0.5F * field.band()).band();
@@ -112,7 +112,7 @@ TEST(DensityHalving, TheSurfaceStaysWhereItWas) {
 TEST(DensityHalving, TakesTheMaterialFromTheOutside) {
   DensityGrid field;
   field.add_box({-100, -40, -100}, {100, 0.8, 100}, 1);
-  // Grass of one sample.
+  // A layer of grass one sample thick.
   field.edit({{-110, 0, -110}, {110, 1, 110}}, [](IVec3, DensitySample sample) {
     if (sample.density < 0.0F) sample.material = 2;
     return sample;

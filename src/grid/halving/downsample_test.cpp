@@ -83,7 +83,7 @@ class Oracle {
   const VoxelRegistry* types_;
 };
 
-// Boxes, rods and specks across the borders of chunks and of coarse chunks.
+// Returns boxes, rods and specks across the borders of chunks and of coarse chunks.
 Grid random_grid(std::mt19937& random) {
   Grid grid;
   const auto below = [&](int limit) { return static_cast<int>(random() % static_cast<unsigned>(limit)); };
@@ -252,7 +252,7 @@ TEST(Downsample, AnEditMakesAnewOnlyTheChunksThatReadIt) {
     }
     return anew;
   };
-  grid.set({0, 0, 0}, 4);  // chunks of one type have no storage to compare
+  grid.set({0, 0, 0}, 4);  // uniform chunks have no storage to compare
   grid.fill_box({{-1, -1, -1}, {0, 0, 0}}, 4);
   for (const int x : {-40, 40}) {
     for (const int y : {-40, 40}) {

@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// A node's state at a time, by the specification: each value applies from its time on.
+/// A node's state at a time, by the specification: each value applies from its time onwards.
 struct Moment {
   DVec3 translation{0.0};
   DQuat rotation{1.0, 0.0, 0.0, 0.0};
@@ -81,7 +81,7 @@ class GltfAnimation : public ::testing::Test {
   }
 };
 
-/// A walker of two models, a bird that flies and turns, and a stone, in a group.
+/// Returns a walker of two models, a bird that flies and turns, and a stone, in a group.
 std::vector<std::byte> film() {
   vox_test::FileBuilder file;
   file.model(2, 2, 3, {{0, 0, 0, 1}, {1, 1, 2, 1}}).model(2, 2, 2, {{0, 0, 0, 2}, {1, 1, 1, 2}});
@@ -137,7 +137,7 @@ std::size_t mesh_triangles(const Scene& scene, GridHandle grid) {
   return static_cast<std::size_t>(mesh->triangle_count());
 }
 
-/// Every node of a file is, in every frame, where the frame's own scene has it.
+/// Expects the nodes of a file to match the placement in each frame's own scene.
 void expect_same_places(const std::vector<std::byte>& file, const SceneAnimation& animation, const ParsedGlb& glb) {
   for (int frame = 0; frame < static_cast<int>(animation.frame_count()); ++frame) {
     LoadOptions options;
@@ -178,7 +178,7 @@ TEST_F(GltfAnimation, EveryFrameIsThatFrame) {
     std::vector<vox_test::Entries> keys;
     for (int frame = 0; frame < 12; frame += 1 + number(4)) {
       const std::string place = std::to_string(number(40) - 20) + " " + std::to_string(number(40)) + " 3";
-      // Turns and reflections: a byte of two columns and three signs.
+      // Tests turns and reflections: a byte of two columns and three signs.
       constexpr std::array<int, 6> kColumns = {4, 8, 1, 9, 2, 6};
       const int turn = kColumns[random() % 6] | (number(8) << 4);
       keys.push_back({{"_t", place}, {"_r", std::to_string(turn)}, {"_f", std::to_string(frame)}});

@@ -38,7 +38,7 @@ TEST_F(GltfAtlas, IsTheColourOfOpaqueBlocks) {
   EXPECT_FALSE(primitive["attributes"].contains("COLOR_0"));
 }
 
-// The red tip stands on grey: where nothing darkens it its own colour is in the texture.
+// The red tip stands on grey: without occlusion the texture shows its own colour.
 TEST_F(GltfAtlas, ShowsTheColoursOfTypes) {
   const SceneMeshes meshes = meshed();
   const ParsedGlb glb = write(meshes);

@@ -18,7 +18,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// The bytes of a view, decoded where they are compressed.
+/// Returns the bytes of a view, decoded if they are compressed.
 std::vector<std::byte> bytes_of_view(const ParsedGlb& glb, const Json& view) {
   const auto slice = [&](const Json& of) {
     const auto first = glb.binary.begin() + of.value("byteOffset", std::ptrdiff_t{0});
@@ -90,15 +90,14 @@ DVec3 xyz(const std::array<double, 4>& element) {
   return {element[0], element[1], element[2]};
 }
 
-/// All that a file shows, corner by corner of its triangles: where it is in the world, its normal, and what else its
-/// vertices have.
+/// The visible content of a file by triangle corners: world position, normal and the other vertex attributes.
 struct Corners {
   std::vector<DVec3> positions;
   std::vector<DVec3> normals;
   std::vector<std::array<double, 4>> others;
 };
 
-/// Triangles begin with their least position, if they are to be compared with those of a file that has turned them.
+/// Triangles begin with their least position if they are compared with a file that rotates them.
 Corners corners_of(const ParsedGlb& glb, bool from_least = false) {
   Corners corners;
   for (const Json& node : glb.document["nodes"]) {
@@ -143,7 +142,7 @@ ParsedGlb glb_of(const SceneMeshes& meshes, const MeshFileOptions& options) {
   return bytes ? parse_glb(*bytes) : ParsedGlb{};
 }
 
-/// Min and max of positions are those of the stored numbers.
+/// Expects the min and max of positions to equal those of the stored numbers.
 void expect_exact_bounds(const ParsedGlb& glb) {
   for (const Json& mesh : glb.document["meshes"]) {
     for (const Json& primitive : mesh["primitives"]) {
@@ -168,7 +167,7 @@ int component_of(const ParsedGlb& glb, const char* attribute) {
   return glb.document["accessors"][primitive["attributes"][attribute].get<std::size_t>()]["componentType"];
 }
 
-/// The asymmetric grid, placed plainly, turned and mirrored, scaled, and below a group.
+/// The asymmetric grid: unchanged, turned and mirrored, scaled, and below a group.
 class GltfStored : public Gltf {
  protected:
   GltfStored() {
@@ -296,7 +295,7 @@ TEST_F(GltfStored, SmoothMeshesAreOffByASmallShareOfTheirSize) {
     SceneMeshes smooth;
     smooth.parts.push_back(mesh_part("body", test_mesh(), DVec3(pivot)));
     smooth.placements.push_back({0, "", Similarity{{1, 2, 3}, {0.5, 0.5, 0.5, 0.5}, 2.0, true}});
-    // At most 6 across on either side of the pivot, twice as large in the world, half a step off an axis.
+    // At most 6 across on either side of the pivot, twice as large in the world, with half a step of error per axis.
     expect_alike(smooth, 2.0 * 6.0 / 65'534.0 * std::sqrt(3.0));
   }
 }

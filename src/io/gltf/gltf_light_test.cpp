@@ -1,4 +1,4 @@
-// Meshes with light at their vertices.
+// Meshes with vertex light.
 
 #include <array>
 #include <string>
@@ -64,7 +64,7 @@ TEST_F(GltfLight, MaterialsAreUnlitAndColoursAreTheLight) {
   EXPECT_EQ(next, vertices);
 }
 
-// What shines by itself is as bright as it can be; opaque blocks, which need one material, stand as they were meshed.
+// Emissive voxels have full brightness; opaque blocks, which need a single material, keep the mesh as it is.
 TEST_F(GltfLight, OcclusionDarkensLightUnlessItIsApart) {
   const SceneMeshes meshes = lit();
   const MeshView& view = meshes.parts[0].surfaces[0];

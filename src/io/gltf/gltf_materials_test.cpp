@@ -97,7 +97,7 @@ TEST_F(GltfMaterials, TransparentTypesBlendWithAlphaInThePalette) {
       << "a voxel that covers 90 of 255 and tints the rest";
 }
 
-/// A cube of glass, a deep pool of water in stone, and a lone voxel of each.
+/// Adds a cube of glass, a deep pool of water in stone, and a single voxel of each.
 void add_glass_and_water(Scene& scene) {
   VoxelProperties glass;
   glass.colour = {190, 230, 235, 12};

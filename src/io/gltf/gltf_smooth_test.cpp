@@ -13,7 +13,7 @@ namespace quoin {
 
 namespace {
 
-/// Four balls apart: plain, of metal, glowing, of glass.
+/// Returns four separate balls: plain, metal, emissive and glass.
 Scene scene_of_balls() {
   Scene scene;
   std::vector<VoxelType> types;

@@ -165,7 +165,7 @@ TEST_F(Gltf, ArraysAreAlignedBoundedAndInsideTheBuffer) {
   EXPECT_EQ(accessor["max"], Json({2.0, 2.5, 1.5}));
 }
 
-/// A mesh of `vertices` vertices, made of as many triangles as hold them all; one kind of voxel.
+/// Returns a mesh of `vertices` vertices with enough triangles to use them all; one kind of voxel.
 SceneMeshes mesh_of_size(std::size_t vertices) {
   SceneMeshes meshes;
   EXPECT_TRUE(meshes.types.add({}));
@@ -227,7 +227,7 @@ TEST_F(Gltf, HiddenInstancesAreLeftOutUnlessAskedFor) {
   EXPECT_EQ(all->parts.size(), 2U);
 }
 
-/// The matrix of a node as glTF puts it together.
+/// Returns a node's matrix, combined by glTF's rules.
 glm::dmat4 matrix_of(const nlohmann::json& node) {
   glm::dmat4 matrix(1.0);
   if (node.contains("rotation")) {
@@ -269,7 +269,7 @@ TEST_F(Gltf, GroupsAreNodesAndNothingMovesByThem) {
   EXPECT_FALSE(nodes[1].contains("extras"));
   const glm::dmat4 whole = matrix_of(nodes[2]) * matrix_of(nodes[3]) * matrix_of(nodes[0]);
   Instance alone = scene_.instances()[placed[0]];
-  alone.mirrored = false;  // which is baked into the mesh
+  alone.mirrored = false;  // the mirror is baked into the mesh
   for (int axis = 0; axis < 3; ++axis) {
     DVec3 unit(0.0);
     unit[axis] = 1.0;

@@ -6,8 +6,8 @@
 
 #include <quoin/io/heights.h>
 
-/// Any bytes, as a picture of any encoding, must give as many heights as its size says, and a landscape of them, or an
-/// error.
+/// Reads any bytes as an image in every encoding: the result must be an error, or as many heights as its size says and
+/// a landscape of them.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using quoin::HeightEncoding;
   for (const auto encoding : {HeightEncoding::Grey, HeightEncoding::Mapbox, HeightEncoding::Terrarium}) {

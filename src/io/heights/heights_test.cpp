@@ -37,7 +37,7 @@ void put_chunk(Bytes& png, std::string_view name, const Bytes& content) {
   put_big(png, crc32(0, covered, static_cast<uInt>(png.size() - begin)), 4);
 }
 
-/// A PNG of one row a list, whose numbers have `bits` each. `kind`: 0 grey, 2 RGB, as the file says it.
+/// Returns a PNG with one row per list, `bits` bits per sample. `kind`: 0 grey, 2 RGB, as in the file.
 Bytes png_of(const std::vector<std::vector<unsigned>>& rows, int bits, int kind) {
   Bytes png;
   for (const unsigned char c : std::string_view("\x89PNG\r\n\x1a\n")) png.push_back(static_cast<std::byte>(c));
@@ -298,7 +298,7 @@ TEST(Heights, ReadsARealTileOfMountFuji) {
   EXPECT_EQ(*std::ranges::max_element(map->metres), 3'751.0F);
   const auto loaded = load_scene(path, options);
   ASSERT_TRUE(loaded);
-  // Counted by a program that shares nothing with this one.
+  // Counted by an independent program.
   EXPECT_EQ(loaded->scene.voxel_count(), 8'676'083);
 }
 

@@ -2,7 +2,7 @@
 
 #include <cstdlib>
 
-/// Any bytes must give a picture of the size that it claims, or an error of one line.
+/// Any bytes must give an image of the declared size, or an error of one line.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto picture = quoin::read_pfm({reinterpret_cast<const std::byte*>(data), size});
   if (!picture) {

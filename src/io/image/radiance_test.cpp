@@ -1,4 +1,4 @@
-// Linear light in files: Radiance's .hdr and OpenEXR.
+// Linear light in image files: Radiance .hdr and OpenEXR.
 
 #include <cmath>
 #include <filesystem>
@@ -63,7 +63,7 @@ TEST(Radiance, RefusesWhatIsBroken) {
   EXPECT_FALSE(read("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n\x01\x02\x03\x04").has_value());
   EXPECT_FALSE(read("#?RADIANCE\nEXPOSURE=0\n\n-Y 1 +X 1\n\x01\x02\x03\x04").has_value());
   EXPECT_FALSE(read("PNG").has_value());
-  // A run that goes past its row.
+  // A run that exceeds its row.
   EXPECT_FALSE(read(kHeader + "-Y 1 +X 10\n" + std::string("\x02\x02\x00\x0A\x8B\x80", 6) + std::string(60, '\x01'))
                    .has_value());
 }

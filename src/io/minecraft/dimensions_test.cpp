@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using minecraft_test::NbtWriter;
 
-/// A world of Minecraft's, in a folder of its own that is removed at the end.
+/// A Minecraft world in a temporary folder.
 class WrittenWorld {
  public:
   explicit WrittenWorld(const char* name) : path_(fs::path(testing::TempDir()) / "quoin_dimensions" / name) {
@@ -154,7 +154,7 @@ TEST(LinearRegion, DamageAnywhereGivesErrorsAndNoCrash) {
     }
     return chunks;
   };
-#ifdef QUOIN_HAVE_STORE  // which needs zstd too
+#ifdef QUOIN_HAVE_STORE  // also requires zstd
   EXPECT_EQ(read_all(*whole), 1U);
 #endif
   for (std::size_t size = 0; size < whole->size() - 8; ++size) {

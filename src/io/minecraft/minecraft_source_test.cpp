@@ -147,7 +147,7 @@ TEST(MinecraftSource, Lz4IsReadOrSaysWhatIsMissing) {
 }
 
 TEST(MinecraftSource, IndicesThatSpanLongsAreRead) {
-  // 17 blocks take 5 bits: 320 longs that they span, or 342 that they do not.
+  // 17 blocks take 5 bits: 320 longs if indices span longs, otherwise 342.
   for (const std::size_t words : {320U, 342U}) {
     NbtWriter nbt;
     nbt.compound("").compound("Level").list("Sections", 10, 1).byte("Y", 0).list("Palette", 10, 17);

@@ -61,7 +61,7 @@ std::vector<std::byte> litematic(IVec3 size) {
   put_vector(nbt, "Position", {10, 20, 30});
   put_vector(nbt, "Size", size);
   put_palette(nbt, "BlockStatePalette");
-  // 33 blocks of two bits: the last one begins the second word.
+  // 33 blocks of two bits: the last block begins the second word.
   return nbt.longs("BlockStates", {1, 2}).end().end().end().bytes;
 }
 
@@ -139,7 +139,7 @@ TEST(Schematic, ALitematicsSizeMayReachDownwards) {
 }
 
 TEST(Schematic, LargerOnesThanASectionComeWhole) {
-  // 70 x 70 x 70, each block by its place.
+  // 70 x 70 x 70 blocks; the type depends on the position.
   constexpr int kEdge = 70;
   std::vector<std::uint8_t> data;
   for (int i = 0; i < kEdge * kEdge * kEdge; ++i) data.push_back(static_cast<std::uint8_t>(i % 3));
@@ -191,11 +191,11 @@ TEST(Schematic, BiomesColourTheGrassOfColumns) {
     const VoxelType plains = grid.get({0, 0, 0});
     EXPECT_NE(grid.get({1, 0, 0}), plains);
     EXPECT_EQ(grid.get({0, 17, 0}), plains);
-    // Each slab of 16 layers by itself, where the file says it.
+    // Every slab of 16 layers has its own biome where the file supports this.
     const bool is_by_block = file.size() == meadow(3, by_block).size();
     EXPECT_EQ(grid.get({1, 17, 0}) == plains, is_by_block);
   }
-  // Too few, or of none: plains, and a line.
+  // Too few biomes, or an unknown one: plains, and a warning.
   for (const auto& file : {meadow(2, {0}), meadow(2, {0, 9}), meadow(0, {1}), meadow(3, {0, 1})}) {
     const auto loaded = read_schematic(file);
     ASSERT_TRUE(loaded) << to_string(loaded.error());
@@ -305,7 +305,7 @@ TEST(Schematic, LongArraysAreReadInPages) {
   }
 }
 
-// More than 128 blocks, so that indices take one or two bytes: in pages as in one array.
+// More than 128 block types, so that indices take one or two bytes: reading by pages equals reading one array.
 TEST(Schematic, LongArraysOfManyBlocksAreReadInPages) {
   constexpr IVec3 kSize(130, 41, 290);
   constexpr unsigned kKinds = 200;
@@ -396,7 +396,7 @@ TEST(PagedBytes, HoldWhatWasAppended) {
 }
 
 TEST(Schematic, NamesTheBedrockEdition) {
-  // The least significant byte first: {"format_version": 1}.
+  // Little-endian: {"format_version": 1}.
   std::vector<std::byte> bytes = {std::byte{10}, std::byte{0}, std::byte{0}, std::byte{3}, std::byte{14}, std::byte{0}};
   for (const char c : std::string("format_version")) bytes.push_back(static_cast<std::byte>(c));
   for (const int b : {1, 0, 0, 0, 0}) bytes.push_back(static_cast<std::byte>(b));

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Bytes, the least significant of a number first.
+/// Writes numbers in little-endian order.
 class Writer {
  public:
   std::vector<std::byte> bytes;
@@ -49,7 +49,7 @@ class Writer {
 constexpr std::uint32_t kRed = 0xFF0000FF;  // r, g, b, a
 constexpr std::uint32_t kBlue = 0xFFFF0000;
 
-// What zlib's wrapping makes of bytes, stored without compression.
+// Returns the content as an uncompressed zlib stream.
 std::vector<std::byte> zlib_stored(std::span<const std::byte> content) {
   Writer writer;
   writer.number(0x78, 1).number(0x01, 1).number(1, 1);
@@ -63,8 +63,8 @@ std::vector<std::byte> zlib_stored(std::span<const std::byte> content) {
   return writer.big(b << 16 | a, 4).bytes;
 }
 
-// Each of these has a red voxel, and a blue one next to it at the greater x; in Voxlap's files z points down, in
-// Goxel's up.
+// Each of these files has a red voxel, and a blue voxel next to it at greater x. Voxlap's files have z down, Goxel's
+// up.
 std::vector<std::byte> binvox() {
   Writer writer;
   writer.text("#binvox 1\ndim 2 2 2\ntranslate 1 2 3\nscale 4\ndata\n");
@@ -132,7 +132,7 @@ std::vector<std::byte> qbt(bool has_map) {
   has_map ? writer.u32s({2, kBlue, kRed}) : writer.u32s({0});
   return writer.text("DATATREE").number(1, 4).number(model.bytes.size(), 4).append(model.bytes).bytes;
 }
-/// A compound of two voxels, made of a matrix that is not read; a run of one, whose other bytes say nothing.
+/// A compound of two voxels, made of a matrix that the reader skips; a run of one, whose other bytes have no meaning.
 std::vector<std::byte> qbcl() {
   const auto matrix = [](Writer& writer, int kind, std::span<const std::byte> voxels) {
     writer.u32s({static_cast<std::uint32_t>(kind), 1}).number(1, 4).text("m").number(0x0101, 3);
@@ -233,7 +233,7 @@ TEST(Models, PlacesAreKept) {
   const auto scanned = load_scene(binvox());
   EXPECT_EQ(position(*scanned), DVec3(1.0, 2.0, 3.0));
   EXPECT_EQ(scanned->scene.instances()[scanned->scene.instances().handles().front()].voxel_size, 2.0);
-  // Three layers of air above: the voxels stand on the ground.
+  // Three layers of air above: the voxels rest on the ground.
   for (const auto& bytes : {kv6(), kvx(), slab6()}) {
     EXPECT_EQ(only_grid(*load_scene(bytes)).bounds().min, IVec3(0));
   }
@@ -298,7 +298,7 @@ TEST(Models, NodesThatMayBePlacedAre) {
     writer.big(1, 2).big(13, 2).text("default:stone").append(zlib_stored(nodes.bytes));
     const auto loaded = read_mts(writer.bytes);
     ASSERT_TRUE(loaded) << to_string(loaded.error());
-    // Half of 255 before version 4, and the least that there is after it; the highest bit says another thing there.
+    // Half of 255 before version 4, and the lowest value after it; the highest bit has another meaning there.
     EXPECT_EQ(only_grid(*loaded).grid.get({0, 0, 0}) != kAir, version < 4) << version;
     EXPECT_EQ(only_grid(*loaded).grid.get({1, 0, 0}) != kAir, version >= 4) << version;
   }
@@ -321,7 +321,7 @@ TEST(Models, TooManyColoursAreReducedWithAWord) {
 }
 
 TEST(Models, AMapOfSpansIsSolidBelowItsSurface) {
-  // 512 x 512 columns of one colour at 60, with ground below; one of them a bridge over air.
+  // 512 x 512 columns of one colour at 60, with ground below; one column is a bridge over air.
   Writer map;
   for (int i = 0; i < 512 * 512; ++i) {
     if (i == 5) {

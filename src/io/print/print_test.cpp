@@ -15,7 +15,7 @@
 namespace quoin {
 namespace {
 
-/// Voxels of two colours that touch in all ways.
+/// Returns voxels of two colours that touch in all ways.
 Scene touching_voxels() {
   Scene scene;
   VoxelProperties red;
@@ -46,7 +46,7 @@ SceneMeshes for_printing(const Scene& scene) {
   return *mesh_scene(scene, options);
 }
 
-/// The files of a zip, by name, which its directory lists.
+/// Returns the files of a zip by name, as its directory lists them.
 std::map<std::string, std::string> unzipped(std::span<const std::byte> zip) {
   std::map<std::string, std::string> files;
   constexpr std::size_t kEnd = 22;
@@ -77,7 +77,7 @@ std::map<std::string, std::string> unzipped(std::span<const std::byte> zip) {
     EXPECT_EQ(inflate(&stream, Z_FINISH), Z_STREAM_END) << name;
     inflateEnd(&stream);
     EXPECT_EQ(crc32(0, reinterpret_cast<const Bytef*>(text.data()), size), crc) << name;
-    // The file's own header says the same.
+    // The local header must match.
     ByteReader own(zip, at, zip.size());
     EXPECT_EQ(own.u32(), 0x04034B50U);
     (void)own.take(10);
@@ -119,7 +119,7 @@ TEST(Print, stl_is_read_again_as_it_was) {
   EXPECT_NEAR(box.min.x, 5.0, 0.02);
   EXPECT_NEAR(box.min.y, 10.0, 0.02);
   EXPECT_NEAR(box.max.z, 24.0, 0.02);
-  // Joined by places, each edge is in two triangles.
+  // After welding by position, each edge lies in two triangles.
   std::map<std::tuple<double, double, double>, int> numbers;
   std::map<std::pair<int, int>, int> uses;
   for (const auto& t : read->mesh.triangles) {

@@ -14,7 +14,7 @@
 #include "io/gltf/glb_for_tests.h"
 #include "io/scene_file/voxel_data.h"
 
-// Data at voxels in scene files.
+// Voxel data in scene files.
 
 namespace quoin {
 namespace {
@@ -22,7 +22,7 @@ namespace {
 constexpr VoxelType kPlain = 1;
 constexpr VoxelType kTurned = 2;
 
-// Of stone, which has no state, and of stairs, which have two bits.
+// The types are stone without a state, and stairs with a state of two bits.
 Scene scene_of(Grid grid) {
   Scene scene;
   EXPECT_TRUE(scene.types.add({.name = "stone", .colour = {}}));
@@ -90,7 +90,7 @@ TEST(SceneData, SplitsManyMegabytesIntoPieces) {
   EXPECT_EQ(encode_data({&all, 1}, VoxelCompression::Stored, {}, {}).value()[0].size(), 3U);
 }
 
-// What compresses too well is stored as it is, so that the reader takes it.
+// The writer stores data uncompressed that compresses too well for the reader's limit.
 TEST(SceneData, StoresHighlyRegularDataUncompressed) {
   Grid grid;
   grid.fill_box({{0, 0, 0}, {64, 64, 1}}, kPlain);
@@ -162,7 +162,7 @@ TEST(SceneData, NamesDataThatVoxCannotHold) {
   EXPECT_EQ(again->scene.types[type].state_bits, 2) << "what a type says of itself is kept";
 }
 
-// A record of data as it lies in a file.
+// A data record as stored in a file.
 struct Record {
   IVec3 chunk{0};
   std::uint32_t count = 1;
@@ -193,7 +193,7 @@ std::vector<std::byte> bytes_of(const std::vector<Record>& records) {
   return bytes;
 }
 
-// Returns the fault of such data in a grid with stairs at (1, 0, 0) and stone at (2, 0, 0).
+// Returns the error for such data in a grid with stairs at (1, 0, 0) and stone at (2, 0, 0).
 std::string fault_of_bytes(const std::vector<std::byte>& data, const std::string& further = "") {
   Grid grid;
   grid.set({1, 0, 0}, kTurned);

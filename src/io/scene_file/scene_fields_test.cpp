@@ -1,4 +1,4 @@
-// Fields of densities within scene files.
+// Density fields in scene files.
 
 #include <cmath>
 #include <limits>
@@ -70,7 +70,7 @@ TEST(SceneFields, ComeBackToTheLastBit) {
   }
 }
 
-// Voxels come before densities; data so regular that they are stored uncompressed are written twice.
+// Voxels precede densities; data so regular that it is stored uncompressed is written twice.
 TEST(SceneFields, WritingThemTellsOfOneWholeThatNeverFalls) {
   DensityGrid field;
   field.add_sphere({0.0, 0.0, 0.0}, 150.0, 1);
@@ -125,7 +125,7 @@ std::string fault_of_grid(const std::string& grid) {
   return read ? "none" : to_string(read.error());
 }
 
-/// Returns the fault of a piece with these numbers, 16 bits each.
+/// Returns the error for a piece with these numbers, 16 bits each.
 std::string fault_of_densities(const std::vector<std::uint16_t>& words, std::size_t cut = 0) {
   std::vector<std::byte> bytes;
   for (const std::uint16_t word : words) {

@@ -15,7 +15,7 @@ void require(bool holds) {
   if (!holds) std::abort();
 }
 
-/// Any bytes must give an error or a scene whose numbers can be used, and that is written again.
+/// Any bytes must give an error or a scene with valid numbers that can be written again.
 void read_as_text(std::span<const std::byte> bytes) {
   const auto scene = quoin::parse_scene_file(bytes);
   if (!scene) return;

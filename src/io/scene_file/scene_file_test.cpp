@@ -238,7 +238,7 @@ TEST(SceneFile, RefusesWhatWouldHurt) {
       fault_of(
           R"({"quoin_scene": 1, "files": [], "instances": [], "camera": {"position": [1,1,1], "look_at": [1,1,1]}})"),
       "none");
-  // As small and as large as numbers are.
+  // Very small and very large numbers.
   EXPECT_EQ(fault_of(file_with(R"({"file": "a", "rotation": [1e-300, 0, 1e-308, 0]})")), "none");
   EXPECT_EQ(fault_of(file_with(R"({"file": "a", "rotation": [1e300, 1e300, 0, 0]})")), "none");
 }
@@ -314,7 +314,7 @@ TEST_F(SceneFiles, PlaceEachFileAsOftenAsWanted) {
   EXPECT_LT(glm::length(world_from_grid(second, scene.grids()[second.grid], DVec3(3, 1, 0)) - expected), 1e-12);
 }
 
-// A smooth world with a lamp, saved whole, under a house of blocks.
+// A smooth world with a lamp, saved as a whole, below a house of blocks.
 TEST_F(SceneFiles, PlaceSceneFilesThatHoldAllThemselves) {
   Scene world;
   VoxelProperties grass;
@@ -358,7 +358,7 @@ TEST_F(SceneFiles, SayWhichFileIsWrong) {
   };
   EXPECT_EQ(with_path("red.vox"), "none");
   EXPECT_NE(with_path("absent.vox").find("absent.vox"), std::string::npos);
-  // Itself.
+  // The file refers to itself.
   EXPECT_NE(with_path("scene.json").find("a scene file that names others, within a scene file"), std::string::npos);
   std::ofstream(folder_ / "noise.vox") << "not voxels";
   EXPECT_NE(with_path("noise.vox").find("noise.vox"), std::string::npos);

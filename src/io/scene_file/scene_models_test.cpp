@@ -16,7 +16,7 @@
 #include "io/gltf/glb_for_tests.h"
 #include "io/scene_file/voxel_data.h"
 
-// Scene files that hold their models themselves.
+// Scene files that contain their models.
 
 namespace quoin {
 namespace {
@@ -31,7 +31,7 @@ class RandomScene {
     for (int i = 0; i < types; ++i) EXPECT_TRUE(scene.types.add(properties()));
     std::vector<GridHandle> grids;
     for (int i = below(4); i >= 0; --i) grids.push_back(scene.add_grid(grid(types)));
-    if (grids.size() > 2) {  // so that handles are no places in a list
+    if (grids.size() > 2) {  // handles must differ from list positions
       scene.remove_grid(grids[1]);
       grids.erase(grids.begin() + 1);
     }
@@ -70,7 +70,7 @@ class RandomScene {
     return all.handles()[static_cast<std::size_t>(below(all.size()))];
   }
   void add_hierarchy(Scene& scene) {
-    if (is_rare()) return;  // files of before
+    if (is_rare()) return;  // imitates files of earlier versions
     for (int i = below(4); i > 0; --i) scene.add_layer({text(), !is_rare()});
     for (int i = below(6); i > 0; --i) {
       SceneGroup group;
@@ -259,7 +259,7 @@ TEST(SceneModels, ChunksOfEveryWidthComeBack) {
   for (const unsigned types : {1U, 2U, 3U, 4U, 5U, 16U, 17U, 256U, 257U, 65'536U}) {
     SceneGrid grid;
     grid.grid.edit({IVec3{0}, IVec3{64}}, [&](IVec3, VoxelType) { return static_cast<VoxelType>(random() % types); });
-    // All types but one of a palette, so that an index is beyond it in no place.
+    // All types of a palette except one, so that no position holds an index beyond the palette.
     grid.grid.edit({{64, 0, 0}, IVec3{128, 64, 64}},
                    [&](IVec3 v, VoxelType) { return static_cast<VoxelType>(v.y < 4 ? random() % types : types - 1); });
     scene.add_grid(std::move(grid));
@@ -269,7 +269,7 @@ TEST(SceneModels, ChunksOfEveryWidthComeBack) {
   expect_equal(scene, read->scene);
 }
 
-// What compresses too well is refused by the reader, so the writer stores it.
+// The reader refuses data that compresses too well, so the writer stores it uncompressed.
 TEST(SceneModels, StoresUncompressedWhereReadingWouldTakeTooMuchMemory) {
   Scene scene;
   ASSERT_TRUE(scene.types.add({}));
@@ -353,7 +353,7 @@ std::string fault_of_scene(const std::string& text) {
   return read ? "none" : to_string(read.error());
 }
 
-/// Returns the fault of a file whose only voxel piece has these numbers, after 16 bits each.
+/// Returns the error for a file whose only voxel piece has these numbers, 16 bits each.
 std::string fault_of_piece(std::vector<std::uint16_t> words, std::size_t cut = 0) {
   std::vector<std::byte> bytes;
   for (const std::uint16_t word : words) {
@@ -429,7 +429,7 @@ TEST(SceneModels, DamagedTextIsRefusedWithItsPlace) {
       "grids[0].name: must be a string, or {\"base64\": \"...\"} where it is not UTF-8");
 }
 
-// A thousand times its size is what deflate can do.
+// Deflate can expand data to about a thousand times its size.
 TEST(SceneModels, BombsAreRefusedBeforeTheyExpand) {
   const std::vector<std::byte> zeros(std::size_t{64} << 20);
   EXPECT_EQ(fault_of_scene(file_with_voxels("\"" + to_base64(gzipped(zeros, 9)) + "\"")),

@@ -34,7 +34,7 @@ VoxelProperties type_of(Rgba8 colour, const std::string& name = "") {
   return type;
 }
 
-/// Two models: one at its place, one turned and mirrored. Of three colours, one transparent.
+/// Two models: one unchanged, one turned and mirrored. They have three colours, one of them transparent.
 Scene two_models() {
   Scene scene;
   const VoxelType red = *scene.types.add(type_of({200, 10, 20, 255}));
@@ -63,7 +63,7 @@ Scene two_models() {
 
 using Voxels = std::map<std::tuple<int, int, int>, std::tuple<int, int, int, int>>;
 
-/// Colours of the world's voxels, which are one unit large.
+/// Returns the colours of the world's voxels, which are one unit large.
 Voxels voxels_of(const Scene& scene) {
   FormatHolds all;
   all.extension = "test";
@@ -78,7 +78,7 @@ Voxels voxels_of(const Scene& scene) {
   return voxels;
 }
 
-/// The same colours at the same places.
+/// Returns true if both scenes have the same colours at the same positions.
 bool are_alike(const Scene& a, const Scene& b) {
   const auto of_a = merge_grids(a, {});
   const auto of_b = merge_grids(b, {});
@@ -196,7 +196,7 @@ TEST(WriteModels, ABinvoxIsNoCubeWhereThatWouldBeAirAlone) {
   const auto read = read_binvox(file->bytes);
   ASSERT_TRUE(read) << to_string(read.error());
   EXPECT_EQ(read->scene.voxel_count(), 1'000);
-  // A smaller one is: some readers want nothing else.
+  // A smaller model is written as a cube: some readers support nothing else.
   scene.edit(rod.grid).grid.fill_box({{100, 0, 0}, {1'000, 1, 1}}, kAir);
   const auto small = write_binvox(scene);
   ASSERT_TRUE(small);
@@ -212,7 +212,7 @@ TEST(WriteModels, MapsKeepEveryColourAndGetGround) {
   const auto read = read_vxl(file->bytes);
   ASSERT_TRUE(read) << to_string(read.error());
   Voxels expected = voxels_of(scene);
-  for (auto& [place, colour] : expected) std::get<3>(colour) = 255;  // nothing is transparent there
+  for (auto& [place, colour] : expected) std::get<3>(colour) = 255;  // the file has no transparency
   std::size_t ground = 0;
   const Voxels found = voxels_of(read->scene);
   for (const auto& [place, colour] : found) {
@@ -235,7 +235,7 @@ TEST(WriteModels, MapsKeepEveryColourAndGetGround) {
   EXPECT_TRUE(again->warnings.empty()) << again->warnings.front();
 }
 
-// Spans with a bottom, a top that fills them, and stretches without colours within.
+// Spans with a bottom and a filling top, and stretches without colours within.
 TEST(WriteModels, SpansOfMapsOfAnyForm) {
   Scene scene;
   const VoxelType red = *scene.types.add(type_of({200, 10, 20, 255}));
@@ -253,7 +253,7 @@ TEST(WriteModels, SpansOfMapsOfAnyForm) {
   const auto file = write_vxl(scene);
   ASSERT_TRUE(file) << to_string(file.error());
   EXPECT_TRUE(file->warnings.empty()) << file->warnings.front();
-  // Of 20 layers of earth the top one alone is seen.
+  // Only the top layer of 20 layers of earth is visible.
   EXPECT_LT(file->bytes.size(), std::size_t{512} * 512 * 9);
   const auto read = read_vxl(file->bytes);
   ASSERT_TRUE(read) << to_string(read.error());
@@ -308,7 +308,7 @@ TEST(WriteModels, SchematicsHaveBlocksOfTheNearestColour) {
   EXPECT_TRUE(again->bytes == file->bytes);
 }
 
-/// Properties that the block reader drops, since they do not change the look, are in the written file.
+/// The written file has properties that the block reader drops because they do not change the appearance.
 TEST(WriteModels, SchematicsSayWhatTheGameWouldTakeOtherwise) {
   Scene scene;
   SceneGrid grid;
@@ -445,14 +445,14 @@ TEST(WriteModels, RefuseWhatTheyWouldShowOtherwise) {
     const auto cancelled = write(two_models(), [](double) { return false; });
     ASSERT_FALSE(cancelled);
     EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
-    // An empty scene is a file, or said to be none.
+    // An empty scene gives a file or a clear refusal.
     const auto empty = write(Scene(), {});
     EXPECT_TRUE(empty || empty.error().code == ErrorCode::Unsupported);
   }
 }
 
 #ifdef QUOIN_SOURCE_DIR
-/// Real files, read and written in their own format, are unchanged.
+/// Real files are unchanged after reading and writing in their own format.
 TEST(WriteModels, RealFilesAreReadAgainAsTheyWere) {
   const fs::path data = fs::path(QUOIN_SOURCE_DIR) / "../shared/data";
   if (!fs::exists(data)) GTEST_SKIP() << "no real files here: " << data;
