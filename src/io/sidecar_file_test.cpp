@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder `in` with a file that names others, and a file `secret` outside of it.
+/// A folder `in` with a file that names others, and a file `secret` outside the folder.
 class SidecarFile : public testing::Test {
  protected:
   void SetUp() override {
@@ -41,7 +41,7 @@ class SidecarFile : public testing::Test {
   [[nodiscard]] fs::path main_file() const { return folder_ / "in" / "main"; }
   [[nodiscard]] Result<fs::path> path_of(const std::string& name) const { return sidecar_path(main_file(), name); }
 
-  /// A glTF file whose buffer of 6 bytes, and whose image, have these names.
+  /// Writes a glTF file that names this buffer of 6 bytes and this image.
   void write_gltf(const std::string& buffer, const std::string& image) const {
     write("in/main.gltf", R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
                           R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]}],)"

@@ -35,7 +35,7 @@ TEST(CornerLight, IsThatOfTheMeshEverywhereOnEveryFace) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> share(0.0, 1.0);
   Grid grid;
-  // Across the corner of eight chunks.
+  // Spans the corner of eight chunks.
   const IBox box{IVec3{-6}, IVec3{6}};
   grid.edit(box, [&](IVec3, VoxelType) { return static_cast<VoxelType>(random() % 4 < 2 ? random() % 3 : 0); });
   GridReader reader(grid);

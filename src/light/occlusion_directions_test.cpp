@@ -89,7 +89,8 @@ TEST(OcclusionDirections, NineTurnAboutTheNormalFromSampleToSample) {
   EXPECT_EQ(OcclusionDirections::turn_of(7, 6).about_normal.sine, 0.0) << "the six are the reference's";
 }
 
-// Turned about itself the upright one would stay: its shadow would have a hard edge at any number of samples.
+// Turned about itself, the upright direction would stay the same: its shadow would have a hard edge at any number of
+// samples.
 TEST(OcclusionDirections, TheUprightOneLeansFromSampleToSampleEvenlyToAllSides) {
   const OcclusionDirections nine(9);
   for (const Direction face : kDirections) {
@@ -97,7 +98,7 @@ TEST(OcclusionDirections, TheUprightOneLeansFromSampleToSampleEvenlyToAllSides) 
     const DVec3 n(normal_of(face));
     constexpr int kSamples = 256;
     DVec3 mean(0.0);
-    double area = 0.0;  // of the disc of the leans, as a share
+    double area = 0.0;  // area of the disc of tilts, as a share
     for (int sample = 0; sample < kSamples; ++sample) {
       const DVec3 upright = nine.turned(OcclusionDirections::turn_of(sample, 9))[f][0];
       const double cosine = glm::dot(upright, n);

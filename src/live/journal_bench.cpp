@@ -1,5 +1,5 @@
-// journal: the cost of finding the changes of one edit, in worlds of 100 and of 100,000 chunks, and the cost of
-// snapshots. journal/find/*: finding alone, in microseconds; journal/follow/*: all work of a consumer after an edit of
+// journal: the cost of finding the changes of one edit in worlds of 100 and of 100,000 chunks, and the cost of
+// snapshots. journal/find/*: finding only, in microseconds. journal/follow/*: a consumer's whole work after an edit of
 // one voxel.
 
 #include <chrono>
@@ -29,7 +29,7 @@ void fail_unless(bool holds, const char* what) {
   std::exit(1);
 }
 
-// A square of chunks with a few voxels each.
+// Returns a square of chunks with a few voxels each.
 Grid sparse_world(int chunks) {
   Grid grid;
   int edge = 1;
@@ -71,7 +71,7 @@ struct World {
   int edits = 0;
 };
 
-// The time of `follow` after each edit.
+// Measures `follow` after each edit.
 template <class Follow>
 void after_edits(benchmark::State& state, World& world, Follow&& follow) {
   // Excludes the work that happens only at the first change.
@@ -176,7 +176,7 @@ void follow_selector(benchmark::State& state) {
   after_edits(state, world, [&] { selector.select(world.scene, camera, 640, 480, {}, selected); });
 }
 
-// The thread that edits: `update` alone; the mesh is made by then or not.
+// Measures only `update` on the editing thread; the mesh may or may not be ready by then.
 void follow_live(benchmark::State& state, SurfaceStyle style) {
   World world(static_cast<int>(state.range(0)));
   LiveMeshOptions options;
@@ -206,7 +206,7 @@ void snapshot_scene(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(world.scene.snapshot().grids().size());
 }
 
-// The first edit of a chunk after a snapshot, which copies the chunk and the path to it.
+// Measures the first edit of a chunk after a snapshot, which copies the chunk and the path to it.
 void snapshot_and_edit(benchmark::State& state) {
   World world(static_cast<int>(state.range(0)));
   for (auto _ : state) {

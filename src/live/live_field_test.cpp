@@ -91,7 +91,7 @@ void expect_field(const ShownSurfaces& shown, const Scene& scene, GridHandle han
   ASSERT_TRUE(found == expected);
 }
 
-// Hills of a few chunks.
+// Returns hills of a few chunks.
 DensityGrid hills(int chunks, unsigned seed = 3) {
   DensityGrid field;
   std::mt19937 random(seed);
@@ -179,7 +179,7 @@ TEST(LiveField, SurfacesStayClosedWhileEdited) {
     shown.apply(meshes.take());
     std::size_t taken = 0;
     const int edits = kIsSlow ? 10 : 60;
-    // On a busy machine workers may need longer than all the edits.
+    // On a busy machine workers may need longer than all edits together.
     for (int i = 0; i < edits || taken == 0; ++i) {
       if (i >= edits) std::this_thread::sleep_for(std::chrono::milliseconds(1));
       if (i < edits && random() % 3 != 0) dig(one.field(), random, 2);
@@ -242,7 +242,7 @@ TEST(LiveField, SeveralEyesAndInstancesHaveWhatTheNearestNeeds) {
   meshes.finish(one.scene, DVec3(0.0, 40.0, 0.0), others);
   shown.apply(meshes.take());
   expect_levels(shown, {DVec3(0.0, 40.0, 0.0), others[0]}, 40.0);
-  // Half as large: twice as many samples away; moved, it is the other end that is near.
+  // At half the size an eye is twice as many samples away; after moving, the other end is near.
   one.scene.edit(one.placed).voxel_size = 0.5;
   one.scene.edit(one.placed).position = {-125.0, 0.0, -125.0};
   meshes.finish(one.scene, DVec3(0.0, 40.0, 0.0));
@@ -272,7 +272,7 @@ TEST(LiveField, ColoursOfTypesAreFollowed) {
   ASSERT_NO_FATAL_FAILURE(expect_field(shown, one.scene, one.handle, options_of(1)));
 }
 
-// A lake that contains a glass ball and crosses chunk borders; `bed` is the material around it.
+// Returns a lake that contains a glass ball and crosses chunk borders; `bed` is the material around it.
 DensityGrid lake(VoxelType water, VoxelType glass, VoxelType bed) {
   DensityGrid field;
   field.add_box({2.0, 2.0, 2.0}, {126.0, 70.0, 126.0}, bed);
@@ -330,7 +330,7 @@ TEST(LiveField, TypesThatBecomeTransparentAreFollowed) {
   for (const Visibility visibility : {Visibility::Transparent, Visibility::Opaque, Visibility::Transparent}) {
     properties.visibility = visibility;
     one.scene.types.replace(3, properties);
-    // An edit at the same time, so that jobs are of both.
+    // Edits at the same time, so that jobs serve both changes.
     one.field().remove_sphere({64.0, 70.0, 64.0}, visibility == Visibility::Opaque ? 4.0 : 7.0);
     ASSERT_NO_FATAL_FAILURE(expect_shown(meshes, one, shown));
     EXPECT_EQ(glass_indices(shown) > 0, visibility == Visibility::Transparent);

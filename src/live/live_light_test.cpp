@@ -70,7 +70,7 @@ TEST(LiveLight, ShownLightIsAlwaysCorrect) {
     world.edit(random);
     light.update(world.scene);
     bool is_taken = light.take();
-    // Now and then until there is something.
+    // Waits for a result from time to time.
     while (i % 8 == 7 && !is_taken) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
       is_taken = light.take();
@@ -136,7 +136,7 @@ TEST(LiveLight, IsReadWhileWorkersGoOn) {
 TEST(LiveLight, TellsWhereLightChanged) {
   LitScene world(4);
   LiveLight light;
-  std::map<std::array<int, 3>, std::vector<std::uint16_t>> copy;  // of rows of chunks
+  std::map<std::array<int, 3>, std::vector<std::uint16_t>> copy;  // by chunk row
   ChangeCursor cursor;
   std::mt19937 random(6);
   int told = 0;

@@ -51,7 +51,7 @@ LitQuads sorted(const QuadBuffer& quads, const std::vector<FaceLight>& light) {
   return all;
 }
 
-// Compares with surfaces made from scratch.
+// Compares with surfaces built from scratch.
 void expect_right(const DarkeningScene& world, const SceneLight& light, const Surfaces& surfaces,
                   LightMerging merging) {
   const GridLight lit = light.of(world.handle);
@@ -101,7 +101,7 @@ INSTANTIATE_TEST_SUITE_P(All, LitMeshes, testing::Values(LightMerging::Constant,
                            return tested.param == LightMerging::Constant ? "Constant" : "Linear";
                          });
 
-// A floor over several chunks in a closed room, and a lamp in it.
+// A floor across several chunks in a closed room with a lamp.
 struct Room {
   Room() {
     EXPECT_TRUE(scene.types.add({.name = "stone", .colour = {}}));
@@ -129,7 +129,7 @@ TEST(LiveLitMeshes, RemeshesAChunkThatOnlyItsLightReaches) {
   take(meshes, surfaces);
   EXPECT_EQ(surfaces.size(), 3U);
 
-  // Six voxels from the next chunk: no voxel of that is its neighbour.
+  // Six voxels from the next chunk: no voxel of that chunk is a neighbour.
   room.scene.edit(room.handle).grid.set({57, 1, 30}, 2);
   light.update(room.scene);
   meshes.finish(room.scene, DVec3(0.0));
@@ -137,7 +137,7 @@ TEST(LiveLitMeshes, RemeshesAChunkThatOnlyItsLightReaches) {
   ASSERT_EQ(updates.size(), 2U);
   for (const SurfaceUpdate& update : updates) {
     ASSERT_LT(update.chunk.x, 2);
-    // In the neighbouring chunk only the regions within the range of the light change: it ends 8 voxels inside.
+    // Only the neighbouring chunk's regions within the light's range change: the light ends 8 voxels inside.
     constexpr std::uint64_t kFirstAlongX = 0x1111'1111'1111'1111U;
     if (update.chunk.x == 1) {
       EXPECT_EQ(update.changed_regions & ~kFirstAlongX, 0U);
@@ -150,7 +150,7 @@ TEST(LiveLitMeshes, RemeshesAChunkThatOnlyItsLightReaches) {
     EXPECT_GT(brightest, 12U * 5);
   }
 
-  // The light of a type is another, and no voxel is.
+  // Changes the light of a type, and no voxel.
   VoxelProperties dark = room.scene.types[2];
   dark.emission = 0.0F;
   room.scene.types.replace(2, dark);
@@ -204,7 +204,7 @@ TEST(LiveLitMeshes, WithoutLightAnyMoreAreThoseOfBefore) {
   }
 }
 
-// Light and meshes update on workers at their own pace. Finally both match the scene.
+// Workers update light and meshes at their own pace. Finally both match the scene.
 TEST(LiveLitMeshes, FollowLiveLight) {
   DarkeningScene world(8);
   LiveLight light;

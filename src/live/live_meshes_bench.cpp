@@ -1,4 +1,4 @@
-// live: time from an edit to the new meshes of all affected chunks, and from scratch to all meshes. Terrain of
+// live: time from an edit to the new meshes of all affected chunks, and from an empty start to all meshes. Terrain of
 // 256x128x256 voxels, the default number of workers of `LiveMeshOptions`.
 
 #include <quoin/live/live_meshes.h>
@@ -27,7 +27,7 @@ struct Land {
     instance.grid = grid = scene.add_grid(std::move(land));
     scene.add_instance(instance);
   }
-  // The first voxel of air above the ground.
+  // Returns the first air voxel above the ground.
   IVec3 above(int x, int z) const {
     int y = 127;
     while (y > 0 && scene.grids()[grid].grid.get({x, y - 1, z}) == kAir) --y;
@@ -91,7 +91,8 @@ void edit(benchmark::State& state, SurfaceStyle style, int x, int z) {
   state.counters["latency_seconds"] = benchmark::Counter(latency_seconds, benchmark::Counter::kAvgIterations);
 }
 
-// A ball of radius 6 dug into smooth ground, and filled again: one thread, `corner`: where eight chunks meet.
+// Digs a ball of radius 6 into smooth ground and fills it again, on one thread. `corner`: at the corner of eight
+// chunks.
 void dig(benchmark::State& state, bool corner) {
   Scene scene;
   VoxelProperties ground;

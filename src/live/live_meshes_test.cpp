@@ -183,7 +183,7 @@ TEST_P(LiveMeshesOf, AnEyeThatIsNowhereHarmsNothing) {
 INSTANTIATE_TEST_SUITE_P(Styles, LiveMeshesOf, testing::Values(SurfaceStyle::Blocky, SurfaceStyle::Smooth),
                          [](const auto& style) { return style.param == SurfaceStyle::Blocky ? "Blocky" : "Smooth"; });
 
-// The unit faces of quads with all that they carry.
+// Returns the unit faces of quads with all their attributes.
 std::multiset<std::uint64_t> faces_of(std::span<const Quad> quads) {
   std::multiset<std::uint64_t> faces;
   constexpr std::uint64_t kSizes = std::uint64_t{63} << Quad::kSizeUShift | std::uint64_t{63} << Quad::kSizeVShift;

@@ -76,7 +76,7 @@ Places chunks_near_changes(const DensityGrid& before, const DensityGrid& after, 
   return all;
 }
 
-// The chunks that can own quads and read a density that differs, or a type of a solid sample that does.
+// Returns the chunks that can own quads and read a changed density, or a changed type of a solid sample.
 Places chunks_that_read_changes(const DensityGrid& before, const DensityGrid& after, const Places& asked) {
   const int reach = reach_of({});
   Places changed;
@@ -139,10 +139,10 @@ TEST(LiveReach, SmoothEditsDeepInsideAreMeshedNowhere) {
   grid.fill_box({{-40, -40, -40}, {101, 101, 101}}, 1);
   Places given;
   EXPECT_GT(followed.meshed(given), 0);
-  // Painted, far from every face: the chunk's densities are the same, and no vertex takes its type.
+  // Painted far from every face: the chunk's densities stay the same, and no vertex uses its type.
   grid.set({30, 30, 30}, 3);
   EXPECT_LE(followed.meshed(given), 1);
-  // A type below the face changes colours of that chunk alone.
+  // A type below the face changes only the colours of that chunk.
   grid.set({30, 100, 30}, 3);
   EXPECT_EQ(followed.meshed(given), 1);
   EXPECT_EQ(given, (Places{{0, 1, 0}}));

@@ -12,7 +12,7 @@
 namespace quoin {
 namespace {
 
-// Workers that stop at a gate, and a log of their work.
+// Workers that stop at a gate, with a log of their work.
 class GatedWork {
  public:
   explicit GatedWork(const LiveMeshOptions& options) : options_(options) {}
@@ -68,7 +68,7 @@ LiveMeshOptions blocky(unsigned threads) {
   return options;
 }
 
-// A voxel in each of a row of chunks.
+// Sets a voxel in each of a row of chunks.
 void fill_row(Grid& grid, int chunks) {
   for (int i = 0; i < chunks; ++i) grid.set({64 * i + 30, 30, 30}, 1);
 }
@@ -237,7 +237,7 @@ TEST(MeshScheduler, DropsChunksRemovedOrReplacedDuringMeshing) {
   }
 }
 
-// Each edit adds a voxel that touches no other: the faces count the edits.
+// Each edit adds an isolated voxel: the number of faces counts the edits.
 TEST(MeshScheduler, NothingOlderIsGivenAfterSomethingNewer) {
   LiveMeshOptions options = blocky(4);
   OneGrid one;

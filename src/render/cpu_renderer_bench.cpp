@@ -1,4 +1,4 @@
-// render/terrain/1280x720: the 256x128x256 terrain with shadows and nine occlusion rays a hit, one thread.
+// render/terrain/1280x720: the 256x128x256 terrain with shadows and nine occlusion rays per hit, one thread.
 
 #include <benchmark/benchmark.h>
 

@@ -20,7 +20,7 @@ using namespace render_test;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-// Opaque, transparent and glowing voxels, here and there, in two instances.
+// Returns two instances of scattered opaque, transparent and emissive voxels.
 Scene lively_scene() {
   Scene scene;
   const VoxelType stone = add_type(scene, {180, 120, 90, 255});
@@ -161,7 +161,7 @@ TEST(CpuRenderer, OneVoxelIsSeenUprightAndNotMirrored) {
   const Rgba8 red{200, 40, 30, 255};
   const VoxelType type = add_type(scene, red);
   Grid grid;
-  grid.set({2, 1, 0}, type);  // right of the middle and above it, seen along -Z
+  grid.set({2, 1, 0}, type);  // to the right of the centre and above it, seen along -Z
   place(scene, std::move(grid));
   RenderOptions options = sized(80, 80);
   options.light.shading = Shading::Unlit;
@@ -173,7 +173,7 @@ TEST(CpuRenderer, OneVoxelIsSeenUprightAndNotMirrored) {
   for (const auto& [x, y] : {std::pair(-28, -16), {27, 16}, {-28, 16}}) {
     EXPECT_EQ(depth_at(picture, 40 + x, 40 + y), static_cast<float>(kInfinity));
   }
-  // The front, and narrow views of its left and its lower side.
+  // The front, and narrow parts of its left and lower sides.
   EXPECT_GT(picture.pixels_hit, 123);
   EXPECT_LT(picture.pixels_hit, 165);
 }
@@ -258,7 +258,7 @@ class UpdatedRenderer {
     renderer_.update();
     for (const bool detail : {true, false}) {
       options.detail.policy.reset();
-      // Far all of them: drawn from impostors.
+      // All instances are far: drawn from impostors.
       if (detail) options.detail.policy.emplace().far_pixels = 1000;
       const auto updated = renderer_.render(camera, options);
       const Picture fresh = taken(scene_, camera, options);
@@ -276,7 +276,7 @@ class UpdatedRenderer {
   Picture last_;
 };
 
-// Applies changes of all kinds between images of every kind.
+// Applies changes of all kinds between images of all kinds.
 TEST(CpuRenderer, UpdatedItTakesThePicturesOfANewOne) {
   Scene scene = lively_scene();
   UpdatedRenderer renderer(scene);

@@ -15,12 +15,12 @@ Pixel pixel_at(const Image& image, int x, int y) {
   return {at[0], at[1], at[2]};
 }
 
-/// Solid shows red, air blue.
+/// Solid is red, air is blue.
 bool is_solid(const Pixel& pixel) {
   return pixel[0] > pixel[2];
 }
 
-/// A ball about the origin of radius 20, or half of one.
+/// A ball of radius 20 about the origin, or half of it.
 Scene ball(double cut_above_y = 100.0) {
   Scene scene;
   SceneGrid grid;
@@ -43,7 +43,7 @@ TEST(DensitySlice, ABallIsADiscInEveryDirection) {
     EXPECT_NEAR(slice->place, 0.0, 0.5);
     EXPECT_TRUE(is_solid(pixel_at(slice->colour, 100, 60)));
     EXPECT_FALSE(is_solid(pixel_at(slice->colour, 5, 60)));
-    // 96 % of 120 pixels are 40 samples.
+    // 40 samples fill 96 % of 120 pixels.
     const double radius = 20.0 * 0.96 * 120 / 40.0;
     EXPECT_NEAR(static_cast<double>(slice->pixels_solid), 3.14159 * radius * radius, 0.06 * 3.14 * radius * radius);
   }
@@ -60,7 +60,7 @@ TEST(DensitySlice, IsSeenFromThePositiveEndUpright) {
     ASSERT_TRUE(slice);
     EXPECT_FALSE(is_solid(pixel_at(slice->colour, 50, 20))) << "above the bounds";
     EXPECT_TRUE(is_solid(pixel_at(slice->colour, 50, 50)));
-    // The lower half is wider above.
+    // The lower half is wider at its top.
     EXPECT_TRUE(is_solid(pixel_at(slice->colour, 12, 35)));
     EXPECT_FALSE(is_solid(pixel_at(slice->colour, 12, 68)));
   }

@@ -76,7 +76,7 @@ Model terrain() {
   return model;
 }
 
-// A deck one voxel thick on piers, under cables of single voxels.
+// Returns a deck one voxel thick on piers, below cables of single voxels.
 Model bridge() {
   Model model;
   const VoxelType stone = add_type(model.scene, {150, 145, 135, 255});
@@ -103,7 +103,7 @@ Model smooth_terrain() {
   return model;
 }
 
-// A hill with a house of blocks, and walls two samples thick.
+// Returns a hill with a house of blocks, and walls two samples thick.
 Model village(bool has_thin_walls) {
   Model model;
   const VoxelType stone = add_type(model.scene, {150, 145, 135, 255});
@@ -123,7 +123,7 @@ Model village(bool has_thin_walls) {
 }
 
 struct Closeness {
-  double colour = 0.0;   // mean absolute difference of the channels, over the pixels of either
+  double colour = 0.0;   // mean absolute difference of the channels, over the pixels of either image
   double overlap = 0.0;  // intersection over union of the silhouettes
 };
 
@@ -162,7 +162,7 @@ int halvings_traced(const Model& model, const Camera& camera, const DetailPolicy
   return placed_in(tracer.with_detail(selected)).at(0).level;
 }
 
-// Of the pictures without detail and with it.
+// Compares the images without and with levels of detail.
 Closeness closeness_at(const Model& model, const Camera& camera, const DetailPolicy& policy) {
   RenderOptions options = sized(kEdge, kEdge);
   options.samples = 64;
@@ -201,7 +201,7 @@ TEST(RenderDetail, AThinBridgeStaysAsItIs) {
   expect_close(bridge(), 0);
 }
 
-// As far away as a grid may be halved so often.
+// Compares at the largest distance for this number of halvings.
 void expect_close_at(const Model& model, int level, int halvings, double difference) {
   const DetailPolicy policy = without_impostors();
   const double voxel_pixels = 0.999 * std::ldexp(policy.cell_pixels, -level);
@@ -218,14 +218,14 @@ TEST(RenderDetail, ASmoothTerrainLooksTheSameInCoarserSamples) {
   const Model model = smooth_terrain();
   expect_close_at(model, 1, 1, 6.0);
   expect_close_at(model, 2, 2, 7.5);
-  // Its caves' roofs would be a sample thin.
+  // Roofs of its caves would be one sample thin.
   expect_close_at(model, 3, 2, 7.5);
 }
 
 TEST(RenderDetail, AFieldAndItsBlocksAreHalvedTogether) {
   const Model model = village(false);
   for (int level = 1; level <= 2; ++level) expect_close_at(model, level, level, 6.0);
-  // The house's eaves would be twice as thick.
+  // The eaves of the house would be twice as thick.
   expect_close_at(model, 3, 2, 6.0);
 }
 

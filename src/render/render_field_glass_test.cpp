@@ -42,7 +42,7 @@ void expect_near(Pixel a, Pixel b, int tolerance) {
   for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(a[c], b[c], tolerance);
 }
 
-// A box with faces between samples, or on them: its sides are exact.
+// Adds a box with faces between samples, or on them: its sides are exact.
 void add_plate(DensityGrid& field, DVec3 low, DVec3 high, VoxelType type) {
   field.edit({IVec3(glm::floor(low)) - 2, IVec3(glm::ceil(high)) + 3}, [&](IVec3 p, DensitySample before) {
     const DVec3 beyond = glm::max(low - DVec3(p), DVec3(p) - high);
@@ -69,7 +69,7 @@ TEST(RenderFieldGlass, ASlabTintsByItsThicknessAndShowsItsOwnColour) {
       wall.fill_box({{-9, -1, -9}, {10, 0, 10}}, s.red);
       place(s.scene, std::move(wall));
       DensityGrid slab;
-      const double low = thickness > 1.0F ? 3.0 : 3.0 - 0.5 * static_cast<double>(thickness);  // round a sample
+      const double low = thickness > 1.0F ? 3.0 : 3.0 - 0.5 * static_cast<double>(thickness);  // around a sample
       add_plate(slab, {-8, low, -8}, {8, low + static_cast<double>(thickness), 8}, is_glass ? s.glass : s.stone);
       place_field(s.scene, std::move(slab));
       RenderOptions options = sized(4, 4);
@@ -96,7 +96,7 @@ TEST(RenderFieldGlass, LengthsAreInVoxelsWhateverTheirSize) {
   expect_near(pixel_at(picture, 1, 2), encoded(linear(kRed) * through(4.0F) + own(4.0F)), 1);
 }
 
-// The floor of a lake in one field with it: at the same place whether water lies over it or air.
+// The floor of a lake in the same field: at the same position below water and below air.
 TEST(RenderFieldGlass, TheFloorOfALakeIsWhereItsSamplesSay) {
   GlassScene s;
   DensityGrid lake;
@@ -133,7 +133,7 @@ TEST(RenderFieldGlass, TintsTheSunAndDoesNotOcclude) {
   options.light.shadow_distance_voxels = 2.5;
   expect_near(floor_below(), encoded(linear(kWhite) * 1.15F), 1);
   options.light.shadow_distance_voxels = 100.0;
-  // Painted with stone it takes the light, and glass again it gives it back.
+  // Painted with stone it blocks the light; painted with glass again it passes the light.
   const GridHandle handle = s.scene.instances()[roof].grid;
   const auto paint = [&](VoxelType type) {
     s.scene.edit(handle).field.edit({{-20, 0, -20}, {20, 10, 20}}, [&](IVec3, DensitySample now) {
@@ -147,7 +147,7 @@ TEST(RenderFieldGlass, TintsTheSunAndDoesNotOcclude) {
   expect_near(floor_below(), encoded(linear(kWhite) * (0.15F + through(2.0F))), 1);
 }
 
-// Blocks and a field of the same glass side by side, seen from above and along both.
+// Blocks and a field of the same glass next to each other, seen from above and along both.
 TEST(RenderFieldGlass, BesideGlassOfBlocksItLooksTheSame) {
   GlassScene s;
   Grid blocks;
@@ -162,7 +162,7 @@ TEST(RenderFieldGlass, BesideGlassOfBlocksItLooksTheSame) {
   options.light.glass_surfaces = true;
   const Picture above = taken(s.scene, from_above(0, 30, 0, 12), options);
   for (int y = 2; y < 14; ++y) expect_near(pixel_at(above, 2, y), pixel_at(above, 13, y), 1);
-  // Along both, as one body of 16.
+  // Along both, as one body of 16 voxels.
   options.light.shading = Shading::Unlit;
   Camera along = towards({-40, 3.5, 0.5}, {0, 3.5, 0.5});
   along.projection = Camera::Projection::Orthographic;
@@ -186,7 +186,7 @@ TEST(RenderFieldGlass, OverlappingBlocksAreSeenThroughIt) {
   EXPECT_GT(std::abs(pixel_at(picture, 0, 0)[2] - pixel_at(picture, 4, 4)[2]), 20) << "beside them it is deeper";
 }
 
-// A ball of clear glass in front of the sky: the reflections of its two surfaces, by the field's own normals.
+// A ball of clear glass in front of the sky: its two surfaces reflect by the field's normals.
 TEST(RenderFieldGlass, SurfacesMirrorByTheGradient) {
   Scene scene;
   VoxelProperties clear;
@@ -208,7 +208,7 @@ TEST(RenderFieldGlass, SurfacesMirrorByTheGradient) {
     const double in_plane = (1.5 * cosine - inside) / (1.5 * cosine + inside);
     return 0.5 * (across * across + in_plane * in_plane);
   };
-  // Straight through: the sky of the camera's own ray directions.
+  // Straight through: the sky in the camera's own ray directions.
   const Picture empty = taken(Scene(), camera, options);
   int compared = 0;
   for (int y = 4; y < 57; y += 4) {
@@ -219,7 +219,7 @@ TEST(RenderFieldGlass, SurfacesMirrorByTheGradient) {
       if (square < 200.0) continue;
       const DVec3 normal = DVec3{px, py, std::sqrt(square)} / kRadius;
       const auto share = static_cast<float>(fresnel(normal.z));
-      const auto up = static_cast<float>(2.0 * normal.z * normal.y);  // of (0, 0, -1), mirrored
+      const auto up = static_cast<float>(2.0 * normal.z * normal.y);  // (0, 0, -1), mirrored
       const Vec3 mirrored = share * (sky_colour(up) + (1.0F - share) * sky_colour(up));
       const Pixel plain = pixel_at(empty, x, y);
       const Vec3 behind = linear({plain[0], plain[1], plain[2], 255});
@@ -316,7 +316,7 @@ TEST(RenderFieldGlass, ARendererFollowsEditsAndTypes) {
   expect_followed("the ground made transparent");
 }
 
-// From inside a body of the field: tinted, without a surface of its own.
+// Seen from inside a body of the field: tinted, without a visible surface.
 TEST(RenderFieldGlass, SeenFromInsideTintsOnly) {
   GlassScene s;
   Grid floor;
@@ -332,7 +332,7 @@ TEST(RenderFieldGlass, SeenFromInsideTintsOnly) {
   EXPECT_EQ(depth_at(picture, 1, 1), 0.0F);
 }
 
-// Its opaque part comes from an impostor, its glass from rays; neither is halved.
+// The opaque part comes from an impostor, the glass from rays; neither is halved.
 TEST(RenderFieldGlass, FromAfarItIsSeenThrough) {
   PondScene s;
   RenderOptions options = sized(96, 72);

@@ -1,4 +1,4 @@
-// Pictures of fields of densities, lit as blocks are.
+// Images of density fields, lit in the same way as blocks.
 
 #include <algorithm>
 #include <array>
@@ -51,7 +51,7 @@ TEST(RenderField, ABallHasTheLightOfItsNormals) {
       if (square < 60.0) continue;
       const DVec3 normal = DVec3{px, std::sqrt(square), pz} / kRadius;
       const double cosine = std::max(glm::dot(normal, kSun), 0.0);
-      // Where the light grazes it, the ball's own cells may or may not be in the way.
+      // At grazing light the own cells of the ball may or may not block it.
       if (std::abs(glm::dot(normal, kSun)) < 0.1) continue;
       const Pixel expected = encoded(linear(colour) * static_cast<float>(0.1 + cosine));
       const Pixel found = pixel_at(picture, x, y);
@@ -77,7 +77,7 @@ TEST(RenderField, ItAndBlocksShadeEachOther) {
   const Picture picture = taken(scene, from_above(0, 100, 0, 81), options);
   // No pixel below the ball's outline is visible; next to it the floor is lit.
   EXPECT_EQ(pixel_at(picture, 40 + 10, 40), encoded(linear({188, 188, 188, 255}) * 1.1F));
-  // With the sun aslant the ball's shadow lies where its centre is cast onto the floor.
+  // With a slanted sun the ball's shadow lies at the projection of its centre onto the floor.
   options.light.sun = {1, 1, 0};
   const Picture aslant = taken(scene, from_above(0, 100, 0, 81), options);
   const Pixel in_shadow = encoded(linear({188, 188, 188, 255}) * 0.1F);
@@ -85,7 +85,7 @@ TEST(RenderField, ItAndBlocksShadeEachOther) {
   EXPECT_EQ(pixel_at(aslant, 40 - 22, 40), in_shadow);
   EXPECT_NE(pixel_at(aslant, 40 - 30, 40), in_shadow);
   EXPECT_NE(pixel_at(aslant, 40 + 16, 40), in_shadow);
-  // A block over the ball takes its light.
+  // A block over the ball blocks its light.
   Grid roof;
   roof.fill_box({{-3, 30, -3}, {4, 31, 4}}, grey);
   place(scene, std::move(roof));
@@ -206,7 +206,7 @@ TEST(RenderField, MaterialsBlendAsThoseOfItsMesh) {
   Scene scene;
   DensityGrid field = patchwork(scene);
   const SmoothMesh mesh = build_smooth_mesh(field, scene.types, {}).value();
-  constexpr int kFirst = 8;  // of the cells that are seen, on both axes
+  constexpr int kFirst = 8;  // first visible cell, on both axes
   constexpr int kCells = 64;
   std::array<std::array<Vec3, kCells + 1>, kCells + 1> colours{};
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {

@@ -70,7 +70,7 @@ TEST(RenderGlass, IsVisibleOnADarkGroundAndAgainstTheSky) {
   EXPECT_GT(count_different(picture, taken(empty, from_above(0, 20, 0, 4), options), 10), 3);
 }
 
-// The same glass in one grid, across a chunk's border, and in two grids that touch.
+// The same glass in one grid, across a chunk border, and in two grids that touch.
 TEST(RenderGlass, HasNoSeamsBetweenEqualNeighbours) {
   const auto picture_of = [](int shift, bool is_split) {
     GlassScene s;
@@ -180,7 +180,7 @@ TEST(RenderGlass, SurfacesMirrorWhatFresnelSays) {
   const SceneTracer tracer(s.scene);
   const SceneView view(tracer, DVec3(0.0));
   const glm::dmat3& axes = placed_in(tracer)[0].world_axes;
-  // At an angle to the upper face, from outside or, with a cosine below 0, from inside.
+  // Reflectance at an angle to the upper face, from outside or, with a cosine below 0, from inside.
   const auto at = [&](double cosine, float ior, float other) {
     const DVec3 direction = axes * DVec3(std::sqrt(1.0 - cosine * cosine), -cosine, 0.0);
     return mirror_at(view, {DVec3(0.0), 7.0 * direction}, 0, DVec3(0, 1, 0), ior, other);
@@ -207,7 +207,7 @@ TEST(RenderGlass, SurfacesShowTheSkyAndDimWhatLiesBehind) {
     Grid pane;
     pane.fill_box({{-5, 0, -5}, {6, 2, 6}}, s.glass);
     place(s.scene, std::move(grid));
-    // Of another grid, so that where they touch is rounded twice.
+    // A separate grid, so that the touching faces are rounded twice.
     place(s.scene, std::move(pane), {0.1, 0.1 + gap, 0.1});
     RenderOptions options = sized(4, 4);
     options.light.sun = {0, 1, 0};
@@ -264,7 +264,7 @@ TEST(RenderGlass, SurfacesBelongToLightAndToBodies) {
   }
 }
 
-// Full cover, deep seas and grazing rays must give numbers.
+// Fully covering glass, deep seas and grazing rays must give finite numbers.
 TEST(RenderGlass, DarkAndDeepGlassIsNeverNotANumber) {
   Scene scene;
   const VoxelType ink = add_type(scene, {0, 0, 0, 255}, Visibility::Transparent);

@@ -1,4 +1,4 @@
-// Pictures lit by lamps: points, spots and voxels that emit light.
+// Images lit by lamps: points, spots and emissive voxels.
 
 #include <algorithm>
 #include <cmath>
@@ -104,7 +104,7 @@ TEST(RenderLamps, ThingsCastShadowsUnlessToldNotTo) {
   EXPECT_GT(pixel_at(taken(scene, camera, options), 27, 20)[0], 30);
 }
 
-// One voxel as a lamp of six faces: close to the light of the faces themselves.
+// One voxel as a lamp of six faces: its light is close to the light of the faces.
 TEST(RenderLamps, AVoxelThatEmitsLightsAsItsFacesDo) {
   Scene scene = floor_by_night();
   const VoxelType torch = add_type(scene, kWhite, Visibility::Opaque, 6.0F);
@@ -114,7 +114,7 @@ TEST(RenderLamps, AVoxelThatEmitsLightsAsItsFacesDo) {
   const double reach = std::sqrt(4096.0 * std::sqrt(3.0) * 6.0 / std::numbers::pi);
   for (int x = 2; x < 80; x += 7) {
     const DVec3 at = floor_at(x, 30, 80, 40) + DVec3(0.5, 0.0, 0.5);
-    // 16 x 16 patches of each face.
+    // 16 x 16 patches per face.
     double sum = 0.0;
     for (const Direction face : kDirections) {
       const FaceFrame& frame = frame_of(face);
@@ -303,7 +303,7 @@ TEST(RenderLamps, BadOnesLightNothing) {
   EXPECT_TRUE(std::all_of(picture.colour.rgb.begin(), picture.colour.rgb.end(), [](auto byte) { return byte == 0; }));
 }
 
-// The same numbers on every machine: each below a limit.
+// Returns the same numbers on every machine, each below a limit.
 class Below {
  public:
   int operator()(std::uint32_t limit) {
@@ -421,7 +421,7 @@ TEST(RenderLamps, PicturesOfFewLampsAndOfManyMayTakeTurns) {
     const Picture picture = renderer.render(from_above(0, 20, 0, 40), options).value();
     EXPECT_EQ(picture.colour.rgb, taken(scene, from_above(0, 20, 0, 40), options).colour.rgb);
   };
-  // Three kinds are one more than are kept.
+  // Three kinds are one more than the cache holds.
   for (const int lamps : {64, 2, 64, 2, 1, 2, 64}) check(lamps);
   scene.lamps[2].intensity = 40.0;
   renderer.update();

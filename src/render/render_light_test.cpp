@@ -23,7 +23,7 @@ Grid floor_of(VoxelType type) {
   return grid;
 }
 
-// The cosine of the sun on each axis, as the renderer rounds it.
+// Returns the cosine of the sun on each axis, with the renderer's rounding.
 Vec3 cosines(DVec3 sun) {
   return Vec3(glm::normalize(sun));
 }
@@ -92,7 +92,7 @@ TEST(RenderLight, ALoneCubesShadowIsRightToThePixel) {
     for (int column = 0; column < 160; ++column) {
       const DVec3 at{(column + 0.5) / 5 - 16, 0.01, (row + 0.5) / 5 - 16};
       if (at.x > low.x && at.x < high.x && at.z > low.z && at.z < high.z) continue;  // the cube itself
-      // The stretch of the ray to the sun within each pair of the cube's planes.
+      // The interval of the ray to the sun within each pair of the cube's planes.
       const DVec3 a = (low - at) / sun;
       const DVec3 b = (high - at) / sun;
       const DVec3 enter = glm::min(a, b);
@@ -114,7 +114,7 @@ TEST(RenderLight, ShadowsEndAtTheirDistanceInVoxels) {
   scene.edit(instance).voxel_size = 0.25;
   RenderOptions options = sized(1, 1);
   options.light.occlusion_mode = OcclusionMode::Off;
-  options.light.sun = {0, 0.001, 0};  // of any length
+  options.light.sun = {0, 0.001, 0};  // any length
   Camera camera = from_above(0, 1, 0, 0.1);
   const Pixel dark = encoded(linear(kGrey) * 0.1F);
   options.light.shadow_distance_voxels = 9.98;
@@ -141,7 +141,7 @@ TEST(RenderLight, OcclusionEndsAtItsDistance) {
   EXPECT_EQ(pixel_at(taken(scene, from_above(0, 5, 0, 1), options), 0, 0), encoded(linear(kGrey) * 0.15F));
 }
 
-// Every ray of this image hits one point, where a wall hides a part of the sky.
+// Every ray of this image hits one point, where a wall hides part of the sky.
 TEST(RenderLight, SamplesOfAPixelHaveOcclusionRaysOfTheirOwn) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);
@@ -198,7 +198,7 @@ TEST(RenderLight, VertexOcclusionIsWhatTheMeshCarries) {
   const float sun = cosines(options.light.sun).y;
   for (const auto affects : {OcclusionAffects::Ambient, OcclusionAffects::All}) {
     options.light.occlusion_affects = affects;
-    // One column of voxels across the image: x from 3 to 4.
+    // One column of voxels fills the image: x from 3 to 4.
     Camera camera = from_above(3.5, 3, 0.5, 1.0 / 40);
     const Picture picture = taken(scene, camera, options);
     for (int column = 0; column < 40; ++column) {
@@ -243,7 +243,7 @@ TEST(RenderLight, TheSixthOcclusionRayIsTheReferences) {
   }
 }
 
-// A floor with a step along x = 5: there the occlusion of vertices falls from 2 to 0 within one voxel.
+// A floor with a step along x = 5, where vertex occlusion falls from 2 to 0 within one voxel.
 Scene with_step(Rgba8 colour) {
   Scene scene;
   const VoxelType type = add_type(scene, colour);
@@ -300,7 +300,7 @@ TEST(RenderLight, OcclusionAloneByRaysIsTheShareThatIsOpen) {
   EXPECT_EQ(pixel_at(open, 45, 0)[0], 255) << "rays of no length";
 }
 
-// With the nine as they are there would be steps of a ninth at any number of samples.
+// With the nine unchanged directions there would be steps of a ninth at any number of samples.
 TEST(RenderLight, ManySamplesLeaveNoBandsBesideAWall) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);
@@ -323,7 +323,7 @@ TEST(RenderLight, ManySamplesLeaveNoBandsBesideAWall) {
   EXPECT_LE(largest_step(64), 12);
 }
 
-// The ray along the normal ends at the slab's edge: upright in all samples it would leave a step of a ninth there.
+// The ray along the normal ends at the slab's edge: upright in all samples, it would leave a step of a ninth there.
 TEST(RenderLight, ManySamplesLeaveNoBandBelowASlab) {
   Scene scene;
   const VoxelType type = add_type(scene, kGrey);
@@ -332,7 +332,7 @@ TEST(RenderLight, ManySamplesLeaveNoBandBelowASlab) {
   place(scene, std::move(grid));
   RenderOptions options = sized(160, 1);
   options.light.shading = Shading::Occlusion;
-  // From below the slab.
+  // Seen from below the slab.
   Camera camera = from_above(0, 2.5, 0.37, 0.025);
   const auto largest_step = [&](int samples) {
     options.samples = samples;

@@ -20,7 +20,7 @@ int brightest(const Picture& picture) {
   return *std::max_element(picture.colour.rgb.begin(), picture.colour.rgb.end());
 }
 
-// Light between the corners of a face, in words.
+// Interpolates the light between the corners of a face by the definition.
 MeanLevels between(const FaceLight& corners, double u, double v) {
   std::array<double, 4> sum{};
   const std::array<double, 4> shares{(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v};
@@ -84,7 +84,7 @@ TEST(RenderPropagated, ShowsTheLightThatItIsGivenAsOfTheLastUpdate) {
   light.update(cave.scene);
   lent.update();
   EXPECT_EQ(taken(lent), taken(own));
-  cave.scene.edit(cave.grid_handle).grid.fill_box({{-20, -12, -3}, {-16, -9, -1}}, kAir);  // a lamp goes
+  cave.scene.edit(cave.grid_handle).grid.fill_box({{-20, -12, -3}, {-16, -9, -1}}, kAir);  // removes a lamp
   own.update();
   lent.update();
   const auto dark = taken(own);
@@ -150,7 +150,7 @@ TEST(RenderPropagated, HalvedGridsKeepTheirLight) {
   EXPECT_GT(brightest(halved), 150);
 }
 
-// Samples of a field lie at voxels' corners: its light is that before its surface.
+// Field samples lie at the corners of voxels: the light comes from in front of the surface.
 TEST(RenderPropagated, FieldsAreLitWhereTheySeeTheSky) {
   Scene scene;
   SceneGrid made;

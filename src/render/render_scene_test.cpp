@@ -1,4 +1,4 @@
-// Images of one world, placed in different ways, are equal.
+// Images of one world are equal for different placements.
 
 #include <algorithm>
 #include <array>
@@ -28,7 +28,7 @@ struct World {
   }
 };
 
-// Blobs in a box around the origin.
+// Returns blobs in a box around the origin.
 Grid blobs(const World& world, unsigned seed, IVec3 shift = IVec3(0)) {
   std::mt19937 random(seed);
   Grid grid;
@@ -42,7 +42,7 @@ Grid blobs(const World& world, unsigned seed, IVec3 shift = IVec3(0)) {
 
 const Camera kCamera = towards({17, 13, 21}, {0, 0, 0}, 0.7);
 
-// All ways to put three axes onto three axes; half of them mirror.
+// Returns all 48 ways to map three axes onto three axes; half of them mirror.
 std::vector<glm::dmat3> signed_permutations() {
   std::vector<glm::dmat3> all;
   for (int code = 0; code < 27 * 8; ++code) {

@@ -20,7 +20,7 @@ VoxelType add_glass(Scene& scene, Rgba8 colour) {
   return scene.types.add(properties).value();
 }
 
-// On walls and water, away from edges: smooth glass matches blocks.
+// On walls and water, away from edges, smooth glass matches blocks.
 TEST(RenderSmoothScene, FlatGlassOfAnyThicknessIsThatOfBlocks) {
   Scene scene;
   const VoxelType stone = add_type(scene, {190, 180, 165});

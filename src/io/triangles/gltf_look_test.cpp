@@ -37,7 +37,7 @@ std::string image_of(const std::vector<Rgba8>& colours) {
   return uri_of(*png, "image/png");
 }
 
-/// A square of one material with textures 0 and up; u goes along x.
+/// Returns a square of one material with the textures numbered from 0; u goes along x.
 std::string square_gltf(const std::string& material, const std::vector<std::string>& images) {
   const float numbers[] = {0, 0, 0, 4, 0, 0, 4, 4, 0, 0, 4, 0, 0, 0, 1, 0, 1, 1, 0, 1};
   const auto buffer = std::as_bytes(std::span(numbers));
@@ -57,7 +57,7 @@ std::string square_gltf(const std::string& material, const std::vector<std::stri
          textures + R"(],"images":[)" + sources + R"(],"materials":[)" + material + "]}";
 }
 
-/// The properties of all types that the square's voxels have, by the column along x.
+/// Returns the properties of the square's voxel types, by column along x.
 std::vector<VoxelProperties> columns_of(const std::string& gltf) {
   LoadOptions options;
   options.mesh.voxel_size = 1.0;
@@ -88,7 +88,7 @@ TEST(GltfLook, MultipliesEmissionByItsTexture) {
   for (const VoxelProperties& type : columns_of(square_gltf(material, {image_of({{0, 0, 0, 255}})}))) {
     EXPECT_EQ(type.emission, 0.0F) << "a black texture";
   }
-  // sRGB 188 is half of the light.
+  // sRGB 188 is half the light of 255.
   for (const VoxelProperties& type : columns_of(square_gltf(material, {image_of({{188, 188, 188, 255}})}))) {
     EXPECT_NEAR(type.emission, 2.0F, 0.13F);
   }
@@ -155,7 +155,7 @@ TEST(GltfLook, RefusesOtherVersionsByTheirNumber) {
   EXPECT_NE(read.error().message.find("glTF 1.0 is not supported"), std::string::npos) << read.error().message;
 }
 
-/// A staircase of three types, with occlusion in its corners.
+/// Returns a staircase of three types, with occlusion in its corners.
 Scene scene_of_stairs() {
   Scene scene;
   SceneGrid grid;
@@ -195,7 +195,7 @@ TEST(GltfLook, TakesOcclusionOfQuoinsFilesForNoColour) {
   std::filesystem::remove_all(folder);
 }
 
-/// A tetrahedron with its corner at the origin and colours a corner, coded by Draco 1.5.
+/// A tetrahedron with a corner at the origin and a colour per corner, encoded by Draco 1.5.
 constexpr const char* kDracoTetrahedron =
     "RFJBQ08CAgEBAAAABAQBAwAAAS8BARD/AmZAAv8AAAAAAAEACQMAAAIBAgIEAAEBAQEBAAMDARABMAMAUIIkkQQAAAAA/wcAAAAAAAAAAAAAAAAA"
     "AAAAgD8LAQEBAAMDASABIAMA8IOvECIAAAAA/wAAAA==";

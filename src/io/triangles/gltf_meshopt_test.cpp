@@ -39,7 +39,8 @@ std::vector<std::byte> castle(bool quantize, bool compress) {
 
 using Triangle = std::array<std::array<double, 3>, 3>;
 
-/// Each from its least corner on, and in order: the codec turns triangles, and may change their order.
+/// Each triangle starts at its least corner, and triangles are sorted: the codec rotates triangles and may reorder
+/// them.
 std::vector<Triangle> triangles_of(const TriangleMesh& mesh) {
   std::vector<Triangle> all;
   for (const auto& corners : mesh.triangles) {
@@ -69,7 +70,7 @@ TEST(GltfMeshopt, ReadsCompressedMeshesLikeUncompressedMeshes) {
   }
 }
 
-// 64 views of one code that stands for a mebibyte.
+// 64 views of one encoded buffer that decodes to a mebibyte.
 TEST(GltfMeshopt, OneCodeIsNotDecodedAnyNumberOfTimes) {
   if (!reads_and_writes()) GTEST_SKIP() << "this build has no tinygltf or no meshoptimizer";
   const std::vector<std::byte> zeros(std::size_t{1} << 20);
@@ -94,7 +95,7 @@ TEST(GltfMeshopt, OneCodeIsNotDecodedAnyNumberOfTimes) {
   EXPECT_NE(loaded.error().message.find("all code can hold"), std::string::npos) << loaded.error().message;
 }
 
-/// The same file with other text of the same length in its JSON.
+/// Replaces text of the file's JSON by text of the same length.
 std::vector<std::byte> with(std::vector<std::byte> file, std::string_view old, std::string_view text) {
   const auto from = std::as_bytes(std::span(old));
   const auto found = std::search(file.begin(), file.end(), from.begin(), from.end());
@@ -119,11 +120,11 @@ TEST(GltfMeshopt, CodesThatLieAreRefusedWithTheirView) {
     EXPECT_EQ(loaded.error().code, ErrorCode::BadFormat) << text;
     EXPECT_NE(loaded.error().message.find("buffer view"), std::string::npos) << loaded.error().message;
   }
-  // No fallback unless it says so: the file's own buffer.
+  // Without a declared fallback the file's own buffer counts.
   const auto own = castle(true, false);
   const auto named = with(own, R"({"byteLength":)", R"({"bytelength":)");
   EXPECT_FALSE(read_mesh(named)) << "no length";
-  // Code that is cut, or other bytes: an error or other numbers, and nothing beyond.
+  // Truncated code and other bytes give an error or other numbers, with no access out of bounds.
   for (std::size_t at = file.size() - 200; at < file.size(); at += 7) {
     auto damaged = file;
     damaged[at] ^= std::byte{0xFF};

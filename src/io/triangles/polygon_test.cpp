@@ -24,7 +24,7 @@ DVec3 area_of(const std::vector<DVec3>& p, const std::array<std::uint32_t, 3>& t
   return 0.5 * glm::cross(p[t[1]] - p[t[0]], p[t[2]] - p[t[0]]);
 }
 
-/// The sum of the areas of all triangles, each positive: what overlaps makes it larger than the polygon's own.
+/// Returns the sum of the triangle areas, each positive: overlaps make it larger than the polygon's own area.
 double total_area(const std::vector<DVec3>& corners) {
   double sum = 0.0;
   for (const auto& triangle : cut(corners)) sum += glm::length(area_of(corners, triangle));

@@ -32,7 +32,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                           quoin::triangles::read_three_mf}) {
     check(read, bytes);
   }
-  // Readers based on libraries: they get only input of their format.
+  // Readers based on libraries receive only input of their own format.
   if (quoin::triangles::is_obj(bytes)) check(quoin::triangles::read_obj, bytes);
   if (quoin::triangles::is_gltf(bytes) || quoin::triangles::is_glb(bytes)) check(quoin::triangles::read_gltf, bytes);
   return 0;

@@ -56,7 +56,7 @@ bool reads(FileFormat format) {
   return format_info(format).readable;
 }
 
-/// A tetrahedron of volume 1/6, each in the words of its format.
+/// A tetrahedron of volume 1/6 in the syntax of each format.
 const std::string kObj =
     "# a tetrahedron\nv 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 1 1 1\n"
     "f 1 3 2\nf 1 2 4\nf 2 3 4\nf -2 -4 -1\n";
@@ -126,7 +126,7 @@ std::string data_uri(const std::string& bytes) {
   return "data:application/octet-stream;base64," + to_base64(bytes_of(bytes));
 }
 
-/// glTF whose buffer is `bytes`.
+/// Returns a glTF file whose buffer is `bytes`.
 std::string gltf(const std::string& bytes, const std::string& rest) {
   return R"({"asset":{"version":"2.0"},"buffers":[{"byteLength":)" + std::to_string(bytes.size()) + R"(,"uri":")" +
          data_uri(bytes) + "\"}]," + rest + "}";
@@ -221,7 +221,7 @@ TEST(GltfTriangles, has_the_transforms_of_nodes) {
   EXPECT_EQ(loaded.mesh.triangles.size(), 8U);
   EXPECT_EQ(loaded.mesh.bounds().min.x, 9.0);
   EXPECT_EQ(loaded.mesh.bounds().max.x, 12.0);
-  // Mirrored, and still turned outwards.
+  // The mirrored tetrahedron still faces outwards.
   EXPECT_NEAR(volume_of(loaded.mesh), 9.0 / 6.0, 1e-9);
 }
 
@@ -291,7 +291,7 @@ TEST(Triangles, inconsistent_files_are_refused_with_a_position) {
   std::string claims = stl_bytes().substr(0, 80);
   put(claims, std::uint32_t{0x7FFF'FFFF});
   claims += stl_bytes().substr(84);
-  // By its length it is none, so that only its reader says why.
+  // Its length matches no STL file, so only the reader reports the reason.
   triangles::Beside nothing;
   const auto refused = triangles::read_stl(bytes_of(claims), nothing);
   ASSERT_FALSE(refused);
@@ -315,7 +315,7 @@ TEST(Triangles, are_recognised_by_what_they_hold) {
   EXPECT_NE(detect_format(bytes_of("v is for victory\nand f for nothing\n")), FileFormat::Obj);
 }
 
-/// A folder that goes away.
+/// A temporary folder.
 struct Folder {
   fs::path path = fs::temp_directory_path() / "quoin_triangles_test";
   Folder() {
@@ -427,7 +427,7 @@ TEST(Triangles, real_files_have_their_counts) {
 
 TEST(MeshFiles, PolygonsOfManyCornersAreRead) {
   if (!reads(FileFormat::Obj)) GTEST_SKIP() << "without OBJ";
-  // A comb of 1,000 teeth: more corners than a byte counts, and not convex.
+  // A comb of 1,000 teeth: not convex, and more corners than a byte can count.
   std::string text;
   std::string face = "f";
   for (int i = 0; i < 1000; ++i) {
@@ -512,7 +512,7 @@ TEST(ThreeMfFiles, PlaceObjectsInMillimetresWithTheirColours) {
   const DBox box = mesh.bounds();
   EXPECT_EQ(box.min, DVec3(0, 0, 50));
   EXPECT_EQ(box.max, DVec3(100, 220, 70));
-  // Each of three tetrahedra is closed and turned outwards, the mirrored one too.
+  // All three tetrahedra are closed and face outwards, including the mirrored one.
   for (std::size_t part = 0; part < 3; ++part) {
     double volume = 0.0;
     for (std::size_t i = 4 * part; i < 4 * part + 4; ++i) {

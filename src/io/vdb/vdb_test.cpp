@@ -111,7 +111,7 @@ TEST(Vdb, FogIsSolidAboveAValue) {
   EXPECT_GT(content_of(load(kCorpus / "fog_half_zip.vdb"), "fog").field.solid_count(), 2'000);
 }
 
-/// A scene of a field, of voxels, and of the same field twice, once turned and mirrored.
+/// Returns a scene of a field, of voxels, and of the same field twice, once turned and mirrored.
 Scene some_scene() {
   Scene scene;
   const auto type = scene.types.add({.name = "stone", .colour = {90, 90, 90, 255}});
@@ -184,7 +184,7 @@ TEST(Vdb, ReportsLosses) {
   fs::remove(path);
 }
 
-/// Reads bytes that may be damaged; errors must have a place in them.
+/// Reads bytes that may be damaged; errors must state a position.
 void expect_sound(std::span<const std::byte> bytes, const std::string& what) {
   const auto read = is_nvdb(bytes) ? read_nvdb_file(bytes) : read_vdb_file(bytes);
   if (!read) {
@@ -208,7 +208,7 @@ TEST(Vdb, DamageIsAnErrorWithItsPlace) {
     }
     for (int i = 0; i < 60; ++i) {
       auto changed = *sound;
-      // Much of a file is zeros: the beginning and the end say most.
+      // Much of a file is zeros: its beginning and end have the most effect.
       const std::size_t at =
           i % 2 == 0 ? random() % 600 : changed.size() - 1 - random() % std::min<std::size_t>(changed.size(), 9'000);
       changed[at] = static_cast<std::byte>(random());
@@ -233,7 +233,7 @@ TEST(Vdb, FramesOfBloscThatAreDamagedAreErrors) {
   std::minstd_rand random(7);
   for (int i = 0; i < 20'000; ++i) {
     for (std::byte& byte : frame) byte = static_cast<std::byte>(random());
-    frame[2] = static_cast<std::byte>(random() & 0x31U);  // LZ4 or none that there is
+    frame[2] = static_cast<std::byte>(random() & 0x31U);  // LZ4, or an unknown method
     frame[3] = std::byte{4};
     frame[4] = std::byte{0};
     frame[5] = std::byte{8};
@@ -263,7 +263,7 @@ TEST(Vdb, RealFilesHoldWhatOpenVdbFindsInThem) {
       for (const std::uint64_t word : leaf.active) active += std::popcount(word);
     }
     EXPECT_EQ(active, count);
-    // Its values are 0, those of the background.
+    // All values equal the background, 0.
     const LoadedScene loaded = load(folder / "syoyo+tinyvdbio" / name);
     ASSERT_EQ(loaded.warnings.size(), 1U);
     EXPECT_NE(loaded.warnings[0].find("the same everywhere"), std::string::npos);

@@ -27,7 +27,7 @@ class VolumeData : public testing::Test {
   }
 };
 
-/// The numbers in "dims=(64, 33, 32)"; a list of eight begins with their count.
+/// Returns the numbers in "dims=(64, 33, 32)"; a list of eight begins with their count.
 std::vector<int> dims_in(const std::string& info) {
   std::smatch found;
   std::vector<int> dims;

@@ -46,7 +46,7 @@ Bytes small_nrrd(bool is_compressed) {
   return bytes;
 }
 
-/// A small file of every kind.
+/// Returns a small file of every kind.
 std::vector<Bytes> small_files() {
   const Bytes first = NiftiFile{.sform_code = 1, .srow = {1, 0, 0, 4, 0, 1, 0, 5, 0, 0, 1, 6}}.bytes(twelve());
   NiftiFile second{.is_second = true, .order = std::endian::big, .qform_code = 1};
@@ -159,7 +159,7 @@ TEST(VolumeHostile, BombsOfGzipAreErrors) {
   EXPECT_EQ(error_in(bomb, {.max_values = 1 << 20}).code, ErrorCode::LimitExceeded);
   file.dim = {3, 1, 1, 1};
   EXPECT_EQ(read_volume(gzipped(file.bytes(Bytes(std::size_t{1} << 26)))).value().values.size(), 1U);
-  // More than so few bytes can hold.
+  // More than this few bytes can hold.
   file.dim = {3, 1000, 1000, 1000};
   const Error lie = error_in(gzipped(file.bytes(twelve())));
   EXPECT_EQ(lie.code, ErrorCode::BadFormat);

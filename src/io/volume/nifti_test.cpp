@@ -22,7 +22,7 @@ Volume volume_of(const NiftiFile& file, const Bytes& values) {
   return volume.value_or(Volume{});
 }
 
-/// A volume of twelve bytes, whose values do not matter.
+/// Returns a volume of twelve bytes, whose values do not matter.
 Volume placed(const NiftiFile& file) {
   return volume_of(file, encode(kTwelve, ScalarType::UInt8));
 }
@@ -45,7 +45,7 @@ TEST(Nifti, EveryTypeInEveryOrderAndVersionIsRead) {
     const bool is_signed = name_of(scalar)[0] != 'u';
     if (is_signed) values[3] = -100;
     if (scalar == ScalarType::Float32 || scalar == ScalarType::Float64) values[4] = 0.5;
-    // Unlike in the other order, and at the end of its range.
+    // Differs from the same bytes in reverse order, and lies at the end of the range.
     if (scalar == ScalarType::UInt64) values[5] = 18446744073709549568.0;
     if (scalar == ScalarType::Int32) values[5] = -2147483648.0;
     for (const std::endian order : {std::endian::little, std::endian::big}) {
@@ -176,7 +176,7 @@ TEST(Nifti, FormsThatPlaceNothingAreLeftOutWithAWarning) {
   volume = placed(file);
   EXPECT_TRUE(warns(volume, "pixdim"));
   EXPECT_EQ(volume.spacing, DVec3(1));
-  // Found by changing single bytes: too small for its square.
+  // Found by changing single bytes: a number too small to square.
   NiftiFile second{.is_second = true};
   second.pixdim[1] = 1e-200;
   EXPECT_EQ(placed(second).spacing, DVec3(1));

@@ -25,7 +25,7 @@ Bytes file_of(const std::string& header, const Bytes& data) {
   return bytes;
 }
 
-/// Three times two times two bytes, with more lines in the header.
+/// Returns three times two times two bytes, with additional header lines.
 Bytes tiny(const std::string& lines, const Bytes& data = encode(kTwelve, ScalarType::UInt8)) {
   return file_of("NRRD0004\n# a comment\ntype: uint8\ndimension: 3\nsizes: 3 2 2\nencoding: raw\n" + lines + "\n",
                  data);
@@ -106,7 +106,7 @@ TEST(Nrrd, DirectionsAndOriginPlaceSamples) {
   EXPECT_EQ(position_of(volume, {0, 0, 1}), DVec3(10, 30, -16));
 }
 
-/// The same point of a body, said in each space, lies in the same place.
+/// A point of the body lies at the same position in every space.
 TEST(Nrrd, TheSameBodyInEverySpaceIsTheSame) {
   const auto origin = [](const std::string& space, const std::string& vector) {
     return position_of(volume_of(tiny("space: " + space + "\nspace origin: (" + vector + ")\n")), {0, 0, 0});

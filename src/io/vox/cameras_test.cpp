@@ -55,7 +55,7 @@ TEST(VoxCameras, WithoutAnglesTheFrontIsSeen) {
   EXPECT_NEAR(camera.vertical_fov_radians, 60 * kDegree, 1e-12);
 }
 
-// Turns in MagicaVoxel's own axes, one after the other, as matrices: first roll, then pitch, then yaw.
+// Turns in MagicaVoxel's axes, in this order, as matrices: roll, pitch, yaw.
 TEST(VoxCameras, AnyAnglesAreThoseTurns) {
   std::mt19937 random(42);
   std::uniform_real_distribution<double> degrees(-360.0, 360.0);

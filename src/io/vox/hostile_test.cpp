@@ -36,7 +36,7 @@ FileBuilder file_of_one_voxel() {
   return builder;
 }
 
-/// A small file that has every kind of chunk.
+/// Returns a small file with every kind of chunk.
 std::vector<std::byte> full_file() {
   FileBuilder builder;
   builder.with("PACK", [](auto& out) { out.u32(2); });
@@ -271,7 +271,7 @@ TEST(VoxHostile, ScatteredVoxelsCannotTakeMemoryWithoutBound) {
   EXPECT_LE(loaded ? vox_test::grid_bytes(loaded->scene) : 0, std::size_t{1} << 29);
 }
 
-// Real writers have counted headers among MAIN's children.
+// Real writers have counted headers as part of MAIN's children.
 TEST(VoxHostile, AMainThatClaimsAFewBytesTooManyIsReadWhenAllWithinIsSound) {
   for (const int more : {1, 8, 12, 20}) {
     std::vector<std::byte> bytes = file_of_one_voxel().file();
@@ -281,7 +281,7 @@ TEST(VoxHostile, AMainThatClaimsAFewBytesTooManyIsReadWhenAllWithinIsSound) {
     EXPECT_EQ(loaded->scene.voxel_count(), 1);
     EXPECT_EQ(loaded->warnings, std::vector<std::string>{"MAIN claims " + std::to_string(more) +
                                                          " bytes more than there are; all that are there were read"});
-    // The same, cut off.
+    // The same file, truncated.
     bytes.pop_back();
     if (more < 20) {
       EXPECT_EQ(text_of(bytes), "byte 44: chunk XYZI claims 8 bytes, but 7 are left");

@@ -12,7 +12,7 @@ struct RandomModel {
   IVec3 size{};
 };
 
-/// Some positions twice, some outside, some without a colour.
+/// Some positions occur twice, some lie outside, and some have no colour.
 RandomModel random_model(std::mt19937& random, IVec3 size, std::size_t count) {
   RandomModel model{{}, size};
   const auto coordinate = [&](int edge) {
@@ -25,7 +25,7 @@ RandomModel random_model(std::mt19937& random, IVec3 size, std::size_t count) {
   return model;
 }
 
-/// The obvious version: one voxel after the other.
+/// The simple version: one voxel after the other.
 Grid one_by_one(const RandomModel& model, const std::array<std::uint8_t, kColours>& type_of, ModelLosses& losses) {
   Grid grid;
   for (std::size_t i = 0; i < model.voxels.size(); i += 4) {

@@ -16,7 +16,7 @@ using vox_test::FileVoxel;
 
 using Matrix = std::array<std::array<double, 3>, 3>;
 
-/// Straight from the format's description: the two lowest pairs of bits are columns of rows 1 and 2, then three signs.
+/// Follows the format's description: the two lowest pairs of bits are columns of rows 1 and 2, followed by three signs.
 Matrix matrix_of(int byte) {
   Matrix m{};
   const int first = byte & 3;
@@ -72,7 +72,7 @@ Placed place_by_scene(const Scene& scene) {
   return placed;
 }
 
-/// A shape without any symmetry, all of whose voxels differ in colour.
+/// Returns a shape without symmetry whose voxels all differ in colour.
 std::vector<FileVoxel> asymmetric_voxels(IVec3 size) {
   std::vector<FileVoxel> voxels;
   std::uint8_t colour = 1;

@@ -42,7 +42,7 @@ void add_packed(FileBuilder& file, IVec3 size, std::span<const std::byte> stream
   });
 }
 
-/// A model both ways: a byte a voxel of the box, x fastest, then y, then z; and as XYZI has it.
+/// A model in both forms: one byte per voxel of the box, x fastest, then y, then z; and as in XYZI.
 struct RandomModel {
   IVec3 size{1};
   std::vector<std::byte> box;
@@ -126,10 +126,10 @@ TEST(PackedVoxels, RefusesDamageWithItsPosition) {
   EXPECT_NE(fault_of(both).find("chunk XYZI has no SIZE before it"), std::string::npos);
 }
 
-// A stream says 1,032 times its own length at most, and a model is no larger than 256 voxels a side.
+// A stream expands to at most 1,032 times its own length, and a model has at most 256 voxels per side.
 TEST(PackedVoxels, BombsStayWithinTheBoundsOfModels) {
   std::vector<std::byte> box(std::size_t{256} * 256 * 256);
-  // A voxel in every slab of every chunk: dear, and small in the file.
+  // A voxel in every slab of every chunk: expensive in memory, and small in the file.
   for (std::size_t i = 0; i < box.size(); i += 1'024) box[i] = std::byte{static_cast<unsigned char>(1 + i % 255)};
   const auto packed = deflated(box, End::Proper);
   FileBuilder file;

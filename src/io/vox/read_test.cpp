@@ -31,7 +31,7 @@ bool warns(const LoadedScene& loaded, std::string_view text) {
   return std::ranges::any_of(loaded.warnings, [&](const std::string& w) { return w.find(text) != std::string::npos; });
 }
 
-/// One 1x1x1 model of that colour, placed by `transform`.
+/// Returns one 1x1x1 model of this colour, placed by `transform`.
 FileBuilder one_voxel(std::uint8_t colour = 1) {
   FileBuilder builder;
   builder.model(1, 1, 1, {{0, 0, 0, colour}});
@@ -163,7 +163,7 @@ TEST(VoxRead, WithoutPaletteTheDefaultOneHolds) {
   EXPECT_EQ(types[255].colour, (Rgba8{17, 17, 17, 255}));
 }
 
-/// IMAP that shows colour index 79 first, 1 in its place, and all others where they are.
+/// Returns an IMAP that shows colour index 79 first and 1 in its place, and leaves all others.
 std::vector<std::byte> swapping_index_map() {
   std::vector<std::byte> map(256);
   for (std::size_t i = 0; i < 255; ++i) map[i] = static_cast<std::byte>(i + 1);

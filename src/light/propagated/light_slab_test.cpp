@@ -12,7 +12,7 @@
 namespace quoin::propagated {
 namespace {
 
-// Slabs of several kinds: one level, sky and rock, gradients along an axis, random levels.
+// Returns slabs of several kinds: one level, sky and rock, gradients along an axis, random levels.
 SlabPlanes random_planes(std::mt19937_64& random) {
   SlabPlanes planes;
   const unsigned kind = random() % 5;
@@ -87,7 +87,7 @@ TEST(LightSlabKernel, PacksAndReadsAlikeWithEveryInstructionSet) {
   std::mt19937_64 random(3);
   for (int step = 0; step < 300; ++step) {
     SlabPlanes planes = random_planes(random);
-    // Rows equal to the previous ones, halves of rows, and units after many missing ones.
+    // Covers rows equal to the previous ones, halves of rows, and units after many missing ones.
     for (std::size_t i = 0; i < planes.words.size(); ++i) {
       if (i % kSlabWords != 0 && random() % 4 < static_cast<unsigned>(step % 5)) planes.words[i] = planes.words[i - 1];
       if (random() % 8 == 0) planes.words[i] &= 0xFFFF'FFFFU;

@@ -1,5 +1,5 @@
-// light/propagated/*: sky and lamps of a 512x128x512 terrain of 128 chunks, with caves and a lamp in 2,000 voxels of
-// these, at first and after edits; the sky of the same terrain without caves.
+// light/propagated/*: sky and lamps of a 512x128x512 terrain of 128 chunks, with caves and a lamp in one of 2,000 cave
+// voxels, from scratch and after edits; also the sky of the same terrain without caves.
 
 #include <quoin/light/propagated_light.h>
 
@@ -25,7 +25,7 @@ struct World {
   VoxelRegistry types = workloads::three_types();
 };
 
-// `lamps`: in caves, of two colours.
+// `lamps`: adds lamps of two colours in the caves.
 World made_world(bool lamps) {
   World world;
   VoxelProperties lamp;
@@ -77,7 +77,7 @@ BENCHMARK(plain)->Name("light/propagated/plain")->Unit(benchmark::kMillisecond);
 BENCHMARK(sky)->Name("light/propagated/sky")->Unit(benchmark::kMillisecond);
 BENCHMARK(sky_and_lamps)->Name("light/propagated/sky_and_lamps")->Unit(benchmark::kMillisecond);
 
-// Voxels of caves, or of their walls where a lamp shines at them.
+// Returns positions in caves, or in their walls where a lamp shines at them.
 std::vector<IVec3> places_in_caves(const World& world, const PropagatedLight& light, bool in_walls) {
   constexpr std::size_t kPlaces = 64;
   std::vector<IVec3> places;
@@ -95,7 +95,7 @@ std::vector<IVec3> places_in_caves(const World& world, const PropagatedLight& li
   return places;
 }
 
-// Alternates between placing and removing, at one position after the other; each counts as an iteration.
+// Alternates between placing and removing, at one position after another; each counts as an iteration.
 void edits_in_caves(benchmark::State& state, bool in_walls, VoxelType type) {
   World world = made_world(true);
   PropagatedLight light;
@@ -118,7 +118,7 @@ BENCHMARK_CAPTURE(edits_in_caves, walls, true, kAir)
     ->Name("light/propagated/dug_in_caves")
     ->Unit(benchmark::kMicrosecond);
 
-// A lamp placed or removed in the middle of a chunk, until all chunks whose faces it lights are split again.
+// Places or removes a lamp in the middle of a chunk, until all chunks with lit faces are split again.
 void edit_to_mesh(benchmark::State& state) {
   World world = made_world(true);
   PropagatedLight light;
@@ -143,7 +143,7 @@ void edit_to_mesh(benchmark::State& state) {
 }
 BENCHMARK(edit_to_mesh)->Name("light/propagated/edit_to_mesh")->Unit(benchmark::kMicrosecond);
 
-// All chunks once.
+// Splits all chunks once.
 void split(benchmark::State& state) {
   const World world = made_world(true);
   PropagatedLight light;

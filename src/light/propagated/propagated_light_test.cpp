@@ -127,7 +127,7 @@ void expect_searched(const PropagatedLight& light, const Grid& grid, const Voxel
 void edit(Grid& grid, std::mt19937& random) {
   const auto below = [&](unsigned n) { return static_cast<int>(random() % n); };
   const IVec3 at{below(60) - 20, below(70) - 30, below(60) - 20};
-  const auto type = static_cast<VoxelType>(random() % 8);  // one of them is not registered
+  const auto type = static_cast<VoxelType>(random() % 8);  // one of the types is not registered
   switch (below(6)) {
     case 0:
       grid.fill_box({at, at + IVec3(1 + below(30), 1 + below(5), 1 + below(30))}, type);
@@ -179,7 +179,7 @@ TEST(PropagatedLight, IsThatOfASearchAfterAnyEdits) {
   }
 }
 
-// Single voxels for the most part, so that neither rock nor air prevails.
+// Mostly edits single voxels, so that neither rock nor air prevails.
 void edit_little(Grid& grid, std::mt19937& random) {
   const auto below = [&](unsigned n) { return static_cast<int>(random() % n); };
   const IVec3 at{below(70) - 30, below(60) - 40, below(70) - 30};
@@ -192,7 +192,7 @@ void edit_little(Grid& grid, std::mt19937& random) {
 }
 
 TEST(PropagatedLight, AMillionRandomEditsEqualASearch) {
-  // A million only at night, and only in fast builds: debug and sanitizer builds take ten times as long.
+  // A million edits only in nightly runs and in fast builds: debug and sanitizer builds take ten times as long.
 #if defined(NDEBUG) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   const bool is_night = std::getenv("QUOIN_NIGHTLY") != nullptr;
 #else
@@ -241,7 +241,7 @@ TEST(PropagatedLight, ShadowsFallAsFarAsThereIsSky) {
   }
 }
 
-// Small edits are solved whole: lamps, stones, glass and holes at corners of chunks, by ones and several an update, and
+// Small edits are solved as a whole: lamps, stones, glass and holes at corners of chunks, one or several per update,
 // with every kernel.
 TEST(PropagatedLight, AfterSmallEditsIsThatOfTheWorldBuiltAnew) {
   const VoxelRegistry types = light_types();
@@ -315,7 +315,7 @@ TEST(PropagatedLight, ASealedRoomIsDark) {
   Grid grid;
   grid.fill_box({{40, 40, 40}, {90, 90, 90}}, kStone);
   grid.fill_box({{41, 41, 41}, {89, 89, 89}}, kAir);
-  grid.set({39, 60, 60}, kLamp);  // outside, at the wall
+  grid.set({39, 60, 60}, kLamp);  // outside, next to the wall
   PropagatedLight light;
   light.update(grid, types);
   for (int z = 41; z < 89; ++z) {
@@ -339,7 +339,7 @@ TEST(PropagatedLight, ColouredGlassFiltersLampsAndNotTheSky) {
   EXPECT_EQ(light.at({7, 5, 5}).red, 0);
   EXPECT_EQ(light.at({7, 5, 5}).green, 0);
   EXPECT_EQ(light.at({7, 5, 5}).blue, lamp_levels(types[kLamp]).blue - 5);
-  grid.fill_box({{6, 6, 5}, {7, 20, 6}}, kBlueGlass);  // a shaft full of it
+  grid.fill_box({{6, 6, 5}, {7, 20, 6}}, kBlueGlass);  // a shaft filled with it
   light.update(grid, types);
   EXPECT_EQ(light.at({6, 5, 5}).sky, 15);
 }

@@ -27,7 +27,7 @@ Scene scene_of(LightWorld world, GridHandle& handle) {
   return scene;
 }
 
-// Digs, builds, and lights lamps, in voxels and in the field.
+// Digs, builds, and places lamps, in voxels and in the field.
 void edit(SceneGrid& grid, std::mt19937& random) {
   const IVec3 at = LightWorld::somewhere(random);
   switch (random() % 4) {

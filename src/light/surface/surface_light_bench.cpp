@@ -1,5 +1,5 @@
-// light/surface/*: light at the quads of a 512x128x512 terrain of 128 chunks, with caves and a lamp in 2,000 voxels of
-// these, and at the vertices of its smooth surface.
+// light/surface/*: light at the quads of a 512x128x512 terrain of 128 chunks, with caves and a lamp in one of 2,000
+// cave voxels, and at the vertices of its smooth surface.
 
 #include <quoin/light/surface_light.h>
 
@@ -21,7 +21,7 @@ struct World {
   Grid grid;
   VoxelRegistry types = workloads::three_types();
   PropagatedLight light;
-  std::vector<QuadBuffer> quads;  // of each chunk
+  std::vector<QuadBuffer> quads;  // by chunk
 };
 
 void add_lamps(World& world) {
@@ -56,7 +56,7 @@ const World& world_with_lamps() {
   return made;
 }
 
-// Without `merging`: levels of whole faces.
+// Without `merging`: light levels of whole faces.
 void split(benchmark::State& state, std::optional<LightMerging> merging) {
   const World& world = world_with_lamps();
   SurfaceLight surface(world.light, world.grid, world.types);

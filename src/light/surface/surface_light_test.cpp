@@ -97,7 +97,7 @@ std::array<double, 4> shown_by_quad(const FaceLight& corners, int width, int hei
   std::array<double, 4> shown{};
   for (std::size_t c = 0; c < 4; ++c) {
     const auto at = [&](std::size_t corner) { return static_cast<double>(corners[corner] >> 8 * c & 255U) / 12.0; };
-    // The triangles (0,1,2) and (0,2,3), each by its own slopes.
+    // The triangles (0,1,2) and (0,2,3), each with its own slopes.
     const double x = static_cast<double>(u) / width;
     const double y = static_cast<double>(v) / height;
     shown[c] =
@@ -128,7 +128,7 @@ TEST(SurfaceLight, SplitQuadsShowWhatSingleFacesDo) {
           const int width = lit[i].size_u();
           const int height = lit[i].size_v();
           if (merging == LightMerging::Constant) {
-            // It goes along edges of equal light only.
+            // Faces merge only along edges of equal light.
             ASSERT_TRUE(width == 1 || corners[i][0] == corners[i][1]);
             ASSERT_TRUE(height == 1 || corners[i][0] == corners[i][3]);
           }
@@ -223,7 +223,7 @@ TEST(SurfaceLight, VerticesAreTheSameFromAnyChunk) {
   SurfaceLight surface(world.light, world.grid, world.types);
   SmoothMesher mesher;
   SmoothChunkMesh mesh;
-  std::map<std::array<std::int64_t, 6>, MeanLevels> known;  // by place and normal
+  std::map<std::array<std::int64_t, 6>, MeanLevels> known;  // by position and normal
   std::vector<MeanLevels> levels;
   std::size_t shared = 0;
   for (const IVec3 chunk : field->chunks()) {
@@ -278,7 +278,7 @@ TEST(SurfaceLight, AClosedRoomIsBlackWhateverShinesOutside) {
     surface.read({mesh->positions, mesh->normals}, levels);
     int dark = 0;
     for (std::size_t i = 0; i < levels.size(); ++i) {
-      // The room's own vertices: the air before them is the room's.
+      // The room's own vertices: the air in front of them is in the room.
       const IVec3 before(glm::round(DVec3(mesh->positions[i]) + 0.5 * DVec3(mesh->normals[i])));
       if (inside.count({before.x, before.y, before.z}) == 0) continue;
       ASSERT_EQ(levels[i], MeanLevels{}) << i;

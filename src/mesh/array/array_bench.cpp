@@ -1,5 +1,5 @@
-// array/*: surfaces straight from dense arrays of 256^3, on one thread and on all. The sphere is of floats, with a
-// radius of 100; the labels are the nearest of 50 seeds within a ball, as bytes and as words of 32 bits.
+// array/*: surfaces directly from dense arrays of 256^3, on one thread and on all. The sphere has float samples and a
+// radius of 100; the labels are the nearest of 50 seeds within a ball, as 8-bit and 32-bit integers.
 
 #include <quoin/mesh/array_surface.h>
 #include <quoin/mesh/label_surfaces.h>

@@ -1,4 +1,4 @@
-// Memory that the surfaces of arrays take in addition to their input and output, measured by the C library at every
+// Measures the memory that array surfaces take in addition to their input and output, through the C library at every
 // progress step.
 
 #include <quoin/mesh/array_surface.h>
@@ -55,7 +55,7 @@ std::size_t most_bytes(Make make) {
 
 TEST(ArrayMemory, IsAtMostAByteASampleBesideInputAndOutput) {
   if (!can_count()) GTEST_SKIP() << "the C library does not tell how much memory is in use";
-  // Noise has the most to do.
+  // Noise needs the most memory.
   for (const Size size : {Size{64, 64, 64}, Size{100, 64, 256}, Size{64, 256, 40}}) {
     const auto samples = static_cast<std::size_t>(size[0] * size[1] * size[2]);
     const TestArray<float> field = noise(size, 41);
@@ -76,7 +76,7 @@ TEST(ArrayMemory, LabelsTakeAtMostAByteASamplePlusInputAndOutput) {
   if (!can_count()) GTEST_SKIP() << "the C library does not tell how much memory is in use";
   const Size size = {128, 64, 256};
   const auto samples = static_cast<std::size_t>(size[0] * size[1] * size[2]);
-  // Slabs of several labels, as tissues are; a vertex a few samples.
+  // Slabs of several labels, similar to tissues; one vertex per few samples.
   const TestArray<std::uint8_t> labels(size, [](DVec3 p) {
     return static_cast<std::uint8_t>(static_cast<int>(p.y / 9 + p.x / 11) % 7 + 2 * (static_cast<int>(p.z) / 16 % 3));
   });

@@ -123,7 +123,7 @@ TEST(ArraySurface, TurnsWithTheSide) {
   expect_same(surface_of(samples.view(), kBelow), surface_of(negated.view()));
 }
 
-// Noise has every configuration, and cells with several sheets.
+// Noise has every configuration, including cells with several sheets.
 class ArrayNoise : public testing::TestWithParam<Size> {};
 
 TEST_P(ArrayNoise, IsClosedWhateverTheSize) {
@@ -142,7 +142,7 @@ TEST_P(ArrayNoise, HasVerticesAtTheMeanOfTheCrossings) {
   const ArraySurface surface = surface_of(samples.view());
   const std::vector<DVec3> expected = naive_vertices(samples, 0.0);
   ASSERT_EQ(surface.positions.size(), expected.size());
-  // Both in the order of the memory, unless rows are short or axes have one sample.
+  // Both are in memory order, unless rows are short or axes have one sample.
   if (GetParam()[2] < 40 || GetParam()[1] == 1) return;
   for (std::size_t i = 0; i < expected.size(); ++i) {
     ASSERT_NEAR(glm::length(DVec3(surface.positions[i]) - expected[i]), 0.0, 3e-5) << i;
@@ -245,7 +245,7 @@ using SampleTypes = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std
                                    std::uint64_t, std::int64_t, float, double>;
 TYPED_TEST_SUITE(ArrayTypes, SampleTypes);
 
-// Whole numbers from 0 to 100 are the same in all.
+// Integers from 0 to 100 are exact in all types.
 TYPED_TEST(ArrayTypes, AllMakeTheSameSurface) {
   const TestArray<float> samples = noise({20, 21, 66}, 5);
   const auto whole = [&](DVec3 p) { return std::floor(50.0F + 50.0F * samples.at(IVec3(p))); };
@@ -409,7 +409,7 @@ TEST(ArraySurface, OneSampleIsClosed) {
   EXPECT_GT(enclosed_volume(surface.positions, surface.indices), 0.0);
 }
 
-// Halves, and a band of 8: positions agree within the precision of both.
+// Halves and a band of 8: positions agree within the precision of both.
 TEST(ArraySurface, IsThatOfTheFieldOfTheSameVolume) {
   Volume volume;
   volume.size = {70, 60, 50};
@@ -433,7 +433,7 @@ TEST(ArraySurface, IsThatOfTheFieldOfTheSameVolume) {
     ASSERT_GT(mesh.positions.size(), 1'000U);
     ASSERT_EQ(surface.positions.size(), mesh.positions.size());
     ASSERT_EQ(surface.indices.size(), mesh.indices.size());
-    // By cell; a vertex on a cell's face may belong to either cell.
+    // Compares by cell; a vertex on a cell's face may belong to either cell.
     std::map<std::array<int, 3>, std::vector<Vec3>> theirs;
     const auto cell_of = [](Vec3 p, IVec3 step) {
       const IVec3 cell = IVec3(glm::floor(p)) + step;

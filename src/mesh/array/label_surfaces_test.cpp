@@ -39,14 +39,14 @@ void expect_same(const LabelSurfaces& a, const LabelSurfaces& b) {
   }
 }
 
-// Every sample at random.
+// Returns random samples.
 template <class T>
 TestArray<T> scattered(Size size, unsigned seed, unsigned kinds = 5) {
   std::mt19937 random(seed);
   return {size, [&](DVec3) { return static_cast<T>(random() % kinds); }};
 }
 
-// The nearest of some seeds within a ball, else 0.
+// Labels each sample by the nearest of some seeds within a ball, otherwise 0.
 TestArray<std::uint8_t> cells_in_a_ball(int n, unsigned seed, int kinds) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> place(0.0, n);
@@ -60,10 +60,10 @@ TestArray<std::uint8_t> cells_in_a_ball(int n, unsigned seed, int kinds) {
           }};
 }
 
-// A face as the samples behind and before it.
+// A face, given by the samples behind and in front of it.
 using Face = std::array<int, 6>;
 
-// All faces of an array, with the two labels.
+// Returns all faces of an array, with both labels.
 template <class T>
 std::map<Face, std::pair<std::int64_t, std::int64_t>> naive_faces(const TestArray<T>& labels, std::int64_t background) {
   const auto label = [&](IVec3 p) { return labels.has(p) ? static_cast<std::int64_t>(labels.at(p)) : background; };
@@ -88,7 +88,7 @@ std::map<Face, std::pair<std::int64_t, std::int64_t>> naive_faces(const TestArra
   return faces;
 }
 
-// The face that a quad is around, by the cells of its four vertices: these are strictly within them.
+// Returns the face inside a quad, from the cells of its four vertices, which lie strictly within their cells.
 Face face_of(const LabelSurfaces& surfaces, std::size_t first_index) {
   IVec3 least(1 << 20);
   IVec3 most(-(1 << 20));
@@ -147,7 +147,7 @@ TEST_P(LabelNoise, HasAClosedSurfaceForEachLabel) {
       volume += enclosed_volume(surface.positions, surface.indices);
       for (const Vec3& normal : surface.normals) ASSERT_NEAR(glm::length(normal), 1.0F, 1e-5F);
     }
-    // All labels together fill the space that the background leaves.
+    // All labels together fill all space outside the background.
     EXPECT_NEAR(volume, -enclosed_volume(surfaces.positions, indices_of_label(surfaces, 0)), 1e-3);
   }
 }
@@ -172,7 +172,7 @@ INSTANTIATE_TEST_SUITE_P(Sizes, LabelNoise,
 TEST(LabelSurfaces, NeighboursShareTheirInterface) {
   const auto labels = cells_in_a_ball(48, 31, 12);
   const LabelSurfaces surfaces = surfaces_of(labels.view());
-  // Triangles from their least vertex on.
+  // Each triangle starts at its least vertex.
   const auto triangles = [&](std::int64_t label, bool is_turned) {
     std::set<std::array<std::uint32_t, 3>> all;
     const Buffer<std::uint32_t> indices = indices_of_label(surfaces, label);

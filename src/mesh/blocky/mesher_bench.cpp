@@ -32,7 +32,7 @@ constexpr struct {
   InstructionSet set;
 } kLesserSets[] = {{"avx2/", InstructionSet::Avx2}, {"plain/", InstructionSet::Plain}};
 
-// W1's terrain over 4x2x4 whole chunks, its surface crossing the lower ones' tops.
+// W1's terrain over 4x2x4 whole chunks; its surface crosses the tops of the lower chunks.
 Grid terrain_of_chunks() {
   std::vector<double> heights;
   for (int z = 0; z < 256; ++z) {
@@ -45,7 +45,7 @@ Grid terrain_of_chunks() {
   return grid;
 }
 
-// Chunks among their neighbours; a time is of one chunk.
+// Meshes chunks with their neighbours; a time is per chunk.
 void mesh_world(benchmark::State& state, bool occlusion, InstructionSet instructions) {
   const Grid grid = terrain_of_chunks();
   const VoxelRegistry types = workloads::three_types();
@@ -107,7 +107,7 @@ void mesh(benchmark::State& state, Blocky which, int chunk_count, bool occlusion
   state.counters["faces"] = static_cast<double>(faces);
 }
 
-// All workloads with the widest instructions; the lesser ones where the specification speaks of them.
+// Selects all workloads for the widest instructions, and for the others those that the specification lists.
 bool is_wanted(const Case& c, int count, bool is_widest) {
   return is_widest || (count > 1 && (c.which == Blocky::W1 || c.which == Blocky::W2));
 }

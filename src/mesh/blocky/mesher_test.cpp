@@ -102,8 +102,8 @@ TEST(BlockyMesher, CheckerboardOfTwoTypesTopHas1024) {
 TEST(BlockyMesher, FloorSplitsAlongAWallsFoot) {
   Chunk chunk = box_chunk({{0, 0, 0}, {16, 1, 16}});
   chunk.fill_box({{0, 1, 8}, {16, 4, 9}}, 1, [](int, int, std::uint64_t) {});
-  // On either side: the floor away from the wall, the row at its foot, and that row's two ends, where the wall's end
-  // leaves one corner lighter. And the wall's own top.
+  // On either side: the floor away from the wall, the row at its foot, and the two ends of that row, where the end of
+  // the wall leaves one corner lighter. In addition the top of the wall.
   EXPECT_EQ(quad_count(chunk, Direction::PosY), 4 + 4 + 1);
   EXPECT_EQ(quad_count(chunk, Direction::PosY, false), 3);
 }
@@ -149,7 +149,7 @@ struct World {
   double density;
 };
 
-// Names the test; gtest would print the bytes, padding among them.
+// Prints a name for the test; gtest would print the bytes, including padding.
 void PrintTo(const World& world, std::ostream* out) {
   *out << "seed " << world.seed << ", " << world.types << " types, density " << world.density;
 }
@@ -184,7 +184,7 @@ TEST_P(RandomWorld, MergedQuadsCoverEachVisibleFaceOnceWithItsTypeAndOcclusion) 
 
 TEST_P(RandomWorld, ChunkedGivesTheFacesOfTheWorldInOnePiece) {
   const VoxelRegistry types = oracle::mixed_types();
-  const IVec3 shift{30, 30, 30};  // all of it in one chunk
+  const IVec3 shift{30, 30, 30};  // the whole world in one chunk
   const FaceSet cut = faces_of_quads(world(), types, {});
   const Grid whole_grid = world(shift);
   ASSERT_EQ(whole_grid.chunk_count(), 1U);
@@ -254,7 +254,7 @@ TEST_P(BlockySets, GiveTheBytesOfThePlainKernel) {
 INSTANTIATE_TEST_SUITE_P(InstructionSets, BlockySets,
                          testing::Values(InstructionSet::Avx2, InstructionSet::Avx512Bytes), name_of_set);
 
-// Wide palettes take other paths to the same masks.
+// Wide palettes reach the same masks by other code paths.
 class ManyTypes : public testing::TestWithParam<int> {};
 
 TEST_P(ManyTypes, MeshLikeAnyOther) {

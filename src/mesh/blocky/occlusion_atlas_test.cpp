@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t kOpaque = static_cast<std::size_t>(SurfaceClass::Opaque);
 
-/// A grid's opaque faces with and without occlusion, and the atlas of them.
+/// A grid's opaque faces with and without occlusion, and their atlas.
 struct Baked {
   BlockyTriangles split;
   BlockyTriangles merged;
@@ -55,7 +55,7 @@ std::array<double, 3> filtered(const Image& image, double u, double v) {
     const double column = std::floor(x) + (i & 1);
     const double row = std::floor(y) + (i >> 1);
     const double share = (1.0 - std::abs(x - column)) * (1.0 - std::abs(y - row));
-    if (share < 1e-4) continue;  // only rounding
+    if (share < 1e-4) continue;  // rounding only
     EXPECT_TRUE(column >= 0 && row >= 0 && column < image.width && row < image.height);
     const auto at =
         3 * (static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(column));
@@ -66,7 +66,7 @@ std::array<double, 3> filtered(const Image& image, double u, double v) {
 
 using Corner = std::tuple<int, int, int, int>;  // position, and direction of the face
 
-/// Calls `visit(voxel's corner, its level, its type)` for every corner of every voxel's face.
+/// Calls `visit(voxel corner, occlusion level, type)` for every corner of every voxel face.
 template <class Visit>
 void for_corners(const BlockyTriangles& mesh, Visit visit) {
   for (std::size_t at = 0; at < mesh.positions.size(); at += 4) {
@@ -86,7 +86,7 @@ void for_corners(const BlockyTriangles& mesh, Visit visit) {
   }
 }
 
-/// The occlusion at corners as the split faces have it; equal wherever two faces meet.
+/// Returns the corner occlusion of the split faces, which is equal wherever two faces meet.
 std::map<Corner, double> levels_of(const BlockyTriangles& split) {
   std::map<Corner, double> levels;
   for_corners(split, [&](std::size_t at, double u, double v, const Corner& corner) {

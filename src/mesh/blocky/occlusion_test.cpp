@@ -175,7 +175,7 @@ TEST(FaceOcclusion, TheTablesVoxelsTouchTheCornerFromTheFront) {
   for (const Direction d : kDirections) {
     const FaceFrame& frame = frame_of(d);
     for (std::size_t i = 0; i < 4; ++i) {
-      // Twice the corner's place, relative to the voxel's centre: whole numbers.
+      // Twice the corner's position, relative to the voxel's centre: integers.
       IVec3 corner = normal_of(d);
       corner[frame.u] = i == 1 || i == 2 ? 1 : -1;
       corner[frame.v] = i >= 2 ? 1 : -1;

@@ -33,7 +33,7 @@ FaceSet faces_of(const QuadBuffer& quads, IVec3 chunk) {
   return faces;
 }
 
-/// Types 1 to `count`; every seventh is transparent where `transparent`.
+/// Types 1 to `count`; every seventh type is transparent if `transparent`.
 VoxelRegistry many_types(int count, bool transparent) {
   VoxelRegistry types;
   for (int i = 1; i <= count; ++i) {
@@ -61,7 +61,7 @@ TEST(MesherReuse, CulledAfterGreedyMergesNothing) {
 
 class NeighbourOffset : public testing::TestWithParam<int> {};
 
-// A chunk with a single neighbour, for each of the 26 places of it: its voxels must hide and darken.
+// A chunk with a single neighbour at each of the 26 offsets: the neighbour's voxels must hide and darken faces.
 TEST_P(NeighbourOffset, AloneHidesAndDarkens) {
   const int i = GetParam();
   const IVec3 offset = Neighbourhood::offset(i);
@@ -92,7 +92,7 @@ struct LitWorld {
   FaceSet unlit;
 };
 
-/// Worlds whose chunks have 1 to 16 bits a voxel, with and without transparent types, spanning 27 chunks.
+/// Returns worlds whose chunks have 1 to 16 bits per voxel, with and without transparent types, spanning 27 chunks.
 std::vector<LitWorld> worlds_of_all_widths() {
   std::vector<LitWorld> worlds;
   for (const bool transparent : {false, true}) {
@@ -101,7 +101,7 @@ std::vector<LitWorld> worlds_of_all_widths() {
       world.types = many_types(types, transparent);
       const auto seed = static_cast<unsigned>(types * 2 + transparent);
       world.grid = oracle::random_world(seed, {IVec3{-5}, IVec3{69}}, types, 0.01);
-      // A solid floor, of several types, with a hole: the mesher leaves such layers out.
+      // A solid floor of several types with a hole: the mesher skips such layers.
       world.grid.edit({IVec3{-5}, {69, 20, 69}}, [&](IVec3 v, VoxelType) {
         const auto type = static_cast<VoxelType>(1 + (v.x / 4 + v.z / 8 + 40) % std::min(types, 8));
         return v == IVec3{30, 9, 63} || world.types.is_transparent(type) ? kAir : type;

@@ -54,7 +54,7 @@ Soundness soundness_of(const BlockyTriangles& mesh) {
     triangles.push_back(triangle);
   }
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> uses;
-  // Around each vertex, from each neighbour to the next.
+  // Walks around each vertex, from each neighbour to the next.
   std::map<std::uint32_t, std::map<std::uint32_t, std::uint32_t>> next;
   for (const auto& t : triangles) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -116,7 +116,7 @@ TEST(ClosedSurface, is_parted_where_voxels_touch_by_an_edge_or_a_corner) {
   corner.set({0, 0, 0}, 1);
   corner.set({1, 1, 1}, 1);
   expect_sound(corner, 0.1);
-  // The edge of two voxels that are joined above and below it: no way of giving corners to sides parts it.
+  // The edge of two voxels that are joined above and below it: no assignment of corners to sides separates it.
   Grid joined;
   joined.fill_box({IVec3(0), IVec3(2, 2, 3)}, 1);
   joined.set({1, 0, 1}, kAir);
@@ -127,7 +127,7 @@ TEST(ClosedSurface, is_parted_where_voxels_touch_by_an_edge_or_a_corner) {
 TEST(ClosedSurface, is_manifold_whatever_eight_voxels_there_are) {
   for (unsigned solid = 1; solid < 256; ++solid) {
     Grid grid;
-    // And as hollows in a block.
+    // The same as hollows in a block.
     Grid block;
     block.fill_box({IVec3(-1), IVec3(3)}, 1);
     for (int cell = 0; cell < 8; ++cell) {
@@ -164,7 +164,7 @@ TEST(ClosedSurface, moves_only_what_touches) {
   for (unsigned solid : {0b1U, 0b11U, 0b1111U, 0b111U, 0b10111U, 0b11111110U}) {
     for (const Vec3& offset : offsets[solid]) EXPECT_EQ(offset, Vec3(0.0F)) << solid;
   }
-  // Two voxels by a corner: each vertex a hundredth into its own.
+  // Two voxels that touch at a corner: each vertex moves a hundredth into its own voxel.
   const Vec3 into = offsets[0b10000001][print::corner_face(0, 0)];
   EXPECT_NEAR(glm::length(into), kApart, 1e-6F);
   EXPECT_LT(into.x, 0.0F);

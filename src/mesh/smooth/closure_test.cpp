@@ -1,4 +1,4 @@
-// The mesh of a field is a closed surface, wherever the chunks' borders lie.
+// The mesh of a field is a closed surface at any position of the chunk borders.
 
 #include <cmath>
 #include <limits>
@@ -18,7 +18,7 @@ using oracle::grid_of;
 using oracle::mesh_of;
 using oracle::SurfaceCount;
 
-// In a chunk, over a face, an edge and a corner of chunks, far away and on the negative side.
+// In a chunk, across a face, an edge and a corner of chunks, far away, and on the negative side.
 const std::vector<DVec3> kPlaces = {{31.3, 30.2, 33.1}, {64.0, 31.4, 30.0},        {0.3, -0.2, 32.5},
                                     {63.5, 63.9, 64.2}, {-64.1, -128.3, -0.4},     {0.0, 0.0, 0.0},
                                     {20.0, 62.9, -1.0}, {1000.2, -3000.6, 500.11}, {32.0, 63.0, 63.0}};
@@ -81,7 +81,7 @@ TEST(SmoothClosure, RandomBlobsAreClosedOverBordersAtAnyScale) {
   }
 }
 
-// The edges of solid blocks on a chunk's outermost samples start or end in chunks that do not exist.
+// Edges of solid blocks on a chunk's outermost samples start or end in chunks that do not exist.
 TEST(SmoothClosure, ASurfaceThatEndsInChunksThatDoNotExistIsClosed) {
   DensityGrid grid;
   grid.edit({IVec3{0}, IVec3{64}}, [](IVec3, DensitySample) { return DensitySample{-3.0F, 1}; });

@@ -72,7 +72,7 @@ void run(benchmark::State& state, const Case& what) {
   }
 }
 
-// The occlusion of a mesh's vertices, as the mesher computes it while meshing.
+// Computes the occlusion of a mesh's vertices separately; the mesher does so while meshing.
 void places(benchmark::State& state) {
   const DensityChunk chunk = workloads::density_chunk(workloads::smooth_field(Smooth::S1, 0, 0));
   DensityGrid field;
@@ -103,10 +103,10 @@ void places(benchmark::State& state) {
   if (found != expected) std::exit(1);
   state.counters["places"] = static_cast<double>(found.size());
 }
-// The samples of one chunk; of a field in one call; of a field in one call each.
+// The samples of one chunk; of a field in one call; of a field with one call each.
 BENCHMARK(places)->Name("smooth/places")->ArgName("how")->DenseRange(0, 2)->Unit(benchmark::kMicrosecond);
 
-// A whole generated world, welded, with occlusion and materials.
+// Meshes a whole generated world, welded, with occlusion and materials.
 void world(benchmark::State& state) {
   VoxelRegistry types;
   const auto materials = add_terrain_types(types);

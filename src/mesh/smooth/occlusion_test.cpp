@@ -25,7 +25,7 @@ float when_open(SmoothOcclusion form) {
   return form == SmoothOcclusion::WeightedPublished ? 0.4F * 0.4F : 0.0F;
 }
 
-/// A field within reach of the middle chunk's vertices; the rest is not computed.
+/// Returns a field within reach of the middle chunk's vertices; the rest is not computed.
 World world_of(const std::function<double(IVec3)>& field) {
   const int reach = reach_of(SmoothOcclusionOptions{});
   return World([&](IVec3 p) {
@@ -77,7 +77,7 @@ TEST(SmoothOcclusion, AConvexSurfaceIsFullyOpen) {
   }
 }
 
-/// A valley along z whose two slopes rise at `degrees` from the horizontal.
+/// Returns the occlusion in a valley along z whose two slopes rise at `degrees` from the horizontal.
 double occlusion_in_valley(double degrees, SmoothOcclusion form) {
   const double angle = glm::radians(degrees);
   const DVec3 left(std::sin(angle), std::cos(angle), 0);
@@ -157,7 +157,7 @@ std::vector<Symmetry> symmetries() {
   return all;
 }
 
-// A field that is as much larger as its cells are; air between its lattice points.
+// Returns a field whose features grow with its cells; air between its lattice points.
 World enlarged(const World& small, int level) {
   const DensityNeighbourhood chunks = small.around();
   const int size = 1 << level;
@@ -184,7 +184,7 @@ TEST(SmoothOcclusion, IsTheSameOfAFieldThatGrowsWithItsCellsAndSpread) {
         ASSERT_GT(coarse.cells.size(), 40U);
         EXPECT_GT(*std::max_element(coarse.occlusion.begin(), coarse.occlusion.end()), 0.0F);
         for (std::size_t i = 0; i < coarse.cells.size(); ++i) {
-          if (coarse.cells[i].chunk_offset() != IVec3(0)) continue;  // called by other names in the small field
+          if (coarse.cells[i].chunk_offset() != IVec3(0)) continue;  // these have other names in the small field
           ASSERT_EQ(coarse.occlusion[i], expected.at(coarse.cells[i].bits))
               << "level " << level << " spread " << spread;
         }
@@ -193,7 +193,7 @@ TEST(SmoothOcclusion, IsTheSameOfAFieldThatGrowsWithItsCellsAndSpread) {
   }
 }
 
-// Hills and caves within reach of level-2 meshes.
+// Returns hills and caves within reach of level-2 meshes.
 World rugged() {
   return World([](IVec3 p) {
     const DVec3 at(p);
@@ -225,7 +225,7 @@ TEST(SmoothOcclusion, IsAboutTheSameAtEveryLevel) {
   }
 }
 
-// The soft share follows the plain one, but takes values between the 28 that a count has.
+// The soft share follows the plain one, but also has values between the 28 values of a count.
 TEST(SmoothOcclusion, TheSoftShareHasNoSteps) {
   const World world = rugged();
   const SmoothChunkMesh soft = mesh_of(world, SmoothOcclusion::SoftShare);
@@ -264,7 +264,7 @@ TEST(SmoothOcclusion, TurnsAndMirrorsWithTheField) {
   ASSERT_EQ(all.size(), 48U);
   for (const SmoothOcclusion form :
        {SmoothOcclusion::SolidShare, SmoothOcclusion::Weighted, SmoothOcclusion::SoftShare}) {
-    // The sum is held to all 48, the count, which shares all but its last step, to every fifth.
+    // The sum is compared with all 48; the count, which shares all but its last step, with every fifth.
     const std::size_t step = form == SmoothOcclusion::SolidShare ? 5 : 1;
     const auto expected = occlusion_by_cell(all[0], form);
     int shared = 0;
@@ -341,7 +341,7 @@ TEST(SmoothOcclusion, AnEditBeyondTheReachChangesNothing) {
     mesher.mesh(grid.neighbourhood(IVec3(0)), options, after);
     ASSERT_EQ(before.occlusion.size(), after.occlusion.size());
     EXPECT_EQ(std::memcmp(before.occlusion.data(), after.occlusion.data(), 4 * before.occlusion.size()), 0);
-    // A change one sample nearer has an effect: the reach is not wider than the corner case requires.
+    // A change one sample nearer has an effect: the reach is no wider than the corner case requires.
     grid.edit({{-64, -64, -reach}, {128, 128, 0}}, [](IVec3, DensitySample) { return DensitySample{-8.0F, 1}; });
     mesher.mesh(grid.neighbourhood(IVec3(0)), options, after);
     const bool is_same = before.occlusion.size() == after.occlusion.size() &&

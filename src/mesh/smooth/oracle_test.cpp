@@ -1,4 +1,4 @@
-// Every kernel returns the bytes of the slow, obvious mesher.
+// Every kernel returns the same bytes as the slow reference mesher.
 
 #include <array>
 #include <cstring>
@@ -34,7 +34,7 @@ void expect_same_mesh(const SmoothChunkMesh& a, const SmoothChunkMesh& b) {
 
 class SmoothKernels : public testing::TestWithParam<unsigned> {
  protected:
-  // A field that fills the chunk and reaches into all of its neighbours.
+  // Returns a field that fills the chunk and reaches into all of its neighbours.
   DensityGrid grid() const {
     const IBox box{IVec3{-12}, IVec3{64 + 13}};
     switch (GetParam() % 3) {
@@ -47,7 +47,7 @@ class SmoothKernels : public testing::TestWithParam<unsigned> {
     }
   }
 
-  // The mesh of every kernel is the oracle's.
+  // Compares the mesh of every kernel with the oracle's mesh.
   void check(const DensityNeighbourhood& chunks, const SmoothOptions& options) {
     oracle::smooth_mesh(chunks, options, expected_);
     ASSERT_GT(expected_.indices.size(), 0U);
@@ -89,7 +89,7 @@ TEST_P(SmoothKernels, GiveTheOraclesBytes) {
   }
 }
 
-// Few active cells are occluded by lists, many otherwise; spreads of 1 and 2 take other ways than the rest.
+// Few active cells take occlusion from lists, many take it otherwise; spreads of 1 and 2 have separate code.
 TEST_P(SmoothKernels, GiveTheOraclesOcclusionInEveryFormWithAnySpread) {
   const DensityGrid field = grid();
   const DensityNeighbourhood chunks = field.neighbourhood(IVec3{0});

@@ -26,7 +26,7 @@ using smooth::kNoFace;
 using smooth::Sheets;
 using smooth::sheets_of;
 
-// The four edges of a face, by their numbers in Sheets, in the order in which one walks around it.
+// Returns the four edges of a face, by their numbers in Sheets, in circular order.
 std::array<std::size_t, 4> edges_around(int face) {
   const auto axis = static_cast<std::size_t>(face / 2);
   const std::size_t u = (axis + 1) % 3;
@@ -75,7 +75,7 @@ TEST(SmoothSheets, AreAsManyAsTheSolidPartsOrTheAirPartsOfSimpleCells) {
   EXPECT_EQ(sheets_of(0xF6).count, 1) << "their complement: one piece of solid around a bridge of air";
 }
 
-// The proof in docs/decisions/archive/021-two-sheets.md leans on this.
+// The proof in docs/decisions/archive/021-two-sheets.md depends on this.
 TEST(SmoothSheets, AtMostOneFaceHasAllItsCrossingsInOneSheet) {
   int cells_with_one = 0;
   for (std::uint32_t solid = 0; solid < 256; ++solid) {

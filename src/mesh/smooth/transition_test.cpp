@@ -22,7 +22,7 @@ using oracle::grid_of;
 using oracle::mesh_of;
 using oracle::SurfaceCount;
 
-// A level for every chunk, from a seed.
+// Returns a random level for every chunk.
 std::function<int(IVec3)> random_levels(unsigned seed) {
   return [=](IVec3 chunk) { return static_cast<int>(oracle::hash_of(seed, chunk) % 4); };
 }
@@ -35,7 +35,7 @@ SmoothMeshOptions options_with(const std::function<int(IVec3)>& level_of, bool s
   return options;
 }
 
-// A box over faces, edges and two corners of chunks.
+// A box across faces, edges and two corners of chunks.
 constexpr IBox box_over_borders() {
   return {{64 - 22, -10, 64 - 21}, {64 + 23, 64 + 14, 64 + 19}};
 }
@@ -154,7 +154,7 @@ TEST(SmoothBorders, ChunksGiveTheirCommonVerticesTheSameBits) {
   }
 }
 
-// Chunk and cell, in samples of the whole field.
+// A chunk and a cell, in samples of the whole field.
 using CellKey = std::tuple<int, int, int, int>;
 
 struct WeightedMean {
@@ -173,7 +173,7 @@ CellKey cell_around(IVec3 sample, const std::function<int(IVec3)>& level_of) {
   return {first.x, first.y, first.z, level};
 }
 
-// Looks at an edge from each of its four sides: when it is a shortest one and crossed, counts it for every cell.
+// Visits an edge from each of its four sides: if it is crossed and no edge there is shorter, counts it for every cell.
 void look_at_edge(const DensityGrid& grid, const std::function<int(IVec3)>& level_of, IVec3 p, int axis,
                   Polygons& polygons) {
   std::set<CellKey> cells;
@@ -244,7 +244,7 @@ TEST_P(MixedLevels, EveryShortestEdgeHasItsPolygonAndEveryCellTheMeanOfItsCrossi
   EXPECT_TRUE(polygons.cells.empty()) << polygons.cells.size() << " cells lack their vertex";
 }
 
-// The tests above would notice: without transitions the borders between levels are open.
+// Shows that the tests above can fail: without transitions the borders between levels are open.
 TEST(SmoothLevels, MeshesThatKnowNothingOfTheirNeighboursLevelsDoNotMeet) {
   const DVec3 centre{64.0, 30.0, 30.0};
   const DensityGrid grid = grid_of(oracle::box_around(centre, 30.0), oracle::sphere(centre, 20.0), 32.0F);

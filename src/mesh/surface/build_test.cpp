@@ -1,4 +1,4 @@
-// The mesh of a whole field: its contents, and the ways to build it.
+// The content of a whole field's mesh, and the ways to build it.
 
 #include <quoin/mesh/smooth_mesh.h>
 
@@ -30,7 +30,8 @@ PositionBits bits_of(const Positions& positions, std::uint32_t vertex, Vec3 orig
   return bits;
 }
 
-// Triangles as sets of positions, beginning with the least so that winding counts and the first corner does not.
+// Returns triangles as sets of positions. Each begins with its least position, so that winding counts and the first
+// corner does not.
 template <class Positions, class Indices>
 std::multiset<TriangleBits> triangles_of(const Positions& positions, const Indices& indices, Vec3 origin) {
   std::multiset<TriangleBits> triangles;
@@ -43,7 +44,7 @@ std::multiset<TriangleBits> triangles_of(const Positions& positions, const Indic
   return triangles;
 }
 
-// The field's chunks and borders do not show: it is as if it were meshed in one piece.
+// Chunks and their borders leave no trace: the mesh equals a mesh made in one piece.
 TEST(SmoothMesh, IsTheMeshOfTheFieldInOnePiece) {
   for (int level = 0; level <= kMaxSmoothLevel; ++level) {
     SCOPED_TRACE(testing::Message() << "level " << level);
@@ -143,7 +144,7 @@ TEST(SmoothMesh, MaterialsAreThoseOfTheSolidSamplesAndNeverAir) {
   }
 }
 
-// Two samples of white sand on red rock: at every level, the view from above shows sand.
+// Two samples of white sand cover red rock: at every level the view from above shows sand.
 TEST(SmoothMesh, AThinCoverShowsAtEveryLevel) {
   DensityGrid grid;
   grid.edit({IVec3{0}, {128, 70, 128}}, [](IVec3 p, DensitySample) {

@@ -29,8 +29,8 @@ using oracle::signed_volume;
 
 using Field = std::function<float(Vec3)>;
 
-/// Surface Nets over the cells of a cube of `edge` samples, a vertex a cell; occlusion, albedo and types tell the
-/// vertices apart.
+/// Returns Surface Nets over the cells of a cube of `edge` samples, one vertex per cell; occlusion, albedo and types
+/// identify the vertices.
 SmoothMesh surface_of(const Field& field, int edge) {
   SmoothMesh mesh;
   std::map<std::array<int, 3>, std::uint32_t> vertex_of;
@@ -66,7 +66,7 @@ SmoothMesh surface_of(const Field& field, int edge) {
   return mesh;
 }
 
-/// Edges that have not exactly one triangle on each side.
+/// Counts the edges without exactly one triangle on each side.
 std::size_t open_edges(const SmoothMesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> uses;
   for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
@@ -103,7 +103,7 @@ float sphere(Vec3 p) {
   return glm::length(p - Vec3(20.3F, 20.1F, 19.8F)) - 15.7F;
 }
 
-/// Several balls that flow together.
+/// Returns several balls that merge.
 Field blob(std::mt19937& random) {
   std::uniform_real_distribution<float> place(10.0F, 30.0F);
   std::uniform_real_distribution<float> radius(3.0F, 6.0F);
@@ -116,7 +116,7 @@ Field blob(std::mt19937& random) {
   };
 }
 
-/// Noise in a cube of `edge` samples with air at its sides. It has every kind of cell with several sheets.
+/// Noise in a cube of `edge` samples with air at its sides, including every kind of cell with several sheets.
 Field random_samples(std::uint32_t seed, int edge) {
   const float last = static_cast<float>(edge) - 2.5F;
   return [=](Vec3 p) {
@@ -181,7 +181,7 @@ TEST_F(Simplify, RandomBlobsStayClosed) {
   EXPECT_GT(tried, 5);
 }
 
-/// The number of vertices at a position that an earlier vertex has.
+/// Returns the number of vertices at the position of an earlier vertex.
 std::size_t coincident_vertices(const SmoothMesh& mesh) {
   std::set<std::array<float, 3>> positions;
   for (const Vec3& p : mesh.positions) positions.insert({p.x, p.y, p.z});
@@ -217,7 +217,7 @@ TEST_F(Simplify, TouchingSurfacesStayClosed) {
   }
 }
 
-/// Tests every triangle.
+/// Tests every triangle separately.
 float distance_from(const SmoothMesh& mesh, Vec3 p) {
   float nearest = std::numeric_limits<float>::infinity();
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
@@ -308,7 +308,7 @@ TEST_F(Simplify, SlightlyMoreErrorLeavesFewerTriangles) {
   }
 }
 
-// Less than 1 % of the triangles of this noise could go with the lower error.
+// The lower error would remove less than 1 % of the triangles of this noise.
 TEST_F(Simplify, LeavesALargeMeshThatHardlyShrinks) {
   std::mt19937 random(3);
   std::vector<float> values(std::size_t{27} * 27 * 27);
@@ -353,7 +353,7 @@ TEST_F(Simplify, AMeshThatIsRoughInOnePlaceShrinksWhereverItLies) {
 }
 
 TEST_F(Simplify, ColoursStayWhereTheyAreAndTheMeshIsManifoldByPlaces) {
-  // A ball of voxels in two halves, the lesser with a checkerboard of small fields.
+  // A voxel ball in two halves; the smaller half has a checkerboard of small fields.
   Grid grid;
   grid.edit({{-16, -16, -16}, {17, 17, 17}}, [](IVec3 p, VoxelType) -> VoxelType {
     if (glm::length(DVec3(p)) > 14.3) return kAir;
@@ -444,7 +444,7 @@ TEST(Manifold, SolidsThatShareAVertexAreSeparated) {
   mesh.normals.resize(8, Vec3(0, 1, 0));
   mesh.albedo.resize(8);
   mesh.types.resize(8);
-  // Two tetrahedra; the last vertex is of neither.
+  // Two tetrahedra; neither uses the last vertex.
   mesh.indices = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3, 0, 4, 5, 0, 6, 4, 0, 5, 6, 4, 6, 5};
   ASSERT_EQ(open_edges(mesh), 0U);
   const double before = signed_volume(mesh);

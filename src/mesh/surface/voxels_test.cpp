@@ -1,4 +1,4 @@
-// Smooth surfaces around voxels: colours, thin things, roundness, bodies.
+// Smooth surfaces of voxels: colours, thin parts, roundness, bodies.
 
 #include <quoin/mesh/smooth_mesh.h>
 
@@ -29,7 +29,7 @@ namespace {
 using oracle::count_surface;
 using oracle::signed_volume;
 
-/// Types 1 to 4 opaque in colours of their own, 5 and 6 transparent.
+/// Types 1 to 4 are opaque in different colours, 5 and 6 are transparent.
 VoxelRegistry six_types() {
   VoxelRegistry types;
   for (int i = 1; i <= 6; ++i) {
@@ -62,7 +62,7 @@ using Place = std::array<std::uint32_t, 3>;
 
 Place place_of(Vec3 position) {
   Place place;
-  position += 0.0F;  // no -0
+  position += 0.0F;  // avoids -0
   std::memcpy(place.data(), &position, sizeof place);
   return place;
 }
@@ -138,7 +138,7 @@ TEST(SmoothVoxels, ThinThingsKeepTheirThickness) {
   struct Case {
     const char* name;
     IBox box;
-    IVec3 thin;  // axes to look at
+    IVec3 thin;  // axes to test
     double least;
   };
   const std::array<Case, 4> cases = {{{"rail", {{0, 0, 0}, {40, 1, 1}}, {0, 1, 1}, 0.75},
@@ -332,7 +332,7 @@ TEST(SmoothVoxels, CoarseLevelsHaveColoursAndAreClosed) {
 TEST(SmoothBodies, GlassIsAClosedBodyThatMeetsItsFrameExactly) {
   const VoxelRegistry types = six_types();
   Grid grid;
-  grid.fill_box({{50, 0, 10}, {80, 30, 12}}, 1);  // a wall over a chunk's border
+  grid.fill_box({{50, 0, 10}, {80, 30, 12}}, 1);  // a wall across a chunk border
   grid.fill_box({{58, 8, 10}, {72, 22, 12}}, 5);  // a window
   grid.fill_box({{64, 8, 10}, {65, 22, 12}}, 2);  // its bar
   const DensityGrid whole = *field_from_grid(grid);
@@ -347,7 +347,7 @@ TEST(SmoothBodies, GlassIsAClosedBodyThatMeetsItsFrameExactly) {
     oracle::expect_manifold(count_surface(surface->mesh, true));
     bodies[i] = std::move(surface->mesh);
   }
-  // Triangles between the two are there in both, turned round.
+  // Both bodies contain the triangles between them, in opposite orientation.
   using Triangle = std::array<Place, 3>;
   const auto triangles = [](const SmoothMesh& mesh, bool turned) {
     std::set<Triangle> all;
@@ -362,9 +362,9 @@ TEST(SmoothBodies, GlassIsAClosedBodyThatMeetsItsFrameExactly) {
   const std::set<Triangle> frame = triangles(bodies[0], false);
   std::int64_t common = 0;
   for (const Triangle& triangle : triangles(bodies[1], true)) common += frame.count(triangle) != 0 ? 1 : 0;
-  // Round both panes: 2 deep, 14 high, 6 and 7 wide.
+  // Around both panes: 2 deep, 14 high, 6 and 7 wide.
   EXPECT_EQ(common, 2 * 2 * (2 * (14 + 6) + 2 * (14 + 7)));
-  // The rest of the glass is its outside, flush with the wall's outside.
+  // All other glass triangles are its outside, flush with the outside of the wall.
   EXPECT_EQ(static_cast<std::int64_t>(bodies[1].indices.size() / 3) - common, 2 * 2 * 14 * 13);
   SmoothMeshOptions united = options;
   const double all = signed_volume(mesh_of(grid, united));

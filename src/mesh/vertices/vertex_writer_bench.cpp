@@ -1,4 +1,4 @@
-// vertices/*: quads of a 256x128x256 terrain turned into vertices and indices of a caller's layout.
+// vertices/*: converts quads of a 256x128x256 terrain to vertices and indices in a caller's layout.
 
 #include <quoin/mesh/vertex_writer.h>
 
@@ -69,7 +69,7 @@ struct Packed {
   std::array<std::uint8_t, 4> rest;
 };
 
-// A layout that the compiler knows.
+// Uses a layout known at compile time.
 void write_inlined(benchmark::State& state) {
   const QuadBuffer& quads = terrain_quads();
   std::vector<Packed> out(vertices_needed(quads.size()));

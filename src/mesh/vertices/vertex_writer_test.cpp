@@ -26,7 +26,7 @@ Value read(const std::vector<std::byte>& bytes, std::size_t at) {
   return value;
 }
 
-// All elements that a vertex of blocks can have; some of them twice, at unusual offsets.
+// All elements that a block vertex can have; some of them twice, at unusual offsets.
 VertexLayout full_layout() {
   return {60,
           {{VertexAttribute::Position, Float32x3, 0},
@@ -41,7 +41,7 @@ VertexLayout full_layout() {
            {VertexAttribute::Position, Sint16x4, 41}}};
 }
 
-// The vertices of a grid by a VertexWriter, and its triangles.
+// The vertices and triangles of a grid, written by a VertexWriter.
 struct Written {
   std::vector<std::byte> vertices;
   std::vector<std::uint32_t> indices;

@@ -38,7 +38,7 @@ TEST(ImpostorCache, BuildsWhatIsAskedFor) {
   CacheWorld world(3);
   ImpostorCache cache;
   for (const GridHandle grid : world.grids) static_cast<void>(cache.find(world.scene, grid));
-  for (const GridHandle grid : world.grids) static_cast<void>(cache.find(world.scene, grid));  // asked for once
+  for (const GridHandle grid : world.grids) static_cast<void>(cache.find(world.scene, grid));  // asks once
   EXPECT_LE(cache.wait(world.scene, 0.0), 3U);
   EXPECT_EQ(cache.wait(world.scene), 0U);
   for (const GridHandle grid : world.grids) EXPECT_NE(cache.find(world.scene, grid), nullptr);
@@ -91,7 +91,7 @@ TEST(ImpostorCache, SeesGridsThatTookAnothersPlaceAndTypesThatBecameOpaque) {
 TEST(ImpostorCache, ThoseOfAnotherScenesGridsAreNotSeenMeanwhile) {
   const CacheWorld first(2);
   CacheWorld second(2);
-  // The same handles, of other voxels.
+  // The same handles with other voxels.
   second.scene = first.scene.snapshot();
   second.grids = first.grids;
   for (const GridHandle grid : second.grids) second.scene.edit(grid).grid.fill_box({{0, 0, 0}, {9, 9, 9}}, 2);
@@ -201,7 +201,7 @@ TEST(ImpostorCache, AnEditRebuildsFromTheOneBefore) {
     const auto coordinate = [&] { return 1 + static_cast<int>(random() % 38); };
     world.scene.edit(world.grids[0])
         .grid.set({coordinate(), coordinate(), coordinate()}, static_cast<VoxelType>(random() % 3));
-    // Some are asked for while the one before is being built.
+    // Requests some while the previous one is being built.
     static_cast<void>(cache.find(world.scene, world.grids[0]));
     if (i % 4 == 3) cache.wait(world.scene);
   }
@@ -238,7 +238,7 @@ TEST(ImpostorCache, CanEndInTheMiddle) {
   }
 }
 
-// A game's frame only looks impostors up while any number is being built.
+// A game's frame only looks up impostors, no matter how many are being built.
 TEST(ImpostorCache, EditsEveryFrameNeverWaitForABuild) {
   CacheWorld world(1);
   world.scene.edit(world.grids[0]).grid.fill_box({{0, 0, 0}, {160, 160, 160}}, 1);
@@ -254,7 +254,7 @@ TEST(ImpostorCache, EditsEveryFrameNeverWaitForABuild) {
     seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
-  // The middle one, since other programs may stop any frame.
+  // The median, since other programs may interrupt any frame.
   std::nth_element(seconds.begin(), seconds.begin() + 100, seconds.end());
   EXPECT_LT(seconds[100], 0.001);
 }

@@ -25,7 +25,7 @@ using World = ImpostorWorld;
 
 constexpr std::array kModels = {Model::Ball, Model::Box, Model::Castle, Model::Blobs, Model::Ship, Model::Terrain};
 
-// Of so many pictures from all around, `pixels` wide.
+// Compares `count` images from all directions; the model is `pixels` wide.
 std::vector<Likeness> likenesses(World& world, int pixels, int count) {
   world.placed().rotation = glm::angleAxis(0.5, glm::normalize(DVec3(0.3, 1, 0.2)));
   const int edge = pixels + 20;
@@ -39,7 +39,8 @@ std::vector<Likeness> likenesses(World& world, int pixels, int count) {
   return all;
 }
 
-// The specification asks for 0.97 and 6; measured at worst: 0.997 and 3.8 (the terrain), 0.9986 and 1.2 (all others).
+// The specification requires 0.97 and 6; the worst measured values are 0.997 and 3.8 (the terrain), 0.9986 and 1.2 (all
+// others).
 TEST(DrawImpostors, LooksLikeTheTracedPictureAtTheThreshold) {
   for (const Model model : kModels) {
     World world(model);
@@ -53,7 +54,7 @@ TEST(DrawImpostors, LooksLikeTheTracedPictureAtTheThreshold) {
   }
 }
 
-// Between its plates no snapshot sees far down.
+// No snapshot sees far down between the model's plates.
 TEST(DrawImpostors, HasNoHolesInCrevices) {
   World world(Model::Comb);
   for (const int pixels : {128, 90}) {

@@ -1,4 +1,4 @@
-// Pictures of the renderer's with far instances drawn from impostors.
+// Rendered images whose far instances are drawn from impostors.
 
 #include <array>
 #include <limits>
@@ -55,7 +55,7 @@ TEST(RenderFar, TheRendererDrawsFarInstancesFromImpostors) {
   EXPECT_GT(middle[2], middle[0]) << "far is blue";
 }
 
-// Each would otherwise find some impostors still being built by another, and trace their grids.
+// Without this, some renderers would find impostors still being built by another one, and trace those grids.
 TEST(RenderFar, PicturesTakenAtOnceAreThoseTakenAlone) {
   ImpostorWorld world(Model::Castle);
   for (int i = 1; i < 4; ++i) {

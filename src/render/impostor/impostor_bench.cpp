@@ -41,7 +41,7 @@ void build26(benchmark::State& state) {
 }
 BENCHMARK(build26)->Name("impostor/build26")->Unit(benchmark::kMillisecond);
 
-// Caves and hills, 256x113x256 voxels.
+// Returns caves and hills of 256x113x256 voxels.
 Grid wide_terrain(VoxelRegistry& types) {
   const auto of_terrain = add_terrain_types(types);
   fail_unless(of_terrain.has_value(), "no types");
@@ -55,7 +55,7 @@ void build_terrain(benchmark::State& state) {
 }
 BENCHMARK(build_terrain)->Name("impostor/terrain/build")->Unit(benchmark::kMillisecond)->Iterations(3);
 
-// After one voxel was taken or set.
+// Measures the rebuild after one voxel was removed or set.
 void rebuild_terrain(benchmark::State& state) {
   VoxelRegistry types;
   Grid grid = wide_terrain(types);
@@ -183,7 +183,7 @@ void far1000(benchmark::State& state, bool impostors) {
   camera.vertical_fov_radians = 0.9;
   RenderOptions options;
   if (impostors) options.detail.policy = DetailPolicy{};
-  const auto first = renderer.render(camera, options, {1});  // takes the impostors
+  const auto first = renderer.render(camera, options, {1});  // creates the impostors
   fail_unless(first.has_value() && first->pixels_hit > 100'000, "too little is seen");
   std::vector<SelectedInstance> selected;
   DetailSelector().select(scene, camera, options.width, options.height, DetailPolicy{}, selected);

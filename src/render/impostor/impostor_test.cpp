@@ -110,7 +110,7 @@ TEST(ImpostorViews, CamerasShowTheWholeSphereAndNoMore) {
     EXPECT_NEAR(glm::dot(camera.up, camera.forward), 0.0, 1e-12);
     const DVec3 upright = std::abs(camera.forward.y) > 0.99 ? DVec3(1, 0, 0) : DVec3(0, 1, 0);
     EXPECT_GT(glm::dot(camera.up, upright), 0.5);
-    const double sine = 1.0 / 8.0;  // of the cone around the sphere
+    const double sine = 1.0 / 8.0;  // for the cone around the sphere
     EXPECT_NEAR(camera.focal * sine / std::sqrt(1.0 - sine * sine), 64.0, 1e-9);
     EXPECT_NEAR(camera.half_size(), 35.5 * 8.0 / std::sqrt(63.0), 1e-9);
   }
@@ -181,7 +181,7 @@ TEST(Impostor, SeesWhateverLiesInABoxFromEveryView) {
     for (int view = 0; view < kImpostorViews; ++view) {
       const Snapshot snapshot = take_snapshot(grid, types, tree, view);
       EXPECT_NE(std::count(snapshot.types.begin(), snapshot.types.end(), VoxelType{2}), 0) << round << " " << view;
-      for (std::size_t i = 0; i < 128; ++i) {  // and none is cropped
+      for (std::size_t i = 0; i < 128; ++i) {  // no snapshot is cropped
         ASSERT_LE(snapshot.types[i] + snapshot.types[128 * i] + snapshot.types[128 * i + 127], round == 0 ? 6 : 3);
       }
     }
@@ -304,7 +304,7 @@ TEST(Impostor, MoreTexelsSeeSmallerFaces) {
     return ImpostorFaces::of(Impostor::build(grid, types, ImpostorOptions{edge})).unseen.count();
   };
   EXPECT_GT(unseen(64), unseen(512));
-  // With 32 texels a side the faces are too many to be held one by one.
+  // With 32 texels per side there are too many faces to store them one by one.
   const auto bytes = [&](int edge) { return Impostor::build(grid, types, ImpostorOptions{edge}).bytes(); };
   EXPECT_LT(bytes(16), bytes(64));
 }

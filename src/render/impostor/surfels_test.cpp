@@ -44,7 +44,7 @@ Worst worst_of(ImpostorWorld& world, int pixels, int count) {
   return worst;
 }
 
-// The specification asks for 0.97 and 6 of blocks; measured at worst: 0.984 and 4.4.
+// The specification requires 0.97 and 6 for blocks; the worst measured values are 0.984 and 4.4.
 TEST(Surfels, LookLikeTheTracedField) {
   for (const Model model : kSurfelModels) {
     ImpostorWorld world(model);
@@ -71,7 +71,7 @@ TEST(Surfels, DepthsAndNormalsAreThoseOfTheSurface) {
     const double off = std::abs(truth.depth.values[i] - picture.depth.values[i]);
     ++both;
     sum += off;
-    // At the outline a pixel further is much deeper.
+    // At the outline, one pixel further is much deeper.
     EXPECT_LE(off, 2.5);
   }
   EXPECT_GT(both, 4'000);
@@ -112,7 +112,7 @@ TEST(Surfels, RenderersDrawFarFieldsFromThem) {
   const Likeness found = likeness(traced, far);
   EXPECT_GE(found.overlap, 0.975);
   EXPECT_LE(found.difference, 6.0);
-  // In front of a near field: the drawing of each must not depend on the other.
+  // In front of a near field: neither drawing may depend on the other.
   SceneGrid ground;
   ground.field.add_box({-300, -90, -300}, {300, -60, 300}, 3);
   world.scene.add_instance({"", world.scene.add_grid(std::move(ground))});

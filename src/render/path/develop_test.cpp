@@ -39,7 +39,7 @@ TEST(PathDevelop, KeepsOrderAndEnds) {
   EXPECT_FALSE(develop(picture, {-1.0}).has_value());
 }
 
-// The published values: grey of 0.18 and white.
+// The published values for grey of 0.18 and for white.
 TEST(PathDevelop, CurvesHaveTheirPublishedValues) {
   PathPicture picture;
   picture.width = 2;
@@ -49,7 +49,7 @@ TEST(PathDevelop, CurvesHaveTheirPublishedValues) {
   picture.alpha = {1.0F, 1.0F};
   const auto neutral = develop(picture, {1.0, ToneCurve::Neutral});
   const SrgbEncoder& encode = SrgbEncoder::shared();
-  EXPECT_EQ(neutral->rgb[0], encode(0.14F));  // less the 0.04 of Fresnel
+  EXPECT_EQ(neutral->rgb[0], encode(0.14F));  // minus the 0.04 of Fresnel
   EXPECT_NEAR(neutral->rgb[3], encode(0.88F), 2);
   const auto clamp = develop(picture, {1.0, ToneCurve::Clamp});
   EXPECT_EQ(clamp->rgb[0], encode(0.18F));
@@ -69,7 +69,7 @@ TEST(PathDevelop, FindsTheExposureThatShowsThePicture) {
   EXPECT_EQ(find_exposure(picture), 1.0);
 }
 
-// Dark and bright, colourful and grey: every curve shows the mean that the neutral curve shows.
+// For dark, bright, colourful and grey images every curve gives the same mean as the neutral curve.
 TEST(PathDevelop, AutomaticExposureGivesEveryCurveTheSameMean) {
   PathPicture picture = picture_of(64, 64, Vec3(0.0F));
   for (std::size_t i = 0; i < picture.radiance.size(); ++i) {
@@ -91,7 +91,7 @@ TEST(PathDevelop, AutomaticExposureGivesEveryCurveTheSameMean) {
   EXPECT_EQ(find_exposure(picture_of(2, 2, Vec3(0.0F)), ToneCurve::Aces), 1.0);
 }
 
-// A bright pixel in the centre of a dark image lights its surroundings, and keeps the rest.
+// A bright pixel in the centre of a dark image lights its surroundings and leaves the rest.
 TEST(PathDevelop, BloomSpreadsWhatIsBright) {
   PathPicture picture = picture_of(65, 65, Vec3(0.1F));
   const std::size_t middle = 32 * 65 + 32;

@@ -29,7 +29,7 @@ using render_test::towards;
 using render_test::town;
 using render_test::under_even_sky;
 
-// With light that is scattered as often as it likes.
+// Returns options for an even sky with practically unlimited scattering.
 PathOptions even_sky(int size, int samples) {
   PathOptions options = under_even_sky(size, size, samples);
   options.max_bounces = 1024;
@@ -37,7 +37,7 @@ PathOptions even_sky(int size, int samples) {
   return options;
 }
 
-// Along -z, each pixel alike.
+// Looks along -z, identically in each pixel.
 Camera straight_at_the_front() {
   Camera camera = towards({0.0, 0.0, 12.0}, {0.0, 0.0, 0.0});
   camera.projection = Camera::Projection::Orthographic;
@@ -84,7 +84,7 @@ TEST(PathMedia, ThePhaseFunctionsSamplesHaveItsDensityAndMean) {
       inverse += 1.0 / static_cast<double>(sample.density);
     }
     EXPECT_NEAR(sum / kSamples, static_cast<double>(g), 2e-3);
-    // The mean of 1 / density is the whole sphere.
+    // The mean of 1 / density is the area of the whole sphere.
     EXPECT_NEAR(inverse / kSamples / (4.0 * std::acos(-1.0)), 1.0, 0.05) << g;
   }
 }
@@ -116,7 +116,7 @@ TEST(PathMedia, TransmissionFallsExponentiallyWithLength) {
   const Camera camera = straight_at_the_front();
   EXPECT_NEAR(mean_red(path_picture(wall, camera, options)), std::exp(-1.2), 0.003);
 
-  // The sun above, through 10 of fog down and, as seen from above, 10 up.
+  // The sun is above: its light passes through 10 of fog downwards, and 10 upwards to the camera above.
   const Scene floor = box_of({.name = "", .colour = {255, 255, 255, 255}}, {{-20, -1, -20}, {20, 0, 20}});
   options = even_sky(16, 256);
   options.sky_brightness = 0.0;
@@ -189,7 +189,7 @@ TEST(PathMedia, RefusesFogThatCannotBe) {
   EXPECT_TRUE(refuses(Fog{0.1, Vec3(1.0F), 0.0, std::numeric_limits<double>::infinity()}));
 }
 
-// A lens of blades shows a point that is out of focus as their polygon.
+// A lens with blades shows an out-of-focus point as the polygon of the blades.
 TEST(PathLens, BladesShapeWhatIsOutOfFocus) {
   VoxelProperties lamp;
   lamp.colour = {255, 255, 255, 255};
@@ -235,7 +235,7 @@ TEST(PathDenoise, HalvesTheErrorAtLeast) {
   EXPECT_LT(after, 0.6 * before) << before << " " << after;
 }
 
-// An image without noise is unchanged: edges of surfaces, colours and hard shadows.
+// An image without noise stays unchanged: edges of surfaces, colours and hard shadows.
 TEST(PathDenoise, KeepsEdges) {
   Scene scene;
   Grid grid;
@@ -258,7 +258,7 @@ TEST(PathDenoise, KeepsEdges) {
   for (std::size_t i = 0; i < plain.radiance.size(); ++i) {
     if (glm::length(plain.radiance[i] - smooth.radiance[i]) > 0.02F) ++different;
   }
-  // Pixels through which a shadow's edge goes have noise themselves.
+  // Pixels on a shadow's edge are noisy themselves.
   EXPECT_LT(different, static_cast<int>(plain.radiance.size()) / 100);
 }
 

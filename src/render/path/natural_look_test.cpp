@@ -26,7 +26,7 @@ Scene white_block() {
   return scene;
 }
 
-// `from`: the camera's direction from the block's middle.
+// `from`: the camera's direction from the block's centre.
 Image natural_image(DVec3 from, SkyModel sky, bool has_ground, DVec3 sun = natural_light().sun) {
   const Scene scene = white_block();
   const NaturalLook natural = natural_look(sky, sun);
@@ -42,7 +42,7 @@ Image natural_image(DVec3 from, SkyModel sky, bool has_ground, DVec3 sun = natur
   return image ? std::move(*image) : Image{};
 }
 
-// Each channel's mean over a square of pixels.
+// Returns each channel's mean over a square of pixels.
 std::array<double, 3> channel_means(const Image& image, int x, int y, int size) {
   std::array<double, 3> means{};
   for (std::size_t channel = 0; channel < 3; ++channel) {
@@ -71,7 +71,7 @@ TEST(NaturalLook, BackgroundsOfTheIsoViewAreBright) {
 }
 
 TEST(NaturalLook, WhiteInFullShadowIsNotDark) {
-  // The sun stands at -x and +z: the block's sides towards +x and -z lie in shadow.
+  // The sun is at -x and +z: the block's sides towards +x and -z are in shadow.
   for (const SkyModel sky : {SkyModel::Gradient, SkyModel::Physical}) {
     for (const DVec3& side : {DVec3(1.0, 0.05, 0.0), DVec3(0.0, 0.05, -1.0)}) {
       const double shadow = middle_of_image(natural_image(glm::normalize(side), sky, false));
@@ -82,7 +82,7 @@ TEST(NaturalLook, WhiteInFullShadowIsNotDark) {
   }
 }
 
-// As marched images show it: dark, but not black.
+// As in marched images: dark, but not black.
 TEST(NaturalLook, WhiteIsSeenAfterSunset) {
   for (const double degrees : {-5.0, -20.0, -60.0}) {
     const double radians = degrees * std::numbers::pi / 180.0;

@@ -43,7 +43,7 @@ TEST(PathMath, FollowsTheCLibrary) {
   EXPECT_TRUE(std::isfinite(exponential(1e9F)));
 }
 
-// The first 4^n samples have one in each of the rectangles into which the square is cut 2^n by 2^n, and so on.
+// The first 4^n samples have one in each of the 2^n by 2^n rectangles of the square, and so on.
 TEST(PathRandom, IsStratifiedInEveryPairOfDimensions) {
   constexpr int kSamples = 256;
   for (std::uint32_t dimension = 0; dimension < 20; ++dimension) {
@@ -228,7 +228,7 @@ double irradiance_by_lambert(const PathLamp& lamp, DVec3 point, DVec3 normal) {
   return std::abs(sum) * 0.5 * static_cast<double>(lamp.radiance.x);
 }
 
-// A row of lamps along x that shine down.
+// Returns a row of lamps along x that shine down.
 std::vector<LampBounds> row_of_lamps(int count) {
   std::vector<LampBounds> lamps(static_cast<std::size_t>(count));
   for (std::size_t i = 0; i < lamps.size(); ++i) {
@@ -258,7 +258,7 @@ TEST(PathLampMemory, LeadsAwayFromLampsBehindWalls) {
   };
   const float before = chance(0);
   EXPECT_EQ(before, tree.probability(0, point, up));
-  // All of the second half stand behind a wall.
+  // All lamps of the second half stand behind a wall.
   for (int sample = 0; sample < 400; ++sample) {
     const auto lamp = static_cast<std::int32_t>(static_cast<std::size_t>(sample) % lamps.size());
     memory.note(tree, place, lamp, 1.0F, 2 * static_cast<std::size_t>(lamp) >= lamps.size());
@@ -315,7 +315,7 @@ TEST(PathEnvironment, SamplesLightAsItShines) {
     const Random random(3, i);
     const SkySample sample = light.sample(random.pair(0));
     by_light += static_cast<double>(sample.radiance.x / sample.density);
-    // At the poles, where pixels are as narrow as rounding, it may be a neighbour's.
+    // At the poles, where pixels are as narrow as rounding errors, a neighbouring pixel is possible.
     if (std::abs(sample.direction.y) < 0.999F) {
       EXPECT_NEAR(light.density(sample.direction) / sample.density, 1.0F, 0.01F);
     }

@@ -1,4 +1,4 @@
-// path/terrain/640x360: the 256x128x256 terrain by day, four samples and four bounces, one thread; rays a second.
+// path/terrain/640x360: the 256x128x256 terrain by day, four samples and four bounces, one thread; rays per second.
 // path/lamps: the same by night, with a thousand lamps.
 
 #include <benchmark/benchmark.h>
@@ -21,7 +21,7 @@ void time_paths(benchmark::State& state, const Scene& scene, PathOptions options
   options.max_bounces = 4;
   const Camera camera = frame_view(scene.bounds(), View::Iso, 16.0 / 9.0);
   std::int64_t rays = 0;
-  fail_unless(tracer.render(camera, options, {1}).has_value(), "a picture", 0);  // the sky is made once
+  fail_unless(tracer.render(camera, options, {1}).has_value(), "a picture", 0);  // builds the sky once
   for (auto _ : state) {
     const auto picture = tracer.render(camera, options, {1});
     fail_unless(picture.has_value() && picture->rays > 0, "a picture", 0);

@@ -48,7 +48,7 @@ Scene cube_of(Rgba8 colour, int edge = 8, float emission = 0.0F) {
   return scene;
 }
 
-// A closed room of inner edge `edge` whose wall towards +y is of another type, and a camera within it.
+// Returns a closed room of inner edge `edge` whose wall towards +y has another type; the camera is inside.
 Scene room(int edge, VoxelProperties walls, VoxelProperties ceiling) {
   Scene scene;
   const VoxelType wall = scene.types.add(walls).value_or(kAir);
@@ -99,7 +99,7 @@ TEST(PathTracer, AClosedBoxThatEmitsFillsWithLight) {
   }
 }
 
-// The share of light from one wall of a cube that reaches another.
+// The fraction of light from one wall of a cube that reaches another wall.
 TEST(PathTracer, FormFactorsOfACubesWalls) {
   constexpr int kEdge = 8;
   const Scene scene = room(kEdge, of_colour(kGrey), of_colour({255, 255, 255, 255}, 1.0F));
@@ -200,7 +200,7 @@ TEST(PathTracer, APenumbraGrowsWithTheDistance) {
   EXPECT_NEAR(share(-0.6 * width), 0.0F, 1e-3F);
   EXPECT_NEAR(share(0.0), 0.5F, 0.05F);
   EXPECT_NEAR(share(0.6 * width), 1.0F, 1e-3F);
-  // Of a disc beyond a chord at a quarter of its diameter from its edge.
+  // The area of a disc beyond a chord at a quarter of its diameter from its edge.
   EXPECT_NEAR(share(-0.25 * width), 1.0 / 3.0 - std::sqrt(3.0) / (4.0 * kPi), 0.03);
 }
 
@@ -232,7 +232,7 @@ TEST(PathTracer, AWhiteBallInAWhiteSkyCannotBeSeen) {
   }
 }
 
-// Clear glass takes no light away, refracts and mirrors as it may.
+// Clear glass absorbs no light, with any refraction and reflection.
 TEST(PathTracer, ClearGlassInAWhiteSkyCannotBeSeen) {
   Scene scene;
   VoxelProperties properties = of_colour({255, 255, 255, 0});
@@ -245,7 +245,7 @@ TEST(PathTracer, ClearGlassInAWhiteSkyCannotBeSeen) {
 }
 
 TEST(PathTracer, GlassShowsWhatLiesBehindItWhereItIsBent) {
-  // A thick pane before a wall that is black on one half: looked at aslant, the edge is seen elsewhere.
+  // A thick pane in front of a wall that is black on one half: seen at an angle, the edge is displaced.
   const auto picture_of = [](float ior) {
     Scene scene;
     const VoxelType black = add_type(scene, {0, 0, 0, 255});
@@ -271,7 +271,7 @@ TEST(PathTracer, GlassShowsWhatLiesBehindItWhereItIsBent) {
   };
   const PathPicture plain = picture_of(1.0F);
   const PathPicture bent = picture_of(1.5F);
-  // By how much a ray at 45 degrees is moved aside by 10 of glass of 1.5, seen across: in pixels of 0.1.
+  // The displacement of a ray at 45 degrees by glass of thickness 10 and index 1.5, seen across: in pixels of 0.1.
   const double inside = std::asin(std::sin(kPi / 4.0) / 1.5);
   const double moved = 10.0 * std::sin(kPi / 4.0 - inside) / std::cos(inside) / 0.1;
   EXPECT_NEAR(std::abs(edge_of(bent) - edge_of(plain)), moved, 6.0);
@@ -305,12 +305,12 @@ TEST(PathTracer, AimedAndFoundLightAgreeOnGloss) {
     VoxelProperties walls = of_colour(kGrey);
     walls.roughness = rough;
     walls.metalness = 0.5F;
-    // Everything emits but the floor: closed, so that any path ends in light of 1.
+    // Everything except the floor emits, and the room is closed, so that any path ends in light of 1.
     Scene scene = room(8, walls, of_colour(kWhite, 1.0F));
     PathOptions options = under_even_sky(16, 16, 256);
     options.max_bounces = 1;
     const float by_both = mean(path_picture(scene, towards({4.0, 4.0, 4.0}, {4.5, 0.0, 4.2}), options)).x;
-    // The same as an environment: the ceiling taken away, and a sky of 1 in its place, is found by chance alone.
+    // The same light from an environment: with the ceiling removed and a sky of 1, only chance finds it.
     Scene open = room(8, walls, of_colour(kWhite));
     open.edit(open.grids().handles().front()).grid.fill_box({{-1, 8, -1}, {9, 9, 9}}, kAir);
     const float by_chance = mean(path_picture(open, towards({4.0, 4.0, 4.0}, {4.5, 0.0, 4.2}), options)).x;
@@ -402,10 +402,10 @@ TEST(PathTracer, GroundCatchesShadowsAndIsNotSeenItself) {
   options.ground->only_shadows = true;
   const PathPicture picture = path_picture(scene, from_above(4.0, 30.0, 4.0, 64.0), options);
   const auto at = [](int x, int y) { return static_cast<std::size_t>(y * 64 + x); };
-  // Far away it shows the background, and is not there.
+  // Far away the image shows only the background.
   EXPECT_NEAR(picture.radiance[at(60, 4)].x, 1.0F, 0.03F);
   EXPECT_NEAR(picture.alpha[at(60, 4)], 0.0F, 0.03F);
-  // To the left of the cube lies its shadow: the pixel's right is +x.
+  // The cube's shadow lies to the left of the cube: the pixel's right is +x.
   EXPECT_LT(picture.radiance[at(25, 32)].x, 0.7F);
   EXPECT_GT(picture.alpha[at(25, 32)], 0.3F);
   EXPECT_EQ(picture.alpha[at(32, 32)], 1.0F);
@@ -443,7 +443,7 @@ TEST(PathTracer, AnEnvironmentOfOnePixelIsAUniformSky) {
   EXPECT_NEAR(light, 0.5F * linear_from_srgb(std::uint8_t{188}), 0.01F);
 }
 
-// Random walls and covered lamps on a floor of 256 voxels; all black except the floor.
+// Random walls and covered lamps on a floor of 256 voxels; everything is black except the floor.
 Scene dim_yard() {
   Scene scene;
   const VoxelType floor = add_type(scene, kGrey);
@@ -471,7 +471,7 @@ Scene dim_yard() {
   return scene;
 }
 
-// Each pixel covers one place, so the place learns from the pixel's own samples.
+// Each pixel covers one position, so the position learns from the pixel's own samples.
 TEST(PathTracer, LearnedLampSharesDarkenNothing) {
   const Scene scene = dim_yard();
   const PathTracer tracer(scene);

@@ -81,7 +81,7 @@ TEST(ImpostorShell, IsNotMadeBeyondItsLimits) {
   EXPECT_TRUE(ImpostorShell::build(world.tree, kPlenty, count).has_value());
   EXPECT_FALSE(ImpostorShell::build(world.tree, kPlenty, count - 1).has_value());
   EXPECT_FALSE(ImpostorShell::build(world.tree, 1000, kPlenty).has_value());
-  // A row of few voxels, around which much is empty.
+  // A row of few voxels with much empty space around it.
   Grid row;
   row.set({0, 0, 0}, 1);
   row.set({20'000'000, 0, 0}, 1);

@@ -1,4 +1,4 @@
-// What happens to a file that was read, edited and written again: the edit, and nothing else.
+// A file that is read, edited and written again contains the edit and no other change.
 
 #include <quoin/io/vox.h>
 
@@ -56,7 +56,7 @@ std::vector<FileChunk> chunks_of(const std::vector<std::byte>& file) {
   return chunks;
 }
 
-/// The names of chunks that are not the same in both files: "+" is new, "-" is gone, "~" is another.
+/// Returns the names of chunks that differ between both files: "+" is new, "-" is removed, "~" is changed.
 std::string changed_chunks(const std::vector<std::byte>& before, const std::vector<std::byte>& after) {
   const auto a = chunks_of(before);
   const auto b = chunks_of(after);
@@ -121,14 +121,14 @@ std::string text_of(const std::multiset<std::string>& said) {
   return text;
 }
 
-/// Grids are called as their instances where the file has no other way; that is looked at elsewhere.
+/// Clears grid names: a file that cannot hold them names grids after their instances, which other tests cover.
 void drop_grid_names(Scene& scene) {
   for (const GridHandle handle : scene.grids().handles()) scene.edit(handle).name.clear();
 }
 
 const std::vector<std::byte> kSecret = {std::byte{1}, std::byte{2}, std::byte{3}, std::byte{0xFF}, std::byte{7}};
 
-/// A house in MagicaVoxel's form: layers, groups, animation, a camera, notes, and unknown chunks.
+/// Returns a house as a MagicaVoxel file: layers, groups, animation, a camera, notes, and unknown chunks.
 std::vector<std::byte> house() {
   FileBuilder file;
   file.chunk("PACK", std::array{std::byte{4}, std::byte{0}, std::byte{0}, std::byte{0}});
@@ -245,7 +245,7 @@ TEST(VoxRevision, AMovedGroupIsOneTransform) {
 TEST(VoxRevision, AModelThatOutgrowsItsBoxStaysWhereItIsInEveryFrame) {
   const auto bytes = house();
   LoadedScene loaded = load(bytes);
-  // Model 1 is the tree's and the bird's, and the bird moves.
+  // The tree and the bird share model 1, and the bird moves.
   loaded.scene.edit(loaded.scene.grids().handles()[1]).grid.set({5, -3, 1}, 4);
   const auto saved = save(loaded);
   EXPECT_EQ(changed_chunks(bytes, saved), " ~SIZE ~XYZI");
@@ -302,7 +302,7 @@ TEST(VoxRevision, NewColoursTakeEntriesThatNoVoxelHas) {
   const VoxelType read = again.scene.grids()[again.scene.grids().handles()[3]].grid.get({0, 0, 0});
   EXPECT_EQ(again.scene.types[read].colour, gold.colour);
   EXPECT_EQ(again.scene.types[read].emission, 2.0F);
-  // Of a palette with colours that are there twice, one of these goes, and nothing is lost.
+  // A palette with duplicate colours loses a duplicate, without any loss of content.
   FileBuilder twice;
   twice.model(1, 1, 1, {{0, 0, 0, 1}});
   twice.with("RGBA", [](auto& out) {
@@ -315,7 +315,7 @@ TEST(VoxRevision, NewColoursTakeEntriesThatNoVoxelHas) {
   warnings.clear();
   EXPECT_EQ(changed_chunks(twice_bytes, save(with_room, &warnings)), " ~XYZI ~RGBA +MATL");
   EXPECT_TRUE(warnings.empty());
-  // A type that looks like one of the palette is that one.
+  // A type with the look of a palette colour uses that colour.
   VoxelProperties known = loaded.scene.types[3];
   known.name = "mine";
   loaded = load(bytes);
@@ -390,7 +390,7 @@ std::vector<std::byte> three_frames() {
 TEST(VoxRevision, AFrameThatOutgrowsItsBoxLeavesTheOthersWhereTheyAre) {
   const auto bytes = three_frames();
   for (const int edited : {0, 1}) {
-    // Beyond each side, and beyond two at once; and so far that no model holds it.
+    // Voxels beyond each side, beyond two sides at once, and too far away for any model.
     for (const IVec3 voxel : {IVec3(-1, 0, 0), IVec3(0, -2, 0), IVec3(0, 0, -1), IVec3(5, 0, 0), IVec3(0, 6, 9),
                               IVec3(300, 0, 0), IVec3(-400, 20, 300)}) {
       SCOPED_TRACE(std::to_string(edited) + " " + std::to_string(voxel.x));
@@ -418,7 +418,7 @@ TEST(VoxRevision, FramesThatAreNotShownMayOutgrowTheirBoxesToo) {
     loaded.scene.edit(loaded.scene.instances().handles()[0]).position.x += 7;
     const auto saved = save(loaded);
     EXPECT_EQ(voxels_of(load(saved, 0).scene), voxels_of(loaded.scene));
-    // As it would be shown at its own frame.
+    // Each frame matches the same edits made at that frame.
     for (const int frame : {1, 2}) {
       LoadedScene at_frame = load(bytes, frame);
       if (frame == 1) at_frame.scene.edit(at_frame.scene.grids().handles()[1]).grid.set(voxel, 9);
@@ -441,7 +441,7 @@ TEST(VoxRevision, FramesThatGoAreSaidToBeLost) {
 
 TEST(VoxRevision, AModelOfAnotherFrameThatOutgrows256IsSaidToStay) {
   LoadedScene loaded = load(house());
-  // The bird shows model 2 later, and so does the bench.
+  // Both the bird and the bench show model 2 later.
   for (const InstanceHandle handle : loaded.scene.instances().handles()) {
     if (loaded.scene.instances()[handle].name == "bench") loaded.scene.remove_instance(handle);
   }
@@ -484,7 +484,7 @@ TEST(VoxRevision, CategoriesOfInstancesAreSaidToBeLost) {
   EXPECT_EQ(losses_of_vox(loaded).value(), warnings);
 }
 
-/// A walk of three frames with the topmost node given by the arguments, and unknown attributes on every node.
+/// Returns a walk of three frames whose topmost node follows the arguments, with unknown attributes on every node.
 std::vector<std::byte> lone_walk(bool has_hidden_group) {
   FileBuilder file;
   file.model(2, 2, 2, {{0, 0, 0, 5}});
@@ -589,7 +589,7 @@ TEST(VoxRevision, NamesContentThatASceneCannotHold) {
   EXPECT_EQ(without->source, nullptr);
 }
 
-/// Does anything that can be done to a scene, many times.
+/// Applies random operations of every kind to a scene.
 class History {
  public:
   History(std::uint32_t seed, LoadedScene& loaded) : random_(seed), scene_(loaded.scene) {}
@@ -663,7 +663,7 @@ class History {
     if (scene_.grids().empty()) return;
     const InstanceHandle like = scene_.instances().empty() ? InstanceHandle{} : any(scene_.instances());
     Instance made;
-    if (const Instance* found = scene_.instances().find(like)) made = *found;  // with its turn
+    if (const Instance* found = scene_.instances().find(like)) made = *found;  // keeps its rotation
     made.name = name();
     made.grid = any(scene_.grids());
     made.position = place();
@@ -690,7 +690,7 @@ class History {
     if (pick(4) == 0) {
       const GroupHandle parent = group();
       scene_.edit(handle).parent = parent;
-      // Circles come to stand at the top, which a file cannot say otherwise.
+      // Circles move to the top, since a file has no other way to express them.
       for (GroupHandle each = parent; scene_.groups().find(each) != nullptr; each = scene_.groups()[each].parent) {
         if (each != handle) continue;
         scene_.edit(handle).parent = {};

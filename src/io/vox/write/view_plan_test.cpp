@@ -143,7 +143,7 @@ TEST(VoxViewWriting, TheSunComesBack) {
   EXPECT_EQ(losses_of_vox(loaded).value().size(), 1U);
 }
 
-// A file with two cameras that were set, one unused camera, and a sun; other keys are kept.
+// Returns a file with two configured cameras, one unused camera, and a sun; other keys are kept.
 std::vector<std::byte> file_with_views() {
   FileBuilder file;
   file.model(1, 1, 1, {{0, 0, 0, 1}});

@@ -57,7 +57,7 @@ void add_random_types(Random& random, Scene& scene) {
   }
 }
 
-/// A grid laid out as the reader lays out a model.
+/// Returns a grid laid out in the same way as the reader lays out a model.
 SceneGrid random_grid(Random& random) {
   const IVec3 size{random.between(1, 80), random.between(1, 20), random.between(1, 20)};
   SceneGrid grid;
@@ -91,7 +91,7 @@ Scene random_scene(std::uint32_t seed) {
     SceneGrid& grid = scene.edit(instance.grid);
     if (grid.name.empty() && random.between(0, 2) == 0) grid.name = "grid";
   }
-  // Names that the file does not hold come from the first instance that has one.
+  // Names that the file cannot hold come from the first instance with a name.
   for (const InstanceHandle handle : scene.instances().handles()) {
     std::string& name = scene.edit(scene.instances()[handle].grid).name;
     if (name.empty()) name = scene.instances()[handle].name;
@@ -138,7 +138,7 @@ Scene reread(const Scene& scene, std::vector<std::string>& warnings) {
   return std::move(loaded->scene);
 }
 
-/// A scene with the types 1 to `count`, of as many colours.
+/// Returns a scene with the types 1 to `count`, each of its own colour.
 Scene scene_with_types(int count) {
   Scene scene;
   for (int i = 1; i <= count; ++i) {

@@ -1,4 +1,4 @@
-// The kernels that draw faces, against every face asked for every pixel in double precision.
+// Compares the kernels that draw faces with a double-precision test of every face for every pixel.
 
 #include "render/impostor/raster/raster.h"
 
@@ -46,7 +46,7 @@ struct Shape {
     for (std::uint32_t& views : level.groups.views) views = ~0U;
   }
 
-  // Boxes of cells: rectangles of many sizes.
+  // Boxes of cells give rectangles of many sizes.
   [[nodiscard]] ImpostorFaces::Level coarse() const {
     return SurfaceCells(faces, content, 128, 2).level([](IVec3) { return false; });
   }
@@ -60,7 +60,7 @@ raster::Aim random_aim(std::mt19937& random, double radius) {
   aim.forward = direction();
   aim.right = glm::normalize(glm::cross(aim.forward, direction()));
   aim.down = glm::cross(aim.forward, aim.right);
-  if (share(random) < 0.2) aim.right = -aim.right;  // as of a mirrored instance
+  if (share(random) < 0.2) aim.right = -aim.right;  // as for a mirrored instance
   aim.is_perspective = share(random) < 0.8;
   aim.voxel_size = std::exp2(normal(random));
   const double distance = radius * (share(random) < 0.3 ? 1.5 * share(random) : 2.0 + 30.0 * share(random));
@@ -72,7 +72,7 @@ raster::Aim random_aim(std::mt19937& random, double radius) {
 
 struct Met {
   double depth = std::numeric_limits<double>::infinity();
-  double rim = 0.0;  // how far inside the nearest face's edge, voxels
+  double rim = 0.0;  // distance inside the nearest face's edge, in voxels
   double next = std::numeric_limits<double>::infinity();
   int face = -1;
 };
@@ -133,7 +133,8 @@ TEST(ImpostorRaster, MeetsWhatEveryFaceAskedForEveryPixelMeets) {
           const std::size_t i = raster::index_of(x, y);
           const Met met = met_by(shape, aim, job.views, x - 15.7, y - 16.2);
           const double size = aim.voxel_size;
-          // Not where single precision may choose another: at a face's edge, or where two lie close together.
+          // Excludes cases that single precision may decide differently: at a face's edge, or where two faces lie close
+          // together.
           if (met.face >= 0 && (met.rim < 1e-3 || met.next - met.depth < 2e-3 * size)) continue;
           ++pixels;
           covered += met.face >= 0;
@@ -170,7 +171,7 @@ void expect_nothing_outside(const raster::Job& job, const raster::Canvas& canvas
   }
 }
 
-// Draws from all around, one over the other.
+// Draws from all directions, one image over the other.
 void expect_same_as_plain(const ImpostorFaces::Level& level, double radius, unsigned seed, InstructionSet with) {
   std::mt19937 random(100 + seed);
   std::array<raster::Canvas, 2> canvases;
@@ -238,7 +239,7 @@ TEST(ImpostorSeen, DrawingSeesWhatRaysSee) {
       const auto found = by_face.find(key_of(face.face));
       const std::uint32_t by_rays = found == by_face.end() ? 0 : found->second.views;
       views += static_cast<std::size_t>(std::popcount(face.views));
-      // Faces that rays met pass their views on to their neighbours.
+      // Faces that rays hit pass their views on to their neighbours.
       others += static_cast<std::size_t>(std::popcount(face.views & ~by_rays));
     }
     EXPECT_GT(views, 20'000U);

@@ -30,7 +30,7 @@ using render_test::place;
 using render_test::towards;
 using render_test::under_even_sky;
 
-constexpr int kEdge = 48;             // of pictures, in pixels
+constexpr int kEdge = 48;             // image size in pixels
 constexpr IVec3 kTower{-16, 0, -16};  // the tower built on the meadow
 constexpr std::array kSamples{1, 4, 16, 64};
 
@@ -54,7 +54,7 @@ double mean_square(const PathPicture& a, const PathPicture& b) {
   return sum / (3.0 * static_cast<double>(a.radiance.size()));
 }
 
-/// A meadow with a wall and lamps seen from above, with visible noise.
+/// A meadow with a wall and lamps, seen from above, with visible noise.
 class PathHistoryTest : public testing::Test {
  protected:
   PathHistoryTest() : scene_(meadow(grid_)), tracer_(scene_), options_(under_even_sky(kEdge, kEdge, 1)) {
@@ -147,7 +147,7 @@ TEST_F(PathHistoryTest, KeepsPixelsUnaffectedByAnEdit) {
   const PathPicture plain = take(kEdge, 1);
   const PathPicture shown = refined(kEdge, 1);
   const PathPicture converged = take(kEdge, 1'024);
-  // Behind the wall hardly a path comes by the tower.
+  // Hardly any path behind the wall passes the tower.
   EXPECT_LT(mean_square(shown, converged), 0.5 * mean_square(plain, converged));
   EXPECT_GT(greatest_difference(plain, before, kEdge / 2), 0.2F);
   int same = 0;
@@ -177,7 +177,7 @@ TEST_F(PathHistoryTest, AnEditTakenBackHasThePictureOfBeforeWithTheFirstSample) 
   EXPECT_LT(greatest_difference(refined(kEdge, 1), before), 0.02F);
 }
 
-// Where an edit takes away little of the light.
+// The edit removes only little of the light.
 TEST_F(PathHistoryTest, ShowsWhatTheNewSceneShowsInTheMean) {
   constexpr int kTries = 24;
   std::vector<DVec3> shown(static_cast<std::size_t>(kEdge) * kEdge, DVec3(0.0));

@@ -50,13 +50,13 @@ std::vector<LampBounds> some_lamps(Numbers& numbers, std::size_t count) {
     lamp.low = Vec3(numbers.between(-40.0F, 40.0F), numbers.between(-5.0F, 5.0F), numbers.between(-40.0F, 40.0F));
     lamp.high = lamp.low + Vec3(numbers.between(0.0F, 3.0F), 0.0F, numbers.between(0.0F, 3.0F));
     lamp.axis = i % 3 == 0 ? numbers.direction() : Vec3(0.0F, 1.0F, 0.0F);
-    if (i % 5 == 0) lamp.cos_spread = lamp.cos_edge = -1.0F;  // it shines everywhere
+    if (i % 5 == 0) lamp.cos_spread = lamp.cos_edge = -1.0F;  // shines in all directions
     lamp.power = numbers.between(0.1F, 10.0F);
   }
   return lamps;
 }
 
-// Axes, their borders and directions between them: cases where component comparisons tie.
+// Axes, their borders and directions in between: cases where component comparisons tie.
 std::vector<Vec3> awkward_directions() {
   std::vector<Vec3> all;
   for (int x = -1; x <= 1; ++x) {
@@ -173,7 +173,7 @@ TEST(PathKernel, ChoosesLampsWithTheirChances) {
   }
 }
 
-// As one point does with choose and pairs of numbers, each of the pixel that is meant for lamps.
+// Matches a single point with choose and pairs of numbers; each pixel uses its own numbers for lamps.
 TEST(PathKernel, ShadesByLampsOfNumbersOfTheirOwn) {
   Numbers numbers;
   const LightTree tree(some_lamps(numbers, 200));
