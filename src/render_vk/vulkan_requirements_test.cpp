@@ -1,4 +1,4 @@
-// How a device is chosen of those there are.
+// The choice of a device.
 
 #include <array>
 

@@ -28,7 +28,7 @@ void expect_orthonormal(const Camera& camera) {
   expect_near(camera.right, glm::cross(camera.forward, camera.up));
 }
 
-/// The position of a point in the image: -1 to 1 from the left to the right edge and from the bottom to the top edge.
+/// The position of a point in the image: -1 to 1 from left to right and from bottom to top.
 struct InPicture {
   double x, y, depth;
 };
@@ -180,7 +180,7 @@ TEST(Camera, EachViewShowsTheSideOfItsName) {
 void expect_framed(const DBox& box, View view, double aspect) {
   const Extent extent = extent_of(frame_view(box, view, aspect), aspect, box);
   constexpr double kFull = 0.92;  // a margin of 4 % on each side
-  // Positions far from the origin are rounded by as much as the box's own coordinates are.
+  // Positions far from the origin have the rounding error of the box's own coordinates.
   const double size = std::max({box.max.x - box.min.x, box.max.y - box.min.y, box.max.z - box.min.z});
   const double far = std::max(glm::length(box.min), glm::length(box.max));
   const double tolerance = 1e-9 + 1e-14 * far / std::min(size, extent.depth);
@@ -215,7 +215,7 @@ TEST(Camera, FramedBoxesLieWithinThePictureAndFillIt) {
   }
 }
 
-/// A few voxels in grids that are turned, mirrored and of other sizes.
+/// Returns a few voxels in grids that are turned, mirrored and of different sizes.
 Scene scattered_scene(std::mt19937_64& random) {
   const auto between = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
   Scene scene;
@@ -305,7 +305,7 @@ TEST(Camera, NothingAndAPointAreFramedAsAUnitCube) {
   }
 }
 
-// Every frame of a turn, and every scene, fits into the image; the camera keeps one distance from the axis.
+// Every frame of a turn, and every scene, fits into the image; the camera keeps its distance from the axis.
 TEST(Framing, SeveralScenesAndTurnsAreFramedAlike) {
   std::mt19937 random(18);
   const auto number = [&](int count) { return static_cast<int>(random() % static_cast<unsigned>(count)); };

@@ -86,7 +86,7 @@ TEST(Hierarchy, ThousandsOfGroupsInEachOtherAreSortedAtOnce) {
   }
   const auto sorted = groups_from_top(scene);
   EXPECT_EQ(sorted, chain);
-  // And with a circle at the top: its three are all there, and the rest hangs below the third.
+  // With a circle at the top, its three groups stay, and the others follow below the third.
   scene.edit(chain[0]).parent = chain[2];
   const auto around = groups_from_top(scene);
   ASSERT_EQ(around.size(), chain.size());
@@ -132,7 +132,7 @@ TEST(Hierarchy, AMovedGroupTakesAllBelowWithIt) {
   EXPECT_LT(glm::length(corner - DVec3(0, 0, -1)), 1e-12);
 }
 
-/// The slow, obvious version, for hierarchies without circles.
+/// The simple slow version for hierarchies without circles.
 bool slowly_shown(const Scene& scene, const Instance& instance) {
   const auto layer_shows = [&](LayerHandle handle) {
     const SceneLayer* layer = scene.layers().find(handle);

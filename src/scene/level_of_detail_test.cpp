@@ -203,7 +203,7 @@ TEST(LevelOfDetail, ACameraThatTremblesAtAThresholdChangesNothing) {
   const double scale = 300.0 / std::tan(std::numbers::pi / 8);
   DetailPolicy policy;
   policy.far_pixels = 40;
-  // Near to Mid; no halving to one; Mid to Far.
+  // Near to Mid; no halvings to one; Mid to Far.
   const std::array<double, 3> thresholds = {radius + scale, radius + 2.0 * scale / policy.cell_pixels,
                                             2.0 * radius * scale / policy.far_pixels};
   for (const double threshold : thresholds) {

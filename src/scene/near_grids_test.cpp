@@ -14,7 +14,7 @@ namespace {
 
 using WorldVoxels = std::set<std::tuple<double, double, double>>;
 
-/// The least corners of all voxels in the world.
+/// Returns the least corners of all voxels in the world.
 WorldVoxels world_voxels(const Scene& scene) {
   WorldVoxels voxels;
   for (const InstanceHandle handle : scene.instances().handles()) {
@@ -89,7 +89,7 @@ TEST(NearGrids, KeepVoxelsTogetherThatTouch) {
   EXPECT_EQ(meshes->stats.faces_visible, 10 + 6) << "no face between neighbours";
 }
 
-/// The triangles of a file of meshes, in Quoin's axes.
+/// Returns the triangles of a written mesh file, in Quoin's axes.
 TriangleMesh written_and_read(const SceneMeshes& meshes, FileFormat format) {
   const auto bytes = write_mesh(meshes, format);
   EXPECT_TRUE(bytes) << (bytes ? "" : to_string(bytes.error()));

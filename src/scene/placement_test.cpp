@@ -22,7 +22,7 @@ struct Random {
   explicit Random(unsigned seed) : engine(seed) {}
   double share() { return std::uniform_real_distribution<double>(-1.0, 1.0)(engine); }
   DVec3 vector() { return {share(), share(), share()}; }
-  // A rotation of any length, including quarter turns.
+  // Returns a rotation of any length, including quarter turns.
   DQuat rotation() {
     if (engine() % 4 == 0) {
       DVec3 axis(0.0);
@@ -54,7 +54,7 @@ TEST(GridFromWorld, IsTheInverseOfWorldFromGrid) {
     grid.pivot = random.vector() * 100.0;
     const DVec3 point = random.vector() * std::pow(10.0, 4.0 + 3.0 * random.share());
     const DVec3 world = world_from_grid(instance, grid, point);
-    // The rounding of the world's doubles, and of the offset in the grid.
+    // Rounding errors of the world's doubles and of the offset in the grid.
     const double rounding = 8.0 * std::numeric_limits<double>::epsilon();
     const double room = rounding * ((largest(world) + largest(instance.position)) / instance.voxel_size +
                                     largest(point) + largest(grid.pivot));
@@ -151,7 +151,7 @@ TEST(VoxelFromWorld, AgreesWithWhatARayHits) {
         if (!hit || hit->starts_inside) continue;
         ++hits;
         ASSERT_EQ(hit->instance, handle);
-        // A thousandth of a voxel behind the face that was hit: the position itself is rounded to either side of it.
+        // A thousandth of a voxel behind the hit face: the position itself is rounded to either side of the face.
         const DVec3 inwards = world_from_grid_direction(instance, DVec3(normal_of(hit->face)) * -1e-3);
         const DVec3 point = hit->position + inwards;
         const DVec3 in_grid = grid_from_world(instance, scene.grids()[instance.grid], point);

@@ -165,7 +165,7 @@ TEST(SceneChanges, AnEditThatThrowsIsTold) {
   EXPECT_TRUE(scene.changes_since(cursor).empty()) << "an edit that changes nothing";
 }
 
-// A consumer that reads in the middle of an edit's callback reads the rest of the edit later.
+// A consumer that reads during an edit's callback reads the rest of the edit later.
 TEST(SceneChanges, AnEditThatIsLookedAtHalfwayIsToldToItsEnd) {
   Scene scene;
   const GridHandle handle = scene.add_grid({});

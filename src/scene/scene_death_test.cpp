@@ -39,7 +39,7 @@ TEST(SceneDeathTest, AHandleOfNothingIsAMistake) {
   QUOIN_EXPECT_MISTAKE(move_group(scene, {}, DVec3(0.0), DQuat(1, 0, 0, 0)), "the handle names an element");
 }
 
-// A grid that is placed once, in a group and on a layer.
+// A grid with one instance, in a group and on a layer.
 struct Built {
   Scene scene;
   GridHandle grid = scene.add_grid({.name = "grid"});
@@ -208,7 +208,7 @@ TEST(CameraDeathTest, FramingByWhatIsNoneIsAMistake) {
 TEST(NoiseDeathTest, PlacesBeyondTheLatticeAreMistakes) {
   QUOIN_EXPECT_MISTAKE((void)noise2(1, 2e9, 0.0), "2.30");
   QUOIN_EXPECT_MISTAKE((void)noise3(1, 0.0, 0.0, -2e9), "2.30");
-  const double edge = 1 << 24;  // of five octaves
+  const double edge = 1 << 24;  // the limit for five octaves
   EXPECT_LE(std::abs(fractal2(1, edge - 1.0, 1.0 - edge, 5)), 2.0);
   QUOIN_EXPECT_MISTAKE((void)fractal2(1, 0.0, edge, 5), "29 - octaves");
   QUOIN_EXPECT_MISTAKE((void)fractal2(1, 0.0, 0.0, 30), "29 - octaves");

@@ -19,9 +19,9 @@ double elevation(const SunTime& time) {
 TEST(SunDirection, StandsAsHighAsTheSeasonSays) {
   EXPECT_NEAR(elevation({6, 21, 12.0, 52.0}), 90.0 - 52.0 + 23.44, 0.3);
   EXPECT_NEAR(elevation({12, 21, 12.0, 52.0}), 90.0 - 52.0 - 23.44, 0.3);
-  EXPECT_NEAR(elevation({3, 21, 12.12, 0.0}), 90.0, 1.0);  // noon is seven minutes late that day
+  EXPECT_NEAR(elevation({3, 21, 12.12, 0.0}), 90.0, 1.0);  // noon is seven minutes late on that day
   EXPECT_NEAR(elevation({6, 21, 0.0, 52.0}), -(90.0 - 52.0 - 23.44), 0.3);
-  EXPECT_GT(elevation({6, 21, 0.0, 80.0}), 0.0);  // it does not set
+  EXPECT_GT(elevation({6, 21, 0.0, 80.0}), 0.0);  // the sun does not set
   EXPECT_NEAR(elevation({12, 21, 12.0, -52.0}), 90.0 - 52.0 + 23.44, 0.3);
 }
 

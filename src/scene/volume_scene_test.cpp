@@ -12,7 +12,7 @@
 namespace quoin {
 namespace {
 
-// A ball round (20, 30, -10) in the world, of radius 12; values grow inwards.
+// A ball of radius 12 about (20, 30, -10) in the world; values increase inwards.
 Volume ball(IVec3 size, const glm::dmat4& world_from_voxel) {
   Volume volume;
   volume.size = size;
@@ -65,7 +65,7 @@ TEST(VolumeScene, StandsWhereTheVolumeSays) {
         const DVec3 away = glm::normalize(out);
         const auto hit = first_hit(tracer, {DVec3{20, 30, -10} + away * 60.0, -away});
         ASSERT_TRUE(hit);
-        // Coarse along one axis: interpolation between its samples cuts corners.
+        // One axis is coarse: interpolation between its samples cuts corners.
         EXPECT_NEAR(hit->t, 60.0 - 12.0, spacing.z > 2.0 ? 0.15 : 0.03);
         EXPECT_GT(glm::dot(hit->normal, away), 0.97);
       }

@@ -22,7 +22,7 @@ constexpr SmoothOcclusion kForms[] = {SmoothOcclusion::SolidShare, SmoothOcclusi
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// Hills with caves in chunks on both sides of the origin, one material per chunk.
+/// Returns hills with caves in the eight chunks around the origin.
 DensityGrid hilly_field() {
   DensityGrid grid(kBand);
   const auto field = [](IVec3 p) {

@@ -54,7 +54,7 @@ TEST_F(VulkanMemory, PlacesNeverOverlapAndBlocksAreGivenBack) {
 
 TEST_F(VulkanMemory, WritesArrive) {
   DeviceMemory memory(*device_, 1 << 20);
-  // More than is staged at a time.
+  // More than the staging buffer holds.
   std::vector<std::uint32_t> values(5'000'000);
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<std::uint32_t>(i * 2654435761U);
   const Place other = memory.allocate(100, "testing").value();

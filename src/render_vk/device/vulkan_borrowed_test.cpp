@@ -1,4 +1,4 @@
-// Renderers on a device that somebody else made.
+// Renderers on a device that the caller created.
 
 #ifdef QUOIN_HAVE_VULKAN
 
@@ -16,7 +16,7 @@ using vulkan::info_of;
 using vulkan_test::OwnDevice;
 using vulkan_test::OwnImage;
 
-/// Skipped where there is no device; fails on every message of the validation layer.
+/// Skips without a device; fails on every message of the validation layer.
 class VulkanBorrowed : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -85,7 +85,7 @@ TEST_F(VulkanBorrowed, TwoRenderersShareADevice) {
   const Status refused = second.draw(picture, camera_, options_, Accumulation::Restart);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().message, "vulkan: the picture is of another renderer");
-  // Each on a thread of its own, with the queue guarded.
+  // Each renderer runs on its own thread, with the queue guarded.
   std::vector<std::thread> threads;
   for (VulkanRenderer* one : {&first, &second}) {
     threads.emplace_back([&, one] {
@@ -118,7 +118,7 @@ TEST_F(VulkanBorrowed, NullHandlesAreRefused) {
   EXPECT_EQ(describe_vulkan_device(own_->instance, nullptr).error().code, ErrorCode::InvalidArgument);
 }
 
-// Stand between a program and Vulkan, for devices that are not at hand.
+// These functions stand between a program and Vulkan, to simulate devices that are not available.
 PFN_vkGetInstanceProcAddr real() {
   return vulkan::Api::load()->vkGetInstanceProcAddr;
 }

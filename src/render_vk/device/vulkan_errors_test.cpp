@@ -83,7 +83,7 @@ TEST_F(VulkanErrors, AreThoseOfTheProcessor) {
   expect_same(wrong, sized(4, 4));
 }
 
-// Before the first update and after a failed one there is no scene for levels of detail.
+// Before the first update and after a failed one, there is no scene for levels of detail.
 TEST_F(VulkanErrors, DetailOfNothingIsTheSky) {
   const Camera camera = towards({20, 20, 40}, {0, 0, 0});
   RenderOptions options = sized(16, 12);

@@ -1,4 +1,4 @@
-// The tables that shaders outside of this library get, read as these read them: 32-bit words, and addresses in bytes.
+// Reads the tables for shaders outside of this library as those shaders do: 32-bit words, and addresses in bytes.
 
 #include "render_vk/march/shader_scene.h"
 
@@ -38,7 +38,7 @@ class Words {
   std::vector<std::uint32_t> words_;
 };
 
-// Descends a tree as walk.wgsl does, to the type of a voxel; nullopt if the tree does not contain it.
+// Descends a tree in the same way as walk.wgsl, to the type of a voxel; nullopt if the tree does not contain it.
 std::optional<VoxelType> type_in(const Words& words, const vulkan::ShaderTree& tree, IVec3 voxel) {
   for (int axis = 0; axis < 3; ++axis) {
     if (voxel[axis] < tree.low[axis] || voxel[axis] >= tree.high[axis]) return std::nullopt;
@@ -86,7 +86,7 @@ struct Scattered {
     std::mt19937 random(kSeed);
     const VoxelType types[] = {stone, brick, glass, lamp};
     SceneGrid placed;
-    placed.grid.fill_box({{-70, -5, -70}, {64, 64, 10}}, stone);  // whole chunks, bricks and slabs among it
+    placed.grid.fill_box({{-70, -5, -70}, {64, 64, 10}}, stone);  // includes whole chunks, bricks and slabs
     for (int i = 0; i < 3'000; ++i) {
       const auto at = [&](int least, int most) { return std::uniform_int_distribution<int>(least, most)(random); };
       placed.grid.set({at(-90, 200), at(-20, 80), at(-80, 90)}, types[at(0, 3)]);

@@ -1,6 +1,6 @@
-// view/*: images as a window shows them, kept on the best device found, compared with the CPU renderer on all threads:
-// the 256x128x256 terrain and a world of 4096x256x4096, at 1920x1080 and 3840x2160, with shadows and six occlusion
-// rays; also by ray kind. `device` is skipped without a device.
+// view/*: images as in a window, kept on the best device found, compared with the CPU renderer on all threads: the
+// 256x128x256 terrain and a world of 4096x256x4096, at 1920x1080 and 3840x2160, with shadows and six occlusion rays;
+// also by ray kind. `device` is skipped without a device.
 
 #include <cmath>
 #include <memory>

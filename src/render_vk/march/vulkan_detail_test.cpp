@@ -1,6 +1,6 @@
 #ifdef QUOIN_HAVE_VULKAN
 
-// Far grids that are halved, drawn by the device and by the CPU.
+// Compares distant halved grids between the device and the CPU.
 
 #include <set>
 
@@ -31,7 +31,7 @@ class VulkanDetail : public vulkan_test::VulkanDetailTest {
   }
 };
 
-// All instances Mid, halved as often as their distance and volume allow.
+// All instances are Mid and halved as often as their distance and volume allow.
 RenderOptions always_mid(double cell_pixels) {
   RenderOptions options = sized(128, 96);
   options.detail.policy.emplace().rule = DetailPolicy::Rule::ByRadius;
@@ -123,7 +123,7 @@ TEST_F(VulkanDetail, AnEditSendsWhatItChanged) {
   compare(camera, options, "after_the_edit");
 }
 
-// Hills with caves, and a house on them.
+// Adds hills with caves, and a house on them.
 GridHandle add_hills(Scene& scene, bool has_house) {
   const GridHandle handle = add_blobs(scene, 31, has_house ? 30 : 0);
   DensityGrid& field = scene.edit(handle).field;

@@ -18,7 +18,7 @@ namespace {
 using namespace render_test;
 using namespace vulkan_test;
 
-// Hills over several chunks, some of them with solid chunks below.
+// Returns hills over several chunks, some with solid chunks below.
 DensityGrid hills(const FieldTypes& types, int edge) {
   DensityGrid field;
   field.edit({{-edge, -100, -edge}, {edge, 40, edge}}, [&](IVec3 p, DensitySample) {
@@ -83,7 +83,7 @@ TEST_F(VulkanField, FromWithinAndFromAbove) {
   compare(scene, towards({50, 40, 60}, {0, 10, 0}), options, "field_lamps");
 }
 
-// Glowing balls over hills, a house and a lantern; near, halved and from an impostor.
+// Emissive balls over hills, a house and a lantern: near, halved and from an impostor.
 TEST_F(VulkanField, EmissiveSamplesLightTheirSurroundings) {
   Scene scene;
   const FieldTypes types = add_field_types(scene);
@@ -157,7 +157,7 @@ TEST_F(VulkanField, EditsAreTakenOver) {
     const auto at = [&] { return static_cast<double>(random() % 120) - 60.0; };
     field.remove_sphere({at(), 4.0, at()}, 7.0);
     field.add_sphere({at(), 12.0, at()}, 6.0, types.stone, 3.0);
-    // Across the corner of chunks.
+    // Across the corner of eight chunks.
     field.add_box({-4.0 - i, 0.0, -3.0}, {3.0, 24.0 + i, 5.0}, types.ground);
     compare(scene, camera, options, "field_edited");
     EXPECT_LT(renderer_->uploaded_bytes(), all);
@@ -197,7 +197,7 @@ TEST_F(VulkanField, ALakeAndBallsOfGlass) {
     options.light.shading = shading;
     compare(scene, camera, options, "field_lake_shading_" + std::to_string(static_cast<int>(shading)));
   }
-  // If all of it is opaque, the image differs.
+  // The image differs if everything is opaque.
   options = sized(160, 120);
   for (const VoxelType type : {types.glass, static_cast<VoxelType>(types.glass + 1)}) {
     VoxelProperties opaque = scene.types[type];
@@ -208,7 +208,7 @@ TEST_F(VulkanField, ALakeAndBallsOfGlass) {
   EXPECT_GT(render_test::count_different(plain, render_test::taken(scene, camera, options), 8), 1000);
 }
 
-// Of several transparent materials in every cell, and opaque ones.
+// Every cell has several transparent materials, and opaque ones.
 TEST_F(VulkanField, MixedGlassInEveryCell) {
   Scene scene;
   const FieldTypes types = add_field_types(scene);

@@ -1,4 +1,4 @@
-// Pictures in images of a program that draws by Vulkan itself.
+// Draws into images of a program that itself uses Vulkan.
 
 #ifdef QUOIN_HAVE_VULKAN
 
@@ -20,7 +20,7 @@ using vulkan_test::OwnImage;
 constexpr std::array kFormats = {VK_FORMAT_R8G8B8A8_UNORM, VK_FORMAT_R8G8B8A8_SRGB, VK_FORMAT_B8G8R8A8_UNORM,
                                  VK_FORMAT_B8G8R8A8_SRGB};
 
-/// Skipped where there is no device; fails on every message of the validation layer.
+/// Skips without a device; fails on every message of the validation layer.
 class VulkanImages : public ::testing::Test {
  protected:
   void SetUp() override {

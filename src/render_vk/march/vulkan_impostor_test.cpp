@@ -1,6 +1,6 @@
 #ifdef QUOIN_HAVE_VULKAN
 
-// Impostors, drawn by the device and by the CPU.
+// Compares impostors between the device and the CPU.
 
 #include <chrono>
 #include <cmath>
@@ -26,7 +26,7 @@ using vulkan_test::in_detail;
 
 class VulkanImpostors : public vulkan_test::VulkanDetailTest {
  protected:
-  // All of one model, on a floor.
+  // Adds instances of one model on a floor.
   void add_model(Model model) {
     ImpostorWorld world(model);
     scene_ = std::move(world.scene);
@@ -47,7 +47,7 @@ TEST_F(VulkanImpostors, AreTheProcessorsFromAllAround) {
     const ImpostorWorld world(model);
     const std::string name = "far_" + std::to_string(static_cast<int>(model)) + "_";
     int view = 0;
-    // Every level of the snapshots.
+    // Covers every level of the snapshots.
     for (const double pixels : {110.0, 60.0, 25.0, 12.0, 5.0}) {
       const Camera camera = orbiting(world, 0.7 + view, 0.6 - 0.2 * view, 0.3 * view, pixels, 128);
       compare(camera, far_options(128), name + std::to_string(view++));
@@ -82,7 +82,7 @@ TEST_F(VulkanImpostors, EveryKindOfLight) {
 TEST_F(VulkanImpostors, AmongOthersOfEveryDetail) {
   add_crowd(scene_, {add_blobs(scene_, 31, 12), add_blobs(scene_, 32, 12)}, 6, 320.0);
   Camera camera = towards({-150, 160, -150}, {900, -60, 900}, 0.7);
-  // More than a tile, Near, Mid and Far.
+  // More than one tile, with Near, Mid and Far instances.
   RenderOptions options = in_detail(320, 200, 128);
   compare(camera, options, "crowd");
   options.detail.colours = true;
@@ -95,7 +95,7 @@ TEST_F(VulkanImpostors, AmongOthersOfEveryDetail) {
   EXPECT_GT(impostor_bytes(), 0U);
 }
 
-// Frames do not wait: neither for impostors to be built, nor for all of one to be sent.
+// Frames wait neither for the build of an impostor nor for its whole upload.
 TEST_F(VulkanImpostors, FramesSendALittleAtATime) {
   SceneGrid large;
   large.grid.edit({IVec3(0), IVec3(150)}, [](IVec3 v, VoxelType) {
@@ -125,7 +125,7 @@ TEST_F(VulkanImpostors, FramesSendALittleAtATime) {
   const Picture traced = taken_as_is(camera, sized(96, 96));
   EXPECT_EQ(taken_as_is(camera, frames).colour.rgb, traced.colour.rgb) << "nothing is there yet";
   EXPECT_GT(frames_until(taken(scene_, camera, waiting)), 0);
-  // An edit: the old impostor is drawn until the new one is there as a whole.
+  // After an edit, the old impostor is drawn until the whole new one is uploaded.
   scene_.edit(instance.grid).grid.fill_box({{60, 100, 100}, {90, 150, 150}}, kAir);
   ASSERT_TRUE(renderer_->update(scene_));
   const Picture first = taken_as_is(camera, frames);
@@ -141,7 +141,7 @@ TEST_F(VulkanImpostors, FramesSendALittleAtATime) {
   EXPECT_EQ(taken_as_is(camera, frames).colour.rgb, taken_as_is(camera, waiting).colour.rgb);
 }
 
-// As far as single precision and further.
+// Up to the range of single precision and beyond.
 TEST_F(VulkanImpostors, FarFromTheOriginAndTheCamera) {
   add_crowd(scene_, {add_blobs(scene_, 31), add_blobs(scene_, 32)}, 5, 260.0);
   const DVec3 away{1e9, -3e8, 5e8};
@@ -151,7 +151,7 @@ TEST_F(VulkanImpostors, FarFromTheOriginAndTheCamera) {
   compare(towards(away + DVec3(-3e5, 4e5, -5e5), away + DVec3(500, 0, 500), 0.004), options, "far_telescope");
 }
 
-// Their fields too, turned and mirrored.
+// The fields too are turned and mirrored.
 TEST_F(VulkanImpostors, FieldsFarFromTheOriginAndTheCamera) {
   ImpostorWorld world(Model::Village);
   scene_ = std::move(world.scene);
@@ -224,7 +224,7 @@ TEST_F(VulkanImpostors, HiddenInstancesShowWhereTheyAreWanted) {
   EXPECT_GT(all->pixels_hit, render_test::taken(scene_, camera, options).pixels_hit);
 }
 
-// Voxels smaller than texels, which grow to the size of these.
+// Voxels smaller than texels grow to texel size.
 TEST_F(VulkanImpostors, LargeGrid) {
   add_model(Model::Terrain);
   const ImpostorWorld world(Model::Terrain);
@@ -289,7 +289,7 @@ TEST_F(VulkanImpostors, ThoseOfAnotherSceneWithTheSameHandlesAreNotShown) {
   EXPECT_GT(impostor_bytes(), 0U);
   scene_ = Scene();
   add_crowd(scene_, {add_blobs(scene_, 77, 9)}, 3, 300.0);
-  // Each frame shows the second scene: traced, until its impostors are there as a whole.
+  // Each frame shows the second scene, traced until its impostors are completely uploaded.
   const Picture far = render_test::taken(scene_, camera, options);
   const Picture near = render_test::taken(scene_, camera, render_test::sized(128, 96));
   options.detail.impostor_seconds = 0.0;
@@ -308,7 +308,7 @@ TEST_F(VulkanImpostors, SamplesAddUpToTheRenderedPicture) {
   add_crowd(scene_, {add_blobs(scene_, 31, 12)}, 3, 300.0);
   ASSERT_TRUE(renderer_->update(scene_));
   const Camera camera = towards({-900, 1200, -1500}, {300, 0, 300}, 0.7);
-  // More than a tile.
+  // More than one tile.
   RenderOptions options = in_detail(300, 100, 128);
   VulkanPicture picture(*renderer_);
   for (int sample = 0; sample < 3; ++sample)

@@ -1,4 +1,4 @@
-// Pictures that stay on the device and get better sample by sample.
+// Images that stay on the device and improve sample by sample.
 
 #include "render_vk/device/vulkan_for_tests.h"
 #include "tests/golden_views.h"

@@ -63,7 +63,8 @@ TEST_F(VulkanPropagated, ShowsTheLightThatItIsGiven) {
   EXPECT_EQ(taken(cave.scene, Cave::inside(), options).colour.rgb, lit.colour.rgb);
 }
 
-// A corridor with a lamp of each channel at an end of its own, a shaft of sky: every level of each, on plain white.
+// A corridor with a lamp of each colour channel at its own end, and a shaft of sky: every level of each, on plain
+// white.
 TEST_F(VulkanPropagated, EveryLevelHasTheColourThatTheProcessorGivesIt) {
   Scene scene;
   const VoxelType white = add_type(scene, {255, 255, 255, 255});

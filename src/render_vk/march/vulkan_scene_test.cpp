@@ -1,4 +1,4 @@
-// Scenes of many kinds, drawn by the device and by the CPU.
+// Compares scenes of many kinds between the device and the CPU.
 
 #include <cmath>
 #include <numbers>
@@ -27,7 +27,7 @@ class VulkanScene : public vulkan_test::VulkanTest {
   }
 };
 
-/// A hut of two opaque types on a floor, with a window of glass and a lamp.
+/// The types of a hut: two opaque types on a floor, a window of glass and a lamp.
 struct Types {
   VoxelType wall, roof, glass, water, lamp;
 };
@@ -102,7 +102,7 @@ TEST_F(VulkanScene, ManyInstances) {
     add_instance(scene, grid, position, {unit(random), unit(random), unit(random), unit(random)}, 0.6, i % 2 == 0);
   }
   compare(scene, towards({60, 30, 70}, {0, 0, 0}), sized(96, 72), "many");
-  // Along the axes, where directions are 0.
+  // Along the axes, where direction components are 0.
   compare(scene, from_above(0.3, 60, -0.7, 80), sized(64, 64), "many_from_above");
 }
 
@@ -125,7 +125,7 @@ TEST_F(VulkanScene, SurfacesOfGlass) {
   compare(scene, slanted, options, "surfaces_slanted");
 }
 
-// Bodies on bodies of another index, in air, on stone of their own grid and of another one.
+// Bodies that touch bodies of another index, in air, on stone of their own grid and of another grid.
 TEST_F(VulkanScene, SurfacesOfGlassThatTouches) {
   Scene scene;
   const Types types = add_types(scene);
@@ -313,7 +313,7 @@ TEST_F(VulkanScene, RandomScenesFromRandomPlaces) {
   }
 }
 
-// A hut by night, with lamps of every kind.
+// Returns a hut at night with lamps of every kind.
 Scene lit_by_night(DVec3 origin) {
   Scene scene;
   const Types types = add_types(scene);

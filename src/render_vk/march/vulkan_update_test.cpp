@@ -30,7 +30,7 @@ class VulkanUpdate : public vulkan_test::VulkanTest {
   }
 };
 
-/// Hills of many chunks, of two types in patches.
+/// Returns hills of many chunks, with two types in patches.
 Grid hills(VoxelType ground, VoxelType stone, int edge) {
   Grid grid;
   for (int x = 0; x < edge; x += 4) {
@@ -148,7 +148,7 @@ TEST_F(VulkanUpdate, IslandsFarApart) {
   expect_equal(taken(scene, near, options), render_test::taken(scene, near, options), "island");
   const Camera far = towards({-3e6 + 60, 4e6 + 50, -5e6 + 70}, {-3e6, 4e6, -5e6});
   expect_equal(taken_as_is(far, options), render_test::taken(scene, far, options), "far_island");
-  // Further than single precision counts voxels: rays end all the same.
+  // Beyond the voxel range of single precision: rays still end.
   scene.edit(scene.instances()[instance].grid).grid.set({400'000'000, 21, 43}, stone);
   const Camera across = towards({150.3, 24.7, 20.1}, {400'000'000, 21, 43}, 1.5);
   expect_equal(taken(scene, across, options), render_test::taken(scene, across, options), "across");

@@ -39,7 +39,7 @@ PathOptions small(int samples = 4) {
 struct PathDifferences {
   int pixels = 0;      ///< pixels whose light differs by more than 1/100
   int depths = 0;      ///< by more than 1e-4 of the distance
-  double light = 1.0;  ///< of the whole, by the other's
+  double light = 1.0;  /// ratio of the total light to the other image
   int total = 0;
 };
 
@@ -81,7 +81,7 @@ class VulkanPaths : public VulkanTest {
     return picture ? std::move(*picture) : PathPicture{};
   }
 
-  // `share`: of pixels where single precision may change paths.
+  // `share`: the share of pixels in which single precision may change paths.
   void expect_same_light(const Scene& scene, const Camera& camera, const PathOptions& options, const std::string& name,
                          double share = 0.002) {
     const PathPicture device = drawn(scene, camera, options);
@@ -198,8 +198,8 @@ TEST_F(VulkanPaths, ConvergeToWhatTheProcessorShows) {
   EXPECT_LT(std::sqrt(sum / blocks), 0.03);
 }
 
-// Fields, one of them without materials, which is white; by night, since its shader takes a minute to compile, glass of
-// fields and of voxels too.
+// Fields, one of them without materials, which is white. Nightly runs add glass of fields and of voxels, since their
+// shader takes a minute to compile.
 TEST_F(VulkanPaths, MeetFields) {
   const bool is_night = std::getenv("QUOIN_NIGHTLY") != nullptr;
   Scene scene = is_night ? town() : Scene();
@@ -315,7 +315,7 @@ TEST_F(VulkanPaths, KeepTheFacesThatGlowUntilTheyAreOthers) {
   const std::uint64_t with_a_type = sent();
   EXPECT_GT(with_a_type, again);
   scene.edit(grid).grid.fill_box({{-4, 0, 10}, {2, 6, 12}}, type);
-  // Over a hundred unit faces, which take 20 bytes each and as many free slots.
+  // More than a hundred unit faces, which take 20 bytes each, and as many free slots.
   EXPECT_GT(sent(), again + 4'000);
   expect_same_light(scene, of_town(), small(), "glowing");
 }

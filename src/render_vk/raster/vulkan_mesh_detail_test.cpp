@@ -25,7 +25,7 @@ using vulkan_test::with_mesh_light;
 
 class VulkanMeshDetail : public vulkan_test::VulkanMeshTest {
  protected:
-  // Glass has its own tests.
+  // Makes all types opaque: other tests cover glass.
   void make_opaque() {
     for (std::size_t type = 1; type < scene_.types.size(); ++type) {
       VoxelProperties properties = scene_.types[static_cast<VoxelType>(type)];
@@ -33,7 +33,7 @@ class VulkanMeshDetail : public vulkan_test::VulkanMeshTest {
       scene_.types.replace(static_cast<VoxelType>(type), properties);
     }
   }
-  // Merged, these scenes' meshes have fewer quads than impostors have faces.
+  // With merged quads, the meshes of these scenes have fewer quads than the impostors have faces.
   void compare_all(const Camera& camera, const RenderOptions& options, const std::string& name, bool merge = false) {
     const RenderOptions lit = with_mesh_light(options);
     meshes_->clear();
@@ -80,7 +80,7 @@ TEST_F(VulkanMeshDetail, ImpostorsAreThoseOfTheProcessor) {
   const RenderOptions options = in_detail(320, 240, 128);
   compare_all(camera, options, "mesh_far");
   const std::int64_t with = triangles_of(camera, with_mesh_light(options));
-  // Where faces of impostors are as small as pixels their edges are everywhere.
+  // With impostor faces as small as pixels, every pixel lies near a face edge.
   const Camera telephoto = towards({-9000, 14200, -15000}, {700, 0, 700}, 0.06);
   const RenderOptions lit = with_mesh_light(options);
   expect_like(drawn(telephoto, mesh_options(lit)), render_test::taken(scene_, telephoto, lit), "mesh_far_telephoto", 2);
@@ -206,7 +206,7 @@ TEST_F(VulkanMeshDetail, DrawsGridsWithoutAnImpostorHalved) {
   EXPECT_LE(different * 20, static_cast<int>(first.rgb.size()));
 }
 
-// Meshes that were put as smooth ones are halved as smooth ones.
+// Smooth meshes have smooth halved meshes.
 TEST_F(VulkanMeshDetail, SmoothMeshesStaySmooth) {
   const VoxelType stone = add_type(scene_, {200, 190, 170});
   SceneGrid ball;
@@ -225,8 +225,8 @@ TEST_F(VulkanMeshDetail, SmoothMeshesStaySmooth) {
   EXPECT_LE(different * 50, static_cast<int>(halved.rgb.size()));
 }
 
-// Fields are drawn from meshes of their halved samples, together with the halved blocks of the same grid; far fields
-// from their full meshes.
+// Fields are drawn from meshes of their halved samples, together with the halved blocks of the same grid; distant
+// fields from their full meshes.
 TEST_F(VulkanMeshDetail, FieldsAreHalvedToo) {
   const VoxelType stone = add_type(scene_, {200, 190, 170});
   const VoxelType brick = add_type(scene_, {190, 90, 70});
@@ -264,7 +264,7 @@ TEST_F(VulkanMeshDetail, FieldsAreHalvedToo) {
     EXPECT_EQ(bytes_that_differ(distant, fine, 8), 0);
     EXPECT_LE(bytes_that_differ(coarse, fine, 40) * 30, static_cast<int>(fine.rgb.size()));
     EXPECT_GT(bytes_that_differ(coarse, fine, 2), 0);
-    // With the shadows of the halved field.
+    // Includes the shadows of the halved field.
     RenderOptions lit = with_mesh_light(always(Detail::Mid, 1.0));
     std::int64_t triangles = 0;
     const Image shaded = shown(lit, triangles);

@@ -20,7 +20,7 @@ using vulkan_test::without_shadows;
 
 class VulkanMeshGlass : public vulkan_test::VulkanMeshTest {
  protected:
-  /// Compares pictures of glass as single faces, and of glass by rays: of panes of one voxel they are the same.
+  /// Compares glass as single faces and glass by rays with the CPU's image: for panes of one voxel they are equal.
   void compare_both(const Scene& scene, const Camera& camera, const RenderOptions& options, const std::string& name) {
     const Picture cpu = render_test::taken(scene, camera, options);
     meshes_->clear();
@@ -51,7 +51,7 @@ Camera straight(DVec3 position, double view_height) {
   return camera;
 }
 
-// A wall with panes before it, the furthest first, one voxel thick each and 40 voxels apart: in chunks of their own.
+// A wall with panes in front of it, the farthest first, each one voxel thick and 40 voxels apart: in separate chunks.
 Scene panes(const std::vector<VoxelType Types::*>& panes) {
   Scene scene;
   const Types types = add_types(scene);
@@ -160,9 +160,9 @@ TEST_F(VulkanMeshGlass, MoreQuadsThanAreSortedAreDrawnByChunk) {
   put(shown, surfaces);
   const Image sorted = drawn(camera, options);
   EXPECT_LT(meshes_->stats().drawn_triangles, 1000);
-  // A million quads that look the other way.
+  // A million quads that face away.
   Grid back;
-  constexpr VoxelType kRed = 3;  // the third that was added
+  constexpr VoxelType kRed = 3;  // the third type that was added
   back.set({30, 30, 30}, kRed);
   const auto surface = blocky_surface(back, shown.types, {0, 0, 0});
   ASSERT_EQ(surface->opaque_quads, 0U);

@@ -24,7 +24,7 @@ using vulkan_test::without_shadows;
 
 class VulkanMeshLight : public vulkan_test::VulkanMeshTest {};
 
-// A hut with a lamp before it; no glass.
+// Returns a hut with a lamp in front of it, without glass.
 Grid hut(Scene& scene) {
   const VoxelType wall = add_type(scene, {200, 180, 150});
   const VoxelType roof = add_type(scene, {150, 40, 30});
@@ -39,7 +39,7 @@ Grid hut(Scene& scene) {
   return grid;
 }
 
-// One hut as it is, one turned and small, one mirrored and large.
+// Returns one hut as it is, one turned and small, one mirrored and large.
 Scene huts(DVec3 at) {
   Scene scene;
   SceneGrid grid;
@@ -147,7 +147,7 @@ TEST_F(VulkanMeshLight, SmoothSurfacesHaveTheReferenceLight) {
   const GridHandle grid = scene.add_grid({});
   scene.add_instance({"", grid});
   put(scene, vulkan_test::smooth_surfaces(grid, field, scene.types));
-  // Onto the middle of a flat face, which is all open.
+  // Looks at the middle of a flat face, which is fully open.
   const Camera camera = from_above(30, 50, 30, 8);
   MeshPictureOptions options = mesh_options(without_shadows(sized(8, 8)));
   const Vec3 colour = render_test::linear({200, 120, 60});
@@ -207,7 +207,7 @@ TEST_F(VulkanMeshLight, ValuesAreShownAsTheyAre) {
   grid.fill_box({{0, 1, 0}, {5, 2, 10}}, stone);
   place(scene, std::move(grid));
   put(scene, blocky_surfaces(scene));
-  // From above, 20 pixels a voxel; x = 5 to 6 is a step lower and dark along its left.
+  // From above, 20 pixels per voxel; x = 5 to 6 is one step lower and dark along its left side.
   const Camera camera = from_above(5, 10, 5, 10);
   MeshPictureOptions options = mesh_options(sized(200, 200));
   options.light.shading = Shading::Normals;
@@ -215,7 +215,7 @@ TEST_F(VulkanMeshLight, ValuesAreShownAsTheyAre) {
   options.light.shading = Shading::Occlusion;
   const Image grey = drawn(camera, options);
   EXPECT_EQ(byte_at(grey, 180, 100), Vec3(255.0F));
-  // Both sides' voxels touch the corners at x = 5: level 2, so openness 1/3, and 1 a voxel further.
+  // Voxels on both sides touch the corners at x = 5: level 2, so openness 1/3, and 1 one voxel further.
   for (const int x : {101, 105, 110, 118}) {
     const float openness = 1.0F / 3.0F + 2.0F / 3.0F * (static_cast<float>(x) + 0.5F - 100.0F) / 20.0F;
     EXPECT_NEAR(byte_at(grey, x, 95).x, 255.0F * openness, 1.5F) << x;

@@ -1,4 +1,4 @@
-// A real model, in all the ways in which meshes are drawn. QUOIN_WRITE_VULKAN writes the pictures, for people.
+// Draws a real model by all mesh methods. QUOIN_WRITE_VULKAN writes the images for viewing.
 
 #include <filesystem>
 
@@ -24,7 +24,7 @@ class VulkanMeshModel : public vulkan_test::VulkanMeshTest {
     }
     return image;
   }
-  /// Each way shows something else.
+  /// Each method gives a different image.
   void show_all(const Camera& camera, MeshPictureOptions options, const std::string& name) {
     std::vector<Image> images = {shown(camera, options, name + "_lit")};
     options.wireframe = Wireframe::Over;

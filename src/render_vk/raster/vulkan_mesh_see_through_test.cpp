@@ -1,4 +1,4 @@
-// Glass by rays: its fragments match the marched image.
+// Ray-traced glass: its fragments match the marched image.
 
 #include <optional>
 
@@ -45,7 +45,7 @@ TEST_F(VulkanMeshSeeThrough, FarFromTheOriginItIsTheSame) {
   compare(glass_yard(far), over_glass_yard(far), glass_yard_options(160, 120), "yard_of_glass_far");
 }
 
-// Of each feature alone: the comparison fails without it.
+// The comparison fails without any one of these features.
 TEST_F(VulkanMeshSeeThrough, SurfacesAndDepthAreSeen) {
   const Scene scene = glass_yard();
   RenderOptions options = glass_yard_options(160, 120);
@@ -59,7 +59,7 @@ TEST_F(VulkanMeshSeeThrough, SurfacesAndDepthAreSeen) {
   EXPECT_GT(bytes_that_differ(right, drawn(over_glass_yard(), meshes), 4), 2500) << "the way through bodies";
 }
 
-// Turned, mirrored and scaled instances that stand in each other and before each other.
+// Turned, mirrored and scaled instances that intersect or cover each other.
 TEST_F(VulkanMeshSeeThrough, InstancesAreSeenThroughOneAnother) {
   Scene scene = glass_yard();
   const VoxelType amber = add_glass(scene, {240, 170, 60, 60}, 1.4F);
@@ -75,7 +75,7 @@ TEST_F(VulkanMeshSeeThrough, InstancesAreSeenThroughOneAnother) {
   compare(scene, over_glass_yard(), glass_yard_options(160, 120), "glass_in_glass");
 }
 
-// More bodies behind each other than a fragment keeps at a time, in one grid and in many.
+// More bodies in a row than a fragment can hold at a time, in one grid and in many.
 TEST_F(VulkanMeshSeeThrough, ManyPanesStandBehindEachOther) {
   Scene scene;
   const VoxelType wall = add_type(scene, {200, 180, 150});
@@ -105,7 +105,7 @@ TEST_F(VulkanMeshSeeThrough, ColoursAndLightHaveTheSameOptions) {
   compare(glass_yard(), over_glass_yard(), options, "glass_without_surfaces");
 }
 
-// Where quads meet that are merged differently, each pixel is passed once: none is darker than its neighbours.
+// At seams between differently merged quads each pixel is passed once: no pixel is darker than its neighbours.
 TEST_F(VulkanMeshSeeThrough, SeamsBetweenQuadsDoNotShow) {
   Scene scene;
   const VoxelType stone = add_type(scene, {230, 230, 230});
@@ -124,7 +124,7 @@ TEST_F(VulkanMeshSeeThrough, SeamsBetweenQuadsDoNotShow) {
   EXPECT_EQ(bytes_that_differ(single, drawn(camera, mesh_options(options)), 2), 0);
 }
 
-// Another scene where one was before is none that the renderer knows.
+// The renderer does not know another scene at the address of a former one.
 TEST_F(VulkanMeshSeeThrough, ItTellsScenesApartThatStandInTheSamePlace) {
   std::optional<Scene> scene(glass_yard());
   ASSERT_TRUE(renderer_->update(*scene));
@@ -163,7 +163,7 @@ TEST_F(VulkanMeshSeeThrough, ItNeedsTheVoxelsOfTheSceneWhereThereIsGlass) {
   meshes_->clear();
 }
 
-// Glass dims the edges of objects behind it; it has its own edges.
+// Glass dims the edges of objects behind it, and has edges of its own.
 TEST_F(VulkanMeshSeeThrough, EdgesAreSeenThroughGlass) {
   Scene scene;
   const VoxelType wall = add_type(scene, {230, 230, 230});
@@ -185,9 +185,9 @@ TEST_F(VulkanMeshSeeThrough, EdgesAreSeenThroughGlass) {
   EXPECT_GT(bytes_that_differ(plain, edges, 20), 3000);
 }
 
-// Onto the middles of walls of glass, two voxels across: where bodies are smooth, no edge is near enough to be seen.
-// Through the pane onto the red block; through the cube into the air; into the pool where it is 7 deep; through the two
-// that touch.
+// Views of the middles of glass walls, two voxels across: where bodies are smooth, no edge is near enough to be
+// visible. Through the pane onto the red block; through the cube into the air; into the pool where it is 7 deep;
+// through the two touching bodies.
 std::vector<Camera> onto_walls() {
   constexpr double kNarrow = 0.03;
   return {towards({20, 19, 110}, {15, 15, 44}, kNarrow), towards({110, 22, 16}, {48, 18, 12}, kNarrow),
@@ -207,7 +207,8 @@ int different_walls(const std::vector<Image>& images, const std::vector<Image>& 
   return different;
 }
 
-// Marched, from blocks and from smooth bodies: light without occlusion, which smooth surfaces have of their own.
+// Compares marched walls, walls of blocks and walls of smooth bodies, in light without occlusion, since smooth surfaces
+// have their own.
 TEST_F(VulkanMeshSeeThrough, WallsAreTheSameMarchedAndFromBlocksAndSmooth) {
   const Scene scene = glass_yard();
   RenderOptions options = glass_yard_options(48, 36);
@@ -259,7 +260,7 @@ TEST_F(VulkanMeshSeeThrough, LakesAndBallsOfFieldsAreThoseOfTheProcessor) {
   const int all = 120 * 90;
   EXPECT_LT(differing(4) * 100, 10 * all);
   EXPECT_LT(differing(16) * 100, 4 * all);
-  // As it was before: one opaque surface.
+  // As before: one opaque surface.
   VoxelProperties opaque = scene.types[water];
   opaque.visibility = Visibility::Opaque;
   scene.types.replace(water, opaque);

@@ -1,4 +1,4 @@
-// Shadows, glass and lamps on meshes: rays through the voxels that the renderer has.
+// Shadows, glass and lamps on meshes, by rays through the renderer's voxels.
 
 #include <glm/gtc/quaternion.hpp>
 
@@ -93,7 +93,7 @@ TEST_F(VulkanMeshShadow, NothingIsDarkWhereAWallBegins) {
   place(scene, std::move(grid));
   put(scene, blocky_surfaces(scene));
   RenderOptions options = with_mesh_light(sized(400, 400));
-  options.light.sun = {1, 1, 0.2};  // it shines on the wall and on the floor before it
+  options.light.sun = {1, 1, 0.2};  // shines on the wall and on the floor in front of it
   options.light.occlusion_mode = OcclusionMode::Off;
   const Camera camera = towards({31.3, 17.7, 22.1}, {9, 2, 19}, 0.5);
   const Image with = drawn(camera, mesh_options(options));
@@ -149,7 +149,7 @@ TEST_F(VulkanMeshShadow, TheSkyAndAllLightFollowTheSun) {
   }
 }
 
-// A slab over a plain, and a cliff behind a gentle slope: shadows where blocks have them, and no others.
+// A slab over a plain, and a cliff behind a gentle slope: shadows equal those of blocks, without additional ones.
 TEST_F(VulkanMeshShadow, SmoothSurfacesHaveThemToo) {
   Scene scene;
   const VoxelType stone = add_type(scene, {200, 190, 170});

@@ -1,4 +1,4 @@
-// Meshes have no holes, face the right way, and are where they belong.
+// Meshes have no holes, face the right way, and have the right position.
 
 #include <cmath>
 #include <optional>
@@ -85,9 +85,9 @@ TEST_F(VulkanMeshShape, SmoothSpheresHaveTheNormalsOfSpheres) {
   Scene scene;
   const VoxelType stone = add_type(scene, {200, 60, 40});
   DensityGrid field;
-  field.add_sphere({64, 64, 64}, 30, stone);  // over eight chunks
+  field.add_sphere({64, 64, 64}, 30, stone);  // across eight chunks
   SceneGrid grid;
-  grid.pivot = {64.5, 64.5, 64.5};  // sample (i, j, k) is the middle of a voxel
+  grid.pivot = {64.5, 64.5, 64.5};  // sample (i, j, k) is the centre of a voxel
   const GridHandle handle = scene.add_grid(std::move(grid));
   Instance instance{"", handle, {5, 6, 7}, glm::angleAxis(0.7, glm::normalize(DVec3(1, 2, 0.5)))};
   instance.voxel_size = 0.5;
@@ -116,12 +116,12 @@ TEST_F(VulkanMeshShape, SmoothSpheresHaveTheNormalsOfSpheres) {
   }
 }
 
-// Sample (i, j, k) of a field is the point (i, j, k) of its grid, as in marched pictures.
+// Sample (i, j, k) of a field is the point (i, j, k) of its grid, as in marched images.
 TEST_F(VulkanMeshShape, FieldsStandWhereTheirSamplesAre) {
   Scene scene;
   const VoxelType stone = add_type(scene, {200, 60, 40});
   SceneGrid grid;
-  grid.field.add_sphere({64, 64, 64}, 20, stone);  // over eight chunks
+  grid.field.add_sphere({64, 64, 64}, 20, stone);  // across eight chunks
   grid.pivot = {64, 64, 64};
   Instance instance{"", scene.add_grid(std::move(grid)), {5, 6, 7}};
   instance.voxel_size = 0.75;
@@ -143,7 +143,7 @@ TEST_F(VulkanMeshShape, FieldsStandWhereTheirSamplesAre) {
   }
   EXPECT_GT(inside, 4000);
   const DVec3 mean = sum / static_cast<double>(inside);
-  // Half a sample aside would be 3.2.
+  // An offset of half a sample would give 3.2.
   EXPECT_LT(glm::length(mean), 1.0) << mean.x << ' ' << mean.y << ' ' << mean.z;
 }
 
@@ -182,7 +182,7 @@ Scene white_cube() {
 TEST_F(VulkanMeshShape, WireframesShowEdgesWhereTheyAre) {
   const Scene scene = white_cube();
   put(scene, blocky_surfaces(scene));
-  // A quarter of a pixel off, so that no edge runs between two pixels.
+  // Shifted by a quarter of a pixel, so that no edge runs between two pixels.
   const Camera camera = from_above(5.05, 30, 5.05, 20);
   MeshPictureOptions options = mesh_options(sized(100, 100));
   options.light.shading = Shading::Unlit;
@@ -228,7 +228,7 @@ TEST_F(VulkanMeshShape, EdgesWinOverTheirSurfaces) {
   put(scene, {{slab.grid, slab.chunk, floor}});
   MeshPictureOptions options = mesh_options(sized(400, 300));
   options.light.shading = Shading::Unlit;
-  // From above, flat over it, and from far away; orthographic too.
+  // From above, at a flat angle, and from far away; also orthographic.
   for (const DVec3 eye : {DVec3(9, 30, 21), DVec3(9, 3, 26), DVec3(5000, 3000, 8000)}) {
     Camera camera = towards(eye, {8, 1, 8}, 0.9 * 30 / std::max(30.0, glm::length(eye)));
     camera.view_height = 20;
@@ -254,7 +254,7 @@ TEST_F(VulkanMeshShape, EdgesWinOverTheirSurfaces) {
 TEST_F(VulkanMeshShape, SamplesAreResolvedInLinearLight) {
   const Scene scene = white_cube();
   put(scene, blocky_surfaces(scene));
-  // The cube's edges run through the middles of pixels.
+  // The cube's edges run through pixel centres.
   const Camera camera = from_above(5.1, 30, 5.1, 20);
   MeshPictureOptions options = mesh_options(sized(100, 100));
   options.light.shading = Shading::Unlit;

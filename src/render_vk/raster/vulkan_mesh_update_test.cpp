@@ -30,7 +30,7 @@ class VulkanMeshUpdate : public vulkan_test::VulkanMeshTest {
   }
 };
 
-// Two boxes, in the chunks (0, 0, 0) and (2, 0, 0).
+// Returns two boxes, in the chunks (0, 0, 0) and (2, 0, 0).
 Scene boxes() {
   Scene scene;
   const VoxelType red = add_type(scene, {200, 40, 40});
@@ -164,7 +164,7 @@ TEST_F(VulkanMeshUpdate, CamerasInsideOfThingsSeeWhatIsBehindThem) {
   put(scene, blocky_surfaces(scene));
   const MeshPictureOptions options = mesh_options(without_shadows(sized(32, 32)));
   drawn(towards({20, 20, 20}, {21, 20, 20}), options);
-  // Two thousandths of a voxel before a face is not too near.
+  // Two thousandths of a voxel in front of a face are not too near.
   const Image near = drawn(towards({20, 30.002, 20}, {20.001, 20, 20}), options);
   EXPECT_EQ(byte_at(near, 16, 16), byte_at(near, 2, 29));
 }

@@ -133,7 +133,7 @@ TEST(SceneEdit, LargeBoxesFillWholeChunksWithin) {
   EXPECT_EQ(placed.grid().grid.chunk_count(), 0U);
 }
 
-// A beam of 2,000 voxels askew, in a box of 10^9 voxels.
+// A tilted beam of 2,000 voxels in a box of 10^9 voxels.
 TEST(SceneEdit, ABeamCrossesOnlyTheChunksOnItsWay) {
   Scene scene;
   Instance instance;

@@ -27,7 +27,7 @@ GridHandle add_grid(Scene& scene, const IBox& box) {
   return scene.add_grid(std::move(grid));
 }
 
-/// An instance that places a grid in the lattice of another so.
+/// Returns an instance that places a grid in the lattice of another instance.
 Instance placed(const Scene& scene, const Instance& lattice, GridHandle grid, const LatticePlace& place) {
   Instance instance;
   instance.grid = grid;
@@ -98,7 +98,7 @@ TEST(Lattices, GroupsAreWhatTouches) {
     }
     EXPECT_EQ(group[0].place.offset, IVec3(0));
   }
-  // 0, 2, 3 in a row, 1 and 7 overlapping; 4 a voxel away from 1 but within 7; 5 and 6 half a voxel off.
+  // 0, 2, 3 in a row, 1 and 7 overlapping; 4 one voxel away from 1 but within 7; 5 and 6 off by half a voxel.
   EXPECT_EQ(numbers, (std::vector<std::vector<std::size_t>>{{0, 2, 3}, {1, 4, 7}, {5}, {6}}));
 }
 

@@ -188,7 +188,7 @@ TEST(SceneMeshes, RotationsOfAnyLengthTurnAsTheyDoInPictures) {
   }
 }
 
-/// An L of voxels with an arm up, that no turn or reflection leaves as it is.
+/// An L of voxels with an arm upwards, which every turn and reflection changes.
 constexpr std::array kVoxels = {IVec3(0, 0, 0), IVec3(0, 1, 0), IVec3(0, 2, 0), IVec3(1, 0, 0), IVec3(0, 1, 1)};
 
 GridHandle add_asymmetric(Scene& scene) {

@@ -149,7 +149,7 @@ TEST(Capsule, SweepsMeetVoxelsWhenTheirDistanceIsTheRadius) {
       EXPECT_NEAR(glm::length(hit->normal), 1.0, 1e-12);
       if (hit->depth > 0.0) {
         ++inside;
-        // Out of that voxel, and no sooner.
+        // The depth leads out of that voxel, and a shorter way does not.
         const auto distance = [&](double share) {
           const InGrid out = in_grid(placed, moved(capsule, share * hit->depth * hit->normal), displacement);
           return line_distance(out.centre, out.half_axis, hit->voxel) - out.radius;
@@ -206,7 +206,7 @@ TEST(Capsule, FiltersAreThoseOfBoxes) {
   EXPECT_FALSE(sweep_capsule(tracer, ball, {0, -10, 0}, without));
 }
 
-// Distance fields: the contact is known by analysis.
+// For distance fields, analysis gives the contact.
 TEST(Capsule, MeetsFieldsWhereTheyAre) {
   Random random(4);
   for (int i = 0; i < 60; ++i) {
@@ -250,7 +250,7 @@ TEST(Capsule, IsNeverInFieldsThatItHasNotMet) {
     const DensityGrid& field = scene.grids()[scene.grids().handles().front()].field;
     hits += hit.has_value();
     for (int n = 0; n < 400; ++n) {
-      // Points within it, on its way up to there.
+      // Points inside the capsule on its way to the contact.
       const DVec3 centre = capsule.centre + displacement * end * std::abs(random.share());
       const DVec3 point = centre + capsule.half_axis * random.share() +
                           random.direction() * (capsule.radius * std::abs(random.share()));
@@ -305,7 +305,7 @@ TEST(Capsule, IsPushedOutToANearFreePlace) {
   EXPECT_NEAR(away->y, 0.95, 2.0 / 32.0);
   EXPECT_LT(std::hypot(away->x, away->z), 0.4);
   EXPECT_FALSE(displacement_to_free_place(tracer, player, 0.5));
-  // Random heaps: the result is free, and no other of many positions is much nearer.
+  // Random heaps: the result is free, and none of many other positions is much nearer.
   for (int i = 0; i < 25; ++i) {
     SceneGrid heap;
     for (int n = 0; n < 150; ++n) heap.grid.set(IVec3(random.vector() * 4.0), kStone);

@@ -19,7 +19,7 @@
 namespace quoin {
 namespace {
 
-// The points of a fine lattice in which a field is negative, in the world.
+// Returns the lattice points with a negative field, in the world.
 std::vector<DVec3> points_of_solid(const Scene& scene, InstanceHandle handle, double spacing) {
   const Instance& instance = scene.instances()[handle];
   const SceneGrid& grid = scene.grids()[instance.grid];
@@ -45,7 +45,7 @@ struct Way {
       : box(on_its_way), axes(glm::mat3_cast(glm::normalize(on_its_way.rotation))) {
     speed = displacement * axes;
   }
-  // Infinity if never, or not deeper than `shrunk_by`.
+  // Infinity if no contact, or no contact deeper than `shrunk_by`.
   [[nodiscard]] double entry(DVec3 point, double shrunk_by) const {
     const DVec3 at = (point - box.centre) * axes;
     double enter = 0.0;
@@ -161,7 +161,7 @@ TEST(FieldQuery, OverlapsAreThoseOfThePointsOfTheSolid) {
   EXPECT_GT(neither, 100);
 }
 
-// A plane is exact in the trilinear field where halves hold its samples exactly.
+// The trilinear field represents a plane exactly where halves hold its samples exactly.
 TEST(FieldQuery, PlanesInAnyOrientationAreMetWhereTheyAre) {
   Random random(21);
   for (const IVec3 normal : {IVec3(0, 1, 0), IVec3(1, 2, 0), IVec3(1, 2, 2), IVec3(-2, 3, 1), IVec3(3, -1, 2)}) {
@@ -177,7 +177,7 @@ TEST(FieldQuery, PlanesInAnyOrientationAreMetWhereTheyAre) {
       const SceneTracer tracer(scene);
       const DVec3 up = glm::normalize(world_from_grid_direction(instance, DVec3(normal)));
       const double size = instance.voxel_size;
-      const double height = -0.5 / glm::length(DVec3(normal)) * size;  // of the plane, along `up` from the position
+      const double height = -0.5 / glm::length(DVec3(normal)) * size;  // plane above the position, along `up`
       const DQuat rotation = i % 4 < 2 ? instance.rotation : random.rotation();
       const OrientedBox box{instance.position + up * (5.0 * size) + random.vector() * size,
                             glm::abs(random.vector()) * size, rotation};
@@ -190,7 +190,7 @@ TEST(FieldQuery, PlanesInAnyOrientationAreMetWhereTheyAre) {
       ASSERT_EQ(hit.has_value(), expected <= 1.0) << i;
       if (!hit) continue;
       EXPECT_NEAR(hit->fraction, expected, 1e-9) << i;
-      // For a flush box all directions that separate the two are equal.
+      // For a flush box, all directions that separate both bodies are equal.
       EXPECT_LT(glm::length(hit->normal - up), 1e-6) << i;
     }
   }
@@ -211,7 +211,7 @@ TEST(FieldQuery, ABallIsMetByFacesEdgesAndCorners) {
     const DVec3 way = (centre + random.vector() - from) * 1.2;
     const auto hit = sweep_box(tracer, box, way);
     ASSERT_TRUE(hit.has_value());
-    // There the nearest point of the box is a radius away; the trilinear field is off by some hundredths.
+    // The box's nearest point is one radius away; the trilinear field is off by a few hundredths.
     const glm::dmat3 axes = glm::mat3_cast(rotation);
     const DVec3 at = box.centre + way * hit->fraction;
     const DVec3 nearest = at + axes * glm::clamp((centre - at) * axes, -half, half);
@@ -223,7 +223,7 @@ TEST(FieldQuery, ABallIsMetByFacesEdgesAndCorners) {
 TEST(FieldQuery, NeverTunnelsAtAnySpeed) {
   Random random(8);
   DensityGrid sheet;
-  // Half a sample thick.
+  // A sheet half a sample thick.
   sheet.edit({{-40, -2, -40}, {41, 3, 41}}, [](IVec3 p, DensitySample) {
     return DensitySample{static_cast<float>(std::abs(p.y)) - 0.25F, 1};
   });
@@ -398,7 +398,7 @@ TEST(FieldQuery, NonFiniteInputMeetsNothing) {
     }
     EXPECT_TRUE(overlaps(tracer, DVec3(0.0), bad).empty());
   }
-  // Far boxes, and an empty scene.
+  // Distant boxes, and an empty scene.
   EXPECT_FALSE(sweep_box(tracer, {DVec3(1e9)}, {1e8, 0, 0}).has_value());
   const Scene empty = scene_of(DensityGrid(), {});
   EXPECT_TRUE(overlaps(SceneTracer(empty), OrientedBox{}).empty());

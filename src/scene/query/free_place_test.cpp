@@ -1,4 +1,4 @@
-// Tests where overlapping boxes move.
+// Tests the displacement of overlapping boxes.
 
 #include <quoin/scene/sweep.h>
 
@@ -20,7 +20,7 @@ Scene scene_of(Grid voxels, const Instance& instance = {}) {
   return scene_of(std::move(grid), instance);
 }
 
-// A heap of single voxels and small boxes about the origin.
+// Returns a heap of single voxels and small boxes about the origin.
 Grid heap(Random& random, int count) {
   Grid grid;
   for (int i = 0; i < count; ++i) {

@@ -17,7 +17,7 @@ namespace {
 constexpr std::uint32_t kShips = 2;
 constexpr std::uint32_t kLand = 4;
 
-// Four types: that collide or do not, opaque or seen through.
+// Four types: colliding or not, opaque or transparent.
 Scene scene_of_all_kinds(Random& random) {
   Scene scene;
   for (int i = 0; i < 4; ++i) {
@@ -70,7 +70,7 @@ struct Filtered {
     const std::vector<InstanceHandle> handles = scene.instances().handles();
     ignored = {handles[seed % handles.size()], handles[(seed + 7) % handles.size()]};
   }
-  // One voxel of each kind, by number.
+  // One voxel of each kind, by index.
   [[nodiscard]] QueryFilter filter(int i) const {
     QueryFilter made;
     if (i % 2 == 1) made.ignored = ignored;
@@ -155,7 +155,7 @@ TEST(QueryFilter, ShapesMeetWhatIsLeft) {
   EXPECT_GT(differing, 100);
 }
 
-// Ten deep of water over a floor of stone, as a field; neither stone nor wood is seen through.
+// A field of water, 10 deep, over a floor of stone; neither stone nor wood is transparent.
 TEST(QueryFilter, RaysPassThroughWaterOfFields) {
   DensityGrid field;
   field.edit({{-8, -8, -8}, {9, 13, 9}}, [&](IVec3 p, DensitySample) {
@@ -169,7 +169,7 @@ TEST(QueryFilter, RaysPassThroughWaterOfFields) {
   EXPECT_NEAR(first_hit(tracer, down)->t, 20.0, 1e-3);
   const auto floor = first_hit(tracer, down, kInfinity, filter);
   ASSERT_TRUE(floor);
-  // A cell is stone where any of its solid samples is: the last of them begins at 0.
+  // A cell is stone if any of its solid samples is stone: the last such cell begins at 0.
   EXPECT_NEAR(floor->t, 30.0, 1e-3);
   EXPECT_EQ(floor->type, kStone);
   EXPECT_TRUE(any_hit(tracer, down, 31.0, filter));
@@ -224,7 +224,7 @@ TEST(SlideContact, SaysWhatWasMet) {
   options.floor = FloorOptions{};
   const OrientedBox player{{10.0, 3.0, 10.0}, {0.4, 0.9, 0.4}};
 
-  // Falls onto the floor, in a slant against the wall.
+  // Falls onto the floor and slides along the wall.
   const SlideResult fallen = move_and_slide(tracer, player, {8.0, -4.0, 0.0}, options);
   ASSERT_EQ(fallen.contacts.size(), 2U);
   EXPECT_EQ(fallen.contacts[0].kind, SlideContact::Kind::Floor);
@@ -250,7 +250,7 @@ TEST(SlideContact, SaysWhatWasMet) {
   EXPECT_TRUE(overlaps(tracer, {out.centre, sunk.half_size}).empty());
 }
 
-// A box on a lift, and on a raft that turns and drifts, keeps its position relative to it.
+// A box on a lift, and on a raft that turns and drifts, keeps its position relative to the floor.
 TEST(SlideContact, FloorsThatMoveCarryWhatStandsOnThem) {
   Scene scene;
   ASSERT_TRUE(scene.types.add({}).has_value());
@@ -289,7 +289,7 @@ TEST(SlideContact, FloorsThatMoveCarryWhatStandsOnThem) {
   EXPECT_EQ(carried_point(nowhere, instance, {1.0, 2.0, 3.0}), DVec3(1.0, 2.0, 3.0));
 }
 
-// A point, a rod and a plate are stopped as boxes are, also between two voxels, and slide along a wall as boxes do.
+// A point, a rod and a plate stop in the same way as boxes, also between two voxels, and slide along a wall.
 TEST(QueryFilter, BoxesWithoutSizeAreStopped) {
   Scene scene;
   ASSERT_TRUE(scene.types.add({}).has_value());

@@ -48,13 +48,13 @@ Scene random_scene(Random& random, DVec3 away) {
   return scene;
 }
 
-// Every voxel of every instance, with its eight corners in the world relative to `away`.
+// A voxel of an instance, with its corners in the world relative to `away`.
 struct PlainVoxel {
   InstanceHandle instance;
   IVec3 voxel;
   VoxelType type;
   DVec3 low;                   // a corner
-  std::array<DVec3, 3> edges;  // from there
+  std::array<DVec3, 3> edges;  // edges that start at `low`
 };
 
 std::vector<PlainVoxel> all_voxels(const Scene& scene, DVec3 away) {
@@ -102,7 +102,7 @@ TEST(SceneQuery, FirstHitIsTheNearestVoxelOfAllHereAndFarAway) {
     const std::vector<PlainVoxel> voxels = all_voxels(scene, away);
     int hits = 0;
     for (int i = 0; i < 400; ++i) {
-      // Positions that are exact 10^9 away.
+      // Positions that are exact at a distance of 10^9.
       const DVec3 origin = DVec3(IVec3(random.vector() * 200.0)) / 4.0;
       const DVec3 direction = random.vector() * 2.0;
       double nearest = std::numeric_limits<double>::infinity();

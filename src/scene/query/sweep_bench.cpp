@@ -139,7 +139,7 @@ void walks(benchmark::State& state, const World& (*world_of)()) {
   }
 }
 
-// Out of ground that they stand `depth` deep in.
+// Displaces boxes from ground in which they stand `depth` deep.
 void free_places(benchmark::State& state, const World& (*world_of)(), Turn turn, double depth) {
   const World& world = world_of();
   std::vector<Query> all = queries(world, turn, 0.3);

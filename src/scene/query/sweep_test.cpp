@@ -171,7 +171,7 @@ TEST(Sweep, SlidesAlongWallsAndStopsInCorners) {
     EXPECT_NEAR(ended.y, 1.6 + 1e-3, 1e-6);
     EXPECT_NEAR(ended.z, 13.2, 1e-6);
     EXPECT_NEAR(glm::length(slid.displacement - rotation * DVec3(5.0, 0.0, 3.0)), 0.0, 1e-6);
-    // Into a corner, a thousand times: never out of the room.
+    // Pushes into a corner a thousand times: the box never leaves the room.
     OrientedBox pushed = box;
     for (int i = 0; i < 1'000; ++i) {
       pushed.centre = move_and_slide(tracer, pushed, rotation * (DVec3(9, 8, 10) + random.vector())).centre;

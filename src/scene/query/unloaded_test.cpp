@@ -62,7 +62,7 @@ TEST(UnloadedRays, SayWhereTheyCameToWhatIsNotLoaded) {
   EXPECT_EQ(hit->unloaded_t, kInfinity);
   EXPECT_FALSE(hit->is_unloaded);
 
-  // From above the loaded chunks: the same voxel, with a possible earlier hit in unloaded chunks.
+  // From above the loaded chunks: hits the same voxel, with a possible earlier hit in unloaded chunks.
   const Ray from_above{{32.0, 200.0, 32.0}, {0.0, -2.0, 0.0}};
   const auto uncertain = first_hit(tracer, from_above);
   ASSERT_TRUE(uncertain);
@@ -117,7 +117,7 @@ TEST(UnloadedRays, AnEmptyPartialGridIsNotLoadedAnywhere) {
   EXPECT_TRUE(overlaps(tracer, DVec3(50.0), 2.0, passed()).empty());
 }
 
-// The first chunk on a ray that is not loaded, by small steps.
+// Finds the first unloaded chunk on a ray in small steps.
 std::optional<double> by_steps(const Grid& grid, const Ray& ray, double max_t, double step) {
   for (double t = 0.0; t <= max_t; t += step) {
     const DVec3 at = ray.origin + t * ray.direction;
@@ -147,7 +147,7 @@ TEST(UnloadedRays, RandomRaysAgreeWithSmallSteps) {
     EXPECT_TRUE(hit.has_value() == expected.has_value() || is_at_end) << i;
     if (!hit || !expected) continue;
     ++ends;
-    EXPECT_NEAR(hit->t, *expected, 0.3) << i;  // steps may pass a corner of a chunk
+    EXPECT_NEAR(hit->t, *expected, 0.3) << i;  // steps may skip a chunk's corner
     EXPECT_LE(hit->t, *expected) << i;
     EXPECT_FALSE(grid.is_loaded(chunk_of(hit->voxel))) << i;
   }
@@ -188,7 +188,7 @@ TEST(UnloadedRays, BetweenSamplesOfAFieldBothMustBeLoaded) {
   const SceneTracer tracer(world.scene);
   const auto up = first_hit(tracer, {{5.5, 5.5, 5.5}, {1.0, 0.0, 0.0}}, kInfinity, met());
   ASSERT_TRUE(up);
-  EXPECT_EQ(up->t, 57.5);  // at 63, the last sample that is loaded
+  EXPECT_EQ(up->t, 57.5);  // at 63, the last loaded sample
   const auto down = first_hit(tracer, {{5.5, 5.5, 5.5}, {-1.0, 0.0, 0.0}}, kInfinity, met());
   ASSERT_TRUE(down);
   EXPECT_EQ(down->t, 69.5);
@@ -274,7 +274,7 @@ TEST(UnloadedSweeps, TurnedAndScaledGridsAlike) {
   world.load_around(1);
   world.scene.edit(world.grid).grid.clear();
   const SceneTracer tracer(world.scene);
-  // Along the grid's x axis: loaded up to voxel 64, 16 in the world.
+  // Along the grid's x axis: loaded up to voxel 64, which is 16 in the world.
   const DVec3 along = turned * DVec3(1.0, 0.0, 0.0);
   const auto ray = first_hit(tracer, {DVec3(0.0), along}, kInfinity, met());
   ASSERT_TRUE(ray);

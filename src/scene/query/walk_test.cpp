@@ -71,7 +71,7 @@ TEST(Walk, StandsStillOnASlope) {
   player.steps(1'000, DVec3(0.0));
   EXPECT_LT(glm::length(player.box.centre - settled), 1e-6);
   EXPECT_TRUE(player.last.is_on_floor);
-  // Without a floor it is as if on ice.
+  // Without floor options the player slides as if on ice.
   Player sliding = player_at(tracer, settled, {});
   sliding.steps(60, DVec3(0.0));
   EXPECT_LT(sliding.box.centre.x, settled.x - 0.05);
@@ -168,7 +168,7 @@ TEST(Walk, StepsOntoWhatIsNoHigher) {
     return DensitySample{static_cast<float>(p.y) + 0.5F, kStone};
   });
   yard.grid.fill_box({{4, -1, -8}, {24, 0, 8}}, kWood);  // half a voxel above the ground
-  yard.grid.fill_box({{10, 0, -8}, {24, 1, 8}}, kWood);  // and a whole one above that
+  yard.grid.fill_box({{10, 0, -8}, {24, 1, 8}}, kWood);  // one voxel above that
   const Scene scene = scene_of(std::move(yard), {});
   const SceneTracer tracer(scene);
   const auto walk = [&](double step_height) {
@@ -246,7 +246,7 @@ TEST(Walk, StaysOutOfCornersOfBlocksAndSlopes) {
   }
 }
 
-// Thousands of steps of all kinds over hills with houses and rocks: never in anything.
+// Thousands of steps of all kinds over hills with houses and rocks never end inside a solid.
 TEST(Walk, WandersWithoutComingIntoAnything) {
   Random random(2024);
   for (int round = 0; round < 8; ++round) {

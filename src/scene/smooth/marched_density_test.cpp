@@ -22,7 +22,7 @@ VoxelType add(VoxelRegistry& types, Visibility visibility) {
   return types.add(properties).value();
 }
 
-/// The slow, obvious version: a sample at a time.
+/// The simple slow version: one sample at a time.
 class Oracle {
  public:
   Oracle(const Grid& grid, const VoxelRegistry& types) : grid_(grid), types_(types) {}
@@ -115,7 +115,7 @@ class Oracle {
   const VoxelRegistry& types_;
 };
 
-/// Walls, slabs, rails, slanted ones and noise, over the borders of chunks.
+/// Returns walls, slabs, rails, slanted shapes and noise, across chunk borders.
 Grid random_grid(std::uint32_t seed, const std::array<VoxelType, 4>& types) {
   std::mt19937 random(seed);
   const auto below = [&](int most) { return static_cast<int>(random() % static_cast<unsigned>(most)); };

@@ -26,7 +26,7 @@ VoxelType add(Scene& scene, Visibility visibility) {
   return scene.types.add(properties).value();
 }
 
-/// A hill with a pond, twice, and a boat that is a field with a mast of blocks.
+/// Returns a hill with a pond, twice, and a boat that is a field with a mast of blocks.
 Made small_scene() {
   Made made;
   made.stone = add(made.scene, Visibility::Opaque);

@@ -1,4 +1,4 @@
-// solid/*: shapes for physics engines of a 512x128x512 terrain of 128 chunks, with caves, at first and after an edit.
+// solid/*: physics shapes of a 512x128x512 terrain of 128 chunks, with caves, from scratch and after an edit.
 
 #include <quoin/scene/solid_shapes.h>
 

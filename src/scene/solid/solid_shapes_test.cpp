@@ -39,7 +39,7 @@ IVec3 random_voxel(std::mt19937& random, int low, int high) {
   return {x, y, one()};
 }
 
-// Boxes, balls and noise of all types, some of them unregistered, around the corner of eight chunks.
+// Adds boxes, balls and noise of all types, some of them unregistered, around the corner of eight chunks.
 void edit(Grid& grid, std::mt19937& random) {
   const auto type = static_cast<VoxelType>(random() % 6);
   const IVec3 at = random_voxel(random, -70, 70);
@@ -154,7 +154,7 @@ TEST(SolidShapes, AFullChunkIsABoxAndSixFaces) {
   const VoxelRegistry types = three_types();
   Grid grid;
   grid.fill_box({{0, 0, 0}, {64, 64, 64}}, 1);
-  grid.set({3, 3, 3}, 3);  // of another type, and solid too
+  grid.set({3, 3, 3}, 3);  // also solid, with another type
   SolidShapes shapes({.boxes = true, .faces = true});
   EXPECT_EQ(shapes.update(grid, types), std::vector<IVec3>{IVec3(0)});
   EXPECT_EQ(shapes.boxes({0, 0, 0}), (std::vector<IBox>{{{0, 0, 0}, {64, 64, 64}}}));

@@ -19,7 +19,7 @@
 namespace quoin {
 namespace {
 
-// A slab away from its pivot, so that its rotation has a visible effect.
+// A slab at a distance from its pivot, so that its rotation has a visible effect.
 struct SlabScene {
   Scene scene;
   GridHandle grid;
@@ -156,7 +156,7 @@ TEST(OddInstances, OddQueriesMeetNothingAndComeToAnEnd) {
   EXPECT_EQ(overlaps(tracer, unturned).size(), 1U);
 }
 
-// Steps of a box's own size are lost in the rounding of such distances.
+// At such distances, steps of a box's own size are lost in rounding.
 TEST(OddInstances, ASweepThroughEndlessSpaceComesToAnEnd) {
   SlabScene world;
   Instance far = world.instance();

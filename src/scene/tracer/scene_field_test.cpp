@@ -17,7 +17,7 @@ namespace {
 
 constexpr DVec3 kCentre{40.0, 20.0, -10.0};  // in the world
 
-// A ball of radius 12 round (16, 16, 16) of its grid, turned, mirrored and doubled in size.
+// A ball of radius 12 about (16, 16, 16) of its grid, turned, mirrored and doubled in size.
 struct BallScene {
   Scene scene;
   GridHandle grid;
@@ -77,7 +77,7 @@ TEST(SceneFields, BoundsAreAroundTheSolid) {
   field.add_sphere({5.5, 6.5, 7.5}, 3.0, 1);
   EXPECT_EQ(field.solid_bounds(), (IBox{{3, 4, 5}, {9, 10, 11}}));
   EXPECT_EQ(field.bounds(), (IBox{{2, 3, 4}, {9, 10, 11}}));
-  // They follow edits, over chunk borders, and back.
+  // Bounds follow edits across chunk borders, and their reversal.
   field.add_sphere({200.5, 6.5, -7.5}, 3.0, 1);
   EXPECT_EQ(field.solid_bounds(), (IBox{{3, 4, -10}, {204, 10, 11}}));
   field.remove_sphere({200.5, 6.5, -7.5}, 4.0);
@@ -123,7 +123,7 @@ TEST(SceneFields, TheNearestCountsBesideBlocks) {
   EXPECT_EQ(first_hit(tracer, {{30, 8, 16}, {-1, 0, 0}})->type, 2);
   EXPECT_EQ(first_hit(tracer, {{30, 2.5, 16}, {0, 0, -1}})->type, 1);
 
-  // Packets agree with rays alone, and follow edits.
+  // Packets agree with single rays, and follow edits.
   std::mt19937 random(2);
   for (int round = 0; round < 3; ++round) {
     const SceneView view(tracer, DVec3(0.0));
@@ -148,7 +148,7 @@ TEST(SceneFields, TheNearestCountsBesideBlocks) {
         if (!alone->in_field) continue;
         ++in_field;
         EXPECT_EQ(hits.material[at], alone->type);
-        // Without steps from cell to cell.
+        // No steps between cells.
         EXPECT_NEAR(glm::length(hits.normal(at)), 1.0, 1e-5);
         EXPECT_GT(glm::dot(DVec3(hits.normal(at)), alone->normal), 0.5);
       }

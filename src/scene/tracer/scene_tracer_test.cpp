@@ -24,7 +24,7 @@ VoxelRegistry stone_and_glass() {
   return types;
 }
 
-// Instances here and there of three small grids.
+// Returns scattered instances of three small grids.
 Scene random_scene(unsigned seed, int instances, DVec3 away = DVec3(0.0)) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> share(-1.0, 1.0);

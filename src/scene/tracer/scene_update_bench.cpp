@@ -68,7 +68,7 @@ BENCHMARK(far)->Name("scene/update10000/tenth_moved_far")->Unit(benchmark::kMicr
 void one_voxel(benchmark::State& state) {
   Scene scene = mixed_scene(kInstances);
   SceneTracer tracer(scene, InstanceFilter::Visible, {1});
-  // The largest: 512 chunks.
+  // The largest grid: 512 chunks.
   Grid& grid = scene.edit(scene.grids().handles().back()).grid;
   bool is_solid = true;
   for (auto _ : state) {

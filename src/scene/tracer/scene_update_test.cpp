@@ -16,7 +16,7 @@
 namespace quoin {
 namespace {
 
-// A scene, and things that may happen to it.
+// A scene with random changes of every kind.
 class ChangingScene {
  public:
   explicit ChangingScene(unsigned seed) : random_(seed) {
@@ -70,7 +70,7 @@ class ChangingScene {
     properties.visibility = below(3) == 0 ? Visibility::Transparent : Visibility::Opaque;
     return properties;
   }
-  // One of them is not registered.
+  // Returns a type, which may be unregistered.
   VoxelType type() { return static_cast<VoxelType>(1 + static_cast<unsigned>(below(4))); }
 
   SceneGrid* any_grid() {
