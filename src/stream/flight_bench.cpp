@@ -95,7 +95,7 @@ class FlightLog {
     plot_ << "seconds,resident_MB,counted_MB,chunks,radius,slowest_update_us\n";
   }
 
-  /// `resident`: more than before there was a world.
+  /// `resident`: memory in addition to the memory before there was a world.
   void note(int frame, double own_seconds, double update_seconds, const StreamStats& now, double base) {
     own.push_back(own_seconds);
     updates.push_back(update_seconds);
@@ -130,7 +130,7 @@ class FlightLog {
   std::vector<double> updates;
   std::vector<double> own;  // the part of `own` spent on the CPU
   std::vector<double> follows;
-  std::vector<double> control;    // of a fixed workload: shows disturbance by the machine
+  std::vector<double> control;    // a fixed workload: shows disturbance by the machine
   std::vector<double> residents;  // megabytes
   double least_radius = std::numeric_limits<double>::infinity();
   double most_counted = 0.0;

@@ -21,7 +21,7 @@ std::vector<double> distances_of(const std::vector<Eye>& eyes) {
   return all;
 }
 
-// Of thousands that move, come and go the nearest are found, some looks later at most.
+// Thousands of placements move, appear and disappear; the nearest are found after a few updates at most.
 TEST(Placements, TheNearestAreFound) {
   std::mt19937 random(4);
   const auto place = [&] { return static_cast<double>(random() % 20'000); };

@@ -14,7 +14,7 @@ using stream::StreamBudget;
 constexpr std::size_t kBudget = std::size_t{64} << 20;
 constexpr std::size_t kChunk = 50'000;
 
-// A program whose meshes need as much memory as the chunks, and appear some time after them.
+// A program whose meshes need as much memory as the chunks, and appear some time later.
 class Program {
  public:
   void load(std::size_t chunks) {
@@ -23,7 +23,7 @@ class Program {
   void let_go(std::size_t chunks) {
     for (std::size_t i = 0; i < chunks; ++i) budget.remove_chunk(kChunk);
   }
-  // A tenth of a second, in which meshes follow.
+  // Waits a tenth of a second, in which meshes appear.
   void wait() {
     meshes_ += (static_cast<double>(budget.loaded_bytes()) - meshes_) * 0.2;
     now_ += std::chrono::milliseconds(100);

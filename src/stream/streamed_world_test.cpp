@@ -79,7 +79,7 @@ class StreamedWorldTest : public ::testing::Test {
       ASSERT_TRUE(world.scene().types.add(coloured_type(type)).has_value());
     }
   }
-  // A world of one grid of PatternGround; the grid's number is 0.
+  // Returns a world with one grid of PatternGround; the grid's number is 0.
   static StreamedWorld ground(const std::filesystem::path& path, const std::shared_ptr<const PatternGround>& generator,
                               StreamOptions options = {}) {
     auto world = StreamedWorld::open_or_create(path, options);
@@ -209,11 +209,11 @@ TEST_F(StreamedWorldTest, EditsReachWhatIsNotLoaded) {
   const std::size_t loaded = world.stats().loaded_chunks;
   ASSERT_TRUE(world.apply({0, WorldEdit::FillBox{{{-10, -10, -10}, {3000, -5, 3}}, 3}}).has_value());
   EXPECT_GT(world.stats().waiting_edits, 0U);
-  ASSERT_TRUE(world.apply({0, WorldEdit::SetVoxels{{{{2000, -6, 0}, 2}}}}).has_value());  // later than the box
+  ASSERT_TRUE(world.apply({0, WorldEdit::SetVoxels{{{{2000, -6, 0}, 2}}}}).has_value());  // later than the box edit
   ASSERT_TRUE(world.flush().has_value());
   EXPECT_EQ(world.stats().waiting_edits, 0U);
   ASSERT_TRUE(world.load_all({&viewer, 1}).has_value());
-  EXPECT_LT(world.stats().loaded_chunks, loaded + 10);  // of the chunks on the way only near ones stay
+  EXPECT_LT(world.stats().loaded_chunks, loaded + 10);  // keeps only nearby chunks of those on the way
   const auto kept = world.store().load_chunk({0, 0, chunk_of(IVec3{2000, -6, 0})});
   ASSERT_TRUE(kept.has_value() && kept->has_value());
   EXPECT_EQ((*kept)->voxels.get(local_of(IVec3{2000, -6, 0})), 2);
@@ -247,7 +247,7 @@ TEST_F(StreamedWorldTest, MeshesHaveNoWallsWhereTheWorldIsNotLoaded) {
     }
   };
   follow(viewer);
-  // Ground without end, from y = -128 to 0.
+  // Endless ground from y = -128 to 0.
   ASSERT_FALSE(quads.empty());
   const Grid& grid = world.scene().grids()[only_grid(world)].grid;
   for (const auto& [chunk, count] : quads) {
@@ -355,7 +355,7 @@ TEST_F(StreamedWorldTest, EditsWithNewTypesWaitAndAreSaved) {
     EXPECT_EQ(world.apply({0, WorldEdit::SetVoxels{{{{900, 1, 1}, 60'000}}}}).error().code, ErrorCode::InvalidArgument);
     EXPECT_EQ(world.apply({0, WorldEdit::FillBox{{{0, 0, 0}, {1, 1, 1}}, 60'000}}).error().code,
               ErrorCode::InvalidArgument);
-    // State bits that the type lacks are left out.
+    // State bits that the type lacks are removed.
     ASSERT_TRUE(world.apply({0, WorldEdit::SetData{{900, 1, 1}, 0xFFFF, {}}}).has_value());
     ASSERT_TRUE(world.flush().has_value());
     EXPECT_TRUE(world.take_problems().empty());
@@ -467,7 +467,7 @@ TEST_F(StreamedWorldTest, RandomSchedulesGiveTheSameBytes) {
         for (int x = -7; x <= 7; ++x) {
           auto chunk = store->load_chunk({0, 0, {x, y, z}});
           ASSERT_TRUE(chunk.has_value());
-          // Chunks that no viewer came near are not generated.
+          // Chunks far from all viewers are not generated.
           found[{x, y, z}] = *chunk ? std::move(**chunk) : StoredChunk{PatternGround::of({x, y, z})};
         }
       }

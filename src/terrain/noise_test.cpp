@@ -61,7 +61,7 @@ TEST(Noise, KeepsItsBoundsAndItsMean) {
   EXPECT_NEAR(sum3 / kSamples, 0.0, 0.01);
 }
 
-// A slope along any direction of the plane is as likely as along any other.
+// Slopes are equally likely in all directions of the plane.
 TEST(Noise, PrefersNoDirectionOfThePlane) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> place(-1e4, 1e4);

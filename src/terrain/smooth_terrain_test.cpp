@@ -150,7 +150,7 @@ int overhung_columns(const DensityGrid& field, IVec3 size) {
   return count;
 }
 
-// Sizes of the pieces that hang together over the six sides.
+// Returns the sizes of the pieces connected over the six sides.
 std::vector<std::int64_t> pieces(const DensityGrid& field, IVec3 size) {
   std::vector<bool> seen(static_cast<std::size_t>(size.x * size.y * size.z));
   const IBox box{IVec3{0}, size};

@@ -108,7 +108,7 @@ TEST(Terrain, PiecesSideBySideFitTogether) {
   piece.for_each([&](IVec3 v, VoxelType type) { ASSERT_EQ(whole.get(v), type); });
 }
 
-// In seed 42, which pictures show.
+// Uses seed 42, which also appears in images.
 TEST(Terrain, HasRidgesValleysAndEveryMaterial) {
   const World world;
   const TerrainOptions options = options_of(42, {4, 2, 4});

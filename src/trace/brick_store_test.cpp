@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::uint64_t kEveryVoxel = ~std::uint64_t{0};
 
-// A brick that is full below layer `from` of its sixteen layers of four by four cells in places, and empty from `to`
-// on, or the other way round.
+// Returns a brick whose 64 cells, in storage order, are full below `from`, mixed up to `to`, and empty from there on;
+// or with full and empty swapped.
 Node layered(int from, int to, bool is_turned, std::mt19937_64& random) {
   Node words;
   for (int cell = 0; cell < 64; ++cell) {
@@ -41,7 +41,7 @@ TEST(BrickStore, BricksReadAsTheyWerePutAndLeaveOutWhatIsAlikeAtAnEnd) {
         const BrickRun run = BrickRun::of(brick);
         EXPECT_EQ(run.code(), brick);
         EXPECT_EQ(store.line_count() - lines, static_cast<std::size_t>(run.count()));
-        // One line that represents the omitted lines stays.
+        // One line, which represents the omitted lines, stays.
         const int below = std::min((from - 1) / 8, 4);
         const int above = std::min((63 - to) / 8, 3);
         EXPECT_EQ(run.count(), 8 - std::max(below, above)) << from << " to " << to;

@@ -32,7 +32,7 @@ void expect_same(const PacketHits& a, const PacketHits& b) {
   }
 }
 
-// Packets of mixed rays: random, short, along axes, from faces, from far away, of odd lengths.
+// Packets of mixed rays: random, short, along axes, from faces, from far away, of unusual lengths.
 class Packets : public testing::TestWithParam<std::tuple<unsigned, InstructionSet>> {
  protected:
   void SetUp() override {
@@ -83,7 +83,7 @@ class Packets : public testing::TestWithParam<std::tuple<unsigned, InstructionSe
     return rays;
   }
 
-  // From one point, or from near it, in about one direction.
+  // Returns rays from one point, or from near it, in about one direction.
   RayPacket beam() {
     const Ray middle = ray();
     const double apart = whole(0, 1) == 0 ? 0.0 : uniform(0, 8);
@@ -102,7 +102,8 @@ class Packets : public testing::TestWithParam<std::tuple<unsigned, InstructionSe
     return rays;
   }
 
-  // Short ones from about one point in any direction, as occlusion asks for them; at times one that has no place there.
+  // Returns short rays from about one point in any direction, similar to occlusion rays; sometimes one has an invalid
+  // origin.
   RayPacket bunch() {
     const DVec3 middle = glm::floor(ray().origin * 0.9);
     const double length = std::exp2(whole(0, 3) == 0 ? whole(-18, 18) : 0);
@@ -163,7 +164,7 @@ int hits_if_all_agree(const OccupancyTree& tree, const RayPacket& rays, Instruct
   return hits;
 }
 
-// Each ray to where it meets something, exactly, and to the numbers next to that.
+// Limits each ray exactly to its hit, and to the adjacent numbers.
 void limit_to_hits(const OccupancyTree& tree, RayPacket& rays, InstructionSet with, std::mt19937& random) {
   for (int lane = 0; lane < RayPacket::kSize; ++lane) {
     const auto hit = first_hit(tree, rays.ray(lane), rays.max_t[static_cast<std::size_t>(lane)]);
@@ -191,7 +192,7 @@ TEST_P(Packets, AgreeWithPlainOnesAndOneByOne) {
   EXPECT_GT(hits, 500);
 }
 
-// Numbers in lanes without data change no bit, however small they are.
+// Values in inactive lanes change no bit, however small they are.
 TEST_P(Packets, AreTheSameWhateverInactiveLanesHold) {
   const InstructionSetOverride over(set());
   int hits = 0;
@@ -278,7 +279,7 @@ TEST_P(Packets, ShortRaysAtTheEndsOfAWorldAgree) {
   EXPECT_GT(hits, 1'000);
 }
 
-// Rays that are brought to the bounds, and enter them where planes meet, or all but miss them.
+// Rays that are moved to the bounds and enter them where planes meet, or nearly miss them.
 TEST_P(Packets, DistantRaysTowardsEdgesAndCornersOfAWorldAgree) {
   Grid grid;
   const IVec3 corner{whole(-40, 40), whole(-40, 40), whole(-40, 40)};
@@ -311,7 +312,7 @@ TEST_P(Packets, DistantRaysTowardsEdgesAndCornersOfAWorldAgree) {
   EXPECT_GT(hits, 1'000);
 }
 
-// Beyond the 4^3 chunks that a beam reads at once, and beyond the range of single precision.
+// Beyond the 4^3 chunks that a beam reads at a time, and beyond the range of single precision.
 TEST_P(Packets, RaysInTheSameDirectionThroughALongWorldAgree) {
   Grid grid;
   for (int i = 0; i < 400; ++i) {
@@ -350,7 +351,7 @@ TEST(PacketsOf, ThroughATreeThatFollowedEditsAreThoseThroughANewOne) {
   std::mt19937 random(3);
   const auto near = [&](int reach) { return static_cast<int>(random() % static_cast<unsigned>(2 * reach)) - reach; };
   for (int round = 0; round < 24; ++round) {
-    // Within the box of chunks, and now and then beyond it.
+    // Within the box of chunks, and sometimes beyond it.
     const int reach = round % 6 == 5 ? 400 : 70;
     const auto type = static_cast<VoxelType>(random() % 3);
     if (round % 2 == 0) {
@@ -376,7 +377,7 @@ TEST(PacketsOf, ThroughATreeThatFollowedEditsAreThoseThroughANewOne) {
   }
 }
 
-// Rays longer than single precision would do for, and worlds without flat tables, are walked in double.
+// Rays too long for single precision, and worlds without flat tables, are walked in double precision.
 TEST(PacketsOf, AcrossALongWorldAndBetweenIslandsAgreeWithTheDenseTracer) {
   const VoxelRegistry types = oracle::mixed_types();
   for (const int gap : {5'000, 1'000'000}) {

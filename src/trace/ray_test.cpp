@@ -18,7 +18,7 @@
 namespace quoin {
 namespace {
 
-// Distance from a point of the ray to the nearest edge of the voxel lattice.
+// Returns the distance from a point of the ray to the nearest edge of the voxel lattice.
 double distance_to_edge(const DVec3& p) {
   std::array<double, 3> off{};
   for (int a = 0; a < 3; ++a) off[static_cast<std::size_t>(a)] = std::abs(p[a] - std::round(p[a]));
@@ -32,7 +32,7 @@ struct Tally {
   int excused = 0;
 };
 
-// Compares one ray with the dense tracer as the specification defines agreement.
+// Compares one ray with the dense tracer by the specification's definition of agreement.
 void compare(const Grid& grid, const OccupancyTree& tree, const Ray& ray, double max_t, Tally& tally) {
   const auto fast = first_hit(tree, ray, max_t);
   const auto dense = oracle::dense_first_hit(grid, grid.bounds(), ray, max_t);
@@ -45,7 +45,7 @@ void compare(const Grid& grid, const OccupancyTree& tree, const Ray& ray, double
                                  std::abs(fast->t - dense->t) <= 1e-4 * std::max(1.0, dense->t)));
   if (agrees) return;
   ++tally.excused;
-  // Only a graze may differ, and then the hit must be a voxel that the ray touches.
+  // Only grazing hits may differ, and then the hit must be a voxel that the ray touches.
   double nearest = kInfinity;
   for (const auto& hit : {fast, dense}) {
     if (hit) nearest = std::min(nearest, distance_to_edge(ray.origin + ray.direction * hit->t));
@@ -141,7 +141,7 @@ TEST(Ray, ABillionVoxelsFromTheOriginHitsAsAtTheOrigin) {
   std::uniform_real_distribution<double> uniform(-40.0, 40.0);
   int hits = 0;
   for (int i = 0; i < 5'000; ++i) {
-    // Origins that are exact at both places.
+    // Origins that are exact at both positions.
     const DVec3 o = glm::floor(DVec3(uniform(random), uniform(random), uniform(random)) * 1024.0) / 1024.0;
     const DVec3 d{uniform(random), uniform(random), uniform(random)};
     const auto a = first_hit(near_tree, {o, d});

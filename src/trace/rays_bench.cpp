@@ -188,7 +188,7 @@ void trace_subnormal_packets(benchmark::State& state, const Case& c, Instruction
   return true;
 }();
 
-// First hits, as a game asks for them.
+// Traces first hits in the same way as a game.
 void random600(benchmark::State& state) {
   const auto& workload = random_ray_workload();
   int hits = 0;
@@ -208,7 +208,7 @@ void build(benchmark::State& state) {
 }
 BENCHMARK(build)->Name("rays/build")->Unit(benchmark::kMillisecond);
 
-// Following an edit of a cube of this edge, the edit itself not counted.
+// Updates the tree after an edit of a cube of this edge; excludes the edit.
 void update(benchmark::State& state) {
   Grid grid = workloads::terrain_grid(256, 256);
   ChangeCursor cursor = grid.cursor();

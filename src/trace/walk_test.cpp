@@ -19,7 +19,7 @@ class WalkOfBlocks : public ::testing::Test {
     }
   }
 
-  /// Boxes and single voxels of glass of two types, with stone in it, over chunks that are full of one type.
+  /// Adds boxes and single voxels of two types of glass, with stone inside, across chunks that are full of one type.
   void scatter() {
     const int low = -80;
     std::uniform_int_distribution<int> place(low, 90);
@@ -32,7 +32,7 @@ class WalkOfBlocks : public ::testing::Test {
     for (int i = 0; i < 500; ++i) grid.set({place(random), place(random), place(random)}, pick(i % 3 == 0));
   }
 
-  /// One of the two types of glass, or anything.
+  /// Returns one of the two types of glass, or any type.
   VoxelType pick(bool anything) {
     const VoxelType any[] = {ids[0], ids[1], ids[2], kAir};
     return any[std::uniform_int_distribution<std::size_t>(0, anything ? 3 : 1)(random)];
@@ -128,7 +128,7 @@ TEST_F(WalkOfBlocks, WholeChunksAreOneStep) {
   EXPECT_EQ(blocks(tree, {{-5, 30.5, 30.5}, {1, 0, 0}}, 1e9).size(), 2U);
   grid.fill_box({{70, 0, 0}, {71, 64, 64}}, ids[1]);
   const OccupancyTree edited = OccupancyTree::build(grid, types, Occupancy::Transparent);
-  // Bricks of 16 where there is one type, and cells of 4 next to the sheet.
+  // Bricks of 16 in uniform areas, and cells of 4 next to the sheet.
   EXPECT_EQ(blocks(edited, {{-5, 30.5, 30.5}, {1, 0, 0}}, 1e9).size(), 1U + 1 + 4 + 2 + 3);
   EXPECT_EQ(blocks(edited, {{-5, 30.5, 30.5}, {1, 0, 0}}, 1e9, 5.0).size(), 16U + 1 + 4 + 2 + 12);
   EXPECT_EQ(blocks(edited, {{-5, 30.5, 30.5}, {1, 0, 0}}, 1e9, 0.0).size(), 128U);

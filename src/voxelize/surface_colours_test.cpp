@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kSide = 16;
 
-/// A square of kSide voxels, in the layer y = 0; (0, 0) of its texture is where x and z are least.
+/// A square of kSide voxels in the layer y = 0; (0, 0) of its texture is at the least x and z.
 TriangleMesh square() {
   TriangleMesh mesh;
   constexpr double kHeight = 0.4;
@@ -21,7 +21,7 @@ TriangleMesh square() {
   return mesh;
 }
 
-/// A texture of `of(x, y)`.
+/// Returns a texture of `of(x, y)`.
 template <class Of>
 MeshTexture texture(int side, const Of& of) {
   MeshTexture made;
@@ -84,7 +84,7 @@ TEST(SurfaceColours, are_means_in_linear_light_where_a_voxel_covers_many_pixels)
   }));
   const Made made = surface_of(mesh);
   EXPECT_EQ(made.types.size(), 2U);
-  // Half of the light is sRGB 188.
+  // sRGB 188 is half the light of 255.
   EXPECT_EQ(made.at(3, 5).colour, (Rgba8{188, 188, 188, 255}));
 }
 
@@ -164,7 +164,7 @@ TEST(SurfaceColours, are_multiplied_by_those_of_vertices_and_have_their_material
   EXPECT_EQ(made.at(8, 0).roughness, 0.25F);
   EXPECT_EQ(made.at(8, 0).colour.g, 188);
   EXPECT_EQ(made.at(8, 0).colour.b, 0);
-  // 8.5 of 16 in linear light.
+  // The mean of 8.5 of 16 in linear light.
   EXPECT_NEAR(made.at(8, 0).colour.r, 193, 1);
 }
 

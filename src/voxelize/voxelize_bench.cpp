@@ -1,4 +1,4 @@
-// voxelize/*: a torus of 69,432 triangles at 512 voxels along its longest side, on one thread; and its distances.
+// voxelize/*: a torus of 69,432 triangles at 512 voxels along its longest side, on one thread; also its distances.
 
 #include <quoin/voxelize/voxelize.h>
 

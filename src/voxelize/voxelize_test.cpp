@@ -30,7 +30,7 @@ Voxels solid_of(const TriangleMesh& mesh, SolidVoxels rule = SolidVoxels::Windin
   return voxelized(mesh, SurfaceVoxels::None, rule);
 }
 
-// Numbers that no plane, edge or corner shares with a voxel's sides or centre lines.
+// Numbers that put no plane, edge or corner on a voxel's sides or centre lines.
 const DVec3 kOdd(0.137, 0.291, 0.173);
 
 std::vector<TriangleMesh> closed_meshes() {
@@ -53,10 +53,10 @@ TEST(VoxelizeSolid, is_what_the_winding_number_says_of_closed_meshes) {
 
 TEST(VoxelizeSolid, has_as_many_voxels_as_shapes_that_can_be_counted) {
   EXPECT_EQ(solid_of(shapes::box(DVec3(-3.0, 0.0, 2.0), DVec3(7.0, 5.0, 4.0))).size(), 10U * 5U * 2U);
-  // Centres on its sides: the lesser one counts, the greater one does not.
+  // Centres lie on the sides of the box: those on lower sides count, those on upper sides do not.
   EXPECT_EQ(solid_of(shapes::box(DVec3(0.5), DVec3(4.5))).size(), 64U);
   // A ball so fine that no centre lies between it and its mesh: the counts of Gauss's circle problem in three
-  // dimensions, about a centre of a voxel.
+  // dimensions, about the centre of a voxel.
   const TriangleMesh ball = shapes::sphere(DVec3(0.5), 10.03, 300, 200);
   const Voxels expected =
       shapes::voxels_where(ball.bounds(), [](IVec3 v) { return v.x * v.x + v.y * v.y + v.z * v.z <= 100; });
@@ -101,7 +101,7 @@ TEST(VoxelizeSolid, does_not_care_which_way_a_part_is_turned) {
     TriangleMesh turned = mesh;
     for (auto& triangle : turned.triangles) std::swap(triangle[0], triangle[1]);
     EXPECT_TRUE(solid_of(turned) == expected);
-    // By parity, any triangle.
+    // By parity each triangle may face either way.
     for (auto& triangle : mesh.triangles) {
       if ((random() & 1U) != 0) std::swap(triangle[0], triangle[1]);
     }
@@ -140,7 +140,7 @@ TEST(VoxelizeSolid, bridges_holes) {
               0.01 * static_cast<double>(whole.size()));
 }
 
-/// The combined votes of six axis rays from a centre, with each triangle tested separately.
+/// Returns the combined votes of six axis rays from a centre, with each triangle tested separately.
 int votes_of(const TriangleMesh& mesh, SolidVoxels rule, DVec3 centre) {
   int votes = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -163,7 +163,7 @@ int votes_of(const TriangleMesh& mesh, SolidVoxels rule, DVec3 centre) {
   return votes;
 }
 
-// Triangles by chance, open on all sides, over several chunks: most of these are decided without looking at voxels.
+// Random triangles, open on all sides, over several chunks: most chunks are decided without looking at voxels.
 TEST(VoxelizeSolid, open_triangles_match_votes_of_six_rays) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> place(0.0, 150.0);
@@ -198,7 +198,7 @@ TEST(VoxelizeSurface, thick_is_every_cube_that_the_mesh_meets) {
     const Voxels expected = shapes::surface_by_boxes(mesh);
     EXPECT_TRUE(voxelized(mesh, SurfaceVoxels::Separating26, SolidVoxels::None) == expected) << expected.size();
   }
-  // Surfaces between two voxels take both.
+  // Surfaces between two voxels take both of them.
   const TriangleMesh box = shapes::box(DVec3(0.0), DVec3(4.0));
   EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating26, SolidVoxels::None).size(), 6U * 6U * 6U - 2U * 2U * 2U);
   EXPECT_TRUE(voxelized(box, SurfaceVoxels::Separating26, SolidVoxels::None) == shapes::surface_by_boxes(box));
@@ -223,7 +223,7 @@ TEST(VoxelizeSurface, between_voxels_belongs_to_its_inner_side) {
     if ((random() & 1U) != 0) std::swap(triangle[0], triangle[1]);
   }
   EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::Parity).size(), 64U) << "turned any way";
-  // A cavity: its walls are as thick as without one.
+  // The walls around a cavity keep their full thickness.
   TriangleMesh hollow = shapes::box(DVec3(0.0), DVec3(10.0));
   TriangleMesh cavity = shapes::box(DVec3(3.0), DVec3(7.0));
   for (auto& triangle : cavity.triangles) std::swap(triangle[0], triangle[1]);
@@ -231,7 +231,7 @@ TEST(VoxelizeSurface, between_voxels_belongs_to_its_inner_side) {
   EXPECT_EQ(voxelized(hollow, SurfaceVoxels::Separating6, SolidVoxels::Winding).size(), 1000U - 64U);
 }
 
-// Where a slanted side ends between voxels it has no inner side.
+// A slanted side that ends between voxels has no inner side there.
 TEST(VoxelizeSurface, KeepsTipsOnTheLatticeWithinBounds) {
   TriangleMesh tip;
   tip.positions = {{0, 0, 0}, {8, 0, 0}, {0, 8, 0}, {0, 0, 8}};
@@ -249,7 +249,7 @@ TEST(VoxelizeSurface, on_centres_takes_all_that_it_passes_on_every_side) {
   const TriangleMesh box = shapes::box(DVec3(0.5), DVec3(3.5));
   EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::Winding).size(), 64U);
   EXPECT_EQ(voxelized(box, SurfaceVoxels::Separating6, SolidVoxels::None).size(), 56U);
-  // Across chunks, and with one side that lies between voxels.
+  // Across chunks, with one side between voxels.
   const TriangleMesh long_box = shapes::box(DVec3(0.5, 0.0, 60.5), DVec3(3.5, 4.0, 70.5));
   EXPECT_EQ(voxelized(long_box, SurfaceVoxels::Separating6, SolidVoxels::Winding).size(), 4U * 4U * 11U);
 }
@@ -328,7 +328,7 @@ TEST(VoxelizeSurface, separates) {
 }
 
 TEST(VoxelizeSurface, WarnsOfTipsThatAreThinnerThanAVoxel) {
-  // A spike of 20 voxels, 0.4 thick at its base, between the lines through centres.
+  // A spike of 20 voxels, 0.4 thick at its base, between the centre lines.
   TriangleMesh mesh;
   mesh.positions = {{0.05, 0, 0.05}, {0.45, 0, 0.05}, {0.05, 0, 0.45}, {0.1, 20, 0.1}};
   mesh.triangles = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};

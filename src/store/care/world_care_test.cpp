@@ -111,7 +111,7 @@ TEST(WorldCare, CompactGivesSpaceBack) {
   EXPECT_EQ(sound_chunks(path), 20U);
 }
 
-/// Turns bytes of a file.
+/// Flips bytes of a file.
 void damage(const std::filesystem::path& path, std::uintmax_t at, std::size_t count) {
   std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
   file.seekg(static_cast<std::streamoff>(at));
@@ -128,7 +128,7 @@ int wanted_damage() {
   return wanted != nullptr ? std::atoi(wanted) : 60;
 }
 
-// The check names all lost items; the repaired world has everything else.
+// The check names all lost items; the repaired world has all others.
 TEST(WorldCare, AnyDamageIsSeenAndWhatIsSoundIsKept) {
   const WorldFolder folder;
   const auto whole = folder / "whole.quoin";
@@ -153,7 +153,7 @@ TEST(WorldCare, AnyDamageIsSeenAndWhatIsSoundIsKept) {
     ASSERT_TRUE(repair) << to_string(repair.error());
     const std::size_t kept = sound_chunks(mended);
     EXPECT_GE(kept, readable);
-    // Two bodies may lie where a few bytes were turned; a page holds some thirty of these small ones.
+    // The flipped bytes may hit two bodies; a page holds about thirty of these small ones.
     EXPECT_GE(kept, std::size_t{kChunks} - (is_page ? 40 : 2));
     EXPECT_EQ(repair->check.chunks, kept);
     const auto sound = check_world(mended);
@@ -181,7 +181,7 @@ TEST(WorldCare, LostTypesShow) {
   const WorldFolder folder;
   const auto path = folder / "w.quoin";
   make_world(path);
-  // The types' texts lie together: all of them go.
+  // All types are lost, since their texts are stored together.
   const auto bytes = read_file(path);
   const std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
   for (std::size_t at = text.find("\"type 1\""); at != std::string_view::npos; at = text.find("\"type 1\"", at + 1)) {
@@ -252,7 +252,7 @@ TEST(WorldCopy, HasAllThatTheWorldHas) {
     auto world = WorldStore::open(path, WorldAccess::Write);
     WorldChanges changes;
     changes.put_thumbnail(png_of('a'));
-    changes.put_chunk({0, 3, {1, 2, 3}}, {Chunk(2)});  // of another level
+    changes.put_chunk({0, 3, {1, 2, 3}}, {Chunk(2)});  // another level
     ASSERT_TRUE(world->save(std::move(changes)));
     ASSERT_TRUE(world->flush());
   }

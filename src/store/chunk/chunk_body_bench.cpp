@@ -1,5 +1,5 @@
 // store/encode, store/decode: bodies of mixed chunks of generated terrain (a fifth of them edited at random), and of
-// the smooth terrain's densities. Each is read back and compared before anything is timed.
+// the smooth terrain's densities. Each body is decoded and compared before timing.
 
 #include "store/chunk/chunk_body.h"
 

@@ -22,7 +22,7 @@ const quoin::VoxelRegistry& types() {
   return all;
 }
 
-/// The counts that a chunk keeps, against its voxels.
+/// Compares the counts stored in a chunk with its voxels.
 void require_sound(const quoin::Chunk& chunk) {
   std::array<std::array<int, quoin::kChunkEdge>, 3> layers{};
   for (int z = 0; z < quoin::kChunkEdge; ++z) {
@@ -44,7 +44,7 @@ void require_sound(const quoin::Chunk& chunk) {
   }
 }
 
-/// A body must give an error, or a chunk that is kept again and read as the same.
+/// A body must give an error, or a chunk that is equal after encoding and decoding again.
 void read_body(std::vector<std::byte>& body) {
   if (body.size() < kChunkBodyHeader) return;
   put_checksum(body);

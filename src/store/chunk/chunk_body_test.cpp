@@ -118,7 +118,7 @@ TEST(ChunkBody, KeepsChunksOfOneType) {
   }
 }
 
-// Voxels that lie at the ends of rows, layers and slabs, where the reader's sums could slip.
+// Voxels at the ends of rows, layers and slabs, where the reader's sums could be wrong.
 TEST(ChunkBody, KeepsSingleVoxelsAnywhere) {
   std::mt19937 random(2);
   for (int i = 0; i < 200; ++i) {
@@ -154,7 +154,7 @@ TEST(ChunkBody, SameVoxelsAreTheSameBytesWhateverLedToThem) {
   std::mt19937 random(4);
   for (const Kind& kind : kKinds) {
     const Chunk chunk = chunk_of_boxes(random, kind.types, kind.boxes, kind.noise / 10);
-    // Row by row from below, over another palette, with types that come and go.
+    // Writes row by row from below, over another palette, with types that appear and disappear.
     Chunk other(static_cast<VoxelType>(kind.types + 1));
     for (int i = 0; i < 300; ++i) {
       other.set(static_cast<int>(random() % 64), static_cast<int>(random() % 64), static_cast<int>(random() % 64),
@@ -222,7 +222,7 @@ TEST(ChunkBody, KeepsDensitiesAndMaterials) {
       for (int row = 0; row < 4'096; ++row) {
         ASSERT_EQ(back->densities->solid_row(row % 64, row / 64), densities.solid_row(row % 64, row / 64));
       }
-      // The other was written row by row, and its slabs are still expanded.
+      // The other chunk was written row by row, and its slabs are still expanded.
       EXPECT_TRUE(encoded(Chunk(), &*back->densities) == body);
     }
   }
@@ -292,7 +292,7 @@ TEST(ChunkBody, RefusesEveryTruncation) {
   for (std::size_t size = 0; size < body.size(); ++size) {
     EXPECT_FALSE(decoder.decode(kPlace, all.first(size), {&types, 8.0F}).has_value()) << size;
     if (size < kChunkBodyHeader) continue;
-    // The same with a checksum that is right.
+    // The same with a correct checksum.
     std::vector<std::byte> shorter(body.begin(), body.begin() + static_cast<std::ptrdiff_t>(size));
     put_checksum(shorter);
     EXPECT_FALSE(decoder.decode(kPlace, shorter, {&types, 8.0F}).has_value()) << size;

@@ -25,7 +25,7 @@ using luanti_test::Bytes;
 using luanti_test::Map;
 using luanti_test::row_of;
 
-/// Air with a stone, a turned chest and a node of a mod.
+/// Returns a block of air with a stone, a rotated chest and a node from a mod.
 Block some_block() {
   Block block;
   block.names = {{0, "air"}, {3, "default:stone"}, {100, "default:chest"}, {2053, "mod:unheard_of"}};

@@ -14,7 +14,7 @@
 namespace quoin {
 namespace {
 
-// A landscape with water, with rotated, hidden and repeated parts, and a grid without placements.
+// Returns a landscape with water, with rotated, hidden and repeated parts, and a grid without placements.
 Scene landscape() {
   Scene scene;
   const auto materials = add_terrain_types(scene.types);
@@ -95,7 +95,7 @@ TEST(WorldMeshes, AreThoseOfTheWholeScene) {
   for (const bool is_plain : {false, true}) {
     WorldMeshOptions options;
     options.folder = folder.path();
-    options.cache_bytes = is_plain ? std::size_t{1} << 30 : 1;  // hardly any: chunks are read again and again
+    options.cache_bytes = is_plain ? std::size_t{1} << 30 : 1;  // hardly any cache: reads chunks again and again
     options.scene.mesh.watertight = is_plain;
     options.scene.mesh.bake_occlusion = !is_plain;
     options.scene.instances = is_plain ? InstanceFilter::All : InstanceFilter::Visible;
@@ -141,7 +141,7 @@ TEST(WorldMeshes, AreReadAgainAfterTheyWereGivenBack) {
     return std::string(std::istreambuf_iterator<char>(in), {});
   };
   EXPECT_TRUE(bytes(folder / "a.glb") == bytes(folder / "b.glb"));
-  // No temporary file is left.
+  // No temporary file remains.
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 3);
 }
 

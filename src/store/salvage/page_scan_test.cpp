@@ -25,7 +25,7 @@ namespace {
 
 using Bytes = std::vector<std::byte>;
 
-/// A body of about so many bytes, which no other is equal to.
+/// Returns a unique body of about `bytes` bytes.
 Bytes body_of(std::mt19937& random, int number, std::uint64_t revision, std::size_t bytes) {
   VoxelRegistry types;
   VoxelProperties properties;
@@ -64,7 +64,7 @@ void put_row(Connection& connection, const Row& row) {
   ASSERT_TRUE(statement->run().has_value());
 }
 
-/// Rows of all sizes: most within a page, some on several.
+/// Returns rows of all sizes: most within a page, some across several pages.
 std::vector<Row> rows_of(std::mt19937& random, int count) {
   std::vector<Row> rows;
   for (int i = 0; i < count; ++i) {
@@ -98,7 +98,7 @@ void write(const std::filesystem::path& path, const Bytes& bytes) {
       .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
 }
 
-/// Bodies that were found, with the keys that they were found under.
+/// Returns the found bodies with their keys.
 std::map<Bytes, std::set<std::int64_t>> found_in(const std::filesystem::path& path) {
   std::map<Bytes, std::set<std::int64_t>> found;
   const auto status = scan_bodies(path, [&](std::int64_t key, std::span<const std::byte> body) {
@@ -166,7 +166,7 @@ std::map<std::int64_t, std::vector<Span>> places_of_rows(const Bytes& file, std:
       while (left > 0) {
         const std::size_t overflow = (next - 1) * page_size;
         const std::size_t count = std::min<std::uint64_t>(left, page_size - 4);
-        // The last page's pointer leads nowhere.
+        // The pointer of the last page leads nowhere.
         spans.push_back({overflow + (left > count ? 0 : 4), overflow + 4 + count});
         left -= count;
         next = number_at(file, overflow, 4);
@@ -247,7 +247,7 @@ TEST(PageScan, FindsJustTheRowsWhoseBytesAreSound) {
   for (int i = 0; i < cases; ++i) {
     Bytes file = sound;
     for (std::size_t k = 1 + random() % 30; k > 0; --k) {
-      // Single bytes, sectors, pages.
+      // Damages single bytes, sectors and pages.
       const std::size_t length = k % 10 == 0 ? (i % 3 == 0 ? 8'192 : 512) : 1;
       const std::size_t begin = random() % (file.size() / length) * length;
       for (std::size_t b = 0; b < length; ++b) file[begin + b] = static_cast<std::byte>(i % 2 == 0 ? 0 : random());
@@ -281,7 +281,7 @@ TEST(PageScan, FindsWhatOnlyTheLogHolds) {
   run(connection, "CREATE TABLE chunks(key INTEGER PRIMARY KEY, body BLOB NOT NULL)");
   for (const Row& row : rows) put_row(connection, row);
   ASSERT_TRUE(connection.checkpoint().has_value());
-  // Rows in the file are rewritten in the log, some of them twice.
+  // The log rewrites rows of the file, some of them twice.
   for (int round = 2; round <= 3; ++round) {
     for (std::size_t i = 0; i < rows.size(); i += static_cast<std::size_t>(round)) {
       rows[i].body = body_of(random, static_cast<int>(i), static_cast<std::uint64_t>(round), 100 + random() % 20'000);
@@ -350,14 +350,14 @@ TEST(PageScan, FindsRecordsOfAnyColumns) {
   }
 }
 
-// Pages that lead to themselves, and rows without number that begin there.
+// Pages that point to themselves, and rows without a number that begin there.
 TEST(PageScan, EndsWhereRecordsDoNot) {
   constexpr std::size_t kPage = 512;
   constexpr std::size_t kPages = 2'048;
   const WorldFolder folder;
   Bytes file(kPage * kPages);
   std::memcpy(file.data(), "SQLite format 3\0\x02\0", 18);
-  // Payload of 1,016,040 bytes, row 1, a record of NULL and a blob; the next page behind the 40 bytes that lie here.
+  // A payload of 1,016,040 bytes, row 1, a record of NULL and a blob; the next page follows the 40 bytes stored here.
   constexpr std::array<std::uint8_t, 16> kCell = {0xBE, 0x81, 0x68, 0x01, 0x05, 0x00, 0xFC, 0x83,
                                                   0x52, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x02};
   for (std::size_t at = 2 * kPage; at < file.size(); at += kCell.size()) std::memcpy(&file[at], kCell.data(), 16);
@@ -372,7 +372,8 @@ TEST(PageScan, EndsWhereRecordsDoNot) {
   EXPECT_TRUE(found_in(path).empty());
 }
 
-// In the form of page_scan_fuzz: a database whose number of 256-byte blocks is the first byte, and its log.
+// Uses the form of page_scan_fuzz: the first byte is the database's number of 256-byte blocks, followed by the database
+// and its log.
 TEST(PageScan, FilesOfTheCorpusHoldTheirBodies) {
   const WorldFolder folder;
   for (const char* const name : {"pages_of_512", "pages_of_1024"}) {

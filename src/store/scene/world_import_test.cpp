@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder with regions of the game's, removed at the end.
+/// A temporary folder with regions of Minecraft.
 class WorldImport : public testing::Test {
  protected:
   void SetUp() override {

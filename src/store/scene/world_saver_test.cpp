@@ -15,7 +15,7 @@
 namespace quoin {
 namespace {
 
-/// The scene's text as a scene file, shortened: equal texts are equal scenes, to the last bit.
+/// Returns the scene's text as a scene file, shortened: equal texts mean equal scenes, to the last bit.
 std::string text_of(const Scene& scene) {
   const auto file = scene_file_of(scene);
   if (!file) return to_string(file.error());
@@ -160,7 +160,7 @@ TEST(WorldSaver, SavesWhatChangedAndNoMore) {
   scene.edit(hill).field.edit({{0, 0, 0}, {1, 1, 1}}, [](IVec3, DensitySample) { return DensitySample{-1.0F, 3}; });
   kept.save(scene);
   EXPECT_EQ(kept.chunks_of_last_save(), 1U);
-  // A chunk that becomes air is kept as air.
+  // A chunk that becomes air is stored as air.
   const IVec3 emptied = scene.grids()[ground].grid.chunks().front();
   scene.edit(ground).grid.fill_box({emptied * kChunkEdge, (emptied + IVec3(1)) * kChunkEdge}, kAir);
   kept.save(scene);

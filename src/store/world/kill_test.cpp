@@ -16,7 +16,8 @@
 namespace quoin {
 namespace {
 
-// Runs in the process to be killed: saves repeatedly from a number on, and writes the numbers of the saves on disk.
+// Runs in the process to be killed: saves repeatedly from a number onwards, and reports the numbers of the saves on
+// disk.
 [[noreturn]] void save_until_killed(const std::string& file, int first, int out) {
   auto world = WorldStore::open(file, WorldAccess::Write, {1});
   if (!world) ::_exit(3);
@@ -31,7 +32,7 @@ namespace {
   }
 }
 
-/// The last number that was written into a pipe.
+/// Returns the last number written into a pipe.
 int last_of(int in, int before) {
   int number = before;
   for (int read = 0; ::read(in, &read, sizeof(read)) == sizeof(read);) number = read;
@@ -60,7 +61,7 @@ TEST(WorldKill, NothingAcknowledgedIsLost) {
     }
     ::close(ends[1]);
     int ready = 0;
-    if (kill % 4 != 0) {  // the others may not even have opened it
+    if (kill % 4 != 0) {  // otherwise it may not even have opened the world
       ASSERT_EQ(::read(ends[0], &ready, sizeof(ready)), static_cast<ssize_t>(sizeof(ready)));
     }
     std::this_thread::sleep_for(std::chrono::microseconds(random() % 60'000));

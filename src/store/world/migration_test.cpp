@@ -46,7 +46,7 @@ void set_version(Connection& database, int version) {
   ASSERT_TRUE(put->run());
 }
 
-// As the first version of the format had it.
+// Creates a world in the first version of the format.
 void make_version_1(const std::filesystem::path& path) {
   make_world(path);
   Connection database = write(path);
@@ -93,7 +93,7 @@ TEST(Migration, IsTakenToThePresentVersionWhenItIsWritten) {
   EXPECT_EQ(*database.number("SELECT count(*) FROM sqlite_schema WHERE name='chunk_keys'"), 1);
   EXPECT_EQ(*database.text("SELECT body FROM parts WHERE kind='world' AND id='version'"),
             std::to_string(kSchemaVersion));
-  EXPECT_FALSE(std::filesystem::exists(path.string() + "~"));  // what only adds keeps no copy
+  EXPECT_FALSE(std::filesystem::exists(path.string() + "~"));  // steps that only add keep no copy
 }
 
 TEST(Migration, KeysAreListedWithoutTheirBodies) {
@@ -110,7 +110,7 @@ TEST(Migration, KeysAreListedWithoutTheirBodies) {
   }
 }
 
-// Steps of a future program: the present version to one that renames types, and one after that.
+// Steps of a future program: from the present version to one that renames types, and to the next one.
 Status rename_values(Connection& database) {
   return database.run("UPDATE parts SET kind='thing' WHERE kind='value'; CREATE TABLE added(x)");
 }

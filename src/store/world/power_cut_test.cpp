@@ -14,7 +14,7 @@ namespace {
 
 constexpr const char* kFile = "w.quoin";
 
-/// Saves to a world on a disk, and cuts the power all the while.
+/// Saves to a world on a simulated disk, with power cuts at any time.
 class Cuts {
  public:
   explicit Cuts(unsigned seed, int one_of) : random_(seed), one_of_(one_of) {
@@ -48,7 +48,7 @@ class Cuts {
   std::string first_fault;
 
  private:
-  // On the thread that writes.
+  // Runs on the writing thread.
   void consider() {
     if (!is_cutting_ || is_looking_ || cut_random_() % static_cast<unsigned>(one_of_) != 0) return;
     is_looking_ = true;
@@ -105,7 +105,7 @@ TEST(WorldPowerCut, ADiskThatLiesAboutSyncsLosesSaves) {
   EXPECT_GT(bad, 0);
 }
 
-/// Fails the n-th call that changes the disk, or it and all behind it.
+/// Fails the n-th call that changes the disk, or that call and all later ones.
 class Fault {
  public:
   Fault(TestDisk& disk, int number, int code, bool is_lasting) : disk_(disk) {
@@ -135,7 +135,7 @@ void expect_one_clear_line(const Error& error) {
   EXPECT_NE(error.code, ErrorCode::BadFormat) << error.message;
 }
 
-/// Saves, with a fault at some call; returns whether there were as many calls.
+/// Saves with a fault at one call; returns false if there were fewer calls.
 bool survives_fault(int number, int code, bool is_lasting) {
   constexpr int kSaves = 6;
   TestDisk disk("faulty");
@@ -156,13 +156,13 @@ bool survives_fault(int number, int code, bool is_lasting) {
         continue;
       }
       expect_one_clear_line(saved.error());
-      // As if the power went now.
+      // Simulates a power cut at this moment.
       TestDisk after("after the fault");
       std::minstd_rand random(static_cast<unsigned>(number));
       after.become(disk.image(), random);
       const Found found = look_at(kFile, after.name());
       EXPECT_GE(found.saves, acknowledged) << found.why << " call " << number;
-      // Failed saves are still readable, and are saved when there is room again.
+      // Failed saves are still readable, and are saved once there is room again.
       Expected expected;
       for (int k = 1; k <= i; ++k) apply(expected, k);
       for (int place = 0; place < kPlaces; ++place) {

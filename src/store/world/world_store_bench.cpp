@@ -70,7 +70,7 @@ void count(benchmark::State& state, const WorldStore& world) {
   state.counters["file_bytes_per_chunk"] = bytes / chunks;
 }
 
-// Into a new world.
+// Saves to a new world.
 void save_new(benchmark::State& state) {
   const WorldFolder folder;
   const std::vector<std::size_t> order = order_of(false);
@@ -90,7 +90,7 @@ void save_new(benchmark::State& state) {
   count(state, *WorldStore::open(path, WorldAccess::Read));
 }
 
-// Again, in another order.
+// Saves the same chunks again, in another order.
 void save_again(benchmark::State& state) {
   const WorldFolder folder;
   WorldStore world = new_world(folder / "w.quoin");
@@ -101,7 +101,7 @@ void save_again(benchmark::State& state) {
   count(state, world);
 }
 
-// One chunk, and until it is safe.
+// Saves one chunk and waits until it is safe.
 void save_one(benchmark::State& state) {
   const WorldFolder folder;
   WorldStore world = new_world(folder / "w.quoin");
@@ -134,7 +134,7 @@ void load(benchmark::State& state) {
   count(state, *world);
 }
 
-/// A landscape, kept by a saver.
+/// A landscape and its saver.
 struct Kept {
   WorldFolder folder;
   WorldStore world;
@@ -161,7 +161,7 @@ void save_nothing(benchmark::State& state) {
   for (auto _ : state) kept.save();
 }
 
-// One voxel a save; the disk's time is not the caller's.
+// Edits one voxel per save; the caller does not wait for the disk.
 void save_edit(benchmark::State& state) {
   Kept kept;
   int i = 0;

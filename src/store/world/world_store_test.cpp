@@ -241,7 +241,7 @@ TEST(WorldStore, CallbacksComeOnceItIsOnDisk) {
   EXPECT_TRUE(was_there);
 }
 
-// Locks of this process on a file, as the system lists them.
+// Returns this process's locks on a file, as listed by the system.
 int locks_on(const std::filesystem::path& path) {
   struct stat info {};
   if (::stat(path.c_str(), &info) != 0) return -1;

@@ -32,7 +32,7 @@ struct Types {
   }
 };
 
-// Finds the material at a point: the slow, obvious way, in double.
+// Finds the material at a point: the simple slow way, in double precision.
 class Oracle {
  public:
   Oracle(const DensityGrid& field, const VoxelRegistry& types) : field_(&field), types_(&types) {}
@@ -113,7 +113,7 @@ DVec3 random_between(std::mt19937& random, double low, double high) {
   return {any(random), any(random), any(random)};
 }
 
-// Every sample has its own value and material: all kinds of cells.
+// Gives every sample its own value and material: all kinds of cells.
 DensityGrid noise(const Types& types, IVec3 corner, int edge, unsigned seed, int materials) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> density(-4.0F, 2.5F);
@@ -141,7 +141,7 @@ int check(const DensityGlass& glass, const Oracle& oracle, const Ray& ray, doubl
   for (double t = 0.5 * kStep; t < max_t; t += kStep) {
     const auto found = [&](double at) { return oracle.at(ray.origin + ray.direction * at); };
     const VoxelType type = found(t);
-    // Near a change, either answer may be right.
+    // Near a change either answer is correct.
     if (found(t - 2e-3) != type || found(t + 2e-3) != type) continue;
     const VoxelType expected = type == kOpaque ? kAir : type;
     EXPECT_EQ(type_at(spans, t), expected) << t;

@@ -1,4 +1,4 @@
-// rays/density/*: the rays of rays/* on the same terrain without steps: a field of 256x128x256 samples.
+// rays/density/*: the rays of rays/* on the same terrain as a smooth field of 256x128x256 samples.
 
 #include <bit>
 #include <cstdint>
@@ -118,7 +118,8 @@ void build(benchmark::State& state) {
 }
 BENCHMARK(build)->Name("rays/density/build")->Unit(benchmark::kMillisecond);
 
-// Following a ball of radius 6 dug or filled in a chunk's middle, and at a corner of eight; the edit not counted.
+// Updates the tree after a ball of radius 6 was dug or filled in a chunk's middle, and at a corner of eight chunks;
+// excludes the edit.
 void update(benchmark::State& state) {
   DensityGrid field = smooth_terrain();
   DensityTree followed(field);

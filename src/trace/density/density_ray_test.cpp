@@ -13,7 +13,7 @@
 namespace quoin {
 namespace {
 
-// The trilinear field in double, sample by sample: the reference for rays.
+// The trilinear field in double precision, sample by sample: the reference for rays.
 class Dense {
  public:
   explicit Dense(const DensityGrid& field) : field_(field) {}
@@ -31,8 +31,7 @@ class Dense {
     return sum;
   }
 
-  // Returns the lowest density on the ray from `from` to `to`, from many samples: more than a cubic has extremes in a
-  // cell.
+  // Returns the lowest density on the ray from `from` to `to`, by more samples than a cubic has extremes in a cell.
   [[nodiscard]] double least(const Ray& ray, double from, double to) const {
     const double step = 0.02 / glm::length(ray.direction);
     double least = kInfinity;
@@ -66,7 +65,7 @@ VoxelType material_at(const DensityGrid& field, IVec3 cell, const DVec3& p) {
   return found;
 }
 
-// Before a hit the field is not negative, and at the hit it is 0. Without a hit it is never negative.
+// The field is not negative before a hit, and 0 at the hit. Without a hit it is never negative.
 void check(const DensityTree& tree, const Ray& ray, double max_t, double far, Tally& tally) {
   const Dense dense(tree.field());
   const auto hit = first_hit(tree, ray, max_t);
@@ -97,7 +96,7 @@ void check(const DensityTree& tree, const Ray& ray, double max_t, double far, Ta
     EXPECT_GE(least, kLeftOut) << hit->t;
     tally.left_out += least < -1e-9;
     EXPECT_NEAR(dense.at(p), 0.0, 1e-6) << hit->t;
-    // The density decreases from here.
+    // The density decreases from here on.
     EXPECT_LE(glm::dot(hit->normal, ray.direction), 1e-6 * glm::length(ray.direction));
   }
   if (hit->normal != DVec3(0.0)) {
@@ -147,7 +146,7 @@ TEST_P(DensityRays, AgreeWithTheTrilinearField) {
       for (int i = 0; i < 400; ++i) {
         Ray ray{middle + random_in(random, -14.0, 14.0), random_in(random, -1.0, 1.0)};
         if (i % 3 == 0) ray.direction = middle + random_in(random, -5.0, 5.0) - ray.origin;
-        // Along axes and planes, from whole numbers.
+        // Along axes and planes, starting at integers.
         if (i % 5 == 0) ray.direction[i / 5 % 3] = 0.0;
         if (i % 20 == 0) ray.direction[(i / 5 + 1) % 3] = 0.0;
         if (i % 7 == 0) ray.origin = glm::round(ray.origin);
@@ -206,7 +205,7 @@ TEST_P(DensityRays, ShortRaysAreTheSameInPackets) {
   std::mt19937 random(11);
   int blocked = 0;
   int free = 0;
-  // A field in eight chunks, a small one, and one of thin solids.
+  // A field in eight chunks, a small field, and a field of thin solids.
   const DensityGrid fields[] = {noise({58, 57, 59}, 12, 5, 0.6), noise({0, 0, 0}, 9, 6, 0.8),
                                 noise({-7, -70, -134}, 40, 7, 0.98)};
   for (const DensityGrid& field : fields) {
@@ -287,7 +286,7 @@ TEST_P(DensityRays, MeetASphereWhereItIs) {
       // Cells approximate the sphere, so the normal deviates slightly.
       EXPECT_GT(glm::dot(hit->normal, out), 0.998);
       EXPECT_EQ(hit->material, 7);
-      // Past it, and away from it.
+      // Passes the sphere, and starts away from it.
       const DVec3 aside = glm::normalize(glm::cross(out, DVec3(0.3, 0.5, 0.8))) * 20.1;
       EXPECT_FALSE(first_hit(tree, {centre + out * distance + aside, -out}));
       EXPECT_FALSE(any_hit(tree, {centre + out * 21.0, out}));
@@ -298,7 +297,7 @@ TEST_P(DensityRays, MeetASphereWhereItIs) {
   }
 }
 
-// Hills of 2,048 samples, 12 high, with a rough skin.
+// Returns hills of 2,048 samples, 12 high, with a rough surface.
 DensityGrid long_hills() {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> rough(-0.2F, 0.2F);
@@ -310,7 +309,7 @@ DensityGrid long_hills() {
   return field;
 }
 
-// Single precision leaves no cell out that a ray passes in double: also where it grazes the surface from far away.
+// Single precision skips no cell that a ray passes in double precision, even where it grazes the surface from far away.
 TEST_P(DensityRays, AreThoseOfTheWalkInDoubleHoweverFarTheyGo) {
   const DensityGrid field = long_hills();
   const DensityTree tree(field);
@@ -324,7 +323,7 @@ TEST_P(DensityRays, AreThoseOfTheWalkInDoubleHoweverFarTheyGo) {
     for (int lane = 0; lane < RayPacket::kSize; ++lane) {
       const DVec3 spread = random_in(random, -0.006, 0.006);
       const DVec3 direction = DVec3(-side, -0.008 + spread.y, spread.z) * (i % 4 == 0 ? 0.01 : 1.0);
-      // Some along the surface that the ray before came to.
+      // Some rays run along the surface that the previous ray hit.
       packet.set(lane, {eye, direction}, kInfinity);
       const auto before = i % 5 == 0 ? first_hit(tree, {eye, direction}) : std::nullopt;
       if (before)
@@ -340,7 +339,7 @@ TEST_P(DensityRays, AreThoseOfTheWalkInDoubleHoweverFarTheyGo) {
       EXPECT_EQ(blocked >> lane & 1U, found.hit >> lane & 1U);
       hits += is_hit;
       const DensityHit& hit = found.lanes[static_cast<std::size_t>(lane)];
-      // Cells that rays pass for less than 1e-3 may differ.
+      // Results may differ in cells that rays pass for less than 1e-3.
       others += is_hit != expected.has_value() || (is_hit && (hit.t != expected->t || hit.cell != expected->cell));
     }
   }
@@ -382,7 +381,7 @@ TEST(DensityRay, StopsAtItsEnd) {
     EXPECT_FALSE(any_hit(tree, {{15, 30, odd}, {0, -1, 0}}));
   }
   EXPECT_FALSE(first_hit(tree, {{15, 30, 15}, {0, 0, 0}}));
-  // Slower than rays heed along every axis, next to the solid.
+  // Slower than the walk's threshold along every axis, next to the solid.
   EXPECT_FALSE(first_hit(tree, {{15, 21.5, 15}, {0, -1e-40, 0}}));
   EXPECT_FALSE(any_hit(tree, {{15, 20.5, 15}, {0, 1e-40, 0}}));
   // Empty space.
@@ -398,11 +397,11 @@ TEST(DensityRay, ComingToZeroIsNoHit) {
   field.edit({IVec3{0}, IVec3{16}}, [](IVec3 p, DensitySample) {
     return DensitySample{static_cast<float>(std::abs(p.y - 8)), 1};
   });
-  // A solid sample far off, so that there is anything to trace.
+  // A distant solid sample, so that the tree is not empty.
   field.set({40, 40, 40}, {-1.0F, 2});
   const DensityTree tree(field);
   EXPECT_FALSE(first_hit(tree, {{5.5, 20, 5.5}, {0, -1, 0}}));
-  // With something solid below, the ray goes in where it is 0.
+  // With a solid below, the ray enters where the density is 0.
   field.edit({IVec3{0}, IVec3{16, 8, 16}}, [](IVec3 p, DensitySample) {
     return DensitySample{static_cast<float>(p.y - 8), 1};
   });
@@ -411,7 +410,7 @@ TEST(DensityRay, ComingToZeroIsNoHit) {
   ASSERT_TRUE(hit);
   EXPECT_NEAR(hit->t, 12.0, 1e-9);
   EXPECT_EQ(hit->normal, (DVec3{0, 1, 0}));
-  // From the surface outwards there is air.
+  // The way out from the surface is air.
   EXPECT_FALSE(any_hit(now, {{5.5, 8, 5.5}, {0.3, 1, 0}}));
   EXPECT_TRUE(any_hit(now, {{5.5, 8, 5.5}, {0.3, -1, 0}}));
 }
@@ -441,7 +440,7 @@ TEST(DensityTree, FollowsEdits) {
     } else if (i % 3 == 1) {
       field.remove_sphere(glm::mix(place, DVec3(64.0), 0.6), 8.0);
     } else {
-      // On the lower faces of a chunk: cells of the chunks below end there.
+      // At the lower faces of a chunk, where cells of the chunks below end.
       field.set({64, 64, 64 + i}, {field.density({64, 64, 64 + i}) < 0.0F ? 2.0F : -2.0F, 3});
     }
     tree.update(field.changes_since(cursor));
