@@ -210,7 +210,7 @@ TEST_F(Tool, FramesBecomeAnAnimation) {
   }
 }
 
-// Nothing of such a file is visible; `info` should show the reason.
+// Such a file shows no voxels; `info` should give the reason.
 TEST_F(Tool, InfoTellsOfHiddenLayersWithoutAName) {
   vox_test::FileBuilder file;
   file.model(2, 2, 2, {{0, 0, 0, 1}});

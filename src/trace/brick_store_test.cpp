@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint64_t kEveryVoxel = ~std::uint64_t{0};
 
-// Returns a brick whose 64 cells, in storage order, are full below `from`, mixed up to `to`, and empty from there on;
+// Returns a brick whose 64 cells, in layer order, are full below `from`, mixed up to `to`, and empty from there on;
 // or with full and empty swapped.
 Node layered(int from, int to, bool is_turned, std::mt19937_64& random) {
   Node words;
