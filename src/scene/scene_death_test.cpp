@@ -108,7 +108,7 @@ TEST(SceneDeathTest, MovingAGroupWithoutARotationIsAMistake) {
   QUOIN_EXPECT_MISTAKE(move_group(scene, unturned, DVec3(0.0), none), "finite and not zero");
 }
 
-TEST(SceneDeathTest, UsingMovedFromObjectsIsAMistake) {
+TEST(SceneDeathTest, UsingMovedFromScenesAndTreesIsAMistake) {
   Scene scene;
   const Scene moved = std::move(scene);
   QUOIN_EXPECT_MISTAKE(scene.add_grid({}), "a scene that was not moved from");  // NOLINT(bugprone-use-after-move)
@@ -122,7 +122,7 @@ TEST(SceneDeathTest, UsingMovedFromObjectsIsAMistake) {
 }
 
 // NOLINTBEGIN(bugprone-use-after-move): tested here
-TEST(SceneDeathTest, WhateverWasMovedFromIsNotToBeUsed) {
+TEST(SceneDeathTest, UsingOtherMovedFromObjectsIsAMistake) {
   const char* const wanted = "an object that was not moved from";
   const auto leave = [](auto& object) { [[maybe_unused]] const auto taken = std::move(object); };
   Scene scene;

@@ -256,7 +256,7 @@ TEST_F(PathHistoryTest, SmallPicturesAreShownInTheLargeOnesPlace) {
   EXPECT_GT(greatest_difference(shown, before), 0.1F) << "and the tower is there";
 }
 
-TEST_F(PathHistoryTest, KeepsPixelsWithoutHistory) {
+TEST_F(PathHistoryTest, KeepsImagesOfUnknownSampleCounts) {
   converge();
   edit(2);
   const PathPicture taken = take(kEdge, 2);
