@@ -249,7 +249,7 @@ TEST(TriangleCases, StlFilesOfOtherLengthsAreReadOrRefusedWithTheReason) {
   EXPECT_EQ(mesh->warnings[0], "left out the last 9 bytes, which follow the triangles");
   const auto cut = load_scene(case_file("stl-cut.stl"));
   ASSERT_FALSE(cut);
-  EXPECT_EQ(cut.error().message, "the header promises 1 triangles, which take 134 bytes, and the file has 127");
+  EXPECT_EQ(cut.error().message, "the header promises 1 triangles, which need 134 bytes, but the file has 127");
 }
 
 TEST(GoxelCases, ReadsShapeLayers) {
@@ -271,7 +271,7 @@ TEST(GoxelCases, ReadsShapeLayers) {
 TEST(LuantiCases, RefusesNamesThatAreCutOff) {
   const auto loaded = load_scene(case_file("mts-names-cut-off.mts"));
   ASSERT_FALSE(loaded);
-  EXPECT_EQ(loaded.error().message, "it ends before its nodes do");
+  EXPECT_EQ(loaded.error().message, "the file ends before its nodes");
   EXPECT_EQ(loaded.error().byte_offset, 15U);
 }
 
@@ -279,7 +279,7 @@ TEST(LuantiCases, RefusesNamesThatAreCutOff) {
 TEST(LuantiCases, RefusesASchematicWithoutNodes) {
   const auto loaded = load_scene(case_file("mts-no-width.mts"));
   ASSERT_FALSE(loaded);
-  EXPECT_EQ(loaded.error().message, "a schematic of 0 x 38400 x 65280 nodes");
+  EXPECT_EQ(loaded.error().message, "invalid size: 0 x 38400 x 65280 nodes");
 }
 
 std::vector<std::byte> unpacked(const fs::path& path) {

@@ -245,7 +245,7 @@ TEST_F(Tool, FromVoxToVoxEverythingIsKept) {
   EXPECT_NE(still.err.find("left out, since --frame takes one: animation: frames 0 to 3"), std::string::npos);
   EXPECT_EQ(Json::parse(run("info still.vox --json").out)["voxels"], 2) << "models stay, placed or not";
   const ToolRun scene = run("convert crew.vox crew.json");
-  EXPECT_NE(scene.err.find("left out, which only .vox keeps: cameras: 1"), std::string::npos);
+  EXPECT_NE(scene.err.find("left out, only .vox stores it: cameras: 1"), std::string::npos);
   const Json info = Json::parse(run("info crew.vox --json").out);
   EXPECT_EQ(info["groups"].at(0)["name"], "crew");
   EXPECT_EQ(info["groups"].at(0)["parent"], Json());
@@ -350,11 +350,11 @@ TEST_F(Tool, AMissingOutputFolderIsSaidAtOnce) {
     const ToolRun failed = run(command);
     EXPECT_EQ(failed.status, 1) << command;
     const std::string file = command.substr(command.find("none/"));
-    EXPECT_EQ(failed.err, "quoin: " + file + ": there is no folder \"none\" to write it into\n") << command;
+    EXPECT_EQ(failed.err, "quoin: " + file + ": the folder \"none\" does not exist\n") << command;
   }
   EXPECT_EQ(run("render tiny.vox -o out.png --depth none/out.pfm").err,
-            "quoin: none/out.pfm: there is no folder \"none\" to write it into\n");
-  EXPECT_EQ(run("convert tiny.vox file/out.glb").err, "quoin: file/out.glb: \"file\" is no folder to write it into\n");
+            "quoin: none/out.pfm: the folder \"none\" does not exist\n");
+  EXPECT_EQ(run("convert tiny.vox file/out.glb").err, "quoin: file/out.glb: \"file\" is not a folder\n");
 }
 
 TEST_F(Tool, FacesAreCountedAlikeByEveryCommand) {
@@ -554,7 +554,7 @@ TEST_F(Tool, InfoAndRenderReadStandardInput) {
   for (const char* command : {"info -", "render - -o none.png"}) {
     const ToolRun result = shell("'" QUOIN_TOOL "' " + std::string(command) + " < named.png");
     EXPECT_EQ(result.status, 1);
-    EXPECT_TRUE(result.err.starts_with("quoin: standard input: not a file of any format")) << result.err;
+    EXPECT_TRUE(result.err.starts_with("quoin: standard input: an image, not a voxel file")) << result.err;
     EXPECT_FALSE(exists("none.png"));
   }
 }
@@ -614,7 +614,7 @@ TEST_F(Tool, ConvertReadsAndWritesStandardStreams) {
   EXPECT_EQ(shell("'" QUOIN_TOOL "' convert - named.glb --from vox < tiny.vox").status, 0);
   for (const auto& [arguments, error] : std::vector<std::array<std::string, 2>>{
            {"convert - x.glb --from nifti < tiny.vox", "quoin: standard input: is vox, not nifti\n"},
-           {"convert - x.glb < nothing.txt", "quoin: standard input: not a file of any format that Quoin reads"},
+           {"convert - x.glb < nothing.txt", "quoin: standard input: unknown file format"},
            {"convert tiny.vox -", "quoin: OUT is standard output: --to says as what"},
            {"convert tiny.vox - --to obj", "quoin: .obj is several files, and standard output is one\n"},
            {"convert tiny.vox - --to glb --json", "quoin: --json prints on standard output, where OUT goes\n"},
@@ -737,7 +737,7 @@ TEST_F(Tool, WrongUsageNamesTheArgument) {
       {"convert tiny.vox", "quoin: OUT is required"},
       {"convert tiny.vox a.vox b.vox", "quoin: 3 files; several are converted by --to FORMAT, --out-dir DIR"},
       {"convert tiny.vox a.glb --out-dir x", "quoin: --out-dir needs --to"},
-      {"convert tiny.vox --to xyz", "quoin: --to: the name must end in one of .3mf"},
+      {"convert tiny.vox --to xyz", "quoin: --to: unknown extension; use one of .3mf"},
       {"convert tiny.vox --to vox --no-ao", "quoin: --mesher, --no-ao"},
       {"", "quoin: no command; there are info, convert"},
       {"bogus", "quoin: no command \"bogus\"; there are info, convert"},

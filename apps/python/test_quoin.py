@@ -282,8 +282,8 @@ class Scenes(unittest.TestCase):
             again = quoin.load(path)
             again.save(os.path.join(folder, "a.json"))
         self.assertEqual(len(again.cameras), 1)
-        self.assertEqual(again.warnings, ["left out, which only .vox keeps: cameras: 1",
-                                          "left out, which only .vox keeps: render settings: 1"])
+        self.assertEqual(again.warnings, ["left out, only .vox stores it: cameras: 1",
+                                          "left out, only .vox stores it: render settings: 1"])
 
     def test_triangles_become_voxels(self):
         corners = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [4, 4, 0], [0, 0, 4], [4, 0, 4], [0, 4, 4], [4, 4, 4]])

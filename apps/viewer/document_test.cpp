@@ -422,8 +422,8 @@ TEST(Document, ReportsLossesOfSavingOnce) {
   ASSERT_TRUE(document);
   const auto losses = (*document)->losses(folder.file("as.json"));
   ASSERT_TRUE(losses);
-  EXPECT_EQ(*losses, (std::vector<std::string>{"left out, which only .vox keeps: animation: frames 0 to 3",
-                                               "left out, which only .vox keeps: cameras: 1"}));
+  EXPECT_EQ(*losses, (std::vector<std::string>{"left out, only .vox stores it: animation: frames 0 to 3",
+                                               "left out, only .vox stores it: cameras: 1"}));
   {
     Saver saver(**document, folder.file("as.json"), false, nullptr);
     while (!saver.is_done()) std::this_thread::sleep_for(std::chrono::milliseconds(1));

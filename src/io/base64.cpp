@@ -36,7 +36,8 @@ std::string to_base64(std::span<const std::byte> bytes) {
 
 Result<std::vector<std::byte>> from_base64(std::string_view text) {
   if (text.size() % 4 != 0) {
-    return make_error(ErrorCode::BadFormat, "base64 is cut off: it comes in fours of characters", {}, text.size());
+    return make_error(ErrorCode::BadFormat, "the base64 text is cut off: its length is not a multiple of 4", {},
+                      text.size());
   }
   std::vector<std::byte> bytes;
   bytes.reserve(text.size() / 4 * 3);
@@ -47,12 +48,13 @@ Result<std::vector<std::byte>> from_base64(std::string_view text) {
     std::uint32_t three = 0;
     for (std::size_t i = 0; i < 4; ++i) {
       const std::uint8_t value = i < digits ? kValues[static_cast<unsigned char>(text[at + i])] : 0;
-      if (value == kNoDigit) return make_error(ErrorCode::BadFormat, "no base64 character", {}, at + i);
+      if (value == kNoDigit) return make_error(ErrorCode::BadFormat, "not a base64 character", {}, at + i);
       three = three << 6 | value;
     }
     for (std::size_t i = 0; i + 1 < digits; ++i) bytes.push_back(static_cast<std::byte>(three >> (16 - 8 * i)));
     const std::uint32_t left_over = digits == 4 ? 0 : three & ((1U << (digits == 3 ? 8 : 16)) - 1);
-    if (left_over != 0) return make_error(ErrorCode::BadFormat, "base64 with bits that belong to no byte", {}, at);
+    if (left_over != 0)
+      return make_error(ErrorCode::BadFormat, "the last base64 character has bits beyond the last byte", {}, at);
   }
   return bytes;
 }

@@ -38,12 +38,12 @@ TEST(Base64, RefusesDamageWithItsPosition) {
     const auto bytes = from_base64(text);
     return bytes ? std::string("none") : to_string(bytes.error());
   };
-  EXPECT_EQ(fault("Zm9"), "byte 3: base64 is cut off: it comes in fours of characters");
-  EXPECT_EQ(fault("Zm9vZm-v"), "byte 6: no base64 character");
-  EXPECT_EQ(fault("Zg==Zm9v"), "byte 2: no base64 character");
-  EXPECT_EQ(fault("Z==="), "byte 1: no base64 character");
-  EXPECT_EQ(fault("Zm9="), "byte 0: base64 with bits that belong to no byte");
-  EXPECT_EQ(fault("Zm9v\xC3\xA9=="), "byte 4: no base64 character");
+  EXPECT_EQ(fault("Zm9"), "byte 3: the base64 text is cut off: its length is not a multiple of 4");
+  EXPECT_EQ(fault("Zm9vZm-v"), "byte 6: not a base64 character");
+  EXPECT_EQ(fault("Zg==Zm9v"), "byte 2: not a base64 character");
+  EXPECT_EQ(fault("Z==="), "byte 1: not a base64 character");
+  EXPECT_EQ(fault("Zm9="), "byte 0: the last base64 character has bits beyond the last byte");
+  EXPECT_EQ(fault("Zm9v\xC3\xA9=="), "byte 4: not a base64 character");
 }
 
 }  // namespace

@@ -92,11 +92,11 @@ Result<std::size_t> ByteStream::inflate_some(std::span<std::byte> out) {
   }
   if (outcome == Z_BUF_ERROR || (outcome == Z_OK && written == 0 && position_ == file_.size())) {
     is_cut_off_ = true;
-    return make_error(ErrorCode::BadFormat, "the compressed data are cut off", {}, file_.size());
+    return make_error(ErrorCode::BadFormat, "the compressed data is cut off", {}, file_.size());
   }
   if (outcome == Z_OK) return written;
   const std::string why = state.msg != nullptr ? std::string(" (") + state.msg + ")" : "";
-  return make_error(ErrorCode::BadFormat, "the compressed data are damaged" + why, {}, position_);
+  return make_error(ErrorCode::BadFormat, "the compressed data is damaged" + why, {}, position_);
 }
 
 Status ByteStream::begin_next_member() {
@@ -105,7 +105,7 @@ Status ByteStream::begin_next_member() {
     return {};
   }
   if (inflateReset(&inflater_->state) == Z_OK) return {};
-  return make_error(ErrorCode::BadFormat, "the compressed data are damaged", {}, position_);
+  return make_error(ErrorCode::BadFormat, "the compressed data is damaged", {}, position_);
 }
 
 Result<std::uint64_t> ByteStream::skip(std::uint64_t count) {

@@ -54,8 +54,8 @@ Status check_folder(const std::filesystem::path& path) {
   const auto kind = std::filesystem::status(folder, unknown).type();
   if (kind == std::filesystem::file_type::none || kind == std::filesystem::file_type::unknown) return {};
   const bool is_absent = kind == std::filesystem::file_type::not_found;
-  std::string why = is_absent ? "there is no folder \"" : "\"";
-  why.append(folder.string()).append(is_absent ? "\" to write it into" : "\" is no folder to write it into");
+  std::string why = is_absent ? "the folder \"" : "\"";
+  why.append(folder.string()).append(is_absent ? "\" does not exist" : "\" is not a folder");
   return cannot_write(std::move(why), path);
 }
 
@@ -270,7 +270,7 @@ Result<FileBackup> FileBackup::of(const std::filesystem::path& path, Older older
   const std::filesystem::path file = follow_links(path);
   if (!is_there(file)) return backup;
   const std::filesystem::path name = name_for(path, older);
-  if (name.empty()) return cannot_write("no name is left for a backup: NAME~ to NAME.~99~ are there", file);
+  if (name.empty()) return cannot_write("no free name for a backup: NAME~ to NAME.~99~ exist", file);
   backup.backup_ = name;
   const std::filesystem::path second_name = temporary_name(file, 0);
   if (::link(file.c_str(), second_name.c_str()) == 0) {
@@ -302,7 +302,7 @@ Status FileBackup::keep() {
   if (::rename(second_name_.c_str(), backup_.c_str()) != 0) {
     const int error = errno;
     const std::string left = std::exchange(second_name_, {}).string();
-    return cannot_write(reason(error) + "; what the file held before is in " + left, backup_);
+    return cannot_write(reason(error) + "; the previous content is in " + left, backup_);
   }
   // Where both were the same file already, renaming does nothing.
   ::unlink(std::exchange(second_name_, {}).c_str());

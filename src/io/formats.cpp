@@ -50,32 +50,31 @@ constexpr bool kReadsThreeMf = false;
 
 constexpr std::array kFormats = {
     FormatInfo{FileFormat::Vox, "vox", ".vox", "MagicaVoxel", true, true, false, false},
-    FormatInfo{FileFormat::Scene, "scene", ".json", "Quoin's scene files", true, true, false, false},
-    FormatInfo{FileFormat::World, "world", ".quoin", "Quoin's worlds, which may be larger than memory", true, true,
-               false, false},
-    FormatInfo{FileFormat::Minecraft, "minecraft", ".mca",
-               "worlds of Minecraft's (Java): folders, or regions of theirs", true, false, false, false},
+    FormatInfo{FileFormat::Scene, "scene", ".json", "Quoin scene file", true, true, false, false},
+    FormatInfo{FileFormat::World, "world", ".quoin", "Quoin world, can be larger than memory", true, true, false,
+               false},
+    FormatInfo{FileFormat::Minecraft, "minecraft", ".mca", "Minecraft world (Java): its folder or one region file",
+               true, false, false, false},
     FormatInfo{FileFormat::Schematic, "schematic", ".schem",
-               "pieces of Minecraft's worlds, also .schematic, .litematic and structures (.nbt)", true, true, false,
-               false, ".schematic .litematic .nbt"},
+               "Minecraft schematic, also .schematic, .litematic and structures (.nbt)", true, true, false, false,
+               ".schematic .litematic .nbt"},
     FormatInfo{FileFormat::Qubicle, "qubicle", ".qb", "Qubicle, also .qbt, .qbcl and .qef", true, true, false, false,
                ".qbt .qbcl .qef"},
     FormatInfo{FileFormat::Goxel, "goxel", ".gox", "Goxel", true, true, false, false},
-    FormatInfo{FileFormat::Voxlap, "voxlap", ".vxl",
-               "maps of Voxlap and Ace of Spades, also models: .kv6, .kvx and SLAB6's .vox", true, true, false, false,
-               ".kv6 .kvx"},
+    FormatInfo{FileFormat::Voxlap, "voxlap", ".vxl", "Voxlap and Ace of Spades map; models: .kv6, .kvx and SLAB6 .vox",
+               true, true, false, false, ".kv6 .kvx"},
     FormatInfo{FileFormat::Binvox, "binvox", ".binvox", "binvox", true, true, false, false},
-    FormatInfo{FileFormat::CubeWorld, "cub", ".cub", "models of Cube World", true, false, false, false},
-    FormatInfo{FileFormat::LuantiSchematic, "luanti", ".mts", "schematics of Luanti", true, false, false, false},
-    FormatInfo{FileFormat::LuantiMap, "luanti_map", ".sqlite", "worlds of Luanti's: folders, or their map.sqlite", true,
+    FormatInfo{FileFormat::CubeWorld, "cub", ".cub", "Cube World model", true, false, false, false},
+    FormatInfo{FileFormat::LuantiSchematic, "luanti", ".mts", "Luanti schematic", true, false, false, false},
+    FormatInfo{FileFormat::LuantiMap, "luanti_map", ".sqlite", "Luanti world: its folder or map.sqlite", true, false,
+               false, false},
+    FormatInfo{FileFormat::Heights, "heights", ".hgt", "SRTM heights; height-map images (.png) with --heights", true,
                false, false, false},
-    FormatInfo{FileFormat::Heights, "heights", ".hgt", "heights of SRTM, and pictures of heights (.png) by --heights",
-               true, false, false, false},
-    FormatInfo{FileFormat::Vdb, "vdb", ".vdb", "grids of OpenVDB, also NanoVDB's (.nvdb)", true, true, false, false,
+    FormatInfo{FileFormat::Vdb, "vdb", ".vdb", "OpenVDB grids, also NanoVDB (.nvdb)", true, true, false, false,
                ".nvdb"},
     FormatInfo{FileFormat::Nifti, "nifti", ".nii", "NIfTI-1 and -2 volumes, also .nii.gz", true, true, false, true},
-    FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes, also .nhdr with a file of values", true, false, false,
-               true, ".nhdr"},
+    FormatInfo{FileFormat::Nrrd, "nrrd", ".nrrd", "NRRD volumes, also .nhdr with a data file", true, false, false, true,
+               ".nhdr"},
     FormatInfo{FileFormat::Glb, "glb", ".glb", "glTF 2.0, one file", kReadsGltf, true, true, false},
     FormatInfo{FileFormat::Gltf, "gltf", ".gltf", "glTF 2.0, JSON and .bin", kReadsGltf, true, true, false},
     FormatInfo{FileFormat::Obj, "obj", ".obj", "Wavefront OBJ with .mtl and palette images", kReadsObj, true, true,
@@ -139,24 +138,23 @@ Error unrecognised(std::span<const std::byte> bytes, const std::filesystem::path
     return {ErrorCode::BadFormat, "a Git LFS pointer, not the file itself (git lfs pull fetches it)", {}, 0};
   }
   if (begins_with(bytes, "Voxel Animation")) {
-    return {ErrorCode::Unsupported, "a model of Westwood's games, no map of Voxlap's", {}, 0};
+    return {ErrorCode::Unsupported, "a Westwood model, not a Voxlap map", {}, 0};
   }
   if (heights::is_png(bytes)) {
     return {ErrorCode::BadFormat,
-            "not a file of any format that Quoin reads, but a picture, which --heights grey, mapbox or terrarium reads "
-            "as heights (in programs the option heights)",
+            "an image, not a voxel file; --heights grey, mapbox or terrarium reads it as heights "
+            "(in programs the option heights)",
             {},
             {}};
   }
   if (const FormatInfo* const named = format_by_name(path)) {
-    return {
-        ErrorCode::BadFormat,
-        "its name ends in " + lower_case_extension(path) + ", but its content is not " + std::string(named->name) +
-            ", nor any other format that Quoin reads; it may be damaged, or of another program's format of that name",
-        {},
-        {}};
+    return {ErrorCode::BadFormat,
+            "its name ends in " + lower_case_extension(path) + ", but its content is not " + std::string(named->name) +
+                ", nor any other known format; it may be damaged, or a different format with the same extension",
+            {},
+            {}};
   }
-  return {ErrorCode::BadFormat, "not a file of any format that Quoin reads (" + readable_extensions() + ")", {}, {}};
+  return {ErrorCode::BadFormat, "unknown file format; readable are " + readable_extensions(), {}, {}};
 }
 
 bool is_volume(const std::optional<FileFormat>& format) {
@@ -290,7 +288,7 @@ struct Saved {
 std::vector<std::string> lost_with_source(const Saved& saved) {
   if (saved.loaded == nullptr || saved.loaded->source == nullptr) return {};
   std::vector<std::string> lines = only_in_source(*saved.loaded->source);
-  for (std::string& line : lines) line.insert(0, "left out, which only .vox keeps: ");
+  for (std::string& line : lines) line.insert(0, "left out, only .vox stores it: ");
   return lines;
 }
 
@@ -324,7 +322,8 @@ std::vector<std::string> lost_beside(const Saved& saved, FileFormat format) {
 Result<FileFormat> format_for_saving(const std::filesystem::path& path) {
   const auto format = format_for_writing(path);
   if (!format) return format.error();
-  if (format->is_mesh) return make_error(ErrorCode::Unsupported, "a format of meshes, not of voxels", path.string());
+  if (format->is_mesh)
+    return make_error(ErrorCode::Unsupported, "a mesh format, which cannot store voxels", path.string());
   return format->format;
 }
 
@@ -453,11 +452,10 @@ Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& pat
   }
   if (const auto world = detect_world(path)) return world;
   if (std::filesystem::is_directory(path, unknown_size)) {
-    return make_error(
-        ErrorCode::CannotRead,
-        "it is a folder, and no world that Quoin reads: of Minecraft's (level.dat and region/r.X.Z.mca) or "
-        "Luanti's (world.mt)",
-        path.string());
+    return make_error(ErrorCode::CannotRead,
+                      "a folder without a Minecraft world (level.dat and region/r.X.Z.mca) or "
+                      "Luanti world (world.mt)",
+                      path.string());
   }
   // What decompresses to a header, with room for names and comments in gzip's own.
   constexpr std::size_t kEnough = 1 << 16;
@@ -481,7 +479,7 @@ Result<FormatInfo> format_for_writing(const std::filesystem::path& path) {
   for (const FormatInfo& info : kFormats) {
     if (info.writable && info.extension == extension) return info;
   }
-  return make_error(ErrorCode::Unsupported, "the name must end in one of " + writable_extensions(), path.string());
+  return make_error(ErrorCode::Unsupported, "unknown extension; use one of " + writable_extensions(), path.string());
 }
 
 Result<SavedScene> save_scene(const Scene& scene, const std::filesystem::path& path, Threads threads,

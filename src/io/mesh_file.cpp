@@ -25,18 +25,18 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
   const bool is_gltf = format == FileFormat::Glb || format == FileFormat::Gltf;
   if ((options.compress || options.quantize) && !is_gltf) {
     return make_error(ErrorCode::Unsupported,
-                      std::string("only .glb and .gltf are ") + (options.compress ? "compressed" : "quantized"));
+                      std::string("only .glb and .gltf can be ") + (options.compress ? "compressed" : "quantized"));
   }
   const bool is_print = format == FileFormat::Stl || format == FileFormat::ThreeMf;
   if (!meshes.atlas.rgb.empty() && (is_print || format == FileFormat::Ply)) {
     return make_error(ErrorCode::Unsupported,
-                      std::string(format_info(format).extension) + " has no textures; .glb, .gltf and .obj have");
+                      std::string(format_info(format).extension) + " cannot store textures; use .glb, .gltf or .obj");
   }
   if (is_print && options.occlusion_in == OcclusionIn::Attribute) {
-    return make_error(ErrorCode::Unsupported, "there is no occlusion in files for printing");
+    return make_error(ErrorCode::Unsupported, "files for printing cannot store occlusion");
   }
   if (has_light(meshes) && !is_gltf) {
-    return make_error(ErrorCode::Unsupported, "only .glb and .gltf have light at vertices");
+    return make_error(ErrorCode::Unsupported, "only .glb and .gltf can store light per vertex");
   }
   if (auto sound = check_meshes(meshes); !sound) return sound.error();
   switch (format) {
@@ -47,7 +47,7 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
     case FileFormat::Obj:
       if (options.occlusion_in == OcclusionIn::Attribute) {
         return make_error(ErrorCode::Unsupported,
-                          "OBJ has no place for occlusion beside colours; .glb, .gltf and .ply have");
+                          "OBJ cannot store occlusion in addition to colours; use .glb, .gltf or .ply");
       }
       return plan_obj(meshes, path);
     case FileFormat::Ply:
@@ -75,7 +75,7 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
     case FileFormat::Nrrd:
       break;
   }
-  return make_error(ErrorCode::Unsupported, std::string(format_info(format).extension) + " is no format of meshes");
+  return make_error(ErrorCode::Unsupported, std::string(format_info(format).extension) + " is not a mesh format");
 }
 
 /// The same meshes without occlusion.
@@ -204,7 +204,7 @@ Result<std::vector<std::byte>> write_mesh(const SceneMeshes& meshes, FileFormat 
   if (!wanted) return wanted.error();
   const auto files = plan(*wanted, format, "", options);
   if (!files) return files.error();
-  if (files->size() > 1) return make_error(ErrorCode::Unsupported, "the meshes take several files in this format");
+  if (files->size() > 1) return make_error(ErrorCode::Unsupported, "this format stores the meshes in several files");
   std::vector<std::byte> bytes;
   bytes.reserve(static_cast<std::size_t>(files->front().expected_bytes));
   const auto sink = [&](std::span<const std::byte> block) {

@@ -277,20 +277,20 @@ TEST_F(SmoothMeshFiles, UnsoundInputIsRefusedAndLeavesNoFile) {
   add("a transform that is singular",
       [](TestPart& part) { part.placements[0].second[1] = part.placements[0].second[0]; });
   add("a transform that is not affine", [](TestPart& part) { part.placements[0].second[1].w = 0.1; });
-  add("a vertex farther away than a float can say", [](TestPart& part) { part.placements[0].second[3].x = 1e39; });
-  add("a vertex farther away than a float can say", [](TestPart& part) { part.placements[0].second[0].x = 2e38; });
-  add("a vertex farther away than a float can say", [](TestPart& part) {
+  add("a vertex too far away for a float", [](TestPart& part) { part.placements[0].second[3].x = 1e39; });
+  add("a vertex too far away for a float", [](TestPart& part) { part.placements[0].second[0].x = 2e38; });
+  add("a vertex too far away for a float", [](TestPart& part) {
     part.pivot.z = 1e200;
     part.placements[0].second[3].z = 1e200;
   });
   add("a pivot that is not finite", [](TestPart& part) { part.pivot.y = kNan; });
   add("arrays of different lengths", [](TestPart& part) { part.mesh.normals.pop_back(); });
   add("arrays of different lengths", [](TestPart& part) { part.mesh.occlusion.pop_back(); });
-  add("an index of no vertex", [](TestPart& part) { part.mesh.indices[3] = 6; });
-  add("indices that make no whole triangles", [](TestPart& part) { part.mesh.indices.pop_back(); });
+  add("an index beyond its vertices", [](TestPart& part) { part.mesh.indices[3] = 6; });
+  add("an index count that is not a multiple of 3", [](TestPart& part) { part.mesh.indices.pop_back(); });
   add("a position that is not finite", [](TestPart& part) { part.mesh.positions[2].x = NAN; });
   add("a normal that is not finite", [](TestPart& part) { part.mesh.normals[2].x = INFINITY; });
-  add("an occlusion beyond 0 to 1", [](TestPart& part) { part.mesh.occlusion[2] = NAN; });
+  add("an occlusion outside 0 to 1", [](TestPart& part) { part.mesh.occlusion[2] = NAN; });
   for (const auto& [message, part] : wrong) {
     for (const Format& format : kFormats) {
       const auto path = folder_.file(std::string("wrong") + format.extension);
@@ -499,7 +499,7 @@ TEST(MeshFiles, TypesThatAreNotRegisteredAreRefused) {
     scene.edit(grid).grid.set({1, 7, 0}, type);
     const auto refused = write_mesh(mesh_scene(scene).value(), FileFormat::Glb);
     ASSERT_FALSE(refused) << type;
-    EXPECT_EQ(refused.error().message, "part \"L\" has a type that is not registered");
+    EXPECT_EQ(refused.error().message, "part \"L\" has an unregistered type");
   }
 }
 
@@ -508,7 +508,7 @@ TEST(MeshFiles, APlacementOfNoPartIsRefused) {
   meshes.placements.push_back({1, "lost", Similarity{}});
   const auto refused = write_mesh(meshes, FileFormat::Ply);
   ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().message, "placement \"lost\" is of a part that is not there");
+  EXPECT_EQ(refused.error().message, "placement \"lost\" has a part that does not exist");
 }
 
 TEST(MeshFiles, TheFormatIsThePathSOrTheOptionS) {

@@ -45,28 +45,28 @@ const char* fault_of_blocks(const MeshView& view, std::size_t types) {
   const bool has_all = is_one_a_vertex(view.directions, view) && is_one_a_vertex(view.types, view) &&
                        is_none_or_one_a_vertex(view.block_occlusion, view) && is_none_or_one_a_vertex(view.atlas, view);
   if (!has_all) return "arrays of different lengths";
-  if (largest_of(view.types) >= types) return "a type that is not registered";
-  if (largest_of(view.directions) > Direction::NegZ) return "a direction that is none of the six";
-  return largest_of(view.block_occlusion) > 3 ? "an occlusion beyond 3" : nullptr;
+  if (largest_of(view.types) >= types) return "an unregistered type";
+  if (largest_of(view.directions) > Direction::NegZ) return "an invalid direction";
+  return largest_of(view.block_occlusion) > 3 ? "an occlusion above 3" : nullptr;
 }
 
 const char* fault_of_smooth(const MeshView& view, std::size_t types) {
   const bool has_all = is_one_a_vertex(view.normals, view) && is_one_a_vertex(view.albedo, view) &&
                        is_none_or_one_a_vertex(view.occlusion, view) && is_none_or_one_a_vertex(view.types, view);
   if (!has_all) return "arrays of different lengths";
-  if (!view.types.empty() && largest_of(view.types) >= types) return "a type that is not registered";
+  if (!view.types.empty() && largest_of(view.types) >= types) return "an unregistered type";
   if (!all_finite(view.normals)) return "a normal that is not finite";
   const auto is_no_share = [](float occlusion) { return !(occlusion >= 0.0F && occlusion <= 1.0F); };
-  return std::ranges::any_of(view.occlusion, is_no_share) ? "an occlusion beyond 0 to 1" : nullptr;
+  return std::ranges::any_of(view.occlusion, is_no_share) ? "an occlusion outside 0 to 1" : nullptr;
 }
 
 /// Returns a description of a mesh's first fault; null if it is valid.
 const char* fault_of(const MeshView& view, std::size_t types) {
   if (const char* fault = view.has_albedo() ? fault_of_smooth(view, types) : fault_of_blocks(view, types)) return fault;
   if (!is_none_or_one_a_vertex(view.light, view)) return "arrays of different lengths";
-  if (!view.light.empty() && !view.atlas.empty()) return "light beside an atlas";
-  if (view.indices.size() % 3 != 0) return "indices that make no whole triangles";
-  if (!view.indices.empty() && largest_of(view.indices) >= view.positions.size()) return "an index of no vertex";
+  if (!view.light.empty() && !view.atlas.empty()) return "both light and an atlas";
+  if (view.indices.size() % 3 != 0) return "an index count that is not a multiple of 3";
+  if (!view.indices.empty() && largest_of(view.indices) >= view.positions.size()) return "an index beyond its vertices";
   return all_finite(view.positions) ? nullptr : "a position that is not finite";
 }
 
@@ -101,7 +101,7 @@ const char* fault_of_place(const DBox& bounds, const DVec3& pivot, const glm::dm
   const DBox from_pivot{bounds.min - pivot, bounds.max - pivot};
   const bool is_within = bounds.empty() || (stays_within_floats(from_pivot, glm::dmat4(1.0)) &&
                                             stays_within_floats(from_pivot, world_from_part));
-  return is_within ? nullptr : "a vertex farther away than a float can say";
+  return is_within ? nullptr : "a vertex too far away for a float";
 }
 
 /// Returns a description of a fault in a placement's keys; null if they are valid.
@@ -113,11 +113,10 @@ const char* fault_of_keys(const DBox& bounds, const DVec3& pivot, const MeshPlac
     const bool is_first = &key == &placement.keys.front();
     const auto seconds = static_cast<float>(key.seconds);
     if (!(is_first ? seconds == 0.0F : seconds > last) || !std::isfinite(seconds)) {
-      return "keys that do not ascend from 0 seconds";
+      return "keys whose times do not ascend from 0 seconds";
     }
     last = seconds;
-    if (key.world_from_part.mirrored != mirrors)
-      return "a key that mirrors where the placement does not, or the other way round";
+    if (key.world_from_part.mirrored != mirrors) return "a key whose mirroring differs from its placement's";
     MeshPlacement at;
     at.world_from_part = key.world_from_part;
     if (const char* fault = fault_of_place(bounds, pivot, at.matrix())) return fault;
@@ -130,10 +129,10 @@ const char* fault_of_atlas(const MeshView& view, const Image& atlas) {
   const auto is_outside = [](const std::array<float, 2>& uv) {
     return !(uv[0] >= 0.0F && uv[0] <= 1.0F && uv[1] >= 0.0F && uv[1] <= 1.0F);
   };
-  if (std::ranges::any_of(view.atlas, is_outside)) return "a texture coordinate beyond 0 to 1";
-  if (!view.atlas.empty() && view.surface != SurfaceClass::Opaque) return "an atlas for what is not opaque";
-  if (!view.atlas.empty() && !view.block_occlusion.empty()) return "occlusion beside that of an atlas";
-  if (!view.atlas.empty() && atlas.rgb.empty()) return "coordinates in an atlas that is not there";
+  if (std::ranges::any_of(view.atlas, is_outside)) return "a texture coordinate outside 0 to 1";
+  if (!view.atlas.empty() && view.surface != SurfaceClass::Opaque) return "an atlas on a surface that is not opaque";
+  if (!view.atlas.empty() && !view.block_occlusion.empty()) return "both occlusion and an atlas";
+  if (!view.atlas.empty() && atlas.rgb.empty()) return "atlas coordinates, and there is no atlas";
   const bool is_left_out = view.atlas.empty() && !view.positions.empty() && view.surface == SurfaceClass::Opaque;
   return is_left_out && !view.has_albedo() && !atlas.rgb.empty() ? "opaque blocks that are not in the atlas" : nullptr;
 }
@@ -147,7 +146,8 @@ Status check_part(const MeshPart& part, const SceneMeshes& meshes, std::vector<D
   if (!is_finite(part.pivot)) return unsound(part, "a pivot that is not finite");
   DBox& box = bounds.emplace_back();
   for (const MeshView& view : part.surfaces) {
-    if (view.has_albedo() != part.surfaces.front().has_albedo()) return unsound(part, "surfaces of two kinds");
+    if (view.has_albedo() != part.surfaces.front().has_albedo())
+      return unsound(part, "surfaces with and without their own colours");
     if (const char* fault = fault_of(view, meshes.types.size())) return unsound(part, fault);
     if (const char* fault = fault_of_atlas(view, meshes.atlas)) return unsound(part, fault);
     if (view.positions.empty()) continue;
@@ -173,7 +173,7 @@ Status check_groups(const std::vector<MeshGroup>& groups) {
     const DQuat& q = place.rotation;
     const bool is_sound = is_finite(place.position) && is_finite({q.x, q.y, q.z}) && std::isfinite(q.w);
     if (is_sound && (!groups[i].parent || *groups[i].parent < i)) continue;
-    const char* what = is_sound ? "is in a group that does not stand before it" : "has a place that is not finite";
+    const char* what = is_sound ? "has a parent that does not come before it" : "has a placement that is not finite";
     return make_error(ErrorCode::InvalidArgument, "group \"" + groups[i].name + "\" " + what);
   }
   return {};
@@ -189,23 +189,23 @@ bool has_light(const SceneMeshes& meshes) {
 
 Status check_meshes(const SceneMeshes& meshes) {
   if (!(meshes.seconds >= 0.0) || !std::isfinite(static_cast<float>(meshes.seconds))) {
-    return make_error(ErrorCode::InvalidArgument, "an animation whose length is no number");
+    return make_error(ErrorCode::InvalidArgument, "the length of the animation is not a finite number of seconds");
   }
   const Image& atlas = meshes.atlas;
   const bool is_sound = atlas.width >= 0 && atlas.height >= 0 &&
                         atlas.rgb.size() == std::size_t{3} * static_cast<std::size_t>(atlas.width) *
                                                 static_cast<std::size_t>(atlas.height);
-  if (!is_sound) return make_error(ErrorCode::InvalidArgument, "an atlas of another size than it says");
+  if (!is_sound) return make_error(ErrorCode::InvalidArgument, "the atlas does not have width x height pixels");
   const bool is_lit = has_light(meshes);
   std::vector<DBox> bounds;
   for (const MeshPart& part : meshes.parts) {
     if (auto sound = check_part(part, meshes, bounds); !sound) return sound;
-    if (is_lit && !is_lit_throughout(part)) return unsound(part, "no light, where others have it");
+    if (is_lit && !is_lit_throughout(part)) return unsound(part, "no light, and other parts have light");
   }
   for (const MeshPlacement& placement : meshes.placements) {
     if (placement.part >= meshes.parts.size()) {
       return make_error(ErrorCode::InvalidArgument,
-                        "placement \"" + placement.name + "\" is of a part that is not there");
+                        "placement \"" + placement.name + "\" has a part that does not exist");
     }
     const MeshPart& part = meshes.parts[placement.part];
     const char* fault = fault_of_place(bounds[placement.part], part.pivot, placement.matrix());
@@ -213,7 +213,7 @@ Status check_meshes(const SceneMeshes& meshes) {
     if (fault != nullptr) return unsound(part, fault);
     if (placement.group && *placement.group >= meshes.groups.size()) {
       return make_error(ErrorCode::InvalidArgument,
-                        "placement \"" + placement.name + "\" is in a group that is not there");
+                        "placement \"" + placement.name + "\" has a group that does not exist");
     }
   }
   return check_groups(meshes.groups);

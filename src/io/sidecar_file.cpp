@@ -44,7 +44,7 @@ Result<fs::path> sidecar_path(const fs::path& from, std::string_view name, Sidec
   std::string plain(name);
   std::replace(plain.begin(), plain.end(), '\\', '/');
   if (plain.empty() || plain.find('\0') != std::string::npos) {
-    return make_error(ErrorCode::BadFormat, "cannot read a file without a name");
+    return make_error(ErrorCode::BadFormat, "cannot read a sidecar file: its name is empty");
   }
   const fs::path folder = from.parent_path();
   const fs::path path = folder / plain;
@@ -52,7 +52,7 @@ Result<fs::path> sidecar_path(const fs::path& from, std::string_view name, Sidec
   if (stays_in_folder(plain) && leads_into_folder(folder, path)) return path;
   return make_error(ErrorCode::CannotRead,
                     "cannot read \"" + printable(std::string(name)) +
-                        "\": it lies outside the folder of the file that names it (--allow-outside-files reads it; in "
+                        "\": it is outside the folder of the main file (allow it with --allow-outside-files; in "
                         "programs SidecarFiles::Anywhere)");
 }
 

@@ -88,7 +88,7 @@ Result<std::uint64_t> glb_file_bytes(std::uint64_t json_bytes, std::uint64_t buf
   if (buffer_bytes > 0) total += kChunkHeaderBytes + buffer_bytes;
   if (total > std::numeric_limits<std::uint32_t>::max()) {
     return make_error(ErrorCode::LimitExceeded,
-                      "the meshes take " + std::to_string(total) + " bytes, and a GLB holds 4294967295 at most");
+                      "the meshes take " + std::to_string(total) + " bytes, more than the 4294967295 of a GLB");
   }
   return total;
 }

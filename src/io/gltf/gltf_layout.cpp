@@ -476,9 +476,8 @@ std::optional<std::size_t> GltfLayout::texture(GltfImageKind kind) const {
 
 Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, const MeshFileOptions& options) {
   if (options.compress && !can_compress_gltf()) {
-    return make_error(
-        ErrorCode::Unsupported,
-        "this build cannot compress meshes: it was made without meshoptimizer (libmeshoptimizer-dev in Debian)");
+    return make_error(ErrorCode::Unsupported,
+                      "cannot compress meshes: Quoin was built without meshoptimizer (Debian: libmeshoptimizer-dev)");
   }
   QUOIN_ASSERT(check_meshes(meshes).has_value(), "sound meshes");
   GltfLayout layout{.palette = MaterialPalette(meshes), .nodes = {}, .meshes = {}, .images = {}, .surfaces = {}};

@@ -56,7 +56,7 @@ HeightMap read_hgt(std::span<const std::byte> bytes, std::size_t edge) {
   }
   if (voids > 0) {
     map.warnings.push_back(std::to_string(voids) + " of " + std::to_string(map.metres.size()) +
-                           " heights are not known (voids); nothing is there");
+                           " heights are unknown (voids) and stay empty");
   }
   return map;
 }
@@ -74,11 +74,12 @@ Result<HeightMap> read_picture(std::span<const std::byte> bytes, HeightEncoding 
   if (!picture) return picture.error();
   const bool is_grey = encoding == HeightEncoding::Grey;
   if (is_grey && picture->channels != 1) {
-    return make_error(ErrorCode::BadFormat, "a picture in colours has no heights by grey (mapbox and terrarium have)");
+    return make_error(ErrorCode::BadFormat,
+                      "the image has colours, and grey heights need a greyscale image (colours: mapbox or terrarium)");
   }
   if (!is_grey && (picture->channels != 3 || picture->bits != 8)) {
-    return make_error(ErrorCode::BadFormat, "heights by " + std::string(name_of(encoding)) +
-                                                " are three channels of 8 bits, which this picture does not have");
+    return make_error(ErrorCode::BadFormat,
+                      std::string(name_of(encoding)) + " heights need an RGB image with 8 bits per channel");
   }
   HeightMap map;
   map.format = name_of(encoding);
@@ -118,10 +119,11 @@ Status check(const HeightOptions& options) {
   if (!are_lengths) {
     return make_error(
         ErrorCode::InvalidArgument,
-        "metres a level, a pixel and a voxel, and how heights are exaggerated, are 0.000001 to 1,000,000");
+        "metres per level, pixel and voxel, and the vertical exaggeration, must be 0.000001 to 1,000,000");
   }
   if (options.depth < 1 || options.depth > kMaxDepth) {
-    return make_error(ErrorCode::InvalidArgument, "the ground is 1 to " + std::to_string(kMaxDepth) + " voxels deep");
+    return make_error(ErrorCode::InvalidArgument,
+                      "the ground must be 1 to " + std::to_string(kMaxDepth) + " voxels deep");
   }
   return {};
 }
@@ -138,16 +140,16 @@ Result<HeightMap> read_height_map(std::span<const std::byte> bytes, const Height
     }
     return make_error(ErrorCode::BadFormat,
                       heights::is_png(bytes)
-                          ? "of a picture it must be said how it has heights: grey, mapbox, terrarium"
-                          : "no heights: .hgt have 1201 x 1201 or 3601 x 3601 numbers of 2 bytes");
+                          ? "an image needs a height encoding: grey, mapbox or terrarium"
+                          : "not an .hgt file, which has 1201 x 1201 or 3601 x 3601 values of 2 bytes");
   }
-  if (!heights::is_png(bytes)) return bad_at(0, "pictures of heights are PNG");
+  if (!heights::is_png(bytes)) return bad_at(0, "not a PNG, which height-map images must be");
   auto map = read_picture(bytes, *options.encoding, options.metres_per_level);
   if (!map) return map.error();
   if (options.metres_per_pixel) {
     map->metres_per_pixel = *options.metres_per_pixel;
   } else {
-    map->warnings.emplace_back("it does not say how far apart its pixels are: taken as 1 metre (--metres-per-pixel)");
+    map->warnings.emplace_back("the pixel distance is unknown and taken as 1 metre (--metres-per-pixel)");
   }
   return map;
 }

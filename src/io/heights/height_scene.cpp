@@ -75,7 +75,7 @@ Result<Surface> surface_of(const HeightMap& map, const HeightOptions& options) {
   const auto count = [&](int pixels) { return std::floor((pixels - 1) / step + 1e-6) + 1.0; };
   constexpr double kMaxColumns = 0x1p26;
   if (!(count(map.width) * count(map.height) <= kMaxColumns)) {
-    return make_error(ErrorCode::LimitExceeded, "a landscape of more than 2^26 columns (larger voxels have fewer)");
+    return make_error(ErrorCode::LimitExceeded, "the landscape has more than 2^26 columns; use larger voxels");
   }
   Surface surface;
   surface.width = static_cast<int>(count(map.width));
@@ -112,7 +112,7 @@ Result<Surface> surface_of(const HeightMap& map, const HeightOptions& options) {
   constexpr double kMaxHeight = 0x1p16;
   constexpr double kMaxPlace = 0x1p24;
   if (highest - lowest + options.depth > kMaxHeight || std::max(-lowest, highest) > kMaxPlace) {
-    return make_error(ErrorCode::LimitExceeded, "columns of more than 2^16 voxels (larger voxels have fewer)");
+    return make_error(ErrorCode::LimitExceeded, "a column has more than 2^16 voxels; use larger voxels");
   }
   surface.base = static_cast<int>(std::floor(lowest)) - options.depth;
   surface.top = static_cast<int>(std::ceil(highest)) + 1;
@@ -304,7 +304,7 @@ Result<Scene> scene_from_heights(const HeightMap& map, const HeightOptions& opti
   const bool is_sound = map.width > 0 && map.height > 0 && std::isfinite(map.metres_per_pixel) &&
                         map.metres_per_pixel > 0.0 &&
                         map.metres.size() == static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height);
-  if (!is_sound) return make_error(ErrorCode::InvalidArgument, "heights that are not as many as their size says");
+  if (!is_sound) return make_error(ErrorCode::InvalidArgument, "the number of heights is not width x height");
   const auto surface = surface_of(map, options);
   if (!surface) return surface.error();
   Scene scene;

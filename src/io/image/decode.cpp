@@ -17,7 +17,7 @@ Result<AlphaImage> decode_picture(std::span<const std::byte> bytes) {
   }
   if (text.starts_with("\xFF\xD8\xFF")) return decode_jpeg(bytes);
   if (text.starts_with("RIFF") && text.substr(0, 12).ends_with("WEBP")) return decode_webp(bytes);
-  return make_error(ErrorCode::Unsupported, "a picture that is no PNG, JPEG or WebP");
+  return make_error(ErrorCode::Unsupported, "not a PNG, JPEG or WebP image");
 }
 
 }  // namespace quoin

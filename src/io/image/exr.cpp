@@ -25,14 +25,14 @@ namespace {
 
 Status check_channels(int width, int height, std::span<const ExrChannel> channels) {
   const auto refuse = [](const std::string& message) { return make_error(ErrorCode::InvalidArgument, message); };
-  if (width <= 0 || height <= 0) return refuse("the picture's sizes are not positive");
-  if (channels.empty()) return refuse("a picture without channels");
+  if (width <= 0 || height <= 0) return refuse("the image's width or height is not positive");
+  if (channels.empty()) return refuse("the image has no channels");
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   std::set<std::string> names;
   for (const ExrChannel& channel : channels) {
-    if (channel.name.empty() || !names.insert(channel.name).second) return refuse("two channels of one name");
+    if (channel.name.empty() || !names.insert(channel.name).second) return refuse("two channels have the same name");
     const std::size_t count = channel.type == ExrChannel::Type::Uint32 ? channel.numbers.size() : channel.values.size();
-    if (count != pixels) return refuse("the channel " + channel.name + " is not of the picture's size");
+    if (count != pixels) return refuse("the channel " + channel.name + " does not have width x height values");
   }
   return {};
 }
@@ -144,14 +144,14 @@ Result<RadianceImage> decode_exr(std::span<const std::byte> bytes, std::size_t m
     const auto window = file.header().dataWindow();
     const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
     const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
-    if (width <= 0 || height <= 0) return make_error(ErrorCode::BadFormat, "an OpenEXR file without pixels");
+    if (width <= 0 || height <= 0) return make_error(ErrorCode::BadFormat, "the OpenEXR file has no pixels");
     if (static_cast<std::uint64_t>(width) > max_pixels / static_cast<std::uint64_t>(height)) {
-      return make_error(ErrorCode::LimitExceeded, "more than " + std::to_string(max_pixels) + " pixels");
+      return make_error(ErrorCode::LimitExceeded, "the image has more than " + std::to_string(max_pixels) + " pixels");
     }
     const imf::ChannelList& channels = file.header().channels();
     const bool is_grey = channels.findChannel("R") == nullptr && channels.findChannel("Y") != nullptr;
     if (!is_grey && channels.findChannel("R") == nullptr) {
-      return make_error(ErrorCode::BadFormat, "an OpenEXR file without channels R, G, B or Y");
+      return make_error(ErrorCode::BadFormat, "the OpenEXR file has no channels R, G, B or Y");
     }
     RadianceImage image{static_cast<int>(width), static_cast<int>(height),
                         std::vector<float>(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height))};
@@ -173,7 +173,7 @@ Result<RadianceImage> decode_exr(std::span<const std::byte> bytes, std::size_t m
   } catch (const std::exception& exception) {
     std::string message = exception.what();
     std::replace(message.begin(), message.end(), '\n', ' ');
-    return make_error(ErrorCode::BadFormat, "not an OpenEXR file that can be read: " + message);
+    return make_error(ErrorCode::BadFormat, "not a readable OpenEXR file: " + message);
   }
 }
 
@@ -182,19 +182,19 @@ Result<std::vector<std::byte>> write_exr(int width, int height, std::span<const 
   try {
     return encode(width, height, channels);
   } catch (const std::exception& exception) {
-    return make_error(ErrorCode::LimitExceeded, std::string("the picture cannot be encoded: ") + exception.what());
+    return make_error(ErrorCode::LimitExceeded, std::string("cannot encode the image: ") + exception.what());
   }
 }
 
 #else
 
 Result<RadianceImage> decode_exr(std::span<const std::byte>, std::size_t) {
-  return make_error(ErrorCode::Unsupported, "an OpenEXR file, and Quoin was built without OpenEXR");
+  return make_error(ErrorCode::Unsupported, "cannot read OpenEXR: Quoin was built without OpenEXR");
 }
 
 Result<std::vector<std::byte>> write_exr(int width, int height, std::span<const ExrChannel> channels) {
   if (Status status = check_channels(width, height, channels); !status) return status.error();
-  return make_error(ErrorCode::Unsupported, "Quoin was built without OpenEXR");
+  return make_error(ErrorCode::Unsupported, "cannot write OpenEXR: Quoin was built without OpenEXR");
 }
 
 #endif

@@ -18,11 +18,11 @@ namespace {
 
 Status check(const Image& picture, int quality) {
   const auto refuse = [](const char* message) { return make_error(ErrorCode::InvalidArgument, message); };
-  if (quality < 1 || quality > 100) return refuse("a quality that is not 1 to 100");
+  if (quality < 1 || quality > 100) return refuse("the quality must be 1 to 100");
   const bool fits = picture.width > 0 && picture.height > 0 &&
                     picture.rgb.size() == std::size_t{3} * static_cast<std::size_t>(picture.width) *
                                               static_cast<std::size_t>(picture.height);
-  return fits ? Status() : refuse("the picture's size is not that of its pixels");
+  return fits ? Status() : refuse("the number of pixels is not width x height");
 }
 
 #ifdef QUOIN_HAVE_JPEG
@@ -80,7 +80,7 @@ bool has_jpeg() {
 Result<std::vector<std::byte>> write_jpeg(const Image& picture, int quality) {
   if (Status status = check(picture, quality); !status) return status.error();
   if (picture.width > JPEG_MAX_DIMENSION || picture.height > JPEG_MAX_DIMENSION) {
-    return make_error(ErrorCode::LimitExceeded, "a JPEG has at most 65,500 pixels along a side");
+    return make_error(ErrorCode::LimitExceeded, "the image is larger than the 65,500 pixels per side of a JPEG");
   }
   jpeg_compress_struct info{};
   Failure failure{};
@@ -94,7 +94,7 @@ Result<std::vector<std::byte>> write_jpeg(const Image& picture, int quality) {
   }
   jpeg_destroy_compress(&info);
   std::free(bytes);  // NOLINT: libjpeg's malloc
-  if (!done) return make_error(ErrorCode::LimitExceeded, "the picture cannot be encoded as JPEG");
+  if (!done) return make_error(ErrorCode::LimitExceeded, "cannot encode the image as JPEG");
   return out;
 }
 
@@ -106,7 +106,7 @@ bool has_jpeg() {
 
 Result<std::vector<std::byte>> write_jpeg(const Image& picture, int quality) {
   if (Status status = check(picture, quality); !status) return status.error();
-  return make_error(ErrorCode::Unsupported, "Quoin was built without libjpeg");
+  return make_error(ErrorCode::Unsupported, "cannot write JPEG: Quoin was built without libjpeg");
 }
 
 #endif
@@ -156,15 +156,15 @@ Result<AlphaImage> decode_jpeg(std::span<const std::byte> bytes) {
     done = read_pixels(info, failure, image.rgba.data());
   }
   jpeg_destroy_decompress(&info);
-  if (!done) return make_error(ErrorCode::BadFormat, "a JPEG that cannot be decoded");
-  if (!is_small) return make_error(ErrorCode::LimitExceeded, "a JPEG with too many pixels for its size");
+  if (!done) return make_error(ErrorCode::BadFormat, "the JPEG cannot be decoded");
+  if (!is_small) return make_error(ErrorCode::LimitExceeded, "the JPEG has too many pixels for its file size");
   return image;
 }
 
 #else
 
 Result<AlphaImage> decode_jpeg(std::span<const std::byte>) {
-  return make_error(ErrorCode::Unsupported, "Quoin was built without libjpeg");
+  return make_error(ErrorCode::Unsupported, "cannot read JPEG: Quoin was built without libjpeg");
 }
 
 #endif

@@ -67,7 +67,7 @@ Result<int> read_size(HeaderReader& reader, const char* what) {
 Result<Header> read_header(std::span<const std::byte> bytes) {
   HeaderReader reader(bytes);
   const std::string_view magic = reader.word();
-  if (magic == "PF") return make_error(ErrorCode::Unsupported, "a PFM in colour; only greyscale ones are read", {}, 0);
+  if (magic == "PF") return make_error(ErrorCode::Unsupported, "a colour PFM; only greyscale PFM is supported", {}, 0);
   if (magic != "Pf" || reader.word_at() != 0) return bad("not a PFM: it does not begin with \"Pf\"", 0);
   Header header;
   const auto width = read_size(reader, "width");
@@ -99,7 +99,7 @@ Result<FloatImage> read_pfm(std::span<const std::byte> bytes) {
   const auto height = static_cast<std::size_t>(header->height);
   const std::size_t held = (bytes.size() - header->data_at) / 4;
   if (held < width * height) {
-    return bad("it claims " + std::to_string(width) + " x " + std::to_string(height) + " pixels and holds " +
+    return bad("it claims " + std::to_string(width) + " x " + std::to_string(height) + " pixels but holds " +
                    std::to_string(held),
                header->data_at);
   }
@@ -121,7 +121,7 @@ Result<std::vector<std::byte>> write_pfm(const FloatImage& picture) {
   const auto width = static_cast<std::size_t>(picture.width);
   const auto height = static_cast<std::size_t>(picture.height);
   if (picture.width <= 0 || picture.height <= 0 || picture.values.size() != width * height) {
-    return make_error(ErrorCode::InvalidArgument, "the picture's size is not that of its values");
+    return make_error(ErrorCode::InvalidArgument, "the number of values is not width x height");
   }
   const std::string header = "Pf\n" + std::to_string(width) + " " + std::to_string(height) + "\n-1.0\n";
   const auto head = std::as_bytes(std::span(header));

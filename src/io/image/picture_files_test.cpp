@@ -88,15 +88,15 @@ TEST_F(PictureFiles, ABrokenPfmSaysWhere) {
   };
   EXPECT_EQ(error(""), "byte 0: not a PFM: it does not begin with \"Pf\"");
   EXPECT_EQ(error(" Pf\n1 1\n-1\n0000"), "byte 0: not a PFM: it does not begin with \"Pf\"");
-  EXPECT_EQ(error("PF\n1 1\n-1\n0000"), "byte 0: a PFM in colour; only greyscale ones are read");
+  EXPECT_EQ(error("PF\n1 1\n-1\n0000"), "byte 0: a colour PFM; only greyscale PFM is supported");
   EXPECT_EQ(error("Pf\n"), "byte 3: the width is \"\"");
   EXPECT_EQ(error("Pf\n0 1\n-1\n"), "byte 3: the width is \"0\"");
   EXPECT_EQ(error("Pf\n2 -1\n-1\n"), "byte 5: the height is \"-1\"");
   EXPECT_EQ(error("Pf\n2 99999999999\n-1\n"), "byte 5: the height is \"99999999999\"");
   EXPECT_EQ(error("Pf\n2 1\n0\n"), "byte 7: the scale is \"0\"");
   EXPECT_EQ(error("Pf\n2 1\nnan\n"), "byte 7: the scale is \"nan\"");
-  EXPECT_EQ(error("Pf\n2 1\n-1\n1234567"), "byte 10: it claims 2 x 1 pixels and holds 1");
-  EXPECT_EQ(error("Pf\n268435456 268435456\n-1\n"), "byte 26: it claims 268435456 x 268435456 pixels and holds 0");
+  EXPECT_EQ(error("Pf\n2 1\n-1\n1234567"), "byte 10: it claims 2 x 1 pixels but holds 1");
+  EXPECT_EQ(error("Pf\n268435456 268435456\n-1\n"), "byte 26: it claims 268435456 x 268435456 pixels but holds 0");
 }
 
 TEST_F(PictureFiles, EveryInputOfThePngCorpusGivesAPictureOrAnError) {

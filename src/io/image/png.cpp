@@ -74,7 +74,7 @@ Result<std::vector<std::byte>> encode_png(const PngImage& image, PngEffort effor
   png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
   const bool written = info != nullptr && write_image(png, info, image, effort, out);
   png_destroy_write_struct(&png, &info);
-  if (!written) return make_error(ErrorCode::LimitExceeded, "the picture cannot be encoded as PNG");
+  if (!written) return make_error(ErrorCode::LimitExceeded, "cannot encode the image as PNG");
   return out;
 }
 
@@ -111,7 +111,7 @@ struct Input {
 
 void take_bytes(png_structp png, png_bytep out, std::size_t size) {
   auto& input = *static_cast<Input*>(png_get_io_ptr(png));
-  if (size > input.left.size()) png_error(png, "it ends early");
+  if (size > input.left.size()) png_error(png, "the file ends too early");
   std::copy_n(input.left.begin(), size, reinterpret_cast<std::byte*>(out));
   input.left = input.left.subspan(size);
 }
@@ -201,7 +201,7 @@ Result<std::vector<std::byte>> write_pixels(int width, int height, std::uint32_t
                                             const std::vector<std::uint8_t>& pixels) {
   if (width <= 0 || height <= 0 ||
       pixels.size() != std::size_t{channels} * static_cast<std::uint32_t>(width) * static_cast<std::uint32_t>(height)) {
-    return make_error(ErrorCode::InvalidArgument, "the picture's size is not that of its pixels");
+    return make_error(ErrorCode::InvalidArgument, "the number of pixels is not width x height");
   }
   return encode_png({static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height), channels, pixels},
                     PngEffort::Quick);

@@ -31,9 +31,10 @@ class HdrReader {
   Result<RadianceImage> read() {
     if (Status header = read_header(); !header) return header.error();
     const std::size_t pixels = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
-    if (pixels > kMaxPixels) return make_error(ErrorCode::LimitExceeded, "more than 67,108,864 pixels", {}, at_);
+    if (pixels > kMaxPixels)
+      return make_error(ErrorCode::LimitExceeded, "the image has more than 67,108,864 pixels", {}, at_);
     // Runs make 127 bytes of two at most: a picture cannot be larger than that.
-    if (pixels > 128 * (bytes_.size() - at_)) return bad("the file ends before its picture", at_);
+    if (pixels > 128 * (bytes_.size() - at_)) return bad("the file ends before the pixels", at_);
     RadianceImage image{width_, height_, {}};
     image.rgb.reserve(3 * pixels);
     std::vector<std::uint8_t> row(4 * static_cast<std::size_t>(width_));
@@ -63,19 +64,19 @@ class HdrReader {
     (void)line();  // "#?RADIANCE", which was looked at before
     float shown = 1.0F;
     while (true) {
-      if (at_ >= bytes_.size()) return bad("the header does not end", at_);
+      if (at_ >= bytes_.size()) return bad("the header has no end", at_);
       const std::size_t begin = at_;
       const std::string_view text = line();
       if (text.empty()) break;
       if (text.starts_with("FORMAT=") && text != "FORMAT=32-bit_rle_rgbe") {
-        return make_error(ErrorCode::Unsupported, "a Radiance picture that is not RGBE", {}, begin);
+        return make_error(ErrorCode::Unsupported, "a Radiance image that is not RGBE", {}, begin);
       }
       if (!text.starts_with("EXPOSURE=")) continue;
       const auto value = number_of(text.substr(9));
-      if (!value || !(*value > 0.0F)) return bad("an exposure that is no number above 0", begin);
+      if (!value || !(*value > 0.0F)) return bad("the exposure is not a number above 0", begin);
       shown *= *value;
     }
-    if (!(shown > 0.0F) || !std::isfinite(shown)) return bad("an exposure that is no number above 0", at_);
+    if (!(shown > 0.0F) || !std::isfinite(shown)) return bad("the exposure is not a number above 0", at_);
     exposure_ = 1.0F / shown;
     return read_size(at_, line());
   }
@@ -90,14 +91,14 @@ class HdrReader {
   Status read_size(std::size_t begin, std::string_view text) {
     const std::size_t x_at = text.find(" +X ");
     if (!text.starts_with("-Y ") || x_at == std::string_view::npos) {
-      return make_error(ErrorCode::Unsupported, "a Radiance picture that is not -Y +X", {}, begin);
+      return make_error(ErrorCode::Unsupported, "a Radiance image whose axes are not -Y +X", {}, begin);
     }
     const auto height = number_of(text.substr(3, x_at - 3));
     const auto width = number_of(text.substr(x_at + 4));
     const auto is_size = [](const std::optional<float>& n) {
       return n && *n >= 1.0F && *n <= 1e6F && *n == std::floor(*n);
     };
-    if (!is_size(height) || !is_size(width)) return bad("a size that is no number from 1 to a million", begin);
+    if (!is_size(height) || !is_size(width)) return bad("the size is not a number from 1 to 1,000,000", begin);
     width_ = static_cast<int>(*width);
     height_ = static_cast<int>(*height);
     return {};
@@ -110,18 +111,19 @@ class HdrReader {
 
   Status read_row(std::vector<std::uint8_t>& row) {
     const std::size_t width = row.size() / 4;
-    if (!has(4)) return bad("the file ends within its picture", at_);
+    if (!has(4)) return bad("the file ends within the pixels", at_);
     const bool in_runs =
         width >= kShortestRuns && width <= kLongestRuns && byte() == 2 && byte(1) == 2 && byte(2) < 128;
     if (in_runs) {
-      if (static_cast<std::size_t>(byte(2)) * 256 + byte(3) != width) return bad("a row of another length", at_);
+      if (static_cast<std::size_t>(byte(2)) * 256 + byte(3) != width)
+        return bad("the row length differs from the image width", at_);
       at_ += 4;
       return read_runs(row);
     }
     for (std::size_t x = 0; x < width;) {
-      if (!has(4)) return bad("the file ends within its picture", at_);
+      if (!has(4)) return bad("the file ends within the pixels", at_);
       if (byte() == 1 && byte(1) == 1 && byte(2) == 1)
-        return make_error(ErrorCode::Unsupported, "runs of the oldest kind", {}, at_);
+        return make_error(ErrorCode::Unsupported, "the oldest run-length encoding is not supported", {}, at_);
       for (std::size_t i = 0; i < 4; ++i) row[4 * x + i] = byte(i);
       at_ += 4;
       ++x;
@@ -134,13 +136,13 @@ class HdrReader {
     const std::size_t width = row.size() / 4;
     for (std::size_t component = 0; component < 4; ++component) {
       for (std::size_t x = 0; x < width;) {
-        if (!has(2)) return bad("the file ends within its picture", at_);
+        if (!has(2)) return bad("the file ends within the pixels", at_);
         const std::size_t code = byte();
         const bool is_run = code > 128;
         const std::size_t count = is_run ? code - 128 : code;
-        if (count == 0 || count > width - x) return bad("a run past its row", at_);
+        if (count == 0 || count > width - x) return bad("a run extends past its row", at_);
         ++at_;
-        if (!has(is_run ? 1 : count)) return bad("the file ends within its picture", at_);
+        if (!has(is_run ? 1 : count)) return bad("the file ends within the pixels", at_);
         for (std::size_t i = 0; i < count; ++i) row[4 * (x + i) + component] = byte(is_run ? 0 : i);
         at_ += is_run ? 1 : count;
         x += count;

@@ -16,11 +16,11 @@ namespace {
 Status check(int width, int height, std::size_t bytes, std::size_t channels) {
   if (width <= 0 || height <= 0 ||
       bytes != channels * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
-    return make_error(ErrorCode::InvalidArgument, "the picture's size is not that of its pixels");
+    return make_error(ErrorCode::InvalidArgument, "the number of pixels is not width x height");
   }
   constexpr int kMostPixels = 16'383;
   if (width > kMostPixels || height > kMostPixels) {
-    return make_error(ErrorCode::LimitExceeded, "a WebP has at most 16,383 pixels along a side");
+    return make_error(ErrorCode::LimitExceeded, "the image is larger than the 16,383 pixels per side of a WebP");
   }
   return {};
 }
@@ -32,7 +32,7 @@ Result<std::vector<std::byte>> encoded(const std::vector<std::uint8_t>& pixels, 
                                        Encode encode) {
   std::uint8_t* bytes = nullptr;
   const std::size_t size = encode(pixels.data(), width, height, channels * width, &bytes);
-  if (size == 0) return make_error(ErrorCode::LimitExceeded, "the picture cannot be encoded as WebP");
+  if (size == 0) return make_error(ErrorCode::LimitExceeded, "cannot encode the image as WebP");
   const auto* const first = reinterpret_cast<const std::byte*>(bytes);
   std::vector<std::byte> out(first, first + size);
   WebPFree(bytes);
@@ -55,7 +55,7 @@ Result<std::vector<std::byte>> write_webp(const Image& picture) {
 #ifdef QUOIN_HAVE_WEBP
   return encoded(picture.rgb, picture.width, picture.height, 3, WebPEncodeLosslessRGB);
 #else
-  return make_error(ErrorCode::Unsupported, "Quoin was built without libwebp");
+  return make_error(ErrorCode::Unsupported, "cannot write WebP: Quoin was built without libwebp");
 #endif
 }
 
@@ -64,7 +64,7 @@ Result<std::vector<std::byte>> write_webp(const AlphaImage& picture) {
 #ifdef QUOIN_HAVE_WEBP
   return encoded(picture.rgba, picture.width, picture.height, 4, WebPEncodeLosslessRGBA);
 #else
-  return make_error(ErrorCode::Unsupported, "Quoin was built without libwebp");
+  return make_error(ErrorCode::Unsupported, "cannot write WebP: Quoin was built without libwebp");
 #endif
 }
 
@@ -73,19 +73,19 @@ Result<AlphaImage> decode_webp(std::span<const std::byte> bytes) {
   const auto* const data = reinterpret_cast<const std::uint8_t*>(bytes.data());
   AlphaImage image;
   if (WebPGetInfo(data, bytes.size(), &image.width, &image.height) == 0) {
-    return make_error(ErrorCode::BadFormat, "a WebP that cannot be decoded");
+    return make_error(ErrorCode::BadFormat, "the WebP cannot be decoded");
   }
   const std::size_t size =
       std::size_t{4} * static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
-  if (size / 4 > kMostPicturePixels) return make_error(ErrorCode::LimitExceeded, "a WebP beyond 2^28 pixels");
+  if (size / 4 > kMostPicturePixels) return make_error(ErrorCode::LimitExceeded, "the WebP has more than 2^28 pixels");
   image.rgba.resize(size);
   if (WebPDecodeRGBAInto(data, bytes.size(), image.rgba.data(), size, 4 * image.width) == nullptr) {
-    return make_error(ErrorCode::BadFormat, "a WebP that cannot be decoded");
+    return make_error(ErrorCode::BadFormat, "the WebP cannot be decoded");
   }
   return image;
 #else
   (void)bytes;
-  return make_error(ErrorCode::Unsupported, "Quoin was built without libwebp");
+  return make_error(ErrorCode::Unsupported, "cannot read WebP: Quoin was built without libwebp");
 #endif
 }
 

@@ -108,7 +108,7 @@ TEST(Dimensions, OnesThatAreNotThereAreErrors) {
 
 TEST(Dimensions, AFolderWithoutRegionsSaysWhatIsMissing) {
   WrittenWorld world("none");
-  EXPECT_NE(error_of(world.path()).find("no world that Quoin reads"), std::string::npos);
+  EXPECT_NE(error_of(world.path()).find("without a Minecraft world"), std::string::npos);
   world.level();
   EXPECT_NE(error_of(world.path()).find("without region files"), std::string::npos);
   EXPECT_NE(error_of(world.path() / "level.dat").find("without region files"), std::string::npos);
@@ -124,9 +124,9 @@ TEST(MinecraftSource, RegionsOfEntitiesAndPointsAreRefused) {
   WrittenWorld world("apart");
   world.level().region("region").region("entities", entities.bytes).region("poi", points.bytes);
   for (const char* path : {"entities", "entities/r.0.0.mca"}) {
-    EXPECT_NE(error_of(world.path() / path).find("a region of entities, not of blocks"), std::string::npos) << path;
+    EXPECT_NE(error_of(world.path() / path).find("a region file of entities, not blocks"), std::string::npos) << path;
   }
-  EXPECT_NE(error_of(world.path() / "poi").find("a region of points of interest"), std::string::npos);
+  EXPECT_NE(error_of(world.path() / "poi").find("a region file of points of interest"), std::string::npos);
 }
 
 TEST(MinecraftSource, ARegionOfAnotherNameIsPlacedAtTheOrigin) {

@@ -83,7 +83,7 @@ class Walker {
     const auto count = number<std::int32_t>();
     if (!count) return count.error();
     if (*count < 0) {
-      return make_error(ErrorCode::BadFormat, "NBT: a length of " + std::to_string(*count), {}, stream_.position());
+      return make_error(ErrorCode::BadFormat, "NBT: invalid length " + std::to_string(*count), {}, stream_.position());
     }
     return static_cast<std::uint32_t>(*count);
   }
@@ -119,7 +119,7 @@ class Walker {
   }
 
   Status walk_payload(Tag kind, const std::string& name, int depth) {
-    if (depth >= kMaxDepth) return make_error(ErrorCode::LimitExceeded, "NBT: deeper than 512 levels");
+    if (depth >= kMaxDepth) return make_error(ErrorCode::LimitExceeded, "NBT: nested deeper than 512 levels");
     if (kind == Tag::String) {
       const auto read = text();
       return read ? Status() : Status(read.error());

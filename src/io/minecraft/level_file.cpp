@@ -12,7 +12,7 @@ Result<LevelFile> parse_level_file(std::span<const std::byte> bytes) {
   const auto document = nbt::Document::parse(*expanded);
   if (!document) return document.error();
   const nbt::Value data = document->root()["Data"];
-  if (!data) return make_error(ErrorCode::BadFormat, "it has no Data");
+  if (!data) return make_error(ErrorCode::BadFormat, "level.dat has no compound Data");
   LevelFile level;
   level.name = data["LevelName"].text().value_or("");
   level.version = data["Version"]["Name"].text().value_or("");

@@ -51,7 +51,7 @@ std::vector<Region> regions_in(const fs::path& folder, std::vector<Error>& broke
     const auto name = parse_region_name(entry->path());
     if (!name) continue;
     if (is_too_far(*name)) {
-      broken.push_back(make_error(ErrorCode::Unsupported, "lies too far out", entry->path().string()));
+      broken.push_back(make_error(ErrorCode::Unsupported, "its position is out of range", entry->path().string()));
       continue;
     }
     regions.push_back({.path = entry->path(), .name = *name});
@@ -66,7 +66,7 @@ std::vector<Region> regions_in(const fs::path& folder, std::vector<Error>& broke
       continue;
     }
     broken.push_back(make_error(ErrorCode::Unsupported,
-                                "of the same region as " + regions[i - 1].path.filename().string(),
+                                "has the same region as " + regions[i - 1].path.filename().string(),
                                 regions[i].path.string()));
     regions.erase(regions.begin() + static_cast<std::ptrdiff_t>(i));
   }
@@ -167,13 +167,14 @@ class MinecraftSource final : public ChunkSource {
                     std::vector<Error>& broken) const {
     const IVec3 place{name.x * kRegionEdge + chunk.x, 0, name.z * kRegionEdge + chunk.z};
     const auto tell = [&](const Error& error) {
-      Error told = error;
+      Error located = error;
       const std::string where = "chunk (" + std::to_string(place.x) + ", " + std::to_string(place.z) + "): ";
-      told.message = where + told.message;
-      if (told.byte_offset) told.message += " (byte " + std::to_string(*told.byte_offset) + " of what it expands to)";
-      told.path = file.path().string();
-      told.byte_offset = file.offset(chunk.x, chunk.z);
-      broken.push_back(std::move(told));
+      located.message = where + located.message;
+      if (located.byte_offset)
+        located.message += " (byte " + std::to_string(*located.byte_offset) + " of the expanded data)";
+      located.path = file.path().string();
+      located.byte_offset = file.offset(chunk.x, chunk.z);
+      broken.push_back(std::move(located));
     };
     const auto bytes = file.read(chunk.x, chunk.z);
     if (!bytes) {
@@ -248,8 +249,8 @@ Status check_holds_blocks(const RegionFile& file) {
     const bool is_points = root["Sections"].tag() == nbt::Tag::Compound;
     if (!is_entities && !is_points) return {};
     return make_error(ErrorCode::Unsupported,
-                      std::string("a region of ") + (is_entities ? "entities" : "points of interest") +
-                          ", not of blocks; those are in the folder \"region\" next to it: name that, or the world",
+                      std::string("a region file of ") + (is_entities ? "entities" : "points of interest") +
+                          ", not blocks; blocks are in the folder \"region\" next to it: name that folder or the world",
                       file.path().string());
   }
   return {};
@@ -265,7 +266,7 @@ Result<WorldRegions> find_regions(const fs::path& path, std::string_view dimensi
   found.info.format = "minecraft";
   std::error_code error;
   if (const auto name = parse_region_name(path); name && fs::is_regular_file(path, error)) {
-    if (is_too_far(*name)) return make_error(ErrorCode::Unsupported, "lies too far out", path.string());
+    if (is_too_far(*name)) return make_error(ErrorCode::Unsupported, "its position is out of range", path.string());
     if (!dimension.empty()) {
       return make_error(ErrorCode::InvalidArgument,
                         "cannot choose a dimension of one region file; name the world's folder", path.string());
@@ -277,7 +278,7 @@ Result<WorldRegions> find_regions(const fs::path& path, std::string_view dimensi
   const bool is_renamed = fs::is_regular_file(path, error) && path.filename() != "level.dat" && dimension.empty();
   if (is_renamed) {
     found.regions.push_back({.path = path, .name = {}});
-    found.info.warnings.emplace_back("its name does not say where it lies (r.X.Z.mca): placed as r.0.0.mca");
+    found.info.warnings.emplace_back("the name is not r.X.Z.mca, so the region is placed as r.0.0.mca");
     return found;
   }
   if (world.dimensions.empty()) return no_regions(path);

@@ -197,7 +197,7 @@ TEST(MinecraftSource, CountsInvisibleBlocksAndMakesLampsOfLight) {
   ASSERT_TRUE(loaded);
   EXPECT_EQ(loaded->scene.lamps.size(), 1U);
   ASSERT_EQ(loaded->warnings.size(), 1U);
-  EXPECT_EQ(loaded->warnings[0], "left out, since they cannot be seen: 2 minecraft:barrier, 1 minecraft:light");
+  EXPECT_EQ(loaded->warnings[0], "left out, since they are invisible: 2 minecraft:barrier, 1 minecraft:light");
 }
 
 TEST(MinecraftSource, NumbersOfTypesDoNotDependOnWhatWasReadBefore) {

@@ -54,7 +54,7 @@ class Parser {
 
   Result<Document> run() {
     constexpr std::size_t kMaxBytes = 0x7FFFFFFF;
-    if (bytes_.size() > kMaxBytes) return make_error(ErrorCode::LimitExceeded, "NBT of more than 2 GiB");
+    if (bytes_.size() > kMaxBytes) return make_error(ErrorCode::LimitExceeded, "the NBT data has more than 2 GiB");
     Status done = named_value(0, nullptr);
     if (!done) return done.error();
     document_.size_ = at_;
@@ -90,7 +90,7 @@ class Parser {
     const auto kind = tag();
     if (!kind) return kind.error();
     if (*kind == Tag::End) {
-      if (is_end == nullptr) return fault("nothing in it", at_ - 1);
+      if (is_end == nullptr) return fault("no content", at_ - 1);
       *is_end = true;
       return {};
     }
@@ -108,7 +108,7 @@ class Parser {
   Result<std::uint32_t> count() {
     if (!has(4)) return cut_off();
     const auto count = big<std::int32_t>(bytes_.data() + at_);
-    if (count < 0) return fault("a length of " + std::to_string(count), at_);
+    if (count < 0) return fault("invalid length " + std::to_string(count), at_);
     at_ += 4;
     return static_cast<std::uint32_t>(count);
   }
@@ -129,8 +129,8 @@ class Parser {
       done = flat(index, length, 1);
     } else {
       if (depth >= limits_.depth) {
-        return make_error(ErrorCode::LimitExceeded, "NBT: deeper than " + std::to_string(limits_.depth) + " levels", {},
-                          at_);
+        return make_error(ErrorCode::LimitExceeded,
+                          "NBT: nested deeper than " + std::to_string(limits_.depth) + " levels", {}, at_);
       }
       done = kind == Tag::List ? list(index, depth + 1) : compound(index, depth + 1);
     }
@@ -156,7 +156,7 @@ class Parser {
     document_.nodes_[index].begin = static_cast<std::uint32_t>(at_);
     document_.nodes_[index].count = *elements;
     if (*element == Tag::End) {
-      return *elements == 0 ? Status() : fault("a list of " + std::to_string(*elements) + " ends", at_ - 4);
+      return *elements == 0 ? Status() : fault("a list of " + std::to_string(*elements) + " End tags", at_ - 4);
     }
     for (std::uint32_t i = 0; i < *elements; ++i) {
       const auto child = add(*element);

@@ -196,10 +196,11 @@ std::uint64_t volume_of(IVec3 size) {
 
 Status check_size(IVec3 size, nbt::Value at) {
   const bool is_sound = size.x > 0 && size.y > 0 && size.z > 0;
-  if (!is_sound) return fault("a region of " + text_of(size) + " blocks", at);
+  if (!is_sound) return fault("invalid region size " + text_of(size) + " blocks", at);
   const std::int64_t blocks = std::int64_t{size.x} * size.z;
   if (std::max({size.x, size.y, size.z}) > kMaxEdge || blocks > kMaxBlocks / size.y) {
-    return make_error(ErrorCode::LimitExceeded, "a region of " + text_of(size) + " blocks", {}, at.offset());
+    return make_error(ErrorCode::LimitExceeded, "the region of " + text_of(size) + " blocks is too large", {},
+                      at.offset());
   }
   return {};
 }
@@ -233,7 +234,7 @@ Result<IVec3> SchematicReader::size_of(nbt::Value schematic) const {
   for (int axis = 0; axis < 3; ++axis) {
     const nbt::Value of_axis = schematic[kNames.at(static_cast<std::size_t>(axis))];
     const auto number = of_axis.integer();
-    if (!number) return fault(std::string("a schematic without ") + kNames.at(static_cast<std::size_t>(axis)), root_);
+    if (!number) return fault(std::string("the schematic has no ") + kNames.at(static_cast<std::size_t>(axis)), root_);
     const bool is_short = of_axis.tag() == nbt::Tag::Short;
     size[axis] = static_cast<int>(is_short ? *number & 0xFFFF : std::clamp<std::int64_t>(*number, 0, kMaxEdge + 1));
   }
@@ -250,11 +251,11 @@ Result<std::vector<Block>> palette_of_texts(nbt::Value palette, BlockTypes& type
     const auto index = entry.integer();
     const auto block = parse_block(entry.name());
     if (!index || *index < 0 || !block) {
-      done = fault("a block \"" + std::string(entry.name()) + "\" without an index", entry);
+      done = fault("the block \"" + std::string(entry.name()) + "\" has no index", entry);
       return;
     }
     if (static_cast<std::uint64_t>(*index) >= kMaxPalette) {
-      done = make_error(ErrorCode::LimitExceeded, "a palette of more than 65,535 blocks", {}, entry.offset());
+      done = make_error(ErrorCode::LimitExceeded, "the palette has more than 65,535 blocks", {}, entry.offset());
       return;
     }
     const auto made = types.block(block->name, block->properties);
@@ -267,7 +268,7 @@ Result<std::vector<Block>> palette_of_texts(nbt::Value palette, BlockTypes& type
     blocks[at] = *made;
   });
   if (!done) return done.error();
-  if (blocks.empty()) return fault("a schematic without a palette", palette);
+  if (blocks.empty()) return fault("the schematic has no palette", palette);
   return blocks;
 }
 
@@ -294,16 +295,17 @@ Status SchematicReader::read_sponge(nbt::Value schematic) {
   }
   VarintReader indices = varints(data);
   if (indices.size() < volume_of(*size)) {
-    return fault("a schematic of " + text_of(*size) + " with " + std::to_string(indices.size()) + " bytes of blocks",
-                 schematic);
+    return fault(
+        "the schematic of " + text_of(*size) + " blocks has " + std::to_string(indices.size()) + " bytes of block data",
+        schematic);
   }
   region.read_layer = [&indices, data, kinds = region.palette.size()](int y, std::span<std::uint16_t> layer) -> Status {
     const std::size_t count = indices.read(layer);
     const auto read = layer.first(count);
     if (count > 0 && *std::ranges::max_element(read) >= kinds) {
-      return fault("an index beyond the " + std::to_string(kinds) + " blocks of its palette", data);
+      return fault("a block index is beyond the " + std::to_string(kinds) + " blocks of the palette", data);
     }
-    return count < layer.size() ? fault("its blocks end in layer " + std::to_string(y), data) : Status();
+    return count < layer.size() ? fault("the block data ends in layer " + std::to_string(y), data) : Status();
   };
   const std::uint64_t area = volume_of({size->x, 1, size->z});
   region.read_uniform = [&indices, area, kinds = region.palette.size()](int layers) -> std::optional<std::uint16_t> {
@@ -374,17 +376,17 @@ Status SchematicReader::read_mcedit() {
   const std::size_t count =
       static_cast<std::size_t>(size->x) * static_cast<std::size_t>(size->y) * static_cast<std::size_t>(size->z);
   if (blocks.size() != count || (!data.empty() && data.size() != count)) {
-    return fault("a schematic of " + text_of(*size) + " with " + std::to_string(blocks.size()) + " blocks and " +
-                     std::to_string(data.size()) + " data",
+    return fault("the schematic of " + text_of(*size) + " blocks has " + std::to_string(blocks.size()) +
+                     " blocks and " + std::to_string(data.size()) + " data values",
                  root_["Blocks"]);
   }
   const std::string materials(root_["Materials"].text().value_or("Alpha"));
   if (materials != "Alpha") {
-    loaded_.warnings.push_back("blocks are read by the numbers of the Java edition, though it says \"" + materials +
+    loaded_.warnings.push_back("block numbers are read as the Java edition's, although Materials is \"" + materials +
                                "\"");
   }
   if (root_["SchematicaMapping"] || root_["BlockIDs"]) {
-    loaded_.warnings.emplace_back("its own numbers of blocks are not used: those of the game are");
+    loaded_.warnings.emplace_back("the file's own block numbers are ignored; the game's are used");
   }
   Region region;
   region.size = *size;
@@ -418,7 +420,7 @@ Status SchematicReader::read_litematic(nbt::Value regions) {
   regions.for_each([&](nbt::Value region) {
     if (done) done = read_litematic_region(region);
   });
-  if (done && loaded_.scene.grids().empty()) return fault("a litematic without regions", regions);
+  if (done && loaded_.scene.grids().empty()) return fault("the litematic has no regions", regions);
   return done;
 }
 
@@ -426,7 +428,7 @@ Status SchematicReader::read_litematic(nbt::Value regions) {
 Status SchematicReader::read_litematic_region(nbt::Value from) {
   const auto place = vector_of(from["Position"]);
   const auto reach = vector_of(from["Size"]);
-  if (!place || !reach) return fault("a region without a place or a size", from);
+  if (!place || !reach) return fault("a region has no position or no size", from);
   Region region;
   region.name = from.name();
   region.size = glm::abs(*reach);
@@ -438,7 +440,7 @@ Status SchematicReader::read_litematic_region(nbt::Value from) {
   if (auto read = read_block_palette(from["BlockStatePalette"], types_, region.palette); !read) return read;
   const std::size_t kinds = region.palette.size();
   if (kinds == 0 || kinds > kMaxPalette) {
-    return fault("a palette of " + std::to_string(kinds) + " blocks", from["BlockStatePalette"]);
+    return fault("invalid palette size " + std::to_string(kinds), from["BlockStatePalette"]);
   }
   block_entities_ += from["TileEntities"].count();
   entities_ += from["Entities"].count();
@@ -452,25 +454,26 @@ Status SchematicReader::read_litematic_region(nbt::Value from) {
   }
   const int bits = bits_of_palette(kinds, 2);
   if (states.count() < (volume_of(region.size) * static_cast<std::uint64_t>(bits) + 63) / 64) {
-    return fault("indices of " + text_of(region.size) + " blocks in " + std::to_string(states.count()) + " longs",
-                 from);
+    return fault(
+        "the indices of " + text_of(region.size) + " blocks do not fit in " + std::to_string(states.count()) + " longs",
+        from);
   }
   region.read_layer = [states, bits, kinds](int y, std::span<std::uint16_t> layer) -> Status {
     unpack_spanning(states, bits, static_cast<std::size_t>(y) * layer.size(), layer);
     if (std::ranges::all_of(layer, [kinds](std::uint16_t index) { return index < kinds; })) return {};
-    return fault("an index beyond the " + std::to_string(kinds) + " blocks of its palette", states);
+    return fault("a block index is beyond the " + std::to_string(kinds) + " blocks of the palette", states);
   };
   return put(region);
 }
 
 Status SchematicReader::read_structure() {
   const auto size = vector_of_list(root_["size"]);
-  if (!size) return fault("a structure without a size", root_);
+  if (!size) return fault("the structure has no size", root_);
   if (auto sound = check_size(*size, root_["size"]); !sound) return sound;
   // Only the content determines the size of such files.
   constexpr std::int64_t kMaxArea = std::int64_t{1} << 22;
   if (std::int64_t{size->x} * size->z > kMaxArea) {
-    return make_error(ErrorCode::LimitExceeded, "a structure of " + text_of(*size) + " blocks");
+    return make_error(ErrorCode::LimitExceeded, "the structure of " + text_of(*size) + " blocks is too large");
   }
   Region region;
   region.size = *size;
@@ -481,11 +484,12 @@ Status SchematicReader::read_structure() {
       if (std::exchange(is_first, false)) palette = each;
     });
     if (root_["palettes"].count() > 1) {
-      loaded_.warnings.push_back("of its " + std::to_string(root_["palettes"].count()) + " palettes the first");
+      loaded_.warnings.push_back("only the first of " + std::to_string(root_["palettes"].count()) +
+                                 " palettes is read");
     }
   }
   if (auto read = read_block_palette(palette, types_, region.palette); !read) return read;
-  if (region.palette.size() >= kMaxPalette) return fault("a palette of more than 65,534 blocks", palette);
+  if (region.palette.size() >= kMaxPalette) return fault("the palette has more than 65,534 blocks", palette);
   entities_ += root_["entities"].count();
   return put_structure(region, root_["blocks"]);
 }
@@ -523,7 +527,7 @@ Status SchematicReader::put_structure(Region& region, nbt::Value blocks) {
     const auto index = block["state"].integer();
     const bool is_sound = at && index && IBox{IVec3(0), region.size}.contains(*at) && *index >= 0 && *index < air;
     if (!is_sound) {
-      done = fault("a block outside of the structure, or of its palette", block);
+      done = fault("a block is outside the structure or its palette", block);
       return;
     }
     if (block["nbt"]) ++block_entities_;
@@ -646,11 +650,11 @@ void SchematicReader::note_left_out() {
   const auto note = [&](std::size_t count, const char* what) {
     if (count > 0) loaded_.warnings.push_back("left out: " + std::to_string(count) + " " + what);
   };
-  note(block_entities_, "blocks' contents (chests, signs and the like)");
+  note(block_entities_, "block entities (chests, signs and others)");
   note(entities_, "entities");
   if (!invisible_.empty()) loaded_.warnings.push_back(text_of_invisible(invisible_));
   if (has_lost_biomes_) {
-    loaded_.warnings.emplace_back("left out: biomes that are cut or not in their palette; what they colour is plains'");
+    loaded_.warnings.emplace_back("left out: damaged biomes; plains colours are used there");
   }
 }
 
@@ -666,7 +670,7 @@ Status SchematicReader::read_any() {
     if (keys.size() < kEnough) keys.append(keys.empty() ? "" : ", ").append(printable(value.name()));
   });
   return make_error(ErrorCode::Unsupported,
-                    "a file of NBT that is no schematic: it has " + (keys.empty() ? std::string("nothing") : keys));
+                    "an NBT file that is not a schematic; it has " + (keys.empty() ? std::string("nothing") : keys));
 }
 
 // NBT with the least significant byte first: a compound without a name, whose first value has a name of printable
@@ -710,10 +714,9 @@ bool begins_nbt(std::span<const std::byte> beginning) {
 
 Result<LoadedScene> read_schematic(std::span<const std::byte> bytes, const Progress& progress) {
   if (is_bedrock_structure(bytes)) {
-    return make_error(
-        ErrorCode::Unsupported,
-        "a structure of Minecraft's Bedrock edition (.mcstructure), which Quoin does not read; load it in "
-        "the game or an editor of worlds, and save it as a structure or schematic of the Java edition");
+    return make_error(ErrorCode::Unsupported,
+                      "a Minecraft Bedrock structure (.mcstructure), which is not supported; load it in "
+                      "the game or a world editor and save it as a Java structure or schematic");
   }
   LargeNbt content;
   if (begins_gzip(bytes)) {

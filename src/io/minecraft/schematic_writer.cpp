@@ -184,11 +184,12 @@ Result<std::vector<std::byte>> blocks_of(const models::MergedGrid& merged, Palet
 Result<models::ModelBytes> write_schematic(const Scene& scene, const Progress& progress) {
   auto merged = models::merge_grids(scene, kHolds);
   if (!merged) return merged.error();
-  if (merged->box.empty()) return make_error(ErrorCode::Unsupported, "there are no voxels, and .schem needs some");
+  if (merged->box.empty())
+    return make_error(ErrorCode::Unsupported, "the scene has no voxels, and .schem needs at least one");
   const IVec3 size = merged->box.size();
   if (std::max({size.x, size.y, size.z}) > kMaxEdge ||
       std::int64_t{size.x} * size.y > kMaxBlocks / std::max(size.z, 1)) {
-    return make_error(ErrorCode::LimitExceeded, "more than 65,535 blocks a side, or some 2^30 in all");
+    return make_error(ErrorCode::LimitExceeded, "more than 65,535 blocks per side, or about 2^30 in total");
   }
   Palette palette(scene.types);
   std::int64_t lost_data = 0;
@@ -214,11 +215,11 @@ Result<models::ModelBytes> write_schematic(const Scene& scene, const Progress& p
   out.empty_list("BlockEntities");
   out.end();
   if (palette.guessed() != 0) {
-    merged->warnings.push_back("types that are no blocks of the game became those of the nearest colour: " +
+    merged->warnings.push_back("types that are not Minecraft blocks, written as the block of the nearest colour: " +
                                with_thousands(palette.guessed()));
   }
   if (lost_data != 0) {
-    merged->warnings.push_back("voxels whose data is left out, which .schem does not hold: " +
+    merged->warnings.push_back("voxels whose data is left out, since .schem cannot store it: " +
                                with_thousands(lost_data));
   }
   // What readers take.

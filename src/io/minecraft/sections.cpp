@@ -75,7 +75,7 @@ Status read_block_palette(nbt::Value palette, BlockTypes& types, std::vector<Blo
     // Before 20w17 and since: a compound; a few snapshots had the name alone.
     const auto name = entry.tag() == nbt::Tag::String ? entry.text() : entry["Name"].text();
     if (!name) {
-      done = fault("a block without a name", entry);
+      done = fault("a block has no name", entry);
       return;
     }
     properties.clear();
@@ -119,7 +119,7 @@ Status SectionReader::put_legacy(std::size_t at, int id, int data) {
 Status SectionReader::read_legacy(nbt::Value section) {
   const auto blocks = section["Blocks"].bytes();
   if (blocks.size() != kSectionBlocks)
-    return fault("a section of " + std::to_string(blocks.size()) + " blocks", section);
+    return fault("a section has " + std::to_string(blocks.size()) + " blocks", section);
   const auto data = section["Data"].bytes();
   const auto add = section["Add"].bytes();
   begin_legacy();
@@ -136,7 +136,7 @@ Status SectionReader::read_mcregion(nbt::Value level, FunctionRef<void(const Sec
   constexpr std::size_t kHeight = 128;
   const auto blocks = level["Blocks"].bytes();
   const auto data = level["Data"].bytes();
-  if (blocks.size() != kHeight * 256) return fault("a chunk of " + std::to_string(blocks.size()) + " blocks", level);
+  if (blocks.size() != kHeight * 256) return fault("a chunk has " + std::to_string(blocks.size()) + " blocks", level);
   for (int y = 0; y < 8; ++y) {
     begin_legacy();
     Status done;
@@ -195,7 +195,7 @@ bool SectionReader::is_air() const {
 
 Status SectionReader::read_section(nbt::Value section, nbt::Value level) {
   const auto y = section["Y"].integer();
-  if (!y || *y < -128 || *y > 127) return fault("a section without a height", section);
+  if (!y || *y < -128 || *y > 127) return fault("a section has no valid height Y", section);
   section_.y = static_cast<int>(*y);
   const nbt::Value states = section["block_states"];
   const nbt::Value palette = states ? states["palette"] : section["Palette"];
@@ -204,21 +204,22 @@ Status SectionReader::read_section(nbt::Value section, nbt::Value level) {
     const nbt::Value data = states ? states["data"] : section["BlockStates"];
     if (auto read = read_block_palette(palette, types_, section_.palette); !read) return read;
     const std::size_t size = section_.palette.size();
-    if (size == 0 || size > kSectionBlocks) return fault("a palette of " + std::to_string(size) + " blocks", palette);
+    if (size == 0 || size > kSectionBlocks) return fault("invalid palette size " + std::to_string(size), palette);
     // Some servers write the array of a section of one block, without longs.
     if (data && (size > 1 || data.count() > 0)) {
       if (is_air()) return {};
       // The game takes 4 bits at least, some servers no more than the palette needs.
       if (!unpack_indices(data, bits_of_palette(size, 4), section_.indices) &&
           !unpack_indices(data, bits_of_palette(size, 1), section_.indices)) {
-        return fault("indices of " + std::to_string(size) + " blocks in " + std::to_string(data.count()) + " longs",
+        return fault("the indices into " + std::to_string(size) + " blocks do not fit in " +
+                         std::to_string(data.count()) + " longs",
                      data);
       }
       if (*std::ranges::max_element(section_.indices) >= size) {
-        return fault("an index beyond the " + std::to_string(size) + " blocks of its palette", data);
+        return fault("a block index is beyond the " + std::to_string(size) + " blocks of the palette", data);
       }
     } else {
-      if (size > 1) return fault("a palette of " + std::to_string(size) + " blocks without indices", palette);
+      if (size > 1) return fault("the palette of " + std::to_string(size) + " blocks has no indices", palette);
       section_.indices.fill(0);
     }
   } else if (section["Blocks"]) {

@@ -70,7 +70,7 @@ Result<LoadedScene> GoxelReader::read() {
   static_cast<void>(reader.take(4));
   version_ = reader.u32();
   if (version_ < 1 || version_ > 2) {
-    return make_error(ErrorCode::Unsupported, "version " + std::to_string(version_) + " of Goxel's files", {}, 4);
+    return make_error(ErrorCode::Unsupported, "Goxel version " + std::to_string(version_) + " is not supported", {}, 4);
   }
   while (reader.remaining() > 0) {
     const std::size_t at = reader.position();
@@ -79,7 +79,7 @@ Result<LoadedScene> GoxelReader::read() {
     const std::size_t begin = reader.position();
     static_cast<void>(reader.take(size));
     static_cast<void>(reader.u32());  // its sum, which programs do not agree on
-    if (reader.failed()) return bad_at(at, "a chunk that ends behind its file");
+    if (reader.failed()) return bad_at(at, "a chunk extends past the end of the file");
     if (auto done = read_chunk(type, ByteReader(bytes_, begin, begin + size)); !done) return done.error();
   }
   for (const auto& [what, count] : left_out_) builder_.warn("left out: " + std::to_string(count) + " " + what);
@@ -94,10 +94,10 @@ Status GoxelReader::read_chunk(std::string_view type, ByteReader chunk) {
     return {};
   }
   if (type == "CAMR") ++left_out_["cameras"];
-  if (type == "IMG ") ++left_out_["settings of its picture"];
-  if (type == "LIGH") ++left_out_["settings of its light"];
+  if (type == "IMG ") ++left_out_["image settings"];
+  if (type == "LIGH") ++left_out_["light settings"];
   const bool is_known = type == "CAMR" || type == "LIGH" || type == "IMG " || type == "PREV";
-  if (!is_known) ++left_out_["chunks of unknown kinds"];
+  if (!is_known) ++left_out_["unknown chunks"];
   return {};
 }
 
@@ -110,11 +110,11 @@ Status GoxelReader::read_block(ByteReader& chunk) {
   static_cast<void>(sizes.take(kSizesAt));
   const std::array<std::uint8_t, 8> edge_64 = {0, 0, 0, 64, 0, 0, 0, 64};
   if (!std::ranges::equal(sizes.take(edge_64.size()), std::as_bytes(std::span(edge_64)))) {
-    return bad_at(at, "a block that is no picture of 64 x 64 pixels");
+    return bad_at(at, "a block is not an image of 64 x 64 pixels");
   }
   auto image = decode_png(png);
-  if (!image) return bad_at(at, "a block that is no picture: " + image.error().message);
-  if (image->pixels.size() != kBlockBytes) return bad_at(at, "a block of another size than 16^3");
+  if (!image) return bad_at(at, "a block is not an image: " + image.error().message);
+  if (image->pixels.size() != kBlockBytes) return bad_at(at, "a block does not have 16^3 voxels");
   blocks_.push_back(std::move(image->pixels));
   return {};
 }
@@ -172,12 +172,12 @@ Status GoxelReader::read_layer(ByteReader& chunk) {
     for (int axis = 0; axis < 3; ++axis) block.place[axis] = chunk.i32();
     static_cast<void>(chunk.u32());
     const auto is_far = [&](int axis) { return block.place[axis] < -kMaxPlace || block.place[axis] > kMaxPlace; };
-    if (is_far(0) || is_far(1) || is_far(2)) return bad_at(at, "a block that lies too far out");
-    if (block.index >= blocks_.size()) return bad_at(at, "a block that is not there");
+    if (is_far(0) || is_far(1) || is_far(2)) return bad_at(at, "a block position is out of range");
+    if (block.index >= blocks_.size()) return bad_at(at, "a layer refers to a block that does not exist");
     if (version_ == 1) block.place -= kBlockEdge / 2;
     blocks.push_back(block);
   }
-  if (chunk.failed()) return bad_at(at, "a layer that ends too early");
+  if (chunk.failed()) return bad_at(at, "a layer ends too early");
   const Dict dict = read_dict(chunk);
   const auto value = [&](std::string_view name) {
     const auto found = dict.find(name);
@@ -188,7 +188,7 @@ Status GoxelReader::read_layer(ByteReader& chunk) {
   ByteReader visible = value("visible");
   model.visible = visible.remaining() == 0 || visible.u8() != 0;
   const bool is_shape = count == 0 && dict.contains("shape");
-  if (count == 0 && !is_shape && value("base_id").u32() != 0) ++left_out_["layers that are clones"];
+  if (count == 0 && !is_shape && value("base_id").u32() != 0) ++left_out_["cloned layers"];
   const std::int32_t index = value("material").i32();
   const bool has_material =
       dict.contains("material") && index >= 0 && static_cast<std::size_t>(index) < materials_.size();
@@ -250,7 +250,7 @@ Status GoxelReader::put_shape(const Dict& dict, const Material& material, std::s
   const auto mat = dict.find("mat");
   const glm::dmat4 placed = matrix_of(mat != dict.end() ? mat->second : std::span<const std::byte>());
   if (!shape || glm::determinant(glm::dmat3(placed)) == 0.0) {
-    ++left_out_[shape ? "shapes without a volume" : "shapes of unknown kinds"];
+    ++left_out_[shape ? "shapes without a volume" : "unknown shapes"];
     return {};
   }
   std::array<std::uint8_t, 4> rgba{255, 255, 255, 255};
@@ -262,7 +262,7 @@ Status GoxelReader::put_shape(const Dict& dict, const Material& material, std::s
   const DVec3 size = box.max - box.min;
   const double farthest = std::max(glm::length(box.min), glm::length(box.max));
   if (!(size.x * size.y * size.z <= kMostVoxels) || !(farthest < kMaxPlace)) {
-    return make_error(ErrorCode::LimitExceeded, "a shape of more than 2^27 voxels, or too far out", {}, at);
+    return make_error(ErrorCode::LimitExceeded, "a shape has more than 2^27 voxels or is out of range", {}, at);
   }
   const glm::dmat4 shape_from_voxel = glm::inverse(placed);
   const Rgba8 colour = tinted(rgba.data(), material);

@@ -37,7 +37,8 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
   static_cast<void>(reader.take(4));
   const int version = read_u16(reader);
   if (version < 1 || version > 4) {
-    return make_error(ErrorCode::Unsupported, "version " + std::to_string(version) + " of Luanti's schematics", {}, 4);
+    return make_error(ErrorCode::Unsupported,
+                      "Luanti schematic version " + std::to_string(version) + " is not supported", {}, 4);
   }
   const int size_x = read_u16(reader);
   const int size_y = read_u16(reader);
@@ -47,24 +48,24 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
   const std::size_t count = read_u16(reader);
   std::vector<std::string_view> names(count <= reader.remaining() / 2 ? count : 0);
   for (std::string_view& name : names) name = reader.text(read_u16(reader));
-  if (reader.failed() || names.size() < count) return bad_at(bytes.size(), "it ends before its nodes do");
+  if (reader.failed() || names.size() < count) return bad_at(bytes.size(), "the file ends before its nodes");
   std::vector<std::optional<VoxelProperties>> nodes(count);  // nothing: air
   std::ranges::transform(names, nodes.begin(), node_properties);
   const std::size_t begin = reader.position();
   const std::uint64_t volume =
       static_cast<std::uint64_t>(size_x) * static_cast<std::uint64_t>(size_y) * static_cast<std::uint64_t>(size_z);
   if (volume == 0) {
-    return bad_at(6, "a schematic of " + std::to_string(size_x) + " x " + std::to_string(size_y) + " x " +
+    return bad_at(6, "invalid size: " + std::to_string(size_x) + " x " + std::to_string(size_y) + " x " +
                          std::to_string(size_z) + " nodes");
   }
   constexpr std::uint64_t kMaxNodes = std::uint64_t{1} << 24;
-  if (volume > kMaxNodes) return make_error(ErrorCode::LimitExceeded, "a schematic of more than 2^24 nodes", {}, 6);
+  if (volume > kMaxNodes) return make_error(ErrorCode::LimitExceeded, "the schematic has more than 2^24 nodes", {}, 6);
   ByteStream stream(bytes, begin, Compression::Zlib);
-  if (volume * 4 > stream.max_bytes()) return bad_at(6, "a schematic of more nodes than there can be");
+  if (volume * 4 > stream.max_bytes()) return bad_at(6, "the size claims more nodes than the file can hold");
   std::vector<std::byte> content(volume * 4);
   const auto read = stream.read(content);
   if (!read) return read.error();
-  if (*read < volume * 3) return bad_at(bytes.size(), "it ends before its nodes do");
+  if (*read < volume * 3) return bad_at(bytes.size(), "the file ends before its nodes");
   ModelBuilder builder;
   Model model;
   model.canvas = {IVec3(0), {size_x, size_y, size_z}};
@@ -77,7 +78,7 @@ Result<LoadedScene> read_mts(std::span<const std::byte> bytes) {
     for (int y = 0; y < size_y; ++y) {
       for (int x = 0; x < size_x; ++x, ++at) {
         const auto index = load<std::uint16_t>(content.data() + 2 * at, std::endian::big);
-        if (index >= nodes.size()) return bad_at(begin, "a node beyond its names");
+        if (index >= nodes.size()) return bad_at(begin, "a node index is beyond the names");
         // How likely the node is, of 127 since version 4 and of 255 before.
         const auto chance = std::to_integer<unsigned>(content[2 * volume + at]);
         if (version >= 2 && (version >= 4 ? chance & 0x7FU : chance >> 1) == 0) continue;

@@ -37,7 +37,7 @@ void ModelBuilder::warn(std::string line) {
 Status ModelBuilder::put(IVec3 voxel, Rgba8 colour, int count, int axis) {
   QUOIN_ASSERT(!parts_.empty(), "a model has begun");
   if (colour.a == 0 || count <= 0) return {};
-  if (runs_.size() == kMaxRuns) return make_error(ErrorCode::LimitExceeded, "more than 2^25 voxels, or runs of them");
+  if (runs_.size() == kMaxRuns) return make_error(ErrorCode::LimitExceeded, "more than 2^25 voxels or runs of voxels");
   runs_.push_back({voxel, looks_.number_of(colour, material_), count, axis});
   return {};
 }

@@ -105,7 +105,7 @@ class QbReader {
   Status read_slices(const Matrix& matrix);
   Status read_run(const Matrix& matrix, int z, std::uint64_t& at, std::uint64_t count, std::uint32_t data);
   Status read_slice(const Matrix& matrix, int z);
-  [[nodiscard]] Error too_short() const { return bad_at(bytes_.size(), "it ends before its matrices do"); }
+  [[nodiscard]] Error too_short() const { return bad_at(bytes_.size(), "the file ends before its matrices"); }
 
   std::span<const std::byte> bytes_;
   ByteReader reader_;
@@ -122,7 +122,7 @@ Status QbReader::read_matrix() {
   const auto size = read_size(reader_);
   const auto place = read_place(reader_);
   if (reader_.failed()) return too_short();
-  if (!size || (!place && !is_empty(*size))) return bad_at(at, "a matrix whose size or place is out of range");
+  if (!size || (!place && !is_empty(*size))) return bad_at(at, "a matrix's size or position is out of range");
   matrix.size = *size;
   if (is_empty(matrix.size)) {
     builder_.warn(empty_text(matrix.name));
@@ -165,7 +165,7 @@ Status QbReader::read_slice(const Matrix& matrix, int z) {
       count = reader_.u32();
       colour = reader_.u32();
     }
-    if (count > area - at) return bad_at(reader_.position(), "a slice of more voxels than its matrix has");
+    if (count > area - at) return bad_at(reader_.position(), "a slice has more voxels than its matrix");
     if (auto done = read_run(matrix, z, at, count, colour); !done) return done;
   }
 }
@@ -205,7 +205,7 @@ class QbtReader {
       at = reader.position();
       part = reader.text(8);
     }
-    if (part != "DATATREE") return bad_at(at, "it has no tree");
+    if (part != "DATATREE") return bad_at(at, "the file has no DATATREE");
     if (auto done = read_node(reader, 0); !done) return done.error();
     return builder_.take("qubicle");
   }
@@ -226,17 +226,17 @@ Status QbtReader::read_node(ByteReader& reader, int depth) {
   const std::size_t at = reader.position();
   const auto kind = static_cast<Kind>(reader.u32());
   const std::size_t size = reader.u32();
-  if (reader.failed() || size > reader.remaining()) return bad_at(at, "a node that ends behind its file");
-  if (depth > kDeepest) return make_error(ErrorCode::LimitExceeded, "nodes within 64 others", {}, at);
+  if (reader.failed() || size > reader.remaining()) return bad_at(at, "a node extends past the end of the file");
+  if (depth > kDeepest) return make_error(ErrorCode::LimitExceeded, "nodes are nested more than 64 deep", {}, at);
   ByteReader node(bytes_, reader.position(), reader.position() + size);
   static_cast<void>(reader.take(size));
   if (kind == Kind::Matrix || kind == Kind::Compound) return read_matrix(node);
   if (kind != Kind::Model) {
-    builder_.warn("left out: a node of the unknown kind " + std::to_string(static_cast<std::uint32_t>(kind)));
+    builder_.warn("left out: a node of unknown kind " + std::to_string(static_cast<std::uint32_t>(kind)));
     return {};
   }
   const std::size_t children = node.count(8);
-  if (node.failed()) return bad_at(at, "a node of more nodes than there is room for");
+  if (node.failed()) return bad_at(at, "a node claims more children than the file can hold");
   for (std::size_t i = 0; i < children; ++i) {
     if (auto done = read_node(node, depth + 1); !done) return done;
   }
@@ -253,8 +253,8 @@ Status QbtReader::read_matrix(ByteReader& reader) {
   const auto size = read_size(reader);
   const std::size_t packed_at = reader.position() + 4;
   const auto packed = reader.take(reader.u32());
-  if (reader.failed()) return bad_at(at, "a matrix that ends too early");
-  if (!size || (!place && !is_empty(*size))) return bad_at(at, "a matrix whose size or place is out of range");
+  if (reader.failed()) return bad_at(at, "a matrix ends too early");
+  if (!size || (!place && !is_empty(*size))) return bad_at(at, "a matrix's size or position is out of range");
   if (is_empty(*size)) {
     builder_.warn(empty_text(matrix.name));
     return {};
@@ -275,13 +275,13 @@ Status QbtReader::put_voxels(const Matrix& matrix, std::span<const std::byte> pa
       const auto read = stream.read(column);
       if (!read)
         return make_error(read.error().code, read.error().message, {}, at + read.error().byte_offset.value_or(0));
-      if (*read != column.size()) return bad_at(at, "a matrix of fewer voxels than its size says");
+      if (*read != column.size()) return bad_at(at, "a matrix has fewer voxels than its size requires");
       ByteReader voxels(column);
       for (int y = 0; y < matrix.size.y; ++y) {
         Rgba8 colour = colour_of(voxels.u32(), false);
         if (colour.a == 0) continue;
         if (!colours_.empty()) {
-          if (colour.r >= colours_.size()) return bad_at(at, "a colour beyond its map");
+          if (colour.r >= colours_.size()) return bad_at(at, "a colour index is beyond the colour map");
           colour = colours_[colour.r];
         }
         colour.a = 255;
@@ -310,11 +310,12 @@ class QbclReader {
     const std::uint32_t version = reader_.u32();
     constexpr std::uint32_t kVersion = 2;
     if (!reader_.failed() && version != kVersion) {
-      return make_error(ErrorCode::Unsupported, "version " + std::to_string(version) + " of Qubicle's projects", {},
-                        version_at);
+      return make_error(ErrorCode::Unsupported,
+                        "Qubicle project version " + std::to_string(version) + " is not supported", {}, version_at);
     }
     const std::uint64_t pixels = std::uint64_t{reader_.u32()} * reader_.u32();
-    if (pixels > reader_.remaining() / 4) return bad_at(version_at + 4, "a thumbnail that ends behind its file");
+    if (pixels > reader_.remaining() / 4)
+      return bad_at(version_at + 4, "the thumbnail extends past the end of the file");
     static_cast<void>(reader_.take(pixels * 4));
     for (int i = 0; i < 7; ++i) static_cast<void>(reader_.take(reader_.u32()));
     static_cast<void>(reader_.take(16));
@@ -323,7 +324,7 @@ class QbclReader {
   }
 
  private:
-  [[nodiscard]] Error too_short() const { return bad_at(reader_.position(), "it ends before its nodes do"); }
+  [[nodiscard]] Error too_short() const { return bad_at(reader_.position(), "the file ends before its nodes"); }
   Status read_node(int depth, bool is_used, bool is_shown);
   Status read_matrix(std::string name, bool is_used, bool is_shown);
   Status put_columns(const Matrix& matrix, std::span<const std::byte> packed, std::size_t at);
@@ -344,13 +345,13 @@ Status QbclReader::read_node(int depth, bool is_used, bool is_shown) {
   is_shown &= reader_.u8() != 0;
   static_cast<void>(reader_.take(2));
   if (reader_.failed()) return too_short();
-  if (depth > kDeepest) return make_error(ErrorCode::LimitExceeded, "nodes within 64 others", {}, at);
+  if (depth > kDeepest) return make_error(ErrorCode::LimitExceeded, "nodes are nested more than 64 deep", {}, at);
   if (kind == Kind::Model) {
     static_cast<void>(reader_.take(36));
     return read_children(depth, is_used, is_shown);
   }
   // Nothing says how long a node is.
-  if (kind != Kind::Matrix && kind != Kind::Compound) return bad_at(at, "a node of an unknown kind");
+  if (kind != Kind::Matrix && kind != Kind::Compound) return bad_at(at, "unknown node kind");
   if (auto done = read_matrix(std::move(name), is_used, is_shown); !done) return done;
   return kind == Kind::Compound ? read_children(depth, false, is_shown) : Status();
 }
@@ -358,7 +359,7 @@ Status QbclReader::read_node(int depth, bool is_used, bool is_shown) {
 Status QbclReader::read_children(int depth, bool is_used, bool is_shown) {
   const std::size_t at = reader_.position();
   const std::size_t children = reader_.count(15);
-  if (reader_.failed()) return bad_at(at, "a node of more nodes than there is room for");
+  if (reader_.failed()) return bad_at(at, "a node claims more children than the file can hold");
   for (std::size_t i = 0; i < children; ++i) {
     if (auto done = read_node(depth + 1, is_used, is_shown); !done) return done;
   }
@@ -372,7 +373,7 @@ Status QbclReader::read_matrix(std::string name, bool is_used, bool is_shown) {
   const auto size = read_size(reader_);
   const auto place = read_place(reader_);
   if (reader_.failed()) return too_short();
-  if (!size || (!place && !is_empty(*size))) return bad_at(at, "a matrix whose size or place is out of range");
+  if (!size || (!place && !is_empty(*size))) return bad_at(at, "a matrix's size or position is out of range");
   std::array<float, 3> pivot{};
   for (float& part : pivot) part = reader_.f32();
   const std::size_t packed_at = reader_.position() + 4;
@@ -399,7 +400,7 @@ Status QbclReader::put_columns(const Matrix& matrix, std::span<const std::byte> 
     entries.resize(count);
     const auto got = stream.read(entries);
     if (!got) return make_error(got.error().code, got.error().message, {}, at + got.error().byte_offset.value_or(0));
-    return *got == count ? Status() : Status(bad_at(at, "a matrix of fewer voxels than its size says"));
+    return *got == count ? Status() : Status(bad_at(at, "a matrix has fewer voxels than its size requires"));
   };
   for (int x = 0; x < matrix.size.x; ++x) {
     for (int z = 0; z < matrix.size.z; ++z) {
@@ -416,7 +417,7 @@ Status QbclReader::put_columns(const Matrix& matrix, std::span<const std::byte> 
           entry = column.u32();
         }
         if (column.failed() || length > static_cast<std::uint32_t>(matrix.size.y) - y) {
-          return bad_at(at, "a column of more voxels than its matrix has");
+          return bad_at(at, "a column has more voxels than its matrix");
         }
         Rgba8 colour = colour_of(entry, false);
         if (colour.a != 0 && length > 0) {
@@ -466,13 +467,13 @@ Result<LoadedScene> read_qef(std::span<const std::byte> bytes) {
   constexpr std::uint32_t kMost = 1 << 20;
   const auto is_edge = [](int edge) { return edge > 0 && edge <= static_cast<int>(kMaxEdge); };
   if (!is_sound || !is_edge(size.x) || !is_edge(size.y) || !is_edge(size.z) || count > kMost) {
-    return bad_at(numbers.position(), "no size and number of colours within their ranges");
+    return bad_at(numbers.position(), "the size or the number of colours is out of range");
   }
   std::vector<Rgba8> colours;
   for (std::uint32_t i = 0; i < count; ++i) {
     std::array<float, 3> rgb{};
     for (float& channel : rgb) {
-      if (!numbers.next(channel)) return bad_at(numbers.position(), "a colour that is no number");
+      if (!numbers.next(channel)) return bad_at(numbers.position(), "a colour is not a number");
     }
     const auto byte = [](float channel) {
       return static_cast<std::uint8_t>(std::lround(std::clamp(channel, 0.0F, 1.0F) * 255.0F));
@@ -491,7 +492,7 @@ Result<LoadedScene> read_qef(std::span<const std::byte> bytes) {
     const bool is_read = numbers.next(voxel.x) && numbers.next(voxel.y) && numbers.next(voxel.z) &&
                          numbers.next(colour) && numbers.next(faces);
     if (!is_read || colour >= colours.size() || !IBox{IVec3(0), size}.contains(voxel)) {
-      return bad_at(place, "a voxel outside of its model, or of its colours");
+      return bad_at(place, "a voxel is outside the model, or its colour outside the palette");
     }
     if (auto put = builder.put(voxel, colours[colour]); !put) return put.error();
   }

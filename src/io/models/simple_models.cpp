@@ -51,17 +51,17 @@ Result<BinvoxHeader> parse_binvox_header(std::span<const std::byte> bytes) {
     std::array<double, 3> numbers{};
     if (key == "data") {
       header.data_at = end + 1;
-      if (header.size.x == 0) return bad_at(at, "no size before its data");
+      if (header.size.x == 0) return bad_at(at, "no dim line before the data");
       return header;
     }
     const std::size_t wanted = key == "dim" || key == "translate" ? 3 : key == "scale" ? 1 : 0;
     if (!parse_numbers(line.substr(space), std::span(numbers).first(wanted))) {
-      return bad_at(at, std::string("a line without its numbers: ").append(key));
+      return bad_at(at, std::string("missing numbers in the line ").append(key));
     }
     if (key == "dim") {
       for (int axis = 0; axis < 3; ++axis) {
         const double edge = numbers.at(static_cast<std::size_t>(axis));
-        if (!(edge >= 1.0 && edge <= kMaxEdge)) return bad_at(at, "a size out of range");
+        if (!(edge >= 1.0 && edge <= kMaxEdge)) return bad_at(at, "the size is out of range");
         header.size[axis] = static_cast<int>(edge);
       }
     }
@@ -69,7 +69,7 @@ Result<BinvoxHeader> parse_binvox_header(std::span<const std::byte> bytes) {
     if (key == "scale") header.scale = numbers[0];
     at = end + 1;
   }
-  return bad_at(text.size(), "it has no data");
+  return bad_at(text.size(), "the file has no data line");
 }
 
 }  // namespace
@@ -93,16 +93,16 @@ Result<LoadedScene> read_binvox(std::span<const std::byte> bytes) {
     model.position = header->translate;
     model.voxel_size = voxel_size;
   } else {
-    builder.warn("its place and size are out of range: a voxel is one unit");
+    builder.warn("translate or scale is out of range and ignored: a voxel is one unit");
   }
   model.canvas = {IVec3(0), size};
   builder.begin(std::move(model));
   std::uint64_t at = 0;
   for (std::size_t byte = header->data_at; at < volume; byte += 2) {
-    if (byte + 2 > bytes.size()) return bad_at(bytes.size(), "it ends before its voxels do");
+    if (byte + 2 > bytes.size()) return bad_at(bytes.size(), "the file ends before its voxels");
     const auto value = std::to_integer<unsigned>(bytes[byte]);
     std::uint64_t count = std::to_integer<unsigned>(bytes[byte + 1]);
-    if (count > volume - at) return bad_at(byte, "more voxels than its size has");
+    if (count > volume - at) return bad_at(byte, "more voxels than the size allows");
     while (count > 0) {
       const auto y = static_cast<int>(at % static_cast<std::uint64_t>(size.y));
       const std::uint64_t run = std::min(count, static_cast<std::uint64_t>(size.y - y));
@@ -132,7 +132,7 @@ bool is_cub(std::span<const std::byte> whole) {
 
 // x changes fastest, then the second ground axis, then the height: rotated so that up is +y.
 Result<LoadedScene> read_cub(std::span<const std::byte> bytes) {
-  if (!is_cub(bytes)) return bad_at(0, "its size does not fit its three sizes");
+  if (!is_cub(bytes)) return bad_at(0, "the file size does not match the model's three sizes");
   ByteReader reader(bytes);
   const auto width = static_cast<int>(reader.u32());
   const auto depth = static_cast<int>(reader.u32());

@@ -68,7 +68,7 @@ Result<LoadedScene> read_kv6(std::span<const std::byte> bytes) {
   ByteReader reader(bytes);
   static_cast<void>(reader.u32());
   const auto sizes = read_sizes(reader);
-  if (!sizes) return bad_at(4, "a size out of range");
+  if (!sizes) return bad_at(4, "the size is out of range");
   const float pivot_x = reader.f32();
   const float pivot_y = reader.f32();
   const float pivot_z = reader.f32();
@@ -76,7 +76,7 @@ Result<LoadedScene> read_kv6(std::span<const std::byte> bytes) {
   ByteReader voxel = reader;
   static_cast<void>(reader.take(voxels * 8));
   static_cast<void>(reader.take(std::size_t{4} * static_cast<std::size_t>(sizes->x)));  // voxels of each x
-  if (reader.failed()) return bad_at(bytes.size(), "it ends before its voxels do");
+  if (reader.failed()) return bad_at(bytes.size(), "the file ends before its voxels");
   ModelBuilder builder;
   builder.begin(model_of(*sizes, DVec3(pivot_x, pivot_y, pivot_z)));
   std::size_t read = 0;
@@ -84,22 +84,22 @@ Result<LoadedScene> read_kv6(std::span<const std::byte> bytes) {
     for (int y = 0; y < sizes->y; ++y) {
       const std::size_t at = reader.position();
       const std::size_t count = reader.u16();
-      if (reader.failed()) return bad_at(bytes.size(), "it ends before its columns do");
+      if (reader.failed()) return bad_at(bytes.size(), "the file ends before its columns");
       read += count;
-      if (read > voxels) return bad_at(at, "columns of more voxels than it has");
+      if (read > voxels) return bad_at(at, "the columns have more voxels than the file");
       for (std::size_t i = 0; i < count; ++i) {
         const std::size_t place = voxel.position();
         const Rgba8 colour = colour_of(voxel.take(4));
         const int z = voxel.u16();
         static_cast<void>(voxel.u16());  // faces that are seen, and a normal
-        if (z >= sizes->z) return bad_at(place, "a voxel below its model");
+        if (z >= sizes->z) return bad_at(place, "a voxel is below its model");
         if (auto put = builder.put(sizes->place(x, y, z), colour); !put) return put.error();
       }
     }
   }
   if (read != voxels)
     return bad_at(reader.position(),
-                  "columns of " + std::to_string(read) + " of its " + std::to_string(voxels) + " voxels");
+                  "the columns have " + std::to_string(read) + " of the file's " + std::to_string(voxels) + " voxels");
   return builder.take("voxlap");
 }
 
@@ -141,7 +141,7 @@ bool is_kvx(std::span<const std::byte> whole) {
 
 Result<LoadedScene> read_kvx(std::span<const std::byte> bytes) {
   const auto layout = kvx_layout(bytes);
-  if (!layout) return bad_at(0, "its tables do not fit its size");
+  if (!layout) return bad_at(0, "the column tables do not match the model's size");
   const Sizes& sizes = layout->sizes;
   const std::span<const std::byte> palette = bytes.last(kPaletteBytes);
   ModelBuilder builder;
@@ -157,7 +157,7 @@ Result<LoadedScene> read_kvx(std::span<const std::byte> bytes) {
       const std::size_t end = of_y.u16();
       const std::size_t from = layout->tables + first + std::exchange(begin, end);
       const std::size_t to = layout->tables + first + end;
-      if (from > to || to > layout->end) return bad_at(of_y.position() - 2, "a column outside of its model");
+      if (from > to || to > layout->end) return bad_at(of_y.position() - 2, "a column is outside the voxel data");
       ByteReader slab(bytes, from, to);
       while (slab.remaining() > 0) {
         const std::size_t at = slab.position();
@@ -165,7 +165,7 @@ Result<LoadedScene> read_kvx(std::span<const std::byte> bytes) {
         const int length = slab.u8();
         static_cast<void>(slab.u8());  // faces that are seen
         const auto indices = slab.take(static_cast<std::size_t>(length));
-        if (slab.failed() || top + length > sizes.z) return bad_at(at, "a slab that does not fit its column");
+        if (slab.failed() || top + length > sizes.z) return bad_at(at, "a slab extends past its column");
         for (int i = 0; i < length; ++i) {
           const auto index = std::to_integer<std::uint8_t>(indices[static_cast<std::size_t>(i)]);
           if (auto put = builder.put(sizes.place(x, y, top + i), colour_of(palette, index)); !put) return put.error();
@@ -186,7 +186,7 @@ bool is_slab6(std::span<const std::byte> whole) {
 }
 
 Result<LoadedScene> read_slab6(std::span<const std::byte> bytes) {
-  if (!is_slab6(bytes)) return bad_at(0, "its size does not fit its three sizes");
+  if (!is_slab6(bytes)) return bad_at(0, "the file size does not match the model's three sizes");
   constexpr std::uint8_t kEmpty = 255;
   ByteReader reader(bytes);
   const Sizes sizes = *read_sizes(reader);
@@ -309,7 +309,7 @@ Result<LoadedScene> read_vxl(std::span<const std::byte> bytes) {
         done = builder.put(sizes.place(x, y, z + count - 1), colour != nullptr ? colour_of(*colour) : kEarth, count);
       };
       if (!read_column(reader, sizes.z, take)) {
-        return bad_at(at, "column (" + std::to_string(x) + ", " + std::to_string(y) + ") does not fit its map");
+        return bad_at(at, "column (" + std::to_string(x) + ", " + std::to_string(y) + ") extends past the map");
       }
       if (!done) return done.error();
     }

@@ -69,18 +69,18 @@ class Losses {
   }
 
   std::vector<std::string> take() {
-    if (rounded != 0) lines.push_back("instances between voxels moved to the nearest: " + with_thousands(rounded));
+    if (rounded != 0) lines.push_back("instances rounded to whole voxels: " + with_thousands(rounded));
     add("hidden instances left out", hidden);
     add("instances without voxels left out", without_voxels);
-    add("instances without a place left out", without_place);
-    if (!holds_.several && placed_ > 1) add("instances became one model", placed_);
+    add("instances without a valid placement left out", without_place);
+    if (!holds_.several && placed_ > 1) add("instances merged into one model", placed_);
     if (!holds_.names) add("names left out", nameless);
     add("groups left out", static_cast<std::int64_t>(scene_.groups().size()));
     add("layers left out", static_cast<std::int64_t>(scene_.layers().size()));
     add("lamps left out", static_cast<std::int64_t>(scene_.lamps.size()));
     if (!holds_.type_names) add("voxels whose data is left out", states_);
     if (holds_.type_names && turned_states != 0) {
-      lines.push_back("voxels of turned instances whose states say the same directions as before: " +
+      lines.push_back("voxels of rotated instances whose states keep their unrotated directions: " +
                       with_thousands(turned_states));
     }
     count_types();
@@ -90,7 +90,7 @@ class Losses {
  private:
   void add(std::string_view what, std::int64_t count) {
     if (count == 0) return;
-    lines.push_back(std::string(what).append(", which ").append(holds_.extension).append(" does not hold: "));
+    lines.push_back(std::string(what).append(", not supported by ").append(holds_.extension).append(": "));
     lines.back().append(with_thousands(count));
   }
   void count_types() {
@@ -115,9 +115,9 @@ class Losses {
       add("colours left out", colours);
       return;
     }
-    if (!holds_.transparency) add("types that are no longer transparent", transparent);
+    if (!holds_.transparency) add("types made opaque", transparent);
     if (!holds_.materials) add("types whose roughness, metalness or light is left out", materials);
-    if (!holds_.type_names) add("types whose scattering, refraction or passage is left out", others);
+    if (!holds_.type_names) add("types whose scattering, refraction or collision is left out", others);
     if (!holds_.type_names) add("types whose names and attributes are left out", names);
   }
 
@@ -146,7 +146,7 @@ class Placer {
   [[nodiscard]] std::vector<std::string> warnings() {
     std::vector<std::string> lines = losses_.take();
     if (voxel_size_ != 1.0 && !holds_.place_in_units) {
-      lines.push_back("the size of voxels is left out, which " + std::string(holds_.extension) + " does not hold");
+      lines.push_back("voxel size left out, not supported by " + std::string(holds_.extension));
     }
     return lines;
   }
@@ -166,8 +166,8 @@ class Placer {
     }
     if (grid->field.chunk_count() != 0) {
       return make_error(ErrorCode::Unsupported, "the grid \"" + printable(grid->name) +
-                                                    "\" holds a field of densities, which " +
-                                                    std::string(holds_.extension) + " does not");
+                                                    "\" is a density field, which " + std::string(holds_.extension) +
+                                                    " cannot store");
     }
     const IBox box = grid->declared_box();
     if (box.empty()) {
@@ -178,8 +178,8 @@ class Placer {
     is_first_ = false;
     if (std::abs(instance.voxel_size - voxel_size_) > kRounding * voxel_size_) {
       return make_error(ErrorCode::Unsupported, text_of(instance, *grid) +
-                                                    " has voxels of another size than others, which " +
-                                                    std::string(holds_.extension) + " does not hold");
+                                                    " has a different voxel size than others, which " +
+                                                    std::string(holds_.extension) + " cannot store");
     }
     return turn(instance, *grid, box, visible);
   }
@@ -187,7 +187,8 @@ class Placer {
   Status turn(const Instance& instance, const SceneGrid& grid, const IBox& box, bool visible) {
     const auto orientation = orientation_of(instance);
     if (!orientation) {
-      return make_error(ErrorCode::Unsupported, text_of(instance, grid) + " is not turned by quarter turns, as " +
+      return make_error(ErrorCode::Unsupported, text_of(instance, grid) +
+                                                    " is not rotated by multiples of 90 degrees, as " +
                                                     std::string(holds_.extension) + " requires");
     }
     const DVec3 a = world_from_grid(instance, grid, DVec3(box.min)) / voxel_size_;
@@ -199,7 +200,7 @@ class Placer {
     const double reach = std::max({std::abs(nearest.x), std::abs(nearest.y), std::abs(nearest.z)}) +
                          static_cast<double>(std::max({size.x, size.y, size.z}));
     if (!(reach < kFarthest)) {
-      return make_error(ErrorCode::LimitExceeded, text_of(instance, grid) + " lies too far out");
+      return make_error(ErrorCode::LimitExceeded, text_of(instance, grid) + " is too far from the origin");
     }
     const DVec3 off = glm::abs(nearest - least);
     if (std::max({off.x, off.y, off.z}) > kNearestVoxel) ++losses_.rounded;
@@ -261,7 +262,7 @@ std::string cut_name(const std::string& name, std::size_t bytes, std::vector<std
   if (name.size() <= bytes) return name;
   std::size_t end = bytes;
   while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0U) == 0x80U) --end;
-  warnings.push_back("a name cut to " + std::to_string(end) + " bytes: \"" + printable(name) + "\"");
+  warnings.push_back("a name was cut to " + std::to_string(end) + " bytes: \"" + printable(name) + "\"");
   return name.substr(0, end);
 }
 

@@ -154,7 +154,7 @@ Result<std::vector<MeshFile>> plan_ply(const SceneMeshes& meshes, const std::fil
   if (counts.vertices > kMost || counts.faces > kMost) {
     return make_error(ErrorCode::LimitExceeded, "the meshes have " + std::to_string(counts.vertices) +
                                                     " vertices and " + std::to_string(counts.faces) +
-                                                    " triangles, and a PLY file holds 2147483647 of each");
+                                                    " triangles, more than the 2147483647 of each in a PLY file");
   }
   plan.header = header_of(counts, plan.occlusion, plan.origin);
   const std::size_t of_vertex = kVertexBytes + (plan.occlusion == OcclusionIn::Attribute ? sizeof(float) : 0);

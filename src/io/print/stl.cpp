@@ -69,8 +69,8 @@ Result<std::vector<MeshFile>> plan_stl(const SceneMeshes& meshes, const std::fil
     for (const MeshView& view : meshes.parts[placement->part].surfaces) triangles += view.indices.size() / 3;
   }
   if (triangles > 0xFFFF'FFFFU) {
-    return make_error(ErrorCode::LimitExceeded,
-                      "an STL file holds 4294967295 triangles, and the meshes have " + std::to_string(triangles));
+    return make_error(ErrorCode::LimitExceeded, "the meshes have " + std::to_string(triangles) +
+                                                    " triangles, more than the 4294967295 of an STL file");
   }
   return std::vector<MeshFile>{{path, kHeader + 4 + triangles * kRecord, [&meshes, triangles](BlockWriter& out) {
                                   write_content(meshes, static_cast<std::uint32_t>(triangles), out);

@@ -112,7 +112,7 @@ Result<std::vector<std::byte>> ZipFile::take() {
   const std::uint64_t directory = bytes_.size();
   for (const Entry& entry : entries_) {
     if (entry.size > kMost || directory > kMost)
-      return make_error(ErrorCode::LimitExceeded, "a zip file of 4 GiB or more");
+      return make_error(ErrorCode::LimitExceeded, "the zip file would have 4 GiB or more");
     put_number(bytes_, 0x0201'4B50, 4);
     put_number(bytes_, 20, 2);  // made by version 2.0
     put_number(bytes_, 20, 2);

@@ -66,8 +66,8 @@ std::string about(IVec3 chunk, std::string_view what) {
 // Adds a piece's chunks to their grid; returns a fault, or "".
 std::string put(std::vector<PlacedChunk> chunks, Grid& grid) {
   for (PlacedChunk& chunk : chunks) {
-    if (chunk.voxels.non_air_count() == 0) return about(chunk.place, "holds nothing");
-    if (grid.find_chunk(chunk.place) != nullptr) return about(chunk.place, "was given before");
+    if (chunk.voxels.non_air_count() == 0) return about(chunk.place, "is empty");
+    if (grid.find_chunk(chunk.place) != nullptr) return about(chunk.place, "is a duplicate");
     grid.put_chunk(chunk.place, std::move(chunk.voxels));
   }
   return "";
@@ -76,9 +76,9 @@ std::string put(std::vector<PlacedChunk> chunks, Grid& grid) {
 // The same of a field.
 std::string put(std::vector<PlacedDensities> chunks, DensityGrid& field) {
   for (PlacedDensities& chunk : chunks) {
-    if (field.find_chunk(chunk.place) != nullptr) return about(chunk.place, "was given before");
+    if (field.find_chunk(chunk.place) != nullptr) return about(chunk.place, "is a duplicate");
     field.put_chunk(chunk.place, std::move(chunk.samples));
-    if (field.find_chunk(chunk.place) == nullptr) return about(chunk.place, "holds nothing");
+    if (field.find_chunk(chunk.place) == nullptr) return about(chunk.place, "is empty");
   }
   return "";
 }
@@ -89,9 +89,9 @@ std::string put(const DataPiece& piece, Grid& grid, const VoxelRegistry& types) 
   for_each_data(piece, [&](IVec3 voxel, const VoxelData& data) {
     const VoxelType type = grid.get(voxel);
     if (type == kAir) {
-      fault = about(chunk_of(voxel), "has data where there is no voxel");
+      fault = about(chunk_of(voxel), "has data for an air voxel");
     } else if (!grid.data(voxel).empty()) {
-      fault = about(chunk_of(voxel), "has data twice at one voxel");
+      fault = about(chunk_of(voxel), "has data twice for one voxel");
     } else if (fault = fault_of_state(voxel, data, types[type]); fault.empty()) {
       grid.set_data(voxel, data);
     }
@@ -151,7 +151,7 @@ void read_voxels(const std::vector<Piece>& pieces, const VoxelRegistry& types, s
                  std::vector<SceneGrid>& grids, Threads threads, Faults& faults) {
   auto decoded = decode(pieces, grids, types.size(), max_voxel_bytes(file_bytes), threads);
   if (!decoded) {
-    faults.add({nullptr, "grids", std::nullopt}, "voxels would take far more memory than the file has bytes",
+    faults.add({nullptr, "grids", std::nullopt}, "the voxels need far more memory than the file has bytes",
                ErrorCode::LimitExceeded);
     return;
   }

@@ -39,7 +39,7 @@ Object::Object(const Json& json, const Place& place, std::initializer_list<std::
   }
   for (const auto& [key, value] : json.items()) {
     if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-      faults.add(place, excerpt(key) + " is not known here");
+      faults.add(place, excerpt(key) + " is unknown here");
     }
   }
 }
@@ -77,7 +77,7 @@ std::string Object::text(const Json& json, const Place& place) const {
     const auto bytes = from_base64(json["base64"].get_ref<const std::string&>());
     if (bytes) return {reinterpret_cast<const char*>(bytes->data()), bytes->size()};
   }
-  faults_.add(place, "must be a string, or {\"base64\": \"...\"} where it is not UTF-8");
+  faults_.add(place, "must be a string, or {\"base64\": \"...\"} if it is not UTF-8");
   return {};
 }
 
@@ -168,7 +168,8 @@ const Json* find_list(const Object& object, std::string_view key, std::size_t mo
     return nullptr;
   }
   if (list->size() <= most) return list;
-  object.faults().add(object.place_of(key), "more than " + std::to_string(most) + " entries", ErrorCode::LimitExceeded);
+  object.faults().add(object.place_of(key), "has more than " + std::to_string(most) + " entries",
+                      ErrorCode::LimitExceeded);
   return nullptr;
 }
 

@@ -153,7 +153,7 @@ TEST(SceneData, NamesDataThatVoxCannotHold) {
   const auto losses = losses_of_vox(scene);
   ASSERT_TRUE(losses);
   ASSERT_EQ(losses->size(), 1U);
-  EXPECT_EQ((*losses)[0], "voxels whose data is left out, which .vox does not hold (a .json keeps it): 1");
+  EXPECT_EQ((*losses)[0], "voxels whose data is left out, not supported by .vox (.json stores it): 1");
   const auto written = write_vox(scene);
   ASSERT_TRUE(written);
   const auto again = load_scene(written->bytes);
@@ -216,25 +216,26 @@ TEST(SceneData, RefusesInvalidDataWithItsPosition) {
   EXPECT_EQ(fault_of({{.voxels = {{.place = 1}}}}), "");
   EXPECT_EQ(fault_of({{.voxels = {{.place = 2}}}}),
             piece + "state 1 of voxel (2, 0, 0) has more than the 0 bits of its type");
-  EXPECT_EQ(fault_of({{.voxels = {{.place = 3}}}}), piece + "chunk (0, 0, 0) has data where there is no voxel");
+  EXPECT_EQ(fault_of({{.voxels = {{.place = 3}}}}), piece + "chunk (0, 0, 0) has data for an air voxel");
   EXPECT_EQ(fault_of({{.chunk = {7, 0, 0}, .voxels = {{.place = 1}}}}),
-            piece + "chunk (7, 0, 0) has data where there is no voxel");
+            piece + "chunk (7, 0, 0) has data for an air voxel");
   EXPECT_EQ(fault_of({{.voxels = {{.place = 1}}}, {.voxels = {{.place = 1}}}}),
-            piece + "chunk (0, 0, 0) has data twice at one voxel");
-  EXPECT_EQ(fault_of({{.voxels = {{.place = 262'144}}}}), at + "a voxel outside its chunk");
+            piece + "chunk (0, 0, 0) has data twice for one voxel");
+  EXPECT_EQ(fault_of({{.voxels = {{.place = 262'144}}}}), at + "a voxel is outside its chunk");
   EXPECT_EQ(fault_of({{.count = 2, .voxels = {{.place = 1}, {.place = 1}}}}),
-            piece + "byte 28 of the voxel data: a voxel that does not come after the one before");
-  EXPECT_EQ(fault_of({{.voxels = {{.place = 1, .state = 0}}}}), at + "a voxel that holds nothing");
+            piece + "byte 28 of the voxel data: voxels with data are not in ascending order");
+  EXPECT_EQ(fault_of({{.voxels = {{.place = 1, .state = 0}}}}), at + "a voxel has no data");
   EXPECT_EQ(fault_of({{.voxels = {{.place = 1, .length = 65'537, .bytes = 65'537}}}}),
-            piece + "byte 24 of the voxel data: 65537 bytes at one voxel");
+            piece + "byte 24 of the voxel data: invalid data length: 65537 bytes for one voxel");
   EXPECT_EQ(fault_of({{.voxels = {{.place = 1, .length = 9, .bytes = 8}}}}),
             piece + "byte 36 of the voxel data: cut off");
-  EXPECT_EQ(fault_of({{.count = 0, .voxels = {}}}), piece + "byte 12 of the voxel data: a chunk with data at 0 voxels");
+  EXPECT_EQ(fault_of({{.count = 0, .voxels = {}}}),
+            piece + "byte 12 of the voxel data: invalid number of voxels with data: 0");
   EXPECT_EQ(fault_of({{.count = 262'145, .voxels = {}}}),
-            piece + "byte 12 of the voxel data: a chunk with data at 262145 voxels");
+            piece + "byte 12 of the voxel data: invalid number of voxels with data: 262145");
   EXPECT_EQ(fault_of({{.count = 200'000, .voxels = {{.place = 1}}}}), piece + "byte 28 of the voxel data: cut off");
   EXPECT_EQ(fault_of({{.chunk = {1 << 30, 0, 0}, .voxels = {{.place = 1}}}}),
-            piece + "byte 0 of the voxel data: a chunk beyond where voxels end");
+            piece + "byte 0 of the voxel data: a chunk position is out of range");
   EXPECT_EQ(fault_of_bytes(std::vector<std::byte>(5)), piece + "byte 5 of the voxel data: cut off");
   EXPECT_EQ(fault_of_bytes(bytes_of({{.voxels = {{.place = 1}}}}), ", 5"), "grids[0].data[1]: must be a string");
 }

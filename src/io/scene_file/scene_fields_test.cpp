@@ -143,26 +143,25 @@ TEST(SceneFields, DamagedOnesAreRefusedWithTheirPlace) {
   EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0}), "none");
   EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0}, 1), at + "byte 21 of the voxel data: cut off");
   EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, beyond, 0}),
-            at + "byte 18 of the voxel data: a density beyond the band");
+            at + "byte 18 of the voxel data: a density is outside the band");
   EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, 0x7E00, 0}),
-            at + "byte 18 of the voxel data: a density beyond the band");
+            at + "byte 18 of the voxel data: a density is outside the band");
   for (const std::uint16_t none : {0x8000, 0x0001, 0x83FF}) {
     EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, none, 0}),
-              at + "byte 18 of the voxel data: a density that is -0, or nearer to 0 than 2^-14");
+              at + "byte 18 of the voxel data: a density is -0 or closer to 0 than 2^-14");
   }
   EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 1}),
-            at + "byte 18 of the voxel data: a density beyond the band");
+            at + "byte 18 of the voxel data: a density is outside the band");
   EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, 0xFFFF, 0xFFFF, beyond, 0}),
-            at + "byte 22 of the voxel data: a density beyond the band");
+            at + "byte 22 of the voxel data: a density is outside the band");
   EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, 0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF, 1}),
             at + "byte 28 of the voxel data: cut off");
   std::vector<std::uint16_t> differences = {1, 0, 2, 0, 3, 0, 1, 0, 1, 0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF};
   differences.resize(differences.size() + 1'024, 0x7F7F);
-  EXPECT_EQ(fault_of_densities(differences), at + "byte 26 of the voxel data: a density beyond the band");
-  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, half_from_float(8.0F), 0}),
-            at + "chunk (1, 2, 3) holds nothing");
+  EXPECT_EQ(fault_of_densities(differences), at + "byte 26 of the voxel data: a density is outside the band");
+  EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, half_from_float(8.0F), 0}), at + "chunk (1, 2, 3) is empty");
   EXPECT_EQ(fault_of_densities({1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0, 1, 0, 2, 0, 3, 0, 1, 0, 1, solid, 0}),
-            at + "chunk (1, 2, 3) was given before");
+            at + "chunk (1, 2, 3) is a duplicate");
   EXPECT_EQ(fault_of_grid(R"("band": 0, "densities": [])"), "grids[0].band: must be more than 0 and at most 65504");
   EXPECT_EQ(fault_of_grid(R"("band": 70000, "densities": [])"), "grids[0].band: must be more than 0 and at most 65504");
   EXPECT_EQ(fault_of_grid(R"("densities": [3])"), "grids[0].densities[0]: must be a string");

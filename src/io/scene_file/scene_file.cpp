@@ -164,7 +164,8 @@ Result<LoadedScene> load_source(const std::filesystem::path& path, const LoadOpt
     // These may name each other in a circle.
     if (!file->sources.empty()) {
       return make_error(ErrorCode::Unsupported,
-                        "a scene file that names others, within a scene file: save it whole first", path.string());
+                        "a scene file that references files cannot be referenced itself; save it as one file first",
+                        path.string());
     }
     return with_path(put_together(*file, {}, taken_over, threads, progress), path);
   }
@@ -323,7 +324,7 @@ Result<LoadedScene> read_scene_file(std::span<const std::byte> text, const LoadO
   auto file = parse_scene_file(text, threads);
   if (!file) return file.error();
   if (!file->sources.empty()) {
-    return make_error(ErrorCode::Unsupported, "a scene file that names others, which only a path finds");
+    return make_error(ErrorCode::Unsupported, "the scene file references other files; load it by path, not from bytes");
   }
   return put_together(*file, {}, options, threads, progress);
 }

@@ -43,13 +43,13 @@ class NameCheck {
   void check() {
     for (std::size_t i = 0; i < scene_.sources.size(); ++i) {
       if (!ids_.insert(scene_.sources[i].id).second) {
-        add("files", i, "id", excerpt(scene_.sources[i].id) + " was given before");
+        add("files", i, "id", excerpt(scene_.sources[i].id) + " is a duplicate");
       }
     }
     for (std::size_t i = 0; i < scene_.groups.size(); ++i) {
       const SceneFile::Group& group = scene_.groups[i];
       if (group.parent && *group.parent >= i) {
-        add("groups", i, "parent", "there is no group " + std::to_string(*group.parent) + " before it");
+        add("groups", i, "parent", "group " + std::to_string(*group.parent) + " does not come before it");
       }
       check_layer("groups", i, group.layer);
     }
@@ -59,17 +59,19 @@ class NameCheck {
  private:
   void check_placement(std::size_t i, const SceneFile::Placement& placement) {
     if (const auto& grid = placement.grid) {
-      if (*grid >= scene_.grids.size()) add("instances", i, "grid", "there is no grid " + std::to_string(*grid));
+      if (*grid >= scene_.grids.size())
+        add("instances", i, "grid", "grid " + std::to_string(*grid) + " does not exist");
     } else if (!ids_.contains(placement.source)) {
       add("instances", i, "file", "no file has the id " + excerpt(placement.source));
     }
     if (placement.group && *placement.group >= scene_.groups.size()) {
-      add("instances", i, "group", "there is no group " + std::to_string(*placement.group));
+      add("instances", i, "group", "group " + std::to_string(*placement.group) + " does not exist");
     }
     check_layer("instances", i, placement.layer);
   }
   void check_layer(std::string_view list, std::size_t i, const std::optional<std::size_t>& layer) {
-    if (layer && *layer >= scene_.layers.size()) add(list, i, "layer", "there is no layer " + std::to_string(*layer));
+    if (layer && *layer >= scene_.layers.size())
+      add(list, i, "layer", "layer " + std::to_string(*layer) + " does not exist");
   }
   void add(std::string_view list, std::size_t i, std::string_view key, const std::string& what) {
     const Place whole{nullptr, list, std::nullopt};
@@ -89,9 +91,9 @@ void read_file_object(const Json& json, std::size_t file_bytes, Threads threads,
       faults);
   const Json* version = file.need("quoin_scene");
   if (version != nullptr && !version->is_number_unsigned())
-    faults.add(file.place_of("quoin_scene"), "must be a version, a whole number");
+    faults.add(file.place_of("quoin_scene"), "must be the version, a whole number");
   if (version != nullptr && version->is_number_unsigned() && (*version < 1 || *version > kVersion)) {
-    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not known; 1 to 5 are",
+    faults.add(file.place_of("quoin_scene"), "version " + version->dump() + " is not supported (1 to 5 are)",
                ErrorCode::Unsupported);
   }
   scene.types = read_types(file);
@@ -156,12 +158,12 @@ Outside outside_strings(std::string_view text) {
 
 Result<SceneFile> parse_scene_file(std::span<const std::byte> text, Threads threads) {
   if (text.size() > kMaxSceneFileBytes) {
-    return make_error(ErrorCode::LimitExceeded, "a scene file of more than 2 GiB");
+    return make_error(ErrorCode::LimitExceeded, "the scene file has more than 2 GiB");
   }
   const std::string_view chars(reinterpret_cast<const char*>(text.data()), text.size());
   const Outside outside = outside_strings(chars);
   if (outside.bytes > kMaxBytes) {
-    return make_error(ErrorCode::LimitExceeded, "a scene file of more than 64 MiB, not counting what is in strings");
+    return make_error(ErrorCode::LimitExceeded, "the scene file has more than 64 MiB outside its strings");
   }
   if (outside.deepest > kMaxDepth) {
     return make_error(ErrorCode::LimitExceeded, "nested more than " + std::to_string(kMaxDepth) + " levels deep");
@@ -173,7 +175,7 @@ Result<SceneFile> parse_scene_file(std::span<const std::byte> text, Threads thre
   } catch (const Json::parse_error& error) {
     return make_error(ErrorCode::BadFormat, "not valid JSON", {}, error.byte == 0 ? 0 : error.byte - 1);
   } catch (const Json::exception&) {
-    return make_error(ErrorCode::BadFormat, "a number too large for any computer");
+    return make_error(ErrorCode::BadFormat, "a number is out of range");
   }
   if (faults.error()) return *faults.error();
   return scene;

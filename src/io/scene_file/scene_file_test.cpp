@@ -195,7 +195,7 @@ TEST(SceneFile, NamesThePlaceOfWhatIsWrong) {
   EXPECT_EQ(fault_of(file_with(R"({"file": "a", "rotation": [0, 0, 0, 0]})")),
             "instances[0].rotation: must not be all 0");
   EXPECT_EQ(fault_of(file_with(R"({"file": "a"}, {"file": "b"})")), "instances[1].file: no file has the id \"b\"");
-  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "colour": 3})")), "instances[0]: \"colour\" is not known here");
+  EXPECT_EQ(fault_of(file_with(R"({"file": "a", "colour": 3})")), "instances[0]: \"colour\" is unknown here");
   EXPECT_EQ(fault_of(file_with(R"({"position": [1, 2, 3]})")), "instances[0]: \"file\" is missing");
   EXPECT_EQ(fault_of(file_with(R"({"file": "a", "scale": 0})")), "instances[0].scale: must be more than 0");
   EXPECT_EQ(fault_of(file_with(R"({"file": "a", "position": [1, "2", 3]})")),
@@ -207,26 +207,25 @@ TEST(SceneFile, NamesThePlaceOfWhatIsWrong) {
   EXPECT_EQ(fault_of(file_with(R"({"file": "a", "visible": 1})")), "instances[0].visible: must be true or false");
   EXPECT_EQ(fault_of(file_with("7")), "instances[0]: must be an object");
   EXPECT_EQ(fault_of(R"({"quoin_scene": 6, "files": [], "instances": []})"),
-            "quoin_scene: version 6 is not known; 1 to 5 are");
+            "quoin_scene: version 6 is not supported (1 to 5 are)");
   EXPECT_EQ(fault_of(R"({"quoin_scene": 0, "files": [], "instances": []})"),
-            "quoin_scene: version 0 is not known; 1 to 5 are");
+            "quoin_scene: version 0 is not supported (1 to 5 are)");
   EXPECT_EQ(fault_of(R"({"quoin_scene": 1, "files": []})"), "\"instances\" is missing");
   const auto hierarchy = [](const std::string& lists, const std::string& instance) {
     return R"({"quoin_scene": 4, "files": [{"id": "a", "path": "x"}], )" + lists + R"("instances": [{"file": "a")" +
            instance + "}]}";
   };
   EXPECT_EQ(fault_of(hierarchy(R"("groups": [{"parent": 0}], )", "")),
-            "groups[0].parent: there is no group 0 before it");
+            "groups[0].parent: group 0 does not come before it");
   EXPECT_EQ(fault_of(hierarchy(R"("groups": [{"layer": 1}], "layers": [{}], )", "")),
-            "groups[0].layer: there is no layer 1");
-  EXPECT_EQ(fault_of(hierarchy("", R"(, "group": 0)")), "instances[0].group: there is no group 0");
-  EXPECT_EQ(fault_of(hierarchy("", R"(, "layer": -1)")),
-            "instances[0].layer: must be a place in the list of layers, from 0");
+            "groups[0].layer: layer 1 does not exist");
+  EXPECT_EQ(fault_of(hierarchy("", R"(, "group": 0)")), "instances[0].group: group 0 does not exist");
+  EXPECT_EQ(fault_of(hierarchy("", R"(, "layer": -1)")), "instances[0].layer: must be an index into layers, from 0");
   EXPECT_EQ(fault_of(R"({"quoin_scene": 1, "files": [{"id": "a", "path": ""}], "instances": []})"),
             "files[0].path: must name a file");
   EXPECT_EQ(
       fault_of(R"({"quoin_scene": 1, "files": [{"id": "a", "path": "x"}, {"id": "a", "path": "y"}], "instances": []})"),
-      "files[1].id: \"a\" was given before");
+      "files[1].id: \"a\" is a duplicate");
 }
 
 TEST(SceneFile, RefusesWhatWouldHurt) {
@@ -359,7 +358,7 @@ TEST_F(SceneFiles, SayWhichFileIsWrong) {
   EXPECT_EQ(with_path("red.vox"), "none");
   EXPECT_NE(with_path("absent.vox").find("absent.vox"), std::string::npos);
   // The file refers to itself.
-  EXPECT_NE(with_path("scene.json").find("a scene file that names others, within a scene file"), std::string::npos);
+  EXPECT_NE(with_path("scene.json").find("a scene file that references files cannot be referenced"), std::string::npos);
   std::ofstream(folder_ / "noise.vox") << "not voxels";
   EXPECT_NE(with_path("noise.vox").find("noise.vox"), std::string::npos);
 }

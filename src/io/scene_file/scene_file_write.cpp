@@ -247,7 +247,8 @@ Result<SceneFile> scene_file_of(const Scene& scene) {
     const Instance& instance = scene.instances()[handle];
     const std::optional<std::size_t> grid = place_of(places.grids, instance.grid);
     if (!grid) {
-      return make_error(ErrorCode::InvalidArgument, "the grid of instance \"" + instance.name + "\" is not there");
+      return make_error(ErrorCode::InvalidArgument,
+                        "instance \"" + instance.name + "\" refers to a grid that does not exist");
     }
     file.placements.push_back({.source = {},
                                .grid = grid,
@@ -279,7 +280,7 @@ Result<std::vector<std::byte>> write_scene_file(const SceneFile& scene, Threads 
   if (!text) return text.error();
   const auto bytes = std::as_bytes(std::span(*text));
   if (bytes.size() > kMaxSceneFileBytes) {
-    return make_error(ErrorCode::LimitExceeded, "a scene file of more than 2 GiB");
+    return make_error(ErrorCode::LimitExceeded, "the scene file would have more than 2 GiB");
   }
   return std::vector<std::byte>(bytes.begin(), bytes.end());
 }

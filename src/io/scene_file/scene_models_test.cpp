@@ -313,7 +313,7 @@ TEST(SceneModels, StandBesideFilesOfModels) {
   ASSERT_TRUE(bytes);
   const auto alone = load_scene(*bytes);
   ASSERT_FALSE(alone);
-  EXPECT_EQ(alone.error().message, "a scene file that names others, which only a path finds");
+  EXPECT_EQ(alone.error().message, "the scene file references other files; load it by path, not from bytes");
 }
 
 TEST(SceneModels, RefusesScenesThatNoFileCanHold) {
@@ -336,7 +336,7 @@ TEST(SceneModels, RefusesScenesThatNoFileCanHold) {
   EXPECT_EQ(fault([](Scene&, Instance& i) { i.position.y = NAN; }), "instances[0].position[1]: must be a number");
   EXPECT_EQ(fault([](Scene&, Instance& i) { i.rotation.w = INFINITY; }), "instances[0].rotation[3]: must be a number");
   EXPECT_EQ(fault([](Scene&, Instance& i) { i.voxel_size = 0; }), "instances[0].scale: must be more than 0");
-  EXPECT_EQ(fault([](Scene&, Instance& i) { i.grid = {}; }), "the grid of instance \"ship\" is not there");
+  EXPECT_EQ(fault([](Scene&, Instance& i) { i.grid = {}; }), "instance \"ship\" refers to a grid that does not exist");
   EXPECT_EQ(fault([](Scene& s, Instance& i) {
               s.edit(i.grid).grid.set({1, 0, 0}, 7);
             }),
@@ -370,16 +370,17 @@ TEST(SceneModels, DamagedVoxelsAreRefusedWithTheirPlace) {
   EXPECT_EQ(fault_of_piece({}), "none");
   EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1}, 1), at + "byte 17 of the voxel data: cut off");
   EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3}), at + "byte 10 of the voxel data: cut off");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 2}), at + "byte 16 of the voxel data: type 2, and the file has 1");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 0, 0}), at + "byte 12 of the voxel data: a chunk of 0 types");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 1}), at + "byte 12 of the voxel data: a chunk of 65537 types");
+  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 2}),
+            at + "byte 16 of the voxel data: type 2 is beyond the file's 1");
+  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 0, 0}), at + "byte 12 of the voxel data: invalid palette size 0");
+  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 1}), at + "byte 12 of the voxel data: invalid palette size 65537");
   EXPECT_EQ(fault_of_piece({0xFFFF, 0x7FFF, 2, 0, 3, 0, 1, 0, 1}),
-            at + "byte 0 of the voxel data: a chunk beyond where voxels end");
-  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 0}), at + "chunk (1, 2, 3) holds nothing");
+            at + "byte 0 of the voxel data: a chunk position is out of range");
+  EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 0}), at + "chunk (1, 2, 3) is empty");
   EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 1, 0, 1, 1, 0, 2, 0, 3, 0, 1, 0, 1}),
-            at + "chunk (1, 2, 3) was given before");
+            at + "chunk (1, 2, 3) is a duplicate");
   EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 2, 0, 0, 1, 2, 0}),
-            at + "byte 20 of the voxel data: index 2 of a palette of 2");
+            at + "byte 20 of the voxel data: index 2 is beyond the palette of 2");
   EXPECT_EQ(fault_of_piece({1, 0, 2, 0, 3, 0, 2, 0, 0, 1, 0xFFFF, 0xFFFF, 1, 2, 3}),
             at + "byte 30 of the voxel data: cut off");
 }
@@ -399,22 +400,22 @@ TEST(SceneModels, DamagedTextIsRefusedWithItsPlace) {
   const std::string at = "grids[0].voxels[0]: ";
   EXPECT_EQ(fault_of_scene(file_with_voxels("")), "none");
   EXPECT_EQ(fault_of_scene(file_with_voxels("7")), at + "must be a string");
-  EXPECT_EQ(fault_of_scene(file_with_voxels("\"A*==\"")), at + "character 1: no base64 character");
-  EXPECT_EQ(fault_of_scene(file_with_voxels("\"\"")), at + "no gzip stream");
-  EXPECT_EQ(fault_of_scene(file_with_voxels("\"AAAA\"")), at + "no gzip stream");
+  EXPECT_EQ(fault_of_scene(file_with_voxels("\"A*==\"")), at + "character 1: not a base64 character");
+  EXPECT_EQ(fault_of_scene(file_with_voxels("\"\"")), at + "not a gzip stream");
+  EXPECT_EQ(fault_of_scene(file_with_voxels("\"AAAA\"")), at + "not a gzip stream");
   std::vector<std::byte> piece = gzipped(std::vector<std::byte>(100), 9);
   const auto fault = [&] { return fault_of_scene(file_with_voxels("\"" + to_base64(piece) + "\"")); };
   piece.push_back({});
-  EXPECT_EQ(fault(), at + "something follows the compressed data");
+  EXPECT_EQ(fault(), at + "bytes follow the compressed data");
   piece.resize(piece.size() - 3);
-  EXPECT_NE(fault().find("the compressed data are cut off"), std::string::npos) << fault();
+  EXPECT_NE(fault().find("the compressed data is cut off"), std::string::npos) << fault();
   piece[12] ^= std::byte{0xFF};
   EXPECT_NE(fault().find(at + "byte "), std::string::npos) << fault();
-  EXPECT_NE(fault().find("the compressed data are damaged"), std::string::npos) << fault();
+  EXPECT_NE(fault().find("the compressed data is damaged"), std::string::npos) << fault();
   EXPECT_EQ(fault_of_scene(R"({"quoin_scene": 2, "grids": [], "instances": [{"grid": 0}]})"),
-            "instances[0].grid: there is no grid 0");
+            "instances[0].grid: grid 0 does not exist");
   EXPECT_EQ(fault_of_scene(R"({"quoin_scene": 2, "grids": [], "instances": [{"grid": -1}]})"),
-            "instances[0].grid: must be a place in the list of grids, from 0");
+            "instances[0].grid: must be an index into grids, from 0");
   EXPECT_EQ(
       fault_of_scene(R"({"quoin_scene": 2, "types": [{"colour": [1, 2, 3, 256]}], "grids": [], "instances": []})"),
       "types[0].colour: must be whole numbers from 0 to 255");
@@ -426,7 +427,7 @@ TEST(SceneModels, DamagedTextIsRefusedWithItsPlace) {
             "types[0].ior: is too large");
   EXPECT_EQ(
       fault_of_scene(R"({"quoin_scene": 2, "grids": [{"name": {"base64": "*"}, "voxels": []}], "instances": []})"),
-      "grids[0].name: must be a string, or {\"base64\": \"...\"} where it is not UTF-8");
+      "grids[0].name: must be a string, or {\"base64\": \"...\"} if it is not UTF-8");
 }
 
 // Deflate can expand data to about a thousand times its size.
@@ -443,7 +444,7 @@ TEST(SceneModels, BombsAreRefusedBeforeTheyExpand) {
     chunks.push_back(std::byte{0});
   }
   EXPECT_EQ(fault_of_scene(file_with_voxels("\"" + to_base64(gzipped(chunks, 9)) + "\"")),
-            "grids: voxels would take far more memory than the file has bytes");
+            "grids: the voxels need far more memory than the file has bytes");
 }
 
 }  // namespace

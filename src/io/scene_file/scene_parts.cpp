@@ -64,7 +64,7 @@ std::optional<std::size_t> place_in(const Object& object, std::string_view key, 
   const Json* json = object.find(key);
   if (json == nullptr) return std::nullopt;
   if (json->is_number_unsigned()) return json->get<std::size_t>();
-  object.faults().add(object.place_of(key), "must be a place in the list of " + std::string(list) + ", from 0");
+  object.faults().add(object.place_of(key), "must be an index into " + std::string(list) + ", from 0");
   return 0;
 }
 
@@ -119,7 +119,7 @@ void read_attributes(const Object& object, std::map<std::string, std::string>& a
     }
     std::string key = object.text(pair[0], {&place, {}, 0});
     const bool is_new = attributes.emplace(std::move(key), object.text(pair[1], {&place, {}, 1})).second;
-    if (!is_new) object.faults().add(place, "this key was given before");
+    if (!is_new) object.faults().add(place, "is a duplicate key");
   });
 }
 

@@ -204,7 +204,7 @@ class PieceReader {
     chunk.place = *place;
     const auto count = take<std::uint32_t>();
     if (count == 0 || count > kMaxTypesOfChunk) {
-      return fault("a chunk of " + std::to_string(count) + " types", at_ - sizeof(count));
+      return fault("invalid palette size " + std::to_string(count), at_ - sizeof(count));
     }
     if (auto read = read_palette(count); !read) return read.error();
     if (count == 1) {
@@ -227,7 +227,7 @@ class PieceReader {
     if (!place) return place.error();
     const auto count = take<std::uint32_t>();
     if (count == 0 || count > kChunkVoxels) {
-      return fault("a chunk with data at " + std::to_string(count) + " voxels", at_ - sizeof(count));
+      return fault("invalid number of voxels with data: " + std::to_string(count), at_ - sizeof(count));
     }
     std::uint32_t next = 0;
     for (std::uint32_t i = 0; i < count; ++i) {
@@ -236,12 +236,12 @@ class PieceReader {
       const auto state = take<std::uint32_t>();
       const auto length = take<std::uint32_t>();
       const std::size_t begin = at_ - kPlacedDataBytes;
-      if (voxel >= kChunkVoxels) return fault("a voxel outside its chunk", begin);
-      if (voxel < next) return fault("a voxel that does not come after the one before", begin);
+      if (voxel >= kChunkVoxels) return fault("a voxel is outside its chunk", begin);
+      if (voxel < next) return fault("voxels with data are not in ascending order", begin);
       next = voxel + 1;
       if (length > kMaxVoxelDataBytes)
-        return fault(std::to_string(length) + " bytes at one voxel", at_ - sizeof(length));
-      if (state == 0 && length == 0) return fault("a voxel that holds nothing", begin);
+        return fault("invalid data length: " + std::to_string(length) + " bytes for one voxel", at_ - sizeof(length));
+      if (state == 0 && length == 0) return fault("a voxel has no data", begin);
       if (!has(length)) return cut_off();
       visit(voxel, VoxelData{state, bytes_.subspan(at_, length)});
       at_ += length;
@@ -298,7 +298,7 @@ class PieceReader {
     IVec3 place{0};
     for (int axis = 0; axis < 3; ++axis) place[axis] = take<std::int32_t>();
     for (int axis = 0; axis < 3; ++axis) {
-      if (place[axis] < kMinPlace || place[axis] > kMaxPlace) return fault("a chunk beyond where voxels end", begin);
+      if (place[axis] < kMinPlace || place[axis] > kMaxPlace) return fault("a chunk position is out of range", begin);
     }
     return place;
   }
@@ -309,7 +309,7 @@ class PieceReader {
     for (VoxelType& type : palette_) {
       type = take<VoxelType>();
       if (type >= type_count_) {
-        return fault("type " + std::to_string(type) + ", and the file has " + std::to_string(type_count_ - 1),
+        return fault("type " + std::to_string(type) + " is beyond the file's " + std::to_string(type_count_ - 1),
                      at_ - sizeof(type));
       }
     }
@@ -351,7 +351,7 @@ class PieceReader {
   }
   [[nodiscard]] Error wrong_density(std::uint32_t half, std::size_t at) const {
     const bool is_near_0 = half <= 0xFFFF && std::abs(float_from_half(static_cast<Half>(half))) <= band_;
-    return fault(is_near_0 ? "a density that is -0, or nearer to 0 than 2^-14" : "a density beyond the band", at);
+    return fault(is_near_0 ? "a density is -0 or closer to 0 than 2^-14" : "a density is outside the band", at);
   }
 
   Status read_slab_of_densities(int slab) {
@@ -381,7 +381,7 @@ class PieceReader {
   }
 
   [[nodiscard]] Error wrong_index(std::uint32_t index, std::size_t at) const {
-    return fault("index " + std::to_string(index) + " of a palette of " + std::to_string(palette_.size()), at);
+    return fault("index " + std::to_string(index) + " is beyond the palette of " + std::to_string(palette_.size()), at);
   }
 
   std::span<const std::byte> bytes_;
@@ -401,7 +401,7 @@ Error placed(const Error& error, const std::string& unit, const std::string& of)
 Result<std::vector<std::byte>> expanded(std::string_view piece) {
   const auto compressed = from_base64(piece);
   if (!compressed) return placed(compressed.error(), "character", "");
-  if (!begins_gzip(*compressed)) return make_error(ErrorCode::BadFormat, "no gzip stream");
+  if (!begins_gzip(*compressed)) return make_error(ErrorCode::BadFormat, "not a gzip stream");
   ByteStream stream(*compressed, 0, Compression::Gzip);
   constexpr std::size_t kStep = std::size_t{1} << 16;
   std::vector<std::byte> bytes;
@@ -414,7 +414,7 @@ Result<std::vector<std::byte>> expanded(std::string_view piece) {
     if (*count == 0) break;
   }
   if (bytes.size() > kMaxPieceBytes) return make_error(ErrorCode::LimitExceeded, "expands to more than 32 MiB");
-  if (stream.remaining() > 0) return make_error(ErrorCode::BadFormat, "something follows the compressed data");
+  if (stream.remaining() > 0) return make_error(ErrorCode::BadFormat, "bytes follow the compressed data");
   return bytes;
 }
 

@@ -95,7 +95,7 @@ Result<std::optional<Chunk>> ChunkSource::read(IVec3 chunk, std::vector<Error>* 
     try {
       return read_part(*part);
     } catch (const std::bad_alloc&) {
-      return make_error(ErrorCode::LimitExceeded, "there is not enough memory to read it");
+      return make_error(ErrorCode::LimitExceeded, "not enough memory");
     }
   }();
   lock.lock();

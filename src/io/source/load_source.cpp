@@ -33,11 +33,11 @@ void warn_of_outside(const ChunkSource& source, const IBox& chunks, std::size_t 
   if (read == all) return;
   const auto& spawn = source.info().spawn;
   const bool is_at_spawn = spawn && is_over(chunks, chunk_of(voxel_of(*spawn)));
-  const std::string why = spawn ? "there are no chunks around its spawn" : "it has no spawn";
-  const std::string where = is_at_spawn ? "only the surroundings of its spawn are read: "
+  const std::string why = spawn ? "the spawn has no chunks around it" : "the world has no spawn";
+  const std::string where = is_at_spawn ? "only chunks around the spawn are read: "
                                         : why + "; only the chunks around (" + text_of(chunks) + ") are read: ";
   warnings.push_back(where + std::to_string(read) + " of " + std::to_string(all) +
-                     " parts of the world (converted to .quoin it is all there)");
+                     " parts of the world (convert it to .quoin for all)");
 }
 
 void add_lines(const std::vector<Error>& broken, std::vector<std::string>& warnings) {
@@ -83,7 +83,7 @@ std::string text_of_invisible(const std::map<std::string, std::uint64_t>& invisi
   for (const auto& [name, count] : invisible) {
     names += (names.empty() ? "" : ", ") + with_thousands(static_cast<std::int64_t>(count)) + " " + name;
   }
-  return names.empty() ? names : "left out, since they cannot be seen: " + names;
+  return names.empty() ? names : "left out, since they are invisible: " + names;
 }
 
 Result<LoadedScene> load_source(const ChunkSource& source, const IBox& chunks, Threads threads,

@@ -131,10 +131,10 @@ class Accessor {
   /// Opens an accessor. Errors: BadFormat if it extends past the end of its buffer.
   static Result<Accessor> open(const tinygltf::Model& model, int index, int components) {
     const tinygltf::Accessor* const of = entry(model.accessors, index);
-    if (of == nullptr) return make_error(ErrorCode::BadFormat, "an accessor that is not there");
+    if (of == nullptr) return make_error(ErrorCode::BadFormat, "an accessor does not exist");
     Accessor made;
     made.components_ = tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(of->type));
-    if (made.components_ < components) return make_error(ErrorCode::BadFormat, "an accessor of another type");
+    if (made.components_ < components) return make_error(ErrorCode::BadFormat, "an accessor has the wrong type");
     made.is_normalized_ = of->normalized;
     made.count_ = of->count;
     const std::size_t size = made.count_ * static_cast<std::size_t>(made.components_);
@@ -180,10 +180,10 @@ class Accessor {
                 std::size_t count) {
       const tinygltf::BufferView* const of = entry(model.bufferViews, view);
       const tinygltf::Buffer* const buffer = of != nullptr ? entry(model.buffers, of->buffer) : nullptr;
-      if (buffer == nullptr) return make_error(ErrorCode::BadFormat, "a buffer view that is not there");
+      if (buffer == nullptr) return make_error(ErrorCode::BadFormat, "a buffer view does not exist");
       type_ = type;
       const int size = tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(type));
-      if (size <= 0) return make_error(ErrorCode::BadFormat, "numbers of an unknown type");
+      if (size <= 0) return make_error(ErrorCode::BadFormat, "unknown component type");
       component_ = static_cast<std::size_t>(size);
       const std::size_t element = component_ * static_cast<std::size_t>(components);
       stride_ = of->byteStride != 0 ? of->byteStride : element;
@@ -192,7 +192,7 @@ class Accessor {
                         offset <= of->byteLength && stride_ >= element && stride_ <= 65'536 &&
                         (count == 0 || (element <= of->byteLength - offset &&
                                         (count - 1) <= (of->byteLength - offset - element) / stride_));
-      if (!fits) return make_error(ErrorCode::BadFormat, "it ends beyond its buffer");
+      if (!fits) return make_error(ErrorCode::BadFormat, "it extends past its buffer");
       data_ = buffer->data.data() + of->byteOffset + offset;
       return {};
     }
@@ -236,7 +236,7 @@ class Accessor {
   Status open_sparse(const tinygltf::Model& model, const tinygltf::Accessor& of) {
     const auto& sparse = of.sparse;
     if (sparse.count < 0 || static_cast<std::size_t>(sparse.count) > count_) {
-      return make_error(ErrorCode::BadFormat, "an accessor with more exceptions than elements");
+      return make_error(ErrorCode::BadFormat, "a sparse accessor replaces more elements than it has");
     }
     const auto count = static_cast<std::size_t>(sparse.count);
     View places;
@@ -248,7 +248,7 @@ class Accessor {
     }
     for (std::size_t i = 0; i < count; ++i) replaced_.push_back(static_cast<std::size_t>(places.at(i, 0, false)));
     if (!std::is_sorted(replaced_.begin(), replaced_.end())) {
-      return make_error(ErrorCode::BadFormat, "an accessor whose exceptions are not in order");
+      return make_error(ErrorCode::BadFormat, "the indices of a sparse accessor are not in ascending order");
     }
     return values_.open(model, sparse.values.bufferView, offset(sparse.values.byteOffset), of.componentType,
                         components_, count);
@@ -332,7 +332,7 @@ class GltfReader {
       if (name == "KHR_draco_mesh_compression") continue;  // decode_draco refuses it without Draco
       const bool is_look = name.starts_with("KHR_materials_");
       if (is_look || std::find(std::begin(kKnown), std::end(kKnown), name) != std::end(kKnown)) continue;
-      return make_error(ErrorCode::Unsupported, "glTF that requires " + name);
+      return make_error(ErrorCode::Unsupported, "unsupported required glTF extension " + name);
     }
     return {};
   }
@@ -457,7 +457,7 @@ class GltfReader {
     }
     const tinygltf::Texture* const texture = entry(model_.textures, index);
     if (texture == nullptr) {
-      loaded_.warnings.push_back("left out texture " + std::to_string(index) + ", which is not there");
+      loaded_.warnings.push_back("left out texture " + std::to_string(index) + ": it does not exist");
       return std::nullopt;
     }
     const auto at = static_cast<std::size_t>(index);
@@ -474,7 +474,7 @@ class GltfReader {
     const std::span<const std::byte> picture =
         image == nullptr ? std::span<const std::byte>() : picture_of(*image, static_cast<std::size_t>(source));
     if (picture.empty()) {
-      loaded_.warnings.push_back("left out the texture " + name + ": its picture is not there");
+      loaded_.warnings.push_back("left out the texture " + name + ": its image does not exist");
       return std::nullopt;
     }
     known_textures_[at] = add_texture(picture, name, loaded_);
@@ -529,7 +529,8 @@ class GltfReader {
       const Waiting at = waiting.back();
       waiting.pop_back();
       const tinygltf::Node* const node = entry(model_.nodes, at.node);
-      if (node == nullptr) return make_error(ErrorCode::BadFormat, "node " + std::to_string(at.node) + " is not there");
+      if (node == nullptr)
+        return make_error(ErrorCode::BadFormat, "node " + std::to_string(at.node) + " does not exist");
       // A node has one parent: a second visit is a cycle or a duplicate.
       if (seen_[static_cast<std::size_t>(at.node)]) {
         return make_error(ErrorCode::BadFormat, "node " + std::to_string(at.node) + " has several parents");
@@ -548,7 +549,7 @@ class GltfReader {
   }
   Status take_mesh(int index, const glm::dmat4& world_from_mesh) {
     const tinygltf::Mesh* const mesh = entry(model_.meshes, index);
-    if (mesh == nullptr) return make_error(ErrorCode::BadFormat, "mesh " + std::to_string(index) + " is not there");
+    if (mesh == nullptr) return make_error(ErrorCode::BadFormat, "mesh " + std::to_string(index) + " does not exist");
     for (const tinygltf::Primitive& primitive : mesh->primitives) {
       if (Status done = take_primitive(primitive, world_from_mesh); !done) {
         return make_error(done.error().code, "mesh " + std::to_string(index) + ": " + done.error().message);
@@ -627,7 +628,7 @@ class GltfReader {
     auto opened = Accessor::open(model_, place, 2);
     if (!opened) return opened.error();
     if (opened->count() < vertices) {
-      return make_error(ErrorCode::BadFormat, "fewer places in the texture than vertices");
+      return make_error(ErrorCode::BadFormat, "fewer texture coordinates than vertices");
     }
     return std::optional(std::move(*opened));
   }
@@ -691,9 +692,8 @@ class GltfReader {
     if (!has_textures_) loaded_.mesh.texture_places.clear();
     if (!has_glows_) loaded_.mesh.emissive_places.clear();
     if (has_others_) loaded_.warnings.emplace_back("left out points and lines");
-    if (has_skins_) loaded_.warnings.emplace_back("skins are left out: the mesh is as it was modelled");
-    if (!model_.animations.empty())
-      loaded_.warnings.emplace_back("left out its animations: the mesh stands as it was modelled");
+    if (has_skins_) loaded_.warnings.emplace_back("left out skins: the mesh keeps its bind pose");
+    if (!model_.animations.empty()) loaded_.warnings.emplace_back("left out animations: the mesh keeps its rest pose");
     builder_.finish();
   }
 
@@ -742,7 +742,7 @@ std::optional<std::string> other_version(std::span<const std::byte> bytes, std::
 
 Result<tinygltf::Model> parse(std::span<const std::byte> bytes, Asked& asked) {
   if (bytes.size() > std::numeric_limits<unsigned>::max()) {
-    return make_error(ErrorCode::LimitExceeded, "glTF beyond 4 GiB");
+    return make_error(ErrorCode::LimitExceeded, "the glTF file has more than 4 GiB");
   }
   tinygltf::TinyGLTF loader;
   loader.SetImageLoader(keep_picture, &asked);
@@ -771,7 +771,7 @@ Result<tinygltf::Model> parse(std::span<const std::byte> bytes, Asked& asked) {
 Result<LoadedMesh> read_gltf(std::span<const std::byte> bytes, Beside& beside) {
   Asked asked{&beside};
   const std::string_view json = json_of(bytes);
-  if (is_too_deep(json)) return make_error(ErrorCode::BadFormat, "its JSON is nested too deeply");
+  if (is_too_deep(json)) return make_error(ErrorCode::BadFormat, "the JSON is nested too deeply");
   const auto rewritten = readable_by_tinygltf(bytes, json);
   auto model = parse(rewritten.empty() ? bytes : rewritten, asked);
   if (beside.refused()) return *beside.refused();
@@ -795,7 +795,7 @@ bool has_gltf() {
 }
 
 Result<LoadedMesh> read_gltf(std::span<const std::byte>, Beside&) {
-  return make_error(ErrorCode::Unsupported, "Quoin was built without tinygltf, which reads glTF");
+  return make_error(ErrorCode::Unsupported, "cannot read glTF: Quoin was built without tinygltf");
 }
 
 #endif

@@ -47,14 +47,14 @@ std::optional<std::size_t> index_in(const tinygltf::Value& object, const std::st
 Result<std::pair<const char*, std::size_t>> coded_bytes(const tinygltf::Model& model,
                                                         const tinygltf::Value& extension) {
   const auto view = index_in(extension, "bufferView");
-  if (!view || *view >= model.bufferViews.size()) return bad("it is coded in a buffer view that is not there");
+  if (!view || *view >= model.bufferViews.size()) return bad("the buffer view of its Draco data does not exist");
   const tinygltf::BufferView& of = model.bufferViews[*view];
   if (of.buffer < 0 || static_cast<std::size_t>(of.buffer) >= model.buffers.size()) {
-    return bad("it is coded in a buffer that is not there");
+    return bad("the buffer of its Draco data does not exist");
   }
   const auto& bytes = model.buffers[static_cast<std::size_t>(of.buffer)].data;
   if (of.byteOffset > bytes.size() || of.byteLength > bytes.size() - of.byteOffset) {
-    return bad("its code ends beyond its buffer");
+    return bad("its Draco data extends past the buffer");
   }
   return std::pair(reinterpret_cast<const char*>(bytes.data()) + of.byteOffset, of.byteLength);
 }
@@ -64,13 +64,13 @@ Result<std::unique_ptr<draco::Mesh>> decoded_mesh(const char* bytes, std::size_t
     draco::DecoderBuffer buffer;
     buffer.Init(bytes, size);
     const auto type = draco::Decoder::GetEncodedGeometryType(&buffer);
-    if (!type.ok() || type.value() != draco::TRIANGULAR_MESH) return bad("it is no mesh of Draco's");
+    if (!type.ok() || type.value() != draco::TRIANGULAR_MESH) return bad("its data is not a Draco mesh");
     draco::Decoder decoder;
     auto mesh = decoder.DecodeMeshFromBuffer(&buffer);
     if (!mesh.ok()) return bad("Draco cannot decode it: " + mesh.status().error_msg_string());
     return std::move(mesh).value();
   } catch (const std::bad_alloc&) {
-    return bad("its code claims more than there is memory for");
+    return bad("its Draco data needs more memory than is available");
   } catch (const std::exception& thrown) {
     return bad("Draco cannot decode it: " + std::string(thrown.what()));
   }
@@ -116,7 +116,7 @@ Result<std::vector<unsigned char>> floats_of(const draco::Mesh& mesh, const drac
     const auto count = static_cast<std::int8_t>(components);
     const bool done = is_float ? attribute.ConvertValue<float>(index, count, values.data())
                                : attribute.ConvertValue<std::int32_t>(index, count, wholes.data());
-    if (!done) return bad("an attribute cannot be converted");
+    if (!done) return bad("cannot convert an attribute");
     for (std::size_t i = 0; i < static_cast<std::size_t>(components); ++i) {
       put(is_float ? values[i] : static_cast<float>(wholes[i] / most), at);
     }
@@ -126,16 +126,16 @@ Result<std::vector<unsigned char>> floats_of(const draco::Mesh& mesh, const drac
 
 Status take_attribute(const draco::Mesh& mesh, std::size_t id, int accessor_index, tinygltf::Model& model) {
   if (accessor_index < 0 || static_cast<std::size_t>(accessor_index) >= model.accessors.size()) {
-    return bad("an accessor that is not there");
+    return bad("an accessor does not exist");
   }
   const draco::PointAttribute* const attribute = mesh.GetAttributeByUniqueId(static_cast<std::uint32_t>(id));
-  if (attribute == nullptr) return bad("an attribute that its code lacks");
+  if (attribute == nullptr) return bad("an attribute is missing from its Draco data");
   tinygltf::Accessor& accessor = model.accessors[static_cast<std::size_t>(accessor_index)];
   const int components = tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(accessor.type));
   if (components < 1 || components > 4 || components > attribute->num_components()) {
-    return bad("an attribute of another type");
+    return bad("an attribute has the wrong type");
   }
-  if (accessor.count != mesh.num_points()) return bad("an accessor of another length than its code");
+  if (accessor.count != mesh.num_points()) return bad("an accessor's count differs from the Draco data's vertices");
   auto bytes = floats_of(mesh, *attribute, accessor, components);
   if (!bytes) return bytes.error();
   accessor.bufferView = add_view(model, std::move(*bytes));
@@ -147,7 +147,7 @@ Status take_attribute(const draco::Mesh& mesh, std::size_t id, int accessor_inde
 
 Status take_indices(const draco::Mesh& mesh, int accessor_index, tinygltf::Model& model) {
   if (accessor_index < 0 || static_cast<std::size_t>(accessor_index) >= model.accessors.size()) {
-    return bad("coded triangles without indices");
+    return bad("Draco triangles need indices");
   }
   std::vector<unsigned char> bytes(std::size_t{12} * mesh.num_faces());
   unsigned char* at = bytes.data();
@@ -155,7 +155,8 @@ Status take_indices(const draco::Mesh& mesh, int accessor_index, tinygltf::Model
     for (int corner = 0; corner < 3; ++corner) put(mesh.face(face)[corner].value(), at);
   }
   tinygltf::Accessor& accessor = model.accessors[static_cast<std::size_t>(accessor_index)];
-  if (accessor.count != std::size_t{3} * mesh.num_faces()) return bad("indices of another number than its code");
+  if (accessor.count != std::size_t{3} * mesh.num_faces())
+    return bad("the number of indices differs from the Draco data's triangles");
   accessor.bufferView = add_view(model, std::move(bytes));
   accessor.byteOffset = 0;
   accessor.componentType = TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
@@ -168,20 +169,21 @@ Status decode(const tinygltf::Primitive& primitive, const tinygltf::Value& exten
   for (const auto& [name, accessor] : primitive.attributes) {
     if (accessor >= 0 && static_cast<std::size_t>(accessor) < model.accessors.size() &&
         model.accessors[static_cast<std::size_t>(accessor)].count / kMostPointsPerByte > coded->second) {
-      return bad("more vertices than its code can hold");
+      return bad("more vertices than the Draco data can hold");
     }
   }
   const auto mesh = decoded_mesh(coded->first, coded->second);
   if (!mesh) return mesh.error();
   const auto indices = index_in(extension, "indices");
-  if (!indices) return bad("coded triangles without indices");
+  if (!indices) return bad("Draco triangles need indices");
   if (Status done = take_indices(**mesh, static_cast<int>(*indices), model); !done) return done;
-  if (!extension.Has("attributes") || !extension.Get("attributes").IsObject()) return bad("code without attributes");
+  if (!extension.Has("attributes") || !extension.Get("attributes").IsObject())
+    return bad("the Draco extension has no attributes");
   const tinygltf::Value& ids = extension.Get("attributes");
   for (const auto& [name, accessor] : primitive.attributes) {
     if (!ids.Has(name)) continue;  // stored without Draco
     const auto id = index_in(ids, name);
-    if (!id) return bad("an attribute without a number");
+    if (!id) return bad("a Draco attribute has no id");
     if (Status done = take_attribute(**mesh, *id, accessor, model); !done) return done;
   }
   return {};
@@ -191,7 +193,7 @@ Status decode(const tinygltf::Primitive& primitive, const tinygltf::Value& exten
 
 Status decode(const tinygltf::Primitive&, const tinygltf::Value&, tinygltf::Model&) {
   return make_error(ErrorCode::Unsupported,
-                    "it is compressed by Draco, and this build was made without Draco (libdraco-dev in Debian)");
+                    "cannot read Draco compression: Quoin was built without Draco (Debian: libdraco-dev)");
 }
 
 #endif

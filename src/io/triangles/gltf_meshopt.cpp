@@ -118,27 +118,29 @@ std::string text_in(const tinygltf::Value& object, const char* key) {
 
 Result<CodedView> coded_view(const tinygltf::Model& model, const tinygltf::Value& extension) {
   const auto bad = [](const char* what) { return make_error(ErrorCode::BadFormat, what); };
-  if (!extension.IsObject()) return bad("its compression is no object");
+  if (!extension.IsObject()) return bad("its compression extension is not an object");
   const auto buffer = whole_in(extension, "buffer");
   const auto offset = extension.Has("byteOffset") ? whole_in(extension, "byteOffset") : std::size_t{0};
   const auto length = whole_in(extension, "byteLength");
   const auto count = whole_in(extension, "count");
   const auto stride = whole_in(extension, "byteStride");
-  if (!buffer || !offset || !length || !count || !stride) return bad("its compression lacks a number");
+  if (!buffer || !offset || !length || !count || !stride) return bad("its compression extension lacks a number");
   CodedView view;
   view.count = *count;
   view.stride = *stride;
   view.mode = text_in(extension, "mode");
   view.filter = text_in(extension, "filter");
-  if (*buffer >= model.buffers.size()) return bad("it is coded in a buffer that is not there");
+  if (*buffer >= model.buffers.size()) return bad("the buffer of its compressed data does not exist");
   const auto& bytes = model.buffers[*buffer].data;
-  if (*offset > bytes.size() || *length > bytes.size() - *offset) return bad("its code ends beyond its buffer");
+  if (*offset > bytes.size() || *length > bytes.size() - *offset)
+    return bad("its compressed data extends past the buffer");
   view.coded = std::span(bytes).subspan(*offset, *length);
   const bool is_attributes = view.mode == "ATTRIBUTES";
   const bool has_stride = is_attributes ? view.stride != 0 && view.stride % 4 == 0 && view.stride <= 256
                                         : view.stride == 2 || view.stride == 4;
-  if (!has_stride) return bad("elements of a size that is not coded");
-  if (view.count > (*length + 1) * kMostPacked / view.stride) return bad("more elements than its code can hold");
+  if (!has_stride) return bad("unsupported element size");
+  if (view.count > (*length + 1) * kMostPacked / view.stride)
+    return bad("more elements than its compressed data can hold");
   return view;
 }
 
@@ -152,9 +154,9 @@ Result<std::vector<unsigned char>> decoded(const CodedView& view) {
   } else if (view.mode == "INDICES") {
     failed = meshopt_decodeIndexSequence(bytes.data(), view.count, view.stride, view.coded.data(), view.coded.size());
   }
-  if (failed != 0) return make_error(ErrorCode::BadFormat, "it cannot be decoded");
+  if (failed != 0) return make_error(ErrorCode::BadFormat, "its compressed data cannot be decoded");
   if (view.filter.empty() || view.filter == "NONE") return bytes;
-  if (view.mode != "ATTRIBUTES") return make_error(ErrorCode::BadFormat, "a filter of indices");
+  if (view.mode != "ATTRIBUTES") return make_error(ErrorCode::BadFormat, "indices must not have a filter");
   if (view.filter == "OCTAHEDRAL" && (view.stride == 4 || view.stride == 8)) {
     meshopt_decodeFilterOct(bytes.data(), view.count, view.stride);
   } else if (view.filter == "QUATERNION" && view.stride == 8) {
@@ -162,7 +164,7 @@ Result<std::vector<unsigned char>> decoded(const CodedView& view) {
   } else if (view.filter == "EXPONENTIAL") {
     meshopt_decodeFilterExp(bytes.data(), view.count, view.stride);
   } else {
-    return make_error(ErrorCode::BadFormat, "a filter that is not known");
+    return make_error(ErrorCode::BadFormat, "unknown filter");
   }
   return bytes;
 }
@@ -202,7 +204,7 @@ Status decode_views(tinygltf::Model& model) {
     const auto coded = coded_view(model, extension->second);
     if (!coded) return fail(coded.error());
     const std::size_t size = coded->count * coded->stride;
-    if (size > most) return fail(make_error(ErrorCode::BadFormat, "more elements than all code can hold"));
+    if (size > most) return fail(make_error(ErrorCode::BadFormat, "more elements than the compressed data can hold"));
     most -= size;
     auto bytes = decoded(*coded);
     if (!bytes) return fail(bytes.error());
@@ -223,7 +225,7 @@ bool has_meshopt() {
 }
 
 Status decode_views(tinygltf::Model&) {
-  return make_error(ErrorCode::Unsupported, "compressed glTF, which this build has no meshoptimizer for");
+  return make_error(ErrorCode::Unsupported, "cannot read compressed glTF: Quoin was built without meshoptimizer");
 }
 
 #endif

@@ -238,7 +238,7 @@ class ObjReader {
     const std::span<const std::byte> bytes = std::as_bytes(std::span(text));
     if (const std::size_t bad = count_bad_numbers(text); bad > 0) {
       loaded_.warnings.push_back(with_thousands(static_cast<std::int64_t>(bad)) +
-                                 " coordinates are no finite numbers, and count as 0");
+                                 " coordinates are not finite numbers and are read as 0");
     }
     Bytes buffer(bytes);
     std::istream stream(&buffer);
@@ -278,7 +278,7 @@ class ObjReader {
       if (line.empty() || line.find("Failed to load material file") != std::string::npos) continue;
       if (++count <= kMost) loaded_.warnings.push_back(std::move(line));
     }
-    if (count > kMost) loaded_.warnings.push_back("and " + std::to_string(count - kMost) + " lines more like these");
+    if (count > kMost) loaded_.warnings.push_back("and " + std::to_string(count - kMost) + " more warnings like these");
   }
   /// Drops the vertex colours that Quoin writes for blocks: the ambient light that arrives, no surface colour. Colours
   /// of its smooth meshes, which have no materials, stay.
@@ -388,8 +388,7 @@ class ObjReader {
       material.colour.a = 1.0F;
       if (material.alpha_mode == AlphaMode::Blend) material.alpha_mode = AlphaMode::Opaque;
     }
-    loaded_.warnings.emplace_back(
-        "its materials make all of the model invisible (Tr 1 or d 0); they are read as opaque");
+    loaded_.warnings.emplace_back("all materials are fully transparent (Tr 1 or d 0) and are read as opaque");
   }
   /// The OBJ origin (0, 0) is the image's bottom left corner.
   [[nodiscard]] glm::vec2 place_of(int index) const {
@@ -426,7 +425,7 @@ bool has_obj() {
 }
 
 Result<LoadedMesh> read_obj(std::span<const std::byte>, Beside&) {
-  return make_error(ErrorCode::Unsupported, "Quoin was built without tinyobjloader, which reads OBJ");
+  return make_error(ErrorCode::Unsupported, "cannot read OBJ: Quoin was built without tinyobjloader");
 }
 
 #endif

@@ -116,10 +116,10 @@ class OffReader {
     if (!lines_.next()) return bad("the file is empty");
     Words words(lines_.line());
     const auto layout = layout_of(words.next().value_or(""));
-    if (!layout) return bad("an OFF file begins with OFF, COFF, NOFF or the like");
+    if (!layout) return bad("not an OFF file: it does not begin with OFF, COFF, NOFF or similar");
     layout_ = *layout;
     if (layout->has_fourth || layout->has_dimension) {
-      return make_error(ErrorCode::Unsupported, "an OFF file of another dimension than three", {}, 0);
+      return make_error(ErrorCode::Unsupported, "only 3-dimensional OFF files are supported", {}, 0);
     }
     lines_.drop(words.position());
     if (Words(lines_.line()).next() == "BINARY") {
@@ -129,14 +129,14 @@ class OffReader {
     const std::vector<double> counts = numbers_in(lines_.line());
     const auto is_count = [](double c) { return c >= 0.0 && c <= 1e15 && c == std::floor(c); };
     if (counts.size() < 2 || !is_count(counts[0]) || !is_count(counts[1]))
-      return bad("no counts of vertices and faces");
+      return bad("the numbers of vertices and faces are missing or invalid");
     vertices_ = static_cast<std::uint64_t>(counts[0]);
     faces_ = static_cast<std::uint64_t>(counts[1]);
     // "0 0 0" and "3 0 1 2", with their ends of lines.
     constexpr std::uint64_t kLeastVertex = 6;
     if (vertices_ > (lines_.remaining() + 1) / kLeastVertex || faces_ > (lines_.remaining() + 1) / 2) {
-      return bad("claims " + std::to_string(vertices_) + " vertices and " + std::to_string(faces_) + " faces in " +
-                 std::to_string(lines_.remaining()) + " bytes");
+      return bad("the file claims " + std::to_string(vertices_) + " vertices and " + std::to_string(faces_) +
+                 " faces in " + std::to_string(lines_.remaining()) + " bytes");
     }
     return {};
   }
@@ -147,14 +147,14 @@ class OffReader {
       const std::vector<double> numbers = numbers_in(lines_.line());
       const std::size_t first = layout_.has_normal ? 6 : 3;
       const std::size_t last = numbers.size() - std::min<std::size_t>(numbers.size(), layout_.has_texture ? 2 : 0);
-      if (numbers.size() < 3 || last < first) return bad("a vertex of " + std::to_string(numbers.size()) + " numbers");
+      if (numbers.size() < 3 || last < first) return bad("a vertex has " + std::to_string(numbers.size()) + " numbers");
       loaded_.mesh.positions.emplace_back(numbers[0], numbers[1], numbers[2]);
       if (!layout_.has_colour) {
         has_more_ |= last > first;
         continue;
       }
       const std::size_t channels = std::min<std::size_t>(last - first, 4);
-      if (channels < 3) return bad("a vertex without its colour");
+      if (channels < 3) return bad("a vertex has no colour");
       loaded_.mesh.colours.push_back(
           colour_of(std::span(numbers).subspan(first, channels), colour_text(first, channels)));
     }
@@ -175,7 +175,8 @@ class OffReader {
       if (!lines_.next()) return bad("the file ends within its " + std::to_string(faces_) + " faces");
       const std::vector<double> numbers = numbers_in(lines_.line());
       const double count = numbers.empty() ? -1.0 : numbers[0];
-      if (!(count >= 0.0) || count > static_cast<double>(numbers.size() - 1)) return bad("a face without its corners");
+      if (!(count >= 0.0) || count > static_cast<double>(numbers.size() - 1))
+        return bad("a face has fewer corners than it claims");
       const auto end = static_cast<std::size_t>(count) + 1;
       corners.clear();
       for (std::size_t k = 1; k < end; ++k) {
@@ -212,9 +213,9 @@ class OffReader {
       material.colour = {colour[0], colour[1], colour[2], colour[3]};
       if (colour[3] < 1.0F) material.alpha_mode = AlphaMode::Blend;
     }
-    if (has_map_) loaded_.warnings.emplace_back("left out colours of faces that are numbers in a colour map");
+    if (has_map_) loaded_.warnings.emplace_back("left out face colours that index a colour map");
     if (has_more_)
-      loaded_.warnings.emplace_back("left out numbers after coordinates, which the first line does not name");
+      loaded_.warnings.emplace_back("left out extra numbers after coordinates, not declared in the first line");
   }
 
   static constexpr std::size_t kNowhere = std::string_view::npos;

@@ -90,12 +90,12 @@ Result<Property> property_of(Words& words, std::size_t line) {
     const auto count_type = words.next();
     property.count = count_type ? scalar_of(*count_type) : std::nullopt;
     if (!property.count || *property.count >= Scalar::Float32)
-      return bad_at(line, "a list without a type of its length");
+      return bad_at(line, "a list property has no type for its length");
     word = words.next();
   }
   const auto type = word ? scalar_of(*word) : std::nullopt;
   const auto name = words.next();
-  if (!type || !name) return bad_at(line, "a property without a type or a name");
+  if (!type || !name) return bad_at(line, "a property has no type or no name");
   property.type = *type;
   property.name = *name;
   return property;
@@ -106,7 +106,7 @@ Result<Encoding> encoding_of(Words& words, std::size_t line) {
   if (word == "ascii") return Encoding::Text;
   if (word == "binary_little_endian") return Encoding::LittleEndian;
   if (word == "binary_big_endian") return Encoding::BigEndian;
-  return bad_at(line, "a PLY of a format that there is none of");
+  return bad_at(line, "unknown PLY format");
 }
 
 Result<Header> read_header(std::string_view text) {
@@ -119,7 +119,7 @@ Result<Header> read_header(std::string_view text) {
     if (!key) continue;
     if (*key == "end_header") {
       header.end = at;
-      if (!has_format) return bad_at(line, "a PLY without its format");
+      if (!has_format) return bad_at(line, "the PLY header has no format");
       return header;
     }
     if (*key == "format") {
@@ -131,16 +131,16 @@ Result<Header> read_header(std::string_view text) {
       const auto name = words.next();
       const auto count = words.next_number();
       if (!name || !count || !(*count >= 0.0) || *count > 9e15)
-        return bad_at(line, "an element without a name or a count");
+        return bad_at(line, "an element has no name or no count");
       header.elements.push_back({std::string(*name), static_cast<std::uint64_t>(*count), {}});
     } else if (*key == "property") {
-      if (header.elements.empty()) return bad_at(line, "a property of no element");
+      if (header.elements.empty()) return bad_at(line, "a property comes before any element");
       auto property = property_of(words, line);
       if (!property) return property.error();
       header.elements.back().properties.push_back(std::move(*property));
     }
   }
-  return bad_at(text.size(), "the file ends within the header of a PLY");
+  return bad_at(text.size(), "the file ends within the PLY header");
 }
 
 /// The values of a body one after the other.
@@ -222,8 +222,8 @@ float share_of(double value, Scalar type) {
 }
 
 Error ends_within(const Values& values, const Element& element) {
-  return bad_at(values.position(), "the file ends, or holds no number, within its " + std::to_string(element.count) +
-                                       " of " + element.name);
+  return bad_at(values.position(), "the file ends, or a number is invalid, within its " +
+                                       std::to_string(element.count) + " of " + element.name);
 }
 
 class PlyReader {
@@ -236,7 +236,7 @@ class PlyReader {
     }
     builder_.finish();
     if (!has_faces_ && loaded_.mesh.triangles.empty()) {
-      loaded_.warnings.emplace_back("points alone: there is no face in it");
+      loaded_.warnings.emplace_back("the file has points but no faces");
     }
     return std::move(loaded_);
   }
@@ -247,12 +247,13 @@ class PlyReader {
     std::size_t least = 0;
     for (const Property& p : element.properties) least += values_.least_bytes(p.count.value_or(p.type));
     if (element.count > values_.remaining() / least) {
-      return bad_at(values_.position(), "claims " + std::to_string(element.count) + " of " + element.name +
-                                            ", and has bytes for " + std::to_string(values_.remaining() / least));
+      return bad_at(values_.position(), "the file claims " + std::to_string(element.count) + " of " + element.name +
+                                            " but has bytes for " + std::to_string(values_.remaining() / least));
     }
     if (element.name == "vertex") {
       // Their properties may differ, and indices would not say which of them they mean.
-      if (std::exchange(has_vertices_, true)) return bad_at(values_.position(), "a second element named vertex");
+      if (std::exchange(has_vertices_, true))
+        return bad_at(values_.position(), "more than one element is named vertex");
       return read_vertices(element);
     }
     const bool is_strips = element.name == "tristrips";
@@ -281,7 +282,7 @@ class PlyReader {
     const double count = values_.next(*property.count);
     const std::size_t room = values_.remaining() / values_.least_bytes(property.type);
     if (!(count >= 0.0) || count > static_cast<double>(room + 1)) {
-      return bad_at(at, "a list longer than the file");
+      return bad_at(at, "a list extends past the end of the file");
     }
     for (auto i = static_cast<std::size_t>(count); i > 0 && !values_.failed(); --i) {
       const double value = values_.next(property.type);

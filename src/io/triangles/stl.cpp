@@ -51,11 +51,11 @@ Result<LoadedMesh> read_bytes(std::span<const std::byte> bytes) {
   ByteReader reader(bytes);
   const auto of_all = colour_of_header(reader.text(kHeader));
   const std::uint32_t count = reader.u32();
-  if (reader.failed()) return bad_at(bytes.size(), "the file ends within the header of an STL");
+  if (reader.failed()) return bad_at(bytes.size(), "the file ends within the STL header");
   const std::uint64_t promised = kHeader + 4 + std::uint64_t{count} * kRecord;
   if (promised > bytes.size()) {
-    return bad_at(kHeader, "the header promises " + std::to_string(count) + " triangles, which take " +
-                               std::to_string(promised) + " bytes, and the file has " + std::to_string(bytes.size()));
+    return bad_at(kHeader, "the header promises " + std::to_string(count) + " triangles, which need " +
+                               std::to_string(promised) + " bytes, but the file has " + std::to_string(bytes.size()));
   }
   LoadedMesh loaded;
   if (promised < bytes.size()) {
@@ -92,14 +92,14 @@ Result<LoadedMesh> read_text(std::span<const std::byte> bytes) {
   std::size_t corners = 0;
   while (const auto word = words.next()) {
     if (*word == "facet" || *word == "endfacet") {
-      if (*word == "endfacet" && corners != 3) return bad_at(words.position(), "a facet without three corners");
+      if (*word == "endfacet" && corners != 3) return bad_at(words.position(), "a facet does not have three corners");
       corners = 0;
     }
     if (*word != "vertex") continue;
     std::array<double, 3> at{};
     for (double& number : at) {
       const auto value = words.next_number();
-      if (!value) return bad_at(words.position(), "a vertex without three numbers");
+      if (!value) return bad_at(words.position(), "a vertex does not have three numbers");
       number = *value;
     }
     loaded.mesh.positions.emplace_back(at[0], at[1], at[2]);

@@ -169,7 +169,7 @@ class PartReader {
  private:
   [[nodiscard]] Error error() const {
     const std::string why =
-        fault_.empty() ? std::string("no XML: ") + XML_ErrorString(XML_GetErrorCode(parser_.get())) : fault_;
+        fault_.empty() ? std::string("invalid XML: ") + XML_ErrorString(XML_GetErrorCode(parser_.get())) : fault_;
     const auto byte = static_cast<std::int64_t>(XML_GetCurrentByteIndex(parser_.get()));
     return make_error(ErrorCode::BadFormat, printable(name_) + ", byte " + std::to_string(byte) + ": " + why);
   }
@@ -179,7 +179,7 @@ class PartReader {
   }
   static void on_entity(void* self, const char*, int, const char*, int, const char*, const char*, const char*,
                         const char*) {
-    static_cast<PartReader*>(self)->fail("it declares an entity, which no 3MF does");
+    static_cast<PartReader*>(self)->fail("entity declarations are not allowed in 3MF");
   }
   static void on_start(void* self, const char* name, const char** attributes) {
     const std::string_view whole = name;
@@ -213,7 +213,7 @@ class PartReader {
 
   void begin_object(const Attributes& attributes) {
     const std::int64_t id = attributes.index("id");
-    if (id == kNone) return fail("an object without a number");
+    if (id == kNone) return fail("an object has no id");
     object_ = &part_.objects[id];
     *object_ = {};
     object_->group = attributes.index("pid");
@@ -223,7 +223,7 @@ class PartReader {
     const auto x = attributes.number("x");
     const auto y = attributes.number("y");
     const auto z = attributes.number("z");
-    if (object_ == nullptr || !x || !y || !z) return fail("a vertex outside of an object, or without three numbers");
+    if (object_ == nullptr || !x || !y || !z) return fail("a vertex is outside an object or lacks a coordinate");
     object_->vertices.emplace_back(*x, *y, *z);
   }
   void add_triangle(const Attributes& attributes) {
@@ -232,7 +232,7 @@ class PartReader {
     constexpr std::array<std::string_view, 3> kColours = {"p1", "p2", "p3"};
     for (std::size_t i = 0; i < 3; ++i) {
       const std::int64_t corner = attributes.index(kCorners[i]);
-      if (object_ == nullptr || corner == kNone) return fail("a triangle outside of an object, or without corners");
+      if (object_ == nullptr || corner == kNone) return fail("a triangle is outside an object or lacks a corner");
       triangle.corners[i] = static_cast<std::uint32_t>(corner);
       triangle.colours[i] = attributes.index(kColours[i]);
       if (triangle.colours[i] == kNone) triangle.colours[i] = triangle.colours[0];
@@ -243,14 +243,14 @@ class PartReader {
   void add_placed(const Attributes& attributes, std::vector<Placed>* list) {
     const auto transform = transform_in(attributes["transform"]);
     const std::int64_t object = attributes.index("objectid");
-    if (list == nullptr || object == kNone) return fail("a component or an item without its object");
-    if (!transform) return fail("a transform that is not 12 numbers");
+    if (list == nullptr || object == kNone) return fail("a component or item has no object");
+    if (!transform) return fail("a transform does not have 12 numbers");
     list->push_back({std::string(attributes["path"]), object, *transform});
   }
   void add_colour(std::string_view text) {
     if (group_ == kNone) return;
     const auto colour = colour_in(text);
-    if (!colour) return fail("the colour \"" + printable(text.substr(0, 20)) + "\"");
+    if (!colour) return fail("invalid colour \"" + printable(text.substr(0, 20)) + "\"");
     part_.colours[group_].push_back(*colour);
   }
 
@@ -292,7 +292,7 @@ class Package {
     for (const std::string& name : zip_.names()) {
       if (name.starts_with("3D/") && name.ends_with(".model")) return name;
     }
-    return make_error(ErrorCode::BadFormat, "a 3MF without a model (3D/3dmodel.model)");
+    return make_error(ErrorCode::BadFormat, "the 3MF has no model (3D/3dmodel.model)");
   }
   static std::string without_slash(std::string_view name) {
     return std::string(name.starts_with('/') ? name.substr(1) : name);
@@ -300,7 +300,7 @@ class Package {
   /// Reads each part once.
   Result<const Part*> part_named(const std::string& name) {
     if (const auto known = parts_.find(name); known != parts_.end()) return &known->second;
-    if (!zip_.has(name)) return make_error(ErrorCode::BadFormat, "a 3MF without its part " + printable(name));
+    if (!zip_.has(name)) return make_error(ErrorCode::BadFormat, "the 3MF has no part " + printable(name));
     const auto xml = zip_.read(name);
     if (!xml) return xml.error();
     auto part = PartReader(name).read(*xml);
@@ -312,14 +312,14 @@ class Package {
 
   Status add(const Placed& placed, const std::string& from, const glm::dmat4& above, int depth) {
     constexpr int kDeepest = 32;
-    if (depth > kDeepest) return make_error(ErrorCode::LimitExceeded, "components within 32 others");
+    if (depth > kDeepest) return make_error(ErrorCode::LimitExceeded, "components are nested more than 32 deep");
     const std::string name = placed.path.empty() ? from : without_slash(placed.path);
     const auto part = part_named(name);
     if (!part) return part.error();
     const auto found = (*part)->objects.find(placed.object);
     if (found == (*part)->objects.end()) {
       return make_error(ErrorCode::BadFormat,
-                        "an object " + std::to_string(placed.object) + " that " + printable(name) + " does not have");
+                        "object " + std::to_string(placed.object) + " does not exist in " + printable(name));
     }
     const glm::dmat4 transform = above * placed.transform;
     if (auto done = add_mesh(found->second, **part, transform); !done) return done;
@@ -341,7 +341,7 @@ class Package {
     constexpr std::size_t kTimes = 64;
     placed_ += object.triangles.size() + object.vertices.size() / 8;
     if (placed_ > kFree + kTimes * defined_) {
-      return make_error(ErrorCode::LimitExceeded, "its components place far more triangles than the file has");
+      return make_error(ErrorCode::LimitExceeded, "the components place far more triangles than the file has");
     }
     const bool is_mirrored = glm::determinant(glm::dmat3(transform)) < 0.0;
     std::unordered_map<std::uint64_t, std::size_t> known;
@@ -423,7 +423,7 @@ bool has_three_mf() {
 }
 
 Result<LoadedMesh> read_three_mf(std::span<const std::byte>, Beside&) {
-  return make_error(ErrorCode::Unsupported, "Quoin was built without expat (Debian: libexpat1-dev), which reads 3MF");
+  return make_error(ErrorCode::Unsupported, "cannot read 3MF: Quoin was built without expat (Debian: libexpat1-dev)");
 }
 
 #endif

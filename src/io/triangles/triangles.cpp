@@ -33,8 +33,8 @@ Result<LoadedMesh> read_any(std::span<const std::byte> bytes, std::optional<File
   if (format == FileFormat::ThreeMf) read = read_three_mf;
   if (format == FileFormat::Glb || format == FileFormat::Gltf) read = read_gltf;
   if (read == nullptr) {
-    return make_error(ErrorCode::Unsupported, format ? std::string(format_info(*format).name) + " holds no triangles"
-                                                     : "not a file of triangles that Quoin reads");
+    return make_error(ErrorCode::Unsupported,
+                      format ? std::string(format_info(*format).name) + " holds no triangles" : "unknown mesh format");
   }
   auto loaded = read(bytes, beside);
   if (!loaded) return loaded;
@@ -56,7 +56,7 @@ Result<std::vector<std::byte>> Beside::read_path(const std::filesystem::path& pa
 }
 
 Result<std::vector<std::byte>> Beside::read(const std::string& name) {
-  if (file_.empty()) return make_error(ErrorCode::CannotRead, "there is no folder to look in");
+  if (file_.empty()) return make_error(ErrorCode::CannotRead, "a mesh read from bytes has no folder for other files");
   const auto path = sidecar_path(file_, name, allowed_);
   if (path) return read_path(*path);
   if (!refused_) refused_ = path.error();
@@ -64,7 +64,7 @@ Result<std::vector<std::byte>> Beside::read(const std::string& name) {
 }
 
 Result<std::vector<std::byte>> Beside::read_or_same_name(const std::string& name) {
-  if (file_.empty()) return make_error(ErrorCode::CannotRead, "there is no folder to look in");
+  if (file_.empty()) return make_error(ErrorCode::CannotRead, "a mesh read from bytes has no folder for other files");
   const auto path = sidecar_path(file_, name, allowed_);
   if (path) return read_path(*path);
   const auto same_name = sidecar_path(file_, name.substr(name.find_last_of("/\\") + 1), allowed_);
@@ -116,12 +116,12 @@ void MeshBuilder::finish() {
     loaded_.warnings.push_back("left out " + with_thousands(static_cast<std::int64_t>(count)) + " triangles with " +
                                what);
   };
-  warn(not_there_, "a corner that is not there");
-  warn(not_finite_, "a corner that is no number");
+  warn(not_there_, "a missing corner");
+  warn(not_finite_, "a corner that is not finite");
   if (too_large_ > 0) {
     loaded_.warnings.push_back(
         "polygons of more than " + with_thousands(std::int64_t{kMostCornersOfConcave}) +
-        " corners, filled as if they were convex: " + with_thousands(static_cast<std::int64_t>(too_large_)));
+        " corners, triangulated as convex: " + with_thousands(static_cast<std::int64_t>(too_large_)));
   }
 }
 
@@ -181,7 +181,7 @@ std::string number_of(double value) {
 
 Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& options, const std::string& name,
                                     Threads threads, const Progress& progress) {
-  if (loaded.mesh.triangles.empty()) return make_error(ErrorCode::Unsupported, "there is no triangle in it");
+  if (loaded.mesh.triangles.empty()) return make_error(ErrorCode::Unsupported, "the file has no triangles");
   const auto lattice = lattice_of(loaded.mesh, options);
   if (!lattice) return lattice.error();
   LoadedScene scene;
@@ -189,8 +189,8 @@ Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& op
   scene.warnings = std::move(loaded.warnings);
   if (!options.size && !options.voxel_size) {
     scene.warnings.push_back("voxelised at " + std::to_string(kDefaultMeshSize) +
-                             " voxels along its longest side, a voxel being " + number_of(lattice->voxel_size) +
-                             " of its units, since no size was given");
+                             " voxels along the longest side, with voxels of " + number_of(lattice->voxel_size) +
+                             " units, since no size was given");
   }
   SceneGrid grid;
   grid.name = name;
@@ -203,7 +203,7 @@ Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& op
     const DistanceFieldOptions wanted{*lattice, options.solid, options.band, most};
     auto made = distance_field(loaded.mesh, wanted, scene.scene.types, threads, progress);
     if (!made) return made.error();
-    if (made->field.chunk_count() == 0) scene.warnings.emplace_back("the mesh encloses nothing");
+    if (made->field.chunk_count() == 0) scene.warnings.emplace_back("the mesh encloses no volume");
     grid.field = std::move(made->field);
     instance.position += DVec3(0.5 * lattice->voxel_size);
     scene.warnings.insert(scene.warnings.end(), made->warnings.begin(), made->warnings.end());
@@ -211,7 +211,7 @@ Result<LoadedScene> scene_from_mesh(LoadedMesh loaded, const MeshLoadOptions& op
     auto made =
         voxelize(loaded.mesh, {*lattice, options.surface, options.solid, most}, scene.scene.types, threads, progress);
     if (!made) return made.error();
-    if (made->grid.voxel_count() == 0) scene.warnings.emplace_back("no voxel came of the mesh");
+    if (made->grid.voxel_count() == 0) scene.warnings.emplace_back("the mesh produced no voxels");
     grid.grid = std::move(made->grid);
     scene.warnings.insert(scene.warnings.end(), made->warnings.begin(), made->warnings.end());
   }

@@ -34,15 +34,15 @@ std::optional<std::size_t> find_end(std::span<const std::byte> zip) {
 
 Result<ZipParts> ZipParts::open(std::span<const std::byte> zip) {
   const auto end_at = find_end(zip);
-  if (!end_at) return bad_at(zip.size(), "a zip file without its directory: it was cut off");
+  if (!end_at) return bad_at(zip.size(), "the zip file has no directory: it is cut off");
   ByteReader end(zip, *end_at + 10, zip.size());
   const std::size_t count = end.u16();
   const std::size_t size = end.u32();
   const std::size_t begin = end.u32();
   if (begin == kZip64 || count == 0xFFFF) {
-    return make_error(ErrorCode::Unsupported, "a zip file of the kind zip64", {}, *end_at);
+    return make_error(ErrorCode::Unsupported, "zip64 is not supported", {}, *end_at);
   }
-  if (begin > *end_at || size > *end_at - begin) return bad_at(*end_at, "a directory outside of the zip file");
+  if (begin > *end_at || size > *end_at - begin) return bad_at(*end_at, "the zip directory is outside the file");
   ZipParts parts;
   parts.bytes_ = zip;
   ByteReader reader(zip, begin, *end_at);
@@ -62,7 +62,7 @@ Result<ZipParts> ZipParts::open(std::span<const std::byte> zip) {
     entry.at = reader.u32();
     std::string text(reader.text(name));
     (void)reader.take(rest);
-    if (!is_entry || reader.failed()) return bad_at(at, "a damaged directory of a zip file");
+    if (!is_entry || reader.failed()) return bad_at(at, "the zip directory is damaged");
     parts.entries_[std::move(text)] = entry;
   }
   return parts;
@@ -81,8 +81,8 @@ Result<std::vector<std::byte>> ZipParts::read(const std::string& name) const {
   constexpr std::uint32_t kEncrypted = 1;
   constexpr std::uint32_t kDeflate = 8;
   if ((entry.flags & kEncrypted) != 0 || (entry.method != 0 && entry.method != kDeflate)) {
-    return make_error(ErrorCode::Unsupported, printable(name) + " is encrypted, or compressed other than by deflate",
-                      {}, entry.at);
+    return make_error(ErrorCode::Unsupported, printable(name) + " is encrypted or not compressed by deflate", {},
+                      entry.at);
   }
   ByteReader head(bytes_, std::min<std::size_t>(entry.at, bytes_.size()), bytes_.size());
   const bool is_file = head.u32() == kOfFile;
@@ -90,9 +90,10 @@ Result<std::vector<std::byte>> ZipParts::read(const std::string& name) const {
   const std::size_t names_and_more = std::size_t{head.u16()} + head.u16();
   (void)head.take(names_and_more);
   const auto packed = head.take(entry.packed);
-  if (!is_file || head.failed()) return bad_at(entry.at, printable(name) + " lies outside of the zip file");
+  if (!is_file || head.failed()) return bad_at(entry.at, printable(name) + " is outside the zip file");
   ByteStream stream(packed, 0, entry.method == kDeflate ? Compression::Deflate : Compression::None);
-  if (entry.size > stream.max_bytes()) return bad_at(entry.at, printable(name) + " claims more bytes than it can have");
+  if (entry.size > stream.max_bytes())
+    return bad_at(entry.at, printable(name) + " claims more bytes than it can expand to");
   std::vector<std::byte> content(entry.size);
   const auto read = stream.read(content);
   if (!read || *read != content.size()) return bad_at(entry.at, printable(name) + " is damaged");

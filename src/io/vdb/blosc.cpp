@@ -45,9 +45,9 @@ Status expand_lz4([[maybe_unused]] std::span<const std::byte> packed, [[maybe_un
       LZ4_decompress_safe(reinterpret_cast<const char*>(packed.data()), reinterpret_cast<char*>(out.data()),
                           static_cast<int>(packed.size()), static_cast<int>(out.size()));
   if (count == static_cast<int>(out.size())) return {};
-  return bad_at(at, "Blosc: a stream of LZ4 that is damaged");
+  return bad_at(at, "Blosc: an LZ4 stream is damaged");
 #else
-  return make_error(ErrorCode::Unsupported, "compressed by LZ4, which this build of Quoin does not have", {}, at);
+  return make_error(ErrorCode::Unsupported, "cannot read LZ4: Quoin was built without it", {}, at);
 #endif
 }
 
@@ -61,13 +61,13 @@ Status expand_stream(const Header& header, std::span<const std::byte> packed, st
   constexpr unsigned kZlib = 3;
   if (header.compressor() == kLz4) return expand_lz4(packed, out, at);
   if (header.compressor() != kZlib) {
-    return make_error(ErrorCode::Unsupported,
-                      "Blosc: by compressor " + std::to_string(header.compressor()) + " (LZ4 and zlib are read)", {},
-                      at);
+    return make_error(
+        ErrorCode::Unsupported,
+        "Blosc: compressor " + std::to_string(header.compressor()) + " is not supported (LZ4 and zlib are)", {}, at);
   }
   ByteStream stream(packed, 0, Compression::Zlib);
   const auto count = stream.read(out);
-  if (!count || *count != out.size()) return bad_at(at, "Blosc: a zlib stream that is damaged");
+  if (!count || *count != out.size()) return bad_at(at, "Blosc: a zlib stream is damaged");
   return {};
 }
 
@@ -90,21 +90,23 @@ Status expand_blosc(std::span<const std::byte> frame, std::span<std::byte> out) 
   header.bytes = reader.u32();
   header.block = reader.u32();
   static_cast<void>(reader.u32());
-  if (reader.failed() || header.bytes != out.size()) return bad_at(0, "Blosc: not as many bytes as there are to be");
+  if (reader.failed() || header.bytes != out.size())
+    return bad_at(0, "Blosc: the frame does not have the expected number of bytes");
   if (header.is_stored()) {
     const auto stored = reader.take(out.size());
     if (reader.failed()) return bad_at(kHeader, "Blosc: cut off");
     std::ranges::copy(stored, out.begin());
     return {};
   }
-  if (header.is_shuffled_by_bits()) return make_error(ErrorCode::Unsupported, "Blosc: shuffled by bits", {}, 2);
+  if (header.is_shuffled_by_bits())
+    return make_error(ErrorCode::Unsupported, "Blosc: bit shuffle is not supported", {}, 2);
   if (header.block == 0 || (out.size() + header.block - 1) / header.block > reader.remaining() / 4) {
-    return bad_at(8, "Blosc: blocks of an impossible size");
+    return bad_at(8, "Blosc: invalid block size");
   }
   std::vector<std::byte> shuffled(std::min(header.block, out.size()));
   for (std::size_t begin = 0; begin < out.size(); begin += header.block) {
     const std::size_t at = reader.u32();
-    if (at > frame.size()) return bad_at(reader.position(), "Blosc: a block behind its end");
+    if (at > frame.size()) return bad_at(reader.position(), "Blosc: a block starts past the end of the frame");
     const auto block = out.subspan(begin, std::min(header.block, out.size() - begin));
     const auto target = header.is_shuffled() ? std::span(shuffled).first(block.size()) : block;
     const bool is_split = header.is_split() && block.size() == header.block && block.size() % header.element == 0;

@@ -60,20 +60,20 @@ class GridReader {
 
   Status read() {
     const std::uint64_t root_of_tree = load_at<std::uint64_t>(kGridBytes + 24);
-    if (root_of_tree > bytes_.size()) return bad_at(kGridBytes + 24, "a root behind the grid");
+    if (root_of_tree > bytes_.size()) return bad_at(kGridBytes + 24, "the root node extends past the grid");
     const std::size_t root = kGridBytes + root_of_tree;
     const bool is_double = type_ == Type::Double;
     const std::size_t root_bytes = is_double ? 96 : 64;
-    if (!has(root, root_bytes)) return bad_at(kGridBytes + 24, "a root behind the grid");
+    if (!has(root, root_bytes)) return bad_at(kGridBytes + 24, "the root node extends past the grid");
     const std::size_t tiles = load_at<std::uint32_t>(root + 24);
     constexpr std::size_t kTile = 32;
     if (tiles > (bytes_.size() - root - root_bytes) / kTile)
-      return bad_at(root + 24, "more tiles than there is room for");
+      return bad_at(root + 24, "more tiles than the grid can hold");
     grid_.background = value_at(root + (is_double ? 32 : 28));
     for (std::size_t i = 0; i < tiles; ++i) {
       const std::size_t tile = root + root_bytes + i * kTile;
       const auto origin = origin_at(tile);
-      if (!origin) return bad_at(tile, "a node at a place that there cannot be");
+      if (!origin) return bad_at(tile, "a node position is invalid");
       const auto child = load_at<std::int64_t>(tile + 8);
       if (child == 0) {
         add_tile(*origin, kUpperEdge, value_at(tile + (is_double ? 24 : 20)), load_at<std::uint32_t>(tile + 16) != 0);
@@ -143,7 +143,7 @@ class GridReader {
   /// `said_at`: where its place is said.
   Status read_node(const NodeShape& shape, std::size_t node, IVec3 origin, std::size_t said_at) {
     std::size_t& left = &shape == &kUpper ? most_upper_ : most_lower_;
-    if (!has(node, shape.bytes) || left == 0) return bad_at(said_at, "a node that lies where it cannot");
+    if (!has(node, shape.bytes) || left == 0) return bad_at(said_at, "a node offset is out of bounds");
     --left;
     const auto bit = [&](std::size_t mask, std::size_t i) {
       return (std::to_integer<unsigned>(bytes_[mask + (i >> 3)]) >> (i & 7U) & 1U) != 0;
@@ -168,7 +168,7 @@ class GridReader {
 
   Status read_leaf(std::size_t leaf, IVec3 origin, std::size_t said_at) {
     if (!has(leaf, leaf_bytes()) || grid_.leaves.size() >= most_leaves_) {
-      return bad_at(said_at, "a leaf that lies where it cannot");
+      return bad_at(said_at, "a leaf offset is out of bounds");
     }
     Leaf read{origin, mask_at(leaf + 16)};
     if (type_ == Type::Bool) {
@@ -204,21 +204,21 @@ Result<std::vector<std::byte>> expand(std::span<const std::byte> stored, unsigne
                                       std::size_t at) {
   ByteReader reader(stored);
   if (codec == 0) {
-    if (stored.size() != bytes) return bad_at(at, "a grid of another size than it says");
+    if (stored.size() != bytes) return bad_at(at, "the stored size of a grid differs from its size");
     return std::vector<std::byte>(stored.begin(), stored.end());
   }
   constexpr std::uint64_t kMostOfAByte = 1032;
-  if (bytes / kMostOfAByte > stored.size()) return bad_at(at, "a grid of more bytes than it can expand to");
+  if (bytes / kMostOfAByte > stored.size()) return bad_at(at, "a grid claims more bytes than it can expand to");
   std::vector<std::byte> out(bytes);
   for (std::size_t done = 0; done < out.size();) {
     const std::uint64_t size = reader.u32() | std::uint64_t{reader.u32()} << 32;
     const std::size_t place = at + reader.position();
     const auto packed = reader.take(size);
-    if (reader.failed()) return bad_at(place, "a grid that is cut off");
+    if (reader.failed()) return bad_at(place, "a grid is cut off");
     if (codec == 1) {
       ByteStream stream(packed, 0, Compression::Zlib);
       const auto count = stream.read(out);
-      if (!count || *count != out.size()) return bad_at(place, "a zlib stream that is damaged");
+      if (!count || *count != out.size()) return bad_at(place, "a zlib stream is damaged");
       return out;
     }
     constexpr std::size_t kMostOfAFrame = std::size_t{1} << 30;
@@ -240,14 +240,13 @@ std::optional<Type> type_of(std::uint32_t number) {
 }
 
 Status read_grid(std::span<const std::byte> bytes, const Entry& entry, File& file) {
-  if (bytes.size() < kGridBytes + 64 || !is_nvdb(bytes)) return bad_at(0, "no grid of NanoVDB's begins here");
+  if (bytes.size() < kGridBytes + 64 || !is_nvdb(bytes)) return bad_at(0, "not the start of a NanoVDB grid");
   const auto number = [&](std::size_t at) { return load<std::uint32_t>(bytes.data() + at, std::endian::little); };
   Grid grid;
   grid.name = printable(std::string_view(entry.name).substr(0, entry.name.find('\0')));
   const auto type = type_of(number(636));
   if (!type) {
-    file.warnings.push_back("left out: the grid \"" + grid.name + "\", of NanoVDB's type " +
-                            std::to_string(number(636)));
+    file.warnings.push_back("left out: the grid \"" + grid.name + "\", of NanoVDB type " + std::to_string(number(636)));
     return {};
   }
   constexpr std::uint32_t kLevelSet = 1;
@@ -277,17 +276,17 @@ Result<File> read_nvdb_file(std::span<const std::byte> bytes) {
   for (std::size_t segment = 0; segment < bytes.size();) {
     ByteReader reader(bytes, segment, bytes.size());
     if (!is_nvdb(bytes.subspan(segment)) || reader.remaining() < kHeader) {
-      return bad_at(segment, "no segment of NanoVDB's begins here");
+      return bad_at(segment, "not the start of a NanoVDB segment");
     }
     static_cast<void>(reader.take(kMagic.size()));
     const std::uint32_t version = reader.u32() >> 21;
     if (version != kMajor) {
-      return make_error(ErrorCode::Unsupported, "version " + std::to_string(version) + " of .nvdb (32 is read)", {},
-                        segment + 8);
+      return make_error(ErrorCode::Unsupported,
+                        ".nvdb version " + std::to_string(version) + " is not supported (32 is)", {}, segment + 8);
     }
     const std::size_t count = reader.u16();
     const unsigned codec = reader.u16();
-    if (codec > 2) return bad_at(segment + 14, "compressed in an unknown way");
+    if (codec > 2) return bad_at(segment + 14, "unknown compression method");
     std::vector<Entry> entries;
     for (std::size_t i = 0; i < count; ++i) {
       ByteReader metadata(bytes, reader.position(), bytes.size());
@@ -298,21 +297,21 @@ Result<File> read_nvdb_file(std::span<const std::byte> bytes) {
       const std::size_t name = metadata.u32();
       static_cast<void>(reader.take(kMetadata));
       entry.name = reader.text(name);
-      if (reader.failed()) return bad_at(reader.position(), "it ends before its grids do");
+      if (reader.failed()) return bad_at(reader.position(), "the file ends before its grids");
       entries.push_back(std::move(entry));
     }
     for (const Entry& entry : entries) {
       const std::size_t at = reader.position();
       const auto stored = reader.take(entry.stored);
-      if (reader.failed()) return bad_at(at, "a grid that ends behind the file");
-      if (entry.bytes > kMaxGrid) return make_error(ErrorCode::LimitExceeded, "a grid of more than 2 GiB", {}, at);
+      if (reader.failed()) return bad_at(at, "a grid extends past the end of the file");
+      if (entry.bytes > kMaxGrid) return make_error(ErrorCode::LimitExceeded, "a grid has more than 2 GiB", {}, at);
       const auto grid = expand(stored, codec, entry.bytes, at);
       if (!grid) return grid.error();
       auto read = read_grid(*grid, entry, file);
       if (!read) {
         // Offsets refer to the decompressed grid.
         const std::uint64_t inside = read.error().byte_offset.value_or(0);
-        const std::string within = codec == 0 ? "" : " (byte " + std::to_string(inside) + " of what it expands to)";
+        const std::string within = codec == 0 ? "" : " (byte " + std::to_string(inside) + " of the expanded data)";
         return make_error(read.error().code, read.error().message + within, {}, codec == 0 ? at + inside : at);
       }
     }

@@ -130,7 +130,7 @@ class TreeReader {
 
   Status read() {
     const std::size_t at = reader_.position();
-    if (reader_.u32() != 1) return bad_at(at, "a tree of several buffers");
+    if (reader_.u32() != 1) return bad_at(at, "a tree has several buffers");
     if (auto done = read_root(); !done) return done;
     if (scalar_ != Scalar::Bool && scalar_ != Scalar::Mask) grid_.values.reserve(grid_.leaves.size() * kLeafVoxels);
     for (Leaf& leaf : grid_.leaves) {
@@ -144,7 +144,7 @@ class TreeReader {
   [[nodiscard]] std::size_t value_bytes() const {
     return scalar_ == Scalar::Float ? 4 : scalar_ == Scalar::Double ? 8 : 1;
   }
-  [[nodiscard]] Error too_short() const { return bad_at(reader_.position(), "it ends before its trees do"); }
+  [[nodiscard]] Error too_short() const { return bad_at(reader_.position(), "the file ends before its trees"); }
 
   float read_value() {
     if (scalar_ == Scalar::Float) return reader_.f32();
@@ -158,7 +158,7 @@ class TreeReader {
     for (int axis = 0; axis < 3; ++axis) {
       origin[axis] = reader_.i32();
       if (origin[axis] < -kMaxCoordinate || origin[axis] >= kMaxCoordinate || (origin[axis] & (edge - 1)) != 0) {
-        return bad_at(at, "a node at a place that there cannot be");
+        return bad_at(at, "a node position is invalid");
       }
     }
     return origin;
@@ -252,7 +252,7 @@ Result<std::vector<float>> TreeReader::read_values(std::size_t count, std::span<
   enum Code : std::uint8_t { Background, MinusBackground, OneValue, MaskOfBackground, MaskOfOne, MaskOfTwo, All };
   const std::size_t at = reader_.position();
   const unsigned code = reader_.u8();
-  if (code > All) return bad_at(at, "values stored in an unknown way");
+  if (code > All) return bad_at(at, "unknown value encoding");
   float first = code == Background ? grid_.background : is_truth() ? 1.0F - grid_.background : -grid_.background;
   float second = grid_.background;
   if (code == OneValue || code == MaskOfOne || code == MaskOfTwo) first = read_value();
@@ -291,10 +291,11 @@ Status TreeReader::read_data(std::size_t count, std::span<float> out) {
     const auto claimed = static_cast<std::int64_t>(read_u64(reader_));
     const std::uint64_t packed_size =
         claimed < 0 ? 0 - static_cast<std::uint64_t>(claimed) : static_cast<std::uint64_t>(claimed);
-    if (reader_.failed() || packed_size > reader_.remaining()) return bad_at(at, "values that end behind the file");
+    if (reader_.failed() || packed_size > reader_.remaining())
+      return bad_at(at, "values extend past the end of the file");
     const auto packed = reader_.take(packed_size);
     if (claimed <= 0) {
-      if (packed_size != bytes) return bad_at(at, "not as many values as the node has");
+      if (packed_size != bytes) return bad_at(at, "the size of the values differs from the node's");
       data = packed;
     } else {
       expanded_.resize(bytes);
@@ -305,7 +306,7 @@ Status TreeReader::read_data(std::size_t count, std::span<float> out) {
       } else {
         ByteStream stream(packed, 0, Compression::Zlib);
         const auto read = stream.read(expanded_);
-        if (!read || *read != bytes) return bad_at(at + 8, "a zlib stream that is damaged");
+        if (!read || *read != bytes) return bad_at(at + 8, "a zlib stream is damaged");
       }
       data = expanded_;
     }
@@ -373,8 +374,9 @@ class FileReader {
     static_cast<void>(reader_.take(kMagic.size()));
     const std::uint32_t version = reader_.u32();
     if (version < kOldest || version > kNewest) {
-      return make_error(ErrorCode::Unsupported, "version " + std::to_string(version) + " of .vdb (222 to 225 are read)",
-                        {}, kMagic.size());
+      return make_error(ErrorCode::Unsupported,
+                        ".vdb version " + std::to_string(version) + " is not supported (222 to 225 are)", {},
+                        kMagic.size());
     }
     static_cast<void>(reader_.take(8));  // of the library
     const std::size_t offsets_at = reader_.position();
@@ -382,9 +384,9 @@ class FileReader {
     static_cast<void>(reader_.take(36));
     static_cast<void>(read_metadata(reader_));
     const std::size_t count = reader_.count(12 + 24);
-    if (reader_.failed()) return bad_at(bytes_.size(), "it ends before its grids do");
+    if (reader_.failed()) return bad_at(bytes_.size(), "the file ends before its grids");
     if (!has_offsets) {
-      return make_error(ErrorCode::Unsupported, "a stream of .vdb, which does not say where its grids are", {},
+      return make_error(ErrorCode::Unsupported, "a streamed .vdb file without grid offsets is not supported", {},
                         offsets_at);
     }
     std::vector<Descriptor> descriptors;
@@ -400,7 +402,7 @@ class FileReader {
         file_.grids[grid].same_as = found->second;
         file_.grids[grid].meaning = file_.grids[found->second].meaning;
       } else {
-        file_.warnings.push_back("left out: " + file_.grids[grid].name + ", whose tree is not there");
+        file_.warnings.push_back("left out: " + file_.grids[grid].name + ", whose tree does not exist");
       }
     }
     return std::move(file_);
@@ -418,7 +420,7 @@ class FileReader {
     static_cast<void>(read_u64(reader_));
     const std::uint64_t end = read_u64(reader_);
     if (reader_.failed() || next.begin < reader_.position() || end < next.begin || end > bytes_.size()) {
-      return bad_at(next.at, "a grid that begins or ends where it cannot");
+      return bad_at(next.at, "a grid's start or end is out of bounds");
     }
     // So grids do not overlap, and each byte is read once.
     reader_ = ByteReader(bytes_, end, bytes_.size());
@@ -432,7 +434,7 @@ class FileReader {
     const std::uint32_t compression = reader.u32();
     const Metadata metadata = read_metadata(reader);
     const std::string map = read_string(reader);
-    if (reader.failed()) return bad_at(descriptor.begin, "a grid that ends before its tree");
+    if (reader.failed()) return bad_at(descriptor.begin, "a grid ends before its tree");
     Grid grid;
     grid.name = shown_name(descriptor.name);
     std::string type = descriptor.type;
@@ -441,8 +443,9 @@ class FileReader {
     const auto scalar = scalar_of(type);
     const auto matrix = read_map(reader, map);
     if (!scalar || !matrix) {
-      file_.warnings.push_back("left out: the grid \"" + grid.name + "\", " +
-                               (scalar ? "which is bent (" + printable(map) + ")" : "of " + printable(type)));
+      file_.warnings.push_back(
+          "left out: the grid \"" + grid.name + "\", " +
+          (scalar ? "whose transform is not affine (" + printable(map) + ")" : "of type " + printable(type)));
       return {};
     }
     grid.world_from_index = *matrix;

@@ -68,7 +68,7 @@ Result<std::vector<Piece>> pieces_of(const Grid& grid, FunctionRef<bool(const Ti
     const auto count = static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge) * static_cast<std::size_t>(edge);
     if (tile.edge > kLeafEdge) filled += count;
     if (filled > kMaxFilledChunks) {
-      return make_error(ErrorCode::LimitExceeded, "tiles that fill more than 2^20 chunks");
+      return make_error(ErrorCode::LimitExceeded, "the tiles fill more than 2^20 chunks");
     }
     for (int z = 0; z < edge; ++z) {
       for (int y = 0; y < edge; ++y) {
@@ -201,12 +201,12 @@ class SceneMaker {
     if (grid.meaning == Meaning::Fog && !is_empty) return add_fog(i);
     auto placed = place_of(grid.world_from_index);
     if (!placed) {
-      loaded_.warnings.push_back("left out: the grid \"" + grid.name + "\", whose voxels are no cubes");
+      loaded_.warnings.push_back("left out: the grid \"" + grid.name + "\", whose voxels are not cubes");
       return {};
     }
     const double band = double{grid.background} / placed->voxel_size;
     if (grid.meaning == Meaning::LevelSet && !(band > 0.0)) {
-      loaded_.warnings.push_back("left out: the grid \"" + grid.name + "\", a level set that says nothing of outside");
+      loaded_.warnings.push_back("left out: the grid \"" + grid.name + "\", a level set without an outside");
       return {};
     }
     SceneGrid content;
@@ -237,7 +237,7 @@ class SceneMaker {
     if (auto placed = place_of(matrix)) {
       place(std::move(*placed), handle, grid);
     } else {
-      loaded_.warnings.push_back("left out: the grid \"" + grid.name + "\", whose voxels are no cubes");
+      loaded_.warnings.push_back("left out: the grid \"" + grid.name + "\", whose voxels are not cubes");
     }
   }
 
@@ -331,7 +331,7 @@ Status SceneMaker::add_fog(std::size_t i) {
   const IBox box = box_of(grid);
   const DVec3 size = DVec3(box.max) - DVec3(box.min);
   if (size.x * size.y * size.z > kMaxFog) {
-    return make_error(ErrorCode::LimitExceeded, "fog of more than 2^27 values (" + grid.name + ")");
+    return make_error(ErrorCode::LimitExceeded, "the fog volume \"" + grid.name + "\" has more than 2^27 values");
   }
   Volume volume;
   volume.size = box.size();
@@ -340,7 +340,8 @@ Status SceneMaker::add_fog(std::size_t i) {
   fill_values(grid, box, volume.values);
   find_range(volume);
   if (volume.min == volume.max) {
-    loaded_.warnings.push_back("the fog \"" + grid.name + "\" is the same everywhere: nothing of it is solid");
+    loaded_.warnings.push_back("the fog volume \"" + grid.name +
+                               "\" has the same density everywhere, so none of it is solid");
   }
   origins_[i] = box.min;
   volume.world_from_voxel = grid.world_from_index;

@@ -266,7 +266,7 @@ TEST(Vdb, RealFilesHoldWhatOpenVdbFindsInThem) {
     // All values equal the background, 0.
     const LoadedScene loaded = load(folder / "syoyo+tinyvdbio" / name);
     ASSERT_EQ(loaded.warnings.size(), 1U);
-    EXPECT_NE(loaded.warnings[0].find("the same everywhere"), std::string::npos);
+    EXPECT_NE(loaded.warnings[0].find("the same density everywhere"), std::string::npos);
   }
 }
 

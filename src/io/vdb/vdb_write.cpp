@@ -415,15 +415,15 @@ std::vector<std::string> losses_of_vdb(const Scene& scene) {
   std::int64_t with_data = 0;
   for (const GridHandle handle : scene.grids().handles()) with_data += scene.grids()[handle].grid.data_count();
   if (scene.types.size() > 1) {
-    lines.emplace_back("left out: of which types voxels and densities are (.vdb has where they are)");
+    lines.emplace_back("left out: voxel types (.vdb stores only where voxels and densities are)");
   }
-  if (with_data > 0) lines.push_back("left out: data at " + std::to_string(with_data) + " voxels");
+  if (with_data > 0) lines.push_back("left out: data of " + std::to_string(with_data) + " voxels");
   if (!scene.groups().handles().empty() || !scene.layers().handles().empty()) {
     lines.emplace_back("left out: groups and layers");
   }
   const auto is_hidden = [&](InstanceHandle handle) { return !is_shown(scene, scene.instances()[handle]); };
   if (std::ranges::any_of(scene.instances().handles(), is_hidden)) {
-    lines.emplace_back("what is hidden is shown: .vdb has no switches");
+    lines.emplace_back("hidden instances become visible: .vdb cannot store visibility");
   }
   return lines;
 }

@@ -48,9 +48,10 @@ Status set_size(const std::array<std::int64_t, 3>& extents, const VolumeOptions&
     room = extent > std::numeric_limits<std::int32_t>::max() ? 0 : room / extent;
   }
   if (room < 1) {
-    return make_error(ErrorCode::LimitExceeded,
-                      "it claims " + text + " values; at most " + std::to_string(options.max_values) + " are read", {},
-                      byte_offset);
+    return make_error(
+        ErrorCode::LimitExceeded,
+        "the header claims " + text + " values, more than the limit of " + std::to_string(options.max_values), {},
+        byte_offset);
   }
   for (int axis = 0; axis < 3; ++axis) {
     volume.size[axis] = static_cast<std::int32_t>(extents[static_cast<std::size_t>(axis)]);

@@ -113,9 +113,10 @@ TEST(VolumeHostile, DimensionsThatAreNoneAreErrors) {
 TEST(VolumeHostile, SizesThatOverflowAreErrors) {
   const std::int64_t huge = std::numeric_limits<std::int64_t>::max();
   EXPECT_EQ(text_of({.is_second = true, .dim = {3, huge, huge, 2}}),
-            "byte 16: it claims 9223372036854775807 x 9223372036854775807 x 2 values; at most 1073741824 are read");
+            "byte 16: the header claims 9223372036854775807 x 9223372036854775807 x 2 values, more than the limit of "
+            "1073741824");
   EXPECT_EQ(text_of({.is_second = true, .dim = {3, 1LL << 32, 1LL << 32, 1}}),
-            "byte 16: it claims 4294967296 x 4294967296 x 1 values; at most 1073741824 are read");
+            "byte 16: the header claims 4294967296 x 4294967296 x 1 values, more than the limit of 1073741824");
   EXPECT_EQ(error_in(NiftiFile{}.bytes(twelve()), {.max_values = 11}).code, ErrorCode::LimitExceeded);
   EXPECT_TRUE(read_volume(NiftiFile{}.bytes(twelve()), {.max_values = 12}));
   EXPECT_FALSE(read_volume(NiftiFile{}.bytes(twelve()), {.max_values = -1}));
@@ -136,14 +137,15 @@ TEST(VolumeHostile, OffsetsBeyondTheFileAreErrors) {
 TEST(VolumeHostile, HeadersThatLieOfTheirValuesAreErrors) {
   EXPECT_EQ(text_of({.dim = {3, 3, 3, 2}}), "byte 352: 3 x 3 x 2 values of uint8 take 18 bytes, but there are 12");
   EXPECT_EQ(text_of({.datatype = 64}), "byte 352: 3 x 2 x 2 values of float64 take 96 bytes, but there are 12");
-  EXPECT_EQ(text_of({.datatype = 3}), "byte 70: datatype 3 is none of NIfTI's");
+  EXPECT_EQ(text_of({.datatype = 3}), "byte 70: datatype 3 is not a NIfTI type");
   EXPECT_EQ(text_of({.slope = 1, .intercept = kNan}), "byte 116: scl_inter is not a finite number");
   for (const int datatype : {1, 32, 128, 1536, 1792, 2048, 2304}) {
     EXPECT_EQ(error_in(NiftiFile{.datatype = datatype}.bytes(twelve())).code, ErrorCode::Unsupported) << datatype;
   }
-  EXPECT_EQ(text_of({.datatype = 128}), "byte 70: the values are colours, not plain numbers of up to 64 bits");
-  EXPECT_EQ(text_of({.magic = "ni1"}), "the header of a pair, whose values are in a file of their own (.img)");
-  EXPECT_EQ(to_string(error_in({})), "neither NIfTI nor NRRD");
+  EXPECT_EQ(text_of({.datatype = 128}),
+            "byte 70: the values are colours, and only plain numbers of up to 64 bits are supported");
+  EXPECT_EQ(text_of({.magic = "ni1"}), "the header of a file pair, whose values are in a second file (.img)");
+  EXPECT_EQ(to_string(error_in({})), "neither a NIfTI nor a NRRD file");
 }
 
 TEST(VolumeHostile, OffsetsWithinCompressedFilesSayWhatTheyCount) {
@@ -169,7 +171,7 @@ TEST(VolumeHostile, BombsOfGzipAreErrors) {
 TEST(VolumeHostile, DamagedCompressionIsAnErrorEvenBehindTheValues) {
   Bytes bytes = gzipped(NiftiFile{}.bytes(twelve()));
   bytes[bytes.size() - 6] ^= std::byte{1};
-  EXPECT_NE(to_string(error_in(bytes)).find("the compressed data are damaged"), std::string::npos);
+  EXPECT_NE(to_string(error_in(bytes)).find("the compressed data is damaged"), std::string::npos);
 }
 
 TEST(VolumeHostile, TheCorpusIsHarmless) {

@@ -109,7 +109,7 @@ DVec3 spacing_of(const Fields& fields, std::vector<std::string>& warnings) {
     // Axes that have one sample need no spacing.
     is_amiss |= !is_good && axis < fields.dim(0);
   }
-  if (is_amiss) warnings.emplace_back("pixdim is no distance; 1 is taken");
+  if (is_amiss) warnings.emplace_back("pixdim is not a valid distance; 1 is used");
   return spacing;
 }
 
@@ -148,7 +148,7 @@ void compare_forms(const glm::dmat4& sform, const glm::dmat4& qform, std::vector
   }
   bool is_opposite = false;
   for (int axis = 0; axis < 3; ++axis) is_opposite |= glm::dot(a[axis], b[axis]) < 0.0;
-  if (is_opposite) warnings.emplace_back("the sform and the qform turn the axes differently; the sform is used");
+  if (is_opposite) warnings.emplace_back("the sform and the qform orient the axes differently; the sform is used");
 }
 
 /// The first of sform and qform that the header gives and that places samples in space.
@@ -158,12 +158,12 @@ std::optional<glm::dmat4> given(const Fields& fields, DVec3 spacing, std::vector
     const glm::dmat4 other = fields.code(kQformCode) > 0 ? qform(fields, spacing) : affine;
     if (is_sound(affine) && is_sound(other)) compare_forms(affine, other, warnings);
     if (is_sound(affine)) return affine;
-    warnings.emplace_back("the sform places no sample; it is left out");
+    warnings.emplace_back("the sform is not invertible and is ignored");
   }
   if (fields.code(kQformCode) > 0) {
     const glm::dmat4 affine = qform(fields, spacing);
     if (is_sound(affine)) return affine;
-    warnings.emplace_back("the qform places no sample; it is left out");
+    warnings.emplace_back("the qform is not invertible and is ignored");
   }
   return std::nullopt;
 }
@@ -264,9 +264,10 @@ Error refuse_type(int datatype, std::size_t at) {
   if (datatype == 32 || datatype == 1792 || datatype == 2048) what = "complex numbers";
   if (datatype == 128 || datatype == 2304) what = "colours";
   if (datatype == 1536) what = "128-bit numbers";
-  if (what == nullptr) return bad("datatype " + std::to_string(datatype) + " is none of NIfTI's", at);
+  if (what == nullptr) return bad("datatype " + std::to_string(datatype) + " is not a NIfTI type", at);
   return make_error(ErrorCode::Unsupported,
-                    std::string("the values are ") + what + ", not plain numbers of up to 64 bits", {}, at);
+                    std::string("the values are ") + what + ", and only plain numbers of up to 64 bits are supported",
+                    {}, at);
 }
 
 Status read_type(const Fields& fields, Volume& volume) {
@@ -299,7 +300,7 @@ Status read_size(const Fields& fields, const VolumeOptions& options, Volume& vol
     has_more |= i > 3 && extent > 1;
   }
   if (has_more) {
-    volume.warnings.push_back("it has " + std::to_string(dimensions) + " dimensions; the first volume is taken");
+    volume.warnings.push_back("it has " + std::to_string(dimensions) + " dimensions; the first volume is read");
   }
   return set_size(extents, options, fields.offset(kDim), volume);
 }
@@ -335,7 +336,7 @@ Status read_data_place(const Fields& fields, bool is_pair, VolumeHeader& header)
   if (header.data_at != 0) return bad("vox_offset is " + std::to_string(header.data_at) + ", within the header", at);
   header.data_at = least;
   // Two statements: in a single one, GCC 12 gives a false warning about the concatenation.
-  std::string& warning = header.volume.warnings.emplace_back("vox_offset is 0; the values are taken from byte ");
+  std::string& warning = header.volume.warnings.emplace_back("vox_offset is 0; the values are read from byte ");
   warning += std::to_string(least);
   return {};
 }

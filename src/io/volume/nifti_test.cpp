@@ -132,9 +132,9 @@ TEST(Nifti, FormsThatDisagreeAreWarnedOf) {
   EXPECT_TRUE(warns(volume, "the sform and the qform disagree on left and right; the sform is used"));
   expect_near(position_of(volume, {1, 0, 0}), {-8, 0, 0});
   file.srow = {-1, 0, 0, 9, 0, -1, 0, 0, 0, 0, 1, 0};
-  EXPECT_TRUE(warns(placed(file), "turn the axes differently"));
+  EXPECT_TRUE(warns(placed(file), "orient the axes differently"));
   file.qform_code = 0;
-  EXPECT_FALSE(warns(placed(file), "turn the axes differently"));
+  EXPECT_FALSE(warns(placed(file), "orient the axes differently"));
 }
 
 TEST(Nifti, TheQformTurnsAndQfacFlipsTheThirdAxis) {

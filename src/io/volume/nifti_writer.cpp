@@ -48,7 +48,7 @@ Status check_size(const IBox& box) {
   if (std::max({size.x, size.y, size.z}) <= kMaxEdge &&
       std::int64_t{size.x} * size.y <= kMaxSamples / std::max(size.z, 1))
     return {};
-  return make_error(ErrorCode::LimitExceeded, "more than 32,767 samples a side, or 2^30 in all");
+  return make_error(ErrorCode::LimitExceeded, "more than 32,767 samples per side, or 2^30 in total");
 }
 
 void write_header(const Header& header, ByteWriter& out) {
@@ -110,7 +110,8 @@ Status for_each_row(const IBox& box, const Progress& progress, Row row) {
 Result<models::ModelBytes> write_labels(const Scene& scene, const Progress& progress) {
   auto merged = models::merge_grids(scene, kHolds);
   if (!merged) return merged.error();
-  if (merged->box.empty()) return make_error(ErrorCode::Unsupported, "there are no voxels, and .nii needs some");
+  if (merged->box.empty())
+    return make_error(ErrorCode::Unsupported, "the scene has no voxels, and .nii needs at least one");
   if (auto sound = check_size(merged->box); !sound) return sound.error();
   const std::vector<VoxelType> types = merged->voxels.types();
   const bool is_wide = !types.empty() && *std::ranges::max_element(types) > 0xFF;
@@ -159,9 +160,9 @@ Result<models::ModelBytes> write_densities(const Instance& instance, const Scene
   });
   if (!done) return done.error();
   file.bytes = out.take();
-  file.warnings.emplace_back("materials, colours, hidden instances and lamps are left out, which .nii does not hold");
+  file.warnings.emplace_back("materials, colours, hidden instances and lamps left out, not supported by .nii");
   file.warnings.push_back("values are densities within " + std::to_string(around.x) +
-                          " samples of the surface, in no unit, not those of a file that was read");
+                          " samples of the surface, without a unit, not the values of the input file");
   return file;
 }
 
@@ -182,7 +183,7 @@ Result<models::ModelBytes> write_nifti(const Scene& scene, const Progress& progr
   if (fields == 0) return write_labels(scene, progress);
   if (fields > 1 || others > 0) {
     return make_error(ErrorCode::Unsupported,
-                      "several fields of densities, or one beside voxels: .nii holds one volume");
+                      "several density fields, or a density field and voxels: .nii stores one volume");
   }
   return write_densities(*shown, scene.grids()[shown->grid], progress);
 }

@@ -79,12 +79,12 @@ Status add_line(std::string_view line, std::size_t at, Fields& fields) {
   if (line.front() == '#') return {};
   const std::size_t colon = line.find(':');
   if (colon == std::string_view::npos || colon + 1 == line.size()) {
-    return bad("the line " + quoted(line) + " is no field of a NRRD header", at);
+    return bad("the line " + quoted(line) + " is not a NRRD header field", at);
   }
   if (line[colon + 1] == '=') return {};
   const Field field{trimmed(line.substr(colon + 1)), at};
   if (fields.all.emplace(key_of(line.substr(0, colon)), field).second) return {};
-  return bad("the field " + quoted(line.substr(0, colon)) + " is there twice", at);
+  return bad("the field " + quoted(line.substr(0, colon)) + " is a duplicate", at);
 }
 
 const Field* Fields::find(std::string_view name) const {
@@ -191,7 +191,8 @@ Result<VolumeSpace> space_of(const Fields& fields) {
   if (space == "left-posterior-superior" || space == "lps") return VolumeSpace::LeftBackHead;
   if (space == "scanner-xyz" || space == "3d-right-handed") return VolumeSpace::RightHanded;
   if (space == "3d-left-handed") return VolumeSpace::LeftHanded;
-  return unsupported("the space is \"" + printable(field->text) + "\", which is none of three dimensions", *field);
+  return unsupported("the space is \"" + printable(field->text) + "\", which is not a known space of 3 dimensions",
+                     *field);
 }
 
 /// Kinds of axes that are not space.
@@ -218,7 +219,7 @@ Result<Axes> read_axes(const Fields& fields, std::size_t dimensions) {
   for (std::size_t axis = axes.first; axis < kinds.size() && axis < axes.first + 3; ++axis) {
     if (!is_spatial(kinds[axis])) {
       return unsupported("axis " + std::to_string(axis + 1) + " is of kind \"" + printable(kinds[axis]) +
-                             "\"; three axes of space must come first, or after one other",
+                             "\"; the three spatial axes must come first, or after one other axis",
                          *field);
     }
   }
@@ -239,17 +240,17 @@ Status read_directions(const Field& field, const Axes& axes, glm::dmat4& space_f
     const std::vector<double>& v = (*vectors)[place];
     if (v.empty()) {
       return unsupported("axis " + std::to_string(place + 1) +
-                             " has no direction; three axes of space must come first, or after one other",
+                             " has no direction; the three spatial axes must come first, or after one other axis",
                          field);
     }
-    if (!is_vector(v)) return bad("a space direction is no vector of 3 finite numbers", field);
+    if (!is_vector(v)) return bad("a space direction is not a vector of 3 finite numbers", field);
     space_from_voxel[axis] = glm::dvec4(v[0], v[1], v[2], 0.0);
   }
   const glm::dmat3 turn(space_from_voxel);
   const double box = glm::length(turn[0]) * glm::length(turn[1]) * glm::length(turn[2]);
   constexpr double kFlattest = 1e-6;
   if (std::isfinite(box) && std::abs(glm::determinant(turn)) > kFlattest * box) return {};
-  return bad("the space directions do not span a space", field);
+  return bad("the space directions are linearly dependent", field);
 }
 
 Status read_origin(const Fields& fields, glm::dmat4& space_from_voxel) {
@@ -257,7 +258,7 @@ Status read_origin(const Fields& fields, glm::dmat4& space_from_voxel) {
   if (field == nullptr) return {};
   const auto vectors = parse_vectors(field->text);
   if (!vectors || vectors->size() != 1 || !is_vector(vectors->front())) {
-    return bad("the space origin is no vector of 3 finite numbers", *field);
+    return bad("the space origin is not a vector of 3 finite numbers", *field);
   }
   const std::vector<double>& v = vectors->front();
   space_from_voxel[3] = glm::dvec4(v[0], v[1], v[2], 1.0);
@@ -280,8 +281,8 @@ Status read_spacings(const Field& field, const Axes& axes, Volume& volume) {
     is_amiss |= !is_good;
     is_turned |= is_good && *number < 0.0;
   }
-  if (is_turned) volume.warnings.emplace_back("a spacing is negative; its size is taken");
-  if (is_amiss) volume.warnings.emplace_back("a spacing is no distance; 1 is taken");
+  if (is_turned) volume.warnings.emplace_back("a spacing is negative; its absolute value is used");
+  if (is_amiss) volume.warnings.emplace_back("a spacing is not a valid distance; 1 is used");
   return {};
 }
 
@@ -360,14 +361,15 @@ Status read_type(const Fields& fields, VolumeHeader& header) {
   const auto type = required(fields, "type");
   if (!type) return type.error();
   const auto scalar = scalar_type(type->text);
-  if (!scalar && normalised(type->text) == "block") return unsupported("the values are blocks, not numbers", type->at);
-  if (!scalar) return bad("the type is " + quoted(type->text), type->at);
+  if (!scalar && normalised(type->text) == "block")
+    return unsupported("the values are blocks, and only numbers are supported", type->at);
+  if (!scalar) return bad("unknown type " + quoted(type->text), type->at);
   header.volume.type = *scalar;
   if (size_of(*scalar) == 1) return {};
   const auto endian = required(fields, "endian");
   if (!endian) return endian.error();
   const std::string order = normalised(endian->text);
-  if (order != "little" && order != "big") return bad("the endian is " + quoted(endian->text), endian->at);
+  if (order != "little" && order != "big") return bad("unknown endian " + quoted(endian->text), endian->at);
   header.order = order == "big" ? std::endian::big : std::endian::little;
   return {};
 }
@@ -377,7 +379,7 @@ Result<std::size_t> read_dimensions(const Fields& fields) {
   if (!field) return field.error();
   const auto dimensions = parse_integer(field->text);
   if (!dimensions || *dimensions < 1 || *dimensions > kMaxDimensions) {
-    return bad("the dimension is " + quoted(field->text), field->at);
+    return bad("invalid dimension " + quoted(field->text), field->at);
   }
   if (*dimensions >= 3) return static_cast<std::size_t>(*dimensions);
   return unsupported("it has " + std::to_string(*dimensions) + " dimensions; a volume has 3", field->at);
@@ -396,7 +398,7 @@ Status take_components(const Fields& fields, std::int64_t count, std::size_t at,
   header.components = static_cast<std::size_t>(count);
   if (count == 1) return {};
   header.volume.warnings.push_back("axis 1 (kind " + kind_of(fields, 0) + ") has " + std::to_string(count) +
-                                   " values per voxel; the first of them is read");
+                                   " values per voxel; only the first is read");
   return {};
 }
 
@@ -409,7 +411,7 @@ Status read_sizes(const Fields& fields, const Axes& axes, const VolumeOptions& o
   bool has_more = false;
   for (std::size_t axis = 0; axis < axes.count; ++axis) {
     const auto extent = parse_integer(words[axis]);
-    if (!extent || *extent < 1) return bad("a size is " + quoted(words[axis]), field->at);
+    if (!extent || *extent < 1) return bad("invalid size " + quoted(words[axis]), field->at);
     if (axis < axes.first) {
       if (auto taken = take_components(fields, *extent, field->at, header); !taken) return taken;
     } else if (axis < axes.first + 3) {
@@ -419,7 +421,7 @@ Status read_sizes(const Fields& fields, const Axes& axes, const VolumeOptions& o
     }
   }
   if (has_more) {
-    header.volume.warnings.push_back("it has " + std::to_string(axes.count) + " dimensions; the first volume is taken");
+    header.volume.warnings.push_back("it has " + std::to_string(axes.count) + " dimensions; the first volume is read");
   }
   return set_size(extents, options, field->at, header.volume);
 }
@@ -440,8 +442,8 @@ Status read_encoding(const Fields& fields, VolumeHeader& header) {
                                             {"hex", DataEncoding::Hex}}};
   const auto* const known = std::ranges::find(kNames, encoding, &Names::first);
   if (known == kNames.end()) {
-    return unsupported("the encoding is " + quoted(field->text) + "; raw, gzip, bzip2, ascii and hex are read",
-                       field->at);
+    return unsupported(
+        "unsupported encoding " + quoted(field->text) + " (raw, gzip, bzip2, ascii and hex are supported)", field->at);
   }
   header.data_encoding = known->second;
   return {};
@@ -469,7 +471,7 @@ Status read_skips(const Fields& fields, std::string_view bytes, VolumeHeader& he
   }
   for (std::int64_t line = 0; line < *lines && !header.is_data_elsewhere; ++line) {
     const std::size_t end = bytes.find('\n', at);
-    if (end == std::string_view::npos) return bad("the lines to skip do not end soon enough", at);
+    if (end == std::string_view::npos) return bad("the lines to skip are too long", at);
     at = end + 1;
   }
   header.data_at = at;
@@ -485,20 +487,20 @@ Status read_skips(const Fields& fields, std::string_view bytes, VolumeHeader& he
 Status read_data_file(const Fields& fields, VolumeHeader& header) {
   const Field* const file = fields.find("datafile");
   if (file == nullptr) {
-    if (!fields.has_end) return bad("no empty line ends the header", fields.end);
+    if (!fields.has_end) return bad("the header does not end with an empty line", fields.end);
     return {};
   }
   std::string_view name = file->text;
   if (name.starts_with("./")) name.remove_prefix(2);
   if (name.starts_with("LIST") || name.find('%') != std::string_view::npos) {
-    return unsupported("the values are in several files (" + quoted(file->text) + "); one is read", file->at);
+    return unsupported("the values are in several files (" + quoted(file->text) + "); only one is supported", file->at);
   }
   const bool is_plain =
       !name.empty() && name != "." && name != ".." && name.find_first_of("/\\:") == std::string_view::npos;
   if (!is_plain) {
-    return unsupported("the values are in the file " + quoted(file->text) +
-                           "; only a file in the folder of the header is read, named without its folder",
-                       file->at);
+    return unsupported(
+        "the data file is " + quoted(file->text) + "; it must be in the header's folder and named without a folder",
+        file->at);
   }
   header.is_data_elsewhere = true;
   header.data_file = name;
@@ -517,7 +519,7 @@ Result<VolumeHeader> read_header(std::span<const std::byte> bytes, const VolumeO
   QUOIN_ASSERT(is_header(bytes), "a header begins here");
   const std::string_view text = text_of(bytes.first(std::min(bytes.size(), kMaxHeaderBytes)));
   if (text[kMagic.size()] < '1' || text[kMagic.size()] > '5') {
-    return unsupported("a NRRD of version " + std::string(1, text[kMagic.size()]) + "; 1 to 5 are read", 0);
+    return unsupported("NRRD version " + std::string(1, text[kMagic.size()]) + " is not supported (1 to 5 are)", 0);
   }
   const auto fields = split_header(text);
   if (!fields) return fields.error();

@@ -90,7 +90,7 @@ Result<std::vector<std::byte>> decode_ascii(std::string_view text, std::size_t b
     const std::size_t end = std::min(text.find_first_of(kBetween, at), text.size());
     const std::string_view word = text.substr(at, end - at);
     if (!append_one(word, header.order, out)) {
-      return bad(quoted(word).append(" is no value of the type ").append(name_of(header.volume.type)), at);
+      return bad(quoted(word).append(" is not a value of type ").append(name_of(header.volume.type)), at);
     }
     at = text.find_first_not_of(kBetween, end);
   }
@@ -113,7 +113,7 @@ Result<std::vector<std::byte>> decode_hex(std::string_view text, std::size_t beg
   for (std::size_t at = begin; at < text.size() && out.size() < wanted; ++at) {
     if (kBlanks.find(text[at]) != std::string_view::npos) continue;
     const int digit = hex_digit(text[at]);
-    if (digit < 0) return bad(quoted(text.substr(at, 1)).append(" is no hexadecimal digit"), at);
+    if (digit < 0) return bad(quoted(text.substr(at, 1)).append(" is not a hexadecimal digit"), at);
     if (high >= 0) out.push_back(static_cast<std::byte>(high << 4 | digit));
     high = high >= 0 ? -1 : digit;
   }
@@ -157,8 +157,8 @@ Result<std::vector<std::byte>> decode_bzip2(std::span<const std::byte> bytes, st
     const std::size_t taken = offered - state.avail_in;
     out.resize(filled + written);
     at += taken;
-    if (outcome != BZ_OK && outcome != BZ_STREAM_END) return bad("the compressed data are damaged", at);
-    if (outcome == BZ_OK && written == 0 && taken == 0) return bad("the compressed data are cut off", at);
+    if (outcome != BZ_OK && outcome != BZ_STREAM_END) return bad("the compressed data is damaged", at);
+    if (outcome == BZ_OK && written == 0 && taken == 0) return bad("the compressed data is cut off", at);
   }
   return out;
 }
@@ -166,8 +166,8 @@ Result<std::vector<std::byte>> decode_bzip2(std::span<const std::byte> bytes, st
 #else
 
 Result<std::vector<std::byte>> decode_bzip2(std::span<const std::byte>, std::size_t begin, const VolumeHeader&) {
-  return make_error(ErrorCode::Unsupported,
-                    "the encoding is bzip2, and Quoin was built without it (Debian: libbz2-dev)", {}, begin);
+  return make_error(ErrorCode::Unsupported, "cannot read bzip2: Quoin was built without it (Debian: libbz2-dev)", {},
+                    begin);
 }
 
 #endif
@@ -181,7 +181,7 @@ Result<std::vector<std::byte>> decode_values(std::span<const std::byte> bytes, s
   const std::uint64_t skipped = begin + header.skip;
   if (skipped > bytes.size()) {
     return bad(
-        "the values begin at byte " + std::to_string(skipped) + ", but there are " + std::to_string(bytes.size()),
+        "the values begin at byte " + std::to_string(skipped) + ", but the file has " + std::to_string(bytes.size()),
         begin);
   }
   const std::string_view text = text_of(bytes);

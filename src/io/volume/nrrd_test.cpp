@@ -91,7 +91,7 @@ TEST(Nrrd, SpacingsPlaceSamplesLikeVoxels) {
   EXPECT_EQ(volume_of(tiny("spacings: 2 nan 4\n")).spacing, DVec3(2, 1, 4));
   const Volume turned = volume_of(tiny("spacings: 2 -3 4\n"));
   EXPECT_EQ(turned.spacing, DVec3(2, 3, 4));
-  EXPECT_EQ(turned.warnings, std::vector<std::string>{"a spacing is negative; its size is taken"});
+  EXPECT_EQ(turned.warnings, std::vector<std::string>{"a spacing is negative; its absolute value is used"});
 }
 
 TEST(Nrrd, DirectionsAndOriginPlaceSamples) {
@@ -152,12 +152,12 @@ TEST(Nrrd, ReadsTheFirstOfSeveralComponents) {
     EXPECT_EQ(volume.size, IVec3(2, 2, 1));
     EXPECT_EQ(volume.spacing, DVec3(2, 3, 4));
     ASSERT_EQ(volume.warnings.size(), 1U);
-    EXPECT_NE(volume.warnings[0].find("3 values per voxel; the first of them is read"), std::string::npos);
+    EXPECT_NE(volume.warnings[0].find("3 values per voxel; only the first is read"), std::string::npos);
   }
   EXPECT_EQ(error_of(file_of(header + "kinds: domain domain vector domain\n\n", data)),
-            "byte 63: axis 3 is of kind \"vector\"; three axes of space must come first, or after one other");
+            "byte 63: axis 3 is of kind \"vector\"; the three spatial axes must come first, or after one other axis");
   EXPECT_EQ(error_of(file_of(header + "space directions: (1,0,0) none (0,1,0) (0,0,1)\n\n", data)),
-            "byte 63: axis 2 has no direction; three axes of space must come first, or after one other");
+            "byte 63: axis 2 has no direction; the three spatial axes must come first, or after one other axis");
   EXPECT_EQ(error_of(file_of(header + "kinds: vector domain domain domain\n\n", Bytes(11))),
             "byte 99: 2 x 2 x 1 values of uint8 take 12 bytes, but there are 11");
 }
@@ -171,8 +171,8 @@ TEST(Nrrd, ReadsValuesAsText) {
   EXPECT_EQ(volume_of(file("int16", "txt", "1 2 3 4 5 6 7 8 9 10 11 12 and more")).values, kTwelveFloats);
   EXPECT_EQ(volume_of(file("uint8", "hex", "0102 030405\n060708090a0B0c")).values, kTwelveFloats);
   EXPECT_EQ(volume_of(file("ushort", "hex", "000100020003000400050006000700080009000A000B000C")).values, kTwelveFloats);
-  EXPECT_EQ(error_of(file("uint8", "ascii", "1 2 256")), "byte 80: \"256\" is no value of the type uint8");
-  EXPECT_EQ(error_of(file("uint8", "hex", "01 0x")), "byte 78: \"x\" is no hexadecimal digit");
+  EXPECT_EQ(error_of(file("uint8", "ascii", "1 2 256")), "byte 80: \"256\" is not a value of type uint8");
+  EXPECT_EQ(error_of(file("uint8", "hex", "01 0x")), "byte 78: \"x\" is not a hexadecimal digit");
   EXPECT_NE(error_of(file("uint8", "ascii", "1 2 3")), "none");
 }
 
@@ -204,32 +204,33 @@ TEST(Nrrd, ReadsValuesOfTheFileNextToADetachedHeader) {
 
 TEST(Nrrd, ReportsErrorsInOneLine) {
   const auto header = [](const std::string& text) { return error_of(file_of("NRRD0004\n" + text, {})); };
-  EXPECT_EQ(header(""), "byte 9: no empty line ends the header");
+  EXPECT_EQ(header(""), "byte 9: the header does not end with an empty line");
   EXPECT_EQ(header("\n"), "byte 10: the header has no field \"dimension\"");
-  EXPECT_EQ(header("dimension\n\n"), "byte 9: the line \"dimension\" is no field of a NRRD header");
-  EXPECT_EQ(header("dimension: 2\ndimension: 2\n\n"), "byte 22: the field \"dimension\" is there twice");
-  EXPECT_EQ(header("dimension: 17\n\n"), "byte 9: the dimension is \"17\"");
+  EXPECT_EQ(header("dimension\n\n"), "byte 9: the line \"dimension\" is not a NRRD header field");
+  EXPECT_EQ(header("dimension: 2\ndimension: 2\n\n"), "byte 22: the field \"dimension\" is a duplicate");
+  EXPECT_EQ(header("dimension: 17\n\n"), "byte 9: invalid dimension \"17\"");
   EXPECT_EQ(header("dimension: 2\n\n"), "byte 9: it has 2 dimensions; a volume has 3");
   EXPECT_EQ(header("dimension: 3\nsizes: 1 2\n\n"), "byte 22: the sizes are not 3 numbers");
-  EXPECT_EQ(header("dimension: 3\nsizes: 1 -2 3\n\n"), "byte 22: a size is \"-2\"");
-  EXPECT_EQ(header("dimension: 3\nsizes: 4294967296 4294967296 4294967296\n\n"),
-            "byte 22: it claims 4294967296 x 4294967296 x 4294967296 values; at most 1073741824 are read");
+  EXPECT_EQ(header("dimension: 3\nsizes: 1 -2 3\n\n"), "byte 22: invalid size \"-2\"");
   EXPECT_EQ(
-      header("data file: ../../secret\n"),
-      "byte 9: the values are in the file \"../../secret\"; only a file in the folder of the header is read, named "
-      "without its folder");
-  EXPECT_EQ(header("data file: LIST\n"), "byte 9: the values are in several files (\"LIST\"); one is read");
-  EXPECT_EQ(error_of(file_of("NRRD0009\n\n", {})), "byte 0: a NRRD of version 9; 1 to 5 are read");
+      header("dimension: 3\nsizes: 4294967296 4294967296 4294967296\n\n"),
+      "byte 22: the header claims 4294967296 x 4294967296 x 4294967296 values, more than the limit of 1073741824");
+  EXPECT_EQ(header("data file: ../../secret\n"),
+            "byte 9: the data file is \"../../secret\"; it must be in the header's folder and named "
+            "without a folder");
+  EXPECT_EQ(header("data file: LIST\n"), "byte 9: the values are in several files (\"LIST\"); only one is supported");
+  EXPECT_EQ(error_of(file_of("NRRD0009\n\n", {})), "byte 0: NRRD version 9 is not supported (1 to 5 are)");
   const auto field = [](const std::string& lines) { return error_of(tiny(lines)); };
   EXPECT_EQ(field("space directions: (1,0,0) (0,1,0)\n"), "byte 73: the space directions are not 3 vectors");
-  EXPECT_EQ(field("space directions: (1,0,0) (0,1,0) (1,1,0)\n"), "byte 73: the space directions do not span a space");
+  EXPECT_EQ(field("space directions: (1,0,0) (0,1,0) (1,1,0)\n"),
+            "byte 73: the space directions are linearly dependent");
   EXPECT_EQ(field("space directions: (1,0,0) (0,1,0) (0,nan,0)\n"),
-            "byte 73: a space direction is no vector of 3 finite numbers");
-  EXPECT_EQ(field("space origin: (1,2\n"), "byte 73: the space origin is no vector of 3 finite numbers");
+            "byte 73: a space direction is not a vector of 3 finite numbers");
+  EXPECT_EQ(field("space origin: (1,2\n"), "byte 73: the space origin is not a vector of 3 finite numbers");
   EXPECT_EQ(field("spacings: 1 2 x\n"), "byte 73: the spacings are not 3 numbers");
   EXPECT_EQ(field("spacings: 1 2 +-3\n"), "byte 73: the spacings are not 3 numbers");
   EXPECT_EQ(field("space: scanner-xyz-time\n"),
-            "byte 73: the space is \"scanner-xyz-time\", which is none of three dimensions");
+            "byte 73: the space is \"scanner-xyz-time\", which is not a known space of 3 dimensions");
   EXPECT_EQ(field("byte skip: -2\n"), "byte 73: the byteskip is \"-2\"");
   EXPECT_EQ(error_of(tiny("", {})), "byte 74: 3 x 2 x 2 values of uint8 take 12 bytes, but there are 0");
 }
@@ -237,13 +238,13 @@ TEST(Nrrd, ReportsErrorsInOneLine) {
 TEST(Nrrd, OtherEncodingsAndTypesAreRefused) {
   const std::string header = "NRRD0004\ndimension: 3\nsizes: 1 1 1\n";
   EXPECT_EQ(error_of(file_of(header + "type: uint8\nencoding: zrl\n\n", {})),
-            "byte 47: the encoding is \"zrl\"; raw, gzip, bzip2, ascii and hex are read");
+            "byte 47: unsupported encoding \"zrl\" (raw, gzip, bzip2, ascii and hex are supported)");
   EXPECT_EQ(error_of(file_of(header + "type: block\nencoding: raw\n\n", {})),
-            "byte 35: the values are blocks, not numbers");
+            "byte 35: the values are blocks, and only numbers are supported");
   EXPECT_EQ(error_of(file_of(header + "type: int16\nencoding: raw\n\n", {})),
             "byte 62: the header has no field \"endian\"");
   EXPECT_EQ(error_of(file_of(header + "type: uint8\nencoding: gzip\n\n12345", {})),
-            "byte 63: the encoding is gzip, but the data are not");
+            "byte 63: the encoding is gzip, but the data is not gzip");
 }
 
 }  // namespace

@@ -28,9 +28,10 @@ Result<Beginning> beginning_of(std::span<const std::byte> bytes) {
 }
 
 Result<VolumeHeader> header_of(const Beginning& beginning, const VolumeOptions& options) {
-  auto header = nifti::is_header(beginning.bytes)  ? nifti::read_header(beginning.bytes, options)
-                : nrrd::is_header(beginning.bytes) ? nrrd::read_header(beginning.bytes, options)
-                                                   : make_error(ErrorCode::BadFormat, "neither NIfTI nor NRRD");
+  auto header = nifti::is_header(beginning.bytes) ? nifti::read_header(beginning.bytes, options)
+                : nrrd::is_header(beginning.bytes)
+                    ? nrrd::read_header(beginning.bytes, options)
+                    : make_error(ErrorCode::BadFormat, "neither a NIfTI nor a NRRD file");
   if (!header && header.error().byte_offset && beginning.compression != Compression::None) {
     header.error().message += " (counted after decompression)";
   }
@@ -87,7 +88,7 @@ Result<Volume> read_data(std::span<const std::byte> bytes, Compression compressi
     return volume;
   }
   if (!begins_gzip(bytes.subspan(begin))) {
-    return make_error(ErrorCode::BadFormat, "the encoding is gzip, but the data are not", {}, begin);
+    return make_error(ErrorCode::BadFormat, "the encoding is gzip, but the data is not gzip", {}, begin);
   }
   ByteStream stream(bytes, begin, Compression::Gzip);
   return read_stream(stream, header.skip, header);
@@ -96,8 +97,7 @@ Result<Volume> read_data(std::span<const std::byte> bytes, Compression compressi
 Status check_combination(const VolumeHeader& header, Compression compression) {
   if (compression == Compression::None) return {};
   if (header.data_encoding == DataEncoding::Raw && !header.is_data_at_end) return {};
-  return make_error(ErrorCode::Unsupported,
-                    "a NRRD within gzip whose data are encoded once more or counted from the end");
+  return make_error(ErrorCode::Unsupported, "a gzip-compressed NRRD must store its data raw and from the start");
 }
 
 std::filesystem::path image_beside(const std::filesystem::path& header_path) {
@@ -123,7 +123,7 @@ Status skip_lines(std::span<const std::byte> bytes, VolumeHeader& header) {
     const auto first = bytes.begin() + static_cast<std::ptrdiff_t>(header.data_at);
     const auto end = std::find(first, bytes.end(), std::byte{'\n'});
     if (end == bytes.end()) {
-      return make_error(ErrorCode::BadFormat, "the lines to skip do not end soon enough", {}, header.data_at);
+      return make_error(ErrorCode::BadFormat, "the lines to skip are too long", {}, header.data_at);
     }
     header.data_at = static_cast<std::uint64_t>(end - bytes.begin()) + 1;
   }
@@ -160,7 +160,7 @@ Result<Volume> decode(std::span<const std::byte> bytes, const std::filesystem::p
   if (!path.empty()) return read_pair(path, options, *header);
   const std::string name = header->data_file.empty() ? std::string(".img") : printable(header->data_file);
   return make_error(ErrorCode::Unsupported,
-                    "the header of a pair, whose values are in a file of their own (" + name + ")");
+                    "the header of a file pair, whose values are in a second file (" + name + ")");
 }
 
 std::string name_from(const std::filesystem::path& path) {
@@ -194,7 +194,7 @@ std::vector<std::filesystem::path> files_of_pair(const std::filesystem::path& pa
 Result<Volume> read_raw_volume(std::span<const std::byte> bytes, const RawVolume& raw, const VolumeOptions& options,
                                const Progress& progress) {
   if (raw.size.x < 1 || raw.size.y < 1 || raw.size.z < 1) {
-    return make_error(ErrorCode::InvalidArgument, "a volume of " + text_of_size(raw.size) + " values");
+    return make_error(ErrorCode::InvalidArgument, "invalid volume size " + text_of_size(raw.size));
   }
   VolumeHeader header;
   header.progress = progress;
@@ -210,7 +210,7 @@ Result<Volume> read_raw_volume(std::span<const std::byte> bytes, const RawVolume
   if (volume && stream.remaining() > 0) {
     return make_error(
         ErrorCode::BadFormat,
-        "the values end here, but " + std::to_string(stream.remaining()) + " bytes follow; is the size right?", {},
+        "the values end here, but " + std::to_string(stream.remaining()) + " bytes follow; check the size", {},
         stream.position());
   }
   return volume;

@@ -27,7 +27,7 @@ TEST(VolumeFiles, RawFilesAreReadAsTheyAreSaidToBe) {
   EXPECT_EQ(DVec3(volume->world_from_voxel * glm::dvec4(1, 2, 3, 1)), DVec3(1, 3, -2));
   raw.size = {3, 2, 1};
   EXPECT_EQ(read_raw_volume(folder.file("a.raw"), raw).error().message,
-            "the values end here, but 12 bytes follow; is the size right?");
+            "the values end here, but 12 bytes follow; check the size");
   raw.size = {3, 2, 3};
   EXPECT_EQ(read_raw_volume(folder.file("a.raw"), raw).error().code, ErrorCode::BadFormat);
   raw.size = {3, 0, 2};

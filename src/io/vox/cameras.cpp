@@ -61,9 +61,9 @@ bool was_never_set(const Keys& keys) {
 
 std::string fault_of(const Keys& keys) {
   const bool is_known = keys.mode == "pers" || keys.mode == "free" || is_orthographic(keys);
-  if (!is_known) return "_mode \"" + printable(keys.mode) + "\" is not drawn";
+  if (!is_known) return "_mode \"" + printable(keys.mode) + "\" is not supported";
   if (!(keys.fov > 0.0 && keys.fov < 180.0)) return "_fov is not between 0 and 180";
-  if (keys.radius < 0.0) return "_radius is less than 0";
+  if (keys.radius < 0.0) return "_radius is below 0";
   if (is_orthographic(keys) && keys.radius == 0.0) return "_radius is 0";
   return {};
 }
@@ -109,9 +109,9 @@ std::vector<FileCamera> cameras_of(const Document& document, const DBox& bounds,
     const Keys keys = read_keys(chunk.attributes, fault);
     if (fault.empty() && was_never_set(keys)) continue;
     if (fault.empty()) fault = fault_of(keys);
-    if (fault.empty() && chunk.id < 0) fault = "its number is less than 0";
+    if (fault.empty() && chunk.id < 0) fault = "its id is below 0";
     if (fault.empty() && std::ranges::find(cameras, chunk.id, &FileCamera::number) != cameras.end()) {
-      fault = "there was one of this number before";
+      fault = "its id is a duplicate";
     }
     if (fault.empty()) {
       cameras.push_back({chunk.id, camera_from(keys, bounds), keys.radius});

@@ -101,10 +101,10 @@ TEST(VoxCameras, SkipsAndNamesUnsupportedCameras) {
                                         {{"_mode", "iso"}, {"_focus", "1 1 1"}}});
   EXPECT_TRUE(loaded.cameras.empty());
   EXPECT_EQ(loaded.warnings,
-            (std::vector<std::string>{"camera 0 skipped: _mode \"pano\" is not drawn",
+            (std::vector<std::string>{"camera 0 skipped: _mode \"pano\" is not supported",
                                       "camera 1 skipped: _angle is \"1 2\"", "camera 2 skipped: _focus is \"1 2 nan\"",
                                       "camera 3 skipped: _fov is not between 0 and 180",
-                                      "camera 4 skipped: _radius is less than 0", "camera 5 skipped: _radius is 0"}));
+                                      "camera 4 skipped: _radius is below 0", "camera 5 skipped: _radius is 0"}));
 }
 
 TEST(VoxCameras, ThoseThatNobodyCanNameAreSkippedAndSaid) {
@@ -118,8 +118,8 @@ TEST(VoxCameras, ThoseThatNobodyCanNameAreSkippedAndSaid) {
   }
   const LoadedScene loaded = read_vox(file.file()).value();
   ASSERT_EQ(loaded.cameras.size(), 1U);
-  EXPECT_EQ(loaded.warnings, (std::vector<std::string>{"camera -1 skipped: its number is less than 0",
-                                                       "camera 4 skipped: there was one of this number before"}));
+  EXPECT_EQ(loaded.warnings, (std::vector<std::string>{"camera -1 skipped: its id is below 0",
+                                                       "camera 4 skipped: its id is a duplicate"}));
 }
 
 TEST(VoxCameras, ADamagedOneIsNoReasonToRefuseTheVoxels) {

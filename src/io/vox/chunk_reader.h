@@ -30,7 +30,7 @@ class ChunkReader : public ByteReader {
   [[nodiscard]] Error error(const std::string& what) const {
     return bad_at(offset_, "chunk " + printable(id_) + " " + what);
   }
-  [[nodiscard]] Error too_short() const { return error("ends before its content does"); }
+  [[nodiscard]] Error too_short() const { return error("ends before its content"); }
 
  private:
   std::string_view id_;

@@ -46,12 +46,12 @@ Status check_signature(std::span<const std::byte> bytes) {
   if (bytes.empty()) return make_error(ErrorCode::BadFormat, "the file is empty");
   if (text_of(bytes, 4) == kMagic) return {};
   if (text_of(bytes, kLfsPointer.size()) == kLfsPointer) {
-    return make_error(ErrorCode::Unsupported, "this is a git-LFS pointer, not the file that it stands for");
+    return make_error(ErrorCode::Unsupported, "a Git LFS pointer, not the file itself (git lfs pull fetches it)");
   }
   if (is_slab6(bytes)) {
-    return make_error(ErrorCode::Unsupported, "this is SLAB6's .vox format, not MagicaVoxel's of the same name");
+    return make_error(ErrorCode::Unsupported, "a SLAB6 .vox file, not a MagicaVoxel .vox file");
   }
-  return bad_at(0, "a MagicaVoxel file starts with \"VOX \", this one with \"" + printable(text_of(bytes, 4)) + "\"");
+  return bad_at(0, "a MagicaVoxel file starts with \"VOX \", this file with \"" + printable(text_of(bytes, 4)) + "\"");
 }
 
 /// Reads a header and checks that its sizes end before `end`; its children may extend up to `spare` bytes further.
@@ -93,7 +93,7 @@ Status parse_size(ChunkReader& chunk, Document& out) {
   if (!read) return read.error();
   const FileSize& size = *read;
   if (std::ranges::find(size, 0U) != size.end()) {
-    out.warnings.push_back("model " + std::to_string(out.models.size()) + " has no extent on an axis; 1 is taken");
+    out.warnings.push_back("model " + std::to_string(out.models.size()) + " has size 0 on an axis; 1 is used");
   }
   Model model;
   for (int axis = 0; axis < 3; ++axis) {
@@ -126,7 +126,7 @@ Status parse_packed_voxels(ChunkReader& chunk, bool has_size, Document& out) {
   model.packed_begin = chunk.position();
   model.packed_end = chunk.position() + chunk.remaining();
   if (has_size) {
-    if (out.models.back().size != model.size) return chunk.error("has another size than the SIZE before it");
+    if (out.models.back().size != model.size) return chunk.error("has a different size than the SIZE before it");
     out.models.back() = model;
   } else {
     out.models.push_back(model);
@@ -140,7 +140,7 @@ Status parse_palette(ChunkReader& chunk, Document& out) {
   if (entries == 0) return chunk.too_short();
   if (entries + 1 < kColours) {
     out.warnings.push_back("the palette has " + std::to_string(entries) +
-                           " of 255 colours; the others are the default");
+                           " of 255 colours; the others come from the default palette");
   }
   out.palette = chunk.take(entries * 4);
   return {};
@@ -262,7 +262,7 @@ std::size_t begin_of_children(std::span<const std::byte> bytes, const ChunkHeade
   out.main_content = main.content_bytes;
   if (main.content_bytes == 0 || !is_chain(bytes, content)) return claimed;
   out.warnings.push_back("MAIN claims " + std::to_string(main.content_bytes) +
-                         " bytes of content and has none; ignored");
+                         " bytes of content but has none; ignored");
   out.main_content = 0;
   return content;
 }
@@ -296,7 +296,7 @@ Result<Document> parse_document(std::span<const std::byte> bytes) {
   document.version = reader.i32();
   if (reader.failed()) return bad_at(4, "the version number is cut off");
   if (document.version != 150 && document.version != 200) {
-    document.warnings.push_back("version " + std::to_string(document.version) + " is unknown; read as 150 and 200 are");
+    document.warnings.push_back("version " + std::to_string(document.version) + " is unknown; read like 150 and 200");
   }
   const Result<ChunkHeader> main = read_header(bytes, kFileHeaderBytes, bytes.size(), kMostOverstated);
   if (!main) return main.error();
@@ -311,10 +311,10 @@ Result<Document> parse_document(std::span<const std::byte> bytes) {
   if (Status status = parse_chunks(bytes, begin, end, document); !status) return status.error();
   if (claimed_end > end) {
     document.warnings.push_back("MAIN claims " + std::to_string(claimed_end - end) +
-                                " bytes more than there are; all that are there were read");
+                                " bytes past the end of the file; the rest was read");
   }
   if (end < bytes.size()) {
-    document.warnings.push_back("the last " + std::to_string(bytes.size() - end) + " bytes lie outside MAIN; skipped");
+    document.warnings.push_back("the last " + std::to_string(bytes.size() - end) + " bytes are outside MAIN; skipped");
   }
   return document;
 }
@@ -341,7 +341,7 @@ std::string quoted(std::string_view text) {
 Result<std::int32_t> parse_frame(const ChunkReader& chunk, const Dict& dict, std::size_t place) {
   const std::string_view text = dict.get("_f");
   const std::optional<std::int32_t> frame = frame_of_key(text, place);
-  if (!frame.has_value()) return chunk.error("has the frame " + quoted(text));
+  if (!frame.has_value()) return chunk.error("has the invalid frame " + quoted(text));
   return *frame;
 }
 
@@ -351,9 +351,9 @@ Result<TransformKey> parse_transform_key(ChunkReader& chunk, std::size_t place) 
   const Result<std::int32_t> frame = parse_frame(chunk, dict, place);
   if (!frame) return frame.error();
   const std::optional<Orientation> orientation = parse_orientation(dict.get("_r"));
-  if (!orientation) return chunk.error("has the rotation " + quoted(dict.get("_r")));
+  if (!orientation) return chunk.error("has the invalid rotation " + quoted(dict.get("_r")));
   const std::optional<IVec3> translation = parse_translation(dict.get("_t"));
-  if (!translation) return chunk.error("has the translation " + quoted(dict.get("_t")));
+  if (!translation) return chunk.error("has the invalid translation " + quoted(dict.get("_t")));
   return TransformKey{*frame, *orientation, *translation};
 }
 

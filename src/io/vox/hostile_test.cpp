@@ -115,11 +115,11 @@ TEST(VoxHostile, EverySingleByteMayBeAnything) {
 TEST(VoxHostile, OtherFormatsAreNamed) {
   EXPECT_EQ(text_of({}), "the file is empty");
   EXPECT_EQ(text_of(bytes_of("version https://git-lfs.github.com/spec/v1\noid sha256:0\n")),
-            "this is a git-LFS pointer, not the file that it stands for");
-  EXPECT_EQ(text_of(bytes_of("GIF\n")), "byte 0: a MagicaVoxel file starts with \"VOX \", this one with \"GIF \"");
+            "a Git LFS pointer, not the file itself (git lfs pull fetches it)");
+  EXPECT_EQ(text_of(bytes_of("GIF\n")), "byte 0: a MagicaVoxel file starts with \"VOX \", this file with \"GIF \"");
   std::vector<std::byte> slab6(12 + 2 * 3 * 4 + 768);
   for (const std::size_t axis : {0U, 1U, 2U}) slab6[4 * axis] = static_cast<std::byte>(2 + axis);
-  EXPECT_EQ(text_of(slab6), "this is SLAB6's .vox format, not MagicaVoxel's of the same name");
+  EXPECT_EQ(text_of(slab6), "a SLAB6 .vox file, not a MagicaVoxel .vox file");
 }
 
 TEST(VoxHostile, SizesBeyondTheFormatAreErrors) {
@@ -140,16 +140,15 @@ TEST(VoxHostile, CountsBeyondTheBytesAreErrors) {
   constexpr std::uint32_t kMost = 0xFFFF'FFFFU;
   EXPECT_EQ(text_of(FileBuilder().size(1, 1, 1).with("XYZI", [](auto& out) { out.u32(kMost); }).file()),
             "byte 44: chunk XYZI claims 4294967295 voxels in 0 bytes");
-  EXPECT_EQ(text_of(with_words("nGRP", {0, 0, kMost})), "byte 64: chunk nGRP ends before its content does");
-  EXPECT_EQ(text_of(with_words("nGRP", {0, kMost})), "byte 64: chunk nGRP ends before its content does");
-  EXPECT_EQ(text_of(with_words("nGRP", {0, 1, kMost, 0, 0})), "byte 64: chunk nGRP ends before its content does");
-  EXPECT_EQ(text_of(with_words("nTRN", {0, 0, 1, kMost, 0, kMost})),
-            "byte 64: chunk nTRN ends before its content does");
-  EXPECT_EQ(text_of(with_words("nSHP", {0, 0, kMost})), "byte 64: chunk nSHP ends before its content does");
-  EXPECT_EQ(text_of(with_words("MATL", {0, kMost})), "byte 64: chunk MATL ends before its content does");
-  EXPECT_EQ(text_of(with_words("MATT", {0, 0, 0, kMost})), "byte 64: chunk MATT ends before its content does");
-  EXPECT_EQ(text_of(with_words("RGBA", {})), "byte 64: chunk RGBA ends before its content does");
-  EXPECT_EQ(text_of(with_words("IMAP", {0})), "byte 64: chunk IMAP ends before its content does");
+  EXPECT_EQ(text_of(with_words("nGRP", {0, 0, kMost})), "byte 64: chunk nGRP ends before its content");
+  EXPECT_EQ(text_of(with_words("nGRP", {0, kMost})), "byte 64: chunk nGRP ends before its content");
+  EXPECT_EQ(text_of(with_words("nGRP", {0, 1, kMost, 0, 0})), "byte 64: chunk nGRP ends before its content");
+  EXPECT_EQ(text_of(with_words("nTRN", {0, 0, 1, kMost, 0, kMost})), "byte 64: chunk nTRN ends before its content");
+  EXPECT_EQ(text_of(with_words("nSHP", {0, 0, kMost})), "byte 64: chunk nSHP ends before its content");
+  EXPECT_EQ(text_of(with_words("MATL", {0, kMost})), "byte 64: chunk MATL ends before its content");
+  EXPECT_EQ(text_of(with_words("MATT", {0, 0, 0, kMost})), "byte 64: chunk MATT ends before its content");
+  EXPECT_EQ(text_of(with_words("RGBA", {})), "byte 64: chunk RGBA ends before its content");
+  EXPECT_EQ(text_of(with_words("IMAP", {0})), "byte 64: chunk IMAP ends before its content");
 }
 
 TEST(VoxHostile, ChunksBeyondTheFileAreErrors) {
@@ -169,7 +168,7 @@ TEST(VoxHostile, SkipsBytesAfterMainWithAWarning) {
   bytes.resize(bytes.size() + 9);
   const auto loaded = read_vox(bytes);
   ASSERT_TRUE(loaded);
-  EXPECT_EQ(loaded->warnings, std::vector<std::string>{"the last 9 bytes lie outside MAIN; skipped"});
+  EXPECT_EQ(loaded->warnings, std::vector<std::string>{"the last 9 bytes are outside MAIN; skipped"});
 }
 
 TEST(VoxHostile, SizesAndVoxelsComeInPairs) {
@@ -180,16 +179,16 @@ TEST(VoxHostile, SizesAndVoxelsComeInPairs) {
 }
 
 TEST(VoxHostile, GraphsThatAreNoGraphsAreErrors) {
-  EXPECT_EQ(text_of(file_of_one_voxel().transform(0, 0, {{}}).file()), "byte 64: node 0 is below itself");
+  EXPECT_EQ(text_of(file_of_one_voxel().transform(0, 0, {{}}).file()), "byte 64: node 0 is its own descendant");
   EXPECT_EQ(text_of(file_of_one_voxel().transform(0, 1, {{}}).group(1, {2}).transform(2, 1, {{}}).file()),
-            "byte 104: node 1 is below itself");
-  EXPECT_EQ(text_of(file_of_one_voxel().group(1, {2}).group(2, {1}).file()), "byte 64: node 1 is below itself");
+            "byte 104: node 1 is its own descendant");
+  EXPECT_EQ(text_of(file_of_one_voxel().group(1, {2}).group(2, {1}).file()), "byte 64: node 1 is its own descendant");
   EXPECT_EQ(text_of(file_of_one_voxel().transform(0, 9, {{}}).file()),
-            "byte 64: node 0 refers to node 9, which is not there");
+            "byte 64: node 0 refers to node 9, which does not exist");
   EXPECT_EQ(text_of(file_of_one_voxel().transform(0, 1, {{}}).shape(1, 4).file()),
             "byte 104: node 1 shows model 4, but there are 1");
   EXPECT_EQ(text_of(file_of_one_voxel().transform(0, 1, {{}}).shape(1, 0).shape(1, 0).file()),
-            "byte 136: node 1 is there twice");
+            "byte 136: node 1 is a duplicate");
   EXPECT_EQ(
       text_of(
           file_of_one_voxel().transform(0, 1, {{}}).shape(1, std::vector<std::pair<std::uint32_t, Entries>>{}).file()),
@@ -201,12 +200,14 @@ TEST(VoxHostile, TransformsThatAreNoTransformsAreErrors) {
     return file_of_one_voxel().transform(0, 1, {frame}).shape(1, 0).file();
   };
   for (const char* r : {"0", "3", "5", "10", "-1", "256", "4.0", "x", "99999999999999999999"}) {
-    EXPECT_EQ(text_of(with_frame({{"_r", r}})), "byte 64: chunk nTRN has the rotation \"" + std::string(r) + "\"");
+    EXPECT_EQ(text_of(with_frame({{"_r", r}})),
+              "byte 64: chunk nTRN has the invalid rotation \"" + std::string(r) + "\"");
   }
   for (const char* t : {"1 2", "1 2 3 4", "1 2 x", "1e3 0 0", "2147483648 0 0", "1,2,3", " "}) {
-    EXPECT_EQ(text_of(with_frame({{"_t", t}})), "byte 64: chunk nTRN has the translation \"" + std::string(t) + "\"");
+    EXPECT_EQ(text_of(with_frame({{"_t", t}})),
+              "byte 64: chunk nTRN has the invalid translation \"" + std::string(t) + "\"");
   }
-  EXPECT_EQ(text_of(with_frame({{"_f", "-1"}})), "byte 64: chunk nTRN has the frame \"-1\"");
+  EXPECT_EQ(text_of(with_frame({{"_f", "-1"}})), "byte 64: chunk nTRN has the invalid frame \"-1\"");
 }
 
 TEST(VoxHostile, HugeTranslationsAddUpWithoutOverflow) {
@@ -280,7 +281,7 @@ TEST(VoxHostile, AMainThatClaimsAFewBytesTooManyIsReadWhenAllWithinIsSound) {
     ASSERT_TRUE(loaded) << to_string(loaded.error());
     EXPECT_EQ(loaded->scene.voxel_count(), 1);
     EXPECT_EQ(loaded->warnings, std::vector<std::string>{"MAIN claims " + std::to_string(more) +
-                                                         " bytes more than there are; all that are there were read"});
+                                                         " bytes past the end of the file; the rest was read"});
     // The same file, truncated.
     bytes.pop_back();
     if (more < 20) {

@@ -12,7 +12,7 @@ namespace {
 
 Error wrong_count(const Model& model, const std::string& held) {
   const std::int64_t wanted = std::int64_t{model.size.x} * model.size.y * model.size.z;
-  return bad_at(model.offset, "chunk TDCZ holds " + held + " voxels, and its size is of " + std::to_string(wanted));
+  return bad_at(model.offset, "chunk TDCZ holds " + held + " voxels, but its size needs " + std::to_string(wanted));
 }
 
 // What follows the last voxel: nothing, or no end at all.

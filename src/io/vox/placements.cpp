@@ -28,7 +28,7 @@ class NodeIndex {
     const auto twice = std::adjacent_find(index.by_id_.begin(), index.by_id_.end(), same);
     if (twice != index.by_id_.end()) {
       return bad_at(document.nodes[std::next(twice)->second].offset,
-                    "node " + std::to_string(twice->first) + " is there twice");
+                    "node " + std::to_string(twice->first) + " is a duplicate");
     }
     return index;
   }
@@ -200,7 +200,7 @@ Hanging GraphWalk::below(const Step& parent) const {
 Status GraphWalk::take_names(const Hanging& hanging, std::string_view more) {
   const std::size_t bytes = hanging.name.size() + more.size();
   if (bytes > names_left_) {
-    return make_error(ErrorCode::LimitExceeded, "the scene graph repeats its names too often", {},
+    return make_error(ErrorCode::LimitExceeded, "the scene graph repeats names too often", {},
                       document_.nodes[hanging.node].offset);
   }
   names_left_ -= bytes;
@@ -267,7 +267,7 @@ Status GraphWalk::add_group(Step& step) {
 
 Status GraphWalk::enter(std::size_t at, const Step& parent) {
   const Node& node = document_.nodes[at];
-  if (is_open_[at]) return bad_at(node.offset, "node " + std::to_string(node.id) + " is below itself");
+  if (is_open_[at]) return bad_at(node.offset, "node " + std::to_string(node.id) + " is its own descendant");
   if (visits_left_ == 0) {
     return make_error(ErrorCode::LimitExceeded, "nodes with several parents multiply beyond the file's size", {},
                       node.offset);
@@ -305,7 +305,7 @@ Status GraphWalk::walk(std::size_t root) {
     const std::size_t child = index_.find(id);
     if (child == kNone) {
       return bad_at(node.offset, "node " + std::to_string(node.id) + " refers to node " + std::to_string(id) +
-                                     ", which is not there");
+                                     ", which does not exist");
     }
     // A copy: entering grows the way.
     const Step parent = step;
@@ -330,7 +330,7 @@ Result<Placements> GraphWalk::run() {
   if (Status status = walk(find_root()); !status) return status.error();
   const auto apart = std::ranges::count(is_seen_, false);
   out_.nodes_apart = static_cast<std::size_t>(apart);
-  if (apart > 0) out_.warnings.push_back("nodes apart from the scene graph skipped: " + std::to_string(apart));
+  if (apart > 0) out_.warnings.push_back("nodes outside the scene graph skipped: " + std::to_string(apart));
   return std::move(out_);
 }
 
@@ -339,7 +339,7 @@ Result<Placements> place_lone_model(const Document& document, int frame) {
   Placements out;
   out.is_model_used.assign(document.models.size(), true);
   if (document.models.empty()) {
-    out.warnings.emplace_back("the file holds no model");
+    out.warnings.emplace_back("the file has no models");
     return out;
   }
   Placement placement;
@@ -355,7 +355,7 @@ Result<Placements> place_models(const Document& document, int frame, std::size_t
   const std::int64_t last = last_frame(document);
   if (frame < 0 || frame > last) {
     return make_error(ErrorCode::InvalidArgument,
-                      "there is no frame " + std::to_string(frame) + "; the last is " + std::to_string(last));
+                      "frame " + std::to_string(frame) + " does not exist; the last frame is " + std::to_string(last));
   }
   Result<Placements> placements =
       document.nodes.empty() ? place_lone_model(document, frame) : GraphWalk(document, frame, file_bytes).run();

@@ -44,7 +44,7 @@ Result<std::vector<GridHandle>> add_grids(const vox::Document& document, vox::Mo
     if (!grid) return grid.error();
     grid_bytes += grid->grid.bytes();
     if (grid_bytes > max_bytes) {
-      return make_error(ErrorCode::LimitExceeded, "scattered voxels take far more memory than the file has bytes", {},
+      return make_error(ErrorCode::LimitExceeded, "scattered voxels need far more memory than the file has bytes", {},
                         model.offset);
     }
     handles.push_back(scene.add_grid(std::move(*grid)));
@@ -133,7 +133,7 @@ void add_warnings(const vox::Placements& placements, const vox::ModelLosses& los
   warnings.insert(warnings.end(), placements.warnings.begin(), placements.warnings.end());
   warn("voxels outside their model's size skipped", losses.outside, warnings);
   warn("voxels of colour 0, which is air, skipped", losses.colourless, warnings);
-  warn("models placed nowhere", std::ranges::count(placements.is_model_used, false), warnings);
+  warn("models without a placement", std::ranges::count(placements.is_model_used, false), warnings);
 }
 
 }  // namespace
@@ -166,7 +166,7 @@ Result<LoadedScene> read_vox(std::span<const std::byte> bytes, const LoadOptions
   add_instances(source->placements, *grids, add_layers(*source, loaded.scene), loaded.scene);
   loaded.cameras = vox::cameras_of(source->document, loaded.scene.bounds(InstanceFilter::All), loaded.warnings);
   loaded.look = vox::look_of(source->document);
-  warn("materials of no colour skipped", source->document.stray_materials, loaded.warnings);
+  warn("materials without a colour skipped", source->document.stray_materials, loaded.warnings);
   add_warnings(source->placements, builder.losses(), loaded.warnings);
   if (options.keep_source) {
     source->scene = loaded.scene.snapshot();
@@ -184,7 +184,7 @@ Result<Scene> scene_at_frame(const VoxSource& source, int frame) {
   const std::vector<GroupHandle> groups = scene.groups().handles();
   const std::vector<GridHandle> grids = scene.grids().handles();
   QUOIN_ASSERT(placements->all.size() == instances.size() && placements->groups.size() == groups.size(),
-               "frames differ in places and models alone");
+               "frames must differ only in placements and models");
   for (std::size_t i = 0; i < instances.size(); ++i) {
     Instance& instance = scene.edit(instances[i]);
     const vox::Placement& placement = placements->all[i];

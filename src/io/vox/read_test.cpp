@@ -71,7 +71,7 @@ TEST(VoxRead, ModelsWithoutNodesAreFramesOfAnAnimation) {
   EXPECT_EQ(instance_at(second, 0).grid, second.scene.grids().handles()[1]);
   const Result<LoadedScene> third = read_vox(bytes, {.frame = 2});
   ASSERT_FALSE(third);
-  EXPECT_EQ(third.error().message, "there is no frame 2; the last is 1");
+  EXPECT_EQ(third.error().message, "frame 2 does not exist; the last frame is 1");
   EXPECT_FALSE(read_vox(bytes, {.frame = -1}));
 }
 
@@ -237,7 +237,7 @@ TEST(VoxRead, EmptyModelsAndUnusedModelsAreKept) {
   EXPECT_EQ(grid_at(loaded, 0).canvas, (IBox{{0, 0, 0}, {5, 7, 6}}));
   EXPECT_EQ(loaded.scene.instances().size(), 1U);
   EXPECT_EQ(loaded.scene.voxel_count(), 1);
-  EXPECT_EQ(loaded.warnings, std::vector<std::string>{"models placed nowhere: 1"});
+  EXPECT_EQ(loaded.warnings, std::vector<std::string>{"models without a placement: 1"});
 }
 
 TEST(VoxRead, AFileWithoutModelsIsAnEmptyScene) {

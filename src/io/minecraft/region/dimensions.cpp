@@ -113,8 +113,8 @@ void sort_dimensions(WorldFolder& world) {
   std::vector<Dimension> unique;
   for (Dimension& each : world.dimensions) {
     if (!unique.empty() && unique.back().name == each.name) {
-      world.warnings.push_back("left out: " + each.regions.string() + ", since " + unique.back().regions.string() +
-                               " is the same dimension in the newer layout");
+      world.warnings.push_back("left out: " + each.regions.string() + ": " + unique.back().regions.string() +
+                               " holds the same dimension in the newer layout");
     } else {
       unique.push_back(std::move(each));
     }
@@ -164,15 +164,14 @@ WorldFolder find_dimensions(const fs::path& path) {
 Error no_regions(const fs::path& path) {
   const fs::path folder = is_file(path) ? path.parent_path() : path;
   if (is_folder(folder / "db")) {
-    return make_error(
-        ErrorCode::Unsupported,
-        "a world of Minecraft's Bedrock edition, which Quoin does not read; convert it to the Java edition",
-        path.string());
+    return make_error(ErrorCode::Unsupported,
+                      "a Minecraft Bedrock world, which is not supported; convert it to the Java edition",
+                      path.string());
   }
   return make_error(
       ErrorCode::BadFormat,
-      "a world of Minecraft's without region files (region/r.X.Z.mca, or since 26.1 "
-      "dimensions/minecraft/overworld/region/r.X.Z.mca): nothing of it was saved yet, or they are missing",
+      "a Minecraft world without region files (region/r.X.Z.mca, or since 26.1 "
+      "dimensions/minecraft/overworld/region/r.X.Z.mca): no chunk was saved yet, or the files are missing",
       path.string());
 }
 

@@ -38,7 +38,7 @@ Error bad(std::string message, std::size_t at) {
 /// Expands the first `wanted` bytes of a zstd stream. Memory grows with the bytes that come out of it.
 Result<std::vector<std::byte>> expand_zstd(std::span<const std::byte> stream, std::size_t wanted) {
   const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
-  if (!context) return make_error(ErrorCode::LimitExceeded, "there is not enough memory to read it");
+  if (!context) return make_error(ErrorCode::LimitExceeded, "not enough memory");
   std::vector<std::byte> out;
   ZSTD_inBuffer input{stream.data(), stream.size(), 0};
   while (out.size() < wanted) {
@@ -56,7 +56,7 @@ Result<std::vector<std::byte>> expand_zstd(std::span<const std::byte> stream, st
     out.resize(filled + output.pos);
     if (output.pos < output.size) {
       return bad(
-          "its data expand to " + std::to_string(out.size()) + " bytes, " + std::to_string(wanted) + " are promised",
+          "the data expands to " + std::to_string(out.size()) + " bytes, not the promised " + std::to_string(wanted),
           LinearRegion::kDataOffset + input.pos);
     }
   }
@@ -66,9 +66,8 @@ Result<std::vector<std::byte>> expand_zstd(std::span<const std::byte> stream, st
 #else
 
 Result<std::vector<std::byte>> expand_zstd(std::span<const std::byte>, std::size_t) {
-  return make_error(
-      ErrorCode::Unsupported,
-      "a Linear region (.linear), and Quoin was built without zstd (Debian: libzstd-dev), which it needs");
+  return make_error(ErrorCode::Unsupported,
+                    "cannot read Linear regions (.linear): Quoin was built without zstd (Debian: libzstd-dev)");
 }
 
 #endif
@@ -85,14 +84,14 @@ Result<std::unique_ptr<const LinearRegion>> LinearRegion::parse(std::vector<std:
   const auto version = std::to_integer<int>(file[kVersionAt]);
   if (version != 1 && version != 2) {
     return make_error(ErrorCode::Unsupported,
-                      "Linear region of version " + std::to_string(version) + "; versions 1 and 2 are read", {},
+                      "Linear region: version " + std::to_string(version) + " is not supported (1 and 2 are)", {},
                       kVersionAt);
   }
   std::unique_ptr<LinearRegion> region(new LinearRegion(std::move(file)));
   const std::span<const std::byte> bytes = region->file_;
   region->stream_bytes_ = big<std::uint32_t>(bytes, kStreamBytesAt);
   if (region->stream_bytes_ > bytes.size() - kDataOffset) {
-    return bad("claims " + std::to_string(region->stream_bytes_) + " compressed bytes, but " +
+    return bad("the header claims " + std::to_string(region->stream_bytes_) + " compressed bytes, but " +
                    std::to_string(bytes.size() - kDataOffset) + " are left",
                kStreamBytesAt);
   }
@@ -103,7 +102,7 @@ Result<std::unique_ptr<const LinearRegion>> LinearRegion::parse(std::vector<std:
     region->sizes_[i] = big<std::uint32_t>(*table, 8 * i);
     sum += region->sizes_[i];
     if (region->sizes_[i] > kMaxChunkBytes || sum > kMaxBytes) {
-      return make_error(ErrorCode::LimitExceeded, "Linear region: its chunks claim too many bytes", {}, kDataOffset);
+      return make_error(ErrorCode::LimitExceeded, "Linear region: the chunks claim too many bytes", {}, kDataOffset);
     }
   }
   return std::unique_ptr<const LinearRegion>(std::move(region));

@@ -27,19 +27,20 @@ Result<std::vector<std::byte>> expand_lz4_blocks(std::span<const std::byte> byte
     if (bytes.size() - at < kHeader) return fault("LZ4: cut off");
     const std::byte* const header = bytes.data() + at;
     if (!std::equal(kMagic.begin(), kMagic.end(), reinterpret_cast<const char*>(header))) {
-      return fault("LZ4: no block begins here");
+      return fault("LZ4: not the start of a block");
     }
     const unsigned method = std::to_integer<unsigned>(header[8]) & 0xF0U;
     const std::size_t packed = load<std::uint32_t>(header + 9, std::endian::little);
     const std::size_t size = load<std::uint32_t>(header + 13, std::endian::little);
     if (size == 0 && packed == 0) return out;
     if (packed > bytes.size() - at - kHeader) return fault("LZ4: cut off");
-    if (size > max_bytes - out.size()) return make_error(ErrorCode::LimitExceeded, "LZ4: expands to too much", {}, at);
+    if (size > max_bytes - out.size())
+      return make_error(ErrorCode::LimitExceeded, "LZ4: the output exceeds the limit", {}, at);
     // A byte of LZ4 gives 255 at most.
-    if (size / 255 > packed) return fault("LZ4: a block that expands to more than it can");
+    if (size / 255 > packed) return fault("LZ4: a block claims more output than its bytes can hold");
     const std::byte* const content = header + kHeader;
     if (method == kStored) {
-      if (packed != size) return fault("LZ4: a block of two sizes");
+      if (packed != size) return fault("LZ4: an uncompressed block has two different sizes");
       out.insert(out.end(), content, content + size);
     } else if (method == kCompressed) {
       const std::size_t filled = out.size();
@@ -47,9 +48,9 @@ Result<std::vector<std::byte>> expand_lz4_blocks(std::span<const std::byte> byte
       const int count =
           LZ4_decompress_safe(reinterpret_cast<const char*>(content), reinterpret_cast<char*>(out.data() + filled),
                               static_cast<int>(packed), static_cast<int>(size));
-      if (count != static_cast<int>(size)) return fault("LZ4: the compressed data are damaged");
+      if (count != static_cast<int>(size)) return fault("LZ4: the compressed data is damaged");
     } else {
-      return fault("LZ4: a block of an unknown kind");
+      return fault("LZ4: unknown compression method");
     }
     at += kHeader + packed;
   }
@@ -59,7 +60,7 @@ Result<std::vector<std::byte>> expand_lz4_blocks(std::span<const std::byte> byte
 #else
 
 Result<std::vector<std::byte>> expand_lz4_blocks(std::span<const std::byte>, std::size_t) {
-  return make_error(ErrorCode::Unsupported, "compressed by LZ4, and Quoin was built without it (Debian: liblz4-dev)");
+  return make_error(ErrorCode::Unsupported, "cannot read LZ4: Quoin was built without it (Debian: liblz4-dev)");
 }
 
 #endif

@@ -76,7 +76,7 @@ Result<std::vector<std::byte>> decompress(std::span<const std::byte> bytes, std:
     case ChunkCompression::Lz4:
       return expand_lz4_blocks(bytes, max_bytes);
   }
-  return make_error(ErrorCode::Unsupported, "compressed in an unknown way, number " + std::to_string(compression));
+  return make_error(ErrorCode::Unsupported, "unknown compression method " + std::to_string(compression));
 }
 
 Result<std::vector<std::byte>> decompress_file(std::span<const std::byte> bytes, std::size_t max_bytes) {
@@ -154,7 +154,7 @@ Result<std::unique_ptr<RegionFile>> RegionFile::open(const std::filesystem::path
   std::unique_ptr<RegionFile> file(new RegionFile(path, name, descriptor));
   struct stat info {};
   if (::fstat(descriptor, &info) != 0) return cannot();
-  if (!S_ISREG(info.st_mode)) return make_error(ErrorCode::CannotRead, "it is not a regular file", path.string());
+  if (!S_ISREG(info.st_mode)) return make_error(ErrorCode::CannotRead, "not a regular file", path.string());
   file->size_ = static_cast<std::uint64_t>(info.st_size);
   if (auto done = file->read_table(); !done) return done.error();
   return file;
@@ -182,13 +182,14 @@ Status RegionFile::read_table() {
     return read_linear();
   }
   if (name_.kind == RegionKind::Linear) {
-    return make_error(ErrorCode::BadFormat, "a .linear file that does not begin as a Linear region", path_.string(), 0);
+    return make_error(ErrorCode::BadFormat, "a .linear file without the header of a Linear region", path_.string(), 0);
   }
   std::array<std::byte, kSectorBytes> table{};
   const auto count = read_at(0, table);
   if (!count) return count.error();
   if (*count < table.size()) {
-    return make_error(ErrorCode::BadFormat, "a region file of " + std::to_string(*count) + " bytes", path_.string(),
+    return make_error(ErrorCode::BadFormat,
+                      "a region file of " + std::to_string(*count) + " bytes, shorter than its table", path_.string(),
                       *count);
   }
   for (std::size_t i = 0; i < table_.size(); ++i) {
@@ -224,8 +225,8 @@ Error RegionFile::fault(int x, int z, std::string what) const {
 
 Result<std::vector<std::byte>> RegionFile::read_sectors(int x, int z, std::uint8_t& compression) const {
   const std::uint64_t begin = offset(x, z);
-  if (begin < 2 * kSectorBytes) return fault(x, z, "its first sector lies in the table");
-  if (begin + kChunkHeader > size_) return fault(x, z, "its first sector lies beyond the file's end");
+  if (begin < 2 * kSectorBytes) return fault(x, z, "the first sector is inside the table");
+  if (begin + kChunkHeader > size_) return fault(x, z, "the first sector is past the end of the file");
   std::array<std::byte, kChunkHeader> header{};
   if (const auto count = read_at(begin, header); !count || *count < header.size()) {
     return count ? Result<std::vector<std::byte>>(fault(x, z, "cut off")) : count.error();
@@ -234,9 +235,9 @@ Result<std::vector<std::byte>> RegionFile::read_sectors(int x, int z, std::uint8
   compression = std::to_integer<std::uint8_t>(header[4]);
   // It may have more sectors than the table says, which the checksum of its compressed data then bears out.
   if (bytes < 1 || begin + 4 + bytes > size_) {
-    return fault(x, z, "says that it has " + std::to_string(bytes) + " bytes");
+    return fault(x, z, "claims " + std::to_string(bytes) + " bytes");
   }
-  if (bytes > kMaxChunkBytes) return fault(x, z, "has " + std::to_string(bytes) + " bytes, which is too much");
+  if (bytes > kMaxChunkBytes) return fault(x, z, "has " + std::to_string(bytes) + " bytes, more than the limit");
   std::vector<std::byte> content(static_cast<std::size_t>(bytes - 1));
   const auto count = read_at(begin + kChunkHeader, content);
   if (!count) return count.error();
@@ -249,7 +250,7 @@ Result<std::vector<std::byte>> RegionFile::read_external(int x, int z) const {
       "c." + std::to_string(name_.x * kRegionEdge + x) + "." + std::to_string(name_.z * kRegionEdge + z) + ".mcc";
   const std::filesystem::path file = path_.parent_path() / name;
   auto bytes = read_file_beginning(file, kMaxChunkBytes);
-  if (!bytes) return fault(x, z, "lies in " + name + ", which cannot be read: " + bytes.error().message);
+  if (!bytes) return fault(x, z, "cannot read " + name + ": " + bytes.error().message);
   return bytes;
 }
 

@@ -63,19 +63,20 @@ class RunWriter {
 Result<ModelBytes> write_binvox(const Scene& scene, const Progress& progress) {
   auto merged = merge_grids(scene, kHolds);
   if (!merged) return merged.error();
-  if (merged->box.empty()) return make_error(ErrorCode::Unsupported, "there are no voxels, and .binvox needs some");
+  if (merged->box.empty())
+    return make_error(ErrorCode::Unsupported, "the scene has no voxels, and .binvox needs at least one");
   const IBox& box = merged->box;
   const int longest = std::max({box.size().x, box.size().y, box.size().z});
   const IVec3 size = is_better_a_cube(box.size(), longest) ? IVec3(longest) : box.size();
   const std::int64_t volume = std::int64_t{size.x} * size.y;
   if (longest > kMaxEdge || volume > kMaxVoxels / std::max(size.z, 1)) {
-    return make_error(ErrorCode::LimitExceeded, "more than 16,384 voxels a side, or 2^32 in all");
+    return make_error(ErrorCode::LimitExceeded, "more than 16,384 voxels per side, or 2^32 in total");
   }
   // What readers take for a size.
   constexpr double kLeastVoxel = 1e-8;
   constexpr double kMostVoxel = 1e8;
   if (!(merged->voxel_size > kLeastVoxel && merged->voxel_size < kMostVoxel)) {
-    return make_error(ErrorCode::Unsupported, "voxels smaller than 1e-8 units, or larger than 1e8");
+    return make_error(ErrorCode::Unsupported, "the voxel size is outside 1e-8 to 1e8 units");
   }
   const auto numbers = [](const DVec3& v) { return text_of(v.x) + " " + text_of(v.y) + " " + text_of(v.z); };
   ByteWriter out;

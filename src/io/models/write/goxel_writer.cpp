@@ -216,7 +216,7 @@ Result<ModelBytes> GoxelWriter::run(const Progress& progress) {
     for (auto& layer : of_grid) layers.emplace_back(&grid, std::move(layer));
   }
   if (split != 0) {
-    placed->warnings.push_back("instances that became several layers, since a layer has one material: " +
+    placed->warnings.push_back("instances split into several layers, since a layer has one material: " +
                                with_thousands(split));
   }
   write_materials();

@@ -70,7 +70,7 @@ Status write_matrix(const PlacedGrid& grid, const std::vector<Rgba8>& colours, B
                     std::vector<std::string>& warnings, ProgressSteps& steps) {
   const IVec3 size = grid.box.size();
   if (std::max({size.x, size.y, size.z}) > kMaxEdge) {
-    std::string line = "16,384 voxels a side are the most, and there are more in ";
+    std::string line = "more than 16,384 voxels per side in ";
     return make_error(ErrorCode::LimitExceeded, line.append(printable(grid.name)));
   }
   const std::string name = cut_name(grid.name, kLongestName, warnings);
@@ -102,7 +102,8 @@ Status write_matrix(const PlacedGrid& grid, const std::vector<Rgba8>& colours, B
 Result<ModelBytes> write_qb(const Scene& scene, const Progress& progress) {
   auto placed = place_grids(scene, kHolds);
   if (!placed) return placed.error();
-  if (placed->grids.empty()) return make_error(ErrorCode::Unsupported, "there are no voxels, and .qb needs some");
+  if (placed->grids.empty())
+    return make_error(ErrorCode::Unsupported, "the scene has no voxels, and .qb needs at least one");
   const std::vector<Rgba8> colours = colours_of(scene.types);
   ByteWriter out;
   out.u32(kVersion);

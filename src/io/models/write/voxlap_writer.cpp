@@ -188,8 +188,7 @@ Result<ModelBytes> write_vxl(const Scene& scene, const Progress& progress) {
   const IVec3 extent = merged->box.empty() ? IVec3(0) : merged->box.size();
   const bool is_small = holds(kAceOfSpades, extent);
   if (!is_small && !holds(kVoxlap, extent)) {
-    return make_error(ErrorCode::LimitExceeded,
-                      "larger than any map of .vxl, which has 1024 x 256 x 1024 voxels at most");
+    return make_error(ErrorCode::LimitExceeded, "larger than the 1024 x 256 x 1024 voxels of a .vxl map");
   }
   const IVec3 size = is_small ? kAceOfSpades : kVoxlap;
   IVec3 min(0);
@@ -198,7 +197,7 @@ Result<ModelBytes> write_vxl(const Scene& scene, const Progress& progress) {
   if (!fits) {
     min = merged->box.min - (size - extent) / 2;
     min.y = merged->box.min.y;
-    merged->warnings.push_back("moved to the middle of the map, by " + std::to_string(-min.x) + ", " +
+    merged->warnings.push_back("moved to the centre of the map by " + std::to_string(-min.x) + ", " +
                                std::to_string(-min.y) + ", " + std::to_string(-min.z));
   }
   const std::vector<Rgba8> colours = colours_of(scene.types);
@@ -207,9 +206,8 @@ Result<ModelBytes> write_vxl(const Scene& scene, const Progress& progress) {
   if (!is_small) write_header(size, out);
   if (auto done = writer.run(out, progress); !done) return done.error();
   if (writer.grounded() != 0) {
-    merged->warnings.push_back(
-        "columns that got a voxel of earth at the bottom, since .vxl knows none without ground: " +
-        with_thousands(writer.grounded()));
+    merged->warnings.push_back("columns given a ground voxel, since .vxl needs one in every column: " +
+                               with_thousands(writer.grounded()));
   }
   return ModelBytes{out.take(), std::move(merged->warnings)};
 }

@@ -275,7 +275,7 @@ TEST(WriteModels, LargeMapsAreVoxlaps) {
   const IBox bounds = read->scene.grids()[read->scene.grids().handles().front()].grid.bounds();
   EXPECT_EQ(bounds.size(), IVec3(1024, 199, 1024));
   EXPECT_TRUE(
-      std::ranges::any_of(file->warnings, [](const std::string& w) { return w.starts_with("moved to the middle"); }));
+      std::ranges::any_of(file->warnings, [](const std::string& w) { return w.starts_with("moved to the centre"); }));
   scene.edit(scene.grids().handles().front()).grid.set(0, 400, 0, red);
   const auto refused = write_vxl(scene);
   ASSERT_FALSE(refused);
@@ -289,7 +289,7 @@ TEST(WriteModels, SchematicsHaveBlocksOfTheNearestColour) {
   const auto file = minecraft::write_schematic(scene);
   ASSERT_TRUE(file) << to_string(file.error());
   EXPECT_TRUE(std::ranges::any_of(file->warnings, [](const std::string& w) {
-    return w == "types that are no blocks of the game became those of the nearest colour: 3";
+    return w == "types that are not Minecraft blocks, written as the block of the nearest colour: 3";
   }));
   const auto read = minecraft::read_schematic(file->bytes);
   ASSERT_TRUE(read) << to_string(read.error());
@@ -335,8 +335,8 @@ TEST(WriteModels, SchematicsSayWhatTheGameWouldTakeOtherwise) {
   const auto has = [&](std::string_view line) {
     return std::ranges::find(file->warnings, line) != file->warnings.end();
   };
-  EXPECT_TRUE(has("types that are no blocks of the game became those of the nearest colour: 2"));
-  EXPECT_TRUE(has("voxels whose data is left out, which .schem does not hold: 1"));
+  EXPECT_TRUE(has("types that are not Minecraft blocks, written as the block of the nearest colour: 2"));
+  EXPECT_TRUE(has("voxels whose data is left out, since .schem cannot store it: 1"));
   EXPECT_TRUE(minecraft::read_schematic(file->bytes));
 }
 
@@ -360,7 +360,7 @@ TEST(PlacedGrids, HalvesOfVoxelsAllGoTheSameWay) {
   EXPECT_EQ(merged->voxels.bounds(), (IBox{{-1, 0, 0}, {3, 1, 1}}));
   EXPECT_EQ(merged->voxels.voxel_count(), 4);
   ASSERT_FALSE(merged->warnings.empty());
-  EXPECT_EQ(merged->warnings.front(), "instances between voxels moved to the nearest: 4");
+  EXPECT_EQ(merged->warnings.front(), "instances rounded to whole voxels: 4");
   // A hidden field is dropped with all hidden instances; names of two lines appear as one line.
   scene.edit(handle).field.add_sphere({0.0, 0.0, 0.0}, 2.0, type);
   const auto refused = merge_grids(scene, holds);

@@ -186,20 +186,19 @@ void GraphRevision::remove_what_is_gone() {
 /// Returns the motion of the pivot that the file gives to the grid's first piece.
 Result<Motion> GraphRevision::place(const Instance& instance, const GridPlan& plan) {
   if (instance.voxel_size != 1.0) {
-    return make_error(
-        ErrorCode::Unsupported,
-        instance_text(instance) + " has voxels of another size than others, which a .vox file cannot say");
+    return make_error(ErrorCode::Unsupported,
+                      instance_text(instance) + " has a different voxel size than others, which .vox cannot store");
   }
   const auto orientation = orientation_from_turn({instance.rotation, instance.mirrored});
   if (!orientation.has_value()) {
     return make_error(ErrorCode::Unsupported,
-                      instance_text(instance) + " is not turned by quarter turns, as .vox requires");
+                      instance_text(instance) + " is not rotated by multiples of 90 degrees, as .vox requires");
   }
   bool is_exact = true;
   const DVec3 world = world_from_grid(instance, scene_.grids()[plan.grid], pivot_of(plan.pieces.front()));
   const auto translation = rounded(world, is_exact);
   if (!translation) {
-    return make_error(ErrorCode::LimitExceeded, instance_text(instance) + " lies too far out for a .vox file");
+    return make_error(ErrorCode::LimitExceeded, instance_text(instance) + " is too far from the origin for .vox");
   }
   if (!is_exact) ++out_.rounded;
   const bool is_far = std::ranges::any_of(plan.pieces, [&](const auto& piece) {
@@ -299,7 +298,7 @@ Status GraphRevision::move(const Wanted& wanted, const Known& known, NodeContent
     for (Entries& key : transform->frames) {
       const Motion motion = from_before * motion_of(key);
       if (!has_32_bits(motion.translation)) {
-        return make_error(ErrorCode::LimitExceeded, "\"" + wanted.name + "\" moves too far out for a .vox file");
+        return make_error(ErrorCode::LimitExceeded, "\"" + wanted.name + "\" moves too far from the origin for .vox");
       }
       set_motion(key, motion);
     }
@@ -307,7 +306,7 @@ Status GraphRevision::move(const Wanted& wanted, const Known& known, NodeContent
   }
   if (local == now) return {};
   if (!has_32_bits(local.translation)) {
-    return make_error(ErrorCode::LimitExceeded, "\"" + wanted.name + "\" lies too far out for a .vox file");
+    return make_error(ErrorCode::LimitExceeded, "\"" + wanted.name + "\" is too far from the origin for .vox");
   }
   set_motion_at(transform != nullptr ? *transform : transform_of(known), source_.frame, local);
   return {};
@@ -387,7 +386,7 @@ Result<NodeContent> GraphRevision::transform_for(const Wanted& wanted, std::int3
   if (!wanted.visible) transform.attributes.set("_hidden", "1");
   const Motion local = inverse(wanted.parent.world) * wanted.world;
   if (!has_32_bits(local.translation)) {
-    return make_error(ErrorCode::LimitExceeded, "\"" + wanted.name + "\" lies too far out for a .vox file");
+    return make_error(ErrorCode::LimitExceeded, "\"" + wanted.name + "\" is too far from the origin for .vox");
   }
   set_motion(transform.frames.emplace_back(), local);
   return transform;

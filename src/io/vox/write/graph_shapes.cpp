@@ -122,7 +122,7 @@ Status GraphRevision::add_frames(NodeContent transform, NodeContent shape, const
   const auto is_one = [](const Frame& frame) { return frame.plan != nullptr && frame.plan->pieces.size() == 1; };
   std::vector<Frame> frames = frames_about(motion_of(transform.frames.front()) * box);
   if (!std::ranges::all_of(frames, [](const Frame& frame) { return has_32_bits(frame.first.translation); })) {
-    return make_error(ErrorCode::LimitExceeded, "\"" + name + "\" lies too far out for a .vox file");
+    return make_error(ErrorCode::LimitExceeded, "\"" + name + "\" is too far from the origin for .vox");
   }
   if (std::ranges::all_of(frames, [&](const Frame& frame) { return frame.plan == nullptr || is_one(frame); })) {
     show_frames(frames, transform, shape);

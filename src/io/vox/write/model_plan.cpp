@@ -101,7 +101,7 @@ Result<std::vector<std::byte>> packed(IVec3 model_size, std::span<const std::byt
   const int status =
       compress2(reinterpret_cast<Bytef*>(compressed.data()), &bytes, reinterpret_cast<const Bytef*>(colours.data()),
                 static_cast<uLong>(colours.size()), Z_DEFAULT_COMPRESSION);
-  if (status != Z_OK) return make_error(ErrorCode::LimitExceeded, "voxels cannot be compressed: out of memory");
+  if (status != Z_OK) return make_error(ErrorCode::LimitExceeded, "cannot compress voxels: out of memory");
   compressed.resize(bytes);
   out.raw(compressed);
   return out.take();

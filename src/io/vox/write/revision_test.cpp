@@ -297,7 +297,7 @@ TEST(VoxRevision, NewColoursTakeEntriesThatNoVoxelHas) {
   const auto saved = save(loaded, &warnings);
   EXPECT_EQ(changed_chunks(bytes, saved), " ~XYZI ~RGBA +MATL");
   ASSERT_EQ(warnings.size(), 1U);
-  EXPECT_EQ(warnings[0], "colours of the palette that no voxel has gave way to new ones: 1");
+  EXPECT_EQ(warnings[0], "unused palette colours replaced by new ones: 1");
   const LoadedScene again = load(saved);
   const VoxelType read = again.scene.grids()[again.scene.grids().handles()[3]].grid.get({0, 0, 0});
   EXPECT_EQ(again.scene.types[read].colour, gold.colour);
@@ -436,7 +436,7 @@ TEST(VoxRevision, FramesThatGoAreSaidToBeLost) {
   loaded.scene.add_instance(other);
   const auto losses = losses_of_vox(loaded).value();
   ASSERT_EQ(losses.size(), 1U);
-  EXPECT_EQ(losses[0], "frames of the file's animation left out, since the model that they are of was removed: 3");
+  EXPECT_EQ(losses[0], "animation frames left out, since their model was removed: 3");
 }
 
 TEST(VoxRevision, AModelOfAnotherFrameThatOutgrows256IsSaidToStay) {
@@ -448,7 +448,7 @@ TEST(VoxRevision, AModelOfAnotherFrameThatOutgrows256IsSaidToStay) {
   loaded.scene.edit(loaded.scene.grids().handles()[2]).grid.set({400, 0, 0}, 4);
   const auto losses = losses_of_vox(loaded).value();
   ASSERT_EQ(losses.size(), 1U);
-  EXPECT_EQ(losses[0], "models of other frames that outgrew 256 voxels stay as the file has them: 1");
+  EXPECT_EQ(losses[0], "models of other frames left unchanged, since they exceed 256 voxels: 1");
 }
 
 TEST(VoxRevision, SharedNodesAreWrittenAnewAndThatIsSaid) {

@@ -49,7 +49,7 @@ LoadedScene divided(const LoadedScene& given, double voxel_size) {
 std::string size_warning(double voxel_size) {
   char text[32];
   std::snprintf(text, sizeof(text), "%.6g", voxel_size);
-  return std::string("the size of voxels is left out, which .vox does not hold: a voxel was ") + text + " units long";
+  return std::string("voxel size left out, not supported by .vox: a voxel was ") + text + " units long";
 }
 
 }  // namespace quoin::vox

@@ -138,8 +138,7 @@ TEST(VoxViewWriting, TheSunComesBack) {
   EXPECT_FALSE(found.sun_is_seen);
 
   loaded.look->look.fog = Fog{};
-  EXPECT_EQ(write_vox(loaded).value().warnings,
-            std::vector<std::string>{"render settings left out, but for the sun's"});
+  EXPECT_EQ(write_vox(loaded).value().warnings, std::vector<std::string>{"render settings left out, except the sun's"});
   EXPECT_EQ(losses_of_vox(loaded).value().size(), 1U);
 }
 

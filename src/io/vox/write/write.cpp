@@ -30,8 +30,7 @@ namespace {
 // Rejects fields, so that they are not lost silently.
 Status check_has_no_field(const SceneGrid& grid) {
   if (grid.field.chunk_count() == 0) return {};
-  return make_error(ErrorCode::Unsupported,
-                    "grid \"" + grid.name + "\" holds a field of densities, which this format does not");
+  return make_error(ErrorCode::Unsupported, "grid \"" + grid.name + "\" is a density field, which .vox cannot store");
 }
 
 constexpr std::uint32_t kVersion = 150;
@@ -284,24 +283,22 @@ void Writer::warn(std::vector<std::string>& warnings) const {
   const auto count = [&](const char* of_what, std::int64_t number) {
     if (number > 0) warnings.push_back(std::string(of_what) + ": " + std::to_string(number));
   };
-  count("instances between voxels moved to the nearest", graph_.rounded);
-  count("instances more than 1,000 voxels from the origin, where the world of MagicaVoxel ends", graph_.beyond_limit);
-  count("groups whose turn a .vox file cannot say are not turned", graph_.turns_left_out);
-  count("frames of the file's animation left out, since the model that they are of was removed",
-        graph_.frames_left_out);
-  count("models of other frames that outgrew 256 voxels stay as the file has them", models_left_as_they_were());
-  count("colours of the palette that no voxel has gave way to new ones", types_.replaced);
-  count("lamps left out, which .vox does not hold (a .json keeps them)",
-        static_cast<std::int64_t>(scene_.lamps.size()));
+  count("instances rounded to whole voxels", graph_.rounded);
+  count("instances more than 1,000 voxels from the origin, outside MagicaVoxel's world", graph_.beyond_limit);
+  count("groups whose rotation is left out, not supported by .vox", graph_.turns_left_out);
+  count("animation frames left out, since their model was removed", graph_.frames_left_out);
+  count("models of other frames left unchanged, since they exceed 256 voxels", models_left_as_they_were());
+  count("unused palette colours replaced by new ones", types_.replaced);
+  count("lamps left out, not supported by .vox (.json stores them)", static_cast<std::int64_t>(scene_.lamps.size()));
   std::int64_t categories = 0;
   scene_.instances().for_each([&](InstanceHandle, const Instance& instance) {
     categories += instance.categories == Instance().categories ? 0 : 1;
   });
   std::int64_t with_data = 0;
   scene_.grids().for_each([&](GridHandle, const SceneGrid& grid) { with_data += grid.grid.data_count(); });
-  count("voxels whose data is left out, which .vox does not hold (a .json keeps it)", with_data);
-  count("instances whose categories are left out, which .vox does not hold (a .json keeps them)", categories);
-  if (view_.has_more_settings) warnings.emplace_back("render settings left out, but for the sun's");
+  count("voxels whose data is left out, not supported by .vox (.json stores it)", with_data);
+  count("instances whose categories are left out, not supported by .vox (.json stores them)", categories);
+  if (view_.has_more_settings) warnings.emplace_back("render settings left out, except the sun's");
   warnings.insert(warnings.end(), lost_.begin(), lost_.end());
 }
 
@@ -315,7 +312,7 @@ std::int64_t Writer::models_left_as_they_were() const {
 
 /// Lists the content of the file's nodes that scenes cannot hold.
 std::vector<std::string> Writer::lost_with_graph() const {
-  constexpr const char* kWhy = " left out: nodes of the file's scene graph have several parents, and one changed";
+  constexpr const char* kWhy = " left out: a node with several parents in the file's scene graph changed";
   std::vector<std::string> lost;
   if (vox::is_animated(source_.document)) lost.push_back(std::string("animation is") + kWhy);
   std::int64_t nodes = 0;
@@ -323,9 +320,9 @@ std::vector<std::string> Writer::lost_with_graph() const {
     nodes += vox::says_more(vox::node_of(source_, i)) ? 1 : 0;
   }
   if (nodes > 0)
-    lost.push_back("attributes of " + std::to_string(nodes) + " nodes that Quoin does not know are" + kWhy);
+    lost.push_back("attributes of " + std::to_string(nodes) + " nodes that are unknown to Quoin are" + kWhy);
   if (source_.placements.nodes_apart > 0) {
-    lost.push_back(std::to_string(source_.placements.nodes_apart) + " nodes apart from the scene graph are" + kWhy);
+    lost.push_back(std::to_string(source_.placements.nodes_apart) + " nodes outside the scene graph are" + kWhy);
   }
   return lost;
 }
@@ -701,7 +698,7 @@ Result<VoxBytes> Writer::run() {
   write_chunks();
   if (!failure_) return failure_.error();
   if (out_.size() > std::numeric_limits<std::uint32_t>::max()) {
-    return make_error(ErrorCode::LimitExceeded, "the scene takes more than the 4 GiB that a .vox file can hold");
+    return make_error(ErrorCode::LimitExceeded, "the scene needs more than the 4 GiB of a .vox file");
   }
   std::vector<std::string> warnings;
   warn(warnings);

@@ -59,8 +59,8 @@ Result<TypeTable> make_type_table(const Scene& scene) {
     for (std::size_t type = 1; type < kColours; ++type) types.push_back(static_cast<VoxelType>(type));
   }
   if (types.size() >= kColours) {
-    return make_error(ErrorCode::LimitExceeded,
-                      "the scene uses " + std::to_string(types.size()) + " voxel types; a .vox file holds 255");
+    return make_error(ErrorCode::LimitExceeded, "the scene uses " + std::to_string(types.size()) +
+                                                    " voxel types, more than the 255 of a .vox file");
   }
   TypeTable table;
   table.index_of_type.resize(std::size_t{types.back()} + 1);
@@ -170,8 +170,7 @@ Result<RevisedTypes> revise_type_table(const Scene& scene, const VoxSource& sour
   for (const VoxelType type : room.strangers()) {
     const auto index = room.place(type < scene.types.size() ? scene.types[type] : VoxelProperties{});
     if (!index) {
-      return make_error(ErrorCode::LimitExceeded,
-                        "the scene uses more than the 255 voxel types that a .vox file holds");
+      return make_error(ErrorCode::LimitExceeded, "the scene uses more than the 255 voxel types of a .vox file");
     }
     if (type >= table.index_of_type.size()) table.index_of_type.resize(std::size_t{type} + 1);
     table.index_of_type[type] = static_cast<std::uint8_t>(*index);

@@ -277,7 +277,7 @@ TEST(VoxWrite, MoreThan255TypesAreRefused) {
   const auto written = write_vox(scene);
   ASSERT_FALSE(written);
   EXPECT_EQ(written.error().code, ErrorCode::LimitExceeded);
-  EXPECT_EQ(written.error().message, "the scene uses 256 voxel types; a .vox file holds 255");
+  EXPECT_EQ(written.error().message, "the scene uses 256 voxel types, more than the 255 of a .vox file");
 }
 
 TEST(VoxWrite, RefusesScenesThatVoxCannotHold) {
@@ -312,7 +312,7 @@ TEST(VoxWrite, RefusesScenesThatVoxCannotHold) {
   EXPECT_EQ(code(), ErrorCode::LimitExceeded);
   scene.edit(instance).position = {0, 0.25, 0};
   EXPECT_EQ(code(), std::nullopt);
-  EXPECT_EQ(warnings, std::vector<std::string>{"instances between voxels moved to the nearest: 1"});
+  EXPECT_EQ(warnings, std::vector<std::string>{"instances rounded to whole voxels: 1"});
 }
 
 TEST(VoxWrite, EmptyGridsAndEmptyScenesAreWritten) {
