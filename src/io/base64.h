@@ -10,11 +10,10 @@
 
 namespace quoin {
 
-/// Bytes as text of A to Z, a to z, 0 to 9, + and /, four characters for three bytes, the last four filled up with =
-/// (RFC 4648, section 4).
+/// Encodes bytes as base64 with padding (RFC 4648, section 4).
 [[nodiscard]] std::string to_base64(std::span<const std::byte> bytes);
 
-/// Errors: BadFormat for text that `to_base64` cannot produce, with the offset in `text`.
+/// Errors: BadFormat for text that `to_base64` does not produce, with the offset in `text`.
 [[nodiscard]] Result<std::vector<std::byte>> from_base64(std::string_view text);
 
 }  // namespace quoin

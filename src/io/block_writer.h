@@ -27,7 +27,7 @@ class BlockWriter {
     block_.resize(kBlockBytes);
   }
 
-  /// The value's bytes as they lie in memory.
+  /// Writes the value's bytes as they are in memory.
   template <class T>
   void put(const T& value) {
     static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= kBlockBytes);
@@ -49,13 +49,13 @@ class BlockWriter {
     used_ = used;
   }
   void put_text(std::string_view text) { put(std::as_bytes(std::span(text))); }
-  /// Fills up to a multiple of four bytes since the start.
+  /// Pads to a multiple of four bytes since the start.
   void align(char filler);
 
   /// Returns true if further writes are ignored; lets long loops end early.
   [[nodiscard]] bool failed() const { return !status_.has_value(); }
   [[nodiscard]] std::uint64_t bytes() const { return written_ + used_; }
-  /// Errors: the sink's first; Cancelled.
+  /// Errors: the sink's first error; Cancelled.
   [[nodiscard]] Status finish();
 
  private:

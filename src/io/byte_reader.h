@@ -13,20 +13,20 @@
 
 namespace quoin {
 
-/// BadFormat at an offset of the file.
+/// Returns BadFormat at an offset in the file.
 [[nodiscard]] inline Error bad_at(std::uint64_t offset, std::string message) {
   return make_error(ErrorCode::BadFormat, std::move(message), {}, offset);
 }
 
-/// The bytes as characters.
+/// Returns the bytes as characters.
 [[nodiscard]] inline std::string_view text_of(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 /// Reads little-endian values from bytes that may end too early.
 ///
-/// A read past the end gives zeros (or an empty view) and makes `failed` true for good, so a parser may read a whole
-/// record and ask once.
+/// After a read past the end, all reads return zeros (or an empty view) and `failed` stays true. A parser can read a
+/// whole record and check once.
 class ByteReader {
  public:
   /// Reads `bytes[begin, end)`. Requires: begin <= end <= bytes.size().
@@ -37,7 +37,7 @@ class ByteReader {
   explicit ByteReader(std::span<const std::byte> bytes) : ByteReader(bytes, 0, bytes.size()) {}
 
   [[nodiscard]] bool failed() const { return failed_; }
-  /// Counted from the beginning of `bytes`.
+  /// The offset from the beginning of `bytes`.
   [[nodiscard]] std::size_t position() const { return position_; }
   [[nodiscard]] std::size_t remaining() const { return end_ - position_; }
 
@@ -70,7 +70,7 @@ class ByteReader {
   [[nodiscard]] float f32() { return std::bit_cast<float>(u32()); }
   [[nodiscard]] std::int32_t i32() { return static_cast<std::int32_t>(u32()); }
 
-  /// A count of records of at least `record_bytes` each: fails when the remaining bytes cannot hold that many.
+  /// Reads a count of records of at least `record_bytes` each. Fails if the remaining bytes cannot hold that many.
   [[nodiscard]] std::size_t count(std::size_t record_bytes) {
     const std::size_t claimed = u32();
     if (claimed <= remaining() / record_bytes) return claimed;

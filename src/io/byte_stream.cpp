@@ -13,13 +13,13 @@ namespace quoin {
 
 namespace {
 
-// A match of 258 bytes takes two bits at least (RFC 1951).
+// A match of 258 bytes takes at least two bits (RFC 1951).
 constexpr std::uint64_t kMaxDeflateRatio = 1032;
 
 // zlib counts in 32 bits.
 constexpr std::size_t kMaxAtOnce = std::size_t{1} << 30;
 
-// Bits of the window of deflate, and what zlib adds to them for gzip's header and trailer.
+// The window bits of deflate. zlib adds 16 for gzip headers and trailers.
 constexpr int kWindow = 15;
 constexpr int kGzipWindow = kWindow + 16;
 
@@ -72,12 +72,12 @@ Result<std::size_t> ByteStream::read(std::span<std::byte> out) {
   return filled;
 }
 
-/// One call of inflate; it may give nothing and still have got ahead.
+/// Calls inflate once. It may produce no output and still make progress.
 Result<std::size_t> ByteStream::inflate_some(std::span<std::byte> out) {
   QUOIN_ASSERT(position_ <= file_.size() && !out.empty(), "bytes of the file, and room for some");
   z_stream& state = inflater_->state;
   const std::size_t offered = std::min(file_.size() - position_, kMaxAtOnce);
-  // zlib reads through this pointer only; its type dates from before const.
+  // zlib only reads through this pointer, which is not const for historical reasons.
   state.next_in = const_cast<Bytef*>(reinterpret_cast<const Bytef*>(file_.data() + position_));
   state.avail_in = static_cast<uInt>(offered);
   state.next_out = reinterpret_cast<Bytef*>(out.data());

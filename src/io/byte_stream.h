@@ -13,14 +13,13 @@ namespace quoin {
 /// Returns true if the bytes begin with a gzip header (RFC 1952).
 [[nodiscard]] bool begins_gzip(std::span<const std::byte> bytes);
 
-/// Gzip (RFC 1952) and Zlib (RFC 1950) are two wrappings of the same compressed data, Deflate (RFC 1951).
+/// Gzip (RFC 1952) and Zlib (RFC 1950) wrap the same compressed data, Deflate (RFC 1951).
 enum class Compression : std::uint8_t { None, Gzip, Zlib, Deflate };
 
-/// The bytes of a file from an offset to its end, in order, decompressed if they are a compressed stream.
-///
+/// Reads the bytes of a file from an offset to its end, decompressing them if they are a compressed stream.
 /// Consecutive gzip members are one stream, as in the standard. Bytes after the last member, or after the end of a zlib
 /// stream, are ignored.
-/// Memory: zlib's window, for any stream. Offsets in errors are file offsets.
+/// Memory: zlib's window. Offsets in errors are file offsets.
 class ByteStream {
  public:
   /// Requires: `file` outlives the stream, begin <= file.size().
@@ -29,16 +28,16 @@ class ByteStream {
   ByteStream(const ByteStream&) = delete;
   ByteStream& operator=(const ByteStream&) = delete;
 
-  /// Fills `out`, or less of it at the end of the stream; returns how many bytes were read.
-  /// Errors: BadFormat when compressed data are damaged or cut off.
+  /// Fills `out`, or part of it at the end of the stream. Returns the number of bytes read.
+  /// Errors: BadFormat if compressed data is damaged or cut off.
   [[nodiscard]] Result<std::size_t> read(std::span<std::byte> out);
-  /// As `read`, without keeping the bytes; returns how many there were.
+  /// Reads like `read` but discards the bytes. Returns their number.
   [[nodiscard]] Result<std::uint64_t> skip(std::uint64_t count);
 
-  /// The most bytes that the whole stream can give: exact without compression; 1,032 a byte with it, which deflate
-  /// cannot exceed.
+  /// Returns the maximum size of the whole stream: exact without compression, else 1,032 bytes per compressed byte, the
+  /// limit of deflate.
   [[nodiscard]] std::uint64_t max_bytes() const;
-  /// The bytes left in the file itself.
+  /// Returns the number of bytes left in the file itself.
   [[nodiscard]] std::size_t remaining() const { return file_.size() - position_; }
   /// Returns the file offset of the next byte.
   [[nodiscard]] std::size_t position() const { return position_; }
@@ -58,11 +57,11 @@ class ByteStream {
   std::unique_ptr<Inflater> inflater_;
 };
 
-/// The same bytes as one gzip stream (RFC 1952), `level` 0 (stored) to 9 (smallest). The same bytes give the same
-/// stream. Requires: fewer than 2^31 of them.
+/// Returns the bytes as one gzip stream (RFC 1952). `level`: 0 (stored) to 9 (smallest). Equal bytes give equal
+/// streams. Requires: fewer than 2^31 bytes.
 [[nodiscard]] std::vector<std::byte> gzipped(std::span<const std::byte> bytes, int level);
 
-/// The first bytes of a file, decompressed where it is a gzip stream: `most` of them, or all that there are.
+/// Returns the first `most` bytes of a file, or all of it if shorter. Decompresses gzip streams.
 [[nodiscard]] Result<std::vector<std::byte>> first_bytes(std::span<const std::byte> file, std::size_t most);
 
 }  // namespace quoin

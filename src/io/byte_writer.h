@@ -11,7 +11,7 @@
 
 namespace quoin {
 
-/// Bytes of a file as they are made; numbers are little-endian.
+/// Builds the bytes of a file; numbers are little-endian.
 class ByteWriter {
  public:
   /// Reserves memory for `more` bytes, so that growth does not move the data.
@@ -30,7 +30,7 @@ class ByteWriter {
   void f32(float value) { u32(std::bit_cast<std::uint32_t>(value)); }
   void f64(double value) { put(std::bit_cast<std::uint64_t>(value), 8); }
 
-  /// Leaves space for bytes that are written through `bytes` later.
+  /// Appends space to be written through `bytes` later.
   void leave(std::size_t count) { bytes_.resize(bytes_.size() + count); }
   /// Overwrites four bytes at `offset` with the lowest four bytes of a number.
   void patch(std::size_t offset, std::size_t value) {

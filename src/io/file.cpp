@@ -20,7 +20,7 @@ namespace quoin {
 
 namespace {
 
-// Far above any file Quoin can make sense of; keeps a sparse file of terabytes from exhausting the memory.
+// Far above any valid input. Keeps a sparse file of terabytes from exhausting the memory.
 constexpr std::uint64_t kMaxFileBytes = std::uint64_t{8} << 30;
 
 constexpr mode_t kPermissionBits = 07777;
@@ -46,7 +46,7 @@ struct DescriptorGuard {
   ~DescriptorGuard() { close_after_reading(descriptor); }
 };
 
-/// Why there is no folder in which `path` could lie, or nothing when there is one.
+/// Returns an error if the folder of `path` does not exist.
 Status check_folder(const std::filesystem::path& path) {
   const std::filesystem::path folder = path.parent_path();
   std::error_code unknown;
@@ -67,7 +67,8 @@ std::filesystem::path temporary_name(const std::filesystem::path& path, unsigned
   return path.parent_path() / name;
 }
 
-/// Why `path` cannot be replaced by a file, or 0 when it can. `mode` becomes the permissions of the file that is there.
+/// Returns the reason why `path` cannot be replaced by a file, or 0. `mode` becomes the permissions of the existing
+/// file.
 Status check_replaceable(const std::filesystem::path& path, std::optional<mode_t>& mode) {
   struct stat info {};
   if (::stat(path.c_str(), &info) != 0) {
@@ -81,7 +82,7 @@ Status check_replaceable(const std::filesystem::path& path, std::optional<mode_t
   return {};
 }
 
-/// The whole of a file, or its first `max_bytes` bytes.
+/// Reads a whole file, or its first `max_bytes` bytes.
 Result<std::vector<std::byte>> read_regular_file(const std::filesystem::path& path,
                                                  std::optional<std::size_t> max_bytes) {
   const int descriptor = open_for_reading(path);
@@ -161,7 +162,7 @@ Result<AtomicFile> AtomicFile::create(const std::filesystem::path& path) {
     if (file.descriptor_ < 0 && errno != EEXIST) break;
   }
   if (file.descriptor_ < 0) return cannot_write(reason(errno), path);
-  // Some file systems have no permissions; the file is then as good as it can be.
+  // Some file systems have no permissions, so a failure is ignored.
   if (mode.has_value()) static_cast<void>(::fchmod(file.descriptor_, *mode));
   return file;
 }
@@ -234,13 +235,13 @@ bool is_there(const std::filesystem::path& path) {
   return ::lstat(path.c_str(), &info) == 0 || errno != ENOENT;
 }
 
-/// A copy that lasts, with permissions.
+/// Makes a synced copy with the same permissions.
 Status copy_whole(const std::filesystem::path& from, const std::filesystem::path& to) {
   std::error_code failed;
   std::filesystem::copy_file(from, to, failed);
   if (failed) return cannot_write(failed.message(), to);
   const int descriptor = ::open(to.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return {};  // unreadable, as is the original
+  if (descriptor < 0) return {};  // unreadable, like the original
   ::fsync(descriptor);
   ::close(descriptor);
   return {};
@@ -304,7 +305,7 @@ Status FileBackup::keep() {
     const std::string left = std::exchange(second_name_, {}).string();
     return cannot_write(reason(error) + "; the previous content is in " + left, backup_);
   }
-  // Where both were the same file already, renaming does nothing.
+  // Renaming does nothing if both names already refer to the same file.
   ::unlink(std::exchange(second_name_, {}).c_str());
   sync_folder(backup_.parent_path());
   return {};

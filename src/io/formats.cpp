@@ -121,7 +121,7 @@ std::string extensions_with(bool FormatInfo::*ability) {
   return list;
 }
 
-/// The readable format of a name's extension.
+/// Returns the readable format with a path's extension; null if there is none.
 const FormatInfo* format_by_name(const std::filesystem::path& path) {
   const std::string extension = lower_case_extension(path);
   const auto* const found = std::ranges::find_if(kFormats, [&](const FormatInfo& info) {
@@ -131,7 +131,7 @@ const FormatInfo* format_by_name(const std::filesystem::path& path) {
   return found == kFormats.end() ? nullptr : found;
 }
 
-/// Why a file of no known format is refused.
+/// Returns the error for a file of unknown format.
 Error unrecognised(std::span<const std::byte> bytes, const std::filesystem::path& path) {
   if (bytes.empty()) return {ErrorCode::BadFormat, "the file is empty", {}, {}};
   if (begins_with(bytes, "version https://git-lfs.github.com/spec/")) {
@@ -198,7 +198,7 @@ Result<LoadedScene> read_heights_as_scene(std::span<const std::byte> bytes, cons
   return loaded;
 }
 
-/// Voxlap's formats have no common name.
+/// Reads a file of any Voxlap format.
 Result<LoadedScene> read_voxlap(std::span<const std::byte> bytes) {
   if (models::is_kv6(bytes)) return models::read_kv6(bytes);
   if (models::is_kvx(bytes)) return models::read_kvx(bytes);
@@ -206,7 +206,7 @@ Result<LoadedScene> read_voxlap(std::span<const std::byte> bytes) {
   return models::read_vxl(bytes);
 }
 
-/// A reader of a model format; null for other formats.
+/// Returns the reader of a model format; null for other formats.
 using ReadModel = Result<LoadedScene> (*)(std::span<const std::byte>);
 ReadModel model_reader(const std::optional<FileFormat>& format) {
   if (format == FileFormat::Qubicle) return models::read_qubicle;
@@ -253,7 +253,7 @@ Result<LoadedScene> read_around_spawn(const Result<std::unique_ptr<ChunkSource>>
   return load_source(**source, chunks_around_spawn(**source, options.radius), threads, progress);
 }
 
-/// `format`: as detect_format says it of the bytes.
+/// `format`: the result of detect_format for the bytes.
 Result<LoadedScene> read_bytes(const std::filesystem::path& path, std::span<const std::byte> bytes,
                                std::optional<FileFormat> format, const LoadOptions& options, Threads threads,
                                const Progress& progress) {
@@ -327,7 +327,7 @@ Result<FileFormat> format_for_saving(const std::filesystem::path& path) {
   return format->format;
 }
 
-/// A writer of a model format, whose losses are known after writing; null for other formats.
+/// Returns the writer of a model format, which reports unsupported content after writing; null for other formats.
 using WriteModel = Result<models::ModelBytes> (*)(const Scene&, const Progress&);
 WriteModel model_writer(FileFormat format) {
   if (format == FileFormat::Schematic) return minecraft::write_schematic;
@@ -457,7 +457,7 @@ Result<std::optional<FileFormat>> detect_format(const std::filesystem::path& pat
                       "Luanti world (world.mt)",
                       path.string());
   }
-  // What decompresses to a header, with room for names and comments in gzip's own.
+  // Enough compressed bytes for a decompressed header, with room for names and comments in the gzip header.
   constexpr std::size_t kEnough = 1 << 16;
   const auto bytes = read_file_beginning(path, kEnough);
   if (!bytes) return bytes.error();
@@ -538,7 +538,7 @@ Result<LoadedScene> load_scene(const std::filesystem::path& path, const LoadOpti
   if (is_volume(*format)) return with_path(read_volume_as_scene(path, options, threads, progress), path);
   const auto bytes = read_file(path);
   if (!bytes) return bytes.error();
-  // Of the whole file, which some formats are known by only then, and which may be another by now.
+  // Detects again from the whole file: some formats need it, and the file may have changed since.
   const auto of_all = detect_format(*bytes);
   if (of_all == FileFormat::Scene) return read_scene_file(path, options, threads, progress);
   if (is_triangles(of_all) || (!of_all && is_triangles(*format))) {

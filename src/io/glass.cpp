@@ -14,7 +14,7 @@ namespace quoin {
 
 namespace {
 
-constexpr float kLeastAttenuation = 0.01F;  // glTF's colours may be 0, logarithms of clients not
+constexpr float kLeastAttenuation = 0.01F;  // glTF colours may be 0, but some clients take logarithms of them
 
 }  // namespace
 
@@ -96,7 +96,7 @@ double area_of(const MeshView& view) {
   return area;
 }
 
-/// The world's length of a unit of the part.
+/// Returns the world length of a unit of the part.
 double unit_of(const MeshPlacement& placement) {
   return std::cbrt(std::abs(glm::determinant(glm::dmat3(placement.matrix()))));
 }

@@ -35,7 +35,7 @@ struct GlassMaterial {
 /// Requires: `thickness` is above 0.
 [[nodiscard]] GlassMaterial glass_material(const Surface& surface, float thickness);
 
-/// The alpha of a smooth surface's vertex, 0 to 65,535, for bodies of that thickness. Requires: as above.
+/// Returns the alpha of a smooth surface's vertex, 0 to 65,535, for bodies of that thickness. Requires: as above.
 [[nodiscard]] std::uint16_t glass_alpha(const LinearRgba16& albedo, float thickness);
 
 /// Estimates the thickness of closed bodies from their surface: the volume divided by the largest of its projected
@@ -51,11 +51,11 @@ class GlassBodies {
     float unit = 1.0F;       ///< the world's length of a voxel, the mean by area
   };
 
-  /// Cost: O(triangles that are transparent), and of parts without MeshPart::thickness once more a type.
+  /// Cost: O(transparent triangles), plus another pass per type for parts without MeshPart::thickness.
   explicit GlassBodies(const SceneMeshes& meshes);
 
   [[nodiscard]] Typical typical(VoxelType type) const;
-  /// The same of smooth surfaces of a type.
+  /// As `typical`, for smooth surfaces of a type.
   [[nodiscard]] Typical typical_of_smooth(VoxelType type) const;
   [[nodiscard]] float thickness_of_smooth() const { return smooth_.empty() ? 1.0F : typical_of(smooth_).thickness; }
 

@@ -18,7 +18,7 @@ using FileNumber = std::pair<unsigned long, unsigned long>;
 // Locks belong to the process, so this registry is global.
 struct Held {
   int databases = 0;
-  int descriptor = -1;  // opened for reading while databases hold the file, and kept open as long as they do
+  int descriptor = -1;  // opened for reading; kept open as long as databases hold the file
 };
 struct HeldFiles {
   std::mutex mutex;

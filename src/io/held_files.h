@@ -2,8 +2,8 @@
 
 #include <filesystem>
 
-// A process loses its fcntl locks on a file (used by SQLite) when it closes any descriptor of that file. So this
-// registry knows the files of open databases, and other readers keep their descriptors open.
+// A process loses its fcntl locks on a file (used by SQLite) when it closes any descriptor of that file. Therefore this
+// registry tracks the files of open databases, and other readers keep their descriptors open.
 
 namespace quoin {
 

@@ -40,7 +40,7 @@ std::uint32_t copy_vertex(const MeshView& source, std::size_t from, SmoothMesh& 
   return static_cast<std::uint32_t>(target.positions.size() - 1);
 }
 
-/// Clamps to the range of the file format: finite and not negative.
+/// Clamps to the values of the file format: finite and not negative.
 float clamped_emission(float emission) {
   return emission > 0.0F ? std::min(emission, std::numeric_limits<float>::max()) : 0.0F;
 }
@@ -313,7 +313,7 @@ void MaterialSurfaces::add(const MeshView& view, const MaterialPalette& palette)
   QUOIN_ASSERT(!view.types.empty(), "blocks have types");
   if (by_material.size() < 2) return surfaces_.push_back({view, palette.material_of(view.surface, view.types.front())});
   for (auto& [material, owned] : by_material) owned = owned_.emplace_back(std::make_unique<Owned>()).get();
-  // A triangle lies in one face, so its three vertices have one type and move together.
+  // A triangle lies in one face, so its three vertices have the same type and move together.
   std::vector<std::uint32_t> moved_to(view.positions.size());
   for (std::size_t i = 0; i < view.positions.size(); ++i) {
     Owned& owned = *by_material.at(palette.material_of(view.surface, view.types[i]));

@@ -26,8 +26,8 @@ struct SurfaceMaterial {
   SurfaceClass surface = SurfaceClass::Opaque;
   float emission = 0.0F;  ///< emission of a full texel in the emissive palette; 0 without emission
   VoxelType type = kAir;  ///< the only type of a transparent material
-  GlassMaterial glass{};  ///< of it
-  float unit = 1.0F;      ///< of it: the size of its voxels in the world, the mean of its placements
+  GlassMaterial glass{};
+  float unit = 1.0F;  ///< its voxel size in the world, the mean over its placements
   // For smooth surfaces, which have no textures:
   float roughness = 1.0F;
   float metalness = 0.0F;
@@ -44,15 +44,15 @@ struct SurfaceMaterial {
 /// The voxel types of a scene's meshes in the form of mesh formats: textures with one texel per type, and the few
 /// materials that use them.
 ///
-/// Each transparent type has its own material, with the light transmission of glass in the type's typical thickness.
+/// Each transparent type has its own material, with the light transmission of glass of the type's typical thickness.
 ///
 /// Emission: strengths are sorted into bands, each from its strongest down to half of it; a band is a material. Within
 /// a band the emissive texel is the type's colour, scaled in linear light by strength / strongest. A file with one
 /// strength, or with strengths more than a factor of two apart, has unscaled colours.
 class MaterialPalette {
  public:
-  /// Only types that blocks of the meshes use get materials; all registered types get texels.
-  /// Requires: the meshes are sound, and their types outlive this.
+  /// Only types used by blocks of the meshes get materials; all registered types get texels.
+  /// Requires: valid meshes, whose types outlive this object.
   explicit MaterialPalette(const SceneMeshes& meshes);
 
   [[nodiscard]] const VoxelRegistry& types() const { return types_; }
@@ -60,20 +60,20 @@ class MaterialPalette {
   /// Requires: the meshes have a triangle of this class and type.
   [[nodiscard]] std::size_t material_of(SurfaceClass surface, VoxelType type) const;
   [[nodiscard]] bool has_emission() const;
-  /// The materials of smooth surfaces, which come after all others: one for each roughness and metalness, and for each
-  /// type that emits or is transparent.
+  /// Returns the materials of smooth surfaces, which come after all others: one per roughness and metalness, and one
+  /// per type that emits or is transparent.
   [[nodiscard]] const std::vector<SurfaceMaterial>& smooth_materials() const { return smooth_materials_; }
-  /// The number of the material of a triangle of a smooth surface, by its first vertex.
+  /// Returns the material number of a smooth triangle, by its first vertex.
   /// Requires: the meshes have such a triangle.
   [[nodiscard]] std::size_t smooth_material(const MeshView& view, std::uint32_t vertex) const;
 
   /// Rows of every texture, a power of two.
   [[nodiscard]] std::uint32_t rows() const { return rows_; }
-  /// The centre of a type's texel, from the top left; exact in float.
+  /// Returns the centre of a type's texel, from the top left; exact in float.
   [[nodiscard]] std::array<float, 2> texel_centre(VoxelType type) const {
     const std::uint32_t column = type % kPaletteWidth;
     const std::uint32_t row = type / kPaletteWidth;
-    // Both sizes are powers of two, so that products are as exact as quotients.
+    // Both sizes are powers of two, so multiplying is as exact as dividing.
     return {(static_cast<float>(column) + 0.5F) * (1.0F / static_cast<float>(kPaletteWidth)),
             (static_cast<float>(row) + 0.5F) * row_height_};
   }
@@ -84,9 +84,9 @@ class MaterialPalette {
   /// Returns sRGB colours with linear alpha: the glass colour for transparent types used by blocks of the meshes, alpha
   /// 255 for opaque types.
   [[nodiscard]] PngImage base_colour() const;
-  /// The same without alpha.
+  /// As above, without alpha.
   [[nodiscard]] PngImage opaque_colour() const;
-  /// Roughness in green, metalness in blue, both linear.
+  /// Returns roughness in green and metalness in blue, both linear.
   [[nodiscard]] PngImage metallic_roughness() const;
   /// Returns sRGB colours; black without emission.
   [[nodiscard]] PngImage emissive() const;
@@ -121,8 +121,8 @@ class MaterialPalette {
   std::vector<SurfaceMaterial> materials_;
   std::vector<SurfaceMaterial> smooth_materials_;
   std::map<SmoothLook, std::size_t> smooth_by_look_;
-  bool has_light_ = false;         ///< colours of vertices have all light in them: types do not matter
-  float smooth_thickness_ = 1.0F;  ///< of all transparent surfaces without types
+  bool has_light_ = false;         ///< vertex colours include all light, so types do not matter
+  float smooth_thickness_ = 1.0F;  ///< the material of all transparent surfaces without types
   std::map<std::pair<SurfaceClass, std::size_t>, std::size_t> by_class_and_group_;
 };
 

@@ -19,7 +19,7 @@ Result<FileFormat> format_of(const std::filesystem::path& path, const MeshFileOp
   return format->format;
 }
 
-/// The files, of sound meshes. Errors: Unsupported, and those of the formats.
+/// Returns the files of valid meshes. Errors: Unsupported; those of the formats.
 Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format, const std::filesystem::path& path,
                                    const MeshFileOptions& options) {
   const bool is_gltf = format == FileFormat::Glb || format == FileFormat::Gltf;
@@ -78,7 +78,7 @@ Result<std::vector<MeshFile>> plan(const SceneMeshes& meshes, FileFormat format,
   return make_error(ErrorCode::Unsupported, std::string(format_info(format).extension) + " is not a mesh format");
 }
 
-/// The same meshes without occlusion.
+/// Returns the meshes without occlusion.
 SceneMeshes without_occlusion(SceneMeshes meshes) {
   for (MeshPart& part : meshes.parts) {
     for (MeshView& view : part.surfaces) view = without_occlusion(view);
@@ -87,7 +87,7 @@ SceneMeshes without_occlusion(SceneMeshes meshes) {
   return meshes;
 }
 
-/// (x, y, z) as (x, -z, y): +Y becomes +Z.
+/// Maps (x, y, z) to (x, -z, y): +Y becomes +Z.
 DVec3 turned(const DVec3& v) {
   return {v.x, -v.z, v.y};
 }
@@ -102,7 +102,7 @@ Similarity placed_in(const MeshFileOptions& options, Similarity place) {
   return place;
 }
 
-/// Lamps keep how bright they light a surface at a distance that is scaled as they are.
+/// Scales lamps so that surfaces at the scaled distance are lit equally.
 void place_lights(const MeshFileOptions& options, SceneMeshes& meshes) {
   const auto direction = [&](const DVec3& v) { return options.up == UpAxis::Z ? turned(v) : v; };
   for (Lamp& lamp : meshes.lamps) {
@@ -119,7 +119,7 @@ void place_lights(const MeshFileOptions& options, SceneMeshes& meshes) {
   }
 }
 
-/// The same meshes in the units and axes of the file.
+/// Returns the meshes in the units and axes of the file.
 Result<SceneMeshes> in_axes_of_file(SceneMeshes meshes, const MeshFileOptions& options) {
   if (!(options.scale > 0.0) || !std::isfinite(options.scale)) {
     return make_error(ErrorCode::InvalidArgument, "the scale must be more than 0");
@@ -147,14 +147,14 @@ Result<SceneMeshes> in_axes_of_file(SceneMeshes meshes, const MeshFileOptions& o
   return meshes;
 }
 
-/// As the options want them.
+/// Returns the meshes as the options require.
 Result<SceneMeshes> as_written(const SceneMeshes& meshes, const MeshFileOptions& options) {
   return in_axes_of_file(options.write_occlusion ? meshes : without_occlusion(meshes), options);
 }
 
 const Progress kNobody;
 
-/// Calls `file.write` with a writer that ends in `sink`; returns the bytes.
+/// Calls `file.write` with a writer to `sink`. Returns the number of bytes.
 Result<std::uint64_t> write_to(BlockWriter::Sink sink, const MeshFile& file, const Progress& progress) {
   BlockWriter out(std::move(sink), file.expected_bytes > 0 ? progress : kNobody, file.expected_bytes);
   file.write(out);

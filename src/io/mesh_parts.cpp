@@ -27,7 +27,7 @@ bool is_none_or_one_a_vertex(std::span<const T> values, const MeshView& view) {
   return values.empty() || is_one_a_vertex(values, view);
 }
 
-/// 0 where there is none. Without an early end, so that it is a matter of the memory's speed.
+/// Returns the largest value, or 0 if empty. Has no early exit, so that it runs at memory speed.
 template <class T>
 T largest_of(std::span<const T> values) {
   T largest{};
@@ -75,7 +75,7 @@ const char* fault_of(const glm::dmat4& matrix) {
     if (!is_finite(DVec3(matrix[column]))) return "a transform that is not finite";
     if (matrix[column].w != (column == 3 ? 1.0 : 0.0)) return "a transform that is not affine";
   }
-  // Against the product of the axes' lengths, so that a small scale is not taken for a singular one.
+  // Relative to the product of the axes' lengths, so that a small scale does not count as singular.
   const double lengths = glm::length(DVec3(matrix[0])) * glm::length(DVec3(matrix[1])) * glm::length(DVec3(matrix[2]));
   const double volume = std::abs(glm::determinant(glm::dmat3(matrix)));
   const bool is_sound = std::isnormal(lengths) && std::isnormal(volume) && volume > 1e-12 * lengths;
@@ -107,7 +107,7 @@ const char* fault_of_place(const DBox& bounds, const DVec3& pivot, const glm::dm
 /// Returns a description of a fault in a placement's keys; null if they are valid.
 const char* fault_of_keys(const DBox& bounds, const DVec3& pivot, const MeshPlacement& placement) {
   const bool mirrors = glm::determinant(glm::dmat3(placement.matrix())) < 0.0;
-  // Files have floats.
+  // Files store times as floats.
   float last = 0.0F;
   for (const MeshKey& key : placement.keys) {
     const bool is_first = &key == &placement.keys.front();
@@ -141,7 +141,7 @@ Status unsound(const MeshPart& part, const char* fault) {
   return make_error(ErrorCode::InvalidArgument, "part \"" + part.name + "\" has " + fault);
 }
 
-/// Adds the bounds of a sound part.
+/// Checks a part, and appends its bounds if it is valid.
 Status check_part(const MeshPart& part, const SceneMeshes& meshes, std::vector<DBox>& bounds) {
   if (!is_finite(part.pivot)) return unsound(part, "a pivot that is not finite");
   DBox& box = bounds.emplace_back();
@@ -251,7 +251,7 @@ VertexTransform::VertexTransform(const glm::dmat4& world_from_part, DVec3 pivot)
       pivot_(pivot),
       mirrors_(glm::determinant(linear_) < 0.0) {
   QUOIN_ASSERT(glm::determinant(linear_) != 0.0, "a linear part that is not singular");
-  // Scaled to about 1, so that squares neither vanish nor overflow.
+  // Scaled to about 1, so that squares neither underflow nor overflow.
   double largest = 0.0;
   for (int column = 0; column < 3; ++column) {
     for (int row = 0; row < 3; ++row) largest = std::max(largest, std::abs(normal_matrix_[column][row]));

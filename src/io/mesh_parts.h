@@ -19,14 +19,14 @@
 
 namespace quoin {
 
-/// One of the files that a mesh is written as; they are all written before the first is put in place, in their order.
+/// One of the files of a mesh. All are written before the first one is put in place, in order.
 struct MeshFile {
   std::filesystem::path path;
-  std::uint64_t expected_bytes = 0;  ///< the total that progress is relative to; 0: too small to report
+  std::uint64_t expected_bytes = 0;  ///< the total for progress; 0: too small to report
   std::function<void(BlockWriter&)> write;
 };
 
-/// The files of a mesh, or why it cannot be written. Requires: the meshes are sound, and outlive the files.
+/// Returns the files of a mesh. Requires: the meshes are valid and outlive the files.
 using PlanMeshFiles = Result<std::vector<MeshFile>>(const SceneMeshes& meshes, const std::filesystem::path& path,
                                                     const MeshFileOptions& options);
 
@@ -51,31 +51,31 @@ using PlanMeshFiles = Result<std::vector<MeshFile>>(const SceneMeshes& meshes, c
 /// Returns true if any surface has light at its vertices; in valid meshes all surfaces then have it.
 [[nodiscard]] bool has_light(const SceneMeshes& meshes);
 
-/// The box of all vertices; empty without one.
+/// Returns the box of all vertices; empty without vertices.
 [[nodiscard]] DBox bounds_of(const MeshView& view);
 
-/// The largest coordinates that floats hold exactly enough, in steps: units of the part.
+/// The largest coordinates that floats represent with enough precision, in steps: units of the part.
 inline constexpr double kMostStepsOfPly = 1 << 20;
-/// Surfaces for printers are parted by a hundredth of a voxel.
+/// Surfaces for printers are separated by a hundredth of a voxel.
 inline constexpr double kMostStepsOfStl = 1 << 16;
 
 /// Returns the point that positions of all placements are relative to in a file with floats in world units: 0, unless
 /// vertices lie more than `most_steps` steps from the origin.
 [[nodiscard]] DVec3 file_origin(const SceneMeshes& meshes, double most_steps);
 
-/// The placements, by part, and in their order within a part.
+/// The placements by part, in order within a part.
 [[nodiscard]] std::vector<const MeshPlacement*> placements_by_part(const SceneMeshes& meshes);
 
-/// A placement's name, or else its part's.
+/// Returns a placement's name, or its part's if it has none.
 [[nodiscard]] const std::string& name_of(const SceneMeshes& meshes, const MeshPlacement& placement);
 
-/// Vertices as one placement, or one shared mesh of a file, has them. Requires: the linear part is not singular.
+/// Transforms vertices for one placement, or for a mesh that a file shares. Requires: the linear part is not singular.
 class VertexTransform {
  public:
   VertexTransform(const glm::dmat4& world_from_part, DVec3 pivot);
 
   [[nodiscard]] DVec3 position(Vec3 in_part) const { return linear_ * (DVec3(in_part) - pivot_) + translation_; }
-  /// Unit.
+  /// Returns the unit normal.
   [[nodiscard]] DVec3 normal(Vec3 in_part) const;
   /// Returns the normals of a block's six faces, by Direction.
   [[nodiscard]] std::array<Vec3, 6> face_normals() const;
@@ -85,9 +85,9 @@ class VertexTransform {
   }
   /// Returns true if triangles must be reversed.
   [[nodiscard]] bool mirrors() const { return mirrors_; }
-  /// The length of the shortest axis once it is moved.
+  /// Returns the length of the shortest axis after the transform.
   [[nodiscard]] double least_step() const;
-  /// The same, but with positions relative to `origin`.
+  /// Returns the transform with positions relative to `origin`.
   [[nodiscard]] VertexTransform relative_to(const DVec3& origin) const;
 
  private:
@@ -98,11 +98,11 @@ class VertexTransform {
   bool mirrors_;
 };
 
-/// The bounds of a part's vertices once they are moved; empty without a vertex.
+/// Returns the transformed bounds of a part's vertices; empty without vertices.
 [[nodiscard]] DBox bounds_of(const MeshPart& part, const VertexTransform& transform);
 
-/// Returns the point that positions are stored relative to: 0, or the whole coordinates in the middle of `bounds` where
-/// these go beyond `most` along an axis.
+/// Returns the point that stored positions are relative to: 0, or the centre of `bounds` in whole coordinates if the
+/// bounds exceed `most` along an axis.
 [[nodiscard]] DVec3 float_origin(const DBox& bounds, double most);
 
 /// Returns the corners of the triangle whose indices begin at `i`, in the order of writing.
@@ -114,7 +114,7 @@ class VertexTransform {
 /// Returns the ambient light left by occlusion at a vertex: 1 open to 0 dark; 1 without occlusion.
 [[nodiscard]] float openness_at(const MeshView& view, std::size_t vertex);
 
-/// The same mesh without occlusion, and so without an atlas.
+/// Returns the mesh without occlusion, and therefore without an atlas.
 [[nodiscard]] MeshView without_occlusion(const MeshView& view);
 
 /// Returns true if surfaces of a class show the background.

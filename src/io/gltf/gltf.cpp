@@ -18,9 +18,8 @@ constexpr std::uint32_t kVersion = 2;
 constexpr std::uint32_t kJsonChunk = 0x4E4F534A;    // "JSON"
 constexpr std::uint32_t kBinaryChunk = 0x004E4942;  // "BIN"
 
-/// Writes the buffer that `layout` describes, converting vertex by vertex; ends on a multiple of four.
-///
-/// Requires: the writer stands at a multiple of four.
+/// Writes the buffer that `layout` describes, converting vertex by vertex. Pads the end to a multiple of four.
+/// Requires: the writer's position is a multiple of four.
 void write_buffer(const GltfLayout& layout, BlockWriter& out) {
   QUOIN_ASSERT(out.bytes() % 4 == 0);
   for (const GltfMesh& mesh : layout.meshes) {
@@ -53,7 +52,8 @@ std::filesystem::path buffer_path(std::filesystem::path path) {
   return path.replace_extension(".bin");
 }
 
-/// A file name as a relative URI reference (RFC 3986): everything but unreserved characters percent-encoded.
+/// Returns a file name as a relative URI reference (RFC 3986): all characters except unreserved ones are
+/// percent-encoded.
 std::string percent_encoded(std::string_view name) {
   constexpr std::string_view unreserved = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~";
   constexpr std::string_view digits = "0123456789ABCDEF";

@@ -15,7 +15,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "glTF buffers are little-endian");
 static_assert(sizeof(Vec3) == 12 && sizeof(LinearRgba16) == 8);
 
-/// Three integers and what fills them up to a multiple of four bytes.
+/// Three integers, padded to a multiple of four bytes.
 template <class Int>
 std::array<Int, 4> integers_from(const DVec3& v) {
   return {static_cast<Int>(std::lround(v.x)), static_cast<Int>(std::lround(v.y)), static_cast<Int>(std::lround(v.z)),
@@ -39,7 +39,7 @@ void write_positions(const VertexTransform& transform, const MeshView& view, Glt
   }
 }
 
-/// Normals, as `put` writes them.
+/// Returns normals in the form that `put` writes.
 template <class Put>
 void for_normals(const VertexTransform& transform, const MeshView& view, const Put& put) {
   if (view.has_albedo()) {
@@ -77,18 +77,18 @@ void write_texture_coordinates(const MaterialPalette& palette, const MeshView& v
   }
 }
 
-/// Linear, as glTF says of COLOR_0.
+/// Writes linear colours, as glTF requires for COLOR_0.
 std::uint8_t occlusion_grey(std::uint8_t occlusion) {
   return static_cast<std::uint8_t>(std::lround(occlusion_brightness(occlusion) * 255.0F));
 }
 
-/// Glass has the alpha of its body.
+/// Glass gets the alpha of its body.
 void write_smooth_colours(float thickness, const MeshView& view, BlockWriter& out) {
   std::uint16_t alpha = 0;
   for (std::size_t i = 0; i < view.positions.size(); ++i) {
     LinearRgba16 colour = linear_colour(view, i);
     if (is_transparent(view.surface)) {
-      // Neighbours are mostly of one type.
+      // Adjacent vertices mostly have the same type.
       if (i == 0 || view.albedo[i] != view.albedo[i - 1]) alpha = glass_alpha(view.albedo[i], thickness);
       colour[3] = alpha;
     }
@@ -132,14 +132,13 @@ bool has_array(const GltfPrimitive& primitive, GltfArrayKind kind) {
   return std::ranges::any_of(primitive.arrays, [&](const GltfArray& array) { return array.kind == kind; });
 }
 
-/// The corners of the box around all vertices.
+/// The bounds of all vertices.
 struct StoredBox {
   DVec3 min{std::numeric_limits<double>::infinity()};
   DVec3 max{-std::numeric_limits<double>::infinity()};
 };
 
-/// Origin and step of a lattice of integers from -`largest` to `largest` around the pivot, or around the box's middle
-/// where the pivot lies beyond it.
+/// Returns the centre of the integer lattice: the pivot, or the centre of the box if the pivot is outside of it.
 DVec3 origin_for(const StoredBox& box) {
   const bool has_pivot =
       glm::all(glm::lessThanEqual(box.min, DVec3(0.0))) && glm::all(glm::greaterThanEqual(box.max, DVec3(0.0)));
@@ -151,7 +150,8 @@ double farthest_from(const DVec3& origin, const StoredBox& box) {
   return std::max({away.x, away.y, away.z});
 }
 
-/// Blocks: whole voxels from an origin less than one away from the pivot, or, far from it, from the box's middle.
+/// Returns the lattice for blocks: whole voxels, with an origin less than one voxel from the pivot or, far from it,
+/// from the centre of the box.
 GltfQuantization quantize_blocks(const VertexTransform& transform, const StoredBox& box,
                                  std::span<const MaterialSurfaces::Surface> surfaces) {
   constexpr double kLargest = 32'767.0;

@@ -14,7 +14,7 @@ namespace quoin {
 
 namespace {
 
-/// The versions of the codecs that EXT_meshopt_compression names; meshoptimizer has them in variables.
+/// Sets the codec versions that EXT_meshopt_compression requires. meshoptimizer keeps them in global variables.
 void choose_versions() {
   static std::once_flag chosen;
   std::call_once(chosen, [] {

@@ -42,7 +42,7 @@ Json json_from(const Vec3& v) {
 Json json_from(const DVec3& v) {
   return {v.x + 0.0, v.y + 0.0, v.z + 0.0};
 }
-/// In glTF's order: x, y, z, w.
+/// In glTF order: x, y, z, w.
 Json json_from(const DQuat& q) {
   return {q.x + 0.0, q.y + 0.0, q.z + 0.0, q.w + 0.0};
 }
@@ -69,7 +69,7 @@ struct Arrays {
     return views.size() - 1;
   }
 
-  /// The accessor of floats, in a view of their own; returns its number.
+  /// Adds floats in a buffer view of their own. Returns the accessor's number.
   std::size_t add_floats(const GltfView& view, std::uint64_t count, int components) {
     accessors.push_back({{"bufferView", add_view(view)},
                          {"componentType", static_cast<int>(GltfComponent::Float)},
@@ -78,7 +78,7 @@ struct Arrays {
     return accessors.size() - 1;
   }
 
-  /// A view and the accessor of all of it; returns the accessor's number.
+  /// Adds a view and an accessor for all of it. Returns the accessor's number.
   std::size_t add(const GltfArray& array) {
     const bool is_index = array.kind == GltfArrayKind::Index;
     add_view(array.view);
@@ -156,7 +156,8 @@ Json meshes_json(const GltfLayout& layout, Arrays& arrays) {
   return meshes;
 }
 
-/// The factor goes up to 1, the extension beyond it, so that clients without the extension get weak lights right.
+/// The emissive factor is at most 1 and the extension multiplies it, so clients without the extension still show weak
+/// lights correctly.
 void add_emission(const GltfLayout& layout, const SurfaceMaterial& material, Json& entry) {
   const float factor = std::min(material.emission, 1.0F);
   entry["emissiveTexture"] = {{"index", *layout.texture(GltfImageKind::Emissive)}};
@@ -186,7 +187,7 @@ Json unlit_json(const std::string& name, bool transparent, std::optional<std::si
   return entry;
 }
 
-/// A material of smooth surfaces, whose colours are in the vertices.
+/// Returns a material for smooth surfaces, whose colours are in the vertices.
 Json smooth_json(const SurfaceMaterial& material, const MaterialPalette& palette) {
   Json entry = {
       {"name", material.name},
@@ -235,7 +236,7 @@ void add_textures(const GltfLayout& layout, Arrays& arrays, Json& document) {
     return Json{{"magFilter", filter}, {"minFilter", filter}, {"wrapS", kClampToEdge}, {"wrapT", kClampToEdge}};
   };
   document["samplers"] = Json::array({sampler(kNearest)});
-  // Between the corners of voxels, and never between patches.
+  // Linear filtering interpolates between the corners of voxels, never across patches.
   if (layout.texture(GltfImageKind::Atlas)) document["samplers"].push_back(sampler(kLinear));
   Json images = Json::array();
   Json textures = Json::array();
@@ -261,7 +262,7 @@ Json node_json(const GltfNode& node) {
   return entry;
 }
 
-/// A node that looks, or shines, along its -Z; `right` and `up` need not be unit.
+/// Returns a node that looks or shines along its -Z. `right` and `up` need not be unit vectors.
 Json node_along(const std::string& name, const DVec3& position, const glm::dmat3& axes) {
   Json entry = Json::object();
   if (!name.empty()) entry["name"] = name;
@@ -271,7 +272,7 @@ Json node_along(const std::string& name, const DVec3& position, const glm::dmat3
   return entry;
 }
 
-/// Any axes with -Z along `direction`. Requires: it is not 0.
+/// Returns any axes with -Z along `direction`. Requires: `direction` is not 0.
 glm::dmat3 axes_along(const DVec3& direction) {
   const DVec3 back = -glm::normalize(direction);
   const DVec3 aside = std::abs(back.y) < 0.9 ? DVec3(0, 1, 0) : DVec3(1, 0, 0);
@@ -279,7 +280,7 @@ glm::dmat3 axes_along(const DVec3& direction) {
   return {right, glm::cross(back, right), back};
 }
 
-/// A white surface that faces a lamp of 1 candela one unit away sends out 1 / pi.
+/// A white surface facing a lamp of 1 candela at distance 1 reflects 1 / pi.
 Json lamp_json(const Lamp& lamp) {
   const float most = std::max({lamp.colour.r, lamp.colour.g, lamp.colour.b});
   const bool is_spot = lamp.kind == Lamp::Kind::Spot;
@@ -298,7 +299,7 @@ Json lamp_json(const Lamp& lamp) {
 }
 
 Json camera_json(const MeshCamera& each) {
-  // Clients clip everything nearer, and with parallel rays everything farther.
+  // Clients clip everything nearer, and with parallel projection also everything farther.
   constexpr double kNear = 0.01;
   constexpr double kFar = 1e6;
   const Camera& camera = each.camera;
@@ -355,7 +356,7 @@ const char* name_of(GltfChannel::Path path) {
   return names[static_cast<std::size_t>(path)];
 }
 
-/// One animation, in which nothing is interpolated.
+/// Returns one animation without interpolation.
 void add_animation(const GltfLayout& layout, Arrays& arrays, Json& document) {
   if (layout.channels.empty()) return;
   Json channels = Json::array();

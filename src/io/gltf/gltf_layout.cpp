@@ -20,7 +20,7 @@ namespace {
 
 const glm::dmat3 kReflection(-1, 0, 0, 0, 1, 0, 0, 0, 1);
 
-/// A view at the end of the buffer, which moves on to the next multiple of four.
+/// Appends a view to the buffer and advances the buffer to the next multiple of four.
 GltfView reserve_view(std::uint64_t bytes, std::uint64_t& end) {
   constexpr std::uint64_t kAlignment = 4;
   const GltfView view{end, bytes};
@@ -53,8 +53,8 @@ GltfTransform transform_of(const Similarity& place) {
           place.mirrored ? kReflection : glm::dmat3(1.0)};
 }
 
-/// As translation, rotation and positive scale, after a reflection of x where it mirrors; when it shears, all but the
-/// translation is baked.
+/// Splits a transform into translation, rotation and positive scale, after a reflection of x if it mirrors. If it
+/// shears, everything except the translation is baked into the mesh.
 GltfTransform transform_of(const glm::dmat4& world_from_part) {
   constexpr double kTolerance = 1e-9;
   GltfTransform node;
@@ -75,7 +75,7 @@ GltfTransform transform_of(const glm::dmat4& world_from_part) {
   if (shears) return {.translation = node.translation, .rotation = {1, 0, 0, 0}, .scale = DVec3(1), .baked = sheared};
   node.rotation = glm::normalize(glm::quat_cast(linear));
   if (node.rotation.w < 0.0) node.rotation = -node.rotation;
-  // Lengths of turned axes are off by a rounding.
+  // The lengths of rotated axes have rounding errors.
   constexpr double kRounding = 1e-14;
   const double mean = (node.scale.x + node.scale.y + node.scale.z) / 3.0;
   if (glm::length(node.scale - mean) < kRounding * mean) node.scale = DVec3(mean);
@@ -83,7 +83,7 @@ GltfTransform transform_of(const glm::dmat4& world_from_part) {
   return node;
 }
 
-/// The bounds of the positions as they are stored.
+/// Returns the bounds of the positions as stored.
 void measure(const GltfMesh& mesh, GltfPrimitive& primitive) {
   const bool is_rounded = mesh.stored.component != GltfComponent::Float;
   const auto stored = [&](const Vec3& position) {
@@ -107,7 +107,8 @@ void measure(const GltfMesh& mesh, GltfPrimitive& primitive) {
   }
 }
 
-/// The arrays of a primitive, in their order, of `count` elements each; their views have sizes, but no places yet.
+/// Lists the arrays of a primitive in their order, with `count` elements each. Their views have sizes but no offsets
+/// yet.
 class ArrayPlan {
  public:
   ArrayPlan(const GltfMesh& mesh, const MeshView& view, const MeshFileOptions& options)
@@ -120,7 +121,7 @@ class ArrayPlan {
     add(GltfArrayKind::Position, mesh_.stored.component, 3, vertices);
     add(GltfArrayKind::Normal, normal_component(), 3, vertices);
     const bool is_short = options_.quantize;
-    // Of an atlas a 65,535th may be a noticeable part of a texel.
+    // 1/65,535 of an atlas may be a noticeable part of a texel.
     if (!view_.atlas.empty()) add(GltfArrayKind::AtlasCoordinate, GltfComponent::Float, 2, vertices);
     if (!is_smooth)
       add(GltfArrayKind::PaletteCoordinate, is_short ? GltfComponent::UnsignedShort : GltfComponent::Float, 2,
@@ -138,7 +139,7 @@ class ArrayPlan {
   }
 
  private:
-  /// Along the axes bytes are exact.
+  /// Bytes represent axis-aligned normals exactly.
   [[nodiscard]] GltfComponent normal_component() const {
     if (!options_.quantize) return GltfComponent::Float;
     return !view_.has_albedo() && mesh_.transform.keeps_axes() ? GltfComponent::Byte : GltfComponent::Short;
@@ -162,8 +163,8 @@ class ArrayPlan {
   std::vector<GltfArray> arrays_;
 };
 
-/// The places of vertices in the order in which triangles first need them: indices, a third of a compressed file, take
-/// a third of the bytes then.
+/// Returns new vertex positions in the order in which triangles first use them. This shrinks the compressed indices to
+/// a third; indices are a third of a compressed file.
 std::vector<std::uint32_t> places_by_use(const MeshView& view) {
   constexpr std::uint32_t kNowhere = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> place_of(view.positions.size(), kNowhere);
@@ -176,7 +177,7 @@ std::vector<std::uint32_t> places_by_use(const MeshView& view) {
   return place_of;
 }
 
-/// The same elements at other places, or the same indices of vertices that have other places.
+/// Moves elements to new positions, or renumbers indices of moved vertices.
 template <class Index>
 void renumber(std::vector<std::byte>& bytes, const std::vector<std::uint32_t>& place_of) {
   for (std::size_t at = 0; at < bytes.size(); at += sizeof(Index)) {
@@ -197,7 +198,7 @@ std::vector<std::byte> moved(const std::vector<std::byte>& bytes, std::size_t st
   return result;
 }
 
-/// An array's elements, compressed, for vertices at these places.
+/// Returns the compressed elements of an array for vertices in this order.
 std::vector<std::byte> packed_array(const MaterialPalette& palette, const GltfMesh& mesh,
                                     const GltfPrimitive& primitive, const GltfArray& array,
                                     const std::vector<std::uint32_t>& place_of) {
@@ -223,7 +224,7 @@ std::vector<std::byte> packed_array(const MaterialPalette& palette, const GltfMe
   return compress_gltf_array(array, bytes);
 }
 
-/// No image that no material uses.
+/// Omits images that no material uses.
 Status add_images(const Image& atlas, GltfLayout& layout) {
   const MaterialPalette& palette = layout.palette;
   const auto& materials = palette.materials();
@@ -248,7 +249,7 @@ Status add_images(const Image& atlas, GltfLayout& layout) {
   return {};
 }
 
-/// The transform of a node whose mesh has its positions stored so.
+/// Returns the transform of a node whose mesh stores its positions this way.
 GltfTransform from_stored(const GltfQuantization& stored, GltfTransform transform) {
   if (stored.step == 1.0 && stored.origin == DVec3(0.0)) return transform;
   transform.translation += transform.rotation * (transform.scale * stored.origin);
@@ -256,7 +257,7 @@ GltfTransform from_stored(const GltfQuantization& stored, GltfTransform transfor
   return transform;
 }
 
-/// Lays out the meshes that nodes ask for: a part's one after the other, those of blocks as they are before reflected.
+/// Lays out the meshes that nodes use, part by part. Unmirrored block meshes come before mirrored ones.
 class MeshLayout {
  public:
   MeshLayout(const SceneMeshes& meshes, const MeshFileOptions& options, GltfLayout& layout)
@@ -350,7 +351,7 @@ GltfTransform below(const Similarity& group, GltfTransform world) {
   frame.rotation = group.rotation;
   world.translation = (world.translation - group.position) * world_axes(frame);
   world.rotation = glm::normalize(glm::conjugate(unit_rotation(group.rotation)) * world.rotation);
-  // Of quarter turns, which rounding should not show.
+  // Removes rounding errors of quarter turns.
   constexpr double kRounding = 1e-15;
   for (int i = 0; i < 4; ++i) {
     const double nearest = std::round(world.rotation[i]);
@@ -359,7 +360,7 @@ GltfTransform below(const Similarity& group, GltfTransform world) {
   return world;
 }
 
-/// Adds the groups' nodes; every node comes to be placed from the one above it.
+/// Adds the groups' nodes and places every node relative to its parent.
 void hang_below_groups(const SceneMeshes& meshes, std::vector<GltfNode>& nodes) {
   const std::size_t first = nodes.size();
   for (const MeshGroup& group : meshes.groups) {
@@ -378,7 +379,7 @@ void hang_below_groups(const SceneMeshes& meshes, std::vector<GltfNode>& nodes) 
   }
 }
 
-/// A scale of 0 is how glTF hides a node.
+/// glTF has no visibility: a scale of 0 hides a node.
 void hide_at_first(const SceneMeshes& meshes, std::vector<GltfNode>& nodes) {
   for (std::size_t i = 0; i < meshes.placements.size(); ++i) {
     const auto& keys = meshes.placements[i].keys;
@@ -399,7 +400,7 @@ class ChannelBuilder {
     channel_.seconds.push_back(static_cast<float>(seconds));
     channel_.values.insert(channel_.values.end(), value.begin(), value.end());
   }
-  /// Nothing when the property never changes.
+  /// Returns nullopt if the property never changes.
   [[nodiscard]] std::optional<GltfChannel> channel() const {
     return has_changes_ ? std::optional(channel_) : std::nullopt;
   }
@@ -417,7 +418,7 @@ std::array<float, 4> floats_of(const DQuat& q) {
   return {static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z), static_cast<float>(q.w)};
 }
 
-/// Adds the animation of placement nodes, up to the end of the last frame, so that a loop has equal frames.
+/// Adds the animation of placement nodes up to the end of the last frame, so that frames of a loop have equal length.
 void add_channels(const SceneMeshes& meshes, GltfLayout& layout) {
   for (std::size_t i = 0; i < meshes.placements.size(); ++i) {
     const MeshPlacement& placement = meshes.placements[i];
@@ -448,7 +449,7 @@ void add_channels(const SceneMeshes& meshes, GltfLayout& layout) {
   }
 }
 
-/// Returns true if a file can say it: finite numbers, some light and, of spots, a direction.
+/// Returns true if glTF can represent the lamp: finite numbers, some light and, for spots, a direction.
 bool can_light(const Lamp& lamp) {
   const bool is_finite_lamp = is_finite(lamp.position) && is_finite(lamp.direction) && is_finite(DVec3(lamp.colour)) &&
                               std::isfinite(lamp.intensity) && std::isfinite(lamp.inner_angle_radians) &&

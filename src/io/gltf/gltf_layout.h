@@ -34,7 +34,7 @@ enum class GltfArrayKind : std::uint8_t {
   Index,
 };
 
-/// glTF 2.0's numbers for the types of components, which are OpenGL's.
+/// glTF 2.0 component types, which equal OpenGL's constants.
 enum class GltfComponent : std::uint16_t {
   Byte = 5120,
   UnsignedByte = 5121,
@@ -44,21 +44,21 @@ enum class GltfComponent : std::uint16_t {
   Float = 5126,
 };
 
-/// One array of a primitive, how its elements are stored, and where it lies.
+/// One array of a primitive: its storage format and its position in the buffer.
 struct GltfArray {
   GltfArrayKind kind{};
   GltfComponent component = GltfComponent::Float;
   int components = 3;
   bool normalized = false;
   std::uint32_t stride = 0;         ///< bytes from one element to the next, a multiple of four except for indices
-  GltfView view{};                  ///< of a compressed file: in the buffer that clients decode into
-  GltfView packed_view{};           ///< of a compressed file: in the file's buffer
+  GltfView view{};                  ///< compressed files: the view in the buffer that clients decode into
+  GltfView packed_view{};           ///< compressed files: the view in the file's buffer
   std::vector<std::byte> packed{};  ///< the encoded content (EXT_meshopt_compression)
 
   [[nodiscard]] std::uint64_t count() const { return view.bytes / stride; }
 };
 
-/// One primitive's arrays, in the order in which they are written.
+/// The arrays of one primitive, in writing order.
 struct GltfPrimitive {
   MeshView view;
   std::size_t material = 0;
@@ -107,7 +107,7 @@ struct GltfChannel {
   std::size_t node = 0;
   Path path{};
   std::vector<float> seconds{};
-  std::vector<float> values{};  ///< three or, of rotations, four a time
+  std::vector<float> values{};  ///< three or, for rotations, four per time
   GltfView seconds_view{};
   GltfView values_view{};
 };
@@ -127,23 +127,23 @@ struct GltfLayout {
   MaterialPalette palette;
   std::vector<GltfNode> nodes;  ///< the placements in their order, then the groups
   std::vector<GltfMesh> meshes;
-  std::vector<GltfImage> images;           ///< of blocks; the first is the first texture
+  std::vector<GltfImage> images;           ///< block textures; the first is the first texture
   std::vector<MaterialSurfaces> surfaces;  ///< of every part
-  std::vector<GltfChannel> channels{};     ///< of its animation; lies after the images
-  std::vector<Lamp> lamps{};               ///< that light something; their nodes come after `nodes`
+  std::vector<GltfChannel> channels{};     ///< the animation's times and values; after the images
+  std::vector<Lamp> lamps{};               ///< lamps that give light; their nodes come after `nodes`
   std::vector<MeshCamera> cameras{};       ///< their nodes come last
   std::uint64_t buffer_bytes = 0;
-  std::uint64_t decoded_bytes = 0;  ///< of a compressed file, of the buffer that its arrays are decoded into; else 0
+  std::uint64_t decoded_bytes = 0;  ///< compressed files: size of the buffer that arrays are decoded into; else 0
 
-  bool is_unlit = false;  ///< colours of vertices have all light in them
+  bool is_unlit = false;  ///< vertex colours include all light
 
   [[nodiscard]] bool is_compressed() const { return decoded_bytes > 0; }
   /// Returns the index of the texture; nullopt if the file has none of that kind.
   [[nodiscard]] std::optional<std::size_t> texture(GltfImageKind kind) const;
 };
 
-/// Requires: sound meshes that outlive the layout. Errors: LimitExceeded from the PNG encoder; Unsupported for
-/// compression where the build has no meshoptimizer.
+/// Requires: valid meshes that outlive the layout. Errors: LimitExceeded from the PNG encoder; Unsupported for
+/// compression in builds without meshoptimizer.
 [[nodiscard]] Result<GltfLayout> lay_out_gltf(const SceneMeshes& meshes, const MeshFileOptions& options = {});
 
 /// Writes the stored elements of one array, without padding to a multiple of four.
@@ -162,11 +162,11 @@ void write_gltf_array(const MaterialPalette& palette, const GltfMesh& mesh, cons
 /// Returns true if the build has meshoptimizer.
 [[nodiscard]] bool can_compress_gltf();
 
-/// The JSON of a glTF file: compact, in a fixed order, names made valid UTF-8. `buffer_uri` names the file that holds
-/// the buffer, percent-encoded; empty for the GLB's own.
+/// Returns the JSON of a glTF file: compact, in a fixed order, with names as valid UTF-8. `buffer_uri`: the
+/// percent-encoded name of the buffer's file; empty for the GLB's own buffer.
 [[nodiscard]] std::string gltf_json(const GltfLayout& layout, std::string_view buffer_uri);
 
-/// The size of a GLB with chunks of these sizes. Errors: LimitExceeded when it does not fit the header's 32 bits.
+/// Returns the size of a GLB with chunks of these sizes. Errors: LimitExceeded if it does not fit the header's 32 bits.
 [[nodiscard]] Result<std::uint64_t> glb_file_bytes(std::uint64_t json_bytes, std::uint64_t buffer_bytes);
 
 }  // namespace quoin

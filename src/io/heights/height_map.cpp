@@ -17,9 +17,9 @@ namespace quoin {
 namespace {
 
 constexpr std::string_view kPngSignature = "\x89PNG\r\n\x1a\n";
-/// Length of a degree of latitude.
+/// The length of a degree of latitude.
 constexpr double kMetresOfDegree = 111'320.0;
-/// Edge lengths of .hgt: three arc-seconds and one.
+/// The edge lengths of .hgt files: three arc-seconds and one.
 constexpr std::size_t kHgtEdges[] = {1201, 3601};
 
 std::optional<std::size_t> hgt_edge(std::uint64_t bytes) {

@@ -18,9 +18,9 @@ namespace {
 
 constexpr float kBand = 8.0F;
 constexpr float kSteep = 1.0F;       // rise of a voxel
-constexpr float kSandMetres = 2.0F;  // the highest that has sand
+constexpr float kSandMetres = 2.0F;  // the highest level with sand
 constexpr float kSnowMetres = 3'000.0F;
-constexpr float kTopsoil = 4.0F;  // voxels above stone
+constexpr float kTopsoil = 4.0F;  // depth of soil above stone, in voxels
 
 /// The materials of a ground column, from the top down.
 struct Ground {
@@ -34,7 +34,7 @@ struct Surface {
   int depth = 0;                 // along z
   std::vector<float> heights{};  // [z][x]; NaN: a void
   int base = 0;                  // the lowest voxel
-  int top = 0;                   // above all of them
+  int top = 0;                   // above all voxels
   float metres_of_height = 1.0F;
 
   [[nodiscard]] float at(int x, int z) const {
@@ -65,12 +65,12 @@ struct Surface {
 struct Range {
   float lowest = std::numeric_limits<float>::infinity();
   float highest = -std::numeric_limits<float>::infinity();
-  bool is_whole = true;  // no voids, nothing beyond the border
+  bool is_whole = true;  // no voids, and nothing beyond the border
 };
 
 Result<Surface> surface_of(const HeightMap& map, const HeightOptions& options) {
   const double voxel = options.metres_per_voxel.value_or(map.metres_per_pixel);
-  const double step = voxel / map.metres_per_pixel;  // pixels a voxel
+  const double step = voxel / map.metres_per_pixel;  // pixels per voxel
   const double scale = options.vertical_exaggeration / voxel;
   const auto count = [&](int pixels) { return std::floor((pixels - 1) / step + 1e-6) + 1.0; };
   constexpr double kMaxColumns = 0x1p26;
@@ -96,7 +96,7 @@ Result<Surface> surface_of(const HeightMap& map, const HeightOptions& options) {
       const int py = static_cast<int>(at_y);
       const double fx = at_x - px;
       const double fy = at_y - py;
-      // At a pixel the result is its height alone, even next to a void.
+      // At a pixel the result is the pixel's height, even next to a void.
       const auto mix = [](double a, double b, double share) { return share < 1e-6 ? a : a + share * (b - a); };
       const double metres =
           mix(mix(pixel(px, py), pixel(px + 1, py), fx), mix(pixel(px, py + 1), pixel(px + 1, py + 1), fx), fy);
@@ -134,7 +134,7 @@ Range range_of(const Surface& surface, int first_x, int first_z) {
   return range;
 }
 
-/// Makes the chunks of one column after the other. Each thread has its own.
+/// Makes the chunks column by column. Each thread has its own instance.
 class ColumnMaker {
  public:
   ColumnMaker(const Surface& surface, const TerrainTypes& types, int chunk_x, int chunk_z)
@@ -153,7 +153,7 @@ class ColumnMaker {
     }
   }
 
-  /// Nothing where all is air.
+  /// Returns null if the chunk is all air.
   [[nodiscard]] std::optional<Chunk> voxels(int chunk_y) {
     const int first_y = chunk_y * kChunkEdge;
     if (static_cast<float>(first_y) > range_.highest + 1.0F) return std::nullopt;
@@ -173,7 +173,7 @@ class ColumnMaker {
     return Chunk::from_dense(std::span<const VoxelType, kChunkVoxels>(dense_));
   }
 
-  /// Nothing where all is far air.
+  /// Returns null if the chunk is all far air.
   [[nodiscard]] std::optional<DensityChunk> densities(int chunk_y) {
     const int first_y = chunk_y * kChunkEdge;
     if (static_cast<float>(first_y) > range_.highest + kBand * 2.0F) return std::nullopt;
@@ -201,7 +201,7 @@ class ColumnMaker {
 
  private:
   [[nodiscard]] static std::size_t place(int x, int z) { return static_cast<std::size_t>(z * kChunkEdge + x); }
-  /// Returns true if a chunk lies at least `below` under the ground and above its bottom.
+  /// Returns true if a chunk lies at least `below` under the ground and above the bottom.
   [[nodiscard]] bool is_within(int first_y, float below) const {
     return range_.is_whole && static_cast<float>(first_y + kChunkEdge) + below <= range_.lowest &&
            first_y >= surface_.base + static_cast<int>(kBand) && is_far_from_border();
@@ -220,7 +220,7 @@ class ColumnMaker {
   [[nodiscard]] float density_at(int x, int y, int z) const {
     const int world_x = first_x_ + x;
     const int world_z = first_z_ + z;
-    // Where the ground ends, it does so halfway between a sample of it and one of air.
+    // The ground ends halfway between a ground sample and an air sample.
     constexpr float kHalf = 0.5F;
     float highest = -std::numeric_limits<float>::infinity();
     bool is_beside_void = false;
@@ -254,7 +254,7 @@ class ColumnMaker {
 Status make_ground(const Surface& surface, const TerrainTypes& types, bool is_field, Threads threads,
                    const Progress& progress, SceneGrid& content) {
   const IVec3 first{0, chunk_of(IVec3(surface.base - 1)).y, 0};
-  // The field goes on to where it is far air.
+  // Continues the field until it is far air.
   const IVec3 last = chunk_of({surface.width, surface.top + static_cast<int>(kBand) * 2, surface.depth});
   const std::size_t across = static_cast<std::size_t>(last.x) + 1;
   const std::size_t count = across * (static_cast<std::size_t>(last.z) + 1);

@@ -109,7 +109,7 @@ std::vector<std::byte> encode(int width, int height, std::span<const ExrChannel>
       data = halves.emplace_back(halves_of(channel.values)).data();
       size = sizeof(half);
     }
-    // It is only read; the slice's type does not say so.
+    // The data is only read, but the slice's type is not const.
     char* const base = static_cast<char*>(const_cast<void*>(data));  // NOLINT
     frame.insert(channel.name, imf::Slice(type, base, size, size * static_cast<std::size_t>(width)));
   }
@@ -136,7 +136,7 @@ bool has_exr() {
 
 #ifdef QUOIN_HAVE_OPENEXR
 
-// OpenEXR reports by exceptions; none leaves.
+// OpenEXR reports errors by exceptions, which must not leave this file.
 Result<RadianceImage> decode_exr(std::span<const std::byte> bytes, std::size_t max_pixels) {
   try {
     MemoryIn in(bytes);

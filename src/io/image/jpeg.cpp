@@ -27,7 +27,7 @@ Status check(const Image& picture, int quality) {
 
 #ifdef QUOIN_HAVE_JPEG
 
-// libjpeg's way to report: it must not return.
+// libjpeg's error handler, which must not return.
 struct Failure {
   jpeg_error_mgr errors;
   std::jmp_buf back;
@@ -39,7 +39,7 @@ struct Failure {
 
 void stay_silent(j_common_ptr) {}
 
-// Everything that libjpeg may jump out of; nothing here needs a destructor.
+// Contains everything that libjpeg may jump out of. Nothing here needs a destructor.
 bool encode(const Image& picture, int quality, jpeg_compress_struct& info, Failure& failure, unsigned char** bytes,
             unsigned long* size) {
   info.err = jpeg_std_error(&failure.errors);
@@ -54,7 +54,7 @@ bool encode(const Image& picture, int quality, jpeg_compress_struct& info, Failu
   info.in_color_space = JCS_RGB;
   jpeg_set_defaults(&info);
   jpeg_set_quality(&info, quality, TRUE);
-  // Voxels have edges of colour, which halved chroma would blur.
+  // Voxels have coloured edges, which halved chroma resolution would blur.
   info.comp_info[0].h_samp_factor = info.comp_info[0].v_samp_factor = 1;
   info.dct_method = JDCT_ISLOW;  // the same bytes on every machine
   jpeg_start_compress(&info, TRUE);
@@ -115,7 +115,7 @@ Result<std::vector<std::byte>> write_jpeg(const Image& picture, int quality) {
 
 namespace {
 
-// Everything that libjpeg may jump out of: to a size, then to pixels. Nothing here needs a destructor.
+// Contains everything that libjpeg may jump out of: first the size, then the pixels. Nothing here needs a destructor.
 bool read_header(std::span<const std::byte> bytes, jpeg_decompress_struct& info, Failure& failure) {
   info.err = jpeg_std_error(&failure.errors);
   failure.errors.error_exit = jump_back;
@@ -148,7 +148,7 @@ Result<AlphaImage> decode_jpeg(std::span<const std::byte> bytes) {
   AlphaImage image;
   bool done = read_header(bytes, info, failure);
   const std::size_t pixels = std::size_t{info.image_width} * info.image_height;
-  // A file of so many bytes has no more pixels than blocks, and half a bit takes one.
+  // A block takes at least half a bit, which limits the number of pixels by the file size.
   const bool is_small = pixels <= kMostPicturePixels && pixels / 1024 <= bytes.size();
   if (done && is_small) {
     image = {static_cast<int>(info.image_width), static_cast<int>(info.image_height), {}};

@@ -17,21 +17,21 @@ constexpr bool is_blank(char c) {
   return c == ' ' || c == '\n' || c == '\r' || c == '\t';
 }
 
-/// The words of a PFM's header: each ends at a blank, the last one at exactly one.
+/// Reads the words of a PFM header. Each ends at blanks, the last at exactly one blank.
 class HeaderReader {
  public:
   explicit HeaderReader(std::span<const std::byte> bytes)
       : text_(reinterpret_cast<const char*>(bytes.data()), bytes.size()) {}
 
-  /// The offset of the last word, and the position where the search for the next starts.
+  /// The offset of the last word, and the position where the search for the next one starts.
   [[nodiscard]] std::size_t word_at() const { return word_at_; }
   [[nodiscard]] std::size_t position() const { return position_; }
 
-  /// The next word, empty at the end; with the one blank behind it taken too.
+  /// Returns the next word and skips the one blank after it; empty at the end.
   std::string_view word() {
     while (position_ < text_.size() && is_blank(text_[position_])) ++position_;
     word_at_ = position_;
-    // No number of use is longer; a file without blanks need not be read to its end.
+    // No valid number is longer, so files without blanks are not read to the end.
     constexpr std::size_t kLongest = 64;
     while (position_ < text_.size() && position_ - word_at_ < kLongest && !is_blank(text_[position_])) ++position_;
     const std::string_view found = text_.substr(word_at_, position_ - word_at_);

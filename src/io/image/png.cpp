@@ -40,14 +40,14 @@ void stay_silent(png_structp, png_const_charp) {}
   png_longjmp(png, 1);
 }
 
-/// Pictures of voxels are patches of one colour: unfiltered rows take half the time of filtered ones and give a quarter
-/// fewer bytes; level 3 takes 16 ms for 1280 x 720 pixels, level 6 twice that for a tenth less.
+/// Voxel images are patches of one colour. Unfiltered rows take half the time of filtered ones and a quarter fewer
+/// bytes. Level 3 takes 16 ms for 1280 x 720 pixels; level 6 takes twice as long and saves a tenth.
 void set_effort(png_structp png, PngEffort effort) {
   png_set_compression_level(png, effort == PngEffort::Quick ? 3 : 9);
   png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_NONE);
 }
 
-/// Everything that libpng may jump out of; nothing here needs a destructor.
+/// Contains everything that libpng may jump out of. Nothing here needs a destructor.
 bool write_image(png_structp png, png_infop info, const PngImage& image, PngEffort effort,
                  std::vector<std::byte>& out) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
@@ -88,7 +88,7 @@ Result<PngImage> decode_png(std::span<const std::byte> file) {
     png_image_free(&header);
     return make_error(ErrorCode::LimitExceeded, "the PNG has more than 2^28 pixels");
   }
-  // Deflate makes at most 1,032 bytes of one, and a pixel takes a bit or more.
+  // Deflate expands a byte to at most 1,032 bytes, and a pixel takes at least a bit.
   if (std::uint64_t{header.width} * header.height > std::uint64_t{8} * 1032 * file.size()) {
     png_image_free(&header);
     return make_error(ErrorCode::BadFormat, "not a readable PNG: it claims more pixels than its bytes can hold");
@@ -116,7 +116,7 @@ void take_bytes(png_structp png, png_bytep out, std::size_t size) {
   input.left = input.left.subspan(size);
 }
 
-/// Keeps the reason, and jumps back.
+/// Keeps the error message, and jumps back.
 [[noreturn]] void keep_reason(png_structp png, png_const_charp reason) {
   auto& kept = *static_cast<std::array<char, 128>*>(png_get_error_ptr(png));
   for (std::size_t i = 0; i + 1 < kept.size() && reason[i] != '\0'; ++i) {
@@ -126,7 +126,7 @@ void take_bytes(png_structp png, png_bytep out, std::size_t size) {
   png_longjmp(png, 1);
 }
 
-/// Everything up to the pixels that libpng may jump out of; nothing here needs a destructor.
+/// Reads everything before the pixels that libpng may jump out of. Nothing here needs a destructor.
 bool read_header(png_structp png, png_infop info, Input& input, PngSamples& samples, int& passes) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
   png_set_read_fn(png, &input, take_bytes);
@@ -157,7 +157,7 @@ bool read_rows(png_structp png, int passes, PngSamples& samples) {
   return true;
 }
 
-/// libpng's reader, which ends with its scope.
+/// Destroys libpng's reader at the end of its scope.
 struct PngReader {
   std::array<char, 128> reason{};
   png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reason, keep_reason, stay_silent);
@@ -186,7 +186,7 @@ Result<PngSamples> decode_png_samples(std::span<const std::byte> file) {
   if (pixels > (std::uint64_t{1} << 28)) {
     return make_error(ErrorCode::LimitExceeded, "the PNG has more than 2^28 pixels");
   }
-  // Deflate makes at most 1,032 bytes of one, and a pixel takes a bit or more.
+  // Deflate expands a byte to at most 1,032 bytes, and a pixel takes at least a bit.
   if (pixels > std::uint64_t{8} * 1032 * file.size()) {
     return make_error(ErrorCode::BadFormat, "not a readable PNG: it claims more pixels than its bytes can hold");
   }

@@ -10,7 +10,7 @@
 
 namespace quoin {
 
-/// 8-bit pixels as PNG holds them: rows from the top, channels interleaved.
+/// 8-bit pixels in PNG order: rows from the top, channels interleaved.
 struct PngImage {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
@@ -25,7 +25,7 @@ struct PngImage {
 /// The compression effort for a small file.
 enum class PngEffort : std::uint8_t {
   Smallest,  ///< for palettes
-  Quick,     ///< for pictures: a third of the time, some 10 to 20 % more bytes
+  Quick,     ///< for images: a third of the time, some 10 to 20 % more bytes
 };
 
 /// Encodes a PNG file without colour-space chunks, so that readers use the numbers unchanged; the same bytes on every
@@ -44,10 +44,10 @@ enum class PngEffort : std::uint8_t {
 struct PngSamples {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
-  std::uint32_t channels = 1;  ///< 1 grey, 3 RGB; of palettes their colours; alpha is left out
-  std::uint32_t bits = 8;      ///< 8 (files of fewer bits too), or 16
+  std::uint32_t channels = 1;  ///< 1 grey, 3 RGB; palettes become colours; alpha is dropped
+  std::uint32_t bits = 8;      ///< 8 (also for files with fewer bits) or 16
   std::vector<std::byte>
-      bytes;  ///< rows from the top, channels interleaved; of 16 bits the more significant byte first
+      bytes;  ///< rows from the top, channels interleaved; 16-bit samples have the more significant byte first
 };
 
 /// Errors: as decode_png.

@@ -16,14 +16,15 @@ namespace quoin {
 namespace {
 
 constexpr std::size_t kMaxPixels = std::size_t{1} << 26;
-constexpr std::size_t kShortestRuns = 8;  // rows that are shorter, or longer than the next, are never in runs
+// Shorter and longer rows are never run-length encoded.
+constexpr std::size_t kShortestRuns = 8;
 constexpr std::size_t kLongestRuns = 32'767;
 
 Error bad(std::string message, std::size_t at) {
   return make_error(ErrorCode::BadFormat, std::move(message), {}, at);
 }
 
-// Of a Radiance picture: four bytes a pixel, three mantissas that share an exponent.
+// A Radiance image has four bytes per pixel: three mantissas and a shared exponent.
 class HdrReader {
  public:
   explicit HdrReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
@@ -33,7 +34,7 @@ class HdrReader {
     const std::size_t pixels = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
     if (pixels > kMaxPixels)
       return make_error(ErrorCode::LimitExceeded, "the image has more than 67,108,864 pixels", {}, at_);
-    // Runs make 127 bytes of two at most: a picture cannot be larger than that.
+    // Two bytes of runs give at most 127 bytes, which limits the number of pixels.
     if (pixels > 128 * (bytes_.size() - at_)) return bad("the file ends before the pixels", at_);
     RadianceImage image{width_, height_, {}};
     image.rgb.reserve(3 * pixels);
@@ -61,7 +62,7 @@ class HdrReader {
   }
 
   Status read_header() {
-    (void)line();  // "#?RADIANCE", which was looked at before
+    (void)line();  // "#?RADIANCE", already checked
     float shown = 1.0F;
     while (true) {
       if (at_ >= bytes_.size()) return bad("the header has no end", at_);
@@ -87,7 +88,7 @@ class HdrReader {
     return parse_float(text);
   }
 
-  // "-Y 512 +X 1024": from the top, from the left. Others are rare, and refused.
+  // "-Y 512 +X 1024": from the top, from the left. Other orders are rare and rejected.
   Status read_size(std::size_t begin, std::string_view text) {
     const std::size_t x_at = text.find(" +X ");
     if (!text.starts_with("-Y ") || x_at == std::string_view::npos) {
@@ -131,7 +132,7 @@ class HdrReader {
     return {};
   }
 
-  // Each component for itself.
+  // Each component is encoded separately.
   Status read_runs(std::vector<std::uint8_t>& row) {
     const std::size_t width = row.size() / 4;
     for (std::size_t component = 0; component < 4; ++component) {
